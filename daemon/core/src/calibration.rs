@@ -1,0 +1,39 @@
+//! What a calibration says, as checked numbers. The file format is the `calibration` crate's.
+
+use glam::{DQuat, DVec2, DVec3};
+
+use crate::geometry::Lens;
+
+/// Everything that maintainers measure about one camera and one inertial unit on one mount.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calibration {
+    /// The camera's lens.
+    pub lens: Lens,
+    /// Standard deviation of the focal length, pixels.
+    pub focal_sigma_px: f64,
+    /// Rotation from the inertial unit's axes to the camera's.
+    pub camera_from_imu: DQuat,
+    /// Standard deviation of that rotation, radians, about the camera's x, y and z.
+    pub camera_from_imu_sigma: DVec3,
+    /// Add this to a frame's mid-exposure stamp to get the time on the inertial unit's (host-mapped) clock, nanoseconds.
+    pub time_offset_ns: i64,
+    /// Standard deviation of the time offset, nanoseconds.
+    pub time_offset_sigma_ns: i64,
+    /// Where the barrel points in the camera's picture: angles right of and below the optical axis, radians.
+    pub boresight: DVec2,
+    /// Standard deviation of the boresight, radians.
+    pub boresight_sigma: f64,
+    /// The muzzle in the camera's space, metres (parallax of camera and barrel).
+    pub muzzle_in_camera: DVec3,
+    /// The gyro's bias, rad/s in the unit's axes, to be subtracted.
+    pub gyro_bias: DVec3,
+    /// Standard deviation of the gyro's bias, rad/s.
+    pub gyro_bias_sigma: DVec3,
+}
+
+impl Calibration {
+    /// The barrel's direction in the camera's space, a unit vector.
+    pub fn bore_in_camera(&self) -> DVec3 {
+        DVec3::new(self.boresight.x.tan(), self.boresight.y.tan(), 1.0).normalize()
+    }
+}

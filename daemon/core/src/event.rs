@@ -1,0 +1,214 @@
+//! The one vocabulary of what the hardware tells the trainer. Devices and simulated hardware both speak it.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3};
+
+use crate::time::Time;
+
+/// Something that a device reported.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// One measurement of the inertial unit.
+    Imu(ImuSample),
+    /// One picture of the camera.
+    Frame(CameraFrame),
+    /// The trigger was pressed or released.
+    Trigger(TriggerEdge),
+}
+
+impl Event {
+    /// When the event reached the host; the order in which a session meets events.
+    pub fn arrival(&self) -> Time {
+        match self {
+            Self::Imu(s) => s.arrival,
+            Self::Frame(f) => f.arrival,
+            Self::Trigger(t) => t.time,
+        }
+    }
+}
+
+/// One measurement of the inertial unit, in the unit's own axes ("imu" frame).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImuSample {
+    /// When the last byte of the packet reached the host.
+    pub arrival: Time,
+    /// The unit's own clock, nanoseconds since its start-up.
+    pub device_time_ns: i64,
+    /// Angular rate, rad/s.
+    pub rate: DVec3,
+    /// Specific force (what an accelerometer feels: +g upwards at rest), m/s^2.
+    pub accel: DVec3,
+    /// The unit's own estimate `world_from_imu` (world: x east, y north, z up), where it gives one.
+    pub world_from_imu: Option<DQuat>,
+}
+
+impl ImuSample {
+    /// Whether every number in the sample is finite.
+    pub fn is_finite(&self) -> bool {
+        self.rate.is_finite()
+            && self.accel.is_finite()
+            && self.world_from_imu.is_none_or(|q| q.is_finite() && q.length() > 0.5)
+    }
+}
+
+/// How the bytes of a picture are laid out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PixelFormat {
+    /// 4:2:2 packed, Y0 U Y1 V, limited-range BT.601, two bytes a pixel. Even width.
+    Yuyv,
+    /// 4:2:0, a full plane of Y, then a half-size plane of interleaved U V; limited-range BT.601. Even width and height.
+    Nv12,
+    /// 8-bit sRGB, three bytes a pixel.
+    Rgb,
+}
+
+impl PixelFormat {
+    /// Bytes of a `width` x `height` picture without padding.
+    pub const fn byte_len(self, width: u32, height: u32) -> usize {
+        let pixels = width as usize * height as usize;
+        match self {
+            Self::Yuyv => pixels * 2,
+            Self::Nv12 => pixels + pixels / 2,
+            Self::Rgb => pixels * 3,
+        }
+    }
+}
+
+/// A picture as the camera delivered it, rows from the top, no padding.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Picture {
+    format: PixelFormat,
+    width: u32,
+    height: u32,
+    bytes: Arc<[u8]>,
+}
+
+/// Why bytes are no picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PictureError {
+    /// The byte count does not belong to the size.
+    #[error("a {width}x{height} {format:?} picture has {expected} bytes, got {actual}")]
+    Length {
+        /// Stated format.
+        format: PixelFormat,
+        /// Stated width in pixels.
+        width: u32,
+        /// Stated height in pixels.
+        height: u32,
+        /// Bytes such a picture has.
+        expected: usize,
+        /// Bytes given.
+        actual: usize,
+    },
+    /// Zero, odd where the format needs even, or beyond 8192 pixels.
+    #[error("{width}x{height} is no usable size for {format:?} (1 to 8192 pixels; even where chroma is shared)")]
+    Size {
+        /// Stated format.
+        format: PixelFormat,
+        /// Stated width in pixels.
+        width: u32,
+        /// Stated height in pixels.
+        height: u32,
+    },
+}
+
+impl Picture {
+    /// Wraps `bytes` after checking that they are a `width` x `height` picture of that format.
+    pub fn new(format: PixelFormat, width: u32, height: u32, bytes: Arc<[u8]>) -> Result<Self, PictureError> {
+        let even = |v: u32| v.is_multiple_of(2);
+        let in_range = (1..=8192).contains(&width) && (1..=8192).contains(&height);
+        let parity = match format {
+            PixelFormat::Yuyv => even(width),
+            PixelFormat::Nv12 => even(width) && even(height),
+            PixelFormat::Rgb => true,
+        };
+        if !in_range || !parity {
+            return Err(PictureError::Size { format, width, height });
+        }
+        let expected = format.byte_len(width, height);
+        if bytes.len() != expected {
+            return Err(PictureError::Length { format, width, height, expected, actual: bytes.len() });
+        }
+        Ok(Self { format, width, height, bytes })
+    }
+
+    /// Byte layout.
+    pub const fn format(&self) -> PixelFormat {
+        self.format
+    }
+
+    /// Width in pixels.
+    pub const fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub const fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The bytes, rows from the top.
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    /// sRGB-coded colour of the pixel nearest to (`x`, `y`), clamped to the picture, each channel 0 to 1.
+    pub fn srgb_at(&self, x: u32, y: u32) -> [f32; 3] {
+        let (x, y) = (x.min(self.width - 1) as usize, y.min(self.height - 1) as usize);
+        let w = self.width as usize;
+        let b = &self.bytes;
+        match self.format {
+            PixelFormat::Rgb => {
+                let i = (y * w + x) * 3;
+                [b[i], b[i + 1], b[i + 2]].map(|v| f32::from(v) / 255.0)
+            }
+            PixelFormat::Yuyv => {
+                let i = (y * w + x / 2 * 2) * 2;
+                bt601_to_srgb(b[i + 2 * (x % 2)], b[i + 1], b[i + 3])
+            }
+            PixelFormat::Nv12 => {
+                let uv = w * self.height as usize + y / 2 * w + x / 2 * 2;
+                bt601_to_srgb(b[y * w + x], b[uv], b[uv + 1])
+            }
+        }
+    }
+}
+
+impl std::fmt::Debug for Picture {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Picture({:?} {}x{})", self.format, self.width, self.height)
+    }
+}
+
+/// Limited-range BT.601 to sRGB-coded RGB (ITU-R BT.601-7, 2.5), clamped to 0 to 1.
+pub fn bt601_to_srgb(y: u8, u: u8, v: u8) -> [f32; 3] {
+    let y = (f32::from(y) - 16.0) / 219.0;
+    let u = (f32::from(u) - 128.0) / 224.0;
+    let v = (f32::from(v) - 128.0) / 224.0;
+    [y + 1.402 * v, y - 0.344_136 * u - 0.714_136 * v, y + 1.772 * u].map(|c| c.clamp(0.0, 1.0))
+}
+
+/// One picture of the camera with its time.
+#[derive(Clone, Debug)]
+pub struct CameraFrame {
+    /// When the picture reached the host.
+    pub arrival: Time,
+    /// Middle of the exposure by the camera's time stamp; the calibrated offset to the inertial unit is not yet applied.
+    pub mid_exposure: Time,
+    /// The camera's frame counter.
+    pub sequence: u32,
+    /// The pixels.
+    pub picture: Picture,
+    /// The JPEG that the pixels were decoded from, kept so that a recording need not encode again.
+    pub jpeg: Option<Arc<[u8]>>,
+}
+
+/// The trigger was pressed or released.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TriggerEdge {
+    /// The kernel's time of the edge.
+    pub time: Time,
+    /// `true` for pressed.
+    pub pressed: bool,
+}

@@ -1,0 +1,14 @@
+//! The trainer without hardware: no I/O, no clock, no threads, no `unsafe`.
+//!
+//! Events of the devices go in ([`event`]), what is to be drawn ([`scene`]) and recorded ([`score`]) comes out.
+
+#![forbid(unsafe_code)]
+
+pub mod calibration;
+pub mod event;
+pub mod geometry;
+pub mod model;
+pub mod scene;
+pub mod score;
+pub mod sea;
+pub mod time;

@@ -1,0 +1,285 @@
+//! What one frame shows: the session's output, the renderer's only input besides the picture.
+
+use glam::{DVec3, Vec3};
+
+use crate::{
+    geometry::{CameraPose, Lens, RigidPose},
+    model::ModelId,
+    sea::BeaufortForce,
+};
+
+/// One frame.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Counts from 0 within a session.
+    pub frame: u64,
+    /// Camera pose at the drawn picture's mid-exposure.
+    pub camera: CameraPose,
+    /// The lens as seen on the screen: [`Lens::covering`] the screen's size.
+    pub lens: Lens,
+    /// What is run for this frame and what is left out, one for each of [`Pass::ALL`], in that order.
+    pub passes: [PassDecision; Pass::COUNT],
+    /// Boats whose hull or reflection can be seen, farthest first.
+    pub boats: Vec<BoatView>,
+    /// Tracers and splashes in view, farthest first.
+    pub rounds: Vec<RoundView>,
+    /// Light on the boats.
+    pub light: Light,
+    /// How the sea mirrors.
+    pub water: Water,
+    /// The head-up display.
+    pub hud: Hud,
+}
+
+impl Scene {
+    /// Whether `pass` runs in this frame.
+    pub fn runs(&self, pass: Pass) -> bool {
+        self.passes[pass as usize] == PassDecision::Run
+    }
+}
+
+/// The passes in the order in which they run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Pass {
+    /// The camera's picture.
+    Video,
+    /// Boats mirrored in the sea, to a layer of its own.
+    Mirror,
+    /// The mirrored layer distorted and blended onto the sea; shadows on the water.
+    Water,
+    /// The boats.
+    Boats,
+    /// Tracers and splashes.
+    Rounds,
+    /// Text and state.
+    Hud,
+}
+
+impl Pass {
+    /// How many there are.
+    pub const COUNT: usize = 6;
+    /// All of them, in order.
+    pub const ALL: [Self; Self::COUNT] =
+        [Self::Video, Self::Mirror, Self::Water, Self::Boats, Self::Rounds, Self::Hud];
+
+    /// The name used in summaries.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Video => "video",
+            Self::Mirror => "mirror",
+            Self::Water => "water",
+            Self::Boats => "boats",
+            Self::Rounds => "rounds",
+            Self::Hud => "hud",
+        }
+    }
+}
+
+/// Whether a pass runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PassDecision {
+    /// It runs.
+    Run,
+    /// It does not, at no cost.
+    LeftOut(LeftOut),
+}
+
+/// Why a pass is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LeftOut {
+    /// The scenario has no boats.
+    NoBoats,
+    /// No boat is within the picture.
+    NoBoatInView,
+    /// No reflection or shadow of a boat falls within the picture.
+    NoReflectionInView,
+    /// Above Beaufort 4 no reflection is seen.
+    SeaTooRough,
+    /// The reflection is switched off.
+    ReflectionOff,
+    /// Neither reflection nor shadow is wanted.
+    NoReflectionNoShadow,
+    /// No tracer or splash is within the picture.
+    NoRoundInView,
+    /// The weapon has no rounds.
+    NoRounds,
+    /// No usable orientation: boats cannot be placed.
+    NoPose,
+}
+
+impl LeftOut {
+    /// The name used in summaries.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoBoats => "no_boats",
+            Self::NoBoatInView => "no_boat_in_view",
+            Self::NoReflectionInView => "no_reflection_in_view",
+            Self::SeaTooRough => "sea_above_beaufort_4",
+            Self::ReflectionOff => "reflection_off",
+            Self::NoReflectionNoShadow => "no_reflection_no_shadow",
+            Self::NoRoundInView => "no_round_in_view",
+            Self::NoRounds => "no_rounds",
+            Self::NoPose => "no_pose",
+        }
+    }
+}
+
+/// A rectangle of whole pixels on the screen; never empty, always inside the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelRect {
+    /// Left edge.
+    pub x: u32,
+    /// Upper edge.
+    pub y: u32,
+    /// At least 1.
+    pub width: u32,
+    /// At least 1.
+    pub height: u32,
+}
+
+/// A boat to draw.
+#[derive(Clone, Debug)]
+pub struct BoatView {
+    /// Index of the boat in the scenario.
+    pub boat: usize,
+    /// Its model.
+    pub model: ModelId,
+    /// Its pose at the picture's time; curvature of the sea already taken off its height.
+    pub pose: RigidPose,
+    /// Height of the mean water surface at the boat, same space as `pose`: hull below it is hidden, the mirror plane lies in it.
+    pub water_level: f64,
+    /// Pixels that the hull can cover (two pixels of margin included); `None` where only the reflection is in view.
+    pub hull: Option<PixelRect>,
+    /// Pixels that its reflection or shadow can reach, distortion and blur included; `None` where neither is drawn.
+    pub reflection: Option<PixelRect>,
+    /// Distance from the camera, metres.
+    pub range_m: f64,
+    /// Share of its light that haze replaces by the horizon's, 0 to 1.
+    pub haze: f32,
+    /// Beyond the sea horizon: hide what lies below the line of sight over it.
+    pub beyond_horizon: bool,
+}
+
+/// A tracer or a splash.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RoundView {
+    /// The streak of a round in flight over the picture's exposure.
+    Tracer {
+        /// Where the streak begins, world.
+        from: DVec3,
+        /// Where it ends, world.
+        to: DVec3,
+        /// Linear radiance relative to paper white at the video's exposure.
+        radiance: Vec3,
+    },
+    /// A column of water where a round struck the sea.
+    Splash {
+        /// Foot of the column, world.
+        at: DVec3,
+        /// Height now, metres.
+        height_m: f32,
+        /// Radius now, metres.
+        radius_m: f32,
+        /// 1 fresh, 0 gone.
+        opacity: f32,
+    },
+    /// Sparks where a round struck a boat.
+    Strike {
+        /// The place, world.
+        at: DVec3,
+        /// Radius now, metres.
+        radius_m: f32,
+        /// 1 fresh, 0 gone.
+        opacity: f32,
+    },
+}
+
+/// Light, linear, in units in which the video's white is 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Unit vector towards the sun, world.
+    pub sun_direction: DVec3,
+    /// Radiance of a white matt surface that faces the sun, without the sky; zero when the sun is down.
+    pub sun: Vec3,
+    /// Radiance of a white matt surface that sees only the upper sky.
+    pub sky: Vec3,
+    /// Radiance of the sky at the horizon: what haze adds and what the sea's lower hemisphere is mixed from.
+    pub horizon: Vec3,
+    /// Radiance that a surface gets from the sea below.
+    pub sea: Vec3,
+}
+
+/// How a boat's light is put onto the sea.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ReflectionMethod {
+    /// No reflection.
+    Off,
+    /// The plain mirror picture.
+    Mirror,
+    /// Nelson 2009, Full Reflection shader, eq. 4-6, singular cases as printed.
+    FullAsPrinted,
+    /// The same, singular cases mended and distances tied to the boat's size on the screen.
+    Full,
+}
+
+/// Nelson 2009, eq. 7-8: how a boat darkens the sea at its foot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ShadowLevel {
+    /// Level 0: none.
+    None,
+    /// Level 1: gradual.
+    Gradual,
+    /// Level 2: strong and short.
+    Strong,
+}
+
+/// How the sea mirrors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Water {
+    /// The method.
+    pub method: ReflectionMethod,
+    /// Wind force: which of the five parameterisations.
+    pub force: BeaufortForce,
+    /// How strong the shadow is.
+    pub shadow: ShadowLevel,
+}
+
+/// What the sailor is told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    /// Ready to train.
+    Ready,
+    /// The last round struck a part that counts.
+    Hit,
+    /// The last round missed.
+    Miss,
+    /// Rounds fired now are not scored.
+    NotScored {
+        /// Short cause, upper case.
+        cause: &'static str,
+        /// One thing to do.
+        action: &'static str,
+    },
+    /// Something is broken.
+    Fault {
+        /// Short cause, upper case.
+        cause: &'static str,
+        /// One thing to do.
+        action: &'static str,
+    },
+}
+
+/// The head-up display. The word TRAINING is always drawn and is no field.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hud {
+    /// State with colour, shape and word.
+    pub status: Status,
+    /// Rounds left in the belt.
+    pub rounds_left: u32,
+    /// Rounds fired.
+    pub shots: u32,
+    /// Rounds that struck.
+    pub hits: u32,
+    /// Seconds since the scenario began.
+    pub clock_s: f64,
+}

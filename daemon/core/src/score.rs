@@ -1,0 +1,75 @@
+//! What became of each virtual round: the records that outlive a session.
+
+use glam::DVec3;
+
+use crate::{model::Zone, time::Time};
+
+/// One virtual round, from trigger to end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShotRecord {
+    /// Counts from 1 within a session.
+    pub shot: u64,
+    /// When the round left the muzzle (the kernel's time of the trigger edge plus the weapon's cycle).
+    pub fired: Time,
+    /// Muzzle in the world, metres.
+    pub muzzle: DVec3,
+    /// Unit direction of the barrel in the world at that time, dispersion not included.
+    pub bore: DVec3,
+    /// Age of the newest pose measurement at that time, nanoseconds; negative where the pose was interpolated.
+    pub pose_age_ns: i64,
+    /// What became of it.
+    pub outcome: Outcome,
+}
+
+/// What became of a virtual round.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// It struck a boat.
+    Hit {
+        /// The boat's name in the scenario.
+        boat: String,
+        /// The part that was struck.
+        zone: Zone,
+        /// When it struck.
+        time: Time,
+        /// Distance from the muzzle, metres.
+        range_m: f64,
+        /// The point in the boat's space, metres.
+        point: DVec3,
+    },
+    /// It struck the sea or flew out of range.
+    Miss {
+        /// The boat that it came closest to, where there was one.
+        boat: Option<String>,
+        /// Closest distance to that boat's hull, metres.
+        miss_m: f64,
+        /// When it was closest.
+        time: Time,
+        /// Distance from the muzzle at that time, metres.
+        range_m: f64,
+    },
+    /// Fired while the trainer could not know where the barrel pointed.
+    NotScored {
+        /// Why, for the sailor.
+        cause: NotScored,
+    },
+}
+
+/// Why a round is not scored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum NotScored {
+    /// No orientation younger than 100 ms.
+    ImuStale,
+    /// No picture younger than 100 ms.
+    CameraStale,
+}
+
+impl NotScored {
+    /// The name used in databases and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ImuStale => "imu_stale",
+            Self::CameraStale => "camera_stale",
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Camera, serial line and trigger of the gun computer.

@@ -1,0 +1,1 @@
+//! Boats: parametric models built here, glTF read from anywhere.

@@ -1,0 +1,1 @@
+//! Simulated hardware: replays recordings and makes ones with known truth.

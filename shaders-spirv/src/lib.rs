@@ -1,0 +1,1 @@
+//! Shaders as SPIR-V and the structs they share with the host.
