@@ -4,10 +4,13 @@
 
 #![forbid(unsafe_code)]
 
+pub mod attitude;
 pub mod calibration;
+pub mod clock;
 pub mod event;
 pub mod geometry;
 pub mod model;
+pub mod pose;
 pub mod scene;
 pub mod score;
 pub mod sea;
