@@ -53,7 +53,11 @@ impl Attitude {
                     return None;
                 }
                 let turn = DQuat::from_scaled_axis((rate + last.rate) * 0.5 * (dt_ns as f64 * 1e-9));
-                *last = OrientationSample { time, world_from_imu: (last.world_from_imu * turn).normalize(), rate };
+                *last = OrientationSample {
+                    time,
+                    world_from_imu: (last.world_from_imu * turn).normalize(),
+                    rate,
+                };
                 Some(*last)
             }
             State::Levelling { since, sum, count } => {
@@ -107,7 +111,9 @@ mod tests {
     #[test]
     fn integrates_a_coning_motion() {
         // Orientation about a fixed tilt that precesses: the worst case for integrating rates axis by axis.
-        let at = |t: f64| DQuat::from_rotation_z(0.5 * t) * DQuat::from_rotation_x(0.3) * DQuat::from_rotation_z(2.0 * t);
+        let at = |t: f64| {
+            DQuat::from_rotation_z(0.5 * t) * DQuat::from_rotation_x(0.3) * DQuat::from_rotation_z(2.0 * t)
+        };
         let rate = |t: f64| {
             let h = 1e-6;
             (at(t - h).inverse() * at(t + h)).to_scaled_axis() / (2.0 * h)

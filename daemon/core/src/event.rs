@@ -102,7 +102,9 @@ pub enum PictureError {
         actual: usize,
     },
     /// Zero, odd where the format needs even, or beyond 8192 pixels.
-    #[error("{width}x{height} is no usable size for {format:?} (1 to 8192 pixels; even where chroma is shared)")]
+    #[error(
+        "{width}x{height} is no usable size for {format:?} (1 to 8192 pixels; even where chroma is shared)"
+    )]
     Size {
         /// Stated format.
         format: PixelFormat,

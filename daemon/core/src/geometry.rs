@@ -16,6 +16,11 @@ pub fn horizon_dip(height_m: f64) -> f64 {
     (2.0 * height_m.max(0.0) * (1.0 - REFRACTION) / EARTH_RADIUS_M).sqrt()
 }
 
+/// Distance along the sea to its visible horizon, metres, for an eye `height_m` above it.
+pub fn horizon_distance(height_m: f64) -> f64 {
+    horizon_dip(height_m) * EARTH_RADIUS_M / (1.0 - REFRACTION)
+}
+
 /// How far the sea surface has dropped below the tangent plane at `distance_m`, refraction included, metres.
 pub fn curvature_drop(distance_m: f64) -> f64 {
     distance_m * distance_m * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M)
@@ -26,7 +31,10 @@ pub fn curvature_drop(distance_m: f64) -> f64 {
 pub fn look(azimuth: f64, elevation: f64, roll: f64) -> DQuat {
     // Level camera that looks north: x east, y down, z north.
     let level = DQuat::from_mat3(&DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y));
-    DQuat::from_rotation_z(-azimuth) * level * DQuat::from_rotation_x(elevation) * DQuat::from_rotation_z(roll)
+    DQuat::from_rotation_z(-azimuth)
+        * level
+        * DQuat::from_rotation_x(elevation)
+        * DQuat::from_rotation_z(roll)
 }
 
 /// Pinhole with radial and tangential distortion (Brown-Conrady, as OpenCV's first five coefficients without k3).
@@ -161,5 +169,57 @@ impl RigidPose {
     /// A world point in the body's space.
     pub fn to_body(&self, world: DVec3) -> DVec3 {
         self.world_from_body.inverse() * (world - self.position)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_horizon_of_a_ten_metre_eye() {
+        // Bowditch: dip 1.76' * sqrt(h), distance 2.08 nautical miles * sqrt(h), h in metres.
+        let (dip, distance) = (horizon_dip(10.0), horizon_distance(10.0));
+        assert!((dip.to_degrees() * 60.0 - 1.76 * 10f64.sqrt()).abs() < 0.1, "{dip}");
+        assert!((distance / 1852.0 - 2.08 * 10f64.sqrt()).abs() < 0.1, "{distance}");
+        // Seen from the eye, the sea at that distance lies just at the dip.
+        let angle = (10.0 + curvature_drop(distance)) / distance;
+        assert!((angle - dip).abs() < 1e-5);
+    }
+
+    #[test]
+    fn looking_east_and_up() {
+        let q = look(90f64.to_radians(), 0.1, 0.0);
+        let forward = q * DVec3::Z;
+        assert!((forward - DVec3::new(0.1f64.cos(), 0.0, 0.1f64.sin())).length() < 1e-12);
+        // Rolled clockwise, the camera's right side points down.
+        assert!((look(0.0, 0.0, 0.2) * DVec3::X).z < 0.0);
+    }
+
+    proptest! {
+        #[test]
+        fn unproject_inverts_project(
+            x in 0.0..1280.0f64, y in 0.0..720.0f64, k1 in -0.2..0.2f64, k2 in -0.02..0.02f64,
+            p1 in -0.005..0.005f64, p2 in -0.005..0.005f64,
+        ) {
+            let mut lens = Lens::pinhole(1280, 720, 1.0);
+            lens.radial = DVec2::new(k1, k2);
+            lens.tangential = DVec2::new(p1, p2);
+            let pixel = DVec2::new(x, y);
+            let back = lens.project(lens.unproject(pixel) * 37.0).unwrap();
+            prop_assert!(back.distance(pixel) < 1e-6, "{back} {pixel}");
+        }
+
+        #[test]
+        fn covering_scales_about_the_centre(w in 16u32..4000, h in 16u32..4000) {
+            let lens = Lens::pinhole(1280, 720, 1.0);
+            let screen = lens.covering(w, h);
+            let axis = screen.project(DVec3::Z).unwrap();
+            prop_assert!(axis.distance(DVec2::new(f64::from(w), f64::from(h)) / 2.0) < 1e-9);
+            // Both sides of the picture reach at least the screen's edge.
+            let scale = screen.focal.x / lens.focal.x;
+            prop_assert!(1280.0 * scale >= f64::from(w) - 1e-6 && 720.0 * scale >= f64::from(h) - 1e-6);
+        }
     }
 }

@@ -205,10 +205,7 @@ mod tests {
             h.at(Time::from_ns(newest + 20_000_000)).unwrap().provenance,
             Provenance::Predicted { age_ns: 20_000_000 }
         );
-        assert_eq!(
-            h.at(Time::from_ns(newest + STALE_NS + 1)),
-            Err(NoPose::Stale { age_ns: STALE_NS + 1 })
-        );
+        assert_eq!(h.at(Time::from_ns(newest + STALE_NS + 1)), Err(NoPose::Stale { age_ns: STALE_NS + 1 }));
         assert_eq!(h.at(Time::from_ns(-5)), Err(NoPose::TooOld { ns: 5 }));
         assert_eq!(PoseHistory::new().at(Time::from_ns(0)), Err(NoPose::Empty));
     }
