@@ -18,3 +18,4 @@ pub mod score;
 pub mod sea;
 pub mod time;
 pub mod view;
+pub mod weapon;
