@@ -1,0 +1,315 @@
+//! From TOML text to checked numbers.
+
+use bowwave_core::{calibration::Calibration, geometry::Lens};
+use glam::{DQuat, DVec2, DVec3};
+use serde::Deserialize;
+use toml::{Spanned, value::Datetime};
+
+use crate::{CalibrationError, CalibrationFile, Date, Provenance};
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawFile {
+    made: Spanned<Datetime>,
+    source: String,
+    #[serde(default)]
+    camera_name: String,
+    #[serde(default)]
+    camera_serial: String,
+    #[serde(default)]
+    imu_name: String,
+    #[serde(default)]
+    imu_serial: String,
+    lens: RawLens,
+    camera_from_imu: RawRotation,
+    time_offset: RawTimeOffset,
+    boresight: RawBoresight,
+    gyro_bias: RawGyroBias,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawLens {
+    size_px: Spanned<[u32; 2]>,
+    focal_px: Spanned<[f64; 2]>,
+    focal_sigma_px: Spanned<f64>,
+    centre_px: Spanned<[f64; 2]>,
+    radial: Spanned<[f64; 2]>,
+    tangential: Spanned<[f64; 2]>,
+    measured: Spanned<Datetime>,
+    #[serde(default)]
+    how: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawRotation {
+    rotation_wxyz: Spanned<[f64; 4]>,
+    sigma_mrad: Spanned<[f64; 3]>,
+    measured: Spanned<Datetime>,
+    #[serde(default)]
+    how: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawTimeOffset {
+    offset_ms: Spanned<f64>,
+    sigma_ms: Spanned<f64>,
+    measured: Spanned<Datetime>,
+    #[serde(default)]
+    how: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawBoresight {
+    right_deg: Spanned<f64>,
+    down_deg: Spanned<f64>,
+    sigma_mrad: Spanned<f64>,
+    muzzle_m: Spanned<[f64; 3]>,
+    measured: Spanned<Datetime>,
+    #[serde(default)]
+    how: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawGyroBias {
+    bias_deg_per_s: Spanned<[f64; 3]>,
+    sigma_deg_per_s: Spanned<[f64; 3]>,
+    measured: Spanned<Datetime>,
+    #[serde(default)]
+    how: String,
+}
+
+/// Reads a calibration; `origin` (a file name, usually) stands at the head of error messages.
+pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationError> {
+    let at = Place { text, origin };
+    let raw: RawFile = toml::from_str(text).map_err(|e| at.syntax(&e))?;
+    Ok(CalibrationFile {
+        made: at.date("made", &raw.made)?,
+        lens: at.provenance("lens.measured", &raw.lens.measured, &raw.lens.how)?,
+        camera_from_imu: at.provenance(
+            "camera_from_imu.measured",
+            &raw.camera_from_imu.measured,
+            &raw.camera_from_imu.how,
+        )?,
+        time_offset: at.provenance(
+            "time_offset.measured",
+            &raw.time_offset.measured,
+            &raw.time_offset.how,
+        )?,
+        boresight: at.provenance("boresight.measured", &raw.boresight.measured, &raw.boresight.how)?,
+        gyro_bias: at.provenance("gyro_bias.measured", &raw.gyro_bias.measured, &raw.gyro_bias.how)?,
+        calibration: at.calibration(&raw)?,
+        source: raw.source,
+        camera_name: raw.camera_name,
+        camera_serial: raw.camera_serial,
+        imu_name: raw.imu_name,
+        imu_serial: raw.imu_serial,
+    })
+}
+
+/// Milliradians to radians; the writer's inverse must be the inverse of just this.
+pub(crate) fn radians_from_mrad(mrad: f64) -> f64 {
+    mrad / 1000.0
+}
+
+/// Milliseconds to whole nanoseconds.
+pub(crate) fn ns_from_ms(ms: f64) -> i64 {
+    (ms * 1e6).round() as i64
+}
+
+/// How far a quaternion's length may be off before it is taken for a typing error, and from where it is left as it stands.
+const NORM_TOLERANCE: f64 = 1e-3;
+const NORM_EXACT: f64 = 1e-14;
+
+struct Place<'a> {
+    text: &'a str,
+    origin: &'a str,
+}
+
+impl Place<'_> {
+    fn line_column(&self, offset: usize) -> (usize, usize) {
+        let before = self.text.get(..offset.min(self.text.len())).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        let start = before.rfind('\n').map_or(0, |i| i + 1);
+        (line, before.get(start..).map_or(0, |s| s.chars().count()) + 1)
+    }
+
+    fn syntax(&self, e: &toml::de::Error) -> CalibrationError {
+        let (line, column) = self.line_column(e.span().map_or(0, |s| s.start));
+        let message = e.message().lines().collect::<Vec<_>>().join(" ");
+        CalibrationError::Syntax { origin: self.origin.to_owned(), line, column, message }
+    }
+
+    fn refuse<T>(&self, key: &'static str, at: &Spanned<T>, problem: impl Into<String>) -> CalibrationError {
+        let (line, column) = self.line_column(at.span().start);
+        CalibrationError::Value { origin: self.origin.to_owned(), line, column, key, problem: problem.into() }
+    }
+
+    fn date(&self, key: &'static str, raw: &Spanned<Datetime>) -> Result<Date, CalibrationError> {
+        let value = raw.get_ref();
+        if value.time.is_some() || value.offset.is_some() {
+            return Err(self.refuse(key, raw, format!("is {value}, but must be a date without a time")));
+        }
+        value
+            .date
+            .and_then(|d| Date::new(d.year, d.month, d.day))
+            .ok_or_else(|| self.refuse(key, raw, format!("is {value}, but must be a day of the calendar")))
+    }
+
+    fn provenance(
+        &self,
+        key: &'static str,
+        measured: &Spanned<Datetime>,
+        how: &str,
+    ) -> Result<Provenance, CalibrationError> {
+        Ok(Provenance::new(self.date(key, measured)?, how))
+    }
+
+    /// Every number within `low..=high`, which no NaN is.
+    fn within<const N: usize>(
+        &self,
+        key: &'static str,
+        raw: &Spanned<[f64; N]>,
+        low: f64,
+        high: f64,
+    ) -> Result<[f64; N], CalibrationError> {
+        let values = *raw.get_ref();
+        match values.iter().find(|v| !(low..=high).contains(*v)) {
+            Some(v) => Err(self.refuse(key, raw, format!("has {v}, but must lie within {low} and {high}"))),
+            None => Ok(values),
+        }
+    }
+
+    fn one_within(
+        &self,
+        key: &'static str,
+        raw: &Spanned<f64>,
+        low: f64,
+        high: f64,
+    ) -> Result<f64, CalibrationError> {
+        let value = *raw.get_ref();
+        if (low..=high).contains(&value) {
+            Ok(value)
+        } else {
+            Err(self.refuse(key, raw, format!("is {value}, but must lie within {low} and {high}")))
+        }
+    }
+
+    /// Standard deviations: above zero and at most `high`.
+    fn sigma<const N: usize>(
+        &self,
+        key: &'static str,
+        raw: &Spanned<[f64; N]>,
+        high: f64,
+    ) -> Result<[f64; N], CalibrationError> {
+        let values = *raw.get_ref();
+        match values.iter().find(|v| !(**v > 0.0 && **v <= high)) {
+            Some(v) => Err(self.refuse(key, raw, format!("has {v}, but must be above 0 and at most {high}"))),
+            None => Ok(values),
+        }
+    }
+
+    fn one_sigma(&self, key: &'static str, raw: &Spanned<f64>, high: f64) -> Result<f64, CalibrationError> {
+        let value = *raw.get_ref();
+        if value > 0.0 && value <= high {
+            Ok(value)
+        } else {
+            Err(self.refuse(key, raw, format!("is {value}, but must be above 0 and at most {high}")))
+        }
+    }
+
+    fn calibration(&self, raw: &RawFile) -> Result<Calibration, CalibrationError> {
+        let offset_ms =
+            self.one_within("time_offset.offset_ms", &raw.time_offset.offset_ms, -10_000.0, 10_000.0)?;
+        let time_offset_sigma_ns =
+            ns_from_ms(self.one_sigma("time_offset.sigma_ms", &raw.time_offset.sigma_ms, 10_000.0)?);
+        if time_offset_sigma_ns < 1 {
+            return Err(self.refuse(
+                "time_offset.sigma_ms",
+                &raw.time_offset.sigma_ms,
+                "is below a nanosecond, the resolution of all times",
+            ));
+        }
+        let right = self.one_within("boresight.right_deg", &raw.boresight.right_deg, -80.0, 80.0)?;
+        let down = self.one_within("boresight.down_deg", &raw.boresight.down_deg, -80.0, 80.0)?;
+        let bias = self.within("gyro_bias.bias_deg_per_s", &raw.gyro_bias.bias_deg_per_s, -100.0, 100.0)?;
+        let bias_sigma = self.sigma("gyro_bias.sigma_deg_per_s", &raw.gyro_bias.sigma_deg_per_s, 100.0)?;
+        let rotation_sigma =
+            self.sigma("camera_from_imu.sigma_mrad", &raw.camera_from_imu.sigma_mrad, 4000.0)?;
+        let boresight_sigma = self.one_sigma("boresight.sigma_mrad", &raw.boresight.sigma_mrad, 4000.0)?;
+        Ok(Calibration {
+            lens: self.lens(&raw.lens)?,
+            focal_sigma_px: self.one_sigma("lens.focal_sigma_px", &raw.lens.focal_sigma_px, 1e5)?,
+            camera_from_imu: self.rotation(&raw.camera_from_imu.rotation_wxyz)?,
+            camera_from_imu_sigma: DVec3::from_array(rotation_sigma.map(radians_from_mrad)),
+            time_offset_ns: ns_from_ms(offset_ms),
+            time_offset_sigma_ns,
+            boresight: DVec2::new(right.to_radians(), down.to_radians()),
+            boresight_sigma: radians_from_mrad(boresight_sigma),
+            muzzle_in_camera: DVec3::from_array(self.within(
+                "boresight.muzzle_m",
+                &raw.boresight.muzzle_m,
+                -100.0,
+                100.0,
+            )?),
+            gyro_bias: DVec3::from_array(bias.map(f64::to_radians)),
+            gyro_bias_sigma: DVec3::from_array(bias_sigma.map(f64::to_radians)),
+        })
+    }
+
+    fn rotation(&self, raw: &Spanned<[f64; 4]>) -> Result<DQuat, CalibrationError> {
+        let key = "camera_from_imu.rotation_wxyz";
+        let [w, x, y, z] = self.within(key, raw, -1.0 - NORM_TOLERANCE, 1.0 + NORM_TOLERANCE)?;
+        let q = DQuat::from_xyzw(x, y, z, w);
+        let excess = (q.length() - 1.0).abs();
+        if excess > NORM_TOLERANCE {
+            let problem = format!("has length {:.6}, but a rotation's quaternion has length 1", q.length());
+            return Err(self.refuse(key, raw, problem));
+        }
+        // Numbers written with full precision stay as they are to the last bit.
+        Ok(if excess <= NORM_EXACT { q } else { q.normalize() })
+    }
+
+    fn lens(&self, raw: &RawLens) -> Result<Lens, CalibrationError> {
+        let [width, height] = *raw.size_px.get_ref();
+        if !(1..=8192).contains(&width) || !(1..=8192).contains(&height) {
+            let problem = format!("is {width} x {height}, but both must be 1 to 8192");
+            return Err(self.refuse("lens.size_px", &raw.size_px, problem));
+        }
+        let (w, h) = (f64::from(width), f64::from(height));
+        let centre = DVec2::from_array(self.within("lens.centre_px", &raw.centre_px, -8192.0, 16_384.0)?);
+        if !(0.0..=w).contains(&centre.x) || !(0.0..=h).contains(&centre.y) {
+            let problem = format!("is outside the picture of {width} x {height} pixels");
+            return Err(self.refuse("lens.centre_px", &raw.centre_px, problem));
+        }
+        let lens = Lens {
+            width,
+            height,
+            focal: DVec2::from_array(self.sigma("lens.focal_px", &raw.focal_px, 1e6)?),
+            centre,
+            radial: DVec2::from_array(self.within("lens.radial", &raw.radial, -100.0, 100.0)?),
+            tangential: DVec2::from_array(self.within("lens.tangential", &raw.tangential, -10.0, 10.0)?),
+        };
+        if let Some(corner) = unseen_corner(&lens) {
+            let problem = format!(
+                "makes no picture of {width} x {height} pixels: no direction falls on the corner ({}, {}), the distortion \
+                 folds back or grows too fast before it",
+                corner.x, corner.y
+            );
+            return Err(self.refuse("lens.radial", &raw.radial, problem));
+        }
+        Ok(lens)
+    }
+}
+
+/// A corner of the picture that does not come back to itself through the lens: the distortion folds back inside the picture.
+fn unseen_corner(lens: &Lens) -> Option<DVec2> {
+    let (w, h) = (f64::from(lens.width), f64::from(lens.height));
+    [DVec2::ZERO, DVec2::new(w, 0.0), DVec2::new(0.0, h), DVec2::new(w, h)]
+        .into_iter()
+        .find(|corner| !lens.project(lens.unproject(*corner)).is_some_and(|p| p.distance(*corner) < 0.01))
+}
