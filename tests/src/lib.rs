@@ -1,1 +1,1 @@
-//! Tests of the whole.
+//! Tests of the whole: what no single crate can check. They live in `tests/`.
