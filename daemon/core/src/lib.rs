@@ -9,6 +9,7 @@ pub mod calibration;
 pub mod clock;
 pub mod event;
 pub mod geometry;
+pub mod gunnery;
 pub mod light;
 pub mod model;
 pub mod pacing;
@@ -19,3 +20,6 @@ pub mod sea;
 pub mod time;
 pub mod view;
 pub mod weapon;
+
+#[cfg(test)]
+mod test_data;

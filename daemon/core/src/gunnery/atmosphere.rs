@@ -103,7 +103,10 @@ mod tests {
     fn heights_out_of_range_give_finite_air() {
         for height in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e300] {
             let air = Atmosphere::ICAO.at(height);
-            assert!(air.density_kg_m3.is_finite() && air.density_kg_m3 > 0.0 && air.sound_m_s > 200.0, "{height}");
+            assert!(
+                air.density_kg_m3.is_finite() && air.density_kg_m3 > 0.0 && air.sound_m_s > 200.0,
+                "{height}"
+            );
         }
     }
 

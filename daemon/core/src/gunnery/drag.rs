@@ -1,7 +1,8 @@
 //! Drag of the G7 standard projectile.
 
 /// Mach number and drag coefficient of the G7 standard projectile (public BRL/JBM tabulation).
-const G7: [(f64, f64); 79] = [
+#[rustfmt::skip] // Several pairs a line.
+const G7: [(f64, f64); 84] = [
     (0.000, 0.1198), (0.050, 0.1197), (0.100, 0.1196), (0.150, 0.1194), (0.200, 0.1193), (0.250, 0.1194),
     (0.300, 0.1194), (0.350, 0.1194), (0.400, 0.1193), (0.450, 0.1193), (0.500, 0.1194), (0.550, 0.1193),
     (0.600, 0.1194), (0.650, 0.1197), (0.700, 0.1202), (0.725, 0.1207), (0.750, 0.1215), (0.775, 0.1226),
