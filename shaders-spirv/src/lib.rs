@@ -1,1 +1,52 @@
-//! Shaders as SPIR-V and the structs they share with the host.
+//! The shaders as SPIR-V, and the structs that they share with the host.
+//!
+//! `glsl/` holds the sources, `spv/` what `./build` made of them. Variants are chosen by specialisation constants, so what a
+//! variant leaves out is not compiled by the driver.
+
+#![forbid(unsafe_code)]
+
+pub mod interface;
+
+/// One compiled shader.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shader {
+    /// Its file's name in `glsl/`.
+    pub name: &'static str,
+    /// SPIR-V, little endian words.
+    pub bytes: &'static [u8],
+}
+
+impl Shader {
+    /// The SPIR-V as words.
+    pub fn words(&self) -> Vec<u32> {
+        self.bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+    }
+}
+
+macro_rules! shaders {
+    ($($(#[$doc:meta])* $constant:ident = $name:literal;)+) => {
+        $($(#[$doc])* pub const $constant: Shader =
+            Shader { name: $name, bytes: include_bytes!(concat!("../spv/", $name, ".spv")) };)+
+        /// All of them.
+        pub const ALL: &[Shader] = &[$($constant),+];
+    };
+}
+
+shaders! {
+    /// A triangle that covers the screen.
+    SCREEN_VERT = "screen.vert";
+    /// Camera bytes to sRGB codes. Constants: 0 format (0 YUYV, 1 NV12, 2 RGB), 1 scaled.
+    VIDEO_FRAG = "video.frag";
+    /// A boat's corner to clip space.
+    BOAT_VERT = "boat.vert";
+    /// A boat's light. Constants: 0 textured, 1 samples.
+    BOAT_FRAG = "boat.frag";
+    /// A rectangle given in pixels.
+    RECT_VERT = "rect.vert";
+    /// The boats' layer, averaged. Constant: 0 samples.
+    COMPOSITE_FRAG = "composite.frag";
+    /// A rectangle of the head-up display.
+    HUD_VERT = "hud.vert";
+    /// A glyph or shape of the head-up display.
+    HUD_FRAG = "hud.frag";
+}

@@ -1,0 +1,17 @@
+// One drawn boat (set 0, binding 1). Directions and planes are in the boat's own space, so normals need no transform.
+struct BoatBlock {
+    vec4 camera_from_boat[3];  // rows
+    vec4 water_plane;          // dot(plane, (p, 1)): metres above the mean water
+    vec4 horizon_plane;        // positive above the line of sight over the sea's horizon
+    vec4 sun;                  // xyz: unit vector towards the sun
+    vec4 eye;                  // xyz: the eye; w: share of the light that haze replaces
+};
+
+layout(std430, set = 0, binding = 1) readonly buffer Boats {
+    BoatBlock boats[];
+};
+
+layout(push_constant) uniform DrawBlock {
+    vec4 rect;   // x0, y0, x1, y1 in pixels, for quads
+    uint index;  // which boat
+} draw;

@@ -1,0 +1,51 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "hud_block.glsl"
+
+layout(set = 1, binding = 0) uniform sampler2D glyphs;
+
+layout(location = 0) in vec2 uv;
+layout(location = 1) in vec2 local;
+layout(location = 2) flat in uint instance;
+
+layout(location = 0) out vec4 colour;
+
+// Distances in pixels, negative inside.
+float box(vec2 p, vec2 half_size, float radius) {
+    vec2 q = abs(p) - half_size + radius;
+    return length(max(q, 0.0)) + min(max(q.x, q.y), 0.0) - radius;
+}
+
+float triangle(vec2 p, float r) {
+    // Upright, its sides at 60 degrees, standing on the rectangle's lower edge.
+    vec2 q = vec2(abs(p.x), p.y);
+    return max(dot(q - vec2(0.0, -r), vec2(0.894427, -0.447214)), q.y - r);
+}
+
+float distance_to(uint shape, vec2 p, vec2 half_size, float edge) {
+    float r = min(half_size.x, half_size.y);
+    switch (shape) {
+        case SHAPE_PLATE: return box(p, half_size, edge);
+        case SHAPE_DISC: return length(p) - r;
+        case SHAPE_RING: return abs(length(p) - 0.75 * r) - 0.25 * r;
+        case SHAPE_CROSS: {
+            vec2 d = vec2(p.x + p.y, p.x - p.y) * 0.707107;
+            return min(box(d, vec2(1.25 * r, 0.28 * r), 0.0), box(d, vec2(0.28 * r, 1.25 * r), 0.0));
+        }
+        case SHAPE_TRIANGLE: return triangle(p, r);
+        default: return box(p, vec2(r), 0.0);
+    }
+}
+
+void main() {
+    HudQuad quad = quads[instance];
+    float cover;
+    if (quad.shape == SHAPE_GLYPH) {
+        cover = texture(glyphs, uv).r;
+    } else {
+        vec2 half_size = 0.5 * (quad.rect.zw - quad.rect.xy);
+        cover = clamp(0.5 - distance_to(quad.shape, local, half_size, quad.edge), 0.0, 1.0);
+    }
+    float alpha = quad.colour.a * cover;
+    colour = vec4(quad.colour.rgb * alpha, alpha);
+}
