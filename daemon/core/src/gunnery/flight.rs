@@ -7,7 +7,8 @@ use glam::DVec3;
 use super::{Atmosphere, GRAVITY_M_S2, g7_drag_coefficient};
 
 /// Step of the integrator, seconds. It holds the reference trajectories to 4 micrometres and, through the steep rise of
-/// drag at Mach 1, any flight of 5 s to half a millimetre; a second of flight costs 200 evaluations of the drag.
+/// drag at Mach 1, flights of 5 s to 3 mm (a round of 0.1 lb/in^2; others to 0.4 mm); a second of flight costs 200
+/// evaluations of the drag.
 pub const STEP_S: f64 = 0.02;
 /// kg/m^2 in one lb/in^2.
 const KG_M2_PER_LB_IN2: f64 = 0.453_592_37 / (0.0254 * 0.0254);

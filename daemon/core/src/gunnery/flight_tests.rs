@@ -123,7 +123,7 @@ fn halving_the_step_changes_nothing_that_matters() {
             worst = worst.max((coarse.position - fine.position).length());
         }
         eprintln!("bc {bc}, {v0} m/s, {elevation_deg} deg: worst {worst:.1e} m in 5 s");
-        assert!(worst < 1e-3, "bc {bc}, {v0} m/s, {elevation_deg} deg: {worst} m");
+        assert!(worst < 3e-3, "bc {bc}, {v0} m/s, {elevation_deg} deg: {worst} m");
     }
 }
 
