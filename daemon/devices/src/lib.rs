@@ -1,1 +1,14 @@
-//! Camera, serial line and trigger of the gun computer.
+//! Camera, serial line and trigger of the gun computer: everything that asks the kernel for something.
+//!
+//! The codecs ([`vectornav`], [`imu`]) are sans-io: bytes and a time of arrival in, samples out. The device layers around
+//! them ([`serial`], [`camera`], [`trigger`]) open nodes, report typed errors that say what to do, and hand events over
+//! in bounded queues. Nothing here knows a pose or a scene.
+
+pub mod camera;
+pub mod clock;
+pub mod imu;
+mod nodes;
+pub mod queue;
+pub mod serial;
+pub mod trigger;
+pub mod vectornav;

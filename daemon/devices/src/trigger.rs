@@ -1,0 +1,253 @@
+//! GPIO lines, one of which carries the trigger switch: which are there and whether one can be watched.
+
+use std::{
+    fs::File,
+    io,
+    path::{Path, PathBuf},
+};
+
+use gpio_cdev::{Chip, LineDirection};
+
+use crate::nodes;
+
+/// One line of a chip.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LineInfo {
+    /// Its number on the chip.
+    pub offset: u32,
+    /// Its name, where the board gives one.
+    pub name: Option<String>,
+    /// Who uses it now.
+    pub consumer: Option<String>,
+    /// Somebody uses it now.
+    pub used: bool,
+    /// It is an output now.
+    pub output: bool,
+}
+
+/// One chip.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChipInfo {
+    /// Its node, such as `/dev/gpiochip0`.
+    pub node: PathBuf,
+    /// The kernel's name for it.
+    pub name: String,
+    /// What the maker calls it.
+    pub label: String,
+    /// Its lines.
+    pub lines: Vec<LineInfo>,
+}
+
+/// Why the trigger line cannot be watched.
+#[derive(Debug, thiserror::Error)]
+pub enum TriggerError {
+    /// No such chip.
+    #[error("no GPIO chip {}: chips here: {present}; name one that is there", node.display())]
+    NotFound {
+        /// The name asked for.
+        node: PathBuf,
+        /// Chips that are there.
+        present: String,
+    },
+    /// The daemon's user may not open it.
+    #[error("may not open {}: add the user to group gpio (usermod -aG gpio USER), then log in again", node.display())]
+    Permission {
+        /// The name asked for.
+        node: PathBuf,
+    },
+    /// It does not answer as a GPIO chip.
+    #[error("{} is no GPIO chip ({source}): name one such as /dev/gpiochip0 (bowwave doctor lists them)", node.display())]
+    NotAChip {
+        /// The name asked for.
+        node: PathBuf,
+        /// What the GPIO layer says.
+        source: gpio_cdev::Error,
+    },
+    /// The chip has no such line.
+    #[error("{} has no line {line}: it has lines 0 to {last}, named {present}; give a number or a name", node.display())]
+    NoLine {
+        /// The chip.
+        node: PathBuf,
+        /// The line asked for.
+        line: String,
+        /// The chip's last line.
+        last: u32,
+        /// The names that are there.
+        present: String,
+    },
+    /// Somebody else uses the line.
+    #[error("line {line} of {} is in use by {consumer}: free it there, or wire the trigger to another", node.display())]
+    LineInUse {
+        /// The chip.
+        node: PathBuf,
+        /// The line asked for.
+        line: String,
+        /// Who uses it.
+        consumer: String,
+    },
+    /// A line does not tell what it is.
+    #[error("cannot read line {offset} of {}: {source}; look at the kernel's log (dmesg)", node.display())]
+    Line {
+        /// The chip.
+        node: PathBuf,
+        /// The line's number.
+        offset: u32,
+        /// What the GPIO layer says.
+        source: gpio_cdev::Error,
+    },
+    /// The kernel reports something else.
+    #[error("cannot open {}: {source}; look at the kernel's log (dmesg)", node.display())]
+    Io {
+        /// The name asked for.
+        node: PathBuf,
+        /// The kernel's answer.
+        source: io::Error,
+    },
+}
+
+/// Every GPIO chip of this computer: its lines, or why it cannot be opened.
+pub fn list() -> Vec<Result<ChipInfo, TriggerError>> {
+    let dev = Path::new("/dev");
+    match nodes::numbered(dev, "gpiochip") {
+        Ok(nodes) => nodes.iter().map(|node| describe(dev, node)).collect(),
+        Err(source) => vec![Err(TriggerError::Io { node: dev.to_owned(), source })],
+    }
+}
+
+/// Whether `line` (a name or a number) of the chip at `node` is there and free.
+pub fn check(node: &Path, line: &str) -> Result<LineInfo, TriggerError> {
+    check_in(Path::new("/dev"), node, line)
+}
+
+fn check_in(dev: &Path, node: &Path, line: &str) -> Result<LineInfo, TriggerError> {
+    find_line(&describe(dev, node)?, line)
+}
+
+/// The free line of `chip` that is called `line` or has that number.
+fn find_line(chip: &ChipInfo, line: &str) -> Result<LineInfo, TriggerError> {
+    let number = line.parse::<u32>().ok();
+    let found = chip
+        .lines
+        .iter()
+        .find(|l| l.name.as_deref() == Some(line))
+        .or_else(|| chip.lines.iter().find(|l| Some(l.offset) == number));
+    match found {
+        None => Err(TriggerError::NoLine {
+            node: chip.node.clone(),
+            line: line.to_owned(),
+            last: chip.lines.last().map_or(0, |l| l.offset),
+            present: nodes::listed(chip.lines.iter().filter_map(|l| l.name.clone())),
+        }),
+        Some(found) if found.used => Err(TriggerError::LineInUse {
+            node: chip.node.clone(),
+            line: line.to_owned(),
+            consumer: found.consumer.clone().unwrap_or_else(|| "the kernel".to_owned()),
+        }),
+        Some(found) => Ok(found.clone()),
+    }
+}
+
+fn describe(dev: &Path, node: &Path) -> Result<ChipInfo, TriggerError> {
+    let chip = open(dev, node)?;
+    let lines = chip
+        .lines()
+        .map(|line| {
+            let info = line.info().map_err(|source| TriggerError::Line {
+                node: node.to_owned(),
+                offset: line.offset(),
+                source,
+            })?;
+            Ok(LineInfo {
+                offset: line.offset(),
+                name: info.name().map(str::to_owned),
+                consumer: info.consumer().map(str::to_owned),
+                used: info.is_used() || info.is_kernel(),
+                output: info.direction() == LineDirection::Out,
+            })
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(ChipInfo {
+        node: node.to_owned(),
+        name: chip.name().to_owned(),
+        label: chip.label().to_owned(),
+        lines,
+    })
+}
+
+/// Opens the chip. The file is opened by itself first, because the GPIO crate does not tell what went wrong.
+fn open(dev: &Path, node: &Path) -> Result<Chip, TriggerError> {
+    File::open(node).map_err(|source| match source.kind() {
+        io::ErrorKind::NotFound => {
+            let present = nodes::numbered(dev, "gpiochip").unwrap_or_default();
+            TriggerError::NotFound {
+                node: node.to_owned(),
+                present: nodes::listed(present.iter().map(|p| p.display().to_string())),
+            }
+        }
+        io::ErrorKind::PermissionDenied => TriggerError::Permission { node: node.to_owned() },
+        _ => TriggerError::Io { node: node.to_owned(), source },
+    })?;
+    Chip::new(node).map_err(|source| TriggerError::NotAChip { node: node.to_owned(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chip() -> ChipInfo {
+        let line = |offset, name: Option<&str>, consumer: Option<&str>| LineInfo {
+            offset,
+            name: name.map(str::to_owned),
+            consumer: consumer.map(str::to_owned),
+            used: consumer.is_some(),
+            output: false,
+        };
+        ChipInfo {
+            node: "/dev/gpiochip0".into(),
+            name: "gpiochip0".into(),
+            label: "pinctrl".into(),
+            lines: vec![
+                line(0, Some("ID_SDA"), Some("i2c")),
+                line(1, Some("TRIGGER"), None),
+                line(2, None, None),
+            ],
+        }
+    }
+
+    #[test]
+    fn a_line_is_found_by_name_or_number() {
+        assert_eq!(find_line(&chip(), "TRIGGER").expect("there").offset, 1);
+        assert_eq!(find_line(&chip(), "2").expect("there").offset, 2);
+    }
+
+    #[test]
+    fn a_line_that_is_not_there_or_not_free_is_refused_in_words() {
+        let message = find_line(&chip(), "FIRE").expect_err("not there").to_string();
+        assert!(message.contains("no line FIRE") && message.contains("ID_SDA, TRIGGER"), "{message}");
+        assert!(matches!(find_line(&chip(), "3"), Err(TriggerError::NoLine { last: 2, .. })));
+        let message = find_line(&chip(), "ID_SDA").expect_err("in use").to_string();
+        assert!(message.contains("in use by i2c"), "{message}");
+    }
+
+    #[test]
+    fn a_chip_that_is_not_there_or_none_is_refused_in_words() {
+        let dev = tempfile::tempdir().expect("temporary folder");
+        let node = dev.path().join("gpiochip3");
+        let message = check_in(dev.path(), &node, "1").expect_err("not there").to_string();
+        assert!(message.contains("no GPIO chip") && message.contains("chips here: none"), "{message}");
+        std::fs::write(&node, []).expect("file");
+        assert!(matches!(check_in(dev.path(), &node, "1"), Err(TriggerError::NotAChip { .. })));
+        assert!(matches!(check(Path::new("/dev/null"), "1"), Err(TriggerError::NotAChip { .. })));
+    }
+
+    /// Whatever chips the machine under test has, each must be described or refused in words.
+    #[test]
+    fn the_chips_of_this_machine_are_listed() {
+        for found in list() {
+            match found {
+                Ok(chip) => assert!(chip.name.starts_with("gpiochip"), "{chip:?}"),
+                Err(e) => assert!(e.to_string().contains("/dev"), "{e}"),
+            }
+        }
+    }
+}
