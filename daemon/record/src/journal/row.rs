@@ -1,0 +1,261 @@
+//! Rounds as rows, cells and JSON.
+
+use bowwave_core::{
+    model::Zone,
+    score::{NotScored, Outcome, ShotRecord},
+    time::Time,
+};
+use glam::DVec3;
+use rusqlite::{Connection, Row, params};
+use serde_json::{Value, json};
+
+/// Columns of a round, in the order of the row functions below.
+pub(super) const COLUMNS: &str = "run, shot, fired_ns, muzzle_x_m, muzzle_y_m, muzzle_z_m, bore_x, bore_y, bore_z, \
+     pose_age_ns, outcome, boat, zone, time_ns, range_m, point_x_m, point_y_m, point_z_m, miss_m, cause";
+
+/// A round as it is in the journal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredShot {
+    /// The run that it belongs to.
+    pub run: i64,
+    /// The round. Numbers that were not finite are NaN.
+    pub record: ShotRecord,
+}
+
+/// What the outcomes have of the columns.
+#[derive(Default)]
+struct Parts<'a> {
+    outcome: &'static str,
+    boat: Option<&'a str>,
+    zone: Option<&'static str>,
+    time: Option<Time>,
+    range_m: Option<f64>,
+    point: Option<DVec3>,
+    miss_m: Option<f64>,
+    cause: Option<&'static str>,
+}
+
+impl<'a> Parts<'a> {
+    fn of(outcome: &'a Outcome) -> Self {
+        match outcome {
+            Outcome::Hit { boat, zone, time, range_m, point } => Self {
+                outcome: "hit",
+                boat: Some(boat),
+                zone: Some(zone.name()),
+                time: Some(*time),
+                range_m: Some(*range_m),
+                point: Some(*point),
+                ..Self::default()
+            },
+            Outcome::Miss { boat, miss_m, time, range_m } => Self {
+                outcome: "miss",
+                boat: boat.as_deref(),
+                time: Some(*time),
+                range_m: Some(*range_m),
+                miss_m: Some(*miss_m),
+                ..Self::default()
+            },
+            Outcome::NotScored { cause } => {
+                Self { outcome: "not_scored", cause: Some(cause.name()), ..Self::default() }
+            }
+        }
+    }
+}
+
+impl StoredShot {
+    /// Names of [`StoredShot::cells`], units last.
+    pub const COLUMNS: [&'static str; 20] = [
+        "run",
+        "shot",
+        "fired_s",
+        "outcome",
+        "boat",
+        "zone",
+        "time_s",
+        "range_m",
+        "miss_m",
+        "cause",
+        "muzzle_x_m",
+        "muzzle_y_m",
+        "muzzle_z_m",
+        "bore_x",
+        "bore_y",
+        "bore_z",
+        "point_x_m",
+        "point_y_m",
+        "point_z_m",
+        "pose_age_ms",
+    ];
+
+    /// The round as text for tables and CSV, in the order of [`StoredShot::COLUMNS`]; empty where a column does not apply.
+    /// Numbers have their full precision.
+    pub fn cells(&self) -> [String; 20] {
+        let record = &self.record;
+        let parts = Parts::of(&record.outcome);
+        let text = |value: Option<&str>| value.unwrap_or_default().to_owned();
+        let number =
+            |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(String::new, |v| v.to_string());
+        let [mx, my, mz] = record.muzzle.to_array().map(|v| number(Some(v)));
+        let [bx, by, bz] = record.bore.to_array().map(|v| number(Some(v)));
+        let [px, py, pz] = parts.point.map_or([None; 3], |p| p.to_array().map(Some)).map(number);
+        [
+            self.run.to_string(),
+            record.shot.to_string(),
+            seconds(record.fired),
+            parts.outcome.to_owned(),
+            text(parts.boat),
+            text(parts.zone),
+            parts.time.map_or_else(String::new, seconds),
+            number(parts.range_m),
+            number(parts.miss_m),
+            text(parts.cause),
+            mx,
+            my,
+            mz,
+            bx,
+            by,
+            bz,
+            px,
+            py,
+            pz,
+            number(Some(record.pose_age_ns as f64 * 1e-6)),
+        ]
+    }
+
+    /// The round as a JSON object; null where a column does not apply or a number is not finite.
+    pub fn to_json(&self) -> Value {
+        let record = &self.record;
+        let parts = Parts::of(&record.outcome);
+        json!({
+            "run": self.run,
+            "shot": record.shot,
+            "fired_ns": record.fired.ns(),
+            "outcome": parts.outcome,
+            "boat": parts.boat,
+            "zone": parts.zone,
+            "time_ns": parts.time.map(Time::ns),
+            "range_m": parts.range_m,
+            "miss_m": parts.miss_m,
+            "cause": parts.cause,
+            "muzzle_m": record.muzzle.to_array(),
+            "bore": record.bore.to_array(),
+            "point_m": parts.point.map(|point| point.to_array()),
+            "pose_age_ns": record.pose_age_ns,
+        })
+    }
+}
+
+/// Seconds with nine digits, without a detour over floating point.
+fn seconds(time: Time) -> String {
+    let ns = time.ns();
+    let sign = if ns < 0 { "-" } else { "" };
+    let ns = ns.unsigned_abs();
+    format!("{sign}{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000)
+}
+
+/// Adds a round; `false` where the run already has one of that number.
+pub(super) fn insert(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Result<bool> {
+    let parts = Parts::of(&shot.outcome);
+    let point = parts.point.map_or([None; 3], |p| p.to_array().map(Some));
+    let sql = format!(
+        "INSERT INTO shots ({COLUMNS}) VALUES \
+         (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20) \
+         ON CONFLICT (run, shot) DO NOTHING"
+    );
+    let number =
+        i64::try_from(shot.shot).map_err(|error| rusqlite::Error::ToSqlConversionFailure(error.into()))?;
+    let rows = connection.prepare_cached(&sql)?.execute(params![
+        run,
+        number,
+        shot.fired.ns(),
+        shot.muzzle.x,
+        shot.muzzle.y,
+        shot.muzzle.z,
+        shot.bore.x,
+        shot.bore.y,
+        shot.bore.z,
+        shot.pose_age_ns,
+        parts.outcome,
+        parts.boat,
+        parts.zone,
+        parts.time.map(Time::ns),
+        parts.range_m,
+        point[0],
+        point[1],
+        point[2],
+        parts.miss_m,
+        parts.cause,
+    ])?;
+    Ok(rows == 1)
+}
+
+/// Number of run and round, and the round or what is wrong with it.
+pub(super) type Parsed = (i64, i64, Result<ShotRecord, String>);
+
+/// A row with the columns of [`COLUMNS`].
+pub(super) fn parse(row: &Row<'_>) -> rusqlite::Result<Parsed> {
+    let number = |column: usize| row.get::<_, Option<f64>>(column).map(|value| value.unwrap_or(f64::NAN));
+    let vector = |column: usize| -> rusqlite::Result<DVec3> {
+        Ok(DVec3::new(number(column)?, number(column + 1)?, number(column + 2)?))
+    };
+    let (run, shot): (i64, i64) = (row.get(0)?, row.get(1)?);
+    let cells = Cells {
+        outcome: row.get(10)?,
+        boat: row.get(11)?,
+        zone: row.get(12)?,
+        time: Time::from_ns(row.get::<_, Option<i64>>(13)?.unwrap_or_default()),
+        range_m: number(14)?,
+        point: vector(15)?,
+        miss_m: number(18)?,
+        cause: row.get(19)?,
+    };
+    let (fired, muzzle, bore) = (Time::from_ns(row.get(2)?), vector(3)?, vector(6)?);
+    let pose_age_ns = row.get(9)?;
+    let record = cells.outcome().and_then(|outcome| {
+        let shot = u64::try_from(shot).map_err(|_| "a negative number".to_owned())?;
+        Ok(ShotRecord { shot, fired, muzzle, bore, pose_age_ns, outcome })
+    });
+    Ok((run, shot, record))
+}
+
+/// The columns that make an outcome.
+struct Cells {
+    outcome: String,
+    boat: Option<String>,
+    zone: Option<String>,
+    time: Time,
+    range_m: f64,
+    point: DVec3,
+    miss_m: f64,
+    cause: Option<String>,
+}
+
+impl Cells {
+    fn outcome(self) -> Result<Outcome, String> {
+        let Self { outcome, boat, zone, time, range_m, point, miss_m, cause } = self;
+        match outcome.as_str() {
+            "hit" => {
+                let zone = Zone::ALL
+                    .into_iter()
+                    .find(|known| Some(known.name()) == zone.as_deref())
+                    .ok_or_else(|| format!("unknown zone {zone:?}"))?;
+                let boat = boat.ok_or("a hit without a boat")?;
+                Ok(Outcome::Hit { boat, zone, time, range_m, point })
+            }
+            "miss" => Ok(Outcome::Miss { boat, miss_m, time, range_m }),
+            "not_scored" => CAUSES
+                .into_iter()
+                .find(|known| Some(known.name()) == cause.as_deref())
+                .map(|cause| Outcome::NotScored { cause })
+                .ok_or_else(|| format!("unknown cause {cause:?}")),
+            other => Err(format!("unknown outcome {other:?}")),
+        }
+    }
+}
+
+/// All causes; the function below does not compile once one is missing.
+const CAUSES: [NotScored; 2] = [NotScored::ImuStale, NotScored::CameraStale];
+
+const _: fn(NotScored) -> NotScored = |cause| match cause {
+    NotScored::ImuStale | NotScored::CameraStale => cause,
+};

@@ -1,0 +1,1 @@
+//! Failures that need smaller bounds than the defaults.

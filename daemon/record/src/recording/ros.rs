@@ -1,0 +1,309 @@
+//! The ROS 2 messages and their CDR encoding (OMG CORBA 3.4 Interoperability, 9.3: plain CDR with a 4-byte encapsulation).
+
+use std::sync::Arc;
+
+use bowwave_core::{
+    event::{ImuSample, TriggerEdge},
+    geometry::CameraPose,
+    time::{NS_PER_S, Time},
+};
+use byteorder::{BigEndian, LittleEndian};
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize, Serializer};
+
+use super::{CameraInfo, Entry, FrameEntry, JPEG_MAX_BYTES, PoseEntry, schema::Topic};
+
+const FRAME_CAMERA: &str = "camera";
+const FRAME_IMU: &str = "imu";
+const FRAME_WORLD: &str = "world";
+
+#[derive(Serialize, Deserialize)]
+struct Stamp {
+    sec: i32,
+    nanosec: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    stamp: Stamp,
+    frame_id: String,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Vector3 {
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Quaternion {
+    x: f64,
+    y: f64,
+    z: f64,
+    w: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Imu {
+    header: Header,
+    orientation: Quaternion,
+    orientation_covariance: [f64; 9],
+    angular_velocity: Vector3,
+    angular_velocity_covariance: [f64; 9],
+    linear_acceleration: Vector3,
+    linear_acceleration_covariance: [f64; 9],
+}
+
+#[derive(Serialize, Deserialize)]
+struct CompressedImage<'a> {
+    header: Header,
+    format: String,
+    #[serde(borrow, serialize_with = "as_bytes")]
+    data: &'a [u8],
+}
+
+#[derive(Serialize, Deserialize)]
+struct Bool {
+    data: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct PoseStamped {
+    header: Header,
+    position: Vector3,
+    orientation: Quaternion,
+}
+
+#[derive(Serialize, Deserialize)]
+struct CameraInfoMessage {
+    header: Header,
+    height: u32,
+    width: u32,
+    distortion_model: String,
+    d: Vec<f64>,
+    k: [f64; 9],
+    r: [f64; 9],
+    p: [f64; 12],
+    binning_x: u32,
+    binning_y: u32,
+    roi: RegionOfInterest,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+struct RegionOfInterest {
+    x_offset: u32,
+    y_offset: u32,
+    height: u32,
+    width: u32,
+    do_rectify: bool,
+}
+
+/// One block of bytes instead of an element at a time.
+fn as_bytes<S: Serializer>(data: &&[u8], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_bytes(data)
+}
+
+/// The topic and sequence number of an entry, its message appended to the emptied `out`. The error says what cannot be
+/// represented and what to do.
+pub(crate) fn encode(entry: &Entry, out: &mut Vec<u8>) -> Result<Topic, String> {
+    match entry {
+        Entry::Imu(sample) => {
+            write(out, &imu_message(sample)?)?;
+            Ok(Topic::Imu)
+        }
+        Entry::Frame(frame) => {
+            if frame.jpeg.is_empty() || frame.jpeg.len() > JPEG_MAX_BYTES {
+                return Err(format!(
+                    "a picture of {} bytes (1 to {JPEG_MAX_BYTES} can be recorded); lower the camera's quality or size",
+                    frame.jpeg.len()
+                ));
+            }
+            out.reserve(frame.jpeg.len() + 64);
+            let header = header(frame.mid_exposure, FRAME_CAMERA)?;
+            write(out, &CompressedImage { header, format: "jpeg".to_owned(), data: &frame.jpeg })?;
+            Ok(Topic::Image)
+        }
+        Entry::Trigger(edge) => {
+            write(out, &Bool { data: edge.pressed })?;
+            Ok(Topic::Trigger)
+        }
+        Entry::Truth(pose) => {
+            write(out, &pose_message(pose)?)?;
+            Ok(Topic::Truth)
+        }
+        Entry::Pose(pose) => {
+            write(out, &pose_message(pose)?)?;
+            Ok(Topic::Pose)
+        }
+    }
+}
+
+/// The message of `/camera/info`.
+pub(crate) fn encode_camera_info(info: &CameraInfo, time: Time, out: &mut Vec<u8>) -> Result<(), String> {
+    let k = info.k;
+    let message = CameraInfoMessage {
+        header: header(time, FRAME_CAMERA)?,
+        height: info.height,
+        width: info.width,
+        distortion_model: "plumb_bob".to_owned(),
+        d: info.d.clone(),
+        k,
+        r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        p: [k[0], k[1], k[2], 0.0, k[3], k[4], k[5], 0.0, k[6], k[7], k[8], 0.0],
+        binning_x: 0,
+        binning_y: 0,
+        roi: RegionOfInterest::default(),
+    };
+    write(out, &message)
+}
+
+/// The camera's numbers out of a message of `/camera/info`.
+pub(crate) fn decode_camera_info(data: &[u8]) -> Result<CameraInfo, String> {
+    let message: CameraInfoMessage = read(data)?;
+    Ok(CameraInfo { width: message.width, height: message.height, k: message.k, d: message.d })
+}
+
+/// The entry of a message; `None` for `/camera/info`, which is a property. The error says what is wrong with the message.
+pub(crate) fn decode(
+    topic: Topic,
+    log_time: Time,
+    sequence: u32,
+    data: &[u8],
+) -> Result<Option<Entry>, String> {
+    Ok(Some(match topic {
+        Topic::CameraInfo => return Ok(None),
+        Topic::Imu => Entry::Imu(imu_sample(&read(data)?, log_time)?),
+        Topic::Image => {
+            let message: CompressedImage<'_> = read(data)?;
+            let format = message.format.to_ascii_lowercase();
+            if !format.contains("jpeg") && !format.contains("jpg") {
+                return Err(format!("a picture in format {:?}, not JPEG", message.format));
+            }
+            if message.data.is_empty() || message.data.len() > JPEG_MAX_BYTES {
+                return Err(format!(
+                    "a picture of {} bytes (1 to {JPEG_MAX_BYTES} are read)",
+                    message.data.len()
+                ));
+            }
+            Entry::Frame(FrameEntry {
+                arrival: log_time,
+                mid_exposure: time(&message.header.stamp)?,
+                sequence,
+                jpeg: Arc::from(message.data),
+            })
+        }
+        Topic::Trigger => Entry::Trigger(TriggerEdge { time: log_time, pressed: read::<Bool>(data)?.data }),
+        Topic::Truth => Entry::Truth(pose_entry(&read(data)?, log_time)?),
+        Topic::Pose => Entry::Pose(pose_entry(&read(data)?, log_time)?),
+    }))
+}
+
+fn imu_message(sample: &ImuSample) -> Result<Imu, String> {
+    let mut orientation_covariance = [0.0; 9];
+    if sample.world_from_imu.is_none() {
+        // sensor_msgs/Imu: "If you have no estimate for one of the data elements, please set element 0 of the associated
+        // covariance matrix to -1".
+        orientation_covariance[0] = -1.0;
+    }
+    Ok(Imu {
+        header: header(Time::from_ns(sample.device_time_ns), FRAME_IMU)?,
+        orientation: quaternion(sample.world_from_imu.unwrap_or(DQuat::IDENTITY)),
+        orientation_covariance,
+        angular_velocity: vector(sample.rate),
+        angular_velocity_covariance: [0.0; 9],
+        linear_acceleration: vector(sample.accel),
+        linear_acceleration_covariance: [0.0; 9],
+    })
+}
+
+fn imu_sample(message: &Imu, arrival: Time) -> Result<ImuSample, String> {
+    let q = &message.orientation;
+    Ok(ImuSample {
+        arrival,
+        device_time_ns: time(&message.header.stamp)?.ns(),
+        rate: dvec3(&message.angular_velocity),
+        accel: dvec3(&message.linear_acceleration),
+        world_from_imu: (message.orientation_covariance[0] != -1.0)
+            .then(|| DQuat::from_xyzw(q.x, q.y, q.z, q.w)),
+    })
+}
+
+fn pose_message(entry: &PoseEntry) -> Result<PoseStamped, String> {
+    check_pose(&entry.pose)?;
+    Ok(PoseStamped {
+        header: header(entry.time, FRAME_WORLD)?,
+        position: vector(entry.pose.position),
+        orientation: quaternion(entry.pose.world_from_camera),
+    })
+}
+
+fn pose_entry(message: &PoseStamped, log_time: Time) -> Result<PoseEntry, String> {
+    let time = time(&message.header.stamp)?;
+    if time != log_time {
+        return Err(format!("its header says {time}"));
+    }
+    let q = &message.orientation;
+    let pose = CameraPose {
+        world_from_camera: DQuat::from_xyzw(q.x, q.y, q.z, q.w),
+        position: dvec3(&message.position),
+    };
+    check_pose(&pose)?;
+    Ok(PoseEntry { time, pose })
+}
+
+fn check_pose(pose: &CameraPose) -> Result<(), String> {
+    let length = pose.world_from_camera.length();
+    // NaN fails the comparison too.
+    if (length - 1.0).abs() < 1e-3 && pose.position.is_finite() {
+        return Ok(());
+    }
+    Err(format!(
+        "a pose at {} with a quaternion of length {length} (needs finite numbers and a unit quaternion)",
+        pose.position
+    ))
+}
+
+fn vector(v: DVec3) -> Vector3 {
+    Vector3 { x: v.x, y: v.y, z: v.z }
+}
+
+fn dvec3(v: &Vector3) -> DVec3 {
+    DVec3::new(v.x, v.y, v.z)
+}
+
+fn quaternion(q: DQuat) -> Quaternion {
+    Quaternion { x: q.x, y: q.y, z: q.z, w: q.w }
+}
+
+fn header(time: Time, frame_id: &str) -> Result<Header, String> {
+    let sec = i32::try_from(time.ns().div_euclid(NS_PER_S))
+        .map_err(|_| format!("a stamp of {time} (ROS stamps end after 2^31 s); check the device's clock"))?;
+    let nanosec = time.ns().rem_euclid(NS_PER_S) as u32;
+    Ok(Header { stamp: Stamp { sec, nanosec }, frame_id: frame_id.to_owned() })
+}
+
+fn time(stamp: &Stamp) -> Result<Time, String> {
+    if i64::from(stamp.nanosec) >= NS_PER_S {
+        return Err(format!("a stamp with {} ns in a second", stamp.nanosec));
+    }
+    Ok(Time::from_ns(i64::from(stamp.sec) * NS_PER_S + i64::from(stamp.nanosec)))
+}
+
+fn write<T: Serialize>(out: &mut Vec<u8>, message: &T) -> Result<(), String> {
+    out.clear();
+    // Representation identifier CDR_LE, no options. Alignment counts from the byte after it.
+    out.extend_from_slice(&[0, 1, 0, 0]);
+    cdr_encoding::to_writer::<T, LittleEndian, _>(out, message).map_err(|e| format!("not encodable: {e}"))
+}
+
+fn read<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String> {
+    let (encapsulation, body) =
+        data.split_at_checked(4).ok_or_else(|| format!("{} bytes are no CDR message", data.len()))?;
+    let result = match encapsulation {
+        [0, 1, ..] => cdr_encoding::from_bytes::<T, LittleEndian>(body),
+        [0, 0, ..] => cdr_encoding::from_bytes::<T, BigEndian>(body),
+        other => return Err(format!("unknown CDR encapsulation {other:02x?}")),
+    };
+    result.map(|(message, _)| message).map_err(|e| format!("not decodable: {e}"))
+}

@@ -1,0 +1,109 @@
+//! Topics and their ROS 2 message definitions, as `ros2 interface show` of the Jazzy distribution has them (comments left out).
+
+/// The file's profile and the encodings of schemas and messages, by their names in the MCAP registry.
+pub(crate) const PROFILE: &str = "ros2";
+pub(crate) const SCHEMA_ENCODING: &str = "ros2msg";
+pub(crate) const MESSAGE_ENCODING: &str = "cdr";
+
+/// What a channel of ours carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Topic {
+    Image,
+    CameraInfo,
+    Imu,
+    Trigger,
+    Truth,
+    Pose,
+}
+
+impl Topic {
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Image, Self::CameraInfo, Self::Imu, Self::Trigger, Self::Truth, Self::Pose];
+
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Image => "/camera/image",
+            Self::CameraInfo => "/camera/info",
+            Self::Imu => "/imu",
+            Self::Trigger => "/trigger",
+            Self::Truth => "/truth/pose",
+            Self::Pose => "/pose",
+        }
+    }
+
+    pub(crate) const fn schema_name(self) -> &'static str {
+        match self {
+            Self::Image => "sensor_msgs/msg/CompressedImage",
+            Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
+            Self::Imu => "sensor_msgs/msg/Imu",
+            Self::Trigger => "std_msgs/msg/Bool",
+            Self::Truth | Self::Pose => "geometry_msgs/msg/PoseStamped",
+        }
+    }
+
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|topic| topic.name() == name)
+    }
+
+    /// The message's definition, followed by those of all messages it is made of.
+    pub(crate) fn definition(self) -> String {
+        let parts: &[(&str, &str)] = match self {
+            Self::Image => &[("", COMPRESSED_IMAGE), HEADER, TIME],
+            Self::CameraInfo => &[("", CAMERA_INFO), HEADER, TIME, REGION_OF_INTEREST],
+            Self::Imu => &[("", IMU), HEADER, TIME, QUATERNION, VECTOR3],
+            Self::Trigger => &[("", "bool data\n")],
+            Self::Truth | Self::Pose => {
+                &[("", "std_msgs/Header header\nPose pose\n"), HEADER, TIME, POSE, POINT, QUATERNION]
+            }
+        };
+        let mut text = String::new();
+        for (name, body) in parts {
+            if !name.is_empty() {
+                text.push_str(&"=".repeat(80));
+                text.push_str("\nMSG: ");
+                text.push_str(name);
+                text.push('\n');
+            }
+            text.push_str(body);
+        }
+        text
+    }
+}
+
+const COMPRESSED_IMAGE: &str = "std_msgs/Header header\nstring format\nuint8[] data\n";
+
+const CAMERA_INFO: &str = "\
+std_msgs/Header header
+uint32 height
+uint32 width
+string distortion_model
+float64[] d
+float64[9] k
+float64[9] r
+float64[12] p
+uint32 binning_x
+uint32 binning_y
+RegionOfInterest roi
+";
+
+const IMU: &str = "\
+std_msgs/Header header
+geometry_msgs/Quaternion orientation
+float64[9] orientation_covariance
+geometry_msgs/Vector3 angular_velocity
+float64[9] angular_velocity_covariance
+geometry_msgs/Vector3 linear_acceleration
+float64[9] linear_acceleration_covariance
+";
+
+const HEADER: (&str, &str) = ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n");
+const TIME: (&str, &str) = ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n");
+const QUATERNION: (&str, &str) =
+    ("geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n");
+const VECTOR3: (&str, &str) = ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n");
+const POINT: (&str, &str) = ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n");
+const POSE: (&str, &str) = ("geometry_msgs/Pose", "Point position\nQuaternion orientation\n");
+const REGION_OF_INTEREST: (&str, &str) = (
+    "sensor_msgs/RegionOfInterest",
+    "uint32 x_offset\nuint32 y_offset\nuint32 height\nuint32 width\nbool do_rectify\n",
+);
