@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod attitude;
+pub mod boats;
 pub mod calibration;
 pub mod clock;
 pub mod event;
