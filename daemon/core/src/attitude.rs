@@ -12,8 +12,7 @@ const GAP_NS: i64 = 1_000_000_000;
 
 /// Orientation by the unit's own estimate where it gives one, else by integrating its rate from a levelled start.
 ///
-/// Integration takes the mean of the rates at both ends of each interval and turns by its exponential, exact for a constant
-/// rate. It is only as good as the bias that the calibration gives; its heading starts at the camera's "north".
+/// Integration is only as good as the bias that the calibration gives; its heading starts at the camera's "north".
 #[derive(Clone, Debug)]
 pub struct Attitude {
     gyro_bias: DVec3,
@@ -25,8 +24,8 @@ pub struct Attitude {
 enum State {
     /// Gathering specific force: since when, the sum and how many.
     Levelling { since: Option<Time>, sum: DVec3, count: u32 },
-    /// Integrating from the last orientation and rate.
-    Integrating(OrientationSample),
+    /// Integrating from the last orientation and rate, and the rate before with its distance in time.
+    Integrating { last: OrientationSample, before: Option<(DVec3, i64)> },
 }
 
 impl State {
@@ -46,13 +45,16 @@ impl Attitude {
             return Some(OrientationSample { time, world_from_imu: q.normalize(), rate });
         }
         match &mut self.state {
-            State::Integrating(last) => {
+            State::Integrating { last, before } => {
                 let dt_ns = time.ns_since(last.time);
                 if !(0..=GAP_NS).contains(&dt_ns) {
                     self.state = State::START;
                     return None;
                 }
-                let turn = DQuat::from_scaled_axis((rate + last.rate) * 0.5 * (dt_ns as f64 * 1e-9));
+                // Times from a shifting clock map differ by microseconds; only about equal steps have a parabola.
+                let even = before.filter(|(_, step_ns)| (step_ns - dt_ns).abs() * 5 < dt_ns).map(|(w, _)| w);
+                let turn = DQuat::from_scaled_axis(magnus(even, last.rate, rate, dt_ns as f64 * 1e-9));
+                *before = Some((last.rate, dt_ns));
                 *last = OrientationSample {
                     time,
                     world_from_imu: (last.world_from_imu * turn).normalize(),
@@ -69,11 +71,22 @@ impl Attitude {
                 }
                 let world_from_imu = level(*sum / f64::from(*count), self.camera_from_imu);
                 let start = OrientationSample { time, world_from_imu, rate };
-                self.state = State::Integrating(start);
+                self.state = State::Integrating { last: start, before: None };
                 Some(start)
             }
         }
     }
+}
+
+/// Turn over the `h` seconds from rate `from` to rate `to`, a scaled axis in the body's frame: the integral of the rate and the
+/// first commutator of the Magnus expansion (Iserles & Norsett 1999, eq. 1.2), which is what coning adds. With the rate `h`
+/// seconds `before` the integral is that of the parabola through all three, else of the line.
+fn magnus(before: Option<DVec3>, from: DVec3, to: DVec3, h: f64) -> DVec3 {
+    let integral = match before {
+        Some(before) => (to * 5.0 + from * 8.0 - before) * (h / 12.0),
+        None => (from + to) * (h / 2.0),
+    };
+    integral + from.cross(to) * (h * h / 12.0)
 }
 
 /// The orientation in which `up_imu` (the direction of the specific force at rest) points up and the camera looks north.
