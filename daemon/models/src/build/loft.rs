@@ -1,0 +1,159 @@
+//! Hulls from a lines plan: fore-and-aft curves (keel, chine, sheer, rail, ...) that sections are drawn through.
+
+use glam::Vec3;
+
+use super::{
+    paint::Paint,
+    solid::{Solid, key},
+};
+
+/// One fore-and-aft curve of the port half, by control points from the stern to the stem.
+pub(crate) struct Line<'a> {
+    /// x, y (to port), z of each control point; every line of a hull has as many.
+    pub(crate) points: &'a [[f32; 3]],
+    /// Whether sections have a corner here.
+    pub(crate) corner: bool,
+    /// Rows of faces between this line and the next.
+    pub(crate) rows: usize,
+    /// Paint of those rows.
+    pub(crate) paint: Paint,
+}
+
+/// A lines plan.
+pub(crate) struct Hull<'a> {
+    /// From the keel outwards and up, then inwards; the first and the last lie in the centre plane.
+    pub(crate) lines: &'a [Line<'a>],
+    /// Sections between two control points that are not close together.
+    pub(crate) steps: usize,
+    /// Faces that meet at more than this stay hard, degrees.
+    pub(crate) crease: f32,
+    /// Paint of the transom.
+    pub(crate) transom: Paint,
+}
+
+impl Hull<'_> {
+    /// The closed surface of both halves.
+    pub(crate) fn build(&self) -> Solid {
+        let sections = self.sections();
+        let paints = self.row_paints();
+        let mut hull = Solid::new(self.crease);
+        for pair in sections.windows(2) {
+            for (row, paint) in paints.iter().enumerate() {
+                let [a, b, c, d] = [pair[0][row], pair[1][row], pair[1][row + 1], pair[0][row + 1]];
+                hull.quad([a, d, c, b], *paint);
+                hull.quad([a, b, c, d].map(to_starboard), *paint);
+            }
+        }
+        if let (Some(aft), Some(fore)) = (sections.first(), sections.last()) {
+            close(&mut hull, aft, true, self.transom);
+            close(&mut hull, fore, false, self.transom);
+        }
+        hull
+    }
+
+    /// Sections of the port half from the stern forward, points from the keel outwards.
+    fn sections(&self) -> Vec<Vec<Vec3>> {
+        let count = self.lines.iter().map(|l| l.points.len()).min().unwrap_or(0);
+        let steps: Vec<usize> = (0..count.saturating_sub(1)).map(|i| self.steps_after(i)).collect();
+        let lines: Vec<Vec<Vec3>> = self.lines.iter().map(|l| sample_line(&l.points[..count], &steps)).collect();
+        let stations = lines.first().map_or(0, Vec::len);
+        (0..stations)
+            .map(|s| {
+                let through: Vec<Vec3> = lines.iter().map(|l| l[s]).collect();
+                self.sample_section(&through)
+            })
+            .collect()
+    }
+
+    /// Bulkheads and transoms are short; only real lengths of hull are divided.
+    fn steps_after(&self, i: usize) -> usize {
+        let at = |l: &Line<'_>, i: usize| Vec3::from_array(l.points[i]);
+        let length = self.lines.first().map_or(0.0, |l| {
+            l.points.last().map_or(0.0, |&last| Vec3::from_array(last).distance(at(l, 0)))
+        });
+        let fore_and_aft = self.lines.iter().map(|l| (at(l, i + 1).x - at(l, i).x).abs()).fold(0.0, f32::max);
+        if fore_and_aft < 0.03 * length { 1 } else { self.steps }
+    }
+
+    fn sample_section(&self, through: &[Vec3]) -> Vec<Vec3> {
+        let corner = |i: usize| self.lines[i].corner;
+        let mut out = Vec::new();
+        for (i, line) in self.lines.iter().enumerate().take(through.len().saturating_sub(1)) {
+            for row in 0..line.rows {
+                let mut p = spline(through, i, row as f32 / line.rows as f32, corner);
+                p.y = p.y.max(0.0);
+                out.push(p);
+            }
+        }
+        out.extend(through.last());
+        out
+    }
+
+    fn row_paints(&self) -> Vec<Paint> {
+        let all_but_last = self.lines.split_last().map_or(&[][..], |(_, rest)| rest);
+        all_but_last.iter().flat_map(|l| std::iter::repeat_n(l.paint, l.rows)).collect()
+    }
+}
+
+/// A line sampled `steps[i]` times after each control point `i`. Where a line repeats a point it runs on smoothly; where it
+/// jumps between two points at one x, as decks do at a bulkhead, it has a corner at both.
+fn sample_line(points: &[[f32; 3]], steps: &[usize]) -> Vec<Vec3> {
+    let p: Vec<Vec3> = points.iter().map(|&p| Vec3::from_array(p)).collect();
+    let jump = |i: usize| i + 1 < p.len() && p[i].x == p[i + 1].x && p[i] != p[i + 1];
+    let corner = |i: usize| jump(i) || i.checked_sub(1).is_some_and(jump);
+    let mut out = Vec::new();
+    for (i, &steps) in steps.iter().enumerate() {
+        out.extend((0..steps).map(|step| spline(&p, i, step as f32 / steps as f32, corner)));
+    }
+    out.extend(p.last());
+    out
+}
+
+/// Point at `t` between control points `i` and `i + 1`: cubic Hermite with chord-limited Catmull-Rom slopes, so that
+/// uneven spacing makes no loops; straight towards corners and ends.
+fn spline(p: &[Vec3], i: usize, t: f32, corner: impl Fn(usize) -> bool) -> Vec3 {
+    let (a, b) = (p[i], p[i + 1]);
+    let chord = b - a;
+    let slope = |k: usize| {
+        let before = p[..k].iter().rev().find(|q| **q != p[k]);
+        let after = p[k + 1..].iter().find(|q| **q != p[k]);
+        let (Some(&before), Some(&after), false) = (before, after, corner(k)) else { return chord };
+        let (before, after) = (p[k] - before, after - p[k]);
+        let (lb, la) = (before.length(), after.length());
+        // Slope per metre at the corner (non-uniform Catmull-Rom), times this chord's length.
+        (before / lb * la + after / la * lb) / (la + lb) * chord.length()
+    };
+    let (m0, m1) = (slope(i), slope(i + 1));
+    let (t2, t3) = (t * t, t * t * t);
+    a * (2.0 * t3 - 3.0 * t2 + 1.0) + m0 * (t3 - 2.0 * t2 + t) + b * (3.0 * t2 - 2.0 * t3) + m1 * (t3 - t2)
+}
+
+fn to_starboard(p: Vec3) -> Vec3 {
+    Vec3::new(p.x, -p.y, p.z)
+}
+
+/// Closes an end with strips across the boat; an end that is a line in the centre plane needs none.
+fn close(hull: &mut Solid, section: &[Vec3], aft: bool, paint: Paint) {
+    for pair in section.windows(2) {
+        let (low, high) = (pair[0], pair[1]);
+        if key(low) == key(high) {
+            continue;
+        }
+        let strip = [to_starboard(low), to_starboard(high), high, low];
+        hull.quad(if aft { strip } else { [strip[3], strip[2], strip[1], strip[0]] }, paint);
+    }
+}
+
+/// A path with a radius at each point, drawn smoothly through its points with `steps` pieces between two of them.
+pub(crate) fn smooth(path: &[(Vec3, f32)], steps: usize) -> Vec<(Vec3, f32)> {
+    let points: Vec<Vec3> = path.iter().map(|p| p.0).collect();
+    let mut out = Vec::new();
+    for (i, pair) in path.windows(2).enumerate() {
+        out.extend((0..steps).map(|step| {
+            let t = step as f32 / steps as f32;
+            (spline(&points, i, t, |_| false), pair[0].1 + (pair[1].1 - pair[0].1) * t)
+        }));
+    }
+    out.extend(path.last());
+    out
+}
