@@ -1,6 +1,7 @@
 //! Drag of the G7 standard projectile.
 
 /// Mach number and drag coefficient of the G7 standard projectile (public BRL/JBM tabulation).
+#[allow(clippy::approx_constant)] // 0.3010 is a measured drag, not a logarithm.
 #[rustfmt::skip] // Several pairs a line.
 const G7: [(f64, f64); 84] = [
     (0.000, 0.1198), (0.050, 0.1197), (0.100, 0.1196), (0.150, 0.1194), (0.200, 0.1193), (0.250, 0.1194),

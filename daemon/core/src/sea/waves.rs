@@ -98,6 +98,11 @@ impl WaveField {
         self.waves.is_empty()
     }
 
+    /// No water is ever higher than this above mean sea level, metres (nor lower than its negative).
+    pub fn crest_max_m(&self) -> f64 {
+        self.waves.iter().map(|w| w.amplitude_m).sum()
+    }
+
     /// Height of the water above mean sea level at a place (world x, y) and time, metres.
     pub fn height(&self, position: DVec2, time_s: f64) -> f64 {
         self.waves.iter().map(|w| w.amplitude_m * w.phase(position, time_s).cos()).sum()

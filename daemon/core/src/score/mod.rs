@@ -1,6 +1,12 @@
-//! What became of each virtual round: the records that outlive a session.
+//! What became of each virtual round: the records that outlive a session, and the swept test that decides them.
+
+mod hit;
+mod round;
 
 use glam::DVec3;
+
+pub use hit::{Closest, Moving, Strike, closest_to_box, strike};
+pub use round::{Approach, End, Round};
 
 use crate::{model::Zone, time::Time};
 
