@@ -1,0 +1,253 @@
+//! From light to a JPEG: the camera with its roll and elevation, its lens, its noise and its transfer curve.
+
+use bowwave_core::geometry::{CameraPose, Lens, look};
+use glam::{DQuat, DVec2, DVec3, Mat3, Vec3};
+use image::{ExtendedColorType, ImageError, codecs::jpeg::JpegEncoder};
+use rand_pcg::{Pcg32, rand_core::Rng};
+
+use super::{
+    field::Surface,
+    march::{LevelView, SeaPicture, SeaShader},
+    noise::{mix, upper_quantile},
+    recipe::Recipe,
+    sky::{Panorama, Sky, arctangent},
+};
+
+/// Steps of the transfer table over 0 to [`LIGHT_MAX`].
+const TRANSFER: usize = 16_384;
+/// Light at which the sensor is full, in units of white.
+const LIGHT_MAX: f32 = 1.6;
+/// Values of the noise table; 10 bits of a random number choose one.
+const NOISE: usize = 1024;
+/// Half the sun's diameter, radians.
+const SUN_RADIUS: f32 = 0.004_65;
+
+/// What stays the same from frame to frame.
+pub(super) struct Camera {
+    lens: Lens,
+    /// Undistorted normalised coordinates of every pixel's centre, and its share of light.
+    rays: Vec<[f32; 3]>,
+    transfer: Vec<u8>,
+    /// Deviation of the noise by light, in 64 steps of the transfer table's range.
+    deviation: Vec<f32>,
+    normal: Vec<f32>,
+    quality: u8,
+    seed: u64,
+}
+
+/// Memory for one frame.
+#[derive(Default)]
+pub(super) struct FrameMemory {
+    sea: SeaPicture,
+    pub rgb: Vec<u8>,
+}
+
+impl Camera {
+    pub fn new(recipe: &Recipe) -> Self {
+        let lens = recipe.lens();
+        let rays = (0..lens.height)
+            .flat_map(|y| (0..lens.width).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                let ray = lens.unproject(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+                let fall_off = 1.0 - recipe.camera.vignetting * (1.0 - ray.z.powi(4));
+                [(ray.x / ray.z) as f32, (ray.y / ray.z) as f32, fall_off as f32]
+            })
+            .collect();
+        let transfer = (0..TRANSFER)
+            .map(|i| (255.0 * to_srgb(shoulder((i as f32 + 0.5) * LIGHT_MAX / TRANSFER as f32))).round() as u8)
+            .collect();
+        let (read, shot) = (recipe.camera.read_noise as f32, recipe.camera.shot_noise as f32);
+        let deviation = (0..=64).map(|i| (read + shot * i as f32 * LIGHT_MAX / 64.0).sqrt()).collect();
+        let normal = (0..NOISE)
+            .map(|i| {
+                let p = (i as f64 + 0.5) / NOISE as f64;
+                (if p < 0.5 { -upper_quantile(p) } else { upper_quantile(1.0 - p) }) as f32
+            })
+            .collect();
+        Self { lens, rays, transfer, deviation, normal, quality: recipe.camera.jpeg_quality, seed: mix(recipe.seed) }
+    }
+
+    /// Draws what the camera sees from `pose` into `memory.rgb`.
+    pub fn expose(
+        &self,
+        shader: &SeaShader,
+        surface: &Surface,
+        sky: &Sky,
+        panorama: &Panorama,
+        pose: &CameraPose,
+        frame: u32,
+        memory: &mut FrameMemory,
+    ) {
+        let forward = pose.world_from_camera * DVec3::Z;
+        let azimuth = forward.x.atan2(forward.y);
+        let level_from_camera = (look(azimuth, 0.0, 0.0).inverse() * pose.world_from_camera).normalize();
+        let turn = Mat3::from_quat(level_from_camera.as_quat());
+        let view = self.level_view(turn, azimuth as f32, pose.position.z as f32);
+        shader.draw(surface, sky, &view, pose.position.z as f32, &mut memory.sea);
+        let sun = (look(azimuth, 0.0, 0.0).inverse() * sky.sun.as_dvec3()).as_vec3();
+        let width = self.lens.width as usize;
+        memory.rgb.resize(self.rays.len() * 3, 0);
+        for (y, (row, rays)) in memory.rgb.chunks_mut(width * 3).zip(self.rays.chunks(width)).enumerate() {
+            let mut random = Pcg32::new(mix(self.seed ^ u64::from(frame)), y as u64);
+            for (pixel, ray) in row.chunks_exact_mut(3).zip(rays) {
+                let light = self.light(turn, *ray, &view, &memory.sea, panorama, sun);
+                self.develop(light, ray[2], random.next_u32(), pixel);
+            }
+        }
+    }
+
+    /// A level camera that sees all of the sea that the camera sees.
+    fn level_view(&self, turn: Mat3, azimuth: f32, eye_height: f32) -> LevelView {
+        let (w, h) = (self.lens.width as usize, self.lens.height as usize);
+        let (mut left, mut right, mut lowest) = (0.0f32, 0.0f32, 0.0f32);
+        let border = (0..w).flat_map(|x| [(x, 0), (x, h - 1)]).chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
+        for (x, y) in border {
+            let [nx, ny, _] = self.rays[y * w + x];
+            let d = turn * Vec3::new(nx, ny, 1.0);
+            let (u, v) = (d.x / d.z.max(0.1), d.y / d.z.max(0.1));
+            (left, right, lowest) = (left.min(u), right.max(u), lowest.max(v));
+        }
+        let focal = self.lens.focal.x as f32;
+        // Crests of high seas may stand above the level of a low eye.
+        let margin = 4.0 + focal * (0.5 / eye_height).min(0.2);
+        LevelView {
+            width: ((right - left) * focal) as usize + 6,
+            height: (lowest * focal + margin) as usize + 4,
+            focal,
+            centre: -left * focal + 3.0,
+            level_row: margin.floor(),
+            azimuth,
+        }
+    }
+
+    #[inline(always)]
+    fn light(
+        &self,
+        turn: Mat3,
+        ray: [f32; 3],
+        view: &LevelView,
+        sea: &SeaPicture,
+        panorama: &Panorama,
+        sun: Vec3,
+    ) -> [f32; 4] {
+        let d = turn * Vec3::new(ray[0], ray[1], 1.0);
+        let inverse = 1.0 / d.z;
+        let (nx, ny) = (d.x * inverse, d.y * inverse);
+        let water = bilinear(sea, view, nx * view.focal + view.centre, ny * view.focal + view.level_row);
+        let open = 1.0 - water[3];
+        if open < 1e-3 {
+            return water;
+        }
+        let tangent = -ny / (1.0 + nx * nx).sqrt();
+        let mut sky = panorama.at(view.azimuth + arctangent(nx), tangent);
+        let towards = d.dot(sun);
+        if towards > 0.0 && towards * towards > d.length_squared() * (1.0 - 6.0 * SUN_RADIUS * SUN_RADIUS) {
+            let off = d.normalize().cross(sun).length();
+            let disc = 1.0 - super::noise::smoothstep(0.9 * SUN_RADIUS, 1.15 * SUN_RADIUS, off);
+            sky.iter_mut().for_each(|c| *c += 50.0 * disc);
+        }
+        std::array::from_fn(|c| water[c] + open * sky[c])
+    }
+
+    #[inline(always)]
+    fn develop(&self, light: [f32; 4], fall_off: f32, random: u32, pixel: &mut [u8]) {
+        const PER_LIGHT: f32 = TRANSFER as f32 / LIGHT_MAX;
+        for c in 0..3 {
+            let clean = (light[c] * fall_off).clamp(0.0, LIGHT_MAX);
+            let deviation = self.deviation[(clean * (64.0 / LIGHT_MAX)) as usize & 127];
+            let noise = self.normal[(random >> (10 * c + 1)) as usize & (NOISE - 1)];
+            let step = ((clean + deviation * noise) * PER_LIGHT).clamp(0.0, (TRANSFER - 1) as f32);
+            pixel[c] = self.transfer[step as usize];
+        }
+    }
+
+    /// The JPEG of a drawn frame.
+    pub fn encode(&self, rgb: &[u8]) -> Result<Vec<u8>, ImageError> {
+        let mut jpeg = Vec::with_capacity(rgb.len() / 8);
+        JpegEncoder::new_with_quality(&mut jpeg, self.quality).encode(
+            rgb,
+            self.lens.width,
+            self.lens.height,
+            ExtendedColorType::Rgb8,
+        )?;
+        Ok(jpeg)
+    }
+}
+
+#[inline(always)]
+fn bilinear(sea: &SeaPicture, view: &LevelView, u: f32, v: f32) -> [f32; 4] {
+    let v = v - 0.5;
+    if v <= -1.0 {
+        return [0.0; 4];
+    }
+    let u = (u - 0.5).clamp(0.0, (view.width - 1) as f32 - 1e-3);
+    let v = v.clamp(0.0, (view.height - 1) as f32 - 1e-3);
+    let (iu, iv) = (u as usize, v as usize);
+    let (fu, fv) = (u - iu as f32, v - iv as f32);
+    let at = iv * view.width + iu;
+    let Some(upper) = sea.texels.get(at..at + 2) else { return [0.0; 4] };
+    let lower = sea.texels.get(at + view.width..at + view.width + 2).unwrap_or(upper);
+    std::array::from_fn(|c| {
+        let a = upper[0][c] + fu * (upper[1][c] - upper[0][c]);
+        let b = lower[0][c] + fu * (lower[1][c] - lower[0][c]);
+        a + fv * (b - a)
+    })
+}
+
+/// Rolls highlights off from 70 % on instead of cutting them at white.
+fn shoulder(light: f32) -> f32 {
+    const KNEE: f32 = 0.7;
+    if light < KNEE { light } else { KNEE + (1.0 - KNEE) * (1.0 - (-(light - KNEE) / (1.0 - KNEE)).exp()) }
+}
+
+/// Linear to sRGB-coded (IEC 61966-2-1).
+fn to_srgb(light: f32) -> f32 {
+    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+}
+
+/// What the camera sees over a whole recording: azimuths from the first to the last (clockwise), and the largest tangents
+/// of elevation above and below the horizontal.
+pub(super) struct Coverage {
+    pub azimuth: [f32; 2],
+    pub above: f32,
+    pub below: f32,
+}
+
+impl Coverage {
+    pub fn new(recipe: &Recipe) -> Self {
+        let (lens, motion) = (recipe.lens(), recipe.motion());
+        let (w, h) = (f64::from(lens.width), f64::from(lens.height));
+        let border: Vec<DVec3> = (0..=8)
+            .flat_map(|i| {
+                let (x, y) = (w * f64::from(i) / 8.0, h * f64::from(i) / 8.0);
+                [DVec2::new(x, 0.0), DVec2::new(x, h), DVec2::new(0.0, y), DVec2::new(w, y)]
+            })
+            .map(|pixel| lens.unproject(pixel))
+            .collect();
+        let azimuth_of = |q: DQuat, d: DVec3| {
+            let d = q * d;
+            d.x.atan2(d.y)
+        };
+        let first = azimuth_of(motion.at(0.0).pose.world_from_camera, DVec3::Z);
+        let (mut least, mut most, mut above, mut below) = (0.0f64, 0.0f64, 0.05f64, 0.05f64);
+        for i in 0..recipe.frames() {
+            let q = motion.at(f64::from(i) / recipe.frame_rate_hz).pose.world_from_camera;
+            for &ray in &border {
+                let off = azimuth_of(q, ray) - first;
+                let off = off - (off / std::f64::consts::TAU).round() * std::f64::consts::TAU;
+                (least, most) = (least.min(off), most.max(off));
+                let d = q * ray;
+                let tangent = d.z / d.x.hypot(d.y).max(1e-3);
+                (above, below) = (above.max(tangent), below.max(-tangent));
+            }
+        }
+        // A view past straight behind the first one needs the whole circle.
+        let around = most - least > 5.0;
+        let azimuth = if around { [-3.2, 3.2] } else { [first + least - 0.01, first + most + 0.01] };
+        Self {
+            azimuth: azimuth.map(|a| a as f32),
+            above: (above * 1.02 + 0.01) as f32,
+            below: (below * 1.02 + 0.01) as f32,
+        }
+    }
+}

@@ -1,0 +1,328 @@
+//! Draws the sea as a level camera sees it: every column walks outwards over the waves and paints each piece of water that
+//! is not hidden by a nearer one over as much of the column as it covers.
+
+use std::f32::consts::TAU;
+
+use bowwave_core::geometry::curvature_drop;
+use glam::Vec3;
+
+use super::{
+    field::{CASCADES, Covariance, Field, LEVELS, Surface, floor},
+    foam::Foam,
+    patches::Patches,
+    shade::{COLUMNS_PER_RADIAN, Glitter, Roughness, WaterTable},
+    sky::{Dome, Rgb, Sky},
+};
+
+/// Pieces of water per row of the picture where waves are drawn one by one.
+const STEPS_PER_ROW: f32 = 1.3;
+/// Longest step relative to range there: front and back of the waves must be met even where a row spans many of them.
+const STEP_MAX: f32 = 0.006;
+/// Beyond this range single waves only tint a row.
+const FAR_M: f32 = 900.0;
+/// Longest step relative to range beyond.
+const STEP_FAR: f32 = 0.02;
+/// Rows of the water table over range.
+const TABLE_ROWS: usize = 40;
+/// Columns between which the glitter's parameters are interpolated.
+const GLITTER_STRIDE: usize = 16;
+
+/// One distance from the camera.
+struct Step {
+    range: f32,
+    drop: f32,
+    table_row: f32,
+    grazing: f32,
+    transmittance: f32,
+    roughness: Roughness,
+    /// For each tile the level, the next one's share, and whether the tile still shows anything.
+    levels: [(usize, f32, bool); CASCADES],
+    foam_threshold: f32,
+}
+
+/// A camera without roll or elevation, looking along an azimuth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LevelView {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Focal length, pixels.
+    pub focal: f32,
+    /// Column of the view's axis.
+    pub centre: f32,
+    /// Row of level directions.
+    pub level_row: f32,
+    /// Radians clockwise from north.
+    pub azimuth: f32,
+}
+
+/// The picture of the sea alone: linear colour times coverage, and coverage.
+#[derive(Default)]
+pub(super) struct SeaPicture {
+    pub texels: Vec<[f32; 4]>,
+    highest: Vec<f32>,
+    columns: Vec<Column>,
+    glitter: Vec<Glitter>,
+}
+
+#[derive(Clone, Copy)]
+struct Column {
+    east: f32,
+    north: f32,
+    /// Rows per tangent of elevation.
+    scale: f32,
+    table_column: f32,
+    haze: Rgb,
+}
+
+/// What stays the same over a recording.
+pub(super) struct SeaShader {
+    steps: Vec<Step>,
+    table: WaterTable,
+    patches: Patches,
+    foam: Option<Foam>,
+    sun_irradiance: Rgb,
+    haze: Vec<Rgb>,
+}
+
+/// What the shader is built for.
+pub(super) struct SeaShaderInput {
+    pub eye_height: f32,
+    pub focal: f32,
+    /// Tangent of the steepest line of sight below the horizontal.
+    pub steepest: f32,
+    pub visibility_m: f32,
+    /// Slope variance of the whole sea (upwind, crosswind) and where the wind comes from.
+    pub slopes: [f64; 2],
+    pub wind_from: f64,
+    pub wind: f64,
+    pub upwelling: Rgb,
+    pub seed: u64,
+}
+
+impl SeaShader {
+    pub fn new(input: &SeaShaderInput, sky: &Sky, dome: &Dome, surface: &Surface) -> Self {
+        let (resolved, height_variance) = Field::statistics(surface);
+        let whole = rotate_slopes(input.slopes, input.wind_from);
+        let crest = 3.0 * height_variance.sqrt() as f32;
+        let start = ((input.eye_height - crest).max(0.3 * input.eye_height) / input.steepest.max(0.02)).max(0.5);
+        let end = (2.0 * f64::from(input.eye_height) * 6.371e6 / 0.87).sqrt() as f32;
+        let foam = Foam::new(input.wind, surface);
+        let mut steps = Vec::new();
+        let mut range = start * 0.85;
+        while range < end {
+            let row_span = range / (input.focal * input.eye_height) * range;
+            let limit = if range < FAR_M { STEP_MAX } else { STEP_MAX + (range / FAR_M - 1.0) * 0.01 };
+            let step = (row_span / STEPS_PER_ROW).clamp(2e-4 * range, limit.min(STEP_FAR) * range);
+            steps.push(make_step(input, surface, &resolved, whole, foam.as_ref(), range));
+            range += step;
+        }
+        let (first, last) = (start * 0.85, range);
+        let rows: Vec<Roughness> = (0..TABLE_ROWS)
+            .map(|i| {
+                let range = first * (last / first).powf(i as f32 / (TABLE_ROWS - 1) as f32);
+                make_step(input, surface, &resolved, whole, None, range).roughness
+            })
+            .collect();
+        for step in &mut steps {
+            step.table_row = (step.range / first).ln() / (last / first).ln() * (TABLE_ROWS - 1) as f32;
+        }
+        let haze = (0..360)
+            .map(|i| {
+                let a = i as f32 * TAU / 360.0;
+                sky.haze(Vec3::new(a.sin(), a.cos(), 0.0))
+            })
+            .collect();
+        Self {
+            steps,
+            table: WaterTable::new(&rows, dome, input.upwelling),
+            patches: Patches::new(input.wind_from, input.seed),
+            foam,
+            sun_irradiance: sky.sun_irradiance,
+            haze,
+        }
+    }
+
+    /// Paints the sea of `surface` seen by `view` from `eye_height` metres into `picture`.
+    pub fn draw(&self, surface: &Surface, sky: &Sky, view: &LevelView, eye_height: f32, picture: &mut SeaPicture) {
+        picture.texels.clear();
+        picture.texels.resize(view.width * view.height, [0.0; 4]);
+        picture.highest.clear();
+        picture.highest.resize(view.width, f32::MAX);
+        self.columns(view, &mut picture.columns);
+        for step in &self.steps {
+            picture.glitter.clear();
+            let last = view.width - 1;
+            picture.glitter.extend((0..=view.width.div_ceil(GLITTER_STRIDE)).map(|i| {
+                let column = picture.columns[(i * GLITTER_STRIDE).min(last)];
+                Glitter::new(&step.roughness, column.east, column.north, sky)
+            }));
+            self.ring(step, surface, view, eye_height, picture);
+        }
+    }
+
+    fn columns(&self, view: &LevelView, columns: &mut Vec<Column>) {
+        let (sin, cos) = view.azimuth.sin_cos();
+        columns.clear();
+        columns.extend((0..view.width).map(|x| {
+            let n = (x as f32 + 0.5 - view.centre) / view.focal;
+            let secant = (1.0 + n * n).sqrt();
+            let azimuth = (view.azimuth + n.atan()).rem_euclid(TAU);
+            let degree = azimuth.to_degrees();
+            let (low, fraction) = (degree as usize % 360, degree.fract());
+            let (a, b) = (self.haze[low], self.haze[(low + 1) % 360]);
+            Column {
+                east: (sin + n * cos) / secant,
+                north: (cos - n * sin) / secant,
+                scale: view.focal * secant,
+                table_column: azimuth * COLUMNS_PER_RADIAN,
+                haze: std::array::from_fn(|c| a[c] + fraction * (b[c] - a[c])),
+            }
+        }));
+    }
+
+    /// All columns at one distance.
+    fn ring(&self, step: &Step, surface: &Surface, view: &LevelView, eye_height: f32, picture: &mut SeaPicture) {
+        let slice = self.table.slice(step.table_row);
+        let inverse_range = 1.0 / step.range;
+        let sun = self.sun_irradiance;
+        for x in 0..view.width {
+            let column = picture.columns[x];
+            let (east, north) = (step.range * column.east, step.range * column.north);
+            let water = sample(step, surface, east, north);
+            let tangent = (water[0] - step.drop - eye_height) * inverse_range;
+            let row = view.level_row - column.scale * tangent;
+            let below = picture.highest[x];
+            if row >= below {
+                continue;
+            }
+            picture.highest[x] = row;
+            if below == f32::MAX || below <= 0.0 || row >= view.height as f32 {
+                continue;
+            }
+            let patch = self.patches.at(east, north);
+            let gain = 1.0 + 0.35 * patch.clamp(-1.5, 1.5);
+            let along = gain * (water[1] * column.east + water[2] * column.north) + 0.012 * patch;
+            let across = gain * (water[1] * column.north - water[2] * column.east);
+            let turned = (-2.0 * (along + step.grazing).max(0.0) * across).clamp(-0.6, 0.6);
+            let mut colour = slice.at(along, column.table_column + turned * COLUMNS_PER_RADIAN);
+            let shine = picture.glitter[x / GLITTER_STRIDE].at(along, across, colour[3]);
+            if shine > 0.0 {
+                let next = picture.glitter[x / GLITTER_STRIDE + 1].at(along, across, colour[3]);
+                let t = (x % GLITTER_STRIDE) as f32 / GLITTER_STRIDE as f32;
+                let shine = shine + t * (next - shine);
+                for c in 0..3 {
+                    colour[c] += shine * sun[c];
+                }
+            }
+            if let Some(foam) = &self.foam {
+                foam.cover(&mut colour, &water, step.foam_threshold, patch, column.haze);
+            }
+            for c in 0..3 {
+                colour[c] = column.haze[c] + step.transmittance * (colour[c] - column.haze[c]);
+            }
+            colour[3] = 1.0;
+            paint(&mut picture.texels, view, x, row, below, colour);
+        }
+    }
+}
+
+#[inline(always)]
+fn sample(step: &Step, surface: &Surface, east: f32, north: f32) -> [f32; 4] {
+    let mut water = [0.0f32; 4];
+    for (tile, &(level, share, shows)) in surface.tiles.iter().zip(&step.levels) {
+        if !shows {
+            continue;
+        }
+        let fine = tile.sample(level, east, north);
+        if share > 0.0 {
+            let coarse = tile.sample(level + 1, east, north);
+            for c in 0..4 {
+                water[c] += fine[c] + share * (coarse[c] - fine[c]);
+            }
+        } else {
+            for c in 0..4 {
+                water[c] += fine[c];
+            }
+        }
+    }
+    water
+}
+
+/// Adds `colour` to column `x` between rows `upper` and `lower` (not whole numbers), by covered share.
+#[inline(always)]
+fn paint(texels: &mut [[f32; 4]], view: &LevelView, x: usize, upper: f32, lower: f32, colour: [f32; 4]) {
+    let upper = upper.max(0.0);
+    let lower = lower.min(view.height as f32);
+    let mut row = floor(upper);
+    while row < lower {
+        let covered = (row + 1.0).min(lower) - row.max(upper);
+        if let Some(texel) = texels.get_mut(row as usize * view.width + x) {
+            for c in 0..4 {
+                texel[c] += covered * colour[c];
+            }
+        }
+        row += 1.0;
+    }
+}
+
+fn make_step(
+    input: &SeaShaderInput,
+    surface: &Surface,
+    resolved: &[[Covariance; LEVELS]; CASCADES],
+    whole: Covariance,
+    foam: Option<&Foam>,
+    range: f32,
+) -> Step {
+    let spacing = range / input.focal;
+    let mut seen = [0.0f32; 3];
+    let levels = std::array::from_fn(|c| {
+        let level = surface.tiles[c].level_for(spacing).clamp(0.0, (LEVELS - 1) as f32);
+        let (low, share) = ((level as usize).min(LEVELS - 2), level - (level as usize).min(LEVELS - 2) as f32);
+        let blend: Covariance = std::array::from_fn(|i| {
+            let (a, b) = (resolved[c][low][i], resolved[c][low + 1][i]);
+            a + share * (b - a)
+        });
+        let shows = blend[0] + blend[1] > 2e-3 * (resolved[c][0][0] + resolved[c][0][1]);
+        if shows {
+            for i in 0..3 {
+                seen[i] += blend[i];
+            }
+        }
+        (low, share, shows)
+    });
+    let drop = curvature_drop(f64::from(range)) as f32;
+    let floor = 0.06 * (whole[0] + whole[1]);
+    let residual =
+        [(whole[0] - seen[0]).max(floor), (whole[1] - seen[1]).max(floor), whole[2] - seen[2]];
+    // A covariance may not outgrow what its variances allow.
+    let limit = 0.8 * (residual[0] * residual[1]).sqrt();
+    let residual = [residual[0], residual[1], residual[2].clamp(-limit, limit)];
+    let slant = (input.eye_height + drop) / range;
+    // The line of sight meets the curved sea at less than its depression.
+    let bend = 2.0 * drop / range;
+    let grazing = (slant - bend).max(2e-4);
+    let grazing = grazing / (1.0 + grazing * grazing).sqrt();
+    let transmittance = (-3.912 * range / input.visibility_m).exp();
+    Step {
+        range,
+        drop,
+        table_row: 0.0,
+        grazing,
+        transmittance,
+        roughness: Roughness { range_m: range, grazing, residual },
+        levels,
+        foam_threshold: foam.map_or(0.0, |f| f.threshold(&levels)),
+    }
+}
+
+/// Slope variances up and across the wind as east, north and covariance.
+fn rotate_slopes([up, cross]: [f64; 2], wind_from: f64) -> Covariance {
+    let (e, n) = wind_from.sin_cos();
+    [
+        (up * e * e + cross * n * n) as f32,
+        (up * n * n + cross * e * e) as f32,
+        ((up - cross) * e * n) as f32,
+    ]
+}

@@ -1,0 +1,135 @@
+//! Everything that is prepared once, to draw any frame of a recording.
+
+use std::sync::Mutex;
+
+use bowwave_core::geometry::CameraPose;
+
+use super::{
+    MakeError,
+    camera::{Camera, Coverage, FrameMemory},
+    field::{Field, Surface},
+    march::{SeaShader, SeaShaderInput},
+    motion::Motion,
+    recipe::Recipe,
+    sky::{Dome, Panorama, Sky},
+    spectrum::{WindSea, cox_munk, wind_speed},
+};
+
+/// Draws the frames of one recipe. Frames may be drawn in any order and from several threads.
+pub struct Studio {
+    motion: Motion,
+    field: Field,
+    sky: Sky,
+    panorama: Panorama,
+    shader: SeaShader,
+    camera: Camera,
+    exposure_delay_s: f64,
+    frame_rate_hz: f64,
+    frames: u32,
+    size: (u32, u32),
+    /// Tiles and pictures of threads that are done with a frame, for the next one.
+    spare: Mutex<Vec<(Surface, FrameMemory)>>,
+}
+
+/// One drawn frame.
+pub struct Shot {
+    /// The picture as the camera delivers it.
+    pub jpeg: Vec<u8>,
+    /// Where the camera was at its exposure.
+    pub truth: CameraPose,
+}
+
+impl Studio {
+    /// Prepares waves, sky and camera; about a second of work.
+    pub fn new(recipe: &Recipe) -> Result<Self, MakeError> {
+        recipe.check()?;
+        let wind = wind_speed(recipe.beaufort);
+        let sea = WindSea::new(wind);
+        let field = Field::new(&sea, recipe.wind_from, recipe.swell.as_ref(), recipe.duration_s, recipe.seed);
+        let mut surface = field.surface();
+        field.evaluate(0.0, &mut surface);
+        let sky = Sky::new(&recipe.sky, recipe.seed).ok_or(MakeError::Recipe {
+            what: "sky.turbidity",
+            value: recipe.sky.turbidity,
+            range: "1 to 10",
+        })?;
+        let camera = Camera::new(recipe);
+        let coverage = Coverage::new(recipe);
+        let focal = recipe.lens().focal.x as f32;
+        let panorama = Panorama::new(&sky, coverage.azimuth, coverage.above, focal);
+        let dome = Dome::new(&sky);
+        let input = SeaShaderInput {
+            eye_height: recipe.eye_height_m as f32,
+            focal,
+            steepest: coverage.below,
+            visibility_m: recipe.visibility_m as f32,
+            slopes: cox_munk(wind),
+            wind_from: recipe.wind_from,
+            wind,
+            upwelling: upwelling(&sky),
+            seed: recipe.seed,
+        };
+        let shader = SeaShader::new(&input, &sky, &dome, &surface);
+        Ok(Self {
+            motion: recipe.motion(),
+            field,
+            sky,
+            panorama,
+            shader,
+            camera,
+            exposure_delay_s: recipe.exposure_delay_s(),
+            frame_rate_hz: recipe.frame_rate_hz,
+            frames: recipe.frames(),
+            size: (recipe.width, recipe.height),
+            spare: Mutex::new(vec![(surface, FrameMemory::default())]),
+        })
+    }
+
+    /// How many frames the recipe has.
+    pub fn frames(&self) -> u32 {
+        self.frames
+    }
+
+    /// Width and height of the pictures.
+    pub fn size(&self) -> (u32, u32) {
+        self.size
+    }
+
+    /// Frame number `frame`, from 0, as JPEG. Numbers beyond the last begin the loop again, with other noise.
+    pub fn shoot(&self, frame: u32) -> Result<Shot, MakeError> {
+        let (truth, jpeg) = self.draw(frame, |rgb| self.camera.encode(rgb));
+        let jpeg = jpeg.map_err(|source| MakeError::Encode { frame, source })?;
+        Ok(Shot { jpeg, truth })
+    }
+
+    /// The same frame before it is encoded: 8-bit sRGB, rows from the top.
+    pub fn shoot_rgb(&self, frame: u32) -> (CameraPose, Vec<u8>) {
+        self.draw(frame, <[u8]>::to_vec)
+    }
+
+    fn draw<T>(&self, frame: u32, take: impl FnOnce(&[u8]) -> T) -> (CameraPose, T) {
+        let spare = self.spare.lock().ok().and_then(|mut spare| spare.pop());
+        let (mut surface, mut memory) = spare.unwrap_or_else(|| (self.field.surface(), FrameMemory::default()));
+        let time_s = f64::from(frame) / self.frame_rate_hz + self.exposure_delay_s;
+        let pose = self.motion.at(time_s).pose;
+        self.field.evaluate(time_s, &mut surface);
+        self.camera.expose(&self.shader, &surface, &self.sky, &self.panorama, &pose, frame, &mut memory);
+        let taken = take(&memory.rgb);
+        if let Ok(mut spare) = self.spare.lock() {
+            spare.push((surface, memory));
+        }
+        (pose, taken)
+    }
+}
+
+/// Light that comes up out of clear deep water, in the picture's units: 2 to 5 % of what falls on it, blue-green (Mobley
+/// 1994, irradiance reflectance of open water at 450, 550 and 620 nm, spread over the hemisphere and dimmed by the surface).
+fn upwelling(sky: &Sky) -> [f32; 3] {
+    let overhead = sky.clear(glam::Vec3::Z);
+    let sin = sky.sun.z;
+    std::array::from_fn(|c| {
+        let falling = sky.sun_irradiance[c] * sin + std::f32::consts::PI * 1.2 * overhead[c];
+        let reflectance = [0.0045, 0.021, 0.034][c];
+        falling * reflectance / (std::f32::consts::PI * 1.9)
+    })
+}
