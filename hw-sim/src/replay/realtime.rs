@@ -1,0 +1,341 @@
+//! Replay on the host's clock, through a pseudo-terminal.
+
+use std::{
+    path::Path,
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::{self, JoinHandle},
+};
+
+use bowwave_core::{
+    event::{CameraFrame, Event, TriggerEdge},
+    time::Time,
+};
+use bowwave_devices::{
+    clock,
+    queue::{NewestSender, newest},
+    serial::ImuPort,
+};
+use bowwave_record::FrameEntry;
+use crossbeam_channel::{Receiver, Sender, bounded};
+
+use super::{
+    ReplayError, ReplayOptions, ReplayStats, Shared, Source,
+    decode::FrameDecoder,
+    locked,
+    wire::{Item, Wire},
+};
+use crate::pty::Terminal;
+
+/// From opening to the recording's beginning: time to read and decode the first picture ahead.
+const PREROLL_NS: i64 = 60_000_000;
+
+/// How long before its time a picture is decoded: late enough that the decoder does not compete with the rendering of the
+/// picture before, early enough for a big picture.
+const DECODE_LEAD_NS: i64 = 12_000_000;
+
+/// Pictures older than this when their turn comes are not decoded any more.
+const LATE_MAX_NS: i64 = 100_000_000;
+
+/// Longest sleep before a thread looks at whether to stop.
+const NAP_NS: i64 = 50_000_000;
+
+/// How long the line stays open after its last byte, for the reader to fetch it.
+const LINGER_NS: i64 = 50_000_000;
+
+/// Delivered and not yet fetched: pictures and trigger edges. Samples wait in the serial port's own queue.
+const QUEUE_FRAMES: usize = 4;
+const QUEUE_TRIGGERS: usize = 256;
+
+/// Read ahead and not yet due: coded pictures, and bytes and edges of the time that those pictures span.
+const AHEAD_FRAMES: usize = 8;
+const AHEAD_LINE: usize = 4096;
+
+/// The baud rate is a matter of form on a pseudo-terminal.
+const BAUD: u32 = 921_600;
+
+/// A replay on the host's clock. Its times are the recorded ones moved by one constant; samples of the inertial unit
+/// arrive when the serial code reads them, and keep the unit's own clock.
+pub struct RealtimeReplay {
+    source: Source,
+    port: ImuPort,
+    frames: Receiver<Event>,
+    triggers: Receiver<Event>,
+    errors: Receiver<ReplayError>,
+    stop: StopOnDrop,
+    stats: Shared<ReplayStats>,
+    reader: JoinHandle<()>,
+    camera: JoinHandle<()>,
+    /// Gives its terminal back at its end, so that the line does not hang up before the port is closed.
+    line: JoinHandle<Terminal>,
+}
+
+impl RealtimeReplay {
+    pub(super) fn open(path: &Path, options: &ReplayOptions) -> Result<Self, ReplayError> {
+        let (source, wire) = Source::open(path, options, Some(clock::now().plus_ns(PREROLL_NS)))?;
+        let terminal = Terminal::open().map_err(|source| ReplayError::Terminal { what: "open", source })?;
+        let port = ImuPort::open(terminal.slave(), BAUD)?;
+        let stop = Arc::new(AtomicBool::new(false));
+        let stats = Arc::new(Mutex::new(ReplayStats::default()));
+        let pace = || Pace { stop: Arc::clone(&stop), stats: Arc::clone(&stats) };
+        let (errors_in, errors) = bounded(2);
+        let (coded_in, coded) = bounded(AHEAD_FRAMES);
+        let (due_in, due) = bounded(AHEAD_LINE);
+        let (frames_in, frames) = newest(QUEUE_FRAMES);
+        let (triggers_in, triggers) = newest(QUEUE_TRIGGERS);
+        let line = Line { pace: pace(), due, terminal, triggers: triggers_in, errors: errors_in.clone() };
+        let camera = Camera { pace: pace(), coded, decoder: FrameDecoder::default(), frames: frames_in };
+        let reader = Reader { pace: pace(), wire, coded: coded_in, due: due_in, errors: errors_in };
+        // Where one cannot be started, those before it end with their channels.
+        let line = spawn("replay-line", move || line.run())?;
+        let camera = spawn("replay-camera", move || camera.run())?;
+        let reader = spawn("replay-reader", move || reader.run())?;
+        Ok(Self {
+            source,
+            port,
+            frames,
+            triggers,
+            errors,
+            stop: StopOnDrop(stop),
+            stats,
+            reader,
+            camera,
+            line,
+        })
+    }
+
+    pub(super) const fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// Appends what has been delivered since the last call, by arrival; never waits. What went wrong comes after all events
+    /// before it.
+    pub fn drain(&mut self, out: &mut Vec<Event>) -> Result<(), ReplayError> {
+        let ended = self.threads_ended();
+        let before = out.len();
+        out.extend(self.port.events().try_iter());
+        out.extend(self.frames.try_iter());
+        out.extend(self.triggers.try_iter());
+        if let Some(fetched) = out.get_mut(before..) {
+            fetched.sort_by_key(Event::arrival);
+        }
+        if ended && let Ok(error) = self.errors.try_recv() {
+            return Err(error);
+        }
+        Ok(())
+    }
+
+    /// Whether everything was delivered and fetched.
+    pub fn finished(&self) -> bool {
+        self.threads_ended()
+            && self.port.events().is_empty()
+            && self.frames.is_empty()
+            && self.triggers.is_empty()
+            && self.errors.is_empty()
+    }
+
+    fn threads_ended(&self) -> bool {
+        self.reader.is_finished() && self.camera.is_finished() && self.line.is_finished()
+    }
+
+    /// What was delivered and left out so far.
+    pub fn stats(&self) -> ReplayStats {
+        ReplayStats { imu: self.port.counters(), ..*locked(&self.stats) }
+    }
+
+    /// Ends the threads and closes the line.
+    pub fn stop(self) -> Result<ReplayStats, ReplayError> {
+        self.stop.0.store(true, Ordering::Relaxed);
+        let broke_down = |name| move |_| ReplayError::BrokeDown { name };
+        // All are asked to end before any failure is reported.
+        let line = self.line.join().map_err(broke_down("replay-line"));
+        let camera = self.camera.join().map_err(broke_down("replay-camera"));
+        let reader = self.reader.join().map_err(broke_down("replay-reader"));
+        let imu = self.port.stop()?;
+        drop(line?);
+        camera?;
+        reader?;
+        Ok(ReplayStats { imu, ..*locked(&self.stats) })
+    }
+}
+
+/// Has the threads end where a replay is dropped without [`RealtimeReplay::stop`].
+struct StopOnDrop(Arc<AtomicBool>);
+
+impl Drop for StopOnDrop {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+fn spawn<T: Send + 'static>(
+    name: &'static str,
+    run: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, ReplayError> {
+    thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(run)
+        .map_err(|source| ReplayError::Thread { name, source })
+}
+
+/// What the threads share.
+struct Pace {
+    stop: Arc<AtomicBool>,
+    stats: Shared<ReplayStats>,
+}
+
+impl Pace {
+    fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Waits for `due`; `false` where the replay is stopped before that.
+    fn wait(&self, due: Time) -> bool {
+        loop {
+            if self.stopped() {
+                return false;
+            }
+            let now = clock::now();
+            if now >= due {
+                return true;
+            }
+            clock::sleep_until(due.min(now.plus_ns(NAP_NS)));
+        }
+    }
+
+    fn count(&self, change: impl FnOnce(&mut ReplayStats)) {
+        change(&mut locked(&self.stats));
+    }
+}
+
+/// Reads ahead and parts the wires.
+struct Reader {
+    pace: Pace,
+    wire: Wire,
+    coded: Sender<FrameEntry>,
+    due: Sender<Due>,
+    errors: Sender<ReplayError>,
+}
+
+/// What the line's thread does at a time.
+enum Due {
+    Bytes(Time, Vec<u8>),
+    Trigger(TriggerEdge),
+}
+
+impl Reader {
+    /// Ends with the recording, or when the other threads have.
+    fn run(mut self) {
+        while let Some(item) = self.wire.next() {
+            let taken = match item {
+                Ok(Item::Frame(frame)) => self.coded.send(frame).is_ok(),
+                Ok(Item::Bytes { due, bytes }) => self.due.send(Due::Bytes(due, bytes)).is_ok(),
+                Ok(Item::Trigger(edge)) => self.due.send(Due::Trigger(edge)).is_ok(),
+                Err(error) => {
+                    // Room for one from each sender; where it is full something else has been reported.
+                    drop(self.errors.try_send(error.into()));
+                    true
+                }
+            };
+            self.pace.count(|stats| stats.take(self.wire.counters()));
+            if !taken || self.pace.stopped() {
+                return;
+            }
+        }
+    }
+}
+
+/// The inertial unit and the trigger switch.
+struct Line {
+    pace: Pace,
+    due: Receiver<Due>,
+    terminal: Terminal,
+    triggers: NewestSender<Event>,
+    errors: Sender<ReplayError>,
+}
+
+impl Line {
+    fn run(mut self) -> Terminal {
+        while let Ok(due) = self.due.recv() {
+            let time = match &due {
+                Due::Bytes(time, _) => *time,
+                Due::Trigger(edge) => edge.time,
+            };
+            if !self.pace.wait(time) {
+                return self.terminal;
+            }
+            match due {
+                Due::Bytes(_, bytes) => match self.terminal.send(&bytes) {
+                    Ok(0) => {}
+                    Ok(lost) => self.pace.count(|stats| stats.line_lost_bytes += lost as u64),
+                    Err(source) => {
+                        // As above: the first report is enough.
+                        drop(self.errors.try_send(ReplayError::Terminal { what: "write to", source }));
+                        return self.terminal;
+                    }
+                },
+                Due::Trigger(edge) => {
+                    self.triggers.send(Event::Trigger(edge));
+                    let overwritten = self.triggers.dropped();
+                    self.pace.count(|stats| {
+                        stats.triggers += 1;
+                        stats.triggers_overwritten = overwritten;
+                    });
+                }
+            }
+        }
+        self.pace.wait(clock::now().plus_ns(LINGER_NS));
+        self.terminal
+    }
+}
+
+/// The camera.
+struct Camera {
+    pace: Pace,
+    coded: Receiver<FrameEntry>,
+    decoder: FrameDecoder,
+    frames: NewestSender<Event>,
+}
+
+impl Camera {
+    fn run(mut self) {
+        while let Ok(frame) = self.coded.recv() {
+            if !self.deliver(frame) {
+                return;
+            }
+        }
+    }
+
+    /// Decodes ahead of time and delivers in time; `false` where the replay is stopped.
+    fn deliver(&mut self, frame: FrameEntry) -> bool {
+        let due = frame.arrival;
+        if !self.pace.wait(due.plus_ns(-DECODE_LEAD_NS)) {
+            return false;
+        }
+        if clock::now().ns_since(due) > LATE_MAX_NS {
+            self.pace.count(|stats| stats.frames_late += 1);
+            return true;
+        }
+        let picture = self.decoder.decode(&frame.jpeg);
+        if !self.pace.wait(due) {
+            return false;
+        }
+        if let Some(picture) = picture {
+            self.frames.send(Event::Frame(CameraFrame {
+                arrival: clock::now(),
+                mid_exposure: frame.mid_exposure,
+                sequence: frame.sequence,
+                picture,
+                jpeg: Some(frame.jpeg),
+            }));
+        }
+        let (counters, overwritten) = (self.decoder.counters(), self.frames.dropped());
+        self.pace.count(|stats| {
+            stats.frames = counters;
+            stats.frames_overwritten = overwritten;
+        });
+        true
+    }
+}

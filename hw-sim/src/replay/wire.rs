@@ -1,0 +1,108 @@
+//! What the simulated hardware puts on its wires, faults included: the same for both modes.
+
+use std::sync::Arc;
+
+use bowwave_core::{
+    event::{ImuSample, TriggerEdge},
+    time::Time,
+};
+use bowwave_devices::vectornav::CommonOutput;
+use bowwave_record::{Entry, FrameEntry, RecordError};
+
+use super::laps::Laps;
+use crate::fault::{FaultPlan, Injector, Picture};
+
+/// Something on a wire.
+pub(super) enum Item {
+    /// Bytes on the inertial unit's line.
+    Bytes {
+        /// When the last of them reaches the host.
+        due: Time,
+        /// A packet, and what precedes it.
+        bytes: Vec<u8>,
+    },
+    /// A picture, still coded.
+    Frame(FrameEntry),
+    /// A trigger edge.
+    Trigger(TriggerEdge),
+}
+
+/// Items by replay time.
+pub(super) struct Wire {
+    laps: Laps,
+    origin: Time,
+    injector: Injector,
+    unsendable: u64,
+}
+
+/// What was put on the wires.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct WireCounters {
+    pub(super) rounds: u64,
+    pub(super) altered: u64,
+    pub(super) unsendable: u64,
+}
+
+impl Wire {
+    pub(super) fn new(laps: Laps, origin: Time, faults: FaultPlan) -> Self {
+        Self { laps, origin, injector: Injector::new(faults), unsendable: 0 }
+    }
+
+    pub(super) const fn counters(&self) -> WireCounters {
+        WireCounters {
+            rounds: self.laps.rounds(),
+            altered: self.injector.altered(),
+            unsendable: self.unsendable,
+        }
+    }
+
+    fn bytes(&mut self, sample: ImuSample) -> Option<Item> {
+        let due = sample.arrival;
+        let since = due.ns_since(self.origin);
+        let sent = self.injector.sample(sample, since)?;
+        let Some(output) = CommonOutput::from_sample(&sent) else {
+            if self.unsendable == 0 {
+                log::warn!(
+                    "{}: a sample of the inertial unit at {due} has a device time before the unit's start-up and cannot be \
+                     sent; such samples are left out",
+                    self.laps.path().display()
+                );
+            }
+            self.unsendable += 1;
+            return None;
+        };
+        let mut bytes = Vec::with_capacity(CommonOutput::MAX_BYTES);
+        self.injector.garbage(since, &mut bytes);
+        output.encode(&mut bytes);
+        Some(Item::Bytes { due, bytes })
+    }
+
+    fn frame(&mut self, frame: FrameEntry) -> Option<Item> {
+        let since = frame.arrival.ns_since(self.origin);
+        match self.injector.picture(&frame.jpeg, self.laps.picture(), since) {
+            Picture::Same => Some(Item::Frame(frame)),
+            Picture::None => None,
+            Picture::Other(jpeg) => Some(Item::Frame(FrameEntry { jpeg: Arc::from(jpeg), ..frame })),
+        }
+    }
+}
+
+impl Iterator for Wire {
+    type Item = Result<Item, RecordError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        loop {
+            let item = match self.laps.next()? {
+                Ok(Entry::Imu(sample)) => self.bytes(sample),
+                Ok(Entry::Frame(frame)) => self.frame(frame),
+                Ok(Entry::Trigger(edge)) => Some(Item::Trigger(edge)),
+                // What is known afterwards comes over no wire.
+                Ok(Entry::Truth(_) | Entry::Pose(_)) => None,
+                Err(error) => return Some(Err(error)),
+            };
+            if let Some(item) = item {
+                return Some(Ok(item));
+            }
+        }
+    }
+}
