@@ -20,6 +20,7 @@ layout(location = 0) out vec4 colour;
 void main() {
     BoatBlock boat = boats[draw.index];
     vec3 reflectance = albedo;
+    int mask = -1;
     if (TEXTURED) {
         vec4 texel = texture(skin, uv);
         // Covered samples in a fixed order: neighbouring triangles of one picture then agree.
@@ -27,9 +28,10 @@ void main() {
         if (covered == 0) {
             discard;
         }
-        gl_SampleMask[0] = int((1u << covered) - 1u);
+        mask = int((1u << covered) - 1u);
         reflectance *= texel.rgb;
     }
+    gl_SampleMask[0] = mask;
     // Shells are seen from both sides; the side that is seen is the one that is lit.
     vec3 n = normalize(normal);
     n = dot(n, boat.eye.xyz - position) < 0.0 ? -n : n;

@@ -1,1 +1,27 @@
-//! The Vulkan renderer.
+//! The Vulkan renderer: takes a frame's [`Scene`](bowwave_core::scene::Scene) and the camera's picture, gives back sRGB pixels.
+//!
+//! One thread submits frames to a [`Renderer`]; another takes the finished ones from [`Completions`]. Between them lies a ring
+//! of a few frames; nobody waits for the GPU within a frame. Light is linear inside, sRGB at the edges: the screen image is
+//! seen as codes by the video pass and as linear light by everything that blends.
+
+mod error;
+mod frame_data;
+mod glyphs;
+mod gpu;
+mod hud_layout;
+mod memory;
+mod meshes;
+mod passes;
+mod pipeline;
+mod renderer;
+mod ring;
+#[cfg(test)]
+mod testing;
+mod upload;
+mod view;
+
+pub use error::RenderError;
+pub use gpu::{DeviceInfo, devices};
+pub use passes::video::PictureShape;
+pub use renderer::{Needs, RenderConfig, Renderer};
+pub use ring::{Completions, Finished};

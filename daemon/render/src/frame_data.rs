@@ -1,0 +1,119 @@
+//! The per-slot upload buffer: one block for each thing that the shaders read, in fixed regions, written by the host before each
+//! submission.
+
+use std::sync::Arc;
+
+use ash::vk;
+use bytemuck::Pod;
+use shaders_spirv::interface::{BoatBlock, FrameBlock, HudQuad, RoundBlock, WaterBlock};
+
+use crate::{
+    error::RenderError,
+    gpu::Gpu,
+    memory::{Access, Buffer},
+    pipeline::{Bound, SetLayout, SetPool},
+};
+
+/// Most quads of the head-up display.
+pub(crate) const QUADS_MAX: usize = 256;
+
+/// Offset and bytes of each region.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Region {
+    offset: u64,
+    size: u64,
+}
+
+/// How many of each thing there can be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Capacity {
+    pub(crate) boats: usize,
+    pub(crate) rounds: usize,
+}
+
+/// One slot's upload buffer with the descriptor set that points into it.
+pub(crate) struct FrameData {
+    buffer: Buffer,
+    regions: [Region; 5],
+    pub(crate) set: vk::DescriptorSet,
+}
+
+/// Descriptor kinds of set 0.
+pub(crate) fn frame_set_layout(gpu: &Arc<Gpu>) -> Result<SetLayout, RenderError> {
+    const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
+    let kinds = [vk::DescriptorType::UNIFORM_BUFFER, STORAGE, STORAGE, STORAGE, STORAGE];
+    SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
+}
+
+impl FrameData {
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        pool: &SetPool,
+        layout: &SetLayout,
+        capacity: Capacity,
+    ) -> Result<Self, RenderError> {
+        let align = gpu
+            .limits
+            .min_uniform_buffer_offset_alignment
+            .max(gpu.limits.min_storage_buffer_offset_alignment)
+            .max(64);
+        // Direct and mirrored blocks of each boat.
+        let sizes = [
+            size_of::<FrameBlock>(),
+            size_of::<BoatBlock>() * capacity.boats.max(1) * 2,
+            size_of::<WaterBlock>() * capacity.boats.max(1),
+            size_of::<RoundBlock>() * capacity.rounds.max(1),
+            size_of::<HudQuad>() * QUADS_MAX,
+        ];
+        let mut end = 0;
+        let regions = sizes.map(|size| {
+            let region = Region { offset: end, size: size as u64 };
+            end = (end + region.size).next_multiple_of(align);
+            region
+        });
+        let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
+        let buffer = Buffer::new(gpu, "frame data", end, usage, Access::Upload)?;
+        let at = |i: usize| (buffer.raw, regions[i].offset, regions[i].size);
+        let storage = |i: usize| {
+            let (buffer, offset, size) = at(i);
+            Bound::Storage { buffer, offset, size }
+        };
+        let (uniform, offset, size) = at(0);
+        let bound = [
+            Bound::Uniform { buffer: uniform, offset, size },
+            storage(1),
+            storage(2),
+            storage(3),
+            storage(4),
+        ];
+        let set = pool.set(layout, &bound)?;
+        Ok(Self { buffer, regions, set })
+    }
+
+    pub(crate) fn write_frame(&mut self, block: &FrameBlock) {
+        self.write(0, std::slice::from_ref(block));
+    }
+
+    pub(crate) fn write_boats(&mut self, blocks: &[BoatBlock]) {
+        self.write(1, blocks);
+    }
+
+    pub(crate) fn write_waters(&mut self, blocks: &[WaterBlock]) {
+        self.write(2, blocks);
+    }
+
+    pub(crate) fn write_rounds(&mut self, blocks: &[RoundBlock]) {
+        self.write(3, blocks);
+    }
+
+    pub(crate) fn write_quads(&mut self, blocks: &[HudQuad]) {
+        self.write(4, blocks);
+    }
+
+    fn write<T: Pod>(&mut self, region: usize, blocks: &[T]) {
+        let Region { offset, size } = self.regions[region];
+        let bytes: &[u8] = bytemuck::cast_slice(blocks);
+        let room = usize::try_from(size).unwrap_or(0).min(bytes.len());
+        self.buffer.write(offset, &bytes[..room]);
+    }
+}

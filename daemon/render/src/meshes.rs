@@ -1,0 +1,253 @@
+//! All models on the device: one vertex buffer, one index buffer, a texture each where there is one.
+
+use std::sync::Arc;
+
+use ash::vk;
+use bowwave_core::model::{Model, ModelId, Texture};
+use shaders_spirv::interface::MeshVertex;
+
+use crate::{
+    error::RenderError,
+    gpu::Gpu,
+    memory::{Access, Buffer, Image, ImageShape},
+    passes::Making,
+    pipeline::{Bound, Recorder, SRGB, Sampler, SetLayout},
+    upload::upload_image,
+};
+
+/// One model's place in the shared buffers.
+struct Mesh {
+    first_index: u32,
+    indices: u32,
+    first_vertex: i32,
+    /// Set 1: the model's texture, or the blank one.
+    skin: vk::DescriptorSet,
+    textured: bool,
+    _texture: Option<Image>,
+}
+
+/// The models.
+pub(crate) struct Meshes {
+    meshes: Vec<Mesh>,
+    vertices: Buffer,
+    indices: Buffer,
+    pub(crate) skin_layout: SetLayout,
+    /// One white pixel, bound where a model has no texture: the shader names one in every variant.
+    _blank: Image,
+    _sampler: Sampler,
+}
+
+impl Meshes {
+    pub(crate) fn new(making: &Making<'_>, models: &[Model]) -> Result<Self, RenderError> {
+        let gpu = making.gpu;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
+        let skin_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let sampler = Sampler::new(gpu, vk::Filter::LINEAR, true)?;
+        let skin_of = |image: &Image| {
+            let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+            making
+                .pool
+                .set(&skin_layout, &[Bound::Texture { view: image.view, sampler: sampler.raw, layout }])
+        };
+        let blank = upload_texture(gpu, "blank", &Texture { width: 1, height: 1, rgba: vec![255; 4] })?;
+        let blank_skin = skin_of(&blank)?;
+        let (mut vertices, mut indices, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
+        for model in models {
+            check(model)?;
+            let too_big =
+                |_| RenderError::Model { name: model.name.clone(), why: "too many corners".to_owned() };
+            let texture = model.texture.as_ref().map(|t| upload_texture(gpu, &model.name, t)).transpose()?;
+            let skin = texture.as_ref().map(skin_of).transpose()?.unwrap_or(blank_skin);
+            meshes.push(Mesh {
+                first_index: u32::try_from(indices.len()).map_err(too_big)?,
+                indices: u32::try_from(model.indices.len()).map_err(too_big)?,
+                first_vertex: i32::try_from(vertices.len()).map_err(too_big)?,
+                skin,
+                textured: texture.is_some(),
+                _texture: texture,
+            });
+            indices.extend_from_slice(&model.indices);
+            vertices.extend(model.vertices.iter().map(|v| MeshVertex {
+                position: v.position.to_array(),
+                normal: v.normal.to_array(),
+                uv: v.uv.to_array(),
+                albedo: v.albedo.to_array(),
+            }));
+        }
+        let vertices = filled(
+            gpu,
+            "models' corners",
+            bytemuck::cast_slice(&vertices),
+            vk::BufferUsageFlags::VERTEX_BUFFER,
+        )?;
+        let indices = filled(
+            gpu,
+            "models' triangles",
+            bytemuck::cast_slice(&indices),
+            vk::BufferUsageFlags::INDEX_BUFFER,
+        )?;
+        Ok(Self { meshes, vertices, indices, skin_layout, _blank: blank, _sampler: sampler })
+    }
+
+    /// Descriptor set of a model's texture, and whether it is one of its own.
+    pub(crate) fn skin(&self, model: ModelId) -> Option<(vk::DescriptorSet, bool)> {
+        self.meshes.get(usize::from(model.0)).map(|m| (m.skin, m.textured))
+    }
+
+    /// Binds the shared buffers.
+    pub(crate) fn bind(&self, to: Recorder<'_>) {
+        // SAFETY: both buffers are live and have the usage.
+        unsafe {
+            to.gpu.device.cmd_bind_vertex_buffers(to.cmd, 0, &[self.vertices.raw], &[0]);
+            to.gpu.device.cmd_bind_index_buffer(to.cmd, self.indices.raw, 0, vk::IndexType::UINT32);
+        }
+    }
+
+    /// Draws one model; what is not there is not drawn.
+    pub(crate) fn draw(&self, to: Recorder<'_>, model: ModelId) {
+        let Some(mesh) = self.meshes.get(usize::from(model.0)) else { return };
+        // SAFETY: within a rendering, with buffers and pipeline bound; the ranges were checked when the model was taken.
+        unsafe {
+            to.gpu.device.cmd_draw_indexed(to.cmd, mesh.indices, 1, mesh.first_index, mesh.first_vertex, 0);
+        }
+    }
+}
+
+/// Refuses what would make the GPU read beyond its buffers.
+fn check(model: &Model) -> Result<(), RenderError> {
+    let bad = |why: String| Err(RenderError::Model { name: model.name.clone(), why });
+    if let Some(i) = model.indices.iter().find(|i| **i as usize >= model.vertices.len()) {
+        return bad(format!("a triangle names corner {i} of {}", model.vertices.len()));
+    }
+    if !model.indices.len().is_multiple_of(3) {
+        return bad(format!("{} indices are no whole triangles", model.indices.len()));
+    }
+    if model.vertices.iter().any(|v| !(v.position.is_finite() && v.normal.is_finite() && v.uv.is_finite())) {
+        return bad("a corner is not finite".to_owned());
+    }
+    if let Some(t) = &model.texture {
+        let expected = t.width as usize * t.height as usize * 4;
+        if t.width == 0 || t.height == 0 || t.rgba.len() != expected {
+            return bad(format!("its {}x{} texture has {} bytes", t.width, t.height, t.rgba.len()));
+        }
+    }
+    Ok(())
+}
+
+fn filled(
+    gpu: &Arc<Gpu>,
+    what: &'static str,
+    bytes: &[u8],
+    usage: vk::BufferUsageFlags,
+) -> Result<Buffer, RenderError> {
+    let mut buffer = Buffer::new(gpu, what, bytes.len() as u64, usage, Access::Upload)?;
+    buffer.write(0, bytes);
+    Ok(buffer)
+}
+
+fn upload_texture(gpu: &Arc<Gpu>, name: &str, texture: &Texture) -> Result<Image, RenderError> {
+    let max = gpu.limits.max_image_dimension2_d;
+    if texture.width > max || texture.height > max {
+        let why = format!("its {}x{} texture exceeds the GPU's {max} pixels", texture.width, texture.height);
+        return Err(RenderError::Model { name: name.to_owned(), why });
+    }
+    let levels = smaller_levels(texture);
+    let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
+    let mut shape = ImageShape::new((texture.width, texture.height), SRGB, usage);
+    shape.levels = u32::try_from(levels.len() + 1).unwrap_or(1);
+    let image = Image::new(gpu, "models' textures", shape)?;
+    let all: Vec<&[u8]> =
+        std::iter::once(&texture.rgba[..]).chain(levels.iter().map(Vec::as_slice)).collect();
+    upload_image(gpu, &image, &all)?;
+    Ok(image)
+}
+
+/// Levels 1 and on: each the mean of 2 x 2 pixels of the one before, in linear light and weighted by alpha, so that what lies
+/// under transparent pixels does not bleed in.
+fn smaller_levels(texture: &Texture) -> Vec<Vec<u8>> {
+    let mut levels: Vec<Vec<u8>> = Vec::new();
+    let (mut width, mut height) = (texture.width as usize, texture.height as usize);
+    while width > 1 || height > 1 {
+        let from = levels.last().map_or(&texture.rgba[..], Vec::as_slice);
+        let (w, h) = ((width / 2).max(1), (height / 2).max(1));
+        let mut next = Vec::with_capacity(w * h * 4);
+        for y in 0..h {
+            for x in 0..w {
+                next.extend_from_slice(&mean(from, (width, height), (x * 2, y * 2)));
+            }
+        }
+        levels.push(next);
+        (width, height) = (w, h);
+    }
+    levels
+}
+
+fn mean(from: &[u8], (width, height): (usize, usize), (x, y): (usize, usize)) -> [u8; 4] {
+    let (mut light, mut alpha) = ([0.0_f32; 3], 0.0_f32);
+    for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+        let i = ((y + dy).min(height - 1) * width + (x + dx).min(width - 1)) * 4;
+        let a = f32::from(from[i + 3]) / 255.0;
+        for (sum, code) in light.iter_mut().zip(&from[i..i + 3]) {
+            *sum += linear(*code) * a;
+        }
+        alpha += a;
+    }
+    let rgb = light.map(|sum| code(sum / alpha.max(1e-6)));
+    [rgb[0], rgb[1], rgb[2], (alpha / 4.0 * 255.0).round() as u8]
+}
+
+/// IEC 61966-2-1.
+fn linear(code: u8) -> f32 {
+    let c = f32::from(code) / 255.0;
+    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+}
+
+/// IEC 61966-2-1, back.
+fn code(linear: f32) -> u8 {
+    let c = if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    (c * 255.0).round().clamp(0.0, 255.0) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+
+    #[test]
+    fn smaller_levels_keep_light_and_ignore_what_is_transparent() {
+        let mut rgba = Vec::new();
+        for i in 0..16 {
+            // A white and black board, in light half as bright, with one transparent red pixel.
+            let on = (i / 4 + i % 4) % 2 == 0;
+            rgba.extend_from_slice(if i == 15 {
+                &[255, 0, 0, 0]
+            } else if on {
+                &[255; 4]
+            } else {
+                &[0, 0, 0, 255]
+            });
+        }
+        let levels = smaller_levels(&Texture { width: 4, height: 4, rgba });
+        assert_eq!(levels.iter().map(Vec::len).collect::<Vec<_>>(), [16, 4]);
+        assert_eq!(levels[0][..4], [188, 188, 188, 255]);
+        assert_eq!(levels[0][12..], [code(1.0 / 3.0), code(1.0 / 3.0), code(1.0 / 3.0), 191]);
+    }
+
+    #[test]
+    fn models_that_would_be_read_out_of_bounds_are_refused() {
+        let good = testing::box_model("box", [4.0, 2.0, 1.5], [0.5; 3]);
+        assert_eq!(check(&good), Ok(()));
+        let mut bad = good.clone();
+        bad.indices[4] = 9999;
+        assert!(check(&bad).unwrap_err().to_string().contains("corner 9999"));
+        let mut bad = good.clone();
+        bad.indices.pop();
+        assert!(check(&bad).is_err());
+        let mut bad = good.clone();
+        bad.texture = Some(Texture { width: 2, height: 2, rgba: vec![0; 15] });
+        assert!(check(&bad).unwrap_err().to_string().contains("2x2"));
+        let mut bad = good;
+        bad.vertices[0].position.x = f32::NAN;
+        assert!(check(&bad).is_err());
+    }
+}

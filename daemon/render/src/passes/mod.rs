@@ -1,0 +1,66 @@
+//! The passes, one file each, run as a plain ordered list by the renderer.
+
+pub(crate) mod boats;
+pub(crate) mod hud;
+pub(crate) mod video;
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::{
+    gpu::Gpu,
+    pipeline::{SetLayout, SetPool},
+};
+
+/// What every pass is made from.
+pub(crate) struct Making<'a> {
+    pub(crate) gpu: &'a Arc<Gpu>,
+    /// Layout of set 0.
+    pub(crate) frame_set: &'a SetLayout,
+    /// Sets that live as long as the renderer.
+    pub(crate) pool: &'a SetPool,
+    /// The screen, pixels.
+    pub(crate) size: (u32, u32),
+    /// Frames in flight.
+    pub(crate) slots: usize,
+}
+
+/// A stage, an access and a layout of an image.
+pub(crate) type Use = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
+
+/// Contents do not matter, but what came before must be over.
+pub(crate) const FORGET_READ: Use =
+    (vk::PipelineStageFlags2::FRAGMENT_SHADER, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+/// Drawn to.
+pub(crate) const DRAWN: Use = (
+    vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+    vk::AccessFlags2::from_raw(
+        vk::AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw() | vk::AccessFlags2::COLOR_ATTACHMENT_READ.as_raw(),
+    ),
+    vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+);
+/// Depth tested and written.
+pub(crate) const DEPTH_TESTED: Use = (
+    vk::PipelineStageFlags2::from_raw(
+        vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS.as_raw()
+            | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS.as_raw(),
+    ),
+    vk::AccessFlags2::from_raw(
+        vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ.as_raw()
+            | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw(),
+    ),
+    vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
+);
+/// Read by a fragment shader.
+pub(crate) const SAMPLED: Use = (
+    vk::PipelineStageFlags2::FRAGMENT_SHADER,
+    vk::AccessFlags2::SHADER_SAMPLED_READ,
+    vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+);
+/// Source of a copy.
+pub(crate) const COPIED_FROM: Use =
+    (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_READ, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
+/// Target of a copy.
+pub(crate) const COPIED_TO: Use =
+    (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);

@@ -1,0 +1,128 @@
+//! Scenes and models that tests are made of.
+
+use bowwave_core::{
+    geometry::{CameraPose, Lens, RigidPose, look},
+    model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
+    scene::{
+        BoatView, Hud, LeftOut, Light, Pass, PassDecision, PixelRect, ReflectionMethod, Scene, ShadowLevel,
+        Status, Water,
+    },
+    sea::BeaufortForce,
+};
+use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
+
+/// A scene without boats, seen from 8 m above the sea to the north.
+pub fn empty_scene(width: u32, height: u32) -> Scene {
+    let mut passes = [PassDecision::LeftOut(LeftOut::NoBoats); Pass::COUNT];
+    passes[Pass::Video as usize] = PassDecision::Run;
+    passes[Pass::Hud as usize] = PassDecision::Run;
+    Scene {
+        frame: 0,
+        camera: CameraPose { world_from_camera: look(0.0, -0.03, 0.0), position: DVec3::new(0.0, 0.0, 8.0) },
+        lens: Lens::pinhole(width, height, 0.9),
+        passes,
+        boats: Vec::new(),
+        rounds: Vec::new(),
+        light: Light {
+            sun_direction: DVec3::new(0.5, -0.5, 0.7).normalize(),
+            sun: Vec3::new(0.8, 0.76, 0.68),
+            sky: Vec3::new(0.35, 0.42, 0.52),
+            horizon: Vec3::new(0.6, 0.66, 0.72),
+            sea: Vec3::new(0.08, 0.13, 0.15),
+        },
+        water: Water {
+            method: ReflectionMethod::Full,
+            force: BeaufortForce::new(1).unwrap(),
+            shadow: ShadowLevel::Gradual,
+        },
+        hud: Hud { status: Status::Ready, rounds_left: 120, shots: 14, hits: 3, clock_s: 83.0 },
+    }
+}
+
+/// A box with its bottom `draught` below the waterline; x forward.
+pub fn box_model(name: &str, [length, beam, height]: [f32; 3], albedo: [f32; 3]) -> Model {
+    let draught = 0.4;
+    let (min, max) =
+        (Vec3::new(-length / 2.0, -beam / 2.0, -draught), Vec3::new(length / 2.0, beam / 2.0, height));
+    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
+    for axis in 0..3 {
+        for sign in [-1.0_f32, 1.0] {
+            let mut normal = Vec3::ZERO;
+            normal[axis] = sign;
+            let (u, v) =
+                if sign > 0.0 { ((axis + 1) % 3, (axis + 2) % 3) } else { ((axis + 2) % 3, (axis + 1) % 3) };
+            let first = u32::try_from(vertices.len()).unwrap();
+            for (a, b) in [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)] {
+                let mut position = Vec3::ZERO;
+                position[axis] = if sign > 0.0 { max[axis] } else { min[axis] };
+                position[u] = min[u] + a * (max[u] - min[u]);
+                position[v] = min[v] + b * (max[v] - min[v]);
+                vertices.push(Vertex { position, normal, uv: Vec2::new(a, b), albedo: Vec3::from(albedo) });
+            }
+            indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
+        }
+    }
+    let end = u32::try_from(indices.len()).unwrap();
+    let (x, y) = (f64::from(length) / 2.0, f64::from(beam) / 2.0);
+    Model {
+        name: name.to_owned(),
+        kind: ModelKind::Mesh,
+        vertices,
+        indices,
+        parts: vec![Part { zone: Zone::Hull, indices: 0..end }],
+        texture: None,
+        waterline: vec![DVec2::new(x, y), DVec2::new(-x, y), DVec2::new(-x, -y), DVec2::new(x, -y)],
+        min,
+        max,
+    }
+}
+
+/// Adds a boat at `range` metres, `bearing` right of north, heading turned by `yaw`, and switches the boats' passes on.
+pub fn add_boat(scene: &mut Scene, models: &[Model], model: usize, range: f64, bearing: f64, yaw: f64) {
+    let position = DVec3::new(range * bearing.sin(), range * bearing.cos(), 0.0);
+    let pose = RigidPose { world_from_body: DQuat::from_rotation_z(yaw), position };
+    let shape = &models[model];
+    let (hull, reflection) = (bounds(scene, shape, &pose, false), bounds(scene, shape, &pose, true));
+    scene.boats.push(BoatView {
+        boat: scene.boats.len(),
+        model: ModelId(u16::try_from(model).unwrap()),
+        pose,
+        water_level: 0.0,
+        hull,
+        reflection,
+        range_m: range,
+        haze: 0.05,
+        beyond_horizon: false,
+    });
+    scene.boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
+    for pass in [Pass::Mirror, Pass::Water, Pass::Boats] {
+        scene.passes[pass as usize] = PassDecision::Run;
+    }
+}
+
+/// Pixels that a boat's bounding box, or its mirror image with some room for waves, can cover.
+fn bounds(scene: &Scene, model: &Model, pose: &RigidPose, mirrored: bool) -> Option<PixelRect> {
+    let (lens, margin) = (&scene.lens, if mirrored { 12.0 } else { 2.0 });
+    let (mut low, mut high) = (DVec2::MAX, DVec2::MIN);
+    for i in 0..8 {
+        let pick = |axis: usize, bit: usize| if i & bit == 0 { model.min[axis] } else { model.max[axis] };
+        let mut p = pose.to_world(Vec3::new(pick(0, 1), pick(1, 2), pick(2, 4)).as_dvec3());
+        if mirrored {
+            p.z = -p.z;
+        }
+        let mut c = scene.camera.to_camera(p);
+        c.z = c.z.max(0.2);
+        let n = (c.truncate() / c.z).clamp(DVec2::splat(-5.0), DVec2::splat(5.0));
+        let pixel = lens.distort(n) * lens.focal + lens.centre;
+        (low, high) = (low.min(pixel), high.max(pixel));
+    }
+    let screen = DVec2::new(f64::from(lens.width), f64::from(lens.height));
+    let low = (low - margin).floor().clamp(DVec2::ZERO, screen);
+    let high = (high + margin).ceil().clamp(DVec2::ZERO, screen);
+    (low.x < high.x && low.y < high.y).then(|| PixelRect {
+        x: low.x as u32,
+        y: low.y as u32,
+        width: (high.x - low.x) as u32,
+        height: (high.y - low.y) as u32,
+    })
+}

@@ -1,0 +1,81 @@
+//! Copying pictures and meshes to the device when the renderer is made.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::{
+    error::{Named, RenderError},
+    gpu::Gpu,
+    memory::{Access, Buffer, Image},
+    passes::{COPIED_TO, SAMPLED},
+    pipeline::{Recorder, Step},
+};
+
+/// A command pool that is gone after one use.
+struct Once {
+    gpu: Arc<Gpu>,
+    pool: vk::CommandPool,
+}
+
+impl Drop for Once {
+    fn drop(&mut self) {
+        // SAFETY: `upload_image` waits for the queue before it returns, also when it fails after submitting.
+        unsafe { self.gpu.device.destroy_command_pool(self.pool, None) };
+    }
+}
+
+/// Fills an image, level by level from the largest, and makes it ready for sampling. Waits for the GPU.
+pub(crate) fn upload_image(gpu: &Arc<Gpu>, image: &Image, levels: &[&[u8]]) -> Result<(), RenderError> {
+    let total: usize = levels.iter().map(|l| l.len().next_multiple_of(16)).sum();
+    let usage = vk::BufferUsageFlags::TRANSFER_SRC;
+    let mut staging = Buffer::new(gpu, "upload", total as u64, usage, Access::Upload)?;
+    let mut regions = Vec::with_capacity(levels.len());
+    let mut offset = 0;
+    for (bytes, level) in levels.iter().zip(0..) {
+        staging.write(offset, bytes);
+        let extent = vk::Extent3D {
+            width: (image.shape.width >> level).max(1),
+            height: (image.shape.height >> level).max(1),
+            depth: 1,
+        };
+        let subresource = vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            mip_level: level,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        regions.push(vk::BufferImageCopy {
+            buffer_offset: offset,
+            image_extent: extent,
+            image_subresource: subresource,
+            ..vk::BufferImageCopy::default()
+        });
+        offset += bytes.len().next_multiple_of(16) as u64;
+    }
+    let device = &gpu.device;
+    let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.family);
+    // SAFETY: `info` is complete.
+    let pool = unsafe { device.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
+    let once = Once { gpu: gpu.clone(), pool };
+    let info = vk::CommandBufferAllocateInfo::default().command_pool(once.pool).command_buffer_count(1);
+    // SAFETY: the pool is live.
+    let cmds = unsafe { device.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?;
+    let cmd = cmds.first().copied().unwrap_or_default();
+    let to = Recorder { gpu, cmd };
+    let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+    // SAFETY: a fresh command buffer; buffer, image and pool outlive the wait below.
+    unsafe {
+        device
+            .begin_command_buffer(cmd, &vk::CommandBufferBeginInfo::default())
+            .named("vkBeginCommandBuffer")?;
+        to.barrier([Step { image, from: nothing, to: COPIED_TO }]);
+        device.cmd_copy_buffer_to_image(cmd, staging.raw, image.raw, COPIED_TO.2, &regions);
+        to.barrier([Step { image, from: COPIED_TO, to: SAMPLED }]);
+        device.end_command_buffer(cmd).named("vkEndCommandBuffer")?;
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
+        let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
+        device.queue_submit2(gpu.queue, &[submit], vk::Fence::null()).named("vkQueueSubmit2")?;
+    }
+    gpu.wait_idle()
+}

@@ -1,0 +1,212 @@
+//! From the scene's f64 world to the f32 blocks that the shaders read. Everything is relative to camera or boat before it is
+//! rounded, so nothing loses digits with distance from the mount.
+
+use bowwave_core::{
+    geometry::{CameraPose, Lens, RigidPose, horizon_dip},
+    model::ModelKind,
+    scene::{BoatView, Light, Scene},
+};
+use glam::{DMat3, DQuat, DVec3, DVec4, Vec3};
+use shaders_spirv::interface::{BoatBlock, FrameBlock};
+
+/// Near plane, metres: nothing virtual is closer to the muzzle's camera.
+pub(crate) const NEAR_M: f64 = 0.1;
+
+/// Lens and light.
+pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
+    let lens = &scene.lens;
+    let pair = |v: glam::DVec2| v.as_vec2().to_array();
+    let light = |v: Vec3| v.extend(0.0).to_array();
+    let Light { sun, sky, horizon, sea, .. } = scene.light;
+    FrameBlock {
+        focal: pair(lens.focal),
+        centre: pair(lens.centre),
+        radial: pair(lens.radial),
+        tangential: pair(lens.tangential),
+        size: [lens.width as f32, lens.height as f32],
+        near: NEAR_M as f32,
+        r2_max: r2_max(lens) as f32,
+        sun: light(sun),
+        sky: light(sky),
+        sea: light(sea),
+        horizon: light(horizon),
+    }
+}
+
+/// Squared angle tangent at which the lens stops being trusted: just short of where its radius folds back, as
+/// [`Lens::project`] has it.
+fn r2_max(lens: &Lens) -> f64 {
+    let (k1, k2) = (lens.radial.x, lens.radial.y);
+    // Smallest positive root of 1 + 3 k1 r2 + 5 k2 r2^2.
+    let unlimited = 1e6;
+    let root = if k2.abs() < 1e-12 {
+        -1.0 / (3.0 * k1)
+    } else {
+        let (b, disc) = (3.0 * k1, 9.0 * k1 * k1 - 20.0 * k2);
+        if disc < 0.0 {
+            return unlimited;
+        }
+        let roots = [(-b - disc.sqrt()) / (10.0 * k2), (-b + disc.sqrt()) / (10.0 * k2)];
+        roots.into_iter().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min)
+    };
+    if root.is_finite() && root > 0.0 { (root * 0.98).min(unlimited) } else { unlimited }
+}
+
+/// The pose in which a boat is drawn: its own, or, for a picture, upright and turned about z towards the camera, its bow on the
+/// side to which the boat heads.
+pub(crate) fn drawn_pose(camera: &CameraPose, boat: &BoatView, kind: ModelKind) -> RigidPose {
+    if kind == ModelKind::Mesh {
+        return boat.pose;
+    }
+    let away = (boat.pose.position - camera.position).with_z(0.0);
+    let Some(away) = away.try_normalize() else { return boat.pose };
+    let right = away.cross(DVec3::Z);
+    let heads_right = (boat.pose.world_from_body * DVec3::X).dot(right) >= 0.0;
+    let x = if heads_right { right } else { -right };
+    let world_from_body = DQuat::from_mat3(&DMat3::from_cols(x, DVec3::Z.cross(x), DVec3::Z));
+    RigidPose { world_from_body, position: boat.pose.position }
+}
+
+/// A boat as the camera sees it, or, with `mirrored`, its mirror image in the plane of its mean water.
+pub(crate) fn boat_block(scene: &Scene, boat: &BoatView, pose: &RigidPose, mirrored: bool) -> BoatBlock {
+    let camera = &scene.camera;
+    let flip = if mirrored { DVec3::new(1.0, 1.0, -1.0) } else { DVec3::ONE };
+    let lift = if mirrored { DVec3::new(0.0, 0.0, 2.0 * boat.water_level) } else { DVec3::ZERO };
+    let camera_from_world = DMat3::from_quat(camera.world_from_camera.inverse());
+    let world_from_boat = DMat3::from_quat(pose.world_from_body);
+    let turn = camera_from_world * DMat3::from_diagonal(flip) * world_from_boat;
+    let shift = camera_from_world * (pose.position * flip + lift - camera.position);
+    // The mirrored boat seen by the camera is the boat seen by the mirrored camera.
+    let eye = camera.position * flip + lift;
+    let boat_from_world = world_from_boat.transpose();
+    let row = |r: usize| turn.row(r).extend(shift[r]).as_vec4().to_array();
+    let plane = |normal: DVec3, through: DVec3| -> [f32; 4] {
+        let value: DVec4 = (boat_from_world * normal).extend(normal.dot(pose.position - through));
+        value.as_vec4().to_array()
+    };
+    let water_plane = plane(DVec3::Z, DVec3::new(0.0, 0.0, boat.water_level));
+    let horizon_plane = match sight_normal(camera, pose.position) {
+        Some(normal) if boat.beyond_horizon && !mirrored => plane(normal, camera.position),
+        _ => [0.0, 0.0, 0.0, 1.0],
+    };
+    BoatBlock {
+        camera_from_boat: [row(0), row(1), row(2)],
+        water_plane,
+        horizon_plane,
+        sun: (boat_from_world * scene.light.sun_direction).extend(0.0).as_vec4().to_array(),
+        eye: (boat_from_world * (eye - pose.position)).extend(f64::from(boat.haze)).as_vec4().to_array(),
+    }
+}
+
+/// Upward normal of the plane that holds the eye and the stretch of sea horizon before `target`.
+fn sight_normal(camera: &CameraPose, target: DVec3) -> Option<DVec3> {
+    let ahead = (target - camera.position).with_z(0.0).try_normalize()?;
+    let dip = horizon_dip(camera.position.z);
+    Some(DVec3::Z * dip.cos() + ahead * dip.sin())
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::{
+        geometry::{curvature_drop, look},
+        model::ModelId,
+    };
+    use glam::DVec2;
+
+    use super::*;
+    use crate::testing;
+
+    fn boat(pose: RigidPose, water_level: f64) -> BoatView {
+        let range_m = pose.position.length();
+        BoatView {
+            boat: 0,
+            model: ModelId(0),
+            pose,
+            water_level,
+            hull: None,
+            reflection: None,
+            range_m,
+            haze: 0.25,
+            beyond_horizon: false,
+        }
+    }
+
+    fn apply(block: &BoatBlock, p: DVec3) -> DVec3 {
+        let v = p.extend(1.0).as_vec4();
+        let row = |i: usize| f64::from(glam::Vec4::from_array(block.camera_from_boat[i]).dot(v));
+        DVec3::new(row(0), row(1), row(2))
+    }
+
+    #[test]
+    fn boat_block_agrees_with_the_cameras_own_projection_at_any_distance() {
+        let mut scene = testing::empty_scene(320, 180);
+        scene.camera =
+            CameraPose { world_from_camera: look(0.4, -0.02, 0.3), position: DVec3::new(0.0, 0.0, 8.0) };
+        for range in [20.0, 500.0, 5000.0] {
+            let position = DVec3::new(range * 0.4_f64.sin(), range * 0.4_f64.cos(), -0.3);
+            let pose = RigidPose {
+                world_from_body: DQuat::from_euler(glam::EulerRot::ZYX, 1.0, 0.1, 0.2),
+                position,
+            };
+            let view = boat(pose, -0.5);
+            let p = DVec3::new(3.0, -1.0, 2.0);
+            let direct = apply(&boat_block(&scene, &view, &pose, false), p);
+            let want = scene.camera.to_camera(pose.to_world(p));
+            assert!((direct - want).length() < 1e-6 * range.max(100.0), "{direct} {want}");
+            let block = boat_block(&scene, &view, &pose, true);
+            let world = pose.to_world(p);
+            let mirrored = DVec3::new(world.x, world.y, 2.0 * -0.5 - world.z);
+            let want = scene.camera.to_camera(mirrored);
+            assert!((apply(&block, p) - want).length() < 1e-6 * range.max(100.0));
+            let height = f64::from(glam::Vec4::from_array(block.water_plane).dot(p.extend(1.0).as_vec4()));
+            assert!((height - (world.z + 0.5)).abs() < 1e-5);
+            assert!((block.eye[3] - 0.25).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn line_of_sight_over_the_horizon_hides_the_hull_but_not_the_mast() {
+        let mut scene = testing::empty_scene(320, 180);
+        scene.camera.position = DVec3::new(0.0, 0.0, 3.0);
+        // The horizon of a 3 m eye lies at 6.6 km; at 15 km the sea hides the lowest 4.8 m.
+        let range = 15_000.0;
+        let drop = curvature_drop(range);
+        let position = DVec3::new(0.0, range, -drop);
+        let pose = RigidPose { world_from_body: DQuat::IDENTITY, position };
+        let view = BoatView { beyond_horizon: true, ..boat(pose, -drop) };
+        let block = boat_block(&scene, &view, &pose, false);
+        let above =
+            |z: f64| glam::Vec4::from_array(block.horizon_plane).dot(DVec4::new(0.0, 0.0, z, 1.0).as_vec4());
+        let hidden = (0..200).map(|i| f64::from(i) * 0.1).find(|z| above(*z) > 0.0).unwrap();
+        let tangent = (2.0 * 3.0 * bowwave_core::geometry::EARTH_RADIUS_M
+            / (1.0 - bowwave_core::geometry::REFRACTION))
+            .sqrt();
+        let want = curvature_drop(range - tangent);
+        assert!((hidden - want).abs() < 0.2, "{hidden} {want}");
+    }
+
+    #[test]
+    fn picture_is_turned_to_the_camera_with_its_bow_the_way_the_boat_heads() {
+        let scene = testing::empty_scene(320, 180);
+        let position = DVec3::new(0.0, 100.0, 0.0);
+        for (heading, bow) in [(0.3, DVec3::X), (2.9, DVec3::NEG_X)] {
+            let pose = RigidPose { world_from_body: DQuat::from_rotation_z(heading), position };
+            let drawn = drawn_pose(&scene.camera, &boat(pose, 0.0), ModelKind::Quad);
+            assert!((drawn.world_from_body * DVec3::X - bow).length() < 1e-9);
+            assert!((drawn.world_from_body * DVec3::Z - DVec3::Z).length() < 1e-9);
+            assert_eq!(drawn_pose(&scene.camera, &boat(pose, 0.0), ModelKind::Mesh), pose);
+        }
+    }
+
+    #[test]
+    fn distortion_is_trusted_up_to_the_fold_and_no_further() {
+        let mut lens = Lens::pinhole(320, 180, 1.0);
+        assert_eq!(r2_max(&lens), 1e6);
+        lens.radial = DVec2::new(-0.3, 0.05);
+        let limit = r2_max(&lens);
+        assert!(lens.project(DVec3::new(limit.sqrt() * 0.99, 0.0, 1.0)).is_some());
+        assert!(lens.project(DVec3::new(limit.sqrt() * 1.02, 0.0, 1.0)).is_none());
+        lens.radial = DVec2::new(0.44, 0.0);
+        assert_eq!(r2_max(&lens), 1e6);
+    }
+}
