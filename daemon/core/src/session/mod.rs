@@ -1,0 +1,376 @@
+//! A session: a pure function from events and frame times to scenes and records.
+
+mod fleet;
+mod rounds;
+mod sensors;
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use crate::{
+    calibration::Calibration,
+    event::{Event, Picture, PixelFormat},
+    geometry::{CameraPose, Lens},
+    light::LightMeter,
+    model::{Model, ModelId},
+    plan::{Needs, ScenePlan},
+    pose::{NoPose, OrientationAt, STALE_NS, camera_pose},
+    scenario::Scenario,
+    scene::{Hud, Scene, Status},
+    score::{NotScored, Outcome, ShotRecord},
+    sea::WaveField,
+    time::Time,
+    view::Eye,
+    weapon::Weapon,
+};
+
+pub use fleet::{Fleet, Vessel};
+pub use rounds::{Ammunition, Launch, Rounds};
+pub use sensors::{SensorCounts, Sensors};
+
+/// How long the last round's result stays on the display, seconds.
+const RESULT_S: f64 = 1.5;
+
+/// How far behind the frame's time rounds are followed while no picture arrives, nanoseconds.
+const BLIND_LAG_NS: i64 = 50_000_000;
+
+/// Longest time that a round waits for an orientation measured after it, before it is scored by prediction, nanoseconds.
+const POSE_WAIT_NS: i64 = 50_000_000;
+
+/// What a session is made from.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    /// The scenario, its seed the one of all chance.
+    pub scenario: Scenario,
+    /// The calibration of the camera and inertial unit in use.
+    pub calibration: Calibration,
+    /// All models in use.
+    pub models: Arc<[Model]>,
+    /// The model of each of the scenario's boats, in order.
+    pub boat_models: Vec<ModelId>,
+    /// Screen size in pixels.
+    pub screen: (u32, u32),
+    /// How the camera's bytes are laid out.
+    pub video: PixelFormat,
+}
+
+/// Why a session cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SetupError {
+    /// Not every boat has a model.
+    #[error("the scenario has {boats} boats, but models for {models}: give each boat one")]
+    Models {
+        /// Boats in the scenario.
+        boats: usize,
+        /// Models given.
+        models: usize,
+    },
+}
+
+/// What one step gives.
+#[derive(Debug)]
+pub struct Step<'a> {
+    /// What to draw; `None` before the first picture.
+    pub view: Option<View<'a>>,
+    /// Rounds that ended, in the order in which they were fired within the step.
+    pub records: &'a [ShotRecord],
+}
+
+/// What to draw.
+#[derive(Debug)]
+pub struct View<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The picture that it is drawn over.
+    pub picture: &'a Picture,
+    /// Whether the picture is another than the last step's.
+    pub picture_is_new: bool,
+    /// The picture's own time stamp, to find it again.
+    pub mid_exposure: Time,
+    /// Whether the camera's pose was known.
+    pub pose_known: bool,
+}
+
+/// A running session.
+#[derive(Debug)]
+pub struct Session {
+    setup: Setup,
+    lens: Lens,
+    plan: ScenePlan,
+    sensors: Sensors,
+    weapon: Weapon,
+    meter: LightMeter,
+    waves: WaveField,
+    running: Option<Running>,
+    scene: Scene,
+    records: Vec<ShotRecord>,
+    shots: u64,
+    hits: u64,
+    last_result: Option<(Time, bool)>,
+}
+
+/// What exists from the first picture on.
+#[derive(Debug)]
+struct Running {
+    start: Time,
+    now: Time,
+    fleet: Fleet,
+    rounds: Rounds,
+}
+
+impl Session {
+    /// A session in which nothing has happened yet.
+    pub fn new(setup: Setup) -> Result<Self, SetupError> {
+        let scenario = &setup.scenario;
+        if scenario.boats.len() != setup.boat_models.len() {
+            return Err(SetupError::Models { boats: scenario.boats.len(), models: setup.boat_models.len() });
+        }
+        let lens = setup.calibration.lens.covering(setup.screen.0, setup.screen.1);
+        let plan = ScenePlan::new(&Needs {
+            size: setup.screen,
+            video: setup.video,
+            picture: (setup.calibration.lens.width, setup.calibration.lens.height),
+            water: scenario.water,
+            boats: scenario.boats.len(),
+            belt: scenario.weapon.belt,
+        });
+        let waves = scenario.wave_field();
+        let sensors = Sensors::new(&setup.calibration);
+        let weapon = Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt);
+        let meter = LightMeter::new(scenario.sun_direction);
+        let scene = Scene {
+            frame: 0,
+            camera: CameraPose {
+                world_from_camera: glam::DQuat::IDENTITY,
+                position: DVec3::Z * scenario.eye_height_m,
+            },
+            lens,
+            passes: plan.frame(false, &[], &[]),
+            boats: Vec::with_capacity(scenario.boats.len()),
+            rounds: Vec::with_capacity(64),
+            light: meter.light(),
+            water: scenario.water,
+            hud: Hud {
+                status: Status::Ready,
+                rounds_left: scenario.weapon.belt,
+                shots: 0,
+                hits: 0,
+                clock_s: 0.0,
+            },
+        };
+        Ok(Self {
+            lens,
+            plan,
+            sensors,
+            weapon,
+            meter,
+            waves,
+            running: None,
+            scene,
+            records: Vec::new(),
+            shots: 0,
+            hits: 0,
+            last_result: None,
+            setup,
+        })
+    }
+
+    /// What the renderer must be able to do for this session.
+    pub const fn plan(&self) -> &ScenePlan {
+        &self.plan
+    }
+
+    /// What was wrong with the sensors so far.
+    pub fn sensor_counts(&self) -> SensorCounts {
+        self.sensors.counts()
+    }
+
+    /// Rounds fired and rounds that struck.
+    pub const fn score(&self) -> (u64, u64) {
+        (self.shots, self.hits)
+    }
+
+    /// Takes in `events`, in the order of their arrival, and gives the frame of `frame_time`. Frame times must not go back.
+    pub fn step(&mut self, events: &[Event], frame_time: Time) -> Step<'_> {
+        self.records.clear();
+        let mut picture_is_new = false;
+        for event in events {
+            match event {
+                Event::Imu(sample) => self.sensors.imu(sample),
+                Event::Frame(frame) => picture_is_new |= self.sensors.frame(frame),
+                Event::Trigger(edge) => self.weapon.edge(*edge),
+            }
+        }
+        let Some(video_time) = self.sensors.video_time() else {
+            return Step { view: None, records: &self.records };
+        };
+        self.advance(video_time, frame_time);
+        let pose_known = self.draw(video_time, frame_time, picture_is_new);
+        let view = self.sensors.newest_frame().map(|frame| View {
+            scene: &self.scene,
+            picture: &frame.picture,
+            picture_is_new,
+            mid_exposure: frame.mid_exposure,
+            pose_known,
+        });
+        Step { view, records: &self.records }
+    }
+
+    /// Rounds still in the air are recorded as misses: the session ends here.
+    pub fn finish(&mut self) -> &[ShotRecord] {
+        self.records.clear();
+        if let Some(running) = &mut self.running {
+            // Twenty seconds are the longest that a round is followed.
+            let end = running.now.plus_secs(21.0);
+            running.rounds.advance(end, running.start, &mut running.fleet, &mut self.records);
+        }
+        self.count_records();
+        &self.records
+    }
+
+    fn start(&self, start: Time) -> Running {
+        let scenario = &self.setup.scenario;
+        let vessel = |(boat, model): (&crate::scenario::BoatSpec, &ModelId)| Vessel {
+            name: boat.name.clone(),
+            model: *model,
+            course: boat.course.clone(),
+        };
+        let vessels = scenario.boats.iter().zip(&self.setup.boat_models).map(vessel).collect();
+        let fleet = Fleet::new(vessels, Arc::clone(&self.setup.models), self.waves.clone(), start);
+        let ammunition = Ammunition { weapon: scenario.weapon, wind: scenario.wind, seed: scenario.seed };
+        Running { start, now: start, fleet, rounds: Rounds::new(ammunition, self.waves.clone(), start) }
+    }
+
+    /// Fires what the trigger asks for and follows all rounds up to the picture's time.
+    fn advance(&mut self, video_time: Time, frame_time: Time) {
+        let mut running = match self.running.take() {
+            Some(running) => running,
+            None => self.start(video_time),
+        };
+        // A frozen picture must not freeze the rounds.
+        let now = running.now.max(video_time).max(frame_time.plus_ns(-BLIND_LAG_NS - STALE_NS));
+        let newest = self.sensors.newest_orientation().unwrap_or(Time::MIN);
+        let known = newest.max(frame_time.plus_ns(-POSE_WAIT_NS)).min(now);
+        while let Some(fired) = self.weapon.fire(known) {
+            self.fire(fired, &mut running);
+        }
+        running.rounds.advance(now, running.start, &mut running.fleet, &mut self.records);
+        running.now = now;
+        self.running = Some(running);
+        self.count_records();
+    }
+
+    fn fire(&mut self, fired: Time, running: &mut Running) {
+        self.shots += 1;
+        let orientation = self.sensors.orientation(fired);
+        let cause = match orientation {
+            Err(_) => Some(NotScored::ImuStale),
+            Ok(_) if !self.sensors.frame_fresh(fired) => Some(NotScored::CameraStale),
+            Ok(_) => None,
+        };
+        let calibration = &self.setup.calibration;
+        let camera = self.camera(orientation).unwrap_or(self.scene.camera);
+        let launch = Launch {
+            shot: self.shots,
+            fired,
+            muzzle: camera.position + camera.world_from_camera * calibration.muzzle_in_camera,
+            bore: camera.world_from_camera * calibration.bore_in_camera(),
+            pose_age_ns: orientation.map_or_else(age_of, |o| o.provenance.age_ns()),
+        };
+        match cause {
+            None => running.rounds.launch(launch, running.start, &mut self.records),
+            Some(cause) => {
+                let Launch { shot, fired, muzzle, bore, pose_age_ns } = launch;
+                let outcome = Outcome::NotScored { cause };
+                self.records.push(ShotRecord { shot, fired, muzzle, bore, pose_age_ns, outcome });
+            }
+        }
+    }
+
+    fn camera(&self, orientation: Result<OrientationAt, NoPose>) -> Option<CameraPose> {
+        let world_from_imu = orientation.ok()?.world_from_imu;
+        Some(camera_pose(&self.setup.calibration, world_from_imu, self.setup.scenario.eye_height_m))
+    }
+
+    fn count_records(&mut self) {
+        for record in &self.records {
+            let (time, hit) = match &record.outcome {
+                Outcome::Hit { time, .. } => (*time, true),
+                Outcome::Miss { time, .. } => (*time, false),
+                Outcome::NotScored { .. } => continue,
+            };
+            self.hits += u64::from(hit);
+            // Of several results at once a hit is what the sailor wants to see.
+            if hit
+                || self.last_result.is_none_or(|(last, was_hit)| !was_hit || time.secs_since(last) > RESULT_S)
+            {
+                self.last_result = Some((time, hit));
+            }
+        }
+    }
+
+    /// Fills the scene; says whether the camera's pose was known.
+    fn draw(&mut self, video_time: Time, frame_time: Time, picture_is_new: bool) -> bool {
+        let camera = self.camera(self.sensors.orientation(video_time));
+        if let (Some(camera), true, Some(frame)) = (&camera, picture_is_new, self.sensors.newest_frame()) {
+            self.meter.observe(video_time, &frame.picture, &self.setup.calibration.lens, camera);
+        }
+        let status = self.status(video_time, frame_time);
+        let scene = &mut self.scene;
+        scene.boats.clear();
+        scene.rounds.clear();
+        if let (Some(camera), Some(running)) = (&camera, &self.running) {
+            scene.camera = *camera;
+            let eye = Eye {
+                camera,
+                lens: &self.lens,
+                visibility_m: self.setup.scenario.visibility_m,
+                reflections: self.plan.has(crate::scene::Pass::Water),
+            };
+            running.fleet.seen(&eye, video_time, &mut scene.boats);
+            running.rounds.views(video_time, running.start, &running.fleet, &mut scene.rounds);
+            scene.rounds.retain(|r| eye.sees_round(r));
+        }
+        scene.passes = self.plan.frame(camera.is_some(), &scene.boats, &scene.rounds);
+        scene.light = self.meter.light();
+        scene.hud = Hud {
+            status,
+            rounds_left: self.weapon.rounds_left(),
+            shots: u32::try_from(self.shots).unwrap_or(u32::MAX),
+            hits: u32::try_from(self.hits).unwrap_or(u32::MAX),
+            clock_s: self.running.as_ref().map_or(0.0, |r| video_time.secs_since(r.start)),
+        };
+        camera.is_some()
+    }
+
+    fn status(&self, video_time: Time, frame_time: Time) -> Status {
+        if let Some(trouble) = self.sensors.trouble(frame_time) {
+            return trouble;
+        }
+        match self.last_result {
+            Some((time, hit)) if video_time.secs_since(time) < RESULT_S => {
+                if hit {
+                    Status::Hit
+                } else {
+                    Status::Miss
+                }
+            }
+            _ => Status::Ready,
+        }
+    }
+
+    /// Counts one frame as shown: the next scene has the next number.
+    pub fn frame_shown(&mut self) {
+        self.scene.frame += 1;
+    }
+}
+
+/// How old the newest orientation is, where it is too old to be used.
+fn age_of(no_pose: NoPose) -> i64 {
+    match no_pose {
+        NoPose::Stale { age_ns } => age_ns,
+        NoPose::TooOld { ns } => -ns,
+        NoPose::Empty => i64::MAX,
+    }
+}

@@ -1,0 +1,251 @@
+//! What the devices said last, made sense of: orientation over time, the newest picture, and whether they can be trusted.
+
+use glam::DVec3;
+
+use crate::{
+    attitude::Attitude,
+    calibration::Calibration,
+    clock::ClockMap,
+    event::{CameraFrame, ImuSample},
+    pose::{NoPose, OrientationAt, PoseHistory, STALE_NS},
+    scene::Status,
+    time::Time,
+};
+
+/// An inertial unit that repeats the very same numbers for this long is stuck: noise alone would change them.
+const FROZEN_NS: i64 = 300_000_000;
+
+/// Angular rate beyond which the unit is taken for broken, rad/s (4000 deg/s: twice what gun-mount units measure).
+const RATE_MAX: f64 = 70.0;
+
+/// Counters of what was not used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SensorCounts {
+    /// Samples taken in.
+    pub imu: u64,
+    /// Samples with a number that is not finite or not possible.
+    pub imu_insane: u64,
+    /// Samples while the unit was stuck.
+    pub imu_frozen: u64,
+    /// Restarts of the unit's clock.
+    pub imu_restarts: u32,
+    /// Pictures taken in.
+    pub frames: u64,
+    /// Pictures whose time stamp was not after the one before.
+    pub frames_backward: u64,
+    /// Pictures of another size than the calibrated one.
+    pub frames_wrong_size: u64,
+}
+
+/// Sensors of one session.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    time_offset_ns: i64,
+    size: (u32, u32),
+    clock: ClockMap,
+    attitude: Attitude,
+    history: PoseHistory,
+    last: Option<(DVec3, DVec3)>,
+    changed: Time,
+    frame: Option<CameraFrame>,
+    counts: SensorCounts,
+}
+
+impl Sensors {
+    /// Sensors with that calibration that have reported nothing.
+    pub fn new(calibration: &Calibration) -> Self {
+        Self {
+            time_offset_ns: calibration.time_offset_ns,
+            size: (calibration.lens.width, calibration.lens.height),
+            clock: ClockMap::new(),
+            attitude: Attitude::new(calibration.gyro_bias, calibration.camera_from_imu),
+            history: PoseHistory::new(),
+            last: None,
+            changed: Time::MIN,
+            frame: None,
+            counts: SensorCounts::default(),
+        }
+    }
+
+    /// Takes in a sample of the inertial unit.
+    pub fn imu(&mut self, sample: &ImuSample) {
+        self.counts.imu += 1;
+        if !sample.is_finite() || sample.rate.abs().max_element() > RATE_MAX {
+            self.counts.imu_insane += 1;
+            return;
+        }
+        let now = Some((sample.rate, sample.accel));
+        if self.last != now {
+            self.last = now;
+            self.changed = sample.arrival;
+        } else if sample.arrival.ns_since(self.changed) > FROZEN_NS {
+            self.counts.imu_frozen += 1;
+            return;
+        }
+        let time = self.clock.observe(sample.device_time_ns, sample.arrival);
+        if self.clock.restarts() != self.counts.imu_restarts {
+            self.counts.imu_restarts = self.clock.restarts();
+            self.history.clear();
+        }
+        if let Some(orientation) = self.attitude.observe(time, sample) {
+            self.history.push(orientation);
+        }
+    }
+
+    /// Takes in a picture; the newest wins. One from the past or of a size that the lens was not calibrated for is left out.
+    pub fn frame(&mut self, frame: &CameraFrame) -> bool {
+        self.counts.frames += 1;
+        if (frame.picture.width(), frame.picture.height()) != self.size {
+            self.counts.frames_wrong_size += 1;
+            return false;
+        }
+        if self.frame.as_ref().is_some_and(|f| frame.mid_exposure <= f.mid_exposure) {
+            self.counts.frames_backward += 1;
+            return false;
+        }
+        self.frame = Some(frame.clone());
+        true
+    }
+
+    /// The newest picture.
+    pub fn newest_frame(&self) -> Option<&CameraFrame> {
+        self.frame.as_ref()
+    }
+
+    /// When the newest picture was exposed (middle), on the inertial unit's clock.
+    pub fn video_time(&self) -> Option<Time> {
+        self.frame.as_ref().map(|f| f.mid_exposure.plus_ns(self.time_offset_ns))
+    }
+
+    /// The orientation at `time`.
+    pub fn orientation(&self, time: Time) -> Result<OrientationAt, NoPose> {
+        self.history.at(time)
+    }
+
+    /// Whether the newest picture was young enough at `time`.
+    pub fn frame_fresh(&self, time: Time) -> bool {
+        self.video_time().is_some_and(|t| time.ns_since(t) <= STALE_NS)
+    }
+
+    /// Time of the newest orientation.
+    pub fn newest_orientation(&self) -> Option<Time> {
+        self.history.newest()
+    }
+
+    /// Counters.
+    pub const fn counts(&self) -> SensorCounts {
+        self.counts
+    }
+
+    /// What the sailor must know about the sensors at `now`; `None` where all is well.
+    pub fn trouble(&self, now: Time) -> Option<Status> {
+        let status = |cause, action| Some(Status::NotScored { cause, action });
+        if self.frame.is_none() && self.counts.frames_wrong_size > 0 {
+            return Some(Status::Fault { cause: "CAL LOST: PICTURE SIZE", action: "CALIBRATE THIS CAMERA" });
+        }
+        match self.frame {
+            None => return status("NO CAMERA YET", "WAIT, THEN CHECK ITS CABLE"),
+            Some(_) if !self.frame_fresh(now) => return status("CAMERA LOST", "CHECK THE CAMERA CABLE"),
+            Some(_) => {}
+        }
+        match self.history.newest() {
+            None => status("NO IMU YET", "WAIT, THEN CHECK ITS CABLE"),
+            Some(t) if now.ns_since(t) > STALE_NS => {
+                let stuck = self.last.is_some() && self.counts.imu_frozen > 0;
+                if stuck {
+                    status("IMU STUCK", "SWITCH THE IMU OFF AND ON")
+                } else {
+                    status("IMU LOST", "CHECK THE IMU CABLE")
+                }
+            }
+            Some(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        event::{Picture, PixelFormat},
+        geometry::Lens,
+    };
+    use glam::{DQuat, DVec2};
+
+    fn sensors() -> Sensors {
+        Sensors::new(&Calibration {
+            lens: Lens::pinhole(4, 2, 1.0),
+            focal_sigma_px: 1.0,
+            camera_from_imu: DQuat::IDENTITY,
+            camera_from_imu_sigma: DVec3::ONE,
+            time_offset_ns: 2_000_000,
+            time_offset_sigma_ns: 1,
+            boresight: DVec2::ZERO,
+            boresight_sigma: 0.001,
+            muzzle_in_camera: DVec3::ZERO,
+            gyro_bias: DVec3::ZERO,
+            gyro_bias_sigma: DVec3::ONE,
+        })
+    }
+
+    fn sample(i: i64) -> ImuSample {
+        ImuSample {
+            arrival: Time::from_ns(i * 5_000_000),
+            device_time_ns: i * 5_000_000,
+            rate: DVec3::X * (i as f64 * 1e-6),
+            accel: DVec3::Z,
+            world_from_imu: Some(DQuat::IDENTITY),
+        }
+    }
+
+    fn frame(ms: i64, width: u32) -> CameraFrame {
+        let bytes = vec![0; width as usize * 6].into();
+        CameraFrame {
+            arrival: Time::from_ns(ms * 1_000_000 + 10_000_000),
+            mid_exposure: Time::from_ns(ms * 1_000_000),
+            sequence: 0,
+            picture: Picture::new(PixelFormat::Rgb, width, 2, bytes).unwrap(),
+            jpeg: None,
+        }
+    }
+
+    #[test]
+    fn not_a_number_and_impossible_rates_are_left_out() {
+        let mut s = sensors();
+        s.imu(&ImuSample { rate: DVec3::NAN, ..sample(0) });
+        s.imu(&ImuSample { rate: DVec3::X * 100.0, ..sample(1) });
+        s.imu(&ImuSample { world_from_imu: Some(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), ..sample(2) });
+        assert_eq!(s.counts().imu_insane, 3);
+        assert!(s.newest_orientation().is_none());
+    }
+
+    #[test]
+    fn a_stuck_unit_goes_stale_and_recovers() {
+        let mut s = sensors();
+        s.frame(&frame(990, 4));
+        (0..200).for_each(|i| s.imu(&sample(i)));
+        let now = |i: i64| Time::from_ns(i * 5_000_000);
+        assert_eq!(s.trouble(now(200)), None);
+        for i in 200..300 {
+            s.imu(&ImuSample { rate: sample(199).rate, ..sample(i) });
+        }
+        s.frame(&frame(1490, 4));
+        let said = s.trouble(now(300));
+        assert_eq!(said, Some(Status::NotScored { cause: "IMU STUCK", action: "SWITCH THE IMU OFF AND ON" }));
+        s.imu(&sample(301));
+        assert_eq!(s.trouble(now(301)), None);
+    }
+
+    #[test]
+    fn pictures_out_of_order_or_of_another_size_are_left_out() {
+        let mut s = sensors();
+        assert!(s.frame(&frame(100, 4)));
+        assert!(!s.frame(&frame(100, 4)));
+        assert!(!s.frame(&frame(90, 4)));
+        assert!(!s.frame(&frame(133, 6)));
+        assert!(s.frame(&frame(166, 4)));
+        let counts = s.counts();
+        assert_eq!((counts.frames, counts.frames_backward, counts.frames_wrong_size), (5, 2, 1));
+        assert_eq!(s.video_time(), Some(Time::from_ns(168_000_000)));
+    }
+}

@@ -1,0 +1,314 @@
+//! The session at its boundary: events in, scenes and records out.
+
+use std::sync::Arc;
+
+use bowwave_core::{
+    calibration::Calibration,
+    event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, TriggerEdge},
+    geometry::{Lens, look},
+    model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
+    scenario::Scenario,
+    scene::{LeftOut, Pass, PassDecision, Status},
+    score::{NotScored, Outcome, ShotRecord},
+    session::{Session, Setup},
+    time::Time,
+};
+use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
+
+const MS: i64 = 1_000_000;
+
+/// A closed box, 8 m long, 3 m wide and 4 m high, 3 m of it above the water; everything is engine.
+fn block() -> Model {
+    let (low, high) = (Vec3::new(-4.0, -1.5, -1.0), Vec3::new(4.0, 1.5, 3.0));
+    let corner = |i: usize| {
+        let pick = |bit: usize, l: f32, h: f32| if i & bit == 0 { l } else { h };
+        let position = Vec3::new(pick(1, low.x, high.x), pick(2, low.y, high.y), pick(4, low.z, high.z));
+        Vertex { position, normal: position.normalize(), uv: Vec2::ZERO, albedo: Vec3::splat(0.5) }
+    };
+    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let indices: Vec<u32> = quads.iter().flat_map(|q| [q[0], q[1], q[2], q[0], q[2], q[3]]).collect();
+    Model {
+        name: "block".into(),
+        kind: ModelKind::Mesh,
+        vertices: (0..8).map(corner).collect(),
+        parts: vec![Part { zone: Zone::Engine, indices: 0..indices.len() as u32 }],
+        indices,
+        texture: None,
+        waterline: [(-4.0, -1.5), (4.0, -1.5), (4.0, 1.5), (-4.0, 1.5)]
+            .map(|(x, y)| DVec2::new(x, y))
+            .to_vec(),
+        min: low,
+        max: high,
+    }
+}
+
+fn calibration() -> Calibration {
+    Calibration {
+        lens: Lens::pinhole(64, 48, 1.0),
+        focal_sigma_px: 1.0,
+        camera_from_imu: DQuat::IDENTITY,
+        camera_from_imu_sigma: DVec3::splat(1e-3),
+        time_offset_ns: 4 * MS,
+        time_offset_sigma_ns: MS,
+        boresight: DVec2::ZERO,
+        boresight_sigma: 1e-3,
+        muzzle_in_camera: DVec3::ZERO,
+        gyro_bias: DVec3::ZERO,
+        gyro_bias_sigma: DVec3::splat(1e-4),
+    }
+}
+
+const SCENARIO: &str = r#"
+name = "One block ahead"
+[sea]
+beaufort = 0
+wind_from_deg = 0
+[mount]
+eye_height_m = 6.0
+[weapon]
+rounds_per_minute = 600
+belt = 5
+dispersion_mrad = 0.0
+[[boat]]
+name = "block"
+model = "block"
+side = "hostile"
+course = "still"
+range_m = 200
+bearing_deg = 0
+heading_deg = 90
+"#;
+
+fn session(text: &str) -> Session {
+    let scenario = Scenario::parse(text, "test").expect("the scenario is valid");
+    let boats = scenario.boats.len();
+    Session::new(Setup {
+        scenario,
+        calibration: calibration(),
+        models: Arc::new([block()]),
+        boat_models: vec![ModelId(0); boats],
+        screen: (128, 96),
+        video: PixelFormat::Rgb,
+    })
+    .expect("every boat has a model")
+}
+
+/// A camera that looks at the block's middle, or swings by `rate` about the vertical.
+fn attitude(t_s: f64, rate: f64) -> DQuat {
+    let drop = (6.0f64 - 1.2) / 200.0;
+    look(rate * t_s, -drop, 0.0)
+}
+
+struct Stream {
+    rate: f64,
+    imu: std::ops::Range<i64>,
+    frames: std::ops::Range<i64>,
+}
+
+/// Steps a session over `seconds`; `stream` says in which milliseconds devices report.
+fn play(
+    session: &mut Session,
+    seconds: f64,
+    stream: &Stream,
+    edges: &[TriggerEdge],
+    mut each: impl FnMut(&Session, Option<Status>, [PassDecision; 6], &[ShotRecord]),
+) {
+    let mut sent_imu = 0;
+    let mut sent_frame = 0;
+    let mut sent_edge = 0;
+    for tick in 1..=(seconds * 30.0) as i64 {
+        let now = Time::from_ns(tick * 1_000_000_000 / 30);
+        let mut events = Vec::new();
+        while sent_imu * 5 * MS + MS / 2 <= now.ns() {
+            let ms = sent_imu * 5;
+            if stream.imu.contains(&ms) {
+                let t = ms as f64 * 1e-3;
+                events.push(Event::Imu(ImuSample {
+                    arrival: Time::from_ns(ms * MS + MS / 2),
+                    device_time_ns: ms * MS,
+                    rate: DVec3::new(1e-9 * ms as f64, stream.rate, 0.0),
+                    accel: DVec3::Z,
+                    world_from_imu: Some(attitude(t, stream.rate)),
+                }));
+            }
+            sent_imu += 1;
+        }
+        while sent_frame * 1_000_000_000 / 30 + 20 * MS <= now.ns() {
+            let mid = sent_frame * 1_000_000_000 / 30;
+            if stream.frames.contains(&(mid / MS)) {
+                let bytes = vec![120u8; 64 * 48 * 3].into();
+                events.push(Event::Frame(CameraFrame {
+                    arrival: Time::from_ns(mid + 20 * MS),
+                    mid_exposure: Time::from_ns(mid),
+                    sequence: sent_frame as u32,
+                    picture: Picture::new(PixelFormat::Rgb, 64, 48, bytes).expect("a picture"),
+                    jpeg: None,
+                }));
+            }
+            sent_frame += 1;
+        }
+        while edges.get(sent_edge).is_some_and(|e| e.time <= now) {
+            events.push(Event::Trigger(edges[sent_edge]));
+            sent_edge += 1;
+        }
+        events.sort_by_key(Event::arrival);
+        let step = session.step(&events, now);
+        let records = step.records.to_vec();
+        let (status, passes) = match &step.view {
+            Some(v) => (Some(v.scene.hud.status.clone()), v.scene.passes),
+            None => (None, [PassDecision::LeftOut(LeftOut::NoPose); 6]),
+        };
+        each(session, status, passes, &records);
+        session.frame_shown();
+    }
+}
+
+fn burst(from_ms: i64, to_ms: i64) -> [TriggerEdge; 2] {
+    [
+        TriggerEdge { time: Time::from_ns(from_ms * MS), pressed: true },
+        TriggerEdge { time: Time::from_ns(to_ms * MS), pressed: false },
+    ]
+}
+
+const ALL: Stream = Stream { rate: 0.0, imu: 0..i64::MAX, frames: 0..i64::MAX };
+
+#[test]
+fn rounds_at_the_block_strike_it() {
+    let mut s = session(SCENARIO);
+    let mut records = Vec::new();
+    let mut states = Vec::new();
+    play(&mut s, 3.0, &ALL, &burst(500, 750), |_, status, passes, r| {
+        records.extend_from_slice(r);
+        states.extend(status);
+        assert_eq!(passes[Pass::Video as usize], PassDecision::Run);
+    });
+    assert_eq!(records.len(), 3, "rounds at 500, 600 and 700 ms");
+    for (i, record) in records.iter().enumerate() {
+        assert_eq!(record.shot, i as u64 + 1);
+        assert_eq!(record.fired.ns(), (500 + 100 * i as i64) * MS);
+        let Outcome::Hit { boat, zone, range_m, time, .. } = &record.outcome else { panic!("{record:?}") };
+        assert_eq!((boat.as_str(), *zone), ("block", Zone::Engine));
+        assert!((197.0..201.0).contains(range_m), "{range_m}");
+        let flight = time.secs_since(record.fired);
+        assert!((0.2..0.3).contains(&flight), "{flight}");
+    }
+    assert!(states.contains(&Status::Hit) && states.last() == Some(&Status::Ready));
+    assert_eq!(s.score(), (3, 3));
+}
+
+#[test]
+fn the_pose_is_the_one_at_the_pictures_mid_exposure() {
+    let mut s = session(SCENARIO);
+    let rate = 0.7;
+    let mut checked = 0;
+    let mut sent = 0i64;
+    for tick in 1..60i64 {
+        let now = Time::from_ns(tick * 33 * MS);
+        let mut events = Vec::new();
+        while sent * 5 * MS <= now.ns() {
+            let t = sent as f64 * 5e-3;
+            events.push(Event::Imu(ImuSample {
+                arrival: Time::from_ns(sent * 5 * MS),
+                device_time_ns: sent * 5 * MS,
+                rate: DVec3::new(0.0, rate, 1e-9 * sent as f64),
+                accel: DVec3::Z,
+                world_from_imu: Some(attitude(t, rate)),
+            }));
+            sent += 1;
+        }
+        let mid = now.plus_ns(-21 * MS);
+        let picture =
+            Picture::new(PixelFormat::Rgb, 64, 48, vec![9u8; 64 * 48 * 3].into()).expect("a picture");
+        events.push(Event::Frame(CameraFrame {
+            arrival: now,
+            mid_exposure: mid,
+            sequence: 0,
+            picture,
+            jpeg: None,
+        }));
+        let step = s.step(&events, now);
+        if let Some(view) = step.view.filter(|v| v.pose_known) {
+            // The calibrated offset moves the exposure by 4 ms on the inertial unit's clock.
+            let truth = attitude(mid.plus_ns(4 * MS).ns() as f64 * 1e-9, rate);
+            assert!(view.scene.camera.world_from_camera.angle_between(truth) < 1e-6);
+            checked += 1;
+        }
+    }
+    assert!(checked > 50);
+}
+
+#[test]
+fn without_orientation_no_boat_is_drawn_and_no_round_is_scored() {
+    let mut s = session(SCENARIO);
+    let stream = Stream { imu: 0..1000, ..ALL };
+    let mut records = Vec::new();
+    let mut last = None;
+    play(&mut s, 2.0, &stream, &burst(1500, 1650), |_, status, passes, r| {
+        records.extend_from_slice(r);
+        last = status.map(|s| (s, passes[Pass::Boats as usize]));
+    });
+    assert_eq!(records.len(), 2);
+    for r in &records {
+        assert_eq!(r.outcome, Outcome::NotScored { cause: NotScored::ImuStale });
+        assert!(r.pose_age_ns > 400 * MS);
+    }
+    let (status, boats) = last.expect("pictures kept coming");
+    assert!(matches!(status, Status::NotScored { cause: "IMU LOST", .. }), "{status:?}");
+    assert_eq!(boats, PassDecision::LeftOut(LeftOut::NoPose));
+}
+
+#[test]
+fn without_pictures_no_round_is_scored() {
+    let mut s = session(SCENARIO);
+    let stream = Stream { frames: 0..1000, ..ALL };
+    let mut records = Vec::new();
+    let mut last = None;
+    play(&mut s, 2.5, &stream, &burst(1500, 1550), |_, status, _, r| {
+        records.extend_from_slice(r);
+        last = status;
+    });
+    let causes: Vec<_> = records.iter().map(|r| &r.outcome).collect();
+    assert_eq!(causes, [&Outcome::NotScored { cause: NotScored::CameraStale }]);
+    assert!(matches!(last, Some(Status::NotScored { cause: "CAMERA LOST", .. })), "{last:?}");
+}
+
+#[test]
+fn the_same_events_give_the_same_records_however_they_are_cut() {
+    let run = || {
+        let mut s = session(&SCENARIO.replace("dispersion_mrad = 0.0", "dispersion_mrad = 4.0"));
+        let mut all = String::new();
+        play(&mut s, 3.0, &Stream { rate: 0.02, ..ALL }, &burst(300, 900), |_, _, _, r| {
+            all += &format!("{r:?}")
+        });
+        all
+    };
+    let first = run();
+    assert!(first.contains("Miss") && first == run());
+}
+
+#[test]
+fn rounds_in_the_air_at_the_end_are_recorded() {
+    let mut s = session(&SCENARIO.replace("range_m = 200", "range_m = 2000"));
+    let mut during = 0;
+    play(&mut s, 1.0, &ALL, &burst(800, 850), |_, _, _, r| during += r.len());
+    assert_eq!(during, 0);
+    let left = s.finish().to_vec();
+    assert_eq!(left.len(), 1);
+    assert!(matches!(left[0].outcome, Outcome::Miss { .. }), "{left:?}");
+}
+
+#[test]
+fn an_empty_scenario_is_video_and_display() {
+    let text: String = SCENARIO.split("[[boat]]").next().expect("text").to_owned();
+    let mut s = session(&text);
+    let mut frames = 0;
+    play(&mut s, 1.0, &ALL, &[], |_, status, passes, _| {
+        if status.is_some() {
+            frames += 1;
+            assert_eq!(passes[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoBoats));
+            assert_eq!(passes[Pass::Mirror as usize], PassDecision::LeftOut(LeftOut::NoBoats));
+            assert_eq!(passes[Pass::Hud as usize], PassDecision::Run);
+        }
+    });
+    assert!(frames > 25);
+}
