@@ -26,7 +26,8 @@ fn run() -> Result<(), Box<dyn Error>> {
     let mut args = env::args().skip(1);
     let out = args.next().ok_or("usage: turntable OUT.png [MODEL...]")?;
     let named: Vec<String> = args.collect();
-    let names = if named.is_empty() { built_in_names().into_iter().map(str::to_owned).collect() } else { named };
+    let names =
+        if named.is_empty() { built_in_names().into_iter().map(str::to_owned).collect() } else { named };
     let mut rows = Vec::new();
     for name in &names {
         let model = resolve(name, Path::new("."))?;
@@ -45,7 +46,9 @@ fn run() -> Result<(), Box<dyn Error>> {
 }
 
 fn describe(m: &Model) {
-    let triangles = |zone: Zone| -> u32 { m.parts.iter().filter(|p| p.zone == zone).map(|p| p.indices.len() as u32 / 3).sum() };
+    let triangles = |zone: Zone| -> u32 {
+        m.parts.iter().filter(|p| p.zone == zone).map(|p| p.indices.len() as u32 / 3).sum()
+    };
     eprintln!(
         "{:13} {:6.2} x {:5.2} m, {:5.2} above and {:4.2} below water; triangles {} (hull {}, engine {}, helm {}), vertices {}",
         m.name,
@@ -104,7 +107,8 @@ fn view(m: &Model, azimuth: f32, distance: f32, eye_height: f32, fov: f32, enlar
     canvas.backdrop(|p| sea_and_sky(from_clip, eye, p));
     let sun = Vec3::new(0.35, -0.62, 0.70).normalize();
     canvas.draw(m, clip, |at, normal, albedo| {
-        let lit = albedo * (Vec3::new(0.34, 0.40, 0.47) * (0.75 + 0.25 * normal.z) + 0.85 * normal.dot(sun).max(0.0));
+        let lit = albedo
+            * (Vec3::new(0.34, 0.40, 0.47) * (0.75 + 0.25 * normal.z) + 0.85 * normal.dot(sun).max(0.0));
         // From far off the sea hides what lies below it; close up it is shown.
         (enlarge == 1 || at.z > 0.0).then_some(lit)
     });

@@ -24,7 +24,9 @@ pub enum ModelError {
         source: io::Error,
     },
     /// A file asks for more than the trainer gives.
-    #[error("{file}: {what} is {value}, at most {limit} are taken; simplify the model or shrink its pictures")]
+    #[error(
+        "{file}: {what} is {value}, at most {limit} are taken; simplify the model or shrink its pictures"
+    )]
     TooLarge {
         /// The file.
         file: String,
@@ -73,7 +75,9 @@ pub enum ModelError {
         highest_m: f32,
     },
     /// The hull is not a body that the sea's surface cuts.
-    #[error("{file}: the hull leaves no outline on the water at height 0; give it sides that go through the surface")]
+    #[error(
+        "{file}: the hull leaves no outline on the water at height 0; give it sides that go through the surface"
+    )]
     NoWaterline {
         /// The file.
         file: String,

@@ -21,7 +21,12 @@ pub(crate) struct Mesh {
 
 impl Mesh {
     /// Checks the mesh and makes the model. `file` is what errors name.
-    pub(crate) fn finish(self, file: &str, name: &str, texture: Option<Texture>) -> Result<Model, ModelError> {
+    pub(crate) fn finish(
+        self,
+        file: &str,
+        name: &str,
+        texture: Option<Texture>,
+    ) -> Result<Model, ModelError> {
         let (min, max) = bounds(&self.vertices);
         check_size(file, min, max)?;
         let position = |i: u32| self.vertices.get(i as usize).map_or(Vec3::ZERO, |v| v.position);

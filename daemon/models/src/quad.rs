@@ -100,7 +100,9 @@ pub fn quad(file: &str, name: &str, picture: RgbaImage, spec: &QuadSpec) -> Resu
             parts.push(Part { zone, indices: start..indices.len() as u32 });
         }
     }
-    let waterline = frame.waterline(&cut, spec).ok_or_else(|| bad("nothing is opaque at waterline_row; correct the row"))?;
+    let waterline = frame
+        .waterline(&cut, spec)
+        .ok_or_else(|| bad("nothing is opaque at waterline_row; correct the row"))?;
     let (min, max) = crate::finish::bounds(&vertices);
     Ok(Model {
         name: name.to_owned(),
@@ -126,7 +128,8 @@ struct Frame {
 
 impl Frame {
     fn new(picture: &RgbaImage, spec: &QuadSpec) -> Result<Self, &'static str> {
-        let opaque = || picture.enumerate_pixels().filter(|(_, _, p)| p.0[3] >= OPAQUE).map(|(x, y, _)| (x, y));
+        let opaque =
+            || picture.enumerate_pixels().filter(|(_, _, p)| p.0[3] >= OPAQUE).map(|(x, y, _)| (x, y));
         let count = opaque().count();
         if count == 0 {
             return Err("no pixel is opaque; draw the boat with an alpha channel");
@@ -215,7 +218,8 @@ impl Frame {
 
     /// A thin rectangle under what is opaque at the water; `cut` has its bow to the right.
     fn waterline(&self, cut: &RgbaImage, spec: &QuadSpec) -> Option<Vec<DVec2>> {
-        let row = (spec.waterline_row.ceil() as i64 - 1 - i64::from(self.top)).clamp(0, i64::from(self.height) - 1);
+        let row =
+            (spec.waterline_row.ceil() as i64 - 1 - i64::from(self.top)).clamp(0, i64::from(self.height) - 1);
         let opaque = |x: &u32| cut.get_pixel(*x, row as u32).0[3] >= OPAQUE;
         let first = (0..self.width).find(opaque)?;
         let last = (0..self.width).rev().find(opaque)?;

@@ -90,7 +90,9 @@ impl Canvas {
                 if depth >= self.depth[i] {
                     continue;
                 }
-                let mix = |f: fn(&Vertex) -> Vec3| f(corners[0]) * w[0] + f(corners[1]) * w[1] + f(corners[2]) * w[2];
+                let mix = |f: fn(&Vertex) -> Vec3| {
+                    f(corners[0]) * w[0] + f(corners[1]) * w[1] + f(corners[2]) * w[2]
+                };
                 let mut albedo = mix(|v| v.albedo);
                 if let Some(texture) = texture {
                     let texel = sample(texture, mix(|v| v.uv.extend(0.0)).truncate());
@@ -138,8 +140,10 @@ fn corner_triple<'a>(model: &'a Model, indices: &[u32]) -> Option<[&'a Vertex; 3
 
 /// Nearest texel, linear with alpha.
 fn sample(texture: &Texture, uv: Vec2) -> Vec4 {
-    let column = ((uv.x.clamp(0.0, 1.0) * texture.width as f32) as usize).min(texture.width.saturating_sub(1) as usize);
-    let row = ((uv.y.clamp(0.0, 1.0) * texture.height as f32) as usize).min(texture.height.saturating_sub(1) as usize);
+    let column = ((uv.x.clamp(0.0, 1.0) * texture.width as f32) as usize)
+        .min(texture.width.saturating_sub(1) as usize);
+    let row = ((uv.y.clamp(0.0, 1.0) * texture.height as f32) as usize)
+        .min(texture.height.saturating_sub(1) as usize);
     let start = (row * texture.width as usize + column) * 4;
     match texture.rgba.get(start..start + 4) {
         Some(&[r, g, b, a]) => {

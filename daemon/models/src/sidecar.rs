@@ -56,7 +56,8 @@ fn parse(text: &str, (width, height): (u32, u32)) -> Result<QuadSpec, (usize, St
         if range.contains(&v) { Ok(v) } else { Err((value.span().start, problem())) }
     };
     let length_m = check(&raw.length_m, "length_m", 0.5..500.0, "metres")?;
-    let waterline_row = check(&raw.waterline_row, "waterline_row", 1.0..f64::from(height) + 1.0, "(a row of the picture)")?;
+    let waterline_row =
+        check(&raw.waterline_row, "waterline_row", 1.0..f64::from(height) + 1.0, "(a row of the picture)")?;
     let bow = match raw.bow.as_ref().map(|b| (b.get_ref().as_str(), b.span().start)) {
         None | Some(("right", _)) => Bow::Right,
         Some(("left", _)) => Bow::Left,
@@ -65,12 +66,23 @@ fn parse(text: &str, (width, height): (u32, u32)) -> Result<QuadSpec, (usize, St
     let rect = |raw: &Option<Spanned<RawRect>>, key: &str| {
         let Some(raw) = raw else { return Ok(None) };
         let RawRect { left, top, right, bottom } = *raw.get_ref();
-        let fits = 0.0 <= left && left < right && right <= f64::from(width) && 0.0 <= top && top < bottom
+        let fits = 0.0 <= left
+            && left < right
+            && right <= f64::from(width)
+            && 0.0 <= top
+            && top < bottom
             && bottom <= f64::from(height);
-        let problem = || format!("[{key}] must have left < right and top < bottom within {width}x{height} pixels");
+        let problem =
+            || format!("[{key}] must have left < right and top < bottom within {width}x{height} pixels");
         if fits { Ok(Some(Rect { left, top, right, bottom })) } else { Err((raw.span().start, problem())) }
     };
-    Ok(QuadSpec { length_m, waterline_row, bow, engine: rect(&raw.engine, "engine")?, helm: rect(&raw.helm, "helm")? })
+    Ok(QuadSpec {
+        length_m,
+        waterline_row,
+        bow,
+        engine: rect(&raw.engine, "engine")?,
+        helm: rect(&raw.helm, "helm")?,
+    })
 }
 
 /// Line and column of a byte offset, both from 1.

@@ -72,26 +72,26 @@ const RAIL: Curve = [
 ];
 /// Foot of the bulwark's inner side; the top of the transom where the boat is not open.
 const DECK: Curve = [
-    [-8.42, 0.60, 3.07],
-    [-8.30, 0.60, 3.02],
-    [-8.30, 1.76, 2.05],
+    [-8.42, 0.60, 3.18],
+    [-8.30, 0.60, 3.13],
+    [-7.97, 1.70, 2.05],
     [-5.75, 2.14, 2.00],
     [-3.00, 2.28, 1.98],
     [-3.00, 2.26, 0.92],
     [0.70, 2.34, 0.86],
-    [5.00, 1.98, 1.20],
-    [8.80, 0.0, 2.10],
+    [4.70, 1.86, 1.26],
+    [8.00, 0.0, 2.16],
 ];
 const CENTRE: Curve = [
-    [-8.42, 0.0, 3.07],
-    [-8.30, 0.0, 3.02],
-    [-8.30, 0.0, 2.12],
+    [-8.42, 0.0, 3.20],
+    [-8.30, 0.0, 3.15],
+    [-7.97, 0.0, 2.12],
     [-5.75, 0.0, 2.08],
     [-3.00, 0.0, 2.06],
     [-3.00, 0.0, 1.00],
     [0.70, 0.0, 0.95],
-    [5.00, 0.0, 1.28],
-    [8.80, 0.0, 2.10],
+    [4.70, 0.0, 1.34],
+    [8.00, 0.0, 2.16],
 ];
 
 fn beside(line: &Curve, out: f32, up: f32) -> Curve {
@@ -136,7 +136,7 @@ fn hull() -> Solid {
             line(&DECK, true, 1, Paint::Planks),
             line(&CENTRE, true, 0, Paint::Planks),
         ],
-        steps: 4,
+        steps: 3,
         crease: 32.0,
         transom: Paint::Teak,
     }
@@ -173,11 +173,16 @@ fn stem_and_rudder() -> Vec<Solid> {
 fn wheelhouse() -> Vec<Solid> {
     let (aft, fore, half, low, high) = (-6.7, -3.9, 1.25, 2.02, 4.25);
     let window = (3.18, 3.88);
-    let house = tapered(Vec3::new(aft, -half, low), Vec3::new(fore, half, high), [0.05, 0.18, 0.06, 0.06], Paint::DeckHouse)
-        .cut(Vec3::Z, window.0)
-        .cut(Vec3::Z, window.1)
-        .cut(Vec3::X, aft + 0.4)
-        .repaint(Paint::Glass, |p| p.z > window.0 && p.z < window.1 && p.x > aft + 0.4);
+    let house = tapered(
+        Vec3::new(aft, -half, low),
+        Vec3::new(fore, half, high),
+        [0.05, 0.18, 0.06, 0.06],
+        Paint::DeckHouse,
+    )
+    .cut(Vec3::Z, window.0)
+    .cut(Vec3::Z, window.1)
+    .cut(Vec3::X, aft + 0.4)
+    .repaint(Paint::Glass, |p| p.z > window.0 && p.z < window.1 && p.x > aft + 0.4);
     let lean = |z: f32, by: f32| by * (z - low) / (high - low);
     let mut solids = vec![house];
     for y in [-0.42, 0.42] {
@@ -186,7 +191,9 @@ fn wheelhouse() -> Vec<Solid> {
     }
     for side in [1.0, -1.0] {
         for x in [-5.65, -4.85, -4.12] {
-            let at = |z: f32| Vec3::new(x - if x > -4.5 { lean(z, 0.18) } else { 0.0 }, side * (half - lean(z, 0.06)), z);
+            let at = |z: f32| {
+                Vec3::new(x - if x > -4.5 { lean(z, 0.18) } else { 0.0 }, side * (half - lean(z, 0.06)), z)
+            };
             solids.push(bar(at(window.0), at(window.1), 0.12, Paint::DeckHouse));
         }
     }
@@ -227,8 +234,18 @@ fn rails() -> Vec<Solid> {
         solids.push(bar(foot(-3.05) + up, foot(-8.15) + up, 0.04, Paint::DeckHouse));
         solids.push(bar(foot(-3.05) + up * 0.5, foot(-8.15) + up * 0.5, 0.025, Paint::DeckHouse));
         // Posts of the awning.
-        solids.push(bar(foot(-3.2) * Vec3::new(1.0, 0.88, 1.0), Vec3::new(-3.2, side * 1.9, 4.15), 0.04, Paint::Teak));
-        solids.push(bar(foot(-8.1) * Vec3::new(1.0, 0.98, 1.0), Vec3::new(-8.2, side * 1.6, 4.20), 0.04, Paint::Teak));
+        solids.push(bar(
+            foot(-3.2) * Vec3::new(1.0, 0.88, 1.0),
+            Vec3::new(-3.2, side * 1.9, 4.15),
+            0.04,
+            Paint::Teak,
+        ));
+        solids.push(bar(
+            foot(-8.1) * Vec3::new(1.0, 0.98, 1.0),
+            Vec3::new(-8.2, side * 1.6, 4.20),
+            0.04,
+            Paint::Teak,
+        ));
     }
     let low = [(-8.35, -1.65), (-7.15, -1.70), (-7.15, 1.70), (-8.35, 1.65)];
     solids.push(prism(&low, 4.16, &low, 4.22, Paint::Canvas));
@@ -259,7 +276,12 @@ fn rig() -> Vec<Solid> {
 /// Nets, fish boxes, drums, a hatch, tyres along the sides.
 fn gear() -> Vec<Solid> {
     let mut solids = vec![
-        tapered(Vec3::new(-1.9, -0.9, 0.9), Vec3::new(0.5, 0.9, 1.42), [0.05, 0.05, 0.05, 0.05], Paint::Planks),
+        tapered(
+            Vec3::new(-1.9, -0.9, 0.9),
+            Vec3::new(0.5, 0.9, 1.42),
+            [0.05, 0.05, 0.05, 0.05],
+            Paint::Planks,
+        ),
         ellipsoid(Vec3::new(3.4, 0.55, 1.45), Vec3::new(1.15, 0.95, 0.62), 10, 5, Paint::Net),
         ellipsoid(Vec3::new(4.7, -0.5, 1.65), Vec3::new(0.95, 0.80, 0.50), 10, 5, Paint::Net),
         drum(Vec3::new(-2.4, 1.75, 0.95), 0.29, 0.88, 10, Paint::BlueDrum),
@@ -274,7 +296,11 @@ fn gear() -> Vec<Solid> {
     for side in [1.0, -1.0] {
         for (x, y, z) in [(-4.6, 2.36, 0.62), (-1.2, 2.50, 0.50), (2.1, 2.48, 0.55)] {
             let middle = Vec3::new(x, y * side, z);
-            solids.push(pipe(&[(middle - Vec3::Y * 0.09, 0.32), (middle + Vec3::Y * 0.09, 0.32)], 12, Paint::Rubber));
+            solids.push(pipe(
+                &[(middle - Vec3::Y * 0.09, 0.32), (middle + Vec3::Y * 0.09, 0.32)],
+                12,
+                Paint::Rubber,
+            ));
         }
     }
     solids

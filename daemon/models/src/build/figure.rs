@@ -57,7 +57,9 @@ pub(crate) struct Pose {
 pub(crate) fn figure(pose: &Pose, wear: &Clothes) -> Vec<Solid> {
     let forward = pose.facing.normalize_or(Vec3::X);
     let left = Vec3::Z.cross(forward);
-    let neck = pose.pelvis + Vec3::Z * (TRUNK * TRUNK - pose.lean * pose.lean).max(0.01).sqrt() + forward * pose.lean;
+    let neck = pose.pelvis
+        + Vec3::Z * (TRUNK * TRUNK - pose.lean * pose.lean).max(0.01).sqrt()
+        + forward * pose.lean;
     let mut solids = vec![trunk(pose.pelvis, neck, forward, left, wear.top)];
     if let Some(vest) = wear.vest {
         solids.push(life_jacket(pose.pelvis, neck, forward, left, vest));

@@ -83,9 +83,7 @@ pub(crate) fn build() -> Assembly {
     let hull = hull();
     let marks = pennant(&hull);
     let hull = hull.cut(Vec3::X, aft).cut(Vec3::X, fore).cut(Vec3::Z, top);
-    ship.add_by(hull, |p| {
-        if p.x > aft && p.x < fore && p.z < top { Zone::Engine } else { Zone::Hull }
-    });
+    ship.add_by(hull, |p| if p.x > aft && p.x < fore && p.z < top { Zone::Engine } else { Zone::Hull });
     ship.add_all(Zone::Hull, marks);
     ship.add_all(Zone::Hull, bulwark_and_rails());
     ship.add_all(Zone::Hull, frigate_top::superstructure());

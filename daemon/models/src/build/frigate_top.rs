@@ -36,10 +36,16 @@ pub(crate) fn superstructure() -> Vec<Solid> {
         let hull: Vec<(Vec3, f32)> = boat.iter().map(|&(x, r)| (Vec3::new(x, y, 7.1), r)).collect();
         solids.push(pipe(&hull, 8, Paint::Orange));
         // Doors and vents break the plating up.
-        for (x, z, w, h) in [(12.0, 6.9, 1.0, 1.9), (20.5, 7.1, 1.0, 1.9), (-14.0, 6.4, 1.0, 1.9), (5.0, 7.2, 2.2, 1.1)] {
+        for (x, z, w, h) in
+            [(12.0, 6.9, 1.0, 1.9), (20.5, 7.1, 1.0, 1.9), (-14.0, 6.4, 1.0, 1.9), (5.0, 7.2, 2.2, 1.1)]
+        {
             let lean = 0.118 * (z - 5.6);
             let at = Vec3::new(x, side * (7.45 - lean), z);
-            solids.push(block(at - Vec3::new(w / 2.0, 0.12, 0.0), at + Vec3::new(w / 2.0, 0.02, h), Paint::DeckGrey));
+            solids.push(block(
+                at - Vec3::new(w / 2.0, 0.12, 0.0),
+                at + Vec3::new(w / 2.0, 0.02, h),
+                Paint::DeckGrey,
+            ));
         }
     }
     solids
@@ -82,7 +88,16 @@ pub(crate) fn bridge() -> Vec<Solid> {
 
 /// Funnel with its black top.
 pub(crate) fn funnel() -> Vec<Solid> {
-    let low = [(-17.0, -2.6), (-15.8, -3.4), (-8.2, -3.4), (-7.0, -2.4), (-7.0, 2.4), (-8.2, 3.4), (-15.8, 3.4), (-17.0, 2.6)];
+    let low = [
+        (-17.0, -2.6),
+        (-15.8, -3.4),
+        (-8.2, -3.4),
+        (-7.0, -2.4),
+        (-7.0, 2.4),
+        (-8.2, 3.4),
+        (-15.8, 3.4),
+        (-17.0, 2.6),
+    ];
     let high = low.map(|(x, y): (f32, f32)| (-11.9 + (x + 12.0) * 0.78, y * 0.72));
     let cap = low.map(|(x, y): (f32, f32)| (-11.9 + (x + 12.0) * 0.70, y * 0.62));
     let mut solids = vec![
@@ -134,19 +149,44 @@ pub(crate) fn masts() -> Vec<Solid> {
     ];
     for side in [1.0, -1.0] {
         for (x, z) in [(19.0, 15.5), (15.2, 21.5)] {
-            solids.push(ellipsoid(Vec3::new(x, side * (4.2 + (18.0 - x).max(0.0) * -0.55), z + 1.2), Vec3::splat(0.75), 8, 5, Paint::White));
+            solids.push(ellipsoid(
+                Vec3::new(x, side * (4.2 + (18.0 - x).max(0.0) * -0.55), z + 1.2),
+                Vec3::splat(0.75),
+                8,
+                5,
+                Paint::White,
+            ));
         }
         let spar = Vec3::new(14.8, side * 2.0, 22.4);
         solids.push(bar(spar, spar + Vec3::new(0.0, side * 2.6, 0.3), 0.14, Paint::Haze));
-        solids.push(bar(Vec3::new(9.0, side * 4.8, 12.4), Vec3::new(8.2, side * 5.8, 21.0), 0.07, Paint::White));
-        solids.push(bar(Vec3::new(-34.0, side * 5.6, 11.6), Vec3::new(-35.0, side * 6.4, 19.5), 0.07, Paint::White));
+        solids.push(bar(
+            Vec3::new(9.0, side * 4.8, 12.4),
+            Vec3::new(8.2, side * 5.8, 21.0),
+            0.07,
+            Paint::White,
+        ));
+        solids.push(bar(
+            Vec3::new(-34.0, side * 5.6, 11.6),
+            Vec3::new(-35.0, side * 6.4, 19.5),
+            0.07,
+            Paint::White,
+        ));
     }
     solids
 }
 
 /// Gun, missile cells, close-in weapon.
 pub(crate) fn weapons() -> Vec<Solid> {
-    let turret_low = [(42.6, -1.5), (43.6, -1.9), (46.2, -1.5), (47.2, -0.7), (47.2, 0.7), (46.2, 1.5), (43.6, 1.9), (42.6, 1.5)];
+    let turret_low = [
+        (42.6, -1.5),
+        (43.6, -1.9),
+        (46.2, -1.5),
+        (47.2, -0.7),
+        (47.2, 0.7),
+        (46.2, 1.5),
+        (43.6, 1.9),
+        (42.6, 1.5),
+    ];
     let turret_high = turret_low.map(|(x, y): (f32, f32)| (44.2 + (x - 44.6) * 0.50, y * 0.50));
     let barrel = [
         (Vec3::new(46.0, 0.0, 9.7), 0.30),
@@ -161,9 +201,24 @@ pub(crate) fn weapons() -> Vec<Solid> {
         // Breakwater.
         skin(
             &[
-                vec![Vec3::new(41.0, -4.6, 7.5), Vec3::new(41.2, -4.6, 7.5), Vec3::new(41.2, -4.6, 8.8), Vec3::new(41.0, -4.6, 8.8)],
-                vec![Vec3::new(42.3, 0.0, 7.7), Vec3::new(42.5, 0.0, 7.7), Vec3::new(42.5, 0.0, 8.8), Vec3::new(42.3, 0.0, 8.8)],
-                vec![Vec3::new(41.0, 4.6, 7.5), Vec3::new(41.2, 4.6, 7.5), Vec3::new(41.2, 4.6, 8.8), Vec3::new(41.0, 4.6, 8.8)],
+                vec![
+                    Vec3::new(41.0, -4.6, 7.5),
+                    Vec3::new(41.2, -4.6, 7.5),
+                    Vec3::new(41.2, -4.6, 8.8),
+                    Vec3::new(41.0, -4.6, 8.8),
+                ],
+                vec![
+                    Vec3::new(42.3, 0.0, 7.7),
+                    Vec3::new(42.5, 0.0, 7.7),
+                    Vec3::new(42.5, 0.0, 8.8),
+                    Vec3::new(42.3, 0.0, 8.8),
+                ],
+                vec![
+                    Vec3::new(41.0, 4.6, 7.5),
+                    Vec3::new(41.2, 4.6, 7.5),
+                    Vec3::new(41.2, 4.6, 8.8),
+                    Vec3::new(41.0, 4.6, 8.8),
+                ],
             ],
             Paint::Haze,
             25.0,
@@ -181,7 +236,11 @@ pub(crate) fn weapons() -> Vec<Solid> {
     for row in 0..4 {
         for side in [1.0, -1.0] {
             let at = Vec3::new(33.3 + 1.4 * row as f32, side * 1.35, 8.7);
-            solids.push(block(at - Vec3::new(0.5, 1.0, 0.05), at + Vec3::new(0.5, 1.0, 0.06), Paint::DeckGrey));
+            solids.push(block(
+                at - Vec3::new(0.5, 1.0, 0.05),
+                at + Vec3::new(0.5, 1.0, 0.06),
+                Paint::DeckGrey,
+            ));
         }
     }
     solids
@@ -190,7 +249,9 @@ pub(crate) fn weapons() -> Vec<Solid> {
 /// Marks on the flight deck and the nets folded down along its edges.
 pub(crate) fn flight_deck() -> Vec<Solid> {
     let z = 5.64;
-    let line = |a: (f32, f32), b: (f32, f32)| block(Vec3::new(a.0, a.1, z), Vec3::new(b.0, b.1, z + 0.06), Paint::Marking);
+    let line = |a: (f32, f32), b: (f32, f32)| {
+        block(Vec3::new(a.0, a.1, z), Vec3::new(b.0, b.1, z + 0.06), Paint::Marking)
+    };
     let mut solids = vec![
         line((-60.5, -0.15), (-39.5, 0.15)),
         line((-60.5, -6.0), (-60.1, 6.0)),

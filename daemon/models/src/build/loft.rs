@@ -55,7 +55,8 @@ impl Hull<'_> {
     fn sections(&self) -> Vec<Vec<Vec3>> {
         let count = self.lines.iter().map(|l| l.points.len()).min().unwrap_or(0);
         let steps: Vec<usize> = (0..count.saturating_sub(1)).map(|i| self.steps_after(i)).collect();
-        let lines: Vec<Vec<Vec3>> = self.lines.iter().map(|l| sample_line(&l.points[..count], &steps)).collect();
+        let lines: Vec<Vec<Vec3>> =
+            self.lines.iter().map(|l| sample_line(&l.points[..count], &steps)).collect();
         let stations = lines.first().map_or(0, Vec::len);
         (0..stations)
             .map(|s| {
@@ -68,9 +69,10 @@ impl Hull<'_> {
     /// Bulkheads and transoms are short; only real lengths of hull are divided.
     fn steps_after(&self, i: usize) -> usize {
         let at = |l: &Line<'_>, i: usize| Vec3::from_array(l.points[i]);
-        let length = self.lines.first().map_or(0.0, |l| {
-            l.points.last().map_or(0.0, |&last| Vec3::from_array(last).distance(at(l, 0)))
-        });
+        let length = self
+            .lines
+            .first()
+            .map_or(0.0, |l| l.points.last().map_or(0.0, |&last| Vec3::from_array(last).distance(at(l, 0))));
         let fore_and_aft = self.lines.iter().map(|l| (at(l, i + 1).x - at(l, i).x).abs()).fold(0.0, f32::max);
         if fore_and_aft < 0.03 * length { 1 } else { self.steps }
     }
@@ -99,7 +101,10 @@ impl Hull<'_> {
 /// jumps between two points at one x, as decks do at a bulkhead, it has a corner at both.
 fn sample_line(points: &[[f32; 3]], steps: &[usize]) -> Vec<Vec3> {
     let p: Vec<Vec3> = points.iter().map(|&p| Vec3::from_array(p)).collect();
-    let jump = |i: usize| i + 1 < p.len() && p[i].x == p[i + 1].x && p[i] != p[i + 1];
+    let jump = |i: usize| {
+        let step = p.get(i + 1).map_or(Vec3::ZERO, |next| *next - p[i]);
+        step.x.abs() < 0.5 * step.length()
+    };
     let corner = |i: usize| jump(i) || i.checked_sub(1).is_some_and(jump);
     let mut out = Vec::new();
     for (i, &steps) in steps.iter().enumerate() {
@@ -132,16 +137,54 @@ fn to_starboard(p: Vec3) -> Vec3 {
     Vec3::new(p.x, -p.y, p.z)
 }
 
-/// Closes an end with strips across the boat; an end that is a line in the centre plane needs none.
+/// Closes an end: the section with its mirror image is a polygon seen along x. An end that lies in the centre plane has no
+/// area and needs nothing.
 fn close(hull: &mut Solid, section: &[Vec3], aft: bool, paint: Paint) {
-    for pair in section.windows(2) {
-        let (low, high) = (pair[0], pair[1]);
-        if key(low) == key(high) {
-            continue;
-        }
-        let strip = [to_starboard(low), to_starboard(high), high, low];
-        hull.quad(if aft { strip } else { [strip[3], strip[2], strip[1], strip[0]] }, paint);
+    // From the keel up to port, down to starboard: clockwise seen from astern, counter-clockwise from ahead.
+    let starboard = section.iter().rev().map(|&p| to_starboard(p));
+    let mut polygon: Vec<Vec3> = section.iter().copied().chain(starboard).collect();
+    polygon.dedup_by_key(|p| key(*p));
+    if polygon.len() > 1 && polygon.first().map(|p| key(*p)) == polygon.last().map(|p| key(*p)) {
+        polygon.pop();
     }
+    while let Some(ear) = best_ear(&polygon) {
+        let [a, b, c] = corners_at(&polygon, ear);
+        if aft {
+            hull.tri(a, c, b, paint)
+        } else {
+            hull.tri(a, b, c, paint)
+        }
+        polygon.remove(ear);
+    }
+}
+
+fn corners_at(polygon: &[Vec3], i: usize) -> [Vec3; 3] {
+    let n = polygon.len();
+    [polygon[(i + n - 1) % n], polygon[i], polygon[(i + 1) % n]]
+}
+
+/// Twice the area of a triangle seen along -x, positive where it runs counter-clockwise.
+fn area_from_ahead([a, b, c]: [Vec3; 3]) -> f32 {
+    (b.y - a.y) * (c.z - a.z) - (c.y - a.y) * (b.z - a.z)
+}
+
+/// The corner whose cutting off leaves the best-shaped triangle; none where no area is left.
+fn best_ear(polygon: &[Vec3]) -> Option<usize> {
+    if polygon.len() < 3 {
+        return None;
+    }
+    let shape = |i: usize| {
+        let t @ [a, b, c] = corners_at(polygon, i);
+        let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+        let area = area_from_ahead(t);
+        let holds = |p: Vec3| {
+            let outside = [[a, b, p], [b, c, p], [c, a, p]].into_iter().any(|e| area_from_ahead(e) < 0.0);
+            !t.contains(&p) && !outside
+        };
+        (area > 1e-6 && !polygon.iter().any(|&p| holds(p))).then_some(area / longest)
+    };
+    let ears = (0..polygon.len()).filter_map(|i| Some((i, shape(i)?)));
+    ears.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
 }
 
 /// A path with a radius at each point, drawn smoothly through its points with `steps` pieces between two of them.

@@ -15,10 +15,20 @@ pub(crate) fn outboard(at: Vec3, scale: f32, trim: f32, steer: f32) -> Vec<Solid
         cowl(),
         band(),
         // Midsection, plate above the propeller, gear case with its strut and skeg.
-        tapered(Vec3::new(-0.36, -0.075, -0.62), Vec3::new(-0.10, 0.075, 0.02), [-0.06, 0.0, -0.04, -0.04], Paint::Cowl),
+        tapered(
+            Vec3::new(-0.36, -0.075, -0.62),
+            Vec3::new(-0.10, 0.075, 0.02),
+            [-0.06, 0.0, -0.04, -0.04],
+            Paint::Cowl,
+        ),
         block(Vec3::new(-0.56, -0.13, -0.655), Vec3::new(-0.10, 0.13, -0.625), Paint::Cowl),
         capsule(Vec3::new(-0.44, 0.0, -0.84), Vec3::new(-0.12, 0.0, -0.84), 0.062, 0.045, 8, Paint::Cowl),
-        tapered(Vec3::new(-0.32, -0.02, -1.06), Vec3::new(-0.20, 0.02, -0.64), [-0.06, -0.06, -0.02, -0.02], Paint::Cowl),
+        tapered(
+            Vec3::new(-0.32, -0.02, -1.06),
+            Vec3::new(-0.20, 0.02, -0.64),
+            [-0.06, -0.06, -0.02, -0.02],
+            Paint::Cowl,
+        ),
         pipe(&[(Vec3::new(-0.58, 0.0, -0.84), 0.03), (Vec3::new(-0.50, 0.0, -0.84), 0.05)], 8, Paint::Steel),
     ];
     solids.extend(propeller());
@@ -48,8 +58,8 @@ fn cowl() -> Solid {
 
 /// The light band that makers put about the cowl's foot.
 fn band() -> Solid {
-    let rings =
-        [(-0.665, 0.125, 0.238, 0.27), (-0.672, 0.128, 0.243, 0.34)].map(|(aft, fore, half, z)| oval(aft, fore, half, z));
+    let rings = [(-0.665, 0.125, 0.238, 0.27), (-0.672, 0.128, 0.243, 0.34)]
+        .map(|(aft, fore, half, z)| oval(aft, fore, half, z));
     skin(&rings, Paint::CowlBand, 40.0)
 }
 
@@ -70,8 +80,11 @@ fn propeller() -> Vec<Solid> {
     let hub = Vec3::new(-0.53, 0.0, -0.84);
     (0..3)
         .map(|blade| {
-            let turn = Quat::from_rotation_x(blade as f32 * std::f32::consts::TAU / 3.0) * Quat::from_rotation_z(0.45);
-            block(Vec3::new(-0.012, -0.05, 0.03), Vec3::new(0.012, 0.05, 0.17), Paint::Steel).turned(turn).moved(hub)
+            let turn = Quat::from_rotation_x(blade as f32 * std::f32::consts::TAU / 3.0)
+                * Quat::from_rotation_z(0.45);
+            block(Vec3::new(-0.012, -0.05, 0.03), Vec3::new(0.012, 0.05, 0.17), Paint::Steel)
+                .turned(turn)
+                .moved(hub)
         })
         .collect()
 }

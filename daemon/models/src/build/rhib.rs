@@ -37,11 +37,11 @@ const EDGE: [[f32; 3]; 6] = [
     [3.34, 0.0, 0.70],
 ];
 const SOLE: [[f32; 3]; 6] = [
-    [-3.10, 0.0, 0.24],
-    [-1.50, 0.0, 0.25],
-    [0.50, 0.0, 0.30],
-    [1.90, 0.0, 0.44],
-    [2.75, 0.0, 0.58],
+    [-3.10, 0.0, 0.26],
+    [-1.50, 0.0, 0.27],
+    [0.50, 0.0, 0.32],
+    [1.90, 0.0, 0.46],
+    [2.75, 0.0, 0.60],
     [3.34, 0.0, 0.70],
 ];
 
@@ -96,18 +96,22 @@ fn collar() -> Vec<Solid> {
     let star = port.iter().rev().skip(1).map(|&(p, r)| (Vec3::new(p.x, -p.y, p.z), r));
     let around: Vec<(Vec3, f32)> = port.iter().copied().chain(star).collect();
     let path = smooth(&around, 2);
-    let outwards = |p: Vec3| Vec3::new((p.x - 1.2).max(0.0) * 0.42, p.y * 0.8, 0.0).normalize_or(Vec3::X);
+    // Along the outermost line of the tube, where it rubs.
     let strake: Vec<(Vec3, f32)> = path
-        .iter()
-        .filter(|(p, _)| p.x > -3.2)
-        .map(|&(p, r)| (p + outwards(p) * (r * 0.97), 0.035))
+        .windows(3)
+        .filter(|w| w[1].0.x > -3.2)
+        .map(|w| (w[1].0 + Vec3::Z.cross(w[2].0 - w[0].0).normalize_or(Vec3::X) * (w[1].1 * 0.98), 0.04))
         .collect();
     let mut solids = vec![pipe(&path, 10, Paint::Tube), pipe(&strake, 4, Paint::Rubber)];
     // Grab patches along the top.
     for x in [-2.4, -1.2, 0.0, 1.1] {
         for y in [-1.13, 1.13] {
             let foot = Vec3::new(x, y, 0.62 + 0.03 * (x + 2.4).max(0.0));
-            solids.push(block(foot - Vec3::new(0.13, 0.045, 0.02), foot + Vec3::new(0.13, 0.045, 0.035), Paint::Orange));
+            solids.push(block(
+                foot - Vec3::new(0.13, 0.045, 0.02),
+                foot + Vec3::new(0.13, 0.045, 0.035),
+                Paint::Orange,
+            ));
         }
     }
     solids
@@ -119,7 +123,12 @@ fn fittings() -> Vec<Solid> {
         block(Vec3::new(-3.16, -0.90, 0.05), Vec3::new(-3.02, 0.90, 0.60), Paint::GreyHull),
         seat(-0.68),
         seat(-1.64),
-        tapered(Vec3::new(1.25, -0.42, 0.32), Vec3::new(2.05, 0.42, 0.78), [0.04, 0.12, 0.06, 0.06], Paint::GreyHull),
+        tapered(
+            Vec3::new(1.25, -0.42, 0.32),
+            Vec3::new(2.05, 0.42, 0.78),
+            [0.04, 0.12, 0.06, 0.06],
+            Paint::GreyHull,
+        ),
         ellipsoid(Vec3::new(2.55, 0.0, 0.66), Vec3::new(0.26, 0.24, 0.12), 8, 4, Paint::Sand),
         block(Vec3::new(-2.85, -0.25, 0.24), Vec3::new(-2.35, 0.25, 0.55), Paint::Black),
     ]
@@ -127,9 +136,24 @@ fn fittings() -> Vec<Solid> {
 
 /// A jockey seat with a backrest.
 fn seat(x: f32) -> Solid {
-    let mut pod = tapered(Vec3::new(x - 0.36, -0.19, 0.25), Vec3::new(x + 0.30, 0.19, 0.82), [0.10, 0.08, 0.03, 0.03], Paint::GreyHull);
-    let cushion = tapered(Vec3::new(x - 0.32, -0.17, 0.82), Vec3::new(x + 0.26, 0.17, 0.94), [0.02, 0.04, 0.03, 0.03], Paint::Black);
-    let back = tapered(Vec3::new(x - 0.40, -0.20, 0.80), Vec3::new(x - 0.28, 0.20, 1.26), [0.0, 0.03, 0.03, 0.03], Paint::Black);
+    let mut pod = tapered(
+        Vec3::new(x - 0.36, -0.19, 0.25),
+        Vec3::new(x + 0.30, 0.19, 0.82),
+        [0.10, 0.08, 0.03, 0.03],
+        Paint::GreyHull,
+    );
+    let cushion = tapered(
+        Vec3::new(x - 0.32, -0.17, 0.82),
+        Vec3::new(x + 0.26, 0.17, 0.94),
+        [0.02, 0.04, 0.03, 0.03],
+        Paint::Black,
+    );
+    let back = tapered(
+        Vec3::new(x - 0.40, -0.20, 0.80),
+        Vec3::new(x - 0.28, 0.20, 1.26),
+        [0.0, 0.03, 0.03, 0.03],
+        Paint::Black,
+    );
     pod.tris.extend(cushion.tris);
     pod.tris.extend(back.tris);
     pod
@@ -145,9 +169,24 @@ fn console() -> Vec<Solid> {
         })
         .collect();
     vec![
-        tapered(Vec3::new(-0.05, -0.44, 0.26), Vec3::new(0.75, 0.44, 1.20), [0.03, 0.22, 0.06, 0.06], Paint::GreyHull),
-        tapered(Vec3::new(0.0, -0.36, 1.20), Vec3::new(0.50, 0.36, 1.32), [0.10, 0.06, 0.02, 0.02], Paint::Black),
-        tapered(Vec3::new(0.30, -0.38, 1.20), Vec3::new(0.52, 0.38, 1.68), [0.0, 0.19, 0.05, 0.05], Paint::Glass),
+        tapered(
+            Vec3::new(-0.05, -0.44, 0.26),
+            Vec3::new(0.75, 0.44, 1.20),
+            [0.03, 0.22, 0.06, 0.06],
+            Paint::GreyHull,
+        ),
+        tapered(
+            Vec3::new(0.0, -0.36, 1.20),
+            Vec3::new(0.50, 0.36, 1.32),
+            [0.10, 0.06, 0.02, 0.02],
+            Paint::Black,
+        ),
+        tapered(
+            Vec3::new(0.30, -0.38, 1.20),
+            Vec3::new(0.52, 0.38, 1.68),
+            [0.0, 0.19, 0.05, 0.05],
+            Paint::Glass,
+        ),
         pipe(&[(Vec3::new(0.04, 0.0, 1.18), 0.03), (wheel_hub - Vec3::X * 0.10, 0.03)], 6, Paint::Black),
         pipe(&rim, 4, Paint::Black),
         bar(Vec3::new(0.02, -0.30, 1.18), Vec3::new(-0.05, -0.30, 1.36), 0.022, Paint::Steel),
@@ -191,7 +230,12 @@ fn crew(pelvis: Vec3, hands_x: f32, hands_z: f32, head: Head) -> Vec<Solid> {
         hands: [Vec3::new(hands_x, 0.17, hands_z), Vec3::new(hands_x, -0.17, hands_z)],
         feet: [Vec3::new(pelvis.x + 0.18, 0.31, 0.34), Vec3::new(pelvis.x + 0.18, -0.31, 0.34)],
     };
-    let wear =
-        Clothes { top: Paint::Navy, trousers: Paint::Navy, shoes: Paint::Black, head, vest: Some(Paint::Orange) };
+    let wear = Clothes {
+        top: Paint::Navy,
+        trousers: Paint::Navy,
+        shoes: Paint::Black,
+        head,
+        vest: Some(Paint::Orange),
+    };
     figure(&pose, &wear)
 }

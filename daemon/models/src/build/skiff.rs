@@ -64,8 +64,8 @@ const SHEER: [[f32; 3]; 10] = [
 ];
 /// Foot of the inner side; the top of the transom and the foredeck where the boat is not open.
 const INSIDE: [[f32; 3]; 10] = [
-    [-3.52, 0.40, 0.56],
-    [-3.43, 0.40, 0.56],
+    [-3.52, 0.40, 0.575],
+    [-3.43, 0.40, 0.575],
     [-3.43, 0.68, 0.07],
     [-2.00, 0.74, 0.07],
     [0.00, 0.75, 0.09],
@@ -76,8 +76,8 @@ const INSIDE: [[f32; 3]; 10] = [
     [3.50, 0.0, 1.12],
 ];
 const CENTRE: [[f32; 3]; 10] = [
-    [-3.52, 0.0, 0.56],
-    [-3.43, 0.0, 0.56],
+    [-3.52, 0.0, 0.585],
+    [-3.43, 0.0, 0.585],
     [-3.43, 0.0, 0.07],
     [-2.00, 0.0, 0.07],
     [0.00, 0.0, 0.09],
@@ -132,8 +132,9 @@ fn hull() -> Solid {
 
 /// Thwarts, cans, a drum, a heap of net, rope on the foredeck.
 fn fittings() -> Vec<Solid> {
-    let thwart =
-        |x: f32, half: f32, z: f32| block(Vec3::new(x, -half, z - 0.05), Vec3::new(x + 0.30, half, z), Paint::WhiteHull);
+    let thwart = |x: f32, half: f32, z: f32| {
+        block(Vec3::new(x, -half, z - 0.05), Vec3::new(x + 0.30, half, z), Paint::WhiteHull)
+    };
     let can = |x: f32, y: f32, paint| {
         let foot = Vec3::new(x, y, 0.08);
         tapered(foot, foot + Vec3::new(0.34, 0.17, 0.36), [0.03, 0.06, 0.02, 0.02], paint)

@@ -88,7 +88,6 @@ impl Solid {
         self.map(|p| by * p)
     }
 
-
     /// Another crease angle, degrees.
     pub(crate) fn creased(mut self, degrees: f32) -> Self {
         self.crease = degrees.to_radians();
@@ -180,16 +179,13 @@ pub(crate) fn skin(rings: &[Vec<Vec3>], paint: Paint, crease_deg: f32) -> Solid 
     solid.outward()
 }
 
-/// Closes a convex ring: a quadrilateral with two triangles, anything else from its middle.
+/// Closes a convex ring, with the shorter diagonal where it has four corners.
 fn fan(solid: &mut Solid, ring: &[Vec3], flip: bool, paint: Paint) {
     let ordered: Vec<Vec3> = if flip { ring.iter().rev().copied().collect() } else { ring.to_vec() };
-    if let [a, b, c, d] = ordered[..] {
-        solid.quad([a, b, c, d], paint);
-        return;
-    }
-    let middle = ordered.iter().sum::<Vec3>() / ordered.len().max(1) as f32;
-    for k in 0..ordered.len() {
-        solid.tri(middle, ordered[k], ordered[(k + 1) % ordered.len()], paint);
+    match ordered[..] {
+        [a, b, c, d] => solid.quad([a, b, c, d], paint),
+        [first, ref rest @ ..] => rest.windows(2).for_each(|w| solid.tri(first, w[0], w[1], paint)),
+        [] => {}
     }
 }
 
@@ -236,7 +232,9 @@ pub(crate) fn pipe(path: &[(Vec3, f32)], sides: usize, paint: Paint) -> Solid {
         let after = path[(i + 1).min(path.len() - 1)].0;
         let along = (after - before).normalize_or(Vec3::Z);
         // Carry the previous ring's direction on, so that the pipe does not twist.
-        side = (side - along * side.dot(along)).try_normalize().unwrap_or_else(|| along.any_orthonormal_vector());
+        side = (side - along * side.dot(along))
+            .try_normalize()
+            .unwrap_or_else(|| along.any_orthonormal_vector());
         rings.push(ellipse(p, side * r, along.cross(side) * r, sides));
     }
     skin(&rings, paint, 65.0)

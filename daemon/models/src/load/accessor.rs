@@ -15,7 +15,9 @@ impl Source<'_> {
     pub(crate) fn floats(&self, index: Index<Accessor>, types: &[Type]) -> Result<Vec<[f32; 4]>, ModelError> {
         let (accessor, component, shape) = self.accessor(index)?;
         if !types.contains(&shape) {
-            return Err(self.error(format!("accessor {} has the shape {shape:?}, expected {types:?}", index.value())));
+            return Err(
+                self.error(format!("accessor {} has the shape {shape:?}, expected {types:?}", index.value()))
+            );
         }
         let width = shape.multiplicity();
         self.elements(index, accessor, component, width, |bytes| {
@@ -32,7 +34,8 @@ impl Source<'_> {
         let (accessor, component, shape) = self.accessor(index)?;
         let whole = matches!(component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32);
         if shape != Type::Scalar || !whole {
-            return Err(self.error(format!("accessor {} holds no indices: {shape:?} of {component:?}", index.value())));
+            return Err(self
+                .error(format!("accessor {} holds no indices: {shape:?} of {component:?}", index.value())));
         }
         self.elements(index, accessor, component, 1, |bytes| {
             bytes.iter().rev().fold(0_u32, |value, &byte| value << 8 | u32::from(byte))
@@ -69,7 +72,9 @@ impl Source<'_> {
         let size = component.size() * width;
         let stride = self.root().buffer_views.get(view).and_then(|v| v.byte_stride).map_or(size, |s| s.0);
         if stride < size {
-            return Err(self.error(format!("accessor {i} has a stride of {stride} bytes for elements of {size}")));
+            return Err(
+                self.error(format!("accessor {i} has a stride of {stride} bytes for elements of {size}"))
+            );
         }
         let outside = || self.error(format!("accessor {i} reaches beyond its buffer view"));
         let bytes = self.view(view)?;

@@ -32,8 +32,7 @@ impl Place {
 pub(crate) fn pack(pictures: &[&Picture]) -> (Texture, Vec<Place>, Vec2) {
     let mut images: Vec<RgbaImage> = pictures.iter().map(|p| p.rgba.clone()).collect();
     let layout = loop {
-        let sizes: Vec<(u32, u32)> =
-            images.iter().map(|i| i.dimensions()).chain([(WHITE, WHITE)]).collect();
+        let sizes: Vec<(u32, u32)> = images.iter().map(|i| i.dimensions()).chain([(WHITE, WHITE)]).collect();
         if let Some(layout) = shelves(&sizes) {
             break layout;
         }

@@ -2,11 +2,7 @@
 
 use bowwave_core::model::{Texture, Vertex, Zone};
 use glam::{Mat3, Mat4, Vec2, Vec3};
-use gltf::{
-    Semantic,
-    json::accessor::Type,
-    mesh::Mode,
-};
+use gltf::{Semantic, json::accessor::Type, mesh::Mode};
 
 use super::{
     TRIANGLES_MAX, VERTICES_MAX,
@@ -92,7 +88,9 @@ impl Walk<'_, '_> {
         let seen = self.seen.get_mut(node.index());
         if depth > DEPTH_MAX || seen.is_none_or(|s| std::mem::replace(s, true)) {
             let i = node.index();
-            return Err(self.source.error(format!("node {i} is reached twice or lies deeper than {DEPTH_MAX} levels")));
+            return Err(self
+                .source
+                .error(format!("node {i} is reached twice or lies deeper than {DEPTH_MAX} levels")));
         }
         let transform = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
         let mesh_name = node.mesh().and_then(|m| m.name().and_then(zone_of));
@@ -124,7 +122,8 @@ impl Walk<'_, '_> {
             return Ok(());
         }
         let surface = self.pictures.surface(source, &primitive.material())?;
-        let attributes = Attributes::read(source, primitive, surface.picture.map(|m| m.set), &mut self.vertices)?;
+        let attributes =
+            Attributes::read(source, primitive, surface.picture.map(|m| m.set), &mut self.vertices)?;
         let triangles = triangles(source, primitive, attributes.positions.len())?;
         self.triangles += triangles.len() as u64;
         limit(source.file, "the number of triangles", self.triangles, TRIANGLES_MAX)?;
@@ -134,9 +133,8 @@ impl Walk<'_, '_> {
         if !to_boat.is_finite() || linear.determinant() == 0.0 {
             return Err(source.error("a node's transform flattens its mesh or is not finite"));
         }
-        let vertices = attributes.vertices(to_boat, surface.albedo, |uv| {
-            surface.picture.map_or(Vec2::ZERO, |m| m.apply(uv))
-        });
+        let vertices = attributes
+            .vertices(to_boat, surface.albedo, |uv| surface.picture.map_or(Vec2::ZERO, |m| m.apply(uv)));
         if !vertices.iter().all(|v| v.position.is_finite() && v.uv.is_finite() && v.albedo.is_finite()) {
             return Err(source.error(format!("mesh {} has a corner that is not finite", primitive.index())));
         }
@@ -214,7 +212,8 @@ impl Piece {
             // glTF 2.0, 3.7.2.1: "When normals are not specified, client implementations MUST calculate flat normals".
             let corners = self.triangles.iter().flatten().map(|&i| vertices[i as usize]).collect();
             self.vertices = corners;
-            self.triangles = (0..self.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+            self.triangles =
+                (0..self.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         }
         for t in &self.triangles {
             let normal = face(&self.vertices, t).normalize_or(Vec3::Z);
@@ -260,7 +259,10 @@ impl Attributes {
         total: &mut u64,
     ) -> Result<Self, ModelError> {
         let get = |semantic: Semantic| {
-            primitive.attributes().find(|(s, _)| *s == semantic).map(|(_, a)| gltf::json::Index::new(a.index() as u32))
+            primitive
+                .attributes()
+                .find(|(s, _)| *s == semantic)
+                .map(|(_, a)| gltf::json::Index::new(a.index() as u32))
         };
         let at = get(Semantic::Positions).ok_or_else(|| source.error("a mesh has no positions"))?;
         *total = total.saturating_add(source.count(at));
@@ -296,7 +298,10 @@ impl Attributes {
                 .as_ref()
                 .map_or(Vec3::ZERO, |n| (normal_matrix * xyz(&n[i])).normalize_or_zero()),
             uv: map_uv(Vec2::new(self.uvs[i][0], self.uvs[i][1])),
-            albedo: self.colours.as_ref().map_or(albedo, |c| albedo * xyz(&c[i]).clamp(Vec3::ZERO, Vec3::ONE)),
+            albedo: self
+                .colours
+                .as_ref()
+                .map_or(albedo, |c| albedo * xyz(&c[i]).clamp(Vec3::ZERO, Vec3::ONE)),
         };
         self.positions.iter().enumerate().map(one).collect()
     }

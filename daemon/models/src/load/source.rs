@@ -75,13 +75,17 @@ impl<'a> Source<'a> {
     fn beside(&self, uri: &str) -> Result<PathBuf, ModelError> {
         let shown: String = uri.chars().take(80).collect();
         let Some(folder) = self.folder else {
-            return Err(self.error(format!("it refers to the file {shown:?}, but must hold everything itself")));
+            return Err(
+                self.error(format!("it refers to the file {shown:?}, but must hold everything itself"))
+            );
         };
         let decoded = percent_decode_str(uri).decode_utf8_lossy().into_owned();
         let path = Path::new(&decoded);
         let stays = path.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         if !stays || decoded.contains("://") || decoded.is_empty() {
-            return Err(self.error(format!("it refers to {shown:?}; only files in its own folder or below are read")));
+            return Err(
+                self.error(format!("it refers to {shown:?}; only files in its own folder or below are read"))
+            );
         }
         Ok(folder.join(path))
     }
@@ -100,7 +104,9 @@ impl<'a> Source<'a> {
             };
             if (bytes.len() as u64) < length {
                 let got = bytes.len();
-                return Err(self.error(format!("buffer {i} should have {length} bytes but has {got}: truncated?")));
+                return Err(
+                    self.error(format!("buffer {i} should have {length} bytes but has {got}: truncated?"))
+                );
             }
             total += bytes.len() as u64;
             limit(self.file, "the sum of its buffers in bytes", total, FILE_BYTES_MAX)?;
@@ -166,9 +172,10 @@ fn parse(bytes: &[u8]) -> Result<(json::Root, Option<Vec<u8>>), String> {
 /// One line on a library error: of many validation errors the first.
 fn explain(error: &gltf::Error) -> String {
     match error {
-        gltf::Error::Validation(all) => match all.first() {
-            Some((path, e)) => format!("{path}: {e} ({} such problems)", all.len()),
-            None => "it is invalid".to_owned(),
+        gltf::Error::Validation(all) => match all.as_slice() {
+            [] => "it is invalid".to_owned(),
+            [(path, e)] => format!("{path}: {e}"),
+            [(path, e), rest @ ..] => format!("{path}: {e} (and {} more problems)", rest.len()),
         },
         other => other.to_string(),
     }

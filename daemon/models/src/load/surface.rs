@@ -113,7 +113,10 @@ impl Pictures {
         // What alpha becomes: always 1, or 0 and 1 about a limit, or itself (limit coded as 1 + 255 steps).
         let cutoff = match material.alpha_mode() {
             AlphaMode::Opaque => 0,
-            AlphaMode::Mask => 1 + (material.alpha_cutoff().unwrap_or(0.5) / alpha.max(1e-3) * 255.0).clamp(0.0, 255.0) as u16,
+            AlphaMode::Mask => {
+                1 + (material.alpha_cutoff().unwrap_or(0.5) / alpha.max(1e-3) * 255.0).clamp(0.0, 255.0)
+                    as u16
+            }
             AlphaMode::Blend => 1 + 128,
         };
         if let Some(&known) = self.known.get(&(image, cutoff)) {
@@ -145,7 +148,8 @@ fn decode(source: &Source<'_>, index: usize) -> Result<RgbaImage, ModelError> {
         (None, None) => return Err(missing()),
     };
     let name = image.uri.as_deref().filter(|u| !u.starts_with("data:"));
-    let what = name.map_or_else(|| format!("{}: picture {index}", source.file), |u| format!("{}: {u}", source.file));
+    let what =
+        name.map_or_else(|| format!("{}: picture {index}", source.file), |u| format!("{}: {u}", source.file));
     decode_bounded(bytes, &what)
 }
 
