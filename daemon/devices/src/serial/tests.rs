@@ -9,12 +9,10 @@ use std::{
 };
 
 use bowwave_core::event::{Event, ImuSample};
-use bowwave_devices::{
-    clock,
-    serial::{self, ImuPort, LineStatus, QUEUE_SAMPLES, SerialError},
-    vectornav::CommonOutput,
-};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+
+use super::{ImuPort, LineStatus, QUEUE_SAMPLES, SerialError};
+use crate::{clock, vectornav::CommonOutput};
 
 /// A pseudo-terminal's master and the path of its slave.
 fn terminal() -> (File, PathBuf) {
@@ -146,7 +144,7 @@ fn what_cannot_be_opened_is_refused_in_words() {
 
 #[test]
 fn the_ports_of_this_machine_are_listed() {
-    for port in serial::list().expect("listed") {
+    for port in super::list().expect("listed") {
         assert!(port.node.starts_with("/dev") && !port.kind.is_empty(), "{port:?}");
     }
 }

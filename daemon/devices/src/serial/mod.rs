@@ -1,5 +1,8 @@
 //! The inertial unit's serial line.
 
+#[cfg(test)]
+mod tests;
+
 use std::{
     io::{self, Read},
     path::{Path, PathBuf},
