@@ -1,12 +1,12 @@
 //! From light to a JPEG: the camera with its roll and elevation, its lens, its noise and its transfer curve.
 
 use bowwave_core::geometry::{CameraPose, Lens, look};
-use glam::{DQuat, DVec2, DVec3, Mat3, Vec3};
+use glam::{DQuat, DVec2, DVec3, Mat3, Vec3, Vec4};
 use image::{ExtendedColorType, ImageError, codecs::jpeg::JpegEncoder};
 use rand_pcg::{Pcg32, rand_core::Rng};
 
 use super::{
-    field::Surface,
+    field::{Surface, split},
     march::{LevelView, SeaPicture, SeaShader},
     noise::{mix, upper_quantile},
     recipe::Recipe,
@@ -129,7 +129,7 @@ impl Camera {
         sea: &SeaPicture,
         panorama: &Panorama,
         sun: Vec3,
-    ) -> [f32; 4] {
+    ) -> Vec4 {
         let d = turn * Vec3::new(ray[0], ray[1], 1.0);
         let inverse = 1.0 / d.z;
         let (nx, ny) = (d.x * inverse, d.y * inverse);
@@ -144,14 +144,15 @@ impl Camera {
         if towards > 0.0 && towards * towards > d.length_squared() * (1.0 - 6.0 * SUN_RADIUS * SUN_RADIUS) {
             let off = d.normalize().cross(sun).length();
             let disc = 1.0 - super::noise::smoothstep(0.9 * SUN_RADIUS, 1.15 * SUN_RADIUS, off);
-            sky.iter_mut().for_each(|c| *c += 50.0 * disc);
+            sky += 50.0 * disc;
         }
-        std::array::from_fn(|c| water[c] + open * sky[c])
+        water + open * sky
     }
 
     #[inline(always)]
-    fn develop(&self, light: [f32; 4], fall_off: f32, random: u32, pixel: &mut [u8]) {
+    fn develop(&self, light: Vec4, fall_off: f32, random: u32, pixel: &mut [u8]) {
         const PER_LIGHT: f32 = TRANSFER as f32 / LIGHT_MAX;
+        let light = light.to_array();
         for c in 0..3 {
             let clean = (light[c] * fall_off).clamp(0.0, LIGHT_MAX);
             let deviation = self.deviation[(clean * (64.0 / LIGHT_MAX)) as usize & 127];
@@ -175,23 +176,18 @@ impl Camera {
 }
 
 #[inline(always)]
-fn bilinear(sea: &SeaPicture, view: &LevelView, u: f32, v: f32) -> [f32; 4] {
+fn bilinear(sea: &SeaPicture, view: &LevelView, u: f32, v: f32) -> Vec4 {
     let v = v - 0.5;
     if v <= -1.0 {
-        return [0.0; 4];
+        return Vec4::ZERO;
     }
-    let u = (u - 0.5).clamp(0.0, (view.width - 1) as f32 - 1e-3);
-    let v = v.clamp(0.0, (view.height - 1) as f32 - 1e-3);
-    let (iu, iv) = (u as usize, v as usize);
-    let (fu, fv) = (u - iu as f32, v - iv as f32);
-    let at = iv * view.width + iu;
-    let Some(upper) = sea.texels.get(at..at + 2) else { return [0.0; 4] };
+    let u = (u - 0.5).clamp(0.0, (view.width - 1) as f32 - 1e-2);
+    let v = v.clamp(0.0, (view.height - 1) as f32 - 1e-2);
+    let ((iu, fu), (iv, fv)) = (split(u), split(v));
+    let at = iv.min(view.height - 2) * view.width + iu.min(view.width - 2);
+    let Some(upper) = sea.texels.get(at..at + 2) else { return Vec4::ZERO };
     let lower = sea.texels.get(at + view.width..at + view.width + 2).unwrap_or(upper);
-    std::array::from_fn(|c| {
-        let a = upper[0][c] + fu * (upper[1][c] - upper[0][c]);
-        let b = lower[0][c] + fu * (lower[1][c] - lower[0][c]);
-        a + fv * (b - a)
-    })
+    upper[0].lerp(upper[1], fu).lerp(lower[0].lerp(lower[1], fu), fv)
 }
 
 /// Rolls highlights off from 70 % on instead of cutting them at white.

@@ -1,9 +1,10 @@
 //! Whitecaps, from a gentle breeze on.
 
+use glam::Vec4;
+
 use super::{
     field::{CASCADES, LEVELS, Surface},
     noise::{smoothstep, upper_quantile},
-    sky::Rgb,
 };
 
 /// Wind below which no crest breaks, m/s (Beaufort 3 begins at 3.4).
@@ -47,16 +48,13 @@ impl Foam {
 
     /// Lays foam over `colour` where the water is squeezed above `threshold`; gusts (`patch`) break more crests.
     #[inline(always)]
-    pub fn cover(&self, colour: &mut [f32; 4], water: &[f32; 4], threshold: f32, patch: f32, light: Rgb) {
+    pub fn cover(&self, colour: Vec4, water: Vec4, threshold: f32, patch: f32, light: Vec4) -> Vec4 {
         let limit = threshold * (1.0 - 0.12 * patch.clamp(-1.0, 1.0));
-        if water[3] < 0.9 * limit {
-            return;
+        if water.w < 0.9 * limit {
+            return colour;
         }
-        let share = 0.85 * smoothstep(0.9 * limit, 1.25 * limit, water[3]);
+        let share = 0.85 * smoothstep(0.9 * limit, 1.25 * limit, water.w);
         // Foam is nearly white and lit by sun and sky, which together are a little brighter than the lower sky.
-        for c in 0..3 {
-            let white = 0.25 + 0.9 * light[c];
-            colour[c] += share * (white - colour[c]);
-        }
+        colour.lerp(0.25 + 0.9 * light, share)
     }
 }

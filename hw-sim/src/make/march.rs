@@ -1,13 +1,13 @@
 //! Draws the sea as a level camera sees it: every column walks outwards over the waves and paints each piece of water that
 //! is not hidden by a nearer one over as much of the column as it covers.
 
-use std::f32::consts::TAU;
+use std::{f32::consts::TAU, ops::Range};
 
 use bowwave_core::geometry::curvature_drop;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 use super::{
-    field::{CASCADES, Covariance, Field, LEVELS, Surface, floor},
+    field::{CASCADES, Covariance, Field, LEVELS, Surface},
     foam::Foam,
     patches::Patches,
     shade::{COLUMNS_PER_RADIAN, Glitter, Roughness, WaterTable},
@@ -26,6 +26,8 @@ const STEP_FAR: f32 = 0.02;
 const TABLE_ROWS: usize = 40;
 /// Columns between which the glitter's parameters are interpolated.
 const GLITTER_STRIDE: usize = 16;
+/// Columns drawn together.
+const BLOCK: usize = 64;
 
 /// One distance from the camera.
 struct Step {
@@ -60,10 +62,9 @@ pub(super) struct LevelView {
 /// The picture of the sea alone: linear colour times coverage, and coverage.
 #[derive(Default)]
 pub(super) struct SeaPicture {
-    pub texels: Vec<[f32; 4]>,
+    pub texels: Vec<Vec4>,
     highest: Vec<f32>,
     columns: Vec<Column>,
-    glitter: Vec<Glitter>,
 }
 
 #[derive(Clone, Copy)]
@@ -73,7 +74,7 @@ struct Column {
     /// Rows per tangent of elevation.
     scale: f32,
     table_column: f32,
-    haze: Rgb,
+    haze: Vec4,
 }
 
 /// What stays the same over a recording.
@@ -82,8 +83,8 @@ pub(super) struct SeaShader {
     table: WaterTable,
     patches: Patches,
     foam: Option<Foam>,
-    sun_irradiance: Rgb,
-    haze: Vec<Rgb>,
+    sun_irradiance: Vec4,
+    haze: Vec<Vec4>,
 }
 
 /// What the shader is built for.
@@ -131,7 +132,7 @@ impl SeaShader {
         let haze = (0..360)
             .map(|i| {
                 let a = i as f32 * TAU / 360.0;
-                sky.haze(Vec3::new(a.sin(), a.cos(), 0.0))
+                Vec3::from(sky.haze(Vec3::new(a.sin(), a.cos(), 0.0))).extend(1.0)
             })
             .collect();
         Self {
@@ -139,7 +140,7 @@ impl SeaShader {
             table: WaterTable::new(&rows, dome, input.upwelling),
             patches: Patches::new(input.wind_from, input.seed),
             foam,
-            sun_irradiance: sky.sun_irradiance,
+            sun_irradiance: Vec3::from(sky.sun_irradiance).extend(0.0),
             haze,
         }
     }
@@ -147,18 +148,16 @@ impl SeaShader {
     /// Paints the sea of `surface` seen by `view` from `eye_height` metres into `picture`.
     pub fn draw(&self, surface: &Surface, sky: &Sky, view: &LevelView, eye_height: f32, picture: &mut SeaPicture) {
         picture.texels.clear();
-        picture.texels.resize(view.width * view.height, [0.0; 4]);
+        picture.texels.resize(view.width * view.height, Vec4::ZERO);
         picture.highest.clear();
         picture.highest.resize(view.width, f32::MAX);
         self.columns(view, &mut picture.columns);
-        for step in &self.steps {
-            picture.glitter.clear();
-            let last = view.width - 1;
-            picture.glitter.extend((0..=view.width.div_ceil(GLITTER_STRIDE)).map(|i| {
-                let column = picture.columns[(i * GLITTER_STRIDE).min(last)];
-                Glitter::new(&step.roughness, column.east, column.north, sky)
-            }));
-            self.ring(step, surface, view, eye_height, picture);
+        // Some columns at a time, so that the part of the tiles that they walk over stays in the nearest cache.
+        for first in (0..view.width).step_by(BLOCK) {
+            let block = first..(first + BLOCK).min(view.width);
+            for step in &self.steps {
+                self.ring(step, surface, sky, view, eye_height, block.clone(), picture);
+            }
         }
     }
 
@@ -177,17 +176,32 @@ impl SeaShader {
                 north: (cos - n * sin) / secant,
                 scale: view.focal * secant,
                 table_column: azimuth * COLUMNS_PER_RADIAN,
-                haze: std::array::from_fn(|c| a[c] + fraction * (b[c] - a[c])),
+                haze: a.lerp(b, fraction),
             }
         }));
     }
 
-    /// All columns at one distance.
-    fn ring(&self, step: &Step, surface: &Surface, view: &LevelView, eye_height: f32, picture: &mut SeaPicture) {
+    /// A block of columns at one distance.
+    #[expect(clippy::too_many_arguments, reason = "the innermost loop, called from one place")]
+    fn ring(
+        &self,
+        step: &Step,
+        surface: &Surface,
+        sky: &Sky,
+        view: &LevelView,
+        eye_height: f32,
+        block: Range<usize>,
+        picture: &mut SeaPicture,
+    ) {
+        let first = block.start;
+        let glitter: [Glitter; BLOCK / GLITTER_STRIDE + 1] = std::array::from_fn(|i| {
+            let column = picture.columns[(first + i * GLITTER_STRIDE).min(view.width - 1)];
+            Glitter::new(&step.roughness, column.east, column.north, sky)
+        });
         let slice = self.table.slice(step.table_row);
         let inverse_range = 1.0 / step.range;
         let sun = self.sun_irradiance;
-        for x in 0..view.width {
+        for x in block {
             let column = picture.columns[x];
             let (east, north) = (step.range * column.east, step.range * column.north);
             let water = sample(step, surface, east, north);
@@ -207,63 +221,49 @@ impl SeaShader {
             let across = gain * (water[1] * column.north - water[2] * column.east);
             let turned = (-2.0 * (along + step.grazing).max(0.0) * across).clamp(-0.6, 0.6);
             let mut colour = slice.at(along, column.table_column + turned * COLUMNS_PER_RADIAN);
-            let shine = picture.glitter[x / GLITTER_STRIDE].at(along, across, colour[3]);
+            let (node, between) = ((x - first) / GLITTER_STRIDE, (x - first) % GLITTER_STRIDE);
+            let shine = glitter[node].at(along, across, colour[3]);
             if shine > 0.0 {
-                let next = picture.glitter[x / GLITTER_STRIDE + 1].at(along, across, colour[3]);
-                let t = (x % GLITTER_STRIDE) as f32 / GLITTER_STRIDE as f32;
-                let shine = shine + t * (next - shine);
-                for c in 0..3 {
-                    colour[c] += shine * sun[c];
-                }
+                let next = glitter[node + 1].at(along, across, colour[3]);
+                let t = between as f32 / GLITTER_STRIDE as f32;
+                colour += (shine + t * (next - shine)) * sun;
             }
             if let Some(foam) = &self.foam {
-                foam.cover(&mut colour, &water, step.foam_threshold, patch, column.haze);
+                colour = foam.cover(colour, water, step.foam_threshold, patch, column.haze);
             }
-            for c in 0..3 {
-                colour[c] = column.haze[c] + step.transmittance * (colour[c] - column.haze[c]);
-            }
-            colour[3] = 1.0;
-            paint(&mut picture.texels, view, x, row, below, colour);
+            let seen = column.haze.lerp(colour, step.transmittance).with_w(1.0);
+            paint(&mut picture.texels, view, x, row, below, seen);
         }
     }
 }
 
 #[inline(always)]
-fn sample(step: &Step, surface: &Surface, east: f32, north: f32) -> [f32; 4] {
-    let mut water = [0.0f32; 4];
+fn sample(step: &Step, surface: &Surface, east: f32, north: f32) -> Vec4 {
+    let mut water = Vec4::ZERO;
     for (tile, &(level, share, shows)) in surface.tiles.iter().zip(&step.levels) {
         if !shows {
             continue;
         }
         let fine = tile.sample(level, east, north);
-        if share > 0.0 {
-            let coarse = tile.sample(level + 1, east, north);
-            for c in 0..4 {
-                water[c] += fine[c] + share * (coarse[c] - fine[c]);
-            }
-        } else {
-            for c in 0..4 {
-                water[c] += fine[c];
-            }
-        }
+        water += if share > 0.0 { fine.lerp(tile.sample(level + 1, east, north), share) } else { fine };
     }
     water
 }
 
 /// Adds `colour` to column `x` between rows `upper` and `lower` (not whole numbers), by covered share.
 #[inline(always)]
-fn paint(texels: &mut [[f32; 4]], view: &LevelView, x: usize, upper: f32, lower: f32, colour: [f32; 4]) {
+fn paint(texels: &mut [Vec4], view: &LevelView, x: usize, upper: f32, lower: f32, colour: Vec4) {
     let upper = upper.max(0.0);
     let lower = lower.min(view.height as f32);
-    let mut row = floor(upper);
-    while row < lower {
-        let covered = (row + 1.0).min(lower) - row.max(upper);
-        if let Some(texel) = texels.get_mut(row as usize * view.width + x) {
-            for c in 0..4 {
-                texel[c] += covered * colour[c];
-            }
+    let mut row = upper as i32 as usize;
+    let mut from = upper;
+    while from < lower {
+        let end = (row as f32 + 1.0).min(lower);
+        if let Some(texel) = texels.get_mut(row * view.width + x) {
+            *texel += (end - from) * colour;
         }
-        row += 1.0;
+        from = end;
+        row += 1;
     }
 }
 
@@ -279,7 +279,9 @@ fn make_step(
     let mut seen = [0.0f32; 3];
     let levels = std::array::from_fn(|c| {
         let level = surface.tiles[c].level_for(spacing).clamp(0.0, (LEVELS - 1) as f32);
-        let (low, share) = ((level as usize).min(LEVELS - 2), level - (level as usize).min(LEVELS - 2) as f32);
+        let low = (level as usize).min(LEVELS - 2);
+        // Only the second half of the way to the next level is blended: the first half costs one look-up instead of two.
+        let share = (2.0 * (level - low as f32) - 1.0).max(0.0);
         let blend: Covariance = std::array::from_fn(|i| {
             let (a, b) = (resolved[c][low][i], resolved[c][low + 1][i]);
             a + share * (b - a)
@@ -311,7 +313,7 @@ fn make_step(
         table_row: 0.0,
         grazing,
         transmittance,
-        roughness: Roughness { range_m: range, grazing, residual },
+        roughness: Roughness { grazing, residual },
         levels,
         foam_threshold: foam.map_or(0.0, |f| f.threshold(&levels)),
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{
-    field::floor,
+    field::split,
     noise::{stream, uniform},
 };
 
@@ -55,9 +55,7 @@ impl Patches {
     pub fn at(&self, east: f32, north: f32) -> f32 {
         const SCALE: f32 = POINTS as f32 / SIZE_M;
         let (u, v) = (east * SCALE, north * SCALE);
-        let (fu, fv) = (floor(u), floor(v));
-        let (iu, iv) = (fu as i32 as usize, fv as i32 as usize);
-        let (fu, fv) = (u - fu, v - fv);
+        let ((iu, fu), (iv, fv)) = (split(u), split(v));
         let values = &self.values[..POINTS * POINTS];
         let mask = POINTS - 1;
         let (x0, x1) = (iu & mask, iu.wrapping_add(1) & mask);

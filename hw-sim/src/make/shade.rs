@@ -3,16 +3,19 @@
 
 use std::f32::consts::TAU;
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{
+    field::split,
     fresnel::reflectance,
     sky::{Dome, Rgb, Sky},
 };
 
 /// Azimuths in the table; it closes around the compass.
 const AZIMUTHS: usize = 72;
+/// Stored azimuths; the last is the first again.
+const STRIDE: usize = AZIMUTHS + 1;
 /// Slopes along the line of sight in the table.
 const SLOPES: usize = 96;
 const SLOPE_MIN: f32 = -0.55;
@@ -21,8 +24,6 @@ const SLOPE_MAX: f32 = 0.75;
 /// How fine the sea is at one range: what a pixel there cannot resolve.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Roughness {
-    /// Distance along the mean sea, metres.
-    pub range_m: f32,
     /// Sine of the angle at which the mean sea is seen.
     pub grazing: f32,
     /// Variances of the slopes not resolved: east, north, and their covariance.
@@ -42,15 +43,15 @@ impl Roughness {
 /// Radiance of the water without the sun's glitter, by range, slope along the line of sight, and azimuth. The fourth
 /// number is the mean projected area of the facets, per area of the mean sea.
 pub(super) struct WaterTable {
-    texels: Vec<[f32; 4]>,
+    texels: Vec<Vec4>,
     ranges: usize,
 }
 
 /// One range of the table, between two of its rows.
 #[derive(Clone, Copy)]
 pub(super) struct Slice<'a> {
-    near: &'a [[f32; 4]],
-    far: &'a [[f32; 4]],
+    near: &'a [Vec4],
+    far: &'a [Vec4],
     fraction: f32,
 }
 
@@ -58,11 +59,11 @@ impl WaterTable {
     /// Sums over visible facets for each of `rows`.
     pub fn new(rows: &[Roughness], dome: &Dome, upwelling: Rgb) -> Self {
         let facets = facets();
-        let texels = (0..rows.len() * SLOPES * AZIMUTHS)
+        let texels = (0..rows.len() * SLOPES * STRIDE)
             .into_par_iter()
             .map(|i| {
                 let (azimuth, slope, range) =
-                    (i % AZIMUTHS, i / AZIMUTHS % SLOPES, i / (AZIMUTHS * SLOPES));
+                    (i % STRIDE, i / STRIDE % SLOPES, i / (STRIDE * SLOPES));
                 let angle = azimuth as f32 * TAU / AZIMUTHS as f32;
                 let slope = SLOPE_MIN + slope as f32 * (SLOPE_MAX - SLOPE_MIN) / (SLOPES - 1) as f32;
                 water(&rows[range], angle, slope, &facets, dome, upwelling)
@@ -75,7 +76,7 @@ impl WaterTable {
     pub fn slice(&self, row: f32) -> Slice<'_> {
         let row = row.clamp(0.0, (self.ranges - 1) as f32);
         let first = (row as usize).min(self.ranges.saturating_sub(2));
-        let size = SLOPES * AZIMUTHS;
+        let size = SLOPES * STRIDE;
         let take = |r: usize| &self.texels[r * size..(r + 1) * size];
         Slice {
             near: take(first),
@@ -88,26 +89,19 @@ impl WaterTable {
 impl Slice<'_> {
     /// Trilinear value for a slope along the line of sight and an azimuth in table columns (0 north, growing eastwards).
     #[inline(always)]
-    pub fn at(&self, slope: f32, column: f32) -> [f32; 4] {
+    pub fn at(&self, slope: f32, column: f32) -> Vec4 {
         const PER_SLOPE: f32 = (SLOPES - 1) as f32 / (SLOPE_MAX - SLOPE_MIN);
         let s = ((slope - SLOPE_MIN) * PER_SLOPE).clamp(0.0, (SLOPES - 1) as f32 - 1e-3);
-        let is = s as usize;
-        let fs = s - is as f32;
         let column = if column < 0.0 { column + AZIMUTHS as f32 } else { column };
-        let ia = column as usize;
-        let fa = column - ia as f32;
-        let (a0, a1) = (ia % AZIMUTHS, (ia + 1) % AZIMUTHS);
-        let (low, high) = (is * AZIMUTHS, (is + 1) * AZIMUTHS);
-        let bilinear = |t: &[[f32; 4]]| -> [f32; 4] {
-            let (a, b, c, d) = (t[low + a0], t[low + a1], t[high + a0], t[high + a1]);
-            std::array::from_fn(|i| {
-                let x = a[i] + fa * (b[i] - a[i]);
-                let y = c[i] + fa * (d[i] - c[i]);
-                x + fs * (y - x)
-            })
+        let ((is, fs), (ia, fa)) = (split(s), split(column));
+        // The stored row is one longer than the circle, so that its end meets its start.
+        let a0 = if ia >= AZIMUTHS { ia - AZIMUTHS } else { ia };
+        let low = is.min(SLOPES - 2) * STRIDE + a0.min(AZIMUTHS - 1);
+        let bilinear = |t: &[Vec4]| -> Vec4 {
+            let (lower, upper) = (&t[low..low + 2], &t[low + STRIDE..low + STRIDE + 2]);
+            lower[0].lerp(lower[1], fa).lerp(upper[0].lerp(upper[1], fa), fs)
         };
-        let (near, far) = (bilinear(self.near), bilinear(self.far));
-        std::array::from_fn(|i| near[i] + self.fraction * (far[i] - near[i]))
+        bilinear(self.near).lerp(bilinear(self.far), self.fraction)
     }
 }
 
@@ -135,13 +129,14 @@ fn water(
     facets: &[(f32, f32, f32)],
     dome: &Dome,
     upwelling: Rgb,
-) -> [f32; 4] {
+) -> Vec4 {
     let (east, north) = azimuth.sin_cos();
     let sin = row.grazing;
     let cos = (1.0 - sin * sin).max(0.0).sqrt();
     let to_eye = Vec3::new(-cos * east, -cos * north, sin);
     let (sigma_along, sigma_across) = row.along_and_across(east, north);
-    let (mut sum, mut seen) = ([0.0f32; 3], 0.0f32);
+    let (mut sum, mut seen) = (Vec4::ZERO, 0.0f32);
+    let upwelling = Vec4::new(upwelling[0], upwelling[1], upwelling[2], 0.0);
     for &(x, y, weight) in facets {
         let (along, across) = (slope + x * sigma_along, y * sigma_across);
         // Slope vector in the world: `along` rises away from the eye, `across` rises to its right.
@@ -156,12 +151,10 @@ fn water(
         let sky = dome.at(mirrored);
         // Light that is thrown down meets the sea again: it shows the sky once more dimmed.
         let again = if mirrored.z < 0.0 { reflectance(-mirrored.z).max(0.25) } else { 1.0 };
-        for c in 0..3 {
-            sum[c] += weight * area * (f * again * sky[c] + (1.0 - f) * upwelling[c]);
-        }
+        sum += weight * area * (f * again * sky + (1.0 - f) * upwelling);
         seen += weight * area;
     }
-    [sum[0] / seen, sum[1] / seen, sum[2] / seen, seen]
+    (sum / seen).with_w(seen)
 }
 
 /// The sun's glitter at one range and azimuth (Cox and Munk 1954, eq. 4, with the projected area of the facets that are
@@ -223,7 +216,7 @@ mod tests {
     }
 
     fn row(grazing: f32, variance: f32) -> Roughness {
-        Roughness { range_m: 50.0, grazing, residual: [variance, variance, 0.0] }
+        Roughness { grazing, residual: [variance, variance, 0.0] }
     }
 
     #[test]

@@ -3,11 +3,14 @@
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 use rayon::prelude::*;
 
-use super::noise::{fractal_noise, gradient_noise, mix, smoothstep};
+use super::{
+    field::split,
+    noise::{fractal_noise, gradient_noise, mix, smoothstep},
+};
 
 /// Linear colour; the fourth number is free for the user.
 pub(super) type Rgb = [f32; 3];
@@ -24,6 +27,9 @@ pub struct SkyRecipe {
     /// Share of the sky under clouds, 0 to 1.
     pub cloud_cover: f64,
 }
+
+/// Sine of the elevation below which the clear sky is a pale band.
+const PALE: f32 = 0.07;
 
 /// The sky as a function of direction.
 pub(super) struct Sky {
@@ -65,21 +71,26 @@ impl Sky {
                 luminance(sky.clear(Vec3::new(a.sin(), a.cos(), 0.14).normalize()))
             })
             .sum();
-        sky.scale = 0.40 / (around / 72.0).max(1e-6);
+        sky.scale = 0.50 / (around / 72.0).max(1e-6);
         // Direct light against the lower sky's radiance on a clear day: about 12 at a high sun, reddened by its path
         // (Bird and Riordan 1986 give the ratio; optical depths of 0.13, 0.20 and 0.33).
         let path = 1.0 / sin_e.max(0.05);
-        sky.sun_irradiance = [0.13f32, 0.20, 0.33].map(|depth| 7.0 * (-depth * path).exp());
+        sky.sun_irradiance = [0.13f32, 0.20, 0.33].map(|depth| 8.5 * (-depth * path).exp());
         Some(sky)
     }
 
     /// Radiance of the cloudless sky; directions below the horizon get the horizon's.
     pub fn clear(&self, direction: Vec3) -> Rgb {
-        let z = direction.z.max(0.0);
-        let theta = z.min(1.0).acos();
+        // The model yellows and darkens in its last degrees, where sea air scatters light into a pale band instead: below
+        // `PALE` it is taken from there and whitened.
+        let z = direction.z.clamp(0.0, 1.0);
+        let theta = z.max(PALE).acos();
         let gamma = direction.dot(self.sun).clamp(-1.0, 1.0).acos();
-        [Channel::R, Channel::G, Channel::B]
-            .map(|c| self.scale * self.state.radiance(theta, gamma, c).max(0.0))
+        let model = [Channel::R, Channel::G, Channel::B]
+            .map(|c| self.scale * self.state.radiance(theta, gamma, c).max(0.0));
+        let grey = luminance(model);
+        let share = 0.75 * (1.0 - smoothstep(0.0, 2.2 * PALE, z));
+        std::array::from_fn(|c| model[c] + share * (grey * [0.97, 1.05, 1.16][c] - model[c]))
     }
 
     /// Radiance with clouds; the sun's disc is not in it.
@@ -94,10 +105,10 @@ impl Sky {
         // Far clouds drown in the haze.
         let fade = (-reach / 30.0).exp();
         let alpha = density * 0.92;
-        let white = 0.62 + 0.45 * lit;
-        let tint = [0.97, 0.985, 1.0];
+        let white = 0.60 + 0.62 * lit;
+        let tint = [0.96, 0.99, 1.04];
         std::array::from_fn(|c| {
-            let cloud = (0.72 * white * tint[c] + 0.12 * clear[c]) * fade + horizon[c] * (1.0 - fade);
+            let cloud = (0.80 * white * tint[c] + 0.10 * clear[c]) * fade + horizon[c] * (1.0 - fade);
             clear[c] + alpha * (cloud - clear[c])
         })
     }
@@ -113,8 +124,8 @@ impl Sky {
         let s = self.seed;
         let warp = 0.35 * gradient_noise(x * 0.6, y * 0.6, s ^ 0x51);
         let shape = |x: f32, y: f32| {
-            fractal_noise(x * 0.42 + warp, y * 0.42 - warp, 7, 0.52, s)
-                + 0.35 * gradient_noise(x * 0.09, y * 0.09, s ^ 0x77)
+            fractal_noise(x * 0.75 + warp, y * 0.75 - warp, 7, 0.55, s)
+                + 0.40 * gradient_noise(x * 0.11, y * 0.11, s ^ 0x77)
         };
         let here = shape(x, y);
         let density = smoothstep(self.threshold, self.threshold + 0.30, here);
@@ -135,7 +146,7 @@ pub(super) fn luminance(c: Rgb) -> f32 {
 
 /// The upper hemisphere in small, for what the sea mirrors.
 pub(super) struct Dome {
-    texels: Vec<[f32; 4]>,
+    texels: Vec<Vec4>,
 }
 
 const DOME_AROUND: usize = 180;
@@ -146,15 +157,13 @@ impl Dome {
         // Clouds in cells of 2 by 1.4 degrees: 3 x 3 directions in each.
         let cell = |i: usize| {
             let (up, around) = (i / DOME_AROUND, i % DOME_AROUND);
-            let mut sum = [0.0; 4];
+            let mut sum = Vec4::ZERO;
             for (du, da) in (0..9).map(|s| ((s / 3) as f32 / 3.0 - 0.33, (s % 3) as f32 / 3.0 - 0.33)) {
                 let elevation = ((up as f32 + du).max(0.0) / (DOME_UP - 1) as f32).min(1.0) * FRAC_PI_2;
                 let azimuth = (around as f32 + da) * TAU / DOME_AROUND as f32;
                 let (sin, cos) = elevation.sin_cos();
                 let colour = sky.radiance(Vec3::new(azimuth.sin() * cos, azimuth.cos() * cos, sin));
-                for c in 0..3 {
-                    sum[c] += colour[c] / 9.0;
-                }
+                sum += Vec3::from(colour).extend(0.0) / 9.0;
             }
             sum
         };
@@ -162,7 +171,7 @@ impl Dome {
     }
 
     /// Bilinear radiance; below the horizon as far above it.
-    pub fn at(&self, direction: Vec3) -> [f32; 4] {
+    pub fn at(&self, direction: Vec3) -> Vec4 {
         let elevation = direction.z.abs().min(1.0).asin();
         let azimuth = direction.x.atan2(direction.y).rem_euclid(TAU);
         let v = (elevation / FRAC_PI_2 * (DOME_UP - 1) as f32).min((DOME_UP - 1) as f32);
@@ -171,18 +180,13 @@ impl Dome {
         let (fv, fu) = (v - iv as f32, u - u.floor());
         let next = (iu + 1) % DOME_AROUND;
         let row = |r: usize, c: usize| self.texels[r * DOME_AROUND + c];
-        let (a, b, c, d) = (row(iv, iu), row(iv, next), row(iv + 1, iu), row(iv + 1, next));
-        std::array::from_fn(|i| {
-            let lower = a[i] + fu * (b[i] - a[i]);
-            let upper = c[i] + fu * (d[i] - c[i]);
-            lower + fv * (upper - lower)
-        })
+        row(iv, iu).lerp(row(iv, next), fu).lerp(row(iv + 1, iu).lerp(row(iv + 1, next), fu), fv)
     }
 }
 
 /// The part of the sky that the camera sees, at its resolution: a cylinder of azimuth against the tangent of elevation.
 pub(super) struct Panorama {
-    texels: Vec<[f32; 4]>,
+    texels: Vec<Vec4>,
     columns: usize,
     rows: usize,
     azimuth_start: f32,
@@ -206,8 +210,7 @@ impl Panorama {
             .map(|i| {
                 let azimuth = start + (i % columns) as f32 / columns_per_radian;
                 let tangent = tangent_start + (i / columns) as f32 / rows_per_tangent;
-                let [r, g, b] = sky.radiance(Vec3::new(azimuth.sin(), azimuth.cos(), tangent).normalize());
-                [r, g, b, 0.0]
+                Vec3::from(sky.radiance(Vec3::new(azimuth.sin(), azimuth.cos(), tangent).normalize())).extend(0.0)
             })
             .collect();
         Self { texels, columns, rows, azimuth_start: start, columns_per_radian, tangent_start, rows_per_tangent }
@@ -215,26 +218,21 @@ impl Panorama {
 
     /// Bilinear radiance at an azimuth (radians) and a tangent of elevation.
     #[inline(always)]
-    pub fn at(&self, azimuth: f32, tangent: f32) -> [f32; 4] {
+    pub fn at(&self, azimuth: f32, tangent: f32) -> Vec4 {
         let mut from_start = azimuth - self.azimuth_start;
         if from_start < 0.0 {
             from_start += TAU;
         } else if from_start > TAU {
             from_start -= TAU;
         }
-        let limit = |x: f32, count: usize| x.clamp(0.0, (count - 1) as f32 - 1e-3);
+        let limit = |x: f32, count: usize| x.clamp(0.0, (count - 1) as f32 - 1e-2);
         let u = limit(from_start * self.columns_per_radian, self.columns);
         let v = limit((tangent - self.tangent_start) * self.rows_per_tangent, self.rows);
-        let (iu, iv) = ((u as usize).min(self.columns - 2), (v as usize).min(self.rows - 2));
-        let (fu, fv) = (u - iu as f32, v - iv as f32);
-        let first = iv * self.columns + iu;
-        let (a, b) = (self.texels[first], self.texels[first + 1]);
-        let (c, d) = (self.texels[first + self.columns], self.texels[first + self.columns + 1]);
-        std::array::from_fn(|i| {
-            let lower = a[i] + fu * (b[i] - a[i]);
-            let upper = c[i] + fu * (d[i] - c[i]);
-            lower + fv * (upper - lower)
-        })
+        let ((iu, fu), (iv, fv)) = (split(u), split(v));
+        let first = iv.min(self.rows - 2) * self.columns + iu.min(self.columns - 2);
+        let lower = &self.texels[first..first + 2];
+        let upper = &self.texels[first + self.columns..first + self.columns + 2];
+        lower[0].lerp(lower[1], fu).lerp(upper[0].lerp(upper[1], fu), fv)
     }
 }
 

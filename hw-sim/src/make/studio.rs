@@ -129,7 +129,7 @@ fn upwelling(sky: &Sky) -> [f32; 3] {
     let sin = sky.sun.z;
     std::array::from_fn(|c| {
         let falling = sky.sun_irradiance[c] * sin + std::f32::consts::PI * 1.2 * overhead[c];
-        let reflectance = [0.0045, 0.021, 0.034][c];
+        let reflectance = [0.007, 0.036, 0.056][c];
         falling * reflectance / (std::f32::consts::PI * 1.9)
     })
 }
