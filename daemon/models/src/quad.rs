@@ -236,7 +236,7 @@ impl Frame {
 
 /// The built-in picture model: the built-in frigate seen from starboard, drawn once under an even sky.
 pub fn frigate_quad() -> Result<Model, ModelError> {
-    const WIDTH: u32 = 1536;
+    const WIDTH: u32 = 1024;
     /// Metres of hull below the waterline that the picture keeps; the sea hides them.
     const BELOW_M: f32 = 2.0;
     let ship = load_glb(&build_glb(Boat::Frigate), Boat::Frigate.name())?;
@@ -256,7 +256,7 @@ pub fn frigate_quad() -> Result<Model, ModelError> {
     ]);
     // A bright sky with a weak sun high on the bow: the side that is seen comes out near its albedo.
     let sun = Vec3::new(0.45, -0.60, 0.66);
-    let mut canvas = Canvas::new(WIDTH, height, 4);
+    let mut canvas = Canvas::new(WIDTH, height, 3);
     canvas.draw(&ship, clip, |_, normal, albedo| {
         Some(albedo * (0.42 + 0.18 * normal.z + 0.55 * normal.dot(sun).max(0.0)))
     });

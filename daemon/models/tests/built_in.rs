@@ -1,5 +1,7 @@
 //! The built-in boats: sizes, parts, closed and outward surfaces, after writing and loading.
 
+#![allow(clippy::expect_used, reason = "a test helper, too, stops at the first thing that is wrong")]
+
 use std::collections::HashMap;
 
 use bowwave_core::model::{Model, Zone};
@@ -121,8 +123,11 @@ fn corners_are_finite_and_lit_from_outside() {
     }
 }
 
+/// A corner in steps of 0.1 mm.
+type Key = (i64, i64, i64);
+
 /// Triangles by the closed piece that they belong to: pieces share no corner.
-fn pieces(m: &Model) -> HashMap<usize, Vec<[(i64, i64, i64); 3]>> {
+fn pieces(m: &Model) -> HashMap<usize, Vec<[Key; 3]>> {
     let key = |p: Vec3| {
         let k = |v: f32| (f64::from(v) * 1e4).round() as i64;
         (k(p.x), k(p.y), k(p.z))
@@ -178,7 +183,7 @@ fn every_piece_is_closed_and_holds_a_volume() {
                 edges.len(),
                 open[0]
             );
-            let at = |(x, y, z): (i64, i64, i64)| glam::DVec3::new(x as f64, y as f64, z as f64) * 1e-4;
+            let at = |(x, y, z): Key| glam::DVec3::new(x as f64, y as f64, z as f64) * 1e-4;
             let origin = at(piece[0][0]);
             let volume: f64 = piece
                 .iter()

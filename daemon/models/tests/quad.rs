@@ -1,5 +1,7 @@
 //! Boats that are pictures.
 
+#![allow(clippy::expect_used, reason = "a test helper, too, stops at the first thing that is wrong")]
+
 use std::{fs, path::Path};
 
 use bowwave_core::model::{Model, ModelKind, Zone};

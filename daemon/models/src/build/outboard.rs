@@ -17,7 +17,7 @@ pub(crate) fn outboard(at: Vec3, scale: f32, trim: f32, steer: f32) -> Vec<Solid
         // Midsection, plate above the propeller, gear case with its strut and skeg.
         tapered(
             Vec3::new(-0.36, -0.075, -0.62),
-            Vec3::new(-0.10, 0.075, 0.02),
+            Vec3::new(-0.10, 0.075, 0.16),
             [-0.06, 0.0, -0.04, -0.04],
             Paint::Cowl,
         ),

@@ -1,13 +1,4 @@
-//! Reads boats from glTF 2.0: metres, y up, +z forward, the waterline at height 0.
-//!
-//! What is read: all triangles of the default scene with their nodes' transforms, normals (flat where there are none),
-//! colours and base-colour textures. Part names: a node, its mesh or the nearest named ancestor called `engine` or `helm`
-//! (any case, a suffix such as `.001` or `_left` is fine) gives its triangles to that part; all else is hull.
-//!
-//! What is made of it: materials' base-colour factors and vertex colours go into the vertices. A model has one texture at
-//! most: one picture is kept as it is; more than one, or one beside materials without, are put into one atlas. A texture
-//! that repeats over a surface has no place in an atlas: its mean colour is taken. Skins and animations stay in the rest
-//! pose; points and lines are left out; see-through materials are drawn opaque.
+//! Reads boats from glTF 2.0.
 
 mod accessor;
 mod atlas;
@@ -24,7 +15,7 @@ use crate::{error::ModelError, finish::zone_index};
 
 /// Largest file and largest sum of buffers, bytes.
 pub(crate) const FILE_BYTES_MAX: u64 = 64 << 20;
-/// Most vertices, counted before equal ones are merged.
+/// Most vertices.
 pub(crate) const VERTICES_MAX: u64 = 1_000_000;
 /// Most triangles.
 pub(crate) const TRIANGLES_MAX: u64 = 2_000_000;
@@ -33,7 +24,17 @@ pub(crate) const TEXTURE_SIDE_MAX: u32 = 4096;
 /// Most names that an error lists.
 const NAMES_MAX: usize = 20;
 
-/// Loads a `.glb` or `.gltf` file; buffers and pictures that it names are looked for in its folder and below.
+/// Loads a `.glb` or `.gltf` file: metres, y up, +z forward, the waterline at height 0. Buffers and pictures that it names are
+/// looked for in its folder and below.
+///
+/// What is read: all triangles of the default scene with their nodes' transforms, normals (flat where there are none),
+/// colours and base-colour textures. Part names: a node, its mesh or the nearest named ancestor called `engine` or `helm`
+/// (any case, a suffix such as `.001` or `_left` is fine) gives its triangles to that part; all else is hull.
+///
+/// What is made of it: materials' base-colour factors and vertex colours go into the vertices. A model has one texture at
+/// most: one picture is kept as it is; more than one, or one beside materials without, are put into one atlas. A texture
+/// that repeats over a surface has no place in an atlas: its mean colour is taken. Skins and animations stay in the rest
+/// pose; points and lines are left out; see-through materials are drawn opaque.
 pub fn load(path: &Path) -> Result<Model, ModelError> {
     let bytes = source::read_bounded(path)?;
     let name = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
