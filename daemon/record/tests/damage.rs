@@ -1,5 +1,12 @@
 //! Recordings that are cut short, damaged, hostile or not ours: a clear error, what can be read is read, nothing panics.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
 mod support;
 
 use std::{fs, io::Cursor, path::Path};

@@ -1,5 +1,12 @@
 //! Recordings that are whole: what goes in comes out, in order.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
 mod support;
 
 use std::{fs, sync::Arc};

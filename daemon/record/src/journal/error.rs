@@ -181,6 +181,8 @@ impl JournalError {
             Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Self::Locked { path },
             Some(ErrorCode::ReadOnly | ErrorCode::PermissionDenied) => Self::ReadOnly { path, reason },
             Some(ErrorCode::DiskFull) => Self::Full { path },
+            // There, but its log beside it cannot be made.
+            Some(ErrorCode::CannotOpen) if path.is_file() => Self::ReadOnly { path, reason },
             Some(ErrorCode::CannotOpen) => Self::Open { path, reason },
             Some(ErrorCode::NotADatabase) => Self::NotADatabase { path },
             Some(ErrorCode::DatabaseCorrupt) => Self::Corrupt { path, reason },

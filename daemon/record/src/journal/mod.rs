@@ -11,6 +11,7 @@ mod row;
 mod worker;
 
 use std::{
+    convert::Infallible,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
     thread::JoinHandle,
@@ -23,7 +24,7 @@ use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 pub use error::{JournalError, Unwritten};
 pub use query::{RunSelection, ShotFilter, StoredRun, read_runs, read_shots};
 pub use row::StoredShot;
-use worker::{Ended, Worker};
+use worker::{Ended, Ends, Worker};
 
 /// Rounds that may wait for the writing thread before [`Journal::shot`] refuses: minutes of firing.
 const QUEUE: usize = 4096;
@@ -96,6 +97,8 @@ pub struct Journal {
     run: i64,
     quarantined: Option<PathBuf>,
     queue: Option<Sender<ShotRecord>>,
+    /// Never carries anything; its end tells the thread to finish.
+    open: Option<Sender<Infallible>>,
     commits: Receiver<u64>,
     fault: Arc<Mutex<Option<JournalFault>>>,
     thread: Option<JoinHandle<Ended>>,
@@ -114,9 +117,10 @@ impl Journal {
         let (queue, incoming) = bounded(QUEUE);
         // Eight bytes a round, and rounds are bounded by belts: not worth losing an acknowledgement for.
         let (committed, commits) = unbounded();
+        let (open, closing) = bounded(0);
         let fault = Arc::new(Mutex::new(None));
-        let worker =
-            Worker::new(opened.connection, path, id, incoming, committed, Arc::clone(&fault), settings);
+        let ends = Ends { incoming, closing, commits: committed, fault: Arc::clone(&fault) };
+        let worker = Worker::new(opened.connection, path, id, ends, settings);
         let thread =
             std::thread::Builder::new().name("journal".to_owned()).spawn(move || worker.run()).map_err(
                 |source| JournalError::File { path: path.into(), doing: "start the thread for", source },
@@ -126,6 +130,7 @@ impl Journal {
             run: id,
             quarantined: opened.quarantined,
             queue: Some(queue),
+            open: Some(open),
             commits,
             fault,
             thread: Some(thread),
@@ -175,6 +180,7 @@ impl Journal {
 
     fn close(&mut self) -> Result<JournalSummary, JournalError> {
         self.queue = None;
+        self.open = None;
         let Some(thread) = self.thread.take() else { return Err(self.stopped()) };
         let ended = thread.join().map_err(|_| self.stopped())?;
         match ended.unwritten {

@@ -4,6 +4,7 @@ use std::{
     ffi::OsString,
     fs::{self, File},
     io::{self, Read},
+    os::unix::ffi::OsStrExt,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -99,17 +100,50 @@ pub(super) fn for_reading(path: &Path) -> Result<Connection, JournalError> {
     if head(path)?.looks_foreign() {
         return Err(JournalError::NotADatabase { path: path.into() });
     }
-    let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
-    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-    let connection = Connection::open_with_flags(path, flags).map_err(fail)?;
-    connection.busy_timeout(BUSY).map_err(fail)?;
-    match versions(&connection).map_err(fail)? {
+    let (connection, versions) =
+        connect_for_reading(path).map_err(|error| JournalError::from_sql(path, &error))?;
+    match versions {
         (APPLICATION_ID, VERSION) => Ok(connection),
         (APPLICATION_ID, found) if found > VERSION => {
             Err(JournalError::Newer { path: path.into(), found, supported: VERSION })
         }
         _ => Err(JournalError::ForeignDatabase { path: path.into() }),
     }
+}
+
+/// A connection that has read something, and what it read: application and schema version.
+fn connect_for_reading(path: &Path) -> rusqlite::Result<(Connection, (i64, i64))> {
+    let open = |name: &Path, flags| {
+        let connection = Connection::open_with_flags(name, flags)?;
+        connection.busy_timeout(BUSY)?;
+        let versions = versions(&connection)?;
+        Ok((connection, versions))
+    };
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
+    open(path, flags).or_else(|error: rusqlite::Error| {
+        // Reading needs a file for its locks beside the database. Where none can be made nobody can write either, so that
+        // reading without locks is safe, unless a log holds what the database does not have yet.
+        let log_bytes = fs::metadata(with_suffix(path, "-wal")).map_or(0, |status| status.len());
+        if error.sqlite_error_code() != Some(ErrorCode::CannotOpen) || log_bytes > 0 {
+            return Err(error);
+        }
+        open(&immutable_uri(path), flags | OpenFlags::SQLITE_OPEN_URI)
+    })
+}
+
+/// `path` as SQLite takes files that nobody changes.
+fn immutable_uri(path: &Path) -> PathBuf {
+    let mut uri = "file:".to_owned();
+    for byte in path.as_os_str().as_bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'.' | b'-' | b'_' => {
+                uri.push(char::from(*byte))
+            }
+            other => uri.push_str(&format!("%{other:02X}")),
+        }
+    }
+    uri.push_str("?immutable=1");
+    PathBuf::from(uri)
 }
 
 /// The first bytes of a file, as far as there are any.

@@ -2,6 +2,7 @@
 
 use std::{
     collections::VecDeque,
+    convert::Infallible,
     fs::OpenOptions,
     io::{self, Write},
     path::{Path, PathBuf},
@@ -10,7 +11,7 @@ use std::{
 };
 
 use bowwave_core::score::ShotRecord;
-use crossbeam_channel::{Receiver, Sender, after, select};
+use crossbeam_channel::{Receiver, Sender, TryRecvError, after, never, select};
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
 use super::{JournalError, JournalFault, Settings, StoredShot, Unwritten, open::with_suffix, row};
@@ -20,6 +21,9 @@ const BATCH: usize = 1024;
 
 /// How long the database may be held by another process within one attempt.
 const BUSY: Duration = Duration::from_millis(250);
+
+/// Longest pause between attempts while the journal is being finished.
+const FINISH_PAUSE_MAX: Duration = Duration::from_millis(500);
 
 /// What the thread leaves.
 pub(super) struct Ended {
@@ -33,6 +37,8 @@ pub(super) struct Worker {
     path: PathBuf,
     run: i64,
     incoming: Receiver<ShotRecord>,
+    /// Disconnected once the journal is being finished. The queue cannot tell while it is full.
+    closing: Receiver<Infallible>,
     commits: Sender<u64>,
     fault: Arc<Mutex<Option<JournalFault>>>,
     settings: Settings,
@@ -43,25 +49,25 @@ pub(super) struct Worker {
     committed: u64,
     /// Failures since the last success.
     failures: u32,
-    /// The queue has been closed: nothing more comes.
-    closed: bool,
+}
+
+/// The thread's ends of the journal's channels.
+pub(super) struct Ends {
+    pub(super) incoming: Receiver<ShotRecord>,
+    pub(super) closing: Receiver<Infallible>,
+    pub(super) commits: Sender<u64>,
+    pub(super) fault: Arc<Mutex<Option<JournalFault>>>,
 }
 
 impl Worker {
-    pub(super) fn new(
-        connection: Connection,
-        path: &Path,
-        run: i64,
-        incoming: Receiver<ShotRecord>,
-        commits: Sender<u64>,
-        fault: Arc<Mutex<Option<JournalFault>>>,
-        settings: Settings,
-    ) -> Self {
+    pub(super) fn new(connection: Connection, path: &Path, run: i64, ends: Ends, settings: Settings) -> Self {
+        let Ends { incoming, closing, commits, fault } = ends;
         Self {
             connection,
             path: path.into(),
             run,
             incoming,
+            closing,
             commits,
             fault,
             settings,
@@ -69,7 +75,6 @@ impl Worker {
             rejected: Vec::new(),
             committed: 0,
             failures: 0,
-            closed: false,
         }
     }
 
@@ -92,7 +97,7 @@ impl Worker {
                 Ok(()) => self.recovered(),
                 Err(error) => {
                     let error = JournalError::from_sql(&self.path, &error);
-                    last_attempts += u32::from(self.closed);
+                    last_attempts += u32::from(self.is_closing());
                     if last_attempts >= self.settings.finish_attempts {
                         cause = Some(error.to_string());
                         break;
@@ -105,17 +110,14 @@ impl Worker {
         self.end(cause)
     }
 
+    fn is_closing(&self) -> bool {
+        self.closing.try_recv().is_err_and(|error: TryRecvError| error.is_disconnected())
+    }
+
     /// Takes what is queued, as far as it may be held.
     fn take_queued(&mut self) {
-        while self.held.len() < self.settings.held_max {
-            match self.incoming.try_recv() {
-                Ok(shot) => self.held.push_back(shot),
-                Err(error) => {
-                    self.closed = error.is_disconnected();
-                    break;
-                }
-            }
-        }
+        let room = self.settings.held_max.saturating_sub(self.held.len());
+        self.held.extend(self.incoming.try_iter().take(room));
     }
 
     /// Commits the oldest rounds held, as many as one transaction takes.
@@ -181,25 +183,21 @@ impl Worker {
     fn wait(&mut self) {
         let doublings = self.failures.saturating_sub(1).min(16);
         let pause = self.settings.retry_first.saturating_mul(1 << doublings).min(self.settings.retry_max);
-        if self.closed {
-            std::thread::sleep(pause.min(Duration::from_millis(500)));
+        if self.is_closing() {
+            std::thread::sleep(pause.min(FINISH_PAUSE_MAX));
             return;
         }
         let timer = after(pause);
         loop {
-            if self.held.len() >= self.settings.held_max {
-                // The queue behind it fills up then, and says so to whoever shoots.
-                let _ = timer.recv();
-                return;
-            }
+            // What may not be held any more fills the queue up, and that says so to whoever shoots.
+            let nothing = never();
+            let incoming = if self.held.len() < self.settings.held_max { &self.incoming } else { &nothing };
             select! {
-                recv(self.incoming) -> shot => match shot {
+                recv(incoming) -> shot => match shot {
                     Ok(shot) => self.held.push_back(shot),
-                    Err(_) => {
-                        self.closed = true;
-                        return;
-                    }
+                    Err(_) => return,
                 },
+                recv(self.closing) -> _ => return,
                 recv(timer) -> _ => return,
             }
         }

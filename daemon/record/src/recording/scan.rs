@@ -202,6 +202,13 @@ pub(crate) struct Found<'a> {
     pub(crate) verified: bool,
 }
 
+/// A message's header.
+struct Head {
+    topic: Topic,
+    time: Time,
+    sequence: u32,
+}
+
 /// What channels and schemas mean.
 #[derive(Clone, Default)]
 pub(crate) struct Channels {
@@ -321,11 +328,10 @@ impl Messages {
             if let Some((opcode, body)) = self.next_inner()? {
                 match opcode {
                     op::MESSAGE => {
-                        if let Some((topic, header)) = self.message(&body)? {
+                        if let Some(Head { topic, time, sequence }) = self.message(&body)? {
                             let data =
                                 self.data.get(body.start + MESSAGE_HEADER..body.end).unwrap_or_default();
                             let (offset, verified) = (self.offset, self.verified);
-                            let (time, sequence) = header;
                             return Ok(Some(Found { topic, time, sequence, data, offset, verified }));
                         }
                     }
@@ -376,8 +382,8 @@ impl Messages {
         Ok(Some((opcode, body..end)))
     }
 
-    /// Topic, time and sequence of the message at `body`; `None` for a topic that is not ours.
-    fn message(&self, body: &Range<usize>) -> Result<Option<(Topic, (Time, u32))>, RecordError> {
+    /// What the message at `body` is; `None` for a topic that is not ours.
+    fn message(&self, body: &Range<usize>) -> Result<Option<Head>, RecordError> {
         let data = self.data.get(body.clone()).unwrap_or_default();
         let (Some(prefix), Some(log_time)) = (u64_at(data, 0), u64_at(data, 6)) else {
             return Err(self.damaged("a message shorter than its header"));
@@ -395,7 +401,7 @@ impl Messages {
         let Ok(ns) = i64::try_from(log_time) else {
             return Err(self.damaged(&format!("a message with the log time {log_time} ns")));
         };
-        Ok(Some((topic, (Time::from_ns(ns), (prefix >> 16) as u32))))
+        Ok(Some(Head { topic, time: Time::from_ns(ns), sequence: (prefix >> 16) as u32 }))
     }
 
     /// Loads the file's next record; `false` after the last.

@@ -28,6 +28,9 @@ const CHUNK_MAX_NS: i64 = 500_000_000;
 
 /// Writes a recording. [`RecordingWriter::finish`] makes it whole; a writer that is only dropped leaves a file that can
 /// still be read, but nobody is told whether its last bytes reached the disk.
+///
+/// Writing can take tens of milliseconds while the disk is busy: a loop that has to keep its pace writes from a thread of its
+/// own.
 pub struct RecordingWriter {
     path: PathBuf,
     mcap: mcap::Writer<BufWriter<File>>,
@@ -313,5 +316,55 @@ impl Drop for Syncer {
         if let Some(error) = self.take_error() {
             log::error!("a recording that was not finished may be incomplete on the disk: {error}");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::recording::FrameEntry;
+
+    #[test]
+    fn a_full_disk_is_named_with_what_to_do_and_stays_an_error() {
+        let path = Path::new("/dev/full");
+        let file = OpenOptions::new().write(true).open(path).unwrap();
+        let properties = Properties { picture: (640, 480), ..Properties::default() };
+        // The device takes nothing, so the very first flush fails.
+        let error = RecordingWriter::begin(path, file, &properties).err().unwrap();
+        assert!(
+            matches!(&error, RecordError::Write { source, .. } if source.kind() == io::ErrorKind::StorageFull)
+        );
+        assert!(
+            error.to_string().contains("/dev/full") && error.to_string().contains("free space"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_disk_that_fills_up_leaves_a_readable_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mcap");
+        let properties = Properties { picture: (640, 480), ..Properties::default() };
+        let mut writer = RecordingWriter::create(&path, &properties).unwrap();
+        let frame = |ms: i64| {
+            let time = Time::from_ns(ms * 1_000_000);
+            let jpeg = Arc::from([[0xff_u8, 0xd8].as_slice(), &[7; 4000], &[0xff, 0xd9]].concat());
+            Entry::Frame(FrameEntry { arrival: time, mid_exposure: time, sequence: ms as u32, jpeg })
+        };
+        for ms in (0..3000).step_by(100) {
+            writer.write(&frame(ms)).unwrap();
+        }
+        // As the system reports a sync that failed: what was written may not be there.
+        *writer.syncer.error.lock().unwrap() = Some(io::Error::from(io::ErrorKind::StorageFull));
+        let error = (3000..6000).step_by(100).find_map(|ms| writer.write(&frame(ms)).err()).unwrap();
+        assert!(
+            matches!(&error, RecordError::Write { source, .. } if source.kind() == io::ErrorKind::StorageFull)
+        );
+        drop(writer);
+        let reader = crate::RecordingReader::open(&path).unwrap();
+        assert!(reader.entries().unwrap().all(|entry| entry.is_ok()));
+        assert!(reader.counts().frames >= 30);
     }
 }
