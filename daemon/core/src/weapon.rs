@@ -94,7 +94,9 @@ mod tests {
     }
 
     fn rounds(weapon: &mut Weapon, until_ms: i64) -> Vec<i64> {
-        std::iter::from_fn(|| weapon.fire(Time::from_ns(until_ms * 1_000_000))).map(|t| t.ns() / 1_000_000).collect()
+        std::iter::from_fn(|| weapon.fire(Time::from_ns(until_ms * 1_000_000)))
+            .map(|t| t.ns() / 1_000_000)
+            .collect()
     }
 
     #[test]

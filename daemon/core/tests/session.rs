@@ -1,5 +1,7 @@
 //! The session at its boundary: events in, scenes and records out.
 
+#![allow(clippy::expect_used, reason = "a test that cannot go on has failed")]
+
 use std::sync::Arc;
 
 use bowwave_core::{

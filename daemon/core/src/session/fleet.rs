@@ -55,6 +55,11 @@ impl Fleet {
         self.members.len()
     }
 
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.members.is_empty()
+    }
+
     /// A boat's name.
     pub fn name(&self, boat: usize) -> &str {
         self.members.get(boat).map_or("", |m| m.vessel.name.as_str())

@@ -1,0 +1,231 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+/// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
+#[derive(Debug, Parser)]
+#[command(name = "bowwave", version, max_term_width = 100)]
+pub struct Cli {
+    /// Log more (-v: info, -vv: debug); RUST_LOG overrides it
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    pub verbose: u8,
+    /// What to do
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run the trainer on a recording, as if its camera, inertial unit and trigger were there
+    Simulate(Simulate),
+    /// Make a recording from a folder of pictures or from a video
+    Import(Import),
+    /// Print what a scenario needs: passes, shader variants, memory, and why the rest is left out
+    Plan(Plan),
+    /// Check this computer: GPU, camera, serial lines, trigger lines, disk; each with what to do about it
+    Doctor(Doctor),
+    /// Print the virtual rounds of a journal
+    Hits(Hits),
+}
+
+/// Arguments of `simulate`.
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// Recording to replay (MCAP); without it the built-in one is made on first use and kept
+    pub recording: Option<PathBuf>,
+    /// Scenario file (TOML); without it the recording's own, else the built-in one with three boats
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+    /// Calibration file (TOML); without it the recording's own
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Configuration file (TOML); what is given on the command line overrides it
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Screen size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    pub size: Option<(u32, u32)>,
+    /// Replay at the recording's own speed, through a pseudo-terminal and bounded queues
+    #[arg(long, conflicts_with = "fast")]
+    pub realtime: bool,
+    /// Replay as fast as it goes, repeatable to the byte (the default)
+    #[arg(long)]
+    pub fast: bool,
+    /// Draw off screen only (the default)
+    #[arg(long, conflicts_with = "window")]
+    pub headless: bool,
+    /// Show a window as well: space fires, escape ends
+    #[arg(long)]
+    pub window: bool,
+    /// End after so many frames
+    #[arg(long, value_name = "N", conflicts_with = "duration", value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: Option<u64>,
+    /// End after so many seconds; without it once through the recording
+    #[arg(long, value_name = "S", value_parser = parse_duration)]
+    pub duration: Option<f64>,
+    /// Seed of all chance; overrides the scenario's
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Folder for summary.json, hits.sqlite and what else is asked for
+    #[arg(long, value_name = "DIR", default_value = "bowwave-out")]
+    pub out: PathBuf,
+    /// Also keep what went in as DIR/recording.mcap
+    #[arg(long)]
+    pub record: bool,
+    /// Also make a video of what was shown, DIR/video.mp4 (needs ffmpeg)
+    #[arg(long)]
+    pub video: bool,
+    /// Also make a contact sheet of what was shown, DIR/contact-sheet.png
+    #[arg(long)]
+    pub sheet: bool,
+    /// Also keep these frames as DIR/frame-NNNNN.png
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    pub stills: Vec<u64>,
+    /// Vulkan device: its number, or part of its name
+    #[arg(long, value_name = "NAME")]
+    pub gpu: Option<String>,
+    /// Run with Vulkan's validation layer; anything it reports makes the run fail
+    #[arg(long)]
+    pub validation: bool,
+    /// Print each committed round's number on standard output as soon as the journal says so
+    #[arg(long)]
+    pub print_commits: bool,
+    /// Print the summary on standard output as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `import`.
+#[derive(Debug, Args)]
+pub struct Import {
+    /// Folder of JPEG or PNG pictures, or a video file
+    pub source: PathBuf,
+    /// Recording to write (MCAP)
+    #[arg(short, long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Calibration file (TOML): lens, camera-from-IMU rotation, time offset
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Scenario file (TOML) to keep in the recording
+    #[arg(long, value_name = "FILE")]
+    pub scenario: Option<PathBuf>,
+    /// Pictures a second of a folder of pictures
+    #[arg(long, value_name = "HZ", default_value_t = 30.0)]
+    pub rate: f64,
+    /// Take the gyro's bias from the first S seconds, during which the camera must not turn
+    #[arg(long, value_name = "S")]
+    pub bias_from: Option<f64>,
+    /// Replace a recording of that name
+    #[arg(long)]
+    pub force: bool,
+    /// Print what was imported as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `plan`.
+#[derive(Debug, Args)]
+pub struct Plan {
+    /// Scenario file (TOML); without it the built-in one
+    pub scenario: Option<PathBuf>,
+    /// Screen size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1280x720")]
+    pub size: (u32, u32),
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `doctor`.
+#[derive(Debug, Args)]
+pub struct Doctor {
+    /// Camera that must be there, as /dev/video0 or a link in /dev/v4l/by-id
+    #[arg(long, value_name = "PATH")]
+    pub camera: Option<PathBuf>,
+    /// Serial line of the inertial unit that must be there
+    #[arg(long, value_name = "PATH")]
+    pub imu: Option<PathBuf>,
+    /// Trigger line that must be there, as CHIP:LINE
+    #[arg(long, value_name = "CHIP:LINE")]
+    pub trigger: Option<String>,
+    /// Vulkan device that must be there: its number, or part of its name
+    #[arg(long, value_name = "NAME")]
+    pub gpu: Option<String>,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// How rounds are printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// Columns for people
+    Table,
+    /// Comma-separated, a header line first
+    Csv,
+    /// One JSON array
+    Json,
+}
+
+/// Arguments of `hits`.
+#[derive(Debug, Args)]
+pub struct Hits {
+    /// Journal (SQLite) or the folder that a run left
+    #[arg(default_value = "bowwave-out")]
+    pub journal: PathBuf,
+    /// How to print
+    #[arg(long, value_enum, default_value_t = Format::Table)]
+    pub format: Format,
+    /// Same as --format json
+    #[arg(long, conflicts_with = "format")]
+    pub json: bool,
+    /// Only this run's rounds; without it the newest run's
+    #[arg(long, value_name = "N", conflicts_with = "all_runs")]
+    pub run: Option<i64>,
+    /// Rounds of all runs
+    #[arg(long)]
+    pub all_runs: bool,
+    /// Only rounds that struck
+    #[arg(long)]
+    pub hits_only: bool,
+}
+
+/// `1280x720`.
+pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let usage = || format!("'{text}' is no size: write WIDTHxHEIGHT, each 64 to 4096, as 1280x720");
+    let (w, h) = text.split_once(['x', 'X']).ok_or_else(usage)?;
+    let number = |s: &str| s.trim().parse::<u32>().ok().filter(|v| (64..=4096).contains(v));
+    match (number(w), number(h)) {
+        (Some(w), Some(h)) => Ok((w, h)),
+        _ => Err(usage()),
+    }
+}
+
+fn parse_duration(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if s.is_finite() && s > 0.0 && s <= 30.0 * 86_400.0 => Ok(s),
+        _ => Err(format!("'{text}' is no duration: write seconds above 0, at most 2592000")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("1280x720"), Ok((1280, 720)));
+        for bad in ["", "1280", "0x0", "-1x5", "1280x", "99999x720", "axb"] {
+            assert!(parse_size(bad).is_err(), "{bad}");
+        }
+    }
+}

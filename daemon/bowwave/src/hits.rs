@@ -1,0 +1,96 @@
+//! `bowwave hits`: the rounds of a journal as a table, CSV or JSON.
+
+use std::io::Write;
+
+use anyhow::{Context, Result, bail};
+use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots};
+
+use crate::cli::{Format, Hits};
+
+/// Name of the journal in a run's folder.
+pub const JOURNAL: &str = "hits.sqlite";
+
+/// Columns of the table for people: name, index into [`StoredShot::COLUMNS`]'s cells, digits after the point.
+const TABLE: &[(&str, &str, Option<usize>)] = &[
+    ("run", "run", None),
+    ("shot", "shot", None),
+    ("fired s", "fired_s", Some(3)),
+    ("outcome", "outcome", None),
+    ("boat", "boat", None),
+    ("zone", "zone", None),
+    ("range m", "range_m", Some(1)),
+    ("miss m", "miss_m", Some(1)),
+    ("cause", "cause", None),
+    ("pose age ms", "pose_age_ms", Some(1)),
+];
+
+/// Prints the rounds.
+pub fn run(arguments: &Hits) -> Result<()> {
+    let path = if arguments.journal.is_dir() { arguments.journal.join(JOURNAL) } else { arguments.journal.clone() };
+    if !path.exists() {
+        bail!("no journal at {}; name the folder that `bowwave simulate --out` left, or the database", path.display());
+    }
+    let runs = match arguments.run {
+        Some(run) => RunSelection::Run(run),
+        None if arguments.all_runs => RunSelection::All,
+        None => RunSelection::Latest,
+    };
+    let shots = read_shots(&path, &ShotFilter { runs, hits_only: arguments.hits_only })?;
+    let mut out = std::io::stdout().lock();
+    let printed = match if arguments.json { Format::Json } else { arguments.format } {
+        Format::Table => out.write_all(table(&shots).as_bytes()),
+        Format::Csv => out.write_all(&csv(&shots)?),
+        Format::Json => {
+            let all: Vec<_> = shots.iter().map(StoredShot::to_json).collect();
+            writeln!(out, "{}", serde_json::to_string_pretty(&all).context("cannot put the rounds into JSON")?)
+        }
+    };
+    // A pager that was closed has seen enough.
+    match printed.and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e).context("cannot write to standard output"),
+        _ => Ok(()),
+    }
+}
+
+fn csv(shots: &[StoredShot]) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(StoredShot::COLUMNS)?;
+    for shot in shots {
+        writer.write_record(shot.cells())?;
+    }
+    writer.into_inner().context("cannot write the CSV")
+}
+
+fn table(shots: &[StoredShot]) -> String {
+    let mut rows: Vec<Vec<String>> = vec![TABLE.iter().map(|(title, ..)| (*title).to_owned()).collect()];
+    for shot in shots {
+        let cells = shot.cells();
+        let cell = |(_, name, digits): &(&str, &str, Option<usize>)| {
+            let text = StoredShot::COLUMNS.iter().position(|c| c == name).map_or("", |i| cells[i].as_str());
+            match (digits, text.parse::<f64>()) {
+                (Some(digits), Ok(value)) => format!("{value:.digits$}"),
+                _ => text.to_owned(),
+            }
+        };
+        rows.push(TABLE.iter().map(cell).collect());
+    }
+    let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..TABLE.len()).map(width).collect();
+    let mut text = String::new();
+    for row in &rows {
+        let line: Vec<String> = row
+            .iter()
+            .zip(&widths)
+            .zip(TABLE)
+            .map(|((cell, width), (_, name, digits))| match digits {
+                None if *name != "run" && *name != "shot" => format!("{cell:<width$}"),
+                _ => format!("{cell:>width$}"),
+            })
+            .collect();
+        text.push_str(line.join("  ").trim_end());
+        text.push('\n');
+    }
+    let hits = shots.iter().filter(|s| matches!(s.record.outcome, bowwave_core::score::Outcome::Hit { .. })).count();
+    text.push_str(&format!("{} rounds, {hits} hits\n", shots.len()));
+    text
+}

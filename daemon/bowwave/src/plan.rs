@@ -1,0 +1,164 @@
+//! `bowwave plan`: what a scenario needs, and why the rest is left out.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use bowwave_core::{
+    event::PixelFormat,
+    model::Model,
+    plan::{Needs, ScenePlan},
+    scenario::{self, Scenario},
+    scene::{Pass, PassDecision, ReflectionMethod},
+};
+use serde::Serialize;
+
+use crate::{
+    cli::Plan,
+    simulate::prepare::{load_models, read_scenario},
+};
+
+/// A plan, as it is printed.
+#[derive(Debug, Serialize)]
+struct Printed {
+    scenario: String,
+    size: String,
+    boats: Vec<PrintedBoat>,
+    passes: Vec<PrintedPass>,
+    variants: Vec<String>,
+    memory: Vec<PrintedMemory>,
+    memory_bytes: u64,
+}
+
+#[derive(Debug, Serialize)]
+struct PrintedBoat {
+    name: String,
+    model: String,
+    side: &'static str,
+    triangles: usize,
+    length_m: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct PrintedPass {
+    pass: &'static str,
+    runs: bool,
+    /// Why it is left out, or when it runs.
+    why: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct PrintedMemory {
+    name: &'static str,
+    bytes: u64,
+}
+
+/// Prints the plan of a scenario.
+pub fn run(arguments: &Plan) -> Result<()> {
+    let (text, origin, base) = match &arguments.scenario {
+        Some(path) => {
+            let (text, base) = read_scenario(path)?;
+            (text, path.display().to_string(), base)
+        }
+        None => (scenario::DEFAULT.to_owned(), "built-in scenario".to_owned(), Path::new("").to_path_buf()),
+    };
+    let scenario = Scenario::parse(&text, &origin)?;
+    let (models, of_boats) = load_models(&scenario, &base)?;
+    let radius = |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
+    scenario.check_clearance(&of_boats.iter().map(radius).collect::<Vec<_>>())?;
+    let plan = ScenePlan::new(&Needs {
+        size: arguments.size,
+        video: PixelFormat::Rgb,
+        picture: arguments.size,
+        water: scenario.water,
+        boats: scenario.boats.len(),
+        belt: scenario.weapon.belt,
+    });
+    let memory: Vec<PrintedMemory> = Vec::<(&'static str, u64)>::new()
+        .into_iter()
+        .map(|(name, bytes)| PrintedMemory { name, bytes })
+        .collect();
+    let printed = Printed {
+        scenario: scenario.name.clone(),
+        size: format!("{}x{}", arguments.size.0, arguments.size.1),
+        boats: scenario
+            .boats
+            .iter()
+            .zip(&of_boats)
+            .filter_map(|(boat, id)| {
+                let model = models.get(usize::from(id.0))?;
+                Some(PrintedBoat {
+                    name: boat.name.clone(),
+                    model: boat.model.clone(),
+                    side: boat.side.name(),
+                    triangles: model.indices.len() / 3,
+                    length_m: (model.length_m() * 10.0).round() / 10.0,
+                })
+            })
+            .collect(),
+        passes: Pass::ALL.into_iter().map(|p| printed_pass(&plan, p)).collect(),
+        variants: variants(&plan),
+        memory_bytes: memory.iter().map(|m| m.bytes).sum(),
+        memory,
+    };
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&printed).context("cannot put the plan into JSON")?);
+    } else {
+        print!("{}", text_of(&printed));
+    }
+    Ok(())
+}
+
+fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
+    let (runs, why) = match plan.passes[pass as usize] {
+        PassDecision::LeftOut(why) => (false, why.name()),
+        PassDecision::Run => (true, match pass {
+            Pass::Video | Pass::Hud => "every frame",
+            Pass::Mirror | Pass::Water => "frames with a reflection or shadow in view, on its pixels only",
+            Pass::Boats => "frames with a boat in view, on its pixels only",
+            Pass::Rounds => "frames with a tracer, splash or strike in view",
+        }),
+    };
+    PrintedPass { pass: pass.name(), runs, why }
+}
+
+fn variants(plan: &ScenePlan) -> Vec<String> {
+    let mut variants = vec![format!(
+        "video: {:?}, {}",
+        plan.video,
+        if plan.picture == plan.size { "pixel for pixel" } else { "scaled to cover the screen" }
+    )];
+    if plan.has(Pass::Water) {
+        let method = match plan.water.method {
+            ReflectionMethod::Off => "no reflection",
+            ReflectionMethod::Mirror => "plain mirror",
+            ReflectionMethod::FullAsPrinted => "Full Reflection as printed",
+            ReflectionMethod::Full => "Full Reflection, mended",
+        };
+        variants.push(format!("water: {method}, Beaufort {}, shadow {:?}", plan.water.force.get(), plan.water.shadow));
+    }
+    variants
+}
+
+fn text_of(plan: &Printed) -> String {
+    let mut text = format!("{} at {}\n\nboats\n", plan.scenario, plan.size);
+    for b in &plan.boats {
+        text += &format!("  {:<16} {:<14} {:<8} {:>6} triangles, {} m\n", b.name, b.model, b.side, b.triangles, b.length_m);
+    }
+    if plan.boats.is_empty() {
+        text += "  none\n";
+    }
+    text += "\npasses\n";
+    for p in &plan.passes {
+        text += &format!("  {:<8} {:<9} {}\n", p.pass, if p.runs { "runs" } else { "left out" }, p.why);
+    }
+    text += "\nshader variants\n";
+    for v in &plan.variants {
+        text += &format!("  {v}\n");
+    }
+    text += "\nmemory\n";
+    for m in &plan.memory {
+        text += &format!("  {:<28} {:>9.2} MB\n", m.name, m.bytes as f64 * 1e-6);
+    }
+    text += &format!("  {:<28} {:>9.2} MB\n", "all", plan.memory_bytes as f64 * 1e-6);
+    text
+}

@@ -1,0 +1,174 @@
+//! What a run is made of, gathered from the command line, the configuration, the recording and what is built in.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use bowwave_calibration::CalibrationFile;
+use bowwave_core::{
+    event::PixelFormat,
+    model::{Model, ModelId},
+    scenario::{self, Scenario},
+    session::Setup,
+};
+use bowwave_record::{Properties, RecordingReader};
+
+use crate::{
+    cache,
+    cli::Simulate,
+    config::{self, Config},
+};
+
+/// Screen size where nothing else is said.
+const SIZE: (u32, u32) = (1280, 720);
+
+/// A run, ready to begin.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The recording.
+    pub recording: PathBuf,
+    /// What it says about itself.
+    pub properties: Properties,
+    /// Its length, nanoseconds.
+    pub duration_ns: i64,
+    /// What the session is made from.
+    pub setup: Setup,
+    /// Text of the scenario in use.
+    pub scenario_toml: String,
+    /// Text of the calibration in use.
+    pub calibration_toml: String,
+    /// Vulkan device by number or part of its name.
+    pub gpu: Option<String>,
+    /// Whether to validate.
+    pub validation: bool,
+    /// Whether to show a window.
+    pub window: bool,
+    /// Whether to keep what went in.
+    pub record: bool,
+}
+
+/// Gathers what a run needs, and refuses what cannot work before anything is begun.
+pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
+    let config = arguments.config.as_deref().map_or_else(|| Ok(Config::default()), config::read)?;
+    let recording = match &arguments.recording {
+        Some(path) => path.clone(),
+        None => cache::default_recording()?,
+    };
+    let reader = RecordingReader::open(&recording)?;
+    let properties = reader.properties().clone();
+    let duration_ns = reader.duration_ns();
+
+    let (calibration, calibration_toml) =
+        calibration(arguments.calibration.as_ref().or(config.calibration.as_ref()), &properties, &recording)?;
+    let named = arguments.scenario.as_ref().or(config.scenario.as_ref());
+    let (mut scenario, scenario_toml, base) = scenario(named, &properties, &recording)?;
+    if let Some(seed) = arguments.seed {
+        scenario.seed = seed;
+    }
+    let (models, boat_models) = load_models(&scenario, &base)?;
+    let radius = |id: &ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
+    scenario.check_clearance(&boat_models.iter().map(radius).collect::<Vec<_>>())?;
+    Ok(Prepared {
+        recording,
+        properties,
+        duration_ns,
+        setup: Setup {
+            scenario,
+            calibration: calibration.calibration,
+            models: models.into(),
+            boat_models,
+            screen: arguments.size.or(config.size).unwrap_or(SIZE),
+            // JPEG pictures are decoded to RGB.
+            video: PixelFormat::Rgb,
+        },
+        scenario_toml,
+        calibration_toml,
+        gpu: arguments.gpu.clone().or(config.gpu),
+        validation: arguments.validation || config.validation,
+        window: arguments.window || config.window && !arguments.headless,
+        record: arguments.record || config.record,
+    })
+}
+
+fn calibration(
+    named: Option<&PathBuf>,
+    properties: &Properties,
+    recording: &Path,
+) -> Result<(CalibrationFile, String)> {
+    let (text, origin) = match named {
+        Some(path) => {
+            let text = std::fs::read_to_string(path).with_context(|| {
+                format!("cannot read the calibration {}; name an existing file with --calibration", path.display())
+            })?;
+            (text, path.display().to_string())
+        }
+        None => (properties.calibration_toml.clone(), format!("{} (its calibration)", recording.display())),
+    };
+    Ok((bowwave_calibration::parse(&text, &origin)?, text))
+}
+
+/// The scenario, its text, and the folder that its models' paths start from.
+fn scenario(named: Option<&PathBuf>, properties: &Properties, recording: &Path) -> Result<(Scenario, String, PathBuf)> {
+    let folder = |path: &Path| path.parent().unwrap_or(Path::new("")).to_path_buf();
+    let (text, origin, base) = match (named, &properties.scenario_toml) {
+        (Some(path), _) => {
+            let (text, base) = read_scenario(path)?;
+            (text, path.display().to_string(), base)
+        }
+        (None, Some(text)) => (text.clone(), format!("{} (its scenario)", recording.display()), folder(recording)),
+        (None, None) => (scenario::DEFAULT.to_owned(), "built-in scenario".to_owned(), PathBuf::new()),
+    };
+    let scenario = Scenario::parse(&text, &origin)?;
+    Ok((scenario, text, base))
+}
+
+/// Text of the scenario that `path` names, a file or a built-in one, and the folder that its models' paths start from.
+pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
+    let built_in = || scenario::BUILT_IN.iter().find(|(name, _)| path.as_os_str() == *name);
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok((text, path.parent().unwrap_or(Path::new("")).to_path_buf())),
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound && built_in().is_some() => {
+            Ok((built_in().map_or_else(String::new, |(_, text)| (*text).to_owned()), PathBuf::new()))
+        }
+        Err(e) => {
+            let names: Vec<&str> = scenario::BUILT_IN.iter().map(|(name, _)| *name).collect();
+            Err(e).with_context(|| {
+                format!("cannot read the scenario {}; name a file, or one of {}", path.display(), names.join(", "))
+            })
+        }
+    }
+}
+
+/// Each model once, and which of them each boat has.
+pub fn load_models(scenario: &Scenario, base: &Path) -> Result<(Vec<Model>, Vec<ModelId>)> {
+    let mut names: Vec<&str> = Vec::new();
+    let mut models = Vec::new();
+    let mut of_boats = Vec::new();
+    for boat in &scenario.boats {
+        let place = match names.iter().position(|n| *n == boat.model) {
+            Some(place) => place,
+            None => {
+                let model = bowwave_models::resolve(&boat.model, base)
+                    .with_context(|| format!("cannot load the model of {}", boat.name))?;
+                names.push(&boat.model);
+                models.push(model);
+                models.len() - 1
+            }
+        };
+        of_boats.push(ModelId(u16::try_from(place).context("more than 65536 models")?));
+    }
+    Ok((models, of_boats))
+}
+
+/// The properties of a recording of this run: the same hardware, with the calibration and scenario in use.
+pub fn properties_of_run(prepared: &Prepared, start: bowwave_core::time::Time) -> Properties {
+    Properties {
+        calibration_toml: prepared.calibration_toml.clone(),
+        scenario_toml: Some(prepared.scenario_toml.clone()),
+        // What is kept is a stretch of the original: it need not close.
+        loop_ns: None,
+        start,
+        source: format!("replay of {}", prepared.properties.source),
+        ..prepared.properties.clone()
+    }
+}
+

@@ -1,0 +1,144 @@
+//! What a run reports about itself.
+
+use std::{collections::BTreeMap, path::Path};
+
+use anyhow::{Context, Result};
+use bowwave_core::scene::{LeftOut, Pass, PassDecision, Scene};
+use serde::Serialize;
+
+use crate::stats::{Percentiles, Samples};
+
+/// The summary of a run, `summary.json`. Times are milliseconds.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Frames shown.
+    pub frames: u64,
+    /// Frames that were not complete when the next was due, or never drawn; null where nothing is due (--fast).
+    pub missed_deadlines: Option<u64>,
+    /// Screen size, as WIDTHxHEIGHT.
+    pub size: String,
+    /// Vulkan device and driver.
+    pub device: String,
+    /// From when a frame was due until its pixels were complete (--fast: from when it was begun).
+    pub frame_ms: Option<Percentiles>,
+    /// The same, stage by stage.
+    pub stage_ms: BTreeMap<String, Percentiles>,
+    /// From the start of the program to the first complete frame.
+    pub first_frame_ms: Option<f64>,
+    /// Frames that ran each pass.
+    pub passes: BTreeMap<String, u64>,
+    /// For each pass and reason, the frames that left it out.
+    pub left_out: BTreeMap<String, u64>,
+    /// Virtual rounds fired.
+    pub shots: u64,
+    /// Virtual rounds that struck a boat.
+    pub hits: u64,
+    /// Virtual rounds that could not be scored.
+    pub not_scored: u64,
+    /// How far from the recording's truth far things were drawn; null without truth.
+    pub registration_px: Option<Registration>,
+    /// SHA-256 over every pose used and every record, in order.
+    pub records_sha256: String,
+    /// SHA-256 over the SHA-256 of every frame's pixels, in order.
+    pub frames_sha256: String,
+    /// Largest resident memory, megabytes.
+    pub peak_rss_mb: Option<f64>,
+    /// Seed of all chance.
+    pub seed: u64,
+    /// The recording played.
+    pub recording: String,
+    /// The scenario's name.
+    pub scenario: String,
+    /// Video format and how it reached the GPU.
+    pub video: String,
+    /// What the simulated hardware and the session counted: dropped, late, broken.
+    pub counts: BTreeMap<String, u64>,
+}
+
+/// Distances on the screen between where things belong and where they were drawn, pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Registration {
+    /// Root mean square.
+    pub rms: f64,
+    /// 99th percentile of frames.
+    pub p99: f64,
+    /// Worst frame.
+    pub max: f64,
+    /// Frames compared.
+    pub frames: u64,
+}
+
+impl Registration {
+    /// From the per-frame errors; `None` where none was measured.
+    pub fn of(errors: &Samples, frames: u64) -> Option<Self> {
+        let p = errors.percentiles()?;
+        Some(Self { rms: errors.rms()?, p99: p.p99, max: p.max, frames })
+    }
+}
+
+/// Counts which passes ran, and why the others did not.
+#[derive(Clone, Debug, Default)]
+pub struct PassCounts {
+    ran: [u64; Pass::COUNT],
+    left_out: BTreeMap<(Pass, LeftOut), u64>,
+}
+
+impl PassCounts {
+    /// Takes in a frame.
+    pub fn count(&mut self, scene: &Scene) {
+        for pass in Pass::ALL {
+            match scene.passes[pass as usize] {
+                PassDecision::Run => self.ran[pass as usize] += 1,
+                PassDecision::LeftOut(why) => *self.left_out.entry((pass, why)).or_default() += 1,
+            }
+        }
+    }
+
+    /// Frames by pass.
+    pub fn passes(&self) -> BTreeMap<String, u64> {
+        Pass::ALL.into_iter().map(|p| (p.name().to_owned(), self.ran[p as usize])).collect()
+    }
+
+    /// Frames by pass and reason.
+    pub fn left_out(&self) -> BTreeMap<String, u64> {
+        self.left_out.iter().map(|((p, why), n)| (format!("{}: {}", p.name(), why.name()), *n)).collect()
+    }
+}
+
+impl Summary {
+    /// Writes `summary.json`.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let mut text = serde_json::to_string_pretty(self).context("cannot put the summary into JSON")?;
+        text.push('\n');
+        std::fs::write(path, text).with_context(|| format!("cannot write {}; check the disk", path.display()))
+    }
+
+    /// The few lines that a person reads.
+    pub fn lines(&self) -> String {
+        let ms = |p: Option<Percentiles>| {
+            p.map_or("-".into(), |p| format!("p50 {:.1}, p95 {:.1}, p99 {:.1}, max {:.1} ms", p.p50, p.p95, p.p99, p.max))
+        };
+        let missed = self.missed_deadlines.map_or("no deadlines in --fast".into(), |n| format!("{n} missed deadlines"));
+        let registration = self
+            .registration_px
+            .map_or("no truth in this recording".into(), |r| format!("rms {:.2}, p99 {:.2}, max {:.2} px", r.rms, r.p99, r.max));
+        format!(
+            "{} frames of {} on {}; {missed}\nframe time     {}\nregistration   {registration}\nrounds         {} fired, {} hit, {} not scored\n",
+            self.frames,
+            self.size,
+            self.device,
+            ms(self.frame_ms),
+            self.shots,
+            self.hits,
+            self.not_scored,
+        )
+    }
+}
+
+/// Largest resident memory of this process so far, megabytes (10^6 bytes); `None` where the kernel does not say.
+pub fn peak_rss_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some((kib * 1.024).round() / 1000.0)
+}
