@@ -256,6 +256,50 @@ fn claimed_sizes_are_refused_before_anything_is_allocated() {
 }
 
 #[test]
+fn a_compressed_chunk_is_named_with_its_method() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, _) = small(folder.path());
+    let first_data =
+        mcap::Summary::read(&whole).unwrap().unwrap().chunk_indexes[1].chunk_start_offset as usize;
+    let mut chunk = vec![0; 16];
+    chunk.extend(500_u64.to_le_bytes());
+    chunk.extend(0_u32.to_le_bytes());
+    chunk.extend(4_u32.to_le_bytes());
+    chunk.extend(b"zstd");
+    chunk.extend(100_u64.to_le_bytes());
+    chunk.extend([0x28; 100]);
+    let mut bytes = whole[..first_data].to_vec();
+    bytes.push(6);
+    bytes.extend((chunk.len() as u64).to_le_bytes());
+    bytes.extend(chunk);
+    let error = opened(&folder.path().join("zstd.mcap"), &bytes).unwrap_err();
+    assert!(matches!(error, RecordError::Compressed { .. }), "{error}");
+    assert!(
+        error.to_string().contains("\"zstd\"") && error.to_string().contains("without compression"),
+        "{error}"
+    );
+}
+
+#[test]
+fn zeros_that_a_power_cut_left_at_the_end_are_no_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("zeros.mcap");
+    write(&path, &properties(), &session(40, 4000));
+    let whole = fs::read(&path).unwrap();
+    let entries = sorted(&session(40, 4000));
+    for length in (whole.len() / 2..whole.len() * 3 / 4).step_by(997) {
+        let mut bytes = whole[..length].to_vec();
+        bytes[length - 3000..].fill(0);
+        let (found, error) = read(&opened(&path, &bytes).unwrap());
+        assert!(
+            matches!(error, Some(RecordError::Truncated { .. } | RecordError::Damaged { .. })),
+            "{error:?}"
+        );
+        assert!(found.iter().all(|entry| entries.contains(entry)), "{length} bytes");
+    }
+}
+
+#[test]
 fn an_attachment_shorter_than_its_header_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("short.mcap");

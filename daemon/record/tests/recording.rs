@@ -86,11 +86,13 @@ fn what_cannot_be_recorded_is_refused_and_the_rest_goes_on() {
     };
     let bad_clock = ImuSample { device_time_ns: i64::MAX, ..imu_sample() };
     let empty = FrameEntry { arrival: at(1), mid_exposure: at(1), sequence: 0, jpeg: Arc::from(&[][..]) };
+    let huge = FrameEntry { jpeg: Arc::from(vec![0; (32 << 20) + 1]), ..empty.clone() };
     for (entry, expected) in [
         (frame(-5, 0, 10), "begin later"),
         (Entry::Truth(bad_pose), "unit quaternion"),
         (Entry::Imu(bad_clock), "device's clock"),
         (Entry::Frame(empty), "0 bytes"),
+        (Entry::Frame(huge), "lower the camera's quality"),
     ] {
         let error = writer.write(&entry).unwrap_err();
         assert!(

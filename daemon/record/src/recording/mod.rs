@@ -12,13 +12,16 @@
 //! metadata record called `bowwave`. Chunks are not compressed, since pictures already are, and none spans more than half
 //! a second: a file that was cut short misses less than a second.
 
+mod channels;
 mod error;
+mod messages;
 mod properties;
 mod read;
+mod records;
 mod recover;
 mod ros;
-mod scan;
 mod schema;
+mod survey;
 mod write;
 
 use std::sync::Arc;

@@ -3,9 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use super::{
-    Counts, RecordError, RecordingWriter,
-    read::{Survey, entry},
-    scan::{Messages, Records},
+    Counts, RecordError, RecordingWriter, messages::Messages, read::entry, records::Records, survey::Survey,
 };
 
 /// What became of a damaged recording.

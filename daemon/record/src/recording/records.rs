@@ -1,0 +1,183 @@
+//! From a file's bytes to records: framed by the MCAP crate's sans-io reader, one at a time, sizes checked before anything is
+//! allocated.
+
+use std::{
+    fs::File,
+    io::{self, Read, Seek, SeekFrom},
+    path::Path,
+    sync::Arc,
+};
+
+use mcap::{
+    McapError,
+    records::{Record, op},
+    sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
+};
+
+use super::{CHUNK_MAX_BYTES, RecordError};
+
+/// Largest record: a chunk and its header.
+const RECORD_MAX_BYTES: u64 = CHUNK_MAX_BYTES + 1024;
+/// Bytes of opcode and length before each record.
+pub(crate) const PREFIX: usize = 9;
+
+/// The records of a file from some place on, one at a time.
+pub(crate) struct Records {
+    path: Arc<Path>,
+    file: File,
+    file_bytes: u64,
+    read_to: u64,
+    next_at: u64,
+    reader: LinearReader,
+    ended: bool,
+}
+
+impl Records {
+    /// From the file's beginning. Checks the magic bytes with the first record.
+    pub(crate) fn open(path: &Arc<Path>) -> Result<Self, RecordError> {
+        Self::open_at(path, 0)
+    }
+
+    /// From the record that begins at `offset`; 0 is the beginning of the file.
+    pub(crate) fn open_at(path: &Arc<Path>, offset: u64) -> Result<Self, RecordError> {
+        let open = |source| RecordError::Open { path: path.to_path_buf(), source };
+        let mut file = File::open(path).map_err(open)?;
+        let status = file.metadata().map_err(open)?;
+        if status.is_dir() {
+            return Err(open(io::Error::from(io::ErrorKind::IsADirectory)));
+        }
+        if status.len() == 0 {
+            return Err(RecordError::Empty { path: path.to_path_buf() });
+        }
+        let mut magic = Vec::with_capacity(mcap::MAGIC.len());
+        Read::by_ref(&mut file).take(mcap::MAGIC.len() as u64).read_to_end(&mut magic).map_err(open)?;
+        if !mcap::MAGIC.starts_with(&magic) {
+            return Err(RecordError::NotMcap { path: path.to_path_buf() });
+        }
+        file.seek(SeekFrom::Start(offset)).map_err(open)?;
+        let options = LinearReaderOptions::default()
+            .with_emit_chunks(true)
+            .with_skip_start_magic(offset > 0)
+            .with_record_length_limit(usize::try_from(RECORD_MAX_BYTES).unwrap_or(usize::MAX));
+        Ok(Self {
+            path: Arc::clone(path),
+            file,
+            file_bytes: status.len(),
+            read_to: offset,
+            next_at: offset.max(mcap::MAGIC.len() as u64),
+            reader: LinearReader::new_with_options(options),
+            ended: false,
+        })
+    }
+
+    pub(crate) fn path(&self) -> &Arc<Path> {
+        &self.path
+    }
+
+    /// The file's length when it was opened.
+    pub(crate) const fn file_bytes(&self) -> u64 {
+        self.file_bytes
+    }
+
+    /// Puts the next record's data into `data` and gives its opcode and place; `None` after the last. Nothing follows an error.
+    pub(crate) fn next(&mut self, data: &mut Vec<u8>) -> Result<Option<(u8, u64)>, RecordError> {
+        if self.ended {
+            return Ok(None);
+        }
+        let result = self.advance(data);
+        self.ended = !matches!(result, Ok(Some(_)));
+        result
+    }
+
+    fn advance(&mut self, data: &mut Vec<u8>) -> Result<Option<(u8, u64)>, RecordError> {
+        loop {
+            let at = self.next_at;
+            let wanted = match self.reader.next_event() {
+                None => return Ok(None),
+                Some(Ok(LinearReadEvent::Record { opcode, data: found })) => {
+                    data.clear();
+                    data.extend_from_slice(found);
+                    self.next_at = at.saturating_add((PREFIX + found.len()) as u64);
+                    return Ok(Some((opcode, at)));
+                }
+                Some(Ok(LinearReadEvent::ReadRequest(wanted))) => wanted,
+                Some(Err(error)) => return Err(self.framing_error(at, error)),
+            };
+            // Never allocate for more than the file can still hold, whatever a length field claims.
+            let rest = usize::try_from(self.file_bytes.saturating_sub(self.read_to)).unwrap_or(usize::MAX);
+            let target = self.reader.insert(wanted.min(rest).max(1));
+            let count = self.file.read(target).map_err(|source| RecordError::Read {
+                path: self.path.to_path_buf(),
+                offset: self.read_to,
+                source,
+            })?;
+            self.reader.notify_read(count);
+            self.read_to = self.read_to.saturating_add(count as u64);
+        }
+    }
+
+    fn framing_error(&self, offset: u64, error: McapError) -> RecordError {
+        let path = self.path.to_path_buf();
+        match error {
+            McapError::UnexpectedEof => RecordError::Truncated { path, offset, bytes: self.file_bytes },
+            McapError::RecordTooLarge { opcode, len } => RecordError::TooLarge {
+                path,
+                offset,
+                what: format!("a record of kind {opcode:#04x}"),
+                bytes: len,
+                limit: RECORD_MAX_BYTES,
+            },
+            other => RecordError::Damaged { path, offset, what: other.to_string() },
+        }
+    }
+
+    /// The bytes of the chunk that begins at `offset` and was cut off by the file's end, without opcode and length.
+    pub(crate) fn cut_chunk(&mut self, offset: u64, data: &mut Vec<u8>) -> Result<bool, RecordError> {
+        let read = |source| RecordError::Read { path: self.path.to_path_buf(), offset, source };
+        self.file.seek(SeekFrom::Start(offset)).map_err(read)?;
+        data.clear();
+        Read::by_ref(&mut self.file)
+            .take(RECORD_MAX_BYTES + PREFIX as u64)
+            .read_to_end(data)
+            .map_err(read)?;
+        let is_chunk = data.first() == Some(&op::CHUNK) && data.len() > PREFIX;
+        if is_chunk {
+            data.drain(..PREFIX);
+        }
+        Ok(is_chunk)
+    }
+}
+
+/// Parses a record. The crate's own parser panics on attachments that are too short for their checksum.
+pub(crate) fn parse<'a>(
+    path: &Path,
+    opcode: u8,
+    offset: u64,
+    data: &'a [u8],
+) -> Result<Record<'a>, RecordError> {
+    let damaged = |what: String| RecordError::Damaged { path: path.into(), offset, what };
+    if opcode == op::ATTACHMENT && !attachment_fits(data) {
+        return Err(damaged("an attachment that is shorter than its header says".to_owned()));
+    }
+    mcap::parse_record(opcode, data).map_err(|error| damaged(error.to_string()))
+}
+
+/// Whether an attachment's two times, two strings, length and checksum fit into its record.
+fn attachment_fits(data: &[u8]) -> bool {
+    let mut at = 16_usize;
+    for _ in 0..2 {
+        let Some(length) = u32_at(data, at) else { return false };
+        at = at.saturating_add(4).saturating_add(length as usize);
+    }
+    data.len() >= at.saturating_add(8 + 4)
+}
+
+pub(crate) fn u32_at(data: &[u8], at: usize) -> Option<u32> {
+    let bytes = data.get(at..at.checked_add(4)?)?;
+    Some(u32::from_le_bytes(bytes.try_into().ok()?))
+}
+
+pub(crate) fn u64_at(data: &[u8], at: usize) -> Option<u64> {
+    let bytes = data.get(at..at.checked_add(8)?)?;
+    Some(u64::from_le_bytes(bytes.try_into().ok()?))
+}
