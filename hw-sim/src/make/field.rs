@@ -340,23 +340,49 @@ impl Tile {
         (spacing_m * self.per_metre).log2()
     }
 
-    /// Bilinear value of one level at a place in the world.
+    /// One level, 0 the finest.
     #[inline(always)]
-    pub fn sample(&self, level: usize, east: f32, north: f32) -> Texel {
-        let shift = level.min(LEVELS - 1);
-        let width = N >> shift;
-        let mask = width - 1;
-        let texels = &self.levels[shift][..width * width];
-        let scale = self.per_metre / (1u32 << shift) as f32;
-        // Averages of 2^level points lie between them.
-        let centre = 0.5 / (1u32 << shift) as f32 - 0.5;
-        let u = (east * self.axis[0] + north * self.axis[1]) * scale + centre;
-        let v = (north * self.axis[0] - east * self.axis[1]) * scale + centre;
+    pub fn level(&self, level: usize) -> Level<'_> {
+        let level = level.min(LEVELS - 1);
+        let width = N >> level;
+        let shrink = 1.0 / (1u32 << level) as f32;
+        let scale = self.per_metre * shrink;
+        Level {
+            texels: &self.levels[level][..width * width],
+            width,
+            axis: self.axis.map(|a| a * scale),
+            // Averages of 2^level points lie between them.
+            centre: 0.5 * shrink - 0.5,
+        }
+    }
+}
+
+/// One level of a tile, ready for many look-ups.
+#[derive(Clone, Copy)]
+pub(super) struct Level<'a> {
+    texels: &'a [Texel],
+    width: usize,
+    axis: [f32; 2],
+    centre: f32,
+}
+
+impl Level<'_> {
+    /// Metres from point to point.
+    pub fn spacing_m(&self) -> f32 {
+        1.0 / self.axis[0].hypot(self.axis[1])
+    }
+
+    /// Bilinear value at a place in the world, metres.
+    #[inline(always)]
+    pub fn sample(&self, east: f32, north: f32) -> Texel {
+        let mask = self.width - 1;
+        let u = east * self.axis[0] + north * self.axis[1] + self.centre;
+        let v = north * self.axis[0] - east * self.axis[1] + self.centre;
         let ((iu, fu), (iv, fv)) = (split(u), split(v));
         let (x0, x1) = (iu & mask, iu.wrapping_add(1) & mask);
-        let (y0, y1) = ((iv & mask) * width, (iv.wrapping_add(1) & mask) * width);
-        let upper = texels[y0 + x0].lerp(texels[y0 + x1], fu);
-        let lower = texels[y1 + x0].lerp(texels[y1 + x1], fu);
+        let (y0, y1) = ((iv & mask) * self.width, (iv.wrapping_add(1) & mask) * self.width);
+        let upper = self.texels[y0 + x0].lerp(self.texels[y0 + x1], fu);
+        let lower = self.texels[y1 + x0].lerp(self.texels[y1 + x1], fu);
         upper.lerp(lower, fv)
     }
 }
@@ -433,7 +459,7 @@ mod tests {
         let (field, mut surface, _) = field(2, 9);
         let mut at = |t: f64| {
             field.evaluate(t, &mut surface);
-            surface.tiles.iter().map(|tile| tile.sample(0, 31.7, -12.9)).collect::<Vec<_>>()
+            surface.tiles.iter().map(|tile| tile.level(0).sample(31.7, -12.9)).collect::<Vec<_>>()
         };
         let (start, later, end) = (at(0.0), at(0.4), at(20.0));
         assert_eq!(start, end);
@@ -449,8 +475,8 @@ mod tests {
             let (mut error, mut power) = (0.0, 0.0);
             for i in 0..400 {
                 let (x, y) = (i as f32 * 0.713 * step, i as f32 * 1.37 * step);
-                let numeric = (tile.sample(0, x + step, y)[0] - tile.sample(0, x - step, y)[0]) / (2.0 * step);
-                let stated = tile.sample(0, x, y)[1];
+                let numeric = (tile.level(0).sample(x + step, y)[0] - tile.level(0).sample(x - step, y)[0]) / (2.0 * step);
+                let stated = tile.level(0).sample(x, y)[1];
                 error += (numeric - stated).powi(2);
                 power += stated.powi(2);
             }

@@ -1,7 +1,10 @@
 //! Draws the sea as a level camera sees it: every column walks outwards over the waves and paints each piece of water that
 //! is not hidden by a nearer one over as much of the column as it covers.
 
-use std::{f32::consts::TAU, ops::Range};
+use std::{
+    f32::consts::TAU,
+    ops::{Add, AddAssign, Mul, Range, Sub},
+};
 
 use bowwave_core::geometry::curvature_drop;
 use glam::{Vec3, Vec4};
@@ -15,23 +18,27 @@ use super::{
 };
 
 /// Pieces of water per row of the picture where waves are drawn one by one.
-const STEPS_PER_ROW: f32 = 1.3;
+const STEPS_PER_ROW: f32 = 1.2;
 /// Longest step relative to range there: front and back of the waves must be met even where a row spans many of them.
-const STEP_MAX: f32 = 0.006;
+const STEP_MAX: f32 = 0.007;
 /// Beyond this range single waves only tint a row.
 const FAR_M: f32 = 900.0;
 /// Longest step relative to range beyond.
 const STEP_FAR: f32 = 0.02;
 /// Rows of the water table over range.
-const TABLE_ROWS: usize = 40;
+const TABLE_ROWS: usize = 32;
 /// Columns between which the glitter's parameters are interpolated.
 const GLITTER_STRIDE: usize = 16;
 /// Columns drawn together.
 const BLOCK: usize = 64;
+/// Most columns from one look-up to the next; divides [`BLOCK`].
+const STRIDE_MAX: usize = 16;
 
 /// One distance from the camera.
 struct Step {
     range: f32,
+    /// Metres from column to column.
+    spacing: f32,
     drop: f32,
     table_row: f32,
     grazing: f32,
@@ -164,7 +171,8 @@ impl SeaShader {
     fn columns(&self, view: &LevelView, columns: &mut Vec<Column>) {
         let (sin, cos) = view.azimuth.sin_cos();
         columns.clear();
-        columns.extend((0..view.width).map(|x| {
+        // The last block looks up to one column beyond itself.
+        columns.extend((0..=view.width.next_multiple_of(BLOCK)).map(|x| {
             let n = (x as f32 + 0.5 - view.centre) / view.focal;
             let secant = (1.0 + n * n).sqrt();
             let azimuth = (view.azimuth + n.atan()).rem_euclid(TAU);
@@ -195,16 +203,22 @@ impl SeaShader {
     ) {
         let first = block.start;
         let glitter: [Glitter; BLOCK / GLITTER_STRIDE + 1] = std::array::from_fn(|i| {
-            let column = picture.columns[(first + i * GLITTER_STRIDE).min(view.width - 1)];
+            let column = picture.columns[first + i * GLITTER_STRIDE];
             Glitter::new(&step.roughness, column.east, column.north, sky)
         });
         let slice = self.table.slice(step.table_row);
         let inverse_range = 1.0 / step.range;
         let sun = self.sun_irradiance;
+        // All look-ups first: they wait for memory side by side, which the branches below would prevent.
+        let mut waters = [Vec4::ZERO; BLOCK];
+        let columns = &picture.columns[first..=first + BLOCK];
+        sample(step, surface, columns, &mut waters);
+        let mut patches = [0.0f32; BLOCK];
+        let patch_stride = stride(step.spacing, 2.0 * Patches::SPACING_M);
+        interpolate(step, columns, patch_stride, &mut patches, |e, n| self.patches.at(e, n));
         for x in block {
             let column = picture.columns[x];
-            let (east, north) = (step.range * column.east, step.range * column.north);
-            let water = sample(step, surface, east, north);
+            let water = waters[x - first];
             let tangent = (water[0] - step.drop - eye_height) * inverse_range;
             let row = view.level_row - column.scale * tangent;
             let below = picture.highest[x];
@@ -215,7 +229,7 @@ impl SeaShader {
             if below == f32::MAX || below <= 0.0 || row >= view.height as f32 {
                 continue;
             }
-            let patch = self.patches.at(east, north);
+            let patch = patches[x - first];
             let gain = 1.0 + 0.35 * patch.clamp(-1.5, 1.5);
             let along = gain * (water[1] * column.east + water[2] * column.north) + 0.012 * patch;
             let across = gain * (water[1] * column.north - water[2] * column.east);
@@ -237,17 +251,58 @@ impl SeaShader {
     }
 }
 
-#[inline(always)]
-fn sample(step: &Step, surface: &Surface, east: f32, north: f32) -> Vec4 {
-    let mut water = Vec4::ZERO;
+/// Height, slopes and squeeze under each of a block's columns at one distance.
+fn sample(step: &Step, surface: &Surface, columns: &[Column], waters: &mut [Vec4; BLOCK]) {
     for (tile, &(level, share, shows)) in surface.tiles.iter().zip(&step.levels) {
         if !shows {
             continue;
         }
-        let fine = tile.sample(level, east, north);
-        water += if share > 0.0 { fine.lerp(tile.sample(level + 1, east, north), share) } else { fine };
+        let fine = tile.level(level);
+        let stride = stride(step.spacing, fine.spacing_m());
+        if share > 0.0 {
+            let coarse = tile.level(level + 1);
+            interpolate(step, columns, stride, waters, |e, n| fine.sample(e, n).lerp(coarse.sample(e, n), share));
+        } else {
+            interpolate(step, columns, stride, waters, |e, n| fine.sample(e, n));
+        }
     }
-    water
+}
+
+/// Columns from one look-up to the next, where neighbouring columns are `column_m` apart and a field's points `point_m`.
+fn stride(column_m: f32, point_m: f32) -> usize {
+    let points = (point_m / column_m) as usize;
+    // The largest power of two that does not step over a point.
+    1 << points.clamp(1, STRIDE_MAX).ilog2()
+}
+
+/// Adds `look_up` (of a place in metres east and north) to every column, looking up only every `stride` columns and going
+/// straight between.
+#[inline(always)]
+fn interpolate<T>(
+    step: &Step,
+    columns: &[Column],
+    stride: usize,
+    values: &mut [T; BLOCK],
+    look_up: impl Fn(f32, f32) -> T,
+) where
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f32, Output = T> + AddAssign,
+{
+    let at = |x: usize| {
+        let column = &columns[x];
+        look_up(step.range * column.east, step.range * column.north)
+    };
+    let share = 1.0 / stride as f32;
+    let mut from = at(0);
+    for first in (0..BLOCK).step_by(stride) {
+        let to = at(first + stride);
+        let change = (to - from) * share;
+        let mut value = from;
+        for target in &mut values[first..first + stride] {
+            *target += value;
+            value += change;
+        }
+        from = to;
+    }
 }
 
 /// Adds `colour` to column `x` between rows `upper` and `lower` (not whole numbers), by covered share.
@@ -309,6 +364,7 @@ fn make_step(
     let transmittance = (-3.912 * range / input.visibility_m).exp();
     Step {
         range,
+        spacing,
         drop,
         table_row: 0.0,
         grazing,

@@ -18,6 +18,9 @@ pub(super) struct Patches {
 }
 
 impl Patches {
+    /// Metres from point to point.
+    pub const SPACING_M: f32 = SIZE_M / POINTS as f32;
+
     /// Streaks along the wind, as gusts and windrows leave them.
     pub fn new(wind_from: f64, seed: u64) -> Self {
         let mut rng = stream(seed, 0x9a7c);

@@ -164,9 +164,9 @@ impl Default for CameraRecipe {
             hfov: 60f64.to_radians(),
             radial: [0.0; 2],
             read_noise: 2.5e-6,
-            shot_noise: 4.0e-5,
+            shot_noise: 3.0e-5,
             vignetting: 0.5,
-            jpeg_quality: 87,
+            jpeg_quality: 86,
             time_offset_ns: 4_000_000,
             latency_ns: [12_000_000, 15_000_000],
         }

@@ -17,7 +17,7 @@ const AZIMUTHS: usize = 72;
 /// Stored azimuths; the last is the first again.
 const STRIDE: usize = AZIMUTHS + 1;
 /// Slopes along the line of sight in the table.
-const SLOPES: usize = 96;
+const SLOPES: usize = 72;
 const SLOPE_MIN: f32 = -0.55;
 const SLOPE_MAX: f32 = 0.75;
 
@@ -111,9 +111,9 @@ pub(super) const COLUMNS_PER_RADIAN: f32 = AZIMUTHS as f32 / TAU;
 /// Points and weights that stand for a normal distribution in two dimensions, in deviations.
 fn facets() -> Vec<(f32, f32, f32)> {
     let mut all = Vec::new();
-    for a in -7..=7 {
+    for a in -5..=5 {
         for c in -2..=2 {
-            let (x, y) = (a as f32 * 0.4, c as f32 * 0.9);
+            let (x, y) = (a as f32 * 0.5, c as f32 * 0.9);
             all.push((x, y, (-0.5 * (x * x + y * y)).exp()));
         }
     }

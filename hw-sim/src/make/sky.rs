@@ -88,7 +88,7 @@ impl Sky {
         let gamma = direction.dot(self.sun).clamp(-1.0, 1.0).acos();
         let model = [Channel::R, Channel::G, Channel::B]
             .map(|c| self.scale * self.state.radiance(theta, gamma, c).max(0.0));
-        let grey = luminance(model);
+        let grey = 1.18 * luminance(model);
         let share = 0.75 * (1.0 - smoothstep(0.0, 2.2 * PALE, z));
         std::array::from_fn(|c| model[c] + share * (grey * [0.97, 1.05, 1.16][c] - model[c]))
     }

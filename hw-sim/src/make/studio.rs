@@ -6,7 +6,7 @@ use bowwave_core::geometry::CameraPose;
 
 use super::{
     MakeError,
-    camera::{Camera, Coverage, FrameMemory},
+    camera::{Camera, Coverage, FrameMemory, level_focal},
     field::{Field, Surface},
     march::{SeaShader, SeaShaderInput},
     motion::Motion,
@@ -60,7 +60,7 @@ impl Studio {
         let dome = Dome::new(&sky);
         let input = SeaShaderInput {
             eye_height: recipe.eye_height_m as f32,
-            focal,
+            focal: level_focal(&recipe.lens()),
             steepest: coverage.below,
             visibility_m: recipe.visibility_m as f32,
             slopes: cox_munk(wind),

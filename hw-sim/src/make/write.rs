@@ -26,7 +26,7 @@ pub const START: Time = Time::from_ns(100_000_000_000);
 pub const DEVICE_LOOP_KEY: &str = "device_loop_ns";
 
 /// Frames drawn at once before they are written.
-const BATCH: u32 = 24;
+const BATCH: u32 = 48;
 
 /// What was made.
 #[derive(Clone, Debug, PartialEq, Eq)]
