@@ -1,0 +1,91 @@
+//! What the importers are told and what they tell.
+
+use std::path::PathBuf;
+
+use bowwave_calibration::{CalibrationFile, Date};
+
+use crate::Bias;
+
+/// What an import is told.
+#[derive(Clone, Debug)]
+pub struct ImportOptions {
+    /// The camera's calibration. Without it an undistorted lens of [`ImportOptions::assumed_hfov_deg`] is assumed.
+    pub calibration: Option<CalibrationFile>,
+    /// Horizontal field of view to assume where there is no calibration, degrees.
+    pub assumed_hfov_deg: f64,
+    /// Take the gyro's bias from so many seconds at the start of the video, in place of the calibration's.
+    pub bias_from_s: Option<f64>,
+    /// Leave the video's gyro out.
+    pub without_gyro: bool,
+    /// Replace a recording of that name.
+    pub replace: bool,
+    /// Today, for what is measured during the import.
+    pub today: Date,
+    /// The `ffmpeg` program; `ffprobe` is looked for beside it.
+    pub ffmpeg: PathBuf,
+}
+
+impl ImportOptions {
+    /// No calibration, 60 degrees assumed, the gyro as it comes, nothing replaced, `ffmpeg` from the search path.
+    pub fn new(today: Date) -> Self {
+        Self {
+            calibration: None,
+            assumed_hfov_deg: 60.0,
+            bias_from_s: None,
+            without_gyro: false,
+            replace: false,
+            today,
+            ffmpeg: PathBuf::from("ffmpeg"),
+        }
+    }
+}
+
+/// How far an import is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Pictures written.
+    pub frames: u64,
+    /// Pictures expected, where that is known.
+    pub frames_total: Option<u64>,
+}
+
+/// What became of the video's gyro.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TelemetryReport {
+    /// Pictures have none.
+    None,
+    /// The video has no gyro track that can be read.
+    Absent,
+    /// There may be one, but it was not wanted.
+    LeftOut,
+    /// It is in the recording.
+    Used {
+        /// What the camera calls itself; may be empty.
+        camera: String,
+        /// Gyro samples a second by the camera's clock.
+        rate_hz: f64,
+        /// The bias that was taken from the start of the video, where that was wanted.
+        bias: Option<Bias>,
+    },
+}
+
+/// What an import made.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImportReport {
+    /// The recording.
+    pub path: PathBuf,
+    /// Pictures in it.
+    pub frames: u64,
+    /// Samples of the inertial unit in it.
+    pub imu_samples: u64,
+    /// From the first entry to the last, nanoseconds.
+    pub duration_ns: i64,
+    /// Size of the file in bytes.
+    pub bytes: u64,
+    /// Width and height of the pictures.
+    pub picture: (u32, u32),
+    /// What became of the video's gyro.
+    pub telemetry: TelemetryReport,
+    /// What the video's reader complained of without stopping.
+    pub warnings: Vec<String>,
+}

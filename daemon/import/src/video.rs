@@ -1,0 +1,200 @@
+//! A recording from a video, with its gyro where it has one.
+
+use std::{collections::BTreeMap, fs::File, ops::ControlFlow, path::Path, sync::Arc};
+
+use bowwave_core::{event::ImuSample, time::Time};
+use bowwave_record::{Entry, FrameEntry};
+
+use crate::{
+    Bias, ImportError, ImportOptions, ImportReport, Progress, START, Telemetry, TelemetryReport, bias,
+    ffmpeg::{VideoFrame, VideoInfo, VideoReader, probe},
+    output::{Output, calibration_for, properties, refuse_existing, set_bias},
+    pictures::jpeg_size,
+    sight::{self, Watch},
+    telemetry::read_telemetry,
+    track::Gray,
+};
+
+/// Makes the recording `out` from a video: its pictures with the times that the container gives them, and the samples of
+/// the gyro that the camera put into it. `progress` is called after each picture and may stop the import.
+pub fn import_video(
+    video: &Path,
+    out: &Path,
+    options: &ImportOptions,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<ImportReport, ImportError> {
+    refuse_existing(out, options.replace)?;
+    // The system's own reason is better than what a program makes of it.
+    File::open(video).map_err(|source| ImportError::Read { path: video.to_owned(), source })?;
+    let info = probe(&options.ffmpeg, video)?;
+    let gyro = Gyro::read(video, options)?;
+    let mut reader = VideoReader::start(&options.ffmpeg, video, None)?;
+    let Some(first) = reader.next_frame()? else {
+        reader.finish()?;
+        return Err(ImportError::NoFrames { path: video.to_owned(), what: "the track is empty".to_owned() });
+    };
+    let mut import = Import::begin(video, out, options, info, &gyro, first)?;
+    loop {
+        if progress(Progress { frames: import.frames.into(), frames_total: info.frames }).is_break() {
+            return Err(ImportError::Stopped);
+        }
+        let Some(frame) = reader.next_frame()? else { break };
+        import.add(&frame)?;
+    }
+    let mut warnings = reader.finish()?;
+    if gyro.telemetry.is_some() && options.calibration.is_none() {
+        warnings.push(
+            "without a calibration nobody knows how the gyro is turned; its axes are taken for the camera's"
+                .to_owned(),
+        );
+    }
+    import.finish(&gyro, warnings)
+}
+
+/// The video's gyro and what became of it.
+struct Gyro {
+    telemetry: Option<Telemetry>,
+    bias: Option<Bias>,
+    report: TelemetryReport,
+}
+
+impl Gyro {
+    fn read(video: &Path, options: &ImportOptions) -> Result<Self, ImportError> {
+        if options.without_gyro {
+            return Ok(Self { telemetry: None, bias: None, report: TelemetryReport::LeftOut });
+        }
+        let Some(telemetry) = read_telemetry(video)? else {
+            return Ok(Self { telemetry: None, bias: None, report: TelemetryReport::Absent });
+        };
+        let bias =
+            options.bias_from_s.map(|s| find_bias(video, &telemetry.samples, s, options)).transpose()?;
+        let report =
+            TelemetryReport::Used { camera: telemetry.camera.clone(), rate_hz: telemetry.rate_hz, bias };
+        Ok(Self { telemetry: Some(telemetry), bias, report })
+    }
+
+    fn samples(&self) -> &[ImuSample] {
+        self.telemetry.as_ref().map_or(&[], |t| t.samples.as_slice())
+    }
+}
+
+/// The bias from the first seconds: against the pictures where there is a calibration to look at them with and something in
+/// them to hold on to, else from rest.
+fn find_bias(
+    video: &Path,
+    samples: &[ImuSample],
+    seconds: f64,
+    options: &ImportOptions,
+) -> Result<Bias, ImportError> {
+    let rest = bias::at_rest(samples, seconds);
+    let Some(file) = &options.calibration else { return rest };
+    if let Err(ImportError::Bias { what, .. }) = &rest {
+        log::debug!("no bias from rest: {what}");
+    }
+    if !(2.0..=60.0).contains(&seconds) {
+        return rest;
+    }
+    let mut watch = Watch::new();
+    let mut reader = VideoReader::start(&options.ffmpeg, video, Some(seconds))?;
+    while let Some(frame) = reader.next_frame()? {
+        let unreadable =
+            |e: image::ImageError| ImportError::NoFrames { path: video.to_owned(), what: e.to_string() };
+        let gray = Gray::from_jpeg(&frame.jpeg).map_err(unreadable)?;
+        let lens = &file.calibration.lens;
+        let picture = (gray.width() as u32, gray.height() as u32);
+        if (lens.width, lens.height) != picture {
+            return Err(ImportError::CalibrationSize { calibration: (lens.width, lens.height), picture });
+        }
+        watch.see(START.plus_ns(frame.time_ns), &gray);
+    }
+    reader.finish()?;
+    match sight::bias(samples, &file.calibration, &watch.finish()) {
+        Some(bias) => Ok(bias),
+        None => rest,
+    }
+}
+
+/// An import under way.
+struct Import<'a> {
+    output: Output,
+    /// Samples that are not yet written.
+    samples: &'a [ImuSample],
+    picture: (u32, u32),
+    interval_ns: i64,
+    frames: u32,
+}
+
+impl<'a> Import<'a> {
+    fn begin(
+        video: &Path,
+        out: &Path,
+        options: &ImportOptions,
+        info: VideoInfo,
+        gyro: &'a Gyro,
+        first: VideoFrame,
+    ) -> Result<Self, ImportError> {
+        let jpeg: Arc<[u8]> = first.jpeg.as_slice().into();
+        let picture = jpeg_size(&jpeg).ok_or_else(|| ImportError::NoFrames {
+            path: video.to_owned(),
+            what: "the first one is broken".to_owned(),
+        })?;
+        let mut file = calibration_for(picture, options)?;
+        let mut extra = BTreeMap::new();
+        if let Some(telemetry) = &gyro.telemetry {
+            extra.insert("camera".to_owned(), telemetry.camera.clone());
+            extra.insert("gyro_rate_hz".to_owned(), telemetry.rate_hz.to_string());
+        }
+        if let Some(bias) = &gyro.bias {
+            set_bias(&mut file, bias, options);
+        }
+        let samples = gyro.samples();
+        let start = samples.first().map_or(START, |s| s.arrival.min(START));
+        let source = format!("video {}", video.display());
+        let output = Output::create(out, options.replace, &properties(&file, start, source, picture, extra))?;
+        let mut import = Self { output, samples, picture, interval_ns: info.interval_ns, frames: 0 };
+        import.add(&first)?;
+        Ok(import)
+    }
+
+    fn add(&mut self, frame: &VideoFrame) -> Result<(), ImportError> {
+        let mid_exposure = START.plus_ns(frame.time_ns);
+        // A camera hands a picture over about when it begins the next.
+        let arrival = mid_exposure.plus_ns(self.interval_ns);
+        self.write_samples_before(arrival)?;
+        let jpeg = frame.jpeg.as_slice().into();
+        self.output.write(&Entry::Frame(FrameEntry {
+            arrival,
+            mid_exposure,
+            sequence: self.frames,
+            jpeg,
+        }))?;
+        self.frames = self.frames.wrapping_add(1);
+        Ok(())
+    }
+
+    fn write_samples_before(&mut self, time: Time) -> Result<(), ImportError> {
+        let count = self.samples.partition_point(|s| s.arrival < time);
+        let (now, later) = self.samples.split_at(count);
+        for sample in now {
+            self.output.write(&Entry::Imu(*sample))?;
+        }
+        self.samples = later;
+        Ok(())
+    }
+
+    fn finish(mut self, gyro: &Gyro, warnings: Vec<String>) -> Result<ImportReport, ImportError> {
+        // What came after the last picture is of no use, but for the few samples that its pose needs.
+        let written = self.output.finish()?;
+        self.samples = &[];
+        Ok(ImportReport {
+            path: written.path,
+            frames: self.frames.into(),
+            imu_samples: written.counts.imu,
+            duration_ns: written.duration_ns,
+            bytes: written.bytes,
+            picture: self.picture,
+            telemetry: gyro.report.clone(),
+            warnings,
+        })
+    }
+}
