@@ -161,10 +161,10 @@ pub struct RoundBlock {
     pub half_width: [f32; 2],
     /// What it is: one of the `ROUND_` constants.
     pub kind: u32,
-    /// How many of the frame's hull rectangles may hide it.
-    pub hull_rects: u32,
+    /// Tells one from another: no two splashes are torn alike.
+    pub seed: f32,
 }
-layout!(RoundBlock, 64, from = 0, to = 16, colour = 32, half_width = 48, kind = 56, hull_rects = 60);
+layout!(RoundBlock, 64, from = 0, to = 16, colour = 32, half_width = 48, kind = 56, seed = 60);
 
 /// [`RoundBlock::kind`]: the streak of a tracer.
 pub const ROUND_TRACER: u32 = 0;

@@ -35,7 +35,7 @@ macro_rules! shaders {
 shaders! {
     /// A triangle that covers the screen.
     SCREEN_VERT = "screen.vert";
-    /// Camera bytes to sRGB codes. Constants: 0 format (0 YUYV, 1 NV12, 2 RGB), 1 scaled.
+    /// Camera bytes to packed sRGB codes. Constants: 0 format (0 YUYV, 1 NV12, 2 RGB), 1 scaled, 2 pixels a fragment.
     VIDEO_FRAG = "video.frag";
     /// A boat's corner to clip space.
     BOAT_VERT = "boat.vert";
@@ -45,6 +45,14 @@ shaders! {
     RECT_VERT = "rect.vert";
     /// The boats' layer, averaged. Constant: 0 samples.
     COMPOSITE_FRAG = "composite.frag";
+    /// A boat's light on the sea. Constants: 0 method (0 none, 1 mirror, 2 as printed, 3 mended), 1 shadow level.
+    WATER_FRAG = "water.frag";
+    /// The rectangle of a tracer, splash or strike.
+    ROUND_VERT = "round.vert";
+    /// A tracer, splash or strike.
+    ROUND_FRAG = "round.frag";
+    /// The same where a hull may stand before it: compares depth.
+    ROUND_HIDDEN_FRAG = "round_hidden.frag";
     /// A rectangle of the head-up display.
     HUD_VERT = "hud.vert";
     /// A glyph or shape of the head-up display.

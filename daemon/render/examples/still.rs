@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         device: None,
         validation: std::env::var_os("VALIDATE").is_some(),
         frames_in_flight: 2,
-        needs: Needs { boats_max: 4, ..Needs::default() },
+        needs: Needs { boats_max: 4, rounds_max: 8, waters: vec![(method, ShadowLevel::Gradual)] },
         picture: None,
     };
     let (mut renderer, mut completions) = Renderer::new(&config, &models)?;

@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use bowwave_core::scene::{Hud, Status};
+use bowwave_core::scene::{Hud, PixelRect, Status};
 use shaders_spirv::interface::{
     HudQuad, SHAPE_CROSS, SHAPE_DISC, SHAPE_GLYPH, SHAPE_PLATE, SHAPE_RING, SHAPE_SQUARE, SHAPE_TRIANGLE,
 };
@@ -76,6 +76,22 @@ impl HudLayout {
         self.status(glyphs, &hud.status);
         self.counts(glyphs, hud);
         &self.quads
+    }
+
+    /// The whole pixels that the quads laid out last cover: everything stands on a plate.
+    pub(crate) fn plates(&self) -> impl Iterator<Item = PixelRect> {
+        let (width, height) = (self.size.0 as f32, self.size.1 as f32);
+        self.quads.iter().filter(|q| q.shape == SHAPE_PLATE).filter_map(move |q| {
+            let [x0, y0, x1, y1] = q.rect;
+            let (x0, y0) = (x0.floor().clamp(0.0, width), y0.floor().clamp(0.0, height));
+            let (x1, y1) = (x1.ceil().clamp(0.0, width), y1.ceil().clamp(0.0, height));
+            (x0 < x1 && y0 < y1).then(|| PixelRect {
+                x: x0 as u32,
+                y: y0 as u32,
+                width: (x1 - x0) as u32,
+                height: (y1 - y0) as u32,
+            })
+        })
     }
 
     fn training(&mut self, glyphs: &Glyphs) {

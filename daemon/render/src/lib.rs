@@ -4,6 +4,8 @@
 //! of a few frames; nobody waits for the GPU within a frame. Light is linear inside, sRGB at the edges: the screen image is
 //! seen as codes by the video pass and as linear light by everything that blends.
 
+mod atlas;
+mod canvas;
 mod error;
 mod frame_data;
 mod glyphs;
@@ -13,12 +15,15 @@ mod memory;
 mod meshes;
 mod passes;
 mod pipeline;
+mod plan;
 mod renderer;
 mod ring;
+mod rounds;
 #[cfg(test)]
 mod testing;
 mod upload;
 mod view;
+mod water;
 
 pub use error::RenderError;
 pub use gpu::{DeviceInfo, devices};

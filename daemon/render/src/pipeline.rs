@@ -9,6 +9,7 @@ use shaders_spirv::Shader;
 use crate::{
     error::{Named, RenderError},
     gpu::Gpu,
+    memory::{Buffer, Image},
 };
 
 /// Format of the screen image as blending and sampling see it: codes in memory, linear light in the shader.
@@ -400,22 +401,35 @@ pub(crate) fn disjoint(rects: impl Iterator<Item = PixelRect>, pieces: &mut Vec<
         let first = pieces.len();
         pieces.push(r);
         for earlier in 0..first {
-            let cutter = pieces[earlier];
-            let mut i = first;
-            while i < pieces.len() {
-                if overlap(pieces[i], cutter).is_none() {
-                    i += 1;
-                } else {
-                    let whole = pieces.swap_remove(i);
-                    pieces.extend(around(whole, cutter).into_iter().flatten());
-                }
-            }
+            cut_from(pieces[earlier], pieces, first);
+        }
+    }
+}
+
+/// The parts of `whole` that none of `cutters` covers. `rest` keeps its memory.
+pub(crate) fn around_all(whole: PixelRect, cutters: &[PixelRect], rest: &mut Vec<PixelRect>) {
+    rest.clear();
+    rest.push(whole);
+    for cutter in cutters {
+        cut_from(*cutter, rest, 0);
+    }
+}
+
+/// Takes `cutter` out of the pieces from `first` on.
+fn cut_from(cutter: PixelRect, pieces: &mut Vec<PixelRect>, first: usize) {
+    let mut i = first;
+    while i < pieces.len() {
+        if overlap(pieces[i], cutter).is_none() {
+            i += 1;
+        } else {
+            let whole = pieces.swap_remove(i);
+            pieces.extend(around(whole, cutter).into_iter().flatten());
         }
     }
 }
 
 /// The pixels that both hold.
-fn overlap(a: PixelRect, b: PixelRect) -> Option<PixelRect> {
+pub(crate) fn overlap(a: PixelRect, b: PixelRect) -> Option<PixelRect> {
     let (x, y) = (a.x.max(b.x), a.y.max(b.y));
     let (right, lower) = ((a.x + a.width).min(b.x + b.width), (a.y + a.height).min(b.y + b.height));
     (x < right && y < lower).then(|| PixelRect { x, y, width: right - x, height: lower - y })
@@ -475,7 +489,7 @@ impl Begin {
 /// One step of an image from one use to the next.
 #[derive(Clone, Copy)]
 pub(crate) struct Step<'a> {
-    pub(crate) image: &'a crate::memory::Image,
+    pub(crate) image: &'a Image,
     pub(crate) from: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
     pub(crate) to: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
 }
@@ -547,6 +561,41 @@ impl Recorder<'_> {
             // SAFETY: a rendering with a colour and a depth attachment was begun; the rectangle lies in its area.
             unsafe { self.gpu.device.cmd_clear_attachments(self.cmd, &what, &areas) };
         }
+    }
+
+    /// Copies parts of a buffer to an image.
+    pub(crate) fn copy_to_image(&self, from: &Buffer, image: &Image, regions: &[vk::BufferImageCopy]) {
+        let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        // SAFETY: both are live and the regions lie within them; the image is in this layout.
+        unsafe { self.gpu.device.cmd_copy_buffer_to_image(self.cmd, from.raw, image.raw, layout, regions) };
+    }
+
+    /// Copies parts of an image to a buffer.
+    pub(crate) fn copy_from_image(&self, image: &Image, buffer: &Buffer, regions: &[vk::BufferImageCopy]) {
+        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        // SAFETY: both are live and the regions lie within them; the image is in this layout.
+        unsafe { self.gpu.device.cmd_copy_image_to_buffer(self.cmd, image.raw, layout, buffer.raw, regions) };
+    }
+
+    /// Makes what was copied to or from the buffer, with `was`, come before what `stage` does with `access`.
+    pub(crate) fn copied(
+        &self,
+        buffer: &Buffer,
+        was: vk::AccessFlags2,
+        (stage, access): (vk::PipelineStageFlags2, vk::AccessFlags2),
+    ) {
+        let barriers = [vk::BufferMemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::COPY)
+            .src_access_mask(was)
+            .dst_stage_mask(stage)
+            .dst_access_mask(access)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .buffer(buffer.raw)
+            .size(vk::WHOLE_SIZE)];
+        let info = vk::DependencyInfo::default().buffer_memory_barriers(&barriers);
+        // SAFETY: the command buffer is being recorded, outside of a rendering; the buffer is live.
+        unsafe { self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info) };
     }
 
     /// Ends drawing.

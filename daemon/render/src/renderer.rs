@@ -5,24 +5,28 @@ use std::sync::Arc;
 use ash::vk;
 use bowwave_core::{
     event::Picture,
-    model::{Model, ModelKind},
-    scene::{Pass, PixelRect, ReflectionMethod, Scene, ShadowLevel},
+    model::Model,
+    scene::{Pass, ReflectionMethod, Scene, ShadowLevel, Water},
 };
-use shaders_spirv::interface::BoatBlock;
 
 use crate::{
+    canvas::Canvas,
     error::{Named, RenderError},
     frame_data::{Capacity, FrameData, frame_set_layout},
     gpu::{DeviceInfo, Gpu},
-    memory::{Image, ImageShape},
+    memory::Buffer,
     meshes::Meshes,
     passes::{
-        COPIED_FROM, DRAWN, Making,
-        boats::{BoatDraw, BoatsPass},
+        Making,
+        boats::BoatsPass,
         hud::HudPass,
+        mirror::MirrorPass,
+        rounds::RoundsPass,
         video::{PictureShape, VideoPass},
+        water::WaterPass,
     },
-    pipeline::{Begin, Recorder, SRGB, SetLayout, SetPool, Step, UNORM, cut, disjoint},
+    pipeline::{Recorder, SetLayout, SetPool, Step},
+    plan::{Outline, Plan, with_gradients},
     ring::{Completions, FRAME_QUERY, QUERIES, SLOTS_MAX, Shared, Span},
     view,
 };
@@ -68,29 +72,49 @@ struct Slot {
     data: FrameData,
 }
 
-/// What a frame is made of, kept from frame to frame for its memory.
-#[derive(Default)]
-struct Scratch {
-    blocks: Vec<BoatBlock>,
-    boats: Vec<BoatDraw>,
-    pieces: Vec<PixelRect>,
-}
-
 /// Draws frames. Belongs to one thread; finished frames come out of [`Completions`], usually on another.
 pub struct Renderer {
     gpu: Arc<Gpu>,
     shared: Arc<Shared>,
     needs: Needs,
-    kinds: Vec<ModelKind>,
+    models: Vec<Outline>,
     slots: Vec<Slot>,
-    target: Image,
-    meshes: Meshes,
-    video: VideoPass,
-    boats: Option<BoatsPass>,
-    hud: HudPass,
-    scratch: Scratch,
+    canvas: Canvas,
+    passes: Passes,
+    plan: Plan,
     _frame_set: SetLayout,
     _sets: SetPool,
+}
+
+/// The passes that can ever be needed, in the order in which they run.
+struct Passes {
+    video: VideoPass,
+    meshes: Meshes,
+    mirror: Option<MirrorPass>,
+    water: Option<WaterPass>,
+    boats: Option<BoatsPass>,
+    rounds: Option<RoundsPass>,
+    hud: HudPass,
+}
+
+impl Passes {
+    fn new(making: &Making<'_>, config: &RenderConfig, models: &[Model]) -> Result<Self, RenderError> {
+        let needs = &config.needs;
+        let any_boat = needs.boats_max > 0;
+        let textured = models.iter().any(|m| m.texture.is_some());
+        let meshes = Meshes::new(making, if any_boat { models } else { &[] })?;
+        let reflects = needs.waters.iter().any(|(method, _)| *method != ReflectionMethod::Off);
+        let mirror =
+            (any_boat && reflects).then(|| MirrorPass::new(making, &meshes, textured)).transpose()?;
+        let water = (any_boat && !needs.waters.is_empty())
+            .then(|| WaterPass::new(making, mirror.as_ref(), &needs.waters))
+            .transpose()?;
+        let boats = any_boat.then(|| BoatsPass::new(making, &meshes, textured)).transpose()?;
+        let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(making, boats.as_ref())).transpose()?;
+        let video = VideoPass::new(making, config.picture)?;
+        let hud = HudPass::new(making)?;
+        Ok(Self { video, meshes, mirror, water, boats, rounds, hud })
+    }
 }
 
 impl Renderer {
@@ -108,44 +132,27 @@ impl Renderer {
         let sets = SetPool::new(&gpu, u32::try_from(count + textured + 8).unwrap_or(u32::MAX), 4)?;
         let frame_set = frame_set_layout(&gpu)?;
         let making = Making { gpu: &gpu, frame_set: &frame_set, pool: &sets, size, slots: count };
+        let canvas = Canvas::new(&making)?;
+        let passes = Passes::new(&making, config, models)?;
         let needs = config.needs.clone();
-        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
-        let shape = ImageShape { second: Some(SRGB), ..ImageShape::new(size, UNORM, usage) };
-        let target = Image::new(&gpu, "screen", shape)?;
-        let drawn_models = if needs.boats_max > 0 { models } else { &[] };
-        let meshes = Meshes::new(&making, drawn_models)?;
-        let boats = match needs.boats_max {
-            0 => None,
-            _ => Some(BoatsPass::new(&making, &meshes, textured > 0)?),
-        };
-        let video = VideoPass::new(&making, config.picture)?;
-        let hud = HudPass::new(&making)?;
         let capacity = Capacity { boats: needs.boats_max, rounds: needs.rounds_max };
-        let scratch = Scratch {
-            blocks: Vec::with_capacity(needs.boats_max * 2),
-            boats: Vec::with_capacity(needs.boats_max),
-            pieces: Vec::with_capacity(needs.boats_max * 8),
-        };
-        let mut renderer = Self {
-            gpu: gpu.clone(),
+        let mut slots = Vec::with_capacity(count);
+        for _ in 0..count {
+            let data = FrameData::new(&gpu, &sets, &frame_set, capacity)?;
+            slots.push(Slot::new(&gpu, data)?);
+        }
+        let renderer = Self {
+            gpu,
             shared: shared.clone(),
-            kinds: models.iter().map(|m| m.kind).collect(),
-            slots: Vec::with_capacity(count),
-            target,
-            meshes,
-            video,
-            boats,
-            hud,
-            scratch,
+            models: models.iter().map(Outline::of).collect(),
+            slots,
+            canvas,
+            passes,
+            plan: Plan::with_capacity(capacity),
             needs,
             _frame_set: frame_set,
             _sets: sets,
         };
-        for _ in 0..count {
-            let data = FrameData::new(&gpu, &renderer._sets, &renderer._frame_set, capacity)?;
-            let slot = Slot::new(&gpu, data)?;
-            renderer.slots.push(slot);
-        }
         Ok((renderer, Completions::new(shared)))
     }
 
@@ -174,11 +181,11 @@ impl Renderer {
     ) -> Result<bool, RenderError> {
         self.check(scene)?;
         let (index, waited) = self.shared.acquire()?;
-        if picture_is_new || !self.video.has_picture() {
-            self.video.take(picture)?;
+        if picture_is_new || !self.passes.video.has_picture() {
+            self.passes.video.take(picture)?;
         }
-        let plan = self.prepare(index, scene);
-        let cmd = self.record(index, &plan)?;
+        self.prepare(index, scene);
+        let cmd = self.record(index, scene.water)?;
         let value = self.shared.next_value();
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
         let signals = [vk::SemaphoreSubmitInfo::default()
@@ -200,38 +207,46 @@ impl Renderer {
         if (scene.lens.width, scene.lens.height) != (width, height) {
             return Err(RenderError::NotPrepared { what: "a lens of another screen size" });
         }
-        if scene.runs(Pass::Boats) && scene.boats.len() > self.needs.boats_max {
-            return Err(RenderError::NotPrepared { what: "more boats" });
+        let missing = |what| Err(RenderError::NotPrepared { what });
+        if scene.boats.len() > self.needs.boats_max {
+            return missing("more boats");
+        }
+        if scene.rounds.len() > self.needs.rounds_max {
+            return missing("more tracers and splashes");
+        }
+        let water = &self.passes.water;
+        if scene.runs(Pass::Water) && water.as_ref().is_none_or(|w| !w.has(scene.water)) {
+            return missing("another way to mirror");
         }
         Ok(())
     }
 
-    /// Writes the slot's data; the GPU no longer reads it.
-    fn prepare(&mut self, index: usize, scene: &Scene) -> Plan {
+    /// Decides what is drawn and writes the slot's data; the GPU no longer reads it.
+    fn prepare(&mut self, index: usize, scene: &Scene) {
+        let Some(slot) = self.slots.get_mut(index) else { return };
         let size = self.shared.size;
-        let Scratch { blocks, boats, pieces } = &mut self.scratch;
-        blocks.clear();
-        boats.clear();
-        for boat in &scene.boats {
-            let Some(kind) = self.kinds.get(usize::from(boat.model.0)) else { continue };
-            let pose = view::drawn_pose(&scene.camera, boat, *kind);
-            if let Some(rect) = boat.hull.and_then(|r| cut(r, size))
-                && scene.runs(Pass::Boats)
-            {
-                boats.push(BoatDraw { model: boat.model, index: blocks.len() as u32, rect });
-                blocks.push(view::boat_block(scene, boat, &pose, false));
-            }
-        }
-        disjoint(boats.iter().map(|b| b.rect), pieces);
-        let Some(slot) = self.slots.get_mut(index) else { return Plan::default() };
+        self.plan.make(scene, &self.models, size, MirrorPass::layer_size(size));
+        let plan = &mut self.plan;
         slot.data.write_frame(&view::frame_block(scene));
-        slot.data.write_boats(blocks);
-        let quads = self.hud.prepare(&mut slot.data, &scene.hud);
-        Plan { quads }
+        slot.data.write_boats(&plan.boat_blocks);
+        slot.data.write_waters(&plan.water_blocks);
+        slot.data.write_rounds(&plan.round_blocks);
+        plan.quads = 0;
+        if scene.runs(Pass::Hud) {
+            plan.quads = self.passes.hud.prepare(&mut slot.data, &scene.hud);
+            plan.rects.extend(self.passes.hud.rects());
+        }
+        plan.regions.clear();
+        plan.regions.extend(plan.rects.iter().map(|r| self.canvas.region(*r)));
+        plan.backdrop_regions.clear();
+        if WaterPass::reads_video(scene.water.method) {
+            let below = plan.waters.iter().map(|w| with_gradients(w.rect, size));
+            plan.backdrop_regions.extend(below.map(|r| self.canvas.region(r)));
+        }
     }
 
     /// Records the frame.
-    fn record(&self, index: usize, plan: &Plan) -> Result<vk::CommandBuffer, RenderError> {
+    fn record(&self, index: usize, water: Water) -> Result<vk::CommandBuffer, RenderError> {
         let device = &self.gpu.device;
         let (slot, out) = (&self.slots[index], &self.shared.slots[index]);
         let to = Recorder { gpu: &self.gpu, cmd: slot.cmd };
@@ -246,81 +261,95 @@ impl Renderer {
             device.cmd_reset_query_pool(slot.cmd, out.queries, 0, QUERIES);
         }
         stamps.write(FRAME_QUERY);
-        self.record_passes(to, &stamps, slot.data.set, plan);
-        self.record_download(to, out.download.raw);
+        self.record_layers(to, &stamps, slot.data.set, &out.download);
+        if !self.plan.rects.is_empty() {
+            self.record_blends(to, &stamps, slot.data.set, &out.download, water);
+        }
+        let host = (vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
+        to.copied(&out.download, vk::AccessFlags2::TRANSFER_WRITE, host);
         stamps.write(FRAME_QUERY + 1);
         // SAFETY: recording was begun above.
         unsafe { device.end_command_buffer(slot.cmd) }.named("vkEndCommandBuffer")?;
         Ok(slot.cmd)
     }
 
-    /// The passes. What does not depend on the video is drawn before the first barrier, everything that blends onto the screen
-    /// in one rendering after it.
-    fn record_passes(&self, to: Recorder<'_>, stamps: &Stamps<'_>, frame: vk::DescriptorSet, plan: &Plan) {
-        let boats = self.boats.as_ref().filter(|_| !self.scratch.boats.is_empty());
-        let after_copy = (COPIED_FROM.0, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
+    /// What does not depend on what is on the screen: the video, the mirrored boats, the boats.
+    fn record_layers(
+        &self,
+        to: Recorder<'_>,
+        stamps: &Stamps<'_>,
+        frame: vk::DescriptorSet,
+        screen: &Buffer,
+    ) {
+        let Passes { video, meshes, .. } = &self.passes;
+        let plan = &self.plan;
+        let mirror = self.passes.mirror.as_ref().filter(|_| !plan.mirrors.is_empty());
+        let boats = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty());
         let mut steps = Steps::default();
-        steps.add(Step { image: &self.target, from: after_copy, to: DRAWN });
-        boats.iter().flat_map(|b| b.before()).for_each(|s| steps.add(s));
+        steps.add([video.before()]);
+        steps.add(mirror.iter().flat_map(|m| m.before()));
+        steps.add(boats.iter().flat_map(|b| b.before()));
         steps.record(to);
-        stamps.around(Span::Video, || self.video.record(to, self.target.view));
+        stamps.around(Span::Video, || video.record(to));
+        if let Some(pass) = mirror {
+            stamps.around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.places));
+        }
+        if let Some(pass) = boats {
+            stamps.around(Span::BoatLayer, || pass.record_layer(to, frame, meshes, &plan.boats));
+        }
         let mut steps = Steps::default();
-        steps.add(Step { image: &self.target, from: DRAWN, to: DRAWN });
-        if let Some(pass) = boats {
-            stamps
-                .around(Span::BoatLayer, || pass.record_layer(to, frame, &self.meshes, &self.scratch.boats));
-            steps.add(pass.between());
-        }
+        steps.add([video.between()]);
+        steps.add(mirror.map(MirrorPass::between));
+        steps.add(boats.iter().flat_map(|b| b.between()));
         steps.record(to);
-        let (width, height) = self.shared.size;
-        let area = PixelRect { x: 0, y: 0, width, height };
-        to.begin(area, (self.target.second_view, Begin::Keep), None);
-        to.window([0.0, 0.0, width as f32, height as f32], area);
-        if let Some(pass) = boats {
-            stamps.around(Span::Composite, || pass.record_composite(to, frame, &self.scratch.pieces));
-        }
-        stamps.around(Span::Hud, || self.hud.record(to, frame, plan.quads));
-        to.end();
+        stamps.around(Span::VideoCopy, || video.record_copy(to, screen));
     }
 
-    /// The screen into the slot's buffer.
-    fn record_download(&self, to: Recorder<'_>, buffer: vk::Buffer) {
-        to.barrier([Step { image: &self.target, from: DRAWN, to: COPIED_FROM }]);
-        let subresource = vk::ImageSubresourceLayers {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            mip_level: 0,
-            base_array_layer: 0,
-            layer_count: 1,
-        };
-        let (width, height) = self.shared.size;
-        let region = vk::BufferImageCopy {
-            image_subresource: subresource,
-            image_extent: vk::Extent3D { width, height, depth: 1 },
-            ..vk::BufferImageCopy::default()
-        };
-        let host = [vk::MemoryBarrier2::default()
-            .src_stage_mask(COPIED_TO_HOST.0)
-            .src_access_mask(COPIED_TO_HOST.1)
-            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
-            .dst_access_mask(vk::AccessFlags2::HOST_READ)];
-        let info = vk::DependencyInfo::default().memory_barriers(&host);
-        // SAFETY: the buffer has room for the whole screen; its reader has given it back.
-        unsafe {
-            self.gpu.device.cmd_copy_image_to_buffer(
-                to.cmd,
-                self.target.raw,
-                COPIED_FROM.2,
-                buffer,
-                &[region],
-            );
-            self.gpu.device.cmd_pipeline_barrier2(to.cmd, &info);
+    /// What blends onto the screen, in one rendering.
+    fn record_blends(
+        &self,
+        to: Recorder<'_>,
+        stamps: &Stamps<'_>,
+        frame: vk::DescriptorSet,
+        screen: &Buffer,
+        how: Water,
+    ) {
+        let plan = &self.plan;
+        let water = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty());
+        let written = vk::AccessFlags2::TRANSFER_WRITE;
+        let copies = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_READ | written);
+        to.copied(screen, written, copies);
+        let mut steps = Steps::default();
+        steps.add([self.canvas.before()]);
+        steps.add(water.map(WaterPass::before));
+        steps.record(to);
+        self.canvas.record_in(to, screen, &plan.regions);
+        if let Some(pass) = water.filter(|_| !plan.backdrop_regions.is_empty()) {
+            to.copy_to_image(screen, &pass.backdrop, &plan.backdrop_regions);
         }
+        let mut steps = Steps::default();
+        steps.add([self.canvas.between()]);
+        steps.add(water.map(WaterPass::between));
+        steps.record(to);
+        if !self.canvas.begin(to, &plan.rects) {
+            return;
+        }
+        if let Some(pass) = water {
+            stamps.around(Span::Water, || pass.record(to, frame, how, &plan.waters));
+        }
+        if let Some(pass) = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty()) {
+            stamps.around(Span::Composite, || pass.record_composite(to, frame, &plan.hulls));
+        }
+        if let Some(pass) = self.passes.rounds.as_ref().filter(|_| !plan.rounds.is_empty()) {
+            stamps.around(Span::Rounds, || pass.record(to, frame, &plan.rounds));
+        }
+        if plan.quads > 0 {
+            stamps.around(Span::Hud, || self.passes.hud.record(to, frame, plan.quads));
+        }
+        to.end();
+        self.canvas.record_out(to, screen, &plan.regions);
     }
 }
-
-/// The copy whose result the host reads.
-const COPIED_TO_HOST: (vk::PipelineStageFlags2, vk::AccessFlags2) =
-    (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE);
 
 impl Drop for Renderer {
     fn drop(&mut self) {
@@ -348,12 +377,6 @@ impl Drop for Slot {
         // SAFETY: the renderer waits for the GPU before it lets go of its slots.
         unsafe { self.gpu.device.destroy_command_pool(self.pool, None) };
     }
-}
-
-/// What was decided while the data were written.
-#[derive(Default)]
-struct Plan {
-    quads: u32,
 }
 
 /// Timestamps of one frame.
@@ -387,10 +410,12 @@ struct Steps<'a> {
 }
 
 impl<'a> Steps<'a> {
-    fn add(&mut self, step: Step<'a>) {
-        if let Some(place) = self.steps.get_mut(self.count) {
-            *place = Some(step);
-            self.count += 1;
+    fn add(&mut self, steps: impl IntoIterator<Item = Step<'a>>) {
+        for step in steps {
+            if let Some(place) = self.steps.get_mut(self.count) {
+                *place = Some(step);
+                self.count += 1;
+            }
         }
     }
 

@@ -26,6 +26,7 @@ const STALL_S: u64 = 5;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Span {
     Video,
+    VideoCopy,
     Mirror,
     BoatLayer,
     Water,
@@ -35,13 +36,21 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    const ALL: [Self; 7] =
-        [Self::Video, Self::Mirror, Self::BoatLayer, Self::Water, Self::Composite, Self::Rounds, Self::Hud];
+    const ALL: [Self; 8] = [
+        Self::Video,
+        Self::VideoCopy,
+        Self::Mirror,
+        Self::BoatLayer,
+        Self::Water,
+        Self::Composite,
+        Self::Rounds,
+        Self::Hud,
+    ];
 
     /// The pass whose time it is part of.
     fn pass(self) -> Pass {
         match self {
-            Self::Video => Pass::Video,
+            Self::Video | Self::VideoCopy => Pass::Video,
             Self::Mirror => Pass::Mirror,
             Self::Water => Pass::Water,
             Self::BoatLayer | Self::Composite => Pass::Boats,
@@ -107,7 +116,7 @@ impl Shared {
         };
         for _ in 0..slots.clamp(1, SLOTS_MAX) {
             let bytes = u64::from(size.0) * u64::from(size.1) * 4;
-            let usage = vk::BufferUsageFlags::TRANSFER_DST;
+            let usage = vk::BufferUsageFlags::TRANSFER_DST | vk::BufferUsageFlags::TRANSFER_SRC;
             let download = Buffer::new(gpu, "finished frames", bytes, usage, Access::Download)?;
             let info =
                 vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(QUERIES);

@@ -156,9 +156,17 @@ impl BoatsPass {
         ]
     }
 
-    /// Step of the layer from being drawn to being composited.
-    pub(crate) fn between(&self) -> Step<'_> {
-        Step { image: &self.colour, from: DRAWN, to: SAMPLED }
+    /// Steps of the layer from being drawn to being composited, and of its depth to being compared.
+    pub(crate) fn between(&self) -> [Step<'_>; 2] {
+        [
+            Step { image: &self.colour, from: DRAWN, to: SAMPLED },
+            Step { image: &self.depth, from: DEPTH_TESTED, to: SAMPLED },
+        ]
+    }
+
+    /// Depth of the layer, valid within the hulls' rectangles.
+    pub(crate) fn depth(&self) -> &Image {
+        &self.depth
     }
 
     /// Draws the boats into the layer. Only their rectangles are cleared and drawn to.

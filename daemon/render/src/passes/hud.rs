@@ -78,6 +78,11 @@ impl HudPass {
         u32::try_from(quads.len()).unwrap_or(0)
     }
 
+    /// The pixels that they cover.
+    pub(crate) fn rects(&self) -> impl Iterator<Item = PixelRect> {
+        self.layout.plates()
+    }
+
     /// Draws them, within a rendering to the screen.
     pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, quads: u32) {
         let (width, height) = self.size;

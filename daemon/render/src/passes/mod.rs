@@ -2,7 +2,10 @@
 
 pub(crate) mod boats;
 pub(crate) mod hud;
+pub(crate) mod mirror;
+pub(crate) mod rounds;
 pub(crate) mod video;
+pub(crate) mod water;
 
 use std::sync::Arc;
 

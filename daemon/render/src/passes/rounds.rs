@@ -1,0 +1,138 @@
+//! Tracers, splashes and strikes over the boats: one quad each, cut apart where a hull may stand before it, so that the boats'
+//! depth is read only where this frame wrote it.
+
+use ash::vk;
+use bowwave_core::scene::PixelRect;
+use shaders_spirv::{ROUND_FRAG, ROUND_HIDDEN_FRAG, ROUND_VERT, Shader, interface::DrawBlock};
+
+use crate::{
+    error::RenderError,
+    passes::{Making, SAMPLED, boats::BoatsPass},
+    pipeline::{
+        Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout, around_all, corners,
+        overlap,
+    },
+};
+
+/// A piece of a round's rectangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RoundDraw {
+    /// Index of its block.
+    pub(crate) index: u32,
+    pub(crate) rect: PixelRect,
+    /// Whether a hull may stand before it here.
+    pub(crate) hidden: bool,
+}
+
+/// Cuts one round's rectangle by the pieces that hulls cover. `rest` is for its own use and keeps its memory.
+pub(crate) fn pieces(
+    index: u32,
+    rect: PixelRect,
+    hulls: &[PixelRect],
+    rest: &mut Vec<PixelRect>,
+    draws: &mut Vec<RoundDraw>,
+) {
+    draws.extend(hulls.iter().filter_map(|h| overlap(rect, *h)).map(|rect| RoundDraw {
+        index,
+        rect,
+        hidden: true,
+    }));
+    around_all(rect, hulls, rest);
+    draws.extend(rest.iter().map(|rect| RoundDraw { index, rect: *rect, hidden: false }));
+}
+
+/// What draws where hulls may stand before rounds.
+struct Hidden {
+    pipeline: Pipeline,
+    set: vk::DescriptorSet,
+    _sampler: Sampler,
+    _set_layout: SetLayout,
+}
+
+/// The rounds' pass.
+pub(crate) struct RoundsPass {
+    open: Pipeline,
+    hidden: Option<Hidden>,
+}
+
+impl RoundsPass {
+    /// `boats` is there if there can be any to hide rounds.
+    pub(crate) fn new(making: &Making<'_>, boats: Option<&BoatsPass>) -> Result<Self, RenderError> {
+        let open = pipeline(making, ROUND_FRAG, &[making.frame_set])?;
+        let hidden = boats.map(|boats| Hidden::new(making, boats)).transpose()?;
+        Ok(Self { open, hidden })
+    }
+
+    /// Draws, within a rendering to the screen.
+    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, draws: &[RoundDraw]) {
+        for draw in draws {
+            let pipeline = match self.hidden.as_ref().filter(|_| draw.hidden) {
+                Some(hidden) => {
+                    to.bind(&hidden.pipeline, &[frame, hidden.set]);
+                    &hidden.pipeline
+                }
+                None => {
+                    to.bind(&self.open, &[frame]);
+                    &self.open
+                }
+            };
+            to.scissor(draw.rect);
+            to.push(pipeline, &DrawBlock { rect: corners(draw.rect), index: draw.index });
+            to.draw(4, 1);
+        }
+    }
+}
+
+impl Hidden {
+    fn new(making: &Making<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
+        let sampler = Sampler::new(making.gpu, vk::Filter::NEAREST, false)?;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
+        let set_layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let bound = Bound::Texture { view: boats.depth().view, sampler: sampler.raw, layout: SAMPLED.2 };
+        let set = making.pool.set(&set_layout, &[bound])?;
+        let pipeline = pipeline(making, ROUND_HIDDEN_FRAG, &[making.frame_set, &set_layout])?;
+        Ok(Self { pipeline, set, _sampler: sampler, _set_layout: set_layout })
+    }
+}
+
+fn pipeline(making: &Making<'_>, fragment: Shader, sets: &[&SetLayout]) -> Result<Pipeline, RenderError> {
+    Pipeline::new(
+        making.gpu,
+        &PipelineShape {
+            vertex: ROUND_VERT,
+            fragment,
+            constants: &[],
+            sets,
+            push: size_of::<DrawBlock>(),
+            vertices: None,
+            topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
+            colour: SRGB,
+            blend: Blend::Over,
+            depth: false,
+            samples: vk::SampleCountFlags::TYPE_1,
+        },
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_of_a_round_is_drawn_once_and_reads_depth_only_under_hulls() {
+        let r = |x, y, width, height| PixelRect { x, y, width, height };
+        let round = r(5, 5, 30, 20);
+        let hulls = [r(0, 0, 10, 10), r(20, 8, 10, 30), r(50, 0, 5, 5)];
+        let (mut rest, mut draws) = (Vec::new(), Vec::new());
+        pieces(3, round, &hulls, &mut rest, &mut draws);
+        for y in 0..40 {
+            for x in 0..60 {
+                let holds =
+                    |q: &PixelRect| (q.x..q.x + q.width).contains(&x) && (q.y..q.y + q.height).contains(&y);
+                let at: Vec<_> = draws.iter().filter(|d| holds(&d.rect)).collect();
+                assert_eq!(at.len(), usize::from(holds(&round)), "pixel {x} {y}");
+                assert!(at.iter().all(|d| d.index == 3 && d.hidden == hulls.iter().any(holds)));
+            }
+        }
+    }
+}

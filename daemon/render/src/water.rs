@@ -1,0 +1,281 @@
+//! The numbers of Nelson 2009's Full Reflection shader (eq. 4-8) for one boat in one frame. The thesis gives the formulas but not
+//! their constants; those here were chosen by eye against photographs, for each wind force 0 to 4.
+
+use bowwave_core::{
+    geometry::RigidPose,
+    model::Model,
+    scene::{BoatView, ReflectionMethod, Scene, ShadowLevel},
+};
+use glam::{DVec2, DVec3};
+use shaders_spirv::interface::{HULL_LINE_COLUMNS, WaterBlock};
+
+use crate::atlas::Placed;
+
+/// Highest wind force at which a reflection is seen.
+const FORCE_MAX: usize = 4;
+
+/// k of eq. 6 as printed: pixels over which the reflection fades, by wind force.
+const PRINTED_FADE_PX: [f64; FORCE_MAX + 1] = [500.0, 320.0, 200.0, 120.0, 70.0];
+/// As printed: the sine moves the mirror coordinate by up to this, pixels.
+const PRINTED_SHIFT_PX: [f64; FORCE_MAX + 1] = [4.0, 7.0, 10.0, 13.0, 16.0];
+/// As printed: share of the largest shift beyond which the reflection is discarded.
+const PRINTED_LIMIT: f64 = 0.7;
+/// As printed: brightness below and above which the video passes through.
+const PRINTED_PASSES: (f64, f64) = (0.10, 0.85);
+/// As printed: i and k (pixels) of eq. 7 for levels 1 and 2.
+const PRINTED_SHADOW: [(f64, f64); 2] = [(0.5, 120.0), (0.9, 25.0)];
+
+/// Mended: k of eq. 6 in heights of the boat on the screen, by wind force.
+const FADE_HEIGHTS: [f64; FORCE_MAX + 1] = [2.4, 1.6, 1.15, 0.8, 0.55];
+/// Mended: largest shift in heights of the boat.
+const SHIFT_HEIGHTS: [f64; FORCE_MAX + 1] = [0.03, 0.08, 0.13, 0.18, 0.24];
+/// Mended: step of the box blur in heights of the boat.
+const BLUR_HEIGHTS: [f64; FORCE_MAX + 1] = [0.012, 0.025, 0.04, 0.06, 0.08];
+/// Mended: brightness over which the video begins to pass through, and over which it passes whole; dark, then bright.
+const PASSES: [f64; 4] = [0.02, 0.08, 0.80, 0.95];
+/// Mended: i and k (heights of the boat) of eq. 7 for levels 1 and 2.
+const SHADOW: [(f64, f64); 2] = [(0.35, 0.55), (0.7, 0.16)];
+/// Mended: spread of the nine gradients, in codes 0 to 1, that a camera's noise alone makes.
+const NOISE_SPREAD: f64 = 0.03;
+
+/// Wind speed in the middle of each force, m/s (WMO-No. 306, code table 1100).
+const WIND_M_S: [f64; FORCE_MAX + 1] = [0.1, 0.9, 2.5, 4.4, 6.7];
+/// Refractive index of sea water.
+const SEA_INDEX: f64 = 1.34;
+
+/// Where a boat's hull meets the water, on the screen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct HullLine {
+    /// The point from which it is measured, pixels.
+    anchor: DVec2,
+    /// Unit vector in which gravity pulls at the boat.
+    down: DVec2,
+    /// Across position of the first column, pixels.
+    first: f64,
+    /// Pixels from one column to the next.
+    pitch: f64,
+    /// Pixels below the anchor, column by column.
+    below: [f64; HULL_LINE_COLUMNS],
+    /// Height of the boat above its waterline, pixels.
+    height: f64,
+}
+
+/// Projects the model's outline at the water's level. `None` where too little of it is before the camera.
+pub(crate) fn hull_line(scene: &Scene, boat: &BoatView, pose: &RigidPose, model: &Model) -> Option<HullLine> {
+    let project = |world: DVec3| scene.lens.project(scene.camera.to_camera(world));
+    let at_water = |body: DVec2| pose.to_world(body.extend(0.0)).with_z(boat.water_level);
+    let foot = pose.position.with_z(boat.water_level);
+    let anchor = project(foot)?;
+    let top = project(foot + DVec3::Z * model.height_m().max(0.1))?;
+    let height = (anchor - top).length();
+    let down = (anchor - top).try_normalize()?;
+    let across = DVec2::new(down.y, -down.x);
+    let local = |body: &DVec2| {
+        let p = project(at_water(*body))? - anchor;
+        Some(DVec2::new(p.dot(across), p.dot(down)))
+    };
+    let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
+    for p in model.waterline.iter().filter_map(local) {
+        (first, last) = (first.min(p.x), last.max(p.x));
+    }
+    if !(first.is_finite() && last.is_finite() && height.is_finite()) {
+        return None;
+    }
+    let pitch = ((last - first) / (HULL_LINE_COLUMNS - 1) as f64).max(1e-3);
+    let mut below = [f64::NEG_INFINITY; HULL_LINE_COLUMNS];
+    let ends = model.waterline.iter().zip(model.waterline.iter().cycle().skip(1));
+    for (a, b) in ends {
+        if let (Some(a), Some(b)) = (local(a), local(b)) {
+            lower(
+                &mut below,
+                (a - DVec2::X * first) / DVec2::new(pitch, 1.0),
+                (b - DVec2::X * first) / DVec2::new(pitch, 1.0),
+            );
+        }
+    }
+    // A column that no edge crosses (part of the outline is behind the camera) takes its neighbour's.
+    let known = below.iter().copied().find(|b| b.is_finite())?;
+    let mut before = known;
+    for b in &mut below {
+        *b = if b.is_finite() { *b } else { before };
+        before = *b;
+    }
+    Some(HullLine { anchor, down, first, pitch, below, height })
+}
+
+/// Lowers the columns that the edge from `a` to `b` crosses; x counts columns.
+fn lower(below: &mut [f64; HULL_LINE_COLUMNS], a: DVec2, b: DVec2) {
+    let (left, right) = if a.x <= b.x { (a, b) } else { (b, a) };
+    // Half a thousandth of a column covers what rounding takes off the outermost points.
+    for (column, value) in below.iter_mut().enumerate() {
+        let x = column as f64;
+        if x < left.x - 5e-4 || x > right.x + 5e-4 {
+            continue;
+        }
+        let width = right.x - left.x;
+        let y = if width > 1e-9 {
+            left.y + (right.y - left.y) * ((x - left.x) / width).clamp(0.0, 1.0)
+        } else {
+            left.y.max(right.y)
+        };
+        *value = value.max(y);
+    }
+}
+
+/// Screen pixels between the texels that the mirror layer of a boat needs: what is blurred needs fewer.
+pub(crate) fn mirror_scale(scene: &Scene, line: &HullLine) -> f64 {
+    match scene.water.method {
+        ReflectionMethod::Full => 1.0 / blur_px(scene, line).max(1.0),
+        _ => 1.0,
+    }
+}
+
+fn force(scene: &Scene) -> usize {
+    usize::from(scene.water.force.get()).min(FORCE_MAX)
+}
+
+fn blur_px(scene: &Scene, line: &HullLine) -> f64 {
+    BLUR_HEIGHTS[force(scene)] * line.height
+}
+
+/// The block of one boat whose mirror image lies at `placed`.
+pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, placed: &Placed) -> WaterBlock {
+    let force = force(scene);
+    let height = line.height.max(1.0);
+    let mended = scene.water.method != ReflectionMethod::FullAsPrinted;
+    let shadow_level = match scene.water.shadow {
+        ShadowLevel::None => None,
+        ShadowLevel::Gradual => Some(0),
+        ShadowLevel::Strong => Some(1),
+    };
+    let (shadow, shadow_px) = match (shadow_level, mended) {
+        (None, _) => (0.0, 1.0),
+        (Some(level), true) => (SHADOW[level].0, SHADOW[level].1 * height),
+        (Some(level), false) => PRINTED_SHADOW[level],
+    };
+    let (alpha, fade_px, shift, limit) = if mended {
+        let shift = SHIFT_HEIGHTS[force] * height;
+        (mirrored_share(scene, boat), FADE_HEIGHTS[force] * height, shift, shift)
+    } else {
+        (1.0, PRINTED_FADE_PX[force], PRINTED_SHIFT_PX[force], PRINTED_SHIFT_PX[force] * PRINTED_LIMIT)
+    };
+    let (dark, bright) = PRINTED_PASSES;
+    let passes = if mended { PASSES } else { [dark - 1e-4, dark, bright, bright + 1e-4] };
+    let step = if mended { (0.02 * height).clamp(1.0, 8.0) } else { 1.0 };
+    let blur = if mended { blur_px(scene, line).max(1.0) } else { 1.0 };
+    let texels = DVec2::new(f64::from(placed.atlas.0), f64::from(placed.atlas.1));
+    let scale = DVec2::splat(placed.scale) / texels;
+    let pair = |v: DVec2| v.as_vec2().to_array();
+    WaterBlock {
+        anchor: pair(line.anchor),
+        down: pair(line.down),
+        columns: [line.first as f32, (1.0 / line.pitch) as f32],
+        mirror_scale: pair(scale),
+        mirror_offset: pair(placed.offset / texels),
+        blur: pair(scale * blur),
+        mirror_bounds: placed.bounds(),
+        passes: passes.map(|p| p as f32),
+        alpha: alpha as f32,
+        alpha_fall: (alpha / fade_px) as f32,
+        shadow: shadow as f32,
+        shadow_fall: (1.0 / shadow_px) as f32 * if mended { shadow as f32 } else { 1.0 },
+        shift: shift as f32,
+        shift_limit: limit as f32,
+        step: step as f32,
+        flat_spread: NOISE_SPREAD as f32,
+        hull_line: line.below.map(|b| b as f32),
+    }
+}
+
+/// Share of a boat's light that the sea throws back at the boat's range: Fresnel's formula for unpolarised light, at the
+/// grazing angle of the view plus half the waves' typical slope, since it is the slopes that face the eye that are seen.
+fn mirrored_share(scene: &Scene, boat: &BoatView) -> f64 {
+    let eye = (scene.camera.position.z - boat.water_level).max(0.0);
+    let grazing = eye.atan2(boat.range_m.max(1.0));
+    // Cox and Munk 1954, upwind.
+    let slope = (0.00316 * WIND_M_S[force(scene)]).sqrt();
+    fresnel(std::f64::consts::FRAC_PI_2 - grazing - 0.5 * slope)
+}
+
+/// Reflectance of the sea for unpolarised light at `incidence` radians from the normal.
+fn fresnel(incidence: f64) -> f64 {
+    let (sin, cos) = incidence.clamp(0.0, std::f64::consts::FRAC_PI_2).sin_cos();
+    let inner = (1.0 - (sin / SEA_INDEX).powi(2)).sqrt();
+    let s = (cos - SEA_INDEX * inner) / (cos + SEA_INDEX * inner);
+    let p = (inner - SEA_INDEX * cos) / (inner + SEA_INDEX * cos);
+    0.5 * (s * s + p * p)
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::geometry::look;
+
+    use super::*;
+    use crate::testing;
+
+    #[test]
+    fn fresnel_agrees_with_textbook_values() {
+        assert!((fresnel(0.0) - 0.0211).abs() < 1e-4);
+        assert!((fresnel(std::f64::consts::FRAC_PI_2) - 1.0).abs() < 1e-9);
+        // Brewster's angle: half of the s-polarised part.
+        let brewster = SEA_INDEX.atan();
+        let n2 = SEA_INDEX * SEA_INDEX;
+        assert!((fresnel(brewster) - 0.5 * ((n2 - 1.0) / (n2 + 1.0)).powi(2)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn hull_line_is_the_near_edge_of_the_outline_at_any_roll() {
+        let models = [testing::box_model("b", [8.0, 2.4, 1.5], [0.5; 3])];
+        for roll in [0.0, 0.4, std::f64::consts::FRAC_PI_2, -2.5] {
+            let mut scene = testing::empty_scene(640, 480);
+            scene.camera.world_from_camera = look(0.0, -0.1, roll);
+            testing::add_boat(&mut scene, &models, 0, 60.0, 0.02, 0.7);
+            let boat = &scene.boats[0];
+            let line = hull_line(&scene, boat, &boat.pose, &models[0]).unwrap();
+            // Every point of the outline lies on the line or above it, and the nearest corner lies on it.
+            let across = DVec2::new(line.down.y, -line.down.x);
+            let mut nearest = f64::INFINITY;
+            for corner in &models[0].waterline {
+                let p = scene
+                    .lens
+                    .project(scene.camera.to_camera(boat.pose.to_world(corner.extend(0.0))))
+                    .unwrap();
+                let local = p - line.anchor;
+                let column = ((local.dot(across) - line.first) / line.pitch).clamp(0.0, 30.999);
+                let (i, part) = (column as usize, column.fract());
+                let edge = line.below[i] * (1.0 - part) + line.below[i + 1] * part;
+                let gap = edge - local.dot(line.down);
+                assert!(gap > -0.3, "roll {roll}: corner {corner} is {gap} px below the line");
+                nearest = nearest.min(gap);
+            }
+            assert!(nearest < 0.3, "roll {roll}: {nearest}");
+            // Gravity on a picture rolled clockwise by `roll` points to the lower right.
+            let want = DVec2::new(roll.sin(), roll.cos());
+            assert!((line.down - want).length() < 0.05, "roll {roll}: {} {want}", line.down);
+        }
+    }
+
+    #[test]
+    fn mended_distances_follow_the_boats_size_and_printed_ones_do_not() {
+        let models = [testing::box_model("b", [8.0, 2.4, 1.5], [0.5; 3])];
+        let block = |range: f64, method| {
+            let mut scene = testing::empty_scene(640, 480);
+            scene.water.method = method;
+            testing::add_boat(&mut scene, &models, 0, range, 0.0, 0.7);
+            let boat = &scene.boats[0];
+            let line = hull_line(&scene, boat, &boat.pose, &models[0]).unwrap();
+            let placed = Placed { atlas: (640, 240), ..Placed::default() };
+            (line.height, water_block(&scene, boat, &line, &placed))
+        };
+        let (h1, near) = block(40.0, ReflectionMethod::Full);
+        let (h2, far) = block(80.0, ReflectionMethod::Full);
+        assert!((h1 / h2 - 2.0).abs() < 0.1);
+        assert!((f64::from(near.shift / far.shift) - h1 / h2).abs() < 0.01);
+        assert!(far.alpha > near.alpha, "the sea mirrors more at a grazing angle");
+        let reach = |b: &WaterBlock| f64::from(b.alpha / b.alpha_fall);
+        assert!((reach(&near) / reach(&far) - h1 / h2).abs() < 0.01);
+        let (_, near) = block(40.0, ReflectionMethod::FullAsPrinted);
+        let (_, far) = block(80.0, ReflectionMethod::FullAsPrinted);
+        assert_eq!((near.shift, reach(&near)), (far.shift, reach(&far)));
+    }
+}

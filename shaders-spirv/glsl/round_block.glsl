@@ -1,0 +1,22 @@
+// One tracer, splash or strike (set 0, binding 3).
+struct RoundBlock {
+    vec4 from;        // one end of the axis: pixels, depth (near / distance), unused
+    vec4 to;          // the other end
+    vec4 colour;      // linear light and opacity
+    vec2 half_width;  // at both ends, pixels
+    uint kind;        // ROUND_*
+    float seed;       // tells one from another
+};
+
+const uint ROUND_TRACER = 0;
+const uint ROUND_SPLASH = 1;
+const uint ROUND_STRIKE = 2;
+
+layout(std430, set = 0, binding = 3) readonly buffer Rounds {
+    RoundBlock rounds[];
+};
+
+layout(push_constant) uniform DrawBlock {
+    vec4 rect;   // the pixels that it can cover
+    uint index;  // which one
+} draw;

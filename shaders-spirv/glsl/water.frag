@@ -1,0 +1,129 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// A boat's light on the sea: Nelson 2009, "Full Reflection" shader, equations 4 to 8. The video is compared as sRGB codes, as
+// the thesis does; what is mixed is linear light. Output is premultiplied: it covers alpha of the sea and adds light.
+#include "frame.glsl"
+#include "water_block.glsl"
+
+// 0 none, 1 plain mirror, 2 as printed, 3 singular cases mended.
+layout(constant_id = 0) const uint METHOD = 3;
+// Shadow level, 0 to 2.
+layout(constant_id = 1) const uint SHADOW = 0;
+
+layout(push_constant) uniform DrawBlock {
+    vec4 rect;
+    uint index;
+} draw;
+
+// The video beneath, as codes.
+layout(set = 1, binding = 0) uniform sampler2D video;
+// The boats mirrored in the sea, premultiplied linear light.
+layout(set = 1, binding = 1) uniform sampler2D mirror;
+
+layout(location = 0) out vec4 colour;
+
+vec3 code_at(vec2 pixel) {
+    return texelFetch(video, ivec2(clamp(pixel, vec2(0.0), frame.size - 1.0)), 0).rgb;
+}
+
+// Eq. 4 and 5: nine gradients downwards, their mean between their least and greatest mapped to -1 to 1.
+float normalised_mean(vec2 at, vec3 here, vec2 step_down) {
+    float least = 1e9, greatest = 0.0, sum = 0.0;
+    for (int n = 1; n <= 9; ++n) {
+        float gradient = distance(here, code_at(at + step_down * float(n)));
+        least = min(least, gradient);
+        greatest = max(greatest, gradient);
+        sum += gradient;
+    }
+    float mean = sum / 9.0;
+    if (METHOD == 2) {
+        // As printed: 0 / 0 on a flat patch. A comparison with the result is then false (or the driver's choice); the
+        // caller's limit test is written so that no number means discarded.
+        return 2.0 / (greatest - least) * (mean - greatest) + 1.0;
+    }
+    // Mended: what differs less than the camera's noise is flat, and a flat patch does not shift.
+    float spread = greatest - least;
+    return (2.0 * (mean - greatest) + spread) / max(spread, waters[draw.index].flat_spread);
+}
+
+// 3x3 box from four bilinear fetches: 2/3 of a texel beyond the middle weighs two texels of a row as 1 and 1/2.
+vec4 blurred(vec2 at, vec2 texel, vec4 bounds) {
+    vec4 sum = vec4(0.0);
+    for (int i = 0; i < 4; ++i) {
+        vec2 corner = vec2((i & 1) == 0 ? -1.0 : 1.0, (i & 2) == 0 ? -1.0 : 1.0);
+        sum += texture(mirror, clamp(at + corner * texel * 0.6667, bounds.xy, bounds.zw));
+    }
+    return 0.25 * sum;
+}
+
+// Share of the mirrored light and the mirrored light itself, premultiplied.
+vec4 reflection(vec2 at, float below) {
+    uint i = draw.index;
+    if (METHOD == 0) {
+        return vec4(0.0);
+    }
+    vec2 uv = at * waters[i].mirror_scale + waters[i].mirror_offset;
+    vec4 bounds = waters[i].mirror_bounds;
+    // Eq. 6.
+    float alpha = waters[i].alpha - below * waters[i].alpha_fall;
+    if (alpha <= 0.0) {
+        return vec4(0.0);
+    }
+    if (METHOD == 1) {
+        return alpha * texture(mirror, clamp(uv, bounds.xy, bounds.zw));
+    }
+    vec3 here = code_at(at);
+    float bright = dot(here, vec3(0.299, 0.587, 0.114));
+    vec4 passes = waters[i].passes;
+    float kept = smoothstep(passes.x, passes.y, bright) * (1.0 - smoothstep(passes.z, passes.w, bright));
+    if (kept == 0.0) {
+        return vec4(0.0);
+    }
+    vec2 down = METHOD == 2 ? vec2(0.0, 1.0) : waters[i].down;
+    float shift = sin(normalised_mean(at, here, down * waters[i].step)) * waters[i].shift;
+    // Not "greater, then discard": what is no number is discarded too.
+    if (!(abs(shift) <= waters[i].shift_limit)) {
+        return vec4(0.0);
+    }
+    return alpha * kept * blurred(uv + shift * waters[i].mirror_scale, waters[i].blur, bounds);
+}
+
+void main() {
+    uint i = draw.index;
+    vec2 at = gl_FragCoord.xy;
+    vec2 from_anchor = at - waters[i].anchor;
+    vec2 down = waters[i].down;
+    // Where on the hull-water line this pixel's column stands, and how far below it the pixel is.
+    float column = (dot(from_anchor, vec2(down.y, -down.x)) - waters[i].columns.x) * waters[i].columns.y;
+    float held = clamp(column, 0.0, float(HULL_LINE_COLUMNS - 1));
+    int first = min(int(held), HULL_LINE_COLUMNS - 2);
+    float line = mix(waters[i].hull_line[first], waters[i].hull_line[first + 1], held - float(first));
+    float below = dot(from_anchor, down) - line;
+    if (below < 0.0) {
+        discard;
+    }
+    vec4 mirrored = reflection(at, below);
+    if (SHADOW == 0) {
+        if (mirrored.a == 0.0) {
+            discard;
+        }
+        colour = mirrored;
+        return;
+    }
+    // Eq. 7. As printed it is not clamped by itself; beyond its reach there is no shadow either way.
+    float proportion = clamp(waters[i].shadow - below * waters[i].shadow_fall, 0.0, 1.0);
+    float lit;
+    if (METHOD == 2) {
+        // Eq. 8 as printed: halved wherever there is any shadow at all.
+        lit = proportion > 0.0 && column == held ? 0.5 * (1.0 - proportion) : 1.0;
+    } else {
+        // Mended: nothing is halved where the shadow ends, and beyond the ends of the hull it fades over a quarter of its depth.
+        float beyond = abs(column - held) / waters[i].columns.y;
+        float depth = waters[i].shadow / waters[i].shadow_fall;
+        lit = 1.0 - proportion * clamp(1.0 - 4.0 * beyond / depth, 0.0, 1.0);
+    }
+    if (lit == 1.0 && mirrored.a == 0.0) {
+        discard;
+    }
+    colour = vec4(mirrored.rgb * lit, 1.0 - (1.0 - mirrored.a) * lit);
+}
