@@ -1,5 +1,12 @@
 //! The calibration file as its users meet it.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a failed step in a test's helper fails the test"
+)]
+
 use std::{fs, path::Path};
 
 use bowwave_calibration::{CalibrationError, CalibrationFile, Date, Provenance, parse, to_toml};
