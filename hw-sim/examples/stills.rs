@@ -34,7 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn set(recipe: &mut Recipe, key: &str, value: &str) -> Result<(), Box<dyn Error>> {
     match key {
-        "beaufort" => recipe.beaufort = BeaufortForce::new(value.parse()?).ok_or("Beaufort goes from 0 to 12")?,
+        "beaufort" => {
+            recipe.beaufort = BeaufortForce::new(value.parse()?).ok_or("Beaufort goes from 0 to 12")?
+        }
         "sun" => {
             let (azimuth, elevation) = value.split_once(',').ok_or("sun=AZIMUTH,ELEVATION")?;
             recipe.sky.sun_azimuth = azimuth.parse::<f64>()?.to_radians();

@@ -55,7 +55,9 @@ impl Camera {
             })
             .collect();
         let transfer = (0..TRANSFER)
-            .map(|i| (255.0 * to_srgb(shoulder((i as f32 + 0.5) * LIGHT_MAX / TRANSFER as f32))).round() as u8)
+            .map(|i| {
+                (255.0 * to_srgb(shoulder((i as f32 + 0.5) * LIGHT_MAX / TRANSFER as f32))).round() as u8
+            })
             .collect();
         let (read, shot) = (recipe.camera.read_noise as f32, recipe.camera.shot_noise as f32);
         let deviation = (0..=64).map(|i| (read + shot * i as f32 * LIGHT_MAX / 64.0).sqrt()).collect();
@@ -110,7 +112,8 @@ impl Camera {
     fn level_view(&self, turn: Mat3, azimuth: f32, eye_height: f32) -> LevelView {
         let (w, h) = (self.lens.width as usize, self.lens.height as usize);
         let (mut left, mut right, mut lowest) = (0.0f32, 0.0f32, 0.0f32);
-        let border = (0..w).flat_map(|x| [(x, 0), (x, h - 1)]).chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
+        let border =
+            (0..w).flat_map(|x| [(x, 0), (x, h - 1)]).chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
         for (x, y) in border {
             let [nx, ny, _] = self.rays[y * w + x];
             let d = turn * Vec3::new(nx, ny, 1.0);

@@ -26,9 +26,7 @@ impl Foam {
             return None;
         }
         let covered = 3.84e-6 * wind.powf(3.41);
-        let squeeze = std::array::from_fn(|c| {
-            std::array::from_fn(|l| surface.tiles[c].mean_square(l, 3))
-        });
+        let squeeze = std::array::from_fn(|c| std::array::from_fn(|l| surface.tiles[c].mean_square(l, 3)));
         Some(Self { quantile: upper_quantile(covered) as f32, squeeze })
     }
 

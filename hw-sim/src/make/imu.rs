@@ -30,7 +30,9 @@ impl SlowError {
     fn at(&self, turn: f64) -> DVec3 {
         self.waves
             .iter()
-            .map(|axes| DVec3::from_array(axes.map(|(cycles, scale, phase)| scale * (cycles * turn + phase).sin())))
+            .map(|axes| {
+                DVec3::from_array(axes.map(|(cycles, scale, phase)| scale * (cycles * turn + phase).sin()))
+            })
             .sum()
     }
 }
@@ -60,7 +62,8 @@ pub fn samples(recipe: &Recipe, start: Time) -> Vec<ImuSample> {
                 + white(&mut noise) * imu.gyro_noise;
             let accel = state.accel + imu.accel_bias + white(&mut noise) * imu.accel_noise;
             let slow = attitude_error.at(turn);
-            let tilt = DVec3::new(slow.x * imu.tilt_error, slow.y * imu.tilt_error, slow.z * imu.heading_error);
+            let tilt =
+                DVec3::new(slow.x * imu.tilt_error, slow.y * imu.tilt_error, slow.z * imu.heading_error);
             let measured_ns = bowwave_core::time::secs_to_ns(t);
             ImuSample {
                 arrival: start.plus_ns(measured_ns + draw_latency(&mut latency, imu.latency_ns)),
@@ -144,7 +147,8 @@ mod tests {
         assert!((0.02..0.06).contains(&rms), "{rms} deg rms");
         // The step over the seam is like any other step.
         let (last, first) = (samples[samples.len() - 1], samples[0]);
-        let step = |a: &ImuSample, b: &ImuSample| a.world_from_imu.unwrap().angle_between(b.world_from_imu.unwrap());
+        let step =
+            |a: &ImuSample, b: &ImuSample| a.world_from_imu.unwrap().angle_between(b.world_from_imu.unwrap());
         let seam = step(&last, &first);
         let before = step(&samples[samples.len() - 2], &last);
         assert!((seam - before).abs() < 1e-4, "{seam} {before}");
@@ -174,8 +178,11 @@ mod tests {
         let device = (last.device_time_ns - first.device_time_ns) as f64;
         let host = 19.995e9;
         assert!((device / host - 1.0 - 35e-6).abs() < 1e-9);
-        let late: Vec<i64> =
-            samples.iter().enumerate().map(|(i, s)| s.arrival.ns_since(start) - i as i64 * 5_000_000).collect();
+        let late: Vec<i64> = samples
+            .iter()
+            .enumerate()
+            .map(|(i, s)| s.arrival.ns_since(start) - i as i64 * 5_000_000)
+            .collect();
         assert!(late.iter().all(|l| (300_000..=2_000_000).contains(l)));
         assert!(late.iter().any(|l| *l < 305_000) && late.iter().any(|l| *l > 1_200_000));
     }

@@ -25,6 +25,8 @@ const STEP_MAX: f32 = 0.007;
 const FAR_M: f32 = 900.0;
 /// Longest step relative to range beyond.
 const STEP_FAR: f32 = 0.02;
+/// Points of a tile are at least this share of a step apart.
+const SHORTEST: f32 = 0.3;
 /// Rows of the water table over range.
 const TABLE_ROWS: usize = 32;
 /// Columns between which the glitter's parameters are interpolated.
@@ -114,23 +116,22 @@ impl SeaShader {
         let (resolved, height_variance) = Field::statistics(surface);
         let whole = rotate_slopes(input.slopes, input.wind_from);
         let crest = 3.0 * height_variance.sqrt() as f32;
-        let start = ((input.eye_height - crest).max(0.3 * input.eye_height) / input.steepest.max(0.02)).max(0.5);
+        let start =
+            ((input.eye_height - crest).max(0.3 * input.eye_height) / input.steepest.max(0.02)).max(0.5);
         let end = (2.0 * f64::from(input.eye_height) * 6.371e6 / 0.87).sqrt() as f32;
         let foam = Foam::new(input.wind, surface);
         let mut steps = Vec::new();
         let mut range = start * 0.85;
         while range < end {
-            let row_span = range / (input.focal * input.eye_height) * range;
-            let limit = if range < FAR_M { STEP_MAX } else { STEP_MAX + (range / FAR_M - 1.0) * 0.01 };
-            let step = (row_span / STEPS_PER_ROW).clamp(2e-4 * range, limit.min(STEP_FAR) * range);
-            steps.push(make_step(input, surface, &resolved, whole, foam.as_ref(), range));
+            let step = step_at(input, range);
+            steps.push(make_step(input, surface, &resolved, whole, foam.as_ref(), range, step));
             range += step;
         }
         let (first, last) = (start * 0.85, range);
         let rows: Vec<Roughness> = (0..TABLE_ROWS)
             .map(|i| {
                 let range = first * (last / first).powf(i as f32 / (TABLE_ROWS - 1) as f32);
-                make_step(input, surface, &resolved, whole, None, range).roughness
+                make_step(input, surface, &resolved, whole, None, range, step_at(input, range)).roughness
             })
             .collect();
         for step in &mut steps {
@@ -153,7 +154,14 @@ impl SeaShader {
     }
 
     /// Paints the sea of `surface` seen by `view` from `eye_height` metres into `picture`.
-    pub fn draw(&self, surface: &Surface, sky: &Sky, view: &LevelView, eye_height: f32, picture: &mut SeaPicture) {
+    pub fn draw(
+        &self,
+        surface: &Surface,
+        sky: &Sky,
+        view: &LevelView,
+        eye_height: f32,
+        picture: &mut SeaPicture,
+    ) {
         picture.texels.clear();
         picture.texels.resize(view.width * view.height, Vec4::ZERO);
         picture.highest.clear();
@@ -261,7 +269,9 @@ fn sample(step: &Step, surface: &Surface, columns: &[Column], waters: &mut [Vec4
         let stride = stride(step.spacing, fine.spacing_m());
         if share > 0.0 {
             let coarse = tile.level(level + 1);
-            interpolate(step, columns, stride, waters, |e, n| fine.sample(e, n).lerp(coarse.sample(e, n), share));
+            interpolate(step, columns, stride, waters, |e, n| {
+                fine.sample(e, n).lerp(coarse.sample(e, n), share)
+            });
         } else {
             interpolate(step, columns, stride, waters, |e, n| fine.sample(e, n));
         }
@@ -322,6 +332,13 @@ fn paint(texels: &mut [Vec4], view: &LevelView, x: usize, upper: f32, lower: f32
     }
 }
 
+/// From one distance to the next.
+fn step_at(input: &SeaShaderInput, range: f32) -> f32 {
+    let row_span = range / (input.focal * input.eye_height) * range;
+    let limit = if range < FAR_M { STEP_MAX } else { STEP_MAX + (range / FAR_M - 1.0) * 0.01 };
+    (row_span / STEPS_PER_ROW).clamp(2e-4 * range, limit.min(STEP_FAR) * range)
+}
+
 fn make_step(
     input: &SeaShaderInput,
     surface: &Surface,
@@ -329,11 +346,14 @@ fn make_step(
     whole: Covariance,
     foam: Option<&Foam>,
     range: f32,
+    step: f32,
 ) -> Step {
     let spacing = range / input.focal;
+    // Waves much shorter than a step would be met at random places: they belong to what is not resolved.
+    let finest = spacing.max(SHORTEST * step);
     let mut seen = [0.0f32; 3];
     let levels = std::array::from_fn(|c| {
-        let level = surface.tiles[c].level_for(spacing).clamp(0.0, (LEVELS - 1) as f32);
+        let level = surface.tiles[c].level_for(finest).clamp(0.0, (LEVELS - 1) as f32);
         let low = (level as usize).min(LEVELS - 2);
         // Only the second half of the way to the next level is blended: the first half costs one look-up instead of two.
         let share = (2.0 * (level - low as f32) - 1.0).max(0.0);
@@ -351,8 +371,7 @@ fn make_step(
     });
     let drop = curvature_drop(f64::from(range)) as f32;
     let floor = 0.06 * (whole[0] + whole[1]);
-    let residual =
-        [(whole[0] - seen[0]).max(floor), (whole[1] - seen[1]).max(floor), whole[2] - seen[2]];
+    let residual = [(whole[0] - seen[0]).max(floor), (whole[1] - seen[1]).max(floor), whole[2] - seen[2]];
     // A covariance may not outgrow what its variances allow.
     let limit = 0.8 * (residual[0] * residual[1]).sqrt();
     let residual = [residual[0], residual[1], residual[2].clamp(-limit, limit)];
@@ -378,9 +397,5 @@ fn make_step(
 /// Slope variances up and across the wind as east, north and covariance.
 fn rotate_slopes([up, cross]: [f64; 2], wind_from: f64) -> Covariance {
     let (e, n) = wind_from.sin_cos();
-    [
-        (up * e * e + cross * n * n) as f32,
-        (up * n * n + cross * e * e) as f32,
-        ((up - cross) * e * n) as f32,
-    ]
+    [(up * e * e + cross * n * n) as f32, (up * n * n + cross * e * e) as f32, ((up - cross) * e * n) as f32]
 }

@@ -32,8 +32,10 @@ pub struct Periodic {
 impl Periodic {
     /// A motion about `mean` made of (cycles, amplitude, phase).
     pub fn new(mean: f64, harmonics: &[(u32, f64, f64)]) -> Self {
-        let harmonics =
-            harmonics.iter().map(|&(cycles, amplitude, phase)| Harmonic { cycles, amplitude, phase }).collect();
+        let harmonics = harmonics
+            .iter()
+            .map(|&(cycles, amplitude, phase)| Harmonic { cycles, amplitude, phase })
+            .collect();
         Self { mean, harmonics }
     }
 
@@ -157,10 +159,7 @@ mod tests {
                 roll: p(0.0, &[(3, 0.09, 0.0), (4, 0.03, 2.0)]),
                 heave: p(0.0, &[(3, 0.2, 0.7)]),
             },
-            GunMotion {
-                traverse: p(0.9, &[(2, 0.5, 0.0)]),
-                elevation: p(-0.1, &[(3, 0.05, 0.5)]),
-            },
+            GunMotion { traverse: p(0.9, &[(2, 0.5, 0.0)]), elevation: p(-0.1, &[(3, 0.05, 0.5)]) },
             8.0,
             20.0,
         )

@@ -273,7 +273,9 @@ impl Recipe {
             inside("swell.height_m", swell.height_m, 0.0, 12.0, "0 to 12 m")?;
             inside("swell.period_s", swell.period_s, 2.0, 20.0, "2 to 20 s")?;
         }
-        for (what, latency) in [("camera.latency_ns", camera.latency_ns), ("imu.latency_ns", self.imu.latency_ns)] {
+        for (what, latency) in
+            [("camera.latency_ns", camera.latency_ns), ("imu.latency_ns", self.imu.latency_ns)]
+        {
             inside(what, latency[0] as f64, 0.0, latency[1] as f64, "0 to the greatest latency")?;
             inside(what, latency[1] as f64, 0.0, 2e8, "0 to 200 ms")?;
         }
@@ -288,7 +290,13 @@ impl Recipe {
         }
         for burst in &self.trigger {
             inside("trigger.start_s", burst.start_s, 0.0, self.duration_s, "within the recording")?;
-            inside("trigger.length_s", burst.length_s, 1e-3, self.duration_s - burst.start_s, "released within it")?;
+            inside(
+                "trigger.length_s",
+                burst.length_s,
+                1e-3,
+                self.duration_s - burst.start_s,
+                "released within it",
+            )?;
         }
         self.check_view()
     }

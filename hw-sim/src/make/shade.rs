@@ -62,8 +62,7 @@ impl WaterTable {
         let texels = (0..rows.len() * SLOPES * STRIDE)
             .into_par_iter()
             .map(|i| {
-                let (azimuth, slope, range) =
-                    (i % STRIDE, i / STRIDE % SLOPES, i / (STRIDE * SLOPES));
+                let (azimuth, slope, range) = (i % STRIDE, i / STRIDE % SLOPES, i / (STRIDE * SLOPES));
                 let angle = azimuth as f32 * TAU / AZIMUTHS as f32;
                 let slope = SLOPE_MIN + slope as f32 * (SLOPE_MAX - SLOPE_MIN) / (SLOPES - 1) as f32;
                 water(&rows[range], angle, slope, &facets, dome, upwelling)
@@ -78,11 +77,7 @@ impl WaterTable {
         let first = (row as usize).min(self.ranges.saturating_sub(2));
         let size = SLOPES * STRIDE;
         let take = |r: usize| &self.texels[r * size..(r + 1) * size];
-        Slice {
-            near: take(first),
-            far: take((first + 1).min(self.ranges - 1)),
-            fraction: row - first as f32,
-        }
+        Slice { near: take(first), far: take((first + 1).min(self.ranges - 1)), fraction: row - first as f32 }
     }
 }
 
@@ -210,8 +205,7 @@ mod tests {
     use super::{super::sky::SkyRecipe, *};
 
     fn sky() -> Sky {
-        let recipe =
-            SkyRecipe { sun_azimuth: 1.5, sun_elevation: 0.7, turbidity: 3.0, cloud_cover: 0.0 };
+        let recipe = SkyRecipe { sun_azimuth: 1.5, sun_elevation: 0.7, turbidity: 3.0, cloud_cover: 0.0 };
         Sky::new(&recipe, 1).unwrap()
     }
 

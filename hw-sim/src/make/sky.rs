@@ -210,10 +210,19 @@ impl Panorama {
             .map(|i| {
                 let azimuth = start + (i % columns) as f32 / columns_per_radian;
                 let tangent = tangent_start + (i / columns) as f32 / rows_per_tangent;
-                Vec3::from(sky.radiance(Vec3::new(azimuth.sin(), azimuth.cos(), tangent).normalize())).extend(0.0)
+                Vec3::from(sky.radiance(Vec3::new(azimuth.sin(), azimuth.cos(), tangent).normalize()))
+                    .extend(0.0)
             })
             .collect();
-        Self { texels, columns, rows, azimuth_start: start, columns_per_radian, tangent_start, rows_per_tangent }
+        Self {
+            texels,
+            columns,
+            rows,
+            azimuth_start: start,
+            columns_per_radian,
+            tangent_start,
+            rows_per_tangent,
+        }
     }
 
     /// Bilinear radiance at an azimuth (radians) and a tangent of elevation.
@@ -255,8 +264,7 @@ mod tests {
     use super::*;
 
     fn sky() -> Sky {
-        let recipe =
-            SkyRecipe { sun_azimuth: 1.2, sun_elevation: 0.6, turbidity: 3.0, cloud_cover: 0.4 };
+        let recipe = SkyRecipe { sun_azimuth: 1.2, sun_elevation: 0.6, turbidity: 3.0, cloud_cover: 0.4 };
         Sky::new(&recipe, 1).unwrap()
     }
 

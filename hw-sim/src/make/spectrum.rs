@@ -54,7 +54,7 @@ pub(super) struct WindSea {
 impl WindSea {
     /// The fully developed sea under a wind of `wind` m/s.
     ///
-    /// The short waves, above ten times the peak, are tilted by a power of the wavenumber such that the whole mean square
+    /// The short waves, above ten times the peak or half a metre, are tilted by a power of the wavenumber such that the whole mean square
     /// slope is Cox and Munk's; Elfouhaily's own high-frequency level is undefined for light winds.
     pub fn new(wind: f64) -> Self {
         let peak = GRAVITY / (wind * wind) * INVERSE_WAVE_AGE.powi(2);
@@ -89,13 +89,13 @@ impl WindSea {
         let enhancement = 1.7f64.powf((-(ratio - 1.0).powi(2) / (2.0 * sigma * sigma)).exp());
         let cut = (-INVERSE_WAVE_AGE / 10f64.sqrt() * (ratio - 1.0)).exp();
         let alpha = 6e-3 * INVERSE_WAVE_AGE.sqrt();
-        let curvature =
-            0.5 * alpha * phase_speed(self.peak) / phase_speed(k) * moskowitz * enhancement * cut;
+        let curvature = 0.5 * alpha * phase_speed(self.peak) / phase_speed(k) * moskowitz * enhancement * cut;
         curvature * self.tail(k) / k.powi(3)
     }
 
     fn tail(&self, k: f64) -> f64 {
-        let x = (k / (10.0 * self.peak)).max(1.0);
+        let from = (10.0 * self.peak).min(12.0).max(self.peak);
+        let x = (k / from).max(1.0);
         x.powf(self.tail_power)
     }
 

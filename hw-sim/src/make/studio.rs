@@ -109,7 +109,8 @@ impl Studio {
 
     fn draw<T>(&self, frame: u32, take: impl FnOnce(&[u8]) -> T) -> (CameraPose, T) {
         let spare = self.spare.lock().ok().and_then(|mut spare| spare.pop());
-        let (mut surface, mut memory) = spare.unwrap_or_else(|| (self.field.surface(), FrameMemory::default()));
+        let (mut surface, mut memory) =
+            spare.unwrap_or_else(|| (self.field.surface(), FrameMemory::default()));
         let time_s = f64::from(frame) / self.frame_rate_hz + self.exposure_delay_s;
         let pose = self.motion.at(time_s).pose;
         self.field.evaluate(time_s, &mut surface);

@@ -16,6 +16,7 @@ use super::{
     MakeError, Recipe,
     imu::{self, draw_latency},
     noise::stream,
+    spectrum::{WindSea, wind_speed},
     studio::{Shot, Studio},
 };
 
@@ -45,11 +46,7 @@ pub struct Made {
 
 /// Makes the recording of `recipe` in a new file at `path`; `progress` hears of (frames done, frames in all). An existing
 /// file is not overwritten; a failure leaves the file cut short.
-pub fn make(
-    recipe: &Recipe,
-    path: &Path,
-    progress: &mut dyn FnMut(u64, u64),
-) -> Result<Made, MakeError> {
+pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) -> Result<Made, MakeError> {
     let studio = Studio::new(recipe)?;
     let mut writer = RecordingWriter::create(path, &properties(recipe))?;
     let mut others = measurements(recipe).into_iter().peekable();
@@ -106,6 +103,12 @@ fn measurements(recipe: &Recipe) -> Vec<Entry> {
     entries
 }
 
+/// Of wind sea and swell together: their energies add.
+fn significant_height(recipe: &Recipe) -> f64 {
+    let wind_sea = WindSea::new(wind_speed(recipe.beaufort)).significant_height();
+    wind_sea.hypot(recipe.swell.map_or(0.0, |swell| swell.height_m))
+}
+
 fn properties(recipe: &Recipe) -> Properties {
     let device_loop = imu::device_ns(recipe.duration_s, recipe.imu.clock_drift_ppm);
     Properties {
@@ -123,6 +126,7 @@ fn properties(recipe: &Recipe) -> Properties {
             ("sun_azimuth_deg".to_owned(), recipe.sky.sun_azimuth.to_degrees().to_string()),
             ("sun_elevation_deg".to_owned(), recipe.sky.sun_elevation.to_degrees().to_string()),
             ("wind_from_deg".to_owned(), recipe.wind_from.to_degrees().to_string()),
+            ("significant_height_m".to_owned(), format!("{:.3}", significant_height(recipe))),
             ("visibility_m".to_owned(), recipe.visibility_m.to_string()),
         ]),
     }
@@ -143,7 +147,8 @@ pub fn calibration(recipe: &Recipe) -> CalibrationFile {
         gyro_bias: recipe.imu.gyro_bias,
         gyro_bias_sigma: DVec3::splat(recipe.imu.gyro_bias_walk.max(1e-6)),
     };
-    let mut file = CalibrationFile::new(epoch(), "hw-sim", "exact, from the recipe of a made recording", numbers);
+    let mut file =
+        CalibrationFile::new(epoch(), "hw-sim", "exact, from the recipe of a made recording", numbers);
     file.camera_name = "simulated camera".to_owned();
     file.imu_name = "simulated unit, VectorNav axes".to_owned();
     file

@@ -1,0 +1,220 @@
+//! Made recordings: what is in the picture is where the truth says, everything loops, and a seed means one recording.
+
+use std::{collections::BTreeMap, sync::LazyLock};
+
+use bowwave_calibration::parse;
+use bowwave_core::geometry::{Lens, horizon_dip};
+use bowwave_record::{Entry, RecordingReader};
+use glam::{DVec2, DVec3};
+use hw_sim::make::{DEVICE_LOOP_KEY, MakeError, Recipe, Studio, make};
+
+const WIDTH: u32 = 320;
+const HEIGHT: u32 = 180;
+
+/// The default recording in small and short: every motion and every wave still closes.
+fn small() -> Recipe {
+    let mut recipe = Recipe { width: WIDTH, height: HEIGHT, duration_s: 2.0, ..Recipe::default() };
+    recipe.frame_rate_hz = 10.0;
+    recipe.trigger.retain(|burst| burst.start_s + burst.length_s < 2.0);
+    recipe.trigger.push(hw_sim::make::Burst { start_s: 0.5, length_s: 0.25 });
+    recipe
+}
+
+/// Without noise, clouds and haze (which hides the last kilometres before the horizon), for measuring in the picture.
+fn clean() -> Recipe {
+    let mut recipe = small();
+    (recipe.camera.read_noise, recipe.camera.shot_noise) = (0.0, 0.0);
+    recipe.sky.cloud_cover = 0.0;
+    recipe.visibility_m = 1e6;
+    recipe
+}
+
+static CLEAN: LazyLock<Studio> = LazyLock::new(|| Studio::new(&clean()).unwrap());
+
+fn luminance(rgb: &[u8], x: u32, y: u32) -> f64 {
+    let i = ((y * WIDTH + x) * 3) as usize;
+    0.3 * f64::from(rgb[i]) + 0.6 * f64::from(rgb[i + 1]) + 0.1 * f64::from(rgb[i + 2])
+}
+
+/// Row of the sea horizon in a column: half-way between the light some pixels above and below, near the steepest step.
+fn horizon_row(rgb: &[u8], x: u32, near: f64) -> f64 {
+    let first = (near as u32).saturating_sub(6).max(3);
+    let steepest = (first..first + 12)
+        .max_by(|a, b| {
+            let step = |y: u32| luminance(rgb, x, y - 1) - luminance(rgb, x, y + 1);
+            step(*a).total_cmp(&step(*b))
+        })
+        .unwrap();
+    let (sky, sea) = (luminance(rgb, x, steepest - 3), luminance(rgb, x, steepest + 3));
+    let middle = 0.5 * (sky + sea);
+    assert!(sky - sea > 6.0, "no horizon in column {x}: {sky} over {sea}");
+    let above = (steepest - 3..steepest + 3).find(|y| luminance(rgb, x, y + 1) < middle).unwrap();
+    let (a, b) = (luminance(rgb, x, above), luminance(rgb, x, above + 1));
+    f64::from(above) + 0.5 + (a - middle) / (a - b)
+}
+
+/// Where the horizon must cross the middle of column `x`.
+fn predicted_row(lens: &Lens, world_from_camera: glam::DQuat, height: f64, x: u32) -> f64 {
+    let dip = horizon_dip(height).sin();
+    let below = |y: f64| {
+        let ray = world_from_camera * lens.unproject(DVec2::new(f64::from(x) + 0.5, y));
+        ray.z < -dip
+    };
+    let (mut up, mut down) = (0.0, f64::from(lens.height));
+    assert!(!below(up) && below(down), "the horizon is not in column {x}");
+    for _ in 0..50 {
+        let middle = 0.5 * (up + down);
+        if below(middle) { down = middle } else { up = middle }
+    }
+    up
+}
+
+#[test]
+fn the_horizon_is_where_the_truth_says() {
+    let lens = clean().lens();
+    let (mut sum, mut worst, mut count) = (0.0, 0.0f64, 0.0);
+    for frame in [0, 7, 13] {
+        let (truth, rgb) = CLEAN.shoot_rgb(frame);
+        for x in (5..WIDTH - 5).step_by(10) {
+            let expected = predicted_row(&lens, truth.world_from_camera, truth.position.z, x);
+            let off = horizon_row(&rgb, x, expected) - expected;
+            sum += off;
+            worst = worst.max(off.abs());
+            count += 1.0;
+        }
+    }
+    assert!(worst < 0.3, "worst {worst} px");
+    assert!((sum / count).abs() < 0.15, "mean {} px", sum / count);
+}
+
+#[test]
+fn the_picture_loops_and_moves() {
+    let difference = |a: u32, b: u32| {
+        let (a, b) = (CLEAN.shoot_rgb(a).1, CLEAN.shoot_rgb(b).1);
+        let sum: u64 = a.iter().zip(&b).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+        sum as f64 / a.len() as f64
+    };
+    let seam = difference(0, CLEAN.frames());
+    assert!(seam < 0.02, "frames 0 and {} differ by {seam} levels", CLEAN.frames());
+    let step = difference(0, 1);
+    assert!(step > 0.5, "nothing moves: {step} levels");
+}
+
+#[test]
+fn clouds_move_as_the_camera_turns() {
+    let mut recipe = clean();
+    recipe.sky.cloud_cover = 0.6;
+    let lens = recipe.lens();
+    let studio = Studio::new(&recipe).unwrap();
+    let (from, before) = studio.shoot_rgb(2);
+    let (to, after) = studio.shoot_rgb(3);
+    // What is seen in one frame is seen in the next where the turn puts it, and not where it was.
+    let (mut followed, mut stayed, mut count) = (0.0, 0.0, 0);
+    for y in (2..30).step_by(2) {
+        for x in (10..WIDTH - 10).step_by(3) {
+            let world =
+                from.world_from_camera * lens.unproject(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+            let Some(place) = lens.project(to.world_from_camera.inverse() * world) else { continue };
+            let (u, v) = (place.x.floor(), place.y.floor());
+            if u < 0.0 || v < 0.0 || u >= f64::from(WIDTH) || v >= f64::from(HEIGHT) {
+                continue;
+            }
+            let then = luminance(&before, x, y);
+            followed += (luminance(&after, u as u32, v as u32) - then).abs();
+            stayed += (luminance(&after, x, y) - then).abs();
+            count += 1;
+        }
+    }
+    assert!(count > 500);
+    assert!(followed < 0.4 * stayed, "{followed} {stayed} over {count} places");
+}
+
+#[test]
+fn a_recording_holds_what_the_recipe_says() {
+    let recipe = small();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("made.mcap");
+    let mut heard = Vec::new();
+    let made = make(&recipe, &path, &mut |done, total| heard.push((done, total))).unwrap();
+    assert_eq!((made.frames, made.imu_samples, made.trigger_edges), (20, 400, 2));
+    assert_eq!((heard.first(), heard.last()), (Some(&(0, 20)), Some(&(20, 20))));
+
+    let reader = RecordingReader::open(&path).unwrap();
+    let properties = reader.properties();
+    assert_eq!(properties.loop_ns, Some(2_000_000_000));
+    assert_eq!(properties.picture, (WIDTH, HEIGHT));
+    assert_eq!(properties.extra[DEVICE_LOOP_KEY], "2000070000");
+    let calibration = parse(&properties.calibration_toml, "made.mcap").unwrap().calibration;
+    assert!(calibration.camera_from_imu.angle_between(recipe.camera_from_imu()) < 1e-9);
+
+    let motion = recipe.motion();
+    let (mut truths, mut frames) = (BTreeMap::new(), 0);
+    for entry in reader.entries().unwrap() {
+        match entry.unwrap() {
+            Entry::Truth(truth) => {
+                truths.insert(truth.time, truth.pose);
+            }
+            Entry::Frame(frame) => {
+                // The truth of a frame has its stamp and comes before it.
+                let truth = truths[&frame.mid_exposure];
+                let since_start = frame.mid_exposure.secs_since(properties.start);
+                let exact = motion.at(since_start + recipe.exposure_delay_s()).pose;
+                assert!(exact.world_from_camera.angle_between(truth.world_from_camera) < 1e-7);
+                assert!((exact.position - truth.position).length() < 1e-9);
+                let picture = image::load_from_memory(&frame.jpeg).unwrap();
+                assert_eq!((picture.width(), picture.height()), (WIDTH, HEIGHT));
+                frames += 1;
+            }
+            _ => {}
+        }
+    }
+    assert_eq!(frames, 20);
+    // What is there is not overwritten.
+    assert!(matches!(make(&recipe, &path, &mut |_, _| {}), Err(MakeError::Record(_))));
+}
+
+#[test]
+fn a_seed_means_one_recording() {
+    let mut recipe = small();
+    recipe.duration_s = 0.5;
+    recipe.trigger.clear();
+    let folder = tempfile::tempdir().unwrap();
+    let file = |recipe: &Recipe, name: &str| {
+        let path = folder.path().join(name);
+        make(recipe, &path, &mut |_, _| {}).unwrap();
+        std::fs::read(path).unwrap()
+    };
+    let first = file(&recipe, "first");
+    assert!(first == file(&recipe, "second"), "the same seed gave two recordings");
+    recipe.seed += 1;
+    assert!(first != file(&recipe, "third"), "another seed gave the same recording");
+}
+
+#[test]
+fn the_sun_glitters_below_itself() {
+    let mut recipe = clean();
+    recipe.sky.sun_azimuth = 0.0;
+    recipe.sky.sun_elevation = 0.6;
+    let studio = Studio::new(&recipe).unwrap();
+    let (truth, rgb) = studio.shoot_rgb(0);
+    let lens = recipe.lens();
+    let brightness = |azimuth: f64| {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for i in 0..20 {
+            let down = 0.03 + 0.01 * f64::from(i);
+            let ray = DVec3::new(azimuth.sin(), azimuth.cos(), -down);
+            if let Some(p) = lens.project(truth.world_from_camera.inverse() * ray)
+                && (0.0..f64::from(WIDTH)).contains(&p.x)
+                && (0.0..f64::from(HEIGHT)).contains(&p.y)
+            {
+                sum += luminance(&rgb, p.x as u32, p.y as u32);
+                count += 1.0;
+            }
+        }
+        assert!(count > 5.0, "azimuth {azimuth} is not in view");
+        sum / count
+    };
+    let forward = truth.world_from_camera * DVec3::Z;
+    let off = if forward.x.atan2(forward.y) > 0.0 { 0.45 } else { -0.45 };
+    assert!(brightness(0.0) > brightness(off) + 25.0, "{} {}", brightness(0.0), brightness(off));
+}
