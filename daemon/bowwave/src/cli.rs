@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use bowwave_core::time::secs_to_ns;
 use clap::{Args, Parser, Subcommand};
+use hw_sim::fault::{Fault, FaultKind};
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
 #[derive(Debug, Parser)]
@@ -84,6 +86,10 @@ pub struct Simulate {
     /// Also keep these frames as DIR/frame-NNNNN.png
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     pub stills: Vec<u64>,
+    /// Let the simulated hardware fail: imu-drop-out, imu-freeze, imu-nan, line-garbage, frame-drop-out,
+    /// frame-other-size or frame-corrupt, from second S for L seconds
+    #[arg(long, value_name = "KIND@S+L", value_parser = parse_fault)]
+    pub fault: Vec<Fault>,
     /// Vulkan device: its number, or part of its name
     #[arg(long, value_name = "NAME")]
     pub gpu: Option<String>,
@@ -193,6 +199,26 @@ pub struct Hits {
     pub hits_only: bool,
 }
 
+/// `imu-freeze@2.5+0.5`.
+fn parse_fault(text: &str) -> Result<Fault, String> {
+    let kinds = [
+        ("imu-drop-out", FaultKind::ImuDropOut),
+        ("imu-freeze", FaultKind::ImuFreeze),
+        ("imu-nan", FaultKind::ImuNan),
+        ("line-garbage", FaultKind::LineGarbage),
+        ("frame-drop-out", FaultKind::FrameDropOut),
+        ("frame-other-size", FaultKind::FrameOtherSize),
+        ("frame-corrupt", FaultKind::FrameCorrupt),
+    ];
+    let names = || kinds.map(|(name, _)| name).join(", ");
+    let usage = || format!("'{text}' is no fault: write KIND@S+L, as imu-freeze@2.5+0.5; kinds are {}", names());
+    let (kind, span) = text.split_once('@').ok_or_else(usage)?;
+    let (from, length) = span.split_once('+').ok_or_else(usage)?;
+    let kind = kinds.into_iter().find(|(name, _)| *name == kind).map(|(_, kind)| kind).ok_or_else(usage)?;
+    let ns = |s: &str| s.parse::<f64>().ok().filter(|v| (0.0..=1e6).contains(v)).map(secs_to_ns).ok_or_else(usage);
+    Ok(Fault { kind, from_ns: ns(from)?, for_ns: ns(length)? })
+}
+
 /// `1280x720`.
 pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let usage = || format!("'{text}' is no size: write WIDTHxHEIGHT, each 64 to 4096, as 1280x720");
@@ -219,6 +245,15 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn faults() {
+        let fault = Fault { kind: FaultKind::ImuFreeze, from_ns: 2_500_000_000, for_ns: 500_000_000 };
+        assert_eq!(parse_fault("imu-freeze@2.5+0.5"), Ok(fault));
+        for bad in ["", "imu-freeze", "imu-freeze@1", "nothing@1+1", "imu-nan@-1+1", "imu-nan@1+x", "imu-nan@NaN+1"] {
+            assert!(parse_fault(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -194,6 +194,16 @@ pub enum RoundView {
     },
 }
 
+impl RoundView {
+    /// Where it is now, world.
+    pub const fn place(&self) -> DVec3 {
+        match *self {
+            Self::Tracer { to, .. } => to,
+            Self::Splash { at, .. } | Self::Strike { at, .. } => at,
+        }
+    }
+}
+
 /// Light, linear, in units in which the video's white is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {

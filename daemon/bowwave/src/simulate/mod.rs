@@ -19,9 +19,9 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use bowwave_core::{plan::ScenePlan, time::Time};
+use bowwave_core::{plan::ScenePlan, scene::Pass, session::ROUNDS_SEEN_MAX, time::Time};
 use bowwave_record::{Journal, Run};
-use bowwave_render::{RenderConfig, Renderer};
+use bowwave_render::{Needs, PictureShape, RenderConfig, Renderer};
 
 use crate::{cli::Simulate, hits::JOURNAL, outcome::Outcome};
 use output::{Output, OutputOptions};
@@ -80,14 +80,20 @@ fn expected_frames(arguments: &Simulate, recording_ns: i64) -> u64 {
 }
 
 fn render_config(plan: &ScenePlan, prepared: &prepare::Prepared) -> RenderConfig {
+    let only = |pass: Pass, n: usize| if plan.has(pass) { n } else { 0 };
+    let waters = if plan.has(Pass::Water) { vec![(plan.water.method, plan.water.shadow)] } else { Vec::new() };
     RenderConfig {
+        width: plan.size.0,
+        height: plan.size.1,
         device: prepared.gpu.clone(),
         validation: prepared.validation,
         frames_in_flight: FRAMES_IN_FLIGHT,
-        width: plan.size.0,
-        height: plan.size.1,
-        needs: bowwave_render::Needs { boats_max: plan.boats, ..Default::default() },
-        picture: None,
+        needs: Needs {
+            boats_max: only(Pass::Boats, plan.boats),
+            rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
+            waters,
+        },
+        picture: Some(PictureShape { format: plan.video, width: plan.picture.0, height: plan.picture.1 }),
     }
 }
 

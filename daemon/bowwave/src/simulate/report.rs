@@ -97,6 +97,7 @@ impl Finished {
             ("pictures_undecodable", r.frames.undecodable),
             ("pictures_overwritten", r.frames_overwritten),
             ("pictures_late", r.frames_late),
+            ("faults_injected", r.faults),
             ("trigger_edges", r.triggers),
             ("ring_waits", self.tally.ring_waits),
             ("recording_entries_dropped", self.dropped_entries),

@@ -25,7 +25,10 @@ use bowwave_core::{
 use bowwave_devices::clock::now;
 use bowwave_record::{Journal, JournalError, PoseEntry};
 use bowwave_render::Renderer;
-use hw_sim::replay::{Replay, ReplayError, ReplayOptions};
+use hw_sim::{
+    fault::FaultPlan,
+    replay::{Replay, ReplayError, ReplayOptions},
+};
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -47,7 +50,8 @@ pub fn open_replay(path: &Path, realtime: bool, arguments: &Simulate, frames: u6
     let asked = arguments.frames.is_some() || arguments.duration.is_some();
     // A little more than asked for, so that the last frames do not run dry.
     let duration_ns = asked.then(|| (frames as i64 + FRAMES_PER_S) * NS_PER_S / FRAMES_PER_S);
-    let options = ReplayOptions { duration_ns, looped: asked, ..ReplayOptions::default() };
+    let faults = FaultPlan { seed: arguments.seed.unwrap_or(0), faults: arguments.fault.clone() };
+    let options = ReplayOptions { duration_ns, looped: asked, faults };
     Ok(if realtime { Replay::realtime(path, &options)? } else { Replay::fast(path, &options)? })
 }
 

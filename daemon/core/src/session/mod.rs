@@ -17,7 +17,7 @@ use crate::{
     plan::{Needs, ScenePlan},
     pose::{NoPose, OrientationAt, STALE_NS, camera_pose},
     scenario::Scenario,
-    scene::{Hud, Scene, Status},
+    scene::{Hud, RoundView, Scene, Status},
     score::{NotScored, Outcome, ShotRecord},
     sea::WaveField,
     time::Time,
@@ -31,6 +31,9 @@ pub use sensors::{SensorCounts, Sensors};
 
 /// How long the last round's result stays on the display, seconds.
 const RESULT_S: f64 = 1.5;
+
+/// Most tracers, splashes and strikes in one scene; of more, the farthest are left out.
+pub const ROUNDS_SEEN_MAX: usize = 64;
 
 /// How far behind the frame's time rounds are followed while no picture arrives, nanoseconds.
 const BLIND_LAG_NS: i64 = 50_000_000;
@@ -148,7 +151,7 @@ impl Session {
             lens,
             passes: plan.frame(false, &[], &[]),
             boats: Vec::with_capacity(scenario.boats.len()),
-            rounds: Vec::with_capacity(64),
+            rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
             light: meter.light(),
             water: scenario.water,
             hud: Hud {
@@ -331,6 +334,10 @@ impl Session {
             running.fleet.seen(&eye, video_time, &mut scene.boats);
             running.rounds.views(video_time, running.start, &running.fleet, &mut scene.rounds);
             scene.rounds.retain(|r| eye.sees_round(r));
+            let range = |r: &RoundView| r.place().distance(camera.position);
+            scene.rounds.sort_by(|a, b| range(b).total_cmp(&range(a)));
+            let surplus = scene.rounds.len().saturating_sub(ROUNDS_SEEN_MAX);
+            scene.rounds.drain(..surplus);
         }
         scene.passes = self.plan.frame(camera.is_some(), &scene.boats, &scene.rounds);
         scene.light = self.meter.light();
