@@ -20,30 +20,29 @@ layout(set = 1, binding = 0) uniform sampler2D video;
 // The boats mirrored in the sea, premultiplied linear light.
 layout(set = 1, binding = 1) uniform sampler2D mirror;
 
+// Mended: the normalised mean of eq. 5, from field.frag, 0 to 1 for -1 to 1.
+layout(set = 1, binding = 2) uniform sampler2D field;
+
 layout(location = 0) out vec4 colour;
+
+// Mended: how far sideways a wave moves the reflection, in parts of how far down.
+const float SIDEWAYS = 0.35;
 
 vec3 code_at(vec2 pixel) {
     return texelFetch(video, ivec2(clamp(pixel, vec2(0.0), frame.size - 1.0)), 0).rgb;
 }
 
-// Eq. 4 and 5: nine gradients downwards, their mean between their least and greatest mapped to -1 to 1.
-float normalised_mean(vec2 at, vec3 here, vec2 step_down) {
+// Eq. 4 and 5 as printed, at every pixel.
+float normalised_mean(vec2 at, vec3 here) {
     float least = 1e9, greatest = 0.0, sum = 0.0;
     for (int n = 1; n <= 9; ++n) {
-        float gradient = distance(here, code_at(at + step_down * float(n)));
+        float gradient = distance(here, code_at(at + vec2(0.0, float(n))));
         least = min(least, gradient);
         greatest = max(greatest, gradient);
         sum += gradient;
     }
-    float mean = sum / 9.0;
-    if (METHOD == 2) {
-        // As printed: 0 / 0 on a flat patch. A comparison with the result is then false (or the driver's choice); the
-        // caller's limit test is written so that no number means discarded.
-        return 2.0 / (greatest - least) * (mean - greatest) + 1.0;
-    }
-    // Mended: what differs less than the camera's noise is flat, and a flat patch does not shift.
-    float spread = greatest - least;
-    return (2.0 * (mean - greatest) + spread) / max(spread, waters[draw.index].flat_spread);
+    // 0 / 0 on a flat patch. What follows may be no number: the caller's limit test is written so that it is discarded.
+    return 2.0 / (greatest - least) * (sum / 9.0 - greatest) + 1.0;
 }
 
 // 3x3 box from four bilinear fetches: 2/3 of a texel beyond the middle weighs two texels of a row as 1 and 1/2.
@@ -79,13 +78,23 @@ vec4 reflection(vec2 at, float below) {
     if (kept == 0.0) {
         return vec4(0.0);
     }
-    vec2 down = METHOD == 2 ? vec2(0.0, 1.0) : waters[i].down;
-    float shift = sin(normalised_mean(at, here, down * waters[i].step)) * waters[i].shift;
-    // Not "greater, then discard": what is no number is discarded too.
-    if (!(abs(shift) <= waters[i].shift_limit)) {
-        return vec4(0.0);
+    vec2 move;
+    if (METHOD == 2) {
+        float shift = sin(normalised_mean(at, here)) * waters[i].shift;
+        // Not "greater, then discard": what is no number is discarded too.
+        if (!(abs(shift) <= waters[i].shift_limit)) {
+            return vec4(0.0);
+        }
+        move = vec2(shift);
+    } else {
+        // Mended: at a grazing angle waves move a reflection up and down much more than sideways, and the more the farther
+        // below the hull it is.
+        float grown = min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
+        float shift = sin(texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).r * 2.0 - 1.0) * waters[i].shift * grown;
+        vec2 down = waters[i].down;
+        move = shift * (down + SIDEWAYS * vec2(down.y, -down.x));
     }
-    return alpha * kept * blurred(uv + shift * waters[i].mirror_scale, waters[i].blur, bounds);
+    return alpha * kept * blurred(uv + move * waters[i].mirror_scale, waters[i].blur, bounds);
 }
 
 void main() {

@@ -18,6 +18,10 @@ struct WaterBlock {
     float shift_limit;   // beyond it the reflection is discarded, pixels
     float step;          // pixels between the nine gradients' places
     float flat_spread;   // spread of the gradients below which a patch counts as flat, codes 0 to 1
+    float shift_near;    // share of the largest shift at the hull-water line
+    float shift_grow;    // how that share grows, per pixel below the line
+    float pad0;
+    float pad1;
     float hull_line[HULL_LINE_COLUMNS];  // pixels below `anchor` of the hull-water line
 };
 

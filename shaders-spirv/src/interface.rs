@@ -116,12 +116,20 @@ pub struct WaterBlock {
     pub step: f32,
     /// Spread of the gradients below which a patch counts as flat, in sRGB codes 0 to 1.
     pub flat_spread: f32,
+    /// Share of the largest shift at the hull-water line.
+    pub shift_near: f32,
+    /// How that share grows, per pixel below the line.
+    pub shift_grow: f32,
+    /// Keeps the array's stride.
+    pub pad0: f32,
+    /// Keeps the array's stride.
+    pub pad1: f32,
     /// Pixels below [`WaterBlock::anchor`] of the hull-water line, column by column.
     pub hull_line: [f32; HULL_LINE_COLUMNS],
 }
 layout!(
     WaterBlock,
-    240,
+    256,
     anchor = 0,
     down = 8,
     columns = 16,
@@ -138,7 +146,11 @@ layout!(
     shift_limit = 100,
     step = 104,
     flat_spread = 108,
-    hull_line = 112,
+    shift_near = 112,
+    shift_grow = 116,
+    pad0 = 120,
+    pad1 = 124,
+    hull_line = 128,
 );
 
 impl Default for WaterBlock {

@@ -1,13 +1,17 @@
-//! Draws two boxes as boats into a photograph: `still PHOTO OUT.png [printed|full|mirror|off] [BEAUFORT] [WIDTHxHEIGHT]`.
+//! Draws boats into a photograph, to be looked at:
+//! `still PHOTO OUT.png [METHOD [FORCE [WIDTHxHEIGHT [MODEL:RANGE:BEARING:YAW...]]]]`, METHOD being one of printed, full, mirror,
+//! off; angles in degrees. `BOWWAVE_VALIDATE` in the environment switches Vulkan's validation layer on.
 
-use std::{error::Error, sync::Arc, time::Duration};
+use std::{error::Error, path::Path, sync::Arc, time::Duration};
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    scene::{ReflectionMethod, ShadowLevel, Water},
+    geometry::look,
+    scene::{Pass, PassDecision, ReflectionMethod, RoundView, ShadowLevel, Water},
     sea::BeaufortForce,
 };
 use bowwave_render::{Needs, RenderConfig, Renderer};
+use glam::{DVec3, Vec3};
 
 #[path = "../src/testing.rs"]
 mod testing;
@@ -21,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("off") => ReflectionMethod::Off,
         _ => ReflectionMethod::Full,
     };
-    let force = args.next().map_or(Ok(1), |f| f.parse())?;
+    let force = BeaufortForce::new(args.next().map_or(Ok(1), |f| f.parse())?).ok_or("no such wind force")?;
     let image = image::open(photo)?.to_rgb8();
     let (width, height) = match args.next().as_deref().and_then(|s| s.split_once('x')) {
         Some((w, h)) => (w.parse()?, h.parse()?),
@@ -29,31 +33,58 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let picture =
         Picture::new(PixelFormat::Rgb, image.width(), image.height(), Arc::from(image.as_raw().as_slice()))?;
-    let models = [
-        testing::box_model("white", [9.0, 2.6, 1.4], [0.8, 0.8, 0.78]),
-        testing::box_model("red", [5.0, 2.0, 0.9], [0.5, 0.06, 0.04]),
-    ];
+    let mut models = Vec::new();
     let mut scene = testing::empty_scene(width, height);
-    let force = BeaufortForce::new(force).ok_or("no such wind force")?;
+    scene.camera.world_from_camera = look(0.0, 0.0, 0.0);
+    scene.camera.position = DVec3::new(0.0, 0.0, 5.0);
     scene.water = Water { method, force, shadow: ShadowLevel::Gradual };
-    testing::add_boat(&mut scene, &models, 0, 60.0, -0.15, 0.4);
-    testing::add_boat(&mut scene, &models, 1, 45.0, 0.22, 2.6);
+    let mut boats: Vec<String> = args.collect();
+    if boats.is_empty() {
+        boats = ["dhow:60:-8:170", "skiff:30:6:150", "rhib:110:9:20"].map(str::to_owned).to_vec();
+    }
+    for boat in &boats {
+        let mut parts = boat.split(':');
+        let name = parts.next().unwrap_or_default();
+        let numbers: Vec<f64> = parts.map(str::parse).collect::<Result<_, _>>()?;
+        let [range, bearing, yaw] = numbers[..] else {
+            return Err("a boat is MODEL:RANGE:BEARING:YAW".into());
+        };
+        models.push(bowwave_models::resolve(name, Path::new("."))?);
+        let (bearing, yaw) = (bearing.to_radians(), yaw.to_radians());
+        testing::add_boat(&mut scene, &models, models.len() - 1, range, bearing, yaw);
+    }
+    if std::env::var_os("BOWWAVE_ROUNDS").is_some() {
+        scene.rounds = rounds(&scene);
+        scene.passes[Pass::Rounds as usize] = PassDecision::Run;
+    }
     let config = RenderConfig {
         width,
         height,
         device: None,
-        validation: std::env::var_os("VALIDATE").is_some(),
+        validation: std::env::var_os("BOWWAVE_VALIDATE").is_some(),
         frames_in_flight: 2,
-        needs: Needs { boats_max: 4, rounds_max: 8, waters: vec![(method, ShadowLevel::Gradual)] },
+        needs: Needs { boats_max: 8, rounds_max: 8, waters: vec![(method, scene.water.shadow)] },
         picture: None,
     };
     let (mut renderer, mut completions) = Renderer::new(&config, &models)?;
     renderer.submit(&scene, &picture, true)?;
     let frame = completions.wait_next(Duration::from_secs(10))?.ok_or("no frame")?;
     image::save_buffer(out, frame.rgba(), width, height, image::ExtendedColorType::Rgba8)?;
-    eprintln!("{}: {:?} ms, passes {:?}", renderer.device().name, frame.frame_ms, frame.passes_ms);
     for message in renderer.validation_messages() {
         eprintln!("{message}");
     }
     Ok(())
+}
+
+/// A tracer towards the first boat, a splash before it and a strike on it.
+fn rounds(scene: &bowwave_core::scene::Scene) -> Vec<RoundView> {
+    let Some(boat) = scene.boats.first() else { return Vec::new() };
+    let (at, eye) = (boat.pose.position, scene.camera.position);
+    let on = |share: f64| eye - DVec3::Z * 0.3 + (at + DVec3::Z - eye) * share;
+    vec![
+        RoundView::Splash { at: at + DVec3::new(4.0, 6.0, 0.0), height_m: 5.0, radius_m: 0.9, opacity: 0.9 },
+        RoundView::Splash { at: at - DVec3::new(3.0, 8.0, 0.0), height_m: 3.0, radius_m: 0.7, opacity: 0.8 },
+        RoundView::Strike { at: at + DVec3::Z * 1.5, radius_m: 0.8, opacity: 0.9 },
+        RoundView::Tracer { from: on(0.5), to: on(0.8), radiance: Vec3::new(4.0, 1.2, 0.5) },
+    ]
 }

@@ -24,8 +24,8 @@ use crate::{
 };
 
 /// Pixels beyond a reflection's rectangle at which the water shader still compares the video: nine gradients of at most eight
-/// pixels' step.
-const GRADIENTS_REACH_PX: u32 = 72;
+/// pixels' step, and the cells that they are taken in.
+const GRADIENTS_REACH_PX: u32 = 84;
 
 /// `r` with the pixels that gradients starting in it can reach, on a screen of `size`.
 pub(crate) fn with_gradients(r: PixelRect, size: (u32, u32)) -> PixelRect {

@@ -329,8 +329,11 @@ impl Renderer {
         }
         let mut steps = Steps::default();
         steps.add([self.canvas.between()]);
-        steps.add(water.map(WaterPass::between));
+        steps.add(water.iter().flat_map(|w| w.between(how)).flatten());
         steps.record(to);
+        if let Some(pass) = water {
+            stamps.around(Span::Field, || pass.record_field(to, frame, how, &plan.waters));
+        }
         if !self.canvas.begin(to, &plan.rects) {
             return;
         }

@@ -29,6 +29,7 @@ pub(crate) enum Span {
     VideoCopy,
     Mirror,
     BoatLayer,
+    Field,
     Water,
     Composite,
     Rounds,
@@ -36,11 +37,12 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Video,
         Self::VideoCopy,
         Self::Mirror,
         Self::BoatLayer,
+        Self::Field,
         Self::Water,
         Self::Composite,
         Self::Rounds,
@@ -52,7 +54,7 @@ impl Span {
         match self {
             Self::Video | Self::VideoCopy => Pass::Video,
             Self::Mirror => Pass::Mirror,
-            Self::Water => Pass::Water,
+            Self::Field | Self::Water => Pass::Water,
             Self::BoatLayer | Self::Composite => Pass::Boats,
             Self::Rounds => Pass::Rounds,
             Self::Hud => Pass::Hud,

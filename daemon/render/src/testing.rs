@@ -3,11 +3,9 @@
 use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
-    scene::{
-        BoatView, Hud, LeftOut, Light, Pass, PassDecision, PixelRect, ReflectionMethod, Scene, ShadowLevel,
-        Status, Water,
-    },
+    scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
     sea::BeaufortForce,
+    view::{Afloat, Eye},
 };
 use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
 
@@ -81,48 +79,18 @@ pub fn box_model(name: &str, [length, beam, height]: [f32; 3], albedo: [f32; 3])
 pub fn add_boat(scene: &mut Scene, models: &[Model], model: usize, range: f64, bearing: f64, yaw: f64) {
     let position = DVec3::new(range * bearing.sin(), range * bearing.cos(), 0.0);
     let pose = RigidPose { world_from_body: DQuat::from_rotation_z(yaw), position };
-    let shape = &models[model];
-    let (hull, reflection) = (bounds(scene, shape, &pose, false), bounds(scene, shape, &pose, true));
-    scene.boats.push(BoatView {
-        boat: scene.boats.len(),
-        model: ModelId(u16::try_from(model).unwrap()),
-        pose,
-        water_level: 0.0,
-        hull,
-        reflection,
-        range_m: range,
-        haze: 0.05,
-        beyond_horizon: false,
-    });
+    add_boat_in(scene, models, model, pose);
+}
+
+/// The same with any pose; the mean water is the world's z = 0. A boat that is not seen is not added.
+pub fn add_boat_in(scene: &mut Scene, models: &[Model], model: usize, pose: RigidPose) {
+    let eye = Eye { camera: &scene.camera, lens: &scene.lens, visibility_m: 20_000.0, reflections: true };
+    let model_id = ModelId(u16::try_from(model).unwrap());
+    let boat = scene.boats.len();
+    let seen = eye.see(&Afloat { boat, model_id, model: &models[model], pose, water_level: 0.0 });
+    scene.boats.extend(seen);
     scene.boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
     for pass in [Pass::Mirror, Pass::Water, Pass::Boats] {
         scene.passes[pass as usize] = PassDecision::Run;
     }
-}
-
-/// Pixels that a boat's bounding box, or its mirror image with some room for waves, can cover.
-fn bounds(scene: &Scene, model: &Model, pose: &RigidPose, mirrored: bool) -> Option<PixelRect> {
-    let (lens, margin) = (&scene.lens, if mirrored { 12.0 } else { 2.0 });
-    let (mut low, mut high) = (DVec2::MAX, DVec2::MIN);
-    for i in 0..8 {
-        let pick = |axis: usize, bit: usize| if i & bit == 0 { model.min[axis] } else { model.max[axis] };
-        let mut p = pose.to_world(Vec3::new(pick(0, 1), pick(1, 2), pick(2, 4)).as_dvec3());
-        if mirrored {
-            p.z = -p.z;
-        }
-        let mut c = scene.camera.to_camera(p);
-        c.z = c.z.max(0.2);
-        let n = (c.truncate() / c.z).clamp(DVec2::splat(-5.0), DVec2::splat(5.0));
-        let pixel = lens.distort(n) * lens.focal + lens.centre;
-        (low, high) = (low.min(pixel), high.max(pixel));
-    }
-    let screen = DVec2::new(f64::from(lens.width), f64::from(lens.height));
-    let low = (low - margin).floor().clamp(DVec2::ZERO, screen);
-    let high = (high + margin).ceil().clamp(DVec2::ZERO, screen);
-    (low.x < high.x && low.y < high.y).then(|| PixelRect {
-        x: low.x as u32,
-        y: low.y as u32,
-        width: (high.x - low.x) as u32,
-        height: (high.y - low.y) as u32,
-    })
 }

@@ -28,7 +28,7 @@ const PRINTED_SHADOW: [(f64, f64); 2] = [(0.5, 120.0), (0.9, 25.0)];
 /// Mended: k of eq. 6 in heights of the boat on the screen, by wind force.
 const FADE_HEIGHTS: [f64; FORCE_MAX + 1] = [2.4, 1.6, 1.15, 0.8, 0.55];
 /// Mended: largest shift in heights of the boat.
-const SHIFT_HEIGHTS: [f64; FORCE_MAX + 1] = [0.03, 0.08, 0.13, 0.18, 0.24];
+const SHIFT_HEIGHTS: [f64; FORCE_MAX + 1] = [0.08, 0.20, 0.26, 0.29, 0.30];
 /// Mended: step of the box blur in heights of the boat.
 const BLUR_HEIGHTS: [f64; FORCE_MAX + 1] = [0.012, 0.025, 0.04, 0.06, 0.08];
 /// Mended: brightness over which the video begins to pass through, and over which it passes whole; dark, then bright.
@@ -37,6 +37,14 @@ const PASSES: [f64; 4] = [0.02, 0.08, 0.80, 0.95];
 const SHADOW: [(f64, f64); 2] = [(0.35, 0.55), (0.7, 0.16)];
 /// Mended: spread of the nine gradients, in codes 0 to 1, that a camera's noise alone makes.
 const NOISE_SPREAD: f64 = 0.03;
+
+/// Mended: pixels between the nine gradients' places, in heights of the boat, and at most.
+const STEP_HEIGHTS: f64 = 0.012;
+const STEP_MAX_PX: f64 = 8.0;
+/// Mended: share of the largest shift at the hull, and over how many heights of the boat it grows to the whole: a wave's slope
+/// moves what stands high above the water more.
+const SHIFT_NEAR: f64 = 0.15;
+const SHIFT_GROWN_HEIGHTS: f64 = 0.8;
 
 /// Wind speed in the middle of each force, m/s (WMO-No. 306, code table 1100).
 const WIND_M_S: [f64; FORCE_MAX + 1] = [0.1, 0.9, 2.5, 4.4, 6.7];
@@ -161,7 +169,7 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
     };
     let (dark, bright) = PRINTED_PASSES;
     let passes = if mended { PASSES } else { [dark - 1e-4, dark, bright, bright + 1e-4] };
-    let step = if mended { (0.02 * height).clamp(1.0, 8.0) } else { 1.0 };
+    let step = if mended { (STEP_HEIGHTS * height).clamp(1.0, STEP_MAX_PX) } else { 1.0 };
     let blur = if mended { blur_px(scene, line).max(1.0) } else { 1.0 };
     let texels = DVec2::new(f64::from(placed.atlas.0), f64::from(placed.atlas.1));
     let scale = DVec2::splat(placed.scale) / texels;
@@ -183,6 +191,10 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
         shift_limit: limit as f32,
         step: step as f32,
         flat_spread: NOISE_SPREAD as f32,
+        shift_near: SHIFT_NEAR as f32,
+        shift_grow: ((1.0 - SHIFT_NEAR) / (SHIFT_GROWN_HEIGHTS * height)) as f32,
+        pad0: 0.0,
+        pad1: 0.0,
         hull_line: line.below.map(|b| b as f32),
     }
 }
@@ -194,7 +206,7 @@ fn mirrored_share(scene: &Scene, boat: &BoatView) -> f64 {
     let grazing = eye.atan2(boat.range_m.max(1.0));
     // Cox and Munk 1954, upwind.
     let slope = (0.00316 * WIND_M_S[force(scene)]).sqrt();
-    fresnel(std::f64::consts::FRAC_PI_2 - grazing - 0.5 * slope)
+    fresnel(std::f64::consts::FRAC_PI_2 - grazing - 0.5 * slope).sqrt()
 }
 
 /// Reflectance of the sea for unpolarised light at `incidence` radians from the normal.

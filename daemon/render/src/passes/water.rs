@@ -3,14 +3,15 @@
 
 use ash::vk;
 use bowwave_core::scene::{PixelRect, ReflectionMethod, ShadowLevel, Water};
-use shaders_spirv::{RECT_VERT, WATER_FRAG, interface::DrawBlock};
+use shaders_spirv::{FIELD_FRAG, RECT_VERT, WATER_FRAG, interface::DrawBlock};
 
 use crate::{
     error::RenderError,
     memory::{Image, ImageShape},
-    passes::{COPIED_TO, FORGET_READ, Making, SAMPLED, mirror::MirrorPass},
+    passes::{COPIED_TO, DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass},
     pipeline::{
-        Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout, Step, UNORM, corners,
+        Begin, Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout, Step, UNORM,
+        corners, joined,
     },
 };
 
@@ -29,13 +30,26 @@ struct Variant {
     pipeline: Pipeline,
 }
 
+/// How the video's brightness changes downwards, at a fraction of the screen's size.
+struct Field {
+    pipeline: Pipeline,
+    image: Image,
+    set: vk::DescriptorSet,
+    _set_layout: SetLayout,
+}
+
+/// Screen pixels to a cell of the field, as `field.frag` and `water.frag` have it.
+const FIELD_CELL: (u32, u32) = (4, 2);
+
 /// The water pass.
 pub(crate) struct WaterPass {
+    size: (u32, u32),
     variants: Vec<Variant>,
+    field: Option<Field>,
     /// The video beneath the reflections, as codes: what the shader compares, while it draws to the screen.
     pub(crate) backdrop: Image,
     set: vk::DescriptorSet,
-    _samplers: [Sampler; 2],
+    _sampler: Sampler,
     _set_layout: SetLayout,
 }
 
@@ -51,18 +65,19 @@ impl WaterPass {
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         let size = if compares { making.size } else { (1, 1) };
         let backdrop = Image::new(gpu, "video beneath reflections", ImageShape::new(size, UNORM, usage))?;
-        let samplers =
-            [Sampler::new(gpu, vk::Filter::NEAREST, false)?, Sampler::new(gpu, vk::Filter::LINEAR, false)?];
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; 2];
+        let linear = Sampler::new(gpu, vk::Filter::LINEAR, false)?;
+        let bound = |view: vk::ImageView| Bound::Texture { view, sampler: linear.raw, layout: SAMPLED.2 };
+        let field = waters
+            .iter()
+            .any(|(method, _)| *method == ReflectionMethod::Full)
+            .then(|| Field::new(making, bound(backdrop.view)))
+            .transpose()?;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; 3];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let layout = SAMPLED.2;
-        // Variants that read no mirror layer still name one.
+        // Variants that read no mirror layer or no field still name one.
         let mirror_view = mirror.map_or(backdrop.view, |m| m.colour.view);
-        let bound = [
-            Bound::Texture { view: backdrop.view, sampler: samplers[0].raw, layout },
-            Bound::Texture { view: mirror_view, sampler: samplers[1].raw, layout },
-        ];
-        let set = making.pool.set(&set_layout, &bound)?;
+        let field_view = field.as_ref().map_or(backdrop.view, |f| f.image.view);
+        let set = making.pool.set(&set_layout, &[backdrop.view, mirror_view, field_view].map(bound))?;
         let mut variants = Vec::with_capacity(waters.len());
         for (method, shadow) in waters {
             let pipeline = Pipeline::new(
@@ -83,7 +98,15 @@ impl WaterPass {
             )?;
             variants.push(Variant { method: *method, shadow: *shadow, pipeline });
         }
-        Ok(Self { variants, backdrop, set, _samplers: samplers, _set_layout: set_layout })
+        Ok(Self {
+            size: making.size,
+            variants,
+            field,
+            backdrop,
+            set,
+            _sampler: linear,
+            _set_layout: set_layout,
+        })
     }
 
     /// Whether a method compares colours of the video.
@@ -106,9 +129,44 @@ impl WaterPass {
         Step { image: &self.backdrop, from: was, to: COPIED_TO }
     }
 
-    /// Step of the backdrop to being sampled.
-    pub(crate) fn between(&self) -> Step<'_> {
-        Step { image: &self.backdrop, from: COPIED_TO, to: SAMPLED }
+    /// Steps of the backdrop to being sampled, and of the field to being drawn.
+    pub(crate) fn between(&self, water: Water) -> [Option<Step<'_>>; 2] {
+        let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
+        let field = self.field.as_ref().filter(|_| water.method == ReflectionMethod::Full);
+        [
+            Some(Step { image: &self.backdrop, from: COPIED_TO, to: SAMPLED }),
+            field.map(|f| Step { image: &f.image, from: was, to: DRAWN }),
+        ]
+    }
+
+    /// Finds how the video changes beneath the boats' reflections, where the method needs it.
+    pub(crate) fn record_field(
+        &self,
+        to: Recorder<'_>,
+        frame: vk::DescriptorSet,
+        water: Water,
+        boats: &[WaterDraw],
+    ) {
+        let Some(field) = self.field.as_ref().filter(|_| water.method == ReflectionMethod::Full) else {
+            return;
+        };
+        let Some(area) = boats.iter().map(|b| field.cells(b.rect)).reduce(joined) else { return };
+        to.begin(area, (field.image.view, Begin::Forget), None);
+        let (width, height) = (self.size.0 as f32, self.size.1 as f32);
+        to.window([0.0, 0.0, width / FIELD_CELL.0 as f32, height / FIELD_CELL.1 as f32], area);
+        to.bind(&field.pipeline, &[frame, field.set]);
+        for boat in boats {
+            to.scissor(field.cells(boat.rect));
+            // The scissor rounds outwards; the quad must reach as far.
+            let [x0, y0, x1, y1] = corners(boat.rect);
+            to.push(
+                &field.pipeline,
+                &DrawBlock { rect: [x0 - 8.0, y0 - 8.0, x1 + 8.0, y1 + 8.0], index: boat.index },
+            );
+            to.draw(4, 1);
+        }
+        to.end();
+        to.barrier([Step { image: &field.image, from: DRAWN, to: SAMPLED }]);
     }
 
     /// Draws, within a rendering to the screen.
@@ -126,6 +184,45 @@ impl WaterPass {
             to.push(&variant.pipeline, &DrawBlock { rect: corners(boat.rect), index: boat.index });
             to.draw(4, 1);
         }
+    }
+}
+
+impl Field {
+    fn new(making: &Making<'_>, backdrop: Bound) -> Result<Self, RenderError> {
+        let gpu = making.gpu;
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
+        let size = (making.size.0.div_ceil(FIELD_CELL.0), making.size.1.div_ceil(FIELD_CELL.1));
+        let format = vk::Format::R8_UNORM;
+        let image = Image::new(gpu, "gradients of the video", ImageShape::new(size, format, usage))?;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
+        let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let set = making.pool.set(&set_layout, &[backdrop])?;
+        let pipeline = Pipeline::new(
+            gpu,
+            &PipelineShape {
+                vertex: RECT_VERT,
+                fragment: FIELD_FRAG,
+                constants: &[],
+                sets: &[making.frame_set, &set_layout],
+                push: size_of::<DrawBlock>(),
+                vertices: None,
+                topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
+                colour: format,
+                blend: Blend::Replace,
+                depth: false,
+                samples: vk::SampleCountFlags::TYPE_1,
+            },
+        )?;
+        Ok(Self { pipeline, image, set, _set_layout: set_layout })
+    }
+
+    /// The cells whose light bilinear fetches within `r` take.
+    fn cells(&self, r: PixelRect) -> PixelRect {
+        let (width, height) = (self.image.shape.width, self.image.shape.height);
+        let (x, y) = ((r.x / FIELD_CELL.0).saturating_sub(1), (r.y / FIELD_CELL.1).saturating_sub(1));
+        let right = ((r.x + r.width).div_ceil(FIELD_CELL.0) + 1).min(width);
+        let lower = ((r.y + r.height).div_ceil(FIELD_CELL.1) + 1).min(height);
+        PixelRect { x, y, width: right - x, height: lower - y }
     }
 }
 

@@ -1,0 +1,43 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Nelson 2009, eq. 4 and 5, mended: how the video's brightness changes downwards, once for each FIELD_CELL of the screen. Seen
+// at a grazing angle waves are long and low, so a cell is wider than high; it averages the camera's noise away, and costs an
+// eighth of doing it at every pixel.
+#include "frame.glsl"
+#include "water_block.glsl"
+
+layout(push_constant) uniform DrawBlock {
+    vec4 rect;
+    uint index;
+} draw;
+
+// The video beneath, as codes, bilinear.
+layout(set = 1, binding = 0) uniform sampler2D video;
+
+layout(location = 0) out float normalised;
+
+// Pixels of the screen to a cell.
+const vec2 FIELD_CELL = vec2(4.0, 2.0);
+
+// Mean of the cell around a pixel corner: each fetch takes the mean of 2 x 2 pixels.
+vec3 mean_code(vec2 corner) {
+    vec2 texel = 1.0 / frame.size;
+    return 0.5 * (texture(video, (corner - vec2(1.0, 0.0)) * texel).rgb + texture(video, (corner + vec2(1.0, 0.0)) * texel).rgb);
+}
+
+void main() {
+    vec2 at = gl_FragCoord.xy * FIELD_CELL;
+    vec2 down = waters[draw.index].down * waters[draw.index].step;
+    vec3 here = mean_code(at);
+    float least = 1e9, greatest = 0.0, sum = 0.0;
+    for (int n = 1; n <= 9; ++n) {
+        float gradient = distance(here, mean_code(at + down * float(n)));
+        least = min(least, gradient);
+        greatest = max(greatest, gradient);
+        sum += gradient;
+    }
+    // What differs less than the camera's noise is flat, and a flat patch does not shift.
+    float spread = greatest - least;
+    float n = (2.0 * (sum / 9.0 - greatest) + spread) / max(spread, waters[draw.index].flat_spread);
+    normalised = 0.5 * n + 0.5;
+}
