@@ -1,5 +1,7 @@
 //! Made recordings: what is in the picture is where the truth says, everything loops, and a seed means one recording.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{collections::BTreeMap, sync::LazyLock};
 
 use bowwave_calibration::parse;

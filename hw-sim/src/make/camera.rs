@@ -19,16 +19,25 @@ const TRANSFER: usize = 16_384;
 const LIGHT_MAX: f32 = 1.6;
 /// Values of the noise table; 10 bits of a random number choose one.
 const NOISE: usize = 1024;
+/// Steps of the noise's deviation over 0 to [`LIGHT_MAX`].
+const DEVIATIONS: usize = 128;
 /// Half the sun's diameter, radians.
 const SUN_RADIUS: f32 = 0.004_65;
 
-/// What stays the same from frame to frame.
+/// What there is to see, all but the waves.
+pub(super) struct Scene {
+    pub sky: Sky,
+    pub panorama: Panorama,
+    pub water: SeaShader,
+}
+
+/// What of the camera stays the same from frame to frame.
 pub(super) struct Camera {
     lens: Lens,
     /// Undistorted normalised coordinates of every pixel's centre, and its share of light.
     rays: Vec<[f32; 3]>,
     transfer: Vec<u8>,
-    /// Deviation of the noise by light, in 64 steps of the transfer table's range.
+    /// Deviation of the noise by light, in [`DEVIATIONS`] steps up to [`LIGHT_MAX`].
     deviation: Vec<f32>,
     normal: Vec<f32>,
     quality: u8,
@@ -60,7 +69,10 @@ impl Camera {
             })
             .collect();
         let (read, shot) = (recipe.camera.read_noise as f32, recipe.camera.shot_noise as f32);
-        let deviation = (0..=64).map(|i| (read + shot * i as f32 * LIGHT_MAX / 64.0).sqrt()).collect();
+        // Twice as long as used, so that its length is a power of two.
+        let deviation = (0..2 * DEVIATIONS)
+            .map(|i| (read + shot * (i as f32 + 0.5) * LIGHT_MAX / DEVIATIONS as f32).sqrt())
+            .collect();
         let normal = (0..NOISE)
             .map(|i| {
                 let p = (i as f64 + 0.5) / NOISE as f64;
@@ -79,30 +91,29 @@ impl Camera {
         }
     }
 
-    /// Draws what the camera sees from `pose` into `memory.rgb`.
+    /// Draws what the camera sees of `scene` from `pose` into `memory.rgb`.
     pub fn expose(
         &self,
-        shader: &SeaShader,
+        scene: &Scene,
         surface: &Surface,
-        sky: &Sky,
-        panorama: &Panorama,
         pose: &CameraPose,
         frame: u32,
         memory: &mut FrameMemory,
     ) {
         let forward = pose.world_from_camera * DVec3::Z;
         let azimuth = forward.x.atan2(forward.y);
-        let level_from_camera = (look(azimuth, 0.0, 0.0).inverse() * pose.world_from_camera).normalize();
-        let turn = Mat3::from_quat(level_from_camera.as_quat());
-        let view = self.level_view(turn, azimuth as f32, pose.position.z as f32);
-        shader.draw(surface, sky, &view, pose.position.z as f32, &mut memory.sea);
-        let sun = (look(azimuth, 0.0, 0.0).inverse() * sky.sun.as_dvec3()).as_vec3();
+        let level_from_world = look(azimuth, 0.0, 0.0).inverse();
+        let turn = Mat3::from_quat((level_from_world * pose.world_from_camera).normalize().as_quat());
+        let eye_height = pose.position.z as f32;
+        let view = self.level_view(turn, azimuth as f32, eye_height);
+        scene.water.draw(surface, &scene.sky, &view, eye_height, &mut memory.sea);
+        let sun = (level_from_world * scene.sky.sun.as_dvec3()).as_vec3();
         let width = self.lens.width as usize;
         memory.rgb.resize(self.rays.len() * 3, 0);
         for (y, (row, rays)) in memory.rgb.chunks_mut(width * 3).zip(self.rays.chunks(width)).enumerate() {
             let mut random = Pcg32::new(mix(self.seed ^ u64::from(frame)), y as u64);
             for (pixel, ray) in row.chunks_exact_mut(3).zip(rays) {
-                let light = self.light(turn, *ray, &view, &memory.sea, panorama, sun);
+                let light = light(scene, turn, *ray, &view, &memory.sea, sun);
                 self.develop(light, ray[2], random.next_u32(), pixel);
             }
         }
@@ -134,44 +145,19 @@ impl Camera {
     }
 
     #[inline(always)]
-    fn light(
-        &self,
-        turn: Mat3,
-        ray: [f32; 3],
-        view: &LevelView,
-        sea: &SeaPicture,
-        panorama: &Panorama,
-        sun: Vec3,
-    ) -> Vec4 {
-        let d = turn * Vec3::new(ray[0], ray[1], 1.0);
-        let inverse = 1.0 / d.z;
-        let (nx, ny) = (d.x * inverse, d.y * inverse);
-        let water = bilinear(sea, view, nx * view.focal + view.centre, ny * view.focal + view.level_row);
-        let open = 1.0 - water[3];
-        if open < 1e-3 {
-            return water;
-        }
-        let tangent = -ny / (1.0 + nx * nx).sqrt();
-        let mut sky = panorama.at(view.azimuth + arctangent(nx), tangent);
-        let towards = d.dot(sun);
-        if towards > 0.0 && towards * towards > d.length_squared() * (1.0 - 6.0 * SUN_RADIUS * SUN_RADIUS) {
-            let off = d.normalize().cross(sun).length();
-            let disc = 1.0 - super::noise::smoothstep(0.9 * SUN_RADIUS, 1.15 * SUN_RADIUS, off);
-            sky += 50.0 * disc;
-        }
-        water + open * sky
-    }
-
-    #[inline(always)]
     fn develop(&self, light: Vec4, fall_off: f32, random: u32, pixel: &mut [u8]) {
         const PER_LIGHT: f32 = TRANSFER as f32 / LIGHT_MAX;
-        let light = light.to_array();
-        for c in 0..3 {
-            let clean = (light[c] * fall_off).clamp(0.0, LIGHT_MAX);
-            let deviation = self.deviation[(clean * (64.0 / LIGHT_MAX)) as usize & 127];
-            let noise = self.normal[(random >> (10 * c + 1)) as usize & (NOISE - 1)];
-            let step = ((clean + deviation * noise) * PER_LIGHT).clamp(0.0, (TRANSFER - 1) as f32);
-            pixel[c] = self.transfer[step as usize];
+        let clean = (light * fall_off).clamp(Vec4::ZERO, Vec4::splat(LIGHT_MAX));
+        let shades = (clean * (DEVIATIONS as f32 / LIGHT_MAX)).to_array();
+        let noise = |c: usize| {
+            let deviation = self.deviation[split(shades[c]).0 & (2 * DEVIATIONS - 1)];
+            deviation * self.normal[(random >> (10 * c + 1)) as usize & (NOISE - 1)]
+        };
+        let exposed = clean + Vec4::new(noise(0), noise(1), noise(2), 0.0);
+        let steps =
+            (exposed * PER_LIGHT).clamp(Vec4::splat(0.5), Vec4::splat(TRANSFER as f32 - 0.5)).to_array();
+        for (value, step) in pixel.iter_mut().zip(steps) {
+            *value = self.transfer[split(step).0 & (TRANSFER - 1)];
         }
     }
 
@@ -186,6 +172,28 @@ impl Camera {
         )?;
         Ok(jpeg)
     }
+}
+
+/// Light that falls on the sensor along a ray of the camera, turned into the level view.
+#[inline(always)]
+fn light(scene: &Scene, turn: Mat3, ray: [f32; 3], view: &LevelView, sea: &SeaPicture, sun: Vec3) -> Vec4 {
+    let d = turn * Vec3::new(ray[0], ray[1], 1.0);
+    let inverse = 1.0 / d.z;
+    let (nx, ny) = (d.x * inverse, d.y * inverse);
+    let water = bilinear(sea, view, nx * view.focal + view.centre, ny * view.focal + view.level_row);
+    let open = 1.0 - water[3];
+    if open < 1e-3 {
+        return water;
+    }
+    let tangent = -ny / (1.0 + nx * nx).sqrt();
+    let mut sky = scene.panorama.at(view.azimuth + arctangent(nx), tangent);
+    let towards = d.dot(sun);
+    if towards > 0.0 && towards * towards > d.length_squared() * (1.0 - 6.0 * SUN_RADIUS * SUN_RADIUS) {
+        let off = d.normalize().cross(sun).length();
+        let disc = 1.0 - super::noise::smoothstep(0.9 * SUN_RADIUS, 1.15 * SUN_RADIUS, off);
+        sky += 50.0 * disc;
+    }
+    water + open * sky
 }
 
 #[inline(always)]

@@ -136,11 +136,10 @@ impl Field {
             let (sin, cos) = (TAU * (f64::from(n) * turn).fract()).sin_cos();
             Complex::new(cos as f32, -sin as f32)
         }));
-        for c in 0..CASCADES {
+        for (c, squeeze) in SQUEEZE.into_iter().enumerate() {
             self.transform(c, surface);
             let per_metre = surface.tiles[c].per_metre;
             displace(surface, per_metre);
-            let squeeze = SQUEEZE[c];
             fill_tile(&mut surface.tiles[c], &surface.heights, &surface.along, &surface.across, squeeze);
         }
     }

@@ -13,14 +13,14 @@ use super::{
     field::{CASCADES, Covariance, Field, LEVELS, Surface},
     foam::Foam,
     patches::Patches,
-    shade::{COLUMNS_PER_RADIAN, Glitter, Roughness, WaterTable},
+    shade::{COLUMNS_PER_RADIAN, Glitter, Roughness, Slice, WaterTable},
     sky::{Dome, Rgb, Sky},
 };
 
 /// Pieces of water per row of the picture where waves are drawn one by one.
-const STEPS_PER_ROW: f32 = 1.2;
+const STEPS_PER_ROW: f32 = 1.1;
 /// Longest step relative to range there: front and back of the waves must be met even where a row spans many of them.
-const STEP_MAX: f32 = 0.007;
+const STEP_MAX: f32 = 0.008;
 /// Beyond this range single waves only tint a row.
 const FAR_M: f32 = 900.0;
 /// Longest step relative to range beyond.
@@ -30,7 +30,7 @@ const SHORTEST: f32 = 0.3;
 /// Rows of the water table over range.
 const TABLE_ROWS: usize = 32;
 /// Columns between which the glitter's parameters are interpolated.
-const GLITTER_STRIDE: usize = 16;
+const GLITTER_STRIDE: usize = 32;
 /// Columns drawn together.
 const BLOCK: usize = 64;
 /// Most columns from one look-up to the next; divides [`BLOCK`].
@@ -84,6 +84,14 @@ struct Column {
     scale: f32,
     table_column: f32,
     haze: Vec4,
+}
+
+/// What is looked at in one frame, and from where.
+struct Look<'a> {
+    surface: &'a Surface,
+    sky: &'a Sky,
+    view: &'a LevelView,
+    eye_height: f32,
 }
 
 /// What stays the same over a recording.
@@ -168,10 +176,11 @@ impl SeaShader {
         picture.highest.resize(view.width, f32::MAX);
         self.columns(view, &mut picture.columns);
         // Some columns at a time, so that the part of the tiles that they walk over stays in the nearest cache.
+        let look = Look { surface, sky, view, eye_height };
         for first in (0..view.width).step_by(BLOCK) {
             let block = first..(first + BLOCK).min(view.width);
             for step in &self.steps {
-                self.ring(step, surface, sky, view, eye_height, block.clone(), picture);
+                self.ring(step, &look, block.clone(), picture);
             }
         }
     }
@@ -198,64 +207,71 @@ impl SeaShader {
     }
 
     /// A block of columns at one distance.
-    #[expect(clippy::too_many_arguments, reason = "the innermost loop, called from one place")]
-    fn ring(
-        &self,
-        step: &Step,
-        surface: &Surface,
-        sky: &Sky,
-        view: &LevelView,
-        eye_height: f32,
-        block: Range<usize>,
-        picture: &mut SeaPicture,
-    ) {
+    fn ring(&self, step: &Step, look: &Look<'_>, block: Range<usize>, picture: &mut SeaPicture) {
         let first = block.start;
-        let glitter: [Glitter; BLOCK / GLITTER_STRIDE + 1] = std::array::from_fn(|i| {
-            let column = picture.columns[first + i * GLITTER_STRIDE];
-            Glitter::new(&step.roughness, column.east, column.north, sky)
-        });
-        let slice = self.table.slice(step.table_row);
-        let inverse_range = 1.0 / step.range;
-        let sun = self.sun_irradiance;
+        let columns = &picture.columns[first..=first + BLOCK];
         // All look-ups first: they wait for memory side by side, which the branches below would prevent.
         let mut waters = [Vec4::ZERO; BLOCK];
-        let columns = &picture.columns[first..=first + BLOCK];
-        sample(step, surface, columns, &mut waters);
+        sample(step, look.surface, columns, &mut waters);
         let mut patches = [0.0f32; BLOCK];
         let patch_stride = stride(step.spacing, 2.0 * Patches::SPACING_M);
         interpolate(step, columns, patch_stride, &mut patches, |e, n| self.patches.at(e, n));
+        let glitter: [Glitter; BLOCK / GLITTER_STRIDE + 1] = std::array::from_fn(|i| {
+            let column = columns[i * GLITTER_STRIDE];
+            Glitter::new(&step.roughness, column.east, column.north, look.sky)
+        });
+        let glitters = glitter.iter().any(Glitter::within_reach);
+        let slice = self.table.slice(step.table_row);
+        let inverse_range = 1.0 / step.range;
         for x in block {
             let column = picture.columns[x];
             let water = waters[x - first];
-            let tangent = (water[0] - step.drop - eye_height) * inverse_range;
-            let row = view.level_row - column.scale * tangent;
+            let tangent = (water.x - step.drop - look.eye_height) * inverse_range;
+            let row = look.view.level_row - column.scale * tangent;
             let below = picture.highest[x];
             if row >= below {
                 continue;
             }
             picture.highest[x] = row;
-            if below == f32::MAX || below <= 0.0 || row >= view.height as f32 {
+            // The first piece of a column has no lower edge yet; it lies below the picture.
+            if below == f32::MAX || below <= 0.0 || row >= look.view.height as f32 {
                 continue;
             }
-            let patch = patches[x - first];
-            let gain = 1.0 + 0.35 * patch.clamp(-1.5, 1.5);
-            let along = gain * (water[1] * column.east + water[2] * column.north) + 0.012 * patch;
-            let across = gain * (water[1] * column.north - water[2] * column.east);
-            let turned = (-2.0 * (along + step.grazing).max(0.0) * across).clamp(-0.6, 0.6);
-            let mut colour = slice.at(along, column.table_column + turned * COLUMNS_PER_RADIAN);
-            let (node, between) = ((x - first) / GLITTER_STRIDE, (x - first) % GLITTER_STRIDE);
-            let shine = glitter[node].at(along, across, colour[3]);
-            if shine > 0.0 {
-                let next = glitter[node + 1].at(along, across, colour[3]);
-                let t = between as f32 / GLITTER_STRIDE as f32;
-                colour += (shine + t * (next - shine)) * sun;
-            }
-            if let Some(foam) = &self.foam {
-                colour = foam.cover(colour, water, step.foam_threshold, patch, column.haze);
-            }
-            let seen = column.haze.lerp(colour, step.transmittance).with_w(1.0);
-            paint(&mut picture.texels, view, x, row, below, seen);
+            let shine = if glitters { Some((&glitter, x - first)) } else { None };
+            let colour = self.colour(step, &column, water, patches[x - first], &slice, shine);
+            paint(&mut picture.texels, look.view, x, row, below, colour);
         }
+    }
+
+    /// Light from one piece of water through the air to the eye; the fourth number is its coverage, 1.
+    #[inline(always)]
+    fn colour(
+        &self,
+        step: &Step,
+        column: &Column,
+        water: Vec4,
+        patch: f32,
+        slice: &Slice<'_>,
+        shine: Option<(&[Glitter; BLOCK / GLITTER_STRIDE + 1], usize)>,
+    ) -> Vec4 {
+        // Gusts raise the small waves, slicks smooth them; rougher water shows more of its faces (see `Patches`).
+        let gain = 1.0 + 0.35 * patch.clamp(-1.5, 1.5);
+        let along = gain * (water.y * column.east + water.z * column.north) + 0.012 * patch;
+        let across = gain * (water.y * column.north - water.z * column.east);
+        // A facet tilted sideways mirrors another azimuth.
+        let turned = (-2.0 * (along + step.grazing).max(0.0) * across).clamp(-0.6, 0.6);
+        let mut colour = slice.at(along, column.table_column + turned * COLUMNS_PER_RADIAN);
+        if let Some((glitter, x)) = shine {
+            let (node, between) = (x / GLITTER_STRIDE, x % GLITTER_STRIDE);
+            let here = glitter[node].at(along, across, colour.w);
+            let next = glitter[node + 1].at(along, across, colour.w);
+            let t = between as f32 / GLITTER_STRIDE as f32;
+            colour += (here + t * (next - here)) * self.sun_irradiance;
+        }
+        if let Some(foam) = &self.foam {
+            colour = foam.cover(colour, water, step.foam_threshold, patch, column.haze);
+        }
+        column.haze.lerp(colour, step.transmittance).with_w(1.0)
     }
 }
 
@@ -301,6 +317,12 @@ fn interpolate<T>(
         let column = &columns[x];
         look_up(step.range * column.east, step.range * column.north)
     };
+    if stride == 1 {
+        for (x, value) in values.iter_mut().enumerate() {
+            *value += at(x);
+        }
+        return;
+    }
     let share = 1.0 / stride as f32;
     let mut from = at(0);
     for first in (0..BLOCK).step_by(stride) {

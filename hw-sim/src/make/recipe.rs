@@ -351,7 +351,8 @@ mod tests {
 
     #[test]
     fn recipes_that_make_no_recording_are_refused() {
-        let cases: [(&str, fn(&mut Recipe)); 7] = [
+        type Spoil = fn(&mut Recipe);
+        let cases: [(&str, Spoil); 7] = [
             ("width", |r| r.width = 0),
             ("duration_s", |r| r.duration_s = f64::NAN),
             ("frame_rate_hz", |r| r.frame_rate_hz = 30.01),

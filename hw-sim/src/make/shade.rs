@@ -186,6 +186,12 @@ impl Glitter {
         }
     }
 
+    /// Whether any water that is likely to be met glitters: slopes that the tiles resolve stay below 0.45.
+    pub fn within_reach(&self) -> bool {
+        let spread = 4.0 / self.inverse_along.min(self.inverse_across);
+        self.along.hypot(self.across) < 0.45 + spread
+    }
+
     /// Share of the sun's irradiance that comes as radiance from water whose resolved slopes are these and whose facets'
     /// projected area is `area`.
     #[inline(always)]

@@ -6,7 +6,7 @@ use bowwave_core::geometry::CameraPose;
 
 use super::{
     MakeError,
-    camera::{Camera, Coverage, FrameMemory, level_focal},
+    camera::{Camera, Coverage, FrameMemory, Scene, level_focal},
     field::{Field, Surface},
     march::{SeaShader, SeaShaderInput},
     motion::Motion,
@@ -19,9 +19,7 @@ use super::{
 pub struct Studio {
     motion: Motion,
     field: Field,
-    sky: Sky,
-    panorama: Panorama,
-    shader: SeaShader,
+    scene: Scene,
     camera: Camera,
     exposure_delay_s: f64,
     frame_rate_hz: f64,
@@ -69,13 +67,11 @@ impl Studio {
             upwelling: upwelling(&sky),
             seed: recipe.seed,
         };
-        let shader = SeaShader::new(&input, &sky, &dome, &surface);
+        let water = SeaShader::new(&input, &sky, &dome, &surface);
         Ok(Self {
             motion: recipe.motion(),
             field,
-            sky,
-            panorama,
-            shader,
+            scene: Scene { sky, panorama, water },
             camera,
             exposure_delay_s: recipe.exposure_delay_s(),
             frame_rate_hz: recipe.frame_rate_hz,
@@ -114,7 +110,7 @@ impl Studio {
         let time_s = f64::from(frame) / self.frame_rate_hz + self.exposure_delay_s;
         let pose = self.motion.at(time_s).pose;
         self.field.evaluate(time_s, &mut surface);
-        self.camera.expose(&self.shader, &surface, &self.sky, &self.panorama, &pose, frame, &mut memory);
+        self.camera.expose(&self.scene, &surface, &pose, frame, &mut memory);
         let taken = take(&memory.rgb);
         if let Ok(mut spare) = self.spare.lock() {
             spare.push((surface, memory));
