@@ -5,10 +5,15 @@
 use std::{collections::BTreeMap, sync::LazyLock};
 
 use bowwave_calibration::parse;
-use bowwave_core::geometry::{Lens, horizon_dip};
+use bowwave_core::{
+    attitude::Attitude,
+    clock::ClockMap,
+    geometry::{Lens, horizon_dip},
+    pose::{PoseHistory, camera_pose, registration_error_px},
+};
 use bowwave_record::{Entry, RecordingReader};
 use glam::{DVec2, DVec3};
-use hw_sim::make::{DEVICE_LOOP_KEY, MakeError, Recipe, Studio, make};
+use hw_sim::make::{DEVICE_LOOP_KEY, MakeError, Recipe, START, Studio, calibration, imu_samples, make};
 
 const WIDTH: u32 = 320;
 const HEIGHT: u32 = 180;
@@ -87,6 +92,36 @@ fn the_horizon_is_where_the_truth_says() {
     }
     assert!(worst < 0.3, "worst {worst} px");
     assert!((sum / count).abs() < 0.15, "mean {} px", sum / count);
+}
+
+/// What a session would make of the default's samples: clock mapped, orientation at each frame's exposure.
+#[test]
+fn the_default_registers_within_two_pixels() {
+    let recipe = Recipe::default();
+    let (lens, motion, calibration) = (recipe.lens(), recipe.motion(), calibration(&recipe).calibration);
+    let mut samples = imu_samples(&recipe, START).into_iter().peekable();
+    let mut clock = ClockMap::new();
+    let mut attitude = Attitude::new(calibration.gyro_bias, calibration.camera_from_imu);
+    let mut history = PoseHistory::new();
+    let (mut sum, mut worst, mut count) = (0.0, 0.0f64, 0.0);
+    for frame in 0..recipe.frames() {
+        let stamp = START.plus_ns(recipe.frame_stamp_ns(frame));
+        while let Some(s) = samples.next_if(|s| s.arrival <= stamp.plus_ns(recipe.camera.latency_ns[0])) {
+            let time = clock.observe(s.device_time_ns, s.arrival);
+            attitude.observe(time, &s).into_iter().for_each(|o| history.push(o));
+        }
+        let at = history.at(stamp.plus_ns(calibration.time_offset_ns)).unwrap();
+        let used = camera_pose(&calibration, at.world_from_imu, recipe.eye_height_m).world_from_camera;
+        let truth = motion.at(stamp.secs_since(START) + recipe.exposure_delay_s()).pose.world_from_camera;
+        let error = registration_error_px(&lens, truth, used).unwrap();
+        sum += error * error;
+        worst = worst.max(error);
+        count += 1.0;
+    }
+    let rms = (sum / count).sqrt();
+    eprintln!("registration of the default: {rms:.2} px rms, {worst:.2} px worst");
+    assert!(rms < 1.5 && worst < 4.0, "{rms} px rms, {worst} px worst");
+    assert!(rms > 0.1, "the unit is perfect: {rms} px");
 }
 
 #[test]

@@ -14,7 +14,7 @@ use super::{
 };
 
 /// Steps of the transfer table over 0 to [`LIGHT_MAX`].
-const TRANSFER: usize = 16_384;
+const TRANSFER: usize = 8192;
 /// Light at which the sensor is full, in units of white.
 const LIGHT_MAX: f32 = 1.6;
 /// Values of the noise table; 10 bits of a random number choose one.

@@ -31,6 +31,7 @@ mod studio;
 mod write;
 
 pub use fresnel::{SEA_WATER_INDEX, reflectance};
+pub use imu::samples as imu_samples;
 pub use motion::{GRAVITY, GunMotion, Harmonic, Motion, MotionState, Periodic, ShipMotion};
 pub use recipe::{Burst, CameraRecipe, ImuRecipe, Recipe};
 pub use sky::SkyRecipe;
