@@ -211,6 +211,40 @@ fn a_recording_holds_what_the_recipe_says() {
 }
 
 #[test]
+fn far_off_recipes_still_draw_a_sea_under_a_sky() {
+    type Change = fn(&mut Recipe);
+    let cases: [(&str, Change); 5] = [
+        ("low eye in high waves", |r| {
+            (r.eye_height_m, r.beaufort) = (3.0, bowwave_core::sea::BeaufortForce::new(6).unwrap());
+        }),
+        ("from a cliff", |r| r.eye_height_m = 200.0),
+        ("telephoto", |r| r.camera.hfov = 0.05),
+        ("wide with distortion", |r| (r.camera.hfov, r.camera.radial) = (1.6, [-0.1, 0.01])),
+        ("calm, upright, low sun ahead", |r| {
+            r.beaufort = bowwave_core::sea::BeaufortForce::new(0).unwrap();
+            (r.swell, r.sky.sun_azimuth, r.sky.sun_elevation) = (None, 0.1, 0.05);
+        }),
+    ];
+    for (name, change) in cases {
+        let mut recipe = Recipe { width: 64, height: 48, ..clean() };
+        change(&mut recipe);
+        let studio = Studio::new(&recipe).unwrap();
+        for frame in [0, 9] {
+            let (truth, rgb) = studio.shoot_rgb(frame);
+            let row_mean =
+                |y: usize| rgb[y * 192..(y + 1) * 192].iter().map(|v| f64::from(*v)).sum::<f64>() / 192.0;
+            let (top, bottom) = (row_mean(0), row_mean(47));
+            let lens = recipe.lens();
+            let top_ray = truth.world_from_camera * lens.unproject(DVec2::new(32.0, 0.5));
+            if top_ray.z > 0.05 {
+                assert!(top > bottom, "{name}, frame {frame}: sky {top}, sea {bottom}");
+            }
+            assert!((1.0..254.0).contains(&bottom), "{name}, frame {frame}: sea {bottom}");
+        }
+    }
+}
+
+#[test]
 fn a_seed_means_one_recording() {
     let mut recipe = small();
     recipe.duration_s = 0.5;

@@ -12,7 +12,7 @@
 //! walks outwards over them and paints what is not hidden; a patch of water mirrors the sky in all the facets too small to be
 //! seen one by one, weighted by how much of each is seen (Ross, Dion and Potvin 2005), by exact Fresnel, out of a table; the
 //! sun's glitter is Cox and Munk's. The level picture is then turned into the camera's. Left out: second reflections between
-//! waves (only their dimming), shadows of clouds, spray, the ship's own wake.
+//! waves (only their dimming), shadows of clouds, spray, the ship's own wake. Believable up to about Beaufort 7.
 
 mod camera;
 mod field;

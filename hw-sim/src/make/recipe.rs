@@ -7,7 +7,7 @@ use super::{
     MakeError,
     motion::{GunMotion, Motion, Periodic, ShipMotion},
     sky::SkyRecipe,
-    spectrum::Swell,
+    spectrum::{Swell, WindSea, wind_speed},
 };
 
 /// A recording to be made. The default is the trainer's embedded one: 20 s of a light breeze (Beaufort 2) that loop without a
@@ -223,6 +223,12 @@ impl Recipe {
         (self.camera.time_offset_ns - self.imu.latency_ns[0]) as f64 * 1e-9
     }
 
+    /// Significant height of wind sea and swell together (their energies add), metres.
+    pub fn significant_height_m(&self) -> f64 {
+        let wind_sea = WindSea::new(wind_speed(self.beaufort)).significant_height();
+        wind_sea.hypot(self.swell.map_or(0.0, |swell| swell.height_m))
+    }
+
     /// How many frames.
     pub fn frames(&self) -> u32 {
         (self.duration_s * self.frame_rate_hz).round() as u32
@@ -298,6 +304,11 @@ impl Recipe {
                 "released within it",
             )?;
         }
+        // Three deviations: the eye would otherwise be under water time and again.
+        if self.eye_height_m < 0.75 * self.significant_height_m() {
+            let range = "above the crests: three quarters of the significant wave height, wind sea and swell";
+            return bad("eye_height_m", self.eye_height_m, range);
+        }
         self.check_view()
     }
 
@@ -352,7 +363,8 @@ mod tests {
     #[test]
     fn recipes_that_make_no_recording_are_refused() {
         type Spoil = fn(&mut Recipe);
-        let cases: [(&str, Spoil); 7] = [
+        let cases: [(&str, Spoil); 8] = [
+            ("eye_height_m", |r| r.swell = Some(Swell { height_m: 12.0, period_s: 10.0, from: 0.0 })),
             ("width", |r| r.width = 0),
             ("duration_s", |r| r.duration_s = f64::NAN),
             ("frame_rate_hz", |r| r.frame_rate_hz = 30.01),

@@ -71,11 +71,11 @@ impl Sky {
                 luminance(sky.clear(Vec3::new(a.sin(), a.cos(), 0.14).normalize()))
             })
             .sum();
-        sky.scale = 0.50 / (around / 72.0).max(1e-6);
+        sky.scale = 0.55 / (around / 72.0).max(1e-6);
         // Direct light against the lower sky's radiance on a clear day: about 12 at a high sun, reddened by its path
         // (Bird and Riordan 1986 give the ratio; optical depths of 0.13, 0.20 and 0.33).
         let path = 1.0 / sin_e.max(0.05);
-        sky.sun_irradiance = [0.13f32, 0.20, 0.33].map(|depth| 8.5 * (-depth * path).exp());
+        sky.sun_irradiance = [0.13f32, 0.20, 0.33].map(|depth| 9.3 * (-depth * path).exp());
         Some(sky)
     }
 
@@ -108,7 +108,7 @@ impl Sky {
         let white = 0.60 + 0.62 * lit;
         let tint = [0.96, 0.99, 1.04];
         std::array::from_fn(|c| {
-            let cloud = (0.80 * white * tint[c] + 0.10 * clear[c]) * fade + horizon[c] * (1.0 - fade);
+            let cloud = (0.86 * white * tint[c] + 0.10 * clear[c]) * fade + horizon[c] * (1.0 - fade);
             clear[c] + alpha * (cloud - clear[c])
         })
     }

@@ -16,7 +16,6 @@ use super::{
     MakeError, Recipe,
     imu::{self, draw_latency},
     noise::stream,
-    spectrum::{WindSea, wind_speed},
     studio::{Shot, Studio},
 };
 
@@ -103,12 +102,6 @@ fn measurements(recipe: &Recipe) -> Vec<Entry> {
     entries
 }
 
-/// Of wind sea and swell together: their energies add.
-fn significant_height(recipe: &Recipe) -> f64 {
-    let wind_sea = WindSea::new(wind_speed(recipe.beaufort)).significant_height();
-    wind_sea.hypot(recipe.swell.map_or(0.0, |swell| swell.height_m))
-}
-
 fn properties(recipe: &Recipe) -> Properties {
     let device_loop = imu::device_ns(recipe.duration_s, recipe.imu.clock_drift_ppm);
     Properties {
@@ -126,7 +119,7 @@ fn properties(recipe: &Recipe) -> Properties {
             ("sun_azimuth_deg".to_owned(), recipe.sky.sun_azimuth.to_degrees().to_string()),
             ("sun_elevation_deg".to_owned(), recipe.sky.sun_elevation.to_degrees().to_string()),
             ("wind_from_deg".to_owned(), recipe.wind_from.to_degrees().to_string()),
-            ("significant_height_m".to_owned(), format!("{:.3}", significant_height(recipe))),
+            ("significant_height_m".to_owned(), format!("{:.3}", recipe.significant_height_m())),
             ("visibility_m".to_owned(), recipe.visibility_m.to_string()),
         ]),
     }
