@@ -42,8 +42,9 @@ pub fn default_recording() -> Result<PathBuf> {
 
 fn make_recording(path: &Path) -> Result<()> {
     let parent = path.parent().unwrap_or(Path::new("."));
-    std::fs::create_dir_all(parent)
-        .with_context(|| format!("cannot make {}; set BOWWAVE_CACHE to a folder that can be written", parent.display()))?;
+    std::fs::create_dir_all(parent).with_context(|| {
+        format!("cannot make {}; set BOWWAVE_CACHE to a folder that can be written", parent.display())
+    })?;
     let recipe = Recipe::default();
     eprintln!("making the built-in recording (once, under a minute): {}", path.display());
     let bar = ProgressBar::new(0);
@@ -66,5 +67,6 @@ fn make_recording(path: &Path) -> Result<()> {
         }
         return Err(e).with_context(|| format!("cannot make the built-in recording {}", path.display()));
     }
-    std::fs::rename(&part, path).with_context(|| format!("cannot put the built-in recording at {}", path.display()))
+    std::fs::rename(&part, path)
+        .with_context(|| format!("cannot put the built-in recording at {}", path.display()))
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use bowwave_core::time::secs_to_ns;
+use bowwave_import::Level;
 use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};
 
@@ -124,6 +125,10 @@ pub struct Import {
     /// Take the gyro's bias from the first S seconds, during which the camera must not turn
     #[arg(long, value_name = "S")]
     pub bias_from: Option<f64>,
+    /// How the camera was held at the first picture: degrees above the horizontal, and degrees rolled clockwise.
+    /// Without it the unit is levelled by its accelerometer, which a moving camera misleads
+    #[arg(long, value_name = "UP,ROLL", value_parser = parse_level, allow_hyphen_values = true)]
+    pub level: Option<Level>,
     /// Replace a recording of that name
     #[arg(long)]
     pub force: bool,
@@ -199,6 +204,21 @@ pub struct Hits {
     pub hits_only: bool,
 }
 
+/// `-2.5,0.4`.
+fn parse_level(text: &str) -> Result<Level, String> {
+    let usage = || format!("'{text}' is no attitude: write UP,ROLL in degrees, each -89 to 89, as -2.5,0.4");
+    let (up, roll) = text.split_once(',').ok_or_else(usage)?;
+    let radians = |s: &str| {
+        s.trim()
+            .parse::<f64>()
+            .ok()
+            .filter(|v| (-89.0..=89.0).contains(v))
+            .map(f64::to_radians)
+            .ok_or_else(usage)
+    };
+    Ok(Level { elevation: radians(up)?, roll: radians(roll)? })
+}
+
 /// `imu-freeze@2.5+0.5`.
 fn parse_fault(text: &str) -> Result<Fault, String> {
     let kinds = [
@@ -211,11 +231,13 @@ fn parse_fault(text: &str) -> Result<Fault, String> {
         ("frame-corrupt", FaultKind::FrameCorrupt),
     ];
     let names = || kinds.map(|(name, _)| name).join(", ");
-    let usage = || format!("'{text}' is no fault: write KIND@S+L, as imu-freeze@2.5+0.5; kinds are {}", names());
+    let usage =
+        || format!("'{text}' is no fault: write KIND@S+L, as imu-freeze@2.5+0.5; kinds are {}", names());
     let (kind, span) = text.split_once('@').ok_or_else(usage)?;
     let (from, length) = span.split_once('+').ok_or_else(usage)?;
     let kind = kinds.into_iter().find(|(name, _)| *name == kind).map(|(_, kind)| kind).ok_or_else(usage)?;
-    let ns = |s: &str| s.parse::<f64>().ok().filter(|v| (0.0..=1e6).contains(v)).map(secs_to_ns).ok_or_else(usage);
+    let ns =
+        |s: &str| s.parse::<f64>().ok().filter(|v| (0.0..=1e6).contains(v)).map(secs_to_ns).ok_or_else(usage);
     Ok(Fault { kind, from_ns: ns(from)?, for_ns: ns(length)? })
 }
 
@@ -251,7 +273,9 @@ mod tests {
     fn faults() {
         let fault = Fault { kind: FaultKind::ImuFreeze, from_ns: 2_500_000_000, for_ns: 500_000_000 };
         assert_eq!(parse_fault("imu-freeze@2.5+0.5"), Ok(fault));
-        for bad in ["", "imu-freeze", "imu-freeze@1", "nothing@1+1", "imu-nan@-1+1", "imu-nan@1+x", "imu-nan@NaN+1"] {
+        for bad in
+            ["", "imu-freeze", "imu-freeze@1", "nothing@1+1", "imu-nan@-1+1", "imu-nan@1+x", "imu-nan@NaN+1"]
+        {
             assert!(parse_fault(bad).is_err(), "{bad}");
         }
     }

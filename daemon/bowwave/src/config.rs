@@ -59,8 +59,9 @@ struct RawFiles {
 
 /// Reads and checks a configuration file. Relative paths in it are taken from its own folder.
 pub fn read(path: &Path) -> Result<Config> {
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("cannot read the configuration {}; name an existing file with --config", path.display()))?;
+    let text = std::fs::read_to_string(path).with_context(|| {
+        format!("cannot read the configuration {}; name an existing file with --config", path.display())
+    })?;
     let base = path.parent().unwrap_or(Path::new("."));
     parse(&text, &path.display().to_string(), base)
 }
@@ -71,7 +72,10 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         Ok(raw) => raw,
         Err(e) => {
             let (line, column) = line_column(text, e.span().map_or(0, |s| s.start));
-            bail!("{origin}:{line}:{column}: {}; systemd/bowwave.toml shows every key", e.message().replace('\n', " "));
+            bail!(
+                "{origin}:{line}:{column}: {}; systemd/bowwave.toml shows every key",
+                e.message().replace('\n', " ")
+            );
         }
     };
     let size = match &raw.screen.size {
@@ -83,7 +87,9 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
     };
     if let Some(device) = raw.gpu.device.as_ref().filter(|d| d.get_ref().trim().is_empty()) {
         let (line, column) = line_column(text, device.span().start);
-        bail!("{origin}:{line}:{column}: gpu.device is empty; leave it out or give a number or part of a name");
+        bail!(
+            "{origin}:{line}:{column}: gpu.device is empty; leave it out or give a number or part of a name"
+        );
     }
     let file = |p: Option<PathBuf>| p.map(|p| base.join(p));
     Ok(Config {
@@ -139,7 +145,9 @@ mod tests {
     #[test]
     fn mistakes_are_refused_where_they_are() {
         assert!(refused("[screen]\nsise = \"1x1\"\n").starts_with("x.toml:2:1: unknown field `sise`"));
-        assert!(refused("[screen]\nsize = \"1x1\"\n").starts_with("x.toml:2:8: screen.size: '1x1' is no size"));
+        assert!(
+            refused("[screen]\nsize = \"1x1\"\n").starts_with("x.toml:2:8: screen.size: '1x1' is no size")
+        );
         assert!(refused("[gpu]\ndevice = \" \"\n").starts_with("x.toml:2:10: gpu.device is empty"));
         assert!(refused("[gpu]\nvalidation = 3\n").starts_with("x.toml:2:14: "));
         assert!(refused("[gpu\n").starts_with("x.toml:1:5: "));

@@ -81,7 +81,10 @@ fn gpus(wanted: Option<&str>) -> Vec<Check> {
         .iter()
         .map(|d| {
             let kind = if d.software { "software" } else { "hardware" };
-            let found = format!("{}: {} ({kind}, {}, Vulkan {}.{})", d.index, d.name, d.driver, d.vulkan.0, d.vulkan.1);
+            let found = format!(
+                "{}: {} ({kind}, {}, Vulkan {}.{})",
+                d.index, d.name, d.driver, d.vulkan.0, d.vulkan.1
+            );
             check("vulkan", if d.vulkan >= (1, 3) { Verdict::Ok } else { Verdict::Warning }, found)
         })
         .collect();
@@ -105,8 +108,14 @@ fn cameras(wanted: Option<&Path>) -> Vec<Check> {
         return vec![check("camera", Verdict::Absent, "no camera; plug one in (UVC cameras need no driver)")];
     }
     let one = |camera: Result<camera::CameraInfo, camera::CameraError>| match camera {
-        Ok(info) if info.modes.iter().any(|m| m.coding.usable()) => check("camera", Verdict::Ok, describe_camera(&info)),
-        Ok(info) => check("camera", Verdict::Warning, format!("{}; none of these can be shown", describe_camera(&info))),
+        Ok(info) if info.modes.iter().any(|m| m.coding.usable()) => {
+            check("camera", Verdict::Ok, describe_camera(&info))
+        }
+        Ok(info) => check(
+            "camera",
+            Verdict::Warning,
+            format!("{}; none of these can be shown", describe_camera(&info)),
+        ),
         Err(e) => check("camera", Verdict::Warning, e.to_string()),
     };
     found.into_iter().map(one).collect()
@@ -122,7 +131,14 @@ fn describe_camera(info: &camera::CameraInfo) -> String {
         })
         .collect();
     let link = info.by_id.as_ref().map_or_else(String::new, |p| format!(", {}", p.display()));
-    format!("{}: {} ({}, {}{link}): {}", info.node.display(), info.card, info.driver, info.bus, modes.join("; "))
+    format!(
+        "{}: {} ({}, {}{link}): {}",
+        info.node.display(),
+        info.card,
+        info.driver,
+        info.bus,
+        modes.join("; ")
+    )
 }
 
 fn serial_lines(wanted: Option<&Path>) -> Vec<Check> {
@@ -138,7 +154,11 @@ fn serial_lines(wanted: Option<&Path>) -> Vec<Check> {
         }];
     }
     if ports.is_empty() {
-        return vec![check("serial line", Verdict::Absent, "no serial port; plug the inertial unit's adapter in")];
+        return vec![check(
+            "serial line",
+            Verdict::Absent,
+            "no serial port; plug the inertial unit's adapter in",
+        )];
     }
     ports
         .iter()
@@ -152,10 +172,15 @@ fn serial_lines(wanted: Option<&Path>) -> Vec<Check> {
 fn triggers(wanted: Option<&str>) -> Vec<Check> {
     if let Some(text) = wanted {
         let Some((chip, line)) = text.rsplit_once(':') else {
-            return vec![failed("trigger", format!("'{text}' names no line: write CHIP:LINE, as /dev/gpiochip0:17"))];
+            return vec![failed(
+                "trigger",
+                format!("'{text}' names no line: write CHIP:LINE, as /dev/gpiochip0:17"),
+            )];
         };
         return vec![match trigger::check(Path::new(chip), line) {
-            Ok(info) => check("trigger", Verdict::Ok, format!("{chip} line {} is there and free", info.offset)),
+            Ok(info) => {
+                check("trigger", Verdict::Ok, format!("{chip} line {} is there and free", info.offset))
+            }
             Err(e) => failed("trigger", e),
         }];
     }
@@ -166,7 +191,17 @@ fn triggers(wanted: Option<&str>) -> Vec<Check> {
     let one = |chip: Result<trigger::ChipInfo, trigger::TriggerError>| match chip {
         Ok(c) => {
             let free = c.lines.iter().filter(|l| !l.used).count();
-            check("trigger", Verdict::Ok, format!("{}: {} ({}), {free} of {} lines free", c.node.display(), c.label, c.name, c.lines.len()))
+            check(
+                "trigger",
+                Verdict::Ok,
+                format!(
+                    "{}: {} ({}), {free} of {} lines free",
+                    c.node.display(),
+                    c.label,
+                    c.name,
+                    c.lines.len()
+                ),
+            )
         }
         Err(e) => check("trigger", Verdict::Warning, e.to_string()),
     };
@@ -185,16 +220,22 @@ fn disk() -> Check {
                 check("disk", Verdict::Ok, found)
             }
         }
-        Err(e) => check("disk", Verdict::Warning, format!("cannot ask for free space in {}: {e}", here.display())),
+        Err(e) => {
+            check("disk", Verdict::Warning, format!("cannot ask for free space in {}: {e}", here.display()))
+        }
     }
 }
 
 fn default_recording() -> Check {
     match cache::default_recording_path() {
-        Ok(path) if path.exists() => check("recording", Verdict::Ok, format!("built-in recording kept at {}", path.display())),
-        Ok(path) => {
-            check("recording", Verdict::Ok, format!("the built-in recording will be made on first use, at {}", path.display()))
+        Ok(path) if path.exists() => {
+            check("recording", Verdict::Ok, format!("built-in recording kept at {}", path.display()))
         }
+        Ok(path) => check(
+            "recording",
+            Verdict::Ok,
+            format!("the built-in recording will be made on first use, at {}", path.display()),
+        ),
         Err(e) => check("recording", Verdict::Warning, format!("{e:#}")),
     }
 }
@@ -211,7 +252,9 @@ fn ffmpeg() -> Check {
 
 fn find_gpu(wanted: &str) -> Result<()> {
     let devices = bowwave_render::devices()?;
-    let found = devices.iter().any(|d| wanted.parse() == Ok(d.index) || d.name.to_lowercase().contains(&wanted.to_lowercase()));
+    let found = devices
+        .iter()
+        .any(|d| wanted.parse() == Ok(d.index) || d.name.to_lowercase().contains(&wanted.to_lowercase()));
     anyhow::ensure!(found, "no Vulkan device '{wanted}'");
     Ok(())
 }

@@ -26,9 +26,13 @@ const TABLE: &[(&str, &str, Option<usize>)] = &[
 
 /// Prints the rounds.
 pub fn run(arguments: &Hits) -> Result<()> {
-    let path = if arguments.journal.is_dir() { arguments.journal.join(JOURNAL) } else { arguments.journal.clone() };
+    let path =
+        if arguments.journal.is_dir() { arguments.journal.join(JOURNAL) } else { arguments.journal.clone() };
     if !path.exists() {
-        bail!("no journal at {}; name the folder that `bowwave simulate --out` left, or the database", path.display());
+        bail!(
+            "no journal at {}; name the folder that `bowwave simulate --out` left, or the database",
+            path.display()
+        );
     }
     let runs = match arguments.run {
         Some(run) => RunSelection::Run(run),
@@ -42,12 +46,18 @@ pub fn run(arguments: &Hits) -> Result<()> {
         Format::Csv => out.write_all(&csv(&shots)?),
         Format::Json => {
             let all: Vec<_> = shots.iter().map(StoredShot::to_json).collect();
-            writeln!(out, "{}", serde_json::to_string_pretty(&all).context("cannot put the rounds into JSON")?)
+            writeln!(
+                out,
+                "{}",
+                serde_json::to_string_pretty(&all).context("cannot put the rounds into JSON")?
+            )
         }
     };
     // A pager that was closed has seen enough.
     match printed.and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(e).context("cannot write to standard output"),
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(e).context("cannot write to standard output")
+        }
         _ => Ok(()),
     }
 }
@@ -90,7 +100,8 @@ fn table(shots: &[StoredShot]) -> String {
         text.push_str(line.join("  ").trim_end());
         text.push('\n');
     }
-    let hits = shots.iter().filter(|s| matches!(s.record.outcome, bowwave_core::score::Outcome::Hit { .. })).count();
+    let hits =
+        shots.iter().filter(|s| matches!(s.record.outcome, bowwave_core::score::Outcome::Hit { .. })).count();
     text.push_str(&format!("{} rounds, {hits} hits\n", shots.len()));
     text
 }

@@ -23,9 +23,10 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("cannot read the scenario {}; name an existing file", path.display()))?;
         bowwave_core::scenario::Scenario::parse(&text, &path.display().to_string())?;
-        let _ = text;
+        options.scenario_toml = Some(text);
     }
     options.bias_from_s = arguments.bias_from;
+    options.level = arguments.level;
     options.replace = arguments.force;
     let bar = ProgressBar::new_spinner();
     if let Ok(style) = ProgressStyle::with_template("{spinner} {pos} pictures {elapsed}") {
@@ -50,7 +51,10 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
     };
     bar.finish_and_clear();
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&as_json(&report)).context("cannot put the report into JSON")?);
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&as_json(&report)).context("cannot put the report into JSON")?
+        );
     }
     eprint!("{}", lines(&report));
     for warning in &report.warnings {
@@ -91,7 +95,10 @@ fn lines(report: &ImportReport) -> String {
             let bias = bias.as_ref().map_or_else(String::new, |b| {
                 let [x, y, z] = (b.rate * 1e3).to_array();
                 let sigma = b.sigma.max_element() * 1e3;
-                format!("; bias of the first {} s: {x:.3}, {y:.3}, {z:.3} mrad/s, each +- {sigma:.3}", b.seconds)
+                format!(
+                    "; bias of the first {} s: {x:.3}, {y:.3}, {z:.3} mrad/s, each +- {sigma:.3}",
+                    b.seconds
+                )
             });
             format!("gyro of {camera} at {rate_hz:.0} Hz, {} samples{bias}", report.imu_samples)
         }

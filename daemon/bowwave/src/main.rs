@@ -27,7 +27,9 @@ fn main() -> ExitCode {
         1 => "info",
         _ => "debug",
     };
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(level)).format_target(false).init();
+    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(format!("{level},mp4parse=error")))
+        .format_target(false)
+        .init();
     match run(&cli.command, program_start) {
         Ok(outcome) => outcome.into(),
         Err(e) => {

@@ -63,7 +63,8 @@ pub fn run(arguments: &Plan) -> Result<()> {
     };
     let scenario = Scenario::parse(&text, &origin)?;
     let (models, of_boats) = load_models(&scenario, &base)?;
-    let radius = |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
+    let radius =
+        |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
     scenario.check_clearance(&of_boats.iter().map(radius).collect::<Vec<_>>())?;
     let plan = ScenePlan::new(&Needs {
         size: arguments.size,
@@ -111,12 +112,17 @@ pub fn run(arguments: &Plan) -> Result<()> {
 fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
     let (runs, why) = match plan.passes[pass as usize] {
         PassDecision::LeftOut(why) => (false, why.name()),
-        PassDecision::Run => (true, match pass {
-            Pass::Video | Pass::Hud => "every frame",
-            Pass::Mirror | Pass::Water => "frames with a reflection or shadow in view, on its pixels only",
-            Pass::Boats => "frames with a boat in view, on its pixels only",
-            Pass::Rounds => "frames with a tracer, splash or strike in view",
-        }),
+        PassDecision::Run => (
+            true,
+            match pass {
+                Pass::Video | Pass::Hud => "every frame",
+                Pass::Mirror | Pass::Water => {
+                    "frames with a reflection or shadow in view, on its pixels only"
+                }
+                Pass::Boats => "frames with a boat in view, on its pixels only",
+                Pass::Rounds => "frames with a tracer, splash or strike in view",
+            },
+        ),
     };
     PrintedPass { pass: pass.name(), runs, why }
 }
@@ -134,7 +140,11 @@ fn variants(plan: &ScenePlan) -> Vec<String> {
             ReflectionMethod::FullAsPrinted => "Full Reflection as printed",
             ReflectionMethod::Full => "Full Reflection, mended",
         };
-        variants.push(format!("water: {method}, Beaufort {}, shadow {:?}", plan.water.force.get(), plan.water.shadow));
+        variants.push(format!(
+            "water: {method}, Beaufort {}, shadow {:?}",
+            plan.water.force.get(),
+            plan.water.shadow
+        ));
     }
     variants
 }
@@ -142,7 +152,10 @@ fn variants(plan: &ScenePlan) -> Vec<String> {
 fn text_of(plan: &Printed) -> String {
     let mut text = format!("{} at {}\n\nboats\n", plan.scenario, plan.size);
     for b in &plan.boats {
-        text += &format!("  {:<16} {:<14} {:<8} {:>6} triangles, {} m\n", b.name, b.model, b.side, b.triangles, b.length_m);
+        text += &format!(
+            "  {:<16} {:<14} {:<8} {:>6} triangles, {} m\n",
+            b.name, b.model, b.side, b.triangles, b.length_m
+        );
     }
     if plan.boats.is_empty() {
         text += "  none\n";

@@ -15,6 +15,11 @@ pub struct ImportOptions {
     pub assumed_hfov_deg: f64,
     /// Take the gyro's bias from so many seconds at the start of the video, in place of the calibration's.
     pub bias_from_s: Option<f64>,
+    /// How the camera was held at the first picture. The gyro then carries on from there, and the recording's inertial unit
+    /// has an attitude; without it the player levels the unit by its accelerometer, which a moving camera misleads.
+    pub level: Option<Level>,
+    /// Text of the scenario to keep in the recording.
+    pub scenario_toml: Option<String>,
     /// Leave the video's gyro out.
     pub without_gyro: bool,
     /// Replace a recording of that name.
@@ -26,18 +31,29 @@ pub struct ImportOptions {
 }
 
 impl ImportOptions {
-    /// No calibration, 60 degrees assumed, the gyro as it comes, nothing replaced, `ffmpeg` from the search path.
+    /// No calibration, 60 degrees assumed, the gyro as it comes, no scenario, nothing replaced, `ffmpeg` from the search path.
     pub fn new(today: Date) -> Self {
         Self {
             calibration: None,
             assumed_hfov_deg: 60.0,
             bias_from_s: None,
+            level: None,
+            scenario_toml: None,
             without_gyro: false,
             replace: false,
             today,
             ffmpeg: PathBuf::from("ffmpeg"),
         }
     }
+}
+
+/// How a camera is held, as its picture of the horizon tells. It looks north: a gyro knows no heading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Level {
+    /// Above the horizontal, radians.
+    pub elevation: f64,
+    /// Clockwise, radians; the horizon then tilts the other way.
+    pub roll: f64,
 }
 
 /// How far an import is.

@@ -129,10 +129,11 @@ pub(crate) fn properties(
     source: String,
     picture: (u32, u32),
     extra: BTreeMap<String, String>,
+    options: &ImportOptions,
 ) -> Properties {
     Properties {
         calibration_toml: to_toml(file),
-        scenario_toml: None,
+        scenario_toml: options.scenario_toml.clone(),
         loop_ns: None,
         start,
         source,

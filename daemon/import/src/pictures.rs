@@ -44,8 +44,11 @@ pub fn import_pictures(
     let calibration = calibration_for(picture, options)?;
     let source = format!("pictures of {}", folder.display());
     let extra = BTreeMap::from([("rate_hz".to_owned(), rate_hz.to_string())]);
-    let mut output =
-        Output::create(out, options.replace, &properties(&calibration, START, source, picture, extra))?;
+    let mut output = Output::create(
+        out,
+        options.replace,
+        &properties(&calibration, START, source, picture, extra, options),
+    )?;
 
     let frames_total = Some(names.len() as u64);
     let interval_ns = NS_PER_S as f64 / rate_hz;

@@ -2,12 +2,14 @@
 
 use std::{collections::BTreeMap, fs::File, ops::ControlFlow, path::Path, sync::Arc};
 
-use bowwave_core::{event::ImuSample, time::Time};
+use bowwave_core::{event::ImuSample, geometry::look, time::Time};
 use bowwave_record::{Entry, FrameEntry};
+use glam::{DQuat, DVec3};
 
 use crate::{
-    Bias, ImportError, ImportOptions, ImportReport, Progress, START, Telemetry, TelemetryReport, bias,
+    Bias, ImportError, ImportOptions, ImportReport, Level, Progress, START, Telemetry, TelemetryReport, bias,
     ffmpeg::{VideoFrame, VideoInfo, VideoReader, probe},
+    gyro::GyroPath,
     output::{Output, calibration_for, properties, refuse_existing, set_bias},
     pictures::jpeg_size,
     sight::{self, Watch},
@@ -63,11 +65,14 @@ impl Gyro {
         if options.without_gyro {
             return Ok(Self { telemetry: None, bias: None, report: TelemetryReport::LeftOut });
         }
-        let Some(telemetry) = read_telemetry(video)? else {
+        let Some(mut telemetry) = read_telemetry(video)? else {
             return Ok(Self { telemetry: None, bias: None, report: TelemetryReport::Absent });
         };
         let bias =
             options.bias_from_s.map(|s| find_bias(video, &telemetry.samples, s, options)).transpose()?;
+        if let Some(level) = options.level {
+            orient(&mut telemetry.samples, options, bias.as_ref(), level);
+        }
         let report =
             TelemetryReport::Used { camera: telemetry.camera.clone(), rate_hz: telemetry.rate_hz, bias };
         Ok(Self { telemetry: Some(telemetry), bias, report })
@@ -75,6 +80,20 @@ impl Gyro {
 
     fn samples(&self) -> &[ImuSample] {
         self.telemetry.as_ref().map_or(&[], |t| t.samples.as_slice())
+    }
+}
+
+/// Gives every sample the attitude that the gyro leads to from a camera that was held like `level` at the first picture.
+fn orient(samples: &mut [ImuSample], options: &ImportOptions, bias: Option<&Bias>, level: Level) {
+    let calibration = options.calibration.as_ref().map(|file| &file.calibration);
+    let rate = bias.map_or_else(|| calibration.map_or(DVec3::ZERO, |c| c.gyro_bias), |b| b.rate);
+    let camera_from_imu = calibration.map_or(DQuat::IDENTITY, |c| c.camera_from_imu);
+    let offset_ns = calibration.map_or(0, |c| c.time_offset_ns);
+    let path = GyroPath::integrate(samples, rate);
+    let first = path.world_from_imu(START.plus_ns(offset_ns));
+    let world_from_path = look(0.0, level.elevation, level.roll) * camera_from_imu * first.inverse();
+    for sample in samples {
+        sample.world_from_imu = Some((world_from_path * path.world_from_imu(sample.arrival)).normalize());
     }
 }
 
@@ -150,7 +169,8 @@ impl<'a> Import<'a> {
         let samples = gyro.samples();
         let start = samples.first().map_or(START, |s| s.arrival.min(START));
         let source = format!("video {}", video.display());
-        let output = Output::create(out, options.replace, &properties(&file, start, source, picture, extra))?;
+        let output =
+            Output::create(out, options.replace, &properties(&file, start, source, picture, extra, options))?;
         let mut import = Self { output, samples, picture, interval_ns: info.interval_ns, frames: 0 };
         import.add(&first)?;
         Ok(import)

@@ -35,11 +35,13 @@ const FRAMES_IN_FLIGHT: usize = 3;
 pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     let stop = Arc::new(AtomicBool::new(false));
     let on_signal = Arc::clone(&stop);
-    ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed)).context("cannot catch interrupts")?;
+    ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed))
+        .context("cannot catch interrupts")?;
 
     let prepared = prepare::prepare(arguments)?;
-    std::fs::create_dir_all(&arguments.out)
-        .with_context(|| format!("cannot make the folder {}; name another with --out", arguments.out.display()))?;
+    std::fs::create_dir_all(&arguments.out).with_context(|| {
+        format!("cannot make the folder {}; name another with --out", arguments.out.display())
+    })?;
     let frames = expected_frames(arguments, prepared.duration_ns);
     let realtime = arguments.realtime || prepared.window;
     let replay = run::open_replay(&prepared.recording, realtime, arguments, frames)?;
@@ -65,7 +67,8 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
         None
     };
     let trainer = Loop::new(replay, session, renderer, output, journal, recorder, stop);
-    let finished = if realtime { trainer.realtime(frames, arguments) } else { trainer.fast(frames, arguments) }?;
+    let finished =
+        if realtime { trainer.realtime(frames, arguments) } else { trainer.fast(frames, arguments) }?;
     finished.report(arguments, &prepared, program_start)
 }
 
@@ -81,7 +84,8 @@ fn expected_frames(arguments: &Simulate, recording_ns: i64) -> u64 {
 
 fn render_config(plan: &ScenePlan, prepared: &prepare::Prepared) -> RenderConfig {
     let only = |pass: Pass, n: usize| if plan.has(pass) { n } else { 0 };
-    let waters = if plan.has(Pass::Water) { vec![(plan.water.method, plan.water.shadow)] } else { Vec::new() };
+    let waters =
+        if plan.has(Pass::Water) { vec![(plan.water.method, plan.water.shadow)] } else { Vec::new() };
     RenderConfig {
         width: plan.size.0,
         height: plan.size.1,

@@ -7,11 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, anyhow};
-use bowwave_core::{
-    event::TriggerEdge,
-    scene::Pass,
-    time::Time,
-};
+use bowwave_core::{event::TriggerEdge, scene::Pass, time::Time};
 use bowwave_devices::clock::now;
 use bowwave_render::{Completions, Finished};
 use crossbeam_channel::{Receiver, Sender, unbounded};
@@ -218,7 +214,8 @@ impl Worker {
         if !on_sheet && !still {
             return Ok(());
         }
-        let picture = copy_frame(frame.rgba(), self.options.size).context("a frame has not the size of the screen")?;
+        let picture =
+            copy_frame(frame.rgba(), self.options.size).context("a frame has not the size of the screen")?;
         if let Some(sheet) = &mut self.sheet {
             sheet.frame(index, &picture);
         }

@@ -47,7 +47,9 @@ impl ContactSheet {
 
     /// Writes the sheet as PNG.
     pub fn write(&self, path: &Path) -> Result<()> {
-        self.sheet.save(path).with_context(|| format!("cannot write the contact sheet {}; check the disk", path.display()))
+        self.sheet
+            .save(path)
+            .with_context(|| format!("cannot write the contact sheet {}; check the disk", path.display()))
     }
 }
 

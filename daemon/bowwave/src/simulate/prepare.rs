@@ -97,7 +97,10 @@ fn calibration(
     let (text, origin) = match named {
         Some(path) => {
             let text = std::fs::read_to_string(path).with_context(|| {
-                format!("cannot read the calibration {}; name an existing file with --calibration", path.display())
+                format!(
+                    "cannot read the calibration {}; name an existing file with --calibration",
+                    path.display()
+                )
             })?;
             (text, path.display().to_string())
         }
@@ -107,14 +110,20 @@ fn calibration(
 }
 
 /// The scenario, its text, and the folder that its models' paths start from.
-fn scenario(named: Option<&PathBuf>, properties: &Properties, recording: &Path) -> Result<(Scenario, String, PathBuf)> {
+fn scenario(
+    named: Option<&PathBuf>,
+    properties: &Properties,
+    recording: &Path,
+) -> Result<(Scenario, String, PathBuf)> {
     let folder = |path: &Path| path.parent().unwrap_or(Path::new("")).to_path_buf();
     let (text, origin, base) = match (named, &properties.scenario_toml) {
         (Some(path), _) => {
             let (text, base) = read_scenario(path)?;
             (text, path.display().to_string(), base)
         }
-        (None, Some(text)) => (text.clone(), format!("{} (its scenario)", recording.display()), folder(recording)),
+        (None, Some(text)) => {
+            (text.clone(), format!("{} (its scenario)", recording.display()), folder(recording))
+        }
         (None, None) => (scenario::DEFAULT.to_owned(), "built-in scenario".to_owned(), PathBuf::new()),
     };
     let scenario = Scenario::parse(&text, &origin)?;
@@ -132,7 +141,11 @@ pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
         Err(e) => {
             let names: Vec<&str> = scenario::BUILT_IN.iter().map(|(name, _)| *name).collect();
             Err(e).with_context(|| {
-                format!("cannot read the scenario {}; name a file, or one of {}", path.display(), names.join(", "))
+                format!(
+                    "cannot read the scenario {}; name a file, or one of {}",
+                    path.display(),
+                    names.join(", ")
+                )
             })
         }
     }
@@ -171,4 +184,3 @@ pub fn properties_of_run(prepared: &Prepared, start: bowwave_core::time::Time) -
         ..prepared.properties.clone()
     }
 }
-

@@ -24,7 +24,10 @@ impl Finished {
         let summary = self.summary(prepared, program_start);
         summary.write(&arguments.out.join("summary.json"))?;
         if arguments.json {
-            println!("{}", serde_json::to_string_pretty(&summary).context("cannot put the summary into JSON")?);
+            println!(
+                "{}",
+                serde_json::to_string_pretty(&summary).context("cannot put the summary into JSON")?
+            );
         }
         eprint!("{}", summary.lines());
         for fault in &faults {

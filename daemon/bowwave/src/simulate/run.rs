@@ -183,7 +183,10 @@ impl Loop {
     }
 
     fn no_picture(&self) -> Result<()> {
-        bail!("no picture in the first {} s of the recording: it cannot be shown", FIRST_PICTURE_NS / NS_PER_S)
+        bail!(
+            "no picture in the first {} s of the recording: it cannot be shown",
+            FIRST_PICTURE_NS / NS_PER_S
+        )
     }
 
     /// Waits for a picture to arrive, so that ticks fall shortly after arrivals.
@@ -219,7 +222,13 @@ impl Loop {
     }
 
     /// One frame. `false` while there is no picture yet.
-    fn frame(&mut self, frame_time: Time, begun: Time, deadline: Option<Time>, arguments: &Simulate) -> Result<bool> {
+    fn frame(
+        &mut self,
+        frame_time: Time,
+        begun: Time,
+        deadline: Option<Time>,
+        arguments: &Simulate,
+    ) -> Result<bool> {
         let entered = now();
         self.collect(frame_time);
         let collected = now();
@@ -327,7 +336,8 @@ impl Tally {
         self.passes.count(scene);
         self.hash.update(format!("{:?} {:?}\n", scene.frame, view.pose_known.then_some(scene.camera)));
         if let Some(truth) = truth.filter(|_| view.pose_known) {
-            let error = registration_error_px(&scene.lens, truth.world_from_camera, scene.camera.world_from_camera);
+            let error =
+                registration_error_px(&scene.lens, truth.world_from_camera, scene.camera.world_from_camera);
             // Poses too far apart to compare are as bad as the screen is wide.
             self.registration.push(error.unwrap_or(f64::from(scene.lens.width)));
             self.registered += 1;

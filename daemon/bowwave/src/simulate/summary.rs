@@ -116,12 +116,16 @@ impl Summary {
     /// The few lines that a person reads.
     pub fn lines(&self) -> String {
         let ms = |p: Option<Percentiles>| {
-            p.map_or("-".into(), |p| format!("p50 {:.1}, p95 {:.1}, p99 {:.1}, max {:.1} ms", p.p50, p.p95, p.p99, p.max))
+            p.map_or("-".into(), |p| {
+                format!("p50 {:.1}, p95 {:.1}, p99 {:.1}, max {:.1} ms", p.p50, p.p95, p.p99, p.max)
+            })
         };
-        let missed = self.missed_deadlines.map_or("no deadlines in --fast".into(), |n| format!("{n} missed deadlines"));
-        let registration = self
-            .registration_px
-            .map_or("no truth in this recording".into(), |r| format!("rms {:.2}, p99 {:.2}, max {:.2} px", r.rms, r.p99, r.max));
+        let missed = self
+            .missed_deadlines
+            .map_or("no deadlines in --fast".into(), |n| format!("{n} missed deadlines"));
+        let registration = self.registration_px.map_or("no truth in this recording".into(), |r| {
+            format!("rms {:.2}, p99 {:.2}, max {:.2} px", r.rms, r.p99, r.max)
+        });
         format!(
             "{} frames of {} on {}; {missed}\nframe time     {}\nregistration   {registration}\nrounds         {} fired, {} hit, {} not scored\n",
             self.frames,

@@ -60,7 +60,10 @@ impl VideoWriter {
         let status = self.child.wait().context("cannot wait for ffmpeg")?;
         if !status.success() {
             let why = words.lines().last().unwrap_or("it gave no reason");
-            bail!("ffmpeg could not write {}: {why}; check the disk, or leave out --video", self.path.display());
+            bail!(
+                "ffmpeg could not write {}: {why}; check the disk, or leave out --video",
+                self.path.display()
+            );
         }
         Ok(())
     }

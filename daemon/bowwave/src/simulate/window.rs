@@ -40,7 +40,9 @@ impl Screen {
         for (word, pixel) in self.words.iter_mut().zip(rgba.chunks_exact(4)) {
             *word = u32::from_be_bytes([0, pixel[0], pixel[1], pixel[2]]);
         }
-        self.window.update_with_buffer(&self.words, self.size.0, self.size.1).context("cannot draw into the window")?;
+        self.window
+            .update_with_buffer(&self.words, self.size.0, self.size.1)
+            .context("cannot draw into the window")?;
         let firing = self.window.is_key_down(Key::Space);
         let trigger = (firing != self.firing).then_some(Pressed::Fire(firing));
         self.firing = firing;
