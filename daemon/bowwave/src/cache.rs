@@ -22,10 +22,10 @@ fn folder() -> Result<PathBuf> {
     bail!("no folder to keep the built-in recording in: set HOME or BOWWAVE_CACHE")
 }
 
-/// Where the built-in recording is, or will be. Its name holds a digest of its recipe and of this version, so that another
-/// recipe never meets an old file.
+/// Where the built-in recording is, or will be. Its name holds a digest of its recipe and of the maker's revision, so that
+/// neither meets an old file.
 pub fn default_recording_path() -> Result<PathBuf> {
-    let recipe = format!("{} {:?}", env!("CARGO_PKG_VERSION"), Recipe::default());
+    let recipe = format!("{} {:?}", make::REVISION, Recipe::default());
     let digest = Sha256::digest(recipe.as_bytes());
     let short: String = digest.iter().take(6).map(|b| format!("{b:02x}")).collect();
     Ok(folder()?.join(format!("built-in-{short}.mcap")))

@@ -39,6 +39,9 @@ pub use spectrum::{Swell, angular_frequency, cox_munk, wind_speed};
 pub use studio::{Shot, Studio};
 pub use write::{DEVICE_LOOP_KEY, Made, START, calibration, make};
 
+/// Raised whenever the same recipe makes another recording than before, so that kept ones are made anew.
+pub const REVISION: u32 = 1;
+
 /// Why no recording was made.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeError {

@@ -280,6 +280,11 @@ impl Loop {
 
     fn finish(mut self, realtime: bool, arguments: &Simulate) -> Result<Finished> {
         let mut faults = Vec::new();
+        if arguments.frames.is_none() && arguments.duration.is_none() {
+            // The last frame was drawn a little before the recording's end: whether it ends well shows only there.
+            self.collect(Time::from_ns(i64::MAX));
+            self.events.clear();
+        }
         if let Some(e) = self.replay_error.take() {
             faults.push(e.to_string());
         }

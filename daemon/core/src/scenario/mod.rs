@@ -21,11 +21,12 @@ use table::Mark;
 pub const DEFAULT: &str = include_str!("../../scenarios/default.toml");
 
 /// Names and texts of the scenarios that need no file.
-pub const BUILT_IN: [(&str, &str); 4] = [
+pub const BUILT_IN: [(&str, &str); 5] = [
     ("default", DEFAULT),
     ("swarm", include_str!("../../scenarios/swarm.toml")),
     ("empty", include_str!("../../scenarios/empty.toml")),
     ("calm-frigate", include_str!("../../scenarios/calm-frigate.toml")),
+    ("karma", include_str!("../../scenarios/karma.toml")),
 ];
 
 /// Space that every boat must leave between its farthest point and the camera, metres.
