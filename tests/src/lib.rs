@@ -26,7 +26,8 @@ pub fn program() -> &'static Path {
             .status()
             .expect("cargo runs");
         assert!(built.success(), "the program does not build");
-        let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
+        let target =
+            std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from);
         target.join("release/bowwave")
     })
 }

@@ -1,5 +1,7 @@
 //! Bad input: one clear line and the right exit code, or ridden out and counted. Nothing panics, nothing recorded is lost.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
 use std::{fs, path::Path, process::Command};
 
 use bowwave_record::{Entry, RecordingReader, RecordingWriter};
@@ -21,7 +23,8 @@ fn refused(arguments: &[&str], words: &[&str]) {
 }
 
 fn one_line_with(said: &str, words: &[&str]) {
-    let line = said.lines().find(|l| l.starts_with("bowwave: ")).unwrap_or_else(|| panic!("no message: {said}"));
+    let line =
+        said.lines().find(|l| l.starts_with("bowwave: ")).unwrap_or_else(|| panic!("no message: {said}"));
     for word in words {
         assert!(line.contains(word), "'{word}' is missing: {line}");
     }
@@ -51,7 +54,10 @@ fn a_truncated_recording_is_played_up_to_the_cut() {
 #[test]
 fn foreign_and_empty_recordings_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    refused(&[&file(folder.path(), "text.mcap", b"this is no recording, but long enough to be one")], &["text.mcap", "MCAP"]);
+    refused(
+        &[&file(folder.path(), "text.mcap", b"this is no recording, but long enough to be one")],
+        &["text.mcap", "MCAP"],
+    );
     refused(&[&file(folder.path(), "empty.mcap", b"")], &["empty.mcap"]);
     refused(&["not-there.mcap"], &["not-there.mcap"]);
 }
@@ -138,14 +144,18 @@ fn mistakes_in_files_are_named_by_line_and_column() {
 fn a_model_without_its_parts_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     // One triangle in the plane of the keel, in a mesh called "blob".
-    let positions: Vec<u8> = [0f32, -1.0, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, -1.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    let positions: Vec<u8> =
+        [0f32, -1.0, 0.0, 0.0, 1.0, 1.0, 0.5, 1.0, -1.0].iter().flat_map(|v| v.to_le_bytes()).collect();
     fs::write(folder.path().join("blob.bin"), &positions).expect("a file");
     let json = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"mesh":0,"name":"blob"}],
         "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"buffers":[{"byteLength":36,"uri":"blob.bin"}],
         "bufferViews":[{"buffer":0,"byteLength":36}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,-1,-1],"max":[0.5,1,1]}]}"#;
     file(folder.path(), "blob.gltf", json.as_bytes());
-    let scenario = file(folder.path(), "scenario.toml", br#"
+    let scenario = file(
+        folder.path(),
+        "scenario.toml",
+        br#"
 name = "blob"
 [[boat]]
 name = "blob-1"
@@ -155,14 +165,18 @@ course = "still"
 range_m = 100
 bearing_deg = 0
 heading_deg = 0
-"#);
+"#,
+    );
     refused(&["--scenario", &scenario], &["blob-1", "blob.gltf", "engine", "helm"]);
 }
 
 #[test]
 fn a_boat_inside_the_camera_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scenario = file(folder.path(), "scenario.toml", br#"
+    let scenario = file(
+        folder.path(),
+        "scenario.toml",
+        br#"
 name = "too close"
 [[boat]]
 name = "skiff-1"
@@ -172,13 +186,19 @@ course = "still"
 range_m = 2
 bearing_deg = 0
 heading_deg = 0
-"#);
+"#,
+    );
     refused(&["--scenario", &scenario], &["scenario.toml:", "skiff-1", "camera"]);
 }
 
 #[test]
 fn wrong_arguments_are_usage_errors() {
-    for arguments in [vec!["simulate", "--size", "0x0"], vec!["simulate", "--fast", "--realtime"], vec!["nonsense"], vec![]] {
+    for arguments in [
+        vec!["simulate", "--size", "0x0"],
+        vec!["simulate", "--fast", "--realtime"],
+        vec!["nonsense"],
+        vec![],
+    ] {
         expect_code(&bowwave(arguments), 2);
     }
     let output = bowwave(["simulate", "--frames", "0"]);
@@ -225,14 +245,24 @@ fn a_full_disk_loses_no_round() {
     let out = disk.0.path().join("out");
     let recording = small_recording().to_str().expect("a plain path");
     let out_text = out.to_str().expect("a plain path");
-    let output =
-        bowwave(["simulate", recording, "--fast", "--size", "160x96", "--record", "--print-commits", "--out", out_text]);
+    let output = bowwave([
+        "simulate",
+        recording,
+        "--fast",
+        "--size",
+        "160x96",
+        "--record",
+        "--print-commits",
+        "--out",
+        out_text,
+    ]);
     let said = said(&output);
     assert!(!said.contains("panicked"), "{said}");
     assert!(matches!(output.status.code(), Some(1 | 3)), "{said}");
     assert!(said.contains("space") || said.contains("full"), "it must say what is wrong: {said}");
     // Every round that was reported committed is in the journal.
-    let committed = String::from_utf8_lossy(&output.stdout).lines().filter(|l| l.starts_with("committed ")).count();
+    let committed =
+        String::from_utf8_lossy(&output.stdout).lines().filter(|l| l.starts_with("committed ")).count();
     let hits = bowwave(["hits", out_text, "--json"]);
     expect_code(&hits, 0);
     let rows: Vec<serde_json::Value> = serde_json::from_slice(&hits.stdout).expect("JSON");

@@ -2,6 +2,8 @@
 //!
 //! 20 kills; `BOWWAVE_KILLS=200` for more.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
 use std::{
     collections::BTreeMap,
     io::{BufRead, BufReader},
@@ -83,10 +85,15 @@ fn no_committed_round_is_lost_and_none_is_invented() {
         assert!(seen.values().all(|n| *n == 1), "kill {kill}: a round is there twice");
         for shot in &committed {
             // A line may have been cut in its number: then a shorter number was read, which was committed before.
-            assert!(seen.contains_key(shot), "kill {kill}: round {shot} was reported committed and is not there");
+            assert!(
+                seen.contains_key(shot),
+                "kill {kill}: round {shot} was reported committed and is not there"
+            );
         }
         reported += committed.len();
         stored += rows.len();
     }
-    println!("{kills} kills: {reported} rounds reported committed, {stored} in the journal, none lost, none twice");
+    println!(
+        "{kills} kills: {reported} rounds reported committed, {stored} in the journal, none lost, none twice"
+    );
 }

@@ -5,8 +5,18 @@ use bowwave_tests::{play, small_recording};
 #[test]
 fn two_fast_runs_are_equal_to_the_byte() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [a, b] = ["a", "b"].map(|name| play(small_recording(), &folder.path().join(name), 0, &["--validation"]));
-    for key in ["records_sha256", "frames_sha256", "frames", "shots", "hits", "passes", "left_out", "registration_px"] {
+    let [a, b] =
+        ["a", "b"].map(|name| play(small_recording(), &folder.path().join(name), 0, &["--validation"]));
+    for key in [
+        "records_sha256",
+        "frames_sha256",
+        "frames",
+        "shots",
+        "hits",
+        "passes",
+        "left_out",
+        "registration_px",
+    ] {
         assert_eq!(a[key], b[key], "{key}");
     }
     assert_eq!(a["frames"], 90);
@@ -19,7 +29,8 @@ fn two_fast_runs_are_equal_to_the_byte() {
 #[test]
 fn another_seed_gives_other_records() {
     let folder = tempfile::tempdir().expect("a folder");
-    let [a, b] = ["1", "2"].map(|seed| play(small_recording(), &folder.path().join(seed), 0, &["--seed", seed]));
+    let [a, b] =
+        ["1", "2"].map(|seed| play(small_recording(), &folder.path().join(seed), 0, &["--seed", seed]));
     assert_ne!(a["records_sha256"], b["records_sha256"]);
     assert_eq!((&a["seed"], &b["seed"]), (&1.into(), &2.into()));
 }
@@ -43,10 +54,12 @@ fn real_time_goes_through_the_serial_line() {
     let out = folder.path().join("out");
     let arguments = ["simulate", "--realtime", "--size", "160x96", "--duration", "2", "--json", "--out"];
     let recording = small_recording().to_str().expect("a plain path");
-    let output = bowwave_tests::bowwave(arguments.into_iter().chain([out.to_str().expect("a plain path"), recording]));
+    let output =
+        bowwave_tests::bowwave(arguments.into_iter().chain([out.to_str().expect("a plain path"), recording]));
     bowwave_tests::expect_code(&output, 0);
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON on standard output");
-    let shown = summary["frames"].as_u64().expect("frames") + summary["missed_deadlines"].as_u64().expect("a clock");
+    let shown =
+        summary["frames"].as_u64().expect("frames") + summary["missed_deadlines"].as_u64().expect("a clock");
     assert!(shown >= 60, "{summary}");
     assert!(summary["counts"]["imu_samples"].as_u64() >= Some(350), "{summary}");
     assert!(summary["registration_px"]["frames"].as_u64() >= Some(40), "{summary}");

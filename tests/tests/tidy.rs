@@ -1,5 +1,7 @@
 //! Rules about the tree itself.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
 use std::{
     collections::BTreeMap,
     fs,
@@ -30,9 +32,17 @@ fn root() -> PathBuf {
 }
 
 fn tracked(pattern: &str) -> Vec<PathBuf> {
-    let out = Command::new("git").args(["ls-files", "-z", "--", pattern]).current_dir(root()).output().expect("git runs");
+    let out = Command::new("git")
+        .args(["ls-files", "-z", "--", pattern])
+        .current_dir(root())
+        .output()
+        .expect("git runs");
     assert!(out.status.success(), "git ls-files failed: {}", String::from_utf8_lossy(&out.stderr));
-    String::from_utf8_lossy(&out.stdout).split('\0').filter(|s| !s.is_empty()).map(|s| root().join(s)).collect()
+    String::from_utf8_lossy(&out.stdout)
+        .split('\0')
+        .filter(|s| !s.is_empty())
+        .map(|s| root().join(s))
+        .collect()
 }
 
 fn lines_where(pattern: &str, mut is_bad: impl FnMut(&Path, &str) -> bool) -> Vec<String> {
@@ -41,7 +51,12 @@ fn lines_where(pattern: &str, mut is_bad: impl FnMut(&Path, &str) -> bool) -> Ve
         let Ok(text) = fs::read_to_string(&path) else { continue };
         for (i, line) in text.lines().enumerate() {
             if is_bad(&path, line) {
-                found.push(format!("{}:{}: {}", path.strip_prefix(root()).expect("under root").display(), i + 1, line.trim()));
+                found.push(format!(
+                    "{}:{}: {}",
+                    path.strip_prefix(root()).expect("under root").display(),
+                    i + 1,
+                    line.trim()
+                ));
             }
         }
     }
@@ -61,7 +76,9 @@ fn crates_depend_only_on_lower_ranks() {
     let mut seen = 0;
     for package in metadata["packages"].as_array().expect("packages") {
         let name = package["name"].as_str().expect("name");
-        let rank = *ranks.get(name).unwrap_or_else(|| panic!("{name} has no rank: add it here and to ARCHITECTURE.md"));
+        let rank = *ranks
+            .get(name)
+            .unwrap_or_else(|| panic!("{name} has no rank: add it here and to ARCHITECTURE.md"));
         seen += 1;
         for dependency in package["dependencies"].as_array().expect("dependencies") {
             let on = dependency["name"].as_str().expect("name");
@@ -90,7 +107,8 @@ fn unsafe_code_stays_in_devices_and_render() {
 
 #[test]
 fn the_core_has_no_io_no_clock_and_no_threads() {
-    let words = ["std::fs", "std::net", "std::thread", "Instant::now", "SystemTime::now", "std::process", "println!"];
+    let words =
+        ["std::fs", "std::net", "std::thread", "Instant::now", "SystemTime::now", "std::process", "println!"];
     let found = lines_where("daemon/core/src/*.rs", |_, line| {
         let code = line.split("//").next().unwrap_or("");
         words.iter().any(|w| code.contains(w))
@@ -123,7 +141,16 @@ fn no_file_is_longer_than_600_lines() {
 
 #[test]
 fn nothing_is_left_unfinished() {
-    let marks = ["TO", "FIX", "XX"].map(|m| format!("{m}{}", match m { "TO" => "DO", "FIX" => "ME", _ => "X" }));
+    let marks = ["TO", "FIX", "XX"].map(|m| {
+        format!(
+            "{m}{}",
+            match m {
+                "TO" => "DO",
+                "FIX" => "ME",
+                _ => "X",
+            }
+        )
+    });
     let found = lines_where("*.rs", |_, line| marks.iter().any(|m| line.contains(m.as_str())));
     assert!(found.is_empty(), "unfinished:\n{}", found.join("\n"));
 }
