@@ -109,7 +109,12 @@ fn unsafe_code_stays_in_devices_and_render() {
 fn the_core_has_no_io_no_clock_and_no_threads() {
     let words =
         ["std::fs", "std::net", "std::thread", "Instant::now", "SystemTime::now", "std::process", "println!"];
-    let found = lines_where("daemon/core/src/*.rs", |_, line| {
+    let found = lines_where("daemon/core/src/*.rs", |path, line| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        // Tests read tables of numbers and list folders.
+        if name.ends_with("_tests.rs") || name == "test_data.rs" {
+            return false;
+        }
         let code = line.split("//").next().unwrap_or("");
         words.iter().any(|w| code.contains(w))
     });

@@ -4,6 +4,7 @@ mod cache;
 mod cli;
 mod config;
 mod doctor;
+mod drawing;
 mod hits;
 mod import;
 mod outcome;
@@ -27,9 +28,11 @@ fn main() -> ExitCode {
         1 => "info",
         _ => "debug",
     };
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(format!("{level},mp4parse=error")))
-        .format_target(false)
-        .init();
+    env_logger::Builder::from_env(
+        env_logger::Env::default().default_filter_or(format!("{level},mp4parse=error")),
+    )
+    .format_target(false)
+    .init();
     match run(&cli.command, program_start) {
         Ok(outcome) => outcome.into(),
         Err(e) => {

@@ -10,10 +10,12 @@ use bowwave_core::{
     scenario::{self, Scenario},
     scene::{Pass, PassDecision, ReflectionMethod},
 };
+use bowwave_render::Renderer;
 use serde::Serialize;
 
 use crate::{
     cli::Plan,
+    drawing,
     simulate::prepare::{load_models, read_scenario},
 };
 
@@ -25,8 +27,10 @@ struct Printed {
     boats: Vec<PrintedBoat>,
     passes: Vec<PrintedPass>,
     variants: Vec<String>,
+    /// As allocated on `device`, for three frames in flight.
     memory: Vec<PrintedMemory>,
     memory_bytes: u64,
+    device: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -74,10 +78,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         boats: scenario.boats.len(),
         belt: scenario.weapon.belt,
     });
-    let memory: Vec<PrintedMemory> = Vec::<(&'static str, u64)>::new()
-        .into_iter()
-        .map(|(name, bytes)| PrintedMemory { name, bytes })
-        .collect();
+    let (memory, device) = memory(&plan, &models);
     let printed = Printed {
         scenario: scenario.name.clone(),
         size: format!("{}x{}", arguments.size.0, arguments.size.1),
@@ -100,6 +101,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         variants: variants(&plan),
         memory_bytes: memory.iter().map(|m| m.bytes).sum(),
         memory,
+        device,
     };
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&printed).context("cannot put the plan into JSON")?);
@@ -107,6 +109,17 @@ pub fn run(arguments: &Plan) -> Result<()> {
         print!("{}", text_of(&printed));
     }
     Ok(())
+}
+
+/// What a renderer for the plan allocates, and on which device: made and let go of, not estimated.
+fn memory(plan: &ScenePlan, models: &[Model]) -> (Vec<PrintedMemory>, String) {
+    match Renderer::new(&drawing::config(plan, None, false), models) {
+        Ok((renderer, _)) => {
+            let listed = renderer.memory().into_iter().map(|(name, bytes)| PrintedMemory { name, bytes });
+            (listed.collect(), renderer.device().name.clone())
+        }
+        Err(e) => (Vec::new(), format!("none: {e}")),
+    }
 }
 
 fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
@@ -168,7 +181,7 @@ fn text_of(plan: &Printed) -> String {
     for v in &plan.variants {
         text += &format!("  {v}\n");
     }
-    text += "\nmemory\n";
+    text += &format!("\nmemory on {}\n", plan.device);
     for m in &plan.memory {
         text += &format!("  {:<28} {:>9.2} MB\n", m.name, m.bytes as f64 * 1e-6);
     }

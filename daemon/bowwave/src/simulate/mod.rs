@@ -19,17 +19,14 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use bowwave_core::{plan::ScenePlan, scene::Pass, session::ROUNDS_SEEN_MAX, time::Time};
+use bowwave_core::time::Time;
 use bowwave_record::{Journal, Run};
-use bowwave_render::{Needs, PictureShape, RenderConfig, Renderer};
+use bowwave_render::Renderer;
 
-use crate::{cli::Simulate, hits::JOURNAL, outcome::Outcome};
+use crate::{cli::Simulate, drawing, hits::JOURNAL, outcome::Outcome};
 use output::{Output, OutputOptions};
 use recorder::Recorder;
 use run::Loop;
-
-/// Frames in flight: one being drawn, one being read, one being filled.
-const FRAMES_IN_FLIGHT: usize = 3;
 
 /// Runs the trainer on a recording.
 pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
@@ -47,8 +44,10 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     let replay = run::open_replay(&prepared.recording, realtime, arguments, frames)?;
 
     let session = bowwave_core::session::Session::new(prepared.setup.clone())?;
-    let (renderer, completions) =
-        Renderer::new(&render_config(session.plan(), &prepared), &prepared.setup.models)?;
+    let (renderer, completions) = Renderer::new(
+        &drawing::config(session.plan(), prepared.gpu.clone(), prepared.validation),
+        &prepared.setup.models,
+    )?;
     let options = OutputOptions {
         folder: arguments.out.clone(),
         size: prepared.setup.screen,
@@ -79,25 +78,6 @@ fn expected_frames(arguments: &Simulate, recording_ns: i64) -> u64 {
         (Some(frames), _) => frames,
         (None, Some(seconds)) => of_seconds(seconds),
         (None, None) => of_seconds(recording_ns as f64 * 1e-9),
-    }
-}
-
-fn render_config(plan: &ScenePlan, prepared: &prepare::Prepared) -> RenderConfig {
-    let only = |pass: Pass, n: usize| if plan.has(pass) { n } else { 0 };
-    let waters =
-        if plan.has(Pass::Water) { vec![(plan.water.method, plan.water.shadow)] } else { Vec::new() };
-    RenderConfig {
-        width: plan.size.0,
-        height: plan.size.1,
-        device: prepared.gpu.clone(),
-        validation: prepared.validation,
-        frames_in_flight: FRAMES_IN_FLIGHT,
-        needs: Needs {
-            boats_max: only(Pass::Boats, plan.boats),
-            rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
-            waters,
-        },
-        picture: Some(PictureShape { format: plan.video, width: plan.picture.0, height: plan.picture.1 }),
     }
 }
 
