@@ -7,11 +7,14 @@ struct BoatBlock {
     vec4 eye;                  // xyz: the eye; w: share of the light that haze replaces
 };
 
-layout(std430, set = 0, binding = 1) readonly buffer Boats {
-    BoatBlock boats[];
+const int BOAT_BLOCKS_MAX = 128;
+
+layout(std140, set = 0, binding = 1) uniform Boats {
+    BoatBlock boats[BOAT_BLOCKS_MAX];
 };
 
 layout(push_constant) uniform DrawBlock {
     vec4 rect;   // x0, y0, x1, y1 in pixels, for quads
     uint index;  // which boat
+    uint first;
 } draw;

@@ -1,14 +1,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Nelson 2009, eq. 4 and 5, mended: how the video's brightness changes downwards, once for each FIELD_CELL of the screen. Seen
-// at a grazing angle waves are long and low, so a cell is wider than high; it averages the camera's noise away, and costs an
-// eighth of doing it at every pixel.
+// at a grazing angle waves are long and low, so a cell is wider than high. A mean over four pixels, and bilinear fetches of the
+// cells, take the camera's noise off; and it costs an eighth of doing it at every pixel.
 #include "frame.glsl"
 #include "water_block.glsl"
 
 layout(push_constant) uniform DrawBlock {
     vec4 rect;
     uint index;
+    uint first;
 } draw;
 
 // The video beneath, as codes, bilinear.
@@ -19,10 +20,9 @@ layout(location = 0) out float normalised;
 // Pixels of the screen to a cell.
 const vec2 FIELD_CELL = vec2(4.0, 2.0);
 
-// Mean of the cell around a pixel corner: each fetch takes the mean of 2 x 2 pixels.
+// Mean of the 2 x 2 pixels around a corner: one fetch.
 vec3 mean_code(vec2 corner) {
-    vec2 texel = 1.0 / frame.size;
-    return 0.5 * (texture(video, (corner - vec2(1.0, 0.0)) * texel).rgb + texture(video, (corner + vec2(1.0, 0.0)) * texel).rgb);
+    return texture(video, corner / frame.size).rgb;
 }
 
 void main() {

@@ -19,4 +19,5 @@ layout(std430, set = 0, binding = 3) readonly buffer Rounds {
 layout(push_constant) uniform DrawBlock {
     vec4 rect;   // the pixels that it can cover
     uint index;  // which one
+    uint first;
 } draw;

@@ -13,6 +13,7 @@ layout(constant_id = 1) const uint SHADOW = 0;
 layout(push_constant) uniform DrawBlock {
     vec4 rect;
     uint index;
+    uint first;
 } draw;
 
 // The video beneath, as codes.
@@ -89,12 +90,22 @@ vec4 reflection(vec2 at, float below) {
     } else {
         // Mended: at a grazing angle waves move a reflection up and down much more than sideways, and the more the farther
         // below the hull it is.
-        float grown = min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
-        float shift = sin(texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).r * 2.0 - 1.0) * waters[i].shift * grown;
+        float normalised = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).r * 2.0 - 1.0;
+        float shift = sin(normalised) * waters[i].shift;
+        // Towards the limit the reflection fades instead of ending.
+        kept *= 1.0 - smoothstep(0.7, 1.0, abs(shift) / waters[i].shift_limit);
+        if (kept == 0.0) {
+            return vec4(0.0);
+        }
+        shift *= min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
         vec2 down = waters[i].down;
         move = shift * (down + SIDEWAYS * vec2(down.y, -down.x));
     }
     return alpha * kept * blurred(uv + move * waters[i].mirror_scale, waters[i].blur, bounds);
+}
+
+float hull_line(int column) {
+    return waters[draw.index].hull_line[column >> 2][column & 3];
 }
 
 void main() {
@@ -106,7 +117,7 @@ void main() {
     float column = (dot(from_anchor, vec2(down.y, -down.x)) - waters[i].columns.x) * waters[i].columns.y;
     float held = clamp(column, 0.0, float(HULL_LINE_COLUMNS - 1));
     int first = min(int(held), HULL_LINE_COLUMNS - 2);
-    float line = mix(waters[i].hull_line[first], waters[i].hull_line[first + 1], held - float(first));
+    float line = mix(hull_line(first), hull_line(first + 1), held - float(first));
     float below = dot(from_anchor, down) - line;
     if (below < 0.0) {
         discard;

@@ -22,9 +22,12 @@ struct WaterBlock {
     float shift_grow;    // how that share grows, per pixel below the line
     float pad0;
     float pad1;
-    float hull_line[HULL_LINE_COLUMNS];  // pixels below `anchor` of the hull-water line
+    vec4 hull_line[HULL_LINE_COLUMNS / 4];  // pixels below `anchor` of the hull-water line, column by column
 };
 
-layout(std430, set = 0, binding = 2) readonly buffer Waters {
-    WaterBlock waters[];
+const int WATERS_MAX = 64;
+
+// A uniform block and no storage buffer: a driver that runs on the processor reads it once and not for every pixel.
+layout(std140, set = 0, binding = 2) uniform Waters {
+    WaterBlock waters[WATERS_MAX];
 };

@@ -60,7 +60,7 @@ layout!(
     horizon = 96,
 );
 
-/// One drawn boat: `BoatBlock`, set 0, binding 1, std430. Planes and directions are in the boat's space.
+/// One drawn boat: `BoatBlock`, set 0, binding 1, std140. Planes and directions are in the boat's space.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct BoatBlock {
@@ -77,10 +77,16 @@ pub struct BoatBlock {
 }
 layout!(BoatBlock, 112, camera_from_boat = 0, water_plane = 48, horizon_plane = 64, sun = 80, eye = 96);
 
+/// Most [`BoatBlock`]s in a frame: each boat's own and its mirror image's.
+pub const BOAT_BLOCKS_MAX: usize = 128;
+
+/// Most [`WaterBlock`]s in a frame.
+pub const WATERS_MAX: usize = 64;
+
 /// Columns of the table that a [`WaterBlock`] holds.
 pub const HULL_LINE_COLUMNS: usize = 32;
 
-/// How one boat is put onto the sea: `WaterBlock`, set 0, binding 2, std430. Pixels are the screen's.
+/// How one boat is put onto the sea: `WaterBlock`, set 0, binding 2, std140. Pixels are the screen's.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct WaterBlock {
@@ -238,12 +244,14 @@ layout!(VideoBlock, 24, scale = 0, offset = 8, size = 16);
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct DrawBlock {
-    /// x0, y0, x1, y1 in pixels, for quads.
+    /// x0, y0, x1, y1 in pixels: the quad, or what is added to each quad of the frame's list.
     pub rect: [f32; 4],
-    /// Which boat.
+    /// Which boat or round.
     pub index: u32,
+    /// First quad of the frame's list: instances count from there.
+    pub first: u32,
 }
-layout!(DrawBlock, 20, rect = 0, index = 16);
+layout!(DrawBlock, 24, rect = 0, index = 16, first = 20);
 
 /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.
 #[repr(C)]

@@ -37,10 +37,14 @@ shaders! {
     SCREEN_VERT = "screen.vert";
     /// Camera bytes to packed sRGB codes. Constants: 0 format (0 YUYV, 1 NV12, 2 RGB), 1 scaled, 2 pixels a fragment.
     VIDEO_FRAG = "video.frag";
-    /// A boat's corner to clip space.
+    /// A corner of a boat without a texture to clip space, and its light.
     BOAT_VERT = "boat.vert";
-    /// A boat's light. Constants: 0 textured, 1 samples.
+    /// The same with a texture.
+    BOAT_TEXTURED_VERT = "boat_textured.vert";
+    /// A boat without a texture. Constant: 0 whether the layer holds roots of light.
     BOAT_FRAG = "boat.frag";
+    /// A boat with a texture. Constants: 0 whether the layer holds roots of light, 1 samples.
+    BOAT_TEXTURED_FRAG = "boat_textured.frag";
     /// A rectangle given in pixels.
     RECT_VERT = "rect.vert";
     /// The boats' layer, averaged. Constant: 0 samples.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use ash::vk;
 use bytemuck::Pod;
-use shaders_spirv::interface::{BoatBlock, FrameBlock, HudQuad, RoundBlock, WaterBlock};
+use shaders_spirv::interface::{
+    BOAT_BLOCKS_MAX, BoatBlock, FrameBlock, HudQuad, RoundBlock, WATERS_MAX, WaterBlock,
+};
 
 use crate::{
     error::RenderError,
@@ -16,6 +18,9 @@ use crate::{
 
 /// Most quads of the head-up display.
 pub(crate) const QUADS_MAX: usize = 256;
+
+/// Most rectangles of the frame's list.
+pub(crate) const RECTS_MAX: usize = 4096;
 
 /// Offset and bytes of each region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,14 +39,15 @@ pub(crate) struct Capacity {
 /// One slot's upload buffer with the descriptor set that points into it.
 pub(crate) struct FrameData {
     buffer: Buffer,
-    regions: [Region; 5],
+    regions: [Region; 6],
     pub(crate) set: vk::DescriptorSet,
 }
 
 /// Descriptor kinds of set 0.
 pub(crate) fn frame_set_layout(gpu: &Arc<Gpu>) -> Result<SetLayout, RenderError> {
     const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
-    let kinds = [vk::DescriptorType::UNIFORM_BUFFER, STORAGE, STORAGE, STORAGE, STORAGE];
+    const UNIFORM: vk::DescriptorType = vk::DescriptorType::UNIFORM_BUFFER;
+    let kinds = [UNIFORM, UNIFORM, UNIFORM, STORAGE, STORAGE, STORAGE];
     SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
 }
 
@@ -57,13 +63,13 @@ impl FrameData {
             .min_uniform_buffer_offset_alignment
             .max(gpu.limits.min_storage_buffer_offset_alignment)
             .max(64);
-        // Direct and mirrored blocks of each boat.
         let sizes = [
             size_of::<FrameBlock>(),
-            size_of::<BoatBlock>() * capacity.boats.max(1) * 2,
-            size_of::<WaterBlock>() * capacity.boats.max(1),
+            size_of::<BoatBlock>() * BOAT_BLOCKS_MAX,
+            size_of::<WaterBlock>() * WATERS_MAX,
             size_of::<RoundBlock>() * capacity.rounds.max(1),
             size_of::<HudQuad>() * QUADS_MAX,
+            size_of::<[f32; 4]>() * RECTS_MAX,
         ];
         let mut end = 0;
         let regions = sizes.map(|size| {
@@ -73,19 +79,14 @@ impl FrameData {
         });
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
         let buffer = Buffer::new(gpu, "frame data", end, usage, Access::Upload)?;
-        let at = |i: usize| (buffer.raw, regions[i].offset, regions[i].size);
-        let storage = |i: usize| {
-            let (buffer, offset, size) = at(i);
-            Bound::Storage { buffer, offset, size }
-        };
-        let (uniform, offset, size) = at(0);
-        let bound = [
-            Bound::Uniform { buffer: uniform, offset, size },
-            storage(1),
-            storage(2),
-            storage(3),
-            storage(4),
-        ];
+        let bound: [Bound; 6] = std::array::from_fn(|i| {
+            let (buffer, Region { offset, size }) = (buffer.raw, regions[i]);
+            if i < 3 {
+                Bound::Uniform { buffer, offset, size }
+            } else {
+                Bound::Storage { buffer, offset, size }
+            }
+        });
         let set = pool.set(layout, &bound)?;
         Ok(Self { buffer, regions, set })
     }
@@ -108,6 +109,10 @@ impl FrameData {
 
     pub(crate) fn write_quads(&mut self, blocks: &[HudQuad]) {
         self.write(4, blocks);
+    }
+
+    pub(crate) fn write_rects(&mut self, rects: &[[f32; 4]]) {
+        self.write(5, rects);
     }
 
     fn write<T: Pod>(&mut self, region: usize, blocks: &[T]) {

@@ -6,6 +6,7 @@
 
 mod atlas;
 mod canvas;
+mod coverage;
 mod error;
 mod frame_data;
 mod glyphs;
@@ -19,6 +20,7 @@ mod plan;
 mod renderer;
 mod ring;
 mod rounds;
+mod simplify;
 #[cfg(test)]
 mod testing;
 mod upload;

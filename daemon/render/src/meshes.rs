@@ -1,10 +1,9 @@
 //! All models on the device: one vertex buffer, one index buffer, a texture each where there is one.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use ash::vk;
 use bowwave_core::model::{Model, ModelId, Texture};
-use shaders_spirv::interface::MeshVertex;
 
 use crate::{
     error::RenderError,
@@ -12,17 +11,17 @@ use crate::{
     memory::{Access, Buffer, Image, ImageShape},
     passes::Making,
     pipeline::{Bound, Recorder, SRGB, Sampler, SetLayout},
+    simplify::{Level, simplify},
     upload::upload_image,
 };
 
 /// One model's place in the shared buffers.
 struct Mesh {
     first_index: u32,
-    indices: u32,
     first_vertex: i32,
-    /// Set 1: the model's texture, or the blank one.
-    skin: vk::DescriptorSet,
-    textured: bool,
+    levels: Vec<Level>,
+    /// Set 1, where the model has a texture.
+    skin: Option<vk::DescriptorSet>,
     _texture: Option<Image>,
 }
 
@@ -32,8 +31,6 @@ pub(crate) struct Meshes {
     vertices: Buffer,
     indices: Buffer,
     pub(crate) skin_layout: SetLayout,
-    /// One white pixel, bound where a model has no texture: the shader names one in every variant.
-    _blank: Image,
     _sampler: Sampler,
 }
 
@@ -49,30 +46,23 @@ impl Meshes {
                 .pool
                 .set(&skin_layout, &[Bound::Texture { view: image.view, sampler: sampler.raw, layout }])
         };
-        let blank = upload_texture(gpu, "blank", &Texture { width: 1, height: 1, rgba: vec![255; 4] })?;
-        let blank_skin = skin_of(&blank)?;
         let (mut vertices, mut indices, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
         for model in models {
             check(model)?;
+            let texture = model.texture.as_ref().map(|t| upload_texture(gpu, &model.name, t)).transpose()?;
+            let skin = texture.as_ref().map(skin_of).transpose()?;
             let too_big =
                 |_| RenderError::Model { name: model.name.clone(), why: "too many corners".to_owned() };
-            let texture = model.texture.as_ref().map(|t| upload_texture(gpu, &model.name, t)).transpose()?;
-            let skin = texture.as_ref().map(skin_of).transpose()?.unwrap_or(blank_skin);
+            let made = simplify(model);
             meshes.push(Mesh {
                 first_index: u32::try_from(indices.len()).map_err(too_big)?,
-                indices: u32::try_from(model.indices.len()).map_err(too_big)?,
                 first_vertex: i32::try_from(vertices.len()).map_err(too_big)?,
+                levels: made.levels,
                 skin,
-                textured: texture.is_some(),
                 _texture: texture,
             });
-            indices.extend_from_slice(&model.indices);
-            vertices.extend(model.vertices.iter().map(|v| MeshVertex {
-                position: v.position.to_array(),
-                normal: v.normal.to_array(),
-                uv: v.uv.to_array(),
-                albedo: v.albedo.to_array(),
-            }));
+            indices.extend_from_slice(&made.indices);
+            vertices.extend_from_slice(&made.vertices);
         }
         let vertices = filled(
             gpu,
@@ -86,12 +76,12 @@ impl Meshes {
             bytemuck::cast_slice(&indices),
             vk::BufferUsageFlags::INDEX_BUFFER,
         )?;
-        Ok(Self { meshes, vertices, indices, skin_layout, _blank: blank, _sampler: sampler })
+        Ok(Self { meshes, vertices, indices, skin_layout, _sampler: sampler })
     }
 
-    /// Descriptor set of a model's texture, and whether it is one of its own.
-    pub(crate) fn skin(&self, model: ModelId) -> Option<(vk::DescriptorSet, bool)> {
-        self.meshes.get(usize::from(model.0)).map(|m| (m.skin, m.textured))
+    /// Descriptor set of a model's texture, where it has one.
+    pub(crate) fn skin(&self, model: ModelId) -> Option<vk::DescriptorSet> {
+        self.meshes.get(usize::from(model.0)).and_then(|m| m.skin)
     }
 
     /// Binds the shared buffers.
@@ -103,13 +93,18 @@ impl Meshes {
         }
     }
 
-    /// Draws one model; what is not there is not drawn.
-    pub(crate) fn draw(&self, to: Recorder<'_>, model: ModelId) {
+    /// The coarsest level of a model that lies within `detail_m` of the whole.
+    pub(crate) fn level(&self, model: ModelId, detail_m: f64) -> Option<&Level> {
+        let levels = &self.meshes.get(usize::from(model.0))?.levels;
+        levels.iter().rev().find(|l| l.error_m() <= detail_m).or_else(|| levels.first())
+    }
+
+    /// Draws some of a model's triangles.
+    pub(crate) fn draw(&self, to: Recorder<'_>, model: ModelId, indices: &Range<u32>) {
         let Some(mesh) = self.meshes.get(usize::from(model.0)) else { return };
+        let (count, first) = (indices.end - indices.start, mesh.first_index + indices.start);
         // SAFETY: within a rendering, with buffers and pipeline bound; the ranges were checked when the model was taken.
-        unsafe {
-            to.gpu.device.cmd_draw_indexed(to.cmd, mesh.indices, 1, mesh.first_index, mesh.first_vertex, 0);
-        }
+        unsafe { to.gpu.device.cmd_draw_indexed(to.cmd, count, 1, first, mesh.first_vertex, 0) };
     }
 }
 

@@ -16,6 +16,8 @@ use crate::{
 pub(crate) const SRGB: vk::Format = vk::Format::R8G8B8A8_SRGB;
 /// The same memory as codes.
 pub(crate) const UNORM: vk::Format = vk::Format::R8G8B8A8_UNORM;
+/// Linear light in memory: a driver that runs on the processor samples it several times as fast as codes.
+pub(crate) const LIGHT: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
 /// Depth, reverse-Z.
 pub(crate) const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 /// Samples a pixel of the boats' layer.
@@ -205,6 +207,8 @@ pub(crate) struct PipelineShape<'a> {
     pub(crate) topology: vk::PrimitiveTopology,
     pub(crate) colour: vk::Format,
     pub(crate) blend: Blend,
+    /// Leaves out back faces, front ones being seen this way round.
+    pub(crate) cull: Option<vk::FrontFace>,
     /// Test and write reverse-Z depth.
     pub(crate) depth: bool,
     pub(crate) samples: vk::SampleCountFlags,
@@ -248,10 +252,7 @@ impl Pipeline {
         vertex: &Module,
         fragment: &Module,
     ) -> Result<vk::Pipeline, RenderError> {
-        let entries: Vec<_> = (0..shape.constants.len())
-            .zip(0..)
-            .map(|(i, id)| vk::SpecializationMapEntry { constant_id: id, offset: 4 * i as u32, size: 4 })
-            .collect();
+        let entries = entries(shape.constants);
         let special = vk::SpecializationInfo::default()
             .map_entries(&entries)
             .data(bytemuck::cast_slice(shape.constants));
@@ -283,8 +284,10 @@ impl Pipeline {
             .vertex_attribute_descriptions(&attributes);
         let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(shape.topology);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-        // Nothing is culled: hulls are open shells that are seen from both sides.
-        let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+        let mut raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+        if let Some(front) = shape.cull {
+            raster = raster.cull_mode(vk::CullModeFlags::BACK).front_face(front);
+        }
         let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(shape.samples);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(shape.depth)
@@ -352,6 +355,12 @@ impl Drop for Module {
     }
 }
 
+/// Specialisation constants from 0 on, four bytes each.
+fn entries(constants: &[u32]) -> Vec<vk::SpecializationMapEntry> {
+    let ids = 0..u32::try_from(constants.len()).unwrap_or(0);
+    ids.map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 }).collect()
+}
+
 fn blend_state(blend: Blend) -> vk::PipelineColorBlendAttachmentState {
     let state =
         vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
@@ -394,30 +403,18 @@ pub(crate) fn cut(r: PixelRect, size: (u32, u32)) -> Option<PixelRect> {
     })
 }
 
-/// Cuts rectangles into pieces that do not overlap and together cover the same pixels. `pieces` keeps its memory.
-pub(crate) fn disjoint(rects: impl Iterator<Item = PixelRect>, pieces: &mut Vec<PixelRect>) {
-    pieces.clear();
-    for r in rects {
-        let first = pieces.len();
-        pieces.push(r);
-        for earlier in 0..first {
-            cut_from(pieces[earlier], pieces, first);
-        }
-    }
-}
-
 /// The parts of `whole` that none of `cutters` covers. `rest` keeps its memory.
 pub(crate) fn around_all(whole: PixelRect, cutters: &[PixelRect], rest: &mut Vec<PixelRect>) {
     rest.clear();
     rest.push(whole);
     for cutter in cutters {
-        cut_from(*cutter, rest, 0);
+        cut_from(*cutter, rest);
     }
 }
 
-/// Takes `cutter` out of the pieces from `first` on.
-fn cut_from(cutter: PixelRect, pieces: &mut Vec<PixelRect>, first: usize) {
-    let mut i = first;
+/// Takes `cutter` out of the pieces.
+fn cut_from(cutter: PixelRect, pieces: &mut Vec<PixelRect>) {
+    let mut i = 0;
     while i < pieces.len() {
         if overlap(pieces[i], cutter).is_none() {
             i += 1;
@@ -553,14 +550,11 @@ impl Recorder<'_> {
     }
 
     /// Sets both attachments to zero (no light, no coverage, infinitely far) in some rectangles, within a rendering.
-    pub(crate) fn clear(&self, rects: impl Iterator<Item = PixelRect>) {
+    pub(crate) fn clear(&self, areas: &[vk::ClearRect]) {
         let zero = |aspect_mask| vk::ClearAttachment { aspect_mask, ..vk::ClearAttachment::default() };
         let what = [zero(vk::ImageAspectFlags::COLOR), zero(vk::ImageAspectFlags::DEPTH)];
-        for r in rects {
-            let areas = [vk::ClearRect { rect: rect(r), base_array_layer: 0, layer_count: 1 }];
-            // SAFETY: a rendering with a colour and a depth attachment was begun; the rectangle lies in its area.
-            unsafe { self.gpu.device.cmd_clear_attachments(self.cmd, &what, &areas) };
-        }
+        // SAFETY: a rendering with a colour and a depth attachment was begun; the rectangles lie in its area.
+        unsafe { self.gpu.device.cmd_clear_attachments(self.cmd, &what, areas) };
     }
 
     /// Copies parts of a buffer to an image.
@@ -658,15 +652,15 @@ mod tests {
         assert_eq!(cut(r(10, 10, 20, 20), (25, 100)), Some(r(10, 10, 15, 20)));
         assert_eq!(cut(r(30, 10, 20, 20), (25, 100)), None);
         assert_eq!(cut(r(u32::MAX, 10, 20, 20), (25, 100)), None);
-        let mut pieces = Vec::new();
-        let rects = [r(0, 0, 30, 20), r(10, 5, 40, 10), r(5, 0, 10, 40), r(0, 0, 30, 20), r(20, 10, 25, 20)];
-        disjoint(rects.into_iter(), &mut pieces);
+        let mut rest = Vec::new();
+        let (whole, cutters) = (r(0, 0, 50, 40), [r(10, 5, 40, 10), r(5, 0, 10, 40), r(20, 10, 25, 20)]);
+        around_all(whole, &cutters, &mut rest);
         for y in 0..50 {
             for x in 0..60 {
                 let holds =
                     |q: &PixelRect| (q.x..q.x + q.width).contains(&x) && (q.y..q.y + q.height).contains(&y);
-                let wanted = usize::from(rects.iter().any(holds));
-                assert_eq!(pieces.iter().filter(|q| holds(q)).count(), wanted, "pixel {x} {y}");
+                let wanted = usize::from(holds(&whole) && !cutters.iter().any(holds));
+                assert_eq!(rest.iter().filter(|q| holds(q)).count(), wanted, "pixel {x} {y}");
             }
         }
         assert_eq!(joined(r(10, 40, 5, 5), r(20, 10, 5, 5)), r(10, 10, 15, 35));

@@ -4,28 +4,46 @@
 use ash::vk;
 use bowwave_core::{
     model::Model,
-    scene::{Pass, PixelRect, ReflectionMethod, Scene},
+    scene::{BoatView, Pass, PixelRect, ReflectionMethod, Scene},
 };
-use shaders_spirv::interface::{BoatBlock, RoundBlock, WaterBlock};
+use glam::DVec2;
+use shaders_spirv::interface::{BOAT_BLOCKS_MAX, BoatBlock, RoundBlock, WATERS_MAX, WaterBlock};
 
 use crate::{
     atlas::{self, Placed},
+    coverage::{Boxes, Cells},
     frame_data::Capacity,
+    frame_data::RECTS_MAX,
     passes::{
         boats::BoatDraw,
-        mirror::MirrorDraw,
         rounds::{RoundDraw, pieces},
         water::WaterDraw,
     },
-    pipeline::{cut, disjoint},
+    pipeline::{corners, cut, joined, overlap, rect},
     rounds::round_block,
     view,
-    water::{HullLine, hull_line, mirror_scale, water_block},
+    water::{self, HullLine, hull_line, mirror_scale, water_block},
 };
 
 /// Pixels beyond a reflection's rectangle at which the water shader still compares the video: nine gradients of at most eight
 /// pixels' step, and the cells that they are taken in.
 const GRADIENTS_REACH_PX: u32 = 84;
+
+/// Boats are drawn simplified by no more than this, pixels.
+const DETAIL_PX: f64 = 0.5;
+/// The same for mirrored boats, which are distorted and blurred; more would let decks show through hulls.
+const MIRROR_DETAIL_PX: f64 = 0.6;
+
+/// Pixels around a boat's boxes that its anti-aliased edges can touch.
+const HULL_MARGIN_PX: f64 = 1.5;
+/// Most rectangles for all hulls together, and for one boat's water.
+const HULL_RECTS_MAX: usize = 512;
+const WATER_RECTS_MAX: usize = 256;
+
+/// Metres that a pixel spans at a boat.
+fn pixel_m(scene: &Scene, boat: &BoatView) -> f64 {
+    boat.range_m / scene.lens.focal.max_element().max(1.0)
+}
 
 /// `r` with the pixels that gradients starting in it can reach, on a screen of `size`.
 pub(crate) fn with_gradients(r: PixelRect, size: (u32, u32)) -> PixelRect {
@@ -35,18 +53,23 @@ pub(crate) fn with_gradients(r: PixelRect, size: (u32, u32)) -> PixelRect {
     PixelRect { x, y, width: right - x, height: lower - y }
 }
 
-/// What of a model the frame's plan needs: all but its mesh and texture.
-pub(crate) struct Outline(Model);
+/// What of a model the frame's plan needs: no mesh and no texture.
+pub(crate) struct Outline {
+    model: Model,
+    boxes: Boxes,
+}
 
 impl Outline {
     pub(crate) fn of(model: &Model) -> Self {
-        Self(Model {
+        let boxes = Boxes::of(model);
+        let light = Model {
             vertices: Vec::new(),
             indices: Vec::new(),
             parts: Vec::new(),
             texture: None,
             ..model.clone()
-        })
+        };
+        Self { model: light, boxes }
     }
 }
 
@@ -57,13 +80,18 @@ pub(crate) struct Plan {
     pub(crate) water_blocks: Vec<WaterBlock>,
     pub(crate) round_blocks: Vec<RoundBlock>,
     pub(crate) boats: Vec<BoatDraw>,
-    pub(crate) mirrors: Vec<MirrorDraw>,
+    pub(crate) mirrors: Vec<BoatDraw>,
     /// Where each of `mirrors` lies in the mirror layer.
-    pub(crate) places: Vec<Placed>,
+    pub(crate) mirror_places: Vec<Placed>,
+    places: Vec<Placed>,
     pub(crate) waters: Vec<WaterDraw>,
     pub(crate) rounds: Vec<RoundDraw>,
-    /// Pixels that hulls can cover, cut apart.
+    /// Pixels that hulls can cover, each once.
     pub(crate) hulls: Vec<PixelRect>,
+    /// The same for clearing.
+    pub(crate) clears: Vec<vk::ClearRect>,
+    /// The frame's list of rectangles: those of `hulls`, then those of each of `waters`.
+    pub(crate) list: Vec<[f32; 4]>,
     /// Every rectangle that something is blended into.
     pub(crate) rects: Vec<PixelRect>,
     /// The same as copies between buffer and screen.
@@ -71,13 +99,14 @@ pub(crate) struct Plan {
     /// What of the video the water's shader compares.
     pub(crate) backdrop_regions: Vec<vk::BufferImageCopy>,
     pub(crate) quads: u32,
+    cells: Cells,
     wanted: Vec<(PixelRect, f64)>,
     lines: Vec<(usize, HullLine)>,
     rest: Vec<PixelRect>,
 }
 
 impl Plan {
-    pub(crate) fn with_capacity(capacity: Capacity) -> Self {
+    pub(crate) fn with_capacity(capacity: Capacity, size: (u32, u32)) -> Self {
         let Capacity { boats, rounds } = capacity;
         Self {
             boat_blocks: Vec::with_capacity(boats * 2),
@@ -86,15 +115,19 @@ impl Plan {
             boats: Vec::with_capacity(boats),
             mirrors: Vec::with_capacity(boats),
             places: Vec::with_capacity(boats),
+            mirror_places: Vec::with_capacity(boats),
             waters: Vec::with_capacity(boats),
             rounds: Vec::with_capacity(rounds * 4),
-            hulls: Vec::with_capacity(boats * 8),
+            hulls: Vec::with_capacity(HULL_RECTS_MAX),
+            clears: Vec::with_capacity(HULL_RECTS_MAX),
+            list: Vec::with_capacity(RECTS_MAX),
+            cells: Cells::new(size),
             rects: Vec::with_capacity(boats * 2 + rounds + 8),
             regions: Vec::with_capacity(boats * 2 + rounds + 8),
             backdrop_regions: Vec::with_capacity(boats),
             wanted: Vec::with_capacity(boats),
             lines: Vec::with_capacity(boats),
-            rest: Vec::with_capacity(64),
+            rest: Vec::with_capacity(WATER_RECTS_MAX),
             quads: 0,
         }
     }
@@ -108,7 +141,6 @@ impl Plan {
         if scene.runs(Pass::Water) {
             self.plan_water(scene, models, size, atlas);
         }
-        disjoint(self.boats.iter().map(|b| b.rect), &mut self.hulls);
         if scene.runs(Pass::Rounds) {
             self.plan_rounds(scene);
         }
@@ -121,9 +153,12 @@ impl Plan {
         self.boats.clear();
         self.mirrors.clear();
         self.places.clear();
+        self.mirror_places.clear();
         self.waters.clear();
         self.rounds.clear();
         self.hulls.clear();
+        self.clears.clear();
+        self.list.clear();
         self.rects.clear();
         self.wanted.clear();
         self.lines.clear();
@@ -131,19 +166,47 @@ impl Plan {
 
     fn plan_boats(&mut self, scene: &Scene, models: &[Outline], size: (u32, u32)) {
         for boat in &scene.boats {
-            let Some(Outline(model)) = models.get(usize::from(boat.model.0)) else { continue };
+            let Some(Outline { model, boxes }) = models.get(usize::from(boat.model.0)) else { continue };
             let Some(rect) = boat.hull.and_then(|r| cut(r, size)) else { continue };
+            if self.boats.len() * 2 >= BOAT_BLOCKS_MAX {
+                break;
+            }
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
-            self.boats.push(BoatDraw { model: boat.model, index: self.boat_blocks.len() as u32, rect });
+            let detail_m = DETAIL_PX * pixel_m(scene, boat);
+            self.boats.push(BoatDraw {
+                model: boat.model,
+                index: self.boat_blocks.len() as u32,
+                rect,
+                detail_m,
+            });
             self.boat_blocks.push(view::boat_block(scene, boat, &pose, false));
             self.rects.push(rect);
+            boxes.mark(&mut self.cells, rect, DVec2::splat(HULL_MARGIN_PX), |p| {
+                let world = pose.to_world(p);
+                scene.lens.project(scene.camera.to_camera(world.with_z(world.z.max(boat.water_level))))
+            });
         }
+        self.cells.take(&mut self.hulls, HULL_RECTS_MAX);
+        // Cells reach beyond the rectangles; nothing is drawn there, and what is drawn must lie in a rectangle.
+        let around = self.rects.iter().copied().reduce(joined);
+        self.hulls.retain_mut(|h| match around.and_then(|a| overlap(*h, a)) {
+            Some(inside) => {
+                *h = inside;
+                true
+            }
+            None => false,
+        });
+        self.list.extend(self.hulls.iter().map(|h| corners(*h)));
+        let clear = |h: &PixelRect| vk::ClearRect { rect: rect(*h), base_array_layer: 0, layer_count: 1 };
+        self.clears.extend(self.hulls.iter().map(clear));
     }
 
     /// Boats whose waterline cannot be placed on the screen have no reflection.
     fn plan_water(&mut self, scene: &Scene, models: &[Outline], size: (u32, u32), atlas: (u32, u32)) {
-        for (i, boat) in scene.boats.iter().enumerate() {
-            let Some(Outline(model)) = models.get(usize::from(boat.model.0)) else { continue };
+        // Farthest first: where there are too many, the nearest count.
+        let skipped = scene.boats.len().saturating_sub(WATERS_MAX);
+        for (i, boat) in scene.boats.iter().enumerate().skip(skipped) {
+            let Some(Outline { model, .. }) = models.get(usize::from(boat.model.0)) else { continue };
             let Some(rect) = boat.reflection.and_then(|r| cut(r, size)) else { continue };
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
             let Some(line) = hull_line(scene, boat, &pose, model) else { continue };
@@ -152,15 +215,41 @@ impl Plan {
         }
         atlas::place(atlas, &self.wanted, &mut self.places);
         let mirrored = scene.water.method != ReflectionMethod::Off;
-        for (((i, line), placed), (rect, _)) in self.lines.iter().zip(&self.places).zip(&self.wanted) {
+        for (n, placed) in self.places.iter().enumerate() {
+            let ((i, line), (rect, _)) = (&self.lines[n], self.wanted[n]);
             let boat = &scene.boats[*i];
-            self.waters.push(WaterDraw { index: self.water_blocks.len() as u32, rect: *rect });
-            self.water_blocks.push(water_block(scene, boat, line, placed));
-            self.rects.push(*rect);
-            if let Some(Outline(model)) = models.get(usize::from(boat.model.0)).filter(|_| mirrored) {
-                let pose = view::drawn_pose(&scene.camera, boat, model.kind);
-                self.mirrors.push(MirrorDraw { model: boat.model, index: self.boat_blocks.len() as u32 });
+            let Some(Outline { model, boxes }) = models.get(usize::from(boat.model.0)) else { continue };
+            let pose = view::drawn_pose(&scene.camera, boat, model.kind);
+            let block = water_block(scene, boat, line, placed);
+            if mirrored {
+                boxes.mark(&mut self.cells, rect, water::reach_px(&block, scene.water.method), |p| {
+                    let world = pose.to_world(p);
+                    let above = (world.z - boat.water_level).max(0.0);
+                    scene.lens.project(scene.camera.to_camera(world.with_z(boat.water_level - above)))
+                });
+            }
+            line.mark_shadow(&mut self.cells, rect, &block);
+            line.unmark_dry(&mut self.cells, &block);
+            self.rest.clear();
+            let Some(around) = self.cells.take(&mut self.rest, WATER_RECTS_MAX) else { continue };
+            if self.list.len() + self.rest.len() > RECTS_MAX {
+                continue;
+            }
+            self.waters.push(WaterDraw {
+                index: self.water_blocks.len() as u32,
+                rect: around,
+                first: self.list.len() as u32,
+                count: self.rest.len() as u32,
+            });
+            self.list.extend(self.rest.iter().map(|r| corners(*r)));
+            self.water_blocks.push(block);
+            self.rects.push(around);
+            if mirrored {
+                let index = self.boat_blocks.len() as u32;
+                let detail_m = MIRROR_DETAIL_PX * pixel_m(scene, boat);
+                self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
                 self.boat_blocks.push(view::boat_block(scene, boat, &pose, true));
+                self.mirror_places.push(*placed);
             }
         }
     }

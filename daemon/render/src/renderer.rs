@@ -148,7 +148,7 @@ impl Renderer {
             slots,
             canvas,
             passes,
-            plan: Plan::with_capacity(capacity),
+            plan: Plan::with_capacity(capacity, size),
             needs,
             _frame_set: frame_set,
             _sets: sets,
@@ -231,6 +231,7 @@ impl Renderer {
         slot.data.write_boats(&plan.boat_blocks);
         slot.data.write_waters(&plan.water_blocks);
         slot.data.write_rounds(&plan.round_blocks);
+        slot.data.write_rects(&plan.list);
         plan.quads = 0;
         if scene.runs(Pass::Hud) {
             plan.quads = self.passes.hud.prepare(&mut slot.data, &scene.hud);
@@ -292,10 +293,12 @@ impl Renderer {
         steps.record(to);
         stamps.around(Span::Video, || video.record(to));
         if let Some(pass) = mirror {
-            stamps.around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.places));
+            stamps
+                .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));
         }
         if let Some(pass) = boats {
-            stamps.around(Span::BoatLayer, || pass.record_layer(to, frame, meshes, &plan.boats));
+            stamps
+                .around(Span::BoatLayer, || pass.record_layer(to, frame, meshes, &plan.boats, &plan.clears));
         }
         let mut steps = Steps::default();
         steps.add([video.between()]);
@@ -341,7 +344,7 @@ impl Renderer {
             stamps.around(Span::Water, || pass.record(to, frame, how, &plan.waters));
         }
         if let Some(pass) = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty()) {
-            stamps.around(Span::Composite, || pass.record_composite(to, frame, &plan.hulls));
+            stamps.around(Span::Composite, || pass.record_composite(to, frame, plan.hulls.len() as u32));
         }
         if let Some(pass) = self.passes.rounds.as_ref().filter(|_| !plan.rounds.is_empty()) {
             stamps.around(Span::Rounds, || pass.record(to, frame, &plan.rounds));

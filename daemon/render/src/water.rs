@@ -4,12 +4,12 @@
 use bowwave_core::{
     geometry::RigidPose,
     model::Model,
-    scene::{BoatView, ReflectionMethod, Scene, ShadowLevel},
+    scene::{BoatView, PixelRect, ReflectionMethod, Scene, ShadowLevel},
 };
 use glam::{DVec2, DVec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, WaterBlock};
 
-use crate::atlas::Placed;
+use crate::{atlas::Placed, coverage::Cells};
 
 /// Highest wind force at which a reflection is seen.
 const FORCE_MAX: usize = 4;
@@ -29,6 +29,10 @@ const PRINTED_SHADOW: [(f64, f64); 2] = [(0.5, 120.0), (0.9, 25.0)];
 const FADE_HEIGHTS: [f64; FORCE_MAX + 1] = [2.4, 1.6, 1.15, 0.8, 0.55];
 /// Mended: largest shift in heights of the boat.
 const SHIFT_HEIGHTS: [f64; FORCE_MAX + 1] = [0.08, 0.20, 0.26, 0.29, 0.30];
+/// Mended: share of the largest shift beyond which the reflection is discarded, having faded before.
+const LIMIT: f64 = 0.5;
+/// Mended: how far sideways a wave moves the reflection, in parts of how far down; as `water.frag` has it.
+const SIDEWAYS: f64 = 0.35;
 /// Mended: step of the box blur in heights of the boat.
 const BLUR_HEIGHTS: [f64; FORCE_MAX + 1] = [0.012, 0.025, 0.04, 0.06, 0.08];
 /// Mended: brightness over which the video begins to pass through, and over which it passes whole; dark, then bright.
@@ -111,6 +115,59 @@ pub(crate) fn hull_line(scene: &Scene, boat: &BoatView, pose: &RigidPose, model:
     Some(HullLine { anchor, down, first, pitch, below, height })
 }
 
+impl HullLine {
+    /// Marks the cells that the boat's shadow can darken.
+    pub(crate) fn mark_shadow(&self, cells: &mut Cells, within: PixelRect, block: &WaterBlock) {
+        if block.shadow <= 0.0 {
+            return;
+        }
+        let depth = f64::from(block.shadow / block.shadow_fall);
+        let (low, high) = self.extent();
+        let across = DVec2::new(self.down.y, -self.down.x);
+        let last = self.first + self.pitch * (HULL_LINE_COLUMNS - 1) as f64;
+        let (mut from, mut to) = (DVec2::MAX, DVec2::MIN);
+        for x in [self.first - 0.25 * depth, last + 0.25 * depth] {
+            for y in [low, high + depth] {
+                let p = self.anchor + across * x + self.down * y;
+                (from, to) = (from.min(p), to.max(p));
+            }
+        }
+        cells.mark_span(from - 1.0, to + 1.0, within);
+    }
+
+    /// Takes back the marks of cells that lie above the hull-water line, or below where reflection and shadow have faded.
+    pub(crate) fn unmark_dry(&self, cells: &mut Cells, block: &WaterBlock) {
+        let reach =
+            f64::from(block.alpha / block.alpha_fall).max(f64::from(block.shadow / block.shadow_fall));
+        let (low, high) = self.extent();
+        cells.unmark(|corners| {
+            let below = corners.map(|c| (c - self.anchor).dot(self.down));
+            below.iter().all(|b| *b < low - 1.0) || below.iter().all(|b| *b > high + reach + 1.0)
+        });
+    }
+
+    /// Highest and lowest point of the line, pixels below the anchor.
+    fn extent(&self) -> (f64, f64) {
+        self.below.iter().fold((f64::MAX, f64::MIN), |(low, high), b| (low.min(*b), high.max(*b)))
+    }
+}
+
+/// How far from where the mirror has a boat its light can be seen in the water, pixels right or left and up or down.
+pub(crate) fn reach_px(block: &WaterBlock, method: ReflectionMethod) -> DVec2 {
+    let limit = f64::from(block.shift_limit);
+    let blur = f64::from(block.blur[0] / block.mirror_scale[0]);
+    let shift = match method {
+        ReflectionMethod::Off | ReflectionMethod::Mirror => DVec2::ZERO,
+        // Both coordinates shift by as much.
+        ReflectionMethod::FullAsPrinted => DVec2::splat(limit),
+        ReflectionMethod::Full => {
+            let down = DVec2::from(block.down.map(f64::from)).abs();
+            (down + SIDEWAYS * DVec2::new(down.y, down.x)) * limit
+        }
+    };
+    shift + blur + 2.0
+}
+
 /// Lowers the columns that the edge from `a` to `b` crosses; x counts columns.
 fn lower(below: &mut [f64; HULL_LINE_COLUMNS], a: DVec2, b: DVec2) {
     let (left, right) = if a.x <= b.x { (a, b) } else { (b, a) };
@@ -163,7 +220,7 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
     };
     let (alpha, fade_px, shift, limit) = if mended {
         let shift = SHIFT_HEIGHTS[force] * height;
-        (mirrored_share(scene, boat), FADE_HEIGHTS[force] * height, shift, shift)
+        (mirrored_share(scene, boat), FADE_HEIGHTS[force] * height, shift, shift * LIMIT)
     } else {
         (1.0, PRINTED_FADE_PX[force], PRINTED_SHIFT_PX[force], PRINTED_SHIFT_PX[force] * PRINTED_LIMIT)
     };

@@ -4,7 +4,7 @@
 use ash::vk;
 use bowwave_core::{model::ModelId, scene::PixelRect};
 use shaders_spirv::{
-    BOAT_FRAG, BOAT_VERT, COMPOSITE_FRAG, RECT_VERT,
+    BOAT_FRAG, BOAT_TEXTURED_FRAG, BOAT_TEXTURED_VERT, BOAT_VERT, COMPOSITE_FRAG, RECT_VERT,
     interface::{DrawBlock, MeshVertex},
 };
 
@@ -15,7 +15,7 @@ use crate::{
     passes::{DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED},
     pipeline::{
         Begin, Blend, Bound, DEPTH, Pipeline, PipelineShape, Recorder, SAMPLES, SRGB, Sampler, SetLayout,
-        Step, corners, joined,
+        Step, UNORM, joined,
     },
 };
 
@@ -25,21 +25,27 @@ pub(crate) struct BoatDraw {
     pub(crate) model: ModelId,
     /// Index of its block.
     pub(crate) index: u32,
-    /// The pixels that it can cover.
+    /// The pixels that it can cover; its place in the mirror layer where it is mirrored.
     pub(crate) rect: PixelRect,
+    /// By how much it may be simplified unseen, metres.
+    pub(crate) detail_m: f64,
 }
 
-/// Pipelines for meshes with and without a texture, and what draws with them.
+/// What draws meshes: closed parts without their back faces, open shells from both sides, textured ones with their texture.
 pub(crate) struct BoatPipelines {
-    plain: Pipeline,
+    closed: Pipeline,
+    open: Pipeline,
     textured: Option<Pipeline>,
 }
 
 impl BoatPipelines {
+    /// `front` is the way round in which the corners of a front face are seen: mirrored, it is the other one.
     pub(crate) fn new(
         making: &Making<'_>,
         meshes: &Meshes,
         samples: vk::SampleCountFlags,
+        front: vk::FrontFace,
+        colour: vk::Format,
         any_textured: bool,
     ) -> Result<Self, RenderError> {
         let attributes = [
@@ -48,42 +54,49 @@ impl BoatPipelines {
             (vk::Format::R32G32_SFLOAT, 24),
             (vk::Format::R32G32B32_SFLOAT, 32),
         ];
-        let make = |textured: bool| {
+        // A layer of codes holds roots, one of light is filtered as it is.
+        let constants = [u32::from(colour == UNORM), samples.as_raw()];
+        let sets = [making.frame_set, &meshes.skin_layout];
+        let make = |textured: bool, cull: Option<vk::FrontFace>| {
             Pipeline::new(
                 making.gpu,
                 &PipelineShape {
-                    vertex: BOAT_VERT,
-                    fragment: BOAT_FRAG,
-                    constants: &[u32::from(textured), samples.as_raw()],
-                    sets: &[making.frame_set, &meshes.skin_layout],
+                    vertex: if textured { BOAT_TEXTURED_VERT } else { BOAT_VERT },
+                    fragment: if textured { BOAT_TEXTURED_FRAG } else { BOAT_FRAG },
+                    constants: if textured { &constants } else { &constants[..1] },
+                    sets: if textured { &sets } else { &sets[..1] },
                     push: size_of::<DrawBlock>(),
                     vertices: Some((size_of::<MeshVertex>() as u32, &attributes)),
                     topology: vk::PrimitiveTopology::TRIANGLE_LIST,
-                    colour: SRGB,
+                    colour,
                     blend: Blend::Replace,
+                    cull,
                     depth: true,
                     samples,
                 },
             )
         };
-        Ok(Self { plain: make(false)?, textured: any_textured.then(|| make(true)).transpose()? })
+        let textured = any_textured.then(|| make(true, None)).transpose()?;
+        Ok(Self { closed: make(false, Some(front))?, open: make(false, None)?, textured })
     }
 
     /// Draws one boat's mesh, within a rendering with depth. The shared buffers are bound.
-    pub(crate) fn draw(
-        &self,
-        to: Recorder<'_>,
-        frame: vk::DescriptorSet,
-        meshes: &Meshes,
-        model: ModelId,
-        index: u32,
-    ) {
-        let block = DrawBlock { rect: [0.0; 4], index };
-        let Some((skin, textured)) = meshes.skin(model) else { return };
-        let pipeline = self.textured.as_ref().filter(|_| textured).unwrap_or(&self.plain);
-        to.bind(pipeline, &[frame, skin]);
-        to.push(pipeline, &block);
-        meshes.draw(to, model);
+    pub(crate) fn draw(&self, to: Recorder<'_>, frame: vk::DescriptorSet, meshes: &Meshes, boat: &BoatDraw) {
+        let Some(level) = meshes.level(boat.model, boat.detail_m) else { return };
+        let block = DrawBlock { index: boat.index, ..DrawBlock::default() };
+        if let (Some(skin), Some(pipeline)) = (meshes.skin(boat.model), &self.textured) {
+            to.bind(pipeline, &[frame, skin]);
+            to.push(pipeline, &block);
+            meshes.draw(to, boat.model, &(level.closed.start..level.open.end));
+            return;
+        }
+        for (pipeline, indices) in [(&self.closed, &level.closed), (&self.open, &level.open)] {
+            if !indices.is_empty() {
+                to.bind(pipeline, &[frame]);
+                to.push(pipeline, &block);
+                meshes.draw(to, boat.model, indices);
+            }
+        }
     }
 }
 
@@ -106,13 +119,14 @@ impl BoatsPass {
             |format, usage| ImageShape { samples: SAMPLES, ..ImageShape::new(making.size, format, usage) };
         let sampled = vk::ImageUsageFlags::SAMPLED;
         let colour =
-            Image::new(gpu, "boats' layer", layer(SRGB, vk::ImageUsageFlags::COLOR_ATTACHMENT | sampled))?;
+            Image::new(gpu, "boats' layer", layer(UNORM, vk::ImageUsageFlags::COLOR_ATTACHMENT | sampled))?;
         let depth = Image::new(
             gpu,
             "boats' depth",
             layer(DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | sampled),
         )?;
-        let pipelines = BoatPipelines::new(making, meshes, SAMPLES, any_textured)?;
+        let front = vk::FrontFace::COUNTER_CLOCKWISE;
+        let pipelines = BoatPipelines::new(making, meshes, SAMPLES, front, UNORM, any_textured)?;
         let sampler = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
@@ -130,6 +144,7 @@ impl BoatsPass {
                 topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                 colour: SRGB,
                 blend: Blend::Over,
+                cull: None,
                 depth: false,
                 samples: vk::SampleCountFlags::TYPE_1,
             },
@@ -169,35 +184,33 @@ impl BoatsPass {
         &self.depth
     }
 
-    /// Draws the boats into the layer. Only their rectangles are cleared and drawn to.
+    /// Draws the boats into the layer. Only the pixels that they can cover are cleared.
     pub(crate) fn record_layer(
         &self,
         to: Recorder<'_>,
         frame: vk::DescriptorSet,
         meshes: &Meshes,
         boats: &[BoatDraw],
+        clears: &[vk::ClearRect],
     ) {
         let Some(area) = boats.iter().map(|b| b.rect).reduce(joined) else { return };
-        to.begin(area, (self.colour.view, Begin::Forget), Some((self.depth.view, Begin::Forget)));
+        to.begin(area, (self.colour.view, Begin::Keep), Some((self.depth.view, Begin::Keep)));
         let (width, height) = self.size;
         to.window([0.0, 0.0, width as f32, height as f32], area);
-        to.clear(boats.iter().map(|b| b.rect));
+        to.clear(clears);
         meshes.bind(to);
         for boat in boats {
             to.scissor(boat.rect);
-            self.pipelines.draw(to, frame, meshes, boat.model, boat.index);
+            self.pipelines.draw(to, frame, meshes, boat);
         }
         to.end();
     }
 
-    /// Puts the layer onto the screen, within a rendering to it. Rectangles that overlap are cut apart so that no pixel is
-    /// composited twice.
-    pub(crate) fn record_composite(&self, to: Recorder<'_>, frame: vk::DescriptorSet, pieces: &[PixelRect]) {
+    /// Puts the layer onto the screen, within a rendering to it: the first `pieces` rectangles of the frame's list, which do not
+    /// overlap.
+    pub(crate) fn record_composite(&self, to: Recorder<'_>, frame: vk::DescriptorSet, pieces: u32) {
         to.bind(&self.composite, &[frame, self.set]);
-        for piece in pieces {
-            to.scissor(*piece);
-            to.push(&self.composite, &DrawBlock { rect: corners(*piece), index: 0 });
-            to.draw(4, 1);
-        }
+        to.push(&self.composite, &DrawBlock::default());
+        to.draw(4, pieces);
     }
 }

@@ -55,6 +55,7 @@ impl HudPass {
                 topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                 colour: SRGB,
                 blend: Blend::Over,
+                cull: None,
                 depth: false,
                 samples: vk::SampleCountFlags::TYPE_1,
             },

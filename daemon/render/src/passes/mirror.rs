@@ -2,24 +2,18 @@
 //! the boat's mean water. Each boat has its own place in the layer.
 
 use ash::vk;
-use bowwave_core::model::ModelId;
 
 use crate::{
     atlas::Placed,
     error::RenderError,
     memory::{Image, ImageShape},
     meshes::Meshes,
-    passes::{DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED, boats::BoatPipelines},
-    pipeline::{Begin, DEPTH, Recorder, SRGB, Step, joined},
+    passes::{
+        DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED,
+        boats::{BoatDraw, BoatPipelines},
+    },
+    pipeline::{Begin, DEPTH, LIGHT, Recorder, Step, joined},
 };
-
-/// A mirrored boat.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MirrorDraw {
-    pub(crate) model: ModelId,
-    /// Index of its block.
-    pub(crate) index: u32,
-}
 
 /// The mirror pass.
 pub(crate) struct MirrorPass {
@@ -34,13 +28,20 @@ impl MirrorPass {
     pub(crate) fn new(making: &Making<'_>, meshes: &Meshes, any_textured: bool) -> Result<Self, RenderError> {
         let size = Self::layer_size(making.size);
         let sampled = vk::ImageUsageFlags::SAMPLED;
-        let colour = ImageShape::new(size, SRGB, vk::ImageUsageFlags::COLOR_ATTACHMENT | sampled);
+        let colour = ImageShape::new(size, LIGHT, vk::ImageUsageFlags::COLOR_ATTACHMENT | sampled);
         let depth = ImageShape::new(size, DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT);
         Ok(Self {
             size: making.size,
             colour: Image::new(making.gpu, "mirror layer", colour)?,
             depth: Image::new(making.gpu, "mirror depth", depth)?,
-            pipelines: BoatPipelines::new(making, meshes, vk::SampleCountFlags::TYPE_1, any_textured)?,
+            pipelines: BoatPipelines::new(
+                making,
+                meshes,
+                vk::SampleCountFlags::TYPE_1,
+                vk::FrontFace::CLOCKWISE,
+                LIGHT,
+                any_textured,
+            )?,
         })
     }
 
@@ -70,7 +71,7 @@ impl MirrorPass {
         to: Recorder<'_>,
         frame: vk::DescriptorSet,
         meshes: &Meshes,
-        boats: &[MirrorDraw],
+        boats: &[BoatDraw],
         places: &[Placed],
     ) {
         let Some(area) = places.iter().map(|p| p.place).reduce(joined) else { return };
@@ -78,7 +79,7 @@ impl MirrorPass {
         meshes.bind(to);
         for (boat, placed) in boats.iter().zip(places) {
             to.window(placed.viewport(self.size), placed.place);
-            self.pipelines.draw(to, frame, meshes, boat.model, boat.index);
+            self.pipelines.draw(to, frame, meshes, boat);
         }
         to.end();
     }

@@ -77,7 +77,7 @@ impl RoundsPass {
                 }
             };
             to.scissor(draw.rect);
-            to.push(pipeline, &DrawBlock { rect: corners(draw.rect), index: draw.index });
+            to.push(pipeline, &DrawBlock { rect: corners(draw.rect), index: draw.index, first: 0 });
             to.draw(4, 1);
         }
     }
@@ -108,6 +108,7 @@ fn pipeline(making: &Making<'_>, fragment: Shader, sets: &[&SetLayout]) -> Resul
             topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
             colour: SRGB,
             blend: Blend::Over,
+            cull: None,
             depth: false,
             samples: vk::SampleCountFlags::TYPE_1,
         },

@@ -189,6 +189,7 @@ impl VideoPass {
                     topology: vk::PrimitiveTopology::TRIANGLE_LIST,
                     colour: self.packed.shape.format,
                     blend: Blend::Replace,
+                    cull: None,
                     depth: false,
                     samples: vk::SampleCountFlags::TYPE_1,
                 },

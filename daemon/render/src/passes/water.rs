@@ -10,8 +10,7 @@ use crate::{
     memory::{Image, ImageShape},
     passes::{COPIED_TO, DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass},
     pipeline::{
-        Begin, Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout, Step, UNORM,
-        corners, joined,
+        Begin, Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout, Step, UNORM, joined,
     },
 };
 
@@ -20,7 +19,11 @@ use crate::{
 pub(crate) struct WaterDraw {
     /// Index of its block.
     pub(crate) index: u32,
+    /// Around all of its rectangles.
     pub(crate) rect: PixelRect,
+    /// First of its rectangles in the frame's list, and how many there are.
+    pub(crate) first: u32,
+    pub(crate) count: u32,
 }
 
 /// One compiled way to mirror.
@@ -92,6 +95,7 @@ impl WaterPass {
                     topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                     colour: SRGB,
                     blend: Blend::Over,
+                    cull: None,
                     depth: false,
                     samples: vk::SampleCountFlags::TYPE_1,
                 },
@@ -156,14 +160,11 @@ impl WaterPass {
         to.window([0.0, 0.0, width / FIELD_CELL.0 as f32, height / FIELD_CELL.1 as f32], area);
         to.bind(&field.pipeline, &[frame, field.set]);
         for boat in boats {
-            to.scissor(field.cells(boat.rect));
-            // The scissor rounds outwards; the quad must reach as far.
-            let [x0, y0, x1, y1] = corners(boat.rect);
-            to.push(
-                &field.pipeline,
-                &DrawBlock { rect: [x0 - 8.0, y0 - 8.0, x1 + 8.0, y1 + 8.0], index: boat.index },
-            );
-            to.draw(4, 1);
+            // Bilinear fetches take one cell more on each side.
+            let (x, y) = (FIELD_CELL.0 as f32, FIELD_CELL.1 as f32);
+            let block = DrawBlock { rect: [-x, -y, x, y], index: boat.index, first: boat.first };
+            to.push(&field.pipeline, &block);
+            to.draw(4, boat.count);
         }
         to.end();
         to.barrier([Step { image: &field.image, from: DRAWN, to: SAMPLED }]);
@@ -180,9 +181,9 @@ impl WaterPass {
         let Some(variant) = self.variant(water) else { return };
         to.bind(&variant.pipeline, &[frame, self.set]);
         for boat in boats {
-            to.scissor(boat.rect);
-            to.push(&variant.pipeline, &DrawBlock { rect: corners(boat.rect), index: boat.index });
-            to.draw(4, 1);
+            let block = DrawBlock { rect: [0.0; 4], index: boat.index, first: boat.first };
+            to.push(&variant.pipeline, &block);
+            to.draw(4, boat.count);
         }
     }
 }
@@ -209,6 +210,7 @@ impl Field {
                 topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                 colour: format,
                 blend: Blend::Replace,
+                cull: None,
                 depth: false,
                 samples: vk::SampleCountFlags::TYPE_1,
             },

@@ -1,0 +1,239 @@
+//! What a mesh does not need for the size at which it is drawn. Small triangles cost by their number and not by their area, so far
+//! boats are drawn from levels that lie within a part of a pixel of the whole model; and the back faces of closed parts, which
+//! nobody sees, are told apart from open shells, which are seen from both sides.
+
+use std::{collections::HashMap, ops::Range};
+
+use bowwave_core::model::{Model, ModelKind};
+use glam::Vec3;
+use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
+use shaders_spirv::interface::MeshVertex;
+
+/// Error of the finest simplified level, metres; each level's is the root of two times the one before.
+const ERROR_MIN_M: f32 = 0.008;
+/// A level is kept if it has at most this share of the triangles of the one before.
+const WORTHWHILE: f64 = 0.8;
+/// No model is simplified to fewer triangles.
+const TRIANGLES_MIN: usize = 40;
+/// Corners closer than this are one corner of the shape, metres.
+const WELD_M: f32 = 1e-4;
+/// What a whole change of normal and of colour weighs, in parts of the level's error.
+const NORMAL_WEIGHT: f32 = 0.15;
+const ALBEDO_WEIGHT: f32 = 0.9;
+
+/// A model at one level of detail, as ranges of indices.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Level {
+    /// How far the surface is from the model's, tenths of millimetres; 0 for the model as it is.
+    error_tenth_mm: u32,
+    /// Triangles of closed parts: back faces can be left out.
+    pub(crate) closed: Range<u32>,
+    /// Triangles that are seen from both sides.
+    pub(crate) open: Range<u32>,
+}
+
+impl Level {
+    /// How far the surface is from the model's, metres.
+    pub(crate) fn error_m(&self) -> f64 {
+        f64::from(self.error_tenth_mm) * 1e-4
+    }
+}
+
+/// A model ready for drawing.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Simplified {
+    pub(crate) vertices: Vec<MeshVertex>,
+    pub(crate) indices: Vec<u32>,
+    /// From the finest to the coarsest; never empty.
+    pub(crate) levels: Vec<Level>,
+}
+
+/// Makes the levels of `model`, whose indices are known to lie within its vertices.
+pub(crate) fn simplify(model: &Model) -> Simplified {
+    let vertices: Vec<MeshVertex> = model
+        .vertices
+        .iter()
+        .map(|v| MeshVertex {
+            position: v.position.to_array(),
+            normal: v.normal.to_array(),
+            uv: v.uv.to_array(),
+            albedo: v.albedo.to_array(),
+        })
+        .collect();
+    let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+    let closed = closed_triangles(&vertices, &triangles);
+    let mut all = Simplified { vertices, ..Simplified::default() };
+    all.push(0.0, &triangles, &closed);
+    // A texture's seams would tear, and a picture has few triangles anyway.
+    if model.texture.is_some() || model.kind == ModelKind::Quad {
+        return all;
+    }
+    // A part is closed or not as a whole, and every corner belongs to one part.
+    let mut corner_closed = vec![false; model.vertices.len()];
+    for (t, closed) in triangles.iter().zip(&closed) {
+        t.iter().for_each(|i| corner_closed[*i as usize] = *closed);
+    }
+    let mut last = triangles.len();
+    let mut error = ERROR_MIN_M;
+    let largest = (model.max - model.min).max_element() / 8.0;
+    while error < largest && last > TRIANGLES_MIN {
+        let fewer = with_error(model, error);
+        if !fewer.is_empty() && fewer.len() as f64 <= WORTHWHILE * last as f64 {
+            last = fewer.len();
+            let closed: Vec<bool> = fewer.iter().map(|t| corner_closed[t[0] as usize]).collect();
+            all.push(error, &fewer, &closed);
+        }
+        error *= std::f32::consts::SQRT_2;
+    }
+    all
+}
+
+/// The triangles of `model` that keep its surface within `error` metres, its shading and colours likewise.
+fn with_error(model: &Model, error: f32) -> Vec<[u32; 3]> {
+    let positions: Vec<[f32; 3]> = model.vertices.iter().map(|v| v.position.to_array()).collect();
+    let Ok(adapter) = VertexDataAdapter::new(bytemuck::cast_slice(&positions), size_of::<[f32; 3]>(), 0)
+    else {
+        return Vec::new();
+    };
+    let attributes: Vec<f32> = model
+        .vertices
+        .iter()
+        .flat_map(|v| v.normal.to_array().into_iter().chain(v.albedo.to_array()))
+        .collect();
+    let (normal, albedo) = (NORMAL_WEIGHT * error, ALBEDO_WEIGHT * error);
+    let weights = [normal, normal, normal, albedo, albedo, albedo];
+    let fewer = simplify_with_attributes_and_locks(
+        &model.indices,
+        &adapter,
+        &attributes,
+        &weights,
+        size_of_val(&weights),
+        &vec![false; model.vertices.len()],
+        TRIANGLES_MIN * 3,
+        error,
+        SimplifyOptions::ErrorAbsolute | SimplifyOptions::Prune | SimplifyOptions::Permissive,
+        None,
+    );
+    fewer.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+}
+
+impl Simplified {
+    fn push(&mut self, error_m: f32, triangles: &[[u32; 3]], closed: &[bool]) {
+        let mut run = |wanted: bool| {
+            let from = self.indices.len() as u32;
+            let chosen = triangles.iter().zip(closed).filter(|(_, closed)| **closed == wanted);
+            self.indices.extend(chosen.flat_map(|(t, _)| t));
+            from..self.indices.len() as u32
+        };
+        let (closed, open) = (run(true), run(false));
+        self.levels.push(Level { error_tenth_mm: (error_m * 1e4).round() as u32, closed, open });
+    }
+}
+
+fn position(v: &MeshVertex) -> Vec3 {
+    Vec3::from(v.position)
+}
+
+/// Which triangles belong to closed parts: every edge is used once in each direction, and the part is not inside out.
+fn closed_triangles(vertices: &[MeshVertex], triangles: &[[u32; 3]]) -> Vec<bool> {
+    let mut ids = HashMap::new();
+    let welded: Vec<u32> = vertices
+        .iter()
+        .map(|v| {
+            let next = ids.len() as u32;
+            *ids.entry((position(v) / WELD_M).round().as_ivec3()).or_insert(next)
+        })
+        .collect();
+    let corners = |t: &[u32; 3]| t.map(|i| welded[i as usize]);
+    // Parts: triangles that share a corner.
+    let mut parent: Vec<u32> = (0..ids.len() as u32).collect();
+    for t in triangles {
+        let [a, b, c] = corners(t);
+        for other in [b, c] {
+            let (a, other) = (root(&mut parent, a), root(&mut parent, other));
+            parent[a as usize] = other;
+        }
+    }
+    // Directed edges that no opposite one answers.
+    let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
+    let mut volumes: HashMap<u32, f32> = HashMap::new();
+    for t in triangles {
+        let [a, b, c] = corners(t);
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            if from != to {
+                let sign = if from < to { 1 } else { -1 };
+                *edges.entry((from.min(to), from.max(to))).or_default() += sign;
+            }
+        }
+        let [p, q, r] = t.map(|i| position(&vertices[i as usize]));
+        *volumes.entry(root(&mut parent, a)).or_default() += p.dot(q.cross(r));
+    }
+    for ((from, _), balance) in edges {
+        if balance != 0 {
+            volumes.insert(root(&mut parent, from), 0.0);
+        }
+    }
+    triangles
+        .iter()
+        .map(|t| volumes.get(&root(&mut parent, corners(t)[0])).is_some_and(|volume| *volume > 0.0))
+        .collect()
+}
+
+/// Representative of `i`'s set, with path halving.
+fn root(parent: &mut [u32], mut i: u32) -> u32 {
+    while parent[i as usize] != i {
+        parent[i as usize] = parent[parent[i as usize] as usize];
+        i = parent[i as usize];
+    }
+    i
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing;
+
+    #[test]
+    fn a_box_is_closed_and_a_box_without_a_lid_or_inside_out_is_not() {
+        let model = testing::box_model("box", [4.0, 2.0, 1.5], [0.5; 3]);
+        let level = &simplify(&model).levels[0];
+        assert_eq!((level.closed.len(), level.open.len()), (36, 0));
+        let mut open = model.clone();
+        open.indices.truncate(30);
+        let level = &simplify(&open).levels[0];
+        assert_eq!((level.closed.len(), level.open.len()), (0, 30));
+        let mut inverted = model;
+        inverted.indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
+        assert_eq!(simplify(&inverted).levels[0].closed.len(), 0);
+    }
+
+    #[test]
+    fn levels_get_coarser_and_keep_the_shape() {
+        for name in ["skiff", "rhib", "dhow", "frigate"] {
+            let model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
+            let made = simplify(&model);
+            assert!(made.levels.len() > 3, "{name}: {} levels", made.levels.len());
+            let mut last = u32::MAX;
+            for level in &made.levels {
+                let count = (level.closed.len() + level.open.len()) as u32;
+                assert!(count < last && count > 0);
+                last = count;
+                assert_eq!(level.closed.end, level.open.start);
+                let (mut low, mut high) = (Vec3::MAX, Vec3::MIN);
+                for i in &made.indices[level.closed.start as usize..level.open.end as usize] {
+                    let p = Vec3::from(made.vertices[*i as usize].position);
+                    (low, high) = (low.min(p), high.max(p));
+                }
+                // Small parts and aerials vanish; the boat's extent stays.
+                let room = level.error_m() as f32 * 2.0 + 0.12 * model.max.x;
+                assert!((low - model.min).abs().max_element() < room, "{name} {low} {}", model.min);
+                assert!(
+                    (high - model.max).truncate().abs().max_element() < room,
+                    "{name} {high} {}",
+                    model.max
+                );
+                assert!(high.z > 0.3 * model.max.z, "{name} {high} {}", model.max);
+            }
+        }
+    }
+}

@@ -1,0 +1,45 @@
+// A boat's corner to clip space, and its light.
+#include "frame.glsl"
+#include "lens.glsl"
+#include "boat_block.glsl"
+
+layout(location = 0) in vec3 position;
+layout(location = 1) in vec3 normal;
+layout(location = 2) in vec2 uv;
+layout(location = 3) in vec3 albedo;
+
+// Light that the corner sends to the eye if it were white, without haze; and its colour as it is, with haze. Both are found
+// here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles cost by the fragment.
+layout(location = 0) out vec3 colour_out;
+#ifdef TEXTURED
+layout(location = 1) out vec2 uv_out;
+#endif
+
+out gl_PerVertex {
+    vec4 gl_Position;
+    float gl_ClipDistance[2];
+};
+
+vec3 lit(BoatBlock boat) {
+    // Shells are seen from both sides; the side that is seen is the one that is lit.
+    vec3 n = dot(normal, boat.eye.xyz - position) < 0.0 ? -normal : normal;
+    float up = dot(n, boat.water_plane.xyz);
+    vec3 ambient = mix(frame.sea.rgb, frame.sky.rgb, 0.5 + 0.5 * up);
+    return albedo * (frame.sun.rgb * max(dot(n, boat.sun.xyz), 0.0) + ambient);
+}
+
+void main() {
+    vec4 p = vec4(position, 1.0);
+    BoatBlock boat = boats[draw.index];
+    gl_Position = clip_from_camera(
+        vec3(dot(boat.camera_from_boat[0], p), dot(boat.camera_from_boat[1], p), dot(boat.camera_from_boat[2], p)));
+    gl_ClipDistance[0] = dot(boat.water_plane, p);
+    gl_ClipDistance[1] = dot(boat.horizon_plane, p);
+#ifdef TEXTURED
+    // The fragment shader mixes the haze in.
+    colour_out = lit(boat);
+    uv_out = uv;
+#else
+    colour_out = mix(lit(boat), frame.horizon.rgb, boat.eye.w);
+#endif
+}
