@@ -91,12 +91,9 @@ vec4 reflection(vec2 at, float below) {
         // Mended: at a grazing angle waves move a reflection up and down much more than sideways, and the more the farther
         // below the hull it is.
         float normalised = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).r * 2.0 - 1.0;
-        float shift = sin(normalised) * waters[i].shift;
-        // Towards the limit the reflection fades instead of ending.
-        kept *= 1.0 - smoothstep(0.7, 1.0, abs(shift) / waters[i].shift_limit);
-        if (kept == 0.0) {
-            return vec4(0.0);
-        }
+        // What goes beyond the limit stays at it: discarded, it would leave specks of bare water in a dark reflection.
+        float limit = waters[i].shift_limit;
+        float shift = clamp(sin(normalised) * waters[i].shift, -limit, limit);
         shift *= min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
         vec2 down = waters[i].down;
         move = shift * (down + SIDEWAYS * vec2(down.y, -down.x));

@@ -30,10 +30,7 @@ use crate::{
 const GRADIENTS_REACH_PX: u32 = 84;
 
 /// Boats are drawn simplified by no more than this, pixels.
-const DETAIL_PX: f64 = 0.5;
-/// The same for mirrored boats, which are distorted and blurred; more would let decks show through hulls.
-const MIRROR_DETAIL_PX: f64 = 0.6;
-
+const DETAIL_PX: f64 = 0.35;
 /// Pixels around a boat's boxes that its anti-aliased edges can touch.
 const HULL_MARGIN_PX: f64 = 1.5;
 /// Most rectangles for all hulls together, and for one boat's water.
@@ -246,7 +243,7 @@ impl Plan {
             self.rects.push(around);
             if mirrored {
                 let index = self.boat_blocks.len() as u32;
-                let detail_m = MIRROR_DETAIL_PX * pixel_m(scene, boat);
+                let detail_m = DETAIL_PX * pixel_m(scene, boat);
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
                 self.boat_blocks.push(view::boat_block(scene, boat, &pose, true));
                 self.mirror_places.push(*placed);

@@ -18,8 +18,8 @@ const TRIANGLES_MIN: usize = 40;
 /// Corners closer than this are one corner of the shape, metres.
 const WELD_M: f32 = 1e-4;
 /// What a whole change of normal and of colour weighs, in parts of the level's error.
-const NORMAL_WEIGHT: f32 = 0.15;
-const ALBEDO_WEIGHT: f32 = 0.9;
+const NORMAL_WEIGHT: f32 = 0.5;
+const ALBEDO_WEIGHT: f32 = 6.0;
 
 /// A model at one level of detail, as ranges of indices.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -61,26 +61,22 @@ pub(crate) fn simplify(model: &Model) -> Simplified {
         })
         .collect();
     let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    let closed = closed_triangles(&vertices, &triangles);
+    let parts = Parts::of(&vertices, &triangles);
+    let closed: Vec<bool> = triangles.iter().map(|t| parts.closed(t[0])).collect();
     let mut all = Simplified { vertices, ..Simplified::default() };
     all.push(0.0, &triangles, &closed);
     // A texture's seams would tear, and a picture has few triangles anyway.
     if model.texture.is_some() || model.kind == ModelKind::Quad {
         return all;
     }
-    // A part is closed or not as a whole, and every corner belongs to one part.
-    let mut corner_closed = vec![false; model.vertices.len()];
-    for (t, closed) in triangles.iter().zip(&closed) {
-        t.iter().for_each(|i| corner_closed[*i as usize] = *closed);
-    }
     let mut last = triangles.len();
     let mut error = ERROR_MIN_M;
     let largest = (model.max - model.min).max_element() / 8.0;
     while error < largest && last > TRIANGLES_MIN {
-        let fewer = with_error(model, error);
+        let fewer = with_error(model, &parts, error);
         if !fewer.is_empty() && fewer.len() as f64 <= WORTHWHILE * last as f64 {
             last = fewer.len();
-            let closed: Vec<bool> = fewer.iter().map(|t| corner_closed[t[0] as usize]).collect();
+            let closed: Vec<bool> = fewer.iter().map(|t| parts.closed(t[0])).collect();
             all.push(error, &fewer, &closed);
         }
         error *= std::f32::consts::SQRT_2;
@@ -89,7 +85,7 @@ pub(crate) fn simplify(model: &Model) -> Simplified {
 }
 
 /// The triangles of `model` that keep its surface within `error` metres, its shading and colours likewise.
-fn with_error(model: &Model, error: f32) -> Vec<[u32; 3]> {
+fn with_error(model: &Model, parts: &Parts, error: f32) -> Vec<[u32; 3]> {
     let positions: Vec<[f32; 3]> = model.vertices.iter().map(|v| v.position.to_array()).collect();
     let Ok(adapter) = VertexDataAdapter::new(bytemuck::cast_slice(&positions), size_of::<[f32; 3]>(), 0)
     else {
@@ -100,6 +96,7 @@ fn with_error(model: &Model, error: f32) -> Vec<[u32; 3]> {
         .iter()
         .flat_map(|v| v.normal.to_array().into_iter().chain(v.albedo.to_array()))
         .collect();
+    let locks: Vec<bool> = (0..model.vertices.len() as u32).map(|v| parts.is_panel(v, error)).collect();
     let (normal, albedo) = (NORMAL_WEIGHT * error, ALBEDO_WEIGHT * error);
     let weights = [normal, normal, normal, albedo, albedo, albedo];
     let fewer = simplify_with_attributes_and_locks(
@@ -108,7 +105,7 @@ fn with_error(model: &Model, error: f32) -> Vec<[u32; 3]> {
         &attributes,
         &weights,
         size_of_val(&weights),
-        &vec![false; model.vertices.len()],
+        &locks,
         TRIANGLES_MIN * 3,
         error,
         SimplifyOptions::ErrorAbsolute | SimplifyOptions::Prune | SimplifyOptions::Permissive,
@@ -134,49 +131,80 @@ fn position(v: &MeshVertex) -> Vec3 {
     Vec3::from(v.position)
 }
 
-/// Which triangles belong to closed parts: every edge is used once in each direction, and the part is not inside out.
-fn closed_triangles(vertices: &[MeshVertex], triangles: &[[u32; 3]]) -> Vec<bool> {
-    let mut ids = HashMap::new();
-    let welded: Vec<u32> = vertices
-        .iter()
-        .map(|v| {
-            let next = ids.len() as u32;
-            *ids.entry((position(v) / WELD_M).round().as_ivec3()).or_insert(next)
-        })
-        .collect();
-    let corners = |t: &[u32; 3]| t.map(|i| welded[i as usize]);
-    // Parts: triangles that share a corner.
-    let mut parent: Vec<u32> = (0..ids.len() as u32).collect();
-    for t in triangles {
-        let [a, b, c] = corners(t);
-        for other in [b, c] {
-            let (a, other) = (root(&mut parent, a), root(&mut parent, other));
-            parent[a as usize] = other;
-        }
-    }
-    // Directed edges that no opposite one answers.
-    let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
-    let mut volumes: HashMap<u32, f32> = HashMap::new();
-    for t in triangles {
-        let [a, b, c] = corners(t);
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            if from != to {
-                let sign = if from < to { 1 } else { -1 };
-                *edges.entry((from.min(to), from.max(to))).or_default() += sign;
+/// The parts of a model: triangles that share corners.
+struct Parts {
+    /// Part of each vertex.
+    of: Vec<u32>,
+    /// By part: twice three times its volume, 0 if it is not closed.
+    volume: HashMap<u32, f32>,
+    /// By part: its extent, smallest first.
+    extent: HashMap<u32, [f32; 3]>,
+}
+
+impl Parts {
+    fn of(vertices: &[MeshVertex], triangles: &[[u32; 3]]) -> Self {
+        let mut ids = HashMap::new();
+        let welded: Vec<u32> = vertices
+            .iter()
+            .map(|v| {
+                let next = ids.len() as u32;
+                *ids.entry((position(v) / WELD_M).round().as_ivec3()).or_insert(next)
+            })
+            .collect();
+        let corners = |t: &[u32; 3]| t.map(|i| welded[i as usize]);
+        let mut parent: Vec<u32> = (0..ids.len() as u32).collect();
+        for t in triangles {
+            let [a, b, c] = corners(t);
+            for other in [b, c] {
+                let (a, other) = (root(&mut parent, a), root(&mut parent, other));
+                parent[a as usize] = other;
             }
         }
-        let [p, q, r] = t.map(|i| position(&vertices[i as usize]));
-        *volumes.entry(root(&mut parent, a)).or_default() += p.dot(q.cross(r));
-    }
-    for ((from, _), balance) in edges {
-        if balance != 0 {
-            volumes.insert(root(&mut parent, from), 0.0);
+        let of: Vec<u32> = welded.iter().map(|w| root(&mut parent, *w)).collect();
+        // How much more often each edge is used in one direction than in the other.
+        let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
+        let mut volume: HashMap<u32, f32> = HashMap::new();
+        for t in triangles {
+            let [a, b, c] = corners(t);
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                if from != to {
+                    *edges.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
+                }
+            }
+            let [p, q, r] = t.map(|i| position(&vertices[i as usize]));
+            *volume.entry(of[t[0] as usize]).or_default() += p.dot(q.cross(r));
         }
+        for ((from, _), balance) in edges {
+            if balance != 0 {
+                volume.insert(root(&mut parent, from), 0.0);
+            }
+        }
+        let mut bounds: HashMap<u32, (Vec3, Vec3)> = HashMap::new();
+        for (v, part) in vertices.iter().zip(&of) {
+            let (low, high) = bounds.entry(*part).or_insert((Vec3::MAX, Vec3::MIN));
+            (*low, *high) = (low.min(position(v)), high.max(position(v)));
+        }
+        let sorted = |(low, high): (Vec3, Vec3)| {
+            let mut extent = (high - low).to_array();
+            extent.sort_by(f32::total_cmp);
+            extent
+        };
+        let extent = bounds.into_iter().map(|(part, b)| (part, sorted(b))).collect();
+        Self { of, volume, extent }
     }
-    triangles
-        .iter()
-        .map(|t| volumes.get(&root(&mut parent, corners(t)[0])).is_some_and(|volume| *volume > 0.0))
-        .collect()
+
+    /// Whether a vertex belongs to a closed part that is not inside out: every edge is used once in each direction.
+    fn closed(&self, vertex: u32) -> bool {
+        let part = self.of.get(vertex as usize);
+        part.and_then(|p| self.volume.get(p)).is_some_and(|volume| *volume > 0.0)
+    }
+
+    /// Whether a vertex belongs to something flat that lies on something else, a window or a stripe: moved by its thickness it
+    /// would sink in and vanish, large as it may be.
+    fn is_panel(&self, vertex: u32, error: f32) -> bool {
+        let part = self.of.get(vertex as usize);
+        part.and_then(|p| self.extent.get(p)).is_some_and(|[thin, middle, _]| *thin < 3.0 * error && *middle > 6.0 * error)
+    }
 }
 
 /// Representative of `i`'s set, with path halving.

@@ -29,7 +29,7 @@ const PRINTED_SHADOW: [(f64, f64); 2] = [(0.5, 120.0), (0.9, 25.0)];
 const FADE_HEIGHTS: [f64; FORCE_MAX + 1] = [2.4, 1.6, 1.15, 0.8, 0.55];
 /// Mended: largest shift in heights of the boat.
 const SHIFT_HEIGHTS: [f64; FORCE_MAX + 1] = [0.08, 0.20, 0.26, 0.29, 0.30];
-/// Mended: share of the largest shift beyond which the reflection is discarded, having faded before.
+/// Mended: share of the largest shift at which it stops.
 const LIMIT: f64 = 0.5;
 /// Mended: how far sideways a wave moves the reflection, in parts of how far down; as `water.frag` has it.
 const SIDEWAYS: f64 = 0.35;
