@@ -1,12 +1,17 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "hud_block.glsl"
+#include "hud_shapes.glsl"
+
+// Which of the three draws this is: 0 plates, 1 shapes, 2 glyphs. Each is compiled without the others.
+layout(constant_id = 0) const uint KIND = 0;
 
 layout(set = 1, binding = 0) uniform sampler2D glyphs;
 
 layout(location = 0) in vec2 uv;
 layout(location = 1) in vec2 local;
-layout(location = 2) flat in uint instance;
+layout(location = 2) flat in vec4 paint;
+layout(location = 3) flat in vec3 half_size_edge;
+layout(location = 4) flat in uint shape;
 
 layout(location = 0) out vec4 colour;
 
@@ -22,10 +27,8 @@ float triangle(vec2 p, float r) {
     return max(dot(q - vec2(0.0, -r), vec2(0.894427, -0.447214)), q.y - r);
 }
 
-float distance_to(uint shape, vec2 p, vec2 half_size, float edge) {
-    float r = min(half_size.x, half_size.y);
-    switch (shape) {
-        case SHAPE_PLATE: return box(p, half_size, edge);
+float distance_to(uint kind, vec2 p, float r) {
+    switch (kind) {
         case SHAPE_DISC: return length(p) - r;
         case SHAPE_RING: return abs(length(p) - 0.75 * r) - 0.25 * r;
         case SHAPE_CROSS: {
@@ -38,14 +41,16 @@ float distance_to(uint shape, vec2 p, vec2 half_size, float edge) {
 }
 
 void main() {
-    HudQuad quad = quads[instance];
     float cover;
-    if (quad.shape == SHAPE_GLYPH) {
-        cover = texture(glyphs, uv).r;
+    if (KIND == 0) {
+        cover = clamp(0.5 - box(local, half_size_edge.xy, half_size_edge.z), 0.0, 1.0);
+    } else if (KIND == 1) {
+        float r = min(half_size_edge.x, half_size_edge.y);
+        cover = clamp(0.5 - distance_to(shape, local, r), 0.0, 1.0);
     } else {
-        vec2 half_size = 0.5 * (quad.rect.zw - quad.rect.xy);
-        cover = clamp(0.5 - distance_to(quad.shape, local, half_size, quad.edge), 0.0, 1.0);
+        // Glyphs stand on whole pixels.
+        cover = texelFetch(glyphs, ivec2(uv), 0).r;
     }
-    float alpha = quad.colour.a * cover;
-    colour = vec4(quad.colour.rgb * alpha, alpha);
+    float alpha = paint.a * cover;
+    colour = vec4(paint.rgb * alpha, alpha);
 }

@@ -197,7 +197,7 @@ pub const ROUND_STRIKE: u32 = 2;
 pub struct HudQuad {
     /// x0, y0, x1, y1 in pixels.
     pub rect: [f32; 4],
-    /// The same corners in the glyph atlas, 0 to 1.
+    /// The same corners in the glyph atlas, texels.
     pub uv: [f32; 4],
     /// Linear light, straight alpha.
     pub colour: [f32; 4],

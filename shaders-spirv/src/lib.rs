@@ -61,6 +61,6 @@ shaders! {
     ROUND_HIDDEN_FRAG = "round_hidden.frag";
     /// A rectangle of the head-up display.
     HUD_VERT = "hud.vert";
-    /// A glyph or shape of the head-up display.
+    /// What fills a rectangle of the head-up display. Constant: 0 plates, shapes or glyphs.
     HUD_FRAG = "hud.frag";
 }

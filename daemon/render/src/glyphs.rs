@@ -22,7 +22,7 @@ pub(crate) enum TextSize {
 /// Where a glyph lies in the atlas and how it is set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Glyph {
-    /// x0, y0, x1, y1 in the atlas, 0 to 1.
+    /// x0, y0, x1, y1 in the atlas, texels.
     pub(crate) uv: [f32; 4],
     /// The same rectangle relative to the pen on the base line, pixels.
     pub(crate) rect: [f32; 4],
@@ -94,11 +94,6 @@ impl Glyphs {
         }
         glyphs.height = (y + shelf + 1).next_power_of_two();
         glyphs.coverage.resize((glyphs.width * glyphs.height) as usize, 0);
-        let (w, h) = (glyphs.width as f32, glyphs.height as f32);
-        for glyph in glyphs.glyphs.iter_mut().flatten() {
-            let [x0, y0, x1, y1] = glyph.uv;
-            glyph.uv = [x0 / w, y0 / h, x1 / w, y1 / h];
-        }
         Ok(glyphs)
     }
 
@@ -136,12 +131,11 @@ mod tests {
         for size in [TextSize::Large, TextSize::Small] {
             for c in ('!'..='~').chain(['?']) {
                 let glyph = glyphs.get(size, c);
-                let px = |v: f32, n: u32| (v * n as f32).round() as usize;
-                let [x0, y0, x1, y1] = glyph.uv;
-                let (w, h) = (glyphs.width, glyphs.height);
+                let [x0, y0, x1, y1] = glyph.uv.map(|v| v as usize);
+                let w = glyphs.width;
                 let mut ink = 0;
-                for y in px(y0, h)..px(y1, h) {
-                    for x in px(x0, w)..px(x1, w) {
+                for y in y0..y1 {
+                    for x in x0..x1 {
                         let i = y * w as usize + x;
                         ink += usize::from(glyphs.coverage[i] > 128);
                         assert!(c == '?' || !std::mem::replace(&mut taken[i], true), "{c} overlaps another");

@@ -57,6 +57,17 @@ fn unit(size: (u32, u32)) -> f32 {
     (size.0 as f32 / 800.0).min(size.1 as f32 / 480.0).max(0.5)
 }
 
+/// Plates, shapes, glyphs: what `hud.frag` is compiled for.
+pub(crate) const KINDS: usize = 3;
+
+fn kind(shape: u32) -> usize {
+    match shape {
+        SHAPE_PLATE => 0,
+        SHAPE_GLYPH => 2,
+        _ => 1,
+    }
+}
+
 /// Lays out into a list that keeps its memory from frame to frame.
 pub(crate) struct HudLayout {
     size: (u32, u32),
@@ -75,7 +86,18 @@ impl HudLayout {
         self.training(glyphs);
         self.status(glyphs, &hud.status);
         self.counts(glyphs, hud);
+        // Each kind is one draw. Nothing of a kind overlaps another of its kind, and plates lie beneath everything.
+        self.quads.sort_unstable_by_key(|q| kind(q.shape));
         &self.quads
+    }
+
+    /// How many plates, shapes and glyphs there are.
+    pub(crate) fn counts_by_kind(&self) -> [u32; KINDS] {
+        let mut counts = [0; KINDS];
+        for quad in &self.quads {
+            counts[kind(quad.shape)] += 1;
+        }
+        counts
     }
 
     /// The whole pixels that the quads laid out last cover: everything stands on a plate.
@@ -217,7 +239,11 @@ mod tests {
                     quads.iter().filter(|q| q.shape == SHAPE_PLATE).map(|q| q.rect).collect();
                 assert_eq!(plates.len(), 3);
                 if size.0 >= 640 {
-                    assert!(plates[1][2] <= plates[2][0], "state runs into the counts at {size:?}");
+                    let lower = |left: &bool| {
+                        let on_side = |p: &&[f32; 4]| (p[0] < size.0 as f32 / 4.0) == *left;
+                        *plates.iter().filter(|p| p[1] > size.1 as f32 / 2.0).find(on_side).unwrap()
+                    };
+                    assert!(lower(&true)[2] <= lower(&false)[0], "state runs into the counts at {size:?}");
                 }
             }
             shapes.sort_unstable();

@@ -634,8 +634,13 @@ impl Recorder<'_> {
 
     /// Draws.
     pub(crate) fn draw(&self, vertices: u32, instances: u32) {
+        self.draw_from(vertices, 0, instances);
+    }
+
+    /// Draws, counting instances from `first`.
+    pub(crate) fn draw_from(&self, vertices: u32, first: u32, instances: u32) {
         // SAFETY: a rendering was begun and everything that the pipeline needs is bound.
-        unsafe { self.gpu.device.cmd_draw(self.cmd, vertices, instances, 0, 0) };
+        unsafe { self.gpu.device.cmd_draw(self.cmd, vertices, instances, 0, first) };
     }
 }
 

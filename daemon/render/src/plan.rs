@@ -13,6 +13,7 @@ use crate::{
     atlas::{self, Placed},
     coverage::{Boxes, Cells},
     frame_data::Capacity,
+    hud_layout::KINDS,
     frame_data::RECTS_MAX,
     passes::{
         boats::BoatDraw,
@@ -95,7 +96,8 @@ pub(crate) struct Plan {
     pub(crate) regions: Vec<vk::BufferImageCopy>,
     /// What of the video the water's shader compares.
     pub(crate) backdrop_regions: Vec<vk::BufferImageCopy>,
-    pub(crate) quads: u32,
+    /// Plates, shapes and glyphs of the head-up display.
+    pub(crate) quads: [u32; KINDS],
     cells: Cells,
     wanted: Vec<(PixelRect, f64)>,
     lines: Vec<(usize, HullLine)>,
@@ -125,7 +127,7 @@ impl Plan {
             wanted: Vec::with_capacity(boats),
             lines: Vec::with_capacity(boats),
             rest: Vec::with_capacity(WATER_RECTS_MAX),
-            quads: 0,
+            quads: [0; KINDS],
         }
     }
 

@@ -232,7 +232,7 @@ impl Renderer {
         slot.data.write_waters(&plan.water_blocks);
         slot.data.write_rounds(&plan.round_blocks);
         slot.data.write_rects(&plan.list);
-        plan.quads = 0;
+        plan.quads = Default::default();
         if scene.runs(Pass::Hud) {
             plan.quads = self.passes.hud.prepare(&mut slot.data, &scene.hud);
             plan.rects.extend(self.passes.hud.rects());
@@ -349,7 +349,7 @@ impl Renderer {
         if let Some(pass) = self.passes.rounds.as_ref().filter(|_| !plan.rounds.is_empty()) {
             stamps.around(Span::Rounds, || pass.record(to, frame, &plan.rounds));
         }
-        if plan.quads > 0 {
+        if plan.quads != [0; 3] {
             stamps.around(Span::Hud, || self.passes.hud.record(to, frame, plan.quads));
         }
         to.end();

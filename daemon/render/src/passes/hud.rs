@@ -8,7 +8,7 @@ use crate::{
     error::RenderError,
     frame_data::FrameData,
     glyphs::Glyphs,
-    hud_layout::{HudLayout, text_px},
+    hud_layout::{HudLayout, KINDS, text_px},
     memory::{Image, ImageShape},
     passes::Making,
     pipeline::{Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout},
@@ -20,7 +20,8 @@ pub(crate) struct HudPass {
     size: (u32, u32),
     glyphs: Glyphs,
     layout: HudLayout,
-    pipeline: Pipeline,
+    /// Plates, shapes, glyphs.
+    pipelines: [Pipeline; KINDS],
     set: vk::DescriptorSet,
     _atlas: Image,
     _sampler: Sampler,
@@ -43,28 +44,31 @@ impl HudPass {
         let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
         let bound = Bound::Texture { view: atlas.view, sampler: sampler.raw, layout };
         let set = making.pool.set(&set_layout, &[bound])?;
-        let pipeline = Pipeline::new(
-            gpu,
-            &PipelineShape {
-                vertex: HUD_VERT,
-                fragment: HUD_FRAG,
-                constants: &[],
-                sets: &[making.frame_set, &set_layout],
-                push: 0,
-                vertices: None,
-                topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
-                colour: SRGB,
-                blend: Blend::Over,
-                cull: None,
-                depth: false,
-                samples: vk::SampleCountFlags::TYPE_1,
-            },
-        )?;
+        let pipeline = |kind: u32| {
+            Pipeline::new(
+                gpu,
+                &PipelineShape {
+                    vertex: HUD_VERT,
+                    fragment: HUD_FRAG,
+                    constants: &[kind],
+                    sets: &[making.frame_set, &set_layout],
+                    push: 0,
+                    vertices: None,
+                    topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
+                    colour: SRGB,
+                    blend: Blend::Over,
+                    cull: None,
+                    depth: false,
+                    samples: vk::SampleCountFlags::TYPE_1,
+                },
+            )
+        };
+        let pipelines = [pipeline(0)?, pipeline(1)?, pipeline(2)?];
         Ok(Self {
             size: making.size,
             glyphs,
             layout: HudLayout::new(making.size),
-            pipeline,
+            pipelines,
             set,
             _atlas: atlas,
             _sampler: sampler,
@@ -72,11 +76,10 @@ impl HudPass {
         })
     }
 
-    /// Writes this frame's quads; returns how many there are.
-    pub(crate) fn prepare(&mut self, data: &mut FrameData, hud: &Hud) -> u32 {
-        let quads = self.layout.lay_out(&self.glyphs, hud);
-        data.write_quads(quads);
-        u32::try_from(quads.len()).unwrap_or(0)
+    /// Writes this frame's quads; returns how many plates, shapes and glyphs there are.
+    pub(crate) fn prepare(&mut self, data: &mut FrameData, hud: &Hud) -> [u32; KINDS] {
+        data.write_quads(self.layout.lay_out(&self.glyphs, hud));
+        self.layout.counts_by_kind()
     }
 
     /// The pixels that they cover.
@@ -85,10 +88,14 @@ impl HudPass {
     }
 
     /// Draws them, within a rendering to the screen.
-    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, quads: u32) {
+    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, counts: [u32; KINDS]) {
         let (width, height) = self.size;
         to.scissor(PixelRect { x: 0, y: 0, width, height });
-        to.bind(&self.pipeline, &[frame, self.set]);
-        to.draw(4, quads);
+        let mut first = 0;
+        for (pipeline, count) in self.pipelines.iter().zip(counts) {
+            to.bind(pipeline, &[frame, self.set]);
+            to.draw_from(4, first, count);
+            first += count;
+        }
     }
 }
