@@ -314,3 +314,14 @@ fn an_empty_scenario_is_video_and_display() {
     });
     assert!(frames > 25);
 }
+
+#[test]
+fn a_rehearsal_has_everything_in_view() {
+    let scene = session(SCENARIO).rehearsal();
+    for pass in Pass::ALL {
+        let runs = scene.passes[pass as usize];
+        // The sea of this scenario is calm and nothing in it is switched off.
+        assert_eq!(runs, PassDecision::Run, "{pass:?}");
+    }
+    assert_eq!((scene.boats.len(), scene.rounds.len()), (1, 3));
+}

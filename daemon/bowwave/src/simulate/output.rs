@@ -53,6 +53,8 @@ pub struct Ticket {
     pub submitted: Time,
     /// When it must be complete.
     pub deadline: Option<Time>,
+    /// Drawn so that the driver is warm, not to be shown or counted.
+    pub rehearsal: bool,
 }
 
 /// What the user did at the window.
@@ -88,6 +90,7 @@ pub struct OutputReport {
 pub struct Output {
     tickets: Option<Sender<Ticket>>,
     user: Receiver<UserEvent>,
+    rehearsed: Receiver<()>,
     thread: Option<JoinHandle<Result<OutputReport>>>,
 }
 
@@ -101,16 +104,28 @@ impl Output {
         };
         let (tickets, incoming) = unbounded();
         let (user_sender, user) = unbounded();
+        let (rehearsed_sender, rehearsed) = unbounded();
+        let told = Told { user: user_sender, rehearsed: rehearsed_sender };
         let thread = thread::Builder::new()
             .name("output".to_owned())
-            .spawn(move || Worker::new(completions, incoming, user_sender, options, video).run())
+            .spawn(move || Worker::new(completions, incoming, told, options, video).run())
             .context("cannot start the output thread; are too many processes running?")?;
-        Ok(Self { tickets: Some(tickets), user, thread: Some(thread) })
+        Ok(Self { tickets: Some(tickets), user, rehearsed, thread: Some(thread) })
     }
 
     /// Tells the thread of a submitted frame; `false` once the thread has ended.
     pub fn expect(&self, ticket: Ticket) -> bool {
         self.tickets.as_ref().is_some_and(|t| t.send(ticket).is_ok())
+    }
+
+    /// Waits until a rehearsal is complete, or the thread has ended, but no longer than `timeout`.
+    pub fn await_rehearsal(&self, timeout: Duration) {
+        if self.rehearsed.recv_timeout(timeout).is_err() {
+            log::warn!(
+                "the rehearsal was not complete after {} s; the first frames may be late",
+                timeout.as_secs()
+            );
+        }
     }
 
     /// What the user did since the last call.
@@ -126,10 +141,16 @@ impl Output {
     }
 }
 
+/// What the thread tells the main loop.
+struct Told {
+    user: Sender<UserEvent>,
+    rehearsed: Sender<()>,
+}
+
 struct Worker {
     completions: Completions,
     tickets: Receiver<Ticket>,
-    user: Sender<UserEvent>,
+    told: Told,
     options: OutputOptions,
     video: Option<VideoWriter>,
     sheet: Option<ContactSheet>,
@@ -142,7 +163,7 @@ impl Worker {
     fn new(
         completions: Completions,
         tickets: Receiver<Ticket>,
-        user: Sender<UserEvent>,
+        told: Told,
         options: OutputOptions,
         video: Option<VideoWriter>,
     ) -> Self {
@@ -153,7 +174,7 @@ impl Worker {
             gpu_ms: Samples::with_capacity(capacity),
             ..OutputReport::default()
         };
-        Self { completions, tickets, user, options, video, sheet, screen: None, hash: Sha256::new(), report }
+        Self { completions, tickets, told, options, video, sheet, screen: None, hash: Sha256::new(), report }
     }
 
     fn run(mut self) -> Result<OutputReport> {
@@ -178,9 +199,22 @@ impl Worker {
 
     fn take(&mut self, frame: &Finished, complete: Time) -> Result<()> {
         let ticket = self.tickets.recv().context("a frame came out that was not put in")?;
+        if ticket.rehearsal {
+            if self.told.rehearsed.send(()).is_err() {
+                log::debug!("the run ended before its rehearsal");
+            }
+            return Ok(());
+        }
         let ms = |from: Time| complete.secs_since(from) * 1e3;
         self.report.frames += 1;
-        self.report.late += u64::from(ticket.deadline.is_some_and(|d| complete > d));
+        if let Some(deadline) = ticket.deadline.filter(|d| complete > *d) {
+            self.report.late += 1;
+            log::info!(
+                "frame {} was complete {:.1} ms late",
+                ticket.frame,
+                complete.secs_since(deadline) * 1e3
+            );
+        }
         self.report.frame_ms.push(ms(ticket.begun));
         self.report.gpu_ms.push(ms(ticket.submitted));
         self.report.first.get_or_insert(complete);
@@ -196,7 +230,7 @@ impl Worker {
                     Pressed::Quit => UserEvent::Quit,
                 };
                 // The main loop may have ended already; then nobody wants to know.
-                if self.user.send(event).is_err() {
+                if self.told.user.send(event).is_err() {
                     log::debug!("a key came after the end of the run");
                 }
             }

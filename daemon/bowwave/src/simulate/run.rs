@@ -14,7 +14,7 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
-    event::Event,
+    event::{Event, Picture},
     geometry::CameraPose,
     pacing::{FRAMES_PER_S, Pacer},
     pose::registration_error_px,
@@ -42,6 +42,8 @@ use crate::{cli::Simulate, stats::Samples};
 const TICK_AFTER_PICTURE_NS: i64 = 5_000_000;
 /// A recording whose first picture takes longer than this has none to speak of.
 const FIRST_PICTURE_NS: i64 = 5 * NS_PER_S;
+/// A driver that compiles for longer than this is not waited for.
+const REHEARSAL: Duration = Duration::from_secs(10);
 /// Rounds that wait for room in the journal's queue before the run gives up on them.
 const ROUNDS_WAITING_MAX: usize = 100_000;
 
@@ -148,6 +150,21 @@ impl Loop {
         }
     }
 
+    /// Draws everything once, to nobody: drivers compile shaders when they are first used, and the first frames must not wait
+    /// for that.
+    fn rehearse(&mut self) -> Result<()> {
+        let scene = self.session.rehearsal();
+        let plan = self.session.plan();
+        let (width, height) = plan.picture;
+        let black = vec![0u8; plan.video.byte_len(width, height)];
+        let picture =
+            Picture::new(plan.video, width, height, black.into()).context("no picture of this size")?;
+        let begun = now();
+        self.output.expect(Ticket { frame: 0, begun, submitted: begun, deadline: None, rehearsal: true });
+        self.renderer.submit(&scene, &picture, true)?;
+        Ok(())
+    }
+
     /// As fast as it goes: time is the recording's.
     pub fn fast(mut self, frames: u64, arguments: &Simulate) -> Result<Finished> {
         let mut tick = 0i64;
@@ -165,6 +182,8 @@ impl Loop {
 
     /// On the host's clock, 30 frames a second.
     pub fn realtime(mut self, frames: u64, arguments: &Simulate) -> Result<Finished> {
+        self.rehearse()?;
+        self.output.await_rehearsal(REHEARSAL);
         self.await_first_picture()?;
         let mut pacer = Pacer::new(now().plus_ns(TICK_AFTER_PICTURE_NS));
         while self.tally.frames + pacer.missed() < frames && !self.ends() {
@@ -250,7 +269,8 @@ impl Loop {
             }
             truth.into_iter().for_each(|pose| recorder.truth(entry(pose)));
         }
-        let ticket = Ticket { frame: view.scene.frame, begun, submitted: stepped, deadline };
+        let ticket =
+            Ticket { frame: view.scene.frame, begun, submitted: stepped, deadline, rehearsal: false };
         let waited = self.renderer.submit(view.scene, view.picture, view.picture_is_new)?;
         if !self.output.expect(ticket) {
             // The output thread has failed; `finish` says why.

@@ -11,7 +11,7 @@ use glam::DVec3;
 use crate::{
     calibration::Calibration,
     event::{Event, Picture, PixelFormat},
-    geometry::{CameraPose, Lens},
+    geometry::{CameraPose, Lens, RigidPose, look},
     light::LightMeter,
     model::{Model, ModelId},
     plan::{Needs, ScenePlan},
@@ -21,7 +21,7 @@ use crate::{
     score::{NotScored, Outcome, ShotRecord},
     sea::WaveField,
     time::Time,
-    view::Eye,
+    view::{Afloat, Eye},
     weapon::Weapon,
 };
 
@@ -365,6 +365,45 @@ impl Session {
             }
             _ => Status::Ready,
         }
+    }
+
+    /// A scene in which everything that this session can ever show is in view. Drawn once and thrown away before the first
+    /// frame, it lets drivers finish compiling what they put off until it is used.
+    pub fn rehearsal(&self) -> Scene {
+        let eye_height_m = self.setup.scenario.eye_height_m;
+        let camera = CameraPose {
+            world_from_camera: look(0.0, -0.08, 0.0),
+            position: DVec3::new(0.0, 0.0, eye_height_m),
+        };
+        let eye = Eye {
+            camera: &camera,
+            lens: &self.lens,
+            visibility_m: self.setup.scenario.visibility_m,
+            reflections: self.plan.has(crate::scene::Pass::Water),
+        };
+        let models = &self.setup.models;
+        let boats: Vec<_> = self
+            .setup
+            .boat_models
+            .iter()
+            .enumerate()
+            .filter_map(|(boat, id)| {
+                let model = models.get(usize::from(id.0))?;
+                let ahead_m = (eye_height_m * 10.0).max(4.0 * model.radius_m());
+                let pose = RigidPose {
+                    world_from_body: glam::DQuat::IDENTITY,
+                    position: DVec3::new(0.0, ahead_m, 0.0),
+                };
+                eye.see(&Afloat { boat, model_id: *id, model, pose, water_level: 0.0 })
+            })
+            .collect();
+        let at = DVec3::new(0.0, eye_height_m * 10.0, 0.5);
+        let rounds = vec![
+            RoundView::Splash { at, height_m: 1.0, radius_m: 0.5, opacity: 1.0 },
+            RoundView::Strike { at, radius_m: 0.5, opacity: 1.0 },
+            RoundView::Tracer { from: at, to: at + DVec3::Y * 10.0, radiance: glam::Vec3::ONE },
+        ];
+        Scene { camera, passes: self.plan.frame(true, &boats, &rounds), boats, rounds, ..self.scene.clone() }
     }
 
     /// Counts one frame as shown: the next scene has the next number.
