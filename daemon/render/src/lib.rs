@@ -14,6 +14,7 @@ mod gpu;
 mod hud_layout;
 mod memory;
 mod meshes;
+mod parts;
 mod passes;
 mod pipeline;
 mod plan;

@@ -55,11 +55,13 @@ pub(crate) fn with_gradients(r: PixelRect, size: (u32, u32)) -> PixelRect {
 pub(crate) struct Outline {
     model: Model,
     boxes: Boxes,
+    /// What of it a reflection shows.
+    solid: Boxes,
 }
 
 impl Outline {
     pub(crate) fn of(model: &Model) -> Self {
-        let boxes = Boxes::of(model);
+        let (boxes, solid) = (Boxes::of(model), Boxes::without_lines(model));
         let light = Model {
             vertices: Vec::new(),
             indices: Vec::new(),
@@ -67,7 +69,7 @@ impl Outline {
             texture: None,
             ..model.clone()
         };
-        Self { model: light, boxes }
+        Self { model: light, boxes, solid }
     }
 }
 
@@ -165,7 +167,7 @@ impl Plan {
 
     fn plan_boats(&mut self, scene: &Scene, models: &[Outline], size: (u32, u32)) {
         for boat in &scene.boats {
-            let Some(Outline { model, boxes }) = models.get(usize::from(boat.model.0)) else { continue };
+            let Some(Outline { model, boxes, .. }) = models.get(usize::from(boat.model.0)) else { continue };
             let Some(rect) = boat.hull.and_then(|r| cut(r, size)) else { continue };
             if self.boats.len() * 2 >= BOAT_BLOCKS_MAX {
                 break;
@@ -217,11 +219,11 @@ impl Plan {
         for (n, placed) in self.places.iter().enumerate() {
             let ((i, line), (rect, _)) = (&self.lines[n], self.wanted[n]);
             let boat = &scene.boats[*i];
-            let Some(Outline { model, boxes }) = models.get(usize::from(boat.model.0)) else { continue };
+            let Some(Outline { model, solid, .. }) = models.get(usize::from(boat.model.0)) else { continue };
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
             let block = water_block(scene, boat, line, placed);
             if mirrored {
-                boxes.mark(&mut self.cells, rect, water::reach_px(&block, scene.water.method), |p| {
+                solid.mark(&mut self.cells, rect, water::reach_px(&block, scene.water.method), |p| {
                     let world = pose.to_world(p);
                     let above = (world.z - boat.water_level).max(0.0);
                     scene.lens.project(scene.camera.to_camera(world.with_z(boat.water_level - above)))

@@ -2,12 +2,13 @@
 //! boats are drawn from levels that lie within a part of a pixel of the whole model; and the back faces of closed parts, which
 //! nobody sees, are told apart from open shells, which are seen from both sides.
 
-use std::{collections::HashMap, ops::Range};
+use std::ops::Range;
 
 use bowwave_core::model::{Model, ModelKind};
-use glam::Vec3;
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 use shaders_spirv::interface::MeshVertex;
+
+use crate::parts::Parts;
 
 /// Error of the finest simplified level, metres; each level's is the root of two times the one before.
 const ERROR_MIN_M: f32 = 0.008;
@@ -15,8 +16,6 @@ const ERROR_MIN_M: f32 = 0.008;
 const WORTHWHILE: f64 = 0.8;
 /// No model is simplified to fewer triangles.
 const TRIANGLES_MIN: usize = 40;
-/// Corners closer than this are one corner of the shape, metres.
-const WELD_M: f32 = 1e-4;
 /// What a whole change of normal and of colour weighs, in parts of the level's error.
 const NORMAL_WEIGHT: f32 = 0.5;
 const ALBEDO_WEIGHT: f32 = 6.0;
@@ -61,7 +60,7 @@ pub(crate) fn simplify(model: &Model) -> Simplified {
         })
         .collect();
     let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    let parts = Parts::of(&vertices, &triangles);
+    let parts = Parts::of(model);
     let closed: Vec<bool> = triangles.iter().map(|t| parts.closed(t[0])).collect();
     let mut all = Simplified { vertices, ..Simplified::default() };
     all.push(0.0, &triangles, &closed);
@@ -127,97 +126,10 @@ impl Simplified {
     }
 }
 
-fn position(v: &MeshVertex) -> Vec3 {
-    Vec3::from(v.position)
-}
-
-/// The parts of a model: triangles that share corners.
-struct Parts {
-    /// Part of each vertex.
-    of: Vec<u32>,
-    /// By part: twice three times its volume, 0 if it is not closed.
-    volume: HashMap<u32, f32>,
-    /// By part: its extent, smallest first.
-    extent: HashMap<u32, [f32; 3]>,
-}
-
-impl Parts {
-    fn of(vertices: &[MeshVertex], triangles: &[[u32; 3]]) -> Self {
-        let mut ids = HashMap::new();
-        let welded: Vec<u32> = vertices
-            .iter()
-            .map(|v| {
-                let next = ids.len() as u32;
-                *ids.entry((position(v) / WELD_M).round().as_ivec3()).or_insert(next)
-            })
-            .collect();
-        let corners = |t: &[u32; 3]| t.map(|i| welded[i as usize]);
-        let mut parent: Vec<u32> = (0..ids.len() as u32).collect();
-        for t in triangles {
-            let [a, b, c] = corners(t);
-            for other in [b, c] {
-                let (a, other) = (root(&mut parent, a), root(&mut parent, other));
-                parent[a as usize] = other;
-            }
-        }
-        let of: Vec<u32> = welded.iter().map(|w| root(&mut parent, *w)).collect();
-        // How much more often each edge is used in one direction than in the other.
-        let mut edges: HashMap<(u32, u32), i32> = HashMap::new();
-        let mut volume: HashMap<u32, f32> = HashMap::new();
-        for t in triangles {
-            let [a, b, c] = corners(t);
-            for (from, to) in [(a, b), (b, c), (c, a)] {
-                if from != to {
-                    *edges.entry((from.min(to), from.max(to))).or_default() += if from < to { 1 } else { -1 };
-                }
-            }
-            let [p, q, r] = t.map(|i| position(&vertices[i as usize]));
-            *volume.entry(of[t[0] as usize]).or_default() += p.dot(q.cross(r));
-        }
-        for ((from, _), balance) in edges {
-            if balance != 0 {
-                volume.insert(root(&mut parent, from), 0.0);
-            }
-        }
-        let mut bounds: HashMap<u32, (Vec3, Vec3)> = HashMap::new();
-        for (v, part) in vertices.iter().zip(&of) {
-            let (low, high) = bounds.entry(*part).or_insert((Vec3::MAX, Vec3::MIN));
-            (*low, *high) = (low.min(position(v)), high.max(position(v)));
-        }
-        let sorted = |(low, high): (Vec3, Vec3)| {
-            let mut extent = (high - low).to_array();
-            extent.sort_by(f32::total_cmp);
-            extent
-        };
-        let extent = bounds.into_iter().map(|(part, b)| (part, sorted(b))).collect();
-        Self { of, volume, extent }
-    }
-
-    /// Whether a vertex belongs to a closed part that is not inside out: every edge is used once in each direction.
-    fn closed(&self, vertex: u32) -> bool {
-        let part = self.of.get(vertex as usize);
-        part.and_then(|p| self.volume.get(p)).is_some_and(|volume| *volume > 0.0)
-    }
-
-    /// Whether a vertex belongs to something flat that lies on something else, a window or a stripe: moved by its thickness it
-    /// would sink in and vanish, large as it may be.
-    fn is_panel(&self, vertex: u32, error: f32) -> bool {
-        let part = self.of.get(vertex as usize);
-        part.and_then(|p| self.extent.get(p)).is_some_and(|[thin, middle, _]| *thin < 3.0 * error && *middle > 6.0 * error)
-    }
-}
-
-/// Representative of `i`'s set, with path halving.
-fn root(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        parent[i as usize] = parent[parent[i as usize] as usize];
-        i = parent[i as usize];
-    }
-    i
-}
-
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
     use crate::testing;
 
