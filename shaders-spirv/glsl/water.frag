@@ -18,7 +18,7 @@ layout(push_constant) uniform DrawBlock {
 
 // The video beneath, as codes.
 layout(set = 1, binding = 0) uniform sampler2D video;
-// The boats mirrored in the sea, premultiplied linear light.
+// The boats mirrored in the sea, premultiplied linear light; mended, softened by soften.frag.
 layout(set = 1, binding = 1) uniform sampler2D mirror;
 
 // Mended: the normalised mean of eq. 5, from field.frag, 0 to 1 for -1 to 1.
@@ -79,26 +79,25 @@ vec4 reflection(vec2 at, float below) {
     if (kept == 0.0) {
         return vec4(0.0);
     }
-    vec2 move;
     if (METHOD == 2) {
         float shift = sin(normalised_mean(at, here)) * waters[i].shift;
         // Not "greater, then discard": what is no number is discarded too.
         if (!(abs(shift) <= waters[i].shift_limit)) {
             return vec4(0.0);
         }
-        move = vec2(shift);
-    } else {
-        // Mended: at a grazing angle waves move a reflection up and down much more than sideways, and the more the farther
-        // below the hull it is.
-        float normalised = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).r * 2.0 - 1.0;
-        // What goes beyond the limit stays at it: discarded, it would leave specks of bare water in a dark reflection.
-        float limit = waters[i].shift_limit;
-        float shift = clamp(sin(normalised) * waters[i].shift, -limit, limit);
-        shift *= min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
-        vec2 down = waters[i].down;
-        move = shift * (down + SIDEWAYS * vec2(down.y, -down.x));
+        return alpha * kept * blurred(uv + shift * waters[i].mirror_scale, waters[i].blur, bounds);
     }
-    return alpha * kept * blurred(uv + move * waters[i].mirror_scale, waters[i].blur, bounds);
+
+    // Mended: at a grazing angle waves move a reflection up and down much more than sideways, and the more the farther below
+    // the hull it is. What goes beyond the limit stays at it: discarded, it would leave specks of bare water in a dark
+    // reflection.
+    float normalised = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).r * 2.0 - 1.0;
+    float limit = waters[i].shift_limit;
+    float shift = clamp(sin(normalised) * waters[i].shift, -limit, limit);
+    shift *= min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
+    vec2 down = waters[i].down;
+    vec2 move = shift * (down + SIDEWAYS * vec2(down.y, -down.x));
+    return alpha * kept * texture(mirror, clamp(uv + move * waters[i].mirror_scale, bounds.xy, bounds.zw));
 }
 
 float hull_line(int column) {

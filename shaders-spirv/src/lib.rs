@@ -49,6 +49,8 @@ shaders! {
     RECT_VERT = "rect.vert";
     /// The boats' layer, averaged. Constant: 0 samples.
     COMPOSITE_FRAG = "composite.frag";
+    /// The mirror layer, softened.
+    SOFTEN_FRAG = "soften.frag";
     /// How the video's brightness changes downwards.
     FIELD_FRAG = "field.frag";
     /// A boat's light on the sea. Constants: 0 method (0 none, 1 mirror, 2 as printed, 3 mended), 1 shadow level.

@@ -15,6 +15,7 @@ use bowwave_core::{
 };
 use bowwave_render::{Needs, RenderConfig, Renderer};
 
+#[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
 #[path = "../src/testing.rs"]
 mod testing;
 

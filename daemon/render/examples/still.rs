@@ -13,6 +13,7 @@ use bowwave_core::{
 use bowwave_render::{Needs, RenderConfig, Renderer};
 use glam::{DVec3, Vec3};
 
+#[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
 #[path = "../src/testing.rs"]
 mod testing;
 

@@ -4,8 +4,12 @@
 use bowwave_core::scene::PixelRect;
 use glam::DVec2;
 
-/// Transparent texels around each place, so that bilinear fetches at its edge take nothing from the next.
-const GUTTER: u32 = 2;
+/// Places begin and end at multiples of this: the softened layer is the layer at a third of its size.
+pub(crate) const SOFT: u32 = 3;
+/// Most texels for a pixel: what is softened needs three.
+pub(crate) const SCALE_MAX: f64 = 3.0;
+/// Transparent texels around each place, so that bilinear fetches at its edge, softened ones too, take nothing from the next.
+const GUTTER: u32 = 2 * SOFT;
 
 /// One boat's place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,15 +32,16 @@ impl Default for Placed {
 }
 
 impl Placed {
-    /// Smallest and largest texture coordinates of the place, half a texel inside its edge.
+    /// Smallest and largest texture coordinates of the place, half a softened texel inside its edge.
     pub(crate) fn bounds(&self) -> [f32; 4] {
         let (w, h) = (f64::from(self.atlas.0), f64::from(self.atlas.1));
         let p = &self.place;
+        let inside = 0.5 * f64::from(SOFT);
         [
-            ((f64::from(p.x) + 0.5) / w) as f32,
-            ((f64::from(p.y) + 0.5) / h) as f32,
-            ((f64::from(p.x + p.width) - 0.5) / w) as f32,
-            ((f64::from(p.y + p.height) - 0.5) / h) as f32,
+            ((f64::from(p.x) + inside) / w) as f32,
+            ((f64::from(p.y) + inside) / h) as f32,
+            ((f64::from(p.x + p.width) - inside) / w) as f32,
+            ((f64::from(p.y + p.height) - inside) / h) as f32,
         ]
     }
 
@@ -47,7 +52,7 @@ impl Placed {
     }
 }
 
-/// Finds places for rectangles, each with its wanted texels for a screen pixel (at most 1), row by row. What does not fit is
+/// Finds places for rectangles, each with its wanted texels for a screen pixel (at most [`SCALE_MAX`]), row by row. What does not fit is
 /// made smaller together until it does. `places` keeps its memory.
 pub(crate) fn place(atlas: (u32, u32), wanted: &[(PixelRect, f64)], places: &mut Vec<Placed>) {
     let mut shrink = 1.0;
@@ -65,8 +70,10 @@ fn try_place(atlas: (u32, u32), wanted: &[(PixelRect, f64)], shrink: f64, places
     places.clear();
     let (mut x, mut y, mut shelf) = (0, 0, 0);
     for (rect, scale) in wanted {
-        let scale = scale.clamp(1e-3, 1.0) * shrink;
-        let texels = |pixels: u32| ((f64::from(pixels) * scale).ceil() as u32).max(1) + 2 * GUTTER;
+        let scale = scale.clamp(1e-3, SCALE_MAX) * shrink;
+        let texels = |pixels: u32| {
+            (((f64::from(pixels) * scale).ceil() as u32).max(1) + 2 * GUTTER).next_multiple_of(SOFT)
+        };
         let (width, height) = (texels(rect.width), texels(rect.height));
         if x + width > atlas.0 {
             (x, y, shelf) = (0, y + shelf, 0);
@@ -92,9 +99,9 @@ mod tests {
     proptest! {
         #[test]
         fn places_lie_inside_and_apart_and_hold_their_rectangles(
-            rects in prop::collection::vec((0_u32..1200, 0_u32..700, 1_u32..800, 1_u32..500, 0.05_f64..1.0), 1..20),
+            rects in prop::collection::vec((0_u32..1200, 0_u32..700, 1_u32..800, 1_u32..500, 0.05_f64..3.0), 1..20),
         ) {
-            let atlas = (1280, 360);
+            let atlas = (1284, 366);
             let wanted: Vec<_> = rects
                 .iter()
                 .map(|&(x, y, width, height, scale)| (PixelRect { x, y, width, height }, scale))
@@ -104,6 +111,7 @@ mod tests {
             prop_assert_eq!(places.len(), wanted.len());
             for (i, (placed, (rect, _))) in places.iter().zip(&wanted).enumerate() {
                 let p = placed.place;
+                prop_assert!([p.x, p.y, p.width, p.height].iter().all(|v| v.is_multiple_of(SOFT)));
                 prop_assert!(p.x + p.width <= atlas.0 && p.y + p.height <= atlas.1);
                 let at = |x: u32, y: u32| DVec2::new(f64::from(x), f64::from(y)) * placed.scale + placed.offset;
                 let (low, high) = (at(rect.x, rect.y), at(rect.x + rect.width, rect.y + rect.height));

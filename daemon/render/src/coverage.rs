@@ -251,7 +251,8 @@ mod tests {
                 let held = boxes.0.iter().any(|(l, h)| p.cmpge(*l - 1e-3).all() && p.cmple(*h + 1e-3).all());
                 assert!(held, "{name}: {p} is in no box");
             }
-            let solid: f64 = Boxes::without_lines(&model).0.iter().copied().map(|(l, h)| (h.x - l.x) * (h.z - l.z)).sum();
+            let solid: f64 =
+                Boxes::without_lines(&model).0.iter().copied().map(|(l, h)| (h.x - l.x) * (h.z - l.z)).sum();
             let area = |(l, h): (DVec3, DVec3)| (h.x - l.x) * (h.z - l.z);
             let boxed: f64 = boxes.0.iter().copied().map(area).sum();
             assert!(boxed < 0.7 * area((model.min.as_dvec3(), model.max.as_dvec3())), "{name}: {boxed}");

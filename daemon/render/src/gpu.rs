@@ -378,6 +378,6 @@ mod tests {
         let error = choose(Some("radeon"), &all).unwrap_err();
         let text = error.to_string();
         assert!(text.contains("0 llvmpipe (LLVM 15), 1 NVIDIA T1000"), "{text}");
-        assert_eq!(choose(Some("7"), &all).unwrap_err().to_string().contains("\"7\""), true);
+        assert!(choose(Some("7"), &all).unwrap_err().to_string().contains("\"7\""));
     }
 }

@@ -107,7 +107,7 @@ impl HudLayout {
             let [x0, y0, x1, y1] = q.rect;
             let (x0, y0) = (x0.floor().clamp(0.0, width), y0.floor().clamp(0.0, height));
             let (x1, y1) = (x1.ceil().clamp(0.0, width), y1.ceil().clamp(0.0, height));
-            (x0 < x1 && y0 < y1).then(|| PixelRect {
+            (x0 < x1 && y0 < y1).then_some(PixelRect {
                 x: x0 as u32,
                 y: y0 as u32,
                 width: (x1 - x0) as u32,

@@ -85,7 +85,9 @@ impl Parts {
     /// `section_m2`.
     pub(crate) fn is_line(&self, vertex: u32, section_m2: f32) -> bool {
         let Some(part) = self.of.get(vertex as usize) else { return false };
-        let (Some(volume), Some(extent)) = (self.volume.get(part), self.extent.get(part)) else { return false };
+        let (Some(volume), Some(extent)) = (self.volume.get(part), self.extent.get(part)) else {
+            return false;
+        };
         let length = Vec3::from(*extent).length();
         *volume > 0.0 && length > LINE_LENGTH_M && volume / 6.0 < section_m2 * length
     }
@@ -94,7 +96,8 @@ impl Parts {
     /// would sink in and vanish, large as it may be.
     pub(crate) fn is_panel(&self, vertex: u32, error: f32) -> bool {
         let part = self.of.get(vertex as usize);
-        part.and_then(|p| self.extent.get(p)).is_some_and(|[thin, middle, _]| *thin < 3.0 * error && *middle > 6.0 * error)
+        part.and_then(|p| self.extent.get(p))
+            .is_some_and(|[thin, middle, _]| *thin < 3.0 * error && *middle > 6.0 * error)
     }
 }
 

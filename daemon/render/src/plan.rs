@@ -13,8 +13,8 @@ use crate::{
     atlas::{self, Placed},
     coverage::{Boxes, Cells},
     frame_data::Capacity,
-    hud_layout::KINDS,
     frame_data::RECTS_MAX,
+    hud_layout::KINDS,
     passes::{
         boats::BoatDraw,
         rounds::{RoundDraw, pieces},
@@ -208,7 +208,9 @@ impl Plan {
         let skipped = scene.boats.len().saturating_sub(WATERS_MAX);
         for (i, boat) in scene.boats.iter().enumerate().skip(skipped) {
             let Some(Outline { model, .. }) = models.get(usize::from(boat.model.0)) else { continue };
-            let Some(rect) = boat.reflection.and_then(|r| cut(r, size)) else { continue };
+            // Beyond the horizon the sea that would mirror the boat is itself out of sight.
+            let seen = boat.reflection.filter(|_| !boat.beyond_horizon);
+            let Some(rect) = seen.and_then(|r| cut(r, size)) else { continue };
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
             let Some(line) = hull_line(scene, boat, &pose, model) else { continue };
             self.wanted.push((rect, mirror_scale(scene, &line)));
@@ -222,12 +224,21 @@ impl Plan {
             let Some(Outline { model, solid, .. }) = models.get(usize::from(boat.model.0)) else { continue };
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
             let block = water_block(scene, boat, line, placed);
+            let softened_px = match scene.water.method {
+                ReflectionMethod::Full => 1.5 * f64::from(atlas::SOFT) / placed.scale,
+                _ => 0.0,
+            };
             if mirrored {
-                solid.mark(&mut self.cells, rect, water::reach_px(&block, scene.water.method), |p| {
-                    let world = pose.to_world(p);
-                    let above = (world.z - boat.water_level).max(0.0);
-                    scene.lens.project(scene.camera.to_camera(world.with_z(boat.water_level - above)))
-                });
+                solid.mark(
+                    &mut self.cells,
+                    rect,
+                    water::reach_px(&block, scene.water.method, softened_px),
+                    |p| {
+                        let world = pose.to_world(p);
+                        let above = (world.z - boat.water_level).max(0.0);
+                        scene.lens.project(scene.camera.to_camera(world.with_z(boat.water_level - above)))
+                    },
+                );
             }
             line.mark_shadow(&mut self.cells, rect, &block);
             line.unmark_dry(&mut self.cells, &block);
@@ -247,7 +258,9 @@ impl Plan {
             self.rects.push(around);
             if mirrored {
                 let index = self.boat_blocks.len() as u32;
-                let detail_m = DETAIL_PX * pixel_m(scene, boat);
+                // Softened, a mirrored boat shows less than the boat itself.
+                let coarser = (0.5 * softened_px).max(1.0);
+                let detail_m = DETAIL_PX * pixel_m(scene, boat) * coarser;
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
                 self.boat_blocks.push(view::boat_block(scene, boat, &pose, true));
                 self.mirror_places.push(*placed);

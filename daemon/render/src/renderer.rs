@@ -104,8 +104,10 @@ impl Passes {
         let textured = models.iter().any(|m| m.texture.is_some());
         let meshes = Meshes::new(making, if any_boat { models } else { &[] })?;
         let reflects = needs.waters.iter().any(|(method, _)| *method != ReflectionMethod::Off);
-        let mirror =
-            (any_boat && reflects).then(|| MirrorPass::new(making, &meshes, textured)).transpose()?;
+        let softens = needs.waters.iter().any(|(method, _)| *method == ReflectionMethod::Full);
+        let mirror = (any_boat && reflects)
+            .then(|| MirrorPass::new(making, &meshes, textured, softens))
+            .transpose()?;
         let water = (any_boat && !needs.waters.is_empty())
             .then(|| WaterPass::new(making, mirror.as_ref(), &needs.waters))
             .transpose()?;
@@ -262,7 +264,7 @@ impl Renderer {
             device.cmd_reset_query_pool(slot.cmd, out.queries, 0, QUERIES);
         }
         stamps.write(FRAME_QUERY);
-        self.record_layers(to, &stamps, slot.data.set, &out.download);
+        self.record_layers(to, &stamps, slot.data.set, &out.download, water);
         if !self.plan.rects.is_empty() {
             self.record_blends(to, &stamps, slot.data.set, &out.download, water);
         }
@@ -281,6 +283,7 @@ impl Renderer {
         stamps: &Stamps<'_>,
         frame: vk::DescriptorSet,
         screen: &Buffer,
+        how: Water,
     ) {
         let Passes { video, meshes, .. } = &self.passes;
         let plan = &self.plan;
@@ -288,21 +291,25 @@ impl Renderer {
         let boats = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty());
         let mut steps = Steps::default();
         steps.add([video.before()]);
-        steps.add(mirror.iter().flat_map(|m| m.before()));
+        steps.add(mirror.iter().flat_map(|m| m.before()).flatten());
         steps.add(boats.iter().flat_map(|b| b.before()));
         steps.record(to);
-        stamps.around(Span::Video, || video.record(to));
         if let Some(pass) = mirror {
             stamps
                 .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));
+            to.barrier([pass.between()]);
+            if how.method == ReflectionMethod::Full {
+                stamps.around(Span::Soften, || pass.record_soft(to, &plan.mirror_places));
+            }
         }
+        stamps.around(Span::Video, || video.record(to));
         if let Some(pass) = boats {
             stamps
                 .around(Span::BoatLayer, || pass.record_layer(to, frame, meshes, &plan.boats, &plan.clears));
         }
         let mut steps = Steps::default();
         steps.add([video.between()]);
-        steps.add(mirror.map(MirrorPass::between));
+        steps.add(mirror.and_then(MirrorPass::softened));
         steps.add(boats.iter().flat_map(|b| b.between()));
         steps.record(to);
         stamps.around(Span::VideoCopy, || video.record_copy(to, screen));

@@ -28,6 +28,7 @@ pub(crate) enum Span {
     Video,
     VideoCopy,
     Mirror,
+    Soften,
     BoatLayer,
     Field,
     Water,
@@ -37,10 +38,11 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Video,
         Self::VideoCopy,
         Self::Mirror,
+        Self::Soften,
         Self::BoatLayer,
         Self::Field,
         Self::Water,
@@ -53,7 +55,7 @@ impl Span {
     fn pass(self) -> Pass {
         match self {
             Self::Video | Self::VideoCopy => Pass::Video,
-            Self::Mirror => Pass::Mirror,
+            Self::Mirror | Self::Soften => Pass::Mirror,
             Self::Field | Self::Water => Pass::Water,
             Self::BoatLayer | Self::Composite => Pass::Boats,
             Self::Rounds => Pass::Rounds,

@@ -9,7 +9,10 @@ use bowwave_core::{
 use glam::{DVec2, DVec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, WaterBlock};
 
-use crate::{atlas::Placed, coverage::Cells};
+use crate::{
+    atlas::{Placed, SCALE_MAX},
+    coverage::Cells,
+};
 
 /// Highest wind force at which a reflection is seen.
 const FORCE_MAX: usize = 4;
@@ -33,8 +36,8 @@ const SHIFT_HEIGHTS: [f64; FORCE_MAX + 1] = [0.08, 0.20, 0.26, 0.29, 0.30];
 const LIMIT: f64 = 0.5;
 /// Mended: how far sideways a wave moves the reflection, in parts of how far down; as `water.frag` has it.
 const SIDEWAYS: f64 = 0.35;
-/// Mended: step of the box blur in heights of the boat.
-const BLUR_HEIGHTS: [f64; FORCE_MAX + 1] = [0.012, 0.025, 0.04, 0.06, 0.08];
+/// Mended: width of the box blur in heights of the boat.
+const BLUR_HEIGHTS: [f64; FORCE_MAX + 1] = [0.018, 0.035, 0.06, 0.09, 0.12];
 /// Mended: brightness over which the video begins to pass through, and over which it passes whole; dark, then bright.
 const PASSES: [f64; 4] = [0.02, 0.08, 0.80, 0.95];
 /// Mended: i and k (heights of the boat) of eq. 7 for levels 1 and 2.
@@ -152,10 +155,11 @@ impl HullLine {
     }
 }
 
-/// How far from where the mirror has a boat its light can be seen in the water, pixels right or left and up or down.
-pub(crate) fn reach_px(block: &WaterBlock, method: ReflectionMethod) -> DVec2 {
+/// How far from where the mirror has a boat its light can be seen in the water, pixels right or left and up or down;
+/// `softened_px` is how far the layer itself is smeared.
+pub(crate) fn reach_px(block: &WaterBlock, method: ReflectionMethod, softened_px: f64) -> DVec2 {
     let limit = f64::from(block.shift_limit);
-    let blur = f64::from(block.blur[0] / block.mirror_scale[0]);
+    let blur = f64::from(block.blur[0] / block.mirror_scale[0]) + softened_px;
     let shift = match method {
         ReflectionMethod::Off | ReflectionMethod::Mirror => DVec2::ZERO,
         // Both coordinates shift by as much.
@@ -187,10 +191,10 @@ fn lower(below: &mut [f64; HULL_LINE_COLUMNS], a: DVec2, b: DVec2) {
     }
 }
 
-/// Screen pixels between the texels that the mirror layer of a boat needs: what is blurred needs fewer.
+/// Texels of the mirror layer for each pixel that a boat needs: softened, three for each step of the blur.
 pub(crate) fn mirror_scale(scene: &Scene, line: &HullLine) -> f64 {
     match scene.water.method {
-        ReflectionMethod::Full => 1.0 / blur_px(scene, line).max(1.0),
+        ReflectionMethod::Full => SCALE_MAX / blur_px(scene, line).max(1.0),
         _ => 1.0,
     }
 }
@@ -227,7 +231,8 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
     let (dark, bright) = PRINTED_PASSES;
     let passes = if mended { PASSES } else { [dark - 1e-4, dark, bright, bright + 1e-4] };
     let step = if mended { (STEP_HEIGHTS * height).clamp(1.0, STEP_MAX_PX) } else { 1.0 };
-    let blur = if mended { blur_px(scene, line).max(1.0) } else { 1.0 };
+    // Mended, the layer is softened before.
+    let blur = if mended { 0.0 } else { 1.0 };
     let texels = DVec2::new(f64::from(placed.atlas.0), f64::from(placed.atlas.1));
     let scale = DVec2::splat(placed.scale) / texels;
     let pair = |v: DVec2| v.as_vec2().to_array();

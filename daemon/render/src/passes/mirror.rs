@@ -2,9 +2,11 @@
 //! the boat's mean water. Each boat has its own place in the layer.
 
 use ash::vk;
+use bowwave_core::scene::PixelRect;
+use shaders_spirv::{SCREEN_VERT, SOFTEN_FRAG};
 
 use crate::{
-    atlas::Placed,
+    atlas::{Placed, SOFT},
     error::RenderError,
     memory::{Image, ImageShape},
     meshes::Meshes,
@@ -12,7 +14,10 @@ use crate::{
         DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED,
         boats::{BoatDraw, BoatPipelines},
     },
-    pipeline::{Begin, DEPTH, LIGHT, Recorder, Step, joined},
+    pipeline::{
+        Begin, Blend, Bound, DEPTH, LIGHT, Pipeline, PipelineShape, Recorder, Sampler, SetLayout, Step,
+        joined,
+    },
 };
 
 /// The mirror pass.
@@ -22,17 +27,36 @@ pub(crate) struct MirrorPass {
     pub(crate) colour: Image,
     depth: Image,
     pipelines: BoatPipelines,
+    soft: Option<Soft>,
+}
+
+/// The layer at a third of its size, softened.
+struct Soft {
+    image: Image,
+    pipeline: Pipeline,
+    set: vk::DescriptorSet,
+    _sampler: Sampler,
+    _set_layout: SetLayout,
 }
 
 impl MirrorPass {
-    pub(crate) fn new(making: &Making<'_>, meshes: &Meshes, any_textured: bool) -> Result<Self, RenderError> {
+    /// `softens` if a method that needs it may be asked for.
+    pub(crate) fn new(
+        making: &Making<'_>,
+        meshes: &Meshes,
+        any_textured: bool,
+        softens: bool,
+    ) -> Result<Self, RenderError> {
         let size = Self::layer_size(making.size);
         let sampled = vk::ImageUsageFlags::SAMPLED;
         let colour = ImageShape::new(size, LIGHT, vk::ImageUsageFlags::COLOR_ATTACHMENT | sampled);
         let depth = ImageShape::new(size, DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT);
+        let colour = Image::new(making.gpu, "mirror layer", colour)?;
+        let soft = softens.then(|| Soft::new(making, &colour)).transpose()?;
         Ok(Self {
             size: making.size,
-            colour: Image::new(making.gpu, "mirror layer", colour)?,
+            soft,
+            colour,
             depth: Image::new(making.gpu, "mirror depth", depth)?,
             pipelines: BoatPipelines::new(
                 making,
@@ -47,22 +71,52 @@ impl MirrorPass {
 
     /// Texels of the layer for a screen of `size`: no reflection covers more than the half below the horizon at full detail.
     pub(crate) fn layer_size(size: (u32, u32)) -> (u32, u32) {
-        (size.0 + 8, size.1 / 2 + 8)
+        ((size.0 + 24).next_multiple_of(SOFT), (size.1 / 2 + 24).next_multiple_of(SOFT))
     }
 
     /// Steps of the layer's images from what the frame before did to being drawn.
-    pub(crate) fn before(&self) -> [Step<'_>; 2] {
+    pub(crate) fn before(&self) -> [Option<Step<'_>>; 3] {
         let was_read = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
         let was_depth = (DEPTH_TESTED.0, DEPTH_TESTED.1, vk::ImageLayout::UNDEFINED);
         [
-            Step { image: &self.colour, from: was_read, to: DRAWN },
-            Step { image: &self.depth, from: was_depth, to: DEPTH_TESTED },
+            Some(Step { image: &self.colour, from: was_read, to: DRAWN }),
+            Some(Step { image: &self.depth, from: was_depth, to: DEPTH_TESTED }),
+            self.soft.as_ref().map(|s| Step { image: &s.image, from: was_read, to: DRAWN }),
         ]
     }
 
     /// Step of the layer from being drawn to being sampled.
     pub(crate) fn between(&self) -> Step<'_> {
         Step { image: &self.colour, from: DRAWN, to: SAMPLED }
+    }
+
+    /// Step of the softened layer from being drawn to being sampled.
+    pub(crate) fn softened(&self) -> Option<Step<'_>> {
+        self.soft.as_ref().map(|s| Step { image: &s.image, from: DRAWN, to: SAMPLED })
+    }
+
+    /// The softened layer, where there is one.
+    pub(crate) fn soft_view(&self) -> Option<vk::ImageView> {
+        self.soft.as_ref().map(|s| s.image.view)
+    }
+
+    /// Softens what was drawn on `places`.
+    pub(crate) fn record_soft(&self, to: Recorder<'_>, places: &[Placed]) {
+        let Some(soft) = &self.soft else { return };
+        let Some(used) = places.iter().map(|p| p.place).reduce(joined) else { return };
+        let third = |v: u32| v / SOFT;
+        let area = PixelRect {
+            x: third(used.x),
+            y: third(used.y),
+            width: third(used.width),
+            height: third(used.height),
+        };
+        let (width, height) = (soft.image.shape.width, soft.image.shape.height);
+        to.begin(area, (soft.image.view, Begin::Forget), None);
+        to.window([0.0, 0.0, width as f32, height as f32], area);
+        to.bind(&soft.pipeline, &[soft.set]);
+        to.draw(3, 1);
+        to.end();
     }
 
     /// Draws the mirrored boats, each onto its place.
@@ -82,5 +136,37 @@ impl MirrorPass {
             self.pipelines.draw(to, frame, meshes, boat);
         }
         to.end();
+    }
+}
+
+impl Soft {
+    fn new(making: &Making<'_>, layer: &Image) -> Result<Self, RenderError> {
+        let gpu = making.gpu;
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
+        let size = (layer.shape.width / SOFT, layer.shape.height / SOFT);
+        let image = Image::new(gpu, "mirror layer, softened", ImageShape::new(size, LIGHT, usage))?;
+        let sampler = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
+        let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let bound = Bound::Texture { view: layer.view, sampler: sampler.raw, layout: SAMPLED.2 };
+        let set = making.pool.set(&set_layout, &[bound])?;
+        let pipeline = Pipeline::new(
+            gpu,
+            &PipelineShape {
+                vertex: SCREEN_VERT,
+                fragment: SOFTEN_FRAG,
+                constants: &[],
+                sets: &[&set_layout],
+                push: 0,
+                vertices: None,
+                topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+                colour: LIGHT,
+                blend: Blend::Replace,
+                cull: None,
+                depth: false,
+                samples: vk::SampleCountFlags::TYPE_1,
+            },
+        )?;
+        Ok(Self { image, pipeline, set, _sampler: sampler, _set_layout: set_layout })
     }
 }

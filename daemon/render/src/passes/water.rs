@@ -51,7 +51,9 @@ pub(crate) struct WaterPass {
     field: Option<Field>,
     /// The video beneath the reflections, as codes: what the shader compares, while it draws to the screen.
     pub(crate) backdrop: Image,
+    /// With the mirror layer as it is, and softened.
     set: vk::DescriptorSet,
+    soft: Option<vk::DescriptorSet>,
     _sampler: Sampler,
     _set_layout: SetLayout,
 }
@@ -78,9 +80,13 @@ impl WaterPass {
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; 3];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         // Variants that read no mirror layer or no field still name one.
-        let mirror_view = mirror.map_or(backdrop.view, |m| m.colour.view);
+        let plain = mirror.map_or(backdrop.view, |m| m.colour.view);
         let field_view = field.as_ref().map_or(backdrop.view, |f| f.image.view);
-        let set = making.pool.set(&set_layout, &[backdrop.view, mirror_view, field_view].map(bound))?;
+        let set = making.pool.set(&set_layout, &[backdrop.view, plain, backdrop.view].map(bound))?;
+        let soft = match mirror.and_then(MirrorPass::soft_view) {
+            Some(soft) => Some(making.pool.set(&set_layout, &[backdrop.view, soft, field_view].map(bound))?),
+            None => None,
+        };
         let mut variants = Vec::with_capacity(waters.len());
         for (method, shadow) in waters {
             let pipeline = Pipeline::new(
@@ -108,6 +114,7 @@ impl WaterPass {
             field,
             backdrop,
             set,
+            soft,
             _sampler: linear,
             _set_layout: set_layout,
         })
@@ -179,7 +186,8 @@ impl WaterPass {
         boats: &[WaterDraw],
     ) {
         let Some(variant) = self.variant(water) else { return };
-        to.bind(&variant.pipeline, &[frame, self.set]);
+        let set = self.soft.filter(|_| water.method == ReflectionMethod::Full).unwrap_or(self.set);
+        to.bind(&variant.pipeline, &[frame, set]);
         for boat in boats {
             let block = DrawBlock { rect: [0.0; 4], index: boat.index, first: boat.first };
             to.push(&variant.pipeline, &block);

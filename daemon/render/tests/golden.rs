@@ -1,0 +1,202 @@
+//! Small pictures of every pass and method against committed ones. `BOWWAVE_BLESS=1` writes them anew: look at them then.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+mod common;
+
+use std::path::PathBuf;
+
+use bowwave_core::{
+    geometry::look,
+    model::{Model, ModelKind, Texture},
+    scene::{Pass, PassDecision, ReflectionMethod, RoundView, Scene, ShadowLevel, Status},
+    sea::BeaufortForce,
+};
+use common::{
+    draw, sea,
+    testing::{add_boat, box_model, empty_scene},
+};
+use glam::{DVec2, DVec3, Vec3};
+
+const SIZE: (u32, u32) = (320, 180);
+/// Another version of the software driver may round and cover otherwise: a pixel in two hundred may be off by more than this
+/// many codes, none may bring the mean beyond a quarter of a code.
+const CODES: i32 = 3;
+const SHARE: f64 = 0.005;
+const MEAN: f64 = 0.25;
+
+fn models() -> Vec<Model> {
+    vec![
+        box_model("white", [9.0, 2.6, 1.8], [0.8, 0.8, 0.78]),
+        box_model("red", [5.0, 2.0, 1.2], [0.5, 0.06, 0.04]),
+    ]
+}
+
+fn boats(method: ReflectionMethod, shadow: ShadowLevel, force: u8) -> Scene {
+    let mut scene = empty_scene(SIZE.0, SIZE.1);
+    scene.water.method = method;
+    scene.water.shadow = shadow;
+    scene.water.force = BeaufortForce::new(force).unwrap();
+    add_boat(&mut scene, &models(), 0, 45.0, -0.12, 0.5);
+    add_boat(&mut scene, &models(), 1, 42.0, 0.14, 2.4);
+    scene
+}
+
+fn check(name: &str, scene: &Scene, models: &[Model]) {
+    let pixels = draw(scene, &sea(SIZE.0, SIZE.1), models);
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{name}.png"));
+    if std::env::var_os("BOWWAVE_BLESS").is_some() {
+        image::save_buffer(&path, &pixels, SIZE.0, SIZE.1, image::ExtendedColorType::Rgba8).unwrap();
+        return;
+    }
+    let golden = image::open(&path)
+        .unwrap_or_else(|e| panic!("{}: {e}; make it with BOWWAVE_BLESS=1", path.display()));
+    let golden = golden.to_rgba8();
+    assert_eq!(golden.dimensions(), SIZE);
+    let differences = pixels
+        .chunks_exact(4)
+        .zip(golden.as_raw().chunks_exact(4))
+        .map(|(a, b)| (0..3).map(|i| (i32::from(a[i]) - i32::from(b[i])).abs()).max().unwrap());
+    let (mut off, mut sum) = (0_u32, 0.0);
+    for d in differences {
+        off += u32::from(d > CODES);
+        sum += f64::from(d);
+    }
+    let count = f64::from(SIZE.0 * SIZE.1);
+    let (share, mean) = (f64::from(off) / count, sum / count);
+    if share > SHARE || mean > MEAN {
+        let seen = std::env::temp_dir().join(format!("{name}.png"));
+        image::save_buffer(&seen, &pixels, SIZE.0, SIZE.1, image::ExtendedColorType::Rgba8).unwrap();
+        panic!(
+            "{name}: {off} pixels off by more than {CODES} codes, mean {mean:.2}; drawn: {}",
+            seen.display()
+        );
+    }
+}
+
+#[test]
+fn display_shows_every_state() {
+    let states = [
+        ("ready", Status::Ready),
+        ("hit", Status::Hit),
+        ("miss", Status::Miss),
+        ("not_scored", Status::NotScored { cause: "POSE OLD", action: "Hold still" }),
+        ("fault", Status::Fault { cause: "NO CAMERA", action: "Check its plug" }),
+    ];
+    for (name, status) in states {
+        let mut scene = empty_scene(SIZE.0, SIZE.1);
+        scene.hud.status = status;
+        check(&format!("hud_{name}"), &scene, &[]);
+    }
+}
+
+#[test]
+fn every_way_to_mirror() {
+    for (name, method) in [
+        ("off", ReflectionMethod::Off),
+        ("mirror", ReflectionMethod::Mirror),
+        ("printed", ReflectionMethod::FullAsPrinted),
+        ("full", ReflectionMethod::Full),
+    ] {
+        check(&format!("water_{name}"), &boats(method, ShadowLevel::Gradual, 1), &models());
+    }
+}
+
+#[test]
+fn sea_states_and_shadows() {
+    for force in [0, 2, 4] {
+        let scene = boats(ReflectionMethod::Full, ShadowLevel::None, force);
+        check(&format!("full_force_{force}"), &scene, &models());
+    }
+    check("full_strong_shadow", &boats(ReflectionMethod::Full, ShadowLevel::Strong, 1), &models());
+    check(
+        "printed_strong_shadow",
+        &boats(ReflectionMethod::FullAsPrinted, ShadowLevel::Strong, 1),
+        &models(),
+    );
+}
+
+#[test]
+fn rolled_camera_with_a_bent_lens() {
+    let mut scene = empty_scene(SIZE.0, SIZE.1);
+    scene.camera.world_from_camera = look(0.0, -0.05, 0.5);
+    scene.lens.radial = DVec2::new(-0.25, 0.06);
+    scene.lens.tangential = DVec2::new(0.002, -0.001);
+    add_boat(&mut scene, &models(), 0, 40.0, -0.05, 0.5);
+    check("rolled", &scene, &models());
+}
+
+#[test]
+fn tracer_splash_and_strike_before_and_behind_a_hull() {
+    let mut scene = boats(ReflectionMethod::Full, ShadowLevel::Gradual, 1);
+    let boat = scene.boats[0].pose.position;
+    scene.rounds = vec![
+        RoundView::Splash {
+            at: boat + DVec3::new(1.0, 5.0, 0.0),
+            height_m: 4.0,
+            radius_m: 0.9,
+            opacity: 1.0,
+        },
+        RoundView::Splash {
+            at: boat - DVec3::new(1.5, 5.0, 0.0),
+            height_m: 2.5,
+            radius_m: 0.8,
+            opacity: 0.9,
+        },
+        RoundView::Strike { at: boat + DVec3::new(2.0, -1.4, 1.5), radius_m: 0.8, opacity: 1.0 },
+        RoundView::Tracer {
+            from: DVec3::new(1.0, 8.0, 7.5),
+            to: DVec3::new(-1.0, 30.0, 5.0),
+            radiance: Vec3::new(4.0, 1.2, 0.5),
+        },
+    ];
+    scene.passes[Pass::Rounds as usize] = PassDecision::Run;
+    check("rounds", &scene, &models());
+}
+
+#[test]
+fn a_picture_stands_for_a_boat() {
+    // A disc on nothing: its edge and its transparency both show.
+    let (width, height) = (64, 64);
+    let mut rgba = Vec::new();
+    for y in 0..height {
+        for x in 0..width {
+            let d = f32::hypot(x as f32 - 31.5, y as f32 - 31.5);
+            rgba.extend([230, (x * 4) as u8, 60, if d < 30.0 { 255 } else { 0 }]);
+        }
+    }
+    let mut quad = box_model("picture", [8.0, 0.0, 6.0], [1.0; 3]);
+    quad.kind = ModelKind::Quad;
+    // Of the box, the face towards -y alone: a picture has one.
+    let face = quad.vertices.iter().position(|v| v.normal.y < -0.5).unwrap() as u32;
+    quad.indices.retain(|i| (face..face + 4).contains(i));
+    for v in &mut quad.vertices {
+        v.uv = glam::Vec2::new(v.position.x / 8.0 + 0.5, 1.0 - (v.position.z + 0.4) / 6.4);
+    }
+    quad.parts[0].indices = 0..6;
+    quad.texture = Some(Texture { width, height, rgba });
+    let models = [quad];
+    let mut scene = empty_scene(SIZE.0, SIZE.1);
+    add_boat(&mut scene, &models, 0, 40.0, 0.03, 1.0);
+    check("picture", &scene, &models);
+}
+
+#[test]
+fn far_boats_sink_into_haze_and_beneath_the_horizon() {
+    let models = [box_model("tall", [60.0, 12.0, 25.0], [0.3, 0.3, 0.35])];
+    let mut scene = empty_scene(SIZE.0, SIZE.1);
+    scene.lens.focal *= 12.0;
+    scene.camera.position.z = 3.0;
+    scene.camera.world_from_camera = look(0.0, 0.0, 0.0);
+    add_boat(&mut scene, &models, 0, 15_000.0, 0.005, 0.8);
+    add_boat(&mut scene, &models, 0, 6_000.0, -0.012, 0.8);
+    for boat in &mut scene.boats {
+        boat.haze = (boat.range_m / 20_000.0) as f32;
+    }
+    assert!(scene.boats[0].beyond_horizon && !scene.boats[1].beyond_horizon);
+    check("far", &scene, &models);
+}
