@@ -9,7 +9,9 @@ use crate::{
     error::RenderError,
     memory::{Buffer, Image, ImageShape},
     passes::{COPIED_FROM, COPIED_TO, DRAWN, Making},
-    pipeline::{Begin, Recorder, SRGB, Step, UNORM, joined, rect},
+    pipeline::{SRGB, UNORM},
+    recorder::{Begin, Recorder, Step},
+    rects::{joined, rect},
 };
 
 /// The image that is blended into.

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     parts::Parts,
-    pipeline::{cut, joined, overlap},
+    rects::{cut, joined, overlap},
 };
 
 /// Slices of a model along its length.

@@ -18,6 +18,8 @@ mod parts;
 mod passes;
 mod pipeline;
 mod plan;
+mod recorder;
+mod rects;
 mod renderer;
 mod ring;
 mod rounds;

@@ -10,7 +10,8 @@ use crate::{
     gpu::Gpu,
     memory::{Access, Buffer, Image, ImageShape},
     passes::Making,
-    pipeline::{Bound, Recorder, SRGB, Sampler, SetLayout},
+    pipeline::{Bound, SRGB, Sampler, SetLayout},
+    recorder::Recorder,
     simplify::{Level, simplify},
     upload::upload_image,
 };

@@ -20,7 +20,7 @@ use crate::{
         rounds::{RoundDraw, pieces},
         water::WaterDraw,
     },
-    pipeline::{corners, cut, joined, overlap, rect},
+    rects::{corners, cut, joined, overlap, rect},
     rounds::round_block,
     view,
     water::{self, HullLine, hull_line, mirror_scale, water_block},

@@ -25,8 +25,9 @@ use crate::{
         video::{PictureShape, VideoPass},
         water::WaterPass,
     },
-    pipeline::{Recorder, SetLayout, SetPool, Step},
+    pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
+    recorder::{Recorder, Step},
     ring::{Completions, FRAME_QUERY, QUERIES, SLOTS_MAX, Shared, Span},
     view,
 };

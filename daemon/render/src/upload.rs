@@ -9,7 +9,7 @@ use crate::{
     gpu::Gpu,
     memory::{Access, Buffer, Image},
     passes::{COPIED_TO, SAMPLED},
-    pipeline::{Recorder, Step},
+    recorder::{Recorder, Step},
 };
 
 /// A command pool that is gone after one use.

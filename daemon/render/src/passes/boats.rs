@@ -13,10 +13,9 @@ use crate::{
     memory::{Image, ImageShape},
     meshes::Meshes,
     passes::{DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED},
-    pipeline::{
-        Begin, Blend, Bound, DEPTH, Pipeline, PipelineShape, Recorder, SAMPLES, SRGB, Sampler, SetLayout,
-        Step, UNORM, joined,
-    },
+    pipeline::{Blend, Bound, DEPTH, Pipeline, PipelineShape, SAMPLES, SRGB, Sampler, SetLayout, UNORM},
+    recorder::{Begin, Recorder, Step},
+    rects::joined,
 };
 
 /// A boat as the passes draw it.

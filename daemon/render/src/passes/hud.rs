@@ -11,7 +11,8 @@ use crate::{
     hud_layout::{HudLayout, KINDS, text_px},
     memory::{Image, ImageShape},
     passes::Making,
-    pipeline::{Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout},
+    pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
+    recorder::Recorder,
     upload::upload_image,
 };
 

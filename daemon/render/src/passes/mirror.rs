@@ -14,10 +14,9 @@ use crate::{
         DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED,
         boats::{BoatDraw, BoatPipelines},
     },
-    pipeline::{
-        Begin, Blend, Bound, DEPTH, LIGHT, Pipeline, PipelineShape, Recorder, Sampler, SetLayout, Step,
-        joined,
-    },
+    pipeline::{Blend, Bound, DEPTH, LIGHT, Pipeline, PipelineShape, Sampler, SetLayout},
+    recorder::{Begin, Recorder, Step},
+    rects::joined,
 };
 
 /// The mirror pass.

@@ -8,10 +8,9 @@ use shaders_spirv::{ROUND_FRAG, ROUND_HIDDEN_FRAG, ROUND_VERT, Shader, interface
 use crate::{
     error::RenderError,
     passes::{Making, SAMPLED, boats::BoatsPass},
-    pipeline::{
-        Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout, around_all, corners,
-        overlap,
-    },
+    pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
+    recorder::Recorder,
+    rects::{around_all, corners, overlap},
 };
 
 /// A piece of a round's rectangle.

@@ -16,7 +16,8 @@ use crate::{
     gpu::Gpu,
     memory::{Access, Buffer, Image, ImageShape},
     passes::{COPIED_FROM, DRAWN, Making},
-    pipeline::{Begin, Blend, Bound, Pipeline, PipelineShape, Recorder, SetLayout, SetPool, Step},
+    pipeline::{Blend, Bound, Pipeline, PipelineShape, SetLayout, SetPool},
+    recorder::{Begin, Recorder, Step},
 };
 
 /// Layout and size of a picture.

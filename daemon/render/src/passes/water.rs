@@ -9,9 +9,9 @@ use crate::{
     error::RenderError,
     memory::{Image, ImageShape},
     passes::{COPIED_TO, DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass},
-    pipeline::{
-        Begin, Blend, Bound, Pipeline, PipelineShape, Recorder, SRGB, Sampler, SetLayout, Step, UNORM, joined,
-    },
+    pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout, UNORM},
+    recorder::{Begin, Recorder, Step},
+    rects::joined,
 };
 
 /// A boat's rectangle of water.

@@ -1,0 +1,200 @@
+//! Recording into a command buffer, as far as the passes have it in common.
+
+use ash::vk;
+use bowwave_core::scene::PixelRect;
+
+use crate::{
+    gpu::Gpu,
+    memory::{Buffer, Image},
+    pipeline::{PUSH_STAGES, Pipeline},
+    rects::rect,
+};
+
+/// Recording into one command buffer.
+#[derive(Clone, Copy)]
+pub(crate) struct Recorder<'a> {
+    pub(crate) gpu: &'a Gpu,
+    pub(crate) cmd: vk::CommandBuffer,
+}
+
+/// What happens to an attachment's contents where a rendering begins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Begin {
+    /// They are wanted.
+    Keep,
+    /// Every pixel is drawn.
+    Forget,
+    /// They become zero: no light, no coverage, infinitely far.
+    Zero,
+}
+
+impl Begin {
+    fn op(self) -> vk::AttachmentLoadOp {
+        match self {
+            Self::Keep => vk::AttachmentLoadOp::LOAD,
+            Self::Forget => vk::AttachmentLoadOp::DONT_CARE,
+            Self::Zero => vk::AttachmentLoadOp::CLEAR,
+        }
+    }
+}
+
+/// One step of an image from one use to the next.
+#[derive(Clone, Copy)]
+pub(crate) struct Step<'a> {
+    pub(crate) image: &'a Image,
+    pub(crate) from: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
+    pub(crate) to: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
+}
+
+impl Recorder<'_> {
+    /// A barrier for up to eight images at once.
+    pub(crate) fn barrier<'a>(&self, steps: impl IntoIterator<Item = Step<'a>>) {
+        let mut barriers = [vk::ImageMemoryBarrier2::default(); 8];
+        let mut count = 0;
+        for (barrier, step) in barriers.iter_mut().zip(steps) {
+            count += 1;
+            *barrier = vk::ImageMemoryBarrier2::default()
+                .src_stage_mask(step.from.0)
+                .src_access_mask(step.from.1)
+                .old_layout(step.from.2)
+                .dst_stage_mask(step.to.0)
+                .dst_access_mask(step.to.1)
+                .new_layout(step.to.2)
+                .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .image(step.image.raw)
+                .subresource_range(vk::ImageSubresourceRange {
+                    aspect_mask: step.image.aspect(),
+                    base_mip_level: 0,
+                    level_count: vk::REMAINING_MIP_LEVELS,
+                    base_array_layer: 0,
+                    layer_count: 1,
+                });
+        }
+        let info = vk::DependencyInfo::default().image_memory_barriers(&barriers[..count]);
+        // SAFETY: the command buffer is being recorded, outside of a rendering; the images are live.
+        unsafe { self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info) };
+    }
+
+    /// Begins drawing to one colour image and, maybe, a depth image, within `area`.
+    pub(crate) fn begin(
+        &self,
+        area: PixelRect,
+        colour: (vk::ImageView, Begin),
+        depth: Option<(vk::ImageView, Begin)>,
+    ) {
+        let colours = [vk::RenderingAttachmentInfo::default()
+            .image_view(colour.0)
+            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+            .load_op(colour.1.op())
+            .store_op(vk::AttachmentStoreOp::STORE)];
+        let mut info =
+            vk::RenderingInfo::default().render_area(rect(area)).layer_count(1).color_attachments(&colours);
+        let depth = depth.map(|(view, begin)| {
+            vk::RenderingAttachmentInfo::default()
+                .image_view(view)
+                .image_layout(vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL)
+                .load_op(begin.op())
+                .store_op(vk::AttachmentStoreOp::STORE)
+        });
+        if let Some(depth) = &depth {
+            info = info.depth_attachment(depth);
+        }
+        // SAFETY: the command buffer is being recorded; the views are live and in the stated layouts.
+        unsafe { self.gpu.device.cmd_begin_rendering(self.cmd, &info) };
+    }
+
+    /// Sets both attachments to zero (no light, no coverage, infinitely far) in some rectangles, within a rendering.
+    pub(crate) fn clear(&self, areas: &[vk::ClearRect]) {
+        let zero = |aspect_mask| vk::ClearAttachment { aspect_mask, ..vk::ClearAttachment::default() };
+        let what = [zero(vk::ImageAspectFlags::COLOR), zero(vk::ImageAspectFlags::DEPTH)];
+        // SAFETY: a rendering with a colour and a depth attachment was begun; the rectangles lie in its area.
+        unsafe { self.gpu.device.cmd_clear_attachments(self.cmd, &what, areas) };
+    }
+
+    /// Copies parts of a buffer to an image.
+    pub(crate) fn copy_to_image(&self, from: &Buffer, image: &Image, regions: &[vk::BufferImageCopy]) {
+        let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        // SAFETY: both are live and the regions lie within them; the image is in this layout.
+        unsafe { self.gpu.device.cmd_copy_buffer_to_image(self.cmd, from.raw, image.raw, layout, regions) };
+    }
+
+    /// Copies parts of an image to a buffer.
+    pub(crate) fn copy_from_image(&self, image: &Image, buffer: &Buffer, regions: &[vk::BufferImageCopy]) {
+        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        // SAFETY: both are live and the regions lie within them; the image is in this layout.
+        unsafe { self.gpu.device.cmd_copy_image_to_buffer(self.cmd, image.raw, layout, buffer.raw, regions) };
+    }
+
+    /// Makes what was copied to or from the buffer, with `was`, come before what `stage` does with `access`.
+    pub(crate) fn copied(
+        &self,
+        buffer: &Buffer,
+        was: vk::AccessFlags2,
+        (stage, access): (vk::PipelineStageFlags2, vk::AccessFlags2),
+    ) {
+        let barriers = [vk::BufferMemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::COPY)
+            .src_access_mask(was)
+            .dst_stage_mask(stage)
+            .dst_access_mask(access)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .buffer(buffer.raw)
+            .size(vk::WHOLE_SIZE)];
+        let info = vk::DependencyInfo::default().buffer_memory_barriers(&barriers);
+        // SAFETY: the command buffer is being recorded, outside of a rendering; the buffer is live.
+        unsafe { self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info) };
+    }
+
+    /// Ends drawing.
+    pub(crate) fn end(&self) {
+        // SAFETY: a rendering was begun.
+        unsafe { self.gpu.device.cmd_end_rendering(self.cmd) };
+    }
+
+    /// Maps clip space onto `viewport` (x, y, width, height) and lets only `scissor` through.
+    pub(crate) fn window(&self, viewport: [f32; 4], scissor: PixelRect) {
+        let [x, y, width, height] = viewport;
+        let viewport = vk::Viewport { x, y, width, height, min_depth: 0.0, max_depth: 1.0 };
+        // SAFETY: the command buffer is being recorded.
+        unsafe { self.gpu.device.cmd_set_viewport(self.cmd, 0, &[viewport]) };
+        self.scissor(scissor);
+    }
+
+    /// Lets only `scissor` through.
+    pub(crate) fn scissor(&self, scissor: PixelRect) {
+        // SAFETY: the command buffer is being recorded.
+        unsafe { self.gpu.device.cmd_set_scissor(self.cmd, 0, &[rect(scissor)]) };
+    }
+
+    /// Binds a pipeline and its sets.
+    pub(crate) fn bind(&self, pipeline: &Pipeline, sets: &[vk::DescriptorSet]) {
+        let point = vk::PipelineBindPoint::GRAPHICS;
+        // SAFETY: pipeline and sets are live and fit each other.
+        unsafe {
+            self.gpu.device.cmd_bind_pipeline(self.cmd, point, pipeline.raw);
+            if !sets.is_empty() {
+                self.gpu.device.cmd_bind_descriptor_sets(self.cmd, point, pipeline.layout, 0, sets, &[]);
+            }
+        }
+    }
+
+    /// Sets the push constants.
+    pub(crate) fn push<T: bytemuck::Pod>(&self, pipeline: &Pipeline, value: &T) {
+        let bytes = bytemuck::bytes_of(value);
+        // SAFETY: the pipeline's layout has room for `T`.
+        unsafe { self.gpu.device.cmd_push_constants(self.cmd, pipeline.layout, PUSH_STAGES, 0, bytes) };
+    }
+
+    /// Draws.
+    pub(crate) fn draw(&self, vertices: u32, instances: u32) {
+        self.draw_from(vertices, 0, instances);
+    }
+
+    /// Draws, counting instances from `first`.
+    pub(crate) fn draw_from(&self, vertices: u32, first: u32, instances: u32) {
+        // SAFETY: a rendering was begun and everything that the pipeline needs is bound.
+        unsafe { self.gpu.device.cmd_draw(self.cmd, vertices, instances, 0, first) };
+    }
+}
