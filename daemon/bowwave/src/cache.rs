@@ -54,8 +54,8 @@ fn make_recording(path: &Path) -> Result<()> {
     // Another process may be making it too: each works on a file of its own, and the last rename wins with the same bytes.
     let part = path.with_extension(format!("{}.part", std::process::id()));
     let made = make::make(&recipe, &part, &mut |done, total| {
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
+        bar.set_length(total);
+        bar.set_position(done);
     });
     bar.finish_and_clear();
     if let Err(e) = made {

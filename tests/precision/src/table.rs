@@ -33,8 +33,8 @@ pub struct Row {
     pub pareto: bool,
 }
 
-/// Times within this factor count as equal: the machines are noisy.
-pub const TIME_NOISE: f64 = 1.25;
+/// Times within this factor count as equal: the machines are shared, and two methods are not timed at the same moment.
+pub const TIME_NOISE: f64 = 2.0;
 
 /// Marks the rows that no other row of the same part and scene beats in error at the same or less time, or in time (by more
 /// than the noise) at the same or less error.
