@@ -10,7 +10,7 @@ use shaders_spirv::interface::MeshVertex;
 
 use crate::parts::Parts;
 
-/// Error of the finest simplified level, metres; each level's is the root of two times the one before.
+/// Error of the finest simplified level, metres; each level has twice the error of the one before.
 const ERROR_MIN_M: f32 = 0.008;
 /// A level is kept if it has at most this share of the triangles of the one before.
 const WORTHWHILE: f64 = 0.8;
@@ -78,7 +78,7 @@ pub(crate) fn simplify(model: &Model) -> Simplified {
             let closed: Vec<bool> = fewer.iter().map(|t| parts.closed(t[0])).collect();
             all.push(error, &fewer, &closed);
         }
-        error *= std::f32::consts::SQRT_2;
+        error *= 2.0;
     }
     all
 }
