@@ -33,5 +33,5 @@ mod water;
 pub use error::RenderError;
 pub use gpu::{DeviceInfo, devices};
 pub use passes::video::PictureShape;
-pub use renderer::{Needs, RenderConfig, Renderer};
+pub use renderer::{Needs, RenderConfig, Renderer, TIMED_EVERY};
 pub use ring::{Completions, Finished};

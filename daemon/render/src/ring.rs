@@ -297,9 +297,10 @@ pub struct Finished {
     slot: usize,
     /// The scene's frame number.
     pub frame: u64,
-    /// GPU milliseconds by pass, in the order of [`Pass::ALL`]; `None` for passes that did not run, or without timestamps.
+    /// GPU milliseconds by pass, in the order of [`Pass::ALL`]; `None` for passes that did not run, in frames that were not
+    /// timed (all but one in [`crate::TIMED_EVERY`]), and on devices without timestamps.
     pub passes_ms: [Option<f64>; Pass::COUNT],
-    /// GPU milliseconds from the frame's first command to its last.
+    /// GPU milliseconds from the frame's first command to its last; `None` likewise.
     pub frame_ms: Option<f64>,
 }
 
