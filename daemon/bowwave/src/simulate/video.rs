@@ -4,16 +4,36 @@ use std::{
     io::Write,
     path::{Path, PathBuf},
     process::{Child, ChildStdin, Command, Stdio},
+    thread::{self, JoinHandle},
 };
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
+use crossbeam_channel::{Receiver, Sender, bounded};
+
+/// Frames that wait for ffmpeg: it takes half a second to begin, and drawing must not wait for that.
+const QUEUE: usize = 20;
 
 /// Frames on their way into an H.264 file.
 #[derive(Debug)]
 pub struct VideoWriter {
     child: Child,
-    stdin: Option<ChildStdin>,
+    frames: Option<Sender<Vec<u8>>>,
+    /// Buffers to fill again.
+    empty: Receiver<Vec<u8>>,
+    feeder: Option<JoinHandle<std::io::Result<()>>>,
     path: PathBuf,
+}
+
+/// Writes frames as they come and gives their buffers back.
+fn feed(mut stdin: ChildStdin, frames: &Receiver<Vec<u8>>, empty: &Sender<Vec<u8>>) -> std::io::Result<()> {
+    for frame in frames {
+        stdin.write_all(&frame)?;
+        // Nobody wants it back once the run has ended.
+        if empty.try_send(frame).is_err() {
+            log::debug!("a buffer of the video is let go");
+        }
+    }
+    Ok(())
 }
 
 impl VideoWriter {
@@ -31,14 +51,23 @@ impl VideoWriter {
             .stderr(Stdio::piped())
             .spawn()
             .context("cannot start ffmpeg for the video; install it (Debian: apt-get install ffmpeg) or leave out --video")?;
-        let stdin = child.stdin.take();
-        Ok(Self { child, stdin, path: path.to_path_buf() })
+        let stdin = child.stdin.take().context("ffmpeg has no standard input")?;
+        let (frames, waiting) = bounded::<Vec<u8>>(QUEUE);
+        let (used, empty) = bounded(QUEUE);
+        let feeder = thread::Builder::new()
+            .name("video".to_owned())
+            .spawn(move || feed(stdin, &waiting, &used))
+            .context("cannot start the video's thread; are too many processes running?")?;
+        Ok(Self { child, frames: Some(frames), empty, feeder: Some(feeder), path: path.to_path_buf() })
     }
 
     /// Adds a frame, sRGB RGBA bytes from the upper left.
     pub fn frame(&mut self, rgba: &[u8]) -> Result<()> {
-        let stdin = self.stdin.as_mut().context("the video is already finished")?;
-        if stdin.write_all(rgba).is_err() {
+        let mut buffer = self.empty.try_recv().unwrap_or_default();
+        buffer.clear();
+        buffer.extend_from_slice(rgba);
+        let frames = self.frames.as_ref().context("the video is already finished")?;
+        if frames.send(buffer).is_err() {
             // It has ended early: its own words say why.
             self.finish_inner()?;
             bail!("ffmpeg stopped taking frames for {}", self.path.display());
@@ -52,7 +81,8 @@ impl VideoWriter {
     }
 
     fn finish_inner(&mut self) -> Result<()> {
-        drop(self.stdin.take());
+        drop(self.frames.take());
+        let fed = self.feeder.take().map(JoinHandle::join);
         let mut words = String::new();
         if let Some(mut stderr) = self.child.stderr.take() {
             std::io::Read::read_to_string(&mut stderr, &mut words).context("cannot read what ffmpeg says")?;
@@ -65,13 +95,19 @@ impl VideoWriter {
                 self.path.display()
             );
         }
-        Ok(())
+        match fed {
+            Some(Ok(Err(e))) => {
+                Err(e).with_context(|| format!("cannot give frames to ffmpeg for {}", self.path.display()))
+            }
+            Some(Err(_)) => Err(anyhow!("the video's thread broke down; report it with the log")),
+            Some(Ok(Ok(()))) | None => Ok(()),
+        }
     }
 }
 
 impl Drop for VideoWriter {
     fn drop(&mut self) {
-        if self.stdin.take().is_some() {
+        if self.frames.take().is_some() {
             log::warn!("the video {} was not finished; ffmpeg ends it as it is", self.path.display());
             if let Err(e) = self.child.wait() {
                 log::warn!("cannot wait for ffmpeg: {e}");
