@@ -21,7 +21,7 @@ layout(set = 1, binding = 0) uniform sampler2D video;
 // The boats mirrored in the sea, premultiplied linear light; mended, softened by soften.frag.
 layout(set = 1, binding = 1) uniform sampler2D mirror;
 
-// Mended: the normalised mean of eq. 5, from field.frag, 0 to 1 for -1 to 1.
+// Mended: what field.frag found.
 layout(set = 1, binding = 2) uniform sampler2D field;
 
 layout(location = 0) out vec4 colour;
@@ -72,32 +72,29 @@ vec4 reflection(vec2 at, float below) {
     if (METHOD == 1) {
         return alpha * texture(mirror, clamp(uv, bounds.xy, bounds.zw));
     }
-    vec3 here = code_at(at);
-    float bright = dot(here, vec3(0.299, 0.587, 0.114));
-    vec4 passes = waters[i].passes;
-    float kept = smoothstep(passes.x, passes.y, bright) * (1.0 - smoothstep(passes.z, passes.w, bright));
-    if (kept == 0.0) {
-        return vec4(0.0);
-    }
     if (METHOD == 2) {
+        vec3 here = code_at(at);
+        float bright = dot(here, vec3(0.299, 0.587, 0.114));
+        if (bright < waters[i].passes.y || bright > waters[i].passes.z) {
+            return vec4(0.0);
+        }
         float shift = sin(normalised_mean(at, here)) * waters[i].shift;
         // Not "greater, then discard": what is no number is discarded too.
         if (!(abs(shift) <= waters[i].shift_limit)) {
             return vec4(0.0);
         }
-        return alpha * kept * blurred(uv + shift * waters[i].mirror_scale, waters[i].blur, bounds);
+        return alpha * blurred(uv + shift * waters[i].mirror_scale, waters[i].blur, bounds);
     }
-
     // Mended: at a grazing angle waves move a reflection up and down much more than sideways, and the more the farther below
     // the hull it is. What goes beyond the limit stays at it: discarded, it would leave specks of bare water in a dark
     // reflection.
-    float normalised = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).r * 2.0 - 1.0;
+    vec2 wave = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).rg;
     float limit = waters[i].shift_limit;
-    float shift = clamp(sin(normalised) * waters[i].shift, -limit, limit);
+    float shift = clamp((wave.x * 2.0 - 1.0) * waters[i].shift, -limit, limit);
     shift *= min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
     vec2 down = waters[i].down;
     vec2 move = shift * (down + SIDEWAYS * vec2(down.y, -down.x));
-    return alpha * kept * texture(mirror, clamp(uv + move * waters[i].mirror_scale, bounds.xy, bounds.zw));
+    return alpha * wave.y * texture(mirror, clamp(uv + move * waters[i].mirror_scale, bounds.xy, bounds.zw));
 }
 
 float hull_line(int column) {

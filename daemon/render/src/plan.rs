@@ -259,7 +259,7 @@ impl Plan {
             if mirrored {
                 let index = self.boat_blocks.len() as u32;
                 // Softened, a mirrored boat shows less than the boat itself.
-                let coarser = (0.5 * softened_px).max(1.0);
+                let coarser = (0.2 * softened_px).max(1.0);
                 let detail_m = DETAIL_PX * pixel_m(scene, boat) * coarser;
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
                 self.boat_blocks.push(view::boat_block(scene, boat, &pose, true));

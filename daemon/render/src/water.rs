@@ -229,7 +229,7 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
         (1.0, PRINTED_FADE_PX[force], PRINTED_SHIFT_PX[force], PRINTED_SHIFT_PX[force] * PRINTED_LIMIT)
     };
     let (dark, bright) = PRINTED_PASSES;
-    let passes = if mended { PASSES } else { [dark - 1e-4, dark, bright, bright + 1e-4] };
+    let passes = if mended { PASSES } else { [dark, dark, bright, bright] };
     let step = if mended { (STEP_HEIGHTS * height).clamp(1.0, STEP_MAX_PX) } else { 1.0 };
     // Mended, the layer is softened before.
     let blur = if mended { 0.0 } else { 1.0 };

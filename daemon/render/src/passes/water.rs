@@ -201,7 +201,7 @@ impl Field {
         let gpu = making.gpu;
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         let size = (making.size.0.div_ceil(FIELD_CELL.0), making.size.1.div_ceil(FIELD_CELL.1));
-        let format = vk::Format::R8_UNORM;
+        let format = vk::Format::R8G8_UNORM;
         let image = Image::new(gpu, "gradients of the video", ImageShape::new(size, format, usage))?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
