@@ -89,7 +89,7 @@ fn gpus(wanted: Option<&str>) -> Vec<Check> {
         })
         .collect();
     if let Some(wanted) = wanted
-        && let Err(e) = find_gpu(wanted)
+        && let Err(e) = bowwave_render::find_device(wanted)
     {
         checks.push(failed("vulkan", e));
     }
@@ -248,13 +248,4 @@ fn ffmpeg() -> Check {
         }
         _ => check("ffmpeg", Verdict::Absent, "import of videos and --video need it: apt-get install ffmpeg"),
     }
-}
-
-fn find_gpu(wanted: &str) -> Result<()> {
-    let devices = bowwave_render::devices()?;
-    let found = devices
-        .iter()
-        .any(|d| wanted.parse() == Ok(d.index) || d.name.to_lowercase().contains(&wanted.to_lowercase()));
-    anyhow::ensure!(found, "no Vulkan device '{wanted}'");
-    Ok(())
 }

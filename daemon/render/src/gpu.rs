@@ -32,6 +32,13 @@ pub fn devices() -> Result<Vec<DeviceInfo>, RenderError> {
     Ok(instance.devices()?.into_iter().map(|(_, info)| info).collect())
 }
 
+/// The device that `wanted` names, by its index or a part of its name; an error that lists those that are there.
+pub fn find_device(wanted: &str) -> Result<DeviceInfo, RenderError> {
+    let devices = devices()?;
+    let index = choose(Some(wanted), &devices.iter().collect::<Vec<_>>())?;
+    devices.into_iter().nth(index).ok_or(RenderError::NoDevice)
+}
+
 /// Loader and instance, destroyed together.
 struct Instance {
     // Field order: the instance's functions live in the loader's library.

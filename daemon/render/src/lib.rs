@@ -31,7 +31,7 @@ mod view;
 mod water;
 
 pub use error::RenderError;
-pub use gpu::{DeviceInfo, devices};
+pub use gpu::{DeviceInfo, devices, find_device};
 pub use passes::video::PictureShape;
 pub use renderer::{Needs, RenderConfig, Renderer, TIMED_EVERY};
 pub use ring::{Completions, Finished};

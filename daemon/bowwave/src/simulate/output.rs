@@ -114,7 +114,7 @@ impl Output {
     }
 
     /// Tells the thread of a submitted frame; `false` once the thread has ended.
-    pub fn expect(&self, ticket: Ticket) -> bool {
+    pub fn announce(&self, ticket: Ticket) -> bool {
         self.tickets.as_ref().is_some_and(|t| t.send(ticket).is_ok())
     }
 

@@ -160,7 +160,7 @@ impl Loop {
         let picture =
             Picture::new(plan.video, width, height, black.into()).context("no picture of this size")?;
         let begun = now();
-        self.output.expect(Ticket { frame: 0, begun, submitted: begun, deadline: None, rehearsal: true });
+        self.output.announce(Ticket { frame: 0, begun, submitted: begun, deadline: None, rehearsal: true });
         self.renderer.submit(&scene, &picture, true)?;
         Ok(())
     }
@@ -272,7 +272,7 @@ impl Loop {
         let ticket =
             Ticket { frame: view.scene.frame, begun, submitted: stepped, deadline, rehearsal: false };
         let waited = self.renderer.submit(view.scene, view.picture, view.picture_is_new)?;
-        if !self.output.expect(ticket) {
+        if !self.output.announce(ticket) {
             // The output thread has failed; `finish` says why.
             self.stop.store(true, Ordering::Relaxed);
         }

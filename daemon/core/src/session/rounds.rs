@@ -214,11 +214,6 @@ impl Rounds {
             }
         }
     }
-
-    /// Rounds in the air.
-    pub fn in_flight(&self) -> usize {
-        self.in_flight.len()
-    }
 }
 
 /// A column of water thrown up and falling back.
