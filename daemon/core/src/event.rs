@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
 
-use crate::time::Time;
+use crate::{fault::FaultChange, time::Time};
 
 /// Something that a device reported.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub enum Event {
     Frame(CameraFrame),
     /// The trigger was pressed or released.
     Trigger(TriggerEdge),
+    /// A fault came or went.
+    Fault(FaultChange),
 }
 
 impl Event {
@@ -24,6 +26,7 @@ impl Event {
             Self::Imu(s) => s.arrival,
             Self::Frame(f) => f.arrival,
             Self::Trigger(t) => t.time,
+            Self::Fault(f) => f.time,
         }
     }
 }
@@ -75,13 +78,25 @@ impl PixelFormat {
     }
 }
 
+/// Memory that a driver fills and lends for as long as somebody holds it. Its `Drop` gives it back.
+pub trait Lent: Send + Sync {
+    /// The whole mapping: whole pages, the picture's bytes first. The same address each time the buffer is lent.
+    fn mapping(&self) -> &[u8];
+}
+
+#[derive(Clone)]
+enum Bytes {
+    Owned(Arc<[u8]>),
+    Lent(Arc<dyn Lent>),
+}
+
 /// A picture as the camera delivered it, rows from the top, no padding.
-#[derive(Clone, PartialEq, Eq)]
+#[derive(Clone)]
 pub struct Picture {
     format: PixelFormat,
     width: u32,
     height: u32,
-    bytes: Arc<[u8]>,
+    bytes: Bytes,
 }
 
 /// Why bytes are no picture.
@@ -118,6 +133,44 @@ pub enum PictureError {
 impl Picture {
     /// Wraps `bytes` after checking that they are a `width` x `height` picture of that format.
     pub fn new(format: PixelFormat, width: u32, height: u32, bytes: Arc<[u8]>) -> Result<Self, PictureError> {
+        let expected = Self::checked_len(format, width, height)?;
+        if bytes.len() != expected {
+            return Err(PictureError::Length { format, width, height, expected, actual: bytes.len() });
+        }
+        Ok(Self { format, width, height, bytes: Bytes::Owned(bytes) })
+    }
+
+    /// Wraps a driver's buffer, which may be longer than the picture in it. It goes back to the driver with the last clone.
+    pub fn lent(
+        format: PixelFormat,
+        width: u32,
+        height: u32,
+        memory: Arc<dyn Lent>,
+    ) -> Result<Self, PictureError> {
+        let expected = Self::checked_len(format, width, height)?;
+        let actual = memory.mapping().len();
+        if actual < expected {
+            return Err(PictureError::Length { format, width, height, expected, actual });
+        }
+        Ok(Self { format, width, height, bytes: Bytes::Lent(memory) })
+    }
+
+    /// A black picture.
+    pub fn black(format: PixelFormat, width: u32, height: u32) -> Result<Self, PictureError> {
+        let mut bytes = vec![0; Self::checked_len(format, width, height)?];
+        let luma = width as usize * height as usize;
+        match format {
+            PixelFormat::Rgb => {}
+            PixelFormat::Yuyv => bytes.chunks_exact_mut(2).for_each(|p| p.copy_from_slice(&[16, 128])),
+            PixelFormat::Nv12 => {
+                bytes[..luma].fill(16);
+                bytes[luma..].fill(128);
+            }
+        }
+        Self::new(format, width, height, bytes.into())
+    }
+
+    fn checked_len(format: PixelFormat, width: u32, height: u32) -> Result<usize, PictureError> {
         let even = |v: u32| v.is_multiple_of(2);
         let in_range = (1..=8192).contains(&width) && (1..=8192).contains(&height);
         let parity = match format {
@@ -128,11 +181,7 @@ impl Picture {
         if !in_range || !parity {
             return Err(PictureError::Size { format, width, height });
         }
-        let expected = format.byte_len(width, height);
-        if bytes.len() != expected {
-            return Err(PictureError::Length { format, width, height, expected, actual: bytes.len() });
-        }
-        Ok(Self { format, width, height, bytes })
+        Ok(format.byte_len(width, height))
     }
 
     /// Byte layout.
@@ -152,14 +201,25 @@ impl Picture {
 
     /// The bytes, rows from the top.
     pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+        match &self.bytes {
+            Bytes::Owned(bytes) => bytes,
+            Bytes::Lent(memory) => &memory.mapping()[..self.format.byte_len(self.width, self.height)],
+        }
+    }
+
+    /// The driver's mapping that the bytes lie in, where they are lent.
+    pub fn mapping(&self) -> Option<&[u8]> {
+        match &self.bytes {
+            Bytes::Owned(_) => None,
+            Bytes::Lent(memory) => Some(memory.mapping()),
+        }
     }
 
     /// sRGB-coded colour of the pixel nearest to (`x`, `y`), clamped to the picture, each channel 0 to 1.
     pub fn srgb_at(&self, x: u32, y: u32) -> [f32; 3] {
         let (x, y) = (x.min(self.width - 1) as usize, y.min(self.height - 1) as usize);
         let w = self.width as usize;
-        let b = &self.bytes;
+        let b = self.bytes();
         match self.format {
             PixelFormat::Rgb => {
                 let i = (y * w + x) * 3;
@@ -176,6 +236,15 @@ impl Picture {
         }
     }
 }
+
+impl PartialEq for Picture {
+    fn eq(&self, other: &Self) -> bool {
+        (self.format, self.width, self.height) == (other.format, other.width, other.height)
+            && self.bytes() == other.bytes()
+    }
+}
+
+impl Eq for Picture {}
 
 impl std::fmt::Debug for Picture {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -9,6 +9,7 @@ pub mod boats;
 pub mod calibration;
 pub mod clock;
 pub mod event;
+pub mod fault;
 pub mod geometry;
 pub mod gunnery;
 pub mod light;

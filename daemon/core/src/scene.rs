@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use crate::{
+    fault::Fault,
     geometry::{CameraPose, Lens, RigidPose},
     model::ModelId,
     sea::BeaufortForce,
@@ -284,6 +285,8 @@ pub enum Status {
 pub struct Hud {
     /// State with colour, shape and word.
     pub status: Status,
+    /// What the sailor should know though training goes on: [`Severity::Warning`](crate::fault::Severity).
+    pub warning: Option<Fault>,
     /// Rounds left in the belt.
     pub rounds_left: u32,
     /// Rounds fired.

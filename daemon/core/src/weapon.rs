@@ -15,6 +15,7 @@ pub struct Weapon {
     cycle_ns: i64,
     rounds_left: u32,
     held: bool,
+    armed: bool,
     last_round: Option<Time>,
     next_round: Option<Time>,
     edges: VecDeque<TriggerEdge>,
@@ -28,6 +29,7 @@ impl Weapon {
             cycle_ns: (60e9 / rate).round() as i64,
             rounds_left: belt,
             held: false,
+            armed: true,
             last_round: None,
             next_round: None,
             edges: VecDeque::with_capacity(EDGES_MAX),
@@ -46,6 +48,14 @@ impl Weapon {
         }
         let place = self.edges.partition_point(|e| e.time <= edge.time);
         self.edges.insert(place, edge);
+    }
+
+    /// Arms or disarms. Disarmed, the weapon meets edges and fires nothing; armed again, it fires at the next press.
+    pub fn arm(&mut self, armed: bool) {
+        self.armed = armed;
+        if !armed {
+            self.next_round = None;
+        }
     }
 
     /// The next round that leaves the muzzle no later than `until`; `None` once there is none. Call until it says so.
@@ -70,7 +80,7 @@ impl Weapon {
             return;
         }
         self.held = edge.pressed;
-        self.next_round = (self.held && self.rounds_left > 0).then(|| {
+        self.next_round = (self.held && self.armed && self.rounds_left > 0).then(|| {
             let ready = self.last_round.map_or(edge.time, |t| t.plus_ns(self.cycle_ns));
             ready.max(edge.time)
         });
@@ -97,6 +107,20 @@ mod tests {
         std::iter::from_fn(|| weapon.fire(Time::from_ns(until_ms * 1_000_000)))
             .map(|t| t.ns() / 1_000_000)
             .collect()
+    }
+
+    #[test]
+    fn a_disarmed_weapon_fires_nothing_and_needs_a_new_press() {
+        let mut w = Weapon::new(600.0, 10);
+        w.edge(edge(1000, true));
+        assert_eq!(rounds(&mut w, 1150), [1000, 1100]);
+        w.arm(false);
+        assert_eq!(rounds(&mut w, 2000), []);
+        w.arm(true);
+        assert_eq!(rounds(&mut w, 3000), [], "held all the time");
+        w.edge(edge(3000, false));
+        w.edge(edge(3500, true));
+        assert_eq!(rounds(&mut w, 3500), [3500]);
     }
 
     #[test]

@@ -9,6 +9,7 @@ pub mod clock;
 pub mod imu;
 mod nodes;
 pub mod queue;
+pub mod report;
 pub mod serial;
 pub mod trigger;
 pub mod vectornav;

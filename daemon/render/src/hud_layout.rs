@@ -223,7 +223,14 @@ mod tests {
             let mut layout = HudLayout::new(size);
             let mut shapes = Vec::new();
             for status in STATES {
-                let hud = Hud { status, rounds_left: 9999, shots: 9999, hits: 9999, clock_s: 5999.0 };
+                let hud = Hud {
+                    status,
+                    warning: None,
+                    rounds_left: 9999,
+                    shots: 9999,
+                    hits: 9999,
+                    clock_s: 5999.0,
+                };
                 let quads = layout.lay_out(&glyphs, &hud).to_vec();
                 assert!(quads.len() < QUADS_MAX);
                 for quad in &quads {
@@ -258,7 +265,14 @@ mod tests {
         let glyphs = Glyphs::new(large, small).unwrap();
         let mut layout = HudLayout::new((800, 480));
         for clock_s in [f64::NAN, f64::INFINITY, -3.0, 1e300] {
-            let hud = Hud { status: Status::Ready, rounds_left: u32::MAX, shots: 0, hits: 0, clock_s };
+            let hud = Hud {
+                status: Status::Ready,
+                warning: None,
+                rounds_left: u32::MAX,
+                shots: 0,
+                hits: 0,
+                clock_s,
+            };
             assert!(!layout.lay_out(&glyphs, &hud).is_empty());
         }
     }

@@ -33,7 +33,14 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             force: BeaufortForce::new(1).unwrap(),
             shadow: ShadowLevel::Gradual,
         },
-        hud: Hud { status: Status::Ready, rounds_left: 120, shots: 14, hits: 3, clock_s: 83.0 },
+        hud: Hud {
+            status: Status::Ready,
+            warning: None,
+            rounds_left: 120,
+            shots: 14,
+            hits: 3,
+            clock_s: 83.0,
+        },
     }
 }
 

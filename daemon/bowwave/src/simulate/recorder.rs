@@ -54,6 +54,8 @@ impl Recorder {
                     jpeg: jpeg.clone(),
                 })
             }
+            // Faults are in the log.
+            Event::Fault(_) => return,
         };
         self.put(entry);
     }

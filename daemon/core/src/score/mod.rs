@@ -8,7 +8,7 @@ use glam::DVec3;
 pub use hit::{Closest, Moving, Strike, closest_to_box, strike};
 pub use round::{Approach, End, Round};
 
-use crate::{model::Zone, time::Time};
+use crate::{fault::Fault, model::Zone, time::Time};
 
 /// One virtual round, from trigger to end.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,6 +68,8 @@ pub enum NotScored {
     ImuStale,
     /// No picture younger than 100 ms.
     CameraStale,
+    /// This fault was there.
+    Fault(Fault),
 }
 
 impl NotScored {
@@ -76,6 +78,16 @@ impl NotScored {
         match self {
             Self::ImuStale => "imu_stale",
             Self::CameraStale => "camera_stale",
+            Self::Fault(fault) => fault.code(),
+        }
+    }
+
+    /// The cause with that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "imu_stale" => Some(Self::ImuStale),
+            "camera_stale" => Some(Self::CameraStale),
+            code => Fault::from_code(code).map(Self::Fault),
         }
     }
 }

@@ -10,7 +10,8 @@ use glam::DVec3;
 
 use crate::{
     calibration::Calibration,
-    event::{Event, Picture, PixelFormat},
+    event::{Event, Picture, PictureError, PixelFormat},
+    fault::{Fault, FaultBoard, Severity},
     geometry::{CameraPose, Lens, RigidPose, look},
     light::LightMeter,
     model::{Model, ModelId},
@@ -69,6 +70,9 @@ pub enum SetupError {
         /// Models given.
         models: usize,
     },
+    /// No picture has the calibrated size in that layout.
+    #[error("the calibrated size does not fit the camera's pictures: {0}")]
+    Picture(#[from] PictureError),
 }
 
 /// What one step gives.
@@ -102,10 +106,12 @@ pub struct Session {
     lens: Lens,
     plan: ScenePlan,
     sensors: Sensors,
+    faults: FaultBoard,
     weapon: Weapon,
     meter: LightMeter,
     waves: WaveField,
     running: Option<Running>,
+    black: Picture,
     scene: Scene,
     records: Vec<ShotRecord>,
     shots: u64,
@@ -129,11 +135,13 @@ impl Session {
         if scenario.boats.len() != setup.boat_models.len() {
             return Err(SetupError::Models { boats: scenario.boats.len(), models: setup.boat_models.len() });
         }
+        let (width, height) = (setup.calibration.lens.width, setup.calibration.lens.height);
+        let black = Picture::black(setup.video, width, height)?;
         let lens = setup.calibration.lens.covering(setup.screen.0, setup.screen.1);
         let plan = ScenePlan::new(&Needs {
             size: setup.screen,
             video: setup.video,
-            picture: (setup.calibration.lens.width, setup.calibration.lens.height),
+            picture: (width, height),
             water: scenario.water,
             boats: scenario.boats.len(),
             belt: scenario.weapon.belt,
@@ -156,6 +164,7 @@ impl Session {
             water: scenario.water,
             hud: Hud {
                 status: Status::Ready,
+                warning: None,
                 rounds_left: scenario.weapon.belt,
                 shots: 0,
                 hits: 0,
@@ -166,10 +175,12 @@ impl Session {
             lens,
             plan,
             sensors,
+            faults: FaultBoard::new(),
             weapon,
             meter,
             waves,
             running: None,
+            black,
             scene,
             records: Vec::new(),
             shots: 0,
@@ -203,8 +214,13 @@ impl Session {
                 Event::Imu(sample) => self.sensors.imu(sample),
                 Event::Frame(frame) => picture_is_new |= self.sensors.frame(frame),
                 Event::Trigger(edge) => self.weapon.edge(*edge),
+                Event::Fault(change) => {
+                    // The line for the log is the caller's affair: this board only knows what is there.
+                    let _ = self.faults.take(change);
+                }
             }
         }
+        self.weapon.arm(self.broken().is_none());
         let Some(video_time) = self.sensors.video_time() else {
             return Step { view: None, records: &self.records };
         };
@@ -218,6 +234,23 @@ impl Session {
             pose_known,
         });
         Step { view, records: &self.records }
+    }
+
+    /// What to show while no picture has come: black, and what is wrong.
+    pub fn blind(&mut self, frame_time: Time) -> View<'_> {
+        let status = self.status(frame_time, frame_time);
+        self.scene.boats.clear();
+        self.scene.rounds.clear();
+        self.scene.passes = self.plan.frame(false, &[], &[]);
+        self.scene.hud.status = status;
+        self.scene.hud.warning = self.warning();
+        View {
+            scene: &self.scene,
+            picture: &self.black,
+            picture_is_new: true,
+            mid_exposure: frame_time,
+            pose_known: false,
+        }
     }
 
     /// Rounds still in the air are recorded as misses: the session ends here.
@@ -270,7 +303,7 @@ impl Session {
         let cause = match orientation {
             Err(_) => Some(NotScored::ImuStale),
             Ok(_) if !self.sensors.frame_fresh(fired) => Some(NotScored::CameraStale),
-            Ok(_) => None,
+            Ok(_) => self.unscored(fired).map(NotScored::Fault),
         };
         let calibration = &self.setup.calibration;
         let camera = self.camera(orientation).unwrap_or(self.scene.camera);
@@ -320,6 +353,7 @@ impl Session {
             self.meter.observe(video_time, &frame.picture, &self.setup.calibration.lens, camera);
         }
         let status = self.status(video_time, frame_time);
+        let warning = self.warning();
         let scene = &mut self.scene;
         scene.boats.clear();
         scene.rounds.clear();
@@ -343,6 +377,7 @@ impl Session {
         scene.light = self.meter.light();
         scene.hud = Hud {
             status,
+            warning,
             rounds_left: self.weapon.rounds_left(),
             shots: u32::try_from(self.shots).unwrap_or(u32::MAX),
             hits: u32::try_from(self.hits).unwrap_or(u32::MAX),
@@ -351,7 +386,33 @@ impl Session {
         camera.is_some()
     }
 
+    /// The worst fault because of which no round is fired.
+    fn broken(&self) -> Option<Fault> {
+        self.faults.active().next().filter(|f| f.severity() == Severity::Fault)
+    }
+
+    /// A fault that was there at `time` and because of which rounds are not scored.
+    fn unscored(&self, time: Time) -> Option<Fault> {
+        self.faults
+            .active()
+            .filter(|f| f.severity() >= Severity::NotScored)
+            .find(|f| self.faults.since(*f).is_some_and(|since| since <= time))
+    }
+
+    fn warning(&self) -> Option<Fault> {
+        self.faults.active().find(|f| f.severity() == Severity::Warning)
+    }
+
     fn status(&self, video_time: Time, frame_time: Time) -> Status {
+        match self.faults.active().next() {
+            Some(f) if f.severity() == Severity::Fault => {
+                return Status::Fault { cause: f.cause(), action: f.action() };
+            }
+            Some(f) if f.severity() == Severity::NotScored => {
+                return Status::NotScored { cause: f.cause(), action: f.action() };
+            }
+            _ => {}
+        }
         if let Some(trouble) = self.sensors.trouble(frame_time) {
             return trouble;
         }
