@@ -7,6 +7,7 @@
 pub mod camera;
 pub mod clock;
 pub mod imu;
+pub mod lcd;
 mod nodes;
 pub mod queue;
 pub mod report;

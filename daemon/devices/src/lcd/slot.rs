@@ -1,0 +1,198 @@
+//! The place where pictures wait for the display: bounded, the newest wins, and nobody waits for anybody.
+//!
+//! Three buffers go round. One is on the screen (`front`); one may be handed to the kernel for the next vblank
+//! (`pending`); the third is free, lent to the caller that draws in it, or `ready` to be handed over. A caller that comes
+//! while a picture is ready takes that one back and overwrites it.
+
+use bowwave_core::time::Time;
+
+/// A buffer with a picture in it.
+#[derive(Debug)]
+pub(super) struct Filled<B> {
+    /// The buffer.
+    pub(super) buffer: B,
+    /// The caller's number of the picture; `None` for the black one with which a mode is set.
+    pub(super) frame: Option<u64>,
+    /// When the caller gave it.
+    pub(super) given: Time,
+}
+
+/// A buffer lent to a caller, to be given back with [`Slot::give_back`].
+#[derive(Debug)]
+pub(super) struct Lent<B> {
+    /// The buffer.
+    pub(super) buffer: B,
+    /// Which screen it is of.
+    screen: u64,
+    /// An older picture that nobody will see because this one takes its place.
+    pub(super) replaces: Option<u64>,
+}
+
+/// The buffers of the screen that is there now, if any.
+#[derive(Debug)]
+pub(super) struct Slot<B> {
+    /// Counts screens: a buffer of an earlier one is not taken back.
+    screen: u64,
+    is_open: bool,
+    free: Vec<B>,
+    ready: Option<Filled<B>>,
+    pending: Option<Filled<B>>,
+    front: Option<Filled<B>>,
+}
+
+impl<B> Default for Slot<B> {
+    fn default() -> Self {
+        Self { screen: 0, is_open: false, free: Vec::new(), ready: None, pending: None, front: None }
+    }
+}
+
+impl<B> Slot<B> {
+    /// A new screen with its buffers.
+    pub(super) fn open(&mut self, buffers: Vec<B>) {
+        let screen = self.screen.wrapping_add(1);
+        *self = Self { screen, is_open: true, free: buffers, ..Self::default() };
+    }
+
+    /// The screen is gone, and its buffers with it. Gives the number of a picture that was waiting.
+    pub(super) fn close(&mut self) -> Option<u64> {
+        let waiting = self.ready.as_ref().or(self.pending.as_ref()).and_then(|f| f.frame);
+        *self = Self { screen: self.screen, ..Self::default() };
+        waiting
+    }
+
+    /// A buffer to draw in. `None` without a screen, or while another caller draws in the last one.
+    pub(super) fn lend(&mut self) -> Option<Lent<B>> {
+        let screen = self.screen;
+        if let Some(buffer) = self.free.pop() {
+            return Some(Lent { buffer, screen, replaces: None });
+        }
+        let old = self.ready.take()?;
+        Some(Lent { buffer: old.buffer, screen, replaces: old.frame })
+    }
+
+    /// The drawn buffer comes back and is ready. `false` where its screen has gone meanwhile.
+    pub(super) fn give_back(&mut self, lent: Lent<B>, frame: u64, given: Time) -> bool {
+        if !self.is_open || lent.screen != self.screen {
+            return false;
+        }
+        let old = self.ready.replace(Filled { buffer: lent.buffer, frame: Some(frame), given });
+        self.free.extend(old.map(|f| f.buffer));
+        true
+    }
+
+    /// The picture to be handed to the kernel now: the ready one, unless another is still pending. It is pending from here
+    /// on.
+    pub(super) fn hand_over(&mut self) -> Option<&Filled<B>> {
+        if self.pending.is_some() {
+            return None;
+        }
+        self.pending = self.ready.take();
+        self.pending.as_ref()
+    }
+
+    /// A free buffer, as it is, becomes pending: the black picture with which a mode is set.
+    pub(super) fn hand_over_blank(&mut self, now: Time) -> Option<&Filled<B>> {
+        let buffer = self.free.pop()?;
+        self.pending = Some(Filled { buffer, frame: None, given: now });
+        self.pending.as_ref()
+    }
+
+    /// The pending picture is on the screen: number and time when it was given. The one before is free.
+    pub(super) fn flipped(&mut self) -> Option<(Option<u64>, Time)> {
+        let shown = self.pending.take()?;
+        let told = (shown.frame, shown.given);
+        self.free.extend(self.front.replace(shown).map(|f| f.buffer));
+        Some(told)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn opened() -> Slot<u8> {
+        let mut slot = Slot::default();
+        slot.open(vec![0, 1, 2]);
+        slot
+    }
+
+    fn show(slot: &mut Slot<u8>, frame: u64) -> Option<u64> {
+        let lent = slot.lend().expect("a buffer");
+        let replaced = lent.replaces;
+        assert!(slot.give_back(lent, frame, Time::from_ns(frame as i64)));
+        replaced
+    }
+
+    #[test]
+    fn without_a_screen_nothing_is_taken() {
+        let mut slot = Slot::<u8>::default();
+        assert!(slot.lend().is_none() && slot.hand_over().is_none());
+        assert_eq!(slot.flipped(), None);
+    }
+
+    #[test]
+    fn the_newest_picture_wins() {
+        let mut slot = opened();
+        assert_eq!(show(&mut slot, 1), None);
+        assert_eq!(slot.hand_over().and_then(|f| f.frame), Some(1));
+        assert_eq!(show(&mut slot, 2), None);
+        assert_eq!(slot.hand_over().map(|f| f.frame), None, "one is pending");
+        assert_eq!(show(&mut slot, 3), None, "the third buffer");
+        assert_eq!(show(&mut slot, 4), None, "the second came free as 3 took its place");
+        assert_eq!(slot.flipped(), Some((Some(1), Time::from_ns(1))));
+        assert_eq!(slot.hand_over().and_then(|f| f.frame), Some(4));
+        show(&mut slot, 5);
+        assert_eq!(show(&mut slot, 6), Some(5), "no buffer is free: the waiting picture gives way");
+    }
+
+    #[test]
+    fn a_buffer_of_an_earlier_screen_is_not_taken_back() {
+        let mut slot = opened();
+        let lent = slot.lend().expect("a buffer");
+        slot.close();
+        assert!(!slot.give_back(lent, 1, Time::MIN));
+        slot.open(vec![3]);
+        let lent = slot.lend().expect("a buffer");
+        slot.open(vec![4, 5]);
+        assert!(!slot.give_back(lent, 2, Time::MIN));
+        assert_eq!(slot.close(), None);
+    }
+
+    #[test]
+    fn the_picture_that_a_lost_screen_swallowed_is_told() {
+        let mut slot = opened();
+        show(&mut slot, 7);
+        slot.hand_over();
+        assert_eq!(slot.close(), Some(7));
+    }
+
+    proptest! {
+        /// Whatever the order of calls: buffers are neither lost nor doubled, and numbers reach the screen in their order.
+        #[test]
+        fn buffers_go_round(steps in prop::collection::vec(0u8..4, 0..200)) {
+            let mut slot = opened();
+            let (mut lent, mut number, mut last) = (None, 0, 0);
+            for step in steps {
+                match step {
+                    0 if lent.is_none() => lent = slot.lend(),
+                    1 => if let Some(l) = lent.take() {
+                        number += 1;
+                        prop_assert!(slot.give_back(l, number, Time::MIN));
+                    },
+                    2 => { slot.hand_over(); }
+                    _ => if let Some((Some(frame), _)) = slot.flipped() {
+                        prop_assert!(frame > last);
+                        last = frame;
+                    },
+                }
+                let mut all: Vec<u8> = slot.free.clone();
+                all.extend([&slot.ready, &slot.pending, &slot.front].into_iter().flatten().map(|f| f.buffer));
+                all.extend(lent.as_ref().map(|l| l.buffer));
+                all.sort_unstable();
+                prop_assert_eq!(all, [0, 1, 2]);
+            }
+        }
+    }
+}

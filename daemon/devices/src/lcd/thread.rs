@@ -1,0 +1,365 @@
+//! The port's thread, and what it shares with the callers.
+
+use std::{
+    os::fd::{AsFd, OwnedFd},
+    sync::{
+        Arc, Condvar, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Instant,
+};
+
+use bowwave_core::{fault::Fault, time::Time};
+use drm::control::{Device as _, Event, PageFlipEvent};
+use rustix::{
+    event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll},
+    io::Errno,
+};
+
+use super::{
+    Flip, Given, LcdCounters, LcdError, LcdSettings, LcdState, LcdStatus, Mode, Vblanks,
+    canvas::Canvas,
+    card::{self, Card},
+    life::{Due, Life, Tell},
+    pixels,
+    screen::{Saved, Screen, Started},
+    slot::Slot,
+};
+use crate::{clock, queue::NewestSender, report::Reporter};
+
+/// What the callers and the thread both see.
+#[derive(Debug)]
+pub(super) struct Shared {
+    inner: Mutex<Inner>,
+    changed: Condvar,
+    wake: OwnedFd,
+    stopping: AtomicBool,
+}
+
+#[derive(Debug)]
+struct Inner {
+    slot: Slot<Canvas>,
+    status: LcdStatus,
+}
+
+impl Shared {
+    pub(super) fn new() -> Result<Self, Errno> {
+        let status = LcdStatus {
+            state: LcdState::Searching,
+            choice: None,
+            is_atomic: false,
+            vblanks: None,
+            fit: None,
+            trouble: None,
+            counters: LcdCounters::default(),
+        };
+        Ok(Self {
+            inner: Mutex::new(Inner { slot: Slot::default(), status }),
+            changed: Condvar::new(),
+            wake: eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?,
+            stopping: AtomicBool::new(false),
+        })
+    }
+
+    /// Whoever died holding the lock left whole values behind: nothing under it can fail half-way.
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn show(&self, rgba: &[u8], size: (u32, u32), frame: u64) -> Given {
+        let given = clock::now();
+        let is_whole = rgba.len() as u64 == u64::from(size.0) * u64::from(size.1) * pixels::PIXEL as u64;
+        let mut inner = self.lock();
+        inner.status.counters.given += 1;
+        if !is_whole || rgba.is_empty() {
+            inner.status.counters.malformed += 1;
+            return Given::Malformed;
+        }
+        let LcdState::Showing(mode) = inner.status.state else {
+            inner.status.counters.without_screen += 1;
+            return Given::NoScreen;
+        };
+        inner.status.fit = Some(pixels::fit(size, (mode.width, mode.height)));
+        let Some(mut lent) = inner.slot.lend() else {
+            inner.status.counters.without_screen += 1;
+            return Given::NoScreen;
+        };
+        inner.status.counters.replaced += u64::from(lent.replaces.is_some());
+        drop(inner);
+        // Without the lock: the thread goes on flipping meanwhile.
+        lent.buffer.draw(rgba, size);
+        let copy_ns = clock::now().ns_since(given);
+        let mut inner = self.lock();
+        let counters = &mut inner.status.counters;
+        counters.copy_ns_max = counters.copy_ns_max.max(copy_ns);
+        if !inner.slot.give_back(lent, frame, given) {
+            inner.status.counters.lost += 1;
+            return Given::NoScreen;
+        }
+        drop(inner);
+        self.wake();
+        Given::Taken
+    }
+
+    pub(super) fn await_mode(&self, until: Instant) -> Option<Mode> {
+        let mut inner = self.lock();
+        loop {
+            match inner.status.state {
+                LcdState::Showing(mode) => return Some(mode),
+                LcdState::Stopped => return None,
+                LcdState::Searching | LcdState::Lost { .. } => {}
+            }
+            let left = until.checked_duration_since(Instant::now())?;
+            inner = self.changed.wait_timeout(inner, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    pub(super) fn status(&self) -> LcdStatus {
+        self.lock().status.clone()
+    }
+
+    pub(super) fn ask_to_stop(&self) {
+        self.stopping.store(true, Ordering::Release);
+        self.wake();
+    }
+
+    fn wake(&self) {
+        // Fails only where the counter is full: the thread is then awake anyway.
+        let _ = rustix::io::write(&self.wake, &1u64.to_ne_bytes());
+    }
+
+    fn update(&self, life: &Life, change: impl FnOnce(&mut Inner)) {
+        let mut inner = self.lock();
+        change(&mut inner);
+        inner.status.state = life.state();
+        inner.status.counters.losses = life.losses();
+        drop(inner);
+        self.changed.notify_all();
+    }
+}
+
+/// The thread.
+pub(super) struct Worker {
+    settings: LcdSettings,
+    reporter: Reporter,
+    shared: Arc<Shared>,
+    flips: NewestSender<Flip>,
+    life: Life,
+    card: Option<Card>,
+    saved: Vec<Saved>,
+    screen: Option<Screen>,
+    vblanks: Option<Vblanks>,
+    last_sequence: Option<u32>,
+}
+
+impl Worker {
+    pub(super) fn new(
+        settings: LcdSettings,
+        reporter: Reporter,
+        shared: Arc<Shared>,
+        flips: NewestSender<Flip>,
+    ) -> Self {
+        Self {
+            settings,
+            reporter,
+            shared,
+            flips,
+            life: Life::new(clock::now()),
+            card: None,
+            saved: Vec::new(),
+            screen: None,
+            vblanks: None,
+            last_sequence: None,
+        }
+    }
+
+    /// Until asked to stop. Fails only in putting back what was shown before.
+    pub(super) fn run(mut self) -> Result<(), LcdError> {
+        while !self.shared.stopping.load(Ordering::Acquire) {
+            self.reporter.beat();
+            if let Err(e) = self.turn() {
+                self.lose(&e);
+            }
+        }
+        self.finish()
+    }
+
+    /// One turn: what is due, then a flip, then sleep until something happens.
+    fn turn(&mut self) -> Result<(), LcdError> {
+        match self.life.due(clock::now()) {
+            Due::Nothing => {}
+            Due::Look if self.screen.is_some() => self.look()?,
+            Due::Look => self.search()?,
+            Due::FlipOverdue => {
+                let node = self.card.as_ref().map(|c| c.node().to_owned()).unwrap_or_default();
+                return Err(LcdError::FlipOverdue { node });
+            }
+        }
+        self.flip()?;
+        self.sleep();
+        self.take_events()
+    }
+
+    /// Looks for a display and sets its mode.
+    fn search(&mut self) -> Result<(), LcdError> {
+        let (card, target) = card::search(&self.settings, self.card.take());
+        if card.is_none() {
+            self.saved.clear();
+        }
+        self.card = card;
+        let target = target?;
+        let Some(card) = &self.card else { return Err(LcdError::NoCard) };
+        if self.saved.iter().all(|s| s.crtc() != target.crtc) {
+            self.saved.push(Saved::of(card, target.crtc)?);
+        }
+        let choice = target.choice.clone();
+        let (screen, canvases) = Screen::make(card, target, !self.settings.legacy)?;
+        let is_atomic = screen.is_atomic();
+        let screen = self.screen.insert(screen);
+        let now = clock::now();
+        self.life.flip_begun(now);
+        let mut first = None;
+        self.shared.update(&self.life, |inner| {
+            inner.slot.open(canvases);
+            inner.status.choice = Some(choice);
+            inner.status.is_atomic = is_atomic;
+            inner.status.counters.mode_sets += 1;
+            first = inner.slot.hand_over_blank(now).map(|f| f.buffer.framebuffer());
+        });
+        // Without the lock: a mode may take long to set, and no caller is to wait for it.
+        match first.map(|first| screen.start(card, first)).transpose()? {
+            Some(Started::Shown) => self.flipped(None),
+            Some(Started::Pending) | None => {}
+        }
+        Ok(())
+    }
+
+    /// Looks whether the display is still there.
+    fn look(&self) -> Result<(), LcdError> {
+        let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
+        let target = screen.target();
+        if card.is_connected(target.connector)? {
+            return Ok(());
+        }
+        let names = target.choice.connector.clone();
+        Err(LcdError::NotConnected { node: card.node().to_owned(), names })
+    }
+
+    /// Hands the newest picture to the kernel, unless it still holds one back.
+    fn flip(&mut self) -> Result<(), LcdError> {
+        let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
+        let next = self.shared.lock().slot.hand_over().map(|f| f.buffer.framebuffer());
+        let Some(next) = next else { return Ok(()) };
+        self.life.flip_begun(clock::now());
+        screen.flip(card, next)
+    }
+
+    fn sleep(&self) {
+        let ns = self.life.sleep_ns(clock::now());
+        let timeout = Timespec { tv_sec: 0, tv_nsec: ns };
+        let mut fds = vec![PollFd::new(&self.shared.wake, PollFlags::IN)];
+        if let Some(card) = &self.card {
+            fds.push(PollFd::from_borrowed_fd(card.as_fd(), PollFlags::IN));
+        }
+        // An interrupted or failed wait only makes the turn shorter.
+        if poll(&mut fds, Some(&timeout)).is_ok() {
+            let _ = rustix::io::read(&self.shared.wake, &mut [0u8; 8]);
+        }
+    }
+
+    /// Takes what the kernel tells of flips.
+    fn take_events(&mut self) -> Result<(), LcdError> {
+        let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
+        let crtc = screen.target().crtc;
+        let events = match card.receive_events() {
+            Ok(events) => events,
+            Err(e) if matches!(Errno::from_io_error(&e), Some(Errno::AGAIN | Errno::INTR)) => return Ok(()),
+            Err(e) => return Err(LcdError::of(card.node(), "read its events", e)),
+        };
+        for event in events {
+            match event {
+                Event::PageFlip(flip) if flip.crtc == crtc => self.flipped(Some(&flip)),
+                Event::PageFlip(_) | Event::Vblank(_) | Event::Unknown(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// The pending picture is on the screen.
+    fn flipped(&mut self, event: Option<&PageFlipEvent>) {
+        let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return };
+        let counts = || if screen.counts_vblanks(card) { Vblanks::Counted } else { Vblanks::Absent };
+        let vblanks = *self.vblanks.get_or_insert_with(counts);
+        let sequence = event.map(|e| e.frame).filter(|_| vblanks == Vblanks::Counted);
+        let time = event.map_or_else(clock::now, |e| {
+            Time::from_ns(i64::try_from(e.duration.as_nanos()).unwrap_or(i64::MAX))
+        });
+        let waited_vblanks = sequence.zip(self.last_sequence).map(|(now, last)| now.wrapping_sub(last));
+        self.last_sequence = sequence;
+        let told = self.life.flipped(screen.target().choice.mode);
+        let mut shown = None;
+        self.shared.update(&self.life, |inner| {
+            shown = inner.slot.flipped();
+            inner.status.vblanks = Some(vblanks);
+            inner.status.trouble = None;
+            inner.status.counters.shown += u64::from(matches!(shown, Some((Some(_), _))));
+        });
+        if let Some((Some(frame), given)) = shown {
+            self.flips.send(Flip { frame, given, time, sequence, waited_vblanks });
+        }
+        self.tell(told);
+    }
+
+    /// There is no display any more, or still none.
+    fn lose(&mut self, why: &LcdError) {
+        let told = self.life.missing(clock::now(), why.to_string());
+        self.shared.update(&self.life, |inner| {
+            inner.status.counters.lost += u64::from(inner.slot.close().is_some());
+            inner.status.is_atomic = false;
+            inner.status.vblanks = None;
+            inner.status.trouble = Some(why.to_string());
+        });
+        (self.vblanks, self.last_sequence) = (None, None);
+        if let (Some(card), Some(screen)) = (&self.card, self.screen.take()) {
+            screen.switch_off(card);
+            screen.free(card);
+        }
+        // An unplugged display leaves the card usable: it is kept, and with it the mastery over it. Whatever else went wrong
+        // is tried from the beginning.
+        if !matches!(why, LcdError::NotConnected { .. } | LcdError::NoMode { .. })
+            && let Err(e) = self.restore()
+        {
+            log::debug!("{e}");
+        }
+        self.tell(told);
+    }
+
+    fn tell(&self, told: Option<Tell>) {
+        match told {
+            Some(Tell::Raised(cause)) => self.reporter.raised(Fault::DisplayLost, cause),
+            Some(Tell::Cleared) => self.reporter.cleared(Fault::DisplayLost),
+            None => {}
+        }
+    }
+
+    /// Puts back what was shown before, and closes the card.
+    fn restore(&mut self) -> Result<(), LcdError> {
+        let Some(card) = self.card.take() else { return Ok(()) };
+        let restored: Vec<_> = self.saved.drain(..).map(|saved| saved.restore(&card)).collect();
+        restored.into_iter().collect()
+    }
+
+    fn finish(mut self) -> Result<(), LcdError> {
+        self.life.stop();
+        self.shared.update(&self.life, |inner| {
+            inner.status.counters.lost += u64::from(inner.slot.close().is_some());
+        });
+        let Some(card) = self.card.take() else { return Ok(()) };
+        let restored: Vec<_> = self.saved.drain(..).map(|saved| saved.restore(&card)).collect();
+        // Only now: a buffer that is shown must not be freed.
+        if let Some(screen) = self.screen.take() {
+            screen.free(&card);
+        }
+        restored.into_iter().collect()
+    }
+}
