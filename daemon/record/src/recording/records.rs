@@ -148,7 +148,8 @@ impl Records {
     }
 }
 
-/// Parses a record. The crate's own parser panics on attachments that are too short for their checksum.
+/// Parses a record. The crate's own parser makes room for whatever a string's length claims, up to 4 GiB, before it looks
+/// whether there is as much, and panics on attachments that are too short for their checksum.
 pub(crate) fn parse<'a>(
     path: &Path,
     opcode: u8,
@@ -156,20 +157,75 @@ pub(crate) fn parse<'a>(
     data: &'a [u8],
 ) -> Result<Record<'a>, RecordError> {
     let damaged = |what: String| RecordError::Damaged { path: path.into(), offset, what };
-    if opcode == op::ATTACHMENT && !attachment_fits(data) {
-        return Err(damaged("an attachment that is shorter than its header says".to_owned()));
+    if !fits(opcode, data) {
+        return Err(damaged(format!(
+            "a record of kind {opcode:#04x} with a part that reaches beyond its end"
+        )));
     }
     mcap::parse_record(opcode, data).map_err(|error| damaged(error.to_string()))
 }
 
-/// Whether an attachment's two times, two strings, length and checksum fit into its record.
-fn attachment_fits(data: &[u8]) -> bool {
-    let mut at = 16_usize;
-    for _ in 0..2 {
-        let Some(length) = u32_at(data, at) else { return false };
-        at = at.saturating_add(4).saturating_add(length as usize);
+/// A part of a record.
+enum Part {
+    /// So many bytes.
+    Bytes(usize),
+    /// A string: its length, its bytes.
+    Text,
+    /// A map of strings: its bytes, then keys and values.
+    Texts,
+    /// A map of numbers: its bytes, then entries of so many each.
+    Numbers(usize),
+}
+
+/// The parts of a record as far as its last string (MCAP specification, "Records").
+const fn parts(opcode: u8) -> &'static [Part] {
+    use Part::{Bytes, Numbers, Text, Texts};
+    match opcode {
+        op::HEADER => &[Text, Text],
+        op::SCHEMA => &[Bytes(2), Text, Text],
+        op::CHANNEL => &[Bytes(4), Text, Text, Texts],
+        op::CHUNK => &[Bytes(28), Text],
+        op::CHUNK_INDEX => &[Bytes(32), Numbers(10), Bytes(8), Text],
+        op::ATTACHMENT => &[Bytes(16), Text, Text, Bytes(8 + 4)],
+        op::ATTACHMENT_INDEX => &[Bytes(40), Text, Text],
+        op::METADATA => &[Text, Texts],
+        op::METADATA_INDEX => &[Bytes(16), Text],
+        _ => &[],
     }
-    data.len() >= at.saturating_add(8 + 4)
+}
+
+/// Whether a record's parts, as they are parsed, end within it.
+fn fits(opcode: u8, data: &[u8]) -> bool {
+    parts(opcode).iter().try_fold(0, |at, part| part.end(data, at)).is_some()
+}
+
+impl Part {
+    /// Where the part that begins at `at` ends; `None` where that is beyond the record.
+    fn end(&self, data: &[u8], at: usize) -> Option<usize> {
+        let end = match self {
+            Self::Bytes(bytes) => at.checked_add(*bytes)?,
+            Self::Text => text_end(data, at)?,
+            Self::Texts => {
+                // Whole entries are parsed, whatever the length says of the last one.
+                let (mut place, end) = (at.checked_add(4)?, text_end(data, at)?);
+                while place < end {
+                    place = text_end(data, text_end(data, place)?)?;
+                }
+                place
+            }
+            Self::Numbers(entry) => {
+                let bytes = u32_at(data, at)? as usize;
+                at.checked_add(4)?.checked_add(bytes.checked_next_multiple_of(*entry)?)?
+            }
+        };
+        (end <= data.len()).then_some(end)
+    }
+}
+
+/// The end of the string at `at`, if it lies within `data`.
+fn text_end(data: &[u8], at: usize) -> Option<usize> {
+    let length = u32_at(data, at)? as usize;
+    at.checked_add(4)?.checked_add(length).filter(|end| *end <= data.len())
 }
 
 pub(crate) fn u32_at(data: &[u8], at: usize) -> Option<u32> {
@@ -180,4 +236,65 @@ pub(crate) fn u32_at(data: &[u8], at: usize) -> Option<u32> {
 pub(crate) fn u64_at(data: &[u8], at: usize) -> Option<u64> {
     let bytes = data.get(at..at.checked_add(8)?)?;
     Some(u64::from_le_bytes(bytes.try_into().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use mcap::records::op;
+
+    use super::{Part, parse, parts};
+
+    /// A record whose parts are all as short as can be, and where its strings and maps begin.
+    fn shortest(opcode: u8) -> (Vec<u8>, Vec<usize>) {
+        let (mut data, mut places) = (Vec::new(), Vec::new());
+        for part in parts(opcode) {
+            match part {
+                Part::Bytes(bytes) => data.resize(data.len() + bytes, 0),
+                Part::Text | Part::Texts | Part::Numbers(_) => {
+                    places.push(data.len());
+                    data.extend([0; 4]);
+                }
+            }
+        }
+        // What stands behind the last string: sizes, times and a schema's length.
+        data.extend([0; 32]);
+        (data, places)
+    }
+
+    #[test]
+    fn a_length_beyond_its_record_is_refused_before_there_is_room_made_for_it() {
+        let mut refused = 0;
+        for opcode in op::HEADER..=op::DATA_END {
+            let (whole, places) = shortest(opcode);
+            if places.is_empty() {
+                continue;
+            }
+            parse(Path::new("x.mcap"), opcode, 8, &whole).expect("a record of empty parts");
+            for place in places {
+                for claimed in [whole.len() as u32, 0x7fff_ffff, u32::MAX] {
+                    let mut data = whole.clone();
+                    data[place..place + 4].copy_from_slice(&claimed.to_le_bytes());
+                    let error =
+                        parse(Path::new("x.mcap"), opcode, 8, &data).expect_err("too long").to_string();
+                    assert!(error.contains("byte 8") && error.contains("reaches beyond its end"), "{error}");
+                    refused += 1;
+                }
+            }
+        }
+        assert_eq!(refused, 3 * 17);
+    }
+
+    #[test]
+    fn a_map_that_ends_within_an_entry_is_followed_as_it_is_parsed() {
+        // The map claims one byte, its entry has ten; the string's length lies behind all ten.
+        let mut index = vec![0; 32];
+        index.extend(1_u32.to_le_bytes());
+        index.extend([0; 10 + 8]);
+        index.extend(u32::MAX.to_le_bytes());
+        index.extend([0; 16]);
+        let error = parse(Path::new("x.mcap"), op::CHUNK_INDEX, 8, &index).expect_err("too long").to_string();
+        assert!(error.contains("reaches beyond its end"), "{error}");
+    }
 }
