@@ -150,7 +150,7 @@ pub struct LcdStatus {
     pub choice: Option<Choice>,
     /// Whether the kernel's atomic interface is used. `false` also while nothing shows.
     pub is_atomic: bool,
-    /// Where the times of flips come from, once something shows.
+    /// Where the times of flips come from, once that is known: with the first or second flip.
     pub vblanks: Option<Vblanks>,
     /// How the last picture given lies on the screen.
     pub fit: Option<LcdFit>,
@@ -183,8 +183,8 @@ pub struct Flip {
     pub time: Time,
     /// The driver's count of that vblank, where it counts.
     pub sequence: Option<u32>,
-    /// Vblanks since the flip before: how long the last picture stayed. `None` where the driver does not count, and for
-    /// the first flip after a mode was set.
+    /// Vblanks since the flip before (for a mode's first picture: since it was set): how long the last picture stayed.
+    /// `None` where the driver does not count.
     pub waited_vblanks: Option<u32>,
 }
 

@@ -12,7 +12,7 @@ use drm::{
 use rustix::io::Errno;
 
 use super::{
-    LcdError,
+    LcdError, Vblanks,
     canvas::{Buffers, Canvas},
     card::{Card, Target},
 };
@@ -145,8 +145,8 @@ impl Screen {
         Ok(Started::Pending)
     }
 
-    /// Shows a picture from the next vblank on.
-    pub(super) fn flip(&self, card: &Card, next: framebuffer::Handle) -> Result<(), LcdError> {
+    /// Shows a picture from the next vblank on. `false` where the kernel is busy with an earlier change.
+    pub(super) fn flip(&self, card: &Card, next: framebuffer::Handle) -> Result<bool, LcdError> {
         let flipped = match &self.path {
             Path::Atomic { plane, ids, .. } => {
                 let mut request = AtomicModeReq::new();
@@ -155,13 +155,21 @@ impl Screen {
             }
             Path::Legacy => card.page_flip(self.target.crtc, next, PageFlipFlags::EVENT, None),
         };
-        card.tried("show a picture", flipped)
+        match flipped {
+            Err(e) if Errno::from_io_error(&e) == Some(Errno::BUSY) => Ok(false),
+            other => card.tried("show a picture", other).map(|()| true),
+        }
     }
 
-    /// Whether the driver counts vblanks. To be asked while the mode is set.
-    pub(super) fn counts_vblanks(&self, card: &Card) -> bool {
+    /// Whether the driver counts vblanks; `None` where that cannot be told yet: some drivers report the first flip of a mode
+    /// before they start to count.
+    pub(super) fn vblanks(&self, card: &Card) -> Option<Vblanks> {
         let now = VblankWaitTarget::Relative(0);
-        card.wait_vblank(now, VblankWaitFlags::empty(), self.target.crtc_index, 0).is_ok()
+        match card.wait_vblank(now, VblankWaitFlags::empty(), self.target.crtc_index, 0) {
+            Ok(_) => Some(Vblanks::Counted),
+            Err(e) if Errno::from_io_error(&e) == Some(Errno::OPNOTSUPP) => Some(Vblanks::Absent),
+            Err(_) => None,
+        }
     }
 
     /// Switches the display off, so that the mode is set anew when it comes back.

@@ -24,8 +24,8 @@ pub(super) struct Lent<B> {
     pub(super) buffer: B,
     /// Which screen it is of.
     screen: u64,
-    /// An older picture that nobody will see because this one takes its place.
-    pub(super) replaces: Option<u64>,
+    /// A picture that waited in it is overwritten.
+    takes_ready: bool,
 }
 
 /// The buffers of the screen that is there now, if any.
@@ -53,31 +53,35 @@ impl<B> Slot<B> {
         *self = Self { screen, is_open: true, free: buffers, ..Self::default() };
     }
 
-    /// The screen is gone, and its buffers with it. Gives the number of a picture that was waiting.
-    pub(super) fn close(&mut self) -> Option<u64> {
-        let waiting = self.ready.as_ref().or(self.pending.as_ref()).and_then(|f| f.frame);
+    /// The screen is gone, and its buffers with it. Gives how many of the caller's pictures were still on their way.
+    pub(super) fn close(&mut self) -> u64 {
+        let waiting =
+            [&self.ready, &self.pending].into_iter().flatten().filter(|f| f.frame.is_some()).count();
         *self = Self { screen: self.screen, ..Self::default() };
-        waiting
+        waiting as u64
     }
 
     /// A buffer to draw in. `None` without a screen, or while another caller draws in the last one.
     pub(super) fn lend(&mut self) -> Option<Lent<B>> {
         let screen = self.screen;
         if let Some(buffer) = self.free.pop() {
-            return Some(Lent { buffer, screen, replaces: None });
+            return Some(Lent { buffer, screen, takes_ready: false });
         }
         let old = self.ready.take()?;
-        Some(Lent { buffer: old.buffer, screen, replaces: old.frame })
+        Some(Lent { buffer: old.buffer, screen, takes_ready: true })
     }
 
-    /// The drawn buffer comes back and is ready. `false` where its screen has gone meanwhile.
-    pub(super) fn give_back(&mut self, lent: Lent<B>, frame: u64, given: Time) -> bool {
+    /// The drawn buffer comes back and is ready. Gives how many waiting pictures gave way to it; where the screen has gone
+    /// meanwhile, as an error, how many pictures went with the buffer.
+    pub(super) fn give_back(&mut self, lent: Lent<B>, frame: u64, given: Time) -> Result<u64, u64> {
+        let overwritten = u64::from(lent.takes_ready);
         if !self.is_open || lent.screen != self.screen {
-            return false;
+            return Err(1 + overwritten);
         }
         let old = self.ready.replace(Filled { buffer: lent.buffer, frame: Some(frame), given });
+        let gave_way = overwritten + u64::from(old.is_some());
         self.free.extend(old.map(|f| f.buffer));
-        true
+        Ok(gave_way)
     }
 
     /// The picture to be handed to the kernel now: the ready one, unless another is still pending. It is pending from here
@@ -95,6 +99,18 @@ impl<B> Slot<B> {
         let buffer = self.free.pop()?;
         self.pending = Some(Filled { buffer, frame: None, given: now });
         self.pending.as_ref()
+    }
+
+    /// The kernel did not take the pending picture: it waits again, unless a newer one does. `true` where it gave way.
+    pub(super) fn take_back(&mut self) -> bool {
+        let Some(refused) = self.pending.take() else { return false };
+        let gives_way = self.ready.is_some();
+        if gives_way {
+            self.free.push(refused.buffer);
+        } else {
+            self.ready = Some(refused);
+        }
+        gives_way
     }
 
     /// The pending picture is on the screen: number and time when it was given. The one before is free.
@@ -118,11 +134,10 @@ mod tests {
         slot
     }
 
-    fn show(slot: &mut Slot<u8>, frame: u64) -> Option<u64> {
+    /// Shows a picture; gives whether another one gave way.
+    fn show(slot: &mut Slot<u8>, frame: u64) -> bool {
         let lent = slot.lend().expect("a buffer");
-        let replaced = lent.replaces;
-        assert!(slot.give_back(lent, frame, Time::from_ns(frame as i64)));
-        replaced
+        slot.give_back(lent, frame, Time::from_ns(frame as i64)).expect("the screen is there") == 1
     }
 
     #[test]
@@ -135,16 +150,16 @@ mod tests {
     #[test]
     fn the_newest_picture_wins() {
         let mut slot = opened();
-        assert_eq!(show(&mut slot, 1), None);
+        assert!(!show(&mut slot, 1));
         assert_eq!(slot.hand_over().and_then(|f| f.frame), Some(1));
-        assert_eq!(show(&mut slot, 2), None);
+        assert!(!show(&mut slot, 2));
         assert_eq!(slot.hand_over().map(|f| f.frame), None, "one is pending");
-        assert_eq!(show(&mut slot, 3), None, "the third buffer");
-        assert_eq!(show(&mut slot, 4), None, "the second came free as 3 took its place");
+        assert!(show(&mut slot, 3), "2 gave way, from the third buffer");
+        assert!(show(&mut slot, 4), "3 gave way, from the buffer of 2");
         assert_eq!(slot.flipped(), Some((Some(1), Time::from_ns(1))));
         assert_eq!(slot.hand_over().and_then(|f| f.frame), Some(4));
-        show(&mut slot, 5);
-        assert_eq!(show(&mut slot, 6), Some(5), "no buffer is free: the waiting picture gives way");
+        assert!(!show(&mut slot, 5));
+        assert!(show(&mut slot, 6), "no buffer is free: 5 is overwritten");
     }
 
     #[test]
@@ -152,39 +167,59 @@ mod tests {
         let mut slot = opened();
         let lent = slot.lend().expect("a buffer");
         slot.close();
-        assert!(!slot.give_back(lent, 1, Time::MIN));
+        assert_eq!(slot.give_back(lent, 1, Time::MIN), Err(1));
         slot.open(vec![3]);
         let lent = slot.lend().expect("a buffer");
         slot.open(vec![4, 5]);
-        assert!(!slot.give_back(lent, 2, Time::MIN));
-        assert_eq!(slot.close(), None);
+        assert_eq!(slot.give_back(lent, 2, Time::MIN), Err(1));
+        assert_eq!(slot.close(), 0);
     }
 
     #[test]
-    fn the_picture_that_a_lost_screen_swallowed_is_told() {
+    fn a_picture_that_the_kernel_refused_waits_again() {
+        let mut slot = opened();
+        show(&mut slot, 1);
+        slot.hand_over();
+        assert!(!slot.take_back());
+        assert_eq!(slot.flipped(), None);
+        assert_eq!(slot.hand_over().and_then(|f| f.frame), Some(1));
+        show(&mut slot, 2);
+        assert!(slot.take_back());
+        assert_eq!(slot.hand_over().and_then(|f| f.frame), Some(2), "a newer one came meanwhile");
+    }
+
+    #[test]
+    fn the_pictures_that_a_lost_screen_swallowed_are_told() {
         let mut slot = opened();
         show(&mut slot, 7);
         slot.hand_over();
-        assert_eq!(slot.close(), Some(7));
+        assert!(!show(&mut slot, 8));
+        assert_eq!(slot.close(), 2);
+        slot.open(vec![0]);
+        slot.hand_over_blank(Time::MIN);
+        assert_eq!(slot.close(), 0, "the black picture is nobody's");
     }
 
     proptest! {
         /// Whatever the order of calls: buffers are neither lost nor doubled, and numbers reach the screen in their order.
         #[test]
-        fn buffers_go_round(steps in prop::collection::vec(0u8..4, 0..200)) {
+        fn buffers_go_round(steps in prop::collection::vec(0u8..5, 0..200)) {
             let mut slot = opened();
             let (mut lent, mut number, mut last) = (None, 0, 0);
+            let (mut shown, mut gave_way) = (0, 0);
             for step in steps {
                 match step {
+                    4 => gave_way += u64::from(slot.take_back()),
                     0 if lent.is_none() => lent = slot.lend(),
                     1 => if let Some(l) = lent.take() {
                         number += 1;
-                        prop_assert!(slot.give_back(l, number, Time::MIN));
+                        gave_way += slot.give_back(l, number, Time::MIN).expect("the screen is there");
                     },
                     2 => { slot.hand_over(); }
                     _ => if let Some((Some(frame), _)) = slot.flipped() {
                         prop_assert!(frame > last);
                         last = frame;
+                        shown += 1;
                     },
                 }
                 let mut all: Vec<u8> = slot.free.clone();
@@ -192,6 +227,10 @@ mod tests {
                 all.extend(lent.as_ref().map(|l| l.buffer));
                 all.sort_unstable();
                 prop_assert_eq!(all, [0, 1, 2]);
+                let waiting = [&slot.ready, &slot.pending].into_iter().flatten().count() as u64;
+                // A picture that is being overwritten gives way when the new one is there.
+                let overwritten = u64::from(lent.as_ref().is_some_and(|l| l.takes_ready));
+                prop_assert_eq!(number, shown + gave_way + waiting + overwritten, "every picture is accounted for");
             }
         }
     }

@@ -84,7 +84,6 @@ impl Shared {
             inner.status.counters.without_screen += 1;
             return Given::NoScreen;
         };
-        inner.status.counters.replaced += u64::from(lent.replaces.is_some());
         drop(inner);
         // Without the lock: the thread goes on flipping meanwhile.
         lent.buffer.draw(rgba, size);
@@ -92,9 +91,12 @@ impl Shared {
         let mut inner = self.lock();
         let counters = &mut inner.status.counters;
         counters.copy_ns_max = counters.copy_ns_max.max(copy_ns);
-        if !inner.slot.give_back(lent, frame, given) {
-            inner.status.counters.lost += 1;
-            return Given::NoScreen;
+        match inner.slot.give_back(lent, frame, given) {
+            Ok(gave_way) => inner.status.counters.replaced += gave_way,
+            Err(lost) => {
+                inner.status.counters.lost += lost;
+                return Given::NoScreen;
+            }
         }
         drop(inner);
         self.wake();
@@ -223,7 +225,6 @@ impl Worker {
             inner.slot.open(canvases);
             inner.status.choice = Some(choice);
             inner.status.is_atomic = is_atomic;
-            inner.status.counters.mode_sets += 1;
             first = inner.slot.hand_over_blank(now).map(|f| f.buffer.framebuffer());
         });
         // Without the lock: a mode may take long to set, and no caller is to wait for it.
@@ -250,8 +251,16 @@ impl Worker {
         let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
         let next = self.shared.lock().slot.hand_over().map(|f| f.buffer.framebuffer());
         let Some(next) = next else { return Ok(()) };
-        self.life.flip_begun(clock::now());
-        screen.flip(card, next)
+        match screen.flip(card, next) {
+            Ok(true) => self.life.flip_begun(clock::now()),
+            // Whether that lasts, the next look tells.
+            Ok(false) => {
+                let mut inner = self.shared.lock();
+                inner.status.counters.replaced += u64::from(inner.slot.take_back());
+            }
+            Err(e) => return Err(e),
+        }
+        Ok(())
     }
 
     fn sleep(&self) {
@@ -288,9 +297,9 @@ impl Worker {
     /// The pending picture is on the screen.
     fn flipped(&mut self, event: Option<&PageFlipEvent>) {
         let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return };
-        let counts = || if screen.counts_vblanks(card) { Vblanks::Counted } else { Vblanks::Absent };
-        let vblanks = *self.vblanks.get_or_insert_with(counts);
-        let sequence = event.map(|e| e.frame).filter(|_| vblanks == Vblanks::Counted);
+        self.vblanks = self.vblanks.or_else(|| screen.vblanks(card));
+        let vblanks = self.vblanks;
+        let sequence = event.map(|e| e.frame).filter(|_| vblanks == Some(Vblanks::Counted));
         let time = event.map_or_else(clock::now, |e| {
             Time::from_ns(i64::try_from(e.duration.as_nanos()).unwrap_or(i64::MAX))
         });
@@ -300,9 +309,10 @@ impl Worker {
         let mut shown = None;
         self.shared.update(&self.life, |inner| {
             shown = inner.slot.flipped();
-            inner.status.vblanks = Some(vblanks);
+            inner.status.vblanks = vblanks;
             inner.status.trouble = None;
             inner.status.counters.shown += u64::from(matches!(shown, Some((Some(_), _))));
+            inner.status.counters.mode_sets += u64::from(matches!(shown, Some((None, _))));
         });
         if let Some((Some(frame), given)) = shown {
             self.flips.send(Flip { frame, given, time, sequence, waited_vblanks });
@@ -314,7 +324,7 @@ impl Worker {
     fn lose(&mut self, why: &LcdError) {
         let told = self.life.missing(clock::now(), why.to_string());
         self.shared.update(&self.life, |inner| {
-            inner.status.counters.lost += u64::from(inner.slot.close().is_some());
+            inner.status.counters.lost += inner.slot.close();
             inner.status.is_atomic = false;
             inner.status.vblanks = None;
             inner.status.trouble = Some(why.to_string());
@@ -323,6 +333,8 @@ impl Worker {
         if let (Some(card), Some(screen)) = (&self.card, self.screen.take()) {
             screen.switch_off(card);
             screen.free(card);
+            // What is still told of this screen is not of the next one.
+            while card.receive_events().is_ok_and(|events| events.count() > 0) {}
         }
         // An unplugged display leaves the card usable: it is kept, and with it the mastery over it. Whatever else went wrong
         // is tried from the beginning.
@@ -352,7 +364,7 @@ impl Worker {
     fn finish(mut self) -> Result<(), LcdError> {
         self.life.stop();
         self.shared.update(&self.life, |inner| {
-            inner.status.counters.lost += u64::from(inner.slot.close().is_some());
+            inner.status.counters.lost += inner.slot.close();
         });
         let Some(card) = self.card.take() else { return Ok(()) };
         let restored: Vec<_> = self.saved.drain(..).map(|saved| saved.restore(&card)).collect();
