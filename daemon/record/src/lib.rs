@@ -4,12 +4,14 @@
 
 pub mod journal;
 pub mod recording;
+pub mod space;
 
 pub use journal::{
-    Journal, JournalError, JournalFault, JournalSummary, Run, RunSelection, ShotFilter, StoredRun,
-    StoredShot, Unwritten, read_runs, read_shots,
+    DirtyEnd, DirtyRun, Journal, JournalError, JournalFault, JournalOptions, JournalSummary, Quarantine, Run,
+    RunSelection, ShotFilter, StoredRun, StoredShot, Unwritten, boot_id, read_runs, read_shots,
 };
 pub use recording::{
     CameraInfo, Counts, Entries, Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingReader,
     RecordingWriter, RecoverReport, WrittenSummary, recover,
 };
+pub use space::{Room, SpaceWatch};

@@ -15,12 +15,14 @@ use std::{
 };
 
 use bowwave_core::{
+    fault::Fault,
     model::Zone,
     score::{NotScored, Outcome, ShotRecord},
     time::Time,
 };
 use bowwave_record::{
-    Journal, JournalError, Run, RunSelection, ShotFilter, StoredShot, read_runs, read_shots,
+    DirtyEnd, Journal, JournalError, JournalOptions, Run, RunSelection, ShotFilter, StoredShot, boot_id,
+    read_runs, read_shots,
 };
 use glam::DVec3;
 use proptest::prelude::*;
@@ -32,6 +34,8 @@ fn run() -> Run {
         recording: "default.mcap".to_owned(),
         seed: u64::MAX,
         version: "0.1.0".to_owned(),
+        boot_id: Some("2d1c7b3a-0000-4000-8000-000000000001".to_owned()),
+        started: Some(Time::from_ns(4_000_000_000)),
     }
 }
 
@@ -188,9 +192,9 @@ fn what_is_no_journal_is_named_and_left_alone() {
 
     let path = folder.path().join("newer.db");
     shoot(&path, &[shot(1)]);
-    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 2").unwrap();
+    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 3").unwrap();
     let error = Journal::open(&path, &run()).err().unwrap();
-    assert!(matches!(error, JournalError::Newer { found: 2, supported: 1, .. }), "{error}");
+    assert!(matches!(error, JournalError::Newer { found: 3, supported: 2, .. }), "{error}");
     assert!(matches!(read_runs(&path), Err(JournalError::Newer { .. })));
 
     let error = Journal::open(folder.path(), &run()).err().unwrap();
@@ -236,6 +240,7 @@ fn a_damaged_journal_is_put_aside_and_a_fresh_one_begun() {
         |bytes: &mut Vec<u8>| bytes[16..200].fill(0xff),
         |bytes: &mut Vec<u8>| bytes.truncate(4096 * 4 + 100),
         |bytes: &mut Vec<u8>| bytes.truncate(16),
+        |bytes: &mut Vec<u8>| bytes.fill(0),
     ] {
         let mut damaged = bytes.clone();
         damage(&mut damaged);
@@ -244,12 +249,127 @@ fn a_damaged_journal_is_put_aside_and_a_fresh_one_begun() {
         count += 1;
         let journal = Journal::open(&path, &run()).unwrap();
         let aside = folder.path().join(format!("hits.db.corrupt-{count}"));
-        assert_eq!(journal.quarantined(), Some(aside.as_path()));
+        assert_eq!(journal.quarantined().map(|q| q.kept_as), Some(aside.clone()));
         assert!(fs::read(&aside).unwrap() == damaged, "kept as it was");
         journal.shot(&shot(1)).unwrap();
         assert_eq!(journal.finish().unwrap().committed, 1);
         assert_eq!(all(&path).len(), 1);
     }
+}
+
+/// Version 1 of the tables, as the first Bowwave made them.
+const VERSION_1: &str = "
+CREATE TABLE runs (
+    id INTEGER PRIMARY KEY AUTOINCREMENT, started_wall_ns INTEGER, scenario TEXT NOT NULL, recording TEXT NOT NULL,
+    seed TEXT NOT NULL, version TEXT NOT NULL, finished INTEGER NOT NULL DEFAULT 0 CHECK (finished IN (0, 1))
+) STRICT;
+CREATE TABLE shots (
+    run INTEGER NOT NULL REFERENCES runs (id), shot INTEGER NOT NULL, fired_ns INTEGER NOT NULL,
+    muzzle_x_m REAL, muzzle_y_m REAL, muzzle_z_m REAL, bore_x REAL, bore_y REAL, bore_z REAL,
+    pose_age_ns INTEGER NOT NULL, outcome TEXT NOT NULL CHECK (outcome IN ('hit', 'miss', 'not_scored')),
+    boat TEXT CHECK (boat IS NOT NULL OR outcome <> 'hit'),
+    zone TEXT CHECK ((zone IS NOT NULL) = (outcome = 'hit')),
+    time_ns INTEGER CHECK ((time_ns IS NOT NULL) = (outcome <> 'not_scored')),
+    range_m REAL, point_x_m REAL, point_y_m REAL, point_z_m REAL, miss_m REAL,
+    cause TEXT CHECK ((cause IS NOT NULL) = (outcome = 'not_scored')),
+    PRIMARY KEY (run, shot)
+) STRICT, WITHOUT ROWID;
+INSERT INTO runs (scenario, recording, seed, version, finished) VALUES ('one skiff', '', '7', '0.0.9', 1);
+INSERT INTO shots (run, shot, fired_ns, pose_age_ns, outcome, cause) VALUES (1, 1, 5, 6, 'not_scored', 'imu_stale');
+PRAGMA application_id = 1112495959; PRAGMA user_version = 1;";
+
+#[test]
+fn a_journal_of_the_first_version_is_read_and_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    rusqlite::Connection::open(&path).unwrap().execute_batch(VERSION_1).unwrap();
+    let runs = read_runs(&path).unwrap();
+    assert_eq!((runs[0].run.scenario.as_str(), runs[0].run.boot_id.as_ref()), ("one skiff", None));
+    assert_eq!(shoot(&path, &[shot(1)]), 2);
+    let runs = read_runs(&path).unwrap();
+    assert_eq!((runs[0].run.seed, runs[0].shots, &runs[1].run), (7, 1, &run()));
+    assert_eq!(all(&path).len(), 2);
+}
+
+#[test]
+fn wall_times_are_filled_in_for_this_boot_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    let second = 1_000_000_000;
+    let begun = |boot: &str, at_s: i64, wall: Option<i64>| Run {
+        started_wall_ns: wall,
+        boot_id: Some(boot.to_owned()),
+        started: Some(Time::from_ns(at_s * second)),
+        ..run()
+    };
+    for run in [begun("one", 10, None), begun("two", 20, None), begun("two", 30, Some(5))] {
+        Journal::open(&path, &run).unwrap().finish().unwrap();
+    }
+    let journal = Journal::open(&path, &begun("two", 40, None)).unwrap();
+    assert_eq!(journal.previous(), None);
+    let wall_ns = 1_795_000_000 * second;
+    journal.set_wall_clock(wall_ns, Time::from_ns(100 * second)).unwrap();
+    journal.finish().unwrap();
+    let walls: Vec<_> = read_runs(&path).unwrap().iter().map(|stored| stored.run.started_wall_ns).collect();
+    assert_eq!(walls, [None, Some(wall_ns - 80 * second), Some(5), Some(wall_ns - 60 * second)]);
+}
+
+#[test]
+fn a_run_that_was_cut_off_is_told_with_its_boot() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    shoot(&path, &[shot(1)]);
+    rusqlite::Connection::open(&path).unwrap().execute_batch("UPDATE runs SET finished = 0").unwrap();
+    for (boot, end) in [("one", DirtyEnd::PowerCut), ("none", DirtyEnd::Unknown), ("same", DirtyEnd::Crash)] {
+        let boot_id = match boot {
+            "same" => run().boot_id,
+            "none" => None,
+            other => Some(other.to_owned()),
+        };
+        let journal = Journal::open(&path, &Run { boot_id, ..run() }).unwrap();
+        let previous = journal.previous().unwrap();
+        assert_eq!((previous.run, &previous.boot_id, previous.end), (1, &run().boot_id, end));
+        drop(journal);
+        rusqlite::Connection::open(&path).unwrap().execute_batch("DELETE FROM runs WHERE id > 1").unwrap();
+    }
+    assert!(boot_id().is_some_and(|id| id.len() == 36));
+}
+
+#[test]
+fn space_that_was_kept_takes_rounds_when_the_disk_is_full() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(disk) = SmallDisk::mount(folder.path(), "4m") else { return };
+    let path = disk.0.join("hits.db");
+    let options = JournalOptions { reserve_bytes: 512 << 10, ..JournalOptions::default() };
+    let journal = Journal::open_with(&path, &run(), &options).unwrap();
+    let commit = |numbers: std::ops::RangeInclusive<u64>| {
+        for number in numbers {
+            journal.shot(&shot(number)).unwrap();
+            assert_eq!(journal.commits().recv_timeout(Duration::from_secs(20)).ok(), Some(number));
+        }
+    };
+    commit(1..=1);
+    let reserve = disk.0.join("hits.db.reserve");
+    assert_eq!(fs::metadata(&reserve).unwrap().len(), 512 << 10);
+    assert_eq!(journal.fault(), None);
+    let _ = fs::write(disk.0.join("rest"), vec![1; 8 << 20]);
+    commit(2..=40);
+    assert!(!reserve.exists());
+    let told = (0..400).find_map(|_| {
+        std::thread::sleep(Duration::from_millis(10));
+        journal.fault().filter(|fault| fault.waiting == 0)
+    });
+    let fault = told.unwrap();
+    assert_eq!(fault.fault, Fault::DiskFull);
+    assert!(fault.message.contains("shots are still written"), "{}", fault.message);
+    fs::remove_file(disk.0.join("rest")).unwrap();
+    let over = (0..1000).any(|_| {
+        std::thread::sleep(Duration::from_millis(10));
+        journal.fault().is_none() && reserve.exists()
+    });
+    assert!(over, "{:?}", journal.fault());
+    assert_eq!(journal.finish().unwrap().committed, 40);
+    assert_eq!(all(&path).len(), 40);
 }
 
 #[test]

@@ -19,7 +19,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use bowwave_core::time::Time;
+use bowwave_core::{fault::Fault, time::Time};
 use bowwave_record::{Journal, Run};
 use bowwave_render::Renderer;
 
@@ -89,10 +89,17 @@ fn open_journal(arguments: &Simulate, prepared: &prepare::Prepared) -> Result<Jo
         recording: prepared.properties.source.clone(),
         seed: prepared.setup.scenario.seed,
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        boot_id: bowwave_record::boot_id(),
+        started: Some(bowwave_devices::clock::now()),
     };
     let journal = Journal::open(&arguments.out.join(JOURNAL), &run)?;
-    if let Some(path) = journal.quarantined() {
-        log::warn!("the journal was damaged; it is kept as {} and a fresh one begun", path.display());
+    if let Some(damaged) = journal.quarantined() {
+        log::warn!(
+            "{} the journal was damaged ({}); it is kept as {} and a fresh one begun",
+            Fault::DbQuarantine.code(),
+            damaged.reason,
+            damaged.kept_as.display()
+        );
     }
     Ok(journal)
 }

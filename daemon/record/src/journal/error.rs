@@ -5,7 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use bowwave_core::fault::Fault;
 use rusqlite::ErrorCode;
+use rustix::fs::{StatVfsMountFlags, statvfs};
+
+use crate::space::free_bytes;
 
 /// What is wrong with the journal, where, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -66,8 +70,8 @@ pub enum JournalError {
         /// SQLite's reason.
         reason: String,
     },
-    /// Damaged while in use; the next start puts it aside.
-    #[error("the journal {} is damaged: {reason}; start again to have it put aside and a fresh one begun", path.display())]
+    /// Damaged while in use; it is put aside.
+    #[error("the journal {} is damaged: {reason}; it is put aside and a fresh one begun, check the disk", path.display())]
     Corrupt {
         /// The database.
         path: PathBuf,
@@ -173,6 +177,30 @@ impl fmt::Display for Unwritten {
 }
 
 impl JournalError {
+    /// The code for log and display.
+    pub const fn fault(&self) -> Fault {
+        match self {
+            Self::Full { .. } => Fault::DiskFull,
+            Self::ReadOnly { .. } => Fault::DiskReadOnly,
+            _ => Fault::DiskFsync,
+        }
+    }
+
+    /// Whether the database itself is damaged.
+    pub(crate) const fn is_damage(&self) -> bool {
+        matches!(self, Self::Corrupt { .. } | Self::NotADatabase { .. })
+    }
+
+    /// What an error of the system means for the database at `path`.
+    pub(crate) fn from_io(path: &Path, doing: &'static str, source: io::Error) -> Self {
+        let path = path.to_path_buf();
+        match source.kind() {
+            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Self::Full { path },
+            io::ErrorKind::ReadOnlyFilesystem => Self::ReadOnly { path, reason: source.to_string() },
+            _ => Self::File { path, doing, source },
+        }
+    }
+
     /// What an error of SQLite means for the database at `path`.
     pub(crate) fn from_sql(path: &Path, error: &rusqlite::Error) -> Self {
         let path = path.to_path_buf();
@@ -186,10 +214,20 @@ impl JournalError {
             Some(ErrorCode::CannotOpen) => Self::Open { path, reason },
             Some(ErrorCode::NotADatabase) => Self::NotADatabase { path },
             Some(ErrorCode::DatabaseCorrupt) => Self::Corrupt { path, reason },
+            // SQLite does not tell a file system that turned read-only from a broken one, nor one that is full where it
+            // maps memory or syncs.
+            Some(ErrorCode::SystemIoFailure) if is_read_only(&path) => Self::ReadOnly { path, reason },
+            Some(ErrorCode::SystemIoFailure) if free_bytes(&path).is_ok_and(|free| free == 0) => {
+                Self::Full { path }
+            }
             Some(ErrorCode::SystemIoFailure) => Self::Disk { path, reason },
             _ => Self::Sql { path, reason },
         }
     }
+}
+
+fn is_read_only(path: &Path) -> bool {
+    statvfs(path).is_ok_and(|status| status.f_flag.contains(StatVfsMountFlags::RDONLY))
 }
 
 fn span(first: Option<i64>, last: Option<i64>) -> String {

@@ -2,25 +2,37 @@
 //!
 //! Written by a thread of its own from a bounded queue, one transaction for whatever is queued, in WAL mode with
 //! `synchronous=FULL`: once a round's number comes out of [`Journal::commits`] it survives a crash and a power cut. While the
-//! disk is full or gone, rounds are kept in memory and written as soon as it is back.
+//! disk is full or gone, rounds are kept in memory and written as soon as it is back. After an fsync that failed nothing
+//! since the last one that succeeded is taken for written; the database is opened anew and written again. A database that
+//! turns out to be damaged is put aside at any time, and a fresh one goes on with this run's rounds.
+//!
+//! Files beside the database `hits.sqlite`: `-wal` and `-shm` are SQLite's, `.reserve` keeps space for when the disk is full,
+//! `.corrupt-N` are damaged databases, `.making` and `.fresh` exist while one is put aside, `.unwritten-N.jsonl` has the
+//! rounds of run N that the database never took.
 
+mod boot;
 mod error;
 mod open;
+mod quarantine;
 mod query;
+mod reserve;
 mod row;
+mod schema;
 mod worker;
 
 use std::{
     convert::Infallible,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     thread::JoinHandle,
     time::Duration,
 };
 
-use bowwave_core::score::ShotRecord;
+use bowwave_core::{fault::Fault, score::ShotRecord, time::Time};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 
+use boot::WallClock;
+pub use boot::{DirtyEnd, DirtyRun, boot_id};
 pub use error::{JournalError, Unwritten};
 pub use query::{RunSelection, ShotFilter, StoredRun, read_runs, read_shots};
 pub use row::StoredShot;
@@ -32,7 +44,8 @@ const QUEUE: usize = 4096;
 /// What a run of the trainer was about.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Run {
-    /// Wall time of its beginning, nanoseconds since 1970, where the clock is known to be set.
+    /// Wall time of its beginning, nanoseconds since 1970, where the clock is known to be set. [`Journal::set_wall_clock`]
+    /// fills it in later.
     pub started_wall_ns: Option<i64>,
     /// Name or file of the scenario.
     pub scenario: String,
@@ -42,15 +55,53 @@ pub struct Run {
     pub seed: u64,
     /// Version of the program.
     pub version: String,
+    /// The boot it runs in, see [`boot_id`].
+    pub boot_id: Option<String>,
+    /// Time of its beginning since that boot.
+    pub started: Option<Time>,
 }
 
-/// Why rounds wait in memory.
+/// How a journal is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct JournalOptions {
+    /// Size of the file that keeps space for rounds when the disk is full, bytes; 0 for none. It stays there between runs.
+    pub reserve_bytes: u64,
+    /// Pages in the log beyond which they are moved into the database.
+    pub checkpoint_pages: u32,
+}
+
+impl JournalOptions {
+    /// A reserve of this size keeps some 30,000 rounds.
+    pub const RESERVE_BYTES: u64 = 8 << 20;
+}
+
+impl Default for JournalOptions {
+    /// Without a reserve: for runs on a desk.
+    fn default() -> Self {
+        Self { reserve_bytes: 0, checkpoint_pages: 1000 }
+    }
+}
+
+/// What is wrong with keeping the journal at present.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JournalFault {
+    /// One of [`Fault::DiskFull`], [`Fault::DiskReadOnly`] and [`Fault::DiskFsync`].
+    pub fault: Fault,
     /// What is wrong and what to do, one line.
     pub message: String,
-    /// Rounds that wait.
+    /// Rounds that wait in memory. 0 where rounds are still written, into the space that was kept for them.
     pub waiting: usize,
+}
+
+/// A damaged database that was put aside.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Quarantine {
+    /// Where it is now.
+    pub kept_as: PathBuf,
+    /// How it is damaged.
+    pub reason: String,
+    /// Rounds of the present run that only it may have: more were fired than are kept in memory.
+    pub rounds_left_there: u64,
 }
 
 /// What a finished journal holds of its run.
@@ -69,6 +120,14 @@ pub struct JournalSummary {
 struct Settings {
     /// Most pages of the database.
     pages_max: Option<u32>,
+    /// Pages of the database that SQLite may keep in memory.
+    pages_cached: Option<u32>,
+    /// As in [`JournalOptions`].
+    reserve_bytes: u64,
+    /// As in [`JournalOptions`].
+    checkpoint_pages: u32,
+    /// Most committed rounds of this run kept in memory, for a fresh database.
+    kept_max: usize,
     /// Most rounds kept in memory while the database cannot be written.
     held_max: usize,
     /// First pause after a failure; doubles up to `retry_max`.
@@ -79,28 +138,46 @@ struct Settings {
     finish_attempts: u32,
 }
 
-impl Default for Settings {
-    fn default() -> Self {
+impl From<&JournalOptions> for Settings {
+    fn from(options: &JournalOptions) -> Self {
         Self {
             pages_max: None,
+            pages_cached: None,
+            reserve_bytes: options.reserve_bytes,
+            checkpoint_pages: options.checkpoint_pages,
+            kept_max: 100_000,
             held_max: 100_000,
             retry_first: Duration::from_millis(50),
-            retry_max: Duration::from_secs(5),
+            retry_max: Duration::from_secs(1),
             finish_attempts: 6,
         }
     }
+}
+
+/// What the thread tells.
+#[derive(Debug, Default)]
+struct Told {
+    fault: Option<JournalFault>,
+    quarantine: Option<Quarantine>,
+}
+
+/// What the thread is told.
+#[derive(Debug)]
+enum Message {
+    Shot(ShotRecord),
+    Clock(WallClock),
 }
 
 /// The journal of one run, open for writing.
 pub struct Journal {
     path: PathBuf,
     run: i64,
-    quarantined: Option<PathBuf>,
-    queue: Option<Sender<ShotRecord>>,
+    previous: Option<DirtyRun>,
+    queue: Option<Sender<Message>>,
     /// Never carries anything; its end tells the thread to finish.
     open: Option<Sender<Infallible>>,
     commits: Receiver<u64>,
-    fault: Arc<Mutex<Option<JournalFault>>>,
+    told: Arc<Mutex<Told>>,
     thread: Option<JoinHandle<Ended>>,
 }
 
@@ -108,19 +185,26 @@ impl Journal {
     /// Opens or makes the database at `path` and begins a run in it. A damaged database is put aside under another name
     /// ([`Journal::quarantined`]) and a fresh one begun.
     pub fn open(path: &Path, run: &Run) -> Result<Self, JournalError> {
-        Self::open_with(path, run, Settings::default())
+        Self::open_with(path, run, &JournalOptions::default())
     }
 
-    fn open_with(path: &Path, run: &Run, settings: Settings) -> Result<Self, JournalError> {
-        let opened = open::for_writing(path, settings.pages_max)?;
-        let id = open::begin_run(&opened.connection, path, run)?;
+    /// The same with other options.
+    pub fn open_with(path: &Path, run: &Run, options: &JournalOptions) -> Result<Self, JournalError> {
+        Self::start(path, run, Settings::from(options))
+    }
+
+    fn start(path: &Path, run: &Run, settings: Settings) -> Result<Self, JournalError> {
+        let opened = open::for_writing(path, &settings)?;
+        let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
+        let previous = boot::last_dirty(&opened.connection, run.boot_id.as_deref()).map_err(fail)?;
+        let id = schema::begin_run(&opened.connection, None, run).map_err(fail)?;
         let (queue, incoming) = bounded(QUEUE);
         // Eight bytes a round, and rounds are bounded by belts: not worth losing an acknowledgement for.
         let (committed, commits) = unbounded();
         let (open, closing) = bounded(0);
-        let fault = Arc::new(Mutex::new(None));
-        let ends = Ends { incoming, closing, commits: committed, fault: Arc::clone(&fault) };
-        let worker = Worker::new(opened.connection, path, id, ends, settings);
+        let told = Arc::new(Mutex::new(Told { fault: None, quarantine: opened.quarantined }));
+        let ends = Ends { incoming, closing, commits: committed, told: Arc::clone(&told) };
+        let worker = Worker::new(opened.connection, path, (id, run.clone()), ends, settings);
         let thread =
             std::thread::Builder::new().name("journal".to_owned()).spawn(move || worker.run()).map_err(
                 |source| JournalError::File { path: path.into(), doing: "start the thread for", source },
@@ -128,11 +212,11 @@ impl Journal {
         Ok(Self {
             path: path.into(),
             run: id,
-            quarantined: opened.quarantined,
+            previous,
             queue: Some(queue),
             open: Some(open),
             commits,
-            fault,
+            told,
             thread: Some(thread),
         })
     }
@@ -147,17 +231,34 @@ impl Journal {
         &self.path
     }
 
-    /// Where a damaged database was put, if there was one. Worth a line to the user.
-    pub fn quarantined(&self) -> Option<&Path> {
-        self.quarantined.as_deref()
+    /// The last damaged database that was put aside, if any: when the journal was opened or since. Raises
+    /// [`Fault::DbQuarantine`].
+    pub fn quarantined(&self) -> Option<Quarantine> {
+        self.told().quarantine.clone()
+    }
+
+    /// The run before this one where it did not end as it should: worth a [`Fault::BootDirty`]. Another program that has the
+    /// same database open and runs at this moment looks like a crash.
+    pub const fn previous(&self) -> Option<&DirtyRun> {
+        self.previous.as_ref()
     }
 
     /// Queues a round; never waits. [`JournalError::QueueFull`] means that the round was not taken and the caller still has
     /// it.
     pub fn shot(&self, shot: &ShotRecord) -> Result<(), JournalError> {
+        self.send(Message::Shot(shot.clone()), shot.shot)
+    }
+
+    /// Tells what the wall clock shows, nanoseconds since 1970, at a time since boot, once it is known to be set. All runs of
+    /// this boot without a wall time get theirs. Never waits; where the queue is full, say it again later.
+    pub fn set_wall_clock(&self, wall_ns: i64, at: Time) -> Result<(), JournalError> {
+        self.send(Message::Clock(WallClock { wall_ns, at }), 0)
+    }
+
+    fn send(&self, message: Message, shot: u64) -> Result<(), JournalError> {
         let Some(queue) = &self.queue else { return Err(self.stopped()) };
-        queue.try_send(shot.clone()).map_err(|error| match error {
-            TrySendError::Full(shot) => JournalError::QueueFull { path: self.path.clone(), shot: shot.shot },
+        queue.try_send(message).map_err(|error| match error {
+            TrySendError::Full(_) => JournalError::QueueFull { path: self.path.clone(), shot },
             TrySendError::Disconnected(_) => self.stopped(),
         })
     }
@@ -167,9 +268,13 @@ impl Journal {
         &self.commits
     }
 
-    /// What keeps rounds from being written at present, if anything.
+    /// What is wrong with keeping the journal at present, if anything.
     pub fn fault(&self) -> Option<JournalFault> {
-        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.told().fault.clone()
+    }
+
+    fn told(&self) -> MutexGuard<'_, Told> {
+        self.told.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Writes what is queued and closes the database. Where rounds cannot be written they go to a file beside it, and

@@ -1,94 +1,59 @@
-//! Opening the database: version, settings, quarantine.
+//! Opening the database, and closing it without trusting what the disk did not confirm.
 
 use std::{
     ffi::OsString,
-    fs::{self, File},
+    fs::{self, File, OpenOptions},
     io::{self, Read},
-    os::unix::ffi::OsStrExt,
+    os::unix::{ffi::OsStrExt, fs::FileExt},
     path::{Path, PathBuf},
     time::Duration,
 };
 
-use rusqlite::{Connection, ErrorCode, OpenFlags, TransactionBehavior, params};
+use rusqlite::{Connection, ErrorCode, OpenFlags, config::DbConfig};
 
-use super::{JournalError, Run};
+use super::{
+    JournalError, Quarantine, Settings, quarantine,
+    schema::{self, APPLICATION_ID, VERSION},
+};
 
-/// Marks the file as ours ("BOWW").
-const APPLICATION_ID: i64 = 0x424f_5757;
-/// Version of the tables.
-const VERSION: i64 = 1;
 /// How long another process may hold the database before that is an error.
 const BUSY: Duration = Duration::from_secs(2);
+/// SQLite's page.
+const PAGE_BYTES: u64 = 4096;
 const MAGIC: &[u8; 16] = b"SQLite format 3\0";
-
-/// The tables. Numbers that are not finite become NULL, since SQLite has no NaN.
-const TABLES: &str = "
-CREATE TABLE runs (
-    id INTEGER PRIMARY KEY AUTOINCREMENT,
-    started_wall_ns INTEGER,
-    scenario TEXT NOT NULL,
-    recording TEXT NOT NULL,
-    seed TEXT NOT NULL,
-    version TEXT NOT NULL,
-    finished INTEGER NOT NULL DEFAULT 0 CHECK (finished IN (0, 1))
-) STRICT;
-CREATE TABLE shots (
-    run INTEGER NOT NULL REFERENCES runs (id),
-    shot INTEGER NOT NULL,
-    fired_ns INTEGER NOT NULL,
-    muzzle_x_m REAL, muzzle_y_m REAL, muzzle_z_m REAL,
-    bore_x REAL, bore_y REAL, bore_z REAL,
-    pose_age_ns INTEGER NOT NULL,
-    outcome TEXT NOT NULL CHECK (outcome IN ('hit', 'miss', 'not_scored')),
-    boat TEXT CHECK (boat IS NOT NULL OR outcome <> 'hit'),
-    zone TEXT CHECK ((zone IS NOT NULL) = (outcome = 'hit')),
-    time_ns INTEGER CHECK ((time_ns IS NOT NULL) = (outcome <> 'not_scored')),
-    range_m REAL,
-    point_x_m REAL, point_y_m REAL, point_z_m REAL,
-    miss_m REAL,
-    cause TEXT CHECK ((cause IS NOT NULL) = (outcome = 'not_scored')),
-    PRIMARY KEY (run, shot)
-) STRICT, WITHOUT ROWID;
-";
 
 /// A database that is ready to be written.
 pub(super) struct Opened {
     pub(super) connection: Connection,
-    pub(super) quarantined: Option<PathBuf>,
+    pub(super) quarantined: Option<Quarantine>,
 }
 
 /// Opens or makes the database for writing; puts a damaged one aside.
-pub(super) fn for_writing(path: &Path, pages_max: Option<u32>) -> Result<Opened, JournalError> {
+pub(super) fn for_writing(path: &Path, settings: &Settings) -> Result<Opened, JournalError> {
+    if let Some(resumed) = quarantine::resume(path)? {
+        return Ok(Opened { connection: connect(path, settings)?, quarantined: Some(resumed) });
+    }
     let head = head(path)?;
     if head.looks_foreign() {
         return Err(JournalError::NotADatabase { path: path.into() });
     }
+    if head.is_blank() && was_never_begun(path)? {
+        remove_unborn(path)?;
+    }
+    let head = self::head(path)?;
     let broken = if head.is_blank() { Err("its beginning is blank".to_owned()) } else { check(path)? };
     let Err(reason) = broken else {
-        return Ok(Opened { connection: connect(path, pages_max)?, quarantined: None });
+        return Ok(Opened { connection: connect(path, settings)?, quarantined: None });
     };
-    let aside = quarantine(path)?;
-    log::error!(
-        "DB_QUARANTINE the journal {} is damaged ({reason}); it is kept as {} and a fresh one begun",
-        path.display(),
-        aside.display()
-    );
-    Ok(Opened { connection: connect(path, pages_max)?, quarantined: Some(aside) })
-}
-
-/// Begins a run and gives its number.
-pub(super) fn begin_run(connection: &Connection, path: &Path, run: &Run) -> Result<i64, JournalError> {
-    connection
-        .execute(
-            "INSERT INTO runs (started_wall_ns, scenario, recording, seed, version) VALUES (?1, ?2, ?3, ?4, ?5)",
-            params![run.started_wall_ns, run.scenario, run.recording, run.seed.to_string(), run.version],
-        )
-        .map_err(|error| JournalError::from_sql(path, &error))?;
-    Ok(connection.last_insert_rowid())
+    let kept_as = quarantine::replace(path, settings, |_| Ok(()))?;
+    let quarantined = Some(Quarantine { kept_as, reason, rounds_left_there: 0 });
+    Ok(Opened { connection: connect(path, settings)?, quarantined })
 }
 
 /// Opens an existing journal for reading.
-pub(super) fn for_reading(path: &Path) -> Result<Connection, JournalError> {
+///
+/// Also gives the version of its tables: nothing is migrated by reading.
+pub(super) fn for_reading(path: &Path) -> Result<(Connection, i64), JournalError> {
     match fs::metadata(path) {
         Ok(status) if status.is_file() => {}
         Ok(_) => return Err(JournalError::NotADatabase { path: path.into() }),
@@ -103,7 +68,7 @@ pub(super) fn for_reading(path: &Path) -> Result<Connection, JournalError> {
     let (connection, versions) =
         connect_for_reading(path).map_err(|error| JournalError::from_sql(path, &error))?;
     match versions {
-        (APPLICATION_ID, VERSION) => Ok(connection),
+        (APPLICATION_ID, found @ 1..=VERSION) => Ok((connection, found)),
         (APPLICATION_ID, found) if found > VERSION => {
             Err(JournalError::Newer { path: path.into(), found, supported: VERSION })
         }
@@ -116,7 +81,7 @@ fn connect_for_reading(path: &Path) -> rusqlite::Result<(Connection, (i64, i64))
     let open = |name: &Path, flags| {
         let connection = Connection::open_with_flags(name, flags)?;
         connection.busy_timeout(BUSY)?;
-        let versions = versions(&connection)?;
+        let versions = schema::versions(&connection)?;
         Ok((connection, versions))
     };
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
@@ -176,11 +141,34 @@ fn head(path: &Path) -> Result<Head, JournalError> {
     Ok(Head(bytes))
 }
 
+/// Whether the file is what a power cut leaves of a database that was just being made: one page without its bytes, and no
+/// log. Nothing was ever in it.
+fn was_never_begun(path: &Path) -> Result<bool, JournalError> {
+    let fail = |source| JournalError::from_io(path, "read", source);
+    if fs::metadata(path).map_err(fail)?.len() > PAGE_BYTES {
+        return Ok(false);
+    }
+    let blank = fs::read(path).map_err(fail)?.iter().all(|byte| *byte == 0);
+    Ok(blank && fs::metadata(with_suffix(path, "-wal")).map_or(0, |status| status.len()) == 0)
+}
+
+fn remove_unborn(path: &Path) -> Result<(), JournalError> {
+    let fail = |source| JournalError::from_io(path, "begin again", source);
+    for part in ["-journal", ""] {
+        match fs::remove_file(with_suffix(path, part)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(fail(error)),
+            _ => {}
+        }
+    }
+    sync_folder(path)
+}
+
 /// Whether the database is intact; the inner error says why not. A fresh one is.
 fn check(path: &Path) -> Result<Result<(), String>, JournalError> {
     let found = (|| {
         let connection = Connection::open(path)?;
         connection.busy_timeout(BUSY)?;
+        keep_log(&connection);
         connection.query_row("PRAGMA quick_check(1)", [], |row| row.get::<_, String>(0))
     })();
     match found {
@@ -199,80 +187,96 @@ fn check(path: &Path) -> Result<Result<(), String>, JournalError> {
     }
 }
 
-fn connect(path: &Path, pages_max: Option<u32>) -> Result<Connection, JournalError> {
+/// Connects to a database that is intact, or makes it. Everything that can be read over the connection is on the disk.
+pub(super) fn connect(path: &Path, settings: &Settings) -> Result<Connection, JournalError> {
     let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
     let mut connection = Connection::open(path).map_err(fail)?;
     connection.busy_timeout(BUSY).map_err(fail)?;
-    claim(&connection, path)?;
+    keep_log(&connection);
+    schema::claim(&connection, path)?;
     let mode: String =
         connection.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0)).map_err(fail)?;
     if mode != "wal" {
         let reason = format!("its file system allows no write-ahead log (got {mode})");
         return Err(JournalError::Open { path: path.into(), reason });
     }
+    // Checkpoints are the thread's own business: SQLite would keep quiet about those that fail.
     connection
-        .execute_batch("PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON; PRAGMA trusted_schema = OFF;")
+        .execute_batch(
+            "PRAGMA synchronous = FULL; PRAGMA foreign_keys = ON; PRAGMA trusted_schema = OFF; \
+             PRAGMA cell_size_check = ON;",
+        )
         .map_err(fail)?;
-    if let Some(pages) = pages_max {
+    connection.query_row("PRAGMA wal_autocheckpoint = 0", [], |_| Ok(())).map_err(fail)?;
+    if let Some(pages) = settings.pages_max {
         connection.query_row(&format!("PRAGMA max_page_count = {pages}"), [], |_| Ok(())).map_err(fail)?;
     }
-    make_tables(&mut connection).map_err(fail)?;
+    if let Some(pages) = settings.pages_cached {
+        connection.execute_batch(&format!("PRAGMA cache_size = {pages}")).map_err(fail)?;
+    }
+    settle_log(&connection, path)?;
+    schema::make_tables(&mut connection).map_err(fail)?;
+    // SQLite asks for this too, and does not say when it fails.
+    sync_folder(path)?;
     Ok(connection)
 }
 
-/// Refuses databases of other programs and of newer versions.
-fn claim(connection: &Connection, path: &Path) -> Result<(), JournalError> {
-    let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
-    let (application, version) = versions(connection).map_err(fail)?;
-    if application == APPLICATION_ID {
-        if version > VERSION {
-            return Err(JournalError::Newer { path: path.into(), found: version, supported: VERSION });
-        }
+/// Puts the log that is found beside the database onto the disk again.
+///
+/// After an fsync that failed, Linux holds the pages for clean: they read as written although the disk has none of them, and
+/// the next fsync reports success. A log that was left behind (by the process that saw the failure, or by one that died
+/// since) may be such a one. It is written once more, byte by byte the same, before anything is built upon it.
+fn settle_log(connection: &Connection, path: &Path) -> Result<(), JournalError> {
+    let log = with_suffix(path, "-wal");
+    if fs::metadata(&log).map_or(0, |status| status.len()) == 0 {
         return Ok(());
     }
-    let tables: i64 =
-        connection.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0)).map_err(fail)?;
-    if application != 0 || version != 0 || tables != 0 {
-        return Err(JournalError::ForeignDatabase { path: path.into() });
-    }
-    Ok(())
+    let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
+    // Nobody else may write the log meanwhile.
+    connection.execute_batch("BEGIN IMMEDIATE").map_err(fail)?;
+    let written = write_again(&log);
+    connection.execute_batch("ROLLBACK").map_err(fail)?;
+    written.map_err(|source| JournalError::from_io(path, "write again the log of", source))
 }
 
-/// Application and schema version.
-fn versions(connection: &Connection) -> rusqlite::Result<(i64, i64)> {
-    let application = connection.query_row("PRAGMA application_id", [], |row| row.get(0))?;
-    let version = connection.query_row("PRAGMA user_version", [], |row| row.get(0))?;
-    Ok((application, version))
+fn write_again(path: &Path) -> io::Result<()> {
+    let file = OpenOptions::new().read(true).write(true).open(path)?;
+    let mut buffer = vec![0; 64 << 10];
+    let mut offset = 0;
+    loop {
+        let count = file.read_at(&mut buffer, offset)?;
+        let Some(bytes) = buffer.get(..count).filter(|bytes| !bytes.is_empty()) else { break };
+        file.write_all_at(bytes, offset)?;
+        offset += count as u64;
+    }
+    file.sync_all()
 }
 
-/// Makes the tables where there are none. One transaction, so that nobody ever finds half of them.
-fn make_tables(connection: &mut Connection) -> rusqlite::Result<()> {
-    let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-    // Asked within the transaction: another process may have been faster.
-    if versions(&transaction)?.1 == 0 {
-        transaction.execute_batch(TABLES)?;
-        transaction.execute_batch(&format!(
-            "PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"
-        ))?;
+/// Leaves the log where it is when the connection is closed, instead of moving it into the database: for connections that
+/// may see what is not on the disk.
+pub(super) fn keep_log(connection: &Connection) {
+    // Fails only for options that SQLite does not know.
+    if let Err(error) = connection.set_db_config(DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, true) {
+        log::debug!("SQLite keeps no log at the end: {error}");
     }
-    transaction.commit()
 }
 
-/// Renames the database and its log; the number makes the name unique.
-fn quarantine(path: &Path) -> Result<PathBuf, JournalError> {
-    let fail = |source| JournalError::File { path: path.into(), doing: "put aside", source };
-    let aside = (1_u32..)
-        .map(|number| with_suffix(path, &format!(".corrupt-{number}")))
-        .find(|candidate| !candidate.exists())
-        .ok_or_else(|| fail(io::Error::from(io::ErrorKind::AlreadyExists)))?;
-    fs::rename(path, &aside).map_err(fail)?;
-    for part in ["-wal", "-shm"] {
-        match fs::rename(with_suffix(path, part), with_suffix(&aside, part)) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(fail(error)),
-            _ => {}
-        }
+/// Has the log moved into the database when the connection is closed, for one that has met no failure.
+pub(super) fn empty_log_at_end(connection: &Connection) {
+    if let Err(error) = connection.set_db_config(DbConfig::SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, false) {
+        log::debug!("SQLite keeps its log: {error}");
     }
-    Ok(aside)
+}
+
+/// Puts the names in the folder of `path` onto the disk.
+pub(super) fn sync_folder(path: &Path) -> Result<(), JournalError> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    File::open(folder)
+        .and_then(|folder| folder.sync_all())
+        .map_err(|source| JournalError::from_io(path, "sync the folder of", source))
 }
 
 /// `path` with `suffix` behind its name.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use bowwave_core::time::Time;
 use rusqlite::{Connection, params};
 
 use super::{JournalError, Run, StoredShot, open, row};
@@ -44,7 +45,7 @@ pub struct StoredRun {
 
 /// The rounds that `filter` selects, by run and number.
 pub fn read_shots(path: &Path, filter: &ShotFilter) -> Result<Vec<StoredShot>, JournalError> {
-    let connection = open::for_reading(path)?;
+    let (connection, _) = open::for_reading(path)?;
     let run = match filter.runs {
         RunSelection::All => None,
         RunSelection::Latest => match span(&connection, path)?.1 {
@@ -77,13 +78,14 @@ pub fn read_shots(path: &Path, filter: &ShotFilter) -> Result<Vec<StoredShot>, J
 
 /// All runs, oldest first.
 pub fn read_runs(path: &Path) -> Result<Vec<StoredRun>, JournalError> {
-    let connection = open::for_reading(path)?;
+    let (connection, version) = open::for_reading(path)?;
+    let boot = if version >= 2 { "boot_id, started_ns" } else { "NULL, NULL" };
     let read = || -> rusqlite::Result<Vec<StoredRun>> {
-        let mut statement = connection.prepare(
+        let mut statement = connection.prepare(&format!(
             "SELECT id, started_wall_ns, scenario, recording, seed, version, finished, \
              (SELECT count(*) FROM shots WHERE run = id), \
-             (SELECT count(*) FROM shots WHERE run = id AND outcome = 'hit') FROM runs ORDER BY id",
-        )?;
+             (SELECT count(*) FROM shots WHERE run = id AND outcome = 'hit'), {boot} FROM runs ORDER BY id",
+        ))?;
         let rows = statement.query_map([], |row| {
             let seed: String = row.get(4)?;
             Ok(StoredRun {
@@ -100,6 +102,8 @@ pub fn read_runs(path: &Path) -> Result<Vec<StoredRun>, JournalError> {
                         )
                     })?,
                     version: row.get(5)?,
+                    boot_id: row.get(9)?,
+                    started: row.get::<_, Option<i64>>(10)?.map(Time::from_ns),
                 },
                 finished: row.get(6)?,
                 shots: row.get::<_, i64>(7)?.unsigned_abs(),

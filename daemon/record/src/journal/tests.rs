@@ -24,7 +24,14 @@ fn shot(number: u64) -> ShotRecord {
 
 fn impatient(pages_max: Option<u32>) -> Settings {
     let retry = Duration::from_millis(5);
-    Settings { pages_max, held_max: 2000, retry_first: retry, retry_max: retry, finish_attempts: 3 }
+    Settings {
+        pages_max,
+        held_max: 2000,
+        retry_first: retry,
+        retry_max: retry,
+        finish_attempts: 3,
+        ..Settings::from(&JournalOptions::default())
+    }
 }
 
 fn wait_for<T>(mut ask: impl FnMut() -> Option<T>) -> T {
@@ -41,11 +48,12 @@ fn wait_for<T>(mut ask: impl FnMut() -> Option<T>) -> T {
 fn what_a_full_database_cannot_take_is_put_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hits.db");
-    let journal = Journal::open_with(&path, &Run::default(), impatient(Some(12))).unwrap();
+    let journal = Journal::start(&path, &Run::default(), impatient(Some(12))).unwrap();
     for number in 1..=1500 {
         wait_for(|| journal.shot(&shot(number)).ok());
     }
     let fault = wait_for(|| journal.fault());
+    assert_eq!(fault.fault, Fault::DiskFull);
     assert!(fault.message.contains("is full; free some space"), "{}", fault.message);
     assert!(fault.waiting > 0);
     let acknowledged: Vec<u64> = journal.commits().try_iter().collect();
@@ -71,7 +79,7 @@ fn what_a_full_database_cannot_take_is_put_beside_it() {
 fn more_than_may_be_held_is_refused_not_lost() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hits.db");
-    let journal = Journal::open_with(&path, &Run::default(), impatient(Some(8))).unwrap();
+    let journal = Journal::start(&path, &Run::default(), impatient(Some(8))).unwrap();
     let mut taken = 0;
     let refused = (1..=20_000)
         .map(|number| {
@@ -93,7 +101,7 @@ fn more_than_may_be_held_is_refused_not_lost() {
 fn a_locked_database_is_written_once_it_is_free() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hits.db");
-    let journal = Journal::open_with(&path, &Run::default(), impatient(None)).unwrap();
+    let journal = Journal::start(&path, &Run::default(), impatient(None)).unwrap();
     let other = Connection::open(&path).unwrap();
     other.execute_batch("BEGIN IMMEDIATE").unwrap();
     journal.shot(&shot(1)).unwrap();
@@ -106,4 +114,102 @@ fn a_locked_database_is_written_once_it_is_free() {
     let summary = journal.finish().unwrap();
     assert_eq!(summary.committed, 1);
     assert!(read_runs(&path).unwrap()[0].finished);
+}
+
+#[test]
+fn a_database_damaged_while_in_use_is_put_aside_and_this_runs_rounds_written_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    // A cache of a few pages, and a log that is emptied at once: SQLite has to read what was damaged.
+    let settings = Settings { pages_cached: Some(2), checkpoint_pages: 1, ..impatient(None) };
+    let run = Run { scenario: "three skiffs".to_owned(), ..Run::default() };
+    let journal = Journal::start(&path, &run, settings).unwrap();
+    let shoot = |from: u64, to: u64| {
+        for number in from..=to {
+            wait_for(|| journal.shot(&shot(number)).ok());
+            assert_eq!(journal.commits().recv_timeout(Duration::from_secs(10)).ok(), Some(number));
+        }
+    };
+    shoot(1, 300);
+    let length = fs::metadata(&path).unwrap().len();
+    let file = fs::OpenOptions::new().write(true).open(&path).unwrap();
+    std::os::unix::fs::FileExt::write_all_at(&file, &vec![0xa5; length as usize - 4096], 4096).unwrap();
+    let begun = std::time::Instant::now();
+    shoot(301, 320);
+    assert!(begun.elapsed() < Duration::from_secs(2), "{:?}", begun.elapsed());
+    let quarantine = journal.quarantined().unwrap();
+    assert_eq!(quarantine.kept_as, folder.path().join("hits.db.corrupt-1"));
+    assert_eq!(quarantine.rounds_left_there, 0);
+    assert!(quarantine.reason.contains("malformed"), "{}", quarantine.reason);
+    wait_for(|| journal.fault().is_none().then_some(()));
+    let id = journal.run();
+    assert_eq!(journal.finish().unwrap().committed, 320);
+    let stored = read_shots(&path, &ShotFilter::default()).unwrap();
+    let expected: Vec<_> = (1..=320).map(|number| StoredShot { run: id, record: shot(number) }).collect();
+    assert_eq!(stored, expected);
+    let runs = read_runs(&path).unwrap();
+    assert_eq!((runs.len(), runs[0].run.clone(), runs[0].finished), (1, run, true));
+}
+
+#[test]
+fn a_quarantine_that_was_interrupted_is_ended() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    for step in 0..3 {
+        fs::write(&path, b"SQLite format 3\0 and nothing of use").unwrap();
+        fs::write(open::with_suffix(&path, "-wal"), b"its log").unwrap();
+        let journal = Journal::open(&folder.path().join("other.db"), &Run::default()).unwrap();
+        journal.finish().unwrap();
+        fs::rename(folder.path().join("other.db"), open::with_suffix(&path, ".fresh")).unwrap();
+        let aside = open::with_suffix(&path, &format!(".corrupt-{}", step + 1));
+        if step >= 1 {
+            fs::rename(open::with_suffix(&path, "-wal"), open::with_suffix(&aside, "-wal")).unwrap();
+        }
+        if step >= 2 {
+            fs::rename(&path, &aside).unwrap();
+        }
+        let journal = Journal::open(&path, &Run::default()).unwrap();
+        assert_eq!(journal.quarantined().unwrap().kept_as, aside);
+        assert_eq!(journal.run(), 2, "the fresh one's first run was there already");
+        journal.finish().unwrap();
+        assert!(!open::with_suffix(&path, ".fresh").exists());
+        assert_eq!(fs::read(open::with_suffix(&aside, "-wal")).unwrap(), b"its log");
+    }
+}
+
+#[test]
+fn what_a_cut_leaves_of_a_database_just_being_made_is_no_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    fs::write(&path, vec![0; 4096]).unwrap();
+    fs::write(open::with_suffix(&path, "-journal"), b"").unwrap();
+    let journal = Journal::open(&path, &Run::default()).unwrap();
+    assert_eq!((journal.quarantined(), journal.run()), (None, 1));
+    journal.finish().unwrap();
+    // With a log there may have been rounds.
+    fs::write(&path, vec![0; 4096]).unwrap();
+    fs::write(open::with_suffix(&path, "-wal"), b"something").unwrap();
+    let journal = Journal::open(&path, &Run::default()).unwrap();
+    assert!(journal.quarantined().is_some());
+}
+
+#[test]
+fn a_log_that_was_left_behind_is_put_onto_the_disk_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.db");
+    let settings = impatient(None);
+    let connection = open::connect(&path, &settings).unwrap();
+    schema::begin_run(&connection, None, &Run::default()).unwrap();
+    open::keep_log(&connection);
+    drop(connection);
+    let log = open::with_suffix(&path, "-wal");
+    let before = fs::read(&log).unwrap();
+    assert!(before.len() > 4096);
+    let changed = fs::metadata(&log).unwrap().modified().unwrap();
+    std::thread::sleep(Duration::from_millis(20));
+    let connection = open::connect(&path, &settings).unwrap();
+    assert_eq!(fs::read(&log).unwrap(), before);
+    assert!(fs::metadata(&log).unwrap().modified().unwrap() > changed, "it was not written");
+    let runs: i64 = connection.query_row("SELECT count(*) FROM runs", [], |row| row.get(0)).unwrap();
+    assert_eq!(runs, 1);
 }

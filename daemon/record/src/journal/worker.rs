@@ -10,17 +10,27 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::score::ShotRecord;
+use bowwave_core::{fault::Fault, score::ShotRecord};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, after, never, select};
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
-use super::{JournalError, JournalFault, Settings, StoredShot, Unwritten, open::with_suffix, row};
+use super::{
+    JournalError, JournalFault, Message, Quarantine, Run, Settings, StoredShot, Told, Unwritten,
+    boot::WallClock,
+    open::{connect, empty_log_at_end, keep_log, with_suffix},
+    quarantine,
+    reserve::Reserve,
+    row, schema,
+};
 
 /// Most rounds in one transaction.
 const BATCH: usize = 1024;
 
 /// How long the database may be held by another process within one attempt.
 const BUSY: Duration = Duration::from_millis(250);
+
+/// How often a reserve that was given up is tried again.
+const RESERVE_PAUSE: Duration = Duration::from_secs(2);
 
 /// Longest pause between attempts while the journal is being finished.
 const FINISH_PAUSE_MAX: Duration = Duration::from_millis(500);
@@ -33,17 +43,30 @@ pub(super) struct Ended {
 
 /// The state of the thread.
 pub(super) struct Worker {
-    connection: Connection,
+    /// `None` after a failure that leaves in doubt what it would read: it is opened anew.
+    connection: Option<Connection>,
     path: PathBuf,
-    run: i64,
-    incoming: Receiver<ShotRecord>,
+    id: i64,
+    run: Run,
+    incoming: Receiver<Message>,
     /// Disconnected once the journal is being finished. The queue cannot tell while it is full.
     closing: Receiver<Infallible>,
     commits: Sender<u64>,
-    fault: Arc<Mutex<Option<JournalFault>>>,
+    told: Arc<Mutex<Told>>,
     settings: Settings,
+    reserve: Reserve,
+    /// The reserve is not there: the disk is full, or was and has not got room enough yet.
+    low: bool,
     /// Taken from the queue and not yet committed, oldest first.
     held: VecDeque<ShotRecord>,
+    /// Committed rounds of this run, oldest first, for a fresh database.
+    kept: VecDeque<ShotRecord>,
+    /// Committed rounds that are too many to be kept.
+    not_kept: u64,
+    /// Wall time to be filled in.
+    clock: Option<WallClock>,
+    /// What is wrong with the database, until it has been put aside.
+    damage: Option<String>,
     /// What the database refuses for good, with the reason.
     rejected: Vec<(ShotRecord, String)>,
     committed: u64,
@@ -53,25 +76,38 @@ pub(super) struct Worker {
 
 /// The thread's ends of the journal's channels.
 pub(super) struct Ends {
-    pub(super) incoming: Receiver<ShotRecord>,
+    pub(super) incoming: Receiver<Message>,
     pub(super) closing: Receiver<Infallible>,
     pub(super) commits: Sender<u64>,
-    pub(super) fault: Arc<Mutex<Option<JournalFault>>>,
+    pub(super) told: Arc<Mutex<Told>>,
 }
 
 impl Worker {
-    pub(super) fn new(connection: Connection, path: &Path, run: i64, ends: Ends, settings: Settings) -> Self {
-        let Ends { incoming, closing, commits, fault } = ends;
+    pub(super) fn new(
+        connection: Connection,
+        path: &Path,
+        (id, run): (i64, Run),
+        ends: Ends,
+        settings: Settings,
+    ) -> Self {
+        let Ends { incoming, closing, commits, told } = ends;
         Self {
-            connection,
+            connection: Some(connection),
             path: path.into(),
+            id,
             run,
             incoming,
             closing,
             commits,
-            fault,
+            told,
             settings,
+            reserve: Reserve::new(path, settings.reserve_bytes),
+            low: false,
             held: VecDeque::new(),
+            kept: VecDeque::new(),
+            not_kept: 0,
+            clock: None,
+            damage: None,
             rejected: Vec::new(),
             committed: 0,
             failures: 0,
@@ -79,24 +115,21 @@ impl Worker {
     }
 
     pub(super) fn run(mut self) -> Ended {
-        if let Err(error) = self.connection.busy_timeout(BUSY) {
-            log::warn!("journal {}: {error}", self.path.display());
+        if let Some(connection) = &self.connection {
+            be_patient(connection, &self.path);
         }
+        self.refill_reserve();
         let mut cause = None;
         // Each attempt of the last phase counts afresh: the disk may have come back.
         let mut last_attempts = 0;
         loop {
-            if self.held.is_empty() {
-                match self.incoming.recv() {
-                    Ok(shot) => self.held.push_back(shot),
-                    Err(_) => break,
-                }
+            if self.is_idle() && !self.next() {
+                break;
             }
             self.take_queued();
-            match self.commit() {
+            match self.attempt() {
                 Ok(()) => self.recovered(),
                 Err(error) => {
-                    let error = JournalError::from_sql(&self.path, &error);
                     last_attempts += u32::from(self.is_closing());
                     if last_attempts >= self.settings.finish_attempts {
                         cause = Some(error.to_string());
@@ -110,26 +143,131 @@ impl Worker {
         self.end(cause)
     }
 
+    /// Nothing is to be written.
+    fn is_idle(&self) -> bool {
+        self.held.is_empty() && self.clock.is_none() && self.failures == 0
+    }
+
+    /// Waits for something to do; `false` at the end.
+    fn next(&mut self) -> bool {
+        let tick = if self.low { after(RESERVE_PAUSE) } else { never() };
+        select! {
+            recv(self.incoming) -> message => match message {
+                Ok(message) => self.take(message),
+                Err(_) => return false,
+            },
+            recv(tick) -> _ => self.refill_reserve(),
+        }
+        true
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Shot(shot) => self.held.push_back(shot),
+            Message::Clock(clock) => {
+                // A fresh database would begin this run with it.
+                self.run.started_wall_ns = self
+                    .run
+                    .started_wall_ns
+                    .or_else(|| self.run.started.and_then(|started| clock.wall_ns(started)));
+                self.clock = Some(clock);
+            }
+        }
+    }
+
     fn is_closing(&self) -> bool {
         self.closing.try_recv().is_err_and(|error: TryRecvError| error.is_disconnected())
     }
 
     /// Takes what is queued, as far as it may be held.
     fn take_queued(&mut self) {
-        let room = self.settings.held_max.saturating_sub(self.held.len());
-        self.held.extend(self.incoming.try_iter().take(room));
+        while self.held.len() < self.settings.held_max
+            && let Ok(message) = self.incoming.try_recv()
+        {
+            self.take(message);
+        }
+    }
+
+    /// Writes the oldest rounds held, and sees to the database as far as it needs it.
+    fn attempt(&mut self) -> Result<(), JournalError> {
+        if let Some(reason) = self.damage.clone() {
+            self.start_afresh(&reason)?;
+        }
+        let mut connection = match self.connection.take() {
+            Some(connection) => connection,
+            None => self.reopen()?,
+        };
+        let done = self.write(&mut connection).map_err(|error| JournalError::from_sql(&self.path, &error));
+        match &done {
+            Ok(()) | Err(JournalError::Locked { .. }) => self.connection = Some(connection),
+            Err(error) => {
+                if error.is_damage() {
+                    self.damage = Some(error.to_string());
+                }
+                // What this connection and the system's memory hold is not to be trusted any more.
+                keep_log(&connection);
+                drop(connection);
+                if matches!(error, JournalError::Full { .. }) {
+                    self.low = true;
+                    // Straight on: this is what the space was kept for.
+                    if self.reserve.release() {
+                        return Ok(());
+                    }
+                }
+            }
+        }
+        done
+    }
+
+    fn reopen(&self) -> Result<Connection, JournalError> {
+        let connection = connect(&self.path, &self.settings)?;
+        be_patient(&connection, &self.path);
+        Ok(connection)
+    }
+
+    fn write(&mut self, connection: &mut Connection) -> rusqlite::Result<()> {
+        if !self.held.is_empty() {
+            self.commit(connection)?;
+        }
+        if let Some(clock) = self.clock {
+            if let Some(boot_id) = &self.run.boot_id {
+                clock.fill_in(connection, boot_id)?;
+            }
+            self.clock = None;
+        }
+        checkpoint(connection, self.settings.checkpoint_pages)
+    }
+
+    /// Puts the damaged database aside and begins another with what is known of this run.
+    fn start_afresh(&mut self, reason: &str) -> Result<(), JournalError> {
+        self.connection = None;
+        let Self { path, settings, id, run, kept, .. } = self;
+        let kept_as = quarantine::replace(path, settings, |connection| {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            schema::begin_run(&transaction, Some(*id), run)?;
+            for shot in kept.iter() {
+                row::insert(&transaction, *id, shot)?;
+            }
+            transaction.commit()
+        })?;
+        self.damage = None;
+        let rounds_left_there = self.not_kept;
+        self.tell(|told| {
+            told.quarantine = Some(Quarantine { kept_as, reason: reason.to_owned(), rounds_left_there });
+        });
+        Ok(())
     }
 
     /// Commits the oldest rounds held, as many as one transaction takes.
-    fn commit(&mut self) -> rusqlite::Result<()> {
+    fn commit(&mut self, connection: &mut Connection) -> rusqlite::Result<()> {
         let count = self.held.len().min(BATCH);
         let mut refused = Vec::new();
-        let transaction = self.connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
         for (index, shot) in self.held.iter().take(count).enumerate() {
-            match row::insert(&transaction, self.run, shot) {
+            match row::insert(&transaction, self.id, shot) {
                 Ok(true) => {}
                 // There already: after a COMMIT that failed and took effect all the same, or a number used twice.
-                Ok(false) if stored(&transaction, self.run, shot)? => {}
+                Ok(false) if stored(&transaction, self.id, shot)? => {}
                 Ok(false) => refused.push((index, "its number is taken by another shot".to_owned())),
                 Err(error) if is_refusal(&error) => refused.push((index, error.to_string())),
                 Err(error) => return Err(error),
@@ -146,37 +284,57 @@ impl Worker {
             self.committed += 1;
             // Nobody may be listening.
             let _ = self.commits.send(shot.shot);
+            self.kept.push_back(shot);
+        }
+        while self.kept.len() > self.settings.kept_max {
+            self.kept.pop_front();
+            self.not_kept += 1;
         }
         Ok(())
     }
 
     fn failed(&mut self, error: &JournalError) {
         self.failures = self.failures.saturating_add(1);
-        if self.failures == 1 {
-            let code = match error {
-                JournalError::Full { .. } => "DISK_FULL",
-                JournalError::ReadOnly { .. } => "DISK_RO",
-                _ => "DISK_FSYNC",
-            };
-            log::error!("{code} {error}; shots are kept in memory until then");
-        }
-        self.tell(Some(JournalFault { message: error.to_string(), waiting: self.held.len() }));
+        let fault =
+            JournalFault { fault: error.fault(), message: error.to_string(), waiting: self.held.len() };
+        self.tell(|told| told.fault = Some(fault));
     }
 
     fn recovered(&mut self) {
-        if self.failures > 0 && self.held.is_empty() {
-            log::info!(
-                "the journal {} is written again after {} attempts",
-                self.path.display(),
-                self.failures
-            );
+        let over = self.failures > 0 && self.held.is_empty();
+        if over {
             self.failures = 0;
-            self.tell(None);
+        }
+        if over || self.low {
+            self.tell_space();
         }
     }
 
-    fn tell(&self, fault: Option<JournalFault>) {
-        *self.fault.lock().unwrap_or_else(PoisonError::into_inner) = fault;
+    /// Makes the reserve where there is room for it.
+    fn refill_reserve(&mut self) {
+        let made = self.reserve.make();
+        if let Err(error) = &made {
+            log::debug!("no space kept for the journal {}: {error}", self.path.display());
+        }
+        // What is no lack of space will show when rounds are written.
+        self.low = made.is_err_and(|error| error.kind() == io::ErrorKind::StorageFull);
+        if self.failures == 0 {
+            self.tell_space();
+        }
+    }
+
+    /// No fault, or that of a disk which is full but for the space that was kept.
+    fn tell_space(&self) {
+        let fault = self.low.then(|| JournalFault {
+            fault: Fault::DiskFull,
+            message: format!("{}; shots are still written", JournalError::Full { path: self.path.clone() }),
+            waiting: 0,
+        });
+        self.tell(|told| told.fault = fault);
+    }
+
+    fn tell(&self, change: impl FnOnce(&mut Told)) {
+        change(&mut self.told.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Pauses before the next attempt and goes on emptying the queue meanwhile.
@@ -193,8 +351,8 @@ impl Worker {
             let nothing = never();
             let incoming = if self.held.len() < self.settings.held_max { &self.incoming } else { &nothing };
             select! {
-                recv(incoming) -> shot => match shot {
-                    Ok(shot) => self.held.push_back(shot),
+                recv(incoming) -> message => match message {
+                    Ok(message) => self.take(message),
                     Err(_) => return,
                 },
                 recv(self.closing) -> _ => return,
@@ -206,16 +364,17 @@ impl Worker {
     /// Closes the run, or saves what could not be written.
     fn end(mut self, cause: Option<String>) -> Ended {
         // After giving up, more than may be held can still be queued.
-        self.held.extend(self.incoming.try_iter());
+        while let Ok(message) = self.incoming.try_recv() {
+            self.take(message);
+        }
         if self.held.is_empty() && self.rejected.is_empty() {
-            let sql = "UPDATE runs SET finished = 1 WHERE id = ?1";
-            if let Err(error) = self.connection.execute(sql, [self.run]) {
-                log::warn!(
-                    "{}; its last run stays marked as unfinished",
-                    JournalError::from_sql(&self.path, &error)
-                );
+            if let Err(error) = self.close_run() {
+                log::warn!("{error}; its last run stays marked as unfinished");
             }
             return Ended { committed: self.committed, unwritten: None };
+        }
+        if let Some(connection) = &self.connection {
+            empty_log_at_end(connection);
         }
         let cause =
             cause.or_else(|| self.rejected.first().map(|(_, reason)| reason.clone())).unwrap_or_default();
@@ -224,9 +383,9 @@ impl Worker {
             .iter()
             .map(|(shot, _)| shot)
             .chain(&self.held)
-            .map(|record| StoredShot { run: self.run, record: record.clone() }.to_json().to_string())
+            .map(|record| StoredShot { run: self.id, record: record.clone() }.to_json().to_string())
             .collect();
-        let side_file = match save(&self.path, self.run, &rows) {
+        let side_file = match save(&self.path, self.id, &rows) {
             Ok(file) => Some(file),
             Err(error) => {
                 log::error!("nor could the shots be put beside the journal {}: {error}", self.path.display());
@@ -234,9 +393,41 @@ impl Worker {
             }
         };
         let unwritten =
-            Unwritten { path: self.path, run: self.run, committed: self.committed, cause, rows, side_file };
+            Unwritten { path: self.path, run: self.id, committed: self.committed, cause, rows, side_file };
         Ended { committed: self.committed, unwritten: Some(unwritten) }
     }
+
+    /// Marks the run as finished and moves the log into the database.
+    fn close_run(&mut self) -> Result<(), JournalError> {
+        let connection = match self.connection.take() {
+            Some(connection) => connection,
+            None => self.reopen()?,
+        };
+        let close = || -> rusqlite::Result<()> {
+            connection.execute("UPDATE runs SET finished = 1 WHERE id = ?1", [self.id])?;
+            checkpoint(&connection, 1)
+        };
+        close().map_err(|error| JournalError::from_sql(&self.path, &error))?;
+        empty_log_at_end(&connection);
+        Ok(())
+    }
+}
+
+fn be_patient(connection: &Connection, path: &Path) {
+    if let Err(error) = connection.busy_timeout(BUSY) {
+        log::warn!("journal {}: {error}", path.display());
+    }
+}
+
+/// Moves the log into the database where it has at least so many pages that are not there yet.
+fn checkpoint(connection: &Connection, pages_min: u32) -> rusqlite::Result<()> {
+    let mut ask = connection.prepare_cached("PRAGMA wal_checkpoint(NOOP)")?;
+    let waiting: i64 = ask.query_row([], |row| Ok(row.get::<_, i64>(1)? - row.get::<_, i64>(2)?))?;
+    if waiting < i64::from(pages_min) {
+        return Ok(());
+    }
+    // Readers may keep some of it in the log: then it is moved later.
+    connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
 }
 
 /// Whether this very round is in the database.

@@ -1,0 +1,111 @@
+//! The tables and their versions.
+
+use std::path::Path;
+
+use rusqlite::{Connection, TransactionBehavior, params};
+
+use super::{JournalError, Run};
+
+/// Marks the file as ours ("BOWW").
+pub(super) const APPLICATION_ID: i64 = 0x424f_5757;
+/// Version of the tables. 2: runs know the boot and the time since it at which they began.
+pub(super) const VERSION: i64 = 2;
+
+/// The tables of version 1. Numbers that are not finite become NULL, since SQLite has no NaN.
+const TABLES: &str = "
+CREATE TABLE runs (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    started_wall_ns INTEGER,
+    scenario TEXT NOT NULL,
+    recording TEXT NOT NULL,
+    seed TEXT NOT NULL,
+    version TEXT NOT NULL,
+    finished INTEGER NOT NULL DEFAULT 0 CHECK (finished IN (0, 1))
+) STRICT;
+CREATE TABLE shots (
+    run INTEGER NOT NULL REFERENCES runs (id),
+    shot INTEGER NOT NULL,
+    fired_ns INTEGER NOT NULL,
+    muzzle_x_m REAL, muzzle_y_m REAL, muzzle_z_m REAL,
+    bore_x REAL, bore_y REAL, bore_z REAL,
+    pose_age_ns INTEGER NOT NULL,
+    outcome TEXT NOT NULL CHECK (outcome IN ('hit', 'miss', 'not_scored')),
+    boat TEXT CHECK (boat IS NOT NULL OR outcome <> 'hit'),
+    zone TEXT CHECK ((zone IS NOT NULL) = (outcome = 'hit')),
+    time_ns INTEGER CHECK ((time_ns IS NOT NULL) = (outcome <> 'not_scored')),
+    range_m REAL,
+    point_x_m REAL, point_y_m REAL, point_z_m REAL,
+    miss_m REAL,
+    cause TEXT CHECK ((cause IS NOT NULL) = (outcome = 'not_scored')),
+    PRIMARY KEY (run, shot)
+) STRICT, WITHOUT ROWID;
+";
+
+/// From version 1 to 2.
+const BOOT_COLUMNS: &str = "
+ALTER TABLE runs ADD COLUMN boot_id TEXT;
+ALTER TABLE runs ADD COLUMN started_ns INTEGER;
+";
+
+/// Refuses databases of other programs and of newer versions.
+pub(super) fn claim(connection: &Connection, path: &Path) -> Result<(), JournalError> {
+    let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
+    let (application, version) = versions(connection).map_err(fail)?;
+    if application == APPLICATION_ID {
+        if version > VERSION {
+            return Err(JournalError::Newer { path: path.into(), found: version, supported: VERSION });
+        }
+        return Ok(());
+    }
+    let tables: i64 =
+        connection.query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0)).map_err(fail)?;
+    if application != 0 || version != 0 || tables != 0 {
+        return Err(JournalError::ForeignDatabase { path: path.into() });
+    }
+    Ok(())
+}
+
+/// Application and schema version.
+pub(super) fn versions(connection: &Connection) -> rusqlite::Result<(i64, i64)> {
+    let application = connection.query_row("PRAGMA application_id", [], |row| row.get(0))?;
+    let version = connection.query_row("PRAGMA user_version", [], |row| row.get(0))?;
+    Ok((application, version))
+}
+
+/// Makes the tables where there are none, and brings older ones up to date. One transaction, so that nobody ever finds half
+/// of them.
+pub(super) fn make_tables(connection: &mut Connection) -> rusqlite::Result<()> {
+    let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+    // Asked within the transaction: another process may have been faster.
+    let (_, found) = versions(&transaction)?;
+    if found >= VERSION {
+        return Ok(());
+    }
+    if found == 0 {
+        transaction.execute_batch(TABLES)?;
+    }
+    transaction.execute_batch(BOOT_COLUMNS)?;
+    transaction.execute_batch(&format!(
+        "PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"
+    ))?;
+    transaction.commit()
+}
+
+/// Begins a run, with a number of its own unless `id` says which, and gives its number.
+pub(super) fn begin_run(connection: &Connection, id: Option<i64>, run: &Run) -> rusqlite::Result<i64> {
+    connection.execute(
+        "INSERT INTO runs (id, started_wall_ns, scenario, recording, seed, version, boot_id, started_ns) \
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
+        params![
+            id,
+            run.started_wall_ns,
+            run.scenario,
+            run.recording,
+            run.seed.to_string(),
+            run.version,
+            run.boot_id,
+            run.started.map(|time| time.ns()),
+        ],
+    )?;
+    Ok(connection.last_insert_rowid())
+}
