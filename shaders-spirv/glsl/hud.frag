@@ -36,6 +36,7 @@ float distance_to(uint kind, vec2 p, float r) {
             return min(box(d, vec2(1.25 * r, 0.28 * r), 0.0), box(d, vec2(0.28 * r, 1.25 * r), 0.0));
         }
         case SHAPE_TRIANGLE: return triangle(p, r);
+        case SHAPE_DIAMOND: return (abs(p.x) + abs(p.y) - r) * 0.707107;
         default: return box(p, vec2(r), 0.0);
     }
 }

@@ -6,3 +6,4 @@ const uint SHAPE_RING = 3;
 const uint SHAPE_CROSS = 4;
 const uint SHAPE_TRIANGLE = 5;
 const uint SHAPE_SQUARE = 6;
+const uint SHAPE_DIAMOND = 7;

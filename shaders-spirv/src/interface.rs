@@ -226,6 +226,8 @@ pub const SHAPE_CROSS: u32 = 4;
 pub const SHAPE_TRIANGLE: u32 = 5;
 /// [`HudQuad::shape`]: a square.
 pub const SHAPE_SQUARE: u32 = 6;
+/// [`HudQuad::shape`]: a square on its corner.
+pub const SHAPE_DIAMOND: u32 = 7;
 
 /// Push constants of the video pass: `VideoBlock`.
 #[repr(C)]

@@ -37,6 +37,9 @@ pub(crate) struct Glyphs {
     line: [f32; 2],
     /// Base line below the line's top, pixels, by size.
     ascent: [f32; 2],
+    /// Height of a capital without serifs, pixels, by size.
+    #[cfg(test)]
+    cap: [f32; 2],
     /// Width of the atlas, pixels.
     pub(crate) width: u32,
     /// Height of the atlas, pixels.
@@ -54,6 +57,8 @@ impl Glyphs {
             glyphs: [[Glyph::default(); COUNT]; 2],
             line: [0.0; 2],
             ascent: [0.0; 2],
+            #[cfg(test)]
+            cap: [0.0; 2],
             width,
             height: 0,
             coverage: Vec::new(),
@@ -64,6 +69,11 @@ impl Glyphs {
             let scaled = font.as_scaled(PxScale::from(px));
             glyphs.line[size] = scaled.height();
             glyphs.ascent[size] = scaled.ascent();
+            #[cfg(test)]
+            {
+                let capital = font.outline(font.glyph_id('H')).map_or(0.0, |o| o.bounds.height().abs());
+                glyphs.cap[size] = capital * scaled.v_scale_factor();
+            }
             for index in 0..COUNT {
                 let id = scaled.glyph_id(char::from(FIRST + index as u8));
                 let advance = scaled.h_advance(id);
@@ -112,6 +122,12 @@ impl Glyphs {
     /// Base line below the line's top, pixels.
     pub(crate) fn ascent(&self, size: TextSize) -> f32 {
         self.ascent[size as usize]
+    }
+
+    /// Height of a capital, pixels.
+    #[cfg(test)]
+    pub(crate) fn cap(&self, size: TextSize) -> f32 {
+        self.cap[size as usize]
     }
 
     /// Width of a run of text, pixels.

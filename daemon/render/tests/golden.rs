@@ -11,6 +11,7 @@ mod common;
 use std::path::PathBuf;
 
 use bowwave_core::{
+    fault::Fault,
     geometry::look,
     model::{Model, ModelKind, Texture},
     scene::{Pass, PassDecision, ReflectionMethod, RoundView, Scene, ShadowLevel, Status},
@@ -47,16 +48,17 @@ fn boats(method: ReflectionMethod, shadow: ShadowLevel, force: u8) -> Scene {
 }
 
 fn check(name: &str, scene: &Scene, models: &[Model]) {
-    let pixels = draw(scene, &sea(SIZE.0, SIZE.1), models);
+    let size = (scene.lens.width, scene.lens.height);
+    let pixels = draw(scene, &sea(size.0, size.1), models);
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{name}.png"));
     if std::env::var_os("BOWWAVE_BLESS").is_some() {
-        image::save_buffer(&path, &pixels, SIZE.0, SIZE.1, image::ExtendedColorType::Rgba8).unwrap();
+        image::save_buffer(&path, &pixels, size.0, size.1, image::ExtendedColorType::Rgba8).unwrap();
         return;
     }
     let golden = image::open(&path)
         .unwrap_or_else(|e| panic!("{}: {e}; make it with BOWWAVE_BLESS=1", path.display()));
     let golden = golden.to_rgba8();
-    assert_eq!(golden.dimensions(), SIZE);
+    assert_eq!(golden.dimensions(), size);
     let differences = pixels
         .chunks_exact(4)
         .zip(golden.as_raw().chunks_exact(4))
@@ -66,11 +68,11 @@ fn check(name: &str, scene: &Scene, models: &[Model]) {
         off += u32::from(d > CODES);
         sum += f64::from(d);
     }
-    let count = f64::from(SIZE.0 * SIZE.1);
+    let count = f64::from(size.0 * size.1);
     let (share, mean) = (f64::from(off) / count, sum / count);
     if share > SHARE || mean > MEAN {
         let seen = std::env::temp_dir().join(format!("{name}.png"));
-        image::save_buffer(&seen, &pixels, SIZE.0, SIZE.1, image::ExtendedColorType::Rgba8).unwrap();
+        image::save_buffer(&seen, &pixels, size.0, size.1, image::ExtendedColorType::Rgba8).unwrap();
         panic!(
             "{name}: {off} pixels off by more than {CODES} codes, mean {mean:.2}; drawn: {}",
             seen.display()
@@ -91,6 +93,26 @@ fn display_shows_every_state() {
         let mut scene = empty_scene(SIZE.0, SIZE.1);
         scene.hud.status = status;
         check(&format!("hud_{name}"), &scene, &[]);
+    }
+}
+
+/// As on the gun's own display.
+#[test]
+fn faults_and_warnings_on_a_seven_inch_display() {
+    let state = |fault: Fault| (fault.cause(), fault.action());
+    let not_scored = |(cause, action)| Status::NotScored { cause, action };
+    let broken = |(cause, action)| Status::Fault { cause, action };
+    for (name, status, warning) in [
+        ("warning", Status::Ready, Some(Fault::Thermal)),
+        ("warning_long", Status::Hit, Some(Fault::CamBandwidth)),
+        ("not_scored", not_scored(state(Fault::ImuBaud)), Some(Fault::DiskFull)),
+        ("fault", broken(state(Fault::NotInert)), None),
+        ("safe_mode", broken(state(Fault::CrashLoop)), None),
+    ] {
+        let mut scene = empty_scene(800, 480);
+        scene.hud.status = status;
+        scene.hud.warning = warning;
+        check(&format!("display_{name}"), &scene, &[]);
     }
 }
 
