@@ -1,14 +1,37 @@
-//! V4L2 cameras: which are there and what they can deliver.
+//! V4L2 cameras: which are there and what they can deliver ([`list`], [`check`]), and their pictures ([`CameraPort`]).
+//!
+//! The camera's life is a state machine over a small driver trait, with time as an argument; the driver that asks the kernel
+//! is a thin layer under it. Which camera, which mode, when a picture was taken and whether it is worth anything are pure
+//! functions.
 
+mod driver;
+mod identity;
 mod ioctl;
+pub mod jpeg;
+mod judge;
+mod machine;
+mod mapping;
+mod negotiate;
+mod pool;
+mod port;
+mod settings;
+mod status;
+mod timing;
+mod trouble;
+mod v4l2;
 
 use std::{
     fmt, io,
-    os::unix::ffi::OsStrExt,
+    os::{
+        fd::{AsFd, BorrowedFd, OwnedFd},
+        unix::ffi::OsStrExt,
+    },
     path::{Path, PathBuf},
 };
 
-use v4l::{Device, format::FourCC, framesize::FrameSizeEnum, video::Capture};
+pub use port::{CameraPort, QUEUE_FRAMES};
+pub use settings::{CameraSettings, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance};
+pub use status::{CameraCounters, CameraStatus, InUse, Life};
 
 use crate::nodes;
 
@@ -151,6 +174,24 @@ pub enum CameraError {
         /// The codings that it offers.
         offered: String,
     },
+    /// The settings cannot be right.
+    #[error("camera settings: {what}")]
+    Settings {
+        /// What is wrong and what to give instead.
+        what: String,
+    },
+    /// The camera's thread could not be started.
+    #[error("cannot start the camera's thread: {source}; are too many processes running?")]
+    Thread {
+        /// The kernel's answer.
+        source: io::Error,
+    },
+    /// A call into the kernel does not return.
+    #[error("the camera's driver does not return: replug the camera, then look at the kernel's log (dmesg)")]
+    Blocked,
+    /// The camera's thread panicked: a defect of this program.
+    #[error("the camera's thread broke down: report it with the log")]
+    BrokeDown,
     /// The kernel reports something else.
     #[error("{}: cannot {what}: {source}; replug the camera, then look at the kernel's log (dmesg)", node.display())]
     Io {
@@ -202,7 +243,8 @@ fn describe(dev: &Path, node: &Path) -> Result<CameraInfo, CameraError> {
     let device = open(dev, node)?;
     let not_a_camera = || CameraError::NotACamera { node: node.to_owned() };
     let io = |what| move |source| CameraError::Io { node: node.to_owned(), what, source };
-    let capability = match ioctl::query_capability(&device) {
+    let device = device.as_fd();
+    let capability = match ioctl::query_capability(device) {
         Ok(capability) if capability.captures => capability,
         Ok(_) => return Err(not_a_camera()),
         // ENOTTY: a file or a device of another kind.
@@ -211,8 +253,8 @@ fn describe(dev: &Path, node: &Path) -> Result<CameraInfo, CameraError> {
         }
         Err(e) => return Err(io("ask what it is")(e)),
     };
-    let codes = ioctl::capture_formats(&device).map_err(io("list its formats"))?;
-    let modes = codes.into_iter().map(|code| mode(&device, code)).collect();
+    let codes = ioctl::capture_formats(device).map_err(io("list its formats"))?;
+    let modes = codes.into_iter().map(|code| mode(device, code)).collect();
     Ok(CameraInfo {
         node: node.to_owned(),
         by_id: nodes::link_to(&dev.join("v4l/by-id"), node),
@@ -223,22 +265,12 @@ fn describe(dev: &Path, node: &Path) -> Result<CameraInfo, CameraError> {
     })
 }
 
-fn mode(device: &Device, code: [u8; 4]) -> Mode {
+fn mode(device: BorrowedFd<'_>, code: [u8; 4]) -> Mode {
     // Some drivers list no sizes: then they are unknown, not none.
-    let listed = device.enum_framesizes(FourCC::new(&code)).unwrap_or_default();
-    let sizes = listed
-        .into_iter()
-        .map(|entry| match entry.size {
-            FrameSizeEnum::Discrete(s) => Size::Fixed { width: s.width, height: s.height },
-            FrameSizeEnum::Stepwise(s) => {
-                Size::Range { least: (s.min_width, s.min_height), most: (s.max_width, s.max_height) }
-            }
-        })
-        .collect();
-    Mode { coding: Coding::from_fourcc(code), sizes }
+    Mode { coding: Coding::from_fourcc(code), sizes: ioctl::frame_sizes(device, code).unwrap_or_default() }
 }
 
-fn open(dev: &Path, node: &Path) -> Result<Device, CameraError> {
+fn open(dev: &Path, node: &Path) -> Result<OwnedFd, CameraError> {
     let not_found = || {
         let present = nodes::numbered(dev, "video").unwrap_or_default();
         CameraError::NotFound {
@@ -246,11 +278,10 @@ fn open(dev: &Path, node: &Path) -> Result<Device, CameraError> {
             present: nodes::listed(present.iter().map(|p| p.display().to_string())),
         }
     };
-    // The v4l crate panics on such a name.
     if node.as_os_str().as_bytes().contains(&0) {
         return Err(not_found());
     }
-    Device::with_path(node).map_err(|source| match source.kind() {
+    v4l2::open_node(node).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => not_found(),
         io::ErrorKind::PermissionDenied => CameraError::Permission { node: node.to_owned() },
         io::ErrorKind::ResourceBusy => CameraError::Busy { node: node.to_owned() },

@@ -1,0 +1,547 @@
+//! The life of the camera: a state machine over a [`Driver`], with time as an argument.
+
+mod pictures;
+
+use std::{collections::BTreeSet, io, sync::Arc};
+
+use bowwave_core::{
+    event::CameraFrame,
+    fault::{Fault, FaultChange},
+    time::Time,
+};
+
+use super::{
+    CameraCounters, CameraSettings, CameraStatus, InUse, Life,
+    driver::{Driver, Format, Opened, Ready},
+    identity::{Choice, Found, choose},
+    jpeg,
+    judge::{Damage, Stillness},
+    negotiate::{Candidate, candidates, next_smaller},
+    pool::Pool,
+    settings::usable_size,
+    trouble::Trouble,
+};
+
+const MS: i64 = 1_000_000;
+/// Between looks for an absent camera.
+const SEARCH_NS: i64 = 100 * MS;
+/// Between looks while another camera than the calibrated one is there.
+const MISMATCH_NS: i64 = 250 * MS;
+/// Between tries while another program holds the camera.
+const BUSY_NS: i64 = 1000 * MS;
+/// Before a camera is opened again whose queue or link failed.
+const AGAIN_NS: i64 = 200 * MS;
+/// What a camera needs to appear again after a reset.
+const RESET_NS: i64 = 500 * MS;
+/// Failures of the link in a row before the device is reset.
+const PROTOCOL_FAILURES: u32 = 3;
+/// No frame for this time is a stall, unless the camera is slow.
+const STALL_NS: i64 = 100 * MS;
+/// From the stall to the first attempt to end it: frames may come by themselves.
+const STALL_GRACE_NS: i64 = 150 * MS;
+/// How long a started stream may take for its first frame, at first and at most.
+const FIRST_FRAME_NS: i64 = 1200 * MS;
+const FIRST_FRAME_MAX_NS: i64 = 6000 * MS;
+/// Modes that are tried before a camera is given up for this time.
+const MODES_TRIED_MAX: usize = 24;
+/// Frames after which a stream is taken to be sound.
+const SOUND_FRAMES: u64 = 10;
+/// Faults that frames prove gone.
+const GONE_WITH_FRAMES: [Fault; 6] = [
+    Fault::CamLost,
+    Fault::CamStall,
+    Fault::CamProtocol,
+    Fault::CamQueue,
+    Fault::CamBusy,
+    Fault::CalMismatch,
+];
+
+/// What a step brought about.
+#[derive(Default)]
+pub(super) struct Output {
+    /// Pictures, oldest first.
+    pub frames: Vec<CameraFrame>,
+    /// Faults that came and went, in their order.
+    pub faults: Vec<FaultChange>,
+}
+
+enum State {
+    /// Nothing is open; the next try is at `next`.
+    Away {
+        life: Life,
+        next: Time,
+    },
+    Streaming(Box<Stream>),
+    Stopped,
+}
+
+/// What is known of a stream that runs.
+struct Stream {
+    found: Found,
+    format: Format,
+    /// Nominal period or the mean of late, whichever is longer, nanoseconds.
+    period_ns: i64,
+    /// When it was started (again).
+    begun: Time,
+    /// Undamaged buffers since then, and the last one's arrival.
+    frames: u64,
+    last_frame: Time,
+    last_sequence: Option<u32>,
+    exposure_ns: Option<i64>,
+    /// When the driver's format was last compared.
+    format_asked: Time,
+    /// Since a stall was seen: when to do something about it.
+    act_at: Option<Time>,
+}
+
+impl Stream {
+    /// The time at which the absence of frames is a stall.
+    fn stalls_at(&self, first_frame_ns: i64) -> Time {
+        if self.frames == 0 {
+            return self.begun.plus_ns(first_frame_ns);
+        }
+        self.last_frame.plus_ns(STALL_NS.max(self.period_ns * 5 / 2))
+    }
+}
+
+/// The camera's life.
+pub(super) struct Machine {
+    settings: CameraSettings,
+    state: State,
+    /// The camera that was last in use, and since when it has been away.
+    known: Option<Found>,
+    lost_at: Option<Time>,
+    raised: BTreeSet<Fault>,
+    /// Failures of the link, and stalls, in a row.
+    protocol_failures: u32,
+    stalls: u32,
+    first_frame_ns: i64,
+    /// The last picture's time: none may be older.
+    last_mid: Time,
+    decoder: jpeg::Decoder,
+    packed: Pool,
+    damage: Damage,
+    stillness: Stillness,
+    counters: CameraCounters,
+    in_use: Option<Arc<InUse>>,
+}
+
+impl Machine {
+    /// A camera that is looked for from `now` on.
+    pub fn new(settings: CameraSettings, now: Time) -> Self {
+        Self {
+            settings,
+            state: State::Away { life: Life::Searching, next: now },
+            known: None,
+            lost_at: None,
+            raised: BTreeSet::new(),
+            protocol_failures: 0,
+            stalls: 0,
+            first_frame_ns: FIRST_FRAME_NS,
+            last_mid: Time::MIN,
+            decoder: jpeg::Decoder::for_camera(),
+            packed: Pool::default(),
+            damage: Damage::default(),
+            stillness: Stillness::default(),
+            counters: CameraCounters::default(),
+            in_use: None,
+        }
+    }
+
+    /// How it stands.
+    pub fn status(&self) -> CameraStatus {
+        let life = match &self.state {
+            State::Away { life, .. } => *life,
+            State::Stopped => Life::Stopped,
+            State::Streaming(s) if s.act_at.is_some() => Life::Stalled,
+            State::Streaming(s) if s.frames == 0 => Life::Opening,
+            State::Streaming(_) => Life::Streaming,
+        };
+        CameraStatus { life, in_use: self.in_use.clone(), counters: self.counters }
+    }
+
+    /// Does what is due at `now`, after the thread was woken by `ready`. Answers when it has to be called again at the
+    /// latest.
+    pub fn step(&mut self, now: Time, ready: Ready, driver: &mut impl Driver, out: &mut Output) -> Time {
+        match std::mem::replace(&mut self.state, State::Stopped) {
+            State::Stopped => return Time::from_ns(i64::MAX),
+            State::Away { life, next } if now < next => self.state = State::Away { life, next },
+            State::Away { .. } => self.look(now, driver, out),
+            State::Streaming(mut stream) => match self.stream(&mut stream, now, ready, driver, out) {
+                Ok(true) => self.state = State::Streaming(stream),
+                // Something decided on another state already.
+                Ok(false) => {}
+                Err((what, error)) => self.fail(now, &stream.found, what, &error, driver, out),
+            },
+        }
+        match &self.state {
+            State::Stopped => Time::from_ns(i64::MAX),
+            State::Away { next, .. } => *next,
+            State::Streaming(s) => s.act_at.unwrap_or_else(|| s.stalls_at(self.first_frame_ns)),
+        }
+    }
+
+    /// Ends for good.
+    pub fn stop(&mut self, driver: &mut impl Driver) {
+        driver.close();
+        self.in_use = None;
+        self.state = State::Stopped;
+    }
+
+    fn raise(&mut self, now: Time, fault: Fault, cause: String, out: &mut Output) {
+        if self.raised.insert(fault) {
+            out.faults.push(FaultChange::raised(now, fault, cause));
+        }
+    }
+
+    fn clear(&mut self, now: Time, fault: Fault, out: &mut Output) {
+        if self.raised.remove(&fault) {
+            out.faults.push(FaultChange::cleared(now, fault));
+        }
+    }
+
+    fn away(&mut self, life: Life, next: Time) {
+        self.in_use = None;
+        self.state = State::Away { life, next };
+    }
+
+    /// Looks for the camera and starts it.
+    fn look(&mut self, now: Time, driver: &mut impl Driver, out: &mut Output) {
+        let found = driver.find(&self.settings);
+        let lost_ns = self.lost_at.map_or(0, |at| now.ns_since(at));
+        match choose(&found, &self.settings, self.known.as_ref(), lost_ns) {
+            Choice::Absent => {
+                let cause = match (&self.settings.device, &self.settings.serial) {
+                    (Some(device), _) => format!("no camera at {}: plug it in", device.display()),
+                    (None, Some(serial)) => format!("no camera with serial number {serial}: plug it in"),
+                    (None, None) => "no camera: plug one in".to_owned(),
+                };
+                self.raise(now, Fault::CamLost, cause, out);
+                self.lost_at.get_or_insert(now);
+                self.away(Life::Searching, now.plus_ns(SEARCH_NS));
+            }
+            Choice::Mismatch(other) => {
+                let cause = format!(
+                    "{} is {}, the calibration is for {}: fit that camera, or calibrate this one",
+                    other.node.display(),
+                    other.identity(),
+                    self.settings.serial.as_deref().unwrap_or_default()
+                );
+                self.raise(now, Fault::CalMismatch, cause, out);
+                self.away(Life::Mismatched, now.plus_ns(MISMATCH_NS));
+            }
+            Choice::Try(list) => self.try_each(now, &list, driver, out),
+        }
+    }
+
+    fn try_each(&mut self, now: Time, list: &[Found], driver: &mut impl Driver, out: &mut Output) {
+        for found in list {
+            match self.begin(now, found, driver, out) {
+                Ok(Some(stream)) => return self.begun(now, stream, driver, out),
+                // A node that delivers no pictures: the next may.
+                Ok(None) => driver.close(),
+                // The first that fits and fails is the camera, and its failure is what there is to tell.
+                Err((what, error)) => return self.fail(now, found, what, &error, driver, out),
+            }
+        }
+        let names: Vec<_> = list.iter().map(|f| f.node.display().to_string()).collect();
+        let cause = format!(
+            "{} delivers no pictures that the trainer can use (YUYV, NV12 or MJPEG): name another camera",
+            names.join(", ")
+        );
+        self.raise(now, Fault::CamLost, cause, out);
+        self.away(Life::Searching, now.plus_ns(MISMATCH_NS));
+    }
+
+    /// Opens `found` and starts it in the best mode that works; `None` where it delivers nothing usable.
+    fn begin(
+        &mut self,
+        now: Time,
+        found: &Found,
+        driver: &mut impl Driver,
+        out: &mut Output,
+    ) -> Result<Option<Stream>, Failure> {
+        let opened = driver.open(&found.node, &self.settings).map_err(during("open it"))?;
+        if !opened.captures {
+            return Ok(None);
+        }
+        let list = candidates(&opened.offers, &self.settings.wanted(), self.settings.calibrated_size);
+        let (mut at, mut tried, mut no_room) = (0, 0, false);
+        while let Some(candidate) = list.get(at).filter(|_| tried < MODES_TRIED_MAX) {
+            tried += 1;
+            let set = driver.set_mode(candidate);
+            let Ok((format, rate)) = set.as_ref().copied() else {
+                let error = set.err().unwrap_or_else(|| io::Error::from_raw_os_error(0));
+                // EINVAL: the driver lists what it cannot do.
+                if error.kind() != io::ErrorKind::InvalidInput {
+                    return Err(("set its format", error));
+                }
+                at += 1;
+                continue;
+            };
+            let last = at + 1 >= list.len();
+            if !plausible(&format) || (!last && !format.is(candidate)) {
+                at += 1;
+                continue;
+            }
+            let refused = driver.set_controls(&self.settings.controls);
+            match driver.start(self.settings.buffers) {
+                Ok(_) => {}
+                Err(error) if Trouble::of(&error) == Trouble::Bandwidth => {
+                    driver.stop();
+                    no_room = true;
+                    let cause = format!(
+                        "{}: the bus has no room for {} ({error}); {}",
+                        found.best_name().display(),
+                        candidate.mode,
+                        Trouble::Bandwidth.advice()
+                    );
+                    self.raise(now, Fault::CamBandwidth, cause, out);
+                    let Some(next) = next_smaller(&list, at) else { return Err(("start it", error)) };
+                    at = next;
+                    continue;
+                }
+                Err(error) => return Err(("start it", error)),
+            }
+            if !no_room {
+                self.clear(now, Fault::CamBandwidth, out);
+            }
+            let rate = rate.unwrap_or(candidate.mode.rate);
+            self.in_use = Some(Arc::new(in_use(found, &opened, &format, rate, refused)));
+            return Ok(Some(Stream {
+                found: found.clone(),
+                format,
+                period_ns: rate.period_ns().clamp(MS, 1000 * MS),
+                begun: now,
+                frames: 0,
+                last_frame: now,
+                last_sequence: None,
+                exposure_ns: driver.exposure_ns(),
+                format_asked: now,
+                act_at: None,
+            }));
+        }
+        Ok(None)
+    }
+
+    /// A stream was started: notes what is other than before.
+    fn begun(&mut self, now: Time, stream: Stream, driver: &mut impl Driver, out: &mut Output) {
+        if let Some(known) = self.known.replace(stream.found.clone())
+            && known.node != stream.found.node
+        {
+            let cause = format!(
+                "the camera {} is {} now, it was {}",
+                stream.found.best_name().display(),
+                stream.found.node.display(),
+                known.node.display()
+            );
+            out.faults.push(FaultChange::noted(now, Fault::CamRenumbered, cause));
+        }
+        self.clear(now, Fault::CalMismatch, out);
+        self.check_size(now, (stream.format.width, stream.format.height), &stream.found, out);
+        self.damage.restart();
+        self.stillness.restart();
+        self.lost_at = None;
+        self.counters.opened += 1;
+        if driver.queued() == 0 {
+            let error = io::Error::from_raw_os_error(rustix::io::Errno::NOMEM.raw_os_error());
+            let found = stream.found;
+            return self.fail(now, &found, "get buffers", &error, driver, out);
+        }
+        self.state = State::Streaming(Box::new(stream));
+    }
+
+    /// Tells whether pictures have the calibrated size.
+    fn check_size(&mut self, now: Time, size: (u32, u32), found: &Found, out: &mut Output) -> bool {
+        match self.settings.calibrated_size {
+            Some(wanted) if wanted != size => {
+                let cause = format!(
+                    "{} delivers {}x{}, the calibration is for {}x{}: set that mode, or calibrate this one",
+                    found.best_name().display(),
+                    size.0,
+                    size.1,
+                    wanted.0,
+                    wanted.1
+                );
+                self.raise(now, Fault::CamFormat, cause, out);
+                false
+            }
+            _ => true,
+        }
+    }
+
+    /// One round of a running stream. `false` where another state was entered.
+    fn stream(
+        &mut self,
+        stream: &mut Stream,
+        now: Time,
+        ready: Ready,
+        driver: &mut impl Driver,
+        out: &mut Output,
+    ) -> Result<bool, Failure> {
+        if ready.event && driver.source_changed() {
+            return Ok(self.reopen(now, driver));
+        }
+        driver.reclaim().map_err(during("give it buffers"))?;
+        let newest = self.drain(stream, driver)?;
+        if newest.is_none() && ready.failed {
+            // The kernel says why only where it is asked.
+            let error = driver
+                .format()
+                .err()
+                .unwrap_or_else(|| io::Error::from_raw_os_error(rustix::io::Errno::IO.raw_os_error()));
+            return Err(("wait for a picture", error));
+        }
+        if let Some(filled) = newest {
+            stream.live(now);
+            if !self.take(stream, filled, now, driver, out)? {
+                return Ok(self.reopen(now, driver));
+            }
+            stream.act_at = None;
+            if stream.frames >= SOUND_FRAMES {
+                (self.protocol_failures, self.stalls) = (0, 0);
+                self.first_frame_ns = FIRST_FRAME_NS;
+            }
+            return Ok(true);
+        }
+        self.stalled(stream, now, driver, out)
+    }
+
+    /// Looks for a stall and acts on it, more roughly each time.
+    fn stalled(
+        &mut self,
+        stream: &mut Stream,
+        now: Time,
+        driver: &mut impl Driver,
+        out: &mut Output,
+    ) -> Result<bool, Failure> {
+        let Some(act_at) = stream.act_at else {
+            if now >= stream.stalls_at(self.first_frame_ns) {
+                let since = if stream.frames == 0 { stream.begun } else { stream.last_frame };
+                let cause = format!(
+                    "no picture from {} for {:.0} ms: restarting it; if it stays so, check its cable",
+                    stream.found.best_name().display(),
+                    now.secs_since(since) * 1e3
+                );
+                self.raise(now, Fault::CamStall, cause, out);
+                self.counters.stalls += 1;
+                // A stream that never began has waited long enough.
+                stream.act_at = Some(if stream.frames == 0 { now } else { now.plus_ns(STALL_GRACE_NS) });
+            }
+            return Ok(true);
+        };
+        if now < act_at {
+            return Ok(true);
+        }
+        self.stalls += 1;
+        if self.stalls > 1 {
+            self.first_frame_ns = (self.first_frame_ns * 2).min(FIRST_FRAME_MAX_NS);
+            if self.stalls.is_multiple_of(PROTOCOL_FAILURES) {
+                self.reset(now, &stream.found, driver);
+                return Ok(false);
+            }
+            return Ok(self.reopen(now, driver));
+        }
+        driver.restart().map_err(during("restart it"))?;
+        let format = driver.format().map_err(during("ask for its format"))?;
+        if format != stream.format {
+            return Ok(self.reopen(now, driver));
+        }
+        (stream.begun, stream.frames, stream.last_sequence) = (now, 0, None);
+        stream.act_at = Some(now.plus_ns(self.first_frame_ns));
+        self.counters.restarts += 1;
+        Ok(true)
+    }
+
+    /// Closes, to open again at once. Always `false`: the stream is over.
+    fn reopen(&mut self, now: Time, driver: &mut impl Driver) -> bool {
+        driver.close();
+        self.away(Life::Opening, now);
+        false
+    }
+
+    fn reset(&mut self, now: Time, found: &Found, driver: &mut impl Driver) {
+        driver.close();
+        match driver.reset(found) {
+            Ok(()) => self.counters.resets += 1,
+            // Without the right to reset, opening it again is all that can be done; the log has the fault already.
+            Err(e) => log::debug!("{}: cannot be reset: {e}", found.node.display()),
+        }
+        self.away(Life::Resetting, now.plus_ns(RESET_NS));
+    }
+
+    /// Something failed: tells, and decides when to try again.
+    fn fail(
+        &mut self,
+        now: Time,
+        found: &Found,
+        what: &'static str,
+        error: &io::Error,
+        driver: &mut impl Driver,
+        out: &mut Output,
+    ) {
+        let trouble = Trouble::of(error);
+        let name = found.best_name().display();
+        let cause = format!("{name}: cannot {what}: {error}; {}", trouble.advice());
+        self.raise(now, trouble.fault(), cause, out);
+        self.lost_at.get_or_insert(now);
+        driver.close();
+        match trouble {
+            Trouble::Gone => self.away(Life::Searching, now.plus_ns(SEARCH_NS / 2)),
+            Trouble::Denied => self.away(Life::Searching, now.plus_ns(SEARCH_NS)),
+            Trouble::Busy => self.away(Life::Busy, now.plus_ns(BUSY_NS)),
+            Trouble::Bandwidth => self.away(Life::Opening, now.plus_ns(BUSY_NS)),
+            Trouble::Queue => self.away(Life::Opening, now.plus_ns(AGAIN_NS)),
+            Trouble::Protocol => {
+                self.protocol_failures += 1;
+                if self.protocol_failures >= PROTOCOL_FAILURES {
+                    self.protocol_failures = 0;
+                    self.reset(now, found, driver);
+                } else {
+                    self.away(Life::Opening, now.plus_ns(AGAIN_NS));
+                }
+            }
+        }
+    }
+}
+
+/// What was tried, and the kernel's answer.
+type Failure = (&'static str, io::Error);
+
+fn during(what: &'static str) -> impl FnOnce(io::Error) -> Failure {
+    move |error| (what, error)
+}
+
+impl Format {
+    fn is(&self, candidate: &Candidate) -> bool {
+        let mode = &candidate.mode;
+        (self.coding, self.width, self.height) == (mode.coding, mode.width, mode.height)
+    }
+}
+
+/// Whether a picture of that format can be what the driver says.
+fn plausible(format: &Format) -> bool {
+    usable_size(format.coding, format.width, format.height)
+        && pictures::layout(format).is_none_or(|layout| layout.bytes <= format.size_image as usize)
+}
+
+fn in_use(
+    found: &Found,
+    opened: &Opened,
+    format: &Format,
+    rate: super::Rate,
+    refused: Vec<&'static str>,
+) -> InUse {
+    InUse {
+        node: found.node.clone(),
+        by_id: found.links.first().cloned(),
+        serial: found.serial.clone(),
+        card: opened.card.clone(),
+        mode: super::WantedMode { coding: format.coding, width: format.width, height: format.height, rate },
+        refused_controls: refused,
+    }
+}
+
+#[cfg(test)]
+#[path = "machine_tests.rs"]
+mod tests;

@@ -1,0 +1,266 @@
+//! From filled buffers to pictures: the newest wins, what is damaged is counted, and what is sound is lent or copied.
+
+use std::sync::Arc;
+
+use bowwave_core::{
+    event::{CameraFrame, Picture, PixelFormat},
+    fault::{Fault, FaultChange},
+    time::Time,
+};
+
+use super::{Failure, MS, Machine, Output, Stream, during};
+use crate::camera::{
+    Coding,
+    driver::{Driver, Filled, Format},
+    jpeg::JpegError,
+    timing::{Sensor, mid_exposure},
+};
+
+/// Buffers that the driver must keep: one to fill while the other waits.
+const DRIVER_KEEPS: usize = 2;
+/// Between questions whether the driver's format is still the same.
+const FORMAT_NS: i64 = 500 * MS;
+
+/// How the rows of an uncompressed picture lie.
+pub(super) struct Layout {
+    pub pixels: PixelFormat,
+    /// Bytes of a row that are pixels.
+    row: usize,
+    /// Bytes from row to row.
+    stride: usize,
+    /// Rows, those of the chroma plane included.
+    rows: usize,
+    /// Bytes that a picture needs in the buffer.
+    pub bytes: usize,
+}
+
+/// The layout, where the format is uncompressed. A row can be no shorter than its pixels, whatever the driver says.
+pub(super) fn layout(format: &Format) -> Option<Layout> {
+    let (width, height) = (format.width as usize, format.height as usize);
+    let (pixels, row, rows) = match format.coding {
+        Coding::Yuyv => (PixelFormat::Yuyv, width * 2, height),
+        Coding::Nv12 => (PixelFormat::Nv12, width, height + height / 2),
+        Coding::Mjpeg | Coding::Other(_) => return None,
+    };
+    let stride = (format.bytes_per_line as usize).max(row);
+    // The last row need not be padded.
+    Some(Layout { pixels, row, stride, rows, bytes: stride * rows.saturating_sub(1) + row })
+}
+
+/// What became of a buffer.
+enum Taken {
+    Picture(Picture, Option<Arc<[u8]>>),
+    /// Damaged, or of another size.
+    Damaged,
+    OtherSize,
+}
+
+impl Stream {
+    /// An undamaged buffer came.
+    pub(super) fn live(&mut self, now: Time) {
+        if self.frames > 0 {
+            // A camera may be slower than it says (long exposures); one late frame is not yet that.
+            let interval = now.ns_since(self.last_frame).clamp(0, self.period_ns * 2);
+            self.period_ns = (self.period_ns * 7 + interval) / 8;
+        }
+        self.frames += 1;
+        self.last_frame = now;
+    }
+}
+
+impl Machine {
+    /// Takes every filled buffer and gives all but the newest sound one back.
+    pub(super) fn drain(
+        &mut self,
+        stream: &mut Stream,
+        driver: &mut impl Driver,
+    ) -> Result<Option<Filled>, Failure> {
+        let mut newest: Option<Filled> = None;
+        // Bounded: a driver may fill faster than this gives back.
+        for _ in 0..=self.settings.buffers {
+            let Some(filled) = driver.dequeue().map_err(during("get a picture"))? else { break };
+            self.counters.buffers += 1;
+            let step = stream.last_sequence.map_or(1, |last| filled.sequence.wrapping_sub(last));
+            // Backwards is a counter that started anew.
+            if (2..1 << 31).contains(&step) {
+                self.counters.sequence_gaps += u64::from(step - 1);
+            }
+            stream.last_sequence = Some(filled.sequence);
+            let unused = if filled.damaged {
+                self.counters.damaged_buffers += 1;
+                Some(filled)
+            } else {
+                let older = newest.replace(filled);
+                self.counters.skipped += u64::from(older.is_some());
+                older
+            };
+            if let Some(unused) = unused {
+                driver.queue(unused.index).map_err(during("give a buffer back"))?;
+            }
+        }
+        Ok(newest)
+    }
+
+    /// Makes a picture of the newest buffer and hands it on. `false` where the format has changed.
+    pub(super) fn take(
+        &mut self,
+        stream: &mut Stream,
+        filled: Filled,
+        now: Time,
+        driver: &mut impl Driver,
+        out: &mut Output,
+    ) -> Result<bool, Failure> {
+        let sensor = Sensor {
+            exposure_ns: stream.exposure_ns,
+            readout_ns: self.settings.readout_us.map_or(stream.period_ns / 2, |us| i64::from(us) * 1000),
+            period_ns: stream.period_ns,
+        };
+        let (mid, believed) = mid_exposure(filled.stamp, now, sensor);
+        self.counters.stamps_not_believed += u64::from(!believed);
+        if mid <= self.last_mid {
+            let cause = format!(
+                "{}: a picture's time is {:.3} ms before the last one's: left out; if it stays so, use another camera",
+                stream.found.best_name().display(),
+                self.last_mid.secs_since(mid) * 1e3
+            );
+            out.faults.push(FaultChange::noted(now, Fault::CamTimestamp, cause));
+            self.counters.out_of_order += 1;
+            driver.queue(filled.index).map_err(during("give a buffer back"))?;
+            return Ok(true);
+        }
+        let taken = match layout(&stream.format) {
+            Some(layout) => self.raw(&layout, stream, filled, driver)?,
+            None => self.jpeg(stream, filled, driver)?,
+        };
+        let Taken::Picture(picture, jpeg) = taken else {
+            return self.refuse(&taken, stream, now, driver, out);
+        };
+        self.last_mid = mid;
+        self.judge(now, &picture, stream, out);
+        self.counters.frames += 1;
+        out.frames.push(CameraFrame {
+            arrival: now,
+            mid_exposure: mid,
+            sequence: filled.sequence,
+            picture,
+            jpeg,
+        });
+        Ok(true)
+    }
+
+    /// A buffer that is no picture. `false` where that is because the format has changed.
+    fn refuse(
+        &mut self,
+        taken: &Taken,
+        stream: &mut Stream,
+        now: Time,
+        driver: &mut impl Driver,
+        out: &mut Output,
+    ) -> Result<bool, Failure> {
+        self.counters.damaged_pictures += 1;
+        if matches!(taken, Taken::OtherSize) {
+            let cause = format!(
+                "{} sends pictures of another size than the {}x{} agreed: calibrate it anew, or use another camera",
+                stream.found.best_name().display(),
+                stream.format.width,
+                stream.format.height
+            );
+            self.raise(now, Fault::CamFormat, cause, out);
+        }
+        self.tell_damage(now, true, stream, out);
+        if now.ns_since(stream.format_asked) >= FORMAT_NS {
+            stream.format_asked = now;
+            return Ok(driver.format().map_err(during("ask for its format"))? == stream.format);
+        }
+        Ok(true)
+    }
+
+    /// What a sound picture says about the camera.
+    fn judge(&mut self, now: Time, picture: &Picture, stream: &Stream, out: &mut Output) {
+        for fault in super::GONE_WITH_FRAMES {
+            self.clear(now, fault, out);
+        }
+        if self.check_size(now, (picture.width(), picture.height()), &stream.found, out) {
+            self.clear(now, Fault::CamFormat, out);
+        }
+        self.tell_damage(now, false, stream, out);
+        if self.stillness.push(now, picture.bytes()) {
+            let cause = format!(
+                "the pictures of {} have not changed for a second: uncover the lens, or replug the camera",
+                stream.found.best_name().display()
+            );
+            self.raise(now, Fault::CamStatic, cause, out);
+        } else {
+            self.clear(now, Fault::CamStatic, out);
+        }
+    }
+
+    fn tell_damage(&mut self, now: Time, damaged: bool, stream: &Stream, out: &mut Output) {
+        if self.damage.push(now, damaged) {
+            let (bad, all) = self.damage.share();
+            let cause = format!(
+                "{bad} of {all} pictures of {} are damaged: check its cable",
+                stream.found.best_name().display()
+            );
+            self.raise(now, Fault::CamCorrupt, cause, out);
+        } else {
+            self.clear(now, Fault::CamCorrupt, out);
+        }
+    }
+
+    /// An uncompressed picture: lent where it lies packed and the driver can spare the buffer, else copied.
+    fn raw(
+        &mut self,
+        layout: &Layout,
+        stream: &Stream,
+        filled: Filled,
+        driver: &mut impl Driver,
+    ) -> Result<Taken, Failure> {
+        let Format { width, height, .. } = stream.format;
+        let back = during("give a buffer back");
+        let memory = driver.bytes(filled.index);
+        // `bytes_used` is the driver's word; the mapping is what there is.
+        if filled.bytes_used < layout.bytes || memory.len() < layout.bytes {
+            driver.queue(filled.index).map_err(back)?;
+            return Ok(Taken::Damaged);
+        }
+        if layout.stride == layout.row
+            && driver.queued() >= DRIVER_KEEPS
+            && let Some(memory) = driver.lend(filled.index)
+        {
+            self.counters.lent += 1;
+            // Its size was checked; a picture that is none gives the buffer back by itself.
+            return Ok(Picture::lent(layout.pixels, width, height, memory)
+                .map_or(Taken::Damaged, |picture| Taken::Picture(picture, None)));
+        }
+        let memory = driver.bytes(filled.index);
+        let packed = self.packed.filled(layout.row * layout.rows, |target| {
+            let rows = memory.chunks(layout.stride).take(layout.rows);
+            for (to, from) in target.chunks_exact_mut(layout.row).zip(rows) {
+                to.copy_from_slice(from.get(..layout.row).ok_or(())?);
+            }
+            Ok::<_, ()>(())
+        });
+        self.counters.copied += 1;
+        driver.queue(filled.index).map_err(back)?;
+        let picture = packed.ok().and_then(|bytes| Picture::new(layout.pixels, width, height, bytes).ok());
+        Ok(picture.map_or(Taken::Damaged, |picture| Taken::Picture(picture, None)))
+    }
+
+    fn jpeg(&mut self, stream: &Stream, filled: Filled, driver: &mut impl Driver) -> Result<Taken, Failure> {
+        let memory = driver.bytes(filled.index);
+        let bytes: Option<Arc<[u8]>> = memory.get(..filled.bytes_used).map(Arc::from);
+        // The copy is small; the buffer need not wait for the decoder.
+        driver.queue(filled.index).map_err(during("give a buffer back"))?;
+        let Some(bytes) = bytes else { return Ok(Taken::Damaged) };
+        let Format { width, height, .. } = stream.format;
+        Ok(match self.decoder.decode(&bytes, Some((width, height))) {
+            Ok(picture) => Taken::Picture(picture, Some(bytes)),
+            Err(JpegError::Size { .. }) => Taken::OtherSize,
+            Err(e) => {
+                log::debug!("{}: {e}", stream.found.node.display());
+                Taken::Damaged
+            }
+        })
+    }
+}

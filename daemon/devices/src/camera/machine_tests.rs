@@ -1,0 +1,762 @@
+//! Every fault of the camera against a scripted driver and a clock of numbers.
+
+use std::{collections::VecDeque, path::Path};
+
+use bowwave_core::{
+    event::{Lent, Picture},
+    fault::Change,
+};
+use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
+use rustix::io::Errno;
+
+use super::*;
+use crate::camera::{
+    Coding, Rate, Size, WantedMode,
+    driver::Filled,
+    negotiate::{Offer, Rates},
+    settings::Controls,
+    timing::Stamp,
+};
+
+const PERIOD_NS: i64 = 33_333_333;
+const SIZE: (u32, u32) = (64, 48);
+
+fn error(errno: Errno) -> io::Error {
+    io::Error::from_raw_os_error(errno.raw_os_error())
+}
+
+struct Memory(Vec<u8>, crossbeam_channel::Sender<u32>, u32);
+
+impl Lent for Memory {
+    fn mapping(&self) -> &[u8] {
+        &self.0
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        let _ = self.1.send(self.2);
+    }
+}
+
+/// A camera that does what the test says.
+struct Fake {
+    found: Vec<Found>,
+    offers: Vec<Offer>,
+    /// Answers of the next calls, where they are not good.
+    open_fails: VecDeque<Errno>,
+    start_fails: fn(&Candidate) -> Option<Errno>,
+    restart_fails: Option<Errno>,
+    dequeue_fails: Option<Errno>,
+    reset_works: bool,
+    /// What the driver sets instead of what it is asked for.
+    format_set: Option<Format>,
+    /// What it says later.
+    format_now: Option<Format>,
+    mode: Option<Candidate>,
+    filled: VecDeque<(Filled, Vec<u8>)>,
+    here: Vec<Option<Vec<u8>>>,
+    at_driver: usize,
+    back: (crossbeam_channel::Sender<u32>, crossbeam_channel::Receiver<u32>),
+    changed: bool,
+    log: Vec<&'static str>,
+}
+
+impl Fake {
+    fn new(coding: &[u8; 4]) -> Self {
+        let rates = Rates::Listed(vec![Rate::hz(30).unwrap()]);
+        let size = |(width, height)| (Size::Fixed { width, height }, rates.clone());
+        Self {
+            found: vec![camera("/dev/video0", "A")],
+            offers: vec![Offer { fourcc: *coding, sizes: vec![size(SIZE), size((32, 24))] }],
+            open_fails: VecDeque::new(),
+            start_fails: |_| None,
+            restart_fails: None,
+            dequeue_fails: None,
+            reset_works: true,
+            format_set: None,
+            format_now: None,
+            mode: None,
+            filled: VecDeque::new(),
+            here: Vec::new(),
+            at_driver: 0,
+            back: crossbeam_channel::unbounded(),
+            changed: false,
+            log: Vec::new(),
+        }
+    }
+
+    fn agreed(&self) -> Format {
+        let mode = self.mode.unwrap().mode;
+        let bytes_per_line = if mode.coding == Coding::Yuyv { mode.width * 2 } else { mode.width };
+        Format {
+            coding: mode.coding,
+            width: mode.width,
+            height: mode.height,
+            bytes_per_line,
+            size_image: mode.width * mode.height * 2,
+        }
+    }
+}
+
+fn camera(node: &str, serial: &str) -> Found {
+    Found {
+        node: node.into(),
+        links: vec![format!("/dev/v4l/by-id/usb-{serial}").into()],
+        serial: Some(serial.to_owned()),
+        name: "Cam".to_owned(),
+        usb: Some("/dev/bus/usb/001/002".into()),
+        named: false,
+    }
+}
+
+impl Driver for Fake {
+    fn find(&mut self, _: &CameraSettings) -> Vec<Found> {
+        self.found.clone()
+    }
+
+    fn open(&mut self, node: &Path, _: &CameraSettings) -> io::Result<Opened> {
+        self.log.push("open");
+        if let Some(errno) = self.open_fails.pop_front() {
+            return Err(error(errno));
+        }
+        let there = self.found.iter().any(|f| f.node == node);
+        if !there {
+            return Err(error(Errno::NODEV));
+        }
+        Ok(Opened { card: "Cam".to_owned(), captures: true, offers: self.offers.clone() })
+    }
+
+    fn set_mode(&mut self, wanted: &Candidate) -> io::Result<(Format, Option<Rate>)> {
+        self.mode = Some(*wanted);
+        Ok((self.format_set.unwrap_or_else(|| self.agreed()), Some(wanted.mode.rate)))
+    }
+
+    fn format(&mut self) -> io::Result<Format> {
+        Ok(self.format_now.or(self.format_set).unwrap_or_else(|| self.agreed()))
+    }
+
+    fn set_controls(&mut self, _: &Controls) -> Vec<&'static str> {
+        vec!["exposure time"]
+    }
+
+    fn exposure_ns(&mut self) -> Option<i64> {
+        Some(4_000_000)
+    }
+
+    fn start(&mut self, buffers: u32) -> io::Result<u32> {
+        self.log.push("start");
+        if let Some(errno) = (self.start_fails)(&self.mode.unwrap()) {
+            return Err(error(errno));
+        }
+        // What was lent by an earlier stream does not come back into this one.
+        self.back = crossbeam_channel::unbounded();
+        self.here = vec![None; buffers as usize];
+        self.at_driver = buffers as usize;
+        self.filled.clear();
+        Ok(buffers)
+    }
+
+    fn restart(&mut self) -> io::Result<()> {
+        self.log.push("restart");
+        self.restart_fails.map_or(Ok(()), |errno| Err(error(errno)))
+    }
+
+    fn stop(&mut self) {
+        self.log.push("stop");
+        self.at_driver = 0;
+    }
+
+    fn dequeue(&mut self) -> io::Result<Option<Filled>> {
+        if let Some(errno) = self.dequeue_fails {
+            return Err(error(errno));
+        }
+        let Some((mut filled, bytes)) = self.filled.pop_front() else { return Ok(None) };
+        assert!(self.at_driver > 0, "the driver has no buffer to fill");
+        self.at_driver -= 1;
+        let free = self.here.iter().position(Option::is_none).unwrap();
+        filled.index = free as u32;
+        self.here[free] = Some(bytes);
+        Ok(Some(filled))
+    }
+
+    fn bytes(&self, index: u32) -> &[u8] {
+        self.here[index as usize].as_deref().unwrap_or_default()
+    }
+
+    fn queue(&mut self, index: u32) -> io::Result<()> {
+        self.here[index as usize].take().expect("a buffer that is here");
+        self.at_driver += 1;
+        Ok(())
+    }
+
+    fn lend(&mut self, index: u32) -> Option<Arc<dyn Lent>> {
+        // It is neither here nor at the driver, but its place stays taken.
+        let bytes = self.here[index as usize].replace(Vec::new())?;
+        Some(Arc::new(Memory(bytes, self.back.0.clone(), index)))
+    }
+
+    fn reclaim(&mut self) -> io::Result<()> {
+        while let Ok(index) = self.back.1.try_recv() {
+            self.queue(index)?;
+        }
+        Ok(())
+    }
+
+    fn queued(&self) -> usize {
+        self.at_driver
+    }
+
+    fn source_changed(&mut self) -> bool {
+        std::mem::take(&mut self.changed)
+    }
+
+    fn close(&mut self) {
+        self.log.push("close");
+        self.at_driver = 0;
+        self.filled.clear();
+    }
+
+    fn reset(&mut self, _: &Found) -> io::Result<()> {
+        self.log.push("reset");
+        if self.reset_works { Ok(()) } else { Err(error(Errno::ACCESS)) }
+    }
+}
+
+/// A machine with its driver and its clock.
+struct Bench {
+    fake: Fake,
+    machine: Machine,
+    now: Time,
+    sequence: u32,
+    frames: Vec<CameraFrame>,
+    faults: Vec<FaultChange>,
+}
+
+impl Bench {
+    fn new(coding: &[u8; 4], settings: CameraSettings) -> Self {
+        settings.check().unwrap();
+        let now = Time::from_ns(10_000_000_000);
+        Self {
+            fake: Fake::new(coding),
+            machine: Machine::new(settings, now),
+            now,
+            sequence: 0,
+            frames: Vec::new(),
+            faults: Vec::new(),
+        }
+    }
+
+    fn step(&mut self, ready: Ready) -> Time {
+        let mut out = Output::default();
+        let due = self.machine.step(self.now, ready, &mut self.fake, &mut out);
+        self.frames.extend(out.frames);
+        self.faults.extend(out.faults);
+        due
+    }
+
+    /// Lets `ms` pass without a picture, waking only when the machine asks for it.
+    fn pass(&mut self, ms: i64) {
+        let end = self.now.plus_ns(ms * MS);
+        let mut steps = 0;
+        loop {
+            let due = self.step(Ready::default());
+            steps += 1;
+            assert!(steps < 10 + ms / 20, "a busy loop");
+            if due > end {
+                break;
+            }
+            self.now = due.max(self.now);
+        }
+        self.now = end;
+        self.step(Ready::default());
+    }
+
+    fn fill(&mut self, bytes: Vec<u8>, damaged: bool) {
+        self.sequence += 1;
+        let stamp = Stamp { time: self.now.plus_ns(-10 * MS), monotonic: true, start_of_exposure: true };
+        let filled = Filled { index: 0, bytes_used: bytes.len(), damaged, sequence: self.sequence, stamp };
+        self.fake.filled.push_back((filled, bytes));
+    }
+
+    /// A picture unlike the last one.
+    fn picture(&self) -> Vec<u8> {
+        let Candidate { mode, .. } = self.fake.mode.unwrap();
+        let value = (self.sequence % 200) as u8;
+        if mode.coding == Coding::Mjpeg {
+            jpeg(mode.width, value)
+        } else {
+            vec![value; (mode.width * mode.height * 2) as usize]
+        }
+    }
+
+    /// `count` frames, one a period, each in its turn.
+    fn frames(&mut self, count: u32) {
+        for _ in 0..count {
+            self.now = self.now.plus_ns(PERIOD_NS);
+            let picture = self.picture();
+            self.fill(picture, false);
+            self.step(Ready { filled: true, ..Ready::default() });
+        }
+    }
+
+    /// Looks for the camera, opens it and streams.
+    fn streaming(mut self) -> Self {
+        self.step(Ready::default());
+        self.frames(20);
+        assert_eq!(self.machine.status().life, Life::Streaming);
+        self.frames.clear();
+        self.faults.clear();
+        self.fake.log.clear();
+        self
+    }
+
+    /// What was reported since the last call, and when, milliseconds from `since`.
+    fn told(&mut self, since: Time) -> Vec<(Fault, &'static str, i64)> {
+        let told = |c: FaultChange| {
+            let kind = match c.change {
+                Change::Raised { cause } => {
+                    assert!(cause.len() > 20 && !cause.contains('\n'), "{cause}");
+                    "raised"
+                }
+                Change::Cleared => "cleared",
+                Change::Noted { .. } => "noted",
+            };
+            (c.fault, kind, c.time.ns_since(since) / MS)
+        };
+        self.faults.drain(..).map(told).collect()
+    }
+
+    fn life(&self) -> Life {
+        self.machine.status().life
+    }
+
+    fn counters(&self) -> CameraCounters {
+        self.machine.status().counters
+    }
+}
+
+fn jpeg(width: u32, value: u8) -> Vec<u8> {
+    let height = width * 3 / 4;
+    let mut bytes = Vec::new();
+    let mut encoder = JpegEncoder::new_with_quality(&mut bytes, 90);
+    encoder
+        .encode(&vec![value; (width * height * 3) as usize], width, height, ExtendedColorType::Rgb8)
+        .unwrap();
+    bytes
+}
+
+fn yuyv() -> Bench {
+    Bench::new(b"YUYV", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() })
+}
+
+fn mjpeg() -> Bench {
+    Bench::new(b"MJPG", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() })
+}
+
+/// Rows 1: unplugged and back.
+#[test]
+fn an_unplugged_camera_is_told_at_once_and_back_within_a_second() {
+    for how in [Errno::NODEV, Errno::NXIO] {
+        let mut bench = yuyv().streaming();
+        let unplugged = bench.now;
+        bench.fake.dequeue_fails = Some(how);
+        let known = std::mem::take(&mut bench.fake.found);
+        bench.step(Ready { failed: true, ..Ready::default() });
+        assert_eq!(bench.told(unplugged), [(Fault::CamLost, "raised", 0)]);
+        assert_eq!(bench.fake.log, ["close"]);
+        bench.pass(3000);
+        assert_eq!((bench.life(), bench.told(unplugged)), (Life::Searching, vec![]));
+        bench.fake.found = known;
+        bench.fake.dequeue_fails = None;
+        let back = bench.now;
+        bench.pass(150);
+        bench.frames(1);
+        let told = bench.told(back);
+        assert!(matches!(told[..], [(Fault::CamLost, "cleared", ..1000)]), "{told:?}");
+        assert_eq!(bench.life(), Life::Streaming);
+    }
+}
+
+/// Row 2: back under another name.
+#[test]
+fn a_camera_under_another_node_is_the_same_camera() {
+    let mut bench = yuyv().streaming();
+    bench.fake.dequeue_fails = Some(Errno::NODEV);
+    bench.step(Ready { failed: true, ..Ready::default() });
+    bench.fake.dequeue_fails = None;
+    bench.fake.found = vec![camera("/dev/video0", "Z"), camera("/dev/video3", "A")];
+    let back = bench.now;
+    bench.pass(150);
+    bench.frames(1);
+    let told = bench.told(back);
+    assert!(told.iter().any(|(f, what, _)| (*f, *what) == (Fault::CamRenumbered, "noted")), "{told:?}");
+    assert_eq!(bench.machine.status().in_use.unwrap().node, Path::new("/dev/video3"));
+}
+
+/// Row 3: no frames and no error.
+#[test]
+fn a_stall_is_seen_in_100_ms_and_ended_more_and_more_roughly() {
+    let mut bench = yuyv().streaming();
+    let last = bench.now;
+    bench.pass(101);
+    assert_eq!(bench.told(last), [(Fault::CamStall, "raised", 100)]);
+    assert_eq!((bench.life(), bench.fake.log.len()), (Life::Stalled, 0), "it may go on by itself");
+    bench.pass(150);
+    assert_eq!(bench.fake.log, ["restart"]);
+    let restarted = bench.now;
+    bench.frames(12);
+    assert_eq!(bench.told(restarted), [(Fault::CamStall, "cleared", 33)]);
+    // Nothing helps: opened anew, then reset, for ever, and told once.
+    bench.fake.log.clear();
+    bench.pass(30_000);
+    let told = bench.told(restarted);
+    assert!(matches!(told[..], [(Fault::CamStall, "raised", _)]), "{told:?}");
+    assert!(
+        bench.fake.log.starts_with(&["restart", "close", "open", "start", "close", "reset"]),
+        "{:?}",
+        bench.fake.log
+    );
+    assert!(bench.fake.log.iter().filter(|l| **l == "reset").count() >= 2);
+}
+
+#[test]
+fn a_stall_ends_by_itself_when_frames_come_in_time() {
+    let mut bench = yuyv().streaming();
+    let last = bench.now;
+    bench.pass(120);
+    bench.frames(1);
+    assert_eq!(bench.told(last), [(Fault::CamStall, "raised", 100), (Fault::CamStall, "cleared", 153)]);
+    assert!(bench.fake.log.is_empty());
+}
+
+#[test]
+fn a_slow_camera_does_not_stall() {
+    let rate = Rate::hz(10).unwrap();
+    let wanted = WantedMode { coding: Coding::Yuyv, width: 64, height: 48, rate };
+    let mut bench = Bench::new(b"YUYV", CameraSettings { modes: vec![wanted], ..CameraSettings::default() });
+    bench.fake.offers[0].sizes[0].1 = Rates::Listed(vec![rate]);
+    bench.step(Ready::default());
+    for _ in 0..10 {
+        bench.pass(100);
+        let picture = bench.picture();
+        bench.fill(picture, false);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    }
+    assert_eq!((bench.frames.len(), bench.told(Time::MIN)), (10, vec![]));
+}
+
+/// Row 4: the link fails for good until a reset.
+#[test]
+fn three_failures_of_the_link_lead_to_a_reset() {
+    for reset_works in [true, false] {
+        let mut bench = yuyv().streaming();
+        bench.fake.reset_works = reset_works;
+        bench.fake.dequeue_fails = Some(Errno::PROTO);
+        bench.fake.open_fails = [Errno::PROTO, Errno::PROTO].into();
+        let shock = bench.now;
+        bench.step(Ready { failed: true, ..Ready::default() });
+        assert_eq!(bench.told(shock), [(Fault::CamProtocol, "raised", 0)]);
+        bench.fake.dequeue_fails = None;
+        bench.pass(500);
+        assert_eq!(bench.fake.log.last(), Some(&"reset"));
+        assert_eq!(bench.life(), Life::Resetting);
+        assert_eq!(bench.counters().resets, u64::from(reset_works));
+        bench.pass(500);
+        bench.frames(1);
+        let told = bench.told(shock);
+        assert!(matches!(told[..], [(Fault::CamProtocol, "cleared", ..5000)]), "{told:?}");
+    }
+}
+
+/// Row 5: a buffer with the error flag.
+#[test]
+fn a_damaged_buffer_is_counted_and_the_next_frame_comes() {
+    let mut bench = yuyv().streaming();
+    bench.now = bench.now.plus_ns(PERIOD_NS);
+    bench.fill(vec![1; 64 * 48 * 2], true);
+    bench.step(Ready { filled: true, ..Ready::default() });
+    assert!(bench.frames.is_empty());
+    bench.frames(1);
+    assert_eq!((bench.frames.len(), bench.told(Time::MIN)), (1, vec![]));
+    assert_eq!(bench.counters().damaged_buffers, 1);
+}
+
+/// Row 6: cut and corrupt JPEGs, and JPEGs that lie.
+#[test]
+fn damaged_jpegs_are_counted_told_above_thirty_percent_and_forgotten_below_ten() {
+    let mut bench = mjpeg().streaming();
+    let send = |bench: &mut Bench, cut: bool| {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        let mut picture = bench.picture();
+        if cut {
+            picture.truncate(picture.len() * 2 / 3);
+        }
+        bench.fill(picture, false);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    };
+    (0..40).for_each(|n| send(&mut bench, n % 5 == 0));
+    assert_eq!((bench.frames.len(), bench.told(Time::MIN)), (32, vec![]), "20 % is not worth a word");
+    (0..60).for_each(|n| send(&mut bench, n % 2 == 0));
+    assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamCorrupt, "raised", _)]));
+    (0..70).for_each(|_| send(&mut bench, false));
+    assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamCorrupt, "cleared", _)]));
+    assert_eq!(bench.counters().damaged_pictures, 8 + 30);
+    let jpeg = bench.frames[0].jpeg.as_ref().unwrap();
+    assert!(jpeg.ends_with(&[0xff, 0xd9]));
+}
+
+/// Row 7: EIO.
+#[test]
+fn a_failed_queue_is_opened_again_within_half_a_second() {
+    let mut bench = yuyv().streaming();
+    bench.fake.dequeue_fails = Some(Errno::IO);
+    let failed = bench.now;
+    bench.step(Ready { failed: true, ..Ready::default() });
+    bench.fake.dequeue_fails = None;
+    bench.pass(250);
+    bench.frames(1);
+    let told = bench.told(failed);
+    assert!(
+        matches!(told[..], [(Fault::CamQueue, "raised", 0), (Fault::CamQueue, "cleared", ..500)]),
+        "{told:?}"
+    );
+    assert_eq!(bench.fake.log, ["close", "open", "start"]);
+}
+
+#[test]
+fn a_queue_that_only_says_that_it_failed_is_opened_again() {
+    let mut bench = yuyv().streaming();
+    bench.step(Ready { failed: true, ..Ready::default() });
+    assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamQueue, "raised", _)]));
+}
+
+/// Row 8: another format than before, or than the calibrated one.
+#[test]
+fn another_size_than_the_calibrated_one_is_told_until_it_is_back() {
+    let mut bench = yuyv().streaming();
+    let other = Format { width: 32, height: 24, bytes_per_line: 64, ..bench.fake.agreed() };
+    (bench.fake.format_set, bench.fake.changed) = (Some(other), true);
+    let changed = bench.now;
+    bench.step(Ready { event: true, ..Ready::default() });
+    bench.pass(10);
+    assert!(matches!(bench.told(changed)[..], [(Fault::CamFormat, "raised", ..100)]));
+    assert_eq!(bench.machine.status().in_use.unwrap().mode.width, 32);
+    (bench.fake.format_set, bench.fake.changed) = (None, true);
+    let back = bench.now;
+    bench.step(Ready { event: true, ..Ready::default() });
+    bench.pass(10);
+    bench.frames(1);
+    let told = bench.told(back);
+    assert!(matches!(told[..], [(Fault::CamFormat, "cleared", ..1000)]), "{told:?}");
+}
+
+#[test]
+fn a_jpeg_of_another_size_is_no_picture() {
+    let mut bench = mjpeg().streaming();
+    bench.now = bench.now.plus_ns(PERIOD_NS);
+    bench.fill(jpeg(32, 9), false);
+    bench.step(Ready { filled: true, ..Ready::default() });
+    assert!(bench.frames.is_empty());
+    assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamFormat, "raised", _)]));
+    bench.frames(1);
+    assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamFormat, "cleared", _)]));
+}
+
+#[test]
+fn a_camera_that_lies_about_its_format_gives_no_pictures_and_no_panic() {
+    let mut bench = yuyv().streaming();
+    for bytes in [vec![], vec![1; 100], vec![1; 64 * 48 * 2 - 1]] {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        bench.fill(bytes, false);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    }
+    // More than there is.
+    bench.now = bench.now.plus_ns(PERIOD_NS);
+    bench.fill(vec![1; 100], false);
+    bench.fake.filled[0].0.bytes_used = usize::MAX;
+    bench.step(Ready { filled: true, ..Ready::default() });
+    assert_eq!((bench.frames.len(), bench.counters().damaged_pictures), (0, 4));
+    // The driver's format has changed without a word.
+    bench.fake.format_now = Some(Format { width: 32, ..bench.fake.agreed() });
+    for _ in 0..15 {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        bench.fill(vec![1; 100], false);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    }
+    assert!(bench.fake.log.contains(&"open"), "{:?}", bench.fake.log);
+    // A size that no camera has is not even started.
+    let mut bench = yuyv();
+    bench.fake.format_set =
+        Some(Format { coding: Coding::Yuyv, width: u32::MAX, height: 2, bytes_per_line: 0, size_image: 0 });
+    bench.pass(1000);
+    assert!(!bench.fake.log.contains(&"start"));
+    assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamLost, "raised", _)]));
+}
+
+/// Row 9: somebody else has it.
+#[test]
+fn a_busy_camera_is_tried_each_second() {
+    let mut bench = yuyv();
+    bench.fake.open_fails = [Errno::BUSY, Errno::BUSY].into();
+    let begun = bench.now;
+    bench.pass(1500);
+    assert_eq!(bench.told(begun), [(Fault::CamBusy, "raised", 0)]);
+    assert_eq!((bench.life(), bench.fake.log.iter().filter(|l| **l == "open").count()), (Life::Busy, 2));
+    bench.pass(600);
+    bench.frames(1);
+    let told = bench.told(begun);
+    assert!(matches!(told[..], [(Fault::CamBusy, "cleared", ..3000)]), "{told:?}");
+}
+
+/// Row 10: no room on the bus.
+#[test]
+fn without_bandwidth_a_smaller_mode_runs_and_is_told() {
+    let mut bench = yuyv();
+    bench.fake.start_fails = |c| (c.mode.width > 32).then_some(Errno::NOSPC);
+    let begun = bench.now;
+    bench.step(Ready::default());
+    bench.frames(1);
+    assert_eq!(bench.machine.status().in_use.unwrap().mode.width, 32);
+    let told: Vec<_> = bench.told(begun).into_iter().map(|(f, what, _)| (f, what)).collect();
+    assert_eq!(told, [(Fault::CamBandwidth, "raised"), (Fault::CamFormat, "raised")]);
+    // Nothing fits: tried again later, not at once.
+    let mut bench = yuyv();
+    bench.fake.start_fails = |_| Some(Errno::NOSPC);
+    bench.pass(3000);
+    assert!(bench.fake.log.iter().filter(|l| **l == "open").count() <= 4);
+}
+
+/// Row 11: time stamps that repeat or go back.
+#[test]
+fn a_picture_that_is_not_newer_is_left_out_and_noted() {
+    let mut bench = yuyv().streaming();
+    for back_ms in [0, 50] {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        let picture = bench.picture();
+        bench.fill(picture, false);
+        let stamp = &mut bench.fake.filled[0].0.stamp;
+        stamp.time = stamp.time.plus_ns(-PERIOD_NS - back_ms * MS);
+        bench.step(Ready { filled: true, ..Ready::default() });
+        assert!(bench.frames.is_empty());
+        assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamTimestamp, "noted", _)]));
+    }
+    bench.frames(2);
+    assert_eq!((bench.frames.len(), bench.counters().out_of_order), (2, 2));
+    assert!(bench.frames[0].mid_exposure < bench.frames[1].mid_exposure);
+    assert_eq!(
+        bench.frames[0].arrival.ns_since(bench.frames[0].mid_exposure),
+        8 * MS,
+        "10 ms less half of 4 ms"
+    );
+}
+
+/// Row 12: another camera than the calibrated one.
+#[test]
+fn another_camera_is_not_opened() {
+    let settings = CameraSettings { serial: Some("B".to_owned()), ..CameraSettings::default() };
+    let mut bench = Bench::new(b"YUYV", settings);
+    let begun = bench.now;
+    bench.pass(1000);
+    assert_eq!(bench.told(begun), [(Fault::CalMismatch, "raised", 0)]);
+    assert_eq!((bench.life(), bench.fake.log.len()), (Life::Mismatched, 0));
+    bench.fake.found = vec![camera("/dev/video0", "B")];
+    bench.pass(300);
+    assert!(matches!(bench.told(begun)[..], [(Fault::CalMismatch, "cleared", _)]));
+    bench.frames(1);
+    assert_eq!(bench.life(), Life::Streaming);
+}
+
+/// Row 13: covered or frozen.
+#[test]
+fn a_picture_that_stays_the_same_is_told_within_a_second() {
+    let mut bench = yuyv().streaming();
+    let covered = bench.now;
+    for _ in 0..33 {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        bench.fill(vec![16; 64 * 48 * 2], false);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    }
+    let told = bench.told(covered);
+    assert!(matches!(told[..], [(Fault::CamStatic, "raised", 1000..1100)]), "{told:?}");
+    assert_eq!(bench.frames.len(), 33, "they are shown all the same");
+    bench.frames(1);
+    assert!(matches!(bench.told(covered)[..], [(Fault::CamStatic, "cleared", _)]));
+}
+
+#[test]
+fn the_newest_frame_wins_and_gaps_are_counted() {
+    let mut bench = yuyv().streaming();
+    for _ in 0..3 {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        let picture = bench.picture();
+        bench.fill(picture, false);
+    }
+    bench.sequence += 5;
+    bench.step(Ready { filled: true, ..Ready::default() });
+    bench.frames(1);
+    assert_eq!(bench.frames.len(), 2);
+    assert_eq!((bench.counters().skipped, bench.counters().sequence_gaps), (2, 5));
+}
+
+#[test]
+fn pictures_are_lent_while_the_driver_keeps_two_buffers_then_copied() {
+    let mut bench = yuyv().streaming();
+    bench.fake.reclaim().unwrap();
+    let total = bench.fake.here.len();
+    bench.frames(12);
+    let lent = bench.frames.iter().filter(|f| f.picture.mapping().is_some()).count();
+    assert_eq!((lent, bench.fake.at_driver), (total - 2, 2));
+    assert!(bench.frames.windows(2).all(|w| w[0].picture != w[1].picture), "none was overwritten");
+    let held: Picture = bench.frames[0].picture.clone();
+    bench.frames.clear();
+    bench.frames(1);
+    assert!(bench.frames[0].picture.mapping().is_some(), "buffers come back");
+    assert_eq!(held.bytes().len(), 64 * 48 * 2);
+}
+
+#[test]
+fn padded_rows_are_packed() {
+    let mut bench =
+        Bench::new(b"NV12", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() });
+    let format =
+        Format { coding: Coding::Nv12, width: 64, height: 48, bytes_per_line: 80, size_image: 80 * 72 };
+    bench.fake.format_set = Some(format);
+    bench.step(Ready::default());
+    bench.now = bench.now.plus_ns(PERIOD_NS);
+    let padded: Vec<u8> =
+        (0..72).flat_map(|row| (0..80).map(move |x| if x < 64 { row } else { 255 })).collect();
+    bench.fill(padded, false);
+    bench.step(Ready { filled: true, ..Ready::default() });
+    let picture = &bench.frames[0].picture;
+    assert_eq!((picture.width(), picture.height(), bench.counters().copied), (64, 48, 1));
+    assert!(picture.bytes().chunks(64).zip(0..72).all(|(row, n)| row.iter().all(|v| *v == n)));
+}
+
+#[test]
+fn a_camera_that_needs_long_to_begin_is_given_longer_each_time() {
+    let mut bench = yuyv();
+    let begun = bench.now;
+    // Never a frame within the first seconds of each start.
+    let mut longest = 0;
+    let mut opened = begun;
+    for _ in 0..400 {
+        bench.now = bench.now.plus_ns(50 * MS);
+        let before = bench.fake.log.len();
+        bench.step(Ready::default());
+        if bench.fake.log[before..].contains(&"start") {
+            longest = longest.max(bench.now.ns_since(opened) / MS);
+            opened = bench.now;
+        }
+    }
+    assert!(longest > 4000, "{longest}");
+    assert!(matches!(bench.told(begun)[..], [(Fault::CamStall, "raised", _)]));
+}
+
+#[test]
+fn stopping_closes_the_camera() {
+    let mut bench = yuyv().streaming();
+    bench.machine.stop(&mut bench.fake);
+    assert_eq!((bench.life(), bench.fake.log.last()), (Life::Stopped, Some(&"close")));
+    assert_eq!(bench.step(Ready::default()), Time::from_ns(i64::MAX));
+}
