@@ -7,6 +7,7 @@
 pub mod camera;
 pub mod clock;
 pub mod imu;
+pub mod lamps;
 pub mod lcd;
 mod nodes;
 pub mod queue;
@@ -14,3 +15,4 @@ pub mod report;
 pub mod serial;
 pub mod trigger;
 pub mod vectornav;
+mod wake;

@@ -1,14 +1,24 @@
-//! The inertial unit's serial line.
+//! The inertial unit's serial line: found, opened, read, lost and found again, for as long as the trainer runs.
+//!
+//! [`health`] decides, as a function of what came and of time; [`sanity`] and [`timing`] judge the samples; [`line`] and
+//! [`ioctl`] speak to the kernel; [`reader`] joins them in a thread.
 
+mod find;
+mod health;
+mod ioctl;
+mod line;
+mod reader;
+mod sanity;
 #[cfg(test)]
 mod tests;
+mod timing;
 
 use std::{
-    io::{self, Read},
+    fmt, io,
     path::{Path, PathBuf},
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicI64, Ordering},
     },
     thread::{self, JoinHandle},
     time::Duration,
@@ -16,20 +26,29 @@ use std::{
 
 use bowwave_core::event::Event;
 use crossbeam_channel::Receiver;
-use serialport::{SerialPort, SerialPortType};
+use rustix::event::{EventfdFlags, eventfd};
+use serialport::SerialPortType;
 
+pub use self::{health::LineStatus, timing::ArrivalTiming};
+use self::{
+    line::Line,
+    reader::{Reader, Shared, Watcher},
+};
 use crate::{
     clock,
-    imu::{ImuCounters, ImuDecoder},
-    nodes,
-    queue::{self, NewestSender},
+    imu::ImuCounters,
+    nodes, queue,
+    report::{Reporter, reporting},
 };
 
 /// Samples that wait to be drained: 4 s at 1000 Hz.
 pub const QUEUE_SAMPLES: usize = 4096;
 
-/// How long a read waits for bytes before it looks at whether to stop.
-const READ_TIMEOUT: Duration = Duration::from_millis(20);
+/// How long [`ImuPort::stop`] waits for the threads.
+const STOP_NS: i64 = 180_000_000;
+
+/// The rates that VectorNav units know, the likeliest first.
+const RATES: [u32; 9] = [115_200, 921_600, 460_800, 230_400, 57_600, 128_000, 38_400, 19_200, 9_600];
 
 /// A serial port of this computer.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,6 +59,26 @@ pub struct PortInfo {
     pub by_id: Option<PathBuf>,
     /// What it is: USB identity, PCI, or built in.
     pub kind: String,
+    /// What tells its adapter from others, where it is one on USB.
+    pub usb: Option<UsbIdentity>,
+}
+
+/// What tells one USB adapter from another, whatever its node is called.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct UsbIdentity {
+    /// Vendor number.
+    pub vendor: u16,
+    /// Product number.
+    pub product: u16,
+    /// Serial number, where the adapter has one.
+    pub serial: Option<String>,
+}
+
+impl fmt::Display for UsbIdentity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "USB {:04x}:{:04x}", self.vendor, self.product)?;
+        self.serial.as_ref().map_or(Ok(()), |serial| write!(f, " serial {serial}"))
+    }
 }
 
 /// Why the line cannot be used.
@@ -78,25 +117,59 @@ pub enum SerialError {
         /// The name asked for.
         node: PathBuf,
         /// What the serial layer says.
-        source: serialport::Error,
+        source: io::Error,
+    },
+    /// Another program has it.
+    #[error("{} is in use by another program (fuser shows which): end that one", node.display())]
+    Busy {
+        /// The name asked for.
+        node: PathBuf,
+    },
+    /// The port does not run at that rate.
+    #[error("{} does not run at {baud} baud but at {got}: set a rate that both the unit and the port know", node.display())]
+    BaudNotTaken {
+        /// The name asked for.
+        node: PathBuf,
+        /// The rate asked for.
+        baud: u32,
+        /// The rate that the port took.
+        got: u32,
+    },
+    /// No rates to try.
+    #[error("no baud rate is given: name one, or up to 16 to be tried")]
+    NoRates,
+    /// No adapter is there.
+    #[error(
+        "no USB serial adapter: ports here: {present}; plug the inertial unit in, or name its port (built-in ones are not \
+         guessed)"
+    )]
+    NoAdapter {
+        /// Ports that are there.
+        present: String,
+    },
+    /// The adapter that carried the unit is gone.
+    #[error("the inertial unit's adapter ({adapter}) is gone: ports here: {present}; plug it in again")]
+    Gone {
+        /// What it was.
+        adapter: String,
+        /// Ports that are there.
+        present: String,
+    },
+    /// A kernel call of the reading thread does not return.
+    #[error("a kernel call on {node} does not return: its thread is left behind; unplug the adapter")]
+    Blocked {
+        /// The port.
+        node: String,
     },
     /// The ports cannot be listed.
     #[error("cannot list the serial ports: {0}; is /sys mounted?")]
     List(#[source] serialport::Error),
-    /// The reading thread could not be started.
-    #[error("cannot start the thread that reads {}: {source}; are too many processes running?", node.display())]
-    Thread {
-        /// The port.
-        node: PathBuf,
-        /// The kernel's answer.
-        source: io::Error,
-    },
-    /// The reading thread panicked: a defect of this program.
-    #[error("the thread that reads {} broke down: report it with the log", node.display())]
-    BrokeDown {
-        /// The port.
-        node: PathBuf,
-    },
+    /// The threads could not be started.
+    #[error("cannot start the threads that read the inertial unit: {0}; are too many processes running?")]
+    Thread(#[source] io::Error),
+    /// A thread panicked: a defect of this program.
+    #[error("a thread that reads the inertial unit broke down: report it with the log")]
+    BrokeDown,
 }
 
 /// Every serial port of this computer.
@@ -107,7 +180,12 @@ pub fn list() -> Result<Vec<PortInfo>, SerialError> {
         .into_iter()
         .map(|port| {
             let node = PathBuf::from(&port.port_name);
-            PortInfo { by_id: nodes::link_to(by_id, &node), kind: kind(&port.port_type), node }
+            PortInfo {
+                by_id: nodes::link_to(by_id, &node),
+                kind: kind(&port.port_type),
+                usb: identity(port.port_type),
+                node,
+            }
         })
         .collect();
     ports.sort_by(|a, b| a.node.cmp(&b.node));
@@ -127,17 +205,77 @@ fn kind(port: &SerialPortType) -> String {
     }
 }
 
-/// The life of a line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LineStatus {
-    /// It is being read; it may be silent.
-    Open,
-    /// It hung up: the adapter was unplugged or the far end closed. It does not come back by itself: open it anew.
-    HungUp,
-    /// Reading failed with this kind of error. It does not come back by itself: open it anew.
-    Failed(io::ErrorKind),
-    /// [`ImuPort::stop`] ended it.
-    Stopped,
+fn identity(port: SerialPortType) -> Option<UsbIdentity> {
+    match port {
+        SerialPortType::UsbPort(usb) => {
+            Some(UsbIdentity { vendor: usb.vid, product: usb.pid, serial: usb.serial_number })
+        }
+        SerialPortType::PciPort | SerialPortType::BluetoothPort | SerialPortType::Unknown => None,
+    }
+}
+
+/// The rate of the line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Baud {
+    /// This rate and no other.
+    Fixed(u32),
+    /// The first of these is tried; where bytes come that are no packets, the others are. At most 16.
+    Scan(Vec<u32>),
+}
+
+impl Default for Baud {
+    fn default() -> Self {
+        Self::Scan(RATES.to_vec())
+    }
+}
+
+impl Baud {
+    fn rates(&self) -> &[u32] {
+        match self {
+            Self::Fixed(baud) => std::slice::from_ref(baud),
+            Self::Scan(rates) => rates,
+        }
+    }
+
+    fn check(&self) -> Result<(), SerialError> {
+        let rates = self.rates();
+        match rates.iter().find(|baud| **baud == 0) {
+            Some(baud) => Err(SerialError::Baud { baud: *baud }),
+            None if rates.is_empty() || rates.len() > 16 => Err(SerialError::NoRates),
+            None => Ok(()),
+        }
+    }
+}
+
+/// How the inertial unit is reached.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ImuSettings {
+    /// Its node, or better its link in `/dev/serial/by-id`. Absent: the first USB adapter on which a unit answers.
+    pub device: Option<PathBuf>,
+    /// Its rate.
+    pub baud: Baud,
+    /// Ask the adapter to hand bytes on at once.
+    pub low_latency: bool,
+}
+
+impl Default for ImuSettings {
+    fn default() -> Self {
+        Self { device: None, baud: Baud::default(), low_latency: true }
+    }
+}
+
+/// Whether the adapter hands bytes on at once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LowLatency {
+    /// Nobody asked it to, or no port is open.
+    #[default]
+    NotAsked,
+    /// It does.
+    Set,
+    /// Its driver has no such setting; most of those hold nothing back.
+    NotOffered,
+    /// This user may not set it.
+    Refused,
 }
 
 /// What a line has carried.
@@ -147,44 +285,85 @@ pub struct PortCounters {
     pub imu: ImuCounters,
     /// Samples dropped, oldest first, because nobody drained the queue.
     pub overflow: u64,
+    /// Samples that the unit's own clock shows to be missing.
+    pub lost_samples: u64,
+    /// Bytes without a stop bit, where the port counts them.
+    pub framing_errors: u64,
+    /// Bytes lost in the port or in the kernel, where the port counts them.
+    pub overruns: u64,
+    /// Times that a port was opened.
+    pub opened: u64,
+    /// Times that the port said it could be read and gave nothing.
+    pub spurious: u64,
 }
 
-struct Shared {
-    stop: AtomicBool,
-    state: Mutex<(LineStatus, PortCounters)>,
-}
-
-impl Shared {
-    /// Plain numbers: whole even where a holder panicked.
-    fn state(&self) -> MutexGuard<'_, (LineStatus, PortCounters)> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
+/// How the inertial unit does.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ImuStatus {
+    /// The line's life.
+    pub line: LineStatus,
+    /// The node that is open.
+    pub node: Option<PathBuf>,
+    /// The rate in use.
+    pub baud: Option<u32>,
+    /// Whether the adapter hands bytes on at once.
+    pub low_latency: LowLatency,
+    /// How evenly samples arrive.
+    pub timing: ArrivalTiming,
+    /// What was carried so far.
+    pub counters: PortCounters,
 }
 
 /// An inertial unit on a serial line, read by a thread of its own into a bounded queue.
+#[derive(Debug)]
 pub struct ImuPort {
-    node: PathBuf,
     events: Receiver<Event>,
     shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
+    threads: Vec<JoinHandle<()>>,
 }
 
 impl ImuPort {
-    /// Opens the port at `node` with 8 data bits, no parity, one stop bit at `baud`, for itself alone, and begins to read.
-    /// Bytes from before the opening are discarded.
+    /// Begins to look for the unit, to read it, and to look for it again whenever it is lost. That it is not there is told
+    /// by `reporter`, as all that happens later.
+    pub fn start(settings: ImuSettings, reporter: Reporter) -> Result<Self, SerialError> {
+        settings.baud.check()?;
+        Self::spawn(settings, None, reporter)
+    }
+
+    /// Like [`Self::start`] for a port that must be there, without reports: for replays and checks. Bytes that are sent
+    /// once this has returned are not lost.
     pub fn open(node: &Path, baud: u32) -> Result<Self, SerialError> {
-        let port = open_port(node, baud)?;
+        let settings =
+            ImuSettings { device: Some(node.to_owned()), baud: Baud::Fixed(baud), low_latency: true };
+        settings.baud.check()?;
+        let line = Line::open(node, baud, settings.low_latency)?;
+        let (reporter, _) = reporting();
+        Self::spawn(settings, Some(line), reporter)
+    }
+
+    fn spawn(settings: ImuSettings, line: Option<Line>, reporter: Reporter) -> Result<Self, SerialError> {
         let (queue, events) = queue::newest(QUEUE_SAMPLES);
+        let wake = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)
+            .map_err(|e| SerialError::Thread(e.into()))?;
         let shared = Arc::new(Shared {
             stop: AtomicBool::new(false),
-            state: Mutex::new((LineStatus::Open, PortCounters::default())),
+            wake,
+            alive_ns: AtomicI64::new(clock::now().ns()),
+            ended: AtomicBool::new(false),
+            status: Mutex::new(ImuStatus::default()),
         });
-        let reader = Reader { port, queue, shared: Arc::clone(&shared) };
-        let thread = thread::Builder::new()
-            .name("imu-serial".to_owned())
-            .spawn(move || reader.run())
-            .map_err(|source| SerialError::Thread { node: node.to_owned(), source })?;
-        Ok(Self { node: node.to_owned(), events, shared, thread: Some(thread) })
+        let mut port = Self { events, shared: Arc::clone(&shared), threads: Vec::with_capacity(2) };
+        let mut start = |name: &str, run: Box<dyn FnOnce() + Send>| {
+            let thread =
+                thread::Builder::new().name(name.to_owned()).spawn(run).map_err(SerialError::Thread)?;
+            port.threads.push(thread);
+            Ok::<_, SerialError>(())
+        };
+        let reader = Reader::new(settings, line, Arc::clone(&shared), reporter.clone(), queue);
+        let watcher = Watcher::new(shared, reporter);
+        start("imu-serial", Box::new(move || reader.run()))?;
+        start("imu-watch", Box::new(move || watcher.run()))?;
+        Ok(port)
     }
 
     /// The samples read and not yet drained, [`Event::Imu`] in the order of their arrival. At most [`QUEUE_SAMPLES`]; the
@@ -194,95 +373,74 @@ impl ImuPort {
     }
 
     /// How the line does.
-    pub fn status(&self) -> LineStatus {
-        self.shared.state().0
+    pub fn status(&self) -> ImuStatus {
+        self.shared.status().clone()
     }
 
     /// What it has carried so far.
     pub fn counters(&self) -> PortCounters {
-        self.shared.state().1
+        self.shared.status().counters
     }
 
-    /// Ends the reading and closes the port. Samples not drained are lost.
+    /// Ends the reading and closes the port, within 200 ms. Samples not drained are lost.
     pub fn stop(mut self) -> Result<PortCounters, SerialError> {
-        self.shared.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
-            return Err(SerialError::BrokeDown { node: self.node.clone() });
+        self.ask_to_stop();
+        let threads = std::mem::take(&mut self.threads);
+        let end = clock::now().plus_ns(STOP_NS);
+        while threads.iter().any(|t| !t.is_finished()) {
+            let now = clock::now();
+            if now >= end {
+                let node = self.shared.status().node.clone();
+                let node = node.map_or_else(|| "the serial port".to_owned(), |n| n.display().to_string());
+                return Err(SerialError::Blocked { node });
+            }
+            clock::sleep_until(now.plus_ns(1_000_000));
         }
-        Ok(self.counters())
+        let broke_down = threads.into_iter().map(JoinHandle::join).filter(Result::is_err).count() > 0;
+        if broke_down { Err(SerialError::BrokeDown) } else { Ok(self.counters()) }
+    }
+
+    fn ask_to_stop(&self) {
+        self.shared.stop.store(true, Ordering::Relaxed);
+        // The threads look at the flag every 100 ms anyway.
+        let _ = rustix::io::write(&self.shared.wake, &1u64.to_ne_bytes());
     }
 }
 
 impl Drop for ImuPort {
     fn drop(&mut self) {
-        if self.thread.is_some() {
-            log::warn!("{} was dropped without stop()", self.node.display());
-            self.shared.stop.store(true, Ordering::Relaxed);
+        if !self.threads.is_empty() {
+            log::warn!("the inertial unit's port was dropped without stop()");
+            self.ask_to_stop();
         }
     }
 }
 
-fn open_port(node: &Path, baud: u32) -> Result<Box<dyn SerialPort>, SerialError> {
-    if baud == 0 {
-        return Err(SerialError::Baud { baud });
-    }
-    match std::fs::metadata(node) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            let present = list().unwrap_or_default();
-            return Err(SerialError::NotFound {
-                node: node.to_owned(),
-                present: nodes::listed(present.iter().map(|p| p.node.display().to_string())),
-            });
+/// Reads the unit for `time` and tells how it does: for a check by hand.
+pub fn check(settings: ImuSettings, time: Duration) -> Result<ImuCheck, SerialError> {
+    let (reporter, reports) = reporting();
+    let port = ImuPort::start(settings, reporter)?;
+    thread::sleep(time);
+    let status = port.status();
+    port.stop()?;
+    let mut board = bowwave_core::fault::FaultBoard::new();
+    let mut causes = Vec::new();
+    for change in reports.changes() {
+        if let bowwave_core::fault::Change::Raised { cause } = &change.change {
+            causes.retain(|(fault, _)| *fault != change.fault);
+            causes.push((change.fault, cause.clone()));
         }
-        // Whatever else is wrong, opening says it.
-        Ok(_) | Err(_) => {}
+        board.take(&change);
     }
-    let open = || {
-        let port = serialport::new(node.to_string_lossy(), baud).timeout(READ_TIMEOUT).open()?;
-        port.clear(serialport::ClearBuffer::Input)?;
-        Ok(port)
-    };
-    open().map_err(|source: serialport::Error| match source.kind() {
-        serialport::ErrorKind::Io(io::ErrorKind::PermissionDenied) => {
-            SerialError::Permission { node: node.to_owned() }
-        }
-        _ => SerialError::Open { node: node.to_owned(), source },
-    })
+    causes.retain(|(fault, _)| board.is_active(*fault));
+    Ok(ImuCheck { status, faults: causes })
 }
 
-/// The reading thread.
-struct Reader {
-    port: Box<dyn SerialPort>,
-    queue: NewestSender<Event>,
-    shared: Arc<Shared>,
-}
-
-impl Reader {
-    fn run(mut self) {
-        let mut decoder = ImuDecoder::new();
-        let mut bytes = [0; 1024];
-        let end = loop {
-            if self.shared.stop.load(Ordering::Relaxed) {
-                break LineStatus::Stopped;
-            }
-            match self.port.read(&mut bytes) {
-                // A terminal that reads nothing has hung up; to try again would be a busy loop.
-                Ok(0) => break LineStatus::HungUp,
-                Ok(count) => {
-                    let arrival = clock::now();
-                    decoder.push(&bytes[..count], arrival, |sample| self.queue.send(Event::Imu(sample)));
-                    self.shared.state().1 =
-                        PortCounters { imu: decoder.counters(), overflow: self.queue.dropped() };
-                }
-                Err(e) => match e.kind() {
-                    io::ErrorKind::TimedOut | io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock => {}
-                    io::ErrorKind::BrokenPipe => break LineStatus::HungUp,
-                    kind => break LineStatus::Failed(kind),
-                },
-            }
-        };
-        self.shared.state().0 = end;
-    }
+/// What [`check`] found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImuCheck {
+    /// How the unit did at the end.
+    pub status: ImuStatus,
+    /// The faults that were there at the end, with their causes.
+    pub faults: Vec<(bowwave_core::fault::Fault, String)>,
 }

@@ -3,16 +3,34 @@
 use std::{
     fs::File,
     io::Write,
-    os::unix::ffi::OsStringExt,
+    os::unix::{ffi::OsStringExt, fs::symlink},
     path::{Path, PathBuf},
+    sync::{
+        Arc, Mutex,
+        atomic::{AtomicBool, AtomicI64, Ordering},
+    },
     time::{Duration, Instant},
 };
 
-use bowwave_core::event::{Event, ImuSample};
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use bowwave_core::{
+    event::{Event, ImuSample},
+    fault::{Change, Fault, FaultChange},
+};
+use rustix::{
+    event::{EventfdFlags, eventfd},
+    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+    time::{ClockId, clock_gettime},
+};
 
-use super::{ImuPort, LineStatus, QUEUE_SAMPLES, SerialError};
-use crate::{clock, vectornav::CommonOutput};
+use super::{
+    Baud, ImuPort, ImuSettings, ImuStatus, LineStatus, QUEUE_SAMPLES, SerialError,
+    reader::{BLOCKED_NS, Shared, Watcher},
+};
+use crate::{
+    clock,
+    report::{Reports, reporting},
+    vectornav::CommonOutput,
+};
 
 /// A pseudo-terminal's master and the path of its slave.
 fn terminal() -> (File, PathBuf) {
@@ -74,7 +92,7 @@ fn bytes_become_stamped_samples() {
         assert!((before..=after).contains(&sample.arrival));
     }
     assert!(samples.is_sorted_by_key(|s| s.arrival));
-    assert_eq!(port.status(), LineStatus::Open);
+    wait_for(|| port.status().line == LineStatus::Streaming);
     let counters = port.stop().expect("stops");
     assert_eq!((counters.imu.samples, counters.imu.skipped_bytes, counters.overflow), (50, 50 * 8, 0));
 }
@@ -98,16 +116,181 @@ fn numbers_that_are_not_finite_are_dropped_and_counted() {
     assert_eq!(port.stop().expect("stops").imu.not_finite, 2);
 }
 
+fn settings(device: &Path) -> ImuSettings {
+    ImuSettings { device: Some(device.to_owned()), ..ImuSettings::default() }
+}
+
+/// Codes of what has been reported: `+` raised, `-` cleared, `!` noted.
+fn codes(reports: &Reports) -> Vec<String> {
+    let code = |c: FaultChange| {
+        let sign = match c.change {
+            Change::Raised { .. } => '+',
+            Change::Cleared => '-',
+            Change::Noted { .. } => '!',
+        };
+        format!("{sign}{}", c.fault.code())
+    };
+    reports.changes().map(code).collect()
+}
+
+/// Waits until the port has settled on `line`.
+fn settle(port: &ImuPort, line: LineStatus) {
+    wait_for(|| port.status().line == line);
+}
+
+/// CPU time that this process has used, nanoseconds.
+fn cpu_ns() -> i64 {
+    let t = clock_gettime(ClockId::ProcessCPUTime);
+    t.tv_sec * 1_000_000_000 + t.tv_nsec
+}
+
 #[test]
-fn a_hang_up_is_a_status_and_no_busy_loop() {
+fn an_unplugged_unit_is_found_again_under_another_name() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let link = folder.path().join("usb-FTDI-if00-port0");
     let (mut master, slave) = terminal();
-    let port = ImuPort::open(&slave, 115_200).expect("opens");
-    master.write_all(&packet(1)).expect("written");
-    assert_eq!(receive(&port, 1).len(), 1);
+    symlink(&slave, &link).expect("link");
+    let (reporter, reports) = reporting();
+    let port = ImuPort::start(settings(&link), reporter).expect("starts");
+    settle(&port, LineStatus::Listening);
+    (0..3).for_each(|n| master.write_all(&packet(n)).expect("written"));
+    settle(&port, LineStatus::Streaming);
+    assert_eq!(port.status().node.as_deref(), Some(slave.as_path()));
+    assert!(codes(&reports).is_empty(), "nothing wrong so far");
+
+    let (unplugged, cpu_before) = (clock::now(), cpu_ns());
+    // The new terminal first: the kernel would give it the old one's name.
+    let (mut master2, slave2) = terminal();
     drop(master);
-    wait_for(|| port.status() != LineStatus::Open);
-    assert_eq!(port.status(), LineStatus::HungUp);
-    port.stop().expect("a line that hung up still stops");
+    settle(&port, LineStatus::Searching);
+    std::fs::remove_file(&link).expect("gone");
+    wait_for(|| clock::now().ns_since(unplugged) > 400_000_000);
+    let lost = reports.changes().next().expect("reported");
+    assert_eq!(lost.fault, Fault::ImuLost);
+    assert!(lost.time.ns_since(unplugged) < 100_000_000, "noticed at once");
+    let waiting_ns = clock::now().ns_since(unplugged);
+    // All tests of this process together: a busy loop alone would take all of one processor.
+    eprintln!("CPU while it is gone: {:.1} %", (cpu_ns() - cpu_before) as f64 / waiting_ns as f64 * 100.0);
+
+    symlink(&slave2, &link).expect("link");
+    let plugged = clock::now();
+    settle(&port, LineStatus::Listening);
+    (0..3).for_each(|n| master2.write_all(&packet(n)).expect("written"));
+    settle(&port, LineStatus::Streaming);
+    assert!(clock::now().ns_since(plugged) < 1_000_000_000, "back within a second");
+    assert_eq!(receive(&port, 6).len(), 6);
+    wait_for(|| port.status().node.as_deref() == Some(slave2.as_path()));
+    let codes = codes(&reports);
+    assert!(codes.contains(&"-IMU_LOST".to_owned()) && codes.contains(&"!IMU_RENUM".to_owned()), "{codes:?}");
+    assert_eq!(port.stop().expect("stops").opened, 2);
+}
+
+#[test]
+fn a_port_that_is_not_there_yet_is_waited_for_without_a_busy_loop() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let link = folder.path().join("imu");
+    let (reporter, reports) = reporting();
+    let port = ImuPort::start(settings(&link), reporter).expect("absence is no error of the start");
+    wait_for(|| reports.changes().any(|c| c.fault == Fault::ImuLost));
+    assert_eq!(port.status().line, LineStatus::Searching);
+    let (mut master, slave) = terminal();
+    symlink(&slave, &link).expect("link");
+    settle(&port, LineStatus::Listening);
+    master.write_all(&packet(1)).expect("written");
+    master.write_all(&packet(2)).expect("written");
+    settle(&port, LineStatus::Streaming);
+    wait_for(|| codes(&reports).contains(&"-IMU_LOST".to_owned()));
+    let before = clock::now();
+    port.stop().expect("stops");
+    assert!(clock::now().ns_since(before) < 200_000_000);
+}
+
+#[test]
+fn the_thread_lives_in_every_state() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (reporter, reports) = reporting();
+    let port = ImuPort::start(settings(&folder.path().join("imu")), reporter).expect("starts");
+    let begin = clock::now();
+    while clock::now().ns_since(begin) < 500_000_000 {
+        std::thread::sleep(Duration::from_millis(10));
+        assert!(clock::now().ns_since(reports.last_beat()) < 250_000_000);
+    }
+    port.stop().expect("stops");
+}
+
+/// A reader that does not move, as one that a driver has swallowed.
+#[test]
+fn a_call_that_does_not_return_is_told_within_200_ms() {
+    let shared = Arc::new(Shared {
+        stop: AtomicBool::new(false),
+        wake: eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK).expect("eventfd"),
+        alive_ns: AtomicI64::new(clock::now().ns()),
+        ended: AtomicBool::new(false),
+        status: Mutex::new(ImuStatus::default()),
+    });
+    let (reporter, reports) = reporting();
+    let watcher = Watcher::new(Arc::clone(&shared), reporter);
+    let begin = clock::now();
+    let thread = std::thread::spawn(move || watcher.run());
+    let raised = loop {
+        if let Some(change) = reports.changes().next() {
+            break change;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    };
+    assert_eq!(raised.fault, Fault::ImuBlocked);
+    assert!(raised.time.ns_since(begin) >= BLOCKED_NS);
+    assert!(clock::now().ns_since(reports.last_beat()) < 250_000_000, "the port lives on");
+    shared.alive_ns.store(clock::now().ns(), Ordering::Relaxed);
+    wait_for(|| codes(&reports).contains(&"-IMU_BLOCKED".to_owned()));
+    shared.stop.store(true, Ordering::Relaxed);
+    thread.join().expect("ends");
+}
+
+/// Hostile bytes as fast as the line takes them: no panic, bounded memory, and the unit is heard again at once.
+#[test]
+fn a_line_full_of_garbage_recovers() {
+    let (mut master, slave) = terminal();
+    let (reporter, reports) = reporting();
+    let fixed = ImuSettings { baud: Baud::Fixed(115_200), ..settings(&slave) };
+    let port = ImuPort::start(fixed, reporter).expect("starts");
+    settle(&port, LineStatus::Listening);
+    let mut seed = 1u32;
+    let begin = clock::now();
+    while clock::now().ns_since(begin) < 900_000_000 {
+        let garbage: Vec<u8> = (0..512)
+            .map(|_| {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                if seed >> 30 == 0 { 0xfa } else { (seed >> 16) as u8 }
+            })
+            .collect();
+        master.write_all(&garbage).expect("written");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    wait_for(|| port.status().line == LineStatus::Garbled);
+    assert!(codes(&reports).contains(&"+IMU_BAUD".to_owned()));
+    wait_for(|| {
+        master.write_all(&packet(1)).expect("written");
+        port.status().line == LineStatus::Streaming
+    });
+    assert!(codes(&reports).contains(&"-IMU_BAUD".to_owned()));
+    port.stop().expect("stops");
+}
+
+#[test]
+fn a_silent_unit_is_lost_after_100_ms_and_back_with_its_first_packet() {
+    let (mut master, slave) = terminal();
+    let (reporter, reports) = reporting();
+    let port = ImuPort::start(settings(&slave), reporter).expect("starts");
+    settle(&port, LineStatus::Listening);
+    (0..5).for_each(|n| master.write_all(&packet(n)).expect("written"));
+    let last = clock::now();
+    settle(&port, LineStatus::Silent);
+    let lost = reports.changes().find(|c| c.fault == Fault::ImuLost).expect("reported");
+    assert!((100_000_000..250_000_000).contains(&lost.time.ns_since(last)), "{}", lost.time.ns_since(last));
+    master.write_all(&packet(9)).expect("written");
+    settle(&port, LineStatus::Streaming);
+    port.stop().expect("stops");
 }
 
 /// Nobody drains: memory stays bounded, the newest samples remain.
@@ -140,6 +323,14 @@ fn what_cannot_be_opened_is_refused_in_words() {
     assert!(matches!(none, SerialError::Open { .. }), "{none}");
     let (_master, slave) = terminal();
     assert!(matches!(refused(&slave, 0), SerialError::Baud { baud: 0 }));
+    let _held = ImuPort::open(&slave, 115_200).expect("opens");
+    // Root may open it all the same.
+    if !rustix::process::geteuid().is_root() {
+        assert!(matches!(refused(&slave, 115_200), SerialError::Busy { .. }));
+    }
+    let (reporter, _) = reporting();
+    let none = ImuSettings { baud: Baud::Scan(Vec::new()), ..ImuSettings::default() };
+    assert!(matches!(ImuPort::start(none, reporter), Err(SerialError::NoRates)));
 }
 
 #[test]

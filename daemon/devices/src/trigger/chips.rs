@@ -1,4 +1,4 @@
-//! GPIO lines, one of which carries the trigger switch: which are there and whether one can be watched.
+//! GPIO chips and their lines: which are there, and whether one can be used.
 
 use std::{
     fs::File,
@@ -6,7 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use gpio_cdev::{Chip, LineDirection};
+use gpio_cdev::{Chip, Line, LineDirection, LineRequestFlags};
 
 use crate::nodes;
 
@@ -23,6 +23,8 @@ pub struct LineInfo {
     pub used: bool,
     /// It is an output now.
     pub output: bool,
+    /// Whether it is high now; only where it was looked at ([`check`]).
+    pub high: Option<bool>,
 }
 
 /// One chip.
@@ -95,6 +97,65 @@ pub enum TriggerError {
         /// What the GPIO layer says.
         source: gpio_cdev::Error,
     },
+    /// No chip is called that.
+    #[error("no GPIO chip is called {chip}: chips here: {present}; give a node, a label or a name")]
+    NoChip {
+        /// The name asked for.
+        chip: String,
+        /// Chips that are there.
+        present: String,
+    },
+    /// The line cannot be had.
+    #[error("cannot use line {offset} of {}: {source}; does its chip know interrupts and the bias asked for?", node.display())]
+    Request {
+        /// The chip.
+        node: PathBuf,
+        /// The line's number.
+        offset: u32,
+        /// What the GPIO layer says.
+        source: gpio_cdev::Error,
+    },
+    /// The window is too short for contacts, or too long for a finger.
+    #[error("a debounce of {ms} ms is out of range: give 10 to 20")]
+    Debounce {
+        /// What was asked for.
+        ms: u128,
+    },
+    /// The time is no time that a belt takes.
+    #[error("a trigger that is stuck after {s} s is out of range: give 1 to 3600")]
+    StuckAfter {
+        /// What was asked for.
+        s: f64,
+    },
+    /// One line for two things.
+    #[error("{name} and {other} are both line {line} of {chip}: give each its own")]
+    SameLine {
+        /// The one.
+        name: &'static str,
+        /// The other.
+        other: &'static str,
+        /// The chip.
+        chip: String,
+        /// The line.
+        line: String,
+    },
+    /// Edges carry no monotonic time.
+    #[error("Linux {release} dates GPIO edges by the wall clock: Linux 5.7 or newer is needed")]
+    Clock {
+        /// The kernel's release.
+        release: String,
+    },
+    /// The thread could not be started.
+    #[error("cannot start the thread that watches the trigger: {0}; are too many processes running?")]
+    Thread(#[source] io::Error),
+    /// The thread panicked: a defect of this program.
+    #[error("the thread that watches the trigger broke down: report it with the log")]
+    BrokeDown,
+    /// A kernel call of the thread does not return.
+    #[error(
+        "a kernel call on the trigger's chip does not return: its thread is left behind; look at the kernel's log (dmesg)"
+    )]
+    Blocked,
     /// The kernel reports something else.
     #[error("cannot open {}: {source}; look at the kernel's log (dmesg)", node.display())]
     Io {
@@ -114,13 +175,108 @@ pub fn list() -> Vec<Result<ChipInfo, TriggerError>> {
     }
 }
 
-/// Whether `line` (a name or a number) of the chip at `node` is there and free.
+/// Whether `line` (a name or a number) of the chip at `node` is there and free, and its level. The line is neither turned
+/// round nor changed.
 pub fn check(node: &Path, line: &str) -> Result<LineInfo, TriggerError> {
     check_in(Path::new("/dev"), node, line)
 }
 
 fn check_in(dev: &Path, node: &Path, line: &str) -> Result<LineInfo, TriggerError> {
-    find_line(&describe(dev, node)?, line)
+    let info = find_line(&describe(dev, node)?, line)?;
+    let placed = PlacedLine { node: node.to_owned(), offset: info.offset, chip: open(dev, node)? };
+    // Asked for neither as an input nor as an output, a line stays what it is.
+    let handle = placed.line().and_then(|l| l.request(LineRequestFlags::empty(), 0, super::input::CONSUMER));
+    let value = handle.and_then(|handle| handle.get_value()).map_err(|e| request_error(&placed, e))?;
+    Ok(LineInfo { high: Some(value != 0), ..info })
+}
+
+/// Whether the kernel dates edges by `CLOCK_MONOTONIC`, as it does since Linux 5.7.
+pub fn clock_is_monotonic() -> Result<(), TriggerError> {
+    let uname = rustix::system::uname();
+    let release = uname.release().to_string_lossy();
+    if monotonic_since(&release) {
+        Ok(())
+    } else {
+        Err(TriggerError::Clock { release: release.into_owned() })
+    }
+}
+
+fn monotonic_since(release: &str) -> bool {
+    let mut numbers = release.split(|c: char| !c.is_ascii_digit()).map(|n| n.parse::<u32>().ok());
+    let version = (numbers.next().flatten(), numbers.next().flatten());
+    matches!(version, (Some(major), Some(minor)) if (major, minor) >= (5, 7))
+}
+
+/// A line that was found.
+#[derive(Debug)]
+pub(crate) struct PlacedLine {
+    /// Its chip's node.
+    pub node: PathBuf,
+    /// Its number there.
+    pub offset: u32,
+    /// Its chip.
+    pub chip: Chip,
+}
+
+impl PlacedLine {
+    pub(crate) fn line(&self) -> Result<Line, gpio_cdev::Error> {
+        let mut chips = self.chip.lines();
+        usize::try_from(self.offset)
+            .ok()
+            .and_then(|offset| chips.nth(offset))
+            .ok_or_else(|| io::Error::from(io::ErrorKind::NotFound).into())
+    }
+}
+
+/// Finds `line` (a name or a number) on `chip` (a node, a label or a name), whoever uses it.
+pub(crate) fn place(dev: &Path, chip: &str, line: &str) -> Result<PlacedLine, TriggerError> {
+    let (node, chip) = find_chip(dev, chip)?;
+    let offset = match line.parse::<u32>().ok().filter(|offset| *offset < chip.num_lines()) {
+        // A number may also be a name; names come first.
+        Some(offset) => find_name(&chip, line).unwrap_or(offset),
+        None => match find_name(&chip, line) {
+            Some(offset) => offset,
+            // With the names that are there.
+            None => find_line(&describe(dev, &node)?, line)?.offset,
+        },
+    };
+    Ok(PlacedLine { node, offset, chip })
+}
+
+fn find_name(chip: &Chip, name: &str) -> Option<u32> {
+    chip.lines().find(|l| l.info().is_ok_and(|info| info.name() == Some(name))).map(|l| l.offset())
+}
+
+fn find_chip(dev: &Path, wanted: &str) -> Result<(PathBuf, Chip), TriggerError> {
+    if wanted.starts_with('/') {
+        let node = PathBuf::from(wanted);
+        let chip = open(dev, &node)?;
+        return Ok((node, chip));
+    }
+    let nodes = nodes::numbered(dev, "gpiochip")
+        .map_err(|source| TriggerError::Io { node: dev.to_owned(), source })?;
+    let mut present = Vec::new();
+    for node in nodes {
+        match open(dev, &node) {
+            Ok(chip) if chip.label() == wanted || chip.name() == wanted => return Ok((node, chip)),
+            Ok(chip) => present.push(format!("{} ({})", node.display(), chip.label())),
+            Err(_) => present.push(format!("{} (cannot be opened)", node.display())),
+        }
+    }
+    Err(TriggerError::NoChip { chip: wanted.to_owned(), present: nodes::listed(present) })
+}
+
+/// Why a line that is there cannot be had.
+pub(crate) fn request_error(placed: &PlacedLine, source: gpio_cdev::Error) -> TriggerError {
+    let info = placed.line().and_then(|line| line.info());
+    match info {
+        Ok(info) if info.is_kernel() => TriggerError::LineInUse {
+            node: placed.node.clone(),
+            line: placed.offset.to_string(),
+            consumer: info.consumer().unwrap_or("the kernel").to_owned(),
+        },
+        _ => TriggerError::Request { node: placed.node.clone(), offset: placed.offset, source },
+    }
 }
 
 /// The free line of `chip` that is called `line` or has that number.
@@ -163,6 +319,7 @@ fn describe(dev: &Path, node: &Path) -> Result<ChipInfo, TriggerError> {
                 consumer: info.consumer().map(str::to_owned),
                 used: info.is_used() || info.is_kernel(),
                 output: info.direction() == LineDirection::Out,
+                high: None,
             })
         })
         .collect::<Result<_, _>>()?;
@@ -201,6 +358,7 @@ mod tests {
             consumer: consumer.map(str::to_owned),
             used: consumer.is_some(),
             output: false,
+            high: None,
         };
         ChipInfo {
             node: "/dev/gpiochip0".into(),
@@ -238,6 +396,26 @@ mod tests {
         std::fs::write(&node, []).expect("file");
         assert!(matches!(check_in(dev.path(), &node, "1"), Err(TriggerError::NotAChip { .. })));
         assert!(matches!(check(Path::new("/dev/null"), "1"), Err(TriggerError::NotAChip { .. })));
+    }
+
+    #[test]
+    fn a_chip_that_is_called_otherwise_is_refused_in_words() {
+        let dev = tempfile::tempdir().expect("temporary folder");
+        std::fs::write(dev.path().join("gpiochip0"), []).expect("file");
+        let message = place(dev.path(), "pinctrl-rp1", "17").expect_err("not there").to_string();
+        assert!(message.starts_with("no GPIO chip is called pinctrl-rp1: chips here: "), "{message}");
+        assert!(message.contains("gpiochip0 (cannot be opened)"), "{message}");
+    }
+
+    #[test]
+    fn old_kernels_date_edges_by_the_wall_clock() {
+        for good in ["5.7.0", "5.10.103-v7+", "6.1.0-56-amd64", "10.0"] {
+            assert!(monotonic_since(good), "{good}");
+        }
+        for bad in ["4.19.0", "5.6.19", "5", "", "x.y"] {
+            assert!(!monotonic_since(bad), "{bad}");
+        }
+        clock_is_monotonic().expect("this machine's kernel");
     }
 
     /// Whatever chips the machine under test has, each must be described or refused in words.

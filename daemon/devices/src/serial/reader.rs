@@ -1,0 +1,411 @@
+//! The thread that reads the inertial unit, and the one that sees to it that the first has not been swallowed by a driver.
+
+use std::{
+    os::fd::{AsFd, BorrowedFd, OwnedFd},
+    path::PathBuf,
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, AtomicI64, Ordering},
+    },
+};
+
+use bowwave_core::{
+    event::Event,
+    fault::{Fault, FaultChange},
+    time::Time,
+};
+use rustix::{
+    event::{PollFd, PollFlags, poll},
+    io::Errno,
+    time::Timespec,
+};
+
+use super::{
+    ImuSettings, ImuStatus, LineStatus, SerialError,
+    find::Finder,
+    health::{Action, Health},
+    ioctl::LineErrors,
+    line::{Line, Read},
+    sanity::{Insane, Sanity},
+    timing::Arrivals,
+};
+use crate::{clock, imu::ImuDecoder, queue::NewestSender, report::Reporter};
+
+/// How often a port that is not there is looked for.
+const SEARCH_NS: i64 = 100_000_000;
+/// Longest wait for bytes: silence is noticed in time, and the thread is seen to live.
+const WAIT_NS: i64 = 20_000_000;
+/// How often the port's own counters are read.
+const COUNT_NS: i64 = 100_000_000;
+/// What a port that lies about bytes costs: no busy loop.
+const SPURIOUS_PAUSE_NS: i64 = 5_000_000;
+/// A round of the reader that takes longer hangs in the kernel.
+pub(super) const BLOCKED_NS: i64 = 150_000_000;
+/// How often the watcher looks.
+const WATCH_NS: i64 = 25_000_000;
+/// Bytes of a read: 44 ms at 921600 baud.
+const READ_BYTES: usize = 4096;
+
+/// What the port's threads and its owner share.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub(super) stop: AtomicBool,
+    /// Readable once the threads are to stop.
+    pub(super) wake: OwnedFd,
+    /// When the reader was last seen outside a kernel call that may hang, nanoseconds.
+    pub(super) alive_ns: AtomicI64,
+    /// The reader ended, as asked or by a panic.
+    pub(super) ended: AtomicBool,
+    pub(super) status: Mutex<ImuStatus>,
+}
+
+impl Shared {
+    /// Plain numbers: whole even where a holder panicked.
+    pub(super) fn status(&self) -> MutexGuard<'_, ImuStatus> {
+        self.status.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn stopping(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    fn alive(&self, now: Time) {
+        self.alive_ns.store(now.ns(), Ordering::Relaxed);
+    }
+}
+
+/// Waits for `fd` to be readable, for the stop, or for `wait_ns`. Gives what `fd` is ready for.
+fn wait_for(fd: Option<BorrowedFd<'_>>, wake: &OwnedFd, wait_ns: i64) -> Result<PollFlags, Errno> {
+    let timeout = Timespec { tv_sec: 0, tv_nsec: wait_ns.clamp(0, 999_999_999) };
+    let wake = PollFd::new(wake, PollFlags::IN);
+    let polled = |fds: &mut [PollFd<'_>]| match poll(fds, Some(&timeout)) {
+        // A poll that was interrupted says nothing of its files.
+        Err(Errno::INTR) | Ok(0) => Ok(PollFlags::empty()),
+        Ok(_) => Ok(fds.get(1).map_or(PollFlags::empty(), PollFd::revents)),
+        Err(e) => Err(e),
+    };
+    match fd {
+        Some(fd) => polled(&mut [wake, PollFd::from_borrowed_fd(fd, PollFlags::IN)]),
+        None => polled(&mut [wake]),
+    }
+}
+
+/// The reading thread.
+pub(super) struct Reader {
+    settings: ImuSettings,
+    line: Option<Line>,
+    shared: Arc<Shared>,
+    reporter: Reporter,
+    queue: NewestSender<Event>,
+    decoder: ImuDecoder,
+    finder: Finder,
+    /// Which of the candidates is tried.
+    attempt: usize,
+    roam: bool,
+    health: Health,
+    sanity: Sanity,
+    insane: bool,
+    arrivals: Arrivals,
+    late: bool,
+    errors: Option<LineErrors>,
+    counted: Time,
+}
+
+/// Sets [`Shared::ended`] however the thread ends.
+struct Ended(Arc<Shared>);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        self.0.status().line = LineStatus::Stopped;
+        self.0.ended.store(true, Ordering::Relaxed);
+    }
+}
+
+impl Reader {
+    pub(super) fn new(
+        settings: ImuSettings,
+        line: Option<Line>,
+        shared: Arc<Shared>,
+        reporter: Reporter,
+        queue: NewestSender<Event>,
+    ) -> Self {
+        Self {
+            finder: Finder::new(settings.device.clone()),
+            health: Health::new(&settings.baud),
+            settings,
+            line,
+            shared,
+            reporter,
+            queue,
+            decoder: ImuDecoder::new(),
+            attempt: 0,
+            roam: false,
+            sanity: Sanity::default(),
+            insane: false,
+            arrivals: Arrivals::default(),
+            late: false,
+            errors: None,
+            counted: Time::MIN,
+        }
+    }
+
+    pub(super) fn run(mut self) {
+        let ended = Ended(Arc::clone(&self.shared));
+        if self.line.is_some() {
+            self.opened(clock::now());
+        }
+        let mut bytes = vec![0; READ_BYTES];
+        while !self.shared.stopping() {
+            self.shared.alive(clock::now());
+            match self.line.take() {
+                None => self.search(),
+                Some(line) => self.line = self.serve(line, &mut bytes),
+            }
+            self.publish();
+        }
+        drop(ended);
+    }
+
+    /// Tries to open a port once, and waits a little where there is none.
+    fn search(&mut self) {
+        let opened = self.finder.candidates().and_then(|found| {
+            self.roam = found.len() > 1;
+            let path = found.get(self.attempt % found.len().max(1)).cloned().unwrap_or_default();
+            Line::open(&path, self.health.baud(), self.settings.low_latency)
+        });
+        let now = clock::now();
+        match opened {
+            Ok(line) => {
+                self.line = Some(line);
+                self.opened(now);
+                return;
+            }
+            Err(e @ SerialError::BaudNotTaken { .. }) => self.health.refused(now, &e.to_string()),
+            Err(e) => {
+                self.attempt = self.attempt.wrapping_add(1);
+                self.health.absent(now, &e.to_string());
+            }
+        }
+        self.pause(SEARCH_NS);
+    }
+
+    /// Waits, unless the stop comes.
+    fn pause(&self, ns: i64) {
+        // A poll that fails would make the search a busy loop.
+        if wait_for(None, &self.shared.wake, ns).is_err() {
+            clock::sleep_until(clock::now().plus_ns(ns));
+        }
+    }
+
+    fn opened(&mut self, now: Time) {
+        self.health.opened(now);
+        self.sanity.forget();
+        self.arrivals.forget();
+        self.errors = self.line.as_ref().and_then(Line::errors);
+        self.counted = now;
+        let Some(line) = &self.line else { return };
+        log::debug!(
+            "{} opened at {} baud, low latency: {:?}",
+            line.path().display(),
+            self.health.baud(),
+            line.low_latency()
+        );
+        let mut status = self.shared.status();
+        status.node = Some(line.node().to_owned());
+        status.low_latency = line.low_latency();
+        status.counters.opened += 1;
+    }
+
+    /// One wait and one read. Gives the line back while it is good.
+    fn serve(&mut self, line: Line, bytes: &mut [u8]) -> Option<Line> {
+        let ready = match wait_for(Some(line.as_fd()), &self.shared.wake, WAIT_NS) {
+            Ok(ready) => ready,
+            Err(e) => return self.lost(&line, &format!("waiting for bytes failed: {e}")),
+        };
+        self.shared.alive(clock::now());
+        let mut spurious = false;
+        if !ready.is_empty() {
+            match line.read(bytes) {
+                Read::Bytes(count) => self.take(&line, bytes.get(..count).unwrap_or_default()),
+                Read::Empty if ready.contains(PollFlags::HUP) => {
+                    return self.lost(&line, "the line hung up: the adapter was unplugged");
+                }
+                Read::Empty => {
+                    self.health.spurious(clock::now());
+                    spurious = true;
+                }
+                Read::HungUp => return self.lost(&line, "the line hung up: the adapter was unplugged"),
+                Read::Failed(e) => return self.lost(&line, &format!("reading failed: {e}")),
+            }
+        }
+        if spurious {
+            self.shared.status().counters.spurious += 1;
+            self.pause(SPURIOUS_PAUSE_NS);
+        }
+        let now = clock::now();
+        self.count(&line, now);
+        self.judge(&line, now);
+        match self.health.tick(now, self.roam) {
+            Action::Keep => Some(line),
+            Action::SetBaud(baud) => {
+                match line.configure(baud) {
+                    // The parser finds its feet by itself; the rest of the old rate's bytes are garbage.
+                    Ok(()) => line.flush(),
+                    Err(e) => log::debug!("{e}"),
+                }
+                Some(line)
+            }
+            Action::Reopen => {
+                self.interrupted();
+                None
+            }
+            Action::NextPort => {
+                self.attempt = self.attempt.wrapping_add(1);
+                self.interrupted();
+                None
+            }
+        }
+    }
+
+    fn lost(&mut self, line: &Line, why: &str) -> Option<Line> {
+        self.health.lost(clock::now(), &format!("{}: {why}", line.path().display()));
+        self.interrupted();
+        None
+    }
+
+    fn interrupted(&mut self) {
+        self.sanity.forget();
+        self.arrivals.forget();
+        self.errors = None;
+    }
+
+    /// Bytes arrived.
+    fn take(&mut self, line: &Line, bytes: &[u8]) {
+        let arrival = clock::now();
+        let before = self.decoder.counters();
+        let Self { decoder, queue, sanity, arrivals, .. } = self;
+        decoder.push(bytes, arrival, |sample| {
+            sanity.sample(&sample);
+            arrivals.sample(&sample);
+            queue.send(Event::Imu(sample));
+        });
+        let after = self.decoder.counters();
+        if after.not_finite > before.not_finite {
+            self.sanity.bad(arrival, Insane::NotFinite);
+        } else if after.unusable > before.unusable && after.samples == before.samples {
+            self.sanity.bad(arrival, Insane::Unusable);
+        }
+        let was = self.health.status();
+        self.health.received(arrival, bytes.len(), after.packets - before.packets);
+        if was != LineStatus::Streaming && self.health.status() == LineStatus::Streaming {
+            self.found(line, arrival);
+        }
+    }
+
+    /// The unit is known to be on this line.
+    fn found(&mut self, line: &Line, now: Time) {
+        if let Some(before) = self.finder.found(line.node()) {
+            let cause =
+                format!("the inertial unit was {} and now is {}", before.display(), line.node().display());
+            self.reporter.send(FaultChange::noted(now, Fault::ImuRenumbered, cause));
+        }
+    }
+
+    /// Looks at the port's own counters now and then.
+    fn count(&mut self, line: &Line, now: Time) {
+        if now.ns_since(self.counted) < COUNT_NS {
+            return;
+        }
+        self.counted = now;
+        let Some(errors) = line.errors() else { return };
+        if let Some(before) = self.errors.replace(errors) {
+            let framing = errors.framing.wrapping_sub(before.framing);
+            self.health.framing(framing);
+            let mut status = self.shared.status();
+            status.counters.framing_errors += u64::from(framing);
+            status.counters.overruns += u64::from(errors.overrun.wrapping_sub(before.overrun));
+        }
+    }
+
+    /// Raises and clears what is known from the samples.
+    fn judge(&mut self, line: &Line, now: Time) {
+        let verdict = self.sanity.verdict(now);
+        if let Some(insane) = verdict
+            && !self.insane
+        {
+            let cause = format!("the inertial unit on {}: {insane}", line.path().display());
+            self.reporter.send(FaultChange::raised(now, Fault::ImuSanity, cause));
+        } else if verdict.is_none() && self.insane {
+            self.reporter.send(FaultChange::cleared(now, Fault::ImuSanity));
+        }
+        self.insane = verdict.is_some();
+        let late = self.arrivals.look(now);
+        if late && !self.late {
+            let timing = self.arrivals.timing();
+            let cause = format!(
+                "packets of {:.1} ms come up to {:.1} ms apart (99 %) on {}: set the adapter's latency timer to 1 ms",
+                timing.period_ms,
+                timing.gap_p99_ms,
+                line.path().display()
+            );
+            self.reporter.send(FaultChange::raised(now, Fault::ImuLatency, cause));
+        } else if self.late && !late {
+            self.reporter.send(FaultChange::cleared(now, Fault::ImuLatency));
+        }
+        self.late = late;
+    }
+
+    /// Tells the supervisor and the owner.
+    fn publish(&mut self) {
+        for change in self.health.changes() {
+            self.reporter.send(change);
+        }
+        let mut status = self.shared.status();
+        status.line = self.health.status();
+        status.baud = self.line.is_some().then(|| self.health.baud());
+        if self.line.is_none() {
+            status.node = None;
+        }
+        status.timing = self.arrivals.timing();
+        status.counters.imu = self.decoder.counters();
+        status.counters.overflow = self.queue.dropped();
+        status.counters.lost_samples = self.arrivals.lost();
+    }
+}
+
+/// Gives the port's sign of life, and tells when a kernel call of the reader does not return. The reader's file is
+/// non-blocking: its reads cannot wait by design, so one that does is a driver's defect, and opening, setting and closing
+/// have no such promise at all. A thread in such a call cannot be ended from outside: it is waited for.
+pub(super) struct Watcher {
+    shared: Arc<Shared>,
+    reporter: Reporter,
+    blocked: bool,
+}
+
+impl Watcher {
+    pub(super) const fn new(shared: Arc<Shared>, reporter: Reporter) -> Self {
+        Self { shared, reporter, blocked: false }
+    }
+
+    pub(super) fn run(mut self) {
+        while !self.shared.stopping() && !self.shared.ended.load(Ordering::Relaxed) {
+            self.reporter.beat();
+            self.look(clock::now());
+            if wait_for(None, &self.shared.wake, WATCH_NS).is_err() {
+                clock::sleep_until(clock::now().plus_ns(WATCH_NS));
+            }
+        }
+    }
+
+    fn look(&mut self, now: Time) {
+        let blocked = now.ns_since(Time::from_ns(self.shared.alive_ns.load(Ordering::Relaxed))) >= BLOCKED_NS;
+        if blocked && !self.blocked {
+            let node = self.shared.status().node.clone().unwrap_or_else(|| PathBuf::from("the serial port"));
+            let cause = format!("a kernel call on {} does not return; unplug the adapter", node.display());
+            self.reporter.send(FaultChange::raised(now, Fault::ImuBlocked, cause));
+        } else if self.blocked && !blocked {
+            self.reporter.send(FaultChange::cleared(now, Fault::ImuBlocked));
+        }
+        self.blocked = blocked;
+    }
+}

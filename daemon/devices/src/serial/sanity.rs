@@ -1,0 +1,257 @@
+//! Whether what the inertial unit says can be so.
+
+use std::fmt;
+
+use bowwave_core::{event::ImuSample, time::Time};
+
+/// After this long one is sure: before the 300 ms within which the sailor is to be told.
+const SURE_NS: i64 = 250_000_000;
+/// Fewer samples than this say nothing, however long they take.
+const SAMPLES_MIN: u32 = 5;
+/// No good sample for this long while bad ones come.
+const BAD_NS: i64 = 150_000_000;
+/// Rates beyond this may be a sensor's end stop (the smallest usual range is 250 deg/s), rad/s.
+const RAIL_RATE: f64 = 4.0;
+/// Specific forces beyond this may be a sensor's end stop (the smallest usual range is 2 g), m/s^2.
+const RAIL_ACCEL: f64 = 19.0;
+/// How still a sensor at its end stop is, although the unit compensates bias and temperature, relative.
+const RAIL_STILL: f64 = 1e-3;
+
+/// What is wrong with the samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Insane {
+    /// Numbers that are none.
+    NotFinite,
+    /// The fields that the trainer needs are missing.
+    Unusable,
+    /// The very same numbers again and again.
+    Stuck,
+    /// The unit's own clock does not advance.
+    ClockStopped,
+    /// A sensor is at its end stop.
+    Saturated {
+        /// Which.
+        axis: &'static str,
+        /// The value that it does not leave, rad/s or m/s^2.
+        value: f64,
+    },
+}
+
+impl fmt::Display for Insane {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite => f.write_str("it sends numbers that are not finite; power-cycle it"),
+            Self::Unusable => f.write_str(
+                "its packets lack time since start-up, angular rate or acceleration: add them to its binary output (common \
+                 group, bits 0, 5 and 8)",
+            ),
+            Self::Stuck => f.write_str("it repeats the very same numbers; power-cycle it"),
+            Self::ClockStopped => f.write_str("its clock does not advance; power-cycle it"),
+            Self::Saturated { axis, value } => {
+                write!(f, "its {axis} stays at {value:.1}: saturated; look for what shakes it, then power-cycle it")
+            }
+        }
+    }
+}
+
+/// Since when something has been as it is.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    value: f64,
+    since: Time,
+    samples: u32,
+}
+
+impl Run {
+    const fn new(value: f64, since: Time) -> Self {
+        Self { value, since, samples: 1 }
+    }
+
+    fn take(&mut self, value: f64, now: Time, same: bool) {
+        if same {
+            self.samples = self.samples.saturating_add(1);
+        } else {
+            *self = Self::new(value, now);
+        }
+    }
+
+    fn sure(&self, now: Time) -> bool {
+        self.samples >= SAMPLES_MIN && now.ns_since(self.since) >= SURE_NS
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    sample: ImuSample,
+    same: Run,
+    clock: Run,
+    axes: [Run; 6],
+}
+
+/// Looks at every sample. Time is the samples' arrival.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sanity {
+    seen: Option<Seen>,
+    bad_since: Option<(Time, Insane)>,
+}
+
+const AXES: [&str; 6] = ["rate x", "rate y", "rate z", "acceleration x", "acceleration y", "acceleration z"];
+
+fn axes(sample: &ImuSample) -> [f64; 6] {
+    let (r, a) = (sample.rate, sample.accel);
+    [r.x, r.y, r.z, a.x, a.y, a.z]
+}
+
+impl Sanity {
+    /// A sample whose numbers are finite.
+    pub(super) fn sample(&mut self, sample: &ImuSample) {
+        self.bad_since = None;
+        let now = sample.arrival;
+        let values = axes(sample);
+        let Some(seen) = &mut self.seen else {
+            self.seen = Some(Seen {
+                sample: *sample,
+                same: Run::new(0.0, now),
+                clock: Run::new(0.0, now),
+                axes: values.map(|v| Run::new(v, now)),
+            });
+            return;
+        };
+        let last = std::mem::replace(&mut seen.sample, *sample);
+        let same = (last.rate, last.accel, last.world_from_imu)
+            == (sample.rate, sample.accel, sample.world_from_imu);
+        seen.same.take(0.0, now, same);
+        seen.clock.take(0.0, now, last.device_time_ns == sample.device_time_ns);
+        for (run, value) in seen.axes.iter_mut().zip(values) {
+            let still = (value - run.value).abs() <= RAIL_STILL * run.value.abs();
+            run.take(value, now, still);
+        }
+    }
+
+    /// A packet at `now` that gave no sample.
+    pub(super) fn bad(&mut self, now: Time, why: Insane) {
+        self.bad_since.get_or_insert((now, why));
+    }
+
+    /// The line was interrupted: what was the same before says nothing.
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// What is wrong, by what came until `now`.
+    pub(super) fn verdict(&self, now: Time) -> Option<Insane> {
+        if let Some((since, why)) = self.bad_since
+            && now.ns_since(since) >= BAD_NS
+        {
+            return Some(why);
+        }
+        let seen = self.seen?;
+        let last = seen.sample.arrival;
+        if seen.same.sure(last) {
+            return Some(Insane::Stuck);
+        }
+        if seen.clock.sure(last) {
+            return Some(Insane::ClockStopped);
+        }
+        seen.axes.iter().zip(AXES).enumerate().find_map(|(i, (run, axis))| {
+            let rail = if i < 3 { RAIL_RATE } else { RAIL_ACCEL };
+            (run.value.abs() >= rail && run.sure(last))
+                .then_some(Insane::Saturated { axis, value: run.value })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    const MS: i64 = 1_000_000;
+
+    fn sample(n: i64, rate: DVec3, accel: DVec3) -> ImuSample {
+        ImuSample {
+            arrival: Time::from_ns(n * 5 * MS),
+            device_time_ns: n * 5 * MS,
+            rate,
+            accel,
+            world_from_imu: None,
+        }
+    }
+
+    fn noise(n: i64) -> DVec3 {
+        DVec3::new((n * 7 % 13) as f64, (n * 5 % 11) as f64, (n * 3 % 7) as f64) * 1e-3
+    }
+
+    /// When a verdict comes, in samples of 5 ms, if it does within a second.
+    fn verdict_after(samples: impl Fn(i64) -> ImuSample) -> Option<(i64, Insane)> {
+        let mut sanity = Sanity::default();
+        (0..200).find_map(|n| {
+            sanity.sample(&samples(n));
+            sanity.verdict(Time::from_ns(n * 5 * MS)).map(|v| (n, v))
+        })
+    }
+
+    #[test]
+    fn a_unit_that_lives_is_believed() {
+        let up = DVec3::Z * -9.81;
+        assert_eq!(verdict_after(|n| sample(n, noise(n), up + noise(n + 3))), None);
+        // Two axes that are exactly still say nothing: small numbers may be quantised.
+        assert_eq!(verdict_after(|n| sample(n, DVec3::Z * noise(n).x, up)), None);
+        // A hard turn whose rate changes.
+        assert_eq!(verdict_after(|n| sample(n, DVec3::Z * (5.0 + 0.01 * n as f64), up)), None);
+    }
+
+    #[test]
+    fn the_same_numbers_again_are_noticed_within_300_ms() {
+        let (n, what) = verdict_after(|n| sample(n, noise(1), noise(2))).expect("stuck");
+        assert_eq!(what, Insane::Stuck);
+        assert!((50..60).contains(&n), "{n}");
+    }
+
+    #[test]
+    fn a_clock_that_stands_is_noticed() {
+        let still = |n| ImuSample { device_time_ns: 17, ..sample(n, noise(n), noise(n + 1)) };
+        assert_eq!(verdict_after(still).map(|v| v.1), Some(Insane::ClockStopped));
+    }
+
+    #[test]
+    fn an_end_stop_is_noticed_and_left_again() {
+        let railed = |n: i64| sample(n, noise(n) + DVec3::Y * (34.9 - noise(n).y), noise(n));
+        let (n, what) = verdict_after(railed).expect("saturated");
+        assert!(matches!(what, Insane::Saturated { axis: "rate y", .. }), "{what}");
+        assert!(n < 60, "{n}");
+        let mut sanity = Sanity::default();
+        (0..100).for_each(|n| sanity.sample(&railed(n)));
+        assert!(sanity.verdict(Time::from_ns(500 * MS)).is_some());
+        sanity.sample(&sample(100, noise(5), noise(6)));
+        assert_eq!(sanity.verdict(Time::from_ns(505 * MS)), None);
+        let shaken = |n: i64| sample(n, noise(n), noise(n) + DVec3::X * (-156.0 + noise(n).x));
+        assert!(matches!(verdict_after(shaken), Some((_, Insane::Saturated { axis: "acceleration x", .. }))));
+    }
+
+    #[test]
+    fn one_bad_packet_is_none_and_many_are() {
+        let mut sanity = Sanity::default();
+        let at = |ms: i64| Time::from_ns(ms * MS);
+        sanity.bad(at(0), Insane::NotFinite);
+        assert_eq!(sanity.verdict(at(100)), None);
+        sanity.sample(&sample(22, noise(1), noise(2)));
+        assert_eq!(sanity.verdict(at(400)), None, "a good one between");
+        for ms in (400..600).step_by(5) {
+            sanity.bad(at(ms), Insane::NotFinite);
+        }
+        assert_eq!(sanity.verdict(at(600)), Some(Insane::NotFinite));
+        sanity.sample(&sample(121, noise(3), noise(4)));
+        assert_eq!(sanity.verdict(at(606)), None);
+    }
+
+    #[test]
+    fn a_gap_is_no_evidence() {
+        let mut sanity = Sanity::default();
+        (0..10).for_each(|_| sanity.sample(&sample(0, noise(1), noise(2))));
+        sanity.forget();
+        sanity.sample(&sample(1000, noise(1), noise(2)));
+        assert_eq!(sanity.verdict(Time::from_ns(5000 * MS)), None);
+    }
+}

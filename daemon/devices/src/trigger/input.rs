@@ -1,0 +1,156 @@
+//! One input line with its edges.
+
+use std::{
+    error::Error as _,
+    io,
+    os::fd::{AsFd, BorrowedFd},
+    path::{Path, PathBuf},
+};
+
+use bowwave_core::time::Time;
+use gpio_cdev::{EventRequestFlags, EventType, LineEventHandle, LineRequestFlags};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
+
+use super::chips::{self, TriggerError, place};
+use crate::clock;
+
+/// What the kernel tells of who uses a line.
+pub(crate) const CONSUMER: &str = "bowwave";
+
+/// What holds an input where nothing drives it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bias {
+    /// As it is set up: by the board, or outside.
+    #[default]
+    AsIs,
+    /// The chip pulls it up.
+    PullUp,
+    /// The chip pulls it down.
+    PullDown,
+    /// Nothing of the chip's.
+    Disabled,
+}
+
+/// An input line and how it is read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct InputLine {
+    /// The chip: a node such as `/dev/gpiochip0`, or its label or name.
+    pub chip: String,
+    /// The line: its name or its number on the chip.
+    pub line: String,
+    /// Active is low, as with a switch to ground.
+    pub active_low: bool,
+    /// What holds it.
+    pub bias: Bias,
+}
+
+impl InputLine {
+    pub(super) fn flags(&self) -> LineRequestFlags {
+        // GPIOHANDLE_REQUEST_BIAS_* of linux/gpio.h (Linux 5.5 and newer), which the crate does not name.
+        let bias = match self.bias {
+            Bias::AsIs => 0,
+            Bias::PullUp => 1 << 5,
+            Bias::PullDown => 1 << 6,
+            Bias::Disabled => 1 << 7,
+        };
+        let level = if self.active_low { LineRequestFlags::ACTIVE_LOW } else { LineRequestFlags::empty() };
+        LineRequestFlags::INPUT | level | LineRequestFlags::from_bits_retain(bias)
+    }
+}
+
+/// An edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Edge {
+    /// The kernel's time.
+    pub time: Time,
+    /// The level that it brought.
+    pub active: bool,
+}
+
+/// An open input line.
+#[derive(Debug)]
+pub(super) struct Input {
+    handle: LineEventHandle,
+    node: PathBuf,
+    offset: u32,
+}
+
+impl Input {
+    /// Opens the line for both edges.
+    pub(super) fn open(dev: &Path, wanted: &InputLine) -> Result<Self, TriggerError> {
+        let placed = place(dev, &wanted.chip, &wanted.line)?;
+        let (node, offset) = (placed.node.clone(), placed.offset);
+        let failed = |source| chips::request_error(&placed, source);
+        let handle = placed
+            .line()
+            .and_then(|line| line.events(wanted.flags(), EventRequestFlags::BOTH_EDGES, CONSUMER))
+            .map_err(failed)?;
+        let flags = fcntl_getfl(&handle).unwrap_or(OFlags::empty()) | OFlags::NONBLOCK;
+        fcntl_setfl(&handle, flags)
+            .map_err(|e| TriggerError::Io { node: node.clone(), source: io::Error::from(e) })?;
+        Ok(Self { handle, node, offset })
+    }
+
+    /// The next edge that waits, if one does.
+    pub(super) fn edge(&mut self) -> Result<Option<Edge>, TriggerError> {
+        match self.handle.next() {
+            Some(Ok(event)) => Ok(Some(Edge {
+                // A time beyond 292 years is no time since start-up: the check of the clock refuses it.
+                time: Time::from_ns(i64::try_from(event.timestamp()).unwrap_or(i64::MAX)),
+                active: event.event_type() == EventType::RisingEdge,
+            })),
+            Some(Err(e)) if would_block(&e) => Ok(None),
+            Some(Err(source)) => Err(self.lost(source)),
+            None => Err(TriggerError::Io {
+                node: self.node.clone(),
+                source: io::Error::new(io::ErrorKind::UnexpectedEof, "half an edge"),
+            }),
+        }
+    }
+
+    /// The line's level, and when it was read.
+    pub(super) fn level(&self) -> Result<(Time, bool), TriggerError> {
+        match self.handle.get_value() {
+            Ok(value) => Ok((clock::now(), value != 0)),
+            Err(source) => Err(self.lost(source)),
+        }
+    }
+
+    fn lost(&self, source: gpio_cdev::Error) -> TriggerError {
+        TriggerError::Line { node: self.node.clone(), offset: self.offset, source }
+    }
+}
+
+impl AsFd for Input {
+    fn as_fd(&self) -> BorrowedFd<'_> {
+        self.handle.as_fd()
+    }
+}
+
+fn would_block(error: &gpio_cdev::Error) -> bool {
+    let io = error.source().and_then(|source| source.downcast_ref::<io::Error>());
+    io.is_some_and(|e| matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_to_read_is_no_loss() {
+        assert!(would_block(&io::Error::from(io::ErrorKind::WouldBlock).into()));
+        assert!(!would_block(&io::Error::from_raw_os_error(19).into()), "ENODEV");
+    }
+
+    #[test]
+    fn an_input_is_never_asked_to_be_an_output() {
+        for bias in [Bias::AsIs, Bias::PullUp, Bias::PullDown, Bias::Disabled] {
+            for active_low in [false, true] {
+                let line = InputLine { chip: String::new(), line: String::new(), active_low, bias };
+                let flags = line.flags();
+                assert!(flags.contains(LineRequestFlags::INPUT) && !flags.contains(LineRequestFlags::OUTPUT));
+                assert_eq!(flags.contains(LineRequestFlags::ACTIVE_LOW), active_low);
+            }
+        }
+    }
+}

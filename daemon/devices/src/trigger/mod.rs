@@ -1,0 +1,115 @@
+//! The trigger switch, the inert interlock and the power supply's warning, over the GPIO character device.
+//!
+//! Edges carry the kernel's `CLOCK_MONOTONIC` time, taken in the interrupt. [`debounce`], [`switch`] and [`guard`] decide
+//! what they mean, as functions of edges and of time; [`input`] asks the kernel; a thread joins them. Nothing here drives
+//! a line.
+
+mod chips;
+mod debounce;
+mod guard;
+mod input;
+mod port;
+mod switch;
+
+use std::time::Duration;
+
+pub use self::{
+    chips::{ChipInfo, LineInfo, TriggerError, check, clock_is_monotonic, list},
+    debounce::Debouncer,
+    input::{Bias, InputLine},
+    port::TriggerPort,
+    switch::{TriggerCounters, TriggerLife},
+};
+pub(crate) use chips::{place, request_error};
+
+/// What is wired where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TriggerSettings {
+    /// The trigger switch: active is pressed.
+    pub trigger: InputLine,
+    /// How long contacts chatter: 10 to 20 ms.
+    pub debounce: Duration,
+    /// How long a trigger may be held: longer than the longest belt lasts.
+    pub stuck_after: Duration,
+    /// The inert interlock: active means that the gun is inert. Where there is none the caller decides what that means.
+    pub interlock: Option<InputLine>,
+    /// The power supply's warning: active means that power is about to fail.
+    pub power_fail: Option<InputLine>,
+}
+
+impl TriggerSettings {
+    /// With everything but the trigger's line at its default: 15 ms, stuck after 10 s, nothing else wired.
+    pub const fn new(trigger: InputLine) -> Self {
+        Self {
+            trigger,
+            debounce: Duration::from_millis(15),
+            stuck_after: Duration::from_secs(10),
+            interlock: None,
+            power_fail: None,
+        }
+    }
+
+    /// Every line that is an input, with what it is.
+    pub fn inputs(&self) -> impl Iterator<Item = (&'static str, &InputLine)> {
+        [
+            ("trigger", Some(&self.trigger)),
+            ("interlock", self.interlock.as_ref()),
+            ("power-fail", self.power_fail.as_ref()),
+        ]
+        .into_iter()
+        .filter_map(|(name, line)| line.map(|line| (name, line)))
+    }
+
+    fn check(&self) -> Result<(), TriggerError> {
+        let ms = self.debounce.as_millis();
+        if !(10..=20).contains(&ms) {
+            return Err(TriggerError::Debounce { ms });
+        }
+        if !(Duration::from_secs(1)..=Duration::from_secs(3600)).contains(&self.stuck_after) {
+            return Err(TriggerError::StuckAfter { s: self.stuck_after.as_secs_f64() });
+        }
+        let lines: Vec<_> = self.inputs().collect();
+        for (i, (name, line)) in lines.iter().enumerate() {
+            if let Some((other, _)) =
+                lines.iter().take(i).find(|(_, l)| (&l.chip, &l.line) == (&line.chip, &line.line))
+            {
+                return Err(TriggerError::SameLine {
+                    name,
+                    other,
+                    chip: line.chip.clone(),
+                    line: line.line.clone(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How a line does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LineState {
+    /// It is not open.
+    #[default]
+    Absent,
+    /// Not active.
+    Inactive,
+    /// Active: pressed, inert, or power failing.
+    Active,
+}
+
+/// How the trigger and the inputs beside it do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TriggerStatus {
+    /// The trigger's life.
+    pub life: TriggerLife,
+    /// The trigger's line, contacts as they are.
+    pub trigger: LineState,
+    /// The interlock's line; `None` where none is wired.
+    pub interlock: Option<LineState>,
+    /// The power supply's line; `None` where none is wired.
+    pub power_fail: Option<LineState>,
+    /// The interlock is closed: presses count. `None` where none is wired: they count always.
+    pub armed: Option<bool>,
+    /// What was met so far.
+    pub counters: TriggerCounters,
+}
