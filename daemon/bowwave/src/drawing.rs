@@ -1,7 +1,7 @@
 //! From a scene's plan to a renderer that can do just that.
 
 use bowwave_core::{plan::ScenePlan, scene::Pass, session::ROUNDS_SEEN_MAX};
-use bowwave_render::{Needs, PictureShape, RenderConfig};
+use bowwave_render::{Needs, PictureShape, RenderConfig, TimeOuts};
 
 /// Frames in flight: one being drawn, one being read, one being filled.
 const FRAMES_IN_FLIGHT: usize = 3;
@@ -23,5 +23,6 @@ pub fn config(plan: &ScenePlan, gpu: Option<String>, validation: bool) -> Render
             waters,
         },
         picture: Some(PictureShape { format: plan.video, width: plan.picture.0, height: plan.picture.1 }),
+        time_outs: TimeOuts::default(),
     }
 }

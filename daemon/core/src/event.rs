@@ -1,6 +1,6 @@
 //! The one vocabulary of what the hardware tells the trainer. Devices and simulated hardware both speak it.
 
-use std::sync::Arc;
+use std::{any::Any, sync::Arc};
 
 use glam::{DQuat, DVec3};
 
@@ -82,6 +82,13 @@ impl PixelFormat {
 pub trait Lent: Send + Sync {
     /// The whole mapping: whole pages, the picture's bytes first. The same address each time the buffer is lent.
     fn mapping(&self) -> &[u8];
+
+    /// What keeps the mapping in place without keeping the buffer from the driver: while it is held, the pages stay mapped at
+    /// this address. The same one (`Arc::ptr_eq`) each time the buffer is lent, another after the memory was mapped anew.
+    /// `None`: the mapping may go with `self`, and nobody may remember its address.
+    fn hold(&self) -> Option<Arc<dyn Any + Send + Sync>> {
+        None
+    }
 }
 
 #[derive(Clone)]
@@ -212,6 +219,14 @@ impl Picture {
         match &self.bytes {
             Bytes::Owned(_) => None,
             Bytes::Lent(memory) => Some(memory.mapping()),
+        }
+    }
+
+    /// What keeps [`Picture::mapping`] in place; see [`Lent::hold`].
+    pub fn hold(&self) -> Option<Arc<dyn Any + Send + Sync>> {
+        match &self.bytes {
+            Bytes::Owned(_) => None,
+            Bytes::Lent(memory) => memory.hold(),
         }
     }
 

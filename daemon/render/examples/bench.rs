@@ -13,7 +13,7 @@ use bowwave_core::{
     event::{Picture, PixelFormat},
     scene::{LeftOut, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel},
 };
-use bowwave_render::{Needs, RenderConfig, Renderer};
+use bowwave_render::{Needs, RenderConfig, Renderer, TimeOuts};
 
 #[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
 #[path = "../src/testing.rs"]
@@ -102,6 +102,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             frames_in_flight: 3,
             needs: case.needs.clone(),
             picture: None,
+            time_outs: TimeOuts::default(),
         };
         let p50 = run(&case, &config, &models, frames, reference)?;
         reference = reference.or(Some(p50));

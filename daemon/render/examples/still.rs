@@ -10,7 +10,7 @@ use bowwave_core::{
     scene::{Pass, PassDecision, ReflectionMethod, RoundView, ShadowLevel, Water},
     sea::BeaufortForce,
 };
-use bowwave_render::{Needs, RenderConfig, Renderer};
+use bowwave_render::{Needs, RenderConfig, Renderer, TimeOuts};
 use glam::{DVec3, Vec3};
 
 #[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
@@ -66,6 +66,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         frames_in_flight: 2,
         needs: Needs { boats_max: 8, rounds_max: 8, waters: vec![(method, scene.water.shadow)] },
         picture: None,
+        time_outs: TimeOuts::default(),
     };
     let (mut renderer, mut completions) = Renderer::new(&config, &models)?;
     renderer.submit(&scene, &picture, true)?;

@@ -34,13 +34,25 @@ pub enum RenderError {
         /// What it lacks.
         lacks: String,
     },
-    /// The device was lost: hung, unplugged or reset.
+    /// The device was lost: unplugged, or reset by its driver. Every later call on this renderer says so as well; drop it and
+    /// its [`Completions`](crate::Completions), and make new ones.
     #[error(
-        "the GPU was lost in {call}; restart the trainer, and if it comes back, power-cycle the computer"
+        "the GPU was lost in {call}; the renderer must be made anew, and if it comes back, power-cycle the computer"
     )]
     DeviceLost {
         /// The Vulkan call that said so.
         call: &'static str,
+    },
+    /// The device did not finish what it was given in time. No renderer of this process can be relied on any more: drop what
+    /// there is, which does not wait for the device, and end the process.
+    #[error(
+        "the GPU did not finish {what} within {after_ms} ms; restart the trainer, and if it comes back, power-cycle the computer"
+    )]
+    Hung {
+        /// What it was given.
+        what: &'static str,
+        /// How long was waited, milliseconds.
+        after_ms: u64,
     },
     /// Memory of the device or of the host ran out.
     #[error("out of GPU memory in {call} for {what}; choose a smaller --size or close other programs")]
@@ -58,10 +70,8 @@ pub enum RenderError {
         /// Its result.
         result: vk::Result,
     },
-    /// The GPU did not finish a frame for seconds, or the reader of finished frames keeps them all.
-    #[error(
-        "no frame slot became free within {seconds} s: the GPU hangs, or finished frames are not given back"
-    )]
+    /// The reader of finished frames keeps them all.
+    #[error("no frame slot became free within {seconds} s: finished frames are not taken, or not given back")]
     Stalled {
         /// How long was waited.
         seconds: u64,

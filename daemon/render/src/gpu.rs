@@ -2,12 +2,18 @@
 
 use std::{
     ffi::{CStr, c_void},
-    sync::{Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use ash::{ext, vk};
 
-use crate::error::{Named, RenderError};
+use crate::{
+    error::{Named, RenderError},
+    import::HostImport,
+};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -32,7 +38,10 @@ pub fn devices() -> Result<Vec<DeviceInfo>, RenderError> {
     Ok(instance.devices()?.into_iter().map(|(_, info)| info).collect())
 }
 
-/// The device that `wanted` names, by its index or a part of its name; an error that lists those that are there.
+/// As a device's name: the first that is a program on the processor, whatever it is called. What safe mode draws with.
+pub const SOFTWARE: &str = "software";
+
+/// The device that `wanted` names: its index, [`SOFTWARE`], or a part of its name; an error that lists those that are there.
 pub fn find_device(wanted: &str) -> Result<DeviceInfo, RenderError> {
     let devices = devices()?;
     let index = choose(Some(wanted), &devices.iter().collect::<Vec<_>>())?;
@@ -186,14 +195,16 @@ pub struct Gpu {
     pub(crate) timestamp_ns: Option<f64>,
     /// What the device can do at most.
     pub(crate) limits: vk::PhysicalDeviceLimits,
+    /// How memory of the host is imported, where the device can.
+    pub(crate) host_import: Option<HostImport>,
     memory: vk::PhysicalDeviceMemoryProperties,
     info: DeviceInfo,
     ledger: Mutex<Vec<(&'static str, u64)>>,
+    abandoned: AtomicBool,
 }
 
 impl Gpu {
-    /// Opens the device whose index is, or whose name contains, `wanted` (case does not matter); without one, the first GPU, or
-    /// the first device of any kind.
+    /// Opens the device that `wanted` names (see [`find_device`]); without one, the first GPU, or the first device of any kind.
     pub(crate) fn open(wanted: Option<&str>, validation: bool) -> Result<Self, RenderError> {
         let instance = Instance::new(validation)?;
         let devices = instance.devices()?;
@@ -216,7 +227,8 @@ impl Gpu {
             .ok_or_else(|| lacks("a graphics queue"))?;
         let timestamps = families.get(family).is_some_and(|f| f.timestamp_valid_bits > 0);
         let family = u32::try_from(family).map_err(|_| lacks("a usable queue"))?;
-        let device = create_device(&instance, physical, family)?;
+        let imports = can_import(&instance, physical)?;
+        let device = create_device(&instance, physical, family, imports)?;
         // SAFETY: the family and its first queue were asked for at creation; `physical` comes from this instance.
         let (queue, properties, memory) = unsafe {
             (
@@ -225,6 +237,10 @@ impl Gpu {
                 instance.raw.get_physical_device_memory_properties(physical),
             )
         };
+        let host_import = imports.then(|| HostImport {
+            calls: ext::external_memory_host::Device::new(&instance.raw, &device),
+            alignment: import_alignment(&instance, physical),
+        });
         let limits = properties.limits;
         let timestamp_ns = timestamps.then(|| f64::from(limits.timestamp_period));
         Ok(Self {
@@ -234,9 +250,11 @@ impl Gpu {
             family,
             timestamp_ns,
             limits,
+            host_import,
             memory,
             info,
             ledger: Mutex::default(),
+            abandoned: AtomicBool::new(false),
         })
     }
 
@@ -262,11 +280,7 @@ impl Gpu {
         needs: vk::MemoryRequirements,
         kinds: &[vk::MemoryPropertyFlags],
     ) -> Result<vk::DeviceMemory, RenderError> {
-        let fits = |kind: &vk::MemoryPropertyFlags| {
-            self.memory.memory_types_as_slice().iter().zip(0_u32..).find_map(|(ty, i)| {
-                (needs.memory_type_bits & (1 << i) != 0 && ty.property_flags.contains(*kind)).then_some(i)
-            })
-        };
+        let fits = |kind: &vk::MemoryPropertyFlags| self.memory_type(needs.memory_type_bits, *kind);
         let Some(index) = kinds.iter().find_map(fits) else {
             return Err(RenderError::Unsuitable {
                 device: self.info.name.clone(),
@@ -279,6 +293,15 @@ impl Gpu {
             unsafe { self.device.allocate_memory(&info, None) }.named_for("vkAllocateMemory", what)?;
         self.ledger.lock().unwrap_or_else(PoisonError::into_inner).push((what, needs.size));
         Ok(memory)
+    }
+
+    /// The first memory type of those in `bits` that has all of `flags`.
+    pub(crate) fn memory_type(&self, bits: u32, flags: vk::MemoryPropertyFlags) -> Option<u32> {
+        self.memory
+            .memory_types_as_slice()
+            .iter()
+            .zip(0_u32..)
+            .find_map(|(ty, i)| (bits & (1 << i) != 0 && ty.property_flags.contains(flags)).then_some(i))
     }
 
     /// Takes back what [`Gpu::allocate`] gave.
@@ -294,10 +317,17 @@ impl Gpu {
         }
     }
 
-    /// Waits until the device has nothing left to do. Used when things are made or torn down, never within a frame.
-    pub(crate) fn wait_idle(&self) -> Result<(), RenderError> {
-        // SAFETY: only the renderer's thread submits, and it is the one that calls this.
-        unsafe { self.device.device_wait_idle() }.named("vkDeviceWaitIdle")
+    /// Gives the device up because it hangs: nothing made from it is destroyed any more, for the device may still use it and
+    /// destroying may wait for ever. Everything stays until the process ends, the driver's library included.
+    pub(crate) fn abandon(self: &Arc<Self>) {
+        if !self.abandoned.swap(true, Ordering::AcqRel) {
+            std::mem::forget(self.clone());
+        }
+    }
+
+    /// Whether the device was given up: then whoever drops what was made from it must leave it as it is.
+    pub(crate) fn is_abandoned(&self) -> bool {
+        self.abandoned.load(Ordering::Acquire)
     }
 }
 
@@ -318,12 +348,12 @@ fn choose(wanted: Option<&str>, devices: &[&DeviceInfo]) -> Result<usize, Render
     };
     let by_index = wanted.parse::<usize>().ok().filter(|i| *i < devices.len());
     let lower = wanted.to_lowercase();
-    by_index.or_else(|| devices.iter().position(|d| d.name.to_lowercase().contains(&lower))).ok_or_else(
-        || {
-            let list: Vec<String> = devices.iter().map(|d| format!("{} {}", d.index, d.name)).collect();
-            RenderError::NoSuchDevice { wanted: wanted.to_owned(), present: list.join(", ") }
-        },
-    )
+    let by_kind = || if lower == SOFTWARE { devices.iter().position(|d| d.software) } else { None };
+    let by_name = || devices.iter().position(|d| d.name.to_lowercase().contains(&lower));
+    by_index.or_else(by_kind).or_else(by_name).ok_or_else(|| {
+        let list: Vec<String> = devices.iter().map(|d| format!("{} {}", d.index, d.name)).collect();
+        RenderError::NoSuchDevice { wanted: wanted.to_owned(), present: list.join(", ") }
+    })
 }
 
 /// Refuses a device without a feature that the passes use.
@@ -346,11 +376,31 @@ fn check_features(instance: &Instance, physical: vk::PhysicalDevice) -> Result<(
     }
 }
 
+/// Whether the device can import memory of the host.
+fn can_import(instance: &Instance, physical: vk::PhysicalDevice) -> Result<bool, RenderError> {
+    // SAFETY: `physical` comes from this instance.
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
+        .named("vkEnumerateDeviceExtensionProperties")?;
+    let wanted = Ok(ext::external_memory_host::NAME);
+    Ok(extensions.iter().any(|e| e.extension_name_as_c_str() == wanted))
+}
+
+/// What address and length of imported memory must be multiples of. Only for devices that can import.
+fn import_alignment(instance: &Instance, physical: vk::PhysicalDevice) -> u64 {
+    let mut import = vk::PhysicalDeviceExternalMemoryHostPropertiesEXT::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut import);
+    // SAFETY: `physical` comes from this instance and has the extension that the chained struct belongs to.
+    unsafe { instance.raw.get_physical_device_properties2(physical, &mut properties) };
+    import.min_imported_host_pointer_alignment.max(1)
+}
+
 fn create_device(
     instance: &Instance,
     physical: vk::PhysicalDevice,
     family: u32,
+    imports: bool,
 ) -> Result<ash::Device, RenderError> {
+    let extensions: &[_] = if imports { &[ext::external_memory_host::NAME.as_ptr()] } else { &[] };
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
     let features = vk::PhysicalDeviceFeatures::default().shader_clip_distance(true);
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
@@ -358,6 +408,7 @@ fn create_device(
         vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true);
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
+        .enabled_extension_names(extensions)
         .enabled_features(&features)
         .push_next(&mut v12)
         .push_next(&mut v13);
@@ -381,6 +432,9 @@ mod tests {
         assert_eq!(choose(None, &all[..1]), Ok(0));
         assert_eq!(choose(Some("LLVM"), &all), Ok(0));
         assert_eq!(choose(Some("1"), &all), Ok(1));
+        let (hard_first, soft_last) = (device(0, "Radeon", false), device(1, "SwiftShader", true));
+        assert_eq!(choose(Some("Software"), &[&hard_first, &soft_last]), Ok(1));
+        assert!(choose(Some(SOFTWARE), &[&hard_first]).is_err(), "a GPU is no software device");
         assert_eq!(choose(None, &[]), Err(RenderError::NoDevice));
         let error = choose(Some("radeon"), &all).unwrap_err();
         let text = error.to_string();

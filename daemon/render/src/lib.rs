@@ -12,6 +12,7 @@ mod frame_data;
 mod glyphs;
 mod gpu;
 mod hud_layout;
+mod import;
 mod memory;
 mod meshes;
 mod parts;
@@ -31,7 +32,7 @@ mod view;
 mod water;
 
 pub use error::RenderError;
-pub use gpu::{DeviceInfo, devices, find_device};
-pub use passes::video::PictureShape;
+pub use gpu::{DeviceInfo, SOFTWARE, devices, find_device};
+pub use passes::pictures::{PictureCounts, PicturePath, PictureShape};
 pub use renderer::{Needs, RenderConfig, Renderer, TIMED_EVERY};
-pub use ring::{Completions, Finished};
+pub use ring::{Completions, Finished, TimeOuts};

@@ -132,6 +132,9 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            return;
+        }
         // SAFETY: owners drop buffers only once the GPU is idle (see `Renderer::drop` and `Shared`).
         unsafe {
             self.gpu.device.destroy_buffer(self.raw, None);
@@ -253,6 +256,9 @@ impl Image {
 
 impl Drop for Image {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            return;
+        }
         // SAFETY: owners drop images only once the GPU is idle; null views are allowed.
         unsafe {
             if self.second_view != self.view {

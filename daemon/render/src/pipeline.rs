@@ -55,6 +55,9 @@ impl SetLayout {
 
 impl Drop for SetLayout {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            return;
+        }
         // SAFETY: pipelines and sets made from the layout do not need it any more.
         unsafe { self.gpu.device.destroy_descriptor_set_layout(self.raw, None) };
     }
@@ -107,7 +110,8 @@ impl SetPool {
         Ok(set)
     }
 
-    fn write(&self, set: vk::DescriptorSet, binding: u32, bound: Bound) {
+    /// Points a binding to something. No frame in flight uses the set.
+    pub(crate) fn write(&self, set: vk::DescriptorSet, binding: u32, bound: Bound) {
         let buffer = |buffer, offset, range| vk::DescriptorBufferInfo { buffer, offset, range };
         let (mut buffers, mut images, mut texels) = (Vec::new(), Vec::new(), Vec::new());
         let kind = match bound {
@@ -145,6 +149,9 @@ impl SetPool {
 
 impl Drop for SetPool {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            return;
+        }
         // SAFETY: owners drop pools only once the GPU is idle.
         unsafe { self.gpu.device.destroy_descriptor_pool(self.raw, None) };
     }
@@ -177,6 +184,9 @@ impl Sampler {
 
 impl Drop for Sampler {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            return;
+        }
         // SAFETY: owners drop samplers only once the GPU is idle.
         unsafe { self.gpu.device.destroy_sampler(self.raw, None) };
     }
@@ -322,6 +332,9 @@ impl Pipeline {
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            return;
+        }
         // SAFETY: owners drop pipelines only once the GPU is idle; a null pipeline is allowed.
         unsafe {
             self.gpu.device.destroy_pipeline(self.raw, None);

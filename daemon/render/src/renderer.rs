@@ -21,14 +21,15 @@ use crate::{
         boats::BoatsPass,
         hud::HudPass,
         mirror::MirrorPass,
+        pictures::{PictureCounts, PicturePath, PictureShape},
         rounds::RoundsPass,
-        video::{PictureShape, VideoPass},
+        video::VideoPass,
         water::WaterPass,
     },
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
     recorder::{Recorder, Step},
-    ring::{Completions, FRAME_QUERY, QUERIES, SLOTS_MAX, Shared, Span},
+    ring::{Completions, FRAME_QUERY, QUERIES, SLOTS_MAX, Shared, Span, TimeOuts},
     view,
 };
 
@@ -50,7 +51,8 @@ pub struct RenderConfig {
     pub width: u32,
     /// Screen height in pixels.
     pub height: u32,
-    /// Index of the device, or a part of its name; `None`: the first GPU, or the first device of any kind.
+    /// Index of the device, a part of its name, or [`SOFTWARE`](crate::SOFTWARE); `None`: the first GPU, or the first device of
+    /// any kind.
     pub device: Option<String>,
     /// Whether Vulkan's validation layer watches. Slow; for tests.
     pub validation: bool,
@@ -60,6 +62,8 @@ pub struct RenderConfig {
     pub needs: Needs,
     /// The pictures that will come, so that the first frame need not prepare for them.
     pub picture: Option<PictureShape>,
+    /// How long the GPU may take before it counts as hung.
+    pub time_outs: TimeOuts,
 }
 
 /// One frame in this many is timed: a driver that runs on the processor finishes all work before it writes a timestamp, so that
@@ -134,7 +138,7 @@ impl Renderer {
             return Err(RenderError::Size { width: size.0, height: size.1, max });
         }
         let count = config.frames_in_flight.clamp(1, SLOTS_MAX);
-        let shared = Arc::new(Shared::new(&gpu, size, count)?);
+        let shared = Arc::new(Shared::new(&gpu, size, count, config.time_outs)?);
         let textured = models.iter().filter(|m| m.texture.is_some()).count();
         let sets = SetPool::new(&gpu, u32::try_from(count + textured + 8).unwrap_or(u32::MAX), 4)?;
         let frame_set = frame_set_layout(&gpu)?;
@@ -178,8 +182,21 @@ impl Renderer {
         self.gpu.messages()
     }
 
-    /// Hands one frame to the GPU: `scene` over `picture`, whose bytes are copied unless `picture_is_new` is false and the last
-    /// picture is still there. Returns whether it had to wait for a slot of the ring; it waits for nothing else.
+    /// How the last new picture came to the GPU.
+    pub fn picture_path(&self) -> PicturePath {
+        self.passes.video.path().0
+    }
+
+    /// How many pictures came to the GPU which way.
+    pub fn picture_counts(&self) -> PictureCounts {
+        self.passes.video.path().1
+    }
+
+    /// Hands one frame to the GPU: `scene` over `picture`, whose bytes are taken over unless `picture_is_new` is false and the
+    /// last picture is still there. A picture that is read where its driver put it is kept until the frame is finished. Returns
+    /// whether it had to wait for a slot of the ring; it waits for nothing else, unless the picture's shape changed.
+    ///
+    /// [`RenderError::DeviceLost`] and [`RenderError::Hung`] as from [`Completions::wait_next`].
     pub fn submit(
         &mut self,
         scene: &Scene,
@@ -187,13 +204,28 @@ impl Renderer {
         picture_is_new: bool,
     ) -> Result<bool, RenderError> {
         self.check(scene)?;
+        let shared = self.shared.clone();
+        self.submit_checked(scene, picture, picture_is_new).map_err(|error| shared.fail(error))
+    }
+
+    fn submit_checked(
+        &mut self,
+        scene: &Scene,
+        picture: &Picture,
+        picture_is_new: bool,
+    ) -> Result<bool, RenderError> {
         let (index, waited) = self.shared.acquire()?;
-        if picture_is_new || !self.passes.video.has_picture() {
-            self.passes.video.take(picture)?;
+        let value = self.shared.next_value();
+        let kept = !picture_is_new && self.passes.video.still_has(picture);
+        let prepared = kept || self.passes.video.is_prepared_for(picture);
+        if !prepared {
+            self.shared.rest()?;
+            self.passes.video.prepare(picture)?;
         }
+        let finished = self.shared.finished()?;
+        let path = self.passes.video.take(picture, kept, value, finished);
         self.prepare(index, scene);
         let cmd = self.record(index, scene.water)?;
-        let value = self.shared.next_value();
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
         let signals = [vk::SemaphoreSubmitInfo::default()
             .semaphore(self.shared.timeline)
@@ -204,7 +236,8 @@ impl Renderer {
         // SAFETY: the command buffer is complete and its slot is free; only this thread submits.
         unsafe { self.gpu.device.queue_submit2(self.gpu.queue, &[submit], vk::Fence::null()) }
             .named("vkQueueSubmit2")?;
-        self.shared.submitted(index, scene.frame);
+        let held = (path == PicturePath::Imported).then(|| picture.clone());
+        self.shared.submitted(index, scene.frame, value == 1 || !prepared, held);
         Ok(waited)
     }
 
@@ -373,8 +406,9 @@ impl Renderer {
 
 impl Drop for Renderer {
     fn drop(&mut self) {
-        if let Err(error) = self.gpu.wait_idle() {
-            log::error!("the GPU did not come to rest: {error}");
+        if let Err(error) = self.shared.rest() {
+            log::error!("the GPU did not come to rest, what is on it stays: {error}");
+            self.gpu.abandon();
         }
         self.shared.close();
     }
@@ -394,6 +428,9 @@ impl Slot {
 
 impl Drop for Slot {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            return;
+        }
         // SAFETY: the renderer waits for the GPU before it lets go of its slots.
         unsafe { self.gpu.device.destroy_command_pool(self.pool, None) };
     }

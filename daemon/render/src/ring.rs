@@ -2,6 +2,9 @@
 //!
 //! Frame n (counted from 0) uses slot n modulo the ring's length and signals n + 1 on the timeline semaphore. A slot is free
 //! again when its [`Finished`] is dropped. The submitting thread waits for a free slot and for nothing else.
+//!
+//! A device that is lost, or that does not finish a frame in time, fails both ends for good: the first to notice writes it down
+//! in [`State::failed`], the other is woken and says the same.
 
 use std::{
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
@@ -9,7 +12,7 @@ use std::{
 };
 
 use ash::vk;
-use bowwave_core::scene::Pass;
+use bowwave_core::{event::Picture, scene::Pass};
 
 use crate::{
     error::{Named, RenderError},
@@ -19,8 +22,35 @@ use crate::{
 
 /// Most slots a ring can have.
 pub(crate) const SLOTS_MAX: usize = 8;
-/// A GPU that takes longer than this for a frame hangs.
+/// A reader that gives no frame back for longer than this has stopped.
 const STALL_S: u64 = 5;
+
+/// How long the GPU may take before it counts as hung.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TimeOuts {
+    /// For one frame, counted from when the reader has the frame before and waits for this one.
+    pub frame: Duration,
+    /// For a frame whose shaders may still have to be compiled: the first, and the first after the picture's shape changed.
+    pub rehearsal: Duration,
+}
+
+impl Default for TimeOuts {
+    /// Half a second, fifteen frames at 30 Hz; and a minute for drivers that compile on a busy processor.
+    fn default() -> Self {
+        Self { frame: Duration::from_millis(500), rehearsal: Duration::from_secs(60) }
+    }
+}
+
+impl TimeOuts {
+    fn of(&self, rehearsal: bool) -> Duration {
+        if rehearsal { self.rehearsal } else { self.frame }
+    }
+}
+
+fn hung(after: Duration) -> RenderError {
+    let after_ms = u64::try_from(after.as_millis()).unwrap_or(u64::MAX);
+    RenderError::Hung { what: "a frame", after_ms }
+}
 
 /// A stretch of the command buffer that is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +116,7 @@ pub(crate) struct Shared {
     pub(crate) timeline: vk::Semaphore,
     pub(crate) slots: Vec<SlotOut>,
     pub(crate) size: (u32, u32),
+    time_outs: TimeOuts,
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -100,12 +131,24 @@ struct State {
     busy: [bool; SLOTS_MAX],
     /// Scene's frame number by slot.
     frame: [u64; SLOTS_MAX],
+    /// Whether shaders may have to be compiled for it, by slot.
+    rehearsal: [bool; SLOTS_MAX],
+    /// The picture whose memory the GPU reads where it lies, by slot, until the frame is finished: the camera's driver must not
+    /// fill it again before.
+    held: [Option<Picture>; SLOTS_MAX],
+    /// Why no frame will come any more: the device was lost, or hangs.
+    failed: Option<RenderError>,
     reader_gone: bool,
     renderer_gone: bool,
 }
 
 impl Shared {
-    pub(crate) fn new(gpu: &Arc<Gpu>, size: (u32, u32), slots: usize) -> Result<Self, RenderError> {
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        size: (u32, u32),
+        slots: usize,
+        time_outs: TimeOuts,
+    ) -> Result<Self, RenderError> {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: `info` is complete; the feature is enabled.
@@ -115,6 +158,7 @@ impl Shared {
             timeline,
             slots: Vec::with_capacity(slots),
             size,
+            time_outs,
             state: Mutex::default(),
             changed: Condvar::new(),
         };
@@ -139,33 +183,54 @@ impl Shared {
         usize::try_from(frame % self.slots.len() as u64).unwrap_or(0)
     }
 
+    /// Writes down why no frame will come any more, and wakes the other thread. Returns the first such reason, which stays;
+    /// what concerns one call alone is returned as it came.
+    pub(crate) fn fail(&self, error: RenderError) -> RenderError {
+        if !matches!(error, RenderError::DeviceLost { .. } | RenderError::Hung { .. }) {
+            return error;
+        }
+        let first = self.lock().failed.get_or_insert(error).clone();
+        self.changed.notify_all();
+        first
+    }
+
     /// Waits for the next slot. Returns it, and whether there was need to wait.
     pub(crate) fn acquire(&self) -> Result<(usize, bool), RenderError> {
-        let stalled = RenderError::Stalled { seconds: STALL_S };
         let mut state = self.lock();
         let slot = self.slot_of(state.submitted);
         let mut waited = false;
-        while state.busy.get(slot).copied().unwrap_or(false) {
+        loop {
+            if let Some(error) = &state.failed {
+                return Err(error.clone());
+            }
+            if !state.busy.get(slot).copied().unwrap_or(false) {
+                break;
+            }
             waited = true;
+            let compiling =
+                state.busy.iter().zip(state.rehearsal).any(|(busy, rehearsal)| *busy && rehearsal);
             if state.reader_gone && state.taken <= state.submitted.saturating_sub(self.slots.len() as u64) {
                 // Nobody reads any more: the slot is free when the GPU is done with it.
                 let value = state.submitted + 1 - self.slots.len() as u64;
+                let allowed = self.time_outs.of(compiling);
                 drop(state);
-                if !self.wait_value(value, Duration::from_secs(STALL_S))? {
-                    return Err(stalled);
+                if !self.wait_value(value, allowed)? {
+                    return Err(hung(allowed));
                 }
                 state = self.lock();
                 state.taken = state.taken.max(value);
                 state.busy[slot] = false;
                 continue;
             }
-            let (next, timeout) = self
-                .changed
-                .wait_timeout(state, Duration::from_secs(STALL_S))
-                .unwrap_or_else(PoisonError::into_inner);
+            let mut allowed = Duration::from_secs(STALL_S).max(self.time_outs.frame);
+            if compiling {
+                allowed = allowed.max(self.time_outs.rehearsal);
+            }
+            let (next, timeout) =
+                self.changed.wait_timeout(state, allowed).unwrap_or_else(PoisonError::into_inner);
             state = next;
             if timeout.timed_out() {
-                return Err(stalled);
+                return Err(RenderError::Stalled { seconds: allowed.as_secs() });
             }
         }
         Ok((slot, waited))
@@ -176,14 +241,47 @@ impl Shared {
         self.lock().submitted + 1
     }
 
-    /// Hands the frame just submitted to the reader.
-    pub(crate) fn submitted(&self, slot: usize, frame: u64) {
+    /// Hands the frame just submitted to the reader. `held` is kept until the frame is finished.
+    pub(crate) fn submitted(&self, slot: usize, frame: u64, rehearsal: bool, held: Option<Picture>) {
         let mut state = self.lock();
         state.busy[slot] = true;
         state.frame[slot] = frame;
+        state.rehearsal[slot] = rehearsal;
+        // Where nobody took the frame that was here before, its picture goes now, outside the lock.
+        let before = std::mem::replace(&mut state.held[slot], held);
         state.submitted += 1;
         drop(state);
         self.changed.notify_all();
+        drop(before);
+    }
+
+    /// How many frames the GPU has finished.
+    pub(crate) fn finished(&self) -> Result<u64, RenderError> {
+        // SAFETY: the semaphore lives as long as `self`.
+        unsafe { self.gpu.device.get_semaphore_counter_value(self.timeline) }
+            .named("vkGetSemaphoreCounterValue")
+    }
+
+    /// Waits until the GPU has finished all frames, but not for ever. On a lost device nothing runs any more, which is rest too.
+    pub(crate) fn rest(&self) -> Result<(), RenderError> {
+        let state = self.lock();
+        let (value, failed) = (state.submitted, state.failed.clone());
+        let compiling = state.busy.iter().zip(state.rehearsal).any(|(busy, rehearsal)| *busy && rehearsal);
+        drop(state);
+        let allowed = self.time_outs.of(compiling);
+        let result = match failed {
+            Some(error) => Err(error),
+            None if value == 0 => Ok(()),
+            None => match self.wait_value(value, allowed) {
+                Ok(true) => Ok(()),
+                Ok(false) => Err(hung(allowed)),
+                Err(error) => Err(error),
+            },
+        };
+        match result.map_err(|e| self.fail(e)) {
+            Err(RenderError::DeviceLost { .. }) => Ok(()),
+            result => result,
+        }
     }
 
     /// Waits for the timeline; `false` after `timeout`.
@@ -230,6 +328,12 @@ impl Shared {
 
 impl Drop for Shared {
     fn drop(&mut self) {
+        if self.gpu.is_abandoned() {
+            // The GPU may still read them: the driver never gets them back.
+            let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+            state.held.iter_mut().for_each(|picture| std::mem::forget(picture.take()));
+            return;
+        }
         // SAFETY: the renderer waits for the device before it lets go of `self`; a reader holds only finished frames.
         unsafe {
             for slot in &self.slots {
@@ -243,37 +347,56 @@ impl Drop for Shared {
 /// The reading end: gives finished frames in order. For a thread of its own.
 pub struct Completions {
     shared: Arc<Shared>,
+    /// How long the frame that comes next was waited for.
+    waited: Duration,
 }
 
 impl Completions {
     pub(crate) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
+        Self { shared, waited: Duration::ZERO }
     }
 
     /// The next frame, once the GPU has finished it; `None` after `timeout`, or when the renderer is gone and every frame was
     /// given (see [`Completions::is_over`]).
+    ///
+    /// [`RenderError::DeviceLost`] once the device is lost: drop both ends and make new ones, which neither waits nor leaks.
+    /// [`RenderError::Hung`] once a frame was waited for, in one call or several, for longer than
+    /// [`TimeOuts`] allow: dropping both ends does not wait for the device, but leaks what is on it. End the process soon.
     pub fn wait_next(&mut self, timeout: Duration) -> Result<Option<Finished>, RenderError> {
         let shared = &self.shared;
         let state = shared.lock();
-        let waiting = |s: &mut State| s.submitted == s.taken && !s.renderer_gone;
+        let waiting = |s: &mut State| s.submitted == s.taken && !s.renderer_gone && s.failed.is_none();
         let (state, _) = shared
             .changed
             .wait_timeout_while(state, timeout, waiting)
             .unwrap_or_else(PoisonError::into_inner);
+        if let Some(error) = &state.failed {
+            return Err(error.clone());
+        }
         if state.submitted == state.taken {
             return Ok(None);
         }
         let next = state.taken;
+        let slot = shared.slot_of(next);
+        let allowed = shared.time_outs.of(state.rehearsal[slot]);
         drop(state);
-        if !shared.wait_value(next + 1, timeout)? {
+        let step = timeout.min(allowed.saturating_sub(self.waited));
+        if !shared.wait_value(next + 1, step).map_err(|e| shared.fail(e))? {
+            self.waited += step;
+            if self.waited >= allowed {
+                return Err(shared.fail(hung(allowed)));
+            }
             return Ok(None);
         }
-        let slot = shared.slot_of(next);
+        self.waited = Duration::ZERO;
         let (passes_ms, frame_ms) = shared.timings(slot);
         let mut state = shared.lock();
         state.taken = next + 1;
         let frame = state.frame[slot];
+        let held = state.held[slot].take();
         drop(state);
+        // Back to the camera's driver, outside the lock.
+        drop(held);
         Ok(Some(Finished { shared: shared.clone(), slot, frame, passes_ms, frame_ms }))
     }
 

@@ -12,16 +12,26 @@ use crate::{
     recorder::{Recorder, Step},
 };
 
-/// A command pool that is gone after one use.
+/// How long copying one picture or mesh may take; a driver on a busy processor needs a while.
+const UPLOAD_MS: u64 = 60_000;
+
+/// A command pool and a fence that are gone after one use.
 struct Once {
     gpu: Arc<Gpu>,
     pool: vk::CommandPool,
+    fence: vk::Fence,
 }
 
 impl Drop for Once {
     fn drop(&mut self) {
-        // SAFETY: `upload_image` waits for the queue before it returns, also when it fails after submitting.
-        unsafe { self.gpu.device.destroy_command_pool(self.pool, None) };
+        if self.gpu.is_abandoned() {
+            return;
+        }
+        // SAFETY: `upload_image` waits for the fence before it returns, or gives the device up; null handles are allowed.
+        unsafe {
+            self.gpu.device.destroy_command_pool(self.pool, None);
+            self.gpu.device.destroy_fence(self.fence, None);
+        }
     }
 }
 
@@ -57,7 +67,10 @@ pub(crate) fn upload_image(gpu: &Arc<Gpu>, image: &Image, levels: &[&[u8]]) -> R
     let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.family);
     // SAFETY: `info` is complete.
     let pool = unsafe { device.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
-    let once = Once { gpu: gpu.clone(), pool };
+    let mut once = Once { gpu: gpu.clone(), pool, fence: vk::Fence::null() };
+    // SAFETY: the info is complete.
+    once.fence =
+        unsafe { device.create_fence(&vk::FenceCreateInfo::default(), None) }.named("vkCreateFence")?;
     let info = vk::CommandBufferAllocateInfo::default().command_pool(once.pool).command_buffer_count(1);
     // SAFETY: the pool is live.
     let cmds = unsafe { device.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?;
@@ -75,7 +88,14 @@ pub(crate) fn upload_image(gpu: &Arc<Gpu>, image: &Image, levels: &[&[u8]]) -> R
         device.end_command_buffer(cmd).named("vkEndCommandBuffer")?;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
         let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
-        device.queue_submit2(gpu.queue, &[submit], vk::Fence::null()).named("vkQueueSubmit2")?;
+        device.queue_submit2(gpu.queue, &[submit], once.fence).named("vkQueueSubmit2")?;
     }
-    gpu.wait_idle()
+    // SAFETY: the fence is live and was submitted above.
+    match unsafe { device.wait_for_fences(&[once.fence], true, UPLOAD_MS * 1_000_000) } {
+        Err(vk::Result::TIMEOUT) => {
+            gpu.abandon();
+            Err(RenderError::Hung { what: "an upload", after_ms: UPLOAD_MS })
+        }
+        result => result.named("vkWaitForFences"),
+    }
 }

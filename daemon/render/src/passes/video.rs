@@ -1,6 +1,6 @@
-//! The camera's picture on the whole screen. Its bytes are copied once, into a mapped ring that the shader reads as words;
-//! conversion, scaling and cropping happen there. A fragment makes up to four pixels and writes them as one packed texel: on a
-//! driver that runs on the processor that takes 0.4 times the time of a pixel each.
+//! The camera's picture on the whole screen. The shader reads its bytes as words (see [`super::pictures`]); conversion, scaling
+//! and cropping happen there. A fragment makes up to four pixels and writes them as one packed texel: on a driver that runs on
+//! the processor that takes 0.4 times the time of a pixel each.
 
 use std::sync::Arc;
 
@@ -12,67 +12,16 @@ use bowwave_core::{
 use shaders_spirv::{SCREEN_VERT, VIDEO_FRAG, interface::VideoBlock};
 
 use crate::{
-    error::{Named, RenderError},
+    error::RenderError,
     gpu::Gpu,
-    memory::{Access, Buffer, Image, ImageShape},
-    passes::{COPIED_FROM, DRAWN, Making},
-    pipeline::{Blend, Bound, Pipeline, PipelineShape, SetLayout, SetPool},
+    memory::{Buffer, Image, ImageShape},
+    passes::{
+        COPIED_FROM, DRAWN, Making,
+        pictures::{PictureCounts, PicturePath, PictureShape, Pictures},
+    },
+    pipeline::{Blend, Pipeline, PipelineShape, SetLayout},
     recorder::{Begin, Recorder, Step},
 };
-
-/// Layout and size of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct PictureShape {
-    /// Byte layout.
-    pub format: PixelFormat,
-    /// Width in pixels.
-    pub width: u32,
-    /// Height in pixels.
-    pub height: u32,
-}
-
-impl PictureShape {
-    /// The shape of `picture`.
-    pub fn of(picture: &Picture) -> Self {
-        Self { format: picture.format(), width: picture.width(), height: picture.height() }
-    }
-
-    /// Where the second plane begins, aligned as texel buffers need it; 0 where there is none.
-    fn chroma_offset(self, align: u64) -> u64 {
-        match self.format {
-            PixelFormat::Nv12 => (u64::from(self.width) * u64::from(self.height)).next_multiple_of(align),
-            PixelFormat::Yuyv | PixelFormat::Rgb => 0,
-        }
-    }
-}
-
-/// One entry of the staging ring.
-struct Entry {
-    gpu: Arc<Gpu>,
-    buffer: Buffer,
-    views: [vk::BufferView; 2],
-    set: vk::DescriptorSet,
-}
-
-impl Drop for Entry {
-    fn drop(&mut self) {
-        // SAFETY: the ring is replaced or dropped only once the GPU is idle.
-        unsafe {
-            for view in self.views {
-                self.gpu.device.destroy_buffer_view(view, None);
-            }
-        }
-    }
-}
-
-/// The staging ring of one picture shape.
-struct Staging {
-    shape: PictureShape,
-    entries: Vec<Entry>,
-    current: usize,
-    // After the entries: their sets live in it.
-    _pool: SetPool,
-}
 
 /// The video pass.
 pub(crate) struct VideoPass {
@@ -84,7 +33,9 @@ pub(crate) struct VideoPass {
     /// The screen as texels of `run` pixels.
     packed: Image,
     layout: SetLayout,
-    staging: Option<Staging>,
+    pictures: Option<Pictures>,
+    path: PicturePath,
+    counts: PictureCounts,
     /// By format and whether it is scaled; made when first needed.
     pipelines: [Option<Pipeline>; 6],
 }
@@ -103,7 +54,9 @@ impl VideoPass {
             size: making.size,
             slots: making.slots,
             layout,
-            staging: None,
+            pictures: None,
+            path: PicturePath::Copied,
+            counts: PictureCounts::default(),
             pipelines: [const { None }; 6],
         };
         if let Some(shape) = expected {
@@ -114,58 +67,11 @@ impl VideoPass {
 
     /// Makes the ring and the pipeline for pictures of `shape`. The GPU must be idle if there was another shape before.
     fn reshape(&mut self, shape: PictureShape) -> Result<(), RenderError> {
-        self.staging = None;
-        let align = self.gpu.limits.min_texel_buffer_offset_alignment.max(16);
-        let bytes = shape.format.byte_len(shape.width, shape.height) as u64;
-        let chroma = shape.chroma_offset(align);
-        // A run's last word may reach beyond the last pixel.
-        let size = (bytes + 2 * align).next_multiple_of(align);
-        if size / 4 > u64::from(self.gpu.limits.max_texel_buffer_elements) {
-            return Err(RenderError::Unsuitable {
-                device: self.gpu.info().name.clone(),
-                lacks: format!("texel buffers of {size} bytes for {}x{} pictures", shape.width, shape.height),
-            });
-        }
-        let pool = SetPool::new(&self.gpu, u32::try_from(self.slots).unwrap_or(1), 2)?;
-        let mut entries = Vec::with_capacity(self.slots);
-        for _ in 0..self.slots {
-            entries.push(self.entry(&pool, shape, size, chroma)?);
-        }
-        self.staging = Some(Staging { shape, entries, current: 0, _pool: pool });
-        self.make_pipeline(shape)?;
-        Ok(())
-    }
-
-    fn entry(
-        &self,
-        pool: &SetPool,
-        shape: PictureShape,
-        size: u64,
-        chroma: u64,
-    ) -> Result<Entry, RenderError> {
-        let usage = vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER;
-        let buffer = Buffer::new(&self.gpu, "camera pictures", size, usage, Access::Upload)?;
+        self.pictures = None;
         // The shader takes words, and where it can, pairs of them.
         let in_pairs = shape.format == PixelFormat::Yuyv && self.run == 4 && !self.is_scaled(shape);
-        let format = if in_pairs { vk::Format::R32G32_UINT } else { vk::Format::R32_UINT };
-        let mut entry = Entry {
-            gpu: self.gpu.clone(),
-            buffer,
-            views: [vk::BufferView::null(); 2],
-            set: vk::DescriptorSet::null(),
-        };
-        for (i, offset) in [0, chroma].into_iter().enumerate() {
-            let info = vk::BufferViewCreateInfo::default()
-                .buffer(entry.buffer.raw)
-                .format(format)
-                .offset(offset)
-                .range(entry.buffer.size - offset);
-            // SAFETY: the buffer is live and has this usage; offset and range are aligned.
-            entry.views[i] = unsafe { self.gpu.device.create_buffer_view(&info, None) }
-                .named_for("vkCreateBufferView", "camera pictures")?;
-        }
-        entry.set = pool.set(&self.layout, &entry.views.map(Bound::Texels))?;
-        Ok(entry)
+        self.pictures = Some(Pictures::new(&self.gpu, &self.layout, shape, in_pairs, self.slots)?);
+        self.make_pipeline(shape)
     }
 
     /// Whether `shape` needs scaling to the screen.
@@ -199,36 +105,47 @@ impl VideoPass {
         Ok(())
     }
 
-    /// Takes over a new picture. The ring's next entry is free: it was last read by a frame at least as many frames ago as there
-    /// are slots, and the caller holds one. A picture of another shape makes a new ring, once, with the GPU idle.
-    pub(crate) fn take(&mut self, picture: &Picture) -> Result<(), RenderError> {
+    /// Makes what pictures of the shape of `picture` need. The GPU is idle.
+    pub(crate) fn prepare(&mut self, picture: &Picture) -> Result<(), RenderError> {
         let shape = PictureShape::of(picture);
-        if self.staging.as_ref().is_none_or(|s| s.shape != shape) {
-            if self.staging.is_some() {
-                log::warn!("pictures are {}x{} {:?} from now on", shape.width, shape.height, shape.format);
-            }
-            self.gpu.wait_idle()?;
-            self.reshape(shape)?;
+        if self.pictures.is_some() {
+            log::warn!("pictures are {}x{} {:?} from now on", shape.width, shape.height, shape.format);
         }
-        let align = self.gpu.limits.min_texel_buffer_offset_alignment.max(16);
-        let Some(staging) = &mut self.staging else { return Ok(()) };
-        staging.current = (staging.current + 1) % staging.entries.len();
-        let Some(entry) = staging.entries.get_mut(staging.current) else { return Ok(()) };
-        let bytes = picture.bytes();
-        match shape.chroma_offset(align) {
-            0 => entry.buffer.write(0, bytes),
-            offset => {
-                let (luma, chroma) = bytes.split_at((shape.width * shape.height) as usize);
-                entry.buffer.write(0, luma);
-                entry.buffer.write(offset, chroma);
-            }
-        }
-        Ok(())
+        self.reshape(shape)
     }
 
-    /// Whether a picture was ever taken.
-    pub(crate) fn has_picture(&self) -> bool {
-        self.staging.is_some()
+    /// Whether pictures of the shape of `picture` can be taken.
+    pub(crate) fn is_prepared_for(&self, picture: &Picture) -> bool {
+        self.pictures.as_ref().is_some_and(|p| p.shape == PictureShape::of(picture))
+    }
+
+    /// Whether the last picture is still there and `picture` means that one, so that a frame need not take it over again.
+    pub(crate) fn still_has(&self, picture: &Picture) -> bool {
+        self.pictures.as_ref().is_some_and(|p| p.still_has(picture))
+    }
+
+    /// Frame `frame` (counted from 1) shows the last picture where it is `kept` (see [`VideoPass::still_has`]), else takes over
+    /// `picture`; the GPU has finished `finished` frames. Where the answer is [`PicturePath::Imported`], the caller keeps the
+    /// picture until the frame is finished.
+    pub(crate) fn take(&mut self, picture: &Picture, kept: bool, frame: u64, finished: u64) -> PicturePath {
+        let Some(pictures) = &mut self.pictures else { return PicturePath::Copied };
+        // A kept import is held by `picture` itself, so it is not let go of here.
+        pictures.release(finished);
+        if kept {
+            return pictures.read_by(frame);
+        }
+        let path = pictures.take(picture, frame);
+        match path {
+            PicturePath::Copied => self.counts.copied += 1,
+            PicturePath::Imported => self.counts.imported += 1,
+        }
+        self.path = path;
+        path
+    }
+
+    /// How the last new picture came, and how many came which way.
+    pub(crate) fn path(&self) -> (PicturePath, PictureCounts) {
+        (self.path, self.counts)
     }
 
     /// Step of the packed pixels from the frame before to being drawn.
@@ -244,18 +161,16 @@ impl VideoPass {
 
     /// Draws the current picture over the whole screen, as packed pixels.
     pub(crate) fn record(&self, to: Recorder<'_>) {
-        let Some(staging) = &self.staging else { return };
-        let index = pipeline_index(staging.shape.format, self.is_scaled(staging.shape));
-        let (Some(pipeline), Some(entry)) = (&self.pipelines[index], staging.entries.get(staging.current))
-        else {
-            return;
-        };
+        let Some(pictures) = &self.pictures else { return };
+        let shape = pictures.shape;
+        let index = pipeline_index(shape.format, self.is_scaled(shape));
+        let (Some(pipeline), Some(set)) = (&self.pipelines[index], pictures.set()) else { return };
         let (width, height) = (self.packed.shape.width, self.packed.shape.height);
         let area = PixelRect { x: 0, y: 0, width, height };
         to.begin(area, (self.packed.view, Begin::Forget), None);
         to.window([0.0, 0.0, width as f32, height as f32], area);
-        to.bind(pipeline, &[entry.set]);
-        to.push(pipeline, &covering(staging.shape, self.size));
+        to.bind(pipeline, &[set]);
+        to.push(pipeline, &covering(shape, self.size));
         to.draw(3, 1);
         to.end();
     }

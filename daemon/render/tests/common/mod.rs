@@ -8,7 +8,7 @@ use bowwave_core::{
     model::Model,
     scene::Scene,
 };
-use bowwave_render::{Completions, Needs, PictureShape, RenderConfig, Renderer};
+use bowwave_render::{Completions, Needs, PictureShape, RenderConfig, Renderer, TimeOuts};
 
 #[path = "../../src/testing.rs"]
 pub mod testing;
@@ -28,6 +28,7 @@ pub fn config(scene: &Scene) -> RenderConfig {
             waters: vec![(scene.water.method, scene.water.shadow)],
         },
         picture: None,
+        time_outs: TimeOuts::default(),
     }
 }
 
