@@ -1,0 +1,22 @@
+//! One function for each thing that is read from outside: it takes any bytes and panics where a promise is broken.
+//!
+//! Used twice: by the fuzzers, and by the test that runs every file in `corpus` and `findings` once.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a broken promise must end the run")]
+
+pub mod calibration;
+pub mod imu;
+mod memory;
+pub mod model;
+mod place;
+pub mod recording;
+pub mod scenario;
+
+/// Each target by the name of its binary and its folders.
+pub const ALL: &[(&str, fn(&[u8]))] = &[
+    ("imu", imu::run),
+    ("calibration", calibration::run),
+    ("recording", recording::run),
+    ("scenario", scenario::run),
+    ("model", model::run),
+];
