@@ -22,6 +22,8 @@ pub struct Cli {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Run the trainer on this computer's camera, inertial unit, trigger and LCD
+    Run(Run),
     /// Run the trainer on a recording, as if its camera, inertial unit and trigger were there
     Simulate(Simulate),
     /// Make a recording from a folder of pictures or from a video
@@ -32,6 +34,23 @@ pub enum Command {
     Doctor(Doctor),
     /// Print the virtual rounds of a journal
     Hits(Hits),
+}
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub struct Run {
+    /// Configuration file (TOML)
+    #[arg(long, value_name = "FILE", default_value = "/etc/bowwave/bowwave.toml")]
+    pub config: PathBuf,
+    /// Folder for hits.sqlite, recordings and the last good settings; without it the configuration's, else the service's
+    #[arg(long, value_name = "DIR")]
+    pub data: Option<PathBuf>,
+    /// Also keep the SHA-256 of the last frames' red, green and blue bytes, to find a picture of the LCD among them
+    #[arg(long, value_name = "FILE")]
+    pub frame_hashes: Option<PathBuf>,
+    /// Print each committed round's number on standard output as soon as the journal says so
+    #[arg(long)]
+    pub print_commits: bool,
 }
 
 /// Arguments of `simulate`.

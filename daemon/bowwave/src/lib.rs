@@ -2,13 +2,18 @@
 
 mod cache;
 mod cli;
+mod commits;
 pub mod config;
 mod doctor;
 mod drawing;
 mod hits;
 mod import;
+mod loading;
 mod outcome;
+mod output;
 mod plan;
+mod recorder;
+mod run;
 mod simulate;
 mod stats;
 
@@ -29,12 +34,19 @@ pub fn main() -> ExitCode {
         1 => "info",
         _ => "debug",
     };
+    if log_to_journal(cli.verbose) {
+        return exit_code(dispatch(&cli.command, program_start));
+    }
     env_logger::Builder::from_env(
         env_logger::Env::default().default_filter_or(format!("{level},mp4parse=error")),
     )
     .format_target(false)
     .init();
-    match run(&cli.command, program_start) {
+    exit_code(dispatch(&cli.command, program_start))
+}
+
+fn exit_code(outcome: Result<Outcome>) -> ExitCode {
+    match outcome {
         Ok(outcome) => outcome.into(),
         Err(e) => {
             eprintln!("bowwave: {e:#}");
@@ -43,8 +55,22 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn run(command: &Command, program_start: bowwave_core::time::Time) -> Result<Outcome> {
+/// Where standard error leads to systemd's journal, lines go there with their fields (fault code, state, duration) instead.
+fn log_to_journal(verbose: u8) -> bool {
+    if !systemd_journal_logger::connected_to_journal() {
+        return false;
+    }
+    let logger = systemd_journal_logger::JournalLog::new()
+        .map(|log| log.with_syslog_identifier("bowwave".to_owned()))
+        .and_then(|log| log.install().map_err(std::io::Error::other));
+    // Ordinary running is told in full: the journal is what is left after a day at sea.
+    log::set_max_level(if verbose > 0 { log::LevelFilter::Debug } else { log::LevelFilter::Info });
+    logger.is_ok()
+}
+
+fn dispatch(command: &Command, program_start: bowwave_core::time::Time) -> Result<Outcome> {
     match command {
+        Command::Run(arguments) => run::run(arguments, program_start),
         Command::Simulate(arguments) => simulate::run(arguments, program_start),
         Command::Import(arguments) => import::run(arguments),
         Command::Plan(arguments) => plan::run(arguments).map(|()| Outcome::Done),

@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::{
     cli::Plan,
     drawing,
-    simulate::prepare::{load_models, read_scenario},
+    loading::{load_models, read_scenario},
 };
 
 /// A plan, as it is printed.

@@ -1,14 +1,9 @@
 //! `bowwave simulate`: the trainer on a recording, as if its devices were there.
 
-mod output;
-mod pictures;
 pub mod prepare;
-mod recorder;
 mod report;
 mod run;
 mod summary;
-mod video;
-mod window;
 
 use std::{
     sync::{
@@ -23,9 +18,14 @@ use bowwave_core::{fault::Fault, time::Time};
 use bowwave_record::{Journal, Run};
 use bowwave_render::Renderer;
 
-use crate::{cli::Simulate, drawing, hits::JOURNAL, outcome::Outcome};
-use output::{Output, OutputOptions};
-use recorder::Recorder;
+use crate::{
+    cli::Simulate,
+    drawing,
+    hits::JOURNAL,
+    outcome::Outcome,
+    output::{Output, OutputOptions},
+    recorder::Recorder,
+};
 use run::Loop;
 
 /// Runs the trainer on a recording.
@@ -56,6 +56,8 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
         sheet: arguments.sheet,
         stills: arguments.stills.clone(),
         window: prepared.window,
+        hash: true,
+        ..OutputOptions::default()
     };
     let output = Output::start(completions, options)?;
     let journal = open_journal(arguments, &prepared)?;

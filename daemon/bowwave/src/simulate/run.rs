@@ -2,7 +2,6 @@
 
 use std::{
     collections::VecDeque,
-    io::Write,
     path::Path,
     sync::{
         Arc,
@@ -31,12 +30,14 @@ use hw_sim::{
 };
 use sha2::{Digest, Sha256};
 
-use super::{
-    output::{Output, Ticket, UserEvent},
+use super::summary::PassCounts;
+use crate::{
+    cli::Simulate,
+    commits,
+    output::{Output, OutputReport, Ticket, UserEvent},
     recorder::Recorder,
-    summary::PassCounts,
+    stats::Samples,
 };
-use crate::{cli::Simulate, stats::Samples};
 
 /// A tick comes this long after a picture's arrival: pictures that come a little late still make it.
 const TICK_AFTER_PICTURE_NS: i64 = 5_000_000;
@@ -104,7 +105,7 @@ pub struct Finished {
     /// What the loop counted.
     pub tally: Tally,
     /// What the output thread measured.
-    pub output: super::output::OutputReport,
+    pub output: OutputReport,
     /// What the replay delivered and left out.
     pub replay: hw_sim::replay::ReplayStats,
     /// What the sensors counted.
@@ -293,7 +294,7 @@ impl Loop {
             }
         }
         if arguments.print_commits {
-            print_commits(&self.journal)?;
+            commits::print(self.journal.commits().try_iter())?;
         }
         Ok(())
     }
@@ -320,10 +321,10 @@ impl Loop {
         let messages = self.renderer.validation_messages();
         drop(self.renderer);
         let output = self.output.finish();
-        let commits = self.journal.commits().clone();
+        let committed = self.journal.commits().clone();
         let journal = self.journal.finish();
         if arguments.print_commits {
-            print_numbers(commits.try_iter())?;
+            commits::print(committed.try_iter())?;
         }
         let mut dropped_entries = 0;
         if let Some(recorder) = self.recorder.take() {
@@ -376,16 +377,4 @@ impl Tally {
         self.step_ms.push(ms_between(collected, stepped));
         self.submit_ms.push(ms_between(stepped, submitted));
     }
-}
-
-fn print_commits(journal: &Journal) -> Result<()> {
-    print_numbers(journal.commits().try_iter())
-}
-
-fn print_numbers(numbers: impl Iterator<Item = u64>) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    for shot in numbers {
-        writeln!(out, "committed {shot}").context("cannot write to standard output")?;
-    }
-    out.flush().context("cannot write to standard output")
 }

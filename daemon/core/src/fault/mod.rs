@@ -60,10 +60,14 @@ macro_rules! faults {
 }
 
 faults! {
+    /// The program was asked to stop.
+    Stop = "STOP", Fault, "STOPPED", "SWITCH OFF, OR START AGAIN";
     /// The configured calibration belongs to another camera, or another size.
     CalMismatch = "CAL_MISMATCH", Fault, "CAL MISMATCH", "FIT THE CALIBRATED CAMERA";
     /// The camera no longer delivers the calibrated format or size.
     CamFormat = "CAM_FORMAT", Fault, "CAL LOST: PICTURE SIZE", "CALIBRATE THIS CAMERA";
+    /// There is no calibration that can be used.
+    NoCalibration = "CAL_NONE", Fault, "NOT CALIBRATED", "CALIBRATE THE CAMERA";
     /// The inert interlock is open: the trainer does not arm.
     NotInert = "NOT_INERT", Fault, "NOT ARMED: GUN NOT INERT", "FIT THE INERT PLUG";
     /// The configuration or a file that it names was refused; the last good one is kept.
@@ -134,8 +138,6 @@ faults! {
     ClockStep = "CLK_STEP", Note, "", "";
     /// The last run did not end as it should: power was cut.
     BootDirty = "BOOT_DIRTY", Note, "", "";
-    /// The program was asked to stop.
-    Stop = "STOP", Note, "", "";
     /// A thread gave no sign of life.
     Watchdog = "WATCHDOG", Note, "", "";
 }

@@ -195,9 +195,23 @@ impl Session {
         &self.plan
     }
 
+    /// Pictures come in another layout from now on: the renderer must be made anew from the changed plan.
+    pub fn set_video(&mut self, video: PixelFormat) -> Result<(), SetupError> {
+        let (width, height) = self.plan.picture;
+        self.black = Picture::black(video, width, height)?;
+        self.plan.video = video;
+        self.setup.video = video;
+        Ok(())
+    }
+
     /// What was wrong with the sensors so far.
     pub fn sensor_counts(&self) -> SensorCounts {
         self.sensors.counts()
+    }
+
+    /// The head-up display as it was drawn last.
+    pub const fn hud(&self) -> &Hud {
+        &self.scene.hud
     }
 
     /// Rounds fired and rounds that struck.
@@ -363,7 +377,9 @@ impl Session {
                 camera,
                 lens: &self.lens,
                 visibility_m: self.setup.scenario.visibility_m,
-                reflections: self.plan.has(crate::scene::Pass::Water),
+                // A computer that is too hot draws no reflections: half of the work.
+                reflections: self.plan.has(crate::scene::Pass::Water)
+                    && !self.faults.is_active(Fault::Thermal),
             };
             running.fleet.seen(&eye, video_time, &mut scene.boats);
             running.rounds.views(video_time, running.start, &running.fleet, &mut scene.rounds);

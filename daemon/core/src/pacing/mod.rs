@@ -1,6 +1,14 @@
 //! The 30 Hz frame clock, with time as an argument.
 
+mod lock;
+#[cfg(test)]
+mod lock_tests;
+mod train;
+
 use crate::time::Time;
+
+pub use lock::{FrameClock, Plan};
+pub use train::Train;
 
 /// The trainer's frame rate.
 pub const FRAMES_PER_S: i64 = 30;

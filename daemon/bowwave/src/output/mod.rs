@@ -1,31 +1,47 @@
-//! The output thread: waits for finished frames and takes them to the hash, the video, the pictures and the window.
+//! The output thread: waits for finished frames and takes them to the LCD, the window, the hash, the video and the pictures.
+
+mod hashes;
+mod pictures;
+mod video;
+mod window;
 
 use std::{
     path::PathBuf,
+    sync::Arc,
     thread::{self, JoinHandle},
     time::Duration,
 };
 
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::{event::TriggerEdge, scene::Pass, time::Time};
-use bowwave_devices::clock::now;
+use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
 use bowwave_render::{Completions, Finished};
-use crossbeam_channel::{Receiver, Sender, unbounded};
+use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use sha2::{Digest, Sha256};
 
-use super::{
-    pictures::{ContactSheet, copy_frame, write_still},
-    video::VideoWriter,
-    window::{Pressed, Screen},
-};
 use crate::stats::Samples;
+use hashes::HashLog;
+use pictures::{ContactSheet, copy_frame, write_still};
+use video::VideoWriter;
+use window::{Pressed, Screen};
 
 /// How long the thread waits for a frame before it looks whether there will be another.
-const WAIT: Duration = Duration::from_millis(200);
+const WAIT: Duration = Duration::from_millis(80);
+
+/// Completed frames that wait to be asked for.
+const DONE: usize = 64;
 
 /// What is to be made of the frames.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct OutputOptions {
+    /// Where the thread reports that it lives, if anybody looks.
+    pub reporter: Option<Reporter>,
+    /// The LCD.
+    pub lcd: Option<Arc<LcdPort>>,
+    /// File that gets the SHA-256 of each frame's red, green and blue bytes, newest last, the last few hundred.
+    pub frame_hashes: Option<PathBuf>,
+    /// Whether to hash all frames into one number for the report.
+    pub hash: bool,
     /// Folder for files.
     pub folder: PathBuf,
     /// Screen size in pixels.
@@ -66,6 +82,17 @@ pub enum UserEvent {
     Quit,
 }
 
+/// A frame that is complete.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Done {
+    /// The scene's frame number.
+    pub frame: u64,
+    /// When it was begun.
+    pub begun: Time,
+    /// When its pixels were complete.
+    pub complete: Time,
+}
+
 /// What the thread measured.
 #[derive(Debug, Default)]
 pub struct OutputReport {
@@ -91,6 +118,7 @@ pub struct Output {
     tickets: Option<Sender<Ticket>>,
     user: Receiver<UserEvent>,
     rehearsed: Receiver<()>,
+    done: Receiver<Done>,
     thread: Option<JoinHandle<Result<OutputReport>>>,
 }
 
@@ -105,12 +133,14 @@ impl Output {
         let (tickets, incoming) = unbounded();
         let (user_sender, user) = unbounded();
         let (rehearsed_sender, rehearsed) = unbounded();
-        let told = Told { user: user_sender, rehearsed: rehearsed_sender };
+        let (done_sender, done) = bounded(DONE);
+        let told = Told { user: user_sender, rehearsed: rehearsed_sender, done: done_sender };
+        let hashes = options.frame_hashes.as_deref().map(HashLog::create).transpose()?;
         let thread = thread::Builder::new()
             .name("output".to_owned())
-            .spawn(move || Worker::new(completions, incoming, told, options, video).run())
+            .spawn(move || Worker::new(completions, incoming, told, options, (video, hashes)).run())
             .context("cannot start the output thread; are too many processes running?")?;
-        Ok(Self { tickets: Some(tickets), user, rehearsed, thread: Some(thread) })
+        Ok(Self { tickets: Some(tickets), user, rehearsed, done, thread: Some(thread) })
     }
 
     /// Tells the thread of a submitted frame; `false` once the thread has ended.
@@ -126,6 +156,16 @@ impl Output {
                 timeout.as_secs()
             );
         }
+    }
+
+    /// Frames completed since the last call. Where nobody asks, none are kept.
+    pub fn done(&self) -> impl Iterator<Item = Done> + '_ {
+        self.done.try_iter()
+    }
+
+    /// Whether the thread still runs. One that has ended says why in [`Self::finish`].
+    pub fn runs(&self) -> bool {
+        self.thread.as_ref().is_some_and(|t| !t.is_finished())
     }
 
     /// What the user did since the last call.
@@ -145,6 +185,7 @@ impl Output {
 struct Told {
     user: Sender<UserEvent>,
     rehearsed: Sender<()>,
+    done: Sender<Done>,
 }
 
 struct Worker {
@@ -153,6 +194,7 @@ struct Worker {
     told: Told,
     options: OutputOptions,
     video: Option<VideoWriter>,
+    hashes: Option<HashLog>,
     sheet: Option<ContactSheet>,
     screen: Option<Screen>,
     hash: Sha256,
@@ -165,16 +207,21 @@ impl Worker {
         tickets: Receiver<Ticket>,
         told: Told,
         options: OutputOptions,
-        video: Option<VideoWriter>,
+        (video, hashes): (Option<VideoWriter>, Option<HashLog>),
     ) -> Self {
         let sheet = options.sheet.then(|| ContactSheet::new(options.frames, options.size));
-        let capacity = usize::try_from(options.frames).unwrap_or(0).min(1 << 20);
-        let report = OutputReport {
-            frame_ms: Samples::with_capacity(capacity),
-            gpu_ms: Samples::with_capacity(capacity),
-            ..OutputReport::default()
-        };
-        Self { completions, tickets, told, options, video, sheet, screen: None, hash: Sha256::new(), report }
+        Self {
+            completions,
+            tickets,
+            told,
+            options,
+            video,
+            hashes,
+            sheet,
+            screen: None,
+            hash: Sha256::new(),
+            report: OutputReport::default(),
+        }
     }
 
     fn run(mut self) -> Result<OutputReport> {
@@ -182,6 +229,9 @@ impl Worker {
             self.screen = Some(Screen::open(self.options.size)?);
         }
         while !self.completions.is_over() {
+            if let Some(reporter) = &self.options.reporter {
+                reporter.beat();
+            }
             if let Some(frame) = self.completions.wait_next(WAIT)? {
                 let complete = now();
                 self.take(&frame, complete)?;
@@ -215,6 +265,12 @@ impl Worker {
                 complete.secs_since(deadline) * 1e3
             );
         }
+        if let Some(lcd) = &self.options.lcd {
+            // Without a display, frames go nowhere; the port has reported that.
+            let _ = lcd.show(frame.rgba(), self.options.size, ticket.frame);
+        }
+        // A caller that does not ask gets the first ones only.
+        let _ = self.told.done.try_send(Done { frame: ticket.frame, begun: ticket.begun, complete: now() });
         self.report.frame_ms.push(ms(ticket.begun));
         self.report.gpu_ms.push(ms(ticket.submitted));
         self.report.first.get_or_insert(complete);
@@ -235,7 +291,12 @@ impl Worker {
                 }
             }
         }
-        self.hash.update(Sha256::digest(frame.rgba()));
+        if self.options.hash {
+            self.hash.update(Sha256::digest(frame.rgba()));
+        }
+        if let Some(hashes) = &mut self.hashes {
+            hashes.frame(ticket.frame, frame.rgba())?;
+        }
         if let Some(video) = &mut self.video {
             video.frame(frame.rgba())?;
         }

@@ -1,0 +1,122 @@
+use bowwave_devices::{
+    camera::{Coding, Exposure, Rate, WhiteBalance},
+    serial::Baud,
+    trigger::Bias,
+};
+
+use super::*;
+
+fn refused(text: &str) -> String {
+    parse(text, "x.toml", Path::new("/etc")).unwrap_err().to_string()
+}
+
+#[test]
+fn the_installed_file_is_valid() {
+    let text = include_str!("../../../../systemd/bowwave.toml");
+    let config = parse(text, "systemd/bowwave.toml", Path::new(".")).unwrap();
+    assert_eq!(config.output, ScreenOutput::Lcd);
+}
+
+#[test]
+fn every_key_is_read() {
+    let text = r#"
+        [screen]
+        output = "window"
+        size = "800x480"
+        card = "/dev/dri/card1"
+        connector = "HDMI-A-1"
+        refresh_hz = 60.0
+        legacy = true
+        [camera]
+        device = "/dev/bowwave/camera"
+        serial = "A1"
+        modes = ["YUYV 1280x720@30", "mjpg 640x480@30000/1001"]
+        exposure_us = 5000
+        white_balance_k = "auto"
+        focus = 3
+        gain = 4
+        buffers = 5
+        readout_us = 9000
+        [imu]
+        device = "/dev/bowwave/imu"
+        baud = [115200, 921600]
+        low_latency = false
+        [trigger]
+        chip = "/dev/gpiochip0"
+        line = 17
+        active_low = true
+        debounce_ms = 12
+        [interlock]
+        chip = "/dev/gpiochip0"
+        line = "inert"
+        bias = "pull-up"
+        [power_fail]
+        chip = "gpio-sim"
+        line = 2
+        [lamps]
+        chip = "/dev/gpiochip1"
+        ready = "ready"
+        fault = 5
+        [gpu]
+        device = "llvm"
+        validation = true
+        [files]
+        scenario = "a.toml"
+        calibration = "/b.toml"
+        record = true
+        data = "/var/lib/bowwave"
+        [health]
+        thermal = "/sys/class/thermal/thermal_zone0/temp"
+        limit_c = 85.0
+    "#;
+    let config = parse(text, "x.toml", Path::new("/etc")).unwrap();
+    assert_eq!((config.output, config.size), (ScreenOutput::Window, Some((800, 480))));
+    assert_eq!(config.lcd.connector.as_deref(), Some("HDMI-A-1"));
+    assert_eq!((config.lcd.mode.refresh_hz, config.lcd.legacy), (Some(60.0), true));
+    let camera = &config.camera;
+    let modes: Vec<_> = camera.modes.iter().map(|m| (m.coding, m.width, m.height, m.rate)).collect();
+    let ntsc = Rate::new(30_000, 1001).unwrap();
+    assert_eq!(modes, [(Coding::Yuyv, 1280, 720, Rate::hz(30).unwrap()), (Coding::Mjpeg, 640, 480, ntsc)]);
+    assert_eq!(camera.controls.exposure, Exposure::Locked { time_us: 5000 });
+    assert_eq!(camera.controls.white_balance, WhiteBalance::Auto);
+    assert_eq!((camera.buffers, camera.readout_us, camera.controls.gain), (5, Some(9000), Some(4)));
+    assert_eq!(config.imu.baud, Baud::Scan(vec![115_200, 921_600]));
+    let line = |chip: &str, line: &str, active_low, bias| InputLine {
+        chip: chip.into(),
+        line: line.into(),
+        active_low,
+        bias,
+    };
+    let trigger = line("/dev/gpiochip0", "17", true, Bias::AsIs);
+    assert_eq!(config.trigger, Some(TriggerChoice { line: trigger, debounce: Duration::from_millis(12) }));
+    assert_eq!(config.interlock, Some(line("/dev/gpiochip0", "inert", false, Bias::PullUp)));
+    assert_eq!(config.power_fail, Some(line("gpio-sim", "2", false, Bias::AsIs)));
+    let lamps = config.lamps.unwrap();
+    assert_eq!((lamps.ready.as_deref(), lamps.hit, lamps.fault.as_deref()), (Some("ready"), None, Some("5")));
+    assert_eq!((config.gpu.as_deref(), config.validation), (Some("llvm"), true));
+    assert_eq!(config.scenario, Some("/etc/a.toml".into()));
+    assert_eq!((config.calibration, config.record), (Some("/b.toml".into()), true));
+    assert_eq!((config.data, config.health.limit_c), (Some("/var/lib/bowwave".into()), Some(85.0)));
+}
+
+#[test]
+fn mistakes_are_refused_where_they_are() {
+    for (text, said) in [
+        ("[screen]\nsise = \"1x1\"\n", "x.toml:2:1: unknown field `sise`"),
+        ("[screen]\nsize = \"1x1\"\n", "x.toml:2:8: screen.size: '1x1' is no size"),
+        ("[screen]\noutput = \"tv\"\n", "x.toml:2:10: "),
+        ("[screen]\nrefresh_hz = 0.0\n", "x.toml:2:14: screen.refresh_hz is 0: give 1 to 1000"),
+        ("[gpu]\ndevice = \" \"\n", "x.toml:2:10: gpu.device is empty"),
+        ("[gpu]\nvalidation = 3\n", "x.toml:2:14: "),
+        ("[gpu\n", "x.toml:1:5: "),
+        ("[camera]\nmodes = [\"YUYV\"]\n", "x.toml:2:10: camera.modes: 'YUYV' is no mode"),
+        ("[camera]\nexposure_us = \"long\"\n", "x.toml:2:15: camera.exposure_us: give a number above 0"),
+        ("[camera]\nbuffers = 1\n", "x.toml:2:11: camera.buffers is 1: give 3 to 32"),
+        ("[imu]\nbaud = []\n", "x.toml:2:8: imu.baud: "),
+        ("[trigger]\nchip = \"a\"\nline = 1\ndebounce_ms = 900\n", "x.toml:4:15: trigger.debounce_ms is 900"),
+        ("[interlock]\nline = 1\n", "x.toml:1:1: missing field `chip`"),
+        ("[health]\nlimit_c = nan\n", "x.toml:2:11: health.limit_c is NaN"),
+    ] {
+        assert!(refused(text).starts_with(said), "{}", refused(text));
+    }
+}

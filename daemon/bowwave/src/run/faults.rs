@@ -1,0 +1,94 @@
+//! Where all reports of faults come together: what is active, and the log.
+
+use bowwave_core::{
+    event::Event,
+    fault::{Change, Fault, FaultBoard, FaultChange, LogEntry, Severity, What},
+};
+
+/// Keeps the board and writes the log.
+#[derive(Debug, Default)]
+pub struct Faults {
+    board: FaultBoard,
+    boot_id: String,
+}
+
+impl Faults {
+    /// Nothing has happened in this boot.
+    pub fn new(boot_id: Option<String>) -> Self {
+        Self { board: FaultBoard::new(), boot_id: boot_id.unwrap_or_default() }
+    }
+
+    /// Takes in a change: a line to the log where it is one, and the event for the session.
+    pub fn take(&mut self, change: FaultChange, events: &mut Vec<Event>) {
+        if let Some(entry) = self.board.take(&change) {
+            self.log(&entry);
+        }
+        // Only what lasts concerns the session.
+        if !matches!(change.change, Change::Noted { .. }) {
+            events.push(Event::Fault(change));
+        }
+    }
+
+    /// Raises or clears `fault`, by whether there is a `cause`.
+    pub fn set(&mut self, fault: Fault, cause: Option<String>, events: &mut Vec<Event>) {
+        let now = bowwave_devices::clock::now();
+        match cause {
+            Some(cause) if !self.board.is_active(fault) => {
+                self.take(FaultChange::raised(now, fault, cause), events)
+            }
+            None if self.board.is_active(fault) => self.take(FaultChange::cleared(now, fault), events),
+            _ => {}
+        }
+    }
+
+    /// How often each fault came or happened, those that never did left out.
+    pub fn counts(&self) -> impl Iterator<Item = (&'static str, u64)> + '_ {
+        Fault::ALL.into_iter().map(|f| (f.code(), self.board.times(f))).filter(|(_, n)| *n > 0)
+    }
+
+    fn log(&self, entry: &LogEntry) {
+        let code = entry.fault.code();
+        let boot = self.boot_id.as_str();
+        let more = if entry.left_out > 0 {
+            format!(" ({} lines of this left out)", entry.left_out)
+        } else {
+            String::new()
+        };
+        match &entry.what {
+            What::Raised { cause } if entry.fault.severity() > Severity::Note => {
+                log::error!(fault_code = code, fault_state = "raised", trainer_boot = boot; "{code} {cause}{more}");
+            }
+            What::Raised { cause } => {
+                log::warn!(fault_code = code, fault_state = "raised", trainer_boot = boot; "{code} {cause}{more}");
+            }
+            What::Cleared { after_s } => {
+                log::warn!(
+                    fault_code = code, fault_state = "cleared", fault_seconds = after_s, trainer_boot = boot;
+                    "{code} over after {after_s:.3} s{more}"
+                );
+            }
+            What::Noted { cause } => {
+                log::warn!(fault_code = code, fault_state = "noted", trainer_boot = boot; "{code} {cause}{more}");
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_session_hears_of_what_lasts_only() {
+        let mut faults = Faults::new(None);
+        let mut events = Vec::new();
+        faults.set(Fault::DiskFull, Some("a".into()), &mut events);
+        faults.set(Fault::DiskFull, Some("a".into()), &mut events);
+        faults.set(Fault::DiskFull, None, &mut events);
+        faults.set(Fault::DiskFull, None, &mut events);
+        let time = bowwave_devices::clock::now();
+        faults.take(FaultChange::noted(time, Fault::CamTimestamp, ""), &mut events);
+        assert_eq!(events.len(), 2);
+        assert_eq!(faults.counts().collect::<Vec<_>>(), [("DISK_FULL", 1), ("CAM_TS", 1)]);
+    }
+}

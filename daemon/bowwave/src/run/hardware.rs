@@ -1,0 +1,248 @@
+//! The devices of a run: started together, drained together, watched together.
+
+use std::{sync::Arc, time::Duration};
+
+use anyhow::Result;
+use bowwave_core::{
+    event::Event,
+    fault::{Fault, FaultChange},
+    scene::Status,
+    time::{NS_PER_S, Time},
+};
+use bowwave_devices::{
+    camera::{CameraPort, CameraSettings},
+    clock::now,
+    lamps::{LampState, Lamps},
+    lcd::{LcdPort, Vblanks},
+    report::{Reporter, Reports, reporting},
+    serial::ImuPort,
+    trigger::{TriggerPort, TriggerSettings},
+};
+
+use super::{health::Health, settings::Settings, starts::Mode};
+use crate::config::ScreenOutput;
+
+/// A thread without a sign of life for this long hangs.
+const HEARTBEAT_MAX_NS: i64 = NS_PER_S;
+/// A trigger held for this long beyond the time that the belt lasts is stuck.
+const STUCK_BEYOND: Duration = Duration::from_secs(3);
+/// How long the first start waits for the LCD, to draw in its size.
+const LCD_WAIT: Duration = Duration::from_millis(1500);
+
+/// The devices.
+pub struct Hardware {
+    camera: CameraPort,
+    imu: Option<ImuPort>,
+    trigger: Option<TriggerPort>,
+    lcd: Option<Arc<LcdPort>>,
+    lamps: Option<Lamps>,
+    health: Health,
+    threads: Vec<(&'static str, Reports)>,
+    output: Reporter,
+    fetched: Vec<Event>,
+}
+
+impl Hardware {
+    /// Starts everything that the settings name. What is absent is searched for; only settings that cannot be right fail.
+    pub fn start(settings: &Settings, mode: Mode, faults: &mut Vec<FaultChange>) -> Result<Self> {
+        let config = &settings.config;
+        let mut threads = Vec::new();
+        let mut reporter = |name| {
+            let (reporter, reports) = reporting();
+            threads.push((name, reports));
+            reporter
+        };
+        let lcd = (config.output == ScreenOutput::Lcd)
+            .then(|| LcdPort::start(config.lcd.clone(), reporter("lcd")).map(Arc::new))
+            .transpose()?;
+        let camera = CameraPort::start(camera_settings(settings), reporter("camera"))?;
+        let training = mode == Mode::Training;
+        let imu = training.then(|| ImuPort::start(config.imu.clone(), reporter("imu"))).transpose()?;
+        let trigger = if training { trigger_settings(settings, faults) } else { None };
+        let lamps = match (&config.lamps, &trigger) {
+            (Some(lamps), trigger) => {
+                Some(Lamps::open(lamps.clone(), trigger.iter().flat_map(TriggerSettings::inputs)))
+            }
+            (None, _) => None,
+        };
+        let lamps = match lamps.transpose() {
+            Ok(lamps) => lamps,
+            Err(e) => {
+                faults.push(FaultChange::raised(now(), Fault::Config, format!("{e}; no lamp is lit")));
+                None
+            }
+        };
+        let trigger = trigger.map(|t| TriggerPort::start(t, reporter("trigger"))).transpose()?;
+        let health = Health::start(&config.health, reporter("health"))?;
+        let output = reporter("output");
+        Ok(Self { camera, imu, trigger, lcd, lamps, health, threads, output, fetched: Vec::new() })
+    }
+
+    /// The LCD, to show on.
+    pub fn lcd(&self) -> Option<Arc<LcdPort>> {
+        self.lcd.clone()
+    }
+
+    /// Size of the LCD, waited for at the start.
+    pub fn await_lcd_size(&self) -> Option<(u32, u32)> {
+        self.lcd.as_ref()?.await_mode(LCD_WAIT).map(|m| (m.width, m.height))
+    }
+
+    /// Size of the LCD that shows now.
+    pub fn lcd_size(&self) -> Option<(u32, u32)> {
+        match self.lcd.as_ref()?.status().state {
+            bowwave_devices::lcd::LcdState::Showing(mode) => Some((mode.width, mode.height)),
+            _ => None,
+        }
+    }
+
+    /// What the output thread reports with.
+    pub fn output_reporter(&self) -> Reporter {
+        self.output.clone()
+    }
+
+    /// What watches the computer.
+    pub const fn health(&self) -> &Health {
+        &self.health
+    }
+
+    /// Fetches what has arrived since the last call, in the order of arrival, and the changes of faults.
+    pub fn collect(&mut self, events: &mut Vec<Event>, faults: &mut Vec<FaultChange>) {
+        self.fetched.clear();
+        self.fetched.extend(self.camera.events().try_iter());
+        if let Some(imu) = &self.imu {
+            self.fetched.extend(imu.events().try_iter());
+        }
+        if let Some(trigger) = &self.trigger {
+            self.fetched.extend(trigger.events().try_iter());
+        }
+        // Stable: each device's own order stays.
+        self.fetched.sort_by_key(Event::arrival);
+        events.append(&mut self.fetched);
+        for (_, reports) in &self.threads {
+            faults.extend(reports.changes());
+        }
+    }
+
+    /// Vertical blanks at which frames came on the LCD, with their period; nothing where the driver knows no blanks.
+    pub fn flips(&self) -> impl Iterator<Item = (Time, i64)> + '_ {
+        let lcd = self.lcd.as_ref();
+        let period = lcd.and_then(|lcd| {
+            let status = lcd.status();
+            let counted = status.vblanks == Some(Vblanks::Counted);
+            status.choice.filter(|_| counted).map(|c| c.mode.period_ns())
+        });
+        lcd.into_iter()
+            .flat_map(|lcd| lcd.flips().try_iter())
+            .filter_map(move |flip| period.map(|period| (flip.time, period)))
+    }
+
+    /// The thread that has given no sign of life for too long, if any.
+    pub fn hanging(&self, now: Time) -> Option<&'static str> {
+        self.threads
+            .iter()
+            .find(|(_, reports)| now.ns_since(reports.last_beat()) > HEARTBEAT_MAX_NS)
+            .map(|(name, _)| *name)
+    }
+
+    /// Lights the lamps that belong to `status`.
+    pub fn light(&mut self, status: &Status, now: Time) {
+        let Some(lamps) = &mut self.lamps else { return };
+        let state = LampState {
+            ready: matches!(status, Status::Ready | Status::Hit | Status::Miss),
+            hit: *status == Status::Hit,
+            fault: matches!(status, Status::NotScored { .. } | Status::Fault { .. }),
+        };
+        if let Err(e) = lamps.set(now, state) {
+            log::warn!("{e}");
+        }
+    }
+
+    /// Names and counters of what the devices met, for the summary.
+    pub fn counters(&self) -> Vec<(&'static str, u64)> {
+        let camera = self.camera.status().counters;
+        let mut counters = vec![
+            ("camera_pictures", camera.frames),
+            ("camera_pictures_lent", camera.lent),
+            ("camera_pictures_copied", camera.copied),
+            ("camera_buffers_skipped", camera.skipped),
+            ("camera_buffers_damaged", camera.damaged_buffers),
+            ("camera_pictures_damaged", camera.damaged_pictures),
+            ("camera_sequence_gaps", camera.sequence_gaps),
+            ("camera_out_of_order", camera.out_of_order),
+            ("camera_opened", camera.opened),
+        ];
+        if let Some(imu) = &self.imu {
+            let c = imu.counters();
+            counters.extend([
+                ("imu_samples", c.imu.samples),
+                ("imu_bad_crc", c.imu.bad_crc),
+                ("imu_skipped_bytes", c.imu.skipped_bytes),
+                ("imu_lost_samples", c.lost_samples),
+                ("imu_overflow", c.overflow),
+                ("imu_opened", c.opened),
+            ]);
+        }
+        if let Some(lcd) = &self.lcd {
+            let c = lcd.status().counters;
+            counters.extend([("lcd_given", c.given), ("lcd_shown", c.shown), ("lcd_replaced", c.replaced)]);
+        }
+        counters
+    }
+
+    /// Ends all devices; what does not end in its time is left to the process's end.
+    pub fn stop(self) {
+        let Self { camera, imu, trigger, lcd, lamps, health, .. } = self;
+        let told = |what: &str, e: &dyn std::fmt::Display| log::warn!("{what}: {e}");
+        if let Err(e) = camera.stop() {
+            told("camera", &e);
+        }
+        if let Some(Err(e)) = imu.map(ImuPort::stop) {
+            told("inertial unit", &e);
+        }
+        if let Some(Err(e)) = trigger.map(TriggerPort::stop) {
+            told("trigger", &e);
+        }
+        drop(lamps);
+        health.stop();
+        // The output thread, which shared it, has ended.
+        if let Some(Err(e)) = lcd.and_then(Arc::into_inner).map(LcdPort::stop) {
+            told("LCD", &e);
+        }
+    }
+}
+
+fn camera_settings(settings: &Settings) -> CameraSettings {
+    let lens = &settings.setup.calibration.lens;
+    let calibrated = !settings.calibration_toml.is_empty();
+    let mut camera = settings.config.camera.clone();
+    camera.calibrated_size = calibrated.then_some((lens.width, lens.height));
+    // The configuration can name another one, for a camera that was exchanged for its like.
+    if camera.serial.is_none() && !settings.camera_serial.is_empty() {
+        camera.serial = Some(settings.camera_serial.clone());
+    }
+    camera
+}
+
+fn trigger_settings(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<TriggerSettings> {
+    let config = &settings.config;
+    if config.interlock.is_none() {
+        let cause =
+            "no interlock is configured: set [interlock] to the line that tells that the gun is inert";
+        faults.push(FaultChange::raised(now(), Fault::NotInert, cause));
+    }
+    let Some(trigger) = &config.trigger else {
+        let cause = "no trigger is configured: set [trigger] to its line";
+        faults.push(FaultChange::raised(now(), Fault::TriggerLost, cause));
+        return None;
+    };
+    let weapon = settings.setup.scenario.weapon;
+    let belt_s = f64::from(weapon.belt) * 60.0 / weapon.rounds_per_minute.max(1.0);
+    Some(TriggerSettings {
+        debounce: trigger.debounce,
+        stuck_after: Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_BEYOND) + STUCK_BEYOND,
+        interlock: config.interlock.clone(),
+        power_fail: config.power_fail.clone(),
+        ..TriggerSettings::new(trigger.line.clone())
+    })
+}

@@ -1,0 +1,99 @@
+//! `bowwave run`: the trainer on the gun computer's own devices, as the service runs it.
+
+mod faults;
+mod hardware;
+mod health;
+mod keeping;
+mod notify;
+mod settings;
+mod stage;
+mod starts;
+mod summary;
+mod trainer;
+
+use std::{
+    env,
+    path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread,
+};
+
+use anyhow::{Context, Result};
+use bowwave_core::time::Time;
+use bowwave_devices::clock::now;
+use signal_hook::{
+    consts::{SIGHUP, SIGINT, SIGTERM},
+    iterator::Signals as Incoming,
+};
+
+use crate::{cli::Run, outcome::Outcome};
+use notify::Notifier;
+use settings::Reader;
+use starts::Starts;
+use trainer::{Ended, Signals, Surroundings, Trainer};
+
+/// Where data go when nobody says: the folder that the package makes.
+const DATA: &str = "/var/lib/bowwave";
+
+/// Runs until a signal ends it.
+pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
+    let signals = catch_signals()?;
+    let starts = Starts::begin(env::var_os("RUNTIME_DIRECTORY").map(PathBuf::from), now());
+    let mut notifier = Notifier::from_environment();
+    // The folder of the last good settings cannot be configured by settings that may be bad.
+    let state = env::var_os("STATE_DIRECTORY").map(PathBuf::from);
+    let last_good = arguments.data.clone().or(state.clone()).map(|d| d.join("last-good"));
+    let reader = Reader { config: arguments.config.clone(), last_good };
+    loop {
+        let settings = reader.read()?;
+        let data = arguments
+            .data
+            .clone()
+            .or_else(|| settings.config.data.clone())
+            .or_else(|| state.clone())
+            .unwrap_or_else(|| Path::new(DATA).into());
+        std::fs::create_dir_all(&data).with_context(|| {
+            format!("cannot make the data folder {}; name another with --data", data.display())
+        })?;
+        let surroundings = Surroundings {
+            data: data.clone(),
+            mode: starts.mode(),
+            boot_id: bowwave_record::boot_id(),
+            frame_hashes: arguments.frame_hashes.clone(),
+            print_commits: arguments.print_commits,
+            program_start,
+        };
+        let trainer = Trainer::start(settings, surroundings, Arc::clone(&signals))?;
+        let (ended, summary) = trainer.run(&mut notifier)?;
+        if let Err(e) = summary.write(&data.join("summary.json")) {
+            log::warn!("{e:#}");
+        }
+        match ended {
+            Ended::Stopped => {
+                starts.ended_well();
+                return Ok(Outcome::Done);
+            }
+            Ended::Reload => notifier.reloading(),
+        }
+    }
+}
+
+/// SIGTERM and SIGINT end the run, SIGHUP has the settings read anew.
+fn catch_signals() -> Result<Arc<Signals>> {
+    let signals = Arc::new(Signals::default());
+    let mut incoming = Incoming::new([SIGTERM, SIGINT, SIGHUP]).context("cannot catch signals")?;
+    let told = Arc::clone(&signals);
+    thread::Builder::new()
+        .name("signals".to_owned())
+        .spawn(move || {
+            for signal in incoming.forever() {
+                let flag: &AtomicBool = if signal == SIGHUP { &told.reload } else { &told.stop };
+                flag.store(true, Ordering::Relaxed);
+            }
+        })
+        .context("cannot start the thread that waits for signals; are too many processes running?")?;
+    Ok(signals)
+}

@@ -1,0 +1,310 @@
+//! What a run is made of: configuration, calibration, scenario. Each that is refused is replaced by its last good copy, kept in
+//! the data folder, so that a mistake in a file does not end the training.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use anyhow::{Context, Result};
+use bowwave_calibration::CalibrationFile;
+use bowwave_core::{
+    calibration::Calibration,
+    event::PixelFormat,
+    fault::{Fault, FaultChange},
+    geometry::Lens,
+    model::Model,
+    scenario::{self, Scenario},
+    session::Setup,
+};
+use bowwave_devices::clock::now;
+use glam::{DQuat, DVec2, DVec3};
+
+use crate::{
+    config::{self, Config},
+    loading::{load_models, read_scenario},
+};
+
+/// Where nobody says how large pictures are.
+const USUAL_SIZE: (u32, u32) = (1280, 720);
+/// Horizontal field of view of the lens that is taken where none is calibrated, radians: of most cameras.
+const USUAL_VIEW: f64 = 1.05;
+
+/// What a run is made of.
+#[derive(Debug)]
+pub struct Settings {
+    /// The configuration.
+    pub config: Config,
+    /// What the session is made from; screen and video are found out later.
+    pub setup: Setup,
+    /// The camera's serial number in the calibration; may be empty.
+    pub camera_serial: String,
+    /// Text of the calibration; empty where there is none.
+    pub calibration_toml: String,
+    /// Text of the scenario.
+    pub scenario_toml: String,
+    /// What was refused.
+    pub faults: Vec<FaultChange>,
+}
+
+/// Reads settings, with a place for the last good ones.
+#[derive(Clone, Debug)]
+pub struct Reader {
+    /// The configuration file.
+    pub config: PathBuf,
+    /// Folder of the last good copies; none are kept without it.
+    pub last_good: Option<PathBuf>,
+}
+
+/// A text that was accepted, or the last good one with why the new one was refused.
+struct Accepted<T> {
+    value: T,
+    text: String,
+    refused: Option<anyhow::Error>,
+}
+
+impl Reader {
+    /// Reads everything. Fails only where not even what is built in works.
+    pub fn read(&self) -> Result<Settings> {
+        let mut faults = Vec::new();
+        let mut refuse = |fault: Fault, why: &anyhow::Error| {
+            faults.push(FaultChange::raised(now(), fault, format!("{why:#}")));
+        };
+        let config = self.config(&mut refuse);
+        let calibration = self.calibration(&config, &mut refuse);
+        let (scenario, scenario_toml, models, boat_models) = self.scenario(&config, &mut refuse)?;
+        let (calibration, calibration_toml, camera_serial) = match calibration {
+            Some(c) => (c.value.calibration, c.text, c.value.camera_serial),
+            None => (uncalibrated(&config), String::new(), String::new()),
+        };
+        let setup = Setup {
+            scenario,
+            calibration,
+            models: models.into(),
+            boat_models,
+            screen: config.size.unwrap_or(USUAL_SIZE),
+            video: PixelFormat::Yuyv,
+        };
+        Ok(Settings { config, setup, camera_serial, calibration_toml, scenario_toml, faults })
+    }
+
+    fn config(&self, refuse: &mut impl FnMut(Fault, &anyhow::Error)) -> Config {
+        let base = self.config.parent().unwrap_or(Path::new("."));
+        let accepted =
+            self.accept("bowwave.toml", Some(&self.config), |text, origin| config::parse(text, origin, base));
+        match accepted {
+            Some(a) => {
+                if let Some(why) = &a.refused {
+                    refuse(Fault::Config, &why_and_instead(why, "the last good configuration is used"));
+                }
+                a.value
+            }
+            None => {
+                let why =
+                    config::read(&self.config).err().unwrap_or_else(|| anyhow::anyhow!("cannot be read"));
+                refuse(Fault::Config, &why_and_instead(&why, "the trainer runs as without a configuration"));
+                Config::default()
+            }
+        }
+    }
+
+    fn calibration(
+        &self,
+        config: &Config,
+        refuse: &mut impl FnMut(Fault, &anyhow::Error),
+    ) -> Option<Accepted<CalibrationFile>> {
+        let parse = |text: &str, origin: &str| Ok(bowwave_calibration::parse(text, origin)?);
+        let accepted = self.accept("calibration.toml", config.calibration.as_deref(), parse);
+        match (&accepted, &config.calibration) {
+            (Some(a), _) => {
+                if let Some(why) = &a.refused {
+                    refuse(Fault::Config, &why_and_instead(why, "the last good calibration is used"));
+                }
+            }
+            (None, None) => refuse(
+                Fault::NoCalibration,
+                &anyhow::anyhow!("{} names no calibration: set files.calibration", self.config.display()),
+            ),
+            (None, Some(path)) => {
+                let why = read_text(path).and_then(|text| parse(&text, &path.display().to_string())).err();
+                let why = why.unwrap_or_else(|| anyhow::anyhow!("{} cannot be used", path.display()));
+                refuse(Fault::NoCalibration, &why);
+            }
+        }
+        accepted
+    }
+
+    #[allow(clippy::type_complexity, reason = "the parts of a setup, once")]
+    fn scenario(
+        &self,
+        config: &Config,
+        refuse: &mut impl FnMut(Fault, &anyhow::Error),
+    ) -> Result<(Scenario, String, Vec<Model>, Vec<bowwave_core::model::ModelId>)> {
+        let load = |text: &str, origin: &str, base: &Path| -> Result<_> {
+            let scenario = Scenario::parse(text, origin)?;
+            let (models, boats) = load_models(&scenario, base)?;
+            let radius = |id: &bowwave_core::model::ModelId| {
+                models.get(usize::from(id.0)).map_or(0.0, Model::radius_m)
+            };
+            scenario.check_clearance(&boats.iter().map(radius).collect::<Vec<_>>())?;
+            Ok((scenario, text.to_owned(), models, boats))
+        };
+        if let Some(path) = &config.scenario {
+            let named = read_scenario(path).and_then(|(text, base)| {
+                let loaded = load(&text, &path.display().to_string(), &base)?;
+                self.keep("scenario.toml", &text);
+                Ok(loaded)
+            });
+            let base = path.parent().unwrap_or(Path::new(""));
+            match named {
+                Ok(loaded) => return Ok(loaded),
+                Err(why) => match self
+                    .kept("scenario.toml")
+                    .and_then(|text| load(&text, "last good scenario", base).ok())
+                {
+                    Some(loaded) => {
+                        refuse(Fault::Config, &why_and_instead(&why, "the last good scenario is used"));
+                        return Ok(loaded);
+                    }
+                    None => refuse(Fault::Config, &why_and_instead(&why, "the built-in scenario is used")),
+                },
+            }
+        }
+        load(scenario::DEFAULT, "built-in scenario", Path::new(""))
+            .context("the built-in scenario is unusable")
+    }
+
+    /// The file at `path` where it is good, else its last good copy.
+    fn accept<T>(
+        &self,
+        name: &str,
+        path: Option<&Path>,
+        parse: impl Fn(&str, &str) -> Result<T>,
+    ) -> Option<Accepted<T>> {
+        let path = path?;
+        let new = read_text(path).and_then(|text| Ok((parse(&text, &path.display().to_string())?, text)));
+        match new {
+            Ok((value, text)) => {
+                self.keep(name, &text);
+                Some(Accepted { value, text, refused: None })
+            }
+            Err(why) => {
+                let text = self.kept(name)?;
+                let value = parse(&text, &format!("last good {name}")).ok()?;
+                Some(Accepted { value, text, refused: Some(why) })
+            }
+        }
+    }
+
+    fn kept(&self, name: &str) -> Option<String> {
+        fs::read_to_string(self.last_good.as_ref()?.join(name)).ok()
+    }
+
+    /// Keeps a good text: whole or not at all, also when power is cut.
+    fn keep(&self, name: &str, text: &str) {
+        let Some(folder) = &self.last_good else { return };
+        if self.kept(name).as_deref() == Some(text) {
+            return;
+        }
+        let write = || -> std::io::Result<()> {
+            fs::create_dir_all(folder)?;
+            let making = folder.join(format!("{name}.making"));
+            let mut file = fs::File::create(&making)?;
+            std::io::Write::write_all(&mut file, text.as_bytes())?;
+            file.sync_all()?;
+            fs::rename(&making, folder.join(name))
+        };
+        if let Err(e) = write() {
+            log::warn!("cannot keep a copy of the good {name} in {}: {e}", folder.display());
+        }
+    }
+}
+
+fn read_text(path: &Path) -> Result<String> {
+    fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+fn why_and_instead(why: &anyhow::Error, instead: &str) -> anyhow::Error {
+    anyhow::anyhow!("{why:#}; {instead}")
+}
+
+/// A lens and mounting to show pictures with; nothing is scored with it.
+fn uncalibrated(config: &Config) -> Calibration {
+    let (width, height) = config.camera.modes.first().map_or(USUAL_SIZE, |m| (m.width, m.height));
+    Calibration {
+        lens: Lens::pinhole(width, height, USUAL_VIEW),
+        focal_sigma_px: f64::from(width),
+        camera_from_imu: DQuat::IDENTITY,
+        camera_from_imu_sigma: DVec3::ONE,
+        time_offset_ns: 0,
+        time_offset_sigma_ns: 100_000_000,
+        boresight: DVec2::ZERO,
+        boresight_sigma: 1.0,
+        muzzle_in_camera: DVec3::ZERO,
+        gyro_bias: DVec3::ZERO,
+        gyro_bias_sigma: DVec3::ONE,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Folder(PathBuf);
+
+    impl Folder {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("bowwave-{name}-{}", std::process::id()));
+            fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+
+        fn reader(&self) -> Reader {
+            Reader { config: self.0.join("bowwave.toml"), last_good: Some(self.0.join("last-good")) }
+        }
+
+        fn write(&self, name: &str, text: &str) {
+            fs::write(self.0.join(name), text).unwrap();
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn faults(settings: &Settings) -> Vec<Fault> {
+        settings.faults.iter().map(|f| f.fault).collect()
+    }
+
+    #[test]
+    fn what_is_refused_is_replaced_by_its_last_good_copy() {
+        let folder = Folder::new("settings");
+        let calibration = include_str!("../../../../calibration/examples/mount.toml");
+        folder.write("calibration.toml", calibration);
+        folder.write("bowwave.toml", "[files]\ncalibration = \"calibration.toml\"\nscenario = \"swarm\"\n");
+        let good = folder.reader().read().unwrap();
+        assert_eq!(faults(&good), []);
+        let boats = good.setup.scenario.boats.len();
+
+        folder.write("bowwave.toml", "[files]\ncalibration = 3\n");
+        folder.write("calibration.toml", "nonsense");
+        let kept = folder.reader().read().unwrap();
+        assert_eq!(faults(&kept), [Fault::Config, Fault::Config]);
+        assert_eq!(kept.setup.scenario.boats.len(), boats);
+        assert_eq!(kept.setup.calibration.lens, good.setup.calibration.lens);
+        let said = format!("{:?}", kept.faults[0].change);
+        assert!(said.contains("bowwave.toml:2:15") && said.contains("last good"), "{said}");
+    }
+
+    #[test]
+    fn without_any_calibration_pictures_are_shown_and_nothing_fires() {
+        let folder = Folder::new("uncalibrated");
+        let settings = folder.reader().read().unwrap();
+        assert_eq!(faults(&settings), [Fault::Config, Fault::NoCalibration]);
+        folder.write("bowwave.toml", "[files]\ncalibration = \"absent.toml\"\nscenario = \"absent.toml\"\n");
+        let settings = folder.reader().read().unwrap();
+        assert_eq!(faults(&settings), [Fault::NoCalibration, Fault::Config]);
+    }
+}
