@@ -105,6 +105,14 @@ pub enum TriggerError {
         /// Chips that are there.
         present: String,
     },
+    /// Several chips are called that.
+    #[error("several GPIO chips are called {chip}: {present}; name one by its node")]
+    ChipsAlike {
+        /// The name asked for.
+        chip: String,
+        /// The chips.
+        present: String,
+    },
     /// The line cannot be had.
     #[error("cannot use line {offset} of {}: {source}; does its chip know interrupts and the bias asked for?", node.display())]
     Request {
@@ -256,14 +264,22 @@ fn find_chip(dev: &Path, wanted: &str) -> Result<(PathBuf, Chip), TriggerError> 
     let nodes = nodes::numbered(dev, "gpiochip")
         .map_err(|source| TriggerError::Io { node: dev.to_owned(), source })?;
     let mut present = Vec::new();
+    let mut found = Vec::new();
     for node in nodes {
         match open(dev, &node) {
-            Ok(chip) if chip.label() == wanted || chip.name() == wanted => return Ok((node, chip)),
+            Ok(chip) if chip.label() == wanted || chip.name() == wanted => found.push((node, chip)),
             Ok(chip) => present.push(format!("{} ({})", node.display(), chip.label())),
             Err(_) => present.push(format!("{} (cannot be opened)", node.display())),
         }
     }
-    Err(TriggerError::NoChip { chip: wanted.to_owned(), present: nodes::listed(present) })
+    // The wrong chip's line read as an interlock would arm a gun that is not inert.
+    if found.len() > 1 {
+        let present = nodes::listed(found.iter().map(|(node, _)| node.display().to_string()));
+        return Err(TriggerError::ChipsAlike { chip: wanted.to_owned(), present });
+    }
+    found
+        .pop()
+        .ok_or_else(|| TriggerError::NoChip { chip: wanted.to_owned(), present: nodes::listed(present) })
 }
 
 /// Why a line that is there cannot be had.

@@ -34,7 +34,8 @@ pub enum Bias {
 /// An input line and how it is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputLine {
-    /// The chip: a node such as `/dev/gpiochip0`, or its label or name.
+    /// The chip: its label or name, or a node such as `/dev/gpiochip0`. A chip that was lost is looked for by its label
+    /// too, because it may come back as another node.
     pub chip: String,
     /// The line: its name or its number on the chip.
     pub line: String,
@@ -72,6 +73,7 @@ pub(super) struct Edge {
 pub(super) struct Input {
     handle: LineEventHandle,
     node: PathBuf,
+    label: String,
     offset: u32,
 }
 
@@ -88,7 +90,12 @@ impl Input {
         let flags = fcntl_getfl(&handle).unwrap_or(OFlags::empty()) | OFlags::NONBLOCK;
         fcntl_setfl(&handle, flags)
             .map_err(|e| TriggerError::Io { node: node.clone(), source: io::Error::from(e) })?;
-        Ok(Self { handle, node, offset })
+        Ok(Self { handle, node, label: placed.chip.label().to_owned(), offset })
+    }
+
+    /// What the maker calls its chip.
+    pub(super) fn label(&self) -> &str {
+        &self.label
     }
 
     /// The next edge that waits, if one does.

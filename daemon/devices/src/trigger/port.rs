@@ -147,11 +147,26 @@ struct Place {
     role: Role,
     wanted: InputLine,
     input: Option<Input>,
+    /// Of the chip that it was on.
+    label: Option<String>,
     /// Earliest time of the next try, or of the next look at a quiet line.
     next: Time,
     /// Its loss has been told.
     told: bool,
     state: LineState,
+}
+
+impl Place {
+    /// Opens the line where it is configured, or else on the one chip that is called as the one that was lost.
+    fn open(&self, dev: &Path) -> Result<Input, TriggerError> {
+        match (Input::open(dev, &self.wanted), &self.label) {
+            (Err(gone @ TriggerError::NotFound { .. }), Some(label)) => {
+                let moved = InputLine { chip: label.clone(), ..self.wanted.clone() };
+                Input::open(dev, &moved).map_err(|_| gone)
+            }
+            (result, _) => result,
+        }
+    }
 }
 
 /// The watching thread.
@@ -182,7 +197,15 @@ impl Watch {
         ];
         let place = |(role, wanted): (Role, Option<&InputLine>)| {
             let wanted = wanted?.clone();
-            Some(Place { role, wanted, input: None, next: Time::MIN, told: false, state: LineState::Absent })
+            Some(Place {
+                role,
+                wanted,
+                input: None,
+                label: None,
+                next: Time::MIN,
+                told: false,
+                state: LineState::Absent,
+            })
         };
         let ns = |d: std::time::Duration| i64::try_from(d.as_nanos()).unwrap_or(i64::MAX);
         let mut switch =
@@ -220,12 +243,13 @@ impl Watch {
                 continue;
             };
             place.next = now.plus_ns(SEARCH_NS);
-            let opened = Input::open(&self.dev, &place.wanted).and_then(|input| {
+            let opened = place.open(&self.dev).and_then(|input| {
                 let level = input.level()?;
                 Ok((input, level))
             });
             match opened {
                 Ok((input, (now, level))) => {
+                    place.label = Some(input.label().to_owned()).filter(|label| !label.is_empty());
                     place.input = Some(input);
                     place.told = false;
                     place.next = now.plus_ns(LEVEL_NS);
