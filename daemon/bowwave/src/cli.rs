@@ -172,6 +172,9 @@ pub struct Plan {
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
 pub struct Doctor {
+    /// Check what this configuration names instead, each device for a moment; the trainer must not run meanwhile
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "imu", "trigger", "gpu"])]
+    pub config: Option<PathBuf>,
     /// Camera that must be there, as /dev/video0 or a link in /dev/v4l/by-id
     #[arg(long, value_name = "PATH")]
     pub camera: Option<PathBuf>,

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use bowwave_core::{
     calibration::Calibration,
     event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, TriggerEdge},
+    fault::{Fault, FaultChange},
     geometry::{Lens, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
     scenario::Scenario,
@@ -105,6 +106,7 @@ struct Stream {
     rate: f64,
     imu: std::ops::Range<i64>,
     frames: std::ops::Range<i64>,
+    faults: Vec<FaultChange>,
 }
 
 /// Steps a session over `seconds`; `stream` says in which milliseconds devices report.
@@ -153,6 +155,9 @@ fn play(
             events.push(Event::Trigger(edges[sent_edge]));
             sent_edge += 1;
         }
+        let before = now.plus_ns(-1_000_000_000 / 30);
+        let due = stream.faults.iter().filter(|f| f.time > before && f.time <= now);
+        events.extend(due.cloned().map(Event::Fault));
         events.sort_by_key(Event::arrival);
         let step = session.step(&events, now);
         let records = step.records.to_vec();
@@ -172,7 +177,7 @@ fn burst(from_ms: i64, to_ms: i64) -> [TriggerEdge; 2] {
     ]
 }
 
-const ALL: Stream = Stream { rate: 0.0, imu: 0..i64::MAX, frames: 0..i64::MAX };
+const ALL: Stream = Stream { rate: 0.0, imu: 0..i64::MAX, frames: 0..i64::MAX, faults: Vec::new() };
 
 #[test]
 fn rounds_at_the_block_strike_it() {
@@ -324,4 +329,76 @@ fn a_rehearsal_has_everything_in_view() {
         assert_eq!(runs, PassDecision::Run, "{pass:?}");
     }
     assert_eq!((scene.boats.len(), scene.rounds.len()), (1, 3));
+}
+
+/// The outcomes of the rounds of three bursts, and the states that were shown in half a second around the middle one.
+fn with_fault(fault: Fault) -> (Vec<Outcome>, Vec<Status>, Vec<Option<Fault>>) {
+    let mut s = session(SCENARIO);
+    let at = |ms: i64| Time::from_ns(ms * MS);
+    let faults = vec![FaultChange::raised(at(1200), fault, "test"), FaultChange::cleared(at(2200), fault)];
+    let edges = [burst(500, 550), burst(1500, 1550), burst(2500, 2550)].concat();
+    let (mut outcomes, mut states, mut warnings, mut tick) = (Vec::new(), Vec::new(), Vec::new(), 0);
+    play(&mut s, 4.0, &Stream { faults, ..ALL }, &edges, |s, status, _, r| {
+        outcomes.extend(r.iter().map(|r| r.outcome.clone()));
+        tick += 1;
+        if (40..60).contains(&tick) {
+            states.extend(status);
+            warnings.push(s.hud().warning);
+        }
+    });
+    (outcomes, states, warnings)
+}
+
+#[test]
+fn a_gun_that_is_not_inert_fires_nothing_and_says_so() {
+    let (outcomes, states, _) = with_fault(Fault::NotInert);
+    assert_eq!(outcomes.len(), 2, "the burst in between fired nothing: {outcomes:?}");
+    assert!(outcomes.iter().all(|o| matches!(o, Outcome::Hit { .. })));
+    let said = Status::Fault { cause: "NOT ARMED: GUN NOT INERT", action: "FIT THE INERT PLUG" };
+    assert!(states.iter().all(|s| *s == said), "{states:?}");
+}
+
+#[test]
+fn a_round_fired_while_a_device_is_lost_is_recorded_with_the_reason() {
+    let (outcomes, states, _) = with_fault(Fault::CamBusy);
+    assert_eq!(outcomes.len(), 3);
+    let cause = NotScored::Fault(Fault::CamBusy);
+    assert!(outcomes.contains(&Outcome::NotScored { cause }), "{outcomes:?}");
+    assert_eq!(NotScored::from_name(cause.name()), Some(cause));
+    assert!(
+        states.iter().all(|s| matches!(s, Status::NotScored { cause: "CAMERA IN USE", .. })),
+        "{states:?}"
+    );
+}
+
+#[test]
+fn a_warning_is_shown_and_everything_is_scored() {
+    let (outcomes, states, warnings) = with_fault(Fault::DiskFull);
+    assert_eq!(outcomes.iter().filter(|o| matches!(o, Outcome::Hit { .. })).count(), 3);
+    assert!(states.iter().all(|s| matches!(s, Status::Ready | Status::Hit)), "{states:?}");
+    assert!(warnings.iter().all(|w| *w == Some(Fault::DiskFull)));
+}
+
+#[test]
+fn a_hot_computer_draws_no_reflection() {
+    let water = |faults: Vec<FaultChange>| {
+        let mut s = session(SCENARIO);
+        let mut last = None;
+        play(&mut s, 1.0, &Stream { faults, ..ALL }, &[], |_, _, passes, _| last = Some(passes));
+        last.map(|passes| (passes[Pass::Water as usize], passes[Pass::Boats as usize]))
+    };
+    let cool = water(Vec::new());
+    let hot = water(vec![FaultChange::raised(Time::from_ns(MS), Fault::Thermal, "test")]);
+    assert_eq!(hot.map(|h| h.1), Some(PassDecision::Run));
+    assert_eq!(cool, Some((PassDecision::Run, PassDecision::Run)));
+    assert_eq!(hot.map(|h| h.0), Some(PassDecision::LeftOut(LeftOut::NoReflectionInView)));
+}
+
+#[test]
+fn before_the_first_picture_a_black_one_says_what_is_wrong() {
+    let mut s = session(SCENARIO);
+    assert!(s.step(&[], Time::from_ns(MS)).view.is_none());
+    let view = s.blind(Time::from_ns(MS));
+    assert!(matches!(view.scene.hud.status, Status::NotScored { cause: "NO CAMERA YET", .. }));
+    assert!(view.scene.boats.is_empty() && view.picture.bytes().iter().all(|b| *b == 0));
 }

@@ -1,9 +1,7 @@
-//! From a coded picture to pixels, in buffers that are used again.
+//! From a recording's coded pictures to pixels: what is left out is counted, and logged once a kind.
 
-use std::{io::Cursor, sync::Arc};
-
-use bowwave_core::event::{Picture, PixelFormat};
-use image::{ColorType, ImageDecoder, codecs::jpeg::JpegDecoder};
+use bowwave_core::event::Picture;
+use bowwave_devices::camera::jpeg::{Decoder, JpegError};
 
 /// What became of the pictures of a replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,16 +15,17 @@ pub struct FrameCounters {
 }
 
 /// Decodes the pictures of one camera.
-#[derive(Default)]
 pub(super) struct FrameDecoder {
     size: Option<(u32, u32)>,
-    /// Buffers that were given away; free again when nobody else holds them.
-    pool: Vec<Arc<[u8]>>,
+    decoder: Decoder,
     counters: FrameCounters,
 }
 
-/// Buffers kept for use again: the queue, the one in decoding, and those that session and renderer hold.
-const POOL_MAX: usize = 8;
+impl Default for FrameDecoder {
+    fn default() -> Self {
+        Self { size: None, decoder: Decoder::for_recordings(), counters: FrameCounters::default() }
+    }
+}
 
 impl FrameDecoder {
     pub(super) const fn counters(&self) -> FrameCounters {
@@ -41,20 +40,18 @@ impl FrameDecoder {
                 self.counters.decoded += 1;
                 Some(picture)
             }
-            Err(Refused::Size(found)) => {
+            Err(JpegError::Size { width: w, height: h, .. }) => {
                 if self.counters.other_size == 0 {
                     let (width, height) = self.size.unwrap_or_default();
                     log::warn!(
-                        "a picture of {}x{} in mid-stream, the first was {width}x{height}: left out; was the camera's mode \
+                        "a picture of {w}x{h} in mid-stream, the first was {width}x{height}: left out; was the camera's mode \
                          changed?",
-                        found.0,
-                        found.1
                     );
                 }
                 self.counters.other_size += 1;
                 None
             }
-            Err(Refused::Undecodable(why)) => {
+            Err(why) => {
                 if self.counters.undecodable == 0 {
                     log::warn!("a picture that is no whole JPEG ({why}): left out");
                 }
@@ -64,69 +61,16 @@ impl FrameDecoder {
         }
     }
 
-    fn try_decode(&mut self, jpeg: &[u8]) -> Result<Picture, Refused> {
-        // The decoder fills what is missing with grey; a picture without its end is not shown.
-        let padding = jpeg.iter().rev().take_while(|b| **b == 0).count();
-        if !jpeg[..jpeg.len() - padding].ends_with(&[0xff, 0xd9]) {
-            return Err(Refused::Undecodable(format!("{} bytes without an end", jpeg.len())));
-        }
-        let decoder = JpegDecoder::new(Cursor::new(jpeg)).map_err(undecodable)?;
-        let size = decoder.dimensions();
-        if self.size.is_some_and(|first| first != size) {
-            return Err(Refused::Size(size));
-        }
-        if size.0 > 8192 || size.1 > 8192 {
-            return Err(Refused::Undecodable(format!("{}x{} pixels, more than 8192", size.0, size.1)));
-        }
-        let bytes = match decoder.color_type() {
-            ColorType::Rgb8 => {
-                let mut bytes = self.buffer(PixelFormat::Rgb.byte_len(size.0, size.1));
-                // A buffer out of the pool is ours alone, or it would not have been taken.
-                let target = Arc::get_mut(&mut bytes)
-                    .ok_or_else(|| Refused::Undecodable("no buffer of its own".to_owned()))?;
-                decoder.read_image(target).map_err(undecodable)?;
-                self.keep(&bytes);
-                bytes
-            }
-            ColorType::L8 => {
-                let mut grey = vec![0; size.0 as usize * size.1 as usize];
-                decoder.read_image(&mut grey).map_err(undecodable)?;
-                grey.into_iter().flat_map(|v| [v; 3]).collect()
-            }
-            other => return Err(Refused::Undecodable(format!("colours {other:?}"))),
-        };
-        let picture = Picture::new(PixelFormat::Rgb, size.0, size.1, bytes).map_err(undecodable)?;
-        self.size = Some(size);
+    fn try_decode(&mut self, jpeg: &[u8]) -> Result<Picture, JpegError> {
+        let picture = self.decoder.decode(jpeg, self.size)?;
+        self.size = Some((picture.width(), picture.height()));
         Ok(picture)
     }
-
-    /// A buffer that nobody else holds.
-    fn buffer(&mut self, bytes: usize) -> Arc<[u8]> {
-        let free = self.pool.iter_mut().position(|slot| slot.len() == bytes && Arc::get_mut(slot).is_some());
-        match free {
-            Some(slot) => self.pool.swap_remove(slot),
-            None => std::iter::repeat_n(0, bytes).collect(),
-        }
-    }
-
-    fn keep(&mut self, bytes: &Arc<[u8]>) {
-        if self.pool.len() < POOL_MAX {
-            self.pool.push(Arc::clone(bytes));
-        }
-    }
-}
-
-enum Refused {
-    Size((u32, u32)),
-    Undecodable(String),
-}
-
-fn undecodable(error: impl std::fmt::Display) -> Refused {
-    Refused::Undecodable(error.to_string())
 }
 
 #[cfg(test)]
 mod tests {
+    use bowwave_core::event::PixelFormat;
     use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 
     use super::*;
@@ -161,24 +105,5 @@ mod tests {
         let padded = [&whole[..], &[0; 100]].concat();
         assert!(decoder.decode(&padded).is_some());
         assert_eq!(decoder.counters(), FrameCounters { decoded: 2, other_size: 1, undecodable: 3 });
-    }
-
-    #[test]
-    fn buffers_are_used_again_but_never_while_held() {
-        let mut decoder = FrameDecoder::default();
-        let (dark, light) =
-            (jpeg(32, 16, ExtendedColorType::Rgb8, 10), jpeg(32, 16, ExtendedColorType::Rgb8, 240));
-        let held = decoder.decode(&dark).expect("decoded");
-        let mut places = std::collections::HashSet::new();
-        for _ in 0..20 {
-            let picture = decoder.decode(&light).expect("decoded");
-            places.insert(picture.bytes().as_ptr());
-        }
-        assert_eq!(places.len(), 1);
-        assert!(held.bytes().iter().all(|v| *v < 20));
-        let many: Vec<_> = (0..3 * POOL_MAX).filter_map(|_| decoder.decode(&light)).collect();
-        assert_eq!(many.len(), 3 * POOL_MAX);
-        assert!(decoder.pool.len() <= POOL_MAX);
-        assert!(held.bytes().iter().all(|v| *v < 20));
     }
 }

@@ -10,7 +10,7 @@ use bowwave_core::{
     time::{NS_PER_S, Time},
 };
 use bowwave_devices::{
-    camera::{CameraPort, CameraSettings},
+    camera::CameraPort,
     clock::now,
     lamps::{LampState, Lamps},
     lcd::{LcdPort, Vblanks},
@@ -19,7 +19,11 @@ use bowwave_devices::{
     trigger::{TriggerPort, TriggerSettings},
 };
 
-use super::{health::Health, settings::Settings, starts::Mode};
+use super::{
+    health::Health,
+    settings::{Settings, camera_settings},
+    starts::Mode,
+};
 use crate::config::ScreenOutput;
 
 /// A thread without a sign of life for this long hangs.
@@ -210,18 +214,6 @@ impl Hardware {
             told("LCD", &e);
         }
     }
-}
-
-fn camera_settings(settings: &Settings) -> CameraSettings {
-    let lens = &settings.setup.calibration.lens;
-    let calibrated = !settings.calibration_toml.is_empty();
-    let mut camera = settings.config.camera.clone();
-    camera.calibrated_size = calibrated.then_some((lens.width, lens.height));
-    // The configuration can name another one, for a camera that was exchanged for its like.
-    if camera.serial.is_none() && !settings.camera_serial.is_empty() {
-        camera.serial = Some(settings.camera_serial.clone());
-    }
-    camera
 }
 
 fn trigger_settings(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<TriggerSettings> {

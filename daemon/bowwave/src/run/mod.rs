@@ -5,7 +5,7 @@ mod hardware;
 mod health;
 mod keeping;
 mod notify;
-mod settings;
+pub mod settings;
 mod stage;
 mod starts;
 mod summary;
@@ -61,7 +61,8 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
         let surroundings = Surroundings {
             data: data.clone(),
             mode: starts.mode(),
-            boot_id: bowwave_record::boot_id(),
+            // The service hides /proc/sys; systemd tells it.
+            boot_id: env::var("BOWWAVE_BOOT_ID").ok().or_else(bowwave_record::boot_id),
             frame_hashes: arguments.frame_hashes.clone(),
             print_commits: arguments.print_commits,
             program_start,

@@ -17,7 +17,7 @@ use bowwave_core::{
     scenario::{self, Scenario},
     session::Setup,
 };
-use bowwave_devices::clock::now;
+use bowwave_devices::{camera::CameraSettings, clock::now};
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
@@ -226,6 +226,19 @@ fn read_text(path: &Path) -> Result<String> {
 
 fn why_and_instead(why: &anyhow::Error, instead: &str) -> anyhow::Error {
     anyhow::anyhow!("{why:#}; {instead}")
+}
+
+/// What is asked of the camera: the configuration's wishes for the calibrated camera.
+pub fn camera_settings(settings: &Settings) -> CameraSettings {
+    let lens = &settings.setup.calibration.lens;
+    let calibrated = !settings.calibration_toml.is_empty();
+    let mut camera = settings.config.camera.clone();
+    camera.calibrated_size = calibrated.then_some((lens.width, lens.height));
+    // The configuration can name another one, for a camera that was exchanged for its like.
+    if camera.serial.is_none() && !settings.camera_serial.is_empty() {
+        camera.serial = Some(settings.camera_serial.clone());
+    }
+    camera
 }
 
 /// A lens and mounting to show pictures with; nothing is scored with it.

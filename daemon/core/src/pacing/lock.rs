@@ -45,6 +45,8 @@ pub struct FrameClock {
     display: Option<Train>,
     budget_ns: i64,
     last: Option<Plan>,
+    /// Whether the last begin waited for a picture that was still to come.
+    waits: bool,
     missed: u64,
     slips: u64,
 }
@@ -63,6 +65,7 @@ impl FrameClock {
             display: None,
             budget_ns: BUDGET_FIRST_NS,
             last: None,
+            waits: false,
             missed: 0,
             slips: 0,
         }
@@ -141,7 +144,7 @@ impl FrameClock {
         };
         let latest = shown.plus_ns(-self.budget_ns);
         // Where the tick follows the camera, nothing arrives around the begin; elsewhere there must be room to wait for it.
-        let room = if self.follows_camera(blank_ns, blanks) { 0.0 } else { 2.0 * self.guard_ns() };
+        let room = if self.follows_camera(blank_ns, blanks) { 0.0 } else { 2.5 * self.guard_ns() };
         Plan { start: self.wait_for_picture(latest.plus_ns(-room as i64)), shown }
     }
 
@@ -196,13 +199,16 @@ impl FrameClock {
     }
 
     /// `start`, or a little later where a picture is expected around it.
-    fn wait_for_picture(&self, start: Time) -> Time {
+    fn wait_for_picture(&mut self, start: Time) -> Time {
         let Some((period, waited)) = self.waited(start) else { return start };
         let guard = self.guard_ns();
-        if waited < guard {
-            start.plus_ns((guard - waited) as i64)
-        } else if period - waited < guard {
+        // Who has begun to wait for pictures goes on a little longer, or the prediction's own noise would decide.
+        let reach = if self.waits { 1.5 * guard } else { guard };
+        self.waits = period - waited < reach;
+        if self.waits {
             start.plus_ns((period - waited + guard) as i64)
+        } else if waited < guard {
+            start.plus_ns((guard - waited) as i64)
         } else {
             start
         }

@@ -116,14 +116,11 @@ fn a_picture_waits_a_period_and_the_rendering_at_most_and_nothing_beats() {
                 let what =
                     format!("camera {camera_fps}, jitter {jitter_ms}, display {display_hz:?}: {seen:?}");
                 let what = &what[..what.len().min(300)];
-                println!(
-                    "p99 {:.2} render {:.2} doubled {} dropped {} {what:.70}",
-                    seen.p99(),
-                    seen.render_ms,
-                    seen.doubled,
-                    seen.dropped
-                );
-                assert!(seen.p99() <= 1e3 / tick_fps + seen.render_ms + 2.5, "p99 {} ms, {what}", seen.p99());
+                // The hand-over to the display and the guard around arrivals come on top; a tick that follows the camera
+                // needs neither, for its pictures wait half a period at most.
+                let follows = camera_fps != 25.0 && display_hz.is_some_and(|hz| hz > 50.0);
+                let limit_ms = 1e3 / tick_fps + seen.render_ms + if follows { 0.0 } else { 3.0 };
+                assert!(seen.p99() <= limit_ms, "p99 {} ms, {what}", seen.p99());
                 assert_eq!(seen.missed, 0, "{what}");
                 // Pictures beyond the tick's rate cannot be shown, ticks beyond the camera's have no new one; a tick that
                 // follows the camera has neither. Nothing else is dropped or doubled, but for one at the ends.

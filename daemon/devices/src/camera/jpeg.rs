@@ -174,6 +174,8 @@ impl Decoder {
         let pixels = width as usize * height as usize;
         let damaged = |e: zune_jpeg::errors::DecodeErrors| JpegError::Damaged(format!("{e:?}"));
         let bytes = self.pool.filled(PixelFormat::Rgb.byte_len(width, height), |target| {
+            // The decoder may take a damaged picture for a whole one and leave rows as they are: another picture's rows.
+            target.fill(0);
             if !grey {
                 return decoder.decode_into(target).map_err(damaged);
             }

@@ -1,6 +1,7 @@
 //! Buffers of the driver, mapped: lent to the pipeline, and given back by themselves.
 
 use std::{
+    any::Any,
     io,
     os::fd::{AsRawFd, BorrowedFd, OwnedFd},
     ptr::{self, NonNull},
@@ -94,6 +95,10 @@ pub(super) struct LentBuffer {
 impl Lent for LentBuffer {
     fn mapping(&self) -> &[u8] {
         self.mapping.bytes()
+    }
+
+    fn hold(&self) -> Option<Arc<dyn Any + Send + Sync>> {
+        Some(self.mapping.clone())
     }
 }
 

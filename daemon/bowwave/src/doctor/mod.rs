@@ -1,9 +1,11 @@
 //! `bowwave doctor`: checks of this computer, each with what to do about it.
 
+mod configured;
+
 use std::{fmt, path::Path, process::Command};
 
 use anyhow::{Context, Result};
-use bowwave_devices::{camera, serial, trigger};
+use bowwave_devices::{camera, lcd, serial, trigger};
 use serde::Serialize;
 
 use crate::{cache, cli::Doctor};
@@ -55,10 +57,16 @@ fn failed(name: &'static str, error: impl fmt::Display) -> Check {
 
 /// Runs all checks; `true` where none failed.
 pub fn run(arguments: &Doctor) -> Result<bool> {
-    let mut checks = gpus(arguments.gpu.as_deref());
-    checks.extend(cameras(arguments.camera.as_deref()));
-    checks.extend(serial_lines(arguments.imu.as_deref()));
-    checks.extend(triggers(arguments.trigger.as_deref()));
+    let mut checks = Vec::new();
+    if let Some(path) = &arguments.config {
+        checks.extend(configured::checks(path));
+    } else {
+        checks.extend(gpus(arguments.gpu.as_deref()));
+        checks.extend(cameras(arguments.camera.as_deref()));
+        checks.extend(serial_lines(arguments.imu.as_deref()));
+        checks.extend(triggers(arguments.trigger.as_deref()));
+        checks.extend(displays());
+    }
     checks.push(disk());
     checks.push(default_recording());
     checks.push(ffmpeg());
@@ -206,6 +214,30 @@ fn triggers(wanted: Option<&str>) -> Vec<Check> {
         Err(e) => check("trigger", Verdict::Warning, e.to_string()),
     };
     chips.into_iter().map(one).collect()
+}
+
+fn displays() -> Vec<Check> {
+    let found = lcd::list();
+    if found.is_empty() {
+        return vec![check(
+            "lcd",
+            Verdict::Absent,
+            "no display card; simulate runs without, run draws to nobody",
+        )];
+    }
+    let one = |card: Result<lcd::CardInfo, lcd::LcdError>| match card {
+        Ok(card) => {
+            let connectors: Vec<String> = card
+                .connectors
+                .iter()
+                .map(|c| format!("{} {:?}, {} modes", c.name, c.connection, c.modes.len()).to_lowercase())
+                .collect();
+            let found = format!("{} ({}): {}", card.node.display(), card.driver, connectors.join("; "));
+            check("lcd", Verdict::Ok, found)
+        }
+        Err(e) => check("lcd", Verdict::Warning, e.to_string()),
+    };
+    found.into_iter().map(one).collect()
 }
 
 fn disk() -> Check {
