@@ -93,7 +93,7 @@ mod tests {
             assert!((found / exact - 1.0).abs() < 0.0026, "{found} for {exact}");
         }
         assert_eq!(p.max, 100.0);
-        assert_eq!(s.rms(), Some((338_350.0f64 / 100.0).sqrt()).map(round));
+        assert_eq!(s.rms(), Some(round((338_350.0f64 / 100.0).sqrt())));
     }
 
     #[test]

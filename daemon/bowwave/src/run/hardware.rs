@@ -30,6 +30,8 @@ use crate::config::ScreenOutput;
 const HEARTBEAT_MAX_NS: i64 = NS_PER_S;
 /// A trigger held for this long beyond the time that the belt lasts is stuck.
 const STUCK_BEYOND: Duration = Duration::from_secs(3);
+/// The longest that is watched for: nobody holds a trigger for an hour.
+const STUCK_MOST: Duration = Duration::from_secs(3600);
 /// How long the first start waits for the LCD, to draw in its size.
 const LCD_WAIT: Duration = Duration::from_millis(1500);
 
@@ -232,7 +234,7 @@ fn trigger_settings(settings: &Settings, faults: &mut Vec<FaultChange>) -> Optio
     let belt_s = f64::from(weapon.belt) * 60.0 / weapon.rounds_per_minute.max(1.0);
     Some(TriggerSettings {
         debounce: trigger.debounce,
-        stuck_after: Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_BEYOND) + STUCK_BEYOND,
+        stuck_after: (Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_MOST) + STUCK_BEYOND).min(STUCK_MOST),
         interlock: config.interlock.clone(),
         power_fail: config.power_fail.clone(),
         ..TriggerSettings::new(trigger.line.clone())
