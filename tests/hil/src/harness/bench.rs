@@ -1,0 +1,416 @@
+//! The bench: a machine, what the harness knows of it, and the questions that every test asks.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    thread,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, Result, bail, ensure};
+use bowwave_hil::{
+    protocol::{Command, Feed},
+    tape::{Header, Tape},
+};
+use serde_json::Value;
+
+use super::{
+    lcd::Plate,
+    machine::{Machine, Parts, Start},
+};
+
+/// Pictures of the tape. Small, because the machine's processor is emulated.
+pub const PICTURE: (u32, u32) = (256, 144);
+/// Pixels of the LCD: as many as software Vulkan in emulation draws at a steady rate.
+pub const LCD: (u32, u32) = (320, 192);
+/// Length of the disk that the data partition is on: small enough to be filled in seconds.
+const DATA_BYTES: u64 = 640 << 20;
+/// Where the trainer keeps hits.
+pub const STATE: &str = "/var/lib/bowwave";
+/// The file that the trainer writes frames' hashes into.
+pub const HASHES: &str = "/run/bowwave/frames";
+/// The file that the layer which breaks the GPU looks for.
+pub const GPU_FAULT: &str = "/run/bowwave/gpu-fault";
+
+/// What is built once for all machines.
+pub struct Shop {
+    /// For what is left.
+    pub out: PathBuf,
+    /// What machines are made of.
+    pub parts: Parts,
+    /// The tape, without its pictures.
+    pub tape: Header,
+}
+
+impl Shop {
+    /// Makes tape and parts.
+    pub fn open(image: &Path, modules: &Path, out: &Path) -> Result<Self> {
+        fs::create_dir_all(out).with_context(|| out.display().to_string())?;
+        let tape_path = out.join("tape");
+        let tape = match Tape::read(&tape_path) {
+            Ok(tape) => tape,
+            Err(_) => make_tape(&out.join("tape.mcap"), &tape_path)?,
+        };
+        let beside = std::env::current_exe().context("this program's path")?;
+        let mut parts = Parts {
+            image: image.to_owned(),
+            modules: modules.to_owned(),
+            agent: beside.with_file_name("hil-agent"),
+            tape: tape_path,
+            files: vec![
+                ("etc/bowwave.toml".into(), configuration(&Configured::default())),
+                ("etc/calibration.toml".into(), tape.header.calibration_toml.clone()),
+                ("etc/scenario.toml".into(), SCENARIO.to_owned()),
+                ("thermal".into(), "41000\n".to_owned()),
+                ("udev/66-hilcam.rules".into(), CAMERA_RULE.to_owned()),
+            ],
+            blobs: Vec::new(),
+            units: vec![("bowwave.service.d/90-hil.conf".into(), SERVICE.to_owned())],
+        };
+        let layer = beside.with_file_name("libgpu_fault_layer.so");
+        if layer.exists() {
+            let manifest = Path::new("tests/hil/gpu-fault-layer/VkLayer_bowwave_gpu_fault.json");
+            parts.blobs.push(("layer/libgpu_fault_layer.so".into(), layer));
+            parts.blobs.push(("layer/VkLayer_bowwave_gpu_fault.json".into(), manifest.to_owned()));
+        }
+        Ok(Self { out: out.to_owned(), parts, tape: tape.header })
+    }
+
+    /// A fresh data partition.
+    pub fn fresh_data(&self, name: &str) -> Result<PathBuf> {
+        let to = self.out.join(name);
+        let from = self.parts.image.join("data.img");
+        fs::copy(&from, &to).with_context(|| format!("{} to {}", from.display(), to.display()))?;
+        // The file system takes what is free behind it, as on a gun computer's disk.
+        fs::OpenOptions::new().write(true).open(&to)?.set_len(DATA_BYTES)?;
+        Ok(to)
+    }
+}
+
+fn make_tape(recording: &Path, out: &Path) -> Result<Tape> {
+    drop(fs::remove_file(recording));
+    let recipe =
+        hw_sim::make::Recipe { width: PICTURE.0, height: PICTURE.1, ..hw_sim::make::Recipe::default() };
+    hw_sim::make::make(&recipe, recording, &mut |_, _| {})?;
+    let tape = Tape::from_recording(recording)?;
+    tape.write(out)?;
+    Ok(tape)
+}
+
+/// A camera on USB has a serial number; this one gets its own, so that it is found again by it.
+const CAMERA_RULE: &str = r#"SUBSYSTEM=="video4linux", ATTR{name}=="HIL camera", ENV{ID_SERIAL}="HIL_camera_0001", ENV{ID_SERIAL_SHORT}="0001", SYMLINK+="v4l/by-id/usb-HIL_camera_0001-video-index0"
+"#;
+
+/// The machine is slower than any gun computer: patience is scaled, nothing else is changed.
+const SERVICE: &str = "[Service]
+ExecStart=
+ExecStart=/usr/bin/bowwave run --config /run/hil/etc/bowwave.toml --frame-hashes /run/bowwave/frames --print-commits
+# The harness hears of each commit as soon as the program says so.
+StandardOutput=file:/run/hil/output
+StandardError=journal
+WatchdogSec=60
+TimeoutStartSec=600
+TimeoutStopSec=20
+Environment=VK_ADD_LAYER_PATH=/run/hil/layer
+Environment=VK_INSTANCE_LAYERS=VK_LAYER_BOWWAVE_gpu_fault
+Environment=BOWWAVE_GPU_FAULT=/run/bowwave/gpu-fault
+ReadWritePaths=-/run/hil/spare
+";
+
+/// One boat that the tape's gun sweeps over, near enough to be struck, and ammunition for the whole test.
+const SCENARIO: &str = r#"name = "bench"
+[weapon]
+rounds_per_minute = 600
+belt = 400
+dispersion_mrad = 1.0
+[[boat]]
+name = "skiff-1"
+model = "skiff"
+side = "hostile"
+course = "still"
+range_m = 120
+bearing_deg = 0
+heading_deg = 90
+"#;
+
+/// What differs between configurations.
+#[derive(Clone, Debug)]
+pub struct Configured {
+    /// Modes of the camera, preferred first.
+    pub modes: String,
+    /// The calibration's name.
+    pub calibration: String,
+    /// Folder for data, where not the service's own.
+    pub data: Option<String>,
+    /// Whether what goes in is kept.
+    pub record: bool,
+    /// A line of its own.
+    pub extra: String,
+}
+
+impl Default for Configured {
+    fn default() -> Self {
+        let (w, h) = PICTURE;
+        Self {
+            modes: format!("\"YUYV {w}x{h}@30\", \"MJPEG {w}x{h}@30\", \"YUYV {}x{}@30\"", w / 2, h / 2),
+            calibration: "calibration.toml".into(),
+            data: None,
+            record: false,
+            extra: String::new(),
+        }
+    }
+}
+
+/// The trainer's configuration for the bench.
+pub fn configuration(c: &Configured) -> String {
+    let data = c.data.as_ref().map_or_else(String::new, |d| format!("data = \"{d}\"\n"));
+    format!(
+        "[screen]\noutput = \"lcd\"\n[camera]\nmodes = [{}]\n[imu]\nbaud = [921600, 115200]\n\
+         [trigger]\nchip = \"bench\"\nline = \"trigger\"\n[interlock]\nchip = \"bench\"\nline = \"interlock\"\n\
+         [power_fail]\nchip = \"bench\"\nline = \"power-fail\"\n\
+         [lamps]\nchip = \"bench\"\nready = \"lamp-ready\"\nhit = \"lamp-hit\"\nfault = \"lamp-fault\"\n\
+         [files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
+         [health]\nthermal = \"/run/hil/thermal\"\nlimit_c = 78.0\n{}",
+        c.modes, c.calibration, c.record, c.extra
+    )
+}
+
+/// What a line of the journal says of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Told {
+    /// It is there, or has happened.
+    Came,
+    /// It is gone.
+    Went,
+}
+
+/// A running test.
+pub struct Bench {
+    /// The machine.
+    pub machine: Machine,
+    /// How many times slower a core of the machine is than one of the host.
+    pub slow: f64,
+    /// What the tape feeds.
+    pub feed: Feed,
+    /// The tape, without its pictures.
+    pub tape: Header,
+    /// Pulls of the trigger: machine times before and after each edge, pressed.
+    pub pulls: Vec<(i64, i64, bool)>,
+    /// Times of the machine between which no round may be scored.
+    pub blind: Vec<(i64, i64)>,
+    /// For what is left.
+    pub out: PathBuf,
+    /// Number of the unit's adapter that is plugged.
+    pub adapter: u32,
+}
+
+impl Bench {
+    /// Switches a machine on and waits for its agent.
+    pub fn switch_on(shop: &Shop, data: &Path, spare: Option<&Path>, clock: &str) -> Result<Self> {
+        let folder = shop.out.join("machine");
+        let start = Start { folder: &folder, data, spare, lcd: LCD, clock };
+        let mut machine = Machine::start(&shop.parts, &start)?;
+        if let Err(e) = machine.guest.greet(Duration::from_secs(180)) {
+            let console = machine.console();
+            let tail: Vec<&str> = console.lines().rev().take(30).collect();
+            bail!("{e:#}; its console: {}", tail.into_iter().rev().collect::<Vec<_>>().join("\n"));
+        }
+        machine.guest.call(Command::FollowPipe { path: "/run/hil/output".into() })?;
+        machine.guest.call(Command::FollowJournal)?;
+        let (feed, adapter) = (Feed::default(), 0);
+        Ok(Self {
+            machine,
+            slow: 20.0,
+            feed,
+            tape: shop.tape.clone(),
+            pulls: Vec::new(),
+            blind: Vec::new(),
+            out: shop.out.clone(),
+            adapter,
+        })
+    }
+
+    /// Plugs the camera, closes the interlock and plays the tape.
+    pub fn play(&mut self) -> Result<()> {
+        let (w, h) = PICTURE;
+        self.camera(&format!("modes YUYV:{w}x{h}@30 MJPG:{w}x{h}@30 YUYV:{}x{}@30", w / 2, h / 2))?;
+        self.camera("plug 0")?;
+        self.machine.guest.call(Command::Play { on: true })?;
+        Ok(())
+    }
+
+    /// A command for the camera's driver.
+    pub fn camera(&mut self, line: &str) -> Result<i64> {
+        let at = self.machine.guest.now_ns();
+        self.machine.guest.call(Command::Camera { line: line.to_owned() })?;
+        Ok(at)
+    }
+
+    /// Changes how the tape is played; the machine's time of the change.
+    pub fn feed(&mut self, change: impl FnOnce(&mut Feed)) -> Result<i64> {
+        change(&mut self.feed);
+        let at = self.machine.guest.call(Command::Feed(self.feed.clone()))?;
+        at.as_i64().context("a time")
+    }
+
+    /// Sets an input; the machine's time after it.
+    pub fn pull(&mut self, line: usize, high: bool) -> Result<i64> {
+        let times = self.pulls(line, vec![(0, high)])?;
+        Ok(times.last().map_or(0, |t| t[1]))
+    }
+
+    /// Sets an input step after step.
+    pub fn pulls(&mut self, line: usize, steps: Vec<(u64, bool)>) -> Result<Vec<[i64; 2]>> {
+        let value = self.machine.guest.call(Command::Pull { line, steps: steps.clone() })?;
+        let times: Vec<[i64; 2]> = serde_json::from_value(value)?;
+        if line == 0 {
+            let edges = times.iter().zip(&steps);
+            self.pulls.extend(edges.map(|([before, after], (_, high))| (*before, *after, *high)));
+        }
+        Ok(times)
+    }
+
+    /// Pulls the trigger for a while; the machine's time of the press.
+    pub fn shoot(&mut self, for_ms: u64) -> Result<i64> {
+        let times = self.pulls(0, vec![(0, true), (for_ms * 1000, false)])?;
+        Ok(times[0][0])
+    }
+
+    /// Waits until the journal says that the fault came or went, at `since_ns` or later; the machine's time of that.
+    pub fn told(&self, code: &str, told: Told, since_ns: i64, patience: Duration) -> Result<i64> {
+        let what = format!("{code} {told:?} in the journal");
+        let entry =
+            self.machine.guest.journal(since_ns, patience, &what, |e| says(&e.fields, code) == Some(told))?;
+        Ok(entry.at_ns)
+    }
+
+    /// What the LCD says, by the service's status line.
+    pub fn status(&mut self) -> Result<String> {
+        let argv = ["/bin/systemctl", "show", "-P", "StatusText", "bowwave.service"];
+        Ok(self.machine.guest.run(&argv)?.trim().to_owned())
+    }
+
+    /// Waits for a state on the LCD itself, seen at `since` or later.
+    pub fn lcd(
+        &self,
+        since: Instant,
+        patience: Duration,
+        what: &str,
+        wanted: impl Fn(Plate, bool) -> bool,
+    ) -> Result<Instant> {
+        let until = Instant::now() + patience;
+        loop {
+            if let Some(sight) = self.machine.lcd.first(since, |s| wanted(s.plate, s.warning)) {
+                return Ok(sight.at);
+            }
+            if Instant::now() > until {
+                bail!(
+                    "{what} was not seen on the LCD within {:.0} s, only {:?}",
+                    patience.as_secs_f64(),
+                    self.machine.lcd.last()
+                );
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits until the LCD says READY, or HIT or MISS, which follow it, and no warning.
+    pub fn ready(&self, patience: Duration) -> Result<Instant> {
+        self.lcd(Instant::now(), patience, "READY", |plate, warning| plate == Plate::Ready && !warning)
+    }
+
+    /// Compares the LCD with the frames' hashes that the trainer keeps; how many of so many pictures were found.
+    pub fn identical(&mut self, pictures: usize) -> Result<(usize, usize)> {
+        let mut seen = Vec::new();
+        let until = Instant::now() + Duration::from_secs(10);
+        while seen.len() < pictures && Instant::now() < until {
+            let hash = self.machine.lcd.newest().context("no picture of the LCD")?.hash();
+            if !seen.contains(&hash) {
+                seen.push(hash);
+            }
+            thread::sleep(Duration::from_millis(30));
+        }
+        let ring = self.machine.guest.run(&["/bin/cat", HASHES])?;
+        let known: Vec<&str> = ring.lines().filter_map(|l| l.split_whitespace().nth(1)).collect();
+        ensure!(!known.is_empty(), "{HASHES} is empty");
+        Ok((seen.iter().filter(|h| known.contains(&h.as_str())).count(), seen.len()))
+    }
+
+    /// The rounds of all runs in the journal of hits.
+    pub fn rounds(&mut self) -> Result<Vec<Value>> {
+        let (code, out, err) = self
+            .machine
+            .guest
+            .run_any(&["/usr/bin/bowwave", "hits", "--json", "--all-runs", STATE], Duration::from_secs(90))?;
+        ensure!(code == 0, "bowwave hits: exit code {code}: {err}");
+        serde_json::from_str(&out).context("bowwave hits")
+    }
+
+    /// Restarts or stops or starts the trainer.
+    pub fn service(&mut self, verb: &str) -> Result<()> {
+        self.machine.guest.run(&["/bin/systemctl", "--no-block", verb, "bowwave.service"]).map(|_| ())
+    }
+
+    /// Writes the trainer's configuration.
+    pub fn configure(&mut self, c: &Configured) -> Result<()> {
+        let (path, text) = ("/run/hil/etc/bowwave.toml".to_owned(), configuration(c));
+        self.machine.guest.call(Command::Write { path, text }).map(|_| ())
+    }
+
+    /// A native time in the machine's terms, at most.
+    pub fn scaled(&self, seconds: f64) -> Duration {
+        Duration::from_secs_f64(seconds * self.slow)
+    }
+
+    /// Keeps the LCD's picture under a name.
+    pub fn keep_picture(&self, name: &str) {
+        if let Some(dump) = self.machine.lcd.newest() {
+            drop(fs::create_dir_all(self.out.join("lcd")));
+            if let Err(e) = dump.save(&self.out.join("lcd").join(format!("{name}.png"))) {
+                eprintln!("{e:#}");
+            }
+        }
+    }
+}
+
+/// What fields of the journal say of a fault.
+pub fn says(fields: &Value, code: &str) -> Option<Told> {
+    let field = |name: &str| fields[name].as_str().unwrap_or_default();
+    let message = field("MESSAGE");
+    let named = match field("FAULT_CODE") {
+        "" => message.split_whitespace().next().unwrap_or_default(),
+        named => named,
+    };
+    if named != code {
+        return None;
+    }
+    let over = message.get(code.len()..).is_some_and(|rest| rest.starts_with(" over "));
+    Some(if field("FAULT_STATE") == "cleared" || over { Told::Went } else { Told::Came })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn the_journal_is_understood() {
+        let raised = json!({ "FAULT_CODE": "CAM_LOST", "FAULT_STATE": "raised", "MESSAGE": "CAM_LOST gone" });
+        assert_eq!(says(&raised, "CAM_LOST"), Some(Told::Came));
+        assert_eq!(says(&raised, "CAM"), None);
+        let cleared = json!({ "MESSAGE": "CAM_LOST over after 1.203 s" });
+        assert_eq!(says(&cleared, "CAM_LOST"), Some(Told::Went));
+        assert_eq!(says(&json!({ "MESSAGE": "it is CAM_LOST" }), "CAM_LOST"), None);
+    }
+
+    #[test]
+    fn the_configuration_is_one_that_the_trainer_takes() {
+        let text =
+            configuration(&Configured { data: Some("/run/hil/spare".into()), ..Configured::default() });
+        bowwave::config::parse(&text, "bench", Path::new("/")).unwrap();
+        assert!(
+            configuration(&Configured { extra: "[camera".into(), ..Configured::default() })
+                .ends_with("[camera")
+        );
+    }
+}

@@ -1,0 +1,302 @@
+//! Faults of the camera. The driver is the bench's own (`modules/hilcam.c`), on the kernel's videobuf2 as uvcvideo is.
+
+use std::{thread, time::Duration};
+
+use anyhow::{Result, ensure};
+use bowwave_hil::protocol::Command;
+
+use super::{Case, Own, Row, Seen, Shown};
+use crate::bench::{Bench, Configured, PICTURE, Told};
+
+const EBUSY: i32 = 16;
+const EPROTO: i32 = 71;
+
+fn quiet(bench: &mut Bench) -> Result<i64> {
+    bench.feed(|f| {
+        *f = bowwave_hil::protocol::Feed { trigger: f.trigger, lead_ns: f.lead_ns, ..Default::default() }
+    })
+}
+
+fn modes() -> String {
+    let (w, h) = PICTURE;
+    format!("YUYV:{w}x{h}@30 MJPG:{w}x{h}@30 YUYV:{}x{}@30", w / 2, h / 2)
+}
+
+/// The camera goes while rounds are fired: none of them may be scored.
+fn unplug_shooting(bench: &mut Bench) -> Result<i64> {
+    let at = bench.camera("unplug")?;
+    thread::sleep(Duration::from_millis(400));
+    let from = bench.shoot(300)?;
+    bench.blind.push((from, bench.machine.guest.now_ns()));
+    Ok(at)
+}
+
+pub fn rows() -> Vec<Row> {
+    vec![
+        Row::Case(Case {
+            number: "1",
+            fault: "Camera unplugged",
+            injected: "driver unregisters the device while it streams; a burst is fired meanwhile",
+            code: "CAM_LOST",
+            shown: Shown::NotScored("CAMERA LOST"),
+            seen_s: Some(0.1),
+            back_s: Some(1.0),
+            lasts: true,
+            stays_s: 0.5,
+            inject: unplug_shooting,
+            end: |b| b.camera("plug 0"),
+        }),
+        Row::Own(Own {
+            number: "2",
+            fault: "Camera back as another node",
+            injected: "unregistered as /dev/video0, registered as /dev/video7",
+            code: "CAM_RENUM",
+            target: "back 1 s",
+            run: renumbered,
+        }),
+        Row::Case(Case {
+            number: "3",
+            fault: "Camera stalls without an error",
+            injected: "no picture is delivered, the queue stays whole",
+            code: "CAM_STALL",
+            shown: Shown::NotScored("CAMERA STALLED"),
+            seen_s: Some(0.1),
+            back_s: Some(2.0),
+            lasts: true,
+            stays_s: 1.0,
+            inject: |b| b.feed(|f| f.stall = true),
+            end: quiet,
+        }),
+        Row::Case(Case {
+            number: "4",
+            fault: "Shock: permanent EPROTO",
+            injected: "the queue fails, and then starting to stream answers EPROTO",
+            code: "CAM_EPROTO",
+            shown: Shown::NotScored("CAMERA LINK BROKEN"),
+            seen_s: None,
+            back_s: Some(5.0),
+            lasts: true,
+            stays_s: 1.0,
+            inject: |b| {
+                b.camera(&format!("fail streamon {EPROTO}"))?;
+                b.camera("fail queue")
+            },
+            end: |b| b.camera("fail streamon 0"),
+        }),
+        Row::Own(Own {
+            number: "5",
+            fault: "Buffer with the error flag",
+            injected: "30 % of the buffers carry V4L2_BUF_FLAG_ERROR",
+            code: "-",
+            target: "next frame: READY throughout",
+            run: |b| goes_on(b, |f| f.flagged = 0.3),
+        }),
+        Row::Case(Case {
+            number: "7",
+            fault: "EIO from the queue",
+            injected: "videobuf2's queue fails until streaming is started anew",
+            code: "CAM_QUEUE",
+            shown: Shown::Nothing,
+            seen_s: None,
+            back_s: Some(0.5),
+            lasts: true,
+            stays_s: 0.0,
+            inject: |b| b.camera("fail queue"),
+            end: |b| Ok(b.machine.guest.now_ns()),
+        }),
+        Row::Case(Case {
+            number: "8",
+            fault: "Format or size changed",
+            injected: "unplugged, and back with half the size only",
+            code: "CAM_FORMAT",
+            shown: Shown::Fault("CAL LOST"),
+            seen_s: None,
+            back_s: Some(1.0),
+            lasts: true,
+            stays_s: 0.5,
+            inject: |b| {
+                b.camera("unplug")?;
+                let (w, h) = PICTURE;
+                b.camera(&format!("modes YUYV:{}x{}@30", w / 2, h / 2))?;
+                b.camera("plug 0")
+            },
+            end: |b| {
+                b.camera("unplug")?;
+                b.camera(&format!("modes {}", modes()))?;
+                b.camera("plug 0")
+            },
+        }),
+        Row::Case(Case {
+            number: "9",
+            fault: "Device busy",
+            injected: "unplugged, and back answering EBUSY as with another owner",
+            code: "CAM_BUSY",
+            shown: Shown::NotScored("CAMERA IN USE"),
+            seen_s: None,
+            back_s: Some(1.0),
+            lasts: true,
+            stays_s: 0.5,
+            inject: |b| {
+                b.camera(&format!("fail control {EBUSY}"))?;
+                b.camera("unplug")?;
+                b.camera("plug 0")
+            },
+            end: |b| b.camera("fail control 0"),
+        }),
+        Row::Own(Own {
+            number: "10",
+            fault: "No bandwidth (ENOSPC)",
+            injected: "starting modes of more than 1 MB/s answers ENOSPC",
+            code: "CAM_BW",
+            target: "smaller mode in 2 s",
+            run: no_bandwidth,
+        }),
+        Row::Case(Case {
+            number: "11",
+            fault: "Camera timestamps backward",
+            injected: "20 % of the pictures are stamped a second back",
+            code: "CAM_TS",
+            shown: Shown::Nothing,
+            seen_s: None,
+            back_s: None,
+            lasts: false,
+            stays_s: 1.0,
+            inject: |b| b.feed(|f| f.backwards = 0.2),
+            end: quiet,
+        }),
+        Row::Case(Case {
+            number: "13",
+            fault: "Lens covered, image frozen",
+            injected: "the same picture again and again",
+            code: "CAM_STATIC",
+            shown: Shown::Warning("PICTURE FROZEN"),
+            seen_s: Some(1.0),
+            back_s: Some(1.0),
+            lasts: true,
+            stays_s: 0.5,
+            inject: |b| b.feed(|f| f.freeze = true),
+            end: quiet,
+        }),
+        Row::Own(Own {
+            number: "5b",
+            fault: "Camera lies about its format",
+            injected: "20 % of the pictures have half the bytes",
+            code: "-",
+            target: "next frame: READY throughout",
+            run: |b| goes_on(b, |f| f.short = 0.2),
+        }),
+        Row::Case(Case {
+            number: "6",
+            fault: "Truncated or corrupt MJPEG",
+            injected: "the camera offers MJPEG only; then 60 % of the pictures are cut or scrambled",
+            code: "CAM_CORRUPT",
+            shown: Shown::Warning("PICTURES DAMAGED"),
+            seen_s: None,
+            back_s: None,
+            lasts: true,
+            stays_s: 0.5,
+            inject: |b| {
+                let (w, h) = PICTURE;
+                b.camera("unplug")?;
+                b.camera(&format!("modes MJPG:{w}x{h}@30"))?;
+                b.camera("plug 0")?;
+                thread::sleep(b.scaled(0.1));
+                b.ready(b.scaled(1.0) + Duration::from_secs(20))?;
+                b.feed(|f| f.corrupt = 0.6)
+            },
+            end: |b| {
+                let at = quiet(b)?;
+                b.told("CAM_CORRUPT", Told::Went, at, b.scaled(2.0))?;
+                b.camera("unplug")?;
+                b.camera(&format!("modes {}", modes()))?;
+                b.camera("plug 0")?;
+                Ok(at)
+            },
+        }),
+        Row::Own(Own {
+            number: "12",
+            fault: "Another camera than the one calibrated",
+            injected: "a calibration of another size is configured, SIGHUP",
+            code: "CAL_MISMATCH",
+            target: "until recalibrated",
+            run: mismatch,
+        }),
+    ]
+}
+
+/// READY throughout, and no fault in the journal.
+fn goes_on(bench: &mut Bench, change: fn(&mut bowwave_hil::protocol::Feed)) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.feed(change)?;
+    let since = std::time::Instant::now();
+    thread::sleep(Duration::from_secs(5));
+    let status = bench.status()?;
+    quiet(bench)?;
+    let lost = bench.machine.lcd.first(since, |s| s.plate == crate::lcd::Plate::NotScored);
+    let said: Vec<String> = bench
+        .machine
+        .guest
+        .journal_since(from)
+        .iter()
+        .filter(|e| e.fields["FAULT_STATE"] == "raised")
+        .map(|e| e.text().to_owned())
+        .collect();
+    let met = lost.is_none() && said.is_empty() && status.starts_with("READY");
+    Ok(Seen { lcd: status, met, note: said.join("; "), ..Seen::default() })
+}
+
+fn renumbered(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.camera("unplug")?;
+    bench.told("CAM_LOST", Told::Came, from, bench.scaled(1.0))?;
+    let lcd = bench.status()?;
+    let plugged = bench.camera("plug 7")?;
+    let renamed = bench.told("CAM_RENUM", Told::Came, plugged, bench.scaled(2.0))?;
+    let back = bench.told("CAM_LOST", Told::Went, plugged, bench.scaled(2.0))?;
+    bench.ready(bench.scaled(2.0))?;
+    let back_s = (back.max(renamed) - plugged) as f64 * 1e-9;
+    bench.camera("unplug")?;
+    bench.settle()?;
+    Ok(Seen { lcd, back_s: Some(back_s), met: back_s <= bench.slow, ..Seen::default() })
+}
+
+fn no_bandwidth(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.machine.guest.now_ns();
+    bench.camera("bandwidth 1000000")?;
+    bench.camera("unplug")?;
+    let plugged = bench.camera("plug 0")?;
+    let told = bench.told("CAM_BW", Told::Came, from, bench.scaled(3.0))?;
+    let state = bench.machine.guest.call(Command::CameraState)?;
+    let lcd = bench.status()?;
+    bench.keep_picture("row-10");
+    bench.camera("unplug")?;
+    bench.settle()?;
+    ensure!(
+        state["streaming"] == 1 && state["width"] == PICTURE.0 / 2,
+        "it does not stream the smaller mode: {state}"
+    );
+    let seen_s = (told - plugged) as f64 * 1e-9;
+    Ok(Seen { lcd, seen_s: Some(seen_s), met: seen_s <= 2.0 * bench.slow, ..Seen::default() })
+}
+
+fn mismatch(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let (w, h) = (PICTURE.0.to_string(), PICTURE.1.to_string());
+    // The lens of another camera.
+    let other = hw_sim::make::Recipe { width: PICTURE.0 * 2, height: PICTURE.1 * 2, ..Default::default() };
+    let text = bowwave_calibration::to_toml(&hw_sim::make::calibration(&other));
+    let path = "/run/hil/etc/other.toml".to_owned();
+    bench.machine.guest.call(Command::Write { path, text })?;
+    bench.configure(&Configured { calibration: "other.toml".into(), ..Configured::default() })?;
+    let from = bench.machine.guest.now_ns();
+    bench.service("reload")?;
+    let told = bench.told("CAL_MISMATCH", Told::Came, from, bench.scaled(2.0));
+    let lcd = bench.status()?;
+    bench.keep_picture("row-12");
+    bench.configure(&Configured::default())?;
+    bench.service("reload")?;
+    bench.settle()?;
+    told?;
+    Ok(Seen { met: lcd.contains("CAL"), lcd, note: format!("the camera has {w}x{h}"), ..Seen::default() })
+}

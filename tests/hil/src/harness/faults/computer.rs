@@ -1,0 +1,411 @@
+//! Faults of the computer: clock, heat, screen, GPU, disk, and the program itself.
+
+use std::{
+    thread,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, Result, ensure};
+use bowwave_hil::protocol::Command;
+
+use super::{Case, Own, Row, Seen, Shown};
+use crate::{
+    bench::{Bench, Configured, GPU_FAULT, STATE, Told},
+    lcd::Plate,
+};
+
+fn write(bench: &mut Bench, path: &str, text: &str) -> Result<i64> {
+    bench.machine.guest.call(Command::Write { path: path.into(), text: text.into() })?;
+    Ok(bench.machine.guest.now_ns())
+}
+
+fn shell(bench: &mut Bench, line: &str) -> Result<i64> {
+    bench.machine.guest.shell(line)?;
+    Ok(bench.machine.guest.now_ns())
+}
+
+pub fn rows() -> Vec<Row> {
+    let mut all = clock_and_heat();
+    all.extend(screen_and_disk());
+    all.extend(program());
+    all.extend(absent());
+    all
+}
+
+fn clock_and_heat() -> Vec<Row> {
+    vec![
+        Row::Own(Own {
+            number: "26",
+            fault: "No clock battery",
+            injected: "the machine started with its hardware clock at 2020; then the clock is set",
+            code: "CLK_UNSET",
+            target: "warning until set",
+            run: clock_unset,
+        }),
+        Row::Own(Own {
+            number: "25",
+            fault: "Wall clock steps an hour",
+            injected: "date --set '+1 hour', and back",
+            code: "CLK_STEP",
+            target: "no missed frame: READY throughout",
+            run: clock_step,
+        }),
+        Row::Case(Case {
+            number: "36",
+            fault: "Thermal throttling",
+            injected: "the configured temperature file says 95 C",
+            code: "THERMAL",
+            shown: Shown::Warning("HOT"),
+            seen_s: None,
+            back_s: None,
+            lasts: true,
+            stays_s: 0.5,
+            inject: |b| write(b, "/run/hil/thermal", "95000\n"),
+            end: |b| write(b, "/run/hil/thermal", "41000\n"),
+        }),
+    ]
+}
+
+fn screen_and_disk() -> Vec<Row> {
+    vec![
+        Row::Own(Own {
+            number: "29",
+            fault: "LCD unplugged and back",
+            injected: "the connector's status is forced off in sysfs, and detected again",
+            code: "DISP_LOST",
+            target: "back 2 s",
+            run: lcd_unplugged,
+        }),
+        Row::Case(Case {
+            number: "30",
+            fault: "Disk full",
+            injected: "a file takes all of the data partition",
+            code: "DISK_FULL",
+            shown: Shown::Warning("REC: DISK FULL"),
+            seen_s: None,
+            back_s: None,
+            lasts: true,
+            stays_s: 1.0,
+            inject: |b| {
+                let at = shell(
+                    b,
+                    "dd if=/dev/zero of=/data/fill bs=1M 2>/dev/null; dd if=/dev/zero of=/data/fill2 bs=4k 2>/dev/null; true",
+                )?;
+                b.shoot(400)?;
+                Ok(at)
+            },
+            end: |b| shell(b, "rm -f /data/fill /data/fill2"),
+        }),
+        Row::Case(Case {
+            number: "31",
+            fault: "File system read-only",
+            injected: "all disks are remounted read-only (SysRq), later the data partition writable",
+            code: "DISK_RO",
+            shown: Shown::Warning("REC: DISK READ-ONLY"),
+            seen_s: None,
+            back_s: None,
+            lasts: true,
+            stays_s: 1.0,
+            inject: |b| {
+                let at = shell(b, "echo u > /proc/sysrq-trigger; sleep 0.5")?;
+                b.shoot(400)?;
+                Ok(at)
+            },
+            end: |b| shell(b, "mount -o remount,rw /data"),
+        }),
+    ]
+}
+
+fn program() -> Vec<Row> {
+    vec![
+        Row::Own(Own {
+            number: "41",
+            fault: "Bad configuration",
+            injected: "an unknown key, SIGHUP; then the good one, SIGHUP",
+            code: "CFG",
+            target: "last good one kept, line:column in the journal",
+            run: bad_configuration,
+        }),
+        Row::Own(Own {
+            number: "27",
+            fault: "Vulkan device lost",
+            injected: "a Vulkan layer answers VK_ERROR_DEVICE_LOST",
+            code: "GPU_LOST",
+            target: "rebuilt in 2 s",
+            run: gpu_lost,
+        }),
+        Row::Own(Own {
+            number: "28",
+            fault: "GPU hangs",
+            injected: "a Vulkan layer never carries out what is submitted",
+            code: "GPU_HANG",
+            target: "restart, pictures again",
+            run: gpu_hang,
+        }),
+        Row::Own(Own {
+            number: "38",
+            fault: "SIGTERM",
+            injected: "systemctl stop",
+            code: "STOP",
+            target: "0.5 s",
+            run: stop,
+        }),
+        Row::Own(Own {
+            number: "33",
+            fault: "Database corrupt",
+            injected: "while the trainer is off, bytes within hits.sqlite are overwritten",
+            code: "DB_QUARANTINE",
+            target: "fresh one, old kept",
+            run: database,
+        }),
+        Row::Own(Own {
+            number: "39",
+            fault: "A thread hangs",
+            injected: "the camera's thread is stopped with ptrace for 60 s",
+            code: "WATCHDOG",
+            target: "systemd restarts the trainer",
+            run: hang,
+        }),
+        Row::Own(Own {
+            number: "40",
+            fault: "Crash loop",
+            injected: "SIGKILL as soon as it runs, four times",
+            code: "CRASHLOOP",
+            target: "SAFE MODE",
+            run: crash_loop,
+        }),
+    ]
+}
+
+fn absent() -> Vec<Row> {
+    vec![
+        Row::Not(
+            "34",
+            "fsync fails",
+            "the journal's tests of every write, where a file system that fails is put beneath SQLite, cover it",
+        ),
+        Row::Not(
+            "35",
+            "Recording cut short",
+            "no device is involved: tests/tests/bad_input.rs cuts recordings, and `recover` reads them",
+        ),
+        Row::Not(
+            "42",
+            "Network down",
+            "the gun computer has no network: nothing is queued because nothing is sent",
+        ),
+    ]
+}
+
+fn clock_unset(bench: &mut Bench) -> Result<Seen> {
+    let told = bench.told("CLK_UNSET", Told::Came, 0, Duration::from_secs(5))?;
+    let lcd = bench.status()?;
+    let set = shell(bench, "date -u -s '2026-06-01 12:00:00'")?;
+    let went = bench.told("CLK_UNSET", Told::Went, set - 2_000_000_000, bench.scaled(1.0))?;
+    let note = format!("told {:.1} s after the kernel's start", told as f64 * 1e-9);
+    Ok(Seen {
+        met: lcd.contains("CLOCK NOT SET"),
+        lcd,
+        back_s: Some((went - set) as f64 * 1e-9),
+        note,
+        ..Seen::default()
+    })
+}
+
+fn clock_step(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let since = Instant::now();
+    let from = bench.machine.guest.now_ns();
+    shell(bench, "date -s '+1 hour'")?;
+    bench.told("CLK_STEP", Told::Came, from, bench.scaled(1.0))?;
+    let between = bench.machine.guest.now_ns();
+    shell(bench, "date -s '-1 hour'")?;
+    bench.told("CLK_STEP", Told::Came, between, bench.scaled(1.0))?;
+    let lcd = bench.status()?;
+    let lost = bench.machine.lcd.first(since, |s| s.plate == Plate::NotScored || s.plate == Plate::Fault);
+    Ok(Seen { met: lost.is_none() && lcd.starts_with("READY"), lcd, ..Seen::default() })
+}
+
+fn lcd_unplugged(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let path =
+        bench.machine.guest.shell("ls -d /sys/class/drm/card*-Virtual-1/status | head -1")?.trim().to_owned();
+    let from = write(bench, &path, "off")?;
+    let told = bench.told("DISP_LOST", Told::Came, from, bench.scaled(2.0));
+    thread::sleep(Duration::from_secs(1));
+    let back = write(bench, &path, "detect")?;
+    let over = bench.told("DISP_LOST", Told::Went, back, bench.scaled(2.0))?;
+    let seen = bench
+        .lcd(bench.machine.guest.host_time(back), bench.scaled(2.0), "READY", |p, _| p == Plate::Ready)?;
+    let told = told?;
+    let back_s = ((over - back) as f64 * 1e-9)
+        .max(seen.saturating_duration_since(bench.machine.guest.host_time(back)).as_secs_f64());
+    let note = format!("noticed after {:.0} ms", (told - from) as f64 * 1e-6);
+    Ok(Seen {
+        lcd: "-".into(),
+        back_s: Some(back_s),
+        met: back_s <= 2.0 * bench.slow,
+        note,
+        ..Seen::default()
+    })
+}
+
+fn bad_configuration(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.machine.guest.now_ns();
+    bench.configure(&Configured { extra: "no_such_key = 1\n".into(), ..Configured::default() })?;
+    bench.service("reload")?;
+    let told = bench.told("CFG", Told::Came, from, bench.scaled(2.0));
+    thread::sleep(Duration::from_secs(2));
+    let lcd = bench.status()?;
+    let lines = bench.machine.guest.journal_since(from);
+    let place =
+        lines.iter().map(|e| e.text()).find(|t| t.contains("bowwave.toml:")).unwrap_or_default().to_owned();
+    let between = bench.machine.guest.now_ns();
+    bench.configure(&Configured::default())?;
+    bench.service("reload")?;
+    let went = bench.told("CFG", Told::Went, between, bench.scaled(2.0));
+    bench.settle()?;
+    told?;
+    went?;
+    Ok(Seen {
+        met: lcd.contains("CONFIGURATION REFUSED") && !place.is_empty(),
+        lcd,
+        note: place,
+        ..Seen::default()
+    })
+}
+
+fn gpu(bench: &mut Bench, fault: &str, code: &str) -> Result<(i64, i64, String)> {
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.machine.guest.now_ns();
+    // The trainer's user deletes it.
+    let line = format!(
+        "echo {fault} > {GPU_FAULT}.new && chown bowwave {GPU_FAULT}.new && mv {GPU_FAULT}.new {GPU_FAULT}"
+    );
+    let caused = shell(bench, &line)?;
+    let told = bench.told(code, Told::Came, from, bench.scaled(3.0))?;
+    let lcd = bench.status()?;
+    Ok((caused, told, lcd))
+}
+
+fn gpu_lost(bench: &mut Bench) -> Result<Seen> {
+    let (caused, told, lcd) = gpu(bench, "lost", "GPU_LOST")?;
+    let back = bench.told("GPU_LOST", Told::Went, caused, bench.scaled(4.0))?;
+    bench.settle()?;
+    let back_s = (back - told) as f64 * 1e-9;
+    Ok(Seen { lcd, back_s: Some(back_s), met: back_s <= 2.0 * bench.slow, ..Seen::default() })
+}
+
+fn gpu_hang(bench: &mut Bench) -> Result<Seen> {
+    let (_, told, lcd) = gpu(bench, "hang", "GPU_HANG")?;
+    thread::sleep(Duration::from_secs(2));
+    let ready = bench.ready(bench.scaled(15.0))?;
+    let back_s = ready.saturating_duration_since(bench.machine.guest.host_time(told)).as_secs_f64();
+    Ok(Seen { lcd, back_s: Some(back_s), met: back_s <= 15.0 * bench.slow, ..Seen::default() })
+}
+
+/// The trainer is off: seconds that it took by systemd's account.
+fn off(bench: &mut Bench) -> Result<f64> {
+    let begun = Instant::now();
+    bench.service("stop")?;
+    let until = Instant::now() + Duration::from_secs(60);
+    while bench.machine.guest.run(&["/bin/systemctl", "show", "-P", "ActiveState", "bowwave.service"])?.trim()
+        != "inactive"
+    {
+        ensure!(Instant::now() < until, "the trainer does not stop");
+    }
+    Ok(begun.elapsed().as_secs_f64())
+}
+
+fn on(bench: &mut Bench) -> Result<()> {
+    bench.service("start")?;
+    bench.ready(bench.scaled(15.0)).map(|_| ())
+}
+
+fn stop(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.machine.guest.now_ns();
+    off(bench)?;
+    let lines = bench.machine.guest.journal_since(from);
+    let at = |text: &str| lines.iter().find(|e| e.text().starts_with(text)).map(|e| e.at_ns);
+    let begun = at("Stopping bowwave.service").context("systemd's line of the beginning")?;
+    let ended = at("Stopped bowwave.service")
+        .or_else(|| at("bowwave.service: Deactivated"))
+        .context("systemd's line of the end")?;
+    let told = lines.iter().any(|e| crate::bench::says(&e.fields, "STOP") == Some(Told::Came));
+    let seconds = (ended - begun) as f64 * 1e-9;
+    let clean =
+        !lines.iter().any(|e| e.text().contains("Failed with result") || e.text().contains("timed out"));
+    let note =
+        format!("{seconds:.2} s from systemd's request to its end{}", if clean { "" } else { ", not clean" });
+    Ok(Seen {
+        lcd: "-".into(),
+        back_s: Some(seconds),
+        met: told && clean && seconds <= 0.5 * bench.slow,
+        note,
+        ..Seen::default()
+    })
+}
+
+fn database(bench: &mut Bench) -> Result<Seen> {
+    let path = format!("{STATE}/hits.sqlite");
+    shell(bench, &format!("rm -f {path}-wal {path}-shm"))?;
+    bench.machine.guest.call(Command::Patch { path, offset: 0, count: 8192 })?;
+    let from = bench.machine.guest.now_ns();
+    bench.service("start")?;
+    let told = bench.told("DB_QUARANTINE", Told::Came, from, bench.scaled(15.0))?;
+    bench
+        .lcd(Instant::now(), bench.scaled(15.0), "a state", |p, _| p != Plate::Black && p != Plate::Plain)?;
+    let lcd = bench.status()?;
+    bench.keep_picture("row-33");
+    let kept = bench.machine.guest.shell(&format!("ls {STATE}"))?.replace('\n', " ");
+    let met = lcd.contains("NEW HIT JOURNAL")
+        && kept.split(' ').filter(|n| n.starts_with("hits.sqlite")).count() >= 2;
+    let seen_s = (told - from) as f64 * 1e-9;
+    // The warning lasts as long as the run.
+    off(bench)?;
+    on(bench)?;
+    Ok(Seen { lcd, seen_s: Some(seen_s), met, note: kept, ..Seen::default() })
+}
+
+fn main_pid(bench: &mut Bench) -> Result<u64> {
+    let pid = bench.machine.guest.run(&["/bin/systemctl", "show", "-P", "MainPID", "bowwave.service"])?;
+    pid.trim().parse().context("a process")
+}
+
+fn hang(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let before = main_pid(bench)?;
+    let from = bench.machine.guest.now_ns();
+    bench
+        .machine
+        .guest
+        .call_within(Command::Hold { thread: "camera".into(), ms: 60_000 }, Duration::from_secs(100))?;
+    let lines = bench.machine.guest.journal_since(from);
+    let own = lines.iter().any(|e| crate::bench::says(&e.fields, "WATCHDOG") == Some(Told::Came));
+    let systemd = lines.iter().any(|e| e.text().to_lowercase().contains("watchdog timeout"));
+    bench.ready(bench.scaled(15.0))?;
+    let after = main_pid(bench)?;
+    let note = format!("told by the trainer: {own}, by systemd: {systemd}; process {before}, then {after}");
+    Ok(Seen { lcd: "frozen".into(), met: systemd && after != before, note, ..Seen::default() })
+}
+
+fn crash_loop(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.machine.guest.now_ns();
+    for _ in 0..4 {
+        let line = "for i in $(seq 100); do [ -s /run/bowwave/starts ] && break; sleep 0.1; done; sleep 0.5; systemctl kill -s KILL bowwave.service";
+        bench.machine.guest.shell(line)?;
+        thread::sleep(Duration::from_millis(1500));
+    }
+    let told = bench.told("CRASHLOOP", Told::Came, from, bench.scaled(10.0))?;
+    let at = bench.machine.guest.host_time(told);
+    bench.lcd(at, bench.scaled(10.0), "FAULT", |p, _| p == Plate::Fault)?;
+    thread::sleep(Duration::from_secs(1));
+    let lcd = bench.status()?;
+    bench.keep_picture("row-40");
+    off(bench)?;
+    on(bench)?;
+    Ok(Seen { met: lcd.contains("SAFE MODE"), lcd, ..Seen::default() })
+}

@@ -1,0 +1,328 @@
+//! The faults of the field, as a table: how each is injected, what must be seen, how soon.
+
+mod camera;
+mod computer;
+mod trigger;
+mod unit;
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail};
+
+use crate::{
+    bench::{Bench, Told},
+    lcd::Plate,
+};
+
+/// What the LCD must show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shown {
+    /// Amber NOT SCORED with this cause.
+    NotScored(&'static str),
+    /// Red FAULT with this cause.
+    Fault(&'static str),
+    /// A warning with this cause, training goes on.
+    Warning(&'static str),
+    /// Nothing: training goes on as if nothing were.
+    Nothing,
+}
+
+/// A row that is injected, seen, ended and recovered from.
+pub struct Case {
+    /// Number in the list of faults, and a letter where there are several.
+    pub number: &'static str,
+    /// The fault.
+    pub fault: &'static str,
+    /// How it is injected.
+    pub injected: &'static str,
+    /// Code that the journal must carry.
+    pub code: &'static str,
+    /// What the LCD must show.
+    pub shown: Shown,
+    /// Within so many seconds on a gun computer it must be seen.
+    pub seen_s: Option<f64>,
+    /// Within so many seconds after the cause is gone it must be over.
+    pub back_s: Option<f64>,
+    /// Whether it lasts (raised and cleared) or only happens (noted).
+    pub lasts: bool,
+    /// For so long the cause stays after it was seen, seconds.
+    pub stays_s: f64,
+    /// Brings the cause about; the machine's time of that.
+    pub inject: fn(&mut Bench) -> Result<i64>,
+    /// Takes the cause away; the machine's time of that.
+    pub end: fn(&mut Bench) -> Result<i64>,
+}
+
+/// A row of another kind.
+pub struct Own {
+    /// As for [`Case`].
+    pub number: &'static str,
+    /// The fault.
+    pub fault: &'static str,
+    /// How it is injected.
+    pub injected: &'static str,
+    /// Code that the journal must carry; "-" for none.
+    pub code: &'static str,
+    /// The target, in words.
+    pub target: &'static str,
+    /// Does all of it.
+    pub run: fn(&mut Bench) -> Result<Seen>,
+}
+
+/// What came of a row of another kind.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// What was seen on the LCD.
+    pub lcd: String,
+    /// Seconds until it was seen.
+    pub seen_s: Option<f64>,
+    /// Seconds from the end of the cause to the end of the fault.
+    pub back_s: Option<f64>,
+    /// Whether the target was met.
+    pub met: bool,
+    /// What else there is to say.
+    pub note: String,
+}
+
+/// One of both.
+pub enum Row {
+    /// The usual kind.
+    Case(Case),
+    /// Another kind.
+    Own(Own),
+    /// It cannot be brought about: number, fault, why.
+    Not(&'static str, &'static str, &'static str),
+}
+
+/// A line of the table.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// Number.
+    pub number: String,
+    /// The fault.
+    pub fault: String,
+    /// How it was injected.
+    pub injected: String,
+    /// What the LCD showed.
+    pub lcd: String,
+    /// The journal's code.
+    pub code: String,
+    /// Seconds from the cause to the LCD.
+    pub seen_s: Option<f64>,
+    /// Seconds from the cause's end to the fault's.
+    pub back_s: Option<f64>,
+    /// The target.
+    pub target: String,
+    /// What it came to.
+    pub verdict: Verdict,
+    /// More to say.
+    pub note: String,
+}
+
+/// What a row came to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The target was met as it stands.
+    Met,
+    /// It was met, in the machine's terms.
+    MetScaled,
+    /// It was not.
+    Missed,
+    /// It was not tried, for the reason given.
+    Not,
+}
+
+impl Verdict {
+    /// For the table.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Met => "met",
+            Self::MetScaled => "met, scaled",
+            Self::Missed => "MISSED",
+            Self::Not => "not injectable",
+        }
+    }
+}
+
+/// Every row, in the order in which they are tried.
+pub fn rows() -> Vec<Row> {
+    let mut all = Vec::new();
+    all.extend(trigger::first());
+    all.extend(camera::rows());
+    all.extend(unit::rows());
+    all.extend(trigger::rows());
+    all.extend(computer::rows());
+    all
+}
+
+impl Row {
+    /// Its number.
+    pub const fn number(&self) -> &'static str {
+        match self {
+            Self::Case(c) => c.number,
+            Self::Own(o) => o.number,
+            Self::Not(number, ..) => number,
+        }
+    }
+
+    /// Tries it.
+    pub fn run(&self, bench: &mut Bench) -> Line {
+        match self {
+            Self::Case(case) => case.line(bench),
+            Self::Own(own) => own.line(bench),
+            Self::Not(number, fault, why) => Line {
+                number: (*number).into(),
+                fault: (*fault).into(),
+                injected: "-".into(),
+                lcd: "-".into(),
+                code: "-".into(),
+                seen_s: None,
+                back_s: None,
+                target: "-".into(),
+                verdict: Verdict::Not,
+                note: (*why).into(),
+            },
+        }
+    }
+}
+
+impl Own {
+    fn line(&self, bench: &mut Bench) -> Line {
+        let seen = (self.run)(bench).unwrap_or_else(|e| Seen { note: format!("{e:#}"), ..Seen::default() });
+        Line {
+            number: self.number.into(),
+            fault: self.fault.into(),
+            injected: self.injected.into(),
+            lcd: seen.lcd,
+            code: self.code.into(),
+            seen_s: seen.seen_s,
+            back_s: seen.back_s,
+            target: self.target.into(),
+            verdict: if seen.met { Verdict::Met } else { Verdict::Missed },
+            note: seen.note,
+        }
+    }
+}
+
+/// Beyond scaled targets nobody waits this much longer.
+const EXTRA: Duration = Duration::from_secs(20);
+
+impl Case {
+    fn line(&self, bench: &mut Bench) -> Line {
+        let mut line = Line {
+            number: self.number.into(),
+            fault: self.fault.into(),
+            injected: self.injected.into(),
+            lcd: String::new(),
+            code: self.code.into(),
+            seen_s: None,
+            back_s: None,
+            target: self.target(),
+            verdict: Verdict::Missed,
+            note: String::new(),
+        };
+        if let Err(e) = self.try_it(bench, &mut line) {
+            line.note = format!("{}{e:#}", if line.note.is_empty() { "" } else { "; " });
+            bench.keep_picture(&format!("row-{}-missed", self.number));
+        } else {
+            line.verdict = self.verdict(bench, &line);
+        }
+        // Whatever became of it: the next row begins in peace.
+        if let Err(e) = bench.settle() {
+            line.note = format!("{}; afterwards: {e:#}", line.note);
+        }
+        line
+    }
+
+    fn target(&self) -> String {
+        let part = |what: &str, s: Option<f64>| s.map(|s| format!("{what} {s} s"));
+        let all: Vec<String> =
+            [part("seen", self.seen_s), part("back", self.back_s)].into_iter().flatten().collect();
+        if all.is_empty() { "-".into() } else { all.join(", ") }
+    }
+
+    fn verdict(&self, bench: &Bench, line: &Line) -> Verdict {
+        let within = |value: Option<f64>, target: Option<f64>, factor: f64| match (value, target) {
+            (Some(v), Some(t)) => v <= t * factor,
+            (None, Some(_)) => false,
+            _ => true,
+        };
+        let all =
+            |factor| within(line.seen_s, self.seen_s, factor) && within(line.back_s, self.back_s, factor);
+        match (all(1.0), all(bench.slow)) {
+            (true, _) => Verdict::Met,
+            (_, true) => Verdict::MetScaled,
+            _ => Verdict::Missed,
+        }
+    }
+
+    fn try_it(&self, bench: &mut Bench, line: &mut Line) -> Result<()> {
+        bench.ready(bench.scaled(2.0) + EXTRA)?;
+        let from = bench.machine.guest.now_ns();
+        let caused = (self.inject)(bench)?;
+        let at = bench.machine.guest.host_time(caused);
+        let patience = bench.scaled(self.seen_s.unwrap_or(1.0)) + EXTRA;
+        bench.told(self.code, Told::Came, from, patience)?;
+        if let Some(seen) = bench.shown(self.shown, at, patience)? {
+            line.seen_s = Some(seen.saturating_duration_since(at).as_secs_f64());
+        }
+        line.lcd = bench.status()?;
+        let cause = match self.shown {
+            Shown::NotScored(cause) | Shown::Fault(cause) | Shown::Warning(cause) => cause,
+            Shown::Nothing => "",
+        };
+        if !line.lcd.contains(cause) {
+            bail!("the LCD says \"{}\", not {cause}", line.lcd);
+        }
+        bench.keep_picture(&format!("row-{}", self.number));
+        std::thread::sleep(Duration::from_secs_f64(self.stays_s));
+        let until = bench.machine.guest.now_ns();
+        let ended = (self.end)(bench)?;
+        if self.lasts {
+            let patience = bench.scaled(self.back_s.unwrap_or(2.0)) + EXTRA;
+            let went = bench.told(self.code, Told::Went, until, patience)?;
+            let over = bench.machine.guest.host_time(ended);
+            let mut back = (went - ended) as f64 * 1e-9;
+            if self.shown != Shown::Nothing {
+                let lcd = bench.lcd(over, patience, "READY", |p, w| p == Plate::Ready && !w)?;
+                back = back.max(lcd.saturating_duration_since(over).as_secs_f64());
+            }
+            line.back_s = Some(back.max(0.0));
+        }
+        Ok(())
+    }
+}
+
+impl Bench {
+    /// Waits until the LCD itself shows it; nothing to wait for where it must go on as if nothing were.
+    fn shown(&self, shown: Shown, since: Instant, patience: Duration) -> Result<Option<Instant>> {
+        let seen = match shown {
+            Shown::NotScored(_) => self.lcd(since, patience, "NOT SCORED", |p, _| p == Plate::NotScored)?,
+            Shown::Fault(_) => self.lcd(since, patience, "FAULT", |p, _| p == Plate::Fault)?,
+            Shown::Warning(_) => self.lcd(since, patience, "a warning", |p, w| w && p != Plate::NotScored)?,
+            Shown::Nothing => return Ok(None),
+        };
+        Ok(Some(seen))
+    }
+
+    /// Takes all causes away and waits for READY.
+    pub fn settle(&mut self) -> Result<()> {
+        let trigger = self.feed.trigger;
+        self.feed(|feed| {
+            *feed = bowwave_hil::protocol::Feed { trigger, lead_ns: feed.lead_ns, ..Default::default() }
+        })?;
+        self.pull(0, false)?;
+        self.pull(1, true)?;
+        self.pull(2, false)?;
+        for line in ["fail streamon 0", "fail control 0", "bandwidth 0"] {
+            self.camera(line)?;
+        }
+        let state = self.machine.guest.call(bowwave_hil::protocol::Command::CameraState)?;
+        if state["plugged"] == 0 {
+            self.camera("plug 0")?;
+        }
+        self.machine.unit.pass(crate::unit::Passage::Straight);
+        self.machine.unit.set_baud(921_600);
+        self.ready(self.scaled(3.0) + EXTRA).map(|_| ())
+    }
+}

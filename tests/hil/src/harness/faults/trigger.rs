@@ -1,0 +1,148 @@
+//! Faults of the trigger, the interlock and the supply. Their lines are gpio-sim's, on the kernel's GPIO character device.
+
+use std::{thread, time::Duration};
+
+use anyhow::{Context, Result};
+use bowwave_hil::protocol::Command;
+
+use super::{Case, Own, Row, Seen, Shown};
+use crate::{
+    bench::{Bench, Told},
+    lcd::Plate,
+};
+
+/// What is tried before all else.
+pub fn first() -> Vec<Row> {
+    vec![Row::Case(Case {
+        number: "I",
+        fault: "Interlock open: gun not inert",
+        injected: "the interlock's line goes low",
+        code: "NOT_INERT",
+        shown: Shown::Fault("NOT ARMED"),
+        seen_s: Some(0.1),
+        back_s: Some(0.1),
+        lasts: true,
+        stays_s: 0.3,
+        inject: |b| {
+            let at = b.pull(1, false)?;
+            // Nothing may be fired.
+            thread::sleep(Duration::from_millis(300));
+            let from = b.shoot(200)?;
+            b.blind.push((from, b.machine.guest.now_ns()));
+            Ok(at)
+        },
+        end: |b| b.pull(1, true),
+    })]
+}
+
+pub fn rows() -> Vec<Row> {
+    vec![
+        Row::Own(Own {
+            number: "21",
+            fault: "Trigger bounce",
+            injected: "12 edges within 6 ms, then pressed for 30 ms, then 12 edges again",
+            code: "-",
+            target: "one shot",
+            run: bounce,
+        }),
+        Row::Case(Case {
+            number: "22",
+            fault: "Trigger held over 3 s beyond the belt",
+            injected: "the trigger's line stays high; the belt is 100 rounds long",
+            code: "TRG_STUCK",
+            shown: Shown::Warning("TRIGGER STUCK"),
+            seen_s: None,
+            back_s: None,
+            lasts: true,
+            stays_s: 0.2,
+            inject: |b| b.pull(0, true),
+            end: |b| b.pull(0, false),
+        }),
+        Row::Own(Own {
+            number: "23",
+            fault: "GPIO events lost",
+            injected: "the trigger's thread is stopped for 2 s while 60 edges come; the kernel keeps 16",
+            code: "TRG_OVERRUN",
+            target: "no phantom shots",
+            run: overrun,
+        }),
+        Row::Not(
+            "24",
+            "GPIO clock is not monotonic",
+            "kernels before 5.7 only; the image's stamps edges with the monotonic clock. Unit tests of the trigger cover it",
+        ),
+        Row::Case(Case {
+            number: "37",
+            fault: "Low voltage",
+            injected: "the power-fail line goes high",
+            code: "BROWNOUT",
+            shown: Shown::Warning("PWR"),
+            seen_s: Some(0.05),
+            back_s: None,
+            lasts: true,
+            stays_s: 0.3,
+            inject: |b| b.pull(2, true),
+            end: |b| b.pull(2, false),
+        }),
+    ]
+}
+
+/// Shots as the status line counts them.
+pub fn shots(bench: &mut Bench) -> Result<u64> {
+    let status = bench.status()?;
+    let text = status.split("shots ").nth(1).and_then(|t| t.split(',').next());
+    text.and_then(|t| t.trim().parse().ok()).with_context(|| format!("no count of shots in \"{status}\""))
+}
+
+/// Rounds take a second to fly, and the status line a second to follow.
+fn settled_shots(bench: &mut Bench) -> Result<u64> {
+    thread::sleep(Duration::from_millis(2500));
+    shots(bench)
+}
+
+fn bounce(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let before = settled_shots(bench)?;
+    let chatter = |up: bool| (0..12).map(move |i| (500, (i % 2 == 0) == up));
+    let mut steps: Vec<(u64, bool)> = chatter(true).collect();
+    steps.push((500, true));
+    steps.push((30_000, false));
+    steps.extend(chatter(true));
+    steps.push((500, false));
+    let from = bench.machine.guest.now_ns();
+    let times = bench.pulls(0, steps)?;
+    let after = settled_shots(bench)?;
+    let lcd = bench.status()?;
+    let took = (times[times.len() - 1][1] - times[0][0]) as f64 * 1e-6;
+    // Ten rounds a second: a press of so short a time is one round.
+    let met = after == before + 1;
+    let said = bench.machine.guest.journal_since(from).len();
+    let note = format!(
+        "{} rounds for one press; all edges within {took:.0} ms; {said} lines in the journal",
+        after - before
+    );
+    Ok(Seen { lcd, met, note, ..Seen::default() })
+}
+
+fn overrun(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    let before = settled_shots(bench)?;
+    let from = bench.machine.guest.now_ns();
+    // The edges must come while the thread stands still.
+    let line = "sleep 0.4; d=$(ls -d /sys/devices/platform/gpio-sim.*/gpiochip*/sim_gpio0 | head -1); for i in $(seq 30); do \
+                echo pull-up > $d/pull; echo pull-down > $d/pull; done";
+    bench.machine.guest.run(&["/bin/systemd-run", "--quiet", "--no-block", "/bin/sh", "-c", line])?;
+    let held = bench.machine.guest.call(Command::Hold { thread: "trigger".into(), ms: 3000 })?;
+    let told = bench.told("TRG_OVERRUN", Told::Came, from, bench.scaled(2.0));
+    let after = settled_shots(bench)?;
+    let lcd = bench.status()?;
+    bench.blind.push((from, bench.machine.guest.now_ns()));
+    bench.settle()?;
+    told?;
+    let fired = after - before;
+    let seen = bench.machine.lcd.last().map(|s| s.plate) == Some(Plate::Ready);
+    let note = format!(
+        "{fired} rounds for 30 short presses of which most were lost; the thread stood still: {held}"
+    );
+    Ok(Seen { lcd, met: fired <= 30 && seen, note, ..Seen::default() })
+}
