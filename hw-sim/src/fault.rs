@@ -1,6 +1,6 @@
 //! Seeded faults of the simulated hardware, to be ridden out.
 
-use bowwave_core::event::ImuSample;
+use bowwave_core::{event::ImuSample, time::NS_PER_S};
 use glam::DVec3;
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 use rand::{RngExt, SeedableRng};
@@ -23,6 +23,19 @@ pub enum FaultKind {
     FrameOtherSize,
     /// The camera delivers JPEGs that are cut short or have no readable header.
     FrameCorrupt,
+}
+
+impl FaultKind {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::ImuDropOut,
+        Self::ImuFreeze,
+        Self::ImuNan,
+        Self::LineGarbage,
+        Self::FrameDropOut,
+        Self::FrameOtherSize,
+        Self::FrameCorrupt,
+    ];
 }
 
 /// One fault.
@@ -49,6 +62,28 @@ impl FaultPlan {
     /// No fault yet.
     pub const fn new(seed: u64) -> Self {
         Self { seed, faults: Vec::new() }
+    }
+
+    /// This plan and a fault of a random kind in each `period_ns` up to `until_ns`, half a second into it at the earliest, for
+    /// 0.3 to 2 s. Bounds outside of 5 s to a day for the period give none.
+    #[must_use]
+    pub fn with_one_every(mut self, period_ns: i64, until_ns: i64) -> Self {
+        if !(5 * NS_PER_S..=86_400 * NS_PER_S).contains(&period_ns) {
+            return self;
+        }
+        let mut random = Pcg64Mcg::seed_from_u64(self.seed ^ 0x5eed);
+        let mut begin = period_ns;
+        while begin + period_ns <= until_ns {
+            let kind = FaultKind::ALL[random.random_range(0..FaultKind::ALL.len())];
+            let from_ns = begin + random.random_range(NS_PER_S / 2..NS_PER_S);
+            self.faults.push(Fault {
+                kind,
+                from_ns,
+                for_ns: random.random_range(3 * NS_PER_S / 10..2 * NS_PER_S),
+            });
+            begin += period_ns;
+        }
+        self
     }
 
     /// This plan and one fault more, from `from_ns` after the replay's origin for `for_ns`.

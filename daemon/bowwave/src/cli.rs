@@ -110,6 +110,9 @@ pub struct Simulate {
     /// frame-other-size or frame-corrupt, from second S for L seconds
     #[arg(long, value_name = "KIND@S+L", value_parser = parse_fault)]
     pub fault: Vec<Fault>,
+    /// Let a fault of a random kind come every S seconds as well, 5 at least; the summary says whether each was ridden out
+    #[arg(long, value_name = "S", value_parser = parse_duration)]
+    pub fault_every: Option<f64>,
     /// Vulkan device: its number, or part of its name
     #[arg(long, value_name = "NAME")]
     pub gpu: Option<String>,

@@ -13,6 +13,7 @@ mod outcome;
 mod output;
 mod plan;
 mod recorder;
+mod resident;
 mod run;
 mod simulate;
 mod stats;

@@ -148,14 +148,9 @@ impl Output {
         self.tickets.as_ref().is_some_and(|t| t.send(ticket).is_ok())
     }
 
-    /// Waits until a rehearsal is complete, or the thread has ended, but no longer than `timeout`.
-    pub fn await_rehearsal(&self, timeout: Duration) {
-        if self.rehearsed.recv_timeout(timeout).is_err() {
-            log::warn!(
-                "the rehearsal was not complete after {} s; the first frames may be late",
-                timeout.as_secs()
-            );
-        }
+    /// Waits until a rehearsal is complete, or the thread has ended, but no longer than `timeout`; whether it is complete.
+    pub fn await_rehearsal(&self, timeout: Duration) -> bool {
+        self.rehearsed.recv_timeout(timeout).is_ok()
     }
 
     /// Frames completed since the last call. Where nobody asks, none are kept.

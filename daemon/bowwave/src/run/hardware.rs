@@ -234,7 +234,8 @@ fn trigger_settings(settings: &Settings, faults: &mut Vec<FaultChange>) -> Optio
     let belt_s = f64::from(weapon.belt) * 60.0 / weapon.rounds_per_minute.max(1.0);
     Some(TriggerSettings {
         debounce: trigger.debounce,
-        stuck_after: (Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_MOST) + STUCK_BEYOND).min(STUCK_MOST),
+        stuck_after: (Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_MOST) + STUCK_BEYOND)
+            .min(STUCK_MOST),
         interlock: config.interlock.clone(),
         power_fail: config.power_fail.clone(),
         ..TriggerSettings::new(trigger.line.clone())

@@ -25,6 +25,9 @@ use crate::{hits::JOURNAL, recorder::Recorder};
 /// Rounds that wait for room in the journal's queue; more than any belt has.
 const ROUNDS_WAITING_MAX: usize = 100_000;
 
+/// Free bytes below which a disk that only takes hits counts as full: months of them.
+const HITS_BYTES: u64 = 32 << 20;
+
 /// Journal and recording of a run.
 pub struct Keeping {
     journal: Journal,
@@ -67,7 +70,7 @@ impl Keeping {
             faults.push(FaultChange::noted(now(), Fault::BootDirty, cause));
         }
         let recorder = if settings.config.record { Some(recorder(folder, settings)?) } else { None };
-        let space = SpaceWatch::new(folder, SpaceWatch::LIMIT_BYTES);
+        let space = SpaceWatch::new(folder, space_limit(folder, recorder.is_some()));
         Ok(Self {
             journal,
             waiting: VecDeque::new(),
@@ -206,6 +209,16 @@ impl Keeping {
         }
         ended?;
         Ok(())
+    }
+}
+
+/// Free bytes below which the disk counts as full: room for a recording's end, or for hits alone, and never more than a part
+/// of a small disk.
+fn space_limit(folder: &Path, records: bool) -> u64 {
+    let (limit, part) = if records { (SpaceWatch::LIMIT_BYTES, 8) } else { (HITS_BYTES, 32) };
+    match rustix::fs::statvfs(folder) {
+        Ok(s) => limit.min(s.f_blocks.saturating_mul(s.f_frsize) / part),
+        Err(_) => limit,
     }
 }
 

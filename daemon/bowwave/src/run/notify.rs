@@ -73,6 +73,14 @@ impl Notifier {
     }
 }
 
+/// Time by which a start that goes on is given longer, microseconds.
+const LONGER_US: u32 = 15_000_000;
+
+/// Something at the start, or a new start of the renderer, takes long but goes on.
+pub fn still_starting() {
+    send(&[NotifyState::ExtendTimeoutUsec(LONGER_US), NotifyState::Watchdog]);
+}
+
 fn send(state: &[NotifyState<'_>]) {
     if let Err(e) = sd_notify::notify(state) {
         log::debug!("systemd was not told: {e}");

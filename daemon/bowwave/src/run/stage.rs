@@ -12,13 +12,16 @@ use bowwave_core::{
 use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
 use bowwave_render::{RenderError, Renderer};
 
+use super::notify;
 use crate::{
     drawing,
     output::{Done, Output, OutputOptions, Ticket, UserEvent},
 };
 
-/// A driver that compiles for longer than this is not waited for.
-const REHEARSAL: Duration = Duration::from_secs(20);
+/// A driver that compiles for longer than this is not waited for, seconds.
+const REHEARSAL_S: f64 = 120.0;
+/// How often systemd hears meanwhile that the start goes on.
+const PATIENCE: Duration = Duration::from_millis(500);
 
 /// How frames are drawn and where they go.
 #[derive(Clone, Debug)]
@@ -74,7 +77,16 @@ impl Stage {
         self.renderer.submit(&scene, &picture, true)?;
         if let Some(output) = &self.output {
             output.announce(Ticket { frame: 0, begun, submitted: begun, deadline: None, rehearsal: true });
-            output.await_rehearsal(REHEARSAL);
+            let begun = now();
+            // A software driver on a slow computer compiles for a long time at its first start; the renderer's own time-out
+            // ends one that hangs.
+            while !output.await_rehearsal(PATIENCE) && output.runs() {
+                notify::still_starting();
+                if now().secs_since(begun) > REHEARSAL_S {
+                    log::warn!("the rehearsal was not complete after {REHEARSAL_S} s; the first frames may be late");
+                    break;
+                }
+            }
         }
         Ok(())
     }

@@ -1,6 +1,8 @@
 //! `bowwave simulate`: the trainer on a recording, as if its devices were there.
 
+mod memory;
 pub mod prepare;
+mod recovery;
 mod report;
 mod run;
 mod summary;
@@ -67,7 +69,8 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     } else {
         None
     };
-    let trainer = Loop::new(replay, session, renderer, output, journal, recorder, stop);
+    let faults = run::fault_plan(arguments, frames).faults;
+    let trainer = Loop::new(replay, session, renderer, output, journal, recorder, stop, faults);
     let finished =
         if realtime { trainer.realtime(frames, arguments) } else { trainer.fast(frames, arguments) }?;
     finished.report(arguments, &prepared, program_start)

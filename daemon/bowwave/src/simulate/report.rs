@@ -9,9 +9,9 @@ use sha2::Digest;
 use super::{
     prepare::Prepared,
     run::Finished,
-    summary::{Registration, Summary, peak_rss_mb},
+    summary::{Registration, Summary},
 };
-use crate::{cli::Simulate, outcome::Outcome, stats::Percentiles};
+use crate::{cli::Simulate, outcome::Outcome, resident::memory_mb, stats::Percentiles};
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
@@ -58,7 +58,8 @@ impl Finished {
             registration_px: Registration::of(&tally.registration, tally.registered),
             records_sha256: hex(&tally.hash.finalize()),
             frames_sha256: hex(&self.output.frames_sha256),
-            peak_rss_mb: peak_rss_mb(),
+            peak_rss_mb: memory_mb("VmHWM:"),
+            memory: self.memory.growth(),
             seed: scenario.seed,
             recording: prepared.recording.display().to_string(),
             scenario: scenario.name.clone(),
@@ -101,6 +102,10 @@ impl Finished {
             ("pictures_overwritten", r.frames_overwritten),
             ("pictures_late", r.frames_late),
             ("faults_injected", r.faults),
+            ("faults_judged", self.recovery.judged),
+            ("faults_recovered", self.recovery.recovered),
+            ("faults_to_be_seen", self.recovery.to_be_seen),
+            ("faults_seen", self.recovery.seen),
             ("trigger_edges", r.triggers),
             ("ring_waits", self.tally.ring_waits),
             ("recording_entries_dropped", self.dropped_entries),

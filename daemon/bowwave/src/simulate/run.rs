@@ -25,12 +25,12 @@ use bowwave_devices::clock::now;
 use bowwave_record::{Journal, JournalError, PoseEntry};
 use bowwave_render::Renderer;
 use hw_sim::{
-    fault::FaultPlan,
+    fault::{Fault, FaultPlan},
     replay::{Replay, ReplayError, ReplayOptions},
 };
 use sha2::{Digest, Sha256};
 
-use super::summary::PassCounts;
+use super::{memory::MemoryWatch, recovery::Recovery, summary::PassCounts};
 use crate::{
     cli::Simulate,
     commits,
@@ -53,9 +53,18 @@ pub fn open_replay(path: &Path, realtime: bool, arguments: &Simulate, frames: u6
     let asked = arguments.frames.is_some() || arguments.duration.is_some();
     // A little more than asked for, so that the last frames do not run dry.
     let duration_ns = asked.then(|| (frames as i64 + FRAMES_PER_S) * NS_PER_S / FRAMES_PER_S);
-    let faults = FaultPlan { seed: arguments.seed.unwrap_or(0), faults: arguments.fault.clone() };
-    let options = ReplayOptions { duration_ns, looped: asked, faults };
+    let options = ReplayOptions { duration_ns, looped: asked, faults: fault_plan(arguments, frames) };
     Ok(if realtime { Replay::realtime(path, &options)? } else { Replay::fast(path, &options)? })
+}
+
+/// The faults that the arguments ask for.
+pub fn fault_plan(arguments: &Simulate, frames: u64) -> FaultPlan {
+    let plan = FaultPlan { seed: arguments.seed.unwrap_or(0), faults: arguments.fault.clone() };
+    let until_ns = frames as i64 * NS_PER_S / FRAMES_PER_S;
+    match arguments.fault_every {
+        Some(seconds) => plan.with_one_every((seconds * NS_PER_S as f64) as i64, until_ns),
+        None => plan,
+    }
 }
 
 /// Everything that a frame passes through.
@@ -71,6 +80,8 @@ pub struct Loop {
     events: Vec<Event>,
     tally: Tally,
     replay_error: Option<ReplayError>,
+    recovery: Recovery,
+    memory: MemoryWatch,
 }
 
 /// What the loop counts.
@@ -116,6 +127,10 @@ pub struct Finished {
     pub realtime: bool,
     /// Entries that the recorder had no room for.
     pub dropped_entries: u64,
+    /// Whether injected faults were ridden out.
+    pub recovery: Recovery,
+    /// Resident memory on the way.
+    pub memory: MemoryWatch,
     /// What went wrong on the way without ending the run.
     pub faults: Vec<String>,
 }
@@ -135,7 +150,9 @@ impl Loop {
         journal: Journal,
         recorder: Option<Recorder>,
         stop: Arc<AtomicBool>,
+        faults: Vec<Fault>,
     ) -> Self {
+        let recovery = Recovery::new(replay.origin(), faults);
         Self {
             replay,
             session,
@@ -148,6 +165,8 @@ impl Loop {
             events: Vec::with_capacity(256),
             tally: Tally::default(),
             replay_error: None,
+            recovery,
+            memory: MemoryWatch::default(),
         }
     }
 
@@ -184,7 +203,12 @@ impl Loop {
     /// On the host's clock, 30 frames a second.
     pub fn realtime(mut self, frames: u64, arguments: &Simulate) -> Result<Finished> {
         self.rehearse()?;
-        self.output.await_rehearsal(REHEARSAL);
+        if !self.output.await_rehearsal(REHEARSAL) {
+            log::warn!(
+                "the rehearsal was not complete after {} s; the first frames may be late",
+                REHEARSAL.as_secs()
+            );
+        }
         self.await_first_picture()?;
         let mut pacer = Pacer::new(now().plus_ns(TICK_AFTER_PICTURE_NS));
         while self.tally.frames + pacer.missed() < frames && !self.ends() {
@@ -261,6 +285,8 @@ impl Loop {
             self.journal_rounds(arguments)?;
             return Ok(false);
         };
+        self.recovery.frame(frame_time, &view.scene.hud.status);
+        self.memory.frame(view.scene.frame);
         let truth = self.replay.truth_at(view.mid_exposure);
         self.tally.pose(&view, truth);
         if let Some(recorder) = self.recorder.as_mut().filter(|_| view.picture_is_new) {
@@ -342,7 +368,18 @@ impl Loop {
             bail!("Vulkan's validation layer reports: {}", messages.join("; "));
         }
         let sensors = self.session.sensor_counts();
-        Ok(Finished { tally: self.tally, output, replay, sensors, device, realtime, dropped_entries, faults })
+        Ok(Finished {
+            tally: self.tally,
+            output,
+            replay,
+            sensors,
+            device,
+            realtime,
+            dropped_entries,
+            recovery: self.recovery,
+            memory: self.memory,
+            faults,
+        })
     }
 }
 

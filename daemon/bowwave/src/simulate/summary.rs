@@ -43,6 +43,8 @@ pub struct Summary {
     pub frames_sha256: String,
     /// Largest resident memory, megabytes.
     pub peak_rss_mb: Option<f64>,
+    /// Resident memory early and late in the run; null for short runs.
+    pub memory: Option<super::memory::Growth>,
     /// Seed of all chance.
     pub seed: u64,
     /// The recording played.
@@ -137,12 +139,4 @@ impl Summary {
             self.not_scored,
         )
     }
-}
-
-/// Largest resident memory of this process so far, megabytes (10^6 bytes); `None` where the kernel does not say.
-pub fn peak_rss_mb() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|l| l.starts_with("VmHWM:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some((kib * 1.024).round() / 1000.0)
 }
