@@ -27,6 +27,7 @@ const RANKS: &[(&str, u8)] = &[
     ("bowwave", 4),
     ("bowwave-tests", 5),
     ("precision", 5),
+    ("bowwave-hil", 5),
 ];
 
 fn root() -> PathBuf {

@@ -72,6 +72,8 @@ pub struct Config {
     pub gpu: Option<String>,
     /// Whether to run with the validation layer.
     pub validation: bool,
+    /// How long the GPU may take over a frame before it counts as hung.
+    pub hang: Option<Duration>,
     /// Scenario file or the name of a built-in one.
     pub scenario: Option<PathBuf>,
     /// Calibration file.
@@ -115,6 +117,7 @@ struct RawScreen {
 struct RawGpu {
     device: Option<Spanned<String>>,
     validation: bool,
+    hang_ms: Option<Spanned<f64>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -222,6 +225,9 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         lamps: raw.lamps.map(devices::RawLamps::settings),
         gpu: raw.gpu.device.map(Spanned::into_inner),
         validation: raw.gpu.validation,
+        hang: source
+            .number(raw.gpu.hang_ms, "gpu.hang_ms", 100.0..=60_000.0)?
+            .map(|ms| Duration::from_secs_f64(ms * 1e-3)),
         scenario,
         calibration: raw.files.calibration.map(|p| base.join(p)),
         record: raw.files.record,

@@ -60,6 +60,7 @@ fn every_key_is_read() {
         [gpu]
         device = "llvm"
         validation = true
+        hang_ms = 900
         [files]
         scenario = "a.toml"
         calibration = "/b.toml"
@@ -94,6 +95,7 @@ fn every_key_is_read() {
     let lamps = config.lamps.unwrap();
     assert_eq!((lamps.ready.as_deref(), lamps.hit, lamps.fault.as_deref()), (Some("ready"), None, Some("5")));
     assert_eq!((config.gpu.as_deref(), config.validation), (Some("llvm"), true));
+    assert_eq!(config.hang, Some(std::time::Duration::from_millis(900)));
     assert_eq!(config.scenario, Some("/etc/a.toml".into()));
     assert_eq!((config.calibration, config.record), (Some("/b.toml".into()), true));
     assert_eq!((config.data, config.health.limit_c), (Some("/var/lib/bowwave".into()), Some(85.0)));

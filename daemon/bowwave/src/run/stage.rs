@@ -10,7 +10,7 @@ use bowwave_core::{
     time::Time,
 };
 use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
-use bowwave_render::{RenderError, Renderer};
+use bowwave_render::{RenderError, Renderer, TimeOuts};
 
 use super::notify;
 use crate::{
@@ -30,6 +30,8 @@ pub struct StageOptions {
     pub gpu: Option<String>,
     /// Whether to run with the validation layer.
     pub validation: bool,
+    /// How long the GPU may take over a frame before it counts as hung.
+    pub hang: Option<Duration>,
     /// The LCD.
     pub lcd: Option<Arc<LcdPort>>,
     /// Whether to show a window.
@@ -50,7 +52,11 @@ impl Stage {
     /// Opens the GPU, makes what `session` needs and draws it once to nobody, so that the first frames do not wait for the
     /// driver's compiler.
     pub fn open(session: &Session, models: &[Model], options: &StageOptions) -> Result<Self> {
-        let config = drawing::config(session.plan(), options.gpu.clone(), options.validation);
+        let mut config = drawing::config(session.plan(), options.gpu.clone(), options.validation);
+        if let Some(frame) = options.hang {
+            // A computer that draws so much slower compiles so much slower.
+            config.time_outs = TimeOuts { frame, rehearsal: config.time_outs.rehearsal.max(frame * 120) };
+        }
         let (renderer, completions) = Renderer::new(&config, models)?;
         let output = Output::start(
             completions,
@@ -83,7 +89,9 @@ impl Stage {
             while !output.await_rehearsal(PATIENCE) && output.runs() {
                 notify::still_starting();
                 if now().secs_since(begun) > REHEARSAL_S {
-                    log::warn!("the rehearsal was not complete after {REHEARSAL_S} s; the first frames may be late");
+                    log::warn!(
+                        "the rehearsal was not complete after {REHEARSAL_S} s; the first frames may be late"
+                    );
                     break;
                 }
             }

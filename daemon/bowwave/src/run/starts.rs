@@ -67,7 +67,7 @@ fn recent(text: &str, now: Time) -> Vec<Time> {
         .take(LINES_MAX)
         .filter_map(|line| line.trim().parse().ok())
         .map(Time::from_ns)
-        .filter(|t| (0..WINDOW_NS).contains(&now.ns_since(*t)))
+        .filter(|t| t.ns() >= 0 && (0..WINDOW_NS).contains(&now.ns_since(*t)))
         .collect()
 }
 

@@ -112,6 +112,7 @@ impl Trainer {
         let stage_options = StageOptions {
             gpu: gpu(&settings, surroundings.mode),
             validation: settings.config.validation,
+            hang: settings.config.hang,
             lcd: hardware.lcd(),
             window: settings.config.output == crate::config::ScreenOutput::Window,
             frame_hashes: surroundings.frame_hashes.clone(),

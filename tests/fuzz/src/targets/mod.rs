@@ -5,7 +5,9 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a broken promise must end the run")]
 
 pub mod calibration;
+pub mod config;
 pub mod imu;
+pub mod jpeg;
 mod memory;
 pub mod model;
 mod place;
@@ -16,6 +18,8 @@ pub mod scenario;
 pub const ALL: &[(&str, fn(&[u8]))] = &[
     ("imu", imu::run),
     ("calibration", calibration::run),
+    ("jpeg", jpeg::run),
+    ("config", config::run),
     ("recording", recording::run),
     ("scenario", scenario::run),
     ("model", model::run),

@@ -169,7 +169,7 @@ pub fn configuration(c: &Configured) -> String {
          [trigger]\nchip = \"bench\"\nline = \"trigger\"\n[interlock]\nchip = \"bench\"\nline = \"interlock\"\n\
          [power_fail]\nchip = \"bench\"\nline = \"power-fail\"\n\
          [lamps]\nchip = \"bench\"\nready = \"lamp-ready\"\nhit = \"lamp-hit\"\nfault = \"lamp-fault\"\n\
-         [files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
+         [gpu]\nhang_ms = 20000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
          [health]\nthermal = \"/run/hil/thermal\"\nlimit_c = 78.0\n{}",
         c.modes, c.calibration, c.record, c.extra
     )
