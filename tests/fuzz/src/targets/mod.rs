@@ -14,8 +14,11 @@ mod place;
 pub mod recording;
 pub mod scenario;
 
-/// Each target by the name of its binary and its folders.
-pub const ALL: &[(&str, fn(&[u8]))] = &[
+/// The name of a target's binary and folders, and its function.
+pub type Target = (&'static str, fn(&[u8]));
+
+/// All targets.
+pub const ALL: &[Target] = &[
     ("imu", imu::run),
     ("calibration", calibration::run),
     ("jpeg", jpeg::run),
