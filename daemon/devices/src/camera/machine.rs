@@ -543,5 +543,4 @@ fn in_use(
 }
 
 #[cfg(test)]
-#[path = "machine_tests.rs"]
 mod tests;
