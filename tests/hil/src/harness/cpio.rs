@@ -89,7 +89,7 @@ mod tests {
         let out = folder.path().join("out");
         archive.append_to(&first, &out).unwrap();
         let bytes = fs::read(out).unwrap();
-        assert_eq!(&bytes[..14], b"abcde\0\0\0070701");
+        assert_eq!(&bytes[..14], b"abcde\x00\x00\x00070701");
         assert_eq!(bytes.len() % 4, 0);
         let listed = std::process::Command::new("cpio").arg("--version").output();
         if listed.is_ok_and(|l| l.status.success()) {

@@ -69,7 +69,7 @@ pub fn run(shop: &mut Shop, count: u32, seed: u64) -> Result<bool> {
     let table = shop.out.join("cuts.csv");
     let data = shop.out.join("cuts-data.img");
     if !table.exists() || !data.exists() {
-        shop.fresh_data("cuts-data.img")?;
+        shop.used_data("cuts-data.img")?;
         fs::write(&table, "cut,run,shot_for_ms,acknowledged,stored,lost,twice,invented,seconds\n")?;
     }
     let done = fs::read_to_string(&table)?.lines().count().saturating_sub(1) as u32;
@@ -79,7 +79,7 @@ pub fn run(shop: &mut Shop, count: u32, seed: u64) -> Result<bool> {
     let mut shot_for = 0;
     for cut in done + 1..=done + count + 1 {
         let begun = Instant::now();
-        let mut bench = Bench::switch_on(shop, &data, None, "utc")?;
+        let mut bench = Bench::switch_on(shop, &data, "utc")?;
         bench.pull(1, true)?;
         bench.play()?;
         let newest = newest_run(&mut bench)?;

@@ -43,8 +43,6 @@ pub struct Start<'a> {
     pub folder: &'a Path,
     /// The data partition, written to.
     pub data: &'a Path,
-    /// A disk besides, for faults of disks.
-    pub spare: Option<&'a Path>,
     /// Pixels of the LCD.
     pub lcd: (u32, u32),
     /// The hardware clock at start, as QEMU's -rtc takes it.
@@ -245,12 +243,6 @@ fn arguments(parts: &Parts, start: &Start<'_>, initrd: &Path, line: &Path) -> Ve
     ] {
         add(&format!("-drive id={name},file={},{options}", shown(&file)));
         add(&format!("-device virtio-blk-pci,drive={name},serial={name}"));
-    }
-    if let Some(spare) = start.spare {
-        add(&format!(
-            "-drive id=spare,file={},{WRITTEN} -device virtio-blk-pci,drive=spare,serial=spare",
-            shown(spare)
-        ));
     }
     add(&format!("-device qemu-xhci,id=usb -chardev serial,id=line,path={}", shown(line)));
     add("-device usb-serial,id=adapter0,chardev=line,bus=usb.0,serial=unit1");

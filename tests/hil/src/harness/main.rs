@@ -91,7 +91,7 @@ fn main() -> ExitCode {
 
 fn boot(shop: &Shop, lines: &[String]) -> Result<bool> {
     let data = shop.fresh_data("boot-data.img")?;
-    let mut bench = Bench::switch_on(shop, &data, None, "utc")?;
+    let mut bench = Bench::switch_on(shop, &data, "utc")?;
     println!("agent after {:.1} s", bench.machine.power_on.elapsed().as_secs_f64());
     for line in lines {
         println!("\n$ {line}");

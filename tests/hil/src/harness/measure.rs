@@ -143,7 +143,7 @@ fn edges(bench: &Bench, rounds: &[Value]) -> Vec<Figure> {
             "p50 {p50:.2} ms, worst {worst:.2} ms over {inside} pulls; {unmatched} pulls without a round"
         ),
         "kernel edge time, 1 ms",
-        inside >= 5 && p50 <= 1.0 && p50 >= -0.1,
+        inside >= 5 && (-0.1..=1.0).contains(&p50),
     )]
 }
 

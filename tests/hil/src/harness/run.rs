@@ -24,8 +24,8 @@ const NO_CLOCK: &str = "2020-01-01T00:00:00";
 pub fn run(shop: &Shop, only: &[String]) -> Result<bool> {
     let begun = Instant::now();
     let host = bowwave_hil::spin();
-    let data = shop.fresh_data("data.img")?;
-    let mut bench = Bench::switch_on(shop, &data, None, NO_CLOCK)?;
+    let data = shop.used_data("data.img")?;
+    let mut bench = Bench::switch_on(shop, &data, NO_CLOCK)?;
     let mut report = Report::default();
     let outcome = tried(shop, &mut bench, &mut report, host, only);
     if let Err(e) = &outcome {
@@ -186,7 +186,7 @@ fn power_cut(shop: &Shop, mut bench: Bench, data: &Path, report: &mut Report) ->
         std::thread::sleep(Duration::from_millis(2700));
         let acknowledged = super::cuts::committed(&bench.machine.guest.lines()[seen..]);
         bench.machine.cut()?;
-        let mut again = Bench::switch_on(shop, data, None, "utc")?;
+        let mut again = Bench::switch_on(shop, data, "utc")?;
         again.slow = slow;
         again.pull(1, true)?;
         again.play()?;

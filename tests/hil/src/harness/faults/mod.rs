@@ -284,7 +284,7 @@ impl Case {
             let over = bench.machine.guest.host_time(ended);
             let mut back = (went - ended) as f64 * 1e-9;
             if self.shown != Shown::Nothing {
-                let lcd = bench.lcd(over, patience, "READY", |p, w| p == Plate::Ready && !w)?;
+                let lcd = bench.lcd(over, patience, "READY", |p, _| p == Plate::Ready)?;
                 back = back.max(lcd.saturating_duration_since(over).as_secs_f64());
             }
             line.back_s = Some(back.max(0.0));
