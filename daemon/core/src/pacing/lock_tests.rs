@@ -69,7 +69,7 @@ fn watch(world: &World) -> Seen {
             newest = Some(next_arrival);
             next_arrival += 1;
         }
-        let render_ms = 6.0 + 4.0 * even(n, 0.754_877_666) + if n % 97 == 0 { 3.0 } else { 0.0 };
+        let render_ms = 6.0 + 4.0 * even(n, 0.754_877_666) + if n.is_multiple_of(97) { 3.0 } else { 0.0 };
         let complete = start.plus_ns((render_ms * 1e6) as i64);
         clock.rendered((render_ms * 1e6) as i64);
         // Two flips cannot share a blank.

@@ -1,7 +1,7 @@
 //! The inertial unit's serial line: found, opened, read, lost and found again, for as long as the trainer runs.
 //!
-//! [`health`] decides, as a function of what came and of time; [`sanity`] and [`timing`] judge the samples; [`line`] and
-//! [`ioctl`] speak to the kernel; [`reader`] joins them in a thread.
+//! `health` decides, as a function of what came and of time; `sanity` and `timing` judge the samples; `line` and
+//! `ioctl` speak to the kernel; `reader` joins them in a thread.
 
 mod find;
 mod health;

@@ -1,7 +1,7 @@
 //! The trigger switch, the inert interlock and the power supply's warning, over the GPIO character device.
 //!
-//! Edges carry the kernel's `CLOCK_MONOTONIC` time, taken in the interrupt. [`debounce`], [`switch`] and [`guard`] decide
-//! what they mean, as functions of edges and of time; [`input`] asks the kernel; a thread joins them. Nothing here drives
+//! Edges carry the kernel's `CLOCK_MONOTONIC` time, taken in the interrupt. `debounce`, `switch` and `guard` decide
+//! what they mean, as functions of edges and of time; `input` asks the kernel; a thread joins them. Nothing here drives
 //! a line.
 
 mod chips;
