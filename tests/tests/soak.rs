@@ -14,16 +14,15 @@ wind_from_deg = 250
 eye_height_m = 8.0
 [weapon]
 rounds_per_minute = 600
-belt = 1000000
+belt = 100000
 [[boat]]
 name = "skiff"
 model = "skiff"
 side = "hostile"
-course = "weave"
-range_m = 150
+course = "still"
+range_m = 120
 bearing_deg = 0
 heading_deg = 80
-speed_kn = 8
 [[boat]]
 name = "dhow"
 model = "dhow"
@@ -31,6 +30,7 @@ side = "neutral"
 course = "still"
 range_m = 250
 bearing_deg = 5
+heading_deg = 100
 "#;
 
 #[test]
