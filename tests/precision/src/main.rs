@@ -37,6 +37,7 @@ const PARTS: &[Part] = &[
     Part { about: parts::clock::ABOUT, rows: parts::clock::rows },
     Part { about: parts::attitude::ABOUT, rows: parts::attitude::rows },
     Part { about: parts::lens::ABOUT, rows: parts::lens::rows },
+    Part { about: parts::pacing::ABOUT, rows: parts::pacing::rows },
 ];
 
 fn run(arguments: &Arguments) -> Result<()> {

@@ -4,6 +4,7 @@ pub mod attitude;
 pub mod clock;
 pub mod flight;
 pub mod lens;
+pub mod pacing;
 
 use crate::table::Row;
 
