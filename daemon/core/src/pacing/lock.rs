@@ -5,8 +5,8 @@
 //! in it is the newest possible. Left at that, a camera of nearly the display's rate would sooner or later deliver right
 //! around the begin of each frame, and its jitter would have pictures dropped and doubled in turn. Two means prevent that:
 //! a display of 60 Hz can show a frame one blank sooner or later, so the tick slips by single blanks and follows the camera's
-//! rate; and where a picture is expected around the begin, the begin waits for it, decided by the smooth prediction and not by
-//! the single arrival.
+//! rate; and where a picture is expected around the begin, the frame begins so much sooner that it is left to the next one,
+//! decided by the smooth prediction and not by the single arrival.
 
 use super::{FRAMES_PER_S, Train};
 use crate::time::{NS_PER_S, Time};
@@ -45,8 +45,8 @@ pub struct FrameClock {
     display: Option<Train>,
     budget_ns: i64,
     last: Option<Plan>,
-    /// Whether the last begin waited for a picture that was still to come.
-    waits: bool,
+    /// Whether the last frame left a picture that came around its begin to the next.
+    leaves: bool,
     missed: u64,
     slips: u64,
 }
@@ -65,7 +65,7 @@ impl FrameClock {
             display: None,
             budget_ns: BUDGET_FIRST_NS,
             last: None,
-            waits: false,
+            leaves: false,
             missed: 0,
             slips: 0,
         }
@@ -142,10 +142,7 @@ impl FrameClock {
                 }
             }
         };
-        let latest = shown.plus_ns(-self.budget_ns);
-        // Where the tick follows the camera, nothing arrives around the begin; elsewhere there must be room to wait for it.
-        let room = if self.follows_camera(blank_ns, blanks) { 0.0 } else { 2.5 * self.guard_ns() };
-        Plan { start: self.wait_for_picture(latest.plus_ns(-room as i64)), shown }
+        Plan { start: self.before_picture(shown.plus_ns(-self.budget_ns)), shown }
     }
 
     /// Whether the tick can follow the camera's rate by slipping single blanks: only a camera of the tick's own rate has a
@@ -198,20 +195,22 @@ impl FrameClock {
         (GUARD_JITTERS * self.camera.jitter_ns()).clamp(GUARD_MIN_NS, GUARD_MAX_NS)
     }
 
-    /// `start`, or a little later where a picture is expected around it.
-    fn wait_for_picture(&mut self, start: Time) -> Time {
+    /// `start`, or a little sooner where a picture is expected around it: so soon that it cannot have arrived, and jitter
+    /// does not decide whether it is in this frame or the next.
+    fn before_picture(&mut self, start: Time) -> Time {
         let Some((period, waited)) = self.waited(start) else { return start };
         let guard = self.guard_ns();
-        // Who has begun to wait for pictures goes on a little longer, or the prediction's own noise would decide.
-        let reach = if self.waits { 1.5 * guard } else { guard };
-        self.waits = period - waited < reach;
-        if self.waits {
-            start.plus_ns((period - waited + guard) as i64)
-        } else if waited < guard {
-            start.plus_ns((guard - waited) as i64)
-        } else {
-            start
-        }
+        // Who has begun to leave pictures to the next frame goes on a little longer, or the prediction's own noise would
+        // decide.
+        let reach = if self.leaves { 1.5 * guard } else { guard };
+        let coming = period - waited;
+        self.leaves = waited < reach || coming < guard;
+        let sooner = match (waited < reach, coming < guard) {
+            (true, _) => waited + guard,
+            (false, true) => guard - coming,
+            (false, false) => 0.0,
+        };
+        start.plus_ns(-sooner as i64)
     }
 
     /// No display sets the time: 30 Hz, and where the camera has that rate, its own 30 Hz.
@@ -237,7 +236,7 @@ impl FrameClock {
                 let ahead = if waited > period / 2.0 { waited - period } else { waited };
                 due.plus_ns((guard - ahead).clamp(-PERIOD_NS / 10.0, PERIOD_NS / 10.0) as i64)
             }
-            _ => self.wait_for_picture(due),
+            _ => self.before_picture(due),
         };
         Plan { start, shown: start.plus_ns(PERIOD_NS as i64) }
     }

@@ -13,7 +13,7 @@ pub const ABOUT: About = About {
     part: "pacing",
     truth: "simulated cameras and displays whose clocks are exact, arrivals late by up to 0.8 ms, rendering of 6 to 13 ms, two \
             minutes; the error is the 99th percentile from a picture's arrival to the blank that shows it first, plus 33 ms for \
-            each picture a second that is dropped or doubled beyond the difference of the rates",
+            each picture a second by which frames go on unevenly (dropped, doubled) beyond the difference of the rates",
     why: "a tick of its own beats against both clocks; a late begin alone waits least but drops and doubles where the camera's \
           phase meets the begin; the locked tick has neither for a fraction of a microsecond a frame",
 };
@@ -88,12 +88,12 @@ impl Tick for Late {
 
     fn next(&mut self, now: Time) -> Time {
         let Some((flip, period_ns)) = self.flip else { return now.plus_ns(33_333_333) };
-        let blanks = (33_333_333.0 / period_ns as f64).round() as i64 * period_ns;
-        let mut start = flip.plus_ns(blanks - self.longest_ns - 1_500_000);
-        let least = self.last.map_or(now, |last| last.plus_ns(blanks * 3 / 4).max(now));
-        while start < least {
-            start = start.plus_ns(blanks);
-        }
+        let blanks_ns = (33_333_333.0 / period_ns as f64).round() as i64 * period_ns;
+        // Of the begins that meet a blank, the one nearest to a tick after the last.
+        let begin = flip.plus_ns(-self.longest_ns - 1_500_000);
+        let due = self.last.map_or(now, |last| last.plus_ns(blanks_ns));
+        let blanks = (due.ns_since(begin) as f64 / period_ns as f64).round() as i64;
+        let start = begin.plus_ns(blanks * period_ns);
         self.last = Some(start);
         start
     }
@@ -103,6 +103,17 @@ struct Seen {
     p99_ms: f64,
     dropped: u64,
     doubled: u64,
+    /// Pictures by which each frame went on.
+    steps: Vec<u64>,
+}
+
+impl Seen {
+    /// Pictures dropped or doubled beyond the difference of the rates: by how much frames went on unevenly.
+    fn beats(&self, camera_fps: f64, tick_fps: f64) -> f64 {
+        let even = (camera_fps / tick_fps).round();
+        let uneven: f64 = self.steps.iter().map(|s| (*s as f64 - even).abs()).sum();
+        (uneven - (camera_fps - even * tick_fps).abs() * SECONDS).max(0.0)
+    }
 }
 
 /// Runs `tick` between a camera and a display.
@@ -114,7 +125,7 @@ fn watch(tick: &mut dyn Tick, camera_fps: f64, display_hz: f64) -> Seen {
     let (mut now, mut next, mut frame) = (at(0.0), 0u64, 0u64);
     let (mut waiting, mut last_flip) = (std::collections::VecDeque::new(), at(0.0));
     let (mut shown, mut waits) = (None::<u64>, Vec::new());
-    let mut seen = Seen { p99_ms: 0.0, dropped: 0, doubled: 0 };
+    let mut seen = Seen { p99_ms: 0.0, dropped: 0, doubled: 0, steps: Vec::new() };
     while now < at(SECONDS + SETTLE_S) {
         while waiting.front().is_some_and(|flip| *flip <= now) {
             waiting.pop_front().into_iter().for_each(|flip| tick.flipped(flip, period_ns));
@@ -132,6 +143,7 @@ fn watch(tick: &mut dyn Tick, camera_fps: f64, display_hz: f64) -> Seen {
         waiting.push_back(flip);
         let newest = next.checked_sub(1);
         if let (Some(picture), true) = (newest, start > at(SETTLE_S)) {
+            seen.steps.extend(shown.map(|last| picture - last));
             match shown {
                 Some(last) if last == picture => seen.doubled += 1,
                 _ => {
@@ -166,13 +178,14 @@ pub fn rows(repeats: usize) -> Vec<Row> {
         for (method, setting, mut tick) in ticks() {
             let seen = watch(tick.as_mut(), camera_fps, display_hz);
             let tick_fps = if display_hz > 50.0 { display_hz / 2.0 } else { display_hz };
-            let surplus = (camera_fps - tick_fps).max(0.0) * SECONDS;
-            let lack = (tick_fps - camera_fps).max(0.0) * SECONDS;
-            let beats = (seen.dropped as f64 - surplus).max(0.0) + (seen.doubled as f64 - lack).max(0.0);
+            let beats = seen.beats(camera_fps, tick_fps);
             let error = seen.p99_ms + 1e3 / 30.0 * beats / SECONDS;
             let scene = format!("camera {camera_fps} Hz, display {display_hz} Hz");
             let mut r = row("pacing", &scene, method, setting, error, "ms", cost_ns(method, repeats));
-            r.note = format!("p99 {:.1} ms, dropped {}, doubled {}", seen.p99_ms, seen.dropped, seen.doubled);
+            r.note = format!(
+                "p99 {:.1} ms, dropped {}, doubled {}, beats {beats:.0}",
+                seen.p99_ms, seen.dropped, seen.doubled
+            );
             r.default = method == "locked tick";
             // A camera of another rate than the tick's cannot be followed: it shows what happens then.
             r.extreme = camera_fps == 25.0;
