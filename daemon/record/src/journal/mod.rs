@@ -145,7 +145,7 @@ impl From<&JournalOptions> for Settings {
             pages_cached: None,
             reserve_bytes: options.reserve_bytes,
             checkpoint_pages: options.checkpoint_pages,
-            kept_max: 100_000,
+            kept_max: 10_000,
             held_max: 100_000,
             retry_first: Duration::from_millis(50),
             retry_max: Duration::from_secs(1),
