@@ -20,7 +20,7 @@ use super::{
 };
 
 /// Pictures of the tape. Small, because the machine's processor is emulated.
-pub const PICTURE: (u32, u32) = (160, 96);
+pub const PICTURE: (u32, u32) = (192, 128);
 /// Pixels of the LCD: as many as software Vulkan in emulation draws at a steady rate.
 pub const LCD: (u32, u32) = (160, 96);
 /// Length of the disk that the data partition is on: small enough to be filled in seconds.
@@ -90,7 +90,7 @@ impl Shop {
             let mut bench = Bench::switch_on(self, &data, "utc")?;
             bench.pull(1, true)?;
             bench.play()?;
-            bench.ready(FIRST_START).inspect_err(|_| bench.keep_picture("first-start"))?;
+            bench.started(FIRST_START)?;
             // Rounds and a hit have shaders of their own.
             bench.shoot(3000)?;
             thread::sleep(Duration::from_secs(20));
@@ -128,6 +128,15 @@ fn make_tape(recording: &Path, out: &Path) -> Result<Tape> {
     Ok(tape)
 }
 
+/// What the tape is made from.
+pub fn recipe() -> hw_sim::make::Recipe {
+    let mut recipe =
+        hw_sim::make::Recipe { width: PICTURE.0, height: PICTURE.1, ..hw_sim::make::Recipe::default() };
+    // Each packet costs the emulated processor as much as twenty cost a real one.
+    recipe.imu.rate_hz = 100.0;
+    recipe
+}
+
 /// A camera on USB has a serial number; this one gets its own, so that it is found again by it.
 const CAMERA_RULE: &str = r#"SUBSYSTEM=="video4linux", ATTR{name}=="HIL camera", ENV{ID_SERIAL}="HIL_camera_0001", ENV{ID_SERIAL_SHORT}="0001", SYMLINK+="v4l/by-id/usb-HIL_camera_0001-video-index0"
 "#;
@@ -142,6 +151,8 @@ StandardError=journal
 WatchdogSec=60
 TimeoutStartSec=600
 TimeoutStopSec=20
+# Software Vulkan compiles in a third of the time where LLVM does not optimise; what it draws stays the same.
+Environment=GALLIVM_PERF=nopt
 Environment=VK_ADD_LAYER_PATH=/run/hil/layer
 Environment=VK_INSTANCE_LAYERS=VK_LAYER_BOWWAVE_gpu_fault
 Environment=BOWWAVE_GPU_FAULT=/run/bowwave/gpu-fault
@@ -342,6 +353,26 @@ impl Bench {
             }
             thread::sleep(Duration::from_millis(20));
         }
+    }
+
+    /// Waits for the end of a start, and tells meanwhile how it goes.
+    pub fn started(&mut self, patience: Duration) -> Result<()> {
+        let until = Instant::now() + patience;
+        while self.ready(Duration::from_secs(20)).is_err() {
+            let seconds = self.machine.power_on.elapsed().as_secs();
+            eprintln!("  {seconds} s after power-on: \"{}\"", self.status()?);
+            if Instant::now() > until {
+                let lines = self.machine.guest.journal_since(0);
+                let last: Vec<&str> = lines.iter().rev().take(12).map(|e| e.text()).collect();
+                self.keep_picture("start");
+                bail!(
+                    "not READY after {} s; the journal, newest first: {}",
+                    patience.as_secs(),
+                    last.join(" | ")
+                );
+            }
+        }
+        Ok(())
     }
 
     /// Waits until the LCD says READY. A warning may stand beside it: IMU LATE comes and goes where the processor is emulated.

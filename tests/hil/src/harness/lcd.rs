@@ -126,7 +126,7 @@ impl Dump {
 }
 
 /// READY's green, HIT's cyan, FAULT's red, the amber of NOT SCORED and of warnings, as sRGB (`render/src/hud_layout.rs`).
-const COLOURS: [[u8; 3]; 4] = [[89, 225, 111], [97, 211, 237], [249, 80, 69], [255, 180, 39]];
+const COLOURS: [[u8; 3]; 4] = [[89, 225, 111], [97, 211, 237], [255, 105, 89], [255, 180, 39]];
 
 fn near(pixel: [u8; 3], colour: [u8; 3]) -> bool {
     pixel.iter().zip(colour).all(|(a, b)| a.abs_diff(b) <= 10)
@@ -142,7 +142,7 @@ pub struct Watch {
 
 impl Watch {
     /// Begins to look.
-    pub fn start(mut qmp: Qmp, folder: &Path) -> Result<Self> {
+    pub fn start(mut qmp: Qmp, folder: &Path, size: (u32, u32)) -> Result<Self> {
         let sights = Arc::new(Mutex::new(Vec::new()));
         let newest = Arc::new(Mutex::new(None));
         let stop = Arc::new(AtomicBool::new(false));
@@ -153,7 +153,9 @@ impl Watch {
             while !stop.load(Ordering::Relaxed) {
                 let at = Instant::now();
                 if let Ok(dump) = take(&mut qmp, &path) {
-                    let (plate, warning) = dump.plate();
+                    // Before the machine has set a mode, QEMU shows a text of its own.
+                    let own = (dump.width as u32, dump.height as u32) == size;
+                    let (plate, warning) = if own { dump.plate() } else { (Plate::Black, false) };
                     locked(&sights).push(Sight { at, plate, warning });
                     *locked(&newest) = Some(dump);
                 }

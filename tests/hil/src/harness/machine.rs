@@ -148,7 +148,9 @@ impl Machine {
         parts.initrd(&initrd)?;
         let (unit, terminal) = Unit::new()?;
         let log = |name: &str| fs::File::create(folder.join(name)).with_context(|| format!("{name} of QEMU"));
-        let mut qemu = Command::new("qemu-system-x86_64");
+        // Whatever becomes of the harness, the machine does not outlive it.
+        let mut qemu = Command::new("setpriv");
+        qemu.args(["--pdeathsig", "KILL", "qemu-system-x86_64"]);
         qemu.args(arguments(parts, start, &initrd, unit.path()));
         let power_on = Instant::now();
         let process = qemu
@@ -159,7 +161,7 @@ impl Machine {
             .context("qemu-system-x86_64 cannot be run; ./check setup installs it")?;
         let connected = || -> Result<_> {
             let qmp = Qmp::connect(&folder.join("qmp"))?;
-            let lcd = Watch::start(Qmp::connect(&folder.join("watch"))?, folder)?;
+            let lcd = Watch::start(Qmp::connect(&folder.join("watch"))?, folder, start.lcd)?;
             let guest = Guest::new(wait_for_socket(&folder.join("ctl"))?)?;
             unit.relay(wait_for_socket(&folder.join("imu"))?, terminal)?;
             Ok((qmp, lcd, guest))

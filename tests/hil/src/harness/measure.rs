@@ -7,7 +7,7 @@ use bowwave_hil::protocol::Command;
 use glam::DVec3;
 use serde_json::Value;
 
-use super::bench::{Bench, PICTURE};
+use super::bench::{Bench, recipe};
 
 /// A line of the list of figures.
 pub struct Figure {
@@ -78,8 +78,7 @@ pub fn shots(bench: &mut Bench, line_delay_ms: Option<f64>) -> Result<Vec<Figure
     let mut figures = Vec::new();
     figures.extend(edges(bench, &rounds));
     figures.push(order(bench, &rounds));
-    let recipe = hw_sim::make::Recipe { width: PICTURE.0, height: PICTURE.1, ..Default::default() };
-    let motion = recipe.motion();
+    let motion = recipe().motion();
     let bore_at = |ns: i64| {
         let t = (ns - origin).rem_euclid(recipe_period(bench)) as f64 * 1e-9;
         motion.at(t).pose.world_from_camera * DVec3::Z

@@ -6,7 +6,10 @@ use anyhow::{Result, ensure};
 use bowwave_hil::protocol::Command;
 
 use super::{Case, Own, Row, Seen, Shown};
-use crate::bench::{Bench, Configured, PICTURE, Told};
+use crate::{
+    bench::{Bench, Configured, PICTURE, Told},
+    guest::Entry,
+};
 
 const EBUSY: i32 = 16;
 const EPROTO: i32 = 71;
@@ -88,7 +91,7 @@ pub fn rows() -> Vec<Row> {
             fault: "Buffer with the error flag",
             injected: "30 % of the buffers carry V4L2_BUF_FLAG_ERROR",
             code: "-",
-            target: "next frame: READY throughout",
+            target: "next frame: no fault of the camera",
             run: |b| goes_on(b, |f| f.flagged = 0.3),
         }),
         Row::Case(Case {
@@ -102,7 +105,7 @@ pub fn rows() -> Vec<Row> {
             lasts: true,
             stays_s: 0.0,
             inject: |b| b.camera("fail queue"),
-            end: |b| Ok(b.machine.guest.now_ns()),
+            end: |_| Ok(0),
         }),
         Row::Case(Case {
             number: "8",
@@ -182,7 +185,7 @@ pub fn rows() -> Vec<Row> {
             fault: "Camera lies about its format",
             injected: "20 % of the pictures have half the bytes",
             code: "-",
-            target: "next frame: READY throughout",
+            target: "next frame: no fault of the camera",
             run: |b| goes_on(b, |f| f.short = 0.2),
         }),
         Row::Case(Case {
@@ -224,24 +227,20 @@ pub fn rows() -> Vec<Row> {
     ]
 }
 
-/// READY throughout, and no fault in the journal.
+/// The camera goes on: no fault of its own in the journal, and the LCD shows none of its causes.
 fn goes_on(bench: &mut Bench, change: fn(&mut bowwave_hil::protocol::Feed)) -> Result<Seen> {
     bench.ready(bench.scaled(2.0))?;
     let from = bench.feed(change)?;
-    let since = std::time::Instant::now();
     thread::sleep(Duration::from_secs(5));
     let status = bench.status()?;
     quiet(bench)?;
-    let lost = bench.machine.lcd.first(since, |s| s.plate == crate::lcd::Plate::NotScored);
-    let said: Vec<String> = bench
-        .machine
-        .guest
-        .journal_since(from)
-        .iter()
-        .filter(|e| e.fields["FAULT_STATE"] == "raised")
-        .map(|e| e.text().to_owned())
-        .collect();
-    let met = lost.is_none() && said.is_empty() && status.starts_with("READY");
+    let of_camera = |e: &Entry| {
+        e.fields["FAULT_STATE"] == "raised"
+            && e.fields["FAULT_CODE"].as_str().is_some_and(|c| c.starts_with("CAM"))
+    };
+    let lines = bench.machine.guest.journal_since(from);
+    let said: Vec<&str> = lines.iter().filter(|e| of_camera(e)).map(Entry::text).collect();
+    let met = said.is_empty() && !status.contains("CAM") && !status.contains("PICTURE");
     Ok(Seen { lcd: status, met, note: said.join("; "), ..Seen::default() })
 }
 

@@ -49,7 +49,7 @@ pub struct Case {
     pub stays_s: f64,
     /// Brings the cause about; the machine's time of that.
     pub inject: fn(&mut Bench) -> Result<i64>,
-    /// Takes the cause away; the machine's time of that.
+    /// Takes the cause away; the machine's time of that. 0 where it goes by itself: then times count from its coming.
     pub end: fn(&mut Bench) -> Result<i64>,
 }
 
@@ -262,7 +262,7 @@ impl Case {
         let caused = (self.inject)(bench)?;
         let at = bench.machine.guest.host_time(caused);
         let patience = bench.scaled(self.seen_s.unwrap_or(1.0)) + EXTRA;
-        bench.told(self.code, Told::Came, from, patience)?;
+        let came = bench.told(self.code, Told::Came, from, patience)?;
         if let Some(seen) = bench.shown(self.shown, at, patience)? {
             line.seen_s = Some(seen.saturating_duration_since(at).as_secs_f64());
         }
@@ -276,11 +276,13 @@ impl Case {
         }
         bench.keep_picture(&format!("row-{}", self.number));
         std::thread::sleep(Duration::from_secs_f64(self.stays_s));
-        let until = bench.machine.guest.now_ns();
-        let ended = (self.end)(bench)?;
+        let ended = match (self.end)(bench)? {
+            0 => caused,
+            ended => ended,
+        };
         if self.lasts {
             let patience = bench.scaled(self.back_s.unwrap_or(2.0)) + EXTRA;
-            let went = bench.told(self.code, Told::Went, until, patience)?;
+            let went = bench.told(self.code, Told::Went, came.max(ended), patience)?;
             let over = bench.machine.guest.host_time(ended);
             let mut back = (went - ended) as f64 * 1e-9;
             if self.shown != Shown::Nothing {

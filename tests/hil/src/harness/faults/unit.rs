@@ -136,7 +136,7 @@ pub fn rows() -> Vec<Row> {
                 Ok(b.machine.guest.now_ns())
             },
             // Nothing is mended: the rate must be found.
-            end: |b| Ok(b.machine.guest.now_ns()),
+            end: |_| Ok(0),
         }),
         sanity("20a", "rates and accelerations repeat, the unit's clock goes on", |b| {
             b.feed(|f| f.stuck = true)
