@@ -11,6 +11,10 @@ use crate::{
 
 /// A round that struck nothing after this time is no longer followed, seconds.
 const LIFE_S: f64 = 20.0;
+/// The path may bend by so much in a turning boat's space before it is followed in shorter pieces, metres.
+const BEND_M: f64 = 0.005;
+/// Most pieces of a stretch.
+const PIECES_MAX: f64 = 32.0;
 /// Distance between the places at which a low round is held against the waves, metres.
 const WATER_STEP_M: f64 = 1.0;
 
@@ -165,11 +169,25 @@ fn sweep_boat(
 ) -> Option<(f64, Zone, DVec3)> {
     let (a, b) = (segment.from.position, segment.to.position);
     let (p, q) = (moving.pose_at(from_s, eye), moving.pose_at(to_s, eye));
-    if distance_to_origin(a - p.position, b - q.position) > moving.reach_m() {
+    let (near, far) = (a - p.position, b - q.position);
+    if distance_to_origin(near, far) > moving.reach_m() {
         return None;
     }
-    let hit = strike(moving.model, p.to_body(a), q.to_body(b))?;
-    Some((hit.fraction, hit.zone, hit.point))
+    // Straight in the world is an arc in a boat that turns: an arc of length d that turns by w bends by w d / 4 from its chord, and
+    // by the square of the pieces less.
+    let bend_m = p.world_from_body.angle_between(q.world_from_body) * near.distance(far) / 4.0;
+    let pieces = (bend_m / BEND_M).sqrt().ceil().clamp(1.0, PIECES_MAX);
+    let in_body = |s: f64| moving.pose_at(from_s + s * (to_s - from_s), eye).to_body(a.lerp(b, s));
+    let mut begin = p.to_body(a);
+    for i in 0..pieces as u32 {
+        let to = f64::from(i + 1) / pieces;
+        let end = if to < 1.0 { in_body(to) } else { q.to_body(b) };
+        if let Some(hit) = strike(moving.model, begin, end) {
+            return Some(((f64::from(i) + hit.fraction) / pieces, hit.zone, hit.point));
+        }
+        begin = end;
+    }
+    None
 }
 
 /// Least distance of the stretch from `a` to `b` from the origin.
