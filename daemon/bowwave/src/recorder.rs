@@ -100,6 +100,11 @@ impl Recorder {
         self.dropped += u64::from(lost);
     }
 
+    /// Whether its thread has ended before it was asked to: it could not write. [`Self::finish`] says why.
+    pub fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_some_and(JoinHandle::is_finished)
+    }
+
     /// Entries that found no place.
     pub const fn dropped(&self) -> u64 {
         self.dropped

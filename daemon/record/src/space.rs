@@ -6,17 +6,22 @@ use std::{
 };
 
 use bowwave_core::time::{NS_PER_S, Time};
-use rustix::fs::statvfs;
+use rustix::fs::{StatVfs, StatVfsMountFlags, statvfs};
 
 /// Bytes that an unprivileged program may still write to the file system of `path`, a file or its folder.
 pub fn free_bytes(path: &Path) -> io::Result<u64> {
+    let status = status(path)?;
+    Ok(status.f_bavail.saturating_mul(status.f_frsize))
+}
+
+fn status(path: &Path) -> io::Result<StatVfs> {
     let status = statvfs(path).or_else(|error| match path.parent() {
         Some(parent) if error == rustix::io::Errno::NOENT => {
             statvfs(if parent.as_os_str().is_empty() { Path::new(".") } else { parent })
         }
         _ => Err(error),
     })?;
-    Ok(status.f_bavail.saturating_mul(status.f_frsize))
+    Ok(status)
 }
 
 /// How often the disk is asked, nanoseconds.
@@ -32,6 +37,8 @@ pub enum Room {
         /// Bytes that are free.
         free_bytes: u64,
     },
+    /// Nothing can be written: the kernel does that to a file system whose disk fails.
+    ReadOnly,
 }
 
 /// Says when the space gets low, with hysteresis: low below the limit, enough again from twice the limit on.
@@ -57,8 +64,12 @@ impl SpaceWatch {
     pub fn room(&mut self, now: Time) -> Room {
         if self.asked.is_none_or(|asked| now.ns_since(asked) >= EVERY_NS || now < asked) {
             self.asked = Some(now);
-            match free_bytes(&self.path) {
-                Ok(free) => self.room = next(self.room, free, self.limit_bytes),
+            match status(&self.path) {
+                Ok(status) if status.f_flag.contains(StatVfsMountFlags::RDONLY) => self.room = Room::ReadOnly,
+                Ok(status) => {
+                    let free = status.f_bavail.saturating_mul(status.f_frsize);
+                    self.room = next(self.room, free, self.limit_bytes);
+                }
                 Err(error) => log::debug!("free space at {}: {error}", self.path.display()),
             }
         }
@@ -68,7 +79,7 @@ impl SpaceWatch {
 
 fn next(room: Room, free_bytes: u64, limit_bytes: u64) -> Room {
     let limit = match room {
-        Room::Enough => limit_bytes,
+        Room::Enough | Room::ReadOnly => limit_bytes,
         Room::Low { .. } => limit_bytes.saturating_mul(2),
     };
     if free_bytes < limit { Room::Low { free_bytes } } else { Room::Enough }
@@ -87,6 +98,21 @@ mod tests {
             room = next(room, free, 100);
             assert_eq!(room, if low { Room::Low { free_bytes: free } } else { Room::Enough }, "{free}");
         }
+    }
+
+    #[test]
+    fn a_read_only_file_system_is_seen_without_writing() {
+        let mut watch = SpaceWatch::new(Path::new("/proc/sys/kernel"), 0);
+        assert_eq!(watch.room(Time::from_ns(0)), Room::Enough);
+        // Mounted read-only on every Linux, where there is one at all.
+        let Some(path) = ["/sys/fs/cgroup", "/sys/firmware", "/proc/sys"]
+            .into_iter()
+            .find(|p| statvfs(*p).is_ok_and(|s| s.f_flag.contains(StatVfsMountFlags::RDONLY)))
+        else {
+            eprintln!("not tested: nothing is mounted read-only here");
+            return;
+        };
+        assert_eq!(SpaceWatch::new(Path::new(path), 0).room(Time::from_ns(0)), Room::ReadOnly);
     }
 
     #[test]

@@ -175,6 +175,22 @@ fn cells_and_json_say_the_same() {
 }
 
 #[test]
+fn what_lies_at_the_programs_own_path_was_a_journal() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.sqlite");
+    let garbage = [0xa5; 8192];
+    fs::write(&path, garbage).unwrap();
+    let options = JournalOptions { own: true, ..JournalOptions::default() };
+    let journal = Journal::open_with(&path, &run(), &options).unwrap();
+    let aside = journal.quarantined().unwrap();
+    assert!(aside.reason.contains("no database"), "{}", aside.reason);
+    assert_eq!(fs::read(&aside.kept_as).unwrap(), garbage);
+    journal.shot(&shot(1)).unwrap();
+    journal.finish().unwrap();
+    assert_eq!(read_shots(&path, &ShotFilter::default()).unwrap().len(), 1);
+}
+
+#[test]
 fn what_is_no_journal_is_named_and_left_alone() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("holiday.mp4");

@@ -112,7 +112,10 @@ fn mode(text: &str) -> Result<WantedMode, String> {
         (Ok(frames), Ok(seconds)) => Rate::new(frames, seconds).ok_or_else(usage)?,
         _ => return Err(usage()),
     };
-    Ok(WantedMode { coding, width, height, rate })
+    let wanted = WantedMode { coding, width, height, rate };
+    let settings = CameraSettings { modes: vec![wanted], ..CameraSettings::default() };
+    settings.check().map_err(|e| e.to_string())?;
+    Ok(wanted)
 }
 
 #[derive(Deserialize)]
@@ -128,6 +131,7 @@ pub(super) struct RawImu {
     device: Option<PathBuf>,
     baud: Option<Spanned<RawBaud>>,
     low_latency: Option<bool>,
+    late_ms: Option<Spanned<f64>>,
 }
 
 impl RawImu {
@@ -148,7 +152,14 @@ impl RawImu {
                 baud
             }
         };
-        Ok(ImuSettings { device: self.device, baud, low_latency: self.low_latency.unwrap_or(true) })
+        let late = source.number(self.late_ms, "imu.late_ms", 1.0..=1000.0)?;
+        let usual = ImuSettings::default();
+        Ok(ImuSettings {
+            device: self.device,
+            baud,
+            low_latency: self.low_latency.unwrap_or(usual.low_latency),
+            late: late.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
+        })
     }
 }
 

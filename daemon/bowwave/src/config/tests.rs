@@ -41,6 +41,7 @@ fn every_key_is_read() {
         device = "/dev/bowwave/imu"
         baud = [115200, 921600]
         low_latency = false
+        late_ms = 12.5
         [trigger]
         chip = "/dev/gpiochip0"
         line = 17

@@ -1,6 +1,7 @@
 //! The output thread: waits for finished frames and takes them to the LCD, the window, the hash, the video and the pictures.
 
 mod hashes;
+mod lateness;
 mod pictures;
 mod video;
 mod window;
@@ -21,6 +22,7 @@ use sha2::{Digest, Sha256};
 
 use crate::stats::Samples;
 use hashes::HashLog;
+use lateness::Lateness;
 use pictures::{ContactSheet, copy_frame, write_still};
 use video::VideoWriter;
 use window::{Pressed, Screen};
@@ -193,6 +195,7 @@ struct Worker {
     sheet: Option<ContactSheet>,
     screen: Option<Screen>,
     hash: Sha256,
+    lateness: Lateness,
     report: OutputReport,
 }
 
@@ -215,6 +218,7 @@ impl Worker {
             sheet,
             screen: None,
             hash: Sha256::new(),
+            lateness: Lateness::default(),
             report: OutputReport::default(),
         }
     }
@@ -254,11 +258,10 @@ impl Worker {
         self.report.frames += 1;
         if let Some(deadline) = ticket.deadline.filter(|d| complete > *d) {
             self.report.late += 1;
-            log::info!(
-                "frame {} was complete {:.1} ms late",
-                ticket.frame,
-                complete.secs_since(deadline) * 1e3
-            );
+            let late_s = complete.secs_since(deadline);
+            if let Some(line) = self.lateness.take(ticket.frame, complete, late_s) {
+                log::info!("{line}");
+            }
         }
         if let Some(lcd) = &self.options.lcd {
             // Without a display, frames go nowhere; the port has reported that.

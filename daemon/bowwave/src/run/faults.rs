@@ -41,6 +41,19 @@ impl Faults {
         }
     }
 
+    /// Everything is looked at anew: the log is told that what there was is over.
+    pub fn end_all(&mut self) {
+        let mut nobody = Vec::new();
+        for fault in self.board.active().collect::<Vec<_>>() {
+            self.set(fault, None, &mut nobody);
+        }
+    }
+
+    /// The warnings that are there.
+    pub fn warnings(&self) -> impl Iterator<Item = Fault> + '_ {
+        self.board.active().filter(|f| f.severity() == Severity::Warning)
+    }
+
     /// How often each fault came or happened, those that never did left out.
     pub fn counts(&self) -> impl Iterator<Item = (&'static str, u64)> + '_ {
         Fault::ALL.into_iter().map(|f| (f.code(), self.board.times(f))).filter(|(_, n)| *n > 0)
@@ -77,6 +90,17 @@ impl Faults {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_is_left_when_all_is_looked_at_anew() {
+        let mut faults = Faults::new(None);
+        let mut events = Vec::new();
+        for fault in [Fault::Config, Fault::ImuLost] {
+            faults.set(fault, Some("a".into()), &mut events);
+        }
+        faults.end_all();
+        assert_eq!((faults.board.active().count(), events.len()), (0, 2));
+    }
 
     #[test]
     fn the_session_hears_of_what_lasts_only() {

@@ -7,7 +7,7 @@ use bowwave_core::{
     event::Event,
     fault::{Fault, FaultChange},
     scene::Status,
-    time::{NS_PER_S, Time},
+    time::Time,
 };
 use bowwave_devices::{
     camera::CameraPort,
@@ -18,6 +18,7 @@ use bowwave_devices::{
     serial::ImuPort,
     trigger::{TriggerPort, TriggerSettings},
 };
+use bowwave_render::TimeOuts;
 
 use super::{
     health::Health,
@@ -26,12 +27,17 @@ use super::{
 };
 use crate::config::ScreenOutput;
 
-/// A thread without a sign of life for this long hangs.
-const HEARTBEAT_MAX_NS: i64 = NS_PER_S;
+/// A thread without a sign of life for so much longer than a GPU may take for a frame hangs: 1 s in all, where nothing is
+/// configured. A computer on which a frame may take seconds is slow at everything.
+const HEARTBEAT_BEYOND: Duration = Duration::from_millis(500);
 /// A trigger held for this long beyond the time that the belt lasts is stuck.
 const STUCK_BEYOND: Duration = Duration::from_secs(3);
 /// The longest that is watched for: nobody holds a trigger for an hour.
 const STUCK_MOST: Duration = Duration::from_secs(3600);
+/// The trigger's thread.
+const TRIGGER: &str = "trigger";
+/// The thread that watches the computer.
+const HEALTH: &str = "health";
 /// How long the first start waits for the LCD, to draw in its size.
 const LCD_WAIT: Duration = Duration::from_millis(1500);
 
@@ -44,6 +50,8 @@ pub struct Hardware {
     lamps: Option<Lamps>,
     health: Health,
     threads: Vec<(&'static str, Reports)>,
+    /// The longest that a thread may be silent.
+    heartbeat_ns: i64,
     output: Reporter,
     fetched: Vec<Event>,
 }
@@ -65,23 +73,22 @@ impl Hardware {
         let training = mode == Mode::Training;
         let imu = training.then(|| ImuPort::start(config.imu.clone(), reporter("imu"))).transpose()?;
         let trigger = if training { trigger_settings(settings, faults) } else { None };
-        let lamps = match (&config.lamps, &trigger) {
-            (Some(lamps), trigger) => {
-                Some(Lamps::open(lamps.clone(), trigger.iter().flat_map(TriggerSettings::inputs)))
-            }
-            (None, _) => None,
-        };
-        let lamps = match lamps.transpose() {
-            Ok(lamps) => lamps,
+        let lamps = lamps(settings, faults);
+        let health = Health::start(&config.health, reporter(HEALTH))?;
+        let output = reporter("output");
+        let trigger = match trigger.map(|t| TriggerPort::start(t, reporter(TRIGGER))).transpose() {
+            Ok(trigger) => trigger,
             Err(e) => {
-                faults.push(FaultChange::raised(now(), Fault::Config, format!("{e}; no lamp is lit")));
+                faults.push(FaultChange::raised(now(), Fault::Config, format!("{e}; there is no trigger")));
+                // Nobody gives its signs of life.
+                threads.retain(|(name, _)| *name != TRIGGER);
                 None
             }
         };
-        let trigger = trigger.map(|t| TriggerPort::start(t, reporter("trigger"))).transpose()?;
-        let health = Health::start(&config.health, reporter("health"))?;
-        let output = reporter("output");
-        Ok(Self { camera, imu, trigger, lcd, lamps, health, threads, output, fetched: Vec::new() })
+        let heartbeat = config.hang.unwrap_or(TimeOuts::default().frame) + HEARTBEAT_BEYOND;
+        let heartbeat_ns = i64::try_from(heartbeat.as_nanos()).unwrap_or(i64::MAX);
+        let fetched = Vec::new();
+        Ok(Self { camera, imu, trigger, lcd, lamps, health, threads, heartbeat_ns, output, fetched })
     }
 
     /// The LCD, to show on.
@@ -147,21 +154,21 @@ impl Hardware {
     pub fn hanging(&self, now: Time) -> Option<&'static str> {
         self.threads
             .iter()
-            .find(|(_, reports)| now.ns_since(reports.last_beat()) > HEARTBEAT_MAX_NS)
+            // Some temperature sensors take seconds to answer, which is no reason to end a training.
+            .filter(|(name, _)| *name != HEALTH)
+            .find(|(_, reports)| now.ns_since(reports.last_beat()) > self.heartbeat_ns)
             .map(|(name, _)| *name)
     }
 
-    /// Lights the lamps that belong to `status`.
-    pub fn light(&mut self, status: &Status, now: Time) {
+    /// Lights the lamps that belong to `status`; never waits for them.
+    pub fn light(&mut self, status: &Status) {
         let Some(lamps) = &mut self.lamps else { return };
         let state = LampState {
             ready: matches!(status, Status::Ready | Status::Hit | Status::Miss),
             hit: *status == Status::Hit,
             fault: matches!(status, Status::NotScored { .. } | Status::Fault { .. }),
         };
-        if let Err(e) = lamps.set(now, state) {
-            log::warn!("{e}");
-        }
+        lamps.set(state);
     }
 
     /// Names and counters of what the devices met, for the summary.
@@ -209,11 +216,31 @@ impl Hardware {
         if let Some(Err(e)) = trigger.map(TriggerPort::stop) {
             told("trigger", &e);
         }
-        drop(lamps);
+        if let Some(Err(e)) = lamps.map(Lamps::stop) {
+            told("lamps", &e);
+        }
         health.stop();
         // The output thread, which shared it, has ended.
         if let Some(Err(e)) = lcd.and_then(Arc::into_inner).map(LcdPort::stop) {
             told("LCD", &e);
+        }
+    }
+}
+
+/// The lamps. No configured input is one of them, whether it is used now or not.
+fn lamps(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<Lamps> {
+    let config = &settings.config;
+    let inputs = [
+        ("trigger", config.trigger.as_ref().map(|t| &t.line)),
+        ("interlock", config.interlock.as_ref()),
+        ("power-fail", config.power_fail.as_ref()),
+    ];
+    let inputs = inputs.into_iter().filter_map(|(name, line)| line.map(|line| (name, line)));
+    match Lamps::start(config.lamps.clone()?, inputs) {
+        Ok(lamps) => Some(lamps),
+        Err(e) => {
+            faults.push(FaultChange::raised(now(), Fault::Config, format!("{e}; no lamp is lit")));
+            None
         }
     }
 }

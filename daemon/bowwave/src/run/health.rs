@@ -30,6 +30,11 @@ const HYSTERESIS_C: f64 = 5.0;
 const STEP_NS: i64 = NS_PER_S / 2;
 /// A wall clock before this was never set: 2025-01-01, before the program was made.
 const SET_AFTER_NS: i64 = 1_735_689_600 * NS_PER_S;
+/// Where the system's start leaves a mark when it had to guess the time: whole seconds that the wall clock is ahead of the
+/// monotonic one. As long as it still is, nobody has set it.
+const GUESS: &str = "/run/bowwave-clock-guessed";
+/// The mark is in whole seconds, of two clocks that are read one after the other.
+const GUESS_NS: i64 = 3 * NS_PER_S;
 /// How often everything is looked at, and how often the thread says that it lives.
 const EVERY: Duration = Duration::from_millis(1000);
 const BEAT: Duration = Duration::from_millis(100);
@@ -71,12 +76,15 @@ impl Health {
         self.clock_set.try_recv().ok()
     }
 
-    /// Ends the thread, within a tenth of a second.
+    /// Ends the thread, within a tenth of a second; one that waits for a sensor is left to itself.
     pub fn stop(mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
+        let Some(thread) = self.thread.take() else { return };
+        let until = now().plus_ns(2 * BEAT.as_nanos() as i64);
+        while !thread.is_finished() && now() < until {
+            thread::sleep(Duration::from_millis(5));
+        }
+        if thread.is_finished() && thread.join().is_err() {
             log::error!("the thread that watches the computer broke down; report it with the log");
         }
     }
@@ -90,7 +98,7 @@ fn watch(
     stop: &AtomicBool,
 ) {
     let mut heat = Heat { limit_c, hot: false };
-    let mut wall = Wall::default();
+    let mut wall = Wall::guessed(guess(Path::new(GUESS)));
     loop {
         if let Some(celsius) = zones.iter().filter_map(|z| celsius(z)).reduce(f64::max) {
             match heat.take(celsius) {
@@ -109,7 +117,7 @@ fn watch(
             match told {
                 ClockNews::Unset => reporter.raised(
                     Fault::ClockUnset,
-                    "the wall clock was never set (no clock battery?): times count from the start, dates are filled in once it is set",
+                    "the wall clock was not set since power-on (no clock battery?): times count from the start, dates are filled in once it is set",
                 ),
                 ClockNews::Set(time) => {
                     reporter.cleared(Fault::ClockUnset);
@@ -139,6 +147,11 @@ fn thermal_zones() -> Vec<PathBuf> {
         .filter(|p| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with("thermal_zone")))
         .map(|p| p.join("temp"))
         .collect()
+}
+
+/// Seconds that a guessed wall clock is ahead of the monotonic one, where the time was guessed.
+fn guess(path: &Path) -> Option<i64> {
+    fs::read_to_string(path).ok()?.trim().parse().ok()
 }
 
 fn celsius(path: &Path) -> Option<f64> {
@@ -172,11 +185,19 @@ enum ClockNews {
 struct Wall {
     last: Option<WallTime>,
     set: Option<bool>,
+    /// How far the wall clock is ahead of the monotonic one when it is only guessed.
+    guess_ns: Option<i64>,
 }
 
 impl Wall {
+    fn guessed(ahead_s: Option<i64>) -> Self {
+        Self { guess_ns: ahead_s.map(|s| s.saturating_mul(NS_PER_S)), ..Self::default() }
+    }
+
     fn take(&mut self, time: WallTime) -> impl Iterator<Item = ClockNews> + use<> {
-        let set = time.wall_ns >= SET_AFTER_NS;
+        let ahead_ns = time.wall_ns.saturating_sub(time.at.ns());
+        let guessed = self.guess_ns.is_some_and(|ns| ahead_ns.abs_diff(ns) < GUESS_NS.unsigned_abs());
+        let set = time.wall_ns >= SET_AFTER_NS && !guessed;
         let changed = self.set.replace(set) != Some(set);
         let news = changed.then_some(if set { ClockNews::Set(time) } else { ClockNews::Unset });
         let stepped = self.last.replace(time).and_then(|last| {
@@ -212,6 +233,18 @@ mod tests {
         assert_eq!(told(&mut wall, 1_800_000_001, 13), []);
         let back = told(&mut wall, 1_799_996_402, 14);
         assert!(matches!(back[..], [ClockNews::Stepped { by_s }] if (by_s + 3600.0).abs() < 0.1), "{back:?}");
+    }
+
+    #[test]
+    fn a_guessed_clock_counts_as_unset_until_somebody_moves_it() {
+        let mut wall = Wall::guessed(Some(1_800_000_000));
+        assert_eq!(told(&mut wall, 1_800_000_011, 10), [ClockNews::Unset]);
+        assert_eq!(told(&mut wall, 1_800_000_012, 11), []);
+        let set = told(&mut wall, 1_800_090_000, 12);
+        assert!(matches!(set[..], [ClockNews::Stepped { .. }, ClockNews::Set(_)]), "{set:?}");
+        // A start of the trainer after that: the mark is still there.
+        let mut wall = Wall::guessed(Some(1_800_000_000));
+        assert!(matches!(told(&mut wall, 1_800_090_010, 22)[..], [ClockNews::Set(_)]));
     }
 
     #[test]

@@ -4,7 +4,8 @@
 use std::{
     collections::VecDeque,
     path::{Path, PathBuf},
-    time::SystemTime,
+    thread::{self, JoinHandle},
+    time::{Duration, SystemTime},
 };
 
 use anyhow::{Context, Result};
@@ -12,7 +13,7 @@ use bowwave_core::{
     event::Event,
     fault::{Fault, FaultChange},
     score::ShotRecord,
-    time::Time,
+    time::{NS_PER_S, Time},
 };
 use bowwave_devices::clock::now;
 use bowwave_record::{
@@ -28,11 +29,46 @@ const ROUNDS_WAITING_MAX: usize = 100_000;
 /// Free bytes below which a disk that only takes hits counts as full: months of them.
 const HITS_BYTES: u64 = 32 << 20;
 
+/// How long to wait before a journal that cannot be opened is tried again.
+const OPEN_AGAIN_NS: i64 = NS_PER_S;
+
+/// What is needed to open the journal, as often as it takes.
+#[derive(Clone)]
+struct Place {
+    path: PathBuf,
+    run: Run,
+}
+
+impl Place {
+    fn open(&self) -> Result<Journal, JournalError> {
+        let options = JournalOptions {
+            reserve_bytes: JournalOptions::RESERVE_BYTES,
+            own: true,
+            ..JournalOptions::default()
+        };
+        Journal::open_with(&self.path, &self.run, &options)
+    }
+}
+
+/// The journal, or why there is none yet.
+enum Store {
+    Open(Journal),
+    Shut {
+        error: JournalError,
+        next: Time,
+        /// The disk may take its time: the frame does not wait for it.
+        attempt: Option<JoinHandle<Result<Journal, JournalError>>>,
+    },
+}
+
 /// Journal and recording of a run.
 pub struct Keeping {
-    journal: Journal,
+    place: Place,
+    store: Store,
     waiting: VecDeque<ShotRecord>,
     recorder: Option<Recorder>,
+    /// Why nothing is recorded although it should be.
+    recording_failed: Option<String>,
     space: SpaceWatch,
     quarantined: Option<PathBuf>,
     wall: Option<WallTime>,
@@ -48,7 +84,7 @@ impl Keeping {
         boot_id: Option<String>,
         print_commits: bool,
         faults: &mut Vec<FaultChange>,
-    ) -> Result<Self> {
+    ) -> Self {
         let run = Run {
             // Filled in once the clock is known to be set.
             started_wall_ns: None,
@@ -59,27 +95,36 @@ impl Keeping {
             boot_id,
             started: Some(now()),
         };
-        let options =
-            JournalOptions { reserve_bytes: JournalOptions::RESERVE_BYTES, ..JournalOptions::default() };
-        let journal = Journal::open_with(&folder.join(JOURNAL), &run, &options)?;
-        if let Some(dirty) = journal.previous() {
-            let cause = format!(
-                "run {} did not end as it should ({:?}); its committed rounds are kept",
-                dirty.run, dirty.end
-            );
-            faults.push(FaultChange::noted(now(), Fault::BootDirty, cause));
-        }
-        let recorder = if settings.config.record { Some(recorder(folder, settings)?) } else { None };
+        let place = Place { path: folder.join(JOURNAL), run };
+        let store = match place.open() {
+            Ok(journal) => {
+                faults.extend(dirty(&journal));
+                Store::Open(journal)
+            }
+            Err(error) => {
+                log::error!("{error}; hits are kept in memory until it can be opened");
+                Store::Shut { error, next: now().plus_ns(OPEN_AGAIN_NS), attempt: None }
+            }
+        };
+        let mut recording_failed = None;
+        let recorder = if settings.config.record {
+            let begun = recorder(folder, settings);
+            begun.inspect_err(|e| recording_failed = Some(format!("nothing is recorded: {e:#}"))).ok()
+        } else {
+            None
+        };
         let space = SpaceWatch::new(folder, space_limit(folder, recorder.is_some()));
-        Ok(Self {
-            journal,
+        Self {
+            place,
+            store,
             waiting: VecDeque::new(),
             recorder,
+            recording_failed,
             space,
             quarantined: None,
             wall: None,
             print_commits,
-        })
+        }
     }
 
     /// Takes in what devices reported, for the recording.
@@ -115,41 +160,89 @@ impl Keeping {
 
     /// Hands on what waits, and tells what is wrong with the disk. Never waits.
     pub fn tend(&mut self, faults: &mut Faults, events: &mut Vec<Event>) -> Result<()> {
-        while let Some(record) = self.waiting.front() {
-            match self.journal.shot(record) {
-                Ok(()) => drop(self.waiting.pop_front()),
-                // They are tried again with the next frame.
-                Err(JournalError::QueueFull { .. }) => break,
-                Err(e) => return Err(e).context("rounds cannot be kept"),
+        self.open_again(faults, events);
+        if let Store::Open(journal) = &self.store {
+            while let Some(record) = self.waiting.front() {
+                match journal.shot(record) {
+                    Ok(()) => drop(self.waiting.pop_front()),
+                    // They are tried again with the next frame.
+                    Err(JournalError::QueueFull { .. }) => break,
+                    Err(e) => return Err(e).context("rounds cannot be kept"),
+                }
             }
-        }
-        if let Some(wall) = self.wall
-            && self.journal.set_wall_clock(wall.wall_ns, wall.at).is_ok()
-        {
-            self.wall = None;
-        }
-        if self.print_commits {
-            crate::commits::print(self.journal.commits().try_iter())?;
-        } else {
-            // Acknowledgements that nobody reads must not pile up.
-            self.journal.commits().try_iter().for_each(drop);
+            if let Some(wall) = self.wall
+                && journal.set_wall_clock(wall.wall_ns, wall.at).is_ok()
+            {
+                self.wall = None;
+            }
+            if self.print_commits {
+                crate::commits::print(journal.commits().try_iter())?;
+            } else {
+                // Acknowledgements that nobody reads must not pile up.
+                journal.commits().try_iter().for_each(drop);
+            }
         }
         self.tend_disk(faults, events);
         Ok(())
     }
 
+    /// Tries to open a journal that could not be opened.
+    fn open_again(&mut self, faults: &mut Faults, events: &mut Vec<Event>) {
+        let Store::Shut { error, next, attempt } = &mut self.store else { return };
+        if let Some(thread) = attempt.take_if(|thread| thread.is_finished()) {
+            match thread.join() {
+                Ok(Ok(journal)) => {
+                    if let Some(change) = dirty(&journal) {
+                        faults.take(change, events);
+                    }
+                    log::warn!("the journal is open; {} rounds from memory go into it", self.waiting.len());
+                    self.store = Store::Open(journal);
+                    return;
+                }
+                Ok(Err(e)) => *error = e,
+                Err(_) => log::error!("opening the journal broke down; report it with the log"),
+            }
+            *next = now().plus_ns(OPEN_AGAIN_NS);
+        }
+        if attempt.is_none() && now() >= *next {
+            let place = self.place.clone();
+            match thread::Builder::new().name("journal-open".to_owned()).spawn(move || place.open()) {
+                Ok(thread) => *attempt = Some(thread),
+                Err(e) => {
+                    log::debug!("no thread to open the journal: {e}");
+                    *next = now().plus_ns(OPEN_AGAIN_NS);
+                }
+            }
+        }
+    }
+
+    /// What is wrong with the journal: code, and why.
+    fn broken(&self) -> Option<(Fault, String)> {
+        match &self.store {
+            Store::Open(journal) => journal
+                .fault()
+                .map(|b| (b.fault, format!("{} ({} rounds wait in memory)", b.message, b.waiting))),
+            Store::Shut { error, .. } => {
+                Some((error.fault(), format!("{error} ({} rounds wait in memory)", self.waiting.len())))
+            }
+        }
+    }
+
     fn tend_disk(&mut self, faults: &mut Faults, events: &mut Vec<Event>) {
-        let broken = self.journal.fault();
-        let cause = |fault| {
-            broken
-                .as_ref()
-                .filter(|b| b.fault == fault)
-                .map(|b| format!("{} ({} rounds wait in memory)", b.message, b.waiting))
-        };
-        faults.set(Fault::DiskReadOnly, cause(Fault::DiskReadOnly), events);
-        faults.set(Fault::DiskFsync, cause(Fault::DiskFsync), events);
-        let low = match self.space.room(now()) {
-            Room::Enough => None,
+        let broken = self.broken();
+        let cause = |fault| broken.as_ref().filter(|(f, _)| *f == fault).map(|(_, why)| why.clone());
+        let room = self.space.room(now());
+        let read_only = (room == Room::ReadOnly)
+            .then(|| "the data partition is mounted read-only: hits are kept in memory; look at the kernel's log, replace the disk".to_owned());
+        faults.set(Fault::DiskReadOnly, cause(Fault::DiskReadOnly).or(read_only), events);
+        if let Some(recorder) = self.recorder.take_if(|r| r.has_ended()) {
+            // It ends by itself only where it cannot write.
+            self.recording_failed = Some("the recording has ended: see the log".to_owned());
+            end_recording(recorder);
+        }
+        faults.set(Fault::DiskFsync, cause(Fault::DiskFsync).or(self.recording_failed.clone()), events);
+        let low = match room {
+            Room::Enough | Room::ReadOnly => None,
             Room::Low { free_bytes } => Some(format!(
                 "{} MB are free: the recording ends, the rest is for hits; free the data partition",
                 free_bytes / 1_000_000
@@ -162,7 +255,8 @@ impl Keeping {
             end_recording(recorder);
         }
         faults.set(Fault::DiskFull, cause(Fault::DiskFull).or(low), events);
-        if let Some(quarantine) = self.journal.quarantined()
+        if let Store::Open(journal) = &self.store
+            && let Some(quarantine) = journal.quarantined()
             && self.quarantined.as_ref() != Some(&quarantine.kept_as)
         {
             let cause = format!(
@@ -185,31 +279,62 @@ impl Keeping {
 
     /// Writes everything and ends.
     pub fn finish(mut self) -> Result<()> {
-        // Room comes as the journal writes.
-        let give_up = now().plus_secs(0.3);
-        while let Some(record) = self.waiting.front() {
-            match self.journal.shot(record) {
-                Ok(()) => drop(self.waiting.pop_front()),
-                Err(JournalError::QueueFull { .. }) if now() < give_up => {
-                    std::thread::sleep(std::time::Duration::from_millis(2));
-                }
-                Err(e) => {
-                    log::error!("{} rounds are lost: {e}", self.waiting.len());
-                    break;
-                }
+        let journal = match self.store {
+            Store::Open(journal) => Some(journal),
+            // The last chance of rounds that are in memory only.
+            Store::Shut { attempt: None, .. } if !self.waiting.is_empty() => {
+                self.place.open().inspect_err(|e| log::error!("{e}")).ok()
             }
-        }
-        let commits = self.journal.commits().clone();
-        let ended = self.journal.finish();
-        if self.print_commits {
-            crate::commits::print(commits.try_iter())?;
-        }
+            Store::Shut { .. } => None,
+        };
+        let written = match journal {
+            Some(journal) => write_out(journal, &mut self.waiting, self.print_commits),
+            None if self.waiting.is_empty() => Ok(()),
+            None => Err(anyhow::anyhow!(
+                "{} rounds are lost: the journal could not be opened",
+                self.waiting.len()
+            )),
+        };
         if let Some(recorder) = self.recorder.take() {
             end_recording(recorder);
         }
-        ended?;
-        Ok(())
+        written
     }
+}
+
+/// Hands what waits to the journal and ends it.
+fn write_out(journal: Journal, waiting: &mut VecDeque<ShotRecord>, print_commits: bool) -> Result<()> {
+    // Room comes as the journal writes.
+    let give_up = now().plus_secs(0.3);
+    while let Some(record) = waiting.front() {
+        match journal.shot(record) {
+            Ok(()) => drop(waiting.pop_front()),
+            Err(JournalError::QueueFull { .. }) if now() < give_up => {
+                thread::sleep(Duration::from_millis(2));
+            }
+            Err(e) => {
+                log::error!("{} rounds are lost: {e}", waiting.len());
+                break;
+            }
+        }
+    }
+    let commits = journal.commits().clone();
+    let ended = journal.finish();
+    if print_commits {
+        crate::commits::print(commits.try_iter())?;
+    }
+    ended?;
+    Ok(())
+}
+
+/// The run before did not end as it should.
+fn dirty(journal: &Journal) -> Option<FaultChange> {
+    let dirty = journal.previous()?;
+    let cause = format!(
+        "run {} did not end as it should ({:?}); its committed rounds are kept",
+        dirty.run, dirty.end
+    );
+    Some(FaultChange::noted(now(), Fault::BootDirty, cause))
 }
 
 /// Free bytes below which the disk counts as full: room for a recording's end, or for hits alone, and never more than a part
@@ -250,4 +375,54 @@ fn recorder(folder: &Path, settings: &Settings) -> Result<Recorder> {
     let path =
         (0..1000).map(name).find(|p| !p.exists()).context("a thousand recordings of this second exist")?;
     Recorder::start(&path, &properties, false)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::settings::Reader;
+    use bowwave_core::score::{NotScored, Outcome};
+    use bowwave_record::{ShotFilter, read_shots};
+    use glam::DVec3;
+
+    fn round(shot: u64) -> ShotRecord {
+        ShotRecord {
+            shot,
+            fired: now(),
+            muzzle: DVec3::ZERO,
+            bore: DVec3::Y,
+            pose_age_ns: 0,
+            outcome: Outcome::NotScored { cause: NotScored::ImuStale },
+        }
+    }
+
+    /// A data folder that is not there at the start, as behind a disk that failed.
+    #[test]
+    fn rounds_wait_in_memory_until_the_journal_can_be_opened() {
+        let base = std::env::temp_dir().join(format!("bowwave-keeping-{}", std::process::id()));
+        std::fs::create_dir_all(&base).unwrap();
+        let folder = base.join("data");
+        let settings = Reader { config: base.join("bowwave.toml"), last_good: None }.read().unwrap();
+        let mut keeping = Keeping::open(&folder, &settings, None, false, &mut Vec::new());
+        let (mut faults, mut events) = (Faults::new(None), Vec::new());
+        keeping.rounds(&[round(1), round(2)]);
+        keeping.tend(&mut faults, &mut events).unwrap();
+        let (fault, why) = keeping.broken().unwrap();
+        assert!(why.contains("2 rounds wait"), "{why}");
+        assert!(faults.warnings().any(|f| f == fault), "the LCD tells");
+
+        std::fs::create_dir_all(&folder).unwrap();
+        let until = now().plus_secs(20.0);
+        while keeping.broken().is_some() && now() < until {
+            keeping.tend(&mut faults, &mut events).unwrap();
+            thread::sleep(Duration::from_millis(20));
+        }
+        keeping.rounds(&[round(3)]);
+        keeping.tend(&mut faults, &mut events).unwrap();
+        assert_eq!(faults.warnings().count(), 0);
+        keeping.finish().unwrap();
+        let stored = read_shots(&folder.join(JOURNAL), &ShotFilter::default()).unwrap();
+        assert_eq!(stored.iter().map(|s| s.record.shot).collect::<Vec<_>>(), [1, 2, 3]);
+        std::fs::remove_dir_all(&base).unwrap();
+    }
 }

@@ -5,6 +5,7 @@ mod hardware;
 mod health;
 mod keeping;
 mod notify;
+mod pulse;
 pub mod settings;
 mod stage;
 mod starts;
@@ -31,6 +32,7 @@ use signal_hook::{
 
 use crate::{cli::Run, outcome::Outcome};
 use notify::Notifier;
+use pulse::Pulse;
 use settings::Reader;
 use starts::Starts;
 use trainer::{Ended, Signals, Surroundings, Trainer};
@@ -41,7 +43,10 @@ const DATA: &str = "/var/lib/bowwave";
 /// Runs until a signal ends it.
 pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
     let signals = catch_signals()?;
-    let starts = Starts::begin(env::var_os("RUNTIME_DIRECTORY").map(PathBuf::from), now());
+    let starts = Arc::new(Starts::begin(env::var_os("RUNTIME_DIRECTORY").map(PathBuf::from), now()));
+    let pulse = Pulse::start(Arc::clone(&signals), Arc::clone(&starts))?;
+    let mut pulsing = pulse.during_start();
+    let mut lcd_size = None;
     let mut notifier = Notifier::from_environment();
     // The folder of the last good settings cannot be configured by settings that may be bad.
     let state = env::var_os("STATE_DIRECTORY").map(PathBuf::from);
@@ -55,9 +60,10 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
             .or_else(|| settings.config.data.clone())
             .or_else(|| state.clone())
             .unwrap_or_else(|| Path::new(DATA).into());
-        std::fs::create_dir_all(&data).with_context(|| {
-            format!("cannot make the data folder {}; name another with --data", data.display())
-        })?;
+        if let Err(e) = std::fs::create_dir_all(&data) {
+            // Hits are kept in memory then, and the LCD says so.
+            log::error!("cannot make the data folder {}: {e}; name another in files.data", data.display());
+        }
         let surroundings = Surroundings {
             data: data.clone(),
             mode: starts.mode(),
@@ -66,9 +72,12 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
             frame_hashes: arguments.frame_hashes.clone(),
             print_commits: arguments.print_commits,
             program_start,
+            lcd_size,
         };
         let trainer = Trainer::start(settings, surroundings, Arc::clone(&signals))?;
-        let (ended, summary) = trainer.run(&mut notifier)?;
+        drop(pulsing);
+        let (ended, summary) = trainer.run(&mut notifier, &pulse)?;
+        pulsing = pulse.during();
         if let Err(e) = summary.write(&data.join("summary.json")) {
             log::warn!("{e:#}");
         }
@@ -77,7 +86,10 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
                 starts.ended_well();
                 return Ok(Outcome::Done);
             }
-            Ended::Reload => notifier.reloading(),
+            Ended::Reload { lcd } => {
+                lcd_size = lcd;
+                notifier.reloading();
+            }
         }
     }
 }

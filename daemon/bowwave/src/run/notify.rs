@@ -48,8 +48,8 @@ impl Notifier {
     }
 
     /// How it fares, where that has changed or was told long ago.
-    pub fn status(&mut self, hud: &Hud, now: Time) {
-        let text = status_text(hud);
+    pub fn status(&mut self, hud: &Hud, warnings: impl Iterator<Item = Fault>, now: Time) {
+        let text = status_text(hud, warnings);
         let (at, last) = &self.told;
         if *last == text && at.is_some_and(|t| now.ns_since(t) < STATUS_EVERY_NS) {
             return;
@@ -87,8 +87,9 @@ fn send(state: &[NotifyState<'_>]) {
     }
 }
 
-/// What the LCD says, as one line: "NOT SCORED: CAMERA LOST; warning REC: DISK FULL; rounds 120, shots 14, hits 3".
-pub fn status_text(hud: &Hud) -> String {
+/// What the LCD says, as one line, but with all `warnings` and not only the first:
+/// "NOT SCORED: CAMERA LOST; warning REC: DISK FULL; rounds 120, shots 14, hits 3".
+pub fn status_text(hud: &Hud, warnings: impl Iterator<Item = Fault>) -> String {
     let mut text = match &hud.status {
         Status::Ready => "READY".to_owned(),
         Status::Hit => "HIT".to_owned(),
@@ -96,9 +97,9 @@ pub fn status_text(hud: &Hud) -> String {
         Status::NotScored { cause, .. } => format!("NOT SCORED: {cause}"),
         Status::Fault { cause, .. } => format!("FAULT: {cause}"),
     };
-    if let Some(warning) = hud.warning.map(Fault::cause) {
-        text.push_str("; warning ");
-        text.push_str(warning);
+    for (i, warning) in warnings.enumerate() {
+        text.push_str(if i == 0 { "; warning " } else { ", " });
+        text.push_str(warning.cause());
     }
     text.push_str(&format!("; rounds {}, shots {}, hits {}", hud.rounds_left, hud.shots, hud.hits));
     text
@@ -119,6 +120,8 @@ mod tests {
             clock_s: 1.0,
         };
         let said = "NOT SCORED: CAMERA LOST; warning REC: DISK FULL; rounds 120, shots 14, hits 3";
-        assert_eq!(status_text(&hud), said);
+        assert_eq!(status_text(&hud, [Fault::DiskFull].into_iter()), said);
+        let several = status_text(&hud, [Fault::DiskFull, Fault::ClockUnset].into_iter());
+        assert!(several.contains("; warning REC: DISK FULL, CLOCK NOT SET; "), "{several}");
     }
 }

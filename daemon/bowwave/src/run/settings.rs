@@ -113,7 +113,11 @@ impl Reader {
         config: &Config,
         refuse: &mut impl FnMut(Fault, &anyhow::Error),
     ) -> Option<Accepted<CalibrationFile>> {
-        let parse = |text: &str, origin: &str| Ok(bowwave_calibration::parse(text, origin)?);
+        let parse = |text: &str, origin: &str| {
+            let file = bowwave_calibration::parse(text, origin)?;
+            possible(&file.calibration.lens).with_context(|| origin.to_owned())?;
+            Ok(file)
+        };
         let accepted = self.accept("calibration.toml", config.calibration.as_deref(), parse);
         match (&accepted, &config.calibration) {
             (Some(a), _) => {
@@ -224,6 +228,19 @@ fn read_text(path: &Path) -> Result<String> {
     fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))
 }
 
+/// Whether there are cameras of this size, in every coding.
+fn possible(lens: &Lens) -> Result<()> {
+    let size = (lens.width, lens.height);
+    CameraSettings { calibrated_size: Some(size), ..CameraSettings::default() }.check()?;
+    anyhow::ensure!(
+        lens.width.is_multiple_of(2) && lens.height.is_multiple_of(2),
+        "size_px {}x{}: pictures have an even size; calibrate in a mode that the camera has",
+        lens.width,
+        lens.height
+    );
+    Ok(())
+}
+
 fn why_and_instead(why: &anyhow::Error, instead: &str) -> anyhow::Error {
     anyhow::anyhow!("{why:#}; {instead}")
 }
@@ -309,6 +326,30 @@ mod tests {
         assert_eq!(kept.setup.calibration.lens, good.setup.calibration.lens);
         let said = format!("{:?}", kept.faults[0].change);
         assert!(said.contains("bowwave.toml:2:15") && said.contains("last good"), "{said}");
+    }
+
+    #[test]
+    fn sizes_that_no_camera_has_are_refused_before_anything_is_started() {
+        let folder = Folder::new("sizes");
+        let calibration = include_str!("../../../../calibration/examples/mount.toml");
+        folder.write("calibration.toml", calibration);
+        let config = "[files]\ncalibration = \"calibration.toml\"\n";
+        folder.write("bowwave.toml", config);
+        let good = folder.reader().read().unwrap();
+        let lens = good.setup.calibration.lens;
+        let from = format!("{}, {}", lens.width, lens.height);
+        assert!(calibration.contains(&from), "{from}");
+        for size in ["641, 480", "8, 8"] {
+            folder.write("calibration.toml", &calibration.replace(&from, size));
+            let kept = folder.reader().read().unwrap();
+            assert_eq!(faults(&kept), [Fault::Config], "{size}");
+            assert_eq!(kept.setup.calibration.lens, lens);
+        }
+        folder.write("calibration.toml", calibration);
+        folder.write("bowwave.toml", &format!("[camera]\nmodes = [\"YUYV 641x480@30\"]\n{config}"));
+        let kept = folder.reader().read().unwrap();
+        assert_eq!(faults(&kept), [Fault::Config]);
+        assert!(kept.config.camera.modes.is_empty());
     }
 
     #[test]

@@ -12,7 +12,6 @@ use bowwave_core::{
 use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
 use bowwave_render::{RenderError, Renderer, TimeOuts};
 
-use super::notify;
 use crate::{
     drawing,
     output::{Done, Output, OutputOptions, Ticket, UserEvent},
@@ -20,7 +19,7 @@ use crate::{
 
 /// A driver that compiles for longer than this is not waited for, seconds.
 const REHEARSAL_S: f64 = 120.0;
-/// How often systemd hears meanwhile that the start goes on.
+/// How often it is looked whether it still runs.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 /// How frames are drawn and where they go.
@@ -87,7 +86,6 @@ impl Stage {
             // A software driver on a slow computer compiles for a long time at its first start; the renderer's own time-out
             // ends one that hangs.
             while !output.await_rehearsal(PATIENCE) && output.runs() {
-                notify::still_starting();
                 if now().secs_since(begun) > REHEARSAL_S {
                     log::warn!(
                         "the rehearsal was not complete after {REHEARSAL_S} s; the first frames may be late"

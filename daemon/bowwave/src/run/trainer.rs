@@ -26,6 +26,7 @@ use super::{
     hardware::Hardware,
     keeping::Keeping,
     notify::Notifier,
+    pulse::Pulse,
     settings::Settings,
     stage::{Stage, StageOptions},
     starts::Mode,
@@ -56,7 +57,10 @@ pub enum Ended {
     /// It was asked to.
     Stopped,
     /// The settings are to be read anew, or the LCD has another size now.
-    Reload,
+    Reload {
+        /// Size of the LCD at that time: one that is slow to start is not waited for again.
+        lcd: Option<(u32, u32)>,
+    },
 }
 
 /// What the loop is given besides settings.
@@ -74,6 +78,8 @@ pub struct Surroundings {
     pub print_commits: bool,
     /// When the program began.
     pub program_start: Time,
+    /// Size of the LCD before the settings were read anew.
+    pub lcd_size: Option<(u32, u32)>,
 }
 
 /// Everything that a frame passes through.
@@ -105,11 +111,12 @@ impl Trainer {
             changes.push(FaultChange::raised(now(), Fault::CrashLoop, cause));
         }
         let hardware = Hardware::start(&settings, surroundings.mode, &mut changes)?;
-        if let Some(size) = settings.config.size.or_else(|| hardware.await_lcd_size()) {
+        let lcd_size = || hardware.await_lcd_size().or(surroundings.lcd_size);
+        if let Some(size) = settings.config.size.or_else(lcd_size) {
             settings.setup.screen = size;
         }
         let session = Session::new(settings.setup.clone())?;
-        let stage_options = StageOptions {
+        let mut stage_options = StageOptions {
             gpu: gpu(&settings, surroundings.mode),
             validation: settings.config.validation,
             hang: settings.config.hang,
@@ -118,7 +125,19 @@ impl Trainer {
             frame_hashes: surroundings.frame_hashes.clone(),
             reporter: hardware.output_reporter(),
         };
-        let stage = Stage::open(&session, &settings.setup.models, &stage_options)?;
+        let stage = match Stage::open(&session, &settings.setup.models, &stage_options) {
+            // The GPU that the configuration names may be gone, or misspelt.
+            Err(e) if settings.config.gpu.is_some() && stage_options.gpu == settings.config.gpu => {
+                changes.push(FaultChange::raised(
+                    now(),
+                    Fault::Config,
+                    format!("{e:#}; another GPU is used"),
+                ));
+                stage_options.gpu = None;
+                Stage::open(&session, &settings.setup.models, &stage_options)?
+            }
+            opened => opened?,
+        };
         let keeping = match surroundings.mode {
             Mode::Safe => None,
             Mode::Training => Some(Keeping::open(
@@ -127,7 +146,7 @@ impl Trainer {
                 surroundings.boot_id.clone(),
                 surroundings.print_commits,
                 &mut changes,
-            )?),
+            )),
         };
         let faults = Faults::new(surroundings.boot_id.clone());
         Ok(Self {
@@ -149,8 +168,9 @@ impl Trainer {
     }
 
     /// Runs until it is asked to end. What is recorded is complete when this returns, also with an error.
-    pub fn run(mut self, notifier: &mut Notifier) -> Result<(Ended, Summary)> {
-        let ended = self.frames(notifier);
+    pub fn run(mut self, notifier: &mut Notifier, pulse: &Pulse) -> Result<(Ended, Summary)> {
+        let ended = self.frames(notifier, pulse);
+        let _pulsing = pulse.during();
         if matches!(ended, Ok(Ended::Stopped) | Err(_)) {
             notifier.stopping();
         }
@@ -161,7 +181,7 @@ impl Trainer {
         ended.map(|ended| (ended, summary))
     }
 
-    fn frames(&mut self, notifier: &mut Notifier) -> Result<Ended> {
+    fn frames(&mut self, notifier: &mut Notifier, pulse: &Pulse) -> Result<Ended> {
         loop {
             let plan = self.clock.plan(now());
             sleep_until(plan.start);
@@ -169,13 +189,13 @@ impl Trainer {
                 return Ok(Ended::Stopped);
             }
             if self.signals.reload.swap(false, Ordering::Relaxed) || self.screen_changed() {
-                return Ok(Ended::Reload);
+                return Ok(Ended::Reload { lcd: self.hardware.lcd_size() });
             }
             self.collect();
-            self.follow_video()?;
+            self.follow_video(pulse)?;
             match self.frame(plan.shown) {
                 Ok(()) => {}
-                Err(e) if is_lost(&e) => self.rebuild(&e)?,
+                Err(e) if is_lost(&e) => self.rebuild(&e, pulse)?,
                 Err(e) => return Err(e),
             }
             self.supervise(notifier);
@@ -228,7 +248,7 @@ impl Trainer {
     }
 
     /// Makes the renderer anew where pictures of the calibrated size come in another layout than it was made for.
-    fn follow_video(&mut self) -> Result<()> {
+    fn follow_video(&mut self, pulse: &Pulse) -> Result<()> {
         let plan = self.session.plan();
         let size = plan.picture;
         let came = self.events.iter().rev().find_map(|event| match event {
@@ -238,13 +258,14 @@ impl Trainer {
         match came {
             Some(format) if format != plan.video => {
                 self.session.set_video(format)?;
-                self.open_stage_again()
+                self.open_stage_again(pulse)
             }
             _ => Ok(()),
         }
     }
 
-    fn open_stage_again(&mut self) -> Result<()> {
+    fn open_stage_again(&mut self, pulse: &Pulse) -> Result<()> {
+        let _pulsing = pulse.during();
         let stage = Stage::open(&self.session, &self.settings.setup.models, &self.stage_options)?;
         let old = std::mem::replace(&mut self.stage, stage);
         if let Err(e) = old.close() {
@@ -294,7 +315,7 @@ impl Trainer {
     }
 
     /// The GPU was lost: everything on it is made anew.
-    fn rebuild(&mut self, why: &anyhow::Error) -> Result<()> {
+    fn rebuild(&mut self, why: &anyhow::Error, pulse: &Pulse) -> Result<()> {
         let begun = now();
         self.losses.retain(|t| begun.ns_since(*t) < LOSSES_WINDOW_NS);
         self.losses.push(begun);
@@ -305,7 +326,7 @@ impl Trainer {
                 self.losses.len()
             );
         }
-        self.open_stage_again().context("the renderer could not be made anew")?;
+        self.open_stage_again(pulse).context("the renderer could not be made anew")?;
         self.faults.set(Fault::GpuLost, None, &mut self.events);
         Ok(())
     }
@@ -316,8 +337,8 @@ impl Trainer {
             notifier.ready();
         }
         let hud = self.session.hud();
-        self.hardware.light(&hud.status, at);
-        notifier.status(hud, at);
+        self.hardware.light(&hud.status);
+        notifier.status(hud, self.faults.warnings(), at);
         match self.hardware.hanging(at) {
             None => {
                 self.faults.set(Fault::Watchdog, None, &mut self.events);
@@ -372,6 +393,10 @@ impl Trainer {
         }
         drop(self.stage_options);
         self.hardware.stop();
+        if matches!(ended, Ok(Ended::Reload { .. })) {
+            // What is still wrong is found again, and told again.
+            self.faults.end_all();
+        }
         log::info!("ran for {:.1} s", now().secs_since(self.surroundings.program_start));
         summary
     }

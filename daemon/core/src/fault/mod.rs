@@ -103,7 +103,7 @@ faults! {
     /// More than 30 % of the pictures are damaged.
     CamCorrupt = "CAM_CORRUPT", Warning, "PICTURES DAMAGED", "CHECK THE CAMERA CABLE";
     /// The bus has no room for the wanted mode; a smaller one runs.
-    CamBandwidth = "CAM_BW", Warning, "CAMERA: SMALLER PICTURE", "GIVE IT A USB PORT OF ITS OWN";
+    CamBandwidth = "CAM_BW", Warning, "CAMERA: USB TOO SLOW", "GIVE IT A USB PORT OF ITS OWN";
     /// The serial adapter holds bytes back.
     ImuLatency = "IMU_LATENCY", Warning, "IMU LATE", "SET THE ADAPTER'S LATENCY TO 1 MS";
     /// The file system is full.

@@ -78,7 +78,7 @@ pub(super) fn choose(
     } else if let Some(serial) = &settings.serial {
         let right = those(&|f| f.identity() == serial);
         // Nodes of codecs and the like are no camera that somebody fitted by mistake.
-        if right.is_empty() { those(&|f| f.usb.is_some()) } else { right }
+        if right.is_empty() { those(&|f| f.usb.is_some() || !f.links.is_empty()) } else { right }
     } else if let Some(known) = known {
         let alike = those(&|f| f.looks_like(known));
         if alike.is_empty() && lost_ns > OTHER_CAMERA_NS { found.to_vec() } else { alike }

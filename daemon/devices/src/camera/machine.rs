@@ -56,6 +56,12 @@ const GONE_WITH_FRAMES: [Fault; 6] = [
     Fault::CalMismatch,
 ];
 
+/// What a camera that is there may suffer from, so that no pictures come.
+const WRONG_WITH_IT: [Fault; 5] =
+    [Fault::CamStall, Fault::CamProtocol, Fault::CamQueue, Fault::CamBusy, Fault::CalMismatch];
+/// What its pictures may suffer from. That it is over cannot be seen once there are none.
+const WRONG_WITH_PICTURES: [Fault; 3] = [Fault::CamFormat, Fault::CamStatic, Fault::CamCorrupt];
+
 /// What a step brought about.
 #[derive(Default)]
 pub(super) struct Output {
@@ -79,7 +85,9 @@ enum State {
 struct Stream {
     found: Found,
     format: Format,
-    /// Nominal period or the mean of late, whichever is longer, nanoseconds.
+    /// Period of the mode, nanoseconds.
+    nominal_ns: i64,
+    /// That or the mean of late, whichever is longer, nanoseconds.
     period_ns: i64,
     /// When it was started (again).
     begun: Time,
@@ -88,6 +96,11 @@ struct Stream {
     last_frame: Time,
     last_sequence: Option<u32>,
     exposure_ns: Option<i64>,
+    /// Whether a time stamp could be believed, and how many since then could not.
+    stamped: bool,
+    odd_stamps: u32,
+    /// Pictures in a row that were of another size.
+    other_sizes: u32,
     /// When the driver's format was last compared.
     format_asked: Time,
     /// Since a stall was seen: when to do something about it.
@@ -189,6 +202,19 @@ impl Machine {
     }
 
     fn raise(&mut self, now: Time, fault: Fault, cause: String, out: &mut Output) {
+        // A camera that is gone does nothing else wrong, and one that does something wrong is there.
+        let over: &[Fault] = match fault {
+            Fault::CamLost => &[&WRONG_WITH_IT[..], &WRONG_WITH_PICTURES[..]].concat(),
+            // The camera that had these is not the one that is there.
+            Fault::CalMismatch => {
+                &[&[Fault::CamLost], &WRONG_WITH_IT[..4], &WRONG_WITH_PICTURES[..]].concat()
+            }
+            f if WRONG_WITH_IT.contains(&f) => &[Fault::CamLost],
+            _ => &[],
+        };
+        for fault in over {
+            self.clear(now, *fault, out);
+        }
         if self.raised.insert(fault) {
             out.faults.push(FaultChange::raised(now, fault, cause));
         }
@@ -311,12 +337,16 @@ impl Machine {
             return Ok(Some(Stream {
                 found: found.clone(),
                 format,
+                nominal_ns: rate.period_ns().clamp(MS, 1000 * MS),
                 period_ns: rate.period_ns().clamp(MS, 1000 * MS),
                 begun: now,
                 frames: 0,
                 last_frame: now,
                 last_sequence: None,
                 exposure_ns: driver.exposure_ns(),
+                stamped: false,
+                odd_stamps: 0,
+                other_sizes: 0,
                 format_asked: now,
                 act_at: None,
             }));
@@ -383,7 +413,7 @@ impl Machine {
             return Ok(self.reopen(now, driver));
         }
         driver.reclaim().map_err(during("give it buffers"))?;
-        let newest = self.drain(stream, driver)?;
+        let newest = self.drain(stream, now, driver, out)?;
         if newest.is_none() && ready.failed {
             // The kernel says why only where it is asked.
             let error = driver

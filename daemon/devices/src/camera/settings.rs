@@ -173,7 +173,7 @@ const USUAL_SIZE: (u32, u32) = (1280, 720);
 
 impl CameraSettings {
     /// Refuses what no camera can do, so that later nothing but the hardware can be wrong.
-    pub(super) fn check(&self) -> Result<(), CameraError> {
+    pub fn check(&self) -> Result<(), CameraError> {
         let refuse = |what: String| Err(CameraError::Settings { what });
         if !(3..=32).contains(&self.buffers) {
             return refuse(format!("{} buffers: give 3 to 32", self.buffers));

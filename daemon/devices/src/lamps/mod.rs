@@ -4,15 +4,29 @@
 //! that acts: they are plain outputs of a training computer, they flicker when it starts and keep their last state when it
 //! is killed. A line that is an input of the trainer (trigger, interlock, power-fail) is refused as a lamp.
 
-use std::path::Path;
+mod bank;
+mod chips;
 
-use bowwave_core::time::{NS_PER_S, Time};
-use gpio_cdev::{LineHandle, LineRequestFlags};
+use std::{
+    io,
+    thread::{self, JoinHandle},
+};
 
-use crate::trigger::{InputLine, TriggerError, place, request_error};
+use crossbeam_channel::{Receiver, RecvTimeoutError};
 
-/// How often lamps that went dark are looked for.
-const RETRY_NS: i64 = NS_PER_S;
+use self::{
+    bank::{Bank, RETRY},
+    chips::{Chips, Kernel, Known},
+};
+use crate::{
+    clock,
+    queue::{self, NewestSender},
+    trigger::{InputLine, TriggerError},
+    wake::{Ended, join_within},
+};
+
+/// How long [`Lamps::stop`] waits for the lamps to go dark.
+const STOP_NS: i64 = 180_000_000;
 
 /// Which lines light which lamps. Lamps that are not wired are left out.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,6 +100,17 @@ pub enum LampError {
         /// What the GPIO layer says.
         source: gpio_cdev::Error,
     },
+    /// The thread could not be started.
+    #[error("cannot start the thread that lights the lamps: {0}; are too many processes running?")]
+    Thread(#[source] io::Error),
+    /// The thread panicked: a defect of this program.
+    #[error("the thread that lights the lamps broke down: report it with the log")]
+    BrokeDown,
+    /// A kernel call of the thread does not return.
+    #[error(
+        "a kernel call on the lamps' chip does not return: they may stay lit; look at the kernel's log (dmesg)"
+    )]
+    Blocked,
 }
 
 impl LampSettings {
@@ -101,180 +126,117 @@ impl LampSettings {
         &self,
         inputs: impl IntoIterator<Item = (&'static str, &'a InputLine)>,
     ) -> Result<(), LampError> {
-        self.check_in(Path::new("/dev"), inputs)
-    }
-
-    fn check_in<'a>(
-        &self,
-        dev: &Path,
-        inputs: impl IntoIterator<Item = (&'static str, &'a InputLine)>,
-    ) -> Result<(), LampError> {
-        let inputs: Vec<_> =
-            inputs.into_iter().map(|(name, input)| (name, Spot::of(dev, &input.chip, &input.line))).collect();
-        let mut lamps: Vec<(&'static str, Spot)> = Vec::new();
-        for (lamp, line) in self.wired() {
-            let spot = Spot::of(dev, &self.chip, line);
-            let chip = self.chip.clone();
-            if let Some((input, _)) = inputs.iter().find(|(_, s)| s.meets(&spot)) {
-                return Err(LampError::Input {
-                    lamp,
-                    input: (*input).to_owned(),
-                    chip,
-                    line: line.to_owned(),
-                });
-            }
-            if let Some((other, _)) = lamps.iter().find(|(_, s)| s.meets(&spot)) {
-                return Err(LampError::SameLine { lamp, other, chip, line: line.to_owned() });
-            }
-            lamps.push((lamp, spot));
-        }
-        Ok(())
+        chips::check(&Kernel, self, &mut Known::inputs(inputs))
     }
 }
 
-/// A line as it is written, and where it is if it is there.
-struct Spot {
-    written: (String, String),
-    found: Option<(String, u32)>,
-}
-
-impl Spot {
-    fn of(dev: &Path, chip: &str, line: &str) -> Self {
-        let found = place(dev, chip, line).ok().map(|p| (p.chip.name().to_owned(), p.offset));
-        Self { written: (chip.to_owned(), line.to_owned()), found }
-    }
-
-    fn meets(&self, other: &Self) -> bool {
-        self.written == other.written || (self.found.is_some() && self.found == other.found)
-    }
-}
-
-/// One lamp's line.
-struct Lamp {
-    name: &'static str,
-    line: String,
-    handle: Option<LineHandle>,
-    /// Told as broken.
-    told: bool,
-}
-
-/// The lamps. All go dark when this is dropped; where the program is killed they keep their last state.
+/// The lamps, lit by a thread of their own: a chip on a slow bus may keep a call for seconds. All go dark at the end; where the
+/// program is killed they keep their last state.
+#[derive(Debug)]
 pub struct Lamps {
-    settings: LampSettings,
-    lamps: Vec<Lamp>,
-    shown: Option<LampState>,
-    retry: Time,
-}
-
-impl std::fmt::Debug for Lamps {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Lamps")
-            .field("settings", &self.settings)
-            .field("shown", &self.shown)
-            .finish_non_exhaustive()
-    }
+    /// Taken at the end: that nobody can give a state any more is what ends the thread.
+    states: Option<NewestSender<LampState>>,
+    shown: LampState,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl Lamps {
-    /// Takes the lines, all dark, after making sure that none of `inputs`
-    /// ([`TriggerSettings::inputs`](crate::trigger::TriggerSettings::inputs)) is among them.
-    pub fn open<'a>(
+    /// Makes sure that none of `inputs` (name and line, as of
+    /// [`TriggerSettings::inputs`](crate::trigger::TriggerSettings::inputs)) is a lamp, and begins to take the lines, all
+    /// dark. Lines that are not there yet, or no more, are tried again once a second, each time after the same check:
+    /// training does not depend on them.
+    pub fn start<'a>(
         settings: LampSettings,
         inputs: impl IntoIterator<Item = (&'static str, &'a InputLine)>,
     ) -> Result<Self, LampError> {
-        settings.check(inputs)?;
-        let lamps = settings
-            .wired()
-            .map(|(name, line)| {
-                let handle = Some(take(&settings, name, line)?);
-                Ok(Lamp { name, line: line.to_owned(), handle, told: false })
-            })
-            .collect::<Result<_, LampError>>()?;
-        Ok(Self { settings, lamps, shown: None, retry: Time::MIN })
+        Self::start_on(Kernel, settings, Known::inputs(inputs))
     }
 
-    /// Shows `state`. One short kernel call a lamp, and none where nothing changes. A lamp that cannot be switched is told
-    /// once, and tried again once a second; training does not depend on it.
-    pub fn set(&mut self, now: Time, state: LampState) -> Result<(), LampError> {
-        let broken = self.lamps.iter().any(|l| l.handle.is_none());
-        if self.shown == Some(state) && !(broken && now >= self.retry) {
-            return Ok(());
-        }
-        let again = now >= self.retry;
-        if again {
-            self.retry = now.plus_ns(RETRY_NS);
-        }
-        self.shown = Some(state);
-        let mut result = Ok(());
-        for lamp in &mut self.lamps {
-            let lit = match lamp.name {
-                "READY" => state.ready,
-                "HIT" => state.hit,
-                _ => state.fault,
-            };
-            if let Err(e) = lamp.show(&self.settings, lit, again)
-                && !std::mem::replace(&mut lamp.told, true)
-                && result.is_ok()
-            {
-                result = Err(e);
-            }
-        }
-        result
+    fn start_on<C>(chips: C, settings: LampSettings, inputs: Vec<Known>) -> Result<Self, LampError>
+    where
+        C: Chips<Handle: Send> + Send + 'static,
+    {
+        let bank = Bank::new(chips, settings, inputs)?;
+        let (states, given) = queue::newest(1);
+        let thread = thread::Builder::new()
+            .name("lamps".to_owned())
+            .spawn(move || light(bank, &given))
+            .map_err(LampError::Thread)?;
+        Ok(Self { states: Some(states), shown: LampState::default(), thread: Some(thread) })
     }
 
-    /// What they were last asked to show.
-    pub const fn shown(&self) -> Option<LampState> {
-        self.shown
+    /// Shows `state` soon. Never waits; the newest wins.
+    pub fn set(&mut self, state: LampState) {
+        if std::mem::replace(&mut self.shown, state) != state
+            && let Some(states) = &mut self.states
+        {
+            states.send(state);
+        }
     }
-}
 
-impl Lamp {
-    fn show(&mut self, settings: &LampSettings, lit: bool, again: bool) -> Result<(), LampError> {
-        let handle = match &self.handle {
-            Some(handle) => handle,
-            None if again => self.handle.insert(take(settings, self.name, &self.line)?),
-            None => return Ok(()),
-        };
-        match handle.set_value(lit.into()) {
-            Ok(()) => {
-                self.told = false;
-                Ok(())
-            }
-            Err(source) => {
-                self.handle = None;
-                Err(LampError::Switch { lamp: self.name, source })
-            }
+    /// Switches the lamps off and gives their lines back, within 200 ms.
+    pub fn stop(mut self) -> Result<(), LampError> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Result<(), LampError> {
+        drop(self.states.take());
+        match join_within(self.thread.take().into_iter().collect(), STOP_NS) {
+            Ended::Well => Ok(()),
+            Ended::BrokeDown => Err(LampError::BrokeDown),
+            Ended::NotInTime => Err(LampError::Blocked),
         }
     }
 }
 
 impl Drop for Lamps {
     fn drop(&mut self) {
-        for lamp in &self.lamps {
-            if let Some(handle) = &lamp.handle
-                && let Err(e) = handle.set_value(0)
-            {
-                log::warn!("cannot switch off the lamp {}: {e}", lamp.name);
-            }
+        if let Err(e) = self.end() {
+            log::warn!("{e}");
         }
     }
 }
 
-fn take(settings: &LampSettings, lamp: &'static str, line: &str) -> Result<LineHandle, LampError> {
-    let failed = |source| LampError::Line { lamp, source };
-    let placed = place(Path::new("/dev"), &settings.chip, line).map_err(failed)?;
-    let level = if settings.active_low { LineRequestFlags::ACTIVE_LOW } else { LineRequestFlags::empty() };
-    // The default is a logical value: dark.
-    placed
-        .line()
-        .and_then(|line| line.request(LineRequestFlags::OUTPUT | level, 0, "bowwave-lamp"))
-        .map_err(|e| failed(request_error(&placed, e)))
+/// Until nobody gives a state any more.
+fn light(mut bank: Bank<impl Chips>, given: &Receiver<LampState>) {
+    let mut state = LampState::default();
+    loop {
+        bank.show(clock::now(), state).iter().for_each(|e| log::warn!("{e}"));
+        match given.recv_timeout(RETRY) {
+            Ok(newer) => state = newer,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => return,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{chips::Spot, *};
     use crate::trigger::{Bias, TriggerSettings};
+
+    /// A chip that keeps each call for a while, as one on a bus that is stuck, and tells of each.
+    struct Slow(crossbeam_channel::Sender<bool>);
+
+    impl Chips for Slow {
+        type Place = u32;
+        type Handle = ();
+
+        fn find(&self, _: &str, line: &str, _: Option<&str>) -> Result<(Spot, u32), TriggerError> {
+            let offset = line.parse().expect("a number");
+            Ok((Spot { chip: "gpiochip0".into(), label: "pinctrl".into(), offset }, offset))
+        }
+
+        fn take(&self, _: &u32, _: bool) -> Result<(), TriggerError> {
+            Ok(())
+        }
+
+        fn set(&self, (): &(), lit: bool) -> Result<(), gpio_cdev::Error> {
+            clock::sleep_until(clock::now().plus_ns(150_000_000));
+            let _ = self.0.send(lit);
+            Ok(())
+        }
+    }
 
     fn input(line: &str) -> InputLine {
         InputLine { chip: "pinctrl".into(), line: line.into(), active_low: true, bias: Bias::AsIs }
@@ -300,15 +262,36 @@ mod tests {
         for (line, name) in [("17", "trigger"), ("27", "interlock"), ("PFAIL", "power-fail")] {
             let e = lamps("5", line).check(inputs.inputs()).expect_err("an input");
             assert!(matches!(&e, LampError::Input { lamp: "HIT", input, .. } if input == name), "{e}");
-            assert!(matches!(Lamps::open(lamps(line, "6"), inputs.inputs()), Err(LampError::Input { .. })));
+            assert!(matches!(Lamps::start(lamps(line, "6"), inputs.inputs()), Err(LampError::Input { .. })));
         }
         lamps("5", "6").check(inputs.inputs()).expect("lines of their own");
         assert!(matches!(lamps("5", "5").check(inputs.inputs()), Err(LampError::SameLine { .. })));
     }
 
     #[test]
-    fn lamps_without_a_chip_are_told_in_words() {
-        let message = Lamps::open(lamps("5", "6"), []).expect_err("no such chip").to_string();
-        assert!(message.starts_with("lamp READY: no GPIO chip is called pinctrl"), "{message}");
+    fn lamps_without_a_chip_are_no_error_and_end_in_time() {
+        let mut lamps = Lamps::start(lamps("5", "6"), []).expect("it may come");
+        (0..100).for_each(|n| lamps.set(LampState { hit: n % 2 == 0, ..LampState::default() }));
+        let begin = clock::now();
+        lamps.stop().expect("ends");
+        assert!(clock::now().ns_since(begin) < 200_000_000);
+    }
+
+    #[test]
+    fn nobody_waits_for_a_slow_chip_and_the_newest_state_wins() {
+        let (sender, seen) = crossbeam_channel::unbounded();
+        let one = LampSettings { hit: None, ..lamps("5", "") };
+        let mut lamps = Lamps::start_on(Slow(sender), one, Vec::new()).expect("starts");
+        let begin = clock::now();
+        (1..=101).for_each(|n| lamps.set(LampState { ready: n % 2 == 1, ..LampState::default() }));
+        assert!(clock::now().ns_since(begin) < 100_000_000);
+        assert_eq!(seen.recv(), Ok(false), "dark at first");
+        assert_eq!(seen.recv(), Ok(true));
+        lamps.set(LampState::default());
+        // It is in that call, and goes dark after it.
+        let stopped = lamps.stop();
+        assert!(clock::now().ns_since(begin) < 3_000_000_000);
+        assert!(matches!(stopped, Ok(()) | Err(LampError::Blocked)), "{stopped:?}");
+        assert_eq!(seen.iter().last(), Some(false));
     }
 }

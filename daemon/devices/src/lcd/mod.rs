@@ -19,6 +19,7 @@ mod error;
 mod life;
 mod mode;
 mod pixels;
+mod pulse;
 mod screen;
 mod slot;
 mod thread;
@@ -239,19 +240,23 @@ pub struct LcdPort {
     shared: Arc<Shared>,
     flips: Receiver<Flip>,
     thread: Option<JoinHandle<Result<(), LcdError>>>,
+    /// Gives signs of life while the other is within the kernel.
+    pulse: Option<JoinHandle<()>>,
 }
 
 impl LcdPort {
-    /// Starts the thread, which looks for the display for ever. Fails only where no thread can be made.
+    /// Starts the threads, which look for the display for ever. Fails only where no thread can be made.
     pub fn start(settings: LcdSettings, reporter: Reporter) -> Result<Self, LcdError> {
         let shared = Arc::new(Shared::new().map_err(|e| LcdError::Thread(e.into()))?);
         let (sender, flips) = queue::newest(FLIPS);
-        let worker = thread::Worker::new(settings, reporter, Arc::clone(&shared), sender);
-        let thread = std::thread::Builder::new()
-            .name("lcd".to_owned())
-            .spawn(move || worker.run())
-            .map_err(LcdError::Thread)?;
-        Ok(Self { shared, flips, thread: Some(thread) })
+        let spawn = |name: &str| std::thread::Builder::new().name(name.to_owned());
+        let worker = thread::Worker::new(settings, reporter.clone(), Arc::clone(&shared), sender);
+        let thread = spawn("lcd").spawn(move || worker.run()).map_err(LcdError::Thread)?;
+        // What is there ends when this is dropped.
+        let mut port = Self { shared: Arc::clone(&shared), flips, thread: Some(thread), pulse: None };
+        let pulse = spawn("lcd-pulse").spawn(move || shared.calls.beat(&reporter, pulse::CALL_MAX_NS));
+        port.pulse = Some(pulse.map_err(LcdError::Thread)?);
+        Ok(port)
     }
 
     /// Gives a picture: `rgba` are sRGB bytes R, G, B, A from the top left, without padding; `size` its width and height in
@@ -285,7 +290,13 @@ impl LcdPort {
     fn end(&mut self) -> Result<(), LcdError> {
         let Some(thread) = self.thread.take() else { return Ok(()) };
         self.shared.ask_to_stop();
-        thread.join().map_err(|_| LcdError::ThreadDied)?
+        let ended = thread.join();
+        self.shared.calls.end();
+        if let Some(pulse) = self.pulse.take() {
+            pulse.thread().unpark();
+            pulse.join().map_err(|_| LcdError::ThreadDied)?;
+        }
+        ended.map_err(|_| LcdError::ThreadDied)?
     }
 }
 
@@ -294,5 +305,29 @@ impl Drop for LcdPort {
         if let Err(e) = self.end() {
             log::debug!("the display: {e}");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::fault::Fault;
+
+    use super::*;
+    use crate::{clock, report::reporting};
+
+    #[test]
+    fn without_a_display_the_port_says_so_lives_and_ends() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let (reporter, reports) = reporting();
+        let settings = LcdSettings { card: Some(folder.path().join("card7")), ..LcdSettings::default() };
+        let port = LcdPort::start(settings, reporter).expect("absence is no error of the start");
+        clock::sleep_until(clock::now().plus_ns(400_000_000));
+        assert!(clock::now().ns_since(reports.last_beat()) < 250_000_000);
+        let changes: Vec<_> = reports.changes().map(|c| c.fault).collect();
+        assert_eq!(changes, [Fault::DisplayLost]);
+        assert_eq!(port.show(&[0; 4], (1, 1), 1), Given::NoScreen);
+        let begin = clock::now();
+        assert_eq!(port.stop().expect("ends").without_screen, 1);
+        assert!(clock::now().ns_since(begin) < 250_000_000);
     }
 }

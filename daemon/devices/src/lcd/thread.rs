@@ -22,6 +22,7 @@ use super::{
     card::{self, Card},
     life::{Due, Life, Tell},
     pixels,
+    pulse::Calls,
     screen::{Saved, Screen, Started},
     slot::Slot,
 };
@@ -34,6 +35,8 @@ pub(super) struct Shared {
     changed: Condvar,
     wake: OwnedFd,
     stopping: AtomicBool,
+    /// What the thread asks of the kernel.
+    pub(super) calls: Calls,
 }
 
 #[derive(Debug)]
@@ -58,6 +61,7 @@ impl Shared {
             changed: Condvar::new(),
             wake: eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?,
             stopping: AtomicBool::new(false),
+            calls: Calls::default(),
         })
     }
 
@@ -204,7 +208,8 @@ impl Worker {
 
     /// Looks for a display and sets its mode.
     fn search(&mut self) -> Result<(), LcdError> {
-        let (card, target) = card::search(&self.settings, self.card.take());
+        let calls = &self.shared.calls;
+        let (card, target) = calls.during(|| card::search(&self.settings, self.card.take()));
         if card.is_none() {
             self.saved.clear();
         }
@@ -212,10 +217,10 @@ impl Worker {
         let target = target?;
         let Some(card) = &self.card else { return Err(LcdError::NoCard) };
         if self.saved.iter().all(|s| s.crtc() != target.crtc) {
-            self.saved.push(Saved::of(card, target.crtc)?);
+            self.saved.push(calls.during(|| Saved::of(card, target.crtc))?);
         }
         let choice = target.choice.clone();
-        let (screen, canvases) = Screen::make(card, target, !self.settings.legacy)?;
+        let (screen, canvases) = calls.during(|| Screen::make(card, target, !self.settings.legacy))?;
         let is_atomic = screen.is_atomic();
         let screen = self.screen.insert(screen);
         let now = clock::now();
@@ -228,7 +233,7 @@ impl Worker {
             first = inner.slot.hand_over_blank(now).map(|f| f.buffer.framebuffer());
         });
         // Without the lock: a mode may take long to set, and no caller is to wait for it.
-        match first.map(|first| screen.start(card, first)).transpose()? {
+        match first.map(|first| calls.during(|| screen.start(card, first))).transpose()? {
             Some(Started::Shown) => self.flipped(None),
             Some(Started::Pending) | None => {}
         }
@@ -239,7 +244,8 @@ impl Worker {
     fn look(&self) -> Result<(), LcdError> {
         let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
         let target = screen.target();
-        if card.is_connected(target.connector)? {
+        // The kernel may be probing it for another program.
+        if self.shared.calls.during(|| card.is_connected(target.connector))? {
             return Ok(());
         }
         let names = target.choice.connector.clone();
@@ -251,7 +257,7 @@ impl Worker {
         let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
         let next = self.shared.lock().slot.hand_over().map(|f| f.buffer.framebuffer());
         let Some(next) = next else { return Ok(()) };
-        match screen.flip(card, next) {
+        match self.shared.calls.during(|| screen.flip(card, next)) {
             Ok(true) => self.life.flip_begun(clock::now()),
             // Whether that lasts, the next look tells.
             Ok(false) => {
@@ -329,10 +335,12 @@ impl Worker {
             inner.status.vblanks = None;
             inner.status.trouble = Some(why.to_string());
         });
+        // Now: the kernel may wait long for what the screen has lost.
+        self.tell(told);
         (self.vblanks, self.last_sequence) = (None, None);
         if let (Some(card), Some(screen)) = (&self.card, self.screen.take()) {
-            screen.switch_off(card);
-            screen.free(card);
+            self.shared.calls.during(|| screen.switch_off(card));
+            self.shared.calls.during(|| screen.free(card));
             // What is still told of this screen is not of the next one.
             while card.receive_events().is_ok_and(|events| events.count() > 0) {}
         }
@@ -343,7 +351,6 @@ impl Worker {
         {
             log::debug!("{e}");
         }
-        self.tell(told);
     }
 
     fn tell(&self, told: Option<Tell>) {
@@ -357,8 +364,10 @@ impl Worker {
     /// Puts back what was shown before, and closes the card.
     fn restore(&mut self) -> Result<(), LcdError> {
         let Some(card) = self.card.take() else { return Ok(()) };
-        let restored: Vec<_> = self.saved.drain(..).map(|saved| saved.restore(&card)).collect();
-        restored.into_iter().collect()
+        let result = put_back(&self.shared.calls, &mut self.saved, &card);
+        // The card is closed within the call too: its last user's screens are switched off.
+        self.shared.calls.during(|| drop(card));
+        result
     }
 
     fn finish(mut self) -> Result<(), LcdError> {
@@ -367,11 +376,18 @@ impl Worker {
             inner.status.counters.lost += inner.slot.close();
         });
         let Some(card) = self.card.take() else { return Ok(()) };
-        let restored: Vec<_> = self.saved.drain(..).map(|saved| saved.restore(&card)).collect();
+        let result = put_back(&self.shared.calls, &mut self.saved, &card);
         // Only now: a buffer that is shown must not be freed.
         if let Some(screen) = self.screen.take() {
-            screen.free(&card);
+            self.shared.calls.during(|| screen.free(&card));
         }
-        restored.into_iter().collect()
+        self.shared.calls.during(|| drop(card));
+        result
     }
+}
+
+/// Puts back all that was shown before, also where one of it fails.
+fn put_back(calls: &Calls, saved: &mut Vec<Saved>, card: &Card) -> Result<(), LcdError> {
+    let restored: Vec<_> = saved.drain(..).map(|saved| calls.during(|| saved.restore(card))).collect();
+    restored.into_iter().collect()
 }

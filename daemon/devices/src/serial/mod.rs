@@ -18,7 +18,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, AtomicI64, Ordering},
+        atomic::{AtomicBool, AtomicI32, AtomicI64, Ordering},
     },
     thread::{self, JoinHandle},
     time::Duration,
@@ -256,11 +256,13 @@ pub struct ImuSettings {
     pub baud: Baud,
     /// Ask the adapter to hand bytes on at once.
     pub low_latency: bool,
+    /// How much longer than its period the 99th percentile of the gaps between its packets may be; more is reported.
+    pub late: Duration,
 }
 
 impl Default for ImuSettings {
     fn default() -> Self {
-        Self { device: None, baud: Baud::default(), low_latency: true }
+        Self { device: None, baud: Baud::default(), low_latency: true, late: timing::LATE }
     }
 }
 
@@ -334,7 +336,7 @@ impl ImuPort {
     /// once this has returned are not lost.
     pub fn open(node: &Path, baud: u32) -> Result<Self, SerialError> {
         let settings =
-            ImuSettings { device: Some(node.to_owned()), baud: Baud::Fixed(baud), low_latency: true };
+            ImuSettings { device: Some(node.to_owned()), baud: Baud::Fixed(baud), ..ImuSettings::default() };
         settings.baud.check()?;
         let line = Line::open(node, baud, settings.low_latency)?;
         let (reporter, _) = reporting();
@@ -349,6 +351,7 @@ impl ImuPort {
             stop: AtomicBool::new(false),
             wake,
             alive_ns: AtomicI64::new(clock::now().ns()),
+            thread: AtomicI32::new(0),
             ended: AtomicBool::new(false),
             status: Mutex::new(ImuStatus::default()),
         });

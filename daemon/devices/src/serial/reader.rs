@@ -2,10 +2,10 @@
 
 use std::{
     os::fd::{AsFd, BorrowedFd, OwnedFd},
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, AtomicI64, Ordering},
+        atomic::{AtomicBool, AtomicI32, AtomicI64, Ordering},
     },
 };
 
@@ -17,6 +17,7 @@ use bowwave_core::{
 use rustix::{
     event::{PollFd, PollFlags, poll},
     io::Errno,
+    thread::gettid,
     time::Timespec,
 };
 
@@ -54,6 +55,8 @@ pub(super) struct Shared {
     pub(super) wake: OwnedFd,
     /// When the reader was last seen outside a kernel call that may hang, nanoseconds.
     pub(super) alive_ns: AtomicI64,
+    /// The reader's thread as the kernel numbers it; 0 until it runs.
+    pub(super) thread: AtomicI32,
     /// The reader ended, as asked or by a panic.
     pub(super) ended: AtomicBool,
     pub(super) status: Mutex<ImuStatus>,
@@ -101,7 +104,8 @@ pub(super) struct Reader {
     finder: Finder,
     /// Which of the candidates is tried.
     attempt: usize,
-    roam: bool,
+    /// There were several candidates.
+    several: bool,
     health: Health,
     sanity: Sanity,
     insane: bool,
@@ -131,6 +135,7 @@ impl Reader {
     ) -> Self {
         Self {
             finder: Finder::new(settings.device.clone()),
+            arrivals: Arrivals::late_above(settings.late),
             health: Health::new(&settings.baud),
             settings,
             line,
@@ -139,10 +144,9 @@ impl Reader {
             queue,
             decoder: ImuDecoder::new(),
             attempt: 0,
-            roam: false,
+            several: false,
             sanity: Sanity::default(),
             insane: false,
-            arrivals: Arrivals::default(),
             late: false,
             errors: None,
             counted: Time::MIN,
@@ -150,6 +154,7 @@ impl Reader {
     }
 
     pub(super) fn run(mut self) {
+        self.shared.thread.store(gettid().as_raw_nonzero().get(), Ordering::Relaxed);
         let ended = Ended(Arc::clone(&self.shared));
         if self.line.is_some() {
             self.opened(clock::now());
@@ -166,21 +171,29 @@ impl Reader {
         drop(ended);
     }
 
-    /// Tries to open a port once, and waits a little where there is none.
-    fn search(&mut self) {
-        let opened = self.finder.candidates().and_then(|found| {
-            self.roam = found.len() > 1;
+    /// Tries to open a port once, and waits a little where there is none. Every step gives a sign of life of its own: on a
+    /// loaded computer they and the wait together may take longer than a call that hangs.
+    pub(super) fn search(&mut self) {
+        let found = self.finder.candidates();
+        self.shared.alive(clock::now());
+        let opened = found.and_then(|found| {
+            self.several = found.len() > 1;
             let path = found.get(self.attempt % found.len().max(1)).cloned().unwrap_or_default();
             Line::open(&path, self.health.baud(), self.settings.low_latency)
         });
         let now = clock::now();
+        self.shared.alive(now);
         match opened {
             Ok(line) => {
                 self.line = Some(line);
                 self.opened(now);
                 return;
             }
-            Err(e @ SerialError::BaudNotTaken { .. }) => self.health.refused(now, &e.to_string()),
+            Err(e @ SerialError::BaudNotTaken { .. }) => {
+                self.health.refused(now, &e.to_string());
+                // Another adapter may know the rate.
+                self.attempt = self.attempt.wrapping_add(usize::from(self.several));
+            }
             Err(e) => {
                 self.attempt = self.attempt.wrapping_add(1);
                 self.health.absent(now, &e.to_string());
@@ -245,7 +258,9 @@ impl Reader {
         let now = clock::now();
         self.count(&line, now);
         self.judge(&line, now);
-        match self.health.tick(now, self.roam) {
+        // Where no port is configured another one may come: an adapter that is there at first may be any device's.
+        let roam = self.several || self.settings.device.is_none();
+        match self.health.tick(now, roam) {
             Action::Keep => Some(line),
             Action::SetBaud(baud) => {
                 match line.configure(baud) {
@@ -259,12 +274,22 @@ impl Reader {
                 self.interrupted();
                 None
             }
-            Action::NextPort => {
-                self.attempt = self.attempt.wrapping_add(1);
-                self.interrupted();
-                None
-            }
+            Action::NextPort => self.next_port(line),
         }
+    }
+
+    /// Leaves the port for the next one. Where there is no other it is kept: to open it anew would only lose bytes.
+    fn next_port(&mut self, line: Line) -> Option<Line> {
+        let found = self.finder.candidates();
+        let now = clock::now();
+        self.shared.alive(now);
+        if !found.is_ok_and(|found| others(&found, line.path())) {
+            return Some(line);
+        }
+        self.attempt = self.attempt.wrapping_add(1);
+        self.health.leave(now);
+        self.interrupted();
+        None
     }
 
     fn lost(&mut self, line: &Line, why: &str) -> Option<Line> {
@@ -373,6 +398,11 @@ impl Reader {
     }
 }
 
+/// Whether there is another candidate than the one that is open.
+fn others(found: &[PathBuf], open: &Path) -> bool {
+    found.iter().any(|candidate| candidate != open)
+}
+
 /// Gives the port's sign of life, and tells when a kernel call of the reader does not return. The reader's file is
 /// non-blocking: its reads cannot wait by design, so one that does is a driver's defect, and opening, setting and closing
 /// have no such promise at all. A thread in such a call cannot be ended from outside: it is waited for.
@@ -398,7 +428,9 @@ impl Watcher {
     }
 
     fn look(&mut self, now: Time) {
-        let blocked = now.ns_since(Time::from_ns(self.shared.alive_ns.load(Ordering::Relaxed))) >= BLOCKED_NS;
+        let still = now.ns_since(Time::from_ns(self.shared.alive_ns.load(Ordering::Relaxed))) >= BLOCKED_NS;
+        // A thread that could run and is not let is no matter of the port: the unit's silence is told by its own fault.
+        let blocked = still && (self.blocked || !runnable(self.shared.thread.load(Ordering::Relaxed)));
         if blocked && !self.blocked {
             let node = self.shared.status().node.clone().unwrap_or_else(|| PathBuf::from("the serial port"));
             let cause = format!("a kernel call on {} does not return; unplug the adapter", node.display());
@@ -407,5 +439,29 @@ impl Watcher {
             self.reporter.send(FaultChange::cleared(now, Fault::ImuBlocked));
         }
         self.blocked = blocked;
+    }
+}
+
+/// Whether the thread waits for a processor, and for nothing else (proc(5), the state in `stat`). Where that cannot be read,
+/// it does not.
+fn runnable(thread: i32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/self/task/{thread}/stat")).unwrap_or_default();
+    // The name before the state is in parentheses and may hold anything, parentheses too.
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('R'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_port_is_left_only_for_another_one() {
+        let found =
+            |nodes: &[&str]| others(&nodes.iter().map(PathBuf::from).collect::<Vec<_>>(), Path::new("a"));
+        for (nodes, is_left) in
+            [(&[][..], false), (&["a"], false), (&["b"], true), (&["a", "b"], true), (&["b", "a"], true)]
+        {
+            assert_eq!(found(nodes), is_left, "{nodes:?}");
+        }
     }
 }

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, AtomicI64, Ordering},
+        atomic::{AtomicBool, AtomicI32, AtomicI64, Ordering},
     },
     time::{Duration, Instant},
 };
@@ -24,10 +24,10 @@ use rustix::{
 
 use super::{
     Baud, ImuPort, ImuSettings, ImuStatus, LineStatus, QUEUE_SAMPLES, SerialError,
-    reader::{BLOCKED_NS, Shared, Watcher},
+    reader::{BLOCKED_NS, Reader, Shared, Watcher},
 };
 use crate::{
-    clock,
+    clock, queue,
     report::{Reports, reporting},
     vectornav::CommonOutput,
 };
@@ -218,16 +218,51 @@ fn the_thread_lives_in_every_state() {
     port.stop().expect("stops");
 }
 
-/// A reader that does not move, as one that a driver has swallowed.
-#[test]
-fn a_call_that_does_not_return_is_told_within_200_ms() {
-    let shared = Arc::new(Shared {
+/// What a watcher sees of a reader that was last seen now.
+fn shared_of(thread: i32) -> Arc<Shared> {
+    Arc::new(Shared {
         stop: AtomicBool::new(false),
         wake: eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK).expect("eventfd"),
         alive_ns: AtomicI64::new(clock::now().ns()),
+        thread: AtomicI32::new(thread),
         ended: AtomicBool::new(false),
         status: Mutex::new(ImuStatus::default()),
+    })
+}
+
+/// A reader that is kept from running by others is not one that the port keeps.
+#[test]
+fn a_reader_without_a_processor_is_not_blocked() {
+    let stop = Arc::new(AtomicBool::new(false));
+    let (number, numbers) = std::sync::mpsc::channel();
+    let busy = std::thread::spawn({
+        let stop = Arc::clone(&stop);
+        move || {
+            number.send(rustix::thread::gettid().as_raw_nonzero().get()).expect("is awaited");
+            // Always ready to run, as a thread that waits for a processor.
+            while !stop.load(Ordering::Relaxed) {
+                std::hint::spin_loop();
+            }
+        }
     });
+    let shared = shared_of(numbers.recv().expect("runs"));
+    let (reporter, reports) = reporting();
+    let watcher = Watcher::new(Arc::clone(&shared), reporter);
+    let watching = std::thread::spawn(move || watcher.run());
+    std::thread::sleep(Duration::from_nanos(2 * BLOCKED_NS as u64));
+    assert_eq!(codes(&reports), Vec::<String>::new());
+    stop.store(true, Ordering::Relaxed);
+    busy.join().expect("ends");
+    // Its thread is gone without a word: now nobody reads.
+    wait_for(|| codes(&reports).contains(&"+IMU_BLOCKED".to_owned()));
+    shared.stop.store(true, Ordering::Relaxed);
+    watching.join().expect("ends");
+}
+
+/// A reader that does not move, as one that a driver has swallowed.
+#[test]
+fn a_call_that_does_not_return_is_told_within_200_ms() {
+    let shared = shared_of(0);
     let (reporter, reports) = reporting();
     let watcher = Watcher::new(Arc::clone(&shared), reporter);
     let begin = clock::now();
@@ -245,6 +280,25 @@ fn a_call_that_does_not_return_is_told_within_200_ms() {
     wait_for(|| codes(&reports).contains(&"-IMU_BLOCKED".to_owned()));
     shared.stop.store(true, Ordering::Relaxed);
     thread.join().expect("ends");
+}
+
+/// Looking for a port and opening it may take long by themselves: the pause after them is no part of that, nor is what
+/// follows an opening.
+#[test]
+fn a_reader_that_searches_gives_a_sign_of_life_before_it_pauses() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (_master, slave) = terminal();
+    for device in [folder.path().join("not-there"), slave] {
+        let shared = shared_of(0);
+        shared.alive_ns.store(0, Ordering::Relaxed);
+        // The pause ends at once.
+        rustix::io::write(&shared.wake, &1u64.to_ne_bytes()).expect("woken");
+        let (queue, _events) = queue::newest(1);
+        let mut reader = Reader::new(settings(&device), None, Arc::clone(&shared), reporting().0, queue);
+        let begin = clock::now();
+        reader.search();
+        assert!(shared.alive_ns.load(Ordering::Relaxed) >= begin.ns(), "{}", device.display());
+    }
 }
 
 /// Hostile bytes as fast as the line takes them: no panic, bounded memory, and the unit is heard again at once.

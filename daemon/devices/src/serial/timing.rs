@@ -1,13 +1,15 @@
 //! How evenly samples arrive.
 
+use std::time::Duration;
+
 use bowwave_core::{event::ImuSample, time::Time};
 
 /// Gaps remembered: 1.3 s at 200 Hz.
 const GAPS: usize = 256;
 /// Fewer gaps say nothing.
 const GAPS_MIN: usize = 40;
-/// How much longer than a packet's period the 99th percentile of the gaps may be.
-const LATE_NS: i64 = 5_000_000;
+/// How much longer than a packet's period the 99th percentile of the gaps may be, where nothing else is asked for.
+pub(super) const LATE: Duration = Duration::from_millis(5);
 /// How often the gaps are looked at.
 const LOOK_NS: i64 = 250_000_000;
 /// Looks in a row that must agree before the unit is called late, and before it no longer is.
@@ -38,8 +40,9 @@ struct Gap {
 }
 
 /// Collects arrivals. Samples read together are one arrival.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Arrivals {
+    late_ms: f64,
     gaps: Vec<Gap>,
     next: usize,
     last: Option<(Time, i64)>,
@@ -53,7 +56,30 @@ pub(super) struct Arrivals {
     lost: u64,
 }
 
+impl Default for Arrivals {
+    fn default() -> Self {
+        Self::late_above(LATE)
+    }
+}
+
 impl Arrivals {
+    /// Nothing has arrived. The unit is late where the 99th percentile of the gaps is longer than its period by more than `late`.
+    pub(super) fn late_above(late: Duration) -> Self {
+        Self {
+            late_ms: late.as_secs_f64() * 1e3,
+            gaps: Vec::new(),
+            next: 0,
+            last: None,
+            current: None,
+            looked: None,
+            timing: ArrivalTiming::default(),
+            bad: 0,
+            good: 0,
+            late: false,
+            lost: 0,
+        }
+    }
+
     /// A sample in the order of arrival.
     pub(super) fn sample(&mut self, sample: &ImuSample) {
         match &mut self.current {
@@ -82,8 +108,10 @@ impl Arrivals {
     fn push(&mut self, gap: Gap) {
         let period_ns = (self.timing.period_ms * 1e6) as i64;
         if period_ns > 0 {
-            let missing = (gap.device_ns + period_ns / 2) / period_ns - gap.samples;
-            self.lost += u64::try_from(missing).unwrap_or(0);
+            // The unit's time may be anything.
+            let missing =
+                (gap.device_ns.saturating_add(period_ns / 2) / period_ns).saturating_sub(gap.samples);
+            self.lost = self.lost.saturating_add(u64::try_from(missing).unwrap_or(0));
         }
         if self.gaps.len() < GAPS {
             self.gaps.push(gap);
@@ -95,7 +123,7 @@ impl Arrivals {
 
     /// The line was interrupted.
     pub(super) fn forget(&mut self) {
-        *self = Self { lost: self.lost, late: self.late, ..Self::default() };
+        *self = Self { lost: self.lost, late: self.late, late_ms: self.late_ms, ..Self::default() };
     }
 
     /// To be called now and then. Whether samples arrive late.
@@ -108,7 +136,7 @@ impl Arrivals {
             return self.late;
         }
         self.timing = self.measure();
-        if (self.timing.gap_p99_ms - self.timing.period_ms) * 1e6 > LATE_NS as f64 {
+        if self.timing.gap_p99_ms - self.timing.period_ms > self.late_ms {
             (self.bad, self.good) = (self.bad + 1, 0);
             self.late |= self.bad >= LOOKS_BAD;
         } else {

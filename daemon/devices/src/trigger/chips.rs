@@ -113,6 +113,19 @@ pub enum TriggerError {
         /// The chips.
         present: String,
     },
+    /// Another chip is called as the one that was lost.
+    #[error(
+        "{chip} now is another chip: it was {known}, which is not there, and is {found}; plug that one in again, or start the \
+         trainer anew where the other is meant"
+    )]
+    OtherChip {
+        /// The name asked for.
+        chip: String,
+        /// Label of the chip that it was.
+        known: String,
+        /// Label of the one that it is.
+        found: String,
+    },
     /// The line cannot be had.
     #[error("cannot use line {offset} of {}: {source}; does its chip know interrupts and the bias asked for?", node.display())]
     Request {
@@ -249,6 +262,46 @@ pub(crate) fn place(dev: &Path, chip: &str, line: &str) -> Result<PlacedLine, Tr
         },
     };
     Ok(PlacedLine { node, offset, chip })
+}
+
+/// Like [`place`], for a chip whose label is `known` because it was used before: its node may be another chip's by now, and it
+/// may have come back as another node. A line of another chip is not found.
+pub(crate) fn place_again(
+    dev: &Path,
+    chip: &str,
+    line: &str,
+    known: Option<&str>,
+) -> Result<PlacedLine, TriggerError> {
+    match known {
+        None => place(dev, chip, line),
+        Some(known) => on_known(chip, known, |chip| {
+            let placed = place(dev, chip, line)?;
+            let label = placed.chip.label().to_owned();
+            Ok((placed, label))
+        }),
+    }
+}
+
+/// What `find` gives for `chip` where that is the one with the label `known`, or else for the one that has it.
+/// `find` also tells the label of the chip that it found.
+fn on_known<T>(
+    chip: &str,
+    known: &str,
+    find: impl Fn(&str) -> Result<(T, String), TriggerError>,
+) -> Result<T, TriggerError> {
+    let why = match find(chip) {
+        Ok((found, label)) if label == known => return Ok(found),
+        Ok((_, found)) => TriggerError::OtherChip { chip: chip.to_owned(), known: known.to_owned(), found },
+        Err(e) => e,
+    };
+    if chip == known {
+        return Err(why);
+    }
+    match find(known) {
+        // A chip's name may be another's label.
+        Ok((found, label)) if label == known => Ok(found),
+        Ok(_) | Err(_) => Err(why),
+    }
 }
 
 fn find_name(chip: &Chip, name: &str) -> Option<u32> {
@@ -421,6 +474,39 @@ mod tests {
         let message = place(dev.path(), "pinctrl-rp1", "17").expect_err("not there").to_string();
         assert!(message.starts_with("no GPIO chip is called pinctrl-rp1: chips here: "), "{message}");
         assert!(message.contains("gpiochip0 (cannot be opened)"), "{message}");
+    }
+
+    /// Chips by what they are called: each as its label, or why it cannot be used.
+    fn again(chips: &[(&str, Result<&str, &str>)]) -> Result<String, TriggerError> {
+        on_known("/dev/gpiochip0", "pinctrl", |wanted| {
+            let present = String::new();
+            match chips.iter().find(|(name, _)| *name == wanted) {
+                Some((name, Ok(label))) => Ok(((*name).to_owned(), (*label).to_owned())),
+                Some((name, Err(line))) => Err(TriggerError::NoLine {
+                    node: name.into(),
+                    line: (*line).to_owned(),
+                    last: 7,
+                    present,
+                }),
+                None => Err(TriggerError::NoChip { chip: wanted.to_owned(), present }),
+            }
+        })
+    }
+
+    #[test]
+    fn a_chip_that_is_known_is_taken_under_any_name_and_no_other_in_its_place() {
+        let (node, label) = ("/dev/gpiochip0", "pinctrl");
+        assert_eq!(again(&[(node, Ok(label))]).expect("as before"), node);
+        // Its node is gone, another chip's, without such a line: it is looked for by its label.
+        for at_node in [&[][..], &[(node, Ok("expander"))], &[(node, Err("17"))]] {
+            let chips: Vec<_> = at_node.iter().copied().chain([(label, Ok(label))]).collect();
+            assert_eq!(again(&chips).expect("by its label"), label);
+        }
+        let message = again(&[(node, Ok("expander"))]).expect_err("another chip").to_string();
+        assert!(message.contains("it was pinctrl") && message.contains("is expander"), "{message}");
+        assert!(matches!(again(&[(node, Err("17"))]), Err(TriggerError::NoLine { .. })));
+        assert!(matches!(again(&[]), Err(TriggerError::NoChip { chip, .. }) if chip == node));
+        assert!(again(&[(label, Ok("another"))]).is_err(), "a name that is another's label");
     }
 
     #[test]

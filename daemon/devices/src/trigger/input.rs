@@ -11,7 +11,7 @@ use bowwave_core::time::Time;
 use gpio_cdev::{EventRequestFlags, EventType, LineEventHandle, LineRequestFlags};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 
-use super::chips::{self, TriggerError, place};
+use super::chips::{self, TriggerError, place_again};
 use crate::clock;
 
 /// What the kernel tells of who uses a line.
@@ -34,8 +34,8 @@ pub enum Bias {
 /// An input line and how it is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputLine {
-    /// The chip: its label or name, or a node such as `/dev/gpiochip0`. A chip that was lost is looked for by its label
-    /// too, because it may come back as another node.
+    /// The chip: its label or name, or a node such as `/dev/gpiochip0`. A chip that was lost is known by its label, because
+    /// it may come back as another node, and another chip as its node.
     pub chip: String,
     /// The line: its name or its number on the chip.
     pub line: String,
@@ -75,14 +75,16 @@ pub(super) struct Input {
     node: PathBuf,
     label: String,
     offset: u32,
+    asked: Time,
 }
 
 impl Input {
-    /// Opens the line for both edges.
-    pub(super) fn open(dev: &Path, wanted: &InputLine) -> Result<Self, TriggerError> {
-        let placed = place(dev, &wanted.chip, &wanted.line)?;
+    /// Opens the line for both edges. Where its chip is `known` by its label from before, it is on that one or nowhere.
+    pub(super) fn open(dev: &Path, wanted: &InputLine, known: Option<&str>) -> Result<Self, TriggerError> {
+        let placed = place_again(dev, &wanted.chip, &wanted.line, known)?;
         let (node, offset) = (placed.node.clone(), placed.offset);
         let failed = |source| chips::request_error(&placed, source);
+        let asked = clock::now();
         let handle = placed
             .line()
             .and_then(|line| line.events(wanted.flags(), EventRequestFlags::BOTH_EDGES, CONSUMER))
@@ -90,7 +92,12 @@ impl Input {
         let flags = fcntl_getfl(&handle).unwrap_or(OFlags::empty()) | OFlags::NONBLOCK;
         fcntl_setfl(&handle, flags)
             .map_err(|e| TriggerError::Io { node: node.clone(), source: io::Error::from(e) })?;
-        Ok(Self { handle, node, label: placed.chip.label().to_owned(), offset })
+        Ok(Self { handle, node, label: placed.chip.label().to_owned(), offset, asked })
+    }
+
+    /// When the line was asked for: no edge of it is older.
+    pub(super) const fn asked(&self) -> Time {
+        self.asked
     }
 
     /// What the maker calls its chip.

@@ -20,7 +20,7 @@ pub use self::{
     port::TriggerPort,
     switch::{TriggerCounters, TriggerLife},
 };
-pub(crate) use chips::{place, request_error};
+pub(crate) use chips::{PlacedLine, place_again, request_error};
 
 /// What is wired where.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -147,26 +147,14 @@ struct Place {
     role: Role,
     wanted: InputLine,
     input: Option<Input>,
-    /// Of the chip that it was on.
+    /// Of the chip that it was on: it is looked for on no other, because another line read as the interlock would arm a gun
+    /// that is not inert.
     label: Option<String>,
     /// Earliest time of the next try, or of the next look at a quiet line.
     next: Time,
     /// Its loss has been told.
     told: bool,
     state: LineState,
-}
-
-impl Place {
-    /// Opens the line where it is configured, or else on the one chip that is called as the one that was lost.
-    fn open(&self, dev: &Path) -> Result<Input, TriggerError> {
-        match (Input::open(dev, &self.wanted), &self.label) {
-            (Err(gone @ TriggerError::NotFound { .. }), Some(label)) => {
-                let moved = InputLine { chip: label.clone(), ..self.wanted.clone() };
-                Input::open(dev, &moved).map_err(|_| gone)
-            }
-            (result, _) => result,
-        }
-    }
 }
 
 /// The watching thread.
@@ -243,17 +231,18 @@ impl Watch {
                 continue;
             };
             place.next = now.plus_ns(SEARCH_NS);
-            let opened = place.open(&self.dev).and_then(|input| {
+            let opened = Input::open(&self.dev, &place.wanted, place.label.as_deref()).and_then(|input| {
                 let level = input.level()?;
                 Ok((input, level))
             });
             match opened {
                 Ok((input, (now, level))) => {
+                    let asked = input.asked();
                     place.label = Some(input.label().to_owned()).filter(|label| !label.is_empty());
                     place.input = Some(input);
                     place.told = false;
                     place.next = now.plus_ns(LEVEL_NS);
-                    self.opened(i, now, level);
+                    self.opened(i, asked, now, level);
                 }
                 Err(e) => self.lost(i, &e),
             }
@@ -318,10 +307,10 @@ impl Watch {
         }
     }
 
-    fn opened(&mut self, i: usize, now: Time, level: bool) {
+    fn opened(&mut self, i: usize, asked: Time, now: Time, level: bool) {
         self.show(i, state(level));
         match self.role(i) {
-            Some(Role::Trigger) => self.switch.opened(now, level),
+            Some(Role::Trigger) => self.switch.opened(asked, now, level),
             Some(Role::Interlock | Role::PowerFail) | None => self.level(i, now, level),
         }
     }

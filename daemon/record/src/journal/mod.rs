@@ -68,6 +68,9 @@ pub struct JournalOptions {
     pub reserve_bytes: u64,
     /// Pages in the log beyond which they are moved into the database.
     pub checkpoint_pages: u32,
+    /// The path is the program's own: whatever lies there was a journal, and is put aside where it no longer is one. Else a file
+    /// that is no database is taken for somebody's, named by mistake, and left as it is.
+    pub own: bool,
 }
 
 impl JournalOptions {
@@ -78,7 +81,7 @@ impl JournalOptions {
 impl Default for JournalOptions {
     /// Without a reserve: for runs on a desk.
     fn default() -> Self {
-        Self { reserve_bytes: 0, checkpoint_pages: 1000 }
+        Self { reserve_bytes: 0, checkpoint_pages: 1000, own: false }
     }
 }
 
@@ -126,6 +129,8 @@ struct Settings {
     reserve_bytes: u64,
     /// As in [`JournalOptions`].
     checkpoint_pages: u32,
+    /// As in [`JournalOptions`].
+    own: bool,
     /// Most committed rounds of this run kept in memory, for a fresh database.
     kept_max: usize,
     /// Most rounds kept in memory while the database cannot be written.
@@ -145,6 +150,7 @@ impl From<&JournalOptions> for Settings {
             pages_cached: None,
             reserve_bytes: options.reserve_bytes,
             checkpoint_pages: options.checkpoint_pages,
+            own: options.own,
             kept_max: 10_000,
             held_max: 100_000,
             retry_first: Duration::from_millis(50),

@@ -34,14 +34,20 @@ pub(super) fn for_writing(path: &Path, settings: &Settings) -> Result<Opened, Jo
         return Ok(Opened { connection: connect(path, settings)?, quarantined: Some(resumed) });
     }
     let head = head(path)?;
-    if head.looks_foreign() {
+    if head.looks_foreign() && !settings.own {
         return Err(JournalError::NotADatabase { path: path.into() });
     }
     if head.is_blank() && was_never_begun(path)? {
         remove_unborn(path)?;
     }
     let head = self::head(path)?;
-    let broken = if head.is_blank() { Err("its beginning is blank".to_owned()) } else { check(path)? };
+    let broken = if head.is_blank() {
+        Err("its beginning is blank".to_owned())
+    } else if head.looks_foreign() {
+        Err("its beginning is no database's".to_owned())
+    } else {
+        check(path)?
+    };
     let Err(reason) = broken else {
         return Ok(Opened { connection: connect(path, settings)?, quarantined: None });
     };

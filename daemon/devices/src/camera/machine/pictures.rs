@@ -47,6 +47,12 @@ pub(super) fn layout(format: &Format) -> Option<Layout> {
     Some(Layout { pixels, row, stride, rows, bytes: stride * rows.saturating_sub(1) + row })
 }
 
+/// So many pictures in a row may be left out because of their time stamps: fewer than 100 ms of video at 30 Hz.
+const ODD_STAMPS: u32 = 2;
+
+/// So many pictures in a row are of another size until that is believed.
+const OTHER_SIZES: u32 = 3;
+
 /// What became of a buffer.
 enum Taken {
     Picture(Picture, Option<Arc<[u8]>>),
@@ -61,10 +67,18 @@ impl Stream {
         if self.frames > 0 {
             // A camera may be slower than it says (long exposures); one late frame is not yet that.
             let interval = now.ns_since(self.last_frame).clamp(0, self.period_ns * 2);
-            self.period_ns = (self.period_ns * 7 + interval) / 8;
+            self.period_ns = ((self.period_ns * 7 + interval) / 8).max(self.nominal_ns);
         }
         self.frames += 1;
         self.last_frame = now;
+    }
+
+    /// Whether a picture whose stamp was `believed` or not is one of a few odd ones. Where they stay odd the camera is one
+    /// without a useful clock, and the arrival counts: pictures that are all left out would be worth nothing.
+    fn oddly_stamped(&mut self, believed: bool) -> bool {
+        self.stamped |= believed;
+        self.odd_stamps = if believed { 0 } else { self.odd_stamps.saturating_add(1) };
+        self.stamped && (1..=ODD_STAMPS).contains(&self.odd_stamps)
     }
 }
 
@@ -73,7 +87,9 @@ impl Machine {
     pub(super) fn drain(
         &mut self,
         stream: &mut Stream,
+        now: Time,
         driver: &mut impl Driver,
+        out: &mut Output,
     ) -> Result<Option<Filled>, Failure> {
         let mut newest: Option<Filled> = None;
         // Bounded: a driver may fill faster than this gives back.
@@ -88,6 +104,7 @@ impl Machine {
             stream.last_sequence = Some(filled.sequence);
             let unused = if filled.damaged {
                 self.counters.damaged_buffers += 1;
+                self.tell_damage(now, true, stream, out);
                 Some(filled)
             } else {
                 let older = newest.replace(filled);
@@ -112,17 +129,22 @@ impl Machine {
     ) -> Result<bool, Failure> {
         let sensor = Sensor {
             exposure_ns: stream.exposure_ns,
-            readout_ns: self.settings.readout_us.map_or(stream.period_ns / 2, |us| i64::from(us) * 1000),
-            period_ns: stream.period_ns,
+            readout_ns: self.settings.readout_us.map_or(stream.nominal_ns / 2, |us| i64::from(us) * 1000),
+            period_ns: stream.nominal_ns,
         };
         let (mid, believed) = mid_exposure(filled.stamp, now, sensor);
         self.counters.stamps_not_believed += u64::from(!believed);
-        if mid <= self.last_mid {
-            let cause = format!(
-                "{}: a picture's time is {:.3} ms before the last one's: left out; if it stays so, use another camera",
-                stream.found.best_name().display(),
-                self.last_mid.secs_since(mid) * 1e3
-            );
+        let odd = stream.oddly_stamped(believed);
+        if odd || mid <= self.last_mid {
+            let name = stream.found.best_name();
+            let what = if odd {
+                let behind_ms = now.secs_since(filled.stamp.time) * 1e3;
+                format!("a picture's time is {behind_ms:.0} ms before its arrival, unlike the others'")
+            } else {
+                let back_ms = self.last_mid.secs_since(mid) * 1e3;
+                format!("a picture's time is {back_ms:.3} ms before the last one's")
+            };
+            let cause = format!("{}: {what}: left out; if it stays so, use another camera", name.display());
             out.faults.push(FaultChange::noted(now, Fault::CamTimestamp, cause));
             self.counters.out_of_order += 1;
             driver.queue(filled.index).map_err(during("give a buffer back"))?;
@@ -136,6 +158,7 @@ impl Machine {
             return self.refuse(&taken, stream, now, driver, out);
         };
         self.last_mid = mid;
+        stream.other_sizes = 0;
         self.judge(now, &picture, stream, out);
         self.counters.frames += 1;
         out.frames.push(CameraFrame {
@@ -158,7 +181,9 @@ impl Machine {
         out: &mut Output,
     ) -> Result<bool, Failure> {
         self.counters.damaged_pictures += 1;
-        if matches!(taken, Taken::OtherSize) {
+        stream.other_sizes = if matches!(taken, Taken::OtherSize) { stream.other_sizes + 1 } else { 0 };
+        // A damaged header says any size.
+        if stream.other_sizes >= OTHER_SIZES {
             let cause = format!(
                 "{} sends pictures of another size than the {}x{} agreed: calibrate it anew, or use another camera",
                 stream.found.best_name().display(),

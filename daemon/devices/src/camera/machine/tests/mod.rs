@@ -209,11 +209,20 @@ fn another_size_than_the_calibrated_one_is_told_until_it_is_back() {
 }
 
 #[test]
-fn a_jpeg_of_another_size_is_no_picture() {
+fn jpegs_of_another_size_are_no_pictures_and_told_when_it_is_no_single_one() {
     let mut bench = mjpeg().streaming();
-    bench.now = bench.now.plus_ns(PERIOD_NS);
-    bench.fill(jpeg(32, 9), false);
-    bench.step(Ready { filled: true, ..Ready::default() });
+    let other = |bench: &mut Bench| {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        bench.fill(jpeg(32, 9), false);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    };
+    other(&mut bench);
+    other(&mut bench);
+    bench.frames(1);
+    assert_eq!(bench.frames.len(), 1, "a damaged header says any size");
+    assert_eq!(bench.told(Time::MIN), []);
+    bench.frames.clear();
+    (0..3).for_each(|_| other(&mut bench));
     assert!(bench.frames.is_empty());
     assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamFormat, "raised", _)]));
     bench.frames(1);
@@ -306,6 +315,50 @@ fn a_picture_that_is_not_newer_is_left_out_and_noted() {
         8 * MS,
         "10 ms less half of 4 ms"
     );
+}
+
+/// What was wrong with a camera's pictures says nothing of it once it is gone.
+#[test]
+fn a_camera_that_is_gone_is_lost_and_nothing_else() {
+    let mut bench = mjpeg().streaming();
+    for _ in 0..3 {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        bench.fill(jpeg(32, 9), false);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    }
+    let from = bench.now;
+    bench.fake.dequeue_fails = Some(Errno::NODEV);
+    bench.fake.found.clear();
+    bench.step(Ready { failed: true, ..Ready::default() });
+    let told: Vec<_> = bench.told(from).into_iter().map(|(fault, how, _)| (fault, how)).collect();
+    assert!(told.contains(&(Fault::CamFormat, "cleared")), "{told:?}");
+    assert!(told.contains(&(Fault::CamLost, "raised")), "{told:?}");
+}
+
+/// Row 11: stamps that are far off now and then, and from some time on all of them.
+#[test]
+fn a_few_odd_stamps_are_left_out_and_many_are_not_believed() {
+    let mut bench = yuyv().streaming();
+    let odd = |bench: &mut Bench| {
+        bench.now = bench.now.plus_ns(PERIOD_NS);
+        let picture = bench.picture();
+        bench.fill(picture, false);
+        let stamp = &mut bench.fake.filled[0].0.stamp;
+        stamp.time = stamp.time.plus_ns(-5000 * MS);
+        bench.step(Ready { filled: true, ..Ready::default() });
+    };
+    odd(&mut bench);
+    odd(&mut bench);
+    assert!(bench.frames.is_empty());
+    assert_eq!(bench.told(Time::MIN).iter().filter(|t| t.0 == Fault::CamTimestamp).count(), 2);
+    bench.frames(1);
+    assert_eq!(bench.frames.len(), 1);
+    for _ in 0..6 {
+        odd(&mut bench);
+    }
+    assert_eq!(bench.frames.len(), 1 + 4, "their arrival counts");
+    assert_eq!(bench.counters().stamps_not_believed, 8);
+    assert!(bench.frames.windows(2).all(|w| w[0].mid_exposure < w[1].mid_exposure));
 }
 
 /// Row 12: another camera than the calibrated one.
