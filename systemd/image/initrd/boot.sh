@@ -19,15 +19,28 @@ mounted /sys || mount -t sysfs -o nosuid,nodev,noexec sys /sys
 mounted /dev || mount -t devtmpfs -o nosuid,mode=0755 dev /dev
 mounted /run || mount -t tmpfs -o nosuid,nodev,mode=0755,size=20% run /run
 
-# Finds root=, a device node or PARTLABEL=, and prints its node.
-find_root() {
+# Prints the nodes that root= means, a device node or PARTLABEL=. There are several where a computer that has the image is started
+# from a stick that has it, too.
+find_roots() {
     case $root in
         PARTLABEL=*)
-            name=$(grep -lx "PARTNAME=${root#PARTLABEL=}" /sys/class/block/*/uevent 2>/dev/null | head -n 1)
-            [ -z "$name" ] || { name=${name%/uevent}; echo "/dev/${name##*/}"; }
+            for name in $(grep -lx "PARTNAME=${root#PARTLABEL=}" /sys/class/block/*/uevent 2>/dev/null); do
+                name=${name%/uevent}
+                echo "/dev/${name##*/}"
+            done
             ;;
         *) [ ! -b "$root" ] || echo "$root" ;;
     esac
+}
+
+# Mounts the root file system that this kernel belongs to, and sets node.
+mount_root() {
+    for node in $(find_roots); do
+        mount -t squashfs -o ro,nodev "$node" /new 2>/dev/null || continue
+        [ ! -d "/new/lib/modules/$(uname -r)" ] || return 0
+        umount /new
+    done
+    return 1
 }
 
 root=PARTLABEL=bowwave-root
@@ -39,8 +52,8 @@ done
 
 # Drivers bring new devices, which want drivers: until the root device is there. 20 s is what a slow USB stick takes.
 tries=0
-while node=$(find_root); [ -z "$node" ]; do
-    [ $tries -lt 200 ] || fail "no device $root"
+until mount_root; do
+    [ $tries -lt 200 ] || fail "no device $root with a squashfs for Linux $(uname -r), only: $(find_roots | tr '\n' ' ')"
     cat /sys/bus/*/devices/*/modalias 2>/dev/null | sort -u >/aliases
     if cmp -s /aliases /aliases.seen; then
         usleep 100000
@@ -50,8 +63,6 @@ while node=$(find_root); [ -z "$node" ]; do
     fi
     tries=$((tries + 1))
 done
-
-mount -t squashfs -o ro,nodev "$node" /new || fail "$node holds no squashfs"
 
 # The same machine has the same identity at each start, although nothing can be written to /etc: one journal, not one a start.
 disk=/sys/class/block/${node##*/}
