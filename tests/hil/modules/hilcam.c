@@ -89,6 +89,12 @@ static u32 mode_bytes(const struct hilcam_mode *m)
 	return m->fourcc == V4L2_PIX_FMT_NV12 ? m->width * m->height * 3 / 2 : m->width * m->height * 2;
 }
 
+/* What a picture takes of the bus: a compressed one a quarter of its buffer. */
+static u64 mode_bus_bytes(const struct hilcam_mode *m)
+{
+	return m->fourcc == V4L2_PIX_FMT_MJPEG ? mode_bytes(m) / 4 : mode_bytes(m);
+}
+
 /* ---- videobuf2 ---- */
 
 static int hilcam_queue_setup(struct vb2_queue *q, unsigned int *buffers, unsigned int *planes, unsigned int sizes[],
@@ -146,7 +152,7 @@ static void return_buffers(struct hilcam *cam, enum vb2_buffer_state state)
 static int hilcam_start(struct vb2_queue *q, unsigned int count)
 {
 	struct hilcam *cam = vb2_get_drv_priv(q);
-	u64 wanted = (u64)mode_bytes(&cam->mode) * cam->mode.rate_hz;
+	u64 wanted = mode_bus_bytes(&cam->mode) * cam->mode.rate_hz;
 	int error = READ_ONCE(fail_streamon);
 
 	if (!error && READ_ONCE(bandwidth) && wanted > READ_ONCE(bandwidth))

@@ -16,6 +16,8 @@ use crate::link::{GetInstanceProcAddr, InstanceLink, erase, find_link, key};
 struct Below {
     instance: vk::Instance,
     get: GetInstanceProcAddr,
+    /// Looked up when the instance was made: later the loader answers with the whole chain's, which layers above are part of.
+    destroy: vk::PFN_vkDestroyInstance,
 }
 
 static INSTANCES: Mutex<BTreeMap<usize, Below>> = Mutex::new(BTreeMap::new());
@@ -75,7 +77,9 @@ unsafe extern "system" fn create_instance(
         let create = transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateInstance>(create);
         let result = create(info, allocator, instance);
         if result == vk::Result::SUCCESS {
-            instances().insert(key(*instance), Below { instance: *instance, get });
+            let Some(destroy) = get(*instance, c"vkDestroyInstance".as_ptr()) else { return FAILED };
+            let destroy = transmute::<unsafe extern "system" fn(), vk::PFN_vkDestroyInstance>(destroy);
+            instances().insert(key(*instance), Below { instance: *instance, get, destroy });
         }
         result
     }
@@ -88,11 +92,9 @@ unsafe extern "system" fn destroy_instance(
     if instance == vk::Instance::null() {
         return;
     }
-    // SAFETY: the instance is live until the function below has destroyed it; that function has the type of its name.
+    // SAFETY: the instance is live until the function below has destroyed it.
     unsafe {
         let Some(below) = instances().remove(&key(instance)) else { return };
-        if let Some(destroy) = (below.get)(instance, c"vkDestroyInstance".as_ptr()) {
-            transmute::<unsafe extern "system" fn(), vk::PFN_vkDestroyInstance>(destroy)(instance, allocator);
-        }
+        (below.destroy)(instance, allocator);
     }
 }

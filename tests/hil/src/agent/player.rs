@@ -187,7 +187,7 @@ impl Shared {
         let fourcc = mode.fourcc.as_bytes();
         let head = PictureHead {
             flagged: random.random_bool(feed.flagged.clamp(0.0, 1.0)),
-            timestamp_ns: exposed.plus_ns(if back { -1_000_000_000 } else { 0 }).ns(),
+            timestamp_ns: exposed.plus_ns(if back { -2_000_000_000 } else { 0 }).ns(),
             fourcc: fourcc.try_into().ok()?,
             width: mode.width,
             height: mode.height,

@@ -25,6 +25,8 @@ pub const PICTURE: (u32, u32) = (192, 128);
 pub const LCD: (u32, u32) = (160, 96);
 /// Length of the disk that the data partition is on: small enough to be filled in seconds.
 const DATA_BYTES: u64 = 640 << 20;
+/// How long READY must last to be believed: the LCD shows what was so some frames ago.
+const STEADY: Duration = Duration::from_millis(600);
 /// Most that a first start may take.
 const FIRST_START: Duration = Duration::from_secs(600);
 /// Where the trainer keeps hits.
@@ -86,6 +88,7 @@ impl Shop {
         let stamp = format!("{} {:?}", root.len(), root.modified().context("root.img")?);
         if !kept.exists() || fs::read_to_string(&stamp_path).unwrap_or_default() != stamp {
             eprintln!("first start, which compiles the shaders");
+            let (w, h) = PICTURE;
             let data = self.fresh_data("first-data.img")?;
             let mut bench = Bench::switch_on(self, &data, "utc")?;
             bench.pull(1, true)?;
@@ -95,6 +98,14 @@ impl Shop {
             bench.shoot(3000)?;
             thread::sleep(Duration::from_secs(20));
             bench.ready(FIRST_START)?;
+            // So have the other codings and sizes of the camera.
+            for mode in [format!("MJPG:{w}x{h}@30"), format!("YUYV:{}x{}@30", w / 2, h / 2)] {
+                bench.camera("unplug")?;
+                bench.camera(&format!("modes {mode}"))?;
+                bench.camera("plug 0")?;
+                thread::sleep(Duration::from_secs(5));
+                bench.lcd(Instant::now(), FIRST_START, "a picture", |p, _| p != Plate::Black)?;
+            }
             bench.machine.guest.run(&["/bin/systemctl", "stop", "bowwave.service"])?;
             bench.machine.guest.shell(&format!("rm -f {STATE}/hits.sqlite* {STATE}/summary.json"))?;
             bench.machine.guest.run(&["/bin/systemctl", "--no-block", "poweroff"])?;
@@ -120,9 +131,7 @@ impl Shop {
 
 fn make_tape(recording: &Path, out: &Path) -> Result<Tape> {
     drop(fs::remove_file(recording));
-    let recipe =
-        hw_sim::make::Recipe { width: PICTURE.0, height: PICTURE.1, ..hw_sim::make::Recipe::default() };
-    hw_sim::make::make(&recipe, recording, &mut |_, _| {})?;
+    hw_sim::make::make(&recipe(), recording, &mut |_, _| {})?;
     let tape = Tape::from_recording(recording)?;
     tape.write(out)?;
     Ok(tape)
@@ -148,7 +157,7 @@ ExecStart=/usr/bin/bowwave run --config /run/hil/etc/bowwave.toml --frame-hashes
 # The harness hears of each commit as soon as the program says so.
 StandardOutput=file:/run/hil/output
 StandardError=journal
-WatchdogSec=60
+WatchdogSec=30
 TimeoutStartSec=600
 TimeoutStopSec=20
 # Software Vulkan compiles in a third of the time where LLVM does not optimise; what it draws stays the same.
@@ -169,8 +178,8 @@ name = "skiff-1"
 model = "skiff"
 side = "hostile"
 course = "still"
-range_m = 120
-bearing_deg = 0
+range_m = 74
+bearing_deg = 4
 heading_deg = 90
 "#;
 
@@ -206,13 +215,13 @@ impl Default for Configured {
 pub fn configuration(c: &Configured) -> String {
     let data = c.data.as_ref().map_or_else(String::new, |d| format!("data = \"{d}\"\n"));
     format!(
-        "[screen]\noutput = \"lcd\"\n[camera]\nmodes = [{}]\n[imu]\nbaud = [921600, 115200]\n\
+        "[screen]\noutput = \"lcd\"\nsize = \"{}x{}\"\n[camera]\nmodes = [{}]\n[imu]\nbaud = [921600, 460800, 230400, 115200]\nlate_ms = 30\n\
          [trigger]\nchip = \"bench\"\nline = \"trigger\"\n[interlock]\nchip = \"bench\"\nline = \"interlock\"\n\
          [power_fail]\nchip = \"bench\"\nline = \"power-fail\"\n\
          [lamps]\nchip = \"bench\"\nready = \"lamp-ready\"\nhit = \"lamp-hit\"\nfault = \"lamp-fault\"\n\
-         [gpu]\nhang_ms = 20000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
+         [gpu]\nhang_ms = 15000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
          [health]\nthermal = \"/run/hil/thermal\"\nlimit_c = 78.0\n{}",
-        c.modes, c.calibration, c.record, c.extra
+        LCD.0, LCD.1, c.modes, c.calibration, c.record, c.extra
     )
 }
 
@@ -375,9 +384,27 @@ impl Bench {
         Ok(())
     }
 
-    /// Waits until the LCD says READY. A warning may stand beside it: IMU LATE comes and goes where the processor is emulated.
-    pub fn ready(&self, patience: Duration) -> Result<Instant> {
-        self.lcd(Instant::now(), patience, "READY", |plate, _| plate == Plate::Ready)
+    /// Waits until the trainer is READY and stays so: by the LCD and by the service's status line, which are told apart by how
+    /// long a frame takes to the LCD. A warning may stand beside it. When the LCD said it first.
+    pub fn ready(&mut self, patience: Duration) -> Result<Instant> {
+        let until = Instant::now() + patience;
+        let mut first = None;
+        loop {
+            let since = Instant::now();
+            let seen =
+                self.lcd(since, until.saturating_duration_since(since), "READY", |p, _| p == Plate::Ready)?;
+            let begun = *first.get_or_insert(seen);
+            if !self.status()?.starts_with("READY") {
+                first = None;
+            } else if begun.elapsed() > STEADY {
+                return Ok(begun);
+            }
+            if let Some(last) = self.machine.lcd.last().filter(|s| s.plate != Plate::Ready) {
+                first = None;
+                ensure!(Instant::now() < until, "READY did not stay on the LCD: {last:?}");
+            }
+            thread::sleep(Duration::from_millis(100));
+        }
     }
 
     /// Compares the LCD with the frames' hashes that the trainer keeps; how many of so many pictures were found.

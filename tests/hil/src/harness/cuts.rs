@@ -56,21 +56,22 @@ struct Left {
 
 /// Does so many cuts; continues a table that is there. Whether nothing was lost or invented.
 pub fn run(shop: &mut Shop, count: u32, seed: u64) -> Result<bool> {
+    let table = shop.out.join("cuts.csv");
+    let data = shop.out.join("cuts-data.img");
+    if !table.exists() || !data.exists() {
+        // With the LCD, by which the first start is followed.
+        shop.used_data("cuts-data.img")?;
+        fs::write(&table, "cut,run,shot_for_ms,acknowledged,stored,lost,twice,invented,seconds\n")?;
+    }
     for (name, content) in &mut shop.parts.files {
         match name.as_str() {
             "etc/scenario.toml" => *content = SCENARIO.to_owned(),
             "etc/bowwave.toml" => {
                 let usual = configuration(&super::bench::Configured::default());
-                *content = usual.replace("output = \"lcd\"", "output = \"none\"\nsize = \"96x64\"");
+                *content = usual.replace("output = \"lcd\"", "output = \"none\"");
             }
             _ => {}
         }
-    }
-    let table = shop.out.join("cuts.csv");
-    let data = shop.out.join("cuts-data.img");
-    if !table.exists() || !data.exists() {
-        shop.used_data("cuts-data.img")?;
-        fs::write(&table, "cut,run,shot_for_ms,acknowledged,stored,lost,twice,invented,seconds\n")?;
     }
     let done = fs::read_to_string(&table)?.lines().count().saturating_sub(1) as u32;
     let mut random = Pcg64Mcg::seed_from_u64(seed.wrapping_add(u64::from(done)));
@@ -82,6 +83,8 @@ pub fn run(shop: &mut Shop, count: u32, seed: u64) -> Result<bool> {
         let mut bench = Bench::switch_on(shop, &data, "utc")?;
         bench.pull(1, true)?;
         bench.play()?;
+        // By then the data partition is mounted. A trigger that was pressed before the trainer looked at it would be no shot.
+        bench.says_within("READY", Duration::from_secs(240))?;
         let newest = newest_run(&mut bench)?;
         if let Some(left) = before.take() {
             let verdict = check(&mut bench, &left, newest)?;

@@ -2,11 +2,12 @@
 
 use std::{
     collections::HashMap,
-    io::{BufRead, BufReader, Write},
+    fs::File,
+    io::{BufRead, BufReader, LineWriter, Write},
     os::unix::net::UnixStream,
     sync::{
         Arc, Condvar, Mutex, MutexGuard, PoisonError,
-        mpsc::{Sender, channel},
+        mpsc::{Receiver, Sender, channel},
     },
     thread,
     time::{Duration, Instant},
@@ -53,6 +54,22 @@ struct Shared {
     waiting: Mutex<HashMap<u64, Sender<Result<Value, String>>>>,
 }
 
+/// A request that is being carried out.
+pub struct Pending {
+    what: String,
+    reply: Receiver<Result<Value, String>>,
+}
+
+impl Pending {
+    /// Waits for its answer.
+    pub fn answer(self, patience: Duration) -> Result<Value> {
+        match self.reply.recv_timeout(patience) {
+            Ok(result) => result.map_err(|e| anyhow!("{}: {e}", shortened(&self.what))),
+            Err(_) => bail!("no answer in {} s to {}", patience.as_secs(), shortened(&self.what)),
+        }
+    }
+}
+
 /// The connection.
 pub struct Guest {
     socket: UnixStream,
@@ -63,15 +80,19 @@ pub struct Guest {
 }
 
 impl Guest {
-    /// Listens on the agent's port.
-    pub fn new(socket: UnixStream) -> Result<Self> {
+    /// Listens on the agent's port. The machine's journal goes into `journal` as it comes, for whoever looks what is going on.
+    pub fn new(socket: UnixStream, journal: File) -> Result<Self> {
         let shared =
             Arc::new(Shared { heard: Mutex::default(), news: Condvar::new(), waiting: Mutex::default() });
         let lines = BufReader::new(socket.try_clone()?);
         let listener = Arc::clone(&shared);
+        let mut journal = LineWriter::new(journal);
         thread::Builder::new().name("agent".into()).spawn(move || {
             for line in lines.lines().map_while(Result::ok) {
-                listener.hear(&line);
+                if let Some(entry) = listener.hear(&line) {
+                    // The test goes on without it.
+                    drop(writeln!(journal, "{:10.3} {}", entry.at_ns as f64 * 1e-9, entry.text()));
+                }
             }
             listener.heard().ended = true;
             locked(&listener.waiting).clear();
@@ -119,6 +140,11 @@ impl Guest {
 
     /// A request, and how long it may take.
     pub fn call_within(&mut self, command: Command, patience: Duration) -> Result<Value> {
+        self.send(command)?.answer(patience)
+    }
+
+    /// A request whose answer is fetched later: the agent carries out several at a time.
+    pub fn send(&mut self, command: Command) -> Result<Pending> {
         let what = format!("{command:?}");
         self.next += 1;
         let (sender, reply) = channel();
@@ -126,10 +152,7 @@ impl Guest {
         let mut line = serde_json::to_vec(&Request { id: self.next, command })?;
         line.push(b'\n');
         self.socket.write_all(&line).with_context(|| format!("the agent's port, {what}"))?;
-        match reply.recv_timeout(patience) {
-            Ok(result) => result.map_err(|e| anyhow!("{}: {e}", shortened(&what))),
-            Err(_) => bail!("no answer in {} s to {}", patience.as_secs(), shortened(&what)),
-        }
+        Ok(Pending { what, reply })
     }
 
     /// Runs a program in the machine; its standard output where it ended well.
@@ -225,14 +248,16 @@ impl Shared {
         locked(&self.heard)
     }
 
-    fn hear(&self, line: &str) {
+    /// Takes a message in; the journal's line, where it is one.
+    fn hear(&self, line: &str) -> Option<Entry> {
         let message = match serde_json::from_str::<Message>(line) {
             Ok(message) => message,
             Err(e) => {
                 self.heard().failures.push(format!("no message ({e}): {}", shortened(line)));
-                return;
+                return None;
             }
         };
+        let mut written = None;
         let mut heard = self.heard();
         match message {
             Message::Hello { now_ns, kernel, gpio_chip } => heard.hello = Some((now_ns, kernel, gpio_chip)),
@@ -241,7 +266,11 @@ impl Shared {
                     drop(sender.send(result));
                 }
             }
-            Message::Journal { at_ns, fields } => heard.journal.push(Entry { at_ns, fields }),
+            Message::Journal { at_ns, fields } => {
+                let entry = Entry { at_ns, fields };
+                written = Some(entry.clone());
+                heard.journal.push(entry);
+            }
             Message::Line { at_ns, text, .. } => heard.lines.push((at_ns, text)),
             Message::Origin { at_ns } => heard.origin_ns = Some(at_ns),
             Message::Trigger { before_ns, after_ns, pressed } => {
@@ -251,6 +280,7 @@ impl Shared {
         }
         drop(heard);
         self.news.notify_all();
+        written
     }
 }
 

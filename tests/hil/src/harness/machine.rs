@@ -162,7 +162,7 @@ impl Machine {
         let connected = || -> Result<_> {
             let qmp = Qmp::connect(&folder.join("qmp"))?;
             let lcd = Watch::start(Qmp::connect(&folder.join("watch"))?, folder, start.lcd)?;
-            let guest = Guest::new(wait_for_socket(&folder.join("ctl"))?)?;
+            let guest = Guest::new(wait_for_socket(&folder.join("ctl"))?, log("journal.txt")?)?;
             unit.relay(wait_for_socket(&folder.join("imu"))?, terminal)?;
             Ok((qmp, lcd, guest))
         };

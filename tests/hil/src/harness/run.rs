@@ -20,6 +20,9 @@ use super::{
 /// A machine's hardware clock that was never set.
 const NO_CLOCK: &str = "2020-01-01T00:00:00";
 
+/// The row that destroys the journal: before it, the rounds of the rows so far are looked at.
+const REPLACES_JOURNAL: &str = "33";
+
 /// Runs the rows whose numbers are asked for, all where none is. Whether nothing was missed.
 pub fn run(shop: &Shop, only: &[String]) -> Result<bool> {
     let begun = Instant::now();
@@ -71,20 +74,28 @@ fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &
         steady(bench, report)?;
     }
     for row in rows().iter().filter(|r| r.number() != "26") {
+        if only.is_empty() && row.number() == REPLACES_JOURNAL {
+            let delay = after_stop(bench)?;
+            report.figures.extend(measure::shots(bench, delay)?);
+            bench.machine.guest.call(Command::Play { on: true })?;
+            bench.settle()?;
+        }
         if only.is_empty() || only.iter().any(|n| n == row.number()) {
             try_row(row, bench, report);
         }
-    }
-    if only.is_empty() {
-        let delay = after_stop(bench)?;
-        report.figures.extend(measure::shots(bench, delay)?);
     }
     Ok(())
 }
 
 fn try_row(row: &Row, bench: &mut Bench, report: &mut Report) {
     let begun = Instant::now();
-    let line = row.run(bench);
+    let mut line = row.run(bench);
+    if line.verdict == Verdict::Missed && !row.only_once() {
+        // The host may have been busy: once more, and the table says so.
+        eprintln!("{:>4} {} was missed: {}; once more", line.number, line.fault, line.note);
+        let first = std::mem::replace(&mut line, row.run(bench));
+        line.note = format!("second try; the first: {}; {}", first.note, line.note);
+    }
     eprintln!(
         "{:>4} {:<40} {:<14} {:>6.1} s  {} {}",
         line.number,

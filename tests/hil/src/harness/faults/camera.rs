@@ -20,7 +20,8 @@ fn quiet(bench: &mut Bench) -> Result<i64> {
     })
 }
 
-fn modes() -> String {
+/// The camera's modes while nothing is wrong.
+pub fn modes() -> String {
     let (w, h) = PICTURE;
     format!("YUYV:{w}x{h}@30 MJPG:{w}x{h}@30 YUYV:{}x{}@30", w / 2, h / 2)
 }
@@ -149,7 +150,7 @@ pub fn rows() -> Vec<Row> {
         Row::Own(Own {
             number: "10",
             fault: "No bandwidth (ENOSPC)",
-            injected: "starting modes of more than 1 MB/s answers ENOSPC",
+            injected: "starting modes of more than 1 MB/s answers ENOSPC: YUYV is too much, MJPEG of the same size is not",
             code: "CAM_BW",
             target: "smaller mode in 2 s",
             run: no_bandwidth,
@@ -157,7 +158,7 @@ pub fn rows() -> Vec<Row> {
         Row::Case(Case {
             number: "11",
             fault: "Camera timestamps backward",
-            injected: "20 % of the pictures are stamped a second back",
+            injected: "20 % of the pictures are stamped two seconds back",
             code: "CAM_TS",
             shown: Shown::Nothing,
             seen_s: None,
@@ -219,7 +220,7 @@ pub fn rows() -> Vec<Row> {
         Row::Own(Own {
             number: "12",
             fault: "Another camera than the one calibrated",
-            injected: "a calibration of another size is configured, SIGHUP",
+            injected: "a calibration of the camera with another serial number is configured, SIGHUP",
             code: "CAL_MISMATCH",
             target: "until recalibrated",
             run: mismatch,
@@ -254,9 +255,7 @@ fn renumbered(bench: &mut Bench) -> Result<Seen> {
     let back = bench.told("CAM_LOST", Told::Went, plugged, bench.scaled(2.0))?;
     bench.ready(bench.scaled(2.0))?;
     let back_s = (back.max(renamed) - plugged) as f64 * 1e-9;
-    bench.camera("unplug")?;
-    bench.settle()?;
-    Ok(Seen { lcd, back_s: Some(back_s), met: back_s <= bench.slow, ..Seen::default() })
+    Ok(Seen { lcd, back_s: Some(back_s), within_s: Some(1.0), met: true, ..Seen::default() })
 }
 
 fn no_bandwidth(bench: &mut Bench) -> Result<Seen> {
@@ -266,36 +265,41 @@ fn no_bandwidth(bench: &mut Bench) -> Result<Seen> {
     bench.camera("unplug")?;
     let plugged = bench.camera("plug 0")?;
     let told = bench.told("CAM_BW", Told::Came, from, bench.scaled(3.0))?;
+    bench.ready(bench.scaled(2.0))?;
+    let streams = bench.machine.guest.now_ns();
     let state = bench.machine.guest.call(Command::CameraState)?;
-    let lcd = bench.status()?;
+    let lcd = bench.says("USB TOO SLOW")?;
     bench.keep_picture("row-10");
-    bench.camera("unplug")?;
-    bench.settle()?;
     ensure!(
-        state["streaming"] == 1 && state["width"] == PICTURE.0 / 2,
+        state["streaming"] == 1 && state["fourcc"] == "MJPG",
         "it does not stream the smaller mode: {state}"
     );
-    let seen_s = (told - plugged) as f64 * 1e-9;
-    Ok(Seen { lcd, seen_s: Some(seen_s), met: seen_s <= 2.0 * bench.slow, ..Seen::default() })
+    let (seen_s, back_s) = ((told - plugged) as f64 * 1e-9, (streams - plugged) as f64 * 1e-9);
+    Ok(Seen {
+        lcd,
+        seen_s: Some(seen_s),
+        back_s: Some(back_s),
+        within_s: Some(2.0),
+        met: true,
+        ..Seen::default()
+    })
 }
 
 fn mismatch(bench: &mut Bench) -> Result<Seen> {
     bench.ready(bench.scaled(2.0))?;
-    let (w, h) = (PICTURE.0.to_string(), PICTURE.1.to_string());
-    // The lens of another camera.
-    let other = hw_sim::make::Recipe { width: PICTURE.0 * 2, height: PICTURE.1 * 2, ..Default::default() };
-    let text = bowwave_calibration::to_toml(&hw_sim::make::calibration(&other));
+    let mut other = hw_sim::make::calibration(&crate::bench::recipe());
+    other.camera_serial = "0002".into();
+    let text = bowwave_calibration::to_toml(&other);
     let path = "/run/hil/etc/other.toml".to_owned();
     bench.machine.guest.call(Command::Write { path, text })?;
     bench.configure(&Configured { calibration: "other.toml".into(), ..Configured::default() })?;
     let from = bench.machine.guest.now_ns();
     bench.service("reload")?;
     let told = bench.told("CAL_MISMATCH", Told::Came, from, bench.scaled(2.0));
-    let lcd = bench.status()?;
+    let lcd = bench.says("CAL MISMATCH").or_else(|_| bench.status())?;
     bench.keep_picture("row-12");
     bench.configure(&Configured::default())?;
     bench.service("reload")?;
-    bench.settle()?;
     told?;
-    Ok(Seen { met: lcd.contains("CAL"), lcd, note: format!("the camera has {w}x{h}"), ..Seen::default() })
+    Ok(Seen { met: lcd.contains("CAL MISMATCH"), lcd, ..Seen::default() })
 }
