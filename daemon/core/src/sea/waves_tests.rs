@@ -106,7 +106,10 @@ proptest! {
     ) {
         let (waves, centre) = (sea(force, 4), DVec2::new(x, y));
         let forward = DVec2::new(heading.sin(), heading.cos());
-        let n = 160;
+        // The sum below sees eight places of the shortest wave, or it would take it for a longer one.
+        let n = 240;
+        let shortest_m = waves.waves.iter().map(|w| w.cycles_per_m.length().recip()).fold(f64::INFINITY, f64::min);
+        let (length, beam) = (length.min(30.0 * shortest_m), beam.min(7.5 * shortest_m));
         let (mut mean, mut by_x, mut by_y, mut xx, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for i in 0..n {
             for j in 0..n / 4 {
