@@ -10,6 +10,7 @@ pub mod imu;
 pub mod lamps;
 pub mod lcd;
 mod nodes;
+mod pulse;
 pub mod queue;
 pub mod report;
 pub mod serial;

@@ -202,17 +202,13 @@ impl Machine {
     }
 
     fn raise(&mut self, now: Time, fault: Fault, cause: String, out: &mut Output) {
-        // A camera that is gone does nothing else wrong, and one that does something wrong is there.
-        let over: &[Fault] = match fault {
-            Fault::CamLost => &[&WRONG_WITH_IT[..], &WRONG_WITH_PICTURES[..]].concat(),
-            // The camera that had these is not the one that is there.
-            Fault::CalMismatch => {
-                &[&[Fault::CamLost], &WRONG_WITH_IT[..4], &WRONG_WITH_PICTURES[..]].concat()
-            }
-            f if WRONG_WITH_IT.contains(&f) => &[Fault::CamLost],
-            _ => &[],
-        };
-        for fault in over {
+        // A camera that is gone does nothing else wrong, and one that does something wrong is there. What another camera had is
+        // not what the one has that is there.
+        let gone = fault == Fault::CamLost;
+        let other = gone || fault == Fault::CalMismatch;
+        let over = WRONG_WITH_IT.iter().chain(&WRONG_WITH_PICTURES).filter(|f| other && **f != fault);
+        let back = (!gone && WRONG_WITH_IT.contains(&fault)).then_some(&Fault::CamLost);
+        for fault in over.chain(back) {
             self.clear(now, *fault, out);
         }
         if self.raised.insert(fault) {
@@ -334,11 +330,12 @@ impl Machine {
             }
             let rate = rate.unwrap_or(candidate.mode.rate);
             self.in_use = Some(Arc::new(in_use(found, &opened, &format, rate, refused)));
+            let nominal_ns = rate.period_ns().clamp(MS, 1000 * MS);
             return Ok(Some(Stream {
                 found: found.clone(),
                 format,
-                nominal_ns: rate.period_ns().clamp(MS, 1000 * MS),
-                period_ns: rate.period_ns().clamp(MS, 1000 * MS),
+                nominal_ns,
+                period_ns: nominal_ns,
                 begun: now,
                 frames: 0,
                 last_frame: now,

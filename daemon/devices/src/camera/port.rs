@@ -3,13 +3,13 @@
 use std::{
     sync::{
         Arc, Mutex, PoisonError,
-        atomic::{AtomicBool, AtomicI64, Ordering},
+        atomic::{AtomicBool, Ordering},
     },
     thread::{self, JoinHandle},
     time::Duration,
 };
 
-use bowwave_core::{event::Event, time::Time};
+use bowwave_core::event::Event;
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
 use super::{
@@ -21,6 +21,7 @@ use super::{
 };
 use crate::{
     clock,
+    pulse::Calls,
     queue::{self, NewestSender},
     report::Reporter,
 };
@@ -51,8 +52,8 @@ struct Shared {
     stop: AtomicBool,
     wake: Arc<Wake>,
     status: Mutex<CameraStatus>,
-    /// When the call into the kernel began that is under way; 0 where none is.
-    calling_since_ns: AtomicI64,
+    /// Opening, setting and starting a USB camera take hundreds of milliseconds, which is no hang.
+    calls: Calls,
 }
 
 impl CameraPort {
@@ -63,17 +64,12 @@ impl CameraPort {
         let thread_error = |source| CameraError::Thread { source };
         let wake = Arc::new(Wake::new().map_err(thread_error)?);
         let status = Mutex::new(CameraStatus::default());
-        let shared = Arc::new(Shared {
-            stop: AtomicBool::new(false),
-            wake,
-            status,
-            calling_since_ns: AtomicI64::new(0),
-        });
+        let shared = Arc::new(Shared { stop: AtomicBool::new(false), wake, status, calls: Calls::default() });
         let (sender, events) = queue::newest(QUEUE_FRAMES);
         let (ending, ended) = bounded(1);
         let pulse = {
             let (shared, reporter) = (Arc::clone(&shared), reporter.clone());
-            spawn("camera-pulse", move || beat_during_calls(&shared, &reporter)).map_err(thread_error)?
+            spawn("camera-pulse", move || shared.calls.beat(&reporter, CALL_MAX_NS)).map_err(thread_error)?
         };
         let work = {
             let shared = Arc::clone(&shared);
@@ -82,7 +78,7 @@ impl CameraPort {
         match work {
             Ok(work) => Ok(Self { events, shared, ended, threads: vec![work, pulse] }),
             Err(source) => {
-                shared.stop.store(true, Ordering::Relaxed);
+                shared.calls.end();
                 Err(CameraError::Thread { source })
             }
         }
@@ -101,8 +97,7 @@ impl CameraPort {
     /// Stops the stream, closes the camera and ends the thread. An error where a call into the kernel does not return in
     /// 200 ms (the thread ends when it does), or the thread broke down.
     pub fn stop(mut self) -> Result<CameraCounters, CameraError> {
-        self.shared.stop.store(true, Ordering::Relaxed);
-        self.shared.wake.signal();
+        self.end();
         match self.ended.recv_timeout(STOP) {
             Err(RecvTimeoutError::Timeout) => return Err(CameraError::Blocked),
             // Disconnected: it broke down, which joining it will tell.
@@ -115,10 +110,18 @@ impl CameraPort {
     }
 }
 
-impl Drop for CameraPort {
-    fn drop(&mut self) {
+impl CameraPort {
+    fn end(&self) {
         self.shared.stop.store(true, Ordering::Relaxed);
         self.shared.wake.signal();
+        self.shared.calls.end();
+        self.threads.iter().for_each(|t| t.thread().unpark());
+    }
+}
+
+impl Drop for CameraPort {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 
@@ -140,9 +143,7 @@ fn run(
     while !shared.stop.load(Ordering::Relaxed) {
         reporter.beat();
         let now = clock::now();
-        shared.calling_since_ns.store(now.ns(), Ordering::Relaxed);
-        let due = machine.step(now, ready, &mut driver, &mut out);
-        shared.calling_since_ns.store(0, Ordering::Relaxed);
+        let due = shared.calls.during(|| machine.step(now, ready, &mut driver, &mut out));
         let idle = ready.filled && out.frames.is_empty();
         out.faults.drain(..).for_each(|change| reporter.send(change));
         out.frames.drain(..).for_each(|frame| events.send(Event::Frame(frame)));
@@ -162,19 +163,6 @@ fn publish(shared: &Shared, machine: &Machine, events: &NewestSender<Event>) {
     let mut status = machine.status();
     status.counters.dropped = events.dropped();
     *shared.status.lock().unwrap_or_else(PoisonError::into_inner) = status;
-}
-
-/// Gives the sign of life while the camera's thread is within the kernel: opening, setting and starting a USB camera take
-/// hundreds of milliseconds, which is no hang. Longer than the longest transfer is one.
-fn beat_during_calls(shared: &Shared, reporter: &Reporter) {
-    const LOOK: Duration = Duration::from_millis(50);
-    while !shared.stop.load(Ordering::Relaxed) {
-        thread::sleep(LOOK);
-        let since = shared.calling_since_ns.load(Ordering::Relaxed);
-        if since != 0 && clock::now().ns_since(Time::from_ns(since)) < CALL_MAX_NS {
-            reporter.beat();
-        }
-    }
 }
 
 #[cfg(test)]

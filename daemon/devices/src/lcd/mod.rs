@@ -19,7 +19,6 @@ mod error;
 mod life;
 mod mode;
 mod pixels;
-mod pulse;
 mod screen;
 mod slot;
 mod thread;
@@ -31,7 +30,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bowwave_core::time::Time;
+use bowwave_core::time::{NS_PER_S, Time};
 use crossbeam_channel::Receiver;
 
 pub use error::LcdError;
@@ -42,6 +41,10 @@ use thread::Shared;
 
 /// Flips that may wait for the caller: two seconds at 30 Hz.
 const FLIPS: usize = 64;
+/// The longest that a call into the kernel may take; after it the thread counts as hung. A display that is probed may take
+/// seconds to answer, and a change of the mode waits 10 s for each earlier flip of the screen and of its plane that was lost,
+/// and as long for its own.
+const CALL_MAX_NS: i64 = 45 * NS_PER_S;
 
 /// Which display is used, and how.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -254,7 +257,7 @@ impl LcdPort {
         let thread = spawn("lcd").spawn(move || worker.run()).map_err(LcdError::Thread)?;
         // What is there ends when this is dropped.
         let mut port = Self { shared: Arc::clone(&shared), flips, thread: Some(thread), pulse: None };
-        let pulse = spawn("lcd-pulse").spawn(move || shared.calls.beat(&reporter, pulse::CALL_MAX_NS));
+        let pulse = spawn("lcd-pulse").spawn(move || shared.calls.beat(&reporter, CALL_MAX_NS));
         port.pulse = Some(pulse.map_err(LcdError::Thread)?);
         Ok(port)
     }

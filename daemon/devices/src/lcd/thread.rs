@@ -22,11 +22,10 @@ use super::{
     card::{self, Card},
     life::{Due, Life, Tell},
     pixels,
-    pulse::Calls,
     screen::{Saved, Screen, Started},
     slot::Slot,
 };
-use crate::{clock, queue::NewestSender, report::Reporter};
+use crate::{clock, pulse::Calls, queue::NewestSender, report::Reporter};
 
 /// What the callers and the thread both see.
 #[derive(Debug)]

@@ -6,20 +6,16 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::time::{NS_PER_S, Time};
+use bowwave_core::time::Time;
 
 use crate::{clock, report::Reporter};
 
-/// The longest that a call into the kernel may take; after it the thread counts as hung. A display that is probed may take
-/// seconds to answer, and a change of the mode waits 10 s for each earlier flip of the screen and of its plane that was lost,
-/// and as long for its own.
-pub(super) const CALL_MAX_NS: i64 = 45 * NS_PER_S;
 /// How often a sign of life is given.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// The calls of one thread.
 #[derive(Debug, Default)]
-pub(super) struct Calls {
+pub(crate) struct Calls {
     /// When the call under way began, nanoseconds; 0 where none is.
     since_ns: AtomicI64,
     ended: AtomicBool,
@@ -36,19 +32,19 @@ impl Drop for Call<'_> {
 
 impl Calls {
     /// Makes a call that may take long.
-    pub(super) fn during<T>(&self, call: impl FnOnce() -> T) -> T {
+    pub(crate) fn during<T>(&self, call: impl FnOnce() -> T) -> T {
         self.since_ns.store(clock::now().ns(), Ordering::Relaxed);
         let _call = Call(self);
         call()
     }
 
     /// There are no more. The thread that gives signs of life is to be unparked.
-    pub(super) fn end(&self) {
+    pub(crate) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
 
     /// Gives the sign of life while a call is under way, for at most `longest_ns` each, until there are no more.
-    pub(super) fn beat(&self, reporter: &Reporter, longest_ns: i64) {
+    pub(crate) fn beat(&self, reporter: &Reporter, longest_ns: i64) {
         while !self.ended.load(Ordering::Relaxed) {
             let since = self.since_ns.load(Ordering::Relaxed);
             if since != 0 && clock::now().ns_since(Time::from_ns(since)) < longest_ns {
