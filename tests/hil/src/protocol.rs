@@ -125,8 +125,6 @@ pub struct Feed {
     pub garbage: f64,
     /// Whether the tape's own pulls of the trigger are played.
     pub trigger: bool,
-    /// Bytes of the unit are sent so much earlier than recorded, to make up for the way through the host, nanoseconds.
-    pub lead_ns: i64,
 }
 
 /// What the agent says.

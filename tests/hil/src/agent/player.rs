@@ -202,7 +202,7 @@ impl Shared {
         for (round, index) in self.rounds(header.samples.len()) {
             let sample = header.samples[index];
             let feed = self.feed().clone();
-            let due = origin.plus_ns(round * header.period_ns + sample.arrival_ns - feed.lead_ns);
+            let due = origin.plus_ns(round * header.period_ns + sample.arrival_ns);
             clock::sleep_until(due);
             if !self.current(number) {
                 return;

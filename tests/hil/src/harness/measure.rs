@@ -4,7 +4,8 @@ use std::{thread, time::Duration};
 
 use anyhow::{Context, Result, ensure};
 use bowwave_hil::protocol::Command;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
+use hw_sim::make::Motion;
 use serde_json::Value;
 
 use super::bench::{Bench, recipe};
@@ -71,72 +72,109 @@ pub fn usage(bench: &mut Bench, what: &str) -> Result<Vec<Figure>> {
 }
 
 /// Shots against what the bench did: kernel's time of the edge, order, pose at the time of firing.
-pub fn shots(bench: &mut Bench, line_delay_ms: Option<f64>) -> Result<Vec<Figure>> {
+///
+/// The unit itself errs by half a milliradian, slowly, and the tape's gun moves by a tenth of a radian a second: against the
+/// truth that is milliseconds. What the trainer can be early or late by is held against what the unit said; how far all is from
+/// the truth is told as an angle.
+pub fn shots(bench: &mut Bench, line_delay_ms: f64) -> Result<Vec<Figure>> {
     let rounds = bench.rounds()?;
     let origin = bench.machine.guest.origin_ns().context("nothing was played")?;
     let fired = |r: &Value| r["fired_ns"].as_i64().unwrap_or(i64::MIN);
     let mut figures = Vec::new();
     figures.extend(edges(bench, &rounds));
     figures.push(order(bench, &rounds));
-    let motion = recipe().motion();
-    let bore_at = |ns: i64| {
-        let t = (ns - origin).rem_euclid(recipe_period(bench)) as f64 * 1e-9;
-        motion.at(t).pose.world_from_camera * DVec3::Z
-    };
+    let unit = Unit::of(bench);
     let scored: Vec<&Value> =
         rounds.iter().filter(|r| r["outcome"] != "not_scored" && fired(r) > origin).collect();
     ensure!(scored.len() >= 20, "only {} scored rounds", scored.len());
-    let mut errors: Vec<Aim> = scored
+    let aims: Vec<Aim> = scored
         .iter()
         .filter_map(|round| {
             let numbers: Vec<f64> =
                 round["bore"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
             let [x, y, z] = numbers[..] else { return None };
-            let at = fired(round);
-            let velocity = (bore_at(at + 500_000) - bore_at(at - 500_000)) * 1000.0;
-            Some(Aim { at, off: DVec3::new(x, y, z) - bore_at(at), velocity })
+            let bore = DVec3::new(x, y, z);
+            let tape_ns = (fired(round) - origin).rem_euclid(unit.period_ns);
+            let said = unit.bore_at(tape_ns)?;
+            let velocity = (unit.bore_at(tape_ns + 5_000_000)? - unit.bore_at(tape_ns - 5_000_000)?) * 100.0;
+            let wrong_rad = bore.angle_between(unit.true_bore_at(tape_ns));
+            Some(Aim { off: bore - said, velocity, wrong_rad })
         })
         .collect();
-    errors.sort_by_key(|aim| aim.at);
-    let (first, second) = errors.split_at(errors.len() / 2);
-    let (all_s, constant_s, rest_s) = (late_s(&errors), late_s(first), late_s(second) - late_s(first));
-    let spread = second.iter().map(|aim| (aim.off - aim.velocity * constant_s).length_squared()).sum::<f64>();
-    let spread_mrad = (spread / second.len() as f64).sqrt() * 1e3;
-    let way = line_delay_ms
-        .map_or_else(String::new, |ms| format!(", {ms:.2} of it the bytes' way through an idle machine"));
-    figures.push(Figure::told(
-        "pose of scored rounds against the tape's truth: constant time error",
-        format!(
-            "{:+.2} ms over {} rounds{way}: the line's delay, which a calibration takes out",
-            all_s * 1e3,
-            errors.len()
-        ),
-    ));
+    let rms = |square: &dyn Fn(&Aim) -> f64| {
+        (aims.iter().map(square).sum::<f64>() / aims.len().max(1) as f64).sqrt() * 1e3
+    };
+    let off_mrad = rms(&|aim| aim.off.length_squared());
+    let wrong_mrad = rms(&|aim| aim.wrong_rad * aim.wrong_rad);
+    // The unit's samples are known to the machine this much later than measured, at best: its own way and the line's. The clock
+    // map leaves that in the time (a calibration of the mount takes it out), so it is the hardware's.
+    let way_ms = recipe().imu.latency_ns[0] as f64 * 1e-6 + line_delay_ms;
+    let raw_ms = late_s(&aims) * 1e3;
+    let late_ms = raw_ms + way_ms;
     figures.push(Figure::judged(
-        "the same, what is left in the second half when the first half's is taken out",
-        format!("{:+.2} ms over {} rounds; {spread_mrad:.2} mrad rms", rest_s * 1e3, second.len()),
+        "pose of scored rounds against what the unit said of that time: time error",
+        format!(
+            "{late_ms:+.2} ms over {} rounds, {off_mrad:.2} mrad rms ({raw_ms:+.2} ms with the {way_ms:.2} ms that the samples are under \
+             way at least)",
+            aims.len()
+        ),
         "1 ms",
-        rest_s.abs() <= 1e-3,
+        late_ms.abs() <= 1.0,
+    ));
+    figures.push(Figure::told(
+        "the same against the tape's truth, with the unit's own error",
+        format!("{wrong_mrad:.2} mrad rms"),
     ));
     Ok(figures)
 }
 
-/// Where a round was aimed: by how much that differs from the truth of its time, and how fast the truth moved.
+/// Where a round was aimed: by how much that differs from what the unit said of its time, and how fast that moved.
 struct Aim {
-    at: i64,
     off: DVec3,
     /// Per second.
     velocity: DVec3,
+    /// Angle to the truth.
+    wrong_rad: f64,
 }
 
-/// By how many seconds the poses of these rounds come after the rounds, by least squares.
+/// By how many seconds the poses of these rounds are ahead of the rounds, by least squares.
 fn late_s(aims: &[Aim]) -> f64 {
     let along: f64 = aims.iter().map(|aim| aim.off.dot(aim.velocity)).sum();
     along / aims.iter().map(|aim| aim.velocity.length_squared()).sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
-fn recipe_period(bench: &Bench) -> i64 {
-    bench.tape.period_ns.max(1)
+/// What the tape's unit says and what is true, by nanoseconds since the tape's beginning.
+struct Unit {
+    period_ns: i64,
+    attitudes: Vec<DQuat>,
+    camera_from_imu: DQuat,
+    truth: Motion,
+}
+
+impl Unit {
+    fn of(bench: &Bench) -> Self {
+        let recipe = recipe();
+        Self {
+            period_ns: bench.tape.period_ns.max(1),
+            attitudes: bench.tape.samples.iter().filter_map(|s| s.attitude.map(DQuat::from_array)).collect(),
+            camera_from_imu: recipe.camera_from_imu(),
+            truth: recipe.motion(),
+        }
+    }
+
+    /// The samples are evenly spaced and begin with the tape.
+    fn bore_at(&self, tape_ns: i64) -> Option<DVec3> {
+        let count = self.attitudes.len();
+        let place = tape_ns.rem_euclid(self.period_ns) as f64 / self.period_ns as f64 * count as f64;
+        let from = self.attitudes.get(place as usize)?;
+        let to = self.attitudes.get((place as usize + 1) % count)?;
+        let world_from_imu = from.slerp(*to, place.fract());
+        Some(world_from_imu * self.camera_from_imu.inverse() * DVec3::Z)
+    }
+
+    fn true_bore_at(&self, tape_ns: i64) -> DVec3 {
+        self.truth.at(tape_ns as f64 * 1e-9).pose.world_from_camera * DVec3::Z
+    }
 }
 
 /// The first round of each pull against the time of the pull.

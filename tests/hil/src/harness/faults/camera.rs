@@ -15,9 +15,7 @@ const EBUSY: i32 = 16;
 const EPROTO: i32 = 71;
 
 fn quiet(bench: &mut Bench) -> Result<i64> {
-    bench.feed(|f| {
-        *f = bowwave_hil::protocol::Feed { trigger: f.trigger, lead_ns: f.lead_ns, ..Default::default() }
-    })
+    bench.feed(|f| *f = bowwave_hil::protocol::Feed { trigger: f.trigger, ..Default::default() })
 }
 
 /// The camera's modes while nothing is wrong.

@@ -266,7 +266,9 @@ fn read_only(bench: &mut Bench) -> Result<Seen> {
     let back_s = (bench.machine.guest.now_ns() - back) as f64 * 1e-9;
     let kept = bench.rounds()?.len() - stored;
     let seen_s = seen?.saturating_duration_since(bench.machine.guest.host_time(at)).as_secs_f64();
-    let note = format!("{fired} rounds meanwhile, {kept} more in the database afterwards");
+    let note = format!(
+        "{fired} rounds meanwhile, {kept} more in the database afterwards; the system's journal is on the same disk and cannot hold the code"
+    );
     let met = fired > 0 && kept as u64 >= fired && !bench.status()?.contains("READ-ONLY");
     Ok(Seen { lcd: lcd?, seen_s: Some(seen_s), back_s: Some(back_s), met, note, ..Seen::default() })
 }

@@ -82,6 +82,8 @@ pub struct Seen {
     pub within_s: Option<f64>,
     /// Whether all else was as it must be.
     pub met: bool,
+    /// Whether that is so only for a machine as slow as this one.
+    pub scaled: bool,
     /// What else there is to say.
     pub note: String,
 }
@@ -205,7 +207,7 @@ impl Own {
         let within = |factor: f64| {
             seen.within_s.is_none_or(|t| seen.back_s.or(seen.seen_s).is_some_and(|v| v <= t * factor))
         };
-        let verdict = match (seen.met, within(1.0), within(bench.slow)) {
+        let verdict = match (seen.met, within(1.0) && !seen.scaled, within(bench.slow)) {
             (true, true, _) => Verdict::Met,
             (true, _, true) => Verdict::MetScaled,
             _ => Verdict::Missed,
@@ -347,9 +349,7 @@ impl Bench {
     /// Takes all causes away and waits for READY.
     pub fn settle(&mut self) -> Result<()> {
         let trigger = self.feed.trigger;
-        self.feed(|feed| {
-            *feed = bowwave_hil::protocol::Feed { trigger, lead_ns: feed.lead_ns, ..Default::default() }
-        })?;
+        self.feed(|feed| *feed = bowwave_hil::protocol::Feed { trigger, ..Default::default() })?;
         self.pull(0, false)?;
         self.pull(1, true)?;
         self.pull(2, false)?;
