@@ -29,6 +29,8 @@ pub enum Passage {
     Batched(Duration),
     /// In pieces of a few bytes.
     Split,
+    /// Not at all.
+    Cut,
 }
 
 struct Shared {
@@ -101,6 +103,9 @@ impl Unit {
                         thread::sleep(wait);
                     }
                     let Ok(count @ 1..) = from.read(&mut bytes) else { return };
+                    if passage == Passage::Cut {
+                        continue;
+                    }
                     let taken = &mut bytes[..count];
                     let line = tcgetattr(&port).map_or(0, |a| u64::from(a.output_speed()));
                     if line != shared.baud.load(Ordering::Relaxed) {
