@@ -73,11 +73,12 @@ fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &
         try_row(row, bench, report);
     }
     bench.ready(bench.scaled(5.0))?;
-    if only.is_empty() || only.iter().any(|n| n == FIGURES) {
+    let figures = only.is_empty() || only.iter().any(|n| n == FIGURES);
+    if figures {
         steady(bench, report)?;
     }
     for row in rows().iter().filter(|r| r.number() != "26") {
-        if only.is_empty() && row.number() == REPLACES_JOURNAL {
+        if figures && row.number() == REPLACES_JOURNAL {
             let delay = after_stop(bench)?;
             report.figures.extend(measure::shots(bench, delay)?);
             bench.machine.guest.call(Command::Play { on: true })?;
@@ -86,10 +87,6 @@ fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &
         if only.is_empty() || only.iter().any(|n| n == row.number()) {
             try_row(row, bench, report);
         }
-    }
-    if only.iter().any(|n| n == FIGURES) {
-        let delay = after_stop(bench)?;
-        report.figures.extend(measure::shots(bench, delay)?);
     }
     Ok(())
 }
