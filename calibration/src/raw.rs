@@ -1,6 +1,10 @@
 //! From TOML text to checked numbers.
 
-use bowwave_core::{calibration::Calibration, geometry::Lens};
+use bowwave_core::{
+    calibration::Calibration,
+    geometry::Lens,
+    text::{line_column, one_line},
+};
 use glam::{DQuat, DVec2, DVec3};
 use serde::Deserialize;
 use toml::{Spanned, value::Datetime};
@@ -131,22 +135,21 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    fn line_column(&self, offset: usize) -> (usize, usize) {
-        let before = self.text.get(..offset.min(self.text.len())).unwrap_or(self.text);
-        let line = before.matches('\n').count() + 1;
-        let start = before.rfind('\n').map_or(0, |i| i + 1);
-        (line, before.get(start..).map_or(0, |s| s.chars().count()) + 1)
-    }
-
     fn syntax(&self, e: &toml::de::Error) -> CalibrationError {
-        let (line, column) = self.line_column(e.span().map_or(0, |s| s.start));
-        let message = e.message().lines().collect::<Vec<_>>().join(" ");
+        let (line, column) = line_column(self.text, e.span().map_or(0, |s| s.start));
+        let message = one_line(e.message());
         CalibrationError::Syntax { origin: self.origin.to_owned(), line, column, message }
     }
 
     fn refuse<T>(&self, key: &'static str, at: &Spanned<T>, problem: impl Into<String>) -> CalibrationError {
-        let (line, column) = self.line_column(at.span().start);
-        CalibrationError::Value { origin: self.origin.to_owned(), line, column, key, problem: problem.into() }
+        let (line, column) = line_column(self.text, at.span().start);
+        CalibrationError::Value {
+            origin: self.origin.to_owned(),
+            line,
+            column,
+            key,
+            problem: one_line(&problem.into()),
+        }
     }
 
     fn date(&self, key: &'static str, raw: &Spanned<Datetime>) -> Result<Date, CalibrationError> {

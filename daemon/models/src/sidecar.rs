@@ -2,6 +2,7 @@
 
 use std::{ops::Range, path::Path};
 
+use bowwave_core::text::{line_column, one_line};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -41,8 +42,8 @@ pub(crate) fn read(path: &Path, size: (u32, u32)) -> Result<QuadSpec, ModelError
     };
     let text = String::from_utf8_lossy(&bytes);
     parse(&text, size).map_err(|(at, problem)| {
-        let (line, column) = line_and_column(&text, at);
-        ModelError::Sidecar { file, line, column, problem }
+        let (line, column) = line_column(&text, at);
+        ModelError::Sidecar { file, line, column, problem: one_line(&problem) }
     })
 }
 
@@ -85,21 +86,13 @@ fn parse(text: &str, (width, height): (u32, u32)) -> Result<QuadSpec, (usize, St
     })
 }
 
-/// Line and column of a byte offset, both from 1.
-fn line_and_column(text: &str, at: usize) -> (usize, usize) {
-    let before: Vec<char> = text.char_indices().take_while(|(i, _)| *i < at).map(|(_, c)| c).collect();
-    let line = before.iter().filter(|c| **c == '\n').count() + 1;
-    let column = before.iter().rev().take_while(|c| **c != '\n').count() + 1;
-    (line, column)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn error(text: &str) -> (usize, usize, String) {
         let (at, problem) = parse(text, (400, 100)).expect_err("must be refused");
-        let (line, column) = line_and_column(text, at);
+        let (line, column) = line_column(text, at);
         (line, column, problem)
     }
 

@@ -8,6 +8,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
+use bowwave_core::text::{line_column, one_line};
 use bowwave_devices::{
     camera::CameraSettings, lamps::LampSettings, lcd::LcdSettings, serial::ImuSettings, trigger::InputLine,
 };
@@ -156,7 +157,7 @@ impl Source<'_> {
     /// An error about the value at `place`.
     fn wrong(self, place: &std::ops::Range<usize>, why: impl std::fmt::Display) -> anyhow::Error {
         let (line, column) = line_column(self.text, place.start);
-        anyhow::anyhow!("{}:{line}:{column}: {why}", self.origin)
+        anyhow::anyhow!("{}:{line}:{column}: {}", self.origin, one_line(&why.to_string()))
     }
 
     /// The value, where `good`; an error that says what it must be.
@@ -185,7 +186,7 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
             let (line, column) = line_column(text, e.span().map_or(0, |s| s.start));
             bail!(
                 "{origin}:{line}:{column}: {}; systemd/bowwave.toml shows every key",
-                e.message().replace('\n', " ")
+                one_line(e.message())
             );
         }
     };
@@ -234,14 +235,6 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         data: raw.files.data.map(|p| base.join(p)),
         health: HealthChoice { thermal: raw.health.thermal, limit_c },
     })
-}
-
-/// Line and column, both from 1, of a byte offset.
-fn line_column(text: &str, offset: usize) -> (usize, usize) {
-    let before = text.get(..offset).unwrap_or(text);
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().unwrap_or("").chars().count() + 1;
-    (line, column)
 }
 
 #[cfg(test)]

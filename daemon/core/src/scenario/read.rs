@@ -18,7 +18,7 @@ const BOATS_MAX: usize = 64;
 pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, ScenarioError> {
     let document = DeTable::parse(text).map_err(|e| {
         let place = Mark::at(text, e.span().map_or(0, |span| span.start));
-        place.error(origin, "", e.message().replace('\n', "; "))
+        place.error(origin, "", e.message().to_owned())
     })?;
     let root = Table::root(Source { text, origin }, &document);
     root.only(&["name", "seed", "duration_s", "sea", "mount", "light", "reflection", "weapon", "boat"])?;

@@ -8,6 +8,7 @@ use toml::{
 };
 
 use super::ScenarioError;
+use crate::text::{line_column, one_line};
 
 /// A place in the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,15 +20,19 @@ pub(super) struct Mark {
 impl Mark {
     /// The place of a byte.
     pub fn at(text: &str, offset: usize) -> Self {
-        let before = text.get(..offset).unwrap_or(text);
-        let line = before.matches('\n').count() + 1;
-        let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
+        let (line, column) = line_column(text, offset);
         Self { line, column }
     }
 
     pub fn error(self, origin: &str, key: &str, problem: String) -> ScenarioError {
         let Self { line, column } = self;
-        ScenarioError { origin: origin.to_owned(), line, column, key: key.to_owned(), problem }
+        ScenarioError {
+            origin: origin.to_owned(),
+            line,
+            column,
+            key: one_line(key),
+            problem: one_line(&problem),
+        }
     }
 }
 
