@@ -30,6 +30,11 @@ pub fn srgb_to_linear(coded: f32) -> f32 {
     if coded <= 0.040_45 { coded / 12.92 } else { ((coded + 0.055) / 1.055).powf(2.4) }
 }
 
+/// Linear light of one channel, 0 to 1, to its sRGB code (IEC 61966-2-1).
+pub fn linear_to_srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
 /// Mean linear colours of sky and sea as the camera sees them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Means {

@@ -8,8 +8,9 @@ use crate::{
     scene::{BoatView, PixelRect, RoundView},
 };
 
-/// Geometry nearer than this to the camera's plane is cut off, metres.
-const NEAR_M: f64 = 0.1;
+/// Geometry nearer than this to the camera's plane is cut off, metres: nothing virtual is closer to the muzzle's camera.
+/// Depth is this over the distance.
+pub const NEAR_M: f64 = 0.1;
 
 /// Pixels added around a hull: half of an edge's filter and rounding.
 const HULL_MARGIN_PX: f64 = 2.0;

@@ -3,7 +3,10 @@
 use std::{ops::Range, sync::Arc};
 
 use ash::vk;
-use bowwave_core::model::{Model, ModelId, Texture};
+use bowwave_core::{
+    light::{linear_to_srgb, srgb_to_linear},
+    model::{Model, ModelId, Texture},
+};
 
 use crate::{
     error::RenderError,
@@ -192,16 +195,12 @@ fn mean(from: &[u8], (width, height): (usize, usize), (x, y): (usize, usize)) ->
     [rgb[0], rgb[1], rgb[2], (alpha / 4.0 * 255.0).round() as u8]
 }
 
-/// IEC 61966-2-1.
 fn linear(code: u8) -> f32 {
-    let c = f32::from(code) / 255.0;
-    if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+    srgb_to_linear(f32::from(code) / 255.0)
 }
 
-/// IEC 61966-2-1, back.
 fn code(linear: f32) -> u8 {
-    let c = if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (c * 255.0).round().clamp(0.0, 255.0) as u8
+    (linear_to_srgb(linear) * 255.0).round().clamp(0.0, 255.0) as u8
 }
 
 #[cfg(test)]

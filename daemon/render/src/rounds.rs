@@ -1,10 +1,11 @@
 //! Tracers, splashes and strikes on the screen: each an axis in pixels with a width.
 
-use bowwave_core::scene::{PixelRect, RoundView, Scene};
+use bowwave_core::{
+    scene::{PixelRect, RoundView, Scene},
+    view::NEAR_M,
+};
 use glam::{DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{ROUND_SPLASH, ROUND_STRIKE, ROUND_TRACER, RoundBlock};
-
-use crate::view::NEAR_M;
 
 /// Radius of a tracer's burning base as the camera sees it bloom, metres.
 const TRACER_RADIUS_M: f64 = 0.06;

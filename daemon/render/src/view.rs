@@ -5,12 +5,10 @@ use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, horizon_dip},
     model::ModelKind,
     scene::{BoatView, Light, Scene},
+    view::NEAR_M,
 };
 use glam::{DMat3, DQuat, DVec3, DVec4, Vec3};
 use shaders_spirv::interface::{BoatBlock, FrameBlock};
-
-/// Near plane, metres: nothing virtual is closer to the muzzle's camera.
-pub(crate) const NEAR_M: f64 = 0.1;
 
 /// Lens and light.
 pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {

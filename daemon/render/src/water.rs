@@ -5,6 +5,7 @@ use bowwave_core::{
     geometry::RigidPose,
     model::Model,
     scene::{BoatView, PixelRect, ReflectionMethod, Scene, ShadowLevel},
+    sea::fresnel,
 };
 use glam::{DVec2, DVec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, WaterBlock};
@@ -55,8 +56,6 @@ const SHIFT_GROWN_HEIGHTS: f64 = 0.8;
 
 /// Wind speed in the middle of each force, m/s (WMO-No. 306, code table 1100).
 const WIND_M_S: [f64; FORCE_MAX + 1] = [0.1, 0.9, 2.5, 4.4, 6.7];
-/// Refractive index of sea water.
-const SEA_INDEX: f64 = 1.34;
 
 /// Where a boat's hull meets the water, on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -268,16 +267,7 @@ fn mirrored_share(scene: &Scene, boat: &BoatView) -> f64 {
     let grazing = eye.atan2(boat.range_m.max(1.0));
     // Cox and Munk 1954, upwind.
     let slope = (0.00316 * WIND_M_S[force(scene)]).sqrt();
-    fresnel(std::f64::consts::FRAC_PI_2 - grazing - 0.5 * slope).sqrt()
-}
-
-/// Reflectance of the sea for unpolarised light at `incidence` radians from the normal.
-fn fresnel(incidence: f64) -> f64 {
-    let (sin, cos) = incidence.clamp(0.0, std::f64::consts::FRAC_PI_2).sin_cos();
-    let inner = (1.0 - (sin / SEA_INDEX).powi(2)).sqrt();
-    let s = (cos - SEA_INDEX * inner) / (cos + SEA_INDEX * inner);
-    let p = (inner - SEA_INDEX * cos) / (inner + SEA_INDEX * cos);
-    0.5 * (s * s + p * p)
+    fresnel((grazing + 0.5 * slope).min(std::f64::consts::FRAC_PI_2).sin()).sqrt()
 }
 
 #[cfg(test)]
@@ -286,16 +276,6 @@ mod tests {
 
     use super::*;
     use crate::testing;
-
-    #[test]
-    fn fresnel_agrees_with_textbook_values() {
-        assert!((fresnel(0.0) - 0.0211).abs() < 1e-4);
-        assert!((fresnel(std::f64::consts::FRAC_PI_2) - 1.0).abs() < 1e-9);
-        // Brewster's angle: half of the s-polarised part.
-        let brewster = SEA_INDEX.atan();
-        let n2 = SEA_INDEX * SEA_INDEX;
-        assert!((fresnel(brewster) - 0.5 * ((n2 - 1.0) / (n2 + 1.0)).powi(2)).abs() < 1e-9);
-    }
 
     #[test]
     fn hull_line_is_the_near_edge_of_the_outline_at_any_roll() {

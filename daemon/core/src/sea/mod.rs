@@ -1,10 +1,12 @@
 //! The sea: scales of its state (two different ones), spectrum and waves.
 
+mod optics;
 mod spectrum;
 mod waves;
 
+pub use optics::{SEA_INDEX, fresnel};
 pub use spectrum::{Spectrum, WaveSpec};
-pub use waves::{WaterPlane, WaveField};
+pub use waves::{WaterPlane, Wave, WaveField};
 
 /// Beaufort wind force, 0 to 12 (WMO-No. 306, code table 1100). What the thesis calls "sea state" 0-4 is this scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -22,15 +22,17 @@ pub struct WaveField {
     waves: Vec<Wave>,
 }
 
+/// One long-crested wave.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Wave {
-    amplitude_m: f64,
-    /// Where it runs, waves a metre.
-    cycles_per_m: DVec2,
+pub struct Wave {
+    /// Half its height, metres.
+    pub amplitude_m: f64,
+    /// Where it runs (world x, y), waves a metre.
+    pub cycles_per_m: DVec2,
     /// Waves a second.
-    hz: f64,
-    /// Phase at the origin and time 0, in cycles.
-    phase: f64,
+    pub hz: f64,
+    /// Phase at the origin and time 0, in cycles; 0 is a crest.
+    pub phase: f64,
 }
 
 impl Wave {
@@ -38,7 +40,7 @@ impl Wave {
     ///
     /// Whole cycles are taken off each product before they meet, so that a place kilometres away and a time of days lose no
     /// more digits than the product itself.
-    fn phase(&self, position: DVec2, time_s: f64) -> f64 {
+    pub fn phase(&self, position: DVec2, time_s: f64) -> f64 {
         let cycles = fraction(self.cycles_per_m.x * position.x) + fraction(self.cycles_per_m.y * position.y)
             - fraction(self.hz * time_s)
             + self.phase;
@@ -67,13 +69,18 @@ impl WaveField {
 
     /// The sea of `spec`. Its mean square height is exactly that of the specification.
     pub fn new(spec: &WaveSpec, seed: u64) -> Self {
+        Self::with_components(spec, seed, COMPONENTS)
+    }
+
+    /// The sea of `spec` as a sum of so many waves: the more, the closer its statistics are to those of the specification.
+    pub fn with_components(spec: &WaveSpec, seed: u64, components: usize) -> Self {
         let spectrum = &spec.spectrum;
         if spectrum.significant_height_m() <= 0.0 || !spec.wind_from.is_finite() {
             return Self::FLAT;
         }
         let mut rng = Pcg64::new(u128::from(seed), STREAM);
-        let n = COMPONENTS as f64;
-        let shares: Vec<f64> = (0..COMPONENTS).map(|i| (i as f64 + rng.random::<f64>()) / n).collect();
+        let n = components as f64;
+        let shares: Vec<f64> = (0..components).map(|i| (i as f64 + rng.random::<f64>()) / n).collect();
         let variance = spectrum.significant_height_m().powi(2) / 16.0;
         let amplitude_m = (2.0 * variance / n).sqrt();
         let spread_start: f64 = rng.random();
@@ -91,6 +98,16 @@ impl WaveField {
             }
         });
         Self { waves: waves.collect() }
+    }
+
+    /// A sea of just these waves.
+    pub fn of(waves: Vec<Wave>) -> Self {
+        Self { waves }
+    }
+
+    /// The waves that it is made of.
+    pub fn waves(&self) -> &[Wave] {
+        &self.waves
     }
 
     /// Whether there are no waves at all.
