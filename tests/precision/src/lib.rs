@@ -1,1 +1,15 @@
 //! Error against run time of every numerical part.
+//!
+//! A [`parts::Part`] holds the ways of doing one thing against a truth that shares no code with them: [`bench`] times the ways
+//! of a scene in turns, [`front`] finds those that nothing beats, [`row`] writes the table and [`page`] the page.
+
+pub mod bench;
+pub mod front;
+pub mod page;
+pub mod parts;
+pub mod plot;
+pub mod row;
+
+/// Counts the heap, so that what a way takes of it can be told.
+#[global_allocator]
+static HEAP: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;

@@ -1,24 +1,22 @@
-//! Error against run time of every numerical part: `precision.csv` and one HTML page.
-
-mod page;
-mod parts;
-mod table;
-mod timing;
+//! Writes the report of error against run time: `precision.csv` and one HTML page.
 
 use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::{Context, Result, bail};
 use clap::Parser;
-
-use page::About;
-use table::Row;
+use precision::{
+    bench::{Bench, Effort},
+    front, page,
+    parts::{About, PARTS, Part},
+    row,
+};
 
 /// Measures the numerical parts against truths that share no code with them.
 #[derive(Debug, Parser)]
 struct Arguments {
     /// Only these parts
     part: Vec<String>,
-    /// Fewer repeats; fails when a default is beaten by more than the noise
+    /// Fewer turns
     #[arg(long)]
     quick: bool,
     /// Folder for precision.csv and index.html
@@ -26,44 +24,32 @@ struct Arguments {
     out: PathBuf,
 }
 
-/// One numerical part: what is said of it, and its rows for a number of timing repeats.
-struct Part {
-    about: About,
-    rows: fn(usize) -> Vec<Row>,
+fn chosen(names: &[String]) -> Result<Vec<&'static Part>> {
+    if let Some(unknown) = names.iter().find(|n| !PARTS.iter().any(|p| p.about.part == **n)) {
+        let known: Vec<&str> = PARTS.iter().map(|p| p.about.part).collect();
+        bail!("no part '{unknown}'; there are: {}", known.join(", "));
+    }
+    Ok(PARTS.iter().filter(|p| names.is_empty() || names.iter().any(|n| n == p.about.part)).collect())
 }
 
-const PARTS: &[Part] = &[
-    Part { about: parts::flight::ABOUT, rows: parts::flight::rows },
-    Part { about: parts::clock::ABOUT, rows: parts::clock::rows },
-    Part { about: parts::attitude::ABOUT, rows: parts::attitude::rows },
-    Part { about: parts::lens::ABOUT, rows: parts::lens::rows },
-    Part { about: parts::pacing::ABOUT, rows: parts::pacing::rows },
-];
-
 fn run(arguments: &Arguments) -> Result<()> {
-    if let Some(unknown) = arguments.part.iter().find(|n| !PARTS.iter().any(|p| p.about.part == **n)) {
-        let names: Vec<&str> = PARTS.iter().map(|p| p.about.part).collect();
-        bail!("no part '{unknown}'; there are: {}", names.join(", "));
+    let parts = chosen(&arguments.part)?;
+    let mut bench = Bench::new(if arguments.quick { Effort::QUICK } else { Effort::FULL });
+    for part in &parts {
+        eprintln!("precision: {}", part.about.part);
+        bench.begin(part.about.part);
+        (part.measure)(&mut bench).with_context(|| format!("part {}", part.about.part))?;
     }
-    let chosen: Vec<&Part> = PARTS
-        .iter()
-        .filter(|p| arguments.part.is_empty() || arguments.part.iter().any(|n| n == p.about.part))
-        .collect();
-    let repeats = if arguments.quick { 5 } else { 41 };
-    let mut rows: Vec<Row> = chosen.iter().flat_map(|p| (p.rows)(repeats)).collect();
-    table::mark_pareto(&mut rows);
+    let rows = bench.finish();
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
-    table::write_csv(&arguments.out.join("precision.csv"), &rows)?;
-    let abouts: Vec<About> = chosen.iter().map(|p| p.about).collect();
+    row::write_csv(&arguments.out.join("precision.csv"), &rows)?;
+    let abouts: Vec<About> = parts.iter().map(|p| p.about).collect();
     page::write(&arguments.out.join("index.html"), &abouts, &rows)?;
     println!("{} rows: {}", rows.len(), arguments.out.join("index.html").display());
-    if let Some(bad) = rows.iter().find(|r| !r.error.is_finite()) {
-        bail!("{}, {} ({}) on {}: the error is no number", bad.part, bad.method, bad.setting, bad.scene);
-    }
-    let beaten = table::beaten_defaults(&rows);
-    if !beaten.is_empty() {
-        bail!("defaults off the Pareto front:\n{}", beaten.join("\n"));
+    let complaints = front::complaints(&rows);
+    if !complaints.is_empty() {
+        bail!("{} complaints:\n{}", complaints.len(), complaints.join("\n"));
     }
     Ok(())
 }

@@ -1,10 +1,12 @@
-//! The rows of the report, and which of them nothing else beats.
+//! The rows of the report.
 
-use std::{fmt::Write as _, path::Path};
+use std::path::Path;
 
 use anyhow::{Context, Result};
 
-/// One method with one setting on one scene.
+use crate::front;
+
+/// One way with one setting on one scene.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// The numerical part.
@@ -15,96 +17,162 @@ pub struct Row {
     pub method: String,
     /// Its setting.
     pub setting: String,
-    /// Error against the truth.
+    /// Error against the truth; infinite where it diverged.
     pub error: f64,
     /// The error's unit.
     pub error_unit: &'static str,
-    /// Run time of one use, nanoseconds.
-    pub time_ns: f64,
-    /// Memory held, bytes.
+    /// What the truth itself is uncertain by, in the same unit.
+    pub truth_error: f64,
+    /// Ranked by error and time, or only listed.
+    pub kind: Kind,
+    /// Bytes that it holds and takes of the heap.
     pub memory_bytes: usize,
     /// Whether the product uses this.
     pub default: bool,
-    /// Whether it stands for a stiff or extreme case; such rows are listed, not ranked.
-    pub extreme: bool,
+    /// Why the product uses this though something beats it here; empty otherwise.
+    pub excuse: String,
     /// What else there is to say.
     pub note: String,
-    /// Whether no other row of the part and scene is both faster and closer; see [`mark_pareto`].
-    pub pareto: bool,
+    /// Whether no other row of the scene beats it; see [`front::mark`].
+    pub on_front: bool,
 }
 
-/// Times within this factor count as equal: the machines are shared, and two methods are not timed at the same moment.
-pub const TIME_NOISE: f64 = 2.0;
+/// What a row is for.
+#[derive(Clone, Debug)]
+pub enum Kind {
+    /// Competes in its scene.
+    Ranked(Timing),
+    /// Stands for a stiff or extreme case: listed, not timed.
+    Extreme,
+}
 
-/// Marks the rows that no other row of the same part and scene beats in error at the same or less time, or in time (by more
-/// than the noise) at the same or less error.
-pub fn mark_pareto(rows: &mut [Row]) {
-    let beaten: Vec<bool> = rows
-        .iter()
-        .map(|r| {
-            rows.iter().filter(|o| !o.extreme && o.part == r.part && o.scene == r.scene).any(|o| {
-                let faster = o.time_ns * TIME_NOISE < r.time_ns;
-                o.error < r.error && o.time_ns <= r.time_ns || o.error <= r.error && faster
-            })
-        })
-        .collect();
-    for (row, beaten) in rows.iter_mut().zip(beaten) {
-        row.pareto = !row.extreme && !beaten;
+/// Run times of a row.
+#[derive(Clone, Debug)]
+pub struct Timing {
+    /// Nanoseconds of the processor for one use, turn by turn with the other rows of the scene.
+    pub samples: Vec<f64>,
+    /// Factor beyond which a way of this scene counts as faster.
+    pub noise: f64,
+}
+
+impl Row {
+    /// Median run time of one use, nanoseconds; `None` where nothing was timed.
+    pub fn time_ns(&self) -> Option<f64> {
+        match &self.kind {
+            Kind::Ranked(timing) => Some(front::median(&mut timing.samples.clone())),
+            Kind::Extreme => None,
+        }
+    }
+
+    /// Whether this is a stiff or extreme case.
+    pub fn is_extreme(&self) -> bool {
+        matches!(self.kind, Kind::Extreme)
     }
 }
 
-/// Defaults that are beaten by more than the noise: by something that is not slower and errs less, or that errs no more
-/// and is faster.
-pub fn beaten_defaults(rows: &[Row]) -> Vec<String> {
-    rows.iter()
-        .filter(|r| r.default && !r.extreme)
-        .filter_map(|r| {
-            let by = rows.iter().find(|o| {
-                !o.extreme
-                    && o.part == r.part
-                    && o.scene == r.scene
-                    && o.error <= r.error
-                    && o.time_ns * TIME_NOISE < r.time_ns
-            })?;
-            Some(format!(
-                "{} on {}: the default {} ({}) errs {:.3e} {} in {:.0} ns; {} ({}) errs {:.3e} in {:.0} ns",
-                r.part,
-                r.scene,
-                r.method,
-                r.setting,
-                r.error,
-                r.error_unit,
-                r.time_ns,
-                by.method,
-                by.setting,
-                by.error,
-                by.time_ns
-            ))
-        })
-        .collect()
-}
+const HEADINGS: [&str; 16] = [
+    "part",
+    "scene",
+    "kind",
+    "method",
+    "setting",
+    "error",
+    "error_unit",
+    "truth_error",
+    "time_ns",
+    "time_ratio",
+    "noise",
+    "memory_bytes",
+    "default",
+    "front",
+    "excuse",
+    "note",
+];
 
-/// Writes `precision.csv`.
-pub fn write_csv(path: &Path, rows: &[Row]) -> Result<()> {
-    let mut text =
-        String::from("part,scene,method,setting,error,error_unit,time_ns,memory_bytes,default,pareto,note\n");
+/// The table as CSV (RFC 4180). `time_ratio` is the time over that of the scene's default, taken turn by turn.
+pub fn csv(rows: &[Row]) -> Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(HEADINGS)?;
     for r in rows {
-        let quoted = |s: &str| format!("\"{}\"", s.replace('"', "\"\""));
-        writeln!(
-            text,
-            "{},{},{},{},{:.6e},{},{:.1},{},{},{},{}",
+        let default =
+            rows.iter().find(|d| d.default && !d.is_extreme() && d.part == r.part && d.scene == r.scene);
+        let (mut time, mut ratio, mut noise) = (String::new(), String::new(), String::new());
+        if let Kind::Ranked(timing) = &r.kind {
+            time = r.time_ns().map(|t| format!("{t:.2}")).unwrap_or_default();
+            ratio = default.map(|d| format!("{:.4}", front::ratio(r, d).log.exp())).unwrap_or_default();
+            noise = format!("{:.3}", timing.noise);
+        }
+        writer.write_record([
             r.part,
-            quoted(&r.scene),
-            quoted(&r.method),
-            quoted(&r.setting),
-            r.error,
+            &r.scene,
+            if r.is_extreme() { "extreme" } else { "ranked" },
+            &r.method,
+            &r.setting,
+            &format!("{:.6e}", r.error),
             r.error_unit,
-            r.time_ns,
-            r.memory_bytes,
-            r.default,
-            r.pareto,
-            quoted(&r.note)
-        )?;
+            &format!("{:.1e}", r.truth_error),
+            &time,
+            &ratio,
+            &noise,
+            &r.memory_bytes.to_string(),
+            &r.default.to_string(),
+            &r.on_front.to_string(),
+            &r.excuse,
+            &r.note,
+        ])?;
     }
-    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    writer.into_inner().context("cannot finish the table")
+}
+
+/// Writes [`csv`] to a file.
+pub fn write_csv(path: &Path, rows: &[Row]) -> Result<()> {
+    std::fs::write(path, csv(rows)?).with_context(|| format!("cannot write {}", path.display()))
+}
+
+#[cfg(test)]
+pub(crate) mod testing {
+    use super::*;
+
+    /// A row of part "part" and scene "scene".
+    pub fn row(method: &str, error: f64) -> Row {
+        Row {
+            part: "part",
+            scene: "scene".into(),
+            method: method.into(),
+            setting: String::new(),
+            error,
+            error_unit: "m",
+            truth_error: 0.0,
+            kind: Kind::Extreme,
+            memory_bytes: 0,
+            default: false,
+            excuse: String::new(),
+            note: String::new(),
+            on_front: false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_with_commas_quotes_and_line_ends_come_back() {
+        let note = "worst at \"2 km\", then\nnone; a,b";
+        let timing = Timing { samples: vec![30.0, 10.0, 20.0], noise: 1.25 };
+        let rows = vec![
+            Row { note: note.into(), kind: Kind::Ranked(timing), default: true, ..testing::row("a, b", 0.5) },
+            Row { scene: "\"".into(), ..testing::row("c", f64::INFINITY) },
+        ];
+        let text = csv(&rows).unwrap();
+        let mut reader = csv::Reader::from_reader(text.as_slice());
+        assert_eq!(reader.headers().unwrap(), HEADINGS.as_slice());
+        let read: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+        assert_eq!(read.len(), 2);
+        let first: Vec<&str> = read[0].iter().collect();
+        assert_eq!(first[3..6], ["a, b", "", "5.000000e-1"]);
+        assert_eq!(first[8..], ["20.00", "1.0000", "1.250", "0", "true", "false", "", note]);
+        assert_eq!((&read[1][1], &read[1][5], &read[1][8]), ("\"", "inf", ""));
+    }
 }

@@ -1,18 +1,22 @@
 //! Integration of angular rate to orientation.
 
+use anyhow::Result;
 use bowwave_core::{attitude::Attitude, event::ImuSample, time::Time};
 use glam::{DQuat, DVec3, Quat};
 
-use super::row;
-use crate::{page::About, table::Row, timing::time_ns};
+use super::About;
+use crate::bench::{Bench, Tried, Way};
 
 /// What is said of this part.
 pub const ABOUT: About = About {
     part: "attitude",
+    what: "Turns a gyro's angular rates into the orientation of the gun.",
     truth: "a coning motion in closed form (three rotations in a row); its rate is differentiated in closed form too, and sampled \
-            as a gyro does",
-    why: "the parabola through three rates with the first commutator, in f64: as close as Runge-Kutta, which answers only \
-          every second sample; f32 loses the slow turn of the Earth altogether. Its time here includes the checks of each sample",
+            as a gyro does. The error is the largest of any answer",
+    rivals: "Euler with the first rate, the mean of two rates in f32 and in f64, Runge-Kutta 4 on the quaternion over two samples",
+    why: "the parabola through three rates with the first commutator, in f64: as close as Runge-Kutta, whose \
+          middle samples have no better answer than the mean rate; f32 loses the slow turn of the Earth \
+          altogether. Its time here includes the checks of each sample",
 };
 
 const RATE_HZ: f64 = 200.0;
@@ -43,14 +47,15 @@ fn samples(motion: Coning, seconds: f64) -> Vec<(f64, DVec3)> {
     (0..(seconds * RATE_HZ) as usize).map(|i| i as f64 / RATE_HZ).map(|t| (t, motion.rate(t))).collect()
 }
 
-/// Orientation at the last sample, started from the truth at the first.
-type Integrator = fn(DQuat, &[(f64, DVec3)]) -> DQuat;
+/// Told the number of a sample and the orientation then.
+type Tell<'a> = &'a mut dyn FnMut(usize, DQuat);
+/// Tells the orientation at every sample, started from the truth at the first.
+type Integrator = fn(DQuat, &[(f64, DVec3)], Tell<'_>);
 
-fn product(start: DQuat, samples: &[(f64, DVec3)]) -> DQuat {
+fn product(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
     // The levelled start of the product is replaced by the truth: only what follows it is compared.
     let mut attitude = Attitude::new(DVec3::ZERO, DQuat::IDENTITY);
-    let mut first: Option<(DQuat, DQuat)> = None;
-    let mut last = start;
+    let mut first: Option<DQuat> = None;
     let mut truth_at_level = start;
     for (i, (t, rate)) in samples.iter().enumerate() {
         let sample = ImuSample {
@@ -60,103 +65,118 @@ fn product(start: DQuat, samples: &[(f64, DVec3)]) -> DQuat {
             accel: DVec3::Z * 9.81,
             world_from_imu: None,
         };
-        if i > 0 {
+        if i > 0 && first.is_none() {
             let (before, earlier) = samples[i - 1];
-            if first.is_none() {
-                truth_at_level *= DQuat::from_scaled_axis((earlier + *rate) * 0.5 * (t - before));
-            }
+            truth_at_level *= DQuat::from_scaled_axis((earlier + *rate) * 0.5 * (t - before));
         }
         if let Some(o) = attitude.observe(Time::from_ns(0).plus_secs(*t), &sample) {
-            let (levelled, truth) = *first.get_or_insert((o.world_from_imu, truth_at_level));
-            last = truth * levelled.inverse() * o.world_from_imu;
+            let levelled = *first.get_or_insert_with(|| truth_at_level * o.world_from_imu.inverse());
+            tell(i, levelled * o.world_from_imu);
         }
     }
-    last
 }
 
-fn euler(start: DQuat, samples: &[(f64, DVec3)]) -> DQuat {
-    samples
-        .windows(2)
-        .fold(start, |q, w| (q * DQuat::from_scaled_axis(w[0].1 * (w[1].0 - w[0].0))).normalize())
+/// Steps from sample to sample by the turn that `turn` makes of both rates and the time between them.
+fn step_by_step(
+    start: DQuat,
+    samples: &[(f64, DVec3)],
+    tell: Tell<'_>,
+    turn: impl Fn(DVec3, DVec3, f64) -> DVec3,
+) {
+    let mut q = start;
+    for (i, w) in samples.windows(2).enumerate() {
+        q = (q * DQuat::from_scaled_axis(turn(w[0].1, w[1].1, w[1].0 - w[0].0))).normalize();
+        tell(i + 1, q);
+    }
 }
 
-fn single_precision(start: DQuat, samples: &[(f64, DVec3)]) -> DQuat {
-    let q = samples.windows(2).fold(start.as_quat(), |q, w| {
+fn euler(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+    step_by_step(start, samples, tell, |a, _, h| a * h);
+}
+
+fn mean_rate(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+    step_by_step(start, samples, tell, |a, b, h| (a + b) * (0.5 * h));
+}
+
+fn single_precision(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+    let mut q = start.as_quat();
+    for (i, w) in samples.windows(2).enumerate() {
         let turn = (w[0].1 + w[1].1) * 0.5 * (w[1].0 - w[0].0);
-        (q * Quat::from_scaled_axis(turn.as_vec3())).normalize()
-    });
-    q.as_dquat().normalize()
+        q = (q * Quat::from_scaled_axis(turn.as_vec3())).normalize();
+        tell(i + 1, q.as_dquat().normalize());
+    }
 }
 
-fn mean_rate(start: DQuat, samples: &[(f64, DVec3)]) -> DQuat {
-    samples.windows(2).fold(start, |q, w| {
-        let turn = (w[0].1 + w[1].1) * (0.5 * (w[1].0 - w[0].0));
-        (q * DQuat::from_scaled_axis(turn)).normalize()
-    })
-}
-
-/// Classical Runge-Kutta on the quaternion's differential equation, two gyro samples a step.
-fn runge_kutta(start: DQuat, samples: &[(f64, DVec3)]) -> DQuat {
+/// Classical Runge-Kutta on the quaternion's differential equation, two gyro samples a step. The sample between is answered
+/// by the mean rate from the step before: no later sample is known then.
+fn runge_kutta(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
     let derivative = |q: DQuat, w: DVec3| q * DQuat::from_xyzw(w.x, w.y, w.z, 0.0) * 0.5;
     let mut q = start;
     let mut at = 0;
     while at + 2 < samples.len() {
-        let [(t0, w0), (_, w1), (t2, w2)] = [samples[at], samples[at + 1], samples[at + 2]];
+        let [(t0, w0), (t1, w1), (t2, w2)] = [samples[at], samples[at + 1], samples[at + 2]];
+        tell(at + 1, (q * DQuat::from_scaled_axis((w0 + w1) * (0.5 * (t1 - t0)))).normalize());
         let h = t2 - t0;
         let k1 = derivative(q, w0);
         let k2 = derivative(q + k1 * (h / 2.0), w1);
         let k3 = derivative(q + k2 * (h / 2.0), w1);
         let k4 = derivative(q + k3 * h, w2);
         q = (q + (k1 + (k2 + k3) * 2.0 + k4) * (h / 6.0)).normalize();
+        tell(at + 2, q);
         at += 2;
     }
-    mean_rate(q, &samples[at..])
 }
 
+/// Largest error of any answer, degrees.
 fn error_deg(motion: Coning, seconds: f64, integrate: Integrator) -> f64 {
     let samples = samples(motion, seconds);
-    let end = samples.last().map_or(0.0, |s| s.0);
-    // Twice the arc sine of the vector part keeps small angles that an arc cosine would round away.
-    let difference = motion.at(end).inverse() * integrate(motion.at(0.0), &samples);
-    (2.0 * difference.to_array()[..3].iter().map(|v| v * v).sum::<f64>().sqrt().min(1.0).asin()).to_degrees()
+    let mut worst = 0f64;
+    integrate(motion.at(0.0), &samples, &mut |i, q| {
+        // Twice the arc sine of the vector part keeps small angles that an arc cosine would round away.
+        let off = (motion.at(samples[i].0).inverse() * q).to_array();
+        let half = off[..3].iter().map(|v| v * v).sum::<f64>().sqrt().min(1.0).asin();
+        worst = if half.is_nan() { f64::NAN } else { worst.max(2.0 * half) };
+    });
+    worst.to_degrees()
 }
 
-/// The rows.
-pub fn rows(repeats: usize) -> Vec<Row> {
-    let methods: [(&str, &str, Integrator); 5] = [
-        ("Euler", "f64", euler),
-        ("mean rate", "f32", single_precision),
-        ("mean rate", "f64", mean_rate),
-        ("Magnus, parabola", "f64", product),
-        ("Runge-Kutta 4", "f64, double step", runge_kutta),
-    ];
+const METHODS: [(&str, &str, Integrator); 5] = [
+    ("Euler", "f64", euler),
+    ("mean rate", "f32", single_precision),
+    ("mean rate", "f64", mean_rate),
+    ("Magnus, parabola", "f64", product),
+    ("Runge-Kutta 4", "f64, double step", runge_kutta),
+];
+
+const EXCUSE: &str = "its time has the checks of each sample in it; Runge-Kutta needs pairs of even steps, and either errs \
+                      far less than a gyro drifts";
+
+/// Measures the scene and extreme cases.
+pub fn measure(bench: &mut Bench) -> Result<()> {
     let gun = Coning { a: 0.3, b: 0.15, c: 0.6 };
     let sampled = samples(gun, 60.0);
-    let mut rows: Vec<Row> = methods
-        .into_iter()
-        .map(|(method, setting, integrate)| {
-            // One that answers every second sample only is charged for both.
-            let answers = if setting.contains("double") { sampled.len() / 2 } else { sampled.len() };
-            let time = time_ns(repeats.min(9), || integrate(gun.at(0.0), &sampled)) / answers as f64;
-            let error = error_deg(gun, 60.0, integrate);
-            let mut r = row("attitude", "gun and ship turning, 60 s", method, setting, error, "deg", time);
-            r.default = method.starts_with("Magnus");
-            r.memory_bytes = size_of::<Attitude>();
-            r
-        })
-        .collect();
-    let extremes = [
-        ("Earth's turn for 24 h", Coning { a: 7.292_115e-5, b: 0.8, c: 0.0 }, 86_400.0),
+    let sampled = &sampled;
+    let ways = METHODS.map(|(method, setting, integrate)| {
+        let error = error_deg(gun, 60.0, integrate);
+        let work = move || {
+            let mut last = DQuat::IDENTITY;
+            integrate(gun.at(0.0), sampled, &mut |_, q| last = q);
+            last
+        };
+        let way = Way::new(method, setting, error, sampled.len(), work).holds(size_of::<Attitude>());
+        if method.starts_with("Magnus") { way.default_although(EXCUSE) } else { way }
+    });
+    bench.scene("gun and ship turning, 60 s", "deg", 1e-12, ways.into());
+    for (case, motion, seconds) in [
+        ("Earth's turn for 2 h", Coning { a: 7.292_115e-5, b: 0.8, c: 0.0 }, 7200.0),
         ("creep of 0.1 deg/s, 10 min", Coning { a: 1.745e-3, b: 0.1, c: 0.0 }, 600.0),
         ("coning at 20 rad/s, 10 s", Coning { a: 5.0, b: 0.3, c: 20.0 }, 10.0),
-    ];
-    for (scene, motion, seconds) in extremes {
-        for (method, setting, integrate) in methods {
-            let mut r =
-                row("attitude", scene, method, setting, error_deg(motion, seconds, integrate), "deg", 0.0);
-            r.extreme = true;
-            rows.push(r);
-        }
+    ] {
+        let tried = METHODS.map(|(method, setting, integrate)| Tried {
+            default: method.starts_with("Magnus"),
+            ..Tried::rival(method, setting, error_deg(motion, seconds, integrate))
+        });
+        bench.extreme(case, "deg", tried.into());
     }
-    rows
+    Ok(())
 }

@@ -2,14 +2,19 @@
 
 use bowwave_core::{clock::ClockMap, time::Time};
 
-use super::row;
-use crate::{page::About, table::Row, timing::time_ns};
+use anyhow::Result;
+
+use super::{About, even};
+use crate::bench::{Bench, Tried, Way};
 
 /// What is said of this part.
 pub const ABOUT: About = About {
     part: "clock",
+    what: "Tells when, on the host's clock, a packet's device time was, from arrivals that are late by unknown delays.",
     truth: "the simulated device's own times, 200 Hz for ten minutes, one-sided delays added; the constant least delay counts as \
             no error, since the calibrated offset absorbs it",
+    rivals: "the arrival itself (cheaper), a moving average of the lag over 10 s and over 60 s (dearer in memory), the least lag \
+             of 10 s without a drift",
     why: "the lower convex hull is the only one whose error does not grow with the delays' spread; it costs tens of nanoseconds \
           a packet",
 };
@@ -18,15 +23,9 @@ pub const ABOUT: About = About {
 type Packet = (i64, Time, i64);
 
 fn packets(ppm: f64, seconds: i64, delay_ms: impl Fn(i64, f64) -> f64) -> Vec<Packet> {
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     (0..seconds * 200)
         .map(|i| {
-            // splitmix64: this truth shares nothing with the simulator's noise.
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = state;
-            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-            let uniform = ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64;
+            let uniform = even(i as u64);
             let host = 5_000_000_000 + i * 5_000_000;
             let device = ((i * 5_000_000) as f64 * (1.0 + ppm * 1e-6)) as i64;
             (device, Time::from_ns(host).plus_secs(delay_ms(i, uniform) * 1e-3), host)
@@ -76,42 +75,69 @@ fn moving_average(window: usize) -> impl FnMut(i64, Time) -> i64 {
     }
 }
 
-/// The rows.
-pub fn rows(repeats: usize) -> Vec<Row> {
-    let mut rows = Vec::new();
+fn least_lag(window: usize) -> impl FnMut(i64, Time) -> i64 {
+    // Lags that no later one undercuts, oldest and least first.
+    let mut lags: std::collections::VecDeque<(usize, i64)> = std::collections::VecDeque::new();
+    let mut count = 0;
+    move |device, arrival| {
+        let lag = arrival.ns() - device;
+        while lags.back().is_some_and(|(_, l)| *l >= lag) {
+            lags.pop_back();
+        }
+        lags.push_back((count, lag));
+        while lags.front().is_some_and(|(i, _)| i + window <= count) {
+            lags.pop_front();
+        }
+        count += 1;
+        device + lags.front().map_or(lag, |l| l.1)
+    }
+}
+
+type Map = Box<dyn FnMut(i64, Time) -> i64>;
+
+/// One way: method, setting, bytes held, maker.
+type Method = (&'static str, &'static str, usize, fn() -> Map);
+
+const METHODS: [Method; 5] = [
+    ("raw arrival", "", 0, || Box::new(|_, arrival: Time| arrival.ns())),
+    ("moving average", "10 s", 16_000, || Box::new(moving_average(2000))),
+    ("moving average", "60 s", 96_000, || Box::new(moving_average(12_000))),
+    ("least lag", "10 s", 0, || Box::new(least_lag(2000))),
+    ("lower hull", "30-60 s", size_of::<ClockMap>(), || Box::new(hull())),
+];
+
+/// Measures the scenes and extreme cases.
+pub fn measure(bench: &mut Bench) -> Result<()> {
     for (scene, delay) in
         [("USB, exponential delay 0.5 ms", usb as fn(i64, f64) -> f64), ("16 ms timer, 80 ms bursts", timer)]
     {
         let packets = packets(35.0, 600, delay);
-        let mut add = |method: &str,
-                       setting: &str,
-                       bytes: usize,
-                       make: &dyn Fn() -> Box<dyn FnMut(i64, Time) -> i64>| {
-            let (rms, worst) = rms_ms(&packets, &mut make());
-            let time = time_ns(repeats.min(9), || {
+        let packets = &packets;
+        let ways = METHODS.map(|(method, setting, bytes, make)| {
+            let (rms, worst) = rms_ms(packets, &mut make());
+            Way::new(method, setting, rms, packets.len(), move || {
                 let mut map = make();
                 packets.iter().map(|(d, a, _)| map(*d, *a)).fold(0i64, i64::wrapping_add)
-            }) / packets.len() as f64;
-            let mut r = row("clock", scene, method, setting, rms, "ms rms", time);
-            r.memory_bytes = bytes;
-            r.note = format!("worst {worst:.3} ms");
-            r.default = method == "lower hull";
-            rows.push(r);
-        };
-        add("raw arrival", "", 0, &|| Box::new(|_, arrival: Time| arrival.ns()));
-        add("moving average", "10 s", 16_000, &|| Box::new(moving_average(2000)));
-        add("lower hull", "30-60 s", size_of::<ClockMap>() + 1024, &|| Box::new(hull()));
+            })
+            .holds(bytes)
+            .note(format!("worst {worst:.3} ms"))
+            .default_if(method == "lower hull")
+        });
+        bench.scene(scene, "ms rms", 0.0, ways.into());
     }
-    for (scene, ppm) in [("+500 ppm", 499.0), ("-100 ppm", -100.0)] {
-        let (rms, worst) = rms_ms(&packets(ppm, 600, usb), &mut hull());
-        let mut r = row("clock", scene, "lower hull", "30-60 s", rms, "ms rms", 0.0);
-        (r.extreme, r.note) = (true, format!("worst {worst:.3} ms"));
-        rows.push(r);
+    let burst = |i: i64, u: f64| if i % 4000 < 16 { 80.0 } else { usb(i, u) };
+    for (case, packets) in [
+        ("device clock 499 ppm fast", packets(499.0, 600, usb)),
+        ("device clock 100 ppm slow", packets(-100.0, 600, usb)),
+        ("80 ms bursts every 20 s", packets(35.0, 600, burst)),
+        ("no delay at all", packets(35.0, 600, |_, _| 0.0)),
+    ] {
+        let tried = METHODS.map(|(method, setting, _, make)| {
+            let (rms, worst) = rms_ms(&packets, &mut make());
+            let tried = Tried { default: method == "lower hull", ..Tried::rival(method, setting, worst) };
+            tried.note(format!("{rms:.4} ms rms"))
+        });
+        bench.extreme(case, "ms", tried.into());
     }
-    let burst = packets(35.0, 600, |i, u| if i % 4000 < 16 { 80.0 } else { usb(i, u) });
-    let (rms, worst) = rms_ms(&burst, &mut hull());
-    let mut r = row("clock", "80 ms bursts every 20 s", "lower hull", "30-60 s", rms, "ms rms", 0.0);
-    (r.extreme, r.note) = (true, format!("worst {worst:.3} ms"));
-    rows.push(r);
-    rows
+    Ok(())
 }

@@ -1,15 +1,18 @@
 //! Inverse of the lens distortion.
 
+use anyhow::Result;
 use bowwave_core::geometry::Lens;
 use glam::{DVec2, DVec3};
 
-use super::row;
-use crate::{page::About, table::Row, timing::time_ns};
+use super::{About, worst};
+use crate::bench::{Bench, Tried, Way};
 
 /// What is said of this part.
 pub const ABOUT: About = About {
     part: "lens",
+    what: "Finds the direction that a pixel sees: the inverse of the lens's distortion.",
     truth: "known directions projected by the forward model; the inverse must lead back to them",
+    rivals: "no distortion at all, five steps of the same iteration (cheaper), Newton's method with a numerical derivative",
     why: "fixed-point iteration until it stands still: it is used a few hundred times a frame at most, so that its time does not \
           count, and it needs no derivative that could be singular",
 };
@@ -51,57 +54,43 @@ fn newton(lens: &Lens, pixel: DVec2) -> DVec3 {
 }
 
 fn worst_px(lens: &Lens, invert: &dyn Fn(&Lens, DVec2) -> DVec3) -> f64 {
-    directions(lens)
-        .iter()
-        .map(|(d, p)| invert(lens, *p).angle_between(*d) * lens.focal.x)
-        .fold(0.0, f64::max)
+    // The chord, not the arc cosine, which rounds small angles away.
+    worst(directions(lens).iter().map(|(d, p)| (invert(lens, *p) - *d).length() * lens.focal.x))
 }
 
 /// One way to invert.
-type Method = (&'static str, &'static str, Box<dyn Fn(&Lens, DVec2) -> DVec3>);
+type Method = (&'static str, &'static str, fn(&Lens, DVec2) -> DVec3);
 
-/// The rows.
-pub fn rows(repeats: usize) -> Vec<Row> {
-    let methods: [Method; 4] = [
-        ("ignore distortion", "", Box::new(|l, p| steps(l, p, 0))),
-        ("fixed point", "5 steps", Box::new(|l, p| steps(l, p, 5))),
-        ("fixed point", "until still", Box::new(|l, p| l.unproject(p))),
-        ("Newton", "6 steps", Box::new(newton)),
-    ];
+const METHODS: [Method; 4] = [
+    ("ignore distortion", "", |l, p| steps(l, p, 0)),
+    ("fixed point", "5 steps", |l, p| steps(l, p, 5)),
+    ("fixed point", "until still", |l, p| l.unproject(p)),
+    ("Newton", "6 steps", newton),
+];
+
+/// Measures the scene and extreme cases.
+pub fn measure(bench: &mut Bench) -> Result<()> {
     let usual = lens(-0.12, 0.02);
-    let points = directions(&usual);
-    let mut rows: Vec<Row> = methods
-        .iter()
-        .map(|(method, setting, invert)| {
-            let time = time_ns(repeats, || points.iter().map(|(_, p)| invert(&usual, *p)).sum::<DVec3>())
-                / points.len() as f64;
-            let mut r = row(
-                "lens",
-                "k1 -0.12, k2 0.02, 70 deg",
-                method,
-                setting,
-                worst_px(&usual, invert),
-                "px",
-                time,
-            );
-            r.default = *setting == "until still";
-            r
+    let usual = &usual;
+    let points = directions(usual);
+    let points = &points;
+    let ways = METHODS.map(|(method, setting, invert)| {
+        Way::new(method, setting, worst_px(usual, &invert), points.len(), move || {
+            points.iter().map(|(_, p)| invert(usual, *p)).sum::<DVec3>()
         })
-        .collect();
-    for (scene, lens) in
-        [("barrel to the fold, k1 -0.2", lens(-0.2, 0.0)), ("pincushion, k1 0.3", lens(0.3, 0.05))]
-    {
-        let mut r = row(
-            "lens",
-            scene,
-            "fixed point",
-            "until still",
-            worst_px(&lens, &|l, p| l.unproject(p)),
-            "px",
-            0.0,
-        );
-        r.extreme = true;
-        rows.push(r);
+        .default_if(setting == "until still")
+    });
+    bench.scene("k1 -0.12, k2 0.02, 70 deg", "px", 1e-9, ways.into());
+    for (case, lens) in [
+        ("barrel to the fold, k1 -0.2", lens(-0.2, 0.0)),
+        ("pincushion, k1 0.3", lens(0.3, 0.05)),
+        ("no distortion", lens(0.0, 0.0)),
+    ] {
+        let tried = METHODS.map(|(method, setting, invert)| Tried {
+            default: setting == "until still",
+            ..Tried::rival(method, setting, worst_px(&lens, &invert))
+        });
+        bench.extreme(case, "px", tried.into());
     }
-    rows
+    Ok(())
 }

@@ -1,35 +1,83 @@
 //! The numerical parts.
 
-pub mod attitude;
-pub mod clock;
-pub mod flight;
-pub mod lens;
-pub mod pacing;
+mod attitude;
+mod clock;
+mod colour;
+mod depth;
+mod flight;
+mod fresnel;
+mod lens;
+mod motion;
+mod pacing;
+mod sea;
+mod wavefield;
 
-use crate::table::Row;
+use anyhow::Result;
 
-/// A ranked row with no note that is no default; change the fields that differ.
-pub fn row(
-    part: &'static str,
-    scene: &str,
-    method: &str,
-    setting: &str,
-    error: f64,
-    unit: &'static str,
-    time_ns: f64,
-) -> Row {
-    Row {
-        part,
-        scene: scene.into(),
-        method: method.into(),
-        setting: setting.into(),
-        error,
-        error_unit: unit,
-        time_ns,
-        memory_bytes: 0,
-        default: false,
-        extreme: false,
-        note: String::new(),
-        pareto: false,
-    }
+use crate::bench::Bench;
+
+/// What is said of a part above its rows.
+#[derive(Clone, Copy, Debug)]
+pub struct About {
+    /// The part's name, as in the rows.
+    pub part: &'static str,
+    /// What it does in the product.
+    pub what: &'static str,
+    /// What the truth is and why it shares nothing with what is tested.
+    pub truth: &'static str,
+    /// What it is held against.
+    pub rivals: &'static str,
+    /// Why the default was chosen.
+    pub why: &'static str,
+}
+
+/// One numerical part.
+pub struct Part {
+    /// What is said of it.
+    pub about: About,
+    /// Measures its scenes and extreme cases.
+    pub measure: fn(&mut Bench) -> Result<()>,
+}
+
+/// All of them, in the order of the report.
+pub const PARTS: &[Part] = &[
+    Part { about: clock::ABOUT, measure: clock::measure },
+    Part { about: attitude::ABOUT, measure: attitude::measure },
+    Part { about: lens::ABOUT, measure: lens::measure },
+    Part { about: pacing::ABOUT, measure: pacing::measure },
+    Part { about: flight::ABOUT, measure: flight::measure },
+    Part { about: sea::ABOUT, measure: sea::measure },
+    Part { about: wavefield::ABOUT, measure: wavefield::measure },
+    Part { about: motion::ABOUT, measure: motion::measure },
+    Part { about: fresnel::ABOUT, measure: fresnel::measure },
+    Part { about: colour::ABOUT, measure: colour::measure },
+    Part { about: depth::ABOUT, measure: depth::measure },
+];
+
+/// The numeric rows of a CSV text: comments and the heading aside; cells that are no numbers become NaN.
+fn table(csv: &str) -> Vec<Vec<f64>> {
+    csv.lines()
+        .filter(|line| !line.starts_with('#'))
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.trim().parse().unwrap_or(f64::NAN)).collect())
+        .collect()
+}
+
+/// Uniform numbers 0 to 1 from splitmix64 of `i`: the product draws from another generator.
+fn even(i: u64) -> f64 {
+    let mut z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// The largest; NaN where one of them is none, so that no broken value hides.
+fn worst(errors: impl IntoIterator<Item = f64>) -> f64 {
+    errors.into_iter().fold(0.0, |a: f64, e| if a.is_nan() || e.is_nan() { f64::NAN } else { a.max(e) })
+}
+
+/// Root mean square; NaN where one of them is none.
+fn rms(errors: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, count) = errors.into_iter().fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
+    (sum / count).sqrt()
 }

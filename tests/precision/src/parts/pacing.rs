@@ -1,19 +1,22 @@
 //! The 30 Hz tick between a camera's clock and a display's.
 
+use anyhow::Result;
 use bowwave_core::{
     pacing::{FrameClock, Pacer},
     time::Time,
 };
 
-use super::row;
-use crate::{page::About, table::Row, timing::time_ns};
+use super::{About, even};
+use crate::bench::{Bench, Tried, Way};
 
 /// What is said of this part.
 pub const ABOUT: About = About {
     part: "pacing",
+    what: "Decides when the next frame begins, between the camera's clock and the display's.",
     truth: "simulated cameras and displays whose clocks are exact, arrivals late by up to 0.8 ms, rendering of 6 to 13 ms, two \
             minutes; the error is the 99th percentile from a picture's arrival to the blank that shows it first, plus 33 ms for \
             each picture a second by which frames go on unevenly (dropped, doubled) beyond the difference of the rates",
+    rivals: "a clock of its own (cheapest), a fixed time before every second blank",
     why: "a tick of its own beats against both clocks; a late begin alone waits least but drops and doubles where the camera's \
           phase meets the begin; the locked tick has neither for a fraction of a microsecond a frame",
 };
@@ -21,14 +24,6 @@ pub const ABOUT: About = About {
 const SECONDS: f64 = 120.0;
 /// Camera and display must first be known.
 const SETTLE_S: f64 = 5.0;
-
-/// splitmix64 of `i`, 0 to 1.
-fn even(i: u64) -> f64 {
-    let mut z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-}
 
 fn at(s: f64) -> Time {
     Time::from_ns((s * 1e9) as i64)
@@ -161,57 +156,62 @@ fn watch(tick: &mut dyn Tick, camera_fps: f64, display_hz: f64) -> Seen {
     seen
 }
 
-fn ticks() -> [(&'static str, &'static str, Box<dyn Tick>); 3] {
-    [
-        ("free tick", "30 Hz", Box::new(Pacer::new(at(0.0011)))),
-        ("late begin", "every second blank", Box::new(Late::default())),
-        ("locked tick", "camera and display", Box::new(FrameClock::new())),
-    ]
+/// One way: method, setting, maker.
+type Method = (&'static str, &'static str, fn() -> Box<dyn Tick>);
+
+const METHODS: [Method; 3] = [
+    ("free tick", "30 Hz", || Box::new(Pacer::new(at(0.0011)))),
+    ("late begin", "every second blank", || Box::new(Late::default())),
+    ("locked tick", "camera and display", || Box::new(FrameClock::new())),
+];
+
+/// Error of a way and what is said of it.
+fn judged(make: fn() -> Box<dyn Tick>, camera_fps: f64, display_hz: f64) -> (f64, String) {
+    let seen = watch(make().as_mut(), camera_fps, display_hz);
+    let tick_fps = if display_hz > 50.0 { display_hz / 2.0 } else { display_hz };
+    let beats = seen.beats(camera_fps, tick_fps);
+    let note = format!(
+        "p99 {:.1} ms, dropped {}, doubled {}, beats {beats:.0}",
+        seen.p99_ms, seen.dropped, seen.doubled
+    );
+    (seen.p99_ms + 1e3 / 30.0 * beats / SECONDS, note)
 }
 
-/// The rows.
-pub fn rows(repeats: usize) -> Vec<Row> {
-    let mut rows = Vec::new();
+/// Measures the scenes and extreme cases.
+pub fn measure(bench: &mut Bench) -> Result<()> {
     for (camera_fps, display_hz) in
-        [(29.97, 60.0), (30.0, 59.94), (30.03, 60.0), (60.0, 59.94), (25.0, 60.0), (29.97, 30.0)]
+        [(29.97, 60.0), (30.0, 59.94), (30.03, 60.0), (60.0, 59.94), (29.97, 30.0)]
     {
-        for (method, setting, mut tick) in ticks() {
-            let seen = watch(tick.as_mut(), camera_fps, display_hz);
-            let tick_fps = if display_hz > 50.0 { display_hz / 2.0 } else { display_hz };
-            let beats = seen.beats(camera_fps, tick_fps);
-            let error = seen.p99_ms + 1e3 / 30.0 * beats / SECONDS;
-            let scene = format!("camera {camera_fps} Hz, display {display_hz} Hz");
-            let mut r = row("pacing", &scene, method, setting, error, "ms", cost_ns(method, repeats));
-            r.note = format!(
-                "p99 {:.1} ms, dropped {}, doubled {}, beats {beats:.0}",
-                seen.p99_ms, seen.dropped, seen.doubled
-            );
-            r.default = method == "locked tick";
-            // A camera of another rate than the tick's cannot be followed: it shows what happens then.
-            r.extreme = camera_fps == 25.0;
-            rows.push(r);
-        }
+        let ways = METHODS.map(|(method, setting, make)| {
+            let (error, note) = judged(make, camera_fps, display_hz);
+            Way::new(method, setting, error, FRAMES, move || decide(make().as_mut()))
+                .default_if(method == "locked tick")
+                .note(note)
+        });
+        bench.scene(&format!("camera {camera_fps} Hz, display {display_hz} Hz"), "ms", 0.0, ways.into());
     }
-    rows
+    // A camera of another rate than the tick's cannot be followed: this shows what happens then.
+    for (camera_fps, display_hz) in [(25.0, 60.0), (15.0, 60.0), (120.0, 59.94)] {
+        let tried = METHODS.map(|(method, setting, make)| {
+            let (error, note) = judged(make, camera_fps, display_hz);
+            Tried { default: method == "locked tick", ..Tried::rival(method, setting, error) }.note(note)
+        });
+        bench.extreme(&format!("camera {camera_fps} Hz, display {display_hz} Hz"), "ms", tried.into());
+    }
+    Ok(())
 }
 
-/// Time that one decision takes, nanoseconds.
-fn cost_ns(method: &str, repeats: usize) -> f64 {
-    const FRAMES: i64 = 1000;
-    time_ns(repeats.min(9), || {
-        let mut sum = 0i64;
-        for (name, _, mut tick) in ticks() {
-            if name != method {
-                continue;
-            }
-            for i in 0..FRAMES {
-                let t = Time::from_ns(i * 33_333_333);
-                tick.arrived(t);
-                tick.flipped(t.plus_ns(20_000_000), 16_666_667);
-                tick.rendered(9_000_000);
-                sum = sum.wrapping_add(tick.next(t.plus_ns(21_000_000)).ns());
-            }
-        }
-        sum
-    }) / FRAMES as f64
+const FRAMES: usize = 1000;
+
+/// Plans that many frames.
+fn decide(tick: &mut dyn Tick) -> i64 {
+    let mut sum = 0i64;
+    for i in 0..FRAMES as i64 {
+        let t = Time::from_ns(i * 33_333_333);
+        tick.arrived(t);
+        tick.flipped(t.plus_ns(20_000_000), 16_666_667);
+        tick.rendered(9_000_000);
+        sum = sum.wrapping_add(tick.next(t.plus_ns(21_000_000)).ns());
+    }
+    sum
 }

@@ -1,0 +1,218 @@
+//! Motion of a boat in waves, and how it could be integrated.
+
+mod boat;
+mod stiff;
+mod system;
+
+use anyhow::{Context, Result, anyhow};
+use bowwave_core::sea::{BeaufortForce, Spectrum, WaveField, WaveSpec};
+use differential_equations::prelude::{ExplicitRungeKutta, IVP};
+
+use self::{
+    boat::{Boat, GRAVITY, State},
+    system::{Library, System as _, euler, heun, rosenbrock, runge_kutta, semi_implicit, tr_bdf2},
+};
+use super::{About, rms, worst};
+use crate::bench::{Bench, Tried, Way};
+
+/// What is said of this part.
+pub const ABOUT: About = About {
+    part: "motion",
+    what: "Heave and pitch of a boat. The product lays it into the mean plane of the water under its hull: a closed function of \
+           time.",
+    truth: "a strip model of a 7 m hull with buoyancy, cross flow and slamming (a test problem, no validated boat), integrated by \
+            DOP853 at 1e-11 of the crate differential-equations, which shares no code with the integrators here; for the stiff \
+            problems the references of the Bari and Hairer test sets (data/ode_stiff_reference.csv). The error is the root mean \
+            square of heave and of three times the pitch (about the bow's height), about their means over seconds 4 to 12: the \
+            start is forgotten, and trim and rise on the plane are constants that the product adds",
+    rivals: "explicit and semi-implicit Euler, Heun, Runge-Kutta 4, Rosenbrock (ode23s) and TR-BDF2 with fixed steps of 1/30 to \
+             1/480 s, and a boat that does not move at all; for the stiff problems the implicit ones with step control against \
+             Radau5, BDF and DOPRI5 of the library",
+    why: "the mean plane: nothing to integrate, the same at any time in any order, so that a round can be swept against the boat \
+          between frames. It is not what such a boat does: at speed its bow and the waves are out of step. Heun at 1/60 s would \
+          follow the model within millimetres for about nine times the time of the mean plane",
+};
+
+/// Seconds of motion, and from where on they count.
+const SECONDS: f64 = 12.0;
+const SETTLED_S: f64 = 4.0;
+/// Times a second at which motions are compared.
+const COMPARED_HZ: usize = 30;
+const FRAMES: usize = SECONDS as usize * COMPARED_HZ;
+
+/// Positions at each frame; empty where the way diverged.
+type Track = Vec<[f64; 2]>;
+
+/// A fixed step.
+type Step = fn(&Boat, f64, &State, f64) -> State;
+
+const STEPS: [(&str, Step); 6] = [
+    ("Euler", euler),
+    ("semi-implicit Euler", semi_implicit),
+    ("Heun", heun),
+    ("Runge-Kutta 4", runge_kutta),
+    ("Rosenbrock (ode23s)", |s, t, y, h| rosenbrock(s, t, y, h).map_or([f64::NAN; 4], |r| r.0)),
+    ("TR-BDF2", |s, t, y, h| tr_bdf2(s, t, y, h).map_or([f64::NAN; 4], |r| r.0)),
+];
+/// Steps a second.
+const RATES: [usize; 4] = [30, 60, 120, 480];
+
+fn fixed(boat: &Boat, step: Step, start: State, hz: usize) -> Track {
+    let h = 1.0 / hz as f64;
+    let (mut y, mut track) = (start, Vec::with_capacity(FRAMES));
+    for i in 0..FRAMES * hz / COMPARED_HZ {
+        if i % (hz / COMPARED_HZ) == 0 {
+            track.push([y[0], y[1]]);
+        }
+        y = step(boat, i as f64 * h, &y, h);
+        // A boat a kilometre up has left the problem.
+        if !y.iter().all(|v| v.abs() < 1e3) {
+            return Vec::new();
+        }
+    }
+    track
+}
+
+fn truth(boat: &Boat, start: State, tolerance: f64) -> Result<Track> {
+    let times: Vec<f64> = (0..FRAMES).map(|i| i as f64 / COMPARED_HZ as f64).collect();
+    // Kinks between long steps would be missed: none is longer than two milliseconds.
+    let method =
+        ExplicitRungeKutta::dop853().rtol(tolerance).atol(tolerance).h_max(2e-3).max_steps(1_000_000);
+    let solution = IVP::ode(&Library(boat), 0.0, SECONDS, start)
+        .method(method)
+        .t_eval(&times)
+        .solve()
+        .map_err(|e| anyhow!("DOP853 gave up: {e:?}"))?;
+    let track: Track = solution.y.iter().take(FRAMES).map(|y| [y[0], y[1]]).collect();
+    (track.len() == FRAMES).then_some(track).context("DOP853 skipped times")
+}
+
+fn apart(track: &[[f64; 2]], truth: &[[f64; 2]]) -> f64 {
+    if track.is_empty() {
+        return f64::INFINITY;
+    }
+    let settled = (SETTLED_S * COMPARED_HZ as f64) as usize;
+    let off: Vec<[f64; 2]> =
+        track.iter().zip(truth).skip(settled).map(|(a, b)| [a[0] - b[0], 3.0 * (a[1] - b[1])]).collect();
+    let mean = |j: usize| off.iter().map(|o| o[j]).sum::<f64>() / off.len() as f64;
+    let (heave, bow) = (mean(0), mean(1));
+    rms(off.iter().map(|o| (o[0] - heave).hypot(o[1] - bow)))
+}
+
+fn product(boat: &Boat) -> Track {
+    (0..FRAMES)
+        .map(|i| {
+            let y = boat.quasi_static(i as f64 / COMPARED_HZ as f64);
+            [y[0], y[1]]
+        })
+        .collect()
+}
+
+/// Largest rate of change of the rates along the way, by the Jacobian's norm, and largest acceleration, in g.
+fn hardness(boat: &Boat, track: &[[f64; 2]]) -> (f64, f64) {
+    let states = track.windows(2).enumerate().map(|(i, w)| {
+        let hz = COMPARED_HZ as f64;
+        let rate = |j: usize| (w[1][j] - w[0][j]) * hz;
+        (i as f64 / hz, [w[0][0], w[0][1], rate(0), rate(1)])
+    });
+    states.fold((0.0, 0.0), |(stiff, hard): (f64, f64), (t, y)| {
+        let f = boat.rate(t, &y);
+        let jacobian = boat.jacobian(t, &y, &f);
+        let norm = jacobian.iter().map(|r| r.iter().map(|v| v.abs()).sum::<f64>()).fold(0.0, f64::max);
+        (stiff.max(norm), hard.max((f[2] / GRAVITY).abs()))
+    })
+}
+
+/// A problem: name, boat, start.
+fn problems() -> Result<Vec<(&'static str, Boat, State)>> {
+    let force = BeaufortForce::new(4).context("force 4")?;
+    let sea = WaveSpec { spectrum: Spectrum::of_force(force), wind_from: 0.0 };
+    Ok(vec![
+        ("chop of 0.5 m and 2.5 s at 5 m/s", Boat::in_regular_waves(0.5, 2.5, 5.0), [0.0; 4]),
+        ("slamming: 1.5 m and 4 s at 12 m/s", Boat::in_regular_waves(1.5, 4.0, 12.0), [0.0; 4]),
+        ("extreme: 3 m and 5 s at 15 m/s", Boat::in_regular_waves(3.0, 5.0, 15.0), [0.0; 4]),
+        ("force 4, the product's sea, at rest", Boat::new(WaveField::new(&sea, 3), 0.0), [0.0; 4]),
+        ("force 4, the product's sea, at 5 m/s", Boat::new(WaveField::new(&sea, 3), 5.0), [0.0; 4]),
+    ])
+}
+
+/// Measures the scenes and extreme cases.
+pub fn measure(bench: &mut Bench) -> Result<()> {
+    for (scene, boat, start) in problems()? {
+        let exact = truth(&boat, start, 1e-11)?;
+        let own = apart(&truth(&boat, start, 1e-9)?, &exact);
+        let boat = &boat;
+        let mut ways = Vec::new();
+        for (method, step) in STEPS {
+            for hz in RATES {
+                // The dearest settings take a second each of a busy machine.
+                if bench.is_quick() && hz > 120 && !method.starts_with("Runge") {
+                    continue;
+                }
+                let error = apart(&fixed(boat, step, start, hz), &exact);
+                let work = move || fixed(boat, step, start, hz);
+                let seconds = SECONDS as usize;
+                let unsettled = error.is_infinite() && method == "TR-BDF2";
+                let note = if unsettled { "Newton's iteration does not settle at the kinks" } else { "" };
+                ways.push(
+                    Way::new(method, &format!("1/{hz} s"), error, seconds, work)
+                        .holds(size_of::<State>())
+                        .note(note),
+                );
+            }
+        }
+        let error = apart(&product(boat), &exact);
+        let moved = apart(&vec![[0.0; 2]; FRAMES], &exact);
+        ways.push(Way::new("flat water", "", moved, SECONDS as usize, || vec![[0.0; 2]; FRAMES]));
+        let (stiffness, g) = hardness(boat, &exact);
+        ways.push(
+            Way::new("mean plane", "no inertia", error, SECONDS as usize, move || product(boat))
+                .default_although(
+                    "it has no inertia; boats must be closed functions of time until courses are integrated ahead",
+                )
+                .note(format!("stiffness up to {stiffness:.0}/s, accelerations up to {g:.1} g")),
+        );
+        bench.scene(&format!("{scene}; time for a second of motion"), "m rms", own, ways);
+    }
+    drop_on_calm_water(bench)?;
+    elsewhere(bench);
+    stiff::measure(bench)
+}
+
+/// The same kinds of problem with a model and integrators made elsewhere, so that both may be compared.
+fn elsewhere(bench: &mut Bench) {
+    let text = include_str!("../../../data/boat_heave_pitch_work_precision.csv");
+    let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+    for case in ["calm_drop", "chop_H0.5_T2.5_U5", "slam_H1.5_T4_U12", "extreme_H3_T5_U15"] {
+        let of_case = rows.iter().filter(|r| r[0] == case && ["0.033333", "0.008333"].contains(&r[2]));
+        let tried = of_case.map(|r| {
+            let setting = if r[2] == "0.008333" { "1/120 s" } else { "1/30 s" };
+            let error = r.get(4).and_then(|e| e.parse().ok()).unwrap_or(f64::NAN);
+            Tried::rival(r[1], setting, error)
+        });
+        bench.extreme(&format!("{case}, as found elsewhere; error after 10 s"), "m", tried.collect());
+    }
+}
+
+/// The fall onto flat water, where the mean plane has nothing to say.
+fn drop_on_calm_water(bench: &mut Bench) -> Result<()> {
+    for (case, height_m) in [("dropped from 0.5 m onto flat water", 0.5), ("dropped from 5 m", 5.0)] {
+        let boat = Boat::in_regular_waves(0.0, 3.0, 0.0);
+        let start = [height_m, 0.1, 0.0, 0.0];
+        let exact = truth(&boat, start, 1e-11)?;
+        let all = |track: &[[f64; 2]]| {
+            if track.is_empty() {
+                return f64::INFINITY;
+            }
+            worst(track.iter().zip(&exact).map(|(a, b)| (a[0] - b[0]).hypot(3.0 * (a[1] - b[1]))))
+        };
+        let mut tried = Vec::new();
+        for (method, step) in STEPS {
+            for hz in [30, 120] {
+                tried.push(Tried::rival(method, &format!("1/{hz} s"), all(&fixed(&boat, step, start, hz))));
+            }
+        }
+        bench.extreme(case, "m", tried);
+    }
+    Ok(())
+}
