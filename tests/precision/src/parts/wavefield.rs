@@ -160,6 +160,6 @@ mod tests {
         let (a, b) = (1.0 + f64::EPSILON, 1_073_741_824.5);
         let (whole, fraction) = (1_073_741_824.0, 0.5);
         assert_eq!(exact_fraction(a, b), fraction + (whole + fraction) * f64::EPSILON);
-        assert_eq!(exact_fraction(1e-30, 1e-30), 1e-60);
+        assert_eq!(exact_fraction(2f64.powi(-100), 2f64.powi(-50)), 2f64.powi(-150));
     }
 }
