@@ -1,6 +1,6 @@
 //! Error against run time of every numerical part.
 //!
-//! A [`parts::Part`] holds the ways of doing one thing against a truth that shares no code with them: [`bench`] times the ways
+//! A [`parts::Part`] holds the ways of doing one thing against a truth that shares no code with them: [`mod@bench`] times the ways
 //! of a scene in turns, [`front`] finds those that nothing beats, [`row`] writes the table and [`page`] the page.
 
 pub mod bench;

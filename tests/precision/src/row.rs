@@ -124,7 +124,7 @@ pub fn csv(rows: &[Row]) -> Result<Vec<u8>> {
     writer.into_inner().context("cannot finish the table")
 }
 
-/// Writes [`csv`] to a file.
+/// Writes the table of [`csv()`] to a file.
 pub fn write_csv(path: &Path, rows: &[Row]) -> Result<()> {
     std::fs::write(path, csv(rows)?).with_context(|| format!("cannot write {}", path.display()))
 }
