@@ -5,10 +5,12 @@
 
 pub mod bench;
 pub mod front;
+pub mod metric;
 pub mod page;
 pub mod parts;
 pub mod plot;
 pub mod row;
+pub mod truth;
 
 /// Counts the heap, so that what a way takes of it can be told.
 #[global_allocator]

@@ -1,0 +1,408 @@
+//! The resolved waves: tiles of Gaussian heights made by Fourier transform, and where rays meet their sum.
+//!
+//! Tiles have incommensurate sizes and directions, so that their sum does not repeat within a view. Each holds a band of wave
+//! lengths of no less than [`CELLS_A_WAVE`] cells; interpolation between cells loses a known share of the slopes, which is added
+//! to the unresolved ones.
+
+use std::f64::consts::{PI, TAU};
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use rustfft::{FftPlanner, num_complex::Complex64};
+
+use super::{
+    rng,
+    spectrum::{Spectrum, cox_munk, frequency},
+};
+
+/// Cells that the shortest wave of a tile spans.
+const CELLS_A_WAVE: f64 = 4.0;
+/// Longest waves of a tile fit into it this many times.
+const WAVES_A_TILE: f64 = 8.0;
+/// Turn between the axes of one tile and the next, radians (the golden angle).
+const TURN: f64 = 2.399_963_229_728_653;
+/// Slopes beyond this many standard deviations are not reckoned with when a ray steps through clear air.
+const SLOPE_SIGMAS: f64 = 3.5;
+
+/// How finely waves are resolved.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Resolution {
+    /// Shortest wave that has a shape, metres; what is shorter is statistics.
+    pub shortest_m: f64,
+    /// Cells along the side of the first tile (a power of two).
+    pub cells: usize,
+    /// Multiplies the cells of every tile without adding waves: discretisation alone.
+    pub oversample: usize,
+    /// Smaller steps along rays: 1 usual, 2 half as long.
+    pub step_refine: f64,
+}
+
+impl Default for Resolution {
+    fn default() -> Self {
+        Self { shortest_m: 0.06, cells: 1024, oversample: 1, step_refine: 1.0 }
+    }
+}
+
+struct Tile {
+    cells: usize,
+    cells_per_m: f64,
+    turn: DVec2,
+    heights: Vec<f32>,
+    slopes: Vec<[f32; 2]>,
+    /// Greatest height of this tile and all finer ones, metres.
+    rest_m: f64,
+    /// Slope that the sum of this tile and all coarser ones rarely exceeds.
+    steepest: f64,
+}
+
+/// Slopes below the resolved waves: a Gaussian about the resolved slope.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unresolved {
+    /// Unit vector along the wind.
+    pub along: DVec2,
+    /// Standard deviations along and across the wind.
+    pub sigma: DVec2,
+}
+
+/// The sea surface at one time.
+pub struct Waves {
+    tiles: Vec<Tile>,
+    /// No wave is higher, metres.
+    pub highest_m: f64,
+    /// Slopes between cells and below the shortest wave.
+    pub unresolved: Unresolved,
+    /// All slopes as statistics: for water so far off that its waves are not traced.
+    pub all_slopes: Unresolved,
+    /// Mean square slopes that the tiles deliver, along and across the wind, in expectation.
+    pub resolved: (f64, f64),
+    /// Beyond this distance along a ray the sea is the plane z = 0 with [`Self::all_slopes`].
+    pub far_m: f64,
+    cell_m: f64,
+    step_refine: f64,
+}
+
+/// Where a ray meets the water.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Distance along the ray, metres.
+    pub t: f64,
+    /// The place.
+    pub point: DVec3,
+    /// Slope of the resolved waves (east, north).
+    pub slope: DVec2,
+    /// Slopes below.
+    pub unresolved: Unresolved,
+}
+
+impl Waves {
+    /// The sea of `spectrum` at `time_s`. The same seed gives the same waves at every time and resolution.
+    pub fn new(spectrum: &Spectrum, resolution: &Resolution, seed: u64, time_s: f64) -> Self {
+        let mut tiles = Vec::new();
+        let mut resolved = DVec2::ZERO;
+        let kp = spectrum.peak();
+        let mut finest = f64::INFINITY;
+        if kp.is_finite() {
+            let mut longest = f64::INFINITY;
+            let mut size_m = (WAVES_A_TILE * TAU / kp).max(32.0);
+            let mut most = resolution.cells;
+            // A rest of less than a third of an octave is not worth a tile.
+            while longest > 1.25 * resolution.shortest_m && tiles.len() < 6 {
+                let needed = size_m / resolution.shortest_m * CELLS_A_WAVE;
+                let cells = (needed.ceil() as usize).next_power_of_two().clamp(16, most);
+                let shortest = (size_m / cells as f64 * CELLS_A_WAVE).max(resolution.shortest_m);
+                let band = (TAU / longest, TAU / shortest);
+                let index = tiles.len();
+                let made = Maker { spectrum, size_m, cells: cells * resolution.oversample, index, band, seed, time_s };
+                let (tile, delivered) = made.make();
+                resolved += delivered;
+                finest = tile.cells_per_m.recip().min(finest);
+                tiles.push(tile);
+                longest = shortest;
+                // Not a round share, so that no two tiles repeat together.
+                size_m = WAVES_A_TILE * longest * 1.137;
+                most = (resolution.cells / 2).max(256);
+            }
+        }
+        finish_bounds(&mut tiles);
+        let (up, across) = cox_munk(spectrum.wind_m_s);
+        let along = spectrum.downwind();
+        let sigma = |up: f64, across: f64| DVec2::new(up.max(0.0).sqrt(), across.max(0.0).sqrt());
+        // The observed total governs; its axes only as far as the resolved waves leave room in both.
+        let rest = (up + across - resolved.x - resolved.y).max(0.0);
+        let share = if rest > 0.0 { ((up - resolved.x) / rest).clamp(0.35, 0.65) } else { 0.5 };
+        let unresolved = Unresolved { along, sigma: sigma(rest * share, rest * (1.0 - share)) };
+        Self {
+            highest_m: tiles.first().map_or(0.0, |t| t.rest_m),
+            tiles,
+            unresolved,
+            all_slopes: Unresolved { along, sigma: sigma(up, across) },
+            resolved: (resolved.x, resolved.y),
+            far_m: 2500.0,
+            cell_m: if finest.is_finite() { finest } else { 1.0 },
+            step_refine: resolution.step_refine,
+        }
+    }
+
+    /// A flat mirror: no waves and no slopes.
+    pub fn mirror() -> Self {
+        let none = Unresolved { along: DVec2::Y, sigma: DVec2::ZERO };
+        Self {
+            tiles: Vec::new(),
+            highest_m: 0.0,
+            unresolved: none,
+            all_slopes: none,
+            resolved: (0.0, 0.0),
+            far_m: f64::INFINITY,
+            cell_m: 1.0,
+            step_refine: 1.0,
+        }
+    }
+
+    /// Height of the resolved water, metres.
+    pub fn height(&self, place: DVec2) -> f64 {
+        self.tiles.iter().map(|t| t.height(place)).sum()
+    }
+
+    /// Slope of the resolved water (east, north).
+    pub fn slope(&self, place: DVec2) -> DVec2 {
+        self.tiles.iter().map(|t| t.slope(place)).sum()
+    }
+
+    /// First place from `from` on where the ray (unit `direction`) goes below the water.
+    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Hit> {
+        let plane_t = |z: f64| (z - origin.z) / direction.z;
+        if self.tiles.is_empty() {
+            let t = plane_t(0.0);
+            return (direction.z < 0.0 && t > from && origin.z > 0.0).then(|| self.flat(origin, direction, t));
+        }
+        let (mut t, end) = if direction.z < 0.0 {
+            (from.max(plane_t(self.highest_m)), plane_t(-self.highest_m))
+        } else if origin.z > self.highest_m {
+            return None;
+        } else if direction.z > 0.0 {
+            (from, plane_t(self.highest_m))
+        } else {
+            (from, self.far_m)
+        };
+        let run = direction.truncate().length();
+        let least = self.cell_m / self.step_refine / run.max(1e-3);
+        let mut before = None;
+        while t <= end {
+            if t > self.far_m {
+                let t = plane_t(0.0);
+                return (direction.z < 0.0).then(|| self.flat(origin, direction, t.max(self.far_m)));
+            }
+            let (gap, step) = self.probe(origin + direction * t, direction.z, run);
+            if gap <= 0.0 {
+                if let Some((t0, gap0)) = before {
+                    return Some(self.refine(origin, direction, (t0, gap0), (t, gap)));
+                }
+            } else {
+                before = Some((t, gap));
+            }
+            t += (step / self.step_refine).max(least * (1.0 + t / 400.0));
+        }
+        None
+    }
+
+    /// Height of a point over the water (or less than it, where coarse tiles already tell that it is well clear), and how far a
+    /// ray can go on.
+    fn probe(&self, point: DVec3, dz: f64, run: f64) -> (f64, f64) {
+        let place = point.truncate();
+        let mut gap = point.z;
+        let last = self.tiles.len() - 1;
+        for (i, tile) in self.tiles.iter().enumerate() {
+            gap -= tile.height(place);
+            let rest = self.tiles.get(i + 1).map_or(0.0, |t| t.rest_m);
+            let clear = gap - rest;
+            let closing = (tile.steepest * run - dz).max(1e-3);
+            let step = clear / closing;
+            if i == last || step > 2.0 * self.cell_m + 0.25 * rest / closing {
+                return (if i == last { gap } else { clear }, step);
+            }
+        }
+        (gap, 0.0)
+    }
+
+    fn refine(&self, origin: DVec3, direction: DVec3, above: (f64, f64), below: (f64, f64)) -> Hit {
+        let ((mut t0, mut g0), (mut t1, mut g1)) = (above, below);
+        for i in 0..12 {
+            // Regula falsi, with a bisection now and then so that it cannot hang at one end.
+            let t = if i % 3 == 2 { (t0 + t1) / 2.0 } else { t0 + (t1 - t0) * g0 / (g0 - g1).max(1e-12) };
+            let p = origin + direction * t;
+            let gap = p.z - self.height(p.truncate());
+            if gap > 0.0 {
+                (t0, g0) = (t, gap);
+            } else {
+                (t1, g1) = (t, gap);
+            }
+            if gap.abs() < 1e-5 {
+                break;
+            }
+        }
+        let t = if g0 < -g1 { t0 } else { t1 };
+        let point = origin + direction * t;
+        Hit { t, point, slope: self.slope(point.truncate()), unresolved: self.unresolved }
+    }
+
+    fn flat(&self, origin: DVec3, direction: DVec3, t: f64) -> Hit {
+        Hit { t, point: origin + direction * t, slope: DVec2::ZERO, unresolved: self.all_slopes }
+    }
+}
+
+fn finish_bounds(tiles: &mut [Tile]) {
+    let mut rest = 0.0;
+    for tile in tiles.iter_mut().rev() {
+        rest += tile.rest_m;
+        tile.rest_m = rest;
+    }
+    let mut squares = 0.0;
+    for tile in tiles {
+        squares += tile.steepest * tile.steepest;
+        tile.steepest = SLOPE_SIGMAS * squares.sqrt();
+    }
+}
+
+impl Tile {
+    /// Cell and shares between it and the next ones.
+    fn locate(&self, place: DVec2) -> ([usize; 4], DVec2) {
+        let p = self.turn.rotate(place) * self.cells_per_m;
+        let floor = p.floor();
+        let mask = self.cells as i64 - 1;
+        let (x0, y0) = ((floor.x as i64 & mask) as usize, (floor.y as i64 & mask) as usize);
+        let (x1, y1) = ((x0 + 1) & mask as usize, ((y0 + 1) & mask as usize) * self.cells);
+        let y0 = y0 * self.cells;
+        ([y0 + x0, y0 + x1, y1 + x0, y1 + x1], p - floor)
+    }
+
+    fn height(&self, place: DVec2) -> f64 {
+        let ([a, b, c, d], f) = self.locate(place);
+        let h = |i: usize| f64::from(self.heights[i]);
+        let low = h(a) + (h(b) - h(a)) * f.x;
+        let high = h(c) + (h(d) - h(c)) * f.x;
+        low + (high - low) * f.y
+    }
+
+    fn slope(&self, place: DVec2) -> DVec2 {
+        let ([a, b, c, d], f) = self.locate(place);
+        let s = |i: usize| DVec2::new(f64::from(self.slopes[i][0]), f64::from(self.slopes[i][1]));
+        let low = s(a) + (s(b) - s(a)) * f.x;
+        let high = s(c) + (s(d) - s(c)) * f.x;
+        low + (high - low) * f.y
+    }
+}
+
+struct Maker<'a> {
+    spectrum: &'a Spectrum,
+    size_m: f64,
+    cells: usize,
+    index: usize,
+    band: (f64, f64),
+    seed: u64,
+    time_s: f64,
+}
+
+impl Maker<'_> {
+    /// The tile, and the mean square slopes that survive interpolation (along, across the wind).
+    fn make(&self) -> (Tile, DVec2) {
+        let n = self.cells;
+        let angle = TURN * self.index as f64;
+        let turn = DVec2::from_angle(angle);
+        let along = self.spectrum.downwind();
+        let unit = TAU / self.size_m;
+        let signed = |i: usize| if i <= n / 2 { i as f64 } else { i as f64 - n as f64 };
+        let reach = (self.band.1 / unit).ceil() as usize + 1;
+        let used = |i: usize| i.min(n - i) <= reach;
+        let amplitude = |ix: usize, iy: usize| -> (Complex64, DVec2) {
+            let k = turn.conjugate_rotate(DVec2::new(signed(ix), signed(iy)) * unit);
+            let length = k.length();
+            if length < self.band.0 || length >= self.band.1 {
+                return (Complex64::ZERO, k);
+            }
+            let off = k.angle_to(along);
+            let power = self.spectrum.directional(length, off) * unit * unit / 2.0;
+            let mode = [signed(ix) as i64, signed(iy) as i64];
+            let gauss = rng::gauss_pair(self.seed, &[self.index as i64, mode[0], mode[1]]);
+            (Complex64::new(gauss[0], gauss[1]) * (power / 2.0).sqrt(), k)
+        };
+        let mut height = vec![Complex64::ZERO; n * n];
+        let mut slope = vec![Complex64::ZERO; n * n];
+        height.par_chunks_mut(n).zip(slope.par_chunks_mut(n)).enumerate().for_each(|(iy, (hs, ss))| {
+            if !used(iy) {
+                return;
+            }
+            for ix in (0..n).filter(|&ix| used(ix)) {
+                let (a, k) = amplitude(ix, iy);
+                let (b, _) = amplitude((n - ix) % n, (n - iy) % n);
+                if a == Complex64::ZERO && b == Complex64::ZERO {
+                    continue;
+                }
+                let phase = Complex64::from_polar(1.0, -frequency(k.length()) * self.time_s);
+                let h = a * phase + (b * phase).conj();
+                hs[ix] = h;
+                // Two real transforms in one: east in the real part, north in the imaginary one.
+                ss[ix] = Complex64::i() * k.x * h - k.y * h;
+            }
+        });
+        let delivered = self.delivered(&along);
+        let (heights, slopes) = (transform(height, n), transform(slope, n));
+        let heights: Vec<f32> = heights.iter().map(|c| c.re as f32).collect();
+        let slopes: Vec<[f32; 2]> = slopes.iter().map(|c| [c.re as f32, c.im as f32]).collect();
+        let highest = heights.iter().fold(0f32, |m, h| m.max(h.abs()));
+        let tile = Tile {
+            cells: n,
+            cells_per_m: n as f64 / self.size_m,
+            turn,
+            heights,
+            slopes,
+            rest_m: f64::from(highest),
+            // One standard deviation for now; summed by finish_bounds.
+            steepest: (delivered.x.max(delivered.y)).sqrt(),
+        };
+        (tile, delivered)
+    }
+
+    /// Expected mean square slopes along and across the wind, less what linear interpolation takes: a wave that advances by `a`
+    /// radians a cell keeps (2 + cos a) / 3 of its power on average.
+    fn delivered(&self, along: &DVec2) -> DVec2 {
+        let (from, to) = (self.band.0.max(self.spectrum.peak() / 30.0), self.band.1);
+        let (steps, angles) = (200, 90);
+        let d_log = (to / from).ln() / f64::from(steps);
+        let cell = self.size_m / self.cells as f64;
+        let turn = DVec2::from_angle(TURN * self.index as f64);
+        let mut sum = DVec2::ZERO;
+        for i in 0..steps {
+            let k = from * ((f64::from(i) + 0.5) * d_log).exp();
+            for j in 0..angles {
+                let angle = PI * ((f64::from(j) + 0.5) / f64::from(angles) - 0.5);
+                let power = self.spectrum.directional(k, angle) * k * k * d_log * PI / f64::from(angles);
+                let phase = turn.rotate(DVec2::from_angle(angle).rotate(*along) * k) * cell;
+                let kept = (2.0 + phase.x.cos()) * (2.0 + phase.y.cos()) / 9.0;
+                let slope = DVec2::new(angle.cos(), angle.sin()) * k;
+                sum += slope * slope * power * kept;
+            }
+        }
+        sum
+    }
+}
+
+/// Inverse transform over rows and columns, without scaling.
+fn transform(mut data: Vec<Complex64>, n: usize) -> Vec<Complex64> {
+    let fft = FftPlanner::new().plan_fft_inverse(n);
+    for _ in 0..2 {
+        data.par_chunks_mut(n).for_each(|row| fft.process(row));
+        data = (0..n * n).into_par_iter().map(|i| data[(i % n) * n + i / n]).collect();
+    }
+    data
+}
+
+/// Rotation back by the unit complex number `self`.
+trait ConjugateRotate {
+    fn conjugate_rotate(self, v: DVec2) -> DVec2;
+}
+
+impl ConjugateRotate for DVec2 {
+    fn conjugate_rotate(self, v: DVec2) -> DVec2 {
+        DVec2::new(self.x, -self.y).rotate(v)
+    }
+}

@@ -1,0 +1,107 @@
+//! The grid of cells that methods are held against.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use super::{
+    boat::BOX_BOAT,
+    cell::{CellSpec, sea_of_state},
+    field::Resolution,
+    files,
+    sky::{SkySpec, Weather},
+    trace::Body,
+};
+
+/// Distances, metres.
+pub const RANGES_M: [f64; 3] = [60.0, 150.0, 400.0];
+/// Eye heights, metres.
+pub const EYES_M: [f64; 3] = [4.0, 8.0, 15.0];
+/// Headings of the bow, degrees clockwise from the direction of view: almost abeam, and three quarters towards the eye.
+pub const HEADINGS_DEG: [f64; 2] = [80.0, 215.0];
+/// Where the wind comes from, degrees clockwise from the direction of view.
+pub const WIND_FROM_DEG: f64 = 320.0;
+
+/// Named lights. Azimuths are clockwise from the direction of view, which is north.
+pub const LIGHTINGS: [(&str, SkySpec); 5] = [
+    ("overcast", SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 180.0 }),
+    ("high", SkySpec { weather: Weather::Clear, sun_elevation_deg: 50.0, sun_azimuth_deg: 230.0 }),
+    ("front", SkySpec { weather: Weather::Clear, sun_elevation_deg: 25.0, sun_azimuth_deg: 12.0 }),
+    ("behind", SkySpec { weather: Weather::Clear, sun_elevation_deg: 25.0, sun_azimuth_deg: 190.0 }),
+    ("low", SkySpec { weather: Weather::Clear, sun_elevation_deg: 5.0, sun_azimuth_deg: 75.0 }),
+];
+
+/// The light of that name.
+pub fn lighting(name: &str) -> Option<SkySpec> {
+    LIGHTINGS.iter().find(|(n, _)| *n == name).map(|(_, s)| *s)
+}
+
+/// A cell with the grid's settings for its range: paths, and the shortest waves that have a shape.
+pub fn cell(range_m: f64, state: u8, eye_m: f64, lighting_name: &str, heading_deg: f64) -> Option<CellSpec> {
+    let (_, long_waves) = sea_of_state(state)?;
+    let samples = if range_m < 100.0 { 96 } else if range_m < 300.0 { 192 } else { 384 };
+    // About twice the width that a pixel covers at that range, within what is worth tracing.
+    let shortest_m = (1.3e-3 * range_m).clamp(0.05, 0.5);
+    Some(CellSpec {
+        range_m,
+        state,
+        eye_m,
+        heading_deg,
+        wind_from_deg: WIND_FROM_DEG,
+        boat: BOX_BOAT.to_owned(),
+        time_s: 0.0,
+        wave_seed: 1,
+        noise_seed: 1,
+        samples,
+        lighting: lighting_name.to_owned(),
+        sky: lighting(lighting_name)?,
+        long_waves,
+        resolution: Resolution { shortest_m, ..Resolution::default() },
+        body: Body::default(),
+    })
+}
+
+/// Folder of a cell.
+pub fn name(c: &CellSpec) -> String {
+    let mut name =
+        format!("r{:03.0}-s{}-e{:02.0}-{}-h{:03.0}", c.range_m, c.state, c.eye_m, c.lighting, c.heading_deg);
+    if c.boat != BOX_BOAT {
+        name.push_str(&format!("-{}", c.boat));
+    }
+    if c.time_s != 0.0 {
+        name.push_str(&format!("-t{:.1}", c.time_s));
+    }
+    name
+}
+
+/// All cells; the quick ones are those of 8 m eye height, two lights and one heading.
+pub fn cells(quick: bool) -> Vec<CellSpec> {
+    let lights: &[&str] = if quick { &["overcast", "high"] } else { &["overcast", "high", "front", "low"] };
+    let eyes: &[f64] = if quick { &[8.0] } else { &EYES_M };
+    let headings: &[f64] = if quick { &HEADINGS_DEG[..1] } else { &HEADINGS_DEG };
+    let mut all = Vec::new();
+    for light in lights {
+        for heading in headings {
+            for eye in eyes {
+                for range in RANGES_M {
+                    all.extend((0..=4).filter_map(|state| cell(range, state, *eye, light, *heading)));
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Renders the cells that `out` does not yet hold with the same specification.
+pub fn make(cells: &[CellSpec], out: &Path) -> Result<()> {
+    for (i, spec) in cells.iter().enumerate() {
+        let folder = out.join(name(spec));
+        if files::read_spec(&folder.join("cell.toml")).is_ok_and(|old| old == *spec) {
+            continue;
+        }
+        let start = std::time::Instant::now();
+        files::make(spec, &folder)?;
+        println!("{}/{} {} {:.1} s", i + 1, cells.len(), name(spec), start.elapsed().as_secs_f64());
+    }
+    Ok(())
+}
