@@ -24,7 +24,7 @@ pub const PICTURE: (u32, u32) = (1280, 720);
 /// Angle that the whole picture covers across, degrees.
 pub const HFOV_DEG: f64 = 45.0;
 /// Largest region of interest, pixels.
-const ROI_MAX: (f64, f64) = (256.0, 176.0);
+const ROI_MAX: (f64, f64) = (256.0, 192.0);
 /// Mean linear value of the whole picture that the exposure aims at.
 const EXPOSED_MEAN: f64 = 0.25;
 
@@ -276,8 +276,8 @@ fn region_of(model: &Model, pose: &RigidPose, lens: &Lens, camera: &CameraPose) 
         high.x -= over.x / 2.0;
     }
     if over.y > 0.0 {
-        low.y += over.y * 0.5;
-        high.y -= over.y * 0.5;
+        low.y += over.y * 0.65;
+        high.y -= over.y * 0.35;
     }
     let picture = DVec2::new(f64::from(PICTURE.0), f64::from(PICTURE.1));
     let low = low.floor().clamp(DVec2::ZERO, picture - 16.0);

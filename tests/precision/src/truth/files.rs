@@ -12,9 +12,9 @@ use super::{
 };
 
 /// Pixels across the overview.
-const OVERVIEW: u32 = 320;
+const OVERVIEW: u32 = 240;
 /// Paths a pixel of the overview.
-const OVERVIEW_SAMPLES: u32 = 24;
+const OVERVIEW_SAMPLES: u32 = 4;
 
 /// A linear value as an sRGB code (IEC 61966-2-1), clipped as a camera does.
 pub fn code(linear: f32) -> u8 {

@@ -1,11 +1,12 @@
 //! Where the reflection is judged.
 //!
 //! The region of the reflection are water pixels (the boat covers less than half of them) that lie either in the boat's exact mirror image
-//! about the mean water at its hull, or where the truth changes: the greatest change of a channel's 8-bit code, averaged over 3 x 3 pixels,
-//! is above [`CHANGE_CODES`]; grown by [`MARGIN`] pixels. The mirror image is in it so that a method that draws a mirror image where the
+//! about the mean water at its hull, or where the truth changes: a channel's 8-bit code, averaged over 3 x 3 pixels, changes by more than
+//! [`CHANGE_CODES`]; grown by [`MARGIN`] pixels. The mirror image is in it so that a method that draws a mirror image where the
 //! truth shows none is judged there too.
 
 use bowwave_core::geometry::RigidPose;
+use glam::{DVec2, DVec3};
 
 use super::{
     cell::{Pictures, Setup},
@@ -21,11 +22,11 @@ pub const MARGIN: i64 = 2;
 /// The region of the reflection, one flag a pixel.
 pub fn reflection(setup: &Setup, pictures: &Pictures) -> Vec<bool> {
     let (w, h) = (pictures.size.0 as usize, pictures.size.1 as usize);
-    let change: Vec<f64> = pictures
+    let change: Vec<DVec3> = pictures
         .without
         .iter()
         .zip(&pictures.with)
-        .map(|(a, b)| (0..3).map(|c| (f64::from(code(a[c])) - f64::from(code(b[c]))).abs()).fold(0.0, f64::max))
+        .map(|(a, b)| DVec3::from_array([0, 1, 2].map(|c| f64::from(code(b[c])) - f64::from(code(a[c])))))
         .collect();
     let water = |i: usize| pictures.hull[i] < 0.5;
     let mirrored = mirror_image(setup, (w, h));
@@ -33,7 +34,7 @@ pub fn reflection(setup: &Setup, pictures: &Pictures) -> Vec<bool> {
     for y in 0..h {
         for x in 0..w {
             let around = neighbours(x, y, 1, (w, h));
-            let (mut sum, mut count) = (0.0, 0.0);
+            let (mut sum, mut count) = (DVec3::ZERO, 0.0);
             for i in around {
                 // Pixels that the hull touches changed because of the hull.
                 if pictures.hull[i] == 0.0 {
@@ -41,7 +42,7 @@ pub fn reflection(setup: &Setup, pictures: &Pictures) -> Vec<bool> {
                     count += 1.0;
                 }
             }
-            seed[y * w + x] = mirrored[y * w + x] || count > 0.0 && sum / count > CHANGE_CODES;
+            seed[y * w + x] = mirrored[y * w + x] || count > 0.0 && sum.abs().max_element() / count > CHANGE_CODES;
         }
     }
     (0..w * h)
@@ -65,7 +66,7 @@ fn mirror_image(setup: &Setup, size: (usize, usize)) -> Vec<bool> {
     eye.z = 2.0 * level - eye.z;
     (0..size.0 * size.1)
         .map(|i| {
-            let pixel = glam::DVec2::new(
+            let pixel = DVec2::new(
                 f64::from(setup.region.x) + (i % size.0) as f64 + 0.5,
                 f64::from(setup.region.y) + (i / size.0) as f64 + 0.5,
             );
