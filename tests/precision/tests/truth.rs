@@ -7,7 +7,7 @@ use glam::{DQuat, DVec2, DVec3};
 use precision::truth::{
     boat,
     cell::Setup,
-    field::{Resolution, Waves},
+    field::{Resolution, Sea, Waves},
     grid,
     mesh::Mesh,
     micro::{Micro, WATER, fresnel},
@@ -84,11 +84,8 @@ fn jonswap_has_the_moments_of_the_table() {
         let crossing = TAU * (moment(0) / moment(2)).sqrt();
         assert!((height / row[3] - 1.0).abs() < 1e-3, "{row:?}: {height}");
         assert!((crossing / row[5] - 1.0).abs() < 2e-3, "{row:?}: {crossing}");
-        let spectrum = Spectrum::new(
-            5.0,
-            0.0,
-            LongWaves::Jonswap { height_m: row[3], period_s: row[0], gamma: row[1] },
-        );
+        let spectrum =
+            Spectrum::new(5.0, 0.0, LongWaves::Jonswap { height_m: row[3], period_s: row[0], gamma: row[1] });
         // The table's waves go on for ever, ours end where they are damped, and short waves ride on them.
         let ours = spectrum.significant_height_m();
         assert!((ours / row[3] - 1.0).abs() < 0.03, "{row:?}: {ours}");
@@ -118,12 +115,20 @@ fn waves_have_the_height_and_with_the_unresolved_ones_the_slopes_of_their_spectr
         let (square, slopes) = moments(waves, spectrum.downwind());
         let wanted = spectrum.significant_height_m();
         // One realisation of a few hundred long waves.
-        assert!((4.0 * square.sqrt() - wanted).abs() <= 0.12 * wanted, "state {state}: {} m", 4.0 * square.sqrt());
-        assert!((slopes.x + slopes.y - waves.resolved.0 - waves.resolved.1).abs() <= 0.06 * (slopes.x + slopes.y));
-        let below = waves.unresolved.sigma * waves.unresolved.sigma;
+        assert!(
+            (4.0 * square.sqrt() - wanted).abs() <= 0.12 * wanted,
+            "state {state}: {} m",
+            4.0 * square.sqrt()
+        );
+        assert!((slopes.x + slopes.y - waves.resolved().element_sum()).abs() <= 0.06 * (slopes.x + slopes.y));
+        let below = waves.unresolved().sigma * waves.unresolved().sigma;
         let (up, across) = cox_munk(spectrum.wind_m_s);
         let total = slopes.x + slopes.y + below.x + below.y;
-        assert!((total / (up + across) - 1.0).abs() < 0.06, "state {state}: {total}, observed {}", up + across);
+        assert!(
+            (total / (up + across) - 1.0).abs() < 0.06,
+            "state {state}: {total}, observed {}",
+            up + across
+        );
     }
 }
 
@@ -132,7 +137,8 @@ fn waves_run_with_the_wind_by_the_dispersion_relation() {
     let spectrum = Spectrum::new(6.0, 1.0, LongWaves::Jonswap { height_m: 0.8, period_s: 4.0, gamma: 3.3 });
     let resolution = Resolution { shortest_m: 0.8, cells: 512, ..Resolution::default() };
     let step = 0.02;
-    let at: Vec<Waves> = (-1..=1).map(|i| Waves::new(&spectrum, &resolution, 5, 40.0 + f64::from(i) * step)).collect();
+    let sea = Sea::new(&spectrum, &resolution, 5);
+    let at: Vec<Waves> = (-1..=1).map(|i| sea.at(40.0 + f64::from(i) * step)).collect();
     let (mut rate, mut acceleration, mut with_wind) = (0.0, 0.0, 0.0);
     let n = 60_000;
     for i in 0..n {
@@ -163,7 +169,7 @@ fn waves_run_with_the_wind_by_the_dispersion_relation() {
 #[test]
 fn rays_meet_the_water_where_dense_sampling_says() {
     let spectrum = Spectrum::new(6.7, 2.0, OLD_SEA);
-    let waves = Waves::new(&spectrum, &coarse(), 3, 0.0);
+    let waves = Sea::new(&spectrum, &coarse(), 3).at(0.0);
     let (mut missed, mut rays) = (0, 0);
     for i in 0..300u32 {
         let mut path = Path::new(4, u64::from(i), 0);
@@ -192,14 +198,17 @@ fn rays_meet_the_water_where_dense_sampling_says() {
 /// A scene without waves, with the box boat 40 m off, for an eye 6 m up.
 fn calm(waves: Waves, sky: Sky, body: Body) -> Scene {
     let model = boat::box_boat();
-    let pose = RigidPose { world_from_body: DQuat::from_rotation_z(0.3), position: DVec3::new(0.0, 40.0, 0.0) };
+    let pose =
+        RigidPose { world_from_body: DQuat::from_rotation_z(0.3), position: DVec3::new(0.0, 40.0, 0.0) };
     let light = Scene::boat_light(&sky, &body);
     Scene { sky, waves, body, boat: Some(Mesh::new(&model, pose)), light }
 }
 
 #[test]
 fn a_mirror_sea_gives_the_exact_mirror_image() {
-    let sky = Sky::new(&SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 }).unwrap();
+    let sky =
+        Sky::new(&SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 })
+            .unwrap();
     let black = Body { reflectance: [0.0; 3], depth_m: 1.0 };
     let scene = calm(Waves::mirror(), sky, black);
     let eye = DVec3::new(0.0, 0.0, 6.0);
@@ -255,7 +264,7 @@ fn no_light_is_lost_or_made() {
 #[test]
 fn the_glitter_holds_the_light_that_facets_mirror_once() {
     let spec = grid::cell(60.0, 0, 8.0, "overcast", 80.0).unwrap();
-    let unresolved = Setup::new(&spec).unwrap().scene.waves.unresolved;
+    let unresolved = Setup::new(&spec).unwrap().scene.waves.unresolved();
     let micro = Micro::new(&unresolved, DVec2::new(0.02, -0.03));
     for down in [0.03, 0.2, 0.7f64] {
         let to_eye = DVec3::new(0.0, -(1.0 - down * down).sqrt(), down);
@@ -267,7 +276,9 @@ fn the_glitter_holds_the_light_that_facets_mirror_once() {
             let normal = micro.visible_normal(to_eye, &mut path);
             let cos = to_eye.dot(normal);
             let onward = 2.0 * cos * normal - to_eye;
-            if micro.strike(onward, height, &mut path).is_none() {
+            let left = micro.strike(onward, height, &mut path).is_none();
+            // Light from below the horizon, over a falling facet, is no sun.
+            if left && onward.z > 0.0 {
                 followed += fresnel(cos, WATER) / n as f64;
             }
             // Directions even over the half sphere that holds the mirror direction's neighbourhood.
@@ -281,7 +292,8 @@ fn the_glitter_holds_the_light_that_facets_mirror_once() {
 
 #[test]
 fn the_boat_darkens_the_water_in_its_shadow() {
-    let sky = Sky::new(&SkySpec { weather: Weather::Clear, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 }).unwrap();
+    let sky = Sky::new(&SkySpec { weather: Weather::Clear, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 })
+        .unwrap();
     let spec = grid::cell(60.0, 0, 8.0, "overcast", 80.0).unwrap();
     let waves = Setup::new(&spec).unwrap().scene.waves;
     let scene = calm(waves, sky, Body { reflectance: [0.3; 3], depth_m: 0.5 });
@@ -289,7 +301,8 @@ fn the_boat_darkens_the_water_in_its_shadow() {
     let (mut with, mut without) = (0.0, 0.0);
     for i in 0..2000 {
         let mut path = Path::new(5, i, 0);
-        let sample = scene.trace(DVec3::new(0.0, 36.0, 5.0), DVec3::new(0.0, 0.3, -1.0).normalize(), &mut path);
+        let sample =
+            scene.trace(DVec3::new(0.0, 36.0, 5.0), DVec3::new(0.0, 0.3, -1.0).normalize(), &mut path);
         with += sample.with.y;
         without += sample.without.y;
     }
@@ -313,12 +326,15 @@ fn extreme_views_stay_finite() {
 
 #[test]
 fn overcast_and_clear_skies_light_the_sea_as_tables_say() {
-    let overcast = Sky::new(&SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 }).unwrap();
+    let overcast =
+        Sky::new(&SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 })
+            .unwrap();
     let lux = |e: DVec3| e.dot(DVec3::new(0.2126, 0.7152, 0.0722)) * 683.0;
     assert!((lux(overcast.sky_irradiance) / 15_000.0 - 1.0).abs() < 0.02);
     let zenith = overcast.radiance(DVec3::Z).y;
     assert!((overcast.radiance(DVec3::Y).y / zenith - 1.0 / 3.0).abs() < 1e-12);
-    let clear = Sky::new(&SkySpec { weather: Weather::Clear, sun_elevation_deg: 50.0, sun_azimuth_deg: 0.0 }).unwrap();
+    let clear = Sky::new(&SkySpec { weather: Weather::Clear, sun_elevation_deg: 50.0, sun_azimuth_deg: 0.0 })
+        .unwrap();
     // CIE S 011 and handbooks: 10 to 20 klx of blue sky, 60 to 90 klx of sun on the horizontal.
     assert!((10_000.0..20_000.0).contains(&lux(clear.sky_irradiance)), "{}", lux(clear.sky_irradiance));
     assert!((60_000.0..90_000.0).contains(&lux(clear.sun_horizontal())), "{}", lux(clear.sun_horizontal()));

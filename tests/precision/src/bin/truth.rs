@@ -4,7 +4,13 @@ use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
-use precision::truth::{files, grid};
+use precision::truth::{
+    cell::sea_of_state,
+    files, grid,
+    spectrum::LongWaves,
+    study,
+    video::{self, VideoSpec},
+};
 
 /// A ray-traced sea with a boat on it.
 #[derive(Debug, Parser)]
@@ -26,6 +32,10 @@ enum What {
         #[arg(long, value_name = "DIR", default_value = "target/truth")]
         out: PathBuf,
     },
+    /// Renders one cell again with other paths and finer waves, and prints what that changes
+    Study(Cell),
+    /// Films a boat-free sea
+    Video(Video),
 }
 
 #[derive(Debug, Args)]
@@ -59,12 +69,93 @@ struct Cell {
     out: PathBuf,
 }
 
-fn one(a: &Cell) -> Result<()> {
+#[derive(Debug, Args)]
+struct Video {
+    /// Beaufort force; gives wind and waves unless --hs and --tp do
+    #[arg(long, default_value_t = 3)]
+    state: u8,
+    /// Significant wave height of a JONSWAP sea, metres
+    #[arg(long, requires = "tp")]
+    hs: Option<f64>,
+    /// Peak period of a JONSWAP sea, seconds
+    #[arg(long, requires = "hs")]
+    tp: Option<f64>,
+    /// Peak enhancement of a JONSWAP sea
+    #[arg(long, default_value_t = 3.3)]
+    gamma: f64,
+    /// Where the wind comes from, degrees clockwise from the direction of view
+    #[arg(long, default_value_t = 320.0)]
+    direction: f64,
+    /// Height of the eye, metres
+    #[arg(long, default_value_t = 10.0)]
+    height: f64,
+    /// Length, seconds
+    #[arg(long, default_value_t = 60.0)]
+    seconds: f64,
+    /// Pictures a second
+    #[arg(long, default_value_t = 5.0)]
+    fps: f64,
+    /// Picture width, pixels
+    #[arg(long, default_value_t = 320)]
+    width: u32,
+    /// Angle across, degrees
+    #[arg(long, default_value_t = 45.0)]
+    hfov: f64,
+    /// Pitch of the camera, degrees above the horizon
+    #[arg(long, default_value_t = -7.0, allow_hyphen_values = true)]
+    pitch: f64,
+    /// Paths a pixel
+    #[arg(long, default_value_t = 4)]
+    samples: u32,
+    /// Which waves
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Name of the light
+    #[arg(long, default_value = "overcast")]
+    light: String,
+    /// Folder of the frames
+    #[arg(long, value_name = "DIR", default_value = "target/truth-video")]
+    out: PathBuf,
+}
+
+fn film(a: &Video) -> Result<()> {
+    let (wind_m_s, by_wind) =
+        sea_of_state(a.state).with_context(|| format!("no sea state {}; there are 0 to 12", a.state))?;
+    let long_waves = match (a.hs, a.tp) {
+        (Some(height_m), Some(period_s)) => LongWaves::Jonswap { height_m, period_s, gamma: a.gamma },
+        _ => by_wind,
+    };
+    let spec = VideoSpec {
+        wind_m_s,
+        wind_from_deg: a.direction,
+        eye_m: a.height,
+        seconds: a.seconds,
+        fps: a.fps,
+        width: a.width,
+        hfov_deg: a.hfov,
+        pitch_deg: a.pitch,
+        samples: a.samples,
+        wave_seed: a.seed,
+        // What a pixel covers of the water nearest in the picture.
+        shortest_m: (4.0 * a.height * a.hfov.to_radians() / f64::from(a.width.max(1))).max(0.1),
+        lighting: a.light.clone(),
+        sky: grid::lighting(&a.light).with_context(|| format!("no light '{}'", a.light))?,
+        long_waves,
+    };
+    video::make(&spec, &a.out)
+}
+
+fn spec_of(a: &Cell) -> Result<precision::truth::cell::CellSpec> {
     let mut spec = grid::cell(a.range, a.state, a.eye, &a.light, a.heading)
         .with_context(|| format!("no sea state {} or light '{}'", a.state, a.light))?;
     spec.time_s = a.time;
     spec.samples = a.samples.unwrap_or(spec.samples);
     spec.boat = a.boat.clone().unwrap_or(spec.boat);
+    Ok(spec)
+}
+
+fn one(a: &Cell) -> Result<()> {
+    let spec = spec_of(a)?;
     let folder = a.out.join(grid::name(&spec));
     files::make(&spec, &folder)?;
     println!("{}", folder.display());
@@ -74,6 +165,12 @@ fn one(a: &Cell) -> Result<()> {
 fn run(arguments: &Arguments) -> Result<()> {
     match &arguments.what {
         What::Cell(cell) => one(cell),
+        What::Study(cell) => {
+            let spec = spec_of(cell)?;
+            println!("{}", study::table(&grid::name(&spec), &study::lines(&spec)?));
+            Ok(())
+        }
+        What::Video(video) => film(video),
         What::Grid { quick, out } => grid::make(&grid::cells(*quick), out),
     }
 }

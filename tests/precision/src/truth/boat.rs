@@ -19,7 +19,8 @@ pub fn model(name: &str) -> Result<Model> {
     if name == BOX_BOAT {
         return Ok(box_boat());
     }
-    bowwave_models::resolve(name, Path::new(".")).with_context(|| format!("no boat '{name}' ({BOX_BOAT} is one)"))
+    bowwave_models::resolve(name, Path::new("."))
+        .with_context(|| format!("no boat '{name}' ({BOX_BOAT} is one)"))
 }
 
 /// A boat of boxes, 8 m long and 2.6 m wide: red below, navy, white with an orange line, a cabin with windows and a mast. Its stripes
@@ -77,9 +78,10 @@ impl Maker {
     }
 
     fn finish(self) -> Model {
-        let (min, max) = self.vertices.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), v| {
-            (a.min(v.position), b.max(v.position))
-        });
+        let (min, max) = self
+            .vertices
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(a, b), v| (a.min(v.position), b.max(v.position)));
         let count = self.indices.len() as u32;
         Model {
             name: BOX_BOAT.to_owned(),
@@ -113,7 +115,8 @@ pub fn float(model: &Model, place: DVec2, heading: f64, waves: &Waves) -> RigidP
     let (mut mean, mut along, mut across) = (0.0, DVec2::ZERO, DVec2::ZERO);
     for i in 0..nx {
         for j in 0..ny {
-            let share = DVec2::new((f64::from(i) + 0.5) / f64::from(nx), (f64::from(j) + 0.5) / f64::from(ny));
+            let share =
+                DVec2::new((f64::from(i) + 0.5) / f64::from(nx), (f64::from(j) + 0.5) / f64::from(ny));
             let p = low + (high - low) * share;
             let h = waves.height(place + forward * p.x + port * p.y);
             let off = p - (low + high) / 2.0;

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::{
     boat,
-    field::{Resolution, Waves},
+    field::{Resolution, Sea, Waves},
     mesh::Mesh,
     rng::Path,
     sky::{Sky, SkySpec},
@@ -128,58 +128,32 @@ impl Setup {
             anyhow::bail!("sea state {} is not on the scale of 0 to 12", spec.state)
         };
         let spectrum = Spectrum::new(wind, spec.wind_from_deg.to_radians(), spec.long_waves);
-        let waves = Waves::new(&spectrum, &spec.resolution, spec.wave_seed, spec.time_s);
+        let waves = Sea::new(&spectrum, &spec.resolution, spec.wave_seed).at(spec.time_s);
         let sky = Sky::new(&spec.sky)?;
         let model = boat::model(&spec.boat)?;
-        let place = DVec2::new(0.0, spec.range_m);
-        let pose = boat::float(&model, place, spec.heading_deg.to_radians(), &waves);
+        let (place, heading) = (DVec2::new(0.0, spec.range_m), spec.heading_deg.to_radians());
+        let pose = boat::float(&model, place, heading, &waves);
         let lens = Lens::pinhole(PICTURE.0, PICTURE.1, HFOV_DEG.to_radians());
         let depression = (spec.eye_m / spec.range_m).atan();
         let camera = CameraPose {
             world_from_camera: look(0.0, -depression / 2.0, 0.0),
             position: DVec3::new(0.0, 0.0, spec.eye_m),
         };
-        let region = region_of(&model, &pose, &lens, &camera);
+        // Region and exposure are those of the mean water, so that they stay while waves move.
+        let level = boat::float(&model, place, heading, &Waves::mirror());
+        let region = region_of(&model, &level, &lens, &camera);
         let light = Scene::boat_light(&sky, &spec.body);
-        let mesh = Mesh::new(&model, pose);
-        let scene = Scene { sky, waves, body: spec.body, boat: Some(mesh), light };
-        let mut setup =
-            Self { spec: spec.clone(), spectrum, lens, camera, scene, model, pose, region, gain: 1.0 };
-        setup.gain = setup.exposure();
-        Ok(setup)
+        let mut scene =
+            Scene { sky, waves: Waves::statistical(&spectrum), body: spec.body, boat: None, light };
+        let gain = exposure(&scene, &lens, &camera);
+        (scene.waves, scene.boat) = (waves, Some(Mesh::new(&model, pose)));
+        Ok(Self { spec: spec.clone(), spectrum, lens, camera, scene, model, pose, region, gain })
     }
 
     /// Light on the boat in the picture's linear values.
     pub fn exposed_light(&self) -> BoatLight {
         let BoatLight { sun, sky, sea } = self.scene.light;
         BoatLight { sun: sun * self.gain, sky: sky * self.gain, sea: sea * self.gain }
-    }
-
-    /// The gain that brings the mean of the whole boat-free picture to [`EXPOSED_MEAN`], as a camera's centre-weighted meter would, from
-    /// a coarse rendering whose brightest parts (the sun) count no more than white.
-    fn exposure(&self) -> f64 {
-        let grid = (24u32, 18u32);
-        let values: Vec<f64> = (0..grid.0 * grid.1)
-            .into_par_iter()
-            .map(|i| {
-                let (x, y) = (f64::from(i % grid.0), f64::from(i / grid.0));
-                let mut sum = 0.0;
-                for sample in 0..16 {
-                    let mut path = Path::new(91, u64::from(i), sample);
-                    let share = DVec2::new((x + path.unit()) / f64::from(grid.0), (y + path.unit()) / f64::from(grid.1));
-                    let pixel = share * DVec2::new(f64::from(PICTURE.0), f64::from(PICTURE.1));
-                    sum += luminance(self.sample(pixel, &mut path).0) / 16.0;
-                }
-                sum
-            })
-            .collect();
-        // Values above white saturate: settle by iteration.
-        let mean = |gain: f64| values.iter().map(|v| (v * gain).min(1.0)).sum::<f64>() / values.len() as f64;
-        let mut gain = EXPOSED_MEAN / (values.iter().sum::<f64>() / values.len() as f64).max(1e-9);
-        for _ in 0..20 {
-            gain *= EXPOSED_MEAN / mean(gain).max(1e-9);
-        }
-        gain
     }
 
     fn sample(&self, pixel: DVec2, path: &mut Path) -> (DVec3, DVec3, bool) {
@@ -191,8 +165,10 @@ impl Setup {
     /// Renders the region.
     pub fn render(&self) -> Pictures {
         let r = self.region;
-        let pixels: Vec<([f32; 3], [f32; 3], f32)> =
-            (0..r.width * r.height).into_par_iter().map(|i| self.pixel(r.x + i % r.width, r.y + i / r.width)).collect();
+        let pixels: Vec<([f32; 3], [f32; 3], f32)> = (0..r.width * r.height)
+            .into_par_iter()
+            .map(|i| self.pixel(r.x + i % r.width, r.y + i / r.width))
+            .collect();
         Pictures {
             size: (r.width, r.height),
             without: pixels.iter().map(|p| p.0).collect(),
@@ -214,7 +190,11 @@ impl Setup {
             hull += f64::from(c);
         }
         let scale = self.gain / f64::from(self.spec.samples);
-        ((without * scale).as_vec3().to_array(), (with * scale).as_vec3().to_array(), (hull / f64::from(self.spec.samples)) as f32)
+        (
+            (without * scale).as_vec3().to_array(),
+            (with * scale).as_vec3().to_array(),
+            (hull / f64::from(self.spec.samples)) as f32,
+        )
     }
 
     /// The whole boat-free picture, `width` pixels wide, with `samples` paths a pixel: context for whoever measures light in it.
@@ -227,7 +207,8 @@ impl Setup {
                 let mut sum = DVec3::ZERO;
                 for index in 0..samples {
                     let mut path = Path::new(self.spec.noise_seed ^ 0x0f, u64::from(i), u64::from(index));
-                    let place = DVec2::new(f64::from(i % width) + path.unit(), f64::from(i / width) + path.unit());
+                    let place =
+                        DVec2::new(f64::from(i % width) + path.unit(), f64::from(i / width) + path.unit());
                     sum += self.sample(place * scale, &mut path).0;
                 }
                 (sum * self.gain / f64::from(samples)).as_vec3().to_array()
@@ -242,6 +223,35 @@ impl Setup {
         let p = self.lens.project(self.camera.to_camera(world))?;
         Some(p - DVec2::new(f64::from(self.region.x), f64::from(self.region.y)))
     }
+}
+
+/// The gain that brings the mean of the whole boat-free picture to [`EXPOSED_MEAN`], as a camera's meter would, from a coarse rendering
+/// in which what is brighter than white (the sun) counts as white.
+pub fn exposure(scene: &Scene, lens: &Lens, camera: &CameraPose) -> f64 {
+    let grid = (24u32, 18u32);
+    let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));
+    let values: Vec<f64> = (0..grid.0 * grid.1)
+        .into_par_iter()
+        .map(|i| {
+            let corner = DVec2::new(f64::from(i % grid.0), f64::from(i / grid.0));
+            let mut sum = 0.0;
+            for sample in 0..16 {
+                let mut path = Path::new(91, u64::from(i), sample);
+                let place = corner + DVec2::new(path.unit(), path.unit());
+                let pixel = place / DVec2::new(f64::from(grid.0), f64::from(grid.1)) * size;
+                let direction = camera.world_from_camera * lens.unproject(pixel);
+                sum += luminance(scene.trace(camera.position, direction, &mut path).without) / 16.0;
+            }
+            sum
+        })
+        .collect();
+    // Values above white saturate: settle by iteration.
+    let mean = |gain: f64| values.iter().map(|v| (v * gain).min(1.0)).sum::<f64>() / values.len() as f64;
+    let mut gain = EXPOSED_MEAN / (values.iter().sum::<f64>() / values.len() as f64).max(1e-9);
+    for _ in 0..20 {
+        gain *= EXPOSED_MEAN / mean(gain).max(1e-9);
+    }
+    gain
 }
 
 /// Relative luminance of linear sRGB (IEC 61966-2-1).
@@ -282,5 +292,10 @@ fn region_of(model: &Model, pose: &RigidPose, lens: &Lens, camera: &CameraPose) 
     let picture = DVec2::new(f64::from(PICTURE.0), f64::from(PICTURE.1));
     let low = low.floor().clamp(DVec2::ZERO, picture - 16.0);
     let high = high.ceil().clamp(low + 16.0, picture);
-    Region { x: low.x as u32, y: low.y as u32, width: (high.x - low.x) as u32, height: (high.y - low.y) as u32 }
+    Region {
+        x: low.x as u32,
+        y: low.y as u32,
+        width: (high.x - low.x) as u32,
+        height: (high.y - low.y) as u32,
+    }
 }

@@ -21,6 +21,8 @@ const CELLS_A_WAVE: f64 = 4.0;
 const WAVES_A_TILE: f64 = 8.0;
 /// Turn between the axes of one tile and the next, radians (the golden angle).
 const TURN: f64 = 2.399_963_229_728_653;
+/// Beyond this distance along a ray waves are not traced, metres.
+const FAR_M: f64 = 2500.0;
 /// Slopes beyond this many standard deviations are not reckoned with when a ray steps through clear air.
 const SLOPE_SIGMAS: f64 = 3.5;
 
@@ -69,16 +71,9 @@ pub struct Waves {
     tiles: Vec<Tile>,
     /// No wave is higher, metres.
     pub highest_m: f64,
-    /// Slopes between cells and below the shortest wave.
-    pub unresolved: Unresolved,
-    /// All slopes as statistics: for water so far off that its waves are not traced.
-    pub all_slopes: Unresolved,
-    /// Mean square slopes that the tiles deliver, along and across the wind, in expectation.
-    pub resolved: (f64, f64),
     /// Beyond this distance along a ray the sea is the plane z = 0 with [`Self::all_slopes`].
     pub far_m: f64,
-    cell_m: f64,
-    step_refine: f64,
+    still: Still,
 }
 
 /// Where a ray meets the water.
@@ -94,9 +89,25 @@ pub struct Hit {
     pub unresolved: Unresolved,
 }
 
-impl Waves {
-    /// The sea of `spectrum` at `time_s`. The same seed gives the same waves at every time and resolution.
-    pub fn new(spectrum: &Spectrum, resolution: &Resolution, seed: u64, time_s: f64) -> Self {
+/// The resolved waves of a sea at all times.
+pub struct Sea {
+    tiles: Vec<TileModes>,
+    still: Still,
+}
+
+/// What of a sea does not change with time.
+#[derive(Clone, Copy)]
+struct Still {
+    unresolved: Unresolved,
+    all_slopes: Unresolved,
+    resolved: DVec2,
+    cell_m: f64,
+    step_refine: f64,
+}
+
+impl Sea {
+    /// The sea of `spectrum`. The same seed gives the same waves at every resolution.
+    pub fn new(spectrum: &Spectrum, resolution: &Resolution, seed: u64) -> Self {
         let mut tiles = Vec::new();
         let mut resolved = DVec2::ZERO;
         let kp = spectrum.peak();
@@ -111,11 +122,10 @@ impl Waves {
                 let cells = (needed.ceil() as usize).next_power_of_two().clamp(16, most);
                 let shortest = (size_m / cells as f64 * CELLS_A_WAVE).max(resolution.shortest_m);
                 let band = (TAU / longest, TAU / shortest);
-                let index = tiles.len();
-                let made = Maker { spectrum, size_m, cells: cells * resolution.oversample, index, band, seed, time_s };
-                let (tile, delivered) = made.make();
-                resolved += delivered;
-                finest = tile.cells_per_m.recip().min(finest);
+                let cells = cells * resolution.oversample;
+                let tile = Maker { spectrum, size_m, cells, index: tiles.len(), band, seed }.make();
+                resolved += tile.delivered;
+                finest = (size_m / cells as f64).min(finest);
                 tiles.push(tile);
                 longest = shortest;
                 // Not a round share, so that no two tiles repeat together.
@@ -123,39 +133,67 @@ impl Waves {
                 most = (resolution.cells / 2).max(256);
             }
         }
-        finish_bounds(&mut tiles);
         let (up, across) = cox_munk(spectrum.wind_m_s);
         let along = spectrum.downwind();
         let sigma = |up: f64, across: f64| DVec2::new(up.max(0.0).sqrt(), across.max(0.0).sqrt());
         // The observed total governs; its axes only as far as the resolved waves leave room in both.
         let rest = (up + across - resolved.x - resolved.y).max(0.0);
         let share = if rest > 0.0 { ((up - resolved.x) / rest).clamp(0.35, 0.65) } else { 0.5 };
-        let unresolved = Unresolved { along, sigma: sigma(rest * share, rest * (1.0 - share)) };
-        Self {
-            highest_m: tiles.first().map_or(0.0, |t| t.rest_m),
-            tiles,
-            unresolved,
+        let still = Still {
+            unresolved: Unresolved { along, sigma: sigma(rest * share, rest * (1.0 - share)) },
             all_slopes: Unresolved { along, sigma: sigma(up, across) },
-            resolved: (resolved.x, resolved.y),
-            far_m: 2500.0,
+            resolved,
             cell_m: if finest.is_finite() { finest } else { 1.0 },
             step_refine: resolution.step_refine,
-        }
+        };
+        Self { tiles, still }
+    }
+
+    /// The surface at `time_s`.
+    pub fn at(&self, time_s: f64) -> Waves {
+        let mut tiles: Vec<Tile> = self.tiles.iter().map(|t| t.at(time_s)).collect();
+        finish_bounds(&mut tiles);
+        Waves { highest_m: tiles.first().map_or(0.0, |t| t.rest_m), tiles, far_m: FAR_M, still: self.still }
+    }
+}
+
+impl Waves {
+    /// A sea without resolved waves, all of whose slopes are statistics.
+    pub fn statistical(spectrum: &Spectrum) -> Self {
+        let (up, across) = cox_munk(spectrum.wind_m_s);
+        let all = Unresolved { along: spectrum.downwind(), sigma: DVec2::new(up.sqrt(), across.sqrt()) };
+        Self::flat_sea(all)
     }
 
     /// A flat mirror: no waves and no slopes.
     pub fn mirror() -> Self {
-        let none = Unresolved { along: DVec2::Y, sigma: DVec2::ZERO };
-        Self {
-            tiles: Vec::new(),
-            highest_m: 0.0,
-            unresolved: none,
-            all_slopes: none,
-            resolved: (0.0, 0.0),
-            far_m: f64::INFINITY,
+        Self::flat_sea(Unresolved { along: DVec2::Y, sigma: DVec2::ZERO })
+    }
+
+    fn flat_sea(slopes: Unresolved) -> Self {
+        let still = Still {
+            unresolved: slopes,
+            all_slopes: slopes,
+            resolved: DVec2::ZERO,
             cell_m: 1.0,
             step_refine: 1.0,
-        }
+        };
+        Self { tiles: Vec::new(), highest_m: 0.0, far_m: f64::INFINITY, still }
+    }
+
+    /// Slopes between cells and below the shortest wave.
+    pub fn unresolved(&self) -> Unresolved {
+        self.still.unresolved
+    }
+
+    /// All slopes as statistics: what water so far off has that its waves are not traced.
+    pub fn all_slopes(&self) -> Unresolved {
+        self.still.all_slopes
+    }
+
+    /// Mean square slopes that the tiles deliver in expectation (along the wind, across it).
+    pub fn resolved(&self) -> DVec2 {
+        self.still.resolved
     }
 
     /// Height of the resolved water, metres.
@@ -173,7 +211,8 @@ impl Waves {
         let plane_t = |z: f64| (z - origin.z) / direction.z;
         if self.tiles.is_empty() {
             let t = plane_t(0.0);
-            return (direction.z < 0.0 && t > from && origin.z > 0.0).then(|| self.flat(origin, direction, t));
+            return (direction.z < 0.0 && t > from && origin.z > 0.0)
+                .then(|| self.flat(origin, direction, t));
         }
         let (mut t, end) = if direction.z < 0.0 {
             (from.max(plane_t(self.highest_m)), plane_t(-self.highest_m))
@@ -185,7 +224,7 @@ impl Waves {
             (from, self.far_m)
         };
         let run = direction.truncate().length();
-        let least = self.cell_m / self.step_refine / run.max(1e-3);
+        let least = self.still.cell_m / self.still.step_refine / run.max(1e-3);
         let mut before = None;
         while t <= end {
             if t > self.far_m {
@@ -200,7 +239,7 @@ impl Waves {
             } else {
                 before = Some((t, gap));
             }
-            t += (step / self.step_refine).max(least * (1.0 + t / 400.0));
+            t += (step / self.still.step_refine).max(least * (1.0 + t / 400.0));
         }
         None
     }
@@ -217,7 +256,7 @@ impl Waves {
             let clear = gap - rest;
             let closing = (tile.steepest * run - dz).max(1e-3);
             let step = clear / closing;
-            if i == last || step > 2.0 * self.cell_m + 0.25 * rest / closing {
+            if i == last || step > 2.0 * self.still.cell_m + 0.25 * rest / closing {
                 return (if i == last { gap } else { clear }, step);
             }
         }
@@ -242,11 +281,11 @@ impl Waves {
         }
         let t = if g0 < -g1 { t0 } else { t1 };
         let point = origin + direction * t;
-        Hit { t, point, slope: self.slope(point.truncate()), unresolved: self.unresolved }
+        Hit { t, point, slope: self.slope(point.truncate()), unresolved: self.still.unresolved }
     }
 
     fn flat(&self, origin: DVec3, direction: DVec3, t: f64) -> Hit {
-        Hit { t, point: origin + direction * t, slope: DVec2::ZERO, unresolved: self.all_slopes }
+        Hit { t, point: origin + direction * t, slope: DVec2::ZERO, unresolved: self.still.all_slopes }
     }
 }
 
@@ -292,6 +331,53 @@ impl Tile {
     }
 }
 
+/// One wave of a tile and the one that runs against it.
+struct Mode {
+    cell: (u32, u32),
+    k: DVec2,
+    omega: f64,
+    with: Complex64,
+    against: Complex64,
+}
+
+/// The waves of one tile.
+struct TileModes {
+    cells: usize,
+    size_m: f64,
+    turn: DVec2,
+    modes: Vec<Mode>,
+    /// Mean square slopes that survive interpolation (along, across the wind).
+    delivered: DVec2,
+}
+
+impl TileModes {
+    fn at(&self, time_s: f64) -> Tile {
+        let n = self.cells;
+        let mut height = vec![Complex64::ZERO; n * n];
+        let mut slope = vec![Complex64::ZERO; n * n];
+        for m in &self.modes {
+            let phase = Complex64::from_polar(1.0, -m.omega * time_s);
+            let h = m.with * phase + (m.against * phase).conj();
+            let i = m.cell.1 as usize * n + m.cell.0 as usize;
+            height[i] = h;
+            // Two real transforms in one: east in the real part, north in the imaginary one.
+            slope[i] = Complex64::i() * m.k.x * h - m.k.y * h;
+        }
+        let (heights, slopes) = (transform(height, n), transform(slope, n));
+        let heights: Vec<f32> = heights.iter().map(|c| c.re as f32).collect();
+        Tile {
+            cells: n,
+            cells_per_m: n as f64 / self.size_m,
+            turn: self.turn,
+            rest_m: heights.iter().fold(0f32, |m, h| m.max(h.abs())).into(),
+            heights,
+            slopes: slopes.iter().map(|c| [c.re as f32, c.im as f32]).collect(),
+            // One standard deviation for now; summed by finish_bounds.
+            steepest: self.delivered.max_element().sqrt(),
+        }
+    }
+}
+
 struct Maker<'a> {
     spectrum: &'a Spectrum,
     size_m: f64,
@@ -299,72 +385,50 @@ struct Maker<'a> {
     index: usize,
     band: (f64, f64),
     seed: u64,
-    time_s: f64,
 }
 
 impl Maker<'_> {
-    /// The tile, and the mean square slopes that survive interpolation (along, across the wind).
-    fn make(&self) -> (Tile, DVec2) {
-        let n = self.cells;
-        let angle = TURN * self.index as f64;
-        let turn = DVec2::from_angle(angle);
-        let along = self.spectrum.downwind();
+    fn make(&self) -> TileModes {
+        let turn = DVec2::from_angle(TURN * self.index as f64);
         let unit = TAU / self.size_m;
-        let signed = |i: usize| if i <= n / 2 { i as f64 } else { i as f64 - n as f64 };
-        let reach = (self.band.1 / unit).ceil() as usize + 1;
-        let used = |i: usize| i.min(n - i) <= reach;
-        let amplitude = |ix: usize, iy: usize| -> (Complex64, DVec2) {
-            let k = turn.conjugate_rotate(DVec2::new(signed(ix), signed(iy)) * unit);
-            let length = k.length();
-            if length < self.band.0 || length >= self.band.1 {
-                return (Complex64::ZERO, k);
-            }
-            let off = k.angle_to(along);
-            let power = self.spectrum.directional(length, off) * unit * unit / 2.0;
-            let mode = [signed(ix) as i64, signed(iy) as i64];
-            let gauss = rng::gauss_pair(self.seed, &[self.index as i64, mode[0], mode[1]]);
-            (Complex64::new(gauss[0], gauss[1]) * (power / 2.0).sqrt(), k)
-        };
-        let mut height = vec![Complex64::ZERO; n * n];
-        let mut slope = vec![Complex64::ZERO; n * n];
-        height.par_chunks_mut(n).zip(slope.par_chunks_mut(n)).enumerate().for_each(|(iy, (hs, ss))| {
-            if !used(iy) {
-                return;
-            }
-            for ix in (0..n).filter(|&ix| used(ix)) {
-                let (a, k) = amplitude(ix, iy);
-                let (b, _) = amplitude((n - ix) % n, (n - iy) % n);
-                if a == Complex64::ZERO && b == Complex64::ZERO {
-                    continue;
-                }
-                let phase = Complex64::from_polar(1.0, -frequency(k.length()) * self.time_s);
-                let h = a * phase + (b * phase).conj();
-                hs[ix] = h;
-                // Two real transforms in one: east in the real part, north in the imaginary one.
-                ss[ix] = Complex64::i() * k.x * h - k.y * h;
-            }
+        // Wave numbers that a tile of half as many cells would fold are left out by the band already.
+        let reach = ((self.band.1 / unit).ceil() as i64 + 1).min(self.cells as i64 / 2 - 1);
+        let modes =
+            (-reach..=reach).into_par_iter().flat_map_iter(|iy| (-reach..=reach).map(move |ix| (ix, iy)));
+        let modes = modes.filter_map(|(ix, iy)| {
+            let k = turn.conjugate_rotate(DVec2::new(ix as f64, iy as f64) * unit);
+            let (with, against) = (self.amplitude(ix, iy, k), self.amplitude(-ix, -iy, -k));
+            let wrap = |i: i64| i.rem_euclid(self.cells as i64) as u32;
+            let cell = (wrap(ix), wrap(iy));
+            (with != Complex64::ZERO || against != Complex64::ZERO).then(|| Mode {
+                cell,
+                k,
+                omega: frequency(k.length()),
+                with,
+                against,
+            })
         });
-        let delivered = self.delivered(&along);
-        let (heights, slopes) = (transform(height, n), transform(slope, n));
-        let heights: Vec<f32> = heights.iter().map(|c| c.re as f32).collect();
-        let slopes: Vec<[f32; 2]> = slopes.iter().map(|c| [c.re as f32, c.im as f32]).collect();
-        let highest = heights.iter().fold(0f32, |m, h| m.max(h.abs()));
-        let tile = Tile {
-            cells: n,
-            cells_per_m: n as f64 / self.size_m,
-            turn,
-            heights,
-            slopes,
-            rest_m: f64::from(highest),
-            // One standard deviation for now; summed by finish_bounds.
-            steepest: (delivered.x.max(delivered.y)).sqrt(),
-        };
-        (tile, delivered)
+        let modes = modes.collect();
+        TileModes { cells: self.cells, size_m: self.size_m, turn, modes, delivered: self.delivered() }
+    }
+
+    /// Amplitude of the wave that runs along `k`: both sine and cosine part normally distributed.
+    fn amplitude(&self, ix: i64, iy: i64, k: DVec2) -> Complex64 {
+        let length = k.length();
+        if length < self.band.0 || length >= self.band.1 || length == 0.0 {
+            return Complex64::ZERO;
+        }
+        let unit = TAU / self.size_m;
+        let power =
+            self.spectrum.directional(length, k.angle_to(self.spectrum.downwind())) * unit * unit / 2.0;
+        let gauss = rng::gauss_pair(self.seed, &[self.index as i64, ix, iy]);
+        Complex64::new(gauss[0], gauss[1]) * (power / 2.0).sqrt()
     }
 
     /// Expected mean square slopes along and across the wind, less what linear interpolation takes: a wave that advances by `a`
     /// radians a cell keeps (2 + cos a) / 3 of its power on average.
-    fn delivered(&self, along: &DVec2) -> DVec2 {
+    fn delivered(&self) -> DVec2 {
+        let along = self.spectrum.downwind();
         let (from, to) = (self.band.0.max(self.spectrum.peak() / 30.0), self.band.1);
         let (steps, angles) = (200, 90);
         let d_log = (to / from).ln() / f64::from(steps);
@@ -376,7 +440,7 @@ impl Maker<'_> {
             for j in 0..angles {
                 let angle = PI * ((f64::from(j) + 0.5) / f64::from(angles) - 0.5);
                 let power = self.spectrum.directional(k, angle) * k * k * d_log * PI / f64::from(angles);
-                let phase = turn.rotate(DVec2::from_angle(angle).rotate(*along) * k) * cell;
+                let phase = turn.rotate(DVec2::from_angle(angle).rotate(along) * k) * cell;
                 let kept = (2.0 + phase.x.cos()) * (2.0 + phase.y.cos()) / 9.0;
                 let slope = DVec2::new(angle.cos(), angle.sin()) * k;
                 sum += slope * slope * power * kept;

@@ -110,7 +110,11 @@ fn write(setup: &Setup, pictures: &Pictures, render_s: f64, folder: &Path) -> Re
     raw(&folder.join("with.f32"), &pictures.with)?;
     let hull = pictures.hull.iter().map(|&h| (h * 255.0).round() as u8).collect();
     grey(&folder.join("hull.png"), pictures.size, hull)?;
-    grey(&folder.join("region.png"), pictures.size, region.iter().map(|&r| if r { 255 } else { 0 }).collect())?;
+    grey(
+        &folder.join("region.png"),
+        pictures.size,
+        region.iter().map(|&r| if r { 255 } else { 0 }).collect(),
+    )?;
     let overview = setup.overview(OVERVIEW, OVERVIEW_SAMPLES);
     rgb(&folder.join("overview.png"), overview.size, coded(&overview.without))?;
     put(&folder.join("sky.csv"), sky_table(setup)?.as_bytes())?;
@@ -122,14 +126,15 @@ fn write(setup: &Setup, pictures: &Pictures, render_s: f64, folder: &Path) -> Re
 fn describe<'a>(setup: &'a Setup, pictures: &Pictures, region: &[bool], render_s: f64) -> Written<'a> {
     let (lens, light, spec) = (&setup.lens, setup.exposed_light(), &setup.spec);
     let waves = &setup.scene.waves;
-    let all = waves.all_slopes.sigma * waves.all_slopes.sigma;
+    let all = waves.all_slopes().sigma * waves.all_slopes().sigma;
     let body = DVec3::from_array(spec.body.reflectance) / std::f64::consts::PI
         * (setup.scene.sky.sky_irradiance + setup.scene.sky.sun_horizontal())
         * setup.gain;
     let count = region.iter().filter(|&&r| r).count();
     let mut change = DVec3::ZERO;
     for i in (0..region.len()).filter(|&i| region[i]) {
-        change += DVec3::from_array([0, 1, 2].map(|c| f64::from(pictures.with[i][c] - pictures.without[i][c])));
+        change +=
+            DVec3::from_array([0, 1, 2].map(|c| f64::from(pictures.with[i][c] - pictures.without[i][c])));
     }
     Written {
         spec,
@@ -157,8 +162,8 @@ fn describe<'a>(setup: &'a Setup, pictures: &Pictures, region: &[bool], render_s
             peak_wavelength_m: std::f64::consts::TAU / setup.spectrum.peak(),
             slope_variance_along: all.x,
             slope_variance_across: all.y,
-            resolved_along: waves.resolved.0,
-            resolved_across: waves.resolved.1,
+            resolved_along: waves.resolved().x,
+            resolved_across: waves.resolved().y,
         },
         light: Light {
             sun_direction: setup.scene.sky.sun_direction.to_array(),
@@ -181,7 +186,9 @@ fn describe<'a>(setup: &'a Setup, pictures: &Pictures, region: &[bool], render_s
 fn sky_table(setup: &Setup) -> Result<String> {
     let mut text = String::from("azimuth_deg,elevation_deg,r,g,b\n");
     for azimuth in (0..360).step_by(30) {
-        for elevation in [0.25, 0.5, 1.0, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0f64] {
+        for elevation in
+            [0.25, 0.5, 1.0, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0f64]
+        {
             let (a, e) = (f64::from(azimuth).to_radians(), elevation.to_radians());
             let direction = (DVec2::new(a.sin(), a.cos()) * e.cos()).extend(e.sin());
             let c = setup.scene.sky.radiance(direction) * setup.gain;
@@ -213,11 +220,13 @@ fn raw(path: &Path, pixels: &[[f32; 3]]) -> Result<()> {
 
 /// Writes an sRGB PNG.
 pub fn rgb(path: &Path, size: (u32, u32), bytes: Vec<u8>) -> Result<()> {
-    let picture = RgbImage::from_raw(size.0, size.1, bytes).context("a picture has the wrong number of bytes")?;
+    let picture =
+        RgbImage::from_raw(size.0, size.1, bytes).context("a picture has the wrong number of bytes")?;
     picture.save(path).with_context(|| format!("cannot write {}", path.display()))
 }
 
 fn grey(path: &Path, size: (u32, u32), bytes: Vec<u8>) -> Result<()> {
-    let picture = GrayImage::from_raw(size.0, size.1, bytes).context("a mask has the wrong number of bytes")?;
+    let picture =
+        GrayImage::from_raw(size.0, size.1, bytes).context("a mask has the wrong number of bytes")?;
     picture.save(path).with_context(|| format!("cannot write {}", path.display()))
 }

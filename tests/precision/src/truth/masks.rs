@@ -42,7 +42,8 @@ pub fn reflection(setup: &Setup, pictures: &Pictures) -> Vec<bool> {
                     count += 1.0;
                 }
             }
-            seed[y * w + x] = mirrored[y * w + x] || count > 0.0 && sum.abs().max_element() / count > CHANGE_CODES;
+            seed[y * w + x] =
+                mirrored[y * w + x] || count > 0.0 && sum.abs().max_element() / count > CHANGE_CODES;
         }
     }
     (0..w * h)

@@ -34,9 +34,15 @@ impl Bounds {
 }
 
 enum Node {
-    Leaf { bounds: Bounds, range: std::ops::Range<usize> },
+    Leaf {
+        bounds: Bounds,
+        range: std::ops::Range<usize>,
+    },
     /// Children are the next node and `right`.
-    Inner { bounds: Bounds, right: usize },
+    Inner {
+        bounds: Bounds,
+        right: usize,
+    },
 }
 
 /// Where a ray meets the boat.

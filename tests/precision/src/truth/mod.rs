@@ -11,4 +11,6 @@ pub mod micro;
 pub mod rng;
 pub mod sky;
 pub mod spectrum;
+pub mod study;
 pub mod trace;
+pub mod video;

@@ -82,7 +82,12 @@ impl Sky {
 
     /// The same radiance from everywhere, and no sun: for tests of energy.
     pub fn uniform(radiance: DVec3) -> Self {
-        let sky = Self { dome: Dome::Uniform(radiance), sun_direction: DVec3::Z, sun: DVec3::ZERO, sky_irradiance: DVec3::ZERO };
+        let sky = Self {
+            dome: Dome::Uniform(radiance),
+            sun_direction: DVec3::Z,
+            sun: DVec3::ZERO,
+            sky_irradiance: DVec3::ZERO,
+        };
         Self::finish(sky)
     }
 
@@ -110,7 +115,11 @@ impl Sky {
             Dome::Overcast { zenith } => *zenith * (1.0 + 2.0 * sin) / 3.0,
             Dome::Clear(state) => {
                 let theta = (FRAC_PI_2 - sin.asin()) as f32;
-                let level = if direction.z < 0.0 { direction.truncate().normalize_or_zero().extend(0.0) } else { direction };
+                let level = if direction.z < 0.0 {
+                    direction.truncate().normalize_or_zero().extend(0.0)
+                } else {
+                    direction
+                };
                 let gamma = level.dot(self.sun_direction).clamp(-1.0, 1.0).acos() as f32;
                 let value = |c: Channel| f64::from(state.radiance(theta, gamma, c)).max(0.0);
                 DVec3::new(value(Channel::R), value(Channel::G), value(Channel::B))

@@ -168,9 +168,8 @@ impl Spectrum {
         let friction = friction_velocity(self.wind_m_s) / C_SLOWEST;
         let rate = if friction < 1.0 { 1.0 } else { 3.0 };
         let alpha = 1e-2 * (1.0 + rate * friction.max(1e-9).ln()).max(0.0);
-        let short = 0.5 * alpha * C_SLOWEST / phase_speed(k)
-            * (-0.25 * (k / K_SLOWEST - 1.0).powi(2)).exp()
-            * shape;
+        let short =
+            0.5 * alpha * C_SLOWEST / phase_speed(k) * (-0.25 * (k / K_SLOWEST - 1.0).powi(2)).exp() * shape;
         (long + short) * (-k / self.damped_above).exp()
     }
 
