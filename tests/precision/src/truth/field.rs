@@ -4,7 +4,7 @@
 //! lengths of no less than [`CELLS_A_WAVE`] cells; interpolation between cells loses a known share of the slopes, which is added
 //! to the unresolved ones.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_8, PI, TAU};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -19,8 +19,9 @@ use super::{
 const CELLS_A_WAVE: f64 = 4.0;
 /// Longest waves of a tile fit into it this many times.
 const WAVES_A_TILE: f64 = 8.0;
-/// Turn between the axes of one tile and the next, radians (the golden angle).
-const TURN: f64 = 2.399_963_229_728_653;
+/// Directions of the tiles' axes, radians from east: their tangents (golden ratio, 1 + root 2 and so on) are far from simple fractions, so
+/// that a view along the axes of the world meets no row of repeats.
+const TURNS: [f64; 6] = [0.5536, 3.0 * FRAC_PI_8, FRAC_PI_8, 1.0172, 0.6319, 0.9389];
 /// Beyond this distance along a ray waves are not traced, metres.
 const FAR_M: f64 = 2500.0;
 /// Slopes beyond this many standard deviations are not reckoned with when a ray steps through clear air.
@@ -114,10 +115,10 @@ impl Sea {
         let mut finest = f64::INFINITY;
         if kp.is_finite() {
             let mut longest = f64::INFINITY;
-            let mut size_m = (WAVES_A_TILE * TAU / kp).max(32.0);
+            let mut size_m = (WAVES_A_TILE * TAU / kp).max(64.0);
             let mut most = resolution.cells;
             // A rest of less than a third of an octave is not worth a tile.
-            while longest > 1.25 * resolution.shortest_m && tiles.len() < 6 {
+            while longest > 1.25 * resolution.shortest_m && tiles.len() < TURNS.len() {
                 let needed = size_m / resolution.shortest_m * CELLS_A_WAVE;
                 let cells = (needed.ceil() as usize).next_power_of_two().clamp(16, most);
                 let shortest = (size_m / cells as f64 * CELLS_A_WAVE).max(resolution.shortest_m);
@@ -389,7 +390,7 @@ struct Maker<'a> {
 
 impl Maker<'_> {
     fn make(&self) -> TileModes {
-        let turn = DVec2::from_angle(TURN * self.index as f64);
+        let turn = DVec2::from_angle(TURNS[self.index]);
         let unit = TAU / self.size_m;
         // Wave numbers that a tile of half as many cells would fold are left out by the band already.
         let reach = ((self.band.1 / unit).ceil() as i64 + 1).min(self.cells as i64 / 2 - 1);
@@ -433,7 +434,7 @@ impl Maker<'_> {
         let (steps, angles) = (200, 90);
         let d_log = (to / from).ln() / f64::from(steps);
         let cell = self.size_m / self.cells as f64;
-        let turn = DVec2::from_angle(TURN * self.index as f64);
+        let turn = DVec2::from_angle(TURNS[self.index]);
         let mut sum = DVec2::ZERO;
         for i in 0..steps {
             let k = from * ((f64::from(i) + 0.5) * d_log).exp();

@@ -98,16 +98,25 @@ pub fn cells(quick: bool) -> Vec<CellSpec> {
     all
 }
 
-/// Renders the cells that `out` does not yet hold with the same specification.
-pub fn make(cells: &[CellSpec], out: &Path) -> Result<()> {
+/// Renders the cells that `out` does not yet hold with the same specification and at least as many paths. The number of paths is that of
+/// the cells times `paths`.
+pub fn make(cells: &[CellSpec], paths: f64, out: &Path) -> Result<()> {
     for (i, spec) in cells.iter().enumerate() {
-        let folder = out.join(name(spec));
-        if files::read_spec(&folder.join("cell.toml")).is_ok_and(|old| old == *spec) {
+        let mut spec = spec.clone();
+        spec.samples = (f64::from(spec.samples) * paths).round().clamp(1.0, 1e6) as u32;
+        let folder = out.join(name(&spec));
+        if files::read_spec(&folder.join("cell.toml")).is_ok_and(|old| is_as_good(&old, &spec)) {
             continue;
         }
         let start = std::time::Instant::now();
-        files::make(spec, &folder)?;
-        println!("{}/{} {} {:.1} s", i + 1, cells.len(), name(spec), start.elapsed().as_secs_f64());
+        files::make(&spec, &folder)?;
+        println!("{}/{} {} {:.1} s", i + 1, cells.len(), name(&spec), start.elapsed().as_secs_f64());
     }
     Ok(())
+}
+
+fn is_as_good(old: &CellSpec, wanted: &CellSpec) -> bool {
+    let mut same = old.clone();
+    same.samples = wanted.samples;
+    same == *wanted && old.samples >= wanted.samples
 }

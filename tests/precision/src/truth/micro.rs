@@ -130,10 +130,8 @@ impl Micro {
             return (seen.up < 0.0).then_some(1.0);
         }
         let hidden = seen.hidden();
-        if seen.up >= 0.0 {
-            if hidden <= 0.0 || u > 1.0 - from.powf(hidden) {
-                return None;
-            }
+        if seen.up >= 0.0 && (hidden <= 0.0 || u > 1.0 - from.powf(hidden)) {
+            return None;
         }
         Some((from / (1.0 - u).powf(1.0 / hidden)).clamp(1e-9, 1.0))
     }

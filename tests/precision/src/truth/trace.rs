@@ -182,7 +182,7 @@ impl Scene {
             let mirrored = fresnel(cos, WATER);
             self.add_body(state, hit, to_eye, normal, 1.0 - mirrored, path);
             state.through *= mirrored;
-            to_eye = to_eye - 2.0 * cos * normal;
+            to_eye -= 2.0 * cos * normal;
         }
         None
     }
