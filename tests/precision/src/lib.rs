@@ -10,6 +10,7 @@ pub mod page;
 pub mod parts;
 pub mod plot;
 pub mod row;
+pub mod sea_video;
 pub mod truth;
 
 /// Counts the heap, so that what a way takes of it can be told.

@@ -1,5 +1,6 @@
 //! The sea: scales of its state (two different ones), spectrum and waves.
 
+pub mod estimate;
 mod optics;
 mod spectrum;
 mod waves;
