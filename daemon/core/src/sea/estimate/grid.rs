@@ -35,8 +35,10 @@ pub(super) struct Cell {
 #[derive(Clone, Debug)]
 pub(super) struct Grid {
     pub cells: Vec<Cell>,
+    /// Azimuth of its middle, radians clockwise from north.
     pub azimuth: f64,
-    pub foot: DVec3,
+    /// Height of the eye, metres.
+    pub eye_m: f64,
 }
 
 /// Azimuth of the view, radians clockwise from north; `None` straight up or down.
@@ -58,7 +60,7 @@ impl Grid {
                 step *= 0.8;
             } else {
                 let enough = cells.len() >= CELLS.0 / 4;
-                return if enough { Ok(Self { cells, azimuth, foot: camera.position }) } else { Err(Unknown::NoWater) };
+                return if enough { Ok(Self { cells, azimuth, eye_m: camera.position.z }) } else { Err(Unknown::NoWater) };
             }
         }
         Err(Unknown::NoWater)

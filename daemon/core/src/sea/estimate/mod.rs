@@ -1,30 +1,40 @@
-//! The sea's state from the live picture.
+//! The sea's state and the sky's light from the live picture.
 //!
 //! Patches of water are followed on the plane z = 0 for a minute or two, Fourier transformed in time, and searched in space for
-//! waves that keep the dispersion relation. The picture's own fall of brightness towards the eye calibrates brightness to slope
-//! ([`profile`]), slope and wavelength give height, and the eye's height fixes all lengths.
+//! waves that keep the dispersion relation (`shell`). Sky, roughness and Fresnel's law, fitted to the mean picture, turn brightness
+//! into slope (`radiance`); slope and wavelength give height, and the eye's height fixes all lengths.
+//!
+//! Limits: deep water; an eye that stands still over the ground; no current; waves lower than about half of the eye's height; no
+//! sun glitter in view (refused); vignetting and tone mapping that differs from sRGB enter the height by as much as they change
+//! the fall of brightness from the horizon to the picture's lower edge.
 
 mod analysis;
+mod follow;
 mod grid;
+mod meter;
 mod profile;
+mod radiance;
 mod record;
 mod shell;
 mod sky;
+mod summary;
+
+pub use self::{
+    follow::{SeaConditions, SeaFollower, SeaInUse, SeaOrder, SeaSource},
+    meter::SeaMeter,
+    sky::{SkyEstimate, SkyFrame, SkyMeter},
+};
 
 use glam::DVec2;
 
-use self::{
-    analysis::{Analysis, Found},
-    grid::Grid,
-    record::{Record, SLOT_NS, WINDOW},
-};
 use crate::{
     geometry::{CameraPose, Lens},
+    sea::{BeaufortForce, WmoSeaState},
     time::Time,
 };
 
 /// Seconds of picture before the first estimate.
-const LEAST_S: f64 = 40.0;
+pub const LEAST_S: f64 = 40.0;
 
 /// One picture as the estimator sees it.
 pub struct Frame<'a> {
@@ -34,121 +44,130 @@ pub struct Frame<'a> {
     pub camera: CameraPose,
     /// The picture's lens.
     pub lens: &'a Lens,
-    /// Linear luminance at a pixel in any unit; `None` where something else than real water or sky covers it.
+    /// Linear luminance at a pixel, 1 where the camera is white; `None` where something else than real water or sky covers it
+    /// (boats, the barrel, marks on the screen) and outside of the picture.
     pub luminance: &'a dyn Fn(DVec2) -> Option<f32>,
+}
+
+/// A value and its standard deviation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    /// The value.
+    pub value: f64,
+    /// One standard deviation.
+    pub sigma: f64,
+}
+
+/// The sea as the picture shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeaEstimate {
+    /// Time of the newest picture used.
+    pub time: Time,
+    /// Length of the record used, seconds.
+    pub seconds: f64,
+    /// Four standard deviations of the water's height, metres.
+    pub significant_height_m: Measured,
+    /// Period at the peak of the spectrum of height, seconds; of a flat sea: the longest that was looked for.
+    pub peak_period_s: Measured,
+    /// Mean direction from which the waves about the peak come, radians clockwise from north; sigma pi where unknown.
+    pub direction_from_rad: Measured,
+    /// The state that holds that height.
+    pub state: WmoSeaState,
+    /// Probability that the true height lies in that state, taking its error for normal.
+    pub state_probability: f64,
+    /// Wind that would raise such waves (Toba 1972, J. Oceanogr. Soc. Japan 28, eq. 3.7), m/s 10 m above the sea. Of swell it is
+    /// not the local wind.
+    pub wind_m_s: Measured,
+    /// That wind's force.
+    pub force: BeaufortForce,
+    /// Root mean square slope per axis of all that roughens the water, from its mean brightness.
+    pub rough_slope: f64,
+    /// Share of the patches' power at the frequencies used that keeps the dispersion relation, 0 to 1.
+    pub wave_share: f64,
 }
 
 /// Why there is no estimate.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Unknown {
     /// Not long enough yet.
-    #[error("the sea has been watched for {seconds:.0} s; an estimate needs {LEAST_S:.0} s")]
+    #[error("the sea has been watched for {seconds:.0} s{}; an estimate needs {LEAST_S:.0} s", .after.map_or(String::new(), |a| format!(" since {a}")))]
     TooShort {
         /// Seconds watched.
         seconds: f64,
+        /// What ended the watch before.
+        after: Option<Restart>,
     },
     /// The camera does not see enough water.
-    #[error("the camera does not see enough water under the horizon")]
+    #[error("the camera sees too little water below the horizon: point it at the sea")]
     NoWater,
+    /// Pose, height of the eye or lens are no usable numbers.
+    #[error("pose, eye height ({eye_m} m; 0.5 to 200 is possible) or lens are no usable numbers: check unit and calibration")]
+    BadPose {
+        /// The camera's height above the sea as told, metres.
+        eye_m: f64,
+    },
+    /// The picture stands still.
+    #[error("the picture has not changed for {seconds:.0} s")]
+    Frozen {
+        /// For how long, seconds.
+        seconds: f64,
+    },
+    /// Too dark to see waves.
+    #[error("the water is too dark to see waves: luminance {luminance:.5} of white")]
+    Dark {
+        /// Mean luminance of the water.
+        luminance: f64,
+    },
+    /// Brightness of the water does not fall evenly towards the eye: the sun's glitter, a shore, shallows.
+    #[error(
+        "the water's brightness is uneven by {:.0} % (glitter or something on the water): turn away from the sun", misfit * 100.0
+    )]
+    Uneven {
+        /// Root mean square of the relative misfit to an even fall.
+        misfit: f64,
+    },
+    /// Brightness tells too little of slope: fog, a lens too long to see the water's brightness fall, a flat grey picture.
+    #[error("how the water's brightness goes with its slope is only known to {:.0} %: fog, or too narrow a view", sigma * 100.0)]
+    Unsure {
+        /// Relative standard deviation over the calibrations that explain the picture; no number where none does.
+        sigma: f64,
+    },
+    /// Nothing moves as waves do, and the view is not clear enough to say that there are none.
+    #[error("nothing on the water moves as waves do; waves of up to {limit_m:.1} m could be hidden")]
+    NoPattern {
+        /// Significant height that would not have been noticed, metres.
+        limit_m: f64,
+    },
+    /// The waves are too high for the height of the eye.
+    #[error("waves of about {height_m:.1} m are too high to be measured from {eye_m:.1} m above the sea")]
+    TooLow {
+        /// Significant height, metres, as a rough value.
+        height_m: f64,
+        /// Height of the eye, metres.
+        eye_m: f64,
+    },
 }
 
-/// Watches the sea.
-pub struct SeaMeter {
-    grid: Option<Grid>,
-    record: Record,
-    row: Vec<f32>,
-    start: Option<Time>,
-    analysis: Option<Analysis>,
-    analysed_at: usize,
-    found: Option<Found>,
-    sky: sky::SkyRows,
-    /// Sky gradient per radian.
-    pub sky_share: f64,
+/// What ended a watch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Restart {
+    /// The camera was turned away.
+    #[error("the camera turned")]
+    Turned,
+    /// The eye's height changed.
+    #[error("the eye's height changed")]
+    Height,
+    /// Pictures were missing or their time jumped.
+    #[error("pictures were missing")]
+    Gap,
+    /// The picture stood still.
+    #[error("the picture stood still")]
+    Frozen,
+    /// Pose or lens were no numbers.
+    #[error("there was no pose")]
+    Pose,
 }
 
-impl Default for SeaMeter {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl SeaMeter {
-    /// A meter that has seen nothing.
-    pub fn new() -> Self {
-        Self {
-            grid: None,
-            record: Record::new(0),
-            row: Vec::new(),
-            start: None,
-            analysis: None,
-            analysed_at: 0,
-            found: None,
-            sky: sky::SkyRows::default(),
-            sky_share: 0.0,
-        }
-    }
-
-    fn slot(&self, time: Time) -> i64 {
-        self.start.map_or(0, |s| time.ns_since(s) / SLOT_NS)
-    }
-
-    /// Whether the picture of that time will be looked at; others need not be prepared.
-    pub fn wants(&self, time: Time) -> bool {
-        self.slot(time) >= self.record.written as i64
-    }
-
-    /// Takes a picture in, and does a small piece of the analysis.
-    pub fn observe(&mut self, frame: &Frame<'_>) {
-        if self.grid.is_none() {
-            let Ok(grid) = Grid::lay(&frame.camera, frame.lens) else { return };
-            self.record = Record::new(grid.cells.len());
-            self.row = vec![f32::NAN; grid.cells.len()];
-            self.grid = Some(grid);
-            self.start = Some(frame.time);
-        }
-        if self.wants(frame.time) {
-            let slot = self.slot(frame.time);
-            while (self.record.written as i64) < slot {
-                self.record.push_missing();
-            }
-            if let Some(grid) = &self.grid {
-                if slot % 10 == 0 {
-                    self.sky.observe(frame, grid.azimuth);
-                }
-                grid.sample(frame, &mut self.row);
-                self.record.push(&self.row);
-            }
-        }
-        self.step();
-    }
-
-    fn step(&mut self) {
-        let Some(grid) = &self.grid else { return };
-        if let Some(analysis) = &mut self.analysis {
-            if let Some(found) = analysis.step(grid, &self.record, self.sky_share * self.sky.gradient().unwrap_or(0.0)) {
-                self.found = Some(found);
-                self.analysis = None;
-            }
-        } else if self.record.written >= (LEAST_S * 5.0) as usize && self.record.written >= self.analysed_at + 50 {
-            self.analysed_at = self.record.written;
-            self.analysis = Some(Analysis::new(grid, &self.record, self.record.written.min(WINDOW)));
-        }
-    }
-
-    /// Research.
-    pub fn lines(&self) -> Vec<[f64; 7]> {
-        self.found.iter().flat_map(|f| f.lines.iter().map(|l| [l.hz, l.density, l.towards, l.spread, l.share, l.leverage, l.freedom])).collect()
-    }
-
-    /// Research.
-    pub fn debug(&self) -> String {
-        let mut out = String::new();
-        if let Some(f) = &self.found {
-            out += &format!("sky {:.2?} T {:.0} gain {:.2} misfit {:.3} contrast {:.3} cells {}\n", self.sky.gradient(), f.seconds, f.gain, f.misfit, f.contrast, self.row.len());
-            for l in &f.lines {
-                out += &format!("  {:.3} Hz  E {:.5}  dir-to {:4.0}  s {:3.0} share {:.2} lev {:.2}\n", l.hz, l.density, l.towards.to_degrees(), l.spread, l.share, l.leverage);
-            }
-        }
-        out
-    }
-}
+#[cfg(test)]
+#[path = "estimate_tests.rs"]
+mod tests;

@@ -1,69 +1,48 @@
-//! How brightness goes with slope, read off the picture itself.
+//! Whether the water's mean brightness falls evenly towards the eye.
 //!
-//! Stilwell 1969 (J. Geophys. Res. 74, 1974) took the slopes of waves from the brightness of photographs with a computed
-//! reflection of the sky. Here the water's own mean brightness calibrates: water tilted towards the eye by a small angle is
-//! met by the ray as level water is that lies by this angle deeper under the horizon, so the fall of mean brightness with
-//! depression is the greater part of the fall with slope. What remains is that a tilted facet mirrors the sky at twice the
-//! tilt: the sky's gradient once more, from the rows above the horizon.
+//! Open water under any sky does; the sun's glitter, a shore, shallows or a wake do not. A smooth surface in depression and azimuth is
+//! fitted; what differs from it is a measure of what does not belong.
 
 use super::grid::Cell;
 
 /// Terms of the fitted profile.
 const TERMS: usize = 6;
 
-/// Mean brightness of water by depression and azimuth.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Profile {
-    coefficients: [f64; TERMS],
-    /// Root mean square misfit of the logarithm.
-    pub misfit: f64,
-}
-
 fn basis(depression: f64, side: f64) -> [f64; TERMS] {
     let l = (depression / 0.2).ln();
     [1.0, l, l * l, l * l * l, side, side * side]
 }
 
-impl Profile {
-    /// Least squares fit to the logarithms of the patches' mean luminances; patches without one are NaN.
-    pub fn fit(cells: &[Cell], means: &[f64]) -> Option<Self> {
-        let mut normal = [[0.0; TERMS + 1]; TERMS];
-        let points = || {
-            cells.iter().zip(means).filter(|(_, m)| m.is_finite() && **m > 0.0).map(|(c, m)| (c, m.ln()))
-        };
-        for (cell, log) in points() {
-            let b = basis(cell.depression, cell.side);
-            for i in 0..TERMS {
-                for j in 0..TERMS {
-                    normal[i][j] += b[i] * b[j];
-                }
-                normal[i][TERMS] += b[i] * log;
+/// Root mean square misfit of the logarithms of the patches' mean luminances (NaN: not seen) to a smooth surface; `None` where
+/// too few are seen.
+pub(super) fn unevenness(cells: &[Cell], means: &[f64]) -> Option<f64> {
+    let points: Vec<([f64; TERMS], f64)> = cells
+        .iter()
+        .zip(means)
+        .filter(|(_, m)| m.is_finite() && **m > 0.0)
+        .map(|(c, m)| (basis(c.depression, c.side), m.ln()))
+        .collect();
+    if points.len() < 4 * TERMS {
+        return None;
+    }
+    let mut normal = [[0.0; TERMS + 1]; TERMS];
+    for (b, log) in &points {
+        for i in 0..TERMS {
+            for j in 0..TERMS {
+                normal[i][j] += b[i] * b[j];
             }
+            normal[i][TERMS] += b[i] * log;
         }
-        let count = points().count();
-        if count < 4 * TERMS {
-            return None;
-        }
-        for (i, row) in normal.iter_mut().enumerate() {
-            row[i] += 1e-6 * count as f64;
-        }
-        let coefficients = solve(normal)?;
-        let mut profile = Self { coefficients, misfit: 0.0 };
-        let square: f64 = points().map(|(c, log)| (log - profile.log_at(c)).powi(2)).sum();
-        profile.misfit = (square / count as f64).sqrt();
-        Some(profile)
     }
-
-    fn log_at(&self, cell: &Cell) -> f64 {
-        basis(cell.depression, cell.side).iter().zip(self.coefficients).map(|(b, c)| b * c).sum()
+    for (i, row) in normal.iter_mut().enumerate() {
+        // A long lens sees a narrow band: the higher powers are then held at nothing.
+        row[i] += 1e-6 * points.len() as f64;
     }
-
-    /// Derivative of the logarithm of brightness by the depression, per radian.
-    pub fn by_depression(&self, depression: f64) -> f64 {
-        let l = (depression / 0.2).ln();
-        let c = &self.coefficients;
-        (c[1] + 2.0 * c[2] * l + 3.0 * c[3] * l * l) / depression
-    }
+    let coefficients = solve(normal)?;
+    let misfit = |(b, log): &([f64; TERMS], f64)| {
+        log - b.iter().zip(coefficients).map(|(b, c)| b * c).sum::<f64>()
+    };
+    Some((points.iter().map(|p| misfit(p).powi(2)).sum::<f64>() / points.len() as f64).sqrt())
 }
 
 /// Gauss and Jordan with pivots.

@@ -7,6 +7,9 @@ pub(super) const WINDOW: usize = 640;
 /// Samples kept beyond the window, so that an analysis in progress is not overwritten.
 const SLACK: usize = 96;
 
+/// Contrasts beyond this many standard deviations are cut to it.
+const OUTLIER: f32 = 4.0;
+
 /// Samples by slot, in a ring.
 #[derive(Clone, Debug)]
 pub(super) struct Record {
@@ -75,10 +78,15 @@ impl Record {
             series.fill(0.0);
             return (f64::NAN, 0.0);
         }
+        let mut square = 0.0;
         for (i, out) in series.iter_mut().enumerate() {
             let level = mean + trend * (i as f64 - middle);
             *out = if out.is_finite() { ((f64::from(*out) - level) / mean) as f32 } else { 0.0 };
+            square += out.powi(2);
         }
+        // A bird, a splash or one false pose must not ring through the spectrum.
+        let bound = OUTLIER * (square / f32::max(count as f32, 1.0)).sqrt();
+        series.iter_mut().for_each(|v| *v = v.clamp(-bound, bound));
         (mean, seen)
     }
 }

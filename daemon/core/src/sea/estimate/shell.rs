@@ -5,6 +5,7 @@
 
 use std::f64::consts::TAU;
 
+use glam::DVec2;
 use rustfft::num_complex::Complex32;
 
 use super::grid::Cell;
@@ -18,6 +19,8 @@ const MEANS: usize = 48;
 const SPREADS: [f64; 5] = [1.0, 3.0, 8.0, 20.0, 50.0];
 /// A patch that averages a wave to less than this is not used for it.
 const LEAST_RESPONSE: f64 = 0.35;
+/// Patches that must resolve a wave.
+const LEAST_CELLS: usize = 24;
 /// Weight of the total power against one beam, where waves and noise are told apart.
 const TOTAL_WEIGHT: f64 = 6.0;
 
@@ -26,18 +29,16 @@ const TOTAL_WEIGHT: f64 = 6.0;
 pub(super) struct Line {
     /// Frequency, Hz.
     pub hz: f64,
-    /// One-sided spectral density of the height, m^2/Hz.
-    pub density: f64,
     /// Direction the waves run to, radians clockwise from north.
     pub towards: f64,
-    /// Exponent of the spread.
-    pub spread: f64,
-    /// Share of the power that waves explain, 0 to 1.
+    /// Share of the power of all patches that waves explain, 0 to 1.
     pub share: f64,
-    /// Independent samples the density rests on, roughly.
-    pub freedom: f64,
-    /// Mean response of the patches to such waves against their steepness (0 when they run across the view).
-    pub leverage: f64,
+    /// One-sided density of the slope towards the eye in the near patches, noise included, 1/Hz.
+    pub slope: f64,
+    /// The same that waves of a density of height of 1 m^2/Hz would cause.
+    pub unit: f64,
+    /// That of such waves if they ran along the view.
+    pub unit_best: f64,
 }
 
 /// Spectra of all patches at one frequency, in slope: `values[taper][cell]`.
@@ -46,71 +47,108 @@ pub(super) struct Observed<'a> {
     pub cells: &'a [Cell],
     /// Weight of each patch: 0 leaves it out.
     pub weights: &'a [f32],
+    /// Patches that are near enough to tell heights.
+    pub near: &'a [bool],
     /// Scaled so that the mean square is a one-sided density.
     pub values: &'a [Vec<Complex32>],
 }
 
-/// Fits waves and noise to one frequency.
+/// Mean power of the near patches.
+pub(super) fn noise(observed: &Observed<'_>) -> f64 {
+    let near: Vec<usize> = (0..observed.cells.len()).filter(|&i| observed.near[i]).collect();
+    power(observed, &near)
+}
+
+/// Mean power of some patches, weighted.
+fn power(observed: &Observed<'_>, some: &[usize]) -> f64 {
+    let square = |i: usize| observed.values.iter().map(|v| f64::from(v[i].norm_sqr())).sum::<f64>();
+    let weight = |i: usize| f64::from(observed.weights[i]).powi(2);
+    let sum: f64 = some.iter().map(|&i| square(i) * weight(i)).sum();
+    let weights: f64 = some.iter().map(|&i| weight(i)).sum();
+    sum / (weights * observed.values.len() as f64).max(1e-30)
+}
+
+/// Fits waves and noise to one frequency; `None` where too few patches resolve such waves.
 pub(super) fn fit(observed: &Observed<'_>) -> Option<Line> {
     let k = (TAU * observed.hz).powi(2) / GRAVITY_M_S2;
     let used: Vec<usize> = (0..observed.cells.len())
-        .filter(|&i| observed.weights[i] > 0.0 && response(&observed.cells[i], k) > LEAST_RESPONSE)
+        .filter(|&i| observed.weights[i] > 0.0 && sinc(k * observed.cells[i].size.x / 2.0) > LEAST_RESPONSE)
         .collect();
-    if used.len() < 24 {
+    let near: Vec<usize> = used.iter().copied().filter(|&i| observed.near[i]).collect();
+    if used.len() < LEAST_CELLS || near.len() < LEAST_CELLS / 2 {
         return None;
     }
     let steering: Vec<Vec<Complex32>> = (0..BEAMS).map(|j| steer(observed, &used, k, j)).collect();
     let norms: Vec<f64> = steering.iter().map(|v| v.iter().map(|z| f64::from(z.norm_sqr())).sum()).collect();
+    let powers = beam_powers(observed, &used, &steering, &norms);
+    // Rows: what a wave of direction j and density 1 gives in each beam, and in the mean power of a patch.
+    let mut table = vec![vec![0.0; BEAMS]; BEAMS + 1];
+    for j in 0..BEAMS {
+        for i in 0..=j {
+            let overlap = f64::from(dot(&steering[i], &steering[j]).norm_sqr());
+            table[i][j] = overlap / norms[i].max(1e-30);
+            table[j][i] = overlap / norms[j].max(1e-30);
+        }
+        table[BEAMS][j] = norms[j] / used.len() as f64;
+    }
+    let best = search(&table, &powers)?;
+    let shares = spread_shares(best.mean, best.spread);
+    let explained = table[BEAMS].iter().zip(&shares).map(|(t, s)| t * s).sum::<f64>() * best.density;
+    let units: Vec<f64> = (0..BEAMS).map(|j| unit(observed, &near, k, j)).collect();
+    let line = Line {
+        hz: observed.hz,
+        towards: best.mean,
+        share: explained / (explained + best.noise).max(1e-30),
+        slope: power(observed, &near),
+        unit: units.iter().zip(&shares).map(|(u, s)| u * s).sum(),
+        unit_best: units.iter().copied().fold(0.0, f64::max),
+    };
+    [line.share, line.slope, line.unit].iter().all(|v| v.is_finite()).then_some(line)
+}
+
+/// Mean power of every beam, and last that of a patch.
+fn beam_powers(observed: &Observed<'_>, used: &[usize], steering: &[Vec<Complex32>], norms: &[f64]) -> Vec<f64> {
     let tapers = observed.values.len() as f64;
     let mut powers = vec![0.0; BEAMS + 1];
     for values in observed.values {
         let y: Vec<Complex32> = used.iter().map(|&i| values[i] * observed.weights[i]).collect();
-        for (j, v) in steering.iter().enumerate() {
-            powers[j] += f64::from(dot(v, &y).norm_sqr()) / norms[j].max(1e-30) / tapers;
+        for (power, (v, norm)) in powers.iter_mut().zip(steering.iter().zip(norms)) {
+            *power += f64::from(dot(v, &y).norm_sqr()) / norm.max(1e-30) / tapers;
         }
         powers[BEAMS] += y.iter().map(|z| f64::from(z.norm_sqr())).sum::<f64>() / (used.len() as f64 * tapers);
     }
-    // Rows: what a wave of direction j and density 1 gives in each beam, and in the mean power of a patch.
-    let mut table = vec![vec![0.0; BEAMS]; BEAMS + 1];
-    for j in 0..BEAMS {
-        for i in 0..BEAMS {
-            table[i][j] = f64::from(dot(&steering[i], &steering[j]).norm_sqr()) / norms[i].max(1e-30);
-        }
-        table[BEAMS][j] = norms[j] / used.len() as f64;
-    }
-    let (score, mean, spread, density, noise) = search(&table, &powers)?;
-    if !score.is_finite() || !density.is_finite() {
-        return None;
-    }
-    let shares = spread_shares(mean, spread);
-    let explained: f64 = table[BEAMS].iter().zip(&shares).map(|(t, s)| t * s).sum::<f64>() * density;
-    let even: f64 = norms.iter().fold(0.0, |a: f64, b| a.max(*b)) / used.len() as f64;
-    Some(Line {
-        hz: observed.hz,
-        density,
-        towards: mean,
-        spread,
-        share: explained / (explained + noise).max(1e-30),
-        freedom: tapers,
-        leverage: explained / (density * even).max(1e-30),
-    })
+    powers
 }
 
-fn response(cell: &Cell, k: f64) -> f64 {
-    let sinc = |x: f64| if x.abs() < 1e-6 { 1.0 } else { x.sin() / x };
-    sinc((k * cell.size.x / 2.0).min(3.1))
+fn sinc(x: f64) -> f64 {
+    if x.abs() < 1e-6 { 1.0 } else { (x.sin() / x).max(if x > 3.1 { 0.0 } else { -1.0 }) }
 }
 
-/// What a wave of unit height running to beam `j` makes of the slope in each patch.
-fn steer(observed: &Observed<'_>, used: &[usize], k: f64, j: usize) -> Vec<Complex32> {
+/// Direction in which beam `j` runs, unit vector east and north.
+fn run_of(j: usize) -> DVec2 {
     let angle = TAU * j as f64 / BEAMS as f64;
-    let run = glam::DVec2::new(angle.sin(), angle.cos());
-    let sinc = |x: f64| if x.abs() < 1e-6 { 1.0 } else { x.sin() / x };
+    DVec2::new(angle.sin(), angle.cos())
+}
+
+/// Slope towards the eye, averaged over a patch, of waves of `k` radians a metre and unit height that run along `run`.
+fn slope_response(cell: &Cell, k: f64, run: DVec2) -> f64 {
+    let (along, across) = (k * run.dot(cell.view), k * run.dot(cell.view.perp()));
+    along * sinc((along * cell.size.x / 2.0).abs()) * sinc((across * cell.size.y / 2.0).abs())
+}
+
+/// Mean square of the response of some patches to beam `j`, weighted as [`power`].
+fn unit(observed: &Observed<'_>, some: &[usize], k: f64, j: usize) -> f64 {
+    let weight = |i: usize| f64::from(observed.weights[i]).powi(2);
+    let sum: f64 = some.iter().map(|&i| slope_response(&observed.cells[i], k, run_of(j)).powi(2) * weight(i)).sum();
+    sum / some.iter().map(|&i| weight(i)).sum::<f64>().max(1e-30)
+}
+
+/// What a wave of unit height running to beam `j` makes of the weighted slope in each patch.
+fn steer(observed: &Observed<'_>, used: &[usize], k: f64, j: usize) -> Vec<Complex32> {
+    let run = run_of(j);
     let one = |&i: &usize| {
         let cell = &observed.cells[i];
-        let (along, across) = (k * run.dot(cell.view), k * run.dot(cell.view.perp()));
-        let averaged = sinc(along * cell.size.x / 2.0) * sinc(across * cell.size.y / 2.0);
-        let size = along * averaged * f64::from(observed.weights[i]);
+        let size = slope_response(cell, k, run) * f64::from(observed.weights[i]);
         let phase = (k * run.dot(cell.at)) % TAU;
         Complex32::from_polar(size as f32, (phase + TAU / 4.0) as f32)
     };
@@ -132,9 +170,19 @@ fn spread_shares(mean: f64, s: f64) -> [f64; BEAMS] {
     shares
 }
 
-/// Most likely mean direction, spread, density and noise: (score, mean, spread, density, noise).
-fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<(f64, f64, f64, f64, f64)> {
-    let mut best: Option<(f64, f64, f64, f64, f64)> = None;
+/// Waves and noise of one frequency.
+#[derive(Clone, Copy, Debug)]
+struct Fit {
+    score: f64,
+    mean: f64,
+    spread: f64,
+    density: f64,
+    noise: f64,
+}
+
+/// Most likely mean direction, spread, density and noise.
+fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<Fit> {
+    let mut best: Option<Fit> = None;
     for m in 0..MEANS {
         let mean = TAU * m as f64 / MEANS as f64;
         for spread in SPREADS {
@@ -142,17 +190,13 @@ fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<(f64, f64, f64, f64, f64
             let waves: Vec<f64> =
                 table.iter().map(|row| row.iter().zip(&shares).map(|(t, s)| t * s).sum()).collect();
             let (density, noise) = split(&waves, powers);
-            let score: f64 = waves
-                .iter()
-                .zip(powers)
-                .enumerate()
-                .map(|(i, (w, p))| {
-                    let q = (w * density + noise).max(1e-30);
-                    weight(i) * (p / q + q.ln())
-                })
-                .sum();
-            if best.is_none_or(|b| score < b.0) {
-                best = Some((score, mean, spread, density, noise));
+            let misfit = |(i, (w, p)): (usize, (&f64, &f64))| {
+                let q = (w * density + noise).max(1e-30);
+                weight(i) * (p / q + q.ln())
+            };
+            let score: f64 = waves.iter().zip(powers).enumerate().map(misfit).sum();
+            if score.is_finite() && best.is_none_or(|b| score < b.score) {
+                best = Some(Fit { score, mean, spread, density, noise });
             }
         }
     }

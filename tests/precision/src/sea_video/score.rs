@@ -1,0 +1,234 @@
+//! Runs the estimator over clips and gathers its errors.
+
+use std::{
+    f64::consts::{PI, TAU},
+    fmt::Write as _,
+    time::Instant,
+};
+
+use bowwave_core::{
+    geometry::{Lens, look},
+    sea::{
+        WmoSeaState,
+        estimate::{Frame, SeaEstimate, SeaMeter, Unknown},
+    },
+    time::Time,
+};
+use glam::{DVec2, DVec3};
+
+use super::video::{Clip, Video};
+
+/// Time between two pictures, nanoseconds: 30 Hz.
+const FRAME_NS: i64 = 33_333_333;
+/// What counts as right, as issue and acceptance have it: height and period as shares, direction in radians.
+const TARGET: (f64, f64, f64) = (0.15, 0.05, 15.0 * PI / 180.0);
+
+/// What the estimator said of one clip.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The clip's class.
+    pub class: &'static str,
+    /// Height of the eye, metres.
+    pub eye_m: f64,
+    /// Significant height of the spectrum, metres.
+    pub height_m: f64,
+    /// Four standard deviations of the water that was in view, metres.
+    pub seen_m: f64,
+    /// Peak period, seconds.
+    pub period_s: f64,
+    /// Direction from which the waves come, radians.
+    pub from_rad: f64,
+    /// The answer.
+    pub answer: Result<SeaEstimate, Unknown>,
+}
+
+impl Outcome {
+    /// Relative error of the height against the water in view.
+    pub fn height_error(&self) -> Option<f64> {
+        self.answer.ok().map(|e| e.significant_height_m.value / self.seen_m - 1.0)
+    }
+
+    /// Relative error of the height against the spectrum's.
+    pub fn spectrum_error(&self) -> Option<f64> {
+        self.answer.ok().map(|e| e.significant_height_m.value / self.height_m - 1.0)
+    }
+
+    /// Relative error of the peak period.
+    pub fn period_error(&self) -> Option<f64> {
+        self.answer.ok().map(|e| e.peak_period_s.value / self.period_s - 1.0)
+    }
+
+    /// Error of the direction, radians.
+    pub fn direction_error(&self) -> Option<f64> {
+        let error = |e: SeaEstimate| (e.direction_from_rad.value - self.from_rad + PI).rem_euclid(TAU) - PI;
+        self.answer.ok().map(error)
+    }
+
+    /// Whether the state is right: that of the water in view.
+    pub fn state_right(&self) -> Option<bool> {
+        self.answer.ok().map(|e| e.state == WmoSeaState::of_wave_height(self.seen_m))
+    }
+}
+
+/// Shows `seconds` of a clip to the estimator. The last analysis must have begun when they are over; it is given five more.
+pub fn run(clip: Clip, seconds: f64) -> Outcome {
+    let mut video = Video::new(clip);
+    let mut meter = SeaMeter::new();
+    for i in 0..((seconds + 5.0) * 30.0) as i64 {
+        let time = Time::from_ns(i * FRAME_NS);
+        let t = time.ns() as f64 * 1e-9;
+        if meter.wants(time) {
+            video.advance(t);
+        }
+        let (camera, lens) = (video.told_pose(t), video.clip.lens);
+        let seen = &video;
+        meter.observe(&Frame { time, camera, lens: &lens, luminance: &|p| seen.luminance(p) });
+    }
+    let main = video.clip.systems[0];
+    Outcome {
+        class: video.clip.class,
+        eye_m: video.clip.eye_m,
+        height_m: video.significant_m(),
+        seen_m: video.seen_m(),
+        period_s: main.peak_s,
+        from_rad: main.from_rad,
+        answer: meter.estimate(),
+    }
+}
+
+/// Runs clips on two threads, in order.
+pub fn run_all(clips: Vec<Clip>, seconds: f64, mut tell: impl FnMut(usize, &Outcome)) -> Vec<Outcome> {
+    let mut outcomes = Vec::new();
+    for pair in clips.chunks(2) {
+        let done: Vec<Outcome> = std::thread::scope(|scope| {
+            let handles: Vec<_> = pair.iter().map(|c| scope.spawn(|| run(c.clone(), seconds))).collect();
+            handles.into_iter().filter_map(|h| h.join().ok()).collect()
+        });
+        for outcome in done {
+            tell(outcomes.len(), &outcome);
+            outcomes.push(outcome);
+        }
+    }
+    outcomes
+}
+
+/// One line about a clip.
+pub fn line(outcome: &Outcome) -> String {
+    let head = format!(
+        "{:16} eye {:4.1} m  H {:4.2} (in view {:4.2}) T {:5.2} from {:3.0}",
+        outcome.class,
+        outcome.eye_m,
+        outcome.height_m,
+        outcome.seen_m,
+        outcome.period_s,
+        outcome.from_rad.to_degrees().rem_euclid(360.0)
+    );
+    match &outcome.answer {
+        Ok(e) => format!(
+            "{head} | H {:4.2} +- {:4.2}  T {:5.2} +- {:4.2}  from {:3.0} +- {:3.0}  state {} (p {:.2})  wind {:.1} m/s",
+            e.significant_height_m.value,
+            e.significant_height_m.sigma,
+            e.peak_period_s.value,
+            e.peak_period_s.sigma,
+            e.direction_from_rad.value.to_degrees(),
+            e.direction_from_rad.sigma.to_degrees(),
+            e.state.get(),
+            e.state_probability,
+            e.wind_m_s.value,
+        ),
+        Err(why) => format!("{head} | {why}"),
+    }
+}
+
+/// Median, 95th percentile and share within a limit of absolute values.
+fn statistics(values: impl Iterator<Item = f64>, limit: f64) -> (f64, f64, f64) {
+    let mut values: Vec<f64> = values.map(f64::abs).collect();
+    values.sort_by(f64::total_cmp);
+    let at = |q: f64| values.get(((values.len() as f64 - 1.0) * q).round() as usize).copied().unwrap_or(f64::NAN);
+    let within = values.iter().filter(|v| **v <= limit).count() as f64 / values.len() as f64;
+    (at(0.5), at(0.95), within)
+}
+
+/// Table of errors by class: median / 95th percentile / share within the target, of the clips that were answered.
+pub fn table(outcomes: &[Outcome]) -> String {
+    let mut text = String::from(
+        "| clips | answered | state right | height in view | height of the spectrum | period | direction, deg |\n|---|---|---|---|---|---|---|\n",
+    );
+    let mut classes: Vec<&str> = Vec::new();
+    for outcome in outcomes {
+        if !classes.contains(&outcome.class) {
+            classes.push(outcome.class);
+        }
+    }
+    let mut row = |name: &str, some: &[&Outcome]| {
+        let answered = some.iter().filter(|o| o.answer.is_ok()).count();
+        let right = some.iter().filter(|o| o.state_right() == Some(true)).count();
+        let cell = |(median, p95, share): (f64, f64, f64), unit: f64| {
+            format!("{:.1} / {:.1} / {:.0} %", median * unit, p95 * unit, share * 100.0)
+        };
+        let of = |error: fn(&Outcome) -> Option<f64>, limit| statistics(some.iter().filter_map(|o| error(o)), limit);
+        let _ = writeln!(
+            text,
+            "| {name} | {answered} of {} | {right} of {answered} | {} | {} | {} | {} |",
+            some.len(),
+            cell(of(Outcome::height_error, TARGET.0), 100.0),
+            cell(of(Outcome::spectrum_error, TARGET.0), 100.0),
+            cell(of(Outcome::period_error, TARGET.1), 100.0),
+            cell(of(Outcome::direction_error, TARGET.2), 1.0_f64.to_degrees()),
+        );
+    };
+    for class in classes {
+        row(class, &outcomes.iter().filter(|o| o.class == class).collect::<Vec<_>>());
+    }
+    row("all", &outcomes.iter().collect::<Vec<_>>());
+    let low = |o: &&Outcome| o.seen_m > 0.25 * o.eye_m;
+    row("of these, waves above a quarter of the eye", &outcomes.iter().filter(low).collect::<Vec<_>>());
+    row("of these, waves below it", &outcomes.iter().filter(|o| !low(o)).collect::<Vec<_>>());
+    text
+}
+
+/// What one picture costs the estimator.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// Mean over all pictures, nanoseconds.
+    pub mean_ns: f64,
+    /// 99th percentile, nanoseconds.
+    pub p99_ns: f64,
+    /// The dearest picture, nanoseconds.
+    pub worst_ns: f64,
+    /// Memory held, bytes.
+    pub memory_bytes: usize,
+}
+
+/// Times the estimator on a picture in memory, 1280 x 720, over the time in which its longest window fills.
+pub fn cost() -> Cost {
+    let lens = Lens::pinhole(1280, 720, PI / 3.0);
+    let picture: Vec<f32> = (0..1280 * 720).map(|i| 0.2 + 0.4 * (1.0 - (i / 1280) as f32 / 720.0)).collect();
+    let mut meter = SeaMeter::new();
+    let (mut times, mut memory_bytes) = (Vec::new(), 0);
+    for i in 0..140 * 30 {
+        let time = Time::from_ns(i * FRAME_NS);
+        let t = time.ns() as f64 * 1e-9;
+        let camera = bowwave_core::geometry::CameraPose {
+            world_from_camera: look(0.002 * t.sin(), -0.12 + 0.002 * (1.7 * t).sin(), 0.0),
+            position: DVec3::Z * 8.0,
+        };
+        let look_up = |p: DVec2| {
+            let (x, y) = (p.x as usize, p.y as usize);
+            let wave = 1.0 + 0.05 * (0.02 * p.y + 1.3 * t).sin() as f32;
+            (x < 1280 && y < 720).then(|| picture[y * 1280 + x] * wave)
+        };
+        let begin = Instant::now();
+        meter.observe(&Frame { time, camera, lens: &lens, luminance: &look_up });
+        times.push(begin.elapsed().as_nanos() as f64);
+        memory_bytes = memory_bytes.max(meter.memory_bytes());
+    }
+    let mean_ns = times.iter().sum::<f64>() / times.len() as f64;
+    times.sort_by(f64::total_cmp);
+    Cost {
+        mean_ns,
+        p99_ns: times[times.len() * 99 / 100],
+        worst_ns: times.last().copied().unwrap_or_default(),
+        memory_bytes,
+    }
+}
