@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use bowwave_core::time::secs_to_ns;
+use bowwave_core::{scene::ReflectionMethod, time::secs_to_ns};
 use bowwave_import::Level;
 use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};
@@ -28,6 +28,8 @@ pub enum Command {
     Simulate(Simulate),
     /// Make a recording from a folder of pictures or from a video
     Import(Import),
+    /// Compose boats into a photograph
+    Compose(Compose),
     /// Print what a scenario needs: passes, shader variants, memory, and why the rest is left out
     Plan(Plan),
     /// Check this computer: GPU, camera, serial lines, trigger lines, disk; each with what to do about it
@@ -159,6 +161,33 @@ pub struct Import {
     pub json: bool,
 }
 
+/// Arguments of `compose`.
+#[derive(Debug, Args)]
+pub struct Compose {
+    /// Scene file (TOML): picture, camera, boats, sea and light
+    #[arg(required_unless_present = "example")]
+    pub scene: Option<PathBuf>,
+    /// Print a commented scene to begin with
+    #[arg(long, conflicts_with_all = ["scene", "method", "out"])]
+    pub example: bool,
+    /// Folder for the pictures, which keep their names
+    #[arg(long, value_name = "DIR", default_value = "bowwave-out")]
+    pub out: PathBuf,
+    /// How the sea mirrors, instead of the scene's own method; several, with commas between, or "all" make a picture each
+    #[arg(long, value_name = "METHOD", value_parser = parse_methods)]
+    pub method: Option<Methods>,
+    /// Vulkan device: its number, or part of its name
+    #[arg(long, value_name = "NAME")]
+    pub gpu: Option<String>,
+    /// Run with Vulkan's validation layer; anything it reports makes the run fail
+    #[arg(long)]
+    pub validation: bool,
+}
+
+/// Ways to mirror, at least one, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Methods(pub Vec<ReflectionMethod>);
+
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
 pub struct Plan {
@@ -277,6 +306,24 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
+/// `full`, `mirror,full` or `all`.
+fn parse_methods(text: &str) -> Result<Methods, String> {
+    if text == "all" {
+        return Ok(Methods(ReflectionMethod::ALL.to_vec()));
+    }
+    let mut methods = Vec::new();
+    for name in text.split(',') {
+        let method = ReflectionMethod::of_name(name.trim()).ok_or_else(|| {
+            let names = ReflectionMethod::ALL.map(ReflectionMethod::name).join(", ");
+            format!("'{name}' is no way to mirror; there are {names}, and all")
+        })?;
+        if !methods.contains(&method) {
+            methods.push(method);
+        }
+    }
+    Ok(Methods(methods))
+}
+
 fn parse_duration(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if s.is_finite() && s > 0.0 && s <= 30.0 * 86_400.0 => Ok(s),
@@ -302,6 +349,17 @@ mod tests {
             ["", "imu-freeze", "imu-freeze@1", "nothing@1+1", "imu-nan@-1+1", "imu-nan@1+x", "imu-nan@NaN+1"]
         {
             assert!(parse_fault(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn methods() {
+        use ReflectionMethod::{Full, Mirror, Off};
+        assert_eq!(parse_methods("mirror"), Ok(Methods(vec![Mirror])));
+        assert_eq!(parse_methods("none, full,off"), Ok(Methods(vec![Off, Full])));
+        assert_eq!(parse_methods("all"), Ok(Methods(ReflectionMethod::ALL.to_vec())));
+        for bad in ["", "magic", "full,", "all,full"] {
+            assert!(parse_methods(bad).is_err(), "{bad}");
         }
     }
 

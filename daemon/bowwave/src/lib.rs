@@ -3,12 +3,13 @@
 mod cache;
 mod cli;
 mod commits;
+pub mod compose;
 pub mod config;
 mod doctor;
 mod drawing;
 mod hits;
 mod import;
-mod loading;
+pub mod loading;
 mod outcome;
 mod output;
 mod plan;
@@ -74,6 +75,7 @@ fn dispatch(command: &Command, program_start: bowwave_core::time::Time) -> Resul
         Command::Run(arguments) => run::run(arguments, program_start),
         Command::Simulate(arguments) => simulate::run(arguments, program_start),
         Command::Import(arguments) => import::run(arguments),
+        Command::Compose(arguments) => compose::run(arguments),
         Command::Plan(arguments) => plan::run(arguments).map(|()| Outcome::Done),
         Command::Doctor(arguments) => {
             doctor::run(arguments).map(|well| if well { Outcome::Done } else { Outcome::Failed })

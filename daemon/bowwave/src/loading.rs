@@ -29,23 +29,37 @@ pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
     }
 }
 
-/// Each model once, and which of them each boat has.
-pub fn load_models(scenario: &Scenario, base: &Path) -> Result<(Vec<Model>, Vec<ModelId>)> {
+/// Models, each once, and which of them each boat has.
+#[derive(Clone, Debug, Default)]
+pub struct Models {
+    /// The models, in the order in which [`ModelId`] counts them.
+    pub list: Vec<Model>,
+    /// The model of each boat.
+    pub of_boats: Vec<ModelId>,
+}
+
+/// Loads the models of `boats`, pairs of a boat's name and its model's. Paths count from `base`.
+pub fn load_models<'a>(boats: impl IntoIterator<Item = (&'a str, &'a str)>, base: &Path) -> Result<Models> {
     let mut names: Vec<&str> = Vec::new();
-    let mut models = Vec::new();
-    let mut of_boats = Vec::new();
-    for boat in &scenario.boats {
-        let place = match names.iter().position(|n| *n == boat.model) {
+    let mut models = Models::default();
+    for (boat, model) in boats {
+        let place = match names.iter().position(|n| *n == model) {
             Some(place) => place,
             None => {
-                let model = bowwave_models::resolve(&boat.model, base)
-                    .with_context(|| format!("cannot load the model of {}", boat.name))?;
-                names.push(&boat.model);
-                models.push(model);
-                models.len() - 1
+                let loaded = bowwave_models::resolve(model, base)
+                    .with_context(|| format!("cannot load the model of {boat}"))?;
+                names.push(model);
+                models.list.push(loaded);
+                models.list.len() - 1
             }
         };
-        of_boats.push(ModelId(u16::try_from(place).context("more than 65536 models")?));
+        models.of_boats.push(ModelId(u16::try_from(place).context("more than 65536 models")?));
     }
-    Ok((models, of_boats))
+    Ok(models)
+}
+
+/// The models of a scenario's boats.
+pub fn scenario_models(scenario: &Scenario, base: &Path) -> Result<(Vec<Model>, Vec<ModelId>)> {
+    let boats = scenario.boats.iter().map(|b| (b.name.as_str(), b.model.as_str()));
+    load_models(boats, base).map(|models| (models.list, models.of_boats))
 }

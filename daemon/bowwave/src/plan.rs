@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::{
     cli::Plan,
     drawing,
-    loading::{load_models, read_scenario},
+    loading::{read_scenario, scenario_models},
 };
 
 /// A plan, as it is printed.
@@ -66,7 +66,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         None => (scenario::DEFAULT.to_owned(), "built-in scenario".to_owned(), Path::new("").to_path_buf()),
     };
     let scenario = Scenario::parse(&text, &origin)?;
-    let (models, of_boats) = load_models(&scenario, &base)?;
+    let (models, of_boats) = scenario_models(&scenario, &base)?;
     let radius =
         |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
     scenario.check_clearance(&of_boats.iter().map(radius).collect::<Vec<_>>())?;

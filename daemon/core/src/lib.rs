@@ -22,6 +22,7 @@ pub mod scene;
 pub mod score;
 pub mod sea;
 pub mod session;
+pub mod still;
 pub mod text;
 pub mod time;
 pub mod view;

@@ -106,6 +106,8 @@ pub enum LeftOut {
     NoRounds,
     /// No usable orientation: boats cannot be placed.
     NoPose,
+    /// A composed picture tells nobody anything.
+    NoTrainee,
 }
 
 impl LeftOut {
@@ -121,6 +123,7 @@ impl LeftOut {
             Self::NoRoundInView => "no_round_in_view",
             Self::NoRounds => "no_rounds",
             Self::NoPose => "no_pose",
+            Self::NoTrainee => "no_trainee",
         }
     }
 }
@@ -231,6 +234,27 @@ pub enum ReflectionMethod {
     FullAsPrinted,
     /// The same, singular cases mended and distances tied to the boat's size on the screen.
     Full,
+}
+
+impl ReflectionMethod {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Off, Self::Mirror, Self::Full, Self::FullAsPrinted];
+
+    /// The name used in scenarios, on the command line and in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Mirror => "mirror",
+            Self::FullAsPrinted => "full_as_printed",
+            Self::Full => "full",
+        }
+    }
+
+    /// The method of that name; hyphens stand for underscores, and "none" for "off".
+    pub fn of_name(name: &str) -> Option<Self> {
+        let name = if name == "none" { "off".to_owned() } else { name.replace('-', "_") };
+        Self::ALL.into_iter().find(|method| method.name() == name)
+    }
 }
 
 /// Nelson 2009, eq. 7-8: how a boat darkens the sea at its foot.

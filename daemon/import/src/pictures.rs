@@ -85,7 +85,8 @@ pub fn import_pictures(
     })
 }
 
-fn picture_names(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
+/// The JPEG and PNG files of a folder in the order that people expect: `frame2` before `frame10`.
+pub fn picture_names(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
     let fail = |source| ImportError::Read { path: folder.to_owned(), source };
     let mut names = Vec::new();
     for entry in fs::read_dir(folder).map_err(fail)? {

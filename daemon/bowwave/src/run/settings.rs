@@ -22,7 +22,7 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
     config::{self, Config},
-    loading::{load_models, read_scenario},
+    loading::{read_scenario, scenario_models},
 };
 
 /// Where nobody says how large pictures are.
@@ -146,7 +146,7 @@ impl Reader {
     ) -> Result<(Scenario, String, Vec<Model>, Vec<bowwave_core::model::ModelId>)> {
         let load = |text: &str, origin: &str, base: &Path| -> Result<_> {
             let scenario = Scenario::parse(text, origin)?;
-            let (models, boats) = load_models(&scenario, base)?;
+            let (models, boats) = scenario_models(&scenario, base)?;
             let radius = |id: &bowwave_core::model::ModelId| {
                 models.get(usize::from(id.0)).map_or(0.0, Model::radius_m)
             };

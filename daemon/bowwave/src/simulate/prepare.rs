@@ -16,7 +16,7 @@ use crate::{
     cache,
     cli::Simulate,
     config::{self, Config, ScreenOutput},
-    loading::{load_models, read_scenario},
+    loading::{read_scenario, scenario_models},
 };
 
 /// Screen size where nothing else is said.
@@ -65,7 +65,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
     if let Some(seed) = arguments.seed {
         scenario.seed = seed;
     }
-    let (models, boat_models) = load_models(&scenario, &base)?;
+    let (models, boat_models) = scenario_models(&scenario, &base)?;
     let radius = |id: &ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
     scenario.check_clearance(&boat_models.iter().map(radius).collect::<Vec<_>>())?;
     Ok(Prepared {

@@ -3,9 +3,9 @@
 //! Degrees, knots and minutes stay outside: everything here is in radians, metres and seconds.
 
 mod boat;
-mod read;
-mod sun;
-mod table;
+pub(crate) mod read;
+pub(crate) mod sun;
+pub(crate) mod table;
 
 use glam::{DVec2, DVec3};
 
@@ -167,7 +167,7 @@ impl Scenario {
 }
 
 /// World x and y of what lies `range_m` away at `bearing`, radians clockwise from north.
-fn place(bearing: f64, range_m: f64) -> DVec2 {
+pub(crate) fn place(bearing: f64, range_m: f64) -> DVec2 {
     DVec2::new(bearing.sin(), bearing.cos()) * range_m
 }
 

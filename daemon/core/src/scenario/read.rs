@@ -1,6 +1,6 @@
 //! The scenario's tables other than the boats.
 
-use toml::de::DeTable;
+use toml::{Spanned, de::DeTable};
 
 use super::{
     Scenario, ScenarioError, WeaponSpec, boat, place, sun,
@@ -16,10 +16,7 @@ use crate::{
 const BOATS_MAX: usize = 64;
 
 pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, ScenarioError> {
-    let document = DeTable::parse(text).map_err(|e| {
-        let place = Mark::at(text, e.span().map_or(0, |span| span.start));
-        place.error(origin, "", e.message().to_owned())
-    })?;
+    let document = document(text, origin)?;
     let root = Table::root(Source { text, origin }, &document);
     root.only(&["name", "seed", "duration_s", "sea", "mount", "light", "reflection", "weapon", "boat"])?;
     let (force, waves) = sea(&root.table("sea")?)?;
@@ -52,7 +49,16 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, ScenarioErr
     })
 }
 
-fn sea(table: &Table<'_>) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
+/// The text as TOML.
+pub(crate) fn document<'a>(text: &'a str, origin: &str) -> Result<Spanned<DeTable<'a>>, ScenarioError> {
+    DeTable::parse(text).map_err(|e| {
+        let place = Mark::at(text, e.span().map_or(0, |span| span.start));
+        place.error(origin, "", e.message().to_owned())
+    })
+}
+
+/// The table `[sea]`.
+pub(crate) fn sea(table: &Table<'_>) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
     table.only(&["beaufort", "wind_from_deg", "significant_wave_height_m", "peak_period_s"])?;
     let number = table.integer("beaufort", 0..=12)?.unwrap_or(2);
     let force = u8::try_from(number)
@@ -77,14 +83,10 @@ fn sea(table: &Table<'_>) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
     Ok((force, WaveSpec { spectrum, wind_from }))
 }
 
-fn reflection(table: &Table<'_>, force: BeaufortForce) -> Result<Water, ScenarioError> {
+/// The table `[reflection]`.
+pub(crate) fn reflection(table: &Table<'_>, force: BeaufortForce) -> Result<Water, ScenarioError> {
     table.only(&["method", "shadow_level"])?;
-    let methods = [
-        ("off", ReflectionMethod::Off),
-        ("mirror", ReflectionMethod::Mirror),
-        ("full", ReflectionMethod::Full),
-        ("full_as_printed", ReflectionMethod::FullAsPrinted),
-    ];
+    let methods = ReflectionMethod::ALL.map(|method| (method.name(), method));
     let method = table.choice("method", &methods)?.unwrap_or(ReflectionMethod::Full);
     let shadow = match table.integer("shadow_level", 0..=2)? {
         Some(0) => ShadowLevel::None,

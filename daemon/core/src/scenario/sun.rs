@@ -10,7 +10,7 @@ use super::{ScenarioError, table::Table};
 const DEFAULT_DEG: (f64, f64) = (215.0, 35.0);
 
 /// Unit vector towards the sun.
-pub(super) fn direction(light: &Table<'_>) -> Result<DVec3, ScenarioError> {
+pub(crate) fn direction(light: &Table<'_>) -> Result<DVec3, ScenarioError> {
     let azimuth = light.number("sun_azimuth_deg", -360.0..=360.0, "degrees")?;
     let elevation = light.number("sun_elevation_deg", -90.0..=90.0, "degrees")?;
     let latitude = light.number("latitude_deg", -90.0..=90.0, "degrees")?;

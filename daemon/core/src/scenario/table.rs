@@ -12,7 +12,7 @@ use crate::text::{line_column, one_line};
 
 /// A place in the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Mark {
+pub(crate) struct Mark {
     line: usize,
     column: usize,
 }
@@ -38,14 +38,14 @@ impl Mark {
 
 /// The text that is being read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Source<'a> {
+pub(crate) struct Source<'a> {
     pub text: &'a str,
     pub origin: &'a str,
 }
 
 /// A table of the text, or the defaults where the text has none.
 #[derive(Clone, Debug)]
-pub(super) struct Table<'a> {
+pub(crate) struct Table<'a> {
     source: Source<'a>,
     /// Path of the table with a dot at its end; empty for the root.
     path: String,
@@ -197,6 +197,25 @@ impl<'a> Table<'a> {
         match parsed {
             Some(stamp) => Ok(Some(stamp)),
             None => self.refuse(key, value, "a time like \"2026-06-01T12:00:00Z\""),
+        }
+    }
+
+    /// A list of numbers within `range`; `None` where the key is left out.
+    pub fn numbers(
+        &self,
+        key: &str,
+        range: RangeInclusive<f64>,
+        what: &str,
+    ) -> Result<Option<Vec<f64>>, ScenarioError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let numbers = value.get_ref().as_array().and_then(|items| {
+            let number =
+                |item: &Spanned<DeValue<'_>>| as_number(item.get_ref()).filter(|n| range.contains(n));
+            items.iter().map(number).collect::<Option<Vec<f64>>>()
+        });
+        match numbers {
+            Some(numbers) => Ok(Some(numbers)),
+            None => self.refuse(key, value, what),
         }
     }
 

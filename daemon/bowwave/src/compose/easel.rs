@@ -1,0 +1,89 @@
+//! Draws scenes off screen, one at a time, with the trainer's own renderer.
+
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use bowwave_core::{
+    event::Picture,
+    plan::ScenePlan,
+    scene::Scene,
+    still::{Composed, Still},
+};
+use bowwave_render::{Completions, Renderer};
+use image::RgbImage;
+
+use super::Photo;
+use crate::{drawing, loading::Models};
+
+/// Longest wait for one picture. A large one with many boats takes seconds on a processor.
+const WAIT: Duration = Duration::from_secs(120);
+
+/// A renderer that is kept as long as pictures ask the same of it.
+pub struct Easel {
+    models: Models,
+    gpu: Option<String>,
+    validation: bool,
+    ready: Option<(ScenePlan, Renderer, Completions)>,
+    messages: Vec<String>,
+}
+
+/// A picture with boats in it.
+#[derive(Debug)]
+pub struct Drawn {
+    /// What was drawn, sRGB.
+    pub picture: RgbImage,
+    /// How many boats or reflections of boats lie within the picture.
+    pub boats_seen: usize,
+}
+
+impl Easel {
+    /// An easel for boats of these models, on the device that `gpu` names (the first GPU where it names none).
+    pub fn new(models: Models, gpu: Option<String>, validation: bool) -> Self {
+        Self { models, gpu, validation, ready: None, messages: Vec::new() }
+    }
+
+    /// Composes boats into picture number `index` of a series (0 for a single one).
+    pub fn compose(&mut self, still: &Still, photo: &Photo, index: u32) -> Result<Drawn> {
+        let models = (self.models.list.as_slice(), self.models.of_boats.as_slice());
+        let composed = still.compose(&photo.picture, index, models, photo.focal_px)?;
+        let boats_seen = composed.scene.boats.len();
+        Ok(Drawn { picture: self.draw(&composed, &photo.picture)?, boats_seen })
+    }
+
+    /// Draws a scene over a picture of the same size.
+    pub fn draw(&mut self, Composed { scene, plan }: &Composed, picture: &Picture) -> Result<RgbImage> {
+        if self.ready.as_ref().is_none_or(|(made_for, ..)| made_for != plan) {
+            self.put_away();
+            let config = drawing::config(plan, self.gpu.clone(), self.validation);
+            let (renderer, completions) = Renderer::new(&config, &self.models.list)?;
+            self.ready = Some((*plan, renderer, completions));
+        }
+        let (_, renderer, completions) = self.ready.as_mut().context("no renderer")?;
+        draw_one(renderer, completions, scene, picture)
+    }
+
+    /// What the validation layer has said so far.
+    pub fn validation_messages(&mut self) -> Vec<String> {
+        self.put_away();
+        std::mem::take(&mut self.messages)
+    }
+
+    fn put_away(&mut self) {
+        if let Some((_, renderer, _)) = self.ready.take() {
+            self.messages.extend(renderer.validation_messages());
+        }
+    }
+}
+
+fn draw_one(
+    renderer: &mut Renderer,
+    completions: &mut Completions,
+    scene: &Scene,
+    picture: &Picture,
+) -> Result<RgbImage> {
+    renderer.submit(scene, picture, true)?;
+    let frame = completions.wait_next(WAIT)?.context("the GPU did not finish the picture in two minutes")?;
+    let (width, height) = (picture.width(), picture.height());
+    let rgb = frame.rgba().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    RgbImage::from_raw(width, height, rgb).context("the renderer gave a picture of another size")
+}

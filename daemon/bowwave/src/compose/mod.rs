@@ -1,0 +1,114 @@
+//! `bowwave compose`: boats composed into photographs.
+
+mod easel;
+mod photo;
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail};
+use bowwave_core::{
+    scene::ReflectionMethod,
+    still::{self, Still},
+};
+
+use crate::{cli::Compose, loading::load_models, outcome::Outcome};
+pub use easel::{Drawn, Easel};
+pub use photo::Photo;
+
+/// Most pictures of a folder.
+const PICTURES_MAX: usize = 10_000;
+
+/// Composes what the arguments name.
+pub fn run(arguments: &Compose) -> Result<Outcome> {
+    if arguments.example {
+        print!("{}", still::EXAMPLE);
+        return Ok(Outcome::Done);
+    }
+    let Some(path) = &arguments.scene else {
+        bail!("no scene named; `bowwave compose --example > scene.toml` makes one to begin with");
+    };
+    let text = std::fs::read_to_string(path).with_context(|| {
+        format!(
+            "cannot read the scene {}; `bowwave compose --example > scene.toml` makes one to begin with",
+            path.display()
+        )
+    })?;
+    let still = Still::parse(&text, &path.display().to_string())?;
+    let base = path.parent().unwrap_or(Path::new(""));
+    let models = load_models(still.boats.iter().map(|b| (b.name.as_str(), b.model.as_str())), base)?;
+    let pictures = pictures(&base.join(&still.picture))?;
+    let methods = arguments.method.as_ref().map_or_else(|| vec![still.water.method], |m| m.0.clone());
+    let mut easel = Easel::new(models, arguments.gpu.clone(), arguments.validation);
+    std::fs::create_dir_all(&arguments.out).with_context(|| {
+        format!("cannot make the folder {}; name another with --out", arguments.out.display())
+    })?;
+    for (index, picture) in pictures.iter().enumerate() {
+        let photo = Photo::read(picture)?;
+        for &method in &methods {
+            let mut still = still.clone();
+            still.water.method = method;
+            let drawn = easel.compose(&still, &photo, u32::try_from(index).unwrap_or(u32::MAX))?;
+            let target = target(&arguments.out, picture, (methods.len() > 1).then_some(method));
+            refuse_to_replace_source(&target, picture)?;
+            drawn
+                .picture
+                .save_with_format(&target, image::ImageFormat::Png)
+                .with_context(|| format!("cannot write {}; check the disk", target.display()))?;
+            println!("{}", target.display());
+            if drawn.boats_seen < still.boats.len() {
+                log::warn!(
+                    "{}: {} of {} boats lie outside the picture; check bearing_deg and azimuth_deg",
+                    picture.display(),
+                    still.boats.len() - drawn.boats_seen,
+                    still.boats.len()
+                );
+            }
+        }
+    }
+    let messages = easel.validation_messages();
+    for message in &messages {
+        log::error!("{message}");
+    }
+    Ok(if messages.is_empty() { Outcome::Done } else { Outcome::Failed })
+}
+
+/// The picture, or the pictures of the folder in the order of their names.
+pub(crate) fn pictures(path: &Path) -> Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        if !path.exists() {
+            bail!(
+                "no picture {}; correct picture in the scene, it counts from the scene's folder",
+                path.display()
+            );
+        }
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let found = bowwave_import::picture_names(path)?;
+    if found.is_empty() {
+        bail!("no JPEG or PNG picture in the folder {}", path.display());
+    }
+    if found.len() > PICTURES_MAX {
+        bail!("{} pictures in {}; at most {PICTURES_MAX} at once", found.len(), path.display());
+    }
+    Ok(found)
+}
+
+fn target(folder: &Path, picture: &Path, method: Option<ReflectionMethod>) -> PathBuf {
+    let stem = picture.file_stem().map_or_else(|| "picture".into(), |s| s.to_string_lossy());
+    folder.join(match method {
+        Some(method) => format!("{stem}.{}.png", method.name()),
+        None => format!("{stem}.png"),
+    })
+}
+
+/// The photograph is somebody's only one.
+fn refuse_to_replace_source(target: &Path, source: &Path) -> Result<()> {
+    let same = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    };
+    if same(target, source) {
+        bail!("{} would be replaced by its own composite; name another folder with --out", source.display());
+    }
+    Ok(())
+}

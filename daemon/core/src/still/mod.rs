@@ -1,0 +1,224 @@
+//! A picture with boats composed into it: TOML text in, checked values out, and the [`Scene`] that the renderer draws.
+//!
+//! The same steps as in a [`Session`](crate::session::Session), without time: the camera is given instead of measured.
+
+mod camera;
+mod read;
+
+use glam::{DVec2, DVec3};
+
+use crate::{
+    boats::{CourseState, Hull, float},
+    event::Picture,
+    geometry::{CameraPose, Lens},
+    light::LightMeter,
+    model::{Model, ModelId},
+    plan::{Needs, ScenePlan},
+    scenario::{CAMERA_CLEAR_M, ScenarioError, table::Mark},
+    scene::{Hud, LeftOut, Pass, PassDecision, Scene, Status, Water},
+    sea::{WaveField, WaveSpec},
+    time::Time,
+    view::{Afloat, Eye},
+};
+pub use camera::{Attitude, Focal, StillCamera, film_focal_px};
+
+/// A commented text to begin with.
+pub const EXAMPLE: &str = include_str!("example.toml");
+
+/// Most boats of a picture.
+pub const BOATS_MAX: usize = 64;
+/// Farthest place of a boat, metres.
+pub const RANGE_MAX_M: f64 = 20_000.0;
+/// Smallest and largest picture, pixels each way.
+pub const SIZE_RANGE: std::ops::RangeInclusive<u32> = 16..=8192;
+
+/// A checked text.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Still {
+    /// The picture, or a folder of pictures, as the text names it.
+    pub picture: String,
+    /// Seed of the waves that boats ride on.
+    pub seed: u64,
+    /// Time between the pictures of a folder, seconds; `None` where they have nothing to do with each other.
+    pub interval_s: Option<f64>,
+    /// The camera.
+    pub camera: StillCamera,
+    /// Waves and where the wind comes from.
+    pub waves: WaveSpec,
+    /// Unit vector towards the sun, world.
+    pub sun_direction: DVec3,
+    /// How much of a clear sky's sun comes through, 0 to 1.
+    pub sun_strength: f64,
+    /// Meteorological visibility, metres.
+    pub visibility_m: f64,
+    /// How the sea mirrors, and at which wind force.
+    pub water: Water,
+    /// The boats.
+    pub boats: Vec<StillBoat>,
+    origin: String,
+}
+
+/// A boat in the first picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StillBoat {
+    /// What errors call it.
+    pub name: String,
+    /// What it looks like: the name of a model or a path to a file, for the caller to resolve.
+    pub model: String,
+    /// Where it is.
+    pub place: Place,
+    /// Where it goes, radians clockwise from north.
+    pub heading: f64,
+    /// How fast, m/s.
+    pub speed_m_s: f64,
+    mark: Mark,
+    key: String,
+}
+
+/// Where a boat's middle meets the water.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Place {
+    /// World x and y, metres from the camera.
+    World(DVec2),
+    /// A pixel of the picture; the sea there has its mean height.
+    Pixel(DVec2),
+}
+
+/// What is drawn over one picture.
+#[derive(Clone, Debug)]
+pub struct Composed {
+    /// The scene.
+    pub scene: Scene,
+    /// What the renderer must be able to do for it.
+    pub plan: ScenePlan,
+}
+
+impl Still {
+    /// Checks a text. `origin` is what errors call it.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
+        read::still(text, origin)
+    }
+
+    /// The scene over picture number `index` (0 for a single one). `boat_models` says for each boat which of `models` it is.
+    /// `focal_px` is the picture's own focal length in pixels, where it tells one; the text's goes first.
+    ///
+    /// # Errors
+    /// Names the place in the text that does not fit the picture.
+    pub fn compose(
+        &self,
+        picture: &Picture,
+        index: u32,
+        (models, boat_models): (&[Model], &[ModelId]),
+        focal_px: Option<f64>,
+    ) -> Result<Composed, ScenarioError> {
+        let size = (picture.width(), picture.height());
+        let (lens, camera) = self.sight(size, focal_px)?;
+        let plan = ScenePlan::new(&Needs {
+            size,
+            video: picture.format(),
+            picture: size,
+            water: self.water,
+            boats: self.boats.len(),
+            belt: 0,
+        });
+        let eye = Eye {
+            camera: &camera,
+            lens: &lens,
+            visibility_m: self.visibility_m,
+            reflections: plan.has(Pass::Water),
+        };
+        let waves = WaveField::new(&self.waves, self.seed);
+        let time_s = f64::from(index) * self.interval_s.unwrap_or(0.0);
+        let mut boats = Vec::with_capacity(self.boats.len());
+        for (number, id) in boat_models.iter().enumerate().take(self.boats.len()) {
+            let Some(model) = models.get(usize::from(id.0)) else { continue };
+            boats.extend(eye.see(&self.afloat(number, (*id, model), &eye, &waves, time_s)?));
+        }
+        boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
+        let mut passes = plan.frame(true, &boats, &[]);
+        passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
+        let mut meter = LightMeter::new(self.sun_direction);
+        meter.observe(Time::from_ns(0), picture, &lens, &camera);
+        let mut light = meter.light();
+        light.sun *= self.sun_strength as f32;
+        let hud =
+            Hud { status: Status::Ready, warning: None, rounds_left: 0, shots: 0, hits: 0, clock_s: 0.0 };
+        let scene = Scene {
+            frame: u64::from(index),
+            camera,
+            lens,
+            passes,
+            boats,
+            rounds: Vec::new(),
+            light,
+            water: self.water,
+            hud,
+        };
+        Ok(Composed { scene, plan })
+    }
+
+    /// A boat on the water `time_s` after the first picture.
+    fn afloat<'a>(
+        &self,
+        number: usize,
+        (id, model): (ModelId, &'a Model),
+        eye: &Eye<'_>,
+        waves: &WaveField,
+        time_s: f64,
+    ) -> Result<Afloat<'a>, ScenarioError> {
+        let boat = &self.boats[number];
+        let refuse = |problem: String| Err(boat.mark.error(&self.origin, &boat.key, problem));
+        let (start, on_mean_sea) = match boat.place {
+            Place::World(place) => (place, false),
+            Place::Pixel(pixel) => match camera::on_the_sea(eye, pixel) {
+                Ok(place) => (place, true),
+                Err(problem) => return refuse(problem),
+            },
+        };
+        let clear_m = model.radius_m() + CAMERA_CLEAR_M;
+        let ahead = DVec2::new(boat.heading.sin(), boat.heading.cos());
+        let position = start + ahead * (boat.speed_m_s * time_s);
+        if position.length() < clear_m {
+            return refuse(format!(
+                "{} lies {:.1} m off, but its model {} needs {clear_m:.1} m; put it farther off",
+                boat.name,
+                position.length(),
+                boat.model
+            ));
+        }
+        let state =
+            CourseState { position, heading: boat.heading, speed_m_s: boat.speed_m_s, turn_rate: 0.0 };
+        let mut floating = float(&state, &Hull::of(model), waves, time_s);
+        if on_mean_sea {
+            // The picture shows where the water is: no wave of ours lifts the boat off it.
+            floating.pose.position.z -= floating.water_level;
+            floating.water_level = 0.0;
+        }
+        Ok(Afloat {
+            boat: number,
+            model_id: id,
+            model,
+            pose: floating.pose,
+            water_level: floating.water_level,
+        })
+    }
+
+    /// Lens and place of the camera in a picture of that size; `focal_px` as for [`Still::compose`].
+    ///
+    /// # Errors
+    /// As [`Still::compose`].
+    pub fn sight(
+        &self,
+        size: (u32, u32),
+        focal_px: Option<f64>,
+    ) -> Result<(Lens, CameraPose), ScenarioError> {
+        let named = |(mark, key, problem): camera::Problem| mark.error(&self.origin, key, problem);
+        let lens = self.camera.lens(size, focal_px).map_err(named)?;
+        let pose = self.camera.pose(&lens).map_err(named)?;
+        Ok((lens, pose))
+    }
+}
+
+#[cfg(test)]
+#[path = "still_tests.rs"]
+mod tests;
