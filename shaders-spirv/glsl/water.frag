@@ -1,11 +1,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// A boat's light on the sea: Nelson 2009, "Full Reflection" shader, equations 4 to 8. The video is compared as sRGB codes, as
-// the thesis does; what is mixed is linear light. Output is premultiplied: it covers alpha of the sea and adds light.
+// A boat's light on the sea: Nelson 2009, "Full Reflection" shader, equations 4 to 8, and "Physics" shader, equations 9 to 16. The
+// video is compared as sRGB codes, as the thesis does; what is mixed is linear light. Output is premultiplied: it covers alpha of the
+// sea and adds light.
 #include "frame.glsl"
 #include "water_block.glsl"
 
-// 0 none, 1 plain mirror, 2 as printed, 3 singular cases mended.
+// 0 none, 1 plain mirror; Full Reflection: 2 as printed, 3 singular cases mended; Physics: 4 as printed, 5 mended.
 layout(constant_id = 0) const uint METHOD = 3;
 // Shadow level, 0 to 2.
 layout(constant_id = 1) const uint SHADOW = 0;
@@ -23,6 +24,12 @@ layout(set = 1, binding = 1) uniform sampler2D mirror;
 
 // Mended: what field.frag found.
 layout(set = 1, binding = 2) uniform sampler2D field;
+
+// Physics, mended: waves of the sea's spectrum, each radians a metre away from the eye and to the right, metres high, phase at the anchor.
+const int WAVES = 8;
+layout(std430, set = 0, binding = 6) readonly buffer WavesBlock {
+    vec4 list[];
+} waves;
 
 layout(location = 0) out vec4 colour;
 
@@ -56,14 +63,89 @@ vec4 blurred(vec2 at, vec2 texel, vec4 bounds) {
     return 0.25 * sum;
 }
 
+// Eq. 9 and 10, or the spectrum: height of the water and its slope away from the eye at a place (metres from the eye and to the right).
+vec2 wave_at(float depth, float right) {
+    uint i = draw.index;
+    if (METHOD == 4) {
+        float height = waters[i].alpha, freq = waters[i].alpha_fall;
+        float swell = waters[i].shift_near, swell_freq = waters[i].shift_grow;
+        return vec2(
+            height * sin(freq * depth) + height * sin(freq * right) + swell * sin(swell_freq * depth)
+                + swell * sin(swell_freq * right),
+            height * freq * cos(freq * depth) + height * freq * cos(freq * right)
+                + swell * swell_freq * cos(swell_freq * depth) + swell * swell_freq * cos(swell_freq * right));
+    }
+    // From the anchor, where the host knows the phases: no digits are lost at any distance.
+    vec2 from_anchor = vec2(depth - waters[i].passes.z / waters[i].passes.x, right);
+    vec2 sum = vec2(0.0);
+    for (int n = 0; n < WAVES; ++n) {
+        vec4 w = waves.list[n];
+        float phase = dot(w.xy, from_anchor) + w.w;
+        sum += w.z * vec2(cos(phase), -w.x * sin(phase));
+    }
+    return sum;
+}
+
+// Whether the line of sight, mirrored by the wave at a pixel, meets the ship: eq. 11 to 16. `below` and `line` are pixels.
+bool meets_ship(float across, float below, float line) {
+    uint i = draw.index;
+    float tangent0 = waters[i].passes.x, per_pixel = waters[i].passes.y, eye = waters[i].passes.z;
+    float ship = eye / (tangent0 + line * per_pixel);
+    float depth = eye / (tangent0 + (line + below) * per_pixel);
+    vec2 wave = wave_at(depth, across * per_pixel * depth);
+    vec2 to_eye = normalize(vec2(-depth, eye - wave.x));
+    vec2 normal;
+    if (METHOD == 4) {
+        // The intercepts of the tangent: infinite at every crest and trough.
+        float x_inter = -wave.x / wave.y + depth;
+        float y_inter = wave.y * -depth + wave.x;
+        normal = normalize(vec2(y_inter, x_inter));
+    } else {
+        normal = vec2(-wave.y, 1.0) / sqrt(1.0 + wave.y * wave.y);
+    }
+    vec2 mirrored = 2.0 * normal * dot(normal, to_eye) - to_eye;
+    float height = mirrored.y / mirrored.x * (ship - depth) + wave.x;
+    bool away = METHOD == 4 || (mirrored.x > 0.0 && dot(normal, to_eye) > 0.0);
+    // No number is within no bounds.
+    return away && height >= 0.0 && height < waters[i].passes.w;
+}
+
+// Table 1: what of the nine pixels about this one shows the ship, mirrored with the same shift as in the other shader.
+vec4 physics(vec2 at, float across, float below, float line, vec2 move) {
+    uint i = draw.index;
+    vec2 down = waters[i].down, right = vec2(down.y, -down.x);
+    vec4 bounds = waters[i].mirror_bounds;
+    vec4 sum = vec4(0.0);
+    for (int n = 0; n < 9; ++n) {
+        vec2 step = vec2(float(n % 3 - 1), float(n / 3 - 1));
+        if (!meets_ship(across + dot(step, right), below + dot(step, down), line)) {
+            continue;
+        }
+        vec2 uv = (at + step + move) * waters[i].mirror_scale + waters[i].mirror_offset;
+        sum += (n == 4 ? 0.5 : 1.0 / 16.0) * texture(mirror, clamp(uv, bounds.xy, bounds.zw));
+    }
+    return sum;
+}
+
 // Share of the mirrored light and the mirrored light itself, premultiplied.
-vec4 reflection(vec2 at, float below) {
+vec4 reflection(vec2 at, float across, float below, float line) {
     uint i = draw.index;
     if (METHOD == 0) {
         return vec4(0.0);
     }
     vec2 uv = at * waters[i].mirror_scale + waters[i].mirror_offset;
     vec4 bounds = waters[i].mirror_bounds;
+    float limit = waters[i].shift_limit;
+    vec2 down = waters[i].down;
+    if (METHOD == 4) {
+        float shift = sin(normalised_mean(at, code_at(at))) * waters[i].shift;
+        return abs(shift) <= limit ? physics(at, across, below, line, vec2(shift)) : vec4(0.0);
+    }
+    if (METHOD == 5) {
+        vec2 wave = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).rg;
+        float shift = clamp((wave.x * 2.0 - 1.0) * waters[i].shift, -limit, limit);
+        return waters[i].alpha * physics(at, across, below, line, shift * (down + SIDEWAYS * vec2(down.y, -down.x)));
+    }
     // Eq. 6.
     float alpha = waters[i].alpha - below * waters[i].alpha_fall;
     if (alpha <= 0.0) {
@@ -89,10 +171,8 @@ vec4 reflection(vec2 at, float below) {
     // the hull it is. What goes beyond the limit stays at it: discarded, it would leave specks of bare water in a dark
     // reflection.
     vec2 wave = texture(field, at / (vec2(textureSize(field, 0)) * vec2(4.0, 2.0))).rg;
-    float limit = waters[i].shift_limit;
     float shift = clamp((wave.x * 2.0 - 1.0) * waters[i].shift, -limit, limit);
     shift *= min(waters[i].shift_near + below * waters[i].shift_grow, 1.0);
-    vec2 down = waters[i].down;
     vec2 move = shift * (down + SIDEWAYS * vec2(down.y, -down.x));
     return alpha * wave.y * texture(mirror, clamp(uv + move * waters[i].mirror_scale, bounds.xy, bounds.zw));
 }
@@ -107,7 +187,8 @@ void main() {
     vec2 from_anchor = at - waters[i].anchor;
     vec2 down = waters[i].down;
     // Where on the hull-water line this pixel's column stands, and how far below it the pixel is.
-    float column = (dot(from_anchor, vec2(down.y, -down.x)) - waters[i].columns.x) * waters[i].columns.y;
+    float across = dot(from_anchor, vec2(down.y, -down.x));
+    float column = (across - waters[i].columns.x) * waters[i].columns.y;
     float held = clamp(column, 0.0, float(HULL_LINE_COLUMNS - 1));
     int first = min(int(held), HULL_LINE_COLUMNS - 2);
     float line = mix(hull_line(first), hull_line(first + 1), held - float(first));
@@ -115,7 +196,7 @@ void main() {
     if (below < 0.0) {
         discard;
     }
-    vec4 mirrored = reflection(at, below);
+    vec4 mirrored = reflection(at, across, below, line);
     if (SHADOW == 0) {
         if (mirrored.a == 0.0) {
             discard;
@@ -126,7 +207,7 @@ void main() {
     // Eq. 7. As printed it is not clamped by itself; beyond its reach there is no shadow either way.
     float proportion = clamp(waters[i].shadow - below * waters[i].shadow_fall, 0.0, 1.0);
     float lit;
-    if (METHOD == 2) {
+    if (METHOD == 2 || METHOD == 4) {
         // Eq. 8 as printed: halved wherever there is any shadow at all.
         lit = proportion > 0.0 && column == held ? 0.5 * (1.0 - proportion) : 1.0;
     } else {

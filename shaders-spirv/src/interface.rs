@@ -165,6 +165,32 @@ impl Default for WaterBlock {
     }
 }
 
+/// Bands of height that a [`LobeBlock`] holds a boat in.
+pub const LOBE_BANDS: usize = 10;
+/// Distances from the hull that a [`LobeBlock`] knows.
+pub const LOBE_STEPS: usize = 64;
+/// Columns of a boat's bands on the GPU.
+pub const LOBE_COLUMNS: u32 = 64;
+
+/// What the sea throws back of one boat: `LobeBlock`, set 0, binding 6, std430. Goes with the [`WaterBlock`] of the same index.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct LobeBlock {
+    /// Tangent below the horizontal at the anchor; 1 / pixels to a tangent of 1; eye over the water, m; 1 / reach, 1/m.
+    pub place: [f32; 4],
+    /// Height of the boat, m; across position of its picture's first column, pixels to a column; pixels to a metre at the anchor.
+    pub board: [f32; 4],
+    /// By distance and band: light thrown back by three tones, metres aside; luminance taken away by tone, half width in metres.
+    pub lobes: [[[f32; 4]; 2 * LOBE_BANDS]; LOBE_STEPS],
+}
+layout!(LobeBlock, 20512, place = 0, board = 16, lobes = 32);
+
+impl Default for LobeBlock {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
 /// One tracer, splash or strike: `RoundBlock`, set 0, binding 3, std430.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -254,6 +280,27 @@ pub struct DrawBlock {
     pub first: u32,
 }
 layout!(DrawBlock, 24, rect = 0, index = 16, first = 20);
+
+/// Push constants of what puts the layers onto the sea: `ReflectBlock`. Begins as [`DrawBlock`] does.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct ReflectBlock {
+    /// What is added to each quad of the frame's list.
+    pub rect: [f32; 4],
+    /// Unused.
+    pub index: u32,
+    /// First quad of the frame's list.
+    pub first: u32,
+    /// Keeps the alignment.
+    pub pad: [f32; 2],
+    /// Tangent below the horizontal: for each pixel right and down, at pixel (0, 0), unused.
+    pub tangent: [f32; 4],
+    /// Mean of the sea's luma: coefficients of the tangent's root's powers 0 to 2; smallest root.
+    pub mean: [f32; 4],
+    /// Standard deviation of it; largest root.
+    pub spread: [f32; 4],
+}
+layout!(ReflectBlock, 80, rect = 0, index = 16, first = 20, pad = 24, tangent = 32, mean = 48, spread = 64);
 
 /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.
 #[repr(C)]

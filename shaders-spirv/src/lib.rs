@@ -53,8 +53,17 @@ shaders! {
     SOFTEN_FRAG = "soften.frag";
     /// How the video's brightness changes downwards.
     FIELD_FRAG = "field.frag";
-    /// A boat's light on the sea. Constants: 0 method (0 none, 1 mirror, 2 as printed, 3 mended), 1 shadow level.
+    /// A boat's light on the sea. Constants: 0 method (0 none, 1 mirror, 2 and 3 Full Reflection as printed and mended, 4 and 5 Physics),
+    /// 1 shadow level.
     WATER_FRAG = "water.frag";
+    /// A boat's mirror image collapsed to bands of height.
+    BANDS_FRAG = "bands.frag";
+    /// Running sums along the bands.
+    SUMS_FRAG = "sums.frag";
+    /// What the sea throws back of a boat, for a dark, a middling and a bright pixel.
+    LAYERS_FRAG = "layers.frag";
+    /// The layers put onto the sea.
+    REFLECT_FRAG = "reflect.frag";
     /// The rectangle of a tracer, splash or strike.
     ROUND_VERT = "round.vert";
     /// A tracer, splash or strike.

@@ -13,7 +13,7 @@ use rspirv::{
     spirv::{Decoration, Op, StorageClass, Word},
 };
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, DrawBlock, FrameBlock, HULL_LINE_COLUMNS, HudQuad, MeshVertex, RoundBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, DrawBlock, FrameBlock, HULL_LINE_COLUMNS, HudQuad, LobeBlock, MeshVertex, ReflectBlock, RoundBlock,
     VideoBlock, WATERS_MAX, WaterBlock,
 };
 
@@ -28,6 +28,8 @@ const HOST: &[Host] = &[
     ("HudQuad", HudQuad::FIELDS, size_of::<HudQuad>()),
     ("VideoBlock", VideoBlock::FIELDS, size_of::<VideoBlock>()),
     ("DrawBlock", DrawBlock::FIELDS, size_of::<DrawBlock>()),
+    ("LobeBlock", LobeBlock::FIELDS, size_of::<LobeBlock>()),
+    ("ReflectBlock", ReflectBlock::FIELDS, size_of::<ReflectBlock>()),
 ];
 
 fn modules() -> Vec<(&'static str, Module)> {

@@ -152,6 +152,9 @@ fn variants(plan: &ScenePlan) -> Vec<String> {
             ReflectionMethod::Mirror => "plain mirror",
             ReflectionMethod::FullAsPrinted => "Full Reflection as printed",
             ReflectionMethod::Full => "Full Reflection, mended",
+            ReflectionMethod::PhysicsAsPrinted => "Physics as printed",
+            ReflectionMethod::Physics => "Physics, mended",
+            ReflectionMethod::Waves => "light thrown back by waves",
         };
         variants.push(format!(
             "water: {method}, Beaufort {}, shadow {:?}",

@@ -17,6 +17,7 @@ pub mod model;
 pub mod pacing;
 pub mod plan;
 pub mod pose;
+pub mod reflection;
 pub mod scenario;
 pub mod scene;
 pub mod score;

@@ -8,6 +8,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::{
     event::Picture,
     geometry::{CameraPose, Lens},
+    reflection::{Sample, SeaTones},
     scene::Light,
     time::Time,
 };
@@ -25,14 +26,17 @@ const SUN_TO_SKY: f32 = 2.6;
 /// Optical depth of a clear maritime atmosphere at about 610, 550 and 465 nm (Rayleigh and background aerosol).
 const OPTICAL_DEPTH: Vec3 = Vec3::new(0.10, 0.14, 0.22);
 
+/// Share of linear red, green and blue in luminance (ITU-R BT.709).
+pub const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
+
+/// One channel of linear light to its sRGB code (IEC 61966-2-1).
+pub fn linear_to_srgb(linear: f32) -> f32 {
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
+}
+
 /// One sRGB-coded channel to linear light (IEC 61966-2-1).
 pub fn srgb_to_linear(coded: f32) -> f32 {
     if coded <= 0.040_45 { coded / 12.92 } else { ((coded + 0.055) / 1.055).powf(2.4) }
-}
-
-/// Linear light of one channel, 0 to 1, to its sRGB code (IEC 61966-2-1).
-pub fn linear_to_srgb(linear: f32) -> f32 {
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// Mean linear colours of sky and sea as the camera sees them.
@@ -48,21 +52,29 @@ struct Means {
 pub struct LightMeter {
     sun_direction: DVec3,
     means: Option<(Time, Means)>,
+    tones: Option<(Time, SeaTones)>,
 }
 
 impl LightMeter {
     /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world).
     pub fn new(sun_direction: DVec3) -> Self {
-        Self { sun_direction, means: None }
+        Self { sun_direction, means: None, tones: None }
     }
 
     /// Takes in a picture whose camera stood at `camera` with `lens` (the picture's own, not the screen's).
     pub fn observe(&mut self, time: Time, picture: &Picture, lens: &Lens, camera: &CameraPose) {
+        if let Some(seen) = tones(picture, lens, camera) {
+            let seen = match self.tones {
+                None => seen,
+                Some((since, old)) => old.towards(&seen, follow(since, time)),
+            };
+            self.tones = Some((time, seen));
+        }
         let Some(seen) = measure(picture, lens, camera) else { return };
         let means = match self.means {
             None => seen,
             Some((since, old)) => {
-                let share = (1.0 - (-time.secs_since(since).max(0.0) / FOLLOW_S).exp()) as f32;
+                let share = follow(since, time);
                 Means {
                     sky: old.sky.lerp(seen.sky, share),
                     horizon: old.horizon.lerp(seen.horizon, share),
@@ -71,6 +83,11 @@ impl LightMeter {
             }
         };
         self.means = Some((time, means));
+    }
+
+    /// How bright the sea is.
+    pub fn tones(&self) -> SeaTones {
+        self.tones.map(|(_, tones)| tones).unwrap_or_default()
     }
 
     /// The light to draw boats with. Before the first picture: an overcast grey.
@@ -82,6 +99,47 @@ impl LightMeter {
         let sun = sun_colour(self.sun_direction.z) * sky.element_sum() / 3.0 * SUN_TO_SKY;
         Light { sun_direction: self.sun_direction, sun, sky, horizon, sea }
     }
+}
+
+/// Share of the way that the estimate goes to what is seen at `time`.
+fn follow(since: Time, time: Time) -> f32 {
+    (1.0 - (-time.secs_since(since).max(0.0) / FOLLOW_S).exp()) as f32
+}
+
+/// Sea is looked at from this far below the horizontal, tangent: what is nearer the horizon is haze and other boats.
+const SEA_FROM: f64 = 0.008;
+/// Pixels looked at along the picture's width, and from the horizon down.
+const SEA_GRID: (usize, usize) = (24, 20);
+
+fn tones(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<SeaTones> {
+    let (w, h) = (f64::from(lens.width), f64::from(lens.height));
+    let down = |pixel: DVec2| {
+        let up = (camera.world_from_camera * lens.unproject(pixel)).z;
+        -up / (1.0 - up * up).max(1e-12).sqrt()
+    };
+    // Rows from the first that shows sea down to the lowest, closer to each other near the horizon. Tangents grow about evenly downwards.
+    let middle = |y: f64| down(DVec2::new(w / 2.0, y * h));
+    let (top, bottom) = (middle(0.0), middle(1.0));
+    let first = ((SEA_FROM - top) / (bottom - top).max(1e-9)).clamp(0.0, 1.0);
+    let mut samples = [Sample { tangent: 0.0, luma: 0.0 }; SEA_GRID.0 * SEA_GRID.1];
+    let mut count = 0;
+    for i in 0..samples.len() {
+        let (column, row) = (i % SEA_GRID.0, i / SEA_GRID.0);
+        let share = ((row as f64 + 0.5) / SEA_GRID.1 as f64).powi(2);
+        let y = (first + share * (1.0 - first)) * h;
+        let x = (column as f64 + 0.5 + 0.4 * (row % 2) as f64) / (SEA_GRID.0 as f64 + 0.5) * w;
+        let tangent = down(DVec2::new(x, y));
+        if tangent < SEA_FROM {
+            continue;
+        }
+        let place = DVec2::new(x / w * f64::from(picture.width()), y / h * f64::from(picture.height()));
+        let code = Vec3::from(picture.srgb_at(place.x as u32, place.y as u32));
+        if let Some(sample) = samples.get_mut(count) {
+            *sample = Sample { tangent, luma: f64::from(code.dot(LUMINANCE)) };
+            count += 1;
+        }
+    }
+    SeaTones::fit(samples.get(..count)?)
 }
 
 /// Colour of direct sun light relative to a high sun's green, for the sine of its elevation; black below the horizon.

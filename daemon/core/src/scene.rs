@@ -1,11 +1,12 @@
 //! What one frame shows: the session's output, the renderer's only input besides the picture.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     fault::Fault,
     geometry::{CameraPose, Lens, RigidPose},
     model::ModelId,
+    reflection::SeaTones,
     sea::BeaufortForce,
 };
 
@@ -28,6 +29,10 @@ pub struct Scene {
     pub light: Light,
     /// How the sea mirrors.
     pub water: Water,
+    /// Velocity of the wind 10 m above the sea, world x and y, m/s.
+    pub wind: DVec2,
+    /// How bright the sea is in the picture.
+    pub tones: SeaTones,
     /// The head-up display.
     pub hud: Hud,
 }
@@ -234,11 +239,25 @@ pub enum ReflectionMethod {
     FullAsPrinted,
     /// The same, singular cases mended and distances tied to the boat's size on the screen.
     Full,
+    /// Nelson 2009, Physics shader, eq. 9-16 and table 1, as printed.
+    PhysicsAsPrinted,
+    /// The same with the normal from the slope, waves of the wind force's spectrum, and phases that hold at any distance.
+    Physics,
+    /// What waves of that wind throw back, from the table of [`crate::reflection`].
+    Waves,
 }
 
 impl ReflectionMethod {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Off, Self::Mirror, Self::Full, Self::FullAsPrinted];
+    pub const ALL: [Self; 7] = [
+        Self::Off,
+        Self::Mirror,
+        Self::Full,
+        Self::FullAsPrinted,
+        Self::Physics,
+        Self::PhysicsAsPrinted,
+        Self::Waves,
+    ];
 
     /// The name used in scenarios, on the command line and in tables.
     pub const fn name(self) -> &'static str {
@@ -247,6 +266,9 @@ impl ReflectionMethod {
             Self::Mirror => "mirror",
             Self::FullAsPrinted => "full_as_printed",
             Self::Full => "full",
+            Self::Physics => "physics",
+            Self::PhysicsAsPrinted => "physics_as_printed",
+            Self::Waves => "waves",
         }
     }
 

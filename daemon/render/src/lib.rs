@@ -13,6 +13,7 @@ mod glyphs;
 mod gpu;
 mod hud_layout;
 mod import;
+mod lobes;
 mod memory;
 mod meshes;
 mod parts;

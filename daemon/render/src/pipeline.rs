@@ -16,6 +16,10 @@ pub(crate) const SRGB: vk::Format = vk::Format::R8G8B8A8_SRGB;
 pub(crate) const UNORM: vk::Format = vk::Format::R8G8B8A8_UNORM;
 /// Linear light in memory: a driver that runs on the processor samples it several times as fast as codes.
 pub(crate) const LIGHT: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
+/// Sums of light.
+pub(crate) const SUMS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
+/// Most images that a pass draws to at once.
+pub(crate) const TARGETS_MAX: usize = 3;
 /// Depth, reverse-Z.
 pub(crate) const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 /// Samples a pixel of the boats' layer.
@@ -199,6 +203,8 @@ pub(crate) enum Blend {
     Replace,
     /// Premultiplied light over it.
     Over,
+    /// It is added.
+    Add,
 }
 
 /// What tells one pipeline from another.
@@ -214,6 +220,8 @@ pub(crate) struct PipelineShape<'a> {
     pub(crate) vertices: Option<(u32, &'a [(vk::Format, u32)])>,
     pub(crate) topology: vk::PrimitiveTopology,
     pub(crate) colour: vk::Format,
+    /// Images of that format that are drawn to at once, 1 to [`TARGETS_MAX`].
+    pub(crate) targets: usize,
     pub(crate) blend: Blend,
     /// Leaves out back faces, front ones being seen this way round.
     pub(crate) cull: Option<vk::FrontFace>,
@@ -301,12 +309,14 @@ impl Pipeline {
             .depth_test_enable(shape.depth)
             .depth_write_enable(shape.depth)
             .depth_compare_op(vk::CompareOp::GREATER);
-        let blends = [blend_state(shape.blend)];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
+        let targets = shape.targets.clamp(1, TARGETS_MAX);
+        let blends = [blend_state(shape.blend); TARGETS_MAX];
+        let blends = &blends[..targets];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(blends);
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
-        let formats = [shape.colour];
-        let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+        let formats = [shape.colour; TARGETS_MAX];
+        let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..targets]);
         if shape.depth {
             rendering = rendering.depth_attachment_format(DEPTH);
         }
@@ -377,8 +387,9 @@ fn blend_state(blend: Blend) -> vk::PipelineColorBlendAttachmentState {
         vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
     match blend {
         Blend::Replace => state,
-        Blend::Over => {
-            let (one, rest) = (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
+        Blend::Over | Blend::Add => {
+            let one = vk::BlendFactor::ONE;
+            let rest = if blend == Blend::Add { one } else { vk::BlendFactor::ONE_MINUS_SRC_ALPHA };
             state
                 .blend_enable(true)
                 .src_color_blend_factor(one)

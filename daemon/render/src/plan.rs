@@ -7,7 +7,9 @@ use bowwave_core::{
     scene::{BoatView, Pass, PixelRect, ReflectionMethod, Scene},
 };
 use glam::DVec2;
-use shaders_spirv::interface::{BOAT_BLOCKS_MAX, BoatBlock, RoundBlock, WATERS_MAX, WaterBlock};
+use shaders_spirv::interface::{
+    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, ReflectBlock, RoundBlock, WATERS_MAX, WaterBlock,
+};
 
 use crate::{
     atlas::{self, Placed},
@@ -15,15 +17,17 @@ use crate::{
     frame_data::Capacity,
     frame_data::RECTS_MAX,
     hud_layout::KINDS,
+    lobes::{Waves, reflect_block},
     passes::{
         boats::BoatDraw,
+        reflect::ReflectDraw,
         rounds::{RoundDraw, pieces},
         water::WaterDraw,
     },
     rects::{corners, cut, joined, overlap, rect},
     rounds::round_block,
     view,
-    water::{self, HullLine, hull_line, mirror_scale, water_block},
+    water::{self, HullLine, PHYSICS_WAVES, hull_line, mirror_scale, physics_waves, water_block},
 };
 
 /// Pixels beyond a reflection's rectangle at which the water shader still compares the video: nine gradients of at most eight
@@ -85,6 +89,12 @@ pub(crate) struct Plan {
     pub(crate) mirror_places: Vec<Placed>,
     places: Vec<Placed>,
     pub(crate) waters: Vec<WaterDraw>,
+    /// What the sea throws back of each of `waters`, where the method asks for it.
+    pub(crate) lobe_blocks: Vec<LobeBlock>,
+    /// Waves of the mended Physics shader about the nearest boat.
+    pub(crate) physics: Option<[[f32; 4]; PHYSICS_WAVES]>,
+    /// The pixels of all of `waters`, each once, and how bright the sea is there; for the same method.
+    pub(crate) reflect: Option<(ReflectDraw, ReflectBlock)>,
     pub(crate) rounds: Vec<RoundDraw>,
     /// Pixels that hulls can cover, each once.
     pub(crate) hulls: Vec<PixelRect>,
@@ -104,11 +114,12 @@ pub(crate) struct Plan {
     wanted: Vec<(PixelRect, f64)>,
     lines: Vec<(usize, HullLine)>,
     rest: Vec<PixelRect>,
+    waves: Option<Waves>,
 }
 
 impl Plan {
     pub(crate) fn with_capacity(capacity: Capacity, size: (u32, u32)) -> Self {
-        let Capacity { boats, rounds } = capacity;
+        let Capacity { boats, rounds, lobes } = capacity;
         Self {
             boat_blocks: Vec::with_capacity(boats * 2),
             water_blocks: Vec::with_capacity(boats),
@@ -118,6 +129,10 @@ impl Plan {
             places: Vec::with_capacity(boats),
             mirror_places: Vec::with_capacity(boats),
             waters: Vec::with_capacity(boats),
+            lobe_blocks: Vec::with_capacity(lobes),
+            physics: None,
+            reflect: None,
+            waves: (lobes > 0).then(Waves::new),
             rounds: Vec::with_capacity(rounds * 4),
             hulls: Vec::with_capacity(HULL_RECTS_MAX),
             clears: Vec::with_capacity(HULL_RECTS_MAX),
@@ -156,6 +171,9 @@ impl Plan {
         self.places.clear();
         self.mirror_places.clear();
         self.waters.clear();
+        self.lobe_blocks.clear();
+        self.reflect = None;
+        self.physics = None;
         self.rounds.clear();
         self.hulls.clear();
         self.clears.clear();
@@ -218,6 +236,8 @@ impl Plan {
         }
         atlas::place(atlas, &self.wanted, &mut self.places);
         let mirrored = scene.water.method != ReflectionMethod::Off;
+        let waves = scene.water.method == ReflectionMethod::Waves;
+        let screen = PixelRect { x: 0, y: 0, width: size.0, height: size.1 };
         for (n, placed) in self.places.iter().enumerate() {
             let ((i, line), (rect, _)) = (&self.lines[n], self.wanted[n]);
             let boat = &scene.boats[*i];
@@ -228,7 +248,14 @@ impl Plan {
                 ReflectionMethod::Full => 1.5 * f64::from(atlas::SOFT) / placed.scale,
                 _ => 0.0,
             };
-            if mirrored {
+            if let Some(waves) = self.waves.as_mut().filter(|_| waves) {
+                self.lobe_blocks.truncate(self.water_blocks.len());
+                self.lobe_blocks.push(LobeBlock::default());
+                let lobes = self.lobe_blocks.last_mut();
+                let reach = lobes.and_then(|out| waves.block(scene, boat, line, model, out));
+                let Some(reach) = reach else { continue };
+                waves.mark(&reach, line, &mut self.cells, screen);
+            } else if mirrored {
                 solid.mark(
                     &mut self.cells,
                     rect,
@@ -241,7 +268,9 @@ impl Plan {
                 );
             }
             line.mark_shadow(&mut self.cells, rect, &block);
-            line.unmark_dry(&mut self.cells, &block);
+            if !waves {
+                line.unmark_dry(&mut self.cells, &block, scene.water.method);
+            }
             self.rest.clear();
             let Some(around) = self.cells.take(&mut self.rest, WATER_RECTS_MAX) else { continue };
             if self.list.len() + self.rest.len() > RECTS_MAX {
@@ -266,6 +295,30 @@ impl Plan {
                 self.mirror_places.push(*placed);
             }
         }
+        if waves {
+            self.join_waters(scene);
+        }
+        if scene.water.method == ReflectionMethod::Physics {
+            self.physics = scene.boats.last().map(|boat| physics_waves(scene, boat));
+        }
+    }
+
+    /// The pixels of all boats' water, each once.
+    fn join_waters(&mut self, scene: &Scene) {
+        let Some(end) = self.waters.last().map(|w| (w.first + w.count) as usize) else { return };
+        let from = self.waters.first().map_or(end, |w| w.first as usize);
+        for r in self.list.get(from..end).unwrap_or(&[]) {
+            let [x, y, right, lower] = r.map(|v| v as u32);
+            self.cells.mark(PixelRect { x, y, width: right - x, height: lower - y });
+        }
+        self.rest.clear();
+        self.cells.take(&mut self.rest, WATER_RECTS_MAX);
+        if self.list.len() + self.rest.len() > RECTS_MAX {
+            return;
+        }
+        let draw = ReflectDraw { first: self.list.len() as u32, count: self.rest.len() as u32 };
+        self.list.extend(self.rest.iter().map(|r| corners(*r)));
+        self.reflect = Some((draw, reflect_block(scene)));
     }
 
     fn plan_rounds(&mut self, scene: &Scene) {

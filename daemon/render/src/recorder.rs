@@ -83,11 +83,23 @@ impl Recorder<'_> {
         colour: (vk::ImageView, Begin),
         depth: Option<(vk::ImageView, Begin)>,
     ) {
-        let colours = [vk::RenderingAttachmentInfo::default()
-            .image_view(colour.0)
-            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-            .load_op(colour.1.op())
-            .store_op(vk::AttachmentStoreOp::STORE)];
+        self.begin_all(area, [colour], depth);
+    }
+
+    /// The same to several colour images.
+    pub(crate) fn begin_all<const N: usize>(
+        &self,
+        area: PixelRect,
+        colours: [(vk::ImageView, Begin); N],
+        depth: Option<(vk::ImageView, Begin)>,
+    ) {
+        let colours = colours.map(|(view, begin)| {
+            vk::RenderingAttachmentInfo::default()
+                .image_view(view)
+                .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+                .load_op(begin.op())
+                .store_op(vk::AttachmentStoreOp::STORE)
+        });
         let mut info =
             vk::RenderingInfo::default().render_area(rect(area)).layer_count(1).color_attachments(&colours);
         let depth = depth.map(|(view, begin)| {

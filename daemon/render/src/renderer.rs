@@ -9,6 +9,8 @@ use bowwave_core::{
     scene::{Pass, ReflectionMethod, Scene, ShadowLevel, Water},
 };
 
+use shaders_spirv::interface::WATERS_MAX;
+
 use crate::{
     canvas::Canvas,
     error::{Named, RenderError},
@@ -22,6 +24,7 @@ use crate::{
         hud::HudPass,
         mirror::MirrorPass,
         pictures::{PictureCounts, PicturePath, PictureShape},
+        reflect::ReflectPass,
         rounds::RoundsPass,
         video::VideoPass,
         water::WaterPass,
@@ -42,6 +45,14 @@ pub struct Needs {
     pub rounds_max: usize,
     /// How the sea may have to mirror.
     pub waters: Vec<(ReflectionMethod, ShadowLevel)>,
+}
+
+impl Needs {
+    /// Boats whose light waves throw back.
+    fn lobes(&self) -> usize {
+        let any = self.waters.iter().any(|(method, _)| *method == ReflectionMethod::Waves);
+        if any { self.boats_max.min(WATERS_MAX) } else { 0 }
+    }
 }
 
 /// How a renderer is made.
@@ -101,6 +112,7 @@ struct Passes {
     meshes: Meshes,
     mirror: Option<MirrorPass>,
     water: Option<WaterPass>,
+    reflect: Option<ReflectPass>,
     boats: Option<BoatsPass>,
     rounds: Option<RoundsPass>,
     hud: HudPass,
@@ -120,11 +132,17 @@ impl Passes {
         let water = (any_boat && !needs.waters.is_empty())
             .then(|| WaterPass::new(making, mirror.as_ref(), &needs.waters))
             .transpose()?;
+        let reflect = match (&mirror, &water) {
+            (Some(mirror), Some(water)) if needs.lobes() > 0 => {
+                Some(ReflectPass::new(making, mirror, &water.backdrop, needs.lobes())?)
+            }
+            _ => None,
+        };
         let boats = any_boat.then(|| BoatsPass::new(making, &meshes, textured)).transpose()?;
         let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(making, boats.as_ref())).transpose()?;
         let video = VideoPass::new(making, config.picture)?;
         let hud = HudPass::new(making)?;
-        Ok(Self { video, meshes, mirror, water, boats, rounds, hud })
+        Ok(Self { video, meshes, mirror, water, reflect, boats, rounds, hud })
     }
 }
 
@@ -146,7 +164,8 @@ impl Renderer {
         let canvas = Canvas::new(&making)?;
         let passes = Passes::new(&making, config, models)?;
         let needs = config.needs.clone();
-        let capacity = Capacity { boats: needs.boats_max, rounds: needs.rounds_max };
+        let capacity =
+            Capacity { boats: needs.boats_max, rounds: needs.rounds_max, lobes: needs.lobes() };
         let mut slots = Vec::with_capacity(count);
         for _ in 0..count {
             let data = FrameData::new(&gpu, &sets, &frame_set, capacity)?;
@@ -270,6 +289,10 @@ impl Renderer {
         slot.data.write_frame(&view::frame_block(scene));
         slot.data.write_boats(&plan.boat_blocks);
         slot.data.write_waters(&plan.water_blocks);
+        slot.data.write_lobes(&plan.lobe_blocks);
+        if let Some(waves) = &plan.physics {
+            slot.data.write_waves(waves);
+        }
         slot.data.write_rounds(&plan.round_blocks);
         slot.data.write_rects(&plan.list);
         plan.quads = Default::default();
@@ -281,7 +304,9 @@ impl Renderer {
         plan.regions.extend(plan.rects.iter().map(|r| self.canvas.region(*r)));
         plan.backdrop_regions.clear();
         if WaterPass::reads_video(scene.water.method) {
-            let below = plan.waters.iter().map(|w| with_gradients(w.rect, size));
+            let compares = scene.water.method != ReflectionMethod::Waves;
+            let below = |r| if compares { with_gradients(r, size) } else { r };
+            let below = plan.waters.iter().map(|w| below(w.rect));
             plan.backdrop_regions.extend(below.map(|r| self.canvas.region(r)));
         }
     }
@@ -351,6 +376,9 @@ impl Renderer {
         if let Some(pass) = mirror.filter(|_| how.method == ReflectionMethod::Full) {
             stamps.around(Span::Soften, || pass.record_soft(to, &plan.mirror_places));
         }
+        if let Some(pass) = self.passes.reflect.as_ref().filter(|_| plan.reflect.is_some()) {
+            stamps.around(Span::Soften, || pass.record_layers(to, frame, &plan.waters));
+        }
         stamps.around(Span::VideoCopy, || video.record_copy(to, screen));
     }
 
@@ -388,7 +416,12 @@ impl Renderer {
             return;
         }
         if let Some(pass) = water {
-            stamps.around(Span::Water, || pass.record(to, frame, how, &plan.waters));
+            stamps.around(Span::Water, || {
+                pass.record(to, frame, how, &plan.waters);
+                if let (Some(pass), Some((draw, block))) = (&self.passes.reflect, &plan.reflect) {
+                    pass.record(to, frame, *draw, block);
+                }
+            });
         }
         if let Some(pass) = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty()) {
             stamps.around(Span::Composite, || pass.record_composite(to, frame, plan.hulls.len() as u32));

@@ -4,6 +4,7 @@ use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
     scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
+    reflection::SeaTones,
     sea::BeaufortForce,
     view::{Afloat, Eye},
 };
@@ -33,6 +34,8 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             force: BeaufortForce::new(1).unwrap(),
             shadow: ShadowLevel::Gradual,
         },
+        wind: DVec2::new(0.6, 0.6),
+        tones: SeaTones::default(),
         hud: Hud {
             status: Status::Ready,
             warning: None,

@@ -1,14 +1,16 @@
 //! The numbers of Nelson 2009's Full Reflection shader (eq. 4-8) for one boat in one frame. The thesis gives the formulas but not
 //! their constants; those here were chosen by eye against photographs, for each wind force 0 to 4.
 
+use std::f64::consts::TAU;
+
 use bowwave_core::{
     geometry::RigidPose,
     model::Model,
     scene::{BoatView, PixelRect, ReflectionMethod, Scene, ShadowLevel},
-    sea::fresnel,
+    sea::{Spectrum, WaveField, WaveSpec, fresnel},
 };
 use glam::{DVec2, DVec3};
-use shaders_spirv::interface::{HULL_LINE_COLUMNS, WaterBlock};
+use shaders_spirv::interface::{HULL_LINE_COLUMNS, LOBE_COLUMNS, WaterBlock};
 
 use crate::{
     atlas::{Placed, SCALE_MAX},
@@ -54,8 +56,21 @@ const STEP_MAX_PX: f64 = 8.0;
 const SHIFT_NEAR: f64 = 0.15;
 const SHIFT_GROWN_HEIGHTS: f64 = 0.8;
 
+/// Physics as printed: height and frequency of wave and swell (metres, radians a metre), by wind force. The thesis names but does not
+/// state them: amplitudes of the force's probable wave height, lengths of its peak and of a fifth of it.
+const PRINTED_WAVES: [[f64; 4]; FORCE_MAX + 1] = [
+    [0.002, 12.0, 0.002, 3.0],
+    [0.008, 8.0, 0.015, 1.6],
+    [0.02, 4.0, 0.03, 0.8],
+    [0.05, 1.6, 0.09, 0.27],
+    [0.08, 0.9, 0.15, 0.16],
+];
+
 /// Wind speed in the middle of each force, m/s (WMO-No. 306, code table 1100).
 const WIND_M_S: [f64; FORCE_MAX + 1] = [0.1, 0.9, 2.5, 4.4, 6.7];
+
+/// Waves of the mended Physics shader, as `water.frag` has it.
+pub(crate) const PHYSICS_WAVES: usize = 8;
 
 /// Where a boat's hull meets the water, on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,23 +139,18 @@ impl HullLine {
             return;
         }
         let depth = f64::from(block.shadow / block.shadow_fall);
-        let (low, high) = self.extent();
-        let across = DVec2::new(self.down.y, -self.down.x);
-        let last = self.first + self.pitch * (HULL_LINE_COLUMNS - 1) as f64;
-        let (mut from, mut to) = (DVec2::MAX, DVec2::MIN);
-        for x in [self.first - 0.25 * depth, last + 0.25 * depth] {
-            for y in [low, high + depth] {
-                let p = self.anchor + across * x + self.down * y;
-                (from, to) = (from.min(p), to.max(p));
-            }
-        }
-        cells.mark_span(from - 1.0, to + 1.0, within);
+        let ((low, high), (left, right)) = (self.extent(), self.ends());
+        self.mark([left - 0.25 * depth, right + 0.25 * depth], [low, high + depth], cells, within);
     }
 
     /// Takes back the marks of cells that lie above the hull-water line, or below where reflection and shadow have faded.
-    pub(crate) fn unmark_dry(&self, cells: &mut Cells, block: &WaterBlock) {
-        let reach =
-            f64::from(block.alpha / block.alpha_fall).max(f64::from(block.shadow / block.shadow_fall));
+    pub(crate) fn unmark_dry(&self, cells: &mut Cells, block: &WaterBlock, method: ReflectionMethod) {
+        let faded = match method {
+            // These do not fade: they end where nothing is mirrored.
+            ReflectionMethod::Physics | ReflectionMethod::PhysicsAsPrinted => f64::INFINITY,
+            _ => f64::from(block.alpha / block.alpha_fall),
+        };
+        let reach = faded.max(f64::from(block.shadow / block.shadow_fall));
         let (low, high) = self.extent();
         cells.unmark(|corners| {
             let below = corners.map(|c| (c - self.anchor).dot(self.down));
@@ -148,8 +158,26 @@ impl HullLine {
         });
     }
 
+    /// Marks the cells of a span: from and to right of the anchor, from and to below it, pixels.
+    pub(crate) fn mark(&self, across: [f64; 2], below: [f64; 2], cells: &mut Cells, within: PixelRect) {
+        let right = DVec2::new(self.down.y, -self.down.x);
+        let (mut from, mut to) = (DVec2::MAX, DVec2::MIN);
+        for x in across {
+            for y in below {
+                let p = self.anchor + right * x + self.down * y;
+                (from, to) = (from.min(p), to.max(p));
+            }
+        }
+        cells.mark_span(from - 1.0, to + 1.0, within);
+    }
+
+    /// Left and right end of the line, pixels right of the anchor.
+    pub(crate) fn ends(&self) -> (f64, f64) {
+        (self.first, self.first + self.pitch * (HULL_LINE_COLUMNS - 1) as f64)
+    }
+
     /// Highest and lowest point of the line, pixels below the anchor.
-    fn extent(&self) -> (f64, f64) {
+    pub(crate) fn extent(&self) -> (f64, f64) {
         self.below.iter().fold((f64::MAX, f64::MIN), |(low, high), b| (low.min(*b), high.max(*b)))
     }
 }
@@ -160,10 +188,10 @@ pub(crate) fn reach_px(block: &WaterBlock, method: ReflectionMethod, softened_px
     let limit = f64::from(block.shift_limit);
     let blur = f64::from(block.blur[0] / block.mirror_scale[0]) + softened_px;
     let shift = match method {
-        ReflectionMethod::Off | ReflectionMethod::Mirror => DVec2::ZERO,
+        ReflectionMethod::Off | ReflectionMethod::Mirror | ReflectionMethod::Waves => DVec2::ZERO,
         // Both coordinates shift by as much.
-        ReflectionMethod::FullAsPrinted => DVec2::splat(limit),
-        ReflectionMethod::Full => {
+        ReflectionMethod::FullAsPrinted | ReflectionMethod::PhysicsAsPrinted => DVec2::splat(limit),
+        ReflectionMethod::Full | ReflectionMethod::Physics => {
             let down = DVec2::from(block.down.map(f64::from)).abs();
             (down + SIDEWAYS * DVec2::new(down.y, down.x)) * limit
         }
@@ -194,6 +222,11 @@ fn lower(below: &mut [f64; HULL_LINE_COLUMNS], a: DVec2, b: DVec2) {
 pub(crate) fn mirror_scale(scene: &Scene, line: &HullLine) -> f64 {
     match scene.water.method {
         ReflectionMethod::Full => SCALE_MAX / blur_px(scene, line).max(1.0),
+        // Its bands have so many columns; twice as many texels keep what is thin.
+        ReflectionMethod::Waves => {
+            let (left, right) = line.ends();
+            (2.0 * f64::from(LOBE_COLUMNS) / (right - left).max(1.0)).min(1.0)
+        }
         _ => 1.0,
     }
 }
@@ -210,7 +243,10 @@ fn blur_px(scene: &Scene, line: &HullLine) -> f64 {
 pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, placed: &Placed) -> WaterBlock {
     let force = force(scene);
     let height = line.height.max(1.0);
-    let mended = scene.water.method != ReflectionMethod::FullAsPrinted;
+    let mended = !matches!(
+        scene.water.method,
+        ReflectionMethod::FullAsPrinted | ReflectionMethod::PhysicsAsPrinted
+    );
     let shadow_level = match scene.water.shadow {
         ShadowLevel::None => None,
         ShadowLevel::Gradual => Some(0),
@@ -235,7 +271,7 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
     let texels = DVec2::new(f64::from(placed.atlas.0), f64::from(placed.atlas.1));
     let scale = DVec2::splat(placed.scale) / texels;
     let pair = |v: DVec2| v.as_vec2().to_array();
-    WaterBlock {
+    let block = WaterBlock {
         anchor: pair(line.anchor),
         down: pair(line.down),
         columns: [line.first as f32, (1.0 / line.pitch) as f32],
@@ -257,7 +293,51 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
         pad0: 0.0,
         pad1: 0.0,
         hull_line: line.below.map(|b| b as f32),
+    };
+    match scene.water.method {
+        ReflectionMethod::PhysicsAsPrinted | ReflectionMethod::Physics => physics_block(scene, boat, line, block),
+        _ => block,
     }
+}
+
+/// What the Physics shaders read in place of what is the other shader's alone.
+fn physics_block(scene: &Scene, boat: &BoatView, line: &HullLine, block: WaterBlock) -> WaterBlock {
+    let eye = (scene.camera.position.z - boat.water_level).max(0.01);
+    let range = (boat.pose.position - scene.camera.position).truncate().length().max(0.1);
+    let tangent = eye / range;
+    // The hull stands on the line: so many pixels are its height in metres.
+    let focal = scene.lens.focal.y;
+    let height = line.height * range / focal;
+    let block = WaterBlock { passes: [tangent, 1.0 / focal, eye, height].map(|v| v as f32), ..block };
+    if scene.water.method == ReflectionMethod::Physics {
+        return block;
+    }
+    let [alpha, alpha_fall, shift_near, shift_grow] = PRINTED_WAVES[force(scene)].map(|v| v as f32);
+    WaterBlock { alpha, alpha_fall, shift_near, shift_grow, ..block }
+}
+
+/// Waves of the sea's spectrum for the mended Physics shader: radians a metre away from the eye and to the right, amplitude, and phase at
+/// the boat.
+pub(crate) fn physics_waves(scene: &Scene, boat: &BoatView) -> [[f32; 4]; PHYSICS_WAVES] {
+    let spec = WaveSpec {
+        spectrum: Spectrum::of_force(scene.water.force),
+        wind_from: (-scene.wind.x).atan2(-scene.wind.y),
+    };
+    let field = WaveField::new(&spec, 0);
+    let away = (boat.pose.position - scene.camera.position).truncate();
+    let away = away.try_normalize().unwrap_or(DVec2::Y);
+    let right = DVec2::new(away.y, -away.x);
+    let at = boat.pose.position.truncate();
+    let time_s = scene.frame as f64 / 30.0;
+    let mut out = [[0.0; 4]; PHYSICS_WAVES];
+    // All waves carry the same energy: so few of them stand for all with the root of the ratio of their numbers.
+    let every = (field.waves().len() / PHYSICS_WAVES).max(1);
+    for (slot, wave) in out.iter_mut().zip(field.waves().iter().step_by(every)) {
+        let k = wave.cycles_per_m * TAU;
+        let amplitude = wave.amplitude_m * (every as f64).sqrt();
+        *slot = [k.dot(away), k.dot(right), amplitude, wave.phase(at, time_s)].map(|v| v as f32);
+    }
+    out
 }
 
 /// Share of a boat's light that the sea throws back at the boat's range: Fresnel's formula for unpolarised light, at the

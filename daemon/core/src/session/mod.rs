@@ -162,6 +162,8 @@ impl Session {
             rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
             light: meter.light(),
             water: scenario.water,
+            wind: scenario.wind.truncate(),
+            tones: meter.tones(),
             hud: Hud {
                 status: Status::Ready,
                 warning: None,
@@ -391,6 +393,7 @@ impl Session {
         }
         scene.passes = self.plan.frame(camera.is_some(), &scene.boats, &scene.rounds);
         scene.light = self.meter.light();
+        scene.tones = self.meter.tones();
         scene.hud = Hud {
             status,
             warning,

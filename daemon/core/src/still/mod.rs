@@ -14,7 +14,7 @@ use crate::{
     light::LightMeter,
     model::{Model, ModelId},
     plan::{Needs, ScenePlan},
-    scenario::{CAMERA_CLEAR_M, ScenarioError, table::Mark},
+    scenario::{CAMERA_CLEAR_M, ScenarioError, place, table::Mark},
     scene::{Hud, LeftOut, Pass, PassDecision, Scene, Status, Water},
     sea::{WaveField, WaveSpec},
     time::Time,
@@ -152,6 +152,8 @@ impl Still {
             rounds: Vec::new(),
             light,
             water: self.water,
+            wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),
+            tones: meter.tones(),
             hud,
         };
         Ok(Composed { scene, plan })

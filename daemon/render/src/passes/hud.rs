@@ -57,6 +57,7 @@ impl HudPass {
                     vertices: None,
                     topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                     colour: SRGB,
+                    targets: 1,
                     blend: Blend::Over,
                     cull: None,
                     depth: false,

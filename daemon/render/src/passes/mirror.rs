@@ -160,6 +160,7 @@ impl Soft {
                 vertices: None,
                 topology: vk::PrimitiveTopology::TRIANGLE_LIST,
                 colour: LIGHT,
+                targets: 1,
                 blend: Blend::Replace,
                 cull: None,
                 depth: false,

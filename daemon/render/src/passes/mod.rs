@@ -4,6 +4,7 @@ pub(crate) mod boats;
 pub(crate) mod hud;
 pub(crate) mod mirror;
 pub(crate) mod pictures;
+pub(crate) mod reflect;
 pub(crate) mod rounds;
 pub(crate) mod video;
 pub(crate) mod water;

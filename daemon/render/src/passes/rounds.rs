@@ -106,6 +106,7 @@ fn pipeline(making: &Making<'_>, fragment: Shader, sets: &[&SetLayout]) -> Resul
             vertices: None,
             topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
             colour: SRGB,
+            targets: 1,
             blend: Blend::Over,
             cull: None,
             depth: false,

@@ -95,6 +95,7 @@ impl VideoPass {
                     vertices: None,
                     topology: vk::PrimitiveTopology::TRIANGLE_LIST,
                     colour: self.packed.shape.format,
+                    targets: 1,
                     blend: Blend::Replace,
                     cull: None,
                     depth: false,

@@ -74,7 +74,7 @@ impl WaterPass {
         let bound = |view: vk::ImageView| Bound::Texture { view, sampler: linear.raw, layout: SAMPLED.2 };
         let field = waters
             .iter()
-            .any(|(method, _)| *method == ReflectionMethod::Full)
+            .any(|(method, _)| has_field(*method))
             .then(|| Field::new(making, bound(backdrop.view)))
             .transpose()?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; 3];
@@ -82,31 +82,32 @@ impl WaterPass {
         // Variants that read no mirror layer or no field still name one.
         let plain = mirror.map_or(backdrop.view, |m| m.colour.view);
         let field_view = field.as_ref().map_or(backdrop.view, |f| f.image.view);
-        let set = making.pool.set(&set_layout, &[backdrop.view, plain, backdrop.view].map(bound))?;
+        let set = making.pool.set(&set_layout, &[backdrop.view, plain, field_view].map(bound))?;
         let soft = match mirror.and_then(MirrorPass::soft_view) {
             Some(soft) => Some(making.pool.set(&set_layout, &[backdrop.view, soft, field_view].map(bound))?),
             None => None,
         };
         let mut variants = Vec::with_capacity(waters.len());
-        for (method, shadow) in waters {
+        for (method, shadow) in waters.iter().filter_map(|(m, s)| drawn(*m, *s)) {
             let pipeline = Pipeline::new(
                 gpu,
                 &PipelineShape {
                     vertex: RECT_VERT,
                     fragment: WATER_FRAG,
-                    constants: &[method_constant(*method), shadow_constant(*shadow)],
+                    constants: &[method_constant(method), shadow_constant(shadow)],
                     sets: &[making.frame_set, &set_layout],
                     push: size_of::<DrawBlock>(),
                     vertices: None,
                     topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                     colour: SRGB,
+                    targets: 1,
                     blend: Blend::Over,
                     cull: None,
                     depth: false,
                     samples: vk::SampleCountFlags::TYPE_1,
                 },
             )?;
-            variants.push(Variant { method: *method, shadow: *shadow, pipeline });
+            variants.push(Variant { method, shadow, pipeline });
         }
         Ok(Self {
             size: making.size,
@@ -122,16 +123,17 @@ impl WaterPass {
 
     /// Whether a method compares colours of the video.
     pub(crate) fn reads_video(method: ReflectionMethod) -> bool {
-        matches!(method, ReflectionMethod::Full | ReflectionMethod::FullAsPrinted)
+        !matches!(method, ReflectionMethod::Off | ReflectionMethod::Mirror)
     }
 
     /// Whether this way to mirror was compiled.
     pub(crate) fn has(&self, water: Water) -> bool {
-        self.variant(water).is_some()
+        drawn(water.method, water.shadow).is_none() || self.variant(water).is_some()
     }
 
     fn variant(&self, water: Water) -> Option<&Variant> {
-        self.variants.iter().find(|v| (v.method, v.shadow) == (water.method, water.shadow))
+        let wanted = drawn(water.method, water.shadow)?;
+        self.variants.iter().find(|v| (v.method, v.shadow) == wanted)
     }
 
     /// Step of the backdrop from what the frame before did to being copied to.
@@ -143,7 +145,7 @@ impl WaterPass {
     /// Steps of the backdrop to being sampled, and of the field to being drawn.
     pub(crate) fn between(&self, water: Water) -> [Option<Step<'_>>; 2] {
         let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
-        let field = self.field.as_ref().filter(|_| water.method == ReflectionMethod::Full);
+        let field = self.field.as_ref().filter(|_| has_field(water.method));
         [
             Some(Step { image: &self.backdrop, from: COPIED_TO, to: SAMPLED }),
             field.map(|f| Step { image: &f.image, from: was, to: DRAWN }),
@@ -158,7 +160,7 @@ impl WaterPass {
         water: Water,
         boats: &[WaterDraw],
     ) {
-        let Some(field) = self.field.as_ref().filter(|_| water.method == ReflectionMethod::Full) else {
+        let Some(field) = self.field.as_ref().filter(|_| has_field(water.method)) else {
             return;
         };
         let Some(area) = boats.iter().map(|b| field.cells(b.rect)).reduce(joined) else { return };
@@ -186,7 +188,7 @@ impl WaterPass {
         boats: &[WaterDraw],
     ) {
         let Some(variant) = self.variant(water) else { return };
-        let set = self.soft.filter(|_| water.method == ReflectionMethod::Full).unwrap_or(self.set);
+        let set = if water.method == ReflectionMethod::Full { self.soft.unwrap_or(self.set) } else { self.set };
         to.bind(&variant.pipeline, &[frame, set]);
         for boat in boats {
             let block = DrawBlock { rect: [0.0; 4], index: boat.index, first: boat.first };
@@ -217,6 +219,7 @@ impl Field {
                 vertices: None,
                 topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                 colour: format,
+                targets: 1,
                 blend: Blend::Replace,
                 cull: None,
                 depth: false,
@@ -236,12 +239,30 @@ impl Field {
     }
 }
 
+/// Whether a method compares the video's gradients in cells.
+fn has_field(method: ReflectionMethod) -> bool {
+    matches!(method, ReflectionMethod::Full | ReflectionMethod::Physics)
+}
+
+/// The variant that a way to mirror needs: light thrown back by waves is drawn by a pass of its own, which leaves the shadow.
+fn drawn(method: ReflectionMethod, shadow: ShadowLevel) -> Option<(ReflectionMethod, ShadowLevel)> {
+    match (method, shadow) {
+        (ReflectionMethod::Waves, ShadowLevel::None) => None,
+        (ReflectionMethod::Waves, _) => Some((ReflectionMethod::Off, shadow)),
+        _ => Some((method, shadow)),
+    }
+}
+
 fn method_constant(method: ReflectionMethod) -> u32 {
     match method {
         ReflectionMethod::Off => 0,
         ReflectionMethod::Mirror => 1,
         ReflectionMethod::FullAsPrinted => 2,
         ReflectionMethod::Full => 3,
+        ReflectionMethod::PhysicsAsPrinted => 4,
+        ReflectionMethod::Physics => 5,
+        // Of this method the shader draws the shadow alone.
+        ReflectionMethod::Waves => 0,
     }
 }
 

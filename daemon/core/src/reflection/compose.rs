@@ -1,0 +1,136 @@
+//! The reflection of one boat drawn on the processor, pixel by pixel: what the GPU's shaders are held against.
+
+use glam::{DVec2, Vec3, Vec4};
+
+use super::{
+    grid::{DRAWN_TONE, TONES, drawn_tones},
+    lobes::{BANDS, Lobe, Lobes},
+    tones::SeaTones,
+};
+use crate::light::{LUMINANCE, linear_to_srgb, srgb_to_linear};
+
+/// No narrower a stretch of hull is asked for, half of it in pixels: what the shaders' coarse cells can hold.
+pub const HALF_WIDTH_MIN_PX: f64 = 1.5;
+
+/// Where a boat's hull meets the water in a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// The point from which the line is measured, pixels.
+    pub anchor: DVec2,
+    /// Unit vector in which gravity pulls.
+    pub down: DVec2,
+    /// Position across, right of the anchor, of the line's first column, and from one to the next, pixels.
+    pub first: f64,
+    /// See `first`.
+    pub pitch: f64,
+    /// The line: pixels below the anchor, column by column.
+    pub line: Vec<f64>,
+    /// Height of the eye over the water, metres.
+    pub eye_m: f64,
+    /// Tangent of the angle below the horizontal under which the anchor is seen.
+    pub tangent: f64,
+    /// Pixels to a tangent of 1 about the anchor.
+    pub focal_px: f64,
+}
+
+/// A boat as a picture that stands on its hull-water line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Billboard {
+    /// Position across, right of the anchor, of the left edge of the first column, pixels.
+    pub first: f64,
+    /// Width of a column, pixels.
+    pub pitch: f64,
+    /// Mean premultiplied linear light and cover of each band, from the water up, column by column.
+    pub columns: Vec<[Vec4; BANDS]>,
+}
+
+impl Billboard {
+    /// Running sums along the columns, so that any stretch's mean is one difference.
+    fn sums(&self) -> Vec<[Vec4; BANDS]> {
+        let mut sum = [Vec4::ZERO; BANDS];
+        let mut sums = vec![sum];
+        for column in &self.columns {
+            for (s, c) in sum.iter_mut().zip(column) {
+                *s += c;
+            }
+            sums.push(sum);
+        }
+        sums
+    }
+}
+
+/// Draws the reflection into `picture`, linear light in rows of `width`.
+pub fn compose(
+    picture: &mut [Vec3],
+    width: usize,
+    place: &Place,
+    billboard: &Billboard,
+    lobes: &Lobes,
+    tones: &SeaTones,
+) {
+    if lobes.reach_m <= 0.0 || width == 0 {
+        return;
+    }
+    let sums = billboard.sums();
+    for (n, pixel) in picture.iter_mut().enumerate() {
+        let at = DVec2::new((n % width) as f64 + 0.5, (n / width) as f64 + 0.5) - place.anchor;
+        let (across, down) = (at.dot(DVec2::new(place.down.y, -place.down.x)), at.dot(place.down));
+        let (line, near) = place.hull(across);
+        let below = down - line;
+        let tangent = near + below / place.focal_px;
+        if below < 0.0 || tangent <= 1e-5 {
+            continue;
+        }
+        let distance = place.eye_m * (1.0 / near - 1.0 / tangent);
+        if distance > lobes.reach_m {
+            continue;
+        }
+        let px_per_m = place.focal_px * near / place.eye_m;
+        let code = Vec3::from(pixel.to_array().map(linear_to_srgb)).dot(LUMINANCE);
+        let luminance = srgb_to_linear(code);
+        let tone = tones.tone(tangent, code);
+        let (added, taken) = gather(&lobes.at(lobes.place(distance)), tone, |lobe, band| {
+            let centre = across + f64::from(lobe.aside_m) * px_per_m;
+            let half = (f64::from(lobe.half_width_m) * px_per_m).max(HALF_WIDTH_MIN_PX);
+            let edge = |x: f64| running(&sums, (x - billboard.first) / billboard.pitch, band);
+            (edge(centre + half) - edge(centre - half)) * (billboard.pitch / (2.0 * half)) as f32
+        });
+        let cover = (taken / luminance.max(1e-4)).clamp(0.0, 1.0);
+        *pixel = *pixel * (1.0 - cover) + added;
+    }
+}
+
+impl Place {
+    /// Pixels below the anchor of the line at a position across, and the tangent under which it is seen there.
+    fn hull(&self, across: f64) -> (f64, f64) {
+        let last = self.line.len().saturating_sub(1) as f64;
+        let column = ((across - self.first) / self.pitch).clamp(0.0, last);
+        let first = column as usize;
+        let at = |i: usize| self.line.get(i).or(self.line.last()).copied().unwrap_or(0.0);
+        let line = at(first) + (at(first + 1) - at(first)) * column.fract();
+        (line, (self.tangent + line / self.focal_px).max(1e-5))
+    }
+}
+
+/// Light thrown back and luminance taken away at a tone, over all bands.
+fn gather(lobes: &[Lobe; BANDS], tone: f32, mean: impl Fn(&Lobe, usize) -> Vec4) -> (Vec3, f32) {
+    let at = (tone / DRAWN_TONE as f32).clamp(-1.0, 1.0);
+    let weights = [(-at).max(0.0), 1.0 - at.abs(), at.max(0.0)];
+    let mut sum = (Vec3::ZERO, 0.0);
+    for (band, lobe) in lobes.iter().enumerate() {
+        let seen = mean(lobe, band);
+        let of = |v: &[f32; TONES]| drawn_tones(v).iter().zip(weights).map(|(v, w)| v * w).sum::<f32>();
+        sum.0 += seen.truncate() * of(&lobe.thrown);
+        sum.1 += seen.w * of(&lobe.taken);
+    }
+    sum
+}
+
+/// A running sum at a place between columns.
+fn running(sums: &[[Vec4; BANDS]], place: f64, band: usize) -> Vec4 {
+    let last = sums.len().saturating_sub(1);
+    let place = place.clamp(0.0, last as f64);
+    let first = (place as usize).min(last.saturating_sub(1));
+    let at = |i: usize| sums.get(i).map_or(Vec4::ZERO, |s| s[band]);
+    at(first) + (at(first + 1) - at(first)) * (place - first as f64) as f32
+}

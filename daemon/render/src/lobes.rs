@@ -1,0 +1,160 @@
+//! The numbers of the method `Waves` for one boat in one frame: what `core::reflection` says of it, as the shaders read it.
+
+use bowwave_core::{
+    model::Model,
+    reflection::{HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, SkyLight, Table, grid::drawn_tones},
+    scene::{BoatView, PixelRect, Scene},
+};
+use glam::{DVec2, DVec3};
+use shaders_spirv::interface::{LOBE_COLUMNS, LobeBlock, ReflectBlock};
+
+use crate::{coverage::Cells, water::HullLine};
+
+/// Beyond the ends of the hull the picture of the boat goes on by this share of its width: what overhangs the water line.
+const OVERHANG: f64 = 0.12;
+/// Pieces in which a reflection's outline is marked.
+const PIECES: usize = 8;
+
+/// The sea of the frames, and room for one boat's lobes.
+pub(crate) struct Waves {
+    table: Table,
+    sea: SeaLobes,
+    wind_m_s: f64,
+    lobes: Lobes,
+}
+
+impl Waves {
+    pub(crate) fn new() -> Self {
+        let table = Table::baked();
+        let sea = table.sea(0.0);
+        let mut lobes = Lobes::default();
+        lobes.steps.reserve_exact(STEPS);
+        Self { table, sea, wind_m_s: 0.0, lobes }
+    }
+
+    /// What the sea throws back of a boat; `None` where that is nothing.
+    pub(crate) fn block(
+        &mut self,
+        scene: &Scene,
+        boat: &BoatView,
+        line: &HullLine,
+        model: &Model,
+        out: &mut LobeBlock,
+    ) -> Option<Reach> {
+        let wind_m_s = scene.wind.length();
+        if wind_m_s != self.wind_m_s {
+            self.table.set_sea(&mut self.sea, wind_m_s);
+            self.wind_m_s = wind_m_s;
+        }
+        let away = (boat.pose.position - scene.camera.position).truncate();
+        let eye_m = scene.camera.position.z - boat.water_level;
+        let seen = Seen {
+            wind_to_view: clockwise(scene.wind) - clockwise(away),
+            sky: SkyLight::of_bands(scene.light.horizon, scene.light.sky),
+            eye_m,
+            range_m: away.length(),
+            height_m: model.height_m().max(0.3),
+        };
+        self.lobes.set(&self.sea, &seen);
+        let focal = focal_px(scene, boat)?;
+        if self.lobes.reach_m <= 0.0 {
+            return None;
+        }
+        let tangent = eye_m / seen.range_m;
+        let (first, last) = line.ends();
+        let overhang = OVERHANG * (last - first) + 2.0;
+        let pitch = (last - first + 2.0 * overhang) / f64::from(LOBE_COLUMNS);
+        let pixels = focal * tangent / eye_m;
+        out.place = [tangent, 1.0 / focal, eye_m, 1.0 / self.lobes.reach_m].map(|v| v as f32);
+        out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
+        for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
+            for (pair, lobe) in step.chunks_exact_mut(2).zip(bands) {
+                let with = |tones: &[f32; 4], last: f32| {
+                    let [dark, middle, bright] = drawn_tones(tones);
+                    [dark, middle, bright, last]
+                };
+                pair[0] = with(&lobe.thrown, lobe.aside_m);
+                pair[1] = with(&lobe.taken, lobe.half_width_m);
+            }
+        }
+        Some(Reach { tangent, focal, pixels, overhang, eye_m })
+    }
+
+    /// Marks the cells that the last block's reflection can change.
+    pub(crate) fn mark(&self, reach: &Reach, line: &HullLine, cells: &mut Cells, within: PixelRect) {
+        let (low, high) = line.extent();
+        let (left, right) = line.ends();
+        for piece in 0..PIECES {
+            let steps = [piece, piece + 1].map(|p| p * (STEPS - 1) / PIECES);
+            let [from, to] = steps.map(|s| reach.below(self.lobes.step_m(s)));
+            let aside = |l: &Lobe| {
+                let half = (f64::from(l.half_width_m) * reach.pixels).max(HALF_WIDTH_MIN_PX);
+                // Where little is thrown back, little is seen of it.
+                let some = l.thrown.iter().any(|t| *t > 2e-3);
+                if some { f64::from(l.aside_m.abs()) * reach.pixels + half } else { 0.0 }
+            };
+            let widest = self.lobes.steps.get(steps[0]..=steps[1]).unwrap_or(&[]);
+            let side = widest.iter().flatten().map(aside).fold(0.0, f64::max) + reach.overhang + 4.0;
+            line.mark([left - side, right + side], [low + from - 2.0, high + to + 2.0], cells, within);
+        }
+    }
+}
+
+/// How far a reflection goes on the screen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reach {
+    tangent: f64,
+    focal: f64,
+    pixels: f64,
+    overhang: f64,
+    eye_m: f64,
+}
+
+impl Reach {
+    /// Pixels below the hull-water line of the water at a distance from the hull.
+    fn below(&self, distance_m: f64) -> f64 {
+        let range = self.eye_m / self.tangent;
+        let tangent = self.eye_m / (range - distance_m).max(0.05 * range);
+        (tangent - self.tangent) * self.focal
+    }
+}
+
+/// Pixels to a tangent of 1 downwards, about where a boat is seen.
+fn focal_px(scene: &Scene, boat: &BoatView) -> Option<f64> {
+    let foot = boat.pose.position.with_z(boat.water_level);
+    let at = |p: DVec3| scene.lens.project(scene.camera.to_camera(p));
+    let lift = 0.002 * boat.range_m;
+    let pixels = (at(foot - DVec3::Z * lift)? - at(foot)?).length() / lift;
+    let focal = pixels * (foot - scene.camera.position).truncate().length();
+    (focal.is_finite() && focal > 1.0).then_some(focal)
+}
+
+/// Direction clockwise from north, radians.
+fn clockwise(v: DVec2) -> f64 {
+    v.x.atan2(v.y)
+}
+
+/// How bright the sea of a scene is, as the shaders take it.
+pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
+    let size = DVec2::new(f64::from(scene.lens.width), f64::from(scene.lens.height));
+    let down = |pixel: DVec2| {
+        let up = (scene.camera.world_from_camera * scene.lens.unproject(pixel)).z;
+        -up / (1.0 - up * up).max(1e-9).sqrt()
+    };
+    // The plane through the tangents about the middle of the screen: bent by less than a pixel's worth within a usual lens.
+    let (middle, arm) = (size / 2.0, size / 8.0);
+    let slope = |axis: DVec2| {
+        let arm = axis * arm;
+        (down(middle + arm) - down(middle - arm)) / (2.0 * arm.length())
+    };
+    let (right, below) = (slope(DVec2::X), slope(DVec2::Y));
+    let start = down(middle) - right * middle.x - below * middle.y;
+    let tones = &scene.tones;
+    let with = |c: [f32; 3], last: f32| [c[0], c[1], c[2], last];
+    ReflectBlock {
+        tangent: [right as f32, below as f32, start as f32, 0.0],
+        mean: with(tones.mean, tones.roots[0]),
+        spread: with(tones.spread, tones.roots[1]),
+        ..ReflectBlock::default()
+    }
+}

@@ -1,0 +1,46 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The sea with the boats in it: each pixel takes from the layers what belongs to its own brightness, so that the waves of the video go
+// through the reflection. Output is premultiplied: it covers what the boats hide of the sky and adds what is seen of them.
+#include "frame.glsl"
+
+layout(push_constant) uniform ReflectBlock {
+    vec4 rect;
+    uint index;
+    uint first;
+    vec2 pad;
+    vec4 tangent;  // tangent below the horizontal: for each pixel right and down, and at pixel (0, 0)
+    vec4 mean;     // sea's mean luma: coefficients of the tangent's root; smallest root
+    vec4 spread;   // its standard deviation; largest root
+} draw;
+
+// The video beneath, as codes.
+layout(set = 1, binding = 0) uniform sampler2D video;
+layout(set = 1, binding = 1) uniform sampler2D dark;
+layout(set = 1, binding = 2) uniform sampler2D middle;
+layout(set = 1, binding = 3) uniform sampler2D bright;
+
+layout(location = 0) out vec4 colour;
+
+const vec2 CELL = vec2(4.0, 2.0);
+// Standard deviations from the mean of the dark and the bright layer, as the host's DRAWN_TONE; smallest spread, as its SPREAD_MIN.
+const float TONE = 1.1505;
+const float SPREAD_MIN = 0.004;
+
+float curve(vec4 c, float x) {
+    return c.x + x * (c.y + x * c.z);
+}
+
+void main() {
+    vec2 at = gl_FragCoord.xy;
+    float luma = dot(texelFetch(video, ivec2(at), 0).rgb, vec3(0.2126, 0.7152, 0.0722));
+    float root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);
+    float tone = (luma - curve(draw.mean, root)) / (max(curve(draw.spread, root), SPREAD_MIN) * TONE);
+    tone = clamp(tone, -1.0, 1.0);
+    vec2 uv = at / (vec2(textureSize(middle, 0)) * CELL);
+    vec4 layer = texture(middle, uv) * (1.0 - abs(tone)) + texture(dark, uv) * max(-tone, 0.0)
+        + texture(bright, uv) * max(tone, 0.0);
+    // sRGB code to linear light within 0.002.
+    float light = luma * (luma * (luma * 0.305306011 + 0.682171111) + 0.012522878);
+    colour = vec4(layer.rgb, clamp(layer.a / max(light, 1e-4), 0.0, 1.0));
+}
