@@ -48,7 +48,7 @@ void main() {
     float far = place.z * (1.0 / near - 1.0 / tangent);
     int distance_step = int(sqrt(max(far * place.w, 0.0)) * float(STEPS - 1) + 0.5);
     // Cells that lie half above the line keep the hull's foot wet where they are blended into those below.
-    if (below < -CELL.y || distance_step >= STEPS - 1) {
+    if (below < -boats[i].foot.x || distance_step >= STEPS - 1) {
         discard;
     }
     float pixels = board.w * near / place.x;

@@ -6,6 +6,7 @@ const int COLUMNS = 64;
 struct LobeBlock {
     vec4 place;             // tangent below the horizontal at the anchor, 1 / pixels to a tangent of 1, eye over the water (m), 1 / reach (1/m)
     vec4 board;             // height of the boat (m), across position of its picture's first column, pixels to a column, pixels to a metre
+    vec4 foot;              // pixels above the hull-water line that are drawn as what is just below it
     vec4 lobes[STEPS][2 * BANDS];  // by distance and band: thrown back by tone, metres aside; taken away by tone, half width in metres
 };
 

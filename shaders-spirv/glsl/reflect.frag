@@ -12,6 +12,7 @@ layout(push_constant) uniform ReflectBlock {
     vec4 tangent;  // tangent below the horizontal: for each pixel right and down, and at pixel (0, 0)
     vec4 mean;     // sea's mean luma: coefficients of the tangent's root; smallest root
     vec4 spread;   // its standard deviation; largest root
+    vec4 hue;      // colour of the sky that boats hide, over its luminance
 } draw;
 
 // The video beneath, as codes.
@@ -33,7 +34,8 @@ float curve(vec4 c, float x) {
 
 void main() {
     vec2 at = gl_FragCoord.xy;
-    float luma = dot(texelFetch(video, ivec2(at), 0).rgb, vec3(0.2126, 0.7152, 0.0722));
+    vec3 code = texelFetch(video, ivec2(at), 0).rgb;
+    float luma = dot(code, vec3(0.2126, 0.7152, 0.0722));
     float root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);
     float tone = (luma - curve(draw.mean, root)) / (max(curve(draw.spread, root), SPREAD_MIN) * TONE);
     tone = clamp(tone, -1.0, 1.0);
@@ -41,6 +43,11 @@ void main() {
     vec4 layer = texture(middle, uv) * (1.0 - abs(tone)) + texture(dark, uv) * max(-tone, 0.0)
         + texture(bright, uv) * max(tone, 0.0);
     // sRGB code to linear light within 0.002.
-    float light = luma * (luma * (luma * 0.305306011 + 0.682171111) + 0.012522878);
-    colour = vec4(layer.rgb, clamp(layer.a / max(light, 1e-4), 0.0, 1.0));
+    vec3 light = code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
+    // What is taken away has the sky's colour, not the water's: enough of the water is covered for each channel, and what is then too
+    // little is given back.
+    vec3 gone = layer.a * draw.hue.rgb;
+    vec3 share = gone / max(light, 1e-3);
+    float cover = clamp(max(max(share.r, share.g), share.b), 0.0, 1.0);
+    colour = vec4(max(layer.rgb + cover * light - gone, 0.0), cover);
 }

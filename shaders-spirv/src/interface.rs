@@ -180,10 +180,12 @@ pub struct LobeBlock {
     pub place: [f32; 4],
     /// Height of the boat, m; across position of its picture's first column, pixels to a column; pixels to a metre at the anchor.
     pub board: [f32; 4],
+    /// Pixels above the hull-water line that are drawn as what is just below it; unused.
+    pub foot: [f32; 4],
     /// By distance and band: light thrown back by three tones, metres aside; luminance taken away by tone, half width in metres.
     pub lobes: [[[f32; 4]; 2 * LOBE_BANDS]; LOBE_STEPS],
 }
-layout!(LobeBlock, 20512, place = 0, board = 16, lobes = 32);
+layout!(LobeBlock, 20528, place = 0, board = 16, foot = 32, lobes = 48);
 
 impl Default for LobeBlock {
     fn default() -> Self {
@@ -299,8 +301,21 @@ pub struct ReflectBlock {
     pub mean: [f32; 4],
     /// Standard deviation of it; largest root.
     pub spread: [f32; 4],
+    /// Colour of the sky that boats hide, over its luminance; unused.
+    pub hue: [f32; 4],
 }
-layout!(ReflectBlock, 80, rect = 0, index = 16, first = 20, pad = 24, tangent = 32, mean = 48, spread = 64);
+layout!(
+    ReflectBlock,
+    96,
+    rect = 0,
+    index = 16,
+    first = 20,
+    pad = 24,
+    tangent = 32,
+    mean = 48,
+    spread = 64,
+    hue = 80,
+);
 
 /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.
 #[repr(C)]

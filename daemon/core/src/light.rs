@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::{
     event::Picture,
     geometry::{CameraPose, Lens},
-    reflection::{Sample, SeaTones},
+    reflection::{Sample, SeaTones, SkyLight},
     scene::Light,
     time::Time,
 };
@@ -83,6 +83,12 @@ impl LightMeter {
             }
         };
         self.means = Some((time, means));
+    }
+
+    /// The sky that boats hide from the sea.
+    pub fn sky(&self) -> SkyLight {
+        let Light { horizon, sky, .. } = self.light();
+        SkyLight::of_bands(horizon, sky)
     }
 
     /// How bright the sea is.

@@ -6,7 +6,7 @@ use crate::{
     fault::Fault,
     geometry::{CameraPose, Lens, RigidPose},
     model::ModelId,
-    reflection::SeaTones,
+    reflection::{SeaTones, SkyLight},
     sea::BeaufortForce,
 };
 
@@ -31,6 +31,8 @@ pub struct Scene {
     pub water: Water,
     /// Velocity of the wind 10 m above the sea, world x and y, m/s.
     pub wind: DVec2,
+    /// The sky that boats hide from the sea.
+    pub sky: SkyLight,
     /// How bright the sea is in the picture.
     pub tones: SeaTones,
     /// The head-up display.

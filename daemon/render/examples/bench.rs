@@ -78,6 +78,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         ReflectionMethod::Mirror,
         ReflectionMethod::Full,
         ReflectionMethod::FullAsPrinted,
+        ReflectionMethod::PhysicsAsPrinted,
+        ReflectionMethod::Physics,
+        ReflectionMethod::Waves,
     ] {
         let mut scene = empty.clone();
         scene.water.method = method;

@@ -24,6 +24,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some("printed") => ReflectionMethod::FullAsPrinted,
         Some("mirror") => ReflectionMethod::Mirror,
         Some("off") => ReflectionMethod::Off,
+        Some("waves") => ReflectionMethod::Waves,
+        Some("physics") => ReflectionMethod::Physics,
+        Some("physics_printed") => ReflectionMethod::PhysicsAsPrinted,
         _ => ReflectionMethod::Full,
     };
     let force = BeaufortForce::new(args.next().map_or(Ok(1), |f| f.parse())?).ok_or("no such wind force")?;

@@ -2,16 +2,18 @@
 
 use bowwave_core::{
     model::Model,
-    reflection::{HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, SkyLight, Table, grid::drawn_tones},
+    reflection::{HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table, grid::drawn_tones},
     scene::{BoatView, PixelRect, Scene},
 };
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{LOBE_COLUMNS, LobeBlock, ReflectBlock};
 
 use crate::{coverage::Cells, water::HullLine};
 
 /// Beyond the ends of the hull the picture of the boat goes on by this share of its width: what overhangs the water line.
 const OVERHANG: f64 = 0.12;
+/// Pixels above the hull-water line that are drawn as what is just below it, so that no bare water shows between hull and reflection.
+const FOOT_PX: f64 = 3.0;
 /// Pieces in which a reflection's outline is marked.
 const PIECES: usize = 8;
 
@@ -50,7 +52,7 @@ impl Waves {
         let eye_m = scene.camera.position.z - boat.water_level;
         let seen = Seen {
             wind_to_view: clockwise(scene.wind) - clockwise(away),
-            sky: SkyLight::of_bands(scene.light.horizon, scene.light.sky),
+            sky: scene.sky,
             eye_m,
             range_m: away.length(),
             height_m: model.height_m().max(0.3),
@@ -66,6 +68,7 @@ impl Waves {
         let pitch = (last - first + 2.0 * overhang) / f64::from(LOBE_COLUMNS);
         let pixels = focal * tangent / eye_m;
         out.place = [tangent, 1.0 / focal, eye_m, 1.0 / self.lobes.reach_m].map(|v| v as f32);
+        out.foot = [FOOT_PX as f32, 0.0, 0.0, 0.0];
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
             for (pair, lobe) in step.chunks_exact_mut(2).zip(bands) {
@@ -78,6 +81,11 @@ impl Waves {
             }
         }
         Some(Reach { tangent, focal, pixels, overhang, eye_m })
+    }
+
+    /// Colour of the sky that the last block's boat hides, over its luminance.
+    pub(crate) fn hue(&self) -> Vec3 {
+        self.lobes.hue
     }
 
     /// Marks the cells that the last block's reflection can change.
@@ -95,7 +103,7 @@ impl Waves {
             };
             let widest = self.lobes.steps.get(steps[0]..=steps[1]).unwrap_or(&[]);
             let side = widest.iter().flatten().map(aside).fold(0.0, f64::max) + reach.overhang + 4.0;
-            line.mark([left - side, right + side], [low + from - 2.0, high + to + 2.0], cells, within);
+            line.mark([left - side, right + side], [low + from - FOOT_PX, high + to + 2.0], cells, within);
         }
     }
 }
@@ -135,7 +143,7 @@ fn clockwise(v: DVec2) -> f64 {
 }
 
 /// How bright the sea of a scene is, as the shaders take it.
-pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
+pub(crate) fn reflect_block(scene: &Scene, hue: Vec3) -> ReflectBlock {
     let size = DVec2::new(f64::from(scene.lens.width), f64::from(scene.lens.height));
     let down = |pixel: DVec2| {
         let up = (scene.camera.world_from_camera * scene.lens.unproject(pixel)).z;
@@ -155,6 +163,7 @@ pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
         tangent: [right as f32, below as f32, start as f32, 0.0],
         mean: with(tones.mean, tones.roots[0]),
         spread: with(tones.spread, tones.roots[1]),
+        hue: hue.extend(0.0).to_array(),
         ..ReflectBlock::default()
     }
 }

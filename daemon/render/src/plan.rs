@@ -6,7 +6,7 @@ use bowwave_core::{
     model::Model,
     scene::{BoatView, Pass, PixelRect, ReflectionMethod, Scene},
 };
-use glam::DVec2;
+use glam::{DVec2, Vec3};
 use shaders_spirv::interface::{
     BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, ReflectBlock, RoundBlock, WATERS_MAX, WaterBlock,
 };
@@ -318,7 +318,9 @@ impl Plan {
         }
         let draw = ReflectDraw { first: self.list.len() as u32, count: self.rest.len() as u32 };
         self.list.extend(self.rest.iter().map(|r| corners(*r)));
-        self.reflect = Some((draw, reflect_block(scene)));
+        // The nearest boat's sky stands for all.
+        let hue = self.waves.as_ref().map_or(Vec3::ONE, Waves::hue);
+        self.reflect = Some((draw, reflect_block(scene, hue)));
     }
 
     fn plan_rounds(&mut self, scene: &Scene) {

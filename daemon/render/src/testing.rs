@@ -4,7 +4,7 @@ use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
     scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
-    reflection::SeaTones,
+    reflection::{SeaTones, SkyLight},
     sea::BeaufortForce,
     view::{Afloat, Eye},
 };
@@ -35,6 +35,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             shadow: ShadowLevel::Gradual,
         },
         wind: DVec2::new(0.6, 0.6),
+        sky: SkyLight::of_bands(Vec3::new(0.6, 0.66, 0.72), Vec3::new(0.35, 0.42, 0.52)),
         tones: SeaTones::default(),
         hud: Hud {
             status: Status::Ready,

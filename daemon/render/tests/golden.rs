@@ -123,6 +123,9 @@ fn every_way_to_mirror() {
         ("mirror", ReflectionMethod::Mirror),
         ("printed", ReflectionMethod::FullAsPrinted),
         ("full", ReflectionMethod::Full),
+        ("physics_printed", ReflectionMethod::PhysicsAsPrinted),
+        ("physics", ReflectionMethod::Physics),
+        ("waves", ReflectionMethod::Waves),
     ] {
         check(&format!("water_{name}"), &boats(method, ShadowLevel::Gradual, 1), &models());
     }

@@ -37,13 +37,15 @@ const CELLS: usize = DISTANCES * RISES;
 struct Pixel {
     light: [f64; 2],
     cells: [Vec<[f32; 2]>; 2],
+    /// Share of the rays that meet water before the hull, by distance: beyond it they meet the hull, and show no water.
+    before: [[f32; DISTANCES]; 2],
 }
 
 /// By distance and rise: weight of light, and sums of how far aside it goes over the distance and of the same without its sign.
 type Aside = Vec<[f64; 3]>;
 
 fn pixel(sea: &Sea, elevation: f64, rng: &mut Pcg64, aside: &mut Aside) -> Pixel {
-    let mut out = Pixel { light: [0.0; 2], cells: [0, 1].map(|_| vec![[0.0; 2]; CELLS]) };
+    let mut out = Pixel { light: [0.0; 2], cells: [0, 1].map(|_| vec![[0.0; 2]; CELLS]), before: [[0.0; DISTANCES]; 2] };
     let part = 2.0 / RAYS as f64;
     let mut path: Vec<Segment> = Vec::new();
     let (x0, y0) = (rng.random::<f64>() * 1000.0, rng.random::<f64>() * 1000.0);
@@ -61,6 +63,10 @@ fn pixel(sea: &Sea, elevation: f64, rng: &mut Pcg64, aside: &mut Aside) -> Pixel
         for d in 0..DISTANCES {
             // A pixel's rays spread over more than the least distances: each has its own place.
             let hull = y0 + dy + distance_m(d);
+            if path.first().is_some_and(|s| s.from[1] >= hull) {
+                continue;
+            }
+            out.before[half][d] += part as f32;
             for s in path.iter().filter(|s| s.dir[1] > 1e-6 && s.from[1] < hull) {
                 let t = (hull - s.from[1]) / s.dir[1];
                 if t > s.end {
@@ -101,13 +107,15 @@ fn bake(seas: &[Sea], elevation: f64, seed: u128) -> Vec<f32> {
     let mean = tones().sum::<f64>() / count;
     let spread = (tones().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt().max(1e-9);
     let mut sums = vec![[[0.0_f64; 2]; TONES]; CELLS];
-    let mut weights = [0.0; TONES];
-    let halves = pixels.iter().flat_map(|p| [(p.light[0], &p.cells[1]), (p.light[1], &p.cells[0])]);
-    for (light, cells) in halves {
+    let mut weights = [[0.0; TONES]; DISTANCES];
+    let halves = pixels.iter().flat_map(|p| [0, 1].map(|h| (p.light[h], &p.cells[1 - h], &p.before[1 - h])));
+    for (light, cells, before) in halves {
         let at = (((tone(light) - mean) / spread - TONE_FIRST) / TONE_STEP).clamp(0.0, TONES as f64 - 1.0);
         let first = (at as usize).min(TONES - 2);
         for (t, w) in [(first, 1.0 - (at - first as f64)), (first + 1, at - first as f64)] {
-            weights[t] += w;
+            for (weight, before) in weights.iter_mut().zip(before) {
+                weight[t] += w * f64::from(*before);
+            }
             for (sum, cell) in sums.iter_mut().zip(cells) {
                 sum[t][0] += w * f64::from(cell[0]);
                 sum[t][1] += w * f64::from(cell[1]);
@@ -115,8 +123,8 @@ fn bake(seas: &[Sea], elevation: f64, seed: u128) -> Vec<f32> {
         }
     }
     let mut out = Vec::with_capacity(CELLS * RECORD);
-    for (sum, a) in sums.iter().zip(&aside) {
-        for (s, w) in sum.iter().zip(weights) {
+    for (cell, (sum, a)) in sums.iter().zip(&aside).enumerate() {
+        for (s, w) in sum.iter().zip(weights[cell / RISES]) {
             out.extend(s.map(|v| (v / w.max(1e-9)) as f32));
         }
         let mean = a[1] / a[0].max(1e-12);

@@ -7,7 +7,7 @@ use super::{
     lobes::{BANDS, Lobe, Lobes},
     tones::SeaTones,
 };
-use crate::light::{LUMINANCE, linear_to_srgb, srgb_to_linear};
+use crate::light::{LUMINANCE, linear_to_srgb};
 
 /// No narrower a stretch of hull is asked for, half of it in pixels: what the shaders' coarse cells can hold.
 pub const HALF_WIDTH_MIN_PX: f64 = 1.5;
@@ -31,6 +31,8 @@ pub struct Place {
     pub tangent: f64,
     /// Pixels to a tangent of 1 about the anchor.
     pub focal_px: f64,
+    /// Pixels above the line that are drawn as what is just below it: waves before the hull stand as high.
+    pub foot_px: f64,
 }
 
 /// A boat as a picture that stands on its hull-water line.
@@ -77,8 +79,8 @@ pub fn compose(
         let (across, down) = (at.dot(DVec2::new(place.down.y, -place.down.x)), at.dot(place.down));
         let (line, near) = place.hull(across);
         let below = down - line;
-        let tangent = near + below / place.focal_px;
-        if below < 0.0 || tangent <= 1e-5 {
+        let tangent = near + below.max(0.0) / place.focal_px;
+        if below < -place.foot_px || tangent <= 1e-5 {
             continue;
         }
         let distance = place.eye_m * (1.0 / near - 1.0 / tangent);
@@ -87,7 +89,6 @@ pub fn compose(
         }
         let px_per_m = place.focal_px * near / place.eye_m;
         let code = Vec3::from(pixel.to_array().map(linear_to_srgb)).dot(LUMINANCE);
-        let luminance = srgb_to_linear(code);
         let tone = tones.tone(tangent, code);
         let (added, taken) = gather(&lobes.at(lobes.place(distance)), tone, |lobe, band| {
             let centre = across + f64::from(lobe.aside_m) * px_per_m;
@@ -95,8 +96,7 @@ pub fn compose(
             let edge = |x: f64| running(&sums, (x - billboard.first) / billboard.pitch, band);
             (edge(centre + half) - edge(centre - half)) * (billboard.pitch / (2.0 * half)) as f32
         });
-        let cover = (taken / luminance.max(1e-4)).clamp(0.0, 1.0);
-        *pixel = *pixel * (1.0 - cover) + added;
+        *pixel = (*pixel - taken * lobes.hue).max(Vec3::ZERO) + added;
     }
 }
 

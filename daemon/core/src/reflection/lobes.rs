@@ -1,5 +1,7 @@
 //! What a sea does to the light of one boat: the table for its place and height.
 
+use glam::Vec3;
+
 use super::{
     grid::{RISE_NODES, TONES, rise_sine},
     table::{Column, SeaLobes, SkyLight},
@@ -34,6 +36,8 @@ pub struct Lobe {
 pub struct Lobes {
     /// Distance from the hull beyond which there is no reflection, metres.
     pub reach_m: f64,
+    /// Colour of the sky that is taken away, over its luminance.
+    pub hue: Vec3,
     /// By distance from the hull, at [`Lobes::step_m`], and by band from the water up.
     pub steps: Vec<[Lobe; BANDS]>,
 }
@@ -116,6 +120,9 @@ impl Lobes {
         let reach = (1..=tries).rev().map(|i| farthest * (f64::from(i) / f64::from(tries)).powi(2));
         let Some(reach_m) = reach.into_iter().find(|d| strength(*d) >= SHARE_MIN) else { return };
         self.reach_m = reach_m;
+        // Seen from a quarter of the reach a third of the boat's height hides this sky.
+        let tangent = 0.35 * seen.height_m / (0.25 * reach_m);
+        self.hue = seen.sky.hue(tangent / (1.0 + tangent * tangent).sqrt());
         for i in 0..STEPS {
             let step = bands(sea, seen, self.step_m(i));
             // It ends at nothing.
@@ -167,4 +174,54 @@ fn band(cells: &Column, sky: &SkyLight, [from, to]: [f64; 2], distance_m: f64) -
     // A box as wide has the spread's standard deviation.
     lobe.half_width_m *= scale * 3.0_f32.sqrt();
     lobe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reflection::table::Table;
+
+    fn seen(eye_m: f64, range_m: f64, height_m: f64) -> Seen {
+        let sky = SkyLight::of_bands(Vec3::new(0.6, 0.66, 0.72), Vec3::new(0.35, 0.42, 0.52));
+        Seen { wind_to_view: 0.4, sky, eye_m, range_m, height_m }
+    }
+
+    #[test]
+    fn lobes_are_finite_wherever_a_boat_is_and_end_at_nothing() {
+        let table = Table::baked();
+        for wind in [0.0, 0.84, 3.3, 6.7, 12.0, f64::NAN] {
+            let sea = table.sea(wind);
+            for eye in [0.0, 0.01, 4.0, 15.0, -2.0, f64::NAN] {
+                for range in [0.0, 0.5, 60.0, 5000.0, 1e9, f64::NAN] {
+                    for height in [0.0, 1.5, 60.0] {
+                        let lobes = Lobes::of(&sea, &seen(eye, range, height));
+                        assert!(lobes.reach_m.is_finite() && lobes.hue.is_finite());
+                        for lobe in lobes.steps.iter().flatten() {
+                            let all = lobe.thrown.iter().chain(&lobe.taken).chain([&lobe.aside_m, &lobe.half_width_m]);
+                            assert!(all.clone().all(|v| v.is_finite()), "{wind} {eye} {range} {height}: {lobe:?}");
+                            assert!(lobe.thrown.iter().all(|t| (0.0..=1.01).contains(t)));
+                        }
+                        let last = lobes.steps.last().map_or(0.0, |s| s.iter().map(|l| l.thrown[0]).sum());
+                        assert_eq!(last, 0.0);
+                    }
+                }
+            }
+        }
+    }
+
+    /// On a calm a boat's whole height is mirrored as far off as geometry has it, and light is what Fresnel's formula leaves of it.
+    #[test]
+    fn a_calm_mirrors_a_tall_boat_by_fresnels_share() {
+        let sea = Table::baked().sea(0.0);
+        let lobes = Lobes::of(&sea, &seen(8.0, 60.0, 30.0));
+        let near = lobes.at(lobes.place(5.0));
+        let sum: f32 = near.iter().map(|l| 0.5 * (l.thrown[1] + l.thrown[2])).sum();
+        // 8 m over 55 m: 8.3 degrees; slopes that face the eye are steeper by some of their 3.1 degrees. Fresnel, n = 1.34, at a grazing
+        // angle of 10 degrees: 0.349 (mean of 0.407 and 0.291).
+        assert!((0.3..0.62).contains(&sum), "{sum}");
+        // Rougher water throws back less, and less far up.
+        let rough = Lobes::of(&Table::baked().sea(6.7), &seen(8.0, 60.0, 30.0));
+        let rough: f32 = rough.at(rough.place(5.0)).iter().map(|l| 0.5 * (l.thrown[1] + l.thrown[2])).sum();
+        assert!(rough < 0.8 * sum, "{rough} {sum}");
+    }
 }

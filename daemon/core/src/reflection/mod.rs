@@ -12,5 +12,5 @@ mod tones;
 
 pub use compose::{Billboard, HALF_WIDTH_MIN_PX, Place, compose};
 pub use lobes::{BANDS, Lobe, Lobes, STEPS, Seen, band_edge_m};
-pub use table::{SeaLobes, SkyLight, Table, encode};
+pub use table::{SKY_SINES, SeaLobes, SkyLight, Table, encode};
 pub use tones::{Sample, SeaTones};

@@ -163,6 +163,7 @@ impl Session {
             light: meter.light(),
             water: scenario.water,
             wind: scenario.wind.truncate(),
+            sky: meter.sky(),
             tones: meter.tones(),
             hud: Hud {
                 status: Status::Ready,
@@ -393,6 +394,7 @@ impl Session {
         }
         scene.passes = self.plan.frame(camera.is_some(), &scene.boats, &scene.rounds);
         scene.light = self.meter.light();
+        scene.sky = self.meter.sky();
         scene.tones = self.meter.tones();
         scene.hud = Hud {
             status,

@@ -153,6 +153,7 @@ impl Still {
             light,
             water: self.water,
             wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),
+            sky: meter.sky(),
             tones: meter.tones(),
             hud,
         };
