@@ -1,6 +1,10 @@
 //! The truth against closed forms, tables and brute force.
 
-use std::f64::consts::{PI, TAU};
+use std::{
+    f64::consts::{PI, TAU},
+    fs,
+    path::Path,
+};
 
 use bowwave_core::geometry::RigidPose;
 use glam::{DQuat, DVec2, DVec3};
@@ -8,10 +12,10 @@ use precision::truth::{
     boat,
     cell::Setup,
     field::{Resolution, Sea, Waves},
-    grid,
+    files, grid, masks,
     mesh::Mesh,
     micro::{Micro, WATER, fresnel},
-    rng::Path,
+    rng,
     sky::{Sky, SkySpec, Weather},
     spectrum::{LongWaves, Spectrum, cox_munk, frequency, jonswap},
     trace::{Body, Scene},
@@ -172,7 +176,7 @@ fn rays_meet_the_water_where_dense_sampling_says() {
     let waves = Sea::new(&spectrum, &coarse(), 3).at(0.0);
     let (mut missed, mut rays) = (0, 0);
     for i in 0..300u32 {
-        let mut path = Path::new(4, u64::from(i), 0);
+        let mut path = rng::Path::new(4, u64::from(i), 0);
         let down = 0.012 + 0.15 * path.unit();
         let flat = DVec2::from_angle(TAU * path.unit());
         let origin = DVec3::new(path.unit() * 500.0, path.unit() * 500.0, 8.0);
@@ -214,7 +218,7 @@ fn a_mirror_sea_gives_the_exact_mirror_image() {
     let eye = DVec3::new(0.0, 0.0, 6.0);
     let mut reflected = 0;
     for i in 0..4000u32 {
-        let mut path = Path::new(1, u64::from(i), 0);
+        let mut path = rng::Path::new(1, u64::from(i), 0);
         let aim = DVec3::new(16.0 * path.unit() - 8.0, 40.0, -9.0 * path.unit());
         let direction = (aim - eye).normalize();
         let seen = scene.trace(eye, direction, &mut path);
@@ -252,7 +256,7 @@ fn no_light_is_lost_or_made() {
             let direction = DVec3::new(0.0, (1.0 - down * down).sqrt(), -down);
             let mut sum = 0.0;
             for i in 0..3000 {
-                let mut path = Path::new(2, i, 0);
+                let mut path = rng::Path::new(2, i, 0);
                 let origin = DVec3::new(path.unit() * 400.0, path.unit() * 400.0, 8.0);
                 sum += scene.trace(origin, direction, &mut path).without.y / 3000.0;
             }
@@ -271,7 +275,7 @@ fn the_glitter_holds_the_light_that_facets_mirror_once() {
         let n = 100_000;
         let (mut followed, mut summed) = (0.0, 0.0);
         for i in 0..n {
-            let mut path = Path::new(3, i, 0);
+            let mut path = rng::Path::new(3, i, 0);
             let height = micro.strike(-to_eye, 1.0, &mut path).expect("a ray from above strikes");
             let normal = micro.visible_normal(to_eye, &mut path);
             let cos = to_eye.dot(normal);
@@ -302,7 +306,7 @@ fn the_boat_darkens_the_water_in_its_shadow() {
     // The sun stands behind the boat: the water before it is in its shadow, seen steeply so that the body dominates.
     let (mut with, mut without) = (0.0, 0.0);
     for i in 0..2000 {
-        let mut path = Path::new(5, i, 0);
+        let mut path = rng::Path::new(5, i, 0);
         let sample =
             scene.trace(DVec3::new(0.0, 36.0, 5.0), DVec3::new(0.0, 0.3, -1.0).normalize(), &mut path);
         with += sample.with.y;
@@ -345,4 +349,54 @@ fn overcast_and_clear_skies_light_the_sea_as_tables_say() {
     assert!(at(5.0) > 1.5 * at(40.0), "{} and {}", at(5.0), at(40.0));
     let disc = clear.sun_disc(clear.sun_direction) * PI * (0.00465f64).powi(2);
     assert!((disc - clear.sun).length() < 1e-9 * clear.sun.length());
+}
+
+#[test]
+fn a_cell_on_disk_tells_what_made_it_and_is_kept() {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("truth-cells");
+    let mut spec = grid::cell(400.0, 1, 8.0, "overcast", 80.0).unwrap();
+    spec.samples = 4;
+    let folder = out.join(grid::name(&spec));
+    grid::make(&[spec.clone()], 1.0, &out).unwrap();
+    assert_eq!(files::read_spec(&folder.join("cell.toml")).unwrap(), spec);
+    let setup = Setup::new(&spec).unwrap();
+    let size = (setup.region.width, setup.region.height);
+    for name in ["with.png", "without.png", "hull.png", "region.png"] {
+        assert_eq!(image::image_dimensions(folder.join(name)).unwrap(), size, "{name}");
+    }
+    let raw = fs::metadata(folder.join("with.f32")).unwrap().len();
+    assert_eq!(raw, u64::from(size.0) * u64::from(size.1) * 12);
+    let made = || fs::metadata(folder.join("cell.toml")).unwrap().modified().unwrap();
+    let first = made();
+    // Fewer paths are already there, more are not.
+    grid::make(&[spec.clone()], 0.5, &out).unwrap();
+    assert_eq!(made(), first);
+    grid::make(&[spec], 2.0, &out).unwrap();
+    assert_ne!(made(), first);
+}
+
+#[test]
+fn the_reflection_is_judged_on_the_water_below_the_hull() {
+    let mut spec = grid::cell(150.0, 0, 8.0, "overcast", 80.0).unwrap();
+    spec.samples = 16;
+    let setup = Setup::new(&spec).unwrap();
+    let pictures = setup.render();
+    let region = masks::reflection(&setup, &pictures);
+    let width = pictures.size.0 as usize;
+    let hull: Vec<usize> = (0..region.len()).filter(|&i| pictures.hull[i] > 0.5).collect();
+    let lowest = hull.iter().max().unwrap() / width;
+    let (below, all) = (0..region.len()).filter(|&i| region[i]).fold((0, 0), |(below, all), i| {
+        assert!(pictures.hull[i] < 0.5, "the hull itself is judged");
+        (below + i32::from(i / width >= lowest), all + 1)
+    });
+    assert!(
+        all > hull.len() as i32 / 3 && below * 10 > all * 8,
+        "{below} of {all} pixels lie below the hull"
+    );
+    // Outside of it and of the hull the boat changes nothing that can be seen.
+    let mut outside = DVec3::ZERO;
+    for i in (0..region.len()).filter(|&i| !region[i] && pictures.hull[i] == 0.0) {
+        outside += (glam::Vec3::from(pictures.with[i]) - glam::Vec3::from(pictures.without[i])).as_dvec3();
+    }
+    assert!(outside.abs().max_element() / (region.len() as f64) < 2e-3, "{outside}");
 }

@@ -92,13 +92,21 @@ struct Own {
     mean_change: [f64; 3],
 }
 
-/// Renders the cell and writes it into `folder`; `cell.toml` last, so that a cell that has one is complete.
+/// Renders the cell and writes it as `folder`, which appears when it is complete and replaces one that was there.
 pub fn make(spec: &CellSpec, folder: &Path) -> Result<()> {
     let start = std::time::Instant::now();
     let setup = Setup::new(spec)?;
     let pictures = setup.render();
     let render_s = start.elapsed().as_secs_f64();
-    write(&setup, &pictures, render_s, folder)
+    let part = folder.with_extension("part");
+    if part.exists() {
+        fs::remove_dir_all(&part).with_context(|| format!("cannot remove {}", part.display()))?;
+    }
+    write(&setup, &pictures, render_s, &part)?;
+    if folder.exists() {
+        fs::remove_dir_all(folder).with_context(|| format!("cannot replace {}", folder.display()))?;
+    }
+    fs::rename(&part, folder).with_context(|| format!("cannot rename {} to its name", part.display()))
 }
 
 fn write(setup: &Setup, pictures: &Pictures, render_s: f64, folder: &Path) -> Result<()> {
