@@ -31,7 +31,8 @@ fn main() -> ExitCode {
         let tell = |_: usize, outcome: &score::Outcome| println!("{}", score::line(outcome));
         let main = (arguments.first..arguments.first + arguments.clips).map(clips::main_clip).collect();
         let main = score::run_all(main, arguments.seconds, tell);
-        let hard = score::run_all((0..arguments.hard).map(clips::hard_clip).collect(), arguments.seconds, tell);
+        let hard =
+            score::run_all((0..arguments.hard).map(clips::hard_clip).collect(), arguments.seconds, tell);
         println!("\n{}\n{}", score::table(&main), score::table(&hard));
     }
     let cost = score::cost();

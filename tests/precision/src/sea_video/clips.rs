@@ -66,11 +66,19 @@ pub fn hard_clip(i: u64) -> Clip {
             // Swell with a wind sea across it.
             let mut clip = usual(seed, 0.8, 9.0, from, 10.0, Sky::Clear);
             clip.systems[0].spread = Some(25.0);
-            clip.systems.push(System { height_m: 0.5, peak_s: 3.5, gamma: 3.3, from_rad: from + 1.5, spread: None });
+            clip.systems.push(System {
+                height_m: 0.5,
+                peak_s: 3.5,
+                gamma: 3.3,
+                from_rad: from + 1.5,
+                spread: None,
+            });
             Clip { class: "swell and wind sea", wind_m_s: 5.0, ..clip }
         }
         1 => Clip { class: "fog", visibility_m: 250.0, ..usual(seed, 0.6, 4.0, from, 8.0, Sky::Overcast) },
-        2 => Clip { class: "night", white: 60.0, noise: 0.02, ..usual(seed, 1.0, 5.0, from, 8.0, Sky::Clear) },
+        2 => {
+            Clip { class: "night", white: 60.0, noise: 0.02, ..usual(seed, 1.0, 5.0, from, 8.0, Sky::Clear) }
+        }
         3 => Clip { class: "4 m under a 3 m eye", ..usual(seed, 4.0, 8.5, from, 3.0, Sky::Clear) },
         4 => Clip { class: "no waves", wind_m_s: 0.5, ..usual(seed, 0.0, 3.0, from, 8.0, Sky::Clear) },
         _ => {

@@ -105,7 +105,8 @@ pub fn water(sky: Sky, ray: DVec3, facet: &Facet, upwelling: f64) -> f64 {
             weight += w;
         }
     }
-    let diffuse = if weight > 0.0 { sum / weight } else { 0.3 * sky.luminance(DVec3::new(view.x, view.y, 0.0)) };
+    let diffuse =
+        if weight > 0.0 { sum / weight } else { 0.3 * sky.luminance(DVec3::new(view.x, view.y, 0.0)) };
     diffuse + glitter(sky, ray, facet)
 }
 
@@ -118,7 +119,8 @@ fn glitter(sky: Sky, ray: DVec3, facet: &Facet) -> f64 {
     }
     let slope = -half.truncate() / half.z;
     let rough = facet.rough + 1e-4;
-    let density = (-(slope - facet.slope).length_squared() / (2.0 * rough)).exp() / (std::f64::consts::TAU * rough);
+    let density =
+        (-(slope - facet.slope).length_squared() / (2.0 * rough)).exp() / (std::f64::consts::TAU * rough);
     let f = fresnel(-half.dot(ray));
     illuminance * f * density / (4.0 * half.z.powi(4) * (-ray.z).max(0.02))
 }

@@ -38,10 +38,7 @@ impl System {
         let n = 4000;
         let (low, high) = (0.3_f64.ln(), 40_f64.ln());
         let step = (high - low) / f64::from(n);
-        (0..n)
-            .map(|i| (low + (f64::from(i) + 0.5) * step).exp())
-            .map(|x| self.shape(x) * x * step)
-            .sum()
+        (0..n).map(|i| (low + (f64::from(i) + 0.5) * step).exp()).map(|x| self.shape(x) * x * step).sum()
     }
 
     fn spread_at(&self, x: f64) -> f64 {
@@ -220,7 +217,14 @@ impl Ocean {
         let mut cascades = Vec::new();
         for (i, (n, length_m, angle)) in sizes.into_iter().enumerate() {
             let high = TAU / length_m * (n as f64) * 0.45;
-            cascades.push(Cascade::new(systems, n, length_m, (low, high), angle, seed.wrapping_add(977 * i as u64)));
+            cascades.push(Cascade::new(
+                systems,
+                n,
+                length_m,
+                (low, high),
+                angle,
+                seed.wrapping_add(977 * i as u64),
+            ));
             low = high;
         }
         let resolved: f64 = cascades.iter().map(|c| c.slope_variance).sum::<f64>() / 2.0;

@@ -144,7 +144,8 @@ pub fn line(outcome: &Outcome) -> String {
 fn statistics(values: impl Iterator<Item = f64>, limit: f64) -> (f64, f64, f64) {
     let mut values: Vec<f64> = values.map(f64::abs).collect();
     values.sort_by(f64::total_cmp);
-    let at = |q: f64| values.get(((values.len() as f64 - 1.0) * q).round() as usize).copied().unwrap_or(f64::NAN);
+    let at =
+        |q: f64| values.get(((values.len() as f64 - 1.0) * q).round() as usize).copied().unwrap_or(f64::NAN);
     let within = values.iter().filter(|v| **v <= limit).count() as f64 / values.len() as f64;
     (at(0.5), at(0.95), within)
 }
@@ -164,9 +165,14 @@ pub fn table(outcomes: &[Outcome]) -> String {
         let answered = some.iter().filter(|o| o.answer.is_ok()).count();
         let right = some.iter().filter(|o| o.state_right() == Some(true)).count();
         let cell = |(median, p95, share): (f64, f64, f64), unit: f64| {
+            if median.is_nan() {
+                return String::from("-");
+            }
             format!("{:.1} / {:.1} / {:.0} %", median * unit, p95 * unit, share * 100.0)
         };
-        let of = |error: fn(&Outcome) -> Option<f64>, limit| statistics(some.iter().filter_map(|o| error(o)), limit);
+        let of = |error: fn(&Outcome) -> Option<f64>, limit| {
+            statistics(some.iter().filter_map(|o| error(o)), limit)
+        };
         let _ = writeln!(
             text,
             "| {name} | {answered} of {} | {right} of {answered} | {} | {} | {} | {} |",

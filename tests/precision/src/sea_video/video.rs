@@ -144,7 +144,11 @@ impl Video {
     pub fn luminance(&self, pixel: DVec2) -> Option<f32> {
         let lens = &self.clip.lens;
         let place = pixel.floor();
-        if !(place.x >= 0.0 && place.y >= 0.0 && place.x < f64::from(lens.width) && place.y < f64::from(lens.height)) {
+        if !(place.x >= 0.0
+            && place.y >= 0.0
+            && place.x < f64::from(lens.width)
+            && place.y < f64::from(lens.height))
+        {
             return None;
         }
         let pose = self.pose(self.time_s);

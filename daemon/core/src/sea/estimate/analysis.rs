@@ -125,11 +125,7 @@ impl Analysis {
             calibration: Calibration::Waits,
             weights: Vec::new(),
             near: vec![false; cells],
-            found: Found {
-                seconds,
-                window_hz2: squares / (4.0 * seconds * seconds),
-                ..Found::default()
-            },
+            found: Found { seconds, window_hz2: squares / (4.0 * seconds * seconds), ..Found::default() },
             series: vec![0.0; slots],
             buffer: vec![Complex32::default(); 2 * slots],
         }
@@ -220,8 +216,8 @@ impl Analysis {
     /// Turns contrast into slope.
     fn calibrate(&mut self, grid: &Grid, gains: &Gains) -> Result<(), Unknown> {
         let sigma = gains.sigma();
-        // Also where there was no fit at all, and sigma is no number.
-        if !(sigma < UNSURE) {
+        // No number where there was no fit at all.
+        if sigma.is_nan() || sigma >= UNSURE {
             return Err(Unknown::Unsure { sigma });
         }
         self.found.gain_sigma = sigma;
@@ -246,7 +242,8 @@ impl Analysis {
 
     /// Marks the patches from which heights are taken.
     fn choose_near(&mut self, grid: &Grid, rough: f64) {
-        let mut by_depression: Vec<usize> = (0..grid.cells.len()).filter(|&i| self.weights[i] > 0.0).collect();
+        let mut by_depression: Vec<usize> =
+            (0..grid.cells.len()).filter(|&i| self.weights[i] > 0.0).collect();
         by_depression.sort_by(|&a, &b| grid.cells[b].depression.total_cmp(&grid.cells[a].depression));
         for (rank, i) in by_depression.into_iter().enumerate() {
             self.near[i] = rank < NEAR_LEAST || grid.cells[i].depression > NEAR.0.max(NEAR.1 * rough);

@@ -101,7 +101,8 @@ impl SeaFollower {
         c.peak_period_s = blend(c.peak_period_s, estimate.peak_period_s.value);
         let Measured { value: from, sigma } = estimate.direction_from_rad;
         if sigma < 1.0 {
-            let turn = (from - c.from_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI;
+            let turn = (from - c.from_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
+                - std::f64::consts::PI;
             c.from_rad = (c.from_rad + turn * share).rem_euclid(std::f64::consts::TAU);
         }
         self.settle(first);
@@ -156,6 +157,7 @@ fn scale_to(conditions: &mut SeaConditions, state: WmoSeaState) {
     let old = conditions.significant_height_m;
     conditions.significant_height_m = middle;
     // From next to nothing there is no steepness to keep: the one of an arisen sea, T = 4.65 sqrt(H).
-    let period = if old > 0.05 { conditions.peak_period_s * (middle / old).sqrt() } else { 4.65 * middle.sqrt() };
+    let period =
+        if old > 0.05 { conditions.peak_period_s * (middle / old).sqrt() } else { 4.65 * middle.sqrt() };
     conditions.peak_period_s = period.clamp(1.0, 25.0);
 }

@@ -60,7 +60,11 @@ impl Grid {
                 step *= 0.8;
             } else {
                 let enough = cells.len() >= CELLS.0 / 4;
-                return if enough { Ok(Self { cells, azimuth, eye_m: camera.position.z }) } else { Err(Unknown::NoWater) };
+                return if enough {
+                    Ok(Self { cells, azimuth, eye_m: camera.position.z })
+                } else {
+                    Err(Unknown::NoWater)
+                };
             }
         }
         Err(Unknown::NoWater)
@@ -77,7 +81,8 @@ impl Grid {
                 let offset = share * cell.size / f64::from(TAPS);
                 let at = cell.at + cell.view * offset.x + cell.view.perp() * offset.y;
                 let ray = at.extend(-frame.camera.position.z);
-                let light = frame.lens.project(camera_from_world * ray).and_then(|pixel| (frame.luminance)(pixel));
+                let light =
+                    frame.lens.project(camera_from_world * ray).and_then(|pixel| (frame.luminance)(pixel));
                 if let Some(light) = light.filter(|l| l.is_finite() && *l >= 0.0) {
                     sum += light;
                     seen += 1;
@@ -109,7 +114,10 @@ fn cells(camera: &CameraPose, lens: &Lens, azimuth: f64, step: f64) -> Vec<Cell>
             let view = DVec2::new((azimuth + side).sin(), (azimuth + side).cos());
             let at = view * range;
             let corner = |a: f64, b: f64| at + (view * a + view.perp() * b) * (range * step / 2.0);
-            if [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)].into_iter().all(|(a, b)| inside(corner(a, b))) {
+            if [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)]
+                .into_iter()
+                .all(|(a, b)| inside(corner(a, b)))
+            {
                 cells.push(Cell {
                     at,
                     depression: (height / range).atan(),

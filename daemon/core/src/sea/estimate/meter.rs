@@ -18,8 +18,10 @@ const SKY_EVERY: usize = 10;
 const GAP: i64 = 25;
 /// Equal samples after which a picture stands still: 2 s.
 const FROZEN: usize = 10;
-/// Share of the patches that must be seen, and for how many samples it may be less.
+/// Share of the patches ever seen at once that must be seen, and for how many samples it may be less.
 const SEEN: (f64, usize) = (0.6, 25);
+/// Patches that must be seen at all.
+const LEAST_SEEN: f64 = 30.0;
 /// Relative change of the eye's height that ends a watch.
 const HEIGHT_CHANGE: f64 = 0.05;
 /// Heights of the eye that are possible, metres.
@@ -36,6 +38,7 @@ struct Watch {
     before: Vec<f32>,
     equal: usize,
     unseen: usize,
+    most_seen: f64,
     sky: SkyRows,
     analysed_at: usize,
     analysis: Option<Analysis>,
@@ -110,7 +113,8 @@ impl SeaMeter {
             Ok(()) => {}
             Err(Restart::Frozen) => {
                 self.restart(Restart::Frozen);
-                self.outcome = Err(Unknown::Frozen { seconds: FROZEN as f64 * SLOT_NS as f64 / NS_PER_S as f64 });
+                self.outcome =
+                    Err(Unknown::Frozen { seconds: FROZEN as f64 * SLOT_NS as f64 / NS_PER_S as f64 });
                 return;
             }
             Err(why) => {
@@ -136,7 +140,8 @@ impl SeaMeter {
 
 fn usable(frame: &Frame<'_>) -> bool {
     let (camera, lens) = (&frame.camera, frame.lens);
-    let turned = camera.world_from_camera.is_finite() && (camera.world_from_camera.length() - 1.0).abs() < 1e-3;
+    let turned =
+        camera.world_from_camera.is_finite() && (camera.world_from_camera.length() - 1.0).abs() < 1e-3;
     let glass = lens.focal.is_finite()
         && lens.focal.cmpgt(glam::DVec2::splat(1.0)).all()
         && lens.centre.is_finite()
@@ -157,6 +162,7 @@ impl Watch {
             before: vec![f32::NAN; cells],
             equal: 0,
             unseen: 0,
+            most_seen: 0.0,
             sky: SkyRows::default(),
             analysed_at: 0,
             analysis: None,
@@ -185,10 +191,14 @@ impl Watch {
         }
         (due..slot).for_each(|_| self.record.push_missing());
         if self.record.written.is_multiple_of(SKY_EVERY) {
-            self.sky.observe(&frame.camera, frame.lens, self.grid.azimuth, false, &|p| (frame.luminance)(p).map(|l| [l; 3]));
+            self.sky.observe(&frame.camera, frame.lens, self.grid.azimuth, false, &|p| {
+                (frame.luminance)(p).map(|l| [l; 3])
+            });
         }
         let seen = self.grid.sample(frame, &mut self.row);
-        self.unseen = if seen < SEEN.0 { self.unseen + 1 } else { 0 };
+        self.most_seen = self.most_seen.max(seen);
+        let few = seen < SEEN.0 * self.most_seen || seen * (self.row.len() as f64) < LEAST_SEEN;
+        self.unseen = if few { self.unseen + 1 } else { 0 };
         if self.unseen > SEEN.1 || azimuth_of(&frame.camera).is_none() {
             return Err(Restart::Turned);
         }

@@ -11,6 +11,7 @@
 mod analysis;
 mod follow;
 mod grid;
+mod linear;
 mod meter;
 mod profile;
 mod radiance;
@@ -101,7 +102,9 @@ pub enum Unknown {
     #[error("the camera sees too little water below the horizon: point it at the sea")]
     NoWater,
     /// Pose, height of the eye or lens are no usable numbers.
-    #[error("pose, eye height ({eye_m} m; 0.5 to 200 is possible) or lens are no usable numbers: check unit and calibration")]
+    #[error(
+        "pose, eye height ({eye_m} m; 0.5 to 200 is possible) or lens are no usable numbers: check unit and calibration"
+    )]
     BadPose {
         /// The camera's height above the sea as told, metres.
         eye_m: f64,

@@ -8,6 +8,8 @@
 
 use glam::DVec3;
 
+use super::linear::solve;
+
 /// Refractive index of sea water.
 const WATER: f64 = 1.34;
 /// Scales tried of the sky's fall from horizon to zenith, radians.
@@ -16,6 +18,11 @@ const SCALES: [f64; 6] = [0.12, 0.22, 0.4, 0.7, 1.2, 2.5];
 const ROUGH: [f64; 12] = [0.02, 0.04, 0.055, 0.07, 0.085, 0.1, 0.115, 0.13, 0.15, 0.175, 0.2, 0.23];
 /// Extinctions of the air tried, per metre: clear air to thick fog (Koschmieder 1924).
 const HAZE: [f64; 6] = [0.0, 0.000_7, 0.002, 0.005, 0.01, 0.02];
+/// A sky that brightens towards the zenith is overcast and does so all the way up (CIE standard overcast sky, S 011): least scale
+/// of such a sky, radians.
+const OVERCAST_SCALE: f64 = 1.0;
+/// Share by which each step of haze must lessen the misfit: light out of the water looks much the same, and is usual.
+const HAZE_PRICE: f64 = 0.15;
 /// A fit whose misfit lies by this share of the least, and this on top, above it counts a third as much in the mean.
 const AS_GOOD: (f64, f64) = (0.12, 0.001_5);
 /// Fits that count less than this are left out.
@@ -55,7 +62,7 @@ pub(super) struct Radiance {
     pub haze: f64,
     /// Height of the eye, metres.
     pub eye_m: f64,
-    /// Root mean square of the relative misfit.
+    /// Root mean square of the relative misfit, haze priced in.
     pub misfit: f64,
 }
 
@@ -126,7 +133,9 @@ impl Radiance {
     pub fn recolour(&self, rows: &[Row]) -> Option<Self> {
         let table: Vec<[f64; TERMS]> = rows
             .iter()
-            .map(|r| hazed(terms(r.elevation, 0.0, self.scale, self.rough), r.elevation, self.haze, self.eye_m))
+            .map(|r| {
+                hazed(terms(r.elevation, 0.0, self.scale, self.rough), r.elevation, self.haze, self.eye_m)
+            })
             .collect();
         let (parts, misfit) = fit_parts(rows, &table)?;
         Some(Self { parts, misfit, ..*self })
@@ -170,12 +179,17 @@ impl Search {
         self.next += 1;
         let (rows, eye_m) = (&self.rows, self.eye_m);
         for scale in SCALES {
-            let clear: Vec<[f64; TERMS]> = rows.iter().map(|r| terms(r.elevation, 0.0, scale, rough)).collect();
-            for haze in HAZE {
+            let clear: Vec<[f64; TERMS]> =
+                rows.iter().map(|r| terms(r.elevation, 0.0, scale, rough)).collect();
+            for (i, haze) in HAZE.into_iter().enumerate() {
                 let table: Vec<[f64; TERMS]> =
                     clear.iter().zip(rows).map(|(t, r)| hazed(*t, r.elevation, haze, eye_m)).collect();
                 let Some((parts, misfit)) = fit_parts(rows, &table) else { continue };
-                self.fits.push(Radiance { parts, scale, rough, haze, eye_m, misfit });
+                if parts[1] > parts[0] && scale < OVERCAST_SCALE {
+                    continue;
+                }
+                let price = 1.0 + HAZE_PRICE * i as f64;
+                self.fits.push(Radiance { parts, scale, rough, haze, eye_m, misfit: misfit * price });
             }
         }
         true
@@ -264,18 +278,19 @@ fn fit_parts(rows: &[Row], table: &[[f64; TERMS]]) -> Option<([f64; TERMS], f64)
 
 /// Least squares with the parts whose bit is set; the others are nothing.
 fn solve_subset(rows: &[Row], table: &[[f64; TERMS]], subset: usize) -> Option<[f64; TERMS]> {
-    let mut m = [[0.0; TERMS + 1]; TERMS];
+    let (mut m, mut right) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
     for (row, t) in rows.iter().zip(table) {
         let scale = row.weight / (row.light * row.light).max(1e-12);
         for i in 0..TERMS {
             for j in 0..TERMS {
                 m[i][j] += scale * t[i] * t[j];
             }
-            m[i][TERMS] += scale * t[i] * row.light;
+            right[i] += scale * t[i] * row.light;
         }
     }
     for i in (0..TERMS).filter(|i| subset >> i & 1 == 0) {
-        m[i] = [0.0; TERMS + 1];
+        m[i] = [0.0; TERMS];
+        right[i] = 0.0;
         m[i][i] = 1.0;
         for (j, row) in m.iter_mut().enumerate() {
             if j != i {
@@ -283,24 +298,5 @@ fn solve_subset(rows: &[Row], table: &[[f64; TERMS]], subset: usize) -> Option<[
             }
         }
     }
-    eliminate(m)
-}
-
-/// Gauss and Jordan with pivots; `None` where the equations do not decide.
-fn eliminate(mut m: [[f64; TERMS + 1]; TERMS]) -> Option<[f64; TERMS]> {
-    for column in 0..TERMS {
-        let pivot = (column..TERMS).max_by(|&a, &b| m[a][column].abs().total_cmp(&m[b][column].abs()))?;
-        m.swap(column, pivot);
-        let lead = m[column][column];
-        if !lead.is_finite() || lead.abs() < 1e-12 {
-            return None;
-        }
-        for row in (0..TERMS).filter(|&r| r != column) {
-            let factor = m[row][column] / lead;
-            for k in column..=TERMS {
-                m[row][k] -= factor * m[column][k];
-            }
-        }
-    }
-    Some(std::array::from_fn(|i| m[i][TERMS] / m[i][i]))
+    solve(m, right)
 }

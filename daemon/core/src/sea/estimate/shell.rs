@@ -107,7 +107,12 @@ pub(super) fn fit(observed: &Observed<'_>) -> Option<Line> {
 }
 
 /// Mean power of every beam, and last that of a patch.
-fn beam_powers(observed: &Observed<'_>, used: &[usize], steering: &[Vec<Complex32>], norms: &[f64]) -> Vec<f64> {
+fn beam_powers(
+    observed: &Observed<'_>,
+    used: &[usize],
+    steering: &[Vec<Complex32>],
+    norms: &[f64],
+) -> Vec<f64> {
     let tapers = observed.values.len() as f64;
     let mut powers = vec![0.0; BEAMS + 1];
     for values in observed.values {
@@ -115,7 +120,8 @@ fn beam_powers(observed: &Observed<'_>, used: &[usize], steering: &[Vec<Complex3
         for (power, (v, norm)) in powers.iter_mut().zip(steering.iter().zip(norms)) {
             *power += f64::from(dot(v, &y).norm_sqr()) / norm.max(1e-30) / tapers;
         }
-        powers[BEAMS] += y.iter().map(|z| f64::from(z.norm_sqr())).sum::<f64>() / (used.len() as f64 * tapers);
+        powers[BEAMS] +=
+            y.iter().map(|z| f64::from(z.norm_sqr())).sum::<f64>() / (used.len() as f64 * tapers);
     }
     powers
 }
@@ -139,7 +145,8 @@ fn slope_response(cell: &Cell, k: f64, run: DVec2) -> f64 {
 /// Mean square of the response of some patches to beam `j`, weighted as [`power`].
 fn unit(observed: &Observed<'_>, some: &[usize], k: f64, j: usize) -> f64 {
     let weight = |i: usize| f64::from(observed.weights[i]).powi(2);
-    let sum: f64 = some.iter().map(|&i| slope_response(&observed.cells[i], k, run_of(j)).powi(2) * weight(i)).sum();
+    let sum: f64 =
+        some.iter().map(|&i| slope_response(&observed.cells[i], k, run_of(j)).powi(2) * weight(i)).sum();
     sum / some.iter().map(|&i| weight(i)).sum::<f64>().max(1e-30)
 }
 

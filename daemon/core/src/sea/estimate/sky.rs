@@ -10,8 +10,8 @@ use crate::geometry::{CameraPose, Lens};
 
 /// Elevations looked at, radians; negative ones are water.
 const ELEVATIONS: [f64; 20] = [
-    -0.5, -0.36, -0.26, -0.19, -0.14, -0.1, -0.07, -0.05, 0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.13, 0.17, 0.22, 0.28,
-    0.36, 0.45,
+    -0.5, -0.36, -0.26, -0.19, -0.14, -0.1, -0.07, -0.05, 0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.13, 0.17,
+    0.22, 0.28, 0.36, 0.45,
 ];
 /// Azimuths looked at, radians from the middle of the view.
 const SIDES: [f64; 5] = [-0.4, -0.2, 0.0, 0.2, 0.4];
@@ -125,7 +125,8 @@ impl SkyMeter {
             return;
         }
         let Some(azimuth) = azimuth_of(&frame.camera) else { return };
-        if self.azimuth.is_none_or(|old| (azimuth - old).sin().abs() > TURNED || (azimuth - old).cos() < 0.0) {
+        if self.azimuth.is_none_or(|old| (azimuth - old).sin().abs() > TURNED || (azimuth - old).cos() < 0.0)
+        {
             *self = Self { rows: SkyRows::default(), azimuth: Some(azimuth), eye_m: 0.0 };
         }
         self.eye_m = frame.camera.position.z.max(0.1);

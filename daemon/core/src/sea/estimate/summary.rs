@@ -2,11 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{
-    Measured, SeaEstimate, Unknown,
-    analysis::Found,
-    shell::Line,
-};
+use super::{Measured, SeaEstimate, Unknown, analysis::Found, shell::Line};
 use crate::{
     gunnery::GRAVITY_M_S2,
     sea::{BeaufortForce, WmoSeaState},
@@ -23,7 +19,7 @@ const GAIN_SIGMA: f64 = 0.1;
 /// its own fall of brightness, which looks like a very long wave.
 const POSE_DENSITY: f64 = 1.5e-5;
 /// A line must rise this far above what the pose can feign.
-const ABOVE_POSE: f64 = 3.0;
+const ABOVE_POSE: f64 = 6.0;
 /// Mean of the fourth power's frequency over that of the peak, for spectra between Pierson-Moskowitz (1.04) and JONSWAP (1.01).
 const FOURTH_OVER_PEAK: f64 = 1.02;
 /// Waves above this share of the eye's height are not measured: the plane z = 0 is no longer near the water.
@@ -113,18 +109,31 @@ fn moments(lines: &[Line], density: impl Fn(&Line) -> f64) -> Moments {
 }
 
 /// Puts errors to the values.
-fn judged(found: &Found, m: &Moments, (height_m, period_s): (f64, f64), eye_m: f64, time: Time) -> SeaEstimate {
+fn judged(
+    found: &Found,
+    m: &Moments,
+    (height_m, period_s): (f64, f64),
+    eye_m: f64,
+    time: Time,
+) -> SeaEstimate {
     // Independent samples of the energy: the band's width times the record's length, and some over the water's area.
     let freedom = (2.0 * m.width_hz * found.seconds).max(2.0);
     let low_eye = height_m / eye_m;
-    let height_share = (1.0 / freedom + GAIN_SIGMA.powi(2) + found.gain_sigma.powi(2) + low_eye.powi(2)
+    let height_share = (1.0 / freedom
+        + GAIN_SIGMA.powi(2)
+        + found.gain_sigma.powi(2)
+        + low_eye.powi(2)
         + (0.05 / m.leverage.max(0.02)).powi(2))
     .sqrt();
-    let period_share = (0.03_f64.powi(2) + (0.4 * period_s / found.seconds).powi(2) + (0.5 * low_eye).powi(2)).sqrt();
+    let period_share =
+        (0.03_f64.powi(2) + (0.4 * period_s / found.seconds).powi(2) + (0.5 * low_eye).powi(2)).sqrt();
     let together = m.towards.length().clamp(1e-6, 1.0);
     let spread = (-2.0 * together.ln()).sqrt();
-    let direction_sigma =
-        (0.07_f64.powi(2) + spread * spread / freedom + (1.5 * low_eye).powi(2) + (0.1 / m.leverage.max(0.05)).powi(2)).sqrt();
+    let direction_sigma = (0.07_f64.powi(2)
+        + spread * spread / freedom
+        + (1.5 * low_eye).powi(2)
+        + (0.1 / m.leverage.max(0.05)).powi(2))
+    .sqrt();
     let height = Measured { value: height_m, sigma: height_m * height_share };
     let period = Measured { value: period_s, sigma: period_s * period_share };
     let state = WmoSeaState::of_wave_height(height_m);
@@ -177,7 +186,8 @@ fn flat(found: &Found, time: Time) -> Result<SeaEstimate, Unknown> {
 /// Probability that a normal variable lies in a state.
 fn probability(height: Measured, state: WmoSeaState) -> f64 {
     let (low, high) = state.wave_height_range_m();
-    let below = |x: f64| if x.is_finite() { logistic((x - height.value) / height.sigma.max(1e-9)) } else { 1.0 };
+    let below =
+        |x: f64| if x.is_finite() { logistic((x - height.value) / height.sigma.max(1e-9)) } else { 1.0 };
     (below(high) - below(low)).clamp(0.0, 1.0)
 }
 
