@@ -30,6 +30,8 @@ pub enum Command {
     Import(Import),
     /// Compose boats into a photograph
     Compose(Compose),
+    /// Make the user study of real and generated reflections, or score its answers
+    Study(Study),
     /// Print what a scenario needs: passes, shader variants, memory, and why the rest is left out
     Plan(Plan),
     /// Check this computer: GPU, camera, serial lines, trigger lines, disk; each with what to do about it
@@ -184,6 +186,60 @@ pub struct Compose {
     pub validation: bool,
 }
 
+/// Arguments of `study`.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
+pub struct Study {
+    /// What to do instead of making one
+    #[command(subcommand)]
+    pub task: Option<StudyTask>,
+    /// Folder for the page, the pictures and the key
+    #[arg(long, value_name = "DIR", default_value = "bowwave-study")]
+    pub out: PathBuf,
+    /// Folder with photographs of real reflections, cut so that neither boat nor horizon is seen; the thesis had 18
+    #[arg(long, value_name = "DIR")]
+    pub real: Option<PathBuf>,
+    /// Scene file as of `bowwave compose` whose picture, or pictures, are a background; twice. Without it two simulated seas
+    #[arg(long, value_name = "FILE")]
+    pub background: Vec<PathBuf>,
+    /// The two ways to mirror that are compared
+    #[arg(long, value_name = "METHOD,METHOD", value_parser = parse_methods)]
+    pub methods: Option<Methods>,
+    /// How many participants get an order of their own
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = parse_participants)]
+    pub participants: usize,
+    /// Seed of orders, names and places
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Replace a study that is in the folder
+    #[arg(long)]
+    pub force: bool,
+    /// Vulkan device: its number, or part of its name
+    #[arg(long, value_name = "NAME")]
+    pub gpu: Option<String>,
+}
+
+/// What else to do with a study.
+#[derive(Debug, Subcommand)]
+pub enum StudyTask {
+    /// Compute rates by factor, standard errors and d' from answers
+    Score(StudyScore),
+}
+
+/// Arguments of `study score`.
+#[derive(Debug, Args)]
+pub struct StudyScore {
+    /// Files that the page saved, or filled-in answer sheets
+    #[arg(required = true)]
+    pub answers: Vec<PathBuf>,
+    /// The study's key
+    #[arg(long, value_name = "FILE", default_value = "bowwave-study/key.csv")]
+    pub key: PathBuf,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Ways to mirror, at least one, each once.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Methods(pub Vec<ReflectionMethod>);
@@ -322,6 +378,11 @@ fn parse_methods(text: &str) -> Result<Methods, String> {
         }
     }
     Ok(Methods(methods))
+}
+
+fn parse_participants(text: &str) -> Result<usize, String> {
+    let number = text.parse::<usize>().ok().filter(|n| (1..=1000).contains(n));
+    number.ok_or_else(|| format!("'{text}' is no number of participants: write 1 to 1000"))
 }
 
 fn parse_duration(text: &str) -> Result<f64, String> {

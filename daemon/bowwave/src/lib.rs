@@ -18,6 +18,7 @@ mod resident;
 mod run;
 mod simulate;
 mod stats;
+mod study;
 
 use std::process::ExitCode;
 
@@ -76,6 +77,7 @@ fn dispatch(command: &Command, program_start: bowwave_core::time::Time) -> Resul
         Command::Simulate(arguments) => simulate::run(arguments, program_start),
         Command::Import(arguments) => import::run(arguments),
         Command::Compose(arguments) => compose::run(arguments),
+        Command::Study(arguments) => study::run(arguments),
         Command::Plan(arguments) => plan::run(arguments).map(|()| Outcome::Done),
         Command::Doctor(arguments) => {
             doctor::run(arguments).map(|well| if well { Outcome::Done } else { Outcome::Failed })

@@ -21,7 +21,7 @@ pub use crate::{
     build::{Boat, build_glb},
     error::ModelError,
     load::{load, load_glb},
-    quad::{Bow, FRIGATE_QUAD, QuadSpec, Rect, frigate_quad, load_quad, quad},
+    quad::{Bow, FRIGATE_QUAD, QuadSpec, Rect, frigate_quad, load_quad, quad, side_view},
 };
 
 /// Names that [`resolve`] knows without a file.

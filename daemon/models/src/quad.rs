@@ -234,15 +234,24 @@ impl Frame {
     }
 }
 
-/// The built-in picture model: the built-in frigate seen from starboard, drawn once under an even sky.
+/// The built-in picture model: the built-in frigate seen from starboard.
 pub fn frigate_quad() -> Result<Model, ModelError> {
+    side_view_as(Boat::Frigate, FRIGATE_QUAD)
+}
+
+/// A picture of a built-in boat seen from starboard, drawn once under an even sky. It is called as the boat, with "-quad" added.
+pub fn side_view(boat: Boat) -> Result<Model, ModelError> {
+    side_view_as(boat, &format!("{}-quad", boat.name()))
+}
+
+fn side_view_as(boat: Boat, name: &str) -> Result<Model, ModelError> {
     const WIDTH: u32 = 1024;
-    /// Metres of hull below the waterline that the picture keeps; the sea hides them.
-    const BELOW_M: f32 = 2.0;
-    let ship = load_glb(&build_glb(Boat::Frigate), Boat::Frigate.name())?;
+    /// Most metres of hull below the waterline that the picture keeps; the sea hides them.
+    const BELOW_MAX_M: f32 = 2.0;
+    let ship = load_glb(&build_glb(boat), boat.name())?;
     let length = ship.max.x - ship.min.x;
     let m_per_px = length / (WIDTH - 4) as f32;
-    let height = ((ship.max.z + BELOW_M) / m_per_px).ceil() as u32 + 2;
+    let height = ((ship.max.z + BELOW_MAX_M.min(-ship.min.z).max(0.0)) / m_per_px).ceil() as u32 + 2;
     let (middle, top) = ((ship.max.x + ship.min.x) / 2.0, ship.max.z + 2.0 * m_per_px);
     let half = WIDTH as f32 / 2.0 * m_per_px;
     let bottom = top - height as f32 * m_per_px;
@@ -267,7 +276,7 @@ pub fn frigate_quad() -> Result<Model, ModelError> {
         engine: Some(region(&ship, Zone::Engine, middle - half, top, m_per_px)),
         helm: Some(region(&ship, Zone::Helm, middle - half, top, m_per_px)),
     };
-    quad(FRIGATE_QUAD, FRIGATE_QUAD, canvas.finish(), &spec)
+    quad(name, name, canvas.finish(), &spec)
 }
 
 /// Where a part of `ship` lies in its side view.

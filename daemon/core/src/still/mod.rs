@@ -75,6 +75,21 @@ pub struct StillBoat {
     key: String,
 }
 
+impl StillBoat {
+    /// A boat at rest that no text places. It is called by its model.
+    pub fn new(model: &str, place: Place, heading: f64) -> Self {
+        Self {
+            name: model.to_owned(),
+            model: model.to_owned(),
+            place,
+            heading,
+            speed_m_s: 0.0,
+            mark: Mark::at("", 0),
+            key: "boat".to_owned(),
+        }
+    }
+}
+
 /// Where a boat's middle meets the water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Place {

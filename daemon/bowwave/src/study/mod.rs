@@ -1,0 +1,134 @@
+//! `bowwave study`: the user study of Nelson 2009, chapter IV, made and scored.
+//!
+//! People see pictures of reflections alone for three seconds each, some real, most generated, and say which are real. Four
+//! factors of two levels (method, shadow, background, textured or shaped boat) make 16 conditions of four pictures each.
+
+mod backgrounds;
+mod design;
+mod key;
+mod page;
+mod pictures;
+mod score;
+mod statistics;
+
+use std::{fs, path::Path};
+
+use anyhow::{Context, Result, bail};
+use bowwave_core::scene::ReflectionMethod;
+use image::RgbImage;
+
+use crate::{
+    cli::{Study, StudyTask},
+    outcome::Outcome,
+};
+use design::{CONDITIONS, Design, Item};
+
+/// The page that shows the pictures.
+const PAGE: &str = "study.html";
+/// What each picture is.
+const KEY: &str = "key.csv";
+
+/// Makes a study, or scores one.
+pub fn run(arguments: &Study) -> Result<Outcome> {
+    match &arguments.task {
+        Some(StudyTask::Score(arguments)) => score::run(arguments),
+        None => make(arguments),
+    }
+}
+
+fn make(arguments: &Study) -> Result<Outcome> {
+    let [first, second] = arguments.methods.as_ref().map_or(Ok(default_methods()), |m| match m.0[..] {
+        [a, b] => Ok([a, b]),
+        ref other => {
+            bail!("{} methods given; a study compares two: --methods full,mirror", other.len())
+        }
+    })?;
+    let backgrounds = backgrounds::gather(&arguments.background)?;
+    let names = backgrounds.each_ref().map(|b| b.name.clone());
+    if names[0] == names[1] {
+        bail!("both backgrounds are called {}; name the two scene files differently", names[0]);
+    }
+    let real = match &arguments.real {
+        Some(folder) => pictures::real(folder)?,
+        None => Vec::new(),
+    };
+    let design = Design::new(real.len(), arguments.participants, arguments.seed);
+    make_folder(&arguments.out, arguments.force)?;
+    let mut drawer =
+        pictures::Drawer::new(backgrounds, [first, second], arguments.gpu.clone(), arguments.seed)?;
+    let bar = indicatif::ProgressBar::new(design.items.len() as u64);
+    let mut images: Vec<(usize, RgbImage)> = Vec::with_capacity(design.items.len());
+    // One condition after the other: the renderer is made anew only where the water changes.
+    for index in design.by_condition() {
+        let image = match design.items[index] {
+            Item::Real(number) => real[number].1.clone(),
+            Item::Generated { condition, replicate } => drawer.draw(CONDITIONS[condition], replicate)?,
+        };
+        images.push((index, image));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    images.sort_by_key(|(index, _)| *index);
+    let rows = key::rows(&design, &names, [first, second], &real);
+    key::write(&arguments.out.join(KEY), &rows)?;
+    let files = write_pictures(&arguments.out, &design, images)?;
+    write_sheets(&arguments.out, &design)?;
+    let page = arguments.out.join(PAGE);
+    fs::write(&page, page::page(&design, &files))
+        .with_context(|| format!("cannot write {}; check the disk", page.display()))?;
+    println!("{}", page.display());
+    eprintln!(
+        "{} pictures, {} real; open the page in a browser, keep key.csv to yourself, then: bowwave study score ANSWERS... --key {}",
+        design.items.len(),
+        real.len(),
+        arguments.out.join(KEY).display()
+    );
+    if real.is_empty() {
+        log::warn!("no real pictures: rates can be had, d' cannot; give some with --real DIR");
+    }
+    Ok(Outcome::Done)
+}
+
+/// The thesis's pair where both are built, else the two forms of the one.
+fn default_methods() -> [ReflectionMethod; 2] {
+    let other = ReflectionMethod::of_name("physics").unwrap_or(ReflectionMethod::FullAsPrinted);
+    [ReflectionMethod::Full, other]
+}
+
+/// Answers that people gave to other pictures must not be scored with a new key.
+fn make_folder(out: &Path, force: bool) -> Result<()> {
+    if out.join(KEY).exists() && !force {
+        bail!(
+            "{} holds a study already; name another folder with --out, or replace it with --force",
+            out.display()
+        );
+    }
+    let pictures = out.join("pictures");
+    fs::create_dir_all(&pictures)
+        .with_context(|| format!("cannot make the folder {}; name another with --out", pictures.display()))
+}
+
+fn write_pictures(out: &Path, design: &Design, images: Vec<(usize, RgbImage)>) -> Result<Vec<Vec<u8>>> {
+    let mut files = Vec::with_capacity(images.len());
+    for (index, image) in images {
+        let path = out.join("pictures").join(format!("{}.png", design.name(index)));
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write_to(&mut bytes, image::ImageFormat::Png).context("cannot encode a picture")?;
+        fs::write(&path, bytes.get_ref())
+            .with_context(|| format!("cannot write {}; check the disk", path.display()))?;
+        files.push(bytes.into_inner());
+    }
+    Ok(files)
+}
+
+/// The order for each participant, as a sheet that answers can be written into by hand.
+fn write_sheets(out: &Path, design: &Design) -> Result<()> {
+    let path = out.join("answer-sheet.csv");
+    let mut text = String::from("participant,position,picture,answer\n");
+    for (participant, order) in design.orders.iter().enumerate() {
+        for (position, &index) in order.iter().enumerate() {
+            text += &format!("{},{},{},\n", participant + 1, position + 1, design.name(index));
+        }
+    }
+    fs::write(&path, text).with_context(|| format!("cannot write {}; check the disk", path.display()))
+}
