@@ -8,6 +8,7 @@ pub mod front;
 pub mod metric;
 pub mod page;
 pub mod parts;
+pub mod photograph;
 pub mod plot;
 pub mod row;
 pub mod sea_video;
