@@ -212,7 +212,7 @@ fn a_sky_cut_off_at_white_is_read_from_the_water() {
         // Smooth water mirrors the sky up to twice the depression; what lies above is continued.
         for (elevation, tolerance) in [(0.05, 0.1), (0.2, 0.2), (0.5, 0.25), (1.0, 0.4)] {
             // Wholly cut off, the sky is known from its reflection alone.
-            let tolerance = if exposure > 1.0 { tolerance.max(0.3) * 1.5 } else { tolerance };
+            let tolerance = if exposure > 1.0 { f64::max(tolerance, 0.3) * 1.5 } else { tolerance };
             let truth = sky(elevation) * f64::from(exposure) * 0.9;
             let got = f64::from(e.radiance(elevation).y);
             assert!(
