@@ -15,8 +15,8 @@ use super::{
 
 /// Distances, metres.
 pub const RANGES_M: [f64; 3] = [60.0, 150.0, 400.0];
-/// Eye heights, metres.
-pub const EYES_M: [f64; 3] = [4.0, 8.0, 15.0];
+/// Eye heights, metres, the usual one first.
+pub const EYES_M: [f64; 3] = [8.0, 4.0, 15.0];
 /// Headings of the bow, degrees clockwise from the direction of view: almost abeam, and three quarters towards the eye.
 pub const HEADINGS_DEG: [f64; 2] = [80.0, 215.0];
 /// Where the wind comes from, degrees clockwise from the direction of view.
@@ -86,9 +86,9 @@ pub fn cells(quick: bool) -> Vec<CellSpec> {
     let eyes: &[f64] = if quick { &[8.0] } else { &EYES_M };
     let headings: &[f64] = if quick { &HEADINGS_DEG[..1] } else { &HEADINGS_DEG };
     let mut all = Vec::new();
-    for light in lights {
-        for heading in headings {
-            for eye in eyes {
+    for heading in headings {
+        for eye in eyes {
+            for light in lights {
                 for range in RANGES_M {
                     all.extend((0..=4).filter_map(|state| cell(range, state, *eye, light, *heading)));
                 }

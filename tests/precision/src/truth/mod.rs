@@ -10,6 +10,21 @@
 //! * **Cells** ([`cell`], [`grid`], [`files`], [`masks`]): pictures without and with the boat from the same paths; [`study`] says what noise
 //!   and resolution do to them; [`video`] films the sea alone.
 //!
+//! Its own error (`truth study` with 48, 96 and 192 paths a pixel at 60, 150 and 400 m, a quarter to an eighth of the grid's; mean FLIP in
+//! the reflection's region, and the change that the boat makes there relative to the unrefined one):
+//!
+//! | | 60 m, state 2, overcast | 150 m, state 2, overcast | 400 m, state 3, high sun |
+//! |---|---|---|---|
+//! | other paths, as many | .0215, .999 | .0174, .998 | .0166, 1.048 |
+//! | other paths, four times as many | .0188, .999 | .0165, .998 | .0140, 1.003 |
+//! | steps along rays half as long | .0044, 1.000 | .0064, 1.002 | .0131, 1.015 |
+//! | cells half as wide | .0190, .998 | .0125, 1.009 | .0165, 1.006 |
+//! | waves down to half the length | .0207, .998 | .0185, 1.006 | .0247, 1.044 |
+//! | waves only down to twice the length | .0256, 1.004 | .0237, .983 | .0303, 1.102 |
+//! | other waves | .1089, .959 | .0716, 1.031 | .1210, 1.424 |
+//!
+//! So what is left is noise, but at 400 m, where waves below half a metre are not traced.
+//!
 //! Not in it: foam, sharpened crests and wave groups beyond linear waves, the boat's own bow wave and wake, haze, the curvature of the Earth,
 //! polarisation, textures, a boat's shadow on itself, and inertia of the boat (it follows the plane that fits the water under it).
 
