@@ -40,11 +40,11 @@ pub fn lighting(name: &str) -> Option<SkySpec> {
 pub fn cell(range_m: f64, state: u8, eye_m: f64, lighting_name: &str, heading_deg: f64) -> Option<CellSpec> {
     let (_, long_waves) = sea_of_state(state)?;
     let samples = if range_m < 100.0 {
-        48
-    } else if range_m < 300.0 {
-        96
-    } else {
         192
+    } else if range_m < 300.0 {
+        512
+    } else {
+        1536
     };
     // About twice the width that a pixel covers at that range, within what is worth tracing.
     let shortest_m = (1.3e-3 * range_m).clamp(0.05, 0.5);
