@@ -9,7 +9,7 @@ use bowwave_core::{
     scene::Scene,
     still::{Composed, Still},
 };
-use bowwave_render::{Completions, Renderer};
+use bowwave_render::{Completions, Renderer, TimeOuts};
 use image::RgbImage;
 
 use super::Photo;
@@ -54,7 +54,9 @@ impl Easel {
     pub fn draw(&mut self, Composed { scene, plan }: &Composed, picture: &Picture) -> Result<RgbImage> {
         if self.ready.as_ref().is_none_or(|(made_for, ..)| made_for != plan) {
             self.put_away();
-            let config = drawing::config(plan, self.gpu.clone(), self.validation);
+            let mut config = drawing::config(plan, self.gpu.clone(), self.validation);
+            // Nobody waits at 30 Hz: a busy processor that draws slowly is no hung GPU.
+            config.time_outs = TimeOuts { frame: WAIT, rehearsal: WAIT };
             let (renderer, completions) = Renderer::new(&config, &self.models.list)?;
             self.ready = Some((*plan, renderer, completions));
         }

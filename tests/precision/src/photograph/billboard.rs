@@ -6,6 +6,7 @@ use bowwave::{
     loading::Models,
 };
 use bowwave_core::{
+    geometry::horizon_dip,
     model::ModelId,
     scene::{ReflectionMethod, Scene, ShadowLevel},
     still::Still,
@@ -63,16 +64,18 @@ pub fn draw(
     Easel::new(models, None, false).draw(&composed, &canvas.picture).context("cannot draw the boat")
 }
 
-/// The camera and the boat's place, as a user of `bowwave compose` writes them.
+/// The camera and the boat's place, as a user of `bowwave compose` writes them. The optical axis goes level to the horizon above
+/// the boat: upright and seen square, the cut-out falls on its own pixels, whatever the camera's perspective did to it already.
 fn still(view: &View, index: usize, assumed: &Assumed, size: (u32, u32), foot: DVec2) -> Result<Still> {
     let horizon = view.waterline(index) - (view.waterline(index) - view.horizon(index)) * assumed.height;
+    let eye_height_m = view.eye_height_m * assumed.height;
+    let focal_px = f64::from(size.0) / 2.0 / (view.hfov_deg * assumed.hfov / 2.0).to_radians().tan();
+    let level = horizon - focal_px * horizon_dip(eye_height_m).tan();
     let text = format!(
-        "picture = \"photograph\"\n[camera]\neye_height_m = {}\nhfov_deg = {}\nhorizon = [[0, {horizon}], [{}, {horizon}]]\n\
+        "picture = \"photograph\"\n[camera]\neye_height_m = {eye_height_m}\nfocal_px = {focal_px}\ncentre_px = [{}, {level}]\npitch_deg = 0\n\
          [[boat]]\nmodel = \"cut-out.png\"\nwaterline_px = [{}, {}]\nheading_deg = 90\n\
          [sea]\nbeaufort = {}\nwind_from_deg = {}\n[light]\nvisibility_km = 200\n",
-        view.eye_height_m * assumed.height,
-        view.hfov_deg * assumed.hfov,
-        size.0,
+        foot.x,
         foot.x,
         foot.y,
         view.beaufort + assumed.force,

@@ -12,13 +12,15 @@ use super::mask::Mask;
 /// Rows above and below over which a side's mean colour is taken.
 const MEAN_ROWS: u32 = 6;
 
-/// The picture with `region` filled from at most `source_px` pixels left and right of it.
-pub fn without(picture: &RgbImage, region: &Mask, source_px: u32) -> RgbImage {
-    let bands: Vec<[Option<Band>; 2]> =
-        (0..picture.height()).map(|y| Band::beside(picture, region, y, source_px)).collect();
+/// The picture with `region` filled from at most `source_px` pixels left and right of `no_water`, which holds the region and
+/// whatever else beside it is no open water.
+pub fn without(picture: &RgbImage, region: &Mask, no_water: &Mask, source_px: u32) -> RgbImage {
+    let bands: Vec<[Option<Band>; 2]> = (0..picture.height())
+        .map(|y| region.span(y).map_or([None, None], |_| Band::beside(picture, no_water, y, source_px)))
+        .collect();
     let mut filled = picture.clone();
     for y in 0..picture.height() {
-        let Some((first, last)) = region.span(y) else { continue };
+        let (Some((first, last)), true) = (no_water.span(y), region.span(y).is_some()) else { continue };
         let [left, right] = [0, 1].map(|side| Side::new(&bands, y, side));
         for x in first..=last {
             if region.has(x, y) {
@@ -145,7 +147,7 @@ mod tests {
                 dark.put_pixel(x, y, Rgb([5, 5, 5]));
             }
         }
-        let filled = without(&dark, &region, 80);
+        let filled = without(&dark, &region, &region, 80);
         let moments = |picture: &RgbImage| {
             let values: Vec<f64> = (10..70)
                 .flat_map(|y| (100..200).map(move |x| (x, y)))
@@ -166,7 +168,7 @@ mod tests {
     fn a_region_at_the_edge_is_filled_from_its_other_side() {
         let picture = water(60, 20);
         let region = Mask::of_polygon((60, 20), &[[0.0, 5.0], [20.0, 5.0], [20.0, 15.0], [0.0, 15.0]]);
-        let filled = without(&picture, &region, 15);
+        let filled = without(&picture, &region, &region, 15);
         // Folded over the edge at column 20.
         assert_eq!(filled.get_pixel(19, 10), picture.get_pixel(20, 10));
         assert_eq!(filled.get_pixel(10, 10), picture.get_pixel(29, 10));

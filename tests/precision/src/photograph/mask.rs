@@ -62,6 +62,16 @@ impl Mask {
         Self { size, inside }
     }
 
+    /// With the pixels of further polygons.
+    #[must_use]
+    pub fn and(mut self, polygons: &[Vec<[f64; 2]>]) -> Self {
+        for polygon in polygons {
+            let more = Self::of_polygon(self.size, polygon);
+            self.inside.iter_mut().zip(more.inside).for_each(|(a, b)| *a |= b);
+        }
+        self
+    }
+
     /// Whether a pixel belongs to it; none outside the picture does.
     pub fn has(&self, x: u32, y: u32) -> bool {
         x < self.size.0 && y < self.size.1 && self.inside[(y * self.size.0 + x) as usize]

@@ -59,14 +59,14 @@ fn measure(data: &Path, out: &Path, view: &View, index: usize, quick: bool) -> R
     let name = format!("{}-{}", view.series, path.file_stem().unwrap_or_default().to_string_lossy());
     let (boat, reflection) = view.outlines(index);
     let region = Mask::of_polygon(photo.dimensions(), &reflection);
-    let cleaned = fill::without(&photo, &region, view.source_px);
+    let cleaned = fill::without(&photo, &region, &region.clone().and(&boat), view.source_px);
     let mut rows = Vec::new();
     let mut add = |method: &str, setting: &str, difference| {
         rows.push(Row { picture: name.clone(), method: method.into(), setting: setting.into(), difference });
     };
     let control = Mask::of_polygon(photo.dimensions(), &view.control(index));
     if control.count() * 10 >= region.count() * 6 {
-        let filled = fill::without(&photo, &control, view.source_px);
+        let filled = fill::without(&photo, &control, &control, view.source_px);
         add(CONTROL, "water without a boat", compare::compare(&photo, &filled, &control)?);
     }
     let cut = billboard::CutOut::new(&photo, &boat);
