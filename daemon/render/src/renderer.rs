@@ -158,7 +158,7 @@ impl Renderer {
         let count = config.frames_in_flight.clamp(1, SLOTS_MAX);
         let shared = Arc::new(Shared::new(&gpu, size, count, config.time_outs)?);
         let textured = models.iter().filter(|m| m.texture.is_some()).count();
-        let sets = SetPool::new(&gpu, u32::try_from(count + textured + 8).unwrap_or(u32::MAX), 4)?;
+        let sets = SetPool::new(&gpu, u32::try_from(count + textured + 16).unwrap_or(u32::MAX), 4)?;
         let frame_set = frame_set_layout(&gpu)?;
         let making = Making { gpu: &gpu, frame_set: &frame_set, pool: &sets, size, slots: count };
         let canvas = Canvas::new(&making)?;
