@@ -13,8 +13,8 @@ use rspirv::{
     spirv::{Decoration, Op, StorageClass, Word},
 };
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, DrawBlock, FrameBlock, HULL_LINE_COLUMNS, HudQuad, LobeBlock, MeshVertex, ReflectBlock, RoundBlock,
-    VideoBlock, WATERS_MAX, WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, DrawBlock, FrameBlock, HULL_LINE_COLUMNS, HudQuad, LobeBlock, MeshVertex,
+    ReflectBlock, RoundBlock, VideoBlock, WATERS_MAX, WaterBlock,
 };
 
 /// Name, fields with offsets, and size of one struct of the host.

@@ -51,6 +51,8 @@ struct Means {
 #[derive(Clone, Debug)]
 pub struct LightMeter {
     sun_direction: DVec3,
+    /// Whether the sea's tones are wanted: only reflections by brightness need them.
+    wants_tones: bool,
     means: Option<(Time, Means)>,
     tones: Option<(Time, SeaTones)>,
 }
@@ -58,12 +60,21 @@ pub struct LightMeter {
 impl LightMeter {
     /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world).
     pub fn new(sun_direction: DVec3) -> Self {
-        Self { sun_direction, means: None, tones: None }
+        Self { sun_direction, wants_tones: false, means: None, tones: None }
+    }
+
+    /// The same that measures the sea's tones as well, where `wanted`.
+    #[must_use]
+    pub fn with_tones(mut self, wanted: bool) -> Self {
+        self.wants_tones = wanted;
+        self
     }
 
     /// Takes in a picture whose camera stood at `camera` with `lens` (the picture's own, not the screen's).
     pub fn observe(&mut self, time: Time, picture: &Picture, lens: &Lens, camera: &CameraPose) {
-        if let Some(seen) = tones(picture, lens, camera) {
+        if self.wants_tones
+            && let Some(seen) = tones(picture, lens, camera)
+        {
             let seen = match self.tones {
                 None => seen,
                 Some((since, old)) => old.towards(&seen, follow(since, time)),
@@ -91,7 +102,7 @@ impl LightMeter {
         SkyLight::of_bands(horizon, sky)
     }
 
-    /// How bright the sea is.
+    /// How bright the sea is; a default where that is not measured.
     pub fn tones(&self) -> SeaTones {
         self.tones.map(|(_, tones)| tones).unwrap_or_default()
     }

@@ -316,7 +316,8 @@ impl Pipeline {
         let dynamic_states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic_states);
         let formats = [shape.colour; TARGETS_MAX];
-        let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..targets]);
+        let mut rendering =
+            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..targets]);
         if shape.depth {
             rendering = rendering.depth_attachment_format(DEPTH);
         }

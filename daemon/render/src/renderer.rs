@@ -164,8 +164,7 @@ impl Renderer {
         let canvas = Canvas::new(&making)?;
         let passes = Passes::new(&making, config, models)?;
         let needs = config.needs.clone();
-        let capacity =
-            Capacity { boats: needs.boats_max, rounds: needs.rounds_max, lobes: needs.lobes() };
+        let capacity = Capacity { boats: needs.boats_max, rounds: needs.rounds_max, lobes: needs.lobes() };
         let mut slots = Vec::with_capacity(count);
         for _ in 0..count {
             let data = FrameData::new(&gpu, &sets, &frame_set, capacity)?;

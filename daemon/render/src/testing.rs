@@ -3,8 +3,8 @@
 use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
-    scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
     reflection::{SeaTones, SkyLight},
+    scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
     sea::BeaufortForce,
     view::{Afloat, Eye},
 };

@@ -243,10 +243,8 @@ fn blur_px(scene: &Scene, line: &HullLine) -> f64 {
 pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, placed: &Placed) -> WaterBlock {
     let force = force(scene);
     let height = line.height.max(1.0);
-    let mended = !matches!(
-        scene.water.method,
-        ReflectionMethod::FullAsPrinted | ReflectionMethod::PhysicsAsPrinted
-    );
+    let mended =
+        !matches!(scene.water.method, ReflectionMethod::FullAsPrinted | ReflectionMethod::PhysicsAsPrinted);
     let shadow_level = match scene.water.shadow {
         ShadowLevel::None => None,
         ShadowLevel::Gradual => Some(0),
@@ -295,7 +293,9 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
         hull_line: line.below.map(|b| b as f32),
     };
     match scene.water.method {
-        ReflectionMethod::PhysicsAsPrinted | ReflectionMethod::Physics => physics_block(scene, boat, line, block),
+        ReflectionMethod::PhysicsAsPrinted | ReflectionMethod::Physics => {
+            physics_block(scene, boat, line, block)
+        }
         _ => block,
     }
 }

@@ -106,9 +106,13 @@ fn the_gpu_draws_what_the_processor_draws() {
         }
         let (error, change) = (error / f64::from(count), change / f64::from(count));
         let bias = bias / f64::from(count);
-        println!("wind {wind}: {count} values change by {change:.2} codes; error {error:.2}, bias {bias:.2}, worst {worst}");
+        println!(
+            "wind {wind}: {count} values change by {change:.2} codes; error {error:.2}, bias {bias:.2}, worst {worst}"
+        );
         assert!(count > 5000 && change > 2.0, "wind {wind}: {count} values change by {change:.2}");
-        failures.extend((error > 0.2 * change + 0.5 || worst > 32).then(|| format!("wind {wind}: {error:.2}, {worst}")));
+        failures.extend(
+            (error > 0.2 * change + 0.5 || worst > 32).then(|| format!("wind {wind}: {error:.2}, {worst}")),
+        );
     }
     assert!(failures.is_empty(), "{failures:?}");
 }

@@ -29,8 +29,11 @@ pub struct KeyRow {
     pub source: String,
 }
 
-/// Names of the factors, and how to read one from a row.
-pub const FACTORS: [(&str, fn(&KeyRow) -> &str); 4] = [
+/// How to read a factor from a row.
+pub type Level = fn(&KeyRow) -> &str;
+
+/// Names of the factors, and how to read each.
+pub const FACTORS: [(&str, Level); 4] = [
     ("method", |row| row.method.as_str()),
     ("shadow", |row| row.shadow.as_str()),
     ("background", |row| row.background.as_str()),

@@ -45,7 +45,11 @@ struct Pixel {
 type Aside = Vec<[f64; 3]>;
 
 fn pixel(sea: &Sea, elevation: f64, rng: &mut Pcg64, aside: &mut Aside) -> Pixel {
-    let mut out = Pixel { light: [0.0; 2], cells: [0, 1].map(|_| vec![[0.0; 2]; CELLS]), before: [[0.0; DISTANCES]; 2] };
+    let mut out = Pixel {
+        light: [0.0; 2],
+        cells: [0, 1].map(|_| vec![[0.0; 2]; CELLS]),
+        before: [[0.0; DISTANCES]; 2],
+    };
     let part = 2.0 / RAYS as f64;
     let mut path: Vec<Segment> = Vec::new();
     let (x0, y0) = (rng.random::<f64>() * 1000.0, rng.random::<f64>() * 1000.0);

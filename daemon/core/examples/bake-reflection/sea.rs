@@ -175,7 +175,9 @@ fn omnidirectional(height_m: f64, peak: f64, k: f64) -> f64 {
     // E(omega) = 5/16 H^2 w_p^4 w^-5 exp(-5/4 (w_p/w)^4), d omega / dk = sqrt(g / k) / 2.
     let ratio = (peak / k).sqrt();
     let omega = (G * k).sqrt();
-    5.0 / 16.0 * height_m * height_m * ratio.powi(4) / omega * (-1.25 * ratio.powi(4)).exp() * 0.5
+    5.0 / 16.0 * height_m * height_m * ratio.powi(4) / omega
+        * (-1.25 * ratio.powi(4)).exp()
+        * 0.5
         * (G / k).sqrt()
 }
 

@@ -197,8 +197,15 @@ mod tests {
                         let lobes = Lobes::of(&sea, &seen(eye, range, height));
                         assert!(lobes.reach_m.is_finite() && lobes.hue.is_finite());
                         for lobe in lobes.steps.iter().flatten() {
-                            let all = lobe.thrown.iter().chain(&lobe.taken).chain([&lobe.aside_m, &lobe.half_width_m]);
-                            assert!(all.clone().all(|v| v.is_finite()), "{wind} {eye} {range} {height}: {lobe:?}");
+                            let all = lobe
+                                .thrown
+                                .iter()
+                                .chain(&lobe.taken)
+                                .chain([&lobe.aside_m, &lobe.half_width_m]);
+                            assert!(
+                                all.clone().all(|v| v.is_finite()),
+                                "{wind} {eye} {range} {height}: {lobe:?}"
+                            );
                             assert!(lobe.thrown.iter().all(|t| (0.0..=1.01).contains(t)));
                         }
                         let last = lobes.steps.last().map_or(0.0, |s| s.iter().map(|l| l.thrown[0]).sum());

@@ -38,7 +38,7 @@ impl SeaTones {
     pub fn fit(samples: &[Sample]) -> Option<Self> {
         let roots = || samples.iter().map(|s| s.tangent.max(0.0).sqrt());
         let (low, high) = roots().fold((f64::MAX, f64::MIN), |(a, b), r| (a.min(r), b.max(r)));
-        if samples.len() < 12 || !(high - low > 1e-3) {
+        if samples.len() < 12 || (high - low).is_nan() || high - low <= 1e-3 {
             return None;
         }
         let mean = quadratic(roots().zip(samples.iter().map(|s| s.luma)))?;

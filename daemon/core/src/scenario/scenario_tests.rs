@@ -85,7 +85,7 @@ fn the_thesis_swarm_closes_200_yards_at_15_knots() {
 fn an_empty_text_is_a_scenario_of_defaults() {
     let scenario = parse("").expect("valid");
     assert_eq!((scenario.seed, scenario.duration_s, scenario.boats.len()), (1, None, 0));
-    assert_eq!(scenario.water.method, ReflectionMethod::Waves);
+    assert_eq!(scenario.water.method, ReflectionMethod::Full);
     assert_eq!(scenario.water.shadow, ShadowLevel::Gradual);
     assert_eq!(scenario.weapon.belt, 100);
     assert!((scenario.sun_direction.length() - 1.0).abs() < 1e-12);
@@ -147,8 +147,8 @@ fn mistakes_are_refused_with_place_key_value_and_what_is_allowed() {
         ("[light]\nlatitude_deg = 54", "light.longitude_deg: is missing; give all of"),
         ("[light]\nlatitude_deg = 54\nsun_azimuth_deg = 3", "light.sun_azimuth_deg: follows from"),
         (
-            "[reflection]\nmethod = \"physics\"",
-            "reflection.method: \"physics\" is not allowed; give one of \"off\", \"mirror\", \"full\", \"full_as_printed\"",
+            "[reflection]\nmethod = \"magic\"",
+            "reflection.method: \"magic\" is not allowed; give one of \"off\", \"mirror\", \"full\", \"full_as_printed\", \"physics\", \"physics_as_printed\", \"waves\"",
         ),
         (
             "[reflection]\nshadow_level = 3",

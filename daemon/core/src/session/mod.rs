@@ -18,7 +18,7 @@ use crate::{
     plan::{Needs, ScenePlan},
     pose::{NoPose, OrientationAt, STALE_NS, camera_pose},
     scenario::Scenario,
-    scene::{Hud, RoundView, Scene, Status},
+    scene::{Hud, ReflectionMethod, RoundView, Scene, Status},
     score::{NotScored, Outcome, ShotRecord},
     sea::WaveField,
     time::Time,
@@ -149,7 +149,8 @@ impl Session {
         let waves = scenario.wave_field();
         let sensors = Sensors::new(&setup.calibration);
         let weapon = Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt);
-        let meter = LightMeter::new(scenario.sun_direction);
+        let meter = LightMeter::new(scenario.sun_direction)
+            .with_tones(scenario.water.method == ReflectionMethod::Waves);
         let scene = Scene {
             frame: 0,
             camera: CameraPose {

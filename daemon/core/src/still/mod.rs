@@ -15,7 +15,7 @@ use crate::{
     model::{Model, ModelId},
     plan::{Needs, ScenePlan},
     scenario::{CAMERA_CLEAR_M, ScenarioError, place, table::Mark},
-    scene::{Hud, LeftOut, Pass, PassDecision, Scene, Status, Water},
+    scene::{Hud, LeftOut, Pass, PassDecision, ReflectionMethod, Scene, Status, Water},
     sea::{WaveField, WaveSpec},
     time::Time,
     view::{Afloat, Eye},
@@ -152,7 +152,8 @@ impl Still {
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
         let mut passes = plan.frame(true, &boats, &[]);
         passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
-        let mut meter = LightMeter::new(self.sun_direction);
+        let mut meter =
+            LightMeter::new(self.sun_direction).with_tones(self.water.method == ReflectionMethod::Waves);
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.sun_strength as f32;

@@ -183,8 +183,7 @@ impl ReflectPass {
         let strip = |columns| PixelRect { x: 0, y: 0, width: columns, height: rows };
         to.begin(strip(LOBE_COLUMNS), (self.bands.view, Begin::Forget), None);
         to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
-        let viewport =
-            |image: &Image| [0.0, 0.0, image.shape.width as f32, image.shape.height as f32];
+        let viewport = |image: &Image| [0.0, 0.0, image.shape.width as f32, image.shape.height as f32];
         for boat in boats {
             let own = PixelRect {
                 x: 0,

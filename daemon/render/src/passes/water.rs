@@ -188,7 +188,8 @@ impl WaterPass {
         boats: &[WaterDraw],
     ) {
         let Some(variant) = self.variant(water) else { return };
-        let set = if water.method == ReflectionMethod::Full { self.soft.unwrap_or(self.set) } else { self.set };
+        let set =
+            if water.method == ReflectionMethod::Full { self.soft.unwrap_or(self.set) } else { self.set };
         to.bind(&variant.pipeline, &[frame, set]);
         for boat in boats {
             let block = DrawBlock { rect: [0.0; 4], index: boat.index, first: boat.first };

@@ -19,9 +19,7 @@ use bowwave_core::{
     light::{LUMINANCE, srgb_to_linear},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
     reflection::{SKY_SINES, Sample, SeaTones, SkyLight},
-    scene::{
-        Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water,
-    },
+    scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
     sea::BeaufortForce,
     view::{Afloat, Eye},
 };
@@ -176,11 +174,7 @@ fn draw(cell: &Cell, scene: &Scene, model: &Model) -> Result<image::RgbImage> {
         device: None,
         validation: false,
         frames_in_flight: 1,
-        needs: Needs {
-            boats_max: 1,
-            rounds_max: 0,
-            waters: vec![(scene.water.method, scene.water.shadow)],
-        },
+        needs: Needs { boats_max: 1, rounds_max: 0, waters: vec![(scene.water.method, scene.water.shadow)] },
         picture: None,
         time_outs: TimeOuts::default(),
     };
@@ -255,7 +249,12 @@ fn box_boat() -> Model {
                     position[u] = if a { high[u] } else { low[u] };
                     position[v] = if b { high[v] } else { low[v] };
                     let normal = sign * Vec3::AXES[axis];
-                    vertices.push(Vertex { position, normal, uv: Vec2::ZERO, albedo: Vec3::from_array(albedo) });
+                    vertices.push(Vertex {
+                        position,
+                        normal,
+                        uv: Vec2::ZERO,
+                        albedo: Vec3::from_array(albedo),
+                    });
                 }
                 let order = if sign > 0.0 { [0, 1, 2, 0, 2, 3] } else { [0, 2, 1, 0, 3, 2] };
                 indices.extend(order.map(|i| first + i));
@@ -288,8 +287,7 @@ fn run() -> Result<()> {
             part = a;
         }
     }
-    let mut cells: Vec<PathBuf> =
-        std::fs::read_dir(&folder)?.filter_map(|e| Some(e.ok()?.path())).collect();
+    let mut cells: Vec<PathBuf> = std::fs::read_dir(&folder)?.filter_map(|e| Some(e.ok()?.path())).collect();
     cells.retain(|p| p.join("cell.toml").exists() && p.to_string_lossy().contains(&part));
     cells.sort();
     if cells.is_empty() {

@@ -111,7 +111,9 @@ mod tests {
     use image::Rgb;
 
     fn stripes(period: u32, height: u8) -> RgbImage {
-        RgbImage::from_fn(96, 96, |_, y| Rgb([if y / period % 2 == 0 { 100 } else { 100 + height }; 3]))
+        RgbImage::from_fn(96, 96, |_, y| {
+            Rgb([if (y / period).is_multiple_of(2) { 100 } else { 100 + height }; 3])
+        })
     }
 
     fn whole() -> Mask {

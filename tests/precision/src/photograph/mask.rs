@@ -115,7 +115,8 @@ mod tests {
         assert_eq!(mask.span(49), None);
         assert!(mask.has(1, 1) && !mask.has(39, 39) && !mask.has(60, 1));
         // The slanting edge covers half of the pixels that it cuts through.
-        let edge: f32 = (0..40).map(|i| coverage(std::slice::from_ref(&triangle), i, 39 - i)).sum::<f32>() / 40.0;
+        let edge: f32 =
+            (0..40).map(|i| coverage(std::slice::from_ref(&triangle), i, 39 - i)).sum::<f32>() / 40.0;
         assert!((edge - 0.5).abs() < 0.15, "{edge}");
     }
 }
