@@ -28,6 +28,9 @@ const vec2 CELL = vec2(4.0, 2.0);
 const float TONE = 1.1505;
 const float SPREAD_MIN = 0.004;
 
+// Largest share of a pixel's light that is taken away, as the host's TAKEN_MAX.
+const float TAKEN_MAX = 0.85;
+
 float curve(vec4 c, float x) {
     return c.x + x * (c.y + x * c.z);
 }
@@ -48,6 +51,9 @@ void main() {
     // little is given back.
     vec3 gone = layer.a * draw.hue.rgb;
     vec3 share = gone / max(light, 1e-3);
-    float cover = clamp(max(max(share.r, share.g), share.b), 0.0, 1.0);
-    colour = vec4(max(layer.rgb + cover * light - gone, 0.0), cover);
+    // A sky that is held brighter than the water can mirror takes no channel's last light: what is left would have a colour of its own.
+    float most = max(max(share.r, share.g), share.b);
+    float held = min(1.0, TAKEN_MAX / max(most, 1e-6));
+    float cover = most * held;
+    colour = vec4(max(layer.rgb + cover * light - gone * held, 0.0), cover);
 }

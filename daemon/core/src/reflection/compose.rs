@@ -9,6 +9,10 @@ use super::{
 };
 use crate::light::{LUMINANCE, linear_to_srgb};
 
+/// Largest share of a pixel's light that is taken away: a sky that is held brighter than the water can mirror would leave what is left a
+/// colour of its own.
+const TAKEN_MAX: f32 = 0.85;
+
 /// No narrower a stretch of hull is asked for, half of it in pixels: what the shaders' coarse cells can hold.
 pub const HALF_WIDTH_MIN_PX: f64 = 1.5;
 
@@ -96,7 +100,10 @@ pub fn compose(
             let edge = |x: f64| running(&sums, (x - billboard.first) / billboard.pitch, band);
             (edge(centre + half) - edge(centre - half)) * (billboard.pitch / (2.0 * half)) as f32
         });
-        *pixel = (*pixel - taken * lobes.hue).max(Vec3::ZERO) + added;
+        let gone = taken * lobes.hue;
+        let most = (gone / pixel.max(Vec3::splat(1e-3))).max_element();
+        let held = (TAKEN_MAX / most.max(1e-6)).min(1.0);
+        *pixel = (*pixel - gone * held).max(Vec3::ZERO) + added;
     }
 }
 
