@@ -36,7 +36,7 @@ pub struct View {
     pub picture: Vec<Placed>,
 }
 
-/// How the outlines lie in a picture: scaled about [`Placed::ORIGIN`], then moved.
+/// How the outlines lie in a picture: scaled about `Placed::ORIGIN`, then moved.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Placed {

@@ -225,7 +225,7 @@ impl Setup {
     }
 }
 
-/// The gain that brings the mean of the whole boat-free picture to [`EXPOSED_MEAN`], as a camera's meter would, from a coarse rendering
+/// The gain that brings the mean of the whole boat-free picture to `EXPOSED_MEAN`, as a camera's meter would, from a coarse rendering
 /// in which what is brighter than white (the sun) counts as white.
 pub fn exposure(scene: &Scene, lens: &Lens, camera: &CameraPose) -> f64 {
     let grid = (24u32, 18u32);

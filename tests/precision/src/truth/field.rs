@@ -1,7 +1,7 @@
 //! The resolved waves: tiles of Gaussian heights made by Fourier transform, and where rays meet their sum.
 //!
 //! Tiles have incommensurate sizes and directions, so that their sum does not repeat within a view. Each holds a band of wave
-//! lengths of no less than [`CELLS_A_WAVE`] cells; interpolation between cells loses a known share of the slopes, which is added
+//! lengths of no less than `CELLS_A_WAVE` cells; interpolation between cells loses a known share of the slopes, which is added
 //! to the unresolved ones.
 
 use std::f64::consts::{FRAC_PI_8, PI, TAU};
