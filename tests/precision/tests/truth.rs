@@ -354,6 +354,10 @@ fn overcast_and_clear_skies_light_the_sea_as_tables_say() {
 #[test]
 fn a_cell_on_disk_tells_what_made_it_and_is_kept() {
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("truth-cells");
+    // An earlier run's cells would be kept.
+    if out.exists() {
+        fs::remove_dir_all(&out).unwrap();
+    }
     let mut spec = grid::cell(400.0, 1, 8.0, "overcast", 80.0).unwrap();
     spec.samples = 4;
     let folder = out.join(grid::name(&spec));
