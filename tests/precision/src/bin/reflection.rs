@@ -17,25 +17,15 @@ use bowwave_core::{
     event::{Picture, PixelFormat},
     geometry::{CameraPose, Lens, RigidPose},
     light::{LUMINANCE, srgb_to_linear},
-    model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
+    model::{Model, ModelId},
     reflection::{SKY_SINES, Sample, SeaTones, SkyLight},
     scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
     sea::BeaufortForce,
     view::{Afloat, Eye},
 };
 use bowwave_render::{Needs, RenderConfig, Renderer, TimeOuts};
-use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
-
-/// The ways to mirror, and what the table calls them.
-const METHODS: [(&str, ReflectionMethod); 7] = [
-    ("none", ReflectionMethod::Off),
-    ("mirror", ReflectionMethod::Mirror),
-    ("full_printed", ReflectionMethod::FullAsPrinted),
-    ("full", ReflectionMethod::Full),
-    ("physics_printed", ReflectionMethod::PhysicsAsPrinted),
-    ("physics", ReflectionMethod::Physics),
-    ("waves", ReflectionMethod::Waves),
-];
+use glam::{DQuat, DVec2, DVec3, Vec3};
+use precision::{metric::flip_mean, truth::boat::box_boat};
 
 struct Cell {
     name: String,
@@ -199,81 +189,16 @@ fn with_hull(cell: &Cell, drawn: &image::RgbImage) -> image::RgbImage {
 }
 
 /// Mean FLIP over the region, and sum of luminance differences from `cell.with`.
-fn errors(cell: &Cell, drawn: &image::RgbImage) -> (f64, f64) {
-    let (w, h) = cell.with.dimensions();
-    let of = |i: &image::RgbImage| nv_flip::FlipImageRgb8::with_data(w, h, i.as_raw());
-    let map = nv_flip::flip(of(&cell.with), of(drawn), nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec();
+fn errors(cell: &Cell, drawn: &image::RgbImage) -> Result<(f64, f64)> {
     let light = |p: &image::Rgb<u8>| {
         f64::from(Vec3::from_array(p.0.map(|c| srgb_to_linear(f32::from(c) / 255.0))).dot(LUMINANCE))
     };
-    let (mut flip, mut bias, mut count) = (0.0, 0.0, 0.0_f64);
-    for (((value, region), got), want) in
-        map.iter().zip(cell.region.pixels()).zip(drawn.pixels()).zip(cell.with.pixels())
-    {
-        if region.0[0] > 127 {
-            flip += f64::from(*value);
-            bias += light(got) - light(want);
-            count += 1.0;
-        }
-    }
-    (flip / count.max(1.0), bias)
-}
-
-/// The truth's boat of boxes, as its README lists them.
-fn box_boat() -> Model {
-    let (white, dark) = ([0.75; 3], [0.02; 3]);
-    let mut blocks = vec![
-        ([-4.0, -1.3, -0.6], [4.0, 1.3, 0.3], [0.22, 0.02, 0.02]),
-        ([-4.0, -1.3, 0.3], [4.0, 1.3, 0.6], [0.012, 0.018, 0.07]),
-        ([-4.0, -1.3, 0.6], [4.0, 1.3, 0.95], white),
-        ([-4.0, -1.3, 0.95], [4.0, 1.3, 1.05], [0.55, 0.14, 0.02]),
-        ([-4.0, -1.3, 1.05], [4.0, 1.3, 1.25], white),
-        ([-1.6, -0.9, 1.25], [1.6, 0.9, 2.5], white),
-        ([-1.75, -1.0, 2.5], [1.75, 1.0, 2.65], [0.60, 0.36, 0.06]),
-        ([1.59, -0.7, 1.75], [1.62, 0.7, 2.25], dark),
-        ([-0.06, -0.06, 2.65], [0.06, 0.06, 4.4], dark),
-    ];
-    for x in [-1.0, 0.0, 1.0] {
-        for (a, b) in [(0.89, 0.92), (-0.92, -0.89)] {
-            blocks.push(([x - 0.35, a, 1.75], [x + 0.35, b, 2.25], dark));
-        }
-    }
-    let (mut vertices, mut indices) = (Vec::new(), Vec::new());
-    for (low, high, albedo) in blocks {
-        for axis in 0..3 {
-            for sign in [-1.0_f32, 1.0] {
-                let first = vertices.len() as u32;
-                let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-                for (a, b) in [(false, false), (true, false), (true, true), (false, true)] {
-                    let mut position = Vec3::from_array(if sign > 0.0 { high } else { low });
-                    position[u] = if a { high[u] } else { low[u] };
-                    position[v] = if b { high[v] } else { low[v] };
-                    let normal = sign * Vec3::AXES[axis];
-                    vertices.push(Vertex {
-                        position,
-                        normal,
-                        uv: Vec2::ZERO,
-                        albedo: Vec3::from_array(albedo),
-                    });
-                }
-                let order = if sign > 0.0 { [0, 1, 2, 0, 2, 3] } else { [0, 2, 1, 0, 3, 2] };
-                indices.extend(order.map(|i| first + i));
-            }
-        }
-    }
-    let (min, max) = (Vec3::new(-4.0, -1.3, -0.6), Vec3::new(4.0, 1.3, 4.4));
-    let corner = |x: f64, y: f64| DVec2::new(4.0 * x, 1.3 * y);
-    Model {
-        name: "box8".to_owned(),
-        kind: ModelKind::Mesh,
-        parts: vec![Part { zone: Zone::Hull, indices: 0..indices.len() as u32 }],
-        vertices,
-        indices,
-        texture: None,
-        waterline: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
-        min,
-        max,
-    }
+    let judged: Vec<bool> = cell.region.pixels().map(|p| p.0[0] > 127).collect();
+    let flip = flip_mean(cell.with.as_raw(), drawn.as_raw(), cell.with.dimensions(), &judged)?;
+    let pixels = judged.iter().zip(drawn.pixels()).zip(cell.with.pixels());
+    let bias =
+        pixels.filter(|((judged, _), _)| **judged).map(|((_, got), want)| light(got) - light(want)).sum();
+    Ok((flip.unwrap_or(0.0), bias))
 }
 
 fn run() -> Result<()> {
@@ -294,27 +219,31 @@ fn run() -> Result<()> {
         bail!("{folder} holds no finished cell whose name contains '{part}'");
     }
     let model = box_boat();
-    println!("{:36} {}", "FLIP (bias of the change)", METHODS.map(|(n, _)| format!("{n:>17}")).concat());
-    let mut sums = [0.0; METHODS.len()];
+    println!(
+        "{:36} {}",
+        "FLIP (bias of the change)",
+        ReflectionMethod::ALL.map(|m| format!("{:>19}", m.name())).concat()
+    );
+    let mut sums = [0.0; ReflectionMethod::ALL.len()];
     for dir in &cells {
         let cell = Cell::load(dir)?;
         let mut scene = scene(&cell, &model)?;
-        let change = errors(&cell, &with_hull(&cell, &cell.without)).1.abs().max(1e-9);
+        let change = errors(&cell, &with_hull(&cell, &cell.without))?.1.abs().max(1e-9);
         let mut line = format!("{:36}", cell.name);
-        for (sum, (name, method)) in sums.iter_mut().zip(METHODS) {
+        for (sum, method) in sums.iter_mut().zip(ReflectionMethod::ALL) {
             scene.water.method = method;
             let drawn = with_hull(&cell, &draw(&cell, &scene, &model)?);
-            let (flip, bias) = errors(&cell, &drawn);
+            let (flip, bias) = errors(&cell, &drawn)?;
             *sum += flip;
-            line += &format!("   {flip:.3} ({:+6.2})", bias / change);
+            line += &format!("     {flip:.3} ({:+6.2})", bias / change);
             if let Some(dir) = &pictures {
                 std::fs::create_dir_all(dir)?;
-                drawn.save(dir.join(format!("{}-{name}.png", cell.name)))?;
+                drawn.save(dir.join(format!("{}-{}.png", cell.name, method.name())))?;
             }
         }
         println!("{line}");
     }
-    let means = sums.map(|s| format!("   {:.4}        ", s / cells.len() as f64)).concat();
+    let means = sums.map(|s| format!("     {:.4}        ", s / cells.len() as f64)).concat();
     println!("{:36}{means}", "mean");
     Ok(())
 }

@@ -4,9 +4,7 @@ use anyhow::Result;
 use image::{RgbImage, imageops};
 
 use super::mask::Mask;
-
-/// Pixels a degree of the eye: a 0.7 m wide 4K monitor seen from 0.7 m, FLIP's own default.
-const PIXELS_PER_DEGREE: f32 = nv_flip::DEFAULT_PIXELS_PER_DEGREE;
+use crate::metric::flip_mean;
 
 /// Pixels around the region that FLIP's filters look at.
 const MARGIN_PX: u32 = 24;
@@ -34,21 +32,9 @@ pub fn compare(truth: &RgbImage, test: &RgbImage, region: &Mask) -> Result<Diffe
     let crop = |p: &RgbImage| imageops::crop_imm(p, x0, y0, x1 - x0, y1 - y0).to_image();
     let (truth, test) = (crop(truth), crop(test));
     let inside = |x: u32, y: u32| region.has(x0 + x, y0 + y);
-    Ok(Difference { flip: flip(&truth, &test, inside), spectrum: spectrum(&truth, &test, inside) })
-}
-
-fn flip(truth: &RgbImage, test: &RgbImage, inside: impl Fn(u32, u32) -> bool) -> f64 {
-    let (width, height) = truth.dimensions();
-    let picture = |p: &RgbImage| nv_flip::FlipImageRgb8::with_data(width, height, p.as_raw());
-    let map = nv_flip::flip(picture(truth), picture(test), PIXELS_PER_DEGREE).to_vec();
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (i, value) in map.iter().enumerate() {
-        if inside(i as u32 % width, i as u32 / width) {
-            sum += f64::from(*value);
-            count += 1.0;
-        }
-    }
-    sum / f64::max(count, 1.0)
+    let judged: Vec<bool> = truth.enumerate_pixels().map(|(x, y, _)| inside(x, y)).collect();
+    let flip = flip_mean(truth.as_raw(), test.as_raw(), truth.dimensions(), &judged)?;
+    Ok(Difference { flip: flip.unwrap_or(0.0), spectrum: spectrum(&truth, &test, inside) })
 }
 
 fn spectrum(truth: &RgbImage, test: &RgbImage, inside: impl Fn(u32, u32) -> bool) -> f64 {
