@@ -20,7 +20,7 @@ const ivec2 TAPS = ivec2(2, 5);
 
 // Lower edge of a band, metres, as the host's band_edge_m.
 float edge(float band) {
-    return boats[draw.index].board.x * pow(band / float(BANDS), 1.4);
+    return boats[draw.index].board.x * pow(band / float(BANDS), 1.8);
 }
 
 float hull_line(int column) {
@@ -34,6 +34,8 @@ void main() {
     vec2 down = waters[i].down, right = vec2(down.y, -down.x);
     vec2 low = waters[i].mirror_bounds.xy, high = waters[i].mirror_bounds.zw;
     float from = edge(float(band)), to = edge(float(band + 1));
+    // Where the mirrored boat ends at the water its texels are half empty: a texel's half is at most as many pixels.
+    float wet = 0.75 * max(0.4 * board.z, 1.0);
     vec4 sum = vec4(0.0);
     for (int x = 0; x < TAPS.x; ++x) {
         float across = board.y + (floor(gl_FragCoord.x) + (float(x) + 0.5) / float(TAPS.x)) * board.z;
@@ -42,7 +44,7 @@ void main() {
         float line = mix(hull_line(first), hull_line(first + 1), column - float(first));
         for (int y = 0; y < TAPS.y; ++y) {
             float height = mix(from, to, (float(y) + 0.5) / float(TAPS.y));
-            vec2 at = waters[i].anchor + right * across + down * (line + height * board.w);
+            vec2 at = waters[i].anchor + right * across + down * (line + max(height * board.w, wet));
             vec2 uv = at * waters[i].mirror_scale + waters[i].mirror_offset;
             sum += texture(mirror, clamp(uv, low, high));
         }

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// What a cell of water throws back of a boat, and what luminance of the sky the boat takes from it: for a dark, a middling and a bright
-// pixel. It changes slowly over the screen, so a cell is a few pixels; boats add up. As the host's reflection::compose.
+// What a cell of water throws back of a boat, and what share of the cell's own light the boat takes from it: for a dark, a middling and a
+// bright pixel; and the colour of that share, with the luminance above which light is the sun's. It changes slowly over the screen, so a cell is a few pixels; boats add up. As the host's
+// reflection::compose.
 #include "frame.glsl"
 #include "water_block.glsl"
 #include "lobe_block.glsl"
@@ -17,6 +18,7 @@ layout(set = 1, binding = 0) uniform sampler2D sums;
 layout(location = 0) out vec4 dark;
 layout(location = 1) out vec4 middle;
 layout(location = 2) out vec4 bright;
+layout(location = 3) out vec4 coloured;
 
 // Pixels of the screen to a cell.
 const vec2 CELL = vec2(4.0, 2.0);
@@ -44,19 +46,23 @@ void main() {
     float line = mix(hull_line(first), hull_line(first + 1), column - float(first));
     float below = dot(from_anchor, down) - line;
     float near = max(place.x + line * place.y, 1e-5);
-    float tangent = max(near + max(below, 0.0) * place.y, 1e-5);
+    // Water above the line is a wave before the hull, as far from it as one as far below.
+    float tangent = max(near + abs(below) * place.y, 1e-5);
     float far = place.z * (1.0 / near - 1.0 / tangent);
-    int distance_step = int(sqrt(max(far * place.w, 0.0)) * float(STEPS - 1) + 0.5);
+    float at_step = sqrt(max(far * place.w, 0.0)) * float(STEPS - 1);
+    int low = min(int(at_step), STEPS - 2);
+    float part = at_step - float(low);
     // Cells that lie half above the line keep the hull's foot wet where they are blended into those below.
-    if (below < -boats[i].foot.x || distance_step >= STEPS - 1) {
+    if (below < -boats[i].foot.x || at_step >= float(STEPS - 1)) {
         discard;
     }
     float pixels = board.w * near / place.x;
     float scale = 1.0 / board.z;
     vec4 sum[3] = vec4[3](vec4(0.0), vec4(0.0), vec4(0.0));
+    vec4 hue = vec4(0.0);
     for (int band = 0; band < BANDS; ++band) {
-        vec4 thrown = boats[i].lobes[distance_step][2 * band];
-        vec4 taken = boats[i].lobes[distance_step][2 * band + 1];
+        vec4 thrown = mix(boats[i].lobes[low][3 * band], boats[i].lobes[low + 1][3 * band], part);
+        vec4 taken = mix(boats[i].lobes[low][3 * band + 1], boats[i].lobes[low + 1][3 * band + 1], part);
         if (max(max(thrown.x, thrown.y), thrown.z) < 1e-4) {
             continue;
         }
@@ -67,8 +73,10 @@ void main() {
         sum[0] += seen * vec4(thrown.xxx, taken.x);
         sum[1] += seen * vec4(thrown.yyy, taken.y);
         sum[2] += seen * vec4(thrown.zzz, taken.z);
+        hue += seen.w * taken.y * mix(boats[i].lobes[low][3 * band + 2], boats[i].lobes[low + 1][3 * band + 2], part);
     }
     dark = sum[0];
     middle = sum[1];
     bright = sum[2];
+    coloured = hue;
 }

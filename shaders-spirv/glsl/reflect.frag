@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // The sea with the boats in it: each pixel takes from the layers what belongs to its own brightness, so that the waves of the video go
-// through the reflection. Output is premultiplied: it covers what the boats hide of the sky and adds what is seen of them.
+// through the reflection. Output is premultiplied: it covers what the boats hide of a pixel's light and adds what is seen of them.
 #include "frame.glsl"
 
 layout(push_constant) uniform ReflectBlock {
@@ -12,7 +12,6 @@ layout(push_constant) uniform ReflectBlock {
     vec4 tangent;  // tangent below the horizontal: for each pixel right and down, and at pixel (0, 0)
     vec4 mean;     // sea's mean luma: coefficients of the tangent's root; smallest root
     vec4 spread;   // its standard deviation; largest root
-    vec4 hue;      // colour of the sky that boats hide, over its luminance
 } draw;
 
 // The video beneath, as codes.
@@ -20,16 +19,16 @@ layout(set = 1, binding = 0) uniform sampler2D video;
 layout(set = 1, binding = 1) uniform sampler2D dark;
 layout(set = 1, binding = 2) uniform sampler2D middle;
 layout(set = 1, binding = 3) uniform sampler2D bright;
+layout(set = 1, binding = 4) uniform sampler2D coloured;
 
 layout(location = 0) out vec4 colour;
 
 const vec2 CELL = vec2(4.0, 2.0);
-// Standard deviations from the mean of the dark and the bright layer, as the host's DRAWN_TONE; smallest spread, as its SPREAD_MIN.
-const float TONE = 1.1505;
+// Standard deviations from the mean of the dark and the bright layer, as the host's TONE_OUTER; smallest spread, as its SPREAD_MIN.
+const float TONE = 1.15;
 const float SPREAD_MIN = 0.004;
 
-// Largest share of a pixel's light that is taken away, as the host's TAKEN_MAX.
-const float TAKEN_MAX = 0.85;
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 
 float curve(vec4 c, float x) {
     return c.x + x * (c.y + x * c.z);
@@ -38,7 +37,7 @@ float curve(vec4 c, float x) {
 void main() {
     vec2 at = gl_FragCoord.xy;
     vec3 code = texelFetch(video, ivec2(at), 0).rgb;
-    float luma = dot(code, vec3(0.2126, 0.7152, 0.0722));
+    float luma = dot(code, LUMINANCE);
     float root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);
     float tone = (luma - curve(draw.mean, root)) / (max(curve(draw.spread, root), SPREAD_MIN) * TONE);
     tone = clamp(tone, -1.0, 1.0);
@@ -47,13 +46,13 @@ void main() {
         + texture(bright, uv) * max(tone, 0.0);
     // sRGB code to linear light within 0.002.
     vec3 light = code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
-    // What is taken away has the sky's colour, not the water's: enough of the water is covered for each channel, and what is then too
-    // little is given back.
-    vec3 gone = layer.a * draw.hue.rgb;
-    vec3 share = gone / max(light, 1e-3);
-    // A sky that is held brighter than the water can mirror takes no channel's last light: what is left would have a colour of its own.
-    float most = max(max(share.r, share.g), share.b);
-    float held = min(1.0, TAKEN_MAX / max(most, 1e-6));
-    float cover = most * held;
-    colour = vec4(max(layer.rgb + cover * light - gone * held, 0.0), cover);
+    // All tones have the middle one's colour.
+    vec4 hue = texture(coloured, uv);
+    float whole = max(dot(hue.rgb, LUMINANCE), 1e-6);
+    // Light over what waves mirror of the sky is the sun's glitter, of which a boat hides little.
+    float of_sky = min(hue.a / max(whole * dot(light, LUMINANCE), 1e-6), 1.0);
+    vec3 share = clamp(layer.a * hue.rgb / whole, 0.0, 1.0) * of_sky;
+    // As much of the water is covered as its most hidden channel asks for; what is then too little of the others is given back.
+    float cover = max(max(share.r, share.g), share.b);
+    colour = vec4(layer.rgb + light * (cover - share), cover);
 }

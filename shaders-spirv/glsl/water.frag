@@ -6,7 +6,7 @@
 #include "frame.glsl"
 #include "water_block.glsl"
 
-// 0 none, 1 plain mirror; Full Reflection: 2 as printed, 3 singular cases mended; Physics: 4 as printed, 5 mended.
+// 0 none, 1 plain mirror; Full Reflection: 2 as printed, 3 singular cases mended; Physics: 4 as printed, 5 mended; 6 none, and the shadow as the light has it.
 layout(constant_id = 0) const uint METHOD = 3;
 // Shadow level, 0 to 2.
 layout(constant_id = 1) const uint SHADOW = 0;
@@ -110,27 +110,42 @@ bool meets_ship(float across, float below, float line) {
     return away && height >= 0.0 && height < waters[i].passes.w;
 }
 
-// Table 1: what of the nine pixels about this one shows the ship, mirrored with the same shift as in the other shader.
+// IEC 61966-2-1.
+vec3 linear_of(vec3 code) {
+    return mix(code / 12.92, pow((code + 0.055) / 1.055, vec3(2.4)), greaterThan(code, vec3(0.04045)));
+}
+
+// Table 1: the nine pixels about this one, each the ship mirrored with the same shift as in the other shader where it is met, else the
+// video. As printed the kernel blurs both, and the whole ocean; here only what has the ship in one of the nine. Mended it blurs the
+// ship alone: the camera's own pixels stay sharp.
 vec4 physics(vec2 at, float across, float below, float line, vec2 move) {
     uint i = draw.index;
     vec2 down = waters[i].down, right = vec2(down.y, -down.x);
     vec4 bounds = waters[i].mirror_bounds;
     vec4 sum = vec4(0.0);
+    vec3 behind = vec3(0.0);
+    bool any_hit = false;
     for (int n = 0; n < 9; ++n) {
         vec2 step = vec2(float(n % 3 - 1), float(n / 3 - 1));
-        if (!meets_ship(across + dot(step, right), below + dot(step, down), line)) {
-            continue;
+        float weight = n == 4 ? 0.5 : 1.0 / 16.0;
+        vec4 here = vec4(0.0);
+        if (meets_ship(across + dot(step, right), below + dot(step, down), line)) {
+            vec2 uv = (at + step + move) * waters[i].mirror_scale + waters[i].mirror_offset;
+            here = texture(mirror, clamp(uv, bounds.xy, bounds.zw));
+            any_hit = any_hit || here.a > 0.0;
         }
-        vec2 uv = (at + step + move) * waters[i].mirror_scale + waters[i].mirror_offset;
-        sum += (n == 4 ? 0.5 : 1.0 / 16.0) * texture(mirror, clamp(uv, bounds.xy, bounds.zw));
+        sum += weight * here;
+        if (METHOD == 4) {
+            behind += weight * (1.0 - here.a) * linear_of(code_at(at + step));
+        }
     }
-    return sum;
+    return METHOD == 4 && any_hit ? vec4(sum.rgb + behind, 1.0) : sum;
 }
 
 // Share of the mirrored light and the mirrored light itself, premultiplied.
 vec4 reflection(vec2 at, float across, float below, float line) {
     uint i = draw.index;
-    if (METHOD == 0) {
+    if (METHOD == 0 || METHOD == 6) {
         return vec4(0.0);
     }
     vec2 uv = at * waters[i].mirror_scale + waters[i].mirror_offset;
@@ -177,6 +192,19 @@ vec4 reflection(vec2 at, float across, float below, float line) {
     return alpha * wave.y * texture(mirror, clamp(uv + move * waters[i].mirror_scale, bounds.xy, bounds.zw));
 }
 
+// Share of the sea's light that the hull keeps from a pixel: of the light that comes out of the water, what the part of the sky gave
+// that the hull hides (a wall seen under the angle a hides (1 - cos a) / 2), and the sun where its shadow lies. `below` and `line` are
+// pixels.
+float kept_off(float below, float line) {
+    uint i = draw.index;
+    float tangent0 = waters[i].passes.x, per_pixel = waters[i].passes.y, eye = waters[i].passes.z, high = waters[i].passes.w;
+    float near = tangent0 + line * per_pixel;
+    float from_hull = eye / near - eye / (near + below * per_pixel);
+    float hidden = 0.5 - 0.5 * from_hull * inversesqrt(from_hull * from_hull + high * high);
+    float in_shadow = 1.0 - smoothstep(0.75, 1.05, from_hull / max(waters[i].shift, 1e-3));
+    return waters[i].alpha * hidden + waters[i].alpha_fall * in_shadow;
+}
+
 float hull_line(int column) {
     return waters[draw.index].hull_line[column >> 2][column & 3];
 }
@@ -206,6 +234,10 @@ void main() {
     }
     // Eq. 7. As printed it is not clamped by itself; beyond its reach there is no shadow either way.
     float proportion = clamp(waters[i].shadow - below * waters[i].shadow_fall, 0.0, 1.0);
+    if (METHOD == 6) {
+        // Within its reach of one, faded over the last third.
+        proportion = kept_off(below, line) * min(3.0 * proportion, 1.0);
+    }
     float lit;
     if (METHOD == 2 || METHOD == 4) {
         // Eq. 8 as printed: halved wherever there is any shadow at all.

@@ -166,7 +166,7 @@ impl Default for WaterBlock {
 }
 
 /// Bands of height that a [`LobeBlock`] holds a boat in.
-pub const LOBE_BANDS: usize = 10;
+pub const LOBE_BANDS: usize = 14;
 /// Distances from the hull that a [`LobeBlock`] knows.
 pub const LOBE_STEPS: usize = 64;
 /// Columns of a boat's bands on the GPU.
@@ -180,14 +180,65 @@ pub struct LobeBlock {
     pub place: [f32; 4],
     /// Height of the boat, m; across position of its picture's first column, pixels to a column; pixels to a metre at the anchor.
     pub board: [f32; 4],
-    /// Pixels above the hull-water line that are drawn as what is just below it; unused.
+    /// Pixels above the hull-water line that are drawn; unused.
     pub foot: [f32; 4],
-    /// By distance and band: light thrown back by three tones, metres aside; luminance taken away by tone, half width in metres.
-    pub lobes: [[[f32; 4]; 2 * LOBE_BANDS]; LOBE_STEPS],
+    /// By distance and band: light thrown back by three tones, metres aside; share of a pixel's luminance taken away by tone, half width in metres;
+    /// colour of that share, luminance above which light is the sun's.
+    pub lobes: [[[[f32; 4]; 3]; LOBE_BANDS]; LOBE_STEPS],
 }
-layout!(LobeBlock, 20528, place = 0, board = 16, foot = 32, lobes = 48);
+layout!(LobeBlock, 48 + 64 * 48 * LOBE_BANDS, place = 0, board = 16, foot = 32, lobes = 48);
 
 impl Default for LobeBlock {
+    fn default() -> Self {
+        Self::zeroed()
+    }
+}
+
+/// Points of a boat's track on the GPU.
+pub const TRACK_POINTS: usize = 32;
+
+/// A point of a boat's track: `WakePoint`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct WakePoint {
+    /// Camera space; how far the track reaches to each side, metres.
+    pub place: [f32; 4],
+    /// Unit vector to starboard, camera space; height of the highest waves one length off, metres.
+    pub side: [f32; 4],
+    /// Place on the water modulo the foam's repeat, metres; unit vector to starboard there.
+    pub world: [f32; 4],
+    /// Metres behind the bow, m/s, seconds since the boat's middle was here, share that is drawn.
+    pub track: [f32; 4],
+}
+layout!(WakePoint, 64, place = 0, side = 16, world = 32, track = 48);
+
+/// What is the same for all of a boat's wake: `WakeHead`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct WakeHead {
+    /// Unit vector upwards, camera space; root of the sea's mean square slope.
+    pub up: [f32; 4],
+    /// Length and beam at the water line, metres; share of light that haze replaces; height of what the bow throws up, metres.
+    pub hull: [f32; 4],
+    /// Light of whole foam; how much of it the hull throws up.
+    pub foam: [f32; 4],
+    /// What the shader's sea is multiplied with to give the picture's; unused.
+    pub sea: [f32; 4],
+}
+layout!(WakeHead, 64, up = 0, hull = 16, foam = 32, sea = 48);
+
+/// What one boat leaves on the water: `WakeBlock`, set 0, binding 7, std430.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct WakeBlock {
+    /// What is the same everywhere.
+    pub head: WakeHead,
+    /// The track from ahead of the bow backwards.
+    pub points: [WakePoint; TRACK_POINTS],
+}
+layout!(WakeBlock, 2112, head = 0, points = 64);
+
+impl Default for WakeBlock {
     fn default() -> Self {
         Self::zeroed()
     }
@@ -301,21 +352,8 @@ pub struct ReflectBlock {
     pub mean: [f32; 4],
     /// Standard deviation of it; largest root.
     pub spread: [f32; 4],
-    /// Colour of the sky that boats hide, over its luminance; unused.
-    pub hue: [f32; 4],
 }
-layout!(
-    ReflectBlock,
-    96,
-    rect = 0,
-    index = 16,
-    first = 20,
-    pad = 24,
-    tangent = 32,
-    mean = 48,
-    spread = 64,
-    hue = 80,
-);
+layout!(ReflectBlock, 80, rect = 0, index = 16, first = 20, pad = 24, tangent = 32, mean = 48, spread = 64,);
 
 /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.
 #[repr(C)]

@@ -37,6 +37,8 @@ shaders! {
     SCREEN_VERT = "screen.vert";
     /// Camera bytes to packed sRGB codes. Constants: 0 format (0 YUYV, 1 NV12, 2 RGB), 1 scaled, 2 pixels a fragment.
     VIDEO_FRAG = "video.frag";
+    /// The same with what lies over the picture.
+    VIDEO_OVERLAID_FRAG = "video_overlaid.frag";
     /// A corner of a boat without a texture to clip space, and its light.
     BOAT_VERT = "boat.vert";
     /// The same with a texture.
@@ -53,7 +55,8 @@ shaders! {
     SOFTEN_FRAG = "soften.frag";
     /// How the video's brightness changes downwards.
     FIELD_FRAG = "field.frag";
-    /// A boat's light on the sea. Constants: 0 method (0 none, 1 mirror, 2 and 3 Full Reflection as printed and mended, 4 and 5 Physics),
+    /// A boat's light on the sea. Constants: 0 method (0 none, 1 mirror, 2 and 3 Full Reflection as printed and mended, 4 and 5 Physics,
+    /// 6 shadow by light alone),
     /// 1 shadow level.
     WATER_FRAG = "water.frag";
     /// A boat's mirror image collapsed to bands of height.
@@ -64,6 +67,14 @@ shaders! {
     LAYERS_FRAG = "layers.frag";
     /// The layers put onto the sea.
     REFLECT_FRAG = "reflect.frag";
+    /// A strip across a boat's track.
+    WAKE_VERT = "wake.vert";
+    /// Waves and foam that a boat leaves on the water.
+    WAKE_FRAG = "wake.frag";
+    /// A sheet of foam beside or behind a hull.
+    SPRAY_VERT = "spray.vert";
+    /// Foam that stands on the water, where no hull hides it.
+    SPRAY_FRAG = "spray.frag";
     /// The rectangle of a tracer, splash or strike.
     ROUND_VERT = "round.vert";
     /// A tracer, splash or strike.

@@ -14,7 +14,8 @@ use rspirv::{
 };
 use shaders_spirv::interface::{
     BOAT_BLOCKS_MAX, BoatBlock, DrawBlock, FrameBlock, HULL_LINE_COLUMNS, HudQuad, LobeBlock, MeshVertex,
-    ReflectBlock, RoundBlock, VideoBlock, WATERS_MAX, WaterBlock,
+    ReflectBlock, RoundBlock, TRACK_POINTS, VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint,
+    WaterBlock,
 };
 
 /// Name, fields with offsets, and size of one struct of the host.
@@ -29,6 +30,9 @@ const HOST: &[Host] = &[
     ("VideoBlock", VideoBlock::FIELDS, size_of::<VideoBlock>()),
     ("DrawBlock", DrawBlock::FIELDS, size_of::<DrawBlock>()),
     ("LobeBlock", LobeBlock::FIELDS, size_of::<LobeBlock>()),
+    ("WakePoint", WakePoint::FIELDS, size_of::<WakePoint>()),
+    ("WakeHead", WakeHead::FIELDS, size_of::<WakeHead>()),
+    ("WakeBlock", WakeBlock::FIELDS, size_of::<WakeBlock>()),
     ("ReflectBlock", ReflectBlock::FIELDS, size_of::<ReflectBlock>()),
 ];
 
@@ -136,7 +140,11 @@ fn arrays_of_blocks_have_the_stride_and_length_of_the_hosts() {
             assert_eq!(word(&decorated.unwrap().operands[2]) as usize, *size, "stride of {name} in {shader}");
             if i.class.opcode == Op::TypeArray {
                 let length = constants[&word(&i.operands[1])] as usize;
-                let wanted = if *host == "BoatBlock" { BOAT_BLOCKS_MAX } else { WATERS_MAX };
+                let wanted = match *host {
+                    "BoatBlock" => BOAT_BLOCKS_MAX,
+                    "WakePoint" => TRACK_POINTS,
+                    _ => WATERS_MAX,
+                };
                 assert_eq!(length, wanted, "{name} in {shader}");
                 // What Vulkan promises every uniform block.
                 assert!(length * size <= 16384);

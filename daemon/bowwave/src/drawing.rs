@@ -19,6 +19,7 @@ pub fn config(plan: &ScenePlan, gpu: Option<String>, validation: bool) -> Render
         frames_in_flight: FRAMES_IN_FLIGHT,
         needs: Needs {
             boats_max: only(Pass::Boats, plan.boats),
+            wakes_max: only(Pass::Wake, plan.moving),
             rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
             waters,
         },

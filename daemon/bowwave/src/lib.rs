@@ -16,6 +16,7 @@ mod plan;
 mod recorder;
 mod resident;
 mod run;
+mod sea;
 mod simulate;
 mod stats;
 mod study;

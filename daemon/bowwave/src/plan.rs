@@ -76,6 +76,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         picture: arguments.size,
         water: scenario.water,
         boats: scenario.boats.len(),
+        moving: scenario.boats.iter().filter(|b| b.course.speed_max_m_s() > 0.0).count(),
         belt: scenario.weapon.belt,
     });
     let (memory, device) = memory(&plan, &models);
@@ -132,6 +133,7 @@ fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
                 Pass::Mirror | Pass::Water => {
                     "frames with a reflection or shadow in view, on its pixels only"
                 }
+                Pass::Wake => "frames with a wake in view, on its pixels only",
                 Pass::Boats => "frames with a boat in view, on its pixels only",
                 Pass::Rounds => "frames with a tracer, splash or strike in view",
             },

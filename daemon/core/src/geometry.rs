@@ -145,6 +145,12 @@ pub struct CameraPose {
 }
 
 impl CameraPose {
+    /// Tangent of the angle below the horizontal under which a pixel of `lens` looks; negative above it.
+    pub fn tangent_below(&self, lens: &Lens, pixel: DVec2) -> f64 {
+        let up = (self.world_from_camera * lens.unproject(pixel)).z;
+        -up / (1.0 - up * up).max(1e-12).sqrt()
+    }
+
     /// A world point in the camera's space.
     pub fn to_camera(&self, world: DVec3) -> DVec3 {
         self.world_from_camera.inverse() * (world - self.position)

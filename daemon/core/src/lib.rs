@@ -27,6 +27,7 @@ pub mod still;
 pub mod text;
 pub mod time;
 pub mod view;
+pub mod wake;
 pub mod weapon;
 
 #[cfg(test)]

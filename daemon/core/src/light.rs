@@ -9,7 +9,8 @@ use crate::{
     event::Picture,
     geometry::{CameraPose, Lens},
     reflection::{Sample, SeaTones, SkyLight},
-    scene::Light,
+    scene::{Light, ReflectionMethod},
+    sea::{Facets, rms_slope},
     time::Time,
 };
 
@@ -25,6 +26,20 @@ const SUN_TO_SKY: f32 = 2.6;
 
 /// Optical depth of a clear maritime atmosphere at about 610, 550 and 465 nm (Rayleigh and background aerosol).
 const OPTICAL_DEPTH: Vec3 = Vec3::new(0.10, 0.14, 0.22);
+
+/// Light that comes out of the sea over the light that falls on it: clear to coastal water, 0.01 to 0.03 under the surface (Mobley
+/// 1994, section 3.3), of which the surface lets half out.
+const WATER_ALBEDO: f32 = 0.015;
+
+/// Tangents below the horizontal at which the sea is compared with the sky: farther up waves hide each other, farther down is more of
+/// the water's own light.
+const MIRROR_TANGENTS: [f64; 5] = [0.03, 0.045, 0.07, 0.11, 0.17];
+
+/// Nodes of slope to either side that stand for the facets there.
+const MIRROR_NODES: u8 = 8;
+
+/// Bounds of what the sea may call for over what is seen above the horizon.
+const MATCH: [f32; 2] = [0.3, 2.0];
 
 /// Share of linear red, green and blue in luminance (ITU-R BT.709).
 pub const LUMINANCE: Vec3 = Vec3::new(0.2126, 0.7152, 0.0722);
@@ -58,16 +73,11 @@ pub struct LightMeter {
 }
 
 impl LightMeter {
-    /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world).
-    pub fn new(sun_direction: DVec3) -> Self {
-        Self { sun_direction, wants_tones: false, means: None, tones: None }
-    }
-
-    /// The same that measures the sea's tones as well, where `wanted`.
-    #[must_use]
-    pub fn with_tones(mut self, wanted: bool) -> Self {
-        self.wants_tones = wanted;
-        self
+    /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world) and whose sea mirrors by `method`: what
+    /// only other methods look at is not measured.
+    pub fn new(sun_direction: DVec3, method: ReflectionMethod) -> Self {
+        let wants_tones = method == ReflectionMethod::Waves;
+        Self { sun_direction, wants_tones, means: None, tones: None }
     }
 
     /// Takes in a picture whose camera stood at `camera` with `lens` (the picture's own, not the screen's).
@@ -96,10 +106,31 @@ impl LightMeter {
         self.means = Some((time, means));
     }
 
-    /// The sky that boats hide from the sea.
-    pub fn sky(&self) -> SkyLight {
-        let Light { horizon, sky, .. } = self.light();
-        SkyLight::of_bands(horizon, sky)
+    /// The sky that boats hide from a sea under a wind of `wind_m_s`: what is seen of it above the horizon, as bright and of the colour
+    /// that the sea's own brightness calls for. The picture shows little of what the sea mirrors, and land before it, or none.
+    pub fn sky(&self, wind_m_s: f64) -> SkyLight {
+        let Means { sky, horizon, sea } = self.means();
+        let seen = SkyLight::of_bands(horizon, sky);
+        let Some((_, tones)) = self.tones else { return seen };
+        let Light { sun, sky, sun_direction, .. } = self.light();
+        let from_below = WATER_ALBEDO * (sky + sun * sun_direction.z.max(0.0) as f32);
+        let hue = sea / sea.dot(LUMINANCE).max(1e-4);
+        let (mut found, mut expected) = (Vec3::ZERO, Vec3::ZERO);
+        for tangent in MIRROR_TANGENTS {
+            let Some(luma) = tones.mean_at(tangent) else { continue };
+            let facets = Facets::seen(-tangent.atan(), 0.0, rms_slope(wind_m_s), MIRROR_NODES);
+            let own = from_below * facets.through as f32;
+            let mirrored = facets.mirrored.iter().map(|m| seen.at(m.sine) * m.share as f32).sum::<Vec3>();
+            // Rows count alike, however bright they are.
+            let scale = 1.0 / mirrored.dot(LUMINANCE).max(1e-4);
+            found += (hue * srgb_to_linear(luma) - own) * scale;
+            expected += mirrored * scale;
+        }
+        if expected.min_element() <= 0.0 {
+            return seen;
+        }
+        let [least, most] = MATCH;
+        seen.scaled((found / expected).clamp(Vec3::splat(least), Vec3::splat(most)))
     }
 
     /// How bright the sea is; a default where that is not measured.
@@ -107,12 +138,17 @@ impl LightMeter {
         self.tones.map(|(_, tones)| tones).unwrap_or_default()
     }
 
-    /// The light to draw boats with. Before the first picture: an overcast grey.
-    pub fn light(&self) -> Light {
-        let Means { sky, horizon, sea } = self.means.map_or(
+    /// Before the first picture: an overcast grey.
+    fn means(&self) -> Means {
+        self.means.map_or(
             Means { sky: Vec3::splat(0.4), horizon: Vec3::splat(0.45), sea: Vec3::splat(0.1) },
             |(_, m)| m,
-        );
+        )
+    }
+
+    /// The light to draw boats with. Before the first picture: that of an overcast grey.
+    pub fn light(&self) -> Light {
+        let Means { sky, horizon, sea } = self.means();
         let sun = sun_colour(self.sun_direction.z) * sky.element_sum() / 3.0 * SUN_TO_SKY;
         Light { sun_direction: self.sun_direction, sun, sky, horizon, sea }
     }
@@ -130,10 +166,7 @@ const SEA_GRID: (usize, usize) = (24, 20);
 
 fn tones(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<SeaTones> {
     let (w, h) = (f64::from(lens.width), f64::from(lens.height));
-    let down = |pixel: DVec2| {
-        let up = (camera.world_from_camera * lens.unproject(pixel)).z;
-        -up / (1.0 - up * up).max(1e-12).sqrt()
-    };
+    let down = |pixel: DVec2| camera.tangent_below(lens, pixel);
     // Rows from the first that shows sea down to the lowest, closer to each other near the horizon. Tangents grow about evenly downwards.
     let middle = |y: f64| down(DVec2::new(w / 2.0, y * h));
     let (top, bottom) = (middle(0.0), middle(1.0));
@@ -223,7 +256,7 @@ mod tests {
     fn the_sky_above_the_horizon_is_what_is_measured() {
         let lens = Lens::pinhole(64, 64, 1.0);
         let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
-        let mut meter = LightMeter::new(DVec3::new(0.0, 0.6, 0.8));
+        let mut meter = LightMeter::new(DVec3::new(0.0, 0.6, 0.8), ReflectionMethod::Full);
         meter.observe(Time::from_ns(0), &two_tone(188, 99), &lens, &camera);
         let light = meter.light();
         assert!((light.sky.x - srgb_to_linear(188.0 / 255.0)).abs() < 1e-4);
@@ -231,6 +264,40 @@ mod tests {
         // A dark picture ten time constants later is followed.
         meter.observe(Time::from_ns(0).plus_secs(10.0), &two_tone(60, 30), &lens, &camera);
         assert!(meter.light().sky.x < 0.06);
+    }
+
+    /// A sea that mirrors `share` of the sky that is seen above it.
+    fn mirroring(share: f64, lens: &Lens, camera: &CameraPose, wind_m_s: f64) -> Picture {
+        let above = srgb_to_linear(200.0 / 255.0);
+        let row = |y: u32| {
+            let up = (camera.world_from_camera * lens.unproject(DVec2::new(32.0, f64::from(y) + 0.5))).z;
+            if up > 0.0 {
+                return 200;
+            }
+            let facets = Facets::seen(up.asin(), 0.0, rms_slope(wind_m_s), MIRROR_NODES);
+            let mirrored: f64 = facets.mirrored.iter().map(|m| m.share).sum();
+            let light = above * (mirrored * share + facets.through * f64::from(WATER_ALBEDO)) as f32;
+            (linear_to_srgb(light) * 255.0).round() as u8
+        };
+        let bytes: Vec<u8> = (0..64).flat_map(|y| vec![row(y); 64 * 3]).collect();
+        Picture::new(PixelFormat::Rgb, 64, 64, bytes.into()).unwrap()
+    }
+
+    #[test]
+    fn the_sky_that_the_sea_mirrors_is_as_bright_as_the_sea_says() {
+        let lens = Lens::pinhole(64, 64, 0.5);
+        let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
+        // The sun is down: nothing but the sky falls on the water.
+        for share in [0.4, 1.0, 1.6] {
+            let mut meter = LightMeter::new(-DVec3::Z, ReflectionMethod::Waves);
+            meter.observe(Time::from_ns(0), &mirroring(share, &lens, &camera, 2.0), &lens, &camera);
+            let times = meter.sky(2.0).at(0.1).y / srgb_to_linear(200.0 / 255.0);
+            assert!((f64::from(times) / share - 1.0).abs() < 0.1, "{share}: {times}");
+        }
+        // However little the two have to do with each other, what is taken stays within bounds.
+        let mut meter = LightMeter::new(-DVec3::Z, ReflectionMethod::Waves);
+        meter.observe(Time::from_ns(0), &two_tone(0, 255), &lens, &camera);
+        assert!(meter.sky(5.0).nodes.iter().all(|n| n.is_finite() && n.min_element() >= 0.0));
     }
 
     #[test]

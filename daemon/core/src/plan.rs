@@ -25,6 +25,8 @@ pub struct ScenePlan {
     pub water: Water,
     /// Number of boats.
     pub boats: usize,
+    /// How many of them ever move.
+    pub moving: usize,
     /// How the camera's bytes are laid out; one variant of the video pass is compiled.
     pub video: PixelFormat,
     /// The camera's picture size; equal to the screen's leaves out the scaling variant.
@@ -44,6 +46,8 @@ pub struct Needs {
     pub water: Water,
     /// Number of boats in the scenario.
     pub boats: usize,
+    /// How many of them ever move.
+    pub moving: usize,
     /// Rounds in the belt.
     pub belt: u32,
 }
@@ -67,11 +71,16 @@ impl ScenePlan {
             PassDecision::Run if !mirrors => PassDecision::LeftOut(LeftOut::ReflectionOff),
             other => other,
         };
+        let wake = match boats {
+            PassDecision::Run if needs.moving == 0 => PassDecision::LeftOut(LeftOut::NoBoatMoves),
+            other => other,
+        };
         let rounds =
             if needs.belt == 0 { PassDecision::LeftOut(LeftOut::NoRounds) } else { PassDecision::Run };
         let mut passes = [PassDecision::Run; Pass::COUNT];
         passes[Pass::Mirror as usize] = mirror;
         passes[Pass::Water as usize] = water;
+        passes[Pass::Wake as usize] = wake;
         passes[Pass::Boats as usize] = boats;
         passes[Pass::Rounds as usize] = rounds;
         Self {
@@ -79,6 +88,7 @@ impl ScenePlan {
             passes,
             water: needs.water,
             boats: needs.boats,
+            moving: needs.moving,
             video: needs.video,
             picture: needs.picture,
         }
@@ -103,12 +113,13 @@ impl ScenePlan {
                 *decision = PassDecision::LeftOut(why);
             }
         };
-        for pass in [Pass::Mirror, Pass::Water, Pass::Boats, Pass::Rounds] {
+        for pass in [Pass::Mirror, Pass::Water, Pass::Wake, Pass::Boats, Pass::Rounds] {
             leave_out(pass, pose_known, LeftOut::NoPose);
         }
         let reflected = boats.iter().any(|b| b.reflection.is_some());
         leave_out(Pass::Mirror, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);
+        leave_out(Pass::Wake, boats.iter().any(|b| b.wake.is_some()), LeftOut::NoWakeInView);
         leave_out(Pass::Boats, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
         leave_out(Pass::Rounds, !rounds.is_empty(), LeftOut::NoRoundInView);
         passes
@@ -130,6 +141,7 @@ mod tests {
                 shadow: ShadowLevel::Gradual,
             },
             boats: 3,
+            moving: 2,
             belt: 100,
         }
     }
@@ -159,6 +171,8 @@ mod tests {
             reason(Needs { water: nothing, ..needs() }, Pass::Water),
             Some(LeftOut::NoReflectionNoShadow)
         );
+        assert_eq!(reason(Needs { moving: 0, ..needs() }, Pass::Wake), Some(LeftOut::NoBoatMoves));
+        assert_eq!(reason(empty, Pass::Wake), Some(LeftOut::NoBoats));
         assert_eq!(reason(Needs { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
     }
 
@@ -169,6 +183,7 @@ mod tests {
         assert_eq!(frame[Pass::Video as usize], PassDecision::Run);
         assert_eq!(frame[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoBoatInView));
         assert_eq!(frame[Pass::Water as usize], PassDecision::LeftOut(LeftOut::NoReflectionInView));
+        assert_eq!(frame[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoWakeInView));
         assert_eq!(frame[Pass::Rounds as usize], PassDecision::LeftOut(LeftOut::NoRoundInView));
         let lost = plan.frame(false, &[], &[]);
         assert_eq!(lost[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoPose));

@@ -7,7 +7,8 @@ use crate::{
     geometry::{CameraPose, Lens, RigidPose},
     model::ModelId,
     reflection::{SeaTones, SkyLight},
-    sea::BeaufortForce,
+    sea::{BeaufortForce, WmoSeaState, estimate::SeaSource},
+    wake::Wake,
 };
 
 /// One frame.
@@ -55,6 +56,8 @@ pub enum Pass {
     Mirror,
     /// The mirrored layer distorted and blended onto the sea; shadows on the water.
     Water,
+    /// Waves and foam of boats under way.
+    Wake,
     /// The boats.
     Boats,
     /// Tracers and splashes.
@@ -65,10 +68,10 @@ pub enum Pass {
 
 impl Pass {
     /// How many there are.
-    pub const COUNT: usize = 6;
+    pub const COUNT: usize = 7;
     /// All of them, in order.
     pub const ALL: [Self; Self::COUNT] =
-        [Self::Video, Self::Mirror, Self::Water, Self::Boats, Self::Rounds, Self::Hud];
+        [Self::Video, Self::Mirror, Self::Water, Self::Wake, Self::Boats, Self::Rounds, Self::Hud];
 
     /// The name used in summaries.
     pub const fn name(self) -> &'static str {
@@ -76,6 +79,7 @@ impl Pass {
             Self::Video => "video",
             Self::Mirror => "mirror",
             Self::Water => "water",
+            Self::Wake => "wake",
             Self::Boats => "boats",
             Self::Rounds => "rounds",
             Self::Hud => "hud",
@@ -107,6 +111,10 @@ pub enum LeftOut {
     ReflectionOff,
     /// Neither reflection nor shadow is wanted.
     NoReflectionNoShadow,
+    /// No boat of the scenario ever moves.
+    NoBoatMoves,
+    /// No wake of a boat is within the picture.
+    NoWakeInView,
     /// No tracer or splash is within the picture.
     NoRoundInView,
     /// The weapon has no rounds.
@@ -127,6 +135,8 @@ impl LeftOut {
             Self::SeaTooRough => "sea_above_beaufort_4",
             Self::ReflectionOff => "reflection_off",
             Self::NoReflectionNoShadow => "no_reflection_no_shadow",
+            Self::NoBoatMoves => "no_boat_moves",
+            Self::NoWakeInView => "no_wake_in_view",
             Self::NoRoundInView => "no_round_in_view",
             Self::NoRounds => "no_rounds",
             Self::NoPose => "no_pose",
@@ -163,6 +173,8 @@ pub struct BoatView {
     pub hull: Option<PixelRect>,
     /// Pixels that its reflection or shadow can reach, distortion and blur included; `None` where neither is drawn.
     pub reflection: Option<PixelRect>,
+    /// What it leaves on the water, curvature of the sea taken off; `None` where it lies still or nothing of it is in view.
+    pub wake: Option<Wake>,
     /// Distance from the camera, metres.
     pub range_m: f64,
     /// Share of its light that haze replaces by the horizon's, 0 to 1.
@@ -343,4 +355,6 @@ pub struct Hud {
     pub hits: u32,
     /// Seconds since the scenario began.
     pub clock_s: f64,
+    /// The sea that is drawn, where it is measured in the video.
+    pub sea: Option<(WmoSeaState, SeaSource)>,
 }

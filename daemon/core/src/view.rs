@@ -6,6 +6,7 @@ use crate::{
     geometry::{CameraPose, Lens, RigidPose, curvature_drop, horizon_distance},
     model::{Model, ModelId, ModelKind},
     scene::{BoatView, PixelRect, RoundView},
+    wake::Wake,
 };
 
 /// Geometry nearer than this to the camera's plane is cut off, metres: nothing virtual is closer to the muzzle's camera.
@@ -61,9 +62,16 @@ pub struct Afloat<'a> {
 impl Eye<'_> {
     /// The boat as it is seen; `None` where neither hull nor reflection touches the screen.
     pub fn see(&self, boat: &Afloat<'_>) -> Option<BoatView> {
+        self.see_with_wake(boat, None)
+    }
+
+    /// The same of a boat with a wake; `None` where that does not touch the screen either.
+    pub fn see_with_wake(&self, boat: &Afloat<'_>, wake: Option<Wake>) -> Option<BoatView> {
         let offset = boat.pose.position - self.camera.position;
         let range_m = offset.length();
-        if !range_m.is_finite() || !self.may_see(offset, range_m, boat.model.radius_m()) {
+        let beyond_horizon = offset.truncate().length() > horizon_distance(self.camera.position.z);
+        let wake = wake.filter(|_| !beyond_horizon).and_then(|w| self.see_wake(w));
+        if !range_m.is_finite() || (wake.is_none() && !self.may_see(offset, range_m, boat.model.radius_m())) {
             return None;
         }
         let drop = curvature_drop(offset.truncate().length());
@@ -78,8 +86,7 @@ impl Eye<'_> {
         } else {
             None
         };
-        let horizon_m = horizon_distance(self.camera.position.z);
-        if hull.is_none() && reflection.is_none() {
+        if hull.is_none() && reflection.is_none() && wake.is_none() {
             return None;
         }
         Some(BoatView {
@@ -89,10 +96,25 @@ impl Eye<'_> {
             water_level,
             hull,
             reflection,
+            wake,
             range_m,
             haze: haze_share(range_m, self.visibility_m),
-            beyond_horizon: offset.truncate().length() > horizon_m,
+            beyond_horizon,
         })
+    }
+
+    /// A wake with the sea's curvature taken off, where any of it can touch the screen.
+    fn see_wake(&self, wake: Wake) -> Option<Wake> {
+        let wake = wake.lifted(|p| -curvature_drop((p - self.camera.position.truncate()).length()));
+        let seen = wake.points().windows(2).any(|pair| {
+            let corner = |i: usize| {
+                let (point, side) = (&pair[i / 4], if i & 1 == 0 { 1.0 } else { -1.0 });
+                point.position + (point.starboard * (side * wake.half_width_m(point))).extend(0.0)
+            };
+            // Corner numbers as of a box, so that edges are found alike: a flat one.
+            self.bounds(&std::array::from_fn(corner), 0.0).is_some()
+        });
+        seen.then_some(wake)
     }
 
     /// Cheap first test: whether a sphere, and its mirror image close below it, can touch the field of view.

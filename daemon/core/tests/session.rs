@@ -115,7 +115,7 @@ fn play(
     seconds: f64,
     stream: &Stream,
     edges: &[TriggerEdge],
-    mut each: impl FnMut(&Session, Option<Status>, [PassDecision; 6], &[ShotRecord]),
+    mut each: impl FnMut(&Session, Option<Status>, [PassDecision; Pass::COUNT], &[ShotRecord]),
 ) {
     let mut sent_imu = 0;
     let mut sent_frame = 0;
@@ -163,7 +163,7 @@ fn play(
         let records = step.records.to_vec();
         let (status, passes) = match &step.view {
             Some(v) => (Some(v.scene.hud.status.clone()), v.scene.passes),
-            None => (None, [PassDecision::LeftOut(LeftOut::NoPose); 6]),
+            None => (None, [PassDecision::LeftOut(LeftOut::NoPose); Pass::COUNT]),
         };
         each(session, status, passes, &records);
         session.frame_shown();
@@ -322,13 +322,17 @@ fn an_empty_scenario_is_video_and_display() {
 
 #[test]
 fn a_rehearsal_has_everything_in_view() {
-    let scene = session(SCENARIO).rehearsal();
+    let moving = SCENARIO.replace("\"still\"", "\"straight\"\nspeed_kn = 10");
+    let scene = session(&moving).rehearsal();
     for pass in Pass::ALL {
         let runs = scene.passes[pass as usize];
         // The sea of this scenario is calm and nothing in it is switched off.
         assert_eq!(runs, PassDecision::Run, "{pass:?}");
     }
     assert_eq!((scene.boats.len(), scene.rounds.len()), (1, 3));
+    // A boat that lies still leaves no wake.
+    let still = session(SCENARIO).rehearsal();
+    assert_eq!(still.passes[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoBoatMoves));
 }
 
 /// The outcomes of the rounds of three bursts, and the states that were shown in half a second around the middle one.

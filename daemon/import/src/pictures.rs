@@ -10,7 +10,7 @@ use std::{
     sync::Arc,
 };
 
-use bowwave_core::time::NS_PER_S;
+use bowwave_core::{text::one_line, time::NS_PER_S};
 use bowwave_record::{Entry, FrameEntry, recording::JPEG_MAX_BYTES};
 use image::{ImageFormat, ImageReader, codecs::jpeg::JpegEncoder};
 
@@ -118,18 +118,18 @@ fn read_picture(path: &Path) -> Result<(Vec<u8>, (u32, u32)), ImportError> {
     let format =
         image::guess_format(&bytes).map_err(|_| unusable("it is neither JPEG nor PNG".to_owned()))?;
     let reader = || ImageReader::with_format(Cursor::new(bytes.as_slice()), format);
-    let size = reader().into_dimensions().map_err(|e| unusable(one_line(&e)))?;
+    let size = reader().into_dimensions().map_err(|e| unusable(one_line(&e.to_string())))?;
     if size.0 > 8192 || size.1 > 8192 {
         return Err(unusable(format!("it is {}x{}, and the largest is 8192x8192", size.0, size.1)));
     }
     let jpeg = match format {
         ImageFormat::Jpeg => bytes,
         ImageFormat::Png => {
-            let colours = reader().decode().map_err(|e| unusable(one_line(&e)))?.to_rgb8();
+            let colours = reader().decode().map_err(|e| unusable(one_line(&e.to_string())))?.to_rgb8();
             let mut jpeg = Vec::new();
             JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY)
                 .encode_image(&colours)
-                .map_err(|e| unusable(one_line(&e)))?;
+                .map_err(|e| unusable(one_line(&e.to_string())))?;
             jpeg
         }
         other => return Err(unusable(format!("it is {other:?}, not JPEG or PNG"))),
@@ -138,10 +138,6 @@ fn read_picture(path: &Path) -> Result<(Vec<u8>, (u32, u32)), ImportError> {
         return Err(unusable(format!("it has {} bytes, and the most is {JPEG_MAX_BYTES}", jpeg.len())));
     }
     Ok((jpeg, size))
-}
-
-fn one_line(error: &image::ImageError) -> String {
-    error.to_string().lines().collect::<Vec<_>>().join(" ")
 }
 
 /// Width and height that a JPEG states; kept with the reader of pictures so that both importers agree.

@@ -2,11 +2,12 @@
 //!
 //! It makes the built-in picture model and contact sheets; the trainer's own pictures come from the renderer.
 
-use bowwave_core::model::{Model, Texture, Vertex};
+use bowwave_core::{
+    light::{linear_to_srgb, srgb_to_linear},
+    model::{Model, Texture, Vertex},
+};
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use image::{Rgba, RgbaImage};
-
-use crate::build::paint::{linear_to_srgb, srgb_to_linear};
 
 /// A picture in the making: linear colour, coverage and depth, several samples a pixel.
 pub struct Canvas {

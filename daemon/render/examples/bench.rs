@@ -1,9 +1,13 @@
-//! Times frames from submission to completion: `bench [FRAMES [WIDTHxHEIGHT [DEVICE [SCENE]]]]`, an empty
-//! DEVICE being the first, SCENE a part of a scene's name. Prints p50 and p99 of the whole frame
-//! and of each pass, for several scenes, and each scene's ratio to a bare video pass of the same run.
+//! The ladder of scenes from empty to full, and what each step costs: `bench [FRAMES [WIDTHxHEIGHT [DEVICE [SCENE [CSV]]]]]`, an empty
+//! DEVICE being the first, SCENE a part of a scene's name (the bare video is always measured), CSV a file to write.
+//!
+//! All scenes are drawn in turns in one run, so that what else the machine does strikes all alike. `wall` is from submission to
+//! completion, one frame at a time; `cpu` is the time of all threads of this process, drivers that draw on the processor included.
+//! Only ratios to the bare video of the same run are comparable between machines and runs.
 
 use std::{
     error::Error,
+    fmt::Write as _,
     path::Path,
     sync::Arc,
     time::{Duration, Instant},
@@ -11,9 +15,12 @@ use std::{
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    scene::{LeftOut, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel},
+    model::Model,
+    scene::{LeftOut, Pass, PassDecision, ReflectionMethod, RoundView, Scene, ShadowLevel},
 };
-use bowwave_render::{Needs, RenderConfig, Renderer, TimeOuts};
+use bowwave_render::{Completions, Needs, RenderConfig, Renderer, TimeOuts};
+use glam::{DVec3, Vec3};
+use rustix::time::{ClockId, clock_gettime};
 
 #[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
 #[path = "../src/testing.rs"]
@@ -27,12 +34,119 @@ fn picture(format: PixelFormat, width: u32, height: u32, phase: u32) -> Result<P
     Ok(Picture::new(format, width, height, Arc::from(bytes))?)
 }
 
+/// A step of the ladder.
 struct Case {
     name: String,
+    /// The step below it, and what is dearer.
+    over: &'static str,
+    why: &'static str,
     scene: Scene,
-    needs: Needs,
     format: PixelFormat,
     size: (u32, u32),
+}
+
+/// A step being measured.
+struct Running {
+    case: Case,
+    renderer: Renderer,
+    completions: Completions,
+    pictures: Vec<Picture>,
+    wall_ms: Vec<f64>,
+    cpu_ms: Vec<f64>,
+    passes_ms: Vec<Vec<f64>>,
+}
+
+const BARE: &str = "bare video";
+
+fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
+    let full = (width, height);
+    let empty = testing::empty_scene(width, height);
+    let mut bare = empty.clone();
+    bare.passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
+    let video = |name: &str, why, format, size| Case {
+        name: name.to_owned(),
+        over: BARE,
+        why,
+        scene: bare.clone(),
+        format,
+        size,
+    };
+    let mut cases = vec![
+        video(BARE, "YUYV, pixel for pixel: converted, copied to the host", PixelFormat::Yuyv, full),
+        video("video NV12", "chroma from a second plane", PixelFormat::Nv12, full),
+        video("video RGB", "three bytes a pixel to fetch, none to convert", PixelFormat::Rgb, full),
+        video("video scaled", "four pixels fetched and blended for one", PixelFormat::Yuyv, (854, 480)),
+    ];
+    let mut step = |name: &str, over, why, scene: &Scene| {
+        let name = name.to_owned();
+        cases.push(Case { name, over, why, scene: scene.clone(), format: PixelFormat::Yuyv, size: full });
+    };
+    step("no boat", BARE, "head-up display: its plates alone are blended", &empty);
+    // From here on without display, so that steps stand for themselves.
+    let with = |method, shadow, range: f64| {
+        let mut scene = bare.clone();
+        (scene.water.method, scene.water.shadow) = (method, shadow);
+        testing::add_boat(&mut scene, models, 0, range, -0.05, 0.4);
+        for pass in [Pass::Mirror, Pass::Water] {
+            if method == ReflectionMethod::Off {
+                scene.passes[pass as usize] = PassDecision::LeftOut(LeftOut::ReflectionOff);
+            }
+        }
+        scene
+    };
+    let (off, none) = (ReflectionMethod::Off, ShadowLevel::None);
+    step("boat far", BARE, "its mesh and the pixels of its hull", &with(off, none, 400.0));
+    step("boat near", "boat far", "more pixels and triangles of the hull", &with(off, none, 60.0));
+    for (name, method, why) in [
+        ("mirror", ReflectionMethod::Mirror, "the mesh mirrored, once a pixel of water"),
+        ("full as printed", ReflectionMethod::FullAsPrinted, "ten pixels of video compared at each of water"),
+        ("full", ReflectionMethod::Full, "video compared a cell at a time, mirror softened"),
+        ("physics as printed", ReflectionMethod::PhysicsAsPrinted, "nine rays a pixel of water"),
+        ("physics", ReflectionMethod::Physics, "nine rays a pixel, eight waves each"),
+        ("waves", ReflectionMethod::Waves, "bands, sums, cells, three layers a pixel"),
+    ] {
+        step(name, "boat near", why, &with(method, none, 60.0));
+    }
+    let shaded = with(ReflectionMethod::Waves, ShadowLevel::Gradual, 60.0);
+    step("waves, shadow", "waves", "what the hull keeps off the water before it", &shaded);
+    let mut moving = bare.clone();
+    (moving.water.method, moving.water.shadow) = (ReflectionMethod::Waves, ShadowLevel::Gradual);
+    testing::add_moving_boat(&mut moving, models, 0, [60.0, -0.05, 0.4], [7.0, 0.0]);
+    step("waves, shadow, wake", "waves, shadow", "the ribbon of the wake, foam beside the hull", &moving);
+    let mut rounds = moving.clone();
+    add_rounds(&mut rounds);
+    step("and rounds", "waves, shadow, wake", "tracer, splash and strike", &rounds);
+    for (name, over, method, speed_m_s) in [
+        ("three still, full", "full", ReflectionMethod::Full, 0.0),
+        ("three boats, full", "three still, full", ReflectionMethod::Full, 7.0),
+        ("three still, waves", "waves, shadow", ReflectionMethod::Waves, 0.0),
+        ("three boats, waves", "three still, waves", ReflectionMethod::Waves, 7.0),
+    ] {
+        let mut scene = empty.clone();
+        (scene.water.method, scene.water.shadow) = (method, ShadowLevel::Gradual);
+        for (i, place) in [[60.0, -0.15, 0.4], [120.0, 0.2, 1.4], [250.0, 0.05, 2.6]].into_iter().enumerate()
+        {
+            testing::add_moving_boat(&mut scene, models, i, place, [speed_m_s, 0.0]);
+        }
+        add_rounds(&mut scene);
+        step(
+            name,
+            over,
+            if speed_m_s > 0.0 { "their wakes" } else { "three boats, rounds and the display" },
+            &scene,
+        );
+    }
+    cases
+}
+
+fn add_rounds(scene: &mut Scene) {
+    let Some(at) = scene.boats.last().map(|b| b.pose.position) else { return };
+    scene.rounds = vec![
+        RoundView::Splash { at: at + DVec3::new(4.0, 6.0, 0.0), height_m: 4.0, radius_m: 0.9, opacity: 0.9 },
+        RoundView::Strike { at: at + DVec3::Z * 1.5, radius_m: 0.8, opacity: 0.9 },
+        RoundView::Tracer { from: at * 0.5, to: at * 0.8, radiance: Vec3::new(4.0, 1.2, 0.5) },
+    ];
+    scene.passes[Pass::Rounds as usize] = PassDecision::Run;
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -40,131 +154,161 @@ fn main() -> Result<(), Box<dyn Error>> {
     let frames: usize = args.next().map_or(Ok(200), |n| n.parse())?;
     let size = args.next().unwrap_or_else(|| "1280x720".to_owned());
     let (w, h) = size.split_once('x').ok_or("a size is WIDTHxHEIGHT")?;
-    let (width, height) = (w.parse()?, h.parse()?);
+    let size = (w.parse()?, h.parse()?);
     let device = args.next().filter(|d| !d.is_empty());
+    let (wanted, csv) = (args.next().unwrap_or_default(), args.next());
     let models = ["dhow", "skiff", "rhib"]
         .into_iter()
         .map(|name| bowwave_models::resolve(name, Path::new(".")))
         .collect::<Result<Vec<_>, _>>()?;
-    let empty = testing::empty_scene(width, height);
-    let mut bare = empty.clone();
-    bare.passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoBoats);
-    let case = |name: &str, scene: &Scene, format, from| Case {
-        name: name.to_owned(),
-        scene: scene.clone(),
-        needs: Needs {
-            boats_max: scene.boats.len(),
-            rounds_max: 0,
-            waters: if scene.boats.is_empty() {
-                vec![]
-            } else {
-                vec![(scene.water.method, scene.water.shadow)]
-            },
-        },
-        format,
-        size: from,
-    };
-    let full = (width, height);
-    let mut cases = vec![
-        case("bare video YUYV", &bare, PixelFormat::Yuyv, full),
-        case("bare video NV12", &bare, PixelFormat::Nv12, full),
-        case("bare video RGB", &bare, PixelFormat::Rgb, full),
-        case("bare video RGB scaled", &bare, PixelFormat::Rgb, (854, 480)),
-        case("bare video YUYV scaled", &bare, PixelFormat::Yuyv, (854, 480)),
-        case("no boat", &empty, PixelFormat::Yuyv, full),
-    ];
-    for method in [
-        ReflectionMethod::Off,
-        ReflectionMethod::Mirror,
-        ReflectionMethod::Full,
-        ReflectionMethod::FullAsPrinted,
-        ReflectionMethod::PhysicsAsPrinted,
-        ReflectionMethod::Physics,
-        ReflectionMethod::Waves,
-    ] {
-        let mut scene = empty.clone();
-        scene.water.method = method;
-        scene.water.shadow = ShadowLevel::Gradual;
-        testing::add_boat(&mut scene, &models, 0, 60.0, -0.15, 0.4);
-        testing::add_boat(&mut scene, &models, 1, 120.0, 0.2, 1.4);
-        testing::add_boat(&mut scene, &models, 2, 250.0, 0.05, 2.6);
-        cases.push(case(&format!("three boats, {method:?}"), &scene, PixelFormat::Yuyv, full));
+    let mut running = cases(size, &models)
+        .into_iter()
+        .filter(|c| c.name == BARE || c.name.contains(&wanted))
+        .map(|case| Running::new(case, size, device.clone(), &models))
+        .collect::<Result<Vec<_>, _>>()?;
+    let warm_up = 8;
+    for i in 0..frames + warm_up {
+        for case in &mut running {
+            case.frame(i, i >= warm_up)?;
+        }
     }
-    let mut reference = None;
-    println!(
-        "{:32} {:>7} {:>7} {:>7} {:>6} {:>7}  passes: p50 ms",
-        "scene", "min ms", "p50 ms", "p99 ms", "ratio", "cpu ms"
-    );
-    let wanted = args.next().unwrap_or_default();
-    for case in cases.into_iter().filter(|c| c.name.contains(&wanted)) {
-        let config = RenderConfig {
-            width,
-            height,
-            device: device.clone(),
-            validation: false,
-            frames_in_flight: 3,
-            needs: case.needs.clone(),
-            picture: None,
-            time_outs: TimeOuts::default(),
-        };
-        let p50 = run(&case, &config, &models, frames, reference)?;
-        reference = reference.or(Some(p50));
+    let table = table(&mut running);
+    println!("{}", text(&table));
+    if let Some(path) = csv {
+        std::fs::write(path, csv_of(&table))?;
     }
     Ok(())
 }
 
-/// Draws one case and prints its line; returns the median.
-fn run(
-    case: &Case,
-    config: &RenderConfig,
-    models: &[bowwave_core::model::Model],
-    frames: usize,
-    reference: Option<f64>,
-) -> Result<f64, Box<dyn Error>> {
-    let (mut renderer, mut completions) = Renderer::new(config, models)?;
-    let pictures = (0..4)
-        .map(|phase| picture(case.format, case.size.0, case.size.1, phase))
-        .collect::<Result<Vec<_>, _>>()?;
-    let warm_up = 10;
-    let (mut whole, mut passes) = (Vec::new(), vec![Vec::new(); Pass::COUNT]);
-    let mut cpu_before = 0.0;
-    for i in 0..frames + warm_up {
-        if i == warm_up {
-            cpu_before = cpu_ms();
+impl Running {
+    fn new(
+        case: Case,
+        size: (u32, u32),
+        device: Option<String>,
+        models: &[Model],
+    ) -> Result<Self, Box<dyn Error>> {
+        let scene = &case.scene;
+        let water = scene.runs(Pass::Water).then_some((scene.water.method, scene.water.shadow));
+        let config = RenderConfig {
+            width: size.0,
+            height: size.1,
+            device,
+            validation: false,
+            frames_in_flight: 3,
+            needs: Needs {
+                boats_max: scene.boats.len(),
+                rounds_max: scene.rounds.len(),
+                wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
+                waters: water.into_iter().collect(),
+            },
+            picture: None,
+            time_outs: TimeOuts::default(),
+        };
+        let (renderer, completions) = Renderer::new(&config, models)?;
+        let pictures = (0..4)
+            .map(|phase| picture(case.format, case.size.0, case.size.1, phase))
+            .collect::<Result<Vec<_>, _>>()?;
+        let passes_ms = vec![Vec::new(); Pass::COUNT];
+        Ok(Self { case, renderer, completions, pictures, wall_ms: Vec::new(), cpu_ms: Vec::new(), passes_ms })
+    }
+
+    fn frame(&mut self, i: usize, counts: bool) -> Result<(), Box<dyn Error>> {
+        let (begun, cpu) = (Instant::now(), cpu_ms());
+        self.renderer.submit(&self.case.scene, &self.pictures[i % 4], true)?;
+        let frame = self.completions.wait_next(Duration::from_secs(20))?.ok_or("no frame within 20 s")?;
+        let (wall, cpu) = (begun.elapsed().as_secs_f64() * 1e3, cpu_ms() - cpu);
+        if !counts {
+            return Ok(());
         }
-        let begun = Instant::now();
-        renderer.submit(&case.scene, &pictures[i % 4], true)?;
-        let frame = completions.wait_next(Duration::from_secs(5))?.ok_or("no frame within 5 s")?;
-        let ms = begun.elapsed().as_secs_f64() * 1e3;
-        if i >= warm_up {
-            whole.push(ms);
-            for (list, ms) in passes.iter_mut().zip(frame.passes_ms) {
+        if frame.passes_ms.iter().any(Option::is_some) {
+            // A timed frame is a slower one.
+            for (list, ms) in self.passes_ms.iter_mut().zip(frame.passes_ms) {
                 list.extend(ms);
             }
+        } else {
+            self.wall_ms.push(wall);
+            self.cpu_ms.push(cpu);
         }
+        Ok(())
     }
-    let p50 = percentile(&mut whole, 0.5);
-    let p99 = percentile(&mut whole, 0.99);
-    let ratio = p50 / reference.unwrap_or(p50);
-    let list: Vec<String> = Pass::ALL
-        .iter()
-        .zip(&mut passes)
-        .filter(|(_, ms)| !ms.is_empty())
-        .map(|(pass, ms)| format!("{} {:.3}", pass.name(), percentile(ms, 0.5)))
-        .collect();
-    let cpu = (cpu_ms() - cpu_before) / frames as f64;
-    let min = percentile(&mut whole, 0.0);
-    println!("{:32} {min:7.3} {p50:7.3} {p99:7.3} {ratio:6.2} {cpu:7.3}  {}", case.name, list.join(", "));
-    Ok(p50)
 }
 
-/// Processor time of all threads so far, to 10 ms: unlike the wall clock it does not grow with what else runs. 0 where the
-/// system does not tell.
+/// Processor time of all threads so far.
 fn cpu_ms() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let after_name = stat.rsplit(')').next().unwrap_or_default();
-    after_name.split_whitespace().skip(11).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>()
-        * 10.0
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 * 1e3 + time.tv_nsec as f64 * 1e-6
+}
+
+/// A line of the table.
+struct Line {
+    scene: String,
+    passes: String,
+    memory_mb: f64,
+    wall_ms: [f64; 3],
+    cpu_ms: f64,
+    wall_ratio: f64,
+    cpu_ratio: f64,
+    /// What it costs more than the step below it, in bare videos.
+    step: f64,
+    over: &'static str,
+    why: &'static str,
+}
+
+fn table(running: &mut [Running]) -> Vec<Line> {
+    let mut lines: Vec<Line> = Vec::new();
+    for case in running {
+        let wall_ms = [0.0, 0.5, 0.99].map(|q| percentile(&mut case.wall_ms, q));
+        let cpu_ms = percentile(&mut case.cpu_ms, 0.5);
+        let of = |name: &str| lines.iter().find(|l| l.scene == name);
+        let bare = lines.first();
+        let cpu_ratio = bare.map_or(1.0, |b| cpu_ms / b.cpu_ms);
+        let timed = Pass::ALL.iter().zip(&mut case.passes_ms).filter(|(_, ms)| !ms.is_empty());
+        let passes: Vec<_> =
+            timed.map(|(pass, ms)| format!("{} {:.2}", pass.name(), percentile(ms, 0.5))).collect();
+        lines.push(Line {
+            passes: passes.join(" + "),
+            memory_mb: case.renderer.memory().iter().map(|(_, bytes)| *bytes as f64).sum::<f64>() * 1e-6,
+            wall_ratio: bare.map_or(1.0, |b| wall_ms[1] / b.wall_ms[1]),
+            step: cpu_ratio - of(case.case.over).map_or(0.0, |l| l.cpu_ratio),
+            scene: case.case.name.clone(),
+            wall_ms,
+            cpu_ms,
+            cpu_ratio,
+            over: case.case.over,
+            why: case.case.why,
+        });
+    }
+    lines
+}
+
+fn text(table: &[Line]) -> String {
+    let mut text = format!(
+        "{:21} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6} {:>6} {:>6}  passes, p50 ms; step over\n",
+        "scene", "MB", "min ms", "p50 ms", "p99 ms", "cpu ms", "wall", "cpu", "step"
+    );
+    for l in table {
+        let [min, p50, p99] = l.wall_ms;
+        let _ = writeln!(
+            text,
+            "{:21} {:6.1} {min:7.2} {p50:7.2} {p99:7.2} {:7.2} {:6.2} {:6.2} {:+6.2}  {}; {}: {}",
+            l.scene, l.memory_mb, l.cpu_ms, l.wall_ratio, l.cpu_ratio, l.step, l.passes, l.over, l.why
+        );
+    }
+    text
+}
+
+fn csv_of(table: &[Line]) -> String {
+    let mut text = "scene,memory_mb,wall_min_ms,wall_p50_ms,wall_p99_ms,cpu_p50_ms,wall_ratio,cpu_ratio,step,over,passes_p50_ms,why\n"
+        .to_owned();
+    for l in table {
+        let [min, p50, p99] = l.wall_ms;
+        let _ = writeln!(
+            text,
+            "\"{}\",{:.2},{min:.3},{p50:.3},{p99:.3},{:.3},{:.3},{:.3},{:.3},\"{}\",\"{}\",\"{}\"",
+            l.scene, l.memory_mb, l.cpu_ms, l.wall_ratio, l.cpu_ratio, l.step, l.over, l.passes, l.why
+        );
+    }
+    text
 }
 
 fn percentile(values: &mut [f64], q: f64) -> f64 {

@@ -1,14 +1,16 @@
 //! Draws boats into a photograph, to be looked at:
-//! `still PHOTO OUT.png [METHOD [FORCE [WIDTHxHEIGHT [MODEL:RANGE:BEARING:YAW...]]]]`, METHOD being one of printed, full, mirror,
-//! off; angles in degrees. `BOWWAVE_VALIDATE` in the environment switches Vulkan's validation layer on.
+//! `still PHOTO OUT.png [METHOD [FORCE [WIDTHxHEIGHT [MODEL:RANGE:BEARING:YAW[:SPEED[:TURN]]...]]]]`, METHOD being one of printed,
+//! full, mirror, waves, physics, physics_printed, off; angles in degrees, metres a second, and degrees a second. `BOWWAVE_VALIDATE` in the environment switches Vulkan's validation layer on.
 
 use std::{error::Error, path::Path, sync::Arc, time::Duration};
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
     geometry::look,
-    scene::{Pass, PassDecision, ReflectionMethod, RoundView, ShadowLevel, Water},
+    light::LightMeter,
+    scene::{LeftOut, Pass, PassDecision, ReflectionMethod, RoundView, ShadowLevel, Water},
     sea::BeaufortForce,
+    time::Time,
 };
 use bowwave_render::{Needs, RenderConfig, Renderer, TimeOuts};
 use glam::{DVec3, Vec3};
@@ -42,6 +44,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     scene.camera.world_from_camera = look(0.0, 0.0, 0.0);
     scene.camera.position = DVec3::new(0.0, 0.0, 5.0);
     scene.water = Water { method, force, shadow: ShadowLevel::Gradual };
+    // As the trainer does: light from the picture, to which the lens of the scene belongs.
+    let mut meter = LightMeter::new(scene.light.sun_direction, method);
+    let lens = scene.lens.covering(image.width(), image.height());
+    meter.observe(Time::from_ns(0), &picture, &lens, &scene.camera);
+    (scene.light, scene.sky, scene.tones) = (meter.light(), meter.sky(force.wind_mean_m_s()), meter.tones());
+    if std::env::var_os("BOWWAVE_NO_HUD").is_some() {
+        scene.passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
+    }
     let mut boats: Vec<String> = args.collect();
     if boats.is_empty() {
         boats = ["dhow:60:-8:170", "skiff:30:6:150", "rhib:110:9:20"].map(str::to_owned).to_vec();
@@ -50,12 +60,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut parts = boat.split(':');
         let name = parts.next().unwrap_or_default();
         let numbers: Vec<f64> = parts.map(str::parse).collect::<Result<_, _>>()?;
-        let [range, bearing, yaw] = numbers[..] else {
-            return Err("a boat is MODEL:RANGE:BEARING:YAW".into());
+        let (speed, turn) = (numbers.get(3).copied().unwrap_or(0.0), numbers.get(4).copied().unwrap_or(0.0));
+        let [range, bearing, yaw, ..] = numbers[..] else {
+            return Err("a boat is MODEL:RANGE:BEARING:YAW[:SPEED[:TURN]]".into());
         };
         models.push(bowwave_models::resolve(name, Path::new("."))?);
         let (bearing, yaw) = (bearing.to_radians(), yaw.to_radians());
-        testing::add_boat(&mut scene, &models, models.len() - 1, range, bearing, yaw);
+        let motion = [speed, turn.to_radians()];
+        testing::add_moving_boat(&mut scene, &models, models.len() - 1, [range, bearing, yaw], motion);
     }
     if std::env::var_os("BOWWAVE_ROUNDS").is_some() {
         scene.rounds = rounds(&scene);
@@ -67,7 +79,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         device: None,
         validation: std::env::var_os("BOWWAVE_VALIDATE").is_some(),
         frames_in_flight: 2,
-        needs: Needs { boats_max: 8, rounds_max: 8, waters: vec![(method, scene.water.shadow)] },
+        needs: Needs {
+            boats_max: 8,
+            rounds_max: 8,
+            wakes_max: 8,
+            waters: vec![(method, scene.water.shadow)],
+        },
         picture: None,
         time_outs: TimeOuts::default(),
     };

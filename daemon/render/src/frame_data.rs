@@ -6,7 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 use bytemuck::Pod;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, FrameBlock, HudQuad, LobeBlock, RoundBlock, WATERS_MAX, WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, FrameBlock, HudQuad, LobeBlock, RoundBlock, WATERS_MAX, WakeBlock, WaterBlock,
 };
 
 use crate::{
@@ -36,12 +36,14 @@ pub(crate) struct Capacity {
     pub(crate) rounds: usize,
     /// Boats whose light waves throw back.
     pub(crate) lobes: usize,
+    /// Boats that leave a wake.
+    pub(crate) wakes: usize,
 }
 
 /// One slot's upload buffer with the descriptor set that points into it.
 pub(crate) struct FrameData {
     buffer: Buffer,
-    regions: [Region; 7],
+    regions: [Region; 8],
     pub(crate) set: vk::DescriptorSet,
 }
 
@@ -49,7 +51,7 @@ pub(crate) struct FrameData {
 pub(crate) fn frame_set_layout(gpu: &Arc<Gpu>) -> Result<SetLayout, RenderError> {
     const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
     const UNIFORM: vk::DescriptorType = vk::DescriptorType::UNIFORM_BUFFER;
-    let kinds = [UNIFORM, UNIFORM, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE];
+    let kinds = [UNIFORM, UNIFORM, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE];
     SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
 }
 
@@ -73,6 +75,7 @@ impl FrameData {
             size_of::<HudQuad>() * QUADS_MAX,
             size_of::<[f32; 4]>() * RECTS_MAX,
             size_of::<LobeBlock>() * capacity.lobes.max(1),
+            size_of::<WakeBlock>() * capacity.wakes.max(1),
         ];
         let mut end = 0;
         let regions = sizes.map(|size| {
@@ -82,7 +85,7 @@ impl FrameData {
         });
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
         let buffer = Buffer::new(gpu, "frame data", end, usage, Access::Upload)?;
-        let bound: [Bound; 7] = std::array::from_fn(|i| {
+        let bound: [Bound; 8] = std::array::from_fn(|i| {
             let (buffer, Region { offset, size }) = (buffer.raw, regions[i]);
             if i < 3 {
                 Bound::Uniform { buffer, offset, size }
@@ -120,6 +123,10 @@ impl FrameData {
 
     pub(crate) fn write_lobes(&mut self, blocks: &[LobeBlock]) {
         self.write(6, blocks);
+    }
+
+    pub(crate) fn write_wakes(&mut self, blocks: &[WakeBlock]) {
+        self.write(7, blocks);
     }
 
     /// Waves of the mended Physics shader: they stand where lobes stand for another method.

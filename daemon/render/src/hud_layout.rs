@@ -11,6 +11,7 @@ use std::fmt::Write;
 use bowwave_core::{
     fault::Fault,
     scene::{Hud, PixelRect, Status},
+    sea::{WmoSeaState, estimate::SeaSource},
 };
 use shaders_spirv::interface::{
     HudQuad, SHAPE_CROSS, SHAPE_DIAMOND, SHAPE_DISC, SHAPE_GLYPH, SHAPE_PLATE, SHAPE_RING, SHAPE_SQUARE,
@@ -94,6 +95,9 @@ impl HudLayout {
         self.quads.clear();
         self.training(glyphs);
         self.clock(glyphs, hud.clock_s);
+        if let Some((state, source)) = hud.sea {
+            self.sea(glyphs, state, source);
+        }
         self.counts(glyphs, hud);
         let top = self.status(glyphs, &hud.status);
         if let Some(fault) = hud.warning {
@@ -101,6 +105,11 @@ impl HudLayout {
         }
         // Each kind is one draw. Nothing of a kind overlaps another of its kind, and plates lie beneath everything.
         self.quads.sort_unstable_by_key(|q| kind(q.shape));
+        &self.quads
+    }
+
+    /// What was laid out last.
+    pub(crate) fn quads(&self) -> &[HudQuad] {
         &self.quads
     }
 
@@ -222,6 +231,27 @@ impl HudLayout {
         let width = glyphs.width_of(TextSize::Small, &text);
         self.plate([pad, pad, 3.0 * pad + width, pad + line]);
         self.text(glyphs, TextSize::Small, (2.0 * pad, pad), WHITE, &text);
+        self.text = text;
+    }
+
+    /// State of the sea that is drawn and where it comes from, below the clock.
+    fn sea(&mut self, glyphs: &Glyphs, state: WmoSeaState, source: SeaSource) {
+        let mut text = std::mem::take(&mut self.text);
+        text.clear();
+        let word = match source {
+            SeaSource::Ordered => "ORDERED",
+            SeaSource::Measured => "VIDEO",
+            SeaSource::Kept => "KEPT",
+            SeaSource::Assumed => "ASSUMED",
+        };
+        // Writing to a String cannot fail.
+        let _ = write!(text, "SEA {} {word}", state.get());
+        let pad = self.pad();
+        let line = glyphs.line(TextSize::Small);
+        // The plates are of whole pixels.
+        let (top, width) = ((pad + line).ceil(), glyphs.width_of(TextSize::Small, &text));
+        self.plate([pad, top, 3.0 * pad + width, top + line]);
+        self.text(glyphs, TextSize::Small, (2.0 * pad, top), WHITE, &text);
         self.text = text;
     }
 

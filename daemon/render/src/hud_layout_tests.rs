@@ -7,7 +7,7 @@ const SIZES: [(u32, u32); 7] =
     [(800, 480), (640, 360), (320, 180), (1024, 600), (1280, 720), (640, 480), (1920, 1080)];
 
 fn hud(status: Status, warning: Option<Fault>) -> Hud {
-    Hud { status, warning, rounds_left: 9999, shots: 9999, hits: 9999, clock_s: 359_999.0 }
+    Hud { status, warning, rounds_left: 9999, shots: 9999, hits: 9999, clock_s: 359_999.0, sea: None }
 }
 
 fn shown(fault: Fault) -> Option<Status> {
@@ -41,6 +41,22 @@ fn check(size: (u32, u32), quads: &[HudQuad], what: &str) {
         for b in &plates[..i] {
             let apart = a[2] <= b[0] || b[2] <= a[0] || a[3] <= b[1] || b[3] <= a[1];
             assert!(apart, "{what} at {size:?}: {a:?} and {b:?} overlap");
+        }
+    }
+}
+
+#[test]
+fn the_sea_stands_below_the_clock_and_hides_nothing() {
+    for size in SIZES {
+        let (large, small) = text_px(size);
+        let glyphs = Glyphs::new(large, small).unwrap();
+        let mut layout = HudLayout::new(size);
+        for source in [SeaSource::Ordered, SeaSource::Measured, SeaSource::Kept, SeaSource::Assumed] {
+            let without = glyph_count(layout.lay_out(&glyphs, &hud(Status::Ready, None)));
+            let told = Hud { sea: WmoSeaState::new(3).map(|s| (s, source)), ..hud(Status::Ready, None) };
+            let quads = layout.lay_out(&glyphs, &told);
+            check(size, quads, &format!("{source:?}"));
+            assert!(glyph_count(quads) > without + letters("SEA 3"), "{source:?} at {size:?}");
         }
     }
 }

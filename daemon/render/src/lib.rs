@@ -30,6 +30,7 @@ mod simplify;
 mod testing;
 mod upload;
 mod view;
+mod wake;
 mod water;
 
 pub use error::RenderError;

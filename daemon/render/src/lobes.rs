@@ -1,18 +1,19 @@
 //! The numbers of the method `Waves` for one boat in one frame: what `core::reflection` says of it, as the shaders read it.
 
 use bowwave_core::{
+    geometry::curvature_drop,
     model::Model,
-    reflection::{HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table, grid::drawn_tones},
+    reflection::{HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table, water_light},
     scene::{BoatView, PixelRect, Scene},
 };
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec2, DVec3};
 use shaders_spirv::interface::{LOBE_COLUMNS, LobeBlock, ReflectBlock};
 
 use crate::{coverage::Cells, water::HullLine};
 
 /// Beyond the ends of the hull the picture of the boat goes on by this share of its width: what overhangs the water line.
 const OVERHANG: f64 = 0.12;
-/// Pixels above the hull-water line that are drawn as what is just below it, so that no bare water shows between hull and reflection.
+/// Pixels above the hull-water line that are drawn, so that no bare water shows between hull and reflection.
 const FOOT_PX: f64 = 3.0;
 /// Pieces in which a reflection's outline is marked.
 const PIECES: usize = 8;
@@ -50,15 +51,21 @@ impl Waves {
         }
         let away = (boat.pose.position - scene.camera.position).truncate();
         let eye_m = scene.camera.position.z - boat.water_level;
+        let focal = focal_px(scene, boat)?;
+        let up = boat.pose.world_from_body * DVec3::Z;
         let seen = Seen {
             wind_to_view: clockwise(scene.wind) - clockwise(away),
             sky: scene.sky,
+            water: water_light(&scene.light),
+            level_m: boat.water_level + curvature_drop(away.length()),
+            // A boat lies on its water as it is tilted.
+            tilt: -up.truncate().dot(away.normalize_or_zero()) / up.z.max(0.2),
             eye_m,
             range_m: away.length(),
             height_m: model.height_m().max(0.3),
+            pixel: 1.0 / focal,
         };
         self.lobes.set(&self.sea, &seen);
-        let focal = focal_px(scene, boat)?;
         if self.lobes.reach_m <= 0.0 {
             return None;
         }
@@ -71,21 +78,16 @@ impl Waves {
         out.foot = [FOOT_PX as f32, 0.0, 0.0, 0.0];
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
-            for (pair, lobe) in step.chunks_exact_mut(2).zip(bands) {
-                let with = |tones: &[f32; 4], last: f32| {
-                    let [dark, middle, bright] = drawn_tones(tones);
-                    [dark, middle, bright, last]
-                };
-                pair[0] = with(&lobe.thrown, lobe.aside_m);
-                pair[1] = with(&lobe.taken, lobe.half_width_m);
+            for (vectors, lobe) in step.iter_mut().zip(bands) {
+                let with = |tones: [f32; 3], last: f32| [tones[0], tones[1], tones[2], last];
+                *vectors = [
+                    with(lobe.thrown, lobe.aside_m),
+                    with(lobe.taken, lobe.half_width_m),
+                    with(lobe.hue.to_array(), lobe.sky_most),
+                ];
             }
         }
         Some(Reach { tangent, focal, pixels, overhang, eye_m })
-    }
-
-    /// Colour of the sky that the last block's boat hides, over its luminance.
-    pub(crate) fn hue(&self) -> Vec3 {
-        self.lobes.hue
     }
 
     /// Marks the cells that the last block's reflection can change.
@@ -143,12 +145,9 @@ fn clockwise(v: DVec2) -> f64 {
 }
 
 /// How bright the sea of a scene is, as the shaders take it.
-pub(crate) fn reflect_block(scene: &Scene, hue: Vec3) -> ReflectBlock {
+pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
     let size = DVec2::new(f64::from(scene.lens.width), f64::from(scene.lens.height));
-    let down = |pixel: DVec2| {
-        let up = (scene.camera.world_from_camera * scene.lens.unproject(pixel)).z;
-        -up / (1.0 - up * up).max(1e-9).sqrt()
-    };
+    let down = |pixel: DVec2| scene.camera.tangent_below(&scene.lens, pixel);
     // The plane through the tangents about the middle of the screen: bent by less than a pixel's worth within a usual lens.
     let (middle, arm) = (size / 2.0, size / 8.0);
     let slope = |axis: DVec2| {
@@ -163,7 +162,6 @@ pub(crate) fn reflect_block(scene: &Scene, hue: Vec3) -> ReflectBlock {
         tangent: [right as f32, below as f32, start as f32, 0.0],
         mean: with(tones.mean, tones.roots[0]),
         spread: with(tones.spread, tones.roots[1]),
-        hue: hue.extend(0.0).to_array(),
         ..ReflectBlock::default()
     }
 }

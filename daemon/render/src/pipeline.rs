@@ -19,7 +19,7 @@ pub(crate) const LIGHT: vk::Format = vk::Format::R16G16B16A16_SFLOAT;
 /// Sums of light.
 pub(crate) const SUMS: vk::Format = vk::Format::R32G32B32A32_SFLOAT;
 /// Most images that a pass draws to at once.
-pub(crate) const TARGETS_MAX: usize = 3;
+pub(crate) const TARGETS_MAX: usize = 4;
 /// Depth, reverse-Z.
 pub(crate) const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 /// Samples a pixel of the boats' layer.

@@ -6,9 +6,10 @@ use bowwave_core::{
     model::Model,
     scene::{BoatView, Pass, PixelRect, ReflectionMethod, Scene},
 };
-use glam::{DVec2, Vec3};
+use glam::DVec2;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, ReflectBlock, RoundBlock, WATERS_MAX, WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, ReflectBlock, RoundBlock, TRACK_POINTS, WATERS_MAX, WakeBlock,
+    WaterBlock,
 };
 
 use crate::{
@@ -22,12 +23,14 @@ use crate::{
         boats::BoatDraw,
         reflect::ReflectDraw,
         rounds::{RoundDraw, pieces},
+        wake::WakeDraw,
         water::WaterDraw,
     },
     rects::{corners, cut, joined, overlap, rect},
     rounds::round_block,
     view,
-    water::{self, HullLine, PHYSICS_WAVES, hull_line, mirror_scale, physics_waves, water_block},
+    wake::{spray_rect, strip_rect, wake_block},
+    water::{self, HullLine, PHYSICS_WAVES, PhysicsSea, hull_line, mirror_scale, physics_waves, water_block},
 };
 
 /// Pixels beyond a reflection's rectangle at which the water shader still compares the video: nine gradients of at most eight
@@ -41,6 +44,8 @@ const HULL_MARGIN_PX: f64 = 1.5;
 /// Most rectangles for all hulls together, and for one boat's water.
 const HULL_RECTS_MAX: usize = 512;
 const WATER_RECTS_MAX: usize = 256;
+/// Most rectangles that are copied to be blended into, and back.
+const BLENDS_MAX: usize = 512;
 
 /// Metres that a pixel spans at a boat.
 fn pixel_m(scene: &Scene, boat: &BoatView) -> f64 {
@@ -95,6 +100,8 @@ pub(crate) struct Plan {
     pub(crate) physics: Option<[[f32; 4]; PHYSICS_WAVES]>,
     /// The pixels of all of `waters`, each once, and how bright the sea is there; for the same method.
     pub(crate) reflect: Option<(ReflectDraw, ReflectBlock)>,
+    pub(crate) wake_blocks: Vec<WakeBlock>,
+    pub(crate) wakes: Vec<WakeDraw>,
     pub(crate) rounds: Vec<RoundDraw>,
     /// Pixels that hulls can cover, each once.
     pub(crate) hulls: Vec<PixelRect>,
@@ -102,24 +109,36 @@ pub(crate) struct Plan {
     pub(crate) clears: Vec<vk::ClearRect>,
     /// The frame's list of rectangles: those of `hulls`, then those of each of `waters`.
     pub(crate) list: Vec<[f32; 4]>,
-    /// Every rectangle that something is blended into.
+    /// What is blended into, as it comes: rectangles may overlap.
+    touched: Vec<PixelRect>,
+    /// The same, each pixel once.
     pub(crate) rects: Vec<PixelRect>,
     /// The same as copies between buffer and screen.
     pub(crate) regions: Vec<vk::BufferImageCopy>,
     /// What of the video the water's shader compares.
     pub(crate) backdrop_regions: Vec<vk::BufferImageCopy>,
-    /// Plates, shapes and glyphs of the head-up display.
+    /// Plates, shapes and glyphs of the head-up display that are drawn over the frame.
     pub(crate) quads: [u32; KINDS],
+    /// Texels of the video pass that take the display from its layer instead, all others, and what is drawn anew in the layer.
+    pub(crate) overlaid: Vec<PixelRect>,
+    pub(crate) bare: Vec<PixelRect>,
+    pub(crate) renewed: [u32; KINDS],
     cells: Cells,
     wanted: Vec<(PixelRect, f64)>,
     lines: Vec<(usize, HullLine)>,
+    /// Boats of the scene beside whose hull foam stands.
+    sprayed: Vec<(usize, PixelRect)>,
     rest: Vec<PixelRect>,
     waves: Option<Waves>,
+    physics_sea: PhysicsSea,
 }
 
 impl Plan {
     pub(crate) fn with_capacity(capacity: Capacity, size: (u32, u32)) -> Self {
-        let Capacity { boats, rounds, lobes } = capacity;
+        let Capacity { boats, rounds, lobes, wakes } = capacity;
+        let touched = 2 * HULL_RECTS_MAX + RECTS_MAX + rounds + wakes * TRACK_POINTS;
+        // With the display's plates.
+        let rects = BLENDS_MAX + 16;
         Self {
             boat_blocks: Vec::with_capacity(boats * 2),
             water_blocks: Vec::with_capacity(boats),
@@ -131,20 +150,28 @@ impl Plan {
             waters: Vec::with_capacity(boats),
             lobe_blocks: Vec::with_capacity(lobes),
             physics: None,
+            physics_sea: PhysicsSea::default(),
             reflect: None,
             waves: (lobes > 0).then(Waves::new),
+            wake_blocks: Vec::with_capacity(wakes),
+            wakes: Vec::with_capacity(wakes),
             rounds: Vec::with_capacity(rounds * 4),
             hulls: Vec::with_capacity(HULL_RECTS_MAX),
-            clears: Vec::with_capacity(HULL_RECTS_MAX),
+            clears: Vec::with_capacity(2 * HULL_RECTS_MAX),
             list: Vec::with_capacity(RECTS_MAX),
             cells: Cells::new(size),
-            rects: Vec::with_capacity(boats * 2 + rounds + 8),
-            regions: Vec::with_capacity(boats * 2 + rounds + 8),
+            touched: Vec::with_capacity(touched),
+            rects: Vec::with_capacity(rects),
+            regions: Vec::with_capacity(rects),
             backdrop_regions: Vec::with_capacity(boats),
             wanted: Vec::with_capacity(boats),
             lines: Vec::with_capacity(boats),
-            rest: Vec::with_capacity(WATER_RECTS_MAX),
+            sprayed: Vec::with_capacity(wakes),
+            rest: Vec::with_capacity(WATER_RECTS_MAX.max(HULL_RECTS_MAX)),
             quads: [0; KINDS],
+            overlaid: Vec::with_capacity(16),
+            bare: Vec::with_capacity(64),
+            renewed: [0; KINDS],
         }
     }
 
@@ -157,9 +184,16 @@ impl Plan {
         if scene.runs(Pass::Water) {
             self.plan_water(scene, models, size, atlas);
         }
+        if scene.runs(Pass::Wake) {
+            self.plan_wakes(scene, size);
+        }
         if scene.runs(Pass::Rounds) {
             self.plan_rounds(scene);
         }
+        for r in &self.touched {
+            self.cells.mark(*r);
+        }
+        self.cells.take(&mut self.rects, BLENDS_MAX);
     }
 
     fn clear(&mut self) {
@@ -174,19 +208,26 @@ impl Plan {
         self.lobe_blocks.clear();
         self.reflect = None;
         self.physics = None;
+        self.wake_blocks.clear();
+        self.wakes.clear();
         self.rounds.clear();
         self.hulls.clear();
         self.clears.clear();
         self.list.clear();
+        self.touched.clear();
         self.rects.clear();
         self.wanted.clear();
         self.lines.clear();
+        self.sprayed.clear();
     }
 
     fn plan_boats(&mut self, scene: &Scene, models: &[Outline], size: (u32, u32)) {
-        for boat in &scene.boats {
+        for (i, boat) in scene.boats.iter().enumerate() {
             let Some(Outline { model, boxes, .. }) = models.get(usize::from(boat.model.0)) else { continue };
-            let Some(rect) = boat.hull.and_then(|r| cut(r, size)) else { continue };
+            let Some(hull) = boat.hull.and_then(|r| cut(r, size)) else { continue };
+            // What stands beside the hull asks for its depth.
+            let spray = spray_rect(scene, boat, size).filter(|_| scene.runs(Pass::Wake));
+            let rect = spray.map_or(hull, |s| joined(hull, s));
             if self.boats.len() * 2 >= BOAT_BLOCKS_MAX {
                 break;
             }
@@ -199,15 +240,17 @@ impl Plan {
                 detail_m,
             });
             self.boat_blocks.push(view::boat_block(scene, boat, &pose, false));
-            self.rects.push(rect);
-            boxes.mark(&mut self.cells, rect, DVec2::splat(HULL_MARGIN_PX), |p| {
+            if let Some(spray) = spray {
+                self.sprayed.push((i, spray));
+            }
+            boxes.mark(&mut self.cells, hull, DVec2::splat(HULL_MARGIN_PX), |p| {
                 let world = pose.to_world(p);
                 scene.lens.project(scene.camera.to_camera(world.with_z(world.z.max(boat.water_level))))
             });
         }
         self.cells.take(&mut self.hulls, HULL_RECTS_MAX);
-        // Cells reach beyond the rectangles; nothing is drawn there, and what is drawn must lie in a rectangle.
-        let around = self.rects.iter().copied().reduce(joined);
+        // Cells reach beyond the boats' rectangles; nothing is drawn there.
+        let around = self.boats.iter().map(|b| b.rect).reduce(joined);
         self.hulls.retain_mut(|h| match around.and_then(|a| overlap(*h, a)) {
             Some(inside) => {
                 *h = inside;
@@ -216,8 +259,18 @@ impl Plan {
             None => false,
         });
         self.list.extend(self.hulls.iter().map(|h| corners(*h)));
+        self.touched.extend_from_slice(&self.hulls);
         let clear = |h: &PixelRect| vk::ClearRect { rect: rect(*h), base_array_layer: 0, layer_count: 1 };
         self.clears.extend(self.hulls.iter().map(clear));
+        // Beside a hull its depth is compared, but nothing of it is there to be put onto the screen.
+        for (_, spray) in &self.sprayed {
+            self.cells.mark(*spray);
+        }
+        self.rest.clear();
+        self.cells.take(&mut self.rest, HULL_RECTS_MAX);
+        let inside = |r: &PixelRect| around.and_then(|a| overlap(*r, a));
+        self.clears.extend(self.rest.iter().filter_map(inside).map(|r| clear(&r)));
+        self.touched.extend_from_slice(&self.rest);
     }
 
     /// Boats whose waterline cannot be placed on the screen have no reflection.
@@ -283,8 +336,8 @@ impl Plan {
                 count: self.rest.len() as u32,
             });
             self.list.extend(self.rest.iter().map(|r| corners(*r)));
+            self.touched.extend_from_slice(&self.rest);
             self.water_blocks.push(block);
-            self.rects.push(around);
             if mirrored {
                 let index = self.boat_blocks.len() as u32;
                 // Softened, a mirrored boat shows less than the boat itself.
@@ -299,7 +352,7 @@ impl Plan {
             self.join_waters(scene);
         }
         if scene.water.method == ReflectionMethod::Physics {
-            self.physics = scene.boats.last().map(|boat| physics_waves(scene, boat));
+            self.physics = scene.boats.last().map(|boat| physics_waves(&mut self.physics_sea, scene, boat));
         }
     }
 
@@ -318,9 +371,22 @@ impl Plan {
         }
         let draw = ReflectDraw { first: self.list.len() as u32, count: self.rest.len() as u32 };
         self.list.extend(self.rest.iter().map(|r| corners(*r)));
-        // The nearest boat's sky stands for all.
-        let hue = self.waves.as_ref().map_or(Vec3::ONE, Waves::hue);
-        self.reflect = Some((draw, reflect_block(scene, hue)));
+        self.reflect = Some((draw, reflect_block(scene)));
+    }
+
+    fn plan_wakes(&mut self, scene: &Scene, size: (u32, u32)) {
+        for (i, boat) in scene.boats.iter().enumerate().filter(|(_, b)| !b.beyond_horizon) {
+            let Some(wake) = &boat.wake else { continue };
+            let (block, strips) = wake_block(scene, boat, wake);
+            let before = self.touched.len();
+            self.touched.extend((0..strips as usize).filter_map(|s| strip_rect(scene, wake, s, size)));
+            let spray = self.sprayed.iter().any(|(n, _)| *n == i);
+            let strips = if self.touched.len() > before { strips } else { 0 };
+            if strips > 0 || spray {
+                self.wakes.push(WakeDraw { index: self.wake_blocks.len() as u32, strips, spray });
+                self.wake_blocks.push(block);
+            }
+        }
     }
 
     fn plan_rounds(&mut self, scene: &Scene) {
@@ -330,7 +396,7 @@ impl Plan {
             let Some((block, rect)) = round_block(scene, round, seed) else { continue };
             let index = self.round_blocks.len() as u32;
             self.round_blocks.push(block);
-            self.rects.push(rect);
+            self.touched.push(rect);
             pieces(index, rect, &self.hulls, &mut self.rest, &mut self.rounds);
         }
     }

@@ -118,6 +118,9 @@ impl Recorder<'_> {
 
     /// Sets both attachments to zero (no light, no coverage, infinitely far) in some rectangles, within a rendering.
     pub(crate) fn clear(&self, areas: &[vk::ClearRect]) {
+        if areas.is_empty() {
+            return;
+        }
         let zero = |aspect_mask| vk::ClearAttachment { aspect_mask, ..vk::ClearAttachment::default() };
         let what = [zero(vk::ImageAspectFlags::COLOR), zero(vk::ImageAspectFlags::DEPTH)];
         // SAFETY: a rendering with a colour and a depth attachment was begun; the rectangles lie in its area.

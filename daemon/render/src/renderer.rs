@@ -27,11 +27,13 @@ use crate::{
         reflect::ReflectPass,
         rounds::RoundsPass,
         video::VideoPass,
+        wake::WakePass,
         water::WaterPass,
     },
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
     recorder::{Recorder, Step},
+    rects::overlap,
     ring::{Completions, FRAME_QUERY, QUERIES, SLOTS_MAX, Shared, Span, TimeOuts},
     view,
 };
@@ -43,6 +45,8 @@ pub struct Needs {
     pub boats_max: usize,
     /// Most tracers, splashes and strikes in one frame.
     pub rounds_max: usize,
+    /// Most boats in one frame that leave a wake.
+    pub wakes_max: usize,
     /// How the sea may have to mirror.
     pub waters: Vec<(ReflectionMethod, ShadowLevel)>,
 }
@@ -113,6 +117,7 @@ struct Passes {
     mirror: Option<MirrorPass>,
     water: Option<WaterPass>,
     reflect: Option<ReflectPass>,
+    wake: Option<WakePass>,
     boats: Option<BoatsPass>,
     rounds: Option<RoundsPass>,
     hud: HudPass,
@@ -139,10 +144,12 @@ impl Passes {
             _ => None,
         };
         let boats = any_boat.then(|| BoatsPass::new(making, &meshes, textured)).transpose()?;
+        let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
+        let wake = wake.map(|boats| WakePass::new(making, boats)).transpose()?;
         let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(making, boats.as_ref())).transpose()?;
-        let video = VideoPass::new(making, config.picture)?;
         let hud = HudPass::new(making)?;
-        Ok(Self { video, meshes, mirror, water, reflect, boats, rounds, hud })
+        let video = VideoPass::new(making, config.picture, &hud.layer_layout)?;
+        Ok(Self { video, meshes, mirror, water, reflect, wake, boats, rounds, hud })
     }
 }
 
@@ -164,7 +171,12 @@ impl Renderer {
         let canvas = Canvas::new(&making)?;
         let passes = Passes::new(&making, config, models)?;
         let needs = config.needs.clone();
-        let capacity = Capacity { boats: needs.boats_max, rounds: needs.rounds_max, lobes: needs.lobes() };
+        let capacity = Capacity {
+            boats: needs.boats_max,
+            rounds: needs.rounds_max,
+            lobes: needs.lobes(),
+            wakes: needs.wakes_max,
+        };
         let mut slots = Vec::with_capacity(count);
         for _ in 0..count {
             let data = FrameData::new(&gpu, &sets, &frame_set, capacity)?;
@@ -272,6 +284,11 @@ impl Renderer {
         if scene.rounds.len() > self.needs.rounds_max {
             return missing("more tracers and splashes");
         }
+        if scene.runs(Pass::Wake)
+            && scene.boats.iter().filter(|b| b.wake.is_some()).count() > self.needs.wakes_max
+        {
+            return missing("more wakes");
+        }
         let water = &self.passes.water;
         if scene.runs(Pass::Water) && water.as_ref().is_none_or(|w| !w.has(scene.water)) {
             return missing("another way to mirror");
@@ -292,13 +309,24 @@ impl Renderer {
         if let Some(waves) = &plan.physics {
             slot.data.write_waves(waves);
         }
+        slot.data.write_wakes(&plan.wake_blocks);
         slot.data.write_rounds(&plan.round_blocks);
         slot.data.write_rects(&plan.list);
-        plan.quads = Default::default();
+        (plan.quads, plan.renewed) = Default::default();
+        let mut covered = true;
         if scene.runs(Pass::Hud) {
-            plan.quads = self.passes.hud.prepare(&mut slot.data, &scene.hud);
-            plan.rects.extend(self.passes.hud.rects());
+            let hud = &mut self.passes.hud;
+            let quads = hud.prepare(&mut slot.data, &scene.hud);
+            covered = hud.rects().any(|h| plan.rects.iter().any(|r| overlap(h, *r).is_some()));
+            if covered {
+                plan.quads = quads;
+                plan.rects.extend(hud.rects());
+            } else {
+                plan.renewed = if hud.renew() { quads } else { Default::default() };
+            }
         }
+        let overlaid = self.passes.hud.rects().filter(|_| !covered);
+        self.passes.video.divide(overlaid, &mut plan.overlaid, &mut plan.bare);
         plan.regions.clear();
         plan.regions.extend(plan.rects.iter().map(|r| self.canvas.region(*r)));
         plan.backdrop_regions.clear();
@@ -357,8 +385,12 @@ impl Renderer {
         steps.add(mirror.iter().flat_map(|m| m.before()).flatten());
         steps.add(boats.iter().flat_map(|b| b.before()));
         steps.record(to);
+        let hud = &self.passes.hud;
+        if plan.renewed != [0; 3] {
+            stamps.around(Span::Hud, || hud.record_layer(to, frame, plan.renewed));
+        }
         // No barrier between these three: a driver that runs on the processor sorts one's triangles while it fills another.
-        stamps.around(Span::Video, || video.record(to));
+        stamps.around(Span::Video, || video.record(to, hud.overlay(), &plan.overlaid, &plan.bare));
         if let Some(pass) = mirror {
             stamps
                 .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));
@@ -422,8 +454,14 @@ impl Renderer {
                 }
             });
         }
+        if let Some(pass) = self.passes.wake.as_ref().filter(|_| !plan.wakes.is_empty()) {
+            stamps.around(Span::Wake, || pass.record(to, frame, &plan.wakes));
+        }
         if let Some(pass) = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty()) {
             stamps.around(Span::Composite, || pass.record_composite(to, frame, plan.hulls.len() as u32));
+        }
+        if let Some(pass) = self.passes.wake.as_ref().filter(|_| plan.wakes.iter().any(|w| w.spray)) {
+            stamps.around(Span::Spray, || pass.record_spray(to, frame, &plan.wakes));
         }
         if let Some(pass) = self.passes.rounds.as_ref().filter(|_| !plan.rounds.is_empty()) {
             stamps.around(Span::Rounds, || pass.record(to, frame, &plan.rounds));

@@ -62,13 +62,15 @@ pub(crate) enum Span {
     BoatLayer,
     Field,
     Water,
+    Wake,
     Composite,
+    Spray,
     Rounds,
     Hud,
 }
 
 impl Span {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 12] = [
         Self::Video,
         Self::VideoCopy,
         Self::Mirror,
@@ -76,7 +78,9 @@ impl Span {
         Self::BoatLayer,
         Self::Field,
         Self::Water,
+        Self::Wake,
         Self::Composite,
+        Self::Spray,
         Self::Rounds,
         Self::Hud,
     ];
@@ -87,6 +91,7 @@ impl Span {
             Self::Video | Self::VideoCopy => Pass::Video,
             Self::Mirror | Self::Soften => Pass::Mirror,
             Self::Field | Self::Water => Pass::Water,
+            Self::Wake | Self::Spray => Pass::Wake,
             Self::BoatLayer | Self::Composite => Pass::Boats,
             Self::Rounds => Pass::Rounds,
             Self::Hud => Pass::Hud,
@@ -420,8 +425,8 @@ pub struct Finished {
     slot: usize,
     /// The scene's frame number.
     pub frame: u64,
-    /// GPU milliseconds by pass, in the order of [`Pass::ALL`]; `None` for passes that did not run, in frames that were not
-    /// timed (all but one in [`crate::TIMED_EVERY`]), and on devices without timestamps.
+    /// GPU milliseconds by pass, in the order of [`Pass::ALL`]; `None` for passes that did not run or that the video pass did with
+    /// its own work, in frames that were not timed (all but one in [`crate::TIMED_EVERY`]), and on devices without timestamps.
     pub passes_ms: [Option<f64>; Pass::COUNT],
     /// GPU milliseconds from the frame's first command to its last; `None` likewise.
     pub frame_ms: Option<f64>,

@@ -1,12 +1,14 @@
 //! Scenes and models that tests are made of.
 
 use bowwave_core::{
+    boats::{CourseState, Hull},
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
     reflection::{SeaTones, SkyLight},
     scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
     sea::BeaufortForce,
     view::{Afloat, Eye},
+    wake::Wake,
 };
 use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
 
@@ -44,6 +46,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             shots: 14,
             hits: 3,
             clock_s: 83.0,
+            sea: None,
         },
     }
 }
@@ -91,6 +94,42 @@ pub fn add_boat(scene: &mut Scene, models: &[Model], model: usize, range: f64, b
     let position = DVec3::new(range * bearing.sin(), range * bearing.cos(), 0.0);
     let pose = RigidPose { world_from_body: DQuat::from_rotation_z(yaw), position };
     add_boat_in(scene, models, model, pose);
+}
+
+/// The same under way for a minute, at `speed_m_s` and turning by `turn_rate` (rad/s clockwise).
+pub fn add_moving_boat(
+    scene: &mut Scene,
+    models: &[Model],
+    model: usize,
+    place: [f64; 3],
+    [speed_m_s, turn_rate]: [f64; 2],
+) {
+    let [range, bearing, yaw] = place;
+    add_boat(scene, models, model, range, bearing, yaw);
+    let position = DVec2::new(range * bearing.sin(), range * bearing.cos());
+    let heading = std::f64::consts::FRAC_PI_2 - yaw;
+    let now = 60.0;
+    let state = |t: f64| {
+        let heading_then = heading + turn_rate * (t - now);
+        let went = if turn_rate.abs() < 1e-6 {
+            DVec2::new(heading.sin(), heading.cos()) * (speed_m_s * (t - now))
+        } else {
+            let side = |h: f64| DVec2::new(-h.cos(), h.sin()) * (speed_m_s / turn_rate);
+            side(heading_then) - side(heading)
+        };
+        CourseState { position: position + went, heading: heading_then, speed_m_s, turn_rate }
+    };
+    let hull = Hull::of(&models[model]);
+    let wake = Wake::of(hull, f64::from(-models[model].min.z), now, state, |_| 0.0);
+    let range_m = position.extend(-scene.camera.position.z).length();
+    if let Some(boat) = scene
+        .boats
+        .iter_mut()
+        .min_by(|a, b| (a.range_m - range_m).abs().total_cmp(&(b.range_m - range_m).abs()))
+    {
+        boat.wake = wake;
+    }
+    scene.passes[Pass::Wake as usize] = PassDecision::Run;
 }
 
 /// The same with any pose; the mean water is the world's z = 0. A boat that is not seen is not added.

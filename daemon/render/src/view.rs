@@ -123,6 +123,7 @@ mod tests {
             water_level,
             hull: None,
             reflection: None,
+            wake: None,
             range_m,
             haze: 0.25,
             beyond_horizon: false,

@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 
 use bowwave_core::{
     geometry::RigidPose,
+    light::LUMINANCE,
     model::Model,
-    scene::{BoatView, PixelRect, ReflectionMethod, Scene, ShadowLevel},
-    sea::{Spectrum, WaveField, WaveSpec, fresnel},
+    scene::{BoatView, Light, PixelRect, ReflectionMethod, Scene, ShadowLevel},
+    sea::{BeaufortForce, Spectrum, WaveField, WaveSpec, fresnel},
 };
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, LOBE_COLUMNS, WaterBlock};
 
 use crate::{
@@ -68,6 +69,15 @@ const PRINTED_WAVES: [[f64; 4]; FORCE_MAX + 1] = [
 
 /// Wind speed in the middle of each force, m/s (WMO-No. 306, code table 1100).
 const WIND_M_S: [f64; FORCE_MAX + 1] = [0.1, 0.9, 2.5, 4.4, 6.7];
+
+/// The hull's shadow is followed so far, in its heights: there a wall hides a hundredth of the sky.
+const CONTACT_HEIGHTS: f64 = 2.5;
+/// What comes out of clear water, as a share of a white matt surface (Mobley 1994, fig. 3.27): no less does.
+const CLEAR_WATER: f64 = 0.015;
+/// A shadow of less is not seen: half a code of a mid grey.
+const CONTACT_SEEN: f64 = 0.01;
+/// The sea's mean in the picture stands for a line of sight so far below the horizontal, tangent.
+pub(crate) const SEEN_DOWN: f64 = 0.12;
 
 /// Waves of the mended Physics shader, as `water.frag` has it.
 pub(crate) const PHYSICS_WAVES: usize = 8;
@@ -296,6 +306,7 @@ pub(crate) fn water_block(scene: &Scene, boat: &BoatView, line: &HullLine, place
         ReflectionMethod::PhysicsAsPrinted | ReflectionMethod::Physics => {
             physics_block(scene, boat, line, block)
         }
+        ReflectionMethod::Waves if shadow_level.is_some() => contact_block(scene, boat, line, block),
         _ => block,
     }
 }
@@ -316,14 +327,90 @@ fn physics_block(scene: &Scene, boat: &BoatView, line: &HullLine, block: WaterBl
     WaterBlock { alpha, alpha_fall, shift_near, shift_grow, ..block }
 }
 
+/// The shadow of a hull on the water by the scene's own light, in place of eq. 7: what the shader's `kept_off` reads.
+fn contact_block(scene: &Scene, boat: &BoatView, line: &HullLine, block: WaterBlock) -> WaterBlock {
+    let eye = (scene.camera.position.z - boat.water_level).max(0.01);
+    let away = (boat.pose.position - scene.camera.position).truncate();
+    let range = away.length().max(0.1);
+    let (tangent, per_pixel) = (eye / range, 1.0 / scene.lens.focal.y);
+    let high = line.height * range * per_pixel;
+    let contact = Contact::of(&scene.light, away / range, tangent, high, scene.wind.length());
+    let reach = contact.sun_m.max(CONTACT_HEIGHTS * high).min(0.8 * range);
+    let reach_px = (eye / (range - reach) - tangent) / per_pixel;
+    let seen = contact.sky * 0.5 + contact.sun > CONTACT_SEEN;
+    WaterBlock {
+        passes: [tangent, per_pixel, eye, high].map(|v| v as f32),
+        alpha: contact.sky as f32,
+        alpha_fall: contact.sun as f32,
+        shift: contact.sun_m as f32,
+        shadow: if seen { 1.0 } else { 0.0 },
+        shadow_fall: (1.0 / reach_px.max(1.0)) as f32,
+        ..block
+    }
+}
+
+/// What a hull can keep from the water before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Contact {
+    /// Share of the sea's light that the sky made within the water.
+    sky: f64,
+    /// The same of the sun, where the hull's shadow lies on this side of it.
+    sun: f64,
+    /// How far towards the eye that shadow reaches, metres.
+    sun_m: f64,
+}
+
+impl Contact {
+    /// For a hull of a height that is seen along the unit vector `away` with that tangent below the horizontal.
+    fn of(light: &Light, away: DVec2, tangent: f64, high_m: f64, wind_m_s: f64) -> Self {
+        let rough = (0.003 + 0.005_12 * wind_m_s).sqrt();
+        let luminance = |v: Vec3| f64::from(v.dot(LUMINANCE));
+        // What the picture's sea holds beyond the mirrored sky has come out of the water.
+        let mirrored = |down: f64| luminance(mirrored_sky(light, down, rough));
+        let up = light.sun_direction.z.max(0.0);
+        let (sun, sky) = (luminance(light.sun) * up, luminance(light.sky));
+        let body = (luminance(light.sea) - mirrored(SEEN_DOWN)).max(CLEAR_WATER * (sun + sky));
+        let share = body / (body + mirrored(tangent)).max(1e-6);
+        let of_sun = sun / (sun + sky).max(1e-6);
+        // Away from the sun the shadow falls; towards the eye where the sun stands behind the boat.
+        let towards_eye = light.sun_direction.truncate().dot(away);
+        let sun_m = if towards_eye > 0.0 { high_m * towards_eye / up.max(0.02) } else { 0.0 };
+        let sun = if sun_m > 0.0 { share * of_sun } else { 0.0 };
+        Self { sky: share * (1.0 - of_sun), sun, sun_m }
+    }
+}
+
+/// Light of the sky that an untilted sea mirrors under a tangent below the horizontal.
+pub(crate) fn mirrored_sky(light: &Light, down: f64, rough: f64) -> Vec3 {
+    let up = 0.5 * (down + (down * down + rough * rough).sqrt());
+    let t = (up / 0.6).clamp(0.0, 1.0) as f32;
+    fresnel(up) as f32 * light.horizon.lerp(light.sky, t * t * (3.0 - 2.0 * t))
+}
+
+/// The sea of the mended Physics shader, made anew only when force or wind change: making it allocates.
+#[derive(Default)]
+pub(crate) struct PhysicsSea(Option<(BeaufortForce, f64, WaveField)>);
+
+impl PhysicsSea {
+    fn field(&mut self, scene: &Scene) -> &WaveField {
+        let (force, wind_from) = (scene.water.force, (-scene.wind.x).atan2(-scene.wind.y));
+        let kept = self.0.take().filter(|(f, w, _)| (*f, w.to_bits()) == (force, wind_from.to_bits()));
+        let (_, _, field) = self.0.insert(kept.unwrap_or_else(|| {
+            let spec = WaveSpec { spectrum: Spectrum::of_force(force), wind_from };
+            (force, wind_from, WaveField::new(&spec, 0))
+        }));
+        field
+    }
+}
+
 /// Waves of the sea's spectrum for the mended Physics shader: radians a metre away from the eye and to the right, amplitude, and phase at
 /// the boat.
-pub(crate) fn physics_waves(scene: &Scene, boat: &BoatView) -> [[f32; 4]; PHYSICS_WAVES] {
-    let spec = WaveSpec {
-        spectrum: Spectrum::of_force(scene.water.force),
-        wind_from: (-scene.wind.x).atan2(-scene.wind.y),
-    };
-    let field = WaveField::new(&spec, 0);
+pub(crate) fn physics_waves(
+    sea: &mut PhysicsSea,
+    scene: &Scene,
+    boat: &BoatView,
+) -> [[f32; 4]; PHYSICS_WAVES] {
+    let field = sea.field(scene);
     let away = (boat.pose.position - scene.camera.position).truncate();
     let away = away.try_normalize().unwrap_or(DVec2::Y);
     let right = DVec2::new(away.y, -away.x);
@@ -387,6 +474,32 @@ mod tests {
             let want = DVec2::new(roll.sin(), roll.cos());
             assert!((line.down - want).length() < 0.05, "roll {roll}: {} {want}", line.down);
         }
+    }
+
+    #[test]
+    fn a_hull_keeps_from_the_water_what_had_come_out_of_it() {
+        let mut light = testing::empty_scene(64, 64).light;
+        let of = |light: &Light| Contact::of(light, DVec2::Y, 0.1, 2.0, 3.0);
+        // The sun stands to the south, behind the eye: no shadow on this side, and the sky's part of the water's light.
+        light.sea = Vec3::splat(0.4);
+        light.sun_direction = DVec3::new(0.0, -0.8, 0.6);
+        let behind_eye = of(&light);
+        assert_eq!((behind_eye.sun, behind_eye.sun_m), (0.0, 0.0));
+        assert!(behind_eye.sky > 0.0 && behind_eye.sky < 0.5, "{behind_eye:?}");
+        // Behind the boat it throws the hull's shadow 2 m * 0.8 / 0.6 towards the eye.
+        light.sun_direction = DVec3::new(0.0, 0.8, 0.6);
+        let behind_boat = of(&light);
+        assert!((behind_boat.sun_m - 2.0 * 0.8 / 0.6).abs() < 1e-9);
+        assert!(behind_boat.sun > behind_boat.sky);
+        // Of a sea that is darker than the sky that it mirrors, what clear water gives is kept off: a few hundredths.
+        light.sea = Vec3::splat(1e-3);
+        let dark = of(&light);
+        assert!(
+            dark.sky > 0.0 && dark.sky + dark.sun < 0.15 * (behind_boat.sky + behind_boat.sun),
+            "{dark:?}"
+        );
+        light.sun_direction = DVec3::new(0.0, 0.0, -1.0);
+        assert!(of(&light).sun_m.is_finite());
     }
 
     #[test]

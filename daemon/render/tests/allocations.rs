@@ -15,10 +15,10 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::scene::{Pass, PassDecision, RoundView};
+use bowwave_core::scene::{Pass, PassDecision, ReflectionMethod, RoundView};
 use common::{
     config, open, sea,
-    testing::{add_boat, box_model, empty_scene},
+    testing::{add_boat, add_moving_boat, box_model, empty_scene},
 };
 use glam::{DVec3, Vec3};
 
@@ -49,13 +49,20 @@ static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn frames_allocate_nothing_after_the_first() {
+    for method in [ReflectionMethod::Full, ReflectionMethod::Physics, ReflectionMethod::Waves] {
+        check(method);
+    }
+}
+
+fn check(method: ReflectionMethod) {
     let models = [
         box_model("white", [9.0, 2.6, 1.8], [0.8, 0.8, 0.78]),
         box_model("red", [5.0, 2.0, 1.2], [0.5, 0.06, 0.04]),
     ];
     let mut scene = empty_scene(640, 360);
+    scene.water.method = method;
     add_boat(&mut scene, &models, 0, 45.0, -0.12, 0.5);
-    add_boat(&mut scene, &models, 1, 38.0, 0.1, 2.4);
+    add_moving_boat(&mut scene, &models, 1, [38.0, 0.1, 2.4], [6.0, 0.2]);
     let at = scene.boats[0].pose.position;
     scene.rounds = vec![
         RoundView::Splash { at, height_m: 4.0, radius_m: 0.9, opacity: 1.0 },
@@ -81,6 +88,6 @@ fn frames_allocate_nothing_after_the_first() {
         let frame = completions.wait_next(Duration::from_secs(20)).unwrap().unwrap();
         assert_eq!(frame.frame, n);
     }
-    assert_eq!(COUNT.get(), 0, "allocations of the submitting and reading thread in 55 frames");
+    assert_eq!(COUNT.get(), 0, "{method:?}: allocations of the submitting and reading thread in 55 frames");
     assert_eq!(renderer.memory(), memory);
 }

@@ -19,7 +19,7 @@ use bowwave_core::{
 use bowwave_render::{Needs, RenderError, Renderer, TIMED_EVERY};
 use common::{
     assert_clean, at, config, draw, grey, open, sea, submit,
-    testing::{add_boat, box_model, empty_scene},
+    testing::{add_boat, add_moving_boat, box_model, empty_scene},
 };
 use glam::{DQuat, DVec3, Vec3};
 
@@ -42,6 +42,7 @@ fn forced(position: DVec3, yaw: f64) -> BoatView {
         water_level: 0.0,
         hull: Some(everywhere()),
         reflection: Some(everywhere()),
+        wake: None,
         range_m: position.length(),
         haze: 0.0,
         beyond_horizon: false,
@@ -96,6 +97,45 @@ fn odd_boats_are_drawn_or_left_out_and_never_break_a_frame() {
         }
         assert_clean(&renderer);
     }
+}
+
+/// A wake wherever a boat can be: beside, behind and beneath the camera, far off, turned by no number.
+#[test]
+fn odd_wakes_never_break_a_frame() {
+    let (models, picture) = (models(), sea(SIZE.0, SIZE.1));
+    let places = [[40.0, 0.1, 1.5], [3.0, 2.0, 0.2], [9.0, 3.1, 1.0], [5e3, 0.0, 0.1], [80.0, 0.0, f64::NAN]];
+    let motions = [[8.0, 0.0], [12.0, 0.8], [0.6, -0.5], [1e3, 0.0]];
+    let mut first = empty_scene(SIZE.0, SIZE.1);
+    add_moving_boat(&mut first, &models, 0, places[0], motions[0]);
+    let (mut renderer, mut completions) = open(&config(&first), &models);
+    let still = {
+        let mut scene = first.clone();
+        scene.boats[0].wake = None;
+        submit(&mut renderer, &mut completions, &scene, &picture)
+    };
+    let mut frame = 0;
+    for place in places {
+        for motion in motions {
+            let mut scene = empty_scene(SIZE.0, SIZE.1);
+            add_moving_boat(&mut scene, &models, 0, place, motion);
+            let Some(boat) = scene.boats.first().cloned() else { continue };
+            // The same wake from below the water, and without the hull that made it.
+            let mut below = scene.clone();
+            below.camera.position.z = -1.0;
+            let mut alone = scene.clone();
+            alone.boats = vec![BoatView { hull: None, reflection: None, ..boat }];
+            for mut scene in [scene, below, alone] {
+                frame += 1;
+                scene.frame = frame;
+                let pixels = submit(&mut renderer, &mut completions, &scene, &picture);
+                if place == places[0] && motion == motions[0] && scene.camera.position.z > 0.0 {
+                    assert_ne!(pixels, still, "the wake is drawn");
+                }
+            }
+        }
+    }
+    assert!(frame > 20, "{frame} frames");
+    assert_clean(&renderer);
 }
 
 fn at_picture(picture: &Picture, x: u32, y: u32) -> [u8; 3] {

@@ -19,7 +19,7 @@ use bowwave_core::{
 };
 use common::{
     draw, sea,
-    testing::{add_boat, box_model, empty_scene},
+    testing::{add_boat, add_moving_boat, box_model, empty_scene},
 };
 use glam::{DVec2, DVec3, Vec3};
 
@@ -143,6 +143,15 @@ fn sea_states_and_shadows() {
         &boats(ReflectionMethod::FullAsPrinted, ShadowLevel::Strong, 1),
         &models(),
     );
+}
+
+#[test]
+fn wakes_of_a_straight_and_of_a_turning_boat() {
+    let mut scene = empty_scene(SIZE.0, SIZE.1);
+    scene.water.method = ReflectionMethod::Waves;
+    add_moving_boat(&mut scene, &models(), 0, [45.0, -0.12, 2.9], [5.0, 0.0]);
+    add_moving_boat(&mut scene, &models(), 1, [32.0, 0.12, 1.2], [7.0, 0.3]);
+    check("wakes", &scene, &models());
 }
 
 #[test]

@@ -10,7 +10,7 @@ mod common;
 
 use bowwave_core::{
     light::{linear_to_srgb, srgb_to_linear},
-    reflection::{BANDS, Billboard, Lobes, Place, SeaTones, Seen, Table, compose},
+    reflection::{BANDS, Billboard, Lobes, Place, SeaTones, Seen, Table, compose, water_light},
     scene::{Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel},
 };
 use common::{
@@ -69,7 +69,17 @@ fn composed(before: &[u8], scene: &Scene) -> Vec<Vec3> {
     let columns: Vec<[Vec4; BANDS]> = vec![[light; BANDS]; 64];
     let billboard = Billboard { first: left.x, pitch: (right.x - left.x) / 64.0, columns };
     let wind_to_view = scene.wind.x.atan2(scene.wind.y);
-    let seen = Seen { wind_to_view, sky: scene.sky, eye_m, range_m: RANGE_M, height_m: f64::from(BOX[2]) };
+    let seen = Seen {
+        wind_to_view,
+        sky: scene.sky,
+        water: water_light(&scene.light),
+        level_m: scene.boats[0].water_level,
+        eye_m,
+        range_m: RANGE_M,
+        height_m: f64::from(BOX[2]),
+        tilt: 0.0,
+        pixel: 1.0 / focal_px,
+    };
     let lobes = Lobes::of(&Table::baked().sea(scene.wind.length()), &seen);
     compose(&mut picture, SIZE.0 as usize, &place, &billboard, &lobes, &scene.tones);
     picture
@@ -110,9 +120,7 @@ fn the_gpu_draws_what_the_processor_draws() {
             "wind {wind}: {count} values change by {change:.2} codes; error {error:.2}, bias {bias:.2}, worst {worst}"
         );
         assert!(count > 5000 && change > 2.0, "wind {wind}: {count} values change by {change:.2}");
-        failures.extend(
-            (error > 0.2 * change + 0.5 || worst > 32).then(|| format!("wind {wind}: {error:.2}, {worst}")),
-        );
+        failures.extend((error > 1.5 || worst > 40).then(|| format!("wind {wind}: {error:.2}, {worst}")));
     }
     assert!(failures.is_empty(), "{failures:?}");
 }

@@ -1,6 +1,9 @@
 //! From light to a JPEG: the camera with its roll and elevation, its lens, its noise and its transfer curve.
 
-use bowwave_core::geometry::{CameraPose, Lens, look};
+use bowwave_core::{
+    geometry::{CameraPose, Lens, look},
+    light::linear_to_srgb,
+};
 use glam::{DQuat, DVec2, DVec3, Mat3, Vec3, Vec4};
 use image::{ExtendedColorType, ImageError, codecs::jpeg::JpegEncoder};
 use rand_pcg::{Pcg32, rand_core::Rng};
@@ -65,7 +68,8 @@ impl Camera {
             .collect();
         let transfer = (0..TRANSFER)
             .map(|i| {
-                (255.0 * to_srgb(shoulder((i as f32 + 0.5) * LIGHT_MAX / TRANSFER as f32))).round() as u8
+                (255.0 * linear_to_srgb(shoulder((i as f32 + 0.5) * LIGHT_MAX / TRANSFER as f32))).round()
+                    as u8
             })
             .collect();
         let (read, shot) = (recipe.camera.read_noise as f32, recipe.camera.shot_noise as f32);
@@ -215,11 +219,6 @@ fn bilinear(sea: &SeaPicture, view: &LevelView, u: f32, v: f32) -> Vec4 {
 fn shoulder(light: f32) -> f32 {
     const KNEE: f32 = 0.7;
     if light < KNEE { light } else { KNEE + (1.0 - KNEE) * (1.0 - (-(light - KNEE) / (1.0 - KNEE)).exp()) }
-}
-
-/// Linear to sRGB-coded (IEC 61966-2-1).
-fn to_srgb(light: f32) -> f32 {
-    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// Focal length of the level picture of the sea. A lens and a colour sensor do not resolve single pixels: drawing the sea a

@@ -262,7 +262,7 @@ fn take_turns(ways: &mut [Way<'_>], twin: usize, effort: Effort) -> Vec<Vec<f64>
 }
 
 /// Time that this thread has had of a processor, nanoseconds: what others take meanwhile does not count.
-fn thread_ns() -> f64 {
+pub(crate) fn thread_ns() -> f64 {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     now.tv_sec as f64 * 1e9 + now.tv_nsec as f64
 }

@@ -42,27 +42,13 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
     std::fs::create_dir_all(&arguments.out).with_context(|| {
         format!("cannot make the folder {}; name another with --out", arguments.out.display())
     })?;
-    for (index, picture) in pictures.iter().enumerate() {
-        let photo = Photo::read(picture)?;
-        for &method in &methods {
-            let mut still = still.clone();
-            still.water.method = method;
-            let drawn = easel.compose(&still, &photo, u32::try_from(index).unwrap_or(u32::MAX))?;
+    // The method is part of what a renderer is built for; decoding a picture again costs far less than building one.
+    for &method in &methods {
+        let mut still = still.clone();
+        still.water.method = method;
+        for (index, picture) in pictures.iter().enumerate() {
             let target = target(&arguments.out, picture, (methods.len() > 1).then_some(method));
-            refuse_to_replace_source(&target, picture)?;
-            drawn
-                .picture
-                .save_with_format(&target, image::ImageFormat::Png)
-                .with_context(|| format!("cannot write {}; check the disk", target.display()))?;
-            println!("{}", target.display());
-            if drawn.boats_seen < still.boats.len() {
-                log::warn!(
-                    "{}: {} of {} boats lie outside the picture; check bearing_deg and azimuth_deg",
-                    picture.display(),
-                    still.boats.len() - drawn.boats_seen,
-                    still.boats.len()
-                );
-            }
+            compose_one(&mut easel, &still, (index, picture), &target)?;
         }
     }
     let messages = easel.validation_messages();
@@ -70,6 +56,31 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
         log::error!("{message}");
     }
     Ok(if messages.is_empty() { Outcome::Done } else { Outcome::Failed })
+}
+
+/// Composes one picture of a series, counted from 0.
+fn compose_one(
+    easel: &mut Easel,
+    still: &Still,
+    (index, picture): (usize, &Path),
+    target: &Path,
+) -> Result<()> {
+    refuse_to_replace_source(target, picture)?;
+    let drawn = easel.compose(still, &Photo::read(picture)?, u32::try_from(index).unwrap_or(u32::MAX))?;
+    drawn
+        .picture
+        .save_with_format(target, image::ImageFormat::Png)
+        .with_context(|| format!("cannot write {}; check the disk", target.display()))?;
+    println!("{}", target.display());
+    if drawn.boats_seen < still.boats.len() {
+        log::warn!(
+            "{}: {} of {} boats lie outside the picture; check bearing_deg and azimuth_deg",
+            picture.display(),
+            still.boats.len() - drawn.boats_seen,
+            still.boats.len()
+        );
+    }
+    Ok(())
 }
 
 /// The picture, or the pictures of the folder in the order of their names.

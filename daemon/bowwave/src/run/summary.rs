@@ -15,6 +15,7 @@ use serde::Serialize;
 use super::{faults::Faults, hardware::Hardware, stage::Stage};
 use crate::{
     output::Done,
+    sea::SeaSummary,
     stats::{Percentiles, Samples},
 };
 
@@ -104,6 +105,7 @@ impl Tally {
             video: format!("{:?}, {}", session.plan().video, stage.picture_path()),
             faults: faults.counts().map(|(code, n)| (code.to_owned(), n)).collect(),
             counts,
+            sea: session.sea().map(SeaSummary::from),
         }
     }
 }
@@ -135,6 +137,8 @@ pub struct Summary {
     pub faults: BTreeMap<String, u64>,
     /// What devices and session counted.
     pub counts: BTreeMap<String, u64>,
+    /// The sea in the video; null where the scenario gives the sea.
+    pub sea: Option<SeaSummary>,
 }
 
 impl Summary {

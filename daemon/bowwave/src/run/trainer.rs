@@ -32,7 +32,7 @@ use super::{
     starts::Mode,
     summary::{Summary, Tally},
 };
-use crate::output::UserEvent;
+use crate::{output::UserEvent, sea::SeaLog};
 
 /// Time between ticks, nanoseconds.
 const PERIOD_NS: i64 = NS_PER_S / FRAMES_PER_S;
@@ -98,6 +98,7 @@ pub struct Trainer {
     events: Vec<Event>,
     changes: Vec<FaultChange>,
     tally: Tally,
+    sea: SeaLog,
 }
 
 impl Trainer {
@@ -164,6 +165,7 @@ impl Trainer {
             events: Vec::with_capacity(256),
             changes,
             tally: Tally::default(),
+            sea: SeaLog::default(),
         })
     }
 
@@ -297,6 +299,9 @@ impl Trainer {
         self.tally.frame(view.scene, blind, begun);
         let announced = self.stage.show(&view, begun, shown)?;
         self.session.frame_shown();
+        if let Some(report) = self.session.sea() {
+            self.sea.follow(&report);
+        }
         if !announced {
             return Err(self.stage_error());
         }

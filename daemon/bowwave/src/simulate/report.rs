@@ -11,7 +11,7 @@ use super::{
     run::Finished,
     summary::{Registration, Summary},
 };
-use crate::{cli::Simulate, outcome::Outcome, resident::memory_mb, stats::Percentiles};
+use crate::{cli::Simulate, outcome::Outcome, resident::memory_mb, sea::SeaSummary, stats::Percentiles};
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
@@ -65,6 +65,7 @@ impl Finished {
             scenario: scenario.name.clone(),
             video: format!("{:?}, copied once into memory that the GPU reads", prepared.setup.video),
             counts,
+            sea: self.sea.map(SeaSummary::from),
         }
     }
 

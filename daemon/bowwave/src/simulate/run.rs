@@ -18,7 +18,7 @@ use bowwave_core::{
     pacing::{FRAMES_PER_S, Pacer},
     pose::registration_error_px,
     score::{Outcome as RoundOutcome, ShotRecord},
-    session::{SensorCounts, Session},
+    session::{SeaReport, SensorCounts, Session},
     time::{NS_PER_S, Time},
 };
 use bowwave_devices::clock::now;
@@ -36,6 +36,7 @@ use crate::{
     commits,
     output::{Output, OutputReport, Ticket, UserEvent},
     recorder::Recorder,
+    sea::SeaLog,
     stats::Samples,
 };
 
@@ -82,6 +83,7 @@ pub struct Loop {
     replay_error: Option<ReplayError>,
     recovery: Recovery,
     memory: MemoryWatch,
+    sea: SeaLog,
 }
 
 /// What the loop counts.
@@ -131,6 +133,8 @@ pub struct Finished {
     pub recovery: Recovery,
     /// Resident memory on the way.
     pub memory: MemoryWatch,
+    /// The sea in the video.
+    pub sea: Option<SeaReport>,
     /// What went wrong on the way without ending the run.
     pub faults: Vec<String>,
 }
@@ -167,6 +171,7 @@ impl Loop {
             replay_error: None,
             recovery,
             memory: MemoryWatch::default(),
+            sea: SeaLog::default(),
         }
     }
 
@@ -304,6 +309,10 @@ impl Loop {
             self.stop.store(true, Ordering::Relaxed);
         }
         self.session.frame_shown();
+        if let Some(report) = self.session.sea() {
+            self.sea.follow(&report);
+            self.tally.sea(&report);
+        }
         self.tally.frame(waited, [entered, collected, stepped, now()]);
         self.journal_rounds(arguments)?;
         Ok(true)
@@ -368,6 +377,7 @@ impl Loop {
             bail!("Vulkan's validation layer reports: {}", messages.join("; "));
         }
         let sensors = self.session.sensor_counts();
+        let sea = self.session.sea();
         Ok(Finished {
             tally: self.tally,
             output,
@@ -378,6 +388,7 @@ impl Loop {
             dropped_entries,
             recovery: self.recovery,
             memory: self.memory,
+            sea,
             faults,
         })
     }
@@ -405,6 +416,10 @@ impl Tally {
             self.registration.push(error.unwrap_or(f64::from(scene.lens.width)));
             self.registered += 1;
         }
+    }
+
+    fn sea(&mut self, report: &SeaReport) {
+        self.hash.update(format!("{:?} {}\n", report.in_use, report.wind_m_s));
     }
 
     fn frame(&mut self, waited: bool, [begun, collected, stepped, submitted]: [Time; 4]) {

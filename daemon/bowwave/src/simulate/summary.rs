@@ -6,7 +6,10 @@ use anyhow::{Context, Result};
 use bowwave_core::scene::{LeftOut, Pass, PassDecision, Scene};
 use serde::Serialize;
 
-use crate::stats::{Percentiles, Samples};
+use crate::{
+    sea::SeaSummary,
+    stats::{Percentiles, Samples},
+};
 
 /// The summary of a run, `summary.json`. Times are milliseconds.
 #[derive(Clone, Debug, Serialize)]
@@ -55,6 +58,8 @@ pub struct Summary {
     pub video: String,
     /// What the simulated hardware and the session counted: dropped, late, broken.
     pub counts: BTreeMap<String, u64>,
+    /// The sea in the video; null where the scenario gives the sea.
+    pub sea: Option<SeaSummary>,
 }
 
 /// Distances on the screen between where things belong and where they were drawn, pixels.

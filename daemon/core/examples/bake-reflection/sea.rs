@@ -9,6 +9,9 @@ use rustfft::{FftPlanner, num_complex::Complex};
 
 /// Grid points along a side.
 const SIDE: usize = 1024;
+/// A small boat's level is the water's, weighted by a normal distribution of this standard deviation about its middle, metres: the mean over
+/// some 8 by 2.6 m.
+const FOOT_M: f64 = 1.3;
 /// Standard gravity, m/s^2.
 const G: f64 = 9.806_65;
 
@@ -36,6 +39,10 @@ pub struct Sea {
     pitch_m: f64,
     /// Height, and slopes to x and y, at each grid point.
     points: Vec<[f32; 3]>,
+    /// Level that a small boat has there.
+    levels: Vec<f32>,
+    /// Standard deviations of that, metres, and of how it tilts away from the eye, tangent.
+    pub spread: [f64; 2],
     /// No water is higher or lower than this, metres.
     pub reach_m: f64,
     /// No resolved slope is steeper.
@@ -45,13 +52,16 @@ pub struct Sea {
 }
 
 impl Sea {
-    /// Waves of the wind force's probable height with a Pierson-Moskowitz spectrum, spread by cos^2; the tail beyond three times the
-    /// peak's wave number is scaled so that resolved waves have at most 60 % of Cox and Munk's mean square slope, and what is
-    /// missing from it is unresolved.
+    /// Waves that the wind raises in time (Pierson and Moskowitz), spread by cos^2; the tail beyond three times the peak's wave number is
+    /// scaled so that resolved waves have at most 60 % of Cox and Munk's mean square slope, and what is missing from it is unresolved.
     pub fn new(spec: &SeaSpec) -> Self {
         let wind = spec.force.wind_mean_m_s();
-        let spectrum = Spectrum::of_force(spec.force);
-        let pitch_m = if spec.force.get() <= 2 { 0.05 } else { 0.1 };
+        let spectrum = Spectrum::fully_developed(wind).unwrap_or(Spectrum::FLAT);
+        let pitch_m = match spec.force.get() {
+            0 | 1 => 0.02,
+            2 => 0.05,
+            _ => 0.1,
+        };
         let (up, cross) = cox_munk(wind);
         let (sin, cos) = spec.wind_to_view.sin_cos();
         // Wind along (sin, cos): slopes to x and y.
@@ -62,7 +72,15 @@ impl Sea {
         ];
         let height = spectrum.significant_height_m();
         if height <= 0.0 {
-            return Self { pitch_m, points: Vec::new(), reach_m: 0.0, steepest: 0.0, fine: total };
+            return Self {
+                pitch_m,
+                points: Vec::new(),
+                levels: Vec::new(),
+                spread: [0.0; 2],
+                reach_m: 0.0,
+                steepest: 0.0,
+                fine: total,
+            };
         }
         let omega_p = TAU / spectrum.peak_period_s();
         let peak = omega_p * omega_p / G;
@@ -75,6 +93,7 @@ impl Sea {
             Complex::new(r * (TAU * b).cos(), r * (TAU * b).sin())
         };
         let mut field = vec![Complex::new(0.0, 0.0); SIDE * SIDE];
+        let mut afloat = field.clone();
         for j in 0..SIDE {
             for i in 0..SIDE {
                 let at = |n: usize| if n < SIDE / 2 { n as f64 } else { n as f64 - SIDE as f64 } * dk;
@@ -90,9 +109,11 @@ impl Sea {
                 let factor = if k > 3.0 * peak { tail } else { 1.0 };
                 let power = omnidirectional(height, peak, k) * factor / k * spread * dk * dk;
                 field[j * SIDE + i] = noise * power.sqrt();
+                afloat[j * SIDE + i] = noise * power.sqrt() * (-0.5 * (k * FOOT_M).powi(2)).exp();
             }
         }
         let heights = real_field(field);
+        let levels: Vec<f32> = real_field(afloat).iter().map(|h| *h as f32).collect();
         let points: Vec<[f32; 3]> = (0..SIDE * SIDE)
             .map(|n| {
                 let (i, j) = (n % SIDE, n / SIDE);
@@ -118,7 +139,17 @@ impl Sea {
         let fine = [fine[0], fine[1], fine[2].clamp(-limit, limit)];
         let reach_m = points.iter().fold(0.0_f64, |m, p| m.max(f64::from(p[0].abs())));
         let steepest = points.iter().fold(0.0_f64, |m, p| m.max(f64::from(p[1].hypot(p[2]))));
-        Self { pitch_m, points, reach_m, steepest, fine }
+        let mut sea = Self { pitch_m, points, levels, spread: [0.0; 2], reach_m, steepest, fine };
+        let side = SIDE as f64 * pitch_m;
+        let places = (0..10_000).map(|i| (side * 0.618 * f64::from(i), side * f64::from(i) / 1e4));
+        for (x, y) in places {
+            let afloat = sea.afloat(x, y);
+            for (sum, v) in sea.spread.iter_mut().zip(afloat) {
+                *sum += v * v / 1e4;
+            }
+        }
+        sea.spread = sea.spread.map(f64::sqrt);
+        sea
     }
 
     /// Height and slopes at a place, metres.
@@ -139,6 +170,20 @@ impl Sea {
             let far = c[n] + (d[n] - c[n]) * u;
             f64::from(near + (far - near) * v)
         })
+    }
+
+    /// Level of a small boat afloat at a place, metres.
+    pub fn level(&self, x: f64, y: f64) -> f64 {
+        if self.levels.is_empty() {
+            return 0.0;
+        }
+        let wrap = |v: f64| ((v / self.pitch_m).round() as i64).rem_euclid(SIDE as i64) as usize;
+        self.levels.get(wrap(y) * SIDE + wrap(x)).map_or(0.0, |l| f64::from(*l))
+    }
+
+    /// Level of such a boat, and how steeply the water under it rises away from the eye.
+    pub fn afloat(&self, x: f64, y: f64) -> [f64; 2] {
+        [self.level(x, y), (self.level(x, y + FOOT_M) - self.level(x, y - FOOT_M)) / (2.0 * FOOT_M)]
     }
 
     /// How far along the ray the water is hit; `None` where it is not. The step is as far as the water can at most rise.

@@ -2,8 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-use super::{CourseState, ahead};
-use crate::{geometry::RigidPose, gunnery::GRAVITY_M_S2, model::Model, sea::WaveField};
+use super::{CourseState, Hull, HullForm, Motion, ahead};
+use crate::{geometry::RigidPose, gunnery::GRAVITY_M_S2, sea::WaveField};
 
 /// Bow-up trim of a boat that planes, radians.
 const PLANING_TRIM: f64 = 4.0 * std::f64::consts::PI / 180.0;
@@ -16,29 +16,6 @@ const LEAN: f64 = 0.6;
 /// Greatest lean into a turn, radians.
 const LEAN_MAX: f64 = 0.35;
 
-/// The size of a hull at the waterline.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hull {
-    /// Metres along x.
-    pub length_m: f64,
-    /// Metres along y.
-    pub beam_m: f64,
-}
-
-impl Hull {
-    /// The extent of the model's waterline; of its bounding box where it has none.
-    pub fn of(model: &Model) -> Self {
-        let low = model.waterline.iter().copied().fold(DVec2::INFINITY, DVec2::min);
-        let high = model.waterline.iter().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
-        let size = high - low;
-        if size.is_finite() && size.min_element() > 0.0 {
-            Self { length_m: size.x, beam_m: size.y }
-        } else {
-            Self { length_m: model.length_m(), beam_m: model.beam_m() }
-        }
-    }
-}
-
 /// A boat on the water.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floating {
@@ -48,22 +25,41 @@ pub struct Floating {
     pub water_level: f64,
 }
 
-/// Puts a boat onto the waves: it follows the mean plane of the water under its hull, rises and trims as it planes, and leans
-/// into its turns. Quasi-static: the hull's own inertia is not modelled.
+/// Puts a boat into the mean plane of the water under its hull: what a boat without inertia does. It rises and trims as it planes,
+/// and leans into its turns.
 pub fn float(state: &CourseState, hull: &Hull, waves: &WaveField, time_s: f64) -> Floating {
     let water = waves.plane_under(state.position, state.heading, hull.length_m, hull.beam_m, time_s);
+    let at = DVec3::new(water.height_m, water.port_slope.atan(), water.forward_slope.atan());
+    lay(state, hull, at, water.height_m)
+}
+
+/// Puts a boat onto the waves where its motion has brought it; it rises, trims and leans by itself as in [`float`].
+pub fn ride(
+    state: &CourseState,
+    hull: &Hull,
+    form: &HullForm,
+    motion: &Motion,
+    waves: &WaveField,
+    time_s: f64,
+) -> Floating {
+    let water = waves.plane_under(state.position, state.heading, hull.length_m, hull.beam_m, time_s);
+    let mut at = motion.at;
+    // From the centre of buoyancy to the boat's origin.
+    at.x -= form.centre_m * at.z.sin();
+    lay(state, hull, at, water.height_m)
+}
+
+/// A boat at heave, roll and pitch `at`.
+fn lay(state: &CourseState, hull: &Hull, at: DVec3, water_level: f64) -> Floating {
     let planing = planing_share(state.speed_m_s, hull.length_m);
-    let pitch_up = water.forward_slope.atan() + PLANING_TRIM * planing;
+    let pitch_up = at.z + PLANING_TRIM * planing;
     // A turn to starboard leans the boat to starboard: port comes up.
     let balanced = (state.speed_m_s * state.turn_rate / GRAVITY_M_S2).atan();
-    let port_up = water.port_slope.atan() + (LEAN * balanced).clamp(-LEAN_MAX, LEAN_MAX) * planing;
+    let port_up = at.y + (LEAN * balanced).clamp(-LEAN_MAX, LEAN_MAX) * planing;
     let level = level_attitude(ahead(state.heading));
     let world_from_body = level * DQuat::from_rotation_y(-pitch_up) * DQuat::from_rotation_x(port_up);
-    let height = water.height_m + PLANING_RISE * hull.length_m * planing;
-    Floating {
-        pose: RigidPose { world_from_body, position: state.position.extend(height) },
-        water_level: water.height_m,
-    }
+    let height = at.x + PLANING_RISE * hull.length_m * planing;
+    Floating { pose: RigidPose { world_from_body, position: state.position.extend(height) }, water_level }
 }
 
 /// The pose of a picture boat ([`crate::model::ModelKind::Quad`]) that is seen from `eye`: upright, its starboard side towards

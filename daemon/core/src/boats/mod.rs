@@ -1,11 +1,17 @@
-//! Boats: where they go, as pure functions of time, and how they lie on the waves.
+//! Boats: where they go, as pure functions of time, and how waves move them.
 
 mod course;
 mod float;
+mod hull;
+mod motion;
 mod path;
+mod ride;
 
 pub use course::{Arrival, Course, CourseError, CourseState, Damage};
-pub use float::{Floating, Hull, facing, float};
+pub use float::{Floating, facing, float, ride};
+pub use hull::{Hull, HullForm};
+pub use motion::Motion;
+pub use ride::Ride;
 
 use glam::DVec2;
 

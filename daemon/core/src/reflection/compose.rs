@@ -3,15 +3,11 @@
 use glam::{DVec2, Vec3, Vec4};
 
 use super::{
-    grid::{DRAWN_TONE, TONES, drawn_tones},
+    grid::{TONES, tone_weights},
     lobes::{BANDS, Lobe, Lobes},
     tones::SeaTones,
 };
 use crate::light::{LUMINANCE, linear_to_srgb};
-
-/// Largest share of a pixel's light that is taken away: a sky that is held brighter than the water can mirror would leave what is left a
-/// colour of its own.
-const TAKEN_MAX: f32 = 0.85;
 
 /// No narrower a stretch of hull is asked for, half of it in pixels: what the shaders' coarse cells can hold.
 pub const HALF_WIDTH_MIN_PX: f64 = 1.5;
@@ -35,7 +31,7 @@ pub struct Place {
     pub tangent: f64,
     /// Pixels to a tangent of 1 about the anchor.
     pub focal_px: f64,
-    /// Pixels above the line that are drawn as what is just below it: waves before the hull stand as high.
+    /// Pixels above the line that are drawn: waves before the hull stand as high.
     pub foot_px: f64,
 }
 
@@ -83,7 +79,8 @@ pub fn compose(
         let (across, down) = (at.dot(DVec2::new(place.down.y, -place.down.x)), at.dot(place.down));
         let (line, near) = place.hull(across);
         let below = down - line;
-        let tangent = near + below.max(0.0) / place.focal_px;
+        // Water above the line is a wave before the hull, as far from it as one as far below.
+        let tangent = near + below.abs() / place.focal_px;
         if below < -place.foot_px || tangent <= 1e-5 {
             continue;
         }
@@ -94,16 +91,14 @@ pub fn compose(
         let px_per_m = place.focal_px * near / place.eye_m;
         let code = Vec3::from(pixel.to_array().map(linear_to_srgb)).dot(LUMINANCE);
         let tone = tones.tone(tangent, code);
-        let (added, taken) = gather(&lobes.at(lobes.place(distance)), tone, |lobe, band| {
+        let luminance = pixel.dot(LUMINANCE);
+        let (added, taken) = gather(&lobes.at(lobes.place(distance)), tone, luminance, |lobe, band| {
             let centre = across + f64::from(lobe.aside_m) * px_per_m;
             let half = (f64::from(lobe.half_width_m) * px_per_m).max(HALF_WIDTH_MIN_PX);
             let edge = |x: f64| running(&sums, (x - billboard.first) / billboard.pitch, band);
             (edge(centre + half) - edge(centre - half)) * (billboard.pitch / (2.0 * half)) as f32
         });
-        let gone = taken * lobes.hue;
-        let most = (gone / pixel.max(Vec3::splat(1e-3))).max_element();
-        let held = (TAKEN_MAX / most.max(1e-6)).min(1.0);
-        *pixel = (*pixel - gone * held).max(Vec3::ZERO) + added;
+        *pixel = *pixel * (Vec3::ONE - taken) + added;
     }
 }
 
@@ -119,18 +114,29 @@ impl Place {
     }
 }
 
-/// Light thrown back and luminance taken away at a tone, over all bands.
-fn gather(lobes: &[Lobe; BANDS], tone: f32, mean: impl Fn(&Lobe, usize) -> Vec4) -> (Vec3, f32) {
-    let at = (tone / DRAWN_TONE as f32).clamp(-1.0, 1.0);
-    let weights = [(-at).max(0.0), 1.0 - at.abs(), at.max(0.0)];
-    let mut sum = (Vec3::ZERO, 0.0);
+/// Light thrown back, and share of the pixel's own light that is taken away, at a tone, over all bands.
+fn gather(
+    lobes: &[Lobe; BANDS],
+    tone: f32,
+    luminance: f32,
+    mean: impl Fn(&Lobe, usize) -> Vec4,
+) -> (Vec3, Vec3) {
+    let weights = tone_weights(f64::from(tone)).map(|w| w as f32);
+    let of = |v: &[f32; TONES]| v.iter().zip(weights).map(|(v, w)| v * w).sum::<f32>();
+    let (mut added, mut taken, mut coloured, mut most) = (Vec3::ZERO, 0.0, Vec3::ZERO, 0.0);
     for (band, lobe) in lobes.iter().enumerate() {
         let seen = mean(lobe, band);
-        let of = |v: &[f32; TONES]| drawn_tones(v).iter().zip(weights).map(|(v, w)| v * w).sum::<f32>();
-        sum.0 += seen.truncate() * of(&lobe.thrown);
-        sum.1 += seen.w * of(&lobe.taken);
+        added += seen.truncate() * of(&lobe.thrown);
+        taken += seen.w * of(&lobe.taken);
+        let middle = seen.w * lobe.taken[TONES / 2];
+        coloured += lobe.hue * middle;
+        most += lobe.sky_most * middle;
     }
-    sum
+    // All tones have the middle one's colour.
+    let whole = coloured.dot(LUMINANCE).max(1e-6);
+    let hue = coloured / whole;
+    let of_sky = (most / (whole * luminance).max(1e-6)).min(1.0);
+    (added, (taken * hue).clamp(Vec3::ZERO, Vec3::ONE) * of_sky)
 }
 
 /// A running sum at a place between columns.

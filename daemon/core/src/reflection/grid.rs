@@ -6,31 +6,55 @@ pub const FORCES: usize = 5;
 /// other side.
 pub const WINDS: usize = 3;
 /// Elevations of the line of sight.
-pub const ELEVATIONS: usize = 14;
+pub const ELEVATIONS: usize = 15;
 /// Distances from the water to the hull.
-pub const DISTANCES: usize = 12;
+pub const DISTANCES: usize = 10;
 /// Heights on the hull over the distance to it.
-pub const RISES: usize = 12;
-/// Brightnesses of a pixel.
-pub const TONES: usize = 4;
-/// Numbers at one elevation, distance and rise: what is thrown back and what is taken away for each brightness, then how far aside light
-/// goes, mean and spread.
+pub const RISES: usize = 13;
+/// Brightnesses of a pixel: dark, middling, bright.
+pub const TONES: usize = 3;
+/// States of the water at the hull: the mean one, low, high, tilted away from the eye, tilted towards it.
+pub const STATES: usize = 5;
+/// Numbers at one elevation, distance, rise and state: what is thrown back and what is taken away for each brightness, then how far aside
+/// light goes, mean and spread.
 pub const RECORD: usize = 2 * TONES + 2;
+/// The same for all states, as they are stored: how far aside light goes is one for all.
+pub const STORED: usize = STATES * 2 * TONES + 2;
 
 /// Least elevation, and the ratio of each to the one before, radians below the horizontal.
-const ELEVATION_MIN: f64 = 0.004;
-const ELEVATION_RATIO: f64 = 1.45;
+const ELEVATION_MIN: f64 = 0.006;
+const ELEVATION_RATIO: f64 = 1.36;
 /// Least distance, metres, and the ratio of each to the one before.
-const DISTANCE_MIN_M: f64 = 0.4;
-const DISTANCE_RATIO: f64 = 1.8;
+pub const DISTANCE_MIN_M: f64 = 0.5;
+const DISTANCE_RATIO: f64 = 1.85;
 
-/// Tangents of the directions that bound the cells in height; what lies below the first comes from under the mean water.
-pub const RISE_NODES: [f64; RISES] = [0.0, 0.02, 0.05, 0.09, 0.14, 0.2, 0.28, 0.38, 0.52, 0.75, 1.2, 3.0];
+/// The states are so many standard deviations of the level and of the tilt of a small boat off the mean.
+pub const STATE_OUTER: f64 = 1.5;
+/// Beyond so many times that they are held.
+const STATE_MAX: f64 = 1.4;
 
-/// The brightnesses, in standard deviations from the sea's mean at that elevation: the eighths of a normal distribution, evenly spaced.
-pub const TONE_STEP: f64 = 0.767;
-/// The first of them.
-pub const TONE_FIRST: f64 = -1.5 * TONE_STEP;
+/// Tangents of the directions that bound the cells in height over the hull's water line; what lies below the first comes from under it, and
+/// the last has also what lies above.
+pub const RISE_NODES: [f64; RISES] =
+    [0.0, 0.02, 0.05, 0.09, 0.14, 0.2, 0.28, 0.38, 0.52, 0.75, 1.2, 3.0, 10.0];
+
+/// The outer brightnesses are so many standard deviations from the sea's mean at that elevation: where an eighth of a normal distribution is
+/// beyond.
+pub const TONE_OUTER: f64 = 1.15;
+
+/// How much each of the states counts for a level and a tilt in standard deviations; what is tilted towards the eye is positive. The first
+/// counts for what the others leave.
+pub fn state_weights(level: f64, tilt: f64) -> [f64; STATES] {
+    let held = |v: f64| if v.is_finite() { (v / STATE_OUTER).clamp(-STATE_MAX, STATE_MAX) } else { 0.0 };
+    let (level, tilt) = (held(level), held(tilt));
+    [1.0 - level.abs() - tilt.abs(), (-level).max(0.0), level.max(0.0), (-tilt).max(0.0), tilt.max(0.0)]
+}
+
+/// How much each of the brightnesses counts for a tone in standard deviations.
+pub fn tone_weights(tone: f64) -> [f64; TONES] {
+    let at = (tone / TONE_OUTER).clamp(-1.0, 1.0);
+    [(-at).max(0.0), 1.0 - at.abs(), at.max(0.0)]
+}
 
 /// Elevation of node `i`, radians.
 pub fn elevation(i: usize) -> f64 {
@@ -68,13 +92,4 @@ pub fn rise_sine(r: usize) -> f64 {
     let lower = r.checked_sub(1).and_then(|l| RISE_NODES.get(l)).copied().unwrap_or(0.0);
     let tangent = 0.5 * (lower + upper).max(0.02);
     tangent / (1.0 + tangent * tangent).sqrt()
-}
-
-/// Drawn are the darkest and the brightest tone of the table and the middle between the inner two: standard deviations from the mean.
-pub const DRAWN_TONE: f64 = -TONE_FIRST;
-
-/// The drawn tones, dark to bright, of the table's.
-pub fn drawn_tones(tones: &[f32; TONES]) -> [f32; 3] {
-    let [dark, darker, brighter, bright] = *tones;
-    [dark, 0.5 * (darker + brighter), bright]
 }

@@ -3,28 +3,41 @@
 use glam::Vec3;
 
 use super::{
-    grid::{RISE_NODES, TONES, rise_sine},
-    table::{Column, SeaLobes, SkyLight},
+    grid::{DISTANCE_MIN_M, RISE_NODES, RISES, TONES, rise_sine},
+    table::{SeaLobes, Sight, SkyLight},
 };
-use crate::light::LUMINANCE;
+use crate::{light::LUMINANCE, scene::Light};
 
 /// Bands of height that a boat is held in.
-pub const BANDS: usize = 10;
+pub const BANDS: usize = 14;
 /// Distances from the hull at which lobes are held.
 pub const STEPS: usize = 64;
 
 /// A boat's bands are finer at its foot, which is seen in the sea from farther off.
-const BAND_POWER: f64 = 1.4;
+const BAND_POWER: f64 = 1.8;
 /// What throws back less than this, everywhere, is not drawn.
 const SHARE_MIN: f32 = 0.006;
+
+/// Diffuse reflectance of the water below its surface, as seen from above without the surface: clear coastal water (Mobley 1994, section 3.8).
+const WATER: Vec3 = Vec3::new(0.006, 0.022, 0.030);
+/// Close to the hull the boat keeps so much of the light from the water below, since it comes in under it and beside it; and the distance, in
+/// heights of the boat, over which that falls to a third.
+const WATER_SHADED: f64 = 0.6;
+const WATER_SHADED_HEIGHTS: f64 = 1.4;
+/// No wave mirrors more than so many times the sky that a bright one does; the sky may be held too dark by some.
+const SKY_MOST: f32 = 1.5;
 
 /// What a pixel of water throws back of one band of a boat.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lobe {
-    /// Share of the band's light, by brightness of the pixel.
+    /// Share of the band's light, for a dark, a middling and a bright pixel.
     pub thrown: [f32; TONES],
-    /// Luminance of the sky that the band hides from the pixel, by brightness of the pixel.
+    /// Share of the pixel's own luminance that the band hides from it, for the same.
     pub taken: [f32; TONES],
+    /// Colour of what is hidden over the pixel's own: its luminance is 1.
+    pub hue: Vec3,
+    /// Luminance above which a pixel's light is not the sky's: the sun's glitter, of which a boat hides little.
+    pub sky_most: f32,
     /// How far right of the pixel's own direction the band is seen, metres at the hull.
     pub aside_m: f32,
     /// Half width of the stretch of hull that is seen, metres.
@@ -36,8 +49,6 @@ pub struct Lobe {
 pub struct Lobes {
     /// Distance from the hull beyond which there is no reflection, metres.
     pub reach_m: f64,
-    /// Colour of the sky that is taken away, over its luminance.
-    pub hue: Vec3,
     /// By distance from the hull, at [`Lobes::step_m`], and by band from the water up.
     pub steps: Vec<[Lobe; BANDS]>,
 }
@@ -69,6 +80,8 @@ impl Lobe {
         Self {
             thrown: std::array::from_fn(|t| mix(self.thrown[t], other.thrown[t])),
             taken: std::array::from_fn(|t| mix(self.taken[t], other.taken[t])),
+            hue: self.hue.lerp(other.hue, part),
+            sky_most: mix(self.sky_most, other.sky_most),
             aside_m: mix(self.aside_m, other.aside_m),
             half_width_m: mix(self.half_width_m, other.half_width_m),
         }
@@ -87,12 +100,25 @@ pub struct Seen {
     pub wind_to_view: f64,
     /// The sky behind the boat.
     pub sky: SkyLight,
+    /// Light that comes out of the water, linear: see [`water_light`].
+    pub water: Vec3,
+    /// Level of the water at the boat over the mean one, metres.
+    pub level_m: f64,
+    /// How steeply that water rises away from the eye, tangent.
+    pub tilt: f64,
     /// Height of the eye over the water, metres.
     pub eye_m: f64,
     /// Distance to the boat along the sea, metres.
     pub range_m: f64,
     /// Height of the boat over the water, metres.
     pub height_m: f64,
+    /// Tangent that one pixel spans downwards.
+    pub pixel: f64,
+}
+
+/// Light that comes out of clear coastal water lit by sun and sky, before the surface keeps some of it.
+pub fn water_light(light: &Light) -> Vec3 {
+    WATER * (light.sky + light.sun * light.sun_direction.z.max(0.0) as f32)
 }
 
 impl Lobes {
@@ -120,11 +146,8 @@ impl Lobes {
         let reach = (1..=tries).rev().map(|i| farthest * (f64::from(i) / f64::from(tries)).powi(2));
         let Some(reach_m) = reach.into_iter().find(|d| strength(*d) >= SHARE_MIN) else { return };
         self.reach_m = reach_m;
-        // Seen from a quarter of the reach a third of the boat's height hides this sky.
-        let tangent = 0.35 * seen.height_m / (0.25 * reach_m);
-        self.hue = seen.sky.hue(tangent / (1.0 + tangent * tangent).sqrt());
         for i in 0..STEPS {
-            let step = bands(sea, seen, self.step_m(i));
+            let step = pixel_bands(sea, seen, self.step_m(i));
             // It ends at nothing.
             let end = |l: Lobe| Lobe { thrown: [0.0; TONES], taken: [0.0; TONES], ..l };
             self.steps.push(if i == STEPS - 1 { step.map(end) } else { step });
@@ -132,43 +155,90 @@ impl Lobes {
     }
 }
 
+/// The lobes of a pixel whose middle is at a distance from the hull: far off it sees a long stretch of water, over which they change.
+fn pixel_bands(sea: &SeaLobes, seen: &Seen, distance_m: f64) -> [Lobe; BANDS] {
+    let to_water = (seen.range_m - distance_m).max(0.05 * seen.range_m);
+    let length_m = seen.pixel * to_water * to_water / seen.eye_m;
+    // Two points of Gauss's formula.
+    let [near, far] = [-1.0, 1.0].map(|side| distance_m + side * length_m / 12.0_f64.sqrt());
+    if !(length_m > 0.1 * distance_m.max(0.5) && far < 0.95 * seen.range_m) {
+        return bands(sea, seen, distance_m);
+    }
+    let (near, far) = (bands(sea, seen, near.max(0.0)), bands(sea, seen, far));
+    std::array::from_fn(|b| near[b].mix(&far[b], 0.5))
+}
+
+/// What comes from one of the table's cells.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    thrown: [f32; TONES],
+    /// Light of the sky that is mirrored from there.
+    sky: [Vec3; TONES],
+    aside: f32,
+    spread: f32,
+}
+
 /// The lobes at one distance from the hull.
 fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64) -> [Lobe; BANDS] {
-    let distance = distance_m.max(0.05);
-    let to_water = (seen.range_m - distance).max(0.05 * seen.range_m);
-    let cells = sea.column(seen.wind_to_view, (seen.eye_m / to_water).atan(), distance);
+    // Nearer than the table reaches, waves between hull and water no longer change what is seen.
+    let distance_m = distance_m.max(DISTANCE_MIN_M);
+    let to_water = (seen.range_m - distance_m).max(0.05 * seen.range_m);
+    let elevation = (seen.eye_m / to_water).atan();
+    let Seen { wind_to_view, level_m, tilt, .. } = *seen;
+    let column = sea.column(&Sight { wind_to_view, level_m, tilt, elevation, distance_m });
+    let mut cells = [Cell::default(); RISES];
+    let (mut sky, mut mirrored) = ([Vec3::ZERO; TONES], [0.0; TONES]);
+    for (r, (cell, record)) in cells.iter_mut().zip(&column).enumerate() {
+        let light = seen.sky.at(rise_sine(r));
+        cell.thrown = std::array::from_fn(|t| record[2 * t]);
+        cell.sky = std::array::from_fn(|t| light * record[2 * t + 1]);
+        [cell.aside, cell.spread] = [record[2 * TONES], record[2 * TONES + 1]];
+        for t in 0..TONES {
+            sky[t] += cell.sky[t];
+            mirrored[t] += cell.thrown[t];
+        }
+    }
+    // All that a pixel sees: only shares of it count, so that the sky may be held too bright or too dark.
+    let shaded = WATER_SHADED * (-distance_m / (WATER_SHADED_HEIGHTS * seen.height_m)).exp();
+    let whole: [Vec3; TONES] = std::array::from_fn(|t| {
+        let water = seen.water * ((1.0 - mirrored[t]).max(0.0) * (1.0 - shaded as f32));
+        (sky[t] + water).max(Vec3::splat(1e-6))
+    });
     std::array::from_fn(|b| {
-        let lower = if b == 0 { f64::NEG_INFINITY } else { band_edge_m(seen.height_m, b) / distance };
-        band(&cells, &seen.sky, [lower, band_edge_m(seen.height_m, b + 1) / distance], distance)
+        let lower = if b == 0 { f64::NEG_INFINITY } else { band_edge_m(seen.height_m, b) / distance_m };
+        band(&cells, &whole, [lower, band_edge_m(seen.height_m, b + 1) / distance_m], distance_m)
     })
 }
 
 /// Sum of the cells between two rises.
-fn band(cells: &Column, sky: &SkyLight, [from, to]: [f64; 2], distance_m: f64) -> Lobe {
+fn band(cells: &[Cell; RISES], whole: &[Vec3; TONES], [from, to]: [f64; 2], distance_m: f64) -> Lobe {
     let mut lobe = Lobe::default();
+    let mut hidden = [Vec3::ZERO; TONES];
     let mut weight = 0.0;
     let mut below = f64::NEG_INFINITY;
-    for (r, (cell, node)) in cells.iter().zip(RISE_NODES).enumerate() {
+    for (cell, node) in cells.iter().zip(RISE_NODES) {
         let part = if below.is_finite() {
             ((to.min(node) - from.max(below)) / (node - below)).clamp(0.0, 1.0)
         } else {
             f64::from(from == f64::NEG_INFINITY)
-        };
+        } as f32;
         below = node;
         if part <= 0.0 {
             continue;
         }
-        let light = sky.at(rise_sine(r)).dot(LUMINANCE);
         let mut thrown = 0.0;
         for t in 0..TONES {
-            lobe.thrown[t] += part as f32 * cell[2 * t];
-            lobe.taken[t] += part as f32 * cell[2 * t + 1] * light;
-            thrown += part as f32 * cell[2 * t];
+            lobe.thrown[t] += part * cell.thrown[t];
+            hidden[t] += part * cell.sky[t] / whole[t];
+            thrown += part * cell.thrown[t];
         }
         weight += thrown;
-        lobe.aside_m += thrown * cell[2 * TONES];
-        lobe.half_width_m += thrown * cell[2 * TONES + 1];
+        lobe.aside_m += thrown * cell.aside;
+        lobe.half_width_m += thrown * cell.spread;
     }
+    lobe.taken = hidden.map(|h| h.dot(LUMINANCE));
+    lobe.hue = hidden[TONES / 2] / lobe.taken[TONES / 2].max(1e-9);
+    lobe.sky_most = SKY_MOST * whole[TONES - 1].dot(LUMINANCE);
     let scale = distance_m as f32 / weight.max(1e-9);
     lobe.aside_m *= scale;
     // A box as wide has the spread's standard deviation.
@@ -183,7 +253,18 @@ mod tests {
 
     fn seen(eye_m: f64, range_m: f64, height_m: f64) -> Seen {
         let sky = SkyLight::of_bands(Vec3::new(0.6, 0.66, 0.72), Vec3::new(0.35, 0.42, 0.52));
-        Seen { wind_to_view: 0.4, sky, eye_m, range_m, height_m }
+        let water = Vec3::new(0.004, 0.016, 0.023);
+        Seen {
+            wind_to_view: 0.4,
+            sky,
+            water,
+            level_m: 0.1,
+            tilt: 0.02,
+            eye_m,
+            range_m,
+            height_m,
+            pixel: 7e-4,
+        }
     }
 
     #[test]
@@ -195,7 +276,7 @@ mod tests {
                 for range in [0.0, 0.5, 60.0, 5000.0, 1e9, f64::NAN] {
                     for height in [0.0, 1.5, 60.0] {
                         let lobes = Lobes::of(&sea, &seen(eye, range, height));
-                        assert!(lobes.reach_m.is_finite() && lobes.hue.is_finite());
+                        assert!(lobes.reach_m.is_finite());
                         for lobe in lobes.steps.iter().flatten() {
                             let all = lobe
                                 .thrown
@@ -206,7 +287,8 @@ mod tests {
                                 all.clone().all(|v| v.is_finite()),
                                 "{wind} {eye} {range} {height}: {lobe:?}"
                             );
-                            assert!(lobe.thrown.iter().all(|t| (0.0..=1.01).contains(t)));
+                            assert!(lobe.hue.is_finite());
+                            assert!(lobe.thrown.iter().chain(&lobe.taken).all(|t| (0.0..=1.03).contains(t)));
                         }
                         let last = lobes.steps.last().map_or(0.0, |s| s.iter().map(|l| l.thrown[0]).sum());
                         assert_eq!(last, 0.0);
@@ -222,13 +304,13 @@ mod tests {
         let sea = Table::baked().sea(0.0);
         let lobes = Lobes::of(&sea, &seen(8.0, 60.0, 30.0));
         let near = lobes.at(lobes.place(5.0));
-        let sum: f32 = near.iter().map(|l| 0.5 * (l.thrown[1] + l.thrown[2])).sum();
+        let sum: f32 = near.iter().map(|l| l.thrown[1]).sum();
         // 8 m over 55 m: 8.3 degrees; slopes that face the eye are steeper by some of their 3.1 degrees. Fresnel, n = 1.34, at a grazing
         // angle of 10 degrees: 0.349 (mean of 0.407 and 0.291).
         assert!((0.3..0.62).contains(&sum), "{sum}");
         // Rougher water throws back less, and less far up.
         let rough = Lobes::of(&Table::baked().sea(6.7), &seen(8.0, 60.0, 30.0));
-        let rough: f32 = rough.at(rough.place(5.0)).iter().map(|l| 0.5 * (l.thrown[1] + l.thrown[2])).sum();
+        let rough: f32 = rough.at(rough.place(5.0)).iter().map(|l| l.thrown[1]).sum();
         assert!(rough < 0.8 * sum, "{rough} {sum}");
     }
 }

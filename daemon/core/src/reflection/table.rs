@@ -3,41 +3,48 @@
 use glam::Vec3;
 
 use super::grid::{
-    DISTANCES, ELEVATIONS, FORCES, RECORD, RISES, TONES, WINDS, distance_place, elevation_place,
+    DISTANCES, ELEVATIONS, FORCES, RECORD, RISES, STATES, STORED, TONES, WINDS, distance_place,
+    elevation_place, state_weights,
 };
-use crate::{light::LUMINANCE, sea::BeaufortForce};
+use crate::sea::BeaufortForce;
 
 /// Numbers of one force and wind.
-const PLANE: usize = ELEVATIONS * DISTANCES * RISES * RECORD;
+const PLANE: usize = ELEVATIONS * DISTANCES * RISES * STORED;
 /// Numbers of all.
 const TOTAL: usize = FORCES * WINDS * PLANE;
-/// Shares are held from 0 to this.
-const SHARE_MAX: f32 = 2.0;
 /// How far aside, over the distance, is held from minus this to this.
-const ASIDE_MAX: f32 = 4.0;
+const ASIDE_MAX: f32 = 2.0;
+/// Spreads are held in steps of this: metres for the level, and for the tilt its tangent.
+const SPREAD_STEP: f64 = 1e-4;
 
 /// The baked table.
 const BAKED: &[u8] = include_bytes!("../../data/reflection.bin");
 
-/// Sixteen bits a number; shares by their root, which keeps small ones.
-pub fn encode(values: &[f32]) -> Vec<u8> {
+/// Eight bits a number, by its root, which keeps small ones; then for each force the spreads of level (metres) and
+/// tilt (tangent) of a small boat, sixteen bits.
+pub fn encode(values: &[f32], spreads: &[[f64; 2]]) -> Vec<u8> {
     let code = |(i, v): (usize, &f32)| {
-        let unit = if i % RECORD < 2 * TONES {
-            (v / SHARE_MAX).clamp(0.0, 1.0).sqrt()
+        if i % STORED < STATES * 2 * TONES {
+            (v.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8
         } else {
-            (0.5 + 0.5 * v / ASIDE_MAX).clamp(0.0, 1.0)
-        };
-        (unit * 65_535.0).round() as u16
+            let unit = (v / ASIDE_MAX).clamp(-1.0, 1.0);
+            (128.0 + 127.0 * unit.abs().sqrt().copysign(unit)).round() as u8
+        }
     };
-    values.iter().enumerate().map(code).flat_map(u16::to_le_bytes).collect()
+    let spread = |s: &f64| ((s / SPREAD_STEP).round() as u16).to_le_bytes();
+    values.iter().enumerate().map(code).chain(spreads.as_flattened().iter().flat_map(spread)).collect()
 }
 
 fn decode(bytes: &[u8]) -> Vec<f32> {
-    let value = |(i, pair): (usize, &[u8])| {
-        let unit = pair.iter().rev().fold(0.0, |sum, b| sum * 256.0 + f32::from(*b)) / 65_535.0;
-        if i % RECORD < 2 * TONES { unit * unit * SHARE_MAX } else { (2.0 * unit - 1.0) * ASIDE_MAX }
+    let value = |(i, byte): (usize, &u8)| {
+        if i % STORED < STATES * 2 * TONES {
+            (f32::from(*byte) / 255.0).powi(2)
+        } else {
+            let unit = (f32::from(*byte) - 128.0) / 127.0;
+            unit * unit.abs() * ASIDE_MAX
+        }
     };
-    bytes.chunks_exact(2).enumerate().map(value).collect()
+    bytes.iter().enumerate().map(value).collect()
 }
 
 /// Sky radiance by elevation, linear, behind a boat; linear between the nodes.
@@ -77,10 +84,10 @@ impl SkyLight {
         self.nodes[before].lerp(self.nodes[i], share as f32)
     }
 
-    /// Its colour at an elevation of that sine, over its luminance there.
-    pub fn hue(&self, sine: f64) -> Vec3 {
-        let low = self.at(sine);
-        low / low.dot(LUMINANCE).max(1e-6)
+    /// The same sky, each channel so many times as bright.
+    #[must_use]
+    pub fn scaled(&self, times: Vec3) -> Self {
+        Self { nodes: self.nodes.map(|n| n * times) }
     }
 }
 
@@ -88,28 +95,51 @@ impl SkyLight {
 #[derive(Clone, Debug)]
 pub struct Table {
     values: Vec<f32>,
+    spreads: [[f64; 2]; FORCES],
 }
 
 /// The table for one strength of the wind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeaLobes {
     values: Vec<f32>,
+    /// Standard deviation of a small boat's level, metres, and of the tangent of its tilt.
+    spread: [f64; 2],
 }
 
-/// The records of all rises at one elevation and distance.
+/// From where to where a line of sight goes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sight {
+    /// Angle from the wind's direction to it, radians clockwise.
+    pub(super) wind_to_view: f64,
+    /// Level of the water at the hull over the mean one, metres.
+    pub(super) level_m: f64,
+    /// How steeply that water rises away from the eye, tangent.
+    pub(super) tilt: f64,
+    /// Radians below the horizontal.
+    pub(super) elevation: f64,
+    /// From where it meets the water to the hull, metres.
+    pub(super) distance_m: f64,
+}
+
+/// The records of all rises for one line of sight.
 pub(super) type Column = [[f32; RECORD]; RISES];
 
 impl Table {
     /// The table that comes with the program.
     pub fn baked() -> Self {
-        let mut values = decode(BAKED);
+        let (values, spreads) = BAKED.split_at(TOTAL.min(BAKED.len()));
+        let mut values = decode(values);
         values.resize(TOTAL, 0.0);
-        Self { values }
+        let mut all = [[0.0; 2]; FORCES];
+        for (spread, pair) in all.as_flattened_mut().iter_mut().zip(spreads.chunks_exact(2)) {
+            *spread = SPREAD_STEP * pair.iter().rev().fold(0.0, |sum, b| sum * 256.0 + f64::from(*b));
+        }
+        Self { values, spreads: all }
     }
 
     /// What it says for a wind 10 m above the sea, m/s; between the forces' own winds it is interpolated. Beyond Beaufort 4 it is that.
     pub fn sea(&self, wind_m_s: f64) -> SeaLobes {
-        let mut sea = SeaLobes { values: vec![0.0; WINDS * PLANE] };
+        let mut sea = SeaLobes { values: vec![0.0; WINDS * PLANE], spread: [0.0; 2] };
         self.set_sea(&mut sea, wind_m_s);
         sea
     }
@@ -117,32 +147,56 @@ impl Table {
     /// The same into what is there.
     pub fn set_sea(&self, sea: &mut SeaLobes, wind_m_s: f64) {
         sea.values.fill(0.0);
+        sea.spread = [0.0; 2];
         for (f, weight) in neighbours(force_place(wind_m_s), FORCES) {
             let values = self.values.iter().skip(f * WINDS * PLANE);
             for (sum, v) in sea.values.iter_mut().zip(values) {
                 *sum += weight as f32 * v;
+            }
+            for (sum, spread) in sea.spread.iter_mut().zip(self.spreads.get(f).unwrap_or(&[0.0; 2])) {
+                *sum += weight * spread;
             }
         }
     }
 }
 
 impl SeaLobes {
-    /// The records at an angle between wind and line of sight (radians clockwise), an elevation (radians below the horizontal) and a
-    /// distance to the hull (metres).
-    pub(super) fn column(&self, wind_to_view: f64, elevation: f64, distance_m: f64) -> Column {
+    /// The records of a line of sight.
+    pub(super) fn column(&self, sight: &Sight) -> Column {
         let mut out = [[0.0; RECORD]; RISES];
-        let (wind, mirrored) = wind_place(wind_to_view);
+        let (wind, mirrored) = wind_place(sight.wind_to_view);
+        let [level, tilt] = self.spread.map(|s| s.max(1e-3));
+        let states = state_weights(sight.level_m / level, sight.tilt / tilt);
         for (w, ww) in neighbours(wind, WINDS) {
-            for (e, ew) in neighbours(elevation_place(elevation), ELEVATIONS) {
-                for (d, dw) in neighbours(distance_place(distance_m), DISTANCES) {
+            for (e, ew) in neighbours(elevation_place(sight.elevation), ELEVATIONS) {
+                for (d, dw) in neighbours(distance_place(sight.distance_m), DISTANCES) {
                     let weight = (ww * ew * dw) as f32;
-                    let start = ((w * ELEVATIONS + e) * DISTANCES + d) * RISES * RECORD;
-                    let values = self.values.get(start..start + RISES * RECORD).unwrap_or(&[]);
-                    for (sum, v) in out.as_flattened_mut().iter_mut().zip(values) {
-                        *sum += weight * v;
+                    if weight == 0.0 {
+                        continue;
+                    }
+                    let start = ((w * ELEVATIONS + e) * DISTANCES + d) * RISES * STORED;
+                    let values = self.values.get(start..start + RISES * STORED).unwrap_or(&[]);
+                    for (sums, stored) in out.iter_mut().zip(values.chunks_exact(STORED)) {
+                        let (shares, aside) = stored.split_at(STATES * 2 * TONES);
+                        for (share, state) in shares.chunks_exact(2 * TONES).zip(states) {
+                            if state == 0.0 {
+                                continue;
+                            }
+                            let weight = weight * state as f32;
+                            for (sum, v) in sums.iter_mut().zip(share) {
+                                *sum += weight * v;
+                            }
+                        }
+                        for (sum, v) in sums.iter_mut().skip(2 * TONES).zip(aside) {
+                            *sum += weight * v;
+                        }
                     }
                 }
             }
+        }
+        // The first state may count for less than nothing.
+        for record in &mut out {
+            record.iter_mut().take(2 * TONES).for_each(|v| *v = v.max(0.0));
         }
         if mirrored {
             out.iter_mut().for_each(|record| record[2 * TONES] = -record[2 * TONES]);
@@ -178,23 +232,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_come_back_from_sixteen_bits() {
-        let values: Vec<f32> = (0..3 * RECORD).map(|i| 0.003 * i as f32).collect();
-        for (got, want) in decode(&encode(&values)).iter().zip(&values) {
-            assert!((got - want).abs() < 1e-4, "{got} {want}");
+    fn numbers_come_back_from_eight_bits() {
+        let values: Vec<f32> = (0..3 * STORED).map(|i| 0.012 * i as f32).collect();
+        for (i, (got, want)) in decode(&encode(&values, &[])).iter().zip(&values).enumerate() {
+            let most = if i % STORED < STATES * 2 * TONES { 1.0 } else { ASIDE_MAX };
+            let want = want.min(most);
+            // Half a step of the root.
+            assert!((got - want).abs() < 1.1 * (want * most).sqrt() / 127.0 + 1e-4, "{i}: {got} {want}");
         }
+    }
+
+    fn sight(wind_to_view: f64, elevation: f64, distance_m: f64) -> Sight {
+        Sight { wind_to_view, level_m: 0.0, tilt: 0.0, elevation, distance_m }
     }
 
     #[test]
     fn the_table_is_whole_and_its_shares_are_shares() {
-        assert_eq!(BAKED.len(), 2 * TOTAL);
+        assert_eq!(BAKED.len(), TOTAL + 4 * FORCES);
         let table = Table::baked();
-        for (i, column) in table.values.chunks_exact(RISES * RECORD).enumerate() {
-            for tone in 0..TONES {
-                let thrown: f32 = column.chunks_exact(RECORD).map(|r| r[2 * tone]).sum();
-                assert!((0.0..=1.01).contains(&thrown), "column {i}, tone {tone}: {thrown}");
+        for (i, column) in table.values.chunks_exact(RISES * STORED).enumerate() {
+            for kind in 0..STATES * TONES {
+                let thrown: f32 = column.chunks_exact(STORED).map(|r| r[2 * kind]).sum();
+                assert!((0.0..=1.03).contains(&thrown), "column {i}, kind {kind}: {thrown}");
             }
         }
+        let spreads = table.spreads;
+        assert!(spreads[0] == [0.0; 2] && spreads.windows(2).all(|s| s[1] >= s[0]), "{spreads:?}");
     }
 
     #[test]
@@ -205,15 +268,18 @@ mod tests {
         // Force 4, and calm.
         assert!(alike(1e9, 0.836 * 8.0) && alike(-3.0, 0.0) && !alike(0.0, 3.0));
         let sea = table.sea(3.0);
-        let flat = |wind: f64| sea.column(wind, 0.1, 5.0).as_flattened().to_vec();
+        let flat = |wind: f64| sea.column(&sight(wind, 0.1, 5.0)).as_flattened().to_vec();
         assert!(close(&flat(0.3), &flat(0.3 + std::f64::consts::PI)));
         assert!(close(&flat(f64::NAN), &flat(0.0)));
         // From the other side light goes to the other side.
-        let (left, right) = (sea.column(-0.6, 0.1, 5.0), sea.column(0.6, 0.1, 5.0));
+        let (left, right) = (sea.column(&sight(-0.6, 0.1, 5.0)), sea.column(&sight(0.6, 0.1, 5.0)));
         assert!((left[5][2 * TONES] + right[5][2 * TONES]).abs() < 1e-5 && right[5][2 * TONES].abs() > 1e-4);
         for elevation in [0.0, 1e-9, 3.0, f64::NAN] {
-            for distance in [-5.0, 0.0, 1e9, f64::NAN] {
-                assert!(sea.column(0.1, elevation, distance).as_flattened().iter().all(|v| v.is_finite()));
+            for distance_m in [-5.0, 0.0, 1e9, f64::NAN] {
+                for level_m in [-1e9, 0.0, 2.0, f64::NAN] {
+                    let sight = Sight { wind_to_view: 0.1, level_m, tilt: -level_m, elevation, distance_m };
+                    assert!(sea.column(&sight).as_flattened().iter().all(|v| v.is_finite()));
+                }
             }
         }
     }

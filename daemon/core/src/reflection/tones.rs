@@ -49,6 +49,13 @@ impl SeaTones {
         Some(Self { mean: single(mean), spread: single(spread), roots: [low as f32, high as f32] })
     }
 
+    /// Mean luma (sRGB-coded) of what is seen under that tangent; `None` where no sea was seen.
+    pub fn mean_at(&self, tangent: f64) -> Option<f32> {
+        let root = tangent.max(0.0).sqrt() as f32;
+        let [low, high] = self.roots;
+        (low..=high).contains(&root).then(|| self.mean[0] + root * (self.mean[1] + root * self.mean[2]))
+    }
+
     /// How many standard deviations brighter than the sea's mean a luma is where it is seen under that tangent.
     pub fn tone(&self, tangent: f64, luma: f32) -> f32 {
         let root = (tangent.max(0.0).sqrt() as f32).clamp(self.roots[0], self.roots[1]);

@@ -4,7 +4,7 @@
 
 mod boat;
 pub(crate) mod read;
-pub(crate) mod sun;
+mod sun;
 pub(crate) mod table;
 
 use glam::{DVec2, DVec3};
@@ -45,6 +45,8 @@ pub struct Scenario {
     pub duration_s: Option<f64>,
     /// Waves and where the wind comes from.
     pub waves: WaveSpec,
+    /// Whether the sea is measured in the video; the waves above are then what is drawn until it is.
+    pub sea_from_video: bool,
     /// Velocity of the air, world, m/s.
     pub wind: DVec3,
     /// Height of the camera over the mean sea, metres.

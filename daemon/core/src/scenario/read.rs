@@ -1,5 +1,6 @@
 //! The scenario's tables other than the boats.
 
+use glam::DVec3;
 use toml::{Spanned, de::DeTable};
 
 use super::{
@@ -19,18 +20,12 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, ScenarioErr
     let document = document(text, origin)?;
     let root = Table::root(Source { text, origin }, &document);
     root.only(&["name", "seed", "duration_s", "sea", "mount", "light", "reflection", "weapon", "boat"])?;
-    let (force, waves) = sea(&root.table("sea")?)?;
+    let sea_table = root.table("sea")?;
+    let (force, waves) = sea(&sea_table, &["source"])?;
+    let sources = [("scenario", false), ("video", true)];
     let mount = root.table("mount")?;
     mount.only(&["eye_height_m"])?;
-    let light = root.table("light")?;
-    light.only(&[
-        "sun_azimuth_deg",
-        "sun_elevation_deg",
-        "latitude_deg",
-        "longitude_deg",
-        "utc",
-        "visibility_km",
-    ])?;
+    let (sun_direction, visibility_m) = light(&root.table("light")?, &[])?;
     let water = reflection(&root.table("reflection")?, force)?;
     let boats = boat::boats(&root.tables("boat", BOATS_MAX)?)?;
     Ok(Scenario {
@@ -38,10 +33,11 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, ScenarioErr
         seed: root.integer("seed", 0..=i64::MAX)?.map_or(1, i64::unsigned_abs),
         duration_s: root.number("duration_s", 0.1..=86_400.0, "s")?,
         waves,
+        sea_from_video: sea_table.choice("source", &sources)?.unwrap_or(false),
         wind: -place(waves.wind_from, force.wind_mean_m_s()).extend(0.0),
         eye_height_m: mount.number("eye_height_m", 0.5..=100.0, "m")?.unwrap_or(8.0),
-        sun_direction: sun::direction(&light)?,
-        visibility_m: 1000.0 * light.number("visibility_km", 0.05..=200.0, "km")?.unwrap_or(20.0),
+        sun_direction,
+        visibility_m,
         water,
         weapon: weapon(&root.table("weapon")?)?,
         boats,
@@ -57,9 +53,10 @@ pub(crate) fn document<'a>(text: &'a str, origin: &str) -> Result<Spanned<DeTabl
     })
 }
 
-/// The table `[sea]`.
-pub(crate) fn sea(table: &Table<'_>) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
-    table.only(&["beaufort", "wind_from_deg", "significant_wave_height_m", "peak_period_s"])?;
+/// The table `[sea]`, in which the keys `more` are the caller's.
+pub(crate) fn sea(table: &Table<'_>, more: &[&str]) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
+    let keys = ["beaufort", "wind_from_deg", "significant_wave_height_m", "peak_period_s"];
+    table.only(&[&keys, more].concat())?;
     let number = table.integer("beaufort", 0..=12)?.unwrap_or(2);
     let force = u8::try_from(number)
         .ok()
@@ -81,6 +78,14 @@ pub(crate) fn sea(table: &Table<'_>) -> Result<(BeaufortForce, WaveSpec), Scenar
         }
     };
     Ok((force, WaveSpec { spectrum, wind_from }))
+}
+
+/// The table `[light]`, in which the keys `more` are the caller's: the unit vector towards the sun, world, and the meteorological
+/// visibility, metres.
+pub(crate) fn light(table: &Table<'_>, more: &[&str]) -> Result<(DVec3, f64), ScenarioError> {
+    table.only(&[&sun::KEYS, more, &["visibility_km"]].concat())?;
+    let visibility_km = table.number("visibility_km", 0.05..=200.0, "km")?.unwrap_or(20.0);
+    Ok((sun::direction(table)?, 1000.0 * visibility_km))
 }
 
 /// The table `[reflection]`.

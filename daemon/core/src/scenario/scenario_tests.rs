@@ -106,6 +106,14 @@ fn units_become_radians_metres_and_seconds() {
 }
 
 #[test]
+fn the_sea_is_measured_only_where_that_is_asked_for() {
+    let from_video = |text: &str| parse(text).expect("valid").sea_from_video;
+    assert!(!from_video("") && !from_video("[sea]\nsource = \"scenario\""));
+    assert!(from_video("[sea]\nsource = \"video\"\nbeaufort = 3"));
+    assert!(refused("[sea]\nsource = \"camera\"").contains("sea.source: \"camera\" is not allowed"));
+}
+
+#[test]
 fn tracers_are_every_nth_round() {
     let tracers = |text: &str| -> Vec<u64> {
         let weapon = parse(text).expect("valid").weapon;

@@ -9,8 +9,12 @@ use super::{ScenarioError, table::Table};
 /// Sun where the text names none: high enough for plain light, to the south-west.
 const DEFAULT_DEG: (f64, f64) = (215.0, 35.0);
 
+/// The keys that say where it stands.
+pub(super) const KEYS: [&str; 5] =
+    ["sun_azimuth_deg", "sun_elevation_deg", "latitude_deg", "longitude_deg", "utc"];
+
 /// Unit vector towards the sun.
-pub(crate) fn direction(light: &Table<'_>) -> Result<DVec3, ScenarioError> {
+pub(super) fn direction(light: &Table<'_>) -> Result<DVec3, ScenarioError> {
     let azimuth = light.number("sun_azimuth_deg", -360.0..=360.0, "degrees")?;
     let elevation = light.number("sun_elevation_deg", -90.0..=90.0, "degrees")?;
     let latitude = light.number("latitude_deg", -90.0..=90.0, "degrees")?;

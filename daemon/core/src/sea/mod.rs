@@ -5,9 +5,9 @@ mod optics;
 mod spectrum;
 mod waves;
 
-pub use optics::{SEA_INDEX, fresnel};
+pub use optics::{Facets, SEA_INDEX, fresnel, rms_slope};
 pub use spectrum::{Spectrum, WaveSpec};
-pub use waves::{WaterPlane, Wave, WaveField};
+pub use waves::{CHANGE_S, WaterPlane, Wave, WaveField};
 
 /// Beaufort wind force, 0 to 12 (WMO-No. 306, code table 1100). What the thesis calls "sea state" 0-4 is this scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -81,11 +81,23 @@ impl Spectrum {
         x.powi(-5) * (-1.25 * x.powi(-4)).exp() * self.gamma.powf(peak)
     }
 
-    /// Frequencies below which each of the shares `quantiles` (0 to 1) of the band's energy lies, rad/s.
-    pub(super) fn quantiles_rad_s(&self, quantiles: &[f64]) -> Vec<f64> {
-        let x = |i: usize| BAND.0 * (BAND.1 / BAND.0).powf(i as f64 / 2000.0);
+    /// The band's energy in `count` equal shares by rising frequency: the root mean square frequency of each, rad/s. Waves of these
+    /// frequencies have the band's mean zero-crossing period, whatever their number.
+    pub(super) fn shares_rad_s(&self, count: usize) -> Vec<f64> {
+        let x = |i: i32| BAND.0 * (BAND.1 / BAND.0).powf(f64::from(i) / 2000.0);
         let points: Vec<(f64, f64)> = (0..=2000).map(|i| (x(i), self.shape(x(i)))).collect();
-        invert_cumulative(&points, quantiles).into_iter().map(|x| x * self.peak_rad_s).collect()
+        let bounds: Vec<f64> = (0..=count).map(|i| i as f64 / count as f64).collect();
+        let ends = invert_cumulative(&points, &bounds);
+        let square = |(x, density): (f64, f64)| density * x * x;
+        let energy: f64 = points.windows(2).map(|p| (p[0].1 + p[1].1) / 2.0 * (p[1].0 - p[0].0)).sum();
+        let share = |pair: &[f64]| {
+            let steps = 64;
+            let width = (pair[1] - pair[0]) / f64::from(steps);
+            let middle = |j: i32| pair[0] + width * (f64::from(j) + 0.5);
+            let second: f64 = (0..steps).map(|j| square((middle(j), self.shape(middle(j)))) * width).sum();
+            (second * count as f64 / energy).sqrt() * self.peak_rad_s
+        };
+        ends.windows(2).map(share).collect()
     }
 }
 
@@ -182,17 +194,29 @@ mod tests {
     }
 
     #[test]
-    fn quantiles_split_the_energy() {
+    fn shares_have_the_periods_of_the_band() {
         let spectrum = Spectrum::jonswap(1.0, 6.0, 1.0).expect("in range");
         let peak = spectrum.peak_rad_s;
         // Closed form of the cumulative: exp(-1.25 x^-4), cut at the ends of the band.
         let below = |w: f64| (-1.25 * (w / peak).powi(-4)).exp();
         let (low, high) = (below(BAND.0 * peak), below(BAND.1 * peak));
-        for (q, w) in
-            [0.01, 0.2, 0.5, 0.9, 0.99].iter().zip(spectrum.quantiles_rad_s(&[0.01, 0.2, 0.5, 0.9, 0.99]))
-        {
-            let share = (below(w) - low) / (high - low);
-            assert!((share - q).abs() < 1e-4, "{q}: {share}");
+        for count in [1, 8, 32] {
+            let shares = spectrum.shares_rad_s(count);
+            for (i, w) in shares.iter().enumerate() {
+                let at = (below(*w) - low) / (high - low) * count as f64;
+                assert!((i as f64..=i as f64 + 1.0).contains(&at), "{w} rad/s lies in share {at}, not {i}");
+            }
+            // Mean square frequency by the substitution u = 1.25 x^-4: sqrt(1.25) times an integral of u^-1/2 exp(-u).
+            let u = |x: f64| 1.25 / x.powi(4);
+            let n = 200_000;
+            let (from, to) = (u(BAND.1).sqrt(), u(BAND.0).sqrt());
+            let integral: f64 = (0..n)
+                .map(|i| from + (to - from) * (f64::from(i) + 0.5) / f64::from(n))
+                .map(|v| 2.0 * (-v * v).exp() * (to - from) / f64::from(n))
+                .sum();
+            let expected = 1.25f64.sqrt() * integral / (high - low) * peak * peak;
+            let found = shares.iter().map(|w| w * w).sum::<f64>() / count as f64;
+            assert!((found / expected - 1.0).abs() < 1e-3, "{count} shares: {found} against {expected}");
         }
     }
 

@@ -9,17 +9,29 @@ use rand_pcg::Pcg64;
 use super::{WaveSpec, spectrum::spread_quantile};
 use crate::gunnery::GRAVITY_M_S2;
 
-/// Waves that a sea is made of. Each carries the same energy.
+/// Waves that a sea is made of. Each carries the same energy, at the root mean square frequency of its share of the spectrum.
 const COMPONENTS: usize = 32;
 /// Stream of the random numbers, so that other users of the same seed draw others.
 const STREAM: u128 = 0x5ea;
 /// Conjugate golden ratio: its multiples modulo 1 fill the unit interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
+/// Time in which a sea goes over into another, seconds.
+pub const CHANGE_S: f64 = 15.0;
+
 /// A sea surface, the same for the same specification and seed. The surface is linear (no sharpened crests).
 #[derive(Clone, Debug, PartialEq)]
 pub struct WaveField {
     waves: Vec<Wave>,
+    before: Option<Before>,
+}
+
+/// The sea that went before.
+#[derive(Clone, Debug, PartialEq)]
+struct Before {
+    waves: Vec<Wave>,
+    /// When it begins to fade.
+    until_s: f64,
 }
 
 /// One long-crested wave.
@@ -65,7 +77,7 @@ pub struct WaterPlane {
 
 impl WaveField {
     /// No waves.
-    pub const FLAT: Self = Self { waves: Vec::new() };
+    pub const FLAT: Self = Self { waves: Vec::new(), before: None };
 
     /// The sea of `spec`. Its mean square height is exactly that of the specification.
     pub fn new(spec: &WaveSpec, seed: u64) -> Self {
@@ -80,11 +92,10 @@ impl WaveField {
         }
         let mut rng = Pcg64::new(u128::from(seed), STREAM);
         let n = components as f64;
-        let shares: Vec<f64> = (0..components).map(|i| (i as f64 + rng.random::<f64>()) / n).collect();
         let variance = spectrum.significant_height_m().powi(2) / 16.0;
         let amplitude_m = (2.0 * variance / n).sqrt();
         let spread_start: f64 = rng.random();
-        let waves = spectrum.quantiles_rad_s(&shares).into_iter().enumerate().map(|(i, omega)| {
+        let waves = spectrum.shares_rad_s(components).into_iter().enumerate().map(|(i, omega)| {
             let side = fraction(spread_start + GOLDEN * i as f64);
             let from = spec.wind_from + spread_quantile(omega / spectrum.peak_rad_s(), side);
             let towards = -DVec2::new(from.sin(), from.cos());
@@ -97,38 +108,60 @@ impl WaveField {
                 phase: rng.random(),
             }
         });
-        Self { waves: waves.collect() }
+        Self::of(waves.collect())
     }
 
     /// A sea of just these waves.
     pub fn of(waves: Vec<Wave>) -> Self {
-        Self { waves }
+        Self { waves, before: None }
     }
 
-    /// The waves that it is made of.
+    /// This sea up to `from_s`, which then goes over into the waves of `next` within [`CHANGE_S`]. Meanwhile both are there, their
+    /// energies in shares that make one: a sea that grows or turns while its waves run on. What was left of a sea before this one is
+    /// gone, so let one change end before the next.
+    #[must_use]
+    pub fn changing_to(self, next: Self, from_s: f64) -> Self {
+        Self { waves: next.waves, before: Some(Before { waves: self.waves, until_s: from_s }) }
+    }
+
+    /// The waves that it is made of; of a sea that changes, those to which it changes.
     pub fn waves(&self) -> &[Wave] {
         &self.waves
     }
 
-    /// Whether there are no waves at all.
+    /// The waves that are there at a time, each with the factor of its amplitude.
+    pub fn waves_at(&self, time_s: f64) -> impl Iterator<Item = (f64, &Wave)> {
+        let share = self.before.as_ref().map_or(1.0, |b| ((time_s - b.until_s) / CHANGE_S).clamp(0.0, 1.0));
+        // Squares that sum to one, and no kink at either end.
+        let turn = share * share * (3.0 - 2.0 * share) * std::f64::consts::FRAC_PI_2;
+        let fading = self.before.iter().filter(move |_| share < 1.0).flat_map(|b| &b.waves);
+        let rising = self.waves.iter().filter(move |_| share > 0.0);
+        let (new, old) = if self.before.is_none() || share >= 1.0 { (1.0, 0.0) } else { turn.sin_cos() };
+        fading.map(move |w| (old, w)).chain(rising.map(move |w| (new, w)))
+    }
+
+    /// Whether there are no waves at all, now or before.
     pub fn is_flat(&self) -> bool {
-        self.waves.is_empty()
+        self.waves.is_empty() && self.before.as_ref().is_none_or(|b| b.waves.is_empty())
     }
 
     /// No water is ever higher than this above mean sea level, metres (nor lower than its negative).
     pub fn crest_max_m(&self) -> f64 {
-        self.waves.iter().map(|w| w.amplitude_m).sum()
+        let before = self.before.iter().flat_map(|b| &b.waves);
+        self.waves.iter().chain(before).map(|w| w.amplitude_m).sum()
     }
 
     /// Height of the water above mean sea level at a place (world x, y) and time, metres.
     pub fn height(&self, position: DVec2, time_s: f64) -> f64 {
-        self.waves.iter().map(|w| w.amplitude_m * w.phase(position, time_s).cos()).sum()
+        self.waves_at(time_s).map(|(f, w)| f * w.amplitude_m * w.phase(position, time_s).cos()).sum()
     }
 
     /// Rise of the water per metre east (x) and north (y).
     pub fn slope(&self, position: DVec2, time_s: f64) -> DVec2 {
-        let slope = |w: &Wave| w.cycles_per_m * (-TAU * w.amplitude_m * w.phase(position, time_s).sin());
-        self.waves.iter().map(slope).sum()
+        let slope = |(f, w): (f64, &Wave)| {
+            w.cycles_per_m * (-TAU * f * w.amplitude_m * w.phase(position, time_s).sin())
+        };
+        self.waves_at(time_s).map(slope).sum()
     }
 
     /// The plane that fits the water best (least squares) over the rectangle `length_m` by `beam_m` about `centre`, whose long
@@ -146,15 +179,16 @@ impl WaveField {
         let forward = DVec2::new(heading.sin(), heading.cos());
         let port = forward.perp();
         let mut plane = WaterPlane::default();
-        for wave in &self.waves {
+        for (factor, wave) in self.waves_at(time_s) {
+            let amplitude_m = factor * wave.amplitude_m;
             let (sin, cos) = wave.phase(centre, time_s).sin_cos();
             let k = wave.cycles_per_m * TAU;
             let (k_forward, k_port) = (k.dot(forward), k.dot(port));
             let (along, across) = (k_forward * length_m / 2.0, k_port * beam_m / 2.0);
             let (mean_along, mean_across) = (mean_filter(along), mean_filter(across));
-            plane.height_m += wave.amplitude_m * cos * mean_along * mean_across;
-            plane.forward_slope -= wave.amplitude_m * sin * k_forward * slope_filter(along) * mean_across;
-            plane.port_slope -= wave.amplitude_m * sin * k_port * slope_filter(across) * mean_along;
+            plane.height_m += amplitude_m * cos * mean_along * mean_across;
+            plane.forward_slope -= amplitude_m * sin * k_forward * slope_filter(along) * mean_across;
+            plane.port_slope -= amplitude_m * sin * k_port * slope_filter(across) * mean_along;
         }
         plane
     }

@@ -88,6 +88,30 @@ fn phases_stay_exact_kilometres_away_and_days_later() {
     }
 }
 
+#[test]
+fn a_sea_goes_over_into_another_without_a_jump_and_keeps_its_energy() {
+    let (old, new) = (sea(3, 1), sea(5, 2));
+    let changing = old.clone().changing_to(new.clone(), 100.0);
+    let at = DVec2::new(40.0, -7.0);
+    assert_eq!(changing.height(at, 99.0), old.height(at, 99.0));
+    assert_eq!(changing.height(at, 101.0 + CHANGE_S), new.height(at, 101.0 + CHANGE_S));
+    let variance = |waves: &WaveField| waves.waves.iter().map(|w| w.amplitude_m.powi(2) / 2.0).sum::<f64>();
+    let (low, high) = (variance(&old), variance(&new));
+    let mut last = low;
+    for i in 0..=1500 {
+        let t = 100.0 + CHANGE_S * f64::from(i) / 1500.0;
+        let now: f64 = changing.waves_at(t).map(|(f, w)| (f * w.amplitude_m).powi(2) / 2.0).sum();
+        assert!((low - 1e-9..=high + 1e-9).contains(&now) && now >= last - 1e-9, "{now} after {t} s");
+        assert!(now - last < 0.003 * (high - low), "{now} after {last}");
+        last = now;
+        let slow = (changing.height(at, t + 1e-3) - changing.height(at, t)).abs();
+        assert!(slow < 0.02, "{slow} m in a millisecond");
+    }
+    assert!(
+        !WaveField::FLAT.changing_to(new, 0.0).is_flat() && !old.changing_to(WaveField::FLAT, 0.0).is_flat()
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 

@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use crate::{
-    boats::{Course, Damage, Floating, Hull, facing, float},
+    boats::{Course, Damage, Floating, Hull, HullForm, Ride, facing, float, ride},
     geometry::RigidPose,
     model::{Model, ModelId, ModelKind, Zone},
     sea::WaveField,
     time::Time,
     view::{Afloat, Eye},
+    wake::Wake,
 };
 use glam::DVec3;
 
@@ -27,6 +28,7 @@ pub struct Vessel {
 struct Member {
     vessel: Vessel,
     hull: Hull,
+    ride: Ride,
     damage: Damage,
 }
 
@@ -37,17 +39,40 @@ pub struct Fleet {
     models: Arc<[Model]>,
     waves: WaveField,
     start: Time,
+    followed: Time,
 }
 
 impl Fleet {
     /// Boats that begin their courses at `start`. Each vessel's model must be in `models`.
     pub fn new(vessels: Vec<Vessel>, models: Arc<[Model]>, waves: WaveField, start: Time) -> Self {
         let member = |vessel: Vessel| {
-            let hull =
-                models.get(usize::from(vessel.model.0)).map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
-            Member { vessel, hull, damage: Damage::NONE }
+            let model = models.get(usize::from(vessel.model.0));
+            let hull = model.map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
+            let form = model.map_or_else(|| HullForm::new((-0.5, 0.5), 0.3, 1.2, |_| 0.5), HullForm::of);
+            Member { vessel, hull, ride: Ride::new(form), damage: Damage::NONE }
         };
-        Self { members: vessels.into_iter().map(member).collect(), models, waves, start }
+        let members = vessels.into_iter().map(member).collect();
+        Self { members, models, waves, start, followed: start }
+    }
+
+    /// Follows all boats up to `time`. On a flat sea there is nothing to follow.
+    pub fn follow(&mut self, time: Time) {
+        self.followed = self.followed.max(time);
+        if self.waves.is_flat() {
+            return;
+        }
+        let until_s = self.followed.secs_since(self.start);
+        for Member { vessel, ride, damage, .. } in &mut self.members {
+            ride.follow(until_s, |t| vessel.course.state(t, damage), &self.waves);
+        }
+    }
+
+    /// The sea is another after `from`.
+    pub fn set_waves(&mut self, waves: WaveField, from: Time) {
+        self.waves = waves;
+        let from_s = from.secs_since(self.start);
+        self.members.iter_mut().for_each(|m| m.ride.forget_after(from_s));
+        self.follow(self.followed);
     }
 
     /// How many boats there are.
@@ -70,11 +95,31 @@ impl Fleet {
         self.models.get(usize::from(self.members.get(boat)?.vessel.model.0))
     }
 
-    /// Where a boat is at `time`.
+    /// Where a boat is at `time`. At times that it was not followed to, or that lie too far back, it lies in the mean plane of the
+    /// water.
     pub fn floating(&self, boat: usize, time: Time) -> Option<Floating> {
-        let member = self.members.get(boat)?;
+        let Member { vessel, hull, ride: motions, damage } = self.members.get(boat)?;
         let seconds = time.secs_since(self.start);
-        Some(float(&member.vessel.course.state(seconds, &member.damage), &member.hull, &self.waves, seconds))
+        let state = vessel.course.state(seconds, damage);
+        Some(match motions.at(seconds) {
+            Some(motion) => ride(&state, hull, motions.form(), &motion, &self.waves, seconds),
+            None => float(&state, hull, &self.waves, seconds),
+        })
+    }
+
+    /// What a boat has left on the water at `time`.
+    fn wake(&self, boat: usize, time: Time) -> Option<Wake> {
+        let member = self.members.get(boat)?;
+        let (seconds, model) = (time.secs_since(self.start), self.model(boat)?);
+        let Hull { length_m, beam_m } = member.hull;
+        Wake::of(
+            member.hull,
+            f64::from(-model.min.z),
+            seconds,
+            |t| member.vessel.course.state(t, &member.damage),
+            // Waves shorter than the hull go through its wake without lifting it.
+            |place| self.waves.plane_under(place, 0.0, length_m, beam_m, seconds).height_m,
+        )
     }
 
     /// A boat's pose as rounds from `muzzle` meet it: pictures turn towards who looks at them.
@@ -94,7 +139,9 @@ impl Fleet {
                 Zone::Hull => return,
             };
             *slot = Some(slot.map_or(seconds, |first| first.min(seconds)));
+            member.ride.forget_after(seconds);
         }
+        self.follow(self.followed);
     }
 
     /// The boats that `eye` sees at `time`, farthest first.
@@ -111,7 +158,7 @@ impl Fleet {
                 pose: floating.pose,
                 water_level: floating.water_level,
             };
-            into.extend(eye.see(&afloat));
+            into.extend(eye.see_with_wake(&afloat, self.wake(boat, time)));
         }
         into.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
     }

@@ -3,32 +3,37 @@
 mod fleet;
 mod rounds;
 mod sensors;
+mod watch;
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
 use crate::{
+    boats::{CourseState, Hull},
     calibration::Calibration,
     event::{Event, Picture, PictureError, PixelFormat},
     fault::{Fault, FaultBoard, Severity},
     geometry::{CameraPose, Lens, RigidPose, look},
     light::LightMeter,
     model::{Model, ModelId},
-    plan::{Needs, ScenePlan},
+    plan::{Needs, ScenePlan, sea_reflects},
     pose::{NoPose, OrientationAt, STALE_NS, camera_pose},
     scenario::Scenario,
-    scene::{Hud, ReflectionMethod, RoundView, Scene, Status},
+    scene::{Hud, Pass, RoundView, Scene, Status, Water},
     score::{NotScored, Outcome, ShotRecord},
-    sea::WaveField,
+    sea::{BeaufortForce, WaveField},
     time::Time,
     view::{Afloat, Eye},
+    wake::Wake,
     weapon::Weapon,
 };
 
 pub use fleet::{Fleet, Vessel};
 pub use rounds::{Ammunition, Launch, Rounds};
 pub use sensors::{SensorCounts, Sensors};
+pub use watch::SeaReport;
+use watch::SeaWatch;
 
 /// How long the last round's result stays on the display, seconds.
 const RESULT_S: f64 = 1.5;
@@ -109,6 +114,7 @@ pub struct Session {
     faults: FaultBoard,
     weapon: Weapon,
     meter: LightMeter,
+    watch: Option<SeaWatch>,
     waves: WaveField,
     running: Option<Running>,
     black: Picture,
@@ -142,15 +148,16 @@ impl Session {
             size: setup.screen,
             video: setup.video,
             picture: (width, height),
-            water: scenario.water,
+            water: water_to_plan(scenario),
             boats: scenario.boats.len(),
+            moving: scenario.boats.iter().filter(|b| b.course.speed_max_m_s() > 0.0).count(),
             belt: scenario.weapon.belt,
         });
         let waves = scenario.wave_field();
+        let watch = SeaWatch::of(scenario);
         let sensors = Sensors::new(&setup.calibration);
         let weapon = Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt);
-        let meter = LightMeter::new(scenario.sun_direction)
-            .with_tones(scenario.water.method == ReflectionMethod::Waves);
+        let meter = LightMeter::new(scenario.sun_direction, scenario.water.method);
         let scene = Scene {
             frame: 0,
             camera: CameraPose {
@@ -164,7 +171,7 @@ impl Session {
             light: meter.light(),
             water: scenario.water,
             wind: scenario.wind.truncate(),
-            sky: meter.sky(),
+            sky: meter.sky(scenario.wind.length()),
             tones: meter.tones(),
             hud: Hud {
                 status: Status::Ready,
@@ -173,6 +180,7 @@ impl Session {
                 shots: 0,
                 hits: 0,
                 clock_s: 0.0,
+                sea: None,
             },
         };
         Ok(Self {
@@ -182,6 +190,7 @@ impl Session {
             faults: FaultBoard::new(),
             weapon,
             meter,
+            watch,
             waves,
             running: None,
             black,
@@ -216,6 +225,11 @@ impl Session {
     /// The head-up display as it was drawn last.
     pub const fn hud(&self) -> &Hud {
         &self.scene.hud
+    }
+
+    /// What is known of the sea, where the scenario has it measured in the video.
+    pub fn sea(&self) -> Option<SeaReport> {
+        self.watch.as_ref().map(SeaWatch::report)
     }
 
     /// Rounds fired and rounds that struck.
@@ -368,10 +382,16 @@ impl Session {
     fn draw(&mut self, video_time: Time, frame_time: Time, picture_is_new: bool) -> bool {
         let camera = self.camera(self.sensors.orientation(video_time));
         if let (Some(camera), true, Some(frame)) = (&camera, picture_is_new, self.sensors.newest_frame()) {
-            self.meter.observe(video_time, &frame.picture, &self.setup.calibration.lens, camera);
+            let lens = &self.setup.calibration.lens;
+            self.meter.observe(video_time, &frame.picture, lens, camera);
+            if let Some(watch) = &mut self.watch {
+                watch.observe(video_time, &frame.picture, lens, camera);
+            }
         }
+        self.follow_sea();
         let status = self.status(video_time, frame_time);
         let warning = self.warning();
+        let sea = self.sea().map(|sea| (sea.in_use.state, sea.in_use.source));
         let scene = &mut self.scene;
         scene.boats.clear();
         scene.rounds.clear();
@@ -382,10 +402,14 @@ impl Session {
                 lens: &self.lens,
                 visibility_m: self.setup.scenario.visibility_m,
                 // A computer that is too hot draws no reflections: half of the work.
-                reflections: self.plan.has(crate::scene::Pass::Water)
-                    && !self.faults.is_active(Fault::Thermal),
+                reflections: self.plan.has(Pass::Water)
+                    && !self.faults.is_active(Fault::Thermal)
+                    && sea_reflects(scene.water.force),
             };
             running.fleet.seen(&eye, video_time, &mut scene.boats);
+            if self.faults.is_active(Fault::Thermal) {
+                scene.boats.iter_mut().for_each(|boat| boat.wake = None);
+            }
             running.rounds.views(video_time, running.start, &running.fleet, &mut scene.rounds);
             scene.rounds.retain(|r| eye.sees_round(r));
             let range = |r: &RoundView| r.place().distance(camera.position);
@@ -395,7 +419,7 @@ impl Session {
         }
         scene.passes = self.plan.frame(camera.is_some(), &scene.boats, &scene.rounds);
         scene.light = self.meter.light();
-        scene.sky = self.meter.sky();
+        scene.sky = self.meter.sky(scene.wind.length());
         scene.tones = self.meter.tones();
         scene.hud = Hud {
             status,
@@ -404,8 +428,25 @@ impl Session {
             shots: u32::try_from(self.shots).unwrap_or(u32::MAX),
             hits: u32::try_from(self.hits).unwrap_or(u32::MAX),
             clock_s: self.running.as_ref().map_or(0.0, |r| video_time.secs_since(r.start)),
+            sea,
         };
         camera.is_some()
+    }
+
+    /// Lets waves, wind and with them boats and reflections go over to the sea in the video.
+    fn follow_sea(&mut self) {
+        let (Some(watch), Some(running)) = (&mut self.watch, &mut self.running) else { return };
+        // What is drawn and scored up to now stays as it was.
+        let now_s = running.now.secs_since(running.start);
+        if let Some(spec) = watch.change(now_s) {
+            let next = WaveField::new(&spec, self.setup.scenario.seed);
+            self.waves = std::mem::replace(&mut self.waves, WaveField::FLAT).changing_to(next, now_s);
+            running.fleet.set_waves(self.waves.clone(), running.now);
+            running.rounds.set_sea(self.waves.clone());
+        }
+        let (wind, force) = watch.wind();
+        self.scene.wind = wind;
+        self.scene.water.force = force;
     }
 
     /// The worst fault because of which no round is fired.
@@ -462,7 +503,7 @@ impl Session {
             camera: &camera,
             lens: &self.lens,
             visibility_m: self.setup.scenario.visibility_m,
-            reflections: self.plan.has(crate::scene::Pass::Water),
+            reflections: self.plan.has(Pass::Water),
         };
         let models = &self.setup.models;
         let boats: Vec<_> = self
@@ -477,7 +518,15 @@ impl Session {
                     world_from_body: glam::DQuat::IDENTITY,
                     position: DVec3::new(0.0, ahead_m, 0.0),
                 };
-                eye.see(&Afloat { boat, model_id: *id, model, pose, water_level: 0.0 })
+                let under_way = CourseState {
+                    position: pose.position.truncate(),
+                    heading: std::f64::consts::FRAC_PI_2,
+                    speed_m_s: 5.0,
+                    turn_rate: 0.0,
+                };
+                let wake = || Wake::of(Hull::of(model), f64::from(-model.min.z), 0.0, |_| under_way, |_| 0.0);
+                let wake = self.plan.has(crate::scene::Pass::Wake).then(wake).flatten();
+                eye.see_with_wake(&Afloat { boat, model_id: *id, model, pose, water_level: 0.0 }, wake)
             })
             .collect();
         let at = DVec3::new(0.0, eye_height_m * 10.0, 0.5);
@@ -493,6 +542,15 @@ impl Session {
     pub fn frame_shown(&mut self) {
         self.scene.frame += 1;
     }
+}
+
+/// How the sea mirrors as far as it is known beforehand: one that is measured may turn out calm enough to mirror.
+fn water_to_plan(scenario: &Scenario) -> Water {
+    let mut water = scenario.water;
+    if scenario.sea_from_video && !sea_reflects(water.force) {
+        water.force = BeaufortForce::of_wind(0.0);
+    }
+    water
 }
 
 /// How old the newest orientation is, where it is too old to be used.

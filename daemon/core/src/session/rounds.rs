@@ -93,6 +93,11 @@ impl Rounds {
         Self { ammunition, sea, in_flight: Vec::new(), marks: Vec::new(), advanced_to: start }
     }
 
+    /// The sea is another from now on.
+    pub fn set_sea(&mut self, sea: WaveField) {
+        self.sea = sea;
+    }
+
     /// Fires a round. One whose flight cannot be computed (a number is not finite) is recorded as a miss at once.
     pub fn launch(&mut self, launch: Launch, start: Time, records: &mut Vec<ShotRecord>) {
         let a = &self.ammunition;
@@ -112,11 +117,12 @@ impl Rounds {
         }
     }
 
-    /// Follows all rounds until `until`. Boats that are struck are told; ended rounds are recorded in the order in which they
+    /// Follows all boats and rounds until `until`. Boats that are struck are told; ended rounds are recorded in the order in which they
     /// were fired.
     pub fn advance(&mut self, until: Time, start: Time, fleet: &mut Fleet, records: &mut Vec<ShotRecord>) {
         while self.advanced_to < until {
             let to = self.advanced_to.plus_secs(SPAN_S).min(until);
+            fleet.follow(to);
             if !self.in_flight.is_empty() {
                 self.advance_span(self.advanced_to, to, start, fleet, records);
             }

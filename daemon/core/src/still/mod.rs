@@ -15,10 +15,11 @@ use crate::{
     model::{Model, ModelId},
     plan::{Needs, ScenePlan},
     scenario::{CAMERA_CLEAR_M, ScenarioError, place, table::Mark},
-    scene::{Hud, LeftOut, Pass, PassDecision, ReflectionMethod, Scene, Status, Water},
+    scene::{Hud, LeftOut, Pass, PassDecision, Scene, Status, Water},
     sea::{WaveField, WaveSpec},
     time::Time,
     view::{Afloat, Eye},
+    wake::Wake,
 };
 pub use camera::{Attitude, Focal, StillCamera, film_focal_px};
 
@@ -134,6 +135,7 @@ impl Still {
             picture: size,
             water: self.water,
             boats: self.boats.len(),
+            moving: self.boats.iter().filter(|b| b.speed_m_s > 0.0).count(),
             belt: 0,
         });
         let eye = Eye {
@@ -147,18 +149,26 @@ impl Still {
         let mut boats = Vec::with_capacity(self.boats.len());
         for (number, id) in boat_models.iter().enumerate().take(self.boats.len()) {
             let Some(model) = models.get(usize::from(id.0)) else { continue };
-            boats.extend(eye.see(&self.afloat(number, (*id, model), &eye, &waves, time_s)?));
+            let afloat = self.afloat(number, (*id, model), &eye, &waves, time_s)?;
+            let wake = self.wake(number, &afloat, &waves, time_s);
+            boats.extend(eye.see_with_wake(&afloat, wake));
         }
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
         let mut passes = plan.frame(true, &boats, &[]);
         passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
-        let mut meter =
-            LightMeter::new(self.sun_direction).with_tones(self.water.method == ReflectionMethod::Waves);
+        let mut meter = LightMeter::new(self.sun_direction, self.water.method);
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.sun_strength as f32;
-        let hud =
-            Hud { status: Status::Ready, warning: None, rounds_left: 0, shots: 0, hits: 0, clock_s: 0.0 };
+        let hud = Hud {
+            status: Status::Ready,
+            warning: None,
+            rounds_left: 0,
+            shots: 0,
+            hits: 0,
+            clock_s: 0.0,
+            sea: None,
+        };
         let scene = Scene {
             frame: u64::from(index),
             camera,
@@ -169,7 +179,7 @@ impl Still {
             light,
             water: self.water,
             wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),
-            sky: meter.sky(),
+            sky: meter.sky(self.water.force.wind_mean_m_s()),
             tones: meter.tones(),
             hud,
         };
@@ -220,6 +230,24 @@ impl Still {
             pose: floating.pose,
             water_level: floating.water_level,
         })
+    }
+
+    /// What a boat has left on the water: it came straight on.
+    fn wake(&self, number: usize, afloat: &Afloat<'_>, waves: &WaveField, time_s: f64) -> Option<Wake> {
+        let boat = self.boats.get(number)?;
+        let hull = Hull::of(afloat.model);
+        let ahead = DVec2::new(boat.heading.sin(), boat.heading.cos());
+        let state = |t: f64| CourseState {
+            position: afloat.pose.position.truncate() + ahead * (boat.speed_m_s * (t - time_s)),
+            heading: boat.heading,
+            speed_m_s: boat.speed_m_s,
+            turn_rate: 0.0,
+        };
+        let Hull { length_m, beam_m } = hull;
+        // A boat that the picture lays on its water has all of its wake there.
+        let waves = Some(waves).filter(|_| matches!(boat.place, Place::World(_)));
+        let height = |p| waves.map_or(0.0, |w| w.plane_under(p, 0.0, length_m, beam_m, time_s).height_m);
+        Wake::of(hull, f64::from(-afloat.model.min.z), time_s, state, height)
     }
 
     /// Lens and place of the camera in a picture of that size; `focal_px` as for [`Still::compose`].

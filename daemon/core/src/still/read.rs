@@ -5,8 +5,7 @@ use glam::DVec2;
 use super::{Attitude, BOATS_MAX, Focal, Place, RANGE_MAX_M, Still, StillBoat, StillCamera};
 use crate::scenario::{
     ScenarioError, place,
-    read::{document, reflection, sea},
-    sun,
+    read::{document, light, reflection, sea},
     table::{Source, Table},
 };
 
@@ -20,26 +19,18 @@ pub(super) fn still(text: &str, origin: &str) -> Result<Still, ScenarioError> {
     let document = document(text, origin)?;
     let root = Table::root(Source { text, origin }, &document);
     root.only(&["picture", "seed", "interval_s", "camera", "boat", "sea", "light", "reflection"])?;
-    let (force, waves) = sea(&root.table("sea")?)?;
-    let light = root.table("light")?;
-    light.only(&[
-        "sun_azimuth_deg",
-        "sun_elevation_deg",
-        "latitude_deg",
-        "longitude_deg",
-        "utc",
-        "sun_strength",
-        "visibility_km",
-    ])?;
+    let (force, waves) = sea(&root.table("sea")?, &[])?;
+    let sky = root.table("light")?;
+    let (sun_direction, visibility_m) = light(&sky, &["sun_strength"])?;
     Ok(Still {
         picture: root.required_text("picture", "the path of a JPEG or PNG file, or of a folder of them")?,
         seed: root.integer("seed", 0..=i64::MAX)?.map_or(1, i64::unsigned_abs),
         interval_s: root.number("interval_s", 0.001..=3600.0, "s")?,
         camera: camera(&root.table("camera")?)?,
         waves,
-        sun_direction: sun::direction(&light)?,
-        sun_strength: light.number("sun_strength", 0.0..=1.0, "")?.unwrap_or(1.0),
-        visibility_m: 1000.0 * light.number("visibility_km", 0.05..=200.0, "km")?.unwrap_or(20.0),
+        sun_direction,
+        sun_strength: sky.number("sun_strength", 0.0..=1.0, "")?.unwrap_or(1.0),
+        visibility_m,
         water: reflection(&root.table("reflection")?, force)?,
         boats: boats(&root.tables("boat", BOATS_MAX)?)?,
         origin: origin.to_owned(),

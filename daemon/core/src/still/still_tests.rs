@@ -69,6 +69,7 @@ fn mistakes_are_named_by_line_and_column() {
             PLAIN.replace("hfov_deg = 60", "hfov_deg = 60\nfocal_px = 9"),
             "camera.hfov_deg: says the same as focal_px",
         ),
+        (format!("{PLAIN}[sea]\nsource = \"video\"\n"), "7:1: sea.source: unknown key; known are beaufort"),
         (PLAIN.replace("pitch_deg", "pitsch_deg"), "5:1: camera.pitsch_deg: unknown key"),
         (PLAIN.replace("pitch_deg = -2", ""), "camera.horizon: is missing"),
         (PLAIN.replace("pitch_deg = -2", "horizon = [[1, 2]]"), "5:11: camera.horizon: has 1 points"),

@@ -1,5 +1,6 @@
 //! The paints that the built-in boats are made of.
 
+use bowwave_core::light::srgb_to_linear;
 use glam::Vec3;
 
 /// A surface: one glTF material.
@@ -132,14 +133,4 @@ impl Paint {
             _ => 0.9,
         }
     }
-}
-
-/// sRGB-coded to linear, both 0 to 1 (IEC 61966-2-1).
-pub(crate) fn srgb_to_linear(c: f32) -> f32 {
-    if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-}
-
-/// Linear to sRGB-coded, both 0 to 1 (IEC 61966-2-1).
-pub(crate) fn linear_to_srgb(c: f32) -> f32 {
-    if c <= 0.003_130_8 { c * 12.92 } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
 }

@@ -2,6 +2,7 @@
 
 use std::{collections::HashMap, io::Cursor};
 
+use bowwave_core::light::srgb_to_linear;
 use glam::{Mat3, Vec2, Vec3};
 use gltf::material::AlphaMode;
 use image::RgbaImage;
@@ -10,7 +11,7 @@ use super::{
     TEXTURE_SIDE_MAX,
     source::{Source, limit},
 };
-use crate::{build::paint::srgb_to_linear, error::ModelError};
+use crate::error::ModelError;
 
 /// Most pixels of all pictures together.
 const PIXELS_MAX: u64 = 4 * (TEXTURE_SIDE_MAX as u64) * (TEXTURE_SIDE_MAX as u64);

@@ -9,6 +9,7 @@ use std::{
     time::Duration,
 };
 
+use bowwave_core::text::one_line;
 use rusqlite::{Connection, ErrorCode, OpenFlags, config::DbConfig};
 
 use super::{
@@ -179,7 +180,7 @@ fn check(path: &Path) -> Result<Result<(), String>, JournalError> {
     })();
     match found {
         Ok(verdict) if verdict == "ok" => Ok(Ok(())),
-        Ok(verdict) => Ok(Err(verdict.replace('\n', " "))),
+        Ok(verdict) => Ok(Err(one_line(&verdict))),
         // The first bytes are SQLite's: whatever follows them was one of its databases once.
         Err(error)
             if matches!(

@@ -1,18 +1,22 @@
-//! The head-up display: one instanced draw of quads with one small texture.
+//! The head-up display: one instanced draw of quads with one small texture. It changes about once a second: until then a layer holds it,
+//! and where nothing else is drawn over the video beneath it, the video pass takes it from there while it writes the pixels. That saves
+//! the frame two copies and a rendering. Otherwise it is drawn over the frame as everything else.
+
+use std::sync::Arc;
 
 use ash::vk;
 use bowwave_core::scene::{Hud, PixelRect};
-use shaders_spirv::{HUD_FRAG, HUD_VERT};
+use shaders_spirv::{HUD_FRAG, HUD_VERT, interface::HudQuad};
 
 use crate::{
     error::RenderError,
-    frame_data::FrameData,
+    frame_data::{FrameData, QUADS_MAX},
     glyphs::Glyphs,
     hud_layout::{HudLayout, KINDS, text_px},
     memory::{Image, ImageShape},
-    passes::Making,
+    passes::{DRAWN, FORGET_READ, Making, SAMPLED},
     pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
-    recorder::Recorder,
+    recorder::{Begin, Recorder, Step},
     upload::upload_image,
 };
 
@@ -23,6 +27,12 @@ pub(crate) struct HudPass {
     layout: HudLayout,
     /// Plates, shapes, glyphs.
     pipelines: [Pipeline; KINDS],
+    /// What was last drawn into the layer.
+    held: Vec<HudQuad>,
+    layer: Image,
+    /// The layer, for the video pass.
+    pub(crate) layer_layout: Arc<SetLayout>,
+    layer_set: vk::DescriptorSet,
     set: vk::DescriptorSet,
     _atlas: Image,
     _sampler: Sampler,
@@ -66,7 +76,20 @@ impl HudPass {
             )
         };
         let pipelines = [pipeline(0)?, pipeline(1)?, pipeline(2)?];
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
+        // The video pass takes its codes as whole words: a driver that runs on the processor converts slowly.
+        let shape =
+            ImageShape { second: Some(vk::Format::R32_UINT), ..ImageShape::new(making.size, SRGB, usage) };
+        let layer = Image::new(gpu, "head-up display", shape)?;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
+        let layer_layout = Arc::new(SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?);
+        let bound = Bound::Texture { view: layer.second_view, sampler: sampler.raw, layout: SAMPLED.2 };
+        let layer_set = making.pool.set(&layer_layout, &[bound])?;
         Ok(Self {
+            held: Vec::with_capacity(QUADS_MAX),
+            layer,
+            layer_layout,
+            layer_set,
             size: making.size,
             glyphs,
             layout: HudLayout::new(making.size),
@@ -82,6 +105,35 @@ impl HudPass {
     pub(crate) fn prepare(&mut self, data: &mut FrameData, hud: &Hud) -> [u32; KINDS] {
         data.write_quads(self.layout.lay_out(&self.glyphs, hud));
         self.layout.counts_by_kind()
+    }
+
+    /// Whether the layer holds something else than what was prepared last; from then on it counts as holding that.
+    pub(crate) fn renew(&mut self) -> bool {
+        let quads = self.layout.quads();
+        let stale = self.held != quads;
+        if stale {
+            self.held.clear();
+            self.held.extend_from_slice(quads);
+        }
+        stale
+    }
+
+    /// The layer, to be sampled.
+    pub(crate) fn overlay(&self) -> vk::DescriptorSet {
+        self.layer_set
+    }
+
+    /// Draws them into the layer.
+    pub(crate) fn record_layer(&self, to: Recorder<'_>, frame: vk::DescriptorSet, counts: [u32; KINDS]) {
+        let (width, height) = self.size;
+        let area = PixelRect { x: 0, y: 0, width, height };
+        let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
+        to.barrier([Step { image: &self.layer, from: was, to: DRAWN }]);
+        to.begin(area, (self.layer.view, Begin::Zero), None);
+        to.window([0.0, 0.0, width as f32, height as f32], area);
+        self.record(to, frame, counts);
+        to.end();
+        to.barrier([Step { image: &self.layer, from: DRAWN, to: SAMPLED }]);
     }
 
     /// The pixels that they cover.

@@ -7,6 +7,7 @@ pub(crate) mod pictures;
 pub(crate) mod reflect;
 pub(crate) mod rounds;
 pub(crate) mod video;
+pub(crate) mod wake;
 pub(crate) mod water;
 
 use std::sync::Arc;

@@ -34,8 +34,8 @@ pub(crate) struct ReflectPass {
     size: (u32, u32),
     bands: Image,
     sums: Image,
-    /// For dark, middling and bright pixels.
-    layers: [Image; 3],
+    /// For dark, middling and bright pixels; and the colour of what is taken away.
+    layers: [Image; 4],
     to_bands: Stage,
     to_sums: Stage,
     to_layers: Stage,
@@ -110,7 +110,7 @@ impl ReflectPass {
         let sums = image("sums of mirrored boats", (LOBE_COLUMNS + 1, rows), SUMS)?;
         let cells = (making.size.0.div_ceil(CELL.0), making.size.1.div_ceil(CELL.1));
         let layer = || image("layers of reflection", cells, LIGHT);
-        let layers = [layer()?, layer()?, layer()?];
+        let layers = [layer()?, layer()?, layer()?, layer()?];
         let linear = Sampler::new(gpu, vk::Filter::LINEAR, false)?;
         let nearest = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
         let bound = |image: &Image, sampler: &Sampler| Bound::Texture {
@@ -151,9 +151,8 @@ impl ReflectPass {
                 ..replace
             },
         )?;
-        let [dark, middle, bright] = &layers;
-        let sampled =
-            [bound(backdrop, &nearest), bound(dark, &linear), bound(middle, &linear), bound(bright, &linear)];
+        let [dark, middle, bright, coloured] = layers.each_ref().map(|layer| bound(layer, &linear));
+        let sampled = [bound(backdrop, &nearest), dark, middle, bright, coloured];
         let to_screen = Stage::new(
             making,
             &StageShape {
@@ -178,8 +177,9 @@ impl ReflectPass {
         let drawn = |image| Step { image, from: was, to: DRAWN };
         let sampled = |image| Step { image, from: DRAWN, to: SAMPLED };
         let rows = boats.iter().map(|b| (b.index + 1) * LOBE_BANDS as u32).max().unwrap_or(0);
-        let [dark, middle, bright] = &self.layers;
-        to.barrier([&self.bands, &self.sums, dark, middle, bright].map(drawn));
+        let layers = self.layers.each_ref();
+        to.barrier([&self.bands, &self.sums].map(drawn));
+        to.barrier(layers.map(drawn));
         let strip = |columns| PixelRect { x: 0, y: 0, width: columns, height: rows };
         to.begin(strip(LOBE_COLUMNS), (self.bands.view, Begin::Forget), None);
         to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
@@ -203,7 +203,7 @@ impl ReflectPass {
         to.draw(3, 1);
         to.end();
         to.barrier([sampled(&self.sums)]);
-        to.begin_all(area, [dark, middle, bright].map(|l| (l.view, Begin::Zero)), None);
+        to.begin_all(area, layers.map(|l| (l.view, Begin::Zero)), None);
         let (width, height) = (self.size.0 as f32, self.size.1 as f32);
         to.window([0.0, 0.0, width / CELL.0 as f32, height / CELL.1 as f32], area);
         to.bind(&self.to_layers.pipeline, &[frame, self.to_layers.set]);
@@ -214,7 +214,7 @@ impl ReflectPass {
             to.draw(4, boat.count);
         }
         to.end();
-        to.barrier([dark, middle, bright].map(sampled));
+        to.barrier(layers.map(sampled));
     }
 
     /// Draws, within a rendering to the screen; `block` says how bright the sea is.

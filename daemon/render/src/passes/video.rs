@@ -9,7 +9,7 @@ use bowwave_core::{
     event::{Picture, PixelFormat},
     scene::PixelRect,
 };
-use shaders_spirv::{SCREEN_VERT, VIDEO_FRAG, interface::VideoBlock};
+use shaders_spirv::{SCREEN_VERT, VIDEO_FRAG, VIDEO_OVERLAID_FRAG, interface::VideoBlock};
 
 use crate::{
     error::RenderError,
@@ -21,6 +21,7 @@ use crate::{
     },
     pipeline::{Blend, Pipeline, PipelineShape, SetLayout},
     recorder::{Begin, Recorder, Step},
+    rects::around_all,
 };
 
 /// The video pass.
@@ -36,12 +37,19 @@ pub(crate) struct VideoPass {
     pictures: Option<Pictures>,
     path: PicturePath,
     counts: PictureCounts,
-    /// By format and whether it is scaled; made when first needed.
-    pipelines: [Option<Pipeline>; 6],
+    /// What lies over the picture.
+    overlay: Arc<SetLayout>,
+    /// By format and whether it is scaled: without and with what lies over it; made when first needed.
+    pipelines: [Option<[Pipeline; 2]>; 6],
 }
 
 impl VideoPass {
-    pub(crate) fn new(making: &Making<'_>, expected: Option<PictureShape>) -> Result<Self, RenderError> {
+    /// `overlay` is the layout of what lies over the picture.
+    pub(crate) fn new(
+        making: &Making<'_>,
+        expected: Option<PictureShape>,
+        overlay: &Arc<SetLayout>,
+    ) -> Result<Self, RenderError> {
         let kinds = [vk::DescriptorType::UNIFORM_TEXEL_BUFFER; 2];
         let layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         let (run, format) = run_of(making.size.0);
@@ -54,6 +62,7 @@ impl VideoPass {
             size: making.size,
             slots: making.slots,
             layout,
+            overlay: overlay.clone(),
             pictures: None,
             path: PicturePath::Copied,
             counts: PictureCounts::default(),
@@ -84,24 +93,28 @@ impl VideoPass {
         let scaled = self.is_scaled(shape);
         let index = pipeline_index(shape.format, scaled);
         if self.pipelines[index].is_none() {
-            self.pipelines[index] = Some(Pipeline::new(
-                &self.gpu,
-                &PipelineShape {
-                    vertex: SCREEN_VERT,
-                    fragment: VIDEO_FRAG,
-                    constants: &[format_constant(shape.format), u32::from(scaled), self.run],
-                    sets: &[&self.layout],
-                    push: size_of::<VideoBlock>(),
-                    vertices: None,
-                    topology: vk::PrimitiveTopology::TRIANGLE_LIST,
-                    colour: self.packed.shape.format,
-                    targets: 1,
-                    blend: Blend::Replace,
-                    cull: None,
-                    depth: false,
-                    samples: vk::SampleCountFlags::TYPE_1,
-                },
-            )?);
+            let sets: [&SetLayout; 2] = [&self.layout, &self.overlay];
+            let make = |fragment, sets: &[&SetLayout]| {
+                Pipeline::new(
+                    &self.gpu,
+                    &PipelineShape {
+                        vertex: SCREEN_VERT,
+                        fragment,
+                        constants: &[format_constant(shape.format), u32::from(scaled), self.run],
+                        sets,
+                        push: size_of::<VideoBlock>(),
+                        vertices: None,
+                        topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+                        colour: self.packed.shape.format,
+                        targets: 1,
+                        blend: Blend::Replace,
+                        cull: None,
+                        depth: false,
+                        samples: vk::SampleCountFlags::TYPE_1,
+                    },
+                )
+            };
+            self.pipelines[index] = Some([make(VIDEO_FRAG, &sets[..1])?, make(VIDEO_OVERLAID_FRAG, &sets)?]);
         }
         Ok(())
     }
@@ -160,19 +173,54 @@ impl VideoPass {
         Step { image: &self.packed, from: DRAWN, to: COPIED_FROM }
     }
 
-    /// Draws the current picture over the whole screen, as packed pixels.
-    pub(crate) fn record(&self, to: Recorder<'_>) {
+    /// The packed pixels, as rectangles of texels: those that hold some of `overlaid`, and all others.
+    pub(crate) fn divide(
+        &self,
+        overlaid: impl Iterator<Item = PixelRect>,
+        over: &mut Vec<PixelRect>,
+        rest: &mut Vec<PixelRect>,
+    ) {
+        let (width, height) = (self.packed.shape.width, self.packed.shape.height);
+        over.clear();
+        over.extend(overlaid.map(|r| {
+            let (first, end) = (r.x / self.run, (r.x + r.width).div_ceil(self.run).min(width));
+            PixelRect { x: first, width: end - first, ..r }
+        }));
+        around_all(PixelRect { x: 0, y: 0, width, height }, over, rest);
+    }
+
+    /// Draws the current picture over the whole screen, as packed pixels divided by [`VideoPass::divide`], with `overlay` over it
+    /// where it is wanted.
+    pub(crate) fn record(
+        &self,
+        to: Recorder<'_>,
+        overlay: vk::DescriptorSet,
+        overlaid: &[PixelRect],
+        rest: &[PixelRect],
+    ) {
         let Some(pictures) = &self.pictures else { return };
         let shape = pictures.shape;
         let index = pipeline_index(shape.format, self.is_scaled(shape));
-        let (Some(pipeline), Some(set)) = (&self.pipelines[index], pictures.set()) else { return };
+        let (Some([alone, both]), Some(set)) = (&self.pipelines[index], pictures.set()) else { return };
         let (width, height) = (self.packed.shape.width, self.packed.shape.height);
         let area = PixelRect { x: 0, y: 0, width, height };
         to.begin(area, (self.packed.view, Begin::Forget), None);
         to.window([0.0, 0.0, width as f32, height as f32], area);
-        to.bind(pipeline, &[set]);
-        to.push(pipeline, &covering(shape, self.size));
-        to.draw(3, 1);
+        let block = covering(shape, self.size);
+        to.bind(alone, &[set]);
+        to.push(alone, &block);
+        for r in rest {
+            to.scissor(*r);
+            to.draw(3, 1);
+        }
+        if !overlaid.is_empty() {
+            to.bind(both, &[set, overlay]);
+            to.push(both, &block);
+        }
+        for r in overlaid {
+            to.scissor(*r);
+            to.draw(3, 1);
+        }
         to.end();
     }
 

@@ -249,7 +249,8 @@ fn has_field(method: ReflectionMethod) -> bool {
 fn drawn(method: ReflectionMethod, shadow: ShadowLevel) -> Option<(ReflectionMethod, ShadowLevel)> {
     match (method, shadow) {
         (ReflectionMethod::Waves, ShadowLevel::None) => None,
-        (ReflectionMethod::Waves, _) => Some((ReflectionMethod::Off, shadow)),
+        // Its shadow follows from the light: there are no levels of it.
+        (ReflectionMethod::Waves, _) => Some((method, ShadowLevel::Gradual)),
         _ => Some((method, shadow)),
     }
 }
@@ -263,7 +264,7 @@ fn method_constant(method: ReflectionMethod) -> u32 {
         ReflectionMethod::PhysicsAsPrinted => 4,
         ReflectionMethod::Physics => 5,
         // Of this method the shader draws the shadow alone.
-        ReflectionMethod::Waves => 0,
+        ReflectionMethod::Waves => 6,
     }
 }
 

@@ -9,6 +9,7 @@ mod fresnel;
 mod lens;
 mod motion;
 mod pacing;
+mod reflection;
 mod sea;
 mod wavefield;
 
@@ -49,6 +50,7 @@ pub const PARTS: &[Part] = &[
     Part { about: sea::ABOUT, measure: sea::measure },
     Part { about: wavefield::ABOUT, measure: wavefield::measure },
     Part { about: motion::ABOUT, measure: motion::measure },
+    Part { about: reflection::ABOUT, measure: reflection::measure },
     Part { about: fresnel::ABOUT, measure: fresnel::measure },
     Part { about: colour::ABOUT, measure: colour::measure },
     Part { about: depth::ABOUT, measure: depth::measure },

@@ -28,68 +28,108 @@ pub fn coded(pixels: &[[f32; 3]]) -> Vec<u8> {
     pixels.iter().flat_map(|p| p.map(code)).collect()
 }
 
-/// What `cell.toml` says beside the [`CellSpec`] (read it with [`read_spec`]).
-#[derive(serde::Serialize)]
-struct Written<'a> {
-    spec: &'a CellSpec,
-    camera: Camera,
-    region: Region,
-    boat: Boat,
-    sea: Sea,
-    light: Light,
-    truth: Own,
+/// What `cell.toml` says.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Described {
+    /// Everything that made the cell.
+    pub spec: CellSpec,
+    /// The camera of the whole picture.
+    pub camera: Camera,
+    /// What of it is rendered.
+    pub region: Region,
+    /// The boat.
+    pub boat: Boat,
+    /// The sea.
+    pub sea: Sea,
+    /// Light in the picture's linear values.
+    pub light: Light,
+    /// About the truth itself.
+    pub truth: Own,
 }
 
-#[derive(serde::Serialize)]
-struct Camera {
-    width: u32,
-    height: u32,
-    fx: f64,
-    fy: f64,
-    cx: f64,
-    cy: f64,
-    vfov_deg: f64,
-    position: [f64; 3],
-    /// x, y, z, w.
-    world_from_camera: [f64; 4],
+/// The camera of the whole picture.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Camera {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Focal length across, pixels.
+    pub fx: f64,
+    /// Focal length down, pixels.
+    pub fy: f64,
+    /// Column of the optical axis.
+    pub cx: f64,
+    /// Row of the optical axis.
+    pub cy: f64,
+    /// Angle that the picture covers down, degrees.
+    pub vfov_deg: f64,
+    /// Place in the world, metres.
+    pub position: [f64; 3],
+    /// Quaternion x, y, z, w.
+    pub world_from_camera: [f64; 4],
 }
 
-#[derive(serde::Serialize)]
-struct Boat {
-    model: String,
-    position: [f64; 3],
-    /// x, y, z, w.
-    world_from_boat: [f64; 4],
+/// The boat.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Boat {
+    /// Name of its model.
+    pub model: String,
+    /// Its origin in the world, metres.
+    pub position: [f64; 3],
+    /// Quaternion x, y, z, w.
+    pub world_from_boat: [f64; 4],
 }
 
-#[derive(serde::Serialize)]
-struct Sea {
-    wind_m_s: f64,
-    wind_from_deg: f64,
-    significant_height_m: f64,
-    peak_wavelength_m: f64,
-    slope_variance_along: f64,
-    slope_variance_across: f64,
-    resolved_along: f64,
-    resolved_across: f64,
+/// The sea.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Sea {
+    /// Wind 10 m above it, m/s.
+    pub wind_m_s: f64,
+    /// Where the wind comes from, degrees clockwise from north.
+    pub wind_from_deg: f64,
+    /// Significant wave height, metres.
+    pub significant_height_m: f64,
+    /// Length of the waves that carry most, metres.
+    pub peak_wavelength_m: f64,
+    /// Mean square slope along the wind.
+    pub slope_variance_along: f64,
+    /// Mean square slope across it.
+    pub slope_variance_across: f64,
+    /// What of the former has a shape.
+    pub resolved_along: f64,
+    /// What of the latter has a shape.
+    pub resolved_across: f64,
 }
 
-#[derive(serde::Serialize)]
-struct Light {
-    sun_direction: [f64; 3],
-    gain: f64,
-    boat_sun: [f64; 3],
-    boat_sky: [f64; 3],
-    boat_sea: [f64; 3],
-    water_body: [f64; 3],
+/// Light in the picture's linear values.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Light {
+    /// Unit vector towards the sun, world.
+    pub sun_direction: [f64; 3],
+    /// Factor from radiance to linear picture values.
+    pub gain: f64,
+    /// Of a white matt surface that faces the sun.
+    pub boat_sun: [f64; 3],
+    /// Of one that faces up, by the sky alone.
+    pub boat_sky: [f64; 3],
+    /// Of one that faces down, by the sea.
+    pub boat_sea: [f64; 3],
+    /// Light that comes out of the water.
+    pub water_body: [f64; 3],
 }
 
-#[derive(serde::Serialize)]
-struct Own {
-    samples: u32,
-    render_s: f64,
-    reflection_pixels: usize,
-    mean_change: [f64; 3],
+/// About the truth itself.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Own {
+    /// Paths a pixel.
+    pub samples: u32,
+    /// Time that it took, seconds.
+    pub render_s: f64,
+    /// Pixels where reflections are judged.
+    pub reflection_pixels: usize,
+    /// Mean change that the boat makes to them, linear.
+    pub mean_change: [f64; 3],
 }
 
 /// Renders the cell and writes it as `folder`, which appears when it is complete and replaces one that was there.
@@ -125,13 +165,18 @@ fn write(setup: &Setup, pictures: &Pictures, render_s: f64, folder: &Path) -> Re
     )?;
     let overview = setup.overview(OVERVIEW, OVERVIEW_SAMPLES);
     rgb(&folder.join("overview.png"), overview.size, coded(&overview.without))?;
-    put(&folder.join("sky.csv"), sky_table(setup)?.as_bytes())?;
+    let mut sky = String::from("azimuth_deg,elevation_deg,r,g,b\n");
+    for [azimuth, elevation, r, g, b] in sky_rows(setup) {
+        writeln!(sky, "{azimuth},{elevation},{r:.5},{g:.5},{b:.5}")?;
+    }
+    put(&folder.join("sky.csv"), sky.as_bytes())?;
     let described = describe(setup, pictures, &region, render_s);
     let text = toml::to_string(&described).context("cannot write a cell as TOML")?;
     put(&folder.join("cell.toml"), text.as_bytes())
 }
 
-fn describe<'a>(setup: &'a Setup, pictures: &Pictures, region: &[bool], render_s: f64) -> Written<'a> {
+/// What a cell's file says of it; `region` is [`masks::reflection`]'s.
+pub fn describe(setup: &Setup, pictures: &Pictures, region: &[bool], render_s: f64) -> Described {
     let (lens, light, spec) = (&setup.lens, setup.exposed_light(), &setup.spec);
     let waves = &setup.scene.waves;
     let all = waves.all_slopes().sigma * waves.all_slopes().sigma;
@@ -144,8 +189,8 @@ fn describe<'a>(setup: &'a Setup, pictures: &Pictures, region: &[bool], render_s
         change +=
             DVec3::from_array([0, 1, 2].map(|c| f64::from(pictures.with[i][c] - pictures.without[i][c])));
     }
-    Written {
-        spec,
+    Described {
+        spec: spec.clone(),
         camera: Camera {
             width: PICTURE.0,
             height: PICTURE.1,
@@ -190,20 +235,26 @@ fn describe<'a>(setup: &'a Setup, pictures: &Pictures, region: &[bool], render_s
     }
 }
 
-/// Radiance of the sky over elevation, in the picture's linear values, in the direction of view, across it and behind.
-fn sky_table(setup: &Setup) -> Result<String> {
-    let mut text = String::from("azimuth_deg,elevation_deg,r,g,b\n");
-    for azimuth in (0..360).step_by(30) {
-        for elevation in
-            [0.25, 0.5, 1.0, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0f64]
-        {
-            let (a, e) = (f64::from(azimuth).to_radians(), elevation.to_radians());
-            let direction = (DVec2::new(a.sin(), a.cos()) * e.cos()).extend(e.sin());
-            let c = setup.scene.sky.radiance(direction) * setup.gain;
-            writeln!(text, "{azimuth},{elevation},{:.5},{:.5},{:.5}", c.x, c.y, c.z)?;
-        }
-    }
-    Ok(text)
+/// Radiance of the sky, in the picture's linear values: azimuth and elevation in degrees (clockwise from the direction of view), red, green,
+/// blue. The sun's disc is not in it.
+pub fn sky_rows(setup: &Setup) -> Vec<[f64; 5]> {
+    const ELEVATIONS: [f64; 15] =
+        [0.25, 0.5, 1.0, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0];
+    let row = |azimuth: f64, elevation: f64| {
+        let (a, e) = (azimuth.to_radians(), elevation.to_radians());
+        let direction = (DVec2::new(a.sin(), a.cos()) * e.cos()).extend(e.sin());
+        let c = setup.scene.sky.radiance(direction) * setup.gain;
+        [azimuth, elevation, c.x, c.y, c.z]
+    };
+    let azimuths = (0..360).step_by(30).map(f64::from);
+    azimuths.flat_map(|azimuth| ELEVATIONS.map(|elevation| row(azimuth, elevation))).collect()
+}
+
+/// What a folder's `cell.toml` says.
+pub fn read(folder: &Path) -> Result<Described> {
+    let path = folder.join("cell.toml");
+    let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    toml::from_str(&text).with_context(|| format!("{} is no cell", path.display()))
 }
 
 /// The specification in a `cell.toml`.

@@ -136,6 +136,25 @@ fn gaps_a_standing_picture_and_no_pose_end_the_watch_and_say_so() {
 }
 
 #[test]
+fn a_gun_that_sweeps_the_horizon_is_given_no_sea() {
+    // A lens that darkens its corners, turned to and fro by 12 degrees in 10 s over water without any wave.
+    let lens = Lens::pinhole(640, 360, 1.0);
+    let mut meter = SeaMeter::new();
+    for i in 0..900 {
+        let t = 0.1 * f64::from(i);
+        let azimuth = 0.3 + 0.2 * (TAU * t / 10.0).sin();
+        let camera = CameraPose { world_from_camera: look(azimuth, -0.12, 0.0), position: DVec3::Z * EYE_M };
+        let see = |p: DVec2| {
+            let ray = lens.unproject(p);
+            let level = light(&Waves::new(0.002, 2.5, 0.0), &camera, camera.world_from_camera * ray, t);
+            Some(level * ray.z.powi(4) as f32)
+        };
+        meter.observe(&Frame { time: Time::from_ns(0).plus_secs(t), camera, lens: &lens, luminance: &see });
+        assert!(meter.estimate().is_err(), "{:?}", meter.estimate());
+    }
+}
+
+#[test]
 fn a_night_without_light_is_told_as_dark() {
     let lens = Lens::pinhole(640, 360, 1.0);
     let camera = CameraPose { world_from_camera: look(0.3, -0.12, 0.0), position: DVec3::Z * EYE_M };

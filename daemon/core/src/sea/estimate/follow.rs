@@ -1,6 +1,6 @@
 //! Which sea is drawn: the measured one, steadied, or the one that the operator orders.
 
-use super::{Measured, SeaEstimate, Unknown};
+use super::{Measured, SeaEstimate, Unknown, summary::wind_m_s};
 use crate::sea::WmoSeaState;
 
 /// Share of a new estimate in the conditions in use.
@@ -19,6 +19,13 @@ pub struct SeaConditions {
     pub peak_period_s: f64,
     /// Where the waves come from, radians clockwise from north.
     pub from_rad: f64,
+}
+
+impl SeaConditions {
+    /// Wind that would raise such waves (Toba 1972), m/s 10 m above the sea.
+    pub fn wind_m_s(&self) -> f64 {
+        wind_m_s(self.significant_height_m, self.peak_period_s)
+    }
 }
 
 /// What the operator wants.

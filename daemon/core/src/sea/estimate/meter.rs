@@ -20,6 +20,9 @@ const GAP: i64 = 25;
 const FROZEN: usize = 10;
 /// Share of the patches ever seen at once that must be seen, and for how many samples it may be less.
 const SEEN: (f64, usize) = (0.6, 25);
+/// A camera turned farther than this from where the watch began, radians, shows the water through another part of its lens, whose
+/// fall of brightness would look like long waves: its pictures count as missing.
+const TURNED: f64 = 0.1;
 /// Patches that must be seen at all.
 const LEAST_SEEN: f64 = 30.0;
 /// Relative change of the eye's height that ends a watch.
@@ -138,6 +141,11 @@ impl SeaMeter {
     }
 }
 
+/// Angle between two azimuths, radians.
+fn turn(a: f64, b: f64) -> f64 {
+    (a - b).sin().atan2((a - b).cos()).abs()
+}
+
 fn usable(frame: &Frame<'_>) -> bool {
     let (camera, lens) = (&frame.camera, frame.lens);
     let turned =
@@ -190,6 +198,11 @@ impl Watch {
             return Err(Restart::Height);
         }
         (due..slot).for_each(|_| self.record.push_missing());
+        if azimuth_of(&frame.camera).is_none_or(|a| turn(a, self.grid.azimuth) > TURNED) {
+            self.unseen += 1;
+            self.record.push_missing();
+            return if self.unseen > SEEN.1 { Err(Restart::Turned) } else { Ok(()) };
+        }
         if self.record.written.is_multiple_of(SKY_EVERY) {
             self.sky.observe(&frame.camera, frame.lens, self.grid.azimuth, false, &|p| {
                 (frame.luminance)(p).map(|l| [l; 3])
@@ -199,7 +212,7 @@ impl Watch {
         self.most_seen = self.most_seen.max(seen);
         let few = seen < SEEN.0 * self.most_seen || seen * (self.row.len() as f64) < LEAST_SEEN;
         self.unseen = if few { self.unseen + 1 } else { 0 };
-        if self.unseen > SEEN.1 || azimuth_of(&frame.camera).is_none() {
+        if self.unseen > SEEN.1 {
             return Err(Restart::Turned);
         }
         let dark = self.row.iter().all(|v| !v.is_finite() || *v < DARK);

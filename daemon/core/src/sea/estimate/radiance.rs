@@ -3,17 +3,14 @@
 //! Stilwell 1969 (J. Geophys. Res. 74, 1974) took the slopes of waves from the brightness of photographs with a computed
 //! reflection of the sky. Here sky, roughness and the light out of the water are fitted to the picture itself: rows above the
 //! horizon show the low sky, the mean brightness of water by depression shows the rest of it through Fresnel's law. The sky is
-//! horizon and zenith with an exponential between them. Facets are Gaussian and seen by their area across the ray; they do not
+//! horizon and zenith with an exponential between them, or the standard overcast one. Facets are Gaussian and seen by their area across the ray; they do not
 //! shade each other, so the fit is worth little within two degrees of the horizon.
 
-use glam::DVec3;
-
 use super::linear::solve;
+use crate::sea::Facets;
 
-/// Refractive index of sea water.
-const WATER: f64 = 1.34;
-/// Scales tried of the sky's fall from horizon to zenith, radians.
-const SCALES: [f64; 6] = [0.12, 0.22, 0.4, 0.7, 1.2, 2.5];
+/// Scales tried of the sky's fall from horizon to zenith, radians; the last stands for the standard overcast sky.
+const SCALES: [f64; 6] = [0.12, 0.22, 0.4, 0.7, 1.2, f64::INFINITY];
 /// Root mean square slopes tried, per axis: a glassy sea to a storm (Cox and Munk 1954: 0.04 to 0.2).
 const ROUGH: [f64; 12] = [0.02, 0.04, 0.055, 0.07, 0.085, 0.1, 0.115, 0.13, 0.15, 0.175, 0.2, 0.23];
 /// Extinctions of the air tried, per metre: clear air to thick fog (Koschmieder 1924).
@@ -29,10 +26,9 @@ const AS_GOOD: (f64, f64) = (0.12, 0.001_5);
 const LEAST_WEIGHT: f64 = 0.05;
 /// Depressions at which the change of brightness with slope is tabulated, radians: the first, the ratio, how many.
 const TABLE: (f64, f64, usize) = (0.04, 1.3, 12);
-/// What water mirrors of other water, as a share of the sky at that elevation.
-const SECOND_BOUNCE: f64 = 0.6;
-/// Nodes of slope along the view, in standard deviations from the last to the first.
-const ALONG: i32 = 6;
+/// Nodes of slope along the view to either side, over three standard deviations. Fewer make the change with tilt uneven: what a facet
+/// mirrors jumps at the horizon.
+const ALONG: u8 = 30;
 /// Half a step of tilt for the derivative, radians.
 const TILT: f64 = 0.02;
 /// Unknowns: horizon, zenith, light out of the water.
@@ -66,44 +62,34 @@ pub(super) struct Radiance {
     pub misfit: f64,
 }
 
-/// Unpolarised reflectance of water by the cosine of incidence (Fresnel).
-fn fresnel(cosine: f64) -> f64 {
-    let c = cosine.clamp(0.0, 1.0);
-    let g = (WATER * WATER - 1.0 + c * c).sqrt();
-    let (a, b) = ((g - c) / (g + c), (c * (g + c) - 1.0) / (c * (g - c) + 1.0));
-    0.5 * a * a * (1.0 + b * b)
+/// Share of the horizon's light left at an elevation, given its sine too: an exponential, or of a scale without end the CIE standard
+/// overcast sky (S 011, type 1), which goes with the sine.
+fn fade(elevation: f64, sine: f64, scale: f64) -> f64 {
+    if scale.is_finite() { (-elevation / scale).exp() } else { 1.0 - sine }
+}
+
+/// What each part of the light gives on water under a sky of that scale.
+fn water_terms(facets: &Facets, scale: f64) -> [f64; TERMS] {
+    let (mut horizon, mut all) = (0.0, 0.0);
+    for facet in &facets.mirrored {
+        horizon += facet.share * fade(facet.elevation, facet.sine, scale);
+        all += facet.share;
+    }
+    [horizon, all - horizon, facets.through]
 }
 
 /// What each part of the light gives at a direction; the water tilted by `tilt` towards the eye.
 fn terms(elevation: f64, tilt: f64, scale: f64, rough: f64) -> [f64; TERMS] {
     if elevation > 0.0 {
-        let fade = (-elevation / scale).exp();
-        return [fade, 1.0 - fade, 0.0];
+        sky_terms(elevation, scale)
+    } else {
+        water_terms(&Facets::seen(elevation, tilt, rough, ALONG), scale)
     }
-    // In the plane of view: x away from the eye, y across, z up.
-    let ray = DVec3::new(elevation.cos(), 0.0, elevation.sin());
-    let (mut sums, mut area) = ([0.0; TERMS], 0.0);
-    for i in -ALONG..=ALONG {
-        let u = f64::from(i) * 3.0 / f64::from(ALONG);
-        for (v, share) in [(-1.732, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732, 1.0 / 6.0)] {
-            let normal = DVec3::new(-(tilt + u * rough), -v * rough, 1.0);
-            let facing = -normal.dot(ray);
-            if facing <= 0.0 {
-                continue;
-            }
-            let weight = (-u * u / 2.0).exp() * share * facing;
-            let size = normal.length();
-            let mirror = fresnel(facing / size);
-            let up = (ray + normal * (2.0 * facing / (size * size))).z;
-            let bounce = if up > 0.0 { 1.0 } else { SECOND_BOUNCE };
-            let fade = (-up.abs().min(1.0).asin() / scale).exp();
-            sums[0] += weight * mirror * bounce * fade;
-            sums[1] += weight * mirror * bounce * (1.0 - fade);
-            sums[2] += weight * (1.0 - mirror);
-            area += weight;
-        }
-    }
-    sums.map(|s| s / f64::max(area, 1e-12))
+}
+
+fn sky_terms(elevation: f64, scale: f64) -> [f64; TERMS] {
+    let fade = fade(elevation, elevation.sin(), scale);
+    [fade, 1.0 - fade, 0.0]
 }
 
 /// The light of water behind hazy air that shines as the horizon does.
@@ -178,9 +164,16 @@ impl Search {
         let Some(&rough) = ROUGH.get(self.next) else { return false };
         self.next += 1;
         let (rows, eye_m) = (&self.rows, self.eye_m);
+        let facets: Vec<Option<Facets>> = rows
+            .iter()
+            .map(|r| (r.elevation <= 0.0).then(|| Facets::seen(r.elevation, 0.0, rough, ALONG)))
+            .collect();
         for scale in SCALES {
-            let clear: Vec<[f64; TERMS]> =
-                rows.iter().map(|r| terms(r.elevation, 0.0, scale, rough)).collect();
+            let of = |(r, f): (&Row, &Option<Facets>)| match f {
+                Some(facets) => water_terms(facets, scale),
+                None => sky_terms(r.elevation, scale),
+            };
+            let clear: Vec<[f64; TERMS]> = rows.iter().zip(&facets).map(of).collect();
             for (i, haze) in HAZE.into_iter().enumerate() {
                 let table: Vec<[f64; TERMS]> =
                     clear.iter().zip(rows).map(|(t, r)| hazed(*t, r.elevation, haze, eye_m)).collect();

@@ -134,7 +134,7 @@ impl SkyMeter {
         self.rows.observe(&frame.camera, frame.lens, middle, true, frame.colour);
     }
 
-    /// Sky and water that explain what was seen; `None` while too little water was seen. Takes about 2 ms.
+    /// Sky and water that explain what was seen; `None` while too little water was seen. Takes about 20 ms.
     pub fn estimate(&self) -> Option<SkyEstimate> {
         let middle_azimuth_rad = self.azimuth?;
         let green = Radiance::fit(&self.rows.rows(1), self.eye_m)?;

@@ -196,15 +196,19 @@ fn logistic(z: f64) -> f64 {
     1.0 / (1.0 + (-1.702 * z).exp())
 }
 
-/// Wind of a growing sea: H = 0.062 sqrt(g u*) T^1.5 with T = peak period / 1.05 (Toba 1972), and the drag of Wu 1982.
-fn wind(height: Measured, period: Measured) -> Measured {
-    let root = height.value / (0.062 * GRAVITY_M_S2.sqrt() * (period.value / 1.05).powf(1.5)).max(1e-9);
+/// Wind of a growing sea: H = 0.062 sqrt(g u*) T^1.5 with T = peak period / 1.05 (Toba 1972), and the drag of Wu 1982; m/s.
+pub(super) fn wind_m_s(height_m: f64, period_s: f64) -> f64 {
+    let root = height_m / (0.062 * GRAVITY_M_S2.sqrt() * (period_s / 1.05).powf(1.5)).max(1e-9);
     let friction = root * root;
     let mut wind = 28.0 * friction;
     for _ in 0..20 {
         wind = friction / ((0.8 + 0.065 * wind) * 1e-3).sqrt();
     }
-    let wind = wind.clamp(0.0, 60.0);
+    wind.clamp(0.0, 60.0)
+}
+
+fn wind(height: Measured, period: Measured) -> Measured {
+    let wind = wind_m_s(height.value, period.value);
     let (h, t) = (height.sigma / height.value.max(1e-9), period.sigma / period.value.max(1e-9));
     Measured { value: wind, sigma: wind * ((1.6 * h).powi(2) + (2.4 * t).powi(2) + 0.0625).sqrt() + 0.5 }
 }

@@ -1,0 +1,261 @@
+//! From a boat's track to what the wake's shaders read: relative to the camera before it is rounded.
+
+use bowwave_core::{
+    scene::{BoatView, Light, PixelRect, Scene},
+    sea::fresnel,
+    view::NEAR_M,
+    wake::{FOAM_FROUDE, FOLLOWED_S, SPEED_MIN_M_S, TrackPoint, Wake, froude, height_m},
+};
+use glam::{DMat3, DVec2, DVec3, Vec3};
+use shaders_spirv::interface::{TRACK_POINTS, WakeBlock, WakeHead, WakePoint};
+
+use crate::water::{SEEN_DOWN, mirrored_sky};
+
+const _: () = assert!(TRACK_POINTS == bowwave_core::wake::TRACK_POINTS);
+
+/// Share of the light that fresh foam throws back (Whitlock, Bartlett & Gurganus 1982).
+const FOAM_ALBEDO: f32 = 0.55;
+/// Foam is no brighter than this share of the video's white.
+const FOAM_MAX: f32 = 0.85;
+/// The shader's sea is brought to the picture's by no more than this factor and no less than its inverse.
+const FIT_MAX: f32 = 4.0;
+/// Where a stretch of wake as long as it is wide takes up fewer rows of pixels, nothing is drawn, and from the second on all of it: in
+/// between it fades, so that what shrinks below a pixel does not flicker.
+const ROWS: (f64, f64) = (0.35, 1.5);
+/// Less of a wake is not seen, and its end not either.
+const SHARE_MIN: f64 = 0.02;
+/// What stands beside a hull reaches so far along it: from ahead of the bow, to behind it, in lengths.
+const SPRAY_ALONG: (f64, f64) = (-0.02, 2.2);
+/// The bow's crest stands so much higher at the hull than waves one length off: the power law of their distance, from there to a
+/// fifth of the length.
+const AT_HULL: f64 = 1.7;
+/// Spray of fewer rows of pixels fades, and of fewer than the first is none.
+const SPRAY_ROWS: (f64, f64) = (0.2, 0.6);
+
+/// A boat's block and how many strips of it are drawn.
+pub(crate) fn wake_block(scene: &Scene, boat: &BoatView, wake: &Wake) -> (WakeBlock, u32) {
+    let camera = &scene.camera;
+    let camera_from_world = DMat3::from_quat(camera.world_from_camera.inverse());
+    let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
+    let light = |v: Vec3, w: f64| v.extend(w as f32).to_array();
+    let (high, thrown) = spray(scene, boat, wake);
+    // Cox and Munk 1954: of both directions together.
+    let rough = (0.003 + 0.005_12 * scene.wind.length()).sqrt();
+    let head = WakeHead {
+        up: with(camera_from_world * DVec3::Z, rough),
+        hull: [wake.hull.length_m as f32, wake.hull.beam_m as f32, boat.haze, high as f32],
+        foam: light(foam_light(&scene.light), thrown),
+        sea: light(sea_fit(&scene.light, rough), 0.0),
+    };
+    let mut block = WakeBlock { head, ..WakeBlock::default() };
+    let mut last = 0;
+    for (i, (point, out)) in wake.points().iter().zip(&mut block.points).enumerate() {
+        let share = share(scene, wake, point);
+        let starboard = point.starboard;
+        let height = height_m(point.speed_m_s, &wake.hull, wake.draught_m);
+        let pair = |a: DVec2, b: DVec2| [a.x, a.y, b.x, b.y].map(|v| v as f32);
+        *out = WakePoint {
+            place: with(camera_from_world * (point.position - camera.position), wake.half_width_m(point)),
+            side: with(camera_from_world * starboard.extend(0.0), height),
+            world: pair(point.position.truncate(), starboard),
+            track: [point.along_m, point.speed_m_s, point.age_s, share].map(|v| v as f32),
+        };
+        if share > 0.0 {
+            last = i + 1;
+        }
+    }
+    let strips = last.min(wake.points().len().saturating_sub(1));
+    (block, strips as u32)
+}
+
+/// Height of what the bow throws up, metres, and how much of it is drawn.
+fn spray(scene: &Scene, boat: &BoatView, wake: &Wake) -> (f64, f64) {
+    let Some(now) = wake.points().first().filter(|p| p.speed_m_s >= SPEED_MIN_M_S) else { return (0.0, 0.0) };
+    let high = AT_HULL * height_m(now.speed_m_s, &wake.hull, wake.draught_m);
+    let grown = |v: f64, (from, to): (f64, f64)| {
+        let t = ((v - from) / (to - from)).clamp(0.0, 1.0);
+        t * t * (3.0 - 2.0 * t)
+    };
+    let rows = high / boat.range_m.max(0.1) * scene.lens.focal.max_element();
+    (high, grown(froude(now.speed_m_s, wake.hull.length_m), FOAM_FROUDE) * grown(rows, SPRAY_ROWS))
+}
+
+/// The pixels that what stands beside a hull can take; `None` where there is none or it is out of view.
+pub(crate) fn spray_rect(scene: &Scene, boat: &BoatView, size: (u32, u32)) -> Option<PixelRect> {
+    let wake = boat.wake.as_ref().filter(|_| !boat.beyond_horizon)?;
+    let (high, thrown) = spray(scene, boat, wake);
+    let [bow, middle] = [1, 3].map(|i| wake.points().get(i));
+    let (bow, middle) = (bow?, middle?);
+    if thrown <= 0.0 {
+        return None;
+    }
+    let back = (middle.position - bow.position).try_normalize()?;
+    let (mut low, mut up) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let aside = 0.6 * wake.hull.beam_m + 0.06 * wake.hull.length_m + 0.4 * high;
+    for i in 0..8 {
+        let pick = |bit: usize, a: f64, b: f64| if i & bit == 0 { a } else { b };
+        let along = pick(1, SPRAY_ALONG.0, SPRAY_ALONG.1) * wake.hull.length_m;
+        let across = middle.starboard * pick(2, -aside, aside);
+        let place = bow.position + back * along + across.extend(0.0) + DVec3::Z * pick(4, -0.1 * high, high);
+        // Beside the camera it would fill the picture: left out.
+        let p = scene.lens.project(scene.camera.to_camera(place))?;
+        (low, up) = (low.min(p), up.max(p));
+    }
+    held(low - 4.0, up + 4.0, size)
+}
+
+/// How much of a point's wake is drawn: less with its age, and none of what would be finer than the picture.
+fn share(scene: &Scene, wake: &Wake, point: &TrackPoint) -> f64 {
+    let to = point.position - scene.camera.position;
+    let eye_m = -to.z;
+    if eye_m <= 0.05 || point.speed_m_s < SPEED_MIN_M_S {
+        return 0.0;
+    }
+    let fresh = (1.0 - point.age_s.max(0.0) / FOLLOWED_S).clamp(0.0, 1.0);
+    let rows = 2.0 * wake.half_width_m(point) * eye_m / to.length_squared() * scene.lens.focal.max_element();
+    let seen = ((rows - ROWS.0) / (ROWS.1 - ROWS.0)).clamp(0.0, 1.0);
+    let share = fresh * fresh * seen;
+    if share < SHARE_MIN { 0.0 } else { share }
+}
+
+/// The rectangle of the screen that holds a strip of a wake; `None` out of view.
+pub(crate) fn strip_rect(scene: &Scene, wake: &Wake, strip: usize, size: (u32, u32)) -> Option<PixelRect> {
+    let pair = wake.points().get(strip..strip + 2)?;
+    let corner = |point: &TrackPoint, side: f64| {
+        let across = point.starboard * (side * wake.half_width_m(point));
+        scene.camera.to_camera(point.position + across.extend(0.0))
+    };
+    // Round the strip.
+    let corners =
+        [corner(&pair[0], -1.0), corner(&pair[0], 1.0), corner(&pair[1], 1.0), corner(&pair[1], -1.0)];
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let mut take = |place: DVec3| {
+        // Beside a bent lens's reach: far off in that direction.
+        let far = f64::from(size.0.max(size.1)) * 4.0;
+        let beside = || scene.lens.centre + place.truncate().normalize_or_zero() * far;
+        let p = scene.lens.project(place).unwrap_or_else(beside);
+        (low, high) = (low.min(p), high.max(p));
+    };
+    for (i, a) in corners.iter().enumerate() {
+        let b = &corners[(i + 1) % 4];
+        if a.z >= NEAR_M {
+            take(*a);
+        }
+        // Cut where it passes the camera's plane.
+        if (a.z < NEAR_M) != (b.z < NEAR_M) {
+            take(a.lerp(*b, (NEAR_M - a.z) / (b.z - a.z)));
+        }
+    }
+    // Under a bent lens a strip's sides bulge a little between its corners.
+    held(low - 3.0, high + 3.0, size)
+}
+
+/// Whole pixels of the screen that hold a span.
+fn held(low: DVec2, high: DVec2, size: (u32, u32)) -> Option<PixelRect> {
+    let low = low.max(DVec2::ZERO).floor();
+    let high = high.min(DVec2::new(f64::from(size.0), f64::from(size.1))).ceil();
+    low.cmplt(high).all().then_some(PixelRect {
+        x: low.x as u32,
+        y: low.y as u32,
+        width: (high.x - low.x) as u32,
+        height: (high.y - low.y) as u32,
+    })
+}
+
+/// Light of whole foam, which lies flat. A camera bends bright light over before it is white.
+fn foam_light(light: &Light) -> Vec3 {
+    let whole = FOAM_ALBEDO * (light.sun * light.sun_direction.z.max(0.0) as f32 + light.sky);
+    whole * (FOAM_MAX / whole.max_element().max(FOAM_MAX))
+}
+
+/// What brings the shader's sea to the picture's mean sea.
+fn sea_fit(light: &Light, rough: f64) -> Vec3 {
+    let model = flat_sea(light, SEEN_DOWN, rough);
+    (light.sea / model.max(Vec3::splat(1e-4))).clamp(Vec3::splat(1.0 / FIT_MAX), Vec3::splat(FIT_MAX))
+}
+
+/// Light of an untilted sea, as `wake.frag` has it.
+fn flat_sea(light: &Light, down: f64, rough: f64) -> Vec3 {
+    let mirrored = fresnel(0.5 * (down + (down * down + rough * rough).sqrt())) as f32;
+    let body = Vec3::new(0.008, 0.016, 0.018) * (light.sun + light.sky);
+    mirrored_sky(light, down, rough) + (1.0 - mirrored) * body
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::boats::{CourseState, Hull};
+
+    use super::*;
+    use crate::testing;
+
+    fn wake(range: f64, speed: f64) -> Wake {
+        let hull = Hull { length_m: 8.0, beam_m: 2.4 };
+        let state = |t: f64| CourseState {
+            position: DVec2::new(speed * (t - 50.0), range),
+            heading: std::f64::consts::FRAC_PI_2,
+            speed_m_s: speed,
+            turn_rate: 0.0,
+        };
+        Wake::of(hull, 0.5, 50.0, state, |_| 0.0).unwrap()
+    }
+
+    fn seen(range: f64) -> (Scene, BoatView) {
+        let models = [testing::box_model("b", [8.0, 2.4, 1.5], [0.5; 3])];
+        let mut scene = testing::empty_scene(640, 360);
+        testing::add_boat(&mut scene, &models, 0, range, 0.0, 0.0);
+        let boat = scene.boats.remove(0);
+        (scene, boat)
+    }
+
+    #[test]
+    fn a_wake_finer_than_the_picture_is_left_out_and_fades_before() {
+        let share_at = |range: f64| {
+            let (scene, boat) = seen(range);
+            let block = wake_block(&scene, &boat, &wake(range, 7.0));
+            block.0.points[3].track[3]
+        };
+        let (near, far, gone) = (share_at(60.0), share_at(200.0), share_at(900.0));
+        assert!(near > 0.9 && far < near && far > 0.0, "{near} {far}");
+        assert_eq!(gone, 0.0);
+    }
+
+    #[test]
+    fn rectangles_hold_the_ribbon() {
+        let models = [testing::box_model("b", [8.0, 2.4, 1.5], [0.5; 3])];
+        let mut scene = testing::empty_scene(640, 360);
+        testing::add_moving_boat(&mut scene, &models, 0, [70.0, 0.0, 0.4], [7.0, 0.1]);
+        let boat = scene.boats.remove(0);
+        let wake = boat.wake.unwrap();
+        let (block, strips) = wake_block(&scene, &boat, &wake);
+        for strip in 0..strips as usize {
+            let rect = strip_rect(&scene, &wake, strip, (640, 360));
+            let p = &block.points[strip];
+            for side in [-0.99, 0.0, 0.99] {
+                let at = Vec3::from_slice(&p.place) + Vec3::from_slice(&p.side) * (side * p.place[3]);
+                let Some(pixel) = scene.lens.project(at.as_dvec3()) else { continue };
+                if pixel.cmplt(DVec2::ZERO).any() || pixel.x >= 640.0 || pixel.y >= 360.0 {
+                    continue;
+                }
+                let r = rect.unwrap();
+                let holds = pixel.x >= f64::from(r.x)
+                    && pixel.y >= f64::from(r.y)
+                    && pixel.x <= f64::from(r.x + r.width)
+                    && pixel.y <= f64::from(r.y + r.height);
+                assert!(holds, "strip {strip}, {pixel} not in {r:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn foam_is_as_bright_as_its_albedo_and_the_sea_as_the_pictures() {
+        let (scene, _) = seen(70.0);
+        let white = scene.light.sun * scene.light.sun_direction.z as f32 + scene.light.sky;
+        assert!((foam_light(&scene.light) / white - Vec3::splat(0.55)).abs().max_element() < 1e-6);
+        let mut bright = scene.light;
+        bright.sky *= 9.0;
+        assert!((foam_light(&bright).max_element() - FOAM_MAX).abs() < 1e-6);
+        let rough = 0.08;
+        let fitted = sea_fit(&scene.light, rough) * flat_sea(&scene.light, SEEN_DOWN, rough);
+        assert!((fitted - scene.light.sea).abs().max_element() < 1e-6);
+    }
+}
