@@ -112,8 +112,7 @@ impl LightMeter {
         let Means { sky, horizon, sea } = self.means();
         let seen = SkyLight::of_bands(horizon, sky);
         let Some((_, tones)) = self.tones else { return seen };
-        let Light { sun, sky, sun_direction, .. } = self.light();
-        let from_below = WATER_ALBEDO * (sky + sun * sun_direction.z.max(0.0) as f32);
+        let from_below = WATER_ALBEDO * self.light().on_level();
         let hue = sea / sea.dot(LUMINANCE).max(1e-4);
         let (mut found, mut expected) = (Vec3::ZERO, Vec3::ZERO);
         for tangent in MIRROR_TANGENTS {

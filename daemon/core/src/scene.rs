@@ -242,6 +242,13 @@ pub struct Light {
     pub sea: Vec3,
 }
 
+impl Light {
+    /// Radiance of a white matt surface that lies level under sun and sky.
+    pub fn on_level(&self) -> Vec3 {
+        self.sky + self.sun * self.sun_direction.z.max(0.0) as f32
+    }
+}
+
 /// How a boat's light is put onto the sea.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ReflectionMethod {
@@ -357,4 +364,17 @@ pub struct Hud {
     pub clock_s: f64,
     /// The sea that is drawn, where it is measured in the video.
     pub sea: Option<(WmoSeaState, SeaSource)>,
+}
+
+impl Hud {
+    /// Nothing has happened yet, and there is nothing to fire.
+    pub const READY: Self = Self {
+        status: Status::Ready,
+        warning: None,
+        rounds_left: 0,
+        shots: 0,
+        hits: 0,
+        clock_s: 0.0,
+        sea: None,
+    };
 }

@@ -42,6 +42,8 @@ pub struct Eye<'a> {
     pub visibility_m: f64,
     /// Whether reflections or shadows are drawn at all.
     pub reflections: bool,
+    /// Whether wakes are drawn at all.
+    pub wakes: bool,
 }
 
 /// A boat afloat, before it is known whether it is seen.
@@ -62,15 +64,16 @@ pub struct Afloat<'a> {
 impl Eye<'_> {
     /// The boat as it is seen; `None` where neither hull nor reflection touches the screen.
     pub fn see(&self, boat: &Afloat<'_>) -> Option<BoatView> {
-        self.see_with_wake(boat, None)
+        self.see_with_wake(boat, || None)
     }
 
-    /// The same of a boat with a wake; `None` where that does not touch the screen either.
-    pub fn see_with_wake(&self, boat: &Afloat<'_>, wake: Option<Wake>) -> Option<BoatView> {
+    /// The same of a boat that leaves a wake, which is asked for where it can be seen; `None` where that does not touch the screen
+    /// either.
+    pub fn see_with_wake(&self, boat: &Afloat<'_>, wake: impl FnOnce() -> Option<Wake>) -> Option<BoatView> {
         let offset = boat.pose.position - self.camera.position;
         let range_m = offset.length();
         let beyond_horizon = offset.truncate().length() > horizon_distance(self.camera.position.z);
-        let wake = wake.filter(|_| !beyond_horizon).and_then(|w| self.see_wake(w));
+        let wake = if self.wakes && !beyond_horizon { wake().and_then(|w| self.see_wake(w)) } else { None };
         if !range_m.is_finite() || (wake.is_none() && !self.may_see(offset, range_m, boat.model.radius_m())) {
             return None;
         }
@@ -78,11 +81,11 @@ impl Eye<'_> {
         let pose = RigidPose { position: boat.pose.position - DVec3::Z * drop, ..boat.pose };
         let water_level = boat.water_level - drop;
         let corners = corners_above(boat.model, &pose, water_level);
-        let hull = self.bounds(&corners, HULL_MARGIN_PX);
+        let hull = bounds(self.camera, self.lens, &corners, HULL_MARGIN_PX);
         let reflection = if self.reflections {
             let mirrored = corners.map(|c| DVec3::new(c.x, c.y, 2.0 * water_level - c.z));
             let height = self.apparent_height_px(range_m, &corners, water_level);
-            self.bounds(&mirrored, REFLECTION_MARGIN_PX + DISTORTION_SHARE * height)
+            bounds(self.camera, self.lens, &mirrored, REFLECTION_MARGIN_PX + DISTORTION_SHARE * height)
         } else {
             None
         };
@@ -106,14 +109,7 @@ impl Eye<'_> {
     /// A wake with the sea's curvature taken off, where any of it can touch the screen.
     fn see_wake(&self, wake: Wake) -> Option<Wake> {
         let wake = wake.lifted(|p| -curvature_drop((p - self.camera.position.truncate()).length()));
-        let seen = wake.points().windows(2).any(|pair| {
-            let corner = |i: usize| {
-                let (point, side) = (&pair[i / 4], if i & 1 == 0 { 1.0 } else { -1.0 });
-                point.position + (point.starboard * (side * wake.half_width_m(point))).extend(0.0)
-            };
-            // Corner numbers as of a box, so that edges are found alike: a flat one.
-            self.bounds(&std::array::from_fn(corner), 0.0).is_some()
-        });
+        let seen = wake.strips().any(|corners| bounds(self.camera, self.lens, &corners, 0.0).is_some());
         seen.then_some(wake)
     }
 
@@ -133,41 +129,6 @@ impl Eye<'_> {
         self.lens.focal.y * top / range_m.max(NEAR_M)
     }
 
-    /// Smallest rectangle of the screen that holds the box and `margin` pixels around it.
-    fn bounds(&self, corners: &[DVec3; 8], margin: f64) -> Option<PixelRect> {
-        let c = corners.map(|p| self.camera.to_camera(p));
-        let mut low = DVec2::INFINITY;
-        let mut high = DVec2::NEG_INFINITY;
-        let mut take = |p: DVec3| {
-            let pixel = self.project_clamped(p);
-            low = low.min(pixel);
-            high = high.max(pixel);
-        };
-        for i in 0..8 {
-            if c[i].z >= NEAR_M {
-                take(c[i]);
-            }
-            // Edges join corners that differ in one bit; each is cut where it passes the near plane.
-            for bit in [1, 2, 4] {
-                let (a, b) = (c[i], c[i ^ bit]);
-                if i & bit == 0 && (a.z < NEAR_M) != (b.z < NEAR_M) {
-                    take(a.lerp(b, (NEAR_M - a.z) / (b.z - a.z)));
-                }
-            }
-        }
-        clip_to_screen(low - margin, high + margin, self.lens.width, self.lens.height)
-    }
-
-    /// Projection that pulls directions outside of the lens model's reach back to its rim instead of losing them.
-    fn project_clamped(&self, camera: DVec3) -> DVec2 {
-        if let Some(pixel) = self.lens.project(camera) {
-            return pixel;
-        }
-        // Far beyond the screen in the right direction is all that a bound needs.
-        let sideways = camera.truncate().normalize_or_zero();
-        self.lens.centre + sideways * 4.0 * f64::from(self.lens.width.max(self.lens.height))
-    }
-
     /// Whether a tracer, splash or strike can touch the screen.
     pub fn sees_round(&self, round: &RoundView) -> bool {
         let (a, b, radius) = match *round {
@@ -179,8 +140,44 @@ impl Eye<'_> {
         };
         let low = a.min(b) - radius;
         let high = a.max(b) + radius;
-        self.bounds(&box_corners(low, high), HULL_MARGIN_PX).is_some()
+        bounds(self.camera, self.lens, &box_corners(low, high), HULL_MARGIN_PX).is_some()
     }
+}
+
+/// Smallest rectangle of the screen that holds a box in the world and `margin` pixels around it; `None` out of view. Corners whose
+/// numbers differ in one bit are joined by an edge.
+pub fn bounds(camera: &CameraPose, lens: &Lens, corners: &[DVec3; 8], margin: f64) -> Option<PixelRect> {
+    let c = corners.map(|p| camera.to_camera(p));
+    let mut low = DVec2::INFINITY;
+    let mut high = DVec2::NEG_INFINITY;
+    let mut take = |p: DVec3| {
+        let pixel = project_clamped(lens, p);
+        low = low.min(pixel);
+        high = high.max(pixel);
+    };
+    for i in 0..8 {
+        if c[i].z >= NEAR_M {
+            take(c[i]);
+        }
+        // Edges join corners that differ in one bit; each is cut where it passes the near plane.
+        for bit in [1, 2, 4] {
+            let (a, b) = (c[i], c[i ^ bit]);
+            if i & bit == 0 && (a.z < NEAR_M) != (b.z < NEAR_M) {
+                take(a.lerp(b, (NEAR_M - a.z) / (b.z - a.z)));
+            }
+        }
+    }
+    clip_to_screen(low - margin, high + margin, lens.width, lens.height)
+}
+
+/// Projection that pulls directions outside of the lens model's reach back to its rim instead of losing them.
+fn project_clamped(lens: &Lens, camera: DVec3) -> DVec2 {
+    if let Some(pixel) = lens.project(camera) {
+        return pixel;
+    }
+    // Far beyond the screen in the right direction is all that a bound needs.
+    let sideways = camera.truncate().normalize_or_zero();
+    lens.centre + sideways * 4.0 * f64::from(lens.width.max(lens.height))
 }
 
 fn box_corners(low: DVec3, high: DVec3) -> [DVec3; 8] {
@@ -208,7 +205,8 @@ fn corners_above(model: &Model, pose: &RigidPose, water_level: f64) -> [DVec3; 8
     })
 }
 
-fn clip_to_screen(low: DVec2, high: DVec2, width: u32, height: u32) -> Option<PixelRect> {
+/// The whole pixels of the screen that hold a span of it; `None` where there is none.
+pub fn clip_to_screen(low: DVec2, high: DVec2, width: u32, height: u32) -> Option<PixelRect> {
     let screen = DVec2::new(f64::from(width), f64::from(height));
     let low = low.floor().max(DVec2::ZERO);
     let high = high.ceil().min(screen);
@@ -263,7 +261,7 @@ mod tests {
             let model = block();
             let lens = Lens::pinhole(640, 360, 1.0);
             let camera = camera(az, el, roll);
-            let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, reflections: true };
+            let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, reflections: true, wakes: true };
             let pose = RigidPose {
                 world_from_body: DQuat::from_rotation_z(heading) * DQuat::from_rotation_x(tilt),
                 position: DVec3::new(x, y, 0.0),
@@ -296,7 +294,7 @@ mod tests {
     #[test]
     fn a_boat_behind_the_camera_is_not_seen() {
         let (model, lens, camera) = (block(), Lens::pinhole(640, 360, 1.0), camera(0.0, 0.0, 0.0));
-        let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, reflections: true };
+        let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, reflections: true, wakes: true };
         let at = |y: f64| {
             let pose = RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::new(0.0, y, 0.0) };
             eye.see(&Afloat { boat: 0, model_id: ModelId(0), model: &model, pose, water_level: 0.0 })

@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    boats::{CourseState, Hull},
+    boats::{CourseState, Hull, ahead},
     gunnery::GRAVITY_M_S2,
 };
 
@@ -69,13 +69,16 @@ impl Wake {
         let state = |age: f64| {
             let before = (age - time_s).max(0.0);
             let state = course((time_s - age).max(0.0));
-            CourseState { position: state.position - ahead(&state) * (state.speed_m_s * before), ..state }
+            CourseState {
+                position: state.position - ahead(state.heading) * (state.speed_m_s * before),
+                ..state
+            }
         };
         let now = state(0.0);
         let mut wake = Self { hull, draught_m, points: [TrackPoint::default(); TRACK_POINTS], count: 0 };
         let half = hull.length_m / 2.0;
         for along_m in [-AHEAD * hull.length_m, 0.0, half / 2.0, half] {
-            let at = CourseState { position: now.position + ahead(&now) * (half - along_m), ..now };
+            let at = CourseState { position: now.position + ahead(now.heading) * (half - along_m), ..now };
             wake.push(&at, along_m, (along_m - half) / now.speed_m_s.max(SPEED_MIN_M_S), &water);
         }
         let (mut along_m, mut before) = (half, now);
@@ -101,7 +104,7 @@ impl Wake {
         if let Some(point) = self.points.get_mut(self.count) {
             *point = TrackPoint {
                 position: at.position.extend(water(at.position)),
-                starboard: -ahead(at).perp(),
+                starboard: -ahead(at.heading).perp(),
                 along_m,
                 age_s,
                 speed_m_s: at.speed_m_s,
@@ -114,6 +117,17 @@ impl Wake {
     /// The track from ahead of the bow backwards.
     pub fn points(&self) -> &[TrackPoint] {
         self.points.get(..self.count).unwrap_or(&[])
+    }
+
+    /// Corners on the water of each strip from one point to the next, numbered as those of a box that is flat: bit 0 tells sides,
+    /// bit 2 ends.
+    pub fn strips(&self) -> impl ExactSizeIterator<Item = [DVec3; 8]> {
+        self.points().windows(2).map(|pair| {
+            std::array::from_fn(|corner| {
+                let (point, side) = (&pair[corner / 4], if corner & 1 == 0 { 1.0 } else { -1.0 });
+                point.position + (point.starboard * (side * self.half_width_m(point))).extend(0.0)
+            })
+        })
     }
 
     /// The same with every point moved upwards by what `lift` says of its place, metres.
@@ -159,10 +173,6 @@ pub const DISTANCE_POWER: f64 = 0.345;
 /// Froude number by length.
 pub fn froude(speed_m_s: f64, length_m: f64) -> f64 {
     speed_m_s / (GRAVITY_M_S2 * length_m.max(0.1)).sqrt()
-}
-
-fn ahead(state: &CourseState) -> DVec2 {
-    DVec2::new(state.heading.sin(), state.heading.cos())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ash::vk;
-use shaders_spirv::Shader;
+use shaders_spirv::{Shader, interface::DrawBlock};
 
 use crate::{
     error::{Named, RenderError},
@@ -228,6 +228,27 @@ pub(crate) struct PipelineShape<'a> {
     /// Test and write reverse-Z depth.
     pub(crate) depth: bool,
     pub(crate) samples: vk::SampleCountFlags,
+}
+
+impl<'a> PipelineShape<'a> {
+    /// Strips of triangles, told apart by a [`DrawBlock`], laid over the screen by their coverage.
+    pub(crate) fn over_screen(vertex: Shader, fragment: Shader, sets: &'a [&'a SetLayout]) -> Self {
+        Self {
+            vertex,
+            fragment,
+            constants: &[],
+            sets,
+            push: size_of::<DrawBlock>(),
+            vertices: None,
+            topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
+            colour: SRGB,
+            targets: 1,
+            blend: Blend::Over,
+            cull: None,
+            depth: false,
+            samples: vk::SampleCountFlags::TYPE_1,
+        }
+    }
 }
 
 /// A pipeline with its layout.

@@ -29,7 +29,7 @@ use crate::{
     rects::{corners, cut, joined, overlap, rect},
     rounds::round_block,
     view,
-    wake::{spray_rect, strip_rect, wake_block},
+    wake::{spray_rect, strip_rects, wake_block},
     water::{self, HullLine, PHYSICS_WAVES, PhysicsSea, hull_line, mirror_scale, physics_waves, water_block},
 };
 
@@ -185,7 +185,7 @@ impl Plan {
             self.plan_water(scene, models, size, atlas);
         }
         if scene.runs(Pass::Wake) {
-            self.plan_wakes(scene, size);
+            self.plan_wakes(scene);
         }
         if scene.runs(Pass::Rounds) {
             self.plan_rounds(scene);
@@ -226,7 +226,7 @@ impl Plan {
             let Some(Outline { model, boxes, .. }) = models.get(usize::from(boat.model.0)) else { continue };
             let Some(hull) = boat.hull.and_then(|r| cut(r, size)) else { continue };
             // What stands beside the hull asks for its depth.
-            let spray = spray_rect(scene, boat, size).filter(|_| scene.runs(Pass::Wake));
+            let spray = spray_rect(scene, boat).filter(|_| scene.runs(Pass::Wake));
             let rect = spray.map_or(hull, |s| joined(hull, s));
             if self.boats.len() * 2 >= BOAT_BLOCKS_MAX {
                 break;
@@ -374,12 +374,12 @@ impl Plan {
         self.reflect = Some((draw, reflect_block(scene)));
     }
 
-    fn plan_wakes(&mut self, scene: &Scene, size: (u32, u32)) {
+    fn plan_wakes(&mut self, scene: &Scene) {
         for (i, boat) in scene.boats.iter().enumerate().filter(|(_, b)| !b.beyond_horizon) {
             let Some(wake) = &boat.wake else { continue };
             let (block, strips) = wake_block(scene, boat, wake);
             let before = self.touched.len();
-            self.touched.extend((0..strips as usize).filter_map(|s| strip_rect(scene, wake, s, size)));
+            self.touched.extend(strip_rects(scene, wake).take(strips as usize).flatten());
             let spray = self.sprayed.iter().any(|(n, _)| *n == i);
             let strips = if self.touched.len() > before { strips } else { 0 };
             if strips > 0 || spray {

@@ -134,7 +134,13 @@ pub fn add_moving_boat(
 
 /// The same with any pose; the mean water is the world's z = 0. A boat that is not seen is not added.
 pub fn add_boat_in(scene: &mut Scene, models: &[Model], model: usize, pose: RigidPose) {
-    let eye = Eye { camera: &scene.camera, lens: &scene.lens, visibility_m: 20_000.0, reflections: true };
+    let eye = Eye {
+        camera: &scene.camera,
+        lens: &scene.lens,
+        visibility_m: 20_000.0,
+        reflections: true,
+        wakes: true,
+    };
     let model_id = ModelId(u16::try_from(model).unwrap());
     let boat = scene.boats.len();
     let seen = eye.see(&Afloat { boat, model_id, model: &models[model], pose, water_level: 0.0 });

@@ -2,8 +2,8 @@
 
 use bowwave_core::{
     scene::{BoatView, Light, PixelRect, Scene},
-    sea::fresnel,
-    view::NEAR_M,
+    sea::{fresnel, mean_square_slope},
+    view::{bounds, clip_to_screen},
     wake::{FOAM_FROUDE, FOLLOWED_S, SPEED_MIN_M_S, TrackPoint, Wake, froude, height_m},
 };
 use glam::{DMat3, DVec2, DVec3, Vec3};
@@ -22,6 +22,8 @@ const FIT_MAX: f32 = 4.0;
 /// Where a stretch of wake as long as it is wide takes up fewer rows of pixels, nothing is drawn, and from the second on all of it: in
 /// between it fades, so that what shrinks below a pixel does not flicker.
 const ROWS: (f64, f64) = (0.35, 1.5);
+/// Pixels added around a strip, whose sides bulge a little between its corners under a bent lens.
+const STRIP_MARGIN_PX: f64 = 3.0;
 /// Less of a wake is not seen, and its end not either.
 const SHARE_MIN: f64 = 0.02;
 /// What stands beside a hull reaches so far along it: from ahead of the bow, to behind it, in lengths.
@@ -39,8 +41,7 @@ pub(crate) fn wake_block(scene: &Scene, boat: &BoatView, wake: &Wake) -> (WakeBl
     let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
     let light = |v: Vec3, w: f64| v.extend(w as f32).to_array();
     let (high, thrown) = spray(scene, boat, wake);
-    // Cox and Munk 1954: of both directions together.
-    let rough = (0.003 + 0.005_12 * scene.wind.length()).sqrt();
+    let rough = mean_square_slope(scene.wind.length()).sqrt();
     let head = WakeHead {
         up: with(camera_from_world * DVec3::Z, rough),
         hull: [wake.hull.length_m as f32, wake.hull.beam_m as f32, boat.haze, high as f32],
@@ -81,7 +82,7 @@ fn spray(scene: &Scene, boat: &BoatView, wake: &Wake) -> (f64, f64) {
 }
 
 /// The pixels that what stands beside a hull can take; `None` where there is none or it is out of view.
-pub(crate) fn spray_rect(scene: &Scene, boat: &BoatView, size: (u32, u32)) -> Option<PixelRect> {
+pub(crate) fn spray_rect(scene: &Scene, boat: &BoatView) -> Option<PixelRect> {
     let wake = boat.wake.as_ref().filter(|_| !boat.beyond_horizon)?;
     let (high, thrown) = spray(scene, boat, wake);
     let [bow, middle] = [1, 3].map(|i| wake.points().get(i));
@@ -101,7 +102,7 @@ pub(crate) fn spray_rect(scene: &Scene, boat: &BoatView, size: (u32, u32)) -> Op
         let p = scene.lens.project(scene.camera.to_camera(place))?;
         (low, up) = (low.min(p), up.max(p));
     }
-    held(low - 4.0, up + 4.0, size)
+    clip_to_screen(low - 4.0, up + 4.0, scene.lens.width, scene.lens.height)
 }
 
 /// How much of a point's wake is drawn: less with its age, and none of what would be finer than the picture.
@@ -118,53 +119,14 @@ fn share(scene: &Scene, wake: &Wake, point: &TrackPoint) -> f64 {
     if share < SHARE_MIN { 0.0 } else { share }
 }
 
-/// The rectangle of the screen that holds a strip of a wake; `None` out of view.
-pub(crate) fn strip_rect(scene: &Scene, wake: &Wake, strip: usize, size: (u32, u32)) -> Option<PixelRect> {
-    let pair = wake.points().get(strip..strip + 2)?;
-    let corner = |point: &TrackPoint, side: f64| {
-        let across = point.starboard * (side * wake.half_width_m(point));
-        scene.camera.to_camera(point.position + across.extend(0.0))
-    };
-    // Round the strip.
-    let corners =
-        [corner(&pair[0], -1.0), corner(&pair[0], 1.0), corner(&pair[1], 1.0), corner(&pair[1], -1.0)];
-    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    let mut take = |place: DVec3| {
-        // Beside a bent lens's reach: far off in that direction.
-        let far = f64::from(size.0.max(size.1)) * 4.0;
-        let beside = || scene.lens.centre + place.truncate().normalize_or_zero() * far;
-        let p = scene.lens.project(place).unwrap_or_else(beside);
-        (low, high) = (low.min(p), high.max(p));
-    };
-    for (i, a) in corners.iter().enumerate() {
-        let b = &corners[(i + 1) % 4];
-        if a.z >= NEAR_M {
-            take(*a);
-        }
-        // Cut where it passes the camera's plane.
-        if (a.z < NEAR_M) != (b.z < NEAR_M) {
-            take(a.lerp(*b, (NEAR_M - a.z) / (b.z - a.z)));
-        }
-    }
-    // Under a bent lens a strip's sides bulge a little between its corners.
-    held(low - 3.0, high + 3.0, size)
-}
-
-/// Whole pixels of the screen that hold a span.
-fn held(low: DVec2, high: DVec2, size: (u32, u32)) -> Option<PixelRect> {
-    let low = low.max(DVec2::ZERO).floor();
-    let high = high.min(DVec2::new(f64::from(size.0), f64::from(size.1))).ceil();
-    low.cmplt(high).all().then_some(PixelRect {
-        x: low.x as u32,
-        y: low.y as u32,
-        width: (high.x - low.x) as u32,
-        height: (high.y - low.y) as u32,
-    })
+/// The rectangles of the screen that hold the strips of a wake; `None` out of view.
+pub(crate) fn strip_rects(scene: &Scene, wake: &Wake) -> impl Iterator<Item = Option<PixelRect>> {
+    wake.strips().map(|corners| bounds(&scene.camera, &scene.lens, &corners, STRIP_MARGIN_PX))
 }
 
 /// Light of whole foam, which lies flat. A camera bends bright light over before it is white.
 fn foam_light(light: &Light) -> Vec3 {
-    let whole = FOAM_ALBEDO * (light.sun * light.sun_direction.z.max(0.0) as f32 + light.sky);
+    let whole = FOAM_ALBEDO * light.on_level();
     whole * (FOAM_MAX / whole.max_element().max(FOAM_MAX))
 }
 
@@ -227,8 +189,7 @@ mod tests {
         let boat = scene.boats.remove(0);
         let wake = boat.wake.unwrap();
         let (block, strips) = wake_block(&scene, &boat, &wake);
-        for strip in 0..strips as usize {
-            let rect = strip_rect(&scene, &wake, strip, (640, 360));
+        for (strip, rect) in strip_rects(&scene, &wake).take(strips as usize).enumerate() {
             let p = &block.points[strip];
             for side in [-0.99, 0.0, 0.99] {
                 let at = Vec3::from_slice(&p.place) + Vec3::from_slice(&p.side) * (side * p.place[3]);

@@ -8,7 +8,7 @@ use bowwave_core::{
     light::LUMINANCE,
     model::Model,
     scene::{BoatView, Light, PixelRect, ReflectionMethod, Scene, ShadowLevel},
-    sea::{BeaufortForce, Spectrum, WaveField, WaveSpec, fresnel},
+    sea::{BeaufortForce, Spectrum, WaveField, WaveSpec, fresnel, mean_square_slope},
 };
 use glam::{DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, LOBE_COLUMNS, WaterBlock};
@@ -363,7 +363,7 @@ struct Contact {
 impl Contact {
     /// For a hull of a height that is seen along the unit vector `away` with that tangent below the horizontal.
     fn of(light: &Light, away: DVec2, tangent: f64, high_m: f64, wind_m_s: f64) -> Self {
-        let rough = (0.003 + 0.005_12 * wind_m_s).sqrt();
+        let rough = mean_square_slope(wind_m_s).sqrt();
         let luminance = |v: Vec3| f64::from(v.dot(LUMINANCE));
         // What the picture's sea holds beyond the mirrored sky has come out of the water.
         let mirrored = |down: f64| luminance(mirrored_sky(light, down, rough));

@@ -118,7 +118,7 @@ pub struct Seen {
 
 /// Light that comes out of clear coastal water lit by sun and sky, before the surface keeps some of it.
 pub fn water_light(light: &Light) -> Vec3 {
-    WATER * (light.sky + light.sun * light.sun_direction.z.max(0.0) as f32)
+    WATER * light.on_level()
 }
 
 impl Lobes {

@@ -5,7 +5,7 @@ mod optics;
 mod spectrum;
 mod waves;
 
-pub use optics::{Facets, SEA_INDEX, fresnel, rms_slope};
+pub use optics::{Facets, SEA_INDEX, fresnel, mean_square_slope, rms_slope};
 pub use spectrum::{Spectrum, WaveSpec};
 pub use waves::{CHANGE_S, WaterPlane, Wave, WaveField};
 

@@ -18,10 +18,15 @@ pub fn fresnel(cos_incidence: f64) -> f64 {
     0.5 * (s * s + p * p)
 }
 
-/// Root mean square slope along each axis of the open sea under a wind of `wind_m_s`, 12.5 m above it: half of the mean square
-/// slope of both axes together (Cox and Munk 1954, clean surface).
+/// Mean square slope of both axes together of the open sea under a wind of `wind_m_s`, 12.5 m above it (Cox and Munk 1954, clean
+/// surface).
+pub fn mean_square_slope(wind_m_s: f64) -> f64 {
+    0.003 + 5.12e-3 * wind_m_s.max(0.0)
+}
+
+/// Root mean square slope along each axis: half of the mean square of both.
 pub fn rms_slope(wind_m_s: f64) -> f64 {
-    (0.5 * (0.003 + 5.12e-3 * wind_m_s.max(0.0))).sqrt()
+    (0.5 * mean_square_slope(wind_m_s)).sqrt()
 }
 
 /// What water mirrors of other water, as a share of the sky at that elevation.

@@ -158,7 +158,7 @@ impl Fleet {
                 pose: floating.pose,
                 water_level: floating.water_level,
             };
-            into.extend(eye.see_with_wake(&afloat, self.wake(boat, time)));
+            into.extend(eye.see_with_wake(&afloat, || self.wake(boat, time)));
         }
         into.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
     }

@@ -173,15 +173,7 @@ impl Session {
             wind: scenario.wind.truncate(),
             sky: meter.sky(scenario.wind.length()),
             tones: meter.tones(),
-            hud: Hud {
-                status: Status::Ready,
-                warning: None,
-                rounds_left: scenario.weapon.belt,
-                shots: 0,
-                hits: 0,
-                clock_s: 0.0,
-                sea: None,
-            },
+            hud: Hud { rounds_left: scenario.weapon.belt, ..Hud::READY },
         };
         Ok(Self {
             lens,
@@ -397,19 +389,16 @@ impl Session {
         scene.rounds.clear();
         if let (Some(camera), Some(running)) = (&camera, &self.running) {
             scene.camera = *camera;
+            // A computer that is too hot draws no reflections and wakes: half of the work.
+            let cool = !self.faults.is_active(Fault::Thermal);
             let eye = Eye {
                 camera,
                 lens: &self.lens,
                 visibility_m: self.setup.scenario.visibility_m,
-                // A computer that is too hot draws no reflections: half of the work.
-                reflections: self.plan.has(Pass::Water)
-                    && !self.faults.is_active(Fault::Thermal)
-                    && sea_reflects(scene.water.force),
+                reflections: cool && self.plan.has(Pass::Water) && sea_reflects(scene.water.force),
+                wakes: cool && self.plan.has(Pass::Wake),
             };
             running.fleet.seen(&eye, video_time, &mut scene.boats);
-            if self.faults.is_active(Fault::Thermal) {
-                scene.boats.iter_mut().for_each(|boat| boat.wake = None);
-            }
             running.rounds.views(video_time, running.start, &running.fleet, &mut scene.rounds);
             scene.rounds.retain(|r| eye.sees_round(r));
             let range = |r: &RoundView| r.place().distance(camera.position);
@@ -504,6 +493,7 @@ impl Session {
             lens: &self.lens,
             visibility_m: self.setup.scenario.visibility_m,
             reflections: self.plan.has(Pass::Water),
+            wakes: self.plan.has(Pass::Wake),
         };
         let models = &self.setup.models;
         let boats: Vec<_> = self
@@ -525,7 +515,6 @@ impl Session {
                     turn_rate: 0.0,
                 };
                 let wake = || Wake::of(Hull::of(model), f64::from(-model.min.z), 0.0, |_| under_way, |_| 0.0);
-                let wake = self.plan.has(crate::scene::Pass::Wake).then(wake).flatten();
                 eye.see_with_wake(&Afloat { boat, model_id: *id, model, pose, water_level: 0.0 }, wake)
             })
             .collect();

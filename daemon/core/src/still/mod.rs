@@ -8,14 +8,14 @@ mod read;
 use glam::{DVec2, DVec3};
 
 use crate::{
-    boats::{CourseState, Hull, float},
+    boats::{CourseState, Hull, ahead, float},
     event::Picture,
     geometry::{CameraPose, Lens},
     light::LightMeter,
     model::{Model, ModelId},
     plan::{Needs, ScenePlan},
     scenario::{CAMERA_CLEAR_M, ScenarioError, place, table::Mark},
-    scene::{Hud, LeftOut, Pass, PassDecision, Scene, Status, Water},
+    scene::{Hud, LeftOut, Pass, PassDecision, Scene, Water},
     sea::{WaveField, WaveSpec},
     time::Time,
     view::{Afloat, Eye},
@@ -143,6 +143,7 @@ impl Still {
             lens: &lens,
             visibility_m: self.visibility_m,
             reflections: plan.has(Pass::Water),
+            wakes: plan.has(Pass::Wake),
         };
         let waves = WaveField::new(&self.waves, self.seed);
         let time_s = f64::from(index) * self.interval_s.unwrap_or(0.0);
@@ -150,8 +151,7 @@ impl Still {
         for (number, id) in boat_models.iter().enumerate().take(self.boats.len()) {
             let Some(model) = models.get(usize::from(id.0)) else { continue };
             let afloat = self.afloat(number, (*id, model), &eye, &waves, time_s)?;
-            let wake = self.wake(number, &afloat, &waves, time_s);
-            boats.extend(eye.see_with_wake(&afloat, wake));
+            boats.extend(eye.see_with_wake(&afloat, || self.wake(number, &afloat, &waves, time_s)));
         }
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
         let mut passes = plan.frame(true, &boats, &[]);
@@ -160,15 +160,6 @@ impl Still {
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.sun_strength as f32;
-        let hud = Hud {
-            status: Status::Ready,
-            warning: None,
-            rounds_left: 0,
-            shots: 0,
-            hits: 0,
-            clock_s: 0.0,
-            sea: None,
-        };
         let scene = Scene {
             frame: u64::from(index),
             camera,
@@ -181,7 +172,7 @@ impl Still {
             wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),
             sky: meter.sky(self.water.force.wind_mean_m_s()),
             tones: meter.tones(),
-            hud,
+            hud: Hud::READY,
         };
         Ok(Composed { scene, plan })
     }
@@ -205,8 +196,8 @@ impl Still {
             },
         };
         let clear_m = model.radius_m() + CAMERA_CLEAR_M;
-        let ahead = DVec2::new(boat.heading.sin(), boat.heading.cos());
-        let position = start + ahead * (boat.speed_m_s * time_s);
+        let forward = ahead(boat.heading);
+        let position = start + forward * (boat.speed_m_s * time_s);
         if position.length() < clear_m {
             return refuse(format!(
                 "{} lies {:.1} m off, but its model {} needs {clear_m:.1} m; put it farther off",
@@ -236,9 +227,9 @@ impl Still {
     fn wake(&self, number: usize, afloat: &Afloat<'_>, waves: &WaveField, time_s: f64) -> Option<Wake> {
         let boat = self.boats.get(number)?;
         let hull = Hull::of(afloat.model);
-        let ahead = DVec2::new(boat.heading.sin(), boat.heading.cos());
+        let forward = ahead(boat.heading);
         let state = |t: f64| CourseState {
-            position: afloat.pose.position.truncate() + ahead * (boat.speed_m_s * (t - time_s)),
+            position: afloat.pose.position.truncate() + forward * (boat.speed_m_s * (t - time_s)),
             heading: boat.heading,
             speed_m_s: boat.speed_m_s,
             turn_rate: 0.0,

@@ -13,7 +13,7 @@ use crate::{
     memory::{Image, ImageShape},
     meshes::Meshes,
     passes::{DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED},
-    pipeline::{Blend, Bound, DEPTH, Pipeline, PipelineShape, SAMPLES, SRGB, Sampler, SetLayout, UNORM},
+    pipeline::{Blend, Bound, DEPTH, Pipeline, PipelineShape, SAMPLES, Sampler, SetLayout, UNORM},
     recorder::{Begin, Recorder, Step},
     rects::joined,
 };
@@ -28,6 +28,13 @@ pub(crate) struct BoatDraw {
     pub(crate) rect: PixelRect,
     /// By how much it may be simplified unseen, metres.
     pub(crate) detail_m: f64,
+}
+
+/// Depth of the boats' layer as a fragment shader reads it, valid within the hulls' rectangles.
+pub(crate) struct HullDepth {
+    pub(crate) set: vk::DescriptorSet,
+    pub(crate) layout: SetLayout,
+    _sampler: Sampler,
 }
 
 /// What draws meshes: closed parts without their back faces, open shells from both sides, textured ones with their texture.
@@ -135,19 +142,8 @@ impl BoatsPass {
         let composite = Pipeline::new(
             gpu,
             &PipelineShape {
-                vertex: RECT_VERT,
-                fragment: COMPOSITE_FRAG,
                 constants: &[SAMPLES.as_raw()],
-                sets: &[making.frame_set, &set_layout],
-                push: size_of::<DrawBlock>(),
-                vertices: None,
-                topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
-                colour: SRGB,
-                targets: 1,
-                blend: Blend::Over,
-                cull: None,
-                depth: false,
-                samples: vk::SampleCountFlags::TYPE_1,
+                ..PipelineShape::over_screen(RECT_VERT, COMPOSITE_FRAG, &[making.frame_set, &set_layout])
             },
         )?;
         Ok(Self {
@@ -180,9 +176,14 @@ impl BoatsPass {
         ]
     }
 
-    /// Depth of the layer, valid within the hulls' rectangles.
-    pub(crate) fn depth(&self) -> &Image {
-        &self.depth
+    /// What lets another pass hide behind hulls.
+    pub(crate) fn hull_depth(&self, making: &Making<'_>) -> Result<HullDepth, RenderError> {
+        let sampler = Sampler::new(making.gpu, vk::Filter::NEAREST, false)?;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
+        let layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let bound = Bound::Texture { view: self.depth.view, sampler: sampler.raw, layout: SAMPLED.2 };
+        let set = making.pool.set(&layout, &[bound])?;
+        Ok(HullDepth { set, layout, _sampler: sampler })
     }
 
     /// Draws the boats into the layer. Only the pixels that they can cover are cleared.

@@ -15,7 +15,7 @@ use crate::{
     hud_layout::{HudLayout, KINDS, text_px},
     memory::{Image, ImageShape},
     passes::{DRAWN, FORGET_READ, Making, SAMPLED},
-    pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
+    pipeline::{Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
     recorder::{Begin, Recorder, Step},
     upload::upload_image,
 };
@@ -59,19 +59,9 @@ impl HudPass {
             Pipeline::new(
                 gpu,
                 &PipelineShape {
-                    vertex: HUD_VERT,
-                    fragment: HUD_FRAG,
                     constants: &[kind],
-                    sets: &[making.frame_set, &set_layout],
                     push: 0,
-                    vertices: None,
-                    topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
-                    colour: SRGB,
-                    targets: 1,
-                    blend: Blend::Over,
-                    cull: None,
-                    depth: false,
-                    samples: vk::SampleCountFlags::TYPE_1,
+                    ..PipelineShape::over_screen(HUD_VERT, HUD_FRAG, &[making.frame_set, &set_layout])
                 },
             )
         };

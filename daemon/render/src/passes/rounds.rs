@@ -7,8 +7,11 @@ use shaders_spirv::{ROUND_FRAG, ROUND_HIDDEN_FRAG, ROUND_VERT, Shader, interface
 
 use crate::{
     error::RenderError,
-    passes::{Making, SAMPLED, boats::BoatsPass},
-    pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
+    passes::{
+        Making,
+        boats::{BoatsPass, HullDepth},
+    },
+    pipeline::{Pipeline, PipelineShape, SetLayout},
     recorder::Recorder,
     rects::{around_all, corners, overlap},
 };
@@ -43,9 +46,7 @@ pub(crate) fn pieces(
 /// What draws where hulls may stand before rounds.
 struct Hidden {
     pipeline: Pipeline,
-    set: vk::DescriptorSet,
-    _sampler: Sampler,
-    _set_layout: SetLayout,
+    depth: HullDepth,
 }
 
 /// The rounds' pass.
@@ -67,7 +68,7 @@ impl RoundsPass {
         for draw in draws {
             let pipeline = match self.hidden.as_ref().filter(|_| draw.hidden) {
                 Some(hidden) => {
-                    to.bind(&hidden.pipeline, &[frame, hidden.set]);
+                    to.bind(&hidden.pipeline, &[frame, hidden.depth.set]);
                     &hidden.pipeline
                 }
                 None => {
@@ -84,35 +85,14 @@ impl RoundsPass {
 
 impl Hidden {
     fn new(making: &Making<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
-        let sampler = Sampler::new(making.gpu, vk::Filter::NEAREST, false)?;
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let set_layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let bound = Bound::Texture { view: boats.depth().view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let set = making.pool.set(&set_layout, &[bound])?;
-        let pipeline = pipeline(making, ROUND_HIDDEN_FRAG, &[making.frame_set, &set_layout])?;
-        Ok(Self { pipeline, set, _sampler: sampler, _set_layout: set_layout })
+        let depth = boats.hull_depth(making)?;
+        let pipeline = pipeline(making, ROUND_HIDDEN_FRAG, &[making.frame_set, &depth.layout])?;
+        Ok(Self { pipeline, depth })
     }
 }
 
 fn pipeline(making: &Making<'_>, fragment: Shader, sets: &[&SetLayout]) -> Result<Pipeline, RenderError> {
-    Pipeline::new(
-        making.gpu,
-        &PipelineShape {
-            vertex: ROUND_VERT,
-            fragment,
-            constants: &[],
-            sets,
-            push: size_of::<DrawBlock>(),
-            vertices: None,
-            topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
-            colour: SRGB,
-            targets: 1,
-            blend: Blend::Over,
-            cull: None,
-            depth: false,
-            samples: vk::SampleCountFlags::TYPE_1,
-        },
-    )
+    Pipeline::new(making.gpu, &PipelineShape::over_screen(ROUND_VERT, fragment, sets))
 }
 
 #[cfg(test)]

@@ -6,8 +6,11 @@ use shaders_spirv::{SPRAY_FRAG, SPRAY_VERT, Shader, WAKE_FRAG, WAKE_VERT, interf
 
 use crate::{
     error::RenderError,
-    passes::{Making, SAMPLED, boats::BoatsPass},
-    pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
+    passes::{
+        Making,
+        boats::{BoatsPass, HullDepth},
+    },
+    pipeline::{Pipeline, PipelineShape, SetLayout},
     recorder::Recorder,
 };
 
@@ -33,44 +36,19 @@ pub(crate) struct WakeDraw {
 pub(crate) struct WakePass {
     pipeline: Pipeline,
     spray: Pipeline,
-    depth: vk::DescriptorSet,
-    _sampler: Sampler,
-    _set_layout: SetLayout,
+    depth: HullDepth,
 }
 
 impl WakePass {
     pub(crate) fn new(making: &Making<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
-        let sampler = Sampler::new(making.gpu, vk::Filter::NEAREST, false)?;
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let set_layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let bound = Bound::Texture { view: boats.depth().view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let depth = making.pool.set(&set_layout, &[bound])?;
+        let depth = boats.hull_depth(making)?;
         let pipeline = |vertex: Shader, fragment: Shader, sets: &[&SetLayout]| {
-            Pipeline::new(
-                making.gpu,
-                &PipelineShape {
-                    vertex,
-                    fragment,
-                    constants: &[],
-                    sets,
-                    push: size_of::<DrawBlock>(),
-                    vertices: None,
-                    topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
-                    colour: SRGB,
-                    targets: 1,
-                    blend: Blend::Over,
-                    cull: None,
-                    depth: false,
-                    samples: vk::SampleCountFlags::TYPE_1,
-                },
-            )
+            Pipeline::new(making.gpu, &PipelineShape::over_screen(vertex, fragment, sets))
         };
         Ok(Self {
             pipeline: pipeline(WAKE_VERT, WAKE_FRAG, &[making.frame_set])?,
-            spray: pipeline(SPRAY_VERT, SPRAY_FRAG, &[making.frame_set, &set_layout])?,
+            spray: pipeline(SPRAY_VERT, SPRAY_FRAG, &[making.frame_set, &depth.layout])?,
             depth,
-            _sampler: sampler,
-            _set_layout: set_layout,
         })
     }
 
@@ -85,7 +63,7 @@ impl WakePass {
 
     /// Draws what stands up beside the hulls, within a rendering to the screen. The boats' depth is ready to be sampled.
     pub(crate) fn record_spray(&self, to: Recorder<'_>, frame: vk::DescriptorSet, wakes: &[WakeDraw]) {
-        to.bind(&self.spray, &[frame, self.depth]);
+        to.bind(&self.spray, &[frame, self.depth.set]);
         for wake in wakes.iter().filter(|w| w.spray) {
             to.push(&self.spray, &DrawBlock { index: wake.index, ..DrawBlock::default() });
             to.draw(SHEET_CORNERS, SHEETS);

@@ -9,7 +9,7 @@ use crate::{
     error::RenderError,
     memory::{Image, ImageShape},
     passes::{COPIED_TO, DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass},
-    pipeline::{Blend, Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout, UNORM},
+    pipeline::{Blend, Bound, Pipeline, PipelineShape, Sampler, SetLayout, UNORM},
     recorder::{Begin, Recorder, Step},
     rects::joined,
 };
@@ -92,19 +92,8 @@ impl WaterPass {
             let pipeline = Pipeline::new(
                 gpu,
                 &PipelineShape {
-                    vertex: RECT_VERT,
-                    fragment: WATER_FRAG,
                     constants: &[method_constant(method), shadow_constant(shadow)],
-                    sets: &[making.frame_set, &set_layout],
-                    push: size_of::<DrawBlock>(),
-                    vertices: None,
-                    topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
-                    colour: SRGB,
-                    targets: 1,
-                    blend: Blend::Over,
-                    cull: None,
-                    depth: false,
-                    samples: vk::SampleCountFlags::TYPE_1,
+                    ..PipelineShape::over_screen(RECT_VERT, WATER_FRAG, &[making.frame_set, &set_layout])
                 },
             )?;
             variants.push(Variant { method, shadow, pipeline });
@@ -212,19 +201,9 @@ impl Field {
         let pipeline = Pipeline::new(
             gpu,
             &PipelineShape {
-                vertex: RECT_VERT,
-                fragment: FIELD_FRAG,
-                constants: &[],
-                sets: &[making.frame_set, &set_layout],
-                push: size_of::<DrawBlock>(),
-                vertices: None,
-                topology: vk::PrimitiveTopology::TRIANGLE_STRIP,
                 colour: format,
-                targets: 1,
                 blend: Blend::Replace,
-                cull: None,
-                depth: false,
-                samples: vk::SampleCountFlags::TYPE_1,
+                ..PipelineShape::over_screen(RECT_VERT, FIELD_FRAG, &[making.frame_set, &set_layout])
             },
         )?;
         Ok(Self { pipeline, image, set, _set_layout: set_layout })

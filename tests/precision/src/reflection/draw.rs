@@ -10,7 +10,7 @@ use bowwave_core::{
     model::{Model, ModelId},
     plan::sea_reflects,
     reflection::{SKY_SINES, Sample, SeaTones, SkyLight},
-    scene::{Hud, LeftOut, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
+    scene::{Hud, LeftOut, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Water},
     sea::BeaufortForce,
     view::{Afloat, Eye},
 };
@@ -101,7 +101,7 @@ pub fn forced_scene(cell: &Cell, method: ReflectionMethod, beliefs: &Beliefs, mo
         (camera, pose, beliefs.eye)
     };
     let (model_id, model) = models.of(size);
-    let eye = Eye { camera: &camera, lens: &cell.lens, visibility_m: 1e9, reflections: true };
+    let eye = Eye { camera: &camera, lens: &cell.lens, visibility_m: 1e9, reflections: true, wakes: false };
     let water_level = pose.position.z;
     let boat = eye.see(&Afloat { boat: 0, model_id, model, pose, water_level });
     // The truth's Earth is flat.
@@ -151,15 +151,7 @@ pub fn bare_scene(camera: CameraPose, lens: Lens, water: Water, light: bowwave_c
         wind: DVec2::ZERO,
         sky: SkyLight::of_bands(light.horizon, light.sky),
         tones: SeaTones::default(),
-        hud: Hud {
-            status: Status::Ready,
-            warning: None,
-            rounds_left: 0,
-            shots: 0,
-            hits: 0,
-            clock_s: 0.0,
-            sea: None,
-        },
+        hud: Hud::READY,
     }
 }
 

@@ -130,7 +130,7 @@ pub fn scene(
     let mut scene = bare_scene(camera, lens, Water { method, force, shadow: ShadowLevel::None }, light);
     scene.tones = tones;
     scene.wind = DVec2::new(0.6, -0.8) * force.wind_mean_m_s();
-    let eye = Eye { camera: &camera, lens: &lens, visibility_m: 1e9, reflections: true };
+    let eye = Eye { camera: &camera, lens: &lens, visibility_m: 1e9, reflections: true, wakes: false };
     for (boat, afloat) in boats.iter().enumerate() {
         let (pose, water_level) = (afloat.pose(), afloat.water_level);
         let seen = eye.see(&Afloat { boat, model_id: ModelId(0), model, pose, water_level });
