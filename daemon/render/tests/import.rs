@@ -24,9 +24,11 @@ use bowwave_core::{
 };
 use bowwave_render::{PictureCounts, PicturePath, Renderer};
 use common::{assert_clean, config, open, submit, testing::empty_scene};
-use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous, munmap};
+use rustix::mm::{MapFlags, MprotectFlags, ProtFlags, mmap_anonymous, mprotect, munmap};
 
-/// Pages of this process, as a driver's buffer.
+const PAGE: usize = 4096;
+
+/// Pages of this process, as a driver's buffer. Nobody may touch what lies before and behind them.
 struct Pages {
     start: *mut u8,
     len: usize,
@@ -40,13 +42,15 @@ unsafe impl Sync for Pages {}
 
 impl Pages {
     fn new(bytes: &[u8], alive: &Arc<AtomicUsize>) -> Arc<Self> {
-        let len = bytes.len().next_multiple_of(4096);
-        // SAFETY: a new mapping; the copy stays within it.
+        let len = bytes.len().next_multiple_of(PAGE);
+        // SAFETY: a new mapping; protection and copy stay within it.
         let start = unsafe {
-            let start =
-                mmap_anonymous(ptr::null_mut(), len, ProtFlags::READ | ProtFlags::WRITE, MapFlags::PRIVATE)
+            let around =
+                mmap_anonymous(ptr::null_mut(), len + 2 * PAGE, ProtFlags::empty(), MapFlags::PRIVATE)
                     .unwrap()
                     .cast::<u8>();
+            let start = around.add(PAGE);
+            mprotect(start.cast(), len, MprotectFlags::READ | MprotectFlags::WRITE).unwrap();
             ptr::copy_nonoverlapping(bytes.as_ptr(), start, bytes.len());
             start
         };
@@ -58,7 +62,7 @@ impl Pages {
 impl Drop for Pages {
     fn drop(&mut self) {
         // SAFETY: nobody holds the mapping any more.
-        unsafe { munmap(self.start.cast(), self.len) }.unwrap();
+        unsafe { munmap(self.start.sub(PAGE).cast(), self.len + 2 * PAGE) }.unwrap();
         self.alive.fetch_sub(1, Ordering::SeqCst);
     }
 }
