@@ -1,8 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// What a cell of water throws back of a boat, and what share of the cell's own light the boat takes from it: for a dark, a middling and a
-// bright pixel; and the colour of that share, with the luminance above which light is the sun's. It changes slowly over the screen, so a cell is a few pixels; boats add up. As the host's
-// reflection::compose.
+// What water throws back of a boat, and what share of the water's own light the boat takes from it: for a dark, a middling and a bright
+// pixel; and the colour of that share, with the luminance above which light is the sun's. A texel is a place across the hull and a step
+// away from it, so that their number follows neither the screen's nor the boat's size. As the host's reflection::compose. Roots are
+// written: what is small keeps its digits.
 #include "frame.glsl"
 #include "water_block.glsl"
 #include "lobe_block.glsl"
@@ -20,8 +21,6 @@ layout(location = 1) out vec4 middle;
 layout(location = 2) out vec4 bright;
 layout(location = 3) out vec4 coloured;
 
-// Pixels of the screen to a cell.
-const vec2 CELL = vec2(4.0, 2.0);
 // No narrower a stretch of hull is asked for, half of it in pixels.
 const float HALF_WIDTH_MIN = 1.5;
 
@@ -37,35 +36,20 @@ vec4 running(float place, int row) {
 
 void main() {
     uint i = draw.index;
-    vec4 place = boats[i].place, board = boats[i].board;
-    vec2 from_anchor = gl_FragCoord.xy * CELL - waters[i].anchor;
-    vec2 down = waters[i].down;
-    float across = dot(from_anchor, vec2(down.y, -down.x));
-    float column = clamp((across - waters[i].columns.x) * waters[i].columns.y, 0.0, float(HULL_LINE_COLUMNS - 1));
-    int first = min(int(column), HULL_LINE_COLUMNS - 2);
-    float line = mix(hull_line(first), hull_line(first + 1), column - float(first));
-    float below = dot(from_anchor, down) - line;
-    float near = max(place.x + line * place.y, 1e-5);
-    // Water above the line is a wave before the hull, as far from it as one as far below.
-    float tangent = max(near + abs(below) * place.y, 1e-5);
-    float far = place.z * (1.0 / near - 1.0 / tangent);
-    float at_step = sqrt(max(far * place.w, 0.0)) * float(STEPS - 1);
-    int low = min(int(at_step), STEPS - 2);
-    float part = at_step - float(low);
-    // Cells that lie half above the line keep the hull's foot wet where they are blended into those below.
-    if (below < -boats[i].foot.x || at_step >= float(STEPS - 1)) {
-        discard;
-    }
-    float pixels = board.w * near / place.x;
+    vec4 place = boats[i].place, board = boats[i].board, span = boats[i].span;
+    int column = int(gl_FragCoord.x), at_step = int(gl_FragCoord.y) - int(i) * STEPS;
+    float side = span.z + span.w * float(at_step);
+    float across = span.x - side + (span.y + 2.0 * side) * float(column) / float(LAYER_COLUMNS - 1);
+    float of_line = clamp((across - waters[i].columns.x) * waters[i].columns.y, 0.0, float(HULL_LINE_COLUMNS - 1));
+    int first = min(int(of_line), HULL_LINE_COLUMNS - 2);
+    float line = mix(hull_line(first), hull_line(first + 1), of_line - float(first));
+    float pixels = board.w * max(place.x + line * place.y, 1e-5) / place.x;
     float scale = 1.0 / board.z;
     vec4 sum[3] = vec4[3](vec4(0.0), vec4(0.0), vec4(0.0));
     vec4 hue = vec4(0.0);
     for (int band = 0; band < BANDS; ++band) {
-        vec4 thrown = mix(boats[i].lobes[low][3 * band], boats[i].lobes[low + 1][3 * band], part);
-        vec4 taken = mix(boats[i].lobes[low][3 * band + 1], boats[i].lobes[low + 1][3 * band + 1], part);
-        if (max(max(thrown.x, thrown.y), thrown.z) < 1e-4) {
-            continue;
-        }
+        vec4 thrown = boats[i].lobes[at_step][3 * band];
+        vec4 taken = boats[i].lobes[at_step][3 * band + 1];
         float centre = (across + thrown.w * pixels - board.y) * scale;
         float reach = max(taken.w * pixels, HALF_WIDTH_MIN) * scale;
         int row = int(i) * BANDS + band;
@@ -73,10 +57,11 @@ void main() {
         sum[0] += seen * vec4(thrown.xxx, taken.x);
         sum[1] += seen * vec4(thrown.yyy, taken.y);
         sum[2] += seen * vec4(thrown.zzz, taken.z);
-        hue += seen.w * taken.y * mix(boats[i].lobes[low][3 * band + 2], boats[i].lobes[low + 1][3 * band + 2], part);
+        hue += seen.w * taken.y * boats[i].lobes[at_step][3 * band + 2];
     }
-    dark = sum[0];
-    middle = sum[1];
-    bright = sum[2];
-    coloured = hue;
+    dark = sqrt(max(sum[0], 0.0));
+    middle = sqrt(max(sum[1], 0.0));
+    bright = sqrt(max(sum[2], 0.0));
+    // Only its ratios count.
+    coloured = sqrt(max(0.5 * hue, 0.0));
 }

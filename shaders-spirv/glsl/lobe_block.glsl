@@ -1,12 +1,13 @@
 // What the sea throws back of one boat (set 0, binding 6); the host's side is core's reflection::Lobes.
 const int BANDS = 14;
-const int STEPS = 64;
+const int STEPS = 32;
 const int COLUMNS = 64;
+const int LAYER_COLUMNS = 96;
 
 struct LobeBlock {
     vec4 place;             // tangent below the horizontal at the anchor, 1 / pixels to a tangent of 1, eye over the water (m), 1 / reach (1/m)
     vec4 board;             // height of the boat (m), across position of its picture's first column, pixels to a column, pixels to a metre
-    vec4 foot;              // pixels above the hull-water line that are drawn
+    vec4 span;              // across position of the hull's left end, its width, how much farther the reflection goes to each side at the hull and a step, pixels
     vec4 lobes[STEPS][3 * BANDS];  // by distance and band: thrown back by tone, metres aside; taken away by tone, half width in metres; hue of that, most luminance of the sky
 };
 

@@ -1,17 +1,22 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The sea with the boats in it: each pixel takes from the layers what belongs to its own brightness, so that the waves of the video go
-// through the reflection. Output is premultiplied: it covers what the boats hide of a pixel's light and adds what is seen of them.
+// The sea with a boat in it: each pixel takes from the layers what belongs to its own brightness, so that the waves of the video go
+// through the reflection. Output is premultiplied: it covers what the boat hides of a pixel's light and adds what is seen
+// of it.
 #include "frame.glsl"
+#include "water_block.glsl"
 
 layout(push_constant) uniform ReflectBlock {
     vec4 rect;
     uint index;
     uint first;
-    vec2 pad;
+    float foot;    // pixels above the hull-water line that are drawn
+    float pad;
     vec4 tangent;  // tangent below the horizontal: for each pixel right and down, and at pixel (0, 0)
     vec4 mean;     // sea's mean luma: coefficients of the tangent's root; smallest root
     vec4 spread;   // its standard deviation; largest root
+    vec4 place;    // as in the boat's block of lobes
+    vec4 span;     // as there
 } draw;
 
 // The video beneath, as codes.
@@ -23,12 +28,16 @@ layout(set = 1, binding = 4) uniform sampler2D coloured;
 
 layout(location = 0) out vec4 colour;
 
-const vec2 CELL = vec2(4.0, 2.0);
+const int STEPS = 32;
 // Standard deviations from the mean of the dark and the bright layer, as the host's TONE_OUTER; smallest spread, as its SPREAD_MIN.
 const float TONE = 1.15;
 const float SPREAD_MIN = 0.004;
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+
+float hull_line(int column) {
+    return waters[draw.index].hull_line[column >> 2][column & 3];
+}
 
 float curve(vec4 c, float x) {
     return c.x + x * (c.y + x * c.z);
@@ -36,18 +45,38 @@ float curve(vec4 c, float x) {
 
 void main() {
     vec2 at = gl_FragCoord.xy;
+    vec2 from_anchor = at - waters[draw.index].anchor, down = waters[draw.index].down;
+    float across = dot(from_anchor, vec2(down.y, -down.x));
+    vec2 columns = waters[draw.index].columns;
+    float column = clamp((across - columns.x) * columns.y, 0.0, float(HULL_LINE_COLUMNS - 1));
+    int first = min(int(column), HULL_LINE_COLUMNS - 2);
+    float line = mix(hull_line(first), hull_line(first + 1), column - float(first));
+    float below = dot(from_anchor, down) - line;
+    float near = max(draw.place.x + line * draw.place.y, 1e-5);
+    // Water above the line is a wave before the hull, as far from it as one as far below.
+    float beneath = max(near + abs(below) * draw.place.y, 1e-5);
+    float far = draw.place.z * (1.0 / near - 1.0 / beneath);
+    float at_step = sqrt(max(far * draw.place.w, 0.0)) * float(STEPS - 1);
+    if (below < -draw.foot || at_step >= float(STEPS - 1)) {
+        discard;
+    }
+    float side = draw.span.z + draw.span.w * at_step;
+    vec2 texels = vec2(textureSize(middle, 0));
+    float over = (across - draw.span.x + side) / (draw.span.y + 2.0 * side) * (texels.x - 1.0);
+    vec2 uv = (vec2(over, at_step + float(int(draw.index) * STEPS)) + 0.5) / texels;
     vec3 code = texelFetch(video, ivec2(at), 0).rgb;
     float luma = dot(code, LUMINANCE);
     float root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);
     float tone = (luma - curve(draw.mean, root)) / (max(curve(draw.spread, root), SPREAD_MIN) * TONE);
     tone = clamp(tone, -1.0, 1.0);
-    vec2 uv = at / (vec2(textureSize(middle, 0)) * CELL);
     vec4 layer = texture(middle, uv) * (1.0 - abs(tone)) + texture(dark, uv) * max(-tone, 0.0)
         + texture(bright, uv) * max(tone, 0.0);
+    layer *= layer;
     // sRGB code to linear light within 0.002.
     vec3 light = code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
     // All tones have the middle one's colour.
     vec4 hue = texture(coloured, uv);
+    hue *= hue;
     float whole = max(dot(hue.rgb, LUMINANCE), 1e-6);
     // Light over what waves mirror of the sky is the sun's glitter, of which a boat hides little.
     float of_sky = min(hue.a / max(whole * dot(light, LUMINANCE), 1e-6), 1.0);

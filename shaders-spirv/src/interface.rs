@@ -168,9 +168,11 @@ impl Default for WaterBlock {
 /// Bands of height that a [`LobeBlock`] holds a boat in.
 pub const LOBE_BANDS: usize = 14;
 /// Distances from the hull that a [`LobeBlock`] knows.
-pub const LOBE_STEPS: usize = 64;
+pub const LOBE_STEPS: usize = 32;
 /// Columns of a boat's bands on the GPU.
 pub const LOBE_COLUMNS: u32 = 64;
+/// Columns of what the sea throws back of a boat on the GPU.
+pub const LAYER_COLUMNS: u32 = 96;
 
 /// What the sea throws back of one boat: `LobeBlock`, set 0, binding 6, std430. Goes with the [`WaterBlock`] of the same index.
 #[repr(C)]
@@ -180,13 +182,14 @@ pub struct LobeBlock {
     pub place: [f32; 4],
     /// Height of the boat, m; across position of its picture's first column, pixels to a column; pixels to a metre at the anchor.
     pub board: [f32; 4],
-    /// Pixels above the hull-water line that are drawn; unused.
-    pub foot: [f32; 4],
+    /// Across position of the hull's left end; its width; how much farther the reflection goes to each side, at the hull and more with
+    /// each step; pixels.
+    pub span: [f32; 4],
     /// By distance and band: light thrown back by three tones, metres aside; share of a pixel's luminance taken away by tone, half width in metres;
     /// colour of that share, luminance above which light is the sun's.
     pub lobes: [[[[f32; 4]; 3]; LOBE_BANDS]; LOBE_STEPS],
 }
-layout!(LobeBlock, 48 + 64 * 48 * LOBE_BANDS, place = 0, board = 16, foot = 32, lobes = 48);
+layout!(LobeBlock, 48 + LOBE_STEPS * 48 * LOBE_BANDS, place = 0, board = 16, span = 32, lobes = 48);
 
 impl Default for LobeBlock {
     fn default() -> Self {
@@ -340,20 +343,39 @@ layout!(DrawBlock, 24, rect = 0, index = 16, first = 20);
 pub struct ReflectBlock {
     /// What is added to each quad of the frame's list.
     pub rect: [f32; 4],
-    /// Unused.
+    /// Index of the boat's [`WaterBlock`] and [`LobeBlock`].
     pub index: u32,
     /// First quad of the frame's list.
     pub first: u32,
+    /// Pixels above the hull-water line that are drawn.
+    pub foot: f32,
     /// Keeps the alignment.
-    pub pad: [f32; 2],
+    pub pad: f32,
     /// Tangent below the horizontal: for each pixel right and down, at pixel (0, 0), unused.
     pub tangent: [f32; 4],
     /// Mean of the sea's luma: coefficients of the tangent's root's powers 0 to 2; smallest root.
     pub mean: [f32; 4],
     /// Standard deviation of it; largest root.
     pub spread: [f32; 4],
+    /// The same as in the [`LobeBlock`].
+    pub place: [f32; 4],
+    /// Likewise.
+    pub span: [f32; 4],
 }
-layout!(ReflectBlock, 80, rect = 0, index = 16, first = 20, pad = 24, tangent = 32, mean = 48, spread = 64,);
+layout!(
+    ReflectBlock,
+    112,
+    rect = 0,
+    index = 16,
+    first = 20,
+    foot = 24,
+    pad = 28,
+    tangent = 32,
+    mean = 48,
+    spread = 64,
+    place = 80,
+    span = 96,
+);
 
 /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.
 #[repr(C)]

@@ -15,6 +15,8 @@ use crate::{coverage::Cells, water::HullLine};
 const OVERHANG: f64 = 0.12;
 /// Pixels above the hull-water line that are drawn, so that no bare water shows between hull and reflection.
 const FOOT_PX: f64 = 3.0;
+/// Pixels beyond the farthest light of a reflection.
+const SIDE_MARGIN_PX: f64 = 4.0;
 /// Pieces in which a reflection's outline is marked.
 const PIECES: usize = 8;
 
@@ -75,7 +77,9 @@ impl Waves {
         let pitch = (last - first + 2.0 * overhang) / f64::from(LOBE_COLUMNS);
         let pixels = focal * tangent / eye_m;
         out.place = [tangent, 1.0 / focal, eye_m, 1.0 / self.lobes.reach_m].map(|v| v as f32);
-        out.foot = [FOOT_PX as f32, 0.0, 0.0, 0.0];
+        let reach = Reach { tangent, focal, pixels, overhang, eye_m };
+        let (side, more) = self.sides(&reach);
+        out.span = [first, last - first, side, more].map(|v| v as f32);
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
             for (vectors, lobe) in step.iter_mut().zip(bands) {
@@ -87,7 +91,26 @@ impl Waves {
                 ];
             }
         }
-        Some(Reach { tangent, focal, pixels, overhang, eye_m })
+        Some(reach)
+    }
+
+    /// How much farther than the hull the last block's reflection goes to each side at a step, pixels.
+    fn side(&self, reach: &Reach, step: usize) -> f64 {
+        let aside = |l: &Lobe| {
+            let half = (f64::from(l.half_width_m) * reach.pixels).max(HALF_WIDTH_MIN_PX);
+            // Where little is thrown back, little is seen of it.
+            let some = l.thrown.iter().any(|t| *t > 2e-3);
+            if some { f64::from(l.aside_m.abs()) * reach.pixels + half } else { 0.0 }
+        };
+        let bands = self.lobes.steps.get(step).map_or(&[][..], |s| s);
+        bands.iter().map(aside).fold(0.0, f64::max) + reach.overhang + SIDE_MARGIN_PX
+    }
+
+    /// The same at the hull, and what each step adds so that all steps have room.
+    fn sides(&self, reach: &Reach) -> (f64, f64) {
+        let at_hull = self.side(reach, 0);
+        let more = (1..STEPS).map(|step| (self.side(reach, step) - at_hull) / step as f64);
+        (at_hull, more.fold(0.0, f64::max))
     }
 
     /// Marks the cells that the last block's reflection can change.
@@ -97,14 +120,7 @@ impl Waves {
         for piece in 0..PIECES {
             let steps = [piece, piece + 1].map(|p| p * (STEPS - 1) / PIECES);
             let [from, to] = steps.map(|s| reach.below(self.lobes.step_m(s)));
-            let aside = |l: &Lobe| {
-                let half = (f64::from(l.half_width_m) * reach.pixels).max(HALF_WIDTH_MIN_PX);
-                // Where little is thrown back, little is seen of it.
-                let some = l.thrown.iter().any(|t| *t > 2e-3);
-                if some { f64::from(l.aside_m.abs()) * reach.pixels + half } else { 0.0 }
-            };
-            let widest = self.lobes.steps.get(steps[0]..=steps[1]).unwrap_or(&[]);
-            let side = widest.iter().flatten().map(aside).fold(0.0, f64::max) + reach.overhang + 4.0;
+            let side = (steps[0]..=steps[1]).map(|s| self.side(reach, s)).fold(0.0, f64::max);
             line.mark([left - side, right + side], [low + from - FOOT_PX, high + to + 2.0], cells, within);
         }
     }
@@ -144,7 +160,7 @@ fn clockwise(v: DVec2) -> f64 {
     v.x.atan2(v.y)
 }
 
-/// How bright the sea of a scene is, as the shaders take it.
+/// How bright the sea of a scene is, as the shaders take it, for any boat.
 pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
     let size = DVec2::new(f64::from(scene.lens.width), f64::from(scene.lens.height));
     let down = |pixel: DVec2| scene.camera.tangent_below(&scene.lens, pixel);
@@ -162,6 +178,7 @@ pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
         tangent: [right as f32, below as f32, start as f32, 0.0],
         mean: with(tones.mean, tones.roots[0]),
         spread: with(tones.spread, tones.roots[1]),
+        foot: FOOT_PX as f32,
         ..ReflectBlock::default()
     }
 }

@@ -21,7 +21,6 @@ use crate::{
     lobes::{Waves, reflect_block},
     passes::{
         boats::BoatDraw,
-        reflect::ReflectDraw,
         rounds::{RoundDraw, pieces},
         wake::WakeDraw,
         water::WaterDraw,
@@ -99,7 +98,7 @@ pub(crate) struct Plan {
     /// Waves of the mended Physics shader about the nearest boat.
     pub(crate) physics: Option<[[f32; 4]; PHYSICS_WAVES]>,
     /// The pixels of all of `waters`, each once, and how bright the sea is there; for the same method.
-    pub(crate) reflect: Option<(ReflectDraw, ReflectBlock)>,
+    pub(crate) reflects: Vec<ReflectBlock>,
     pub(crate) wake_blocks: Vec<WakeBlock>,
     pub(crate) wakes: Vec<WakeDraw>,
     pub(crate) rounds: Vec<RoundDraw>,
@@ -151,7 +150,7 @@ impl Plan {
             lobe_blocks: Vec::with_capacity(lobes),
             physics: None,
             physics_sea: PhysicsSea::default(),
-            reflect: None,
+            reflects: Vec::with_capacity(lobes),
             waves: (lobes > 0).then(Waves::new),
             wake_blocks: Vec::with_capacity(wakes),
             wakes: Vec::with_capacity(wakes),
@@ -206,7 +205,7 @@ impl Plan {
         self.mirror_places.clear();
         self.waters.clear();
         self.lobe_blocks.clear();
-        self.reflect = None;
+        self.reflects.clear();
         self.physics = None;
         self.wake_blocks.clear();
         self.wakes.clear();
@@ -349,29 +348,20 @@ impl Plan {
             }
         }
         if waves {
-            self.join_waters(scene);
+            let any = reflect_block(scene);
+            self.reflects.extend(self.waters.iter().zip(&self.lobe_blocks).map(|(draw, lobes)| {
+                ReflectBlock {
+                    index: draw.index,
+                    first: draw.first,
+                    place: lobes.place,
+                    span: lobes.span,
+                    ..any
+                }
+            }));
         }
         if scene.water.method == ReflectionMethod::Physics {
             self.physics = scene.boats.last().map(|boat| physics_waves(&mut self.physics_sea, scene, boat));
         }
-    }
-
-    /// The pixels of all boats' water, each once.
-    fn join_waters(&mut self, scene: &Scene) {
-        let Some(end) = self.waters.last().map(|w| (w.first + w.count) as usize) else { return };
-        let from = self.waters.first().map_or(end, |w| w.first as usize);
-        for r in self.list.get(from..end).unwrap_or(&[]) {
-            let [x, y, right, lower] = r.map(|v| v as u32);
-            self.cells.mark(PixelRect { x, y, width: right - x, height: lower - y });
-        }
-        self.rest.clear();
-        self.cells.take(&mut self.rest, WATER_RECTS_MAX);
-        if self.list.len() + self.rest.len() > RECTS_MAX {
-            return;
-        }
-        let draw = ReflectDraw { first: self.list.len() as u32, count: self.rest.len() as u32 };
-        self.list.extend(self.rest.iter().map(|r| corners(*r)));
-        self.reflect = Some((draw, reflect_block(scene)));
     }
 
     fn plan_wakes(&mut self, scene: &Scene) {

@@ -407,7 +407,7 @@ impl Renderer {
         if let Some(pass) = mirror.filter(|_| how.method == ReflectionMethod::Full) {
             stamps.around(Span::Soften, || pass.record_soft(to, &plan.mirror_places));
         }
-        if let Some(pass) = self.passes.reflect.as_ref().filter(|_| plan.reflect.is_some()) {
+        if let Some(pass) = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty()) {
             stamps.around(Span::Soften, || pass.record_layers(to, frame, &plan.waters));
         }
         stamps.around(Span::VideoCopy, || video.record_copy(to, screen));
@@ -449,8 +449,8 @@ impl Renderer {
         if let Some(pass) = water {
             stamps.around(Span::Water, || {
                 pass.record(to, frame, how, &plan.waters);
-                if let (Some(pass), Some((draw, block))) = (&self.passes.reflect, &plan.reflect) {
-                    pass.record(to, frame, *draw, block);
+                if let Some(pass) = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty()) {
+                    pass.record(to, frame, &plan.waters, &plan.reflects);
                 }
             });
         }

@@ -11,7 +11,7 @@ use crate::{light::LUMINANCE, scene::Light};
 /// Bands of height that a boat is held in.
 pub const BANDS: usize = 14;
 /// Distances from the hull at which lobes are held.
-pub const STEPS: usize = 64;
+pub const STEPS: usize = 32;
 
 /// A boat's bands are finer at its foot, which is seen in the sea from farther off.
 const BAND_POWER: f64 = 1.8;

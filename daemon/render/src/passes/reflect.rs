@@ -1,37 +1,24 @@
 //! What waves throw back of the boats (`core::reflection`). Each boat's mirror image is collapsed to bands of height with running sums;
-//! from these, cells of a few pixels get what they throw back for three brightnesses of a pixel; and each pixel takes what belongs to
-//! its own brightness. Only the last step is done for every pixel.
+//! from these a small grid of places across the hull and away from it gets what water there throws back for three brightnesses of a
+//! pixel; and each pixel takes what belongs to its place and its own brightness. Only the last step is done for every pixel.
 
 use ash::vk;
 use bowwave_core::scene::PixelRect;
 use shaders_spirv::{
     BANDS_FRAG, LAYERS_FRAG, RECT_VERT, REFLECT_FRAG, SCREEN_VERT, SUMS_FRAG,
-    interface::{DrawBlock, LOBE_BANDS, LOBE_COLUMNS, ReflectBlock},
+    interface::{DrawBlock, LAYER_COLUMNS, LOBE_BANDS, LOBE_COLUMNS, LOBE_STEPS, ReflectBlock},
 };
 
 use crate::{
     error::RenderError,
     memory::{Image, ImageShape},
     passes::{DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass, water::WaterDraw},
-    pipeline::{Blend, Bound, LIGHT, Pipeline, PipelineShape, SRGB, SUMS, Sampler, SetLayout},
+    pipeline::{Blend, Bound, LIGHT, Pipeline, PipelineShape, SRGB, SUMS, Sampler, SetLayout, UNORM},
     recorder::{Begin, Recorder, Step},
-    rects::joined,
 };
-
-/// Screen pixels to a cell, as the shaders have it.
-const CELL: (u32, u32) = (4, 2);
-
-/// Pixels that belong to no boat alone, drawn at once.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct ReflectDraw {
-    /// First of the rectangles in the frame's list, and how many there are.
-    pub(crate) first: u32,
-    pub(crate) count: u32,
-}
 
 /// The pass.
 pub(crate) struct ReflectPass {
-    size: (u32, u32),
     bands: Image,
     sums: Image,
     /// For dark, middling and bright pixels; and the colour of what is taken away.
@@ -108,8 +95,9 @@ impl ReflectPass {
         let rows = u32::try_from(boats.max(1) * LOBE_BANDS).unwrap_or(u32::MAX);
         let bands = image("bands of mirrored boats", (LOBE_COLUMNS, rows), LIGHT)?;
         let sums = image("sums of mirrored boats", (LOBE_COLUMNS + 1, rows), SUMS)?;
-        let cells = (making.size.0.div_ceil(CELL.0), making.size.1.div_ceil(CELL.1));
-        let layer = || image("layers of reflection", cells, LIGHT);
+        let steps = u32::try_from(boats.max(1) * LOBE_STEPS).unwrap_or(u32::MAX);
+        // Of eight bits: a driver that runs on the processor filters these several times as fast as others.
+        let layer = || image("layers of reflection", (LAYER_COLUMNS, steps), UNORM);
         let layers = [layer()?, layer()?, layer()?, layer()?];
         let linear = Sampler::new(gpu, vk::Filter::LINEAR, false)?;
         let nearest = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
@@ -143,11 +131,10 @@ impl ReflectPass {
         let to_layers = Stage::new(
             making,
             &StageShape {
-                vertex: RECT_VERT,
                 fragment: LAYERS_FRAG,
                 sampled: &[bound(&sums, &nearest)],
+                colour: UNORM,
                 targets: layers.len(),
-                blend: Blend::Add,
                 ..replace
             },
         )?;
@@ -166,32 +153,31 @@ impl ReflectPass {
             },
         )?;
         let samplers = [linear, nearest];
-        let size = making.size;
-        Ok(Self { size, bands, sums, layers, to_bands, to_sums, to_layers, to_screen, _samplers: samplers })
+        Ok(Self { bands, sums, layers, to_bands, to_sums, to_layers, to_screen, _samplers: samplers })
     }
 
-    /// Finds what cells of water throw back. The mirror layer is ready to be sampled.
+    /// Finds what water throws back. The mirror layer is ready to be sampled.
     pub(crate) fn record_layers(&self, to: Recorder<'_>, frame: vk::DescriptorSet, boats: &[WaterDraw]) {
-        let Some(area) = boats.iter().map(|b| self.cells(b.rect)).reduce(joined) else { return };
+        let Some(count) = boats.iter().map(|b| b.index + 1).max() else { return };
         let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
         let drawn = |image| Step { image, from: was, to: DRAWN };
         let sampled = |image| Step { image, from: DRAWN, to: SAMPLED };
-        let rows = boats.iter().map(|b| (b.index + 1) * LOBE_BANDS as u32).max().unwrap_or(0);
+        let rows = count * LOBE_BANDS as u32;
         let layers = self.layers.each_ref();
         to.barrier([&self.bands, &self.sums].map(drawn));
         to.barrier(layers.map(drawn));
         let strip = |columns| PixelRect { x: 0, y: 0, width: columns, height: rows };
+        let own = |boat: &WaterDraw, width, each: usize| PixelRect {
+            x: 0,
+            y: boat.index * each as u32,
+            width,
+            height: each as u32,
+        };
         to.begin(strip(LOBE_COLUMNS), (self.bands.view, Begin::Forget), None);
         to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
         let viewport = |image: &Image| [0.0, 0.0, image.shape.width as f32, image.shape.height as f32];
         for boat in boats {
-            let own = PixelRect {
-                x: 0,
-                y: boat.index * LOBE_BANDS as u32,
-                width: LOBE_COLUMNS,
-                height: LOBE_BANDS as u32,
-            };
-            to.window(viewport(&self.bands), own);
+            to.window(viewport(&self.bands), own(boat, LOBE_COLUMNS, LOBE_BANDS));
             to.push(&self.to_bands.pipeline, &DrawBlock { rect: [0.0; 4], index: boat.index, first: 0 });
             to.draw(3, 1);
         }
@@ -203,39 +189,30 @@ impl ReflectPass {
         to.draw(3, 1);
         to.end();
         to.barrier([sampled(&self.sums)]);
-        to.begin_all(area, layers.map(|l| (l.view, Begin::Zero)), None);
-        let (width, height) = (self.size.0 as f32, self.size.1 as f32);
-        to.window([0.0, 0.0, width / CELL.0 as f32, height / CELL.1 as f32], area);
+        let area = PixelRect { x: 0, y: 0, width: LAYER_COLUMNS, height: count * LOBE_STEPS as u32 };
+        to.begin_all(area, layers.map(|l| (l.view, Begin::Forget)), None);
         to.bind(&self.to_layers.pipeline, &[frame, self.to_layers.set]);
         for boat in boats {
-            // Cells lie aligned to the rectangles, whose sides are multiples of eight pixels.
-            let block = DrawBlock { rect: [0.0; 4], index: boat.index, first: boat.first };
-            to.push(&self.to_layers.pipeline, &block);
-            to.draw(4, boat.count);
+            to.window(viewport(layers[0]), own(boat, LAYER_COLUMNS, LOBE_STEPS));
+            to.push(&self.to_layers.pipeline, &DrawBlock { rect: [0.0; 4], index: boat.index, first: 0 });
+            to.draw(3, 1);
         }
         to.end();
         to.barrier(layers.map(sampled));
     }
 
-    /// Draws, within a rendering to the screen; `block` says how bright the sea is.
+    /// Draws, within a rendering to the screen; `blocks` go with `boats`.
     pub(crate) fn record(
         &self,
         to: Recorder<'_>,
         frame: vk::DescriptorSet,
-        draw: ReflectDraw,
-        block: &ReflectBlock,
+        boats: &[WaterDraw],
+        blocks: &[ReflectBlock],
     ) {
         to.bind(&self.to_screen.pipeline, &[frame, self.to_screen.set]);
-        to.push(&self.to_screen.pipeline, &ReflectBlock { first: draw.first, ..*block });
-        to.draw(4, draw.count);
-    }
-
-    /// The cells that pixels of `r`, interpolated, can take from.
-    fn cells(&self, r: PixelRect) -> PixelRect {
-        let (width, height) = (self.layers[0].shape.width, self.layers[0].shape.height);
-        let (x, y) = ((r.x / CELL.0).saturating_sub(1), (r.y / CELL.1).saturating_sub(1));
-        let right = ((r.x + r.width).div_ceil(CELL.0) + 1).min(width);
-        let lower = ((r.y + r.height).div_ceil(CELL.1) + 1).min(height);
-        PixelRect { x, y, width: right - x, height: lower - y }
+        for (boat, block) in boats.iter().zip(blocks) {
+            to.push(&self.to_screen.pipeline, block);
+            to.draw(4, boat.count);
+        }
     }
 }
