@@ -1,11 +1,7 @@
 //! Drawing one frame with Vulkan's validation layer watching.
 #![allow(dead_code, reason = "each test file uses its own part")]
 
-use std::{
-    cell::RefCell,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
@@ -37,22 +33,7 @@ pub fn config(scene: &Scene) -> RenderConfig {
     }
 }
 
-/// Tests take turns from their first renderer on: the trainer has one device a process at a time, and the software driver's and the
-/// layer's own threads are not what is tested here.
-fn take_turns() {
-    static TURN: Mutex<()> = Mutex::new(());
-    thread_local! {
-        // Let go when the test's thread ends, after its renderers.
-        static MINE: RefCell<Option<MutexGuard<'static, ()>>> = const { RefCell::new(None) };
-    }
-    MINE.with_borrow_mut(|mine| {
-        // A test that failed has nothing to leave behind.
-        mine.get_or_insert_with(|| TURN.lock().unwrap_or_else(PoisonError::into_inner));
-    });
-}
-
 pub fn open(config: &RenderConfig, models: &[Model]) -> (Renderer, Completions) {
-    take_turns();
     match Renderer::new(config, models) {
         Ok(pair) => pair,
         Err(error) => {
