@@ -203,8 +203,6 @@ pub(crate) enum Blend {
     Replace,
     /// Premultiplied light over it.
     Over,
-    /// It is added.
-    Add,
 }
 
 /// What tells one pipeline from another.
@@ -409,9 +407,8 @@ fn blend_state(blend: Blend) -> vk::PipelineColorBlendAttachmentState {
         vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
     match blend {
         Blend::Replace => state,
-        Blend::Over | Blend::Add => {
-            let one = vk::BlendFactor::ONE;
-            let rest = if blend == Blend::Add { one } else { vk::BlendFactor::ONE_MINUS_SRC_ALPHA };
+        Blend::Over => {
+            let (one, rest) = (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA);
             state
                 .blend_enable(true)
                 .src_color_blend_factor(one)

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::light::{LUMINANCE, linear_to_srgb};
 
-/// No narrower a stretch of hull is asked for, half of it in pixels: what the shaders' coarse cells can hold.
+/// No narrower a stretch of hull is asked for, half of it in pixels: what the shaders' grid can hold.
 pub const HALF_WIDTH_MIN_PX: f64 = 1.5;
 
 /// Where a boat's hull meets the water in a picture.
