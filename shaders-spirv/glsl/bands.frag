@@ -3,6 +3,7 @@
 // A boat's mirror image collapsed to bands of height: each texel is the mean of a column's stretch, premultiplied linear light.
 #include "frame.glsl"
 #include "water_block.glsl"
+#include "hull_line.glsl"
 #include "lobe_block.glsl"
 
 layout(push_constant) uniform DrawBlock {
@@ -23,10 +24,6 @@ float edge(float band) {
     return boats[draw.index].board.x * pow(band / float(BANDS), 1.8);
 }
 
-float hull_line(int column) {
-    return waters[draw.index].hull_line[column >> 2][column & 3];
-}
-
 void main() {
     uint i = draw.index;
     vec4 board = boats[i].board;
@@ -39,9 +36,7 @@ void main() {
     vec4 sum = vec4(0.0);
     for (int x = 0; x < TAPS.x; ++x) {
         float across = board.y + (floor(gl_FragCoord.x) + (float(x) + 0.5) / float(TAPS.x)) * board.z;
-        float column = clamp((across - waters[i].columns.x) * waters[i].columns.y, 0.0, float(HULL_LINE_COLUMNS - 1));
-        int first = min(int(column), HULL_LINE_COLUMNS - 2);
-        float line = mix(hull_line(first), hull_line(first + 1), column - float(first));
+        float line = hull_line_at(i, across);
         for (int y = 0; y < TAPS.y; ++y) {
             float height = mix(from, to, (float(y) + 0.5) / float(TAPS.y));
             vec2 at = waters[i].anchor + right * across + down * (line + max(height * board.w, wet));

@@ -6,6 +6,7 @@
 // written: what is small keeps its digits.
 #include "frame.glsl"
 #include "water_block.glsl"
+#include "hull_line.glsl"
 #include "lobe_block.glsl"
 
 layout(push_constant) uniform DrawBlock {
@@ -24,10 +25,6 @@ layout(location = 3) out vec4 coloured;
 // No narrower a stretch of hull is asked for, half of it in pixels.
 const float HALF_WIDTH_MIN = 1.5;
 
-float hull_line(int column) {
-    return waters[draw.index].hull_line[column >> 2][column & 3];
-}
-
 vec4 running(float place, int row) {
     float held = clamp(place, 0.0, float(COLUMNS));
     int first = min(int(held), COLUMNS - 1);
@@ -40,10 +37,7 @@ void main() {
     int column = int(gl_FragCoord.x), at_step = int(gl_FragCoord.y) - int(i) * STEPS;
     float side = span.z + span.w * float(at_step);
     float across = span.x - side + (span.y + 2.0 * side) * float(column) / float(LAYER_COLUMNS - 1);
-    float of_line = clamp((across - waters[i].columns.x) * waters[i].columns.y, 0.0, float(HULL_LINE_COLUMNS - 1));
-    int first = min(int(of_line), HULL_LINE_COLUMNS - 2);
-    float line = mix(hull_line(first), hull_line(first + 1), of_line - float(first));
-    float pixels = board.w * max(place.x + line * place.y, 1e-5) / place.x;
+    float pixels = board.w * max(place.x + hull_line_at(i, across) * place.y, 1e-5) / place.x;
     float scale = 1.0 / board.z;
     vec4 sum[3] = vec4[3](vec4(0.0), vec4(0.0), vec4(0.0));
     vec4 hue = vec4(0.0);

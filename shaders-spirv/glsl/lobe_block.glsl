@@ -1,8 +1,5 @@
 // What the sea throws back of one boat (set 0, binding 6); the host's side is core's reflection::Lobes.
-const int BANDS = 14;
-const int STEPS = 32;
-const int COLUMNS = 64;
-const int LAYER_COLUMNS = 96;
+#include "lobe_sizes.glsl"
 
 struct LobeBlock {
     vec4 place;             // tangent below the horizontal at the anchor, 1 / pixels to a tangent of 1, eye over the water (m), 1 / reach (1/m)

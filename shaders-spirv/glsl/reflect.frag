@@ -5,6 +5,8 @@
 // of it.
 #include "frame.glsl"
 #include "water_block.glsl"
+#include "hull_line.glsl"
+#include "lobe_sizes.glsl"
 
 layout(push_constant) uniform ReflectBlock {
     vec4 rect;
@@ -28,16 +30,11 @@ layout(set = 1, binding = 4) uniform sampler2D coloured;
 
 layout(location = 0) out vec4 colour;
 
-const int STEPS = 32;
 // Standard deviations from the mean of the dark and the bright layer, as the host's TONE_OUTER; smallest spread, as its SPREAD_MIN.
 const float TONE = 1.15;
 const float SPREAD_MIN = 0.004;
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
-
-float hull_line(int column) {
-    return waters[draw.index].hull_line[column >> 2][column & 3];
-}
 
 float curve(vec4 c, float x) {
     return c.x + x * (c.y + x * c.z);
@@ -47,10 +44,7 @@ void main() {
     vec2 at = gl_FragCoord.xy;
     vec2 from_anchor = at - waters[draw.index].anchor, down = waters[draw.index].down;
     float across = dot(from_anchor, vec2(down.y, -down.x));
-    vec2 columns = waters[draw.index].columns;
-    float column = clamp((across - columns.x) * columns.y, 0.0, float(HULL_LINE_COLUMNS - 1));
-    int first = min(int(column), HULL_LINE_COLUMNS - 2);
-    float line = mix(hull_line(first), hull_line(first + 1), column - float(first));
+    float line = hull_line_at(draw.index, across);
     float below = dot(from_anchor, down) - line;
     float near = max(draw.place.x + line * draw.place.y, 1e-5);
     // Water above the line is a wave before the hull, as far from it as one as far below.

@@ -5,6 +5,7 @@
 // sea and adds light.
 #include "frame.glsl"
 #include "water_block.glsl"
+#include "hull_line.glsl"
 
 // 0 none, 1 plain mirror; Full Reflection: 2 as printed, 3 singular cases mended; Physics: 4 as printed, 5 mended; 6 none, and the shadow as the light has it.
 layout(constant_id = 0) const uint METHOD = 3;
@@ -205,10 +206,6 @@ float kept_off(float below, float line) {
     return waters[i].alpha * hidden + waters[i].alpha_fall * in_shadow;
 }
 
-float hull_line(int column) {
-    return waters[draw.index].hull_line[column >> 2][column & 3];
-}
-
 void main() {
     uint i = draw.index;
     vec2 at = gl_FragCoord.xy;
@@ -216,10 +213,9 @@ void main() {
     vec2 down = waters[i].down;
     // Where on the hull-water line this pixel's column stands, and how far below it the pixel is.
     float across = dot(from_anchor, vec2(down.y, -down.x));
-    float column = (across - waters[i].columns.x) * waters[i].columns.y;
+    float column = hull_column(i, across);
     float held = clamp(column, 0.0, float(HULL_LINE_COLUMNS - 1));
-    int first = min(int(held), HULL_LINE_COLUMNS - 2);
-    float line = mix(hull_line(first), hull_line(first + 1), held - float(first));
+    float line = hull_line(i, held);
     float below = dot(from_anchor, down) - line;
     if (below < 0.0) {
         discard;
