@@ -105,17 +105,17 @@ impl Buffer {
         }
     }
 
-    /// Copies `bytes` to `offset`; what does not fit is left off.
+    /// Copies `bytes` to `offset`, where the caller has made room for them: as with a slice, what would go beyond the end is a
+    /// mistake of this crate's and ends the program.
     pub(crate) fn write(&mut self, offset: u64, bytes: &[u8]) {
         let room = usize::try_from(self.size.saturating_sub(offset)).unwrap_or(usize::MAX);
-        debug_assert!(bytes.len() <= room, "{} bytes at {offset} of {}", bytes.len(), self.size);
-        let count = bytes.len().min(room);
-        if count > 0 {
-            // SAFETY: `offset + count` lies within the mapping, source and target do not overlap, and the ring sees to it that
+        assert!(bytes.len() <= room, "{} bytes at {offset} of {}", bytes.len(), self.size);
+        if !bytes.is_empty() {
+            // SAFETY: `offset + bytes.len()` lies within the mapping, source and target do not overlap, and the ring sees to it that
             // the GPU does not read this buffer now.
             unsafe {
                 let target = self.mapped.as_ptr().add(usize::try_from(offset).unwrap_or(usize::MAX));
-                std::ptr::copy_nonoverlapping(bytes.as_ptr(), target, count);
+                std::ptr::copy_nonoverlapping(bytes.as_ptr(), target, bytes.len());
             }
         }
     }
