@@ -474,15 +474,21 @@ fn vector() -> impl Strategy<Value = DVec3> {
     (number(), number(), number()).prop_map(|(x, y, z)| DVec3::new(x, y, z))
 }
 
+// SQLite's own text ends at a zero.
+fn text() -> impl Strategy<Value = String> {
+    prop::collection::vec(any::<char>().prop_filter("no zero", |c| *c != '\0'), 0..20)
+        .prop_map(String::from_iter)
+}
+
 fn outcome() -> impl Strategy<Value = Outcome> {
     let time = || any::<i64>().prop_map(Time::from_ns);
     prop_oneof![
-        (any::<String>(), 0..3_usize, time(), number(), vector()).prop_map(
+        (text(), 0..3_usize, time(), number(), vector()).prop_map(
             |(boat, zone, time, range_m, point)| {
-                Outcome::Hit { boat: boat.replace('\0', ""), zone: Zone::ALL[zone], time, range_m, point }
+                Outcome::Hit { boat, zone: Zone::ALL[zone], time, range_m, point }
             }
         ),
-        (prop::option::of("[a-z ü]*"), number(), time(), number())
+        (prop::option::of(text()), number(), time(), number())
             .prop_map(|(boat, miss_m, time, range_m)| Outcome::Miss { boat, miss_m, time, range_m }),
         prop_oneof![Just(NotScored::ImuStale), Just(NotScored::CameraStale)]
             .prop_map(|cause| Outcome::NotScored { cause }),
