@@ -483,11 +483,9 @@ fn text() -> impl Strategy<Value = String> {
 fn outcome() -> impl Strategy<Value = Outcome> {
     let time = || any::<i64>().prop_map(Time::from_ns);
     prop_oneof![
-        (text(), 0..3_usize, time(), number(), vector()).prop_map(
-            |(boat, zone, time, range_m, point)| {
-                Outcome::Hit { boat, zone: Zone::ALL[zone], time, range_m, point }
-            }
-        ),
+        (text(), 0..3_usize, time(), number(), vector()).prop_map(|(boat, zone, time, range_m, point)| {
+            Outcome::Hit { boat, zone: Zone::ALL[zone], time, range_m, point }
+        }),
         (prop::option::of(text()), number(), time(), number())
             .prop_map(|(boat, miss_m, time, range_m)| Outcome::Miss { boat, miss_m, time, range_m }),
         prop_oneof![Just(NotScored::ImuStale), Just(NotScored::CameraStale)]
