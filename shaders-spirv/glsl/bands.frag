@@ -21,7 +21,7 @@ const ivec2 TAPS = ivec2(2, 5);
 
 // Lower edge of a band, metres, as the host's band_edge_m.
 float edge(float band) {
-    return boats[draw.index].board.x * pow(band / float(BANDS), 1.8);
+    return boats[draw.index].board.x * pow(band / float(boats[draw.index].sizes.x), 1.8);
 }
 
 void main() {

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // What water throws back of a boat, and what share of the water's own light the boat takes from it: for a dark, a middling and a bright
 // pixel; and the colour of that share, with the luminance above which light is the sun's. A texel is a place across the hull and a step
-// away from it, so that their number follows neither the screen's nor the boat's size. As the host's reflection::compose. Roots are
+// away from it, as many as the boat is large in the picture. As the host's reflection::compose. Roots are
 // written: what is small keeps its digits.
 #include "frame.glsl"
 #include "water_block.glsl"
@@ -26,8 +26,9 @@ layout(location = 3) out vec4 coloured;
 const float HALF_WIDTH_MIN = 1.5;
 
 vec4 running(float place, int row) {
-    float held = clamp(place, 0.0, float(COLUMNS));
-    int first = min(int(held), COLUMNS - 1);
+    int columns = boats[draw.index].sizes.z;
+    float held = clamp(place, 0.0, float(columns));
+    int first = min(int(held), columns - 1);
     return mix(texelFetch(sums, ivec2(first, row), 0), texelFetch(sums, ivec2(first + 1, row), 0), held - float(first));
 }
 
@@ -36,12 +37,12 @@ void main() {
     vec4 place = boats[i].place, board = boats[i].board, span = boats[i].span;
     int column = int(gl_FragCoord.x), at_step = int(gl_FragCoord.y) - int(i) * STEPS;
     float side = span.z + span.w * float(at_step);
-    float across = span.x - side + (span.y + 2.0 * side) * float(column) / float(LAYER_COLUMNS - 1);
+    float across = span.x - side + (span.y + 2.0 * side) * float(column) / float(boats[i].sizes.w - 1);
     float pixels = board.w * max(place.x + hull_line_at(i, across) * place.y, 1e-5) / place.x;
     float scale = 1.0 / board.z;
     vec4 sum[3] = vec4[3](vec4(0.0), vec4(0.0), vec4(0.0));
     vec4 hue = vec4(0.0);
-    for (int band = 0; band < BANDS; ++band) {
+    for (int band = 0; band < boats[i].sizes.x; ++band) {
         vec4 thrown = boats[i].lobes[at_step][3 * band];
         vec4 taken = boats[i].lobes[at_step][3 * band + 1];
         float centre = (across + thrown.w * pixels - board.y) * scale;

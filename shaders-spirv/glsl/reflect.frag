@@ -13,8 +13,8 @@ layout(push_constant) uniform ReflectBlock {
     uint index;
     uint first;
     float foot;    // pixels above the hull-water line that are drawn
-    float pad;
-    vec4 tangent;  // tangent below the horizontal: for each pixel right and down, and at pixel (0, 0)
+    float last_step;
+    vec4 tangent;  // tangent below the horizontal: for each pixel right and down, and at pixel (0, 0); last column of the layers
     vec4 mean;     // sea's mean luma: coefficients of the tangent's root; smallest root
     vec4 spread;   // its standard deviation; largest root
     vec4 place;    // as in the boat's block of lobes
@@ -50,14 +50,13 @@ void main() {
     // Water above the line is a wave before the hull, as far from it as one as far below.
     float beneath = max(near + abs(below) * draw.place.y, 1e-5);
     float far = draw.place.z * (1.0 / near - 1.0 / beneath);
-    float at_step = sqrt(max(far * draw.place.w, 0.0)) * float(STEPS - 1);
-    if (below < -draw.foot || at_step >= float(STEPS - 1)) {
+    float at_step = sqrt(max(far * draw.place.w, 0.0)) * draw.last_step;
+    if (below < -draw.foot || at_step >= draw.last_step) {
         discard;
     }
     float side = draw.span.z + draw.span.w * at_step;
-    vec2 texels = vec2(textureSize(middle, 0));
-    float over = (across - draw.span.x + side) / (draw.span.y + 2.0 * side) * (texels.x - 1.0);
-    vec2 uv = (vec2(over, at_step + float(int(draw.index) * STEPS)) + 0.5) / texels;
+    float over = clamp((across - draw.span.x + side) / (draw.span.y + 2.0 * side), 0.0, 1.0) * draw.tangent.w;
+    vec2 uv = (vec2(over, at_step + float(int(draw.index) * STEPS)) + 0.5) / vec2(textureSize(middle, 0));
     vec3 code = texelFetch(video, ivec2(at), 0).rgb;
     float luma = dot(code, LUMINANCE);
     float root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);

@@ -165,13 +165,13 @@ impl Default for WaterBlock {
     }
 }
 
-/// Bands of height that a [`LobeBlock`] holds a boat in.
+/// Bands of height that a [`LobeBlock`] holds a boat in, at most.
 pub const LOBE_BANDS: usize = 14;
-/// Distances from the hull that a [`LobeBlock`] knows.
+/// Distances from the hull that a [`LobeBlock`] knows, at most.
 pub const LOBE_STEPS: usize = 32;
-/// Columns of a boat's bands on the GPU.
+/// Columns of a boat's bands on the GPU, at most.
 pub const LOBE_COLUMNS: u32 = 64;
-/// Columns of what the sea throws back of a boat on the GPU.
+/// Columns of what the sea throws back of a boat on the GPU, at most.
 pub const LAYER_COLUMNS: u32 = 96;
 
 /// What the sea throws back of one boat: `LobeBlock`, set 0, binding 6, std430. Goes with the [`WaterBlock`] of the same index.
@@ -185,11 +185,21 @@ pub struct LobeBlock {
     /// Across position of the hull's left end; its width; how much farther the reflection goes to each side, at the hull and more with
     /// each step; pixels.
     pub span: [f32; 4],
+    /// Bands, steps, columns of its picture and columns of its layers, as many as this boat has.
+    pub sizes: [i32; 4],
     /// By distance and band: light thrown back by three tones, metres aside; share of a pixel's luminance taken away by tone, half width in metres;
     /// colour of that share, luminance above which light is the sun's.
     pub lobes: [[[[f32; 4]; 3]; LOBE_BANDS]; LOBE_STEPS],
 }
-layout!(LobeBlock, 48 + LOBE_STEPS * 48 * LOBE_BANDS, place = 0, board = 16, span = 32, lobes = 48);
+layout!(
+    LobeBlock,
+    64 + LOBE_STEPS * 48 * LOBE_BANDS,
+    place = 0,
+    board = 16,
+    span = 32,
+    sizes = 48,
+    lobes = 64
+);
 
 impl Default for LobeBlock {
     fn default() -> Self {
@@ -349,9 +359,9 @@ pub struct ReflectBlock {
     pub first: u32,
     /// Pixels above the hull-water line that are drawn.
     pub foot: f32,
-    /// Keeps the alignment.
-    pub pad: f32,
-    /// Tangent below the horizontal: for each pixel right and down, at pixel (0, 0), unused.
+    /// The boat's last step.
+    pub last_step: f32,
+    /// Tangent below the horizontal: for each pixel right and down, at pixel (0, 0); last column of the boat's layers.
     pub tangent: [f32; 4],
     /// Mean of the sea's luma: coefficients of the tangent's root's powers 0 to 2; smallest root.
     pub mean: [f32; 4],
@@ -369,7 +379,7 @@ layout!(
     index = 16,
     first = 20,
     foot = 24,
-    pad = 28,
+    last_step = 28,
     tangent = 32,
     mean = 48,
     spread = 64,

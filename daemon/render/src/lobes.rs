@@ -7,7 +7,7 @@ use bowwave_core::{
     scene::{BoatView, PixelRect, Scene},
 };
 use glam::{DVec2, DVec3};
-use shaders_spirv::interface::{LOBE_COLUMNS, LobeBlock, ReflectBlock};
+use shaders_spirv::interface::{LAYER_COLUMNS, LOBE_COLUMNS, LobeBlock, ReflectBlock};
 
 use crate::{coverage::Cells, water::HullLine};
 
@@ -19,6 +19,9 @@ const FOOT_PX: f64 = 3.0;
 const SIDE_MARGIN_PX: f64 = 4.0;
 /// Pieces in which a reflection's outline is marked.
 const PIECES: usize = 8;
+/// Pixels to a column of the boat's picture and of the layers, where there are columns enough; and the fewest columns.
+const COLUMN_PX: f64 = 2.0;
+const COLUMNS_MIN: u32 = 12;
 
 /// The sea of the frames, and room for one boat's lobes.
 pub(crate) struct Waves {
@@ -74,11 +77,17 @@ impl Waves {
         let tangent = eye_m / seen.range_m;
         let (first, last) = line.ends();
         let overhang = OVERHANG * (last - first) + 2.0;
-        let pitch = (last - first + 2.0 * overhang) / f64::from(LOBE_COLUMNS);
+        let board = last - first + 2.0 * overhang;
+        let columns = columns(board, LOBE_COLUMNS);
+        let pitch = board / f64::from(columns);
         let pixels = focal * tangent / eye_m;
         out.place = [tangent, 1.0 / focal, eye_m, 1.0 / self.lobes.reach_m].map(|v| v as f32);
         let reach = Reach { tangent, focal, pixels, overhang, eye_m };
         let (side, more) = self.sides(&reach);
+        let steps = self.lobes.steps.len();
+        let widest = last - first + 2.0 * (side + more * steps as f64);
+        let counts = [self.lobes.bands as u32, steps as u32, columns, self::columns(widest, LAYER_COLUMNS)];
+        out.sizes = counts.map(|n| n as i32);
         out.span = [first, last - first, side, more].map(|v| v as f32);
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
@@ -109,7 +118,7 @@ impl Waves {
     /// The same at the hull, and what each step adds so that all steps have room.
     fn sides(&self, reach: &Reach) -> (f64, f64) {
         let at_hull = self.side(reach, 0);
-        let more = (1..STEPS).map(|step| (self.side(reach, step) - at_hull) / step as f64);
+        let more = (1..self.lobes.steps.len()).map(|step| (self.side(reach, step) - at_hull) / step as f64);
         (at_hull, more.fold(0.0, f64::max))
     }
 
@@ -118,7 +127,7 @@ impl Waves {
         let (low, high) = line.extent();
         let (left, right) = line.ends();
         for piece in 0..PIECES {
-            let steps = [piece, piece + 1].map(|p| p * (STEPS - 1) / PIECES);
+            let steps = [piece, piece + 1].map(|p| p * (self.lobes.steps.len() - 1) / PIECES);
             let [from, to] = steps.map(|s| reach.below(self.lobes.step_m(s)));
             let side = (steps[0]..=steps[1]).map(|s| self.side(reach, s)).fold(0.0, f64::max);
             line.mark([left - side, right + side], [low + from - FOOT_PX, high + to + 2.0], cells, within);
@@ -153,6 +162,11 @@ fn focal_px(scene: &Scene, boat: &BoatView) -> Option<f64> {
     let pixels = (at(foot - DVec3::Z * lift)? - at(foot)?).length() / lift;
     let focal = pixels * (foot - scene.camera.position).truncate().length();
     (focal.is_finite() && focal > 1.0).then_some(focal)
+}
+
+/// Columns for so many pixels.
+fn columns(pixels: f64, most: u32) -> u32 {
+    ((pixels / COLUMN_PX).ceil() as u32).clamp(COLUMNS_MIN, most)
 }
 
 /// Direction clockwise from north, radians.

@@ -350,9 +350,13 @@ impl Plan {
         if waves {
             let any = reflect_block(scene);
             self.reflects.extend(self.waters.iter().zip(&self.lobe_blocks).map(|(draw, lobes)| {
+                let [_, steps, _, columns] = lobes.sizes;
+                let [right, down, start, _] = any.tangent;
                 ReflectBlock {
                     index: draw.index,
                     first: draw.first,
+                    last_step: (steps - 1) as f32,
+                    tangent: [right, down, start, (columns - 1) as f32],
                     place: lobes.place,
                     span: lobes.span,
                     ..any

@@ -408,7 +408,9 @@ impl Renderer {
             stamps.around(Span::Soften, || pass.record_soft(to, &plan.mirror_places));
         }
         if let Some(pass) = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty()) {
-            stamps.around(Span::Soften, || pass.record_layers(to, frame, &plan.waters));
+            stamps.around(Span::Soften, || {
+                pass.record_layers(to, frame, &plan.waters, &plan.lobe_blocks);
+            });
         }
         stamps.around(Span::VideoCopy, || video.record_copy(to, screen));
     }

@@ -8,15 +8,22 @@ use super::{
 };
 use crate::{light::LUMINANCE, scene::Light};
 
-/// Bands of height that a boat is held in.
+/// Bands of height that a boat is held in, at most.
 pub const BANDS: usize = 14;
-/// Distances from the hull at which lobes are held.
+/// Distances from the hull at which lobes are held, at most.
 pub const STEPS: usize = 32;
+/// And at least.
+const BANDS_MIN: usize = 4;
+const STEPS_MIN: usize = 12;
+/// No band is finer than so many pixels of the boat, and no step beside the hull than so many of the water.
+const BAND_PX: f64 = 0.4;
+const STEP_PX: f64 = 0.1;
 
 /// A boat's bands are finer at its foot, which is seen in the sea from farther off.
 const BAND_POWER: f64 = 1.8;
-/// What throws back less than this, everywhere, is not drawn.
-const SHARE_MIN: f32 = 0.006;
+/// What throws back less than this, everywhere, is not drawn: of light as bright as the sky's it changes a code of 256. The farthest
+/// water is most of the picture's, so that half this share would take twice the time.
+const SHARE_MIN: f32 = 0.015;
 
 /// Diffuse reflectance of the water below its surface, as seen from above without the surface: clear coastal water (Mobley 1994, section 3.8).
 const WATER: Vec3 = Vec3::new(0.006, 0.022, 0.030);
@@ -49,24 +56,31 @@ pub struct Lobe {
 pub struct Lobes {
     /// Distance from the hull beyond which there is no reflection, metres.
     pub reach_m: f64,
-    /// By distance from the hull, at [`Lobes::step_m`], and by band from the water up.
+    /// How many bands of height there are: as many as the boat is large in the picture.
+    pub bands: usize,
+    /// By distance from the hull, at [`Lobes::step_m`], and by band from the water up; bands that there are not throw back nothing.
     pub steps: Vec<[Lobe; BANDS]>,
 }
 
 impl Lobes {
     /// Distance from the hull of a step, metres: they grow with the square.
     pub fn step_m(&self, step: usize) -> f64 {
-        self.reach_m * (step as f64 / (STEPS - 1) as f64).powi(2)
+        self.reach_m * (step as f64 / self.last()).powi(2)
     }
 
-    /// Place of a distance among the steps; beyond the last it is more than `STEPS - 1`.
+    /// Place of a distance among the steps; beyond the last it is more than the last's.
     pub fn place(&self, distance_m: f64) -> f64 {
-        (distance_m.max(0.0) / self.reach_m.max(1e-6)).sqrt() * (STEPS - 1) as f64
+        (distance_m.max(0.0) / self.reach_m.max(1e-6)).sqrt() * self.last()
+    }
+
+    /// Place of the last step.
+    fn last(&self) -> f64 {
+        self.steps.len().saturating_sub(1).max(1) as f64
     }
 
     /// The lobes at a place among the steps, interpolated.
     pub fn at(&self, place: f64) -> [Lobe; BANDS] {
-        let first = (place as usize).min(STEPS - 2);
+        let first = (place as usize).min(self.steps.len().saturating_sub(2));
         let part = (place - first as f64).clamp(0.0, 1.0) as f32;
         let none = [Lobe::default(); BANDS];
         let (a, b) = (self.steps.get(first).unwrap_or(&none), self.steps.get(first + 1).unwrap_or(&none));
@@ -88,9 +102,15 @@ impl Lobe {
     }
 }
 
-/// Height of the lower edge of a band of a boat `height_m` high, metres; of `BANDS`, the boat's.
-pub fn band_edge_m(height_m: f64, band: usize) -> f64 {
-    height_m * (band as f64 / BANDS as f64).powf(BAND_POWER)
+/// Height of the lower edge of a band, of so many, of a boat `height_m` high, metres; of band `bands`, the boat's.
+fn band_edge_m(height_m: f64, band: usize, bands: usize) -> f64 {
+    height_m * (band as f64 / bands as f64).powf(BAND_POWER)
+}
+
+/// So many as the lowest, or nearest, of them is `least_px` of `whole_px` wide, where they grow with a power.
+fn divisions(whole_px: f64, least_px: f64, power: f64, (fewest, most): (usize, usize)) -> usize {
+    let count = (whole_px / least_px).max(1.0).powf(1.0 / power).ceil();
+    if count.is_finite() { (count as usize).clamp(fewest, most) } else { most }
 }
 
 /// How a boat is seen.
@@ -116,6 +136,18 @@ pub struct Seen {
     pub pixel: f64,
 }
 
+impl Seen {
+    /// How high the boat stands in the picture, pixels.
+    fn height_px(&self) -> f64 {
+        self.height_m / (self.range_m * self.pixel)
+    }
+
+    /// How far below the hull the water at a distance from it lies in the picture, pixels.
+    fn below_px(&self, distance_m: f64) -> f64 {
+        (self.eye_m / (self.range_m - distance_m) - self.eye_m / self.range_m) / self.pixel
+    }
+}
+
 /// Light that comes out of clear coastal water lit by sun and sky, before the surface keeps some of it.
 pub fn water_light(light: &Light) -> Vec3 {
     WATER * light.on_level()
@@ -133,9 +165,10 @@ impl Lobes {
     pub fn set(&mut self, sea: &SeaLobes, seen: &Seen) {
         self.steps.clear();
         self.reach_m = 0.0;
+        self.bands = divisions(seen.height_px(), BAND_PX, BAND_POWER, (BANDS_MIN, BANDS));
         let strength = |distance: f64| {
             let strongest = |l: &Lobe| l.thrown.iter().copied().fold(0.0, f32::max);
-            bands(sea, seen, distance).iter().map(strongest).sum::<f32>()
+            bands(sea, seen, distance, self.bands).iter().map(strongest).sum::<f32>()
         };
         // Nearer the eye than a twentieth of the range there is no water to be seen.
         let farthest = 0.95 * seen.range_m;
@@ -146,25 +179,27 @@ impl Lobes {
         let reach = (1..=tries).rev().map(|i| farthest * (f64::from(i) / f64::from(tries)).powi(2));
         let Some(reach_m) = reach.into_iter().find(|d| strength(*d) >= SHARE_MIN) else { return };
         self.reach_m = reach_m;
-        for i in 0..STEPS {
-            let step = pixel_bands(sea, seen, self.step_m(i));
+        let last = divisions(seen.below_px(reach_m), STEP_PX, 2.0, (STEPS_MIN, STEPS)) - 1;
+        for i in 0..=last {
+            let distance_m = reach_m * (i as f64 / last as f64).powi(2);
+            let step = pixel_bands(sea, seen, distance_m, self.bands);
             // It ends at nothing.
             let end = |l: Lobe| Lobe { thrown: [0.0; TONES], taken: [0.0; TONES], ..l };
-            self.steps.push(if i == STEPS - 1 { step.map(end) } else { step });
+            self.steps.push(if i == last { step.map(end) } else { step });
         }
     }
 }
 
 /// The lobes of a pixel whose middle is at a distance from the hull: far off it sees a long stretch of water, over which they change.
-fn pixel_bands(sea: &SeaLobes, seen: &Seen, distance_m: f64) -> [Lobe; BANDS] {
+fn pixel_bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; BANDS] {
     let to_water = (seen.range_m - distance_m).max(0.05 * seen.range_m);
     let length_m = seen.pixel * to_water * to_water / seen.eye_m;
     // Two points of Gauss's formula.
     let [near, far] = [-1.0, 1.0].map(|side| distance_m + side * length_m / 12.0_f64.sqrt());
     if !(length_m > 0.1 * distance_m.max(0.5) && far < 0.95 * seen.range_m) {
-        return bands(sea, seen, distance_m);
+        return bands(sea, seen, distance_m, count);
     }
-    let (near, far) = (bands(sea, seen, near.max(0.0)), bands(sea, seen, far));
+    let (near, far) = (bands(sea, seen, near.max(0.0), count), bands(sea, seen, far, count));
     std::array::from_fn(|b| near[b].mix(&far[b], 0.5))
 }
 
@@ -178,8 +213,8 @@ struct Cell {
     spread: f32,
 }
 
-/// The lobes at one distance from the hull.
-fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64) -> [Lobe; BANDS] {
+/// The lobes at one distance from the hull, of so many bands.
+fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; BANDS] {
     // Nearer than the table reaches, waves between hull and water no longer change what is seen.
     let distance_m = distance_m.max(DISTANCE_MIN_M);
     let to_water = (seen.range_m - distance_m).max(0.05 * seen.range_m);
@@ -205,8 +240,12 @@ fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64) -> [Lobe; BANDS] {
         (sky[t] + water).max(Vec3::splat(1e-6))
     });
     std::array::from_fn(|b| {
-        let lower = if b == 0 { f64::NEG_INFINITY } else { band_edge_m(seen.height_m, b) / distance_m };
-        band(&cells, &whole, [lower, band_edge_m(seen.height_m, b + 1) / distance_m], distance_m)
+        if b >= count {
+            return Lobe::default();
+        }
+        let edge = |b| band_edge_m(seen.height_m, b, count) / distance_m;
+        let lower = if b == 0 { f64::NEG_INFINITY } else { edge(b) };
+        band(&cells, &whole, [lower, edge(b + 1)], distance_m)
     })
 }
 
@@ -294,6 +333,34 @@ mod tests {
                         assert_eq!(last, 0.0);
                     }
                 }
+            }
+        }
+    }
+
+    /// What lies between the steps is what is there, however few there are of them.
+    #[test]
+    fn a_far_boats_few_steps_hold_what_many_would() {
+        for wind in [0.84, 3.3, 6.7] {
+            let sea = Table::baked().sea(wind);
+            for range in [30.0, 60.0, 150.0, 400.0, 1000.0] {
+                let seen = seen(8.0, range, 3.0);
+                let lobes = Lobes::of(&sea, &seen);
+                let all = |lobes: &[Lobe; BANDS], t: usize| {
+                    lobes.iter().map(|l| l.thrown[t] + l.taken[t]).sum::<f32>()
+                };
+                let mut worst: f32 = 0.0;
+                for i in 0..=200 {
+                    let distance_m = lobes.reach_m * 0.9 * f64::from(i) / 200.0;
+                    let (held, there) =
+                        (lobes.at(lobes.place(distance_m)), pixel_bands(&sea, &seen, distance_m, BANDS));
+                    for t in 0..TONES {
+                        worst = worst.max((all(&held, t) - all(&there, t)).abs());
+                    }
+                }
+                // Of as much as two. At a kilometre all of it lies within three pixels.
+                let allowed = if range > 500.0 { 0.15 } else { 0.06 };
+                assert!(worst < allowed, "wind {wind}, {range} m: {worst}");
+                assert!(range < 300.0 || lobes.steps.len() <= STEPS / 2 && lobes.bands <= BANDS / 2);
             }
         }
     }

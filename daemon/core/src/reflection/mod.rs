@@ -11,6 +11,6 @@ mod table;
 mod tones;
 
 pub use compose::{Billboard, HALF_WIDTH_MIN_PX, Place, compose};
-pub use lobes::{BANDS, Lobe, Lobes, STEPS, Seen, band_edge_m, water_light};
+pub use lobes::{BANDS, Lobe, Lobes, STEPS, Seen, water_light};
 pub use table::{SKY_SINES, SeaLobes, SkyLight, Table, encode};
 pub use tones::{Sample, SeaTones};

@@ -6,7 +6,7 @@ use ash::vk;
 use bowwave_core::scene::PixelRect;
 use shaders_spirv::{
     BANDS_FRAG, LAYERS_FRAG, RECT_VERT, REFLECT_FRAG, SCREEN_VERT, SUMS_FRAG,
-    interface::{DrawBlock, LAYER_COLUMNS, LOBE_BANDS, LOBE_COLUMNS, LOBE_STEPS, ReflectBlock},
+    interface::{DrawBlock, LAYER_COLUMNS, LOBE_BANDS, LOBE_COLUMNS, LOBE_STEPS, LobeBlock, ReflectBlock},
 };
 
 use crate::{
@@ -156,45 +156,54 @@ impl ReflectPass {
         Ok(Self { bands, sums, layers, to_bands, to_sums, to_layers, to_screen, _samplers: samplers })
     }
 
-    /// Finds what water throws back. The mirror layer is ready to be sampled.
-    pub(crate) fn record_layers(&self, to: Recorder<'_>, frame: vk::DescriptorSet, boats: &[WaterDraw]) {
+    /// Finds what water throws back. The mirror layer is ready to be sampled; `lobes` go with `boats`.
+    pub(crate) fn record_layers(
+        &self,
+        to: Recorder<'_>,
+        frame: vk::DescriptorSet,
+        boats: &[WaterDraw],
+        lobes: &[LobeBlock],
+    ) {
         let Some(count) = boats.iter().map(|b| b.index + 1).max() else { return };
         let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
         let drawn = |image| Step { image, from: was, to: DRAWN };
         let sampled = |image| Step { image, from: DRAWN, to: SAMPLED };
-        let rows = count * LOBE_BANDS as u32;
         let layers = self.layers.each_ref();
         to.barrier([&self.bands, &self.sums].map(drawn));
         to.barrier(layers.map(drawn));
-        let strip = |columns| PixelRect { x: 0, y: 0, width: columns, height: rows };
-        let own = |boat: &WaterDraw, width, each: usize| PixelRect {
-            x: 0,
-            y: boat.index * each as u32,
-            width,
-            height: each as u32,
-        };
-        to.begin(strip(LOBE_COLUMNS), (self.bands.view, Begin::Forget), None);
-        to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
+        let boats = || boats.iter().zip(lobes.iter().map(|l| l.sizes.map(i32::unsigned_abs)));
+        // Each boat has a strip of its own, and draws in as much of it as it has.
+        let strip =
+            |index: u32, of: usize, width, height| PixelRect { x: 0, y: index * of as u32, width, height };
         let viewport = |image: &Image| [0.0, 0.0, image.shape.width as f32, image.shape.height as f32];
-        for boat in boats {
-            to.window(viewport(&self.bands), own(boat, LOBE_COLUMNS, LOBE_BANDS));
-            to.push(&self.to_bands.pipeline, &DrawBlock { rect: [0.0; 4], index: boat.index, first: 0 });
+        let push = |stage: &Stage, index| {
+            to.push(&stage.pipeline, &DrawBlock { rect: [0.0; 4], index, first: 0 });
+        };
+        let rows = count * LOBE_BANDS as u32;
+        to.begin(strip(0, 0, LOBE_COLUMNS, rows), (self.bands.view, Begin::Forget), None);
+        to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
+        for (boat, [bands, _, columns, _]) in boats() {
+            to.window(viewport(&self.bands), strip(boat.index, LOBE_BANDS, columns, bands));
+            push(&self.to_bands, boat.index);
             to.draw(3, 1);
         }
         to.end();
         to.barrier([sampled(&self.bands)]);
-        to.begin(strip(LOBE_COLUMNS + 1), (self.sums.view, Begin::Forget), None);
-        to.window(viewport(&self.sums), strip(LOBE_COLUMNS + 1));
+        to.begin(strip(0, 0, LOBE_COLUMNS + 1, rows), (self.sums.view, Begin::Forget), None);
         to.bind(&self.to_sums.pipeline, &[self.to_sums.set]);
-        to.draw(3, 1);
+        for (boat, [bands, _, columns, _]) in boats() {
+            to.window(viewport(&self.sums), strip(boat.index, LOBE_BANDS, columns + 1, bands));
+            to.draw(3, 1);
+        }
         to.end();
         to.barrier([sampled(&self.sums)]);
-        let area = PixelRect { x: 0, y: 0, width: LAYER_COLUMNS, height: count * LOBE_STEPS as u32 };
-        to.begin_all(area, layers.map(|l| (l.view, Begin::Forget)), None);
+        let rows = count * LOBE_STEPS as u32;
+        let targets = layers.map(|l| (l.view, Begin::Forget));
+        to.begin_all(strip(0, 0, LAYER_COLUMNS, rows), targets, None);
         to.bind(&self.to_layers.pipeline, &[frame, self.to_layers.set]);
-        for boat in boats {
-            to.window(viewport(layers[0]), own(boat, LAYER_COLUMNS, LOBE_STEPS));
-            to.push(&self.to_layers.pipeline, &DrawBlock { rect: [0.0; 4], index: boat.index, first: 0 });
+        for (boat, [_, steps, _, columns]) in boats() {
+            to.window(viewport(layers[0]), strip(boat.index, LOBE_STEPS, columns, steps));
+            push(&self.to_layers, boat.index);
             to.draw(3, 1);
         }
         to.end();
