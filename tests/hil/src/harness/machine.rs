@@ -188,11 +188,11 @@ impl Machine {
         self.qmp.execute("device_add", device).map(|_| ())
     }
 
-    /// Takes the power away, now: the process is killed.
-    pub fn cut(mut self) -> Result<()> {
+    /// Takes the power away, now: the process is killed. A time of the machine that it did not reach.
+    pub fn cut(mut self) -> Result<i64> {
         self.process.kill().context("QEMU cannot be killed")?;
         self.process.wait().context("QEMU")?;
-        Ok(())
+        Ok(self.guest.now_ns())
     }
 
     /// Waits until it has switched itself off.
