@@ -78,7 +78,7 @@ impl Waves {
         let (first, last) = line.ends();
         let overhang = OVERHANG * (last - first) + 2.0;
         let board = last - first + 2.0 * overhang;
-        let columns = columns(board, LOBE_COLUMNS);
+        let columns = columns_for(board, LOBE_COLUMNS);
         let pitch = board / f64::from(columns);
         let pixels = focal * tangent / eye_m;
         out.place = [tangent, 1.0 / focal, eye_m, 1.0 / self.lobes.reach_m].map(|v| v as f32);
@@ -86,7 +86,7 @@ impl Waves {
         let (side, more) = self.sides(&reach);
         let steps = self.lobes.steps.len();
         let widest = last - first + 2.0 * (side + more * steps as f64);
-        let counts = [self.lobes.bands as u32, steps as u32, columns, self::columns(widest, LAYER_COLUMNS)];
+        let counts = [self.lobes.bands as u32, steps as u32, columns, columns_for(widest, LAYER_COLUMNS)];
         out.sizes = counts.map(|n| n as i32);
         out.span = [first, last - first, side, more].map(|v| v as f32);
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
@@ -165,7 +165,7 @@ fn focal_px(scene: &Scene, boat: &BoatView) -> Option<f64> {
 }
 
 /// Columns for so many pixels.
-fn columns(pixels: f64, most: u32) -> u32 {
+fn columns_for(pixels: f64, most: u32) -> u32 {
     ((pixels / COLUMN_PX).ceil() as u32).clamp(COLUMNS_MIN, most)
 }
 

@@ -21,8 +21,8 @@ const STEP_PX: f64 = 0.1;
 
 /// A boat's bands are finer at its foot, which is seen in the sea from farther off.
 const BAND_POWER: f64 = 1.8;
-/// What throws back less than this, everywhere, is not drawn: of light as bright as the sky's it changes a code of 256. The farthest
-/// water is most of the picture's, so that half this share would take twice the time.
+/// Water that throws back less than this share of a boat's light is not drawn: where the boat is black against a bright sky it changes one
+/// or two codes of 256.
 const SHARE_MIN: f32 = 0.015;
 
 /// Diffuse reflectance of the water below its surface, as seen from above without the surface: clear coastal water (Mobley 1994, section 3.8).
@@ -65,7 +65,7 @@ pub struct Lobes {
 impl Lobes {
     /// Distance from the hull of a step, metres: they grow with the square.
     pub fn step_m(&self, step: usize) -> f64 {
-        self.reach_m * (step as f64 / self.last()).powi(2)
+        step_m(self.reach_m, step, self.last())
     }
 
     /// Place of a distance among the steps; beyond the last it is more than the last's.
@@ -100,6 +100,11 @@ impl Lobe {
             half_width_m: mix(self.half_width_m, other.half_width_m),
         }
     }
+}
+
+/// Distance from the hull of a step, of which `last` is the last's place, metres.
+fn step_m(reach_m: f64, step: usize, last: f64) -> f64 {
+    reach_m * (step as f64 / last).powi(2)
 }
 
 /// Height of the lower edge of a band, of so many, of a boat `height_m` high, metres; of band `bands`, the boat's.
@@ -181,7 +186,7 @@ impl Lobes {
         self.reach_m = reach_m;
         let last = divisions(seen.below_px(reach_m), STEP_PX, 2.0, (STEPS_MIN, STEPS)) - 1;
         for i in 0..=last {
-            let distance_m = reach_m * (i as f64 / last as f64).powi(2);
+            let distance_m = step_m(reach_m, i, last as f64);
             let step = pixel_bands(sea, seen, distance_m, self.bands);
             // It ends at nothing.
             let end = |l: Lobe| Lobe { thrown: [0.0; TONES], taken: [0.0; TONES], ..l };
