@@ -202,14 +202,9 @@ impl Machine {
     }
 
     fn raise(&mut self, now: Time, fault: Fault, cause: String, out: &mut Output) {
-        // A camera that is gone does nothing else wrong, and one that does something wrong is there. What another camera had is
-        // not what the one has that is there.
-        let gone = fault == Fault::CamLost;
-        let other = gone || fault == Fault::CalMismatch;
-        let over = WRONG_WITH_IT.iter().chain(&WRONG_WITH_PICTURES).filter(|f| other && **f != fault);
-        let back = (!gone && WRONG_WITH_IT.contains(&fault)).then_some(&Fault::CamLost);
-        for fault in over.chain(back) {
-            self.clear(now, *fault, out);
+        let over: Vec<Fault> = self.raised.iter().copied().filter(|old| replaces(fault, *old)).collect();
+        for old in over {
+            self.clear(now, old, out);
         }
         if self.raised.insert(fault) {
             out.faults.push(FaultChange::raised(now, fault, cause));
@@ -530,6 +525,23 @@ impl Machine {
             }
         }
     }
+}
+
+/// Whether a camera with the fault `new` has the fault `old` no longer.
+fn replaces(new: Fault, old: Fault) -> bool {
+    let with_it = WRONG_WITH_IT.contains(&old);
+    new != old
+        && match new {
+            // A camera that is gone does nothing else wrong.
+            Fault::CamLost => with_it || WRONG_WITH_PICTURES.contains(&old),
+            // What another camera had is not what the one has that is there.
+            Fault::CalMismatch => with_it || WRONG_WITH_PICTURES.contains(&old) || old == Fault::CamLost,
+            // Nothing else is known of a camera that another program holds, not even that its queue would fail again.
+            Fault::CamBusy => with_it || old == Fault::CamLost,
+            // One that does something wrong is there, and nobody holds it.
+            _ if WRONG_WITH_IT.contains(&new) => matches!(old, Fault::CamLost | Fault::CamBusy),
+            _ => false,
+        }
 }
 
 /// What was tried, and the kernel's answer.

@@ -296,13 +296,15 @@ impl Case {
         line.lcd = bench.says(cause)?;
         bench.keep_picture(&format!("row-{}", self.number));
         std::thread::sleep(Duration::from_secs_f64(self.stays_s));
-        let ended = match (self.end)(bench)? {
-            0 => caused,
-            ended => ended,
+        // It may be over with the first thing that is done to end it, or by itself.
+        let ending = bench.machine.guest.now_ns();
+        let (ended, over_from) = match (self.end)(bench)? {
+            0 => (caused, came),
+            ended => (ended, came.max(ending)),
         };
         if self.lasts {
             let patience = bench.scaled(self.back_s.unwrap_or(2.0)) + EXTRA;
-            let went = bench.told(self.code, Told::Went, came.max(ended), patience)?;
+            let went = bench.told(self.code, Told::Went, over_from, patience)?;
             let over = bench.machine.guest.host_time(ended);
             let mut back = (went - ended) as f64 * 1e-9;
             if self.shown != Shown::Nothing {

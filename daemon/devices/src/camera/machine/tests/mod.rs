@@ -275,6 +275,22 @@ fn a_busy_camera_is_tried_each_second() {
     assert!(matches!(told[..], [(Fault::CamBusy, "cleared", ..3000)]), "{told:?}");
 }
 
+#[test]
+fn a_camera_whose_queue_failed_and_that_is_busy_then_is_busy() {
+    let mut bench = yuyv().streaming();
+    bench.fake.dequeue_fails = Some(Errno::IO);
+    let failed = bench.now;
+    bench.step(Ready { failed: true, ..Ready::default() });
+    bench.fake.dequeue_fails = None;
+    bench.fake.open_fails = [Errno::BUSY].into();
+    bench.pass(250);
+    let told: Vec<_> = bench.told(failed).into_iter().map(|(f, what, _)| (f, what)).collect();
+    assert_eq!(told, [(Fault::CamQueue, "raised"), (Fault::CamQueue, "cleared"), (Fault::CamBusy, "raised")]);
+    bench.pass(1000);
+    bench.frames(1);
+    assert!(matches!(bench.told(failed)[..], [.., (Fault::CamBusy, "cleared", ..1500)]));
+}
+
 /// Row 10: no room on the bus.
 #[test]
 fn without_bandwidth_a_smaller_mode_runs_and_is_told() {
