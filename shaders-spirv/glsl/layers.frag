@@ -45,6 +45,10 @@ void main() {
     for (int band = 0; band < boats[i].sizes.x; ++band) {
         vec4 thrown = boats[i].lobes[at_step][3 * band];
         vec4 taken = boats[i].lobes[at_step][3 * band + 1];
+        // No band from here on is seen at this step.
+        if (taken.w < 0.0) {
+            break;
+        }
         float centre = (across + thrown.w * pixels - board.y) * scale;
         float reach = max(taken.w * pixels, HALF_WIDTH_MIN) * scale;
         int row = int(i) * BANDS + band;

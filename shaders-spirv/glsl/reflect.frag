@@ -33,6 +33,8 @@ layout(location = 0) out vec4 colour;
 // Standard deviations from the mean of the dark and the bright layer, as the host's TONE_OUTER; smallest spread, as its SPREAD_MIN.
 const float TONE = 1.15;
 const float SPREAD_MIN = 0.004;
+// Beyond the outer layers they are extrapolated so far, as the host's TONE_MOST has it.
+const float TONE_MOST = 1.5;
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 
@@ -51,7 +53,10 @@ void main() {
     float beneath = max(near + abs(below) * draw.place.y, 1e-5);
     float far = draw.place.z * (1.0 / near - 1.0 / beneath);
     float at_step = sqrt(max(far * draw.place.w, 0.0)) * draw.last_step;
-    if (below < -draw.foot || at_step >= draw.last_step) {
+    // Beside the hull there is sea above the line, farther off than the boat.
+    float column = hull_column(draw.index, across);
+    float foot = column < 0.0 || column > float(HULL_LINE_COLUMNS - 1) ? 0.0 : draw.foot;
+    if (below < -foot || at_step >= draw.last_step) {
         discard;
     }
     float side = draw.span.z + draw.span.w * at_step;
@@ -61,10 +66,10 @@ void main() {
     float luma = dot(code, LUMINANCE);
     float root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);
     float tone = (luma - curve(draw.mean, root)) / (max(curve(draw.spread, root), SPREAD_MIN) * TONE);
-    tone = clamp(tone, -1.0, 1.0);
-    vec4 layer = texture(middle, uv) * (1.0 - abs(tone)) + texture(dark, uv) * max(-tone, 0.0)
-        + texture(bright, uv) * max(tone, 0.0);
-    layer *= layer;
+    tone = clamp(tone, -TONE_MOST, TONE_MOST);
+    vec4 low = texture(dark, uv), mid = texture(middle, uv), high = texture(bright, uv);
+    vec4 layer = mid * mid * (1.0 - abs(tone)) + low * low * max(-tone, 0.0) + high * high * max(tone, 0.0);
+    layer = max(layer, 0.0);
     // sRGB code to linear light within 0.002.
     vec3 light = code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
     // All tones have the middle one's colour.

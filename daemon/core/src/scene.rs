@@ -167,8 +167,11 @@ pub struct BoatView {
     pub model: ModelId,
     /// Its pose at the picture's time; curvature of the sea already taken off its height.
     pub pose: RigidPose,
-    /// Height of the mean water surface at the boat, same space as `pose`: hull below it is hidden, the mirror plane lies in it.
+    /// Height of the water at whose line the hull is seen to end, same space as `pose`: hull below it is hidden, the mirror plane lies
+    /// in it.
     pub water_level: f64,
+    /// How far that is above the boat's own water, metres: waves before it hide so much of its hull.
+    pub hidden_m: f64,
     /// Pixels that the hull can cover (two pixels of margin included); `None` where only the reflection is in view.
     pub hull: Option<PixelRect>,
     /// Pixels that its reflection or shadow can reach, distortion and blur included; `None` where neither is drawn.

@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use crate::{
     geometry::{CameraPose, Lens, RigidPose, curvature_drop, horizon_distance},
     model::{Model, ModelId, ModelKind},
+    reflection::{Sighted, hidden_m, tilt_away, wind_to_view},
     scene::{BoatView, PixelRect, RoundView},
     wake::Wake,
 };
@@ -21,6 +22,9 @@ const DISTORTION_SHARE: f64 = 0.25;
 
 /// Pixels added around a reflection for its blur and the largest shift in pixels.
 const REFLECTION_MARGIN_PX: f64 = 12.0;
+
+/// Waves hide no more of a boat's height: in the mean over their phases something of it is always seen.
+const HIDDEN_SHARE_MAX: f64 = 0.7;
 
 /// Share of light that haze takes over `range_m` at a meteorological visibility of `visibility_m` (Koschmieder 1924, contrast
 /// threshold 2 %).
@@ -40,6 +44,8 @@ pub struct Eye<'a> {
     pub lens: &'a Lens,
     /// Meteorological visibility, metres.
     pub visibility_m: f64,
+    /// The wind whose waves stand before boats: where it blows (east, north), m/s; none where the picture says where hulls end.
+    pub wind: DVec2,
     /// Whether reflections or shadows are drawn at all.
     pub reflections: bool,
     /// Whether wakes are drawn at all.
@@ -79,7 +85,8 @@ impl Eye<'_> {
         }
         let drop = curvature_drop(offset.truncate().length());
         let pose = RigidPose { position: boat.pose.position - DVec3::Z * drop, ..boat.pose };
-        let water_level = boat.water_level - drop;
+        let hidden_m = self.hidden_m(boat, offset);
+        let water_level = boat.water_level - drop + hidden_m;
         let corners = corners_above(boat.model, &pose, water_level);
         let hull = bounds(self.camera, self.lens, &corners, HULL_MARGIN_PX);
         let reflection = if self.reflections {
@@ -97,6 +104,7 @@ impl Eye<'_> {
             model: boat.model_id,
             pose,
             water_level,
+            hidden_m,
             hull,
             reflection,
             wake,
@@ -104,6 +112,19 @@ impl Eye<'_> {
             haze: haze_share(range_m, self.visibility_m),
             beyond_horizon,
         })
+    }
+
+    /// How much of a boat's hull waves before it hide; `offset` leads to it.
+    fn hidden_m(&self, boat: &Afloat<'_>, offset: DVec3) -> f64 {
+        let (away, eye_m) = (offset.truncate(), self.camera.position.z - boat.water_level);
+        let hidden = hidden_m(&Sighted {
+            wind_m_s: self.wind.length(),
+            wind_to_view: wind_to_view(self.wind, away),
+            elevation: eye_m.atan2(away.length()),
+            level_m: boat.water_level,
+            tilt: tilt_away(&boat.pose, away),
+        });
+        hidden.min(HIDDEN_SHARE_MAX * boat.model.height_m().max(0.0))
     }
 
     /// A wake with the sea's curvature taken off, where any of it can touch the screen.
@@ -261,7 +282,7 @@ mod tests {
             let model = block();
             let lens = Lens::pinhole(640, 360, 1.0);
             let camera = camera(az, el, roll);
-            let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, reflections: true, wakes: true };
+            let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, wind: DVec2::ZERO, reflections: true, wakes: true };
             let pose = RigidPose {
                 world_from_body: DQuat::from_rotation_z(heading) * DQuat::from_rotation_x(tilt),
                 position: DVec3::new(x, y, 0.0),
@@ -294,7 +315,14 @@ mod tests {
     #[test]
     fn a_boat_behind_the_camera_is_not_seen() {
         let (model, lens, camera) = (block(), Lens::pinhole(640, 360, 1.0), camera(0.0, 0.0, 0.0));
-        let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, reflections: true, wakes: true };
+        let eye = Eye {
+            camera: &camera,
+            lens: &lens,
+            visibility_m: 2e4,
+            wind: DVec2::ZERO,
+            reflections: true,
+            wakes: true,
+        };
         let at = |y: f64| {
             let pose = RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::new(0.0, y, 0.0) };
             eye.see(&Afloat { boat: 0, model_id: ModelId(0), model: &model, pose, water_level: 0.0 })

@@ -3,7 +3,10 @@
 use bowwave_core::{
     geometry::curvature_drop,
     model::Model,
-    reflection::{HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table, water_light},
+    reflection::{
+        BANDS, HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table, tilt_away, water_light,
+        wind_to_view,
+    },
     scene::{BoatView, PixelRect, Scene},
 };
 use glam::{DVec2, DVec3};
@@ -19,6 +22,10 @@ const FOOT_PX: f64 = 3.0;
 const SIDE_MARGIN_PX: f64 = 4.0;
 /// Pieces in which a reflection's outline is marked.
 const PIECES: usize = 8;
+/// Bands that together throw back or take away less are not looked up: a tenth of a code of 256.
+const UNSEEN: f32 = 1e-3;
+/// Stands for the width of the band after the last that is looked up.
+const NO_MORE: f32 = -1.0;
 /// Pixels to a column of the boat's picture and of the layers, where there are columns enough; and the fewest columns.
 const COLUMN_PX: f64 = 2.0;
 const COLUMNS_MIN: u32 = 12;
@@ -37,6 +44,7 @@ impl Waves {
         let sea = table.sea(0.0);
         let mut lobes = Lobes::default();
         lobes.steps.reserve_exact(STEPS);
+        lobes.aside_m.reserve_exact(STEPS);
         Self { table, sea, wind_m_s: 0.0, lobes }
     }
 
@@ -57,30 +65,29 @@ impl Waves {
         let away = (boat.pose.position - scene.camera.position).truncate();
         let eye_m = scene.camera.position.z - boat.water_level;
         let focal = focal_px(scene, boat)?;
-        let up = boat.pose.world_from_body * DVec3::Z;
+        let tangent = eye_m / away.length();
+        let pixels = focal / away.length();
+        let (first, last) = line.ends();
         let seen = Seen {
-            wind_to_view: clockwise(scene.wind) - clockwise(away),
+            wind_to_view: wind_to_view(scene.wind, away),
             sky: scene.sky,
             water: water_light(&scene.light),
-            level_m: boat.water_level + curvature_drop(away.length()),
-            // A boat lies on its water as it is tilted.
-            tilt: -up.truncate().dot(away.normalize_or_zero()) / up.z.max(0.2),
+            level_m: boat.water_level - boat.hidden_m + curvature_drop(away.length()),
+            tilt: tilt_away(&boat.pose, away),
             eye_m,
             range_m: away.length(),
             height_m: model.height_m().max(0.3),
+            width_m: (last - first) / pixels,
             pixel: 1.0 / focal,
         };
         self.lobes.set(&self.sea, &seen);
         if self.lobes.reach_m <= 0.0 {
             return None;
         }
-        let tangent = eye_m / seen.range_m;
-        let (first, last) = line.ends();
         let overhang = OVERHANG * (last - first) + 2.0;
         let board = last - first + 2.0 * overhang;
         let columns = columns_for(board, LOBE_COLUMNS);
         let pitch = board / f64::from(columns);
-        let pixels = focal * tangent / eye_m;
         out.place = [tangent, 1.0 / focal, eye_m, 1.0 / self.lobes.reach_m].map(|v| v as f32);
         let reach = Reach { tangent, focal, pixels, overhang, eye_m };
         let (side, more) = self.sides(&reach);
@@ -91,7 +98,8 @@ impl Waves {
         out.span = [first, last - first, side, more].map(|v| v as f32);
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
-            for (vectors, lobe) in step.iter_mut().zip(bands) {
+            let seen = seen_bands(bands);
+            for (vectors, lobe) in step.iter_mut().zip(&bands[..seen]) {
                 let with = |tones: [f32; 3], last: f32| [tones[0], tones[1], tones[2], last];
                 *vectors = [
                     with(lobe.thrown, lobe.aside_m),
@@ -99,20 +107,17 @@ impl Waves {
                     with(lobe.hue.to_array(), lobe.sky_most),
                 ];
             }
+            if let Some(end) = step.get_mut(seen) {
+                end[1][3] = NO_MORE;
+            }
         }
         Some(reach)
     }
 
     /// How much farther than the hull the last block's reflection goes to each side at a step, pixels.
     fn side(&self, reach: &Reach, step: usize) -> f64 {
-        let aside = |l: &Lobe| {
-            let half = (f64::from(l.half_width_m) * reach.pixels).max(HALF_WIDTH_MIN_PX);
-            // Where little is thrown back, little is seen of it.
-            let some = l.thrown.iter().any(|t| *t > 2e-3);
-            if some { f64::from(l.aside_m.abs()) * reach.pixels + half } else { 0.0 }
-        };
-        let bands = self.lobes.steps.get(step).map_or(&[][..], |s| s);
-        bands.iter().map(aside).fold(0.0, f64::max) + reach.overhang + SIDE_MARGIN_PX
+        let aside = self.lobes.aside_m.get(step).map_or(0.0, |m| m * reach.pixels);
+        aside.max(HALF_WIDTH_MIN_PX) + reach.overhang + SIDE_MARGIN_PX
     }
 
     /// The same at the hull, and what each step adds so that all steps have room.
@@ -164,14 +169,19 @@ fn focal_px(scene: &Scene, boat: &BoatView) -> Option<f64> {
     (focal.is_finite() && focal > 1.0).then_some(focal)
 }
 
+/// How many bands from the water up are seen: close to the hull, water that is seen from above mirrors little that is high.
+fn seen_bands(bands: &[Lobe; BANDS]) -> usize {
+    let most = |l: &Lobe| l.thrown.iter().chain(&l.taken).copied().fold(0.0, f32::max);
+    let above = bands.iter().rev().scan(0.0, |sum, l| {
+        *sum += most(l);
+        Some(*sum)
+    });
+    BANDS - above.take_while(|sum| *sum < UNSEEN).count()
+}
+
 /// Columns for so many pixels.
 fn columns_for(pixels: f64, most: u32) -> u32 {
     ((pixels / COLUMN_PX).ceil() as u32).clamp(COLUMNS_MIN, most)
-}
-
-/// Direction clockwise from north, radians.
-fn clockwise(v: DVec2) -> f64 {
-    v.x.atan2(v.y)
 }
 
 /// How bright the sea of a scene is, as the shaders take it, for any boat.

@@ -138,6 +138,7 @@ pub fn add_boat_in(scene: &mut Scene, models: &[Model], model: usize, pose: Rigi
         camera: &scene.camera,
         lens: &scene.lens,
         visibility_m: 20_000.0,
+        wind: scene.wind,
         reflections: true,
         wakes: true,
     };

@@ -121,6 +121,7 @@ mod tests {
             model: ModelId(0),
             pose,
             water_level,
+            hidden_m: 0.0,
             hull: None,
             reflection: None,
             wake: None,

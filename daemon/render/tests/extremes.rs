@@ -40,6 +40,7 @@ fn forced(position: DVec3, yaw: f64) -> BoatView {
         model: ModelId(0),
         pose: RigidPose { world_from_body: DQuat::from_rotation_z(yaw), position },
         water_level: 0.0,
+        hidden_m: 0.0,
         hull: Some(everywhere()),
         reflection: Some(everywhere()),
         wake: None,

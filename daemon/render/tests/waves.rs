@@ -73,10 +73,11 @@ fn composed(before: &[u8], scene: &Scene) -> Vec<Vec3> {
         wind_to_view,
         sky: scene.sky,
         water: water_light(&scene.light),
-        level_m: scene.boats[0].water_level,
+        level_m: scene.boats[0].water_level - scene.boats[0].hidden_m,
         eye_m,
         range_m: RANGE_M,
         height_m: f64::from(BOX[2]),
+        width_m: 8.0,
         tilt: 0.0,
         pixel: 1.0 / focal_px,
     };

@@ -1,18 +1,23 @@
-//! Bakes what waves do to a boat's reflection into `data/reflection.bin`: rays of sight are followed over patches of sea of every wind
-//! force, and counted by where and how high they pass a hull that floats at some distance.
+//! Bakes what waves do to a boat's reflection into `reflection.bin`: rays of sight are followed over patches of sea of every wind
+//! force, and counted by where and how high they pass a hull that floats at some distance. And into `hiding.bin` how much of a hull
+//! the waves before it hide.
 //!
-//!     cargo run --release -p bowwave-core --example bake-reflection -- daemon/core/data/reflection.bin
+//!     cargo run --release -p bowwave-core --example bake-reflection -- daemon/core/data
 
 mod fit;
+mod hide;
 mod path;
 mod sea;
 
-use std::{f64::consts::FRAC_PI_2, process::ExitCode};
+use std::{f64::consts::FRAC_PI_2, path::PathBuf, process::ExitCode};
 
 use bowwave_core::{
-    reflection::grid::{
-        DISTANCES, ELEVATIONS, FORCES, RISE_NODES, RISES, STATES, STORED, TONES, WINDS, distance_m,
-        elevation, rise_sine, sky_shape, state_weights, tone_weights,
+    reflection::{
+        encode, encode_hiding,
+        grid::{
+            DISTANCES, ELEVATIONS, FORCES, RISE_NODES, RISES, STATES, STORED, TONES, WINDS, distance_m,
+            elevation, sky_shape, state_weights, tone_weights,
+        },
     },
     sea::BeaufortForce,
 };
@@ -30,80 +35,98 @@ const EYE_M: f64 = 8.0;
 /// Patches of sea for each force and wind; pixels of each at each elevation; rays of each pixel.
 const PATCHES: u64 = 12;
 const PIXELS: usize = 100;
-const RAYS: usize = 64;
+const RAYS: usize = 256;
 
-/// Places along the line of sight at which the level of a boat is looked up lie so far apart, metres.
-const LEVEL_STEP_M: f64 = 0.4;
+/// Hulls stand at places so far apart along the line of sight, metres.
+const PLACE_STEP_M: f64 = 0.1;
+/// A node stands for distances from its own divided by this to its own times this: the root of the ratio from one to the next.
+const BIN: f64 = 1.36;
 /// From the plane of the hull to the boat's middle, metres.
 const HALF_BEAM_M: f64 = 1.3;
-/// A pixel that sees the same distance over a long stretch of levels counts at most so many times.
-const WEIGHT_MAX: f64 = 4.0;
-
 const CELLS: usize = DISTANCES * RISES;
+/// Numbers of one pixel that are fitted: by rise, what is thrown back and what is taken away.
+const VALUES: usize = 2 * RISES;
 
-/// One hull behind a pixel.
-struct Hull {
-    distance: usize,
-    /// Where it stands: y of its plane, metres; and level (metres) and tilt (tangent) of the boat.
-    y: f64,
-    afloat: [f64; 2],
-    /// How much water sees it so.
-    weight: f64,
-    /// By halves of the pixel's rays and by rise, what is thrown back and taken away.
-    cells: [[[f32; 2]; RISES]; 2],
-    /// Share of the rays that meet water before the hull: the others meet the hull, and show no water.
-    before: [f32; 2],
+/// What a pixel's rays see of hulls at a node's distance, by halves of the rays. A ray has a hull of its own, any that ends at that
+/// distance from it, and counts for as many places as such hulls could have.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// By rise, what is thrown back and what is taken away.
+    cells: [[f32; VALUES]; 2],
+    /// Weight of the rays, of which those that meet water before the hull: the others meet the hull, and show no water.
+    before: [f64; 2],
+    /// Sum over these of the states that their hulls are in.
+    states: [[f64; STATES]; 2],
 }
 
-/// One pixel: its brightness by halves of its rays, and the hulls behind it. A half's brightness is held against the other's cells, so that
+/// One pixel: its brightness by halves of its rays, and what they see. A half's brightness is held against the other's cells, so that
 /// the chance of the draw in one does not look like a law.
 struct Pixel {
     light: [f64; 2],
-    hulls: Vec<Hull>,
+    seen: [Seen; DISTANCES],
 }
 
-/// By distance and rise: weight of light, and sums of how far aside it goes over the distance and of the same without its sign.
-type Aside = Vec<[f64; 3]>;
+/// Where light comes from, by distance and rise.
+#[derive(Clone, Copy, Default)]
+struct From {
+    /// Weight of what passes the hull's plane, and sums of how far aside it goes over the distance and of the same without its sign.
+    aside: [f64; 3],
+    /// Weight of what comes from the sky, and sum of the sine of its elevation.
+    sky: [f64; 2],
+}
 
-/// The hulls that stand at a node's distance from where the line of sight through (x, y) on the mean water meets the level of their own
-/// water. Boats are as likely everywhere: a place counts by how fast the distance grows with it.
-fn hulls(sea: &Sea, x: f64, y: f64, elevation: f64) -> Vec<Hull> {
-    let cot = 1.0 / elevation.tan();
-    let reach = if sea.spread[0] > 0.0 { 4.0 * sea.spread[0] * cot } else { 0.0 };
-    let farthest = distance_m(DISTANCES - 1);
-    let place = |i: usize| y - reach - LEVEL_STEP_M + i as f64 * LEVEL_STEP_M;
-    let count = ((farthest + 2.0 * reach) / LEVEL_STEP_M) as usize + 4;
-    let distance = |hull: f64| hull + sea.level(x, hull + HALF_BEAM_M) * cot - y;
-    let mut out = Vec::new();
-    let mut before = distance(place(0));
-    for i in 1..count {
-        let after = distance(place(i));
-        for d in 0..DISTANCES {
-            let node = distance_m(d);
-            if (before < node) == (after < node) {
-                continue;
+/// The places where hulls can stand along a line of sight, from near to far.
+struct Places {
+    /// Where the first stands, metres; the others follow in steps of [`PLACE_STEP_M`].
+    first_y: f64,
+    /// Where the line of sight that passes over all waves before the hull meets the mean water, metres; and its height at the hull.
+    ends: Vec<[f64; 2]>,
+}
+
+impl Places {
+    /// Along x, for pixels whose lines of sight meet the mean water about y. A hull is seen to end where waves before it hide its foot.
+    fn along(sea: &Sea, x: f64, y: f64, elevation: f64) -> Self {
+        let (tangent, cot) = (elevation.tan(), 1.0 / elevation.tan());
+        let reach = sea.reach_m * cot;
+        let half = 0.5 * PIXEL * EYE_M / elevation.sin().powi(2);
+        let from = y - half - reach - PLACE_STEP_M;
+        let count =
+            ((2.0 * half + 2.0 * reach + BIN * distance_m(DISTANCES - 1)) / PLACE_STEP_M) as usize + 2;
+        // Waves farther before the first place hide nothing of what stands there.
+        let warm = (2.0 * reach / PLACE_STEP_M) as usize + 1;
+        let mut highest = f64::NEG_INFINITY;
+        let mut ends = Vec::with_capacity(count);
+        for i in 0..warm + count {
+            let place = from + (i as f64 - warm as f64) * PLACE_STEP_M;
+            highest = sea.at(x, place)[0].max(highest - PLACE_STEP_M * tangent);
+            if i >= warm {
+                ends.push([place + highest * cot, highest]);
             }
-            let slope = (after - before) / LEVEL_STEP_M;
-            let hull = place(i - 1) + LEVEL_STEP_M * (node - before) / (after - before);
-            out.push(Hull {
-                distance: d,
-                y: hull,
-                afloat: sea.afloat(x, hull + HALF_BEAM_M),
-                weight: slope.abs().recip().min(WEIGHT_MAX),
-                cells: [[[0.0; 2]; RISES]; 2],
-                before: [0.0; 2],
-            });
         }
-        before = after;
+        Self { first_y: from, ends }
     }
-    out
+
+    /// Any of the places whose hulls end at about a node's distance from where a line of sight meets the mean water: where it stands, the
+    /// height of its end and the distance, and how many there are.
+    fn draw(&self, y: f64, node: usize, rng: &mut Pcg64) -> Option<([f64; 3], usize)> {
+        let below = |distance: f64| self.ends.partition_point(|[end, _]| end - y < distance);
+        let nearest = if node == 0 { 0.2 * distance_m(0) } else { distance_m(node) / BIN };
+        let (from, to) = (below(nearest), below(distance_m(node) * BIN));
+        if from >= to {
+            return None;
+        }
+        let i = rng.random_range(from..to);
+        let [end, height] = self.ends[i];
+        Some(([self.first_y + i as f64 * PLACE_STEP_M, height, end - y], to - from))
+    }
 }
 
-fn pixel(sea: &Sea, elevation: f64, rng: &mut Pcg64, aside: &mut Aside) -> Pixel {
+fn pixel(sea: &Sea, elevation: f64, spread: [f64; 2], rng: &mut Pcg64, from: &mut [From]) -> Pixel {
     let part = 2.0 / RAYS as f64;
     let mut path: Vec<Segment> = Vec::new();
     let (x0, y0) = (rng.random::<f64>() * 1000.0, rng.random::<f64>() * 1000.0);
-    let mut out = Pixel { light: [0.0; 2], hulls: hulls(sea, x0, y0, elevation) };
+    let places = Places::along(sea, x0, y0, elevation);
+    let mut out = Pixel { light: [0.0; 2], seen: Default::default() };
     let width = PIXEL * EYE_M / elevation.sin();
     for ray in 0..RAYS {
         let half = ray % 2;
@@ -114,13 +137,18 @@ fn pixel(sea: &Sea, elevation: f64, rng: &mut Pcg64, aside: &mut Aside) -> Pixel
         let open = last.end.is_infinite();
         let light = if open { last.share * sky_shape(last.dir[2]) } else { 0.0 };
         out.light[half] += light * part;
-        for hull in &mut out.hulls {
-            // A pixel's rays spread over more than the least distances: each has its own hull.
-            let y = hull.y + dy;
+        for (node, seen) in out.seen.iter_mut().enumerate() {
+            let Some(([y, foot, distance], count)) = places.draw(y0 + dy, node, rng) else { continue };
             if path.first().is_some_and(|s| s.from[1] >= y) {
                 continue;
             }
-            hull.before[half] += part as f32;
+            let weight = part * count as f64;
+            let afloat = sea.afloat(x0, y + HALF_BEAM_M);
+            let [level, tilt] = [0, 1].map(|i| afloat[i] / spread[i].max(1e-9));
+            seen.before[half] += weight;
+            for (sum, state) in seen.states[half].iter_mut().zip(state_weights(level, tilt)) {
+                *sum += weight * state;
+            }
             let passing = path.iter().find_map(|s| {
                 let t = (y - s.from[1]) / s.dir[1];
                 (s.dir[1] > 1e-6 && s.from[1] < y && t <= s.end).then_some((s, t))
@@ -129,29 +157,32 @@ fn pixel(sea: &Sea, elevation: f64, rng: &mut Pcg64, aside: &mut Aside) -> Pixel
             let (r, share) = match passing {
                 None => (RISES - 1, if open { last.share } else { 0.0 }),
                 Some((s, t)) => {
-                    let rise = (s.from[2] + t * s.dir[2] - hull.afloat[0]) / distance_m(hull.distance);
+                    let rise = (s.from[2] + t * s.dir[2] - foot) / distance;
                     let r = RISE_NODES.iter().position(|n| rise < *n).unwrap_or(RISES - 1);
-                    let off = (s.from[0] + t * s.dir[0] - x0 - dx) / distance_m(hull.distance);
+                    let off = (s.from[0] + t * s.dir[0] - x0 - dx) / distance;
                     // A few rays that run along the hull would count for all others.
                     let off = off.clamp(-1.5, 1.5);
-                    if let Some(sums) = aside.get_mut(hull.distance * RISES + r) {
-                        for (sum, v) in sums.iter_mut().zip([1.0, off, off.abs()]) {
-                            *sum += hull.weight * s.share * v;
-                        }
+                    for (sum, v) in from[node * RISES + r].aside.iter_mut().zip([1.0, off, off.abs()]) {
+                        *sum += weight * s.share * v;
                     }
                     (r, s.share)
                 }
             };
-            let cell = &mut hull.cells[half][r];
-            cell[0] += (share * part) as f32;
-            cell[1] += (light / sky_shape(rise_sine(r)) * part) as f32;
+            let cells = &mut seen.cells[half];
+            cells[2 * r] += (share * weight) as f32;
+            if open {
+                cells[2 * r + 1] += (last.share * weight) as f32;
+                for (sum, v) in from[node * RISES + r].sky.iter_mut().zip([1.0, last.dir[2]]) {
+                    *sum += weight * last.share * v;
+                }
+            }
         }
     }
     out
 }
 
 /// What is thrown back and taken away, fitted to all pixels: by distance and tone.
-fn fits(pixels: &[Pixel], spread: [f64; 2]) -> Vec<Fit> {
+fn fits(pixels: &[Pixel]) -> Vec<Fit<VALUES>> {
     let tone = |light: f64| light.max(0.0).powf(1.0 / 2.2);
     let tones = || pixels.iter().flat_map(|p| p.light.map(tone));
     let count = 2.0 * pixels.len() as f64;
@@ -159,14 +190,13 @@ fn fits(pixels: &[Pixel], spread: [f64; 2]) -> Vec<Fit> {
     let deviation = (tones().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt().max(1e-9);
     let mut out = vec![Fit::new(); DISTANCES * TONES];
     for (pixel, half) in pixels.iter().flat_map(|p| [(p, 0), (p, 1)]) {
-        let weights = tone_weights((tone(pixel.light[half]) - mean) / deviation);
-        for hull in &pixel.hulls {
-            let [level, tilt] = [0, 1].map(|i| hull.afloat[i] / spread[i].max(1e-9));
-            let states = state_weights(level, tilt);
-            let fits = out.iter_mut().skip(hull.distance * TONES);
-            for (fit, weight) in fits.zip(weights).filter(|(_, w)| *w > 0.0) {
-                let before = f64::from(hull.before[1 - half]);
-                fit.add(hull.weight * weight, &states, before, &hull.cells[1 - half]);
+        let weights = tone_weights((tone(pixel.light[half]) - mean) / deviation, 1.0);
+        for (node, seen) in pixel.seen.iter().enumerate() {
+            let (before, cells) = (seen.before[1 - half], &seen.cells[1 - half]);
+            let states = seen.states[1 - half].map(|s| s / before.max(1e-12));
+            let fits = out.iter_mut().skip(node * TONES);
+            for (fit, weight) in fits.zip(weights).filter(|(_, w)| *w > 0.0 && before > 0.0) {
+                fit.add(weight, &states, before, cells);
             }
         }
     }
@@ -176,15 +206,16 @@ fn fits(pixels: &[Pixel], spread: [f64; 2]) -> Vec<Fit> {
 /// All records of one force, wind and elevation.
 fn bake(seas: &[Sea], elevation: f64, seed: u128) -> Vec<f32> {
     let mut rng = Pcg64::new(seed, 0x7ab1e);
-    let mut aside: Aside = vec![[0.0; 3]; CELLS];
+    let mut from = vec![From::default(); CELLS];
     let mut pixels = Vec::new();
+    let spread = spread(seas);
     for sea in seas {
-        pixels.extend((0..PIXELS).map(|_| pixel(sea, elevation, &mut rng, &mut aside)));
+        pixels.extend((0..PIXELS).map(|_| pixel(sea, elevation, spread, &mut rng, &mut from)));
     }
     // By distance and tone: by state and rise what is thrown back and taken away.
-    let fitted: Vec<_> = fits(&pixels, spread(seas)).iter().map(Fit::solve).collect();
+    let fitted: Vec<_> = fits(&pixels).iter().map(Fit::solve).collect();
     let mut out = Vec::with_capacity(CELLS * STORED);
-    for (cell, a) in aside.iter().enumerate() {
+    for (cell, From { aside: a, sky }) in from.iter().enumerate() {
         let (distance, rise) = (cell / RISES, cell % RISES);
         for state in 0..STATES {
             for by_state in &fitted[distance * TONES..(distance + 1) * TONES] {
@@ -195,7 +226,7 @@ fn bake(seas: &[Sea], elevation: f64, seed: u128) -> Vec<f32> {
         let mean = a[1] / a[0].max(1e-12);
         // Of a normal distribution about 0 the mean magnitude is sqrt(2 / pi) of the standard deviation.
         let variance = (FRAC_PI_2 * (a[2] / a[0].max(1e-12)).powi(2) - mean * mean).max(0.0);
-        out.extend([mean as f32, variance.sqrt() as f32]);
+        out.extend([mean, variance.sqrt(), sky[1] / sky[0].max(1e-12)].map(|v| v as f32));
     }
     out
 }
@@ -206,9 +237,19 @@ fn spread(seas: &[Sea]) -> [f64; 2] {
     [mean(0).sqrt(), mean(1).sqrt()]
 }
 
-/// The records of all forces and winds, and each force's spreads of level and tilt.
-fn all() -> (Vec<f32>, Vec<[f64; 2]>) {
-    let (mut out, mut spreads) = (Vec::new(), Vec::new());
+/// Of all forces and winds.
+#[derive(Default)]
+struct Baked {
+    /// See [`bake`].
+    records: Vec<f32>,
+    /// See [`hide::hidden`].
+    hidden_m: Vec<f64>,
+    /// Each force's spreads of level and tilt.
+    spreads: Vec<[f64; 2]>,
+}
+
+fn all() -> Baked {
+    let mut out = Baked::default();
     for force in 0..FORCES {
         let mut sum = [0.0; 2];
         for wind in 0..WINDS {
@@ -226,28 +267,33 @@ fn all() -> (Vec<f32>, Vec<[f64; 2]>) {
                 .into_par_iter()
                 .map(|e| bake(&seas, elevation(e), (force * WINDS + wind) as u128 * 100 + e as u128))
                 .collect();
-            out.extend(parts.into_iter().flatten());
+            out.records.extend(parts.into_iter().flatten());
+            out.hidden_m.extend(hide::hidden(&seas, spread(&seas)));
             let part = spread(&seas).map(|s| s / WINDS as f64);
             sum = [sum[0] + part[0], sum[1] + part[1]];
             eprintln!("force {force}, wind {wind}: {:.1} s", started.elapsed().as_secs_f64());
         }
-        spreads.push(sum);
+        out.spreads.push(sum);
     }
-    (out, spreads)
+    out
 }
 
 fn main() -> ExitCode {
-    let Some(file) = std::env::args().nth(1) else {
-        eprintln!("bake-reflection: name the file to write");
+    let Some(folder) = std::env::args_os().nth(1).map(PathBuf::from) else {
+        eprintln!("bake-reflection: name the folder to write to");
         return ExitCode::FAILURE;
     };
-    let (values, spreads) = all();
-    let bytes = bowwave_core::reflection::encode(&values, &spreads);
-    match std::fs::write(&file, bytes) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("bake-reflection: cannot write {file}: {error}");
-            ExitCode::FAILURE
+    let baked = all();
+    let files = [
+        ("reflection.bin", encode(&baked.records, &baked.spreads)),
+        ("hiding.bin", encode_hiding(&baked.hidden_m, &baked.spreads)),
+    ];
+    for (name, bytes) in files {
+        let file = folder.join(name);
+        if let Err(error) = std::fs::write(&file, bytes) {
+            eprintln!("bake-reflection: cannot write {}: {error}", file.display());
+            return ExitCode::FAILURE;
         }
     }
+    ExitCode::SUCCESS
 }

@@ -3,7 +3,7 @@
 use glam::{DVec2, Vec3, Vec4};
 
 use super::{
-    grid::{TONES, tone_weights},
+    grid::{TONE_MOST, TONES, tone_weights},
     lobes::{BANDS, Lobe, Lobes},
     tones::SeaTones,
 };
@@ -77,11 +77,13 @@ pub fn compose(
     for (n, pixel) in picture.iter_mut().enumerate() {
         let at = DVec2::new((n % width) as f64 + 0.5, (n / width) as f64 + 0.5) - place.anchor;
         let (across, down) = (at.dot(DVec2::new(place.down.y, -place.down.x)), at.dot(place.down));
-        let (line, near) = place.hull(across);
+        let (line, near, beside) = place.hull(across);
         let below = down - line;
+        // Beside the hull there is sea above the line, farther off than the boat.
+        let foot_px = if beside { 0.0 } else { place.foot_px };
         // Water above the line is a wave before the hull, as far from it as one as far below.
         let tangent = near + below.abs() / place.focal_px;
-        if below < -place.foot_px || tangent <= 1e-5 {
+        if below < -foot_px || tangent <= 1e-5 {
             continue;
         }
         let distance = place.eye_m * (1.0 / near - 1.0 / tangent);
@@ -103,14 +105,16 @@ pub fn compose(
 }
 
 impl Place {
-    /// Pixels below the anchor of the line at a position across, and the tangent under which it is seen there.
-    fn hull(&self, across: f64) -> (f64, f64) {
+    /// Pixels below the anchor of the line at a position across, the tangent under which it is seen there, and whether that is beside the
+    /// hull.
+    fn hull(&self, across: f64) -> (f64, f64, bool) {
         let last = self.line.len().saturating_sub(1) as f64;
-        let column = ((across - self.first) / self.pitch).clamp(0.0, last);
+        let place = (across - self.first) / self.pitch;
+        let column = place.clamp(0.0, last);
         let first = column as usize;
         let at = |i: usize| self.line.get(i).or(self.line.last()).copied().unwrap_or(0.0);
         let line = at(first) + (at(first + 1) - at(first)) * column.fract();
-        (line, (self.tangent + line / self.focal_px).max(1e-5))
+        (line, (self.tangent + line / self.focal_px).max(1e-5), place != column)
     }
 }
 
@@ -121,8 +125,8 @@ fn gather(
     luminance: f32,
     mean: impl Fn(&Lobe, usize) -> Vec4,
 ) -> (Vec3, Vec3) {
-    let weights = tone_weights(f64::from(tone)).map(|w| w as f32);
-    let of = |v: &[f32; TONES]| v.iter().zip(weights).map(|(v, w)| v * w).sum::<f32>();
+    let weights = tone_weights(f64::from(tone), TONE_MOST).map(|w| w as f32);
+    let of = |v: &[f32; TONES]| v.iter().zip(weights).map(|(v, w)| v * w).sum::<f32>().max(0.0);
     let (mut added, mut taken, mut coloured, mut most) = (Vec3::ZERO, 0.0, Vec3::ZERO, 0.0);
     for (band, lobe) in lobes.iter().enumerate() {
         let seen = mean(lobe, band);

@@ -15,11 +15,11 @@ pub const RISES: usize = 13;
 pub const TONES: usize = 3;
 /// States of the water at the hull: the mean one, low, high, tilted away from the eye, tilted towards it.
 pub const STATES: usize = 5;
-/// Numbers at one elevation, distance, rise and state: what is thrown back and what is taken away for each brightness, then how far aside
-/// light goes, mean and spread.
-pub const RECORD: usize = 2 * TONES + 2;
-/// The same for all states, as they are stored: how far aside light goes is one for all.
-pub const STORED: usize = STATES * 2 * TONES + 2;
+/// Numbers at one elevation, distance, rise and state: what is thrown back and what share of a sky that is bright all over is taken away
+/// for each brightness, then how far aside light goes, mean and spread, and the sine of the sky's elevation that it comes from.
+pub const RECORD: usize = 2 * TONES + 3;
+/// The same for all states, as they are stored: where light comes from is one for all.
+pub const STORED: usize = STATES * 2 * TONES + 3;
 
 /// Least elevation, and the ratio of each to the one before, radians below the horizontal.
 const ELEVATION_MIN: f64 = 0.006;
@@ -41,6 +41,8 @@ pub const RISE_NODES: [f64; RISES] =
 /// The outer brightnesses are so many standard deviations from the sea's mean at that elevation: where an eighth of a normal distribution is
 /// beyond.
 pub const TONE_OUTER: f64 = 1.15;
+/// What pixels throw back goes on as between the outer and the middling brightness up to so many times the outer ones'.
+pub const TONE_MOST: f64 = 1.5;
 
 /// How much each of the states counts for a level and a tilt in standard deviations; what is tilted towards the eye is positive. The first
 /// counts for what the others leave.
@@ -50,9 +52,10 @@ pub fn state_weights(level: f64, tilt: f64) -> [f64; STATES] {
     [1.0 - level.abs() - tilt.abs(), (-level).max(0.0), level.max(0.0), (-tilt).max(0.0), tilt.max(0.0)]
 }
 
-/// How much each of the brightnesses counts for a tone in standard deviations.
-pub fn tone_weights(tone: f64) -> [f64; TONES] {
-    let at = (tone / TONE_OUTER).clamp(-1.0, 1.0);
+/// How much each of the brightnesses counts for a tone in standard deviations, which is held to `most` times the outer ones'; beyond these
+/// the middling one counts for less than nothing.
+pub fn tone_weights(tone: f64, most: f64) -> [f64; TONES] {
+    let at = (tone / TONE_OUTER).clamp(-most, most);
     [(-at).max(0.0), 1.0 - at.abs(), at.max(0.0)]
 }
 
@@ -84,12 +87,4 @@ fn place(value: f64, least: f64, ratio: f64, count: usize) -> f64 {
 /// Sky radiance by elevation, relative, that the table was baked under: a clear day's.
 pub fn sky_shape(sine: f64) -> f64 {
     0.3 + 0.7 * (-sine.max(0.0) / 0.25).exp()
-}
-
-/// Sine of the direction that stands for the cell whose upper bound is rise node `r`.
-pub fn rise_sine(r: usize) -> f64 {
-    let upper = RISE_NODES.get(r).copied().unwrap_or(3.0);
-    let lower = r.checked_sub(1).and_then(|l| RISE_NODES.get(l)).copied().unwrap_or(0.0);
-    let tangent = 0.5 * (lower + upper).max(0.02);
-    tangent / (1.0 + tangent * tangent).sqrt()
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    grid::{DISTANCE_MIN_M, RISE_NODES, RISES, TONES, rise_sine},
+    grid::{DISTANCE_MIN_M, RISE_NODES, RISES, TONES},
     table::{SeaLobes, Sight, SkyLight},
 };
 use crate::{light::LUMINANCE, scene::Light};
@@ -22,8 +22,10 @@ const STEP_PX: f64 = 0.1;
 /// A boat's bands are finer at its foot, which is seen in the sea from farther off.
 const BAND_POWER: f64 = 1.8;
 /// Water that throws back less than this share of a boat's light is not drawn: where the boat is black against a bright sky it changes one
-/// or two codes of 256.
-const SHARE_MIN: f32 = 0.015;
+/// code of 256.
+const SHARE_MIN: f32 = 0.01;
+/// Beside the boat it is drawn down to this one, of which nothing is seen to end.
+const SHARE_ASIDE: f32 = 0.004;
 
 /// Diffuse reflectance of the water below its surface, as seen from above without the surface: clear coastal water (Mobley 1994, section 3.8).
 const WATER: Vec3 = Vec3::new(0.006, 0.022, 0.030);
@@ -60,6 +62,8 @@ pub struct Lobes {
     pub bands: usize,
     /// By distance from the hull, at [`Lobes::step_m`], and by band from the water up; bands that there are not throw back nothing.
     pub steps: Vec<[Lobe; BANDS]>,
+    /// How far to either side of the hull it is seen at each step, metres at the hull.
+    pub aside_m: Vec<f64>,
 }
 
 impl Lobes {
@@ -89,6 +93,13 @@ impl Lobes {
 }
 
 impl Lobe {
+    /// Share of the band's light that water throws back which lies so far beyond an end of a hull, in the brightest of the tones.
+    fn seen_beyond(&self, beyond_m: f32, width_m: f32) -> f32 {
+        let half = self.half_width_m.max(1e-6);
+        let part = (half + self.aside_m.abs() - beyond_m).min(width_m) / (2.0 * half);
+        self.thrown.iter().copied().fold(0.0, f32::max) * part.clamp(0.0, 1.0)
+    }
+
     fn mix(&self, other: &Self, part: f32) -> Self {
         let mix = |a: f32, b: f32| a + (b - a) * part;
         Self {
@@ -137,6 +148,8 @@ pub struct Seen {
     pub range_m: f64,
     /// Height of the boat over the water, metres.
     pub height_m: f64,
+    /// Width of the boat across the line of sight, metres.
+    pub width_m: f64,
     /// Tangent that one pixel spans downwards.
     pub pixel: f64,
 }
@@ -169,15 +182,16 @@ impl Lobes {
     /// The same into what is there. Empty where the sea throws back nothing that is seen.
     pub fn set(&mut self, sea: &SeaLobes, seen: &Seen) {
         self.steps.clear();
+        self.aside_m.clear();
         self.reach_m = 0.0;
         self.bands = divisions(seen.height_px(), BAND_PX, BAND_POWER, (BANDS_MIN, BANDS));
-        let strength = |distance: f64| {
-            let strongest = |l: &Lobe| l.thrown.iter().copied().fold(0.0, f32::max);
-            bands(sea, seen, distance, self.bands).iter().map(strongest).sum::<f32>()
-        };
+        let width = seen.width_m as f32;
+        let strength =
+            |distance: f64| seen_beyond(&bands(sea, seen, distance, self.bands), -0.5 * width, width);
         // Nearer the eye than a twentieth of the range there is no water to be seen.
         let farthest = 0.95 * seen.range_m;
-        if !(farthest > 0.0 && farthest.is_finite() && seen.eye_m > 0.0 && seen.height_m > 0.0) {
+        if !(farthest > 0.0 && farthest.is_finite() && seen.eye_m > 0.0 && seen.height_m > 0.0 && width > 0.0)
+        {
             return;
         }
         let tries = 24;
@@ -188,11 +202,29 @@ impl Lobes {
         for i in 0..=last {
             let distance_m = step_m(reach_m, i, last as f64);
             let step = pixel_bands(sea, seen, distance_m, self.bands);
+            self.aside_m.push(f64::from(aside(&step, width)));
             // It ends at nothing.
             let end = |l: Lobe| Lobe { thrown: [0.0; TONES], taken: [0.0; TONES], ..l };
             self.steps.push(if i == last { step.map(end) } else { step });
         }
     }
+}
+
+/// Share of the boat's light that water throws back which lies so far beyond an end of the hull.
+fn seen_beyond(bands: &[Lobe; BANDS], beyond_m: f32, width_m: f32) -> f32 {
+    bands.iter().map(|l| l.seen_beyond(beyond_m, width_m)).sum()
+}
+
+/// How far beyond an end of the hull more than [`SHARE_ASIDE`] is seen, metres.
+fn aside(bands: &[Lobe; BANDS], width_m: f32) -> f32 {
+    let widest = bands.iter().map(|l| l.half_width_m + l.aside_m.abs()).fold(0.0, f32::max);
+    let (mut seen, mut unseen) = (0.0, widest);
+    for _ in 0..8 {
+        let middle = 0.5 * (seen + unseen);
+        let there = seen_beyond(bands, middle, width_m) > SHARE_ASIDE;
+        *(if there { &mut seen } else { &mut unseen }) = middle;
+    }
+    unseen
 }
 
 /// The lobes of a pixel whose middle is at a distance from the hull: far off it sees a long stretch of water, over which they change.
@@ -228,8 +260,8 @@ fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; B
     let column = sea.column(&Sight { wind_to_view, level_m, tilt, elevation, distance_m });
     let mut cells = [Cell::default(); RISES];
     let (mut sky, mut mirrored) = ([Vec3::ZERO; TONES], [0.0; TONES]);
-    for (r, (cell, record)) in cells.iter_mut().zip(&column).enumerate() {
-        let light = seen.sky.at(rise_sine(r));
+    for (cell, record) in cells.iter_mut().zip(&column) {
+        let light = seen.sky.at(f64::from(record[2 * TONES + 2]));
         cell.thrown = std::array::from_fn(|t| record[2 * t]);
         cell.sky = std::array::from_fn(|t| light * record[2 * t + 1]);
         [cell.aside, cell.spread] = [record[2 * TONES], record[2 * TONES + 1]];
@@ -307,6 +339,7 @@ mod tests {
             eye_m,
             range_m,
             height_m,
+            width_m: 3.0 * height_m,
             pixel: 7e-4,
         }
     }

@@ -20,11 +20,16 @@ const SPREAD_STEP: f64 = 1e-4;
 /// The baked table.
 const BAKED: &[u8] = include_bytes!("../../data/reflection.bin");
 
+/// Whether number `i` says how far aside light goes, or its spread.
+fn is_aside(i: usize) -> bool {
+    (STATES * 2 * TONES..STORED - 1).contains(&(i % STORED))
+}
+
 /// Eight bits a number, by its root, which keeps small ones; then for each force the spreads of level (metres) and
 /// tilt (tangent) of a small boat, sixteen bits.
 pub fn encode(values: &[f32], spreads: &[[f64; 2]]) -> Vec<u8> {
     let code = |(i, v): (usize, &f32)| {
-        if i % STORED < STATES * 2 * TONES {
+        if !is_aside(i) {
             (v.clamp(0.0, 1.0).sqrt() * 255.0).round() as u8
         } else {
             let unit = (v / ASIDE_MAX).clamp(-1.0, 1.0);
@@ -37,7 +42,7 @@ pub fn encode(values: &[f32], spreads: &[[f64; 2]]) -> Vec<u8> {
 
 fn decode(bytes: &[u8]) -> Vec<f32> {
     let value = |(i, byte): (usize, &u8)| {
-        if i % STORED < STATES * 2 * TONES {
+        if !is_aside(i) {
             (f32::from(*byte) / 255.0).powi(2)
         } else {
             let unit = (f32::from(*byte) - 128.0) / 127.0;
@@ -206,7 +211,7 @@ impl SeaLobes {
 }
 
 /// Place of a wind among the forces' own winds.
-fn force_place(wind_m_s: f64) -> f64 {
+pub(super) fn force_place(wind_m_s: f64) -> f64 {
     // BeaufortForce::wind_mean_m_s turned round.
     let force =
         (wind_m_s.max(0.0) / BeaufortForce::new(1).map_or(1.0, BeaufortForce::wind_mean_m_s)).powf(2.0 / 3.0);
@@ -214,7 +219,7 @@ fn force_place(wind_m_s: f64) -> f64 {
 }
 
 /// Place of an angle among the winds, and whether the sea is to be mirrored left and right.
-fn wind_place(wind_to_view: f64) -> (f64, bool) {
+pub(super) fn wind_place(wind_to_view: f64) -> (f64, bool) {
     use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
     let angle = if wind_to_view.is_finite() { wind_to_view.rem_euclid(PI) } else { 0.0 };
     if angle > FRAC_PI_2 { ((PI - angle) / FRAC_PI_4, true) } else { (angle / FRAC_PI_4, false) }
@@ -235,7 +240,7 @@ mod tests {
     fn numbers_come_back_from_eight_bits() {
         let values: Vec<f32> = (0..3 * STORED).map(|i| 0.012 * i as f32).collect();
         for (i, (got, want)) in decode(&encode(&values, &[])).iter().zip(&values).enumerate() {
-            let most = if i % STORED < STATES * 2 * TONES { 1.0 } else { ASIDE_MAX };
+            let most = if !is_aside(i) { 1.0 } else { ASIDE_MAX };
             let want = want.min(most);
             // Half a step of the root.
             assert!((got - want).abs() < 1.1 * (want * most).sqrt() / 127.0 + 1e-4, "{i}: {got} {want}");

@@ -395,6 +395,7 @@ impl Session {
                 camera,
                 lens: &self.lens,
                 visibility_m: self.setup.scenario.visibility_m,
+                wind: scene.wind,
                 reflections: cool && self.plan.has(Pass::Water) && sea_reflects(scene.water.force),
                 wakes: cool && self.plan.has(Pass::Wake),
             };
@@ -492,6 +493,7 @@ impl Session {
             camera: &camera,
             lens: &self.lens,
             visibility_m: self.setup.scenario.visibility_m,
+            wind: self.scene.wind,
             reflections: self.plan.has(Pass::Water),
             wakes: self.plan.has(Pass::Wake),
         };

@@ -142,6 +142,8 @@ impl Still {
             camera: &camera,
             lens: &lens,
             visibility_m: self.visibility_m,
+            // The picture shows where the water is.
+            wind: DVec2::ZERO,
             reflections: plan.has(Pass::Water),
             wakes: plan.has(Pass::Wake),
         };

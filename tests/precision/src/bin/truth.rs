@@ -61,6 +61,9 @@ struct Cell {
     /// Time of the waves, seconds
     #[arg(long, default_value_t = 0.0)]
     time: f64,
+    /// Which waves
+    #[arg(long, default_value_t = 1)]
+    waves: u64,
     /// Paths a pixel
     #[arg(long)]
     samples: Option<u32>,
@@ -152,6 +155,7 @@ fn spec_of(a: &Cell) -> Result<precision::truth::cell::CellSpec> {
     let mut spec = grid::cell(a.range, a.state, a.eye, &a.light, a.heading)
         .with_context(|| format!("no sea state {} or light '{}'", a.state, a.light))?;
     spec.time_s = a.time;
+    spec.wave_seed = a.waves;
     spec.samples = a.samples.unwrap_or(spec.samples);
     spec.boat = a.boat.clone().unwrap_or(spec.boat);
     Ok(spec)

@@ -18,7 +18,7 @@ use bowwave_render::{Completions, Finished, Needs, RenderConfig, Renderer, SOFTW
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::RgbImage;
 
-use super::cell::Cell;
+use super::{cell::Cell, scenes::flat};
 use crate::truth::boat;
 
 /// Sea closer to the horizon than this is not measured, tangent.
@@ -101,18 +101,18 @@ pub fn forced_scene(cell: &Cell, method: ReflectionMethod, beliefs: &Beliefs, mo
         (camera, pose, beliefs.eye)
     };
     let (model_id, model) = models.of(size);
-    let eye = Eye { camera: &camera, lens: &cell.lens, visibility_m: 1e9, reflections: true, wakes: false };
+    let wind = -DVec2::new(beliefs.wind_from.sin(), beliefs.wind_from.cos()) * beliefs.wind_m_s;
+    let eye =
+        Eye { camera: &camera, lens: &cell.lens, visibility_m: 1e9, wind, reflections: true, wakes: false };
     let water_level = pose.position.z;
     let boat = eye.see(&Afloat { boat: 0, model_id, model, pose, water_level });
-    // The truth's Earth is flat.
-    let flat = |b| bowwave_core::scene::BoatView { pose, water_level, beyond_horizon: false, ..b };
     let mut light = cell.light;
     light.sky *= beliefs.skylight;
     light.horizon *= beliefs.sky;
     Scene {
-        boats: boat.map(flat).into_iter().collect(),
+        boats: boat.map(|b| flat(b, pose, water_level)).into_iter().collect(),
         light,
-        wind: -DVec2::new(beliefs.wind_from.sin(), beliefs.wind_from.cos()) * beliefs.wind_m_s,
+        wind,
         sky: SkyLight { nodes: SKY_SINES.map(|s| cell.sky_at(s.asin().to_degrees()) * beliefs.sky) },
         tones: tones(&cell.without, &cell.lens, &camera),
         ..bare_scene(

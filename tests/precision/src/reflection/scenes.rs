@@ -4,7 +4,7 @@ use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId},
     reflection::SeaTones,
-    scene::{Light, ReflectionMethod, Scene, ShadowLevel, Water},
+    scene::{BoatView, Light, ReflectionMethod, Scene, ShadowLevel, Water},
     sea::BeaufortForce,
     view::{Afloat, Eye},
 };
@@ -118,6 +118,11 @@ impl Afloats {
     }
 }
 
+/// A boat as it is seen where the Earth is flat.
+pub fn flat(seen: BoatView, pose: RigidPose, water_level: f64) -> BoatView {
+    BoatView { pose, water_level: water_level + seen.hidden_m, beyond_horizon: false, ..seen }
+}
+
 /// A scene over a sea of those tones: `model`'s boats in the wind of a force that comes from ahead on the left. The Earth is flat.
 pub fn scene(
     (camera, lens): (CameraPose, Lens),
@@ -130,12 +135,12 @@ pub fn scene(
     let mut scene = bare_scene(camera, lens, Water { method, force, shadow: ShadowLevel::None }, light);
     scene.tones = tones;
     scene.wind = DVec2::new(0.6, -0.8) * force.wind_mean_m_s();
-    let eye = Eye { camera: &camera, lens: &lens, visibility_m: 1e9, reflections: true, wakes: false };
+    let wind = scene.wind;
+    let eye = Eye { camera: &camera, lens: &lens, visibility_m: 1e9, wind, reflections: true, wakes: false };
     for (boat, afloat) in boats.iter().enumerate() {
         let (pose, water_level) = (afloat.pose(), afloat.water_level);
         let seen = eye.see(&Afloat { boat, model_id: ModelId(0), model, pose, water_level });
-        let flat = |b| bowwave_core::scene::BoatView { pose, water_level, beyond_horizon: false, ..b };
-        scene.boats.extend(seen.map(flat));
+        scene.boats.extend(seen.map(|b| flat(b, pose, water_level)));
     }
     scene.boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
     scene

@@ -74,23 +74,30 @@ pub fn name(c: &CellSpec) -> String {
     if c.boat != BOX_BOAT {
         name.push_str(&format!("-{}", c.boat));
     }
+    if c.wave_seed != 1 {
+        name.push_str(&format!("-w{}", c.wave_seed));
+    }
     if c.time_s != 0.0 {
         name.push_str(&format!("-t{:.1}", c.time_s));
     }
     name
 }
 
-/// All cells; the quick ones are those of 8 m eye height, two lights and one heading.
+/// All cells; the quick ones are those of 8 m eye height, two lights and one heading. Each heading, eye height and light has waves of its
+/// own, so that no single wave before the boat speaks for a state of the sea.
 pub fn cells(quick: bool) -> Vec<CellSpec> {
     let lights: &[&str] = if quick { &["overcast", "high"] } else { &["overcast", "high", "front", "low"] };
     let eyes: &[f64] = if quick { &[8.0] } else { &EYES_M };
     let headings: &[f64] = if quick { &HEADINGS_DEG[..1] } else { &HEADINGS_DEG };
     let mut all = Vec::new();
+    let mut wave_seed = 0;
     for heading in headings {
         for eye in eyes {
             for light in lights {
+                wave_seed += 1;
                 for range in RANGES_M {
-                    all.extend((0..=4).filter_map(|state| cell(range, state, *eye, light, *heading)));
+                    let cells = (0..=4).filter_map(|state| cell(range, state, *eye, light, *heading));
+                    all.extend(cells.map(|c| CellSpec { wave_seed, ..c }));
                 }
             }
         }

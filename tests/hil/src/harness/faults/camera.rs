@@ -238,9 +238,12 @@ fn goes_on(bench: &mut Bench, change: fn(&mut bowwave_hil::protocol::Feed)) -> R
             && e.fields["FAULT_CODE"].as_str().is_some_and(|c| c.starts_with("CAM"))
     };
     let lines = bench.machine.guest.journal_since(from);
-    let said: Vec<&str> = lines.iter().filter(|e| of_camera(e)).map(Entry::text).collect();
-    let met = said.is_empty() && !status.contains("CAM") && !status.contains("PICTURE");
-    Ok(Seen { lcd: status, met, note: said.join("; "), ..Seen::default() })
+    let mut said: Vec<&str> = lines.iter().filter(|e| of_camera(e)).map(Entry::text).collect();
+    let shown = status.contains("CAM") || status.contains("PICTURE");
+    let met = said.is_empty() && !shown;
+    said.extend(shown.then_some(status.as_str()));
+    let note = said.join("; ");
+    Ok(Seen { lcd: status, met, note, ..Seen::default() })
 }
 
 fn renumbered(bench: &mut Bench) -> Result<Seen> {
