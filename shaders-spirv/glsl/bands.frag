@@ -31,8 +31,9 @@ void main() {
     vec2 down = waters[i].down, right = vec2(down.y, -down.x);
     vec2 low = waters[i].mirror_bounds.xy, high = waters[i].mirror_bounds.zw;
     float from = edge(float(band)), to = edge(float(band + 1));
-    // Where the mirrored boat ends at the water its texels are half empty: a texel's half is at most as many pixels.
-    float wet = 0.75 * max(0.4 * board.z, 1.0);
+    // Where the mirrored boat ends at the water its texels are half empty: what is fetched lies wholly within others.
+    vec2 texel = 1.0 / (waters[i].mirror_scale * vec2(textureSize(mirror, 0)));
+    float wet = 1.5 * max(texel.x, texel.y);
     vec4 sum = vec4(0.0);
     for (int x = 0; x < TAPS.x; ++x) {
         float across = board.y + (floor(gl_FragCoord.x) + (float(x) + 0.5) / float(TAPS.x)) * board.z;

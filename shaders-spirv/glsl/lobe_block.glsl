@@ -6,7 +6,8 @@ struct LobeBlock {
     vec4 board;             // height of the boat (m), across position of its picture's first column, pixels to a column, pixels to a metre
     vec4 span;              // across position of the hull's left end, its width, how much farther the reflection goes to each side at the hull and a step, pixels
     ivec4 sizes;            // of this boat: bands, steps, columns of its picture, columns of its layers
-    vec4 lobes[STEPS][3 * BANDS];  // by distance and band: thrown back by tone, metres aside; taken away by tone, half width in metres (less than 0: no more bands); hue of that, most luminance of the sky
+    vec4 sky_most;          // luminance above which light is the sun's: coefficients of the powers of the step over the last
+    vec4 lobes[STEPS][2 * BANDS];  // by distance and band: thrown back, more of it by a bright pixel, metres aside, half width in metres (less than 0: no more bands); taken away by channel, more of it from a bright pixel
 };
 
 layout(std430, set = 0, binding = 6) readonly buffer Lobes {

@@ -19,27 +19,31 @@ layout(push_constant) uniform ReflectBlock {
     vec4 spread;   // its standard deviation; largest root
     vec4 place;    // as in the boat's block of lobes
     vec4 span;     // as there
+    vec4 sky_most; // as there
 } draw;
 
 // The video beneath, as codes.
 layout(set = 1, binding = 0) uniform sampler2D video;
-layout(set = 1, binding = 1) uniform sampler2D dark;
-layout(set = 1, binding = 2) uniform sampler2D middle;
-layout(set = 1, binding = 3) uniform sampler2D bright;
-layout(set = 1, binding = 4) uniform sampler2D coloured;
+layout(set = 1, binding = 1) uniform sampler2D thrown;
+layout(set = 1, binding = 2) uniform sampler2D taken;
 
 layout(location = 0) out vec4 colour;
 
-// Standard deviations from the mean of the dark and the bright layer, as the host's TONE_OUTER; smallest spread, as its SPREAD_MIN.
+// Standard deviations from the mean of a dark and a bright pixel, as the host's TONE_OUTER; smallest spread, as its SPREAD_MIN.
 const float TONE = 1.15;
 const float SPREAD_MIN = 0.004;
-// Beyond the outer layers they are extrapolated so far, as the host's TONE_MOST has it.
+// Brighter and darker ones count as so many times that, as the host's TONE_MOST.
 const float TONE_MOST = 1.5;
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 
 float curve(vec4 c, float x) {
     return c.x + x * (c.y + x * c.z);
+}
+
+// How much more there is at a tone, of a layer whose last channel says what a bright pixel has more; all channels change alike.
+float times(float part, float tone) {
+    return max(1.0 + tone * (2.0 * part - 1.0), 0.0);
 }
 
 void main() {
@@ -61,25 +65,20 @@ void main() {
     }
     float side = draw.span.z + draw.span.w * at_step;
     float over = clamp((across - draw.span.x + side) / (draw.span.y + 2.0 * side), 0.0, 1.0) * draw.tangent.w;
-    vec2 uv = (vec2(over, at_step + float(int(draw.index) * STEPS)) + 0.5) / vec2(textureSize(middle, 0));
+    vec2 uv = (vec2(over, at_step + float(int(draw.index) * STEPS)) + 0.5) / vec2(textureSize(thrown, 0));
     vec3 code = texelFetch(video, ivec2(at), 0).rgb;
     float luma = dot(code, LUMINANCE);
-    float root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);
-    float tone = (luma - curve(draw.mean, root)) / (max(curve(draw.spread, root), SPREAD_MIN) * TONE);
+    float tangent_root = clamp(sqrt(max(dot(draw.tangent.xy, at) + draw.tangent.z, 0.0)), draw.mean.w, draw.spread.w);
+    float tone = (luma - curve(draw.mean, tangent_root)) / (max(curve(draw.spread, tangent_root), SPREAD_MIN) * TONE);
     tone = clamp(tone, -TONE_MOST, TONE_MOST);
-    vec4 low = texture(dark, uv), mid = texture(middle, uv), high = texture(bright, uv);
-    vec4 layer = mid * mid * (1.0 - abs(tone)) + low * low * max(-tone, 0.0) + high * high * max(tone, 0.0);
-    layer = max(layer, 0.0);
+    vec4 root = texture(thrown, uv), away = texture(taken, uv);
+    vec3 added = root.rgb * root.rgb * times(root.a, tone);
     // sRGB code to linear light within 0.002.
     vec3 light = code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
-    // All tones have the middle one's colour.
-    vec4 hue = texture(coloured, uv);
-    hue *= hue;
-    float whole = max(dot(hue.rgb, LUMINANCE), 1e-6);
     // Light over what waves mirror of the sky is the sun's glitter, of which a boat hides little.
-    float of_sky = min(hue.a / max(whole * dot(light, LUMINANCE), 1e-6), 1.0);
-    vec3 share = clamp(layer.a * hue.rgb / whole, 0.0, 1.0) * of_sky;
+    float of_sky = min(curve(draw.sky_most, at_step / draw.last_step) / max(dot(light, LUMINANCE), 1e-6), 1.0);
+    vec3 share = min(away.rgb * times(away.a, tone), 1.0) * of_sky;
     // As much of the water is covered as its most hidden channel asks for; what is then too little of the others is given back.
     float cover = max(max(share.r, share.g), share.b);
-    colour = vec4(layer.rgb + light * (cover - share), cover);
+    colour = vec4(added + light * (cover - share), cover);
 }

@@ -187,18 +187,21 @@ pub struct LobeBlock {
     pub span: [f32; 4],
     /// Bands, steps, columns of its picture and columns of its layers, as many as this boat has.
     pub sizes: [i32; 4],
-    /// By distance and band: light thrown back by three tones, metres aside; share of a pixel's luminance taken away by tone, half width in metres;
-    /// colour of that share, luminance above which light is the sun's.
-    pub lobes: [[[[f32; 4]; 3]; LOBE_BANDS]; LOBE_STEPS],
+    /// Luminance above which light is the sun's: coefficients of the powers 0 to 2 of the step over the last.
+    pub sky_most: [f32; 4],
+    /// By distance and band: light thrown back, what a bright pixel has more of it, metres aside, half width in metres (less than 0: no
+    /// more bands); share of a pixel's light taken away, by channel, and what a bright pixel has more of it.
+    pub lobes: [[[[f32; 4]; 2]; LOBE_BANDS]; LOBE_STEPS],
 }
 layout!(
     LobeBlock,
-    64 + LOBE_STEPS * 48 * LOBE_BANDS,
+    80 + LOBE_STEPS * 32 * LOBE_BANDS,
     place = 0,
     board = 16,
     span = 32,
     sizes = 48,
-    lobes = 64
+    sky_most = 64,
+    lobes = 80
 );
 
 impl Default for LobeBlock {
@@ -371,10 +374,12 @@ pub struct ReflectBlock {
     pub place: [f32; 4],
     /// Likewise.
     pub span: [f32; 4],
+    /// Likewise.
+    pub sky_most: [f32; 4],
 }
 layout!(
     ReflectBlock,
-    112,
+    128,
     rect = 0,
     index = 16,
     first = 20,
@@ -385,6 +390,7 @@ layout!(
     spread = 64,
     place = 80,
     span = 96,
+    sky_most = 112,
 );
 
 /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.

@@ -97,21 +97,31 @@ impl Waves {
         out.sizes = counts.map(|n| n as i32);
         out.span = [first, last - first, side, more].map(|v| v as f32);
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
+        out.sky_most = self.sky_most();
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
             let seen = seen_bands(bands);
             for (vectors, lobe) in step.iter_mut().zip(&bands[..seen]) {
-                let with = |tones: [f32; 3], last: f32| [tones[0], tones[1], tones[2], last];
+                let Lobe { thrown, taken, aside_m, half_width_m, hue, .. } = *lobe;
                 *vectors = [
-                    with(lobe.thrown, lobe.aside_m),
-                    with(lobe.taken, lobe.half_width_m),
-                    with(lobe.hue.to_array(), lobe.sky_most),
+                    [thrown.mean, thrown.slope, aside_m, half_width_m],
+                    (hue * taken.mean).extend(taken.slope).to_array(),
                 ];
             }
             if let Some(end) = step.get_mut(seen) {
-                end[1][3] = NO_MORE;
+                end[0][3] = NO_MORE;
             }
         }
         Some(reach)
+    }
+
+    /// The luminance above which light is the sun's, as a parabola through that of the first, the middle and the last step.
+    fn sky_most(&self) -> [f32; 4] {
+        let last = self.lobes.steps.len() - 1;
+        let [a, b, c] = [0, last / 2, last].map(|step| self.lobes.steps[step][0].sky_most);
+        // Where the middle one stands.
+        let x = (last / 2) as f32 / last as f32;
+        let bend = ((b - a) / x - (c - a)) / (x - 1.0);
+        [a, c - a - bend, bend, 0.0]
     }
 
     /// How much farther than the hull the last block's reflection goes to each side at a step, pixels.
@@ -171,9 +181,8 @@ fn focal_px(scene: &Scene, boat: &BoatView) -> Option<f64> {
 
 /// How many bands from the water up are seen: close to the hull, water that is seen from above mirrors little that is high.
 fn seen_bands(bands: &[Lobe; BANDS]) -> usize {
-    let most = |l: &Lobe| l.thrown.iter().chain(&l.taken).copied().fold(0.0, f32::max);
     let above = bands.iter().rev().scan(0.0, |sum, l| {
-        *sum += most(l);
+        *sum += l.thrown.most().max(l.taken.most());
         Some(*sum)
     });
     BANDS - above.take_while(|sum| *sum < UNSEEN).count()

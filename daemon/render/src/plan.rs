@@ -358,6 +358,7 @@ impl Plan {
                     last_step: (steps - 1) as f32,
                     tangent: [right, down, start, (columns - 1) as f32],
                     place: lobes.place,
+                    sky_most: lobes.sky_most,
                     span: lobes.span,
                     ..any
                 }

@@ -190,7 +190,7 @@ fn fits(pixels: &[Pixel]) -> Vec<Fit<VALUES>> {
     let deviation = (tones().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt().max(1e-9);
     let mut out = vec![Fit::new(); DISTANCES * TONES];
     for (pixel, half) in pixels.iter().flat_map(|p| [(p, 0), (p, 1)]) {
-        let weights = tone_weights((tone(pixel.light[half]) - mean) / deviation, 1.0);
+        let weights = tone_weights((tone(pixel.light[half]) - mean) / deviation);
         for (node, seen) in pixel.seen.iter().enumerate() {
             let (before, cells) = (seen.before[1 - half], &seen.cells[1 - half]);
             let states = seen.states[1 - half].map(|s| s / before.max(1e-12));

@@ -3,7 +3,7 @@
 use glam::{DVec2, Vec3, Vec4};
 
 use super::{
-    grid::{TONE_MOST, TONES, tone_weights},
+    grid::outer_tones,
     lobes::{BANDS, Lobe, Lobes},
     tones::SeaTones,
 };
@@ -125,22 +125,24 @@ fn gather(
     luminance: f32,
     mean: impl Fn(&Lobe, usize) -> Vec4,
 ) -> (Vec3, Vec3) {
-    let weights = tone_weights(f64::from(tone), TONE_MOST).map(|w| w as f32);
-    let of = |v: &[f32; TONES]| v.iter().zip(weights).map(|(v, w)| v * w).sum::<f32>().max(0.0);
-    let (mut added, mut taken, mut coloured, mut most) = (Vec3::ZERO, 0.0, Vec3::ZERO, 0.0);
+    let (mut thrown, mut taken) = ([Vec3::ZERO; 2], [Vec3::ZERO; 2]);
     for (band, lobe) in lobes.iter().enumerate() {
         let seen = mean(lobe, band);
-        added += seen.truncate() * of(&lobe.thrown);
-        taken += seen.w * of(&lobe.taken);
-        let middle = seen.w * lobe.taken[TONES / 2];
-        coloured += lobe.hue * middle;
-        most += lobe.sky_most * middle;
+        for (sums, of, each) in
+            [(&mut thrown, lobe.thrown, seen.truncate()), (&mut taken, lobe.taken, lobe.hue * seen.w)]
+        {
+            sums[0] += each * of.mean;
+            sums[1] += each * of.slope;
+        }
     }
-    // All tones have the middle one's colour.
-    let whole = coloured.dot(LUMINANCE).max(1e-6);
-    let hue = coloured / whole;
-    let of_sky = (most / (whole * luminance).max(1e-6)).min(1.0);
-    (added, (taken * hue).clamp(Vec3::ZERO, Vec3::ONE) * of_sky)
+    // All channels change alike with the tone.
+    let at_tone = |[mean, slope]: [Vec3; 2]| {
+        let ratio = (slope.dot(LUMINANCE) / mean.dot(LUMINANCE).max(1e-6)).clamp(-1.0, 1.0);
+        mean * (1.0 + outer_tones(tone) * ratio).max(0.0)
+    };
+    let sky_most = lobes.first().map_or(0.0, |l| l.sky_most);
+    let of_sky = (sky_most / luminance.max(1e-6)).min(1.0);
+    (at_tone(thrown), at_tone(taken).clamp(Vec3::ZERO, Vec3::ONE) * of_sky)
 }
 
 /// A running sum at a place between columns.

@@ -41,8 +41,8 @@ pub const RISE_NODES: [f64; RISES] =
 /// The outer brightnesses are so many standard deviations from the sea's mean at that elevation: where an eighth of a normal distribution is
 /// beyond.
 pub const TONE_OUTER: f64 = 1.15;
-/// What pixels throw back goes on as between the outer and the middling brightness up to so many times the outer ones'.
-pub const TONE_MOST: f64 = 1.5;
+/// What pixels throw back changes with their brightness up to so many times the outer ones.
+const TONE_MOST: f32 = 1.5;
 
 /// How much each of the states counts for a level and a tilt in standard deviations; what is tilted towards the eye is positive. The first
 /// counts for what the others leave.
@@ -52,11 +52,15 @@ pub fn state_weights(level: f64, tilt: f64) -> [f64; STATES] {
     [1.0 - level.abs() - tilt.abs(), (-level).max(0.0), level.max(0.0), (-tilt).max(0.0), tilt.max(0.0)]
 }
 
-/// How much each of the brightnesses counts for a tone in standard deviations, which is held to `most` times the outer ones'; beyond these
-/// the middling one counts for less than nothing.
-pub fn tone_weights(tone: f64, most: f64) -> [f64; TONES] {
-    let at = (tone / TONE_OUTER).clamp(-most, most);
+/// How much each of the brightnesses counts for a tone in standard deviations.
+pub fn tone_weights(tone: f64) -> [f64; TONES] {
+    let at = (tone / TONE_OUTER).clamp(-1.0, 1.0);
     [(-at).max(0.0), 1.0 - at.abs(), at.max(0.0)]
+}
+
+/// A tone in standard deviations as one in steps to the outer brightnesses, held.
+pub fn outer_tones(tone: f32) -> f32 {
+    (tone / TONE_OUTER as f32).clamp(-TONE_MOST, TONE_MOST)
 }
 
 /// Elevation of node `i`, radians.

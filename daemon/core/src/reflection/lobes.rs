@@ -23,9 +23,9 @@ const STEP_PX: f64 = 0.1;
 const BAND_POWER: f64 = 1.8;
 /// Water that throws back less than this share of a boat's light is not drawn: where the boat is black against a bright sky it changes one
 /// code of 256.
-const SHARE_MIN: f32 = 0.01;
+const SHARE_MIN: f32 = 0.02;
 /// Beside the boat it is drawn down to this one, of which nothing is seen to end.
-const SHARE_ASIDE: f32 = 0.004;
+const SHARE_ASIDE: f32 = 0.005;
 
 /// Diffuse reflectance of the water below its surface, as seen from above without the surface: clear coastal water (Mobley 1994, section 3.8).
 const WATER: Vec3 = Vec3::new(0.006, 0.022, 0.030);
@@ -36,16 +36,46 @@ const WATER_SHADED_HEIGHTS: f64 = 1.4;
 /// No wave mirrors more than so many times the sky that a bright one does; the sky may be held too dark by some.
 const SKY_MOST: f32 = 1.5;
 
+/// A share that changes with a pixel's brightness.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Toned {
+    /// Its mean over the pixels of a sea.
+    pub mean: f32,
+    /// By how much more a bright pixel has it (one [`TONE_OUTER`] beyond the mean brightness), and a dark one less.
+    pub slope: f32,
+}
+
+/// How many of a sea's pixels are dark, middling and bright, where brightness is distributed normally.
+const TONE_SHARES: [f32; TONES] = [0.293, 0.414, 0.293];
+
+impl Toned {
+    /// Of a dark, a middling and a bright pixel.
+    fn of(tones: [f32; TONES]) -> Self {
+        let mean = tones.iter().zip(TONE_SHARES).map(|(v, share)| v * share).sum();
+        Self { mean, slope: 0.5 * (tones[TONES - 1] - tones[0]) }
+    }
+
+    /// The most that dark or bright pixels have.
+    pub fn most(&self) -> f32 {
+        self.mean + self.slope.abs()
+    }
+
+    fn mix(&self, other: &Self, part: f32) -> Self {
+        let mix = |a: f32, b: f32| a + (b - a) * part;
+        Self { mean: mix(self.mean, other.mean), slope: mix(self.slope, other.slope) }
+    }
+}
+
 /// What a pixel of water throws back of one band of a boat.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Lobe {
-    /// Share of the band's light, for a dark, a middling and a bright pixel.
-    pub thrown: [f32; TONES],
-    /// Share of the pixel's own luminance that the band hides from it, for the same.
-    pub taken: [f32; TONES],
+    /// Share of the band's light.
+    pub thrown: Toned,
+    /// Share of the pixel's own luminance that the band hides from it.
+    pub taken: Toned,
     /// Colour of what is hidden over the pixel's own: its luminance is 1.
     pub hue: Vec3,
-    /// Luminance above which a pixel's light is not the sky's: the sun's glitter, of which a boat hides little.
+    /// Luminance above which a pixel's light is not the sky's: the sun's glitter, of which a boat hides little. The same for all bands.
     pub sky_most: f32,
     /// How far right of the pixel's own direction the band is seen, metres at the hull.
     pub aside_m: f32,
@@ -93,18 +123,18 @@ impl Lobes {
 }
 
 impl Lobe {
-    /// Share of the band's light that water throws back which lies so far beyond an end of a hull, in the brightest of the tones.
+    /// Share of the band's light that water throws back which lies so far beyond an end of a hull.
     fn seen_beyond(&self, beyond_m: f32, width_m: f32) -> f32 {
         let half = self.half_width_m.max(1e-6);
         let part = (half + self.aside_m.abs() - beyond_m).min(width_m) / (2.0 * half);
-        self.thrown.iter().copied().fold(0.0, f32::max) * part.clamp(0.0, 1.0)
+        self.thrown.mean * part.clamp(0.0, 1.0)
     }
 
     fn mix(&self, other: &Self, part: f32) -> Self {
         let mix = |a: f32, b: f32| a + (b - a) * part;
         Self {
-            thrown: std::array::from_fn(|t| mix(self.thrown[t], other.thrown[t])),
-            taken: std::array::from_fn(|t| mix(self.taken[t], other.taken[t])),
+            thrown: self.thrown.mix(&other.thrown, part),
+            taken: self.taken.mix(&other.taken, part),
             hue: self.hue.lerp(other.hue, part),
             sky_most: mix(self.sky_most, other.sky_most),
             aside_m: mix(self.aside_m, other.aside_m),
@@ -204,7 +234,7 @@ impl Lobes {
             let step = pixel_bands(sea, seen, distance_m, self.bands);
             self.aside_m.push(f64::from(aside(&step, width)));
             // It ends at nothing.
-            let end = |l: Lobe| Lobe { thrown: [0.0; TONES], taken: [0.0; TONES], ..l };
+            let end = |l: Lobe| Lobe { thrown: Toned::default(), taken: Toned::default(), ..l };
             self.steps.push(if i == last { step.map(end) } else { step });
         }
     }
@@ -289,8 +319,7 @@ fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; B
 /// Sum of the cells between two rises.
 fn band(cells: &[Cell; RISES], whole: &[Vec3; TONES], [from, to]: [f64; 2], distance_m: f64) -> Lobe {
     let mut lobe = Lobe::default();
-    let mut hidden = [Vec3::ZERO; TONES];
-    let mut weight = 0.0;
+    let (mut thrown, mut hidden) = ([0.0; TONES], [Vec3::ZERO; TONES]);
     let mut below = f64::NEG_INFINITY;
     for (cell, node) in cells.iter().zip(RISE_NODES) {
         let part = if below.is_finite() {
@@ -302,23 +331,23 @@ fn band(cells: &[Cell; RISES], whole: &[Vec3; TONES], [from, to]: [f64; 2], dist
         if part <= 0.0 {
             continue;
         }
-        let mut thrown = 0.0;
         for t in 0..TONES {
-            lobe.thrown[t] += part * cell.thrown[t];
+            thrown[t] += part * cell.thrown[t];
             hidden[t] += part * cell.sky[t] / whole[t];
-            thrown += part * cell.thrown[t];
         }
-        weight += thrown;
-        lobe.aside_m += thrown * cell.aside;
-        lobe.half_width_m += thrown * cell.spread;
+        let all: f32 = cell.thrown.iter().sum();
+        lobe.aside_m += part * all * cell.aside;
+        lobe.half_width_m += part * all * cell.spread;
     }
-    lobe.taken = hidden.map(|h| h.dot(LUMINANCE));
-    lobe.hue = hidden[TONES / 2] / lobe.taken[TONES / 2].max(1e-9);
-    lobe.sky_most = SKY_MOST * whole[TONES - 1].dot(LUMINANCE);
-    let scale = distance_m as f32 / weight.max(1e-9);
+    let scale = distance_m as f32 / thrown.iter().sum::<f32>().max(1e-9);
     lobe.aside_m *= scale;
     // A box as wide has the spread's standard deviation.
     lobe.half_width_m *= scale * 3.0_f32.sqrt();
+    lobe.thrown = Toned::of(thrown);
+    lobe.taken = Toned::of(hidden.map(|h| h.dot(LUMINANCE)));
+    let middling = hidden[TONES / 2];
+    lobe.hue = middling / middling.dot(LUMINANCE).max(1e-9);
+    lobe.sky_most = SKY_MOST * whole[TONES - 1].dot(LUMINANCE);
     lobe
 }
 
@@ -355,19 +384,20 @@ mod tests {
                         let lobes = Lobes::of(&sea, &seen(eye, range, height));
                         assert!(lobes.reach_m.is_finite());
                         for lobe in lobes.steps.iter().flatten() {
-                            let all = lobe
-                                .thrown
-                                .iter()
-                                .chain(&lobe.taken)
-                                .chain([&lobe.aside_m, &lobe.half_width_m]);
                             assert!(
-                                all.clone().all(|v| v.is_finite()),
+                                lobe.aside_m.is_finite() && lobe.half_width_m.is_finite(),
                                 "{wind} {eye} {range} {height}: {lobe:?}"
                             );
                             assert!(lobe.hue.is_finite());
-                            assert!(lobe.thrown.iter().chain(&lobe.taken).all(|t| (0.0..=1.03).contains(t)));
+                            for share in [lobe.thrown, lobe.taken] {
+                                assert!(
+                                    (0.0..=1.03).contains(&share.mean) && share.most() < 1.5,
+                                    "{share:?}"
+                                );
+                            }
                         }
-                        let last = lobes.steps.last().map_or(0.0, |s| s.iter().map(|l| l.thrown[0]).sum());
+                        let last =
+                            lobes.steps.last().map_or(0.0, |s| s.iter().map(|l| l.thrown.most()).sum());
                         assert_eq!(last, 0.0);
                     }
                 }
@@ -383,16 +413,18 @@ mod tests {
             for range in [30.0, 60.0, 150.0, 400.0] {
                 let seen = seen(8.0, range, 3.0);
                 let lobes = Lobes::of(&sea, &seen);
-                let all = |lobes: &[Lobe; BANDS], t: usize| {
-                    lobes.iter().map(|l| l.thrown[t] + l.taken[t]).sum::<f32>()
+                let all = |lobes: &[Lobe; BANDS]| {
+                    let sum = |of: fn(&Lobe) -> f32| lobes.iter().map(of).sum::<f32>();
+                    [sum(|l| l.thrown.mean + l.taken.mean), sum(|l| l.thrown.slope + l.taken.slope)]
                 };
                 let mut worst: f32 = 0.0;
                 for i in 0..=200 {
-                    let distance_m = lobes.reach_m * 0.9 * f64::from(i) / 200.0;
+                    // In the last step it fades away.
+                    let distance_m = lobes.reach_m * 0.8 * f64::from(i) / 200.0;
                     let (held, there) =
                         (lobes.at(lobes.place(distance_m)), pixel_bands(&sea, &seen, distance_m, BANDS));
-                    for t in 0..TONES {
-                        worst = worst.max((all(&held, t) - all(&there, t)).abs());
+                    for (held, there) in all(&held).iter().zip(all(&there)) {
+                        worst = worst.max((held - there).abs());
                     }
                 }
                 // Of as much as two. Farther off, all of it lies within a pixel.
@@ -408,13 +440,13 @@ mod tests {
         let sea = Table::baked().sea(0.0);
         let lobes = Lobes::of(&sea, &seen(8.0, 60.0, 30.0));
         let near = lobes.at(lobes.place(5.0));
-        let sum: f32 = near.iter().map(|l| l.thrown[1]).sum();
+        let sum: f32 = near.iter().map(|l| l.thrown.mean).sum();
         // 8 m over 55 m: 8.3 degrees; slopes that face the eye are steeper by some of their 3.1 degrees. Fresnel, n = 1.34, at a grazing
         // angle of 10 degrees: 0.349 (mean of 0.407 and 0.291).
         assert!((0.3..0.62).contains(&sum), "{sum}");
         // Rougher water throws back less, and less far up.
         let rough = Lobes::of(&Table::baked().sea(6.7), &seen(8.0, 60.0, 30.0));
-        let rough: f32 = rough.at(rough.place(5.0)).iter().map(|l| l.thrown[1]).sum();
+        let rough: f32 = rough.at(rough.place(5.0)).iter().map(|l| l.thrown.mean).sum();
         assert!(rough < 0.8 * sum, "{rough} {sum}");
     }
 }

@@ -13,7 +13,7 @@ mod tones;
 
 pub use compose::{Billboard, HALF_WIDTH_MIN_PX, Place, compose};
 pub use hiding::{Sighted, encode_hiding, hidden_m};
-pub use lobes::{BANDS, Lobe, Lobes, STEPS, Seen, water_light};
+pub use lobes::{BANDS, Lobe, Lobes, STEPS, Seen, Toned, water_light};
 pub use table::{SKY_SINES, SeaLobes, SkyLight, Table, encode};
 pub use tones::{Sample, SeaTones};
 

@@ -1,6 +1,6 @@
 //! What waves throw back of the boats (`core::reflection`). Each boat's mirror image is collapsed to bands of height with running sums;
-//! from these a small grid of places across the hull and away from it gets what water there throws back for three brightnesses of a
-//! pixel; and each pixel takes what belongs to its place and its own brightness. Only the last step is done for every pixel.
+//! from these a small grid of places across the hull and away from it gets what water there throws back and how that changes with a
+//! pixel's brightness; and each pixel takes what belongs to its place and its own brightness. Only the last step is done for every pixel.
 
 use ash::vk;
 use bowwave_core::scene::PixelRect;
@@ -21,8 +21,8 @@ use crate::{
 pub(crate) struct ReflectPass {
     bands: Image,
     sums: Image,
-    /// For dark, middling and bright pixels; and the colour of what is taken away.
-    layers: [Image; 4],
+    /// What is thrown back, and what is taken away.
+    layers: [Image; 2],
     to_bands: Stage,
     to_sums: Stage,
     to_layers: Stage,
@@ -98,7 +98,7 @@ impl ReflectPass {
         let steps = u32::try_from(boats.max(1) * LOBE_STEPS).unwrap_or(u32::MAX);
         // Of eight bits: a driver that runs on the processor filters these several times as fast as others.
         let layer = || image("layers of reflection", (LAYER_COLUMNS, steps), UNORM);
-        let layers = [layer()?, layer()?, layer()?, layer()?];
+        let layers = [layer()?, layer()?];
         let linear = Sampler::new(gpu, vk::Filter::LINEAR, false)?;
         let nearest = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
         let bound = |image: &Image, sampler: &Sampler| Bound::Texture {
@@ -138,8 +138,8 @@ impl ReflectPass {
                 ..replace
             },
         )?;
-        let [dark, middle, bright, coloured] = layers.each_ref().map(|layer| bound(layer, &linear));
-        let sampled = [bound(backdrop, &nearest), dark, middle, bright, coloured];
+        let [thrown, taken] = layers.each_ref().map(|layer| bound(layer, &linear));
+        let sampled = [bound(backdrop, &nearest), thrown, taken];
         let to_screen = Stage::new(
             making,
             &StageShape {
