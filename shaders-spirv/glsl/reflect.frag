@@ -12,7 +12,7 @@ layout(push_constant) uniform ReflectBlock {
     vec4 rect;
     uint index;
     uint first;
-    float foot;    // pixels above the hull-water line that are drawn
+    float foot;    // pixels above the hull-water line that are drawn, along the hull
     float last_step;
     vec4 tangent;  // tangent below the horizontal: for each pixel right and down, and at pixel (0, 0); last column of the layers
     vec4 mean;     // sea's mean luma: coefficients of the tangent's root; smallest root
@@ -76,7 +76,7 @@ void main() {
     // sRGB code to linear light within 0.002.
     vec3 light = code * (code * (code * 0.305306011 + 0.682171111) + 0.012522878);
     // Light over what waves mirror of the sky is the sun's glitter, of which a boat hides little.
-    float of_sky = min(curve(draw.sky_most, at_step / draw.last_step) / max(dot(light, LUMINANCE), 1e-6), 1.0);
+    float of_sky = min(max(curve(draw.sky_most, at_step / draw.last_step), 0.0) / max(dot(light, LUMINANCE), 1e-6), 1.0);
     vec3 share = min(away.rgb * times(away.a, tone), 1.0) * of_sky;
     // As much of the water is covered as its most hidden channel asks for; what is then too little of the others is given back.
     float cover = max(max(share.r, share.g), share.b);

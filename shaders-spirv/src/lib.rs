@@ -63,7 +63,7 @@ shaders! {
     BANDS_FRAG = "bands.frag";
     /// Running sums along the bands.
     SUMS_FRAG = "sums.frag";
-    /// What the sea throws back of a boat, for a dark, a middling and a bright pixel.
+    /// What the sea throws back of a boat and takes away, and how that changes with a pixel's brightness.
     LAYERS_FRAG = "layers.frag";
     /// The layers put onto the sea.
     REFLECT_FRAG = "reflect.frag";

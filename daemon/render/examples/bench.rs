@@ -103,7 +103,7 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
         ("full", ReflectionMethod::Full, "video compared a cell at a time, mirror softened"),
         ("physics as printed", ReflectionMethod::PhysicsAsPrinted, "nine rays a pixel of water"),
         ("physics", ReflectionMethod::Physics, "nine rays a pixel, eight waves each"),
-        ("waves", ReflectionMethod::Waves, "bands, sums, a grid, four layers a pixel"),
+        ("waves", ReflectionMethod::Waves, "bands, sums, a grid, two layers a pixel"),
     ] {
         step(name, "boat near", why, &with(method, none, 60.0));
     }

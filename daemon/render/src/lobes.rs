@@ -16,13 +16,14 @@ use crate::{coverage::Cells, water::HullLine};
 
 /// Beyond the ends of the hull the picture of the boat goes on by this share of its width: what overhangs the water line.
 const OVERHANG: f64 = 0.12;
-/// Pixels above the hull-water line that are drawn, so that no bare water shows between hull and reflection.
+/// Pixels above the hull-water line that are drawn along the hull, so that no bare water shows between hull and reflection.
 const FOOT_PX: f64 = 3.0;
 /// Pixels beyond the farthest light of a reflection.
 const SIDE_MARGIN_PX: f64 = 4.0;
 /// Pieces in which a reflection's outline is marked.
 const PIECES: usize = 8;
-/// Bands that together throw back or take away less are not looked up: a tenth of a code of 256.
+/// Bands that together throw back or take away less are not looked up: of a boat as bright as white, on water a tenth as bright, less
+/// than half a code of 256.
 const UNSEEN: f32 = 1e-3;
 /// Stands for the width of the band after the last that is looked up.
 const NO_MORE: f32 = -1.0;
@@ -76,7 +77,7 @@ impl Waves {
             tilt: tilt_away(&boat.pose, away),
             eye_m,
             range_m: away.length(),
-            height_m: model.height_m().max(0.3),
+            height_m: (model.height_m() - boat.hidden_m).max(0.3),
             width_m: (last - first) / pixels,
             pixel: 1.0 / focal,
         };

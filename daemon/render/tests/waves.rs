@@ -46,12 +46,13 @@ fn composed(before: &[u8], scene: &Scene) -> Vec<Vec3> {
     let linear = |p: &[u8]| Vec3::from_array([0, 1, 2].map(|c| srgb_to_linear(f32::from(p[c]) / 255.0)));
     let mut picture: Vec<Vec3> = before.chunks_exact(4).map(linear).collect();
     let project = |p: DVec3| scene.lens.project(scene.camera.to_camera(p)).unwrap();
-    let foot = scene.boats[0].pose.position;
+    let level = scene.boats[0].water_level;
+    let foot = scene.boats[0].pose.position.with_z(level);
     let anchor = project(foot);
     // The near side of the box.
-    let side = |x: f64| project(DVec3::new(x, foot.y - f64::from(BOX[1]) / 2.0, 0.0)) - anchor;
+    let side = |x: f64| project(DVec3::new(x, foot.y - f64::from(BOX[1]) / 2.0, level)) - anchor;
     let (left, right) = (side(-4.0), side(4.0));
-    let eye_m = scene.camera.position.z;
+    let eye_m = scene.camera.position.z - level;
     let lift = 0.002 * scene.boats[0].range_m;
     let focal_px = (project(foot - DVec3::Z * lift) - anchor).length() / lift * RANGE_M;
     let place = Place {
@@ -73,10 +74,10 @@ fn composed(before: &[u8], scene: &Scene) -> Vec<Vec3> {
         wind_to_view,
         sky: scene.sky,
         water: water_light(&scene.light),
-        level_m: scene.boats[0].water_level - scene.boats[0].hidden_m,
+        level_m: level - scene.boats[0].hidden_m,
         eye_m,
         range_m: RANGE_M,
-        height_m: f64::from(BOX[2]),
+        height_m: f64::from(BOX[2]) - level,
         width_m: 8.0,
         tilt: 0.0,
         pixel: 1.0 / focal_px,

@@ -11,7 +11,7 @@ use crate::{HALF_BEAM_M, fit::Fit, sea::Sea};
 const PLACES: usize = 600;
 /// Waves are looked at so far apart along the line of sight, metres.
 const STEP_M: f64 = 0.2;
-/// The line of sight is followed a little aslant, so that it does not come by the same waves again where a patch repeats.
+/// The line of sight is followed eight degrees aslant, so that it does not come by the same waves again where a patch repeats.
 const ASLANT: f64 = 0.137;
 
 /// By elevation and state: height over a hull's own water up to which it is hidden, metres.

@@ -31,7 +31,7 @@ pub struct Place {
     pub tangent: f64,
     /// Pixels to a tangent of 1 about the anchor.
     pub focal_px: f64,
-    /// Pixels above the line that are drawn: waves before the hull stand as high.
+    /// Pixels above the line that are drawn along the hull: waves before the hull stand as high.
     pub foot_px: f64,
 }
 

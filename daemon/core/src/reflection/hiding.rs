@@ -17,9 +17,9 @@ const SPREAD_STEP: f64 = 1e-4;
 /// How a boat is seen over the waves before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighted {
-    /// Wind 10 m above the sea, m/s.
+    /// Wind 10 m above the sea, m/s; beyond Beaufort 4 it counts as that.
     pub wind_m_s: f64,
-    /// Angle from its direction to the line of sight, radians clockwise.
+    /// Angle from the line of sight to the direction in which it blows, radians clockwise.
     pub wind_to_view: f64,
     /// Angle below the horizontal under which the boat's foot is seen, radians.
     pub elevation: f64,

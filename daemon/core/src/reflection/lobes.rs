@@ -41,7 +41,7 @@ const SKY_MOST: f32 = 1.5;
 pub struct Toned {
     /// Its mean over the pixels of a sea.
     pub mean: f32,
-    /// By how much more a bright pixel has it (one [`TONE_OUTER`] beyond the mean brightness), and a dark one less.
+    /// By how much more a bright pixel has it (one that is [`TONE_OUTER`](super::grid::TONE_OUTER) beyond the mean), and a dark one less.
     pub slope: f32,
 }
 
@@ -162,7 +162,7 @@ fn divisions(whole_px: f64, least_px: f64, power: f64, (fewest, most): (usize, u
 /// How a boat is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// Angle from the wind's direction to the line of sight, radians clockwise; a sea looks the same half a turn on.
+    /// Angle from the line of sight to the direction in which the wind blows, radians clockwise; a sea looks the same half a turn on.
     pub wind_to_view: f64,
     /// The sky behind the boat.
     pub sky: SkyLight,

@@ -21,7 +21,8 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::RigidPose;
 
-/// Angle from the direction in which the wind blows to that in which a boat is seen (both east, north), radians clockwise.
+/// Angle from the direction in which a boat is seen to that in which the wind blows (both east, north), radians clockwise. Without wind it
+/// is no number, which the tables take for 0.
 pub fn wind_to_view(wind: DVec2, away: DVec2) -> f64 {
     wind.angle_to(away)
 }

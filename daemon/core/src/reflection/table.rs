@@ -114,7 +114,7 @@ pub struct SeaLobes {
 /// From where to where a line of sight goes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sight {
-    /// Angle from the wind's direction to it, radians clockwise.
+    /// Angle from it to the direction in which the wind blows, radians clockwise.
     pub(super) wind_to_view: f64,
     /// Level of the water at the hull over the mean one, metres.
     pub(super) level_m: f64,
