@@ -22,7 +22,7 @@ const STEP_PX: f64 = 0.1;
 /// A boat's bands are finer at its foot, which is seen in the sea from farther off.
 const BAND_POWER: f64 = 1.8;
 /// Water that throws back less than this share of a boat's light is not drawn: where the boat is black against a bright sky it changes one
-/// code of 256.
+/// or two codes of 256.
 const SHARE_MIN: f32 = 0.02;
 /// Beside the boat it is drawn down to this one, of which nothing is seen to end.
 const SHARE_ASIDE: f32 = 0.005;

@@ -532,10 +532,10 @@ fn replaces(new: Fault, old: Fault) -> bool {
     let with_it = WRONG_WITH_IT.contains(&old);
     new != old
         && match new {
-            // A camera that is gone does nothing else wrong.
-            Fault::CamLost => with_it || WRONG_WITH_PICTURES.contains(&old),
-            // What another camera had is not what the one has that is there.
-            Fault::CalMismatch => with_it || WRONG_WITH_PICTURES.contains(&old) || old == Fault::CamLost,
+            // A camera that is gone does nothing else wrong, and what another camera had is not what the one has that is there.
+            Fault::CamLost | Fault::CalMismatch => {
+                with_it || WRONG_WITH_PICTURES.contains(&old) || old == Fault::CamLost
+            }
             // Nothing else is known of a camera that another program holds, not even that its queue would fail again.
             Fault::CamBusy => with_it || old == Fault::CamLost,
             // One that does something wrong is there, and nobody holds it.
