@@ -249,6 +249,11 @@ impl Ocean {
         self.cascades.iter().take(2).map(|c| c.at(place).x).sum()
     }
 
+    /// Height of the water in metres and its slopes east and north, of the waves that the fields resolve.
+    pub fn water(&self, place: DVec2) -> DVec3 {
+        self.cascades.iter().take(2).map(|c| c.at(place)).sum()
+    }
+
     /// Slopes at a place for a pixel that covers `footprint_m` of water.
     pub fn facet(&self, place: DVec2, footprint_m: f64) -> Facet {
         let mut facet = Facet { slope: DVec2::ZERO, rough: self.ripples };

@@ -15,7 +15,10 @@ use bowwave_core::{
 };
 use glam::{DVec2, DVec3};
 
-use super::video::{Clip, Video};
+use super::{
+    gauges::Gauged,
+    video::{Clip, Video},
+};
 use crate::bench::thread_ns;
 
 /// Time between two pictures, nanoseconds: 30 Hz.
@@ -38,6 +41,8 @@ pub struct Outcome {
     pub period_s: f64,
     /// Direction from which the waves come, radians.
     pub from_rad: f64,
+    /// Peak and direction of the water that was in view, from buoys on it.
+    pub gauged: Option<Gauged>,
     /// The answer.
     pub answer: Result<SeaEstimate, Unknown>,
 }
@@ -92,6 +97,7 @@ pub fn run(clip: Clip, seconds: f64) -> Outcome {
         seen_m: video.seen_m(),
         period_s: main.peak_s,
         from_rad: main.from_rad,
+        gauged: video.gauged(),
         answer: meter.estimate(),
     }
 }
@@ -114,14 +120,17 @@ pub fn run_all(clips: Vec<Clip>, seconds: f64, mut tell: impl FnMut(usize, &Outc
 
 /// One line about a clip.
 pub fn line(outcome: &Outcome) -> String {
+    let (gauged_s, gauged_from) = outcome.gauged.map_or((f64::NAN, f64::NAN), |g| (g.period_s, g.from_rad));
     let head = format!(
-        "{:16} eye {:4.1} m  H {:4.2} (in view {:4.2}) T {:5.2} from {:3.0}",
+        "{:16} eye {:4.1} m  H {:4.2} (in view {:4.2}) T {:5.2} ({:5.2}) from {:3.0} ({:3.0})",
         outcome.class,
         outcome.eye_m,
         outcome.height_m,
         outcome.seen_m,
         outcome.period_s,
-        outcome.from_rad.to_degrees().rem_euclid(360.0)
+        gauged_s,
+        outcome.from_rad.to_degrees().rem_euclid(360.0),
+        gauged_from.to_degrees().rem_euclid(360.0)
     );
     match &outcome.answer {
         Ok(e) => format!(

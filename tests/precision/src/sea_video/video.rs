@@ -6,6 +6,7 @@ use bowwave_core::geometry::{CameraPose, Lens, look};
 use glam::{DVec2, DVec3};
 
 use super::{
+    gauges::{Gauged, Gauges},
     light::{Sky, water},
     ocean::{Ocean, System, normal, uniform},
 };
@@ -61,6 +62,7 @@ pub struct Video {
     codes: Vec<f32>,
     squares: f64,
     count: f64,
+    gauges: Gauges,
 }
 
 impl Video {
@@ -68,7 +70,8 @@ impl Video {
     pub fn new(clip: Clip) -> Self {
         let ocean = Ocean::new(&clip.systems, 0.5 * (0.003 + 0.005_12 * clip.wind_m_s), clip.seed);
         let codes = (0..256).map(|i| decode(f64::from(i) / 255.0) as f32).collect();
-        Self { clip, ocean, time_s: 0.0, codes, squares: 0.0, count: 0.0 }
+        let gauges = Gauges::lay(clip.eye_m, clip.look.0);
+        Self { clip, ocean, time_s: 0.0, codes, squares: 0.0, count: 0.0, gauges }
     }
 
     /// Moves on to `t` seconds, and takes note of the height of the water in view.
@@ -82,6 +85,12 @@ impl Video {
             self.squares += self.ocean.height(DVec2::new(azimuth.sin(), azimuth.cos()) * range).powi(2);
             self.count += 1.0;
         }
+        self.gauges.write(t, |place| self.ocean.water(place));
+    }
+
+    /// What the water that was in view says of its own peak and direction.
+    pub fn gauged(&self) -> Option<Gauged> {
+        self.gauges.read()
     }
 
     /// Four standard deviations of the spectrum's height, metres.
