@@ -166,13 +166,13 @@ impl Default for WaterBlock {
 }
 
 /// Bands of height that a [`LobeBlock`] holds a boat in, at most.
-pub const LOBE_BANDS: usize = 14;
+pub const LOBE_BANDS: usize = 10;
 /// Distances from the hull that a [`LobeBlock`] knows, at most.
-pub const LOBE_STEPS: usize = 32;
+pub const LOBE_STEPS: usize = 20;
 /// Columns of a boat's bands on the GPU, at most.
-pub const LOBE_COLUMNS: u32 = 64;
+pub const LOBE_COLUMNS: u32 = 42;
 /// Columns of what the sea throws back of a boat on the GPU, at most.
-pub const LAYER_COLUMNS: u32 = 96;
+pub const LAYER_COLUMNS: u32 = 64;
 
 /// What the sea throws back of one boat: `LobeBlock`, set 0, binding 6, std430. Goes with the [`WaterBlock`] of the same index.
 #[repr(C)]
@@ -350,47 +350,50 @@ pub struct DrawBlock {
 }
 layout!(DrawBlock, 24, rect = 0, index = 16, first = 20);
 
-/// Push constants of what puts the layers onto the sea: `ReflectBlock`. Begins as [`DrawBlock`] does.
+/// Push constants of what puts the layers onto the sea: `ReflectBlock`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ReflectBlock {
-    /// What is added to each quad of the frame's list.
-    pub rect: [f32; 4],
     /// Index of the boat's [`WaterBlock`] and [`LobeBlock`].
     pub index: u32,
-    /// First quad of the frame's list.
+    /// First vector of the frame's list.
     pub first: u32,
-    /// Pixels above the hull-water line that are drawn.
-    pub foot: f32,
     /// The boat's last step.
     pub last_step: f32,
+    /// Middle of the boat's first row of the layers, texels.
+    pub first_row: f32,
     /// Tangent below the horizontal: for each pixel right and down, at pixel (0, 0); last column of the boat's layers.
     pub tangent: [f32; 4],
     /// Mean of the sea's luma: coefficients of the tangent's root's powers 0 to 2; smallest root.
     pub mean: [f32; 4],
-    /// Standard deviation of it; largest root.
+    /// How much brighter than that a pixel is which has as much more as an outer brightness; largest root.
     pub spread: [f32; 4],
-    /// The same as in the [`LobeBlock`].
+    /// Tangent below the horizontal at the anchor, its change by pixel, square of the step by pixel and over the tangent's square.
     pub place: [f32; 4],
-    /// Likewise.
+    /// The same as in the [`LobeBlock`].
     pub span: [f32; 4],
-    /// Likewise.
+    /// Luminance above which light is the sun's: coefficients of the powers of the step.
     pub sky_most: [f32; 4],
+    /// Size of the layers' texels, texture coordinates.
+    pub texel: [f32; 2],
+    /// Keeps the size.
+    pub pad: [f32; 2],
 }
 layout!(
     ReflectBlock,
     128,
-    rect = 0,
-    index = 16,
-    first = 20,
-    foot = 24,
-    last_step = 28,
-    tangent = 32,
-    mean = 48,
-    spread = 64,
-    place = 80,
-    span = 96,
-    sky_most = 112,
+    index = 0,
+    first = 4,
+    last_step = 8,
+    first_row = 12,
+    tangent = 16,
+    mean = 32,
+    spread = 48,
+    place = 64,
+    span = 80,
+    sky_most = 96,
+    texel = 112,
+    pad = 120,
 );
 
 /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.

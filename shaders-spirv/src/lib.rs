@@ -49,6 +49,8 @@ shaders! {
     BOAT_TEXTURED_FRAG = "boat_textured.frag";
     /// A rectangle given in pixels.
     RECT_VERT = "rect.vert";
+    /// A strip of water below a hull, given by where the hull-water line is.
+    REFLECT_VERT = "reflect.vert";
     /// The boats' layer, averaged. Constant: 0 samples.
     COMPOSITE_FRAG = "composite.frag";
     /// The mirror layer, softened.

@@ -4,8 +4,9 @@ use bowwave_core::{
     geometry::curvature_drop,
     model::Model,
     reflection::{
-        BANDS, HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table, tilt_away, water_light,
-        wind_to_view,
+        BANDS, HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table,
+        grid::{TONE_GAIN, TONE_OUTER},
+        tilt_away, water_light, wind_to_view,
     },
     scene::{BoatView, PixelRect, Scene},
 };
@@ -20,8 +21,10 @@ const OVERHANG: f64 = 0.12;
 const FOOT_PX: f64 = 3.0;
 /// Pixels beyond the farthest light of a reflection.
 const SIDE_MARGIN_PX: f64 = 4.0;
-/// Pieces in which a reflection's outline is marked.
+/// Pieces of a reflection's outline beside the hull, and of what is marked of it.
 const PIECES: usize = 8;
+/// None is lower than so many pixels.
+const PIECE_PX: f64 = 8.0;
 /// Bands that together throw back or take away less are not looked up: of a boat as bright as white, on water a tenth as bright, less
 /// than half a code of 256.
 const UNSEEN: f32 = 1e-3;
@@ -138,15 +141,42 @@ impl Waves {
         (at_hull, more.fold(0.0, f64::max))
     }
 
-    /// Marks the cells that the last block's reflection can change.
-    pub(crate) fn mark(&self, reach: &Reach, line: &HullLine, cells: &mut Cells, within: PixelRect) {
-        let (low, high) = line.extent();
-        let (left, right) = line.ends();
-        for piece in 0..PIECES {
-            let steps = [piece, piece + 1].map(|p| p * (self.lobes.steps.len() - 1) / PIECES);
-            let [from, to] = steps.map(|s| reach.below(self.lobes.step_m(s)));
+    /// Appends the strips of water that the last block's reflection is drawn on, as `reflect.vert` takes them; says how many.
+    pub(crate) fn strips(&self, reach: &Reach, line: &HullLine, out: &mut Vec<[f32; 4]>) -> u32 {
+        let before = out.len();
+        let mut strip = |x: [f64; 2], y: [f64; 2], below: [f64; 3]| {
+            out.push([x[0], x[1], y[0], y[1]].map(|v| v as f32));
+            out.push([below[0], below[1], below[2], 0.0].map(|v| v as f32));
+        };
+        let lower = |y: f64| reach.below(y, self.lobes.reach_m);
+        for (a, b) in line.corners().zip(line.corners().skip(1)) {
+            strip([a.x, b.x], [a.y, b.y], [-FOOT_PX, lower(a.y), lower(b.y)]);
+        }
+        // Beside the hull there is sea above the line, farther off than the boat.
+        let (Some(left), Some(right)) = (line.corners().next(), line.corners().last()) else { return 0 };
+        let pieces = ((lower(0.0) / PIECE_PX) as usize).clamp(1, PIECES);
+        for piece in 0..pieces {
+            let steps = [piece, piece + 1].map(|p| p * (self.lobes.steps.len() - 1) / pieces);
             let side = (steps[0]..=steps[1]).map(|s| self.side(reach, s)).fold(0.0, f64::max);
-            line.mark([left - side, right + side], [low + from - FOOT_PX, high + to + 2.0], cells, within);
+            for (x, y) in [([left.x - side, left.x], left.y), ([right.x, right.x + side], right.y)] {
+                let [from, to] = steps.map(|s| reach.below(y, self.lobes.step_m(s)));
+                strip(x, [y, y], [from, to, to]);
+            }
+        }
+        ((out.len() - before) / 2) as u32
+    }
+}
+
+/// Marks the cells that strips touch.
+pub(crate) fn mark_strips(strips: &[[f32; 4]], line: &HullLine, cells: &mut Cells, within: PixelRect) {
+    for strip in strips.chunks_exact(2) {
+        let ([left, right, a, b], [upper, lower_a, lower_b, _]) =
+            (strip[0].map(f64::from), strip[1].map(f64::from));
+        let (from, to) = (a.min(b) + upper, (a + lower_a).max(b + lower_b));
+        // In pieces: seen with a tilted head, a tall strip's box is wide.
+        let at = |piece: usize| from + (to - from) * piece as f64 / PIECES as f64;
+        for piece in 0..PIECES {
+            line.mark([left, right], [at(piece), at(piece + 1)], cells, within);
         }
     }
 }
@@ -162,11 +192,12 @@ pub(crate) struct Reach {
 }
 
 impl Reach {
-    /// Pixels below the hull-water line of the water at a distance from the hull.
-    fn below(&self, distance_m: f64) -> f64 {
-        let range = self.eye_m / self.tangent;
+    /// Pixels below the hull-water line of the water at a distance from the hull, where the line lies so far below the anchor.
+    fn below(&self, line: f64, distance_m: f64) -> f64 {
+        let near = (self.tangent + line / self.focal).max(1e-5);
+        let range = self.eye_m / near;
         let tangent = self.eye_m / (range - distance_m).max(0.05 * range);
-        (tangent - self.tangent) * self.focal
+        (tangent - near) * self.focal
     }
 }
 
@@ -194,8 +225,8 @@ fn columns_for(pixels: f64, most: u32) -> u32 {
     ((pixels / COLUMN_PX).ceil() as u32).clamp(COLUMNS_MIN, most)
 }
 
-/// How bright the sea of a scene is, as the shaders take it, for any boat.
-pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
+/// What puts the layers of a boat onto the sea: `at` is the index of its blocks and the first vector of its strips.
+pub(crate) fn reflect_block(scene: &Scene, lobes: &LobeBlock, at: (u32, u32)) -> ReflectBlock {
     let size = DVec2::new(f64::from(scene.lens.width), f64::from(scene.lens.height));
     let down = |pixel: DVec2| scene.camera.tangent_below(&scene.lens, pixel);
     // The plane through the tangents about the middle of the screen: bent by less than a pixel's worth within a usual lens.
@@ -208,11 +239,21 @@ pub(crate) fn reflect_block(scene: &Scene) -> ReflectBlock {
     let start = down(middle) - right * middle.x - below * middle.y;
     let tones = &scene.tones;
     let with = |c: [f32; 3], last: f32| [c[0], c[1], c[2], last];
+    let [_, steps, _, columns] = lobes.sizes;
+    let last = (steps - 1) as f32;
+    let [tangent, per_pixel, eye_m, per_reach] = lobes.place;
+    let [sky, sky_1, sky_2, _] = lobes.sky_most;
     ReflectBlock {
-        tangent: [right as f32, below as f32, start as f32, 0.0],
+        index: at.0,
+        first: at.1,
+        last_step: last,
+        first_row: (at.0 as usize * STEPS) as f32 + 0.5,
+        tangent: [right as f32, below as f32, start as f32, (columns - 1) as f32],
         mean: with(tones.mean, tones.roots[0]),
-        spread: with(tones.spread, tones.roots[1]),
-        foot: FOOT_PX as f32,
+        spread: with(tones.spread.map(|c| c * (TONE_OUTER as f32 / TONE_GAIN)), tones.roots[1]),
+        place: [tangent, per_pixel, eye_m * per_pixel * per_reach * last * last, 0.0],
+        span: lobes.span,
+        sky_most: [sky, sky_1 / last, sky_2 / (last * last), 0.0],
         ..ReflectBlock::default()
     }
 }

@@ -8,8 +8,7 @@ use bowwave_core::{
 };
 use glam::DVec2;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, ReflectBlock, RoundBlock, TRACK_POINTS, WATERS_MAX, WakeBlock,
-    WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, RoundBlock, TRACK_POINTS, WATERS_MAX, WakeBlock, WaterBlock,
 };
 
 use crate::{
@@ -18,9 +17,10 @@ use crate::{
     frame_data::Capacity,
     frame_data::RECTS_MAX,
     hud_layout::KINDS,
-    lobes::{Waves, reflect_block},
+    lobes::{Waves, mark_strips, reflect_block},
     passes::{
         boats::BoatDraw,
+        reflect::ReflectDraw,
         rounds::{RoundDraw, pieces},
         wake::WakeDraw,
         water::WaterDraw,
@@ -97,8 +97,8 @@ pub(crate) struct Plan {
     pub(crate) lobe_blocks: Vec<LobeBlock>,
     /// Waves of the mended Physics shader about the nearest boat.
     pub(crate) physics: Option<[[f32; 4]; PHYSICS_WAVES]>,
-    /// The pixels of all of `waters`, each once, and how bright the sea is there; for the same method.
-    pub(crate) reflects: Vec<ReflectBlock>,
+    /// For the same method: the strips of water that throw back light, and how bright the sea is there.
+    pub(crate) reflects: Vec<ReflectDraw>,
     pub(crate) wake_blocks: Vec<WakeBlock>,
     pub(crate) wakes: Vec<WakeDraw>,
     pub(crate) rounds: Vec<RoundDraw>,
@@ -106,7 +106,7 @@ pub(crate) struct Plan {
     pub(crate) hulls: Vec<PixelRect>,
     /// The same for clearing.
     pub(crate) clears: Vec<vk::ClearRect>,
-    /// The frame's list of rectangles: those of `hulls`, then those of each of `waters`.
+    /// The frame's list: rectangles of `hulls`, then for each of `waters` its strips and its rectangles.
     pub(crate) list: Vec<[f32; 4]>,
     /// What is blended into, as it comes: rectangles may overlap.
     touched: Vec<PixelRect>,
@@ -289,24 +289,22 @@ impl Plan {
         atlas::place(atlas, &self.wanted, &mut self.places);
         let mirrored = scene.water.method != ReflectionMethod::Off;
         let waves = scene.water.method == ReflectionMethod::Waves;
-        let screen = PixelRect { x: 0, y: 0, width: size.0, height: size.1 };
-        for (n, placed) in self.places.iter().enumerate() {
-            let ((i, line), (rect, _)) = (&self.lines[n], self.wanted[n]);
-            let boat = &scene.boats[*i];
+        for n in 0..self.places.len() {
+            let (placed, (i, line), (rect, _)) = (self.places[n], self.lines[n], self.wanted[n]);
+            let boat = &scene.boats[i];
             let Some(Outline { model, solid, .. }) = models.get(usize::from(boat.model.0)) else { continue };
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
-            let block = water_block(scene, boat, line, placed);
+            let block = water_block(scene, boat, &line, &placed);
             let softened_px = match scene.water.method {
                 ReflectionMethod::Full => 1.5 * f64::from(atlas::SOFT) / placed.scale,
                 _ => 0.0,
             };
-            if let Some(waves) = self.waves.as_mut().filter(|_| waves) {
-                self.lobe_blocks.truncate(self.water_blocks.len());
-                self.lobe_blocks.push(LobeBlock::default());
-                let lobes = self.lobe_blocks.last_mut();
-                let reach = lobes.and_then(|out| waves.block(scene, boat, line, model, out));
-                let Some(reach) = reach else { continue };
-                waves.mark(&reach, line, &mut self.cells, screen);
+            let mut thrown = None;
+            if waves {
+                thrown = self.plan_thrown(scene, boat, &line, model, size);
+                if thrown.is_none() {
+                    continue;
+                }
             } else if mirrored {
                 solid.mark(
                     &mut self.cells,
@@ -324,10 +322,12 @@ impl Plan {
                 line.unmark_dry(&mut self.cells, &block, scene.water.method);
             }
             self.rest.clear();
-            let Some(around) = self.cells.take(&mut self.rest, WATER_RECTS_MAX) else { continue };
+            let marked = self.cells.take(&mut self.rest, WATER_RECTS_MAX);
+            let Some(around) = marked.into_iter().chain(thrown.map(|t| t.1)).reduce(joined) else { continue };
             if self.list.len() + self.rest.len() > RECTS_MAX {
                 continue;
             }
+            self.reflects.extend(thrown.map(|t| t.0));
             self.waters.push(WaterDraw {
                 index: self.water_blocks.len() as u32,
                 rect: around,
@@ -344,29 +344,42 @@ impl Plan {
                 let detail_m = DETAIL_PX * pixel_m(scene, boat) * coarser;
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
                 self.boat_blocks.push(view::boat_block(scene, boat, &pose, true));
-                self.mirror_places.push(*placed);
+                self.mirror_places.push(placed);
             }
-        }
-        if waves {
-            let any = reflect_block(scene);
-            self.reflects.extend(self.waters.iter().zip(&self.lobe_blocks).map(|(draw, lobes)| {
-                let [_, steps, _, columns] = lobes.sizes;
-                let [right, down, start, _] = any.tangent;
-                ReflectBlock {
-                    index: draw.index,
-                    first: draw.first,
-                    last_step: (steps - 1) as f32,
-                    tangent: [right, down, start, (columns - 1) as f32],
-                    place: lobes.place,
-                    sky_most: lobes.sky_most,
-                    span: lobes.span,
-                    ..any
-                }
-            }));
         }
         if scene.water.method == ReflectionMethod::Physics {
             self.physics = scene.boats.last().map(|boat| physics_waves(&mut self.physics_sea, scene, boat));
         }
+    }
+
+    /// What the sea throws back of a boat, and the pixels about it; `None` where that is nothing.
+    fn plan_thrown(
+        &mut self,
+        scene: &Scene,
+        boat: &BoatView,
+        line: &HullLine,
+        model: &Model,
+        size: (u32, u32),
+    ) -> Option<(ReflectDraw, PixelRect)> {
+        let index = self.water_blocks.len();
+        // One that came to nothing after all leaves its block.
+        self.lobe_blocks.truncate(index);
+        self.lobe_blocks.push(LobeBlock::default());
+        let (waves, out) = (self.waves.as_mut()?, self.lobe_blocks.last_mut()?);
+        let reach = waves.block(scene, boat, line, model, out)?;
+        let block = reflect_block(scene, out, (index as u32, self.list.len() as u32));
+        let first = self.list.len();
+        let strips = waves.strips(&reach, line, &mut self.list);
+        if self.list.len() > RECTS_MAX {
+            self.list.truncate(first);
+            return None;
+        }
+        let screen = PixelRect { x: 0, y: 0, width: size.0, height: size.1 };
+        mark_strips(&self.list[first..], line, &mut self.cells, screen);
+        self.rest.clear();
+        let around = self.cells.take(&mut self.rest, WATER_RECTS_MAX)?;
+        self.touched.extend_from_slice(&self.rest);
+        Some((ReflectDraw { block, strips }, around))
     }
 
     fn plan_wakes(&mut self, scene: &Scene) {

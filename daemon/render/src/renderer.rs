@@ -452,7 +452,7 @@ impl Renderer {
             stamps.around(Span::Water, || {
                 pass.record(to, frame, how, &plan.waters);
                 if let Some(pass) = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty()) {
-                    pass.record(to, frame, &plan.waters, &plan.reflects);
+                    pass.record(to, frame, &plan.reflects);
                 }
             });
         }

@@ -82,6 +82,9 @@ pub(crate) const SEEN_DOWN: f64 = 0.12;
 /// Waves of the mended Physics shader, as `water.frag` has it.
 pub(crate) const PHYSICS_WAVES: usize = 8;
 
+/// A piece of the hull-water line counts as straight where it lies within so many pixels of its chord.
+const STRAIGHT_PX: f64 = 0.15;
+
 /// Where a boat's hull meets the water, on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HullLine {
@@ -184,6 +187,29 @@ impl HullLine {
     /// Left and right end of the line, pixels right of the anchor.
     pub(crate) fn ends(&self) -> (f64, f64) {
         (self.first, self.first + self.pitch * (HULL_LINE_COLUMNS - 1) as f64)
+    }
+
+    /// The line as straight pieces, none farther from it than [`STRAIGHT_PX`]: their ends from left to right, pixels right of the
+    /// anchor and below it.
+    pub(crate) fn corners(&self) -> impl Iterator<Item = DVec2> {
+        let last = HULL_LINE_COLUMNS - 1;
+        let columns = std::iter::successors(Some(0), move |from| {
+            let straight = |to: &usize| self.is_straight(*from, *to);
+            (*from < last).then(|| (from + 2..=last).take_while(straight).last().unwrap_or(from + 1))
+        });
+        columns.map(|column| self.corner(column))
+    }
+
+    fn corner(&self, column: usize) -> DVec2 {
+        DVec2::new(self.first + self.pitch * column as f64, self.below[column])
+    }
+
+    fn is_straight(&self, from: usize, to: usize) -> bool {
+        let (a, b) = (self.below[from], self.below[to]);
+        (from + 1..to).all(|column| {
+            let chord = a + (b - a) * (column - from) as f64 / (to - from) as f64;
+            (self.below[column] - chord).abs() <= STRAIGHT_PX
+        })
     }
 
     /// Highest and lowest point of the line, pixels below the anchor.

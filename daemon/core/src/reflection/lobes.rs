@@ -9,15 +9,15 @@ use super::{
 use crate::{light::LUMINANCE, scene::Light};
 
 /// Bands of height that a boat is held in, at most.
-pub const BANDS: usize = 14;
+pub const BANDS: usize = 10;
 /// Distances from the hull at which lobes are held, at most.
-pub const STEPS: usize = 32;
+pub const STEPS: usize = 20;
 /// And at least.
-const BANDS_MIN: usize = 4;
-const STEPS_MIN: usize = 12;
+const BANDS_MIN: usize = 3;
+const STEPS_MIN: usize = 8;
 /// No band is finer than so many pixels of the boat, and no step beside the hull than so many of the water.
-const BAND_PX: f64 = 0.4;
-const STEP_PX: f64 = 0.1;
+const BAND_PX: f64 = 0.8;
+const STEP_PX: f64 = 0.4;
 
 /// A boat's bands are finer at its foot, which is seen in the sea from farther off.
 const BAND_POWER: f64 = 1.8;

@@ -92,7 +92,7 @@ pub(crate) fn light(table: &Table<'_>, more: &[&str]) -> Result<(DVec3, f64), Sc
 pub(crate) fn reflection(table: &Table<'_>, force: BeaufortForce) -> Result<Water, ScenarioError> {
     table.only(&["method", "shadow_level"])?;
     let methods = ReflectionMethod::ALL.map(|method| (method.name(), method));
-    let method = table.choice("method", &methods)?.unwrap_or(ReflectionMethod::Full);
+    let method = table.choice("method", &methods)?.unwrap_or(ReflectionMethod::Waves);
     let shadow = match table.integer("shadow_level", 0..=2)? {
         Some(0) => ShadowLevel::None,
         Some(2) => ShadowLevel::Strong,

@@ -5,7 +5,7 @@
 use ash::vk;
 use bowwave_core::scene::PixelRect;
 use shaders_spirv::{
-    BANDS_FRAG, LAYERS_FRAG, RECT_VERT, REFLECT_FRAG, SCREEN_VERT, SUMS_FRAG,
+    BANDS_FRAG, LAYERS_FRAG, REFLECT_FRAG, REFLECT_VERT, SCREEN_VERT, SUMS_FRAG,
     interface::{DrawBlock, LAYER_COLUMNS, LOBE_BANDS, LOBE_COLUMNS, LOBE_STEPS, LobeBlock, ReflectBlock},
 };
 
@@ -16,6 +16,13 @@ use crate::{
     pipeline::{Blend, Bound, LIGHT, Pipeline, PipelineShape, SRGB, SUMS, Sampler, SetLayout, UNORM},
     recorder::{Begin, Recorder, Step},
 };
+
+/// A boat's strips of water, and what is thrown back there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReflectDraw {
+    pub(crate) block: ReflectBlock,
+    pub(crate) strips: u32,
+}
 
 /// The pass.
 pub(crate) struct ReflectPass {
@@ -64,7 +71,7 @@ impl Stage {
                 sets: if shape.framed { &sets } else { &sets[1..] },
                 push: shape.push,
                 vertices: None,
-                topology: if shape.vertex == RECT_VERT {
+                topology: if shape.vertex == REFLECT_VERT {
                     vk::PrimitiveTopology::TRIANGLE_STRIP
                 } else {
                     vk::PrimitiveTopology::TRIANGLE_LIST
@@ -143,7 +150,7 @@ impl ReflectPass {
         let to_screen = Stage::new(
             making,
             &StageShape {
-                vertex: RECT_VERT,
+                vertex: REFLECT_VERT,
                 fragment: REFLECT_FRAG,
                 sampled: &sampled,
                 push: size_of::<ReflectBlock>(),
@@ -210,18 +217,14 @@ impl ReflectPass {
         to.barrier(layers.map(sampled));
     }
 
-    /// Draws, within a rendering to the screen; `blocks` go with `boats`.
-    pub(crate) fn record(
-        &self,
-        to: Recorder<'_>,
-        frame: vk::DescriptorSet,
-        boats: &[WaterDraw],
-        blocks: &[ReflectBlock],
-    ) {
+    /// Draws, within a rendering to the screen.
+    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, boats: &[ReflectDraw]) {
         to.bind(&self.to_screen.pipeline, &[frame, self.to_screen.set]);
-        for (boat, block) in boats.iter().zip(blocks) {
-            to.push(&self.to_screen.pipeline, block);
-            to.draw(4, boat.count);
+        let shape = &self.layers[0].shape;
+        let texel = [1.0 / shape.width as f32, 1.0 / shape.height as f32];
+        for boat in boats {
+            to.push(&self.to_screen.pipeline, &ReflectBlock { texel, ..boat.block });
+            to.draw(4, boat.strips);
         }
     }
 }
