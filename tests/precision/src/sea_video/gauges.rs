@@ -67,7 +67,7 @@ impl Gauges {
         let fourth = |i: usize| lines[i].0.powi(4);
         let sum: f64 = (0..n).filter(used).map(fourth).sum();
         let peak = (0..n).filter(used).map(|i| fourth(i) * hz(i)).sum::<f64>() / sum;
-        if !(peak > 0.0) {
+        if peak.is_nan() || peak <= 0.0 {
             return None;
         }
         let about = (0..n).filter(|i| (0.65..1.8).contains(&(hz(*i) / peak)));
