@@ -19,7 +19,7 @@ use crate::{
 /// Most quads of the head-up display.
 pub(crate) const QUADS_MAX: usize = 256;
 
-/// Most rectangles of the frame's list.
+/// Most vectors of the frame's list: a rectangle is one, a strip of water two.
 pub(crate) const RECTS_MAX: usize = 4096;
 
 /// Offset and bytes of each region.

@@ -11,7 +11,7 @@ use bowwave_core::{
     scene::{BoatView, PixelRect, Scene},
 };
 use glam::{DVec2, DVec3};
-use shaders_spirv::interface::{LAYER_COLUMNS, LOBE_COLUMNS, LobeBlock, ReflectBlock};
+use shaders_spirv::interface::{HULL_LINE_COLUMNS, LAYER_COLUMNS, LOBE_COLUMNS, LobeBlock, ReflectBlock};
 
 use crate::{coverage::Cells, water::HullLine};
 
@@ -23,6 +23,8 @@ const FOOT_PX: f64 = 3.0;
 const SIDE_MARGIN_PX: f64 = 4.0;
 /// Pieces of a reflection's outline beside the hull, and of what is marked of it.
 const PIECES: usize = 8;
+/// Most vectors of the frame's list that a boat's strips take.
+pub(crate) const STRIP_VECTORS_MAX: usize = 2 * (HULL_LINE_COLUMNS - 1 + 2 * PIECES);
 /// None is lower than so many pixels.
 const PIECE_PX: f64 = 8.0;
 /// Bands that together throw back or take away less are not looked up: of a boat as bright as white, on water a tenth as bright, less

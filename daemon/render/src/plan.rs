@@ -17,7 +17,7 @@ use crate::{
     frame_data::Capacity,
     frame_data::RECTS_MAX,
     hud_layout::KINDS,
-    lobes::{Waves, mark_strips, reflect_block},
+    lobes::{STRIP_VECTORS_MAX, Waves, mark_strips, reflect_block},
     passes::{
         boats::BoatDraw,
         reflect::ReflectDraw,
@@ -97,7 +97,7 @@ pub(crate) struct Plan {
     pub(crate) lobe_blocks: Vec<LobeBlock>,
     /// Waves of the mended Physics shader about the nearest boat.
     pub(crate) physics: Option<[[f32; 4]; PHYSICS_WAVES]>,
-    /// For the same method: the strips of water that throw back light, and how bright the sea is there.
+    /// For the method `Waves`: the strips of water that throw back light, and how bright the sea is there.
     pub(crate) reflects: Vec<ReflectDraw>,
     pub(crate) wake_blocks: Vec<WakeBlock>,
     pub(crate) wakes: Vec<WakeDraw>,
@@ -135,7 +135,8 @@ pub(crate) struct Plan {
 impl Plan {
     pub(crate) fn with_capacity(capacity: Capacity, size: (u32, u32)) -> Self {
         let Capacity { boats, rounds, lobes, wakes } = capacity;
-        let touched = 2 * HULL_RECTS_MAX + RECTS_MAX + rounds + wakes * TRACK_POINTS;
+        let touched =
+            2 * HULL_RECTS_MAX + RECTS_MAX + lobes * WATER_RECTS_MAX + rounds + wakes * TRACK_POINTS;
         // With the display's plates.
         let rects = BLENDS_MAX + 16;
         Self {
@@ -157,7 +158,8 @@ impl Plan {
             rounds: Vec::with_capacity(rounds * 4),
             hulls: Vec::with_capacity(HULL_RECTS_MAX),
             clears: Vec::with_capacity(2 * HULL_RECTS_MAX),
-            list: Vec::with_capacity(RECTS_MAX),
+            // The boat that is one too many is found once its strips are written.
+            list: Vec::with_capacity(RECTS_MAX + STRIP_VECTORS_MAX),
             cells: Cells::new(size),
             touched: Vec::with_capacity(touched),
             rects: Vec::with_capacity(rects),
@@ -377,7 +379,10 @@ impl Plan {
         let screen = PixelRect { x: 0, y: 0, width: size.0, height: size.1 };
         mark_strips(&self.list[first..], line, &mut self.cells, screen);
         self.rest.clear();
-        let around = self.cells.take(&mut self.rest, WATER_RECTS_MAX)?;
+        let Some(around) = self.cells.take(&mut self.rest, WATER_RECTS_MAX) else {
+            self.list.truncate(first);
+            return None;
+        };
         self.touched.extend_from_slice(&self.rest);
         Some((ReflectDraw { block, strips }, around))
     }

@@ -96,9 +96,9 @@ impl Gauges {
                 let [height, east, north] = [transform(|v| v.x), transform(|v| v.y), transform(|v| v.z)];
                 for (i, line) in lines.iter_mut().enumerate() {
                     line.0 += height[i].norm_sqr() * step_s;
-                    // A slope runs a quarter of a period ahead of its height where the wave runs that way.
-                    let ahead = |slope: Complex64| (height[i] * slope.conj()).im;
-                    line.1 += DVec2::new(ahead(east[i]), ahead(north[i]));
+                    // A slope follows its height by a quarter of a period where the wave runs that way.
+                    let behind = |slope: Complex64| (height[i] * slope.conj()).im;
+                    line.1 += DVec2::new(behind(east[i]), behind(north[i]));
                 }
             }
         }
