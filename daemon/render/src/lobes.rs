@@ -155,7 +155,7 @@ impl Waves {
             strip([a.x, b.x], [a.y, b.y], [-FOOT_PX, lower(a.y), lower(b.y)]);
         }
         // Beside the hull there is sea above the line, farther off than the boat.
-        let (Some(left), Some(right)) = (line.corners().next(), line.corners().last()) else { return 0 };
+        let [left, right] = [0, HULL_LINE_COLUMNS - 1].map(|column| line.corner(column));
         let pieces = ((lower(0.0) / PIECE_PX) as usize).clamp(1, PIECES);
         for piece in 0..pieces {
             let steps = [piece, piece + 1].map(|p| p * (self.lobes.steps.len() - 1) / pieces);
@@ -227,8 +227,8 @@ fn columns_for(pixels: f64, most: u32) -> u32 {
     ((pixels / COLUMN_PX).ceil() as u32).clamp(COLUMNS_MIN, most)
 }
 
-/// What puts the layers of a boat onto the sea: `at` is the index of its blocks and the first vector of its strips.
-pub(crate) fn reflect_block(scene: &Scene, lobes: &LobeBlock, at: (u32, u32)) -> ReflectBlock {
+/// How bright the sea of a scene is, as the shaders take it, for any boat.
+pub(crate) fn sea_block(scene: &Scene) -> ReflectBlock {
     let size = DVec2::new(f64::from(scene.lens.width), f64::from(scene.lens.height));
     let down = |pixel: DVec2| scene.camera.tangent_below(&scene.lens, pixel);
     // The plane through the tangents about the middle of the screen: bent by less than a pixel's worth within a usual lens.
@@ -241,21 +241,30 @@ pub(crate) fn reflect_block(scene: &Scene, lobes: &LobeBlock, at: (u32, u32)) ->
     let start = down(middle) - right * middle.x - below * middle.y;
     let tones = &scene.tones;
     let with = |c: [f32; 3], last: f32| [c[0], c[1], c[2], last];
+    ReflectBlock {
+        tangent: [right as f32, below as f32, start as f32, 0.0],
+        mean: with(tones.mean, tones.roots[0]),
+        spread: with(tones.spread.map(|c| c * (TONE_OUTER as f32 / TONE_GAIN)), tones.roots[1]),
+        ..ReflectBlock::default()
+    }
+}
+
+/// What puts the layers of a boat onto a sea: `at` is the index of its blocks and the first vector of its strips.
+pub(crate) fn reflect_block(sea: &ReflectBlock, lobes: &LobeBlock, at: (u32, u32)) -> ReflectBlock {
     let [_, steps, _, columns] = lobes.sizes;
     let last = (steps - 1) as f32;
     let [tangent, per_pixel, eye_m, per_reach] = lobes.place;
     let [sky, sky_1, sky_2, _] = lobes.sky_most;
+    let [right, below, start, _] = sea.tangent;
     ReflectBlock {
         index: at.0,
         first: at.1,
         last_step: last,
         first_row: (at.0 as usize * STEPS) as f32 + 0.5,
-        tangent: [right as f32, below as f32, start as f32, (columns - 1) as f32],
-        mean: with(tones.mean, tones.roots[0]),
-        spread: with(tones.spread.map(|c| c * (TONE_OUTER as f32 / TONE_GAIN)), tones.roots[1]),
+        tangent: [right, below, start, (columns - 1) as f32],
         place: [tangent, per_pixel, eye_m * per_pixel * per_reach * last * last, 0.0],
         span: lobes.span,
         sky_most: [sky, sky_1 / last, sky_2 / (last * last), 0.0],
-        ..ReflectBlock::default()
+        ..*sea
     }
 }

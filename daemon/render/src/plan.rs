@@ -8,7 +8,8 @@ use bowwave_core::{
 };
 use glam::DVec2;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, RoundBlock, TRACK_POINTS, WATERS_MAX, WakeBlock, WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, ReflectBlock, RoundBlock, TRACK_POINTS, WATERS_MAX, WakeBlock,
+    WaterBlock,
 };
 
 use crate::{
@@ -17,7 +18,7 @@ use crate::{
     frame_data::Capacity,
     frame_data::RECTS_MAX,
     hud_layout::KINDS,
-    lobes::{STRIP_VECTORS_MAX, Waves, mark_strips, reflect_block},
+    lobes::{STRIP_VECTORS_MAX, Waves, mark_strips, reflect_block, sea_block},
     passes::{
         boats::BoatDraw,
         reflect::ReflectDraw,
@@ -291,6 +292,7 @@ impl Plan {
         atlas::place(atlas, &self.wanted, &mut self.places);
         let mirrored = scene.water.method != ReflectionMethod::Off;
         let waves = scene.water.method == ReflectionMethod::Waves;
+        let sea = if waves { sea_block(scene) } else { ReflectBlock::default() };
         for n in 0..self.places.len() {
             let (placed, (i, line), (rect, _)) = (self.places[n], self.lines[n], self.wanted[n]);
             let boat = &scene.boats[i];
@@ -303,7 +305,7 @@ impl Plan {
             };
             let mut thrown = None;
             if waves {
-                thrown = self.plan_thrown(scene, boat, &line, model, size);
+                thrown = self.plan_thrown(scene, (boat, model), &line, &sea, size);
                 if thrown.is_none() {
                     continue;
                 }
@@ -358,26 +360,23 @@ impl Plan {
     fn plan_thrown(
         &mut self,
         scene: &Scene,
-        boat: &BoatView,
+        (boat, model): (&BoatView, &Model),
         line: &HullLine,
-        model: &Model,
+        sea: &ReflectBlock,
         size: (u32, u32),
     ) -> Option<(ReflectDraw, PixelRect)> {
-        let index = self.water_blocks.len();
+        let (index, first) = (self.water_blocks.len(), self.list.len());
         // One that came to nothing after all leaves its block.
         self.lobe_blocks.truncate(index);
         self.lobe_blocks.push(LobeBlock::default());
         let (waves, out) = (self.waves.as_mut()?, self.lobe_blocks.last_mut()?);
         let reach = waves.block(scene, boat, line, model, out)?;
-        let block = reflect_block(scene, out, (index as u32, self.list.len() as u32));
-        let first = self.list.len();
+        let block = reflect_block(sea, out, (index as u32, first as u32));
         let strips = waves.strips(&reach, line, &mut self.list);
-        if self.list.len() > RECTS_MAX {
-            self.list.truncate(first);
-            return None;
+        if self.list.len() <= RECTS_MAX {
+            let screen = PixelRect { x: 0, y: 0, width: size.0, height: size.1 };
+            mark_strips(&self.list[first..], line, &mut self.cells, screen);
         }
-        let screen = PixelRect { x: 0, y: 0, width: size.0, height: size.1 };
-        mark_strips(&self.list[first..], line, &mut self.cells, screen);
         self.rest.clear();
         let Some(around) = self.cells.take(&mut self.rest, WATER_RECTS_MAX) else {
             self.list.truncate(first);

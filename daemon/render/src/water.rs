@@ -186,7 +186,7 @@ impl HullLine {
 
     /// Left and right end of the line, pixels right of the anchor.
     pub(crate) fn ends(&self) -> (f64, f64) {
-        (self.first, self.first + self.pitch * (HULL_LINE_COLUMNS - 1) as f64)
+        (self.first, self.corner(HULL_LINE_COLUMNS - 1).x)
     }
 
     /// The line as straight pieces, none farther from it than [`STRAIGHT_PX`]: their ends from left to right, pixels right of the
@@ -200,7 +200,8 @@ impl HullLine {
         columns.map(|column| self.corner(column))
     }
 
-    fn corner(&self, column: usize) -> DVec2 {
+    /// The line at a column of its table.
+    pub(crate) fn corner(&self, column: usize) -> DVec2 {
         DVec2::new(self.first + self.pitch * column as f64, self.below[column])
     }
 

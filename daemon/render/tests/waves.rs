@@ -123,7 +123,7 @@ fn the_gpu_draws_what_the_processor_draws() {
         );
         assert!(count > 5000 && change > 2.0, "wind {wind}: {count} values change by {change:.2}");
         // Of some 30 codes of change; the worst stand at the hull's ends, where a column of the layers is several pixels wide.
-        failures.extend((error > 2.0 || worst > 65).then(|| format!("wind {wind}: {error:.2}, {worst}")));
+        failures.extend((error > 1.8 || worst > 62).then(|| format!("wind {wind}: {error:.2}, {worst}")));
     }
     assert!(failures.is_empty(), "{failures:?}");
 }

@@ -22,7 +22,7 @@ const TAPERS: usize = 2;
 #[derive(Clone, Debug)]
 pub struct Gauges {
     /// Where they float, metres east and north of the eye's foot.
-    pub places: Vec<DVec2>,
+    places: Vec<DVec2>,
     records: Vec<Vec<DVec3>>,
     times: Vec<f64>,
 }

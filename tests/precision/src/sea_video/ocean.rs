@@ -245,12 +245,12 @@ impl Ocean {
 
     /// Height of the water, metres.
     pub fn height(&self, place: DVec2) -> f64 {
-        // The third field adds millimetres only.
-        self.cascades.iter().take(2).map(|c| c.at(place).x).sum()
+        self.water(place).x
     }
 
-    /// Height of the water in metres and its slopes east and north, of the waves that the fields resolve.
+    /// Height of the water in metres and its slopes east and north, but for the ripples of the third field.
     pub fn water(&self, place: DVec2) -> DVec3 {
+        // It adds millimetres of height only.
         self.cascades.iter().take(2).map(|c| c.at(place)).sum()
     }
 
