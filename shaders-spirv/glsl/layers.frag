@@ -38,7 +38,8 @@ float part(vec3 light, float more) {
 
 void main() {
     uint i = draw.index;
-    vec4 place = boats[i].place, board = boats[i].board, span = boats[i].span;
+    vec2 place = boats[i].place;
+    vec4 board = boats[i].board, span = boats[i].span;
     int column = int(gl_FragCoord.x), at_step = int(gl_FragCoord.y) - int(i) * STEPS;
     float side = span.z + span.w * float(at_step);
     float across = span.x - side + (span.y + 2.0 * side) * float(column) / float(boats[i].sizes.w - 1);

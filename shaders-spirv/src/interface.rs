@@ -178,8 +178,10 @@ pub const LAYER_COLUMNS: u32 = 64;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct LobeBlock {
-    /// Tangent below the horizontal at the anchor; 1 / pixels to a tangent of 1; eye over the water, m; 1 / reach, 1/m.
-    pub place: [f32; 4],
+    /// Tangent below the horizontal at the anchor; 1 / pixels to a tangent of 1.
+    pub place: [f32; 2],
+    /// Keeps the size.
+    pub pad: [f32; 2],
     /// Height of the boat, m; across position of its picture's first column, pixels to a column; pixels to a metre at the anchor.
     pub board: [f32; 4],
     /// Across position of the hull's left end; its width; how much farther the reflection goes to each side, at the hull and more with
@@ -187,21 +189,19 @@ pub struct LobeBlock {
     pub span: [f32; 4],
     /// Bands, steps, columns of its picture and columns of its layers, as many as this boat has.
     pub sizes: [i32; 4],
-    /// Luminance above which light is the sun's: coefficients of the powers 0 to 2 of the step over the last.
-    pub sky_most: [f32; 4],
     /// By distance and band: light thrown back, what a bright pixel has more of it, metres aside, half width in metres (less than 0: no
     /// more bands); share of a pixel's light taken away, by channel, and what a bright pixel has more of it.
     pub lobes: [[[[f32; 4]; 2]; LOBE_BANDS]; LOBE_STEPS],
 }
 layout!(
     LobeBlock,
-    80 + LOBE_STEPS * 32 * LOBE_BANDS,
+    64 + LOBE_STEPS * 32 * LOBE_BANDS,
     place = 0,
+    pad = 8,
     board = 16,
     span = 32,
     sizes = 48,
-    sky_most = 64,
-    lobes = 80
+    lobes = 64
 );
 
 impl Default for LobeBlock {

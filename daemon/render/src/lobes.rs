@@ -94,8 +94,9 @@ impl Waves {
         let board = last - first + 2.0 * overhang;
         let columns = columns_for(board, LOBE_COLUMNS);
         let pitch = board / f64::from(columns);
-        out.place = [tangent, 1.0 / focal, eye_m, 1.0 / self.lobes.reach_m].map(|v| v as f32);
-        let reach = Reach { tangent, focal, pixels, overhang, eye_m };
+        out.place = [tangent, 1.0 / focal].map(|v| v as f32);
+        let reach_m = self.lobes.reach_m;
+        let reach = Reach { tangent, focal, pixels, overhang, eye_m, reach_m, sky_most: self.sky_most() };
         let (side, more) = self.sides(&reach);
         let steps = self.lobes.steps.len();
         let widest = last - first + 2.0 * (side + more * steps as f64);
@@ -103,7 +104,6 @@ impl Waves {
         out.sizes = counts.map(|n| n as i32);
         out.span = [first, last - first, side, more].map(|v| v as f32);
         out.board = [seen.height_m, first - overhang, pitch, pixels].map(|v| v as f32);
-        out.sky_most = self.sky_most();
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
             let seen = seen_bands(bands);
             for (vectors, lobe) in step.iter_mut().zip(&bands[..seen]) {
@@ -120,14 +120,15 @@ impl Waves {
         Some(reach)
     }
 
-    /// The luminance above which light is the sun's, as a parabola through that of the first, the middle and the last step.
-    fn sky_most(&self) -> [f32; 4] {
+    /// The luminance above which light is the sun's, as a parabola through that of the first, the middle and the last step: the
+    /// coefficients of the powers of the step over the last.
+    fn sky_most(&self) -> [f32; 3] {
         let last = self.lobes.steps.len() - 1;
         let [a, b, c] = [0, last / 2, last].map(|step| self.lobes.steps[step][0].sky_most);
         // Where the middle one stands.
         let x = (last / 2) as f32 / last as f32;
         let bend = ((b - a) / x - (c - a)) / (x - 1.0);
-        [a, c - a - bend, bend, 0.0]
+        [a, c - a - bend, bend]
     }
 
     /// How much farther than the hull the last block's reflection goes to each side at a step, pixels.
@@ -150,7 +151,7 @@ impl Waves {
             out.push([x[0], x[1], y[0], y[1]].map(|v| v as f32));
             out.push([below[0], below[1], below[2], 0.0].map(|v| v as f32));
         };
-        let lower = |y: f64| reach.below(y, self.lobes.reach_m);
+        let lower = |y: f64| reach.below(y, reach.reach_m);
         for (a, b) in line.corners().zip(line.corners().skip(1)) {
             strip([a.x, b.x], [a.y, b.y], [-FOOT_PX, lower(a.y), lower(b.y)]);
         }
@@ -183,7 +184,7 @@ pub(crate) fn mark_strips(strips: &[[f32; 4]], line: &HullLine, cells: &mut Cell
     }
 }
 
-/// How far a reflection goes on the screen.
+/// How far a reflection goes on the screen, and up to which light it is the sky that the boat hides.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach {
     tangent: f64,
@@ -191,6 +192,8 @@ pub(crate) struct Reach {
     pixels: f64,
     overhang: f64,
     eye_m: f64,
+    reach_m: f64,
+    sky_most: [f32; 3],
 }
 
 impl Reach {
@@ -250,11 +253,17 @@ pub(crate) fn sea_block(scene: &Scene) -> ReflectBlock {
 }
 
 /// What puts the layers of a boat onto a sea: `at` is the index of its blocks and the first vector of its strips.
-pub(crate) fn reflect_block(sea: &ReflectBlock, lobes: &LobeBlock, at: (u32, u32)) -> ReflectBlock {
+pub(crate) fn reflect_block(
+    sea: &ReflectBlock,
+    lobes: &LobeBlock,
+    reach: &Reach,
+    at: (u32, u32),
+) -> ReflectBlock {
     let [_, steps, _, columns] = lobes.sizes;
     let last = (steps - 1) as f32;
-    let [tangent, per_pixel, eye_m, per_reach] = lobes.place;
-    let [sky, sky_1, sky_2, _] = lobes.sky_most;
+    let [tangent, per_pixel] = lobes.place;
+    let [sky, sky_1, sky_2] = reach.sky_most;
+    let step_squared = (reach.eye_m / (reach.focal * reach.reach_m)) as f32 * last * last;
     let [right, below, start, _] = sea.tangent;
     ReflectBlock {
         index: at.0,
@@ -262,7 +271,7 @@ pub(crate) fn reflect_block(sea: &ReflectBlock, lobes: &LobeBlock, at: (u32, u32
         last_step: last,
         first_row: (at.0 as usize * STEPS) as f32 + 0.5,
         tangent: [right, below, start, (columns - 1) as f32],
-        place: [tangent, per_pixel, eye_m * per_pixel * per_reach * last * last, 0.0],
+        place: [tangent, per_pixel, step_squared, 0.0],
         span: lobes.span,
         sky_most: [sky, sky_1 / last, sky_2 / (last * last), 0.0],
         ..*sea

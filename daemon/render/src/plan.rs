@@ -306,9 +306,6 @@ impl Plan {
             let mut thrown = None;
             if waves {
                 thrown = self.plan_thrown(scene, (boat, model), &line, &sea, size);
-                if thrown.is_none() {
-                    continue;
-                }
             } else if mirrored {
                 solid.mark(
                     &mut self.cells,
@@ -371,7 +368,7 @@ impl Plan {
         self.lobe_blocks.push(LobeBlock::default());
         let (waves, out) = (self.waves.as_mut()?, self.lobe_blocks.last_mut()?);
         let reach = waves.block(scene, boat, line, model, out)?;
-        let block = reflect_block(sea, out, (index as u32, first as u32));
+        let block = reflect_block(sea, out, &reach, (index as u32, first as u32));
         let strips = waves.strips(&reach, line, &mut self.list);
         if self.list.len() <= RECTS_MAX {
             let screen = PixelRect { x: 0, y: 0, width: size.0, height: size.1 };
