@@ -10,6 +10,7 @@ pub mod page;
 pub mod parts;
 pub mod photograph;
 pub mod plot;
+pub mod recorded;
 pub mod reflection;
 pub mod row;
 pub mod sea_video;
