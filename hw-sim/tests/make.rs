@@ -6,10 +6,10 @@ use std::{collections::BTreeMap, sync::LazyLock};
 
 use bowwave_calibration::parse;
 use bowwave_core::{
-    attitude::Attitude,
+    attitude::{Attitude, AttitudeSettings, Source},
     clock::ClockMap,
     geometry::{Lens, horizon_dip},
-    pose::{PoseHistory, camera_pose, registration_error_px},
+    pose::{camera_pose, registration_error_px},
 };
 use bowwave_record::{Entry, RecordingReader};
 use glam::{DVec2, DVec3};
@@ -101,16 +101,16 @@ fn the_default_registers_within_two_pixels() {
     let (lens, motion, calibration) = (recipe.lens(), recipe.motion(), calibration(&recipe).calibration);
     let mut samples = imu_samples(&recipe, START).into_iter().peekable();
     let mut clock = ClockMap::new();
-    let mut attitude = Attitude::new(calibration.gyro_bias, calibration.camera_from_imu);
-    let mut history = PoseHistory::new();
+    let settings = AttitudeSettings::new(Source::Auto, &calibration);
+    let mut attitude = Attitude::new(settings, calibration.gyro_bias, calibration.camera_from_imu);
     let (mut sum, mut worst, mut count) = (0.0, 0.0f64, 0.0);
     for frame in 0..recipe.frames() {
         let stamp = START.plus_ns(recipe.frame_stamp_ns(frame));
         while let Some(s) = samples.next_if(|s| s.arrival <= stamp.plus_ns(recipe.camera.latency_ns[0])) {
             let time = clock.observe(s.device_time_ns, s.arrival);
-            attitude.observe(time, &s).into_iter().for_each(|o| history.push(o));
+            attitude.observe(time, &s);
         }
-        let at = history.at(stamp.plus_ns(calibration.time_offset_ns)).unwrap();
+        let at = attitude.at(stamp.plus_ns(calibration.time_offset_ns)).unwrap();
         let used = camera_pose(&calibration, at.world_from_imu, recipe.eye_height_m).world_from_camera;
         let truth = motion.at(stamp.secs_since(START) + recipe.exposure_delay_s()).pose.world_from_camera;
         let error = registration_error_px(&lens, truth, used).unwrap();

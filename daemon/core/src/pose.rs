@@ -87,7 +87,9 @@ pub enum NoPose {
 /// Orientations of the last seconds, by time.
 #[derive(Clone, Debug, Default)]
 pub struct PoseHistory {
+    /// Each turned back by what the world was turned until it came, so that to turn all of them is to turn one.
     samples: VecDeque<OrientationSample>,
+    turned: DQuat,
 }
 
 impl PoseHistory {
@@ -102,7 +104,8 @@ impl PoseHistory {
         if self.samples.back().is_some_and(|newest| sample.time <= newest.time) {
             return;
         }
-        self.samples.push_back(sample);
+        let world_from_imu = self.turned.inverse() * sample.world_from_imu;
+        self.samples.push_back(OrientationSample { world_from_imu, ..sample });
         while self.samples.front().is_some_and(|s| sample.time.ns_since(s.time) > HISTORY_NS) {
             self.samples.pop_front();
         }
@@ -110,7 +113,12 @@ impl PoseHistory {
 
     /// Forgets everything, as when the unit has restarted.
     pub fn clear(&mut self) {
-        self.samples.clear();
+        *self = Self::default();
+    }
+
+    /// Turns all of it with the world: what is learnt now of how wrong it is holds for the seconds before, too.
+    pub fn turn(&mut self, turn: DQuat) {
+        self.turned = (turn * self.turned).normalize();
     }
 
     /// Time of the newest sample.
@@ -120,6 +128,11 @@ impl PoseHistory {
 
     /// The orientation at `time`.
     pub fn at(&self, time: Time) -> Result<OrientationAt, NoPose> {
+        let OrientationAt { world_from_imu, provenance } = self.kept_at(time)?;
+        Ok(OrientationAt { world_from_imu: (self.turned * world_from_imu).normalize(), provenance })
+    }
+
+    fn kept_at(&self, time: Time) -> Result<OrientationAt, NoPose> {
         let after = self.samples.partition_point(|s| s.time < time);
         match (after.checked_sub(1).and_then(|i| self.samples.get(i)), self.samples.get(after)) {
             (_, Some(b)) if b.time == time => {
@@ -229,6 +242,19 @@ mod tests {
             }
             prop_assert!(h.at(Time::from_ns(ns)).unwrap().world_from_imu.angle_between(q) < 1e-7);
         }
+    }
+
+    #[test]
+    fn the_world_turns_with_all_that_was_before() {
+        let mut h = turning(1.0, 10);
+        let (before, turn) = (h.at(Time::from_ns(22_000_000)).unwrap(), DQuat::from_rotation_x(0.3));
+        h.turn(turn);
+        let after = h.at(Time::from_ns(22_000_000)).unwrap();
+        assert!(after.world_from_imu.angle_between(turn * before.world_from_imu) < 1e-7);
+        let new =
+            OrientationSample { time: Time::from_ns(50_000_000), world_from_imu: turn, rate: DVec3::ZERO };
+        h.push(new);
+        assert!(h.at(new.time).unwrap().world_from_imu.angle_between(turn) < 1e-7);
     }
 
     #[test]

@@ -14,6 +14,7 @@ pub mod recorded;
 pub mod reflection;
 pub mod row;
 pub mod sea_video;
+pub mod ship;
 pub mod truth;
 
 /// Counts the heap, so that what a way takes of it can be told.

@@ -3,11 +3,11 @@
 use glam::DVec3;
 
 use crate::{
-    attitude::Attitude,
+    attitude::{Attitude, AttitudeSettings, Source},
     calibration::Calibration,
     clock::ClockMap,
     event::{CameraFrame, ImuSample},
-    pose::{NoPose, OrientationAt, PoseHistory, STALE_NS},
+    pose::{NoPose, OrientationAt, STALE_NS},
     scene::Status,
     time::Time,
 };
@@ -38,13 +38,12 @@ pub struct SensorCounts {
 }
 
 /// Sensors of one session.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Sensors {
     time_offset_ns: i64,
     size: (u32, u32),
     clock: ClockMap,
     attitude: Attitude,
-    history: PoseHistory,
     last: Option<(DVec3, DVec3)>,
     changed: Time,
     frame: Option<CameraFrame>,
@@ -58,8 +57,11 @@ impl Sensors {
             time_offset_ns: calibration.time_offset_ns,
             size: (calibration.lens.width, calibration.lens.height),
             clock: ClockMap::new(),
-            attitude: Attitude::new(calibration.gyro_bias, calibration.camera_from_imu),
-            history: PoseHistory::new(),
+            attitude: Attitude::new(
+                AttitudeSettings::new(Source::Auto, calibration),
+                calibration.gyro_bias,
+                calibration.camera_from_imu,
+            ),
             last: None,
             changed: Time::MIN,
             frame: None,
@@ -85,11 +87,9 @@ impl Sensors {
         let time = self.clock.observe(sample.device_time_ns, sample.arrival);
         if self.clock.restarts() != self.counts.imu_restarts {
             self.counts.imu_restarts = self.clock.restarts();
-            self.history.clear();
+            self.attitude.restart();
         }
-        if let Some(orientation) = self.attitude.observe(time, sample) {
-            self.history.push(orientation);
-        }
+        self.attitude.observe(time, sample);
     }
 
     /// Takes in a picture; the newest wins. One from the past or of a size that the lens was not calibrated for is left out.
@@ -119,7 +119,7 @@ impl Sensors {
 
     /// The orientation at `time`.
     pub fn orientation(&self, time: Time) -> Result<OrientationAt, NoPose> {
-        self.history.at(time)
+        self.attitude.at(time)
     }
 
     /// Whether the newest picture was young enough at `time`.
@@ -129,7 +129,7 @@ impl Sensors {
 
     /// Time of the newest orientation.
     pub fn newest_orientation(&self) -> Option<Time> {
-        self.history.newest()
+        self.attitude.newest()
     }
 
     /// Counters.
@@ -148,7 +148,7 @@ impl Sensors {
             Some(_) if !self.frame_fresh(now) => return status("CAMERA LOST", "CHECK THE CAMERA CABLE"),
             Some(_) => {}
         }
-        match self.history.newest() {
+        match self.attitude.newest() {
             None => status("NO IMU YET", "WAIT, THEN CHECK ITS CABLE"),
             Some(t) if now.ns_since(t) > STALE_NS => {
                 let stuck = self.last.is_some() && self.counts.imu_frozen > 0;

@@ -8,6 +8,7 @@ mod flight;
 mod fresnel;
 mod lens;
 mod motion;
+mod orientation;
 mod pacing;
 mod reflection;
 mod sea;
@@ -44,6 +45,7 @@ pub struct Part {
 pub const PARTS: &[Part] = &[
     Part { about: clock::ABOUT, measure: clock::measure },
     Part { about: attitude::ABOUT, measure: attitude::measure },
+    Part { about: orientation::ABOUT, measure: orientation::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
     Part { about: pacing::ABOUT, measure: pacing::measure },
     Part { about: flight::ABOUT, measure: flight::measure },

@@ -1,0 +1,129 @@
+//! Inclination from angular rate and specific force: VQF without magnetometer (Laidig & Seel, "VQF: Highly accurate IMU orientation
+//! estimation with bias estimation and magnetic disturbance rejection", Information Fusion 91, 2023), set for a gun on a ship.
+
+use std::fmt;
+
+use glam::{DQuat, DVec3};
+use vqf_rs::{Params, VQF};
+
+use super::filter::GRAVITY;
+
+/// Specific force that differs from gravity by more than this, m/s^2, is a shock: recoil or a blow. Hands make 20 m/s^2, and twelve
+/// metres from the middle of a ship in sea state 6 waves make 3.
+const SHOCK: f64 = 60.0;
+
+/// What follows a shock is ringing for so long, seconds.
+const RINGING_S: f64 = 0.05;
+
+/// After so long without a quiet sample it is no shock but what the unit has come to measure, seconds.
+const SHOCK_MOST_S: f64 = 1.0;
+
+/// How VQF is set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Time constant of the specific force's low-pass filter, seconds: longer than the waves.
+    pub tau_accel_s: f64,
+    /// Rest is what turns by less than this about its mean, rad/s.
+    pub rest_rate: f64,
+    /// Rest is what is accelerated by less than this about its mean, m/s^2.
+    pub rest_accel: f64,
+    /// No bias beyond the calibrated one is larger than this on any axis, rad/s.
+    pub bias_most: f64,
+    /// Standard deviation of the bias at the start, rad/s.
+    pub bias_sigma: f64,
+}
+
+impl Settings {
+    /// For a gun that traverses slowly on a ship in waves. By VQF's own defaults (3 s, 2 deg/s, 0.5 m/s^2) a gun that creeps on a calm
+    /// day is at rest, and its turn is learnt as the gyro's bias.
+    pub const GUN: Self = Self {
+        tau_accel_s: 10.0,
+        rest_rate: 0.2 * DEGREE,
+        rest_accel: 0.05,
+        bias_most: 0.5 * DEGREE,
+        bias_sigma: 0.5 * DEGREE,
+    };
+
+    /// In hands, as for a calibration: VQF's own.
+    pub const HAND: Self = Self {
+        tau_accel_s: 3.0,
+        rest_rate: 2.0 * DEGREE,
+        rest_accel: 0.5,
+        bias_most: 2.0 * DEGREE,
+        bias_sigma: 0.5 * DEGREE,
+    };
+
+    fn params(&self) -> Params {
+        Params {
+            tau_acc: self.tau_accel_s,
+            rest_th_gyr: self.rest_rate.to_degrees(),
+            rest_th_acc: self.rest_accel,
+            bias_clip: self.bias_most.to_degrees(),
+            bias_sigma_init: self.bias_sigma.min(self.bias_most).to_degrees(),
+            mag_dist_rejection_enabled: false,
+            ..Params::default()
+        }
+    }
+}
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// VQF between the samples of one unit without interruption.
+pub(super) struct Fused {
+    vqf: VQF,
+    /// Seconds for which specific force is still left out, and for which it has been.
+    ringing_s: f64,
+    shaken_s: f64,
+}
+
+impl Fused {
+    /// A filter for samples `period_s` apart, begun with the unit as in `world_from_imu`.
+    pub(super) fn new(settings: &Settings, period_s: f64, world_from_imu: DQuat) -> Self {
+        let mut vqf = VQF::new(period_s, None, None, Some(settings.params()));
+        // The filter takes its first sample's direction for up.
+        vqf.update_acc((world_from_imu.inverse() * (DVec3::Z * GRAVITY)).to_array());
+        Self { vqf, ringing_s: 0.0, shaken_s: 0.0 }
+    }
+
+    /// Takes in a turn (scaled axis, radians, the unit's axes) over `dt_s` seconds and the specific force at its end.
+    pub(super) fn update(&mut self, turn: DVec3, dt_s: f64, accel: DVec3) {
+        // The mean rate of the step, so that the filter's product of rate and time is the turn.
+        self.vqf.update_gyr_with_ts((turn / dt_s).to_array(), dt_s);
+        if self.is_steady(accel, dt_s) {
+            self.vqf.update_acc(accel.to_array());
+        }
+    }
+
+    /// Which way is up, in the unit's axes.
+    pub(super) fn up_imu(&self) -> DVec3 {
+        quaternion(&self.vqf).inverse() * DVec3::Z
+    }
+
+    fn is_steady(&mut self, accel: DVec3, dt_s: f64) -> bool {
+        if (accel.length() - GRAVITY).abs() > SHOCK {
+            self.ringing_s = RINGING_S;
+        }
+        if self.ringing_s <= 0.0 {
+            self.shaken_s = 0.0;
+            return true;
+        }
+        self.ringing_s -= dt_s;
+        self.shaken_s += dt_s;
+        self.shaken_s > SHOCK_MOST_S
+    }
+}
+
+fn quaternion(vqf: &VQF) -> DQuat {
+    let q = vqf.quat_6d();
+    DQuat::from_xyzw(q.1, q.2, q.3, q.0)
+}
+
+impl fmt::Debug for Fused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (orientation, bias) = (quaternion(&self.vqf), self.vqf.bias_estimate().0);
+        f.debug_struct("Fused")
+            .field("orientation", &orientation)
+            .field("bias", &bias)
+            .finish_non_exhaustive()
+    }
+}

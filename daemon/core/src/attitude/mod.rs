@@ -1,0 +1,460 @@
+//! From the inertial unit's samples, and from what else tells which way it looks, to its orientation over time.
+
+mod filter;
+mod fused;
+
+use glam::{DMat2, DMat3, DQuat, DVec3};
+
+use self::{filter::Filter, fused::Fused};
+pub use self::{
+    filter::{Noise, Outcome},
+    fused::Settings,
+};
+use crate::{
+    calibration::Calibration,
+    event::ImuSample,
+    pose::{NoPose, OrientationAt, OrientationSample, PoseHistory},
+    time::Time,
+};
+
+/// A unit without an orientation of its own is levelled by the mean specific force over this long.
+const LEVEL_NS: i64 = 250_000_000;
+
+/// A gap longer than this is not bridged by integrating: the unit is levelled anew.
+const GAP_NS: i64 = 1_000_000_000;
+
+/// Steps of a filter that are shorter or longer than this are no unit's, seconds.
+const PERIODS_S: [f64; 2] = [1e-4, 0.1];
+
+/// The integrated orientation is held against VQF's inclination this often, seconds.
+const INCLINE_S: f64 = 0.25;
+
+/// VQF's inclination has settled after so many of its time constants.
+const SETTLE_TAUS: f64 = 2.0;
+
+/// Whose estimate of the orientation is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Source {
+    /// The unit's own where it gives one, else [`Source::Fused`].
+    #[default]
+    Auto,
+    /// Rate and specific force are fused here, whatever the unit thinks.
+    Fused,
+}
+
+/// What a unit's rate tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RateKind {
+    /// The rate at the sample's time.
+    #[default]
+    Instant,
+    /// The mean rate since the sample before, as of a unit that integrates by itself.
+    Mean,
+}
+
+/// How orientation is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AttitudeSettings {
+    /// Whose estimate is used.
+    pub source: Source,
+    /// What the unit's rate tells.
+    pub rate: RateKind,
+    /// How inclination is found from specific force.
+    pub inclination: Settings,
+    /// How the unit errs.
+    pub noise: Noise,
+}
+
+impl AttitudeSettings {
+    /// For that unit on that camera, of the usual class (a VN-100's: 0.0035 deg/s per square root of a hertz).
+    pub fn new(source: Source, calibration: &Calibration) -> Self {
+        Self {
+            source,
+            rate: RateKind::Instant,
+            inclination: Settings::GUN,
+            noise: Noise {
+                bias: calibration.gyro_bias_sigma,
+                mounting: calibration.camera_from_imu_sigma,
+                ..Noise::USUAL
+            },
+        }
+    }
+}
+
+/// Which way is up, as a camera saw it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UpSeen {
+    /// Middle of the exposure on the inertial unit's clock.
+    pub time: Time,
+    /// Unit vector, camera's axes.
+    pub up_camera: DVec3,
+    /// Covariance of its error, rad^2, in the camera's axes.
+    pub covariance: DMat3,
+}
+
+/// Orientation by the unit's own estimate; or integrated from its rates, with what is wrong with that estimated from VQF's inclination and
+/// from what else is seen. Its heading then starts at the camera's "north" and drifts with what is left of the gyro's bias about the
+/// vertical.
+#[derive(Debug)]
+pub struct Attitude {
+    gyro_bias: DVec3,
+    camera_from_imu: DQuat,
+    settings: AttitudeSettings,
+    state: State,
+    history: PoseHistory,
+}
+
+#[derive(Debug)]
+enum State {
+    /// Gathering specific force: since when, the sum and how many.
+    Levelling { since: Option<Time>, sum: DVec3, count: u32 },
+    /// Integrating.
+    Running(Box<Running>),
+}
+
+#[derive(Debug)]
+struct Running {
+    inclination: Fused,
+    filter: Filter,
+    last: OrientationSample,
+    /// The newest rate less the calibrated bias, and the one before with its distance in time.
+    rate: DVec3,
+    before: Option<(DVec3, i64)>,
+    inclined_s: f64,
+}
+
+impl State {
+    const START: Self = Self::Levelling { since: None, sum: DVec3::ZERO, count: 0 };
+}
+
+impl Attitude {
+    /// An estimator for a unit with that bias (rad/s, its own axes) and that place on the camera.
+    pub fn new(settings: AttitudeSettings, gyro_bias: DVec3, camera_from_imu: DQuat) -> Self {
+        Self { gyro_bias, camera_from_imu, settings, state: State::START, history: PoseHistory::new() }
+    }
+
+    /// Takes in a finite sample whose measurement was made at `time`; the orientation then, `None` while levelling.
+    pub fn observe(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
+        let found = self.find(time, sample)?;
+        self.history.push(found);
+        Some(found)
+    }
+
+    /// The orientation at `time`.
+    pub fn at(&self, time: Time) -> Result<OrientationAt, NoPose> {
+        self.history.at(time)
+    }
+
+    /// Time of the newest orientation.
+    pub fn newest(&self) -> Option<Time> {
+        self.history.newest()
+    }
+
+    /// Begins anew, as when the unit has restarted.
+    pub fn restart(&mut self) {
+        self.history.clear();
+        self.state = State::START;
+    }
+
+    /// Covariance of the orientation's error as a turn of the world, rad^2; `None` where the unit's own estimate is used.
+    pub fn covariance(&self) -> Option<DMat3> {
+        match &self.state {
+            State::Running(running) => Some(running.filter.turn_covariance()),
+            State::Levelling { .. } => None,
+        }
+    }
+
+    /// The gyro's bias as it is known by now, rad/s, the unit's axes.
+    pub fn gyro_bias(&self) -> DVec3 {
+        match &self.state {
+            State::Running(running) => self.gyro_bias + running.filter.bias(),
+            State::Levelling { .. } => self.gyro_bias,
+        }
+    }
+
+    /// Rotation from the unit's axes to the camera's as it is known by now.
+    pub fn camera_from_imu(&self) -> DQuat {
+        match &self.state {
+            State::Running(running) => {
+                DQuat::from_scaled_axis(running.filter.mounting()) * self.camera_from_imu
+            }
+            State::Levelling { .. } => self.camera_from_imu,
+        }
+    }
+
+    /// Takes in where a camera saw up, unless that differs by more than `limit` (chi squared with two degrees of freedom) from what
+    /// is known. `None` where nothing is known of that time, or the unit's own estimate is used.
+    pub fn see_up(&mut self, seen: &UpSeen, limit: f64) -> Option<Outcome> {
+        let then = self.history.at(seen.time).ok()?.world_from_imu;
+        let world_from_camera = then * self.camera_from_imu().inverse();
+        let State::Running(running) = &mut self.state else { return None };
+        running.filter.predict();
+        let axes = DMat3::from_quat(world_from_camera);
+        let turned = axes * seen.covariance * axes.transpose();
+        let across = DMat2::from_cols(turned.x_axis.truncate(), turned.y_axis.truncate());
+        let (turn, outcome) = running.filter.see_up(world_from_camera, seen.up_camera, across, limit);
+        running.turn(turn);
+        self.history.turn(turn);
+        Some(outcome)
+    }
+
+    fn find(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
+        let rate = sample.rate - self.gyro_bias;
+        if let (Some(q), Source::Auto) = (sample.world_from_imu, self.settings.source) {
+            return Some(OrientationSample { time, world_from_imu: q.normalize(), rate });
+        }
+        match &mut self.state {
+            State::Running(running) => {
+                let dt_ns = time.ns_since(running.last.time);
+                if !(0..=GAP_NS).contains(&dt_ns) {
+                    self.state = State::START;
+                    return None;
+                }
+                if dt_ns > 0 {
+                    let turn = running.step(self.settings.rate, (time, dt_ns), rate, sample.accel);
+                    turn.into_iter().for_each(|turn| self.history.turn(turn));
+                }
+                Some(running.last)
+            }
+            State::Levelling { since, sum, count } => {
+                *sum += sample.accel;
+                *count += 1;
+                let since = *since.get_or_insert(time);
+                let span_ns = time.ns_since(since);
+                if span_ns < LEVEL_NS {
+                    return None;
+                }
+                let world_from_imu = level(*sum / f64::from(*count), self.camera_from_imu);
+                let [shortest, longest] = PERIODS_S;
+                let period_s = span_ns as f64 * 1e-9 / f64::from(*count - 1).max(1.0);
+                let inclination =
+                    Fused::new(&self.settings.inclination, period_s.clamp(shortest, longest), world_from_imu);
+                let last = OrientationSample { time, world_from_imu, rate };
+                let filter =
+                    Filter::new(self.settings.noise, SETTLE_TAUS * self.settings.inclination.tau_accel_s);
+                let running = Running { inclination, filter, last, rate, before: None, inclined_s: 0.0 };
+                self.state = State::Running(Box::new(running));
+                Some(last)
+            }
+        }
+    }
+}
+
+impl Running {
+    /// Goes on to a sample; by what the world is to be turned for all that was before.
+    fn step(
+        &mut self,
+        kind: RateKind,
+        (time, dt_ns): (Time, i64),
+        rate: DVec3,
+        accel: DVec3,
+    ) -> Option<DQuat> {
+        let dt_s = dt_ns as f64 * 1e-9;
+        let turn = match kind {
+            RateKind::Mean => rate * dt_s + coning(self.rate, rate, dt_s),
+            RateKind::Instant => {
+                // Times from a shifting clock map differ by microseconds; only about equal steps have a parabola.
+                let even = self.before.filter(|(_, step_ns)| (step_ns - dt_ns).abs() * 5 < dt_ns);
+                turn_between(even.map(|(w, _)| w), self.rate, rate, dt_s)
+            }
+        };
+        self.before = Some((self.rate, dt_ns));
+        self.rate = rate;
+        self.inclination.update(turn, dt_s, accel);
+        let turn = turn - self.filter.bias() * dt_s;
+        let world_from_imu = (self.last.world_from_imu * DQuat::from_scaled_axis(turn)).normalize();
+        self.last = OrientationSample { time, world_from_imu, rate: rate - self.filter.bias() };
+        self.filter.step(world_from_imu, turn.length(), dt_s);
+        self.inclined_s += dt_s;
+        (self.inclined_s >= INCLINE_S).then(|| {
+            let since_s = std::mem::take(&mut self.inclined_s);
+            self.filter.predict();
+            let up_imu = self.inclination.up_imu();
+            let turn = self.filter.incline(world_from_imu, up_imu, since_s);
+            self.turn(turn);
+            turn
+        })
+    }
+
+    fn turn(&mut self, turn: DQuat) {
+        self.last.world_from_imu = (turn * self.last.world_from_imu).normalize();
+    }
+}
+
+/// Turn over the `h` seconds from rate `from` to rate `to`, a scaled axis in the body's frame: the integral of the rate and the
+/// first commutator of the Magnus expansion (Iserles & Norsett 1999, eq. 1.2), which is what coning adds. With the rate `h`
+/// seconds `before` the integral is that of the parabola through all three, else of the line.
+pub fn turn_between(before: Option<DVec3>, from: DVec3, to: DVec3, h: f64) -> DVec3 {
+    let integral = match before {
+        Some(before) => (to * 5.0 + from * 8.0 - before) * (h / 12.0),
+        None => (from + to) * (h / 2.0),
+    };
+    integral + coning(from, to, h)
+}
+
+/// What a turn whose axis turns from `from` to `to` in `h` seconds has more than the integral of its rate.
+fn coning(from: DVec3, to: DVec3, h: f64) -> DVec3 {
+    from.cross(to) * (h * h / 12.0)
+}
+
+/// The orientation in which `up_imu` (the direction of the specific force at rest) points up and the camera looks north.
+/// A camera that looks straight up or down keeps the heading of its picture's top.
+pub fn level(up_imu: DVec3, camera_from_imu: DQuat) -> DQuat {
+    let up = up_imu.try_normalize().unwrap_or(DVec3::NEG_Z);
+    let tilted = DQuat::from_rotation_arc(up, DVec3::Z);
+    let axis = |camera: DVec3| tilted * (camera_from_imu.inverse() * camera);
+    let forward = axis(DVec3::Z);
+    let north = if forward.truncate().length() > 1e-3 { forward } else { axis(DVec3::NEG_Y) };
+    let azimuth = north.x.atan2(north.y);
+    (DQuat::from_rotation_z(azimuth) * tilted).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::look;
+    use proptest::prelude::*;
+
+    fn sample(rate: DVec3, accel: DVec3) -> ImuSample {
+        ImuSample { arrival: Time::from_ns(0), device_time_ns: 0, rate, accel, world_from_imu: None }
+    }
+
+    fn attitude(source: Source, gyro_bias: DVec3) -> Attitude {
+        let settings = AttitudeSettings {
+            source,
+            rate: RateKind::Instant,
+            inclination: Settings::GUN,
+            noise: Noise::USUAL,
+        };
+        Attitude::new(settings, gyro_bias, DQuat::IDENTITY)
+    }
+
+    proptest! {
+        #[test]
+        fn levelling_finds_elevation_and_roll(el in -1.4..1.4f64, roll in -3.0..3.0f64) {
+            // Camera axes serve as the unit's axes.
+            let truth = look(0.0, el, roll);
+            let q = level(truth.inverse() * DVec3::Z * 9.81, DQuat::IDENTITY);
+            prop_assert!(q.angle_between(truth) < 1e-6, "{}", q.angle_between(truth));
+        }
+    }
+
+    /// Orientation about a tilt that precesses: the worst case for integrating rates axis by axis.
+    fn coning(t: f64) -> DQuat {
+        DQuat::from_rotation_z(0.5 * t) * DQuat::from_rotation_x(0.3) * DQuat::from_rotation_z(2.0 * t)
+    }
+
+    fn coning_rate(t: f64) -> DVec3 {
+        let h = 1e-5;
+        let turn = coning(t - h).inverse() * coning(t + h);
+        DVec3::new(turn.x, turn.y, turn.z) * (turn.w.signum() / h)
+    }
+
+    /// What a unit in that motion measures at 200 Hz, and by which angle up was wrong after `settle_s`, at most.
+    fn worst_tilt(
+        attitude: &mut Attitude,
+        seconds: f64,
+        settle_s: f64,
+        sense: impl Fn(f64, ImuSample) -> ImuSample,
+    ) -> f64 {
+        let mut worst: f64 = 0.0;
+        for i in 0..(seconds * 200.0) as i64 {
+            let time = Time::from_ns(i * 5_000_000);
+            let t = i as f64 * 0.005;
+            let exact = sample(coning_rate(t), coning(t).inverse() * DVec3::Z * 9.806_65);
+            if let Some(o) = attitude.observe(time, &sense(t, exact)) {
+                assert!((o.world_from_imu.length() - 1.0).abs() < 1e-12);
+                let up = o.world_from_imu * (coning(t).inverse() * DVec3::Z);
+                worst = if t > settle_s { worst.max(up.truncate().length()) } else { worst };
+            }
+        }
+        worst.to_degrees()
+    }
+
+    #[test]
+    fn integrates_a_coning_motion() {
+        let h = 0.005;
+        let mut q = coning(0.0);
+        for i in 0..200 * 60 {
+            let t = f64::from(i) * h;
+            let before = (i > 0).then(|| coning_rate(t - h));
+            q *= DQuat::from_scaled_axis(turn_between(before, coning_rate(t), coning_rate(t + h), h));
+        }
+        let off = q.inverse() * coning(60.0);
+        assert!(DVec3::new(off.x, off.y, off.z).length() < 1e-5, "{off}");
+    }
+
+    #[test]
+    fn up_is_found_though_the_gyro_has_a_bias_and_the_gun_fires() {
+        let bias = DVec3::new(1.7e-3, -2e-3, 1e-3);
+        let mut fused = attitude(Source::Fused, DVec3::ZERO);
+        let tilt = worst_tilt(&mut fused, 90.0, 30.0, |_, s| ImuSample { rate: s.rate + bias, ..s });
+        assert!(tilt < 0.15, "{tilt} deg");
+        // Recoil: 5 ms of 30 g to one side, ten times a second.
+        let mut fused = attitude(Source::Fused, DVec3::ZERO);
+        let tilt = worst_tilt(&mut fused, 60.0, 20.0, |t, s| {
+            let fires = t > 30.0 && t < 40.0 && (t * 200.0).round() as i64 % 20 == 0;
+            let kick = if fires { DVec3::X * 300.0 } else { DVec3::ZERO };
+            ImuSample { rate: s.rate, accel: s.accel + kick, ..s }
+        });
+        assert!(tilt < 0.3, "{tilt} deg");
+    }
+
+    #[test]
+    fn a_horizon_is_believed_where_it_can_be_true() {
+        let mut fused = attitude(Source::Fused, DVec3::ZERO);
+        // A unit that feels gravity a third of a degree wrong, and a camera that sees the horizon.
+        let wrong = DQuat::from_rotation_x(0.35f64.to_radians());
+        worst_tilt(&mut fused, 60.0, 0.0, |t, s| ImuSample {
+            accel: coning(t).inverse() * (wrong * (coning(t) * s.accel)),
+            ..s
+        });
+        let now = Time::from_ns(11_990 * 5_000_000);
+        let at = |time: Time| coning(time.ns() as f64 * 1e-9);
+        let covariance = DMat3::IDENTITY * 0.03f64.to_radians().powi(2);
+        let up = |time: Time| at(time).inverse() * DVec3::Z;
+        let found = |fused: &Attitude| fused.newest().and_then(|t| fused.at(t).ok()).unwrap().world_from_imu;
+        let error =
+            |fused: &Attitude| (found(fused) * up(fused.newest().unwrap())).truncate().length().to_degrees();
+        assert!(error(&fused) > 0.2, "{}", error(&fused));
+        let shore = DQuat::from_rotation_y(0.2) * up(now);
+        let seen = UpSeen { time: now, up_camera: shore, covariance };
+        assert!(!fused.see_up(&seen, 13.8).unwrap().taken);
+        assert!(error(&fused) > 0.2);
+        for _ in 0..10 {
+            let seen = UpSeen { time: now, up_camera: up(now), covariance };
+            assert!(fused.see_up(&seen, 13.8).unwrap().taken);
+        }
+        assert!(error(&fused) < 0.1, "{}", error(&fused));
+        let deviations = fused.covariance().unwrap();
+        assert!((0.0..0.06f64.to_radians().powi(2)).contains(&deviations.x_axis.x), "{deviations}");
+        let early = UpSeen { time: Time::from_ns(0), up_camera: DVec3::Y, covariance };
+        assert_eq!(fused.see_up(&early, 13.8), None);
+        let broken = UpSeen { time: now, up_camera: DVec3::NAN, covariance };
+        assert!(!fused.see_up(&broken, 13.8).unwrap().taken);
+    }
+
+    #[test]
+    fn after_a_gap_it_is_levelled_anew() {
+        let mut fused = attitude(Source::Fused, DVec3::ZERO);
+        let at = |ms: i64| Time::from_ns(ms * 1_000_000);
+        let still = sample(DVec3::ZERO, DVec3::Z * 9.8);
+        for i in 0..100 {
+            fused.observe(at(i * 5), &still);
+        }
+        assert!(fused.observe(at(700), &still).is_some(), "200 ms are bridged");
+        assert!(fused.observe(at(1800), &still).is_none(), "1.1 s are not");
+        assert!(fused.observe(at(1700), &still).is_none(), "nor is a time before");
+        assert!((0..100).any(|i| fused.observe(at(2000 + i * 5), &still).is_some()));
+    }
+
+    #[test]
+    fn the_units_own_orientation_is_taken_as_it_is() {
+        let q = look(1.0, 0.2, 0.1);
+        let mut s = sample(DVec3::X, DVec3::Z);
+        s.world_from_imu = Some(q);
+        let o = attitude(Source::Auto, DVec3::X).observe(Time::from_ns(5), &s).unwrap();
+        assert!(o.world_from_imu.angle_between(q) < 1e-9);
+        assert_eq!(o.rate, DVec3::ZERO);
+    }
+}
