@@ -10,7 +10,7 @@ use bowwave_core::{
     event::{CameraFrame, Event},
     time::Time,
 };
-use bowwave_devices::imu::ImuDecoder;
+use bowwave_devices::imu::{ImuDecoder, ImuFormat};
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::{
@@ -43,7 +43,8 @@ impl FastReplay {
         let stats = Arc::new(Mutex::new(ReplayStats::default()));
         let producer = Producer {
             wire,
-            imu: ImuDecoder::new(),
+            // What is simulated is known: no sample waits for a proof of its format.
+            imu: ImuDecoder::fixed(ImuFormat::VectorNav),
             frames: FrameDecoder::default(),
             triggers: 0,
             events: sender,

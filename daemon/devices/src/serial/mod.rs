@@ -36,7 +36,7 @@ use self::{
 };
 use crate::{
     clock,
-    imu::ImuCounters,
+    imu::{Fields, ImuCounters, ImuFormat},
     nodes, queue,
     report::{Reporter, reporting},
 };
@@ -47,7 +47,7 @@ pub const QUEUE_SAMPLES: usize = 4096;
 /// How long [`ImuPort::stop`] waits for the threads.
 const STOP_NS: i64 = 180_000_000;
 
-/// The rates that VectorNav units know, the likeliest first.
+/// The rates that units come with or can be set to, the likeliest first.
 const RATES: [u32; 9] = [115_200, 921_600, 460_800, 230_400, 57_600, 128_000, 38_400, 19_200, 9_600];
 
 /// A serial port of this computer.
@@ -254,6 +254,8 @@ pub struct ImuSettings {
     pub device: Option<PathBuf>,
     /// Its rate.
     pub baud: Baud,
+    /// The only format that is read; absent: whichever comes.
+    pub format: Option<ImuFormat>,
     /// Ask the adapter to hand bytes on at once.
     pub low_latency: bool,
     /// How much longer than its period the 99th percentile of the gaps between its packets may be; more is reported.
@@ -262,7 +264,7 @@ pub struct ImuSettings {
 
 impl Default for ImuSettings {
     fn default() -> Self {
-        Self { device: None, baud: Baud::default(), low_latency: true, late: timing::LATE }
+        Self { device: None, baud: Baud::default(), format: None, low_latency: true, late: timing::LATE }
     }
 }
 
@@ -308,6 +310,10 @@ pub struct ImuStatus {
     pub node: Option<PathBuf>,
     /// The rate in use.
     pub baud: Option<u32>,
+    /// The format, once it is known.
+    pub format: Option<ImuFormat>,
+    /// What the unit sends.
+    pub fields: Fields,
     /// Whether the adapter hands bytes on at once.
     pub low_latency: LowLatency,
     /// How evenly samples arrive.

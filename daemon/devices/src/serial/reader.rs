@@ -137,12 +137,12 @@ impl Reader {
             finder: Finder::new(settings.device.clone()),
             arrivals: Arrivals::late_above(settings.late),
             health: Health::new(&settings.baud),
+            decoder: ImuDecoder::with(settings.format),
             settings,
             line,
             shared,
             reporter,
             queue,
-            decoder: ImuDecoder::new(),
             attempt: 0,
             several: false,
             sanity: Sanity::default(),
@@ -212,6 +212,7 @@ impl Reader {
 
     fn opened(&mut self, now: Time) {
         self.health.opened(now);
+        self.decoder.restart();
         self.sanity.forget();
         self.arrivals.forget();
         self.errors = self.line.as_ref().and_then(Line::errors);
@@ -264,8 +265,11 @@ impl Reader {
             Action::Keep => Some(line),
             Action::SetBaud(baud) => {
                 match line.configure(baud) {
-                    // The parser finds its feet by itself; the rest of the old rate's bytes are garbage.
-                    Ok(()) => line.flush(),
+                    // What came at the old rate is garbage, and what it was taken for was chance.
+                    Ok(()) => {
+                        line.flush();
+                        self.decoder.restart();
+                    }
                     Err(e) => log::debug!("{e}"),
                 }
                 Some(line)
@@ -391,6 +395,8 @@ impl Reader {
         if self.line.is_none() {
             status.node = None;
         }
+        status.format = self.decoder.format();
+        status.fields = self.decoder.fields();
         status.timing = self.arrivals.timing();
         status.counters.imu = self.decoder.counters();
         status.counters.overflow = self.queue.dropped();

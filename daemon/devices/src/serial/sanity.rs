@@ -42,8 +42,7 @@ impl fmt::Display for Insane {
         match self {
             Self::NotFinite => f.write_str("it sends numbers that are not finite; power-cycle it"),
             Self::Unusable => f.write_str(
-                "its packets lack time since start-up, angular rate or acceleration: add them to its binary output (common \
-                 group, bits 0, 5 and 8)",
+                "its packets lack angular rate or acceleration: switch them on in its output (doctor says what it sends)",
             ),
             Self::Stuck => f.write_str("it repeats the very same numbers; power-cycle it"),
             Self::ClockStopped => f.write_str("its clock does not advance; power-cycle it"),

@@ -4,6 +4,7 @@
 //! Body axes: x forward, y right, z down. The unit's reference is north, east, down; see [`Packet::to_sample`] for the way
 //! into our world.
 
+pub(crate) mod ascii;
 mod crc;
 mod layout;
 mod parser;
@@ -11,12 +12,15 @@ mod parser;
 mod tests;
 
 use bowwave_core::{event::ImuSample, time::Time};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
-pub use self::parser::{Parser, ParserCounters};
-use self::{
-    crc::crc16,
-    layout::{Field, Layout, SYNC},
+pub(crate) use self::crc::crc16;
+use self::layout::{Field, Layout, SYNC};
+pub(crate) use self::parser::Binary;
+pub use self::parser::Parser;
+use crate::imu::{
+    axes::{SWAP, from_yaw_pitch_roll, rotation, vector},
+    reading::{Reading, Stamp},
 };
 
 /// The fields of one packet that the trainer can use, in the unit's own units and axes. Fields of the packet that are
@@ -82,42 +86,30 @@ impl Packet {
         }
     }
 
-    /// The packet as a sample that arrived at `arrival`; `None` unless it has the time since start-up, a rate and an
-    /// acceleration (compensated ones are preferred). Rate and specific force stay in the body's axes. The attitude comes
-    /// from the quaternion, or else from yaw, pitch and roll, and is turned from north-east-down into our world.
-    pub fn to_sample(&self, arrival: Time) -> Option<ImuSample> {
-        let device_time_ns = i64::try_from(self.time_startup_ns?).ok()?;
-        let ned_from_imu = self
-            .quaternion
-            .map(|q| {
-                let [x, y, z, w] = q.map(f64::from);
-                let q = DQuat::from_xyzw(x, y, z, w);
-                // What cannot be a rotation is left as it is, for the receiver's sanity check to see.
-                if q.is_finite() && q.length() > 0.5 { q.normalize() } else { q }
-            })
-            .or_else(|| {
-                self.yaw_pitch_roll_deg.map(|ypr| ned_from_euler(ypr.map(|v| f64::from(v).to_radians())))
-            });
-        Some(ImuSample {
-            arrival,
-            device_time_ns,
-            rate: vector(self.angular_rate.or(self.raw_rate)?),
-            accel: vector(self.accel.or(self.raw_accel)?),
-            world_from_imu: ned_from_imu.map(|q| WORLD_FROM_NED * q),
-        })
+    /// What it says in our axes. Rate and specific force (compensated ones are preferred) stay in the body's axes. The
+    /// attitude comes from the quaternion, or else from yaw, pitch and roll, and is turned from north-east-down into our world.
+    pub(crate) fn reading(&self) -> Reading {
+        let ned_from_imu = self.quaternion.map(rotation).or_else(|| {
+            let angles = self.yaw_pitch_roll_deg?;
+            Some(from_yaw_pitch_roll(angles.map(|v| f64::from(v).to_radians())))
+        });
+        let time_ns = self.time_startup_ns.and_then(|ns| i64::try_from(ns).ok());
+        Reading {
+            stamp: time_ns.map_or(Stamp::Arrival, |ns| Stamp::Device { ns }),
+            rate: self.angular_rate.or(self.raw_rate).map(vector),
+            accel: self.accel.or(self.raw_accel).map(vector),
+            world_from_imu: ned_from_imu.map(|q| SWAP * q),
+        }
     }
-}
 
-/// East-north-up from north-east-down: half a turn about the horizontal axis between east and north.
-const WORLD_FROM_NED: DQuat =
-    DQuat::from_xyzw(std::f64::consts::FRAC_1_SQRT_2, std::f64::consts::FRAC_1_SQRT_2, 0.0, 0.0);
-
-fn ned_from_euler([yaw, pitch, roll]: [f64; 3]) -> DQuat {
-    DQuat::from_rotation_z(yaw) * DQuat::from_rotation_y(pitch) * DQuat::from_rotation_x(roll)
-}
-
-fn vector([x, y, z]: [f32; 3]) -> DVec3 {
-    DVec3::new(f64::from(x), f64::from(y), f64::from(z))
+    /// The packet as a sample that arrived at `arrival`; `None` unless it has the time since start-up, a rate and an
+    /// acceleration.
+    pub fn to_sample(&self, arrival: Time) -> Option<ImuSample> {
+        let Reading { stamp: Stamp::Device { ns }, rate, accel, world_from_imu } = self.reading() else {
+            return None;
+        };
+        Some(ImuSample { arrival, device_time_ns: ns, rate: rate?, accel: accel?, world_from_imu })
+    }
 }
 
 /// `N` little-endian floats; `None` if the length is another.
@@ -150,7 +142,7 @@ impl CommonOutput {
         Some(Self {
             time_startup_ns: u64::try_from(sample.device_time_ns).ok()?,
             quaternion: sample.world_from_imu.map(|world_from_imu| {
-                let q = WORLD_FROM_NED.inverse() * world_from_imu;
+                let q = SWAP.inverse() * world_from_imu;
                 [q.x as f32, q.y as f32, q.z as f32, q.w as f32]
             }),
             angular_rate: narrow(sample.rate),

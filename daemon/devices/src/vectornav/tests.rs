@@ -165,8 +165,9 @@ proptest! {
         let c = parser.counters();
         prop_assert_eq!(packets.len() as u64, c.packets);
         prop_assert!(c.skipped_bytes <= bytes.len() as u64);
-        prop_assert!(parser.buffer.len() < MAX_PACKET);
-        prop_assert!(parser.buffer.capacity() <= 2 * (MAX_PACKET + super::parser::CHUNK));
+        let (bytes, memory) = parser.scanner.held();
+        prop_assert!(bytes < MAX_PACKET);
+        prop_assert!(memory <= 2 * (MAX_PACKET + crate::framing::CHUNK));
     }
 
     /// Whatever lies between them, every packet is found, in order and once; none is invented.

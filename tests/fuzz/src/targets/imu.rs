@@ -83,7 +83,7 @@ impl Line {
         assert_eq!(counters.samples, self.samples, "{counters:?}");
         assert_eq!(
             counters.packets,
-            counters.samples + counters.not_finite + counters.unusable,
+            counters.samples + counters.not_finite + counters.unusable + counters.other,
             "{counters:?}"
         );
         // The shortest packet has a sync byte, a group byte, a mask, a field of one byte and a check sum.

@@ -1,0 +1,95 @@
+use std::{fs, path::Path};
+
+use bowwave_core::{event::ImuSample, time::Time};
+use glam::DVec3;
+
+use super::*;
+use crate::{
+    framing::Scanner,
+    imu::{
+        ImuDecoder, ImuFormat,
+        streams::{encode, truth},
+    },
+};
+
+fn parse(stream: &[u8]) -> Vec<Packet> {
+    let mut scanner = Scanner::<Rvc>::new();
+    let mut packets = Vec::new();
+    scanner.push(stream, |found| packets.extend(Packet::parse(found.bytes)));
+    packets
+}
+
+/// The data sheet's example and what it says of it.
+#[test]
+fn the_data_sheets_example_is_decoded_as_it_says() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared/data/imu_bytes/bno08x_uart_rvc_datasheet_example.bin");
+    let Ok(bytes) = fs::read(&path) else {
+        eprintln!("skipped: {} is not there", path.display());
+        return;
+    };
+    let packets = parse(&bytes);
+    assert_eq!(
+        packets,
+        [Packet { index: 222, yaw_pitch_roll_deg: [0.01, -1.1, 20.85], accel_g: [-0.371, -0.02, 0.977] }]
+    );
+    // Its acceleration is gravity in the axes that we take its angles for.
+    let reading = Unit::default().reading(&packets[0]);
+    let up = reading.world_from_imu.expect("given") * reading.accel.expect("given");
+    let off = up.angle_between(DVec3::Z).to_degrees();
+    eprintln!("the example's acceleration is {off:.3} degrees from its own vertical");
+    assert!(off < 0.1, "{off} degrees");
+}
+
+#[test]
+fn angles_lie_where_the_axes_say() {
+    let packet = |yaw_pitch_roll_deg| Packet { index: 0, yaw_pitch_roll_deg, accel_g: [0.1, 0.2, 0.97] };
+    let attitude = |angles| Unit::default().reading(&packet(angles)).world_from_imu.expect("given");
+    let level = attitude([0.0; 3]);
+    assert!((level * DVec3::X).abs_diff_eq(DVec3::Y, 1e-12), "forward is north");
+    assert!((level * DVec3::Y).abs_diff_eq(DVec3::X, 1e-12), "right is east");
+    assert!(
+        (attitude([90.0, 0.0, 0.0]) * DVec3::X).abs_diff_eq(DVec3::NEG_X, 1e-12),
+        "counter-clockwise to the west"
+    );
+    assert!((attitude([0.0, 30.0, 0.0]) * DVec3::X).z > 0.49, "the nose goes up");
+    assert!((attitude([0.0, 0.0, 30.0]) * DVec3::Y).z < -0.49, "the right side goes down");
+    let accel = Unit::default().reading(&packet([0.0; 3])).accel.expect("given");
+    assert!(accel.abs_diff_eq(DVec3::new(0.2, 0.1, -0.97) * G, 1e-12), "forward, right, down");
+}
+
+/// The index wraps every 2.56 s; packets that are lost leave a gap of their number.
+#[test]
+fn the_index_wraps_and_tells_what_is_lost() {
+    let mut decoder = ImuDecoder::fixed(ImuFormat::Bno08x);
+    let mut samples: Vec<ImuSample> = Vec::new();
+    for n in (0..3_000).filter(|n| n % 500 != 499) {
+        decoder.push(&encode(ImuFormat::Bno08x, n), truth(ImuFormat::Bno08x, n).arrival, |s| samples.push(s));
+    }
+    let steps: Vec<i64> = samples.windows(2).map(|w| w[1].device_time_ns - w[0].device_time_ns).collect();
+    let of = |ms: i64| steps.iter().filter(|s| (**s - ms * 1_000_000).abs() < 100_000).count();
+    assert_eq!((of(10), of(20)), (steps.len() - 5, 5));
+}
+
+/// A unit that begins anew begins its index anew: time goes on, as no clock says otherwise.
+#[test]
+fn an_index_that_begins_anew_breaks_nothing() {
+    let mut decoder = ImuDecoder::fixed(ImuFormat::Bno08x);
+    let mut last = -1;
+    for n in 0..2_000i64 {
+        let index = if n < 777 { n } else { n - 777 };
+        let gap = if n < 777 { 0 } else { 400_000_000 };
+        let arrival = Time::from_ns(truth(ImuFormat::Bno08x, n).arrival.ns() + gap);
+        let mut bytes = encode(ImuFormat::Bno08x, n);
+        let change = (index as u8).wrapping_sub(bytes[2]);
+        bytes[2] = index as u8;
+        bytes[18] = bytes[18].wrapping_add(change);
+        decoder.push(&bytes, arrival, |s| {
+            assert!(s.device_time_ns > last, "packet {n}");
+            last = s.device_time_ns;
+            let expected = arrival.ns_since(truth(ImuFormat::Bno08x, 0).arrival);
+            assert!((last - expected).abs() < 1_000_000, "packet {n}: {last} {expected}");
+        });
+    }
+    assert!(decoder.counters().samples > 1_990);
+}

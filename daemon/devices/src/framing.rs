@@ -1,0 +1,222 @@
+//! Finds the packets of a format in a byte stream that may hold anything: the part that all formats share.
+//!
+//! A format says how a packet begins, how long it is and whether it is intact ([`Framing`]); [`Scanner`] does the rest. No
+//! byte is thrown away before it is clear that no packet begins there, so a false preamble costs no packet behind it, and a
+//! claimed length never makes memory grow beyond the longest packet that the format knows.
+
+/// Bytes taken in at a time; with one unfinished packet they bound the buffer.
+pub(crate) const CHUNK: usize = 1024;
+/// Kinds of packets remembered. Units send a handful.
+const KNOWN: usize = 8;
+
+/// What a scanner has met.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LineCounters {
+    /// Packets with a right check sum.
+    pub packets: u64,
+    /// Places that looked like a packet and had a wrong check sum: damaged packets and false preambles.
+    pub bad_crc: u64,
+    /// Bytes that belonged to no packet.
+    pub skipped_bytes: u64,
+}
+
+/// What begins where a packet may begin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Look<Head> {
+    /// More bytes are needed to tell.
+    Incomplete,
+    /// No packet of this format.
+    Invalid,
+    /// A packet that claims this many bytes, from its first to its last.
+    Packet {
+        /// What its first bytes say.
+        head: Head,
+        /// Its length; never above [`Framing::MAX_BYTES`].
+        bytes: usize,
+    },
+}
+
+/// How a format's packets are told from other bytes.
+pub(crate) trait Framing {
+    /// What tells one kind of packet from another, its length included.
+    type Head: Copy + PartialEq + std::fmt::Debug;
+    /// The first byte of every packet.
+    const SYNC: u8;
+    /// The longest packet, bytes.
+    const MAX_BYTES: usize;
+    /// The check sum has eight bits only: one of 256 false preambles passes it.
+    const WEAK: bool;
+
+    /// Looks at bytes that begin with [`Self::SYNC`] and go on beyond the packet, or end before it does.
+    fn look(bytes: &[u8]) -> Look<Self::Head>;
+
+    /// Whether a packet of the length that it claims has the right check sum.
+    fn intact(packet: &[u8]) -> bool;
+}
+
+/// A packet in the stream.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found<'a, Head> {
+    /// What its first bytes say.
+    pub(crate) head: Head,
+    /// The whole packet.
+    pub(crate) bytes: &'a [u8],
+    /// Bytes skipped before it since the stream began.
+    pub(crate) skipped_bytes: u64,
+}
+
+/// Takes bytes in pieces of any size and reports the packets in them. Memory is bounded.
+#[derive(Debug)]
+pub(crate) struct Scanner<F: Framing> {
+    buffer: Vec<u8>,
+    /// The newest kinds of good packets.
+    known: [Option<F::Head>; KNOWN],
+    /// The last thing met was a packet: what follows begins where one may.
+    in_step: bool,
+    counters: LineCounters,
+}
+
+impl<F: Framing> Scanner<F> {
+    /// A scanner that has met nothing.
+    pub(crate) fn new() -> Self {
+        Self { buffer: Vec::new(), known: [None; KNOWN], in_step: false, counters: LineCounters::default() }
+    }
+
+    /// What has been met so far. Bytes of a packet still incomplete are not counted yet.
+    pub(crate) const fn counters(&self) -> LineCounters {
+        self.counters
+    }
+
+    /// Bytes of a packet still incomplete, and bytes of memory for them.
+    #[cfg(test)]
+    pub(crate) fn held(&self) -> (usize, usize) {
+        (self.buffer.len(), self.buffer.capacity())
+    }
+
+    /// Takes the next bytes of the stream and calls `sink` with each packet that they complete, in order.
+    pub(crate) fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(Found<'_, F::Head>)) {
+        for chunk in bytes.chunks(CHUNK) {
+            self.buffer.extend_from_slice(chunk);
+            self.advance(&mut sink);
+        }
+    }
+
+    /// Reports every complete packet in the buffer and keeps the unfinished rest.
+    fn advance(&mut self, sink: &mut impl FnMut(Found<'_, F::Head>)) {
+        let mut at = 0;
+        while let Some(rest) = self.buffer.get(at..).filter(|rest| !rest.is_empty()) {
+            let Some(sync) = rest.iter().position(|&b| b == F::SYNC) else {
+                at = self.skip(at, self.buffer.len());
+                break;
+            };
+            at = self.skip(at, at + sync);
+            let candidate = &self.buffer[at..];
+            let (head, bytes) = match F::look(candidate) {
+                Look::Incomplete => break,
+                Look::Packet { head, bytes } if bytes <= F::MAX_BYTES => (head, bytes),
+                Look::Packet { .. } | Look::Invalid => {
+                    at = self.skip(at, at + 1);
+                    continue;
+                }
+            };
+            match candidate.get(..bytes) {
+                Some(packet) if F::intact(packet) => match self.rival(at, bytes) {
+                    Rival::None => {
+                        let skipped_bytes = self.counters.skipped_bytes;
+                        sink(Found { head, bytes: packet, skipped_bytes });
+                        self.counters.packets += 1;
+                        self.in_step = true;
+                        self.learn(head);
+                        at += bytes;
+                    }
+                    Rival::Perhaps => break,
+                    Rival::At(place) => {
+                        self.counters.bad_crc += 1;
+                        at = self.skip(at, place);
+                    }
+                },
+                Some(_) => {
+                    self.counters.bad_crc += 1;
+                    at = self.skip(at, at + 1);
+                }
+                None => match self.packet_within(at, head) {
+                    Some(place) => at = self.skip(at, place),
+                    None => break,
+                },
+            }
+        }
+        self.buffer.drain(..at);
+    }
+
+    /// Counts the bytes from `from` to `to` as skipped; `to`.
+    fn skip(&mut self, from: usize, to: usize) -> usize {
+        self.in_step &= from == to;
+        self.counters.skipped_bytes += (to - from) as u64;
+        to
+    }
+
+    /// Whether another packet claims bytes of the intact one at `at`. A check sum of eight bits is right by chance too often
+    /// to take the first that is, unless it stands directly behind a packet or before one.
+    fn rival(&self, at: usize, bytes: usize) -> Rival {
+        if !F::WEAK || self.in_step {
+            return Rival::None;
+        }
+        let behind = &self.buffer[at + bytes..];
+        if behind.first() == Some(&F::SYNC) && F::look(behind) != Look::Invalid {
+            return Rival::None;
+        }
+        for place in at + 1..at + bytes {
+            let rest = &self.buffer[place..];
+            if rest.first() != Some(&F::SYNC) {
+                continue;
+            }
+            match F::look(rest) {
+                Look::Invalid => {}
+                Look::Incomplete => return Rival::Perhaps,
+                Look::Packet { bytes, .. } => match rest.get(..bytes) {
+                    None => return Rival::Perhaps,
+                    Some(packet) if F::intact(packet) => return Rival::At(place),
+                    Some(_) => {}
+                },
+            }
+        }
+        Rival::None
+    }
+
+    /// A candidate of a kind that the line has not sent before and that lacks bytes may be a false preamble that claims many
+    /// of them. If a whole packet lies behind its first byte, it is one: two packets never overlap.
+    fn packet_within(&self, at: usize, head: F::Head) -> Option<usize> {
+        if self.known.contains(&Some(head)) {
+            return None;
+        }
+        (at + 1..self.buffer.len()).find(|&place| {
+            let rest = &self.buffer[place..];
+            if rest.first() != Some(&F::SYNC) {
+                return false;
+            }
+            match F::look(rest) {
+                Look::Packet { bytes, .. } => rest.get(..bytes).is_some_and(F::intact),
+                Look::Incomplete | Look::Invalid => false,
+            }
+        })
+    }
+
+    /// Remembers that the line sends packets of this kind.
+    fn learn(&mut self, head: F::Head) {
+        if self.known.contains(&Some(head)) {
+            return;
+        }
+        self.known.rotate_right(1);
+        self.known[0] = Some(head);
+    }
+}
+
+/// Whether an intact packet may be none.
+enum Rival {
+    /// It is one.
+    None,
+    /// That needs more bytes.
+    Perhaps,
+    /// The one that begins here is intact as well and begins later.
+    At(usize),
+}

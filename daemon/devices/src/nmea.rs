@@ -1,0 +1,294 @@
+//! Heading and attitude of the ship from its own instruments, as lines of NMEA 0183, sans-io: a second input beside the unit
+//! on the gun, which cannot tell the ship's motion from the gun's and has no heading of its own.
+//!
+//! Read are `$--HDT` (true heading: NMEA 0183, IEC 61162-1), `$PASHR` (attitude as Applanix, NovAtel and Oxford units send
+//! it) and `$PSXN,23` with its quality `$PSXN,20` (Kongsberg Seapath). Heading is clockwise from true north; roll is positive
+//! with starboard down, pitch with the bow up; all in radians.
+
+use bowwave_core::time::Time;
+
+use crate::{
+    framing::{Framing, LineCounters, Look, Scanner},
+    lines::{self, LINE_MAX_BYTES, number},
+};
+
+/// The framing of any line.
+#[derive(Debug)]
+struct Sentences;
+
+impl Framing for Sentences {
+    type Head = ();
+    const SYNC: u8 = b'$';
+    const MAX_BYTES: usize = LINE_MAX_BYTES;
+    // A '$' within a line ends it, so that no false beginning can swallow one.
+    const WEAK: bool = false;
+
+    fn look(bytes: &[u8]) -> Look<()> {
+        lines::look(bytes, b"")
+    }
+
+    fn intact(packet: &[u8]) -> bool {
+        lines::checked(packet).is_some()
+    }
+}
+
+/// Which line a measurement came in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Sentence {
+    /// `$--HDT`.
+    Hdt,
+    /// `$PASHR`.
+    Pashr,
+    /// `$PSXN,23`.
+    Psxn,
+}
+
+/// What one line says of the ship. What its instrument calls invalid is absent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShipAttitude {
+    /// When the last byte of the line reached the host.
+    pub arrival: Time,
+    /// The line.
+    pub sentence: Sentence,
+    /// Time of the measurement, seconds of the UTC day, where the line tells it.
+    pub utc_day_s: Option<f64>,
+    /// True heading, radians clockwise from north, at least 0 and below a turn.
+    pub heading: Option<f64>,
+    /// Roll, radians, starboard down.
+    pub roll: Option<f64>,
+    /// Pitch, radians, bow up.
+    pub pitch: Option<f64>,
+    /// The instrument's own estimate of the heading's standard deviation, radians.
+    pub heading_sigma: Option<f64>,
+    /// The instrument says that it is not at its best: reduced quality, or not aligned yet.
+    pub reduced: bool,
+}
+
+/// Quality of `$PSXN,20`: 0 normal, 1 reduced, 2 invalid.
+#[derive(Clone, Copy, Debug, Default)]
+struct Quality {
+    heading: u8,
+    roll_pitch: u8,
+}
+
+/// Takes bytes in pieces of any size and reports what the ship's instruments say in them. Memory is bounded.
+#[derive(Debug)]
+pub struct ShipParser {
+    scanner: Scanner<Sentences>,
+    quality: Quality,
+}
+
+impl Default for ShipParser {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl ShipParser {
+    /// A parser that has met nothing.
+    pub fn new() -> Self {
+        Self { scanner: Scanner::new(), quality: Quality::default() }
+    }
+
+    /// Lines with a right check sum (of all kinds), damaged ones, and bytes that belonged to none.
+    pub const fn counters(&self) -> LineCounters {
+        self.scanner.counters()
+    }
+
+    /// Takes bytes that arrived together at `arrival` and calls `sink` with what each line that they complete says.
+    pub fn push(&mut self, bytes: &[u8], arrival: Time, mut sink: impl FnMut(ShipAttitude)) {
+        let Self { scanner, quality } = self;
+        scanner.push(bytes, |found| {
+            if let Some(attitude) = lines::checked(found.bytes).and_then(|body| read(body, quality, arrival))
+            {
+                sink(attitude);
+            }
+        });
+    }
+}
+
+/// What a line without `$` and check sum says; `None` for other lines and those that say nothing.
+fn read(body: &str, quality: &mut Quality, arrival: Time) -> Option<ShipAttitude> {
+    let mut fields = body.split(',');
+    let address = fields.next()?;
+    let fields: [&str; 11] = std::array::from_fn(|_| fields.next().unwrap_or_default());
+    let nothing = |sentence| ShipAttitude {
+        arrival,
+        sentence,
+        utc_day_s: None,
+        heading: None,
+        roll: None,
+        pitch: None,
+        heading_sigma: None,
+        reduced: false,
+    };
+    let said = match (address, fields) {
+        (address, [degrees, "T", ..]) if address.len() == 5 && address.ends_with("HDT") => {
+            ShipAttitude { heading: heading(degrees), ..nothing(Sentence::Hdt) }
+        }
+        ("PASHR", [time, degrees, "T", roll, pitch, _, _, _, sigma, _, aligned]) => ShipAttitude {
+            utc_day_s: utc_day_s(time),
+            heading: heading(degrees),
+            roll: angle(roll, 180.0),
+            pitch: angle(pitch, 90.0),
+            heading_sigma: angle(sigma, 180.0).filter(|s| *s >= 0.0),
+            reduced: aligned == "0",
+            ..nothing(Sentence::Pashr)
+        },
+        ("PSXN", ["20", _, _, heading, roll_pitch, ..]) => {
+            // What is no number is as good as invalid.
+            let of = |field: &str| field.parse().unwrap_or(2);
+            *quality = Quality { heading: of(heading), roll_pitch: of(roll_pitch) };
+            return None;
+        }
+        ("PSXN", ["23", roll, pitch, degrees, ..]) => ShipAttitude {
+            heading: heading(degrees).filter(|_| quality.heading < 2),
+            roll: angle(roll, 180.0).filter(|_| quality.roll_pitch < 2),
+            pitch: angle(pitch, 90.0).filter(|_| quality.roll_pitch < 2),
+            reduced: quality.heading.max(quality.roll_pitch) > 0,
+            ..nothing(Sentence::Psxn)
+        },
+        _ => return None,
+    };
+    (said.heading.is_some() || said.roll.is_some() || said.pitch.is_some()).then_some(said)
+}
+
+/// Degrees within `limit` either way, as radians.
+fn angle(field: &str, limit: f64) -> Option<f64> {
+    number(field).filter(|v| v.abs() <= limit).map(f64::to_radians)
+}
+
+/// Degrees from 0 to 360, as radians below a turn.
+fn heading(field: &str) -> Option<f64> {
+    number(field).filter(|v| (0.0..=360.0).contains(v)).map(|v| (v % 360.0).to_radians())
+}
+
+/// `hhmmss.sss`, or `hhmmssfff` as one maker writes it, as seconds of the day.
+fn utc_day_s(field: &str) -> Option<f64> {
+    let digits = field.get(..6).filter(|d| d.bytes().all(|b| b.is_ascii_digit()))?;
+    let two = |at: usize| digits.get(at..at + 2).and_then(|d| d.parse::<f64>().ok());
+    let (hours, minutes, seconds) = (two(0)?, two(2)?, two(4)?);
+    let rest = field.get(6..)?;
+    let fraction = match rest.strip_prefix('.').unwrap_or(rest) {
+        "" => 0.0,
+        digits if digits.len() <= 9 && digits.bytes().all(|b| b.is_ascii_digit()) => {
+            digits.parse::<f64>().ok()? / 10f64.powi(digits.len() as i32)
+        }
+        _ => return None,
+    };
+    // A leap second is 60.
+    (hours < 24.0 && minutes < 60.0 && seconds <= 60.0)
+        .then_some(hours * 3600.0 + minutes * 60.0 + seconds + fraction)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn parse(bytes: &[u8], piece: usize) -> (Vec<ShipAttitude>, LineCounters) {
+        let mut parser = ShipParser::new();
+        let mut said = Vec::new();
+        for piece in bytes.chunks(piece) {
+            parser.push(piece, Time::from_ns(3), |a| said.push(a));
+        }
+        (said, parser.counters())
+    }
+
+    fn line(body: &str) -> String {
+        format!("${body}*{:02X}\r\n", body.bytes().fold(0, |sum, byte| sum ^ byte))
+    }
+
+    /// Lines as ships' loggers have published them, check sums included.
+    const LOGGED: &str = "$INZDA,163611.11,10,09,2019,,*76\r\n$INHDT,235.18,T*18\r\n$PSXN,20,1,0,0,0*3A\r\n\
+                          $PSXN,22,-0.05,-0.68*32\r\n$PSXN,23,-2.82,1.00,235.18,-1.66*3D\r\n\
+                          $PASHR,164100190,138.24,T,+32.56,+48.49,+00.00,3.141,3.141,35.000,1,0*17\r\n";
+
+    fn degrees(value: Option<f64>) -> Option<f64> {
+        value.map(|v| (v.to_degrees() * 1e6).round() / 1e6)
+    }
+
+    #[test]
+    fn logged_lines_are_read() {
+        for piece in 1..LOGGED.len() {
+            let (said, counters) = parse(LOGGED.as_bytes(), piece);
+            assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (6, 0, 0));
+            let [hdt, psxn, pashr] = said[..] else { panic!("{said:?}") };
+            assert_eq!((hdt.sentence, degrees(hdt.heading), hdt.roll), (Sentence::Hdt, Some(235.18), None));
+            assert_eq!(psxn.sentence, Sentence::Psxn);
+            assert_eq!(
+                [psxn.roll, psxn.pitch, psxn.heading].map(degrees),
+                [Some(-2.82), Some(1.0), Some(235.18)]
+            );
+            assert!(!psxn.reduced);
+            assert_eq!(
+                [pashr.roll, pashr.pitch, pashr.heading].map(degrees),
+                [Some(32.56), Some(48.49), Some(138.24)]
+            );
+            assert_eq!(degrees(pashr.heading_sigma), Some(35.0));
+            assert!(pashr.reduced, "its inertial part is not aligned");
+            let utc = pashr.utc_day_s.expect("given");
+            assert!((utc - 60_060.19).abs() < 1e-9, "{utc}");
+        }
+    }
+
+    #[test]
+    fn what_an_instrument_calls_invalid_is_absent() {
+        let bad = [line("PSXN,20,0,0,2,1"), line("PSXN,23,1.5,-0.5,10.0,0.1")].concat();
+        let (said, _) = parse(bad.as_bytes(), 7);
+        assert_eq!((said[0].heading, degrees(said[0].roll), said[0].reduced), (None, Some(1.5), true));
+        let nothing = [
+            line("PSXN,20,0,0,2,2"),
+            line("PSXN,23,1.5,-0.5,10.0,0.1"),
+            line("HEHDT,,T"),
+            line("HEHDT,361.0,T"),
+            line("HEHDT,10.0,M"),
+            line("GPHDT,nan,T"),
+            line("PASHR,POS,1,2"),
+        ]
+        .concat();
+        assert_eq!(
+            parse(nothing.as_bytes(), 9),
+            (Vec::new(), LineCounters { packets: 7, ..LineCounters::default() })
+        );
+        let north = parse(line("HEHDT,360.0,T").as_bytes(), 3).0;
+        assert_eq!(north[0].heading, Some(0.0));
+    }
+
+    #[test]
+    fn times_of_day() {
+        assert_eq!(utc_day_s("000000"), Some(0.0));
+        assert_eq!(utc_day_s("235960.500"), Some(86_400.5));
+        for none in ["", "1234", "246000", "12:00:00", "120000.1.2", "120000,5", "ab0000"] {
+            assert_eq!(utc_day_s(none), None, "{none}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_survived_in_bounded_memory(bytes in prop::collection::vec(any::<u8>(), 0..4000), piece in 1usize..2000) {
+            let mut parser = ShipParser::new();
+            for piece in bytes.chunks(piece) {
+                parser.push(piece, Time::MIN, |_| {});
+            }
+            prop_assert!(parser.scanner.held().0 <= LINE_MAX_BYTES);
+        }
+
+        /// Whatever lies between them, every line is found, in order and once.
+        #[test]
+        fn garbage_between_lines_loses_none(
+            gaps in prop::collection::vec(prop::collection::vec(prop_oneof![any::<u8>(), Just(b'$'), Just(b'*')], 0..90), 1..20),
+            piece in 1usize..100,
+        ) {
+            let mut bytes = Vec::new();
+            for (n, gap) in gaps.iter().enumerate() {
+                bytes.extend(gap);
+                bytes.extend(line(&format!("HEHDT,{n}.5,T")).bytes());
+            }
+            let (said, _) = parse(&bytes, piece);
+            let said: Vec<_> = said.iter().map(|a| degrees(a.heading)).collect();
+            prop_assert_eq!(said, (0..gaps.len()).map(|n| Some(n as f64 + 0.5)).collect::<Vec<_>>());
+        }
+    }
+}
