@@ -1,11 +1,14 @@
-//! The inertial unit's line: any bytes in any pieces.
+//! The line of an inertial unit of VectorNav: any bytes in any pieces.
 //!
 //! Input: one byte, the size of the pieces in which everything is pushed (0: steps at once); then steps. A step is two bytes
 //! and its content: bit 15 says whether it is sent as it is or as a packet, with a sync byte before and the right check sum
 //! behind, the lowest ten bits how many bytes it has. Without such packets a fuzzer would hardly ever pass the check sum.
 
 use bowwave_core::{event::ImuSample, time::Time};
-use bowwave_devices::{imu::ImuDecoder, vectornav::CommonOutput};
+use bowwave_devices::{
+    imu::{ImuDecoder, ImuFormat},
+    vectornav::CommonOutput,
+};
 
 const SYNC: u8 = 0xfa;
 /// The longest packet that the parser takes, bytes.
@@ -20,7 +23,13 @@ const MEMORY_BYTES: usize = 16 << 10;
 /// Whatever came before: samples are finite, everything is counted, and good packets come through again.
 pub fn run(input: &[u8]) {
     let Some((&piece, mut rest)) = input.split_first() else { return };
-    let mut line = Line { decoder: ImuDecoder::new(), piece: usize::from(piece), ms: 0, sent: 0, samples: 0 };
+    let mut line = Line {
+        decoder: ImuDecoder::fixed(ImuFormat::VectorNav),
+        piece: usize::from(piece),
+        ms: 0,
+        sent: 0,
+        samples: 0,
+    };
     while let Some((bytes, behind)) = step(rest) {
         rest = behind;
         line.push(&bytes, |_| {});

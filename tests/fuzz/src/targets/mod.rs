@@ -7,6 +7,7 @@
 pub mod calibration;
 pub mod config;
 pub mod imu;
+pub mod imu_formats;
 pub mod jpeg;
 mod memory;
 pub mod model;
@@ -20,6 +21,7 @@ pub type Target = (&'static str, fn(&[u8]));
 /// All targets.
 pub const ALL: &[Target] = &[
     ("imu", imu::run),
+    ("imu_formats", imu_formats::run),
     ("calibration", calibration::run),
     ("jpeg", jpeg::run),
     ("config", config::run),
