@@ -15,6 +15,7 @@ use std::{
 use bowwave_core::{
     event::{Event, ImuSample},
     fault::{Change, Fault, FaultChange},
+    time::Time,
 };
 use rustix::{
     event::{EventfdFlags, eventfd},
@@ -24,10 +25,13 @@ use rustix::{
 
 use super::{
     Baud, ImuPort, ImuSettings, ImuStatus, LineStatus, QUEUE_SAMPLES, SerialError,
+    health::{Action, Health},
     reader::{BLOCKED_NS, Reader, Shared, Watcher},
 };
 use crate::{
-    clock, queue,
+    clock,
+    imu::{ImuDecoder, ImuFormat, streams::encode},
+    queue,
     report::{Reports, reporting},
     vectornav::CommonOutput,
 };
@@ -95,6 +99,61 @@ fn bytes_become_stamped_samples() {
     wait_for(|| port.status().line == LineStatus::Streaming);
     let counters = port.stop().expect("stops");
     assert_eq!((counters.imu.samples, counters.imu.skipped_bytes, counters.overflow), (50, 50 * 8, 0));
+}
+
+#[test]
+fn every_format_comes_through_the_port() {
+    for format in ImuFormat::ALL {
+        let (mut master, slave) = terminal();
+        let port = ImuPort::open(&slave, 115_200).expect("opens");
+        for n in 0..60 {
+            master.write_all(&encode(format, n)).expect("written");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        let samples = receive(&port, 59);
+        assert!(samples.len() >= 59, "{format}: {}", samples.len());
+        assert!(samples.is_sorted_by_key(|s| s.arrival));
+        wait_for(|| port.status().line == LineStatus::Streaming);
+        let status = port.status();
+        assert_eq!((status.format, status.fields.accel), (Some(format), true));
+        assert_eq!(port.stop().expect("stops").imu.skipped_bytes, 0, "{format}");
+    }
+}
+
+/// Units of all formats at a rate that is tried last: health and decoder together find it, as the reader joins them.
+#[test]
+fn the_scan_of_rates_finds_every_format() {
+    for format in ImuFormat::ALL {
+        let Baud::Scan(rates) = Baud::default() else { panic!("several rates") };
+        let right = rates[rates.len() - 1];
+        let mut health = Health::new(&Baud::default());
+        let mut decoder = ImuDecoder::new();
+        health.opened(Time::from_ns(0));
+        let mut noise = 7u32;
+        let mut found_ms = None;
+        // What the slowest of those rates can carry: a group each 50 ms.
+        for n in 0..200 {
+            let now = Time::from_ns(n * 50_000_000);
+            let mut bytes = encode(format, n);
+            if health.baud() != right {
+                for byte in &mut bytes {
+                    noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    *byte = (noise >> 24) as u8;
+                }
+            }
+            let before = decoder.counters().packets;
+            decoder.push(&bytes, now, |_| {});
+            health.received(now, bytes.len(), decoder.counters().packets - before);
+            if let Action::SetBaud(_) = health.tick(now, false) {
+                decoder.restart();
+            }
+            if health.status() == LineStatus::Streaming {
+                found_ms.get_or_insert(n * 50);
+            }
+        }
+        assert_eq!((health.baud(), decoder.format()), (right, Some(format)));
+        assert!(found_ms.is_some_and(|ms| ms < 4_000), "{format}: {found_ms:?} ms");
+    }
 }
 
 #[test]
