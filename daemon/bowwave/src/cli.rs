@@ -259,7 +259,11 @@ pub struct Plan {
 
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct Doctor {
+    /// One device more closely
+    #[command(subcommand)]
+    pub device: Option<DoctorDevice>,
     /// Check what this configuration names instead, each device for a moment; the trainer must not run meanwhile
     #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "imu", "trigger", "gpu"])]
     pub config: Option<PathBuf>,
@@ -275,6 +279,30 @@ pub struct Doctor {
     /// Vulkan device that must be there: its number, or part of its name
     #[arg(long, value_name = "NAME")]
     pub gpu: Option<String>,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Devices that `doctor` looks at more closely.
+#[derive(Debug, Subcommand)]
+pub enum DoctorDevice {
+    /// Listen to the inertial unit: its format, its rate, what it sends and lacks; the trainer must not run meanwhile
+    Imu(DoctorImu),
+}
+
+/// Arguments of `doctor imu`.
+#[derive(Debug, Args)]
+pub struct DoctorImu {
+    /// Serial line; without it the configuration's, else the first USB adapter on which a unit answers
+    #[arg(value_name = "PATH")]
+    pub device: Option<PathBuf>,
+    /// Take line, rate and format from this configuration
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// How long to listen; all usual rates are tried within 4 s
+    #[arg(long, value_name = "SECONDS", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=600))]
+    pub seconds: u32,
     /// Print as JSON
     #[arg(long)]
     pub json: bool,

@@ -5,6 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use anyhow::Result;
 use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
+    imu::ImuFormat,
     lamps::LampSettings,
     serial::{Baud, ImuSettings},
     trigger::{Bias, InputLine},
@@ -130,6 +131,7 @@ enum RawBaud {
 pub(super) struct RawImu {
     device: Option<PathBuf>,
     baud: Option<Spanned<RawBaud>>,
+    format: Option<Spanned<String>>,
     low_latency: Option<bool>,
     late_ms: Option<Spanned<f64>>,
 }
@@ -152,15 +154,24 @@ impl RawImu {
                 baud
             }
         };
+        let format = self.format.map(|name| imu_format(source, &name)).transpose()?;
         let late = source.number(self.late_ms, "imu.late_ms", 1.0..=1000.0)?;
         let usual = ImuSettings::default();
         Ok(ImuSettings {
             device: self.device,
             baud,
+            format,
             low_latency: self.low_latency.unwrap_or(usual.low_latency),
             late: late.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
         })
     }
+}
+
+fn imu_format(source: Source<'_>, name: &Spanned<String>) -> Result<ImuFormat> {
+    ImuFormat::from_key(name.get_ref()).ok_or_else(|| {
+        let known = ImuFormat::ALL.map(ImuFormat::key).join(", ");
+        source.wrong(&name.span(), format!("imu.format: '{}' is none of {known}", name.get_ref()))
+    })
 }
 
 #[derive(Deserialize)]

@@ -1,5 +1,6 @@
 use bowwave_devices::{
     camera::{Coding, Exposure, Rate, WhiteBalance},
+    imu::ImuFormat,
     serial::Baud,
     trigger::Bias,
 };
@@ -40,6 +41,7 @@ fn every_key_is_read() {
         [imu]
         device = "/dev/bowwave/imu"
         baud = [115200, 921600]
+        format = "xsens"
         low_latency = false
         late_ms = 12.5
         [trigger]
@@ -83,6 +85,7 @@ fn every_key_is_read() {
     assert_eq!(camera.controls.white_balance, WhiteBalance::Auto);
     assert_eq!((camera.buffers, camera.readout_us, camera.controls.gain), (5, Some(9000), Some(4)));
     assert_eq!(config.imu.baud, Baud::Scan(vec![115_200, 921_600]));
+    assert_eq!(config.imu.format, Some(ImuFormat::Xsens));
     let line = |chip: &str, line: &str, active_low, bias| InputLine {
         chip: chip.into(),
         line: line.into(),
@@ -105,6 +108,10 @@ fn every_key_is_read() {
 #[test]
 fn mistakes_are_refused_where_they_are() {
     for (text, said) in [
+        (
+            "[imu]\nformat = \"xens\"\n",
+            "x.toml:2:10: imu.format: 'xens' is none of vectornav, vectornav-ascii, xsens,",
+        ),
         ("[screen]\nsise = \"1x1\"\n", "x.toml:2:1: unknown field `sise`"),
         ("[screen]\nsize = \"1x1\"\n", "x.toml:2:8: screen.size: '1x1' is no size"),
         ("[screen]\noutput = \"tv\"\n", "x.toml:2:10: "),

@@ -107,7 +107,7 @@ fn left(reports: &Reports) -> Vec<(Fault, String)> {
 }
 
 /// A check that fails with the faults that are left, or is `found`.
-fn verdict(name: &'static str, faults: &[(Fault, String)], found: String, enough: bool) -> Check {
+pub(super) fn verdict(name: &'static str, faults: &[(Fault, String)], found: String, enough: bool) -> Check {
     match faults {
         [] if enough => check(name, Verdict::Ok, found),
         [] => failed(name, format!("{found}: too little; look at its cable")),
@@ -165,19 +165,15 @@ fn imu(config: &Config) -> Check {
         Err(e) => return failed("imu", e),
     };
     let status = &found.status;
-    let c = status.counters;
-    let text = match (&status.node, status.baud) {
-        (Some(node), Some(baud)) => format!(
-            "{} at {baud} baud: {} samples in {:.1} s, {} damaged packets, low latency {:?}",
-            node.display(),
-            c.imu.samples,
-            LISTEN.as_secs_f64(),
-            c.imu.bad_crc,
-            status.low_latency
-        ),
-        _ => "no unit answers".to_owned(),
-    };
-    verdict("imu", &found.faults, text, c.imu.samples >= PICTURES_MIN)
+    let text = format!(
+        "{}: {} samples in {:.1} s, {} damaged packets, low latency {:?}",
+        super::imu::unit(status),
+        status.counters.imu.samples,
+        LISTEN.as_secs_f64(),
+        status.counters.imu.bad_crc,
+        status.low_latency
+    );
+    verdict("imu", &found.faults, text, status.counters.imu.samples >= PICTURES_MIN)
 }
 
 fn lines(config: &Config) -> Vec<Check> {

@@ -1,6 +1,7 @@
 //! `bowwave doctor`: checks of this computer, each with what to do about it.
 
 mod configured;
+mod imu;
 
 use std::{fmt, path::Path, process::Command};
 
@@ -8,7 +9,10 @@ use anyhow::{Context, Result};
 use bowwave_devices::{camera, lcd, serial, trigger};
 use serde::Serialize;
 
-use crate::{cache, cli::Doctor};
+use crate::{
+    cache,
+    cli::{Doctor, DoctorDevice},
+};
 
 /// Free space below which a session of an hour may not fit, bytes.
 const FREE_BYTES_MIN: u64 = 2_000_000_000;
@@ -57,6 +61,9 @@ fn failed(name: &'static str, error: impl fmt::Display) -> Check {
 
 /// Runs all checks; `true` where none failed.
 pub fn run(arguments: &Doctor) -> Result<bool> {
+    if let Some(DoctorDevice::Imu(arguments)) = &arguments.device {
+        return print(&imu::checks(arguments)?, arguments.json);
+    }
     let mut checks = Vec::new();
     if let Some(path) = &arguments.config {
         checks.extend(configured::checks(path));
@@ -70,10 +77,15 @@ pub fn run(arguments: &Doctor) -> Result<bool> {
     checks.push(disk());
     checks.push(default_recording());
     checks.push(ffmpeg());
-    if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&checks).context("cannot put the checks into JSON")?);
+    print(&checks, arguments.json)
+}
+
+/// Prints the checks; `true` where none failed.
+fn print(checks: &[Check], json: bool) -> Result<bool> {
+    if json {
+        println!("{}", serde_json::to_string_pretty(checks).context("cannot put the checks into JSON")?);
     } else {
-        for c in &checks {
+        for c in checks {
             println!("{:<8} {:<16} {}", c.verdict, c.name, c.found);
         }
     }

@@ -1,0 +1,145 @@
+//! `bowwave doctor imu`: what the inertial unit says, for somebody who sets one up.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use bowwave_devices::{
+    imu::ImuFormat,
+    serial::{self, ImuSettings, ImuStatus, LineStatus},
+};
+
+use super::{Check, Verdict, check, configured, failed};
+use crate::{cli::DoctorImu, config};
+
+/// Samples that the time must bring at least: fewer are no unit that the trainer can follow.
+const SAMPLES_MIN: u64 = 10;
+
+/// Listens to the unit.
+pub(super) fn checks(arguments: &DoctorImu) -> Result<Vec<Check>> {
+    let mut settings = match &arguments.config {
+        Some(path) => config::read(path)?.imu,
+        None => ImuSettings::default(),
+    };
+    if let Some(device) = &arguments.device {
+        settings.device = Some(device.clone());
+    }
+    let time = Duration::from_secs(u64::from(arguments.seconds));
+    let found = match serial::check(settings, time) {
+        Ok(found) => found,
+        Err(e) => return Ok(vec![failed("imu", e)]),
+    };
+    let status = &found.status;
+    let enough = status.counters.imu.samples >= SAMPLES_MIN;
+    let mut checks = vec![configured::verdict("imu", &found.faults, unit(status), enough)];
+    if status.format.is_some() {
+        let verdict = if status.fields.clock && status.fields.rate && status.fields.accel {
+            Verdict::Ok
+        } else {
+            Verdict::Warning
+        };
+        checks.push(check("output", verdict, status.fields.to_string()));
+        checks.push(check("timing", Verdict::Ok, timing(status)));
+    }
+    checks.push(check("line", Verdict::Ok, line(status)));
+    Ok(checks)
+}
+
+/// Which unit answers, where and how fast.
+pub(super) fn unit(status: &ImuStatus) -> String {
+    let (Some(node), Some(baud)) = (&status.node, status.baud) else { return "no unit answers".to_owned() };
+    let place = format!("{} at {baud} baud", node.display());
+    match status.format {
+        Some(format) if status.timing.period_ms > 0.0 => {
+            format!("{place}: {format}, {:.1} samples a second", 1e3 / status.timing.period_ms)
+        }
+        Some(format) => format!("{place}: {format}"),
+        None if status.line == LineStatus::Garbled || status.counters.imu.skipped_bytes > 0 => {
+            let known = ImuFormat::ALL.map(|f| f.to_string()).join(", ");
+            format!("{place}: bytes come that are none of {known}")
+        }
+        None => format!("{place}: nothing comes"),
+    }
+}
+
+fn timing(status: &ImuStatus) -> String {
+    let t = status.timing;
+    if t.period_ms <= 0.0 {
+        return "too few samples to tell".to_owned();
+    }
+    format!(
+        "a sample every {:.2} ms by the unit's time; arrivals up to {:.1} ms apart (99 %), {:.2} ms off in the median; {} \
+         samples missing",
+        t.period_ms, t.gap_p99_ms, t.jitter_p50_ms, status.counters.lost_samples
+    )
+}
+
+fn line(status: &ImuStatus) -> String {
+    let c = status.counters;
+    format!(
+        "{} packets, of them {} samples, {} parts and other ones, {} that lack something, {} with numbers that are none; {} \
+         damaged, {} bytes of no packet; {} framing errors, {} overruns; low latency {:?}",
+        c.imu.packets,
+        c.imu.samples,
+        c.imu.other,
+        c.imu.unusable,
+        c.imu.not_finite,
+        c.imu.bad_crc,
+        c.imu.skipped_bytes,
+        c.framing_errors,
+        c.overruns,
+        status.low_latency
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_devices::{
+        imu::Fields,
+        serial::{ArrivalTiming, PortCounters},
+    };
+
+    use super::*;
+
+    fn status() -> ImuStatus {
+        ImuStatus {
+            node: Some("/dev/ttyUSB0".into()),
+            baud: Some(115_200),
+            format: Some(ImuFormat::Bno08x),
+            fields: Fields { counter: true, accel: true, attitude: true, ..Fields::default() },
+            timing: ArrivalTiming {
+                period_ms: 10.0,
+                gap_p99_ms: 16.2,
+                jitter_p50_ms: 1.5,
+                jitter_p99_ms: 6.0,
+            },
+            ..ImuStatus::default()
+        }
+    }
+
+    #[test]
+    fn what_answers_is_told_in_words() {
+        let told = status();
+        assert_eq!(unit(&told), "/dev/ttyUSB0 at 115200 baud: BNO08x UART-RVC, 100.0 samples a second");
+        assert!(
+            timing(&told)
+                .starts_with("a sample every 10.00 ms by the unit's time; arrivals up to 16.2 ms apart")
+        );
+        assert_eq!(unit(&ImuStatus::default()), "no unit answers");
+        let silent = ImuStatus { format: None, ..status() };
+        assert_eq!(unit(&silent), "/dev/ttyUSB0 at 115200 baud: nothing comes");
+        let mut counters = PortCounters::default();
+        counters.imu.skipped_bytes = 900;
+        let strange = unit(&ImuStatus { counters, ..silent });
+        assert!(strange.contains("none of VectorNav binary") && strange.contains("Witmotion"), "{strange}");
+        assert!(line(&ImuStatus { counters, ..status() }).contains("900 bytes of no packet"));
+    }
+
+    #[test]
+    fn a_line_that_is_not_there_fails_with_what_to_do() {
+        let arguments =
+            DoctorImu { device: Some("/dev/absent-imu".into()), config: None, seconds: 1, json: false };
+        let checks = checks(&arguments).unwrap();
+        assert_eq!(checks[0].verdict, Verdict::Failed);
+        assert!(checks[0].found.contains("absent-imu"), "{}", checks[0].found);
+    }
+}
