@@ -120,10 +120,11 @@ impl Packet {
 
     fn stamp(&self) -> Stamp {
         let own_ns = self.reference_ns.and_then(|ns| i64::try_from(ns).ok());
-        let gps_ns = self.gps.map(|(tow_s, week)| {
+        let gps_ns = self.gps.and_then(|(tow_s, week)| {
             let whole = tow_s.floor();
-            let since = i64::from(week) * WEEK_S as i64 + whole as i64;
-            since * 1_000_000_000 + ((tow_s - whole) * 1e9) as i64
+            let since_s = i64::from(week) * WEEK_S as i64 + whole as i64;
+            // A week beyond the year 2272 is none.
+            since_s.checked_mul(1_000_000_000)?.checked_add(((tow_s - whole) * 1e9) as i64)
         });
         own_ns.or(gps_ns).map_or(Stamp::Arrival, |ns| Stamp::Device { ns })
     }

@@ -176,6 +176,7 @@ fn times_of_gps_are_taken_where_there_is_no_clock() {
     for wrong in [f64::NAN, -1.0, 604_800.0, f64::INFINITY] {
         assert_eq!(time((0xd3, gps(wrong, 2))), Stamp::Arrival);
     }
+    assert_eq!(time((0xd3, gps(1.0, u16::MAX))), Stamp::Arrival);
     assert_eq!(time((0xd5, u64::MAX.to_be_bytes().to_vec())), Stamp::Arrival);
 }
 

@@ -22,15 +22,16 @@ pub(crate) fn vector([x, y, z]: [f32; 3]) -> DVec3 {
     DVec3::new(f64::from(x), f64::from(y), f64::from(z))
 }
 
-/// A rotation from what a wire says, scalar last. What cannot be one is left as it is, for the check of the sample to see.
+/// A rotation from what a wire says, scalar last; all zeros, which the check of the sample drops, where it cannot be one.
 pub(crate) fn rotation(xyzw: [f32; 4]) -> DQuat {
     let [x, y, z, w] = xyzw.map(f64::from);
     unit(DQuat::from_xyzw(x, y, z, w))
 }
 
-/// A quaternion of length 1, where it can be a rotation at all.
+/// A quaternion of length 1, or all zeros where it cannot be a rotation. Left as it is, one at the limit might pass a later
+/// check with its length off.
 pub(crate) fn unit(q: DQuat) -> DQuat {
-    if q.is_finite() && q.length() > 0.5 { q.normalize() } else { q }
+    if q.is_finite() && q.length() > 0.5 { q.normalize() } else { DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0) }
 }
 
 /// Yaw, then pitch, then roll (about z, y, x, each in the turned axes), radians.
@@ -41,6 +42,16 @@ pub(crate) fn from_yaw_pitch_roll([yaw, pitch, roll]: [f64; 3]) -> DQuat {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_rotation_is_nothing() {
+        for none in
+            [[0.0; 4], [0.0, 0.0, 0.0, 0.5], [f32::NAN, 0.0, 0.0, 1.0], [f32::INFINITY, 0.0, 0.0, 0.0]]
+        {
+            assert_eq!(rotation(none).length(), 0.0, "{none:?}");
+        }
+        assert_eq!(rotation([0.0, 0.0, 0.0, 0.6]), DQuat::IDENTITY);
+    }
 
     #[test]
     fn turns_take_axes_where_they_say() {

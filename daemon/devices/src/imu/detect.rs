@@ -1,7 +1,7 @@
 //! Which format a line carries, found from the bytes alone.
 //!
 //! Every format reads along. The first of which so many packets stand close together that chance cannot have put them there
-//! is the line's; the samples that it has made meanwhile are not lost. What lies between packets (text of a receiver on the
+//! is the line's; the samples of those packets are not lost. What lies between packets (text of a receiver on the
 //! same line, noise) may be as much as the packets themselves.
 
 use std::collections::VecDeque;
@@ -12,9 +12,6 @@ use super::{
     ImuFormat,
     unit::{Place, Unit},
 };
-
-/// Samples kept of a format that is not proven yet.
-const SAMPLES: usize = 16;
 
 /// Packets that prove a format. Chance makes a packet of random bytes with a check sum of sixteen bits (and a preamble) less
 /// than once in 10^8 bytes, one of eight bits about once in 10^6: as many close together never.
@@ -31,48 +28,45 @@ pub(super) const fn proof(format: ImuFormat) -> usize {
 #[derive(Debug)]
 struct Candidate {
     unit: Unit,
-    /// The newest packets' places, as many as prove the format.
-    places: VecDeque<Place>,
-    samples: VecDeque<ImuSample>,
+    /// The newest packets, as many as prove the format, and the samples that they completed.
+    newest: VecDeque<(Place, Option<ImuSample>)>,
+    /// Samples of packets before: chance made them, or they came long before the proof.
+    dropped: u64,
+    /// Samples from the proof on; `None`: it is not proven.
+    proven: Option<Vec<ImuSample>>,
 }
 
 impl Candidate {
     fn new(format: ImuFormat) -> Self {
-        Self { unit: Unit::new(format), places: VecDeque::new(), samples: VecDeque::new() }
+        Self { unit: Unit::new(format), newest: VecDeque::new(), dropped: 0, proven: None }
     }
 
     fn push(&mut self, bytes: &[u8], arrival: Time) {
-        let Self { unit, places, samples } = self;
+        let Self { unit, newest, dropped, proven } = self;
         let proof = proof(unit.format());
-        let mut proven = is_proven(places, proof);
         unit.push(bytes, arrival, &mut |sample, place| {
-            if let Some(sample) = sample {
-                // What comes behind the proof belongs to the line whatever there is of it; before, memory is bounded.
-                if samples.len() >= SAMPLES && !proven {
-                    samples.pop_front();
-                }
-                samples.push_back(sample);
+            if let Some(samples) = proven {
+                samples.extend(sample);
+                return;
             }
-            if !proven {
-                if places.len() >= proof {
-                    places.pop_front();
-                }
-                places.push_back(place);
-                proven = is_proven(places, proof);
+            if newest.len() >= proof
+                && let Some((_, Some(_))) = newest.pop_front()
+            {
+                *dropped += 1;
+            }
+            newest.push_back((place, sample));
+            if is_proof(newest, proof) {
+                *proven = Some(newest.iter().filter_map(|(_, sample)| *sample).collect());
             }
         });
-    }
-
-    fn proven(&self) -> bool {
-        is_proven(&self.places, proof(self.unit.format()))
     }
 }
 
 /// As many packets as prove it, with fewer bytes skipped between them than are in them.
-fn is_proven(places: &VecDeque<Place>, proof: usize) -> bool {
-    let (Some(first), Some(last)) = (places.front(), places.back()) else { return false };
-    let bytes: usize = places.iter().map(|p| p.bytes).sum();
-    places.len() >= proof && last.skipped_bytes - first.skipped_bytes <= bytes as u64
+fn is_proof(newest: &VecDeque<(Place, Option<ImuSample>)>, proof: usize) -> bool {
+    let (Some((first, _)), Some((last, _))) = (newest.front(), newest.back()) else { return false };
+    let bytes: usize = newest.iter().map(|(place, _)| place.bytes).sum();
+    newest.len() >= proof && last.skipped_bytes - first.skipped_bytes <= bytes as u64
 }
 
 /// A line whose format is not known yet.
@@ -86,14 +80,16 @@ impl Detection {
         Self { candidates: ImuFormat::ALL.into_iter().map(Candidate::new).collect() }
     }
 
-    /// Takes bytes that arrived together; the unit once its format is proven, with the samples that it has made so far.
-    pub(super) fn push(&mut self, bytes: &[u8], arrival: Time) -> Option<(Unit, VecDeque<ImuSample>)> {
+    /// Takes bytes that arrived together; the unit once its format is proven, with the samples of the packets that proved it
+    /// and those behind.
+    pub(super) fn push(&mut self, bytes: &[u8], arrival: Time) -> Option<(Unit, Vec<ImuSample>)> {
         for candidate in &mut self.candidates {
             candidate.push(bytes, arrival);
         }
-        let place = self.candidates.iter().position(Candidate::proven)?;
-        let Candidate { unit, samples, .. } = self.candidates.swap_remove(place);
-        Some((unit, samples))
+        let place = self.candidates.iter().position(|c| c.proven.is_some())?;
+        let Candidate { mut unit, dropped, proven, .. } = self.candidates.swap_remove(place);
+        unit.disown(dropped);
+        Some((unit, proven.unwrap_or_default()))
     }
 
     /// Bytes that belong to no packet of any format, and damaged packets: the fewest that any format counts.

@@ -207,6 +207,24 @@ fn another_unit_on_the_line_is_recognised() {
     assert_eq!(fixed.format(), Some(ImuFormat::Xsens), "what is fixed stays");
 }
 
+/// A packet on its own, long before the unit's, is not handed on late, and is not counted as a sample.
+#[test]
+fn what_came_before_the_proof_is_left_out() {
+    // SBG's rate and attitude are two packets, and with that a proof.
+    for format in ImuFormat::ALL.into_iter().filter(|f| (packets(*f) as usize) < proof(*f)) {
+        let mut decoder = ImuDecoder::new();
+        let mut samples = Vec::new();
+        decoder.push(&encode(format, 0), Time::from_ns(0), |s| samples.push(s));
+        decoder.push(&[b' '; 3000], Time::from_ns(1), |s| samples.push(s));
+        assert_eq!(decoder.format(), None, "{format}");
+        samples.extend(decode(&mut decoder, format, 100..130, 1 << 12));
+        assert!(samples.iter().all(|s| s.arrival >= truth(format, 100).arrival), "{format}");
+        let counters = decoder.counters();
+        assert_eq!(counters.samples, samples.len() as u64, "{format}");
+        assert!(consistent(&counters), "{format}: {counters:?}");
+    }
+}
+
 /// What a unit sends and what is done about the rest, in words.
 #[test]
 fn what_a_unit_sends_and_lacks_is_told() {

@@ -157,6 +157,12 @@ impl Unit {
         }
     }
 
+    /// So many of its samples were not handed on: their packets count as others.
+    pub(super) const fn disown(&mut self, samples: u64) {
+        self.samples -= samples;
+        self.other += samples;
+    }
+
     /// Calls `sink` with each packet's place and the good sample that it completed, if it did.
     pub(super) fn push(
         &mut self,
