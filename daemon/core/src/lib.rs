@@ -12,6 +12,7 @@ pub mod event;
 pub mod fault;
 pub mod geometry;
 pub mod gunnery;
+pub mod horizon;
 pub mod light;
 pub mod model;
 pub mod pacing;

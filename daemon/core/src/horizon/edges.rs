@@ -1,0 +1,265 @@
+//! Steps from one brightness to another along the columns, and the lines on which they lie.
+
+use std::ops::Range;
+
+use glam::{DVec2, Vec2};
+
+use super::{cells::Cells, mask::Hidden, rays::Rays};
+
+/// Rows that steps are taken over, and how much a step counts: the shorter, the more of it is noise.
+const SCALES: [(usize, f32); 3] = [(3, 0.7), (8, 1.0), (20, 1.0)];
+
+/// Steps kept of a column.
+const PER_COLUMN: usize = 4;
+
+/// Steps of a column are farther from each other than this, rows.
+const APART: usize = 6;
+
+/// A step smaller than this is none, codes.
+const STEP_MIN: f32 = 1.0;
+
+/// A step counts no more than one of this size, codes: a white hull is no better horizon than a dark sea.
+const STEP_MAX: f32 = 30.0;
+
+/// Rows above an edge that should be sky.
+const SKY: Range<usize> = 7..40;
+
+/// Angle between the rolls that lines are sought at, radians.
+const ROLL_STEP: f64 = std::f64::consts::PI / 180.0;
+
+/// Steepest line that is sought, radians: beyond it too few columns cross it.
+pub(super) const ROLL_MAX: f64 = 65.0 * std::f64::consts::PI / 180.0;
+
+/// Breadth of a bin of the height at the axis, reduced pixels: half a step of roll moves the ends of a line as much.
+const BIN_PX: f64 = 6.0;
+
+/// Most bins of the height.
+const BINS_MAX: usize = 1024;
+
+/// A step of brightness.
+#[derive(Clone, Copy, Debug)]
+struct Edge {
+    /// Where it lies on the plane at a distance of one before the camera.
+    place: Vec2,
+    weight: f32,
+}
+
+/// A line that many steps lie on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    /// Roll and elevation of the camera, radians.
+    pub angles: DVec2,
+    /// Whether the sea is brighter than the sky.
+    pub brighter_below: bool,
+}
+
+/// Where lines are sought: rolls, elevations (radians).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    pub roll: (f64, f64),
+    pub elevation: (f64, f64),
+}
+
+/// How quiet the rows above `row` are, from 1 (sky) to 0: `floor` is what noise alone would give.
+pub(super) fn quiet(cells: &Cells, column: usize, row: usize, floor: f32) -> Option<f32> {
+    let wiggle = above(cells, column, row)?;
+    Some(1.0 / (1.0 + (wiggle / (1.5 * floor)).powi(2)))
+}
+
+/// How much the rows above `row` that should be sky differ from one to the next, codes; `None` too near the upper edge.
+pub(super) fn above(cells: &Cells, column: usize, row: usize) -> Option<f32> {
+    let top = row.saturating_sub(SKY.end).max(cells.rows().start);
+    let bottom = row.checked_sub(SKY.start)?;
+    if bottom < top + 6 {
+        return None;
+    }
+    cells.wiggle(column, top..bottom)
+}
+
+/// Finds the strongest steps of each column and the lines through them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Seeker {
+    response: Vec<f32>,
+    edges: [Vec<Edge>; 2],
+    taken: Vec<Edge>,
+    votes: Vec<f32>,
+}
+
+impl Seeker {
+    /// Collects steps; `rows` gives the rows of a column that are looked at. Returns how many there are.
+    pub fn collect(
+        &mut self,
+        cells: &Cells,
+        rays: &Rays,
+        hidden: &Hidden,
+        floor: f32,
+        rows: impl Fn(usize) -> Range<usize>,
+    ) -> usize {
+        self.edges.iter_mut().for_each(Vec::clear);
+        for column in 0..cells.columns {
+            self.respond(cells, column);
+            for (row, step) in self.strongest(cells, rows(column)).into_iter().flatten() {
+                if hidden.touches(column, row, SCALES[1].0) {
+                    continue;
+                }
+                let Some((ray, _)) = rays.at(column, row as f64) else { continue };
+                let quiet = quiet(cells, column, row, floor).unwrap_or(0.5);
+                let weight = step.abs().min(STEP_MAX) * quiet;
+                let place = (ray.truncate() / ray.z.max(1e-3)).as_vec2();
+                self.edges[usize::from(step > 0.0)].push(Edge { place, weight });
+            }
+        }
+        self.edges.iter().map(Vec::len).sum()
+    }
+
+    /// The largest step at each row that was read, over any number of rows, in codes.
+    fn respond(&mut self, cells: &Cells, column: usize) {
+        let sums = cells.column(column);
+        self.response.clear();
+        self.response.resize(sums.len(), 0.0);
+        for (size, gain) in SCALES {
+            if sums.len() <= 2 * size {
+                continue;
+            }
+            let gain = gain * cells.unit() / size as f32;
+            let around = sums.iter().zip(&sums[size..]).zip(&sums[2 * size..]);
+            for (best, ((above, at), below)) in self.response[size..].iter_mut().zip(around) {
+                let step = (below - 2 * at + above) as f32 * gain;
+                *best = if step.abs() > best.abs() { step } else { *best };
+            }
+        }
+    }
+
+    /// The strongest steps of the column responded to, with their rows.
+    fn strongest(&self, cells: &Cells, rows: Range<usize>) -> [Option<(usize, f32)>; PER_COLUMN] {
+        let offset = cells.rows().start;
+        let mut kept: [Option<(usize, f32)>; PER_COLUMN] = [None; PER_COLUMN];
+        let from = rows.start.saturating_sub(offset);
+        let to = rows.end.saturating_sub(offset).min(self.response.len());
+        let mut weakest = STEP_MIN;
+        for (i, around) in self.response.get(from..to).unwrap_or(&[]).windows(3).enumerate() {
+            let size = around[1].abs();
+            if size <= weakest || size < around[0].abs() || size < around[2].abs() {
+                continue;
+            }
+            let row = offset + from + i + 1;
+            // A stronger step near by is kept in place of this one, a weaker one makes room for it.
+            let near = kept.iter().position(|k| k.is_some_and(|(r, _)| row.abs_diff(r) < APART));
+            let place = near.or_else(|| {
+                let strength = |k: &Option<(usize, f32)>| k.map_or(0.0, |(_, s)| s.abs());
+                (0..PER_COLUMN).min_by(|a, b| strength(&kept[*a]).total_cmp(&strength(&kept[*b])))
+            });
+            if let Some(slot) = place.and_then(|p| kept.get_mut(p))
+                && slot.is_none_or(|(_, s)| s.abs() < size)
+            {
+                *slot = Some((row, around[1]));
+            }
+            weakest = kept.iter().map(|k| k.map_or(STEP_MIN, |(_, s)| s.abs())).fold(f32::MAX, f32::min);
+        }
+        kept
+    }
+
+    /// The `N` lines with most steps on them, best first. The steps on a line that was found are not counted for those after
+    /// it: a skyline would else be found again and again, turned a little about one of its points.
+    pub fn lines<const N: usize>(&mut self, rays: &Rays, dip: f64, span: Span) -> [Option<Candidate>; N] {
+        let bin_size = (BIN_PX / rays.focal).max(2.0 * rays.reach / BINS_MAX as f64);
+        let low = (span.elevation.0.tan() + dip).max(-rays.reach);
+        let high = (span.elevation.1.tan() + dip).min(rays.reach);
+        let bins = (((high - low) / bin_size).ceil().max(0.0) as usize + 1).min(BINS_MAX);
+        let rolls = ((span.roll.1 - span.roll.0) / ROLL_STEP).ceil().max(0.0) as usize + 1;
+        let grid = Grid { low, bin_size, bins, roll_0: span.roll.0 };
+        self.votes.clear();
+        self.votes.resize(2 * bins * rolls, 0.0);
+        for (edges, votes) in self.edges.iter().zip(self.votes.chunks_exact_mut(bins * rolls)) {
+            grid.vote(edges, votes, 1.0);
+        }
+        let mut found = [None; N];
+        for slot in &mut found {
+            let peak = |(sign, votes)| grid.peak(votes).map(|p| (sign, p));
+            let peaks = self.votes.chunks_exact(bins * rolls).enumerate().filter_map(peak);
+            let Some((sign, peak)) = peaks.max_by(|a, b| a.1.votes.total_cmp(&b.1.votes)) else { break };
+            let angles = grid.angles(&peak, dip);
+            *slot = Some(Candidate { angles, brighter_below: sign == 1 });
+            let (edges, taken) = (&mut self.edges[sign], &mut self.taken);
+            taken.clear();
+            edges.retain(|edge| {
+                let stays = !grid.is_on(edge, &peak);
+                if !stays {
+                    taken.push(*edge);
+                }
+                stays
+            });
+            if let Some(votes) = self.votes.chunks_exact_mut(bins * rolls).nth(sign) {
+                grid.vote(taken, votes, -1.0);
+            }
+        }
+        found
+    }
+}
+
+/// Rolls, and heights at the picture's middle, that lines are counted by.
+struct Grid {
+    low: f64,
+    bin_size: f64,
+    bins: usize,
+    roll_0: f64,
+}
+
+/// A place of the grid with many votes.
+struct Peak {
+    roll: usize,
+    bin: usize,
+    votes: f32,
+}
+
+impl Grid {
+    fn roll(&self, roll: usize) -> f64 {
+        self.roll_0 + roll as f64 * ROLL_STEP
+    }
+
+    /// Adds the edges' weights, times `sign`, to all lines through them.
+    fn vote(&self, edges: &[Edge], votes: &mut [f32], sign: f32) {
+        let per_bin = 1.0 / self.bin_size as f32;
+        let low = self.low as f32 * per_bin;
+        for (roll, votes) in votes.chunks_exact_mut(self.bins).enumerate() {
+            let (sin, cos) = self.roll(roll).sin_cos();
+            let (sin, cos) = (sin as f32 * per_bin, cos as f32 * per_bin);
+            for edge in edges {
+                let bin = edge.place.x * sin + edge.place.y * cos - low;
+                if bin >= 0.0
+                    && let Some(vote) = votes.get_mut(bin as usize)
+                {
+                    *vote += sign * edge.weight;
+                }
+            }
+        }
+    }
+
+    /// The line with most votes, with half of what its neighbours have.
+    fn peak(&self, votes: &[f32]) -> Option<Peak> {
+        let mut best = Peak { roll: 0, bin: 0, votes: 1.0 };
+        for (roll, line) in votes.chunks_exact(self.bins).enumerate() {
+            let around = line.windows(3).map(|w| 0.5 * w[0] + w[1] + 0.5 * w[2]);
+            for (i, votes) in around.enumerate() {
+                if votes > best.votes {
+                    best = Peak { roll, bin: i + 1, votes };
+                }
+            }
+        }
+        (best.bin > 0).then_some(best)
+    }
+
+    /// Roll and elevation of a camera that sees the horizon there.
+    fn angles(&self, peak: &Peak, dip: f64) -> DVec2 {
+        let tangent = self.low + (peak.bin as f64 + 0.5) * self.bin_size - dip;
+        DVec2::new(self.roll(peak.roll), tangent.atan())
+    }
+
+    /// Whether the edge lies on that line, or next to it.
+    fn is_on(&self, edge: &Edge, peak: &Peak) -> bool {
+        let (sin, cos) = self.roll(peak.roll).sin_cos();
+        let tangent = f64::from(edge.place.x) * sin + f64::from(edge.place.y) * cos;
+        let bin = (tangent - self.low) / self.bin_size;
+        (bin - (peak.bin as f64 + 0.5)).abs() <= 1.5
+    }
+}

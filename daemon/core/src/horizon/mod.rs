@@ -1,0 +1,334 @@
+//! The sea's horizon in a picture: which way is up, as the camera sees it.
+//!
+//! Steps of brightness down columns eight pixels wide (`edges`) vote for lines (Hough 1962), each by how quiet the rows above
+//! it are: sky is. The four lines with most votes are fitted in shrinking windows with Tukey's weights (`fit`), on rays that
+//! the lens's distortion is taken off (`rays`), to the direction of up, dip included. The best of them is the horizon, or
+//! there is none, with the reason (`judge`).
+//!
+//! What it cannot tell: a far shore that is low, straight and smooth, or lies in haze, from the sea; a straight line of cloud
+//! low in the sky over water that cannot be told from it. Refraction moves the true horizon by up to a tenth of a degree,
+//! which no picture shows.
+
+mod cells;
+mod edges;
+mod fit;
+mod judge;
+mod mask;
+mod rays;
+
+use std::ops::Range;
+
+use glam::{DMat2, DVec2, DVec3};
+
+pub use mask::Mask;
+
+use crate::{
+    event::Picture,
+    geometry::{Lens, horizon_dip},
+};
+use cells::Cells;
+use edges::{Candidate, ROLL_MAX, Seeker, Span};
+use fit::{Fit, Fitter, Line, Scene, angles_of};
+use judge::Judge;
+use mask::Hidden;
+use rays::Rays;
+
+/// Contrast at which a line is no worse for being faint, codes.
+const CONTRAST_FULL: f64 = 15.0;
+
+/// Score from which a line is taken for the horizon.
+const SCORE_MIN: f64 = 0.7;
+
+/// Contrast that a horizon has at least, codes.
+const CONTRAST_MIN: f64 = 2.0;
+
+/// Share of a crisp edge's sharpness below which it is blurred: motion over 15 rows, or fog, which moves the edge that is seen.
+const SHARPNESS_MIN: f64 = 0.3;
+
+/// Sky differs from row to row no more than this many times what noise does, or by this share of the step below it; trees,
+/// houses and rocks do.
+const TEXTURE_MAX: (f64, f64) = (2.0, 0.1);
+
+/// A prediction is sought within this many of its standard deviations...
+const GATE_SIGMAS: f64 = 3.0;
+/// ...and no closer than this, radians.
+const GATE_MIN: f64 = 0.5 * std::f64::consts::PI / 180.0;
+/// A prediction less certain than this is none, radians.
+const GATE_MAX: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+/// Standard deviation of what moves all of an edge, reduced pixels: of a crisp one, and for each time that a step over 20
+/// rows is larger than one over 3.
+const SHIFT_PX: f64 = 0.1;
+const SHIFT_SOFT_PX: f64 = 0.8;
+/// Standard deviation by which its ends are moved against each other.
+const TURN_PX: f64 = 0.05;
+
+/// Rows beyond the predicted ones that are read as well: the longest step, the sky above an edge, the parallels.
+const MARGIN: f64 = 60.0;
+
+/// Smallest picture, in cells and rows.
+const SIZE_MIN: (usize, usize) = (16, 64);
+
+/// Where up is predicted to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Up in the camera's axes, unit length.
+    pub up: DVec3,
+    /// Its standard deviation about any axis, radians.
+    pub sigma: f64,
+}
+
+/// What is known when a picture is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// The camera's lens; where it is given for another size than the picture has, it is scaled.
+    pub lens: Lens,
+    /// Height of the eye above the sea, metres.
+    pub eye_height_m: f64,
+    /// Where up is predicted to be, if anybody knows.
+    pub prior: Option<Prior>,
+}
+
+/// The horizon of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Horizon {
+    /// Up in the camera's axes (x right, y down, z forward), unit length, dip taken into account.
+    pub up: DVec3,
+    /// Covariance of roll and elevation, rad^2.
+    pub covariance: DMat2,
+    /// What spoke for it.
+    pub quality: Quality,
+}
+
+impl Horizon {
+    /// Roll of the camera, clockwise, as in [`crate::geometry::look`], radians.
+    pub fn roll(&self) -> f64 {
+        angles_of(self.up).x
+    }
+
+    /// Elevation of the camera's axis above the horizontal, as in [`crate::geometry::look`], radians.
+    pub fn elevation(&self) -> f64 {
+        angles_of(self.up).y
+    }
+}
+
+/// What speaks for a line and against it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Quality {
+    /// Columns of eight pixels with an edge on the line, and neighbours that have too.
+    pub columns: usize,
+    /// These over the columns that the line crosses.
+    pub solid_share: f64,
+    /// Columns that the line crosses, not hidden, over all.
+    pub visible_share: f64,
+    /// Mean step of brightness across it, codes of 255.
+    pub contrast: f64,
+    /// That over what is found on lines parallel to it.
+    pub peak_ratio: f64,
+    /// How much rows above it differ from one to the next, codes: the median over the columns.
+    pub texture: f64,
+    /// What of that the picture's noise makes, codes.
+    pub noise: f64,
+    /// Share of the change over twenty rows that lies within three.
+    pub sharpness: f64,
+    /// Standard deviation of the edges about it, reduced pixels.
+    pub scatter_px: f64,
+    /// All of it in one number: the acceptance Q of the search.
+    pub score: f64,
+}
+
+/// Why there is no horizon.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoHorizon {
+    /// The picture is too small to hold one that is any good.
+    #[error("the picture is too small")]
+    TooSmall,
+    /// It is predicted to lie outside of the picture.
+    #[error("the horizon is predicted outside of the picture")]
+    OutOfView,
+    /// Nothing stands out.
+    #[error("no line stands out")]
+    Featureless,
+    /// The best line is not clear enough, or too faint.
+    #[error("the best line scores only {:.2}, with a step of {:.1} codes", .0.score, .0.contrast)]
+    Unclear(Quality),
+    /// The best line is smeared, by motion or fog.
+    #[error("the best line is blurred, its sharpness is {:.2}", .0.sharpness)]
+    Blurred(Quality),
+    /// What is above the best line is no sky: a shore's water line.
+    #[error("above the best line rows differ by {:.1} codes, which is no sky", .0.texture)]
+    Textured(Quality),
+    /// The best line is not where the horizon is predicted.
+    #[error("the best line is not where the horizon is predicted")]
+    Elsewhere(Quality),
+}
+
+/// Finds horizons; keeps its memory from picture to picture.
+#[derive(Clone, Debug, Default)]
+pub struct HorizonFinder {
+    cells: Cells,
+    rays: Rays,
+    hidden: Hidden,
+    seeker: Seeker,
+    fitter: Fitter,
+    judge: Judge,
+    scratch: Vec<f32>,
+}
+
+impl HorizonFinder {
+    /// A finder that has not seen a picture.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What of the pictures shows the own ship or gun, from now on.
+    pub fn set_mask(&mut self, mask: Option<Mask>) {
+        self.hidden.set(mask);
+    }
+
+    /// The horizon of `picture`.
+    pub fn find(&mut self, picture: &Picture, view: &View) -> Result<Horizon, NoHorizon> {
+        self.cells.measure(picture);
+        if self.cells.columns < SIZE_MIN.0 || self.cells.height < SIZE_MIN.1 {
+            return Err(NoHorizon::TooSmall);
+        }
+        self.rays.make(&view.lens, &self.cells);
+        self.hidden.lay(&self.cells);
+        let dip = horizon_dip(view.eye_height_m);
+        let gate = view.prior.map(|p| Gate::new(&p, dip.sin())).filter(|g| g.half <= GATE_MAX);
+        let rows = match &gate {
+            Some(gate) => gate.all_rows(&self.rays, &self.cells).ok_or(NoHorizon::OutOfView)?,
+            None => 0..self.cells.height,
+        };
+        self.cells.fill(picture, rows);
+        let floor = self.noise_floor();
+        let (cells, rays) = (&self.cells, &self.rays);
+        let count = self.seeker.collect(cells, rays, &self.hidden, floor, |column| match &gate {
+            Some(gate) => gate.rows(rays, cells, column).unwrap_or(0..0),
+            None => cells.rows(),
+        });
+        if count == 0 {
+            return Err(NoHorizon::Featureless);
+        }
+        let lines: [Option<Candidate>; 4] = self.seeker.lines(&self.rays, dip, span(gate.as_ref()));
+        let (fit, quality) = self.best(&lines, dip.sin(), floor).ok_or(NoHorizon::Featureless)?;
+        refusal(&quality).map_or(Ok(()), Err)?;
+        let up = fit.line.up();
+        if gate.is_some_and(|g| g.up.angle_between(up) > 1.5 * g.half) {
+            return Err(NoHorizon::Elsewhere(quality));
+        }
+        let covariance = fit.covariance + unseen(&quality, self.rays.focal, self.cells.size.x);
+        Ok(Horizon { up, covariance, quality })
+    }
+
+    /// Refines the lines roughly, and the best of them finely.
+    fn best(&mut self, lines: &[Option<Candidate>], sin_dip: f64, floor: f32) -> Option<(Fit, Quality)> {
+        let scene = Scene { cells: &self.cells, rays: &self.rays, hidden: &self.hidden, sin_dip, floor };
+        let mut best: Option<(Fit, Quality)> = None;
+        for candidate in lines.iter().flatten() {
+            let line = Line { angles: candidate.angles, brighter_below: candidate.brighter_below };
+            let Some(fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)]) else { continue };
+            let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+            if best.is_none_or(|(_, b)| b.score < quality.score) {
+                best = Some((fit, quality));
+            }
+        }
+        let fit = self.fitter.refine(&scene, best?.0.line, &[(4, 4), (3, 3)])?;
+        let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+        Some((fit, quality))
+    }
+
+    /// How much rows differ from one to the next where nothing is but noise: a low quantile over pieces of the picture, codes.
+    fn noise_floor(&mut self) -> f32 {
+        let rows = self.cells.rows();
+        self.scratch.clear();
+        for column in (0..self.cells.columns).step_by(4) {
+            for from in rows.clone().step_by(32) {
+                self.scratch.extend(self.cells.wiggle(column, from..(from + 32).min(rows.end)));
+            }
+        }
+        let tenth = self.scratch.len() / 10;
+        if self.scratch.is_empty() {
+            return NOISE_MIN;
+        }
+        let (_, low, _) = self.scratch.select_nth_unstable_by(tenth, f32::total_cmp);
+        low.max(NOISE_MIN)
+    }
+}
+
+/// Why a line with these qualities is not the horizon; `None` if it is.
+fn refusal(quality: &Quality) -> Option<NoHorizon> {
+    let (noises, steps) = TEXTURE_MAX;
+    let texture_max = (noises * quality.noise).max(steps * quality.contrast);
+    if quality.score < SCORE_MIN || quality.contrast < CONTRAST_MIN {
+        Some(NoHorizon::Unclear(*quality))
+    } else if quality.sharpness < SHARPNESS_MIN {
+        Some(NoHorizon::Blurred(*quality))
+    } else if quality.texture > texture_max {
+        Some(NoHorizon::Textured(*quality))
+    } else {
+        None
+    }
+}
+
+/// Covariance of what the scatter of the columns does not show: haze and swell move all of an edge, and the more the softer
+/// it is.
+fn unseen(quality: &Quality, focal_px: f64, width_px: f64) -> DMat2 {
+    let softness = (1.0 / quality.sharpness.clamp(SHARPNESS_MIN, 1.0) - 1.0).max(0.0);
+    let shift = (SHIFT_PX + SHIFT_SOFT_PX * softness) / focal_px;
+    let turn = TURN_PX * 2.0 / (quality.visible_share * width_px).max(1.0);
+    DMat2::from_diagonal(DVec2::new(turn * turn, shift * shift))
+}
+
+/// Rows never differ less than this, codes: what rounding leaves.
+const NOISE_MIN: f32 = 0.3;
+
+/// Where a prediction lets the horizon be.
+struct Gate {
+    up: DVec3,
+    angles: DVec2,
+    half: f64,
+    sin_dip: f64,
+}
+
+impl Gate {
+    fn new(prior: &Prior, sin_dip: f64) -> Self {
+        let up = prior.up.normalize_or(DVec3::NEG_Y);
+        let half = (GATE_SIGMAS * prior.sigma.abs()).max(GATE_MIN);
+        Self { up, angles: angles_of(up), half, sin_dip }
+    }
+
+    /// Rows in which a column may cross the horizon.
+    fn rows(&self, rays: &Rays, cells: &Cells, column: usize) -> Option<Range<usize>> {
+        let row = rays.crossing(column, self.up, self.sin_dip)?;
+        let (ray, down) = rays.at(column, row)?;
+        // Pitch moves a column's row by this much, roll by as much as it lies off the axis.
+        let fall = -down.dot(self.up);
+        let reach = 4.0 + self.half * (1.0 + ray.truncate().length()) / fall.max(1e-6);
+        let (from, to) = (row - reach, row + reach);
+        let rows = from.max(0.0) as usize..(to.max(0.0) as usize).min(cells.height);
+        (rows.start < rows.end).then_some(rows)
+    }
+
+    /// Rows that have to be read.
+    fn all_rows(&self, rays: &Rays, cells: &Cells) -> Option<Range<usize>> {
+        let rows = (0..cells.columns).filter_map(|column| self.rows(rays, cells, column));
+        let all = rows.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))?;
+        let margin = MARGIN as usize;
+        Some(all.start.saturating_sub(margin)..(all.end + margin).min(cells.height))
+    }
+}
+
+/// Rolls and elevations that lines are sought at.
+fn span(gate: Option<&Gate>) -> Span {
+    match gate {
+        Some(g) => {
+            let around = |angle: f64| (angle - g.half, angle + g.half);
+            Span { roll: around(g.angles.x), elevation: around(g.angles.y) }
+        }
+        None => Span { roll: (-ROLL_MAX, ROLL_MAX), elevation: (-1.4, 1.4) },
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,177 @@
+use std::sync::Arc;
+
+use proptest::prelude::*;
+
+use super::{fit::up_of, *};
+use crate::event::PixelFormat;
+
+/// Evenly spread numbers from -1 to 1, by place.
+fn grain(i: usize, seed: u64) -> f64 {
+    let mut z = (i as u64).wrapping_add(seed << 32).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+const SIZE: (u32, u32) = (640, 360);
+const EYE_M: f64 = 6.0;
+
+fn lens(k1: f64) -> Lens {
+    Lens { radial: DVec2::new(k1, 0.0), ..Lens::pinhole(SIZE.0, SIZE.1, 1.1) }
+}
+
+fn view(lens: Lens, prior: Option<Prior>) -> View {
+    View { lens, eye_height_m: EYE_M, prior }
+}
+
+/// Luma of what `paint` gives for the angle over the horizon, in pixels, and the pixel's index.
+fn painted(lens: &Lens, up: DVec3, paint: impl Fn(f64, usize) -> f64) -> Vec<u8> {
+    let sin_dip = horizon_dip(EYE_M).sin();
+    let code = |i: usize| {
+        let place = DVec2::new((i % SIZE.0 as usize) as f64, (i / SIZE.0 as usize) as f64) + 0.5;
+        let over = (lens.unproject(place).dot(up) + sin_dip) * lens.focal.x;
+        paint(over, i).round().clamp(0.0, 255.0) as u8
+    };
+    (0..(SIZE.0 * SIZE.1) as usize).map(code).collect()
+}
+
+/// A smooth sky over a rough sea, a pixel wide where they meet.
+fn sea_and_sky(over: f64, i: usize) -> f64 {
+    let sky = (over + 0.5).clamp(0.0, 1.0);
+    sky * (170.0 + 2.0 * grain(i, 1)) + (1.0 - sky) * (80.0 + 12.0 * grain(i / 3, 2))
+}
+
+fn nv12(size: (u32, u32), mut luma: Vec<u8>) -> Picture {
+    luma.resize(luma.len() * 3 / 2, 128);
+    Picture::new(PixelFormat::Nv12, size.0, size.1, luma.into()).unwrap()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn a_drawn_horizon_is_found(roll in -1.05..1.05f64, share in -0.7..0.7f64, k1 in -0.25..0.1f64, seed in 0u64..99) {
+        let lens = lens(k1);
+        let elevation = (share * 180.0 / lens.focal.y).atan();
+        let up = up_of(roll, elevation);
+        let picture = nv12(SIZE, painted(&lens, up, |over, i| sea_and_sky(over, i + seed as usize)));
+        let mut finder = HorizonFinder::new();
+        let turned = up_of(roll + 0.01, elevation - 0.01);
+        for prior in [None, Some(Prior { up: turned, sigma: 0.01 })] {
+            let found = finder.find(&picture, &view(lens, prior)).unwrap();
+            // A third of a pixel, or a fiftieth of a degree for a level line; a steep one crosses few columns.
+            prop_assert!((found.elevation() - elevation).abs() * lens.focal.x < 0.35, "{found:?}");
+            prop_assert!((found.roll() - roll).abs() < 0.0015, "{found:?}");
+            let sigma = found.covariance.col(0).x.sqrt();
+            prop_assert!(sigma > 1e-5 && sigma < 0.005, "{sigma}");
+        }
+    }
+
+    #[test]
+    fn no_picture_panics(
+        width in 1u32..300, height in 1u32..300, seed in 0u64..1000, level in 0u8..255,
+        sigma in prop_oneof![Just(0.0), Just(f64::NAN), 0.0..1.0f64],
+        up in prop_oneof![Just(DVec3::ZERO), Just(DVec3::NAN), Just(DVec3::Z), Just(DVec3::NEG_Y)],
+        focal in prop_oneof![Just(0.0), Just(f64::NAN), Just(1e-3), 10.0..1000.0f64],
+    ) {
+        let mut finder = HorizonFinder::new();
+        finder.set_mask(Mask::new(3, 2, vec![false, true, false, true, false, false]));
+        for format in [PixelFormat::Rgb, PixelFormat::Yuyv, PixelFormat::Nv12] {
+            let bytes: Vec<u8> = (0..format.byte_len(width, height))
+                .map(|i| level.wrapping_add((grain(i, seed) * 60.0) as i8 as u8))
+                .collect();
+            // Sizes that a format cannot have are refused before they come here.
+            let Ok(picture) = Picture::new(format, width, height, bytes.into()) else { continue };
+            let lens = Lens { focal: DVec2::splat(focal), ..Lens::pinhole(width, height, 1.0) };
+            for prior in [None, Some(Prior { up, sigma })] {
+                let _ = finder.find(&picture, &view(lens, prior));
+            }
+        }
+    }
+
+    #[test]
+    fn noise_is_no_horizon(seed in 0u64..1000, size in 1.0..120.0f64, mean in 20.0..230.0f64) {
+        let luma = (0..(SIZE.0 * SIZE.1) as usize).map(|i| (mean + size * grain(i, seed)).clamp(0.0, 255.0) as u8);
+        let picture = nv12(SIZE, luma.collect());
+        for prior in [None, Some(Prior { up: DVec3::NEG_Y, sigma: 0.01 })] {
+            prop_assert!(HorizonFinder::new().find(&picture, &view(lens(0.0), prior)).is_err());
+        }
+    }
+}
+
+#[test]
+fn a_blank_picture_has_none() {
+    for code in [0, 16, 128, 255] {
+        let picture = nv12(SIZE, vec![code; (SIZE.0 * SIZE.1) as usize]);
+        let found = HorizonFinder::new().find(&picture, &view(lens(0.0), None));
+        assert_eq!(found, Err(NoHorizon::Featureless));
+    }
+    let small = nv12((16, 16), vec![9; 256]);
+    assert_eq!(HorizonFinder::new().find(&small, &view(lens(0.0), None)), Err(NoHorizon::TooSmall));
+}
+
+#[test]
+fn all_formats_and_a_picture_of_twice_the_size_say_the_same() {
+    let lens = lens(-0.1);
+    let up = up_of(0.1, 0.05);
+    let luma = painted(&lens, up, sea_and_sky);
+    let yuyv: Arc<[u8]> = luma.iter().flat_map(|y| [*y, 128]).collect();
+    let rgb: Arc<[u8]> = luma.iter().flat_map(|y| [*y; 3]).collect();
+    let (w, h) = SIZE;
+    let mut finder = HorizonFinder::new();
+    let mut find = |picture: &Picture| finder.find(picture, &view(lens, None)).unwrap().up;
+    let reference = find(&nv12(SIZE, luma.clone()));
+    for (format, bytes) in [(PixelFormat::Yuyv, yuyv), (PixelFormat::Rgb, rgb)] {
+        let found = find(&Picture::new(format, w, h, bytes).unwrap());
+        assert!(found.angle_between(reference) < 1e-6, "{format:?}");
+    }
+    // Four times as large, it is reduced by two; the lens stays that of the small one.
+    let (w, h) = (w as usize, h as usize);
+    let large = (0..w * h * 16).map(|i| luma[i / (w * 4) / 4 * w + i % (w * 4) / 4]).collect();
+    let found = find(&nv12((4 * w as u32, 4 * h as u32), large));
+    assert!(found.angle_between(reference) < 2e-4, "{}", found.angle_between(reference));
+}
+
+#[test]
+fn what_is_masked_is_not_looked_at() {
+    let lens = lens(0.0);
+    let up = up_of(-0.05, -0.02);
+    // The upper edge of the own ship is a better line than the horizon.
+    let deck = |over: f64, i: usize| {
+        if i / SIZE.0 as usize > 250 { 10.0 } else { 0.4 * sea_and_sky(over, i) + 100.0 }
+    };
+    let picture = nv12(SIZE, painted(&lens, up, deck));
+    let mut finder = HorizonFinder::new();
+    let rows: Vec<bool> = (0..36).map(|row| row >= 24).collect();
+    finder.set_mask(Mask::new(1, 36, rows));
+    let found = finder.find(&picture, &view(lens, None)).unwrap();
+    assert!(found.up.angle_between(up) < 1e-3, "{found:?}");
+    assert!(Mask::new(2, 2, vec![true]).is_none() && Mask::new(0, 0, vec![]).is_none());
+    finder.set_mask(Mask::new(1, 1, vec![true]));
+    assert_eq!(finder.find(&picture, &view(lens, None)), Err(NoHorizon::Featureless));
+}
+
+#[test]
+fn a_shore_a_blur_and_a_view_past_it_are_told_apart() {
+    let lens = lens(0.0);
+    let up = up_of(0.02, 0.0);
+    let find = |paint: &dyn Fn(f64, usize) -> f64, prior: Option<Prior>| {
+        HorizonFinder::new().find(&nv12(SIZE, painted(&lens, up, paint)), &view(lens, prior))
+    };
+    // Rocks and trees higher than the picture over bright water.
+    let shore = |over: f64, i: usize| {
+        if over > 0.0 { 60.0 + 40.0 * grain(i / 8 + i / 640 / 3 * 80, 5) } else { 150.0 + 6.0 * grain(i, 6) }
+    };
+    for prior in [None, Some(Prior { up, sigma: 0.01 })] {
+        let found = find(&shore, prior);
+        assert!(matches!(found, Err(NoHorizon::Textured(_) | NoHorizon::Unclear(_))), "{found:?}");
+    }
+    let smeared = |over: f64, i: usize| 125.0 + 45.0 * (over / 12.0).clamp(-1.0, 1.0) + 2.0 * grain(i, 7);
+    let found = find(&smeared, None);
+    assert!(matches!(found, Err(NoHorizon::Blurred(_) | NoHorizon::Unclear(_))), "{found:?}");
+    let away = Prior { up: up_of(0.0, 0.9), sigma: 0.01 };
+    assert_eq!(find(&sea_and_sky, Some(away)), Err(NoHorizon::OutOfView));
+    // A prediction that is wrong by more than it says finds nothing.
+    let wrong = Prior { up: up_of(0.02, 0.1), sigma: 0.005 };
+    assert!(find(&sea_and_sky, Some(wrong)).is_err());
+}
