@@ -5,6 +5,7 @@
 
 pub mod bench;
 pub mod front;
+pub mod horizon;
 pub mod metric;
 pub mod page;
 pub mod parts;

@@ -6,6 +6,7 @@ mod colour;
 mod depth;
 mod flight;
 mod fresnel;
+mod horizon;
 mod lens;
 mod motion;
 mod orientation;
@@ -46,6 +47,7 @@ pub const PARTS: &[Part] = &[
     Part { about: clock::ABOUT, measure: clock::measure },
     Part { about: attitude::ABOUT, measure: attitude::measure },
     Part { about: orientation::ABOUT, measure: orientation::measure },
+    Part { about: horizon::ABOUT, measure: horizon::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
     Part { about: pacing::ABOUT, measure: pacing::measure },
     Part { about: flight::ABOUT, measure: flight::measure },

@@ -1,0 +1,230 @@
+//! The whole table of the real frames and drawn pictures, in words.
+//!
+//! What served to set the finder's constants: every other marked frame (the first, third, ...), every fourth of the boat
+//! before a shore, all stills, the pieces cut from all marked frames, and drawn pictures of seeds below [`SET_WITH`]. The
+//! other frames and seeds were held out.
+
+use std::path::Path;
+
+use anyhow::Result;
+use bowwave_core::horizon::{Horizon, HorizonFinder, NoHorizon, Prior, Quality};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    cases::{SET_WITH, with_horizon, without_horizon},
+    frames::{self, Frame},
+    overlay,
+    score::{Drawn, Miss, PRIOR_SIGMA, find, miss, predicted, quantile},
+    video,
+};
+
+type Answer = std::result::Result<Horizon, NoHorizon>;
+
+fn qualities(answer: &Answer) -> Option<Quality> {
+    match answer {
+        Ok(found) => Some(found.quality),
+        Err(
+            NoHorizon::Unclear(q) | NoHorizon::Blurred(q) | NoHorizon::Textured(q) | NoHorizon::Elsewhere(q),
+        ) => Some(*q),
+        Err(NoHorizon::TooSmall | NoHorizon::OutOfView | NoHorizon::Featureless) => None,
+    }
+}
+
+fn described(answer: &Answer) -> String {
+    let why = answer.as_ref().err().map(|e| format!(" ({e})")).unwrap_or_default();
+    let numbers = |q: Quality| {
+        format!(
+            "score {:.2}, solid {:.2} of {:.2}, step {:.1}, peak {:.1}, texture {:.2}/{:.2}, sharp {:.2}, scatter {:.2}",
+            q.score,
+            q.solid_share,
+            q.visible_share,
+            q.contrast,
+            q.peak_ratio,
+            q.texture,
+            q.noise,
+            q.sharpness,
+            q.scatter_px
+        )
+    };
+    qualities(answer).map(numbers).unwrap_or_default() + &why
+}
+
+/// One line of what was missed by how much.
+fn summary(what: &str, misses: &[Option<Miss>]) -> String {
+    let found: Vec<Miss> = misses.iter().copied().flatten().collect();
+    let of = |value: fn(&Miss) -> f64| found.iter().map(value).collect::<Vec<f64>>();
+    let (px, deg) = (of(|m| m.px), of(|m| m.deg));
+    format!(
+        "{what:32} found {:3} of {:3}, failures {}; px median {:.2}, p95 {:.2}, worst {:.2}; deg median {:.3}, p95 {:.3}, worst {:.3}",
+        found.len(),
+        misses.len(),
+        found.iter().filter(|m| m.is_failure()).count(),
+        quantile(&px, 0.5),
+        quantile(&px, 0.95),
+        quantile(&px, 1.0),
+        quantile(&deg, 0.5),
+        quantile(&deg, 0.95),
+        quantile(&deg, 1.0),
+    )
+}
+
+/// Frames whose horizon was marked, one by one, without and with predictions.
+pub fn marked(overlays: Option<&Path>) -> Result<()> {
+    let frames = frames::marked()?;
+    let mut finder = HorizonFinder::new();
+    // Without and with prediction; of frames that set constants, and held out.
+    let mut misses = [const { Vec::new() }; 4];
+    for (i, frame) in frames.iter().enumerate() {
+        let held_out = i % 2 == 1;
+        let answer = find(&mut finder, frame, None)?;
+        let off = answer.as_ref().ok().and_then(|h| miss(frame, h.up));
+        let told = off.map_or("none".into(), |m| format!("{:.2} px {:.3} deg", m.px, m.deg));
+        println!(
+            "{:18} {} {told:20} {}",
+            frame.name,
+            if held_out { "held" } else { "set " },
+            described(&answer)
+        );
+        misses[usize::from(held_out)].push(off);
+        if let Some(folder) = overlays {
+            overlay::write(folder, frame, answer.ok().map(|h| h.up))?;
+        }
+        let Some(up) = frame.marked_up() else { continue };
+        for draw in 0..8 {
+            let answer = find(&mut finder, frame, Some(predicted(up, i as u64 * 8 + draw)))?;
+            misses[2 + usize::from(held_out)].push(answer.ok().and_then(|h| miss(frame, h.up)));
+        }
+    }
+    let names = ["no prediction, set", "no prediction, held out", "prediction, set", "prediction, held out"];
+    names.iter().zip(&misses).for_each(|(name, misses)| println!("{}", summary(name, misses)));
+    Ok(())
+}
+
+/// Turning from frame to frame of the clip from the drone, whose gimbal hardly turns before its last half second.
+pub fn jitter() -> Result<()> {
+    let frames = video::karma()?;
+    let mut finder = HorizonFinder::new();
+    let mut ups = Vec::new();
+    for frame in &frames {
+        ups.push(find(&mut finder, frame, None)?.ok().map(|h| h.up));
+    }
+    let found = ups.iter().flatten().count();
+    // What a frame differs from the mean of its neighbours: the gimbal's own slow turning falls out.
+    let bends: Vec<f64> = ups
+        .windows(3)
+        .filter_map(|w| Some(w[1]?.angle_between((w[0]? + w[2]?).normalize()).to_degrees()))
+        .collect();
+    println!(
+        "clip from a drone: found in {found} of {} frames; a frame differs from the mean of its neighbours by {:.4} deg (median), {:.4} (p95), \
+         {:.4} (worst)",
+        frames.len(),
+        quantile(&bends, 0.5),
+        quantile(&bends, 0.95),
+        quantile(&bends, 1.0)
+    );
+    Ok(())
+}
+
+/// Predictions laid all over a frame: twelve heights, five rolls.
+fn laid(frame: &Frame) -> Vec<Prior> {
+    let lens = frame.picture_lens();
+    let prior = |i: usize| {
+        let row = ((i / 5) as f64 + 0.5) / 12.0 * f64::from(lens.height);
+        let ray = lens.unproject(glam::DVec2::new(lens.centre.x, row));
+        let (elevation, roll) = ((ray.y / ray.z).atan(), ((i % 5) as f64 * 2.0 - 4.0).to_radians());
+        let up = DVec3::new(-roll.sin() * elevation.cos(), -roll.cos() * elevation.cos(), elevation.sin());
+        Prior { up, sigma: PRIOR_SIGMA }
+    };
+    (0..60).map(prior).collect()
+}
+
+/// Real pictures that show none: shores, harbours, pieces of sky and water.
+pub fn without(overlays: Option<&Path>) -> Result<()> {
+    let mut frames = frames::without_horizon()?;
+    frames.extend(frames::crops(&frames::marked()?));
+    let mut finder = HorizonFinder::new();
+    let (mut taken, mut with_any, mut tries, mut wrong) = (0, 0, 0, 0);
+    for frame in &frames {
+        let answer = find(&mut finder, frame, None)?;
+        let mut accepted = 0;
+        for prior in laid(frame) {
+            tries += 1;
+            accepted += usize::from(find(&mut finder, frame, Some(prior))?.is_ok());
+        }
+        wrong += accepted;
+        with_any += usize::from(accepted > 0);
+        if answer.is_ok() || accepted > 0 {
+            taken += usize::from(answer.is_ok());
+            println!("{:18} {accepted} of 60 predictions; without: {}", frame.name, described(&answer));
+            if let Some(folder) = overlays {
+                overlay::write(folder, frame, answer.ok().map(|h| h.up))?;
+            }
+        }
+    }
+    println!(
+        "no horizon to be seen: {taken} of {} taken for one without a prediction; {wrong} of {tries} with one laid on them, in {with_any} frames",
+        frames.len()
+    );
+    Ok(())
+}
+
+/// Drawn pictures by kind, and whether the stated covariance is right.
+pub fn drawn(count: u64, set: bool) -> Result<()> {
+    let seed = if set { 0 } else { SET_WITH };
+    let show = |drawn: &Drawn, prior: Option<Prior>| drawn.find(&mut HorizonFinder::new(), prior);
+    for (told, is_told) in [("no prediction", false), ("prediction", true)] {
+        let rows: Vec<_> = (0..count)
+            .into_par_iter()
+            .map(|i| {
+                let drawn = Drawn::new(with_horizon(seed, i))?;
+                let up = DVec3::from(drawn.shown.up());
+                let found = show(&drawn, is_told.then(|| predicted(up, seed + i))).ok();
+                let off = found.map(|h| (drawn.miss(h.up), drawn.normalised(&h)));
+                Ok((drawn.shown.kind, off))
+            })
+            .collect::<Result<_>>()?;
+        for kind in KINDS {
+            let of_kind = || rows.iter().filter(|r| kind == "all" || r.0 == kind);
+            let misses: Vec<Option<Miss>> = of_kind().map(|r| r.1.map(|o| o.0)).collect();
+            let squares: Vec<f64> = of_kind().filter_map(|r| r.1.map(|o| o.1)).collect();
+            let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+            println!("{}; normalised square {mean:.2}", summary(&format!("{kind}, {told}"), &misses));
+        }
+        let none: Vec<_> = (0..count)
+            .into_par_iter()
+            .map(|i| {
+                let drawn = Drawn::new(without_horizon(seed, i))?;
+                let up = DVec3::from(drawn.shown.up());
+                Ok(show(&drawn, is_told.then(|| predicted(up, seed + i))).is_ok().then_some(drawn.shown.kind))
+            })
+            .collect::<Result<_>>()?;
+        let taken: Vec<&str> = none.iter().copied().flatten().collect();
+        println!("none drawn, {told}: {} of {} taken for one {taken:?}", taken.len(), none.len());
+    }
+    Ok(())
+}
+
+const KINDS: [&str; 9] =
+    ["fair", "lens bow", "glitter", "ships, barrel", "steep", "edge", "part", "haze", "all"];
+
+/// Time of a picture of 1280 x 720, milliseconds of this thread: least, median.
+pub fn cost() -> Result<()> {
+    let drawn = Drawn::new(with_horizon(SET_WITH, 0))?;
+    let up = DVec3::from(drawn.shown.up());
+    for (told, prior) in [("no prediction", None), ("prediction", Some(predicted(up, 3)))] {
+        let mut finder = HorizonFinder::new();
+        let mut times = Vec::new();
+        for _ in 0..300 {
+            let start = crate::bench::thread_ns();
+            std::hint::black_box(drawn.find(&mut finder, prior).ok());
+            times.push((crate::bench::thread_ns() - start) * 1e-6);
+        }
+        println!(
+            "{told}: {:.2} ms at least, {:.2} in the median",
+            quantile(&times, 0.0),
+            quantile(&times, 0.5)
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,71 @@
+//! The horizon finder on drawn pictures that set none of its constants, and on real frames where they are there.
+
+#![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
+
+use bowwave_core::horizon::HorizonFinder;
+use glam::DVec3;
+use precision::horizon::{
+    cases::{SET_WITH, with_horizon, without_horizon},
+    frames,
+    score::{Drawn, find, miss, predicted, quantile},
+};
+
+#[test]
+fn drawn_horizons_are_found_and_their_covariance_is_right() {
+    let mut finder = HorizonFinder::new();
+    let (mut px, mut squares, mut count) = (Vec::new(), Vec::new(), 0.0);
+    for i in 0..64 {
+        let drawn = Drawn::new(with_horizon(SET_WITH + 5000, i)).unwrap();
+        let up = DVec3::from(drawn.shown.up());
+        for prior in [None, Some(predicted(up, i))] {
+            count += 1.0;
+            if let Ok(found) = drawn.find(&mut finder, prior) {
+                px.push(drawn.miss(found.up).px);
+                squares.push(drawn.normalised(&found));
+            }
+        }
+    }
+    assert!(px.len() as f64 >= 0.95 * count, "{} of {count}", px.len());
+    let (median, p95, worst) = (quantile(&px, 0.5), quantile(&px, 0.95), quantile(&px, 1.0));
+    assert!(median < 0.5 && p95 < 2.0 && worst < 10.0, "{median} {p95} {worst}");
+    // Two degrees of freedom: 2 in the mean. More would be overconfident, far less would waste the measurement.
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!((0.4..3.0).contains(&mean), "{mean}");
+}
+
+#[test]
+fn nothing_drawn_without_a_horizon_is_taken_for_one() {
+    let mut finder = HorizonFinder::new();
+    let mut taken = Vec::new();
+    for i in 0..70 {
+        let drawn = Drawn::new(without_horizon(SET_WITH + 5000, i)).unwrap();
+        let up = DVec3::from(drawn.shown.up());
+        for prior in [None, Some(predicted(up, i))] {
+            if let Ok(found) = drawn.find(&mut finder, prior) {
+                taken.push((drawn.shown.kind, found.quality));
+            }
+        }
+    }
+    assert!(taken.len() <= 1, "{taken:?}");
+}
+
+#[test]
+fn marked_frames_are_found_and_shores_are_not() {
+    let mut finder = HorizonFinder::new();
+    let (mut found, mut count) = (0, 0);
+    for (i, frame) in frames::marked().unwrap().iter().enumerate() {
+        let up = frame.marked_up().unwrap();
+        for prior in [None, Some(predicted(up, i as u64))] {
+            count += 1;
+            let Ok(horizon) = find(&mut finder, frame, prior).unwrap() else { continue };
+            found += 1;
+            let off = miss(frame, horizon.up).unwrap();
+            assert!(off.px < 2.0 && off.deg < 0.2, "{}: {off:?}", frame.name);
+        }
+    }
+    assert!(10 * found >= 9 * count, "{found} of {count}");
+    for frame in frames::without_horizon().unwrap() {
+        let found = find(&mut finder, &frame, None).unwrap();
+        assert!(found.is_err(), "{}: {found:?}", frame.name);
+    }
+}
