@@ -39,6 +39,9 @@ const CONTRAST_FULL: f64 = 15.0;
 /// Score from which a line is taken for the horizon.
 const SCORE_MIN: f64 = 0.7;
 
+/// Score from which a line is so clear that no other need be tried.
+const SCORE_CLEAR: f64 = 1.4;
+
 /// Contrast that a horizon has at least, codes.
 const CONTRAST_MIN: f64 = 2.0;
 
@@ -231,6 +234,9 @@ impl HorizonFinder {
             let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
             if best.is_none_or(|(_, b)| b.score < quality.score) {
                 best = Some((fit, quality));
+            }
+            if quality.score >= SCORE_CLEAR && refusal(&quality).is_none() {
+                break;
             }
         }
         let fit = self.fitter.refine(&scene, best?.0.line, &[(4, 4), (3, 3)])?;
