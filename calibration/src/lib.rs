@@ -25,10 +25,13 @@
 //! by one unit in the last place (2e-16 of the value) when it is first written, because not every number of radians is a
 //! number of degrees.
 
+pub mod alignment;
 mod date;
 mod error;
 mod file;
 mod raw;
+pub mod simulated;
+mod so3;
 mod write;
 
 pub use date::Date;

@@ -1,0 +1,149 @@
+//! From a start to the best unknowns, the size of the noises and the covariance.
+
+use super::{
+    error::AlignmentError,
+    filter::{Kind, Levels, Normal, Row, Whitened, cost, invert, whiten},
+    noise::most_likely,
+    problem::{Problem, Unknowns, Weights},
+    start::Start,
+};
+
+/// What the iteration ends with.
+#[derive(Clone, Debug)]
+pub(super) struct Fitted {
+    pub unknowns: Unknowns,
+    pub levels: Levels,
+    pub rows: Vec<Row>,
+    pub whitened: Whitened,
+    pub active: Vec<usize>,
+    pub covariance: Normal,
+}
+
+/// Squares of whitened innovations beyond which one in a thousand sound ones lies, for two and three axes (chi-squared).
+const OUTLIER: [f64; 2] = [13.8, 16.3];
+/// Rounds of solving, weighing and sizing of the noises.
+const ROUNDS: usize = 4;
+
+const NO_STEP: AlignmentError = AlignmentError::NoFit { problem: "the normal equations cannot be solved" };
+
+/// Iterates from the start.
+pub(super) fn fit(problem: &Problem, start: &Start) -> Result<Fitted, AlignmentError> {
+    let active = problem.active();
+    let mut weights = Weights::default();
+    let mut unknowns = problem.unknowns(start);
+    let mut rows = problem.rows(&unknowns, &weights);
+    if rows.len() < 6 {
+        return Err(AlignmentError::TooFew {
+            what: "pictures within the gyro's recording",
+            count: rows.len(),
+            least: 6,
+        });
+    }
+    let primary = if problem.has_orientations() { Kind::Orientation } else { Kind::Up };
+    let mut levels = first_levels(&rows, primary);
+    for round in 0..ROUNDS {
+        weigh(&rows, &levels, &mut weights);
+        unknowns = descend(problem, unknowns, &weights, &levels, &active)?;
+        rows = problem.rows(&unknowns, &weights);
+        if round > 0 {
+            let evaluations = if round == 1 { 60 } else { 30 };
+            levels = most_likely(&rows, primary as usize, &active, levels, evaluations);
+            rescale_others(&rows, primary, &mut levels);
+        }
+    }
+    weigh(&rows, &levels, &mut weights);
+    unknowns = descend(problem, unknowns, &weights, &levels, &active)?;
+    rows = problem.rows(&unknowns, &weights);
+    let whitened = whiten(&rows, &levels).ok_or(NO_STEP)?;
+    let covariance = invert(&whitened.normal, &active, 0.0).ok_or(NO_STEP)?;
+    Ok(Fitted { unknowns, levels, rows, whitened, active, covariance })
+}
+
+/// Noises to begin with: the camera's by the differences of residuals that follow each other, which no slow error enters.
+fn first_levels(rows: &[Row], primary: Kind) -> Levels {
+    let own: Vec<&Row> = rows.iter().filter(|r| r.kind == primary).collect();
+    let mut steps: Vec<f64> = own
+        .windows(2)
+        .filter(|w| w[0].segment == w[1].segment)
+        .map(|w| (w[1].residual - w[0].residual).norm() / (2f64.sqrt() * w[1].sigma))
+        .collect();
+    steps.sort_by(f64::total_cmp);
+    // The first quartile, and that of the length of three (or two) standard normal numbers: most differences are wild where a third
+    // of the poses is.
+    let usual = if primary == Kind::Orientation { 1.101 } else { 0.759 };
+    let scale = steps.get(steps.len() / 4).map_or(1.0, |m| (m / usual).clamp(0.01, 300.0));
+    let mut levels = Levels { scale: [1.0; 3], jitter_s: 5e-4, walk: 2e-3 };
+    levels.scale[primary as usize] = scale;
+    levels
+}
+
+/// Outliers lose weight, so that what they pull with falls with their distance (Cauchy's tail); all others keep it whole, so that the
+/// covariance holds.
+fn weigh(rows: &[Row], levels: &Levels, weights: &mut Weights) {
+    let Some(whitened) = whiten(rows, levels) else { return };
+    for (row, square) in rows.iter().zip(&whitened.squares) {
+        let limit = if row.blind.is_some() { OUTLIER[0] } else { OUTLIER[1] };
+        weights.set(row, if *square > limit { limit / square } else { 1.0 });
+    }
+}
+
+/// The scales of kinds that the likelihood was not asked about: by their own scatter.
+fn rescale_others(rows: &[Row], primary: Kind, levels: &mut Levels) {
+    let Some(whitened) = whiten(rows, levels) else { return };
+    for kind in [Kind::Up, Kind::Level] {
+        let (mut sum, mut freedom) = (0.0, 0.0);
+        for (row, square) in
+            rows.iter().zip(&whitened.squares).filter(|(r, _)| r.kind == kind && kind != primary)
+        {
+            sum += square * row.weight;
+            freedom += row.freedom();
+        }
+        if freedom > 8.0 {
+            let scale = &mut levels.scale[kind as usize];
+            *scale = (*scale * (sum / freedom).sqrt().clamp(0.2, 5.0)).clamp(0.01, 300.0);
+        }
+    }
+}
+
+/// Levenberg's method on the whitened residuals.
+fn descend(
+    problem: &Problem,
+    mut at: Unknowns,
+    weights: &Weights,
+    levels: &Levels,
+    active: &[usize],
+) -> Result<Unknowns, AlignmentError> {
+    let mut damping = 1e-9;
+    let mut rows = problem.rows(&at, weights);
+    for _ in 0..12 {
+        let whitened = whiten(&rows, levels).ok_or(NO_STEP)?;
+        let mut better = None;
+        for _ in 0..8 {
+            let Some(inverse) = invert(&whitened.normal, active, damping) else {
+                damping = (damping * 100.0f64).max(1e-8);
+                continue;
+            };
+            let step = -(inverse * whitened.gradient);
+            let mut next = at.plus(&step);
+            next.settle(&problem.rows(&next, weights));
+            let next_rows = problem.rows(&next, weights);
+            // An offset that pushes pictures out of the recording must not look like progress.
+            if next_rows.len() * 10 >= rows.len() * 9 {
+                let per_row = |rows: &[Row]| cost(rows, levels) / rows.len() as f64;
+                if per_row(&next_rows) <= per_row(&rows) + 1e-9 {
+                    let small = active.iter().all(|&i| step[i].powi(2) <= 1e-6 * inverse[(i, i)]);
+                    better = Some((next, next_rows, small));
+                    break;
+                }
+            }
+            damping = (damping * 30.0).max(1e-6);
+        }
+        let Some((next, next_rows, small)) = better else { break };
+        (at, rows) = (next, next_rows);
+        damping = (damping * 0.1).max(1e-9);
+        if small {
+            break;
+        }
+    }
+    Ok(at)
+}
