@@ -1,4 +1,5 @@
-//! The calibration file: what maintainers measured about one camera and one inertial unit on one mount.
+//! The calibration file: what maintainers measured about one camera and one inertial unit on one mount; and the solvers that its
+//! numbers come from ([`alignment`]).
 //!
 //! A file is TOML with human units (pixels, degrees, milliradians, milliseconds, metres); in memory everything is a checked
 //! [`bowwave_core::calibration::Calibration`] in radians and nanoseconds. Every measured value comes with its uncertainty

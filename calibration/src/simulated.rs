@@ -195,19 +195,23 @@ pub struct Recording {
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
+fn mix(mut z: u64) -> u64 {
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
 impl Random {
     /// The sequence that belongs to `seed`.
     pub fn new(seed: u64) -> Self {
-        Self(seed)
+        // The state counts on by a constant: seeds that differ by it would give one sequence, shifted.
+        Self(mix(mix(seed) ^ 0x6a09_e667_f3bc_c909))
     }
 
     /// Uniform in (0, 1).
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (((z ^ (z >> 31)) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
+        ((mix(self.0) >> 11) as f64 + 0.5) / (1u64 << 53) as f64
     }
 
     /// Standard normal.

@@ -206,19 +206,32 @@ pub(super) fn cost(rows: &[Row], levels: &Levels) -> f64 {
     if sum.is_finite() { sum } else { f64::INFINITY }
 }
 
-/// Twice the negative restricted log-likelihood (Patterson & Thompson 1971): what the parameters could take of the noise does not
-/// make it look smaller. Infinite where there is none.
-pub(super) fn restricted(rows: &[Row], levels: &Levels, active: &[usize]) -> f64 {
+/// Rotation, offset and bias: the parameters that can take most of the noise.
+const MAIN: usize = 7;
+
+/// Twice the negative restricted log-likelihood (Patterson & Thompson 1971): what the main parameters could take of the noise does
+/// not make it look smaller. Infinite where there is none.
+pub(super) fn restricted(rows: &[Row], levels: &Levels) -> f64 {
+    const COLUMNS: usize = MAIN + 1;
     let told = || {
-        let whitened = whiten(rows, levels)?;
-        let n = active.len();
-        let scale: Vec<f64> = active.iter().map(|&i| whitened.normal[(i, i)].sqrt()).collect();
-        let m = nalgebra::DMatrix::from_fn(n, n, |r, c| {
-            whitened.normal[(active[r], active[c])] / (scale[r] * scale[c])
-        });
-        let factor = m.cholesky()?;
-        let log_det: f64 = factor.l_dirty().diagonal().iter().chain(&scale).map(|d| 2.0 * d.ln()).sum();
-        Some(whitened.cost + log_det).filter(|c| c.is_finite())
+        let mut walk = Walk::<COLUMNS>::begin(rows.first()?);
+        let (mut cost, mut normal) = (0.0, SMatrix::<f64, MAIN, MAIN>::zeros());
+        for row in rows {
+            walk.reach(row, levels.walk);
+            let mut seen = SMatrix::<f64, 3, COLUMNS>::zeros();
+            seen.fixed_columns_mut::<MAIN>(0).copy_from(&row.jacobian.fixed_columns::<MAIN>(0));
+            seen.set_column(MAIN, &row.residual);
+            let (w, _, log_det) = walk.meet(&seen, &(noise(row, levels) / row.weight))?;
+            let jacobian = w.fixed_columns::<MAIN>(0).into_owned();
+            normal += jacobian.transpose() * jacobian;
+            cost += w.column(MAIN).norm_squared() + log_det;
+        }
+        let scale = normal.diagonal().map(f64::sqrt);
+        let even = SMatrix::<f64, MAIN, MAIN>::from_fn(|r, c| normal[(r, c)] / (scale[r] * scale[c]));
+        let factor = even.cholesky()?;
+        let log_det =
+            factor.l_dirty().diagonal().component_mul(&scale).iter().map(|d| 2.0 * d.ln()).sum::<f64>();
+        Some(cost + log_det).filter(|c| c.is_finite())
     };
     told().unwrap_or(f64::INFINITY)
 }

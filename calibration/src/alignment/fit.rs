@@ -46,8 +46,8 @@ pub(super) fn fit(problem: &Problem, start: &Start) -> Result<Fitted, AlignmentE
         unknowns = descend(problem, unknowns, &weights, &levels, &active)?;
         rows = problem.rows(&unknowns, &weights);
         if round > 0 {
-            let evaluations = if round == 1 { 60 } else { 30 };
-            levels = most_likely(&rows, primary as usize, &active, levels, evaluations);
+            let evaluations = if round == 1 { 50 } else { 20 };
+            levels = most_likely(&rows, primary as usize, levels, evaluations);
             rescale_others(&rows, primary, &mut levels);
         }
     }

@@ -16,7 +16,7 @@ fn levels(at: &[f64; 3], primary: usize, before: &Levels) -> Levels {
 /// Where the residuals tell nothing of the gyro's walk, because the camera is noisier by far, it is that of MEMS gyros: 0.1 to 1
 /// deg/sqrt(h) from the best to the worst, here as the middle of a normal distribution of its logarithm and its standard deviation. Too
 /// small a walk would make the bias look surer than it is.
-const USUAL_WALK: (f64, f64) = (1e-4, 1.0);
+pub(super) const USUAL_WALK: (f64, f64) = (1e-4, 1.0);
 
 fn surprise(walk: f64) -> f64 {
     ((walk / USUAL_WALK.0).ln() / USUAL_WALK.1).powi(2)
@@ -24,16 +24,10 @@ fn surprise(walk: f64) -> f64 {
 
 /// Noises under which the residuals are most likely, from `start` on: the simplex method (Nelder & Mead 1965) over the
 /// logarithms of the scale of the kind `primary`, the jitter and the walk.
-pub(super) fn most_likely(
-    rows: &[Row],
-    primary: usize,
-    active: &[usize],
-    start: Levels,
-    evaluations: usize,
-) -> Levels {
+pub(super) fn most_likely(rows: &[Row], primary: usize, start: Levels, evaluations: usize) -> Levels {
     let tell = |at: &[f64; 3]| {
         let levels = levels(at, primary, &start);
-        restricted(rows, &levels, active) + surprise(levels.walk)
+        restricted(rows, &levels) + surprise(levels.walk)
     };
     let first = [start.scale[primary].ln(), start.jitter_s.ln(), start.walk.ln()];
     let mut simplex = vec![(tell(&first), first)];

@@ -11,6 +11,7 @@ use super::{
     filter::{Kind, Step, invert, place, whiten},
     fit::Fitted,
     input::{LeftOut, Observation},
+    noise::USUAL_WALK,
     problem::Problem,
 };
 use crate::so3::{dmat, dvec, vector};
@@ -212,7 +213,7 @@ pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, Ali
         offset_s: unknowns.offset_s,
         offset_sigma_s,
         gyro_bias: unknowns.bias,
-        gyro_bias_sigma: DVec3::from_array([0, 1, 2].map(|i| sigma(place::BIAS + i))),
+        gyro_bias_sigma: bias_sigma(fitted),
         readout_s: problem.options.estimate_readout.then(|| (unknowns.readout_s, sigma(place::READOUT))),
         information_ratio,
         noise: NoiseFound {
@@ -230,6 +231,16 @@ pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, Ali
         alignment.grade = alignment.grade.min(Grade::Usable);
     }
     Ok(alignment)
+}
+
+/// Standard deviation of the bias. A mean rate is as good as the walk over the recording allows; where the camera's noise hides that walk,
+/// the one found may be too small, and a usual one is counted in its stead.
+fn bias_sigma(fitted: &Fitted) -> DVec3 {
+    let times = fitted.rows.first().zip(fitted.rows.last());
+    let span_s = times.map_or(1.0, |(first, last)| (last.time - first.time).max(1.0));
+    let hidden = (USUAL_WALK.0.powi(2) - fitted.levels.walk.powi(2)).max(0.0) / span_s;
+    let own = |i: usize| fitted.covariance[(place::BIAS + i, place::BIAS + i)].max(0.0);
+    DVec3::new(own(0), own(1), own(2)).map(|v| (v + hidden).sqrt())
 }
 
 /// Ratio of the information's singular values; an error with the missing movement where an angle is not told.
