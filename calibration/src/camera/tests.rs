@@ -1,0 +1,137 @@
+use glam::{DQuat, DVec2, DVec3};
+use proptest::prelude::*;
+
+use super::*;
+use crate::{simulated::Random, so3::vector};
+
+const SIZE: (u32, u32) = (1280, 720);
+const PINHOLE: [f64; 8] = [905.0, 902.0, 652.0, 349.0, -0.21, 0.06, 8e-4, -1.1e-3];
+const FISHEYE: [f64; 8] = [405.0, 403.0, 645.0, 355.0, -0.03, 0.008, -0.004, 0.0008];
+
+/// A board of 6 x 6 tags, their 144 corners: seen from `count` sides with corners found to `noise` pixels.
+fn views(model: Model, numbers: [f64; 8], count: usize, tilt: f64, noise: f64, seed: u64) -> Vec<View> {
+    let mut random = Random::new(seed);
+    let intrinsics = Intrinsics::from(numbers);
+    let mut out = Vec::new();
+    while out.len() < count {
+        let near = 0.35 + 0.5 * random.unit();
+        let reach = 0.45 * 1280.0 / numbers[0] * near;
+        let place = DVec3::new((random.unit() - 0.5) * 2.0 * reach, (random.unit() - 0.5) * reach, near);
+        let turn = DQuat::from_scaled_axis(DVec3::new(random.gauss(), random.gauss(), 0.0) * tilt)
+            * DQuat::from_rotation_z(random.gauss() * 0.5);
+        let mut view = View::default();
+        for i in 0..144 {
+            let board = DVec2::new(f64::from(i % 12), f64::from(i / 12)) * 0.03 - DVec2::splat(0.165);
+            let point = turn * board.extend(0.0) + place;
+            if let Some((pixel, ..)) = model.project(&intrinsics, &vector(point)) {
+                let pixel = DVec2::new(pixel.x, pixel.y) + DVec2::new(random.gauss(), random.gauss()) * noise;
+                if (0.0..1280.0).contains(&pixel.x) && (0.0..720.0).contains(&pixel.y) && point.z > 0.05 {
+                    view.corners.push(Corner { board, pixel });
+                }
+            }
+        }
+        if view.corners.len() >= 40 {
+            out.push(view);
+        }
+    }
+    out
+}
+
+#[test]
+fn both_lenses_are_found_and_told_apart() {
+    for (model, truth) in [(Model::RadialTangential, PINHOLE), (Model::Fisheye, FISHEYE)] {
+        let mut outside = 0;
+        for seed in 0..5 {
+            let camera = solve(&views(model, truth, 25, 0.4, 0.2, seed), SIZE).unwrap();
+            assert_eq!(camera.model, model, "{:?}", camera.evidence);
+            assert!((camera.sigma_px - 0.2).abs() < 0.02, "{}", camera.sigma_px);
+            let error = |i: usize| (camera.intrinsics[i] - truth[i]).abs();
+            assert!(
+                error(0) < 2.0 && error(1) < 2.0 && error(2) < 2.0 && error(3) < 2.0,
+                "{:?}",
+                camera.intrinsics
+            );
+            outside += (0..8).filter(|i| error(*i) > 3.0 * camera.sigma[*i]).count();
+            assert!(camera.coverage.share > 0.6 && camera.coverage.tilt[1] > 0.4, "{:?}", camera.coverage);
+            assert!(camera.evidence.iter().all(|e| e.held_out_px < 3.0 || e.model != model));
+            assert_eq!(camera.lens().is_some(), model == Model::RadialTangential);
+            assert_eq!(camera.poses.len(), 25);
+        }
+        // Of forty numbers three standard deviations hold all but one.
+        assert!(outside <= 1, "{model:?}: {outside} of 40 beyond three sigmas");
+    }
+}
+
+#[test]
+fn the_trainers_lens_is_the_same_function() {
+    let camera = solve(&views(Model::RadialTangential, PINHOLE, 20, 0.4, 0.1, 3), SIZE).unwrap();
+    let lens = camera.lens().unwrap();
+    for point in [DVec3::new(0.3, -0.2, 1.0), DVec3::new(-0.5, 0.3, 1.2)] {
+        let (seen, ..) = camera.model.project(&Intrinsics::from(camera.intrinsics), &vector(point)).unwrap();
+        assert!(lens.project(point).unwrap().distance(DVec2::new(seen.x, seen.y)) < 1e-9);
+    }
+}
+
+#[test]
+fn one_corner_in_twenty_wild() {
+    let mut seen = views(Model::RadialTangential, PINHOLE, 25, 0.4, 0.2, 8);
+    let mut random = Random::new(2);
+    for corner in seen.iter_mut().flat_map(|v| &mut v.corners).step_by(20) {
+        corner.pixel = (corner.pixel + DVec2::new(random.gauss(), random.gauss()) * 30.0)
+            .clamp(DVec2::ZERO, DVec2::new(1280.0, 720.0));
+    }
+    let camera = solve(&seen, SIZE).unwrap();
+    assert!((camera.intrinsics[0] - PINHOLE[0]).abs() < 3.0, "{:?}", camera.intrinsics);
+    assert!(camera.sigma_px < 0.25);
+}
+
+#[test]
+fn degenerate_views_are_refused() {
+    let frontal = views(Model::RadialTangential, PINHOLE, 20, 0.0, 0.2, 4);
+    let error = solve(&frontal, SIZE).unwrap_err();
+    assert!(matches!(error, CameraError::NoTilt { .. } | CameraError::Uncertain { .. }), "{error}");
+    let few = views(Model::RadialTangential, PINHOLE, 3, 0.4, 0.2, 5);
+    assert_eq!(solve(&few, SIZE), Err(CameraError::TooFew { count: 3, least: 4, corners: 8 }));
+    // Corners of one line do not span the board.
+    let line: Vec<View> = views(Model::RadialTangential, PINHOLE, 10, 0.4, 0.2, 6)
+        .into_iter()
+        .map(|v| View {
+            corners: v.corners.into_iter().filter(|c| c.board.y.abs() < 0.02 && c.board.y > 0.0).collect(),
+        })
+        .collect();
+    assert!(solve(&line, SIZE).is_err());
+    // A board of the wrong layout fits nothing.
+    let mut wrong = views(Model::RadialTangential, PINHOLE, 12, 0.4, 0.2, 7);
+    let mut random = Random::new(3);
+    wrong
+        .iter_mut()
+        .flat_map(|v| &mut v.corners)
+        .for_each(|c| c.board += DVec2::new(random.gauss(), random.gauss()) * 0.03);
+    assert!(matches!(
+        solve(&wrong, SIZE),
+        Err(CameraError::NoFit { .. } | CameraError::Uncertain { .. } | CameraError::NoTilt { .. })
+    ));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn nothing_from_outside_panics(seed in 0u64..100_000, wild in 0.0..1.0f64, size in (0u32..3000, 0u32..3000)) {
+        let mut random = Random::new(seed);
+        let odd = |random: &mut Random, v: f64| match (random.unit() / wild.max(1e-9) * 8.0) as u32 {
+            0 => f64::NAN,
+            1 => 1e300,
+            2 => 0.0,
+            _ => v,
+        };
+        let mut seen = views(Model::RadialTangential, PINHOLE, 5, 0.3, 5.0, seed);
+        for c in seen.iter_mut().flat_map(|v| &mut v.corners) {
+            c.pixel.x = odd(&mut random, c.pixel.x);
+            c.board.y = odd(&mut random, c.board.y);
+        }
+        if let Ok(camera) = solve(&seen, size) {
+            prop_assert!(camera.intrinsics.iter().chain(&camera.sigma).all(|v| v.is_finite()));
+        }
+    }
+}
