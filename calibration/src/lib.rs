@@ -1,5 +1,5 @@
 //! The calibration file: what maintainers measured about one camera and one inertial unit on one mount; and the solvers that its
-//! numbers come from ([`alignment`], [`camera`]).
+//! numbers come from ([`alignment`], [`camera`], [`boresight`]).
 //!
 //! A file is TOML with human units (pixels, degrees, milliradians, milliseconds, metres); in memory everything is a checked
 //! [`bowwave_core::calibration::Calibration`] in radians and nanoseconds. Every measured value comes with its uncertainty
@@ -27,6 +27,7 @@
 //! number of degrees.
 
 pub mod alignment;
+pub mod boresight;
 pub mod camera;
 mod date;
 mod error;
