@@ -1,6 +1,7 @@
 //! The numerical parts.
 
 mod attitude;
+mod calibration;
 mod clock;
 mod colour;
 mod depth;
@@ -49,6 +50,7 @@ pub const PARTS: &[Part] = &[
     Part { about: orientation::ABOUT, measure: orientation::measure },
     Part { about: horizon::ABOUT, measure: horizon::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
+    Part { about: calibration::ABOUT, measure: calibration::measure },
     Part { about: pacing::ABOUT, measure: pacing::measure },
     Part { about: flight::ABOUT, measure: flight::measure },
     Part { about: sea::ABOUT, measure: sea::measure },
