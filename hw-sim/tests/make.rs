@@ -111,7 +111,8 @@ fn the_default_registers_within_two_pixels() {
             attitude.observe(time, &s);
         }
         let at = attitude.at(stamp.plus_ns(calibration.time_offset_ns)).unwrap();
-        let used = camera_pose(&calibration, at.world_from_imu, recipe.eye_height_m).world_from_camera;
+        let used = camera_pose(calibration.camera_from_imu, at.world_from_imu, recipe.eye_height_m)
+            .world_from_camera;
         let truth = motion.at(stamp.secs_since(START) + recipe.exposure_delay_s()).pose.world_from_camera;
         let error = registration_error_px(&lens, truth, used).unwrap();
         sum += error * error;

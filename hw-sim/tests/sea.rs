@@ -5,6 +5,7 @@
 use std::{path::Path, sync::Arc};
 
 use bowwave_core::{
+    attitude::Source,
     event::PixelFormat,
     scenario::Scenario,
     sea::{BeaufortForce, estimate::SeaSource},
@@ -54,6 +55,7 @@ fn watched(path: &Path, seconds: i64, scenario: &str) -> Vec<(SeaReport, DVec2, 
         boat_models: Vec::new(),
         screen: (lens.width, lens.height),
         video: PixelFormat::Rgb,
+        orientation: Source::Auto,
     })
     .unwrap();
     let (mut events, mut known) = (Vec::new(), Vec::new());

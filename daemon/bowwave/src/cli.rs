@@ -92,6 +92,9 @@ pub struct Simulate {
     /// End after so many seconds; without it once through the recording
     #[arg(long, value_name = "S", value_parser = parse_duration)]
     pub duration: Option<f64>,
+    /// Fuse rates and specific force here, and correct by the horizon, though the recording has the unit's own orientation
+    #[arg(long)]
+    pub fuse: bool,
     /// Seed of all chance; overrides the scenario's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,

@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use glam::{DQuat, DVec3};
 
 use crate::{
-    calibration::Calibration,
     geometry::{CameraPose, Lens},
     time::{NS_PER_S, Time},
 };
@@ -162,9 +161,9 @@ fn predict(newest: &OrientationSample, time: Time) -> Result<OrientationAt, NoPo
 }
 
 /// The camera's pose from the unit's orientation: registration.
-pub fn camera_pose(calibration: &Calibration, world_from_imu: DQuat, eye_height_m: f64) -> CameraPose {
+pub fn camera_pose(camera_from_imu: DQuat, world_from_imu: DQuat, eye_height_m: f64) -> CameraPose {
     CameraPose {
-        world_from_camera: (world_from_imu * calibration.camera_from_imu.inverse()).normalize(),
+        world_from_camera: (world_from_imu * camera_from_imu.inverse()).normalize(),
         position: DVec3::new(0.0, 0.0, eye_height_m),
     }
 }

@@ -5,6 +5,7 @@
 use std::sync::Arc;
 
 use bowwave_core::{
+    attitude::Source,
     calibration::Calibration,
     event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, TriggerEdge},
     fault::{Fault, FaultChange},
@@ -92,6 +93,7 @@ fn session(text: &str) -> Session {
         boat_models: vec![ModelId(0); boats],
         screen: (128, 96),
         video: PixelFormat::Rgb,
+        orientation: Source::Auto,
     })
     .expect("every boat has a model")
 }

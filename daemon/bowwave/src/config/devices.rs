@@ -3,6 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use anyhow::Result;
+use bowwave_core::attitude::Source as Orientation;
 use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
     imu::ImuFormat,
@@ -134,9 +135,23 @@ pub(super) struct RawImu {
     format: Option<Spanned<String>>,
     low_latency: Option<bool>,
     late_ms: Option<Spanned<f64>>,
+    orientation: Option<Spanned<String>>,
 }
 
 impl RawImu {
+    /// Whose estimate of the orientation is used.
+    pub(super) fn orientation(&self, source: Source<'_>) -> Result<Orientation> {
+        let Some(name) = &self.orientation else { return Ok(Orientation::default()) };
+        match name.get_ref().as_str() {
+            "auto" => Ok(Orientation::Auto),
+            "fused" => Ok(Orientation::Fused),
+            other => {
+                let why = format!("imu.orientation: '{other}' is neither \"auto\" nor \"fused\"");
+                Err(source.wrong(&name.span(), why))
+            }
+        }
+    }
+
     pub(super) fn check(self, source: Source<'_>) -> Result<ImuSettings> {
         let baud = match self.baud {
             None => Baud::default(),

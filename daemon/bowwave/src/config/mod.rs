@@ -8,7 +8,10 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::text::{line_column, one_line};
+use bowwave_core::{
+    attitude::Source as Orientation,
+    text::{line_column, one_line},
+};
 use bowwave_devices::{
     camera::CameraSettings, lamps::LampSettings, lcd::LcdSettings, serial::ImuSettings, trigger::InputLine,
 };
@@ -61,6 +64,8 @@ pub struct Config {
     pub camera: CameraSettings,
     /// The inertial unit.
     pub imu: ImuSettings,
+    /// Whose estimate of the orientation is used.
+    pub orientation: Orientation,
     /// The trigger's line; without it nothing fires.
     pub trigger: Option<TriggerChoice>,
     /// The input that tells that the gun is inert; without it the trainer does not arm.
@@ -219,6 +224,7 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         size,
         lcd,
         camera: raw.camera.check(source)?,
+        orientation: raw.imu.orientation(source)?,
         imu: raw.imu.check(source)?,
         trigger: raw.trigger.map(|t| t.check(source)).transpose()?,
         interlock: raw.interlock.map(devices::RawLine::input),

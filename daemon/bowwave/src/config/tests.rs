@@ -42,6 +42,7 @@ fn every_key_is_read() {
         device = "/dev/bowwave/imu"
         baud = [115200, 921600]
         format = "xsens"
+        orientation = "fused"
         low_latency = false
         late_ms = 12.5
         [trigger]
@@ -86,6 +87,7 @@ fn every_key_is_read() {
     assert_eq!((camera.buffers, camera.readout_us, camera.controls.gain), (5, Some(9000), Some(4)));
     assert_eq!(config.imu.baud, Baud::Scan(vec![115_200, 921_600]));
     assert_eq!(config.imu.format, Some(ImuFormat::Xsens));
+    assert_eq!(config.orientation, Orientation::Fused);
     let line = |chip: &str, line: &str, active_low, bias| InputLine {
         chip: chip.into(),
         line: line.into(),
@@ -108,6 +110,10 @@ fn every_key_is_read() {
 #[test]
 fn mistakes_are_refused_where_they_are() {
     for (text, said) in [
+        (
+            "[imu]\norientation = \"unit\"\n",
+            "x.toml:2:15: imu.orientation: 'unit' is neither \"auto\" nor \"fused\"",
+        ),
         (
             "[imu]\nformat = \"xens\"\n",
             "x.toml:2:10: imu.format: 'xens' is none of vectornav, vectornav-ascii, xsens,",

@@ -84,6 +84,7 @@ impl Reader {
             boat_models,
             screen: config.size.unwrap_or(USUAL_SIZE),
             video: PixelFormat::Yuyv,
+            orientation: config.orientation,
         };
         Ok(Settings { config, setup, camera_serial, calibration_toml, scenario_toml, faults })
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use bowwave_calibration::CalibrationFile;
 use bowwave_core::{
+    attitude::Source,
     event::PixelFormat,
     model::{Model, ModelId},
     scenario::{self, Scenario},
@@ -80,6 +81,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
             screen: arguments.size.or(config.size).unwrap_or(SIZE),
             // JPEG pictures are decoded to RGB.
             video: PixelFormat::Rgb,
+            orientation: if arguments.fuse { Source::Fused } else { config.orientation },
         },
         scenario_toml,
         calibration_toml,

@@ -93,8 +93,8 @@ pub struct UpSeen {
 }
 
 /// Orientation by the unit's own estimate; or integrated from its rates, with what is wrong with that estimated from VQF's inclination and
-/// from what else is seen. Its heading then starts at the camera's "north" and drifts with what is left of the gyro's bias about the
-/// vertical.
+/// from what else is seen. Its heading then starts at the unit's own, or else at the camera's "north", and drifts with what is left of the
+/// gyro's bias about the vertical.
 #[derive(Debug)]
 pub struct Attitude {
     gyro_bias: DVec3,
@@ -224,7 +224,8 @@ impl Attitude {
                 if span_ns < LEVEL_NS {
                     return None;
                 }
-                let world_from_imu = level(*sum / f64::from(*count), self.camera_from_imu);
+                let levelled = level(*sum / f64::from(*count), self.camera_from_imu);
+                let world_from_imu = sample.world_from_imu.map_or(levelled, |own| headed(levelled, own));
                 let [shortest, longest] = PERIODS_S;
                 let period_s = span_ns as f64 * 1e-9 / f64::from(*count - 1).max(1.0);
                 let inclination =
@@ -307,6 +308,14 @@ pub fn level(up_imu: DVec3, camera_from_imu: DQuat) -> DQuat {
     let north = if forward.truncate().length() > 1e-3 { forward } else { axis(DVec3::NEG_Y) };
     let azimuth = north.x.atan2(north.y);
     (DQuat::from_rotation_z(azimuth) * tilted).normalize()
+}
+
+/// `levelled`, turned about the vertical to the heading of `own`.
+fn headed(levelled: DQuat, own: DQuat) -> DQuat {
+    // The twist about z of what lies between (Dobrowolski 2015, swing-twist).
+    let between = own * levelled.inverse();
+    let twist = DQuat::from_xyzw(0.0, 0.0, between.z, between.w);
+    if twist.length() > 1e-6 { (twist.normalize() * levelled).normalize() } else { levelled }
 }
 
 #[cfg(test)]
@@ -432,6 +441,23 @@ mod tests {
         assert_eq!(fused.see_up(&early, 13.8), None);
         let broken = UpSeen { time: now, up_camera: DVec3::NAN, covariance };
         assert!(!fused.see_up(&broken, 13.8).unwrap().taken);
+    }
+
+    #[test]
+    fn fused_it_starts_at_the_units_own_heading() {
+        let mut fused = attitude(Source::Fused, DVec3::ZERO);
+        let truth = look(2.5, 0.2, 0.1);
+        let mut still = sample(DVec3::ZERO, truth.inverse() * DVec3::Z * 9.806_65);
+        // Its inclination is five degrees wrong, and is not taken.
+        still.world_from_imu = Some(DQuat::from_rotation_x(0.09) * truth);
+        let found =
+            (0..100).filter_map(|i| fused.observe(Time::from_ns(i * 5_000_000), &still)).last().unwrap();
+        assert!(
+            found.world_from_imu.angle_between(truth) < 0.02,
+            "{}",
+            found.world_from_imu.angle_between(truth)
+        );
+        assert!((found.world_from_imu * (truth.inverse() * DVec3::Z)).truncate().length() < 1e-3);
     }
 
     #[test]

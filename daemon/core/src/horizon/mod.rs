@@ -18,13 +18,13 @@ mod rays;
 
 use std::ops::Range;
 
-use glam::{DMat2, DVec2, DVec3};
+use glam::{DMat2, DMat3, DVec2, DVec3};
 
 pub use mask::Mask;
 
 use crate::{
     event::Picture,
-    geometry::{Lens, horizon_dip},
+    geometry::{Lens, horizon_dip, look},
 };
 use cells::Cells;
 use edges::{Candidate, ROLL_MAX, Seeker, Span};
@@ -112,6 +112,22 @@ impl Horizon {
     /// Elevation of the camera's axis above the horizontal, as in [`crate::geometry::look`], radians.
     pub fn elevation(&self) -> f64 {
         angles_of(self.up).y
+    }
+}
+
+impl Horizon {
+    /// Covariance of the error of [`Self::up`], rad^2, in the camera's axes.
+    pub fn up_covariance(&self) -> DMat3 {
+        let (roll, elevation) = (self.roll(), self.elevation());
+        let up = |roll: f64, elevation: f64| look(0.0, elevation, roll).inverse() * DVec3::Z;
+        let step = 1e-4;
+        let by_roll = (up(roll + step, elevation) - up(roll - step, elevation)) / (2.0 * step);
+        let by_elevation = (up(roll, elevation + step) - up(roll, elevation - step)) / (2.0 * step);
+        let outer = |a: DVec3, b: DVec3| DMat3::from_cols(a * b.x, a * b.y, a * b.z);
+        let c = self.covariance;
+        outer(by_roll, by_roll) * c.x_axis.x
+            + outer(by_elevation, by_elevation) * c.y_axis.y
+            + (outer(by_roll, by_elevation) + outer(by_elevation, by_roll)) * c.x_axis.y
     }
 }
 

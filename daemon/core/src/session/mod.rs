@@ -1,6 +1,7 @@
 //! A session: a pure function from events and frame times to scenes and records.
 
 mod fleet;
+mod level;
 mod rounds;
 mod sensors;
 mod watch;
@@ -10,6 +11,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use crate::{
+    attitude::Source,
     boats::{CourseState, Hull},
     calibration::Calibration,
     event::{Event, Picture, PictureError, PixelFormat},
@@ -30,6 +32,7 @@ use crate::{
 };
 
 pub use fleet::{Fleet, Vessel};
+pub use level::HorizonCounts;
 pub use rounds::{Ammunition, Launch, Rounds};
 pub use sensors::{SensorCounts, Sensors};
 pub use watch::SeaReport;
@@ -62,6 +65,8 @@ pub struct Setup {
     pub screen: (u32, u32),
     /// How the camera's bytes are laid out.
     pub video: PixelFormat,
+    /// Whose estimate of the orientation is used.
+    pub orientation: Source,
 }
 
 /// Why a session cannot be made.
@@ -155,7 +160,7 @@ impl Session {
         });
         let waves = scenario.wave_field();
         let watch = SeaWatch::of(scenario);
-        let sensors = Sensors::new(&setup.calibration);
+        let sensors = Sensors::new(&setup.calibration, setup.orientation, setup.scenario.eye_height_m);
         let weapon = Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt);
         let meter = LightMeter::new(scenario.sun_direction, scenario.water.method);
         let scene = Scene {
@@ -248,6 +253,9 @@ impl Session {
         let Some(video_time) = self.sensors.video_time() else {
             return Step { view: None, records: &self.records };
         };
+        if picture_is_new {
+            self.sensors.level();
+        }
         self.advance(video_time, frame_time);
         let pose_known = self.draw(video_time, frame_time, picture_is_new);
         let view = self.sensors.newest_frame().map(|frame| View {
@@ -350,7 +358,7 @@ impl Session {
 
     fn camera(&self, orientation: Result<OrientationAt, NoPose>) -> Option<CameraPose> {
         let world_from_imu = orientation.ok()?.world_from_imu;
-        Some(camera_pose(&self.setup.calibration, world_from_imu, self.setup.scenario.eye_height_m))
+        Some(camera_pose(self.sensors.camera_from_imu(), world_from_imu, self.setup.scenario.eye_height_m))
     }
 
     fn count_records(&mut self) {

@@ -1,12 +1,14 @@
 //! What the devices said last, made sense of: orientation over time, the newest picture, and whether they can be trusted.
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
+use super::level::{HorizonCounts, Level};
 use crate::{
     attitude::{Attitude, AttitudeSettings, Source},
     calibration::Calibration,
     clock::ClockMap,
     event::{CameraFrame, ImuSample},
+    geometry::Lens,
     pose::{NoPose, OrientationAt, STALE_NS},
     scene::Status,
     time::Time,
@@ -35,13 +37,16 @@ pub struct SensorCounts {
     pub frames_backward: u64,
     /// Pictures of another size than the calibrated one.
     pub frames_wrong_size: u64,
+    /// Horizons seen.
+    pub horizons: HorizonCounts,
 }
 
 /// Sensors of one session.
 #[derive(Debug)]
 pub struct Sensors {
     time_offset_ns: i64,
-    size: (u32, u32),
+    lens: Lens,
+    level: Level,
     clock: ClockMap,
     attitude: Attitude,
     last: Option<(DVec3, DVec3)>,
@@ -51,14 +56,15 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Sensors with that calibration that have reported nothing.
-    pub fn new(calibration: &Calibration) -> Self {
+    /// Sensors with that calibration, `eye_height_m` above the sea, that have reported nothing; orientation is found from `source`.
+    pub fn new(calibration: &Calibration, source: Source, eye_height_m: f64) -> Self {
         Self {
             time_offset_ns: calibration.time_offset_ns,
-            size: (calibration.lens.width, calibration.lens.height),
+            lens: calibration.lens,
+            level: Level::new(eye_height_m),
             clock: ClockMap::new(),
             attitude: Attitude::new(
-                AttitudeSettings::new(Source::Auto, calibration),
+                AttitudeSettings::new(source, calibration),
                 calibration.gyro_bias,
                 calibration.camera_from_imu,
             ),
@@ -95,7 +101,7 @@ impl Sensors {
     /// Takes in a picture; the newest wins. One from the past or of a size that the lens was not calibrated for is left out.
     pub fn frame(&mut self, frame: &CameraFrame) -> bool {
         self.counts.frames += 1;
-        if (frame.picture.width(), frame.picture.height()) != self.size {
+        if (frame.picture.width(), frame.picture.height()) != (self.lens.width, self.lens.height) {
             self.counts.frames_wrong_size += 1;
             return false;
         }
@@ -105,6 +111,19 @@ impl Sensors {
         }
         self.frame = Some(frame.clone());
         true
+    }
+
+    /// Looks for the horizon in the newest picture and corrects the orientation by it.
+    pub fn level(&mut self) {
+        if let (Some(frame), Some(time)) = (&self.frame, self.video_time()) {
+            self.level.look(time, &frame.picture, &self.lens, &mut self.attitude);
+            self.counts.horizons = self.level.counts();
+        }
+    }
+
+    /// Rotation from the inertial unit's axes to the camera's, as it is known by now.
+    pub fn camera_from_imu(&self) -> DQuat {
+        self.attitude.camera_from_imu()
     }
 
     /// The newest picture.
@@ -166,14 +185,11 @@ impl Sensors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        event::{Picture, PixelFormat},
-        geometry::Lens,
-    };
-    use glam::{DQuat, DVec2};
+    use crate::event::{Picture, PixelFormat};
+    use glam::DVec2;
 
     fn sensors() -> Sensors {
-        Sensors::new(&Calibration {
+        let calibration = Calibration {
             lens: Lens::pinhole(4, 2, 1.0),
             focal_sigma_px: 1.0,
             camera_from_imu: DQuat::IDENTITY,
@@ -185,7 +201,8 @@ mod tests {
             muzzle_in_camera: DVec3::ZERO,
             gyro_bias: DVec3::ZERO,
             gyro_bias_sigma: DVec3::ONE,
-        })
+        };
+        Sensors::new(&calibration, Source::Auto, 5.0)
     }
 
     fn sample(i: i64) -> ImuSample {

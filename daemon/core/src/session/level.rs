@@ -1,0 +1,77 @@
+//! The horizon in the live picture tells the orientation which way is up.
+
+use glam::{DMat3, DVec3};
+
+use crate::{
+    attitude::{Attitude, UpSeen},
+    event::Picture,
+    geometry::Lens,
+    horizon::{HorizonFinder, Prior, View},
+    time::Time,
+};
+
+/// A horizon is sought so often: it corrects what drifts in seconds.
+const EVERY_NS: i64 = 100_000_000;
+
+/// Refraction moves the true horizon by as much from day to day and hour to hour (design figures: 0.08 to 0.12 deg in daytime), radians.
+const REFRACTION: f64 = 0.1 * std::f64::consts::PI / 180.0;
+
+/// Chi squared with two degrees of freedom that a horizon exceeds once in a thousand: beyond it is a shore, a cloud or a ship's side.
+const SURPRISE_MAX: f64 = 13.8;
+
+/// What became of the horizons of a session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct HorizonCounts {
+    /// Taken in.
+    pub taken: u64,
+    /// Not believed.
+    pub refused: u64,
+    /// Pictures that were looked at and had none.
+    pub none: u64,
+}
+
+/// Looks for the horizon in pictures, now and then.
+#[derive(Debug)]
+pub(super) struct Level {
+    finder: HorizonFinder,
+    eye_height_m: f64,
+    next: Time,
+    counts: HorizonCounts,
+}
+
+impl Level {
+    pub(super) fn new(eye_height_m: f64) -> Self {
+        let (next, counts) = (Time::MIN, HorizonCounts::default());
+        Self { finder: HorizonFinder::new(), eye_height_m, next, counts }
+    }
+
+    pub(super) const fn counts(&self) -> HorizonCounts {
+        self.counts
+    }
+
+    /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all.
+    pub(super) fn look(&mut self, time: Time, picture: &Picture, lens: &Lens, attitude: &mut Attitude) {
+        if time < self.next {
+            return;
+        }
+        let (Some(covariance), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return };
+        self.next = time.plus_ns(EVERY_NS);
+        let world_from_camera = then.world_from_imu * attitude.camera_from_imu().inverse();
+        let tilt = covariance.x_axis.x.max(covariance.y_axis.y);
+        let prior = Prior {
+            up: world_from_camera.inverse() * DVec3::Z,
+            sigma: (tilt + REFRACTION * REFRACTION).sqrt(),
+        };
+        let view = View { lens: *lens, eye_height_m: self.eye_height_m, prior: Some(prior) };
+        let Ok(horizon) = self.finder.find(picture, &view) else {
+            self.counts.none += 1;
+            return;
+        };
+        let refraction = DMat3::from_diagonal(DVec3::splat(REFRACTION * REFRACTION));
+        let seen = UpSeen { time, up_camera: horizon.up, covariance: horizon.up_covariance() + refraction };
+        match attitude.see_up(&seen, SURPRISE_MAX) {
+            Some(outcome) if outcome.taken => self.counts.taken += 1,
+            _ => self.counts.refused += 1,
+        }
+    }
+}
