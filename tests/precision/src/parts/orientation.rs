@@ -38,6 +38,10 @@ struct Trial {
     samples: Vec<(DVec3, DVec3, Option<DQuat>)>,
 }
 
+/// Three of its 39 trials: a slow rotation, fast rotation and translation, tapping.
+const BROAD: [&str; 3] =
+    ["02_undisturbed_slow_rotation_B", "21_undisturbed_fast_combined", "24_disturbed_tapping_A"];
+
 fn broad(name: &str) -> Result<Option<Trial>> {
     let Some(path) = recorded::find(&format!("imu_groundtruth/broad/{name}.mat")) else { return Ok(None) };
     let [gyro, accel, truth, moving, rate] =
@@ -244,14 +248,18 @@ fn aided_cases(bench: &mut Bench) {
 
 /// Measures the scenes and extreme cases.
 pub fn measure(bench: &mut Bench) -> Result<()> {
-    for name in ["02_undisturbed_slow_rotation_B", "21_undisturbed_fast_combined", "24_disturbed_tapping_A"] {
-        if let Some(trial) = broad(name)? {
-            scene(bench, &format!("BROAD {name}"), &trial, Settings::HAND, RateKind::Mean);
-        }
+    let mut trials = Vec::new();
+    for name in BROAD {
+        let Some(trial) = broad(name)? else { continue };
+        extreme(bench, &format!("BROAD {name}"), &trial, Settings::HAND, RateKind::Mean);
+        trials.push(trial);
+    }
+    if !trials.is_empty() {
+        scene(bench, "in hands, trials of BROAD", &trials, Settings::HAND, RateKind::Mean);
     }
     for sea in [ship::SEA_4, ship::SEA_6] {
         let trial = ship_trial(sea, true, 300.0, Errors::usual());
-        scene(bench, &format!("gun on a ship, {}", sea.name), &trial, Settings::GUN, RateKind::Instant);
+        scene(bench, &format!("gun on a ship, {}", sea.name), &[trial], Settings::GUN, RateKind::Instant);
     }
     let usual = Errors::usual();
     let slow = Errors { rate_hz: 100.0, ..usual };
@@ -264,26 +272,31 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("sea 4, bias of 0.3 deg/s on each axis", ship::SEA_4, biased),
     ] {
         let trial = ship_trial(sea, true, 300.0, errors);
-        let tried =
-            ways(Settings::GUN, RateKind::Instant).into_iter().map(|(method, setting, default, run)| Tried {
-                default,
-                ..Tried::rival(method, setting, error_deg(&trial, run))
-            });
-        bench.extreme(case, "deg", tried.collect());
+        extreme(bench, case, &trial, Settings::GUN, RateKind::Instant);
     }
     aided_cases(bench);
     Ok(())
 }
 
-fn scene(bench: &mut Bench, name: &str, trial: &Trial, default: Settings, rate: RateKind) {
+fn extreme(bench: &mut Bench, case: &str, trial: &Trial, default: Settings, rate: RateKind) {
+    let tried = ways(default, rate).into_iter().map(|(method, setting, default, run)| Tried {
+        default,
+        ..Tried::rival(method, setting, error_deg(trial, run))
+    });
+    bench.extreme(case, "deg", tried.collect());
+}
+
+/// The error is the mean over the trials.
+fn scene(bench: &mut Bench, name: &str, trials: &[Trial], default: Settings, rate: RateKind) {
+    let samples = trials.iter().map(|t| t.samples.len()).sum();
     let ways = ways(default, rate).into_iter().map(|(method, setting, is_default, run)| {
-        let error = error_deg(trial, &run);
+        let error = trials.iter().map(|t| error_deg(t, &run)).sum::<f64>() / trials.len() as f64;
         let work = move || {
             let mut last = DQuat::IDENTITY;
-            run(trial, &mut |_, q| last = q);
+            trials.iter().for_each(|t| run(t, &mut |_, q| last = q));
             last
         };
-        let way = Way::new(method, setting, error, trial.samples.len(), work).holds(size_of::<Attitude>());
+        let way = Way::new(method, setting, error, samples, work).holds(size_of::<Attitude>());
         way.default_if(is_default)
     });
     bench.scene(name, "deg", 1e-3, ways.collect());
