@@ -231,7 +231,7 @@ fn observed(
     };
     jacobian.set_column(place::READOUT, &(speed * line));
     let mut row = Row {
-        time: 0.0,
+        time: state.time,
         kind: Kind::Orientation,
         index,
         residual: Vector3::zeros(),
@@ -252,7 +252,6 @@ fn observed(
             flatten(&mut row, unknowns.up);
         }
     }
-    row.time = state.time;
     row
 }
 

@@ -170,6 +170,12 @@ fn moved(state: &State, own: &Intrinsics, poses: &[SVector<f64, 6>]) -> State {
     State { intrinsics: state.intrinsics + own, poses: state.poses.iter().zip(poses).map(turn).collect() }
 }
 
+/// The normal equations' part of each view.
+fn blocks(model: Model, state: &State, views: &[View], sigma: f64) -> Vec<Block> {
+    let own = |(pose, view)| block(model, &state.intrinsics, pose, view, sigma);
+    state.poses.iter().zip(views).map(own).collect()
+}
+
 /// Levenberg's and Marquardt's method; `held` leaves the intrinsics as they are.
 pub(super) fn adjust(model: Model, mut state: State, views: &[View], held: bool) -> Adjusted {
     let mut sigma = spread(model, &state, views).max(0.05);
@@ -177,12 +183,7 @@ pub(super) fn adjust(model: Model, mut state: State, views: &[View], held: bool)
         let mut damping = 1e-3;
         let mut now = cost(model, &state, views, sigma);
         for _ in 0..if round == 0 { 40 } else { 15 } {
-            let blocks: Vec<Block> = state
-                .poses
-                .iter()
-                .zip(views)
-                .map(|(pose, view)| block(model, &state.intrinsics, pose, view, sigma))
-                .collect();
+            let blocks = blocks(model, &state, views, sigma);
             let mut gain = None;
             for _ in 0..8 {
                 if let Some((own, poses)) = step(&blocks, damping, held) {
@@ -209,12 +210,7 @@ pub(super) fn adjust(model: Model, mut state: State, views: &[View], held: bool)
 }
 
 fn finish(model: Model, state: State, views: &[View], sigma: f64, held: bool) -> Adjusted {
-    let blocks: Vec<Block> = state
-        .poses
-        .iter()
-        .zip(views)
-        .map(|(pose, view)| block(model, &state.intrinsics, pose, view, sigma))
-        .collect();
+    let blocks = blocks(model, &state, views, sigma);
     let variance = sigma * sigma;
     let inverse = |b: &Block| b.pose.cholesky().map(|c| c.inverse());
     let rotations = blocks

@@ -7,6 +7,8 @@ use bowwave_calibration::{
 use glam::DVec3;
 use rayon::prelude::*;
 
+use crate::front::quantile;
+
 /// One simulated recording and what became of it.
 #[derive(Clone, Debug)]
 pub struct Run {
@@ -75,10 +77,8 @@ pub fn series(motion: Motion, degrees: f64, jitter_s: f64, first: u64, runs: u64
     (first..first + runs).into_par_iter().map(|seed| Run::of(recipe(seed))).collect()
 }
 
-/// A value below which that share of all lies; NaN of none.
+/// A value below which that share of all numbers lies; NaN of none.
 pub fn percentile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
-    let mut all: Vec<f64> = values.into_iter().filter(|v| !v.is_nan()).collect();
-    all.sort_by(f64::total_cmp);
-    let last = all.len().saturating_sub(1);
-    all.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+    let known: Vec<f64> = values.into_iter().filter(|v| !v.is_nan()).collect();
+    quantile(&known, share)
 }

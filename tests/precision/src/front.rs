@@ -36,6 +36,14 @@ pub fn median(values: &mut [f64]) -> f64 {
     }
 }
 
+/// The value below which a share of them lies; NaN for none.
+pub fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len().saturating_sub(1);
+    sorted.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
+}
+
 /// Time of `a` over that of `b`, two rows of one scene.
 pub fn ratio(a: &Row, b: &Row) -> Ratio {
     match (&a.kind, &b.kind) {

@@ -4,10 +4,13 @@
 
 use bowwave_core::horizon::HorizonFinder;
 use glam::DVec3;
-use precision::horizon::{
-    cases::{SET_WITH, with_horizon, without_horizon},
-    frames,
-    score::{Drawn, find, miss, predicted, quantile},
+use precision::{
+    front::quantile,
+    horizon::{
+        cases::{SET_WITH, with_horizon, without_horizon},
+        frames,
+        score::{Drawn, find, miss, predicted},
+    },
 };
 
 #[test]

@@ -8,6 +8,8 @@
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{SMatrix, SVector};
 
+use crate::gunnery::GRAVITY_M_S2;
+
 /// Turn of the world (3), gyro's bias in the unit's axes (3), error of the inclination it is held against (2), turn of the camera against
 /// the unit in the camera's axes (3), bias of the specific force over gravity in the unit's axes (3).
 const STATES: usize = 14;
@@ -57,7 +59,7 @@ pub struct Outcome {
 }
 
 /// What a measurement changes: the world is to be turned by this.
-pub(super) type Correction = DQuat;
+type Correction = DQuat;
 
 /// The filter.
 #[derive(Clone, Debug)]
@@ -80,9 +82,7 @@ pub(super) struct Filter {
     settling_s: f64,
 }
 
-/// Standard gravity, m/s^2 (CGPM 1901).
-pub(super) const GRAVITY: f64 = 9.806_65;
-/// The inclination's error forgets itself in this time, seconds: half of VQF's own.
+/// The inclination's error forgets itself in this time, seconds: about a quarter of a long wave's period.
 const REFERENCE_TAU_S: f64 = 3.0;
 /// It is never better than this, rad.
 const REFERENCE_LEAST: f64 = 2e-3;
@@ -103,7 +103,7 @@ impl Filter {
             set(axis, if axis < 2 { START_TILT } else { 0.0 });
             set(BIAS + axis, noise.bias[axis]);
             set(MOUNTING + axis, noise.mounting[axis]);
-            set(FORCE + axis, noise.force / GRAVITY);
+            set(FORCE + axis, noise.force / GRAVITY_M_S2);
         }
         set(REFERENCE, REFERENCE_START);
         set(REFERENCE + 1, REFERENCE_START);
@@ -176,7 +176,7 @@ impl Filter {
         add(REFERENCE + 1, self.reference_variance * (1.0 - kept * kept));
     }
 
-    /// Holds `world_from_imu` against an inclination of its own error, that of `reference` in the unit's axes.
+    /// Holds `world_from_imu` against an inclination that errs by itself: where up is in the unit's axes, `since_s` after the last one.
     pub(super) fn incline(&mut self, world_from_imu: DQuat, up_imu: DVec3, since_s: f64) -> Correction {
         let up = world_from_imu * (up_imu - self.force);
         if self.settling_s > 0.0 {

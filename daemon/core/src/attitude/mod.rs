@@ -1,14 +1,14 @@
 //! From the inertial unit's samples, and from what else tells which way it looks, to its orientation over time.
 
 mod filter;
-mod fused;
+mod inclination;
 
 use glam::{DMat2, DMat3, DQuat, DVec3};
 
-use self::{filter::Filter, fused::Fused};
+use self::{filter::Filter, inclination::Inclination};
 pub use self::{
     filter::{Noise, Outcome},
-    fused::Settings,
+    inclination::Settings,
 };
 use crate::{
     calibration::Calibration,
@@ -114,7 +114,7 @@ enum State {
 
 #[derive(Debug)]
 struct Running {
-    inclination: Fused,
+    inclination: Inclination,
     filter: Filter,
     last: OrientationSample,
     /// The newest rate less the calibrated bias, and the one before with its distance in time.
@@ -161,14 +161,6 @@ impl Attitude {
         match &self.state {
             State::Running(running) => Some(running.filter.turn_covariance()),
             State::Levelling { .. } => None,
-        }
-    }
-
-    /// The gyro's bias as it is known by now, rad/s, the unit's axes.
-    pub fn gyro_bias(&self) -> DVec3 {
-        match &self.state {
-            State::Running(running) => self.gyro_bias + running.filter.bias(),
-            State::Levelling { .. } => self.gyro_bias,
         }
     }
 
@@ -228,8 +220,11 @@ impl Attitude {
                 let world_from_imu = sample.world_from_imu.map_or(levelled, |own| headed(levelled, own));
                 let [shortest, longest] = PERIODS_S;
                 let period_s = span_ns as f64 * 1e-9 / f64::from(*count - 1).max(1.0);
-                let inclination =
-                    Fused::new(&self.settings.inclination, period_s.clamp(shortest, longest), world_from_imu);
+                let inclination = Inclination::new(
+                    &self.settings.inclination,
+                    period_s.clamp(shortest, longest),
+                    world_from_imu,
+                );
                 let last = OrientationSample { time, world_from_imu, rate };
                 let filter =
                     Filter::new(self.settings.noise, SETTLE_TAUS * self.settings.inclination.tau_accel_s);

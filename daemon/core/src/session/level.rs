@@ -14,7 +14,7 @@ use crate::{
 const EVERY_NS: i64 = 100_000_000;
 
 /// Refraction moves the true horizon by as much from day to day and hour to hour (design figures: 0.08 to 0.12 deg in daytime), radians.
-const REFRACTION: f64 = 0.1 * std::f64::consts::PI / 180.0;
+const REFRACTION: f64 = 0.1f64.to_radians();
 
 /// Chi squared with two degrees of freedom that a horizon exceeds once in a thousand: beyond it is a shore, a cloud or a ship's side.
 const SURPRISE_MAX: f64 = 13.8;

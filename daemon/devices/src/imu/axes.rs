@@ -14,8 +14,8 @@ pub(crate) const ROLL_OVER: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 /// Quarter of a turn about the vertical: east-north-up from north-west-up.
 pub(crate) const ENU_FROM_NWU: DQuat = DQuat::from_xyzw(0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2);
 
-/// Standard gravity, m/s^2: what units that measure in g mean by it.
-pub(crate) const G: f64 = 9.806_65;
+/// What units that measure in g mean by it.
+pub(crate) use bowwave_core::gunnery::GRAVITY_M_S2 as G;
 
 /// Three numbers of a wire as a vector.
 pub(crate) fn vector([x, y, z]: [f32; 3]) -> DVec3 {

@@ -15,9 +15,10 @@ use super::{
     cases::{SET_WITH, with_horizon, without_horizon},
     frames::{self, Frame},
     overlay,
-    score::{Drawn, Miss, PRIOR_SIGMA, find, miss, predicted, quantile},
+    score::{Drawn, Miss, PRIOR_SIGMA, find, miss, predicted},
     video,
 };
+use crate::front::quantile;
 
 type Answer = std::result::Result<Horizon, NoHorizon>;
 

@@ -147,11 +147,3 @@ fn barrel_mask() -> Option<Mask> {
     };
     Mask::new(width, height, (0..width * height).map(hides).collect())
 }
-
-/// The value below which a share of them lies; NaN for none.
-pub fn quantile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let last = sorted.len().saturating_sub(1);
-    sorted.get((share * last as f64).round() as usize).copied().unwrap_or(f64::NAN)
-}

@@ -6,10 +6,11 @@ use bowwave_core::horizon::HorizonFinder;
 use super::{About, worst};
 use crate::{
     bench::{Bench, Tried, Way},
+    front::quantile,
     horizon::{
         cases::{SET_WITH, with_horizon, without_horizon},
         frames::{self, Frame},
-        score::{Drawn, miss, quantile},
+        score::{Drawn, miss},
         ways::{METHODS, Method, in_drawn, in_frame, px},
     },
 };

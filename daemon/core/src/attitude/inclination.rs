@@ -6,7 +6,7 @@ use std::fmt;
 use glam::{DQuat, DVec3};
 use vqf_rs::{Params, VQF};
 
-use super::filter::GRAVITY;
+use crate::gunnery::GRAVITY_M_S2;
 
 /// Specific force that differs from gravity by more than this, m/s^2, is a shock: recoil or a blow. Hands make 20 m/s^2, and twelve
 /// metres from the middle of a ship in sea state 6 waves make 3.
@@ -38,19 +38,19 @@ impl Settings {
     /// day is at rest, and its turn is learnt as the gyro's bias.
     pub const GUN: Self = Self {
         tau_accel_s: 10.0,
-        rest_rate: 0.2 * DEGREE,
+        rest_rate: 0.2f64.to_radians(),
         rest_accel: 0.05,
-        bias_most: 0.5 * DEGREE,
-        bias_sigma: 0.5 * DEGREE,
+        bias_most: 0.5f64.to_radians(),
+        bias_sigma: 0.5f64.to_radians(),
     };
 
     /// In hands, as for a calibration: VQF's own.
     pub const HAND: Self = Self {
         tau_accel_s: 3.0,
-        rest_rate: 2.0 * DEGREE,
+        rest_rate: 2f64.to_radians(),
         rest_accel: 0.5,
-        bias_most: 2.0 * DEGREE,
-        bias_sigma: 0.5 * DEGREE,
+        bias_most: 2f64.to_radians(),
+        bias_sigma: 0.5f64.to_radians(),
     };
 
     fn params(&self) -> Params {
@@ -66,22 +66,20 @@ impl Settings {
     }
 }
 
-const DEGREE: f64 = std::f64::consts::PI / 180.0;
-
 /// VQF between the samples of one unit without interruption.
-pub(super) struct Fused {
+pub(super) struct Inclination {
     vqf: VQF,
     /// Seconds for which specific force is still left out, and for which it has been.
     ringing_s: f64,
     shaken_s: f64,
 }
 
-impl Fused {
+impl Inclination {
     /// A filter for samples `period_s` apart, begun with the unit as in `world_from_imu`.
     pub(super) fn new(settings: &Settings, period_s: f64, world_from_imu: DQuat) -> Self {
         let mut vqf = VQF::new(period_s, None, None, Some(settings.params()));
         // The filter takes its first sample's direction for up.
-        vqf.update_acc((world_from_imu.inverse() * (DVec3::Z * GRAVITY)).to_array());
+        vqf.update_acc((world_from_imu.inverse() * (DVec3::Z * GRAVITY_M_S2)).to_array());
         Self { vqf, ringing_s: 0.0, shaken_s: 0.0 }
     }
 
@@ -100,7 +98,7 @@ impl Fused {
     }
 
     fn is_steady(&mut self, accel: DVec3, dt_s: f64) -> bool {
-        if (accel.length() - GRAVITY).abs() > SHOCK {
+        if (accel.length() - GRAVITY_M_S2).abs() > SHOCK {
             self.ringing_s = RINGING_S;
         }
         if self.ringing_s <= 0.0 {
@@ -118,10 +116,10 @@ fn quaternion(vqf: &VQF) -> DQuat {
     DQuat::from_xyzw(q.1, q.2, q.3, q.0)
 }
 
-impl fmt::Debug for Fused {
+impl fmt::Debug for Inclination {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (orientation, bias) = (quaternion(&self.vqf), self.vqf.bias_estimate().0);
-        f.debug_struct("Fused")
+        f.debug_struct("Inclination")
             .field("orientation", &orientation)
             .field("bias", &bias)
             .finish_non_exhaustive()
