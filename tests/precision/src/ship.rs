@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
@@ -194,8 +194,8 @@ pub struct Errors {
     pub gyro_bias: DVec3,
     /// Random walk of the rate's error, rad/s in a square root of a second.
     pub gyro_walk: f64,
-    /// Share by which the rate is too large.
-    pub gyro_scale: f64,
+    /// What the rate errs by, as shares of the true rate's axes: wrong scales on the diagonal, axes that are not square elsewhere.
+    pub gyro_matrix: DMat3,
     /// White noise of the specific force, m/s^2/sqrt(Hz).
     pub accel_noise: f64,
     /// Constant part of its error, m/s^2.
@@ -210,7 +210,7 @@ impl Errors {
             gyro_noise: 0.0035f64.to_radians(),
             gyro_bias: DVec3::new(0.05, -0.05, 0.05) * std::f64::consts::PI / 180.0,
             gyro_walk: 2e-4f64.to_radians(),
-            gyro_scale: 3e-4,
+            gyro_matrix: DMat3::from_diagonal(DVec3::splat(3e-4)),
             accel_noise: 1.4e-3,
             accel_bias: DVec3::new(0.008, -0.006, 0.01),
         }
@@ -241,7 +241,8 @@ pub fn samples(ship: &Ship, errors: &Errors, seconds: f64, seed: u64) -> Vec<Sam
             let truth = ship.at(time_s);
             let mut white = || DVec3::new(gaussian(&mut rng), gaussian(&mut rng), gaussian(&mut rng));
             walk += white() * errors.gyro_walk * dt.sqrt();
-            let rate = truth.rate * (1.0 + errors.gyro_scale)
+            let rate = truth.rate
+                + errors.gyro_matrix * truth.rate
                 + errors.gyro_bias
                 + walk
                 + white() * errors.gyro_noise / dt.sqrt();

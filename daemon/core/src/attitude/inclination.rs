@@ -66,29 +66,60 @@ impl Settings {
     }
 }
 
+/// VQF is fed steps of this length at least, seconds: its time constants are seconds, and a step costs more than all the rest of a sample.
+const STEP_S: f64 = 0.008;
+
+/// Share of a sample's period by which a step may be shorter: clocks shift by microseconds.
+const SLACK: f64 = 0.2;
+
 /// VQF between the samples of one unit without interruption.
 pub(super) struct Inclination {
     vqf: VQF,
+    gathered: Gathered,
     /// Seconds for which specific force is still left out, and for which it has been.
     ringing_s: f64,
     shaken_s: f64,
 }
 
+/// What came since VQF's last step: the turn, the sum of specific force in the axes at its end and of how many samples, how long.
+#[derive(Clone, Copy, Debug, Default)]
+struct Gathered {
+    turn: DVec3,
+    accel: DVec3,
+    count: u32,
+    dt_s: f64,
+}
+
 impl Inclination {
     /// A filter for samples `period_s` apart, begun with the unit as in `world_from_imu`.
     pub(super) fn new(settings: &Settings, period_s: f64, world_from_imu: DQuat) -> Self {
-        let mut vqf = VQF::new(period_s, None, None, Some(settings.params()));
+        let steps = (STEP_S / period_s - SLACK).ceil().max(1.0);
+        let mut vqf = VQF::new(steps * period_s, None, None, Some(settings.params()));
         // The filter takes its first sample's direction for up.
         vqf.update_acc((world_from_imu.inverse() * (DVec3::Z * GRAVITY_M_S2)).to_array());
-        Self { vqf, ringing_s: 0.0, shaken_s: 0.0 }
+        Self { vqf, gathered: Gathered::default(), ringing_s: 0.0, shaken_s: 0.0 }
     }
 
     /// Takes in a turn (scaled axis, radians, the unit's axes) over `dt_s` seconds and the specific force at its end.
     pub(super) fn update(&mut self, turn: DVec3, dt_s: f64, accel: DVec3) {
+        let steady = self.is_steady(accel, dt_s);
+        let g = &mut self.gathered;
+        // Turn after turn, and what was felt before carried along, to the second order of a turn of some degrees.
+        g.turn += turn + g.turn.cross(turn) * 0.5;
+        g.accel -= turn.cross(g.accel);
+        if steady {
+            g.accel += accel;
+            g.count += 1;
+        }
+        g.dt_s += dt_s;
+        if g.dt_s < STEP_S - SLACK * dt_s {
+            return;
+        }
+        let g = std::mem::take(g);
         // The mean rate of the step, so that the filter's product of rate and time is the turn.
-        self.vqf.update_gyr_with_ts((turn / dt_s).to_array(), dt_s);
-        if self.is_steady(accel, dt_s) {
-            self.vqf.update_acc(accel.to_array());
+        self.vqf.update_gyr_with_ts((g.turn / g.dt_s).to_array(), g.dt_s);
+        if g.count > 0 {
+            self.vqf.update_acc((g.accel / f64::from(g.count)).to_array());
         }
     }
 

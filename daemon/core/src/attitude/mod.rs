@@ -7,7 +7,7 @@ use glam::{DMat2, DMat3, DQuat, DVec3};
 
 use self::{filter::Filter, inclination::Inclination};
 pub use self::{
-    filter::{Noise, Outcome},
+    filter::{DIP_SIGMA, Noise, Outcome},
     inclination::Settings,
 };
 use crate::{
@@ -90,6 +90,17 @@ pub struct UpSeen {
     pub up_camera: DVec3,
     /// Covariance of its error, rad^2, in the camera's axes.
     pub covariance: DMat3,
+}
+
+/// Where something of known direction was seen against where the believed heading has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadingSeen {
+    /// When it was seen, on the inertial unit's clock.
+    pub time: Time,
+    /// By what the believed world is to be turned about the vertical (counter-clockwise from above), radians.
+    pub off: f64,
+    /// Variance of that, rad^2.
+    pub variance: f64,
 }
 
 /// Orientation by the unit's own estimate; or integrated from its rates, with what is wrong with that estimated from VQF's inclination and
@@ -190,6 +201,52 @@ impl Attitude {
         Some(outcome)
     }
 
+    /// Sets the heading: turns the world by `off` about the vertical, which is then known to `sigma`, radians. `false` where there is no
+    /// estimate of ours yet to be turned. What was anchored before ([`Self::anchor_heading`]) no longer is.
+    pub fn set_heading(&mut self, off: f64, sigma: f64) -> bool {
+        let State::Running(running) = &mut self.state else { return false };
+        running.filter.predict();
+        running.filter.set_heading(sigma);
+        let turn = DQuat::from_rotation_z(off);
+        running.turn(turn);
+        self.history.turn(turn);
+        true
+    }
+
+    /// Takes in a heading, unless that differs by more than `limit` (chi squared with one degree of freedom) from what is known. `None`
+    /// where nothing is known of that time, or the unit's own estimate is used.
+    pub fn see_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
+        self.correct_heading(seen, |filter| filter.see_heading(seen.off, seen.variance, limit))
+    }
+
+    /// From now on [`Self::see_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
+    /// may turn by some `drift` rad/s itself, steadily, as seen from a ship under way; what is learnt of that stays over later anchors.
+    pub fn anchor_heading(&mut self, drift: f64) -> bool {
+        let State::Running(running) = &mut self.state else { return false };
+        running.filter.predict();
+        running.filter.anchor(drift);
+        true
+    }
+
+    /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`].
+    pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
+        self.correct_heading(seen, |filter| filter.see_anchor(seen.off, seen.variance, limit))
+    }
+
+    fn correct_heading(
+        &mut self,
+        seen: &HeadingSeen,
+        correct: impl FnOnce(&mut Filter) -> (DQuat, Outcome),
+    ) -> Option<Outcome> {
+        self.history.at(seen.time).ok()?;
+        let State::Running(running) = &mut self.state else { return None };
+        running.filter.predict();
+        let (turn, outcome) = correct(&mut running.filter);
+        running.turn(turn);
+        self.history.turn(turn);
+        Some(outcome)
+    }
+
     fn find(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
         let rate = sample.rate - self.gyro_bias;
         if let (Some(q), Source::Auto) = (sample.world_from_imu, self.settings.source) {
@@ -260,7 +317,7 @@ impl Running {
         let turn = turn - self.filter.bias() * dt_s;
         let world_from_imu = (self.last.world_from_imu * DQuat::from_scaled_axis(turn)).normalize();
         self.last = OrientationSample { time, world_from_imu, rate: rate - self.filter.bias() };
-        self.filter.step(world_from_imu, turn.length(), dt_s);
+        self.filter.step(world_from_imu, turn, dt_s);
         self.inclined_s += dt_s;
         (self.inclined_s >= INCLINE_S).then(|| {
             let since_s = std::mem::take(&mut self.inclined_s);
@@ -436,6 +493,36 @@ mod tests {
         assert_eq!(fused.see_up(&early, 13.8), None);
         let broken = UpSeen { time: now, up_camera: DVec3::NAN, covariance };
         assert!(!fused.see_up(&broken, 13.8).unwrap().taken);
+    }
+
+    /// By what the heading found is wrong at its newest time, radians.
+    fn heading_error(fused: &Attitude) -> f64 {
+        let time = fused.newest().unwrap();
+        let off = coning(time.ns() as f64 * 1e-9) * fused.at(time).unwrap().world_from_imu.inverse();
+        2.0 * (off.z / off.w).atan()
+    }
+
+    #[test]
+    fn a_heading_is_set_and_held_by_what_was_anchored() {
+        let mut fused = attitude(Source::Fused, DVec3::ZERO);
+        let bias = |_: f64, s: ImuSample| ImuSample { rate: s.rate + DVec3::Z * 2e-3, ..s };
+        worst_tilt(&mut fused, 60.0, 0.0, bias);
+        assert!(fused.set_heading(heading_error(&fused), 1e-3));
+        assert!(heading_error(&fused).abs() < 1e-9);
+        let deviation = |fused: &Attitude| fused.covariance().unwrap().z_axis.z.sqrt();
+        assert!((deviation(&fused) - 1e-3).abs() < 1e-9);
+        assert!(fused.anchor_heading(0.0));
+        // What is anchored in tells of changes only: it makes nothing surer than the heading was.
+        let time = fused.newest().unwrap();
+        let seen = |off| HeadingSeen { time, off, variance: 1e-8 };
+        assert!(fused.see_anchored_heading(&seen(2e-5), 10.8).unwrap().taken);
+        assert!(deviation(&fused) > 0.99e-3, "{}", deviation(&fused));
+        assert!(!fused.see_anchored_heading(&seen(0.1), 10.8).unwrap().taken, "another island");
+        assert!(fused.see_heading(&seen(1e-3), 10.8).unwrap().taken);
+        assert!(deviation(&fused) < 2e-4, "{}", deviation(&fused));
+        assert!((heading_error(&fused) + 1e-3).abs() < 1e-4, "{}", heading_error(&fused));
+        let broken = HeadingSeen { off: f64::NAN, ..seen(0.0) };
+        assert!(!fused.see_heading(&broken, 10.8).unwrap().taken);
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The horizon in the live picture tells the orientation which way is up.
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
 use crate::{
-    attitude::{Attitude, UpSeen},
+    attitude::{self, Attitude, UpSeen},
     event::Picture,
     geometry::Lens,
     horizon::{HorizonFinder, Prior, View},
@@ -12,9 +12,6 @@ use crate::{
 
 /// A horizon is sought so often: it corrects what drifts in seconds.
 const EVERY_NS: i64 = 100_000_000;
-
-/// Refraction moves the true horizon by as much from day to day and hour to hour (design figures: 0.08 to 0.12 deg in daytime), radians.
-const REFRACTION: f64 = 0.1f64.to_radians();
 
 /// Chi squared with two degrees of freedom that a horizon exceeds once in a thousand: beyond it is a shore, a cloud or a ship's side.
 const SURPRISE_MAX: f64 = 13.8;
@@ -60,15 +57,14 @@ impl Level {
         let tilt = covariance.x_axis.x.max(covariance.y_axis.y);
         let prior = Prior {
             up: world_from_camera.inverse() * DVec3::Z,
-            sigma: (tilt + REFRACTION * REFRACTION).sqrt(),
+            sigma: (tilt + attitude::DIP_SIGMA * attitude::DIP_SIGMA).sqrt(),
         };
         let view = View { lens: *lens, eye_height_m: self.eye_height_m, prior: Some(prior) };
         let Ok(horizon) = self.finder.find(picture, &view) else {
             self.counts.none += 1;
             return;
         };
-        let refraction = DMat3::from_diagonal(DVec3::splat(REFRACTION * REFRACTION));
-        let seen = UpSeen { time, up_camera: horizon.up, covariance: horizon.up_covariance() + refraction };
+        let seen = UpSeen { time, up_camera: horizon.up, covariance: horizon.up_covariance() };
         match attitude.see_up(&seen, SURPRISE_MAX) {
             Some(outcome) if outcome.taken => self.counts.taken += 1,
             _ => self.counts.refused += 1,
