@@ -3,6 +3,7 @@
 //! A [`parts::Part`] holds the ways of doing one thing against a truth that shares no code with them: [`mod@bench`] times the ways
 //! of a scene in turns, [`front`] finds those that nothing beats, [`row`] writes the table and [`page`] the page.
 
+pub mod aided;
 pub mod alignment;
 pub mod bench;
 pub mod front;

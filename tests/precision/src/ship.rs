@@ -196,6 +196,8 @@ pub struct Errors {
     pub gyro_walk: f64,
     /// What the rate errs by, as shares of the true rate's axes: wrong scales on the diagonal, axes that are not square elsewhere.
     pub gyro_matrix: DMat3,
+    /// The Earth's turn in the world's axes, rad/s, which a gyro measures too.
+    pub earth: DVec3,
     /// White noise of the specific force, m/s^2/sqrt(Hz).
     pub accel_noise: f64,
     /// Constant part of its error, m/s^2.
@@ -211,6 +213,7 @@ impl Errors {
             gyro_bias: DVec3::new(0.05, -0.05, 0.05) * std::f64::consts::PI / 180.0,
             gyro_walk: 2e-4f64.to_radians(),
             gyro_matrix: DMat3::from_diagonal(DVec3::splat(3e-4)),
+            earth: DVec3::ZERO,
             accel_noise: 1.4e-3,
             accel_bias: DVec3::new(0.008, -0.006, 0.01),
         }
@@ -232,24 +235,34 @@ pub struct Sample {
 
 /// The samples of a unit that errs so on that ship.
 pub fn samples(ship: &Ship, errors: &Errors, seconds: f64, seed: u64) -> Vec<Sample> {
+    stream(ship, errors, seconds, seed).collect()
+}
+
+/// The same one after the other.
+pub fn stream<'a>(
+    ship: &'a Ship,
+    errors: &'a Errors,
+    seconds: f64,
+    seed: u64,
+) -> impl Iterator<Item = Sample> + use<'a> {
     let mut rng = Pcg64::seed_from_u64(seed ^ 0x51a7);
     let dt = 1.0 / errors.rate_hz;
     let mut walk = DVec3::ZERO;
-    (0..(seconds * errors.rate_hz) as usize)
-        .map(|i| {
-            let time_s = i as f64 * dt;
-            let truth = ship.at(time_s);
-            let mut white = || DVec3::new(gaussian(&mut rng), gaussian(&mut rng), gaussian(&mut rng));
-            walk += white() * errors.gyro_walk * dt.sqrt();
-            let rate = truth.rate
-                + errors.gyro_matrix * truth.rate
-                + errors.gyro_bias
-                + walk
-                + white() * errors.gyro_noise / dt.sqrt();
-            let accel = truth.accel + errors.accel_bias + white() * errors.accel_noise / dt.sqrt();
-            Sample { time_s, rate, accel, truth }
-        })
-        .collect()
+    (0..(seconds * errors.rate_hz) as usize).map(move |i| {
+        let time_s = i as f64 * dt;
+        let truth = ship.at(time_s);
+        let mut white = || DVec3::new(gaussian(&mut rng), gaussian(&mut rng), gaussian(&mut rng));
+        walk += white() * errors.gyro_walk * dt.sqrt();
+        let earth = truth.world_from_imu.inverse() * errors.earth;
+        let rate = truth.rate
+            + earth
+            + errors.gyro_matrix * truth.rate
+            + errors.gyro_bias
+            + walk
+            + white() * errors.gyro_noise / dt.sqrt();
+        let accel = truth.accel + errors.accel_bias + white() * errors.accel_noise / dt.sqrt();
+        Sample { time_s, rate, accel, truth }
+    })
 }
 
 /// Box and Muller's (1958).

@@ -87,16 +87,22 @@ pub(super) struct Filter {
     dt_s: f64,
     /// How far it has turned in the last seconds, in the unit's axes.
     swing: DVec3,
+    /// What it may have turned since the last prediction without the gyro's telling, radians.
+    missed: f64,
     /// Mean square of what the inclination it is held against errs by on an axis, rad^2, and for how long it was watched, s.
     reference_variance: f64,
     watched_s: f64,
     /// For how long the inclination still settles, s; nothing where up was seen otherwise.
     settling_s: f64,
+    /// The inclination's own time constant, s.
+    tau_s: f64,
 }
 
-/// The inclination's error forgets itself in this time, seconds: VQF's own time constant for a gun. With a quarter of a wave's period the
-/// filter is three times surer of itself on a calm day than it may be.
-const REFERENCE_TAU_S: f64 = 10.0;
+/// The inclination's error forgets itself in this many of VQF's own time constants. With a quarter of a wave's period the filter errs half
+/// as much on a gun without a horizon, and with one is three times surer of itself on a calm day than it may be.
+const REFERENCE_TAUS: f64 = 0.8;
+/// VQF's inclination has settled after so many of its time constants.
+const SETTLE_TAUS: f64 = 2.0;
 /// It is never better than this, rad.
 const REFERENCE_LEAST: f64 = 2e-3;
 /// How wrong it is at the start, rad: what the first seconds of a sea show of gravity.
@@ -111,11 +117,14 @@ pub const DIP_SIGMA: f64 = 0.1f64.to_radians();
 const DIP_TAU_S: f64 = 3600.0;
 /// A turn is remembered for so long, seconds: longer than a slew, shorter than what corrects its error takes.
 const SWING_TAU_S: f64 = 10.0;
+/// A turn that the gyro did not tell and that is larger than this is more than the inclination's own error, radians.
+const MISSED_MUCH: f64 = 5e-3;
 /// Inclination after levelling, rad.
 const START_TILT: f64 = 0.06;
 
 impl Filter {
-    pub(super) fn new(noise: Noise, settling_s: f64) -> Self {
+    /// Nothing learnt yet about an orientation that is held against an inclination with the time constant `tau_s`.
+    pub(super) fn new(noise: Noise, tau_s: f64) -> Self {
         let mut covariance = Covariance::zeros();
         let mut set = |at: usize, deviation: f64| covariance[(at, at)] = deviation * deviation;
         for axis in 0..3 {
@@ -141,9 +150,11 @@ impl Filter {
             turned: DVec3::ZERO,
             dt_s: 0.0,
             swing: DVec3::ZERO,
+            missed: 0.0,
             reference_variance: REFERENCE_START * REFERENCE_START,
             watched_s: 0.0,
-            settling_s,
+            settling_s: SETTLE_TAUS * tau_s,
+            tau_s,
         }
     }
 
@@ -170,6 +181,11 @@ impl Filter {
         self.dt_s += dt_s;
     }
 
+    /// It may have turned by another `turn` radians that the gyro did not tell.
+    pub(super) fn miss(&mut self, turn: f64) {
+        self.missed += turn;
+    }
+
     /// Brings the covariance to the present.
     pub(super) fn predict(&mut self) {
         let dt = std::mem::take(&mut self.dt_s);
@@ -179,7 +195,7 @@ impl Filter {
         let axes = std::mem::replace(&mut self.axes, DMat3::ZERO);
         let turned = std::mem::take(&mut self.turned);
         self.turn_by_bias(&axes);
-        let kept = (-dt / REFERENCE_TAU_S).exp();
+        let kept = (-dt / (REFERENCE_TAUS * self.tau_s)).exp();
         self.reference *= kept;
         for at in [REFERENCE, REFERENCE + 1] {
             self.fade(at, kept, self.reference_variance);
@@ -189,8 +205,13 @@ impl Filter {
         self.fade(DIP, kept, DIP_SIGMA * DIP_SIGMA);
         self.anchor += self.anchor_rate * dt;
         self.add_row(ANCHOR, ANCHOR_RATE, dt);
+        let missed = std::mem::take(&mut self.missed);
+        // The inclination it is held against has missed the same turn.
+        if missed > MISSED_MUCH {
+            self.settling_s = SETTLE_TAUS * self.tau_s;
+        }
         for axis in 0..3 {
-            self.covariance[(axis, axis)] += self.noise.gyro.powi(2) * dt;
+            self.covariance[(axis, axis)] += self.noise.gyro.powi(2) * dt + missed * missed;
             self.covariance[(BIAS + axis, BIAS + axis)] += self.noise.bias_walk.powi(2) * dt;
         }
         let before = self.swing * (-dt / SWING_TAU_S).exp();

@@ -3,6 +3,8 @@
 mod filter;
 mod inclination;
 
+use std::f64::consts::TAU;
+
 use glam::{DMat2, DMat3, DQuat, DVec3};
 
 use self::{filter::Filter, inclination::Inclination};
@@ -29,8 +31,11 @@ const PERIODS_S: [f64; 2] = [1e-4, 0.1];
 /// The integrated orientation is held against VQF's inclination this often, seconds.
 const INCLINE_S: f64 = 0.25;
 
-/// VQF's inclination has settled after so many of its time constants.
-const SETTLE_TAUS: f64 = 2.0;
+/// No gyro's range is smaller, rad/s (30 deg/s).
+const CLIPPED_LEAST: f64 = 0.52;
+
+/// By what share of it a rate that stands at its range may be exceeded (one standard deviation).
+const CLIPPED_SHARE: f64 = 0.5;
 
 /// Whose estimate of the orientation is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -97,7 +102,7 @@ pub struct UpSeen {
 pub struct HeadingSeen {
     /// When it was seen, on the inertial unit's clock.
     pub time: Time,
-    /// By what the believed world is to be turned about the vertical (counter-clockwise from above), radians.
+    /// By what the believed world is to be turned about the vertical (counter-clockwise from above), radians; whole turns do not count.
     pub off: f64,
     /// Variance of that, rad^2.
     pub variance: f64,
@@ -216,7 +221,7 @@ impl Attitude {
     /// Takes in a heading, unless that differs by more than `limit` (chi squared with one degree of freedom) from what is known. `None`
     /// where nothing is known of that time, or the unit's own estimate is used.
     pub fn see_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        self.correct_heading(seen, |filter| filter.see_heading(seen.off, seen.variance, limit))
+        self.correct_heading(seen, |filter, off| filter.see_heading(off, seen.variance, limit))
     }
 
     /// From now on [`Self::see_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
@@ -230,18 +235,18 @@ impl Attitude {
 
     /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`].
     pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        self.correct_heading(seen, |filter| filter.see_anchor(seen.off, seen.variance, limit))
+        self.correct_heading(seen, |filter, off| filter.see_anchor(off, seen.variance, limit))
     }
 
     fn correct_heading(
         &mut self,
         seen: &HeadingSeen,
-        correct: impl FnOnce(&mut Filter) -> (DQuat, Outcome),
+        correct: impl FnOnce(&mut Filter, f64) -> (DQuat, Outcome),
     ) -> Option<Outcome> {
         self.history.at(seen.time).ok()?;
         let State::Running(running) = &mut self.state else { return None };
         running.filter.predict();
-        let (turn, outcome) = correct(&mut running.filter);
+        let (turn, outcome) = correct(&mut running.filter, seen.off - TAU * (seen.off / TAU).round());
         running.turn(turn);
         self.history.turn(turn);
         Some(outcome)
@@ -255,10 +260,11 @@ impl Attitude {
         match &mut self.state {
             State::Running(running) => {
                 let dt_ns = time.ns_since(running.last.time);
-                if !(0..=GAP_NS).contains(&dt_ns) {
+                if dt_ns.abs() > GAP_NS {
                     self.state = State::START;
                     return None;
                 }
+                // One that comes twice or after a younger one tells nothing new.
                 if dt_ns > 0 {
                     let turn = running.step(self.settings.rate, (time, dt_ns), rate, sample.accel);
                     turn.into_iter().for_each(|turn| self.history.turn(turn));
@@ -283,8 +289,7 @@ impl Attitude {
                     world_from_imu,
                 );
                 let last = OrientationSample { time, world_from_imu, rate };
-                let filter =
-                    Filter::new(self.settings.noise, SETTLE_TAUS * self.settings.inclination.tau_accel_s);
+                let filter = Filter::new(self.settings.noise, self.settings.inclination.tau_accel_s);
                 let running = Running { inclination, filter, last, rate, before: None, inclined_s: 0.0 };
                 self.state = State::Running(Box::new(running));
                 Some(last)
@@ -311,6 +316,9 @@ impl Running {
                 turn_between(even.map(|(w, _)| w), self.rate, rate, dt_s)
             }
         };
+        if is_clipped(self.rate, rate) {
+            self.filter.miss(rate.length() * CLIPPED_SHARE * dt_s);
+        }
         self.before = Some((self.rate, dt_ns));
         self.rate = rate;
         self.inclination.update(turn, dt_s, accel);
@@ -332,6 +340,12 @@ impl Running {
     fn turn(&mut self, turn: DQuat) {
         self.last.world_from_imu = (turn * self.last.world_from_imu).normalize();
     }
+}
+
+/// Whether a gyro stands at its range: fast, and on one axis exactly as fast as before, which noise would not let it be.
+fn is_clipped(before: DVec3, rate: DVec3) -> bool {
+    let stands = |axis: usize| rate[axis].abs() > CLIPPED_LEAST && rate[axis] == before[axis];
+    stands(0) || stands(1) || stands(2)
 }
 
 /// Turn over the `h` seconds from rate `from` to rate `to`, a scaled axis in the body's frame: the integral of the rate and the

@@ -7,6 +7,7 @@ mod colour;
 mod depth;
 mod flight;
 mod fresnel;
+mod fusion;
 mod horizon;
 mod lens;
 mod motion;
@@ -48,6 +49,7 @@ pub const PARTS: &[Part] = &[
     Part { about: clock::ABOUT, measure: clock::measure },
     Part { about: attitude::ABOUT, measure: attitude::measure },
     Part { about: orientation::ABOUT, measure: orientation::measure },
+    Part { about: fusion::ABOUT, measure: fusion::measure },
     Part { about: horizon::ABOUT, measure: horizon::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
     Part { about: calibration::ABOUT, measure: calibration::measure },

@@ -2,13 +2,11 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::{Attitude, AttitudeSettings, Noise, RateKind, Settings, Source, UpSeen},
+    attitude::{Attitude, AttitudeSettings, Noise, RateKind, Settings, Source},
     event::ImuSample,
     time::Time,
 };
-use glam::{DMat2, DMat3, DQuat, DVec3};
-use rand::SeedableRng as _;
-use rand_pcg::Pcg64;
+use glam::{DQuat, DVec3};
 use vqf_rs::{Params, VQF};
 
 use super::About;
@@ -156,96 +154,6 @@ fn ways<'a>(default: Settings, rate: RateKind) -> Vec<(&'static str, &'static st
     ]
 }
 
-/// What a camera sees of the horizon on that ship: up, with so much noise on each axis, ten times a second for `seen_s`, then nothing for
-/// as long.
-struct Horizon {
-    seen_s: f64,
-    sigma: f64,
-}
-
-/// How the calibration has the camera against the unit, and how it is.
-const CAMERA_FROM_IMU: DQuat = DQuat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
-const MOUNTED_WRONG: DVec3 = DVec3::new(7e-4, -6e-4, 5e-4);
-/// From exposure to the horizon's being known, seconds.
-const HORIZON_LATE_S: f64 = 0.045;
-/// Chi squared with two degrees of freedom at 99.9 %.
-const LIMIT: f64 = 13.8;
-
-/// Errors of a run with a horizon: root mean square and worst angle of up, degrees, and mean of its square over the filter's variance
-/// (two where that is right).
-struct Aided {
-    rms_deg: f64,
-    worst_deg: f64,
-    surprise: f64,
-}
-
-fn aided(sea: Sea, horizon: &Horizon, seconds: f64, seed: u64) -> Aided {
-    let samples = ship::samples(&Ship::new(sea, true, seed), &Errors::usual(), seconds, seed + 100);
-    let mut rng = Pcg64::seed_from_u64(seed);
-    let imu_from_camera = (DQuat::from_scaled_axis(MOUNTED_WRONG) * CAMERA_FROM_IMU).inverse();
-    let mut attitude =
-        Attitude::new(settings(Settings::GUN, RateKind::Instant), DVec3::ZERO, CAMERA_FROM_IMU);
-    let mut waiting: Option<UpSeen> = None;
-    let (mut sum, mut worst, mut surprise, mut count) = (0.0, 0.0f64, 0.0, 0.0);
-    for (i, s) in samples.iter().enumerate() {
-        let time = Time::from_ns(0).plus_secs(s.time_s);
-        let sample = ImuSample {
-            arrival: time,
-            device_time_ns: time.ns(),
-            rate: s.rate,
-            accel: s.accel,
-            world_from_imu: None,
-        };
-        let Some(found) = attitude.observe(time, &sample) else { continue };
-        let truth = s.truth.world_from_imu;
-        if i % 20 == 0 && s.time_s % (2.0 * horizon.seen_s) < horizon.seen_s {
-            let noise = DVec3::new(ship::gaussian(&mut rng), ship::gaussian(&mut rng), 0.0) * horizon.sigma;
-            let up_world = DQuat::from_scaled_axis(noise) * DVec3::Z;
-            let up_camera = (truth * imu_from_camera).inverse() * up_world;
-            let covariance = DMat3::IDENTITY * horizon.sigma * horizon.sigma;
-            waiting = Some(UpSeen { time, up_camera, covariance });
-        }
-        if let Some(seen) = waiting.take_if(|seen| time.secs_since(seen.time) > HORIZON_LATE_S) {
-            attitude.see_up(&seen, LIMIT);
-        }
-        if s.time_s > 60.0 {
-            let off = inclination_error(truth, found.world_from_imu);
-            let turn = (truth * found.world_from_imu.inverse()).to_scaled_axis().truncate();
-            let expected = attitude
-                .covariance()
-                .map_or(DMat2::NAN, |c| DMat2::from_cols(c.x_axis.truncate(), c.y_axis.truncate()));
-            sum += off * off;
-            worst = worst.max(off);
-            surprise += turn.dot(expected.inverse() * turn);
-            count += 1.0;
-        }
-    }
-    Aided {
-        rms_deg: (sum / count).sqrt().to_degrees(),
-        worst_deg: worst.to_degrees(),
-        surprise: surprise / count,
-    }
-}
-
-fn aided_cases(bench: &mut Bench) {
-    let sigma = 0.03f64.to_radians();
-    for (case, sea, seen_s) in [
-        ("sea 4, horizon seen for 10 s of 20", ship::SEA_4, 10.0),
-        ("sea 6, horizon seen for 10 s of 20", ship::SEA_6, 10.0),
-        ("calm, horizon seen for 60 s of 120", ship::CALM, 60.0),
-        ("sea 6, horizon seen for 60 s of 120", ship::SEA_6, 60.0),
-    ] {
-        let run = aided(sea, &Horizon { seen_s, sigma }, 400.0, 3);
-        let note = format!(
-            "worst {:.3} deg; square over its variance {:.2} in the mean",
-            run.worst_deg, run.surprise
-        );
-        let tried =
-            Tried::product("VQF and error-state filter", "for a gun, with horizon", run.rms_deg).note(note);
-        bench.extreme(case, "deg", vec![tried]);
-    }
-}
-
 /// Measures the scenes and extreme cases.
 pub fn measure(bench: &mut Bench) -> Result<()> {
     let mut trials = Vec::new();
@@ -274,7 +182,6 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         let trial = ship_trial(sea, true, 300.0, errors);
         extreme(bench, case, &trial, Settings::GUN, RateKind::Instant);
     }
-    aided_cases(bench);
     Ok(())
 }
 
@@ -312,26 +219,4 @@ fn error_deg(trial: &Trial, run: impl Fn(&Trial, Tell<'_>)) -> f64 {
         }
     });
     (sum / f64::from(count)).sqrt().to_degrees()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The filter must know how wrong it is: the mean of the squares over their variances lies about two, on the safe side rather than
-    /// on the other.
-    #[test]
-    fn a_horizon_half_of_the_time_is_enough_and_the_filter_knows_its_error() {
-        for (sea, seed) in [(ship::CALM, 1), (ship::SEA_4, 2), (ship::SEA_6, 3)] {
-            let run = aided(sea, &Horizon { seen_s: 20.0, sigma: 0.03f64.to_radians() }, 300.0, seed);
-            assert!(
-                run.rms_deg < 0.08 && run.worst_deg < 0.25,
-                "{}: {} {}",
-                sea.name,
-                run.rms_deg,
-                run.worst_deg
-            );
-            assert!((0.3..3.0).contains(&run.surprise), "{}: {}", sea.name, run.surprise);
-        }
-    }
 }

@@ -1,0 +1,314 @@
+//! Correcting the integrated orientation by what else is seen: horizon, what stands far away, a compass.
+
+use anyhow::Result;
+use bowwave_core::{
+    attitude::{Attitude, HeadingSeen, UpSeen, turn_between},
+    event::ImuSample,
+    time::Time,
+};
+use glam::{DMat3, DQuat, DVec3};
+
+use super::About;
+use crate::{
+    aided::{
+        Aids, CAMERA_FROM_IMU, Estimator, Heading, Horizon, Outcome, Recording, Unit, bounds, outcome,
+        product,
+    },
+    bench::{Bench, Tried, Way},
+    ship::{self, Errors, Sample, Sea, Ship},
+};
+
+/// What is said of this part.
+pub const ABOUT: About = About {
+    part: "fusion",
+    what: "Corrects the gun's orientation by a horizon that is seen now and then, and its heading by what stands far away or by a compass; \
+           says how wrong it may be.",
+    truth: "the simulated ship and gun of the part before, 12 m from the ship's middle; a horizon with 0.03 deg of noise ten times a second, \
+            known 45 ms late. Errors count from the second minute on; the ship is not told anything of the product",
+    rivals: "the same without a horizon, and rates that are turned by a fixed share of what each horizon says",
+    why: "a fixed share either forgets a bias as soon as no horizon is seen or follows the horizon's noise; the error-state filter does \
+          neither, and its claim of its own error holds: with all errors drawn from what it assumes, squares over variances lie about two",
+};
+
+/// What is known of a horizon in the picture, radians.
+const HORIZON_SIGMA: f64 = 0.03f64.to_radians();
+
+/// Rates integrated, and a fixed share of each horizon's and heading's difference taken.
+struct FixedShare {
+    share: f64,
+    last: Option<(Time, DVec3, DQuat)>,
+}
+
+impl Estimator for FixedShare {
+    fn observe(&mut self, time: Time, sample: &ImuSample) -> Option<DQuat> {
+        let found = match self.last {
+            None => DQuat::from_rotation_arc(sample.accel.normalize_or(DVec3::NEG_Z), DVec3::Z),
+            Some((then, rate, q)) => {
+                let turn = turn_between(None, rate, sample.rate, time.secs_since(then));
+                (q * DQuat::from_scaled_axis(turn)).normalize()
+            }
+        };
+        self.last = Some((time, sample.rate, found));
+        Some(found)
+    }
+
+    fn see_up(&mut self, seen: &UpSeen) {
+        // The horizon is 45 ms old: what the unit turned by since is small beside what a share of it says.
+        if let Some((_, _, q)) = &mut self.last {
+            let up = *q * CAMERA_FROM_IMU.inverse() * seen.up_camera;
+            *q = DQuat::from_scaled_axis(up.cross(DVec3::Z) * self.share) * *q;
+        }
+    }
+
+    fn anchor(&mut self, _: f64) {}
+
+    fn see_heading(&mut self, seen: &HeadingSeen, _: bool) {
+        if let Some((_, _, q)) = &mut self.last {
+            *q = DQuat::from_rotation_z(seen.off * self.share) * *q;
+        }
+    }
+
+    fn covariance(&self) -> Option<DMat3> {
+        None
+    }
+}
+
+fn horizon(seen_s: f64) -> Option<Horizon> {
+    Some(Horizon { seen_s, sigma: HORIZON_SIGMA })
+}
+
+type Begin<'a> = Box<dyn Fn() -> Box<dyn Estimator> + 'a>;
+
+/// Method, setting, on what, and the estimator at its start; the first is the product's.
+fn ways<'a>(
+    with: &'a Recording,
+    without: &'a Recording,
+) -> Vec<(&'static str, &'static str, &'a Recording, Begin<'a>)> {
+    const OURS: &str = "VQF and error-state filter";
+    const SHARE: &str = "rates and a fixed share";
+    let share = |share: f64| -> Begin<'a> { Box::new(move || Box::new(FixedShare { share, last: None })) };
+    vec![
+        (OURS, "with horizon", with, Box::new(|| Box::new(product()))),
+        (OURS, "without", without, Box::new(|| Box::new(product()))),
+        (SHARE, "0.02 of each horizon", with, share(0.02)),
+        (SHARE, "0.2 of each horizon", with, share(0.2)),
+        (SHARE, "all of each horizon", with, share(1.0)),
+    ]
+}
+
+fn half_seen(bench: &mut Bench, sea: Sea, seen_s: f64) {
+    let recording = |aid| Recording::new(sea, Unit::Usual, (aid, Heading::Start), 300.0, 3);
+    let (with, without) = (recording(horizon(seen_s)), recording(None));
+    let ways =
+        ways(&with, &without).into_iter().enumerate().map(|(i, (method, setting, recording, begin))| {
+            let [rms, worst] = outcome(recording, &mut *begin()).up_deg;
+            let work = move || {
+                let mut last = DQuat::IDENTITY;
+                recording.run(&mut *begin(), |_, found, _| last = found);
+                last
+            };
+            let way =
+                Way::new(method, setting, rms, recording.samples.len(), work).holds(size_of::<Attitude>());
+            way.default_if(i == 0).note(format!("worst {worst:.3} deg"))
+        });
+    bench.scene(&format!("horizon seen for {seen_s} s, then not, {}", sea.name), "deg", 1e-3, ways.collect());
+}
+
+/// Runs of several seeds, their worst figures and all squares over variances.
+fn drawn(bench: &Bench, sea: Sea, seen_s: f64) -> Outcome {
+    let seeds = if bench.is_quick() { 4 } else { 24 };
+    let mut all = Outcome::default();
+    for seed in 0..seeds {
+        let recording = Recording::new(sea, Unit::Drawn, (horizon(seen_s), Heading::Start), 400.0, seed);
+        let one = outcome(&recording, &mut product());
+        all.up_deg[0] += one.up_deg[0].powi(2) / seeds as f64;
+        all.up_deg[1] = all.up_deg[1].max(one.up_deg[1]);
+        all.surprises.extend(one.surprises);
+    }
+    all.up_deg[0] = all.up_deg[0].sqrt();
+    all
+}
+
+fn consistency(bench: &mut Bench) {
+    for (sea, seen_s) in [
+        (ship::CALM, 10.0),
+        (ship::SEA_4, 10.0),
+        (ship::SEA_6, 10.0),
+        (ship::CALM, 60.0),
+        (ship::SEA_4, 60.0),
+        (ship::SEA_6, 60.0),
+    ] {
+        let all = drawn(bench, sea, seen_s);
+        let n = all.surprises.len();
+        let mean = all.surprises.iter().sum::<f64>() / n as f64;
+        let [low, high] = bounds(n);
+        let inside = all.surprises.iter().filter(|s| **s < 5.99).count() as f64 / n as f64;
+        let note = format!(
+            "up {:.3} deg rms, worst {:.3}; square over variance {mean:.2} in the mean (95 % bounds of {n} independent ones {low:.2} to \
+             {high:.2}); {:.0} % within the 95 % ellipse",
+            all.up_deg[0],
+            all.up_deg[1],
+            100.0 * inside
+        );
+        let tried =
+            Tried::product("VQF and error-state filter", "errors drawn from its own", mean).note(note);
+        let case = format!("square over variance, two is right: {}, horizon {seen_s} s, then none", sea.name);
+        bench.extreme(&case, "", vec![tried]);
+    }
+}
+
+fn headings(bench: &mut Bench) {
+    let noise = 0.05f64.to_radians();
+    for (case, heading) in [
+        ("heading, nothing sees it", Heading::Start),
+        ("heading, a coast is seen that stands still", Heading::Anchored(noise, 1e-6)),
+        ("heading, a coast is seen that turns by 0.02 deg/s", Heading::Anchored(noise, 0.02f64.to_radians())),
+        ("heading, a compass with 0.3 deg of noise", Heading::Compass(0.3f64.to_radians())),
+    ] {
+        let recording = Recording::new(ship::SEA_4, Unit::Usual, (horizon(10.0), heading), 400.0, 5);
+        let tried = [("VQF and error-state filter", true, 0.0), ("rates and a fixed share", false, 0.1)].map(
+            |(method, ours, share)| {
+                let mut estimator: Box<dyn Estimator> =
+                    if ours { Box::new(product()) } else { Box::new(FixedShare { share, last: None }) };
+                let [rms, worst] = outcome(&recording, &mut *estimator).heading_deg;
+                let setting = if ours { "for a gun" } else { "a tenth of each" };
+                Tried { default: ours, ..Tried::rival(method, setting, rms) }
+                    .note(format!("worst {worst:.3} deg in 400 s"))
+            },
+        );
+        bench.extreme(case, "deg", tried.into());
+    }
+}
+
+/// What is wrong with a recording's samples: its name and what does it.
+type Damage = (&'static str, fn(&mut Vec<Sample>));
+
+const DAMAGES: [Damage; 8] = [
+    ("nothing wrong", |_| ()),
+    ("10 ms missing once a second", |all| all.retain(|s| s.time_s % 1.0 > 0.010)),
+    ("0.8 s missing once in 20 s", |all| all.retain(|s| s.time_s % 20.0 > 0.8)),
+    ("5 s missing once in 60 s", |all| all.retain(|s| s.time_s % 60.0 > 5.0)),
+    ("every tenth comes twice", |all| {
+        *all = all.iter().enumerate().flat_map(|(i, s)| vec![*s; if i % 10 == 0 { 2 } else { 1 }]).collect();
+    }),
+    ("every tenth comes after the next", |all| {
+        all.chunks_exact_mut(10).for_each(|ten| ten.swap(8, 9));
+    }),
+    ("recoil, 30 g for 5 ms, bursts of ten rounds a second", |all| {
+        for s in all.iter_mut().filter(|s| s.time_s % 30.0 < 3.0 && s.time_s % 0.1 < 0.005) {
+            s.accel += DVec3::new(-300.0, 0.0, 40.0);
+        }
+    }),
+    ("gyro clips at 40 deg/s, slews are 60", |all| {
+        let range = 40f64.to_radians();
+        all.iter_mut().for_each(|s| s.rate = s.rate.clamp(DVec3::splat(-range), DVec3::splat(range)));
+    }),
+];
+
+fn damaged(bench: &mut Bench) {
+    for (name, damage) in DAMAGES {
+        for (aid, aids) in [("no horizon", None), ("horizon for 10 s of 20", horizon(10.0))] {
+            let mut recording = Recording::new(ship::SEA_4, Unit::Usual, (aids, Heading::Start), 300.0, 9);
+            damage(&mut recording.samples);
+            let tried = [("VQF and error-state filter", true), ("rates and a fixed share", false)].map(
+                |(method, ours)| {
+                    let mut estimator: Box<dyn Estimator> = if ours {
+                        Box::new(product())
+                    } else {
+                        Box::new(FixedShare { share: 0.02, last: None })
+                    };
+                    let out = outcome(&recording, &mut *estimator);
+                    Tried { default: ours, ..Tried::rival(method, aid, out.up_deg[1]) }
+                        .note(format!("up {:.3} deg rms", out.up_deg[0]))
+                },
+            );
+            bench.extreme(&format!("sea 4, {name}"), "deg", tried.into());
+        }
+    }
+}
+
+/// Latitude of 50 degrees: the Earth's turn in axes east, north, up, rad/s.
+const EARTH: DVec3 = DVec3::new(0.0, 4.687e-5, 5.586e-5);
+
+/// A day at sea with the Earth's turn, a horizon half of the time and a compass: nothing may grow.
+fn day(bench: &mut Bench) {
+    let hours: f64 = if bench.is_quick() { 1.0 } else { 24.0 };
+    let errors = Errors { rate_hz: 50.0, earth: EARTH, ..Errors::usual() };
+    let ship = Ship::new(ship::SEA_4, true, 3);
+    let aids = Aids::usual(horizon(300.0), Heading::Compass(0.3f64.to_radians()));
+    let seconds = hours * 3600.0;
+    let part_s = (seconds / 4.0).min(3600.0);
+    let mut estimator = product();
+    // Squares of up's error in the first and the last part after a minute; worst; norm; least variance over the largest.
+    let (mut first, mut last) = ([0.0; 2], [0.0; 2]);
+    let (mut worst, mut heading, mut norm, mut thin) = (0.0f64, 0.0f64, 0.0f64, f64::INFINITY);
+    let mut heap = [0usize; 2];
+    aids.run(ship::stream(&ship, &errors, seconds, 5), &mut estimator, |s, found, estimator| {
+        norm = norm.max((found.length() - 1.0).abs());
+        if s.time_s < 60.0 {
+            return;
+        }
+        let tilt = ship::inclination_error(s.truth.world_from_imu, found).to_degrees();
+        worst = worst.max(tilt);
+        heading = heading.max(ship::heading_error(s.truth.world_from_imu, found).abs().to_degrees());
+        if s.time_s < part_s {
+            first = [first[0] + tilt * tilt, first[1] + 1.0];
+            heap[0] = heap[0].max(crate::HEAP.current_usage());
+        } else if s.time_s > seconds - part_s {
+            last = [last[0] + tilt * tilt, last[1] + 1.0];
+            heap[1] = heap[1].max(crate::HEAP.current_usage());
+        }
+        if let Some(c) = estimator.covariance() {
+            thin = thin.min(c.determinant());
+        }
+    });
+    let rms = |[sum, count]: [f64; 2]| (sum / count).sqrt();
+    let note = format!(
+        "up {:.3} deg rms at first, {:.3} at last; heading worst {heading:.2} deg; norm within {norm:.0e} of 1; least determinant of the \
+         covariance {thin:.0e} rad^6; heap {} bytes more at last than at first",
+        rms(first),
+        rms(last),
+        heap[1].saturating_sub(heap[0])
+    );
+    let tried =
+        Tried::product("VQF and error-state filter", "horizon half of the time, compass", worst).note(note);
+    bench.extreme(&format!("{hours} h in sea 4 with the Earth's turn"), "deg", vec![tried]);
+}
+
+/// Measures the scenes and extreme cases.
+pub fn measure(bench: &mut Bench) -> Result<()> {
+    half_seen(bench, ship::SEA_4, 10.0);
+    half_seen(bench, ship::SEA_6, 10.0);
+    half_seen(bench, ship::SEA_6, 60.0);
+    consistency(bench);
+    headings(bench);
+    damaged(bench);
+    day(bench);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_horizon_half_of_the_time_is_enough_and_the_filter_knows_its_error() {
+        for (sea, seed) in [(ship::CALM, 1), (ship::SEA_4, 2), (ship::SEA_6, 3)] {
+            let recording = Recording::new(sea, Unit::Usual, (horizon(20.0), Heading::Start), 300.0, seed);
+            let run = outcome(&recording, &mut product());
+            assert!(run.up_deg[0] < 0.08 && run.up_deg[1] < 0.25, "{}: {:?}", sea.name, run.up_deg);
+            let mean = run.surprises.iter().sum::<f64>() / run.surprises.len() as f64;
+            assert!((0.1..4.0).contains(&mean), "{}: {mean}", sea.name);
+        }
+    }
+
+    #[test]
+    fn a_coast_holds_the_heading_that_a_bias_would_turn() {
+        let run = |heading| {
+            let recording = Recording::new(ship::SEA_4, Unit::Usual, (horizon(20.0), heading), 200.0, 2);
+            outcome(&recording, &mut product()).heading_deg[1]
+        };
+        let (free, held) = (run(Heading::Start), run(Heading::Anchored(5e-4, 1e-6)));
+        assert!(free > 3.0 && held < 0.3, "{free} {held}");
+    }
+}
