@@ -47,6 +47,8 @@ pub struct CalibrationFile {
     pub camera_from_imu: Provenance,
     /// Where the time offset comes from.
     pub time_offset: Provenance,
+    /// Where the shutter's readout time comes from; `None` where all rows are exposed at once.
+    pub shutter: Option<Provenance>,
     /// Where the boresight comes from.
     pub boresight: Provenance,
     /// Where the gyro's bias comes from.
@@ -64,6 +66,7 @@ impl CalibrationFile {
         calibration: Calibration,
     ) -> Self {
         let provenance = Provenance::new(made, how);
+        let rolling = calibration.readout_ns != 0;
         Self {
             made,
             source: source.into(),
@@ -74,6 +77,7 @@ impl CalibrationFile {
             lens: provenance.clone(),
             camera_from_imu: provenance.clone(),
             time_offset: provenance.clone(),
+            shutter: rolling.then(|| provenance.clone()),
             boresight: provenance.clone(),
             gyro_bias: provenance,
             calibration,

@@ -12,6 +12,7 @@
 //! | `[lens]` | `size_px = [width, height]`, `focal_px = [fx, fy]`, `focal_sigma_px`, `centre_px = [cx, cy]` (the centre of the first pixel is 0.5, 0.5), `radial = [k1, k2]`, `tangential = [p1, p2]` |
 //! | `[camera_from_imu]` | `rotation_wxyz`, `sigma_mrad = [x, y, z]` (about the camera's axes) |
 //! | `[time_offset]` | `offset_ms` (add to a frame's mid-exposure stamp to get the time on the unit's clock), `sigma_ms` |
+//! | `[shutter]` | `readout_ms` (from reading the picture's first row to its last, negative where the last is read first), `sigma_ms`; left out where all rows are exposed at once |
 //! | `[boresight]` | `right_deg`, `down_deg` (of the optical axis), `sigma_mrad`, `muzzle_m = [right, down, forward]` from the camera |
 //! | `[gyro_bias]` | `bias_deg_per_s = [x, y, z]` (subtracted from the rates, unit's axes), `sigma_deg_per_s` |
 //!

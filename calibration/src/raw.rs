@@ -27,6 +27,7 @@ struct RawFile {
     lens: RawLens,
     camera_from_imu: RawRotation,
     time_offset: RawTimeOffset,
+    shutter: Option<RawShutter>,
     boresight: RawBoresight,
     gyro_bias: RawGyroBias,
 }
@@ -59,6 +60,16 @@ struct RawRotation {
 #[serde(deny_unknown_fields)]
 struct RawTimeOffset {
     offset_ms: Spanned<f64>,
+    sigma_ms: Spanned<f64>,
+    measured: Spanned<Datetime>,
+    #[serde(default)]
+    how: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawShutter {
+    readout_ms: Spanned<f64>,
     sigma_ms: Spanned<f64>,
     measured: Spanned<Datetime>,
     #[serde(default)]
@@ -104,6 +115,11 @@ pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationErr
             &raw.time_offset.measured,
             &raw.time_offset.how,
         )?,
+        shutter: raw
+            .shutter
+            .as_ref()
+            .map(|shutter| at.provenance("shutter.measured", &shutter.measured, &shutter.how))
+            .transpose()?,
         boresight: at.provenance("boresight.measured", &raw.boresight.measured, &raw.boresight.how)?,
         gyro_bias: at.provenance("gyro_bias.measured", &raw.gyro_bias.measured, &raw.gyro_bias.how)?,
         calibration: at.calibration(&raw)?,
@@ -128,6 +144,9 @@ pub(crate) fn ns_from_ms(ms: f64) -> i64 {
 /// How far a quaternion's length may be off before it is taken for a typing error, and from where it is left as it stands.
 const NORM_TOLERANCE: f64 = 1e-3;
 const NORM_EXACT: f64 = 1e-14;
+
+/// No camera of 10 pictures a second or more takes longer to read one.
+const READOUT_MS_MAX: f64 = 100.0;
 
 struct Place<'a> {
     text: &'a str,
@@ -225,18 +244,21 @@ impl Place<'_> {
         }
     }
 
+    /// The same in milliseconds, to nanoseconds.
+    fn sigma_ns(&self, key: &'static str, raw: &Spanned<f64>, high_ms: f64) -> Result<i64, CalibrationError> {
+        let ns = ns_from_ms(self.one_sigma(key, raw, high_ms)?);
+        if ns < 1 {
+            return Err(self.refuse(key, raw, "is below a nanosecond, the resolution of all times"));
+        }
+        Ok(ns)
+    }
+
     fn calibration(&self, raw: &RawFile) -> Result<Calibration, CalibrationError> {
         let offset_ms =
             self.one_within("time_offset.offset_ms", &raw.time_offset.offset_ms, -10_000.0, 10_000.0)?;
         let time_offset_sigma_ns =
-            ns_from_ms(self.one_sigma("time_offset.sigma_ms", &raw.time_offset.sigma_ms, 10_000.0)?);
-        if time_offset_sigma_ns < 1 {
-            return Err(self.refuse(
-                "time_offset.sigma_ms",
-                &raw.time_offset.sigma_ms,
-                "is below a nanosecond, the resolution of all times",
-            ));
-        }
+            self.sigma_ns("time_offset.sigma_ms", &raw.time_offset.sigma_ms, 10_000.0)?;
+        let (readout_ns, readout_sigma_ns) = self.shutter(raw.shutter.as_ref())?;
         let right = self.one_within("boresight.right_deg", &raw.boresight.right_deg, -80.0, 80.0)?;
         let down = self.one_within("boresight.down_deg", &raw.boresight.down_deg, -80.0, 80.0)?;
         let bias = self.within("gyro_bias.bias_deg_per_s", &raw.gyro_bias.bias_deg_per_s, -100.0, 100.0)?;
@@ -251,6 +273,8 @@ impl Place<'_> {
             camera_from_imu_sigma: DVec3::from_array(rotation_sigma.map(radians_from_mrad)),
             time_offset_ns: ns_from_ms(offset_ms),
             time_offset_sigma_ns,
+            readout_ns,
+            readout_sigma_ns,
             boresight: DVec2::new(right.to_radians(), down.to_radians()),
             boresight_sigma: radians_from_mrad(boresight_sigma),
             muzzle_in_camera: DVec3::from_array(self.within(
@@ -262,6 +286,14 @@ impl Place<'_> {
             gyro_bias: DVec3::from_array(bias.map(f64::to_radians)),
             gyro_bias_sigma: DVec3::from_array(bias_sigma.map(f64::to_radians)),
         })
+    }
+
+    /// Readout time and its deviation, nanoseconds; without the section all rows are exposed at once.
+    fn shutter(&self, raw: Option<&RawShutter>) -> Result<(i64, i64), CalibrationError> {
+        let Some(raw) = raw else { return Ok((0, 0)) };
+        let readout =
+            self.one_within("shutter.readout_ms", &raw.readout_ms, -READOUT_MS_MAX, READOUT_MS_MAX)?;
+        Ok((ns_from_ms(readout), self.sigma_ns("shutter.sigma_ms", &raw.sigma_ms, READOUT_MS_MAX)?))
     }
 
     fn rotation(&self, raw: &Spanned<[f64; 4]>) -> Result<DQuat, CalibrationError> {
@@ -296,6 +328,7 @@ impl Place<'_> {
             centre,
             radial: DVec2::from_array(self.within("lens.radial", &raw.radial, -100.0, 100.0)?),
             tangential: DVec2::from_array(self.within("lens.tangential", &raw.tangential, -10.0, 10.0)?),
+            row_turn: DVec3::ZERO,
         };
         if let Some(corner) = unseen_corner(&lens) {
             let problem = format!(

@@ -11,6 +11,7 @@ pub fn to_toml(file: &CalibrationFile) -> String {
     let _ = header(&mut out, file);
     let _ = lens(&mut out, file);
     let _ = alignment(&mut out, file);
+    let _ = shutter(&mut out, file);
     let _ = boresight(&mut out, file);
     let _ = gyro_bias(&mut out, file);
     out
@@ -62,6 +63,18 @@ fn alignment(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
     writeln!(out, "offset_ms = {:?}", ms(c.time_offset_ns))?;
     writeln!(out, "sigma_ms = {:?}", ms(c.time_offset_sigma_ns))?;
     provenance(out, &file.time_offset)
+}
+
+fn shutter(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
+    let Some(shutter) = &file.shutter else { return Ok(()) };
+    section(
+        out,
+        "shutter",
+        "From reading the picture's first row to its last; negative where the last is read first.",
+    )?;
+    writeln!(out, "readout_ms = {:?}", ms(file.calibration.readout_ns))?;
+    writeln!(out, "sigma_ms = {:?}", ms(file.calibration.readout_sigma_ns))?;
+    provenance(out, shutter)
 }
 
 fn boresight(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {

@@ -89,6 +89,23 @@ fn mistakes_are_refused_with_their_place() {
 }
 
 #[test]
+fn a_rolling_shutter_is_optional_and_checked() {
+    let global = example();
+    assert_eq!((global.calibration.readout_ns, &global.shutter), (0, &None));
+    let section = "\n[shutter]\nreadout_ms = -21.5\nsigma_ms = 0.2\nmeasured = 2026-11-19\n";
+    let rolling = parse(&format!("{EXAMPLE}{section}"), "rolling").unwrap();
+    assert_eq!(
+        (rolling.calibration.readout_ns, rolling.calibration.readout_sigma_ns),
+        (-21_500_000, 200_000)
+    );
+    assert_eq!(parse(&to_toml(&rolling), "again").unwrap(), rolling);
+    for (from, to, says) in [("-21.5", "-2150", "shutter.readout_ms"), ("= 0.2", "= 0", "shutter.sigma_ms")] {
+        let message = parse(&format!("{EXAMPLE}{}", section.replace(from, to)), "x").unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
+    }
+}
+
+#[test]
 fn writing_keeps_the_former_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("calibration.toml");
@@ -173,6 +190,9 @@ prop_compose! {
         camera_from_imu_sigma in sigma3(),
         time_offset_ns in -10_000_000_000i64..=10_000_000_000,
         time_offset_sigma_ns in 1i64..1_000_000_000,
+        readout_ns in -100_000_000i64..=100_000_000,
+        readout_sigma_ns in 1i64..1_000_000,
+        rolling in any::<bool>(),
         boresight in [-0.5..0.5, -0.5..0.5f64],
         boresight_sigma in 1e-6..0.1f64,
         muzzle_in_camera in vec3(-3.0, 3.0),
@@ -186,6 +206,8 @@ prop_compose! {
             camera_from_imu_sigma,
             time_offset_ns,
             time_offset_sigma_ns,
+            readout_ns: if rolling { readout_ns } else { 0 },
+            readout_sigma_ns: if rolling { readout_sigma_ns } else { 0 },
             boresight: DVec2::from_array(boresight),
             boresight_sigma,
             muzzle_in_camera,
@@ -199,14 +221,15 @@ prop_compose! {
     fn calibration_file()(
         made in date(),
         texts in [text(20), text(20), text(20), text(20), text(20)],
-        sections in [provenance(), provenance(), provenance(), provenance(), provenance()],
+        sections in [provenance(), provenance(), provenance(), provenance(), provenance(), provenance()],
         calibration in calibration(),
     ) -> CalibrationFile {
         let [source, camera_name, camera_serial, imu_name, imu_serial] = texts;
-        let [lens, camera_from_imu, time_offset, boresight, gyro_bias] = sections;
+        let [lens, camera_from_imu, time_offset, shutter, boresight, gyro_bias] = sections;
+        let shutter = (calibration.readout_sigma_ns > 0).then_some(shutter);
         CalibrationFile {
             made, source, camera_name, camera_serial, imu_name, imu_serial,
-            lens, camera_from_imu, time_offset, boresight, gyro_bias, calibration,
+            lens, camera_from_imu, time_offset, shutter, boresight, gyro_bias, calibration,
         }
     }
 }

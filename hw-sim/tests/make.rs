@@ -13,7 +13,9 @@ use bowwave_core::{
 };
 use bowwave_record::{Entry, RecordingReader};
 use glam::{DVec2, DVec3};
-use hw_sim::make::{DEVICE_LOOP_KEY, MakeError, Recipe, START, Studio, calibration, imu_samples, make};
+use hw_sim::make::{
+    DEVICE_LOOP_KEY, MakeError, Periodic, Recipe, START, Studio, calibration, imu_samples, make,
+};
 
 const WIDTH: u32 = 320;
 const HEIGHT: u32 = 180;
@@ -92,6 +94,31 @@ fn the_horizon_is_where_the_truth_says() {
     }
     assert!(worst < 0.3, "worst {worst} px");
     assert!((sum / count).abs() < 0.15, "mean {} px", sum / count);
+}
+
+/// A gun that is elevated at 40 deg/s while its shutter takes 30 ms, on a ship with a list: the horizon runs over many rows.
+#[test]
+fn a_rolling_shutter_sees_each_row_at_its_own_time() {
+    let mut recipe = clean();
+    recipe.camera.readout_ns = 30_000_000;
+    recipe.ship.roll = Periodic::new(0.3, &[]);
+    recipe.gun.traverse = Periodic::default();
+    recipe.gun.elevation = Periodic::new(-0.02, &[(1, 40f64.to_radians() / std::f64::consts::PI, 0.0)]);
+    let (studio, motion) = (Studio::new(&recipe).unwrap(), recipe.motion());
+    for frame in [0, 10] {
+        let (truth, rgb) = studio.shoot_rgb(frame);
+        let time = f64::from(frame) / recipe.frame_rate_hz + recipe.exposure_delay_s();
+        let [from, to] = [-0.015, 0.015].map(|t| motion.at(time + t).pose.world_from_camera);
+        let rolling = recipe.lens().read_while((from.inverse() * to).to_scaled_axis());
+        let (mut worst, mut ignored) = (0.0f64, 0.0f64);
+        for x in (5..WIDTH - 5).step_by(10) {
+            let expected = predicted_row(&rolling, truth.world_from_camera, truth.position.z, x);
+            worst = worst.max((horizon_row(&rgb, x, expected) - expected).abs());
+            let global = predicted_row(&recipe.lens(), truth.world_from_camera, truth.position.z, x);
+            ignored = ignored.max((global - expected).abs());
+        }
+        assert!(worst < 0.35 && ignored > 1.5, "frame {frame}: off by {worst} px, ignored {ignored} px");
+    }
 }
 
 /// What a session would make of the default's samples: clock mapped, orientation at each frame's exposure.

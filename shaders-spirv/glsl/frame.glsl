@@ -13,6 +13,7 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec4 sky;         // the same, seeing only the upper sky
     vec4 sea;         // the same, seeing only the sea
     vec4 horizon;     // radiance of the horizon
+    vec4 row_turn;    // the camera's turn from row to row while a rolling shutter reads, radians about its axes
 } frame;
 
 // Pixels to clip space.

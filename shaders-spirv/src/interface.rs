@@ -43,10 +43,12 @@ pub struct FrameBlock {
     pub sea: [f32; 4],
     /// Radiance of the horizon.
     pub horizon: [f32; 4],
+    /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is unused.
+    pub row_turn: [f32; 4],
 }
 layout!(
     FrameBlock,
-    112,
+    128,
     focal = 0,
     centre = 8,
     radial = 16,
@@ -58,6 +60,7 @@ layout!(
     sky = 64,
     sea = 80,
     horizon = 96,
+    row_turn = 112,
 );
 
 /// One drawn boat: `BoatBlock`, set 0, binding 1, std140. Planes and directions are in the boat's space.

@@ -10,7 +10,7 @@ mod model;
 mod start;
 
 use bowwave_core::geometry::Lens;
-use glam::{DMat3, DVec2};
+use glam::{DMat3, DVec2, DVec3};
 
 pub use model::Model;
 pub use start::BoardPose;
@@ -142,6 +142,7 @@ impl Camera {
             centre: DVec2::new(cx, cy),
             radial: DVec2::new(k1, k2),
             tangential: DVec2::new(p1, p2),
+            row_turn: DVec3::ZERO,
         })
     }
 

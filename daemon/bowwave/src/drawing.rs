@@ -22,6 +22,7 @@ pub fn config(plan: &ScenePlan, gpu: Option<String>, validation: bool) -> Render
             wakes_max: only(Pass::Wake, plan.moving),
             rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
             waters,
+            optics: plan.optics,
         },
         picture: Some(PictureShape { format: plan.video, width: plan.picture.0, height: plan.picture.1 }),
         time_outs: TimeOuts::default(),

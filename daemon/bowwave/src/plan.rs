@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use bowwave_core::{
     event::PixelFormat,
+    geometry::Optics,
     model::Model,
     plan::{Needs, ScenePlan},
     scenario::{self, Scenario},
@@ -74,6 +75,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         size: arguments.size,
         video: PixelFormat::Rgb,
         picture: arguments.size,
+        optics: Optics::default(),
         water: scenario.water,
         boats: scenario.boats.len(),
         moving: scenario.boats.iter().filter(|b| b.course.speed_max_m_s() > 0.0).count(),

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::geometry::Lens;
+use crate::geometry::{Lens, Optics};
 
 /// Everything that maintainers measure about one camera and one inertial unit on one mount.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +19,11 @@ pub struct Calibration {
     pub time_offset_ns: i64,
     /// Standard deviation of the time offset, nanoseconds.
     pub time_offset_sigma_ns: i64,
+    /// From reading the picture's first row to reading its last, nanoseconds; negative where the last comes first, zero where all are
+    /// exposed at once.
+    pub readout_ns: i64,
+    /// Standard deviation of that, nanoseconds; zero where all are exposed at once.
+    pub readout_sigma_ns: i64,
     /// Where the barrel points in the camera's picture: angles right of and below the optical axis, radians.
     pub boresight: DVec2,
     /// Standard deviation of the boresight, radians.
@@ -32,6 +37,11 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// What drawing through its lens and shutter has to follow.
+    pub fn optics(&self) -> Optics {
+        Optics { rolling: self.readout_ns != 0, ..self.lens.optics() }
+    }
+
     /// The barrel's direction in the camera's space, a unit vector.
     pub fn bore_in_camera(&self) -> DVec3 {
         DVec3::new(self.boresight.x.tan(), self.boresight.y.tan(), 1.0).normalize()

@@ -2,6 +2,7 @@
 
 use crate::{
     event::PixelFormat,
+    geometry::Optics,
     scene::{BoatView, LeftOut, Pass, PassDecision, ReflectionMethod, RoundView, ShadowLevel, Water},
     sea::BeaufortForce,
 };
@@ -31,6 +32,8 @@ pub struct ScenePlan {
     pub video: PixelFormat,
     /// The camera's picture size; equal to the screen's leaves out the scaling variant.
     pub picture: (u32, u32),
+    /// What of the lens and shutter has to be followed; one variant of what draws boats is compiled.
+    pub optics: Optics,
 }
 
 /// What decides on a plan.
@@ -42,6 +45,8 @@ pub struct Needs {
     pub video: PixelFormat,
     /// The camera's picture size.
     pub picture: (u32, u32),
+    /// What its lens and shutter do.
+    pub optics: Optics,
     /// How the sea is asked to mirror.
     pub water: Water,
     /// Number of boats in the scenario.
@@ -91,6 +96,7 @@ impl ScenePlan {
             moving: needs.moving,
             video: needs.video,
             picture: needs.picture,
+            optics: needs.optics,
         }
     }
 
@@ -135,6 +141,7 @@ mod tests {
             size: (1280, 720),
             video: PixelFormat::Rgb,
             picture: (1280, 720),
+            optics: Optics::default(),
             water: Water {
                 method: ReflectionMethod::Full,
                 force: BeaufortForce::new(2).unwrap(),

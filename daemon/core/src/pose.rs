@@ -131,6 +131,16 @@ impl PoseHistory {
         Ok(OrientationAt { world_from_imu: (self.turned * world_from_imu).normalize(), provenance })
     }
 
+    /// The turn from half of `span_ns` before `time` to half of it after, radians about the unit's axes at `time`; `None` where one end
+    /// is not known.
+    pub fn turn_over(&self, time: Time, span_ns: i64) -> Option<DVec3> {
+        let end = |ns| self.kept_at(time.plus_ns(ns)).ok().map(|at| at.world_from_imu);
+        let (from, to) = (end(-span_ns / 2)?, end(span_ns / 2)?);
+        let turn = from.inverse() * to;
+        // The shorter way round: q and -q are the same.
+        Some((if turn.w < 0.0 { -turn } else { turn }).to_scaled_axis())
+    }
+
     fn kept_at(&self, time: Time) -> Result<OrientationAt, NoPose> {
         let after = self.samples.partition_point(|s| s.time < time);
         match (after.checked_sub(1).and_then(|i| self.samples.get(i)), self.samples.get(after)) {
@@ -230,6 +240,16 @@ mod tests {
             let truth = DQuat::from_rotation_z(rate * ns as f64 * 1e-9);
             prop_assert!(q.angle_between(truth) < 1e-7);
             prop_assert!((q.length() - 1.0).abs() < 1e-12);
+        }
+
+        #[test]
+        fn a_constant_turn_is_the_same_before_and_after(rate in -3.0..3.0f64, ns in 20_000_000i64..550_000_000) {
+            let h = turning(rate, 100);
+            let turn = h.turn_over(Time::from_ns(ns), 30_000_000).unwrap();
+            prop_assert!((turn - DVec3::Z * rate * 0.03).length() < 1e-9);
+            let back = h.turn_over(Time::from_ns(ns), -30_000_000).unwrap();
+            prop_assert!((turn + back).length() < 1e-9);
+            prop_assert!(h.turn_over(Time::from_ns(ns + 600_000_000), 30_000_000).is_none());
         }
 
         #[test]

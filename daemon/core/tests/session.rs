@@ -54,6 +54,8 @@ fn calibration() -> Calibration {
         camera_from_imu_sigma: DVec3::splat(1e-3),
         time_offset_ns: 4 * MS,
         time_offset_sigma_ns: MS,
+        readout_ns: 0,
+        readout_sigma_ns: 0,
         boresight: DVec2::ZERO,
         boresight_sigma: 1e-3,
         muzzle_in_camera: DVec3::ZERO,

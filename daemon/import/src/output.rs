@@ -96,6 +96,8 @@ fn assumed((width, height): (u32, u32), options: &ImportOptions) -> CalibrationF
         camera_from_imu_sigma: DVec3::splat(1.0),
         time_offset_ns: 0,
         time_offset_sigma_ns: 50_000_000,
+        readout_ns: 0,
+        readout_sigma_ns: 0,
         boresight: DVec2::ZERO,
         boresight_sigma: 0.1,
         muzzle_in_camera: DVec3::ZERO,

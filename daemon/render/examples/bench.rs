@@ -200,6 +200,7 @@ impl Running {
                 rounds_max: scene.rounds.len(),
                 wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
                 waters: water.into_iter().collect(),
+                optics: scene.lens.optics(),
             },
             picture: None,
             time_outs: TimeOuts::default(),

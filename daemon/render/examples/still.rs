@@ -84,6 +84,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             rounds_max: 8,
             wakes_max: 8,
             waters: vec![(method, scene.water.shadow)],
+            optics: scene.lens.optics(),
         },
         picture: None,
         time_outs: TimeOuts::default(),

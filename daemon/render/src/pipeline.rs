@@ -209,6 +209,8 @@ pub(crate) enum Blend {
 pub(crate) struct PipelineShape<'a> {
     pub(crate) vertex: Shader,
     pub(crate) fragment: Shader,
+    /// Vertex shader's specialisation constants, from 0 on.
+    pub(crate) vertex_constants: &'a [u32],
     /// Fragment shader's specialisation constants, from 0 on.
     pub(crate) constants: &'a [u32],
     pub(crate) sets: &'a [&'a SetLayout],
@@ -234,6 +236,7 @@ impl<'a> PipelineShape<'a> {
         Self {
             vertex,
             fragment,
+            vertex_constants: &[],
             constants: &[],
             sets,
             push: size_of::<DrawBlock>(),
@@ -287,15 +290,19 @@ impl Pipeline {
         vertex: &Module,
         fragment: &Module,
     ) -> Result<vk::Pipeline, RenderError> {
-        let entries = entries(shape.constants);
+        let [for_vertices, for_fragments] = [shape.vertex_constants, shape.constants].map(entries);
+        let vertex_special = vk::SpecializationInfo::default()
+            .map_entries(&for_vertices)
+            .data(bytemuck::cast_slice(shape.vertex_constants));
         let special = vk::SpecializationInfo::default()
-            .map_entries(&entries)
+            .map_entries(&for_fragments)
             .data(bytemuck::cast_slice(shape.constants));
         let stages = [
             vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::VERTEX)
                 .module(vertex.raw)
-                .name(c"main"),
+                .name(c"main")
+                .specialization_info(&vertex_special),
             vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::FRAGMENT)
                 .module(fragment.raw)

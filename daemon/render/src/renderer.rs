@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 use bowwave_core::{
     event::Picture,
+    geometry::Optics,
     model::Model,
     scene::{Pass, ReflectionMethod, Scene, ShadowLevel, Water},
 };
@@ -49,6 +50,8 @@ pub struct Needs {
     pub wakes_max: usize,
     /// How the sea may have to mirror.
     pub waters: Vec<(ReflectionMethod, ShadowLevel)>,
+    /// What lens and shutter of the camera do.
+    pub optics: Optics,
 }
 
 impl Needs {
@@ -167,7 +170,14 @@ impl Renderer {
         let textured = models.iter().filter(|m| m.texture.is_some()).count();
         let sets = SetPool::new(&gpu, u32::try_from(count + textured + 16).unwrap_or(u32::MAX), 4)?;
         let frame_set = frame_set_layout(&gpu)?;
-        let making = Making { gpu: &gpu, frame_set: &frame_set, pool: &sets, size, slots: count };
+        let making = Making {
+            gpu: &gpu,
+            frame_set: &frame_set,
+            pool: &sets,
+            size,
+            slots: count,
+            optics: config.needs.optics,
+        };
         let canvas = Canvas::new(&making)?;
         let passes = Passes::new(&making, config, models)?;
         let needs = config.needs.clone();

@@ -28,6 +28,7 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         sky: light(sky),
         sea: light(sea),
         horizon: light(horizon),
+        row_turn: lens.row_turn.extend(0.0).as_vec4().to_array(),
     }
 }
 

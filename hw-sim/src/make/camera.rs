@@ -46,6 +46,8 @@ pub(super) struct Camera {
     quality: u8,
     seed: u64,
     level_focal: f32,
+    /// Seconds from one row to the next.
+    row_s: f64,
 }
 
 /// Memory for one frame.
@@ -91,30 +93,40 @@ impl Camera {
             quality: recipe.camera.jpeg_quality,
             seed: mix(recipe.seed),
             level_focal: level_focal(&lens),
+            row_s: recipe.camera.readout_ns as f64 * 1e-9 / f64::from(lens.height),
             lens,
         }
     }
 
-    /// Draws what the camera sees of `scene` from `pose` into `memory.rgb`.
+    /// Draws what the camera sees of `scene` from `pose` into `memory.rgb`; `turned` is how it is turned so many seconds later.
     pub fn expose(
         &self,
         scene: &Scene,
         surface: &Surface,
-        pose: &CameraPose,
+        (pose, turned): (&CameraPose, &dyn Fn(f64) -> DQuat),
         frame: u32,
         memory: &mut FrameMemory,
     ) {
         let forward = pose.world_from_camera * DVec3::Z;
         let azimuth = forward.x.atan2(forward.y);
         let level_from_world = look(azimuth, 0.0, 0.0).inverse();
-        let turn = Mat3::from_quat((level_from_world * pose.world_from_camera).normalize().as_quat());
+        let middle = f64::from(self.lens.height) / 2.0;
+        let turn = |row: usize| {
+            let world_from_camera = match self.row_s {
+                0.0 => pose.world_from_camera,
+                row_s => turned((row as f64 + 0.5 - middle) * row_s),
+            };
+            Mat3::from_quat((level_from_world * world_from_camera).normalize().as_quat())
+        };
+        let turns: Vec<Mat3> = (0..self.lens.height as usize).map(turn).collect();
         let eye_height = pose.position.z as f32;
-        let view = self.level_view(turn, azimuth as f32, eye_height);
+        let view = self.level_view(&turns, azimuth as f32, eye_height);
         scene.water.draw(surface, &scene.sky, &view, eye_height, &mut memory.sea);
         let sun = (level_from_world * scene.sky.sun.as_dvec3()).as_vec3();
         let width = self.lens.width as usize;
         memory.rgb.resize(self.rays.len() * 3, 0);
-        for (y, (row, rays)) in memory.rgb.chunks_mut(width * 3).zip(self.rays.chunks(width)).enumerate() {
+        let rows = memory.rgb.chunks_mut(width * 3).zip(self.rays.chunks(width));
+        for (y, ((row, rays), turn)) in rows.zip(turns).enumerate() {
             let mut random = Pcg32::new(mix(self.seed ^ u64::from(frame)), y as u64);
             for (pixel, ray) in row.chunks_exact_mut(3).zip(rays) {
                 let light = light(scene, turn, *ray, &view, &memory.sea, sun);
@@ -123,15 +135,15 @@ impl Camera {
         }
     }
 
-    /// A level camera that sees all of the sea that the camera sees.
-    fn level_view(&self, turn: Mat3, azimuth: f32, eye_height: f32) -> LevelView {
+    /// A level camera that sees all of the sea that the camera sees, turned row by row.
+    fn level_view(&self, turns: &[Mat3], azimuth: f32, eye_height: f32) -> LevelView {
         let (w, h) = (self.lens.width as usize, self.lens.height as usize);
         let (mut left, mut right, mut lowest) = (0.0f32, 0.0f32, 0.0f32);
         let border =
             (0..w).flat_map(|x| [(x, 0), (x, h - 1)]).chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
         for (x, y) in border {
             let [nx, ny, _] = self.rays[y * w + x];
-            let d = turn * Vec3::new(nx, ny, 1.0);
+            let d = turns[y] * Vec3::new(nx, ny, 1.0);
             let (u, v) = (d.x / d.z.max(0.1), d.y / d.z.max(0.1));
             (left, right, lowest) = (left.min(u), right.max(u), lowest.max(v));
         }

@@ -6,7 +6,8 @@
 //! Times. All motion is a function of the host's clock. A frame with stamp s was exposed at
 //! s + [`Recipe::exposure_delay_s`]; the calibration's `time_offset` is that delay plus the least latency of the inertial
 //! unit's link, since that is how late the unit's clock seems to the host that maps it. The truth of a frame is the exact pose
-//! at its exposure, filed under its stamp. Exposures are instantaneous: motion does not blur.
+//! at its exposure, filed under its stamp. Exposures are instantaneous: motion does not blur. With a rolling shutter each row is exposed
+//! at a time of its own, the middle one at the frame's: the camera turns from row to row, waves and heave wait.
 //!
 //! The picture. Three tiles of waves (FFT of a directional spectrum) give heights and slopes; each column of a level camera
 //! walks outwards over them and paints what is not hidden; a patch of water mirrors the sky in all the facets too small to be

@@ -68,6 +68,9 @@ pub struct CameraRecipe {
     /// Add this to a frame's stamp to get the time on the inertial unit's host-mapped clock, nanoseconds. The pictures are
     /// sharp: motion within the exposure is not drawn.
     pub time_offset_ns: i64,
+    /// From reading the picture's first row to reading its last, nanoseconds; negative where the last is read first, zero where all
+    /// are exposed at once. The stamp is the middle row's.
+    pub readout_ns: i64,
     /// From the stamp to the picture's arrival at the host, nanoseconds, least and most.
     pub latency_ns: [i64; 2],
 }
@@ -168,6 +171,7 @@ impl Default for CameraRecipe {
             vignetting: 0.5,
             jpeg_quality: 86,
             time_offset_ns: 4_000_000,
+            readout_ns: 0,
             latency_ns: [12_000_000, 15_000_000],
         }
     }
@@ -273,6 +277,7 @@ impl Recipe {
         inside("camera.read_noise", camera.read_noise, 0.0, 0.1, "0 to 0.1")?;
         inside("camera.shot_noise", camera.shot_noise, 0.0, 0.1, "0 to 0.1")?;
         inside("camera.vignetting", camera.vignetting, 0.0, 1.0, "0 to 1")?;
+        inside("camera.readout_ns", camera.readout_ns as f64, -1e8, 1e8, "-100 to 100 ms")?;
         inside("camera.jpeg_quality", f64::from(camera.jpeg_quality), 1.0, 100.0, "1 to 100")?;
         inside("imu.clock_drift_ppm", self.imu.clock_drift_ppm, -400.0, 400.0, "-400 to 400 ppm")?;
         if let Some(swell) = &self.swell {

@@ -109,8 +109,9 @@ impl Studio {
             spare.unwrap_or_else(|| (self.field.surface(), FrameMemory::default()));
         let time_s = f64::from(frame) / self.frame_rate_hz + self.exposure_delay_s;
         let pose = self.motion.at(time_s).pose;
+        let turned = |after_s: f64| self.motion.at(time_s + after_s).pose.world_from_camera;
         self.field.evaluate(time_s, &mut surface);
-        self.camera.expose(&self.scene, &surface, &pose, frame, &mut memory);
+        self.camera.expose(&self.scene, &surface, (&pose, &turned), frame, &mut memory);
         let taken = take(&memory.rgb);
         if let Ok(mut spare) = self.spare.lock() {
             spare.push((surface, memory));

@@ -134,6 +134,8 @@ pub fn calibration(recipe: &Recipe) -> CalibrationFile {
         camera_from_imu_sigma: DVec3::splat(0.75e-3),
         time_offset_ns: recipe.camera.time_offset_ns,
         time_offset_sigma_ns: 150_000,
+        readout_ns: recipe.camera.readout_ns,
+        readout_sigma_ns: if recipe.camera.readout_ns == 0 { 0 } else { 100_000 },
         boresight: DVec2::ZERO,
         boresight_sigma: 0.5e-3,
         muzzle_in_camera: DVec3::new(0.0, 0.12, 0.6),

@@ -269,6 +269,8 @@ fn uncalibrated(config: &Config) -> Calibration {
         camera_from_imu_sigma: DVec3::ONE,
         time_offset_ns: 0,
         time_offset_sigma_ns: 100_000_000,
+        readout_ns: 0,
+        readout_sigma_ns: 0,
         boresight: DVec2::ZERO,
         boresight_sigma: 1.0,
         muzzle_in_camera: DVec3::ZERO,

@@ -161,6 +161,11 @@ impl Attitude {
         self.history.at(time)
     }
 
+    /// How the camera turns in the `span_ns` about `time`, radians about its axes; `None` where that is not known.
+    pub fn camera_turn(&self, time: Time, span_ns: i64) -> Option<DVec3> {
+        Some(self.camera_from_imu() * self.history.turn_over(time, span_ns)?)
+    }
+
     /// Time of the newest orientation.
     pub fn newest(&self) -> Option<Time> {
         self.history.newest()

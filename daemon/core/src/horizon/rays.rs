@@ -14,6 +14,8 @@ pub(super) struct Rays {
     made_for: Option<(Lens, DVec2)>,
     nodes: usize,
     rays: Vec<DVec3>,
+    /// The same for the middle row's camera where a rolling shutter was turned while it read; else empty.
+    turned: Vec<DVec3>,
     /// Largest distance from the axis of what is seen, tangent.
     pub reach: f64,
     /// Reduced pixels to a radian at the axis, down.
@@ -21,8 +23,22 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    /// Makes the table where lens or size have changed.
+    /// Makes the table where lens or size have changed; how the camera turned is another for each picture.
     pub fn make(&mut self, lens: &Lens, cells: &Cells) {
+        self.make_still(&Lens { row_turn: DVec3::ZERO, ..*lens }, cells);
+        self.turned.clear();
+        if lens.row_turn == DVec3::ZERO {
+            return;
+        }
+        let rows = f64::from(lens.height) / cells.size.y;
+        self.turned.extend_from_slice(&self.rays);
+        for node in 0..self.nodes {
+            let turn = lens.turned_at((node * SPACING) as f64 * rows);
+            self.turned.iter_mut().skip(node).step_by(self.nodes).for_each(|ray| *ray = turn * *ray);
+        }
+    }
+
+    fn make_still(&mut self, lens: &Lens, cells: &Cells) {
         let key = (*lens, cells.size);
         if self.made_for == Some(key) {
             return;
@@ -44,7 +60,8 @@ impl Rays {
     }
 
     fn column(&self, column: usize) -> &[DVec3] {
-        self.rays.get(column * self.nodes..(column + 1) * self.nodes).unwrap_or(&[])
+        let rays = if self.turned.is_empty() { &self.rays } else { &self.turned };
+        rays.get(column * self.nodes..(column + 1) * self.nodes).unwrap_or(&[])
     }
 
     /// Direction that the column sees at `row` (0 at the picture's upper edge), of about unit length, and its change from one

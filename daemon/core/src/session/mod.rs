@@ -153,6 +153,7 @@ impl Session {
             size: setup.screen,
             video: setup.video,
             picture: (width, height),
+            optics: setup.calibration.optics(),
             water: water_to_plan(scenario),
             boats: scenario.boats.len(),
             moving: scenario.boats.iter().filter(|b| b.course.speed_max_m_s() > 0.0).count(),
@@ -381,11 +382,11 @@ impl Session {
     /// Fills the scene; says whether the camera's pose was known.
     fn draw(&mut self, video_time: Time, frame_time: Time, picture_is_new: bool) -> bool {
         let camera = self.camera(self.sensors.orientation(video_time));
+        let lens = self.sensors.lens_at(video_time);
         if let (Some(camera), true, Some(frame)) = (&camera, picture_is_new, self.sensors.newest_frame()) {
-            let lens = &self.setup.calibration.lens;
-            self.meter.observe(video_time, &frame.picture, lens, camera);
+            self.meter.observe(video_time, &frame.picture, &lens, camera);
             if let Some(watch) = &mut self.watch {
-                watch.observe(video_time, &frame.picture, lens, camera);
+                watch.observe(video_time, &frame.picture, &lens, camera);
             }
         }
         self.follow_sea();
@@ -397,11 +398,12 @@ impl Session {
         scene.rounds.clear();
         if let (Some(camera), Some(running)) = (&camera, &self.running) {
             scene.camera = *camera;
+            scene.lens = lens.covering(self.setup.screen.0, self.setup.screen.1);
             // A computer that is too hot draws no reflections and wakes: half of the work.
             let cool = !self.faults.is_active(Fault::Thermal);
             let eye = Eye {
                 camera,
-                lens: &self.lens,
+                lens: &scene.lens,
                 visibility_m: self.setup.scenario.visibility_m,
                 wind: scene.wind,
                 reflections: cool && self.plan.has(Pass::Water) && sea_reflects(scene.water.force),

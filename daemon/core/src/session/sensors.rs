@@ -45,6 +45,7 @@ pub struct SensorCounts {
 #[derive(Debug)]
 pub struct Sensors {
     time_offset_ns: i64,
+    readout_ns: i64,
     lens: Lens,
     level: Level,
     clock: ClockMap,
@@ -60,6 +61,7 @@ impl Sensors {
     pub fn new(calibration: &Calibration, source: Source, eye_height_m: f64) -> Self {
         Self {
             time_offset_ns: calibration.time_offset_ns,
+            readout_ns: calibration.readout_ns,
             lens: calibration.lens,
             level: Level::new(eye_height_m),
             clock: ClockMap::new(),
@@ -116,7 +118,8 @@ impl Sensors {
     /// Looks for the horizon in the newest picture and corrects the orientation by it.
     pub fn level(&mut self) {
         if let (Some(frame), Some(time)) = (&self.frame, self.video_time()) {
-            self.level.look(time, &frame.picture, &self.lens, &mut self.attitude);
+            let lens = self.lens_at(time);
+            self.level.look(time, &frame.picture, &lens, &mut self.attitude);
             self.counts.horizons = self.level.counts();
         }
     }
@@ -124,6 +127,14 @@ impl Sensors {
     /// Rotation from the inertial unit's axes to the camera's, as it is known by now.
     pub fn camera_from_imu(&self) -> DQuat {
         self.attitude.camera_from_imu()
+    }
+
+    /// The lens of a picture exposed at `time`: with how the camera turned while a rolling shutter read it.
+    pub fn lens_at(&self, time: Time) -> Lens {
+        if self.readout_ns == 0 {
+            return self.lens;
+        }
+        self.attitude.camera_turn(time, self.readout_ns).map_or(self.lens, |turn| self.lens.read_while(turn))
     }
 
     /// The newest picture.
@@ -196,6 +207,8 @@ mod tests {
             camera_from_imu_sigma: DVec3::ONE,
             time_offset_ns: 2_000_000,
             time_offset_sigma_ns: 1,
+            readout_ns: 0,
+            readout_sigma_ns: 0,
             boresight: DVec2::ZERO,
             boresight_sigma: 0.001,
             muzzle_in_camera: DVec3::ZERO,

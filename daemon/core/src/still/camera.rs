@@ -109,6 +109,7 @@ impl StillCamera {
             centre,
             radial: self.radial,
             tangential: self.tangential,
+            row_turn: DVec3::ZERO,
         })
     }
 

@@ -133,6 +133,7 @@ impl Still {
             size,
             video: picture.format(),
             picture: size,
+            optics: lens.optics(),
             water: self.water,
             boats: self.boats.len(),
             moving: self.boats.iter().filter(|b| b.speed_m_s > 0.0).count(),

@@ -62,6 +62,7 @@ impl BoatPipelines {
         ];
         // A layer of codes holds roots, one of light is filtered as it is.
         let constants = [u32::from(colour == UNORM), samples.as_raw()];
+        let lens = making.lens_constants();
         let sets = [making.frame_set, &meshes.skin_layout];
         let make = |textured: bool, cull: Option<vk::FrontFace>| {
             Pipeline::new(
@@ -69,6 +70,7 @@ impl BoatPipelines {
                 &PipelineShape {
                     vertex: if textured { BOAT_TEXTURED_VERT } else { BOAT_VERT },
                     fragment: if textured { BOAT_TEXTURED_FRAG } else { BOAT_FRAG },
+                    vertex_constants: &lens,
                     constants: if textured { &constants } else { &constants[..1] },
                     sets: if textured { &sets } else { &sets[..1] },
                     push: size_of::<DrawBlock>(),
@@ -142,6 +144,7 @@ impl BoatsPass {
         let composite = Pipeline::new(
             gpu,
             &PipelineShape {
+                vertex_constants: &[],
                 constants: &[SAMPLES.as_raw()],
                 ..PipelineShape::over_screen(RECT_VERT, COMPOSITE_FRAG, &[making.frame_set, &set_layout])
             },

@@ -59,6 +59,7 @@ impl HudPass {
             Pipeline::new(
                 gpu,
                 &PipelineShape {
+                    vertex_constants: &[],
                     constants: &[kind],
                     push: 0,
                     ..PipelineShape::over_screen(HUD_VERT, HUD_FRAG, &[making.frame_set, &set_layout])

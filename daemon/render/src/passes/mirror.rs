@@ -154,6 +154,7 @@ impl Soft {
             &PipelineShape {
                 vertex: SCREEN_VERT,
                 fragment: SOFTEN_FRAG,
+                vertex_constants: &[],
                 constants: &[],
                 sets: &[&set_layout],
                 push: 0,

@@ -13,6 +13,7 @@ pub(crate) mod water;
 use std::sync::Arc;
 
 use ash::vk;
+use bowwave_core::geometry::Optics;
 
 use crate::{
     gpu::Gpu,
@@ -30,6 +31,15 @@ pub(crate) struct Making<'a> {
     pub(crate) size: (u32, u32),
     /// Frames in flight.
     pub(crate) slots: usize,
+    /// What lens and shutter of the camera do.
+    pub(crate) optics: Optics,
+}
+
+impl Making<'_> {
+    /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`).
+    pub(crate) fn lens_constants(&self) -> [u32; 2] {
+        [u32::from(self.optics.distorted), u32::from(self.optics.rolling)]
+    }
 }
 
 /// A stage, an access and a layout of an image.

@@ -67,6 +67,7 @@ impl Stage {
             &PipelineShape {
                 vertex: shape.vertex,
                 fragment: shape.fragment,
+                vertex_constants: &[],
                 constants: &[],
                 sets: if shape.framed { &sets } else { &sets[1..] },
                 push: shape.push,

@@ -100,6 +100,7 @@ impl VideoPass {
                     &PipelineShape {
                         vertex: SCREEN_VERT,
                         fragment,
+                        vertex_constants: &[],
                         constants: &[format_constant(shape.format), u32::from(scaled), self.run],
                         sets,
                         push: size_of::<VideoBlock>(),

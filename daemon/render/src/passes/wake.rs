@@ -42,8 +42,10 @@ pub(crate) struct WakePass {
 impl WakePass {
     pub(crate) fn new(making: &Making<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
         let depth = boats.hull_depth(making)?;
+        let lens = making.lens_constants();
         let pipeline = |vertex: Shader, fragment: Shader, sets: &[&SetLayout]| {
-            Pipeline::new(making.gpu, &PipelineShape::over_screen(vertex, fragment, sets))
+            let shape = PipelineShape::over_screen(vertex, fragment, sets);
+            Pipeline::new(making.gpu, &PipelineShape { vertex_constants: &lens, ..shape })
         };
         Ok(Self {
             pipeline: pipeline(WAKE_VERT, WAKE_FRAG, &[making.frame_set])?,

@@ -92,6 +92,7 @@ impl WaterPass {
             let pipeline = Pipeline::new(
                 gpu,
                 &PipelineShape {
+                    vertex_constants: &[],
                     constants: &[method_constant(method), shadow_constant(shadow)],
                     ..PipelineShape::over_screen(RECT_VERT, WATER_FRAG, &[making.frame_set, &set_layout])
                 },

@@ -27,6 +27,7 @@ pub fn config(scene: &Scene) -> RenderConfig {
             rounds_max: scene.rounds.len(),
             wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
             waters: vec![(scene.water.method, scene.water.shadow)],
+            optics: scene.lens.optics(),
         },
         picture: None,
         time_outs: TimeOuts::default(),

@@ -123,13 +123,10 @@ pub fn ship() -> Result<Vec<Frame>> {
     let [video] = recorded::arrays(&path, ["VideoFrames"])?;
     let [height, width, count] = video.size[..] else { anyhow::bail!("frames of size {:?}", video.size) };
     let lens = Lens {
-        width: width as u32,
-        height: height as u32,
         focal: DVec2::new(673.37, 610.03),
         // The file counts from the centre of the first pixel, which it calls 1.
         centre: DVec2::new(339.23, 244.47) - 0.5,
-        radial: DVec2::ZERO,
-        tangential: DVec2::ZERO,
+        ..Lens::pinhole(width as u32, height as u32, 1.0)
     };
     let frame = |i: usize| {
         let at = |p: usize| video.values[(i * width + p % width) * height + p / width];

@@ -116,12 +116,9 @@ impl Cell {
         Ok(Self {
             spec: of.spec.clone(),
             lens: Lens {
-                width,
-                height,
                 focal: DVec2::new(of.camera.fx, of.camera.fy),
                 centre: DVec2::new(of.camera.cx, of.camera.cy) - corner,
-                radial: DVec2::ZERO,
-                tangential: DVec2::ZERO,
+                ..Lens::pinhole(width, height, 1.0)
             },
             camera: CameraPose {
                 world_from_camera: DQuat::from_array(of.camera.world_from_camera),

@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use anyhow::{Context, Result, ensure};
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    geometry::{CameraPose, Lens},
+    geometry::{CameraPose, Lens, Optics},
     light::LUMINANCE,
     model::{Model, ModelId},
     plan::sea_reflects,
@@ -228,7 +228,7 @@ impl Painter {
             device: device.map(str::to_owned),
             validation: false,
             frames_in_flight: 1,
-            needs: Needs { boats_max, rounds_max: 0, wakes_max: 0, waters },
+            needs: Needs { boats_max, rounds_max: 0, wakes_max: 0, waters, optics: Optics::default() },
             picture: None,
             // Others may keep the processor that draws.
             time_outs: TimeOuts { frame: Duration::from_secs(60), rehearsal: Duration::from_secs(120) },
