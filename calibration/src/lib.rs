@@ -9,7 +9,7 @@
 //! | Section | Keys |
 //! |---|---|
 //! | (top) | `made` (date), `source`; optional `camera_name`, `camera_serial`, `imu_name`, `imu_serial` |
-//! | `[lens]` | `size_px = [width, height]`, `focal_px = [fx, fy]`, `focal_sigma_px`, `centre_px = [cx, cy]` (the centre of the first pixel is 0.5, 0.5), `radial = [k1, k2]`, `tangential = [p1, p2]` |
+//! | `[lens]` | `size_px = [width, height]`, `focal_px = [fx, fy]`, `focal_sigma_px`, `centre_px = [cx, cy]` (the centre of the first pixel is 0.5, 0.5), `radial = [k1, k2]` and `tangential = [p1, p2]`, or `fisheye = [k1, k2, k3, k4]` |
 //! | `[camera_from_imu]` | `rotation_wxyz`, `sigma_mrad = [x, y, z]` (about the camera's axes) |
 //! | `[time_offset]` | `offset_ms` (add to a frame's mid-exposure stamp to get the time on the unit's clock), `sigma_ms` |
 //! | `[shutter]` | `readout_ms` (from reading the picture's first row to its last, negative where the last is read first), `sigma_ms`; left out where all rows are exposed at once |
@@ -19,7 +19,7 @@
 //! Every section also has `measured` (a TOML date, unquoted) and may have `how`.
 //!
 //! Lens: Brown-Conrady in the direction of OpenCV, from undistorted to distorted normalised coordinates (barrel distortion
-//! has a negative `k1`). `rotation_wxyz` is a unit Hamilton quaternion, scalar first, that turns a vector's coordinates in the
+//! has a negative `k1`); or Kannala-Brandt, OpenCV's fisheye. `rotation_wxyz` is a unit Hamilton quaternion, scalar first, that turns a vector's coordinates in the
 //! unit's axes into its coordinates in the camera's (x right, y down, z forward): `v_camera = q v_imu q*`. For a unit mounted
 //! x forward, y right, z down it is `[0.5, -0.5, -0.5, -0.5]`.
 //!

@@ -2,7 +2,7 @@
 
 use bowwave_core::{
     calibration::Calibration,
-    geometry::Lens,
+    geometry::{Distortion, Lens},
     text::{line_column, one_line},
 };
 use glam::{DQuat, DVec2, DVec3};
@@ -39,8 +39,9 @@ struct RawLens {
     focal_px: Spanned<[f64; 2]>,
     focal_sigma_px: Spanned<f64>,
     centre_px: Spanned<[f64; 2]>,
-    radial: Spanned<[f64; 2]>,
-    tangential: Spanned<[f64; 2]>,
+    radial: Option<Spanned<[f64; 2]>>,
+    tangential: Option<Spanned<[f64; 2]>>,
+    fisheye: Option<Spanned<[f64; 4]>>,
     measured: Spanned<Datetime>,
     #[serde(default)]
     how: String,
@@ -326,8 +327,7 @@ impl Place<'_> {
             height,
             focal: DVec2::from_array(self.sigma("lens.focal_px", &raw.focal_px, 1e6)?),
             centre,
-            radial: DVec2::from_array(self.within("lens.radial", &raw.radial, -100.0, 100.0)?),
-            tangential: DVec2::from_array(self.within("lens.tangential", &raw.tangential, -10.0, 10.0)?),
+            distortion: self.distortion(raw)?,
             row_turn: DVec3::ZERO,
         };
         if let Some(corner) = unseen_corner(&lens) {
@@ -336,9 +336,35 @@ impl Place<'_> {
                  folds back or grows too fast before it",
                 corner.x, corner.y
             );
-            return Err(self.refuse("lens.radial", &raw.radial, problem));
+            return Err(match (&raw.fisheye, &raw.radial) {
+                (Some(k), _) => self.refuse("lens.fisheye", k, problem),
+                (None, Some(k)) => self.refuse("lens.radial", k, problem),
+                (None, None) => self.refuse("lens.size_px", &raw.size_px, problem),
+            });
         }
         Ok(lens)
+    }
+
+    fn distortion(&self, raw: &RawLens) -> Result<Distortion, CalibrationError> {
+        match (&raw.fisheye, &raw.radial, &raw.tangential) {
+            (Some(k), None, None) => {
+                Ok(Distortion::fisheye(self.within("lens.fisheye", k, -100.0, 100.0)?))
+            }
+            (None, Some(radial), Some(tangential)) => Ok(Distortion::radial_tangential(
+                DVec2::from_array(self.within("lens.radial", radial, -100.0, 100.0)?),
+                DVec2::from_array(self.within("lens.tangential", tangential, -10.0, 10.0)?),
+            )),
+            (Some(k), ..) => Err(self.refuse(
+                "lens.fisheye",
+                k,
+                "stands beside radial or tangential; a lens is one or the other",
+            )),
+            (None, ..) => Err(self.refuse(
+                "lens.size_px",
+                &raw.size_px,
+                "stands in a lens without distortion; give radial and tangential, or fisheye",
+            )),
+        }
     }
 }
 

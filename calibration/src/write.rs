@@ -2,6 +2,9 @@
 
 use std::fmt::Write as _;
 
+use bowwave_core::geometry::Distortion;
+use glam::DVec2;
+
 use crate::{CalibrationFile, Provenance, raw::radians_from_mrad};
 
 /// The file's text, with its units as comments. [`crate::parse`] gives the same [`CalibrationFile`] back.
@@ -37,14 +40,25 @@ fn lens(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
     section(
         out,
         "lens",
-        "Brown-Conrady, from undistorted to distorted; barrel distortion has a negative k1.",
+        match c.lens.distortion {
+            Distortion::Fisheye(_) => "Kannala-Brandt: the radius by the angle from the axis.",
+            _ => "Brown-Conrady, from undistorted to distorted; barrel distortion has a negative k1.",
+        },
     )?;
     writeln!(out, "size_px = [{}, {}]", c.lens.width, c.lens.height)?;
     writeln!(out, "focal_px = {:?}", c.lens.focal.to_array())?;
     writeln!(out, "focal_sigma_px = {:?}", c.focal_sigma_px)?;
     writeln!(out, "centre_px = {:?}", c.lens.centre.to_array())?;
-    writeln!(out, "radial = {:?}", c.lens.radial.to_array())?;
-    writeln!(out, "tangential = {:?}", c.lens.tangential.to_array())?;
+    let (radial, tangential) = match c.lens.distortion {
+        Distortion::Fisheye(fisheye) => {
+            writeln!(out, "fisheye = {:?}", fisheye.k())?;
+            return provenance(out, &file.lens);
+        }
+        Distortion::RadialTangential(d) => (d.radial(), d.tangential()),
+        Distortion::None => (DVec2::ZERO, DVec2::ZERO),
+    };
+    writeln!(out, "radial = {:?}", radial.to_array())?;
+    writeln!(out, "tangential = {:?}", tangential.to_array())?;
     provenance(out, &file.lens)
 }
 

@@ -10,7 +10,10 @@
 use std::{fs, path::Path};
 
 use bowwave_calibration::{CalibrationError, CalibrationFile, Date, Provenance, parse, to_toml};
-use bowwave_core::{calibration::Calibration, geometry::Lens};
+use bowwave_core::{
+    calibration::Calibration,
+    geometry::{Distortion, Lens},
+};
 use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
 
@@ -89,6 +92,23 @@ fn mistakes_are_refused_with_their_place() {
 }
 
 #[test]
+fn a_fisheye_stands_in_place_of_the_other_model() {
+    let both = "radial = [-0.112, 0.034]\n";
+    let text = EXAMPLE.replace(both, "fisheye = [-0.02, 0.01, -0.004, 0.001]\n");
+    let message = parse(&text, "x").unwrap_err().to_string();
+    assert!(message.contains("lens.fisheye") && message.contains("one or the other"), "{message}");
+    let alone: String =
+        text.lines().filter(|l| !l.starts_with("tangential")).fold(String::new(), |t, l| t + l + "\n");
+    let file = parse(&alone, "x").unwrap();
+    assert_eq!(file.calibration.lens.distortion, Distortion::fisheye([-0.02, 0.01, -0.004, 0.001]));
+    assert_eq!(parse(&to_toml(&file), "again").unwrap(), file);
+    let folding = parse(&alone.replace("-0.02, 0.01", "-2.0, 0.01"), "x").unwrap_err().to_string();
+    assert!(folding.contains("lens.fisheye") && folding.contains("folds back"), "{folding}");
+    let none = alone.lines().filter(|l| !l.starts_with("fisheye")).fold(String::new(), |t, l| t + l + "\n");
+    assert!(parse(&none, "x").unwrap_err().to_string().contains("give radial and tangential, or fisheye"));
+}
+
+#[test]
 fn a_rolling_shutter_is_optional_and_checked() {
     let global = example();
     assert_eq!((global.calibration.readout_ns, &global.shutter), (0, &None));
@@ -159,12 +179,19 @@ fn rotation() -> impl Strategy<Value = DQuat> {
 }
 
 fn lens() -> impl Strategy<Value = Lens> {
-    (64u32..4096, 64u32..4096, 0.4..1.3f64, [-0.05..0.05, -0.01..0.01f64], [-1e-3..1e-3, -1e-3..1e-3f64])
-        .prop_map(|(width, height, hfov, radial, tangential)| Lens {
-            radial: DVec2::from_array(radial),
-            tangential: DVec2::from_array(tangential),
-            ..Lens::pinhole(width, height.min(width), hfov)
-        })
+    let radial =
+        (64u32..4096, 64u32..4096, 0.4..1.3f64, [-0.05..0.05, -0.01..0.01f64], [-1e-3..1e-3, -1e-3..1e-3f64])
+            .prop_map(|(width, height, hfov, radial, tangential)| Lens {
+                distortion: Distortion::radial_tangential(
+                    DVec2::from_array(radial),
+                    DVec2::from_array(tangential),
+                ),
+                ..Lens::pinhole(width, height.min(width), hfov)
+            });
+    let k = [-0.03..0.03, -0.01..0.01, -0.002..0.002, -2e-4..2e-4f64];
+    let fisheye = (64u32..4096, 64u32..4096, 0.4..1.6f64, k)
+        .prop_map(|(width, height, hfov, k)| Lens::fisheye(width, height.min(width), hfov, k));
+    prop_oneof![radial, fisheye]
 }
 
 fn date() -> impl Strategy<Value = Date> {

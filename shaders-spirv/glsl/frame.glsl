@@ -4,8 +4,7 @@
 layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec2 focal;       // pixels
     vec2 centre;      // pixels
-    vec2 radial;      // k1, k2
-    vec2 tangential;  // p1, p2
+    vec4 bend;        // k1, k2, p1, p2, or a fisheye's k1 to k4
     vec2 size;        // pixels
     float near;       // metres: depth is near / distance, 1 at the near plane, 0 at infinity
     float r2_max;     // beyond this squared angle tangent the distortion stays as it is there

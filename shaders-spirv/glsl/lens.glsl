@@ -1,22 +1,38 @@
 // Camera space (x right, y down, z forward) to clip space through the distorting lens, reverse-Z with an infinite far plane.
 
-layout(constant_id = 0) const bool DISTORTED = true;
+// 0 a pinhole, 1 radial and tangential, 2 a fisheye.
+layout(constant_id = 0) const uint BEND = 1;
 layout(constant_id = 1) const bool ROLLING = false;
 
-// Pixels times distance. Brown-Conrady as in the host's Lens::distort. Beyond r2_max, and behind the camera, the radial factor stays at
-// its last value, so that the mapping is a plain perspective there and clipping at the near plane holds.
+// Angle of a tangent up to tan(85 deg): halved twice, then its series. Drivers may err by 4096 units in the last place in their own.
+float angle_of(float tangent) {
+    float half_tangent = tangent / (1.0 + sqrt(1.0 + tangent * tangent));
+    float t = half_tangent / (1.0 + sqrt(1.0 + half_tangent * half_tangent));
+    float t2 = t * t;
+    return 4.0 * t * (1.0 - t2 * (1.0 / 3.0 - t2 * (1.0 / 5.0 - t2 * (1.0 / 7.0 - t2 * (1.0 / 9.0 - t2 / 11.0)))));
+}
+
+// Pixels times distance, as the host's Distortion has it. Beyond r2_max, and behind the camera, the radial factor stays at its last
+// value, so that the mapping is a plain perspective there and clipping at the near plane holds.
 vec2 pixels_from_camera(vec3 p) {
     vec2 bent = p.xy;
-    if (DISTORTED) {
+    if (BEND != 0) {
         vec2 n = p.xy / max(p.z, 1e-3);
         float r2 = dot(n, n);
         float held = min(r2, frame.r2_max);
         n *= sqrt(held / max(r2, 1e-12));
-        float radial = 1.0 + held * (frame.radial.x + held * frame.radial.y);
-        vec2 tangential = vec2(
-            2.0 * frame.tangential.x * n.x * n.y + frame.tangential.y * (held + 2.0 * n.x * n.x),
-            frame.tangential.x * (held + 2.0 * n.y * n.y) + 2.0 * frame.tangential.y * n.x * n.y);
-        bent = p.xy * radial + tangential * p.z;
+        vec4 k = frame.bend;
+        if (BEND == 2) {
+            float r = sqrt(held);
+            float a = angle_of(r);
+            float a2 = a * a;
+            bent *= (1.0 + a2 * (k.x + a2 * (k.y + a2 * (k.z + a2 * k.w)))) * (r > 1e-4 ? a / r : 1.0);
+        } else {
+            vec2 tangential = vec2(
+                2.0 * k.z * n.x * n.y + k.w * (held + 2.0 * n.x * n.x),
+                k.z * (held + 2.0 * n.y * n.y) + 2.0 * k.w * n.x * n.y);
+            bent = bent * (1.0 + held * (k.x + held * k.y)) + tangential * p.z;
+        }
     }
     return bent * frame.focal + frame.centre * p.z;
 }

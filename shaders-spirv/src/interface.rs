@@ -25,15 +25,13 @@ pub struct FrameBlock {
     pub focal: [f32; 2],
     /// Principal point, pixels.
     pub centre: [f32; 2],
-    /// k1, k2.
-    pub radial: [f32; 2],
-    /// p1, p2.
-    pub tangential: [f32; 2],
+    /// k1, k2, p1, p2, or a fisheye's k1 to k4.
+    pub bend: [f32; 4],
     /// The screen, pixels.
     pub size: [f32; 2],
     /// Near plane, metres; depth is near / distance.
     pub near: f32,
-    /// Squared angle tangent beyond which the distortion stays as it is there.
+    /// Squared tangent of the angle from the axis beyond which the distortion stays as it is there.
     pub r2_max: f32,
     /// Linear radiance of a white matt surface that faces the sun.
     pub sun: [f32; 4],
@@ -51,8 +49,7 @@ layout!(
     128,
     focal = 0,
     centre = 8,
-    radial = 16,
-    tangential = 24,
+    bend = 16,
     size = 32,
     near = 40,
     r2_max = 44,

@@ -9,7 +9,7 @@ mod adjust;
 mod model;
 mod start;
 
-use bowwave_core::geometry::Lens;
+use bowwave_core::geometry::{Distortion, Lens};
 use glam::{DMat3, DVec2, DVec3};
 
 pub use model::Model;
@@ -132,18 +132,20 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The lens as the trainer's file can hold it; `None` for a fisheye.
-    pub fn lens(&self) -> Option<Lens> {
-        let [fx, fy, cx, cy, k1, k2, p1, p2] = self.intrinsics;
-        (self.model == Model::RadialTangential).then_some(Lens {
+    /// The lens as the trainer's file holds it.
+    pub fn lens(&self) -> Lens {
+        let [fx, fy, cx, cy, a, b, c, d] = self.intrinsics;
+        Lens {
             width: self.size.0,
             height: self.size.1,
             focal: DVec2::new(fx, fy),
             centre: DVec2::new(cx, cy),
-            radial: DVec2::new(k1, k2),
-            tangential: DVec2::new(p1, p2),
+            distortion: match self.model {
+                Model::RadialTangential => Distortion::radial_tangential(DVec2::new(a, b), DVec2::new(c, d)),
+                Model::Fisheye => Distortion::fisheye([a, b, c, d]),
+            },
             row_turn: DVec3::ZERO,
-        })
+        }
     }
 
     /// Standard deviation of the focal length, pixels: the larger of both.

@@ -10,7 +10,7 @@ pub(super) type Intrinsics = SVector<f64, INTRINSICS>;
 /// Which lens model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
-    /// Pinhole with radial k1, k2 and tangential p1, p2 (Brown 1971; Conrady 1919), what the trainer's [`bowwave_core::geometry::Lens`] is.
+    /// Pinhole with radial k1, k2 and tangential p1, p2 (Brown 1971; Conrady 1919).
     RadialTangential,
     /// Equidistant fisheye with k1 to k4 (Kannala & Brandt 2006, eq. 6; OpenCV's fisheye).
     Fisheye,

@@ -3,11 +3,13 @@
 //! World: x east, y north, z up, z = 0 mean sea level under the mount, metres. Camera: x right, y down, z forward. Boat:
 //! x forward, y to port, z up, z = 0 at the waterline. Quaternions are Hamilton, named `to_from_from`.
 
+mod distortion;
 mod lens;
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-pub use lens::{Lens, Optics};
+pub use distortion::{Distortion, Fisheye, RadialTangential};
+pub use lens::{Bend, Lens, Optics};
 
 /// Mean Earth radius in metres (IUGG R1).
 pub const EARTH_RADIUS_M: f64 = 6_371_008.8;

@@ -2,7 +2,7 @@
 //! rounded, so nothing loses digits with distance from the mount.
 
 use bowwave_core::{
-    geometry::{CameraPose, Lens, RigidPose, horizon_dip},
+    geometry::{CameraPose, Distortion, Lens, RigidPose, horizon_dip},
     model::ModelKind,
     scene::{BoatView, Light, Scene},
     view::NEAR_M,
@@ -19,8 +19,7 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
     FrameBlock {
         focal: pair(lens.focal),
         centre: pair(lens.centre),
-        radial: pair(lens.radial),
-        tangential: pair(lens.tangential),
+        bend: bend(&lens.distortion),
         size: [lens.width as f32, lens.height as f32],
         near: NEAR_M as f32,
         r2_max: r2_max(lens) as f32,
@@ -32,23 +31,30 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
     }
 }
 
+/// A fisheye is followed up to this angle from its axis, radians: what is drawn lies before the camera's plane.
+const FISHEYE_MAX: f64 = 85f64.to_radians();
+
 /// Squared angle tangent at which the lens stops being trusted: just short of where its radius folds back, as
 /// [`Lens::project`] has it.
 fn r2_max(lens: &Lens) -> f64 {
-    let (k1, k2) = (lens.radial.x, lens.radial.y);
-    // Smallest positive root of 1 + 3 k1 r2 + 5 k2 r2^2.
     let unlimited = 1e6;
-    let root = if k2.abs() < 1e-12 {
-        -1.0 / (3.0 * k1)
-    } else {
-        let (b, disc) = (3.0 * k1, 9.0 * k1 * k1 - 20.0 * k2);
-        if disc < 0.0 {
-            return unlimited;
+    match lens.distortion {
+        Distortion::None => unlimited,
+        Distortion::RadialTangential(d) => (0.98 * d.reach2()).min(unlimited),
+        Distortion::Fisheye(d) => (0.99 * d.reach()).min(FISHEYE_MAX).tan().powi(2),
+    }
+}
+
+/// The model's coefficients: k1, k2, p1, p2 or k1 to k4.
+fn bend(distortion: &Distortion) -> [f32; 4] {
+    match distortion {
+        Distortion::None => [0.0; 4],
+        Distortion::RadialTangential(d) => {
+            let (k, p) = (d.radial().as_vec2(), d.tangential().as_vec2());
+            [k.x, k.y, p.x, p.y]
         }
-        let roots = [(-b - disc.sqrt()) / (10.0 * k2), (-b + disc.sqrt()) / (10.0 * k2)];
-        roots.into_iter().filter(|r| *r > 0.0).fold(f64::INFINITY, f64::min)
-    };
-    if root.is_finite() && root > 0.0 { (root * 0.98).min(unlimited) } else { unlimited }
+        Distortion::Fisheye(d) => d.k().map(|k| k as f32),
+    }
 }
 
 /// The pose in which a boat is drawn: its own, or, for a picture, upright and turned about z towards the camera, its bow on the
@@ -203,11 +209,11 @@ mod tests {
     fn distortion_is_trusted_up_to_the_fold_and_no_further() {
         let mut lens = Lens::pinhole(320, 180, 1.0);
         assert_eq!(r2_max(&lens), 1e6);
-        lens.radial = DVec2::new(-0.3, 0.01);
+        lens.distortion = Distortion::radial_tangential(DVec2::new(-0.3, 0.01), DVec2::ZERO);
         let limit = r2_max(&lens);
         assert!(lens.project(DVec3::new(limit.sqrt() * 0.99, 0.0, 1.0)).is_some());
         assert!(lens.project(DVec3::new(limit.sqrt() * 1.02, 0.0, 1.0)).is_none());
-        lens.radial = DVec2::new(0.44, 0.0);
+        lens.distortion = Distortion::radial_tangential(DVec2::new(0.44, 0.0), DVec2::ZERO);
         assert_eq!(r2_max(&lens), 1e6);
     }
 }

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 use bowwave_core::{
     fault::Fault,
-    geometry::look,
+    geometry::{Distortion, look},
     model::{Model, ModelKind, Texture},
     scene::{Pass, PassDecision, ReflectionMethod, RoundView, Scene, ShadowLevel, Status},
     sea::BeaufortForce,
@@ -158,8 +158,7 @@ fn wakes_of_a_straight_and_of_a_turning_boat() {
 fn rolled_camera_with_a_bent_lens() {
     let mut scene = empty_scene(SIZE.0, SIZE.1);
     scene.camera.world_from_camera = look(0.0, -0.05, 0.5);
-    scene.lens.radial = DVec2::new(-0.25, 0.06);
-    scene.lens.tangential = DVec2::new(0.002, -0.001);
+    scene.lens.distortion = Distortion::radial_tangential(DVec2::new(-0.25, 0.06), DVec2::new(0.002, -0.001));
     add_boat(&mut scene, &models(), 0, 40.0, -0.05, 0.5);
     check("rolled", &scene, &models());
 }

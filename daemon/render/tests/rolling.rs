@@ -4,19 +4,22 @@
 
 mod common;
 
-use bowwave_core::{geometry::Lens, scene::Scene};
+use bowwave_core::{
+    geometry::{Distortion, Lens},
+    scene::Scene,
+};
 use common::{draw, testing};
 use glam::{DVec2, DVec3};
 
 const SIZE: (u32, u32) = (640, 360);
 
 /// A box 60 m off near the picture's lower edge, seen while the camera turns by `turn` within one picture.
-fn scene(models: &[bowwave_core::model::Model], turn: DVec3) -> Scene {
+fn scene(models: &[bowwave_core::model::Model], turn: DVec3, distortion: Distortion) -> Scene {
     let mut scene = testing::empty_scene(SIZE.0, SIZE.1);
     scene.camera.world_from_camera = bowwave_core::geometry::look(0.0, 0.1, 0.2);
     scene.water.method = bowwave_core::scene::ReflectionMethod::Off;
     scene.water.shadow = bowwave_core::scene::ShadowLevel::None;
-    scene.lens = Lens { radial: DVec2::new(-0.15, 0.02), ..scene.lens }.read_while(turn);
+    scene.lens = Lens { distortion, ..scene.lens }.read_while(turn);
     testing::add_boat(&mut scene, models, 0, 60.0, 0.1, 0.7);
     scene
 }
@@ -37,8 +40,17 @@ fn span(a: &[u8], b: &[u8]) -> (DVec2, DVec2) {
 fn boats_are_drawn_on_the_rows_that_see_them() {
     let models = [testing::box_model("box", [6.0, 2.0, 2.5], [0.9, 0.1, 0.1])];
     let rate = 40f64.to_radians() * 0.03;
-    for turn in [DVec3::ZERO, DVec3::Y * rate, DVec3::X * rate, DVec3::X * -rate, DVec3::Z * rate] {
-        let scene = scene(&models, turn);
+    let bent = Distortion::radial_tangential(DVec2::new(-0.15, 0.02), DVec2::new(0.002, -0.001));
+    let cases = [
+        (DVec3::ZERO, bent),
+        (DVec3::Y * rate, bent),
+        (DVec3::X * rate, bent),
+        (DVec3::X * -rate, Distortion::None),
+        (DVec3::new(0.6, 0.6, 0.5) * rate, bent),
+        (DVec3::Y * rate, Distortion::fisheye([-0.05, 0.01, -0.003, 0.0])),
+    ];
+    for (turn, distortion) in cases {
+        let scene = scene(&models, turn, distortion);
         let picture = common::grey(SIZE.0, SIZE.1, 90);
         let mut empty = scene.clone();
         empty.boats.clear();

@@ -1,6 +1,9 @@
 //! What to make: all numbers of a recording.
 
-use bowwave_core::{geometry::Lens, sea::BeaufortForce};
+use bowwave_core::{
+    geometry::{Distortion, Lens},
+    sea::BeaufortForce,
+};
 use glam::{DQuat, DVec3};
 
 use super::{
@@ -53,10 +56,10 @@ pub struct Recipe {
 /// The camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraRecipe {
-    /// Horizontal field of view of the undistorted lens, radians.
+    /// Horizontal field of view, radians: of a fisheye as it is, else of the undistorted lens.
     pub hfov: f64,
-    /// Radial distortion k1, k2 (Brown-Conrady, see [`Lens`]).
-    pub radial: [f64; 2],
+    /// How the lens bends straight lines.
+    pub distortion: Distortion,
     /// Variance of the noise of dark pixels, in squared units of white.
     pub read_noise: f64,
     /// Growth of the noise's variance with light, in units of white.
@@ -165,7 +168,7 @@ impl Default for CameraRecipe {
     fn default() -> Self {
         Self {
             hfov: 60f64.to_radians(),
-            radial: [0.0; 2],
+            distortion: Distortion::None,
             read_noise: 2.5e-6,
             shot_noise: 3.0e-5,
             vignetting: 0.5,
@@ -203,10 +206,11 @@ impl Default for ImuRecipe {
 impl Recipe {
     /// The lens that the pictures are drawn with.
     pub fn lens(&self) -> Lens {
-        let [k1, k2] = self.camera.radial;
-        let mut lens = Lens::pinhole(self.width, self.height, self.camera.hfov);
-        lens.radial = glam::DVec2::new(k1, k2);
-        lens
+        let CameraRecipe { hfov, distortion, .. } = self.camera;
+        match distortion {
+            Distortion::Fisheye(fisheye) => Lens::fisheye(self.width, self.height, hfov, fisheye.k()),
+            _ => Lens { distortion, ..Lens::pinhole(self.width, self.height, hfov) },
+        }
     }
 
     /// The camera's exact motion; time 0 is the recording's start.

@@ -2,7 +2,9 @@
 
 use glam::{DQuat, DVec2, DVec3};
 
-/// Pinhole with radial and tangential distortion (Brown-Conrady, as OpenCV's first five coefficients without k3).
+use super::Distortion;
+
+/// A camera's lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     /// Picture width in pixels.
@@ -13,20 +15,30 @@ pub struct Lens {
     pub focal: DVec2,
     /// Principal point in pixels; the centre of the first pixel is (0.5, 0.5).
     pub centre: DVec2,
-    /// Radial coefficients k1, k2.
-    pub radial: DVec2,
-    /// Tangential coefficients p1, p2.
-    pub tangential: DVec2,
+    /// How it bends straight lines.
+    pub distortion: Distortion,
     /// How the camera turns while a rolling shutter reads the picture: from one row to the next, radians about the camera's axes.
     /// The camera's space is that of the middle row. None where all rows are exposed at once.
     pub row_turn: DVec3,
 }
 
+/// Which model of distortion a lens needs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Bend {
+    /// None: straight lines stay straight.
+    #[default]
+    None,
+    /// [`RadialTangential`](super::RadialTangential).
+    RadialTangential,
+    /// [`Fisheye`](super::Fisheye).
+    Fisheye,
+}
+
 /// What a lens does that drawing through it has to follow; the rest is not compiled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Optics {
-    /// It bends straight lines.
-    pub distorted: bool,
+    /// How it bends straight lines.
+    pub bend: Bend,
     /// Rows are exposed one after another.
     pub rolling: bool,
 }
@@ -46,10 +58,19 @@ impl Lens {
             height,
             focal: DVec2::splat(focal),
             centre: DVec2::new(f64::from(width), f64::from(height)) / 2.0,
-            radial: DVec2::ZERO,
-            tangential: DVec2::ZERO,
+            distortion: Distortion::None,
             row_turn: DVec3::ZERO,
         }
+    }
+
+    /// An equidistant fisheye with square pixels, centred, that covers `hfov` radians across, with k1 to k4.
+    pub fn fisheye(width: u32, height: u32, hfov: f64, k: [f64; 4]) -> Self {
+        let distortion = Distortion::fisheye(k);
+        let edge = DVec3::new((hfov / 2.0).sin(), 0.0, (hfov / 2.0).cos());
+        // A model that folds before the picture's edge is stretched to it as if it did not bend.
+        let radius = distortion.project(edge).map_or(hfov / 2.0, |edge| edge.x);
+        let focal = DVec2::splat(f64::from(width) / 2.0 / radius);
+        Self { focal, distortion, ..Self::pinhole(width, height, 1.0) }
     }
 
     /// The same lens before a shutter that reads the picture from its first row to its last while the camera turns by `turn`
@@ -61,8 +82,12 @@ impl Lens {
 
     /// What drawing through it has to follow.
     pub fn optics(&self) -> Optics {
-        let distorted = self.radial != DVec2::ZERO || self.tangential != DVec2::ZERO;
-        Optics { distorted, rolling: self.row_turn != DVec3::ZERO }
+        let bend = match self.distortion {
+            Distortion::None => Bend::None,
+            Distortion::RadialTangential(_) => Bend::RadialTangential,
+            Distortion::Fisheye(_) => Bend::Fisheye,
+        };
+        Optics { bend, rolling: self.row_turn != DVec3::ZERO }
     }
 
     /// How the camera has turned when `row` is read, from its axes then to those of the middle row.
@@ -102,43 +127,13 @@ impl Lens {
 
     /// Where a point falls in the middle row's camera, whatever row that is.
     fn project_at_once(&self, camera: DVec3) -> Option<DVec2> {
-        if camera.z <= 1e-6 || !camera.is_finite() {
-            return None;
-        }
-        let n = camera.truncate() / camera.z;
-        let r2 = n.length_squared();
-        // Radius must still grow with the angle, or the model wraps far-off points into the picture.
-        if 1.0 + 3.0 * self.radial.x * r2 + 5.0 * self.radial.y * r2 * r2 <= 0.0 {
-            return None;
-        }
-        Some(self.distort(n) * self.focal + self.centre)
+        Some(self.distortion.project(camera)? * self.focal + self.centre)
     }
 
-    /// Undistorted normalised coordinates (x/z, y/z) to distorted ones.
-    pub fn distort(&self, n: DVec2) -> DVec2 {
-        let r2 = n.length_squared();
-        let radial = 1.0 + r2 * (self.radial.x + r2 * self.radial.y);
-        let (p1, p2) = (self.tangential.x, self.tangential.y);
-        let tangential = DVec2::new(
-            2.0 * p1 * n.x * n.y + p2 * (r2 + 2.0 * n.x * n.x),
-            p1 * (r2 + 2.0 * n.y * n.y) + 2.0 * p2 * n.x * n.y,
-        );
-        n * radial + tangential
-    }
-
-    /// Unit vector in the camera's space of what falls on `pixel`. Fixed-point iteration; error below 1e-9 for the lenses
-    /// that [`Lens::project`] accepts inside the picture.
+    /// Unit vector in the camera's space of what falls on `pixel`; error below 1e-9 wherever [`Lens::project`] leads there at all, else a
+    /// direction near the rim of what does.
     pub fn unproject(&self, pixel: DVec2) -> DVec3 {
-        let distorted = (pixel - self.centre) / self.focal;
-        let mut n = distorted;
-        for _ in 0..60 {
-            let step = distorted - self.distort(n);
-            n += step;
-            if step.length_squared() < 1e-24 {
-                break;
-            }
-        }
-        let seen = DVec3::new(n.x, n.y, 1.0).normalize();
+        let seen = self.distortion.unproject((pixel - self.centre) / self.focal).normalize();
         if self.row_turn == DVec3::ZERO { seen } else { self.turned_at(pixel.y) * seen }
     }
 
@@ -174,6 +169,52 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Whether some direction falls on a pixel, with room for rounding at the rim.
+    fn within(lens: &Lens, pixel: DVec2) -> bool {
+        let far = |pixel: DVec2| ((pixel - lens.centre) / lens.focal).length();
+        match lens.distortion {
+            Distortion::None => true,
+            Distortion::RadialTangential(d) => {
+                let rim = d.reach2().sqrt().min(1e6);
+                let tangential = 4.0 * d.tangential().length() * far(pixel).max(rim.min(10.0)).powi(2);
+                far(pixel) + tangential < 0.999 * d.bend(DVec2::X * rim).x.max(0.0)
+            }
+            Distortion::Fisheye(d) => {
+                let rim = DVec3::new((0.999 * d.reach()).sin(), 0.0, (0.999 * d.reach()).cos());
+                lens.project(rim).is_some_and(|rim| far(pixel) < far(rim))
+            }
+        }
+    }
+
+    #[test]
+    fn what_folds_back_is_refused_and_stays_refused() {
+        // Grows again beyond its fold: what lies there must not come back into the picture.
+        let folding = Distortion::radial_tangential(DVec2::new(-0.6, 0.12), DVec2::ZERO);
+        let lens = Lens { distortion: folding, ..Lens::pinhole(1280, 720, 1.0) };
+        let at = |tangent: f64| lens.project(DVec3::new(tangent, 0.0, 1.0));
+        let Distortion::RadialTangential(d) = folding else { panic!("{folding:?}") };
+        let reach = d.reach2().sqrt();
+        assert!(at(0.99 * reach).is_some());
+        for beyond in [1.01, 1.5, 2.0, 5.0, 50.0] {
+            assert_eq!(at(beyond * reach), None, "{beyond}");
+        }
+        assert_eq!(lens.project(DVec3::NEG_Z), None);
+        let fisheye = Lens::fisheye(1280, 720, 2.0, [-0.1, 0.0, 0.0, 0.0]);
+        let Distortion::Fisheye(d) = fisheye.distortion else { panic!("{fisheye:?}") };
+        // 1 - 0.3 a^2 = 0.
+        assert!((d.reach() - (1.0 / 0.3f64).sqrt()).abs() < 1e-9);
+        let at = |angle: f64| fisheye.project(DVec3::new(angle.sin(), 0.0, angle.cos()));
+        assert!(at(0.99 * d.reach()).is_some() && at(1.01 * d.reach()).is_none() && at(3.1).is_none());
+    }
+
+    #[test]
+    fn a_fisheye_sees_behind_itself() {
+        let lens = Lens::fisheye(1000, 1000, 190f64.to_radians(), [0.0; 4]);
+        let edge = lens.unproject(DVec2::new(1000.0, 500.0));
+        assert!((edge.z - 95f64.to_radians().cos()).abs() < 1e-9, "{edge}");
+        assert!((lens.half_diagonal().to_degrees() - 95.0 * 2f64.sqrt()).abs() < 1e-6);
+    }
+
     #[test]
     fn a_camera_that_turns_right_shears_what_stands_upright() {
         // Clockwise from above is a turn about the camera's y, which points down.
@@ -187,17 +228,46 @@ mod tests {
     }
 
     proptest! {
+        /// Any direction comes back, up to the corners of pictures from a telephoto's to a fisheye's.
         #[test]
         fn unproject_inverts_project(
-            x in 0.0..1280.0f64, y in 0.0..720.0f64, k1 in -0.2..0.2f64, k2 in -0.02..0.02f64,
-            p1 in -0.005..0.005f64, p2 in -0.005..0.005f64,
+            u in 0.0..1.0f64, v in 0.0..1.0f64, hfov in 20.0..150.0f64, k1 in -0.4..0.3f64, k2 in -0.05..0.05f64,
+            p in [-0.005..0.005f64, -0.005..0.005f64], fisheye in [-0.1..0.05f64, -0.03..0.03, -0.005..0.005, -1e-3..1e-3],
+            across in 60.0..190.0f64,
         ) {
-            let mut lens = Lens::pinhole(1280, 720, 1.0);
-            lens.radial = DVec2::new(k1, k2);
-            lens.tangential = DVec2::new(p1, p2);
-            let pixel = DVec2::new(x, y);
-            let back = lens.project(lens.unproject(pixel) * 37.0).unwrap();
-            prop_assert!(back.distance(pixel) < 1e-6, "{back} {pixel}");
+            let hfov = hfov.to_radians();
+            let bent = Lens {
+                distortion: Distortion::radial_tangential(DVec2::new(k1, k2), DVec2::from(p)),
+                ..Lens::pinhole(1280, 720, hfov)
+            };
+            let wide = Lens::fisheye(1280, 720, across.to_radians(), fisheye);
+            for lens in [bent, wide] {
+                let pixel = DVec2::new(u * 1280.0, v * 720.0);
+                let seen = lens.unproject(pixel);
+                prop_assert!(seen.is_finite() && (seen.length() - 1.0).abs() < 1e-12, "{seen}");
+                // Pixels beyond the rim see nothing; all others come back.
+                if within(&lens, pixel) {
+                    let back = lens.project(seen * 37.0).unwrap_or(DVec2::NAN);
+                    prop_assert!(back.distance(pixel) < 1e-9 * lens.focal.x.max(1000.0), "{back} {pixel} {lens:?}");
+                }
+            }
+        }
+
+        /// Directions, not pixels: what the model can show comes back though the picture were larger.
+        #[test]
+        fn project_inverts_unproject(
+            off in 0.0..1.4f64, around in 0.0..6.3f64, k1 in -0.4..0.4f64, k2 in -0.05..0.1f64,
+        ) {
+            let distortion = Distortion::radial_tangential(DVec2::new(k1, k2), DVec2::ZERO);
+            let lens = Lens { distortion, ..Lens::pinhole(1280, 720, 1.0) };
+            let direction = DVec3::new(off.sin() * around.cos(), off.sin() * around.sin(), off.cos());
+            // Near the fold, where the radius hardly grows any more, nothing can tell directions apart.
+            let reach = match distortion { Distortion::RadialTangential(d) => d.reach2().sqrt(), _ => f64::INFINITY };
+            if let Some(pixel) = lens.project(direction).filter(|_| off.tan() < 0.98 * reach) {
+                prop_assert!(lens.unproject(pixel).distance(direction) < 1e-9, "{direction}");
+            } else {
+                prop_assert!(off.tan() >= 0.98 * reach);
+            }
         }
 
         /// 30 ms at up to 60 deg/s about any axis.
@@ -207,7 +277,7 @@ mod tests {
             k1 in -0.2..0.1f64,
         ) {
             let mut lens = Lens::pinhole(1280, 720, 1.0).read_while(DVec3::from(turn));
-            lens.radial.x = k1;
+            lens.distortion = Distortion::radial_tangential(DVec2::X * k1, DVec2::ZERO);
             let pixel = DVec2::new(x, y);
             let seen = lens.unproject(pixel);
             prop_assert!(lens.project(seen * 37.0).unwrap().distance(pixel) < 1e-8);

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use proptest::prelude::*;
 
 use super::{fit::up_of, *};
-use crate::event::PixelFormat;
+use crate::{event::PixelFormat, geometry::Distortion};
 
 /// Evenly spread numbers from -1 to 1, by place.
 fn grain(i: usize, seed: u64) -> f64 {
@@ -17,7 +17,10 @@ const SIZE: (u32, u32) = (640, 360);
 const EYE_M: f64 = 6.0;
 
 fn lens(k1: f64) -> Lens {
-    Lens { radial: DVec2::new(k1, 0.0), ..Lens::pinhole(SIZE.0, SIZE.1, 1.1) }
+    Lens {
+        distortion: Distortion::radial_tangential(DVec2::X * k1, DVec2::ZERO),
+        ..Lens::pinhole(SIZE.0, SIZE.1, 1.1)
+    }
 }
 
 fn view(lens: Lens, prior: Option<Prior>) -> View {

@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use crate::{
-    geometry::{CameraPose, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
+    geometry::{CameraPose, Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
     scenario::table::Mark,
     view::Eye,
 };
@@ -58,9 +58,9 @@ pub struct StillCamera {
     pub focal: Focal,
     /// Principal point, pixels; `None` for the picture's middle.
     pub centre: Option<DVec2>,
-    /// Radial coefficients k1, k2 as in [`Lens`].
+    /// Radial coefficients k1, k2 as in [`Distortion`].
     pub radial: DVec2,
-    /// Tangential coefficients p1, p2 as in [`Lens`].
+    /// Tangential coefficients p1, p2 as in [`Distortion`].
     pub tangential: DVec2,
     /// Where the middle of the picture lies, radians clockwise from north.
     pub azimuth: f64,
@@ -107,8 +107,7 @@ impl StillCamera {
             height,
             focal: DVec2::splat(focal),
             centre,
-            radial: self.radial,
-            tangential: self.tangential,
+            distortion: Distortion::radial_tangential(self.radial, self.tangential),
             row_turn: DVec3::ZERO,
         })
     }

@@ -2,7 +2,10 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use bowwave_core::{geometry::Lens, time::Time};
+use bowwave_core::{
+    geometry::{Distortion, Lens},
+    time::Time,
+};
 
 use super::RecordError;
 
@@ -46,7 +49,7 @@ pub struct CameraInfo {
     pub height: u32,
     /// Camera matrix, row-major, pixels.
     pub k: [f64; 9],
-    /// Distortion: k1, k2, p1, p2, k3 ("plumb_bob").
+    /// Distortion: k1, k2, p1, p2, k3 ("plumb_bob"), or a fisheye's k1 to k4 ("equidistant").
     pub d: Vec<f64>,
 }
 
@@ -67,7 +70,13 @@ impl CameraInfo {
                 0.0,
                 1.0,
             ],
-            d: vec![lens.radial.x, lens.radial.y, lens.tangential.x, lens.tangential.y, 0.0],
+            d: match lens.distortion {
+                Distortion::None => vec![0.0; 5],
+                Distortion::RadialTangential(d) => {
+                    vec![d.radial().x, d.radial().y, d.tangential().x, d.tangential().y, 0.0]
+                }
+                Distortion::Fisheye(d) => d.k().to_vec(),
+            },
         }
     }
 }

@@ -146,7 +146,7 @@ pub(crate) fn encode_camera_info(info: &CameraInfo, time: Time, out: &mut Vec<u8
         header: header(time, FRAME_CAMERA)?,
         height: info.height,
         width: info.width,
-        distortion_model: "plumb_bob".to_owned(),
+        distortion_model: if info.d.len() == 4 { "equidistant" } else { "plumb_bob" }.to_owned(),
         d: info.d.clone(),
         k,
         r: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

@@ -13,7 +13,7 @@ pub(crate) mod water;
 use std::sync::Arc;
 
 use ash::vk;
-use bowwave_core::geometry::Optics;
+use bowwave_core::geometry::{Bend, Optics};
 
 use crate::{
     gpu::Gpu,
@@ -38,7 +38,12 @@ pub(crate) struct Making<'a> {
 impl Making<'_> {
     /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`).
     pub(crate) fn lens_constants(&self) -> [u32; 2] {
-        [u32::from(self.optics.distorted), u32::from(self.optics.rolling)]
+        let bend = match self.optics.bend {
+            Bend::None => 0,
+            Bend::RadialTangential => 1,
+            Bend::Fisheye => 2,
+        };
+        [bend, u32::from(self.optics.rolling)]
     }
 }
 

@@ -27,7 +27,7 @@ fn check_numbers(calibration: &Calibration) {
     let lens = &calibration.lens;
     assert!((1..=8192).contains(&lens.width) && (1..=8192).contains(&lens.height), "{lens:?}");
     assert!(lens.focal.is_finite() && lens.focal.min_element() > 0.0, "{lens:?}");
-    assert!(lens.centre.is_finite() && lens.radial.is_finite() && lens.tangential.is_finite(), "{lens:?}");
+    assert!(lens.centre.is_finite() && lens.distortion.is_finite(), "{lens:?}");
     let ray = lens.unproject(lens.centre);
     assert!(ray.is_finite(), "the centre has no direction: {lens:?}");
     assert!((calibration.camera_from_imu.length() - 1.0).abs() < 1e-12, "{:?}", calibration.camera_from_imu);

@@ -3,7 +3,7 @@
 use anyhow::{Context as _, Result};
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    geometry::Lens,
+    geometry::{Distortion, Lens},
     horizon::{Horizon, HorizonFinder, Mask, NoHorizon, Prior, View},
 };
 use glam::{DMat2, DQuat, DVec2, DVec3};
@@ -96,7 +96,7 @@ impl Drawn {
         let picture = Picture::new(PixelFormat::Nv12, w as u32, h as u32, bytes.into())?;
         let lens = Lens {
             focal: DVec2::splat(shown.lens.focal),
-            radial: DVec2::from(shown.lens.radial),
+            distortion: Distortion::radial_tangential(DVec2::from(shown.lens.radial), DVec2::ZERO),
             ..Lens::pinhole(w as u32, h as u32, 1.0)
         };
         let mask = if shown.barrel { Some(barrel_mask().context("a mask")?) } else { None };

@@ -153,8 +153,7 @@ fn usable(frame: &Frame<'_>) -> bool {
     let glass = lens.focal.is_finite()
         && lens.focal.cmpgt(glam::DVec2::splat(1.0)).all()
         && lens.centre.is_finite()
-        && lens.radial.is_finite()
-        && lens.tangential.is_finite();
+        && lens.distortion.is_finite();
     turned && glass && camera.position.is_finite() && EYE_M.contains(&camera.position.z)
 }
 
