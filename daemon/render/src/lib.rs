@@ -26,6 +26,7 @@ mod renderer;
 mod ring;
 mod rounds;
 mod simplify;
+mod split;
 #[cfg(test)]
 mod testing;
 mod upload;

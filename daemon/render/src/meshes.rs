@@ -4,6 +4,7 @@ use std::{ops::Range, sync::Arc};
 
 use ash::vk;
 use bowwave_core::{
+    geometry::Bend,
     light::{linear_to_srgb, srgb_to_linear},
     model::{Model, ModelId, Texture},
 };
@@ -57,7 +58,7 @@ impl Meshes {
             let skin = texture.as_ref().map(skin_of).transpose()?;
             let too_big =
                 |_| RenderError::Model { name: model.name.clone(), why: "too many corners".to_owned() };
-            let made = simplify(model);
+            let made = simplify(model, making.optics.bend != Bend::None);
             meshes.push(Mesh {
                 first_index: u32::try_from(indices.len()).map_err(too_big)?,
                 first_vertex: i32::try_from(vertices.len()).map_err(too_big)?,

@@ -38,7 +38,7 @@ use crate::{
 const GRADIENTS_REACH_PX: u32 = 84;
 
 /// Boats are drawn simplified by no more than this, pixels.
-const DETAIL_PX: f64 = 0.4;
+pub(crate) const DETAIL_PX: f64 = 0.4;
 /// Pixels around a boat's boxes that its anti-aliased edges can touch.
 const HULL_MARGIN_PX: f64 = 1.5;
 /// Most rectangles for all hulls together, and for one boat's water.

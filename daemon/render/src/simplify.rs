@@ -8,7 +8,11 @@ use bowwave_core::model::{Model, ModelKind};
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 use shaders_spirv::interface::MeshVertex;
 
-use crate::parts::Parts;
+use crate::{
+    parts::Parts,
+    plan::DETAIL_PX,
+    split::{EDGE_PX, split},
+};
 
 /// Error of the finest simplified level, metres; each level has twice the error of the one before.
 const ERROR_MIN_M: f32 = 0.008;
@@ -16,6 +20,8 @@ const ERROR_MIN_M: f32 = 0.008;
 const WORTHWHILE: f64 = 0.8;
 /// No model is simplified to fewer triangles.
 const TRIANGLES_MIN: usize = 40;
+/// A boat that is longer than so many pixels is not seen whole.
+const FILLED_PX: f32 = 1600.0;
 /// What a whole change of normal and of colour weighs, in parts of the level's error.
 const NORMAL_WEIGHT: f32 = 0.5;
 const ALBEDO_WEIGHT: f32 = 6.0;
@@ -45,10 +51,20 @@ pub(crate) struct Simplified {
     pub(crate) indices: Vec<u32>,
     /// From the finest to the coarsest; never empty.
     pub(crate) levels: Vec<Level>,
+    /// Long edges are cut.
+    bent: bool,
+    /// Largest extent of the model, metres.
+    size_m: f32,
 }
 
-/// Makes the levels of `model`, whose indices are known to lie within its vertices.
-pub(crate) fn simplify(model: &Model) -> Simplified {
+/// What a pixel spans at a boat that is drawn from the level of that error, at least: the error hides in a part of it, and no boat is
+/// looked at from nearer than where it fills the picture.
+fn least_pixel_m(error_m: f32, size_m: f32) -> f32 {
+    (error_m.max(ERROR_MIN_M / 2.0) / DETAIL_PX as f32).max(size_m / FILLED_PX)
+}
+
+/// Makes the levels of `model`, whose indices are known to lie within its vertices; without long edges where a lens is `bent`.
+pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
     let vertices: Vec<MeshVertex> = model
         .vertices
         .iter()
@@ -62,7 +78,8 @@ pub(crate) fn simplify(model: &Model) -> Simplified {
     let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let parts = Parts::of(model);
     let closed: Vec<bool> = triangles.iter().map(|t| parts.closed(t[0])).collect();
-    let mut all = Simplified { vertices, ..Simplified::default() };
+    let size_m = (model.max - model.min).max_element();
+    let mut all = Simplified { vertices, bent, size_m, ..Simplified::default() };
     all.push(0.0, &triangles, &closed);
     // A texture's seams would tear, and a picture has few triangles anyway.
     if model.texture.is_some() || model.kind == ModelKind::Quad {
@@ -115,9 +132,13 @@ fn with_error(model: &Model, parts: &Parts, error: f32) -> Vec<[u32; 3]> {
 
 impl Simplified {
     fn push(&mut self, error_m: f32, triangles: &[[u32; 3]], closed: &[bool]) {
+        let mut triangles: Vec<_> = triangles.iter().copied().zip(closed.iter().copied()).collect();
+        if self.bent {
+            triangles = split(&mut self.vertices, triangles, EDGE_PX * least_pixel_m(error_m, self.size_m));
+        }
         let mut run = |wanted: bool| {
             let from = self.indices.len() as u32;
-            let chosen = triangles.iter().zip(closed).filter(|(_, closed)| **closed == wanted);
+            let chosen = triangles.iter().filter(|(_, closed)| *closed == wanted);
             self.indices.extend(chosen.flat_map(|(t, _)| t));
             from..self.indices.len() as u32
         };
@@ -136,22 +157,44 @@ mod tests {
     #[test]
     fn a_box_is_closed_and_a_box_without_a_lid_or_inside_out_is_not() {
         let model = testing::box_model("box", [4.0, 2.0, 1.5], [0.5; 3]);
-        let level = &simplify(&model).levels[0];
+        let level = &simplify(&model, false).levels[0];
         assert_eq!((level.closed.len(), level.open.len()), (36, 0));
         let mut open = model.clone();
         open.indices.truncate(30);
-        let level = &simplify(&open).levels[0];
+        let level = &simplify(&open, false).levels[0];
         assert_eq!((level.closed.len(), level.open.len()), (0, 30));
         let mut inverted = model;
         inverted.indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
-        assert_eq!(simplify(&inverted).levels[0].closed.len(), 0);
+        assert_eq!(simplify(&inverted, false).levels[0].closed.len(), 0);
+    }
+
+    #[test]
+    fn a_bent_lens_gets_no_long_edges_and_few_more_triangles() {
+        for name in ["skiff", "rhib", "dhow", "frigate"] {
+            let model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
+            let (plain, bent) = (simplify(&model, false), simplify(&model, true));
+            assert_eq!(plain.levels.len(), bent.levels.len());
+            for (plain, level) in plain.levels.iter().zip(&bent.levels) {
+                let longest = EDGE_PX * least_pixel_m(level.error_m() as f32, bent.size_m);
+                let indices = &bent.indices[level.closed.start as usize..level.open.end as usize];
+                for t in indices.chunks_exact(3) {
+                    let at = |i: u32| Vec3::from(bent.vertices[i as usize].position);
+                    for (a, b) in [(0, 1), (1, 2), (2, 0)] {
+                        assert!(at(t[a]).distance(at(t[b])) <= longest + 1e-4);
+                    }
+                }
+                let count = plain.closed.len() + plain.open.len();
+                println!("{name}: {} triangles, {} cut", count / 3, indices.len() / 3);
+                assert!(indices.len() <= 4 * count + 3000, "{name}: {} of {count}", indices.len());
+            }
+        }
     }
 
     #[test]
     fn levels_get_coarser_and_keep_the_shape() {
         for name in ["skiff", "rhib", "dhow", "frigate"] {
             let model = bowwave_models::resolve(name, std::path::Path::new(".")).unwrap();
-            let made = simplify(&model);
+            let made = simplify(&model, false);
             assert!(made.levels.len() > 3, "{name}: {} levels", made.levels.len());
             let mut last = u32::MAX;
             for level in &made.levels {

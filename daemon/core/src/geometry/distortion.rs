@@ -155,7 +155,8 @@ impl RadialTangential {
         for _ in 0..STEPS_MAX {
             let next = n + self.slope(n).inverse() * off;
             let left = distorted - self.bend(next);
-            if !(left.length_squared() < off.length_squared()) {
+            let nearer = left.length_squared() < off.length_squared();
+            if !nearer {
                 break;
             }
             (n, off) = (next, left);
