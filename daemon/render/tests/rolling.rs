@@ -1,6 +1,11 @@
 //! Boats fall on the rows of a rolling shutter: what is drawn against the host's own projection.
 
-#![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a step that fails fails the test"
+)]
 
 mod common;
 

@@ -15,6 +15,7 @@ pub mod photograph;
 pub mod plot;
 pub mod recorded;
 pub mod reflection;
+pub mod registration;
 pub mod row;
 pub mod sea_video;
 pub mod ship;

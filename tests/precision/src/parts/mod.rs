@@ -5,6 +5,7 @@ mod calibration;
 mod clock;
 mod colour;
 mod depth;
+mod drawn;
 mod flight;
 mod fresnel;
 mod fusion;
@@ -15,6 +16,7 @@ mod orientation;
 mod pacing;
 mod reflection;
 mod sea;
+mod shutter;
 mod wavefield;
 
 use anyhow::Result;
@@ -52,6 +54,8 @@ pub const PARTS: &[Part] = &[
     Part { about: fusion::ABOUT, measure: fusion::measure },
     Part { about: horizon::ABOUT, measure: horizon::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
+    Part { about: drawn::ABOUT, measure: drawn::measure },
+    Part { about: shutter::ABOUT, measure: shutter::measure },
     Part { about: calibration::ABOUT, measure: calibration::measure },
     Part { about: pacing::ABOUT, measure: pacing::measure },
     Part { about: flight::ABOUT, measure: flight::measure },
@@ -87,7 +91,7 @@ fn worst(errors: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Root mean square; NaN where one of them is none.
-fn rms(errors: impl IntoIterator<Item = f64>) -> f64 {
+pub(crate) fn rms(errors: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = errors.into_iter().fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
     (sum / count).sqrt()
 }

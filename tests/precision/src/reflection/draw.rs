@@ -219,6 +219,17 @@ impl Painter {
         size: (u32, u32),
         models: &[Model],
         methods: &[ReflectionMethod],
+        boats_on: (usize, Option<&str>),
+    ) -> Result<Self> {
+        Self::through(Optics::default(), size, models, methods, boats_on)
+    }
+
+    /// The same through a lens and shutter that need `optics`.
+    pub fn through(
+        optics: Optics,
+        size: (u32, u32),
+        models: &[Model],
+        methods: &[ReflectionMethod],
         (boats_max, device): (usize, Option<&str>),
     ) -> Result<Self> {
         let waters = methods.iter().map(|m| (*m, ShadowLevel::None)).collect();
@@ -228,7 +239,7 @@ impl Painter {
             device: device.map(str::to_owned),
             validation: false,
             frames_in_flight: 1,
-            needs: Needs { boats_max, rounds_max: 0, wakes_max: 0, waters, optics: Optics::default() },
+            needs: Needs { boats_max, rounds_max: 0, wakes_max: 0, waters, optics },
             picture: None,
             // Others may keep the processor that draws.
             time_outs: TimeOuts { frame: Duration::from_secs(60), rehearsal: Duration::from_secs(120) },

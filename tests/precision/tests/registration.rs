@@ -1,0 +1,37 @@
+//! Whole sessions on simulated recordings draw things far away where they belong; `precision --bin registration` has the table.
+
+#![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
+
+use bowwave_core::attitude::Source;
+use precision::registration::{Errors, Moved, Replayed, record, replay, summary};
+
+const WIDTH: u32 = 480;
+
+fn errors(moved: Moved, sources: &[(Source, bool)]) -> Vec<Errors> {
+    let recipe = moved.recipe(WIDTH);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("registration.mcap");
+    record(&recipe, &path).unwrap();
+    let how = |(source, shutter_unknown)| Replayed { source, exact: true, shutter_unknown, seconds: 45.0 };
+    sources.iter().map(|source| replay(&recipe, &path, how(*source)).unwrap()).collect()
+}
+
+#[test]
+fn a_gun_that_is_swung_at_40_deg_s_registers() {
+    let found = errors(Moved::Swung, &[(Source::Auto, false), (Source::Fused, false)]);
+    let ((rms, p99), (up, up_p99)) = (summary(&found[0].whole), summary(&found[1].up));
+    println!("the unit's own: {rms:.2} px rms, p99 {p99:.2}; fused, up alone: {up:.2}, {up_p99:.2}");
+    assert!(found.iter().all(|e| e.whole.len() > 100), "too few frames");
+    assert!(rms < 2.0 && p99 < 4.0, "the unit's own: {rms} px rms, p99 {p99}");
+    // Its heading starts with the unit's own error, and drifts until something aids it.
+    assert!(up < 1.5 && up_p99 < 3.0, "fused, up alone: {up} px rms, p99 {up_p99}");
+}
+
+#[test]
+fn a_rolling_shutter_registers_where_it_is_known() {
+    let found = errors(Moved::Rolling, &[(Source::Auto, false), (Source::Auto, true)]);
+    let [(known, p99), (unknown, _)] = [summary(&found[0].whole), summary(&found[1].whole)];
+    println!("30 ms at 40 deg/s: {known:.2} px rms, p99 {p99:.2}; nothing known of it: {unknown:.2}");
+    assert!(known < 2.0 && p99 < 4.0, "{known} px rms, p99 {p99}");
+    assert!(unknown > 3.0 * known, "{unknown} px without, {known} px with the shutter");
+}
