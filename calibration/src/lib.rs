@@ -1,5 +1,5 @@
 //! The calibration file: what maintainers measured about one camera and one inertial unit on one mount; and the solvers that its
-//! numbers come from ([`alignment`], [`camera`], [`boresight`]).
+//! numbers come from ([`alignment`], [`camera`] from pictures of a [`target`], [`boresight`]).
 //!
 //! A file is TOML with human units (pixels, degrees, milliradians, milliseconds, metres); in memory everything is a checked
 //! [`bowwave_core::calibration::Calibration`] in radians and nanoseconds. Every measured value comes with its uncertainty
@@ -36,6 +36,7 @@ mod file;
 mod raw;
 pub mod simulated;
 mod so3;
+pub mod target;
 mod write;
 
 pub use date::Date;

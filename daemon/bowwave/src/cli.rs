@@ -1,11 +1,15 @@
 //! The command line.
 
+mod calibrate;
+
 use std::path::PathBuf;
 
 use bowwave_core::{scene::ReflectionMethod, time::secs_to_ns};
 use bowwave_import::Level;
 use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};
+
+pub use calibrate::{Calibrate, CalibrateBoard, CalibrateTask};
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
 #[derive(Debug, Parser)]
@@ -38,6 +42,8 @@ pub enum Command {
     Doctor(Doctor),
     /// Print the virtual rounds of a journal
     Hits(Hits),
+    /// Measure lens, mounting and timing, or print the board for it
+    Calibrate(Calibrate),
 }
 
 /// Arguments of `run`.

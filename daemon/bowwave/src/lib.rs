@@ -1,6 +1,7 @@
 //! The trainer's program: command line, configuration, main loops. A library only so that tests can reach what reads files.
 
 mod cache;
+mod calibrate;
 mod cli;
 mod commits;
 pub mod compose;
@@ -84,5 +85,6 @@ fn dispatch(command: &Command, program_start: bowwave_core::time::Time) -> Resul
             doctor::run(arguments).map(|well| if well { Outcome::Done } else { Outcome::Failed })
         }
         Command::Hits(arguments) => hits::run(arguments).map(|()| Outcome::Done),
+        Command::Calibrate(arguments) => calibrate::run(&arguments.task),
     }
 }
