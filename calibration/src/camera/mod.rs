@@ -6,14 +6,17 @@
 //! is (0.5, 0.5).
 
 mod adjust;
+mod judge;
 mod model;
 mod start;
 
 use bowwave_core::geometry::{Distortion, Lens};
 use glam::{DMat3, DVec2, DVec3};
 
+pub use judge::Missing;
 pub use model::Model;
 pub use start::BoardPose;
+pub(crate) use start::homography;
 
 use adjust::{Adjusted, State, adjust};
 use model::{INTRINSICS, Intrinsics};
@@ -99,10 +102,15 @@ pub struct Evidence {
     pub held_out_px: f64,
 }
 
+/// Parts of the picture that coverage is counted in: across and down.
+pub const CELLS: (usize, usize) = (8, 6);
+
 /// How well the pictures cover what there is to see.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coverage {
-    /// Share of 8 x 6 cells of the picture with a corner in them.
+    /// Corners in each part of the picture, row by row from above.
+    pub cells: [[usize; CELLS.0]; CELLS.1],
+    /// Share of the parts with a corner in them.
     pub share: f64,
     /// Smallest and largest tilt of the board, radians.
     pub tilt: [f64; 2],
@@ -119,6 +127,8 @@ pub struct Camera {
     pub intrinsics: [f64; 8],
     /// Standard deviation of each.
     pub sigma: [f64; 8],
+    /// Their covariance.
+    pub covariance: [[f64; 8]; 8],
     /// Standard deviation of a corner's coordinate, pixels.
     pub sigma_px: f64,
     /// Both models.
@@ -195,7 +205,7 @@ pub fn solve(views: &[View], (width, height): (u32, u32)) -> Result<Camera, Came
     }
     let unknown = CameraError::Uncertain { share: 1.0, most: FOCAL_MOST };
     let covariance = fit.covariance.ok_or(unknown)?;
-    let sigma = std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt());
+    let sigma: [f64; INTRINSICS] = std::array::from_fn(|i| covariance[(i, i)].max(0.0).sqrt());
     let intrinsics: [f64; INTRINSICS] = fit.state.intrinsics.into();
     let share = (sigma[0] / intrinsics[0]).max(sigma[1] / intrinsics[1]).abs();
     if !(share <= FOCAL_MOST && intrinsics[0] > 0.0 && intrinsics[1] > 0.0) {
@@ -207,9 +217,10 @@ pub fn solve(views: &[View], (width, height): (u32, u32)) -> Result<Camera, Came
         size: (width, height),
         intrinsics,
         sigma,
+        covariance: covariance.into(),
         sigma_px: best.sigma_px,
         evidence,
-        coverage: Coverage { share: covered(&views, size), tilt },
+        coverage: covered(&views, size, tilt),
         pose_covariances: fit.rotations.iter().map(rotation).collect(),
         poses: numbers.into_iter().zip(fit.state.poses).collect(),
     })
@@ -278,16 +289,16 @@ fn fit(model: Model, views: &[View], size: DVec2) -> Option<Adjusted> {
     best.filter(|b| b.state.intrinsics.iter().all(|v| v.is_finite()))
 }
 
-fn covered(views: &[View], size: DVec2) -> f64 {
-    const CELLS: (usize, usize) = (8, 6);
-    let mut seen = [false; CELLS.0 * CELLS.1];
+fn covered(views: &[View], size: DVec2, tilt: [f64; 2]) -> Coverage {
+    let mut cells = [[0; CELLS.0]; CELLS.1];
     for corner in views.iter().flat_map(|v| &v.corners) {
         let share = corner.pixel / size;
         let x = ((share.x * CELLS.0 as f64) as usize).min(CELLS.0 - 1);
         let y = ((share.y * CELLS.1 as f64) as usize).min(CELLS.1 - 1);
-        seen[y * CELLS.0 + x] = true;
+        cells[y][x] += 1;
     }
-    seen.iter().filter(|s| **s).count() as f64 / seen.len() as f64
+    let seen = cells.iter().flatten().filter(|count| **count > 0).count();
+    Coverage { cells, share: seen as f64 / (CELLS.0 * CELLS.1) as f64, tilt }
 }
 
 #[cfg(test)]

@@ -34,7 +34,7 @@ fn even(points: impl Iterator<Item = DVec2> + Clone) -> Option<(DVec2, f64)> {
 }
 
 /// Homography from the board to `seen` by the direct linear transform (Hartley & Zisserman 2004, alg. 4.2).
-fn homography(pairs: &[(DVec2, DVec2)]) -> Option<Matrix3<f64>> {
+pub(crate) fn homography(pairs: &[(DVec2, DVec2)]) -> Option<Matrix3<f64>> {
     if pairs.len() < 4 {
         return None;
     }

@@ -74,6 +74,55 @@ fn the_trainers_lens_is_the_same_function() {
 }
 
 #[test]
+fn the_stated_angles_hold() {
+    let middle = DVec2::new(640.0, 360.0);
+    let edge = [(0.0, 0.0), (1280.0, 0.0), (640.0, 720.0), (0.0, 360.0)];
+    // No board reaches a fisheye's corners.
+    let inner = [(250.0, 100.0), (1000.0, 600.0), (640.0, 650.0), (150.0, 360.0)];
+    for (model, truth, pixels) in [(Model::RadialTangential, PINHOLE, edge), (Model::Fisheye, FISHEYE, inner)]
+    {
+        let angle = |numbers: [f64; 8], pixel: DVec2| {
+            let to = |p: DVec2| model.unproject(&Intrinsics::from(numbers), p).unwrap();
+            to(pixel).angle_between(to(middle))
+        };
+        let (mut outside, mut all) = (0, 0);
+        for seed in 20..32 {
+            let camera = solve(&views(model, truth, 14, 0.4, 0.3, seed), SIZE).unwrap();
+            for pixel in pixels.map(DVec2::from) {
+                let sigma = camera.angle_sigma(pixel);
+                assert!((1e-5..3e-2).contains(&sigma) && sigma <= camera.edge_sigma(), "{model:?} {sigma}");
+                all += 1;
+                outside +=
+                    usize::from((angle(camera.intrinsics, pixel) - angle(truth, pixel)).abs() > 3.0 * sigma);
+            }
+        }
+        assert!(outside <= 1, "{model:?} {outside} of {all}");
+    }
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    let whole = solve(&views(Model::RadialTangential, PINHOLE, 40, 0.4, 0.2, 11), SIZE).unwrap();
+    assert_eq!(whole.missing(), [], "{:?}", whole.coverage);
+    assert_eq!(whole.grade(), crate::alignment::Grade::Good);
+    // Corners of the left half only, eight pictures, much noise.
+    let mut some = views(Model::RadialTangential, PINHOLE, 8, 0.4, 0.6, 12);
+    some.iter_mut().for_each(|v| v.corners.retain(|c| c.pixel.x < 700.0));
+    some.retain(|v| v.corners.len() > 20);
+    let camera = solve(&some, SIZE).unwrap();
+    let missing = camera.missing();
+    for wanted in [
+        Missing::Pictures(camera.poses.len()),
+        Missing::Fit(camera.sigma_px),
+        Missing::Part("upper right corner"),
+    ] {
+        assert!(missing.contains(&wanted), "{wanted:?} in {missing:?}");
+    }
+    assert!(camera.grade() < crate::alignment::Grade::Good);
+    assert!(camera.edge_sigma() > whole.edge_sigma());
+}
+
+#[test]
 fn one_corner_in_twenty_wild() {
     let mut seen = views(Model::RadialTangential, PINHOLE, 25, 0.4, 0.2, 8);
     let mut random = Random::new(2);

@@ -5,10 +5,20 @@
 //! neither blur nor exposure moves. A board can be seen in part, because every tag says which one it is.
 
 mod codes;
+mod corner;
+mod detect;
+mod picture;
+mod quads;
+mod read;
+mod varied;
 
 use std::{fmt, str::FromStr};
 
 use glam::DVec2;
+
+pub use detect::{Tag, detect, view};
+pub use picture::Grey;
+pub use varied::varied;
 
 /// Modules along a tag's side: six of data, two of border on either side.
 pub const MODULES: usize = 10;
@@ -151,68 +161,4 @@ impl fmt::Display for Target {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn turned(code: u64) -> u64 {
-        let bit = |r: usize, c: usize| code >> (35 - (6 * r + c)) & 1;
-        (0..36).fold(0, |turned, i| turned | bit(i / 6, i % 6) << (35 - (6 * (i % 6) + 5 - i / 6)))
-    }
-
-    fn mirrored(code: u64) -> u64 {
-        (0..36).fold(0, |m, i| m | (code >> i & 1) << (6 * (i / 6) + 5 - i % 6))
-    }
-
-    /// Fewest modules that tell `code`, turned any way, from any tag of the family but `but`, unturned.
-    fn apart(code: u64, but: usize) -> u32 {
-        let turns = [code, turned(code), turned(turned(code)), turned(turned(turned(code)))];
-        let all = turns.iter().enumerate().flat_map(|(turn, code)| {
-            let others = codes::TAG36H11.iter().enumerate().filter(move |(id, _)| turn > 0 || *id != but);
-            others.map(move |(_, other)| (code ^ other).count_ones())
-        });
-        all.min().unwrap()
-    }
-
-    #[test]
-    fn no_tag_looks_like_another_or_like_a_mirrored_one() {
-        let all = codes::TAG36H11.iter();
-        assert_eq!(all.clone().enumerate().map(|(id, code)| apart(*code, id)).min(), Some(11));
-        // Three wrong modules, which detection allows, do not make a tag of a mirrored one.
-        assert_eq!(all.map(|code| apart(mirrored(*code), usize::MAX)).min(), Some(4));
-    }
-
-    #[test]
-    fn targets_are_read_as_they_are_written() {
-        for text in ["6x6:22:0.3", "7x4:88.5:0.25", "1x1:1:1", "6x6:22"] {
-            let target: Target = text.parse().unwrap();
-            assert_eq!(target.to_string().parse::<Target>(), Ok(target), "{text}");
-        }
-        assert_eq!("6x6:22".parse(), Ok(Target::A4));
-        for bad in [
-            "",
-            "6x6",
-            "6:22",
-            "6x6:22:0.3:1",
-            "0x6:22",
-            "60x60:22",
-            "6x6:-1",
-            "6x6:nan",
-            "6x6:22:0",
-            "ax6:22",
-        ] {
-            assert!(bad.parse::<Target>().is_err(), "{bad}");
-        }
-        assert!(Target::new(usize::MAX, 2, 0.02, 0.3).is_err());
-    }
-
-    #[test]
-    fn the_first_tag_is_the_lower_left_one() {
-        let t = Target::new(3, 2, 0.1, 0.5).unwrap();
-        assert_eq!(t.corners(0), [(0.0, 0.0), (0.1, 0.0), (0.1, 0.1), (0.0, 0.1)].map(DVec2::from));
-        assert!(t.corners(4)[0].distance(DVec2::new(0.15, 0.15)) < 1e-12);
-        assert!(t.size_m().distance(DVec2::new(0.5, 0.35)) < 1e-12);
-        // Kalibr's tag 0, 0xd5d628584: its first row is 110101.
-        let row: Vec<bool> = (0..MODULES).map(|c| is_white(0, 2, c)).collect();
-        assert_eq!(row, [0, 0, 1, 1, 0, 1, 0, 1, 0, 0].map(|b| b == 1));
-    }
-}
+mod tests;

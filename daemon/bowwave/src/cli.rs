@@ -9,7 +9,7 @@ use bowwave_import::Level;
 use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};
 
-pub use calibrate::{Calibrate, CalibrateBoard, CalibrateTask};
+pub use calibrate::{Calibrate, CalibrateBoard, CalibrateCamera, CalibrateTask};
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
 #[derive(Debug, Parser)]

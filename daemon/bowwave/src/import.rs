@@ -64,10 +64,10 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
 }
 
 /// The date in UTC: what is measured now is measured today.
-fn today() -> Result<Date> {
+pub fn today() -> Result<Date> {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok();
     now.and_then(|d| Date::from_unix_seconds(i64::try_from(d.as_secs()).ok()?))
-        .context("the clock of this computer is not set: set it, so that the import can be dated")
+        .context("the clock of this computer is not set: set it, so that what is measured can be dated")
 }
 
 fn as_json(report: &ImportReport) -> serde_json::Value {

@@ -30,6 +30,7 @@ mod video;
 pub use bias::{Bias, BiasSource};
 pub use error::ImportError;
 pub use options::{ImportOptions, ImportReport, Level, Progress, TelemetryReport};
+pub use output::assumed;
 pub use pictures::{import_pictures, picture_names};
 pub use telemetry::{Telemetry, read_telemetry};
 pub use video::import_video;

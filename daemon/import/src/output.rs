@@ -86,7 +86,8 @@ pub(crate) fn calibration_for(
     Ok(file.clone())
 }
 
-fn assumed((width, height): (u32, u32), options: &ImportOptions) -> CalibrationFile {
+/// A calibration of pictures of that size in which nothing was measured: it says so, with uncertainties to match.
+pub fn assumed((width, height): (u32, u32), options: &ImportOptions) -> CalibrationFile {
     let degrees = options.assumed_hfov_deg;
     let lens = Lens::pinhole(width, height, degrees.clamp(1.0, 150.0).to_radians());
     let calibration = Calibration {

@@ -1,6 +1,8 @@
 //! `bowwave calibrate`: what lens, mounting and timing are, for maintainers.
 
 mod board;
+mod camera;
+mod pictures;
 
 use anyhow::Result;
 
@@ -10,5 +12,6 @@ use crate::{cli::CalibrateTask, outcome::Outcome};
 pub fn run(task: &CalibrateTask) -> Result<Outcome> {
     match task {
         CalibrateTask::Board(arguments) => board::run(arguments),
+        CalibrateTask::Camera(arguments) => camera::run(arguments),
     }
 }

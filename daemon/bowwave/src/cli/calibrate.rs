@@ -18,6 +18,8 @@ pub struct Calibrate {
 pub enum CalibrateTask {
     /// Make the board whose pictures tell the lens, ready to print
     Board(CalibrateBoard),
+    /// Measure the lens from pictures of the board: focal length, centre, distortion
+    Camera(CalibrateCamera),
 }
 
 /// Arguments of `calibrate board`.
@@ -32,4 +34,23 @@ pub struct CalibrateBoard {
     /// Replace a file of that name
     #[arg(long)]
     pub force: bool,
+}
+
+/// Arguments of `calibrate camera`.
+#[derive(Debug, Args)]
+pub struct CalibrateCamera {
+    /// Folder of JPEG or PNG pictures of the board, or a recording (MCAP) in which it is shown
+    pub pictures: PathBuf,
+    /// The board, as `calibrate board` prints below it. Its size does not matter to the lens, its layout does
+    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]", default_value_t = Target::A4)]
+    pub target: Target,
+    /// Calibration file (TOML) whose lens is replaced; where there is none, one is begun
+    #[arg(short, long, value_name = "FILE", default_value = "calibration.toml")]
+    pub out: PathBuf,
+    /// Only say what the lens is, and write nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
 }

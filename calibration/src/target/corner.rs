@@ -1,0 +1,149 @@
+//! A tag's corner to a fraction of a pixel.
+//!
+//! Around a corner two dark and two bright fields meet, so that the picture turned by half a turn about the corner is the same picture,
+//! however blurred, smeared or slanted it is. The place about which it differs least from itself is the corner: as good as fitting the
+//! true shape, without knowing it. It is approached along the edges, whose normals all pass the corner by (Förstner & Gülch 1987).
+
+use glam::DVec2;
+
+use super::picture::Plane;
+
+/// Window of the last search, pixels: more costs time, less errs more.
+const REACH: [f64; 2] = [2.5, 8.0];
+/// The window by the tag's smallest height: within two modules of ten and three of gap there is nothing but the corner.
+const REACH_SHARE: f64 = 0.13;
+/// How far the corner may be from where it was expected, by the tag's smallest height, and pixels more.
+const OFF_SHARE: f64 = 0.1;
+const OFF_PX: f64 = 1.0;
+/// Least correlation of the window with itself turned by half a turn: what covers a corner, or glare, is not symmetric.
+const LIKENESS: f64 = 0.9;
+/// Least of the smaller by the larger spread of edge directions: one edge alone is no corner.
+const EDGES: f64 = 0.04;
+
+/// Pixels around a place, sampled between pixels.
+struct Patch {
+    reach: i32,
+    side: usize,
+    values: Vec<f64>,
+}
+
+impl Patch {
+    fn around(plane: &Plane, place: DVec2, reach: i32) -> Self {
+        let side = (2 * reach + 3) as usize;
+        let step = |i: usize| i as f64 - f64::from(reach) - 1.0;
+        let values =
+            (0..side * side).map(|i| plane.at(place + DVec2::new(step(i % side), step(i / side)))).collect();
+        Self { reach, side, values }
+    }
+
+    fn get(&self, dx: i32, dy: i32) -> f64 {
+        let along = |d: i32| (d + self.reach + 1) as usize;
+        self.values[along(dy) * self.side + along(dx)]
+    }
+
+    fn slope(&self, dx: i32, dy: i32) -> DVec2 {
+        DVec2::new(self.get(dx + 1, dy) - self.get(dx - 1, dy), self.get(dx, dy + 1) - self.get(dx, dy - 1))
+            * 0.5
+    }
+
+    /// Offsets within the window and their weights.
+    fn offsets(&self) -> impl Iterator<Item = (i32, i32, f64)> + use<> {
+        let (n, limit) = (self.reach, f64::from(self.reach * self.reach) + 0.5);
+        (-n..=n).flat_map(move |y| (-n..=n).map(move |x| (x, y))).filter_map(move |(x, y)| {
+            let square = f64::from(x * x + y * y);
+            (square <= limit).then(|| (x, y, (-1.5 * square / limit).exp()))
+        })
+    }
+}
+
+/// Two equations for two unknowns, from sums of products.
+#[derive(Default)]
+struct Sums {
+    xx: f64,
+    xy: f64,
+    yy: f64,
+    right: DVec2,
+}
+
+impl Sums {
+    fn add(&mut self, slope: DVec2, value: f64, weight: f64) {
+        self.xx += weight * slope.x * slope.x;
+        self.xy += weight * slope.x * slope.y;
+        self.yy += weight * slope.y * slope.y;
+        self.right += slope * (value * weight);
+    }
+
+    fn solve(&self) -> Option<DVec2> {
+        let det = self.xx * self.yy - self.xy * self.xy;
+        let mean = 0.5 * (self.xx + self.yy);
+        // The eigenvalues' ratio, from their sum and product.
+        let root = (mean * mean - det).max(0.0).sqrt();
+        if mean <= 0.0 || (mean - root) < EDGES * (mean + root) {
+            return None;
+        }
+        let step = DVec2::new(
+            self.yy * self.right.x - self.xy * self.right.y,
+            self.xx * self.right.y - self.xy * self.right.x,
+        ) / det;
+        step.is_finite().then_some(step)
+    }
+}
+
+/// One step towards where the edges' lines meet.
+pub(super) fn towards_edges(plane: &Plane, place: DVec2, reach: i32) -> Option<DVec2> {
+    let patch = Patch::around(plane, place, reach);
+    let mut sums = Sums::default();
+    for (x, y, weight) in patch.offsets() {
+        let slope = patch.slope(x, y);
+        sums.add(slope, slope.dot(DVec2::new(f64::from(x), f64::from(y))), weight);
+    }
+    sums.solve()
+}
+
+/// One step towards where the picture is most like itself turned by half a turn, and how like it is now.
+fn towards_symmetry(plane: &Plane, place: DVec2, reach: i32) -> Option<(DVec2, f64)> {
+    let patch = Patch::around(plane, place, reach);
+    let (mut sums, mut weights, mut mean) = (Sums::default(), 0.0, 0.0);
+    for (x, y, weight) in patch.offsets() {
+        weights += weight;
+        mean += weight * patch.get(x, y);
+    }
+    mean /= weights;
+    let (mut both, mut own) = (0.0, 1e-9);
+    for (x, y, weight) in patch.offsets() {
+        let (here, there) = (patch.get(x, y), patch.get(-x, -y));
+        both += weight * (here - mean) * (there - mean);
+        own += weight * (here - mean) * (here - mean);
+        sums.add(patch.slope(x, y) - patch.slope(-x, -y), there - here, weight);
+    }
+    Some((sums.solve()?, both / own))
+}
+
+/// The corner near `start`, pixels of this plane, of a tag whose smallest height is `tag_px` there; `None` where there is none.
+pub(super) fn refine(plane: &Plane, start: DVec2, tag_px: f64) -> Option<DVec2> {
+    let off_max = OFF_SHARE * tag_px + OFF_PX;
+    let reach = (REACH_SHARE * tag_px).clamp(REACH[0], REACH[1]).round() as i32;
+    let fine = |p: DVec2| plane.surrounds(p, f64::from(reach) + 1.0) && p.distance(start) <= off_max;
+    let mut place = start;
+    for _ in 0..6 {
+        if !fine(place) {
+            return None;
+        }
+        let step = towards_edges(plane, place, reach)?;
+        place += step.clamp_length_max(f64::from(reach));
+        if step.length() < 0.1 {
+            break;
+        }
+    }
+    for _ in 0..12 {
+        if !fine(place) {
+            return None;
+        }
+        let (step, likeness) = towards_symmetry(plane, place, reach)?;
+        place += step.clamp_length_max(0.7);
+        if step.length() < 2e-3 {
+            return (likeness >= LIKENESS && fine(place)).then_some(place);
+        }
+    }
+    None
+}

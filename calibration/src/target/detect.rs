@@ -1,0 +1,237 @@
+//! The board in a picture.
+//!
+//! Dark quadrilaterals are read at every scale of a pyramid; what the neighbours of a tag predict is looked for in turn, so that one tag
+//! is enough to find the others through blur and glare; what does not stand where its neighbours say is no tag of the board.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec2;
+
+use super::{
+    Target, corner,
+    picture::{Grey, Plane},
+    quads::{self, Quad},
+    read::{self, Sight, WRONG_EXPECTED},
+};
+use crate::camera::{Corner, View};
+
+/// Smallest side of a picture of the pyramid, pixels.
+const LEAST_PX: usize = 100;
+/// Side of a tag where the search for its corners begins, pixels.
+const BEGIN_PX: f64 = 24.0;
+/// How far a tag may be from where a neighbour expects it, by its least height and the steps between them: a near board seen by a fisheye
+/// bends that far.
+const APART: f64 = 0.35;
+/// How far a corner may be from the middle of what all neighbours expect: by the tag's least height and pixels more, or by the median of
+/// all tags where the lens bends the board.
+const STRAY: f64 = 0.03;
+const STRAY_PX: f64 = 0.7;
+const STRAY_MEDIANS: f64 = 4.0;
+/// No lens bends it so far, in times of what is allowed: of few tags, wrong ones would make a large median.
+const STRAY_MOST: f64 = 4.0;
+
+/// A tag in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tag {
+    /// Which one.
+    pub id: usize,
+    /// Its corners, pixels: lower left, lower right, upper right, upper left as printed.
+    pub corners: [DVec2; 4],
+}
+
+/// The picture and its halves.
+struct Pyramid(Vec<Plane>);
+
+impl Pyramid {
+    fn new(picture: &Grey) -> Self {
+        let mut planes = vec![Plane::smoothed(picture)];
+        while let Some(last) = planes.last().filter(|p| p.width.min(p.height) >= 2 * LEAST_PX) {
+            planes.push(last.halved());
+        }
+        Self(planes)
+    }
+
+    /// The corners near `quad`, pixels of the whole picture, from scale `level` down to the finest.
+    fn refine(&self, quad: &Quad, level: usize) -> Option<Quad> {
+        let mut found = *quad;
+        for (level, plane) in self.0.iter().enumerate().take(level + 1).rev() {
+            let scale = (1_u32 << level) as f64;
+            let tag_px = height_px(&found) / scale;
+            for corner in &mut found {
+                *corner = corner::refine(plane, *corner / scale, tag_px)? * scale;
+            }
+        }
+        Some(found)
+    }
+
+    /// Where the search for the corners of a tag of that size begins.
+    fn level_for(&self, tag_px: f64) -> usize {
+        ((tag_px / BEGIN_PX).log2().max(0.0) as usize).min(self.0.len() - 1)
+    }
+
+    fn finest(&self) -> &Plane {
+        &self.0[0]
+    }
+}
+
+/// Least height of a quadrilateral over one of its sides, about, pixels.
+fn height_px(q: &Quad) -> f64 {
+    let area = 0.5 * (q[2] - q[0]).perp_dot(q[3] - q[1]).abs();
+    let longest = (0..4).map(|i| q[i].distance(q[(i + 1) % 4])).fold(1e-9, f64::max);
+    area / longest
+}
+
+/// The tags of the board that `picture` shows; two at least (one on a board of one), else none. In order of their ids.
+pub fn detect(target: &Target, picture: &Grey) -> Vec<Tag> {
+    let (width, height) = picture.size();
+    if width < 32 || height < 32 {
+        return Vec::new();
+    }
+    let pyramid = Pyramid::new(picture);
+    let mut found = together(target, &seeds(target, &pyramid));
+    // A tag of which one corner was mistaken is found by its neighbours, once it is dropped.
+    for _ in 0..2 {
+        grow(target, &pyramid, &mut found);
+        settle(target, &mut found);
+    }
+    if found.len() < target.tags().min(2) {
+        return Vec::new();
+    }
+    found.into_iter().map(|(id, corners)| Tag { id, corners }).collect()
+}
+
+/// Tags that are read by themselves.
+fn seeds(target: &Target, pyramid: &Pyramid) -> BTreeMap<usize, Quad> {
+    let mut best: BTreeMap<usize, (u32, Quad)> = BTreeMap::new();
+    for (level, plane) in pyramid.0.iter().enumerate() {
+        let scale = (1_u32 << level) as f64;
+        for quad in quads::find(plane) {
+            let quad = quad.map(|p| p * scale);
+            let known =
+                |(_, other): &(u32, Quad)| middle(&quad).distance(middle(other)) < 0.2 * height_px(other);
+            if best.values().any(known) {
+                continue;
+            }
+            let Some(refined) = pyramid.refine(&quad, level) else { continue };
+            let Some((id, wrong, corners)) = read::read(pyramid.finest(), &refined, target) else { continue };
+            if best.get(&id).is_none_or(|b| wrong < b.0) {
+                best.insert(id, (wrong, corners));
+            }
+        }
+    }
+    best.into_iter().map(|(id, (_, quad))| (id, quad)).collect()
+}
+
+fn middle(q: &Quad) -> DVec2 {
+    q.iter().sum::<DVec2>() / 4.0
+}
+
+/// Steps from one tag to another on the board, the larger of across and upwards.
+fn steps(target: &Target, a: usize, b: usize) -> usize {
+    let (columns, place) = (target.columns(), |id: usize, n: usize| (id % n, id / n));
+    let ((ax, ay), (bx, by)) = (place(a, columns), place(b, columns));
+    ax.abs_diff(bx).max(ay.abs_diff(by))
+}
+
+/// Whether two tags near each other on the board stand in the picture as the board says.
+fn agree(target: &Target, (a, one): (usize, &Quad), (b, other): (usize, &Quad)) -> bool {
+    let count = steps(target, a, b);
+    let Some(expected) = Sight::of(one).and_then(|s| s.expected(target, a, b)) else { return false };
+    let off = expected.iter().zip(other).map(|(e, o)| e.distance(*o)).fold(0.0, f64::max);
+    (1..=2).contains(&count) && off <= APART * height_px(other) * count as f64
+}
+
+/// The largest group of tags of which each agrees with one near it.
+fn together(target: &Target, all: &BTreeMap<usize, Quad>) -> BTreeMap<usize, Quad> {
+    let mut left: BTreeSet<usize> = all.keys().copied().collect();
+    let mut largest = BTreeMap::new();
+    while let Some(first) = left.pop_first() {
+        let mut group = BTreeMap::from([(first, all[&first])]);
+        let mut open = vec![first];
+        while let Some(id) = open.pop() {
+            let near: Vec<usize> =
+                left.iter().copied().filter(|o| agree(target, (id, &all[&id]), (*o, &all[o]))).collect();
+            for other in near {
+                left.remove(&other);
+                group.insert(other, all[&other]);
+                open.push(other);
+            }
+        }
+        if group.len() > largest.len() {
+            largest = group;
+        }
+    }
+    largest
+}
+
+/// Adds the tags beside those that were found, and beside these.
+fn grow(target: &Target, pyramid: &Pyramid, found: &mut BTreeMap<usize, Quad>) {
+    let mut open: Vec<usize> = found.keys().copied().collect();
+    while let Some(id) = open.pop() {
+        let Some(sight) = found.get(&id).and_then(Sight::of) else { continue };
+        for other in (0..target.tags()).filter(|o| steps(target, id, *o) == 1) {
+            if found.contains_key(&other) {
+                continue;
+            }
+            let Some(expected) = sight.expected(target, id, other) else { continue };
+            let Some(quad) = pyramid.refine(&expected, pyramid.level_for(height_px(&expected))) else {
+                continue;
+            };
+            let wrong = read::wrong_as(pyramid.finest(), &quad, target, other);
+            if wrong.is_some_and(|w| w <= WRONG_EXPECTED) && agree(target, (id, &found[&id]), (other, &quad))
+            {
+                found.insert(other, quad);
+                open.push(other);
+            }
+        }
+    }
+}
+
+/// The middle one, or between the two middle ones.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let at = |i: usize| values.get(i).copied().unwrap_or(f64::NAN);
+    0.5 * (at(values.len() / 2) + at(values.len().saturating_sub(1) / 2))
+}
+
+/// How far the worst corner of a tag is from the middle of what the nearest others expect, in times of what is allowed; `None` without
+/// others.
+fn stray(target: &Target, found: &BTreeMap<usize, Quad>, id: usize) -> Option<f64> {
+    let own = &found[&id];
+    let away = |other: &usize| steps(target, *other, id);
+    let nearest = found.keys().map(away).filter(|steps| *steps > 0).min()?;
+    let expected: Vec<Quad> = found
+        .iter()
+        .filter(|(other, _)| away(other) == nearest)
+        .filter_map(|(other, quad)| Sight::of(quad)?.expected(target, *other, id))
+        .collect();
+    let off = |i: usize| {
+        let along = |f: fn(DVec2) -> f64| median(expected.iter().map(|q| f(q[i])).collect());
+        own[i].distance(DVec2::new(along(|p| p.x), along(|p| p.y)))
+    };
+    let allowed = (STRAY * height_px(own) + STRAY_PX) * nearest as f64;
+    (!expected.is_empty()).then(|| (0..4).map(off).fold(0.0, f64::max) / allowed)
+}
+
+/// Drops tags whose corners are not where their neighbours expect them, the worst one first: it may be what spoils the others.
+fn settle(target: &Target, found: &mut BTreeMap<usize, Quad>) {
+    loop {
+        let all: Vec<(usize, f64)> =
+            found.keys().filter_map(|id| Some((*id, stray(target, found, *id)?))).collect();
+        let limit = (STRAY_MEDIANS * median(all.iter().map(|s| s.1).collect())).clamp(1.0, STRAY_MOST);
+        let Some((worst, _)) = all.into_iter().filter(|s| s.1 > limit).max_by(|a, b| a.1.total_cmp(&b.1))
+        else {
+            return;
+        };
+        found.remove(&worst);
+    }
+}
+
+/// The corners of the board as the solvers take them.
+pub fn view(target: &Target, tags: &[Tag]) -> View {
+    let corners = tags.iter().flat_map(|tag| {
+        let places = target.corners(tag.id).into_iter().zip(tag.corners);
+        places.map(|(board, pixel)| Corner { board, pixel })
+    });
+    View { corners: corners.collect() }
+}

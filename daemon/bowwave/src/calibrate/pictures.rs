@@ -1,0 +1,129 @@
+//! Pictures of the board, from a folder or a recording.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use bowwave_calibration::{
+    camera::View,
+    target::{Grey, Target, detect, view},
+};
+use bowwave_import::picture_names;
+use bowwave_record::{Entry, RecordError, RecordingReader};
+use image::{GrayImage, ImageFormat, ImageReader, Limits};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Most pictures of a recording that are looked at, evenly over its length.
+const LOOKED_MOST: u64 = 240;
+
+/// What was seen in pictures of one camera.
+#[derive(Clone, Debug, Default)]
+pub struct Looked {
+    /// Their width and height, pixels.
+    pub size: (u32, u32),
+    /// Each with the board's corners in it, none where it shows no board.
+    pub views: Vec<(String, View)>,
+    /// The recording's own calibration, where it has one.
+    pub calibration_toml: Option<String>,
+}
+
+impl Looked {
+    fn take(&mut self, name: String, picture: &GrayImage, target: &Target) -> Result<()> {
+        let size = picture.dimensions();
+        if self.views.is_empty() {
+            self.size = size;
+        } else if size != self.size {
+            bail!(
+                "{name} has {}x{} pixels, those before it {}x{}; keep pictures of one camera and one mode in a folder",
+                size.0,
+                size.1,
+                self.size.0,
+                self.size.1
+            );
+        }
+        let grey = Grey::new(size.0 as usize, size.1 as usize, picture.as_raw()).with_context(|| {
+            format!("{name} has {}x{} pixels; at most {} a side", size.0, size.1, Grey::SIDE_MAX)
+        })?;
+        self.views.push((name, view(target, &detect(target, &grey))));
+        Ok(())
+    }
+}
+
+/// Looks for the board in all pictures of a folder, or in many of a recording.
+pub fn look(source: &Path, target: &Target) -> Result<Looked> {
+    if !source.exists() {
+        bail!(
+            "no file or folder {}; name a folder of pictures of the board, or a recording",
+            source.display()
+        );
+    }
+    let mut looked = Looked::default();
+    if source.is_dir() {
+        folder(source, target, &mut looked)?;
+    } else {
+        recording(source, target, &mut looked)?;
+    }
+    Ok(looked)
+}
+
+fn progress(count: u64) -> ProgressBar {
+    let bar = ProgressBar::new(count);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+fn folder(source: &Path, target: &Target, looked: &mut Looked) -> Result<()> {
+    let names = picture_names(source)?;
+    if names.is_empty() {
+        bail!("{} has no JPEG or PNG pictures; put those of the board into it", source.display());
+    }
+    let bar = progress(names.len() as u64);
+    for path in names {
+        bar.inc(1);
+        let said = || format!("cannot read the picture {}; take it out of the folder", path.display());
+        let mut reader =
+            ImageReader::open(&path).and_then(ImageReader::with_guessed_format).with_context(said)?;
+        let mut limits = Limits::default();
+        let side = u32::try_from(Grey::SIDE_MAX).unwrap_or(u32::MAX);
+        (limits.max_image_width, limits.max_image_height) = (Some(side), Some(side));
+        reader.limits(limits);
+        // As it lies in the file: that is how the trainer gets it from the camera.
+        let picture = reader.decode().with_context(said)?.into_luma8();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        looked.take(name, &picture, target)?;
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+fn recording(source: &Path, target: &Target, looked: &mut Looked) -> Result<()> {
+    let reader = RecordingReader::open(source)?;
+    looked.calibration_toml = Some(reader.properties().calibration_toml.clone());
+    let frames = reader.counts().frames;
+    let step = frames.div_ceil(LOOKED_MOST).max(1);
+    let bar = progress(frames);
+    let mut number = 0_u64;
+    for entry in reader.entries()? {
+        let frame = match entry {
+            Ok(Entry::Frame(frame)) => frame,
+            Ok(_) => continue,
+            Err(e @ RecordError::Truncated { .. }) => {
+                log::warn!("{e}");
+                break;
+            }
+            Err(e) => return Err(e.into()),
+        };
+        bar.inc(1);
+        number += 1;
+        if !(number - 1).is_multiple_of(step) {
+            continue;
+        }
+        match image::load_from_memory_with_format(&frame.jpeg, ImageFormat::Jpeg) {
+            Ok(picture) => looked.take(format!("picture {number}"), &picture.into_luma8(), target)?,
+            Err(why) => log::warn!("picture {number} is no whole JPEG ({why}): left out"),
+        }
+    }
+    bar.finish_and_clear();
+    Ok(())
+}

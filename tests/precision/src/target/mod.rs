@@ -1,0 +1,4 @@
+//! Pictures of the calibration target with known truth.
+
+pub mod draw;
+pub mod shots;
