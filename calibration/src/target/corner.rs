@@ -8,8 +8,29 @@ use glam::DVec2;
 
 use super::picture::Plane;
 
-/// Window of the last search, pixels: more costs time, less errs more.
-const REACH: [f64; 2] = [2.5, 8.0];
+/// How corners are found to fractions of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refinement {
+    /// Where edges meet, in a window of so many pixels to every side at most.
+    Edges(f64),
+    /// Where the picture is most like itself turned by half a turn.
+    Symmetry(f64),
+}
+
+impl Refinement {
+    /// What [`super::detect`] does: larger windows err hardly less.
+    pub const DEFAULT: Self = Self::Symmetry(8.0);
+
+    const fn reach_px(self) -> f64 {
+        match self {
+            Self::Edges(reach) | Self::Symmetry(reach) => reach,
+        }
+    }
+}
+
+/// Least window, and the largest while a corner is approached, pixels.
+const REACH_MIN: f64 = 2.0;
+const APPROACH_PX: f64 = 8.0;
 /// The window by the tag's smallest height: within two modules of ten and three of gap there is nothing but the corner.
 const REACH_SHARE: f64 = 0.13;
 /// How far the corner may be from where it was expected, by the tag's smallest height, and pixels more.
@@ -90,7 +111,7 @@ impl Sums {
 }
 
 /// One step towards where the edges' lines meet.
-pub(super) fn towards_edges(plane: &Plane, place: DVec2, reach: i32) -> Option<DVec2> {
+fn towards_edges(plane: &Plane, place: DVec2, reach: i32) -> Option<DVec2> {
     let patch = Patch::around(plane, place, reach);
     let mut sums = Sums::default();
     for (x, y, weight) in patch.offsets() {
@@ -120,9 +141,10 @@ fn towards_symmetry(plane: &Plane, place: DVec2, reach: i32) -> Option<(DVec2, f
 }
 
 /// The corner near `start`, pixels of this plane, of a tag whose smallest height is `tag_px` there; `None` where there is none.
-pub(super) fn refine(plane: &Plane, start: DVec2, tag_px: f64) -> Option<DVec2> {
+pub(super) fn refine(plane: &Plane, start: DVec2, tag_px: f64, by: Refinement) -> Option<DVec2> {
     let off_max = OFF_SHARE * tag_px + OFF_PX;
-    let reach = (REACH_SHARE * tag_px).clamp(REACH[0], REACH[1]).round() as i32;
+    let within = |most: f64| (REACH_SHARE * tag_px).min(most).max(REACH_MIN).round() as i32;
+    let reach = within(APPROACH_PX);
     let fine = |p: DVec2| plane.surrounds(p, f64::from(reach) + 1.0) && p.distance(start) <= off_max;
     let mut place = start;
     for _ in 0..6 {
@@ -135,13 +157,21 @@ pub(super) fn refine(plane: &Plane, start: DVec2, tag_px: f64) -> Option<DVec2> 
             break;
         }
     }
+    let reach = within(by.reach_px());
     for _ in 0..12 {
         if !fine(place) {
             return None;
         }
-        let (step, likeness) = towards_symmetry(plane, place, reach)?;
+        let (step, likeness, near) = match by {
+            // As OpenCV ends: small windows do not come to rest.
+            Refinement::Edges(_) => (towards_edges(plane, place, reach)?, 1.0, 0.1),
+            Refinement::Symmetry(_) => {
+                let (step, likeness) = towards_symmetry(plane, place, reach)?;
+                (step, likeness, 2e-3)
+            }
+        };
         place += step.clamp_length_max(0.7);
-        if step.length() < 2e-3 {
+        if step.length() < near {
             return (likeness >= LIKENESS && fine(place)).then_some(place);
         }
     }

@@ -8,7 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 
 use super::{
-    Target, corner,
+    Target,
+    corner::{self, Refinement},
     picture::{Grey, Plane},
     quads::{self, Quad},
     read::{self, Sight, WRONG_EXPECTED},
@@ -19,16 +20,17 @@ use crate::camera::{Corner, View};
 const LEAST_PX: usize = 100;
 /// Side of a tag where the search for its corners begins, pixels.
 const BEGIN_PX: f64 = 24.0;
-/// How far a tag may be from where a neighbour expects it, by its least height and the steps between them: a near board seen by a fisheye
-/// bends that far.
-const APART: f64 = 0.35;
-/// How far a corner may be from the middle of what all neighbours expect: by the tag's least height and pixels more, or by the median of
-/// all tags where the lens bends the board.
-const STRAY: f64 = 0.03;
+/// How far the nearest corner of a tag may be from where another tag expects it: by its least height and the distance between them in
+/// tags, and pixels more.
+const APART: f64 = 0.3;
+const APART_PX: f64 = 1.0;
+/// How far any corner may be from the middle of what the nearest other tags expect: by the tag's least height and the distance in tags,
+/// and pixels more; or by the median of all tags, where the lens bends the board.
+const STRAY: f64 = 0.1;
 const STRAY_PX: f64 = 0.7;
 const STRAY_MEDIANS: f64 = 4.0;
 /// No lens bends it so far, in times of what is allowed: of few tags, wrong ones would make a large median.
-const STRAY_MOST: f64 = 4.0;
+const STRAY_MOST: f64 = 2.5;
 
 /// A tag in a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,26 +41,29 @@ pub struct Tag {
     pub corners: [DVec2; 4],
 }
 
-/// The picture and its halves.
-struct Pyramid(Vec<Plane>);
+/// The picture and its halves, the whole first, and how corners are refined in them.
+struct Pyramid {
+    planes: Vec<Plane>,
+    by: Refinement,
+}
 
 impl Pyramid {
-    fn new(picture: &Grey) -> Self {
+    fn new(picture: &Grey, by: Refinement) -> Self {
         let mut planes = vec![Plane::smoothed(picture)];
         while let Some(last) = planes.last().filter(|p| p.width.min(p.height) >= 2 * LEAST_PX) {
             planes.push(last.halved());
         }
-        Self(planes)
+        Self { planes, by }
     }
 
     /// The corners near `quad`, pixels of the whole picture, from scale `level` down to the finest.
     fn refine(&self, quad: &Quad, level: usize) -> Option<Quad> {
         let mut found = *quad;
-        for (level, plane) in self.0.iter().enumerate().take(level + 1).rev() {
+        for (level, plane) in self.planes.iter().enumerate().take(level + 1).rev() {
             let scale = (1_u32 << level) as f64;
             let tag_px = height_px(&found) / scale;
             for corner in &mut found {
-                *corner = corner::refine(plane, *corner / scale, tag_px)? * scale;
+                *corner = corner::refine(plane, *corner / scale, tag_px, self.by)? * scale;
             }
         }
         Some(found)
@@ -66,11 +71,11 @@ impl Pyramid {
 
     /// Where the search for the corners of a tag of that size begins.
     fn level_for(&self, tag_px: f64) -> usize {
-        ((tag_px / BEGIN_PX).log2().max(0.0) as usize).min(self.0.len() - 1)
+        ((tag_px / BEGIN_PX).log2().max(0.0) as usize).min(self.planes.len() - 1)
     }
 
     fn finest(&self) -> &Plane {
-        &self.0[0]
+        &self.planes[0]
     }
 }
 
@@ -83,19 +88,24 @@ fn height_px(q: &Quad) -> f64 {
 
 /// The tags of the board that `picture` shows; two at least (one on a board of one), else none. In order of their ids.
 pub fn detect(target: &Target, picture: &Grey) -> Vec<Tag> {
+    detect_by(target, picture, Refinement::DEFAULT)
+}
+
+/// The same with corners found in another way.
+pub fn detect_by(target: &Target, picture: &Grey, by: Refinement) -> Vec<Tag> {
     let (width, height) = picture.size();
     if width < 32 || height < 32 {
         return Vec::new();
     }
-    let pyramid = Pyramid::new(picture);
+    let pyramid = Pyramid::new(picture, by);
     let mut found = together(target, &seeds(target, &pyramid));
+    if target.tags() == 1 {
+        return found.into_iter().map(|(id, corners)| Tag { id, corners }).collect();
+    }
     // A tag of which one corner was mistaken is found by its neighbours, once it is dropped.
     for _ in 0..2 {
         grow(target, &pyramid, &mut found);
         settle(target, &mut found);
-    }
-    if found.len() < target.tags().min(2) {
-        return Vec::new();
     }
     found.into_iter().map(|(id, corners)| Tag { id, corners }).collect()
 }
@@ -103,7 +113,7 @@ pub fn detect(target: &Target, picture: &Grey) -> Vec<Tag> {
 /// Tags that are read by themselves.
 fn seeds(target: &Target, pyramid: &Pyramid) -> BTreeMap<usize, Quad> {
     let mut best: BTreeMap<usize, (u32, Quad)> = BTreeMap::new();
-    for (level, plane) in pyramid.0.iter().enumerate() {
+    for (level, plane) in pyramid.planes.iter().enumerate() {
         let scale = (1_u32 << level) as f64;
         for quad in quads::find(plane) {
             let quad = quad.map(|p| p * scale);
@@ -133,12 +143,20 @@ fn steps(target: &Target, a: usize, b: usize) -> usize {
     ax.abs_diff(bx).max(ay.abs_diff(by))
 }
 
-/// Whether two tags near each other on the board stand in the picture as the board says.
+/// Distance on the board from a tag to a place, by the side of a tag: how far its view must be carried on to tell where that is seen. That
+/// errs by the square of it through a lens that bends.
+fn beyond(target: &Target, id: usize, place: DVec2) -> f64 {
+    let off = target.corners(id).map(|c| c.distance(place));
+    off.into_iter().fold(f64::INFINITY, f64::min) / target.tag_m()
+}
+
+/// Whether two tags beside each other on the board stand in the picture as the board says.
 fn agree(target: &Target, (a, one): (usize, &Quad), (b, other): (usize, &Quad)) -> bool {
-    let count = steps(target, a, b);
     let Some(expected) = Sight::of(one).and_then(|s| s.expected(target, a, b)) else { return false };
-    let off = expected.iter().zip(other).map(|(e, o)| e.distance(*o)).fold(0.0, f64::max);
-    (1..=2).contains(&count) && off <= APART * height_px(other) * count as f64
+    let away = target.corners(b).map(|place| beyond(target, a, place));
+    let nearest = (0..4).min_by(|i, k| away[*i].total_cmp(&away[*k])).unwrap_or(0);
+    let allowed = APART * height_px(other) * away[nearest] + APART_PX;
+    steps(target, a, b) == 1 && expected[nearest].distance(other[nearest]) <= allowed
 }
 
 /// The largest group of tags of which each agrees with one near it.
@@ -194,30 +212,28 @@ fn median(mut values: Vec<f64>) -> f64 {
     0.5 * (at(values.len() / 2) + at(values.len().saturating_sub(1) / 2))
 }
 
-/// How far the worst corner of a tag is from the middle of what the nearest others expect, in times of what is allowed; `None` without
-/// others.
-fn stray(target: &Target, found: &BTreeMap<usize, Quad>, id: usize) -> Option<f64> {
+/// How far the worst corner of a tag is from the middle of what its neighbours expect, in times of what is allowed; infinite without
+/// neighbours.
+fn stray(target: &Target, found: &BTreeMap<usize, Quad>, id: usize) -> f64 {
     let own = &found[&id];
-    let away = |other: &usize| steps(target, *other, id);
-    let nearest = found.keys().map(away).filter(|steps| *steps > 0).min()?;
-    let expected: Vec<Quad> = found
-        .iter()
-        .filter(|(other, _)| away(other) == nearest)
-        .filter_map(|(other, quad)| Sight::of(quad)?.expected(target, *other, id))
-        .collect();
+    let near = |other: &&usize| steps(target, **other, id) == 1;
+    let seen = |other: &usize| Some((*other, Sight::of(&found[other])?.expected(target, *other, id)?));
+    let expected: Vec<(usize, Quad)> = found.keys().filter(near).filter_map(seen).collect();
     let off = |i: usize| {
-        let along = |f: fn(DVec2) -> f64| median(expected.iter().map(|q| f(q[i])).collect());
-        own[i].distance(DVec2::new(along(|p| p.x), along(|p| p.y)))
+        let away = |other: usize| beyond(target, other, target.corners(id)[i]);
+        let least = expected.iter().map(|e| away(e.0)).fold(f64::INFINITY, f64::min);
+        let nearest = || expected.iter().filter(|e| away(e.0) < 1.5 * least).map(|e| e.1[i]);
+        let along = |f: fn(DVec2) -> f64| median(nearest().map(f).collect());
+        let allowed = STRAY * height_px(own) * least + STRAY_PX;
+        own[i].distance(DVec2::new(along(|p| p.x), along(|p| p.y))) / allowed
     };
-    let allowed = (STRAY * height_px(own) + STRAY_PX) * nearest as f64;
-    (!expected.is_empty()).then(|| (0..4).map(off).fold(0.0, f64::max) / allowed)
+    if expected.is_empty() { f64::INFINITY } else { (0..4).map(off).fold(0.0, f64::max) }
 }
 
 /// Drops tags whose corners are not where their neighbours expect them, the worst one first: it may be what spoils the others.
 fn settle(target: &Target, found: &mut BTreeMap<usize, Quad>) {
     loop {
-        let all: Vec<(usize, f64)> =
-            found.keys().filter_map(|id| Some((*id, stray(target, found, *id)?))).collect();
+        let all: Vec<(usize, f64)> = found.keys().map(|id| (*id, stray(target, found, *id))).collect();
         let limit = (STRAY_MEDIANS * median(all.iter().map(|s| s.1).collect())).clamp(1.0, STRAY_MOST);
         let Some((worst, _)) = all.into_iter().filter(|s| s.1 > limit).max_by(|a, b| a.1.total_cmp(&b.1))
         else {

@@ -16,7 +16,8 @@ use std::{fmt, str::FromStr};
 
 use glam::DVec2;
 
-pub use detect::{Tag, detect, view};
+pub use corner::Refinement;
+pub use detect::{Tag, detect, detect_by, view};
 pub use picture::Grey;
 pub use varied::varied;
 

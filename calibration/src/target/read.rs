@@ -15,6 +15,8 @@ pub(super) const WRONG_MOST: u32 = 3;
 pub(super) const WRONG_EXPECTED: u32 = 5;
 /// Least difference of white and black, codes.
 const CONTRAST: f64 = 8.0;
+/// Most of the 96 places on border and gap that may have the wrong colour: with one corner mistaken, more have.
+const FRAME_WRONG: usize = 6;
 
 /// The view of a tag: its modules' places to pixels. Places count modules from the lower left corner, x right, y up.
 pub(super) struct Sight(Matrix3<f64>);
@@ -70,19 +72,26 @@ impl Level {
 /// The 36 modules as a code, the first in the highest bit, as if the quadrilateral's first corner were the lower left one.
 fn code(plane: &Plane, sight: &Sight, spacing: f64) -> Option<u64> {
     let (side, border) = (MODULES as f64, BORDER as f64);
-    let (mut black, mut white) = (Level::default(), Level::default());
+    let (mut black, mut white, mut frame) = (Level::default(), Level::default(), Vec::new());
     // Along the middle of the border, and of the gap where it is narrow; between the corners' black squares only.
     let beyond = (0.5 * spacing * side).min(1.0);
     for i in 0..12 {
         let along = (f64::from(i) + 0.5) / 12.0 * (side - border) + 0.5 * border;
-        for (inside, level) in [(0.5 * border, &mut black), (-beyond, &mut white)] {
+        for (inside, level, is_white) in [(0.5 * border, &mut black, false), (-beyond, &mut white, true)] {
             let places = [(along, inside), (along, side - inside), (inside, along), (side - inside, along)];
             for place in places.map(DVec2::from) {
-                level.add(place, plane.at(sight.pixel(place)?));
+                let value = plane.at(sight.pixel(place)?);
+                level.add(place, value);
+                frame.push((place.extend(1.0), value, is_white));
             }
         }
     }
     let (black, white) = (black.solve()?, white.solve()?);
+    let wrong =
+        |(at, value, is_white): &&(DVec3, f64, bool)| (*value > 0.5 * (black + white).dot(*at)) != *is_white;
+    if frame.iter().filter(wrong).count() > FRAME_WRONG {
+        return None;
+    }
     let mut code = 0;
     for i in 0..DATA * DATA {
         let module = DVec2::new((BORDER + i % DATA) as f64, (MODULES - 1 - BORDER - i / DATA) as f64);

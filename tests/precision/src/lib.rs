@@ -19,6 +19,7 @@ pub mod registration;
 pub mod row;
 pub mod sea_video;
 pub mod ship;
+pub mod target;
 pub mod truth;
 
 /// Counts the heap, so that what a way takes of it can be told.

@@ -1,6 +1,6 @@
 //! `bowwave calibrate camera`: the lens from pictures of the board.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, io::Write as _};
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
@@ -39,11 +39,19 @@ pub fn run(arguments: &CalibrateCamera) -> Result<Outcome> {
     let used: Vec<View> = varied(&seen, USED_MOST).into_iter().map(|i| seen[i].clone()).collect();
     let camera = solve(&used, looked.size)
         .with_context(|| format!("no lens from the {} pictures that show the board", seen.len()))?;
-    if arguments.json {
-        let text = serde_json::to_string_pretty(&as_json(&camera, &looked));
-        println!("{}", text.context("cannot put the result into JSON")?);
+    let told = if arguments.json {
+        serde_json::to_string_pretty(&as_json(&camera, &looked)).context("cannot put the result into JSON")?
+            + "\n"
     } else {
-        print!("{}", as_text(&camera, &looked));
+        as_text(&camera, &looked)
+    };
+    let mut out = std::io::stdout().lock();
+    match out.write_all(told.as_bytes()).and_then(|()| out.flush()) {
+        // A pager that was closed has seen enough.
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            return Err(e).context("cannot write to standard output");
+        }
+        _ => {}
     }
     let Some(lens) = camera.lens() else {
         bail!(
@@ -51,17 +59,17 @@ pub fn run(arguments: &CalibrateCamera) -> Result<Outcome> {
              or another mode of the camera"
         )
     };
+    let passed = camera.grade() > Grade::Poor;
     if arguments.dry_run {
-        return Ok(outcome(&camera));
+        eprintln!("nothing was written");
+    } else if passed || arguments.accept_poor {
+        let file = with_lens(former(arguments, &looked, today)?, &camera, lens, today);
+        file.write(&arguments.out)?;
+        eprintln!("{}: the lens is written; all else is as it was", arguments.out.display());
+    } else {
+        eprintln!("{} is left as it is; --accept-poor writes the lens", arguments.out.display());
     }
-    let file = with_lens(former(arguments, &looked, today)?, &camera, lens, today);
-    file.write(&arguments.out)?;
-    eprintln!("{}: the lens is written; all else is as it was", arguments.out.display());
-    Ok(outcome(&camera))
-}
-
-fn outcome(camera: &Camera) -> Outcome {
-    if camera.grade() == Grade::Poor { Outcome::Partly } else { Outcome::Done }
+    Ok(if passed { Outcome::Done } else { Outcome::Failed })
 }
 
 /// The file as it stands, or the recording's own, or one in which all is assumed.
@@ -173,7 +181,7 @@ fn as_text(camera: &Camera, looked: &Looked) -> String {
         ("covered", format!("{:.0} % of the picture", camera.coverage.share * 100.0)),
     ];
     let mut out = String::new();
-    let verdict = if camera.grade() == Grade::Poor { "FAIL" } else { "PASS" };
+    let verdict = if camera.grade() > Grade::Poor { "PASS" } else { "FAIL" };
     let _ = writeln!(out, "{verdict}: the lens is {}", camera.grade());
     for (what, value) in rows {
         let _ = writeln!(out, "  {what:21}  {value}");

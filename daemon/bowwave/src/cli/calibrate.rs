@@ -47,8 +47,11 @@ pub struct CalibrateCamera {
     /// Calibration file (TOML) whose lens is replaced; where there is none, one is begun
     #[arg(short, long, value_name = "FILE", default_value = "calibration.toml")]
     pub out: PathBuf,
-    /// Only say what the lens is, and write nothing
+    /// Write a lens that is graded poor, too
     #[arg(long)]
+    pub accept_poor: bool,
+    /// Only say what the lens is, and write nothing
+    #[arg(long, conflicts_with = "accept_poor")]
     pub dry_run: bool,
     /// Print as JSON
     #[arg(long)]

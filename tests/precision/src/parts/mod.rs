@@ -2,6 +2,7 @@
 
 mod attitude;
 mod calibration;
+mod camera;
 mod clock;
 mod colour;
 mod depth;
@@ -17,6 +18,7 @@ mod pacing;
 mod reflection;
 mod sea;
 mod shutter;
+mod target;
 mod wavefield;
 
 use anyhow::Result;
@@ -57,6 +59,8 @@ pub const PARTS: &[Part] = &[
     Part { about: drawn::ABOUT, measure: drawn::measure },
     Part { about: shutter::ABOUT, measure: shutter::measure },
     Part { about: calibration::ABOUT, measure: calibration::measure },
+    Part { about: target::ABOUT, measure: target::measure },
+    Part { about: camera::ABOUT, measure: camera::measure },
     Part { about: pacing::ABOUT, measure: pacing::measure },
     Part { about: flight::ABOUT, measure: flight::measure },
     Part { about: sea::ABOUT, measure: sea::measure },

@@ -205,10 +205,12 @@ pub fn draw(target: &Target, lens: &TrueLens, directions: &[DVec3], shot: &Shot)
         }
         (code + shot.noise * random.gauss()).round().clamp(0.0, 255.0) as u8
     });
-    Drawn { size: lens.size, grey: grey.collect(), corners: corners(target, lens, shot, half) }
+    Drawn { size: lens.size, grey: grey.collect(), corners: true_corners(target, lens, shot) }
 }
 
-fn corners(target: &Target, lens: &TrueLens, shot: &Shot, half: DVec2) -> Vec<(usize, usize, DVec2)> {
+/// Tag, corner of the tag and place, pixels, of all corners that fall into the picture.
+pub fn true_corners(target: &Target, lens: &TrueLens, shot: &Shot) -> Vec<(usize, usize, DVec2)> {
+    let half = target.size_m() / 2.0 - target.tag_m() * target.spacing();
     let mut out = Vec::new();
     for id in 0..target.tags() {
         for (i, corner) in target.corners(id).into_iter().enumerate() {
@@ -232,7 +234,8 @@ fn pixel(target: &Target, c: DVec2, right: DVec2, down: DVec2) -> f64 {
         return first;
     }
     const COUNT: usize = 400;
-    let place = |i: usize| (DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053) * i as f64).fract() - 0.5;
+    let place =
+        |i: usize| (DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053) * i as f64).fract() - 0.5;
     (0..COUNT).map(|i| at(place(i))).sum::<f64>() / COUNT as f64
 }
 
@@ -242,8 +245,7 @@ fn blur(values: &mut [f64], w: usize, h: usize, sigma: f64) {
         return;
     }
     let reach = (4.0 * sigma).ceil() as isize;
-    let mut kernel: Vec<f64> =
-        (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp()).collect();
+    let mut kernel: Vec<f64> = (-reach..=reach).map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp()).collect();
     let sum: f64 = kernel.iter().sum();
     kernel.iter_mut().for_each(|k| *k /= sum);
     let pass = |from: &[f64], stride: isize, count: isize, along: &dyn Fn(usize) -> isize| -> Vec<f64> {

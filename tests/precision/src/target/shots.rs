@@ -25,7 +25,8 @@ pub fn held(lens: &TrueLens, target: &Target, count: usize, tilt: f64, seed: u64
             // So far that the board fills a third to the whole of the picture's height.
             let fills = 0.45 + 0.5 * random.unit();
             let distance = target.size_m().y * lens.numbers[1] / (size.y * fills);
-            let around = DVec2::from_angle(std::f64::consts::TAU * random.unit()) * tilt * random.unit().sqrt();
+            let around =
+                DVec2::from_angle(std::f64::consts::TAU * random.unit()) * tilt * random.unit().sqrt();
             let turn = DQuat::from_rotation_z(0.3 * random.gauss());
             Shot {
                 middle: lens.direction(share * size) * distance,
@@ -34,6 +35,8 @@ pub fn held(lens: &TrueLens, target: &Target, count: usize, tilt: f64, seed: u64
             }
             .turned(turn)
             .turned(DQuat::from_scaled_axis(DVec3::new(around.x, around.y, 0.0)))
+            // People hold it towards the camera.
+            .turned(DQuat::from_rotation_arc(DVec3::Z, lens.direction(share * size)))
         })
         .collect()
 }

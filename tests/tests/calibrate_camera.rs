@@ -1,0 +1,155 @@
+//! The lens from pictures of the board, as a maintainer measures it, and everything that can be wrong with them.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::{fs, path::Path};
+
+use bowwave_calibration::CalibrationFile;
+use bowwave_tests::{bowwave, expect_code, said};
+use glam::DQuat;
+use image::GrayImage;
+use precision::target::{
+    draw::{Shot, TrueLens, draw},
+    shots::{board, held},
+};
+
+/// A small camera, so that the pictures are drawn soon.
+const LENS: TrueLens = TrueLens {
+    size: (640, 360),
+    numbers: [450.0, 452.0, 327.0, 176.0, -0.19, 0.05, 6e-4, -9e-4],
+    fisheye: false,
+};
+
+/// Draws the board as `shots` have it into a folder.
+fn pictures(folder: &Path, lens: &TrueLens, shots: &[Shot]) {
+    fs::create_dir_all(folder).expect("a folder");
+    let directions = lens.directions();
+    for (i, shot) in shots.iter().enumerate() {
+        let drawn = draw(&board(), lens, &directions, shot);
+        let picture = GrayImage::from_raw(drawn.size.0 as u32, drawn.size.1 as u32, drawn.grey)
+            .expect("as many codes as pixels");
+        picture.save(folder.join(format!("picture{i}.png"))).expect("a picture");
+    }
+}
+
+fn calibrate(pictures: &Path, out: &Path, further: &[&str]) -> std::process::Output {
+    let mut arguments = vec![
+        "calibrate".as_ref(),
+        "camera".as_ref(),
+        pictures.as_os_str(),
+        "--out".as_ref(),
+        out.as_os_str(),
+    ];
+    arguments.extend(further.iter().map(std::ffi::OsStr::new));
+    bowwave(arguments)
+}
+
+/// Requires failure, one line of complaint with all of `words`, and nothing written.
+fn refused(output: &std::process::Output, out: &Path, words: &[&str]) {
+    expect_code(output, 1);
+    let said = said(output);
+    let line =
+        said.lines().find(|l| l.starts_with("bowwave: ")).unwrap_or_else(|| panic!("no message: {said}"));
+    for word in words {
+        assert!(line.contains(word), "'{word}' is missing: {line}");
+    }
+    assert!(!out.exists(), "{} was written", out.display());
+}
+
+#[test]
+fn the_lens_that_drew_the_pictures_is_found_and_only_it_is_replaced() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (shown, out) = (folder.path().join("shown"), folder.path().join("calibration.toml"));
+    pictures(&shown, &LENS, &held(&LENS, &board(), 18, 0.7, 3));
+    // One that shows no board does no harm.
+    GrayImage::new(640, 360).save(shown.join("empty.png")).expect("a picture");
+    let target = board().to_string();
+    let output = calibrate(&shown, &out, &["--target", &target]);
+    expect_code(&output, 0);
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    for word in ["PASS", "18 of 19", "pinhole", "mrad", "at 500 m", "empty.png"] {
+        assert!(told.contains(word), "'{word}' is missing: {told}");
+    }
+    let begun = CalibrationFile::read(&out).expect("a calibration");
+    let (lens, [fx, fy, cx, cy, k1, k2, p1, p2]) = (begun.calibration.lens, LENS.numbers);
+    assert_eq!((lens.width, lens.height), (640, 360));
+    let sigma = begun.calibration.focal_sigma_px;
+    assert!(sigma < 0.5, "{sigma}");
+    assert!(
+        (lens.focal.x - fx).abs() < 3.0 * sigma && (lens.focal.y - fy).abs() < 3.0 * sigma,
+        "{lens:?} +- {sigma}"
+    );
+    // The picture's geometry is that of the truth, over all of it.
+    assert!((lens.centre.x - cx).abs() < 0.3 && (lens.centre.y - cy).abs() < 0.3, "{lens:?}");
+    for i in 0..63 {
+        let pixel = glam::DVec2::new(f64::from(i % 9) * 80.0, f64::from(i / 9) * 60.0);
+        let off = lens.project(LENS.direction(pixel)).expect("a pixel").distance(pixel);
+        assert!(off < 0.5, "{off} px at {pixel}: {lens:?}, truth {:?}", [k1, k2, p1, p2]);
+    }
+    // Anew, over a file in which something else was measured.
+    let mut measured = begun.clone();
+    measured.calibration.camera_from_imu = DQuat::from_rotation_y(0.2);
+    measured.calibration.lens.focal *= 1.1;
+    measured.camera_name = "the one on the bow".to_owned();
+    measured.write(&out).expect("it is written");
+    expect_code(&calibrate(&shown, &out, &["--target", &target, "--json"]), 0);
+    let again = CalibrationFile::read(&out).expect("a calibration");
+    assert_eq!(again.calibration.lens, begun.calibration.lens);
+    assert_eq!(again.camera_name, measured.camera_name);
+    let off = again.calibration.camera_from_imu.angle_between(measured.calibration.camera_from_imu);
+    assert!(off < 1e-9, "{off}");
+}
+
+#[test]
+fn what_tells_no_lens_is_refused_with_what_is_missing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("calibration.toml");
+    let target = board().to_string();
+    let at = |name: &str| folder.path().join(name);
+    let shots = held(&LENS, &board(), 6, 0.6, 8);
+    pictures(&at("few"), &LENS, &shots[..3]);
+    refused(&calibrate(&at("few"), &out, &["--target", &target]), &out, &["3 pictures", "at least 4"]);
+    let frontal: Vec<Shot> =
+        (0..6).map(|i| Shot { seed: i, ..Shot::frontal(0.62 + 0.02 * i as f64) }).collect();
+    pictures(&at("frontal"), &LENS, &frontal);
+    refused(&calibrate(&at("frontal"), &out, &["--target", &target]), &out, &["tilt"]);
+    // Corners of the picture's left half only, blurred and dim: a lens, but none to train with.
+    let poor = held(&LENS, &board(), 60, 0.5, 9).into_iter().filter(|s| s.middle.x < -0.05);
+    let poor: Vec<Shot> =
+        poor.map(|s| Shot { blur_px: 1.6, noise: 30.0, middle: s.middle * 1.3, ..s }).take(5).collect();
+    pictures(&at("poor"), &LENS, &poor);
+    let output = calibrate(&at("poor"), &out, &["--target", &target]);
+    expect_code(&output, 1);
+    let told = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(told.starts_with("FAIL: the lens is poor") && told.contains("right"), "{told} {}", said(&output));
+    assert!(!out.exists() && said(&output).contains("--accept-poor"));
+    // The usual board has tags where this one has none.
+    pictures(&at("other"), &LENS, &shots);
+    refused(&calibrate(&at("other"), &out, &["--target", "2x1:34"]), &out, &["2x1:34"]);
+    GrayImage::new(320, 240).save(at("few").join("picture9.png")).expect("a picture");
+    refused(&calibrate(&at("few"), &out, &["--target", &target]), &out, &["picture9.png", "320x240"]);
+    fs::create_dir(at("nothing")).expect("a folder");
+    refused(&calibrate(&at("nothing"), &out, &[]), &out, &["no JPEG or PNG"]);
+    refused(&calibrate(&at("not-there"), &out, &[]), &out, &["not-there"]);
+    fs::write(at("nothing").join("text.png"), b"no picture").expect("a file");
+    refused(&calibrate(&at("nothing"), &out, &[]), &out, &["text.png"]);
+    expect_code(&bowwave(["calibrate", "camera", "x", "--target", "7"]), 2);
+    expect_code(&bowwave(["calibrate"]), 2);
+}
+
+#[test]
+fn the_board_is_drawn_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("board.svg");
+    let out = path.to_str().expect("a plain path");
+    expect_code(&bowwave(["calibrate", "board", "--out", out, "--target", "7x5:25"]), 0);
+    let drawing = fs::read_to_string(&path).expect("a drawing");
+    assert!(
+        drawing.starts_with("<svg") && drawing.contains("7x5:25") && drawing.trim_end().ends_with("</svg>")
+    );
+    let again = bowwave(["calibrate", "board", "--out", out]);
+    expect_code(&again, 1);
+    assert!(said(&again).contains("--force"));
+    assert_eq!(fs::read_to_string(&path).expect("a drawing"), drawing);
+    expect_code(&bowwave(["calibrate", "board", "--out", out, "--force"]), 0);
+}
