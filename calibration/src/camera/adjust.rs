@@ -127,6 +127,16 @@ fn spread(model: Model, state: &State, views: &[View]) -> f64 {
     squares.get(squares.len() / 2).map_or(1.0, |m| (m / 1.386).sqrt()).max(1e-4)
 }
 
+/// Whether each view fits as the others do: the median of its squares is no more than so many times theirs.
+pub(super) fn sound(model: Model, fit: &Adjusted, views: &[View]) -> Vec<bool> {
+    const TIMES: f64 = 5.0;
+    let own = |(pose, view): (&BoardPose, &View)| {
+        let one = State { intrinsics: fit.state.intrinsics, poses: vec![*pose] };
+        spread(model, &one, std::slice::from_ref(view)) <= TIMES * fit.sigma_px
+    };
+    fit.state.poses.iter().zip(views).map(own).collect()
+}
+
 /// The normal equations with the poses eliminated (Schur's complement), damped by Marquardt's diagonal.
 fn step(blocks: &[Block], damping: f64, held: bool) -> Option<(Intrinsics, Vec<SVector<f64, 6>>)> {
     let mut own: Own = blocks.iter().map(|b| b.own).sum();

@@ -167,6 +167,8 @@ impl Camera {
 /// Fewest corners of a picture, and pictures.
 const CORNERS_LEAST: usize = 8;
 const VIEWS_LEAST: usize = 4;
+/// How often views that do not fit are left out and the rest is fitted anew.
+const REFITS: usize = 2;
 /// Least tilt that some picture must have, radians.
 const TILT_LEAST: f64 = 0.17;
 /// Most relative uncertainty of the focal length.
@@ -180,19 +182,32 @@ const LEFT_MOST: f64 = 0.005;
 /// Where there are too few pictures, none is tilted, the focal length is not told, or nothing fits.
 pub fn solve(views: &[View], (width, height): (u32, u32)) -> Result<Camera, CameraError> {
     let size = DVec2::new(f64::from(width), f64::from(height)).max(DVec2::ONE);
-    let (numbers, views) = clean(views, size);
+    let (mut numbers, mut views) = clean(views, size);
     let few = |count| CameraError::TooFew { count, least: VIEWS_LEAST, corners: CORNERS_LEAST };
-    if views.len() < VIEWS_LEAST {
-        return Err(few(views.len()));
-    }
     let no_fit = |sigma_px| CameraError::NoFit { sigma_px, width, height };
-    let fits: Vec<(Evidence, Adjusted)> = [Model::RadialTangential, Model::Fisheye]
-        .into_iter()
-        .filter_map(|model| weigh(model, &views, size))
-        .filter(|(e, _)| e.sigma_px.is_finite())
-        .collect();
-    let evidence: Vec<Evidence> = fits.iter().map(|f| f.0).collect();
-    let (best, fit) = choose(fits).ok_or_else(|| no_fit(f64::INFINITY))?;
+    let mut tries = 0;
+    let (evidence, best, fit) = loop {
+        if views.len() < VIEWS_LEAST {
+            return Err(few(views.len()));
+        }
+        let fits: Vec<(Evidence, Adjusted)> = [Model::RadialTangential, Model::Fisheye]
+            .into_iter()
+            .filter_map(|model| weigh(model, &views, size))
+            .filter(|(e, _)| e.sigma_px.is_finite())
+            .collect();
+        let evidence: Vec<Evidence> = fits.iter().map(|f| f.0).collect();
+        let (best, fit) = choose(fits).ok_or_else(|| no_fit(f64::INFINITY))?;
+        // A view whose pose came to rest in a wrong valley spoils the others.
+        let sound = adjust::sound(best.model, &fit, &views);
+        tries += 1;
+        if tries > REFITS || sound.iter().all(|s| *s) {
+            break (evidence, best, fit);
+        }
+        let mut keep = sound.iter().copied();
+        numbers.retain(|_| keep.next().unwrap_or(true));
+        let mut keep = sound.iter().copied();
+        views.retain(|_| keep.next().unwrap_or(true));
+    };
     let tilts: Vec<f64> = fit.state.poses.iter().map(BoardPose::tilt).collect();
     let tilt =
         [tilts.iter().copied().fold(f64::INFINITY, f64::min), tilts.iter().copied().fold(0.0, f64::max)];
