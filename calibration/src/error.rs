@@ -49,6 +49,16 @@ pub enum CalibrationError {
         /// The system's reason.
         source: io::Error,
     },
+    /// There is no kept copy of that number.
+    #[error(
+        "no copy number {number} of {path} is kept; `bowwave calibrate restore --list` shows those that are"
+    )]
+    NotKept {
+        /// The calibration file.
+        path: PathBuf,
+        /// The number.
+        number: u32,
+    },
     /// A calibration made in memory that a reader would refuse; nothing was written.
     #[error("the calibration is not written, because it could not be read back: {0}")]
     Unreadable(Box<CalibrationError>),

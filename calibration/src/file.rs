@@ -1,14 +1,10 @@
 //! A calibration with where it comes from, and its way to and from the disk.
 
-use std::{
-    fs::{self, File},
-    io::{self, Write as _},
-    path::{Path, PathBuf},
-};
+use std::{fs, path::Path};
 
 use bowwave_core::calibration::Calibration;
 
-use crate::{CalibrationError, Date, parse, to_toml};
+use crate::{CalibrationError, Date, keep, parse, to_toml};
 
 /// When and how something was measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -92,48 +88,11 @@ impl CalibrationFile {
     }
 
     /// Writes the file so that at every moment either the old or the new one is whole: to a temporary file beside it, synced,
-    /// renamed over it. What was there before is kept with `.bak` added to its name.
+    /// renamed over it. What was there before is kept ([`keep`]).
     pub fn write(&self, path: &Path) -> Result<(), CalibrationError> {
         let text = to_toml(self);
         parse(&text, &path.display().to_string()).map_err(|e| CalibrationError::Unreadable(Box::new(e)))?;
-        replace(path, text.as_bytes())
+        keep::replace(path, text.as_bytes())
             .map_err(|source| CalibrationError::Write { path: path.to_owned(), source })
     }
-}
-
-/// The name under which [`CalibrationFile::write`] keeps the former file.
-fn backup_path(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".bak");
-    PathBuf::from(name)
-}
-
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = match path.parent() {
-        Some(p) if !p.as_os_str().is_empty() => p,
-        _ => Path::new("."),
-    };
-    match fs::read(path) {
-        Ok(former) => write_whole(folder, &backup_path(path), &former)?,
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {}
-        Err(e) => return Err(e),
-    }
-    write_whole(folder, path, bytes)?;
-    // The rename itself lies in the folder, which has its own place in the disk's cache.
-    File::open(folder)?.sync_all()
-}
-
-fn write_whole(folder: &Path, path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut temporary =
-        tempfile::Builder::new().prefix(".calibration-").suffix(".tmp").tempfile_in(folder)?;
-    temporary.write_all(bytes)?;
-    temporary.as_file().sync_all()?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        // Temporary files are private to their maker; the daemon's user must be able to read the result.
-        temporary.as_file().set_permissions(fs::Permissions::from_mode(0o644))?;
-    }
-    temporary.persist(path).map_err(|e| e.error)?;
-    Ok(())
 }

@@ -33,6 +33,7 @@ pub mod camera;
 mod date;
 mod error;
 mod file;
+pub mod keep;
 mod raw;
 pub mod simulated;
 mod so3;

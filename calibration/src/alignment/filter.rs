@@ -39,6 +39,15 @@ pub(super) enum Kind {
     Orientation,
     Up,
     Level,
+    /// What was known before: its sigma is not for the residuals to tell.
+    Known,
+}
+
+impl Kind {
+    /// Whether it comes from the camera.
+    pub(super) fn is_seen(self) -> bool {
+        matches!(self, Self::Orientation | Self::Up)
+    }
 }
 
 /// One residual: the rotation vector in the reference's axes that takes the prediction to what was seen.
@@ -55,6 +64,8 @@ pub(super) struct Row {
     /// Direction about which nothing was seen.
     pub blind: Option<Vector3<f64>>,
     pub sigma: f64,
+    /// What all of its kind share, as if each had so much of its own: standard deviation times the square root of their number.
+    pub common: f64,
     /// Share of its weight that an outlier keeps.
     pub weight: f64,
     /// Residuals of different segments have walks of their own.
@@ -65,13 +76,19 @@ impl Row {
     pub(super) fn freedom(&self) -> f64 {
         if self.blind.is_some() { 2.0 } else { 3.0 }
     }
+
+    /// The prediction's own rotation, from the camera's axes to the reference's: the Jacobian by the rotation. An up's has nothing about the
+    /// vertical.
+    pub(super) fn reference_from_camera(&self) -> Matrix3<f64> {
+        self.jacobian.fixed_columns::<3>(place::ROTATION).into()
+    }
 }
 
 /// How large the errors are.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Levels {
     /// Times the stated sigma, for each kind.
-    pub scale: [f64; 3],
+    pub scale: [f64; 4],
     /// Of the camera's stamps, one sigma, seconds.
     pub jitter_s: f64,
     /// Gyro's angle random walk, rad/sqrt(s).
@@ -85,8 +102,8 @@ const BLIND: f64 = 1e4;
 
 fn noise(row: &Row, levels: &Levels) -> Matrix3<f64> {
     let own = levels.scale[row.kind as usize] * row.sigma;
-    let mut r = Matrix3::from_diagonal_element(own * own);
-    if row.kind != Kind::Level {
+    let mut r = Matrix3::from_diagonal_element(own * own + row.common * row.common);
+    if row.kind.is_seen() {
         r += row.speed * row.speed.transpose() * levels.jitter_s.powi(2);
     }
     if let Some(blind) = row.blind {
@@ -266,7 +283,7 @@ mod tests {
     /// The filter against the full covariance matrix written out.
     #[test]
     fn innovations_are_those_of_the_full_covariance() {
-        let levels = Levels { scale: [1.3, 1.0, 1.0], jitter_s: 0.01, walk: 0.02 };
+        let levels = Levels { scale: [1.3, 1.0, 1.0, 1.0], jitter_s: 0.01, walk: 0.02 };
         let rows: Vec<Row> = (0..8)
             .map(|i| {
                 let x = f64::from(i);
@@ -283,6 +300,7 @@ mod tests {
                     speed: Vector3::new(0.5, x * 0.1, -0.3),
                     blind: None,
                     sigma: 0.03,
+                    common: 0.0,
                     weight: 1.0,
                     segment: 0,
                 }

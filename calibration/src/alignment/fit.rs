@@ -72,7 +72,7 @@ fn first_levels(rows: &[Row], primary: Kind) -> Levels {
     // of the poses is.
     let usual = if primary == Kind::Orientation { 1.101 } else { 0.759 };
     let scale = steps.get(steps.len() / 4).map_or(1.0, |m| (m / usual).clamp(0.01, 300.0));
-    let mut levels = Levels { scale: [1.0; 3], jitter_s: 5e-4, walk: 2e-3 };
+    let mut levels = Levels { scale: [1.0; 4], jitter_s: 5e-4, walk: 2e-3 };
     levels.scale[primary as usize] = scale;
     levels
 }

@@ -15,6 +15,7 @@
 //! gyro and its bias Jacobian); Durbin & Koopman 2012 (the filter). Errors of rotations are rotation vectors in the camera's axes:
 //! `true = exp(error) estimate`.
 
+mod compare;
 mod error;
 mod filter;
 mod fit;
@@ -25,6 +26,7 @@ mod result;
 mod start;
 mod track;
 
+pub use compare::{Comparison, Known, compare};
 pub use error::{AlignmentError, Movement};
 pub use input::{ImuReading, Increment, LeftOut, Observation, chained};
 pub use result::{Alignment, Checks, Finding, Grade, NoiseFound, Residual};
@@ -41,11 +43,14 @@ pub struct Options {
     pub estimate_readout: bool,
     /// The gyro's limit, rad/s; without it, plateaus tell it.
     pub gyro_range: Option<f64>,
+    /// Standard deviation of the error of elevation that all horizons of the recording share, radians: refraction, and the dip of a height
+    /// that is not well known.
+    pub horizon_sigma: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { offset_range_s: 0.6, estimate_readout: false, gyro_range: None }
+        Self { offset_range_s: 0.6, estimate_readout: false, gyro_range: None, horizon_sigma: 0.0 }
     }
 }
 
@@ -66,7 +71,9 @@ fn problem(
 ) -> Result<Problem, AlignmentError> {
     let mut left = LeftOut::default();
     let range = if options.offset_range_s.is_finite() { options.offset_range_s } else { OFFSET_MOST_S };
-    let options = Options { offset_range_s: range.clamp(0.01, OFFSET_MOST_S), ..*options };
+    let shared = if options.horizon_sigma.is_finite() { options.horizon_sigma.clamp(0.0, 1.0) } else { 1.0 };
+    let options =
+        Options { offset_range_s: range.clamp(0.01, OFFSET_MOST_S), horizon_sigma: shared, ..*options };
     let gyro = input::clean_gyro(readings, options.gyro_range.filter(|r| *r > 0.0), &mut left);
     let observations = input::clean_observations(observations, &mut left);
     let span_s = gyro.time.last().copied().unwrap_or(0.0);
@@ -90,7 +97,7 @@ fn problem(
     }
     let has_up = observations.iter().any(|o| matches!(o, Observation::Up { .. }));
     let levels = if has_up { input::levels(&gyro) } else { Vec::new() };
-    Ok(Problem { gyro, observations, levels, options, left })
+    Ok(Problem { gyro, observations, levels, options, left, known: None })
 }
 
 /// Refuses a camera at rest, whose noise would otherwise be taken for motion.

@@ -23,6 +23,8 @@ pub(super) struct Problem {
     pub levels: Vec<(f64, DVec3)>,
     pub options: Options,
     pub left: LeftOut,
+    /// What is taken for roughly known ([`known`]).
+    pub known: Option<Start>,
 }
 
 /// What is solved for.
@@ -43,6 +45,8 @@ type Segment = (usize, u32);
 
 /// Standard deviation of a level by half a second of specific force, radians: a start, the scatter tells the rest.
 const LEVEL_SIGMA: f64 = 0.02;
+/// Standard deviation of the error that all levels share, radians: data sheets of units of the class (VN-100, MTi) state 5 mg of bias.
+const LEVEL_COMMON: f64 = 5e-3;
 
 impl Problem {
     pub(super) fn has_orientations(&self) -> bool {
@@ -157,12 +161,45 @@ impl Problem {
             let Some(state) = track.at(*time) else { continue };
             if let Some((anchor, segment)) = place(&state, main) {
                 let weight = weights.levels.get(index).copied().unwrap_or(1.0);
-                rows.push(levelled(*time, *up, index, unknowns, &state, (anchor, segment), weight));
+                let mut row = levelled(*time, *up, index, unknowns, &state, (anchor, segment), weight);
+                row.common = LEVEL_COMMON * (self.levels.len() as f64).sqrt();
+                rows.push(row);
             }
+        }
+        if let Some(start) = &self.known {
+            rows.extend(known(start, unknowns));
         }
         rows.sort_by(|a, b| a.time.total_cmp(&b.time));
         rows
     }
+}
+
+/// How roughly a start is known, for those of its numbers that the recording does not tell: 0.1 rad, 0.1 s, 0.1 rad/s. That the filter lets
+/// every segment begin anywhere adds a tenth to these.
+const KNOWN_SIGMA: f64 = 0.1;
+
+/// Rotation, offset and bias as if each had been seen once, each in a segment of its own that no observation has.
+fn known(start: &Start, unknowns: &Unknowns) -> [Row; 3] {
+    let row = |number: usize, residual: Vector3<f64>, jacobian: Jacobian| Row {
+        time: f64::MIN,
+        kind: Kind::Known,
+        index: number,
+        residual,
+        jacobian,
+        speed: Vector3::zeros(),
+        blind: None,
+        sigma: KNOWN_SIGMA,
+        common: 0.0,
+        weight: 1.0,
+        segment: usize::MAX - number,
+    };
+    let mut by = [Jacobian::zeros(); 3];
+    by[0].fixed_columns_mut::<3>(place::ROTATION).fill_with_identity();
+    by[1][(0, place::OFFSET)] = 1.0;
+    by[2].fixed_columns_mut::<3>(place::BIAS).fill_with_identity();
+    let turn = log(unknowns.camera_from_imu * start.camera_from_imu.inverse());
+    let offset = Vector3::new(unknowns.offset_s - start.offset_s, 0.0, 0.0);
+    [row(0, vector(turn), by[0]), row(1, offset, by[1]), row(2, vector(unknowns.bias - start.bias), by[2])]
 }
 
 /// Of each observation and level.
@@ -177,7 +214,8 @@ impl Weights {
     pub(super) fn set(&mut self, row: &Row, weight: f64) {
         let (list, index) = match row.kind {
             Kind::Level => (&mut self.levels, row.index),
-            _ => (&mut self.observations, row.index),
+            Kind::Orientation | Kind::Up => (&mut self.observations, row.index),
+            Kind::Known => return,
         };
         if list.len() <= index {
             list.resize(index + 1, 1.0);
@@ -239,6 +277,7 @@ fn observed(
         speed,
         blind: None,
         sigma,
+        common: 0.0,
         weight,
         segment,
     };
@@ -277,6 +316,7 @@ fn levelled(
         speed,
         blind: None,
         sigma: LEVEL_SIGMA,
+        common: 0.0,
         weight,
         segment,
     };
@@ -329,7 +369,7 @@ impl Unknowns {
     /// Turns each segment's reference by what is left of its residuals in the (weighted) mean, so that they stay small.
     pub(super) fn settle(&mut self, rows: &[Row]) {
         let mut sums: BTreeMap<usize, (Vector3<f64>, f64)> = BTreeMap::new();
-        for row in rows.iter().filter(|r| r.kind != Kind::Level) {
+        for row in rows.iter().filter(|r| r.kind.is_seen()) {
             let (sum, weight) = sums.entry(row.segment).or_insert((Vector3::zeros(), 0.0));
             // Residuals of half a turn are outliers that were not yet found out.
             let w = row.weight / row.residual.norm().max(0.05);

@@ -159,9 +159,10 @@ pub struct Alignment {
     pub left_out: LeftOut,
 }
 
-/// Below this ratio, or beyond this standard deviation (radians), an angle is not known.
-const RATIO_LEAST: f64 = 0.02;
+/// Beyond this standard deviation (radians) an angle is not known, nor beyond the lesser one where it is so much less known than the best.
 const SIGMA_MOST: f64 = 0.1;
+const SIGMA_UNEVEN: f64 = 0.03;
+const RATIO_LEAST: f64 = 0.02;
 
 impl Alignment {
     /// Standard deviation about each of the camera's axes, radians.
@@ -201,9 +202,10 @@ pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, Ali
         fitted.covariance.fixed_view::<3, 3>(place::ROTATION, place::ROTATION).into();
     let sigma = |i: usize| fitted.covariance[(i, i)].max(0.0).sqrt();
     let information_ratio = observe(problem, fitted, &rotation)?;
+    let rotation = rotation + horizons_share(problem);
     let unknowns = &fitted.unknowns;
     let mut left_out = problem.left;
-    let used = fitted.rows.iter().filter(|r| r.kind != Kind::Level).count();
+    let used = fitted.rows.iter().filter(|r| r.kind.is_seen()).count();
     left_out.without_gyro = problem.observations.len() - used;
     let worst = rotation.symmetric_eigenvalues().max().max(0.0).sqrt();
     let offset_sigma_s = sigma(place::OFFSET);
@@ -216,12 +218,7 @@ pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, Ali
         gyro_bias_sigma: bias_sigma(fitted),
         readout_s: problem.options.estimate_readout.then(|| (unknowns.readout_s, sigma(place::READOUT))),
         information_ratio,
-        noise: NoiseFound {
-            orientation_scale: fitted.levels.scale[Kind::Orientation as usize],
-            up_scale: fitted.levels.scale[Kind::Up as usize],
-            jitter_s: fitted.levels.jitter_s,
-            gyro_walk: fitted.levels.walk,
-        },
+        noise: noise_found(fitted),
         grade: Grade::of(worst, offset_sigma_s),
         checks: checks(fitted),
         residuals: residuals(problem, fitted),
@@ -231,6 +228,32 @@ pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, Ali
         alignment.grade = alignment.grade.min(Grade::Usable);
     }
     Ok(alignment)
+}
+
+/// Sizes of the noises.
+pub(super) fn noise_found(fitted: &Fitted) -> NoiseFound {
+    let levels = &fitted.levels;
+    NoiseFound {
+        orientation_scale: levels.scale[Kind::Orientation as usize],
+        up_scale: levels.scale[Kind::Up as usize],
+        jitter_s: levels.jitter_s,
+        gyro_walk: levels.walk,
+    }
+}
+
+/// Covariance of what an error of elevation that all horizons share does to the rotation: where nothing but horizons was seen, it turns the
+/// camera about the picture's horizontal. (Less where the camera rolled, by which it could be told.)
+pub(super) fn horizons_share(problem: &Problem) -> Matrix3<f64> {
+    if problem.has_orientations() {
+        return Matrix3::zeros();
+    }
+    let level = |o: &Observation| match o {
+        Observation::Up { up_in_camera, .. } => up_in_camera.cross(DVec3::Z).normalize_or_zero(),
+        Observation::Orientation { .. } => DVec3::ZERO,
+    };
+    let mean = vector(problem.observations.iter().map(level).sum::<DVec3>())
+        / problem.observations.len().max(1) as f64;
+    mean * mean.transpose() * problem.options.horizon_sigma.powi(2)
 }
 
 /// Standard deviation of the bias. A mean rate is as good as the walk over the recording allows; where the camera's noise hides that walk,
@@ -252,19 +275,18 @@ fn observe(problem: &Problem, fitted: &Fitted, rotation: &Matrix3<f64>) -> Resul
     if !(ratio.is_finite() && sigma.is_finite()) {
         return Err(AlignmentError::NoFit { problem: "the covariance is no number" });
     }
-    if ratio >= RATIO_LEAST && sigma <= SIGMA_MOST {
+    if sigma <= if ratio < RATIO_LEAST { SIGMA_UNEVEN } else { SIGMA_MOST } {
         return Ok(ratio);
     }
-    let missing = if best > SIGMA_MOST {
-        Movement::Any
-    } else {
-        missing(problem, fitted, dvec(&eigen.eigenvectors.column(worst).into()))
-    };
+    let missing = if best > SIGMA_MOST { Movement::Any } else { missing(problem, fitted, rotation) };
     Err(AlignmentError::NotObservable { missing, ratio, sigma_mrad: sigma * 1e3 })
 }
 
-/// The movement that would tell the angle about `blind` (camera's axes): one about another axis, of which there is least.
-fn missing(problem: &Problem, fitted: &Fitted, blind: DVec3) -> Movement {
+/// The movement that would tell the angle of which `rotation`, a covariance in the camera's axes, knows least: one about another axis, of
+/// which there is least.
+pub(super) fn missing(problem: &Problem, fitted: &Fitted, rotation: &Matrix3<f64>) -> Movement {
+    let eigen = rotation.symmetric_eigen();
+    let blind = dvec(&eigen.eigenvectors.column(eigen.eigenvalues.imax()).into());
     let mut energy = DVec3::ZERO;
     for rate in &problem.gyro.rate {
         let turned = fitted.unknowns.camera_from_imu * (*rate - fitted.unknowns.bias);
@@ -280,7 +302,7 @@ fn missing(problem: &Problem, fitted: &Fitted, blind: DVec3) -> Movement {
 }
 
 fn checks(fitted: &Fitted) -> Checks {
-    let outliers = fitted.rows.iter().filter(|r| r.weight < 1.0 && r.kind != Kind::Level).count();
+    let outliers = fitted.rows.iter().filter(|r| r.weight < 1.0 && r.kind.is_seen()).count();
     Checks {
         halves: halves(fitted),
         outliers: outliers as f64 / fitted.rows.len().max(1) as f64,
@@ -319,14 +341,11 @@ fn gyro_scale(fitted: &Fitted) -> Option<(DVec3, DVec3)> {
 
 fn residuals(problem: &Problem, fitted: &Fitted) -> Vec<Residual> {
     let of = |(i, row): (usize, &super::filter::Row)| {
-        let observation: &Observation =
-            problem.observations.get(row.index).filter(|_| row.kind != Kind::Level)?;
-        // The Jacobian by the rotation is the prediction's own rotation, camera's axes to the reference's.
-        let reference_from_camera: Matrix3<f64> = row.jacobian.fixed_columns::<3>(place::ROTATION).into();
+        let observation: &Observation = problem.observations.get(row.index).filter(|_| row.kind.is_seen())?;
         let innovation = fitted.whitened.innovations.get(i)?;
         Some(Residual {
             stamp: observation.stamp(),
-            turn: dvec(&(reference_from_camera.transpose() * innovation)),
+            turn: dvec(&(row.reference_from_camera().transpose() * innovation)),
             normalised: (fitted.whitened.squares.get(i)? / row.freedom()).sqrt(),
             weight: row.weight,
         })

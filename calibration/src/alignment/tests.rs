@@ -450,6 +450,7 @@ proptest! {
             offset_range_s: odd(&mut random, 0.2),
             estimate_readout: random.unit() < 0.5,
             gyro_range: Some(odd(&mut random, 2.0)),
+            horizon_sigma: odd(&mut random, 1e-3),
         };
         if let Ok(a) = solve(&readings, &observations, &options) {
             prop_assert!(a.camera_from_imu.is_finite() && a.offset_s.is_finite() && a.offset_sigma_s.is_finite());
@@ -458,4 +459,81 @@ proptest! {
         }
         let _ = closed_form(&readings, &observations, &options);
     }
+}
+
+/// What a recipe's calibration would be, off by a turn and by seconds.
+fn known(recipe: &Recipe, turn: DVec3, late_s: f64) -> Known {
+    Known {
+        camera_from_imu: exp(turn) * recipe.camera_from_imu,
+        rotation_sigma: DVec3::splat(0.5e-3),
+        offset_s: recipe.offset_s + late_s,
+        offset_sigma_s: 0.1e-3,
+        gyro_bias: recipe.gyro_bias,
+    }
+}
+
+#[test]
+fn what_has_changed_is_told_and_what_has_not() {
+    let options = Options::default();
+    for seed in 0..3 {
+        let recipe = by_hand(30 + seed);
+        let recording = recipe.record();
+        for all in [&recording.orientations, &recording.ups] {
+            let same =
+                compare(&recording.readings, all, &known(&recipe, DVec3::ZERO, 0.0), &options).unwrap();
+            assert!(same.surprise < 20.0, "{same:?}");
+            for (turn, late_s) in
+                [(DVec3::X * 4e-3, 0.0), (DVec3::new(0.0, 0.3, -0.2), 0.0), (DVec3::ZERO, 3e-3)]
+            {
+                let other = known(&recipe, turn, late_s);
+                let told = compare(&recording.readings, all, &other, &options).unwrap();
+                assert!(told.surprise > 25.0, "{turn} {late_s}: {}", told.surprise);
+                let off = log(exp(-turn) * exp(told.turn).inverse());
+                assert!(off.length() < 3e-3, "{turn}: {}", told.turn);
+                assert!((told.offset_s + late_s).abs() < 1e-3, "{late_s}: {}", told.offset_s);
+                assert_eq!(told.residuals.len(), all.len() - told.left_out.without_gyro);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_a_recording_does_not_tell_is_said_to_be_unknown() {
+    for (motion, blind, missing) in [
+        (Motion::TraverseOnly, DVec3::Y, Movement::Elevation),
+        (Motion::ElevationOnly, DVec3::X, Movement::Traverse),
+    ] {
+        let recipe = Recipe::minute(motion, TENTH, 2e-3, 3);
+        let recording = recipe.record();
+        let all = &recording.orientations;
+        // Off about the blind axis: nobody can tell.
+        let off = known(&recipe, blind * 5e-3, 0.0);
+        let told = compare(&recording.readings, all, &off, &Options::default()).unwrap();
+        assert!(told.surprise < 20.0, "{motion:?}: {}", told.surprise);
+        assert!(told.turn_sigma().dot(blind) > 0.03, "{motion:?}: {}", told.turn_sigma());
+        assert_eq!(told.missing, missing);
+        // Off about another: told all the same.
+        let off = known(&recipe, DVec3::Z * 0.02, 0.0);
+        let told = compare(&recording.readings, all, &off, &Options::default()).unwrap();
+        assert!(told.surprise > 25.0, "{motion:?}: {}", told.surprise);
+    }
+    let recipe = Recipe::minute(Motion::Rest, TENTH, 2e-3, 3);
+    let recording = recipe.record();
+    let off = known(&recipe, DVec3::new(0.01, 0.01, 0.01), 0.0);
+    let told = compare(&recording.readings, &recording.orientations, &off, &Options::default()).unwrap();
+    assert!(told.surprise < 20.0 && told.turn_sigma().min_element() > 0.03, "{told:?}");
+}
+
+#[test]
+fn horizons_that_share_an_error_are_no_surer_than_it() {
+    let recording = by_hand(40).record();
+    let options = Options { horizon_sigma: 1.7e-3, ..Options::default() };
+    let plain = solve(&recording.readings, &recording.ups, &Options::default()).unwrap();
+    let shared = solve(&recording.readings, &recording.ups, &options).unwrap();
+    let (before, after) = (plain.rotation_sigma(), shared.rotation_sigma());
+    assert!(after.x > 1.5e-3 && after.x < 1.1 * before.x.hypot(1.7e-3), "{before} {after}");
+    assert!((after.z - before.z).abs() < 0.2e-3 && shared.grade == Grade::Usable, "{before} {after}");
+    // A board tells the rotation without it.
+    let board = solve(&recording.readings, &recording.orientations, &options).unwrap();
+    assert!(board.rotation_sigma().max_element() < 1e-3);
 }
