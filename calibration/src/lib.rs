@@ -30,6 +30,7 @@
 pub mod alignment;
 pub mod boresight;
 pub mod camera;
+pub mod capture;
 mod date;
 mod error;
 mod file;

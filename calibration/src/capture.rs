@@ -1,0 +1,354 @@
+//! From what devices report to what the solvers take: readings on the host's clock, and what pictures tell of the camera's orientation.
+//!
+//! Without a target only the horizon is looked for; a board, where one is expected, by whoever can find it ([`FindBoard`]). Nothing is
+//! predicted from a calibration: what is to be found must not guide the search.
+
+use bowwave_core::{
+    calibration::Calibration,
+    clock::ClockMap,
+    event::{CameraFrame, Event, ImuSample, Picture, TriggerEdge},
+    geometry::{Lens, horizon_dip},
+    horizon::{HorizonFinder, NoHorizon, View},
+    time::Time,
+};
+use glam::{DQuat, DVec2, DVec3};
+
+use crate::alignment::{
+    self, Alignment, AlignmentError, Comparison, ImuReading, Known, Observation, Options,
+};
+
+/// Standard deviation of the error of elevation that all horizons of a recording share, radians: refraction moves the true horizon by
+/// 0.08 to 0.12 deg in daytime.
+pub const HORIZON_SIGMA: f64 = 0.1f64.to_radians();
+/// Pictures with a board from which on horizons are not needed to tell the rotation.
+const BOARDS_ENOUGH: usize = 30;
+/// What is taken at most: half an hour at 1000 readings and 60 pictures a second.
+const READINGS_MOST: usize = 1_800_000;
+const OBSERVATIONS_MOST: usize = 108_000;
+
+/// A board seen in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoardSeen {
+    /// Rotation from the camera's axes to the board's.
+    pub board_from_camera: DQuat,
+    /// Its standard deviation about each axis, radians.
+    pub sigma: f64,
+    /// Its middle, pixels.
+    pub pixel: DVec2,
+}
+
+/// Finds the board in a picture.
+pub trait FindBoard {
+    /// The board, or `None` where it is not to be seen well enough.
+    fn find(&mut self, picture: &Picture, lens: &Lens) -> Option<BoardSeen>;
+}
+
+/// Where in the picture an observation was made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sighting {
+    /// The picture's mid-exposure by the camera's stamp.
+    pub stamp: Time,
+    /// Where the horizon crosses the picture's middle, or the middle of the board, pixels.
+    pub pixel: DVec2,
+}
+
+/// What has come so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Readings of the inertial unit.
+    pub readings: usize,
+    /// Pictures of the calibrated size.
+    pub pictures: usize,
+    /// Pictures of another size, which were left out.
+    pub other_size: usize,
+    /// Pictures with a horizon.
+    pub horizons: usize,
+    /// Pictures whose horizon, or what looked like it, was smeared by motion or fog.
+    pub blurred: usize,
+    /// Pictures with a board.
+    pub boards: usize,
+    /// Restarts of the unit's clock.
+    pub restarts: u32,
+}
+
+/// Collects what a calibration is solved from. Holds no pictures.
+pub struct Capture {
+    lens: Lens,
+    eye_height_m: f64,
+    clock: ClockMap,
+    finder: HorizonFinder,
+    board: Option<Box<dyn FindBoard + Send>>,
+    readings: Vec<ImuReading>,
+    observations: Vec<Observation>,
+    sightings: Vec<Sighting>,
+    edges: Vec<TriggerEdge>,
+    counts: Counts,
+}
+
+impl Capture {
+    /// Nothing so far, of a camera with that lens, `eye_height_m` above the sea.
+    pub fn new(lens: Lens, eye_height_m: f64) -> Self {
+        Self {
+            lens,
+            eye_height_m,
+            clock: ClockMap::new(),
+            finder: HorizonFinder::new(),
+            board: None,
+            readings: Vec::new(),
+            observations: Vec::new(),
+            sightings: Vec::new(),
+            edges: Vec::new(),
+            counts: Counts::default(),
+        }
+    }
+
+    /// Looks for a board as well.
+    #[must_use]
+    pub fn with_board(mut self, board: Box<dyn FindBoard + Send>) -> Self {
+        self.board = Some(board);
+        self
+    }
+
+    /// Takes in what a device reported.
+    pub fn take(&mut self, event: &Event) {
+        match event {
+            Event::Imu(sample) => self.sample(sample),
+            Event::Frame(frame) => self.frame(frame),
+            Event::Trigger(edge) if self.edges.len() < OBSERVATIONS_MOST => self.edges.push(*edge),
+            Event::Trigger(_) | Event::Fault(_) => {}
+        }
+    }
+
+    fn sample(&mut self, sample: &ImuSample) {
+        if !sample.is_finite() || self.readings.len() >= READINGS_MOST {
+            return;
+        }
+        let time = self.clock.observe(sample.device_time_ns, sample.arrival);
+        self.readings.push(ImuReading::new(time, sample));
+        self.counts.readings += 1;
+        self.counts.restarts = self.clock.restarts();
+    }
+
+    fn frame(&mut self, frame: &CameraFrame) {
+        let picture = &frame.picture;
+        if (picture.width(), picture.height()) != (self.lens.width, self.lens.height) {
+            self.counts.other_size += 1;
+            return;
+        }
+        self.counts.pictures += 1;
+        if self.observations.len() + 1 >= OBSERVATIONS_MOST {
+            return;
+        }
+        let stamp = frame.mid_exposure;
+        let view = View { lens: self.lens, eye_height_m: self.eye_height_m, prior: None };
+        match self.finder.find(picture, &view) {
+            Ok(horizon) => {
+                self.counts.horizons += 1;
+                let covariance = horizon.up_covariance();
+                let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
+                let pixel = horizon_pixel(&self.lens, horizon.up, self.eye_height_m);
+                let (sigma, row) = ((0.5 * trace).sqrt(), row(&self.lens, pixel));
+                self.observations.push(Observation::Up { stamp, up_in_camera: horizon.up, sigma, row });
+                self.sightings.push(Sighting { stamp, pixel });
+            }
+            Err(NoHorizon::Blurred(_)) => self.counts.blurred += 1,
+            Err(_) => {}
+        }
+        if let Some(seen) = self.board.as_mut().and_then(|b| b.find(picture, &self.lens)) {
+            self.counts.boards += 1;
+            self.observations.push(Observation::Orientation {
+                stamp,
+                reference_from_camera: seen.board_from_camera,
+                sigma: seen.sigma,
+                row: row(&self.lens, seen.pixel),
+                chain: 0,
+            });
+            self.sightings.push(Sighting { stamp, pixel: seen.pixel });
+        }
+    }
+
+    /// What has come so far.
+    pub const fn counts(&self) -> Counts {
+        self.counts
+    }
+
+    /// The inertial unit's readings on the host's clock.
+    pub fn readings(&self) -> &[ImuReading] {
+        &self.readings
+    }
+
+    /// What pictures told.
+    pub fn observations(&self) -> &[Observation] {
+        &self.observations
+    }
+
+    /// Where in the picture each of the observations was made, in the same order.
+    pub fn sightings(&self) -> &[Sighting] {
+        &self.sightings
+    }
+
+    /// The trigger's edges.
+    pub fn edges(&self) -> &[TriggerEdge] {
+        &self.edges
+    }
+
+    /// From the first reading or picture to the last, seconds.
+    pub fn seconds(&self) -> f64 {
+        let readings = self.readings.first().zip(self.readings.last());
+        readings.map_or(0.0, |(first, last)| last.time.secs_since(first.time))
+    }
+
+    fn options(&self) -> Options {
+        Options { horizon_sigma: HORIZON_SIGMA, ..Options::default() }
+    }
+
+    /// The observations that tell most: of a board alone where it was seen often, because horizons share the error of refraction.
+    fn best(&self) -> Vec<Observation> {
+        let enough = self.counts.boards >= BOARDS_ENOUGH;
+        let wanted = |o: &&Observation| !enough || matches!(o, Observation::Orientation { .. });
+        self.observations.iter().filter(wanted).copied().collect()
+    }
+
+    /// Finds rotation, time offset and bias: from the board where there is one, with the help of the horizon where the movement alone does
+    /// not tell, else from the horizon.
+    ///
+    /// # Errors
+    /// As [`alignment::solve`].
+    pub fn solve(&self) -> Result<Alignment, AlignmentError> {
+        let (best, options) = (self.best(), self.options());
+        let found = alignment::solve(&self.readings, &best, &options);
+        match found {
+            Err(AlignmentError::NotObservable { .. }) if best.len() < self.observations.len() => {
+                alignment::solve(&self.readings, &self.observations, &options)
+            }
+            other => other,
+        }
+    }
+
+    /// Holds a calibration against what was seen.
+    ///
+    /// # Errors
+    /// As [`alignment::compare`].
+    pub fn compare(&self, calibration: &Calibration) -> Result<Comparison, AlignmentError> {
+        let known = Known {
+            camera_from_imu: calibration.camera_from_imu,
+            rotation_sigma: calibration.camera_from_imu_sigma,
+            offset_s: calibration.time_offset_ns as f64 * 1e-9,
+            offset_sigma_s: calibration.time_offset_sigma_ns as f64 * 1e-9,
+            gyro_bias: calibration.gyro_bias,
+        };
+        alignment::compare(&self.readings, &self.best(), &known, &self.options())
+    }
+}
+
+impl std::fmt::Debug for Capture {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Capture").field("counts", &self.counts).finish_non_exhaustive()
+    }
+}
+
+/// Where the sea's horizon is straight ahead; the picture's middle where that is outside of it.
+fn horizon_pixel(lens: &Lens, up: DVec3, eye_height_m: f64) -> DVec2 {
+    let (sin, cos) = horizon_dip(eye_height_m).sin_cos();
+    let ahead = (DVec3::Z - up * up.z).normalize_or_zero();
+    let middle = DVec2::new(f64::from(lens.width), f64::from(lens.height)) / 2.0;
+    lens.project(ahead * cos - up * sin).unwrap_or(middle)
+}
+
+/// Off the picture's middle, in picture heights.
+fn row(lens: &Lens, pixel: DVec2) -> f64 {
+    (pixel.y / f64::from(lens.height) - 0.5).clamp(-0.5, 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use bowwave_core::{event::PixelFormat, geometry::look};
+
+    use super::*;
+
+    /// A sky over a sea, seen from 10 m.
+    fn picture(lens: &Lens, world_from_camera: DQuat) -> Picture {
+        let sin_dip = -horizon_dip(10.0).sin();
+        let mut bytes = Vec::new();
+        for y in 0..lens.height {
+            for x in 0..lens.width {
+                let ray = lens.unproject(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+                let above = (world_from_camera * ray).z - sin_dip;
+                // As sharp as a pixel.
+                let share = (above * lens.focal.y + 0.5).clamp(0.0, 1.0);
+                bytes.extend([(70.0 + 110.0 * share) as u8; 3]);
+            }
+        }
+        Picture::new(PixelFormat::Rgb, lens.width, lens.height, Arc::from(bytes)).unwrap()
+    }
+
+    fn frame(picture: Picture) -> Event {
+        let time = Time::from_ns(5);
+        Event::Frame(CameraFrame { arrival: time, mid_exposure: time, sequence: 0, picture, jpeg: None })
+    }
+
+    #[test]
+    fn a_horizon_becomes_an_up_with_its_place() {
+        let lens = Lens::pinhole(320, 180, 1.0);
+        let mut capture = Capture::new(lens, 10.0);
+        let world_from_camera = look(0.3, 0.1, -0.05);
+        capture.take(&frame(picture(&lens, world_from_camera)));
+        let [Observation::Up { up_in_camera, sigma, row, .. }] = *capture.observations() else {
+            panic!("{:?}", capture.counts())
+        };
+        let off = up_in_camera.angle_between(world_from_camera.inverse() * DVec3::Z);
+        assert!(off < 4.0 * sigma && sigma < 3e-3, "{off} {sigma}");
+        let below = lens.focal.y * (0.1f64 + horizon_dip(10.0)).tan();
+        assert!((capture.sightings()[0].pixel.y - 90.0 - below).abs() < 1.5, "{:?}", capture.sightings());
+        assert!((row - below / 180.0).abs() < 0.01);
+        // Nothing but sky, and another size.
+        capture.take(&frame(picture(&lens, look(0.3, 0.9, 0.0))));
+        capture.take(&frame(picture(&Lens::pinhole(160, 90, 1.0), world_from_camera)));
+        let counts = capture.counts();
+        assert_eq!((counts.pictures, counts.horizons, counts.other_size), (2, 1, 1));
+    }
+
+    #[test]
+    fn samples_come_on_the_hosts_clock_and_bad_ones_are_left_out() {
+        let mut capture = Capture::new(Lens::pinhole(320, 180, 1.0), 10.0);
+        for i in 0..100i64 {
+            let sample = ImuSample {
+                arrival: Time::from_ns(9_000_000_000 + i * 5_000_000 + i % 7 * 100_000),
+                device_time_ns: i * 5_000_000,
+                rate: if i == 40 { DVec3::NAN } else { DVec3::X },
+                accel: DVec3::Z * 9.81,
+                world_from_imu: None,
+            };
+            capture.take(&Event::Imu(sample));
+        }
+        assert_eq!(capture.counts().readings, 99);
+        assert_eq!(capture.readings()[98].time.ns(), 9_000_000_000 + 99 * 5_000_000);
+        assert!((capture.seconds() - 0.495).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_board_that_was_seen_often_needs_no_horizon() {
+        struct Same;
+        impl FindBoard for Same {
+            fn find(&mut self, _: &Picture, _: &Lens) -> Option<BoardSeen> {
+                let pixel = DVec2::new(160.0, 45.0);
+                Some(BoardSeen { board_from_camera: DQuat::IDENTITY, sigma: 1e-3, pixel })
+            }
+        }
+        let lens = Lens::pinhole(320, 180, 1.0);
+        let mut capture = Capture::new(lens, 10.0).with_board(Box::new(Same));
+        let event = frame(picture(&lens, look(0.0, 0.0, 0.0)));
+        (0..29).for_each(|_| capture.take(&event));
+        assert_eq!(capture.best().len(), 58);
+        capture.take(&event);
+        assert_eq!(capture.best().len(), 30);
+        assert!(
+            capture
+                .best()
+                .iter()
+                .all(|o| matches!(o, Observation::Orientation { row, .. } if (row + 0.25).abs() < 1e-9))
+        );
+    }
+}
