@@ -17,9 +17,10 @@ use crate::alignment::{
     self, Alignment, AlignmentError, Comparison, ImuReading, Known, Observation, Options,
 };
 
-/// Standard deviation of the error of elevation that all horizons of a recording share, radians: refraction moves the true horizon by
-/// 0.08 to 0.12 deg in daytime.
-pub const HORIZON_SIGMA: f64 = 0.1f64.to_radians();
+/// What moves all horizons of a recording alike, one standard deviation: refraction, by 0.08 to 0.12 deg in daytime, radians...
+const REFRACTION: f64 = 0.1f64.to_radians();
+/// ...and where in its haze the edge is found, pixels.
+const EDGE_PX: f64 = 0.5;
 /// Pictures with a board from which on horizons are not needed to tell the rotation.
 const BOARDS_ENOUGH: usize = 30;
 /// What is taken at most: half an hour at 1000 readings and 60 pictures a second.
@@ -167,6 +168,11 @@ impl Capture {
         }
     }
 
+    /// The camera's lens.
+    pub const fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
     /// What has come so far.
     pub const fn counts(&self) -> Counts {
         self.counts
@@ -198,13 +204,23 @@ impl Capture {
         readings.map_or(0.0, |(first, last)| last.time.secs_since(first.time))
     }
 
+    /// Standard deviation of the error of elevation that all horizons share, radians: no recording tells it.
+    pub fn horizon_sigma(&self) -> f64 {
+        REFRACTION.hypot(EDGE_PX / self.lens.focal.y)
+    }
+
     fn options(&self) -> Options {
-        Options { horizon_sigma: HORIZON_SIGMA, ..Options::default() }
+        Options { horizon_sigma: self.horizon_sigma(), ..Options::default() }
+    }
+
+    /// Whether there is nothing, or too little, but horizons.
+    pub const fn is_by_horizon(&self) -> bool {
+        self.counts.boards < BOARDS_ENOUGH
     }
 
     /// The observations that tell most: of a board alone where it was seen often, because horizons share the error of refraction.
     fn best(&self) -> Vec<Observation> {
-        let enough = self.counts.boards >= BOARDS_ENOUGH;
+        let enough = !self.is_by_horizon();
         let wanted = |o: &&Observation| !enough || matches!(o, Observation::Orientation { .. });
         self.observations.iter().filter(wanted).copied().collect()
     }

@@ -42,6 +42,20 @@ impl Date {
     pub const fn ymd(self) -> (u16, u8, u8) {
         (self.year, self.month, self.day)
     }
+
+    /// Days from `earlier` to this one; negative where that is the later one.
+    pub fn days_since(self, earlier: Self) -> i64 {
+        self.days() - earlier.days()
+    }
+
+    /// Days since 0000-03-01 (H. Hinnant, days_from_civil).
+    fn days(self) -> i64 {
+        let (month, day) = (i64::from(self.month), i64::from(self.day));
+        let year = i64::from(self.year) - i64::from(month <= 2);
+        let of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
+        let (era, year_of_era) = (year.div_euclid(400), year.rem_euclid(400));
+        era * 146_097 + year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + of_year
+    }
 }
 
 impl fmt::Display for Date {
@@ -67,6 +81,15 @@ mod tests {
             (0, 1, 1, false),
         ] {
             assert_eq!(Date::new(year, month, day).is_some(), exists, "{year}-{month}-{day}");
+        }
+    }
+
+    #[test]
+    fn days_are_counted_over_leap_years() {
+        let of = |days: i64| Date::from_unix_seconds(days * 86_400).unwrap();
+        for days in (-700_000..2_000_000).step_by(97) {
+            assert_eq!(of(days).days_since(of(3)), days - 3);
+            assert_eq!(of(days + 1).days_since(of(days)), 1);
         }
     }
 

@@ -11,7 +11,7 @@ use super::{
     fit::{Fitted, fit},
     input::{ImuReading, LeftOut, Observation},
     moved, problem,
-    problem::{Problem, Weights},
+    problem::{KNOWN_SIGMA, Problem, Weights},
     result::{NoiseFound, Residual, horizons_share, judge, missing, noise_found},
     start,
     start::Start,
@@ -88,10 +88,15 @@ pub fn compare(
     options: &Options,
 ) -> Result<Comparison, AlignmentError> {
     let mut problem = problem(readings, observations, options)?;
-    let told = match alone(&problem) {
+    let told = match moved(&problem).and_then(|()| alone(&problem)) {
         Ok(told) => told,
         Err(AlignmentError::NotObservable { .. } | AlignmentError::NoFit { .. }) => {
-            together(&mut problem, known)?
+            let mut told = together(&mut problem, known)?;
+            if moved(&problem).is_err() {
+                // Of a camera at rest noise alone would tell it.
+                told.offset = (known.offset_s, KNOWN_SIGMA);
+            }
+            told
         }
         Err(e) => return Err(e),
     };
@@ -121,7 +126,6 @@ pub fn compare(
 }
 
 fn alone(problem: &Problem) -> Result<Told, AlignmentError> {
-    moved(problem)?;
     let fitted = fit(problem, &start(problem)?)?;
     let found = judge(problem, &fitted)?;
     Ok(Told {
@@ -130,7 +134,7 @@ fn alone(problem: &Problem) -> Result<Told, AlignmentError> {
         offset: (found.offset_s, found.offset_sigma_s),
         bias: found.gyro_bias,
         noise: found.noise,
-        missing: missing(problem, &fitted, &matrix(found.rotation_covariance)),
+        missing: found.missing,
     })
 }
 

@@ -32,6 +32,7 @@ pub use input::{ImuReading, Increment, LeftOut, Observation, chained};
 pub use result::{Alignment, Checks, Finding, Grade, NoiseFound, Residual};
 pub use start::Start;
 
+use glam::DVec3;
 use problem::Problem;
 
 /// What may be said beside the measurements.
@@ -63,6 +64,8 @@ const PICTURES_LEAST: usize = 8;
 const READINGS_LEAST: usize = 100;
 /// Orientations that scatter less than this (radians, median) are those of a camera at rest.
 const SPREAD_LEAST: f64 = 0.006;
+/// Rates that scatter less than this (rad/s, rms) may be noise.
+const TURNED_LEAST: f64 = 0.02;
 
 fn problem(
     readings: &[ImuReading],
@@ -114,7 +117,9 @@ fn moved(problem: &Problem) -> Result<(), AlignmentError> {
     // Seen from several, as one of them may be wild.
     let off = [1, 3, 5].map(|i| off(all.len() * i / 6)).into_iter().fold(f64::INFINITY, f64::min);
     if off < SPREAD_LEAST {
-        let missing = Movement::Any;
+        // A horizon rests while the gun is only trained.
+        let missing =
+            if problem.has_orientations() || !turned(problem) { Movement::Any } else { Movement::Elevation };
         return Err(AlignmentError::NotObservable {
             missing,
             ratio: 0.0,
@@ -122,6 +127,15 @@ fn moved(problem: &Problem) -> Result<(), AlignmentError> {
         });
     }
     Ok(())
+}
+
+/// Whether the gyro turned by more than its bias does.
+fn turned(problem: &Problem) -> bool {
+    let rates = &problem.gyro.rate;
+    let count = rates.len().max(1) as f64;
+    let mean = rates.iter().sum::<DVec3>() / count;
+    let square = rates.iter().map(|rate| (*rate - mean).length_squared()).sum::<f64>() / count;
+    square.sqrt() > TURNED_LEAST
 }
 
 /// Angle between observations of a kind, radians.

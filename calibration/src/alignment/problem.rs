@@ -174,9 +174,10 @@ impl Problem {
     }
 }
 
-/// How roughly a start is known, for those of its numbers that the recording does not tell: 0.1 rad, 0.1 s, 0.1 rad/s. That the filter lets
-/// every segment begin anywhere adds a tenth to these.
-const KNOWN_SIGMA: f64 = 0.1;
+/// How roughly a start is known, for those of its numbers that the recording does not tell: 0.1 rad, 0.1 s, 0.01 rad/s (by as much biases
+/// change from day to day). That the filter lets every segment begin anywhere adds a twentieth to these.
+pub(super) const KNOWN_SIGMA: f64 = 0.1;
+const KNOWN_BIAS: f64 = 0.01;
 
 /// Rotation, offset and bias as if each had been seen once, each in a segment of its own that no observation has.
 fn known(start: &Start, unknowns: &Unknowns) -> [Row; 3] {
@@ -196,7 +197,7 @@ fn known(start: &Start, unknowns: &Unknowns) -> [Row; 3] {
     let mut by = [Jacobian::zeros(); 3];
     by[0].fixed_columns_mut::<3>(place::ROTATION).fill_with_identity();
     by[1][(0, place::OFFSET)] = 1.0;
-    by[2].fixed_columns_mut::<3>(place::BIAS).fill_with_identity();
+    by[2].fixed_columns_mut::<3>(place::BIAS).fill_diagonal(KNOWN_SIGMA / KNOWN_BIAS);
     let turn = log(unknowns.camera_from_imu * start.camera_from_imu.inverse());
     let offset = Vector3::new(unknowns.offset_s - start.offset_s, 0.0, 0.0);
     [row(0, vector(turn), by[0]), row(1, offset, by[1]), row(2, vector(unknowns.bias - start.bias), by[2])]

@@ -147,6 +147,8 @@ pub struct Alignment {
     pub readout_s: Option<(f64, f64)>,
     /// Smallest singular value of the rotation's normalised information over the largest: 1 is even, 0 blind about an axis.
     pub information_ratio: f64,
+    /// The movement that would tell most of the angle that is known least.
+    pub missing: Movement,
     /// Noises as found.
     pub noise: NoiseFound,
     /// How good it is.
@@ -218,6 +220,7 @@ pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, Ali
         gyro_bias_sigma: bias_sigma(fitted),
         readout_s: problem.options.estimate_readout.then(|| (unknowns.readout_s, sigma(place::READOUT))),
         information_ratio,
+        missing: missing(problem, fitted, &rotation),
         noise: noise_found(fitted),
         grade: Grade::of(worst, offset_sigma_s),
         checks: checks(fitted),

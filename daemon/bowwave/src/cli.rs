@@ -1,6 +1,7 @@
 //! The command line.
 
 mod calibrate;
+mod mounting;
 
 use std::path::PathBuf;
 
@@ -10,6 +11,7 @@ use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};
 
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateCamera, CalibrateTask};
+pub use mounting::{CalibrateCheck, CalibrateImu, CalibrateRestore, Material};
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
 #[derive(Debug, Parser)]

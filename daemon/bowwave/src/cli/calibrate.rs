@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use bowwave_calibration::target::Target;
 use clap::{Args, Subcommand};
 
+use super::mounting::{CalibrateCheck, CalibrateImu, CalibrateRestore};
+
 /// Arguments of `calibrate`.
 #[derive(Debug, Args)]
 pub struct Calibrate {
@@ -20,6 +22,12 @@ pub enum CalibrateTask {
     Board(CalibrateBoard),
     /// Measure the lens from pictures of the board: focal length, centre, distortion
     Camera(CalibrateCamera),
+    /// Measure how the inertial unit is turned against the camera, how far their clocks are apart, and the gyro's bias
+    Imu(CalibrateImu),
+    /// Check on any recording whether a calibration still holds: exit code 0 it does, 1 it does not, 3 the recording does not tell
+    Check(CalibrateCheck),
+    /// Put a calibration back that was replaced
+    Restore(CalibrateRestore),
 }
 
 /// Arguments of `calibrate board`.

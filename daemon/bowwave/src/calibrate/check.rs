@@ -1,0 +1,28 @@
+//! `bowwave calibrate check`: whether a calibration still holds, on any recording.
+
+use anyhow::Result;
+use bowwave_calibration::sheet::{Sheet, Verdict};
+
+use super::{
+    material::{look, tell, warn},
+    today,
+};
+use crate::{cli::CalibrateCheck, outcome::Outcome};
+
+/// Checks and tells: done where it holds, failed where it does not, partly where the recording does not tell.
+pub fn run(arguments: &CalibrateCheck) -> Result<Outcome> {
+    let looked = look(&arguments.recording, &arguments.material)?;
+    let calibration = &looked.file.calibration;
+    let found = looked.capture.compare(calibration);
+    let of = arguments.material.calibration.as_ref();
+    let of = of.map_or_else(|| "Its own calibration".to_owned(), |path| path.display().to_string());
+    let title = format!("{of} checked on {}", arguments.recording.display());
+    let mut sheet = Sheet::of_check(&title, &looked.capture, calibration, &found);
+    warn(&mut sheet, &looked, today()?);
+    tell(&sheet, &arguments.material)?;
+    Ok(match sheet.verdict {
+        Verdict::Pass | Verdict::Good => Outcome::Done,
+        Verdict::Fail | Verdict::Stale => Outcome::Failed,
+        Verdict::CannotTell => Outcome::Partly,
+    })
+}

@@ -1,0 +1,281 @@
+//! Calibration as a maintainer does it: recordings of a simulated sea whose truth is known, and what can be wrong with them.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Output,
+    sync::OnceLock,
+};
+
+use bowwave_calibration::{CalibrationFile, keep, parse};
+use bowwave_record::{Entry, RecordingReader, RecordingWriter};
+use bowwave_tests::{bowwave, expect_code};
+use glam::{DQuat, DVec3};
+use hw_sim::make::{self, GunMotion, Periodic, Recipe, ShipMotion};
+
+/// Twenty seconds of a small picture of the sea.
+fn sea(ship: ShipMotion, gun: GunMotion) -> Recipe {
+    Recipe {
+        width: 256,
+        height: 144,
+        frame_rate_hz: 10.0,
+        ship,
+        gun,
+        trigger: Vec::new(),
+        ..Recipe::default()
+    }
+}
+
+/// Camera and unit in the hand.
+fn by_hand() -> Recipe {
+    sea(
+        ShipMotion { roll: Periodic::new(0.0, &[(4, 0.10, 0.0), (11, 0.06, 1.0)]), ..ShipMotion::default() },
+        GunMotion {
+            traverse: Periodic::new(0.0, &[(3, 0.12, 0.5), (9, 0.08, 2.0)]),
+            elevation: Periodic::new(0.0, &[(5, 0.05, 1.5), (13, 0.03, 0.2)]),
+        },
+    )
+}
+
+/// The gun swung left and right on a ship at rest.
+fn traverse_only() -> Recipe {
+    let traverse = Periodic::new(0.0, &[(3, 0.2, 0.5), (7, 0.1, 2.0)]);
+    let elevation = Periodic::new(-0.03, &[]);
+    sea(ShipMotion::default(), GunMotion { traverse, elevation })
+}
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+}
+
+/// The recording of the movement by hand, made once.
+fn recording() -> &'static Path {
+    static RECORDING: OnceLock<(Folder, PathBuf)> = OnceLock::new();
+    let (_, path) = RECORDING.get_or_init(|| {
+        let folder = Folder::new();
+        let path = folder.path("hand.mcap");
+        make::make(&by_hand(), &path, &mut |_, _| {}).unwrap();
+        (folder, path)
+    });
+    path
+}
+
+/// The recording with every entry changed.
+fn changed(to: &Path, mut change: impl FnMut(usize, &mut Entry)) {
+    let reader = RecordingReader::open(recording()).unwrap();
+    let mut writer = RecordingWriter::create(to, reader.properties()).unwrap();
+    for (number, entry) in reader.entries().unwrap().enumerate() {
+        let mut entry = entry.unwrap();
+        change(number, &mut entry);
+        writer.write(&entry).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn calibrate(task: &str, recording: &Path, further: &[&str]) -> Output {
+    bowwave(["calibrate", task, recording.to_str().unwrap()].into_iter().chain(further.iter().copied()))
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn truth() -> CalibrationFile {
+    make::calibration(&by_hand())
+}
+
+/// Calibrates from `recording` and holds the result against the truth: within three of its own standard deviations.
+fn holds(recording: &Path, camera_from_imu: DQuat, time_offset_ns: i64) {
+    let folder = Folder::new();
+    let out = folder.path("new.toml");
+    let output = calibrate("imu", recording, &["--out", out.to_str().unwrap()]);
+    expect_code(&output, 0);
+    let found = CalibrationFile::read(&out).unwrap().calibration;
+    let turn = (camera_from_imu * found.camera_from_imu.inverse()).to_scaled_axis();
+    let off = (turn / found.camera_from_imu_sigma).abs().max_element();
+    assert!(off < 3.0, "{} mrad, stated {}", turn * 1e3, found.camera_from_imu_sigma * 1e3);
+    assert!(found.camera_from_imu_sigma.max_element() < 4e-3, "{}", found.camera_from_imu_sigma);
+    let late = (found.time_offset_ns - time_offset_ns) as f64;
+    let sigma = found.time_offset_sigma_ns as f64;
+    // What the map of the unit's clock moves by while it settles is in no deviation.
+    assert!(
+        late.abs() < 3.0 * sigma.hypot(0.05e6) && sigma < 0.5e6,
+        "{} ms +- {}",
+        late * 1e-6,
+        sigma * 1e-6
+    );
+}
+
+#[test]
+fn the_truth_is_found_from_the_horizon_alone_written_and_restored() {
+    let truth = truth().calibration;
+    holds(recording(), truth.camera_from_imu, truth.time_offset_ns);
+    let folder = Folder::new();
+    let (file, page) = (folder.path("gun.toml"), folder.path("report.html"));
+    let old = bowwave_calibration::to_toml(&make::calibration(&by_hand()));
+    fs::write(&file, &old).unwrap();
+    let at = file.to_str().unwrap();
+    let output = calibrate("imu", recording(), &["--calibration", at, "--report", page.to_str().unwrap()]);
+    expect_code(&output, 0);
+    assert!(told(&output).starts_with("PASS: usable; boats lie within"), "{}", told(&output));
+    let written = CalibrationFile::read(&file).unwrap();
+    assert!(written.camera_from_imu.how.contains("horizon"), "{:?}", written.camera_from_imu);
+    assert_eq!(written.calibration.lens, truth.lens);
+    let page = fs::read_to_string(page).unwrap();
+    assert!(page.contains("<b>PASS</b>") && page.matches("<svg").count() == 2);
+    assert_eq!(keep::kept(&file).unwrap().len(), 1);
+    expect_code(&bowwave(["calibrate", "restore", at]), 0);
+    assert_eq!(fs::read_to_string(&file).unwrap(), old);
+    expect_code(&bowwave(["calibrate", "restore", at]), 0);
+    assert_eq!(CalibrationFile::read(&file).unwrap(), written);
+    let list = bowwave(["calibrate", "restore", at, "--list"]);
+    assert_eq!(told(&list).lines().count(), 3, "{}", told(&list));
+    expect_code(&bowwave(["calibrate", "restore", at, "--number", "9"]), 1);
+}
+
+#[test]
+fn a_stale_calibration_is_found_out_and_a_good_one_is_not() {
+    let folder = Folder::new();
+    let file = folder.path("gun.toml");
+    let at = file.to_str().unwrap();
+    let output = calibrate("check", recording(), &[]);
+    expect_code(&output, 0);
+    assert!(told(&output).starts_with("GOOD: "), "{}", told(&output));
+    let turned = |turn: DVec3, late_ns: i64| {
+        let mut file = truth();
+        let c = &mut file.calibration;
+        c.camera_from_imu = DQuat::from_scaled_axis(turn) * c.camera_from_imu;
+        c.time_offset_ns += late_ns;
+        file
+    };
+    for (turn, late_ns, says) in [
+        (DVec3::Y * 0.015, 0, "traverse off by"),
+        (DVec3::ZERO, 8_000_000, "time offset off by"),
+        (DVec3::X * std::f64::consts::PI, 0, "elevation off by"),
+    ] {
+        fs::write(&file, bowwave_calibration::to_toml(&turned(turn, late_ns))).unwrap();
+        let output = calibrate("check", recording(), &["--calibration", at]);
+        expect_code(&output, 1);
+        let told = told(&output);
+        assert!(told.starts_with("STALE: boats lie off by ") && told.contains(says), "{told}");
+    }
+}
+
+#[test]
+fn traverse_alone_is_refused_with_what_is_missing_and_checks_nothing() {
+    let folder = Folder::new();
+    let path = folder.path("traverse.mcap");
+    make::make(&traverse_only(), &path, &mut |_, _| {}).unwrap();
+    let out = folder.path("new.toml");
+    let output = calibrate("imu", &path, &["--accept-poor", "--out", out.to_str().unwrap()]);
+    expect_code(&output, 1);
+    let said = told(&output);
+    assert!(said.starts_with("FAIL: ") && said.contains("missing: "), "{said}");
+    assert!(!out.exists());
+    let output = calibrate("check", &path, &[]);
+    expect_code(&output, 3);
+    assert!(told(&output).starts_with("CANNOT TELL: "), "{}", told(&output));
+}
+
+#[test]
+fn mounted_upside_down_and_half_a_second_late() {
+    let truth = truth().calibration;
+    let folder = Folder::new();
+    let path = folder.path("odd.mcap");
+    let half_turn = DQuat::from_rotation_z(std::f64::consts::PI);
+    changed(&path, |_, entry| match entry {
+        Entry::Imu(sample) => {
+            (sample.rate, sample.accel) = (half_turn * sample.rate, half_turn * sample.accel);
+        }
+        // Stamps half a second early.
+        Entry::Frame(frame) => frame.mid_exposure = frame.mid_exposure.plus_ns(-500_000_000),
+        _ => {}
+    });
+    holds(&path, truth.camera_from_imu * half_turn.inverse(), truth.time_offset_ns + 500_000_000);
+}
+
+#[test]
+fn a_wrong_stamp_flag_comes_out_as_offset_and_as_stale() {
+    let truth = truth().calibration;
+    let folder = Folder::new();
+    let path = folder.path("flag.mcap");
+    // The exposure's begin instead of its middle.
+    changed(&path, |_, entry| {
+        if let Entry::Frame(frame) = entry {
+            frame.mid_exposure = frame.mid_exposure.plus_ns(-8_000_000);
+        }
+    });
+    holds(&path, truth.camera_from_imu, truth.time_offset_ns + 8_000_000);
+    let output = calibrate("check", &path, &[]);
+    expect_code(&output, 1);
+    assert!(told(&output).contains("8.0"), "{}", told(&output));
+}
+
+#[test]
+fn stamps_that_repeat_and_run_backwards_do_no_harm() {
+    let truth = truth().calibration;
+    let folder = Folder::new();
+    let path = folder.path("stamps.mcap");
+    changed(&path, |number, entry| match entry {
+        Entry::Frame(frame) if frame.sequence % 17 == 3 => {
+            frame.mid_exposure = frame.mid_exposure.plus_ns(-250_000_000);
+        }
+        Entry::Imu(sample) if number % 301 == 5 => sample.device_time_ns -= 5_000_000,
+        _ => {}
+    });
+    holds(&path, truth.camera_from_imu, truth.time_offset_ns);
+}
+
+#[test]
+fn mirrored_axes_are_refused_and_stale() {
+    let folder = Folder::new();
+    let path = folder.path("mirrored.mcap");
+    changed(&path, |_, entry| {
+        if let Entry::Imu(sample) = entry {
+            // A rate is an axial vector: mirrored wiring reverses one axis of both.
+            sample.rate.y = -sample.rate.y;
+            sample.accel.y = -sample.accel.y;
+        }
+    });
+    let output = calibrate("imu", &path, &[]);
+    expect_code(&output, 1);
+    let said = told(&output);
+    assert!(said.starts_with("FAIL: "), "{said}");
+    let output = calibrate("check", &path, &[]);
+    expect_code(&output, 1);
+    assert!(told(&output).starts_with("STALE: "), "{}", told(&output));
+}
+
+#[test]
+fn what_cannot_be_looked_at_says_why() {
+    let folder = Folder::new();
+    let path = folder.path("absent.mcap");
+    let output = calibrate("check", &path, &[]);
+    expect_code(&output, 1);
+    let output = calibrate("check", recording(), &["--eye-height", "-3"]);
+    expect_code(&output, 2);
+    // The lens of another camera.
+    let file = folder.path("other.toml");
+    let other = make::calibration(&Recipe { width: 640, height: 360, ..by_hand() });
+    fs::write(&file, bowwave_calibration::to_toml(&other)).unwrap();
+    assert!(parse(&fs::read_to_string(&file).unwrap(), "other").is_ok());
+    let output = calibrate("check", recording(), &["--calibration", file.to_str().unwrap()]);
+    expect_code(&output, 1);
+    let said = bowwave_tests::said(&output);
+    assert!(said.contains("640x360") && said.contains("256x144"), "{said}");
+}
