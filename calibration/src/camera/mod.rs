@@ -16,7 +16,7 @@ use glam::{DMat3, DVec2, DVec3};
 pub use judge::Missing;
 pub use model::Model;
 pub use start::BoardPose;
-pub(crate) use start::homography;
+pub(crate) use start::{homography, pose_from};
 
 use adjust::{Adjusted, State, adjust};
 use model::{INTRINSICS, Intrinsics};

@@ -93,7 +93,12 @@ pub(super) fn pose(model: Model, intrinsics: &Intrinsics, corners: &[Corner]) ->
             (d.z > 0.17).then(|| (c.board, d.truncate() / d.z))
         })
         .collect();
-    let h = homography(&pairs)?;
+    pose_from(&pairs)
+}
+
+/// Pose of a board whose points are seen at undistorted coordinates (x/z, y/z).
+pub(crate) fn pose_from(pairs: &[(DVec2, DVec2)]) -> Option<BoardPose> {
+    let h = homography(pairs)?;
     let scale = 2.0 / (h.column(0).norm() + h.column(1).norm());
     let scale = if h[(2, 2)] < 0.0 { -scale } else { scale };
     let (x, y): (Vector3<f64>, Vector3<f64>) = (h.column(0) * scale, h.column(1) * scale);

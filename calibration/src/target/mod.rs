@@ -4,6 +4,7 @@
 //! between them cross, so that every corner of a tag is a crossing of two black and two white fields: a saddle of brightness, whose place
 //! neither blur nor exposure moves. A board can be seen in part, because every tag says which one it is.
 
+mod board;
 mod codes;
 mod corner;
 mod detect;
@@ -16,6 +17,7 @@ use std::{fmt, str::FromStr};
 
 use glam::DVec2;
 
+pub use board::BoardFinder;
 pub use corner::Refinement;
 pub use detect::{Tag, detect, detect_by, view};
 pub use picture::Grey;

@@ -3,11 +3,8 @@
 use anyhow::Result;
 use bowwave_calibration::sheet::{Sheet, Verdict};
 
-use super::{
-    material::{look, tell, warn},
-    today,
-};
-use crate::{cli::CalibrateCheck, outcome::Outcome};
+use super::material::{look, tell, warn};
+use crate::{cli::CalibrateCheck, import::today, outcome::Outcome};
 
 /// Checks and tells: done where it holds, failed where it does not, partly where the recording does not tell.
 pub fn run(arguments: &CalibrateCheck) -> Result<Outcome> {

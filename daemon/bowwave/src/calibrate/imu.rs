@@ -3,11 +3,8 @@
 use anyhow::Result;
 use bowwave_calibration::sheet::{Sheet, Verdict};
 
-use super::{
-    material::{look, tell, warn},
-    today,
-};
-use crate::{cli::CalibrateImu, outcome::Outcome};
+use super::material::{look, tell, warn};
+use crate::{cli::CalibrateImu, import::today, outcome::Outcome};
 
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateImu) -> Result<Outcome> {

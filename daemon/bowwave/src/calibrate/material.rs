@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use bowwave_calibration::{CalibrationFile, Date, capture::Capture, page::page, parse, sheet::Sheet};
+use bowwave_calibration::{
+    CalibrationFile, Date, capture::Capture, page::page, parse, sheet::Sheet, target::BoardFinder,
+};
 use bowwave_core::{
     event::{CameraFrame, Event},
     scenario::Scenario,
@@ -58,6 +60,9 @@ pub fn look(recording: &Path, material: &Material) -> Result<Looked> {
         );
     }
     let mut capture = Capture::new(lens, height);
+    if let Some(target) = material.target {
+        capture = capture.with_board(Box::new(BoardFinder::new(target)));
+    }
     let is_cut = play(&reader, &mut capture)?;
     Ok(Looked { capture, file, recorded: recorded.ok(), is_cut })
 }

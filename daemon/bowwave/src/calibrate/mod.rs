@@ -10,7 +10,7 @@ mod restore;
 
 use anyhow::Result;
 
-use crate::{cli::CalibrateTask, import::today, outcome::Outcome};
+use crate::{cli::CalibrateTask, outcome::Outcome};
 
 /// Does one of the tasks.
 pub fn run(task: &CalibrateTask) -> Result<Outcome> {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bowwave_calibration::target::Target;
 use clap::Args;
 
 /// What all of them look at.
@@ -13,6 +14,9 @@ pub struct Material {
     /// The camera's height above the sea; without it what the recording or its scenario says
     #[arg(long, value_name = "M", value_parser = parse_height)]
     pub eye_height: Option<f64>,
+    /// Also look for this board, which must stand still (see `calibrate board`): tags across and upwards, side in millimetres, gap by that
+    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]")]
+    pub target: Option<Target>,
     /// Also write the result as a page (HTML), with what is left over plotted
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
