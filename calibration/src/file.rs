@@ -47,6 +47,8 @@ pub struct CalibrationFile {
     pub shutter: Option<Provenance>,
     /// Where the boresight comes from.
     pub boresight: Provenance,
+    /// Where the trigger's latency comes from; `None` where it was not measured.
+    pub trigger: Option<Provenance>,
     /// Where the gyro's bias comes from.
     pub gyro_bias: Provenance,
     /// The checked numbers.
@@ -75,6 +77,7 @@ impl CalibrationFile {
             time_offset: provenance.clone(),
             shutter: rolling.then(|| provenance.clone()),
             boresight: provenance.clone(),
+            trigger: calibration.trigger.map(|_| provenance.clone()),
             gyro_bias: provenance,
             calibration,
         }

@@ -14,6 +14,7 @@
 //! | `[time_offset]` | `offset_ms` (add to a frame's mid-exposure stamp to get the time on the unit's clock), `sigma_ms` |
 //! | `[shutter]` | `readout_ms` (from reading the picture's first row to its last, negative where the last is read first), `sigma_ms`; left out where all rows are exposed at once |
 //! | `[boresight]` | `right_deg`, `down_deg` (of the optical axis), `sigma_mrad`, `muzzle_m = [right, down, forward]` from the camera |
+//! | `[trigger]` | `latency_ms` (from the line's edge to the round, negative where the line is the later one), `sigma_ms`; left out where it was not measured |
 //! | `[gyro_bias]` | `bias_deg_per_s = [x, y, z]` (subtracted from the rates, unit's axes), `sigma_deg_per_s` |
 //!
 //! Every section also has `measured` (a TOML date, unquoted) and may have `how`.
@@ -40,7 +41,9 @@ mod raw;
 pub mod sheet;
 pub mod simulated;
 mod so3;
+mod statistics;
 pub mod target;
+pub mod trigger;
 mod write;
 
 pub use date::Date;

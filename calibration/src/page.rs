@@ -5,7 +5,10 @@ use std::fmt::Write as _;
 use glam::{DMat3, DVec2};
 use plotters::prelude::*;
 
-use crate::sheet::{Placed, Sheet, Verdict};
+use crate::{
+    sheet::{Placed, Sheet, Verdict},
+    statistics::quantile,
+};
 
 const SIZE: (u32, u32) = (980, 320);
 /// More points than this hide each other and make the page slow.
@@ -128,13 +131,10 @@ fn over_time(area: &Area<'_>, residuals: &[Placed]) -> Drawn {
     if low > high {
         return Err("no residual is a number".into());
     }
-    let mut sizes: Vec<f64> = thinned(residuals, POINTS_MOST)
-        .flat_map(|p| (p.residual.turn * 1e3).to_array().map(f64::abs))
-        .collect();
-    sizes.sort_by(f64::total_cmp);
+    let sizes =
+        thinned(residuals, POINTS_MOST).flat_map(|p| (p.residual.turn * 1e3).to_array().map(f64::abs));
     // A few wild ones must not press all others onto the axis; they stand at the edge.
-    let usual = sizes.get(sizes.len() * 98 / 100).copied().unwrap_or(1.0);
-    let reach = (1.5 * usual).clamp(1e-3, 1e4);
+    let reach = (1.5 * quantile(sizes, 0.98)).clamp(1e-3, 1e4);
     let mut chart = ChartBuilder::on(area)
         .margin(8)
         .x_label_area_size(36)

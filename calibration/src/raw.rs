@@ -1,7 +1,7 @@
 //! From TOML text to checked numbers.
 
 use bowwave_core::{
-    calibration::Calibration,
+    calibration::{Calibration, TriggerLatency},
     geometry::{Distortion, Lens},
     text::{line_column, one_line},
 };
@@ -29,6 +29,7 @@ struct RawFile {
     time_offset: RawTimeOffset,
     shutter: Option<RawShutter>,
     boresight: RawBoresight,
+    trigger: Option<RawTrigger>,
     gyro_bias: RawGyroBias,
 }
 
@@ -91,6 +92,16 @@ struct RawBoresight {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct RawTrigger {
+    latency_ms: Spanned<f64>,
+    sigma_ms: Spanned<f64>,
+    measured: Spanned<Datetime>,
+    #[serde(default)]
+    how: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct RawGyroBias {
     bias_deg_per_s: Spanned<[f64; 3]>,
     sigma_deg_per_s: Spanned<[f64; 3]>,
@@ -122,6 +133,11 @@ pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationErr
             .map(|shutter| at.provenance("shutter.measured", &shutter.measured, &shutter.how))
             .transpose()?,
         boresight: at.provenance("boresight.measured", &raw.boresight.measured, &raw.boresight.how)?,
+        trigger: raw
+            .trigger
+            .as_ref()
+            .map(|trigger| at.provenance("trigger.measured", &trigger.measured, &trigger.how))
+            .transpose()?,
         gyro_bias: at.provenance("gyro_bias.measured", &raw.gyro_bias.measured, &raw.gyro_bias.how)?,
         calibration: at.calibration(&raw)?,
         source: raw.source,
@@ -284,6 +300,7 @@ impl Place<'_> {
                 -100.0,
                 100.0,
             )?),
+            trigger: raw.trigger.as_ref().map(|t| self.trigger(t)).transpose()?,
             gyro_bias: DVec3::from_array(bias.map(f64::to_radians)),
             gyro_bias_sigma: DVec3::from_array(bias_sigma.map(f64::to_radians)),
         })
@@ -295,6 +312,12 @@ impl Place<'_> {
         let readout =
             self.one_within("shutter.readout_ms", &raw.readout_ms, -READOUT_MS_MAX, READOUT_MS_MAX)?;
         Ok((ns_from_ms(readout), self.sigma_ns("shutter.sigma_ms", &raw.sigma_ms, READOUT_MS_MAX)?))
+    }
+
+    fn trigger(&self, raw: &RawTrigger) -> Result<TriggerLatency, CalibrationError> {
+        let latency = self.one_within("trigger.latency_ms", &raw.latency_ms, -1000.0, 1000.0)?;
+        let sigma_ns = self.sigma_ns("trigger.sigma_ms", &raw.sigma_ms, 1000.0)?;
+        Ok(TriggerLatency { latency_ns: ns_from_ms(latency), sigma_ns })
     }
 
     fn rotation(&self, raw: &Spanned<[f64; 4]>) -> Result<DQuat, CalibrationError> {

@@ -8,7 +8,10 @@ use glam::{DMat3, DVec2, DVec3};
 use crate::{
     CalibrationFile, Date, Provenance,
     alignment::{Alignment, AlignmentError, Comparison, Grade, LeftOut, NoiseFound, Residual},
+    boresight::{Boresight, BoresightError},
     capture::{Capture, Counts},
+    statistics::quantile,
+    trigger::{Latency, TriggerError},
 };
 
 /// Range at which errors are said in metres.
@@ -114,18 +117,64 @@ fn deg_per_s(rate: DVec3) -> String {
 }
 
 impl Sheet {
-    fn new(title: &str, verdict: Verdict, says: String, capture: &Capture) -> Self {
-        let lens = capture.lens();
+    fn bare(title: &str, verdict: Verdict, says: String) -> Self {
         Self {
             title: title.to_owned(),
             verdict,
             says,
-            rows: seen(capture),
+            rows: Vec::new(),
             notes: Vec::new(),
             covariance: None,
             residuals: Vec::new(),
-            picture: (DVec2::new(lens.width.into(), lens.height.into()), lens.focal),
+            picture: (DVec2::ONE, DVec2::ONE),
         }
+    }
+
+    fn new(title: &str, verdict: Verdict, says: String, capture: &Capture) -> Self {
+        let lens = capture.lens();
+        let picture = (DVec2::new(lens.width.into(), lens.height.into()), lens.focal);
+        Self { rows: seen(capture), picture, ..Self::bare(title, verdict, says) }
+    }
+
+    /// Of a trigger's latency that was found, or why there is none.
+    pub fn of_trigger(title: &str, found: &Result<Latency, TriggerError>) -> Self {
+        let found = match found {
+            Ok(found) => found,
+            Err(why) => return Self::bare(title, Verdict::Fail, why.to_string()),
+        };
+        let says = format!("rounds leave {} after the line's edge", ms(found.latency_s, found.sigma_s));
+        let mut sheet = Self::bare(title, Verdict::Pass, says);
+        let all: Vec<String> = found.jolts.iter().map(|(_, late)| format!("{:.1}", late * 1e3)).collect();
+        sheet.row("jolts after, ms", all.join(", "));
+        sheet.row("spread of one press", format!("{:.2} ms", found.spread_s * 1e3));
+        sheet.row("presses without a jolt", found.without.to_string());
+        sheet
+    }
+
+    /// Of a boresight that was found, or why there is none. `known` is the calibration before.
+    pub fn of_boresight(title: &str, found: &Result<Boresight, BoresightError>, known: &Calibration) -> Self {
+        let found = match found {
+            Ok(found) => found,
+            Err(why) => return Self::bare(title, Verdict::Fail, why.to_string()),
+        };
+        let sigma = found.sigma();
+        let verdict = if sigma <= Grade::ROTATION[1] { Verdict::Pass } else { Verdict::Fail };
+        let says =
+            format!("where the barrel points is known within {} (one standard deviation)", at_range(sigma));
+        let mut sheet = Self::bare(title, verdict, says);
+        let degrees = |a: DVec2| format!("{:.3} right, {:.3} down, deg", a.x.to_degrees(), a.y.to_degrees());
+        sheet.row("barrel off the optical axis", degrees(found.angles));
+        sheet.row("before", degrees(known.boresight));
+        sheet.row("scatter of one pull", at_range(found.scatter));
+        let [right, down, ahead] = known.muzzle_in_camera.to_array();
+        sheet.row("muzzle from the camera", format!("{right:.2} right, {down:.2} down, {ahead:.2} ahead, m"));
+        let mrad = |r: &DVec2| format!("{:+.2} {:+.2}", r.x * 1e3, r.y * 1e3);
+        let each: Vec<String> = found.residuals.iter().map(mrad).collect();
+        sheet.row("pulls off the mean, mrad", each.join(", "));
+        if verdict == Verdict::Fail {
+            sheet.notes.push("hold the gun on the mark for each pull, and pull more often".to_owned());
+        }
+        sheet
     }
 
     /// Of an alignment that was found, or why there is none.
@@ -188,9 +237,7 @@ impl Sheet {
         let moved = (0..3).any(|axis| is_told(axis) && c.turn[axis].abs() > Grade::ROTATION[0])
             || offset_told && c.offset_s.abs() > Grade::OFFSET_S[0];
         let blind: Vec<&str> = (0..3).filter(|axis| !is_told(*axis)).map(|axis| AXES[axis]).collect();
-        let mut left: Vec<f64> = c.residuals.iter().map(|r| r.turn.length()).collect();
-        left.sort_by(f64::total_cmp);
-        let left = left.get(left.len() / 2).copied().unwrap_or(0.0);
+        let left = quantile(c.residuals.iter().map(|r| r.turn.length()), 0.5);
         let (verdict, says) = if c.surprise > SURPRISE_MAX && moved {
             let seen = DVec3::from_array([0, 1, 2].map(|i| if is_told(i) { c.turn[i] } else { 0.0 }));
             let says = format!(
@@ -300,9 +347,7 @@ impl Sheet {
     }
 
     fn residual_rows(&mut self, noise: &NoiseFound, residuals: &[Residual], left: &LeftOut) {
-        let mut sizes: Vec<f64> = residuals.iter().map(|r| r.turn.length()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let at = |share: f64| sizes.get((share * sizes.len() as f64) as usize).copied().unwrap_or(0.0);
+        let at = |share: f64| quantile(residuals.iter().map(|r| r.turn.length()), share);
         self.row("left over, median, p95", format!("{:.2}, {:.2} mrad", at(0.5) * 1e3, at(0.95) * 1e3));
         self.row("jitter of the camera's stamps", format!("{:.2} ms", noise.jitter_s * 1e3));
         self.row("gyro's random walk", format!("{:.3} deg/sqrt(h)", noise.gyro_walk.to_degrees() * 60.0));

@@ -16,6 +16,7 @@ pub fn to_toml(file: &CalibrationFile) -> String {
     let _ = alignment(&mut out, file);
     let _ = shutter(&mut out, file);
     let _ = boresight(&mut out, file);
+    let _ = trigger(&mut out, file);
     let _ = gyro_bias(&mut out, file);
     out
 }
@@ -103,6 +104,14 @@ fn boresight(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
     writeln!(out, "sigma_mrad = {:?}", mrad(c.boresight_sigma))?;
     writeln!(out, "muzzle_m = {:?}", c.muzzle_in_camera.to_array())?;
     provenance(out, &file.boresight)
+}
+
+fn trigger(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
+    let (Some(latency), Some(measured)) = (file.calibration.trigger, &file.trigger) else { return Ok(()) };
+    section(out, "trigger", "From the line's edge to the round; negative where the line is the later one.")?;
+    writeln!(out, "latency_ms = {:?}", ms(latency.latency_ns))?;
+    writeln!(out, "sigma_ms = {:?}", ms(latency.sigma_ns))?;
+    provenance(out, measured)
 }
 
 fn gyro_bias(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {

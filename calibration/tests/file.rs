@@ -11,7 +11,7 @@ use std::{fs, path::Path};
 
 use bowwave_calibration::{CalibrationError, CalibrationFile, Date, Provenance, keep, parse, to_toml};
 use bowwave_core::{
-    calibration::Calibration,
+    calibration::{Calibration, TriggerLatency},
     geometry::{Distortion, Lens},
 };
 use glam::{DQuat, DVec2, DVec3};
@@ -224,6 +224,7 @@ prop_compose! {
         boresight in [-0.5..0.5, -0.5..0.5f64],
         boresight_sigma in 1e-6..0.1f64,
         muzzle_in_camera in vec3(-3.0, 3.0),
+        trigger in proptest::option::of((-1_000_000_000i64..=1_000_000_000, 1i64..1_000_000_000)),
         gyro_bias in vec3(-0.5, 0.5),
         gyro_bias_sigma in sigma3(),
     ) -> Calibration {
@@ -239,6 +240,7 @@ prop_compose! {
             boresight: DVec2::from_array(boresight),
             boresight_sigma,
             muzzle_in_camera,
+            trigger: trigger.map(|(latency_ns, sigma_ns)| TriggerLatency { latency_ns, sigma_ns }),
             gyro_bias,
             gyro_bias_sigma,
         }
@@ -253,11 +255,12 @@ prop_compose! {
         calibration in calibration(),
     ) -> CalibrationFile {
         let [source, camera_name, camera_serial, imu_name, imu_serial] = texts;
-        let [lens, camera_from_imu, time_offset, shutter, boresight, gyro_bias] = sections;
+        let [lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias] = sections;
         let shutter = (calibration.readout_sigma_ns > 0).then_some(shutter);
+        let trigger = calibration.trigger.map(|_| trigger);
         CalibrationFile {
             made, source, camera_name, camera_serial, imu_name, imu_serial,
-            lens, camera_from_imu, time_offset, shutter, boresight, gyro_bias, calibration,
+            lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias, calibration,
         }
     }
 }
@@ -295,5 +298,24 @@ proptest! {
         let place = torn.char_indices().nth(at.min(cut)).map_or(torn.len(), |(i, _)| i);
         torn.insert_str(place, &with);
         let _ = parse(&torn, "torn");
+    }
+}
+
+#[test]
+fn a_triggers_latency_is_optional_and_comes_back() {
+    let mut file = example();
+    assert_eq!((file.calibration.trigger, &file.trigger), (None, &None));
+    file.calibration.trigger = Some(TriggerLatency { latency_ns: -3_400_001, sigma_ns: 210_000 });
+    file.trigger = Some(Provenance::new(Date::new(2026, 11, 23).unwrap(), "8 dry shots"));
+    let text = to_toml(&file);
+    assert_eq!(parse(&text, "again").unwrap(), file);
+    for (from, to, says) in [
+        ("latency_ms = -3.400001", "latency_ms = 2000.0", "trigger.latency_ms"),
+        ("sigma_ms = 0.21", "sigma_ms = 0.0", "trigger.sigma_ms"),
+        ("latency_ms = -3.400001", "latency_s = -0.1", "latency_s"),
+    ] {
+        assert!(text.contains(from), "{text}");
+        let message = parse(&text.replacen(from, to, 1), "gun.toml").unwrap_err().to_string();
+        assert!(message.contains(says), "{message}");
     }
 }

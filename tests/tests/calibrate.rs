@@ -15,6 +15,7 @@ use std::{
 };
 
 use bowwave_calibration::{CalibrationFile, keep, parse};
+use bowwave_core::event::TriggerEdge;
 use bowwave_record::{Entry, RecordingReader, RecordingWriter};
 use bowwave_tests::{bowwave, expect_code};
 use glam::{DQuat, DVec3};
@@ -259,6 +260,65 @@ fn mirrored_axes_are_refused_and_stale() {
     let output = calibrate("check", &path, &[]);
     expect_code(&output, 1);
     assert!(told(&output).starts_with("STALE: "), "{}", told(&output));
+}
+
+/// The recording with `count` pulls of the trigger, 1.5 s apart; the gun jolts `late_s` after each by `jolt` m/s^2.
+fn with_pulls(to: &Path, count: usize, late_s: f64, jolt: f64) {
+    let reader = RecordingReader::open(recording()).unwrap();
+    let mut writer = RecordingWriter::create(to, reader.properties()).unwrap();
+    let pulls: Vec<_> = (0..count).map(|i| reader.first().plus_secs(1.0003 + 1.5 * i as f64)).collect();
+    let mut left = pulls.iter().flat_map(|p| [(*p, true), (p.plus_secs(0.2), false)]).peekable();
+    for entry in reader.entries().unwrap() {
+        let mut entry = entry.unwrap();
+        while let Some((time, pressed)) = left.next_if(|(time, _)| *time <= entry.time()) {
+            writer.write(&Entry::Trigger(TriggerEdge { time, pressed })).unwrap();
+        }
+        if let Entry::Imu(sample) = &mut entry {
+            for pull in &pulls {
+                let since = sample.arrival.secs_since(*pull) - late_s;
+                if since > 0.0 {
+                    sample.accel.x += jolt * (-since / 0.04).exp() * (300.0 * since).cos();
+                }
+            }
+        }
+        writer.write(&entry).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn dry_shots_tell_the_triggers_latency() {
+    let folder = Folder::new();
+    let (path, out) = (folder.path("dry.mcap"), folder.path("gun.toml"));
+    with_pulls(&path, 8, 0.023, 40.0);
+    expect_code(&calibrate("trigger", &path, &["--out", out.to_str().unwrap()]), 0);
+    let found = CalibrationFile::read(&out).unwrap().calibration.trigger.unwrap();
+    let off = (found.latency_ns - 23_000_000) as f64;
+    assert!(off.abs() < 3.0 * found.sigma_ns as f64 && found.sigma_ns < 3_000_000, "{found:?}");
+    let still = folder.path("still.mcap");
+    with_pulls(&still, 8, 0.023, 0.0);
+    let output = calibrate("trigger", &still, &[]);
+    expect_code(&output, 1);
+    assert!(told(&output).starts_with("FAIL: a jolt stands out after"), "{}", told(&output));
+}
+
+#[test]
+fn pulls_at_a_mark_tell_the_boresight_with_its_parallax() {
+    let folder = Folder::new();
+    let (path, out) = (folder.path("aimed.mcap"), folder.path("gun.toml"));
+    with_pulls(&path, 3, 0.0, 0.0);
+    let marks = ["--mark", "141.2,80.1", "--mark", "141.6,79.7", "--mark", "141.1,80.2"];
+    let further = ["--range", "50", "--out", out.to_str().unwrap()];
+    let output = calibrate("boresight", &path, &[&marks[..], &further].concat());
+    expect_code(&output, 0);
+    let found = CalibrationFile::read(&out).unwrap().calibration;
+    let hit = found.lens.unproject(glam::DVec2::new(141.3, 80.0)) * 50.0 - found.muzzle_in_camera;
+    let expected = glam::DVec2::new((hit.x / hit.z).atan(), (hit.y / hit.z).atan());
+    assert!(found.boresight.distance(expected) < 1e-4, "{} {expected}", found.boresight);
+    assert!(found.boresight_sigma > 1e-3 && found.boresight_sigma < 4e-3, "{}", found.boresight_sigma);
+    // A mark for each pull, or none of them is used.
+    expect_code(&calibrate("boresight", &path, &[&marks[..4], &further].concat()), 1);
+    expect_code(&calibrate("boresight", &path, &["--range", "50"]), 2);
 }
 
 #[test]

@@ -47,6 +47,18 @@ impl FindBoard for BoardFinder {
     }
 }
 
+/// Middle of a tag of the board in a picture, where its diagonals cross, pixels; `None` where it is not to be seen.
+pub fn find_tag(target: &Target, tag: usize, picture: &Picture) -> Option<DVec2> {
+    let mut grey = Vec::new();
+    to_grey(picture, &mut grey);
+    let grey = Grey::new(picture.width() as usize, picture.height() as usize, &grey)?;
+    let found = detect(target, &grey).into_iter().find(|t| t.id == tag)?;
+    let [a, b, c, d] = found.corners;
+    let (one, other) = (c - a, d - b);
+    let share = (b - a).perp_dot(other) / one.perp_dot(other);
+    Some(a + one * share).filter(|at| at.is_finite())
+}
+
 /// Brightness of every pixel.
 fn to_grey(picture: &Picture, grey: &mut Vec<u8>) {
     grey.clear();

@@ -17,7 +17,7 @@ use std::{fmt, str::FromStr};
 
 use glam::DVec2;
 
-pub use board::BoardFinder;
+pub use board::{BoardFinder, find_tag};
 pub use corner::Refinement;
 pub use detect::{Tag, detect, detect_by, view};
 pub use picture::Grey;

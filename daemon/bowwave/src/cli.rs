@@ -11,7 +11,9 @@ use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};
 
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateCamera, CalibrateTask};
-pub use mounting::{CalibrateCheck, CalibrateImu, CalibrateRestore, Material};
+pub use mounting::{
+    CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger, Material,
+};
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
 #[derive(Debug, Parser)]

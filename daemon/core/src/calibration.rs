@@ -30,10 +30,21 @@ pub struct Calibration {
     pub boresight_sigma: f64,
     /// The muzzle in the camera's space, metres (parallax of camera and barrel).
     pub muzzle_in_camera: DVec3,
+    /// How long after the trigger's edge a round leaves, where that was measured.
+    pub trigger: Option<TriggerLatency>,
     /// The gyro's bias, rad/s in the unit's axes, to be subtracted.
     pub gyro_bias: DVec3,
     /// Standard deviation of the gyro's bias, rad/s.
     pub gyro_bias_sigma: DVec3,
+}
+
+/// From the edge of the trigger's line to the round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TriggerLatency {
+    /// Nanoseconds; negative where the line is the later one.
+    pub latency_ns: i64,
+    /// Standard deviation, nanoseconds.
+    pub sigma_ns: i64,
 }
 
 impl Calibration {

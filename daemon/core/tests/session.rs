@@ -59,6 +59,7 @@ fn calibration() -> Calibration {
         boresight: DVec2::ZERO,
         boresight_sigma: 1e-3,
         muzzle_in_camera: DVec3::ZERO,
+        trigger: None,
         gyro_bias: DVec3::ZERO,
         gyro_bias_sigma: DVec3::splat(1e-4),
     }

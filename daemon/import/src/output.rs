@@ -102,6 +102,7 @@ pub fn assumed((width, height): (u32, u32), options: &ImportOptions) -> Calibrat
         boresight: DVec2::ZERO,
         boresight_sigma: 0.1,
         muzzle_in_camera: DVec3::ZERO,
+        trigger: None,
         gyro_bias: DVec3::ZERO,
         gyro_bias_sigma: DVec3::splat(0.05),
     };

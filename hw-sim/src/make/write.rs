@@ -139,6 +139,7 @@ pub fn calibration(recipe: &Recipe) -> CalibrationFile {
         boresight: DVec2::ZERO,
         boresight_sigma: 0.5e-3,
         muzzle_in_camera: DVec3::new(0.0, 0.12, 0.6),
+        trigger: None,
         gyro_bias: recipe.imu.gyro_bias,
         gyro_bias_sigma: DVec3::splat(recipe.imu.gyro_bias_walk.max(1e-6)),
     };

@@ -3,35 +3,30 @@
 use anyhow::Result;
 use bowwave_calibration::sheet::{Sheet, Verdict};
 
-use super::material::{look, tell, warn};
+use super::material::{look, tell, write};
 use crate::{cli::CalibrateImu, import::today, outcome::Outcome};
 
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateImu) -> Result<Outcome> {
-    let looked = look(&arguments.recording, &arguments.material)?;
-    let found = looked.capture.solve();
+    let material = &arguments.material;
+    let (opened, capture, is_cut) = look(&arguments.recording, material)?;
+    let found = capture.solve();
     let today = today()?;
     let title = format!("Camera and inertial unit from {}, {today}", arguments.recording.display());
-    let mut sheet = Sheet::of_alignment(&title, &looked.capture, &found);
-    warn(&mut sheet, &looked, today);
-    tell(&sheet, &arguments.material)?;
+    let mut sheet = Sheet::of_alignment(&title, &capture, &found);
+    opened.warn(&mut sheet, is_cut, today);
+    tell(&sheet, material.report.as_deref(), material.json)?;
     let passed = sheet.verdict == Verdict::Pass;
-    let out = arguments.out.as_ref().or(arguments.material.calibration.as_ref());
-    match (&found, out) {
-        (Ok(found), Some(out)) if passed || arguments.accept_poor => {
-            let mut file = looked.file;
-            let how = if looked.capture.is_by_horizon() { "horizon" } else { "board" };
-            let seconds = looked.capture.seconds();
-            file.set_alignment(found, today, &format!("{seconds:.0} s of movement, {how}, {}", found.grade));
-            file.write(out)?;
-            eprintln!(
-                "{} written; what stood there before is kept (bowwave calibrate restore)",
-                out.display()
-            );
+    match &found {
+        Ok(found) if passed || arguments.accept_poor => {
+            let mut file = opened.file;
+            let by = if capture.is_by_horizon() { "horizon" } else { "board" };
+            let seconds = capture.seconds();
+            file.set_alignment(found, today, &format!("{seconds:.0} s of movement, {by}, {}", found.grade));
+            write(file, today, [arguments.out.as_ref(), material.calibration.as_ref()])?;
         }
-        (Ok(_), Some(out)) => eprintln!("{} is left as it is; --accept-poor writes it", out.display()),
-        (Ok(_), None) => eprintln!("nothing is written; name a file with --out or --calibration"),
-        (Err(_), _) => {}
+        Ok(_) => eprintln!("nothing is written; --accept-poor writes it all the same"),
+        Err(_) => {}
     }
     Ok(if passed { Outcome::Done } else { Outcome::Failed })
 }

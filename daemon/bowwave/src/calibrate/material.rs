@@ -1,6 +1,6 @@
-//! What a task looks at: a recording played without a clock, and the calibration that goes with it.
+//! What a task looks at: a recording played without a clock, and the calibration that goes with it; and how its result is told and kept.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
@@ -11,46 +11,37 @@ use bowwave_core::{
     scenario::Scenario,
 };
 use bowwave_devices::camera::jpeg::Decoder;
-use bowwave_record::{Entry, Properties, RecordError, RecordingReader};
+use bowwave_record::{Entry, RecordError, RecordingReader};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
 use crate::cli::Material;
 
-/// A recording that was looked at.
-pub struct Looked {
-    /// What was found in it.
-    pub capture: Capture,
+/// A recording, with the calibration that goes with it.
+pub struct Opened {
+    reader: RecordingReader,
     /// The calibration that was asked for.
     pub file: CalibrationFile,
     /// The recording's own, where it has one that can be read.
-    pub recorded: Option<CalibrationFile>,
-    /// Whether the recording ends before its end.
-    pub is_cut: bool,
+    recorded: Option<CalibrationFile>,
 }
 
-/// Plays a recording.
-pub fn look(recording: &Path, material: &Material) -> Result<Looked> {
+/// Opens a recording. The calibration is that at `calibration`, or the recording's own.
+pub fn open(recording: &Path, calibration: Option<&Path>) -> Result<Opened> {
     let reader = RecordingReader::open(recording)?;
-    let properties = reader.properties();
-    let recorded = parse(&properties.calibration_toml, "the recording's calibration");
-    let file = match (&material.calibration, &recorded) {
+    let text = &reader.properties().calibration_toml;
+    let recorded = parse(text, "the recording's calibration");
+    let file = match (calibration, &recorded) {
         (Some(path), _) => CalibrationFile::read(path)?,
         (None, Ok(own)) => own.clone(),
-        (None, Err(_)) if properties.calibration_toml.is_empty() => {
+        (None, Err(_)) if text.is_empty() => {
             bail!("{} has no calibration of its own; name one with --calibration", recording.display())
         }
         (None, Err(e)) => bail!("{e}; or name another one with --calibration"),
     };
-    let height = match material.eye_height {
-        Some(height) => height,
-        None => recorded_height(properties).with_context(|| {
-            format!("{} does not say how high the camera was; say it with --eye-height", recording.display())
-        })?,
-    };
-    let lens = file.calibration.lens;
-    if (lens.width, lens.height) != properties.picture {
-        let (width, height) = properties.picture;
+    let lens = &file.calibration.lens;
+    if (lens.width, lens.height) != reader.properties().picture {
+        let (width, height) = reader.properties().picture;
         bail!(
             "the calibrated lens is of pictures of {}x{}, those of {} are {width}x{height}; name the calibration of that camera \
              and mode with --calibration",
@@ -59,74 +50,100 @@ pub fn look(recording: &Path, material: &Material) -> Result<Looked> {
             recording.display()
         );
     }
-    let mut capture = Capture::new(lens, height);
+    Ok(Opened { reader, file, recorded: recorded.ok() })
+}
+
+impl Opened {
+    /// Hands over what the recording holds, in its order; pictures only where they are asked for. Tells whether the recording was cut
+    /// short.
+    pub fn play(&self, pictures: bool, mut take: impl FnMut(Event)) -> Result<bool> {
+        let bar = ProgressBar::new(self.reader.counts().frames);
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left") {
+            bar.set_style(style);
+        }
+        let (mut decoder, mut damaged) = (Decoder::for_recordings(), 0u64);
+        for entry in self.reader.entries()? {
+            match entry {
+                Ok(Entry::Imu(sample)) => take(Event::Imu(sample)),
+                Ok(Entry::Trigger(edge)) => take(Event::Trigger(edge)),
+                Ok(Entry::Frame(frame)) if pictures => {
+                    bar.inc(1);
+                    match decoder.decode(&frame.jpeg, None) {
+                        Ok(picture) => take(Event::Frame(CameraFrame {
+                            arrival: frame.arrival,
+                            mid_exposure: frame.mid_exposure,
+                            sequence: frame.sequence,
+                            picture,
+                            jpeg: None,
+                        })),
+                        Err(why) => {
+                            if damaged == 0 {
+                                log::warn!("a picture that is no whole JPEG ({why}): left out");
+                            }
+                            damaged += 1;
+                        }
+                    }
+                }
+                Ok(Entry::Frame(_) | Entry::Truth(_) | Entry::Pose(_)) => {}
+                Err(e @ RecordError::Truncated { .. }) => {
+                    bar.finish_and_clear();
+                    log::warn!("{e}");
+                    return Ok(true);
+                }
+                Err(e) => return Err(e.into()),
+            }
+        }
+        bar.finish_and_clear();
+        Ok(false)
+    }
+
+    /// What the recording, or the scenario in it, says of the camera's height above the sea.
+    fn height(&self) -> Option<f64> {
+        let properties = self.reader.properties();
+        let own = properties.extra.get("eye_height_m").and_then(|text| text.parse::<f64>().ok());
+        let scenario =
+            || Scenario::parse(properties.scenario_toml.as_deref()?, "the recording's scenario").ok();
+        own.filter(|m| (0.5..=100.0).contains(m)).or_else(|| scenario().map(|s| s.eye_height_m))
+    }
+
+    /// Adds what there is to warn of on the day of `today`.
+    pub fn warn(&self, sheet: &mut Sheet, is_cut: bool, today: Date) {
+        sheet.warn_of_age(&self.file, today);
+        if let Some(recorded) = &self.recorded {
+            sheet.warn_of_others(&self.file, recorded);
+        }
+        if is_cut {
+            sheet.notes.push("the recording was cut short; what there is of it was used".to_owned());
+        }
+    }
+}
+
+/// Looks for horizon and board in all of a recording; tells whether that was cut short, too.
+pub fn look(recording: &Path, material: &Material) -> Result<(Opened, Capture, bool)> {
+    let opened = open(recording, material.calibration.as_deref())?;
+    let height = match material.eye_height {
+        Some(height) => height,
+        None => opened.height().with_context(|| {
+            format!("{} does not say how high the camera was; say it with --eye-height", recording.display())
+        })?,
+    };
+    let mut capture = Capture::new(opened.file.calibration.lens, height);
     if let Some(target) = material.target {
         capture = capture.with_board(Box::new(BoardFinder::new(target)));
     }
-    let is_cut = play(&reader, &mut capture)?;
-    Ok(Looked { capture, file, recorded: recorded.ok(), is_cut })
-}
-
-/// Whether the recording was cut short.
-fn play(reader: &RecordingReader, capture: &mut Capture) -> Result<bool> {
-    let bar = ProgressBar::new(reader.counts().frames);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left") {
-        bar.set_style(style);
-    }
-    let (mut decoder, mut damaged) = (Decoder::for_recordings(), 0u64);
-    for entry in reader.entries()? {
-        match entry {
-            Ok(Entry::Imu(sample)) => capture.take(&Event::Imu(sample)),
-            Ok(Entry::Trigger(edge)) => capture.take(&Event::Trigger(edge)),
-            Ok(Entry::Frame(frame)) => {
-                bar.inc(1);
-                match decoder.decode(&frame.jpeg, None) {
-                    Ok(picture) => capture.take(&Event::Frame(CameraFrame {
-                        arrival: frame.arrival,
-                        mid_exposure: frame.mid_exposure,
-                        sequence: frame.sequence,
-                        picture,
-                        jpeg: None,
-                    })),
-                    Err(why) => {
-                        if damaged == 0 {
-                            log::warn!("a picture that is no whole JPEG ({why}): left out");
-                        }
-                        damaged += 1;
-                    }
-                }
-            }
-            Ok(Entry::Truth(_) | Entry::Pose(_)) => {}
-            Err(e @ RecordError::Truncated { .. }) => {
-                bar.finish_and_clear();
-                log::warn!("{e}");
-                return Ok(true);
-            }
-            Err(e) => return Err(e.into()),
-        }
-    }
-    bar.finish_and_clear();
-    Ok(false)
-}
-
-/// What the recording, or the scenario in it, says of the camera's height above the sea.
-fn recorded_height(properties: &Properties) -> Option<f64> {
-    let own = properties.extra.get("eye_height_m").and_then(|text| text.parse::<f64>().ok());
-    let scenario = || Scenario::parse(properties.scenario_toml.as_deref()?, "the recording's scenario").ok();
-    own.filter(|m| (0.5..=100.0).contains(m)).or_else(|| scenario().map(|s| s.eye_height_m))
+    let is_cut = opened.play(true, |event| capture.take(&event))?;
+    Ok((opened, capture, is_cut))
 }
 
 /// Tells the result in all the ways that were asked for.
-pub fn tell(sheet: &Sheet, material: &Material) -> Result<()> {
-    if material.json {
-        println!(
-            "{}",
-            serde_json::to_string_pretty(&as_json(sheet)).context("cannot put the result into JSON")?
-        );
+pub fn tell(sheet: &Sheet, report: Option<&Path>, json: bool) -> Result<()> {
+    if json {
+        let text = serde_json::to_string_pretty(&as_json(sheet));
+        println!("{}", text.context("cannot put the result into JSON")?);
     } else {
         print!("{sheet}");
     }
-    if let Some(path) = &material.report {
+    if let Some(path) = report {
         std::fs::write(path, page(sheet)).with_context(|| {
             format!("cannot write {}; check the folder and its permissions", path.display())
         })?;
@@ -145,13 +162,14 @@ fn as_json(sheet: &Sheet) -> serde_json::Value {
     })
 }
 
-/// Adds what there is to warn of, on the day of `today`.
-pub fn warn(sheet: &mut Sheet, looked: &Looked, today: Date) {
-    sheet.warn_of_age(&looked.file, today);
-    if let Some(recorded) = &looked.recorded {
-        sheet.warn_of_others(&looked.file, recorded);
-    }
-    if looked.is_cut {
-        sheet.notes.push("the recording was cut short; what there is of it was used".to_owned());
-    }
+/// Writes the calibration to the first of `places` that was named.
+pub fn write(mut file: CalibrationFile, today: Date, places: [Option<&PathBuf>; 2]) -> Result<()> {
+    let Some(out) = places.into_iter().flatten().next() else {
+        eprintln!("nothing is written; name a file with --out or --calibration");
+        return Ok(());
+    };
+    file.made = today;
+    file.write(out)?;
+    eprintln!("{} written; what stood there before is kept (bowwave calibrate restore)", out.display());
+    Ok(())
 }

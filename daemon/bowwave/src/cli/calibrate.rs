@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bowwave_calibration::target::Target;
 use clap::{Args, Subcommand};
 
-use super::mounting::{CalibrateCheck, CalibrateImu, CalibrateRestore};
+use super::mounting::{CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger};
 
 /// Arguments of `calibrate`.
 #[derive(Debug, Args)]
@@ -24,6 +24,10 @@ pub enum CalibrateTask {
     Camera(CalibrateCamera),
     /// Measure how the inertial unit is turned against the camera, how far their clocks are apart, and the gyro's bias
     Imu(CalibrateImu),
+    /// Measure where the barrel points, by trigger pulls with the bore aimed at a mark
+    Boresight(CalibrateBoresight),
+    /// Measure how long after the trigger's edge a round leaves, by dry shots
+    Trigger(CalibrateTrigger),
     /// Check on any recording whether a calibration still holds: exit code 0 it does, 1 it does not, 3 the recording does not tell
     Check(CalibrateCheck),
     /// Put a calibration back that was replaced

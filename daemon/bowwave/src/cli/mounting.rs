@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use bowwave_calibration::target::Target;
 use clap::Args;
+use glam::DVec2;
 
 /// What all of them look at.
 #[derive(Clone, Debug, Args)]
@@ -60,6 +61,74 @@ pub struct CalibrateRestore {
     /// Only show what is kept
     #[arg(long)]
     pub list: bool,
+}
+
+/// Arguments of `calibrate trigger`.
+#[derive(Debug, Args)]
+pub struct CalibrateTrigger {
+    /// Recording (MCAP) of dry shots: gun cocked and held still, a second of rest between presses, five times or more
+    pub recording: PathBuf,
+    /// Calibration file (TOML); without it the recording's own
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Calibration file to write; without it the one of --calibration. What stands there is kept, see `restore`
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Also write the result as a page (HTML)
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `calibrate boresight`.
+#[derive(Debug, Args)]
+pub struct CalibrateBoresight {
+    /// Recording (MCAP) in which the bore is aimed at the mark, by collimator or through the barrel, and the trigger pulled, three to five
+    /// times, the aim taken anew for each
+    pub recording: PathBuf,
+    /// From the camera to the mark, metres: tells the parallax of camera and barrel
+    #[arg(long, value_name = "M", value_parser = parse_range)]
+    pub range: f64,
+    /// The mark is the middle of a tag of this board (see `calibrate board`)
+    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]", conflicts_with = "mark")]
+    pub target: Option<Target>,
+    /// Which tag
+    #[arg(long, value_name = "ID", default_value_t = 0, requires = "target")]
+    pub tag: usize,
+    /// The mark's place in the picture of a pull, pixels; once for each pull, in their order
+    #[arg(long, value_name = "X,Y", value_parser = parse_mark, required_unless_present = "target")]
+    pub mark: Vec<Mark>,
+    /// Calibration file (TOML) whose lens and muzzle are used; without it the recording's own
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Calibration file to write; without it the one of --calibration. What stands there is kept, see `restore`
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Also write the result as a page (HTML)
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A place in a picture, pixels; the centre of the first pixel is (0.5, 0.5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mark(pub DVec2);
+
+fn parse_mark(text: &str) -> Result<Mark, String> {
+    let numbers =
+        text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
+    let mark = numbers.filter(|(x, y)| (0.0..=8192.0).contains(x) && (0.0..=8192.0).contains(y));
+    mark.map(|(x, y)| Mark(DVec2::new(x, y)))
+        .ok_or_else(|| format!("'{text}' is no place: write X,Y in pixels, as 641.5,358"))
+}
+
+fn parse_range(text: &str) -> Result<f64, String> {
+    let range = text.parse::<f64>().ok().filter(|v| (1.0..=10_000.0).contains(v));
+    range.ok_or_else(|| format!("'{text}' is no range: give metres, 1 to 10000"))
 }
 
 fn parse_height(text: &str) -> Result<f64, String> {

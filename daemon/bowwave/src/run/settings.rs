@@ -274,6 +274,7 @@ fn uncalibrated(config: &Config) -> Calibration {
         boresight: DVec2::ZERO,
         boresight_sigma: 1.0,
         muzzle_in_camera: DVec3::ZERO,
+        trigger: None,
         gyro_bias: DVec3::ZERO,
         gyro_bias_sigma: DVec3::ONE,
     }

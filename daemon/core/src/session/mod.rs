@@ -14,7 +14,7 @@ use crate::{
     attitude::Source,
     boats::{CourseState, Hull},
     calibration::Calibration,
-    event::{Event, Picture, PictureError, PixelFormat},
+    event::{Event, Picture, PictureError, PixelFormat, TriggerEdge},
     fault::{Fault, FaultBoard, Severity},
     geometry::{CameraPose, Lens, RigidPose, look},
     light::LightMeter,
@@ -243,7 +243,10 @@ impl Session {
             match event {
                 Event::Imu(sample) => self.sensors.imu(sample),
                 Event::Frame(frame) => picture_is_new |= self.sensors.frame(frame),
-                Event::Trigger(edge) => self.weapon.edge(*edge),
+                Event::Trigger(edge) => self.weapon.edge(TriggerEdge {
+                    time: edge.time.plus_ns(self.setup.calibration.trigger.map_or(0, |t| t.latency_ns)),
+                    ..*edge
+                }),
                 Event::Fault(change) => {
                     // The line for the log is the caller's affair: this board only knows what is there.
                     let _ = self.faults.take(change);

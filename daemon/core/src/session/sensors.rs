@@ -212,6 +212,7 @@ mod tests {
             boresight: DVec2::ZERO,
             boresight_sigma: 0.001,
             muzzle_in_camera: DVec3::ZERO,
+            trigger: None,
             gyro_bias: DVec3::ZERO,
             gyro_bias_sigma: DVec3::ONE,
         };
