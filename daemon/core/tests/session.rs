@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bowwave_core::{
     attitude::Source,
-    calibration::Calibration,
+    calibration::{Calibration, TriggerLatency},
     event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, TriggerEdge},
     fault::{Fault, FaultChange},
     geometry::{Lens, look},
@@ -87,11 +87,15 @@ heading_deg = 90
 "#;
 
 fn session(text: &str) -> Session {
+    session_with(text, calibration())
+}
+
+fn session_with(text: &str, calibration: Calibration) -> Session {
     let scenario = Scenario::parse(text, "test").expect("the scenario is valid");
     let boats = scenario.boats.len();
     Session::new(Setup {
         scenario,
-        calibration: calibration(),
+        calibration,
         models: Arc::new([block()]),
         boat_models: vec![ModelId(0); boats],
         screen: (128, 96),
@@ -206,6 +210,19 @@ fn rounds_at_the_block_strike_it() {
     }
     assert!(states.contains(&Status::Hit) && states.last() == Some(&Status::Ready));
     assert_eq!(s.score(), (3, 3));
+}
+
+#[test]
+fn rounds_leave_as_late_as_the_trigger_is() {
+    for latency_ms in [-30, 45] {
+        let trigger = Some(TriggerLatency { latency_ns: latency_ms * MS, sigma_ns: MS });
+        let mut s = session_with(SCENARIO, Calibration { trigger, ..calibration() });
+        let mut fired = Vec::new();
+        play(&mut s, 3.0, &ALL, &burst(500, 750), |_, _, _, r| {
+            fired.extend(r.iter().map(|r| r.fired.ns() / MS));
+        });
+        assert_eq!(fired, [500, 600, 700].map(|ms| ms + latency_ms));
+    }
 }
 
 #[test]
