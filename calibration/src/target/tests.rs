@@ -1,7 +1,16 @@
+use bowwave_core::{
+    event::{Picture, PixelFormat},
+    geometry::Lens,
+};
+use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::simulated::Random;
+use crate::{
+    capture::FindBoard,
+    simulated::Random,
+    so3::{exp, log},
+};
 
 fn turned(code: u64) -> u64 {
     let bit = |r: usize, c: usize| code >> (35 - (6 * r + c)) & 1;
@@ -215,4 +224,31 @@ proptest! {
             }
         }
     }
+}
+
+#[test]
+fn a_picture_tells_how_the_camera_is_turned_and_where_a_tag_is() {
+    let lens = Lens::pinhole(SIZE.0 as u32, SIZE.1 as u32, 0.9);
+    let camera_from_board = exp(DVec3::new(0.2, -0.3, 0.4)) * DQuat::from_rotation_x(std::f64::consts::PI);
+    let middle = camera_from_board * (board().size_m() / 2.0).extend(0.0);
+    let place = DVec3::new(0.0, 0.0, 0.17) - middle;
+    // Where the ray of a pixel meets the board's plane.
+    let (eye, back) = (-(camera_from_board.inverse() * place), camera_from_board.inverse());
+    let on_board = |pixel: DVec2| {
+        let ray = back * lens.unproject(pixel);
+        (eye - ray * (eye.z / ray.z)).truncate()
+    };
+    let codes = draw(&board(), on_board, SIZE, 2.0);
+    let rgb: Vec<u8> = codes.iter().flat_map(|code| [*code; 3]).collect();
+    let picture = Picture::new(PixelFormat::Rgb, lens.width, lens.height, rgb.into()).unwrap();
+    let found = BoardFinder::new(board()).find(&picture, &lens).unwrap();
+    let off = log(camera_from_board * found.board_from_camera).length();
+    // An edge drawn a sixth of a pixel off moves a corner by as much.
+    assert!(off < 3e-3 && found.sigma < 3e-3, "{off}, stated {}", found.sigma);
+    let tag = board().corners(6).iter().sum::<DVec2>() / 4.0;
+    let truth = lens.project(camera_from_board * tag.extend(0.0) + place).unwrap();
+    assert!(find_tag(&board(), 6, &picture).unwrap().distance(truth) < 0.3);
+    let black = Picture::black(PixelFormat::Rgb, lens.width, lens.height).unwrap();
+    assert_eq!(BoardFinder::new(board()).find(&black, &lens), None);
+    assert_eq!(find_tag(&board(), 6, &black), None);
 }
