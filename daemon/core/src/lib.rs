@@ -24,6 +24,7 @@ pub mod scene;
 pub mod score;
 pub mod sea;
 pub mod session;
+pub mod skyline;
 pub mod still;
 pub mod text;
 pub mod time;

@@ -20,7 +20,7 @@ impl Mask {
     }
 
     /// Whether the field at these shares of width and height is hidden.
-    fn hides(&self, x: f64, y: f64) -> bool {
+    pub(crate) fn hides(&self, x: f64, y: f64) -> bool {
         let column = ((x * self.width as f64) as usize).min(self.width - 1);
         let row = ((y * self.height as f64) as usize).min(self.height - 1);
         self.hidden.get(row * self.width + column).copied().unwrap_or(false)
