@@ -8,6 +8,7 @@ pub mod alignment;
 pub mod bench;
 pub mod front;
 pub mod horizon;
+pub mod karma;
 pub mod metric;
 pub mod page;
 pub mod parts;
