@@ -1,4 +1,5 @@
-//! A session that fuses rates and specific force levels itself by the horizon in the pictures of a made recording.
+//! A session that fuses rates and specific force levels itself by the horizon, and holds its heading by the sky, in the pictures of a made
+//! recording.
 
 use std::sync::Arc;
 
@@ -6,7 +7,7 @@ use bowwave_core::{
     attitude::Source,
     event::PixelFormat,
     scenario::Scenario,
-    session::{Session, Setup},
+    session::{SensorCounts, Session, Setup},
 };
 use glam::DVec3;
 use hw_sim::{
@@ -31,24 +32,32 @@ fn recipe() -> Recipe {
     }
 }
 
-#[test]
-fn up_comes_from_the_horizon_in_the_picture() {
+/// How long it is played, and until when it settles, seconds.
+const SECONDS: i64 = 60;
+const SETTLED: i64 = 25;
+
+/// By what up and heading were wrong in the pictures after it has settled, degrees; the gyro has a bias of `drift` deg/s about the vertical
+/// that the calibration does not know.
+fn played(recipe: &Recipe, drift: f64) -> (Vec<(f64, f64)>, SensorCounts) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("level.mcap");
-    make(&recipe(), &path, &mut |_, _| {}).unwrap();
-    let (seconds, settled) = (60, 25);
+    make(recipe, &path, &mut |_, _| {}).unwrap();
     let options = ReplayOptions {
-        duration_ns: Some((seconds + 1) * 1_000_000_000),
+        duration_ns: Some((SECONDS + 1) * 1_000_000_000),
         looped: true,
         ..ReplayOptions::default()
     };
     let mut replay = Replay::fast(&path, &options).unwrap();
-    let calibration = bowwave_calibration::parse(&replay.properties().calibration_toml, "recording").unwrap();
-    let lens = calibration.calibration.lens;
-    let scenario = format!("[mount]\neye_height_m = {:?}\n", recipe().eye_height_m);
+    let mut calibration =
+        bowwave_calibration::parse(&replay.properties().calibration_toml, "recording").unwrap().calibration;
+    // The unit's z points down.
+    calibration.gyro_bias += DVec3::Z * drift.to_radians();
+    calibration.gyro_bias_sigma = DVec3::splat(0.1f64.to_radians());
+    let lens = calibration.lens;
+    let scenario = format!("[mount]\neye_height_m = {:?}\n", recipe.eye_height_m);
     let mut session = Session::new(Setup {
         scenario: Scenario::parse(&scenario, "test").unwrap(),
-        calibration: calibration.calibration,
+        calibration,
         models: Arc::new([]),
         boat_models: Vec::new(),
         screen: (lens.width, lens.height),
@@ -57,25 +66,45 @@ fn up_comes_from_the_horizon_in_the_picture() {
     })
     .unwrap();
     let mut events = Vec::new();
-    let (mut sum, mut worst, mut count) = (0.0, 0.0f64, 0.0);
-    for frame in 1..=seconds * 10 {
+    let mut errors = Vec::new();
+    for frame in 1..=SECONDS * 10 {
         let time = replay.origin().plus_ns(frame * FRAME_NS);
         events.clear();
         replay.collect(time, &mut events).unwrap();
         let Some(view) = session.step(&events, time).view else { continue };
         let truth = replay.truth_at(view.mid_exposure).unwrap().world_from_camera;
-        if view.pose_known && frame > settled * 10 {
-            let found = view.scene.camera.world_from_camera;
-            let off = (found * (truth.inverse() * DVec3::Z)).truncate().length().to_degrees();
-            sum += off * off;
-            worst = worst.max(off);
-            count += 1.0;
+        if view.pose_known && frame > SETTLED * 10 {
+            let off = view.scene.camera.world_from_camera * truth.inverse();
+            let up = off * DVec3::Z;
+            errors.push((up.truncate().length().to_degrees(), (2.0 * off.z.atan2(off.w)).to_degrees()));
         }
     }
     replay.stop().unwrap();
-    let horizons = session.sensor_counts().horizons;
-    let rms = (sum / f64::max(count, 1.0)).sqrt();
+    (errors, session.sensor_counts())
+}
+
+#[test]
+fn up_comes_from_the_horizon_in_the_picture() {
+    let (errors, counts) = played(&recipe(), 0.0);
+    let (count, horizons) = (errors.len() as f64, counts.horizons);
+    let rms = (errors.iter().map(|e| e.0 * e.0).sum::<f64>() / count.max(1.0)).sqrt();
+    let worst = errors.iter().map(|e| e.0).fold(0.0, f64::max);
     println!("up errs by {rms:.3} deg rms, {worst:.3} at worst, over {count} pictures; {horizons:?}");
     assert!(count > 300.0 && horizons.taken > 450 && horizons.refused < 20, "{count} pictures; {horizons:?}");
     assert!(rms < 0.08 && worst < 0.2, "{rms:.3} deg rms, {worst:.3} at worst");
+}
+
+#[test]
+fn heading_is_held_by_the_sky_in_the_picture() {
+    let (errors, counts) = played(&Recipe { duration_s: SECONDS as f64 + 1.0, ..recipe() }, 0.05);
+    let headings = || errors.iter().map(|e| e.1);
+    let (first, last) = (headings().next().unwrap(), headings().last().unwrap());
+    let swing = headings().fold(f64::MIN, f64::max) - headings().fold(f64::MAX, f64::min);
+    println!(
+        "heading is off by {first:.3} deg, {last:.3} at the end, {swing:.3} between extremes; {:?}",
+        counts.skyline
+    );
+    // The gyro alone would drift by 1.75 degrees.
+    assert!(counts.skyline.taken > 400 && counts.skyline.refused < 40, "{:?}", counts.skyline);
+    assert!((last - first).abs() < 0.4 && swing < 0.4, "{first:.3} to {last:.3}, {swing:.3}");
 }

@@ -4,6 +4,7 @@ mod fleet;
 mod level;
 mod rounds;
 mod sensors;
+mod steady;
 mod watch;
 
 use std::sync::Arc;
@@ -35,6 +36,7 @@ pub use fleet::{Fleet, Vessel};
 pub use level::HorizonCounts;
 pub use rounds::{Ammunition, Launch, Rounds};
 pub use sensors::{SensorCounts, Sensors};
+pub use steady::SkylineCounts;
 pub use watch::SeaReport;
 use watch::SeaWatch;
 
@@ -258,7 +260,7 @@ impl Session {
             return Step { view: None, records: &self.records };
         };
         if picture_is_new {
-            self.sensors.level();
+            self.sensors.sight();
         }
         self.advance(video_time, frame_time);
         let pose_known = self.draw(video_time, frame_time, picture_is_new);

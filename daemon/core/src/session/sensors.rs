@@ -2,7 +2,10 @@
 
 use glam::{DQuat, DVec3};
 
-use super::level::{HorizonCounts, Level};
+use super::{
+    level::{HorizonCounts, Level},
+    steady::{SkylineCounts, Steady},
+};
 use crate::{
     attitude::{Attitude, AttitudeSettings, Source},
     calibration::Calibration,
@@ -39,6 +42,8 @@ pub struct SensorCounts {
     pub frames_wrong_size: u64,
     /// Horizons seen.
     pub horizons: HorizonCounts,
+    /// Headings by the sky.
+    pub skyline: SkylineCounts,
 }
 
 /// Sensors of one session.
@@ -48,6 +53,7 @@ pub struct Sensors {
     readout_ns: i64,
     lens: Lens,
     level: Level,
+    steady: Steady,
     clock: ClockMap,
     attitude: Attitude,
     last: Option<(DVec3, DVec3)>,
@@ -64,6 +70,7 @@ impl Sensors {
             readout_ns: calibration.readout_ns,
             lens: calibration.lens,
             level: Level::new(eye_height_m),
+            steady: Steady::new(eye_height_m, calibration.time_offset_sigma_ns as f64 * 1e-9),
             clock: ClockMap::new(),
             attitude: Attitude::new(
                 AttitudeSettings::new(source, calibration),
@@ -96,6 +103,7 @@ impl Sensors {
         if self.clock.restarts() != self.counts.imu_restarts {
             self.counts.imu_restarts = self.clock.restarts();
             self.attitude.restart();
+            self.steady.forget();
         }
         self.attitude.observe(time, sample);
     }
@@ -115,12 +123,14 @@ impl Sensors {
         true
     }
 
-    /// Looks for the horizon in the newest picture and corrects the orientation by it.
-    pub fn level(&mut self) {
+    /// Looks for horizon and sky in the newest picture and corrects the orientation by them.
+    pub fn sight(&mut self) {
         if let (Some(frame), Some(time)) = (&self.frame, self.video_time()) {
             let lens = self.lens_at(time);
             self.level.look(time, &frame.picture, &lens, &mut self.attitude);
+            self.steady.look(time, &frame.picture, &lens, &mut self.attitude);
             self.counts.horizons = self.level.counts();
+            self.counts.skyline = self.steady.counts();
         }
     }
 

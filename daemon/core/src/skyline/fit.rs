@@ -147,8 +147,9 @@ fn spread(sights: &[Sight], scratch: &mut Vec<f64>) -> Option<f64> {
     Some(*median / 1.1774)
 }
 
-/// Rotation vector of a small turn, radians.
+/// Rotation vector of the shorter way, radians; exact near nothing, where glam's own goes through an arc cosine.
 pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
-    let v = DVec3::new(q.x, q.y, q.z);
-    2.0 * v * (if q.w < 0.0 { -1.0 } else { 1.0 })
+    let (v, sign) = (DVec3::new(q.x, q.y, q.z), if q.w < 0.0 { -1.0 } else { 1.0 });
+    let sin = v.length();
+    if sin < 1e-12 { 2.0 * sign * v } else { v * (2.0 * sign * sin.atan2(q.w.abs()) / sin) }
 }

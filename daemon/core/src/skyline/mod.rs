@@ -29,20 +29,18 @@ use grid::{FIELD, Grid};
 use patch::{HALF, Patch};
 use pyramid::{LEVELS, Pyramid};
 
-/// Points that are followed in a picture.
-const POINTS: usize = 60;
-/// Points that are remembered, those out of view included.
-const POINTS_KEPT: usize = 160;
+/// For each point that is followed in a picture, so many are remembered, those out of view included.
+const KEPT: usize = 3;
 /// Fewer that agree are chance.
 const POINTS_LEAST: usize = 7;
-/// Below this share of [`POINTS`] others are sought.
-const POINTS_FEW: usize = POINTS * 3 / 4;
+/// Where fewer than this share of the points agree, others are sought.
+const FEW: f64 = 0.75;
 /// Fields that are searched for others in one picture; an anchor searches all.
 const FIELDS_A_LOOK: usize = 12;
 /// A patch that looks less like itself than this is not it.
-const LIKENESS_MIN: f32 = 0.8;
+const LIKENESS_MIN: f32 = 0.7;
 /// One that looks less like itself than this is taken anew where it is: clouds change their shape within seconds.
-const LIKENESS_RENEW: f32 = 0.9;
+const LIKENESS_RENEW: f32 = 0.8;
 /// Looks in a row that a point may be missed in.
 const MISSES_MAX: u8 = 3;
 /// A point that was out of view for longer than this is forgotten.
@@ -155,8 +153,9 @@ struct Point {
 }
 
 /// Follows the sky; keeps its memory from picture to picture.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Skyline {
+    points_most: usize,
     pyramid: Pyramid,
     grid: Grid,
     points: Vec<Point>,
@@ -189,10 +188,35 @@ struct Look {
     pixel: f64,
 }
 
+impl Default for Skyline {
+    fn default() -> Self {
+        Self::of_points(Self::POINTS)
+    }
+}
+
 impl Skyline {
+    /// Points that are followed in a picture, usually.
+    pub const POINTS: usize = 60;
+
     /// One that has not seen a picture.
     pub fn new() -> Self {
         Self::default()
+    }
+
+    /// One that follows so many points in a picture.
+    pub fn of_points(points: usize) -> Self {
+        Self {
+            points_most: points.clamp(POINTS_LEAST, 1000),
+            pyramid: Pyramid::default(),
+            grid: Grid::default(),
+            points: Vec::new(),
+            sights: Vec::new(),
+            places: Vec::new(),
+            taken: Vec::new(),
+            scratch: Vec::new(),
+            cursor: 0,
+            anchor: None,
+        }
     }
 
     /// What of the pictures shows the own ship or gun, from now on.
@@ -219,7 +243,7 @@ impl Skyline {
         // Coarse patches hang over the horizon.
         self.pyramid.fill(picture, rows.start..rows.end + FIELD);
         self.points.retain(|p| time.ns_since(p.seen) <= KEPT_NS);
-        self.points.drain(..self.points.len().saturating_sub(POINTS_KEPT));
+        self.points.drain(..self.points.len().saturating_sub(KEPT * self.points_most));
         let Some(anchor) = self.anchor else { return self.begin(&look) };
         let sought = self.seek(&look, anchor.turn);
         match self.agree(&look, &anchor, sought) {
@@ -256,7 +280,7 @@ impl Skyline {
     /// Makes this picture the anchor, where it has enough to hold on to.
     fn begin(&mut self, look: &Look) -> Result<YawSeen, NoYaw> {
         let before = self.points.len();
-        self.points.reserve((POINTS_KEPT + POINTS).saturating_sub(before));
+        self.points.reserve(((KEPT + 1) * self.points_most).saturating_sub(before));
         self.taken.clear();
         self.taken.resize(self.grid.sky.len(), false);
         self.tie_in(look, DQuat::IDENTITY, 0.0, usize::MAX);
@@ -347,7 +371,7 @@ impl Skyline {
         let variance = fit.covariance.z_axis.z + if weights > 0.0 { tied / weights } else { 0.0 };
         self.anchor = Some(Anchor { held: look.time, turn: fit.turn, ..*anchor });
         self.keep(look, fit);
-        if fit.inliers < POINTS_FEW {
+        if (fit.inliers as f64) < FEW * self.points_most as f64 {
             self.tie_in(look, fit.turn, variance, FIELDS_A_LOOK);
         }
         Ok(YawSeen {
@@ -396,7 +420,7 @@ impl Skyline {
     /// of the next ones in the next picture.
     fn tie_in(&mut self, look: &Look, turn: DQuat, variance: f64, fields_most: usize) {
         let count = self.grid.sky.len();
-        let mut room = POINTS.saturating_sub(self.taken.iter().filter(|t| **t).count());
+        let mut room = self.points_most.saturating_sub(self.taken.iter().filter(|t| **t).count());
         let mut searched = 0;
         for _ in 0..count {
             if room == 0 || searched == fields_most {

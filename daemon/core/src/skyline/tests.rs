@@ -140,7 +140,7 @@ fn another_scene_is_another_anchor() {
     let fresh: Vec<Time> = answers.iter().flatten().filter(|s| s.is_anchor()).map(|s| s.time).collect();
     assert!(matches!(fresh[..], [t] if t.ns_since(at(7)) > LOST_NS), "{fresh:?}");
     assert!(answers.last().unwrap().is_ok());
-    assert!(skyline.points.len() <= POINTS_KEPT + POINTS);
+    assert!(skyline.points.len() <= (KEPT + 1) * Skyline::POINTS);
 }
 
 proptest! {

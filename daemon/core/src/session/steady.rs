@@ -1,0 +1,118 @@
+//! Sky line, coast and clouds in the live picture hold the heading between aids.
+
+use crate::{
+    attitude::{Attitude, HeadingSeen},
+    event::Picture,
+    geometry::Lens,
+    skyline::{SkyView, Skyline},
+    time::Time,
+};
+
+/// The sky is looked at so often: at 60 deg/s nine tenths of it are still in view.
+const EVERY_NS: i64 = 100_000_000;
+
+/// What is anchored in turns by so much itself, as clouds do and as a ship with little way on sees it, rad/s. Ten knots abeam of what is 10 km
+/// off are six times as much; told that, the filter took a gyro's whole bias for the scene's drift.
+const DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
+
+/// By how much the change of the believed orientation since the last look is wrong at rest, about any axis, radians.
+const CHANGE_SIGMA: f64 = 2e-3;
+
+/// How fast the gun turns is told over so long.
+const TURN_NS: i64 = 20_000_000;
+
+/// Chi squared with one degree of freedom that a heading exceeds once in a thousand.
+const SURPRISE_MAX: f64 = 10.8;
+
+/// So many headings in a row that are not believed mean that it is the anchor that is wrong.
+const REFUSED_MAX: u32 = 20;
+
+/// What became of the headings by the sky of a session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SkylineCounts {
+    /// Taken in.
+    pub taken: u64,
+    /// Not believed.
+    pub refused: u64,
+    /// Pictures that were looked at and told none.
+    pub none: u64,
+    /// Pictures that became anchors: after the first one, what was held before was lost.
+    pub anchors: u64,
+}
+
+/// Looks at the sky in pictures, now and then.
+#[derive(Debug)]
+pub(super) struct Steady {
+    skyline: Skyline,
+    eye_height_m: f64,
+    time_sigma_s: f64,
+    next: Time,
+    refused_in_a_row: u32,
+    counts: SkylineCounts,
+}
+
+impl Steady {
+    /// Pictures' times are known to `time_sigma_s` seconds.
+    pub(super) fn new(eye_height_m: f64, time_sigma_s: f64) -> Self {
+        Self {
+            skyline: Skyline::new(),
+            eye_height_m,
+            time_sigma_s,
+            next: Time::MIN,
+            refused_in_a_row: 0,
+            counts: SkylineCounts::default(),
+        }
+    }
+
+    pub(super) const fn counts(&self) -> SkylineCounts {
+        self.counts
+    }
+
+    /// What was held is worth nothing any more, as when the unit has restarted.
+    pub(super) fn forget(&mut self) {
+        self.skyline.forget();
+    }
+
+    /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all.
+    pub(super) fn look(&mut self, time: Time, picture: &Picture, lens: &Lens, attitude: &mut Attitude) {
+        if time < self.next {
+            return;
+        }
+        let (Some(_), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return };
+        self.next = time.plus_ns(EVERY_NS);
+        // A wrong time is a wrong heading while the gun is trained.
+        let before = attitude.at(time.plus_ns(-TURN_NS)).map_or(then.world_from_imu, |b| b.world_from_imu);
+        let rate = before.angle_between(then.world_from_imu) / (TURN_NS as f64 * 1e-9);
+        let late = rate * self.time_sigma_s;
+        let view = SkyView {
+            lens: *lens,
+            eye_height_m: self.eye_height_m,
+            world_from_camera: then.world_from_imu * attitude.camera_from_imu().inverse(),
+            sigma: CHANGE_SIGMA + late,
+        };
+        let Ok(yaw) = self.skyline.look(time, picture, &view) else {
+            self.counts.none += 1;
+            return;
+        };
+        if yaw.is_anchor() {
+            self.counts.anchors += 1;
+            self.refused_in_a_row = 0;
+            attitude.anchor_heading(DRIFT);
+            return;
+        }
+        let variance = yaw.sigma * yaw.sigma + late * late;
+        match attitude.see_anchored_heading(&HeadingSeen { time, off: yaw.off, variance }, SURPRISE_MAX) {
+            Some(outcome) if outcome.taken => {
+                self.counts.taken += 1;
+                self.refused_in_a_row = 0;
+            }
+            _ => {
+                self.counts.refused += 1;
+                self.refused_in_a_row += 1;
+                if self.refused_in_a_row >= REFUSED_MAX {
+                    self.forget();
+                }
+            }
+        }
+    }
+}
