@@ -251,7 +251,7 @@ prop_compose! {
     fn calibration_file()(
         made in date(),
         texts in [text(20), text(20), text(20), text(20), text(20)],
-        sections in [provenance(), provenance(), provenance(), provenance(), provenance(), provenance()],
+        sections in [provenance(), provenance(), provenance(), provenance(), provenance(), provenance(), provenance()],
         calibration in calibration(),
     ) -> CalibrationFile {
         let [source, camera_name, camera_serial, imu_name, imu_serial] = texts;

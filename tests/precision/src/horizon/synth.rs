@@ -47,6 +47,16 @@ pub struct Shown {
     pub smear: usize,
     /// Seed.
     pub seed: u64,
+    /// Where the camera looks, clockwise, radians.
+    pub heading: f64,
+    /// How far wind has turned the clouds, clockwise, radians.
+    pub clouds_turned: f64,
+    /// How far the ships have gone, clockwise, radians.
+    pub ships_turned: f64,
+    /// Height of hills along the horizon, radians; nothing for none.
+    pub coast: f64,
+    /// Which picture of a series it is: noise is another in each.
+    pub picture: u64,
 }
 
 impl Shown {
@@ -68,6 +78,11 @@ impl Shown {
             barrel: false,
             smear: 0,
             seed,
+            heading: 0.0,
+            clouds_turned: 0.0,
+            ships_turned: 0.0,
+            coast: 0.0,
+            picture: 0,
         }
     }
 
@@ -109,7 +124,7 @@ impl Shown {
         [-roll.sin() * elevation.cos(), -roll.cos() * elevation.cos(), elevation.sin()]
     }
 
-    /// Elevation over the visible horizon, and azimuth, of a pixel's place, radians.
+    /// Elevation over the visible horizon, and azimuth clockwise from where heading is nothing, of a pixel's place, radians.
     fn angles(&self, x: f64, y: f64) -> (f64, f64) {
         let (d, u) = (self.ray(x, y), self.up());
         let [roll, _] = self.attitude;
@@ -118,7 +133,8 @@ impl Shown {
         let across: f64 = (0..3).map(|i| d[i] * right[i]).sum();
         // Bowditch: 1.76 minutes of arc by the root of the height in metres.
         let dip = (1.76 / 60.0 * self.eye_m.sqrt()).to_radians();
-        (sine.asin() + dip, across.atan2((1.0 - sine * sine - across * across).max(0.0).sqrt()))
+        let off_axis = across.atan2((1.0 - sine * sine - across * across).max(0.0).sqrt());
+        (sine.asin() + dip, self.heading + off_axis)
     }
 
     /// Luma codes, row by row.
@@ -132,7 +148,7 @@ impl Shown {
             light = smeared(&light, w, h, self.smear);
         }
         let noisy = |(i, code): (usize, &f64)| {
-            let key = i as u64 ^ self.seed.wrapping_mul(0x51_7cc1);
+            let key = i as u64 ^ self.seed.wrapping_mul(0x51_7cc1) ^ (self.picture << 40);
             let (a, b) = (hash(key, 1).max(1e-12), hash(key, 2));
             (code + self.noise * (-2.0 * a.ln()).sqrt() * (TAU * b).cos()).round().clamp(0.0, 255.0) as u8
         };
@@ -147,7 +163,7 @@ impl Shown {
         let pixel = 1.0 / self.lens.focal;
         let lift = self.ragged_px * pixel * 1.4 * noise(azimuth * 90.0, 3.0, self.seed ^ 6);
         let over = elevation - lift;
-        if let Some(code) = self.ship(elevation, azimuth) {
+        if let Some(code) = self.ship(elevation, azimuth).or_else(|| self.hill(elevation, azimuth)) {
             return code;
         }
         // A lens spreads an edge over about a pixel and a half.
@@ -163,8 +179,8 @@ impl Shown {
         // Clouds are flatter the nearer they are to the horizon.
         let height = (elevation + 0.03).ln() * 6.0;
         let octaves = [(1.0, 1.0), (2.3, 0.5), (5.1, 0.25)];
-        let cloud: f64 =
-            octaves.iter().map(|(f, a)| a * noise(azimuth * 7.0 * f, height * f, self.seed ^ 11)).sum();
+        let along = (azimuth - self.clouds_turned) * 7.0;
+        let cloud: f64 = octaves.iter().map(|(f, a)| a * noise(along * f, height * f, self.seed ^ 11)).sum();
         clear + self.contrast[0] * 1.3 * cloud
     }
 
@@ -202,9 +218,25 @@ impl Shown {
         radius * (down - (down * down - dip * dip).sqrt())
     }
 
+    /// Woods and rocks below a sky line of hills.
+    fn hill(&self, elevation: f64, azimuth: f64) -> Option<f64> {
+        if self.coast <= 0.0 {
+            return None;
+        }
+        let ridge: f64 = [(6.0, 0.5), (17.0, 0.3), (60.0, 0.15), (190.0, 0.05)]
+            .iter()
+            .map(|(f, a)| a * noise(azimuth * f, 1.5, self.seed ^ 41))
+            .sum();
+        let top = self.coast * (0.6 + ridge);
+        (elevation > 0.0 && elevation < top).then(|| {
+            let texture = noise(azimuth * 300.0, elevation * 500.0, self.seed ^ 42);
+            0.5 * self.codes[2] + 0.35 * self.codes[0] + 12.0 * texture
+        })
+    }
+
     fn ship(&self, elevation: f64, azimuth: f64) -> Option<f64> {
         (0..self.ships as u64).find_map(|i| {
-            let middle = (self.even(400 + i) - 0.5) * 1.1;
+            let middle = (self.even(400 + i) - 0.5) * 1.1 + self.ships_turned;
             let (half, height) = (0.01 + 0.05 * self.even(500 + i), 0.004 + 0.02 * self.even(600 + i));
             let inside = (azimuth - middle).abs() < half && elevation > -0.25 * height && elevation < height;
             inside.then(|| {

@@ -18,6 +18,7 @@ mod pacing;
 mod reflection;
 mod sea;
 mod shutter;
+mod skyline;
 mod target;
 mod wavefield;
 
@@ -55,6 +56,7 @@ pub const PARTS: &[Part] = &[
     Part { about: orientation::ABOUT, measure: orientation::measure },
     Part { about: fusion::ABOUT, measure: fusion::measure },
     Part { about: horizon::ABOUT, measure: horizon::measure },
+    Part { about: skyline::ABOUT, measure: skyline::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
     Part { about: drawn::ABOUT, measure: drawn::measure },
     Part { about: shutter::ABOUT, measure: shutter::measure },
