@@ -103,7 +103,7 @@ impl fmt::Display for Sheet {
 }
 
 /// An angle in milliradians and what it is in metres at [`RANGE_M`].
-fn at_range(radians: f64) -> String {
+pub fn at_range(radians: f64) -> String {
     format!("{:.2} mrad ({:.2} m at {RANGE_M:.0} m)", radians * 1e3, radians * RANGE_M)
 }
 

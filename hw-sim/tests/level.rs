@@ -1,6 +1,8 @@
 //! A session that fuses rates and specific force levels itself by the horizon, and holds its heading by the sky, in the pictures of a made
 //! recording.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::sync::Arc;
 
 use bowwave_core::{
@@ -98,7 +100,7 @@ fn up_comes_from_the_horizon_in_the_picture() {
 fn heading_is_held_by_the_sky_in_the_picture() {
     let (errors, counts) = played(&Recipe { duration_s: SECONDS as f64 + 1.0, ..recipe() }, 0.05);
     let headings = || errors.iter().map(|e| e.1);
-    let (first, last) = (headings().next().unwrap(), headings().last().unwrap());
+    let (first, last) = (headings().next().unwrap(), headings().next_back().unwrap());
     let swing = headings().fold(f64::MIN, f64::max) - headings().fold(f64::MAX, f64::min);
     println!(
         "heading is off by {first:.3} deg, {last:.3} at the end, {swing:.3} between extremes; {:?}",

@@ -148,12 +148,13 @@ fn orient(lens: &Lens, corners: &[Corner]) -> Option<(BoardPose, f64)> {
 mod tests {
     use super::*;
     use crate::{simulated::Random, so3::log};
+    use bowwave_core::geometry::Distortion;
 
     #[test]
     fn the_pose_is_found_within_its_own_deviation() {
         let (target, mut random) = (Target::A4, Random::new(3));
         let mut lens = Lens::pinhole(1280, 720, 1.0);
-        lens.radial = DVec2::new(-0.12, 0.03);
+        lens.distortion = Distortion::radial_tangential(DVec2::new(-0.12, 0.03), DVec2::ZERO);
         let (mut squares, mut count) = (0.0, 0.0);
         for _ in 0..200 {
             let camera_from_board =

@@ -8,9 +8,9 @@ use bowwave_calibration::{
     alignment::Grade,
     camera::{CELLS, Camera, Evidence, Model, View, solve},
     parse,
+    sheet::at_range,
     target::varied,
 };
-use bowwave_core::geometry::Lens;
 use bowwave_import::{ImportOptions, assumed};
 use serde_json::json;
 
@@ -19,8 +19,6 @@ use crate::{cli::CalibrateCamera, import::today, outcome::Outcome};
 
 /// Most pictures that the lens is solved from: more take longer and tell nothing new.
 const USED_MOST: usize = 40;
-/// Range at which errors are said in metres.
-const RANGE_M: f64 = 500.0;
 
 /// Finds the lens, says how good it is, and writes it.
 pub fn run(arguments: &CalibrateCamera) -> Result<Outcome> {
@@ -53,17 +51,11 @@ pub fn run(arguments: &CalibrateCamera) -> Result<Outcome> {
         }
         _ => {}
     }
-    let Some(lens) = camera.lens() else {
-        bail!(
-            "the lens is a fisheye, which a calibration file cannot hold yet; nothing was written. Use a lens of less than 100 deg, \
-             or another mode of the camera"
-        )
-    };
     let passed = camera.grade() > Grade::Poor;
     if arguments.dry_run {
         eprintln!("nothing was written");
     } else if passed || arguments.accept_poor {
-        let file = with_lens(former(arguments, &looked, today)?, &camera, lens, today);
+        let file = with_lens(former(arguments, &looked, today)?, &camera, today);
         file.write(&arguments.out)?;
         eprintln!("{}: the lens is written; all else is as it was", arguments.out.display());
     } else {
@@ -87,8 +79,8 @@ fn former(arguments: &CalibrateCamera, looked: &Looked, today: Date) -> Result<C
 }
 
 /// The file with another lens.
-fn with_lens(mut file: CalibrationFile, camera: &Camera, lens: Lens, today: Date) -> CalibrationFile {
-    file.calibration.lens = lens;
+fn with_lens(mut file: CalibrationFile, camera: &Camera, today: Date) -> CalibrationFile {
+    file.calibration.lens = camera.lens();
     file.calibration.focal_sigma_px = camera.focal_sigma_px();
     file.made = today;
     let how = format!(
@@ -145,12 +137,14 @@ fn evidence(camera: &Camera) -> String {
     }
 }
 
-/// An angle in milliradians and what it is in metres at [`RANGE_M`].
-fn at_range(radians: f64) -> String {
-    if !radians.is_finite() {
-        return "not known: the lens folds back before a corner of the picture".to_owned();
+/// How uncertain the picture's edge is.
+fn at_edge(camera: &Camera) -> String {
+    let sigma = camera.edge_sigma();
+    if sigma.is_finite() {
+        format!("{}, one sigma", at_range(sigma))
+    } else {
+        "not known: the lens folds back before a corner of the picture".to_owned()
     }
-    format!("{:.2} mrad ({:.2} m at {RANGE_M:.0} m)", radians * 1e3, radians * RANGE_M)
 }
 
 fn as_text(camera: &Camera, looked: &Looked) -> String {
@@ -176,7 +170,7 @@ fn as_text(camera: &Camera, looked: &Looked) -> String {
             format!("{cx:.2} +- {scx:.2}, {cy:.2} +- {scy:.2} px of {}x{}", looked.size.0, looked.size.1),
         ),
         ("left over", format!("{:.2} px", camera.sigma_px)),
-        ("uncertain at the edge", format!("{}, one sigma", at_range(camera.edge_sigma()))),
+        ("uncertain at the edge", at_edge(camera)),
         ("tilt of the board", format!("{:.0} to {:.0} deg", tilt[0], tilt[1])),
         ("covered", format!("{:.0} % of the picture", camera.coverage.share * 100.0)),
     ];

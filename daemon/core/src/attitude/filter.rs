@@ -168,6 +168,11 @@ impl Filter {
         self.mounting
     }
 
+    /// By how much the horizon stands higher than geometry has it, radians.
+    pub(super) fn dip(&self) -> f64 {
+        self.dip
+    }
+
     /// Covariance of the turn of the world, rad^2.
     pub(super) fn turn_covariance(&self) -> DMat3 {
         let p = &self.covariance;

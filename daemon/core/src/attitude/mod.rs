@@ -195,6 +195,16 @@ impl Attitude {
         }
     }
 
+    /// Rotation from the camera's axes to the world's with the unit as in `world_from_imu`, for what is drawn: refraction is laid on the
+    /// camera, so that the horizon that is seen lies where the one that is drawn about would.
+    pub fn world_from_camera(&self, world_from_imu: DQuat) -> DQuat {
+        let world_from_camera = world_from_imu * self.camera_from_imu().inverse();
+        let State::Running(running) = &self.state else { return world_from_camera };
+        let ahead = world_from_camera * DVec3::Z;
+        let right = ahead.cross(DVec3::Z).normalize_or_zero();
+        (DQuat::from_scaled_axis(right * -running.filter.dip()) * world_from_camera).normalize()
+    }
+
     /// Takes in where a camera saw up, unless that differs by more than `limit` (chi squared with two degrees of freedom) from what
     /// is known. `None` where nothing is known of that time, or the unit's own estimate is used.
     pub fn see_up(&mut self, seen: &UpSeen, limit: f64) -> Option<Outcome> {
@@ -505,6 +515,9 @@ mod tests {
             let seen = UpSeen { time: now, up_camera: up(now), covariance };
             assert!(fused.see_up(&seen, 13.8).unwrap().taken);
         }
+        // What is drawn follows the horizon wholly, though a part of what differs may be refraction.
+        let drawn = fused.world_from_camera(fused.at(now).unwrap().world_from_imu);
+        assert!((drawn * up(now)).truncate().length() < 2e-4, "{}", drawn * up(now));
         assert!(error(&fused) < 0.1, "{}", error(&fused));
         let deviations = fused.covariance().unwrap();
         assert!((0.0..0.06f64.to_radians().powi(2)).contains(&deviations.x_axis.x), "{deviations}");

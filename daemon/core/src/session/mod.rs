@@ -21,7 +21,7 @@ use crate::{
     light::LightMeter,
     model::{Model, ModelId},
     plan::{Needs, ScenePlan, sea_reflects},
-    pose::{NoPose, OrientationAt, STALE_NS, camera_pose},
+    pose::{NoPose, OrientationAt, STALE_NS},
     scenario::Scenario,
     scene::{Hud, Pass, RoundView, Scene, Status, Water},
     score::{NotScored, Outcome, ShotRecord},
@@ -364,7 +364,10 @@ impl Session {
 
     fn camera(&self, orientation: Result<OrientationAt, NoPose>) -> Option<CameraPose> {
         let world_from_imu = orientation.ok()?.world_from_imu;
-        Some(camera_pose(self.sensors.camera_from_imu(), world_from_imu, self.setup.scenario.eye_height_m))
+        Some(CameraPose {
+            world_from_camera: self.sensors.world_from_camera(world_from_imu),
+            position: DVec3::Z * self.setup.scenario.eye_height_m,
+        })
     }
 
     fn count_records(&mut self) {

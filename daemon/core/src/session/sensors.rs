@@ -134,9 +134,9 @@ impl Sensors {
         }
     }
 
-    /// Rotation from the inertial unit's axes to the camera's, as it is known by now.
-    pub fn camera_from_imu(&self) -> DQuat {
-        self.attitude.camera_from_imu()
+    /// Rotation from the camera's axes to the world's for what is drawn, with the unit as in `world_from_imu`.
+    pub fn world_from_camera(&self, world_from_imu: DQuat) -> DQuat {
+        self.attitude.world_from_camera(world_from_imu)
     }
 
     /// The lens of a picture exposed at `time`: with how the camera turned while a rolling shutter read it.

@@ -258,11 +258,18 @@ impl Skyline {
         let scale = full
             / DVec2::new(f64::from(view.lens.width), f64::from(view.lens.height))
             / self.pyramid.reduction as f64;
-        let lens = Lens { focal: view.lens.focal * scale, centre: view.lens.centre * scale, ..view.lens };
+        let lens = Lens {
+            width: (f64::from(view.lens.width) * scale.x).round() as u32,
+            height: (f64::from(view.lens.height) * scale.y).round() as u32,
+            focal: view.lens.focal * scale,
+            centre: view.lens.centre * scale,
+            ..view.lens
+        };
         let q = view.world_from_camera;
         let sensible = lens.focal.min_element() > 1.0
             && lens.focal.max_element() < 1e6
-            && [lens.centre, lens.radial, lens.tangential].iter().all(|v| v.is_finite())
+            && lens.centre.is_finite()
+            && lens.distortion.is_finite()
             && q.is_finite()
             && (0.5..2.0).contains(&q.length())
             && view.sigma.is_finite()

@@ -1,13 +1,19 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::{event::PixelFormat, geometry::look};
+use crate::{
+    event::PixelFormat,
+    geometry::{Distortion, look},
+};
 
 const SIZE: (u32, u32) = (640, 360);
 const EYE_M: f64 = 6.0;
 
 fn lens() -> Lens {
-    Lens { radial: DVec2::new(-0.15, 0.02), ..Lens::pinhole(SIZE.0, SIZE.1, 1.1) }
+    Lens {
+        distortion: Distortion::radial_tangential(DVec2::new(-0.15, 0.02), DVec2::ZERO),
+        ..Lens::pinhole(SIZE.0, SIZE.1, 1.1)
+    }
 }
 
 /// Evenly spread numbers from 0 to 1, by place.
@@ -157,7 +163,11 @@ proptest! {
     ) {
         let mut skyline = Skyline::new();
         skyline.set_mask(Mask::new(3, 2, vec![false, true, false, false, false, false]));
-        let lens = Lens { radial: DVec2::new(k1, 0.0), focal: DVec2::splat(focal), ..Lens::pinhole(width, height, 1.0) };
+        let lens = Lens {
+            distortion: Distortion::radial_tangential(DVec2::new(k1, 0.0), DVec2::ZERO),
+            focal: DVec2::splat(focal),
+            ..Lens::pinhole(width, height, 1.0)
+        };
         for (i, (azimuth, elevation, roll)) in turns.into_iter().enumerate() {
             for format in [PixelFormat::Rgb, PixelFormat::Yuyv, PixelFormat::Nv12] {
                 let bytes: Vec<u8> = (0..format.byte_len(width, height))

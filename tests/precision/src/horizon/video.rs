@@ -17,8 +17,11 @@ const DRONE_M: f64 = 40.0;
 /// The clip's place among the public recordings.
 pub const KARMA: &str = "camera_imu/gopro_karma/karma.mp4";
 
+/// When a picture was taken, and its bytes.
+pub type Timed = (Time, Vec<u8>);
+
 /// Time on the container's clock and JPEG of all pictures. None, with a word of it, where clip or ffmpeg is absent.
-pub fn karma_pictures() -> Result<Option<Vec<(Time, Vec<u8>)>>> {
+pub fn karma_pictures() -> Result<Option<Vec<Timed>>> {
     let Some(video) = recorded::find(KARMA) else { return Ok(None) };
     let folder = tempfile::tempdir().context("no folder for the recording")?;
     let recording = folder.path().join("karma.mcap");

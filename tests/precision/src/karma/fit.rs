@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use bowwave_core::{
     event::ImuSample,
-    geometry::Lens,
+    geometry::{Distortion, Lens},
     time::{NS_PER_S, Time},
 };
 use bowwave_import::gyro::GyroPath;
@@ -58,11 +58,22 @@ pub struct Unknowns {
 }
 
 impl Unknowns {
+    /// The lens's k1 and k2.
+    pub fn radial(&self) -> DVec2 {
+        match self.lens.distortion {
+            Distortion::RadialTangential(d) => d.radial(),
+            _ => DVec2::ZERO,
+        }
+    }
+
     fn plus(&self, step: &Vector) -> Self {
         let three = |i: usize| DVec3::new(step[i], step[i + 1], step[i + 2]);
         let lens = Lens {
             focal: self.lens.focal * step[FOCAL].exp(),
-            radial: self.lens.radial + DVec2::new(step[RADIAL], step[RADIAL + 1]),
+            distortion: Distortion::radial_tangential(
+                self.radial() + DVec2::new(step[RADIAL], step[RADIAL + 1]),
+                DVec2::ZERO,
+            ),
             ..self.lens
         };
         Self {

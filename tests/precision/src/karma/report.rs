@@ -222,9 +222,9 @@ fn describe(name: &str, found: &Found) {
         found.sigma(READOUT) * 1e3,
         lens.focal.x,
         lens.focal.x * found.sigma(FOCAL),
-        lens.radial.x,
+        found.at.radial().x,
         found.sigma(RADIAL),
-        lens.radial.y,
+        found.at.radial().y,
         found.sigma(RADIAL + 1),
     );
     println!(

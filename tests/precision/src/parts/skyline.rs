@@ -5,7 +5,7 @@ use std::sync::Arc;
 use anyhow::{Context as _, Result};
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    geometry::{Lens, look},
+    geometry::{Distortion, Lens, look},
     skyline::{SkyView, Skyline},
     time::Time,
 };
@@ -60,8 +60,11 @@ impl Series {
         let pictures = drawn.collect::<Result<Vec<_>>>()?;
         let first = shown(0.0);
         let plain = Lens::pinhole(first.size.0 as u32, first.size.1 as u32, 1.0);
-        let lens =
-            Lens { focal: DVec2::splat(first.lens.focal), radial: DVec2::from(first.lens.radial), ..plain };
+        let lens = Lens {
+            focal: DVec2::splat(first.lens.focal),
+            distortion: Distortion::radial_tangential(DVec2::from(first.lens.radial), DVec2::ZERO),
+            ..plain
+        };
         Ok(Self { lens, eye_m: first.eye_m, pictures })
     }
 
