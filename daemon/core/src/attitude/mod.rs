@@ -136,6 +136,8 @@ struct Running {
     /// The newest rate less the calibrated bias, and the one before with its distance in time.
     rate: DVec3,
     before: Option<(DVec3, i64)>,
+    /// The largest rate so far on each axis.
+    fastest: DVec3,
     inclined_s: f64,
 }
 
@@ -305,7 +307,15 @@ impl Attitude {
                 );
                 let last = OrientationSample { time, world_from_imu, rate };
                 let filter = Filter::new(self.settings.noise, self.settings.inclination.tau_accel_s);
-                let running = Running { inclination, filter, last, rate, before: None, inclined_s: 0.0 };
+                let running = Running {
+                    inclination,
+                    filter,
+                    last,
+                    rate,
+                    before: None,
+                    fastest: DVec3::ZERO,
+                    inclined_s: 0.0,
+                };
                 self.state = State::Running(Box::new(running));
                 Some(last)
             }
@@ -331,7 +341,7 @@ impl Running {
                 turn_between(even.map(|(w, _)| w), self.rate, rate, dt_s)
             }
         };
-        if is_clipped(self.rate, rate) {
+        if self.is_clipped(rate) {
             self.filter.miss(rate.length() * CLIPPED_SHARE * dt_s);
         }
         self.before = Some((self.rate, dt_ns));
@@ -352,15 +362,19 @@ impl Running {
         })
     }
 
+    /// Whether the gyro stands at its range: on one axis as fast as ever, and exactly as fast as before, which noise would not let it be.
+    fn is_clipped(&mut self, rate: DVec3) -> bool {
+        let size = rate.abs();
+        self.fastest = self.fastest.max(size);
+        let stands = |axis: usize| {
+            size[axis] > CLIPPED_LEAST && size[axis] >= self.fastest[axis] && rate[axis] == self.rate[axis]
+        };
+        stands(0) || stands(1) || stands(2)
+    }
+
     fn turn(&mut self, turn: DQuat) {
         self.last.world_from_imu = (turn * self.last.world_from_imu).normalize();
     }
-}
-
-/// Whether a gyro stands at its range: fast, and on one axis exactly as fast as before, which noise would not let it be.
-fn is_clipped(before: DVec3, rate: DVec3) -> bool {
-    let stands = |axis: usize| rate[axis].abs() > CLIPPED_LEAST && rate[axis] == before[axis];
-    stands(0) || stands(1) || stands(2)
 }
 
 /// Turn over the `h` seconds from rate `from` to rate `to`, a scaled axis in the body's frame: the integral of the rate and the
