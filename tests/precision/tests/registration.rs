@@ -24,7 +24,7 @@ fn a_gun_that_is_swung_at_40_deg_s_registers() {
     assert!(found.iter().all(|e| e.whole.len() > 100), "too few frames");
     assert!(rms < 2.0 && p99 < 4.0, "the unit's own: {rms} px rms, p99 {p99}");
     // Its heading starts with the unit's own error, and drifts until something aids it.
-    assert!(up < 1.5 && up_p99 < 3.0, "fused, up alone: {up} px rms, p99 {up_p99}");
+    assert!(up < 2.0 && up_p99 < 4.0, "fused, up alone: {up} px rms, p99 {up_p99}");
 }
 
 #[test]

@@ -1,0 +1,192 @@
+use super::*;
+use crate::geometry::look;
+use proptest::prelude::*;
+
+fn sample(rate: DVec3, accel: DVec3) -> ImuSample {
+    ImuSample { arrival: Time::from_ns(0), device_time_ns: 0, rate, accel, world_from_imu: None }
+}
+
+fn attitude(source: Source, gyro_bias: DVec3) -> Attitude {
+    let settings =
+        AttitudeSettings { source, rate: RateKind::Instant, inclination: Settings::GUN, noise: Noise::USUAL };
+    Attitude::new(settings, gyro_bias, DQuat::IDENTITY)
+}
+
+proptest! {
+    #[test]
+    fn levelling_finds_elevation_and_roll(el in -1.4..1.4f64, roll in -3.0..3.0f64) {
+        // Camera axes serve as the unit's axes.
+        let truth = look(0.0, el, roll);
+        let q = level(truth.inverse() * DVec3::Z * 9.81, DQuat::IDENTITY);
+        prop_assert!(q.angle_between(truth) < 1e-6, "{}", q.angle_between(truth));
+    }
+}
+
+/// Orientation about a tilt that precesses: the worst case for integrating rates axis by axis.
+fn coning(t: f64) -> DQuat {
+    DQuat::from_rotation_z(0.5 * t) * DQuat::from_rotation_x(0.3) * DQuat::from_rotation_z(2.0 * t)
+}
+
+fn coning_rate(t: f64) -> DVec3 {
+    let h = 1e-5;
+    let turn = coning(t - h).inverse() * coning(t + h);
+    DVec3::new(turn.x, turn.y, turn.z) * (turn.w.signum() / h)
+}
+
+/// What a unit in that motion measures at 200 Hz, and by which angle up was wrong after `settle_s`, at most.
+fn worst_tilt(
+    attitude: &mut Attitude,
+    seconds: f64,
+    settle_s: f64,
+    sense: impl Fn(f64, ImuSample) -> ImuSample,
+) -> f64 {
+    let mut worst: f64 = 0.0;
+    for i in 0..(seconds * 200.0) as i64 {
+        let time = Time::from_ns(i * 5_000_000);
+        let t = i as f64 * 0.005;
+        let exact = sample(coning_rate(t), coning(t).inverse() * DVec3::Z * 9.806_65);
+        if let Some(o) = attitude.observe(time, &sense(t, exact)) {
+            assert!((o.world_from_imu.length() - 1.0).abs() < 1e-12);
+            let up = o.world_from_imu * (coning(t).inverse() * DVec3::Z);
+            worst = if t > settle_s { worst.max(up.truncate().length()) } else { worst };
+        }
+    }
+    worst.to_degrees()
+}
+
+#[test]
+fn integrates_a_coning_motion() {
+    let h = 0.005;
+    let mut q = coning(0.0);
+    for i in 0..200 * 60 {
+        let t = f64::from(i) * h;
+        let before = (i > 0).then(|| coning_rate(t - h));
+        q *= DQuat::from_scaled_axis(turn_between(before, coning_rate(t), coning_rate(t + h), h));
+    }
+    let off = q.inverse() * coning(60.0);
+    assert!(DVec3::new(off.x, off.y, off.z).length() < 1e-5, "{off}");
+}
+
+#[test]
+fn up_is_found_though_the_gyro_has_a_bias_and_the_gun_fires() {
+    let bias = DVec3::new(1.7e-3, -2e-3, 1e-3);
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let tilt = worst_tilt(&mut fused, 90.0, 30.0, |_, s| ImuSample { rate: s.rate + bias, ..s });
+    assert!(tilt < 0.15, "{tilt} deg");
+    // Recoil: 5 ms of 30 g to one side, ten times a second.
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let tilt = worst_tilt(&mut fused, 60.0, 20.0, |t, s| {
+        let fires = t > 30.0 && t < 40.0 && (t * 200.0).round() as i64 % 20 == 0;
+        let kick = if fires { DVec3::X * 300.0 } else { DVec3::ZERO };
+        ImuSample { rate: s.rate, accel: s.accel + kick, ..s }
+    });
+    assert!(tilt < 0.3, "{tilt} deg");
+}
+
+#[test]
+fn a_horizon_is_believed_where_it_can_be_true() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    // A unit that feels gravity a third of a degree wrong, and a camera that sees the horizon.
+    let wrong = DQuat::from_rotation_x(0.35f64.to_radians());
+    worst_tilt(&mut fused, 60.0, 0.0, |t, s| ImuSample {
+        accel: coning(t).inverse() * (wrong * (coning(t) * s.accel)),
+        ..s
+    });
+    let now = Time::from_ns(11_990 * 5_000_000);
+    let at = |time: Time| coning(time.ns() as f64 * 1e-9);
+    let covariance = DMat3::IDENTITY * 0.03f64.to_radians().powi(2);
+    let up = |time: Time| at(time).inverse() * DVec3::Z;
+    let found = |fused: &Attitude| fused.newest().and_then(|t| fused.at(t).ok()).unwrap().world_from_imu;
+    let error =
+        |fused: &Attitude| (found(fused) * up(fused.newest().unwrap())).truncate().length().to_degrees();
+    assert!(error(&fused) > 0.2, "{}", error(&fused));
+    let shore = DQuat::from_rotation_y(0.2) * up(now);
+    let seen = UpSeen { time: now, up_camera: shore, covariance };
+    assert!(!fused.see_up(&seen, 13.8).unwrap().taken);
+    assert!(error(&fused) > 0.2);
+    for _ in 0..10 {
+        let seen = UpSeen { time: now, up_camera: up(now), covariance };
+        assert!(fused.see_up(&seen, 13.8).unwrap().taken);
+    }
+    // What is drawn follows the horizon wholly, though a part of what differs may be refraction.
+    let drawn = fused.world_from_camera(fused.at(now).unwrap().world_from_imu);
+    assert!((drawn * up(now)).truncate().length() < 2e-4, "{}", drawn * up(now));
+    assert!(error(&fused) < 0.1, "{}", error(&fused));
+    // A horizon says up no better than refraction lets it.
+    let deviations = fused.covariance().unwrap();
+    assert!((0.0..0.07f64.to_radians().powi(2)).contains(&deviations.x_axis.x), "{deviations}");
+    let early = UpSeen { time: Time::from_ns(0), up_camera: DVec3::Y, covariance };
+    assert_eq!(fused.see_up(&early, 13.8), None);
+    let broken = UpSeen { time: now, up_camera: DVec3::NAN, covariance };
+    assert!(!fused.see_up(&broken, 13.8).unwrap().taken);
+}
+
+/// By what the heading found is wrong at its newest time, radians.
+fn heading_error(fused: &Attitude) -> f64 {
+    let time = fused.newest().unwrap();
+    let off = coning(time.ns() as f64 * 1e-9) * fused.at(time).unwrap().world_from_imu.inverse();
+    2.0 * (off.z / off.w).atan()
+}
+
+#[test]
+fn a_heading_is_set_and_held_by_what_was_anchored() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let bias = |_: f64, s: ImuSample| ImuSample { rate: s.rate + DVec3::Z * 2e-3, ..s };
+    worst_tilt(&mut fused, 60.0, 0.0, bias);
+    assert!(fused.set_heading(heading_error(&fused), 1e-3));
+    assert!(heading_error(&fused).abs() < 1e-9);
+    let deviation = |fused: &Attitude| fused.covariance().unwrap().z_axis.z.sqrt();
+    assert!((deviation(&fused) - 1e-3).abs() < 1e-9);
+    assert!(fused.anchor_heading(0.0));
+    // What is anchored in tells of changes only: it makes nothing surer than the heading was.
+    let time = fused.newest().unwrap();
+    let seen = |off| HeadingSeen { time, off, variance: 1e-8 };
+    assert!(fused.see_anchored_heading(&seen(2e-5), 10.8).unwrap().taken);
+    assert!(deviation(&fused) > 0.99e-3, "{}", deviation(&fused));
+    assert!(!fused.see_anchored_heading(&seen(0.1), 10.8).unwrap().taken, "another island");
+    assert!(fused.see_heading(&seen(1e-3), 10.8).unwrap().taken);
+    assert!(deviation(&fused) < 2e-4, "{}", deviation(&fused));
+    assert!((heading_error(&fused) + 1e-3).abs() < 1e-4, "{}", heading_error(&fused));
+    let broken = HeadingSeen { off: f64::NAN, ..seen(0.0) };
+    assert!(!fused.see_heading(&broken, 10.8).unwrap().taken);
+}
+
+#[test]
+fn fused_it_starts_at_the_units_own_heading() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let truth = look(2.5, 0.2, 0.1);
+    let mut still = sample(DVec3::ZERO, truth.inverse() * DVec3::Z * 9.806_65);
+    // Its inclination is five degrees wrong, and is not taken.
+    still.world_from_imu = Some(DQuat::from_rotation_x(0.09) * truth);
+    let found = (0..100).filter_map(|i| fused.observe(Time::from_ns(i * 5_000_000), &still)).last().unwrap();
+    assert!(
+        found.world_from_imu.angle_between(truth) < 0.02,
+        "{}",
+        found.world_from_imu.angle_between(truth)
+    );
+    assert!((found.world_from_imu * (truth.inverse() * DVec3::Z)).truncate().length() < 1e-3);
+}
+
+#[test]
+fn after_a_gap_it_is_levelled_anew() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let at = |ms: i64| Time::from_ns(ms * 1_000_000);
+    let still = sample(DVec3::ZERO, DVec3::Z * 9.8);
+    for i in 0..100 {
+        fused.observe(at(i * 5), &still);
+    }
+    assert!(fused.observe(at(700), &still).is_some(), "200 ms are bridged");
+    assert!(fused.observe(at(1800), &still).is_none(), "1.1 s are not");
+    assert!(fused.observe(at(1700), &still).is_none(), "nor is a time before");
+    assert!((0..100).any(|i| fused.observe(at(2000 + i * 5), &still).is_some()));
+}
+
+#[test]
+fn the_units_own_orientation_is_taken_as_it_is() {
+    let q = look(1.0, 0.2, 0.1);
+    let mut s = sample(DVec3::X, DVec3::Z);
+    s.world_from_imu = Some(q);
+    let o = attitude(Source::Auto, DVec3::X).observe(Time::from_ns(5), &s).unwrap();
+    assert!(o.world_from_imu.angle_between(q) < 1e-9);
+    assert_eq!(o.rate, DVec3::ZERO);
+}
