@@ -67,6 +67,9 @@ const METHODS: [(&str, &str, Method); 7] = [
     ("symmetry", "25 x 25 pixels", |t, p| by(t, p, Refinement::Symmetry(12.0))),
 ];
 
+/// Why the default is what it is where another one is no worse.
+const TIE: &str = "25 x 25 pixels err by two hundredths less or more, as the lens bends, and need more room around a corner";
+
 fn is_ours(method: &str, setting: &str) -> bool {
     method == "symmetry" && setting.starts_with("17")
 }
@@ -151,9 +154,9 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         let ways = METHODS.map(|(method, setting, find)| {
             let (error, lost) = errors(&target, &pictures, find);
             let work = move || first.iter().map(|p| find(&target, p)).collect::<Vec<_>>();
-            Way::new(method, setting, error, 1, work)
-                .default_if(is_ours(method, setting))
-                .note(format!("{lost:.1} % of the tags not found"))
+            let way =
+                Way::new(method, setting, error, 1, work).note(format!("{lost:.1} % of the tags not found"));
+            if is_ours(method, setting) { way.default_although(TIE) } else { way }
         });
         bench.scene(scene, "px", 0.002, ways.into());
         if usual.is_empty() {
