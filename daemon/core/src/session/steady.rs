@@ -12,7 +12,7 @@ use crate::{
 const EVERY_NS: i64 = 100_000_000;
 
 /// What is anchored in turns by so much itself, as clouds do and as a ship with little way on sees it, rad/s. Ten knots abeam of what is 10 km
-/// off are six times as much; told that, the filter took a gyro's whole bias for the scene's drift.
+/// off are six times as much. With as much as that a made recording's heading was held no better than by its gyro.
 const DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
 
 /// By how much the change of the believed orientation since the last look is wrong at rest, about any axis, radians.

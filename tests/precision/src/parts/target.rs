@@ -24,7 +24,7 @@ pub const ABOUT: About = About {
              in the product's; smaller and larger windows of the product's way; the product on the picture at half its size",
     why: "the place about which the picture is most like itself turned by half a turn: it needs no model of blur and errs least of all \
           windows that small tags allow. It takes hundredths of a second, some tens of times in a calibration. The crate aprilgrid 0.8, \
-          tried apart, erred .03 to .09 px, saw nothing of 40 codes of contrast, and overflowed its stack on a checked pattern",
+          tried apart, saw nothing of 40 codes of contrast, and overflowed its stack on a checked pattern",
 };
 
 type Found = Vec<(usize, [DVec2; 4])>;
