@@ -9,7 +9,7 @@ use bowwave_core::{
     attitude::{Attitude, AttitudeSettings, Source},
     clock::ClockMap,
     geometry::{Distortion, Lens, horizon_dip},
-    pose::{camera_pose, registration_error_px},
+    pose::registration_error_px,
 };
 use bowwave_record::{Entry, RecordingReader};
 use glam::{DVec2, DVec3};
@@ -158,8 +158,7 @@ fn the_default_registers_within_two_pixels() {
             attitude.observe(time, &s);
         }
         let at = attitude.at(stamp.plus_ns(calibration.time_offset_ns)).unwrap();
-        let used = camera_pose(calibration.camera_from_imu, at.world_from_imu, recipe.eye_height_m)
-            .world_from_camera;
+        let used = attitude.camera(at.world_from_imu);
         let truth = motion.at(stamp.secs_since(START) + recipe.exposure_delay_s()).pose.world_from_camera;
         let error = registration_error_px(&lens, truth, used).unwrap();
         sum += error * error;

@@ -1,11 +1,12 @@
 //! `bowwave hits`: the rounds of a journal as a table, CSV or JSON.
 
-use std::io::Write;
-
 use anyhow::{Context, Result, bail};
 use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots};
 
-use crate::cli::{Format, Hits};
+use crate::{
+    cli::{Format, Hits},
+    stdout,
+};
 
 /// Name of the journal in a run's folder.
 pub const JOURNAL: &str = "hits.sqlite";
@@ -40,25 +41,10 @@ pub fn run(arguments: &Hits) -> Result<()> {
         None => RunSelection::Latest,
     };
     let shots = read_shots(&path, &ShotFilter { runs, hits_only: arguments.hits_only })?;
-    let mut out = std::io::stdout().lock();
-    let printed = match if arguments.json { Format::Json } else { arguments.format } {
-        Format::Table => out.write_all(table(&shots).as_bytes()),
-        Format::Csv => out.write_all(&csv(&shots)?),
-        Format::Json => {
-            let all: Vec<_> = shots.iter().map(StoredShot::to_json).collect();
-            writeln!(
-                out,
-                "{}",
-                serde_json::to_string_pretty(&all).context("cannot put the rounds into JSON")?
-            )
-        }
-    };
-    // A pager that was closed has seen enough.
-    match printed.and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(e).context("cannot write to standard output")
-        }
-        _ => Ok(()),
+    match if arguments.json { Format::Json } else { arguments.format } {
+        Format::Table => stdout::print(table(&shots)),
+        Format::Csv => stdout::print(&csv(&shots)?),
+        Format::Json => stdout::print_json(&shots.iter().map(StoredShot::to_json).collect::<Vec<_>>()),
     }
 }
 

@@ -8,7 +8,7 @@ use bowwave_import::{ImportOptions, ImportReport, Progress, TelemetryReport, imp
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use crate::{cli::Import, outcome::Outcome};
+use crate::{cli::Import, outcome::Outcome, stdout};
 
 /// Imports a folder of pictures or a video.
 pub fn run(arguments: &Import) -> Result<Outcome> {
@@ -51,10 +51,7 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
     };
     bar.finish_and_clear();
     if arguments.json {
-        println!(
-            "{}",
-            serde_json::to_string_pretty(&as_json(&report)).context("cannot put the report into JSON")?
-        );
+        stdout::print_json(&as_json(&report))?;
     }
     eprint!("{}", lines(&report));
     for warning in &report.warnings {

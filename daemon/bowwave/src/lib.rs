@@ -20,6 +20,7 @@ mod run;
 mod sea;
 mod simulate;
 mod stats;
+mod stdout;
 mod study;
 
 use std::process::ExitCode;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bowwave_core::{
     event::PixelFormat,
     geometry::Optics,
@@ -18,6 +18,7 @@ use crate::{
     cli::Plan,
     drawing,
     loading::{read_scenario, scenario_models},
+    stdout,
 };
 
 /// A plan, as it is printed.
@@ -106,12 +107,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         memory,
         device,
     };
-    if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&printed).context("cannot put the plan into JSON")?);
-    } else {
-        print!("{}", text_of(&printed));
-    }
-    Ok(())
+    if arguments.json { stdout::print_json(&printed) } else { stdout::print(text_of(&printed)) }
 }
 
 /// What a renderer for the plan allocates, and on which device: made and let go of, not estimated.

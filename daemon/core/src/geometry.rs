@@ -32,6 +32,13 @@ pub fn curvature_drop(distance_m: f64) -> f64 {
     distance_m * distance_m * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M)
 }
 
+/// Rotation vector of the shorter way, radians; exact near nothing, where glam's own goes through an arc cosine.
+pub fn rotation_vector(q: DQuat) -> DVec3 {
+    let (v, sign) = (DVec3::new(q.x, q.y, q.z), if q.w < 0.0 { -1.0 } else { 1.0 });
+    let sin = v.length();
+    if sin < 1e-12 { 2.0 * sign * v } else { v * (2.0 * sign * sin.atan2(q.w.abs()) / sin) }
+}
+
 /// `world_from_camera` of a camera that looks along `azimuth` (clockwise from north), `elevation` above the horizontal and
 /// is rolled clockwise by `roll` (the horizon then tilts counter-clockwise in its picture), all in radians.
 pub fn look(azimuth: f64, elevation: f64, roll: f64) -> DQuat {

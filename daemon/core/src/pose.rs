@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use glam::{DQuat, DVec3};
 
 use crate::{
-    geometry::{CameraPose, Lens},
+    geometry::{Lens, rotation_vector},
     time::{NS_PER_S, Time},
 };
 
@@ -136,9 +136,7 @@ impl PoseHistory {
     pub fn turn_over(&self, time: Time, span_ns: i64) -> Option<DVec3> {
         let end = |ns| self.kept_at(time.plus_ns(ns)).ok().map(|at| at.world_from_imu);
         let (from, to) = (end(-span_ns / 2)?, end(span_ns / 2)?);
-        let turn = from.inverse() * to;
-        // The shorter way round: q and -q are the same.
-        Some((if turn.w < 0.0 { -turn } else { turn }).to_scaled_axis())
+        Some(rotation_vector(from.inverse() * to))
     }
 
     fn kept_at(&self, time: Time) -> Result<OrientationAt, NoPose> {
@@ -168,14 +166,6 @@ fn predict(newest: &OrientationSample, time: Time) -> Result<OrientationAt, NoPo
     let turn = DQuat::from_scaled_axis(newest.rate * (age_ns as f64 * 1e-9));
     let world_from_imu = (newest.world_from_imu * turn).normalize();
     Ok(OrientationAt { world_from_imu, provenance: Provenance::Predicted { age_ns } })
-}
-
-/// The camera's pose from the unit's orientation: registration.
-pub fn camera_pose(camera_from_imu: DQuat, world_from_imu: DQuat, eye_height_m: f64) -> CameraPose {
-    CameraPose {
-        world_from_camera: (world_from_imu * camera_from_imu.inverse()).normalize(),
-        position: DVec3::new(0.0, 0.0, eye_height_m),
-    }
 }
 
 /// How far, in pixels, things far away are drawn from where they belong: root mean square over a 5 x 5 grid of the picture.

@@ -1,8 +1,6 @@
 //! A unit on the simulated ship whose errors are drawn from what the product's filter assumes of it, and what a camera and other aids tell
 //! it: how wrong orientation is, and whether the filter knows.
 
-use std::f64::consts::TAU;
-
 use bowwave_core::{
     attitude::{
         Attitude, AttitudeSettings, DIP_SIGMA, HeadingSeen, Noise, RateKind, Settings, Source, UpSeen,
@@ -284,8 +282,7 @@ pub fn outcome(recording: &Recording, aided: &mut dyn Estimator) -> Outcome {
         }
         let tilt = inclination_error(truth, found).to_degrees();
         let heading = ship::heading_error(truth, found);
-        let turned = heading - start;
-        let heading = (turned - TAU * (turned / TAU).round()).to_degrees();
+        let heading = ship::wrapped(heading - start).to_degrees();
         for (sums, error) in [(&mut out.up_deg, tilt), (&mut out.heading_deg, heading)] {
             sums[0] += error * error;
             sums[1] = sums[1].max(error.abs());

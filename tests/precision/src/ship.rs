@@ -280,6 +280,10 @@ pub fn inclination_error(truth: DQuat, found: DQuat) -> f64 {
 /// Angle about the vertical, radians, signed.
 pub fn heading_error(truth: DQuat, found: DQuat) -> f64 {
     let off = found * truth.inverse();
-    let angle = 2.0 * off.z.atan2(off.w);
+    wrapped(2.0 * off.z.atan2(off.w))
+}
+
+/// The angle less whole turns, between half a turn to either side.
+pub fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }

@@ -30,7 +30,7 @@ struct Pull {
 
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateBoresight) -> Result<Outcome> {
-    let opened = open(&arguments.recording, arguments.calibration.as_deref())?;
+    let opened = open(&arguments.recording, arguments.files.calibration.as_deref())?;
     let (pulls, is_cut) = pulls(&opened)?;
     let calibration = &opened.file.calibration;
     let marks = match arguments.target {
@@ -60,7 +60,7 @@ pub fn run(arguments: &CalibrateBoresight) -> Result<Outcome> {
         sheet.notes.push(format!("in {missed} of {} pulls the mark was not seen", pulls.len()));
     }
     opened.warn(&mut sheet, is_cut, today);
-    tell(&sheet, arguments.report.as_deref(), arguments.json)?;
+    tell(&sheet, &arguments.told)?;
     let passed = sheet.verdict == Verdict::Pass;
     if let (Ok(found), true) = (&found, passed) {
         let how = format!("{} pulls at a mark {} m away", found.residuals.len(), arguments.range);
@@ -68,7 +68,7 @@ pub fn run(arguments: &CalibrateBoresight) -> Result<Outcome> {
         file.calibration.boresight = found.angles;
         file.calibration.boresight_sigma = found.sigma().max(1e-9);
         file.boresight = Provenance::new(today, how);
-        write(file, today, [arguments.out.as_ref(), arguments.calibration.as_ref()])?;
+        write(file, today, &arguments.files)?;
     }
     Ok(if passed { Outcome::Done } else { Outcome::Failed })
 }

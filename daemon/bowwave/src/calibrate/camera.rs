@@ -1,6 +1,6 @@
 //! `bowwave calibrate camera`: the lens from pictures of the board.
 
-use std::{fmt::Write as _, io::Write as _};
+use std::fmt::Write as _;
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
@@ -15,7 +15,7 @@ use bowwave_import::{ImportOptions, assumed};
 use serde_json::json;
 
 use super::pictures::{Looked, look};
-use crate::{cli::CalibrateCamera, import::today, outcome::Outcome};
+use crate::{cli::CalibrateCamera, import::today, outcome::Outcome, stdout};
 
 /// Most pictures that the lens is solved from: more take longer and tell nothing new.
 const USED_MOST: usize = 40;
@@ -37,19 +37,10 @@ pub fn run(arguments: &CalibrateCamera) -> Result<Outcome> {
     let used: Vec<View> = varied(&seen, USED_MOST).into_iter().map(|i| seen[i].clone()).collect();
     let camera = solve(&used, looked.size)
         .with_context(|| format!("no lens from the {} pictures that show the board", seen.len()))?;
-    let told = if arguments.json {
-        serde_json::to_string_pretty(&as_json(&camera, &looked)).context("cannot put the result into JSON")?
-            + "\n"
+    if arguments.json {
+        stdout::print_json(&as_json(&camera, &looked))?;
     } else {
-        as_text(&camera, &looked)
-    };
-    let mut out = std::io::stdout().lock();
-    match out.write_all(told.as_bytes()).and_then(|()| out.flush()) {
-        // A pager that was closed has seen enough.
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            return Err(e).context("cannot write to standard output");
-        }
-        _ => {}
+        stdout::print(as_text(&camera, &looked))?;
     }
     let passed = camera.grade() > Grade::Poor;
     if arguments.dry_run {

@@ -8,16 +8,15 @@ use crate::{cli::CalibrateCheck, import::today, outcome::Outcome};
 
 /// Checks and tells: done where it holds, failed where it does not, partly where the recording does not tell.
 pub fn run(arguments: &CalibrateCheck) -> Result<Outcome> {
-    let material = &arguments.material;
-    let (opened, capture, is_cut) = look(&arguments.recording, material)?;
+    let named = arguments.calibration.as_deref();
+    let (opened, capture, is_cut) = look(&arguments.recording, named, &arguments.material)?;
     let calibration = &opened.file.calibration;
     let found = capture.compare(calibration);
-    let of = material.calibration.as_ref();
-    let of = of.map_or_else(|| "Its own calibration".to_owned(), |path| path.display().to_string());
+    let of = named.map_or_else(|| "Its own calibration".to_owned(), |path| path.display().to_string());
     let title = format!("{of} checked on {}", arguments.recording.display());
     let mut sheet = Sheet::of_check(&title, &capture, calibration, &found);
     opened.warn(&mut sheet, is_cut, today()?);
-    tell(&sheet, material.report.as_deref(), material.json)?;
+    tell(&sheet, &arguments.material.told)?;
     Ok(match sheet.verdict {
         Verdict::Pass | Verdict::Good => Outcome::Done,
         Verdict::Fail | Verdict::Stale => Outcome::Failed,

@@ -8,14 +8,14 @@ use crate::{cli::CalibrateImu, import::today, outcome::Outcome};
 
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateImu) -> Result<Outcome> {
-    let material = &arguments.material;
-    let (opened, capture, is_cut) = look(&arguments.recording, material)?;
+    let (opened, capture, is_cut) =
+        look(&arguments.recording, arguments.files.calibration.as_deref(), &arguments.material)?;
     let found = capture.solve();
     let today = today()?;
     let title = format!("Camera and inertial unit from {}, {today}", arguments.recording.display());
     let mut sheet = Sheet::of_alignment(&title, &capture, &found);
     opened.warn(&mut sheet, is_cut, today);
-    tell(&sheet, material.report.as_deref(), material.json)?;
+    tell(&sheet, &arguments.material.told)?;
     let passed = sheet.verdict == Verdict::Pass;
     match &found {
         Ok(found) if passed || arguments.accept_poor => {
@@ -23,7 +23,7 @@ pub fn run(arguments: &CalibrateImu) -> Result<Outcome> {
             let by = if capture.is_by_horizon() { "horizon" } else { "board" };
             let seconds = capture.seconds();
             file.set_alignment(found, today, &format!("{seconds:.0} s of movement, {by}, {}", found.grade));
-            write(file, today, [arguments.out.as_ref(), material.calibration.as_ref()])?;
+            write(file, today, &arguments.files)?;
         }
         Ok(_) => eprintln!("nothing is written; --accept-poor writes it all the same"),
         Err(_) => {}

@@ -1,6 +1,6 @@
 //! What a task looks at: a recording played without a clock, and the calibration that goes with it; and how its result is told and kept.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
@@ -15,7 +15,10 @@ use bowwave_record::{Entry, RecordError, RecordingReader};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use crate::cli::Material;
+use crate::{
+    cli::{Files, Material, Told},
+    stdout,
+};
 
 /// A recording, with the calibration that goes with it.
 pub struct Opened {
@@ -24,6 +27,30 @@ pub struct Opened {
     pub file: CalibrationFile,
     /// The recording's own, where it has one that can be read.
     recorded: Option<CalibrationFile>,
+}
+
+/// A bar of so many pictures.
+pub fn progress(pictures: u64) -> ProgressBar {
+    let bar = ProgressBar::new(pictures);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// Hands over what a recording holds, in its order. Tells whether it was cut short.
+pub fn read(reader: &RecordingReader, mut take: impl FnMut(Entry) -> Result<()>) -> Result<bool> {
+    for entry in reader.entries()? {
+        match entry {
+            Ok(entry) => take(entry)?,
+            Err(e @ RecordError::Truncated { .. }) => {
+                log::warn!("{e}");
+                return Ok(true);
+            }
+            Err(e) => return Err(e.into()),
+        }
+    }
+    Ok(false)
 }
 
 /// Opens a recording. The calibration is that at `calibration`, or the recording's own.
@@ -57,16 +84,13 @@ impl Opened {
     /// Hands over what the recording holds, in its order; pictures only where they are asked for. Tells whether the recording was cut
     /// short.
     pub fn play(&self, pictures: bool, mut take: impl FnMut(Event)) -> Result<bool> {
-        let bar = ProgressBar::new(self.reader.counts().frames);
-        if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left") {
-            bar.set_style(style);
-        }
+        let bar = progress(self.reader.counts().frames);
         let (mut decoder, mut damaged) = (Decoder::for_recordings(), 0u64);
-        for entry in self.reader.entries()? {
+        let is_cut = read(&self.reader, |entry| {
             match entry {
-                Ok(Entry::Imu(sample)) => take(Event::Imu(sample)),
-                Ok(Entry::Trigger(edge)) => take(Event::Trigger(edge)),
-                Ok(Entry::Frame(frame)) if pictures => {
+                Entry::Imu(sample) => take(Event::Imu(sample)),
+                Entry::Trigger(edge) => take(Event::Trigger(edge)),
+                Entry::Frame(frame) if pictures => {
                     bar.inc(1);
                     match decoder.decode(&frame.jpeg, None) {
                         Ok(picture) => take(Event::Frame(CameraFrame {
@@ -84,17 +108,12 @@ impl Opened {
                         }
                     }
                 }
-                Ok(Entry::Frame(_) | Entry::Truth(_) | Entry::Pose(_)) => {}
-                Err(e @ RecordError::Truncated { .. }) => {
-                    bar.finish_and_clear();
-                    log::warn!("{e}");
-                    return Ok(true);
-                }
-                Err(e) => return Err(e.into()),
+                Entry::Frame(_) | Entry::Truth(_) | Entry::Pose(_) => {}
             }
-        }
+            Ok(())
+        })?;
         bar.finish_and_clear();
-        Ok(false)
+        Ok(is_cut)
     }
 
     /// What the recording, or the scenario in it, says of the camera's height above the sea.
@@ -119,8 +138,12 @@ impl Opened {
 }
 
 /// Looks for horizon and board in all of a recording; tells whether that was cut short, too.
-pub fn look(recording: &Path, material: &Material) -> Result<(Opened, Capture, bool)> {
-    let opened = open(recording, material.calibration.as_deref())?;
+pub fn look(
+    recording: &Path,
+    calibration: Option<&Path>,
+    material: &Material,
+) -> Result<(Opened, Capture, bool)> {
+    let opened = open(recording, calibration)?;
     let height = match material.eye_height {
         Some(height) => height,
         None => opened.height().with_context(|| {
@@ -136,14 +159,13 @@ pub fn look(recording: &Path, material: &Material) -> Result<(Opened, Capture, b
 }
 
 /// Tells the result in all the ways that were asked for.
-pub fn tell(sheet: &Sheet, report: Option<&Path>, json: bool) -> Result<()> {
-    if json {
-        let text = serde_json::to_string_pretty(&as_json(sheet));
-        println!("{}", text.context("cannot put the result into JSON")?);
+pub fn tell(sheet: &Sheet, told: &Told) -> Result<()> {
+    if told.json {
+        stdout::print_json(&as_json(sheet))?;
     } else {
-        print!("{sheet}");
+        stdout::print(sheet.to_string())?;
     }
-    if let Some(path) = report {
+    if let Some(path) = &told.report {
         std::fs::write(path, page(sheet)).with_context(|| {
             format!("cannot write {}; check the folder and its permissions", path.display())
         })?;
@@ -162,9 +184,9 @@ fn as_json(sheet: &Sheet) -> serde_json::Value {
     })
 }
 
-/// Writes the calibration to the first of `places` that was named.
-pub fn write(mut file: CalibrationFile, today: Date, places: [Option<&PathBuf>; 2]) -> Result<()> {
-    let Some(out) = places.into_iter().flatten().next() else {
+/// Writes the calibration where `files` say.
+pub fn write(mut file: CalibrationFile, today: Date, files: &Files) -> Result<()> {
+    let Some(out) = files.out.as_ref().or(files.calibration.as_ref()) else {
         eprintln!("nothing is written; name a file with --out or --calibration");
         return Ok(());
     };

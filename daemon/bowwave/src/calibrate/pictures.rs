@@ -8,9 +8,10 @@ use bowwave_calibration::{
     target::{Grey, Target, detect, view},
 };
 use bowwave_import::picture_names;
-use bowwave_record::{Entry, RecordError, RecordingReader};
+use bowwave_record::{Entry, RecordingReader};
 use image::{GrayImage, ImageFormat, ImageReader, Limits};
-use indicatif::{ProgressBar, ProgressStyle};
+
+use super::material::{progress, read};
 
 /// Most pictures of a recording that are looked at, evenly over its length.
 const LOOKED_MOST: u64 = 240;
@@ -65,14 +66,6 @@ pub fn look(source: &Path, target: &Target) -> Result<Looked> {
     Ok(looked)
 }
 
-fn progress(count: u64) -> ProgressBar {
-    let bar = ProgressBar::new(count);
-    if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} pictures, {eta} left") {
-        bar.set_style(style);
-    }
-    bar
-}
-
 fn folder(source: &Path, target: &Target, looked: &mut Looked) -> Result<()> {
     let names = picture_names(source)?;
     if names.is_empty() {
@@ -104,26 +97,19 @@ fn recording(source: &Path, target: &Target, looked: &mut Looked) -> Result<()> 
     let step = frames.div_ceil(LOOKED_MOST).max(1);
     let bar = progress(frames);
     let mut number = 0_u64;
-    for entry in reader.entries()? {
-        let frame = match entry {
-            Ok(Entry::Frame(frame)) => frame,
-            Ok(_) => continue,
-            Err(e @ RecordError::Truncated { .. }) => {
-                log::warn!("{e}");
-                break;
-            }
-            Err(e) => return Err(e.into()),
-        };
+    read(&reader, |entry| {
+        let Entry::Frame(frame) = entry else { return Ok(()) };
         bar.inc(1);
         number += 1;
         if !(number - 1).is_multiple_of(step) {
-            continue;
+            return Ok(());
         }
         match image::load_from_memory_with_format(&frame.jpeg, ImageFormat::Jpeg) {
             Ok(picture) => looked.take(format!("picture {number}"), &picture.into_luma8(), target)?,
             Err(why) => log::warn!("picture {number} is no whole JPEG ({why}): left out"),
         }
-    }
+        Ok(())
+    })?;
     bar.finish_and_clear();
     Ok(())
 }

@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use bowwave_calibration::keep;
 
-use crate::{cli::CalibrateRestore, outcome::Outcome};
+use crate::{cli::CalibrateRestore, outcome::Outcome, stdout};
 
 /// Puts it back, or lists what there is.
 pub fn run(arguments: &CalibrateRestore) -> Result<Outcome> {
@@ -11,7 +11,7 @@ pub fn run(arguments: &CalibrateRestore) -> Result<Outcome> {
     if arguments.list {
         for kept in keep::kept(path)? {
             let made = kept.made.map_or_else(|| "cannot be read".to_owned(), |d| format!("made on {d}"));
-            println!("{:4}  {made}  {}", kept.number, kept.path.display());
+            stdout::print(format!("{:4}  {made}  {}\n", kept.number, kept.path.display()))?;
         }
         return Ok(Outcome::Done);
     }

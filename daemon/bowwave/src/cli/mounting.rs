@@ -6,24 +6,39 @@ use bowwave_calibration::target::Target;
 use clap::Args;
 use glam::DVec2;
 
-/// What all of them look at.
+/// How a result is told.
 #[derive(Clone, Debug, Args)]
-pub struct Material {
-    /// Calibration file (TOML); without it the recording's own
-    #[arg(long, value_name = "FILE")]
-    pub calibration: Option<PathBuf>,
-    /// The camera's height above the sea; without it what the recording or its scenario says
-    #[arg(long, value_name = "M", value_parser = parse_height)]
-    pub eye_height: Option<f64>,
-    /// Also look for this board, which must stand still (see `calibrate board`): tags across and upwards, side in millimetres, gap by that
-    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]")]
-    pub target: Option<Target>,
+pub struct Told {
     /// Also write the result as a page (HTML), with what is left over plotted
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Which calibration is begun with and which is written.
+#[derive(Clone, Debug, Args)]
+pub struct Files {
+    /// Calibration file (TOML); without it the recording's own
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
+    /// Calibration file to write; without it the one of --calibration. What stands there is kept, see `restore`
+    #[arg(short, long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+/// What all of them look at.
+#[derive(Clone, Debug, Args)]
+pub struct Material {
+    /// The camera's height above the sea; without it what the recording or its scenario says
+    #[arg(long, value_name = "M", value_parser = parse_height)]
+    pub eye_height: Option<f64>,
+    /// Also look for this board, which must stand still (see `calibrate board`): tags across and upwards, side in millimetres, gap by that
+    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]")]
+    pub target: Option<Target>,
+    #[command(flatten)]
+    pub told: Told,
 }
 
 /// Arguments of `calibrate imu`.
@@ -33,9 +48,8 @@ pub struct CalibrateImu {
     pub recording: PathBuf,
     #[command(flatten)]
     pub material: Material,
-    /// Calibration file to write; without it the one of --calibration. What stands there is kept, see `restore`
-    #[arg(short, long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub files: Files,
     /// Write the file although the result is poor
     #[arg(long)]
     pub accept_poor: bool,
@@ -46,6 +60,9 @@ pub struct CalibrateImu {
 pub struct CalibrateCheck {
     /// Any recording (MCAP) in which the horizon is seen
     pub recording: PathBuf,
+    /// Calibration file (TOML); without it the recording's own
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
     #[command(flatten)]
     pub material: Material,
 }
@@ -68,18 +85,10 @@ pub struct CalibrateRestore {
 pub struct CalibrateTrigger {
     /// Recording (MCAP) of dry shots: gun cocked and held still, a second of rest between presses, five times or more
     pub recording: PathBuf,
-    /// Calibration file (TOML); without it the recording's own
-    #[arg(long, value_name = "FILE")]
-    pub calibration: Option<PathBuf>,
-    /// Calibration file to write; without it the one of --calibration. What stands there is kept, see `restore`
-    #[arg(short, long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Also write the result as a page (HTML)
-    #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
-    /// Print the result as JSON
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub files: Files,
+    #[command(flatten)]
+    pub told: Told,
 }
 
 /// Arguments of `calibrate boresight`.
@@ -100,18 +109,10 @@ pub struct CalibrateBoresight {
     /// The mark's place in the picture of a pull, pixels; once for each pull, in their order
     #[arg(long, value_name = "X,Y", value_parser = parse_mark, required_unless_present = "target")]
     pub mark: Vec<Mark>,
-    /// Calibration file (TOML) whose lens and muzzle are used; without it the recording's own
-    #[arg(long, value_name = "FILE")]
-    pub calibration: Option<PathBuf>,
-    /// Calibration file to write; without it the one of --calibration. What stands there is kept, see `restore`
-    #[arg(short, long, value_name = "FILE")]
-    pub out: Option<PathBuf>,
-    /// Also write the result as a page (HTML)
-    #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
-    /// Print the result as JSON
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    pub files: Files,
+    #[command(flatten)]
+    pub told: Told,
 }
 
 /// A place in a picture, pixels; the centre of the first pixel is (0.5, 0.5).

@@ -11,7 +11,7 @@ use bowwave_core::{
     still::{self, Still},
 };
 
-use crate::{cli::Compose, loading::load_models, outcome::Outcome};
+use crate::{cli::Compose, loading::load_models, outcome::Outcome, stdout};
 pub use easel::{Drawn, Easel};
 pub use photo::Photo;
 
@@ -21,7 +21,7 @@ const PICTURES_MAX: usize = 10_000;
 /// Composes what the arguments name.
 pub fn run(arguments: &Compose) -> Result<Outcome> {
     if arguments.example {
-        print!("{}", still::EXAMPLE);
+        stdout::print(still::EXAMPLE)?;
         return Ok(Outcome::Done);
     }
     let Some(path) = &arguments.scene else {
@@ -71,7 +71,7 @@ fn compose_one(
         .picture
         .save_with_format(target, image::ImageFormat::Png)
         .with_context(|| format!("cannot write {}; check the disk", target.display()))?;
-    println!("{}", target.display());
+    stdout::print(format!("{}\n", target.display()))?;
     if drawn.boats_seen < still.boats.len() {
         log::warn!(
             "{}: {} of {} boats lie outside the picture; check bearing_deg and azimuth_deg",

@@ -5,13 +5,14 @@ mod imu;
 
 use std::{fmt, path::Path, process::Command};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bowwave_devices::{camera, lcd, serial, trigger};
 use serde::Serialize;
 
 use crate::{
     cache,
     cli::{Doctor, DoctorDevice},
+    stdout,
 };
 
 /// Free space below which a session of an hour may not fit, bytes.
@@ -83,11 +84,10 @@ pub fn run(arguments: &Doctor) -> Result<bool> {
 /// Prints the checks; `true` where none failed.
 fn print(checks: &[Check], json: bool) -> Result<bool> {
     if json {
-        println!("{}", serde_json::to_string_pretty(checks).context("cannot put the checks into JSON")?);
+        stdout::print_json(checks)?;
     } else {
-        for c in checks {
-            println!("{:<8} {:<16} {}", c.verdict, c.name, c.found);
-        }
+        let line = |c: &Check| format!("{:<8} {:<16} {}\n", c.verdict, c.name, c.found);
+        stdout::print(checks.iter().map(line).collect::<String>())?;
     }
     Ok(checks.iter().all(|c| c.verdict != Verdict::Failed))
 }

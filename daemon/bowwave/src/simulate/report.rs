@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bowwave_core::{scene::Pass, time::Time};
 use sha2::Digest;
 
@@ -11,7 +11,9 @@ use super::{
     run::Finished,
     summary::{Registration, Summary},
 };
-use crate::{cli::Simulate, outcome::Outcome, resident::memory_mb, sea::SeaSummary, stats::Percentiles};
+use crate::{
+    cli::Simulate, outcome::Outcome, resident::memory_mb, sea::SeaSummary, stats::Percentiles, stdout,
+};
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
@@ -24,10 +26,7 @@ impl Finished {
         let summary = self.summary(prepared, program_start);
         summary.write(&arguments.out.join("summary.json"))?;
         if arguments.json {
-            println!(
-                "{}",
-                serde_json::to_string_pretty(&summary).context("cannot put the summary into JSON")?
-            );
+            stdout::print_json(&summary)?;
         }
         eprint!("{}", summary.lines());
         for fault in &faults {

@@ -20,6 +20,7 @@ use image::RgbImage;
 use crate::{
     cli::{Study, StudyTask},
     outcome::Outcome,
+    stdout,
 };
 use design::{CONDITIONS, Design, Item};
 
@@ -76,7 +77,7 @@ fn make(arguments: &Study) -> Result<Outcome> {
     let page = arguments.out.join(PAGE);
     fs::write(&page, page::page(&design, &files))
         .with_context(|| format!("cannot write {}; check the disk", page.display()))?;
-    println!("{}", page.display());
+    stdout::print(format!("{}\n", page.display()))?;
     eprintln!(
         "{} pictures, {} real; open the page in a browser, keep key.csv to yourself, then: bowwave study score ANSWERS... --key {}",
         design.items.len(),

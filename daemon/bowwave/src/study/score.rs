@@ -12,7 +12,7 @@ use super::{
     key::{self, FACTORS, KeyRow},
     statistics::{Estimate, Tally, d_prime, rate},
 };
-use crate::{cli::StudyScore, outcome::Outcome};
+use crate::{cli::StudyScore, outcome::Outcome, stdout};
 
 /// A line of an answer file; further columns are left alone.
 #[derive(Clone, Debug, Deserialize)]
@@ -52,9 +52,9 @@ pub fn run(arguments: &StudyScore) -> Result<Outcome> {
     }
     let lines = answers.lines();
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&lines).context("cannot put the result into JSON")?);
+        stdout::print_json(&lines)?;
     } else {
-        print!("{}", table(&lines));
+        stdout::print(table(&lines))?;
         eprintln!("{} participants", answers.by_participant.len());
     }
     let missing = answers.missing();

@@ -190,7 +190,7 @@ impl Attitude {
     }
 
     /// Rotation from the unit's axes to the camera's as it is known by now.
-    pub fn camera_from_imu(&self) -> DQuat {
+    fn camera_from_imu(&self) -> DQuat {
         match &self.state {
             State::Running(running) => {
                 DQuat::from_scaled_axis(running.filter.mounting()) * self.camera_from_imu
@@ -199,10 +199,15 @@ impl Attitude {
         }
     }
 
-    /// Rotation from the camera's axes to the world's with the unit as in `world_from_imu`, for what is drawn: refraction is laid on the
-    /// camera, so that the horizon that is seen lies where the one that is drawn about would.
+    /// Rotation from the camera's axes to the world's with the unit as in `world_from_imu`.
+    pub fn camera(&self, world_from_imu: DQuat) -> DQuat {
+        (world_from_imu * self.camera_from_imu().inverse()).normalize()
+    }
+
+    /// The same for what is drawn: refraction is laid on the camera, so that the horizon that is seen lies where the one that is drawn
+    /// about would.
     pub fn world_from_camera(&self, world_from_imu: DQuat) -> DQuat {
-        let world_from_camera = world_from_imu * self.camera_from_imu().inverse();
+        let world_from_camera = self.camera(world_from_imu);
         let State::Running(running) = &self.state else { return world_from_camera };
         let ahead = world_from_camera * DVec3::Z;
         let right = ahead.cross(DVec3::Z).normalize_or_zero();
@@ -213,7 +218,7 @@ impl Attitude {
     /// is known. `None` where nothing is known of that time, or the unit's own estimate is used.
     pub fn see_up(&mut self, seen: &UpSeen, limit: f64) -> Option<Outcome> {
         let then = self.history.at(seen.time).ok()?.world_from_imu;
-        let world_from_camera = then * self.camera_from_imu().inverse();
+        let world_from_camera = self.camera(then);
         let State::Running(running) = &mut self.state else { return None };
         running.filter.predict();
         let axes = DMat3::from_quat(world_from_camera);

@@ -53,7 +53,7 @@ impl Level {
         }
         let (Some(covariance), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return };
         self.next = time.plus_ns(EVERY_NS);
-        let world_from_camera = then.world_from_imu * attitude.camera_from_imu().inverse();
+        let world_from_camera = attitude.camera(then.world_from_imu);
         let tilt = covariance.x_axis.x.max(covariance.y_axis.y);
         let prior = Prior {
             up: world_from_camera.inverse() * DVec3::Z,

@@ -87,7 +87,7 @@ impl Steady {
         let view = SkyView {
             lens: *lens,
             eye_height_m: self.eye_height_m,
-            world_from_camera: then.world_from_imu * attitude.camera_from_imu().inverse(),
+            world_from_camera: attitude.camera(then.world_from_imu),
             sigma: CHANGE_SIGMA + late,
         };
         let Ok(yaw) = self.skyline.look(time, picture, &view) else {

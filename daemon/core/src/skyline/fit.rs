@@ -2,6 +2,8 @@
 
 use glam::{DMat3, DQuat, DVec3};
 
+use crate::geometry::rotation_vector;
+
 /// A point of the sky that was found.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sight {
@@ -145,11 +147,4 @@ fn spread(sights: &[Sight], scratch: &mut Vec<f64>) -> Option<f64> {
     let middle = scratch.len() / 2;
     let (_, median, _) = scratch.select_nth_unstable_by(middle, f64::total_cmp);
     Some(*median / 1.1774)
-}
-
-/// Rotation vector of the shorter way, radians; exact near nothing, where glam's own goes through an arc cosine.
-pub(super) fn rotation_vector(q: DQuat) -> DVec3 {
-    let (v, sign) = (DVec3::new(q.x, q.y, q.z), if q.w < 0.0 { -1.0 } else { 1.0 });
-    let sin = v.length();
-    if sin < 1e-12 { 2.0 * sign * v } else { v * (2.0 * sign * sin.atan2(q.w.abs()) / sin) }
 }

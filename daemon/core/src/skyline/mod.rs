@@ -20,7 +20,7 @@ use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use crate::{
     event::Picture,
-    geometry::{Lens, horizon_dip},
+    geometry::{Lens, horizon_dip, rotation_vector},
     horizon::Mask,
     time::Time,
 };
@@ -386,7 +386,7 @@ impl Skyline {
             anchor: anchor.time,
             off: 2.0 * fit.turn.z.atan2(fit.turn.w),
             sigma: variance.max(0.0).sqrt(),
-            turn: fit::rotation_vector(fit.turn),
+            turn: rotation_vector(fit.turn),
             covariance: fit.covariance,
             points: (fit.inliers, sought),
             scatter_px: fit.scatter / look.pixel * self.pyramid.reduction as f64,

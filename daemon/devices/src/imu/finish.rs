@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use bowwave_core::{event::ImuSample, time::Time};
+use bowwave_core::{event::ImuSample, geometry::rotation_vector, time::Time};
 use glam::{DQuat, DVec3};
 
 use super::{
@@ -138,10 +138,7 @@ impl Finisher {
         if !RATE_NS.contains(&dt_ns) {
             return None;
         }
-        let turn = before.inverse() * attitude;
-        // Both signs are the same attitude.
-        let turn = if turn.w < 0.0 { -turn } else { turn };
-        Some(turn.to_scaled_axis() / (dt_ns as f64 * 1e-9))
+        Some(rotation_vector(before.inverse() * attitude) / (dt_ns as f64 * 1e-9))
     }
 
     fn keep_attitude(&mut self, time_ns: i64, attitude: DQuat) {
