@@ -99,6 +99,13 @@ pub fn marked(overlays: Option<&Path>) -> Result<()> {
     }
     let names = ["no prediction, set", "no prediction, held out", "prediction, set", "prediction, held out"];
     names.iter().zip(&misses).for_each(|(name, misses)| println!("{}", summary(name, misses)));
+    let [alone, alone_held, told, told_held] = misses;
+    for (name, misses) in [
+        ("no prediction, all", [alone, alone_held].concat()),
+        ("prediction, all", [told, told_held].concat()),
+    ] {
+        println!("{}", summary(name, &misses));
+    }
     Ok(())
 }
 

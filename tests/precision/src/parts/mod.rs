@@ -20,6 +20,7 @@ mod sea;
 mod shutter;
 mod skyline;
 mod target;
+mod warp;
 mod wavefield;
 
 use anyhow::Result;
