@@ -41,8 +41,9 @@ impl Clip {
         Ok(Some(Self { pictures, samples: telemetry.samples }))
     }
 
-    /// Clouds of picture `first`, followed up to picture `end`.
-    pub fn follow(&self, first: usize, end: usize) -> Result<Vec<Track>> {
+    /// Clouds of picture `first`, followed up to picture `end`; those in the odd stripes (`held` 1) or in the even ones (0) are
+    /// held out.
+    pub fn follow(&self, first: usize, end: usize, held: usize) -> Result<Vec<Track>> {
         let mut tracker: Option<Tracker> = None;
         let mut tracks: Vec<Track> = Vec::new();
         for (i, (_, jpeg)) in self.pictures.iter().enumerate().take(end).skip(first) {
@@ -58,7 +59,7 @@ impl Clip {
                 let stripe = |at: &DVec2| (at.x / picture.width() as f64 * STRIPES) as usize;
                 let track = |p: &Option<DVec2>| Track {
                     seen: Vec::new(),
-                    held_out: p.is_some_and(|at| stripe(&at) % 2 == 1),
+                    held_out: p.is_some_and(|at| stripe(&at) % 2 == held),
                 };
                 tracks = places.iter().map(track).collect();
             }
