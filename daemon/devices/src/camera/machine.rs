@@ -96,6 +96,8 @@ struct Stream {
     last_frame: Time,
     last_sequence: Option<u32>,
     exposure_ns: Option<i64>,
+    /// When the exposure was last asked for.
+    exposure_asked: Time,
     /// Whether a time stamp could be believed, and how many since then could not.
     stamped: bool,
     odd_stamps: u32,
@@ -336,6 +338,7 @@ impl Machine {
                 last_frame: now,
                 last_sequence: None,
                 exposure_ns: driver.exposure_ns(),
+                exposure_asked: now,
                 stamped: false,
                 odd_stamps: 0,
                 other_sizes: 0,

@@ -6,6 +6,8 @@
 pub(crate) mod axes;
 mod detect;
 mod finish;
+#[cfg(test)]
+mod pole_tests;
 pub(crate) mod reading;
 mod steady;
 #[cfg(test)]

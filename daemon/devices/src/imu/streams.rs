@@ -33,11 +33,6 @@ fn attitude(t_s: f64) -> DQuat {
         * DQuat::from_rotation_x(std::f64::consts::PI + 0.3 * (0.8 * t_s).sin())
 }
 
-/// The body's axes in the world at a time: forward, right, down as columns of east, north, up.
-fn axes(t_s: f64) -> DMat3 {
-    DMat3::from_quat(attitude(t_s))
-}
-
 /// The true sample `n`: a gun on a ship, forces of gravity alone.
 pub(crate) fn truth(format: ImuFormat, n: i64) -> ImuSample {
     let ns = n * period_ns(format);
@@ -55,21 +50,27 @@ pub(crate) fn truth(format: ImuFormat, n: i64) -> ImuSample {
 
 /// What a unit of that format sends for [`truth`]'s sample `n`.
 pub(crate) fn encode(format: ImuFormat, n: i64) -> Vec<u8> {
-    let s = truth(format, n);
-    let world = axes(s.device_time_ns as f64 * 1e-9);
+    send(format, &truth(format, n), n, false)
+}
+
+/// What a unit of that format sends for sample `n` of any motion. `by_angles`: units that choose between quaternion and Euler angles tell
+/// the angles.
+pub(crate) fn send(format: ImuFormat, s: &ImuSample, n: i64, by_angles: bool) -> Vec<u8> {
+    // The body's axes in the world: forward, right, down as columns of east, north, up.
+    let world = DMat3::from_quat(s.world_from_imu.unwrap_or(DQuat::IDENTITY));
     let mut bytes = Vec::new();
     match format {
         ImuFormat::VectorNav => {
-            if let Some(output) = CommonOutput::from_sample(&s) {
+            if let Some(output) = CommonOutput::from_sample(s) {
                 output.encode(&mut bytes);
             }
         }
-        ImuFormat::VectorNavAscii => bytes = vectornav_line(&s, world),
-        ImuFormat::Xsens => bytes = xsens(&s, world, n),
-        ImuFormat::MicroStrain => bytes = mip(&s, world),
-        ImuFormat::Sbg => bytes = sbg(&s, world),
-        ImuFormat::Bno08x => bytes = rvc(&s, world, n),
-        ImuFormat::Witmotion => bytes = witmotion(&s, world),
+        ImuFormat::VectorNavAscii => bytes = vectornav_line(s, world),
+        ImuFormat::Xsens => bytes = xsens(s, world, n),
+        ImuFormat::MicroStrain => bytes = mip(s, world),
+        ImuFormat::Sbg => bytes = sbg(s, world, by_angles),
+        ImuFormat::Bno08x => bytes = rvc(s, world, n),
+        ImuFormat::Witmotion => bytes = witmotion(s, world, by_angles),
     }
     bytes
 }
@@ -80,10 +81,16 @@ fn ned(world: DMat3) -> DMat3 {
     DMat3::from_cols(rows.y_axis, rows.x_axis, -rows.z_axis).transpose()
 }
 
+/// Nearer to the pole than this the cosine of the elevation is all rounding, and yaw has what both turn by.
+const POLE: f64 = 1e-9;
+
 /// Yaw, pitch and roll of a matrix by the textbook's formulas for z, y, x.
 fn yaw_pitch_roll(m: DMat3) -> [f64; 3] {
     let at = |row: usize, column: usize| m.col(column)[row];
-    [at(1, 0).atan2(at(0, 0)), (-at(2, 0)).asin(), at(2, 1).atan2(at(2, 2))]
+    if at(2, 1).hypot(at(2, 2)) < POLE {
+        return [(-at(0, 1)).atan2(at(1, 1)), (-at(2, 0)).clamp(-1.0, 1.0).asin(), 0.0];
+    }
+    [at(1, 0).atan2(at(0, 0)), (-at(2, 0)).clamp(-1.0, 1.0).asin(), at(2, 1).atan2(at(2, 2))]
 }
 
 fn vectornav_line(s: &ImuSample, world: DMat3) -> Vec<u8> {
@@ -187,13 +194,18 @@ fn le(values: impl IntoIterator<Item = f64>) -> Vec<u8> {
     values.into_iter().flat_map(|v| (v as f32).to_le_bytes()).collect()
 }
 
-fn sbg(s: &ImuSample, world: DMat3) -> Vec<u8> {
+fn sbg(s: &ImuSample, world: DMat3, by_angles: bool) -> Vec<u8> {
     let time = ((s.device_time_ns / 1000) as u32).to_le_bytes();
     let motion =
         [&time[..], &[0xff, 0x01], &le(s.accel.to_array()), &le(s.rate.to_array()), &le([0.0; 7])].concat();
-    let q = DQuat::from_mat3(&ned(world));
-    let quaternion = [&time[..], &le(wxyz(q)), &le([0.01; 3]), &[0x32, 0, 0, 0]].concat();
-    [sbg_frame(3, &motion), sbg_frame(7, &quaternion)].concat()
+    let (log, numbers) = if by_angles {
+        let [yaw, pitch, roll] = yaw_pitch_roll(ned(world));
+        (6, le([roll, pitch, yaw]))
+    } else {
+        (7, le(wxyz(DQuat::from_mat3(&ned(world)))))
+    };
+    let attitude = [&time[..], &numbers, &le([0.01; 3]), &[0x32, 0, 0, 0]].concat();
+    [sbg_frame(3, &motion), sbg_frame(log, &attitude)].concat()
 }
 
 fn i16s(values: [f64; 3]) -> Vec<u8> {
@@ -209,8 +221,12 @@ fn rvc(s: &ImuSample, world: DMat3, n: i64) -> Vec<u8> {
     let m = rfu(world);
     let at = |row: usize, column: usize| m.col(column)[row];
     // About z, then x, then y.
-    let (yaw, pitch) = ((-at(0, 1)).atan2(at(1, 1)), at(2, 1).asin());
-    let roll = (-at(2, 0)).atan2(at(2, 2));
+    let pitch = at(2, 1).clamp(-1.0, 1.0).asin();
+    let (yaw, roll) = if at(2, 0).hypot(at(2, 2)) < POLE {
+        (at(1, 0).atan2(at(0, 0)), 0.0)
+    } else {
+        ((-at(0, 1)).atan2(at(1, 1)), (-at(2, 0)).atan2(at(2, 2)))
+    };
     let mut bytes = vec![0xaa, 0xaa, n as u8];
     bytes.extend(i16s([yaw, pitch, roll].map(|v| v.to_degrees() * 100.0)));
     bytes.extend(i16s([s.accel.y, s.accel.x, -s.accel.z].map(|v| v / G * 1000.0)));
@@ -228,7 +244,7 @@ pub(crate) fn witmotion_packet(kind: u8, data: &[u8]) -> Vec<u8> {
     bytes
 }
 
-fn witmotion(s: &ImuSample, world: DMat3) -> Vec<u8> {
+fn witmotion(s: &ImuSample, world: DMat3, by_angles: bool) -> Vec<u8> {
     let m = rfu(world);
     let [yaw, pitch, roll] = yaw_pitch_roll(m).map(f64::to_degrees);
     let part = |values: [f64; 3], full: f64| i16s(values.map(|v| v / full * 32_768.0));
@@ -237,12 +253,15 @@ fn witmotion(s: &ImuSample, world: DMat3) -> Vec<u8> {
         .iter()
         .flat_map(|v| ((v * 32_768.0).round().min(32_767.0) as i16).to_le_bytes())
         .collect();
-    [
+    let mut bytes = [
         witmotion_packet(0x51, &part(body(s.accel / G), 16.0)),
         witmotion_packet(0x52, &part(body(s.rate * 1f64.to_degrees()), 2000.0)),
         witmotion_packet(0x53, &part([roll, pitch, yaw], 180.0)),
         witmotion_packet(0x54, &[1, 2, 3, 4]),
-        witmotion_packet(0x59, &quaternion),
     ]
-    .concat()
+    .concat();
+    if !by_angles {
+        bytes.extend(witmotion_packet(0x59, &quaternion));
+    }
+    bytes
 }

@@ -10,7 +10,7 @@ use bowwave_core::{
 
 use super::{Failure, MS, Machine, Output, Stream, during};
 use crate::camera::{
-    Coding,
+    Coding, Exposure,
     driver::{Driver, Filled, Format},
     jpeg::JpegError,
     timing::{Sensor, mid_exposure},
@@ -20,6 +20,8 @@ use crate::camera::{
 const DRIVER_KEEPS: usize = 2;
 /// Between questions whether the driver's format is still the same.
 const FORMAT_NS: i64 = 500 * MS;
+/// Between questions how long the camera exposes: one that sees to that by itself takes some pictures from dark to bright.
+const EXPOSURE_NS: i64 = 100 * MS;
 
 /// How the rows of an uncompressed picture lie.
 pub(super) struct Layout {
@@ -127,6 +129,10 @@ impl Machine {
         driver: &mut impl Driver,
         out: &mut Output,
     ) -> Result<bool, Failure> {
+        let locked = matches!(self.settings.controls.exposure, Exposure::Locked { .. });
+        if !locked && now.ns_since(stream.exposure_asked) >= EXPOSURE_NS {
+            (stream.exposure_ns, stream.exposure_asked) = (driver.exposure_ns(), now);
+        }
         let sensor = Sensor {
             exposure_ns: stream.exposure_ns,
             readout_ns: self.settings.readout_us.map_or(stream.nominal_ns / 2, |us| i64::from(us) * 1000),

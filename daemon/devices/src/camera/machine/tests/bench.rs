@@ -51,6 +51,7 @@ pub(super) struct Fake {
     /// What it says later.
     pub(super) format_now: Option<Format>,
     pub(super) mode: Option<Candidate>,
+    pub(super) exposure_ns: i64,
     pub(super) filled: VecDeque<(Filled, Vec<u8>)>,
     pub(super) here: Vec<Option<Vec<u8>>>,
     pub(super) at_driver: usize,
@@ -74,6 +75,7 @@ impl Fake {
             format_set: None,
             format_now: None,
             mode: None,
+            exposure_ns: 4 * MS,
             filled: VecDeque::new(),
             here: Vec::new(),
             at_driver: 0,
@@ -138,7 +140,7 @@ impl Driver for Fake {
     }
 
     fn exposure_ns(&mut self) -> Option<i64> {
-        Some(4_000_000)
+        Some(self.exposure_ns)
     }
 
     fn start(&mut self, buffers: u32) -> io::Result<u32> {
