@@ -90,10 +90,14 @@ pub fn compare(
     let mut problem = problem(readings, observations, options)?;
     let told = match moved(&problem).and_then(|()| alone(&problem)) {
         Ok(told) => told,
-        Err(AlignmentError::NotObservable { .. } | AlignmentError::NoFit { .. }) => {
+        Err(
+            why @ (AlignmentError::NotObservable { .. }
+            | AlignmentError::NoFit { .. }
+            | AlignmentError::NotShared { .. }),
+        ) => {
             let mut told = together(&mut problem, known)?;
-            if moved(&problem).is_err() {
-                // Of a camera at rest noise alone would tell it.
+            if matches!(why, AlignmentError::NotShared { .. }) || moved(&problem).is_err() {
+                // Of a camera at rest, or one that sees little of what the gyro feels, noise alone would tell it.
                 told.offset = (known.offset_s, KNOWN_SIGMA);
             }
             told

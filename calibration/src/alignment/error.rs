@@ -85,6 +85,16 @@ pub enum AlignmentError {
         /// Standard deviation about the worst axis, milliradians.
         sigma_mrad: f64,
     },
+    /// The gyro felt what the camera did not see.
+    #[error(
+        "the camera has seen only {:.0} % of the movement by which the gyro would tell the time offset; the rest is vibration, or a gimbal \
+         holds the camera still: fasten camera and inertial unit on one rigid mount, and turn it farther",
+        share * 100.0
+    )]
+    NotShared {
+        /// Share of the gyro's movement that the camera has seen.
+        share: f64,
+    },
     /// Nothing fits.
     #[error(
         "what the camera saw does not fit the gyro: {problem}; check that both were recorded on one rigid mount, at the same time"

@@ -123,6 +123,8 @@ pub(super) struct Whitened {
     pub squares: Vec<f64>,
     /// Of each row: residual less the walk predicted from those before.
     pub innovations: Vec<Vector3<f64>>,
+    /// Of each row: the same as independent numbers of variance one, where the noises are what they are taken for.
+    pub white: Vec<Vector3<f64>>,
 }
 
 /// Walk and covariance while the filter runs.
@@ -182,6 +184,7 @@ pub(super) fn whiten(rows: &[Row], levels: &Levels) -> Option<Whitened> {
         cost: 0.0,
         squares: Vec::with_capacity(rows.len()),
         innovations: Vec::with_capacity(rows.len()),
+        white: Vec::with_capacity(rows.len()),
     };
     let mut walk = Walk::<COLUMNS>::begin(rows.first()?);
     for row in rows {
@@ -204,6 +207,7 @@ pub(super) fn whiten(rows: &[Row], levels: &Levels) -> Option<Whitened> {
             residual.norm_squared()
         });
         out.innovations.push(turn);
+        out.white.push(residual);
     }
     out.cost.is_finite().then_some(out)
 }

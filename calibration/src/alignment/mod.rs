@@ -9,12 +9,14 @@
 //!    is a continuous unknown.
 //! 3. Residuals are weighed by a filter that knows that the gyro drifts and the camera is noisy (`filter`); Levenberg's method
 //!    finds the unknowns (`fit`), the likelihood the noises (`noise`). Outliers lose their weight.
-//! 4. The covariance, a comparison of the recording's halves and of the gyro's scale say how good it is (`result`).
+//! 4. The covariance, a comparison of the recording's halves and of the gyro's scale say how good it is (`result`); whether camera and gyro
+//!    saw the same movement, and what is left of pictures that follow each other, whether that can be believed (`agree`).
 //!
 //! Literature: Furgale, Rehder & Siegwart 2013 (offset as an unknown of a continuous trajectory); Forster et al. 2017 (pre-integrated
 //! gyro and its bias Jacobian); Durbin & Koopman 2012 (the filter). Errors of rotations are rotation vectors in the camera's axes:
 //! `true = exp(error) estimate`.
 
+mod agree;
 mod compare;
 mod error;
 mod filter;

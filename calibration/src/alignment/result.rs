@@ -7,6 +7,7 @@ use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix4, Vector4};
 
 use super::{
+    agree::{HALVES_MOST, correlation, shared},
     error::{AlignmentError, Movement},
     filter::{Kind, Step, invert, place, whiten},
     fit::Fitted,
@@ -76,6 +77,13 @@ pub struct Checks {
     pub halves: Option<f64>,
     /// Share of the observations that are outliers.
     pub outliers: f64,
+    /// Share of the gyro's movement that the camera has seen too, as far as it tells the time offset: 1 is usual; `None` where the movement
+    /// tells that too poorly to be asked.
+    pub shared: Option<f64>,
+    /// Correlation of what is left of pictures that follow each other: about 0 is usual.
+    pub correlation: f64,
+    /// By what factor the covariances are larger than the noises alone make them, because halves disagree or pictures err alike.
+    pub widened: f64,
     /// Relative error of the gyro's scale, each axis, and its standard deviation; `None` where the motion does not tell.
     pub gyro_scale: Option<(DVec3, DVec3)>,
 }
@@ -85,6 +93,8 @@ pub struct Checks {
 pub enum Finding {
     /// The halves disagree by so many standard deviations.
     Inconsistent(f64),
+    /// Pictures that follow each other err alike, with that correlation.
+    Alike(f64),
     /// So large a share of the observations are outliers.
     ManyOutliers(f64),
     /// The gyro's scale is off by that share about that axis (0, 1, 2).
@@ -96,8 +106,13 @@ impl fmt::Display for Finding {
         match self {
             Self::Inconsistent(sigmas) => write!(
                 f,
-                "the first and the second half of the recording disagree by {sigmas:.1} standard deviations: something moved, or the \
-                 stamps jump; fasten camera and inertial unit, record again"
+                "the first and the second half of the recording disagree by {sigmas:.1} standard deviations, so all are stated that much \
+                 larger: something moved, or the stamps jump; fasten camera and inertial unit, record again"
+            ),
+            Self::Alike(correlation) => write!(
+                f,
+                "pictures that follow each other err alike (correlation {correlation:.2}), so deviations are stated larger: calibrate the \
+                 lens first, light the target better"
             ),
             Self::ManyOutliers(share) => write!(
                 f,
@@ -165,6 +180,8 @@ pub struct Alignment {
 const SIGMA_MOST: f64 = 0.1;
 const SIGMA_UNEVEN: f64 = 0.03;
 const RATIO_LEAST: f64 = 0.02;
+/// A correlation that is worth a word.
+const ALIKE_MOST: f64 = 0.1;
 
 impl Alignment {
     /// Standard deviation about each of the camera's axes, radians.
@@ -181,8 +198,11 @@ impl Alignment {
     /// What the maintainer should look into.
     pub fn findings(&self) -> Vec<Finding> {
         let mut out = Vec::new();
-        if let Some(sigmas) = self.checks.halves.filter(|s| *s > 2.5) {
+        if let Some(sigmas) = self.checks.halves.filter(|s| *s > HALVES_MOST) {
             out.push(Finding::Inconsistent(sigmas));
+        }
+        if self.checks.correlation > ALIKE_MOST {
+            out.push(Finding::Alike(self.checks.correlation));
         }
         if self.checks.outliers > 0.1 {
             out.push(Finding::ManyOutliers(self.checks.outliers));
@@ -200,11 +220,12 @@ impl Alignment {
 
 /// Judges the fit.
 pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, AlignmentError> {
-    let rotation: Matrix3<f64> =
+    let covariance: Matrix3<f64> =
         fitted.covariance.fixed_view::<3, 3>(place::ROTATION, place::ROTATION).into();
-    let sigma = |i: usize| fitted.covariance[(i, i)].max(0.0).sqrt();
-    let information_ratio = observe(problem, fitted, &rotation)?;
-    let rotation = rotation + horizons_share(problem);
+    let information_ratio = observe(problem, fitted, &covariance)?;
+    let checks = Checks { shared: shared(problem, fitted)?, ..checks(fitted) };
+    let sigma = |i: usize| (fitted.covariance[(i, i)].max(0.0) * checks.widened).sqrt();
+    let rotation = covariance * checks.widened + horizons_share(problem);
     let unknowns = &fitted.unknowns;
     let mut left_out = problem.left;
     let used = fitted.rows.iter().filter(|r| r.kind.is_seen()).count();
@@ -217,13 +238,13 @@ pub(super) fn judge(problem: &Problem, fitted: &Fitted) -> Result<Alignment, Ali
         offset_s: unknowns.offset_s,
         offset_sigma_s,
         gyro_bias: unknowns.bias,
-        gyro_bias_sigma: bias_sigma(fitted),
+        gyro_bias_sigma: bias_sigma(fitted) * checks.widened.sqrt(),
         readout_s: problem.options.estimate_readout.then(|| (unknowns.readout_s, sigma(place::READOUT))),
         information_ratio,
         missing: missing(problem, fitted, &rotation),
         noise: noise_found(fitted),
         grade: Grade::of(worst, offset_sigma_s),
-        checks: checks(fitted),
+        checks,
         residuals: residuals(problem, fitted),
         left_out,
     };
@@ -306,8 +327,14 @@ pub(super) fn missing(problem: &Problem, fitted: &Fitted, rotation: &Matrix3<f64
 
 fn checks(fitted: &Fitted) -> Checks {
     let outliers = fitted.rows.iter().filter(|r| r.weight < 1.0 && r.kind.is_seen()).count();
+    let (halves, (correlation, by_correlation)) = (halves(fitted), correlation(fitted));
+    // Birge's ratio, where chance does not explain it.
+    let by_halves = halves.filter(|s| *s > HALVES_MOST).map_or(1.0, |s| s * s);
     Checks {
-        halves: halves(fitted),
+        halves,
+        shared: None,
+        correlation,
+        widened: by_correlation * by_halves,
         outliers: outliers as f64 / fitted.rows.len().max(1) as f64,
         gyro_scale: gyro_scale(fitted),
     }

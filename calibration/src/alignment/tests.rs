@@ -537,3 +537,46 @@ fn horizons_that_share_an_error_are_no_surer_than_it() {
     let board = solve(&recording.readings, &recording.orientations, &options).unwrap();
     assert!(board.rotation_sigma().max_element() < 1e-3);
 }
+
+/// A camera on a gimbal hardly turns, while the gyro beside it feels what the gimbal takes away: residuals are white and halves agree, but the
+/// offset is a number by chance.
+#[test]
+fn a_gyro_that_feels_what_the_camera_does_not_see_is_refused() {
+    for seed in 0..4 {
+        let mut recording = Recipe::minute(Motion::SlowMount, FIFTIETH, 0.0, seed).record();
+        let mut random = Random::new(seed + 70);
+        let mut shake = DVec3::ZERO;
+        for reading in &mut recording.readings {
+            // A rate of 2 deg/s that forgets itself within some hundredths of a second.
+            shake = shake * 0.8 + random.vector() * 0.02;
+            reading.rate += shake;
+        }
+        let error = solved(&recording).unwrap_err();
+        assert!(matches!(error, AlignmentError::NotShared { share } if share < 0.5), "{seed}: {error}");
+        let known = known(&recording.recipe, DVec3::ZERO, 0.03);
+        let told =
+            compare(&recording.readings, &recording.orientations, &known, &Options::default()).unwrap();
+        assert!(told.offset_sigma_s > 0.05, "{told:?}");
+    }
+}
+
+/// What errs alike from picture to picture is stated with deviations that hold.
+#[test]
+fn pictures_that_err_alike_widen_what_is_stated() {
+    let mut squares = Vec::new();
+    for seed in 0..8 {
+        let recipe = Recipe { seconds: 30.0, ..Recipe::minute(Motion::ByHand, 1e-5, 0.0, seed) };
+        let mut recording = recipe.record();
+        let (mut random, mut error) = (Random::new(seed + 5), DVec3::ZERO);
+        map_orientations(&mut recording, |_, stamp, q| {
+            error = error * 0.4 + random.vector() * TENTH;
+            Some((stamp, q * exp(error)))
+        });
+        let a = solved(&recording).unwrap();
+        assert!(a.checks.correlation > 0.1 && a.checks.widened > 1.2, "{:?}", a.checks);
+        assert!(a.findings().iter().any(|f| matches!(f, Finding::Alike(_))), "{:?}", a.findings());
+        squares.push(((a.offset_s - recipe.offset_s) / a.offset_sigma_s).powi(2));
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!(mean < 2.5, "{squares:?}");
+}
