@@ -23,14 +23,34 @@ pub const ABOUT: About = About {
 type Packet = (i64, Time, i64);
 
 fn packets(ppm: f64, seconds: i64, delay_ms: impl Fn(i64, f64) -> f64) -> Vec<Packet> {
+    drifting(|_| ppm, seconds, delay_ms)
+}
+
+/// The device's clock is fast by `ppm` of the seconds since the start.
+fn drifting(ppm: impl Fn(f64) -> f64, seconds: i64, delay_ms: impl Fn(i64, f64) -> f64) -> Vec<Packet> {
+    const STEP_NS: f64 = 5e6;
+    let mut ahead_ns = 0.0;
     (0..seconds * 200)
         .map(|i| {
             let uniform = even(i as u64);
-            let host = 5_000_000_000 + i * 5_000_000;
-            let device = ((i * 5_000_000) as f64 * (1.0 + ppm * 1e-6)) as i64;
+            let since_ns = i * STEP_NS as i64;
+            let host = 5_000_000_000 + since_ns;
+            let device = since_ns + f64::round(ahead_ns) as i64;
+            ahead_ns += STEP_NS * 1e-6 * ppm(since_ns as f64 * 1e-9);
             (device, Time::from_ns(host).plus_secs(delay_ms(i, uniform) * 1e-3), host)
         })
         .collect()
+}
+
+/// From `from` to `to` ppm after five minutes, as when a unit that lay in the sun is hosed down: all but a thirtieth within a minute and
+/// a half.
+fn temperature(from: f64, to: f64) -> impl Fn(f64) -> f64 {
+    move |s| to + (from - to) * (-(s - 300.0).max(0.0) / 25.0).exp()
+}
+
+/// The same from one packet to the next.
+fn jump(from: f64, to: f64) -> impl Fn(f64) -> f64 {
+    move |s| if s < 300.0 { from } else { to }
 }
 
 fn usb(_: i64, u: f64) -> f64 {
@@ -131,6 +151,10 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("device clock 100 ppm slow", packets(-100.0, 600, usb)),
         ("80 ms bursts every 20 s", packets(35.0, 600, burst)),
         ("no delay at all", packets(35.0, 600, |_, _| 0.0)),
+        ("temperature: 100 ppm slow to 100 fast", drifting(temperature(-100.0, 100.0), 600, usb)),
+        ("temperature: 100 ppm fast to 100 slow", drifting(temperature(100.0, -100.0), 600, usb)),
+        ("100 ppm slow to 100 fast at once", drifting(jump(-100.0, 100.0), 600, usb)),
+        ("100 ppm fast to 100 slow at once, 16 ms timer", drifting(jump(100.0, -100.0), 600, timer)),
     ] {
         let tried = METHODS.map(|(method, setting, _, make)| {
             let (rms, worst) = rms_ms(&packets, &mut make());
