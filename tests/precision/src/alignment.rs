@@ -44,6 +44,12 @@ impl Run {
         self.found.as_ref().map_or(f64::NAN, |a| (a.offset_s - self.recipe.offset_s).abs() * 1e3)
     }
 
+    /// Length of the bias's error, degrees a second; NaN where there is no result.
+    pub fn bias_deg_per_s(&self) -> f64 {
+        let off = |a: &Alignment| (a.gyro_bias - self.recipe.gyro_bias).length().to_degrees();
+        self.found.as_ref().map_or(f64::NAN, off)
+    }
+
     /// Whether rotation, offset and bias lie within three stated standard deviations: the rotation by the ellipsoid that holds
     /// 99.73 % too, the bias about each axis.
     pub fn within(&self) -> Option<[bool; 3]> {

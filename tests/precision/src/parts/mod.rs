@@ -98,7 +98,7 @@ fn worst(errors: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Root mean square; NaN where one of them is none.
-pub(crate) fn rms(errors: impl IntoIterator<Item = f64>) -> f64 {
+pub fn rms(errors: impl IntoIterator<Item = f64>) -> f64 {
     let (sum, count) = errors.into_iter().fold((0.0, 0.0), |(s, n), e| (s + e * e, n + 1.0));
     (sum / count).sqrt()
 }
