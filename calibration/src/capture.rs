@@ -116,7 +116,7 @@ impl Capture {
             Event::Imu(sample) => self.sample(sample),
             Event::Frame(frame) => self.frame(frame),
             Event::Trigger(edge) if self.edges.len() < OBSERVATIONS_MOST => self.edges.push(*edge),
-            Event::Trigger(_) | Event::Fault(_) => {}
+            Event::Trigger(_) | Event::Fault(_) | Event::Ship(_) | Event::Mark(_) => {}
         }
     }
 

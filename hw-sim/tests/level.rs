@@ -65,6 +65,7 @@ fn played(recipe: &Recipe, drift: f64) -> (Vec<(f64, f64)>, SensorCounts) {
         screen: (lens.width, lens.height),
         video: PixelFormat::Rgb,
         orientation: Source::Fused,
+        heading: bowwave_core::session::HeadingSettings::default(),
     })
     .unwrap();
     let mut events = Vec::new();

@@ -342,3 +342,28 @@ fn the_sun_glitters_below_itself() {
     let off = if forward.x.atan2(forward.y) > 0.0 { 0.45 } else { -0.45 };
     assert!(brightness(0.0) > brightness(off) + 25.0, "{} {}", brightness(0.0), brightness(off));
 }
+
+#[test]
+fn the_ships_own_heading_is_told_with_its_errors_and_late() {
+    use hw_sim::make::{ShipFeedRecipe, ship_samples};
+    let feed = ShipFeedRecipe { offset: 0.02, attitude: true, ..ShipFeedRecipe::default() };
+    let recipe = Recipe { ship_feed: Some(feed), ..Recipe::default() };
+    recipe.check().expect("a recipe");
+    let (motion, start) = (recipe.motion(), bowwave_core::time::Time::from_ns(7));
+    let samples = ship_samples(&recipe, start);
+    assert_eq!(samples.len(), 200);
+    let (mut sum, mut square) = (0.0, 0.0);
+    for (n, sample) in samples.iter().enumerate() {
+        let [heading, pitch, _] = motion.ship_at(n as f64 * 0.1);
+        let off = (sample.heading.expect("told") - heading).rem_euclid(std::f64::consts::TAU);
+        (sum, square) = (sum + off, square + (off - 0.02) * (off - 0.02));
+        assert!((sample.pitch.expect("told") - pitch).abs() <= 0.05f64.to_radians() + 1e-12);
+        let late = sample.arrival.ns_since(start) - n as i64 * 100_000_000;
+        assert!((60_000_000..=75_000_000).contains(&late), "{late}");
+    }
+    // Noise of 0.05 deg and steps of 0.1 deg, whose error is even.
+    let expected = 0.05f64.hypot(0.1 / 12f64.sqrt()).to_radians();
+    assert!((sum / 200.0 - 0.02).abs() < 4.0 * expected / 200f64.sqrt(), "{}", sum / 200.0);
+    assert!(((square / 200.0).sqrt() / expected - 1.0).abs() < 0.2, "{}", (square / 200.0).sqrt());
+    assert!(ship_samples(&Recipe::default(), start).is_empty());
+}

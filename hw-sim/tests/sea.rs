@@ -56,6 +56,7 @@ fn watched(path: &Path, seconds: i64, scenario: &str) -> Vec<(SeaReport, DVec2, 
         screen: (lens.width, lens.height),
         video: PixelFormat::Rgb,
         orientation: Source::Auto,
+        heading: bowwave_core::session::HeadingSettings::default(),
     })
     .unwrap();
     let (mut events, mut known) = (Vec::new(), Vec::new());

@@ -8,6 +8,7 @@ pub mod compose;
 pub mod config;
 mod doctor;
 mod drawing;
+mod headings;
 mod hits;
 mod import;
 pub mod loading;

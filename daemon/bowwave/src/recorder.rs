@@ -7,7 +7,8 @@ use std::{
 
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::event::{CameraFrame, Event, Picture};
-use bowwave_record::{Entry, FrameEntry, PoseEntry, Properties, RecordingWriter, WrittenSummary};
+use bowwave_devices::nmea::line_of;
+use bowwave_record::{Entry, FrameEntry, PoseEntry, Properties, RecordingWriter, ShipEntry, WrittenSummary};
 use crossbeam_channel::{Sender, TrySendError, bounded};
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 
@@ -64,6 +65,10 @@ impl Recorder {
         let entry = match event {
             Event::Imu(sample) => Entry::Imu(*sample),
             Event::Trigger(edge) => Entry::Trigger(*edge),
+            Event::Ship(sample) => {
+                Entry::Ship(ShipEntry { arrival: sample.arrival, sentence: line_of(sample) })
+            }
+            Event::Mark(mark) => Entry::Mark(*mark),
             Event::Frame(frame) => match &frame.jpeg {
                 Some(jpeg) => Entry::Frame(frame_entry(frame, jpeg.clone())),
                 None => return self.put(Item::Raw(frame.clone())),

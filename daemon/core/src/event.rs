@@ -15,6 +15,10 @@ pub enum Event {
     Frame(CameraFrame),
     /// The trigger was pressed or released.
     Trigger(TriggerEdge),
+    /// The ship's own instruments told its heading or attitude.
+    Ship(ShipSample),
+    /// The operator says that the gun stands at something of known bearing.
+    Mark(Mark),
     /// A fault came or went.
     Fault(FaultChange),
 }
@@ -26,6 +30,8 @@ impl Event {
             Self::Imu(s) => s.arrival,
             Self::Frame(f) => f.arrival,
             Self::Trigger(t) => t.time,
+            Self::Ship(s) => s.arrival,
+            Self::Mark(m) => m.time,
             Self::Fault(f) => f.time,
         }
     }
@@ -53,6 +59,41 @@ impl ImuSample {
             && self.accel.is_finite()
             && self.world_from_imu.is_none_or(|q| q.is_finite() && q.length() > 0.5)
     }
+}
+
+/// What the ship's own instruments said in one message. What they call invalid is absent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShipSample {
+    /// When its last byte reached the host: later than the measurement by the feed's latency.
+    pub arrival: Time,
+    /// True heading, radians clockwise from north, at least 0 and below a turn.
+    pub heading: Option<f64>,
+    /// Roll, radians, starboard down.
+    pub roll: Option<f64>,
+    /// Pitch, radians, bow up.
+    pub pitch: Option<f64>,
+    /// The instrument's own estimate of the heading's standard deviation, radians.
+    pub heading_sigma: Option<f64>,
+    /// The instrument says that it is not at its best: reduced quality, or not aligned yet.
+    pub reduced: bool,
+}
+
+/// What the gun stands at when the operator presses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MarkKind {
+    /// Its stow, or another place of known bearing on the mount.
+    Stow,
+    /// A landmark of known true bearing: the camera's axis lies on it.
+    Landmark,
+}
+
+/// The operator pressed while the gun stood at something of known bearing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// When it was pressed.
+    pub time: Time,
+    /// What it stood at.
+    pub kind: MarkKind,
 }
 
 /// How the bytes of a picture are laid out.

@@ -367,6 +367,8 @@ pub struct Hud {
     pub clock_s: f64,
     /// The sea that is drawn, where it is measured in the video.
     pub sea: Option<(WmoSeaState, SeaSource)>,
+    /// Standard deviation of the heading in tenths of a degree, where the sailor is to know it.
+    pub heading_tenths_deg: Option<u16>,
 }
 
 impl Hud {
@@ -379,5 +381,6 @@ impl Hud {
         hits: 0,
         clock_s: 0.0,
         sea: None,
+        heading_tenths_deg: None,
     };
 }

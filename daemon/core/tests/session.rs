@@ -101,6 +101,7 @@ fn session_with(text: &str, calibration: Calibration) -> Session {
         screen: (128, 96),
         video: PixelFormat::Rgb,
         orientation: Source::Auto,
+        heading: bowwave_core::session::HeadingSettings::default(),
     })
     .expect("every boat has a model")
 }

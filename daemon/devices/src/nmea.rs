@@ -5,10 +5,13 @@
 //! it) and `$PSXN,23` with its quality `$PSXN,20` (Kongsberg Seapath). Heading is clockwise from true north; roll is positive
 //! with starboard down, pitch with the bow up; all in radians.
 
-use bowwave_core::time::Time;
+use std::f64::consts::TAU;
 
+use bowwave_core::{event::ShipSample, time::Time};
+
+pub use crate::framing::LineCounters;
 use crate::{
-    framing::{Framing, LineCounters, Look, Scanner},
+    framing::{Framing, Look, Scanner},
     lines::{self, LINE_MAX_BYTES, number},
 };
 
@@ -43,25 +46,26 @@ pub enum Sentence {
     Psxn,
 }
 
-/// What one line says of the ship. What its instrument calls invalid is absent.
+impl Sentence {
+    /// Its name for people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hdt => "HDT",
+            Self::Pashr => "PASHR",
+            Self::Psxn => "PSXN",
+        }
+    }
+}
+
+/// What one line says of the ship.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShipAttitude {
-    /// When the last byte of the line reached the host.
-    pub arrival: Time,
     /// The line.
     pub sentence: Sentence,
     /// Time of the measurement, seconds of the UTC day, where the line tells it.
     pub utc_day_s: Option<f64>,
-    /// True heading, radians clockwise from north, at least 0 and below a turn.
-    pub heading: Option<f64>,
-    /// Roll, radians, starboard down.
-    pub roll: Option<f64>,
-    /// Pitch, radians, bow up.
-    pub pitch: Option<f64>,
-    /// The instrument's own estimate of the heading's standard deviation, radians.
-    pub heading_sigma: Option<f64>,
-    /// The instrument says that it is not at its best: reduced quality, or not aligned yet.
-    pub reduced: bool,
+    /// What it says.
+    pub sample: ShipSample,
 }
 
 /// Quality of `$PSXN,20`: 0 normal, 1 reduced, 2 invalid.
@@ -95,6 +99,11 @@ impl ShipParser {
         self.scanner.counters()
     }
 
+    /// The line was interrupted: what an instrument said of its quality before may no longer hold.
+    pub fn restart(&mut self) {
+        self.quality = Quality::default();
+    }
+
     /// Takes bytes that arrived together at `arrival` and calls `sink` with what each line that they complete says.
     pub fn push(&mut self, bytes: &[u8], arrival: Time, mut sink: impl FnMut(ShipAttitude)) {
         let Self { scanner, quality } = self;
@@ -112,45 +121,65 @@ fn read(body: &str, quality: &mut Quality, arrival: Time) -> Option<ShipAttitude
     let mut fields = body.split(',');
     let address = fields.next()?;
     let fields: [&str; 11] = std::array::from_fn(|_| fields.next().unwrap_or_default());
-    let nothing = |sentence| ShipAttitude {
-        arrival,
-        sentence,
-        utc_day_s: None,
-        heading: None,
-        roll: None,
-        pitch: None,
-        heading_sigma: None,
-        reduced: false,
-    };
-    let said = match (address, fields) {
+    let nothing =
+        ShipSample { arrival, heading: None, roll: None, pitch: None, heading_sigma: None, reduced: false };
+    let (sentence, utc_day_s, sample) = match (address, fields) {
         (address, [degrees, "T", ..]) if address.len() == 5 && address.ends_with("HDT") => {
-            ShipAttitude { heading: heading(degrees), ..nothing(Sentence::Hdt) }
+            (Sentence::Hdt, None, ShipSample { heading: heading(degrees), ..nothing })
         }
-        ("PASHR", [time, degrees, "T", roll, pitch, _, _, _, sigma, _, aligned]) => ShipAttitude {
-            utc_day_s: utc_day_s(time),
-            heading: heading(degrees),
-            roll: angle(roll, 180.0),
-            pitch: angle(pitch, 90.0),
-            heading_sigma: angle(sigma, 180.0).filter(|s| *s >= 0.0),
-            reduced: aligned == "0",
-            ..nothing(Sentence::Pashr)
-        },
+        ("PASHR", [time, degrees, "T", roll, pitch, _, _, _, sigma, _, aligned]) => {
+            let sample = ShipSample {
+                heading: heading(degrees),
+                roll: angle(roll, 180.0),
+                pitch: angle(pitch, 90.0),
+                heading_sigma: angle(sigma, 180.0).filter(|s| *s >= 0.0),
+                reduced: aligned == "0",
+                ..nothing
+            };
+            (Sentence::Pashr, utc_day_s(time), sample)
+        }
         ("PSXN", ["20", _, _, heading, roll_pitch, ..]) => {
             // What is no number is as good as invalid.
             let of = |field: &str| field.parse().unwrap_or(2);
             *quality = Quality { heading: of(heading), roll_pitch: of(roll_pitch) };
             return None;
         }
-        ("PSXN", ["23", roll, pitch, degrees, ..]) => ShipAttitude {
-            heading: heading(degrees).filter(|_| quality.heading < 2),
-            roll: angle(roll, 180.0).filter(|_| quality.roll_pitch < 2),
-            pitch: angle(pitch, 90.0).filter(|_| quality.roll_pitch < 2),
-            reduced: quality.heading.max(quality.roll_pitch) > 0,
-            ..nothing(Sentence::Psxn)
-        },
+        ("PSXN", ["23", roll, pitch, degrees, ..]) => {
+            let sample = ShipSample {
+                heading: heading(degrees).filter(|_| quality.heading < 2),
+                roll: angle(roll, 180.0).filter(|_| quality.roll_pitch < 2),
+                pitch: angle(pitch, 90.0).filter(|_| quality.roll_pitch < 2),
+                reduced: quality.heading.max(quality.roll_pitch) > 0,
+                ..nothing
+            };
+            (Sentence::Psxn, None, sample)
+        }
         _ => return None,
     };
-    (said.heading.is_some() || said.roll.is_some() || said.pitch.is_some()).then_some(said)
+    let says = sample.heading.is_some() || sample.roll.is_some() || sample.pitch.is_some();
+    says.then_some(ShipAttitude { sentence, utc_day_s, sample })
+}
+
+/// The line that says `sample`: `$HEHDT` where it tells nothing but a heading, else `$PASHR` without a time of day. Read again it is
+/// the same to a billionth of a degree, and to the bit where its numbers came from a line with as many digits.
+pub fn line_of(sample: &ShipSample) -> String {
+    let plain =
+        sample.roll.is_none() && sample.pitch.is_none() && sample.heading_sigma.is_none() && !sample.reduced;
+    let degrees = |angle: Option<f64>| {
+        // A billionth of a degree has no more digits than what is read here.
+        angle.map_or_else(String::new, |a| format!("{:.9}", a.to_degrees()))
+    };
+    let heading = degrees(sample.heading.map(|h| h.rem_euclid(TAU)));
+    let body = if plain {
+        format!("HEHDT,{heading},T")
+    } else {
+        let (roll, pitch, sigma) =
+            (degrees(sample.roll), degrees(sample.pitch), degrees(sample.heading_sigma));
+        let aligned = u8::from(!sample.reduced);
+        format!("PASHR,,{heading},T,{roll},{pitch},,,,{sigma},1,{aligned}")
+    };
+    let sum = body.bytes().fold(0, |sum, byte| sum ^ byte);
+    format!("${body}*{sum:02X}\r\n")
 }
 
 /// Degrees within `limit` either way, as radians.
@@ -215,19 +244,22 @@ mod tests {
             let (said, counters) = parse(LOGGED.as_bytes(), piece);
             assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (6, 0, 0));
             let [hdt, psxn, pashr] = said[..] else { panic!("{said:?}") };
-            assert_eq!((hdt.sentence, degrees(hdt.heading), hdt.roll), (Sentence::Hdt, Some(235.18), None));
+            assert_eq!(
+                (hdt.sentence, degrees(hdt.sample.heading), hdt.sample.roll),
+                (Sentence::Hdt, Some(235.18), None)
+            );
             assert_eq!(psxn.sentence, Sentence::Psxn);
             assert_eq!(
-                [psxn.roll, psxn.pitch, psxn.heading].map(degrees),
+                [psxn.sample.roll, psxn.sample.pitch, psxn.sample.heading].map(degrees),
                 [Some(-2.82), Some(1.0), Some(235.18)]
             );
-            assert!(!psxn.reduced);
+            assert!(!psxn.sample.reduced);
             assert_eq!(
-                [pashr.roll, pashr.pitch, pashr.heading].map(degrees),
+                [pashr.sample.roll, pashr.sample.pitch, pashr.sample.heading].map(degrees),
                 [Some(32.56), Some(48.49), Some(138.24)]
             );
-            assert_eq!(degrees(pashr.heading_sigma), Some(35.0));
-            assert!(pashr.reduced, "its inertial part is not aligned");
+            assert_eq!(degrees(pashr.sample.heading_sigma), Some(35.0));
+            assert!(pashr.sample.reduced, "its inertial part is not aligned");
             let utc = pashr.utc_day_s.expect("given");
             assert!((utc - 60_060.19).abs() < 1e-9, "{utc}");
         }
@@ -237,7 +269,8 @@ mod tests {
     fn what_an_instrument_calls_invalid_is_absent() {
         let bad = [line("PSXN,20,0,0,2,1"), line("PSXN,23,1.5,-0.5,10.0,0.1")].concat();
         let (said, _) = parse(bad.as_bytes(), 7);
-        assert_eq!((said[0].heading, degrees(said[0].roll), said[0].reduced), (None, Some(1.5), true));
+        let bad = said[0].sample;
+        assert_eq!((bad.heading, degrees(bad.roll), bad.reduced), (None, Some(1.5), true));
         let nothing = [
             line("PSXN,20,0,0,2,2"),
             line("PSXN,23,1.5,-0.5,10.0,0.1"),
@@ -253,7 +286,7 @@ mod tests {
             (Vec::new(), LineCounters { packets: 7, ..LineCounters::default() })
         );
         let north = parse(line("HEHDT,360.0,T").as_bytes(), 3).0;
-        assert_eq!(north[0].heading, Some(0.0));
+        assert_eq!(north[0].sample.heading, Some(0.0));
     }
 
     #[test]
@@ -275,6 +308,29 @@ mod tests {
             prop_assert!(parser.scanner.held().0 <= LINE_MAX_BYTES);
         }
 
+        /// What a recording keeps is what was said.
+        #[test]
+        fn a_line_says_what_was_read(
+            heading in prop::option::of(0i64..360_000),
+            roll in prop::option::of(-180_000i64..180_000),
+            sigma in prop::option::of(0i64..10_000),
+            reduced in any::<bool>(),
+        ) {
+            let angle = |v: Option<i64>| v.map(|v| (v as f64 / 1000.0).to_radians());
+            let sample = ShipSample {
+                arrival: Time::from_ns(3),
+                heading: angle(heading),
+                roll: angle(roll),
+                pitch: angle(roll.map(|r| r / 2)),
+                heading_sigma: angle(sigma),
+                reduced,
+            };
+            let (said, counters) = parse(line_of(&sample).as_bytes(), 11);
+            prop_assert_eq!(counters, LineCounters { packets: 1, ..LineCounters::default() });
+            let says = heading.is_some() || roll.is_some();
+            prop_assert_eq!(said.iter().map(|a| a.sample).collect::<Vec<_>>(), if says { vec![sample] } else { vec![] });
+        }
+
         /// Whatever lies between them, every line is found, in order and once.
         #[test]
         fn garbage_between_lines_loses_none(
@@ -287,7 +343,7 @@ mod tests {
                 bytes.extend(line(&format!("HEHDT,{n}.5,T")).bytes());
             }
             let (said, _) = parse(&bytes, piece);
-            let said: Vec<_> = said.iter().map(|a| degrees(a.heading)).collect();
+            let said: Vec<_> = said.iter().map(|a| degrees(a.sample.heading)).collect();
             prop_assert_eq!(said, (0..gaps.len()).map(|n| Some(n as f64 + 0.5)).collect::<Vec<_>>());
         }
     }

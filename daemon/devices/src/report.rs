@@ -6,7 +6,7 @@ use std::sync::{
 };
 
 use bowwave_core::{
-    fault::{Fault, FaultChange},
+    fault::{Change, Fault, FaultBoard, FaultChange},
     time::Time,
 };
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -96,6 +96,21 @@ impl Reports {
     /// The changes since the last call, in their order.
     pub fn changes(&self) -> impl Iterator<Item = FaultChange> + '_ {
         self.changes.try_iter()
+    }
+
+    /// The faults that are there after all changes since the last call, with their newest causes.
+    pub fn left(&self) -> Vec<(Fault, String)> {
+        let mut board = FaultBoard::new();
+        let mut causes: Vec<(Fault, String)> = Vec::new();
+        for change in self.changes() {
+            if let Change::Raised { cause } = &change.change {
+                causes.retain(|(fault, _)| *fault != change.fault);
+                causes.push((change.fault, cause.clone()));
+            }
+            board.take(&change);
+        }
+        causes.retain(|(fault, _)| board.is_active(*fault));
+        causes
     }
 
     /// Changes lost because nobody looked.

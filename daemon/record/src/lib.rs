@@ -12,6 +12,6 @@ pub use journal::{
 };
 pub use recording::{
     CameraInfo, Counts, Entries, Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingReader,
-    RecordingWriter, RecoverReport, WrittenSummary, recover,
+    RecordingWriter, RecoverReport, SENTENCE_MAX_BYTES, ShipEntry, WrittenSummary, recover,
 };
 pub use space::{Room, SpaceWatch};

@@ -12,12 +12,12 @@ mod support;
 use std::{fs, sync::Arc};
 
 use bowwave_core::{
-    event::{ImuSample, TriggerEdge},
+    event::{ImuSample, Mark, MarkKind, TriggerEdge},
     geometry::CameraPose,
     time::Time,
 };
 use bowwave_record::{
-    Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingReader, RecordingWriter,
+    Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingReader, RecordingWriter, ShipEntry,
 };
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
@@ -217,6 +217,9 @@ fn entry(ms: i64) -> impl Strategy<Value = Entry> {
                 jpeg: Arc::from(bytes),
             })),
         any::<bool>().prop_map(move |pressed| Entry::Trigger(TriggerEdge { time, pressed })),
+        "[ -~]{1,80}\r\n".prop_map(move |sentence| Entry::Ship(ShipEntry { arrival: time, sentence })),
+        prop_oneof![Just(MarkKind::Stow), Just(MarkKind::Landmark)]
+            .prop_map(move |kind| Entry::Mark(Mark { time, kind })),
         pose().prop_map(move |pose| Entry::Truth(PoseEntry { time, pose })),
         pose().prop_map(move |pose| Entry::Pose(PoseEntry { time, pose })),
     ]

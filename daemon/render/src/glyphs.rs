@@ -1,4 +1,4 @@
-//! The glyphs of the head-up display, rasterised once: printable ASCII in two sizes in one atlas of coverage bytes.
+//! The glyphs of the head-up display, rasterised once: printable ASCII and two signs more in two sizes in one atlas of coverage bytes.
 
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont};
 
@@ -8,7 +8,10 @@ use crate::error::RenderError;
 const FONT: &[u8] = include_bytes!("../assets/B612-Bold.otf");
 
 const FIRST: u8 = b' ';
-const COUNT: usize = (b'~' - b' ') as usize + 1;
+const ASCII: usize = (b'~' - b' ') as usize + 1;
+/// What an uncertainty in degrees is written with.
+const SIGNS: [char; 2] = ['±', '°'];
+const COUNT: usize = ASCII + SIGNS.len();
 
 /// One of the two sizes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +78,8 @@ impl Glyphs {
                 glyphs.cap[size] = capital * scaled.v_scale_factor();
             }
             for index in 0..COUNT {
-                let id = scaled.glyph_id(char::from(FIRST + index as u8));
+                let sign = index.checked_sub(ASCII).and_then(|at| SIGNS.get(at).copied());
+                let id = scaled.glyph_id(sign.unwrap_or_else(|| char::from(FIRST + index as u8)));
                 let advance = scaled.h_advance(id);
                 let Some(outline) = scaled.outline_glyph(id.with_scale(px)) else {
                     glyphs.glyphs[size][index].advance = advance;
@@ -109,9 +113,11 @@ impl Glyphs {
 
     /// The glyph of `c`; that of "?" for what is not in the atlas.
     pub(crate) fn get(&self, size: TextSize, c: char) -> &Glyph {
-        let index = u8::try_from(c).ok().and_then(|c| c.checked_sub(FIRST)).map_or(usize::MAX, usize::from);
+        let ascii = u8::try_from(c).ok().and_then(|c| c.checked_sub(FIRST)).map(usize::from);
+        let sign = || SIGNS.iter().position(|sign| *sign == c).map(|at| ASCII + at);
+        let index = ascii.filter(|index| *index < ASCII).or_else(sign);
         let row = &self.glyphs[size as usize];
-        row.get(index).unwrap_or(&row[usize::from(b'?' - FIRST)])
+        index.and_then(|index| row.get(index)).unwrap_or(&row[usize::from(b'?' - FIRST)])
     }
 
     /// Height of a line, pixels.

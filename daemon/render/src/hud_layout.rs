@@ -98,6 +98,9 @@ impl HudLayout {
         if let Some((state, source)) = hud.sea {
             self.sea(glyphs, state, source);
         }
+        if let Some(tenths) = hud.heading_tenths_deg {
+            self.heading(glyphs, tenths, if hud.sea.is_some() { 2 } else { 1 });
+        }
         self.counts(glyphs, hud);
         let top = self.status(glyphs, &hud.status);
         if let Some(fault) = hud.warning {
@@ -236,22 +239,33 @@ impl HudLayout {
 
     /// State of the sea that is drawn and where it comes from, below the clock.
     fn sea(&mut self, glyphs: &Glyphs, state: WmoSeaState, source: SeaSource) {
-        let mut text = std::mem::take(&mut self.text);
-        text.clear();
         let word = match source {
             SeaSource::Ordered => "ORDERED",
             SeaSource::Measured => "VIDEO",
             SeaSource::Kept => "KEPT",
             SeaSource::Assumed => "ASSUMED",
         };
+        self.below_clock(glyphs, 1, WHITE, format_args!("SEA {} {word}", state.get()));
+    }
+
+    /// How well the heading is known, below the clock and what stands there: it is told only where that is worse than it should be.
+    fn heading(&mut self, glyphs: &Glyphs, tenths_deg: u16, row: u8) {
+        let deg = f32::from(tenths_deg) / 10.0;
+        self.below_clock(glyphs, row, AMBER, format_args!("HDG ±{deg:.1}°"));
+    }
+
+    /// A line of text so many rows below the clock.
+    fn below_clock(&mut self, glyphs: &Glyphs, row: u8, colour: [f32; 3], words: std::fmt::Arguments<'_>) {
+        let mut text = std::mem::take(&mut self.text);
+        text.clear();
         // Writing to a String cannot fail.
-        let _ = write!(text, "SEA {} {word}", state.get());
+        let _ = text.write_fmt(words);
         let pad = self.pad();
         let line = glyphs.line(TextSize::Small);
         // The plates are of whole pixels.
-        let (top, width) = ((pad + line).ceil(), glyphs.width_of(TextSize::Small, &text));
+        let (top, width) = ((pad + f32::from(row) * line).ceil(), glyphs.width_of(TextSize::Small, &text));
         self.plate([pad, top, 3.0 * pad + width, top + line]);
-        self.text(glyphs, TextSize::Small, (2.0 * pad, top), WHITE, &text);
+        self.text(glyphs, TextSize::Small, (2.0 * pad, top), colour, &text);
         self.text = text;
     }
 

@@ -7,7 +7,7 @@ const SIZES: [(u32, u32); 7] =
     [(800, 480), (640, 360), (320, 180), (1024, 600), (1280, 720), (640, 480), (1920, 1080)];
 
 fn hud(status: Status, warning: Option<Fault>) -> Hud {
-    Hud { status, warning, rounds_left: 9999, shots: 9999, hits: 9999, clock_s: 359_999.0, sea: None }
+    Hud { status, warning, rounds_left: 9999, shots: 9999, hits: 9999, clock_s: 359_999.0, ..Hud::READY }
 }
 
 fn shown(fault: Fault) -> Option<Status> {
@@ -58,6 +58,26 @@ fn the_sea_stands_below_the_clock_and_hides_nothing() {
             check(size, quads, &format!("{source:?}"));
             assert!(glyph_count(quads) > without + letters("SEA 3"), "{source:?} at {size:?}");
         }
+    }
+}
+
+#[test]
+fn the_headings_uncertainty_stands_below_and_hides_nothing() {
+    for size in SIZES {
+        let (large, small) = text_px(size);
+        let glyphs = Glyphs::new(large, small).unwrap();
+        let mut layout = HudLayout::new(size);
+        let plain = glyph_count(layout.lay_out(&glyphs, &hud(Status::Ready, None)));
+        for sea in [None, WmoSeaState::new(3).map(|s| (s, SeaSource::Assumed))] {
+            let without = Hud { sea, ..hud(Status::Ready, None) };
+            let other = glyph_count(layout.lay_out(&glyphs, &without));
+            let quads = layout.lay_out(&glyphs, &Hud { heading_tenths_deg: Some(1234), ..without });
+            check(size, quads, "heading");
+            assert_eq!(glyph_count(quads), other + letters("HDG ±123.4°"), "{plain} at {size:?}");
+        }
+        // Neither sign is the question mark that stands for what the font lacks.
+        let unknown = glyphs.get(TextSize::Small, '?').uv;
+        assert!(['±', '°'].iter().all(|sign| glyphs.get(TextSize::Small, *sign).uv != unknown));
     }
 }
 

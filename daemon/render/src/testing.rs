@@ -47,6 +47,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             hits: 3,
             clock_s: 83.0,
             sea: None,
+            heading_tenths_deg: None,
         },
     }
 }

@@ -1,4 +1,4 @@
-//! Makes recordings with known truth: a sea, a camera on a ship, an inertial unit and a trigger.
+//! Makes recordings with known truth: a sea, a camera on a ship, an inertial unit, a trigger, and the ship's own heading.
 //!
 //! [`make`] writes what a [`Recipe`] says. Everything in a recording repeats after its length, so that it can be replayed in a
 //! loop without a seam: every wave's frequency, the ship, the gun and the slow errors have a whole number of cycles in it.
@@ -26,6 +26,7 @@ mod noise;
 mod patches;
 mod recipe;
 mod shade;
+mod ship;
 mod sky;
 mod spectrum;
 mod studio;
@@ -34,7 +35,8 @@ mod write;
 pub use fresnel::{SEA_WATER_INDEX, reflectance};
 pub use imu::samples as imu_samples;
 pub use motion::{GRAVITY, GunMotion, Harmonic, Motion, MotionState, Periodic, ShipMotion};
-pub use recipe::{Burst, CameraRecipe, ImuRecipe, Recipe};
+pub use recipe::{Burst, CameraRecipe, ImuRecipe, Recipe, ShipFeedRecipe};
+pub use ship::samples as ship_samples;
 pub use sky::SkyRecipe;
 pub use spectrum::{Swell, angular_frequency, cox_munk, wind_speed};
 pub use studio::{Shot, Studio};

@@ -112,6 +112,12 @@ impl Motion {
             .all(|p| p.is_finite())
     }
 
+    /// The ship's heading (clockwise from north), pitch (bow up) and roll (starboard down) `time_s` seconds after the recording's
+    /// start, radians.
+    pub fn ship_at(&self, time_s: f64) -> [f64; 3] {
+        [&self.ship.heading, &self.ship.pitch, &self.ship.roll].map(|p| p.at(time_s, self.period_s)[0])
+    }
+
     /// The state `time_s` seconds after the recording's start.
     pub fn at(&self, time_s: f64) -> MotionState {
         let value = |p: &Periodic| p.at(time_s, self.period_s);

@@ -1,6 +1,7 @@
 //! What to make: all numbers of a recording.
 
 use bowwave_core::{
+    event::MarkKind,
     geometry::{Distortion, Lens},
     sea::BeaufortForce,
 };
@@ -47,6 +48,10 @@ pub struct Recipe {
     pub gun: GunMotion,
     /// The inertial unit.
     pub imu: ImuRecipe,
+    /// The ship's own heading, where it reaches the gun.
+    pub ship_feed: Option<ShipFeedRecipe>,
+    /// When the operator presses, and at what the gun then stands by its motion, seconds after the recording's start.
+    pub marks: Vec<(f64, MarkKind)>,
     /// When the trigger is pressed.
     pub trigger: Vec<Burst>,
     /// The scenario that belongs to the recording, where there is one.
@@ -111,6 +116,38 @@ pub struct ImuRecipe {
     pub latency_ns: [i64; 2],
 }
 
+/// The ship's own heading as lines of `$HEHDT`, or of `$PASHR` with roll and pitch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShipFeedRecipe {
+    /// Lines a second; a whole number within the recording.
+    pub rate_hz: f64,
+    /// Deviation of the heading's white noise, radians.
+    pub noise: f64,
+    /// What it is wrong by all the time, radians.
+    pub offset: f64,
+    /// Smallest step of what is told, degrees.
+    pub step_deg: f64,
+    /// Whether roll and pitch are told, too.
+    pub attitude: bool,
+    /// From the measurement to the line's last byte at the host, nanoseconds, least and most.
+    pub latency_ns: [i64; 2],
+}
+
+impl Default for ShipFeedRecipe {
+    fn default() -> Self {
+        let deg = f64::to_radians;
+        // A gyro compass: ten lines a second in tenths of a degree, 20 characters each at 4800 baud.
+        Self {
+            rate_hz: 10.0,
+            noise: deg(0.05),
+            offset: 0.0,
+            step_deg: 0.1,
+            attitude: false,
+            latency_ns: [60_000_000, 75_000_000],
+        }
+    }
+}
+
 /// One pull of the trigger.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Burst {
@@ -158,6 +195,8 @@ impl Default for Recipe {
                 elevation: turn(-6.2, &[(2, 0.9, 2.0), (3, 0.5, 0.2), (7, 0.12, 0.0)]),
             },
             imu: ImuRecipe::default(),
+            ship_feed: None,
+            marks: Vec::new(),
             trigger: vec![burst(3.2, 0.45), burst(6.1, 0.3), burst(10.4, 0.8), burst(15.7, 0.5)],
             scenario_toml: None,
         }
@@ -288,13 +327,15 @@ impl Recipe {
             inside("swell.height_m", swell.height_m, 0.0, 12.0, "0 to 12 m")?;
             inside("swell.period_s", swell.period_s, 2.0, 20.0, "2 to 20 s")?;
         }
-        for (what, latency) in
-            [("camera.latency_ns", camera.latency_ns), ("imu.latency_ns", self.imu.latency_ns)]
-        {
+        let feed = self.ship_feed.iter().map(|feed| ("ship_feed.latency_ns", feed.latency_ns));
+        let latencies = [("camera.latency_ns", camera.latency_ns), ("imu.latency_ns", self.imu.latency_ns)];
+        for (what, latency) in latencies.into_iter().chain(feed) {
             inside(what, latency[0] as f64, 0.0, latency[1] as f64, "0 to the greatest latency")?;
             inside(what, latency[1] as f64, 0.0, 2e8, "0 to 200 ms")?;
         }
-        for (what, rate) in [("frame_rate_hz", self.frame_rate_hz), ("imu.rate_hz", self.imu.rate_hz)] {
+        let feed = self.ship_feed.iter().map(|feed| ("ship_feed.rate_hz", feed.rate_hz));
+        let rates = [("frame_rate_hz", self.frame_rate_hz), ("imu.rate_hz", self.imu.rate_hz)];
+        for (what, rate) in rates.into_iter().chain(feed) {
             let count = self.duration_s * rate;
             if (count - count.round()).abs() > 1e-6 {
                 return bad(what, rate, "a whole number within duration_s, or the recording cannot loop");
@@ -302,6 +343,13 @@ impl Recipe {
         }
         if !self.motion().is_finite() {
             return bad("ship or gun", f64::NAN, "finite motions");
+        }
+        if let Some(feed) = &self.ship_feed {
+            inside("ship_feed.rate_hz", feed.rate_hz, 0.1, 50.0, "0.1 to 50 Hz")?;
+            inside("ship_feed.step_deg", feed.step_deg, 1e-6, 10.0, "above 0, to 10 degrees")?;
+        }
+        for (time_s, _) in &self.marks {
+            inside("marks", *time_s, 0.0, self.duration_s, "within the recording")?;
         }
         for burst in &self.trigger {
             inside("trigger.start_s", burst.start_s, 0.0, self.duration_s, "within the recording")?;

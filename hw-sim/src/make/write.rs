@@ -5,10 +5,11 @@ use std::{collections::BTreeMap, path::Path, sync::Arc};
 use bowwave_calibration::{CalibrationFile, Date, to_toml};
 use bowwave_core::{
     calibration::Calibration,
-    event::TriggerEdge,
+    event::{Mark, TriggerEdge},
     time::{Time, secs_to_ns},
 };
-use bowwave_record::{CameraInfo, Entry, FrameEntry, PoseEntry, Properties, RecordingWriter};
+use bowwave_devices::nmea::line_of;
+use bowwave_record::{CameraInfo, Entry, FrameEntry, PoseEntry, Properties, RecordingWriter, ShipEntry};
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
@@ -16,6 +17,7 @@ use super::{
     MakeError, Recipe,
     imu::{self, draw_latency},
     noise::stream,
+    ship,
     studio::{Shot, Studio},
 };
 
@@ -89,7 +91,7 @@ pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) ->
     })
 }
 
-/// Samples and trigger edges in the order in which the host meets them.
+/// Samples, trigger edges, the ship's lines and the operator's presses in the order in which the host meets them.
 fn measurements(recipe: &Recipe) -> Vec<Entry> {
     let mut entries: Vec<Entry> = imu::samples(recipe, START).into_iter().map(Entry::Imu).collect();
     for burst in &recipe.trigger {
@@ -98,6 +100,17 @@ fn measurements(recipe: &Recipe) -> Vec<Entry> {
         };
         entries.extend([edge(burst.start_s, true), edge(burst.start_s + burst.length_s, false)]);
     }
+    entries.extend(
+        ship::samples(recipe, START)
+            .into_iter()
+            .map(|sample| Entry::Ship(ShipEntry { arrival: sample.arrival, sentence: line_of(&sample) })),
+    );
+    entries.extend(
+        recipe
+            .marks
+            .iter()
+            .map(|&(time_s, kind)| Entry::Mark(Mark { time: START.plus_ns(secs_to_ns(time_s)), kind })),
+    );
     entries.sort_by_key(Entry::time);
     entries
 }

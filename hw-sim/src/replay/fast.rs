@@ -10,7 +10,10 @@ use bowwave_core::{
     event::{CameraFrame, Event},
     time::Time,
 };
-use bowwave_devices::imu::{ImuDecoder, ImuFormat};
+use bowwave_devices::{
+    imu::{ImuDecoder, ImuFormat},
+    nmea::ShipParser,
+};
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::{
@@ -45,6 +48,7 @@ impl FastReplay {
             wire,
             // What is simulated is known: no sample waits for a proof of its format.
             imu: ImuDecoder::fixed(ImuFormat::VectorNav),
+            ship: ShipParser::new(),
             frames: FrameDecoder::default(),
             triggers: 0,
             events: sender,
@@ -106,6 +110,7 @@ impl FastReplay {
 struct Producer {
     wire: Wire,
     imu: ImuDecoder,
+    ship: ShipParser,
     frames: FrameDecoder,
     triggers: u64,
     events: Sender<Result<Event, ReplayError>>,
@@ -147,6 +152,10 @@ impl Producer {
                     })));
                 }
             }
+            Item::Ship { due, bytes } => {
+                self.ship.push(&bytes, due, |said| ready.push(Ok(Event::Ship(said.sample))));
+            }
+            Item::Mark(mark) => ready.push(Ok(Event::Mark(mark))),
             Item::Trigger(edge) => {
                 self.triggers += 1;
                 ready.push(Ok(Event::Trigger(edge)));
@@ -158,6 +167,7 @@ impl Producer {
         let mut stats = locked(&self.stats);
         stats.frames = self.frames.counters();
         stats.imu.imu = self.imu.counters();
+        stats.ship = self.ship.counters();
         stats.triggers = self.triggers;
         stats.take(self.wire.counters());
     }

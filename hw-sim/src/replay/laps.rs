@@ -107,6 +107,11 @@ impl Laps {
         self.lap as u64 + 1
     }
 
+    /// Whether there are lines of a ship's instruments.
+    pub(super) const fn has_ship(&self) -> bool {
+        self.reader.counts().ship > 0
+    }
+
     /// Size of the pictures, as the recording states it.
     pub(super) const fn picture(&self) -> (u32, u32) {
         self.reader.properties().picture
@@ -181,6 +186,8 @@ impl Laps {
                 frame.sequence = frame.sequence.wrapping_add(round.wrapping_mul(self.lap as u32));
             }
             Entry::Trigger(edge) => edge.time = edge.time.plus_ns(shift),
+            Entry::Ship(line) => line.arrival = line.arrival.plus_ns(shift),
+            Entry::Mark(mark) => mark.time = mark.time.plus_ns(shift),
             Entry::Truth(pose) => {
                 pose.time = pose.time.plus_ns(shift);
                 if self.lap == 0 {
@@ -200,7 +207,7 @@ impl Laps {
                 let first = self.sequences.map_or(frame.sequence, |(first, _)| first);
                 self.sequences = Some((first, frame.sequence));
             }
-            Entry::Trigger(_) | Entry::Truth(_) | Entry::Pose(_) => {}
+            Entry::Trigger(_) | Entry::Ship(_) | Entry::Mark(_) | Entry::Truth(_) | Entry::Pose(_) => {}
         }
     }
 }

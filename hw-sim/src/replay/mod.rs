@@ -23,7 +23,10 @@ use std::{
 };
 
 use bowwave_core::{event::Event, geometry::CameraPose, time::Time};
-use bowwave_devices::serial::{PortCounters, SerialError};
+use bowwave_devices::{
+    nmea::LineCounters,
+    serial::{PortCounters, SerialError},
+};
 use bowwave_record::{Properties, RecordError, RecordingReader};
 
 pub use self::{decode::FrameCounters, fast::FastReplay, realtime::RealtimeReplay};
@@ -62,6 +65,8 @@ pub struct ReplayStats {
     pub frames_late: u64,
     /// What the inertial unit's line carried.
     pub imu: PortCounters,
+    /// What the line of the ship's instruments carried.
+    pub ship: LineCounters,
     /// Samples that no unit could have sent.
     pub imu_unsendable: u64,
     /// Bytes that the inertial unit's line lost because they were not read in time.
@@ -104,10 +109,8 @@ pub enum ReplayError {
         /// From its start to its last entry, seconds.
         length_s: f64,
     },
-    /// No pseudo-terminal for the simulated inertial unit.
-    #[error(
-        "cannot {what} the pseudo-terminal of the simulated inertial unit: {source}; is /dev/pts mounted?"
-    )]
+    /// No pseudo-terminal for a simulated device.
+    #[error("cannot {what} the pseudo-terminal of a simulated device: {source}; is /dev/pts mounted?")]
     Terminal {
         /// What was tried.
         what: &'static str,
@@ -115,7 +118,7 @@ pub enum ReplayError {
         source: io::Error,
     },
     /// The serial code cannot use the pseudo-terminal.
-    #[error("the simulated inertial unit's line: {0}")]
+    #[error("a simulated device's line: {0}")]
     Serial(#[from] SerialError),
     /// A thread could not be started.
     #[error("cannot start the replay's thread {name}: {source}; are too many processes running?")]

@@ -10,13 +10,13 @@ use std::{
 };
 
 use bowwave_core::{
-    event::{CameraFrame, Event, TriggerEdge},
+    event::{CameraFrame, Event, Mark, TriggerEdge},
     time::Time,
 };
 use bowwave_devices::{
     clock,
     queue::{NewestSender, newest},
-    serial::ImuPort,
+    serial::{ImuPort, ShipPort},
 };
 use bowwave_record::FrameEntry;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -55,12 +55,15 @@ const AHEAD_LINE: usize = 4096;
 
 /// The baud rate is a matter of form on a pseudo-terminal.
 const BAUD: u32 = 921_600;
+const SHIP_BAUD: u32 = 38_400;
 
 /// A replay on the host's clock. Its times are the recorded ones moved by one constant; samples of the inertial unit
 /// arrive when the serial code reads them, and keep the unit's own clock.
 pub struct RealtimeReplay {
     source: Source,
     port: ImuPort,
+    /// Where the recording has a ship's line.
+    ship: Option<ShipPort>,
     frames: Receiver<Event>,
     triggers: Receiver<Event>,
     errors: Receiver<ReplayError>,
@@ -68,15 +71,20 @@ pub struct RealtimeReplay {
     stats: Shared<ReplayStats>,
     reader: JoinHandle<()>,
     camera: JoinHandle<()>,
-    /// Gives its terminal back at its end, so that the line does not hang up before the port is closed.
-    line: JoinHandle<Terminal>,
+    /// Gives its terminals back at its end, so that no line hangs up before its port is closed.
+    line: JoinHandle<Terminals>,
 }
 
 impl RealtimeReplay {
     pub(super) fn open(path: &Path, options: &ReplayOptions) -> Result<Self, ReplayError> {
         let (source, wire) = Source::open(path, options, Some(clock::now().plus_ns(PREROLL_NS)))?;
-        let terminal = Terminal::open().map_err(|source| ReplayError::Terminal { what: "open", source })?;
-        let port = ImuPort::open(terminal.slave(), BAUD)?;
+        let terminal = || Terminal::open().map_err(|source| ReplayError::Terminal { what: "open", source });
+        let imu = terminal()?;
+        let port = ImuPort::open(imu.slave(), BAUD)?;
+        let ship_terminal = wire.has_ship().then(terminal).transpose()?;
+        let ship =
+            ship_terminal.as_ref().map(|terminal| ShipPort::open(terminal.slave(), SHIP_BAUD)).transpose()?;
+        let terminals = Terminals { imu, ship: ship_terminal };
         let stop = Arc::new(AtomicBool::new(false));
         let stats = Arc::new(Mutex::new(ReplayStats::default()));
         let pace = || Pace { stop: Arc::clone(&stop), stats: Arc::clone(&stats) };
@@ -85,7 +93,7 @@ impl RealtimeReplay {
         let (due_in, due) = bounded(AHEAD_LINE);
         let (frames_in, frames) = newest(QUEUE_FRAMES);
         let (triggers_in, triggers) = newest(QUEUE_TRIGGERS);
-        let line = Line { pace: pace(), due, terminal, triggers: triggers_in, errors: errors_in.clone() };
+        let line = Line { pace: pace(), due, terminals, triggers: triggers_in, errors: errors_in.clone() };
         let camera = Camera { pace: pace(), coded, decoder: FrameDecoder::default(), frames: frames_in };
         let reader = Reader { pace: pace(), wire, coded: coded_in, due: due_in, errors: errors_in };
         // Where one cannot be started, those before it end with their channels.
@@ -95,6 +103,7 @@ impl RealtimeReplay {
         Ok(Self {
             source,
             port,
+            ship,
             frames,
             triggers,
             errors,
@@ -116,6 +125,9 @@ impl RealtimeReplay {
         let ended = self.threads_ended();
         let before = out.len();
         out.extend(self.port.events().try_iter());
+        if let Some(ship) = &self.ship {
+            out.extend(ship.events().try_iter());
+        }
         out.extend(self.frames.try_iter());
         out.extend(self.triggers.try_iter());
         if let Some(fetched) = out.get_mut(before..) {
@@ -131,6 +143,7 @@ impl RealtimeReplay {
     pub fn finished(&self) -> bool {
         self.threads_ended()
             && self.port.events().is_empty()
+            && self.ship.as_ref().is_none_or(|ship| ship.events().is_empty())
             && self.frames.is_empty()
             && self.triggers.is_empty()
             && self.errors.is_empty()
@@ -142,7 +155,8 @@ impl RealtimeReplay {
 
     /// What was delivered and left out so far.
     pub fn stats(&self) -> ReplayStats {
-        ReplayStats { imu: self.port.counters(), ..*locked(&self.stats) }
+        let ship = self.ship.as_ref().map(|ship| ship.status().said.lines).unwrap_or_default();
+        ReplayStats { imu: self.port.counters(), ship, ..*locked(&self.stats) }
     }
 
     /// Ends the threads and closes the line.
@@ -154,10 +168,11 @@ impl RealtimeReplay {
         let camera = self.camera.join().map_err(broke_down("replay-camera"));
         let reader = self.reader.join().map_err(broke_down("replay-reader"));
         let imu = self.port.stop()?;
+        let ship = self.ship.map(ShipPort::stop).transpose()?.map(|ship| ship.said.lines).unwrap_or_default();
         drop(line?);
         camera?;
         reader?;
-        Ok(ReplayStats { imu, ..*locked(&self.stats) })
+        Ok(ReplayStats { imu, ship, ..*locked(&self.stats) })
     }
 }
 
@@ -222,7 +237,9 @@ struct Reader {
 /// What the line's thread does at a time.
 enum Due {
     Bytes(Time, Vec<u8>),
+    Ship(Time, Vec<u8>),
     Trigger(TriggerEdge),
+    Mark(Mark),
 }
 
 impl Reader {
@@ -232,7 +249,9 @@ impl Reader {
             let taken = match item {
                 Ok(Item::Frame(frame)) => self.coded.send(frame).is_ok(),
                 Ok(Item::Bytes { due, bytes }) => self.due.send(Due::Bytes(due, bytes)).is_ok(),
+                Ok(Item::Ship { due, bytes }) => self.due.send(Due::Ship(due, bytes)).is_ok(),
                 Ok(Item::Trigger(edge)) => self.due.send(Due::Trigger(edge)).is_ok(),
+                Ok(Item::Mark(mark)) => self.due.send(Due::Mark(mark)).is_ok(),
                 Err(error) => {
                     // Room for one from each sender; where it is full something else has been reported.
                     drop(self.errors.try_send(error.into()));
@@ -247,35 +266,35 @@ impl Reader {
     }
 }
 
-/// The inertial unit and the trigger switch.
+/// The ends of the lines that the devices hold.
+struct Terminals {
+    imu: Terminal,
+    ship: Option<Terminal>,
+}
+
+/// The inertial unit, the ship's instruments, the trigger switch and the operator.
 struct Line {
     pace: Pace,
     due: Receiver<Due>,
-    terminal: Terminal,
+    terminals: Terminals,
     triggers: NewestSender<Event>,
     errors: Sender<ReplayError>,
 }
 
 impl Line {
-    fn run(mut self) -> Terminal {
+    fn run(mut self) -> Terminals {
         while let Ok(due) = self.due.recv() {
             let time = match &due {
-                Due::Bytes(time, _) => *time,
+                Due::Bytes(time, _) | Due::Ship(time, _) => *time,
                 Due::Trigger(edge) => edge.time,
+                Due::Mark(mark) => mark.time,
             };
             if !self.pace.wait(time) {
-                return self.terminal;
+                return self.terminals;
             }
-            match due {
-                Due::Bytes(_, bytes) => match self.terminal.send(&bytes) {
-                    Ok(0) => {}
-                    Ok(lost) => self.pace.count(|stats| stats.line_lost_bytes += lost as u64),
-                    Err(source) => {
-                        // As above: the first report is enough.
-                        drop(self.errors.try_send(ReplayError::Terminal { what: "write to", source }));
-                        return self.terminal;
-                    }
-                },
+            let sent = match due {
+                Due::Bytes(_, bytes) => self.terminals.imu.send(&bytes),
+                Due::Ship(_, bytes) => self.terminals.ship.as_ref().map_or(Ok(0), |t| t.send(&bytes)),
                 Due::Trigger(edge) => {
                     self.triggers.send(Event::Trigger(edge));
                     let overwritten = self.triggers.dropped();
@@ -283,11 +302,25 @@ impl Line {
                         stats.triggers += 1;
                         stats.triggers_overwritten = overwritten;
                     });
+                    Ok(0)
+                }
+                Due::Mark(mark) => {
+                    self.triggers.send(Event::Mark(mark));
+                    Ok(0)
+                }
+            };
+            match sent {
+                Ok(0) => {}
+                Ok(lost) => self.pace.count(|stats| stats.line_lost_bytes += lost as u64),
+                Err(source) => {
+                    // As above: the first report is enough.
+                    drop(self.errors.try_send(ReplayError::Terminal { what: "write to", source }));
+                    return self.terminals;
                 }
             }
         }
         self.pace.wait(clock::now().plus_ns(LINGER_NS));
-        self.terminal
+        self.terminals
     }
 }
 

@@ -4,12 +4,12 @@ use std::{
 };
 
 use bowwave_core::{
-    event::{CameraFrame, Event, ImuSample, TriggerEdge},
+    event::{CameraFrame, Event, ImuSample, Mark, MarkKind, ShipSample, TriggerEdge},
     geometry::{CameraPose, look},
     time::Time,
 };
-use bowwave_devices::clock;
-use bowwave_record::{Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingWriter};
+use bowwave_devices::{clock, nmea::line_of};
+use bowwave_record::{Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingWriter, ShipEntry};
 use glam::{DQuat, DVec3};
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 
@@ -119,6 +119,74 @@ fn frames(events: &[Event]) -> Vec<&CameraFrame> {
 
 fn triggers(events: &[Event]) -> Vec<TriggerEdge> {
     events.iter().filter_map(|e| if let Event::Trigger(t) = e { Some(*t) } else { None }).collect()
+}
+
+/// Ten lines of the ship's a second, through north, and two presses of the operator.
+fn with_ship() -> Vec<Entry> {
+    let mut entries = entries();
+    entries.extend((0..10).map(|n| {
+        let sample = ship(n);
+        Entry::Ship(ShipEntry { arrival: sample.arrival, sentence: line_of(&sample) })
+    }));
+    entries.extend(
+        [(150, MarkKind::Stow), (850, MarkKind::Landmark)]
+            .map(|(ms, kind)| Entry::Mark(Mark { time: START.plus_ns(ms * MS), kind })),
+    );
+    entries.sort_by_key(Entry::time);
+    entries
+}
+
+fn ship(n: i64) -> ShipSample {
+    let attitude = (n % 3 == 0).then_some(0.01 * n as f64);
+    ShipSample {
+        arrival: START.plus_ns(n * 100 * MS + 11 * MS),
+        heading: Some(((355 + n) as f64).rem_euclid(360.0).to_radians()),
+        roll: attitude,
+        pitch: attitude,
+        heading_sigma: None,
+        reduced: false,
+    }
+}
+
+fn ships(events: &[Event]) -> Vec<ShipSample> {
+    events.iter().filter_map(|e| if let Event::Ship(s) = e { Some(*s) } else { None }).collect()
+}
+
+fn marks(events: &[Event]) -> Vec<MarkKind> {
+    events.iter().filter_map(|e| if let Event::Mark(m) = e { Some(m.kind) } else { None }).collect()
+}
+
+#[test]
+fn a_ships_lines_and_presses_come_back_in_both_modes() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = write(folder.path(), &with_ship(), Some(PERIOD));
+    let (events, stats) = fast(&path, &options(2_000, FaultPlan::default()));
+    assert!(events.is_sorted_by_key(Event::arrival));
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-10;
+    for (n, got) in (0..20).zip(ships(&events)) {
+        let sent = ship(n % 10);
+        assert_eq!(got.arrival.ns_since(sent.arrival), n / 10 * PERIOD);
+        assert!(near(got.heading.expect("told"), sent.heading.expect("told")), "{got:?}");
+        assert_eq!(got.roll.is_some(), sent.roll.is_some());
+    }
+    assert_eq!((ships(&events).len(), stats.ship.packets, stats.ship.bad_crc), (20, 20, 0));
+    assert_eq!(marks(&events), [MarkKind::Stow, MarkKind::Landmark, MarkKind::Stow, MarkKind::Landmark]);
+
+    let mut replay = Replay::realtime(&path, &options(1_000, FaultPlan::default())).expect("opens");
+    let (mut live, origin) = (Vec::new(), replay.origin());
+    while !replay.finished() {
+        replay.collect(Time::MIN, &mut live).expect("read");
+        clock::sleep_until(clock::now().plus_ns(5 * MS));
+    }
+    let stats = replay.stop().expect("stops");
+    let got = ships(&live);
+    assert_eq!((got.len(), stats.ship.packets), (10, 10));
+    for (n, got) in (0..).zip(&got) {
+        assert!(near(got.heading.expect("told"), ship(n).heading.expect("told")));
+        let late = got.arrival.ns_since(origin) - ship(n).arrival.ns_since(START);
+        assert!((0..500 * MS).contains(&late), "{late}");
+    }
+    assert_eq!(marks(&live), [MarkKind::Stow, MarkKind::Landmark]);
 }
 
 /// Everything about an event that a session could depend on.

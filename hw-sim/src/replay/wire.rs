@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bowwave_core::{
-    event::{ImuSample, TriggerEdge},
+    event::{ImuSample, Mark, TriggerEdge},
     time::Time,
 };
 use bowwave_devices::vectornav::CommonOutput;
@@ -25,6 +25,15 @@ pub(super) enum Item {
     Frame(FrameEntry),
     /// A trigger edge.
     Trigger(TriggerEdge),
+    /// Bytes on the line of the ship's instruments.
+    Ship {
+        /// When the last of them reaches the host.
+        due: Time,
+        /// A line.
+        bytes: Vec<u8>,
+    },
+    /// The operator's press.
+    Mark(Mark),
 }
 
 /// Items by replay time.
@@ -46,6 +55,11 @@ pub(super) struct WireCounters {
 impl Wire {
     pub(super) fn new(laps: Laps, origin: Time, faults: FaultPlan) -> Self {
         Self { laps, origin, injector: Injector::new(faults), unsendable: 0 }
+    }
+
+    /// Whether there is a ship's line at all.
+    pub(super) const fn has_ship(&self) -> bool {
+        self.laps.has_ship()
     }
 
     pub(super) const fn counters(&self) -> WireCounters {
@@ -96,6 +110,10 @@ impl Iterator for Wire {
                 Ok(Entry::Imu(sample)) => self.bytes(sample),
                 Ok(Entry::Frame(frame)) => self.frame(frame),
                 Ok(Entry::Trigger(edge)) => Some(Item::Trigger(edge)),
+                Ok(Entry::Ship(line)) => {
+                    Some(Item::Ship { due: line.arrival, bytes: line.sentence.into_bytes() })
+                }
+                Ok(Entry::Mark(mark)) => Some(Item::Mark(mark)),
                 // What is known afterwards comes over no wire.
                 Ok(Entry::Truth(_) | Entry::Pose(_)) => None,
                 Err(error) => return Some(Err(error)),

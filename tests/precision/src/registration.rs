@@ -165,6 +165,7 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
         screen: (lens.width, lens.height),
         video: PixelFormat::Rgb,
         orientation: how.source,
+        heading: bowwave_core::session::HeadingSettings::default(),
     })?;
     let motion = recipe.motion();
     let least = if recipe.gun.traverse.harmonics.is_empty() { 0.0 } else { SWUNG_DEG_S.to_radians() };

@@ -108,7 +108,7 @@ impl Opened {
                         }
                     }
                 }
-                Entry::Frame(_) | Entry::Truth(_) | Entry::Pose(_) => {}
+                Entry::Frame(_) | Entry::Truth(_) | Entry::Pose(_) | Entry::Ship(_) | Entry::Mark(_) => {}
             }
             Ok(())
         })?;

@@ -122,7 +122,7 @@ fn mode(text: &str) -> Result<WantedMode, String> {
 
 #[derive(Deserialize)]
 #[serde(untagged)]
-enum RawBaud {
+pub(super) enum RawBaud {
     One(u32),
     Several(Vec<u32>),
 }
@@ -153,22 +153,7 @@ impl RawImu {
     }
 
     pub(super) fn check(self, source: Source<'_>) -> Result<ImuSettings> {
-        let baud = match self.baud {
-            None => Baud::default(),
-            Some(value) => {
-                let place = value.span();
-                let (rates, baud) = match value.into_inner() {
-                    RawBaud::One(rate) => (vec![rate], Baud::Fixed(rate)),
-                    RawBaud::Several(rates) => (rates.clone(), Baud::Scan(rates)),
-                };
-                if rates.is_empty() || rates.len() > 16 || rates.contains(&0) {
-                    return Err(
-                        source.wrong(&place, "imu.baud: give a rate such as 115200, or 1 to 16 to try")
-                    );
-                }
-                baud
-            }
-        };
+        let baud = baud(source, self.baud, "imu.baud")?.unwrap_or_default();
         let format = self.format.map(|name| imu_format(source, &name)).transpose()?;
         let late = source.number(self.late_ms, "imu.late_ms", 1.0..=1000.0)?;
         let usual = ImuSettings::default();
@@ -180,6 +165,19 @@ impl RawImu {
             late: late.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
         })
     }
+}
+
+pub(super) fn baud(source: Source<'_>, value: Option<Spanned<RawBaud>>, name: &str) -> Result<Option<Baud>> {
+    let Some(value) = value else { return Ok(None) };
+    let place = value.span();
+    let (rates, baud) = match value.into_inner() {
+        RawBaud::One(rate) => (vec![rate], Baud::Fixed(rate)),
+        RawBaud::Several(rates) => (rates.clone(), Baud::Scan(rates)),
+    };
+    if rates.is_empty() || rates.len() > 16 || rates.contains(&0) {
+        return Err(source.wrong(&place, format!("{name}: give a rate such as 115200, or 1 to 16 to try")));
+    }
+    Ok(Some(baud))
 }
 
 fn imu_format(source: Source<'_>, name: &Spanned<String>) -> Result<ImuFormat> {

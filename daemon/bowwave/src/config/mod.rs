@@ -1,12 +1,14 @@
 //! The configuration file: raw TOML in, checked settings out. Unknown keys and bad values are refused with line and column.
 
 mod devices;
+mod heading;
 
 use std::{
     path::{Path, PathBuf},
     time::Duration,
 };
 
+pub use self::heading::HeadingChoice;
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
     attitude::Source as Orientation,
@@ -66,6 +68,8 @@ pub struct Config {
     pub imu: ImuSettings,
     /// Whose estimate of the orientation is used.
     pub orientation: Orientation,
+    /// Where headings come from beside the inertial unit.
+    pub heading: HeadingChoice,
     /// The trigger's line; without it nothing fires.
     pub trigger: Option<TriggerChoice>,
     /// The input that tells that the gun is inert; without it the trainer does not arm.
@@ -98,6 +102,10 @@ struct Raw {
     screen: RawScreen,
     camera: devices::RawCamera,
     imu: devices::RawImu,
+    ship: Option<heading::RawShip>,
+    rezero: Option<Spanned<heading::RawRezero>>,
+    landmarks: heading::RawLandmarks,
+    heading: heading::RawHeading,
     trigger: Option<devices::RawTrigger>,
     interlock: Option<devices::RawLine>,
     power_fail: Option<devices::RawLine>,
@@ -219,7 +227,14 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         let built_in = bowwave_core::scenario::BUILT_IN.iter().any(|(name, _)| p.as_os_str() == *name);
         if built_in { p } else { base.join(p) }
     });
+    let heading = heading::RawHeadings {
+        ship: raw.ship,
+        rezero: raw.rezero,
+        landmarks: raw.landmarks,
+        heading: raw.heading,
+    };
     Ok(Config {
+        heading: heading.check(source)?,
         output: raw.screen.output,
         size,
         lcd,

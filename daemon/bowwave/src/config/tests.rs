@@ -1,8 +1,9 @@
+use bowwave_core::event::MarkKind;
 use bowwave_devices::{
     camera::{Coding, Exposure, Rate, WhiteBalance},
     imu::ImuFormat,
     serial::Baud,
-    trigger::Bias,
+    trigger::{Bias, Press},
 };
 
 use super::*;
@@ -45,6 +46,22 @@ fn every_key_is_read() {
         orientation = "fused"
         low_latency = false
         late_ms = 12.5
+        [ship]
+        device = "/dev/serial/by-id/usb-Moxa_*-port0"
+        baud = [4800, 38400]
+        latency_ms = 70
+        sigma_deg = 0.4
+        [rezero]
+        input = { chip = "/dev/gpiochip0", line = "rezero", active_low = true }
+        from_bow_deg = -90
+        from_north_deg = 318.0
+        sigma_deg = 0.3
+        [landmarks]
+        at = [{ bearing_deg = 41.3, sigma_deg = 0.2 }, { bearing_deg = 127 }]
+        input = { chip = "/dev/gpiochip0", line = 9 }
+        [heading]
+        growth_deg_per_h = 36
+        shown_above_deg = 0.4
         [trigger]
         chip = "/dev/gpiochip0"
         line = 17
@@ -94,6 +111,24 @@ fn every_key_is_read() {
         active_low,
         bias,
     };
+    let heading = &config.heading;
+    let ship = heading.ship.as_ref().unwrap();
+    assert_eq!(ship.device, Path::new("/dev/serial/by-id/usb-Moxa_*-port0"));
+    assert_eq!(ship.baud, Baud::Scan(vec![4_800, 38_400]));
+    let s = &heading.settings;
+    assert_eq!((s.ship_latency_ns, s.ship_sigma), (70_000_000, 0.4f64.to_radians()));
+    let stow = s.stow.unwrap();
+    assert_eq!(stow.from_bow, Some((-90f64).to_radians()));
+    assert_eq!((stow.from_north, stow.sigma), (Some(318f64.to_radians()), 0.3f64.to_radians()));
+    let bearings: Vec<_> = s.landmarks.iter().map(|l| (l.bearing, l.sigma)).collect();
+    assert_eq!(
+        bearings,
+        [(41.3, 0.2), (127.0, 0.3)].map(|(b, s): (f64, f64)| (b.to_radians(), s.to_radians()))
+    );
+    assert_eq!((s.own_growth, s.shown_above), (Some(36f64.to_radians() / 3600.0), 0.4f64.to_radians()));
+    let rezero = Press { line: line("/dev/gpiochip0", "rezero", true, Bias::AsIs), kind: MarkKind::Stow };
+    let landmark = Press { line: line("/dev/gpiochip0", "9", false, Bias::AsIs), kind: MarkKind::Landmark };
+    assert_eq!(heading.presses, [rezero, landmark]);
     let trigger = line("/dev/gpiochip0", "17", true, Bias::AsIs);
     assert_eq!(config.trigger, Some(TriggerChoice { line: trigger, debounce: Duration::from_millis(12) }));
     assert_eq!(config.interlock, Some(line("/dev/gpiochip0", "inert", false, Bias::PullUp)));
@@ -131,6 +166,13 @@ fn mistakes_are_refused_where_they_are() {
         ("[imu]\nbaud = []\n", "x.toml:2:8: imu.baud: "),
         ("[trigger]\nchip = \"a\"\nline = 1\ndebounce_ms = 900\n", "x.toml:4:15: trigger.debounce_ms is 900"),
         ("[interlock]\nline = 1\n", "x.toml:1:1: missing field `chip`"),
+        ("[ship]\nbaud = 4800\n", "x.toml:1:1: missing field `device`"),
+        ("[ship]\ndevice = \"/dev/tty[\"\n", "x.toml:2:10: ship.device: "),
+        ("[ship]\ndevice = \"a\"\nlatency_ms = -1\n", "x.toml:3:14: ship.latency_ms is -1: give 0 to 1500"),
+        ("[ship]\ndevice = \"a\"\nbaud = 0\n", "x.toml:3:8: ship.baud: "),
+        ("[rezero]\nsigma_deg = 1\n", "x.toml:1:1: rezero: give from_bow_deg"),
+        ("[landmarks]\nat = [{ bearing_deg = 400 }]\n", "x.toml:2:22: bearing_deg is 400"),
+        ("[heading]\ngrowth_deg_per_h = -1\n", "x.toml:2:20: heading.growth_deg_per_h is -1"),
         ("[health]\nlimit_c = nan\n", "x.toml:2:11: health.limit_c is NaN"),
     ] {
         assert!(refused(text).starts_with(said), "{}", refused(text));

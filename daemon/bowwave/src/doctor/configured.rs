@@ -2,12 +2,12 @@
 
 use std::{path::Path, thread, time::Duration};
 
-use bowwave_core::fault::{Change, Fault, FaultBoard};
+use bowwave_core::fault::{Change, Fault};
 use bowwave_devices::{
     camera::CameraPort,
     clock::{now, sleep_until},
     lcd,
-    report::{Reports, reporting},
+    report::reporting,
     serial,
     trigger::{self, InputLine, TriggerSettings},
 };
@@ -20,6 +20,8 @@ use crate::{
 
 /// How long camera and inertial unit are listened to.
 const LISTEN: Duration = Duration::from_millis(2500);
+/// How long the ship's instruments are: one line a second, at a rate that may have to be found.
+const LISTEN_SHIP: Duration = Duration::from_secs(6);
 /// Pictures and samples that such a time must bring at least.
 const PICTURES_MIN: u64 = 10;
 
@@ -41,8 +43,12 @@ pub(super) fn checks(path: &Path) -> Vec<Check> {
     // Both take their time, so they take it together.
     let camera = thread::scope(|scope| {
         let camera = scope.spawn(|| camera(&settings));
+        let ship =
+            config.heading.ship.as_ref().map(|ship| scope.spawn(|| super::ship::check(ship, LISTEN_SHIP)));
         checks.push(imu(config));
-        camera.join().unwrap_or_else(|_| failed("camera", "the check broke down; report it"))
+        let broke_down = |name| move |_| failed(name, "the check broke down; report it");
+        checks.extend(ship.map(|ship| ship.join().unwrap_or_else(broke_down("ship"))));
+        camera.join().unwrap_or_else(broke_down("camera"))
     });
     checks.push(camera);
     checks.extend(lines(config));
@@ -89,21 +95,6 @@ fn files(path: &Path, settings: &Settings) -> Vec<Check> {
         ));
     }
     checks
-}
-
-/// The faults that were there at the end, with their causes.
-fn left(reports: &Reports) -> Vec<(Fault, String)> {
-    let mut board = FaultBoard::new();
-    let mut causes: Vec<(Fault, String)> = Vec::new();
-    for change in reports.changes() {
-        if let Change::Raised { cause } = &change.change {
-            causes.retain(|(fault, _)| *fault != change.fault);
-            causes.push((change.fault, cause.clone()));
-        }
-        board.take(&change);
-    }
-    causes.retain(|(fault, _)| board.is_active(*fault));
-    causes
 }
 
 /// A check that fails with the faults that are left, or is `found`.
@@ -156,7 +147,7 @@ fn camera(settings: &Settings) -> Check {
         }
         None => format!("no pictures ({:?})", status.life),
     };
-    verdict("camera", &left(&reports), found, c.frames >= PICTURES_MIN)
+    verdict("camera", &reports.left(), found, c.frames >= PICTURES_MIN)
 }
 
 fn imu(config: &Config) -> Check {
@@ -210,10 +201,14 @@ fn lines(config: &Config) -> Vec<Check> {
     if let Some(line) = &config.power_fail {
         checks.push(one("power-fail", line, "power is failing", "power is good"));
     }
+    for press in &config.heading.presses {
+        checks.push(one(press.name(), &press.line, "pressed", "not pressed"));
+    }
     if let Some(lamps) = &config.lamps {
         let trigger = config.trigger.as_ref().map(|t| TriggerSettings {
             interlock: config.interlock.clone(),
             power_fail: config.power_fail.clone(),
+            presses: config.heading.presses.clone(),
             ..TriggerSettings::new(t.line.clone())
         });
         let inputs = trigger.iter().flat_map(TriggerSettings::inputs);

@@ -2,6 +2,7 @@
 
 mod configured;
 mod imu;
+mod ship;
 
 use std::{fmt, path::Path, process::Command};
 

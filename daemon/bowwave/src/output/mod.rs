@@ -80,6 +80,8 @@ pub struct Ticket {
 pub enum UserEvent {
     /// The space bar.
     Trigger(TriggerEdge),
+    /// Z: the gun stands at its stow.
+    Rezero,
     /// Escape, or the window was closed.
     Quit,
 }
@@ -281,6 +283,7 @@ impl Worker {
             for pressed in screen.show(frame.rgba())? {
                 let event = match pressed {
                     Pressed::Fire(pressed) => UserEvent::Trigger(TriggerEdge { time: now(), pressed }),
+                    Pressed::Rezero => UserEvent::Rezero,
                     Pressed::Quit => UserEvent::Quit,
                 };
                 // The main loop may have ended already; then nobody wants to know.

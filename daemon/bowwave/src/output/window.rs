@@ -1,4 +1,4 @@
-//! The window on a desktop. Space is the trigger, escape ends.
+//! The window on a desktop. Space is the trigger, Z says that the gun stands at its stow, escape ends.
 
 use anyhow::{Context, Result};
 use minifb::{Key, KeyRepeat, ScaleMode, Window, WindowOptions};
@@ -8,6 +8,8 @@ use minifb::{Key, KeyRepeat, ScaleMode, Window, WindowOptions};
 pub enum Pressed {
     /// The trigger was pressed (`true`) or released.
     Fire(bool),
+    /// The gun stands at its stow.
+    Rezero,
     /// The user wants to end.
     Quit,
 }
@@ -47,6 +49,7 @@ impl Screen {
         let trigger = (firing != self.firing).then_some(Pressed::Fire(firing));
         self.firing = firing;
         let ends = !self.window.is_open() || self.window.is_key_pressed(Key::Escape, KeyRepeat::No);
-        Ok(trigger.into_iter().chain(ends.then_some(Pressed::Quit)))
+        let rezero = self.window.is_key_pressed(Key::Z, KeyRepeat::No).then_some(Pressed::Rezero);
+        Ok(trigger.into_iter().chain(rezero).chain(ends.then_some(Pressed::Quit)))
     }
 }

@@ -15,7 +15,7 @@ use bowwave_devices::{
     lamps::{LampState, Lamps},
     lcd::{LcdPort, Vblanks},
     report::{Reporter, Reports, reporting},
-    serial::ImuPort,
+    serial::{ImuPort, ShipPort},
     trigger::{TriggerPort, TriggerSettings},
 };
 use bowwave_render::TimeOuts;
@@ -45,6 +45,7 @@ const LCD_WAIT: Duration = Duration::from_millis(1500);
 pub struct Hardware {
     camera: CameraPort,
     imu: Option<ImuPort>,
+    ship: Option<ShipPort>,
     trigger: Option<TriggerPort>,
     lcd: Option<Arc<LcdPort>>,
     lamps: Option<Lamps>,
@@ -72,6 +73,8 @@ impl Hardware {
         let camera = CameraPort::start(camera_settings(settings), reporter("camera"))?;
         let training = mode == Mode::Training;
         let imu = training.then(|| ImuPort::start(config.imu.clone(), reporter("imu"))).transpose()?;
+        let ship = config.heading.ship.as_ref().filter(|_| training);
+        let ship = ship.map(|ship| ShipPort::start(ship, reporter("ship"))).transpose()?;
         let trigger = if training { trigger_settings(settings, faults) } else { None };
         let lamps = lamps(settings, faults);
         let health = Health::start(&config.health, reporter(HEALTH))?;
@@ -88,7 +91,7 @@ impl Hardware {
         let heartbeat = config.hang.unwrap_or(TimeOuts::default().frame) + HEARTBEAT_BEYOND;
         let heartbeat_ns = i64::try_from(heartbeat.as_nanos()).unwrap_or(i64::MAX);
         let fetched = Vec::new();
-        Ok(Self { camera, imu, trigger, lcd, lamps, health, threads, heartbeat_ns, output, fetched })
+        Ok(Self { camera, imu, ship, trigger, lcd, lamps, health, threads, heartbeat_ns, output, fetched })
     }
 
     /// The LCD, to show on.
@@ -125,6 +128,9 @@ impl Hardware {
         self.fetched.extend(self.camera.events().try_iter());
         if let Some(imu) = &self.imu {
             self.fetched.extend(imu.events().try_iter());
+        }
+        if let Some(ship) = &self.ship {
+            self.fetched.extend(ship.events().try_iter());
         }
         if let Some(trigger) = &self.trigger {
             self.fetched.extend(trigger.events().try_iter());
@@ -196,6 +202,15 @@ impl Hardware {
                 ("imu_opened", c.opened),
             ]);
         }
+        if let Some(ship) = &self.ship {
+            let status = ship.status();
+            counters.extend([
+                ("ship_headings", status.said.headings),
+                ("ship_lines", status.said.lines.packets),
+                ("ship_lines_damaged", status.said.lines.bad_crc),
+                ("ship_opened", status.line.opened),
+            ]);
+        }
         if let Some(lcd) = &self.lcd {
             let c = lcd.status().counters;
             counters.extend([("lcd_given", c.given), ("lcd_shown", c.shown), ("lcd_replaced", c.replaced)]);
@@ -205,13 +220,16 @@ impl Hardware {
 
     /// Ends all devices; what does not end in its time is left to the process's end.
     pub fn stop(self) {
-        let Self { camera, imu, trigger, lcd, lamps, health, .. } = self;
+        let Self { camera, imu, ship, trigger, lcd, lamps, health, .. } = self;
         let told = |what: &str, e: &dyn std::fmt::Display| log::warn!("{what}: {e}");
         if let Err(e) = camera.stop() {
             told("camera", &e);
         }
         if let Some(Err(e)) = imu.map(ImuPort::stop) {
             told("inertial unit", &e);
+        }
+        if let Some(Err(e)) = ship.map(ShipPort::stop) {
+            told("ship feed", &e);
         }
         if let Some(Err(e)) = trigger.map(TriggerPort::stop) {
             told("trigger", &e);
@@ -235,7 +253,9 @@ fn lamps(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<Lamps> {
         ("interlock", config.interlock.as_ref()),
         ("power-fail", config.power_fail.as_ref()),
     ];
-    let inputs = inputs.into_iter().filter_map(|(name, line)| line.map(|line| (name, line)));
+    let presses = config.heading.presses.iter().map(|press| (press.name(), Some(&press.line)));
+    let inputs = inputs.into_iter().chain(presses);
+    let inputs = inputs.filter_map(|(name, line)| line.map(|line| (name, line)));
     match Lamps::start(config.lamps.clone()?, inputs) {
         Ok(lamps) => Some(lamps),
         Err(e) => {
@@ -265,6 +285,7 @@ fn trigger_settings(settings: &Settings, faults: &mut Vec<FaultChange>) -> Optio
             .min(STUCK_MOST),
         interlock: config.interlock.clone(),
         power_fail: config.power_fail.clone(),
+        presses: config.heading.presses.clone(),
         ..TriggerSettings::new(trigger.line.clone())
     })
 }

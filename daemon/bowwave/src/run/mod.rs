@@ -26,7 +26,7 @@ use anyhow::{Context, Result};
 use bowwave_core::time::Time;
 use bowwave_devices::clock::now;
 use signal_hook::{
-    consts::{SIGHUP, SIGINT, SIGTERM},
+    consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1},
     iterator::Signals as Incoming,
 };
 
@@ -94,16 +94,20 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
     }
 }
 
-/// SIGTERM and SIGINT end the run, SIGHUP has the settings read anew.
+/// SIGTERM and SIGINT end the run, SIGHUP has the settings read anew, SIGUSR1 says that the gun stands at its stow.
 fn catch_signals() -> Result<Arc<Signals>> {
     let signals = Arc::new(Signals::default());
-    let mut incoming = Incoming::new([SIGTERM, SIGINT, SIGHUP]).context("cannot catch signals")?;
+    let mut incoming = Incoming::new([SIGTERM, SIGINT, SIGHUP, SIGUSR1]).context("cannot catch signals")?;
     let told = Arc::clone(&signals);
     thread::Builder::new()
         .name("signals".to_owned())
         .spawn(move || {
             for signal in incoming.forever() {
-                let flag: &AtomicBool = if signal == SIGHUP { &told.reload } else { &told.stop };
+                let flag: &AtomicBool = match signal {
+                    SIGHUP => &told.reload,
+                    SIGUSR1 => &told.rezero,
+                    _ => &told.stop,
+                };
                 flag.store(true, Ordering::Relaxed);
             }
         })

@@ -85,6 +85,7 @@ impl Reader {
             screen: config.size.unwrap_or(USUAL_SIZE),
             video: PixelFormat::Yuyv,
             orientation: config.orientation,
+            heading: config.heading.settings.clone(),
         };
         Ok(Settings { config, setup, camera_serial, calibration_toml, scenario_toml, faults })
     }

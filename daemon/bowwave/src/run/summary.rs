@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use super::{faults::Faults, hardware::Hardware, stage::Stage};
 use crate::{
+    headings::HeadingSummary,
     output::Done,
     sea::SeaSummary,
     stats::{Percentiles, Samples},
@@ -113,6 +114,7 @@ impl Tally {
             faults: faults.counts().map(|(code, n)| (code.to_owned(), n)).collect(),
             counts,
             sea: session.sea().map(SeaSummary::from),
+            heading: HeadingSummary::of(session),
         }
     }
 }
@@ -146,6 +148,8 @@ pub struct Summary {
     pub counts: BTreeMap<String, u64>,
     /// The sea in the video; null where the scenario gives the sea.
     pub sea: Option<SeaSummary>,
+    /// How well the heading was known at the end, and what told it; null where it never was.
+    pub heading: Option<HeadingSummary>,
 }
 
 impl Summary {

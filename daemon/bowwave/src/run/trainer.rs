@@ -10,7 +10,7 @@ use std::{
 
 use anyhow::{Context, Result};
 use bowwave_core::{
-    event::{Event, PixelFormat},
+    event::{Event, Mark, MarkKind, PixelFormat},
     fault::{Change, Fault, FaultChange},
     pacing::{FRAMES_PER_S, FrameClock},
     scenario::{self, Scenario},
@@ -32,7 +32,7 @@ use super::{
     starts::Mode,
     summary::{Summary, Tally},
 };
-use crate::{output::UserEvent, sea::SeaLog};
+use crate::{headings::HeadingLog, output::UserEvent, sea::SeaLog};
 
 /// Time between ticks, nanoseconds.
 const PERIOD_NS: i64 = NS_PER_S / FRAMES_PER_S;
@@ -49,6 +49,8 @@ pub struct Signals {
     pub stop: AtomicBool,
     /// Read the settings anew.
     pub reload: AtomicBool,
+    /// The gun stands at its stow.
+    pub rezero: AtomicBool,
 }
 
 /// Why the loop ended.
@@ -99,6 +101,7 @@ pub struct Trainer {
     changes: Vec<FaultChange>,
     tally: Tally,
     sea: SeaLog,
+    headings: HeadingLog,
 }
 
 impl Trainer {
@@ -166,6 +169,7 @@ impl Trainer {
             changes,
             tally: Tally::default(),
             sea: SeaLog::default(),
+            headings: HeadingLog::default(),
         })
     }
 
@@ -229,8 +233,14 @@ impl Trainer {
         for user in self.stage.user_events() {
             match user {
                 UserEvent::Trigger(edge) => self.events.push(Event::Trigger(edge)),
+                UserEvent::Rezero => {
+                    self.events.push(Event::Mark(Mark { time: now(), kind: MarkKind::Stow }));
+                }
                 UserEvent::Quit => self.signals.stop.store(true, Ordering::Relaxed),
             }
+        }
+        if self.signals.rezero.swap(false, Ordering::Relaxed) {
+            self.events.push(Event::Mark(Mark { time: now(), kind: MarkKind::Stow }));
         }
         for (time, period_ns) in self.hardware.flips() {
             self.clock.flipped(time, period_ns);
@@ -302,6 +312,7 @@ impl Trainer {
         if let Some(report) = self.session.sea() {
             self.sea.follow(&report);
         }
+        self.headings.follow(self.session.heading_sigma(), &self.session.sensor_counts().headings);
         if !announced {
             return Err(self.stage_error());
         }

@@ -82,6 +82,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
             // JPEG pictures are decoded to RGB.
             video: PixelFormat::Rgb,
             orientation: if arguments.fuse { Source::Fused } else { config.orientation },
+            heading: config.heading.settings.clone(),
         },
         scenario_toml,
         calibration_toml,

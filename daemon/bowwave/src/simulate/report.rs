@@ -65,6 +65,7 @@ impl Finished {
             video: format!("{:?}, copied once into memory that the GPU reads", prepared.setup.video),
             counts,
             sea: self.sea.map(SeaSummary::from),
+            heading: self.heading,
         }
     }
 

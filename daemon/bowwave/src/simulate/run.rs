@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
-    event::{Event, Picture},
+    event::{Event, Mark, MarkKind, Picture},
     geometry::CameraPose,
     pacing::{FRAMES_PER_S, Pacer},
     pose::registration_error_px,
@@ -34,6 +34,7 @@ use super::{memory::MemoryWatch, recovery::Recovery, summary::PassCounts};
 use crate::{
     cli::Simulate,
     commits,
+    headings::{HeadingLog, HeadingSummary},
     output::{Output, OutputReport, Ticket, UserEvent},
     recorder::Recorder,
     sea::SeaLog,
@@ -84,6 +85,7 @@ pub struct Loop {
     recovery: Recovery,
     memory: MemoryWatch,
     sea: SeaLog,
+    headings: HeadingLog,
 }
 
 /// What the loop counts.
@@ -123,6 +125,8 @@ pub struct Finished {
     pub replay: hw_sim::replay::ReplayStats,
     /// What the sensors counted.
     pub sensors: SensorCounts,
+    /// The heading at the end.
+    pub heading: Option<HeadingSummary>,
     /// Vulkan device and driver.
     pub device: String,
     /// Whether frames had deadlines.
@@ -172,6 +176,7 @@ impl Loop {
             recovery,
             memory: MemoryWatch::default(),
             sea: SeaLog::default(),
+            headings: HeadingLog::default(),
         }
     }
 
@@ -262,6 +267,9 @@ impl Loop {
         for user in self.output.user_events() {
             match user {
                 UserEvent::Trigger(edge) => self.events.push(Event::Trigger(edge)),
+                UserEvent::Rezero => {
+                    self.events.push(Event::Mark(Mark { time: now(), kind: MarkKind::Stow }));
+                }
                 UserEvent::Quit => self.stop.store(true, Ordering::Relaxed),
             }
         }
@@ -313,6 +321,7 @@ impl Loop {
             self.sea.follow(&report);
             self.tally.sea(&report);
         }
+        self.headings.follow(self.session.heading_sigma(), &self.session.sensor_counts().headings);
         self.tally.frame(waited, [entered, collected, stepped, now()]);
         self.journal_rounds(arguments)?;
         Ok(true)
@@ -378,7 +387,9 @@ impl Loop {
         }
         let sensors = self.session.sensor_counts();
         let sea = self.session.sea();
+        let heading = HeadingSummary::of(&self.session);
         Ok(Finished {
+            heading,
             tally: self.tally,
             output,
             replay,

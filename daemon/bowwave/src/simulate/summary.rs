@@ -7,6 +7,7 @@ use bowwave_core::scene::{LeftOut, Pass, PassDecision, Scene};
 use serde::Serialize;
 
 use crate::{
+    headings::HeadingSummary,
     sea::SeaSummary,
     stats::{Percentiles, Samples},
 };
@@ -60,6 +61,8 @@ pub struct Summary {
     pub counts: BTreeMap<String, u64>,
     /// The sea in the video; null where the scenario gives the sea.
     pub sea: Option<SeaSummary>,
+    /// How well the heading was known at the end, and what told it; null where it never was.
+    pub heading: Option<HeadingSummary>,
 }
 
 /// Distances on the screen between where things belong and where they were drawn, pixels.
@@ -133,8 +136,10 @@ impl Summary {
         let registration = self.registration_px.map_or("no truth in this recording".into(), |r| {
             format!("rms {:.2}, p99 {:.2}, max {:.2} px", r.rms, r.p99, r.max)
         });
+        let heading =
+            self.heading.map_or("not known".into(), |h| format!("±{:.2} deg (1 sigma)", h.sigma_deg));
         format!(
-            "{} frames of {} on {}; {missed}\nframe time     {}\nregistration   {registration}\nrounds         {} fired, {} hit, {} not scored\n",
+            "{} frames of {} on {}; {missed}\nframe time     {}\nregistration   {registration}\nheading        {heading}\nrounds         {} fired, {} hit, {} not scored\n",
             self.frames,
             self.size,
             self.device,

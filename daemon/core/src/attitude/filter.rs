@@ -12,8 +12,8 @@ use crate::gunnery::GRAVITY_M_S2;
 
 /// Turn of the world (3), gyro's bias in the unit's axes (3), error of the inclination it is held against (2), turn of the camera against
 /// the unit in the camera's axes (3), bias of the specific force over gravity in the unit's axes (3), how much higher the horizon stands
-/// than geometry has it, turn about the vertical of the anchor and its rate.
-const STATES: usize = 17;
+/// than geometry has it, turn about the vertical of the anchor and its rate, turn of the gun on its mount.
+const STATES: usize = 18;
 const HEADING: usize = 2;
 const BIAS: usize = 3;
 const REFERENCE: usize = 6;
@@ -22,6 +22,7 @@ const FORCE: usize = 11;
 const DIP: usize = 14;
 const ANCHOR: usize = 15;
 const ANCHOR_RATE: usize = 16;
+const MOUNT: usize = 17;
 
 type Covariance = SMatrix<f64, STATES, STATES>;
 /// How a measured number changes with the states.
@@ -81,6 +82,7 @@ pub(super) struct Filter {
     dip: f64,
     anchor: f64,
     anchor_rate: f64,
+    mount: f64,
     /// Since the last prediction: integral of the unit's axes in the world, its turn, how long.
     axes: DMat3,
     turned: DVec3,
@@ -146,6 +148,7 @@ impl Filter {
             dip: 0.0,
             anchor: 0.0,
             anchor_rate: 0.0,
+            mount: 0.0,
             axes: DMat3::ZERO,
             turned: DVec3::ZERO,
             dt_s: 0.0,
@@ -359,14 +362,49 @@ impl Filter {
     pub(super) fn set_heading(&mut self, deviation: f64) {
         self.forget(HEADING, deviation);
         self.forget(ANCHOR, std::f64::consts::PI);
+        self.forget(MOUNT, std::f64::consts::PI);
+    }
+
+    /// By how much the bias turns the world about the vertical, standard deviation, rad/s, with the unit as in `world_from_imu`.
+    pub(super) fn drift_sigma(&self, world_from_imu: DQuat) -> f64 {
+        let vertical = world_from_imu.inverse() * DVec3::Z;
+        let bias = DMat3::from_cols_array_2d(
+            &[0, 1, 2].map(|c| [0, 1, 2].map(|r| self.covariance[(BIAS + r, BIAS + c)])),
+        );
+        vertical.dot(bias * vertical).max(0.0).sqrt()
+    }
+
+    /// The gun's bearing on its mount is what heading and the ship's heading now make it, which errs by `variance` beyond the heading.
+    pub(super) fn anchor_mount(&mut self, variance: f64) {
+        self.copy_heading(MOUNT);
+        self.covariance[(MOUNT, MOUNT)] += variance;
+        self.mount = 0.0;
+    }
+
+    /// The bearing, or what the ship says of its own heading, may have changed by `variance`.
+    pub(super) fn walk_mount(&mut self, variance: f64) {
+        self.covariance[(MOUNT, MOUNT)] += variance;
+    }
+
+    /// Takes in that by the ship's heading and the gun's bearing on its mount the world is to be turned by `off` about the vertical, rad.
+    pub(super) fn see_mount(&mut self, off: f64, variance: f64, limit: f64) -> (Correction, Outcome) {
+        let mut row = Row::zeros();
+        row[HEADING] = 1.0;
+        row[MOUNT] = -1.0;
+        self.update_one(&row, off + self.mount, variance, limit)
+    }
+
+    /// The state is from now on what the heading is.
+    fn copy_heading(&mut self, state: usize) {
+        let mut heading = self.covariance.row(HEADING).into_owned();
+        heading[state] = heading[HEADING];
+        self.covariance.set_row(state, &heading);
+        self.covariance.set_column(state, &heading.transpose());
     }
 
     /// From now on what is seen of the anchor tells of changes since now; what is anchored in turns by `drift` rad/s itself.
     pub(super) fn anchor(&mut self, drift: f64) {
-        let mut heading = self.covariance.row(HEADING).into_owned();
-        heading[ANCHOR] = heading[HEADING];
-        self.covariance.set_row(ANCHOR, &heading);
-        self.covariance.set_column(ANCHOR, &heading.transpose());
+        self.copy_heading(ANCHOR);
         self.anchor = 0.0;
         if self.covariance[(ANCHOR_RATE, ANCHOR_RATE)] <= 0.0 {
             self.forget(ANCHOR_RATE, drift);
@@ -429,6 +467,7 @@ impl Filter {
         self.dip += error[DIP];
         self.anchor += error[ANCHOR];
         self.anchor_rate += error[ANCHOR_RATE];
+        self.mount += error[MOUNT];
         DQuat::from_scaled_axis(three(0))
     }
 }

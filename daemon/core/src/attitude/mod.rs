@@ -2,6 +2,7 @@
 
 mod filter;
 mod inclination;
+mod own;
 #[cfg(test)]
 mod tests;
 
@@ -9,7 +10,7 @@ use std::f64::consts::TAU;
 
 use glam::{DMat2, DMat3, DQuat, DVec3};
 
-use self::{filter::Filter, inclination::Inclination};
+use self::{filter::Filter, inclination::Inclination, own::Own};
 pub use self::{
     filter::{DIP_SIGMA, Noise, Outcome},
     inclination::Settings,
@@ -17,6 +18,7 @@ pub use self::{
 use crate::{
     calibration::Calibration,
     event::ImuSample,
+    geometry::rotation_vector,
     pose::{NoPose, OrientationAt, OrientationSample, PoseHistory},
     time::Time,
 };
@@ -70,7 +72,12 @@ pub struct AttitudeSettings {
     pub inclination: Settings,
     /// How the unit errs.
     pub noise: Noise,
+    /// By how much the deviation of the heading of a unit's own orientation grows, rad/s.
+    pub own_growth: f64,
 }
+
+/// What units that find their orientation by themselves are good for without a compass (5 deg/h), rad/s.
+const OWN_GROWTH: f64 = 5.0 * std::f64::consts::PI / 180.0 / 3600.0;
 
 impl AttitudeSettings {
     /// For that unit on that camera, of the usual class (a VN-100's: 0.0035 deg/s per square root of a hertz).
@@ -79,6 +86,7 @@ impl AttitudeSettings {
             source,
             rate: RateKind::Instant,
             inclination: Settings::GUN,
+            own_growth: OWN_GROWTH,
             noise: Noise {
                 bias: calibration.gyro_bias_sigma,
                 mounting: calibration.camera_from_imu_sigma,
@@ -120,6 +128,9 @@ pub struct Attitude {
     settings: AttitudeSettings,
     state: State,
     history: PoseHistory,
+    /// Where the unit's own orientation is taken, and when it last told one.
+    own: Option<(Own, Time)>,
+    corrected: f64,
 }
 
 #[derive(Debug)]
@@ -150,7 +161,15 @@ impl State {
 impl Attitude {
     /// An estimator for a unit with that bias (rad/s, its own axes) and that place on the camera.
     pub fn new(settings: AttitudeSettings, gyro_bias: DVec3, camera_from_imu: DQuat) -> Self {
-        Self { gyro_bias, camera_from_imu, settings, state: State::START, history: PoseHistory::new() }
+        Self {
+            gyro_bias,
+            camera_from_imu,
+            settings,
+            state: State::START,
+            history: PoseHistory::new(),
+            own: None,
+            corrected: 0.0,
+        }
     }
 
     /// Takes in a finite sample whose measurement was made at `time`; the orientation then, `None` while levelling.
@@ -179,6 +198,7 @@ impl Attitude {
     pub fn restart(&mut self) {
         self.history.clear();
         self.state = State::START;
+        self.own = None;
     }
 
     /// Covariance of the orientation's error as a turn of the world, rad^2; `None` where the unit's own estimate is used.
@@ -187,6 +207,32 @@ impl Attitude {
             State::Running(running) => Some(running.filter.turn_covariance()),
             State::Levelling { .. } => None,
         }
+    }
+
+    /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
+    pub fn heading_sigma(&self) -> Option<f64> {
+        match (&self.own, &self.state) {
+            (Some((own, _)), _) => Some(own.sigma()),
+            (None, State::Running(running)) => {
+                Some(running.filter.turn_covariance().z_axis.z.max(0.0).sqrt())
+            }
+            (None, State::Levelling { .. }) => None,
+        }
+    }
+
+    /// By how much the heading may drift, standard deviation, rad/s.
+    pub fn drift_sigma(&self) -> Option<f64> {
+        match (&self.own, &self.state) {
+            (Some((own, _)), _) => Some(own.drift_sigma()),
+            (None, State::Running(running)) => Some(running.filter.drift_sigma(running.last.world_from_imu)),
+            (None, State::Levelling { .. }) => None,
+        }
+    }
+
+    /// By how much corrections have turned the world about the vertical in all, radians: with that put back, the orientation's heading is
+    /// what the unit alone makes of it.
+    pub const fn corrected(&self) -> f64 {
+        self.corrected
     }
 
     /// Rotation from the unit's axes to the camera's as it is known by now.
@@ -226,26 +272,64 @@ impl Attitude {
         let across = DMat2::from_cols(turned.x_axis.truncate(), turned.y_axis.truncate());
         let (turn, outcome) = running.filter.see_up(world_from_camera, seen.up_camera, across, limit);
         running.turn(turn);
-        self.history.turn(turn);
+        self.turn_history(turn);
         Some(outcome)
     }
 
     /// Sets the heading: turns the world by `off` about the vertical, which is then known to `sigma`, radians. `false` where there is no
     /// estimate of ours yet to be turned. What was anchored before ([`Self::anchor_heading`]) no longer is.
     pub fn set_heading(&mut self, off: f64, sigma: f64) -> bool {
-        let State::Running(running) = &mut self.state else { return false };
-        running.filter.predict();
-        running.filter.set_heading(sigma);
         let turn = DQuat::from_rotation_z(off);
-        running.turn(turn);
-        self.history.turn(turn);
+        match (&mut self.own, &mut self.state) {
+            (Some((own, _)), _) => {
+                own.set_heading(sigma);
+                own.turn += off;
+            }
+            (None, State::Running(running)) => {
+                running.filter.predict();
+                running.filter.set_heading(sigma);
+                running.turn(turn);
+            }
+            (None, State::Levelling { .. }) => return false,
+        }
+        self.turn_history(turn);
         true
     }
 
+    /// The gun's bearing on its mount is what its heading and the ship's now make it, which errs by `variance` (rad^2) beyond the gun's
+    /// heading: from now on [`Self::see_mount`] tells of changes of the ship's heading. `false` where there is no heading yet.
+    pub fn anchor_mount(&mut self, variance: f64) -> bool {
+        self.of_mount(|filter| filter.anchor_mount(variance), |own| own.anchor_mount(variance))
+    }
+
+    /// The gun's bearing on its mount, or what the ship's instruments say of its heading, may have changed by `variance`, rad^2.
+    pub fn walk_mount(&mut self, variance: f64) -> bool {
+        self.of_mount(|filter| filter.walk_mount(variance), |own| own.walk_mount(variance))
+    }
+
+    fn of_mount(&mut self, filter: impl FnOnce(&mut Filter), own: impl FnOnce(&mut Own)) -> bool {
+        match (&mut self.own, &mut self.state) {
+            (Some((state, _)), _) => own(state),
+            (None, State::Running(running)) => {
+                running.filter.predict();
+                filter(&mut running.filter);
+            }
+            (None, State::Levelling { .. }) => return false,
+        }
+        true
+    }
+
+    /// Takes in the heading as it is by the ship's and the gun's bearing on its mount; else as [`Self::see_heading`].
+    pub fn see_mount(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
+        let by_own = |own: &mut Own, off| own.see_mount(off, seen.variance, limit);
+        self.correct_heading(seen, |filter, off| filter.see_mount(off, seen.variance, limit), by_own)
+    }
+
     /// Takes in a heading, unless that differs by more than `limit` (chi squared with one degree of freedom) from what is known. `None`
-    /// where nothing is known of that time, or the unit's own estimate is used.
+    /// where nothing is known of that time.
     pub fn see_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        self.correct_heading(seen, |filter, off| filter.see_heading(off, seen.variance, limit))
+        let by_own = |own: &mut Own, off| own.see_heading(off, seen.variance, limit);
+        self.correct_heading(seen, |filter, off| filter.see_heading(off, seen.variance, limit), by_own)
     }
 
     /// From now on [`Self::see_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
@@ -257,30 +341,67 @@ impl Attitude {
         true
     }
 
-    /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`].
+    /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`]. `None` where the unit's own estimate is used.
     pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        self.correct_heading(seen, |filter, off| filter.see_anchor(off, seen.variance, limit))
+        if self.own.is_some() {
+            return None;
+        }
+        let by_own = |_: &mut Own, _| (0.0, Outcome { surprise: f64::NAN, taken: false });
+        self.correct_heading(seen, |filter, off| filter.see_anchor(off, seen.variance, limit), by_own)
     }
 
     fn correct_heading(
         &mut self,
         seen: &HeadingSeen,
-        correct: impl FnOnce(&mut Filter, f64) -> (DQuat, Outcome),
+        by_filter: impl FnOnce(&mut Filter, f64) -> (DQuat, Outcome),
+        by_own: impl FnOnce(&mut Own, f64) -> (f64, Outcome),
     ) -> Option<Outcome> {
         self.history.at(seen.time).ok()?;
-        let State::Running(running) = &mut self.state else { return None };
-        running.filter.predict();
-        let (turn, outcome) = correct(&mut running.filter, seen.off - TAU * (seen.off / TAU).round());
-        running.turn(turn);
-        self.history.turn(turn);
+        let off = seen.off - TAU * (seen.off / TAU).round();
+        let (turn, outcome) = match (&mut self.own, &mut self.state) {
+            (Some((own, _)), _) => {
+                let (turn, outcome) = by_own(own, off);
+                own.turn += turn;
+                (DQuat::from_rotation_z(turn), outcome)
+            }
+            (None, State::Running(running)) => {
+                running.filter.predict();
+                let (turn, outcome) = by_filter(&mut running.filter, off);
+                running.turn(turn);
+                (turn, outcome)
+            }
+            (None, State::Levelling { .. }) => return None,
+        };
+        self.turn_history(turn);
         Some(outcome)
+    }
+
+    /// What was before is turned with the world, too.
+    fn turn_history(&mut self, turn: DQuat) {
+        self.corrected += rotation_vector(turn).z;
+        self.history.turn(turn);
+    }
+
+    /// The unit's own orientation at `time`, turned by what is known to be wrong with its heading.
+    fn own(&mut self, time: Time, world_from_imu: DQuat) -> DQuat {
+        let growth = self.settings.own_growth;
+        let (own, last) = self.own.get_or_insert_with(|| (Own::new(growth), time));
+        own.predict(time.ns_since(*last).max(0) as f64 * 1e-9);
+        *last = time.max(*last);
+        // Most units' headings are never corrected: theirs stay as they were sent.
+        if own.turn == 0.0 {
+            return world_from_imu;
+        }
+        (DQuat::from_rotation_z(own.turn) * world_from_imu).normalize()
     }
 
     fn find(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
         let rate = sample.rate - self.gyro_bias;
         if let (Some(q), Source::Auto) = (sample.world_from_imu, self.settings.source) {
-            return Some(OrientationSample { time, world_from_imu: q.normalize(), rate });
+            let world_from_imu = self.own(time, q.normalize());
+            return Some(OrientationSample { time, world_from_imu, rate });
         }
+        self.own = None;
         match &mut self.state {
             State::Running(running) => {
                 let dt_ns = time.ns_since(running.last.time);
@@ -291,7 +412,9 @@ impl Attitude {
                 // One that comes twice or after a younger one tells nothing new.
                 if dt_ns > 0 {
                     let turn = running.step(self.settings.rate, (time, dt_ns), rate, sample.accel);
-                    turn.into_iter().for_each(|turn| self.history.turn(turn));
+                    let last = running.last;
+                    turn.into_iter().for_each(|turn| self.turn_history(turn));
+                    return Some(last);
                 }
                 Some(running.last)
             }

@@ -7,8 +7,13 @@ fn sample(rate: DVec3, accel: DVec3) -> ImuSample {
 }
 
 fn attitude(source: Source, gyro_bias: DVec3) -> Attitude {
-    let settings =
-        AttitudeSettings { source, rate: RateKind::Instant, inclination: Settings::GUN, noise: Noise::USUAL };
+    let settings = AttitudeSettings {
+        source,
+        rate: RateKind::Instant,
+        inclination: Settings::GUN,
+        noise: Noise::USUAL,
+        own_growth: 0.0,
+    };
     Attitude::new(settings, gyro_bias, DQuat::IDENTITY)
 }
 

@@ -106,6 +106,14 @@ faults! {
     CamBandwidth = "CAM_BW", Warning, "CAMERA: USB TOO SLOW", "GIVE IT A USB PORT OF ITS OWN";
     /// The serial adapter holds bytes back.
     ImuLatency = "IMU_LATENCY", Warning, "IMU LATE", "SET THE ADAPTER'S LATENCY TO 1 MS";
+    /// The ship's heading does not come.
+    ShipLost = "SHIP_LOST", Warning, "SHIP HEADING LOST", "CHECK THE SHIP FEED'S CABLE";
+    /// A read of the ship feed's line did not return.
+    ShipBlocked = "SHIP_BLOCKED", Warning, "SHIP HEADING LOST", "REPLUG THE SHIP FEED";
+    /// The ship feed's line carries bytes that are no lines of text: another baud rate.
+    ShipBaud = "SHIP_BAUD", Warning, "SHIP HEADING LOST: BAUD RATE", "SET THE SHIP FEED'S RATE";
+    /// Lines come, and none tells a valid heading.
+    ShipInvalid = "SHIP_INVALID", Warning, "SHIP HEADING INVALID", "CHECK THE SHIP'S COMPASS";
     /// The file system is full.
     DiskFull = "DISK_FULL", Warning, "REC: DISK FULL", "FREE THE DATA PARTITION";
     /// The file system cannot be written.
@@ -132,6 +140,8 @@ faults! {
     CamTimestamp = "CAM_TS", Note, "", "";
     /// The unit came back under another name.
     ImuRenumbered = "IMU_RENUM", Note, "", "";
+    /// The ship feed came back under another name.
+    ShipRenumbered = "SHIP_RENUM", Note, "", "";
     /// Edges of the trigger were lost in the kernel.
     TriggerOverrun = "TRG_OVERRUN", Note, "", "";
     /// The wall clock stepped.

@@ -1,6 +1,7 @@
 //! A session: a pure function from events and frame times to scenes and records.
 
 mod fleet;
+mod heading;
 mod level;
 mod rounds;
 mod sensors;
@@ -33,6 +34,7 @@ use crate::{
 };
 
 pub use fleet::{Fleet, Vessel};
+pub use heading::{HeadingCounts, HeadingSettings, Landmark, Stow};
 pub use level::HorizonCounts;
 pub use rounds::{Ammunition, Launch, Rounds};
 pub use sensors::{SensorCounts, Sensors};
@@ -69,6 +71,8 @@ pub struct Setup {
     pub video: PixelFormat,
     /// Whose estimate of the orientation is used.
     pub orientation: Source,
+    /// What is known of headings beforehand.
+    pub heading: HeadingSettings,
 }
 
 /// Why a session cannot be made.
@@ -163,7 +167,8 @@ impl Session {
         });
         let waves = scenario.wave_field();
         let watch = SeaWatch::of(scenario);
-        let sensors = Sensors::new(&setup.calibration, setup.orientation, setup.scenario.eye_height_m);
+        let sensors =
+            Sensors::new(&setup.calibration, setup.orientation, &setup.heading, setup.scenario.eye_height_m);
         let weapon = Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt);
         let meter = LightMeter::new(scenario.sun_direction, scenario.water.method);
         let scene = Scene {
@@ -222,6 +227,11 @@ impl Session {
         self.sensors.counts()
     }
 
+    /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
+    pub fn heading_sigma(&self) -> Option<f64> {
+        self.sensors.heading_sigma()
+    }
+
     /// The head-up display as it was drawn last.
     pub const fn hud(&self) -> &Hud {
         &self.scene.hud
@@ -249,6 +259,8 @@ impl Session {
                     time: edge.time.plus_ns(self.setup.calibration.trigger.map_or(0, |t| t.latency_ns)),
                     ..*edge
                 }),
+                Event::Ship(sample) => self.sensors.ship(sample),
+                Event::Mark(mark) => self.sensors.mark(mark),
                 Event::Fault(change) => {
                     // The line for the log is the caller's affair: this board only knows what is there.
                     let _ = self.faults.take(change);
@@ -400,6 +412,7 @@ impl Session {
         self.follow_sea();
         let status = self.status(video_time, frame_time);
         let warning = self.warning();
+        let heading_tenths_deg = self.sensors.heading_shown();
         let sea = self.sea().map(|sea| (sea.in_use.state, sea.in_use.source));
         let scene = &mut self.scene;
         scene.boats.clear();
@@ -437,6 +450,7 @@ impl Session {
             hits: u32::try_from(self.hits).unwrap_or(u32::MAX),
             clock_s: self.running.as_ref().map_or(0.0, |r| video_time.secs_since(r.start)),
             sea,
+            heading_tenths_deg,
         };
         camera.is_some()
     }

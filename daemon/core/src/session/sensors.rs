@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 
 use super::{
+    heading::{Aid, HeadingCounts, HeadingSettings},
     level::{HorizonCounts, Level},
     steady::{SkylineCounts, Steady},
 };
@@ -10,7 +11,7 @@ use crate::{
     attitude::{Attitude, AttitudeSettings, Source},
     calibration::Calibration,
     clock::ClockMap,
-    event::{CameraFrame, ImuSample},
+    event::{CameraFrame, ImuSample, Mark, ShipSample},
     geometry::Lens,
     pose::{NoPose, OrientationAt, STALE_NS},
     scene::Status,
@@ -40,6 +41,8 @@ pub struct SensorCounts {
     pub frames_backward: u64,
     /// Pictures of another size than the calibrated one.
     pub frames_wrong_size: u64,
+    /// Headings from outside.
+    pub headings: HeadingCounts,
     /// Horizons seen.
     pub horizons: HorizonCounts,
     /// Headings by the sky.
@@ -54,6 +57,7 @@ pub struct Sensors {
     lens: Lens,
     level: Level,
     steady: Steady,
+    aid: Aid,
     clock: ClockMap,
     attitude: Attitude,
     last: Option<(DVec3, DVec3)>,
@@ -64,19 +68,23 @@ pub struct Sensors {
 
 impl Sensors {
     /// Sensors with that calibration, `eye_height_m` above the sea, that have reported nothing; orientation is found from `source`.
-    pub fn new(calibration: &Calibration, source: Source, eye_height_m: f64) -> Self {
+    pub fn new(
+        calibration: &Calibration,
+        source: Source,
+        heading: &HeadingSettings,
+        eye_height_m: f64,
+    ) -> Self {
+        let mut settings = AttitudeSettings::new(source, calibration);
+        settings.own_growth = heading.own_growth.unwrap_or(settings.own_growth);
         Self {
             time_offset_ns: calibration.time_offset_ns,
             readout_ns: calibration.readout_ns,
             lens: calibration.lens,
             level: Level::new(eye_height_m),
             steady: Steady::new(eye_height_m, calibration.time_offset_sigma_ns as f64 * 1e-9),
+            aid: Aid::new(heading.clone()),
             clock: ClockMap::new(),
-            attitude: Attitude::new(
-                AttitudeSettings::new(source, calibration),
-                calibration.gyro_bias,
-                calibration.camera_from_imu,
-            ),
+            attitude: Attitude::new(settings, calibration.gyro_bias, calibration.camera_from_imu),
             last: None,
             changed: Time::MIN,
             frame: None,
@@ -104,8 +112,34 @@ impl Sensors {
             self.counts.imu_restarts = self.clock.restarts();
             self.attitude.restart();
             self.steady.forget();
+            self.aid.forget();
         }
         self.attitude.observe(time, sample);
+    }
+
+    /// Takes in what the ship's instruments said.
+    pub fn ship(&mut self, sample: &ShipSample) {
+        self.aid.ship(sample, &mut self.attitude);
+        self.counts.headings = self.aid.counts();
+    }
+
+    /// Takes in the operator's press.
+    pub fn mark(&mut self, mark: &Mark) {
+        self.aid.mark(mark.kind, mark.time, &mut self.attitude);
+        // Its anchor holds another heading than the one that is now known.
+        self.steady.forget();
+        self.counts.headings = self.aid.counts();
+    }
+
+    /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
+    pub fn heading_sigma(&self) -> Option<f64> {
+        self.attitude.heading_sigma()
+    }
+
+    /// The same in tenths of a degree where the sailor is to know it.
+    pub fn heading_shown(&self) -> Option<u16> {
+        let sigma = self.heading_sigma().filter(|sigma| *sigma > self.aid.settings().shown_above)?;
+        Some((sigma.to_degrees() * 10.0).round().min(1800.0) as u16)
     }
 
     /// Takes in a picture; the newest wins. One from the past or of a size that the lens was not calibrated for is left out.
@@ -226,7 +260,7 @@ mod tests {
             gyro_bias: DVec3::ZERO,
             gyro_bias_sigma: DVec3::ONE,
         };
-        Sensors::new(&calibration, Source::Auto, 5.0)
+        Sensors::new(&calibration, Source::Auto, &HeadingSettings::default(), 5.0)
     }
 
     fn sample(i: i64) -> ImuSample {

@@ -1,4 +1,4 @@
-//! Which port the inertial unit is on, also after it came back under another name.
+//! Which port a device is on, also after it came back under another name.
 
 use std::{
     fs,
@@ -24,6 +24,9 @@ impl Finder {
 
     /// Names to be tried, best first; never empty.
     pub(super) fn candidates(&self) -> Result<Vec<PathBuf>, SerialError> {
+        if let Some(pattern) = self.wanted.as_deref().filter(|wanted| is_pattern(wanted)) {
+            return matching(pattern);
+        }
         // A link that is there needs no look at every port: udev keeps it by the adapter's identity.
         if let Some(wanted) = &self.wanted
             && fs::symlink_metadata(wanted).is_ok_and(|m| m.file_type().is_symlink())
@@ -56,6 +59,24 @@ impl Finder {
         }
         self.last_node.replace(node.to_owned())
     }
+}
+
+/// Whether a name stands for several.
+fn is_pattern(wanted: &Path) -> bool {
+    wanted.to_string_lossy().contains(['*', '?', '['])
+}
+
+/// What is there now of a pattern.
+fn matching(pattern: &Path) -> Result<Vec<PathBuf>, SerialError> {
+    let pattern = pattern.to_string_lossy();
+    // A pattern that is none was refused with the configuration; here it fits nothing.
+    let found: Vec<_> =
+        glob::glob(&pattern).map(|paths| paths.filter_map(Result::ok).collect()).unwrap_or_default();
+    if found.is_empty() {
+        let present = nodes::listed(list()?.iter().map(|p| p.node.display().to_string()));
+        return Err(SerialError::NoMatch { pattern: pattern.into_owned(), present });
+    }
+    Ok(found)
 }
 
 /// The ports among `ports` that may carry the unit: the one that was `wanted`, the adapter that is `known`, or, where

@@ -1,14 +1,12 @@
-//! What the thread that reads the inertial unit does next, as a function of what came over the line and of time.
+//! What the thread that reads a line does next, as a function of what came over the line and of time.
 
 use bowwave_core::{
     fault::{Fault, FaultChange},
     time::Time,
 };
 
-use super::Baud;
+use super::{Baud, feed::Kind};
 
-/// A line that carries nothing for this long is silent.
-pub(super) const SILENT_NS: i64 = 100_000_000;
 /// Bytes without a packet for this long come at another rate...
 const GARBLED_NS: i64 = 500_000_000;
 /// ...or for this long, where the port sees broken bytes.
@@ -17,16 +15,10 @@ const GARBLED_FRAMING_NS: i64 = 150_000_000;
 const GARBLED_BYTES_MIN: u64 = 32;
 /// Broken bytes that are a sign of another rate, at least an eighth of all.
 const FRAMING_SHARE: u64 = 8;
-/// How long a rate is tried: several packets of a unit that sends 40 a second.
-const DWELL_NS: i64 = 300_000_000;
-/// A line silent for this long during the scan is not garbled but dead.
-const DEAD_NS: i64 = 1_000_000_000;
 /// Packets that prove a rate.
 const PROOF: u64 = 2;
 /// A port that says it can be read and gives nothing for this long is opened anew.
 const SPURIOUS_NS: i64 = 150_000_000;
-/// How long a port is listened to, where any port may be the right one, before the next one is tried.
-const ROAM_NS: i64 = 1_500_000_000;
 
 /// What the reader is to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +72,7 @@ struct Open {
 /// The line's health. Changes of faults are collected for the caller to fetch.
 #[derive(Debug)]
 pub(super) struct Health {
+    kind: &'static Kind,
     rates: Vec<u32>,
     rate: usize,
     /// The rate that last proved right.
@@ -96,9 +89,10 @@ pub(super) struct Health {
 }
 
 impl Health {
-    pub(super) fn new(baud: &Baud) -> Self {
+    pub(super) fn new(baud: &Baud, kind: &'static Kind) -> Self {
         let rates = baud.rates().to_vec();
         Self {
+            kind,
             rates,
             rate: 0,
             good: None,
@@ -123,7 +117,7 @@ impl Health {
     pub(super) fn status(&self) -> LineStatus {
         match (&self.open, self.trouble) {
             (None, _) => LineStatus::Searching,
-            (Some(_), Some(Fault::ImuBaud)) => LineStatus::Garbled,
+            (Some(_), Some(fault)) if fault == self.kind.baud => LineStatus::Garbled,
             (Some(open), _) if open.last_bytes.is_none() || !open.proven => LineStatus::Listening,
             (Some(_), Some(_)) => LineStatus::Silent,
             (Some(_), None) => LineStatus::Streaming,
@@ -134,7 +128,7 @@ impl Health {
     pub(super) fn absent(&mut self, now: Time, cause: &str) {
         self.open = None;
         self.unblock(now);
-        self.trouble(now, Fault::ImuLost, cause);
+        self.trouble(now, self.kind.lost, cause);
     }
 
     /// A port was opened at [`Self::baud`].
@@ -152,7 +146,7 @@ impl Health {
     pub(super) fn lost(&mut self, now: Time, cause: &str) {
         self.open = None;
         self.unblock(now);
-        self.trouble(now, Fault::ImuLost, cause);
+        self.trouble(now, self.kind.lost, cause);
         self.rate = self.good.unwrap_or(0);
     }
 
@@ -201,7 +195,7 @@ impl Health {
         if open.spurious.is_some_and(|since| now.ns_since(since) >= SPURIOUS_NS) {
             if !std::mem::replace(&mut self.blocked, true) {
                 let cause = "the port says that bytes wait and gives none; it is opened anew";
-                self.changes.push(FaultChange::raised(now, Fault::ImuBlocked, cause));
+                self.changes.push(FaultChange::raised(now, self.kind.blocked, cause));
             }
             self.open = None;
             return Action::Reopen;
@@ -220,26 +214,31 @@ impl Health {
 
     /// The open port is left for another one.
     pub(super) fn leave(&mut self, now: Time) {
-        self.trouble(
-            now,
-            Fault::ImuLost,
-            "no packet of an inertial unit on this port; the next one is tried",
-        );
+        let cause = format!("no packet of the {} on this port; the next one is tried", self.kind.name);
+        self.trouble(now, self.kind.lost, &cause);
         (self.open, self.rate, self.turn, self.astray) = (None, self.good.unwrap_or(0), 0, true);
     }
 
     /// Long enough for every rate, where something comes at all.
     fn roam_ns(&self, open: &Open) -> i64 {
         let rates = i64::try_from(self.rates.len()).unwrap_or(1);
-        if open.last_bytes.is_none() { ROAM_NS } else { ROAM_NS.max(GARBLED_NS + rates * DWELL_NS) }
+        if open.last_bytes.is_none() {
+            self.kind.roam_ns
+        } else {
+            self.kind.roam_ns.max(GARBLED_NS + rates * self.kind.dwell_ns)
+        }
     }
 
     fn watch(&mut self, now: Time, open: &Open, silent_ns: i64) -> Action {
-        if silent_ns >= SILENT_NS {
+        if silent_ns >= self.kind.silent_ns {
             if let Some(open) = &mut self.open {
                 (open.garbage, open.garbage_bytes) = (None, 0);
             }
-            self.trouble(now, Fault::ImuLost, "the line is silent: is the unit powered, is its output on?");
+            self.trouble(
+                now,
+                self.kind.lost,
+                &format!("the line is silent: is the {} powered, is its output on?", self.kind.name),
+            );
             return Action::Keep;
         }
         let Some(since) = open.garbage else { return Action::Keep };
@@ -252,7 +251,7 @@ impl Health {
         let cause = if self.rates.len() > 1 {
             format!("bytes come that are no packets at {baud} baud; other rates are tried")
         } else {
-            format!("bytes come that are no packets at {baud} baud; set the unit's rate in the configuration")
+            format!("bytes come that are no packets at {baud} baud; set its rate in the configuration")
         };
         self.wrong_rate(now, &cause);
         if let Some(open) = &mut self.open {
@@ -262,15 +261,19 @@ impl Health {
     }
 
     fn scan(&mut self, now: Time, open: &Open, silent_ns: i64) -> Action {
-        if silent_ns >= DEAD_NS {
-            self.trouble(now, Fault::ImuLost, "the line fell silent; is the unit powered?");
+        if silent_ns >= self.kind.dead_ns {
+            self.trouble(
+                now,
+                self.kind.lost,
+                &format!("the line fell silent; is the {} powered?", self.kind.name),
+            );
             if let Some(open) = &mut self.open {
                 open.scanning = false;
             }
             let home = self.good.unwrap_or(0);
             return if home == self.rate { Action::Keep } else { self.set(now, home) };
         }
-        if now.ns_since(open.since) >= DWELL_NS { self.next_rate(now) } else { Action::Keep }
+        if now.ns_since(open.since) >= self.kind.dwell_ns { self.next_rate(now) } else { Action::Keep }
     }
 
     fn next_rate(&mut self, now: Time) -> Action {
@@ -314,7 +317,7 @@ impl Health {
 
     fn wrong_rate(&mut self, now: Time, cause: &str) {
         if !self.astray {
-            self.trouble(now, Fault::ImuBaud, cause);
+            self.trouble(now, self.kind.baud, cause);
         }
     }
 
@@ -330,7 +333,7 @@ impl Health {
 
     fn unblock(&mut self, now: Time) {
         if std::mem::take(&mut self.blocked) {
-            self.changes.push(FaultChange::cleared(now, Fault::ImuBlocked));
+            self.changes.push(FaultChange::cleared(now, self.kind.blocked));
         }
     }
 }

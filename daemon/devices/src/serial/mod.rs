@@ -1,14 +1,19 @@
-//! The inertial unit's serial line: found, opened, read, lost and found again, for as long as the trainer runs.
+//! Serial lines, of the inertial unit and of the ship's instruments: found, opened, read, lost and found again, for as long as the
+//! trainer runs.
 //!
-//! `health` decides, as a function of what came and of time; `sanity` and `timing` judge the samples; `line` and
-//! `ioctl` speak to the kernel; `reader` joins them in a thread.
+//! `health` decides, as a function of what came and of time; `line` and `ioctl` speak to the kernel; `reader` joins them in a
+//! thread, `port` owns it. What the bytes mean is a `feed`: `imu_feed`, whose samples `sanity` and `timing` judge, and `ship`.
 
+mod feed;
 mod find;
 mod health;
+mod imu_feed;
 mod ioctl;
 mod line;
+mod port;
 mod reader;
 mod sanity;
+mod ship;
 #[cfg(test)]
 mod tests;
 mod timing;
@@ -16,36 +21,32 @@ mod timing;
 use std::{
     fmt, io,
     path::{Path, PathBuf},
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, AtomicI32, AtomicI64, Ordering},
-    },
-    thread::{self, JoinHandle},
+    thread,
     time::Duration,
 };
 
-use bowwave_core::event::Event;
+use bowwave_core::{event::Event, fault::Fault};
 use crossbeam_channel::Receiver;
-use rustix::event::{EventfdFlags, eventfd};
 use serialport::SerialPortType;
 
-pub use self::{health::LineStatus, timing::ArrivalTiming};
+pub use self::{
+    health::LineStatus,
+    ship::{ShipPort, ShipReport, ShipSettings, ShipStatus, check_ship},
+    timing::ArrivalTiming,
+};
 use self::{
+    imu_feed::{ImuFeed, ImuReport},
     line::Line,
-    reader::{Reader, Shared, Watcher},
+    port::Port,
 };
 use crate::{
-    clock,
     imu::{Fields, ImuCounters, ImuFormat},
-    nodes, queue,
+    nodes,
     report::{Reporter, reporting},
 };
 
 /// Samples that wait to be drained: 4 s at 1000 Hz.
 pub const QUEUE_SAMPLES: usize = 4096;
-
-/// How long [`ImuPort::stop`] waits for the threads.
-const STOP_NS: i64 = 180_000_000;
 
 /// The rates that units come with or can be set to, the likeliest first.
 const RATES: [u32; 9] = [115_200, 921_600, 460_800, 230_400, 57_600, 128_000, 38_400, 19_200, 9_600];
@@ -86,7 +87,7 @@ impl fmt::Display for UsbIdentity {
 pub enum SerialError {
     /// No such node.
     #[error(
-        "no serial port {}: ports here: {present}; plug the inertial unit in, or name a port that is there (best by its \
+        "no serial port {}: ports here: {present}; plug the device in, or name a port that is there (best by its \
          /dev/serial/by-id link)",
         node.display()
     )]
@@ -103,7 +104,7 @@ pub enum SerialError {
         node: PathBuf,
     },
     /// No line runs at that rate.
-    #[error("{baud} baud is no rate of a serial line: give the inertial unit's, such as 115200 or 921600")]
+    #[error("{baud} baud is no rate of a serial line: give the device's, such as 115200 or 921600")]
     Baud {
         /// The rate asked for.
         baud: u32,
@@ -126,7 +127,7 @@ pub enum SerialError {
         node: PathBuf,
     },
     /// The port does not run at that rate.
-    #[error("{} does not run at {baud} baud but at {got}: set a rate that both the unit and the port know", node.display())]
+    #[error("{} does not run at {baud} baud but at {got}: set a rate that both the device and the port know", node.display())]
     BaudNotTaken {
         /// The name asked for.
         node: PathBuf,
@@ -147,8 +148,18 @@ pub enum SerialError {
         /// Ports that are there.
         present: String,
     },
-    /// The adapter that carried the unit is gone.
-    #[error("the inertial unit's adapter ({adapter}) is gone: ports here: {present}; plug it in again")]
+    /// No port's name fits the configured pattern.
+    #[error(
+        "no serial port fits {pattern}: ports here: {present}; plug the device in, or correct the pattern"
+    )]
+    NoMatch {
+        /// The pattern.
+        pattern: String,
+        /// Ports that are there.
+        present: String,
+    },
+    /// The adapter that carried the device is gone.
+    #[error("the adapter ({adapter}) is gone: ports here: {present}; plug it in again")]
     Gone {
         /// What it was.
         adapter: String,
@@ -165,10 +176,10 @@ pub enum SerialError {
     #[error("cannot list the serial ports: {0}; is /sys mounted?")]
     List(#[source] serialport::Error),
     /// The threads could not be started.
-    #[error("cannot start the threads that read the inertial unit: {0}; are too many processes running?")]
+    #[error("cannot start the threads that read a serial line: {0}; are too many processes running?")]
     Thread(#[source] io::Error),
     /// A thread panicked: a defect of this program.
-    #[error("a thread that reads the inertial unit broke down: report it with the log")]
+    #[error("a thread that reads a serial line broke down: report it with the log")]
     BrokeDown,
 }
 
@@ -237,7 +248,7 @@ impl Baud {
         }
     }
 
-    fn check(&self) -> Result<(), SerialError> {
+    pub(super) fn check(&self) -> Result<(), SerialError> {
         let rates = self.rates();
         match rates.iter().find(|baud| **baud == 0) {
             Some(baud) => Err(SerialError::Baud { baud: *baud }),
@@ -265,6 +276,21 @@ pub struct ImuSettings {
 impl Default for ImuSettings {
     fn default() -> Self {
         Self { device: None, baud: Baud::default(), format: None, low_latency: true, late: timing::LATE }
+    }
+}
+
+/// How a line is reached.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct LineSettings {
+    /// Its node, link or pattern; absent: any USB adapter.
+    device: Option<PathBuf>,
+    baud: Baud,
+    low_latency: bool,
+}
+
+impl ImuSettings {
+    fn line(&self) -> LineSettings {
+        LineSettings { device: self.device.clone(), baud: self.baud.clone(), low_latency: self.low_latency }
     }
 }
 
@@ -301,6 +327,29 @@ pub struct PortCounters {
     pub spurious: u64,
 }
 
+/// How a line does.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LineReport {
+    /// Its life.
+    pub status: LineStatus,
+    /// The node that is open.
+    pub node: Option<PathBuf>,
+    /// The rate in use.
+    pub baud: Option<u32>,
+    /// Whether the adapter hands bytes on at once.
+    pub low_latency: LowLatency,
+    /// What was read and dropped, oldest first, because nobody drained the queue.
+    pub overflow: u64,
+    /// Bytes without a stop bit, where the port counts them.
+    pub framing_errors: u64,
+    /// Bytes lost in the port or in the kernel, where the port counts them.
+    pub overruns: u64,
+    /// Times that a port was opened.
+    pub opened: u64,
+    /// Times that the port said it could be read and gave nothing.
+    pub spurious: u64,
+}
+
 /// How the inertial unit does.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ImuStatus {
@@ -325,9 +374,7 @@ pub struct ImuStatus {
 /// An inertial unit on a serial line, read by a thread of its own into a bounded queue.
 #[derive(Debug)]
 pub struct ImuPort {
-    events: Receiver<Event>,
-    shared: Arc<Shared>,
-    threads: Vec<JoinHandle<()>>,
+    port: Port<ImuFeed>,
 }
 
 impl ImuPort {
@@ -335,7 +382,7 @@ impl ImuPort {
     /// by `reporter`, as all that happens later.
     pub fn start(settings: ImuSettings, reporter: Reporter) -> Result<Self, SerialError> {
         settings.baud.check()?;
-        Self::spawn(settings, None, reporter)
+        Self::spawn(&settings, None, reporter)
     }
 
     /// Like [`Self::start`] for a port that must be there, without reports: for replays and checks. Bytes that are sent
@@ -345,111 +392,76 @@ impl ImuPort {
             ImuSettings { device: Some(node.to_owned()), baud: Baud::Fixed(baud), ..ImuSettings::default() };
         settings.baud.check()?;
         let line = Line::open(node, baud, settings.low_latency)?;
-        let (reporter, _) = reporting();
-        Self::spawn(settings, Some(line), reporter)
+        Self::spawn(&settings, Some(line), reporting().0)
     }
 
-    fn spawn(settings: ImuSettings, line: Option<Line>, reporter: Reporter) -> Result<Self, SerialError> {
-        let (queue, events) = queue::newest(QUEUE_SAMPLES);
-        let wake = eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)
-            .map_err(|e| SerialError::Thread(e.into()))?;
-        let shared = Arc::new(Shared {
-            stop: AtomicBool::new(false),
-            wake,
-            alive_ns: AtomicI64::new(clock::now().ns()),
-            thread: AtomicI32::new(0),
-            ended: AtomicBool::new(false),
-            status: Mutex::new(ImuStatus::default()),
-        });
-        let mut port = Self { events, shared: Arc::clone(&shared), threads: Vec::with_capacity(2) };
-        let mut start = |name: &str, run: Box<dyn FnOnce() + Send>| {
-            let thread =
-                thread::Builder::new().name(name.to_owned()).spawn(run).map_err(SerialError::Thread)?;
-            port.threads.push(thread);
-            Ok::<_, SerialError>(())
-        };
-        let reader = Reader::new(settings, line, Arc::clone(&shared), reporter.clone(), queue);
-        let watcher = Watcher::new(shared, reporter);
-        start("imu-serial", Box::new(move || reader.run()))?;
-        start("imu-watch", Box::new(move || watcher.run()))?;
-        Ok(port)
+    fn spawn(settings: &ImuSettings, line: Option<Line>, reporter: Reporter) -> Result<Self, SerialError> {
+        let port = Port::spawn(settings.line(), ImuFeed::new(settings), line, reporter, QUEUE_SAMPLES)?;
+        Ok(Self { port })
     }
 
     /// The samples read and not yet drained, [`Event::Imu`] in the order of their arrival. At most [`QUEUE_SAMPLES`]; the
     /// oldest give way.
     pub fn events(&self) -> &Receiver<Event> {
-        &self.events
+        self.port.events()
     }
 
     /// How the line does.
     pub fn status(&self) -> ImuStatus {
-        self.shared.status().clone()
+        let (line, said) = self.port.status();
+        let counters = counters(&line, &said);
+        ImuStatus {
+            line: line.status,
+            node: line.node,
+            baud: line.baud,
+            format: said.format,
+            fields: said.fields,
+            low_latency: line.low_latency,
+            timing: said.timing,
+            counters,
+        }
     }
 
     /// What it has carried so far.
     pub fn counters(&self) -> PortCounters {
-        self.shared.status().counters
+        self.status().counters
     }
 
     /// Ends the reading and closes the port, within 200 ms. Samples not drained are lost.
-    pub fn stop(mut self) -> Result<PortCounters, SerialError> {
-        self.ask_to_stop();
-        let threads = std::mem::take(&mut self.threads);
-        let end = clock::now().plus_ns(STOP_NS);
-        while threads.iter().any(|t| !t.is_finished()) {
-            let now = clock::now();
-            if now >= end {
-                let node = self.shared.status().node.clone();
-                let node = node.map_or_else(|| "the serial port".to_owned(), |n| n.display().to_string());
-                return Err(SerialError::Blocked { node });
-            }
-            clock::sleep_until(now.plus_ns(1_000_000));
-        }
-        let broke_down = threads.into_iter().map(JoinHandle::join).filter(Result::is_err).count() > 0;
-        if broke_down { Err(SerialError::BrokeDown) } else { Ok(self.counters()) }
-    }
-
-    fn ask_to_stop(&self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
-        // The threads look at the flag every 100 ms anyway.
-        let _ = rustix::io::write(&self.shared.wake, &1u64.to_ne_bytes());
+    pub fn stop(self) -> Result<PortCounters, SerialError> {
+        let Self { port } = self;
+        let (line, said) = port.stop()?;
+        Ok(counters(&line, &said))
     }
 }
 
-impl Drop for ImuPort {
-    fn drop(&mut self) {
-        if !self.threads.is_empty() {
-            log::warn!("the inertial unit's port was dropped without stop()");
-            self.ask_to_stop();
-        }
+fn counters(line: &LineReport, said: &ImuReport) -> PortCounters {
+    PortCounters {
+        imu: said.counters,
+        overflow: line.overflow,
+        lost_samples: said.lost_samples,
+        framing_errors: line.framing_errors,
+        overruns: line.overruns,
+        opened: line.opened,
+        spurious: line.spurious,
     }
+}
+
+/// What a check found: how the device did at the end, and the faults that were there then with their causes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checked<S> {
+    /// How it did at the end.
+    pub status: S,
+    /// The faults that were there at the end, with their causes.
+    pub faults: Vec<(Fault, String)>,
 }
 
 /// Reads the unit for `time` and tells how it does: for a check by hand.
-pub fn check(settings: ImuSettings, time: Duration) -> Result<ImuCheck, SerialError> {
+pub fn check(settings: ImuSettings, time: Duration) -> Result<Checked<ImuStatus>, SerialError> {
     let (reporter, reports) = reporting();
     let port = ImuPort::start(settings, reporter)?;
     thread::sleep(time);
     let status = port.status();
     port.stop()?;
-    let mut board = bowwave_core::fault::FaultBoard::new();
-    let mut causes = Vec::new();
-    for change in reports.changes() {
-        if let bowwave_core::fault::Change::Raised { cause } = &change.change {
-            causes.retain(|(fault, _)| *fault != change.fault);
-            causes.push((change.fault, cause.clone()));
-        }
-        board.take(&change);
-    }
-    causes.retain(|(fault, _)| board.is_active(*fault));
-    Ok(ImuCheck { status, faults: causes })
-}
-
-/// What [`check`] found.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImuCheck {
-    /// How the unit did at the end.
-    pub status: ImuStatus,
-    /// The faults that were there at the end, with their causes.
-    pub faults: Vec<(bowwave_core::fault::Fault, String)>,
+    Ok(Checked { status, faults: reports.left() })
 }

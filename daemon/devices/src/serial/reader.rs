@@ -1,4 +1,4 @@
-//! The thread that reads the inertial unit, and the one that sees to it that the first has not been swallowed by a driver.
+//! The thread that reads a line, and the one that sees to it that the first has not been swallowed by a driver.
 
 use std::{
     os::fd::{AsFd, BorrowedFd, OwnedFd},
@@ -9,11 +9,7 @@ use std::{
     },
 };
 
-use bowwave_core::{
-    event::Event,
-    fault::{Fault, FaultChange},
-    time::Time,
-};
+use bowwave_core::{event::Event, fault::FaultChange, time::Time};
 use rustix::{
     event::{PollFd, PollFlags, poll},
     io::Errno,
@@ -22,15 +18,14 @@ use rustix::{
 };
 
 use super::{
-    ImuSettings, ImuStatus, LineStatus, SerialError,
+    LineReport, LineSettings, LineStatus, SerialError,
+    feed::{Feed, Kind},
     find::Finder,
     health::{Action, Health},
     ioctl::LineErrors,
     line::{Line, Read},
-    sanity::{Insane, Sanity},
-    timing::Arrivals,
 };
-use crate::{clock, imu::ImuDecoder, queue::NewestSender, report::Reporter};
+use crate::{clock, queue::NewestSender, report::Reporter};
 
 /// How often a port that is not there is looked for.
 const SEARCH_NS: i64 = 100_000_000;
@@ -59,13 +54,13 @@ pub(super) struct Shared {
     pub(super) thread: AtomicI32,
     /// The reader ended, as asked or by a panic.
     pub(super) ended: AtomicBool,
-    pub(super) status: Mutex<ImuStatus>,
+    pub(super) line: Mutex<LineReport>,
 }
 
 impl Shared {
     /// Plain numbers: whole even where a holder panicked.
-    pub(super) fn status(&self) -> MutexGuard<'_, ImuStatus> {
-        self.status.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn line(&self) -> MutexGuard<'_, LineReport> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub(super) fn stopping(&self) -> bool {
@@ -94,23 +89,20 @@ fn wait_for(fd: Option<BorrowedFd<'_>>, wake: &OwnedFd, wait_ns: i64) -> Result<
 }
 
 /// The reading thread.
-pub(super) struct Reader {
-    settings: ImuSettings,
+pub(super) struct Reader<F: Feed> {
+    settings: LineSettings,
+    feed: F,
     line: Option<Line>,
     shared: Arc<Shared>,
+    said: Arc<Mutex<F::Status>>,
     reporter: Reporter,
     queue: NewestSender<Event>,
-    decoder: ImuDecoder,
     finder: Finder,
     /// Which of the candidates is tried.
     attempt: usize,
     /// There were several candidates.
     several: bool,
     health: Health,
-    sanity: Sanity,
-    insane: bool,
-    arrivals: Arrivals,
-    late: bool,
     errors: Option<LineErrors>,
     counted: Time,
 }
@@ -120,34 +112,33 @@ struct Ended(Arc<Shared>);
 
 impl Drop for Ended {
     fn drop(&mut self) {
-        self.0.status().line = LineStatus::Stopped;
+        self.0.line().status = LineStatus::Stopped;
         self.0.ended.store(true, Ordering::Relaxed);
     }
 }
 
-impl Reader {
+impl<F: Feed> Reader<F> {
     pub(super) fn new(
-        settings: ImuSettings,
+        settings: LineSettings,
+        feed: F,
         line: Option<Line>,
         shared: Arc<Shared>,
+        said: Arc<Mutex<F::Status>>,
         reporter: Reporter,
         queue: NewestSender<Event>,
     ) -> Self {
         Self {
             finder: Finder::new(settings.device.clone()),
-            arrivals: Arrivals::late_above(settings.late),
-            health: Health::new(&settings.baud),
-            decoder: ImuDecoder::with(settings.format),
+            health: Health::new(&settings.baud, F::KIND),
             settings,
+            feed,
             line,
             shared,
+            said,
             reporter,
             queue,
             attempt: 0,
             several: false,
-            sanity: Sanity::default(),
-            insane: false,
-            late: false,
             errors: None,
             counted: Time::MIN,
         }
@@ -212,9 +203,8 @@ impl Reader {
 
     fn opened(&mut self, now: Time) {
         self.health.opened(now);
-        self.decoder.restart();
-        self.sanity.forget();
-        self.arrivals.forget();
+        self.feed.restart();
+        self.feed.forget();
         self.errors = self.line.as_ref().and_then(Line::errors);
         self.counted = now;
         let Some(line) = &self.line else { return };
@@ -224,10 +214,10 @@ impl Reader {
             self.health.baud(),
             line.low_latency()
         );
-        let mut status = self.shared.status();
+        let mut status = self.shared.line();
         status.node = Some(line.node().to_owned());
         status.low_latency = line.low_latency();
-        status.counters.opened += 1;
+        status.opened += 1;
     }
 
     /// One wait and one read. Gives the line back while it is good.
@@ -253,12 +243,12 @@ impl Reader {
             }
         }
         if spurious {
-            self.shared.status().counters.spurious += 1;
+            self.shared.line().spurious += 1;
             self.pause(SPURIOUS_PAUSE_NS);
         }
         let now = clock::now();
         self.count(&line, now);
-        self.judge(&line, now);
+        self.feed.judge(line.path(), now, &self.reporter);
         // Where no port is configured another one may come: an adapter that is there at first may be any device's.
         let roam = self.several || self.settings.device.is_none();
         match self.health.tick(now, roam) {
@@ -268,7 +258,7 @@ impl Reader {
                     // What came at the old rate is garbage, and what it was taken for was chance.
                     Ok(()) => {
                         line.flush();
-                        self.decoder.restart();
+                        self.feed.restart();
                     }
                     Err(e) => log::debug!("{e}"),
                 }
@@ -303,40 +293,27 @@ impl Reader {
     }
 
     fn interrupted(&mut self) {
-        self.sanity.forget();
-        self.arrivals.forget();
+        self.feed.forget();
         self.errors = None;
     }
 
     /// Bytes arrived.
     fn take(&mut self, line: &Line, bytes: &[u8]) {
         let arrival = clock::now();
-        let before = self.decoder.counters();
-        let Self { decoder, queue, sanity, arrivals, .. } = self;
-        decoder.push(bytes, arrival, |sample| {
-            sanity.sample(&sample);
-            arrivals.sample(&sample);
-            queue.send(Event::Imu(sample));
-        });
-        let after = self.decoder.counters();
-        if after.not_finite > before.not_finite {
-            self.sanity.bad(arrival, Insane::NotFinite);
-        } else if after.unusable > before.unusable && after.samples == before.samples {
-            self.sanity.bad(arrival, Insane::Unusable);
-        }
+        let packets = self.feed.take(bytes, arrival, &mut self.queue);
         let was = self.health.status();
-        self.health.received(arrival, bytes.len(), after.packets - before.packets);
+        self.health.received(arrival, bytes.len(), packets);
         if was != LineStatus::Streaming && self.health.status() == LineStatus::Streaming {
             self.found(line, arrival);
         }
     }
 
-    /// The unit is known to be on this line.
+    /// The device is known to be on this line.
     fn found(&mut self, line: &Line, now: Time) {
         if let Some(before) = self.finder.found(line.node()) {
             let cause =
-                format!("the inertial unit was {} and now is {}", before.display(), line.node().display());
-            self.reporter.send(FaultChange::noted(now, Fault::ImuRenumbered, cause));
+                format!("the {} was {} and now is {}", F::KIND.name, before.display(), line.node().display());
+            self.reporter.send(FaultChange::noted(now, F::KIND.renumbered, cause));
         }
     }
 
@@ -350,38 +327,10 @@ impl Reader {
         if let Some(before) = self.errors.replace(errors) {
             let framing = errors.framing.wrapping_sub(before.framing);
             self.health.framing(framing);
-            let mut status = self.shared.status();
-            status.counters.framing_errors += u64::from(framing);
-            status.counters.overruns += u64::from(errors.overrun.wrapping_sub(before.overrun));
+            let mut status = self.shared.line();
+            status.framing_errors += u64::from(framing);
+            status.overruns += u64::from(errors.overrun.wrapping_sub(before.overrun));
         }
-    }
-
-    /// Raises and clears what is known from the samples.
-    fn judge(&mut self, line: &Line, now: Time) {
-        let verdict = self.sanity.verdict(now);
-        if let Some(insane) = verdict
-            && !self.insane
-        {
-            let cause = format!("the inertial unit on {}: {insane}", line.path().display());
-            self.reporter.send(FaultChange::raised(now, Fault::ImuSanity, cause));
-        } else if verdict.is_none() && self.insane {
-            self.reporter.send(FaultChange::cleared(now, Fault::ImuSanity));
-        }
-        self.insane = verdict.is_some();
-        let late = self.arrivals.look(now);
-        if late && !self.late {
-            let timing = self.arrivals.timing();
-            let cause = format!(
-                "packets of {:.1} ms come up to {:.1} ms apart (99 %) on {}: set the adapter's latency timer to 1 ms",
-                timing.period_ms,
-                timing.gap_p99_ms,
-                line.path().display()
-            );
-            self.reporter.send(FaultChange::raised(now, Fault::ImuLatency, cause));
-        } else if self.late && !late {
-            self.reporter.send(FaultChange::cleared(now, Fault::ImuLatency));
-        }
-        self.late = late;
     }
 
     /// Tells the supervisor and the owner.
@@ -389,18 +338,14 @@ impl Reader {
         for change in self.health.changes() {
             self.reporter.send(change);
         }
-        let mut status = self.shared.status();
-        status.line = self.health.status();
+        *self.said.lock().unwrap_or_else(PoisonError::into_inner) = self.feed.status();
+        let mut status = self.shared.line();
+        status.status = self.health.status();
         status.baud = self.line.is_some().then(|| self.health.baud());
         if self.line.is_none() {
             status.node = None;
         }
-        status.format = self.decoder.format();
-        status.fields = self.decoder.fields();
-        status.timing = self.arrivals.timing();
-        status.counters.imu = self.decoder.counters();
-        status.counters.overflow = self.queue.dropped();
-        status.counters.lost_samples = self.arrivals.lost();
+        status.overflow = self.queue.dropped();
     }
 }
 
@@ -415,12 +360,13 @@ fn others(found: &[PathBuf], open: &Path) -> bool {
 pub(super) struct Watcher {
     shared: Arc<Shared>,
     reporter: Reporter,
+    kind: &'static Kind,
     blocked: bool,
 }
 
 impl Watcher {
-    pub(super) const fn new(shared: Arc<Shared>, reporter: Reporter) -> Self {
-        Self { shared, reporter, blocked: false }
+    pub(super) const fn new(shared: Arc<Shared>, reporter: Reporter, kind: &'static Kind) -> Self {
+        Self { shared, reporter, kind, blocked: false }
     }
 
     pub(super) fn run(mut self) {
@@ -435,14 +381,14 @@ impl Watcher {
 
     fn look(&mut self, now: Time) {
         let still = now.ns_since(Time::from_ns(self.shared.alive_ns.load(Ordering::Relaxed))) >= BLOCKED_NS;
-        // A thread that could run and is not let is no matter of the port: the unit's silence is told by its own fault.
+        // A thread that could run and is not let is no matter of the port: the device's silence is told by its own fault.
         let blocked = still && (self.blocked || !runnable(self.shared.thread.load(Ordering::Relaxed)));
         if blocked && !self.blocked {
-            let node = self.shared.status().node.clone().unwrap_or_else(|| PathBuf::from("the serial port"));
+            let node = self.shared.line().node.clone().unwrap_or_else(|| PathBuf::from("the serial port"));
             let cause = format!("a kernel call on {} does not return; unplug the adapter", node.display());
-            self.reporter.send(FaultChange::raised(now, Fault::ImuBlocked, cause));
+            self.reporter.send(FaultChange::raised(now, self.kind.blocked, cause));
         } else if self.blocked && !blocked {
-            self.reporter.send(FaultChange::cleared(now, Fault::ImuBlocked));
+            self.reporter.send(FaultChange::cleared(now, self.kind.blocked));
         }
         self.blocked = blocked;
     }

@@ -13,7 +13,7 @@ use std::{
 };
 
 use bowwave_core::{
-    event::{Event, ImuSample},
+    event::{Event, ImuSample, ShipSample},
     fault::{Change, Fault, FaultChange},
     time::Time,
 };
@@ -24,13 +24,16 @@ use rustix::{
 };
 
 use super::{
-    Baud, ImuPort, ImuSettings, ImuStatus, LineStatus, QUEUE_SAMPLES, SerialError,
+    Baud, ImuPort, ImuSettings, LineReport, LineStatus, QUEUE_SAMPLES, SerialError, ShipPort, ShipSettings,
+    feed::IMU,
     health::{Action, Health},
+    imu_feed::ImuFeed,
     reader::{BLOCKED_NS, Reader, Shared, Watcher},
 };
 use crate::{
     clock,
     imu::{ImuDecoder, ImuFormat, streams::encode},
+    nmea::line_of,
     queue,
     report::{Reports, reporting},
     vectornav::CommonOutput,
@@ -126,7 +129,7 @@ fn the_scan_of_rates_finds_every_format() {
     for format in ImuFormat::ALL {
         let Baud::Scan(rates) = Baud::default() else { panic!("several rates") };
         let right = rates[rates.len() - 1];
-        let mut health = Health::new(&Baud::default());
+        let mut health = Health::new(&Baud::default(), &IMU);
         let mut decoder = ImuDecoder::new();
         health.opened(Time::from_ns(0));
         let mut noise = 7u32;
@@ -287,7 +290,7 @@ fn shared_of(thread: i32) -> Arc<Shared> {
         alive_ns: AtomicI64::new(clock::now().ns()),
         thread: AtomicI32::new(thread),
         ended: AtomicBool::new(false),
-        status: Mutex::new(ImuStatus::default()),
+        line: Mutex::new(LineReport::default()),
     })
 }
 
@@ -308,7 +311,7 @@ fn a_reader_without_a_processor_is_not_blocked() {
     });
     let shared = shared_of(numbers.recv().expect("runs"));
     let (reporter, reports) = reporting();
-    let watcher = Watcher::new(Arc::clone(&shared), reporter);
+    let watcher = Watcher::new(Arc::clone(&shared), reporter, &IMU);
     let watching = std::thread::spawn(move || watcher.run());
     std::thread::sleep(Duration::from_nanos(2 * BLOCKED_NS as u64));
     assert_eq!(codes(&reports), Vec::<String>::new());
@@ -325,7 +328,7 @@ fn a_reader_without_a_processor_is_not_blocked() {
 fn a_call_that_does_not_return_is_told_within_200_ms() {
     let shared = shared_of(0);
     let (reporter, reports) = reporting();
-    let watcher = Watcher::new(Arc::clone(&shared), reporter);
+    let watcher = Watcher::new(Arc::clone(&shared), reporter, &IMU);
     let begin = clock::now();
     let thread = std::thread::spawn(move || watcher.run());
     let raised = loop {
@@ -355,7 +358,17 @@ fn a_reader_that_searches_gives_a_sign_of_life_before_it_pauses() {
         // The pause ends at once.
         rustix::io::write(&shared.wake, &1u64.to_ne_bytes()).expect("woken");
         let (queue, _events) = queue::newest(1);
-        let mut reader = Reader::new(settings(&device), None, Arc::clone(&shared), reporting().0, queue);
+        let settings = settings(&device);
+        let feed = ImuFeed::new(&settings);
+        let mut reader = Reader::new(
+            settings.line(),
+            feed,
+            None,
+            Arc::clone(&shared),
+            Arc::default(),
+            reporting().0,
+            queue,
+        );
         let begin = clock::now();
         reader.search();
         assert!(shared.alive_ns.load(Ordering::Relaxed) >= begin.ns(), "{}", device.display());
@@ -453,4 +466,75 @@ fn the_ports_of_this_machine_are_listed() {
     for port in super::list().expect("listed") {
         assert!(port.node.starts_with("/dev") && !port.kind.is_empty(), "{port:?}");
     }
+}
+
+/// A line of the ship's instruments, as sent.
+fn hdt(degrees: f64) -> Vec<u8> {
+    let sample = ShipSample {
+        arrival: Time::MIN,
+        heading: Some(degrees.to_radians()),
+        roll: None,
+        pitch: None,
+        heading_sigma: None,
+        reduced: false,
+    };
+    line_of(&sample).into_bytes()
+}
+
+#[test]
+fn a_ship_feed_is_found_by_its_pattern_lost_and_found_again() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (mut master, slave) = terminal();
+    symlink(&slave, folder.path().join("usb-Moxa_A-port0")).expect("link");
+    let (reporter, reports) = reporting();
+    let port = ShipPort::start(&ShipSettings::new(folder.path().join("usb-Moxa_*-port0")), reporter)
+        .expect("starts");
+    wait_for(|| port.status().line.status == LineStatus::Listening);
+    master.write_all(b"$GPZDA,1,2*00\r\nnoise").expect("written");
+    for n in 0..20 {
+        master.write_all(&hdt(350.0 + f64::from(n))).expect("written");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    wait_for(|| port.status().said.headings == 20);
+    let headings: Vec<_> = port
+        .events()
+        .try_iter()
+        .map(|event| match event {
+            Event::Ship(sample) => sample.heading.expect("a heading").to_degrees().round(),
+            other => panic!("not of a ship: {other:?}"),
+        })
+        .collect();
+    assert_eq!(headings, (0..20).map(|n| f64::from((350 + n) % 360)).collect::<Vec<_>>());
+    let status = port.status();
+    assert!(status.said.period_s.is_some_and(|s| (0.003..0.1).contains(&s)), "{:?}", status.said);
+    assert_eq!(status.line.status, LineStatus::Streaming);
+    // Another terminal first: the kernel would give it the old one's name.
+    let (mut master2, slave2) = terminal();
+    drop(master);
+    wait_for(|| port.status().line.status == LineStatus::Searching);
+    std::fs::remove_file(folder.path().join("usb-Moxa_A-port0")).expect("gone");
+    symlink(&slave2, folder.path().join("usb-Moxa_B-port0")).expect("link");
+    wait_for(|| port.status().line.status == LineStatus::Listening);
+    (0..3).for_each(|_| master2.write_all(&hdt(5.0)).expect("written"));
+    wait_for(|| port.status().line.status == LineStatus::Streaming);
+    let codes = codes(&reports);
+    assert_eq!(codes, ["+SHIP_LOST", "!SHIP_RENUM", "-SHIP_LOST"]);
+    assert_eq!(port.stop().expect("stops").line.opened, 2);
+}
+
+#[test]
+fn a_ship_feed_without_a_valid_heading_is_told() {
+    let (mut master, slave) = terminal();
+    let (reporter, reports) = reporting();
+    let settings = ShipSettings { baud: Baud::Fixed(4_800), ..ShipSettings::new(slave) };
+    let port = ShipPort::start(&settings, reporter).expect("starts");
+    wait_for(|| port.status().line.status == LineStatus::Listening);
+    wait_for(|| {
+        master.write_all(b"$HEHDT,,T*01\r\n").expect("written");
+        std::thread::sleep(Duration::from_millis(50));
+        codes(&reports).contains(&"+SHIP_INVALID".to_owned())
+    });
+    master.write_all(&hdt(5.0)).expect("written");
+    wait_for(|| codes(&reports).contains(&"-SHIP_INVALID".to_owned()));
+    port.stop().expect("stops");
 }

@@ -13,6 +13,8 @@ mod switch;
 
 use std::time::Duration;
 
+use bowwave_core::event::MarkKind;
+
 pub use self::{
     chips::{ChipInfo, LineInfo, TriggerError, check, clock_is_monotonic, list},
     debounce::Debouncer,
@@ -21,6 +23,25 @@ pub use self::{
     switch::{TriggerCounters, TriggerLife},
 };
 pub(crate) use chips::{PlacedLine, place_again, request_error};
+
+/// A button of the operator.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Press {
+    /// Its line: active is pressed.
+    pub line: InputLine,
+    /// What the gun stands at when it is pressed.
+    pub kind: MarkKind,
+}
+
+impl Press {
+    /// What it is called.
+    pub const fn name(&self) -> &'static str {
+        match self.kind {
+            MarkKind::Stow => "re-zero",
+            MarkKind::Landmark => "landmark",
+        }
+    }
+}
 
 /// What is wired where.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,6 +56,8 @@ pub struct TriggerSettings {
     pub interlock: Option<InputLine>,
     /// The power supply's warning: active means that power is about to fail.
     pub power_fail: Option<InputLine>,
+    /// Buttons by which the operator tells where the gun stands.
+    pub presses: Vec<Press>,
 }
 
 impl TriggerSettings {
@@ -46,6 +69,7 @@ impl TriggerSettings {
             stuck_after: Duration::from_secs(10),
             interlock: None,
             power_fail: None,
+            presses: Vec::new(),
         }
     }
 
@@ -58,6 +82,7 @@ impl TriggerSettings {
         ]
         .into_iter()
         .filter_map(|(name, line)| line.map(|line| (name, line)))
+        .chain(self.presses.iter().map(|press| (press.name(), &press.line)))
     }
 
     fn check(&self) -> Result<(), TriggerError> {

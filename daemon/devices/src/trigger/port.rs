@@ -11,7 +11,7 @@ use std::{
 };
 
 use bowwave_core::{
-    event::Event,
+    event::{Event, Mark, MarkKind},
     fault::{Fault, FaultChange},
     time::Time,
 };
@@ -20,6 +20,7 @@ use crossbeam_channel::Receiver;
 use super::{
     LineState, TriggerCounters, TriggerError, TriggerSettings, TriggerStatus,
     chips::clock_is_monotonic,
+    debounce::Debouncer,
     guard::{Interlock, Power},
     input::{Edge, Input, InputLine},
     switch::{Output, Switch},
@@ -99,7 +100,8 @@ impl TriggerPort {
         Ok(Self { events, shared, thread: Some(thread) })
     }
 
-    /// Edges not yet drained, [`Event::Trigger`] with the kernel's times, without chatter, presses and releases in turn.
+    /// Edges not yet drained, [`Event::Trigger`] with the kernel's times, without chatter, presses and releases in turn; and
+    /// [`Event::Mark`] for each press of a button.
     pub fn events(&self) -> &Receiver<Event> {
         &self.events
     }
@@ -140,6 +142,7 @@ enum Role {
     Trigger,
     Interlock,
     PowerFail,
+    Press(MarkKind),
 }
 
 /// A line that is wanted, and open where it can be.
@@ -155,6 +158,8 @@ struct Place {
     /// Its loss has been told.
     told: bool,
     state: LineState,
+    /// Of a button of the operator.
+    button: Option<Debouncer>,
 }
 
 /// The watching thread.
@@ -167,6 +172,8 @@ struct Watch {
     switch: Switch,
     interlock: Option<Interlock>,
     power: Power,
+    /// How long contacts chatter, nanoseconds.
+    debounce_ns: i64,
 }
 
 impl Watch {
@@ -178,6 +185,7 @@ impl Watch {
         queue: NewestSender<Event>,
     ) -> Self {
         let now = clock::now();
+        let presses = settings.presses.iter().map(|press| (Role::Press(press.kind), Some(&press.line)));
         let lines = [
             (Role::Trigger, Some(&settings.trigger)),
             (Role::Interlock, settings.interlock.as_ref()),
@@ -193,6 +201,7 @@ impl Watch {
                 next: Time::MIN,
                 told: false,
                 state: LineState::Absent,
+                button: None,
             })
         };
         let ns = |d: std::time::Duration| i64::try_from(d.as_nanos()).unwrap_or(i64::MAX);
@@ -206,10 +215,11 @@ impl Watch {
             shared,
             reporter,
             queue,
-            places: lines.into_iter().filter_map(place).collect(),
+            places: lines.into_iter().chain(presses).filter_map(place).collect(),
             switch,
             interlock: settings.interlock.as_ref().map(|_| Interlock::new(now)),
             power: Power::default(),
+            debounce_ns: ns(settings.debounce),
         }
     }
 
@@ -311,6 +321,12 @@ impl Watch {
         self.show(i, state(level));
         match self.role(i) {
             Some(Role::Trigger) => self.switch.opened(asked, now, level),
+            Some(Role::Press(_)) => {
+                let button = Debouncer::new(self.debounce_ns, level, now);
+                if let Some(place) = self.places.get_mut(i) {
+                    place.button = Some(button);
+                }
+            }
             Some(Role::Interlock | Role::PowerFail) | None => self.level(i, now, level),
         }
     }
@@ -327,6 +343,12 @@ impl Watch {
                 }
             }
             Some(Role::PowerFail) => self.power.level(now, edge.active),
+            Some(Role::Press(kind)) => {
+                let Self { places, queue, .. } = self;
+                if let Some(button) = places.get_mut(i).and_then(|p| p.button.as_mut()) {
+                    button.edge(edge.time, edge.active, |time, pressed| press(queue, kind, time, pressed));
+                }
+            }
             None => {}
         }
         self.publish();
@@ -343,6 +365,13 @@ impl Watch {
                 }
             }
             Some(Role::PowerFail) => self.power.level(now, level),
+            Some(Role::Press(_)) => {
+                if let Some(button) = self.places.get_mut(i).and_then(|p| p.button.as_mut())
+                    && button.level() != level
+                {
+                    button.correct(now, level);
+                }
+            }
             None => {}
         }
     }
@@ -360,6 +389,12 @@ impl Watch {
                 if let Some(interlock) = &mut self.interlock {
                     interlock.lost(now, &format!("interlock: {error}"));
                     self.switch.arm(now, false);
+                }
+            }
+            Role::Press(_) => {
+                if first {
+                    let cause = format!("button: {error}; the heading cannot be set by it");
+                    self.reporter.send(FaultChange::noted(now, Fault::TriggerLost, cause));
                 }
             }
             Role::PowerFail => {
@@ -382,6 +417,12 @@ impl Watch {
             }
         }
         self.power.tick(now);
+        let Self { places, queue, .. } = self;
+        for place in places {
+            if let (Role::Press(kind), Some(button)) = (place.role, &mut place.button) {
+                button.settle(now, |time, pressed| press(queue, kind, time, pressed));
+            }
+        }
         self.switch.tick(now);
     }
 
@@ -410,6 +451,13 @@ impl Watch {
     }
 }
 
+/// A button tells by being pressed; that it is let go means nothing.
+fn press(queue: &mut NewestSender<Event>, kind: MarkKind, time: Time, pressed: bool) {
+    if pressed {
+        queue.send(Event::Mark(Mark { time, kind }));
+    }
+}
+
 const fn state(level: bool) -> LineState {
     if level { LineState::Active } else { LineState::Inactive }
 }
@@ -421,7 +469,7 @@ mod tests {
     use super::*;
     use crate::{
         report::reporting,
-        trigger::{Bias, TriggerLife},
+        trigger::{Bias, Press, TriggerLife},
     };
 
     fn line(line: &str) -> InputLine {
@@ -435,6 +483,7 @@ mod tests {
         let settings = TriggerSettings {
             interlock: Some(line("INERT")),
             power_fail: Some(line("PFAIL")),
+            presses: vec![Press { line: line("REZERO"), kind: MarkKind::Stow }],
             ..TriggerSettings::new(line("TRIGGER"))
         };
         let port =
@@ -449,8 +498,8 @@ mod tests {
             seen.extend(reports.changes().map(|c| c.fault));
         }
         seen.sort_unstable();
-        // The power-fail input is noted as lost, the trigger raised, each once.
-        assert_eq!(seen, [Fault::NotInert, Fault::TriggerLost, Fault::TriggerLost]);
+        // The power-fail input and the button are noted as lost, the trigger raised, each once.
+        assert_eq!(seen, [Fault::NotInert, Fault::TriggerLost, Fault::TriggerLost, Fault::TriggerLost]);
         let status = port.status();
         assert_eq!((status.life, status.armed), (TriggerLife::Searching, Some(false)));
         let before = clock::now();
@@ -469,6 +518,10 @@ mod tests {
         assert!(matches!(refused(long), TriggerError::Debounce { ms: 50 }));
         let short = TriggerSettings { stuck_after: Duration::ZERO, ..good.clone() };
         assert!(matches!(refused(short), TriggerError::StuckAfter { .. }));
+        let button = Press { line: line("TRIGGER"), kind: MarkKind::Landmark };
+        let same = TriggerSettings { presses: vec![button], ..good.clone() };
+        let message = refused(same).to_string();
+        assert!(message.contains("landmark and trigger are both line TRIGGER"), "{message}");
         let twice = TriggerSettings { interlock: Some(line("TRIGGER")), ..good };
         let message = refused(twice).to_string();
         assert!(message.contains("interlock and trigger are both line TRIGGER"), "{message}");

@@ -6,6 +6,8 @@
 //! | `/camera/info` | `sensor_msgs/msg/CameraInfo`, once | start |
 //! | `/imu` | `sensor_msgs/msg/Imu` | log: arrival; header: the unit's own clock |
 //! | `/trigger` | `std_msgs/msg/Bool` | log: the kernel's time of the edge |
+//! | `/ship` | `nmea_msgs/msg/Sentence` | both: arrival |
+//! | `/mark` | `std_msgs/msg/String`: `stow` or `landmark` | log: when the operator pressed |
 //! | `/truth/pose`, `/pose` | `geometry_msgs/msg/PoseStamped` | both: the pose's time |
 //!
 //! Calibration and scenario are attachments (`calibration.toml`, `scenario.toml`), everything else of [`Properties`] is one
@@ -27,7 +29,7 @@ mod write;
 use std::sync::Arc;
 
 use bowwave_core::{
-    event::{ImuSample, TriggerEdge},
+    event::{ImuSample, Mark, TriggerEdge},
     geometry::CameraPose,
     time::Time,
 };
@@ -40,6 +42,9 @@ pub use write::{RecordingWriter, WrittenSummary};
 
 /// The largest chunk that is read, bytes: what a reader may have to hold at once.
 pub const CHUNK_MAX_BYTES: u64 = 64 << 20;
+
+/// The longest line of the ship's instruments that is written or read, bytes.
+pub const SENTENCE_MAX_BYTES: usize = 256;
 
 /// The largest JPEG that is written or read, bytes.
 pub const JPEG_MAX_BYTES: usize = 32 << 20;
@@ -56,6 +61,10 @@ pub enum Entry {
     Frame(FrameEntry),
     /// The trigger.
     Trigger(TriggerEdge),
+    /// A line of the ship's instruments.
+    Ship(ShipEntry),
+    /// The operator's press.
+    Mark(Mark),
     /// Where the camera really was (recordings with known truth).
     Truth(PoseEntry),
     /// The pose that a session used.
@@ -69,6 +78,8 @@ impl Entry {
             Self::Imu(sample) => sample.arrival,
             Self::Frame(frame) => frame.arrival,
             Self::Trigger(edge) => edge.time,
+            Self::Ship(line) => line.arrival,
+            Self::Mark(mark) => mark.time,
             Self::Truth(pose) | Self::Pose(pose) => pose.time,
         }
     }
@@ -98,6 +109,15 @@ impl std::fmt::Debug for FrameEntry {
     }
 }
 
+/// A line of the ship's instruments as it came over the wire.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShipEntry {
+    /// When its last byte reached the host.
+    pub arrival: Time,
+    /// The line with its check sum, at most [`SENTENCE_MAX_BYTES`].
+    pub sentence: String,
+}
+
 /// A pose of the camera at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseEntry {
@@ -116,6 +136,10 @@ pub struct Counts {
     pub frames: u64,
     /// Trigger edges.
     pub triggers: u64,
+    /// Lines of the ship's instruments.
+    pub ship: u64,
+    /// The operator's presses.
+    pub marks: u64,
     /// True poses.
     pub truths: u64,
     /// Poses that were used.
@@ -125,7 +149,7 @@ pub struct Counts {
 impl Counts {
     /// All entries together.
     pub const fn total(&self) -> u64 {
-        self.imu + self.frames + self.triggers + self.truths + self.poses
+        self.imu + self.frames + self.triggers + self.ship + self.marks + self.truths + self.poses
     }
 
     pub(crate) fn add(&mut self, entry: &Entry) {
@@ -133,6 +157,8 @@ impl Counts {
             Entry::Imu(_) => self.imu += 1,
             Entry::Frame(_) => self.frames += 1,
             Entry::Trigger(_) => self.triggers += 1,
+            Entry::Ship(_) => self.ship += 1,
+            Entry::Mark(_) => self.marks += 1,
             Entry::Truth(_) => self.truths += 1,
             Entry::Pose(_) => self.poses += 1,
         }

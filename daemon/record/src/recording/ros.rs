@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bowwave_core::{
-    event::{ImuSample, TriggerEdge},
+    event::{ImuSample, Mark, MarkKind, TriggerEdge},
     geometry::CameraPose,
     time::{NS_PER_S, Time},
 };
@@ -11,11 +11,17 @@ use byteorder::{BigEndian, LittleEndian};
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::{CameraInfo, Entry, FrameEntry, JPEG_MAX_BYTES, PoseEntry, schema::Topic};
+use super::{
+    CameraInfo, Entry, FrameEntry, JPEG_MAX_BYTES, PoseEntry, SENTENCE_MAX_BYTES, ShipEntry, schema::Topic,
+};
 
 const FRAME_CAMERA: &str = "camera";
 const FRAME_IMU: &str = "imu";
 const FRAME_WORLD: &str = "world";
+const FRAME_SHIP: &str = "ship";
+
+/// What the operator's presses are called.
+const MARKS: [(MarkKind, &str); 2] = [(MarkKind::Stow, "stow"), (MarkKind::Landmark, "landmark")];
 
 #[derive(Serialize, Deserialize)]
 struct Stamp {
@@ -66,6 +72,17 @@ struct CompressedImage<'a> {
 #[derive(Serialize, Deserialize)]
 struct Bool {
     data: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Text {
+    data: String,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Sentence {
+    header: Header,
+    sentence: String,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -127,6 +144,16 @@ pub(crate) fn encode(entry: &Entry, out: &mut Vec<u8>) -> Result<Topic, String> 
         Entry::Trigger(edge) => {
             write(out, &Bool { data: edge.pressed })?;
             Ok(Topic::Trigger)
+        }
+        Entry::Ship(line) => {
+            let sentence = sentence(&line.sentence)?.to_owned();
+            write(out, &Sentence { header: header(line.arrival, FRAME_SHIP)?, sentence })?;
+            Ok(Topic::Ship)
+        }
+        Entry::Mark(mark) => {
+            let (_, name) = MARKS[usize::from(mark.kind == MarkKind::Landmark)];
+            write(out, &Text { data: name.to_owned() })?;
+            Ok(Topic::Mark)
         }
         Entry::Truth(pose) => {
             write(out, &pose_message(pose)?)?;
@@ -194,9 +221,31 @@ pub(crate) fn decode(
             })
         }
         Topic::Trigger => Entry::Trigger(TriggerEdge { time: log_time, pressed: read::<Bool>(data)?.data }),
+        Topic::Ship => {
+            let message: Sentence = read(data)?;
+            sentence(&message.sentence)?;
+            Entry::Ship(ShipEntry { arrival: log_time, sentence: message.sentence })
+        }
+        Topic::Mark => {
+            let name = read::<Text>(data)?.data;
+            let known = MARKS.into_iter().find(|(_, known)| *known == name);
+            let (kind, _) = known.ok_or_else(|| format!("a press at {name:?}, which is no mark"))?;
+            Entry::Mark(Mark { time: log_time, kind })
+        }
         Topic::Truth => Entry::Truth(pose_entry(&read(data)?, log_time)?),
         Topic::Pose => Entry::Pose(pose_entry(&read(data)?, log_time)?),
     }))
+}
+
+/// A line that can be kept: one that a wire could have carried.
+fn sentence(line: &str) -> Result<&str, String> {
+    if line.is_empty() || line.len() > SENTENCE_MAX_BYTES || !line.is_ascii() {
+        return Err(format!(
+            "a line of the ship's instruments of {} bytes (1 to {SENTENCE_MAX_BYTES} of ASCII)",
+            line.len()
+        ));
+    }
+    Ok(line)
 }
 
 fn imu_message(sample: &ImuSample) -> Result<Imu, String> {

@@ -1,4 +1,5 @@
-//! Topics and their ROS 2 message definitions, as `ros2 interface show` of the Jazzy distribution has them (comments left out).
+//! Topics and their ROS 2 message definitions, as `ros2 interface show` of the Jazzy distribution has them (comments left out). The
+//! ship's lines are kept as the drivers of receivers publish them (package nmea_msgs).
 
 /// The file's profile and the encodings of schemas and messages, by their names in the MCAP registry.
 pub(crate) const PROFILE: &str = "ros2";
@@ -12,13 +13,23 @@ pub(crate) enum Topic {
     CameraInfo,
     Imu,
     Trigger,
+    Ship,
+    Mark,
     Truth,
     Pose,
 }
 
 impl Topic {
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Image, Self::CameraInfo, Self::Imu, Self::Trigger, Self::Truth, Self::Pose];
+    pub(crate) const ALL: [Self; 8] = [
+        Self::Image,
+        Self::CameraInfo,
+        Self::Imu,
+        Self::Trigger,
+        Self::Ship,
+        Self::Mark,
+        Self::Truth,
+        Self::Pose,
+    ];
 
     pub(crate) const fn name(self) -> &'static str {
         match self {
@@ -26,6 +37,8 @@ impl Topic {
             Self::CameraInfo => "/camera/info",
             Self::Imu => "/imu",
             Self::Trigger => "/trigger",
+            Self::Ship => "/ship",
+            Self::Mark => "/mark",
             Self::Truth => "/truth/pose",
             Self::Pose => "/pose",
         }
@@ -37,6 +50,8 @@ impl Topic {
             Self::CameraInfo => "sensor_msgs/msg/CameraInfo",
             Self::Imu => "sensor_msgs/msg/Imu",
             Self::Trigger => "std_msgs/msg/Bool",
+            Self::Ship => "nmea_msgs/msg/Sentence",
+            Self::Mark => "std_msgs/msg/String",
             Self::Truth | Self::Pose => "geometry_msgs/msg/PoseStamped",
         }
     }
@@ -52,6 +67,8 @@ impl Topic {
             Self::CameraInfo => &[("", CAMERA_INFO), HEADER, TIME, REGION_OF_INTEREST],
             Self::Imu => &[("", IMU), HEADER, TIME, QUATERNION, VECTOR3],
             Self::Trigger => &[("", "bool data\n")],
+            Self::Ship => &[("", "std_msgs/Header header\nstring sentence\n"), HEADER, TIME],
+            Self::Mark => &[("", "string data\n")],
             Self::Truth | Self::Pose => {
                 &[("", "std_msgs/Header header\nPose pose\n"), HEADER, TIME, POSE, POINT, QUATERNION]
             }

@@ -79,6 +79,8 @@ impl Survey {
                 Some(Topic::Image) => &mut self.counts.frames,
                 Some(Topic::Imu) => &mut self.counts.imu,
                 Some(Topic::Trigger) => &mut self.counts.triggers,
+                Some(Topic::Ship) => &mut self.counts.ship,
+                Some(Topic::Mark) => &mut self.counts.marks,
                 Some(Topic::Truth) => &mut self.counts.truths,
                 Some(Topic::Pose) => &mut self.counts.poses,
                 Some(Topic::CameraInfo) | None => continue,
@@ -114,6 +116,8 @@ impl Survey {
             Topic::Image => self.counts.frames += 1,
             Topic::Imu => self.counts.imu += 1,
             Topic::Trigger => self.counts.triggers += 1,
+            Topic::Ship => self.counts.ship += 1,
+            Topic::Mark => self.counts.marks += 1,
             Topic::Truth => self.counts.truths += 1,
             Topic::Pose => self.counts.poses += 1,
             Topic::CameraInfo => {

@@ -72,7 +72,8 @@ fn check_entry(entry: &Entry) {
             assert!((pose.world_from_camera.length() - 1.0).abs() < 1e-3, "no rotation: {pose:?}");
         }
         // The inertial unit's values are kept as they were measured; the session judges them.
-        Entry::Imu(_) | Entry::Trigger(_) => {}
+        Entry::Imu(_) | Entry::Trigger(_) | Entry::Mark(_) => {}
+        Entry::Ship(line) => assert!(line.sentence.is_ascii() && !line.sentence.is_empty(), "{line:?}"),
     }
 }
 
@@ -81,6 +82,8 @@ fn count(counts: &mut Counts, entry: &Entry) {
         Entry::Imu(_) => &mut counts.imu,
         Entry::Frame(_) => &mut counts.frames,
         Entry::Trigger(_) => &mut counts.triggers,
+        Entry::Ship(_) => &mut counts.ship,
+        Entry::Mark(_) => &mut counts.marks,
         Entry::Truth(_) => &mut counts.truths,
         Entry::Pose(_) => &mut counts.poses,
     } += 1;

@@ -4,6 +4,7 @@ use bowwave_core::fault::Change;
 use proptest::prelude::*;
 
 use super::*;
+use crate::serial::feed::IMU;
 
 const MS: i64 = 1_000_000;
 
@@ -24,7 +25,7 @@ struct Rig {
 
 impl Rig {
     fn new(baud: Baud, unit_baud: Option<u32>) -> Self {
-        let mut health = Health::new(&baud);
+        let mut health = Health::new(&baud, &IMU);
         health.opened(at(0));
         Self {
             health,
@@ -152,7 +153,7 @@ fn silence_is_no_wrong_rate() {
 
 #[test]
 fn a_port_that_lies_about_bytes_is_opened_anew() {
-    let mut health = Health::new(&Baud::Fixed(9_600));
+    let mut health = Health::new(&Baud::Fixed(9_600), &IMU);
     health.opened(at(0));
     health.spurious(at(10));
     assert_eq!(health.tick(at(20), false), Action::Keep);
@@ -170,7 +171,7 @@ fn a_port_that_lies_about_bytes_is_opened_anew() {
 
 #[test]
 fn where_any_port_may_be_it_the_next_one_is_tried() {
-    let mut health = Health::new(&Baud::default());
+    let mut health = Health::new(&Baud::default(), &IMU);
     health.opened(at(0));
     assert_eq!(health.tick(at(1400), true), Action::Keep);
     assert_eq!(health.tick(at(1500), true), Action::NextPort);
@@ -240,7 +241,7 @@ proptest! {
     fn faults_alternate_and_the_unit_is_found(
         happenings in prop::collection::vec((0u8..6, 1i64..200, 0u64..3), 0..200),
     ) {
-        let mut health = Health::new(&Baud::Scan(vec![1, 2, 3]));
+        let mut health = Health::new(&Baud::Scan(vec![1, 2, 3]), &IMU);
         let mut active = std::collections::HashSet::new();
         let mut now_ms = 0;
         let mut follow = |health: &mut Health| {

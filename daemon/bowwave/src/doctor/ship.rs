@@ -1,0 +1,94 @@
+//! What the ship's own instruments say.
+
+use std::time::Duration;
+
+use bowwave_devices::serial::{self, ShipSettings, ShipStatus};
+
+use super::{Check, configured, failed};
+
+/// Headings that the time must bring at least: an instrument sends one a second.
+const HEADINGS_MIN: u64 = 2;
+
+/// Listens to the feed for `time`.
+pub(super) fn check(settings: &ShipSettings, time: Duration) -> Check {
+    match serial::check_ship(settings, time) {
+        Ok(found) => {
+            let enough = found.status.said.headings >= HEADINGS_MIN;
+            configured::verdict("ship", &found.faults, told(&found.status), enough)
+        }
+        Err(e) => failed("ship", e),
+    }
+}
+
+fn told(status: &ShipStatus) -> String {
+    let (Some(node), Some(baud)) = (&status.line.node, status.line.baud) else {
+        return "no ship feed answers".to_owned();
+    };
+    let place = format!("{} at {baud} baud", node.display());
+    let lines = status.said.lines;
+    let counts = format!(
+        "{} headings in {} lines, {} damaged, {} bytes of no line",
+        status.said.headings, lines.packets, lines.bad_crc, lines.skipped_bytes
+    );
+    let Some((sentence, sample)) = status.said.newest else {
+        return format!("{place}: no heading; {counts}");
+    };
+    let deg = |what: &str, angle: Option<f64>| angle.map(|a| format!(", {what} {:.2} deg", a.to_degrees()));
+    let rate = status.said.period_s.filter(|s| *s > 0.0).map(|s| format!(", {:.1} a second", s.recip()));
+    let parts = [
+        deg("heading", sample.heading),
+        deg("roll", sample.roll),
+        deg("pitch", sample.pitch),
+        deg("its own sigma", sample.heading_sigma),
+        sample.reduced.then(|| ", quality reduced".to_owned()),
+        rate,
+    ];
+    format!("{place}: {}{}; {counts}", sentence.name(), parts.into_iter().flatten().collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::{event::ShipSample, time::Time};
+    use bowwave_devices::{
+        nmea::{LineCounters, Sentence},
+        serial::{LineReport, ShipReport},
+    };
+
+    use super::*;
+
+    #[test]
+    fn a_feed_is_told_in_words() {
+        let sample = ShipSample {
+            arrival: Time::MIN,
+            heading: Some(235.18f64.to_radians()),
+            roll: None,
+            pitch: None,
+            heading_sigma: None,
+            reduced: true,
+        };
+        let said = ShipReport {
+            newest: Some((Sentence::Hdt, sample)),
+            period_s: Some(0.1),
+            headings: 25,
+            lines: LineCounters { packets: 50, bad_crc: 1, skipped_bytes: 7 },
+        };
+        let line =
+            LineReport { node: Some("/dev/ttyUSB1".into()), baud: Some(4800), ..LineReport::default() };
+        let told_now = told(&ShipStatus { line: line.clone(), said });
+        assert_eq!(
+            told_now,
+            "/dev/ttyUSB1 at 4800 baud: HDT, heading 235.18 deg, quality reduced, 10.0 a second; 25 headings in 50 lines, 1 \
+             damaged, 7 bytes of no line"
+        );
+        let silent = told(&ShipStatus { line, said: ShipReport::default() });
+        assert!(silent.starts_with("/dev/ttyUSB1 at 4800 baud: no heading; 0 headings"), "{silent}");
+        assert_eq!(told(&ShipStatus::default()), "no ship feed answers");
+    }
+
+    #[test]
+    fn a_feed_that_is_not_there_fails_with_what_to_do() {
+        let found = check(&ShipSettings::new("/dev/absent-ship".into()), Duration::from_millis(300));
+        assert_eq!(found.verdict, super::super::Verdict::Failed);
+        assert!(found.found.contains("absent-ship"), "{}", found.found);
+    }
+}

@@ -1,0 +1,207 @@
+//! The ship's own instruments on a serial line: heading and attitude as lines of NMEA 0183.
+
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use bowwave_core::{
+    event::{Event, ShipSample},
+    fault::{Fault, FaultChange},
+    time::Time,
+};
+use crossbeam_channel::Receiver;
+
+use super::{
+    Baud, LineReport, LineSettings, SerialError,
+    feed::{Feed, Kind, SHIP},
+    line::Line,
+    port::Port,
+};
+use crate::{
+    framing::LineCounters,
+    nmea::{Sentence, ShipParser},
+    queue::NewestSender,
+    report::{Reporter, reporting},
+};
+
+/// Lines that wait to be drained: ten seconds of the fastest feed.
+const QUEUE_LINES: usize = 512;
+
+/// The rates of ships' instruments, that of the standard first (NMEA 0183: 4800; its high-speed variant: 38400).
+const RATES: [u32; 6] = [4_800, 38_400, 9_600, 19_200, 57_600, 115_200];
+
+/// Lines without a valid heading for so long mean that there is none.
+const INVALID_NS: i64 = 3_000_000_000;
+
+/// A beat is the mean over about so many lines.
+const BEATS: f64 = 16.0;
+
+/// How the ship's instruments are reached.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShipSettings {
+    /// The port's node, or better its link in `/dev/serial/by-id`; `*` and `?` in it stand for what may change (the first port that fits
+    /// and answers is taken).
+    pub device: PathBuf,
+    /// Its rate.
+    pub baud: Baud,
+}
+
+impl ShipSettings {
+    /// On that port at whichever usual rate.
+    pub fn new(device: PathBuf) -> Self {
+        Self { device, baud: Baud::Scan(RATES.to_vec()) }
+    }
+}
+
+/// What the ship's lines said.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ShipReport {
+    /// The newest line that said something of heading or attitude.
+    pub newest: Option<(Sentence, ShipSample)>,
+    /// Mean time between headings, seconds; nothing before enough came.
+    pub period_s: Option<f64>,
+    /// Lines with a valid heading.
+    pub headings: u64,
+    /// Lines of all kinds, damaged ones and bytes of none.
+    pub lines: LineCounters,
+}
+
+/// How the ship feed does.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ShipStatus {
+    /// The line.
+    pub line: LineReport,
+    /// What it said.
+    pub said: ShipReport,
+}
+
+/// The ship's instruments, read by a thread of its own into a bounded queue.
+#[derive(Debug)]
+pub struct ShipPort {
+    port: Port<ShipFeed>,
+}
+
+impl ShipPort {
+    /// Begins to look for the feed, to read it, and to look for it again whenever it is lost. That it is not there is told by
+    /// `reporter`, as all that happens later.
+    pub fn start(settings: &ShipSettings, reporter: Reporter) -> Result<Self, SerialError> {
+        Self::spawn(settings, None, reporter)
+    }
+
+    /// Like [`Self::start`] for a port that must be there, without reports: for replays and checks.
+    pub fn open(node: &Path, baud: u32) -> Result<Self, SerialError> {
+        let settings = ShipSettings { device: node.to_owned(), baud: Baud::Fixed(baud) };
+        settings.baud.check()?;
+        let line = Line::open(node, baud, true)?;
+        Self::spawn(&settings, Some(line), reporting().0)
+    }
+
+    fn spawn(settings: &ShipSettings, line: Option<Line>, reporter: Reporter) -> Result<Self, SerialError> {
+        settings.baud.check()?;
+        let wanted = LineSettings {
+            device: Some(settings.device.clone()),
+            baud: settings.baud.clone(),
+            low_latency: true,
+        };
+        let port = Port::spawn(wanted, ShipFeed::default(), line, reporter, QUEUE_LINES)?;
+        Ok(Self { port })
+    }
+
+    /// What was said and not yet drained, [`Event::Ship`] in the order of arrival; the oldest give way.
+    pub fn events(&self) -> &Receiver<Event> {
+        self.port.events()
+    }
+
+    /// How the feed does.
+    pub fn status(&self) -> ShipStatus {
+        let (line, said) = self.port.status();
+        ShipStatus { line, said }
+    }
+
+    /// Ends the reading and closes the port, within 200 ms. What was not drained is lost.
+    pub fn stop(self) -> Result<ShipStatus, SerialError> {
+        self.port.stop().map(|(line, said)| ShipStatus { line, said })
+    }
+}
+
+/// Reads the feed for `time` and tells how it does: for a check by hand.
+pub fn check_ship(
+    settings: &ShipSettings,
+    time: Duration,
+) -> Result<super::Checked<ShipStatus>, SerialError> {
+    let (reporter, reports) = reporting();
+    let port = ShipPort::start(settings, reporter)?;
+    std::thread::sleep(time);
+    let status = port.status();
+    port.stop()?;
+    Ok(super::Checked { status, faults: reports.left() })
+}
+
+/// The codec, and what its lines told.
+#[derive(Debug, Default)]
+pub(super) struct ShipFeed {
+    parser: ShipParser,
+    said: ShipReport,
+    /// When the last heading came, and since when lines come without one.
+    last: Option<Time>,
+    without: Option<Time>,
+    invalid: bool,
+}
+
+impl Feed for ShipFeed {
+    type Status = ShipReport;
+
+    const KIND: &'static Kind = &SHIP;
+
+    fn take(&mut self, bytes: &[u8], arrival: Time, queue: &mut NewestSender<Event>) -> u64 {
+        let before = self.parser.counters().packets;
+        let Self { parser, said, last, without, .. } = self;
+        parser.push(bytes, arrival, |line| {
+            said.newest = Some((line.sentence, line.sample));
+            if line.sample.heading.is_some() {
+                said.headings += 1;
+                *without = None;
+                if let Some(before) = last.replace(arrival) {
+                    let gap_s = arrival.secs_since(before);
+                    let mean_s = said.period_s.unwrap_or(gap_s);
+                    said.period_s = Some(mean_s + (gap_s - mean_s) / BEATS);
+                }
+            }
+            queue.send(Event::Ship(line.sample));
+        });
+        let lines = self.parser.counters();
+        self.said.lines = lines;
+        if lines.packets > before && self.last.is_none_or(|last| last < arrival) {
+            self.without.get_or_insert(arrival);
+        }
+        lines.packets - before
+    }
+
+    fn restart(&mut self) {
+        self.parser.restart();
+    }
+
+    fn forget(&mut self) {
+        (self.last, self.without) = (None, None);
+    }
+
+    fn judge(&mut self, path: &Path, now: Time, reporter: &Reporter) {
+        let invalid = self.without.is_some_and(|since| now.ns_since(since) >= INVALID_NS);
+        if invalid && !self.invalid {
+            let cause = format!(
+                "lines come on {} and none tells a valid heading (HDT, PASHR or PSXN,23): is the compass settled, and is one of these \
+                 switched on?",
+                path.display()
+            );
+            reporter.send(FaultChange::raised(now, Fault::ShipInvalid, cause));
+        } else if self.invalid && !invalid {
+            reporter.send(FaultChange::cleared(now, Fault::ShipInvalid));
+        }
+        self.invalid = invalid;
+    }
+
+    fn status(&self) -> ShipReport {
+        self.said
+    }
+}
