@@ -8,12 +8,14 @@
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{SMatrix, SVector};
 
+use super::{inclination::Settings, lag::Lag, swell::Swell};
 use crate::gunnery::GRAVITY_M_S2;
 
 /// Turn of the world (3), gyro's bias in the unit's axes (3), error of the inclination it is held against (2), turn of the camera against
 /// the unit in the camera's axes (3), bias of the specific force over gravity in the unit's axes (3), how much higher the horizon stands
-/// than geometry has it, turn about the vertical of the anchor and its rate, turn of the gun on its mount.
-const STATES: usize = 18;
+/// than geometry has it, turn about the vertical of the anchor and its rate, what a turn about the unit's upright axis is measured too large
+/// by about each of its axes, what the inclination's error is the slope of (2), turn of the gun on its mount.
+const STATES: usize = 23;
 const HEADING: usize = 2;
 const BIAS: usize = 3;
 const REFERENCE: usize = 6;
@@ -22,7 +24,9 @@ const FORCE: usize = 11;
 const DIP: usize = 14;
 const ANCHOR: usize = 15;
 const ANCHOR_RATE: usize = 16;
-const MOUNT: usize = 17;
+const SCREW: usize = 17;
+const SWAY: usize = 20;
+const MOUNT: usize = 22;
 
 type Covariance = SMatrix<f64, STATES, STATES>;
 /// How a measured number changes with the states.
@@ -77,14 +81,22 @@ pub(super) struct Filter {
     /// Estimates of what is not put into the orientation at once.
     bias: DVec3,
     reference: DVec2,
+    sway: DVec2,
     mounting: DVec3,
     force: DVec3,
     dip: f64,
     anchor: f64,
     anchor_rate: f64,
     mount: f64,
-    /// Since the last prediction: integral of the unit's axes in the world, its turn, how long.
+    screw: DVec3,
+    /// The unit's axis that pointed up when it was looked at last.
+    upright: DVec3,
+    lag: Lag,
+    swell: Swell,
+    /// Since the last prediction: integral of the unit's axes in the world, of them times the rate about the upright axis, the turn about
+    /// others, how long.
     axes: DMat3,
+    screws: DMat3,
     turned: DVec3,
     dt_s: f64,
     /// How far it has turned in the last seconds, in the unit's axes.
@@ -94,19 +106,14 @@ pub(super) struct Filter {
     /// Mean square of what the inclination it is held against errs by on an axis, rad^2, and for how long it was watched, s.
     reference_variance: f64,
     watched_s: f64,
-    /// For how long the inclination still settles, s; nothing where up was seen otherwise.
+    /// For how long the inclination still settles, s, and whether up was seen otherwise since that began.
     settling_s: f64,
-    /// The inclination's own time constant, s.
-    tau_s: f64,
+    seen: bool,
+    inclination: Settings,
 }
 
-/// The inclination's error forgets itself in this many of VQF's own time constants. With a quarter of a wave's period the filter errs half
-/// as much on a gun without a horizon, and with one is three times surer of itself on a calm day than it may be.
-const REFERENCE_TAUS: f64 = 0.8;
-/// VQF's inclination has settled after so many of its time constants.
-const SETTLE_TAUS: f64 = 2.0;
-/// It is never better than this, rad.
-const REFERENCE_LEAST: f64 = 2e-3;
+/// VQF's inclination has settled after so many of its time constants: until then what it lags by is not that of the filter alone.
+const SETTLE_TAUS: f64 = 4.0;
 /// How wrong it is at the start, rad: what the first seconds of a sea show of gravity.
 const REFERENCE_START: f64 = 0.05;
 /// How long its size is averaged over, seconds.
@@ -117,7 +124,9 @@ const REFERENCE_NOISE: f64 = 5e-4;
 pub const DIP_SIGMA: f64 = 0.1f64.to_radians();
 /// It forgets itself in this time, seconds.
 const DIP_TAU_S: f64 = 3600.0;
-/// A turn is remembered for so long, seconds: longer than a slew, shorter than what corrects its error takes.
+/// Cosine of how far the upright axis may lean: beyond, a turn about the vertical errs by something else.
+const UPRIGHT_LEAST: f64 = 0.7;
+/// A turn about others is remembered for so long, seconds: longer than a wave, shorter than what corrects its error takes.
 const SWING_TAU_S: f64 = 10.0;
 /// A turn that the gyro did not tell and that is larger than this is more than the inclination's own error, radians.
 const MISSED_MUCH: f64 = 5e-3;
@@ -125,8 +134,9 @@ const MISSED_MUCH: f64 = 5e-3;
 const START_TILT: f64 = 0.06;
 
 impl Filter {
-    /// Nothing learnt yet about an orientation that is held against an inclination with the time constant `tau_s`.
-    pub(super) fn new(noise: Noise, tau_s: f64) -> Self {
+    /// Nothing learnt yet about an orientation that is held against an inclination so set.
+    pub(super) fn new(noise: Noise, inclination: Settings) -> Self {
+        let tau_s = inclination.tau_accel_s;
         let mut covariance = Covariance::zeros();
         let mut set = |at: usize, deviation: f64| covariance[(at, at)] = deviation * deviation;
         for axis in 0..3 {
@@ -134,22 +144,27 @@ impl Filter {
             set(BIAS + axis, noise.bias[axis]);
             set(MOUNTING + axis, noise.mounting[axis]);
             set(FORCE + axis, noise.force / GRAVITY_M_S2);
+            set(SCREW + axis, noise.scale);
         }
-        set(REFERENCE, REFERENCE_START);
-        set(REFERENCE + 1, REFERENCE_START);
         set(DIP, DIP_SIGMA);
-        Self {
+        let mut filter = Self {
             noise,
             covariance,
             bias: DVec3::ZERO,
             reference: DVec2::ZERO,
+            sway: DVec2::ZERO,
             mounting: DVec3::ZERO,
             force: DVec3::ZERO,
             dip: 0.0,
             anchor: 0.0,
             anchor_rate: 0.0,
             mount: 0.0,
+            screw: DVec3::ZERO,
+            upright: DVec3::ZERO,
+            lag: Lag::new(tau_s),
+            swell: Swell::new(tau_s),
             axes: DMat3::ZERO,
+            screws: DMat3::ZERO,
             turned: DVec3::ZERO,
             dt_s: 0.0,
             swing: DVec3::ZERO,
@@ -157,13 +172,21 @@ impl Filter {
             reference_variance: REFERENCE_START * REFERENCE_START,
             watched_s: 0.0,
             settling_s: SETTLE_TAUS * tau_s,
-            tau_s,
-        }
+            seen: false,
+            inclination,
+        };
+        filter.forget_tilt();
+        filter
     }
 
     /// The bias beyond the calibrated one, rad/s, the unit's axes.
     pub(super) fn bias(&self) -> DVec3 {
         self.bias
+    }
+
+    /// A turn (scaled axis, radians, the unit's axes) that was measured over `dt_s` seconds, without what is known to be wrong with it.
+    pub(super) fn corrected(&self, turn: DVec3, dt_s: f64) -> DVec3 {
+        turn - self.bias * dt_s - self.screw * turn.dot(self.upright)
     }
 
     /// Turn of the camera against its calibrated place on the unit, radians, about the camera's axes.
@@ -184,9 +207,27 @@ impl Filter {
 
     /// A step by `turn` (scaled axis, radians) over `dt_s` seconds, with the unit's axes in the world.
     pub(super) fn step(&mut self, world_from_imu: DQuat, turn: DVec3, dt_s: f64) {
-        self.axes += DMat3::from_quat(world_from_imu) * dt_s;
-        self.turned += turn;
+        let axes = DMat3::from_quat(world_from_imu);
+        let up = axes.transpose().z_axis;
+        if up.dot(self.upright) < UPRIGHT_LEAST {
+            self.set_upright(up);
+        }
+        let about = turn.dot(self.upright);
+        self.axes += axes * dt_s;
+        self.screws += axes * about;
+        self.turned += turn - self.upright * about;
         self.dt_s += dt_s;
+    }
+
+    /// Another axis points up: what is wrong with turns about it is another thing.
+    fn set_upright(&mut self, up: DVec3) {
+        self.upright = up;
+        self.screw = DVec3::ZERO;
+        self.screws = DMat3::ZERO;
+        self.lag.forget_screw();
+        for axis in 0..3 {
+            self.forget(SCREW + axis, self.noise.scale);
+        }
     }
 
     /// It may have turned by another `turn` radians that the gyro did not tell.
@@ -202,12 +243,11 @@ impl Filter {
         }
         let axes = std::mem::replace(&mut self.axes, DMat3::ZERO);
         let turned = std::mem::take(&mut self.turned);
-        self.turn_by_bias(&axes);
-        let kept = (-dt / (REFERENCE_TAUS * self.tau_s)).exp();
-        self.reference *= kept;
-        for at in [REFERENCE, REFERENCE + 1] {
-            self.fade(at, kept, self.reference_variance);
-        }
+        let screws = std::mem::replace(&mut self.screws, DMat3::ZERO);
+        self.turn_by(BIAS, &axes);
+        self.turn_by(SCREW, &screws);
+        self.lag.step(axes, screws, dt);
+        self.sway_on(dt);
         let kept = (-dt / DIP_TAU_S).exp();
         self.dip *= kept;
         self.fade(DIP, kept, DIP_SIGMA * DIP_SIGMA);
@@ -216,7 +256,8 @@ impl Filter {
         let missed = std::mem::take(&mut self.missed);
         // The inclination it is held against has missed the same turn.
         if missed > MISSED_MUCH {
-            self.settling_s = SETTLE_TAUS * self.tau_s;
+            self.settling_s = SETTLE_TAUS * self.inclination.tau_accel_s;
+            self.seen = false;
         }
         for axis in 0..3 {
             self.covariance[(axis, axis)] += self.noise.gyro.powi(2) * dt + missed * missed;
@@ -227,28 +268,47 @@ impl Filter {
         self.turn_by_axes((self.swing.length_squared() - before.length_squared()).max(0.0));
     }
 
-    /// What wrong scales and axes of the gyro that are not square add up to, `farther` being by how much the square of the turn from where
-    /// it was before has grown: turning back undoes that error, so turns there and back do not add up.
+    /// What wrong scales and axes of the gyro that are not square add up to where it does not turn about the upright axis, `farther` being by
+    /// how much the square of the turn from where it was before has grown: turning back undoes that error, so turns there and back do not
+    /// add up.
     fn turn_by_axes(&mut self, farther: f64) {
-        let variance = self.noise.scale.powi(2) * farther;
         for axis in 0..3 {
-            self.covariance[(axis, axis)] += variance;
-            // An error that comes and goes with the heading looks like a camera that sits otherwise.
-            let mounting = self.noise.mounting[axis].powi(2);
-            if mounting > 0.0 {
-                let kept = (-0.5 * variance / mounting).exp();
-                self.mounting[axis] *= kept;
-                self.fade(MOUNTING + axis, kept, mounting);
+            self.covariance[(axis, axis)] += self.noise.scale.powi(2) * farther;
+        }
+    }
+
+    /// What an error of the rate at these three states turned the world by since the last prediction, `axes` being the integral of what
+    /// it turns by where it is one about each of the unit's axes: states that nothing happens to are left out, which makes this ten times as
+    /// fast as the product of matrices.
+    fn turn_by(&mut self, state: usize, axes: &DMat3) {
+        for row in 0..3 {
+            for column in 0..3 {
+                self.add_row(row, state + column, -axes.col(column)[row]);
             }
         }
     }
 
-    /// What the bias turned the world by since the last prediction, `axes` being the integral of the unit's axes in the world: states that
-    /// nothing happens to are left out, which makes this ten times as fast as the product of matrices.
-    fn turn_by_bias(&mut self, axes: &DMat3) {
-        for row in 0..3 {
-            for column in 0..3 {
-                self.add_row(row, BIAS + column, -axes.col(column)[row]);
+    /// The inclination's error goes on to and fro.
+    fn sway_on(&mut self, dt: f64) {
+        let (change, added) = self.swell.step(dt);
+        let [place, slope] = [0, 1].map(|row| change.row(row));
+        for axis in 0..2 {
+            let at = [SWAY + axis, REFERENCE + axis];
+            let now = change * DVec2::new(self.sway[axis], self.reference[axis]);
+            (self.sway[axis], self.reference[axis]) = (now.x, now.y);
+            let p = &mut self.covariance;
+            for other in 0..STATES {
+                let both = DVec2::new(p[(at[0], other)], p[(at[1], other)]);
+                (p[(at[0], other)], p[(at[1], other)]) = (place.dot(both), slope.dot(both));
+            }
+            for other in 0..STATES {
+                let both = DVec2::new(p[(other, at[0])], p[(other, at[1])]);
+                (p[(other, at[0])], p[(other, at[1])]) = (place.dot(both), slope.dot(both));
+            }
+            for (row, of_row) in at.into_iter().enumerate() {
+                for (column, of_column) in at.into_iter().enumerate() {
+                    p[(of_row, of_column)] += self.reference_variance * added.col(column)[row];
+                }
             }
         }
     }
@@ -275,33 +335,48 @@ impl Filter {
 
     /// Holds `world_from_imu` against an inclination that errs by itself: where up is in the unit's axes, `since_s` after the last one.
     pub(super) fn incline(&mut self, world_from_imu: DQuat, up_imu: DVec3, since_s: f64) -> Correction {
-        let up = world_from_imu * (up_imu - self.force);
+        let swung = self.lag.behind() * self.bias + self.lag.screwed() * self.screw;
+        let up = (world_from_imu * up_imu - self.lag.axes() * self.force + swung.cross(DVec3::Z)).truncate();
         if self.settling_s > 0.0 {
             self.settling_s -= since_s;
+            if self.seen {
+                return DQuat::IDENTITY;
+            }
             self.forget_tilt();
         } else {
             self.watch(up, since_s);
         }
-        let mut rows = up_rows();
-        let axes = DMat3::from_quat(world_from_imu);
-        for (of_world, row) in rows.iter_mut().enumerate() {
-            row[REFERENCE + of_world] = 1.0;
-            for column in 0..3 {
-                row[FORCE + column] = axes.col(column)[of_world];
-            }
-        }
-        let differ = DVec2::new(up.x, up.y) - self.reference;
         let noise = DMat2::from_diagonal(DVec2::splat(REFERENCE_NOISE * REFERENCE_NOISE));
-        self.update(&rows, differ, noise, f64::INFINITY).0
+        self.update(&self.inclined_rows(), up - self.reference, noise, f64::INFINITY).0
+    }
+
+    /// How the horizontal parts of that inclination change with the states.
+    fn inclined_rows(&self) -> [Row; 2] {
+        let mut rows = up_rows();
+        for column in 0..3 {
+            let (felt, behind, screwed) =
+                (self.lag.axes().col(column), self.lag.behind().col(column), self.lag.screwed().col(column));
+            // A turn of the axes that it works in turns up.
+            for (row, by) in rows.iter_mut().zip([DVec2::new(0.0, -1.0), DVec2::new(1.0, 0.0)]) {
+                row[BIAS + column] = by.dot(behind.truncate());
+                row[SCREW + column] = by.dot(screwed.truncate());
+            }
+            rows[0][FORCE + column] = felt.x;
+            rows[1][FORCE + column] = felt.y;
+        }
+        rows[0][REFERENCE] = 1.0;
+        rows[1][REFERENCE + 1] = 1.0;
+        rows
     }
 
     /// Until the inclination has settled, nothing that it said before is worth more than what it says now.
     fn forget_tilt(&mut self) {
-        self.reference = DVec2::ZERO;
-        for (state, deviation) in
-            [(0, START_TILT), (1, START_TILT), (REFERENCE, REFERENCE_START), (REFERENCE + 1, REFERENCE_START)]
-        {
-            self.forget(state, deviation);
+        (self.reference, self.sway) = (DVec2::ZERO, DVec2::ZERO);
+        let place = REFERENCE_START * self.swell.place_variance().sqrt();
+        for axis in 0..2 {
+            self.forget(axis, START_TILT);
+            self.forget(REFERENCE + axis, REFERENCE_START);
+            self.forget(SWAY + axis, place);
         }
     }
 
@@ -313,13 +388,13 @@ impl Filter {
     }
 
     /// Learns how far that inclination swings about.
-    fn watch(&mut self, up: DVec3, since_s: f64) {
+    fn watch(&mut self, up: DVec2, since_s: f64) {
         self.watched_s = (self.watched_s + since_s).min(REFERENCE_MEAN_S);
         let share = (since_s / self.watched_s.max(since_s)).min(1.0);
-        let seen = 0.5 * (up.x * up.x + up.y * up.y);
+        let seen = 0.5 * up.length_squared();
         let now = self.reference_variance + share * (seen - self.reference_variance);
         self.reference_variance =
-            now.clamp(REFERENCE_LEAST * REFERENCE_LEAST, REFERENCE_START * REFERENCE_START);
+            now.clamp(self.inclination.error_least.powi(2), REFERENCE_START * REFERENCE_START);
     }
 
     /// Takes in the direction of up that the camera saw, in the camera's axes, with the covariance of its part across up, rad^2, in the
@@ -346,7 +421,7 @@ impl Filter {
         let differ = up.truncate() + ahead * self.dip;
         let (turn, outcome) = self.update(&rows, differ, covariance, limit);
         if outcome.taken {
-            self.settling_s = 0.0;
+            self.seen = true;
         }
         (turn, outcome)
     }
@@ -462,6 +537,8 @@ impl Filter {
         let three = |at: usize| DVec3::new(error[at], error[at + 1], error[at + 2]);
         self.bias += three(BIAS);
         self.reference += DVec2::new(error[REFERENCE], error[REFERENCE + 1]);
+        self.sway += DVec2::new(error[SWAY], error[SWAY + 1]);
+        self.screw += three(SCREW);
         self.mounting += three(MOUNTING);
         self.force += three(FORCE);
         self.dip += error[DIP];

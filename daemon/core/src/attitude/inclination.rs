@@ -18,48 +18,29 @@ const RINGING_S: f64 = 0.05;
 /// After so long without a quiet sample it is no shock but what the unit has come to measure, seconds.
 const SHOCK_MOST_S: f64 = 1.0;
 
-/// How VQF is set.
+/// How VQF is set, and how well it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Time constant of the specific force's low-pass filter, seconds: longer than the waves.
     pub tau_accel_s: f64,
-    /// Rest is what turns by less than this about its mean, rad/s.
-    pub rest_rate: f64,
-    /// Rest is what is accelerated by less than this about its mean, m/s^2.
-    pub rest_accel: f64,
-    /// No bias beyond the calibrated one is larger than this on any axis, rad/s.
-    pub bias_most: f64,
-    /// Standard deviation of the bias at the start, rad/s.
-    pub bias_sigma: f64,
+    /// Its inclination is never better than this, radians, beside what errors of the unit that are estimated do to it.
+    pub error_least: f64,
 }
 
 impl Settings {
-    /// For a gun that traverses slowly on a ship in waves. By VQF's own defaults (3 s, 2 deg/s, 0.5 m/s^2) a gun that creeps on a calm
-    /// day is at rest, and its turn is learnt as the gyro's bias.
-    pub const GUN: Self = Self {
-        tau_accel_s: 10.0,
-        rest_rate: 0.2f64.to_radians(),
-        rest_accel: 0.05,
-        bias_most: 0.5f64.to_radians(),
-        bias_sigma: 0.5f64.to_radians(),
-    };
+    /// For a gun on a ship in waves.
+    pub const GUN: Self = Self { tau_accel_s: 10.0, error_least: 1e-3 };
 
-    /// In hands, as for a calibration: VQF's own.
-    pub const HAND: Self = Self {
-        tau_accel_s: 3.0,
-        rest_rate: 2f64.to_radians(),
-        rest_accel: 0.5,
-        bias_most: 2f64.to_radians(),
-        bias_sigma: 0.5f64.to_radians(),
-    };
+    /// In hands, which accelerate for shorter and turn faster, so that wrong scales turn its axes.
+    pub const HAND: Self = Self { tau_accel_s: 2.0, error_least: 5e-3 };
 
+    /// The gyro's bias is not VQF's to estimate: a gun that creeps on a calm day looks like one at rest, and its turn would be learnt as
+    /// the bias. What a bias does to the inclination is known, and is counted where the bias is estimated.
     fn params(&self) -> Params {
         Params {
             tau_acc: self.tau_accel_s,
-            rest_th_gyr: self.rest_rate.to_degrees(),
-            rest_th_acc: self.rest_accel,
-            bias_clip: self.bias_most.to_degrees(),
-            bias_sigma_init: self.bias_sigma.min(self.bias_most).to_degrees(),
+            rest_bias_est_enabled: false,
+            motion_bias_est_enabled: false,
             mag_dist_rejection_enabled: false,
             ..Params::default()
         }
@@ -149,10 +130,6 @@ fn quaternion(vqf: &VQF) -> DQuat {
 
 impl fmt::Debug for Inclination {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (orientation, bias) = (quaternion(&self.vqf), self.vqf.bias_estimate().0);
-        f.debug_struct("Inclination")
-            .field("orientation", &orientation)
-            .field("bias", &bias)
-            .finish_non_exhaustive()
+        f.debug_struct("Inclination").field("orientation", &quaternion(&self.vqf)).finish_non_exhaustive()
     }
 }

@@ -2,7 +2,9 @@
 
 mod filter;
 mod inclination;
+mod lag;
 mod own;
+mod swell;
 #[cfg(test)]
 mod tests;
 
@@ -436,7 +438,7 @@ impl Attitude {
                     world_from_imu,
                 );
                 let last = OrientationSample { time, world_from_imu, rate };
-                let filter = Filter::new(self.settings.noise, self.settings.inclination.tau_accel_s);
+                let filter = Filter::new(self.settings.noise, self.settings.inclination);
                 let running = Running {
                     inclination,
                     filter,
@@ -477,7 +479,7 @@ impl Running {
         self.before = Some((self.rate, dt_ns));
         self.rate = rate;
         self.inclination.update(turn, dt_s, accel);
-        let turn = turn - self.filter.bias() * dt_s;
+        let turn = self.filter.corrected(turn, dt_s);
         let world_from_imu = (self.last.world_from_imu * DQuat::from_scaled_axis(turn)).normalize();
         self.last = OrientationSample { time, world_from_imu, rate: rate - self.filter.bias() };
         self.filter.step(world_from_imu, turn, dt_s);

@@ -24,10 +24,11 @@ pub const ABOUT: About = About {
             every motion is a closed function of time, with the noise and biases of a unit of the VN-100's class. The error is the root \
             mean square of the angle between the found and the true up; on the ship after a minute",
     rivals: "VQF alone as its authors set it and as it is set here, rates alone, a complementary filter (Mahony's without integral) with two gains",
-    why: "VQF with a time constant above the waves' period and limits of rest below a creeping gun's; on it stands a filter that \
-          integrates the rates by itself and takes VQF's inclination for what it is, a measurement that errs for seconds on end. On \
-          the ship that halves VQF's error, and it tells how wrong it may be. In hands VQF's own settings are better, since hands \
-          accelerate for shorter",
+    why: "VQF with a time constant above the waves' period; on it stands a filter that integrates the rates by itself and takes VQF's \
+          inclination for what it is: specific force through a low-pass filter, in which waves show as what comes and goes, and biases of \
+          gyro and specific force and a gyro's axes that are not square as what that filter makes of them. VQF's own bias estimate is off: \
+          a creeping gun looks like one at rest. On the ship that errs a fourth as much as VQF, and it tells how wrong it may be. In hands, \
+          which accelerate for shorter, a shorter time constant is better",
 };
 
 struct Trial {
