@@ -5,6 +5,7 @@
 //! direction from the camera to a hit is not that of the barrel: the parallax is taken off by the distance. Rounds fall: the drop is
 //! given by the ballistics and taken off too.
 
+use bowwave_core::{calibration::Calibration, geometry::Lens, time::Time};
 use glam::{DMat2, DVec2, DVec3};
 
 /// One round fired at the mark.
@@ -16,6 +17,51 @@ pub struct Shot {
     pub range_m: f64,
     /// Fall of the round below the line of the bore at that range, camera's axes, metres (zero where the mark is near).
     pub drop_in_camera_m: DVec3,
+}
+
+/// A picture farther from a pull than this shows another aim, seconds.
+const APART_MOST_S: f64 = 0.05;
+/// How well the mark is found in a picture, pixels.
+const MARK_PX: f64 = 0.5;
+
+impl Shot {
+    /// The bore aimed at a mark `range_m` away, seen at that pixel: nothing flies.
+    pub fn aimed(lens: &Lens, pixel: DVec2, range_m: f64) -> Self {
+        Self { hit_in_camera: lens.unproject(pixel), range_m, drop_in_camera_m: DVec3::ZERO }
+    }
+}
+
+/// How well all directions are known alike: by the lens's focal length, and by the mark's place in a picture. For [`solve`].
+pub fn pointing_sigma(calibration: &Calibration, shots: &[Shot]) -> f64 {
+    let focal = calibration.lens.focal.y;
+    let slope = |s: &Shot| s.hit_in_camera.truncate().length() / s.hit_in_camera.z.max(1e-3);
+    let off_axis = shots.iter().map(slope).fold(0.0, f64::max);
+    (MARK_PX / focal).hypot(off_axis * calibration.focal_sigma_px / focal)
+}
+
+/// A pull of the trigger, with what the picture nearest to it shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pull<T> {
+    /// When the round left, by the trigger's calibrated latency.
+    pub fired: Time,
+    /// Seconds from there to the picture, and what it shows; `None` where no picture is near.
+    pub nearest: Option<(f64, T)>,
+}
+
+impl<T> Pull<T> {
+    /// A pull at the edge's time.
+    pub fn new(edge: Time, calibration: &Calibration) -> Self {
+        let latency_ns = calibration.trigger.map_or(0, |t| t.latency_ns);
+        Self { fired: edge.plus_ns(latency_ns), nearest: None }
+    }
+
+    /// Takes over what a picture with that stamp shows, where it is nearer than those before.
+    pub fn offer(&mut self, stamp: Time, calibration: &Calibration, shows: impl FnOnce() -> T) {
+        let apart = stamp.plus_ns(calibration.time_offset_ns).secs_since(self.fired).abs();
+        if apart < self.nearest.as_ref().map_or(APART_MOST_S, |n| n.0) {
+            self.nearest = Some((apart, shows()));
+        }
+    }
 }
 
 /// Why there is no boresight.

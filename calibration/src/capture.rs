@@ -72,35 +72,44 @@ pub struct Counts {
     pub restarts: u32,
 }
 
-/// Collects what a calibration is solved from. Holds no pictures.
-pub struct Capture {
-    lens: Lens,
-    eye_height_m: f64,
-    clock: ClockMap,
-    finder: HorizonFinder,
-    board: Option<Box<dyn FindBoard + Send>>,
-    readings: Vec<ImuReading>,
-    observations: Vec<Observation>,
-    sightings: Vec<Sighting>,
-    edges: Vec<TriggerEdge>,
-    counts: Counts,
+/// The horizon seen in a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HorizonSeen {
+    /// Where up is, camera's axes.
+    pub up_in_camera: DVec3,
+    /// Its standard deviation about each axis, radians.
+    pub sigma: f64,
+    /// Where it crosses the picture's middle, pixels.
+    pub pixel: DVec2,
 }
 
-impl Capture {
-    /// Nothing so far, of a camera with that lens, `eye_height_m` above the sea.
+/// What a picture tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// The picture's mid-exposure by the camera's stamp.
+    pub stamp: Time,
+    /// Whether it has the calibrated size; nothing is looked for in others.
+    pub fits: bool,
+    /// The horizon.
+    pub horizon: Option<HorizonSeen>,
+    /// Whether the horizon, or what looked like it, was smeared by motion or fog.
+    pub is_blurred: bool,
+    /// The board.
+    pub board: Option<BoardSeen>,
+}
+
+/// Looks for horizon and board in pictures. Holds none of them.
+pub struct Watcher {
+    lens: Lens,
+    eye_height_m: f64,
+    finder: HorizonFinder,
+    board: Option<Box<dyn FindBoard + Send>>,
+}
+
+impl Watcher {
+    /// Looks through that lens, `eye_height_m` above the sea.
     pub fn new(lens: Lens, eye_height_m: f64) -> Self {
-        Self {
-            lens,
-            eye_height_m,
-            clock: ClockMap::new(),
-            finder: HorizonFinder::new(),
-            board: None,
-            readings: Vec::new(),
-            observations: Vec::new(),
-            sightings: Vec::new(),
-            edges: Vec::new(),
-            counts: Counts::default(),
-        }
+        Self { lens, eye_height_m, finder: HorizonFinder::new(), board: None }
     }
 
     /// Looks for a board as well.
@@ -110,13 +119,72 @@ impl Capture {
         self
     }
 
-    /// Takes in what a device reported.
+    /// What the picture tells.
+    pub fn look(&mut self, frame: &CameraFrame) -> Seen {
+        let (picture, lens) = (&frame.picture, &self.lens);
+        let fits = (picture.width(), picture.height()) == (lens.width, lens.height);
+        let mut seen =
+            Seen { stamp: frame.mid_exposure, fits, horizon: None, is_blurred: false, board: None };
+        if !fits {
+            return seen;
+        }
+        let view = View { lens: *lens, eye_height_m: self.eye_height_m, prior: None };
+        match self.finder.find(picture, &view) {
+            Ok(horizon) => {
+                let covariance = horizon.up_covariance();
+                let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
+                seen.horizon = Some(HorizonSeen {
+                    up_in_camera: horizon.up,
+                    sigma: (0.5 * trace).sqrt(),
+                    pixel: horizon_pixel(lens, horizon.up, self.eye_height_m),
+                });
+            }
+            Err(NoHorizon::Blurred(_)) => seen.is_blurred = true,
+            Err(_) => {}
+        }
+        seen.board = self.board.as_mut().and_then(|b| b.find(picture, lens));
+        seen
+    }
+}
+
+impl std::fmt::Debug for Watcher {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Watcher").field("eye_height_m", &self.eye_height_m).finish_non_exhaustive()
+    }
+}
+
+/// Collects what a calibration is solved from.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    lens: Lens,
+    clock: ClockMap,
+    readings: Vec<ImuReading>,
+    observations: Vec<Observation>,
+    sightings: Vec<Sighting>,
+    edges: Vec<TriggerEdge>,
+    counts: Counts,
+}
+
+impl Capture {
+    /// Nothing so far, of a camera with that lens.
+    pub fn new(lens: Lens) -> Self {
+        Self {
+            lens,
+            clock: ClockMap::new(),
+            readings: Vec::new(),
+            observations: Vec::new(),
+            sightings: Vec::new(),
+            edges: Vec::new(),
+            counts: Counts::default(),
+        }
+    }
+
+    /// Takes in what a device reported. What a picture tells is [`Self::see`]n.
     pub fn take(&mut self, event: &Event) {
         match event {
             Event::Imu(sample) => self.sample(sample),
-            Event::Frame(frame) => self.frame(frame),
             Event::Trigger(edge) if self.edges.len() < OBSERVATIONS_MOST => self.edges.push(*edge),
-            Event::Trigger(_) | Event::Fault(_) | Event::Ship(_) | Event::Mark(_) => {}
+            Event::Frame(_) | Event::Trigger(_) | Event::Fault(_) | Event::Ship(_) | Event::Mark(_) => {}
         }
     }
 
@@ -130,9 +198,9 @@ impl Capture {
         self.counts.restarts = self.clock.restarts();
     }
 
-    fn frame(&mut self, frame: &CameraFrame) {
-        let picture = &frame.picture;
-        if (picture.width(), picture.height()) != (self.lens.width, self.lens.height) {
+    /// Takes in what a picture told.
+    pub fn see(&mut self, seen: &Seen) {
+        if !seen.fits {
             self.counts.other_size += 1;
             return;
         }
@@ -140,31 +208,24 @@ impl Capture {
         if self.observations.len() + 1 >= OBSERVATIONS_MOST {
             return;
         }
-        let stamp = frame.mid_exposure;
-        let view = View { lens: self.lens, eye_height_m: self.eye_height_m, prior: None };
-        match self.finder.find(picture, &view) {
-            Ok(horizon) => {
-                self.counts.horizons += 1;
-                let covariance = horizon.up_covariance();
-                let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
-                let pixel = horizon_pixel(&self.lens, horizon.up, self.eye_height_m);
-                let (sigma, row) = ((0.5 * trace).sqrt(), row(&self.lens, pixel));
-                self.observations.push(Observation::Up { stamp, up_in_camera: horizon.up, sigma, row });
-                self.sightings.push(Sighting { stamp, pixel });
-            }
-            Err(NoHorizon::Blurred(_)) => self.counts.blurred += 1,
-            Err(_) => {}
+        let stamp = seen.stamp;
+        if let Some(HorizonSeen { up_in_camera, sigma, pixel }) = seen.horizon {
+            self.counts.horizons += 1;
+            let row = row(&self.lens, pixel);
+            self.observations.push(Observation::Up { stamp, up_in_camera, sigma, row });
+            self.sightings.push(Sighting { stamp, pixel });
         }
-        if let Some(seen) = self.board.as_mut().and_then(|b| b.find(picture, &self.lens)) {
+        self.counts.blurred += usize::from(seen.is_blurred);
+        if let Some(board) = seen.board {
             self.counts.boards += 1;
             self.observations.push(Observation::Orientation {
                 stamp,
-                reference_from_camera: seen.board_from_camera,
-                sigma: seen.sigma,
-                row: row(&self.lens, seen.pixel),
+                reference_from_camera: board.board_from_camera,
+                sigma: board.sigma,
+                row: row(&self.lens, board.pixel),
                 chain: 0,
             });
-            self.sightings.push(Sighting { stamp, pixel: seen.pixel });
+            self.sightings.push(Sighting { stamp, pixel: board.pixel });
         }
     }
 
@@ -207,6 +268,17 @@ impl Capture {
     /// Standard deviation of the error of elevation that all horizons share, radians: no recording tells it.
     pub fn horizon_sigma(&self) -> f64 {
         REFRACTION.hypot(EDGE_PX / self.lens.focal.y)
+    }
+
+    /// The error that all observations share, where nothing but horizons tells the rotation, radians.
+    pub fn shared_sigma(&self) -> Option<f64> {
+        self.is_by_horizon().then(|| self.horizon_sigma())
+    }
+
+    /// What an alignment was made from, in words.
+    pub fn how(&self, found: &Alignment) -> String {
+        let by = if self.is_by_horizon() { "horizon" } else { "board" };
+        format!("{:.0} s of movement, {by}, {}", self.seconds(), found.grade)
     }
 
     fn options(&self) -> Options {
@@ -257,12 +329,6 @@ impl Capture {
     }
 }
 
-impl std::fmt::Debug for Capture {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Capture").field("counts", &self.counts).finish_non_exhaustive()
-    }
-}
-
 /// Where the sea's horizon is straight ahead; the picture's middle where that is outside of it.
 fn horizon_pixel(lens: &Lens, up: DVec3, eye_height_m: f64) -> DVec2 {
     let (sin, cos) = horizon_dip(eye_height_m).sin_cos();
@@ -300,17 +366,17 @@ mod tests {
         Picture::new(PixelFormat::Rgb, lens.width, lens.height, Arc::from(bytes)).unwrap()
     }
 
-    fn frame(picture: Picture) -> Event {
+    fn frame(picture: Picture) -> CameraFrame {
         let time = Time::from_ns(5);
-        Event::Frame(CameraFrame { arrival: time, mid_exposure: time, sequence: 0, picture, jpeg: None })
+        CameraFrame { arrival: time, mid_exposure: time, sequence: 0, picture, jpeg: None }
     }
 
     #[test]
     fn a_horizon_becomes_an_up_with_its_place() {
         let lens = Lens::pinhole(320, 180, 1.0);
-        let mut capture = Capture::new(lens, 10.0);
+        let (mut watcher, mut capture) = (Watcher::new(lens, 10.0), Capture::new(lens));
         let world_from_camera = look(0.3, 0.1, -0.05);
-        capture.take(&frame(picture(&lens, world_from_camera)));
+        capture.see(&watcher.look(&frame(picture(&lens, world_from_camera))));
         let [Observation::Up { up_in_camera, sigma, row, .. }] = *capture.observations() else {
             panic!("{:?}", capture.counts())
         };
@@ -320,15 +386,15 @@ mod tests {
         assert!((capture.sightings()[0].pixel.y - 90.0 - below).abs() < 1.5, "{:?}", capture.sightings());
         assert!((row - below / 180.0).abs() < 0.01);
         // Nothing but sky, and another size.
-        capture.take(&frame(picture(&lens, look(0.3, 0.9, 0.0))));
-        capture.take(&frame(picture(&Lens::pinhole(160, 90, 1.0), world_from_camera)));
+        capture.see(&watcher.look(&frame(picture(&lens, look(0.3, 0.9, 0.0)))));
+        capture.see(&watcher.look(&frame(picture(&Lens::pinhole(160, 90, 1.0), world_from_camera))));
         let counts = capture.counts();
         assert_eq!((counts.pictures, counts.horizons, counts.other_size), (2, 1, 1));
     }
 
     #[test]
     fn samples_come_on_the_hosts_clock_and_bad_ones_are_left_out() {
-        let mut capture = Capture::new(Lens::pinhole(320, 180, 1.0), 10.0);
+        let mut capture = Capture::new(Lens::pinhole(320, 180, 1.0));
         for i in 0..100i64 {
             let sample = ImuSample {
                 arrival: Time::from_ns(9_000_000_000 + i * 5_000_000 + i % 7 * 100_000),
@@ -354,11 +420,13 @@ mod tests {
             }
         }
         let lens = Lens::pinhole(320, 180, 1.0);
-        let mut capture = Capture::new(lens, 10.0).with_board(Box::new(Same));
-        let event = frame(picture(&lens, look(0.0, 0.0, 0.0)));
-        (0..29).for_each(|_| capture.take(&event));
+        let mut capture = Capture::new(lens);
+        let seen = Watcher::new(lens, 10.0)
+            .with_board(Box::new(Same))
+            .look(&frame(picture(&lens, look(0.0, 0.0, 0.0))));
+        (0..29).for_each(|_| capture.see(&seen));
         assert_eq!(capture.best().len(), 58);
-        capture.take(&event);
+        capture.see(&seen);
         assert_eq!(capture.best().len(), 30);
         assert!(
             capture

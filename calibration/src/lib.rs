@@ -28,6 +28,7 @@
 //! by one unit in the last place (2e-16 of the value) when it is first written, because not every number of radians is a
 //! number of degrees.
 
+mod adopt;
 pub mod alignment;
 pub mod boresight;
 pub mod camera;
@@ -44,6 +45,7 @@ mod so3;
 mod statistics;
 pub mod target;
 pub mod trigger;
+pub mod wizard;
 mod write;
 
 pub use date::Date;

@@ -1,5 +1,7 @@
 //! What a calibration came to, in units that maintainers know: printed on the terminal or shown as a page ([`crate::page`]).
 
+mod lens;
+
 use std::fmt;
 
 use bowwave_core::calibration::Calibration;
@@ -7,7 +9,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::{
     CalibrationFile, Date, Provenance,
-    alignment::{Alignment, AlignmentError, Comparison, Grade, LeftOut, NoiseFound, Residual},
+    alignment::{Alignment, AlignmentError, Comparison, Grade, LeftOut, Movement, NoiseFound, Residual},
     boresight::{Boresight, BoresightError},
     capture::{Capture, Counts},
     statistics::quantile,
@@ -23,7 +25,7 @@ const LEFT_MOST: f64 = 0.01;
 /// A calibration older than this is said to be, days.
 const OLD_DAYS: i64 = 183;
 /// What the camera's axes mean to who turns a gun.
-const AXES: [&str; 3] = ["elevation", "traverse", "roll"];
+pub(crate) const AXES: [&str; 3] = ["elevation", "traverse", "roll"];
 
 /// What it comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -208,9 +210,7 @@ impl Sheet {
         sheet.row("evenness of the movement", format!("{:.2} (1: all axes alike)", a.information_ratio));
         sheet.residual_rows(&a.noise, &a.residuals, &a.left_out);
         sheet.notes.extend(a.findings().iter().map(ToString::to_string));
-        if a.grade < Grade::Good {
-            sheet.notes.extend(wanting(a, capture.is_by_horizon().then(|| capture.horizon_sigma())));
-        }
+        sheet.notes.extend(Wanting::of(a, capture.shared_sigma()).map(|w| w.to_string()));
         sheet.covariance = Some(a.rotation_covariance);
         sheet.place(capture, &a.residuals);
         sheet
@@ -401,38 +401,48 @@ fn seen(capture: &Capture) -> Vec<(String, String)> {
     rows
 }
 
-/// What keeps an alignment from being good. `shared` is the error that all horizons share, where nothing else was seen.
-fn wanting(a: &Alignment, shared: Option<f64>) -> Option<String> {
-    let sigma = a.rotation_sigma();
-    let worst = (0..3).max_by(|i, j| sigma[*i].total_cmp(&sigma[*j]))?;
-    if sigma[worst] <= Grade::ROTATION[0] {
-        let late = a.offset_sigma_s > Grade::OFFSET_S[0];
-        return late.then(|| "faster movements to and fro tell the time offset better".to_owned());
-    }
-    match shared {
-        Some(limit) if worst == 0 && sigma.x < 1.2 * limit => Some(format!(
-            "of elevation the horizon tells no more than {:.1} mrad (refraction, and where its edge is found); a board tells it better",
-            limit * 1e3
-        )),
-        _ => Some(format!("{} is what is known least; more {} tells it better", AXES[worst], a.missing)),
+/// What keeps an alignment from being good.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Wanting {
+    /// The time offset.
+    Faster,
+    /// Elevation, of which no horizon tells more than this, radians.
+    Board(f64),
+    /// The angle about that axis of the camera, which that movement tells better.
+    Moving(usize, Movement),
+}
+
+impl Wanting {
+    /// What it is; `shared` is the error that all horizons share, where nothing else was seen.
+    pub(crate) fn of(a: &Alignment, shared: Option<f64>) -> Option<Self> {
+        if a.grade == Grade::Good {
+            return None;
+        }
+        let sigma = a.rotation_sigma();
+        let worst = (0..3).max_by(|i, j| sigma[*i].total_cmp(&sigma[*j]))?;
+        if sigma[worst] <= Grade::ROTATION[0] {
+            return (a.offset_sigma_s > Grade::OFFSET_S[0]).then_some(Self::Faster);
+        }
+        Some(match shared {
+            Some(limit) if worst == 0 && sigma.x < 1.2 * limit => Self::Board(limit),
+            _ => Self::Moving(worst, a.missing),
+        })
     }
 }
 
-impl CalibrationFile {
-    /// Takes over what an alignment found on that day in that way.
-    pub fn set_alignment(&mut self, found: &Alignment, measured: Date, how: &str) {
-        let c = &mut self.calibration;
-        // A file says of nothing that it is known exactly.
-        let some = |v: DVec3| v.max(DVec3::splat(1e-9));
-        c.camera_from_imu = found.camera_from_imu;
-        c.camera_from_imu_sigma = some(found.rotation_sigma());
-        c.time_offset_ns = bowwave_core::time::secs_to_ns(found.offset_s);
-        c.time_offset_sigma_ns = bowwave_core::time::secs_to_ns(found.offset_sigma_s).max(1);
-        c.gyro_bias = found.gyro_bias;
-        c.gyro_bias_sigma = some(found.gyro_bias_sigma);
-        self.made = measured;
-        for part in [&mut self.camera_from_imu, &mut self.time_offset, &mut self.gyro_bias] {
-            *part = Provenance::new(measured, how);
+impl fmt::Display for Wanting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Faster => f.write_str("faster movements to and fro tell the time offset better"),
+            Self::Board(limit) => write!(
+                f,
+                "of elevation the horizon tells no more than {:.1} mrad (refraction, and where its edge is found); a board tells it better",
+                limit * 1e3
+            ),
+            Self::Moving(axis, missing) => {
+                let what = AXES.get(*axis).copied().unwrap_or("rotation");
+                write!(f, "{what} is what is known least; more {missing} tells it better")
+            }
         }
     }
 }
@@ -452,7 +462,7 @@ mod tests {
     const NOISE: f64 = 2e-3;
 
     fn capture() -> Capture {
-        Capture::new(Lens::pinhole(1280, 720, 1.0), 8.0)
+        Capture::new(Lens::pinhole(1280, 720, 1.0))
     }
 
     fn calibration(recipe: &Recipe, turn: DVec3, late_s: f64) -> CalibrationFile {

@@ -8,7 +8,7 @@ use std::{
     sync::OnceLock,
 };
 
-use hw_sim::make::{self, Burst, Recipe};
+use hw_sim::make::{self, Burst, GunMotion, Periodic, Recipe, ShipMotion};
 use serde_json::Value;
 
 /// The workspace's folder.
@@ -50,6 +50,37 @@ pub fn small_recording() -> &'static Path {
         (folder, path)
     });
     path
+}
+
+/// Twenty seconds of a small picture of the sea.
+fn sea(ship: ShipMotion, gun: GunMotion) -> Recipe {
+    Recipe {
+        width: 256,
+        height: 144,
+        frame_rate_hz: 10.0,
+        ship,
+        gun,
+        trigger: Vec::new(),
+        ..Recipe::default()
+    }
+}
+
+/// A recording of the sea with camera and unit in the hand.
+pub fn by_hand() -> Recipe {
+    sea(
+        ShipMotion { roll: Periodic::new(0.0, &[(4, 0.10, 0.0), (11, 0.06, 1.0)]), ..ShipMotion::default() },
+        GunMotion {
+            traverse: Periodic::new(0.0, &[(3, 0.12, 0.5), (9, 0.08, 2.0)]),
+            elevation: Periodic::new(0.0, &[(5, 0.05, 1.5), (13, 0.03, 0.2)]),
+        },
+    )
+}
+
+/// The same with the gun swung left and right on a ship at rest.
+pub fn traverse_only() -> Recipe {
+    let traverse = Periodic::new(0.0, &[(3, 0.2, 0.5), (7, 0.1, 2.0)]);
+    let elevation = Periodic::new(-0.03, &[]);
+    sea(ShipMotion::default(), GunMotion { traverse, elevation })
 }
 
 /// Runs the program and waits for it.

@@ -17,40 +17,9 @@ use std::{
 use bowwave_calibration::{CalibrationFile, keep, parse};
 use bowwave_core::event::TriggerEdge;
 use bowwave_record::{Entry, RecordingReader, RecordingWriter};
-use bowwave_tests::{bowwave, expect_code};
+use bowwave_tests::{bowwave, by_hand, expect_code, traverse_only};
 use glam::{DQuat, DVec3};
-use hw_sim::make::{self, GunMotion, Periodic, Recipe, ShipMotion};
-
-/// Twenty seconds of a small picture of the sea.
-fn sea(ship: ShipMotion, gun: GunMotion) -> Recipe {
-    Recipe {
-        width: 256,
-        height: 144,
-        frame_rate_hz: 10.0,
-        ship,
-        gun,
-        trigger: Vec::new(),
-        ..Recipe::default()
-    }
-}
-
-/// Camera and unit in the hand.
-fn by_hand() -> Recipe {
-    sea(
-        ShipMotion { roll: Periodic::new(0.0, &[(4, 0.10, 0.0), (11, 0.06, 1.0)]), ..ShipMotion::default() },
-        GunMotion {
-            traverse: Periodic::new(0.0, &[(3, 0.12, 0.5), (9, 0.08, 2.0)]),
-            elevation: Periodic::new(0.0, &[(5, 0.05, 1.5), (13, 0.03, 0.2)]),
-        },
-    )
-}
-
-/// The gun swung left and right on a ship at rest.
-fn traverse_only() -> Recipe {
-    let traverse = Periodic::new(0.0, &[(3, 0.2, 0.5), (7, 0.1, 2.0)]);
-    let elevation = Periodic::new(-0.03, &[]);
-    sea(ShipMotion::default(), GunMotion { traverse, elevation })
-}
+use hw_sim::make;
 
 struct Folder(tempfile::TempDir);
 

@@ -5,15 +5,20 @@ use std::fmt;
 use glam::DVec2;
 use nalgebra::{SMatrix, SVector};
 
-use super::{CELLS, Camera, model::INTRINSICS};
+use super::{CELLS, Camera, Coverage, model::INTRINSICS};
 use crate::{alignment::Grade, so3::vector};
 
-/// Fewest pictures that are enough.
-const PICTURES: usize = 12;
-/// Tilt that some picture should have, radians.
-const TILT: f64 = 0.35;
-/// Share of the parts of the picture that should have corners.
-const SHARE: f64 = 0.75;
+/// What pictures should show in all.
+pub(crate) mod enough {
+    /// Fewest pictures.
+    pub(crate) const PICTURES: usize = 12;
+    /// Tilt that some picture should have, radians.
+    pub(crate) const TILT: f64 = 0.35;
+    /// Share of the parts of the picture that should have corners.
+    pub(crate) const SHARE: f64 = 0.75;
+}
+
+use enough::{PICTURES, SHARE, TILT};
 /// What may be left, pixels, of the grades good and usable: sharp pictures of a flat board leave less than half of the first.
 const LEFT_PX: [f64; 2] = [0.4, 1.0];
 
@@ -68,6 +73,17 @@ const PARTS: [(&str, [usize; 4]); 8] = [
     ("right middle", [2, CELLS.1 - 2, CELLS.0 - 1, CELLS.0]),
 ];
 
+impl Coverage {
+    /// The parts of the picture that matter most and have no corner.
+    pub(crate) fn missing(&self) -> impl Iterator<Item = Missing> + '_ {
+        let is_seen = |[top, bottom, left, right]: [usize; 4]| {
+            let seen = |row: &[usize; CELLS.0]| row.iter().take(right).skip(left).any(|count| *count > 0);
+            self.cells.iter().take(bottom).skip(top).any(seen)
+        };
+        PARTS.iter().filter(move |(_, part)| !is_seen(*part)).map(|(name, _)| Missing::Part(name))
+    }
+}
+
 impl Camera {
     /// Largest standard deviation of the angle between the picture's middle and a place on its edge, radians: how far boats are misplaced
     /// by the lens alone. How the picture's middle looks is no part of it, since mounting and boresight are measured through the same
@@ -115,12 +131,7 @@ impl Camera {
         if self.coverage.tilt[1] < TILT {
             out.push(Missing::Tilt(self.coverage.tilt[1]));
         }
-        for (name, [top, bottom, left, right]) in PARTS {
-            let seen = |row: &[usize; CELLS.0]| row.iter().take(right).skip(left).any(|count| *count > 0);
-            if !self.coverage.cells.iter().take(bottom).skip(top).any(seen) {
-                out.push(Missing::Part(name));
-            }
-        }
+        out.extend(self.coverage.missing());
         out
     }
 

@@ -10,10 +10,14 @@ mod judge;
 mod model;
 mod start;
 
-use bowwave_core::geometry::{Distortion, Lens};
+use bowwave_core::{
+    geometry::{Distortion, Lens},
+    guide::Cell,
+};
 use glam::{DMat3, DVec2, DVec3};
 
 pub use judge::Missing;
+pub(crate) use judge::enough;
 pub use model::Model;
 pub use start::BoardPose;
 pub(crate) use start::{homography, pose_from};
@@ -165,7 +169,7 @@ impl Camera {
 }
 
 /// Fewest corners of a picture, and pictures.
-const CORNERS_LEAST: usize = 8;
+pub(crate) const CORNERS_LEAST: usize = 8;
 const VIEWS_LEAST: usize = 4;
 /// How often views that do not fit are left out and the rest is fitted anew.
 const REFITS: usize = 2;
@@ -235,7 +239,7 @@ pub fn solve(views: &[View], (width, height): (u32, u32)) -> Result<Camera, Came
         covariance: covariance.into(),
         sigma_px: best.sigma_px,
         evidence,
-        coverage: covered(&views, size, tilt),
+        coverage: Coverage::of(&views, size, tilt),
         pose_covariances: fit.rotations.iter().map(rotation).collect(),
         poses: numbers.into_iter().zip(fit.state.poses).collect(),
     })
@@ -304,16 +308,30 @@ fn fit(model: Model, views: &[View], size: DVec2) -> Option<Adjusted> {
     best.filter(|b| b.state.intrinsics.iter().all(|v| v.is_finite()))
 }
 
-fn covered(views: &[View], size: DVec2, tilt: [f64; 2]) -> Coverage {
-    let mut cells = [[0; CELLS.0]; CELLS.1];
-    for corner in views.iter().flat_map(|v| &v.corners) {
-        let share = corner.pixel / size;
-        let x = ((share.x * CELLS.0 as f64) as usize).min(CELLS.0 - 1);
-        let y = ((share.y * CELLS.1 as f64) as usize).min(CELLS.1 - 1);
-        cells[y][x] += 1;
+impl Coverage {
+    /// Of corners in pictures of that size, and of the board's smallest and largest tilt.
+    pub(crate) fn of(views: &[View], size: DVec2, tilt: [f64; 2]) -> Self {
+        let mut cells = [[0; CELLS.0]; CELLS.1];
+        for corner in views.iter().flat_map(|v| &v.corners) {
+            let share = corner.pixel / size;
+            let x = ((share.x * CELLS.0 as f64) as usize).min(CELLS.0 - 1);
+            let y = ((share.y * CELLS.1 as f64) as usize).min(CELLS.1 - 1);
+            cells[y][x] += 1;
+        }
+        let seen = cells.iter().flatten().filter(|count| **count > 0).count();
+        Self { cells, share: seen as f64 / (CELLS.0 * CELLS.1) as f64, tilt }
     }
-    let seen = cells.iter().flatten().filter(|count| **count > 0).count();
-    Coverage { cells, share: seen as f64 / (CELLS.0 * CELLS.1) as f64, tilt }
+
+    /// How much there is in each part, row by row from above.
+    pub fn levels(&self) -> Vec<Cell> {
+        let mean = self.cells.iter().flatten().sum::<usize>() / (CELLS.0 * CELLS.1);
+        let level = |count: &usize| match *count {
+            0 => Cell::Empty,
+            count if count > mean / 2 => Cell::Many,
+            _ => Cell::Few,
+        };
+        self.cells.iter().flatten().map(level).collect()
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix6, Vector2, Vector6};
 
 use super::{Grey, Target, detect, view};
 use crate::{
-    camera::{BoardPose, Corner, pose_from},
+    camera::{BoardPose, Corner, View, pose_from},
     capture::{BoardSeen, FindBoard},
     so3::{exp, matrix, vector},
 };
@@ -37,14 +37,18 @@ impl BoardFinder {
 
 impl FindBoard for BoardFinder {
     fn find(&mut self, picture: &Picture, lens: &Lens) -> Option<BoardSeen> {
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
-        to_grey(picture, &mut self.grey);
-        let grey = Grey::new(width, height, &self.grey)?;
-        let corners = view(&self.target, &detect(&self.target, &grey)).corners;
+        let corners = look_for(&self.target, picture, &mut self.grey)?.corners;
         let (pose, sigma) = orient(lens, &corners)?;
         let pixel = corners.iter().map(|c| c.pixel).sum::<DVec2>() / corners.len() as f64;
         Some(BoardSeen { board_from_camera: pose.camera_from_board.inverse(), sigma, pixel })
     }
+}
+
+/// The board's corners in a picture; `None` where the picture is too large. `grey` is memory that is used again.
+pub fn look_for(target: &Target, picture: &Picture, grey: &mut Vec<u8>) -> Option<View> {
+    to_grey(picture, grey);
+    let grey = Grey::new(picture.width() as usize, picture.height() as usize, grey)?;
+    Some(view(target, &detect(target, &grey)))
 }
 
 /// Middle of a tag of the board in a picture, where its diagonals cross, pixels; `None` where it is not to be seen.

@@ -17,11 +17,12 @@ use std::{fmt, str::FromStr};
 
 use glam::DVec2;
 
-pub use board::{BoardFinder, find_tag};
+pub use board::{BoardFinder, find_tag, look_for};
 pub use corner::Refinement;
 pub use detect::{Tag, detect, detect_by, view};
 pub use picture::Grey;
 pub use varied::varied;
+pub(crate) use varied::{apart, lie};
 
 /// Modules along a tag's side: six of data, two of border on either side.
 pub const MODULES: usize = 10;

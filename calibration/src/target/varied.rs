@@ -5,7 +5,7 @@ use glam::DVec2;
 use crate::camera::View;
 
 /// Numbers that tell how the board lies in a picture: its middle, its extent, its slant, all in pixels.
-fn lie(view: &View) -> [f64; 5] {
+pub(crate) fn lie(view: &View) -> [f64; 5] {
     let count = view.corners.len().max(1) as f64;
     let middle = view.corners.iter().map(|c| c.pixel).sum::<DVec2>() / count;
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
@@ -18,11 +18,15 @@ fn lie(view: &View) -> [f64; 5] {
     [middle.x, middle.y, xx.sqrt(), yy.sqrt(), xy.abs().sqrt().copysign(xy)]
 }
 
+/// How differently the board lies in two pictures, pixels.
+pub(crate) fn apart(a: &[f64; 5], b: &[f64; 5]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| (x - y).powi(2)).sum::<f64>().sqrt()
+}
+
 /// Numbers of `most` views, in order, among which every other one has a similar one: the one with most corners, then whichever differs
 /// most from those taken (Gonzalez 1985). Of a recording, many pictures show the same.
 pub fn varied(views: &[View], most: usize) -> Vec<usize> {
     let lies: Vec<[f64; 5]> = views.iter().map(lie).collect();
-    let apart = |a: usize, b: usize| lies[a].iter().zip(&lies[b]).map(|(x, y)| (x - y).powi(2)).sum::<f64>();
     let mut taken = Vec::new();
     let mut off = vec![f64::INFINITY; views.len()];
     // Of equals the first.
@@ -30,7 +34,7 @@ pub fn varied(views: &[View], most: usize) -> Vec<usize> {
     while let Some(i) = next.filter(|i| taken.len() < most && off[*i] > 0.0) {
         taken.push(i);
         for (k, off) in off.iter_mut().enumerate() {
-            *off = off.min(apart(i, k));
+            *off = off.min(apart(&lies[i], &lies[k]));
         }
         next = (0..views.len()).rev().max_by(|a, b| off[*a].total_cmp(&off[*b]));
     }

@@ -12,8 +12,8 @@ use hw_sim::fault::{Fault, FaultKind};
 
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateCamera, CalibrateTask};
 pub use mounting::{
-    CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger, Files, Material,
-    Told,
+    CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger, CalibrateWizard,
+    Files, Material, Told, WizardTask,
 };
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.

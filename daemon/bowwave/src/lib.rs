@@ -87,6 +87,6 @@ fn dispatch(command: &Command, program_start: bowwave_core::time::Time) -> Resul
             doctor::run(arguments).map(|well| if well { Outcome::Done } else { Outcome::Failed })
         }
         Command::Hits(arguments) => hits::run(arguments).map(|()| Outcome::Done),
-        Command::Calibrate(arguments) => calibrate::run(&arguments.task),
+        Command::Calibrate(arguments) => calibrate::run(arguments.task.as_ref()),
     }
 }

@@ -48,7 +48,8 @@ impl Hull {
     }
 
     fn push(&mut self, device_ns: i64, lag_ns: i64) {
-        let p = ((device_ns - self.device_origin) as f64, (lag_ns - self.lag_origin) as f64);
+        let since = |ns: i64, origin: i64| ns.saturating_sub(origin) as f64;
+        let p = (since(device_ns, self.device_origin), since(lag_ns, self.lag_origin));
         if p.0 <= self.last_x {
             return;
         }
@@ -67,7 +68,7 @@ impl Hull {
 
     /// Lag at `device_ns` on the line of the hull's edge under the points' mean.
     fn lag_at(&self, device_ns: i64) -> i64 {
-        let x = (device_ns - self.device_origin) as f64;
+        let x = device_ns.saturating_sub(self.device_origin) as f64;
         let lowest = self.points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
         let lag = if self.span_ns() < SLOPE_AFTER_NS {
             lowest
@@ -82,7 +83,7 @@ impl Hull {
                 _ => lowest,
             }
         };
-        self.lag_origin + lag.round() as i64
+        self.lag_origin.saturating_add(lag.round() as i64)
     }
 }
 
@@ -108,7 +109,10 @@ impl ClockMap {
     /// Takes in one packet and returns when, on the host's clock, its measurement was made.
     pub fn observe(&mut self, device_ns: i64, arrival: Time) -> Time {
         let lag = arrival.ns().saturating_sub(device_ns);
-        let restarted = self.current.as_ref().is_some_and(|h| (lag - h.lag_at(device_ns)).abs() > RESTART_NS);
+        let restarted = self
+            .current
+            .as_ref()
+            .is_some_and(|h| lag.abs_diff(h.lag_at(device_ns)) > RESTART_NS.unsigned_abs());
         if restarted {
             self.restarts += 1;
             self.current = None;

@@ -11,6 +11,7 @@ pub mod clock;
 pub mod event;
 pub mod fault;
 pub mod geometry;
+pub mod guide;
 pub mod gunnery;
 pub mod horizon;
 pub mod light;

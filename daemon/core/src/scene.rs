@@ -1,10 +1,13 @@
 //! What one frame shows: the session's output, the renderer's only input besides the picture.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     fault::Fault,
     geometry::{CameraPose, Lens, RigidPose},
+    guide::Guide,
     model::ModelId,
     reflection::{SeaTones, SkyLight},
     sea::{BeaufortForce, WmoSeaState, estimate::SeaSource},
@@ -38,6 +41,8 @@ pub struct Scene {
     pub tones: SeaTones,
     /// The head-up display.
     pub hud: Hud,
+    /// What it shows instead of counts and state, while a maintainer calibrates.
+    pub guide: Option<Arc<Guide>>,
 }
 
 impl Scene {

@@ -16,8 +16,8 @@ use crate::{
     pipeline::{Bound, SetLayout, SetPool},
 };
 
-/// Most quads of the head-up display.
-pub(crate) const QUADS_MAX: usize = 256;
+/// Most quads of the head-up display: a calibration's page with long texts.
+pub(crate) const QUADS_MAX: usize = 640;
 
 /// Most vectors of the frame's list: a rectangle is one, a strip of water two.
 pub(crate) const RECTS_MAX: usize = 4096;

@@ -331,6 +331,9 @@ impl HudLayout {
     }
 }
 
+#[path = "guide_layout.rs"]
+mod guide;
+
 #[cfg(test)]
 #[path = "hud_layout_tests.rs"]
 mod tests;

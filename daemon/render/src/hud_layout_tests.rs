@@ -3,7 +3,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-const SIZES: [(u32, u32); 7] =
+pub(super) const SIZES: [(u32, u32); 7] =
     [(800, 480), (640, 360), (320, 180), (1024, 600), (1280, 720), (640, 480), (1920, 1080)];
 
 fn hud(status: Status, warning: Option<Fault>) -> Hud {
@@ -25,7 +25,7 @@ fn statuses() -> Vec<Status> {
 }
 
 /// Everything within the screen, plates apart from each other, and everything else within a plate.
-fn check(size: (u32, u32), quads: &[HudQuad], what: &str) {
+pub(super) fn check(size: (u32, u32), quads: &[HudQuad], what: &str) {
     let (width, height) = (size.0 as f32, size.1 as f32);
     let plates: Vec<_> = quads.iter().filter(|q| q.shape == SHAPE_PLATE).map(|q| q.rect).collect();
     for quad in quads {
@@ -85,7 +85,7 @@ fn glyph_count(quads: &[HudQuad]) -> usize {
     quads.iter().filter(|q| q.shape == SHAPE_GLYPH).count()
 }
 
-fn letters(text: &str) -> usize {
+pub(super) fn letters(text: &str) -> usize {
     text.chars().filter(|c| *c != ' ').count()
 }
 

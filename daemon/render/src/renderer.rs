@@ -326,7 +326,7 @@ impl Renderer {
         let mut covered = true;
         if scene.runs(Pass::Hud) {
             let hud = &mut self.passes.hud;
-            let quads = hud.prepare(&mut slot.data, &scene.hud);
+            let quads = hud.prepare(&mut slot.data, scene);
             covered = hud.rects().any(|h| plan.rects.iter().any(|r| overlap(h, *r).is_some()));
             if covered {
                 plan.quads = quads;

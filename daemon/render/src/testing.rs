@@ -49,6 +49,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             sea: None,
             heading_tenths_deg: None,
         },
+        guide: None,
     }
 }
 

@@ -8,11 +8,12 @@
 
 mod common;
 
-use std::path::PathBuf;
+use std::{path::PathBuf, sync::Arc};
 
 use bowwave_core::{
     fault::Fault,
     geometry::{Distortion, look},
+    guide::{Cell, Coverage, Gauge, Guide, Rating},
     model::{Model, ModelKind, Texture},
     scene::{Pass, PassDecision, ReflectionMethod, RoundView, Scene, ShadowLevel, Status},
     sea::BeaufortForce,
@@ -113,6 +114,69 @@ fn faults_and_warnings_on_a_seven_inch_display() {
         scene.hud.status = status;
         scene.hud.warning = warning;
         check(&format!("display_{name}"), &scene, &[]);
+    }
+}
+
+/// The pages that guide a maintainer, as on the gun's own display.
+#[test]
+fn calibration_pages_on_a_seven_inch_display() {
+    let gauge = |name, value: &str, share, rating| Gauge { name, value: value.to_owned(), share, rating };
+    let rated = |rating| Some(rating);
+    let moving = Guide {
+        title: "Calibrate: inertial unit to camera".to_owned(),
+        says: "Elevate the gun up and down".to_owned(),
+        problem: Some("ONLY TRAVERSE SO FAR".to_owned()),
+        gauges: vec![
+            gauge("elevation", "1.9 mrad, 0.9 m at 500 m", 0.86, rated(Rating::Usable)),
+            gauge("traverse", "31.0 mrad, 15.5 m at 500 m", 0.25, rated(Rating::Poor)),
+            gauge("roll", "0.6 mrad, 0.3 m at 500 m", 1.0, rated(Rating::Good)),
+            gauge("time offset", "not known yet", 0.0, None),
+        ],
+        lines: vec!["32 s, horizon in 84 % of the pictures".to_owned()],
+        keys: "Enter or trigger: result   b: back   q: end",
+        ..Guide::default()
+    };
+    let cells = (0..48).map(|i| {
+        if i % 8 > 5 {
+            Cell::Empty
+        } else if i < 10 {
+            Cell::Few
+        } else {
+            Cell::Many
+        }
+    });
+    let lens = Guide {
+        title: "Calibrate: camera lens".to_owned(),
+        says: "Take pictures with the board in the upper right corner of the picture".to_owned(),
+        gauges: vec![
+            gauge("parts seen", "75 % of 75 %", 1.0, rated(Rating::Good)),
+            gauge("pictures", "7 of 12", 0.58, None),
+        ],
+        coverage: Some(Coverage { columns: 8, cells: cells.collect(), picture: (1280, 720) }),
+        lines: vec!["board fills 12 to 55 % of the picture".to_owned()],
+        keys: "Enter or trigger: result   b: back   q: end",
+        ..Guide::default()
+    };
+    let passed = Guide {
+        says: "Press Enter to save; what is replaced is kept".to_owned(),
+        passed: Some(true),
+        problem: None,
+        gauges: vec![
+            gauge("elevation", "1.9 mrad, 0.9 m at 500 m", 0.86, rated(Rating::Usable)),
+            gauge("traverse", "0.3 mrad, 0.1 m at 500 m", 1.0, rated(Rating::Good)),
+            gauge("roll", "0.6 mrad, 0.3 m at 500 m", 1.0, rated(Rating::Good)),
+            gauge("time offset", "0.12 ms", 1.0, rated(Rating::Good)),
+        ],
+        lines: vec![
+            "PASS: usable; boats lie within 1.90 mrad (0.95 m at 500 m) (one standard deviation), in time within 0.12 ms".to_owned(),
+        ],
+        keys: "Enter or trigger: save   b: gather more   q: end",
+        ..moving.clone()
+    };
+    for (name, guide) in [("moving", moving), ("lens", lens), ("passed", passed)] {
+        let mut scene = empty_scene(800, 480);
+        scene.guide = Some(Arc::new(guide));
+        check(&format!("calibrate_{name}"), &scene, &[]);
     }
 }
 

@@ -1,20 +1,20 @@
 //! `bowwave calibrate camera`: the lens from pictures of the board.
 
-use std::fmt::Write as _;
-
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
-    CalibrationFile, Date, Provenance,
+    CalibrationFile, Date,
     alignment::Grade,
-    camera::{CELLS, Camera, Evidence, Model, View, solve},
+    camera::{Camera, View, solve},
     parse,
-    sheet::at_range,
+    sheet::Sheet,
     target::varied,
 };
-use bowwave_import::{ImportOptions, assumed};
 use serde_json::json;
 
-use super::pictures::{Looked, look};
+use super::{
+    material::begun,
+    pictures::{Looked, look},
+};
 use crate::{cli::CalibrateCamera, import::today, outcome::Outcome, stdout};
 
 /// Most pictures that the lens is solved from: more take longer and tell nothing new.
@@ -46,7 +46,8 @@ pub fn run(arguments: &CalibrateCamera) -> Result<Outcome> {
     if arguments.dry_run {
         eprintln!("nothing was written");
     } else if passed || arguments.accept_poor {
-        let file = with_lens(former(arguments, &looked, today)?, &camera, today);
+        let mut file = former(arguments, &looked, today)?;
+        file.set_lens(&camera, today);
         file.write(&arguments.out)?;
         eprintln!("{}: the lens is written; all else is as it was", arguments.out.display());
     } else {
@@ -62,91 +63,17 @@ fn former(arguments: &CalibrateCamera, looked: &Looked, today: Date) -> Result<C
     }
     let own =
         looked.calibration_toml.as_ref().and_then(|text| parse(text, "the recording's calibration").ok());
-    Ok(own.unwrap_or_else(|| {
-        let mut file = assumed(looked.size, &ImportOptions::new(today));
-        file.source = "bowwave calibrate".to_owned();
-        file
-    }))
-}
-
-/// The file with another lens.
-fn with_lens(mut file: CalibrationFile, camera: &Camera, today: Date) -> CalibrationFile {
-    file.calibration.lens = camera.lens();
-    file.calibration.focal_sigma_px = camera.focal_sigma_px();
-    file.made = today;
-    let how = format!(
-        "{} pictures of a board, {:.2} px left, {} % of the picture covered, {:.2} mrad at its edge: {}",
-        camera.poses.len(),
-        camera.sigma_px,
-        (camera.coverage.share * 100.0).round(),
-        camera.edge_sigma() * 1e3,
-        camera.grade()
-    );
-    file.lens = Provenance::new(today, how);
-    file
-}
-
-const fn name(model: Model) -> &'static str {
-    match model {
-        Model::RadialTangential => "pinhole with radial and tangential distortion",
-        Model::Fisheye => "fisheye",
-    }
-}
-
-/// The parts of the picture: `.` without corners, `+` with some, `#` with many.
-fn map(camera: &Camera) -> String {
-    let mean = camera.coverage.cells.iter().flatten().sum::<usize>() / (CELLS.0 * CELLS.1);
-    let sign = |count: &usize| match *count {
-        0 => '.',
-        count if count > mean / 2 => '#',
-        _ => '+',
-    };
-    camera
-        .coverage
-        .cells
-        .iter()
-        .map(|row| format!("    {}\n", row.iter().map(sign).collect::<String>()))
-        .collect()
-}
-
-/// What speaks for the model that was chosen, and against the other.
-fn evidence(camera: &Camera) -> String {
-    let of = |chosen: bool| camera.evidence.iter().find(|e| (e.model == camera.model) == chosen);
-    let left =
-        |e: &Evidence| format!("{:.3} px left, {:.3} px where it took no part", e.sigma_px, e.held_out_px);
-    match (of(true), of(false)) {
-        (Some(own), Some(other)) => format!(
-            "{}: {}; as {}: {}; BIC {:+.0}",
-            name(own.model),
-            left(own),
-            name(other.model),
-            left(other),
-            own.bic - other.bic
-        ),
-        (Some(own), None) => format!("{}: {}; the other one fits nothing", name(own.model), left(own)),
-        _ => name(camera.model).to_owned(),
-    }
-}
-
-/// How uncertain the picture's edge is.
-fn at_edge(camera: &Camera) -> String {
-    let sigma = camera.edge_sigma();
-    if sigma.is_finite() {
-        format!("{}, one sigma", at_range(sigma))
-    } else {
-        "not known: the lens folds back before a corner of the picture".to_owned()
-    }
+    Ok(own.unwrap_or_else(|| begun(looked.size, today)))
 }
 
 fn as_text(camera: &Camera, looked: &Looked) -> String {
     let seen = looked.views.iter().filter(|v| !v.1.corners.is_empty());
     let corners: usize = camera.coverage.cells.iter().flatten().sum();
-    let [fx, fy, cx, cy, ..] = camera.intrinsics;
-    let [sx, sy, scx, scy, ..] = camera.sigma;
-    let tilt = camera.coverage.tilt.map(f64::to_degrees);
-    let rows = [
+    let mut sheet = Sheet::of_lens("", &Ok(camera.clone()));
+    sheet.rows.insert(
+        0,
         (
-            "pictures",
+            "pictures".to_owned(),
             format!(
                 "{} of {} show the board, {} differ enough to be used, {corners} corners",
                 seen.count(),
@@ -154,40 +81,20 @@ fn as_text(camera: &Camera, looked: &Looked) -> String {
                 camera.poses.len()
             ),
         ),
-        ("lens", evidence(camera)),
-        ("focal length", format!("{fx:.2} +- {sx:.2}, {fy:.2} +- {sy:.2} px")),
-        (
-            "centre",
-            format!("{cx:.2} +- {scx:.2}, {cy:.2} +- {scy:.2} px of {}x{}", looked.size.0, looked.size.1),
-        ),
-        ("left over", format!("{:.2} px", camera.sigma_px)),
-        ("uncertain at the edge", at_edge(camera)),
-        ("tilt of the board", format!("{:.0} to {:.0} deg", tilt[0], tilt[1])),
-        ("covered", format!("{:.0} % of the picture", camera.coverage.share * 100.0)),
-    ];
-    let mut out = String::new();
-    let verdict = if camera.grade() > Grade::Poor { "PASS" } else { "FAIL" };
-    let _ = writeln!(out, "{verdict}: the lens is {}", camera.grade());
-    for (what, value) in rows {
-        let _ = writeln!(out, "  {what:21}  {value}");
-    }
-    let _ = write!(out, "{}", map(camera));
-    for missing in camera.missing() {
-        let _ = writeln!(out, "* {missing}");
-    }
+    );
     let blind: Vec<&str> =
         looked.views.iter().filter(|v| v.1.corners.is_empty()).map(|v| v.0.as_str()).collect();
     if let Some(first) = blind.first() {
-        let _ = writeln!(out, "* no board was found in {} pictures, as in {first}", blind.len());
+        sheet.notes.push(format!("no board was found in {} pictures, as in {first}", blind.len()));
     }
-    out
+    sheet.to_string()
 }
 
 fn as_json(camera: &Camera, looked: &Looked) -> serde_json::Value {
     let finite = |v: f64| v.is_finite().then_some(v);
     json!({
         "grade": camera.grade().to_string(),
-        "model": name(camera.model),
+        "model": camera.model.to_string(),
         "size_px": [looked.size.0, looked.size.1],
         "intrinsics": camera.intrinsics,
         "sigma": camera.sigma,
@@ -197,7 +104,7 @@ fn as_json(camera: &Camera, looked: &Looked) -> serde_json::Value {
         "coverage": { "share": camera.coverage.share, "cells": camera.coverage.cells,
             "tilt_deg": camera.coverage.tilt.map(f64::to_degrees) },
         "evidence": camera.evidence.iter().map(|e| json!({
-            "model": name(e.model), "left_px": finite(e.sigma_px), "bic": finite(e.bic), "held_out_px": finite(e.held_out_px),
+            "model": e.model.to_string(), "left_px": finite(e.sigma_px), "bic": finite(e.bic), "held_out_px": finite(e.held_out_px),
         })).collect::<Vec<_>>(),
         "missing": camera.missing().iter().map(ToString::to_string).collect::<Vec<_>>(),
     })

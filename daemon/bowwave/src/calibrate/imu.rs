@@ -20,9 +20,7 @@ pub fn run(arguments: &CalibrateImu) -> Result<Outcome> {
     match &found {
         Ok(found) if passed || arguments.accept_poor => {
             let mut file = opened.file;
-            let by = if capture.is_by_horizon() { "horizon" } else { "board" };
-            let seconds = capture.seconds();
-            file.set_alignment(found, today, &format!("{seconds:.0} s of movement, {by}, {}", found.grade));
+            file.set_alignment(found, today, &capture.how(found));
             write(file, today, &arguments.files)?;
         }
         Ok(_) => eprintln!("nothing is written; --accept-poor writes it all the same"),

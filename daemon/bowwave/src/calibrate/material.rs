@@ -4,13 +4,19 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
-    CalibrationFile, Date, capture::Capture, page::page, parse, sheet::Sheet, target::BoardFinder,
+    CalibrationFile, Date,
+    capture::{Capture, Watcher},
+    page::page,
+    parse,
+    sheet::Sheet,
+    target::BoardFinder,
 };
 use bowwave_core::{
     event::{CameraFrame, Event},
     scenario::Scenario,
 };
 use bowwave_devices::camera::jpeg::Decoder;
+use bowwave_import::{ImportOptions, assumed};
 use bowwave_record::{Entry, RecordError, RecordingReader};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -27,6 +33,13 @@ pub struct Opened {
     pub file: CalibrationFile,
     /// The recording's own, where it has one that can be read.
     recorded: Option<CalibrationFile>,
+}
+
+/// A calibration in which all is assumed, for pictures of that size.
+pub fn begun(size: (u32, u32), today: Date) -> CalibrationFile {
+    let mut file = assumed(size, &ImportOptions::new(today));
+    file.source = "bowwave calibrate".to_owned();
+    file
 }
 
 /// A bar of so many pictures.
@@ -117,7 +130,7 @@ impl Opened {
     }
 
     /// What the recording, or the scenario in it, says of the camera's height above the sea.
-    fn height(&self) -> Option<f64> {
+    pub fn height(&self) -> Option<f64> {
         let properties = self.reader.properties();
         let own = properties.extra.get("eye_height_m").and_then(|text| text.parse::<f64>().ok());
         let scenario =
@@ -150,11 +163,15 @@ pub fn look(
             format!("{} does not say how high the camera was; say it with --eye-height", recording.display())
         })?,
     };
-    let mut capture = Capture::new(opened.file.calibration.lens, height);
+    let lens = opened.file.calibration.lens;
+    let (mut watcher, mut capture) = (Watcher::new(lens, height), Capture::new(lens));
     if let Some(target) = material.target {
-        capture = capture.with_board(Box::new(BoardFinder::new(target)));
+        watcher = watcher.with_board(Box::new(BoardFinder::new(target)));
     }
-    let is_cut = opened.play(true, |event| capture.take(&event))?;
+    let is_cut = opened.play(true, |event| match &event {
+        Event::Frame(frame) => capture.see(&watcher.look(frame)),
+        event => capture.take(event),
+    })?;
     Ok((opened, capture, is_cut))
 }
 

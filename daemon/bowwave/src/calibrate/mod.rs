@@ -9,14 +9,20 @@ mod material;
 mod pictures;
 mod restore;
 mod trigger;
+mod wizard;
 
 use anyhow::Result;
 
-use crate::{cli::CalibrateTask, outcome::Outcome};
+use crate::{
+    cli::{CalibrateTask, CalibrateWizard},
+    outcome::Outcome,
+};
 
-/// Does one of the tasks.
-pub fn run(task: &CalibrateTask) -> Result<Outcome> {
+/// Does one of the tasks; without one, the wizard asks.
+pub fn run(task: Option<&CalibrateTask>) -> Result<Outcome> {
+    let Some(task) = task else { return wizard::run(&CalibrateWizard::default()) };
     match task {
+        CalibrateTask::Wizard(arguments) => wizard::run(arguments),
         CalibrateTask::Board(arguments) => board::run(arguments),
         CalibrateTask::Camera(arguments) => camera::run(arguments),
         CalibrateTask::Imu(arguments) => imu::run(arguments),

@@ -5,19 +5,23 @@ use std::path::PathBuf;
 use bowwave_calibration::target::Target;
 use clap::{Args, Subcommand};
 
-use super::mounting::{CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger};
+use super::mounting::{
+    CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger, CalibrateWizard,
+};
 
 /// Arguments of `calibrate`.
 #[derive(Debug, Args)]
 pub struct Calibrate {
-    /// What to measure or make
+    /// What to measure or make; without it the wizard asks
     #[command(subcommand)]
-    pub task: CalibrateTask,
+    pub task: Option<CalibrateTask>,
 }
 
 /// What to measure or make.
 #[derive(Debug, Subcommand)]
 pub enum CalibrateTask {
+    /// Be guided through all of it, on this computer's devices or on a recording
+    Wizard(CalibrateWizard),
     /// Make the board whose pictures tell the lens, ready to print
     Board(CalibrateBoard),
     /// Measure the lens from pictures of the board: focal length, centre, distortion

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use bowwave_calibration::target::Target;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use glam::DVec2;
 
 /// How a result is told.
@@ -113,6 +113,81 @@ pub struct CalibrateBoresight {
     pub files: Files,
     #[command(flatten)]
     pub told: Told,
+}
+
+/// What the wizard can calibrate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum WizardTask {
+    /// The camera's lens, by the board
+    Camera,
+    /// Inertial unit to camera, by the horizon or the board
+    Imu,
+    /// Where the barrel points, by pulls at a tag of the board
+    Boresight,
+    /// When a round leaves, by dry shots
+    Trigger,
+}
+
+/// Arguments of `calibrate wizard`.
+#[derive(Debug, Args)]
+pub struct CalibrateWizard {
+    /// What to calibrate; without it the wizard asks
+    pub task: Option<WizardTask>,
+    /// Configuration file (TOML) that names the devices and the calibration
+    #[arg(long, value_name = "FILE", default_value = CONFIG)]
+    pub config: PathBuf,
+    /// Go through it on a recording (MCAP) instead of the devices
+    #[arg(long, value_name = "RECORDING")]
+    pub replay: Option<PathBuf>,
+    /// Play the recording as fast as it goes, to its end
+    #[arg(long, requires = "replay")]
+    pub fast: bool,
+    /// The board (see `calibrate board`): tags across and upwards, side in millimetres, gap by that
+    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]")]
+    pub target: Option<Target>,
+    /// The tag of the board at which the bore is aimed for the boresight
+    #[arg(long, value_name = "ID", default_value_t = 0, requires = "target")]
+    pub tag: usize,
+    /// From the camera to that tag, metres
+    #[arg(long, value_name = "M", value_parser = parse_range, requires = "target")]
+    pub range: Option<f64>,
+    /// The camera's height above the sea; without it what scenario or recording say
+    #[arg(long, value_name = "M", value_parser = parse_height)]
+    pub eye_height: Option<f64>,
+    /// Folder for what is gathered, as recordings; without it the configuration's data folder
+    #[arg(long, value_name = "DIR", conflicts_with = "replay")]
+    pub data: Option<PathBuf>,
+    /// Show the pages in a window as well
+    #[arg(long, conflicts_with = "fast")]
+    pub window: bool,
+    /// Also write the last result as a page (HTML)
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    #[command(flatten)]
+    pub files: Files,
+}
+
+/// Where the configuration lies.
+const CONFIG: &str = "/etc/bowwave/bowwave.toml";
+
+impl Default for CalibrateWizard {
+    /// As without any argument.
+    fn default() -> Self {
+        Self {
+            task: None,
+            config: CONFIG.into(),
+            replay: None,
+            fast: false,
+            target: None,
+            tag: 0,
+            range: None,
+            eye_height: None,
+            data: None,
+            window: false,
+            report: None,
+            files: Files { calibration: None, out: None },
+        }
+    }
 }
 
 /// A place in a picture, pixels; the centre of the first pixel is (0.5, 0.5).

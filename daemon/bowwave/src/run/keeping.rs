@@ -108,7 +108,7 @@ impl Keeping {
         };
         let mut recording_failed = None;
         let recorder = if settings.config.record {
-            let begun = recorder(folder, settings);
+            let begun = begin_recording(folder, "recording", settings).map(|begun| begun.0);
             begun.inspect_err(|e| recording_failed = Some(format!("nothing is recorded: {e:#}"))).ok()
         } else {
             None
@@ -357,7 +357,8 @@ fn end_recording(recorder: Recorder) {
     }
 }
 
-fn recorder(folder: &Path, settings: &Settings) -> Result<Recorder> {
+/// Begins a recording in `folder` whose name begins with `what`; tells where it lies.
+pub fn begin_recording(folder: &Path, what: &str, settings: &Settings) -> Result<(Recorder, PathBuf)> {
     let lens = &settings.setup.calibration.lens;
     let properties = Properties {
         calibration_toml: settings.calibration_toml.clone(),
@@ -367,14 +368,14 @@ fn recorder(folder: &Path, settings: &Settings) -> Result<Recorder> {
         source: "live".to_owned(),
         picture: (lens.width, lens.height),
         camera_info: Some(CameraInfo::from_lens(lens)),
-        extra: std::collections::BTreeMap::new(),
+        extra: [("eye_height_m".to_owned(), settings.setup.scenario.eye_height_m.to_string())].into(),
     };
     // A name of its own for each run: nothing that was recorded is overwritten.
     let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs();
-    let name = |n: u32| folder.join(format!("recording-{wall}-{n}.mcap"));
+    let name = |n: u32| folder.join(format!("{what}-{wall}-{n}.mcap"));
     let path =
         (0..1000).map(name).find(|p| !p.exists()).context("a thousand recordings of this second exist")?;
-    Recorder::start(&path, &properties, false)
+    Ok((Recorder::start(&path, &properties, false)?, path))
 }
 
 #[cfg(test)]

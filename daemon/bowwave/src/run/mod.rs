@@ -1,14 +1,14 @@
 //! `bowwave run`: the trainer on the gun computer's own devices, as the service runs it.
 
 mod faults;
-mod hardware;
+pub(crate) mod hardware;
 mod health;
-mod keeping;
+pub(crate) mod keeping;
 mod notify;
 mod pulse;
 pub mod settings;
-mod stage;
-mod starts;
+pub(crate) mod stage;
+pub(crate) mod starts;
 mod summary;
 mod trainer;
 
@@ -35,7 +35,8 @@ use notify::Notifier;
 use pulse::Pulse;
 use settings::Reader;
 use starts::Starts;
-use trainer::{Ended, Signals, Surroundings, Trainer};
+pub(crate) use trainer::Signals;
+use trainer::{Ended, Surroundings, Trainer};
 
 /// Where data go when nobody says: the folder that the package makes.
 const DATA: &str = "/var/lib/bowwave";
@@ -95,7 +96,7 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
 }
 
 /// SIGTERM and SIGINT end the run, SIGHUP has the settings read anew, SIGUSR1 says that the gun stands at its stow.
-fn catch_signals() -> Result<Arc<Signals>> {
+pub(crate) fn catch_signals() -> Result<Arc<Signals>> {
     let signals = Arc::new(Signals::default());
     let mut incoming = Incoming::new([SIGTERM, SIGINT, SIGHUP, SIGUSR1]).context("cannot catch signals")?;
     let told = Arc::clone(&signals);

@@ -187,6 +187,7 @@ impl Session {
             sky: meter.sky(scenario.wind.length()),
             tones: meter.tones(),
             hud: Hud { rounds_left: scenario.weapon.belt, ..Hud::READY },
+            guide: None,
         };
         Ok(Self {
             lens,

@@ -176,6 +176,7 @@ impl Still {
             sky: meter.sky(self.water.force.wind_mean_m_s()),
             tones: meter.tones(),
             hud: Hud::READY,
+            guide: None,
         };
         Ok(Composed { scene, plan })
     }

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use ash::vk;
-use bowwave_core::scene::{Hud, PixelRect};
+use bowwave_core::scene::{PixelRect, Scene};
 use shaders_spirv::{HUD_FRAG, HUD_VERT, interface::HudQuad};
 
 use crate::{
@@ -93,8 +93,11 @@ impl HudPass {
     }
 
     /// Writes this frame's quads; returns how many plates, shapes and glyphs there are.
-    pub(crate) fn prepare(&mut self, data: &mut FrameData, hud: &Hud) -> [u32; KINDS] {
-        data.write_quads(self.layout.lay_out(&self.glyphs, hud));
+    pub(crate) fn prepare(&mut self, data: &mut FrameData, scene: &Scene) -> [u32; KINDS] {
+        data.write_quads(match &scene.guide {
+            Some(guide) => self.layout.lay_out_guide(&self.glyphs, guide),
+            None => self.layout.lay_out(&self.glyphs, &scene.hud),
+        });
         self.layout.counts_by_kind()
     }
 

@@ -152,6 +152,7 @@ pub fn bare_scene(camera: CameraPose, lens: Lens, water: Water, light: bowwave_c
         sky: SkyLight::of_bands(light.horizon, light.sky),
         tones: SeaTones::default(),
         hud: Hud::READY,
+        guide: None,
     }
 }
 

@@ -1,0 +1,332 @@
+//! The wizard in its own time: on the devices, or on a recording at that one's pace.
+
+use std::{
+    path::PathBuf,
+    sync::{Arc, atomic::Ordering},
+    thread,
+    time::Duration,
+};
+
+use anyhow::{Context, Result};
+use bowwave_calibration::{
+    CalibrationFile,
+    wizard::{Ask, Eyes, Finding, Input, Key, Look, Solved, Step, Task, Work},
+};
+use bowwave_core::{
+    event::{CameraFrame, Event},
+    fault::{Change, FaultChange},
+    time::Time,
+};
+use bowwave_devices::clock::now;
+use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
+
+use super::{
+    Guided,
+    player::Player,
+    screen::Screen,
+    teller::{Deaf, Teller},
+};
+use crate::{
+    calibrate::material::begun,
+    cli::CalibrateWizard,
+    config::ScreenOutput,
+    import::today,
+    outcome::Outcome,
+    recorder::Recorder,
+    run::{
+        Signals, catch_signals,
+        hardware::Hardware,
+        keeping::begin_recording,
+        settings::{Reader, Settings},
+        starts::Mode,
+    },
+};
+
+/// Time between looks at devices and keys: that of the display.
+const TICK: Duration = Duration::from_millis(33);
+
+/// Where events come from.
+enum Source {
+    Devices { hardware: Box<Hardware>, settings: Box<Settings>, data: PathBuf },
+    Recording(Player),
+}
+
+/// On the configured devices, and on the LCD.
+pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
+    let reader = Reader { config: arguments.config.clone(), last_good: None };
+    let mut settings = reader.read()?;
+    let named = arguments.files.calibration.clone().or_else(|| settings.config.calibration.clone());
+    let path = named
+        .context("nothing says where the calibration lies: set files.calibration in the configuration, or say --calibration")?;
+    let file = if path.exists() {
+        CalibrationFile::read(&path)?
+    } else {
+        let lens = settings.setup.calibration.lens;
+        begun((lens.width, lens.height), today()?)
+    };
+    settings.setup.calibration = file.calibration.clone();
+    settings.calibration_toml = bowwave_calibration::to_toml(&file);
+    if arguments.window {
+        settings.config.output = ScreenOutput::Window;
+    }
+    for fault in &settings.faults {
+        if let Change::Raised { cause } = &fault.change {
+            log::warn!("{cause}");
+        }
+    }
+    let data =
+        arguments.data.clone().or_else(|| settings.config.data.clone()).unwrap_or_else(|| PathBuf::from("."));
+    std::fs::create_dir_all(&data)
+        .with_context(|| format!("cannot make the folder {}; name another with --data", data.display()))?;
+    let height = arguments.eye_height.unwrap_or(settings.setup.scenario.eye_height_m);
+    settings.setup.scenario.eye_height_m = height;
+    let out = arguments.files.out.clone().or(Some(path));
+    let guided = Guided::new(arguments, file, out, height)?;
+    let signals = catch_signals()?;
+    let mut faults = Vec::new();
+    let hardware = Hardware::start(&settings, Mode::Training, &mut faults)?;
+    let screen = (settings.config.output != ScreenOutput::None)
+        .then(|| Screen::open(&mut settings, Some(&hardware), arguments.window))
+        .transpose()?;
+    let source = Source::Devices { hardware: Box::new(hardware), settings: Box::new(settings), data };
+    Loop::new(guided, source, screen, signals, arguments)?.run(faults)
+}
+
+/// On a recording, at its own pace.
+pub fn paced(guided: Guided, player: Player, arguments: &CalibrateWizard) -> Result<Outcome> {
+    let signals = catch_signals()?;
+    let screen = arguments
+        .window
+        .then(|| {
+            let reader = Reader { config: arguments.config.clone(), last_good: None };
+            let mut settings = reader.read()?;
+            settings.setup.calibration = guided.wizard.calibration().clone();
+            Screen::open(&mut settings, None, true)
+        })
+        .transpose()?;
+    Loop::new(guided, Source::Recording(player), screen, signals, arguments)?.run(Vec::new())
+}
+
+/// Pictures on their way to the eyes, and what these found.
+type Watched = (Sender<(Look, CameraFrame)>, Receiver<(Time, Finding)>);
+
+/// The wizard with everything around it.
+struct Loop<'a> {
+    guided: Guided,
+    source: Source,
+    screen: Option<Screen>,
+    signals: Arc<Signals>,
+    arguments: &'a CalibrateWizard,
+    teller: Teller,
+    /// Pictures that are looked at beside, the newest only.
+    pictures: Sender<(Look, CameraFrame)>,
+    findings: Receiver<(Time, Finding)>,
+    solved: (Sender<Solved>, Receiver<Solved>),
+    recorder: Option<Recorder>,
+    /// What was gathered so far.
+    recordings: Vec<(PathBuf, Task)>,
+}
+
+impl<'a> Loop<'a> {
+    fn new(
+        guided: Guided,
+        source: Source,
+        screen: Option<Screen>,
+        signals: Arc<Signals>,
+        arguments: &'a CalibrateWizard,
+    ) -> Result<Self> {
+        let (pictures, findings) = watch(guided.eyes(arguments))?;
+        Ok(Self {
+            guided,
+            source,
+            screen,
+            signals,
+            arguments,
+            teller: Teller::new(),
+            pictures,
+            findings,
+            solved: unbounded(),
+            recorder: None,
+            recordings: Vec::new(),
+        })
+    }
+
+    fn run(mut self, mut faults: Vec<FaultChange>) -> Result<Outcome> {
+        let ended = self.rounds(&mut faults);
+        if let Some(recorder) = self.recorder.take()
+            && let Err(e) = recorder.finish()
+        {
+            log::error!("{e:#}");
+        }
+        self.teller.finish(&self.guided.wizard.guide())?;
+        for (path, task) in &self.recordings {
+            eprintln!("what was gathered is kept: bowwave calibrate {} {}", task.command(), path.display());
+        }
+        if let Some(screen) = self.screen {
+            screen.close();
+        }
+        match self.source {
+            Source::Devices { hardware, .. } => hardware.stop(),
+            // A recording that cannot be played further says so here.
+            Source::Recording(player) => drop(player.finish()?),
+        }
+        ended?;
+        Ok(self.guided.outcome())
+    }
+
+    fn rounds(&mut self, faults: &mut Vec<FaultChange>) -> Result<()> {
+        let mut events = Vec::new();
+        while self.guided.wizard.step() != Step::Over {
+            self.keys();
+            self.collect(&mut events, faults);
+            self.record(&events)?;
+            for event in events.drain(..) {
+                self.event(event);
+            }
+            for (arrival, finding) in self.findings.try_iter() {
+                self.guided.wizard.take(Input::Seen(arrival, finding));
+            }
+            for solved in self.solved.1.try_iter() {
+                let sheet = solved.sheet.clone();
+                self.guided.wizard.take(Input::Solved(Box::new(solved)));
+                self.guided.report(&sheet);
+            }
+            self.serve()?;
+            self.show()?;
+            thread::sleep(TICK);
+        }
+        Ok(())
+    }
+
+    fn show(&mut self) -> Result<()> {
+        let mut guide = self.guided.wizard.guide();
+        if let Some(screen) = &mut self.screen
+            && let Err(e) = screen.show(guide.clone())
+        {
+            log::error!("the display is lost, the rest goes on: {e:#}");
+            self.screen = None;
+        }
+        if let Some((path, _)) = self.recordings.last().filter(|_| self.recorder.is_some()) {
+            guide.lines.push(format!("recorded in {}", path.display()));
+        }
+        self.teller.show(&guide)
+    }
+
+    fn keys(&mut self) {
+        let is_deaf = loop {
+            match self.teller.key() {
+                Ok(Some(key)) => self.guided.wizard.take(Input::Key(key)),
+                Ok(None) => break false,
+                Err(Deaf) => break true,
+            }
+        };
+        // At the gun the trigger goes on; a recording has nobody who could.
+        if is_deaf && matches!(self.source, Source::Recording(_)) && self.guided.wizard.waits() {
+            self.guided.wizard.take(Input::Key(Key::Quit));
+        }
+        if self.signals.stop.load(Ordering::Relaxed) || self.screen.as_ref().is_some_and(Screen::is_closed) {
+            self.guided.wizard.take(Input::Key(Key::Quit));
+        }
+    }
+
+    fn collect(&mut self, events: &mut Vec<Event>, faults: &mut Vec<FaultChange>) {
+        match &mut self.source {
+            Source::Devices { hardware, .. } => {
+                hardware.collect(events, faults);
+                events.extend(faults.drain(..).map(Event::Fault));
+                self.guided.wizard.take(Input::Time(now()));
+            }
+            // A recording stands still while a key is waited for.
+            Source::Recording(_) if self.guided.wizard.waits() => {}
+            Source::Recording(player) => loop {
+                match player.events.try_recv() {
+                    Ok(event) => events.push(event),
+                    Err(TryRecvError::Empty) => break,
+                    Err(TryRecvError::Disconnected) => {
+                        self.guided.wizard.take(Input::Ended);
+                        break;
+                    }
+                }
+            },
+        }
+    }
+
+    fn event(&mut self, event: Event) {
+        let Event::Frame(frame) = event else { return self.guided.event(event) };
+        if let Some(screen) = &mut self.screen {
+            screen.picture(&frame.picture);
+        }
+        // One that comes while another is looked at is left out.
+        let _ = self.pictures.try_send((self.guided.wizard.look(), frame));
+    }
+
+    /// What is gathered on devices is a recording, so that it can be solved again.
+    fn record(&mut self, events: &[Event]) -> Result<()> {
+        let Source::Devices { settings, data, .. } = &self.source else { return Ok(()) };
+        let step = self.guided.wizard.step();
+        if step == Step::Gather && self.recorder.is_none() {
+            let task = self.guided.wizard.task();
+            let (recorder, path) = begin_recording(data, &format!("calibrate-{}", task.command()), settings)?;
+            self.recordings.push((path, task));
+            self.recorder = Some(recorder);
+        } else if matches!(step, Step::Choose | Step::Saved | Step::Over)
+            && let Some(recorder) = self.recorder.take()
+        {
+            let lost = recorder.dropped();
+            recorder.finish()?;
+            if lost > 0 {
+                log::warn!("{lost} pictures or readings are not in the recording: the disk is too slow");
+            }
+        }
+        if let Some(recorder) = &mut self.recorder {
+            events.iter().for_each(|event| recorder.event(event));
+        }
+        Ok(())
+    }
+
+    fn serve(&mut self) -> Result<()> {
+        while let Some(ask) = self.guided.wizard.ask() {
+            match ask {
+                Ask::Solve(work) => solve(*work, self.solved.0.clone())?,
+                Ask::Save(found) => {
+                    self.guided.save(&found);
+                    (self.pictures, self.findings) = watch(self.guided.eyes(self.arguments))?;
+                    if let Source::Devices { settings, .. } = &mut self.source {
+                        settings.calibration_toml = bowwave_calibration::to_toml(&self.guided.file);
+                    }
+                }
+                Ask::End => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Looks at pictures in a thread of its own, which ends when no more can come.
+fn watch(mut eyes: Eyes) -> Result<Watched> {
+    let (pictures, incoming) = bounded::<(Look, CameraFrame)>(1);
+    let (told, findings) = unbounded();
+    thread::Builder::new()
+        .name("eyes".to_owned())
+        .spawn(move || {
+            for (look, frame) in incoming {
+                if told.send((frame.arrival, eyes.look(look, &frame))).is_err() {
+                    return;
+                }
+            }
+        })
+        .context("cannot start the thread that looks at pictures; are too many processes running?")?;
+    Ok((pictures, findings))
+}
+
+/// Solves in a thread of its own.
+fn solve(work: Work, told: Sender<Solved>) -> Result<()> {
+    thread::Builder::new()
+        .name("solver".to_owned())
+        .spawn(move || {
+            // Nobody waits for it any more where this fails.
+            let _ = told.send(work.run());
+        })
+        .context("cannot start the solver's thread; are too many processes running?")?;
+    Ok(())
+}

@@ -1,0 +1,115 @@
+//! The guide over the live picture: drawn by the trainer's own renderer, shown on its own way.
+
+use std::sync::Arc;
+
+use anyhow::Result;
+use bowwave_core::{
+    event::Picture,
+    guide::Guide,
+    session::{Session, View},
+};
+use bowwave_devices::{
+    clock::now,
+    report::{Reporter, reporting},
+};
+
+use crate::{
+    output::UserEvent,
+    run::{
+        hardware::Hardware,
+        settings::Settings,
+        stage::{Stage, StageOptions},
+    },
+};
+
+/// Nanoseconds that a frame may take.
+const FRAME_NS: i64 = 33_333_333;
+
+/// A screen with the newest picture and the guide over it.
+pub struct Screen {
+    stage: Stage,
+    options: StageOptions,
+    session: Session,
+    picture: Option<(Picture, bool)>,
+    frame: u64,
+    is_closed: bool,
+}
+
+impl Screen {
+    /// Opens the LCD of the hardware, or a window. The settings' scenario loses its boats.
+    pub fn open(settings: &mut Settings, hardware: Option<&Hardware>, window: bool) -> Result<Self> {
+        let setup = &mut settings.setup;
+        setup.scenario.boats.clear();
+        setup.boat_models.clear();
+        if let Some(size) = settings.config.size.or_else(|| hardware?.await_lcd_size()) {
+            setup.screen = size;
+        }
+        let session = Session::new(setup.clone())?;
+        let options = StageOptions {
+            gpu: settings.config.gpu.clone(),
+            validation: settings.config.validation,
+            hang: settings.config.hang,
+            lcd: hardware.and_then(Hardware::lcd),
+            window,
+            frame_hashes: None,
+            reporter: hardware.map_or_else(unheard, Hardware::output_reporter),
+        };
+        let stage = Stage::open(&session, &[], &options)?;
+        Ok(Self { stage, options, session, picture: None, frame: 0, is_closed: false })
+    }
+
+    /// Takes a picture; the newest is shown.
+    pub fn picture(&mut self, picture: &Picture) {
+        let plan = self.session.plan();
+        // One of another size cannot be shown through this lens; the guide says so.
+        if (picture.width(), picture.height()) == plan.picture {
+            self.picture = Some((picture.clone(), true));
+        }
+    }
+
+    /// Shows the guide.
+    pub fn show(&mut self, guide: Guide) -> Result<()> {
+        let format = self.picture.as_ref().map(|(picture, _)| picture.format());
+        if let Some(format) = format.filter(|f| *f != self.session.plan().video) {
+            self.session.set_video(format)?;
+            self.stage = Stage::open(&self.session, &[], &self.options)?;
+        }
+        let begun = now();
+        let blind = self.session.blind(begun);
+        let mut scene = blind.scene.clone();
+        scene.frame = self.frame;
+        scene.guide = Some(Arc::new(guide));
+        self.frame += 1;
+        let (picture, picture_is_new) = match &mut self.picture {
+            Some((picture, is_new)) => (&*picture, std::mem::take(is_new)),
+            None => (blind.picture, true),
+        };
+        let view = View { scene: &scene, picture, picture_is_new, mid_exposure: begun, pose_known: false };
+        let announced = self.stage.show(&view, begun, begun.plus_ns(FRAME_NS))?;
+        self.is_closed |= self.stage.user_events().any(|e| e == UserEvent::Quit);
+        if !announced {
+            return Err(match self.stage.take_error() {
+                Some(e) => e,
+                None => anyhow::anyhow!("the output thread has ended without a word; report it with the log"),
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether the window was closed.
+    pub const fn is_closed(&self) -> bool {
+        self.is_closed
+    }
+
+    /// Takes the last frames out.
+    pub fn close(self) {
+        if let Err(e) = self.stage.close() {
+            log::debug!("the output thread ended with: {e:#}");
+        }
+    }
+}
+
+/// A reporter that nobody listens to.
+fn unheard() -> Reporter {
+    reporting().0
+}

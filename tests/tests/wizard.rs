@@ -1,0 +1,165 @@
+//! The guided calibration as a maintainer meets it: on recordings whose truth is known, by keys in a pipe and on a terminal.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+use std::{
+    fs::{self, File},
+    io::{Read as _, Write as _},
+    path::{Path, PathBuf},
+    process::{Command, Output, Stdio},
+    sync::OnceLock,
+};
+
+use bowwave_calibration::{CalibrationFile, keep, to_toml};
+use bowwave_tests::{bowwave, by_hand, expect_code, program, traverse_only};
+use hw_sim::make::{self, Recipe};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+
+fn made(recipe: &Recipe, name: &str) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    make::make(recipe, &path, &mut |_, _| {}).unwrap();
+    (folder, path)
+}
+
+/// The recording of the movement by hand, made once.
+fn recording() -> &'static Path {
+    static RECORDING: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
+    &RECORDING.get_or_init(|| made(&by_hand(), "hand.mcap")).1
+}
+
+fn command(recording: &Path, further: &[&str]) -> Command {
+    let mut command = Command::new(program());
+    command.args(["calibrate", "wizard", "--replay", recording.to_str().unwrap(), "--fast"]).args(further);
+    command.env_remove("RUST_LOG").stderr(Stdio::piped());
+    command
+}
+
+/// Runs the wizard with lines for keys.
+fn wizard(recording: &Path, keys: &str, further: &[&str]) -> Output {
+    let mut child =
+        command(recording, further).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it starts");
+    child.stdin.take().unwrap().write_all(keys.as_bytes()).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+fn told(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn a_good_movement_passes_and_is_saved_as_the_recordings_own_command_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let (file, other) = (folder.path().join("gun.toml"), folder.path().join("other.toml"));
+    let page = folder.path().join("report.html");
+    for path in [&file, &other] {
+        fs::write(path, to_toml(&make::calibration(&by_hand()))).unwrap();
+    }
+    let further = ["--calibration", file.to_str().unwrap(), "--report", page.to_str().unwrap()];
+    // Camera and unit, begin, save, on.
+    let output = wizard(recording(), "2\n\n\n\n", &further);
+    expect_code(&output, 0);
+    let said = told(&output);
+    for words in [
+        "== Calibrate\n",
+        "> 2 inertial unit to camera",
+        "-> Swing the gun left and right, up and down, the horizon in view",
+        "horizon in ",
+        " mrad, ",
+        " m at 500 m usable",
+        "PASS: usable; boats lie within",
+        "-> Press Enter to save; what is replaced is kept",
+        "-> Saved; press Enter",
+    ] {
+        assert!(said.contains(words), "'{words}' is missing:\n{said}");
+    }
+    let recorded = recording().to_str().unwrap();
+    expect_code(&bowwave(["calibrate", "imu", recorded, "--calibration", other.to_str().unwrap()]), 0);
+    assert_eq!(CalibrationFile::read(&file).unwrap(), CalibrationFile::read(&other).unwrap());
+    assert_eq!(keep::kept(&file).unwrap().len(), 1);
+    assert!(fs::read_to_string(page).unwrap().contains("<b>PASS</b>"));
+    // The same recording and keys say the same.
+    fs::write(&file, to_toml(&make::calibration(&by_hand()))).unwrap();
+    assert_eq!(told(&wizard(recording(), "2\n\n\n\n", &further)), said);
+}
+
+#[test]
+fn traverse_only_names_what_is_missing_and_saves_nothing() {
+    let (folder, path) = made(&traverse_only(), "traverse.mcap");
+    let out = folder.path().join("new.toml");
+    let output = wizard(&path, "\n\n\n", &["imu", "--out", out.to_str().unwrap()]);
+    expect_code(&output, 1);
+    let said = told(&output);
+    for words in [
+        "!! ONLY TRAVERSE SO FAR",
+        "-> Elevate the gun up and down",
+        "FAIL: ",
+        "the movement that was missing: elevation (up and down)",
+    ] {
+        assert!(said.contains(words), "'{words}' is missing:\n{said}");
+    }
+    assert!(!said.contains("usable") && !said.contains(": good") && !out.exists(), "{said}");
+}
+
+#[test]
+fn what_cannot_be_done_is_said_and_nothing_is_written() {
+    let without_board = wizard(recording(), "1\n\nq\n", &[]);
+    expect_code(&without_board, 1);
+    assert!(
+        told(&without_board).contains("!! no board: start again with --target"),
+        "{}",
+        told(&without_board)
+    );
+    // Keys that end are an end, also where something could be saved.
+    let ended = wizard(recording(), "", &["imu"]);
+    expect_code(&ended, 1);
+    assert!(told(&ended).contains("PASS"), "{}", told(&ended));
+    let nowhere = wizard(recording(), "\nq\n", &["imu"]);
+    expect_code(&nowhere, 1);
+    assert!(told(&nowhere).contains("!! nothing is written"), "{}", told(&nowhere));
+    let absent = wizard(Path::new("absent.mcap"), "", &[]);
+    expect_code(&absent, 1);
+}
+
+#[test]
+fn on_a_terminal_keys_are_single_and_the_terminal_is_left_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new.toml");
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+    grantpt(&master).unwrap();
+    unlockpt(&master).unwrap();
+    let slave = PathBuf::from(ptsname(&master, Vec::new()).unwrap().into_string().unwrap());
+    let end = || File::options().read(true).write(true).open(&slave).unwrap();
+    let kept = end();
+    let before = rustix::termios::tcgetattr(&kept).unwrap();
+    let mut child = command(recording(), &["--out", out.to_str().unwrap()])
+        .stdin(end())
+        .stdout(end())
+        .env("TERM", "xterm")
+        .spawn()
+        .expect("it starts");
+    let (mut master, mut seen) = (File::from(master), String::new());
+    let mut keys =
+        [("> 1 camera lens", "2"), ("> 2 inertial unit", "\r"), ("to save;", "\r"), ("Saved;", "q")]
+            .into_iter()
+            .peekable();
+    let mut bytes = [0; 4096];
+    while keys.peek().is_some() {
+        let count = master.read(&mut bytes).unwrap();
+        seen += &String::from_utf8_lossy(&bytes[..count]);
+        if let Some((_, key)) = keys.next_if(|(shown, _)| seen.contains(shown)) {
+            master.write_all(key.as_bytes()).unwrap();
+            seen.clear();
+        }
+    }
+    let status = child.wait().unwrap();
+    assert_eq!(status.code(), Some(0));
+    assert!(CalibrationFile::read(&out).is_ok());
+    let after = rustix::termios::tcgetattr(&kept).unwrap();
+    assert_eq!((after.local_modes, after.input_modes), (before.local_modes, before.input_modes));
+}
