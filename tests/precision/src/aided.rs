@@ -3,7 +3,8 @@
 
 use bowwave_core::{
     attitude::{
-        Attitude, AttitudeSettings, DIP_SIGMA, HeadingSeen, Noise, RateKind, Settings, Source, UpSeen,
+        Attitude, AttitudeSettings, DIP_SIGMA, HeadingSeen, Noise, OWN_GROWTH, RateKind, Settings, Source,
+        UpSeen,
     },
     event::ImuSample,
     time::Time,
@@ -105,6 +106,7 @@ pub fn product() -> Attitude {
         rate: RateKind::Instant,
         inclination: Settings::GUN,
         noise: Noise::USUAL,
+        own_growth: OWN_GROWTH,
     };
     Attitude::new(settings, DVec3::ZERO, CAMERA_FROM_IMU)
 }

@@ -79,7 +79,7 @@ pub struct AttitudeSettings {
 }
 
 /// What units that find their orientation by themselves are good for without a compass (5 deg/h), rad/s.
-const OWN_GROWTH: f64 = 5.0 * std::f64::consts::PI / 180.0 / 3600.0;
+pub const OWN_GROWTH: f64 = 5.0 * std::f64::consts::PI / 180.0 / 3600.0;
 
 impl AttitudeSettings {
     /// For that unit on that camera, of the usual class (a VN-100's: 0.0035 deg/s per square root of a hertz).

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::{Attitude, AttitudeSettings, Noise, RateKind, Settings, Source},
+    attitude::{Attitude, AttitudeSettings, Noise, OWN_GROWTH, RateKind, Settings, Source},
     event::ImuSample,
     time::Time,
 };
@@ -76,7 +76,7 @@ fn settings(inclination: Settings, rate: RateKind) -> AttitudeSettings {
         Settings::HAND => Noise { bias: DVec3::splat(9e-3), scale: 5e-3, force: 0.02, ..Noise::USUAL },
         _ => Noise::USUAL,
     };
-    AttitudeSettings { source: Source::Fused, rate, inclination, noise }
+    AttitudeSettings { source: Source::Fused, rate, inclination, noise, own_growth: OWN_GROWTH }
 }
 
 fn ours(settings: AttitudeSettings, trial: &Trial, tell: Tell<'_>) {
