@@ -184,10 +184,10 @@ fn check_sample(sample: &ImuSample) {
 }
 
 fn check_ship(said: &ShipAttitude) {
-    let turn = std::f64::consts::TAU;
-    assert!(said.heading.is_none_or(|v| (0.0..turn).contains(&v)), "{said:?}");
+    let (turn, ship) = (std::f64::consts::TAU, &said.sample);
+    assert!(ship.heading.is_none_or(|v| (0.0..turn).contains(&v)), "{said:?}");
     assert!(
-        said.roll.is_none_or(|v| v.abs() <= turn / 2.0) && said.pitch.is_none_or(|v| v.abs() <= turn / 4.0)
+        ship.roll.is_none_or(|v| v.abs() <= turn / 2.0) && ship.pitch.is_none_or(|v| v.abs() <= turn / 4.0)
     );
     assert!(said.utc_day_s.is_none_or(|v| (0.0..86_402.0).contains(&v)), "{said:?}");
 }
