@@ -2,7 +2,8 @@
 
 use std::{fs, path::Path};
 
-use bowwave_core::calibration::Calibration;
+use bowwave_core::{calibration::Calibration, horizon::Mask};
+use glam::DVec2;
 
 use crate::{CalibrationError, Date, keep, parse, to_toml};
 
@@ -51,6 +52,8 @@ pub struct CalibrationFile {
     pub trigger: Option<Provenance>,
     /// Where the gyro's bias comes from.
     pub gyro_bias: Provenance,
+    /// What of the pictures shows the own ship or gun: polygons with corners in pixels, x right, y down, from the upper left corner.
+    pub own_ship: Vec<Vec<DVec2>>,
     /// The checked numbers.
     pub calibration: Calibration,
 }
@@ -79,8 +82,15 @@ impl CalibrationFile {
             boresight: provenance.clone(),
             trigger: calibration.trigger.map(|_| provenance.clone()),
             gyro_bias: provenance,
+            own_ship: Vec::new(),
             calibration,
         }
+    }
+
+    /// What hides the own ship from those who seek horizon and sky; `None` where nothing does.
+    pub fn own_ship_mask(&self) -> Option<Mask> {
+        let lens = &self.calibration.lens;
+        Mask::of_polygons(&self.own_ship, (lens.width, lens.height))
     }
 
     /// Reads and checks a file.

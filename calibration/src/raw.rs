@@ -3,6 +3,7 @@
 use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
     geometry::{Distortion, Lens},
+    horizon::Mask,
     text::{line_column, one_line},
 };
 use glam::{DQuat, DVec2, DVec3};
@@ -31,6 +32,7 @@ struct RawFile {
     boresight: RawBoresight,
     trigger: Option<RawTrigger>,
     gyro_bias: RawGyroBias,
+    own_ship: Option<RawOwnShip>,
 }
 
 #[derive(Deserialize)]
@@ -110,6 +112,12 @@ struct RawGyroBias {
     how: String,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawOwnShip {
+    hidden_px: Vec<Spanned<Vec<[f64; 2]>>>,
+}
+
 /// Reads a calibration; `origin` (a file name, usually) stands at the head of error messages.
 pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationError> {
     let at = Place { text, origin };
@@ -140,6 +148,7 @@ pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationErr
             .transpose()?,
         gyro_bias: at.provenance("gyro_bias.measured", &raw.gyro_bias.measured, &raw.gyro_bias.how)?,
         calibration: at.calibration(&raw)?,
+        own_ship: at.own_ship(&raw)?,
         source: raw.source,
         camera_name: raw.camera_name,
         camera_serial: raw.camera_serial,
@@ -161,6 +170,11 @@ pub(crate) fn ns_from_ms(ms: f64) -> i64 {
 /// How far a quaternion's length may be off before it is taken for a typing error, and from where it is left as it stands.
 const NORM_TOLERANCE: f64 = 1e-3;
 const NORM_EXACT: f64 = 1e-14;
+
+/// Polygons of the own ship, corners of one, and the share of the picture that they may hide.
+const POLYGONS_MOST: usize = 32;
+const CORNERS_MOST: usize = 64;
+const SHARE_MOST: f64 = 0.8;
 
 /// No camera of 10 pictures a second or more takes longer to read one.
 const READOUT_MS_MAX: f64 = 100.0;
@@ -304,6 +318,41 @@ impl Place<'_> {
             gyro_bias: DVec3::from_array(bias.map(f64::to_radians)),
             gyro_bias_sigma: DVec3::from_array(bias_sigma.map(f64::to_radians)),
         })
+    }
+
+    /// Polygons of the own ship in the picture, in pixels.
+    fn own_ship(&self, raw: &RawFile) -> Result<Vec<Vec<DVec2>>, CalibrationError> {
+        const KEY: &str = "own_ship.hidden_px";
+        let Some(own_ship) = &raw.own_ship else { return Ok(Vec::new()) };
+        let [width, height] = raw.lens.size_px.get_ref().map(f64::from);
+        let mut polygons = Vec::new();
+        for polygon in &own_ship.hidden_px {
+            let corners = polygon.get_ref();
+            if !(3..=CORNERS_MOST).contains(&corners.len()) || polygons.len() >= POLYGONS_MOST {
+                let problem = format!(
+                    "has a polygon of {} corners: give 3 to {CORNERS_MOST} for each, and {POLYGONS_MOST} polygons at most",
+                    corners.len()
+                );
+                return Err(self.refuse(KEY, polygon, problem));
+            }
+            let outside = |c: &&[f64; 2]| !((0.0..=width).contains(&c[0]) && (0.0..=height).contains(&c[1]));
+            if let Some([x, y]) = corners.iter().find(outside) {
+                let problem =
+                    format!("has the corner [{x}, {y}], which is not in a picture of {width}x{height}");
+                return Err(self.refuse(KEY, polygon, problem));
+            }
+            polygons.push(corners.iter().map(|c| DVec2::from_array(*c)).collect());
+        }
+        let mask = Mask::of_polygons(&polygons, (width as u32, height as u32));
+        match (own_ship.hidden_px.first(), mask.map(|mask| mask.share())) {
+            (Some(first), Some(share)) if share > SHARE_MOST => {
+                let problem =
+                    format!("hides {:.0} % of the picture: too little is left to see", share * 100.0);
+                Err(self.refuse(KEY, first, problem))
+            }
+            (Some(first), None) => Err(self.refuse(KEY, first, "hides nothing: its polygons have no area")),
+            _ => Ok(polygons),
+        }
     }
 
     /// Readout time and its deviation, nanoseconds; without the section all rows are exposed at once.

@@ -18,6 +18,7 @@ pub fn to_toml(file: &CalibrationFile) -> String {
     let _ = boresight(&mut out, file);
     let _ = trigger(&mut out, file);
     let _ = gyro_bias(&mut out, file);
+    let _ = own_ship(&mut out, file);
     out
 }
 
@@ -90,6 +91,19 @@ fn shutter(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
     writeln!(out, "readout_ms = {:?}", ms(file.calibration.readout_ns))?;
     writeln!(out, "sigma_ms = {:?}", ms(file.calibration.readout_sigma_ns))?;
     provenance(out, shutter)
+}
+
+fn own_ship(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
+    if file.own_ship.is_empty() {
+        return Ok(());
+    }
+    section(
+        out,
+        "own_ship",
+        "What of the picture shows the own gun or ship: polygons of [x, y] in pixels from the upper left corner.",
+    )?;
+    let corners = |polygon: &Vec<DVec2>| polygon.iter().map(|c| c.to_array()).collect::<Vec<_>>();
+    writeln!(out, "hidden_px = {:?}", file.own_ship.iter().map(corners).collect::<Vec<_>>())
 }
 
 fn boresight(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {

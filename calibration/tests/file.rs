@@ -46,6 +46,8 @@ fn the_example_means_what_it_says() {
     assert_eq!(file.lens.measured, Date::new(2026, 11, 18).unwrap());
     assert_eq!(c.lens.centre, DVec2::new(641.7, 358.2));
     assert_eq!(c.time_offset_ns, -3_200_000);
+    assert_eq!(file.own_ship[0][1], DVec2::new(420.0, 560.0));
+    assert!((0.05..0.08).contains(&file.own_ship_mask().unwrap().share()));
     assert!((c.gyro_bias.z - 0.021_f64.to_radians()).abs() < 1e-15);
     assert!((c.camera_from_imu_sigma.x - 0.7e-3).abs() < 1e-15);
     // What the unit feels ahead (its x) lies ahead in the camera (its z), what it feels below (its z) below (y).
@@ -81,6 +83,16 @@ fn mistakes_are_refused_with_their_place() {
         ("[gyro_bias]", "[gyro_bias", "40:", ""),
         ("[gyro_bias]", "[gyro_bais]", "40:", "gyro_bais"),
         ("bias_deg_per_s = [0.012, -0.004, 0.021]\n", "", "40:", "bias_deg_per_s"),
+        (", [430.0, 720.0], [0.0, 720.0]]", "]", "49:14", "polygon of 2 corners"),
+        ("[420.0, 560.0]", "[1420.0, 560.0]", "49:14", "not in a picture of 1280x720"),
+        ("[420.0, 560.0]", "[nan, 560.0]", "49:14", "not in a picture"),
+        ("[420.0, 560.0], [430.0, 720.0]", "[0.0, 700.0]", "49:14", "hides nothing"),
+        (
+            "[[0.0, 640.0], [420.0, 560.0], [430.0, 720.0], [0.0, 720.0]]",
+            "[[0.0, 0.0], [1280.0, 0.0], [1280.0, 700.0], [0.0, 700.0]]",
+            "49:14",
+            "hides 9",
+        ),
     ];
     for (from, to, place, says) in cases {
         assert!(EXAMPLE.contains(from), "{from}");
@@ -253,14 +265,18 @@ prop_compose! {
         texts in [text(20), text(20), text(20), text(20), text(20)],
         sections in [provenance(), provenance(), provenance(), provenance(), provenance(), provenance(), provenance()],
         calibration in calibration(),
+        hidden in prop::option::of(0.2f64..1.0),
     ) -> CalibrationFile {
         let [source, camera_name, camera_serial, imu_name, imu_serial] = texts;
         let [lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias] = sections;
         let shutter = (calibration.readout_sigma_ns > 0).then_some(shutter);
         let trigger = calibration.trigger.map(|_| trigger);
+        let size = DVec2::new(f64::from(calibration.lens.width), f64::from(calibration.lens.height));
+        let corner = |share: f64| vec![DVec2::ZERO, DVec2::new(size.x * share, 0.0), DVec2::new(0.0, size.y)];
+        let own_ship = hidden.map(corner).into_iter().collect();
         CalibrationFile {
             made, source, camera_name, camera_serial, imu_name, imu_serial,
-            lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias, calibration,
+            lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias, own_ship, calibration,
         }
     }
 }

@@ -7,11 +7,12 @@ use std::sync::Arc;
 
 use bowwave_core::{
     attitude::Source,
-    event::PixelFormat,
+    event::{Event, Picture, PixelFormat},
+    horizon::Mask,
     scenario::Scenario,
     session::{SensorCounts, Session, Setup},
 };
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use hw_sim::{
     make::{GunMotion, Periodic, Recipe, make},
     replay::{Replay, ReplayOptions},
@@ -38,9 +39,28 @@ fn recipe() -> Recipe {
 const SECONDS: i64 = 60;
 const SETTLED: i64 = 25;
 
+/// What is in the pictures beside the recording.
+#[derive(Default)]
+struct Sight {
+    /// A rail of the own ship, rows from the top.
+    rail: std::ops::Range<usize>,
+    mask: Option<Mask>,
+}
+
+impl Sight {
+    /// Draws the rail.
+    fn draw(&self, event: &mut Event) {
+        let Event::Frame(frame) = event else { return };
+        let (width, height) = (frame.picture.width(), frame.picture.height());
+        let mut bytes = frame.picture.bytes().to_vec();
+        bytes[self.rail.start * width as usize * 3..self.rail.end * width as usize * 3].fill(15);
+        frame.picture = Picture::new(PixelFormat::Rgb, width, height, bytes.into()).unwrap();
+    }
+}
+
 /// By what up and heading were wrong in the pictures after it has settled, degrees; the gyro has a bias of `drift` deg/s about the vertical
 /// that the calibration does not know.
-fn played(recipe: &Recipe, drift: f64) -> (Vec<(f64, f64)>, SensorCounts) {
+fn played(recipe: &Recipe, drift: f64, sight: &Sight) -> (Vec<(f64, f64)>, SensorCounts) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("level.mcap");
     make(recipe, &path, &mut |_, _| {}).unwrap();
@@ -66,6 +86,7 @@ fn played(recipe: &Recipe, drift: f64) -> (Vec<(f64, f64)>, SensorCounts) {
         video: PixelFormat::Rgb,
         orientation: Source::Fused,
         heading: bowwave_core::session::HeadingSettings::default(),
+        own_ship: sight.mask.clone(),
     })
     .unwrap();
     let mut events = Vec::new();
@@ -74,6 +95,7 @@ fn played(recipe: &Recipe, drift: f64) -> (Vec<(f64, f64)>, SensorCounts) {
         let time = replay.origin().plus_ns(frame * FRAME_NS);
         events.clear();
         replay.collect(time, &mut events).unwrap();
+        events.iter_mut().for_each(|event| sight.draw(event));
         let Some(view) = session.step(&events, time).view else { continue };
         let truth = replay.truth_at(view.mid_exposure).unwrap().world_from_camera;
         if view.pose_known && frame > SETTLED * 10 {
@@ -88,7 +110,7 @@ fn played(recipe: &Recipe, drift: f64) -> (Vec<(f64, f64)>, SensorCounts) {
 
 #[test]
 fn up_comes_from_the_horizon_in_the_picture() {
-    let (errors, counts) = played(&recipe(), 0.0);
+    let (errors, counts) = played(&recipe(), 0.0, &Sight::default());
     let (count, horizons) = (errors.len() as f64, counts.horizons);
     let rms = (errors.iter().map(|e| e.0 * e.0).sum::<f64>() / count.max(1.0)).sqrt();
     let worst = errors.iter().map(|e| e.0).fold(0.0, f64::max);
@@ -99,7 +121,8 @@ fn up_comes_from_the_horizon_in_the_picture() {
 
 #[test]
 fn heading_is_held_by_the_sky_in_the_picture() {
-    let (errors, counts) = played(&Recipe { duration_s: SECONDS as f64 + 1.0, ..recipe() }, 0.05);
+    let (errors, counts) =
+        played(&Recipe { duration_s: SECONDS as f64 + 1.0, ..recipe() }, 0.05, &Sight::default());
     let headings = || errors.iter().map(|e| e.1);
     let (first, last) = (headings().next().unwrap(), headings().next_back().unwrap());
     let swing = headings().fold(f64::MIN, f64::max) - headings().fold(f64::MAX, f64::min);
@@ -110,4 +133,24 @@ fn heading_is_held_by_the_sky_in_the_picture() {
     // The gyro alone would drift by 1.75 degrees.
     assert!(counts.skyline.taken > 400 && counts.skyline.refused < 40, "{:?}", counts.skyline);
     assert!((last - first).abs() < 0.4 && swing < 0.4, "{first:.3} to {last:.3}, {swing:.3}");
+}
+
+/// A dark rail just below the horizon, straight and sharper than it.
+#[test]
+fn a_rail_of_the_own_ship_is_no_horizon_where_it_is_hidden() {
+    let rail = 118..130;
+    let corner = |x: f64, y: usize| DVec2::new(x, y as f64);
+    let (top, bottom) = (rail.start - 3, rail.end + 3);
+    let polygon = vec![corner(0.0, top), corner(480.0, top), corner(480.0, bottom), corner(0.0, bottom)];
+    let mask = Mask::of_polygons(&[polygon], (480, 270));
+    let of = |mask| {
+        let (errors, counts) = played(&recipe(), 0.0, &Sight { rail: rail.clone(), mask });
+        let square = errors.iter().map(|e| e.0 * e.0).sum::<f64>();
+        ((square / errors.len() as f64).sqrt(), counts.horizons)
+    };
+    let ((seen, seen_counts), (hidden, hidden_counts)) = (of(None), of(mask));
+    println!(
+        "up errs by {seen:.3} deg rms with the rail in view, {seen_counts:?}; {hidden:.3} with it hidden, {hidden_counts:?}"
+    );
+    assert!(hidden < 0.2 && seen > 10.0 * hidden, "{seen:.3} in view, {hidden:.3} hidden");
 }

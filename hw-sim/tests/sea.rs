@@ -57,6 +57,7 @@ fn watched(path: &Path, seconds: i64, scenario: &str) -> Vec<(SeaReport, DVec2, 
         video: PixelFormat::Rgb,
         orientation: Source::Auto,
         heading: bowwave_core::session::HeadingSettings::default(),
+        own_ship: None,
     })
     .unwrap();
     let (mut events, mut known) = (Vec::new(), Vec::new());

@@ -315,7 +315,7 @@ pub struct DoctorImu {
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
     /// How long to listen; all usual rates are tried within 4 s
-    #[arg(long, value_name = "SECONDS", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=600))]
+    #[arg(long, value_name = "SECONDS", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=600))]
     pub seconds: u32,
     /// Print as JSON
     #[arg(long)]

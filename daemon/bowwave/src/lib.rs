@@ -23,6 +23,7 @@ mod simulate;
 mod stats;
 mod stdout;
 mod study;
+mod unit_clock;
 
 use std::process::ExitCode;
 

@@ -102,6 +102,7 @@ fn session_with(text: &str, calibration: Calibration) -> Session {
         video: PixelFormat::Rgb,
         orientation: Source::Auto,
         heading: bowwave_core::session::HeadingSettings::default(),
+        own_ship: None,
     })
     .expect("every boat has a model")
 }

@@ -166,6 +166,7 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
         video: PixelFormat::Rgb,
         orientation: how.source,
         heading: bowwave_core::session::HeadingSettings::default(),
+        own_ship: None,
     })?;
     let motion = recipe.motion();
     let least = if recipe.gun.traverse.harmonics.is_empty() { 0.0 } else { SWUNG_DEG_S.to_radians() };

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Result;
+use bowwave_core::clock::{ClockReport, DRIFT_MUCH_PPM};
 use bowwave_devices::{
     imu::ImuFormat,
     serial::{self, ImuSettings, ImuStatus, LineStatus},
@@ -39,6 +40,7 @@ pub(super) fn checks(arguments: &DoctorImu) -> Result<Vec<Check>> {
         };
         checks.push(check("output", verdict, status.fields.to_string()));
         checks.push(check("timing", Verdict::Ok, timing(status)));
+        checks.push(clock(status));
     }
     checks.push(check("line", Verdict::Ok, line(status)));
     Ok(checks)
@@ -70,6 +72,40 @@ fn timing(status: &ImuStatus) -> String {
         "a sample every {:.2} ms by the unit's time; arrivals up to {:.1} ms apart (99 %), {:.2} ms off in the median; {} \
          samples missing",
         t.period_ms, t.gap_p99_ms, t.jitter_p50_ms, status.counters.lost_samples
+    )
+}
+
+/// How the unit's clock does, and what to do where it does badly.
+fn clock(status: &ImuStatus) -> Check {
+    if !status.fields.clock {
+        let found = "the unit tells no time: its samples are timed by their own beat";
+        return check("clock", Verdict::Ok, found);
+    }
+    let Some(clock) = status.clock else {
+        return check("clock", Verdict::Ok, "too short to tell its drift (--seconds 20)");
+    };
+    let verdict = if clock.is_bad() { Verdict::Warning } else { Verdict::Ok };
+    let advice = if clock.drift_ppm.abs() > DRIFT_MUCH_PPM {
+        "; no crystal drifts as much: is its clock set to follow another one?"
+    } else if clock.is_bad() {
+        "; set the adapter's latency timer to 1 ms, and look for what holds the line up"
+    } else {
+        ""
+    };
+    check("clock", verdict, format!("{}{advice}", in_words(&clock)))
+}
+
+/// A clock's report for people.
+fn in_words(clock: &ClockReport) -> String {
+    format!(
+        "{:+.1} ppm against this computer (sigma {:.1}); mapped times jitter by {:.3} ms (1 sigma), {:.3} ms at most, arrivals by \
+         {:.2} ms; {} restarts",
+        clock.drift_ppm,
+        clock.drift_sigma_ppm,
+        clock.jitter_s * 1e3,
+        clock.jitter_max_s * 1e3,
+        clock.arrival_jitter_s * 1e3,
+        clock.restarts
     )
 }
 
@@ -132,6 +168,38 @@ mod tests {
         let strange = unit(&ImuStatus { counters, ..silent });
         assert!(strange.contains("none of VectorNav binary") && strange.contains("Witmotion"), "{strange}");
         assert!(line(&ImuStatus { counters, ..status() }).contains("900 bytes of no packet"));
+    }
+
+    #[test]
+    fn a_clock_is_told_and_warned_of() {
+        let good = ClockReport {
+            drift_ppm: 35.04,
+            drift_sigma_ppm: 0.2,
+            jitter_s: 7e-6,
+            jitter_max_s: 3e-5,
+            arrival_jitter_s: 1.6e-3,
+            restarts: 0,
+        };
+        let of = |report| {
+            let fields = Fields { clock: true, ..Fields::default() };
+            clock(&ImuStatus { fields, clock: report, ..status() })
+        };
+        let told = of(Some(good));
+        assert_eq!(told.verdict, Verdict::Ok);
+        assert!(
+            told.found
+                .starts_with("+35.0 ppm against this computer (sigma 0.2); mapped times jitter by 0.007 ms")
+        );
+        let fast = of(Some(ClockReport { drift_ppm: -300.0, ..good }));
+        assert!(fast.verdict == Verdict::Warning && fast.found.contains("no crystal"), "{}", fast.found);
+        let shaken = of(Some(ClockReport { jitter_s: 1e-3, ..good }));
+        assert!(
+            shaken.verdict == Verdict::Warning && shaken.found.contains("latency timer"),
+            "{}",
+            shaken.found
+        );
+        assert!(of(None).found.contains("too short"));
+        assert!(clock(&status()).found.contains("tells no time"));
     }
 
     #[test]

@@ -73,6 +73,7 @@ impl Reader {
         let config = self.config(&mut refuse);
         let calibration = self.calibration(&config, &mut refuse);
         let (scenario, scenario_toml, models, boat_models) = self.scenario(&config, &mut refuse)?;
+        let own_ship = calibration.as_ref().and_then(|c| c.value.own_ship_mask());
         let (calibration, calibration_toml, camera_serial) = match calibration {
             Some(c) => (c.value.calibration, c.text, c.value.camera_serial),
             None => (uncalibrated(&config), String::new(), String::new()),
@@ -86,6 +87,7 @@ impl Reader {
             video: PixelFormat::Yuyv,
             orientation: config.orientation,
             heading: config.heading.settings.clone(),
+            own_ship,
         };
         Ok(Settings { config, setup, camera_serial, calibration_toml, scenario_toml, faults })
     }

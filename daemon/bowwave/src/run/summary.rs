@@ -18,6 +18,7 @@ use crate::{
     output::Done,
     sea::SeaSummary,
     stats::{Percentiles, Samples},
+    unit_clock::ClockSummary,
 };
 
 /// What the loop counts.
@@ -115,6 +116,7 @@ impl Tally {
             counts,
             sea: session.sea().map(SeaSummary::from),
             heading: HeadingSummary::of(session),
+            unit_clock: session.unit_clock().map(ClockSummary::from),
         }
     }
 }
@@ -150,6 +152,8 @@ pub struct Summary {
     pub sea: Option<SeaSummary>,
     /// How well the heading was known at the end, and what told it; null where it never was.
     pub heading: Option<HeadingSummary>,
+    /// How the inertial unit's clock did; null where that could not be told.
+    pub unit_clock: Option<ClockSummary>,
 }
 
 impl Summary {

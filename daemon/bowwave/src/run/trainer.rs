@@ -32,13 +32,15 @@ use super::{
     starts::Mode,
     summary::{Summary, Tally},
 };
-use crate::{headings::HeadingLog, output::UserEvent, sea::SeaLog};
+use crate::{headings::HeadingLog, output::UserEvent, sea::SeaLog, unit_clock::ClockLog};
 
 /// Time between ticks, nanoseconds.
 const PERIOD_NS: i64 = NS_PER_S / FRAMES_PER_S;
 /// So often within a minute the GPU may be lost before the program ends: the driver needs a fresh process then.
 const LOSSES_MAX: usize = 3;
 const LOSSES_WINDOW_NS: i64 = 60 * NS_PER_S;
+/// The unit's clock is looked at once in so many frames: ten seconds.
+const CLOCK_FRAMES: u64 = 300;
 /// How long the end waits for its last frame to be seen.
 const FAREWELL: Duration = Duration::from_millis(120);
 
@@ -102,6 +104,7 @@ pub struct Trainer {
     tally: Tally,
     sea: SeaLog,
     headings: HeadingLog,
+    unit_clock: ClockLog,
 }
 
 impl Trainer {
@@ -170,6 +173,7 @@ impl Trainer {
             tally: Tally::default(),
             sea: SeaLog::default(),
             headings: HeadingLog::default(),
+            unit_clock: ClockLog::default(),
         })
     }
 
@@ -313,6 +317,9 @@ impl Trainer {
             self.sea.follow(&report);
         }
         self.headings.follow(self.session.heading_sigma(), &self.session.sensor_counts().headings);
+        if self.tally.frames.is_multiple_of(CLOCK_FRAMES) {
+            self.unit_clock.follow(self.session.unit_clock());
+        }
         if !announced {
             return Err(self.stage_error());
         }

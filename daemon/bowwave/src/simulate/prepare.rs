@@ -75,6 +75,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
         duration_ns,
         setup: Setup {
             scenario,
+            own_ship: calibration.own_ship_mask(),
             calibration: calibration.calibration,
             models: models.into(),
             boat_models,

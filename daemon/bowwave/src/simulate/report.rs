@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     cli::Simulate, outcome::Outcome, resident::memory_mb, sea::SeaSummary, stats::Percentiles, stdout,
+    unit_clock::ClockSummary,
 };
 
 fn hex(bytes: &[u8]) -> String {
@@ -66,6 +67,7 @@ impl Finished {
             counts,
             sea: self.sea.map(SeaSummary::from),
             heading: self.heading,
+            unit_clock: self.unit_clock.map(ClockSummary::from),
         }
     }
 

@@ -13,6 +13,7 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
+    clock::ClockReport,
     event::{Event, Mark, MarkKind, Picture},
     geometry::CameraPose,
     pacing::{FRAMES_PER_S, Pacer},
@@ -39,6 +40,7 @@ use crate::{
     recorder::Recorder,
     sea::SeaLog,
     stats::Samples,
+    unit_clock::ClockLog,
 };
 
 /// A tick comes this long after a picture's arrival: pictures that come a little late still make it.
@@ -127,6 +129,8 @@ pub struct Finished {
     pub sensors: SensorCounts,
     /// The heading at the end.
     pub heading: Option<HeadingSummary>,
+    /// How the unit's clock did.
+    pub unit_clock: Option<ClockReport>,
     /// Vulkan device and driver.
     pub device: String,
     /// Whether frames had deadlines.
@@ -388,7 +392,10 @@ impl Loop {
         let sensors = self.session.sensor_counts();
         let sea = self.session.sea();
         let heading = HeadingSummary::of(&self.session);
+        let unit_clock = self.session.unit_clock();
+        ClockLog::default().follow(unit_clock);
         Ok(Finished {
+            unit_clock,
             heading,
             tally: self.tally,
             output,

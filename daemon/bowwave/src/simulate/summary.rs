@@ -10,6 +10,7 @@ use crate::{
     headings::HeadingSummary,
     sea::SeaSummary,
     stats::{Percentiles, Samples},
+    unit_clock::ClockSummary,
 };
 
 /// The summary of a run, `summary.json`. Times are milliseconds.
@@ -63,6 +64,8 @@ pub struct Summary {
     pub sea: Option<SeaSummary>,
     /// How well the heading was known at the end, and what told it; null where it never was.
     pub heading: Option<HeadingSummary>,
+    /// How the inertial unit's clock did; null where that could not be told.
+    pub unit_clock: Option<ClockSummary>,
 }
 
 /// Distances on the screen between where things belong and where they were drawn, pixels.
@@ -136,10 +139,16 @@ impl Summary {
         let registration = self.registration_px.map_or("no truth in this recording".into(), |r| {
             format!("rms {:.2}, p99 {:.2}, max {:.2} px", r.rms, r.p99, r.max)
         });
+        let clock = self.unit_clock.map_or("too short to tell".into(), |c| {
+            format!(
+                "{:+.1} ppm (sigma {:.1}), jitter {:.3} ms, {:.3} at most",
+                c.drift_ppm, c.drift_sigma_ppm, c.jitter_ms, c.jitter_max_ms
+            )
+        });
         let heading =
             self.heading.map_or("not known".into(), |h| format!("±{:.2} deg (1 sigma)", h.sigma_deg));
         format!(
-            "{} frames of {} on {}; {missed}\nframe time     {}\nregistration   {registration}\nheading        {heading}\nrounds         {} fired, {} hit, {} not scored\n",
+            "{} frames of {} on {}; {missed}\nframe time     {}\nregistration   {registration}\nheading        {heading}\nunit's clock   {clock}\nrounds         {} fired, {} hit, {} not scored\n",
             self.frames,
             self.size,
             self.device,

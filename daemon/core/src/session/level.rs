@@ -6,7 +6,7 @@ use crate::{
     attitude::{self, Attitude, UpSeen},
     event::Picture,
     geometry::Lens,
-    horizon::{HorizonFinder, Prior, View},
+    horizon::{HorizonFinder, Mask, Prior, View},
     time::Time,
 };
 
@@ -37,9 +37,12 @@ pub(super) struct Level {
 }
 
 impl Level {
-    pub(super) fn new(eye_height_m: f64) -> Self {
+    /// `mask` hides the own ship.
+    pub(super) fn new(eye_height_m: f64, mask: Option<Mask>) -> Self {
         let (next, counts) = (Time::MIN, HorizonCounts::default());
-        Self { finder: HorizonFinder::new(), eye_height_m, next, counts }
+        let mut finder = HorizonFinder::new();
+        finder.set_mask(mask);
+        Self { finder, eye_height_m, next, counts }
     }
 
     pub(super) const fn counts(&self) -> HorizonCounts {

@@ -16,9 +16,11 @@ use crate::{
     attitude::Source,
     boats::{CourseState, Hull},
     calibration::Calibration,
+    clock::ClockReport,
     event::{Event, Picture, PictureError, PixelFormat, TriggerEdge},
     fault::{Fault, FaultBoard, Severity},
     geometry::{CameraPose, Lens, RigidPose, look},
+    horizon::Mask,
     light::LightMeter,
     model::{Model, ModelId},
     plan::{Needs, ScenePlan, sea_reflects},
@@ -73,6 +75,8 @@ pub struct Setup {
     pub orientation: Source,
     /// What is known of headings beforehand.
     pub heading: HeadingSettings,
+    /// What of the pictures shows the own ship or gun: no horizon and no sky is sought there.
+    pub own_ship: Option<Mask>,
 }
 
 /// Why a session cannot be made.
@@ -167,8 +171,13 @@ impl Session {
         });
         let waves = scenario.wave_field();
         let watch = SeaWatch::of(scenario);
-        let sensors =
-            Sensors::new(&setup.calibration, setup.orientation, &setup.heading, setup.scenario.eye_height_m);
+        let sensors = Sensors::new(
+            &setup.calibration,
+            setup.orientation,
+            &setup.heading,
+            setup.own_ship.as_ref(),
+            setup.scenario.eye_height_m,
+        );
         let weapon = Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt);
         let meter = LightMeter::new(scenario.sun_direction, scenario.water.method);
         let scene = Scene {
@@ -226,6 +235,11 @@ impl Session {
     /// What was wrong with the sensors so far.
     pub fn sensor_counts(&self) -> SensorCounts {
         self.sensors.counts()
+    }
+
+    /// How the inertial unit's clock does; `None` before that can be told.
+    pub fn unit_clock(&self) -> Option<ClockReport> {
+        self.sensors.clock()
     }
 
     /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.

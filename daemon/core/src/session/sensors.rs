@@ -10,9 +10,10 @@ use super::{
 use crate::{
     attitude::{Attitude, AttitudeSettings, Source},
     calibration::Calibration,
-    clock::ClockMap,
+    clock::{ClockMap, ClockReport},
     event::{CameraFrame, ImuSample, Mark, ShipSample},
     geometry::Lens,
+    horizon::Mask,
     pose::{NoPose, OrientationAt, STALE_NS},
     scene::Status,
     time::Time,
@@ -67,11 +68,13 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Sensors with that calibration, `eye_height_m` above the sea, that have reported nothing; orientation is found from `source`.
+    /// Sensors with that calibration, `eye_height_m` above the sea, that have reported nothing; orientation is found from `source`, `mask`
+    /// hides the own ship in the pictures.
     pub fn new(
         calibration: &Calibration,
         source: Source,
         heading: &HeadingSettings,
+        mask: Option<&Mask>,
         eye_height_m: f64,
     ) -> Self {
         let mut settings = AttitudeSettings::new(source, calibration);
@@ -80,8 +83,8 @@ impl Sensors {
             time_offset_ns: calibration.time_offset_ns,
             readout_ns: calibration.readout_ns,
             lens: calibration.lens,
-            level: Level::new(eye_height_m),
-            steady: Steady::new(eye_height_m, calibration.time_offset_sigma_ns as f64 * 1e-9),
+            level: Level::new(eye_height_m, mask.cloned()),
+            steady: Steady::new(eye_height_m, calibration.time_offset_sigma_ns as f64 * 1e-9, mask.cloned()),
             aid: Aid::new(heading.clone()),
             clock: ClockMap::new(),
             attitude: Attitude::new(settings, calibration.gyro_bias, calibration.camera_from_imu),
@@ -129,6 +132,11 @@ impl Sensors {
         // Its anchor holds another heading than the one that is now known.
         self.steady.forget();
         self.counts.headings = self.aid.counts();
+    }
+
+    /// How the unit's clock does; `None` before that can be told.
+    pub fn clock(&self) -> Option<ClockReport> {
+        self.clock.report()
     }
 
     /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
@@ -260,7 +268,7 @@ mod tests {
             gyro_bias: DVec3::ZERO,
             gyro_bias_sigma: DVec3::ONE,
         };
-        Sensors::new(&calibration, Source::Auto, &HeadingSettings::default(), 5.0)
+        Sensors::new(&calibration, Source::Auto, &HeadingSettings::default(), None, 5.0)
     }
 
     fn sample(i: i64) -> ImuSample {

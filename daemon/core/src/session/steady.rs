@@ -4,6 +4,7 @@ use crate::{
     attitude::{Attitude, HeadingSeen},
     event::Picture,
     geometry::Lens,
+    horizon::Mask,
     skyline::{SkyView, Skyline},
     time::Time,
 };
@@ -52,10 +53,12 @@ pub(super) struct Steady {
 }
 
 impl Steady {
-    /// Pictures' times are known to `time_sigma_s` seconds.
-    pub(super) fn new(eye_height_m: f64, time_sigma_s: f64) -> Self {
+    /// Pictures' times are known to `time_sigma_s` seconds; `mask` hides the own ship.
+    pub(super) fn new(eye_height_m: f64, time_sigma_s: f64, mask: Option<Mask>) -> Self {
+        let mut skyline = Skyline::new();
+        skyline.set_mask(mask);
         Self {
-            skyline: Skyline::new(),
+            skyline,
             eye_height_m,
             time_sigma_s,
             next: Time::MIN,

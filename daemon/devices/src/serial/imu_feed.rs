@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use bowwave_core::{
+    clock::{ClockMap, ClockReport},
     event::Event,
     fault::{Fault, FaultChange},
     time::Time,
@@ -20,6 +21,9 @@ use crate::{
     report::Reporter,
 };
 
+/// How often the unit's clock is looked at.
+const CLOCK_NS: i64 = 500_000_000;
+
 /// What the unit tells beside its samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ImuReport {
@@ -28,6 +32,7 @@ pub(super) struct ImuReport {
     pub(super) timing: ArrivalTiming,
     pub(super) counters: ImuCounters,
     pub(super) lost_samples: u64,
+    pub(super) clock: Option<ClockReport>,
 }
 
 /// An inertial unit on a line.
@@ -37,6 +42,10 @@ pub(super) struct ImuFeed {
     insane: bool,
     arrivals: Arrivals,
     late: bool,
+    clock: ClockMap,
+    reported: Option<ClockReport>,
+    /// When that was.
+    looked: Time,
 }
 
 impl ImuFeed {
@@ -47,6 +56,9 @@ impl ImuFeed {
             insane: false,
             arrivals: Arrivals::late_above(settings.late),
             late: false,
+            clock: ClockMap::new(),
+            reported: None,
+            looked: Time::MIN,
         }
     }
 }
@@ -58,10 +70,11 @@ impl Feed for ImuFeed {
 
     fn take(&mut self, bytes: &[u8], arrival: Time, queue: &mut NewestSender<Event>) -> u64 {
         let before = self.decoder.counters();
-        let Self { decoder, sanity, arrivals, .. } = self;
+        let Self { decoder, sanity, arrivals, clock, .. } = self;
         decoder.push(bytes, arrival, |sample| {
             sanity.sample(&sample);
             arrivals.sample(&sample);
+            clock.observe(sample.device_time_ns, sample.arrival);
             queue.send(Event::Imu(sample));
         });
         let after = self.decoder.counters();
@@ -80,6 +93,7 @@ impl Feed for ImuFeed {
     fn forget(&mut self) {
         self.sanity.forget();
         self.arrivals.forget();
+        self.clock = ClockMap::new();
     }
 
     fn judge(&mut self, path: &Path, now: Time, reporter: &Reporter) {
@@ -107,6 +121,10 @@ impl Feed for ImuFeed {
             reporter.send(FaultChange::cleared(now, Fault::ImuLatency));
         }
         self.late = late;
+        if now.ns_since(self.looked) >= CLOCK_NS {
+            self.looked = now;
+            self.reported = self.clock.report();
+        }
     }
 
     fn status(&self) -> ImuReport {
@@ -116,6 +134,7 @@ impl Feed for ImuFeed {
             timing: self.arrivals.timing(),
             counters: self.decoder.counters(),
             lost_samples: self.arrivals.lost(),
+            clock: self.reported,
         }
     }
 }

@@ -25,7 +25,7 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::{event::Event, fault::Fault};
+use bowwave_core::{clock::ClockReport, event::Event, fault::Fault};
 use crossbeam_channel::Receiver;
 use serialport::SerialPortType;
 
@@ -367,6 +367,8 @@ pub struct ImuStatus {
     pub low_latency: LowLatency,
     /// How evenly samples arrive.
     pub timing: ArrivalTiming,
+    /// How the unit's clock does; absent before that can be told.
+    pub clock: Option<ClockReport>,
     /// What was carried so far.
     pub counters: PortCounters,
 }
@@ -418,6 +420,7 @@ impl ImuPort {
             fields: said.fields,
             low_latency: line.low_latency,
             timing: said.timing,
+            clock: said.clock,
             counters,
         }
     }

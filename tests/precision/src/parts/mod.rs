@@ -10,6 +10,7 @@ mod drawn;
 mod flight;
 mod fresnel;
 mod fusion;
+mod heading;
 mod horizon;
 mod lens;
 mod motion;
@@ -56,6 +57,7 @@ pub const PARTS: &[Part] = &[
     Part { about: attitude::ABOUT, measure: attitude::measure },
     Part { about: orientation::ABOUT, measure: orientation::measure },
     Part { about: fusion::ABOUT, measure: fusion::measure },
+    Part { about: heading::ABOUT, measure: heading::measure },
     Part { about: horizon::ABOUT, measure: horizon::measure },
     Part { about: skyline::ABOUT, measure: skyline::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
