@@ -14,7 +14,7 @@ use bowwave_core::{
     event::PixelFormat,
     geometry::Lens,
     scenario::Scenario,
-    session::{Session, Setup},
+    session::{HeadingSettings, Session, Setup},
 };
 use glam::{DQuat, DVec2, DVec3};
 use hw_sim::{
@@ -30,6 +30,9 @@ const FRAME_RATE_HZ: f64 = 10.0;
 const SETTLED_S: f64 = 25.0;
 /// Frames of a swing count while the camera turns at least so fast, deg/s.
 const SWUNG_DEG_S: f64 = 32.0;
+
+/// A sky that is said to stand, as before a pier: the recordings' does, rad/s.
+pub const SKY_STANDS: f64 = 0.0005 * std::f64::consts::PI / 180.0;
 
 /// How the gun moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -101,7 +104,8 @@ impl Moved {
 pub struct Errors {
     /// As drawn.
     pub whole: Vec<f64>,
-    /// With the error of the first heading taken off all that follow: what an aid at the start leaves.
+    /// With the error of the first heading taken off all that follow: what is left where the heading is set at the start and the sky, which
+    /// is anchored in then, holds it.
     pub aided: Vec<f64>,
     /// With each picture's own error of heading taken off: inclination alone.
     pub up: Vec<f64>,
@@ -134,6 +138,8 @@ pub struct Replayed {
     pub source: Source,
     /// With the recording's own calibration, else with one that errs by its deviations.
     pub exact: bool,
+    /// By how much the sky is said to turn itself, rad/s; absent: as is usual.
+    pub sky_drift: Option<f64>,
     /// Without the shutter's readout.
     pub shutter_unknown: bool,
     /// For so long.
@@ -157,6 +163,7 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
     }
     let lens = calibration.lens;
     let scenario = format!("[mount]\neye_height_m = {:?}\n", recipe.eye_height_m);
+    let usual = HeadingSettings::default();
     let mut session = Session::new(Setup {
         scenario: Scenario::parse(&scenario, "registration")?,
         calibration,
@@ -165,7 +172,7 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
         screen: (lens.width, lens.height),
         video: PixelFormat::Rgb,
         orientation: how.source,
-        heading: bowwave_core::session::HeadingSettings::default(),
+        heading: HeadingSettings { sky_drift: how.sky_drift.unwrap_or(usual.sky_drift), ..usual },
         own_ship: None,
     })?;
     let motion = recipe.motion();

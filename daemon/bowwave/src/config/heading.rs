@@ -58,6 +58,7 @@ struct RawLandmark {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RawHeading {
     growth_deg_per_h: Option<Spanned<f64>>,
+    sky_drift_deg_per_h: Option<Spanned<f64>>,
     shown_above_deg: Option<Spanned<f64>>,
 }
 
@@ -98,6 +99,11 @@ impl RawHeadings {
         let growth =
             source.number(self.heading.growth_deg_per_h, "heading.growth_deg_per_h", 0.0..=3600.0)?;
         choice.settings.own_growth = growth.map(|g| g.to_radians() / 3600.0);
+        let drift =
+            source.number(self.heading.sky_drift_deg_per_h, "heading.sky_drift_deg_per_h", 0.0..=3600.0)?;
+        if let Some(deg) = drift {
+            choice.settings.sky_drift = deg.to_radians() / 3600.0;
+        }
         if let Some(deg) =
             source.number(self.heading.shown_above_deg, "heading.shown_above_deg", 0.0..=180.0)?
         {

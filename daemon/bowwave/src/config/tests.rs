@@ -61,6 +61,7 @@ fn every_key_is_read() {
         input = { chip = "/dev/gpiochip0", line = 9 }
         [heading]
         growth_deg_per_h = 36
+        sky_drift_deg_per_h = 1.8
         shown_above_deg = 0.4
         [trigger]
         chip = "/dev/gpiochip0"
@@ -126,6 +127,7 @@ fn every_key_is_read() {
         [(41.3, 0.2), (127.0, 0.3)].map(|(b, s): (f64, f64)| (b.to_radians(), s.to_radians()))
     );
     assert_eq!((s.own_growth, s.shown_above), (Some(36f64.to_radians() / 3600.0), 0.4f64.to_radians()));
+    assert_eq!(s.sky_drift, 1.8f64.to_radians() / 3600.0);
     let rezero = Press { line: line("/dev/gpiochip0", "rezero", true, Bias::AsIs), kind: MarkKind::Stow };
     let landmark = Press { line: line("/dev/gpiochip0", "9", false, Bias::AsIs), kind: MarkKind::Landmark };
     assert_eq!(heading.presses, [rezero, landmark]);

@@ -12,6 +12,7 @@ use std::{
 
 use glam::{DQuat, DVec3};
 
+use super::steady::SKY_DRIFT;
 use crate::{
     attitude::{Attitude, HeadingSeen},
     event::{MarkKind, ShipSample},
@@ -51,6 +52,8 @@ pub struct HeadingSettings {
     pub landmarks: Vec<Landmark>,
     /// By how much the deviation of the heading of a unit's own orientation grows, rad/s; absent: as units do without a compass.
     pub own_growth: Option<f64>,
+    /// By how much sky line and clouds may turn themselves (one standard deviation), rad/s.
+    pub sky_drift: f64,
     /// The display tells the heading's deviation above this, radians.
     pub shown_above: f64,
 }
@@ -63,6 +66,7 @@ impl Default for HeadingSettings {
             stow: None,
             landmarks: Vec::new(),
             own_growth: None,
+            sky_drift: SKY_DRIFT,
             shown_above: 1f64.to_radians(),
         }
     }

@@ -84,7 +84,12 @@ impl Sensors {
             readout_ns: calibration.readout_ns,
             lens: calibration.lens,
             level: Level::new(eye_height_m, mask.cloned()),
-            steady: Steady::new(eye_height_m, calibration.time_offset_sigma_ns as f64 * 1e-9, mask.cloned()),
+            steady: Steady::new(
+                eye_height_m,
+                calibration.time_offset_sigma_ns as f64 * 1e-9,
+                heading.sky_drift,
+                mask.cloned(),
+            ),
             aid: Aid::new(heading.clone()),
             clock: ClockMap::new(),
             attitude: Attitude::new(settings, calibration.gyro_bias, calibration.camera_from_imu),

@@ -12,9 +12,9 @@ use crate::{
 /// The sky is looked at so often: at 60 deg/s nine tenths of it are still in view.
 const EVERY_NS: i64 = 100_000_000;
 
-/// What is anchored in turns by so much itself, as clouds do and as a ship with little way on sees it, rad/s. Ten knots abeam of what is 10 km
-/// off are six times as much. With as much as that a made recording's heading was held no better than by its gyro.
-const DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
+/// What is anchored in may turn by so much itself, as clouds do and as a ship with little way on sees it, rad/s. Ten knots abeam of what is
+/// 10 km off are six times as much. Where a gyro's bias is known better than this, the sky holds the heading little better than the gyro.
+pub const SKY_DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
 
 /// By how much the change of the believed orientation since the last look is wrong at rest, about any axis, radians.
 const CHANGE_SIGMA: f64 = 2e-3;
@@ -47,20 +47,22 @@ pub(super) struct Steady {
     skyline: Skyline,
     eye_height_m: f64,
     time_sigma_s: f64,
+    drift: f64,
     next: Time,
     refused_in_a_row: u32,
     counts: SkylineCounts,
 }
 
 impl Steady {
-    /// Pictures' times are known to `time_sigma_s` seconds; `mask` hides the own ship.
-    pub(super) fn new(eye_height_m: f64, time_sigma_s: f64, mask: Option<Mask>) -> Self {
+    /// Pictures' times are known to `time_sigma_s` seconds; the sky may turn by `drift` rad/s; `mask` hides the own ship.
+    pub(super) fn new(eye_height_m: f64, time_sigma_s: f64, drift: f64, mask: Option<Mask>) -> Self {
         let mut skyline = Skyline::new();
         skyline.set_mask(mask);
         Self {
             skyline,
             eye_height_m,
             time_sigma_s,
+            drift,
             next: Time::MIN,
             refused_in_a_row: 0,
             counts: SkylineCounts::default(),
@@ -100,7 +102,7 @@ impl Steady {
         if yaw.is_anchor() {
             self.counts.anchors += 1;
             self.refused_in_a_row = 0;
-            attitude.anchor_heading(DRIFT);
+            attitude.anchor_heading(self.drift);
             return;
         }
         let variance = yaw.sigma * yaw.sigma + late * late;

@@ -84,7 +84,13 @@ fn truth(format: ImuFormat, motion: Motion, n: i64) -> ImuSample {
 /// Worst errors through a motion, radians: where the camera looks and how its picture is turned, both at samples and halfway between.
 fn worst(format: ImuFormat, motion: Motion, source: Source) -> [f64; 2] {
     let inclination = Settings::GUN;
-    let settings = AttitudeSettings { source, rate: RateKind::Instant, inclination, noise: Noise::USUAL };
+    let settings = AttitudeSettings {
+        source,
+        rate: RateKind::Instant,
+        inclination,
+        noise: Noise::USUAL,
+        own_growth: 0.0,
+    };
     let mut attitude = Attitude::new(settings, DVec3::ZERO, CAMERA_FROM_IMU);
     let mut decoder = ImuDecoder::fixed(format);
     let (mut worst, mut compared, mut heading) = ([0.0f64; 2], 0, None);

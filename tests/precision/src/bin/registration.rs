@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use bowwave_core::attitude::Source;
 use clap::Parser;
-use precision::registration::{Moved, Replayed, record, replay, summary};
+use precision::registration::{Moved, Replayed, SKY_STANDS, record, replay, summary};
 
 /// Makes recordings, replays them and lists how far off things far away are drawn, in pixels of 1920 over 60 deg.
 #[derive(Debug, Parser)]
@@ -24,18 +24,23 @@ fn run(arguments: &Arguments) -> Result<()> {
     );
     println!(
         "{:12} {:12} {:12} {:>15} {:>15} {:>15}",
-        "gun", "orientation", "calibration", "as drawn", "heading aided", "up alone"
+        "gun", "orientation", "calibration", "as drawn", "from its start", "up alone"
     );
     let folder = tempfile::tempdir()?;
     for moved in Moved::ALL {
         let recipe = moved.recipe(arguments.width);
         let path = folder.path().join("registration.mcap");
         record(&recipe, &path)?;
-        for (source, orientation) in [(Source::Auto, "unit's own"), (Source::Fused, "fused")] {
+        for (source, sky_drift, orientation) in [
+            (Source::Auto, None, "unit's own"),
+            (Source::Fused, None, "fused"),
+            (Source::Fused, Some(SKY_STANDS), "sky stands"),
+        ] {
             for (exact, calibration) in [(true, "exact"), (false, "1 sigma off")] {
                 let how = Replayed {
                     source,
                     exact,
+                    sky_drift,
                     shutter_unknown: moved == Moved::RollingUnknown,
                     seconds: arguments.seconds,
                 };
