@@ -19,7 +19,7 @@ use bowwave_core::event::TriggerEdge;
 use bowwave_record::{Entry, RecordingReader, RecordingWriter};
 use bowwave_tests::{bowwave, by_hand, expect_code, traverse_only};
 use glam::{DQuat, DVec3};
-use hw_sim::make;
+use hw_sim::make::{self, Recipe};
 
 struct Folder(tempfile::TempDir);
 

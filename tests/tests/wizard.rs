@@ -9,15 +9,22 @@
 
 use std::{
     fs::{self, File},
-    io::{Read as _, Write as _},
+    io::{BufRead as _, BufReader, Read as _, Write as _},
     path::{Path, PathBuf},
     process::{Command, Output, Stdio},
     sync::OnceLock,
 };
 
 use bowwave_calibration::{CalibrationFile, keep, to_toml};
+use bowwave_core::time::Time;
+use bowwave_record::{Entry, FrameEntry, Properties, RecordingWriter};
 use bowwave_tests::{bowwave, by_hand, expect_code, program, traverse_only};
 use hw_sim::make::{self, Recipe};
+use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
+use precision::target::{
+    draw::{TrueLens, draw},
+    shots::{board, held},
+};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 fn made(recipe: &Recipe, name: &str) -> (tempfile::TempDir, PathBuf) {
@@ -82,7 +89,7 @@ fn a_good_movement_passes_and_is_saved_as_the_recordings_own_command_does() {
     expect_code(&bowwave(["calibrate", "imu", recorded, "--calibration", other.to_str().unwrap()]), 0);
     assert_eq!(CalibrationFile::read(&file).unwrap(), CalibrationFile::read(&other).unwrap());
     assert_eq!(keep::kept(&file).unwrap().len(), 1);
-    assert!(fs::read_to_string(page).unwrap().contains("<b>PASS</b>"));
+    assert!(fs::read_to_string(&page).unwrap().contains("<b>PASS</b>"));
     // The same recording and keys say the same.
     fs::write(&file, to_toml(&make::calibration(&by_hand()))).unwrap();
     assert_eq!(told(&wizard(recording(), "2\n\n\n\n", &further)), said);
@@ -104,6 +111,92 @@ fn traverse_only_names_what_is_missing_and_saves_nothing() {
         assert!(said.contains(words), "'{words}' is missing:\n{said}");
     }
     assert!(!said.contains("usable") && !said.contains(": good") && !out.exists(), "{said}");
+}
+
+/// A small camera before which the board is held in many ways, for two pictures each time.
+#[test]
+fn the_lens_is_found_from_a_board_that_is_led_over_the_picture() {
+    const LENS: TrueLens = TrueLens {
+        size: (640, 360),
+        numbers: [450.0, 452.0, 327.0, 176.0, -0.19, 0.05, 6e-4, -9e-4],
+        fisheye: false,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let (path, out) = (folder.path().join("board.mcap"), folder.path().join("new.toml"));
+    let begun = make::calibration(&Recipe { width: 640, height: 360, ..Recipe::default() });
+    let properties = Properties {
+        calibration_toml: to_toml(&begun),
+        scenario_toml: None,
+        loop_ns: None,
+        start: Time::from_ns(0),
+        source: "test".to_owned(),
+        picture: (640, 360),
+        camera_info: None,
+        extra: [("eye_height_m".to_owned(), "8".to_owned())].into(),
+    };
+    let mut writer = RecordingWriter::create(&path, &properties).unwrap();
+    let directions = LENS.directions();
+    let mut sequence = 0;
+    for shot in held(&LENS, &board(), 18, 0.7, 3) {
+        let drawn = draw(&board(), &LENS, &directions, &shot);
+        let mut jpeg = Vec::new();
+        JpegEncoder::new_with_quality(&mut jpeg, 95)
+            .encode(&drawn.grey, 640, 360, ExtendedColorType::L8)
+            .unwrap();
+        for _ in 0..2 {
+            let time = Time::from_ns(i64::from(sequence) * 100_000_000);
+            let jpeg = jpeg.clone().into();
+            let entry = FrameEntry { arrival: time, mid_exposure: time, sequence, jpeg };
+            writer.write(&Entry::Frame(entry)).unwrap();
+            sequence += 1;
+        }
+    }
+    writer.finish().unwrap();
+    let target = board().to_string();
+    let further = ["camera", "--target", &target, "--out", out.to_str().unwrap()];
+    let output = wizard(&path, "\n\n\n", &further);
+    expect_code(&output, 0);
+    let said = told(&output);
+    for words in
+        ["!! HOLD THE BOARD STILL", "   seen in ", "pictures: 12 of 12 good", "PASS: the lens is", "-> Saved"]
+    {
+        assert!(said.contains(words), "'{words}' is missing:\n{said}");
+    }
+    let found = CalibrationFile::read(&out).unwrap().calibration;
+    let off = (found.lens.focal - glam::DVec2::new(450.0, 452.0)).abs().max_element();
+    assert!(off < 4.0 * found.focal_sigma_px && found.focal_sigma_px < 1.0, "{:?}", found.lens);
+}
+
+/// On a computer without any of the devices.
+#[test]
+fn devices_that_are_not_there_are_said_and_what_was_gathered_is_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("bowwave.toml");
+    fs::write(folder.path().join("gun.toml"), to_toml(&make::calibration(&by_hand()))).unwrap();
+    fs::write(
+        &config,
+        "[screen]\noutput = \"none\"\n[camera]\ndevice = \"/dev/absent\"\n[imu]\ndevice = \"/dev/absent\"\n\
+         [files]\ncalibration = \"gun.toml\"\ndata = \"data\"\n",
+    )
+    .unwrap();
+    let mut child = Command::new(program())
+        .args(["calibrate", "wizard", "imu", "--config", config.to_str().unwrap()])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map(Result::unwrap);
+    let lost = lines.find(|line| line.starts_with("!! "));
+    assert!(lost.as_ref().is_some_and(|l| l.contains("LOST: CHECK THE ")), "{lost:?}");
+    child.stdin.take().unwrap().write_all(b"q\n").unwrap();
+    assert_eq!(lines.last().as_deref(), Some("-> Ended"));
+    let output = child.wait_with_output().unwrap();
+    expect_code(&output, 1);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let kept = said.lines().find_map(|l| l.strip_prefix("what was gathered is kept: bowwave calibrate imu "));
+    let kept = kept.unwrap_or_else(|| panic!("{said}"));
+    assert!(kept.contains("calibrate-imu-") && fs::metadata(kept).is_ok_and(|m| m.len() > 0), "{kept}");
 }
 
 #[test]

@@ -29,7 +29,9 @@ fn fast(mut guided: Guided, player: Player, arguments: &CalibrateWizard) -> Resu
     let mut eyes = guided.eyes(arguments);
     while guided.wizard.step() != Step::Over {
         teller.show(&guided.wizard.guide())?;
-        if let Some(ask) = guided.wizard.ask() {
+        if teller.is_interrupted() {
+            guided.wizard.take(Input::Key(Key::Quit));
+        } else if let Some(ask) = guided.wizard.ask() {
             match ask {
                 Ask::Solve(work) => {
                     let solved = work.run();

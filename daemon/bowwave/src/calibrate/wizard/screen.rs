@@ -113,3 +113,29 @@ impl Screen {
 fn unheard() -> Reporter {
     reporting().0
 }
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::event::PixelFormat;
+
+    use super::*;
+    use crate::run::settings::Reader;
+
+    #[test]
+    fn pages_are_drawn_over_pictures_of_any_layout_and_over_none() {
+        let mut settings = Reader { config: "absent.toml".into(), last_good: None }.read().unwrap();
+        settings.config.gpu = Some("llvmpipe".to_owned());
+        settings.setup.screen = (320, 192);
+        let mut screen = Screen::open(&mut settings, None, false).unwrap();
+        let guide = Guide { title: "Calibrate".to_owned(), says: "Begin".to_owned(), ..Guide::default() };
+        screen.show(guide.clone()).unwrap();
+        for (format, width) in [(PixelFormat::Yuyv, 1280), (PixelFormat::Rgb, 1280), (PixelFormat::Rgb, 640)]
+        {
+            screen.picture(&Picture::black(format, width, 720).unwrap());
+            screen.show(guide.clone()).unwrap();
+        }
+        assert_eq!((screen.frame, screen.is_closed()), (4, false));
+        assert_eq!(screen.session.plan().video, PixelFormat::Rgb);
+        screen.close();
+    }
+}

@@ -2,7 +2,11 @@
 
 use std::{
     fmt::Write as _,
-    io::{self, BufRead as _, IsTerminal as _},
+    io::{self, BufRead as _, IsTerminal as _, Read as _},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
     time::{Duration, Instant},
 };
@@ -22,6 +26,9 @@ const REDRAWN: Duration = Duration::from_millis(200);
 const SQUARES: usize = 20;
 /// Keys that wait.
 const KEYS: usize = 16;
+/// Bytes that a terminal sends for these keys.
+const BACKSPACE: u8 = 0x7f;
+const CONTROL_C: u8 = 3;
 
 /// Where it is told.
 enum Kind {
@@ -39,6 +46,8 @@ pub struct Deaf;
 pub struct Teller {
     kind: Kind,
     keys: Receiver<Key>,
+    /// Control and C were pressed.
+    interrupted: Arc<AtomicBool>,
     shown: Option<Guide>,
 }
 
@@ -46,17 +55,17 @@ impl Teller {
     /// On the terminal where standard input and output are one.
     pub fn new() -> Self {
         let (sender, keys) = bounded(KEYS);
+        let interrupted = Arc::new(AtomicBool::new(false));
         let kind = if io::stdout().is_terminal() && io::stdin().is_terminal() {
-            let before = tcgetattr(io::stdin()).ok();
-            let term = Term::stdout();
-            let listened = Term::stdout();
-            thread::spawn(move || listen(&listened, &sender));
-            Kind::Terminal { term, lines: 0, drawn: None, before }
+            let before = make_raw();
+            let told = Arc::clone(&interrupted);
+            thread::spawn(move || listen(&sender, &told));
+            Kind::Terminal { term: Term::stdout(), lines: 0, drawn: None, before }
         } else {
             thread::spawn(move || hear_lines(&sender));
             Kind::Lines
         };
-        Self { kind, keys, shown: None }
+        Self { kind, keys, interrupted, shown: None }
     }
 
     /// A key that was pressed, if any; an error where none will be.
@@ -66,6 +75,11 @@ impl Teller {
             Err(TryRecvError::Empty) => Ok(None),
             Err(TryRecvError::Disconnected) => Err(Deaf),
         }
+    }
+
+    /// Whether Control and C were pressed.
+    pub fn is_interrupted(&self) -> bool {
+        self.interrupted.load(Ordering::Relaxed)
     }
 
     /// Waits for a key; `None` where none will come.
@@ -98,11 +112,12 @@ impl Teller {
         Ok(())
     }
 
-    /// Whether only numbers have changed.
+    /// Whether only numbers have changed: what is said and what is asked for is shown at once.
     fn is_small_change(&self, guide: &Guide) -> bool {
-        self.shown
-            .as_ref()
-            .is_some_and(|s| s.title == guide.title && s.passed == guide.passed && s.keys == guide.keys)
+        let same = |s: &Guide| {
+            (&s.title, s.passed, s.keys, &s.says) == (&guide.title, guide.passed, guide.keys, &guide.says)
+        };
+        self.shown.as_ref().is_some_and(same)
     }
 
     /// Shows the last page and leaves the terminal as it was.
@@ -116,7 +131,6 @@ impl Teller {
 
 impl Drop for Teller {
     fn drop(&mut self) {
-        // The thread that listens holds the terminal raw.
         if let Kind::Terminal { before: Some(before), .. } = &self.kind
             && let Err(e) = tcsetattr(io::stdin(), OptionalActions::Now, before)
         {
@@ -125,21 +139,34 @@ impl Drop for Teller {
     }
 }
 
-/// Keys of a terminal.
-fn listen(term: &Term, keys: &Sender<Key>) {
-    use console::Key as Pressed;
-    while let Ok(pressed) = term.read_key() {
-        let key = match pressed {
-            Pressed::Enter => Some(Key::Next),
-            Pressed::Backspace | Pressed::ArrowLeft => Some(Key::Back),
-            Pressed::Escape => Some(Key::Quit),
-            Pressed::Char(c) => of_letter(c),
-            _ => None,
+/// Keys of a terminal that hands over each at once.
+fn listen(keys: &Sender<Key>, interrupted: &AtomicBool) {
+    for byte in io::stdin().lock().bytes() {
+        let key = match byte {
+            Ok(b'\r' | b'\n') => Some(Key::Next),
+            Ok(BACKSPACE) => Some(Key::Back),
+            Ok(CONTROL_C) => {
+                interrupted.store(true, Ordering::Relaxed);
+                Some(Key::Quit)
+            }
+            Ok(byte) => of_letter(char::from(byte)),
+            Err(_) => return,
         };
         if key.is_some_and(|key| keys.send(key).is_err()) {
             return;
         }
     }
+}
+
+/// Has the terminal hand over each key at once, unseen; gives the settings that it had.
+fn make_raw() -> Option<Termios> {
+    let before = tcgetattr(io::stdin()).ok()?;
+    let mut raw = before.clone();
+    raw.make_raw();
+    // Lines still end as before.
+    raw.output_modes = before.output_modes;
+    tcsetattr(io::stdin(), OptionalActions::Now, &raw).ok()?;
+    Some(before)
 }
 
 /// Keys by lines: an empty one is Enter.
