@@ -263,7 +263,8 @@ impl HudLayout {
         let pad = self.pad();
         let line = glyphs.line(TextSize::Small);
         // The plates are of whole pixels.
-        let (top, width) = ((pad + f32::from(row) * line).ceil(), glyphs.width_of(TextSize::Small, &text));
+        let top = (pad + line).ceil() + f32::from(row.saturating_sub(1)) * line.ceil();
+        let width = glyphs.width_of(TextSize::Small, &text);
         self.plate([pad, top, 3.0 * pad + width, top + line]);
         self.text(glyphs, TextSize::Small, (2.0 * pad, top), colour, &text);
         self.text = text;
