@@ -1,5 +1,5 @@
-//! Elevation of 90 degrees, where yaw and roll of Euler angles turn about one axis: from the bytes of units that tell angles to where the
-//! camera looks.
+//! Elevation of 90 degrees, where yaw and roll of Euler angles turn about one axis, and the seam of yaw: from the bytes of units that tell
+//! angles to where the camera looks.
 
 use bowwave_core::{
     attitude::{Attitude, AttitudeSettings, Noise, RateKind, Settings, Source},
@@ -43,11 +43,17 @@ fn turned_at_the_top(s: f64) -> [f64; 3] {
     [40.0 * DEG * s, 90.0 * DEG, 0.0]
 }
 
-const MOTIONS: [(&str, Motion); 4] = [
+/// Through south, where a yaw of 180 degrees becomes one of -180.
+fn through_south(s: f64) -> [f64; 3] {
+    [std::f64::consts::PI + 40.0 * DEG * s, 0.3, 0.1]
+}
+
+const MOTIONS: [(&str, Motion); 5] = [
     ("over the top", over_the_top),
     ("under the bottom", under_the_bottom),
     ("past the top", past_the_top),
     ("turned at the top", turned_at_the_top),
+    ("through south", through_south),
 ];
 
 /// The camera so many seconds from the middle; at rest at first, so that what is fused can be levelled.
