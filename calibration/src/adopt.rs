@@ -42,6 +42,11 @@ impl CalibrationFile {
         for part in [&mut self.camera_from_imu, &mut self.time_offset, &mut self.gyro_bias] {
             *part = Provenance::new(measured, how);
         }
+        if let Some((seconds, sigma)) = found.readout_s {
+            c.readout_ns = secs_to_ns(seconds);
+            c.readout_sigma_ns = secs_to_ns(sigma).max(1);
+            self.shutter = Some(Provenance::new(measured, how));
+        }
     }
 
     /// Takes over where the barrel points, found on that day by pulls at a mark `range_m` away.

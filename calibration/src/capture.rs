@@ -13,8 +13,10 @@ use bowwave_core::{
 };
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::alignment::{
-    self, Alignment, AlignmentError, Comparison, ImuReading, Known, Observation, Options,
+use crate::{
+    alignment::{self, Alignment, AlignmentError, Comparison, ImuReading, Known, Observation, Options},
+    camera::Corner,
+    rows::{self, Rows},
 };
 
 /// What moves all horizons of a recording alike, one standard deviation: refraction, by 0.08 to 0.12 deg in daytime, radians...
@@ -27,8 +29,23 @@ const BOARDS_ENOUGH: usize = 30;
 const READINGS_MOST: usize = 1_800_000;
 const OBSERVATIONS_MOST: usize = 108_000;
 
-/// A board seen in a picture.
+/// Corners of boards that are kept at most: half an hour of the usual board, 128 MB.
+const CORNERS_MOST: usize = 4_000_000;
+
+/// Rounds of putting pictures right that are read row by row and solving anew.
+const ROUNDS: usize = 2;
+
+/// How long the camera reads a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
+enum Readout {
+    /// Nobody has said.
+    Unknown,
+    /// Seconds from the first row to the last.
+    Known(f64),
+}
+
+/// A board seen in a picture.
+#[derive(Clone, Debug, PartialEq)]
 pub struct BoardSeen {
     /// Rotation from the camera's axes to the board's.
     pub board_from_camera: DQuat,
@@ -36,6 +53,8 @@ pub struct BoardSeen {
     pub sigma: f64,
     /// Its middle, pixels.
     pub pixel: DVec2,
+    /// What of it was seen where.
+    pub corners: Vec<Corner>,
 }
 
 /// Finds the board in a picture.
@@ -84,7 +103,7 @@ pub struct HorizonSeen {
 }
 
 /// What a picture tells.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Seen {
     /// The picture's mid-exposure by the camera's stamp.
     pub stamp: Time,
@@ -157,26 +176,43 @@ impl std::fmt::Debug for Watcher {
 #[derive(Clone, Debug)]
 pub struct Capture {
     lens: Lens,
+    eye_height_m: f64,
     clock: ClockMap,
     readings: Vec<ImuReading>,
     observations: Vec<Observation>,
     sightings: Vec<Sighting>,
+    /// Corners of the boards, by the observation.
+    boards: Vec<(usize, Vec<Corner>)>,
+    corners: usize,
+    readout: Readout,
     edges: Vec<TriggerEdge>,
     counts: Counts,
 }
 
 impl Capture {
-    /// Nothing so far, of a camera with that lens.
-    pub fn new(lens: Lens) -> Self {
+    /// Nothing so far, of a camera with that lens, `eye_height_m` above the sea.
+    pub fn new(lens: Lens, eye_height_m: f64) -> Self {
         Self {
             lens,
+            eye_height_m,
             clock: ClockMap::new(),
             readings: Vec::new(),
             observations: Vec::new(),
             sightings: Vec::new(),
+            boards: Vec::new(),
+            corners: 0,
+            readout: Readout::Unknown,
             edges: Vec::new(),
             counts: Counts::default(),
         }
+    }
+
+    /// The camera reads its rows one after another, over that many seconds from first to last (negative where the last comes first); zero
+    /// where it exposes all at once. Where nothing is said, boards tell it.
+    #[must_use]
+    pub const fn with_readout(mut self, seconds: f64) -> Self {
+        self.readout = Readout::Known(seconds);
+        self
     }
 
     /// Takes in what a device reported. What a picture tells is [`Self::see`]n.
@@ -216,7 +252,7 @@ impl Capture {
             self.sightings.push(Sighting { stamp, pixel });
         }
         self.counts.blurred += usize::from(seen.is_blurred);
-        if let Some(board) = seen.board {
+        if let Some(board) = seen.board.as_ref().filter(|_| self.corners < CORNERS_MOST) {
             self.counts.boards += 1;
             self.observations.push(Observation::Orientation {
                 stamp,
@@ -226,6 +262,8 @@ impl Capture {
                 chain: 0,
             });
             self.sightings.push(Sighting { stamp, pixel: board.pixel });
+            self.corners += board.corners.len();
+            self.boards.push((self.observations.len() - 1, board.corners.clone()));
         }
     }
 
@@ -291,26 +329,58 @@ impl Capture {
     }
 
     /// The observations that tell most: of a board alone where it was seen often, because horizons share the error of refraction.
-    fn best(&self) -> Vec<Observation> {
+    fn best(&self, all: &[Observation]) -> Vec<Observation> {
         let enough = !self.is_by_horizon();
         let wanted = |o: &&Observation| !enough || matches!(o, Observation::Orientation { .. });
-        self.observations.iter().filter(wanted).copied().collect()
+        all.iter().filter(wanted).copied().collect()
     }
 
     /// Finds rotation, time offset and bias: from the board where there is one, with the help of the horizon where the movement alone does
-    /// not tell, else from the horizon.
+    /// not tell, else from the horizon. A picture that is read row by row while the camera turns is put right by the gyro, for which rotation
+    /// and offset must be known: what was found from the picture as it is, and then once more.
     ///
     /// # Errors
     /// As [`alignment::solve`].
     pub fn solve(&self) -> Result<Alignment, AlignmentError> {
-        let (best, options) = (self.best(), self.options());
+        let mut found = self.solve_from(&self.observations)?;
+        let readout = match self.readout {
+            Readout::Known(seconds) => (seconds != 0.0).then_some((seconds, None)),
+            Readout::Unknown => self.rows(&found).readout().map(|(seconds, sigma)| (seconds, Some(sigma))),
+        };
+        let Some((seconds, sigma)) = readout else { return Ok(found) };
+        for _ in 0..ROUNDS {
+            found = self.solve_from(&self.rows(&found).straightened(seconds))?;
+        }
+        found.readout_s = sigma.map(|sigma| (seconds, sigma));
+        Ok(found)
+    }
+
+    fn solve_from(&self, all: &[Observation]) -> Result<Alignment, AlignmentError> {
+        let (best, options) = (self.best(all), self.options());
         let found = alignment::solve(&self.readings, &best, &options);
         match found {
-            Err(AlignmentError::NotObservable { .. }) if best.len() < self.observations.len() => {
-                alignment::solve(&self.readings, &self.observations, &options)
+            Err(AlignmentError::NotObservable { .. }) if best.len() < all.len() => {
+                alignment::solve(&self.readings, all, &options)
             }
             other => other,
         }
+    }
+
+    fn rows(&self, found: &Alignment) -> Rows<'_> {
+        self.rows_by(found.camera_from_imu, found.offset_s, found.gyro_bias)
+    }
+
+    fn rows_by(&self, camera_from_imu: DQuat, offset_s: f64, bias: DVec3) -> Rows<'_> {
+        Rows::new(rows::Seen {
+            lens: self.lens,
+            dip: horizon_dip(self.eye_height_m),
+            readings: &self.readings,
+            observations: &self.observations,
+            boards: &self.boards,
+            camera_from_imu,
+            offset_s,
+            bias,
+        })
     }
 
     /// Holds a calibration against what was seen.
@@ -325,7 +395,14 @@ impl Capture {
             offset_sigma_s: calibration.time_offset_sigma_ns as f64 * 1e-9,
             gyro_bias: calibration.gyro_bias,
         };
-        alignment::compare(&self.readings, &self.best(), &known, &self.options())
+        let straight = match self.readout {
+            Readout::Known(seconds) if seconds != 0.0 => {
+                let rows = self.rows_by(known.camera_from_imu, known.offset_s, known.gyro_bias);
+                rows.straightened(seconds)
+            }
+            _ => self.observations.clone(),
+        };
+        alignment::compare(&self.readings, &self.best(&straight), &known, &self.options())
     }
 }
 
@@ -338,7 +415,7 @@ fn horizon_pixel(lens: &Lens, up: DVec3, eye_height_m: f64) -> DVec2 {
 }
 
 /// Off the picture's middle, in picture heights.
-fn row(lens: &Lens, pixel: DVec2) -> f64 {
+pub(crate) fn row(lens: &Lens, pixel: DVec2) -> f64 {
     (pixel.y / f64::from(lens.height) - 0.5).clamp(-0.5, 0.5)
 }
 
@@ -374,7 +451,7 @@ mod tests {
     #[test]
     fn a_horizon_becomes_an_up_with_its_place() {
         let lens = Lens::pinhole(320, 180, 1.0);
-        let (mut watcher, mut capture) = (Watcher::new(lens, 10.0), Capture::new(lens));
+        let (mut watcher, mut capture) = (Watcher::new(lens, 10.0), Capture::new(lens, 10.0));
         let world_from_camera = look(0.3, 0.1, -0.05);
         capture.see(&watcher.look(&frame(picture(&lens, world_from_camera))));
         let [Observation::Up { up_in_camera, sigma, row, .. }] = *capture.observations() else {
@@ -394,7 +471,7 @@ mod tests {
 
     #[test]
     fn samples_come_on_the_hosts_clock_and_bad_ones_are_left_out() {
-        let mut capture = Capture::new(Lens::pinhole(320, 180, 1.0));
+        let mut capture = Capture::new(Lens::pinhole(320, 180, 1.0), 10.0);
         for i in 0..100i64 {
             let sample = ImuSample {
                 arrival: Time::from_ns(9_000_000_000 + i * 5_000_000 + i % 7 * 100_000),
@@ -416,21 +493,26 @@ mod tests {
         impl FindBoard for Same {
             fn find(&mut self, _: &Picture, _: &Lens) -> Option<BoardSeen> {
                 let pixel = DVec2::new(160.0, 45.0);
-                Some(BoardSeen { board_from_camera: DQuat::IDENTITY, sigma: 1e-3, pixel })
+                Some(BoardSeen {
+                    board_from_camera: DQuat::IDENTITY,
+                    sigma: 1e-3,
+                    pixel,
+                    corners: Vec::new(),
+                })
             }
         }
         let lens = Lens::pinhole(320, 180, 1.0);
-        let mut capture = Capture::new(lens);
+        let mut capture = Capture::new(lens, 10.0);
         let seen = Watcher::new(lens, 10.0)
             .with_board(Box::new(Same))
             .look(&frame(picture(&lens, look(0.0, 0.0, 0.0))));
         (0..29).for_each(|_| capture.see(&seen));
-        assert_eq!(capture.best().len(), 58);
+        assert_eq!(capture.best(capture.observations()).len(), 58);
         capture.see(&seen);
-        assert_eq!(capture.best().len(), 30);
+        assert_eq!(capture.best(capture.observations()).len(), 30);
         assert!(
             capture
-                .best()
+                .best(capture.observations())
                 .iter()
                 .all(|o| matches!(o, Observation::Orientation { row, .. } if (row + 0.25).abs() < 1e-9))
         );

@@ -39,6 +39,7 @@ mod file;
 pub mod keep;
 pub mod page;
 mod raw;
+mod rows;
 pub mod sheet;
 pub mod simulated;
 mod so3;

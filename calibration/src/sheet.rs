@@ -462,7 +462,7 @@ mod tests {
     const NOISE: f64 = 2e-3;
 
     fn capture() -> Capture {
-        Capture::new(Lens::pinhole(1280, 720, 1.0))
+        Capture::new(Lens::pinhole(1280, 720, 1.0), 10.0)
     }
 
     fn calibration(recipe: &Recipe, turn: DVec3, late_s: f64) -> CalibrationFile {

@@ -115,13 +115,23 @@ impl Recipe {
         })
     }
 
+    /// When the recording's first reading is made.
+    pub const EPOCH: Time = Time::from_ns(3_600_000_000_000);
+
+    /// The camera so many seconds after the first reading, in a world with z up, and its rate in its own axes, rad/s. Asked for many instants
+    /// at once, because the movement is made of `seed` anew.
+    pub fn poses(&self, seconds: &[f64]) -> Vec<(DQuat, DVec3)> {
+        let sines = self.sines();
+        seconds.iter().map(|t| pose(&sines, *t)).collect()
+    }
+
     /// The recording.
     pub fn record(&self) -> Recording {
         let sines = self.sines();
         let mut random = Random::new(self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 77);
         // The board, or the world, stands any way; recordings do not begin at the clock's zero.
         let board_from_world = DQuat::from_scaled_axis(random.vector());
-        let epoch = Time::from_ns(3_600_000_000_000);
+        let epoch = Self::EPOCH;
         let camera_s = |i: usize| 0.7 + i as f64 / self.camera_hz;
         let imu_from_camera = self.camera_from_imu.inverse();
         let density = self.gyro_walk * self.gyro_hz.sqrt();

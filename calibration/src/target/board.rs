@@ -17,7 +17,9 @@ use crate::{
 /// Fewest corners of a pose: two tags.
 const CORNERS_LEAST: usize = 8;
 /// Corners that are off by more than this in the mean are those of a wrong lens or board, pixels.
-const OFF_MOST_PX: f64 = 3.0;
+pub(crate) const OFF_MOST_PX: f64 = 3.0;
+/// The same where the picture may be read row by row while the camera turns.
+pub(crate) const SHEARED_MOST_PX: f64 = 20.0;
 /// Corners are never better than this, pixels.
 const SIGMA_LEAST_PX: f64 = 0.05;
 
@@ -38,9 +40,9 @@ impl BoardFinder {
 impl FindBoard for BoardFinder {
     fn find(&mut self, picture: &Picture, lens: &Lens) -> Option<BoardSeen> {
         let corners = look_for(&self.target, picture, &mut self.grey)?.corners;
-        let (pose, sigma) = orient(lens, &corners)?;
+        let Oriented { pose, sigma, .. } = orient(lens, &corners, SHEARED_MOST_PX)?;
         let pixel = corners.iter().map(|c| c.pixel).sum::<DVec2>() / corners.len() as f64;
-        Some(BoardSeen { board_from_camera: pose.camera_from_board.inverse(), sigma, pixel })
+        Some(BoardSeen { board_from_camera: pose.camera_from_board.inverse(), sigma, pixel, corners })
     }
 }
 
@@ -110,8 +112,19 @@ fn normal(lens: &Lens, corners: &[Corner], pose: &BoardPose) -> Option<(Matrix6<
     Some((n, g, cost))
 }
 
-/// The board's pose with the standard deviation of its rotation about an axis, radians: least squares of the corners' pixels.
-fn orient(lens: &Lens, corners: &[Corner]) -> Option<(BoardPose, f64)> {
+/// A board's pose and how well it is known.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Oriented {
+    pub pose: BoardPose,
+    /// Standard deviation of its rotation about an axis, radians.
+    pub sigma: f64,
+    /// Sum of squares of what is left, pixels, and how many numbers are left for it.
+    pub squares: f64,
+    pub freedom: f64,
+}
+
+/// The board's pose by least squares of the corners' pixels; `None` where these are off by more than `most_px` in the mean.
+pub(crate) fn orient(lens: &Lens, corners: &[Corner], most_px: f64) -> Option<Oriented> {
     if corners.len() < CORNERS_LEAST {
         return None;
     }
@@ -138,14 +151,14 @@ fn orient(lens: &Lens, corners: &[Corner]) -> Option<(BoardPose, f64)> {
             break;
         }
     }
-    let (information, _, cost) = last;
+    let (information, _, squares) = last;
     let freedom = 2.0 * corners.len() as f64 - 6.0;
-    let sigma_px = (cost / freedom).sqrt().max(SIGMA_LEAST_PX);
+    let sigma_px = (squares / freedom).sqrt().max(SIGMA_LEAST_PX);
     let covariance: Matrix3<f64> =
         information.try_inverse()?.fixed_view::<3, 3>(0, 0) * (sigma_px * sigma_px);
     let sigma = (covariance.trace() / 3.0).sqrt();
-    let sound = sigma_px < OFF_MOST_PX && sigma.is_finite() && vector(pose.place).norm() < 1e4;
-    sound.then_some((pose, sigma))
+    let sound = sigma_px < most_px && sigma.is_finite() && vector(pose.place).norm() < 1e4;
+    sound.then_some(Oriented { pose, sigma, squares, freedom })
 }
 
 #[cfg(test)]
@@ -173,7 +186,7 @@ mod tests {
                     Some(Corner { board, pixel: pixel + noise })
                 })
                 .collect();
-            let (pose, sigma) = orient(&lens, &corners).unwrap();
+            let Oriented { pose, sigma, .. } = orient(&lens, &corners, OFF_MOST_PX).unwrap();
             let off = log(camera_from_board * pose.camera_from_board.inverse());
             squares += off.length_squared() / (3.0 * sigma * sigma);
             count += 1.0;
@@ -187,7 +200,7 @@ mod tests {
     fn too_few_corners_and_another_lens_are_no_pose() {
         let lens = Lens::pinhole(1280, 720, 1.0);
         let corner = |x: f64, y: f64| Corner { board: DVec2::new(x, y), pixel: DVec2::new(x, y) * 1e4 };
-        assert!(orient(&lens, &[corner(0.0, 0.0), corner(0.01, 0.0)]).is_none());
+        assert!(orient(&lens, &[corner(0.0, 0.0), corner(0.01, 0.0)], OFF_MOST_PX).is_none());
         let mut random = Random::new(9);
         let wild: Vec<Corner> = (0..40)
             .map(|_| Corner {
@@ -195,7 +208,7 @@ mod tests {
                 pixel: DVec2::new(random.unit() * 1280.0, random.unit() * 720.0),
             })
             .collect();
-        assert!(orient(&lens, &wild).is_none());
+        assert!(orient(&lens, &wild, OFF_MOST_PX).is_none());
     }
 
     #[test]

@@ -145,10 +145,21 @@ pub enum Step {
 pub struct Setup {
     /// The calibration that is begun with.
     pub calibration: Calibration,
+    /// Height of the camera above the sea, metres.
+    pub eye_height_m: f64,
     /// The board, where there is one.
     pub target: Option<Target>,
     /// From the camera to the mark on the board, metres; no boresight without it.
     pub range_m: Option<f64>,
+}
+
+impl Setup {
+    /// Nothing gathered yet. A read-out that is known is taken as it is, else boards tell it.
+    fn capture(&self) -> Capture {
+        let Calibration { lens, readout_ns, .. } = &self.calibration;
+        let capture = Capture::new(*lens, self.eye_height_m);
+        if *readout_ns == 0 { capture } else { capture.with_readout(*readout_ns as f64 * 1e-9) }
+    }
 }
 
 /// A pull that comes so soon after a step began belonged to the one before, seconds.
@@ -194,7 +205,7 @@ impl Wizard {
             now: Time::MIN,
             task: task.unwrap_or(first),
             done: [false; Task::ALL.len()],
-            capture: Capture::new(setup.calibration.lens),
+            capture: setup.capture(),
             views: Views::default(),
             aim: Aim::default(),
             live: Live::new(setup.calibration.camera_from_imu),
@@ -301,7 +312,7 @@ impl Wizard {
     }
 
     fn gather_anew(&mut self) {
-        self.capture = Capture::new(self.setup.calibration.lens);
+        self.capture = self.setup.capture();
         self.views = Views::default();
         self.aim = Aim::default();
         self.live = Live::new(self.setup.calibration.camera_from_imu);

@@ -14,7 +14,7 @@ use crate::{
 
 fn setup() -> Setup {
     let calibration = parse(include_str!("../../examples/mount.toml"), "mount.toml").unwrap().calibration;
-    Setup { calibration, target: Some(Target::A4), range_m: Some(40.0) }
+    Setup { calibration, eye_height_m: 10.0, target: Some(Target::A4), range_m: Some(40.0) }
 }
 
 /// What the devices say in a made recording, in the order of arrival: by the board or by the horizon.
@@ -38,7 +38,12 @@ fn inputs(recording: &Recording, by_board: bool) -> Vec<Input> {
                 seen.horizon = Some(HorizonSeen { up_in_camera, sigma, pixel });
             }
             Observation::Orientation { reference_from_camera, sigma, .. } => {
-                seen.board = Some(BoardSeen { board_from_camera: reference_from_camera, sigma, pixel });
+                seen.board = Some(BoardSeen {
+                    board_from_camera: reference_from_camera,
+                    sigma,
+                    pixel,
+                    corners: Vec::new(),
+                });
             }
         }
         let arrival = seen.stamp.plus_ns(15_000_000);
@@ -369,7 +374,7 @@ fn anything() -> impl Strategy<Value = Input> {
         |(arrival, stamp, [fits, is_blurred, horizon, board], v, sigma, pixel)| {
             let horizon = horizon.then_some(HorizonSeen { up_in_camera: v, sigma, pixel });
             let board_from_camera = DQuat::from_xyzw(v.x, v.y, v.z, sigma);
-            let board = board.then_some(BoardSeen { board_from_camera, sigma, pixel });
+            let board = board.then_some(BoardSeen { board_from_camera, sigma, pixel, corners: Vec::new() });
             Input::Seen(arrival, Finding::Orientation(Seen { stamp, fits, horizon, is_blurred, board }))
         },
     );

@@ -163,8 +163,12 @@ pub fn look(
             format!("{} does not say how high the camera was; say it with --eye-height", recording.display())
         })?,
     };
-    let lens = opened.file.calibration.lens;
-    let (mut watcher, mut capture) = (Watcher::new(lens, height), Capture::new(lens));
+    let calibration = &opened.file.calibration;
+    let mut watcher = Watcher::new(calibration.lens, height);
+    let mut capture = Capture::new(calibration.lens, height);
+    if opened.file.shutter.is_some() {
+        capture = capture.with_readout(calibration.readout_ns as f64 * 1e-9);
+    }
     if let Some(target) = material.target {
         watcher = watcher.with_board(Box::new(BoardFinder::new(target)));
     }

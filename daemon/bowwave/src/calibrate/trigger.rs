@@ -13,7 +13,7 @@ use crate::{cli::CalibrateTrigger, import::today, outcome::Outcome};
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateTrigger) -> Result<Outcome> {
     let opened = open(&arguments.recording, arguments.files.calibration.as_deref())?;
-    let mut capture = Capture::new(opened.file.calibration.lens);
+    let mut capture = Capture::new(opened.file.calibration.lens, 0.0);
     let is_cut = opened.play(false, |event| capture.take(&event))?;
     let found = trigger::solve(capture.readings(), capture.edges());
     let today = today()?;

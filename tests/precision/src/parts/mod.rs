@@ -1,6 +1,7 @@
 //! The numerical parts.
 
 mod attitude;
+mod board;
 mod calibration;
 mod camera;
 mod clock;
@@ -14,6 +15,7 @@ mod heading;
 mod horizon;
 mod lens;
 mod motion;
+mod mount;
 mod orientation;
 mod pacing;
 mod reflection;
@@ -66,6 +68,8 @@ pub const PARTS: &[Part] = &[
     Part { about: calibration::ABOUT, measure: calibration::measure },
     Part { about: target::ABOUT, measure: target::measure },
     Part { about: camera::ABOUT, measure: camera::measure },
+    Part { about: board::ABOUT, measure: board::measure },
+    Part { about: mount::ABOUT, measure: mount::measure },
     Part { about: pacing::ABOUT, measure: pacing::measure },
     Part { about: flight::ABOUT, measure: flight::measure },
     Part { about: sea::ABOUT, measure: sea::measure },

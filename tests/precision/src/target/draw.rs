@@ -171,16 +171,27 @@ fn albedo(target: &Target, at: DVec2) -> f64 {
 
 /// Draws what `lens` (its `directions` made once) sees.
 pub fn draw(target: &Target, lens: &TrueLens, directions: &[DVec3], shot: &Shot) -> Drawn {
+    draw_by_rows(target, lens, directions, shot, &vec![(shot.camera_from_board, shot.middle); lens.size.1])
+}
+
+/// The same where the camera moves while it reads one row after the other: `rows` have the board's attitude and middle for each.
+pub fn draw_by_rows(
+    target: &Target,
+    lens: &TrueLens,
+    directions: &[DVec3],
+    shot: &Shot,
+    rows: &[(DQuat, DVec3)],
+) -> Drawn {
     let (w, h) = lens.size;
     let half = target.size_m() / 2.0 - target.tag_m() * target.spacing();
-    let board_from_camera = shot.camera_from_board.inverse();
-    let eye = board_from_camera * -shot.middle;
-    let hit = |direction: DVec3| -> Option<DVec2> {
-        let d = board_from_camera * direction;
+    let hit = |i: usize, direction: DVec3| -> Option<DVec2> {
+        let (camera_from_board, middle) = rows.get(i / w)?;
+        let board_from_camera = camera_from_board.inverse();
+        let (eye, d) = (board_from_camera * -*middle, board_from_camera * direction);
         let t = -eye.z / d.z;
         (t > 0.0 && t.is_finite()).then(|| (eye + d * t).truncate() + half)
     };
-    let hits: Vec<Option<DVec2>> = directions.iter().map(|d| hit(*d)).collect();
+    let hits: Vec<Option<DVec2>> = directions.iter().enumerate().map(|(i, d)| hit(i, *d)).collect();
     let at = |x: usize, y: usize| hits[y.min(h - 1) * w + x.min(w - 1)];
     let mut bright = vec![0.55; w * h];
     for y in 0..h {

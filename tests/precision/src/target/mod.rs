@@ -1,4 +1,5 @@
 //! Pictures of the calibration target with known truth.
 
 pub mod draw;
+pub mod moved;
 pub mod shots;

@@ -55,6 +55,7 @@ impl Guided {
     ) -> Result<Self> {
         let setup = Setup {
             calibration: file.calibration.clone(),
+            eye_height_m,
             target: arguments.target,
             range_m: arguments.range,
         };
