@@ -25,7 +25,10 @@ use precision::target::{
     draw::{TrueLens, draw},
     shots::{board, held},
 };
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::{
+    event::{PollFd, PollFlags, Timespec, poll},
+    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+};
 
 fn made(recipe: &Recipe, name: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -237,12 +240,20 @@ fn on_a_terminal_keys_are_single_and_the_terminal_is_left_as_it_was() {
         .spawn()
         .expect("it starts");
     let (mut master, mut seen) = (File::from(master), String::new());
-    let mut keys =
-        [("> 1 camera lens", "2"), ("> 2 inertial unit", "\r"), ("to save;", "\r"), ("Saved;", "q")]
-            .into_iter()
-            .peekable();
+    let mut keys = [
+        ("> 2 inertial unit", "4"),
+        ("> 4 trigger", "2"),
+        ("> 2 inertial unit", "\r"),
+        ("to save;", "\r"),
+        ("Saved;", "q"),
+    ]
+    .into_iter()
+    .peekable();
     let mut bytes = [0; 4096];
     while keys.peek().is_some() {
+        let minute = Timespec { tv_sec: 60, tv_nsec: 0 };
+        let ready = poll(&mut [PollFd::new(&master, PollFlags::IN)], Some(&minute)).unwrap();
+        assert!(ready > 0, "{:?} does not come:\n{seen}", keys.peek());
         let count = master.read(&mut bytes).unwrap();
         seen += &String::from_utf8_lossy(&bytes[..count]);
         if let Some((_, key)) = keys.next_if(|(shown, _)| seen.contains(shown)) {
