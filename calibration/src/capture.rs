@@ -8,7 +8,7 @@ use bowwave_core::{
     clock::ClockMap,
     event::{CameraFrame, Event, ImuSample, Picture, TriggerEdge},
     geometry::{Lens, horizon_dip},
-    horizon::{HorizonFinder, NoHorizon, View},
+    horizon::{HorizonFinder, Mask, NoHorizon, View},
     time::Time,
 };
 use glam::{DQuat, DVec2, DVec3};
@@ -135,6 +135,13 @@ impl Watcher {
     #[must_use]
     pub fn with_board(mut self, board: Box<dyn FindBoard + Send>) -> Self {
         self.board = Some(board);
+        self
+    }
+
+    /// Looks at nothing that the mask hides: the own ship.
+    #[must_use]
+    pub fn with_mask(mut self, mask: Option<Mask>) -> Self {
+        self.finder.set_mask(mask);
         self
     }
 

@@ -1,6 +1,6 @@
 //! What pictures tell the wizard.
 
-use bowwave_core::{calibration::Calibration, event::CameraFrame, time::Time};
+use bowwave_core::{calibration::Calibration, event::CameraFrame, horizon::Mask, time::Time};
 use glam::DVec2;
 
 use crate::{
@@ -63,6 +63,13 @@ impl Eyes {
             watcher = watcher.with_board(Box::new(BoardFinder::new(target)));
         }
         Self { watcher, target, tag, grey: Vec::new() }
+    }
+
+    /// Looks for no horizon in what the mask hides: the own ship.
+    #[must_use]
+    pub fn with_mask(mut self, mask: Option<Mask>) -> Self {
+        self.watcher = self.watcher.with_mask(mask);
+        self
     }
 
     /// Looks for that in a picture.

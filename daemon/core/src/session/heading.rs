@@ -98,8 +98,8 @@ const LATENCY_SIGMA_S: f64 = 0.02;
 /// In this time what a gyro compass errs by becomes another error: a quarter of its own period of 84 minutes (Schuler 1923), seconds.
 const COMPASS_TAU_S: f64 = 1260.0;
 
-/// Bearings are watched over so long: longer than a wave, whose tilts move them.
-const WATCH_NS: i64 = 10 * NS_PER_S;
+/// Bearings are watched over so long: waves, whose tilts move them, fall out of a slope over that.
+const WATCH_NS: i64 = 30 * NS_PER_S;
 
 /// Less than this of them tells no rest.
 const REST_NS: i64 = 4 * NS_PER_S;
@@ -110,8 +110,12 @@ const GAP_NS: i64 = 10 * NS_PER_S;
 /// While nothing is heard of the ship the gun may have moved: by this in a square root of a second, rad.
 const UNSEEN_WALK: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
-/// Bearings that change by less than this are at rest, whatever is known, rad/s: what a compass's own wander looks like.
+/// Bearings that change by less than this are at rest, whatever is known, rad/s: what a compass's own wander looks like...
 const REST_RATE: f64 = 0.03 * std::f64::consts::PI / 180.0;
+
+/// ...and bearings that change by as much are not, whatever is not known: no gun is trained more slowly. A gyro with more bias than that, which
+/// nothing has told yet, is not helped by a ship.
+const CREEP_RATE: f64 = 0.075 * std::f64::consts::PI / 180.0;
 
 /// How many deviations a bearing may lie off before it counts as moved.
 const GATE: f64 = 3.5;
@@ -128,6 +132,18 @@ const FROZEN_TURN: f64 = 0.3 * std::f64::consts::PI / 180.0;
 
 /// A bearing on the mount as gyro and ship make it: when, and how much it differs from the first one, radians.
 type Bearing = (Time, f64);
+
+/// What the gun does on its mount.
+#[derive(Clone, Copy, Debug)]
+enum Motion {
+    /// It cannot be told yet.
+    Unknown,
+    Moves,
+    /// The newest bearing lies so far off the line through all, radians.
+    Rests {
+        off: f64,
+    },
+}
 
 /// Takes in headings from outside.
 #[derive(Debug)]
@@ -223,15 +239,15 @@ impl Aid {
         self.watch(time, bearing + attitude.corrected());
         let drift = attitude.drift_sigma().unwrap_or(0.0);
         match self.rests(line, drift) {
-            Some(false) => {
+            Motion::Moves => {
                 // What was before it moved says nothing of the next rest.
                 let moving = self.watched.len().saturating_sub(1);
                 self.watched.drain(..moving);
                 self.release();
             }
-            None => {}
-            Some(true) => match self.anchored {
-                None => self.tie(bearing, line, attitude),
+            Motion::Unknown => {}
+            Motion::Rests { off } => match self.anchored {
+                None => self.tie(bearing - off, line, attitude),
                 Some(anchored) => self.hold(time, bearing - anchored, line, attitude),
             },
         }
@@ -275,11 +291,10 @@ impl Aid {
         }
     }
 
-    /// Whether the gun rests on its mount, as far as can be told; `None` before that. One line errs by `line`, and the gyro may drift by
-    /// `drift` rad/s.
-    fn rests(&self, line: f64, drift: f64) -> Option<bool> {
+    /// Whether the gun rests on its mount, as far as can be told. One line errs by `line`, and the gyro may drift by `drift` rad/s.
+    fn rests(&self, line: f64, drift: f64) -> Motion {
         let (Some(&(first, _)), Some(&(last, newest))) = (self.watched.front(), self.watched.back()) else {
-            return None;
+            return Motion::Unknown;
         };
         let count = self.watched.len() as f64;
         let seconds = |time: &Time| time.secs_since(first);
@@ -298,12 +313,15 @@ impl Aid {
         // What scatters by waves does not scatter from line to line: of a second's lines only one is counted.
         let alike = count / count.min(last.secs_since(first) + 1.0);
         let uncertain = if square > 0.0 { sigma * (alike / square).sqrt() } else { f64::INFINITY };
-        let still = slope.abs() <= REST_RATE + GATE * uncertain.hypot(drift);
-        let place = (newest - mean).abs() <= GATE * line.hypot(sigma) + drift * 0.5 * last.secs_since(first);
-        if !still || !place {
-            return Some(false);
+        let most = (REST_RATE + GATE * uncertain.hypot(drift)).min(CREEP_RATE);
+        let off = newest - mean - slope * (last.secs_since(first) - mean_s);
+        if slope.abs() > most + GATE * uncertain || off.abs() > GATE * line.hypot(sigma) {
+            return Motion::Moves;
         }
-        (last.ns_since(first) >= REST_NS).then_some(true)
+        if last.ns_since(first) < REST_NS || uncertain > CREEP_RATE / 4.0 {
+            return Motion::Unknown;
+        }
+        if slope.abs() <= most { Motion::Rests { off } } else { Motion::Moves }
     }
 
     fn release(&mut self) {
@@ -311,14 +329,11 @@ impl Aid {
         self.refused_in_a_row = 0;
     }
 
-    /// A rest begins: the bearing is what it now is.
+    /// A rest begins: the bearing is what all that was watched says that it now is.
     fn tie(&mut self, bearing: f64, line: f64, attitude: &mut Attitude) {
-        // The mean of what was watched errs less than the newest.
         let count = self.watched.len() as f64;
-        let newest = self.watched.back().map_or(0.0, |(_, b)| *b);
-        let mean = self.watched.iter().map(|(_, b)| b).sum::<f64>() / count;
         if attitude.anchor_mount(line * line / count.min(10.0)) {
-            self.anchored = Some(bearing + mean - newest);
+            self.anchored = Some(bearing);
             self.counts.rests += 1;
         }
     }

@@ -31,8 +31,9 @@ pub const ABOUT: About = About {
     truth: "ship and gun as closed functions of time, five minutes, roll 5 and pitch 2 deg; the gyro has 0.05 deg/s of bias that no \
             calibration knows; errors count from the heading of the fifth second on",
     rivals: "the gyro alone, and the ship's heading with the gun's first bearing on it",
-    why: "it holds a gun that rests or moves visibly; what creeps slower than the gyro's bias is known to cannot be told from that bias, \
-          and is taken for it: with 0.1 deg/s unknown it errs twice as much as the gyro alone there, and does not know",
+    why: "it holds a gun that rests or moves visibly. A bearing that goes on by more than 0.075 deg/s counts as a gun that creeps and not as \
+          bias: nothing is tied then, the gyro coasts and its deviation says so. A gyro with more bias than that, of which no calibration \
+          knows, is not helped by a ship",
 };
 
 const DEG: f64 = PI / 180.0;
