@@ -6,6 +6,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use bowwave_calibration::{CalibrationFile, to_toml};
+use bowwave_core::geometry::rotation_vector;
 use bowwave_record::{Entry, FrameEntry, Properties, RecordingWriter};
 use bowwave_tests::{bowwave, expect_code};
 use glam::DQuat;
@@ -61,7 +62,7 @@ fn record(moved: &Moved, to: &Path) {
 /// Rotation's error in milliradians, the offset's in milliseconds, and both in stated standard deviations.
 fn errors(found: &CalibrationFile, camera_from_imu: DQuat, offset_s: f64) -> [(f64, f64); 2] {
     let c = &found.calibration;
-    let turn = (camera_from_imu * c.camera_from_imu.inverse()).to_scaled_axis();
+    let turn = rotation_vector(camera_from_imu * c.camera_from_imu.inverse());
     let late = c.time_offset_ns as f64 * 1e-9 - offset_s;
     let sigmas = (turn / c.camera_from_imu_sigma).abs().max_element();
     [(turn.length() * 1e3, sigmas), (late.abs() * 1e3, late.abs() / (c.time_offset_sigma_ns as f64 * 1e-9))]

@@ -138,7 +138,7 @@ fn what_tells_no_lens_is_refused_with_what_is_missing() {
     fs::write(at("nothing").join("text.png"), b"no picture").expect("a file");
     refused(&calibrate(&at("nothing"), &out, &[]), &out, &["text.png"]);
     expect_code(&bowwave(["calibrate", "camera", "x", "--target", "7"]), 2);
-    expect_code(&bowwave(["calibrate"]), 2);
+    expect_code(&bowwave(["calibrate", "nothing"]), 2);
 }
 
 #[test]

@@ -41,7 +41,8 @@ pub const JITTER_MUCH_S: f64 = 0.5e-3;
 pub struct ClockReport {
     /// How much faster than the host's it runs, parts per million.
     pub drift_ppm: f64,
-    /// Standard deviation of that: half of what the hull's neighbouring edges differ by, which bracket the true slope.
+    /// Standard deviation of that: half of what the hull's neighbouring edges differ by, which bracket the true slope, and what jitter makes
+    /// of the line's ends.
     pub drift_sigma_ppm: f64,
     /// By how much mapped times differ from the line that is known by now, seconds, one standard deviation.
     pub jitter_s: f64,
@@ -56,7 +57,7 @@ pub struct ClockReport {
 impl ClockReport {
     /// Whether maintainers should look at it.
     pub fn is_bad(&self) -> bool {
-        self.drift_ppm.abs() > DRIFT_MUCH_PPM || self.jitter_s > JITTER_MUCH_S
+        self.drift_ppm.abs().max(self.drift_sigma_ppm) > DRIFT_MUCH_PPM || self.jitter_s > JITTER_MUCH_S
     }
 }
 
@@ -119,8 +120,8 @@ impl Hull {
         Some((b.1 - a.1) / (b.0 - a.0))
     }
 
-    /// Slope of the line and its standard deviation.
-    fn slope_known(&self) -> Option<(f64, f64)> {
+    /// Slope of the line, half of what its neighbours' slopes differ by, and the line's length in seconds.
+    fn slope_known(&self) -> Option<(f64, f64, f64)> {
         let at = self.edge()?;
         let slope = self.slope(at)?;
         let before = at.checked_sub(1).and_then(|before| self.slope(before));
@@ -129,7 +130,8 @@ impl Hull {
             (Some(one), None) | (None, Some(one)) => (one - slope).abs(),
             (None, None) => return None,
         };
-        Some((slope, spread))
+        let length_s = (self.points.get(at + 1)?.0 - self.points.get(at)?.0) * 1e-9;
+        Some((slope, spread, length_s))
     }
 
     /// Lag at `device_ns` on the line of the hull's edge under the points' mean.
@@ -206,7 +208,7 @@ impl ClockMap {
     /// How the clock does; `None` before that can be told.
     pub fn report(&self) -> Option<ClockReport> {
         let hull = self.current.as_ref().filter(|_| self.kept.len() >= KEPT_MIN)?;
-        let (slope, slope_sigma) = hull.slope_known()?;
+        let (slope, spread, length_s) = hull.slope_known()?;
         let off = |pick: fn(&(i64, i64, i64)) -> i64| {
             let off = move |kept: &(i64, i64, i64)| (pick(kept) - hull.lag_at(kept.0)) as f64 * 1e-9;
             let mean = self.kept.iter().map(off).sum::<f64>() / self.kept.len() as f64;
@@ -219,7 +221,8 @@ impl ClockMap {
         Some(ClockReport {
             // A device whose clock is fast gets less late by its own time.
             drift_ppm: -slope * 1e6,
-            drift_sigma_ppm: slope_sigma * 1e6,
+            // Where neighbours agree by chance, its ends are still no better than what was mapped.
+            drift_sigma_ppm: spread.hypot(2.0 * jitter_s / length_s) * 1e6,
             jitter_s,
             jitter_max_s,
             arrival_jitter_s,
@@ -311,7 +314,9 @@ mod tests {
             map.observe(((i * 5_000_000) as f64 * (1.0 - 50e-6)) as i64, later(i).plus_secs(noise(i) * 1e-3));
         }
         let report = map.report().expect("told");
-        assert!((report.drift_ppm + 50.0).abs() < 1.0 && report.restarts == 1, "{report:?}");
+        // Twenty seconds tell it to some ppm.
+        let off = (report.drift_ppm + 50.0).abs();
+        assert!(off < 5.0 && off < 3.0 * report.drift_sigma_ppm && report.restarts == 1, "{report:?}");
     }
 
     #[test]

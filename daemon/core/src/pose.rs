@@ -83,6 +83,17 @@ pub enum NoPose {
     },
 }
 
+impl NoPose {
+    /// How old the newest orientation is, where it is too old to be used.
+    pub const fn age_ns(self) -> i64 {
+        match self {
+            Self::Stale { age_ns } => age_ns,
+            Self::TooOld { ns } => -ns,
+            Self::Empty => i64::MAX,
+        }
+    }
+}
+
 /// Orientations of the last seconds, by time.
 #[derive(Clone, Debug, Default)]
 pub struct PoseHistory {

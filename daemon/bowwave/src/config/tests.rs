@@ -173,7 +173,7 @@ fn mistakes_are_refused_where_they_are() {
         ("[ship]\ndevice = \"a\"\nlatency_ms = -1\n", "x.toml:3:14: ship.latency_ms is -1: give 0 to 1500"),
         ("[ship]\ndevice = \"a\"\nbaud = 0\n", "x.toml:3:8: ship.baud: "),
         ("[rezero]\nsigma_deg = 1\n", "x.toml:1:1: rezero: give from_bow_deg"),
-        ("[landmarks]\nat = [{ bearing_deg = 400 }]\n", "x.toml:2:22: bearing_deg is 400"),
+        ("[landmarks]\nat = [{ bearing_deg = 400 }]\n", "x.toml:2:23: bearing_deg is 400"),
         ("[heading]\ngrowth_deg_per_h = -1\n", "x.toml:2:20: heading.growth_deg_per_h is -1"),
         ("[health]\nlimit_c = nan\n", "x.toml:2:11: health.limit_c is NaN"),
     ] {

@@ -377,7 +377,7 @@ impl Session {
             fired,
             muzzle: camera.position + camera.world_from_camera * calibration.muzzle_in_camera,
             bore: camera.world_from_camera * calibration.bore_in_camera(),
-            pose_age_ns: orientation.map_or_else(age_of, |o| o.provenance.age_ns()),
+            pose_age_ns: orientation.map_or_else(NoPose::age_ns, |o| o.provenance.age_ns()),
         };
         match cause {
             None => running.rounds.launch(launch, running.start, &mut self.records),
@@ -589,13 +589,4 @@ fn water_to_plan(scenario: &Scenario) -> Water {
         water.force = BeaufortForce::of_wind(0.0);
     }
     water
-}
-
-/// How old the newest orientation is, where it is too old to be used.
-fn age_of(no_pose: NoPose) -> i64 {
-    match no_pose {
-        NoPose::Stale { age_ns } => age_ns,
-        NoPose::TooOld { ns } => -ns,
-        NoPose::Empty => i64::MAX,
-    }
 }
