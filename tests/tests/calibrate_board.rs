@@ -80,9 +80,9 @@ fn calibrated(recording: &Path, further: &[&str], out: &Path) -> CalibrationFile
 #[test]
 fn a_board_moved_by_hand_tells_rotation_and_offset_within_the_goals() {
     let folder = tempfile::tempdir().unwrap();
-    let (path, out) = (folder.path().join("board.mcap"), folder.path().join("gun.toml"));
     let target = board().to_string();
     for (seed, readout_s) in [(1, 0.0), (2, 0.03)] {
+        let [path, out] = ["mcap", "toml"].map(|kind| folder.path().join(format!("board-{seed}.{kind}")));
         let mut moved = Moved::by_hand(board(), 9.0, 12.0, seed);
         moved.recipe.readout_s = readout_s;
         record(&moved, &path);
