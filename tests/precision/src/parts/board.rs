@@ -5,7 +5,10 @@ use bowwave_calibration::{
     capture::{Capture, Watcher},
     target::BoardFinder,
 };
-use bowwave_core::event::{CameraFrame, Event};
+use bowwave_core::{
+    event::{CameraFrame, Event},
+    geometry::rotation_vector,
+};
 use glam::DQuat;
 
 use super::About;
@@ -74,7 +77,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         for (what, unit) in [("rotation", "mrad"), ("offset", "ms")] {
             let tried = found.iter().map(|(way, found)| {
                 let error = found.as_ref().map_or(f64::NAN, |(q, offset_s, _)| {
-                    let turn = (moved.recipe.camera_from_imu * q.inverse()).to_scaled_axis();
+                    let turn = rotation_vector(moved.recipe.camera_from_imu * q.inverse());
                     if unit == "mrad" {
                         turn.length() * 1e3
                     } else {
