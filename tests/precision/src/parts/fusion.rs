@@ -4,6 +4,7 @@ use anyhow::Result;
 use bowwave_core::{
     attitude::{Attitude, HeadingSeen, UpSeen, turn_between},
     event::ImuSample,
+    gunnery::GRAVITY_M_S2,
     time::Time,
 };
 use glam::{DMat3, DQuat, DVec3};
@@ -186,7 +187,7 @@ fn headings(bench: &mut Bench) {
 /// What is wrong with a recording's samples: its name and what does it.
 type Damage = (&'static str, fn(&mut Vec<Sample>));
 
-const DAMAGES: [Damage; 9] = [
+const DAMAGES: [Damage; 10] = [
     ("nothing wrong", |_| ()),
     ("10 ms missing once a second", |all| all.retain(|s| s.time_s % 1.0 > 0.010)),
     ("0.8 s missing once in 20 s", |all| all.retain(|s| s.time_s % 20.0 > 0.8)),
@@ -197,10 +198,11 @@ const DAMAGES: [Damage; 9] = [
     ("every tenth comes after the next", |all| {
         all.chunks_exact_mut(10).for_each(|ten| ten.swap(8, 9));
     }),
-    ("recoil, 30 g for 5 ms, bursts of ten rounds a second", |all| {
-        for s in all.iter_mut().filter(|s| s.time_s % 30.0 < 3.0 && s.time_s % 0.1 < 0.005) {
-            s.accel += DVec3::new(-300.0, 0.0, 40.0);
-        }
+    ("recoil, 30 g for 5 ms, bursts of ten rounds a second", |all| recoil(all)),
+    ("the same recoil, the accelerometer clips at 2 g", |all| {
+        recoil(all);
+        let range = DVec3::splat(2.0 * GRAVITY_M_S2);
+        all.iter_mut().for_each(|s| s.accel = s.accel.clamp(-range, range));
     }),
     ("gyro clips at 40 deg/s, slews are 60", |all| {
         let range = 40f64.to_radians();
@@ -215,6 +217,12 @@ const DAMAGES: [Damage; 9] = [
         }
     }),
 ];
+
+fn recoil(all: &mut [Sample]) {
+    for s in all.iter_mut().filter(|s| s.time_s % 30.0 < 3.0 && s.time_s % 0.1 < 0.005) {
+        s.accel += DVec3::new(-300.0, 0.0, 40.0);
+    }
+}
 
 fn damaged(bench: &mut Bench) {
     for (name, damage) in DAMAGES {
