@@ -6,6 +6,8 @@
 mod distortion;
 mod lens;
 
+use std::f64::consts::TAU;
+
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 pub use distortion::{Distortion, Fisheye, RadialTangential};
@@ -30,6 +32,11 @@ pub fn horizon_distance(height_m: f64) -> f64 {
 /// How far the sea surface has dropped below the tangent plane at `distance_m`, refraction included, metres.
 pub fn curvature_drop(distance_m: f64) -> f64 {
     distance_m * distance_m * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M)
+}
+
+/// An angle by at most half a turn either way, radians.
+pub fn wrapped(angle: f64) -> f64 {
+    angle - TAU * (angle / TAU).round()
 }
 
 /// Rotation vector of the shorter way, radians; exact near nothing, where glam's own goes through an arc cosine.

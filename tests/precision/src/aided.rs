@@ -7,6 +7,7 @@ use bowwave_core::{
         UpSeen,
     },
     event::ImuSample,
+    geometry::wrapped,
     time::Time,
 };
 use glam::{DMat2, DMat3, DQuat, DVec3};
@@ -284,7 +285,7 @@ pub fn outcome(recording: &Recording, aided: &mut dyn Estimator) -> Outcome {
         }
         let tilt = inclination_error(truth, found).to_degrees();
         let heading = ship::heading_error(truth, found);
-        let heading = ship::wrapped(heading - start).to_degrees();
+        let heading = wrapped(heading - start).to_degrees();
         for (sums, error) in [(&mut out.up_deg, tilt), (&mut out.heading_deg, heading)] {
             sums[0] += error * error;
             sums[1] = sums[1].max(error.abs());

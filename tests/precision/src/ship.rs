@@ -3,11 +3,12 @@
 
 use std::f64::consts::TAU;
 
+use bowwave_core::geometry::wrapped;
 use glam::{DMat3, DQuat, DVec3};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
-const GRAVITY: f64 = 9.806_65;
+pub(crate) const GRAVITY: f64 = 9.806_65;
 /// Half the step of the differences that rates and accelerations are made of, seconds.
 const STEP_S: f64 = 1e-4;
 const STEP_WIDE_S: f64 = 2e-3;
@@ -281,9 +282,4 @@ pub fn inclination_error(truth: DQuat, found: DQuat) -> f64 {
 pub fn heading_error(truth: DQuat, found: DQuat) -> f64 {
     let off = found * truth.inverse();
     wrapped(2.0 * off.z.atan2(off.w))
-}
-
-/// The angle less whole turns, between half a turn to either side.
-pub fn wrapped(angle: f64) -> f64 {
-    angle - TAU * (angle / TAU).round()
 }

@@ -8,8 +8,6 @@ mod swell;
 #[cfg(test)]
 mod tests;
 
-use std::f64::consts::TAU;
-
 use glam::{DMat2, DMat3, DQuat, DVec3};
 
 use self::{filter::Filter, inclination::Inclination, own::Own};
@@ -20,7 +18,7 @@ pub use self::{
 use crate::{
     calibration::Calibration,
     event::ImuSample,
-    geometry::rotation_vector,
+    geometry::{rotation_vector, wrapped},
     pose::{NoPose, OrientationAt, OrientationSample, PoseHistory},
     time::Time,
 };
@@ -118,6 +116,17 @@ pub struct HeadingSeen {
     pub off: f64,
     /// Variance of that, rad^2.
     pub variance: f64,
+}
+
+/// What a heading is seen against.
+#[derive(Clone, Copy, Debug)]
+enum Against {
+    /// North itself.
+    North,
+    /// What was anchored.
+    Anchor,
+    /// The ship, by the gun's bearing on its mount.
+    Mount,
 }
 
 /// Orientation by the unit's own estimate; or integrated from its rates, with what is wrong with that estimated from VQF's inclination and
@@ -323,15 +332,13 @@ impl Attitude {
 
     /// Takes in the heading as it is by the ship's and the gun's bearing on its mount; else as [`Self::see_heading`].
     pub fn see_mount(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        let by_own = |own: &mut Own, off| own.see_mount(off, seen.variance, limit);
-        self.correct_heading(seen, |filter, off| filter.see_mount(off, seen.variance, limit), by_own)
+        self.correct_heading(seen, Against::Mount, limit)
     }
 
     /// Takes in a heading, unless that differs by more than `limit` (chi squared with one degree of freedom) from what is known. `None`
     /// where nothing is known of that time.
     pub fn see_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        let by_own = |own: &mut Own, off| own.see_heading(off, seen.variance, limit);
-        self.correct_heading(seen, |filter, off| filter.see_heading(off, seen.variance, limit), by_own)
+        self.correct_heading(seen, Against::North, limit)
     }
 
     /// From now on [`Self::see_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
@@ -345,30 +352,30 @@ impl Attitude {
 
     /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`]. `None` where the unit's own estimate is used.
     pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        if self.own.is_some() {
-            return None;
-        }
-        let by_own = |_: &mut Own, _| (0.0, Outcome { surprise: f64::NAN, taken: false });
-        self.correct_heading(seen, |filter, off| filter.see_anchor(off, seen.variance, limit), by_own)
+        self.correct_heading(seen, Against::Anchor, limit)
     }
 
-    fn correct_heading(
-        &mut self,
-        seen: &HeadingSeen,
-        by_filter: impl FnOnce(&mut Filter, f64) -> (DQuat, Outcome),
-        by_own: impl FnOnce(&mut Own, f64) -> (f64, Outcome),
-    ) -> Option<Outcome> {
+    fn correct_heading(&mut self, seen: &HeadingSeen, against: Against, limit: f64) -> Option<Outcome> {
         self.history.at(seen.time).ok()?;
-        let off = seen.off - TAU * (seen.off / TAU).round();
+        let (off, variance) = (wrapped(seen.off), seen.variance);
         let (turn, outcome) = match (&mut self.own, &mut self.state) {
             (Some((own, _)), _) => {
-                let (turn, outcome) = by_own(own, off);
+                let (turn, outcome) = match against {
+                    Against::North => own.see_heading(off, variance, limit),
+                    Against::Mount => own.see_mount(off, variance, limit),
+                    Against::Anchor => return None,
+                };
                 own.turn += turn;
                 (DQuat::from_rotation_z(turn), outcome)
             }
             (None, State::Running(running)) => {
                 running.filter.predict();
-                let (turn, outcome) = by_filter(&mut running.filter, off);
+                let filter = &mut running.filter;
+                let (turn, outcome) = match against {
+                    Against::North => filter.see_heading(off, variance, limit),
+                    Against::Mount => filter.see_mount(off, variance, limit),
+                    Against::Anchor => filter.see_anchor(off, variance, limit),
+                };
                 running.turn(turn);
                 (turn, outcome)
             }

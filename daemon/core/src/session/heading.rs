@@ -5,10 +5,7 @@
 //! ship together make it; where it rests, the ship's heading holds the gun's, with the bearing as a state of the filter that knows as much as
 //! the heading did when the rest began. Where the gun moves, the bearing is worth nothing, and the gyro coasts.
 
-use std::{
-    collections::VecDeque,
-    f64::consts::{FRAC_PI_2, TAU},
-};
+use std::{collections::VecDeque, f64::consts::FRAC_PI_2};
 
 use glam::{DQuat, DVec3};
 
@@ -16,6 +13,7 @@ use super::steady::SKY_DRIFT;
 use crate::{
     attitude::{Attitude, HeadingSeen},
     event::{MarkKind, ShipSample},
+    geometry::wrapped,
     time::{NS_PER_S, Time},
 };
 
@@ -410,11 +408,6 @@ impl Aid {
         self.release();
         attitude.set_heading(off, sigma).then_some(())
     }
-}
-
-/// An angle by less than half a turn either way.
-fn wrapped(angle: f64) -> f64 {
-    angle - TAU * (angle / TAU).round()
 }
 
 /// Where the camera's axis points, clockwise from north, as its right-hand side tells it; `None` where that stands on end.

@@ -1,3 +1,5 @@
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 
 use super::*;

@@ -7,7 +7,7 @@ use bowwave_core::{
     attitude::Source,
     calibration::Calibration,
     event::{ImuSample, ShipSample},
-    geometry::{look, rotation_vector},
+    geometry::{look, rotation_vector, wrapped},
     session::{HeadingSettings, Sensors},
     time::Time,
 };
@@ -20,7 +20,7 @@ use super::{About, rms, worst};
 use crate::{
     aided::CAMERA_FROM_IMU,
     bench::{Bench, Tried},
-    ship::gaussian,
+    ship::{GRAVITY, gaussian},
 };
 
 /// What is said of this part.
@@ -40,7 +40,6 @@ const DEG: f64 = PI / 180.0;
 const RATE_HZ: f64 = 200.0;
 const SECONDS: f64 = 300.0;
 const START_S: f64 = 5.0;
-const GRAVITY: f64 = 9.806_65;
 
 /// A motion and a feed: the gun's bearing on its mount and the ship's heading (degrees) over time, and what the line says of the latter.
 struct Case {
@@ -184,10 +183,6 @@ struct Found {
 fn heading(world_from_camera: DQuat) -> f64 {
     let ahead = world_from_camera * DVec3::Z;
     ahead.x.atan2(ahead.y)
-}
-
-fn wrapped(angle: f64) -> f64 {
-    angle - TAU * (angle / TAU).round()
 }
 
 /// Measures the cases.
