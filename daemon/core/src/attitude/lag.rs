@@ -36,6 +36,14 @@ impl Lag {
         self.screw.step(self.corner, screw, dt_s);
     }
 
+    /// The world is turned, and what is kept in its axes with it.
+    pub fn turn(&mut self, turn: DMat3) {
+        for followed in [&mut self.axes, &mut self.screw] {
+            followed.through = turn * followed.through;
+            followed.behind = turn * followed.behind;
+        }
+    }
+
     /// The upright axis is another.
     pub fn forget_screw(&mut self) {
         self.screw = Followed::NOTHING;

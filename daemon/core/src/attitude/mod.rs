@@ -1,5 +1,6 @@
 //! From the inertial unit's samples, and from what else tells which way it looks, to its orientation over time.
 
+mod aided;
 mod filter;
 mod inclination;
 mod lag;
@@ -8,11 +9,17 @@ mod swell;
 #[cfg(test)]
 mod tests;
 
-use glam::{DMat2, DMat3, DQuat, DVec3};
+use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
-use self::{filter::Filter, inclination::Inclination, own::Own};
+use self::{
+    aided::{Against, Aids},
+    filter::Filter,
+    inclination::Inclination,
+    own::Own,
+};
 pub use self::{
-    filter::{DIP_SIGMA, Noise, Outcome},
+    aided::{DIP_SIGMA, Outcome},
+    filter::Noise,
     inclination::Settings,
 };
 use crate::{
@@ -118,20 +125,9 @@ pub struct HeadingSeen {
     pub variance: f64,
 }
 
-/// What a heading is seen against.
-#[derive(Clone, Copy, Debug)]
-enum Against {
-    /// North itself.
-    North,
-    /// What was anchored.
-    Anchor,
-    /// The ship, by the gun's bearing on its mount.
-    Mount,
-}
-
-/// Orientation by the unit's own estimate; or integrated from its rates, with what is wrong with that estimated from VQF's inclination and
-/// from what else is seen. Its heading then starts at the unit's own, or else at the camera's "north", and drifts with what is left of the
-/// gyro's bias about the vertical.
+/// Orientation by the unit's own estimate, with what is wrong with that estimated from what else is seen; or integrated from its rates, with
+/// what is wrong with that estimated from VQF's inclination, too. Its heading then starts at the unit's own, or else at the camera's
+/// "north", and drifts with what is left of the gyro's bias about the vertical.
 #[derive(Debug)]
 pub struct Attitude {
     gyro_bias: DVec3,
@@ -139,8 +135,6 @@ pub struct Attitude {
     settings: AttitudeSettings,
     state: State,
     history: PoseHistory,
-    /// Where the unit's own orientation is taken, and when it last told one.
-    own: Option<(Own, Time)>,
     corrected: f64,
 }
 
@@ -150,6 +144,8 @@ enum State {
     Levelling { since: Option<Time>, sum: DVec3, count: u32 },
     /// Integrating.
     Running(Box<Running>),
+    /// The unit's own orientation is taken; when it last told one.
+    Own(Box<Own>, Time),
 }
 
 #[derive(Debug)]
@@ -178,7 +174,6 @@ impl Attitude {
             settings,
             state: State::START,
             history: PoseHistory::new(),
-            own: None,
             corrected: 0.0,
         }
     }
@@ -209,51 +204,63 @@ impl Attitude {
     pub fn restart(&mut self) {
         self.history.clear();
         self.state = State::START;
-        self.own = None;
     }
 
-    /// Covariance of the orientation's error as a turn of the world, rad^2; `None` where the unit's own estimate is used.
+    /// Covariance of the orientation's error as a turn of the world, rad^2; `None` before there is one.
     pub fn covariance(&self) -> Option<DMat3> {
-        match &self.state {
-            State::Running(running) => Some(running.filter.turn_covariance()),
-            State::Levelling { .. } => None,
-        }
+        Some(self.aids()?.turn_covariance())
     }
 
     /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
     pub fn heading_sigma(&self) -> Option<f64> {
-        match (&self.own, &self.state) {
-            (Some((own, _)), _) => Some(own.sigma()),
-            (None, State::Running(running)) => {
-                Some(running.filter.turn_covariance().z_axis.z.max(0.0).sqrt())
-            }
-            (None, State::Levelling { .. }) => None,
-        }
+        Some(self.covariance()?.z_axis.z.max(0.0).sqrt())
     }
 
     /// By how much the heading may drift, standard deviation, rad/s.
     pub fn drift_sigma(&self) -> Option<f64> {
-        match (&self.own, &self.state) {
-            (Some((own, _)), _) => Some(own.drift_sigma()),
-            (None, State::Running(running)) => Some(running.filter.drift_sigma(running.last.world_from_imu)),
-            (None, State::Levelling { .. }) => None,
+        match &self.state {
+            State::Running(running) => Some(running.filter.drift_sigma(running.last.world_from_imu)),
+            State::Own(own, _) => Some(own.drift_sigma()),
+            State::Levelling { .. } => None,
+        }
+    }
+
+    fn aids(&self) -> Option<&dyn Aids> {
+        match &self.state {
+            State::Running(running) => Some(&running.filter.aided),
+            State::Own(own, _) => Some(&own.aided),
+            State::Levelling { .. } => None,
+        }
+    }
+
+    /// What takes in aids, brought to the present.
+    fn aids_now(&mut self) -> Option<&mut dyn Aids> {
+        match &mut self.state {
+            State::Running(running) => {
+                running.filter.predict();
+                Some(&mut running.filter.aided)
+            }
+            State::Own(own, _) => {
+                own.predict();
+                Some(&mut own.aided)
+            }
+            State::Levelling { .. } => None,
         }
     }
 
     /// By how much corrections have turned the world about the vertical in all, radians: with that put back, the orientation's heading is
     /// what the unit alone makes of it.
-    pub const fn corrected(&self) -> f64 {
-        self.corrected
+    pub fn corrected(&self) -> f64 {
+        match &self.state {
+            State::Own(own, _) => own.heading(),
+            State::Running(_) | State::Levelling { .. } => self.corrected,
+        }
     }
 
     /// Rotation from the unit's axes to the camera's as it is known by now.
     fn camera_from_imu(&self) -> DQuat {
-        match &self.state {
-            State::Running(running) => {
-                DQuat::from_scaled_axis(running.filter.mounting()) * self.camera_from_imu
-            }
-            State::Levelling { .. } => self.camera_from_imu,
-        }
+        let mounting = self.aids().map_or(DVec3::ZERO, |aids| aids.mounting());
+        DQuat::from_scaled_axis(mounting) * self.camera_from_imu
     }
 
     /// Rotation from the camera's axes to the world's with the unit as in `world_from_imu`.
@@ -265,43 +272,47 @@ impl Attitude {
     /// about would.
     pub fn world_from_camera(&self, world_from_imu: DQuat) -> DQuat {
         let world_from_camera = self.camera(world_from_imu);
-        let State::Running(running) = &self.state else { return world_from_camera };
+        let dip = self.aids().map_or(0.0, |aids| aids.dip());
         let ahead = world_from_camera * DVec3::Z;
         let right = ahead.cross(DVec3::Z).normalize_or_zero();
-        (DQuat::from_scaled_axis(right * -running.filter.dip()) * world_from_camera).normalize()
+        (DQuat::from_scaled_axis(right * -dip) * world_from_camera).normalize()
     }
 
     /// Takes in where a camera saw up, unless that differs by more than `limit` (chi squared with two degrees of freedom) from what
-    /// is known. `None` where nothing is known of that time, or the unit's own estimate is used.
+    /// is known. `None` where nothing is known of that time.
     pub fn see_up(&mut self, seen: &UpSeen, limit: f64) -> Option<Outcome> {
         let then = self.history.at(seen.time).ok()?.world_from_imu;
         let world_from_camera = self.camera(then);
-        let State::Running(running) = &mut self.state else { return None };
-        running.filter.predict();
         let axes = DMat3::from_quat(world_from_camera);
         let turned = axes * seen.covariance * axes.transpose();
         let across = DMat2::from_cols(turned.x_axis.truncate(), turned.y_axis.truncate());
-        let (turn, outcome) = running.filter.see_up(world_from_camera, seen.up_camera, across, limit);
-        running.turn(turn);
-        self.turn_history(turn);
+        let (turn, outcome) = self.aids_now()?.see_up(world_from_camera, seen.up_camera, across, limit);
+        match &mut self.state {
+            State::Running(running) if outcome.taken => running.filter.saw_up(),
+            State::Own(own, _) if outcome.taken => {
+                let up = world_from_camera * seen.up_camera;
+                own.watch(DVec2::new(up.y, -up.x), 0.5 * (across.x_axis.x + across.y_axis.y));
+            }
+            _ => {}
+        }
+        self.turn(turn);
         Some(outcome)
     }
 
     /// Sets the heading: turns the world by `off` about the vertical, which is then known to `sigma`, radians. `false` where there is no
-    /// estimate of ours yet to be turned. What was anchored before ([`Self::anchor_heading`]) no longer is.
+    /// estimate yet to be turned. What was anchored before ([`Self::anchor_heading`]) no longer is.
     pub fn set_heading(&mut self, off: f64, sigma: f64) -> bool {
+        if self.aids_now().is_none() {
+            return false;
+        }
         let turn = DQuat::from_rotation_z(off);
-        match (&mut self.own, &mut self.state) {
-            (Some((own, _)), _) => {
-                own.set_heading(sigma);
-                own.turn += off;
-            }
-            (None, State::Running(running)) => {
-                running.filter.predict();
-                running.filter.set_heading(sigma);
+        match &mut self.state {
+            State::Own(own, _) => own.set_heading(off, sigma),
+            State::Running(running) => {
+                running.filter.set_heading(off, sigma);
                 running.turn(turn);
             }
-            (None, State::Levelling { .. }) => return false,
+            State::Levelling { .. } => {}
         }
         self.turn_history(turn);
         true
@@ -310,24 +321,12 @@ impl Attitude {
     /// The gun's bearing on its mount is what its heading and the ship's now make it, which errs by `variance` (rad^2) beyond the gun's
     /// heading: from now on [`Self::see_mount`] tells of changes of the ship's heading. `false` where there is no heading yet.
     pub fn anchor_mount(&mut self, variance: f64) -> bool {
-        self.of_mount(|filter| filter.anchor_mount(variance), |own| own.anchor_mount(variance))
+        self.aids_now().map(|aids| aids.anchor_mount(variance)).is_some()
     }
 
     /// The gun's bearing on its mount, or what the ship's instruments say of its heading, may have changed by `variance`, rad^2.
     pub fn walk_mount(&mut self, variance: f64) -> bool {
-        self.of_mount(|filter| filter.walk_mount(variance), |own| own.walk_mount(variance))
-    }
-
-    fn of_mount(&mut self, filter: impl FnOnce(&mut Filter), own: impl FnOnce(&mut Own)) -> bool {
-        match (&mut self.own, &mut self.state) {
-            (Some((state, _)), _) => own(state),
-            (None, State::Running(running)) => {
-                running.filter.predict();
-                filter(&mut running.filter);
-            }
-            (None, State::Levelling { .. }) => return false,
-        }
-        true
+        self.aids_now().map(|aids| aids.walk_mount(variance)).is_some()
     }
 
     /// Takes in the heading as it is by the ship's and the gun's bearing on its mount; else as [`Self::see_heading`].
@@ -344,45 +343,30 @@ impl Attitude {
     /// From now on [`Self::see_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
     /// may turn by some `drift` rad/s itself, steadily, as seen from a ship under way; what is learnt of that stays over later anchors.
     pub fn anchor_heading(&mut self, drift: f64) -> bool {
-        let State::Running(running) = &mut self.state else { return false };
-        running.filter.predict();
-        running.filter.anchor(drift);
-        true
+        self.aids_now().map(|aids| aids.anchor(drift)).is_some()
     }
 
-    /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`]. `None` where the unit's own estimate is used.
+    /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`].
     pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
         self.correct_heading(seen, Against::Anchor, limit)
     }
 
     fn correct_heading(&mut self, seen: &HeadingSeen, against: Against, limit: f64) -> Option<Outcome> {
         self.history.at(seen.time).ok()?;
-        let (off, variance) = (wrapped(seen.off), seen.variance);
-        let (turn, outcome) = match (&mut self.own, &mut self.state) {
-            (Some((own, _)), _) => {
-                let (turn, outcome) = match against {
-                    Against::North => own.see_heading(off, variance, limit),
-                    Against::Mount => own.see_mount(off, variance, limit),
-                    Against::Anchor => return None,
-                };
-                own.turn += turn;
-                (DQuat::from_rotation_z(turn), outcome)
-            }
-            (None, State::Running(running)) => {
-                running.filter.predict();
-                let filter = &mut running.filter;
-                let (turn, outcome) = match against {
-                    Against::North => filter.see_heading(off, variance, limit),
-                    Against::Mount => filter.see_mount(off, variance, limit),
-                    Against::Anchor => filter.see_anchor(off, variance, limit),
-                };
-                running.turn(turn);
-                (turn, outcome)
-            }
-            (None, State::Levelling { .. }) => return None,
-        };
-        self.turn_history(turn);
+        let aids = self.aids_now()?;
+        let (turn, outcome) = aids.see_heading(against, wrapped(seen.off), seen.variance, limit);
+        self.turn(turn);
         Some(outcome)
+    }
+
+    /// The world is turned by a little, from now on and in what was before.
+    fn turn(&mut self, turn: DQuat) {
+        match &mut self.state {
+            State::Running(running) => running.turn(turn),
+            State::Own(own, _) => own.turn(turn),
+            State::Levelling { .. } => {}
+        }
+        self.turn_history(turn);
     }
 
     /// What was before is turned with the world, too.
@@ -391,17 +375,16 @@ impl Attitude {
         self.history.turn(turn);
     }
 
-    /// The unit's own orientation at `time`, turned by what is known to be wrong with its heading.
+    /// The unit's own orientation at `time`, turned by what is known to be wrong with it.
     fn own(&mut self, time: Time, world_from_imu: DQuat) -> DQuat {
-        let growth = self.settings.own_growth;
-        let (own, last) = self.own.get_or_insert_with(|| (Own::new(growth), time));
-        own.predict(time.ns_since(*last).max(0) as f64 * 1e-9);
-        *last = time.max(*last);
-        // Most units' headings are never corrected: theirs stay as they were sent.
-        if own.turn == 0.0 {
-            return world_from_imu;
+        let (growth, mounting) = (self.settings.own_growth, self.settings.noise.mounting);
+        if !matches!(self.state, State::Own(..)) {
+            self.state = State::Own(Box::new(Own::new(growth, mounting)), time);
         }
-        (DQuat::from_rotation_z(own.turn) * world_from_imu).normalize()
+        let State::Own(own, last) = &mut self.state else { return world_from_imu };
+        let dt_s = time.ns_since(*last).max(0) as f64 * 1e-9;
+        *last = time.max(*last);
+        own.corrected(world_from_imu, dt_s)
     }
 
     fn find(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
@@ -410,8 +393,9 @@ impl Attitude {
             let world_from_imu = self.own(time, q.normalize());
             return Some(OrientationSample { time, world_from_imu, rate });
         }
-        self.own = None;
         match &mut self.state {
+            // A unit that tells its orientation now and then tells nothing in between.
+            State::Own(_, last) if time.ns_since(*last).abs() <= GAP_NS => None,
             State::Running(running) => {
                 let dt_ns = time.ns_since(running.last.time);
                 if dt_ns.abs() > GAP_NS {
@@ -427,38 +411,38 @@ impl Attitude {
                 }
                 Some(running.last)
             }
-            State::Levelling { since, sum, count } => {
-                *sum += sample.accel;
-                *count += 1;
-                let since = *since.get_or_insert(time);
-                let span_ns = time.ns_since(since);
-                if span_ns < LEVEL_NS {
-                    return None;
-                }
-                let levelled = level(*sum / f64::from(*count), self.camera_from_imu);
-                let world_from_imu = sample.world_from_imu.map_or(levelled, |own| headed(levelled, own));
-                let [shortest, longest] = PERIODS_S;
-                let period_s = span_ns as f64 * 1e-9 / f64::from(*count - 1).max(1.0);
-                let inclination = Inclination::new(
-                    &self.settings.inclination,
-                    period_s.clamp(shortest, longest),
-                    world_from_imu,
-                );
-                let last = OrientationSample { time, world_from_imu, rate };
-                let filter = Filter::new(self.settings.noise, self.settings.inclination);
-                let running = Running {
-                    inclination,
-                    filter,
-                    last,
-                    rate,
-                    before: None,
-                    fastest: DVec3::ZERO,
-                    inclined_s: 0.0,
-                };
-                self.state = State::Running(Box::new(running));
-                Some(last)
-            }
+            State::Own(..) | State::Levelling { .. } => self.level_out(time, sample, rate),
         }
+    }
+
+    /// Gathers specific force until it tells which way is up.
+    fn level_out(&mut self, time: Time, sample: &ImuSample, rate: DVec3) -> Option<OrientationSample> {
+        let (since, sum, count) = match self.state {
+            State::Levelling { since, sum, count } => (since.unwrap_or(time), sum, count),
+            State::Running(_) | State::Own(..) => (time, DVec3::ZERO, 0),
+        };
+        let (sum, count) = (sum + sample.accel, count + 1);
+        self.state = State::Levelling { since: Some(since), sum, count };
+        let span_ns = time.ns_since(since);
+        if span_ns < LEVEL_NS {
+            return None;
+        }
+        let levelled = level(sum / f64::from(count), self.camera_from_imu);
+        let world_from_imu = sample.world_from_imu.map_or(levelled, |own| headed(levelled, own));
+        let [shortest, longest] = PERIODS_S;
+        let period_s = (span_ns as f64 * 1e-9 / f64::from(count - 1).max(1.0)).clamp(shortest, longest);
+        let last = OrientationSample { time, world_from_imu, rate };
+        let running = Running {
+            inclination: Inclination::new(&self.settings.inclination, period_s, world_from_imu),
+            filter: Filter::new(self.settings.noise, self.settings.inclination),
+            last,
+            rate,
+            before: None,
+            fastest: DVec3::ZERO,
+            inclined_s: 0.0,
+        };
+        self.state = State::Running(Box::new(running));
+        Some(last)
     }
 }
 

@@ -1,82 +1,177 @@
-//! What is known of the heading of a unit whose own orientation is taken: two states, its error and the gun's bearing on its mount.
+//! What is wrong with an orientation that the unit finds by itself, and how far that is known.
+//!
+//! Such a unit corrects itself by ways that it does not tell, so that nothing can be said of its gyro. What can be said: its error on an axis
+//! goes to and fro about a mean within seconds and that mean creeps within minutes; its heading's mean drifts for as long as it runs.
 
-use glam::{DMat2, DVec2};
+use glam::{DQuat, DVec2, DVec3};
 
-use super::Outcome;
+use super::aided::{Aided, COMMON, HEADING, TURN};
 
-/// A filter of a unit's own heading. What is wrong with it grows steadily, as a unit's gyro has it drift: variances of a random walk would
-/// have it drift ever slower.
+/// Beside what all have: mean of the turn that the world needs (3), the rate of the heading's.
+const MEAN: usize = COMMON;
+const MEAN_HEADING: usize = MEAN + HEADING;
+const RATE: usize = MEAN + 3;
+const STATES: usize = RATE + 1;
+
+/// The mean inclination is wrong by this: data sheets of the class have half a degree at rest, radians.
+const MEAN_SIGMA: f64 = 0.5f64.to_radians();
+/// It forgets itself in this time, seconds.
+const MEAN_TAU_S: f64 = 300.0;
+/// What goes to and fro about it, on an axis, before that has been watched, radians...
+const SWAY_START: f64 = 0.1f64.to_radians();
+/// ...at least, ...
+const SWAY_LEAST: f64 = 0.01f64.to_radians();
+/// ...and at most.
+const SWAY_MOST: f64 = 1f64.to_radians();
+/// It forgets itself in this time, seconds.
+const SWAY_TAU_S: f64 = 3.0;
+/// How far it goes is told by errors this long apart, seconds,...
+const APART_S: f64 = 1.0;
+/// ...over so long, seconds.
+const WATCHED_MOST_S: f64 = 60.0;
+/// What the heading has of that. An inclination is held by gravity, a heading by nothing that a wave turns; radians.
+const HEADING_SWAY: f64 = 0.03f64.to_radians();
+/// A drift forgets itself in this time, seconds.
+const RATE_TAU_S: f64 = 3600.0;
+/// Errors are brought to the present this often at least, seconds.
+const STEP_S: f64 = 0.1;
+
+/// A filter of the turn by which a unit's own world is to be turned.
 #[derive(Clone, Debug)]
 pub(super) struct Own {
-    /// By what the unit's world is turned about the vertical, radians.
-    pub(super) turn: f64,
-    /// Covariance of that turn's error and of the mount's, rad^2.
-    covariance: DMat2,
-    mount: f64,
+    /// States and how far they are known.
+    pub(super) aided: Aided<STATES>,
+    /// By what the unit's world is turned: about the vertical first, then by a small tilt; radians.
+    heading: f64,
+    tilt: DVec2,
     /// By how much the deviation of the unit's heading grows, rad/s.
     growth: f64,
+    /// Time since the last prediction, seconds.
+    dt_s: f64,
+    sway: Sway,
 }
 
-/// How a measured number changes with heading and mount.
-const HEADING: DVec2 = DVec2::X;
-const DIFFERENCE: DVec2 = DVec2::new(1.0, -1.0);
+/// How far inclination goes to and fro, by what was seen of it.
+#[derive(Clone, Copy, Debug)]
+struct Sway {
+    /// Variance on an axis, rad^2.
+    variance: f64,
+    watched_s: f64,
+    /// An error that was seen, with the variance of that, and how long ago.
+    before: Option<(DVec2, f64)>,
+    since_s: f64,
+}
 
 impl Own {
-    /// A unit whose heading counts as right now.
-    pub(super) const fn new(growth: f64) -> Self {
-        Self { turn: 0.0, covariance: DMat2::ZERO, mount: 0.0, growth }
-    }
-
-    /// Standard deviation of the heading, radians.
-    pub(super) fn sigma(&self) -> f64 {
-        self.covariance.x_axis.x.max(0.0).sqrt()
-    }
-
-    /// How fast that grows, rad/s.
-    pub(super) const fn drift_sigma(&self) -> f64 {
-        self.growth
-    }
-
-    /// `dt_s` seconds went by.
-    pub(super) fn predict(&mut self, dt_s: f64) {
-        let grown = self.growth * dt_s;
-        self.covariance.x_axis.x += (2.0 * self.sigma() + grown) * grown;
-    }
-
-    /// The heading is set from outside and known to that deviation.
-    pub(super) fn set_heading(&mut self, deviation: f64) {
-        self.covariance = DMat2::from_diagonal(DVec2::new(deviation * deviation, 10.0));
-    }
-
-    pub(super) fn anchor_mount(&mut self, variance: f64) {
-        let heading = self.covariance.x_axis.x;
-        self.covariance = DMat2::from_cols_array(&[heading, heading, heading, heading + variance]);
-        self.mount = 0.0;
-    }
-
-    pub(super) fn walk_mount(&mut self, variance: f64) {
-        self.covariance.y_axis.y += variance;
-    }
-
-    /// As the filter's; gives by what the world is to be turned.
-    pub(super) fn see_heading(&mut self, off: f64, variance: f64, limit: f64) -> (f64, Outcome) {
-        self.update(HEADING, off, variance, limit)
-    }
-
-    pub(super) fn see_mount(&mut self, off: f64, variance: f64, limit: f64) -> (f64, Outcome) {
-        self.update(DIFFERENCE, off + self.mount, variance, limit)
-    }
-
-    fn update(&mut self, row: DVec2, differ: f64, variance: f64, limit: f64) -> (f64, Outcome) {
-        let across = self.covariance * row;
-        let expected = row.dot(across) + variance;
-        let surprise = differ * differ / expected;
-        if surprise.is_nan() || surprise > limit {
-            return (0.0, Outcome { surprise, taken: false });
+    /// A unit whose mean heading counts as right now.
+    pub(super) fn new(growth: f64, mounting: DVec3) -> Self {
+        let mut aided = Aided::new(mounting);
+        for axis in 0..2 {
+            aided.forget(MEAN + axis, MEAN_SIGMA);
+            aided.copy(TURN + axis, MEAN + axis);
+            aided.walk(TURN + axis, SWAY_START * SWAY_START);
         }
-        self.covariance -= DMat2::from_cols(across * across.x, across * across.y) * expected.recip();
-        let error = across * (differ / expected);
-        self.mount += error.y;
-        (error.x, Outcome { surprise, taken: true })
+        aided.forget(HEADING, HEADING_SWAY);
+        aided.forget(RATE, growth);
+        Self { aided, heading: 0.0, tilt: DVec2::ZERO, growth, dt_s: 0.0, sway: Sway::START }
+    }
+
+    /// The unit's own orientation `dt_s` seconds after the one before, without what is known to be wrong with it.
+    pub(super) fn corrected(&mut self, world_from_imu: DQuat, dt_s: f64) -> DQuat {
+        self.dt_s += dt_s;
+        if self.dt_s >= STEP_S {
+            self.predict();
+        }
+        // Where nothing was ever seen it stays as it was sent.
+        if self.heading == 0.0 && self.tilt == DVec2::ZERO {
+            return world_from_imu;
+        }
+        let turn = DQuat::from_scaled_axis(self.tilt.extend(0.0)) * DQuat::from_rotation_z(self.heading);
+        (turn * world_from_imu).normalize()
+    }
+
+    /// By what the unit's world is turned about the vertical, radians.
+    pub(super) const fn heading(&self) -> f64 {
+        self.heading
+    }
+
+    /// By how much the heading may drift, standard deviation, rad/s.
+    pub(super) fn drift_sigma(&self) -> f64 {
+        self.aided.variance(RATE).max(0.0).sqrt()
+    }
+
+    /// Brings all to the present.
+    pub(super) fn predict(&mut self) {
+        let dt = std::mem::take(&mut self.dt_s);
+        if dt <= 0.0 {
+            return;
+        }
+        self.sway.since_s += dt;
+        self.aided.pass_time(dt);
+        let (creeps, sways) = ((-dt / MEAN_TAU_S).exp(), (-dt / SWAY_TAU_S).exp());
+        for axis in 0..2 {
+            let mean = self.aided.at(MEAN + axis);
+            // The world turns back towards where the unit's own mean has it.
+            self.tilt[axis] += (1.0 - sways) * (mean - self.tilt[axis]);
+            self.revert(TURN + axis, MEAN + axis, sways, self.sway.variance);
+            self.aided.fade(MEAN + axis, creeps, MEAN_SIGMA * MEAN_SIGMA);
+        }
+        self.heading += (1.0 - sways) * (self.aided.at(MEAN_HEADING) - self.heading);
+        self.revert(HEADING, MEAN_HEADING, sways, HEADING_SWAY * HEADING_SWAY);
+        self.aided.carry(MEAN_HEADING, RATE, dt);
+        self.aided.fade(RATE, (-dt / RATE_TAU_S).exp(), self.growth * self.growth);
+    }
+
+    /// A state keeps that share of how it differs from its mean, and chance makes up what its variance loses. What is known of it is kept
+    /// elsewhere.
+    fn revert(&mut self, state: usize, mean: usize, kept: f64, variance: f64) {
+        self.aided.fade(state, kept, variance);
+        self.aided.add(state, mean, 1.0 - kept);
+    }
+
+    /// The heading is set from outside: the world is turned by `off` about the vertical, which is then known to `deviation`.
+    pub(super) fn set_heading(&mut self, off: f64, deviation: f64) {
+        self.aided.set_heading(off, deviation, &[MEAN]);
+        self.heading += off;
+        self.tilt = DVec2::from_angle(off).rotate(self.tilt);
+        self.aided.copy(MEAN_HEADING, HEADING);
+        self.aided.walk(MEAN_HEADING, HEADING_SWAY * HEADING_SWAY);
+        self.aided.set(MEAN_HEADING, self.heading);
+    }
+
+    /// The world has been turned by what an aid told; where that was up, `seen` is by what it was to be turned, with that variance.
+    pub(super) fn turn(&mut self, turn: DQuat) {
+        let turn = turn.to_scaled_axis();
+        self.tilt += turn.truncate();
+        self.heading += turn.z;
+    }
+
+    /// Learns from an error of inclination that was seen, as the turn that the world as it is now believed needs, and its variance on an axis.
+    pub(super) fn watch(&mut self, turn: DVec2, variance: f64) {
+        self.sway.watch(self.tilt + turn, variance);
+    }
+}
+
+impl Sway {
+    const START: Self =
+        Self { variance: SWAY_START * SWAY_START, watched_s: 0.0, before: None, since_s: 0.0 };
+
+    /// Takes in a whole error of the unit: two that lie apart differ by twice the variance that has not stayed and by what seeing errs by.
+    fn watch(&mut self, error: DVec2, seen: f64) {
+        match self.before {
+            Some((_, _)) if self.since_s < APART_S => return,
+            Some((before, seen_before)) if self.since_s < 2.0 * APART_S => {
+                let kept = (-self.since_s / SWAY_TAU_S).exp();
+                let apart = 0.5 * before.distance_squared(error) - seen - seen_before;
+                let variance = 0.5 * apart / (1.0 - kept);
+                self.watched_s = (self.watched_s + self.since_s).min(WATCHED_MOST_S);
+                // A few look like chance: what was expected counts as much as ten seconds.
+                let share = self.since_s / (self.watched_s + 10.0).min(WATCHED_MOST_S);
+                let now = self.variance + share * (variance - self.variance);
+                self.variance = now.clamp(SWAY_LEAST * SWAY_LEAST, SWAY_MOST * SWAY_MOST);
+            }
+            _ => {}
+        }
+        (self.before, self.since_s) = (Some((error, seen)), 0.0);
     }
 }

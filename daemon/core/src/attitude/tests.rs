@@ -195,3 +195,112 @@ fn the_units_own_orientation_is_taken_as_it_is() {
     assert!(o.world_from_imu.angle_between(q) < 1e-9);
     assert_eq!(o.rate, DVec3::ZERO);
 }
+
+/// A unit's own orientation, sent 100 times a second while it looks the same way, wrong by a turn of the world that `wrong` tells by the
+/// second; `aid` is told of each tenth with the time and with what is believed. Gives root mean square and largest error after `settle_s`,
+/// radians, with the heading's and without.
+fn own(
+    estimator: &mut Attitude,
+    (from_s, to_s, settle_s): (f64, f64, f64),
+    wrong: impl Fn(f64) -> DVec3,
+    mut aid: impl FnMut(&mut Attitude, Time, f64),
+) -> (f64, f64) {
+    let truth = look(0.4, -0.1, 0.02);
+    let (mut square, mut worst, mut count) = (0.0, 0.0f64, 0.0f64);
+    for i in (from_s * 100.0) as i64..(to_s * 100.0) as i64 {
+        let (t, time) = (i as f64 * 0.01, Time::from_ns(i * 10_000_000));
+        let mut s = sample(DVec3::ZERO, DVec3::Z);
+        s.world_from_imu = Some(DQuat::from_scaled_axis(wrong(t)) * truth);
+        let found = estimator.observe(time, &s).unwrap().world_from_imu;
+        if i % 10 == 0 {
+            aid(estimator, time, t);
+        }
+        if t >= settle_s {
+            let off = rotation_vector(truth * found.inverse());
+            square += off.length_squared();
+            worst = worst.max(off.length());
+            count += 1.0;
+        }
+    }
+    ((square / count).sqrt(), worst)
+}
+
+const DEG: f64 = std::f64::consts::PI / 180.0;
+
+/// What a horizon with that noise says, which is drawn.
+fn horizon_seen(rng: &mut rand_pcg::Pcg64, time: Time, sigma: f64) -> UpSeen {
+    let mut noise = || (0..12).map(|_| rng.random_range(-0.5..0.5)).sum::<f64>() * sigma;
+    let up_camera = look(0.4, -0.1, 0.02).inverse() * DVec3::new(noise(), noise(), 1.0);
+    UpSeen { time, up_camera, covariance: DMat3::IDENTITY * sigma * sigma }
+}
+
+#[test]
+fn a_units_own_inclination_is_held_by_horizons() {
+    let mut rng = <rand_pcg::Pcg64 as rand::SeedableRng>::seed_from_u64(3);
+    // Half a degree off, a tenth to and fro: a unit on a small ship.
+    let wrong = |t: f64| DVec3::new(0.5 + 0.1 * (0.9 * t).sin(), -0.3 + 0.1 * (0.7 * t).cos(), 0.0) * DEG;
+    let mut estimator = attitude(Source::Auto, DVec3::ZERO);
+    let sigma = 0.03 * DEG;
+    let (rms, worst) = own(&mut estimator, (0.0, 60.0, 10.0), wrong, |estimator, time, _| {
+        let outcome = estimator.see_up(&horizon_seen(&mut rng, time, sigma), 13.8).unwrap();
+        assert!(outcome.surprise < 25.0, "{outcome:?}");
+    });
+    assert!(rms < 0.05 * DEG && worst < 0.15 * DEG, "{} {} deg", rms / DEG, worst / DEG);
+    // It knows how wrong it is: refraction is nothing here, but may have been.
+    let known = estimator.covariance().unwrap();
+    assert!((0.02 * DEG..0.2 * DEG).contains(&known.x_axis.x.sqrt()), "{known}");
+    // Without a horizon its mean is held.
+    let (rms, _) = own(&mut estimator, (60.0, 80.0, 60.0), wrong, |_, _, _| ());
+    assert!(rms < 0.15 * DEG, "{} deg", rms / DEG);
+}
+
+#[test]
+fn a_units_own_heading_is_averaged_where_the_sky_holds_it() {
+    // To and fro by 0.05 deg, and it drifts by 5 deg/h.
+    let wrong = |t: f64| DVec3::Z * (0.05 * (1.1 * t).sin() + t * 5.0 / 3600.0) * DEG;
+    let run = |with_sky: bool| {
+        let mut estimator = attitude(Source::Auto, DVec3::ZERO);
+        let truth = look(0.4, -0.1, 0.02);
+        let mut held = None;
+        own(&mut estimator, (0.0, 60.0, 20.0), wrong, |estimator, time, _| {
+            if !with_sky {
+                return;
+            }
+            let believed = estimator.at(time).unwrap().world_from_imu;
+            let off = rotation_vector(truth * believed.inverse()).z;
+            match held {
+                None => {
+                    estimator.anchor_heading(1e-6);
+                    held = Some(off);
+                }
+                Some(then) => {
+                    let seen = HeadingSeen { time, off: off - then, variance: (0.005 * DEG).powi(2) };
+                    estimator.see_anchored_heading(&seen, 1e3).unwrap();
+                }
+            }
+        })
+        .0 / DEG
+    };
+    let (alone, held) = (run(false), run(true));
+    assert!(alone > 0.06 && held < 0.04, "{alone} {held} deg");
+}
+
+#[test]
+fn a_heading_that_is_set_turns_what_is_known_of_up() {
+    let wrong = |_: f64| DVec3::new(0.5, 0.0, 0.0) * DEG;
+    let mut rng = <rand_pcg::Pcg64 as rand::SeedableRng>::seed_from_u64(3);
+    let mut estimator = attitude(Source::Auto, DVec3::ZERO);
+    own(&mut estimator, (0.0, 20.0, 0.0), wrong, |estimator, time, _| {
+        estimator.see_up(&horizon_seen(&mut rng, time, 0.01 * DEG), 13.8);
+    });
+    let up = |estimator: &Attitude| {
+        let found = estimator.at(estimator.newest().unwrap()).unwrap().world_from_imu;
+        (found * (look(0.4, -0.1, 0.02).inverse() * DVec3::Z)).truncate().length()
+    };
+    assert!(up(&estimator) < 0.06 * DEG);
+    assert!(estimator.set_heading(100.0 * DEG, 0.1 * DEG));
+    assert!((estimator.heading_sigma().unwrap() - 0.1 * DEG).abs() < 1e-12);
+    assert!((estimator.corrected() - 100.0 * DEG).abs() < 0.1 * DEG);
+    own(&mut estimator, (20.0, 25.0, 99.0), wrong, |_, _, _| ());
+    assert!(up(&estimator) < 0.08 * DEG, "{} deg", up(&estimator) / DEG);
+}

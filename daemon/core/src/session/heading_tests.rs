@@ -168,9 +168,10 @@ fn a_drop_out_is_ridden_through() {
     let mut rig = Rig::new(0.01, |_| 30.0, gone, HeadingSettings::default());
     rig.run(100.0);
     let coasted = rig.error_deg();
-    assert!((0.5..0.8).contains(&coasted), "{coasted} deg");
+    // A minute of the unit's drift is 0.6 deg; it was learnt while the ship held the heading.
+    assert!(coasted.abs() < 0.2, "{coasted} deg");
     rig.run(160.0);
-    // The rest after it is tied to what the heading was by then: it comes back no farther than that.
+    // The rest after it is tied to what the heading was by then.
     assert!(rig.error_deg().abs() < coasted.abs() + 0.1, "{} deg", rig.error_deg());
 }
 

@@ -17,6 +17,7 @@ mod lens;
 mod motion;
 mod mount;
 mod orientation;
+mod own;
 mod pacing;
 mod reflection;
 mod sea;
@@ -59,6 +60,7 @@ pub const PARTS: &[Part] = &[
     Part { about: attitude::ABOUT, measure: attitude::measure },
     Part { about: orientation::ABOUT, measure: orientation::measure },
     Part { about: fusion::ABOUT, measure: fusion::measure },
+    Part { about: own::ABOUT, measure: own::measure },
     Part { about: heading::ABOUT, measure: heading::measure },
     Part { about: horizon::ABOUT, measure: horizon::measure },
     Part { about: skyline::ABOUT, measure: skyline::measure },

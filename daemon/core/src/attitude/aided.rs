@@ -1,0 +1,374 @@
+//! What every estimate of the orientation has in common: how wrong it is believed to be, and what cameras and ships tell of that.
+//!
+//! The error is a small turn of the world: `true = exp(error) estimate` (Sola, "Quaternion kinematics for the error-state Kalman filter",
+//! 2017, section 7, global error). A turn of the world hardly changes from one sample to the next, so that a measurement made some
+//! frames ago corrects the present.
+
+use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
+use nalgebra::{SMatrix, SVector};
+
+/// Where the states lie that all have: turn of the world (3), ...
+pub(super) const TURN: usize = 0;
+/// ...of which the heading is the last, ...
+pub(super) const HEADING: usize = 2;
+/// ...turn of the camera against the unit in the camera's axes (3), ...
+const MOUNTING: usize = 3;
+/// ...how much higher the horizon stands than geometry has it, ...
+const DIP: usize = 6;
+/// ...turn about the vertical of the anchor and its rate, ...
+const ANCHOR: usize = 7;
+const ANCHOR_RATE: usize = 8;
+/// ...turn of the gun on its mount.
+const MOUNT: usize = 9;
+/// How many these are.
+pub(super) const COMMON: usize = 10;
+
+/// Refraction moves the true horizon by as much from day to day and hour to hour (design figures: 0.08 to 0.12 deg in daytime), radians.
+pub const DIP_SIGMA: f64 = 0.1f64.to_radians();
+/// It forgets itself in this time, seconds.
+const DIP_TAU_S: f64 = 3600.0;
+
+/// How a measured number changes with the states.
+pub(super) type Row<const N: usize> = SVector<f64, N>;
+
+/// By what a measurement differs from what was expected, and whether it was believed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// Square of the difference over its expected variance: chi squared with as many degrees of freedom as the measurement has.
+    pub surprise: f64,
+    /// Whether it was taken in.
+    pub taken: bool,
+}
+
+/// What a measurement changes: the world is to be turned by this.
+pub(super) type Correction = DQuat;
+
+/// What a heading is seen against.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Against {
+    /// North itself.
+    North,
+    /// What was anchored.
+    Anchor,
+    /// The ship, by the gun's bearing on its mount.
+    Mount,
+}
+
+/// `N` states: estimates and the covariance of their errors. What of the estimates is a turn of the world is put into the orientation at
+/// once and kept there.
+#[derive(Clone, Debug)]
+pub(super) struct Aided<const N: usize> {
+    covariance: SMatrix<f64, N, N>,
+    estimate: SVector<f64, N>,
+}
+
+/// What cameras and ships tell, whatever else the states are.
+pub(super) trait Aids {
+    /// Covariance of the turn of the world, rad^2.
+    fn turn_covariance(&self) -> DMat3;
+
+    /// Turn of the camera against its calibrated place on the unit, radians, about the camera's axes.
+    fn mounting(&self) -> DVec3;
+
+    /// By how much the horizon stands higher than geometry has it, radians.
+    fn dip(&self) -> f64;
+
+    /// Takes in the direction of up that the camera saw, in the camera's axes, with the covariance of its part across up, rad^2, in the
+    /// world's horizontal axes; `limit` is the surprise beyond which it is not believed.
+    fn see_up(
+        &mut self,
+        world_from_camera: DQuat,
+        up_camera: DVec3,
+        covariance: DMat2,
+        limit: f64,
+    ) -> (Correction, Outcome);
+
+    /// Takes in that by what is seen the world is to be turned by `off` about the vertical, rad, known to that variance.
+    fn see_heading(&mut self, against: Against, off: f64, variance: f64, limit: f64)
+    -> (Correction, Outcome);
+
+    /// The gun's bearing on its mount is what heading and the ship's heading now make it, which errs by `variance` beyond the heading.
+    fn anchor_mount(&mut self, variance: f64);
+
+    /// The bearing, or what the ship says of its own heading, may have changed by `variance`.
+    fn walk_mount(&mut self, variance: f64);
+
+    /// From now on what is seen of the anchor tells of changes since now; what is anchored in turns by `drift` rad/s itself.
+    fn anchor(&mut self, drift: f64);
+}
+
+impl<const N: usize> Aided<N> {
+    /// Nothing learnt yet of a camera that is mounted on the unit to within `mounting`, rad.
+    pub fn new(mounting: DVec3) -> Self {
+        let mut aided = Self { covariance: SMatrix::zeros(), estimate: SVector::zeros() };
+        for axis in 0..3 {
+            aided.forget(MOUNTING + axis, mounting[axis]);
+        }
+        aided.forget(DIP, DIP_SIGMA);
+        aided
+    }
+
+    /// What is known of a state.
+    pub fn at(&self, state: usize) -> f64 {
+        self.estimate[state]
+    }
+
+    /// Of two of them.
+    pub fn two(&self, state: usize) -> DVec2 {
+        DVec2::new(self.estimate[state], self.estimate[state + 1])
+    }
+
+    /// Of three of them.
+    pub fn three(&self, state: usize) -> DVec3 {
+        self.two(state).extend(self.estimate[state + 2])
+    }
+
+    /// A state is known otherwise from now on; its error stays as it is.
+    pub fn set(&mut self, state: usize, estimate: f64) {
+        self.estimate[state] = estimate;
+    }
+
+    /// Variance of a state's error.
+    pub fn variance(&self, state: usize) -> f64 {
+        self.covariance[(state, state)]
+    }
+
+    /// Covariance of three states' errors.
+    pub fn covariance(&self, state: usize) -> DMat3 {
+        let p = &self.covariance;
+        DMat3::from_cols_array_2d(&[0, 1, 2].map(|c| [0, 1, 2].map(|r| p[(state + r, state + c)])))
+    }
+
+    /// What `dt_s` seconds do to the states that all have, but for the turn.
+    pub fn pass_time(&mut self, dt_s: f64) {
+        self.fade(DIP, (-dt_s / DIP_TAU_S).exp(), DIP_SIGMA * DIP_SIGMA);
+        self.carry(ANCHOR, ANCHOR_RATE, dt_s);
+    }
+
+    /// Chance adds that variance to a state.
+    pub fn walk(&mut self, state: usize, variance: f64) {
+        self.covariance[(state, state)] += variance;
+    }
+
+    /// Error of the state `to` grows by `share` of that of the state `from`: states that nothing happens to are left out, which makes this
+    /// ten times as fast as the product of matrices.
+    pub fn add(&mut self, to: usize, from: usize, share: f64) {
+        let p = &mut self.covariance;
+        for other in 0..N {
+            p[(to, other)] += share * p[(from, other)];
+        }
+        for other in 0..N {
+            p[(other, to)] += share * p[(other, from)];
+        }
+    }
+
+    /// The same for what is known of it, too.
+    pub fn carry(&mut self, to: usize, from: usize, share: f64) {
+        self.estimate[to] += share * self.estimate[from];
+        self.add(to, from, share);
+    }
+
+    /// Two states become `change` of what they were, and chance adds `added` to their covariance.
+    pub fn mix(&mut self, at: [usize; 2], change: DMat2, added: DMat2) {
+        let rows = [change.row(0), change.row(1)];
+        let now = change * DVec2::new(self.estimate[at[0]], self.estimate[at[1]]);
+        (self.estimate[at[0]], self.estimate[at[1]]) = (now.x, now.y);
+        let p = &mut self.covariance;
+        for other in 0..N {
+            let both = DVec2::new(p[(at[0], other)], p[(at[1], other)]);
+            (p[(at[0], other)], p[(at[1], other)]) = (rows[0].dot(both), rows[1].dot(both));
+        }
+        for other in 0..N {
+            let both = DVec2::new(p[(other, at[0])], p[(other, at[1])]);
+            (p[(other, at[0])], p[(other, at[1])]) = (rows[0].dot(both), rows[1].dot(both));
+        }
+        for (row, of_row) in at.into_iter().enumerate() {
+            for (column, of_column) in at.into_iter().enumerate() {
+                p[(of_row, of_column)] += added.col(column)[row];
+            }
+        }
+    }
+
+    /// The state keeps that share of itself, and chance makes up what its variance loses.
+    pub fn fade(&mut self, state: usize, kept: f64, variance: f64) {
+        self.estimate[state] *= kept;
+        for other in 0..N {
+            self.covariance[(state, other)] *= kept;
+            self.covariance[(other, state)] *= kept;
+        }
+        self.covariance[(state, state)] += variance * (1.0 - kept * kept);
+    }
+
+    /// Nothing is known of the state any longer but its deviation.
+    pub fn forget(&mut self, state: usize, deviation: f64) {
+        self.estimate[state] = 0.0;
+        self.covariance.row_mut(state).fill(0.0);
+        self.covariance.column_mut(state).fill(0.0);
+        self.covariance[(state, state)] = deviation * deviation;
+    }
+
+    /// Error of the state `to` is from now on that of the state `from`.
+    pub fn copy(&mut self, to: usize, from: usize) {
+        let mut row = self.covariance.row(from).into_owned();
+        row[to] = row[from];
+        self.covariance.set_row(to, &row);
+        self.covariance.set_column(to, &row.transpose());
+    }
+
+    /// The heading is set from outside and known to that deviation: what was known of it before holds no longer. The world is turned by
+    /// `off` about the vertical, and with it what lies along its axes: the turn's own tilt, and the states that come in pairs at `pairs`.
+    pub fn set_heading(&mut self, off: f64, deviation: f64, pairs: &[usize]) {
+        self.forget(HEADING, deviation);
+        self.forget(ANCHOR, std::f64::consts::PI);
+        self.forget(MOUNT, std::f64::consts::PI);
+        let turned = DMat2::from_angle(off);
+        for at in std::iter::once(TURN).chain(pairs.iter().copied()) {
+            self.mix([at, at + 1], turned, DMat2::ZERO);
+        }
+    }
+
+    /// Takes in a number that differs by `differ` from what was expected.
+    pub fn update_one(
+        &mut self,
+        row: &Row<N>,
+        differ: f64,
+        variance: f64,
+        limit: f64,
+    ) -> (Correction, Outcome) {
+        let gain = self.covariance * row;
+        let expected = row.dot(&gain) + variance;
+        let surprise = differ * differ / expected;
+        if surprise.is_nan() || surprise > limit {
+            return (DQuat::IDENTITY, Outcome { surprise, taken: false });
+        }
+        self.covariance -= gain * gain.transpose() / expected;
+        self.hold_symmetric();
+        (self.put_in(&(gain * (differ / expected))), Outcome { surprise, taken: true })
+    }
+
+    /// Takes in two numbers.
+    pub fn update(
+        &mut self,
+        rows: &[Row<N>; 2],
+        differ: DVec2,
+        noise: DMat2,
+        limit: f64,
+    ) -> (Correction, Outcome) {
+        let rows = SMatrix::<f64, N, 2>::from_columns(rows);
+        let differ = SVector::<f64, 2>::new(differ.x, differ.y);
+        let noise = SMatrix::<f64, 2, 2>::from_fn(|r, c| noise.col(c)[r]);
+        let across = self.covariance * rows;
+        let expected = rows.transpose() * across + noise;
+        let Some(inverse) = expected.try_inverse() else {
+            return (DQuat::IDENTITY, Outcome { surprise: f64::NAN, taken: false });
+        };
+        let surprise = (differ.transpose() * inverse * differ)[(0, 0)];
+        if surprise.is_nan() || surprise > limit {
+            return (DQuat::IDENTITY, Outcome { surprise, taken: false });
+        }
+        let gain = across * inverse;
+        // Joseph's form, (I - K H) P (I - K H)' + K R K', from the left: what rounding left of the second factor is taken off by it.
+        self.covariance -= gain * across.transpose();
+        let rest = self.covariance * rows - gain * noise;
+        self.covariance -= rest * gain.transpose();
+        self.hold_symmetric();
+        (self.put_in(&(gain * differ)), Outcome { surprise, taken: true })
+    }
+
+    fn hold_symmetric(&mut self) {
+        self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
+    }
+
+    /// Adds the estimated error to what is known; what is left is the turn of the world.
+    fn put_in(&mut self, error: &SVector<f64, N>) -> Correction {
+        self.estimate += error;
+        let turn = self.three(TURN);
+        self.estimate.fixed_rows_mut::<3>(TURN).fill(0.0);
+        DQuat::from_scaled_axis(turn)
+    }
+}
+
+impl<const N: usize> Aids for Aided<N> {
+    fn turn_covariance(&self) -> DMat3 {
+        self.covariance(TURN)
+    }
+
+    fn mounting(&self) -> DVec3 {
+        self.three(MOUNTING)
+    }
+
+    fn dip(&self) -> f64 {
+        self.at(DIP)
+    }
+
+    fn see_up(
+        &mut self,
+        world_from_camera: DQuat,
+        up_camera: DVec3,
+        covariance: DMat2,
+        limit: f64,
+    ) -> (Correction, Outcome) {
+        let up = world_from_camera * up_camera;
+        let mut rows = up_rows();
+        let axes = DMat3::from_quat(world_from_camera);
+        // A horizon that stands higher tilts up away from where the camera looks.
+        let ahead = axes.z_axis.truncate().normalize_or_zero();
+        for column in 0..3 {
+            let turned = axes.col(column);
+            rows[0][MOUNTING + column] = turned.y;
+            rows[1][MOUNTING + column] = -turned.x;
+        }
+        rows[0][DIP] = -ahead.x;
+        rows[1][DIP] = -ahead.y;
+        let differ = up.truncate() + ahead * self.dip();
+        self.update(&rows, differ, covariance, limit)
+    }
+
+    fn see_heading(
+        &mut self,
+        against: Against,
+        off: f64,
+        variance: f64,
+        limit: f64,
+    ) -> (Correction, Outcome) {
+        let mut row = Row::zeros();
+        row[HEADING] = 1.0;
+        let reference = match against {
+            Against::North => None,
+            Against::Anchor => Some(ANCHOR),
+            Against::Mount => Some(MOUNT),
+        };
+        let mut turned = 0.0;
+        if let Some(state) = reference {
+            row[state] = -1.0;
+            turned = self.at(state);
+        }
+        self.update_one(&row, off + turned, variance, limit)
+    }
+
+    fn anchor_mount(&mut self, variance: f64) {
+        self.copy(MOUNT, HEADING);
+        self.walk(MOUNT, variance);
+        self.set(MOUNT, 0.0);
+    }
+
+    fn walk_mount(&mut self, variance: f64) {
+        self.walk(MOUNT, variance);
+    }
+
+    fn anchor(&mut self, drift: f64) {
+        self.copy(ANCHOR, HEADING);
+        self.set(ANCHOR, 0.0);
+        if self.variance(ANCHOR_RATE) <= 0.0 {
+            self.forget(ANCHOR_RATE, drift);
+        }
+    }
+}
+
+/// How the horizontal parts of where up is found change with the turn of the world: `up + up x turn`.
+pub(super) fn up_rows<const N: usize>() -> [Row<N>; 2] {
+    let mut rows = [Row::zeros(); 2];
+    rows[0][TURN + 1] = -1.0;
+    rows[1][TURN] = 1.0;
+    rows
+}
