@@ -162,7 +162,12 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
         calibration.readout_ns = 0;
     }
     let lens = calibration.lens;
-    let scenario = format!("[mount]\neye_height_m = {:?}\n", recipe.eye_height_m);
+    // Who sets up an exercise knows how high the gun stands, and from the weather report how far one sees: that to a third.
+    let visibility_km = recipe.visibility_m / 1000.0 * if how.exact { 1.0 } else { 1.3 };
+    let scenario = format!(
+        "[mount]\neye_height_m = {:?}\n[light]\nsun_azimuth_deg = 112\nsun_elevation_deg = 38\nvisibility_km = {visibility_km:?}\n",
+        recipe.eye_height_m
+    );
     let usual = HeadingSettings::default();
     let mut session = Session::new(Setup {
         scenario: Scenario::parse(&scenario, "registration")?,

@@ -12,6 +12,7 @@
 mod cells;
 mod edges;
 mod fit;
+mod haze;
 mod judge;
 mod mask;
 mod rays;
@@ -20,6 +21,7 @@ use std::ops::Range;
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
+pub use haze::lowered_by_haze;
 pub use mask::Mask;
 
 use crate::{

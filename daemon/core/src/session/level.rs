@@ -6,7 +6,7 @@ use crate::{
     attitude::{self, Attitude, UpSeen},
     event::Picture,
     geometry::Lens,
-    horizon::{HorizonFinder, Mask, Prior, View},
+    horizon::{HorizonFinder, Mask, Prior, View, lowered_by_haze},
     time::Time,
 };
 
@@ -32,17 +32,20 @@ pub struct HorizonCounts {
 pub(super) struct Level {
     finder: HorizonFinder,
     eye_height_m: f64,
+    /// By how much lower than the true horizon the one that is seen stands, radians.
+    lowered: f64,
     next: Time,
     counts: HorizonCounts,
 }
 
 impl Level {
-    /// `mask` hides the own ship.
-    pub(super) fn new(eye_height_m: f64, mask: Option<Mask>) -> Self {
+    /// One for pictures by that lens, in haze that leaves `visibility_m` metres; `mask` hides the own ship.
+    pub(super) fn new(lens: &Lens, eye_height_m: f64, visibility_m: f64, mask: Option<Mask>) -> Self {
         let (next, counts) = (Time::MIN, HorizonCounts::default());
+        let lowered = lowered_by_haze(lens, eye_height_m, visibility_m);
         let mut finder = HorizonFinder::new();
         finder.set_mask(mask);
-        Self { finder, eye_height_m, next, counts }
+        Self { finder, eye_height_m, lowered, next, counts }
     }
 
     pub(super) const fn counts(&self) -> HorizonCounts {
@@ -67,7 +70,10 @@ impl Level {
             self.counts.none += 1;
             return;
         };
-        let seen = UpSeen { time, up_camera: horizon.up, covariance: horizon.up_covariance() };
+        // An edge that stands too low tilts up towards where the camera looks.
+        let right = DVec3::Z.cross(horizon.up).normalize_or_zero();
+        let up_camera = (horizon.up + right.cross(horizon.up) * self.lowered).normalize_or_zero();
+        let seen = UpSeen { time, up_camera, covariance: horizon.up_covariance() };
         match attitude.see_up(&seen, SURPRISE_MAX) {
             Some(outcome) if outcome.taken => self.counts.taken += 1,
             _ => self.counts.refused += 1,

@@ -177,6 +177,7 @@ impl Session {
             &setup.heading,
             setup.own_ship.as_ref(),
             setup.scenario.eye_height_m,
+            setup.scenario.visibility_m,
         );
         let weapon = Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt);
         let meter = LightMeter::new(scenario.sun_direction, scenario.water.method);

@@ -68,14 +68,15 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// Sensors with that calibration, `eye_height_m` above the sea, that have reported nothing; orientation is found from `source`, `mask`
-    /// hides the own ship in the pictures.
+    /// Sensors with that calibration, `eye_height_m` above the sea, in haze that leaves `visibility_m` metres, that have reported nothing; orientation is
+    /// found from `source`, `mask` hides the own ship in the pictures.
     pub fn new(
         calibration: &Calibration,
         source: Source,
         heading: &HeadingSettings,
         mask: Option<&Mask>,
         eye_height_m: f64,
+        visibility_m: f64,
     ) -> Self {
         let mut settings = AttitudeSettings::new(source, calibration);
         settings.own_growth = heading.own_growth.unwrap_or(settings.own_growth);
@@ -83,7 +84,7 @@ impl Sensors {
             time_offset_ns: calibration.time_offset_ns,
             readout_ns: calibration.readout_ns,
             lens: calibration.lens,
-            level: Level::new(eye_height_m, mask.cloned()),
+            level: Level::new(&calibration.lens, eye_height_m, visibility_m, mask.cloned()),
             steady: Steady::new(
                 eye_height_m,
                 calibration.time_offset_sigma_ns as f64 * 1e-9,
@@ -273,7 +274,7 @@ mod tests {
             gyro_bias: DVec3::ZERO,
             gyro_bias_sigma: DVec3::ONE,
         };
-        Sensors::new(&calibration, Source::Auto, &HeadingSettings::default(), None, 5.0)
+        Sensors::new(&calibration, Source::Auto, &HeadingSettings::default(), None, 5.0, 20_000.0)
     }
 
     fn sample(i: i64) -> ImuSample {

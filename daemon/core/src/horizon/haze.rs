@@ -1,0 +1,109 @@
+//! How much lower than the true horizon the edge lies that is seen through haze.
+//!
+//! Near the horizon haze has nearly the sky's colour, and water at half the horizon's distance stands only a pixel below it: what is found
+//! as the edge is that of water some kilometres nearer. How much that is depends on how edges are found, so the finder itself is asked, with
+//! pictures of nothing but sky, water and haze.
+
+use std::sync::Arc;
+
+use super::{HorizonFinder, Prior, View};
+use crate::{
+    event::{Picture, PixelFormat},
+    geometry::{Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
+    view::haze_share,
+};
+use glam::DVec3;
+
+/// Rows of the pictures in the lens's own pixels: a tenth of a picture's height, but no fewer than the finder wants.
+const ROWS: u32 = 256;
+/// The horizon stands at so many different places within a row.
+const PHASES: u32 = 4;
+/// Codes of sky, and of water without haze.
+const SKY: f64 = 200.0;
+const WATER: f64 = 90.0;
+/// Pieces of a row, over which its light is summed.
+const PIECES: u32 = 8;
+/// How well the pictures' up is foretold to the finder, radians.
+const PRIOR_SIGMA: f64 = 0.1f64.to_radians();
+
+/// By how much lower than the true horizon the finder sees it with that lens from that height, at a meteorological visibility of
+/// `visibility_m` metres; radians. Nothing where haze leaves no edge that is found.
+pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> f64 {
+    let height = lens.height.min(ROWS);
+    let flat = Lens {
+        height,
+        distortion: Distortion::None,
+        row_turn: DVec3::ZERO,
+        centre: glam::DVec2::new(lens.centre.x, f64::from(height) / 2.0),
+        ..*lens
+    };
+    let mut finder = HorizonFinder::new();
+    let (mut sum, mut count) = (0.0, 0);
+    for phase in 0..PHASES {
+        let elevation = f64::from(phase) / f64::from(PHASES) / lens.focal.y;
+        let Some(picture) = picture(&flat, elevation, eye_height_m, visibility_m) else { continue };
+        let prior = Prior { up: look(0.0, elevation, 0.0).inverse() * DVec3::Z, sigma: PRIOR_SIGMA };
+        let view = View { lens: flat, eye_height_m, prior: Some(prior) };
+        if let Ok(found) = finder.find(&picture, &view) {
+            // An edge that lies lower makes the camera look higher.
+            sum += found.elevation() - elevation;
+            count += 1;
+        }
+    }
+    if count > 0 { sum / f64::from(count) } else { 0.0 }
+}
+
+/// Sky, water and haze, seen level but for `elevation` (radians).
+fn picture(lens: &Lens, elevation: f64, eye_height_m: f64, visibility_m: f64) -> Option<Picture> {
+    let row_bytes = lens.width as usize * 3;
+    let mut bytes = Vec::with_capacity(row_bytes * lens.height as usize);
+    for row in 0..lens.height {
+        let piece = |i: u32| {
+            let y = f64::from(row) + (f64::from(i) + 0.5) / f64::from(PIECES);
+            let depression = ((y - lens.centre.y) / lens.focal.y).atan() - elevation;
+            seen(depression, eye_height_m, visibility_m)
+        };
+        let code = (0..PIECES).map(piece).sum::<f64>() / f64::from(PIECES);
+        bytes.resize(bytes.len() + row_bytes, code.round() as u8);
+    }
+    Picture::new(PixelFormat::Rgb, lens.width, lens.height, Arc::from(bytes)).ok()
+}
+
+/// What is seen at an angle below the horizontal, codes.
+fn seen(depression: f64, eye_height_m: f64, visibility_m: f64) -> f64 {
+    if depression <= horizon_dip(eye_height_m) {
+        return SKY;
+    }
+    // The nearer of the two places where a ray at that angle meets a sea that drops with the square of distance.
+    let drop = (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M);
+    let root = (depression * depression - 4.0 * drop * eye_height_m).max(0.0).sqrt();
+    let range = 2.0 * eye_height_m / (depression + root);
+    let haze = f64::from(haze_share(range, visibility_m));
+    WATER + haze * (SKY - WATER)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn haze_lowers_the_edge_that_is_seen() {
+        let lens = Lens::pinhole(1280, 720, 1.05);
+        let by = |visibility_m| lowered_by_haze(&lens, 8.0, visibility_m).to_degrees();
+        assert!(by(500_000.0).abs() < 0.005, "{} deg in clear air", by(500_000.0));
+        assert!((0.01..0.05).contains(&by(35_000.0)), "{} deg", by(35_000.0));
+        assert!(by(15_000.0) > 1.5 * by(35_000.0), "{} deg", by(15_000.0));
+        // Fog, or a lens that sees nothing, lower nothing.
+        assert!(by(1.0).abs() < 0.3 && by(0.0).abs() < 0.01, "{} {}", by(1.0), by(0.0));
+        assert_eq!(lowered_by_haze(&Lens { width: 8, ..lens }, 8.0, 35_000.0), 0.0);
+    }
+
+    #[test]
+    fn water_is_seen_where_geometry_has_it() {
+        // From 8 m, 1 km away: 8 mrad less what the Earth's curve and refraction make, 0.068 mrad.
+        let depression = 8.0 / 1000.0 + 1000.0 * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M);
+        let half = 3912.0 / 2f64.ln();
+        assert!((seen(depression, 8.0, half) - 0.5 * (SKY + WATER)).abs() < 0.01);
+        assert_eq!(seen(0.0, 8.0, half), SKY);
+    }
+}
