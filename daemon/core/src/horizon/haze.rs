@@ -2,7 +2,7 @@
 //!
 //! Near the horizon haze has nearly the sky's colour, and water at half the horizon's distance stands only a pixel below it: what is found
 //! as the edge is that of water some kilometres nearer. How much that is depends on how edges are found, so the finder itself is asked, with
-//! pictures of nothing but sky, water and haze.
+//! pictures of nothing but sky, water and haze, as a camera's tone curve has them.
 
 use std::sync::Arc;
 
@@ -10,6 +10,7 @@ use super::{HorizonFinder, Prior, View};
 use crate::{
     event::{Picture, PixelFormat},
     geometry::{Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
+    light::linear_to_srgb,
     view::haze_share,
 };
 use glam::DVec3;
@@ -18,9 +19,9 @@ use glam::DVec3;
 const ROWS: u32 = 256;
 /// The horizon stands at so many different places within a row.
 const PHASES: u32 = 4;
-/// Codes of sky, and of water without haze.
-const SKY: f64 = 200.0;
-const WATER: f64 = 90.0;
+/// Light of sky, and of water without haze, over that of white.
+const SKY: f64 = 0.58;
+const WATER: f64 = 0.1;
 /// Pieces of a row, over which its light is summed.
 const PIECES: u32 = 8;
 /// How well the pictures' up is foretold to the finder, radians.
@@ -53,7 +54,8 @@ pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> f64
     if count > 0 { sum / f64::from(count) } else { 0.0 }
 }
 
-/// Sky, water and haze, seen level but for `elevation` (radians).
+/// Sky, water and haze, seen level but for `elevation` (radians). Light is summed before it is put in codes, which moves an edge towards
+/// the dark.
 fn picture(lens: &Lens, elevation: f64, eye_height_m: f64, visibility_m: f64) -> Option<Picture> {
     let row_bytes = lens.width as usize * 3;
     let mut bytes = Vec::with_capacity(row_bytes * lens.height as usize);
@@ -63,13 +65,13 @@ fn picture(lens: &Lens, elevation: f64, eye_height_m: f64, visibility_m: f64) ->
             let depression = ((y - lens.centre.y) / lens.focal.y).atan() - elevation;
             seen(depression, eye_height_m, visibility_m)
         };
-        let code = (0..PIECES).map(piece).sum::<f64>() / f64::from(PIECES);
-        bytes.resize(bytes.len() + row_bytes, code.round() as u8);
+        let light = (0..PIECES).map(piece).sum::<f64>() / f64::from(PIECES);
+        bytes.resize(bytes.len() + row_bytes, (255.0 * linear_to_srgb(light as f32)).round() as u8);
     }
     Picture::new(PixelFormat::Rgb, lens.width, lens.height, Arc::from(bytes)).ok()
 }
 
-/// What is seen at an angle below the horizontal, codes.
+/// Light at an angle below the horizontal.
 fn seen(depression: f64, eye_height_m: f64, visibility_m: f64) -> f64 {
     if depression <= horizon_dip(eye_height_m) {
         return SKY;
@@ -90,7 +92,8 @@ mod tests {
     fn haze_lowers_the_edge_that_is_seen() {
         let lens = Lens::pinhole(1280, 720, 1.05);
         let by = |visibility_m| lowered_by_haze(&lens, 8.0, visibility_m).to_degrees();
-        assert!(by(500_000.0).abs() < 0.005, "{} deg in clear air", by(500_000.0));
+        // A sixth of a pixel is the camera's own tone curve, haze or none.
+        assert!(by(500_000.0).abs() < 0.012, "{} deg in clear air", by(500_000.0));
         assert!((0.01..0.05).contains(&by(35_000.0)), "{} deg", by(35_000.0));
         assert!(by(15_000.0) > 1.5 * by(35_000.0), "{} deg", by(15_000.0));
         // Fog, or a lens that sees nothing, lower nothing.
@@ -103,7 +106,7 @@ mod tests {
         // From 8 m, 1 km away: 8 mrad less what the Earth's curve and refraction make, 0.068 mrad.
         let depression = 8.0 / 1000.0 + 1000.0 * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M);
         let half = 3912.0 / 2f64.ln();
-        assert!((seen(depression, 8.0, half) - 0.5 * (SKY + WATER)).abs() < 0.01);
+        assert!((seen(depression, 8.0, half) - 0.5 * (SKY + WATER)).abs() < 1e-4);
         assert_eq!(seen(0.0, 8.0, half), SKY);
     }
 }

@@ -11,6 +11,7 @@ mod drawn;
 mod flight;
 mod fresnel;
 mod fusion;
+mod haze;
 mod heading;
 mod horizon;
 mod lens;
@@ -63,6 +64,7 @@ pub const PARTS: &[Part] = &[
     Part { about: own::ABOUT, measure: own::measure },
     Part { about: heading::ABOUT, measure: heading::measure },
     Part { about: horizon::ABOUT, measure: horizon::measure },
+    Part { about: haze::ABOUT, measure: haze::measure },
     Part { about: skyline::ABOUT, measure: skyline::measure },
     Part { about: lens::ABOUT, measure: lens::measure },
     Part { about: drawn::ABOUT, measure: drawn::measure },
