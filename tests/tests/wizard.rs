@@ -82,7 +82,7 @@ fn a_good_movement_passes_and_is_saved_as_the_recordings_own_command_does() {
         "horizon in ",
         " mrad, ",
         " m at 500 m usable",
-        "PASS: usable; boats lie within",
+        "   PASS\n   usable; boats lie within",
         "-> Press Enter to save; what is replaced is kept",
         "-> Saved; press Enter",
     ] {
@@ -108,7 +108,7 @@ fn traverse_only_names_what_is_missing_and_saves_nothing() {
     for words in [
         "!! ONLY TRAVERSE SO FAR",
         "-> Elevate the gun up and down",
-        "FAIL: ",
+        "   FAIL\n",
         "the movement that was missing: elevation (up and down)",
     ] {
         assert!(said.contains(words), "'{words}' is missing:\n{said}");
@@ -160,9 +160,13 @@ fn the_lens_is_found_from_a_board_that_is_led_over_the_picture() {
     let output = wizard(&path, "\n\n\n", &further);
     expect_code(&output, 0);
     let said = told(&output);
-    for words in
-        ["!! HOLD THE BOARD STILL", "   seen in ", "pictures: 12 of 12 good", "PASS: the lens is", "-> Saved"]
-    {
+    for words in [
+        "!! HOLD THE BOARD STILL",
+        "   seen in ",
+        "pictures: 12 of 12 good",
+        "   PASS\n   the lens is",
+        "-> Saved",
+    ] {
         assert!(said.contains(words), "'{words}' is missing:\n{said}");
     }
     let found = CalibrationFile::read(&out).unwrap().calibration;

@@ -58,13 +58,12 @@ fn result(w: &Wizard) -> Guide {
         (false, false) => "Press Enter to gather more",
         (false, true) => "Record again as the lines say; press Enter to end",
     };
-    let verdict = format!("{}: {}", solved.sheet.verdict, solved.sheet.says);
     Guide {
         says: says.to_owned(),
         problem: w.refused.clone(),
         gauges: solved.gauges.clone(),
         passed: Some(passed),
-        lines: [verdict].into_iter().chain(solved.sheet.notes.iter().cloned()).collect(),
+        lines: [&solved.sheet.says].into_iter().chain(&solved.sheet.notes).cloned().collect(),
         keys: if passed {
             "Enter or trigger: save   b: gather more   q: end"
         } else {
@@ -91,7 +90,8 @@ fn device(w: &Wizard) -> Option<String> {
     let matters = |fault: &Fault| match fault.code().split('_').next() {
         Some("CAM") => w.task != Task::Trigger,
         Some("IMU") => needs_unit,
-        Some("TRG") => w.task.wants_pulls(),
+        // Nobody pulls the trigger of a gun that may not be inert.
+        Some("TRG" | "NOT") => w.task.wants_pulls(),
         _ => false,
     };
     let raised = w.faults.active().filter(|f| f.severity() > Severity::Note).find(matters);

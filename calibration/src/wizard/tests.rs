@@ -105,7 +105,7 @@ fn a_good_movement_ends_in_a_pass_that_is_saved() {
     assert_eq!(press(&mut wizard, Key::Next), None);
     let guide = wizard.guide();
     assert_eq!((wizard.step(), guide.passed), (Step::Result, Some(true)));
-    assert!(guide.lines[0].starts_with("PASS: good"), "{guide:?}");
+    assert!(guide.lines[0].starts_with("good"), "{guide:?}");
     let Some(Found::Alignment(found, how)) = press(&mut wizard, Key::Next) else { panic!("{guide:?}") };
     let off = recording.recipe.camera_from_imu.angle_between(found.camera_from_imu);
     assert!(off < 1e-3 && how.contains("board, good"), "{off} {how}");
@@ -226,6 +226,9 @@ fn the_trigger_is_a_key_but_not_where_pulls_are_measured() {
     assert_eq!(wizard.step(), Step::Gather);
     (0..9).for_each(|i| wizard.take(edge(5.0 + f64::from(i))));
     assert_eq!(wizard.step(), Step::Gather);
+    wizard.take(Input::Fault(FaultChange::raised(wizard.now, Fault::NotInert, "test")));
+    let inert = "NOT ARMED: GUN NOT INERT: FIT THE INERT PLUG";
+    assert_eq!(wizard.guide().problem.as_deref(), Some(inert));
 }
 
 #[test]

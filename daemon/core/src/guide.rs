@@ -79,3 +79,62 @@ pub struct Guide {
     /// What keys and trigger do.
     pub keys: &'static str,
 }
+
+impl Guide {
+    /// The word for [`Guide::passed`].
+    pub fn verdict(&self) -> Option<&'static str> {
+        self.passed.map(|passed| if passed { "PASS" } else { "FAIL" })
+    }
+}
+
+/// A text in lines that fit, broken between words, and within a word only where that alone does not fit. `fits` holds for every
+/// beginning of a text for which it holds.
+pub fn wrapped(text: &str, fits: impl Fn(&str) -> bool) -> Vec<&str> {
+    let longest = |ends: &mut dyn Iterator<Item = usize>, rest: &str| {
+        ends.take_while(|end| fits(&rest[..*end])).last().filter(|end| *end > 0)
+    };
+    let (mut lines, mut rest) = (Vec::new(), text);
+    while let Some(first) = rest.chars().next() {
+        let mut words = rest.match_indices(' ').map(|(at, _)| at).chain([rest.len()]);
+        let mut letters = rest.char_indices().map(|(at, letter)| at + letter.len_utf8());
+        // A letter that does not fit stands alone, or there would be no end.
+        let end = longest(&mut words, rest)
+            .or_else(|| longest(&mut letters, rest))
+            .unwrap_or_else(|| first.len_utf8());
+        lines.push(&rest[..end]);
+        rest = &rest[end..];
+        rest = rest.strip_prefix(' ').unwrap_or(rest);
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn lines_break_between_words_and_only_words_without_room_within() {
+        let lines = |text| wrapped(text, |line| line.len() <= 8);
+        for (text, expected) in [
+            ("", &[][..]),
+            ("aim anew", &["aim anew"]),
+            ("aim anew, pull", &["aim", "anew,", "pull"]),
+            ("  2 lens", &["  2 lens"]),
+            ("in data/calibrate.mcap", &["in", "data/cal", "ibrate.m", "cap"]),
+        ] {
+            assert_eq!(lines(text), expected, "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_but_spaces_at_breaks_is_lost(text in "\\PC{0,80}", most in 0_usize..20) {
+            let lines = wrapped(&text, |line| line.chars().count() <= most);
+            prop_assert!(lines.iter().all(|line| line.chars().count() <= most.max(1)));
+            let letters = |text: &str| text.replace(' ', "");
+            prop_assert_eq!(letters(&lines.concat()), letters(&text));
+        }
+    }
+}

@@ -2,7 +2,7 @@
 //! the upper left, which parts of the picture were seen at the upper right. Nothing stands in the middle: neither is there a mark to
 //! aim with.
 
-use bowwave_core::guide::{Cell, Coverage, Gauge, Guide, Rating};
+use bowwave_core::guide::{Cell, Coverage, Gauge, Guide, Rating, wrapped};
 
 use super::{
     AMBER, CYAN, GREEN, Glyphs, HudLayout, HudQuad, RED, SHAPE_CROSS, SHAPE_DIAMOND, SHAPE_DISC, SHAPE_RING,
@@ -59,7 +59,8 @@ impl HudLayout {
         let room = right_max - pad - text_x;
         let mut lines: Vec<Line<'_>> = Vec::new();
         let mut add = |text, colour, icon| {
-            for (n, text) in wrapped(glyphs, text, room).into_iter().take(LINES_MOST).enumerate() {
+            let fits = |line: &str| glyphs.width_of(TextSize::Small, line) <= room;
+            for (n, text) in wrapped(text, fits).into_iter().take(LINES_MOST).enumerate() {
                 lines.push(Line { text, colour, icon: if n == 0 { icon } else { None } });
             }
         };
@@ -77,18 +78,15 @@ impl HudLayout {
         let height = large + small * lines.len() as f32 + 0.5 * pad;
         let top = (self.size.1 as f32 - pad - height).round();
         let width = |l: &Line<'_>| glyphs.width_of(TextSize::Small, l.text);
-        let (word, colour) = match guide.passed {
-            Some(true) => (" PASS", GREEN),
-            Some(false) => (" FAIL", RED),
-            None => ("", WHITE),
-        };
+        let word = guide.verdict().map_or_else(String::new, |word| format!(" {word}"));
+        let colour = if guide.passed == Some(true) { GREEN } else { RED };
         let title = guide.title.as_str();
-        let head = glyphs.width_of(TextSize::Large, title) + glyphs.width_of(TextSize::Large, word);
+        let head = glyphs.width_of(TextSize::Large, title) + glyphs.width_of(TextSize::Large, &word);
         let right = lines.iter().map(|l| text_x + width(l)).fold(2.0 * pad + head, f32::max) + pad;
         self.plate([pad, top, right.min(right_max), top + height]);
         let size = if 2.0 * pad + head <= right_max - pad { TextSize::Large } else { TextSize::Small };
         let end = self.text(glyphs, size, (2.0 * pad, top), WHITE, title);
-        self.text(glyphs, size, (end, top), colour, word);
+        self.text(glyphs, size, (end, top), colour, &word);
         for (line, n) in lines.iter().zip(0_u8..) {
             let y = top + large + small * f32::from(n);
             if let Some((shape, colour)) = line.icon {
@@ -174,24 +172,6 @@ impl HudLayout {
 /// A value without what follows its comma: metres stand in the result.
 fn short(value: &str) -> &str {
     value.split(',').next().unwrap_or(value)
-}
-
-/// A text in lines no wider than `room`, broken between words; a word that is wider stands alone.
-fn wrapped<'a>(glyphs: &Glyphs, text: &'a str, room: f32) -> Vec<&'a str> {
-    let mut lines = Vec::new();
-    let (mut begin, mut end) = (0, 0);
-    for (at, word) in text.split(' ').map(|w| (w.as_ptr() as usize - text.as_ptr() as usize, w)) {
-        let to = at + word.len();
-        if end > begin && glyphs.width_of(TextSize::Small, &text[begin..to]) > room {
-            lines.push(&text[begin..end]);
-            begin = at;
-        }
-        end = to;
-    }
-    if end > begin {
-        lines.push(&text[begin..end]);
-    }
-    lines
 }
 
 #[cfg(test)]

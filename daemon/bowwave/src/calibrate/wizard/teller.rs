@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::Result;
 use bowwave_calibration::wizard::{Key, Task};
-use bowwave_core::guide::{Cell, Coverage, Gauge, Guide, Rating};
+use bowwave_core::guide::{Cell, Coverage, Gauge, Guide, Rating, wrapped};
 use console::{Style, Term};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
 use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
@@ -205,6 +205,9 @@ fn changes(before: Option<&Guide>, guide: &Guide) -> String {
     if is_new(&|b| b.title == guide.title) && !guide.title.is_empty() {
         let _ = writeln!(out, "== {}", guide.title);
     }
+    if let Some(verdict) = guide.verdict().filter(|_| is_new(&|b| b.passed == guide.passed)) {
+        let _ = writeln!(out, "   {verdict}");
+    }
     for line in &guide.lines {
         if is_new(&|b| b.lines.contains(line)) {
             let _ = writeln!(out, "   {line}");
@@ -251,19 +254,18 @@ fn map(coverage: &Coverage) -> impl Iterator<Item = String> + '_ {
 
 /// The whole page, `width` columns wide.
 fn screen(guide: &Guide, width: usize) -> String {
-    let (bold, red, dim) = (Style::new().bold(), Style::new().red().bold(), Style::new().dim());
+    let (bold, dim) = (Style::new().bold(), Style::new().dim());
+    let (green, red) = (Style::new().green().bold(), Style::new().red().bold());
     let mut out = String::new();
     // Lines that the terminal would break could not be cleared again.
     let mut line = |text: &str, style: &Style| {
-        for part in wrapped(text, width.saturating_sub(1).max(20)) {
+        for part in wrapped(text, |line| line.chars().count() < width.max(21)) {
             let _ = writeln!(out, "{}", style.apply_to(part));
         }
     };
     line(&guide.title, &bold);
-    match guide.passed {
-        Some(true) => line("PASS", &Style::new().green().bold()),
-        Some(false) => line("FAIL", &red),
-        None => {}
+    if let Some(verdict) = guide.verdict() {
+        line(verdict, if guide.passed == Some(true) { &green } else { &red });
     }
     for text in &guide.lines {
         line(text, &Style::new());
@@ -283,21 +285,4 @@ fn screen(guide: &Guide, width: usize) -> String {
     line(&format!("-> {}", guide.says), &bold);
     line(guide.keys, &dim);
     out
-}
-
-/// Lines of at most `width` columns, broken between words.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for (i, word) in text.split(' ').enumerate() {
-        let Some(last) = lines.last_mut() else { break };
-        if i > 0 && last.chars().count() + 1 + word.chars().count() > width {
-            lines.push(word.chars().take(width).collect());
-        } else {
-            if i > 0 {
-                last.push(' ');
-            }
-            last.push_str(word);
-        }
-    }
-    lines
 }
