@@ -51,11 +51,14 @@ pub enum Command {
     Calibrate(Calibrate),
 }
 
+/// Where the configuration lies.
+const CONFIG: &str = "/etc/bowwave/bowwave.toml";
+
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub struct Run {
     /// Configuration file (TOML)
-    #[arg(long, value_name = "FILE", default_value = "/etc/bowwave/bowwave.toml")]
+    #[arg(long, value_name = "FILE", default_value = CONFIG)]
     pub config: PathBuf,
     /// Folder for hits.sqlite, recordings and the last good settings; without it the configuration's, else the service's
     #[arg(long, value_name = "DIR")]

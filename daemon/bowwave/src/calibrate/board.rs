@@ -16,13 +16,18 @@ const LINE_MM: f64 = 4.5;
 /// Writes the board.
 pub fn run(arguments: &CalibrateBoard) -> Result<Outcome> {
     let path = &arguments.out;
-    if path.exists() && !arguments.force {
-        bail!("{} is there already; name another file, or add --force to replace it", path.display());
-    }
     let mut text = String::new();
     draw(&mut text, &arguments.target).context("cannot draw the board")?;
-    std::fs::write(path, text)
-        .with_context(|| format!("cannot write {}; check the folder and its permissions", path.display()))?;
+    let kalibr = arguments.kalibr.iter().map(|path| (path, arguments.target.to_kalibr()));
+    let files: Vec<_> = [(path, text)].into_iter().chain(kalibr).collect();
+    if let Some((path, _)) = files.iter().find(|(path, _)| path.exists() && !arguments.force) {
+        bail!("{} is there already; name another file, or add --force to replace it", path.display());
+    }
+    for (path, text) in &files {
+        std::fs::write(path, text).with_context(|| {
+            format!("cannot write {}; check the folder and its permissions", path.display())
+        })?;
+    }
     let size = sheet_mm(&arguments.target);
     eprintln!(
         "{}: {} tags on {:.0} x {:.0} mm. Print it in true size (100 %), measure the line below the board, and mount it flat on \
@@ -32,6 +37,9 @@ pub fn run(arguments: &CalibrateBoard) -> Result<Outcome> {
         size[0],
         size[1]
     );
+    if let Some(path) = &arguments.kalibr {
+        eprintln!("{}: the same board for Kalibr, and for --target", path.display());
+    }
     Ok(Outcome::Done)
 }
 

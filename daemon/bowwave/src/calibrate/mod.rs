@@ -20,7 +20,7 @@ use crate::{
 
 /// Does one of the tasks; without one, the wizard asks.
 pub fn run(task: Option<&CalibrateTask>) -> Result<Outcome> {
-    let Some(task) = task else { return wizard::run(&CalibrateWizard::default()) };
+    let Some(task) = task else { return wizard::run(&CalibrateWizard::unasked()?) };
     match task {
         CalibrateTask::Wizard(arguments) => wizard::run(arguments),
         CalibrateTask::Board(arguments) => board::run(arguments),

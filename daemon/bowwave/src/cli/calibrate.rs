@@ -1,8 +1,8 @@
 //! Arguments of `calibrate`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use bowwave_calibration::target::Target;
+use bowwave_calibration::target::{Target, TargetError};
 use clap::{Args, Subcommand};
 
 use super::mounting::{
@@ -44,10 +44,14 @@ pub struct CalibrateBoard {
     /// Drawing to write (SVG), in true size
     #[arg(short, long, value_name = "FILE", default_value = "board.svg")]
     pub out: PathBuf,
-    /// Tags across and upwards, side of a tag in millimetres, gap between tags by that side; 6x6:22 fills A4, 6x6:34 fills A3
-    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]", default_value_t = Target::A4)]
+    /// Tags across and upwards, side of a tag in millimetres, gap between tags by that side; 6x6:22 fills A4, 6x6:34 fills A3. Or Kalibr's
+    /// file of a board (YAML: target_type 'aprilgrid', tagCols, tagRows, tagSize in metres, tagSpacing)
+    #[arg(long, value_name = BOARD, value_parser = parse_board, default_value_t = Target::A4)]
     pub target: Target,
-    /// Replace a file of that name
+    /// Also write the board as Kalibr's file (YAML), which --target of every task takes
+    #[arg(long, value_name = "FILE")]
+    pub kalibr: Option<PathBuf>,
+    /// Replace files of these names
     #[arg(long)]
     pub force: bool,
 }
@@ -57,8 +61,8 @@ pub struct CalibrateBoard {
 pub struct CalibrateCamera {
     /// Folder of JPEG or PNG pictures of the board, or a recording (MCAP) in which it is shown
     pub pictures: PathBuf,
-    /// The board, as `calibrate board` prints below it. Its size does not matter to the lens, its layout does
-    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]", default_value_t = Target::A4)]
+    /// The board, as `calibrate board` prints below it, or Kalibr's file of it. Its size does not matter to the lens, its layout does
+    #[arg(long, value_name = BOARD, value_parser = parse_board, default_value_t = Target::A4)]
     pub target: Target,
     /// Calibration file (TOML) whose lens is replaced; where there is none, one is begun
     #[arg(short, long, value_name = "FILE", default_value = "calibration.toml")]
@@ -72,4 +76,23 @@ pub struct CalibrateCamera {
     /// Print as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// How a board is named.
+pub(super) const BOARD: &str = "COLUMNSxROWS:MM[:GAP]|FILE.yaml";
+
+/// A board by its numbers, or by Kalibr's file of it.
+pub(super) fn parse_board(text: &str) -> Result<Target, String> {
+    let path = Path::new(text);
+    let is_file =
+        path.extension().is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"));
+    if !is_file {
+        return text
+            .parse()
+            .map_err(|e: TargetError| format!("{e}; or name Kalibr's file of it, as april_6x6.yaml"));
+    }
+    let yaml = std::fs::read_to_string(path).map_err(|e| {
+        format!("cannot read {text}: {e}; `bowwave calibrate board --kalibr {text}` writes one")
+    })?;
+    Target::of_kalibr(&yaml).map_err(|e| format!("{text}: {e}"))
 }

@@ -3,8 +3,10 @@
 use std::path::PathBuf;
 
 use bowwave_calibration::target::Target;
-use clap::{Args, ValueEnum};
+use clap::{Args, FromArgMatches as _, ValueEnum};
 use glam::DVec2;
+
+use super::calibrate::{BOARD, parse_board};
 
 /// How a result is told.
 #[derive(Clone, Debug, Args)]
@@ -34,8 +36,9 @@ pub struct Material {
     /// The camera's height above the sea; without it what the recording or its scenario says
     #[arg(long, value_name = "M", value_parser = parse_height)]
     pub eye_height: Option<f64>,
-    /// Also look for this board, which must stand still (see `calibrate board`): tags across and upwards, side in millimetres, gap by that
-    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]")]
+    /// Also look for this board, which must stand still (see `calibrate board`): tags across and upwards, side in millimetres, gap by that; or
+    /// Kalibr's file of it
+    #[arg(long, value_name = BOARD, value_parser = parse_board)]
     pub target: Option<Target>,
     #[command(flatten)]
     pub told: Told,
@@ -101,7 +104,7 @@ pub struct CalibrateBoresight {
     #[arg(long, value_name = "M", value_parser = parse_range)]
     pub range: f64,
     /// The mark is the middle of a tag of this board (see `calibrate board`)
-    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]", conflicts_with = "mark")]
+    #[arg(long, value_name = BOARD, value_parser = parse_board, conflicts_with = "mark")]
     pub target: Option<Target>,
     /// Which tag
     #[arg(long, value_name = "ID", default_value_t = 0, requires = "target")]
@@ -134,7 +137,7 @@ pub struct CalibrateWizard {
     /// What to calibrate; without it the wizard asks
     pub task: Option<WizardTask>,
     /// Configuration file (TOML) that names the devices and the calibration
-    #[arg(long, value_name = "FILE", default_value = CONFIG)]
+    #[arg(long, value_name = "FILE", default_value = super::CONFIG)]
     pub config: PathBuf,
     /// Go through it on a recording (MCAP) instead of the devices
     #[arg(long, value_name = "RECORDING")]
@@ -142,8 +145,8 @@ pub struct CalibrateWizard {
     /// Play the recording as fast as it goes, to its end
     #[arg(long, requires = "replay")]
     pub fast: bool,
-    /// The board (see `calibrate board`): tags across and upwards, side in millimetres, gap by that
-    #[arg(long, value_name = "COLUMNSxROWS:MM[:GAP]")]
+    /// The board (see `calibrate board`): tags across and upwards, side in millimetres, gap by that; or Kalibr's file of it
+    #[arg(long, value_name = BOARD, value_parser = parse_board)]
     pub target: Option<Target>,
     /// The tag of the board at which the bore is aimed for the boresight
     #[arg(long, value_name = "ID", default_value_t = 0, requires = "target")]
@@ -154,7 +157,7 @@ pub struct CalibrateWizard {
     /// The camera's height above the sea; without it what scenario or recording say
     #[arg(long, value_name = "M", value_parser = parse_height)]
     pub eye_height: Option<f64>,
-    /// Folder for what is gathered, as recordings; without it the configuration's data folder
+    /// Folder for what is gathered, as recordings; without it the configuration's data folder, else the trainer's, else this one
     #[arg(long, value_name = "DIR", conflicts_with = "replay")]
     pub data: Option<PathBuf>,
     /// Show the pages in a window as well
@@ -167,26 +170,14 @@ pub struct CalibrateWizard {
     pub files: Files,
 }
 
-/// Where the configuration lies.
-const CONFIG: &str = "/etc/bowwave/bowwave.toml";
-
-impl Default for CalibrateWizard {
+impl CalibrateWizard {
     /// As without any argument.
-    fn default() -> Self {
-        Self {
-            task: None,
-            config: CONFIG.into(),
-            replay: None,
-            fast: false,
-            target: None,
-            tag: 0,
-            range: None,
-            eye_height: None,
-            data: None,
-            window: false,
-            report: None,
-            files: Files { calibration: None, out: None },
-        }
+    ///
+    /// # Errors
+    /// Where an argument is required, which none is.
+    pub fn unasked() -> Result<Self, clap::Error> {
+        let command = Self::augment_args(clap::Command::new("wizard").no_binary_name(true));
+        Self::from_arg_matches(&command.try_get_matches_from([""; 0])?)
     }
 }
 
