@@ -39,7 +39,7 @@ pub(crate) use trainer::Signals;
 use trainer::{Ended, Surroundings, Trainer};
 
 /// Where data go when nobody says: the folder that the package makes.
-const DATA: &str = "/var/lib/bowwave";
+pub const DATA: &str = "/var/lib/bowwave";
 
 /// Runs until a signal ends it.
 pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {

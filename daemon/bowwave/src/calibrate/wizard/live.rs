@@ -1,7 +1,7 @@
 //! The wizard in its own time: on the devices, or on a recording at that one's pace.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::{Arc, atomic::Ordering},
     thread,
     time::Duration,
@@ -34,7 +34,7 @@ use crate::{
     outcome::Outcome,
     recorder::Recorder,
     run::{
-        Signals, catch_signals,
+        DATA, Signals, catch_signals,
         hardware::Hardware,
         keeping::begin_recording,
         settings::{Reader, Settings},
@@ -44,6 +44,9 @@ use crate::{
 
 /// Time between looks at devices and keys: that of the display.
 const TICK: Duration = Duration::from_millis(33);
+
+/// Pictures that wait to be looked at: as many as come in a slow round, so that a pull finds the one nearest to it.
+const PICTURES: usize = 4;
 
 /// Where events come from.
 enum Source {
@@ -74,8 +77,10 @@ pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
             log::warn!("{cause}");
         }
     }
-    let data =
-        arguments.data.clone().or_else(|| settings.config.data.clone()).unwrap_or_else(|| PathBuf::from("."));
+    let data = arguments.data.clone().or_else(|| settings.config.data.clone()).unwrap_or_else(|| {
+        let usual = Path::new(DATA);
+        if usual.is_dir() { usual } else { Path::new(".") }.to_owned()
+    });
     std::fs::create_dir_all(&data)
         .with_context(|| format!("cannot make the folder {}; name another with --data", data.display()))?;
     let height = arguments.eye_height.unwrap_or(settings.setup.scenario.eye_height_m);
@@ -118,11 +123,13 @@ struct Loop<'a> {
     signals: Arc<Signals>,
     arguments: &'a CalibrateWizard,
     teller: Teller,
-    /// Pictures that are looked at beside, the newest only.
+    /// Pictures that are looked at beside.
     pictures: Sender<(Look, CameraFrame)>,
     findings: Receiver<(Time, Finding)>,
     solved: (Sender<Solved>, Receiver<Solved>),
     recorder: Option<Recorder>,
+    /// No recording could be begun.
+    cannot_record: bool,
     /// What was gathered so far.
     recordings: Vec<(PathBuf, Task)>,
 }
@@ -147,6 +154,7 @@ impl<'a> Loop<'a> {
             findings,
             solved: unbounded(),
             recorder: None,
+            cannot_record: false,
             recordings: Vec::new(),
         })
     }
@@ -256,7 +264,7 @@ impl<'a> Loop<'a> {
         if let Some(screen) = &mut self.screen {
             screen.picture(&frame.picture);
         }
-        // One that comes while another is looked at is left out.
+        // Where looking takes longer than pictures come, some are left out.
         let _ = self.pictures.try_send((self.guided.wizard.look(), frame));
     }
 
@@ -264,11 +272,19 @@ impl<'a> Loop<'a> {
     fn record(&mut self, events: &[Event]) -> Result<()> {
         let Source::Devices { settings, data, .. } = &self.source else { return Ok(()) };
         let step = self.guided.wizard.step();
-        if step == Step::Gather && self.recorder.is_none() {
+        if step == Step::Gather && self.recorder.is_none() && !self.cannot_record {
             let task = self.guided.wizard.task();
-            let (recorder, path) = begin_recording(data, &format!("calibrate-{}", task.command()), settings)?;
-            self.recordings.push((path, task));
-            self.recorder = Some(recorder);
+            match begin_recording(data, &format!("calibrate-{}", task.command()), settings) {
+                Ok((recorder, path)) => {
+                    self.recordings.push((path, task));
+                    self.recorder = Some(recorder);
+                }
+                // The calibration does not need it.
+                Err(e) => {
+                    log::warn!("what is gathered is not kept: {e:#}; name another folder with --data");
+                    self.cannot_record = true;
+                }
+            }
         } else if matches!(step, Step::Choose | Step::Saved | Step::Over)
             && let Some(recorder) = self.recorder.take()
         {
@@ -304,7 +320,7 @@ impl<'a> Loop<'a> {
 
 /// Looks at pictures in a thread of its own, which ends when no more can come.
 fn watch(mut eyes: Eyes) -> Result<Watched> {
-    let (pictures, incoming) = bounded::<(Look, CameraFrame)>(1);
+    let (pictures, incoming) = bounded::<(Look, CameraFrame)>(PICTURES);
     let (told, findings) = unbounded();
     thread::Builder::new()
         .name("eyes".to_owned())
