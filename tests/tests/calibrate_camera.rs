@@ -157,3 +157,30 @@ fn the_board_is_drawn_once() {
     assert_eq!(fs::read_to_string(&path).expect("a drawing"), drawing);
     expect_code(&bowwave(["calibrate", "board", "--out", out, "--force"]), 0);
 }
+
+#[test]
+fn a_board_is_named_by_kalibrs_file_as_well() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a name").to_owned();
+    let (drawn, yaml, again) = (path("drawn.svg"), path("board.yaml"), path("again.svg"));
+    let board = ["calibrate", "board", "--target"];
+    let made = [&board[..], &["7x5:25:0.25", "--out", &drawn, "--kalibr", &yaml]].concat();
+    expect_code(&bowwave(&made), 0);
+    expect_code(&bowwave(&made), 1);
+    expect_code(&bowwave([&board[..], &[&yaml, "--out", &again]].concat()), 0);
+    assert_eq!(fs::read(&drawn).expect("a drawing"), fs::read(&again).expect("a drawing"));
+    fs::write(&yaml, "target_type: 'aprilgrid'\ntagCols: many\n").expect("a file");
+    for (name, words) in [
+        (yaml, ["board.yaml: line 2, column 10", "tagCols is not a whole number", "tagSize (metres)"]),
+        (path("absent.yml"), ["cannot read", "absent.yml", "bowwave calibrate board --kalibr"]),
+        ("6x6".to_owned(), ["'6x6' is no target", "6x6:22:0.3", "Kalibr's file"]),
+    ] {
+        let output = bowwave([&board[..], &[&name, "--out", &path("not.svg")]].concat());
+        expect_code(&output, 2);
+        let said = said(&output);
+        for word in words {
+            assert!(said.contains(word), "'{word}' is missing: {said}");
+        }
+    }
+    assert!(!folder.path().join("not.svg").exists());
+}

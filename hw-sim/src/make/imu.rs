@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use super::{
     motion::{GRAVITY, Motion},
     noise::{gaussian, stream, uniform},
-    recipe::Recipe,
+    recipe::{Jolt, Recipe},
 };
 
 /// Slow errors with a whole number of cycles in the recording: mean zero, deviation one on each axis.
@@ -49,6 +49,13 @@ pub fn samples(recipe: &Recipe, start: Time) -> Vec<ImuSample> {
     let (bias_walk, attitude_error) = (SlowError::new(&mut errors), SlowError::new(&mut errors));
     let mut noise = stream(recipe.seed, 0x1e1);
     let mut latency = stream(recipe.seed, 0x1e2);
+    let mut sear = stream(recipe.seed, 0x1e3);
+    let jolts: Vec<(f64, &Jolt)> = imu
+        .jolt
+        .iter()
+        .flat_map(|jolt| recipe.trigger.iter().map(move |burst| (burst.start_s + jolt.latency_s, jolt)))
+        .map(|(late_s, jolt)| (late_s + jolt.spread_s * gaussian(&mut sear), jolt))
+        .collect();
     let count = recipe.samples();
     (0..count)
         .map(|i| {
@@ -60,7 +67,8 @@ pub fn samples(recipe: &Recipe, start: Time) -> Vec<ImuSample> {
                 + imu.gyro_bias
                 + bias_walk.at(turn) * imu.gyro_bias_walk
                 + white(&mut noise) * imu.gyro_noise;
-            let accel = state.accel + imu.accel_bias + white(&mut noise) * imu.accel_noise;
+            let jolt: f64 = jolts.iter().map(|(at_s, jolt)| jolt.felt(t - at_s)).sum();
+            let accel = state.accel + DVec3::X * jolt + imu.accel_bias + white(&mut noise) * imu.accel_noise;
             let slow = attitude_error.at(turn);
             let tilt =
                 DVec3::new(slow.x * imu.tilt_error, slow.y * imu.tilt_error, slow.z * imu.heading_error);

@@ -35,7 +35,7 @@ mod write;
 pub use fresnel::{SEA_WATER_INDEX, reflectance};
 pub use imu::samples as imu_samples;
 pub use motion::{GRAVITY, GunMotion, Harmonic, Motion, MotionState, Periodic, ShipMotion};
-pub use recipe::{Burst, CameraRecipe, ImuRecipe, Recipe, ShipFeedRecipe};
+pub use recipe::{Burst, CameraRecipe, ImuRecipe, Jolt, Recipe, ShipFeedRecipe};
 pub use ship::samples as ship_samples;
 pub use sky::SkyRecipe;
 pub use spectrum::{Swell, angular_frequency, cox_munk, wind_speed};

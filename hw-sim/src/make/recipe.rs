@@ -114,6 +114,26 @@ pub struct ImuRecipe {
     pub clock_start_ns: i64,
     /// From the measurement to the packet's arrival at the host, nanoseconds, least and most.
     pub latency_ns: [i64; 2],
+    /// What it feels when the trigger is pressed: dry shots; nothing without.
+    pub jolt: Option<Jolt>,
+}
+
+/// How a gun jolts when its sear lets go, along the unit's x.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jolt {
+    /// From the press to the jolt, seconds.
+    pub latency_s: f64,
+    /// Deviation of that from press to press, seconds.
+    pub spread_s: f64,
+    /// Its first and largest acceleration, m/s^2.
+    pub peak: f64,
+}
+
+impl Jolt {
+    /// What is felt so many seconds after the sear let go, m/s^2: it rings out.
+    pub fn felt(&self, since_s: f64) -> f64 {
+        if since_s < 0.0 { 0.0 } else { self.peak * (-since_s / 0.04).exp() * (300.0 * since_s).cos() }
+    }
 }
 
 /// The ship's own heading as lines of `$HEHDT`, or of `$PASHR` with roll and pitch.
@@ -238,6 +258,7 @@ impl Default for ImuRecipe {
             clock_drift_ppm: 35.0,
             clock_start_ns: 81_234_567_000,
             latency_ns: [300_000, 2_000_000],
+            jolt: None,
         }
     }
 }
@@ -323,6 +344,11 @@ impl Recipe {
         inside("camera.readout_ns", camera.readout_ns as f64, -1e8, 1e8, "-100 to 100 ms")?;
         inside("camera.jpeg_quality", f64::from(camera.jpeg_quality), 1.0, 100.0, "1 to 100")?;
         inside("imu.clock_drift_ppm", self.imu.clock_drift_ppm, -400.0, 400.0, "-400 to 400 ppm")?;
+        if let Some(jolt) = &self.imu.jolt {
+            inside("imu.jolt.latency_s", jolt.latency_s, -0.2, 0.2, "-0.2 to 0.2 s")?;
+            inside("imu.jolt.spread_s", jolt.spread_s, 0.0, 0.05, "0 to 0.05 s")?;
+            inside("imu.jolt.peak", jolt.peak, 0.0, 1e3, "0 to 1000 m/s^2")?;
+        }
         if let Some(swell) = &self.swell {
             inside("swell.height_m", swell.height_m, 0.0, 12.0, "0 to 12 m")?;
             inside("swell.period_s", swell.period_s, 2.0, 20.0, "2 to 20 s")?;
