@@ -29,6 +29,7 @@ const fn look(rating: Option<Rating>) -> (u32, [f32; 3]) {
 }
 
 /// A line of the panel at the lower left.
+#[derive(Clone)]
 struct Line<'a> {
     text: &'a str,
     colour: [f32; 3],
@@ -50,31 +51,30 @@ impl HudLayout {
     }
 
     /// What to do, at the lower left; returns the panel's upper edge.
-    fn panel(&mut self, glyphs: &Glyphs, guide: &Guide) -> f32 {
+    fn panel<'a>(&mut self, glyphs: &Glyphs, guide: &'a Guide) -> f32 {
         let pad = self.pad();
         let (large, small) = (glyphs.line(TextSize::Large), glyphs.line(TextSize::Small));
         let icon = (small * 0.6).round();
         let text_x = 2.0 * pad + icon + pad;
         let right_max = self.size.0 as f32 - pad;
         let room = right_max - pad - text_x;
-        let mut lines: Vec<Line<'_>> = Vec::new();
-        let mut add = |text, colour, icon| {
+        // Half of the picture stays free: what is wrong and what to do about it go before the rest.
+        let mut left = ((0.62 * self.size.1 as f32 - large) / small).floor().max(3.0) as usize;
+        let mut part = |texts: &mut dyn Iterator<Item = &'a str>, colour, icon| {
             let fits = |line: &str| glyphs.width_of(TextSize::Small, line) <= room;
-            for (n, text) in wrapped(text, fits).into_iter().take(LINES_MOST).enumerate() {
-                lines.push(Line { text, colour, icon: if n == 0 { icon } else { None } });
-            }
+            let line = |(n, text)| Line { text, colour, icon: if n == 0 { icon } else { None } };
+            let lines: Vec<Line<'a>> = texts
+                .flat_map(|text| wrapped(text, fits).into_iter().take(LINES_MOST).enumerate().map(line))
+                .take(left)
+                .collect();
+            left -= lines.len();
+            lines
         };
-        for line in &guide.lines {
-            add(line, WHITE, None);
-        }
-        if let Some(problem) = &guide.problem {
-            add(problem, AMBER, Some((SHAPE_DIAMOND, AMBER)));
-        }
-        add(&guide.says, GREEN, Some((SHAPE_DISC, GREEN)));
-        add(guide.keys, CYAN, None);
-        // Half of the picture stays free; what is to be done stands last.
-        let most = ((0.62 * self.size.1 as f32 - large) / small).floor().max(3.0) as usize;
-        let lines = lines.split_off(lines.len().saturating_sub(most));
+        let problem = part(&mut guide.problem.as_deref().into_iter(), AMBER, Some((SHAPE_DIAMOND, AMBER)));
+        let says = part(&mut [guide.says.as_str()].into_iter(), GREEN, Some((SHAPE_DISC, GREEN)));
+        let keys = part(&mut [guide.keys].into_iter(), CYAN, None);
+        let lines = part(&mut guide.lines.iter().map(String::as_str), WHITE, None);
+        let lines = [lines, problem, says, keys].concat();
         let height = large + small * lines.len() as f32 + 0.5 * pad;
         let top = (self.size.1 as f32 - pad - height).round();
         let width = |l: &Line<'_>| glyphs.width_of(TextSize::Small, l.text);
@@ -113,12 +113,14 @@ impl HudLayout {
         let pitch = square + (square * 0.25).round();
         let bar = pitch * SQUARES as f32;
         let names = shown.iter().map(|g| width(g.name)).fold(0.0, f32::max);
-        let values = shown.iter().map(|g| width(short(&g.value))).fold(0.0, f32::max);
         let icon_x = 2.0 * pad;
         let name_x = icon_x + square + pad;
         let bar_x = (name_x + names + pad).round();
         let value_x = bar_x + bar + pad;
-        let right = (value_x + values + pad).min(self.size.0 as f32 - pad);
+        let values = shown.iter().map(|g| width(short(&g.value))).fold(0.0, f32::max);
+        // A narrow screen has no room for them.
+        let has_values = value_x + values + 2.0 * pad <= self.size.0 as f32;
+        let right = if has_values { value_x + values + pad } else { value_x };
         self.plate([pad, top, right, top + small * shown.len() as f32]);
         for (gauge, n) in shown.iter().zip(0_u8..) {
             let y = top + small * f32::from(n);
@@ -132,7 +134,9 @@ impl HudLayout {
                 let paint = if i >= full { DIM } else { gauge.rating.map_or(WHITE, |_| colour) };
                 self.shape(SHAPE_SQUARE, [x, middle, x + square, middle + square], paint);
             }
-            self.text(glyphs, TextSize::Small, (value_x, y), WHITE, short(&gauge.value));
+            if has_values {
+                self.text(glyphs, TextSize::Small, (value_x, y), WHITE, short(&gauge.value));
+            }
         }
     }
 
