@@ -328,7 +328,7 @@ fn gpu_hang(bench: &mut Bench) -> Result<Seen> {
 }
 
 /// The trainer is off: seconds that it took by systemd's account.
-fn off(bench: &mut Bench) -> Result<f64> {
+pub(super) fn off(bench: &mut Bench) -> Result<f64> {
     let begun = Instant::now();
     bench.service("stop")?;
     let until = Instant::now() + Duration::from_secs(60);

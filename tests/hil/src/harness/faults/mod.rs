@@ -2,6 +2,8 @@
 
 mod camera;
 mod computer;
+mod guide;
+mod ship;
 mod trigger;
 mod unit;
 
@@ -154,6 +156,8 @@ pub fn rows() -> Vec<Row> {
     all.extend(trigger::first());
     all.extend(camera::rows());
     all.extend(unit::rows());
+    all.extend(ship::rows());
+    all.extend(guide::rows());
     all.extend(trigger::rows());
     all.extend(computer::rows());
     all
@@ -360,7 +364,9 @@ impl Bench {
         }
         let state = self.machine.guest.call(bowwave_hil::protocol::Command::CameraState)?;
         if state["plugged"] == 0 || state["fourcc"] != "YUYV" || state["width"] != PICTURE.0 {
-            self.camera("unplug")?;
+            if state["plugged"] != 0 {
+                self.camera("unplug")?;
+            }
             self.camera(&format!("modes {}", camera::modes()))?;
             self.camera("plug 0")?;
         }

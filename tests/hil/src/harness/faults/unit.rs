@@ -17,7 +17,7 @@ fn quiet(bench: &mut Bench) -> Result<i64> {
     bench.feed(|f| *f = Feed { trigger: f.trigger, ..Feed::default() })
 }
 
-fn unplug(bench: &mut Bench) -> Result<i64> {
+pub(super) fn unplug(bench: &mut Bench) -> Result<i64> {
     let at = bench.machine.guest.now_ns();
     let id = format!("adapter{}", bench.adapter);
     // A plug that is drawn cuts the line. QEMU's adapter must not be left with a byte at hand when it goes: that ends QEMU.
@@ -28,7 +28,7 @@ fn unplug(bench: &mut Bench) -> Result<i64> {
     removed.map(|()| at)
 }
 
-fn plug(bench: &mut Bench) -> Result<i64> {
+pub(super) fn plug(bench: &mut Bench) -> Result<i64> {
     bench.adapter += 1;
     let id = format!("adapter{}", bench.adapter);
     bench.machine.plug_adapter(&id)?;

@@ -1,0 +1,275 @@
+//! The guided calibration on live devices: told by lines and on the LCD, led by keys and trigger, ended in every way.
+
+use std::{
+    thread,
+    time::{Duration, Instant},
+};
+
+use anyhow::{Context, Result, bail, ensure};
+use bowwave_calibration::{CalibrationFile, parse};
+use bowwave_hil::{board, protocol::Command};
+
+use super::{Own, Row, Seen, computer::off, unit};
+use crate::{
+    bench::{Bench, Configured, PICTURE, configuration},
+    guest::Pending,
+    lcd::Plate,
+};
+
+/// Folder of configuration and calibration.
+const FOLDER: &str = "/run/hil/etc";
+/// Where keys go in.
+const KEYS: &str = "/run/hil/keys";
+/// What it says.
+const SAID: &str = "/run/hil/said";
+/// Where it keeps what it gathers.
+const DATA: &str = "/run/hil/gathered";
+/// Longest wait for the next thing it says, and for all of it.
+const PATIENCE: Duration = Duration::from_secs(60);
+const TOGETHER: Duration = Duration::from_secs(400);
+/// Distance to the board, metres, and how far off the barrel may be found, radians.
+const RANGE_M: f64 = 40.0;
+const BORE_OFF: f64 = 1e-3;
+/// Between two pulls.
+const APART: Duration = Duration::from_millis(1500);
+/// After pulls were measured the trigger waits for so long before it accepts their result.
+const MEASURED: Duration = Duration::from_millis(3600);
+
+pub fn rows() -> Vec<Row> {
+    vec![
+        Row::Own(Own {
+            number: "W",
+            fault: "Guided calibration on live devices",
+            injected: "camera and unit unplugged while it gathers; interlock opened; six pulls at a board",
+            code: "-",
+            target: "says what to do, goes on, finds the boresight, keeps the file before",
+            run: guided,
+        }),
+        Row::Own(Own {
+            number: "Wq",
+            fault: "Guided calibration ended early",
+            injected: "SIGTERM while it gathers, by a folder that cannot be written",
+            code: "-",
+            target: "the calibration is as it was, nothing else is left",
+            run: ended,
+        }),
+    ]
+}
+
+/// The program while it runs.
+struct Wizard {
+    pending: Pending,
+    /// So much of what it says was looked at.
+    seen: usize,
+}
+
+impl Wizard {
+    /// Starts it in the trainer's place, with the trainer's compiled shaders.
+    fn start(bench: &mut Bench, arguments: &str) -> Result<Self> {
+        bench.machine.guest.shell(&format!("rm -f {KEYS} {SAID}; mkfifo {KEYS}"))?;
+        // Of a machine as slow as this one IMU LATE would be said all the time.
+        let text = configuration(&Configured::default()).replace("late_ms = 30", "late_ms = 800");
+        bench.machine.guest.call(Command::Write { path: format!("{FOLDER}/guided.toml"), text })?;
+        let line = format!(
+            "cd / && GALLIVM_PERF=nopt MESA_SHADER_CACHE_DIR=/var/cache/bowwave CACHE_DIRECTORY=/var/cache/bowwave \
+             exec bowwave calibrate wizard --config {FOLDER}/guided.toml {arguments} <>{KEYS} >{SAID} 2>&1"
+        );
+        let argv = ["/bin/sh", "-c", &line].map(str::to_owned).to_vec();
+        let timeout_ms = TOGETHER.as_millis() as u64;
+        let pending = bench.machine.guest.send(Command::Run { argv, timeout_ms })?;
+        Ok(Self { pending, seen: 0 })
+    }
+
+    fn said(bench: &mut Bench) -> Result<String> {
+        bench.machine.guest.shell(&format!("cat {SAID} 2>/dev/null; true"))
+    }
+
+    /// Waits until it says these words after those that were waited for before; all that it said between.
+    fn says(&mut self, bench: &mut Bench, words: &str) -> Result<String> {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            let said = Self::said(bench)?;
+            let news = said.get(self.seen..).unwrap_or_default();
+            if let Some(at) = news.find(words) {
+                self.seen += at + words.len();
+                return Ok(news[..at].to_owned());
+            }
+            if Instant::now() > until {
+                bail!("the wizard does not say '{words}', but: {news}");
+            }
+            thread::sleep(Duration::from_millis(200));
+        }
+    }
+
+    fn key(bench: &mut Bench, key: &str) -> Result<()> {
+        bench.machine.guest.shell(&format!("echo '{key}' >{KEYS}")).map(|_| ())
+    }
+
+    /// Pulls the trigger, a while after what was done before: a pull at once would belong to that. These pulls are none of the trainer's,
+    /// which the journal of hits must hold.
+    fn pull(bench: &mut Bench) -> Result<()> {
+        thread::sleep(APART);
+        let steps = vec![(0, true), (150_000, false)];
+        bench.machine.guest.call(Command::Pull { line: 0, steps }).map(|_| ())
+    }
+
+    /// Waits for its end; its exit code.
+    fn ends(self) -> Result<i64> {
+        self.pending.answer(PATIENCE)?["code"].as_i64().context("an exit code")
+    }
+}
+
+impl Bench {
+    /// Waits until the LCD shows a page of the guide, one that tells of a problem where that is asked for, and keeps it. Nobody else shows
+    /// anything: the trainer is off, and what is to be done has the green shape of READY.
+    fn guide(&self, problem: bool, name: &str) -> Result<()> {
+        let shown =
+            self.lcd(Instant::now(), PATIENCE, name, |p, told| p == Plate::Ready && (told || !problem));
+        self.keep_picture(name);
+        shown.map(|_| ())
+    }
+
+    fn file(&mut self, name: &str) -> Result<CalibrationFile> {
+        let text = self.machine.guest.shell(&format!("cat {FOLDER}/{name}"))?;
+        Ok(parse(&text, name)?)
+    }
+
+    fn listed(&mut self) -> Result<String> {
+        self.machine
+            .guest
+            .shell(&format!("cd {FOLDER} && ls -A -I guided.toml && sha256sum calibration.toml"))
+    }
+}
+
+fn guided(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    off(bench)?;
+    bench.lcd(Instant::now(), PATIENCE, "nothing", |p, _| p == Plate::Black)?;
+    bench.machine.guest.shell(&format!("cp {FOLDER}/calibration.toml /run/hil/before.toml"))?;
+    let arguments = format!("--target {} --range {RANGE_M} --data {DATA}", board::NAME);
+    let mut wizard = Wizard::start(bench, &arguments)?;
+    let notes = (|| -> Result<Vec<String>> {
+        wizard.says(bench, "== Calibrate\n")?;
+        let notes = vec![moved(bench, &mut wizard)?, aimed(bench, &mut wizard)?];
+        Wizard::key(bench, "q")?;
+        wizard.says(bench, "-> Ended")?;
+        Ok(notes)
+    })();
+    if notes.is_err() {
+        let back = format!("kill $(pidof bowwave); cp /run/hil/before.toml {FOLDER}/calibration.toml");
+        drop(bench.machine.guest.shell(&back));
+    }
+    let code = wizard.ends()?;
+    let said = Wizard::said(bench)?;
+    std::fs::write(bench.out.join("wizard.txt"), &said).context("wizard.txt")?;
+    let mut notes = notes?;
+    let kept =
+        bench.machine.guest.shell(&format!("bowwave calibrate restore {FOLDER}/calibration.toml --list"))?;
+    let back = format!(
+        "cd {FOLDER} && bowwave calibrate restore calibration.toml --number 1 && cmp calibration.toml /run/hil/before.toml"
+    );
+    bench.machine.guest.shell(&back)?;
+    let gathered = bench.machine.guest.shell(&format!("ls {DATA}"))?;
+    let recordings =
+        said.lines().filter(|l| l.starts_with("what was gathered is kept: bowwave calibrate ")).count();
+    bench.machine.guest.shell(&format!("rm -r {DATA} {FOLDER}/calibration.toml.*"))?;
+    ensure!(
+        recordings == 2 && gathered.lines().count() == 2,
+        "{recordings} recordings are named: {gathered}"
+    );
+    notes.push(format!("exit code {code}; {} files kept", kept.lines().count()));
+    Ok(Seen { lcd: "guide".into(), met: code == 0, note: notes.join("; "), ..Seen::default() })
+}
+
+/// Camera and unit are gathered from, unplugged and plugged again.
+fn moved(bench: &mut Bench, wizard: &mut Wizard) -> Result<String> {
+    bench.guide(false, "row-W-choose")?;
+    Wizard::key(bench, "2")?;
+    wizard.says(bench, "> 2 inertial unit to camera")?;
+    Wizard::pull(bench)?;
+    wizard.says(bench, "-> Swing the gun left and right, up and down")?;
+    wizard.says(bench, " s, horizon in ")?;
+    bench.guide(false, "row-W-gather")?;
+    bench.camera("unplug")?;
+    wizard.says(bench, "!! CAMERA LOST: CHECK THE ")?;
+    bench.guide(true, "row-W-camera")?;
+    bench.camera("plug 0")?;
+    wizard.says(bench, "(well again)")?;
+    unit::unplug(bench)?;
+    wizard.says(bench, "!! IMU LOST: CHECK THE ")?;
+    unit::plug(bench)?;
+    wizard.says(bench, "(well again)")?;
+    wizard.says(bench, "   elevation: ")?;
+    bench.guide(false, "row-W-gauges")?;
+    Wizard::pull(bench)?;
+    // Whether such small pictures and so late packets are good enough is no question here: it is not saved.
+    let told = wizard.says(bench, "-> Press Enter to ")?;
+    Wizard::key(bench, "b")?;
+    Wizard::key(bench, "b")?;
+    wizard.says(bench, "== Calibrate\n")?;
+    let verdict = told.lines().skip_while(|l| !matches!(*l, "   FAIL" | "   PASS")).nth(1);
+    Ok(format!("movement: {}", verdict.context("no result was told")?.trim()))
+}
+
+/// Pulls at a board whose place in the picture is known.
+fn aimed(bench: &mut Bench, wizard: &mut Wizard) -> Result<String> {
+    bench.feed(|f| f.board = true)?;
+    Wizard::key(bench, "3")?;
+    wizard.says(bench, "> 3 boresight")?;
+    Wizard::pull(bench)?;
+    wizard.says(bench, "-> Aim the bore at the mark anew")?;
+    bench.pull(1, false)?;
+    wizard.says(bench, "!! NOT ARMED: GUN NOT INERT: ")?;
+    bench.pull(1, true)?;
+    wizard.says(bench, "(well again)")?;
+    pulls(bench, wizard, "row-W-boresight")?;
+    bench.feed(|f| f.board = false)?;
+    let found = bench.file("calibration.toml")?.calibration;
+    let mark = found.lens.unproject(board::middle(0, PICTURE)?) * RANGE_M - found.muzzle_in_camera;
+    let truth = glam::DVec2::new((mark.x / mark.z).atan(), (mark.y / mark.z).atan());
+    let off = found.boresight.distance(truth);
+    ensure!(off < BORE_OFF, "a boresight of {} was found, {truth} is true", found.boresight);
+    Ok(format!("boresight off by {:.2} mrad", off * 1e3))
+}
+
+/// Pulls until there are enough, accepts the result, and goes back to the choice.
+fn pulls(bench: &mut Bench, wizard: &mut Wizard, name: &str) -> Result<()> {
+    // Enough are five; one more goes nowhere.
+    for _ in 0..6 {
+        Wizard::pull(bench)?;
+    }
+    wizard.says(bench, "   PASS\n")?;
+    wizard.says(bench, "-> Press Enter to save; what is replaced is kept")?;
+    bench.guide(false, name)?;
+    thread::sleep(MEASURED);
+    Wizard::pull(bench)?;
+    wizard.says(bench, "-> Saved; press Enter")?;
+    thread::sleep(MEASURED);
+    Wizard::pull(bench)?;
+    wizard.says(bench, "== Calibrate\n").map(|_| ())
+}
+
+/// Nobody says where recordings go, and the folder it runs in cannot be written.
+fn ended(bench: &mut Bench) -> Result<Seen> {
+    bench.ready(bench.scaled(2.0))?;
+    off(bench)?;
+    let before = bench.listed()?;
+    let mut wizard = Wizard::start(bench, "imu --data /proc/bowwave")?;
+    let told = wizard.says(bench, "cannot make the folder /proc/bowwave");
+    let refused = wizard.ends()?;
+    told?;
+    let mut wizard = Wizard::start(bench, "imu --data /sys")?;
+    let gathers = wizard.says(bench, " s, horizon in ");
+    bench.machine.guest.shell("kill $(pidof bowwave)")?;
+    let told = wizard.says(bench, "-> Ended");
+    let code = wizard.ends()?;
+    let said = Wizard::said(bench)?;
+    std::fs::write(bench.out.join("wizard-ended.txt"), &said).context("wizard-ended.txt")?;
+    gathers?;
+    told?;
+    let after = bench.listed()?;
+    ensure!(before == after, "before: {before}; after: {after}");
+    ensure!(said.contains("what is gathered is not kept"), "it does not say that nothing is kept: {said}");
+    let note = format!("exit code {refused} for a folder that cannot be made, {code} after SIGTERM");
+    Ok(Seen { lcd: "guide".into(), met: (refused, code) == (1, 1), note, ..Seen::default() })
+}
