@@ -4,8 +4,16 @@
 //! The lower convex hull of those points, taken at the edge under their middle, finds it: Zhang, Liu & Xia, "Clock
 //! synchronization algorithms for network measurements", INFOCOM 2002. The least delay stays in the result; the calibrated
 //! time offset absorbs it.
+//!
+//! A clock that speeds up pulls the line down at once. One that slows down leaves it standing as the bound that it is, for as long as the
+//! middle lies before the change (5.8 ms after 29 s of 200 ppm); when not even the quickest arrivals come down to it (`floor`), the middle
+//! is taken of the newest points alone.
+
+mod floor;
 
 use std::collections::VecDeque;
+
+use floor::Floor;
 
 use crate::time::{NS_PER_S, Time};
 
@@ -15,8 +23,8 @@ const WINDOW_NS: i64 = 60 * NS_PER_S;
 /// The slope is fitted only once the points span this long; before, only the offset is.
 const SLOPE_AFTER_NS: i64 = 5 * NS_PER_S;
 
-/// Crystal clocks do not differ by more than this, 500 ppm; a steeper line is an outlier.
-const SLOPE_MAX: f64 = 500e-6;
+/// Crystal clocks do not differ by more than 500 ppm; a line that is steeper than this is an outlier.
+const SLOPE_MAX: f64 = 600e-6;
 
 /// A device time that disagrees with the map by more than this is a restart of the device, not a delay.
 const RESTART_NS: i64 = 2 * NS_PER_S;
@@ -68,8 +76,8 @@ struct Hull {
     device_origin: i64,
     lag_origin: i64,
     points: Vec<(f64, f64)>,
-    sum_x: f64,
-    count: u64,
+    /// The line is taken under the middle between here and the last point.
+    begin_x: f64,
     last_x: f64,
 }
 
@@ -79,8 +87,7 @@ impl Hull {
             device_origin: device_ns,
             lag_origin: lag_ns,
             points: vec![(0.0, 0.0)],
-            sum_x: 0.0,
-            count: 1,
+            begin_x: 0.0,
             last_x: 0.0,
         }
     }
@@ -96,8 +103,6 @@ impl Hull {
             return;
         }
         self.last_x = p.0;
-        self.sum_x += p.0;
-        self.count += 1;
         while let [.., a, b] = self.points[..] {
             // b stays only where it lies below the line from a to p.
             if (b.0 - a.0) * (p.1 - a.1) - (b.1 - a.1) * (p.0 - a.0) > 0.0 {
@@ -108,10 +113,10 @@ impl Hull {
         self.points.push(p);
     }
 
-    /// Where the edge under the points' mean begins, in `points`.
-    fn edge(&self) -> Option<usize> {
-        let mean = self.sum_x / self.count as f64;
-        self.points.windows(2).position(|w| w[1].0 >= mean)
+    /// The line is that of the points since `device_ns`. Older ones stay: where the newest were only late, the next that is not makes
+    /// the old line stand again.
+    fn begin_at(&mut self, device_ns: i64) {
+        self.begin_x = self.begin_x.max(device_ns.saturating_sub(self.device_origin) as f64);
     }
 
     /// Slope of the edge that begins at `at`.
@@ -120,10 +125,26 @@ impl Hull {
         Some((b.1 - a.1) / (b.0 - a.0))
     }
 
+    /// The edge under the middle: where it begins, in `points`, and its slope. Where no clock differs by that much it is the next that
+    /// one can, or the last.
+    fn edge(&self) -> Option<(usize, f64)> {
+        let middle = self.begin_x.midpoint(self.last_x);
+        let mut last = None;
+        for at in 0..self.points.len().saturating_sub(1) {
+            let slope = self.slope(at)?;
+            if slope.abs() <= SLOPE_MAX {
+                last = Some((at, slope));
+                if self.points.get(at + 1)?.0 >= middle {
+                    break;
+                }
+            }
+        }
+        last
+    }
+
     /// Slope of the line, half of what its neighbours' slopes differ by, and the line's length in seconds.
     fn slope_known(&self) -> Option<(f64, f64, f64)> {
-        let at = self.edge()?;
-        let slope = self.slope(at)?;
+        let (at, slope) = self.edge()?;
         let before = at.checked_sub(1).and_then(|before| self.slope(before));
         let spread = match (before, self.slope(at + 1)) {
             (Some(before), Some(after)) => (after - before) / 2.0,
@@ -134,18 +155,13 @@ impl Hull {
         Some((slope, spread, length_s))
     }
 
-    /// Lag at `device_ns` on the line of the hull's edge under the points' mean.
+    /// Lag at `device_ns` on the line of the hull's edge under the middle.
     fn lag_at(&self, device_ns: i64) -> i64 {
         let x = device_ns.saturating_sub(self.device_origin) as f64;
-        let lowest = self.points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
-        let lag = if self.span_ns() < SLOPE_AFTER_NS {
-            lowest
-        } else {
-            let line = self.edge().and_then(|at| Some((self.points.get(at)?, self.slope(at)?)));
-            match line {
-                Some((a, slope)) if slope.abs() <= SLOPE_MAX => a.1 + slope * (x - a.0),
-                _ => lowest,
-            }
+        let edge = self.edge().filter(|_| self.span_ns() >= SLOPE_AFTER_NS);
+        let lag = match edge.and_then(|(at, slope)| Some((self.points.get(at)?, slope))) {
+            Some((a, slope)) => a.1 + slope * (x - a.0),
+            None => self.points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min),
         };
         self.lag_origin.saturating_add(lag.round() as i64)
     }
@@ -157,6 +173,10 @@ pub struct ClockMap {
     current: Option<Hull>,
     younger: Option<Hull>,
     restarts: u32,
+    /// Tells when the line no longer is what arrivals come down to.
+    floor: Floor,
+    /// Device time and what it was mapped to, of the last packet.
+    last: Option<(i64, Time)>,
     /// Device time, mapped lag and the arrival's own, now and then.
     kept: VecDeque<(i64, i64, i64)>,
 }
@@ -172,7 +192,8 @@ impl ClockMap {
         self.restarts
     }
 
-    /// Takes in one packet and returns when, on the host's clock, its measurement was made.
+    /// Takes in one packet and returns when, on the host's clock, its measurement was made: never before that of the packet before, unless
+    /// its device time is.
     pub fn observe(&mut self, device_ns: i64, arrival: Time) -> Time {
         let lag = arrival.ns().saturating_sub(device_ns);
         let restarted = self
@@ -180,29 +201,55 @@ impl ClockMap {
             .as_ref()
             .is_some_and(|h| lag.abs_diff(h.lag_at(device_ns)) > RESTART_NS.unsigned_abs());
         if restarted {
-            self.restarts += 1;
-            self.current = None;
-            self.younger = None;
-            self.kept.clear();
+            *self = Self { restarts: self.restarts + 1, ..Self::default() };
         }
+        let mapped = self.map(device_ns, lag);
+        let time = Time::from_ns(device_ns.saturating_add(mapped));
+        let time = match self.last {
+            // The line falls when an arrival is earlier than any before, at the start of a burst by many packets' time.
+            Some((last_ns, last)) if device_ns >= last_ns => time.max(last),
+            _ => time,
+        };
+        self.last = Some((device_ns, time));
+        time
+    }
+
+    /// Takes in a point and returns the lag that is taken for the least at its device time.
+    fn map(&mut self, device_ns: i64, lag: i64) -> i64 {
         let current = self.current.get_or_insert_with(|| Hull::new(device_ns, lag));
         current.push(device_ns, lag);
+        let mut mapped = current.lag_at(device_ns);
+        if current.span_ns() < SLOPE_AFTER_NS {
+            return mapped;
+        }
+        let mut aged = false;
         if current.span_ns() >= WINDOW_NS / 2 {
             let younger = self.younger.get_or_insert_with(|| Hull::new(device_ns, lag));
             younger.push(device_ns, lag);
-            if younger.span_ns() >= WINDOW_NS / 2 {
-                self.current = self.younger.take();
-            }
+            aged = younger.span_ns() >= WINDOW_NS / 2;
         }
-        let settled = self.current.as_ref().is_some_and(|h| h.span_ns() >= SLOPE_AFTER_NS);
-        let mapped = self.current.as_ref().map_or(lag, |h| h.lag_at(device_ns));
-        if settled && self.kept.back().is_none_or(|(last, ..)| device_ns.saturating_sub(*last) >= KEEP_NS) {
+        let left = self.floor.observe(device_ns, lag.saturating_sub(mapped));
+        if let Some(begin_ns) = left {
+            for hull in self.current.iter_mut().chain(&mut self.younger) {
+                hull.begin_at(begin_ns);
+            }
+            // By a line of the new rate these were never mapped.
+            self.kept.retain(|kept| kept.0 >= begin_ns);
+        }
+        if aged {
+            self.current = self.younger.take();
+        }
+        if let Some(hull) = self.current.as_ref().filter(|_| aged || left.is_some()) {
+            let before = std::mem::replace(&mut mapped, hull.lag_at(device_ns));
+            self.floor.raise(mapped.saturating_sub(before));
+        }
+        if self.kept.back().is_none_or(|(last, ..)| device_ns.saturating_sub(*last) >= KEEP_NS) {
             self.kept.push_back((device_ns, mapped, lag));
             if self.kept.len() > KEPT {
                 self.kept.pop_front();
             }
         }
-        Time::from_ns(device_ns.saturating_add(mapped))
+        mapped
     }
 
     /// How the clock does; `None` before that can be told.
@@ -210,7 +257,8 @@ impl ClockMap {
         let hull = self.current.as_ref().filter(|_| self.kept.len() >= KEPT_MIN)?;
         let (slope, spread, length_s) = hull.slope_known()?;
         let off = |pick: fn(&(i64, i64, i64)) -> i64| {
-            let off = move |kept: &(i64, i64, i64)| (pick(kept) - hull.lag_at(kept.0)) as f64 * 1e-9;
+            let off =
+                move |kept: &(i64, i64, i64)| pick(kept).saturating_sub(hull.lag_at(kept.0)) as f64 * 1e-9;
             let mean = self.kept.iter().map(off).sum::<f64>() / self.kept.len() as f64;
             let square = self.kept.iter().map(|k| (off(k) - mean).powi(2)).sum::<f64>();
             let most = self.kept.iter().map(|k| (off(k) - mean).abs()).fold(0.0, f64::max);
@@ -233,6 +281,8 @@ impl ClockMap {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     /// Arrival times of a 200 Hz device whose clock runs `ppm` fast, with one-sided delays from a fixed sequence.
@@ -269,6 +319,71 @@ mod tests {
     fn a_burst_of_late_packets_does_not_pull_the_map() {
         let worst = worst_error_ms(35.0, 120, 20, |i| if i % 2000 < 16 { 80.0 } else { noise(i) });
         assert!(worst < 0.15, "{worst} ms");
+    }
+
+    /// Errors in milliseconds, from ten seconds on, of a 200 Hz device whose clock runs fast by `ppm` of the second; the change is at 60 s.
+    fn errors_ms(ppm: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut map = ClockMap::new();
+        let mut ahead_ns = 0.0;
+        let error = |i: i64| {
+            let host = i * 5_000_000;
+            let device = host + ahead_ns as i64;
+            ahead_ns += 5.0 * ppm(host as f64 * 1e-9);
+            (map.observe(device, Time::from_ns(host).plus_secs(noise(i) * 1e-3)).ns() - host) as f64 * 1e-6
+        };
+        (0..180 * 200).map(error).skip(2000).collect()
+    }
+
+    fn worst(errors: &[f64]) -> f64 {
+        errors.iter().fold(0.0, |worst, e| worst.max(e.abs()))
+    }
+
+    #[test]
+    fn a_rate_that_changes_at_once_is_followed_either_way() {
+        for (from, to) in [(100.0, -100.0), (-100.0, 100.0), (20.0, -20.0)] {
+            let errors = errors_ms(|s| if s < 60.0 { from } else { to });
+            let (ever, later) = (worst(&errors), worst(&errors[55 * 200..]));
+            assert!(ever < 0.5 && later < 0.15, "{from} to {to} ppm: {ever} ms, after 5 s {later}");
+        }
+    }
+
+    #[test]
+    fn a_rate_that_changes_with_the_temperature_is_followed_either_way() {
+        for (from, to) in [(100.0, -100.0), (-100.0, 100.0)] {
+            let ever = worst(&errors_ms(|s| to + (from - to) * (-(s - 60.0).max(0.0) / 25.0).exp()));
+            assert!(ever < 0.2, "{from} to {to} ppm: {ever} ms");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn mapped_times_never_run_backwards(
+            steps in prop::collection::vec((1_i64..20_000_000, 0_i64..100_000_000), 100..3000),
+            ppm in -500_i64..500,
+            slower in 0_i64..500,
+        ) {
+            let mut map = ClockMap::new();
+            let (mut device, mut host, mut last) = (0, 0, Time::MIN);
+            let half = steps.len() / 2;
+            for (i, (step, delay)) in steps.into_iter().enumerate() {
+                host += step;
+                device += step + step * (if i < half { ppm } else { ppm - slower }) / 1_000_000;
+                let time = map.observe(device, Time::from_ns(host + delay));
+                prop_assert!(time >= last, "{last} then {time}");
+                prop_assert!(time.ns_since(last) >= 0 && (time.ns() - host).abs() < RESTART_NS);
+                last = time;
+            }
+            prop_assert_eq!(map.restarts(), 0);
+        }
+
+        #[test]
+        fn any_times_are_survived(times in prop::collection::vec((any::<i64>(), any::<i64>()), 1..200)) {
+            let mut map = ClockMap::new();
+            for (device, arrival) in times {
+                map.observe(device, Time::from_ns(arrival));
+                map.report();
+            }
+        }
     }
 
     /// A map after `seconds` of a 200 Hz device whose clock runs `ppm` fast.
