@@ -174,6 +174,30 @@ fn the_clock_goes_on_where_it_wraps_and_back_where_the_unit_begins_anew() {
     assert!(times[1_000] < times[999]);
 }
 
+/// A unit that is set to send no time: its packet counter of 16 bits is its clock, by the beat that arrivals tell.
+#[test]
+fn a_unit_without_a_clock_goes_on_where_its_packet_counter_wraps() {
+    let mut decoder = ImuDecoder::fixed(ImuFormat::Xsens);
+    let mut map = ClockMap::new();
+    let mut times = Vec::new();
+    // 200 Hz over two wraps, with two packets lost at the first.
+    for n in (0..140_000_i64).filter(|n| !(65_535..65_537).contains(n)) {
+        let payload = [
+            item(0x1020, &(n as u16).to_be_bytes()),
+            item(0x4020, &f32s(&[0.0, 0.0, 9.8])),
+            item(0x8020, &f32s(&[0.0, 0.0, n as f32 * 1e-9])),
+        ];
+        let arrival = Time::from_ns(n * 5_000_000);
+        decoder.push(&xbus(MTDATA2, &payload.concat()), arrival, |s| {
+            times.push((map.observe(s.device_time_ns, arrival).ns_since(arrival), s.device_time_ns));
+        });
+    }
+    assert_eq!((times.len(), map.restarts()), (139_998, 0));
+    assert!(times.windows(2).all(|w| w[1].1 > w[0].1), "never back");
+    let off = times.iter().skip(1000).map(|t| t.0.abs()).max();
+    assert!(off < Some(10_000), "{off:?} ns off at a wrap");
+}
+
 #[test]
 fn lengths_beyond_a_payload_and_the_protocol_are_refused() {
     let long =
