@@ -320,6 +320,8 @@ impl Trainer {
         if self.tally.frames.is_multiple_of(CLOCK_FRAMES) {
             self.unit_clock.follow(self.session.unit_clock());
         }
+        let frozen = self.session.ship_frozen_s(begun).map(frozen_cause);
+        self.faults.set(Fault::ShipFrozen, frozen, &mut self.events);
         if !announced {
             return Err(self.stage_error());
         }
@@ -447,6 +449,14 @@ fn gpu(settings: &Settings, mode: Mode) -> Option<String> {
         Mode::Training => settings.config.gpu.clone(),
         Mode::Safe => software().or_else(|| settings.config.gpu.clone()),
     }
+}
+
+/// What the log says of a ship's heading that has been the same for `seconds`.
+fn frozen_cause(seconds: f64) -> String {
+    format!(
+        "the ship's heading has been the very same for {seconds:.0} s though the ship rolls: is the compass settled, and does what sends its \
+         lines still hear it?"
+    )
 }
 
 fn is_lost(e: &anyhow::Error) -> bool {

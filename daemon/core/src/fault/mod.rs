@@ -114,6 +114,8 @@ faults! {
     ShipBaud = "SHIP_BAUD", Warning, "SHIP HEADING LOST: BAUD RATE", "SET THE SHIP FEED'S RATE";
     /// Lines come, and none tells a valid heading.
     ShipInvalid = "SHIP_INVALID", Warning, "SHIP HEADING INVALID", "CHECK THE SHIP'S COMPASS";
+    /// The ship's heading is the very same all the time though the ship moves.
+    ShipFrozen = "SHIP_FROZEN", Warning, "SHIP HEADING FROZEN", "CHECK THE SHIP'S COMPASS";
     /// The file system is full.
     DiskFull = "DISK_FULL", Warning, "REC: DISK FULL", "FREE THE DATA PARTITION";
     /// The file system cannot be written.

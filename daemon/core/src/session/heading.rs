@@ -128,6 +128,11 @@ const REFUSED_MAX: u32 = 10;
 const FROZEN_NS: i64 = 20 * NS_PER_S;
 const FROZEN_TURN: f64 = 0.3 * std::f64::consts::PI / 180.0;
 
+/// A ship that rolls turns as well. Where the picture has tilted by [`FROZEN_ROLL`] meanwhile, which no gunner makes it do, and the feed has
+/// said the very same for so long, it is stuck for sure.
+const STUCK_NS: i64 = 60 * NS_PER_S;
+const FROZEN_ROLL: f64 = 2.0 * std::f64::consts::PI / 180.0;
+
 /// A bearing on the mount as gyro and ship make it: when, and how much it differs from the first one, radians.
 type Bearing = (Time, f64);
 
@@ -164,14 +169,16 @@ struct Newest {
     sigma: f64,
 }
 
-/// Since when the ship has said the very same, and the gun's heading by gyro then.
+/// Since when the ship has said the very same, and the gun's heading by gyro and the picture's tilt then.
 #[derive(Clone, Copy, Debug)]
 struct Same {
     heading: f64,
     since: Time,
     gun: f64,
-    /// Farthest that the gun has turned since.
+    tilt: f64,
+    /// Farthest that the gun has turned, and the picture tilted, since.
     turned: f64,
+    tilted: f64,
 }
 
 impl Aid {
@@ -229,7 +236,8 @@ impl Aid {
         let line = LINE_SIGMA.hypot(turned * LATENCY_SIGMA_S);
         self.pass_time(time, dt_s, sigma, attitude);
         let gun = bearing + heading + attitude.corrected();
-        if self.is_stuck(time, heading, gun) {
+        let tilt = (camera * DVec3::X).z.clamp(-1.0, 1.0).asin();
+        if self.is_stuck(time, heading, gun, tilt) {
             self.watched.clear();
             self.release();
             return;
@@ -265,17 +273,25 @@ impl Aid {
         attitude.walk_mount(wander + UNSEEN_WALK * UNSEEN_WALK * unseen_s);
     }
 
-    fn is_stuck(&mut self, time: Time, heading: f64, gun: f64) -> bool {
+    fn is_stuck(&mut self, time: Time, heading: f64, gun: f64, tilt: f64) -> bool {
         match &mut self.same {
             Some(same) if same.heading == heading => {
                 same.turned = same.turned.max(wrapped(gun - same.gun).abs());
+                same.tilted = same.tilted.max((tilt - same.tilt).abs());
                 time.ns_since(same.since) > FROZEN_NS && same.turned > FROZEN_TURN
             }
             _ => {
-                self.same = Some(Same { heading, since: time, gun, turned: 0.0 });
+                self.same = Some(Same { heading, since: time, gun, tilt, turned: 0.0, tilted: 0.0 });
                 false
             }
         }
+    }
+
+    /// For how long the feed has said the very same though the ship moves, seconds; `None` where it does not, or is silent.
+    pub(super) fn frozen_s(&self, now: Time) -> Option<f64> {
+        let (same, newest) = (self.same?, self.newest?);
+        let said = newest.time.ns_since(same.since) > STUCK_NS && now.ns_since(newest.time) <= GAP_NS;
+        (said && same.turned > FROZEN_TURN && same.tilted > FROZEN_ROLL).then(|| now.secs_since(same.since))
     }
 
     fn watch(&mut self, time: Time, bearing: f64) {

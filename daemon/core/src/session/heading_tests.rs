@@ -21,6 +21,8 @@ struct Rig {
     bearing: fn(f64) -> f64,
     /// What the ship's line says of a heading at that time, degrees; `None`: no line.
     line: fn(f64, f64) -> Option<f64>,
+    /// By how much the sea rolls ship and gun, degrees.
+    roll_deg: f64,
     t: f64,
 }
 
@@ -59,7 +61,7 @@ impl Rig {
         // A unit that does not drift is known not to.
         of_unit.own_growth = (0.002 + 2.0 * drift_deg_s) * DEG;
         let attitude = Attitude::new(of_unit, DVec3::ZERO, DQuat::IDENTITY);
-        Self { attitude, aid: Aid::new(settings), drift_deg_s, bearing, line, t: 0.0 }
+        Self { attitude, aid: Aid::new(settings), drift_deg_s, bearing, line, roll_deg: 0.0, t: 0.0 }
     }
 
     fn time(&self) -> Time {
@@ -79,7 +81,8 @@ impl Rig {
     fn run(&mut self, until: f64) {
         while self.t < until {
             self.t += 0.01;
-            let said = look((self.truth_deg() + self.drift_deg_s * self.t) * DEG, -0.1, 0.0);
+            let roll = self.roll_deg * (0.7 * self.t).sin() * DEG;
+            let said = look((self.truth_deg() + self.drift_deg_s * self.t) * DEG, -0.1, roll);
             let sample = ImuSample {
                 arrival: self.time(),
                 device_time_ns: self.time().ns(),
@@ -160,6 +163,34 @@ fn a_feed_that_freezes_is_left() {
         worst = worst.max(rig.error_deg().abs());
     }
     assert!(worst < 0.4, "{worst} deg");
+}
+
+#[test]
+fn a_feed_that_is_frozen_is_told_of_until_it_goes_on() {
+    let frozen = |t: f64, deg| Some(if (30.0..150.0).contains(&t) { 5.0 } else { deg });
+    let mut rig = Rig::new(0.0, |_| 30.0, frozen, HeadingSettings::default());
+    rig.roll_deg = 4.0;
+    rig.run(85.0);
+    assert_eq!(rig.aid.frozen_s(rig.time()), None, "a minute must pass");
+    rig.run(100.0);
+    let told = rig.aid.frozen_s(rig.time()).expect("frozen");
+    assert!((told - 70.0).abs() < 0.5, "{told} s");
+    rig.run(151.0);
+    assert_eq!(rig.aid.frozen_s(rig.time()), None, "it goes on");
+}
+
+#[test]
+fn a_ship_that_lies_still_has_no_frozen_feed() {
+    // At a pier: the gun is trained, the ship stands; then at sea with a feed that has gone silent, which another fault tells.
+    let mut rig = Rig::new(0.0, |t| 40.0 * (0.3 * t).sin(), |_, _| Some(5.0), HeadingSettings::default());
+    rig.run(150.0);
+    assert_eq!(rig.aid.frozen_s(rig.time()), None);
+    let silent = |t: f64, _| (t < 100.0).then_some(5.0);
+    let mut rig = Rig { roll_deg: 4.0, ..Rig::new(0.0, |_| 30.0, silent, HeadingSettings::default()) };
+    rig.run(99.0);
+    assert!(rig.aid.frozen_s(rig.time()).is_some());
+    rig.run(115.0);
+    assert_eq!(rig.aid.frozen_s(rig.time()), None);
 }
 
 #[test]

@@ -238,6 +238,11 @@ impl Session {
         self.sensors.counts()
     }
 
+    /// For how long the ship's heading has been the very same though the ship moves, seconds; `None` where it is not stuck.
+    pub fn ship_frozen_s(&self, now: Time) -> Option<f64> {
+        self.sensors.ship_frozen_s(now)
+    }
+
     /// How the inertial unit's clock does; `None` before that can be told.
     pub fn unit_clock(&self) -> Option<ClockReport> {
         self.sensors.clock()

@@ -140,6 +140,11 @@ impl Sensors {
         self.counts.headings = self.aid.counts();
     }
 
+    /// For how long the ship's heading has been the very same though the ship moves, seconds; `None` where it is not stuck.
+    pub fn ship_frozen_s(&self, now: Time) -> Option<f64> {
+        self.aid.frozen_s(now)
+    }
+
     /// How the unit's clock does; `None` before that can be told.
     pub fn clock(&self) -> Option<ClockReport> {
         self.clock.report()
