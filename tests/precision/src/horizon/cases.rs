@@ -1,6 +1,6 @@
 //! Series of drawn pictures, with a horizon and without.
 
-use super::synth::{DrawnLens, Shown};
+use super::synth::{DrawnLens, Glare, Shown};
 
 /// Pictures of a series that served to set the finder's constants: those with a smaller seed than this.
 pub const SET_WITH: u64 = 1000;
@@ -54,6 +54,35 @@ pub fn with_horizon(seed: u64, i: u64) -> Shown {
         }
         _ => {}
     }
+    shown
+}
+
+/// A picture with the sun low over a horizon of which it washes out a sixth to two thirds, with lens flare: the `i`th of the series that
+/// begins at `seed`.
+pub fn with_glare(seed: u64, i: u64) -> Shown {
+    let mut shown = with_horizon(seed, 8 * i);
+    let spread = |k: u64, low: f64, high: f64| Shown::fair(seed + i).even(k).mul_add(high - low, low);
+    shown.kind = "glare";
+    shown.glitter = Some(spread(41, -0.35, 0.35));
+    shown.glare = Some(Glare {
+        sun: [spread(41, -0.35, 0.35), spread(42, 0.0, 0.12)],
+        spread: [spread(43, 0.05, 0.2), spread(44, 0.03, 0.08)],
+        codes: spread(45, 300.0, 900.0),
+    });
+    shown
+}
+
+/// A picture with a washed-out strip over all of its horizon: the `i`th of the series that begins at `seed`.
+pub fn all_glare(seed: u64, i: u64) -> Shown {
+    let mut shown = with_glare(seed, i);
+    let spread = |k: u64, low: f64, high: f64| Shown::fair(seed + i).even(k).mul_add(high - low, low);
+    shown.kind = "all glare";
+    shown.attitude[0] = spread(46, -0.05, 0.05);
+    shown.glare = Some(Glare {
+        sun: [spread(47, -0.2, 0.2), spread(48, -0.01, 0.03)],
+        spread: [2.0, spread(49, 0.04, 0.1)],
+        codes: spread(50, 600.0, 1500.0),
+    });
     shown
 }
 

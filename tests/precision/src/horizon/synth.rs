@@ -14,6 +14,37 @@ pub struct DrawnLens {
     pub radial: [f64; 2],
 }
 
+/// The sun before the lens: it washes out what is near it, and its light goes to and fro between the glasses.
+#[derive(Clone, Copy, Debug)]
+pub struct Glare {
+    /// Where the sun stands: azimuth, and elevation over the visible horizon, radians.
+    pub sun: [f64; 2],
+    /// How far its light is spread across and upwards (standard deviation), radians.
+    pub spread: [f64; 2],
+    /// Codes that it adds in the middle: several times the brightest code, so that a plateau is washed out.
+    pub codes: f64,
+}
+
+impl Glare {
+    /// Codes that it adds at an elevation and azimuth.
+    fn veil(&self, elevation: f64, azimuth: f64) -> f64 {
+        let off =
+            ((azimuth - self.sun[0]) / self.spread[0]).hypot((elevation - self.sun[1]) / self.spread[1]);
+        // What the lens scatters reaches farther than what blooms, and is faint.
+        self.codes * (-0.5 * off * off).exp() + 25.0 * (-off / 3.0).exp()
+    }
+
+    /// Codes that its mirrored pictures add: discs on the line through the sun and the middle, beyond it, at `place` by the picture's
+    /// half width from the middle, with the sun at `sun`.
+    fn flare(place: [f64; 2], sun: [f64; 2]) -> f64 {
+        let disc = |(along, radius, codes): (f64, f64, f64)| {
+            let off = (place[0] + along * sun[0]).hypot(place[1] + along * sun[1]);
+            codes * (0.5 + 0.5 * ((radius - off) / 0.01).clamp(-1.0, 1.0))
+        };
+        [(0.35, 0.05, 22.0), (0.7, 0.11, 14.0), (1.15, 0.07, 18.0)].into_iter().map(disc).sum()
+    }
+}
+
 /// What a picture shows.
 #[derive(Clone, Debug)]
 pub struct Shown {
@@ -39,6 +70,8 @@ pub struct Shown {
     pub noise: f64,
     /// Azimuth under which the sun glitters on the water, radians.
     pub glitter: Option<f64>,
+    /// The sun before the lens.
+    pub glare: Option<Glare>,
     /// Ships before the horizon.
     pub ships: usize,
     /// Whether the own barrel stands in the picture.
@@ -74,6 +107,7 @@ impl Shown {
             ragged_px: 0.3,
             noise: 2.0,
             glitter: None,
+            glare: None,
             ships: 0,
             barrel: false,
             smear: 0,
@@ -156,6 +190,16 @@ impl Shown {
     }
 
     fn code(&self, x: f64, y: f64) -> f64 {
+        let Some(glare) = self.glare else { return self.without_glare(x, y) };
+        let (elevation, azimuth) = self.angles(x, y);
+        let half = self.size.0 as f64 / 2.0;
+        let place = [x / half - 1.0, (y - self.size.1 as f64 / 2.0) / half];
+        let sun = glare.sun.map(|angle| angle.tan() * self.lens.focal / half);
+        let flare = Glare::flare(place, [sun[0], -sun[1]]);
+        self.without_glare(x, y) + glare.veil(elevation, azimuth - self.heading) + flare
+    }
+
+    fn without_glare(&self, x: f64, y: f64) -> f64 {
         if self.is_barrel(x, y) {
             return 35.0 + 15.0 * noise(x / 40.0, y / 9.0, self.seed ^ 5);
         }

@@ -8,7 +8,7 @@ use crate::{
     bench::{Bench, Tried, Way},
     front::quantile,
     horizon::{
-        cases::{SET_WITH, with_horizon, without_horizon},
+        cases::{SET_WITH, all_glare, with_glare, with_horizon, without_horizon},
         frames::{self, Frame},
         score::{Drawn, miss},
         ways::{METHODS, Method, in_drawn, in_frame, px},
@@ -78,29 +78,49 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     drawn_scene(bench, &pictures);
     real_scene(bench, &frames::marked()?)?;
     for kind in ["lens bow", "glitter", "ships, barrel", "steep", "edge", "part", "haze"] {
-        let tried = METHODS.map(|(name, setting, method)| {
-            let of_kind = pictures.iter().filter(|d| d.shown.kind == kind);
-            let mut finder = HorizonFinder::new();
-            let error = worst(of_kind.map(|d| px(in_drawn(method, &mut finder, d).map(|up| d.miss(up)))));
-            Tried {
-                default: matches!(method, Method::Finder { prior: true }),
-                ..Tried::rival(name, setting, error)
-            }
-        });
-        bench.extreme(kind, "px", tried.into());
+        let of_kind: Vec<&Drawn> = pictures.iter().filter(|d| d.shown.kind == kind).collect();
+        worst_of(bench, kind, &of_kind, px(None));
     }
+    let few = if bench.is_quick() { 8 } else { 32 };
+    let glare: Vec<Drawn> = (0..few).map(|i| Drawn::new(with_glare(SET_WITH, i))).collect::<Result<_>>()?;
+    // To say nothing is right where the sun has taken too much of it.
+    worst_of(bench, "glare: sun over it, flare, a part washed out", &glare.iter().collect::<Vec<_>>(), 0.0);
+    let washed: Vec<Drawn> = (0..few).map(|i| Drawn::new(all_glare(SET_WITH, i))).collect::<Result<_>>()?;
+    taken_for_one(bench, "none seen: glare has washed out all of it", &washed);
     let count = if bench.is_quick() { 21 } else { 84 };
     let without: Vec<Drawn> =
         (0..count).map(|i| Drawn::new(without_horizon(SET_WITH, i))).collect::<Result<_>>()?;
+    taken_for_one(bench, "none there: sky, water, fog, night, noise, smear, blank", &without);
+    Ok(())
+}
+
+/// The worst error on pictures with a horizon; one that is not answered counts as `unanswered_px`.
+fn worst_of(bench: &mut Bench, case: &str, pictures: &[&Drawn], unanswered_px: f64) {
     let tried = METHODS.map(|(name, setting, method)| {
         let mut finder = HorizonFinder::new();
-        let taken = without.iter().filter(|d| in_drawn(method, &mut finder, d).is_some()).count();
-        let share = 100.0 * taken as f64 / without.len().max(1) as f64;
+        let mut find = |d: &&Drawn| in_drawn(method, &mut finder, d).map(|up| px(Some(d.miss(up))));
+        let found: Vec<Option<f64>> = pictures.iter().map(&mut find).collect();
+        let answered = found.iter().flatten().count();
+        let error = worst(found.iter().map(|px| px.unwrap_or(unanswered_px)));
+        let tried = Tried {
+            default: matches!(method, Method::Finder { prior: true }),
+            ..Tried::rival(name, setting, error)
+        };
+        tried.note(format!("{answered} of {} answered", pictures.len()))
+    });
+    bench.extreme(case, "px", tried.into());
+}
+
+/// The share of pictures without one in which a horizon is found.
+fn taken_for_one(bench: &mut Bench, case: &str, pictures: &[Drawn]) {
+    let tried = METHODS.map(|(name, setting, method)| {
+        let mut finder = HorizonFinder::new();
+        let taken = pictures.iter().filter(|d| in_drawn(method, &mut finder, d).is_some()).count();
+        let share = 100.0 * taken as f64 / pictures.len().max(1) as f64;
         Tried {
             default: matches!(method, Method::Finder { prior: true }),
             ..Tried::rival(name, setting, share)
         }
     });
-    bench.extreme("none there: sky, water, fog, night, noise, smear, blank", "% taken for one", tried.into());
-    Ok(())
+    bench.extreme(case, "% taken for one", tried.into());
 }
