@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::DVec2;
 
 use super::{
-    Target,
+    Target, bend,
     corner::{self, Refinement},
     picture::{Grey, Plane},
     quads::{self, Quad},
@@ -137,7 +137,7 @@ fn middle(q: &Quad) -> DVec2 {
 }
 
 /// Steps from one tag to another on the board, the larger of across and upwards.
-fn steps(target: &Target, a: usize, b: usize) -> usize {
+pub(super) fn steps(target: &Target, a: usize, b: usize) -> usize {
     let (columns, place) = (target.columns(), |id: usize, n: usize| (id % n, id / n));
     let ((ax, ay), (bx, by)) = (place(a, columns), place(b, columns));
     ax.abs_diff(bx).max(ay.abs_diff(by))
@@ -186,12 +186,11 @@ fn together(target: &Target, all: &BTreeMap<usize, Quad>) -> BTreeMap<usize, Qua
 fn grow(target: &Target, pyramid: &Pyramid, found: &mut BTreeMap<usize, Quad>) {
     let mut open: Vec<usize> = found.keys().copied().collect();
     while let Some(id) = open.pop() {
-        let Some(sight) = found.get(&id).and_then(Sight::of) else { continue };
         for other in (0..target.tags()).filter(|o| steps(target, id, *o) == 1) {
             if found.contains_key(&other) {
                 continue;
             }
-            let Some(expected) = sight.expected(target, id, other) else { continue };
+            let Some(expected) = bend::expected(target, found, id, other) else { continue };
             let Some(quad) = pyramid.refine(&expected, pyramid.level_for(height_px(&expected))) else {
                 continue;
             };
@@ -217,7 +216,7 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn stray(target: &Target, found: &BTreeMap<usize, Quad>, id: usize) -> f64 {
     let own = &found[&id];
     let near = |other: &&usize| steps(target, **other, id) == 1;
-    let seen = |other: &usize| Some((*other, Sight::of(&found[other])?.expected(target, *other, id)?));
+    let seen = |other: &usize| Some((*other, bend::expected(target, found, *other, id)?));
     let expected: Vec<(usize, Quad)> = found.keys().filter(near).filter_map(seen).collect();
     let off = |i: usize| {
         let away = |other: usize| beyond(target, other, target.corners(id)[i]);

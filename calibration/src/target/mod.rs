@@ -4,6 +4,7 @@
 //! between them cross, so that every corner of a tag is a crossing of two black and two white fields: a saddle of brightness, whose place
 //! neither blur nor exposure moves. A board can be seen in part, because every tag says which one it is.
 
+mod bend;
 mod board;
 mod codes;
 mod corner;
