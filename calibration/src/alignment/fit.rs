@@ -2,8 +2,8 @@
 
 use super::{
     error::AlignmentError,
-    filter::{Kind, Levels, Normal, Row, Whitened, cost, invert, whiten},
-    noise::most_likely,
+    filter::{Kind, Levels, Normal, Row, Whitened, cost, invert, restricted, whiten},
+    noise::{USUAL_WALK, most_likely},
     problem::{Problem, Unknowns, Weights},
     start::Start,
 };
@@ -55,8 +55,20 @@ pub(super) fn fit(problem: &Problem, start: &Start) -> Result<Fitted, AlignmentE
     unknowns = descend(problem, unknowns, &weights, &levels, &active)?;
     rows = problem.rows(&unknowns, &weights);
     let whitened = whiten(&rows, &levels).ok_or(NO_STEP)?;
-    let covariance = invert(&whitened.normal, &active, 0.0).ok_or(NO_STEP)?;
+    let doubted = whiten(&rows, &with_usual_walk(&rows, &levels)).ok_or(NO_STEP)?;
+    let covariance = invert(&doubted.normal, &active, 0.0).ok_or(NO_STEP)?;
     Ok(Fitted { unknowns, levels, rows, whitened, active, covariance })
+}
+
+/// A usual walk is believed instead of a smaller one that was found, unless the residuals are against it by three standard deviations, which
+/// is what is held against the covariance: twice the logarithm of the likelihoods' ratio.
+const AGAINST: f64 = 9.0;
+
+/// The noises with the walk that the covariance is to be stated by. Where the movement is slow, rotation and offset take some of the walk for
+/// movement; what they took is missing in the residuals, so that too little of it is found just where they err most.
+fn with_usual_walk(rows: &[Row], levels: &Levels) -> Levels {
+    let usual = Levels { walk: levels.walk.max(USUAL_WALK.0), ..*levels };
+    if restricted(rows, &usual) - restricted(rows, levels) < AGAINST { usual } else { *levels }
 }
 
 /// Noises to begin with: the camera's by the differences of residuals that follow each other, which no slow error enters.
