@@ -378,7 +378,7 @@ impl Capture {
     }
 
     fn rows_by(&self, camera_from_imu: DQuat, offset_s: f64, bias: DVec3) -> Rows<'_> {
-        Rows::new(rows::Seen {
+        Rows::new(rows::Measured {
             lens: self.lens,
             dip: horizon_dip(self.eye_height_m),
             readings: &self.readings,

@@ -41,7 +41,7 @@ const SIGMA_LEAST_S: f64 = 0.2e-3;
 
 /// What was seen, and how camera and unit belong together.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen<'a> {
+pub(crate) struct Measured<'a> {
     pub lens: Lens,
     /// Of the horizon, radians.
     pub dip: f64,
@@ -57,7 +57,7 @@ pub(crate) struct Seen<'a> {
 /// The same with the rates in order of time.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows<'a> {
-    seen: Seen<'a>,
+    seen: Measured<'a>,
     /// Times and rates of the camera, its own axes, rad/s.
     rates: Vec<(Time, DVec3)>,
 }
@@ -82,7 +82,7 @@ impl Turning {
 type Made = BTreeMap<(usize, usize), Option<Oriented>>;
 
 impl<'a> Rows<'a> {
-    pub(crate) fn new(seen: Seen<'a>) -> Self {
+    pub(crate) fn new(seen: Measured<'a>) -> Self {
         let camera = |r: &ImuReading| (r.time, seen.camera_from_imu * (r.rate - seen.bias));
         let mut rates: Vec<(Time, DVec3)> =
             seen.readings.iter().filter(|r| r.rate.is_finite()).map(camera).collect();
@@ -311,7 +311,7 @@ mod tests {
 
     impl Made {
         fn rows(&self) -> Rows<'_> {
-            Rows::new(Seen {
+            Rows::new(Measured {
                 lens: Lens::pinhole(1280, 720, 1.2),
                 dip: 1e-3,
                 readings: &self.readings,
@@ -381,7 +381,7 @@ mod tests {
                 row: 0.1,
             };
             let observations = [observation];
-            let rows = Rows::new(Seen {
+            let rows = Rows::new(Measured {
                 lens,
                 dip,
                 readings: &readings,
