@@ -35,7 +35,7 @@ const SWUNG_DEG_S: f64 = 32.0;
 pub const SKY_STANDS: f64 = 0.0005 * std::f64::consts::PI / 180.0;
 
 /// How the gun moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Moved {
     /// It points at one place while the ship rolls and pitches by 0.2 deg, as at a pier.
     Still,

@@ -263,6 +263,7 @@ impl Skyline {
             height: (f64::from(view.lens.height) * scale.y).round() as u32,
             focal: view.lens.focal * scale,
             centre: view.lens.centre * scale,
+            row_turn: view.lens.row_turn / scale.y,
             ..view.lens
         };
         let q = view.world_from_camera;

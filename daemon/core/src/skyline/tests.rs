@@ -41,7 +41,11 @@ fn clouds(azimuth: f64, elevation: f64) -> f64 {
 
 /// What `sky` gives for azimuth and elevation over a rough sea, with noise that differs by `seed`.
 fn painted(world_from_camera: DQuat, seed: u64, sky: impl Fn(f64, f64) -> f64) -> Picture {
-    let lens = lens();
+    painted_by(&lens(), world_from_camera, seed, sky)
+}
+
+/// The same through another lens.
+fn painted_by(lens: &Lens, world_from_camera: DQuat, seed: u64, sky: impl Fn(f64, f64) -> f64) -> Picture {
     let code = |i: u32| {
         let (x, y) = (i % SIZE.0, i / SIZE.0);
         let d = world_from_camera * lens.unproject(DVec2::new(f64::from(x), f64::from(y)) + 0.5);
@@ -91,6 +95,26 @@ fn a_drifting_heading_is_told_in_a_pan() {
         let off = seen.off - drift * 7.0;
         assert!(off.abs() < 4e-4 && off.abs() < 4.0 * seen.sigma, "{off} of {seen:?}");
         assert!(seen.anchor == at(0) && !seen.is_anchor() && seen.points.0 >= 20, "{seen:?}");
+    }
+}
+
+#[test]
+fn rows_are_seen_one_after_another() {
+    // 30 ms at 40 deg/s, to and fro, of a lens that is given for twice the picture's size.
+    let mut skyline = Skyline::new();
+    for i in 0..8 {
+        let turn = DVec3::new(0.004, 0.021, -0.003) * (0.9 * i as f64).cos();
+        let rolling = lens().read_while(turn);
+        let pose = look(0.3 + 0.03 * (0.9 * i as f64).sin(), -0.05, 0.02 * i as f64);
+        let picture = painted_by(&rolling, pose, i, clouds);
+        let seen = |lens: Lens, skyline: &mut Skyline| {
+            skyline.look(at(i as i64), &picture, &SkyView { lens, ..view(pose) })
+        };
+        // Nobody knows of the rows.
+        let unknown = seen(lens(), &mut skyline.clone());
+        let known = seen(rolling.covering(2 * SIZE.0, 2 * SIZE.1), &mut skyline).unwrap();
+        assert!(known.off.abs() < 3e-4, "{known:?}");
+        assert!(i != 4 || unknown.map_or(1.0, |u| u.off.abs()) > 1.5e-3, "{unknown:?}");
     }
 }
 

@@ -16,6 +16,9 @@ struct Arguments {
     /// Seconds that are replayed, the first 25 of which do not count
     #[arg(long, default_value_t = 125.0)]
     seconds: f64,
+    /// How the gun moves, more than once for several; absent: in all ways
+    #[arg(long)]
+    moved: Vec<Moved>,
 }
 
 fn run(arguments: &Arguments) -> Result<()> {
@@ -27,7 +30,8 @@ fn run(arguments: &Arguments) -> Result<()> {
         "gun", "orientation", "calibration", "as drawn", "from its start", "up alone"
     );
     let folder = tempfile::tempdir()?;
-    for moved in Moved::ALL {
+    for moved in Moved::ALL.into_iter().filter(|m| arguments.moved.is_empty() || arguments.moved.contains(m))
+    {
         let recipe = moved.recipe(arguments.width);
         let path = folder.path().join("registration.mcap");
         record(&recipe, &path)?;
