@@ -95,6 +95,9 @@ pub(super) trait Aids {
 
     /// From now on what is seen of the anchor tells of changes since now; what is anchored in turns by `drift` rad/s itself.
     fn anchor(&mut self, drift: f64);
+
+    /// Takes in that what is anchored in does not turn itself, to that variance, (rad/s)^2.
+    fn see_anchor_stand(&mut self, variance: f64) -> Correction;
 }
 
 impl<const N: usize> Aided<N> {
@@ -359,9 +362,14 @@ impl<const N: usize> Aids for Aided<N> {
     fn anchor(&mut self, drift: f64) {
         self.copy(ANCHOR, HEADING);
         self.set(ANCHOR, 0.0);
-        if self.variance(ANCHOR_RATE) <= 0.0 {
-            self.forget(ANCHOR_RATE, drift);
-        }
+        // Another sky may drift otherwise, by no less than what is said of it.
+        self.walk(ANCHOR_RATE, (drift * drift - self.variance(ANCHOR_RATE)).max(0.0));
+    }
+
+    fn see_anchor_stand(&mut self, variance: f64) -> Correction {
+        let mut row = Row::zeros();
+        row[ANCHOR_RATE] = 1.0;
+        self.update_one(&row, -self.at(ANCHOR_RATE), variance, f64::INFINITY).0
     }
 }
 

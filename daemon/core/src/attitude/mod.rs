@@ -346,6 +346,14 @@ impl Attitude {
         self.aids_now().map(|aids| aids.anchor(drift)).is_some()
     }
 
+    /// Takes in that what was anchored does not turn itself, known to that variance, (rad/s)^2. `false` where there is no estimate yet.
+    pub fn see_anchor_stand(&mut self, variance: f64) -> bool {
+        let Some(aids) = self.aids_now() else { return false };
+        let turn = aids.see_anchor_stand(variance);
+        self.turn(turn);
+        true
+    }
+
     /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`].
     pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
         self.correct_heading(seen, Against::Anchor, limit)

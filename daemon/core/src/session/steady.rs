@@ -22,6 +22,9 @@ const CHANGE_SIGMA: f64 = 2e-3;
 /// How fast the gun turns is told over so long.
 const TURN_NS: i64 = 20_000_000;
 
+/// What the sky shows of its own drift is told where it is so much better known than before: each time costs an update of the filter.
+const TOLD_ANEW: f64 = 0.9;
+
 /// Chi squared with one degree of freedom that a heading exceeds once in a thousand.
 const SURPRISE_MAX: f64 = 10.8;
 
@@ -48,6 +51,8 @@ pub(super) struct Steady {
     eye_height_m: f64,
     time_sigma_s: f64,
     drift: f64,
+    /// How well the filter was told that the sky does not turn by itself, rad/s.
+    told: f64,
     next: Time,
     refused_in_a_row: u32,
     counts: SkylineCounts,
@@ -63,6 +68,7 @@ impl Steady {
             eye_height_m,
             time_sigma_s,
             drift,
+            told: 0.0,
             next: Time::MIN,
             refused_in_a_row: 0,
             counts: SkylineCounts::default(),
@@ -76,6 +82,7 @@ impl Steady {
     /// What was held is worth nothing any more, as when the unit has restarted.
     pub(super) fn forget(&mut self) {
         self.skyline.forget();
+        self.told = 0.0;
     }
 
     /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all.
@@ -94,6 +101,7 @@ impl Steady {
             eye_height_m: self.eye_height_m,
             world_from_camera: attitude.camera(then.world_from_imu),
             sigma: CHANGE_SIGMA + late,
+            drift: self.drift,
         };
         let Ok(yaw) = self.skyline.look(time, picture, &view) else {
             self.counts.none += 1;
@@ -102,9 +110,11 @@ impl Steady {
         if yaw.is_anchor() {
             self.counts.anchors += 1;
             self.refused_in_a_row = 0;
-            attitude.anchor_heading(self.drift);
+            self.told = self.told.max(yaw.drift_sigma);
+            attitude.anchor_heading(yaw.drift_sigma);
             return;
         }
+        self.tell_drift(yaw.drift_sigma, attitude);
         let variance = yaw.sigma * yaw.sigma + late * late;
         match attitude.see_anchored_heading(&HeadingSeen { time, off: yaw.off, variance }, SURPRISE_MAX) {
             Some(outcome) if outcome.taken => {
@@ -118,6 +128,14 @@ impl Steady {
                     self.forget();
                 }
             }
+        }
+    }
+
+    /// Tells the filter what the sky has shown of its own drift beyond what was told before.
+    fn tell_drift(&mut self, sigma: f64, attitude: &mut Attitude) {
+        let more = sigma.powi(-2) - self.told.powi(-2);
+        if sigma < TOLD_ANEW * self.told && attitude.see_anchor_stand(1.0 / more) {
+            self.told = sigma;
         }
     }
 }

@@ -7,14 +7,17 @@
 //! picture whose orientation was believed without question. Points that are lost are replaced by others whose directions come from that turn; what
 //! this errs by is counted.
 //!
-//! What it cannot tell: clouds that all drift from a heading that does, and landmarks that a moving ship passes. Both grow with the anchor's
-//! age, at v/distance; who uses the answer must count that.
+//! Wind carries clouds, and the less of that is seen the nearer they are to the horizon (`wind`): points at several elevations tell wind from
+//! turn, and the turn is what is left where nothing of the wind is seen. Points at the sky line may be coast, which stands, or goes by as
+//! the ship passes it; each goes with clouds or coast as fits it better. What this leaves open grows with the anchor's age and is said as a
+//! rate of its own: few points, or points that are all equally high, leave most of it.
 
 mod corners;
 mod fit;
 mod grid;
 mod patch;
 mod pyramid;
+mod wind;
 
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
@@ -28,6 +31,7 @@ use fit::{Expected, Fit, Sight};
 use grid::{FIELD, Grid};
 use patch::{HALF, Patch};
 use pyramid::{LEVELS, Pyramid};
+use wind::{Wind, carried, nearness};
 
 /// For each point that is followed in a picture, so many are remembered, those out of view included.
 const KEPT: usize = 3;
@@ -53,6 +57,10 @@ const SIGMA_MAX: f64 = 0.3 * std::f64::consts::PI / 180.0;
 const FORETOLD_PX: f64 = 2.0;
 /// Distance over which a patch's turn and stretch are told, pixels of the finest level.
 const STRETCH_PX: f64 = HALF as f64;
+/// A point that was tied in counts in full after so long: what moves by itself is found out before, seconds.
+const TRUSTED_S: f64 = 2.0;
+/// Drifts at the horizon that are no clouds', rad/s.
+const DRIFTS: [f64; 2] = [1e-7, 1e-2];
 /// Smallest picture, in fields.
 const FIELDS_MIN: (usize, usize) = (4, 2);
 
@@ -67,6 +75,8 @@ pub struct SkyView {
     pub world_from_camera: DQuat,
     /// By how much its change since the last look may be wrong about any axis, radians.
     pub sigma: f64,
+    /// How fast clouds or coast at the horizon may drift by themselves (standard deviation), rad/s.
+    pub drift: f64,
 }
 
 /// The heading, held against the anchor's.
@@ -78,8 +88,12 @@ pub struct YawSeen {
     pub anchor: Time,
     /// By which the believed heading must be turned, counter-clockwise from above, radians.
     pub off: f64,
-    /// Standard deviation of `off`, radians: of the sights, and of what points that were tied in later err by.
+    /// Standard deviation of `off`, radians: of the sights, of their drift, and of what points that were tied in later err by.
     pub sigma: f64,
+    /// Standard deviation of a rate at which `off` may grow by itself, rad/s: of what the sky leaves open of its own drift.
+    pub drift_sigma: f64,
+    /// Wind as clouds show it, heights of theirs a second towards x and y of the anchor's world, and its standard deviation on an axis.
+    pub wind: (DVec2, f64),
     /// The whole turn from the believed world to the anchor's, a rotation vector in the world, radians.
     pub turn: DVec3,
     /// Covariance of the whole turn's error, of the sights alone, rad^2.
@@ -145,8 +159,11 @@ struct Point {
     right: DVec3,
     down: DVec3,
     patch: Patch,
-    /// When it was seen last.
+    /// When it had that direction, and when it was seen last.
+    taken: Time,
     seen: Time,
+    /// Whether it goes as what lies at the sky line, and not with the clouds.
+    stands: bool,
     misses: u8,
     /// Variance of the heading that it was tied in with, rad^2.
     tied: f64,
@@ -165,6 +182,7 @@ pub struct Skyline {
     scratch: Vec<f64>,
     cursor: usize,
     anchor: Option<Anchor>,
+    wind: Wind,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -174,6 +192,8 @@ struct Anchor {
     held: Time,
     /// From the believed world to the anchor's.
     turn: DQuat,
+    /// Wind by its points, heights of the clouds a second.
+    wind: DVec2,
 }
 
 /// A picture under the lens that made it, both reduced.
@@ -182,10 +202,18 @@ struct Look {
     lens: Lens,
     world_from_camera: DQuat,
     sigma: f64,
+    drift: f64,
     /// Sine of the elevation above which there is sky.
     sine: f64,
     /// Angle of a reduced pixel, radians.
     pixel: f64,
+}
+
+impl Look {
+    /// What is known of the wind where that was `learnt`: as clouds at the horizon may drift, so may all of their layer.
+    fn wind(&self, learnt: &Wind) -> Wind {
+        Wind::calm(self.drift / nearness(DVec3::X)).and(learnt)
+    }
 }
 
 impl Default for Skyline {
@@ -216,6 +244,7 @@ impl Skyline {
             scratch: Vec::new(),
             cursor: 0,
             anchor: None,
+            wind: Wind::UNKNOWN,
         }
     }
 
@@ -224,10 +253,11 @@ impl Skyline {
         self.grid.set_mask(mask);
     }
 
-    /// Forgets anchor and points: the next picture with a sky is the anchor.
+    /// Forgets anchor, points and wind: the next picture with a sky is the anchor.
     pub fn forget(&mut self) {
         self.points.clear();
         self.anchor = None;
+        self.wind = Wind::UNKNOWN;
     }
 
     /// The heading in `picture`, exposed at `time`, against the anchor's.
@@ -245,7 +275,7 @@ impl Skyline {
         self.points.retain(|p| time.ns_since(p.seen) <= KEPT_NS);
         self.points.drain(..self.points.len().saturating_sub(KEPT * self.points_most));
         let Some(anchor) = self.anchor else { return self.begin(&look) };
-        let sought = self.seek(&look, anchor.turn);
+        let sought = self.seek(&look, &anchor);
         match self.agree(&look, &anchor, sought) {
             Ok(fit) => self.answer(&look, &anchor, &fit, sought),
             Err(_) if time.ns_since(anchor.held) > LOST_NS => self.begin(&look),
@@ -274,6 +304,7 @@ impl Skyline {
             && q.is_finite()
             && (0.5..2.0).contains(&q.length())
             && view.sigma.is_finite()
+            && view.drift.is_finite()
             && view.eye_height_m.is_finite();
         if !sensible {
             return Err(NoYaw::Senseless);
@@ -282,7 +313,8 @@ impl Skyline {
         let sigma = view.sigma.abs().clamp(0.1 * pixel, 0.2);
         // A patch must lie above the horizon, wherever that may be.
         let sine = (f64::from(HALF) * pixel + sigma).sin() - horizon_dip(view.eye_height_m).sin();
-        Ok(Look { time, lens, world_from_camera: q.normalize(), sigma, sine, pixel })
+        let drift = view.drift.abs().clamp(DRIFTS[0], DRIFTS[1]);
+        Ok(Look { time, lens, world_from_camera: q.normalize(), sigma, drift, sine, pixel })
     }
 
     /// Makes this picture the anchor, where it has enough to hold on to.
@@ -298,12 +330,20 @@ impl Skyline {
             return Err(NoYaw::Featureless { points });
         }
         self.points.drain(..before);
-        self.anchor = Some(Anchor { time: look.time, held: look.time, turn: DQuat::IDENTITY });
+        if let Some(lost) = self.anchor {
+            self.wind = self.wind.turned(lost.turn.inverse());
+        }
+        let wind = look.wind(&self.wind);
+        let (mean, sigma) = (wind.mean(), wind.sigma());
+        let near = self.points.iter().map(|p| nearness(p.middle)).sum::<f64>() / points as f64;
+        self.anchor = Some(Anchor { time: look.time, held: look.time, turn: DQuat::IDENTITY, wind: mean });
         Ok(YawSeen {
             time: look.time,
             anchor: look.time,
             off: 0.0,
             sigma: 0.0,
+            drift_sigma: near * sigma,
+            wind: (mean, sigma),
             turn: DVec3::ZERO,
             covariance: DMat3::ZERO,
             points: (points, points),
@@ -312,17 +352,20 @@ impl Skyline {
     }
 
     /// Seeks all points that should be in view; how many these are.
-    fn seek(&mut self, look: &Look, turn: DQuat) -> usize {
-        let camera_from_anchor = (turn * look.world_from_camera).inverse();
+    fn seek(&mut self, look: &Look, anchor: &Anchor) -> usize {
+        let camera_from_anchor = (anchor.turn * look.world_from_camera).inverse();
         // How far a prediction may be off decides how coarse the search begins.
         let off_px = 3.0 * look.sigma / look.pixel;
         let coarsest =
             (0..LEVELS - 1).find(|k| off_px <= FORETOLD_PX * f64::from(1u32 << k)).unwrap_or(LEVELS - 1);
+        let settled = |taken: Time| taken == anchor.time;
         self.sights.clear();
         self.places.clear();
         let mut sought = 0;
         for (index, point) in self.points.iter_mut().enumerate() {
-            let project = |d: DVec3| look.lens.project(camera_from_anchor * d);
+            let age_s = look.time.secs_since(point.taken);
+            let gone = if point.stands { DVec2::ZERO } else { anchor.wind * age_s };
+            let project = |d: DVec3| look.lens.project(camera_from_anchor * carried(d, gone));
             let Some(guess) = project(point.middle) else { continue };
             let in_sky = self.grid.field(guess).is_some_and(|f| self.grid.sky.get(f) == Some(&true));
             if !in_sky || !self.grid.is_open(guess) {
@@ -338,9 +381,17 @@ impl Skyline {
             };
             let seen = look.world_from_camera * look.lens.unproject(found.place);
             if seen.is_finite() {
-                let held = point.middle;
-                let (likeness, unit) = (f64::from(found.likeness), point.patch.unit());
-                self.sights.push(Sight { point: index, seen, held, likeness, unit, ..Sight::default() });
+                let trust = if settled(point.taken) { 1.0 } else { (age_s / TRUSTED_S).min(1.0).powi(2) };
+                self.sights.push(Sight {
+                    point: index,
+                    seen,
+                    held: point.middle,
+                    age_s,
+                    trust,
+                    likeness: f64::from(found.likeness),
+                    unit: point.patch.unit(),
+                    ..Sight::default()
+                });
                 self.places.push(found.place);
             }
         }
@@ -353,7 +404,13 @@ impl Skyline {
         let fit = if found < POINTS_LEAST {
             Err(NoYaw::Missed { found, sought })
         } else {
-            let expected = Expected::new(anchor.turn, look.sigma, look.pixel);
+            let expected = Expected {
+                turn: anchor.turn,
+                tilt_sigma: look.sigma,
+                pixel: look.pixel,
+                wind: look.wind(&self.wind),
+                rate_sigma: look.drift,
+            };
             fit::fit(&mut self.sights, &expected, POINTS_LEAST, &mut self.scratch)
                 .ok_or(NoYaw::Disagreed { found })
         };
@@ -377,7 +434,8 @@ impl Skyline {
             }
         }
         let variance = fit.covariance.z_axis.z + if weights > 0.0 { tied / weights } else { 0.0 };
-        self.anchor = Some(Anchor { held: look.time, turn: fit.turn, ..*anchor });
+        self.wind.learn(&fit.told, look.time.secs_since(anchor.held));
+        self.anchor = Some(Anchor { held: look.time, turn: fit.turn, wind: fit.wind.mean(), ..*anchor });
         self.keep(look, fit);
         if (fit.inliers as f64) < FEW * self.points_most as f64 {
             self.tie_in(look, fit.turn, variance, FIELDS_A_LOOK);
@@ -387,6 +445,8 @@ impl Skyline {
             anchor: anchor.time,
             off: 2.0 * fit.turn.z.atan2(fit.turn.w),
             sigma: variance.max(0.0).sqrt(),
+            drift_sigma: fit.rate_sigma,
+            wind: (fit.wind.mean(), fit.wind.sigma()),
             turn: rotation_vector(fit.turn),
             covariance: fit.covariance,
             points: (fit.inliers, sought),
@@ -399,6 +459,7 @@ impl Skyline {
         self.taken.clear();
         self.taken.resize(self.grid.sky.len(), false);
         let anchor_from_camera = fit.turn * look.world_from_camera;
+        let wind = fit.wind.mean();
         for (sight, place) in self.sights.iter().zip(&self.places) {
             let Some(point) = self.points.get_mut(sight.point) else { continue };
             if sight.weight <= 0.0 {
@@ -407,11 +468,14 @@ impl Skyline {
             }
             point.seen = look.time;
             point.misses = 0;
+            point.stands = sight.stands;
             if sight.likeness < f64::from(LIKENESS_RENEW)
                 && let Some(patch) = Patch::take(&self.pyramid, *place)
             {
-                let ray = |by: DVec2| anchor_from_camera * look.lens.unproject(*place + by);
-                // The point stays where it was; only the way around it is that of this picture.
+                // The point stays where it was; only the way around it is that of this picture, before wind had carried it there.
+                let age_s = look.time.secs_since(point.taken);
+                let gone = if point.stands { DVec2::ZERO } else { wind * -age_s };
+                let ray = |by: DVec2| carried(anchor_from_camera * look.lens.unproject(*place + by), gone);
                 let middle = ray(DVec2::ZERO);
                 point.right = point.middle + ray(DVec2::X * STRETCH_PX) - middle;
                 point.down = point.middle + ray(DVec2::Y * STRETCH_PX) - middle;
@@ -460,9 +524,21 @@ impl Skyline {
         let middle = ray(DVec2::ZERO);
         let (right, down) = (ray(DVec2::X * STRETCH_PX), ray(DVec2::Y * STRETCH_PX));
         let sound = [middle, right, down].iter().all(|d| d.is_finite());
-        sound.then_some(Point { middle, right, down, patch, seen: look.time, misses: 0, tied: 0.0 })
+        sound.then_some(Point {
+            middle,
+            right,
+            down,
+            patch,
+            taken: look.time,
+            seen: look.time,
+            stands: false,
+            misses: 0,
+            tied: 0.0,
+        })
     }
 }
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod wind_tests;

@@ -8,6 +8,8 @@ use crate::{
 
 const SIZE: (u32, u32) = (640, 360);
 const EYE_M: f64 = 6.0;
+/// As clouds at the horizon drift, rad/s.
+const DRIFT: f64 = 1e-4;
 
 fn lens() -> Lens {
     Lens {
@@ -17,7 +19,7 @@ fn lens() -> Lens {
 }
 
 /// Evenly spread numbers from 0 to 1, by place.
-fn grain(x: i64, y: i64, seed: u64) -> f64 {
+pub(super) fn grain(x: i64, y: i64, seed: u64) -> f64 {
     let mut z = (x as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (y as u64).wrapping_add(seed << 32);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -62,7 +64,7 @@ fn painted_by(lens: &Lens, world_from_camera: DQuat, seed: u64, sky: impl Fn(f64
 }
 
 fn view(world_from_camera: DQuat) -> SkyView {
-    SkyView { lens: lens(), eye_height_m: EYE_M, world_from_camera, sigma: 0.005 }
+    SkyView { lens: lens(), eye_height_m: EYE_M, world_from_camera, sigma: 0.005, drift: DRIFT }
 }
 
 fn at(tenths: i64) -> Time {
@@ -116,6 +118,26 @@ fn rows_are_seen_one_after_another() {
         assert!(known.off.abs() < 3e-4, "{known:?}");
         assert!(i != 4 || unknown.map_or(1.0, |u| u.off.abs()) > 1.5e-3, "{unknown:?}");
     }
+}
+
+#[test]
+fn clouds_that_wind_carries_turn_nothing() {
+    let wind = DVec2::new(0.008, -0.003);
+    let mut skyline = Skyline::new();
+    let mut last = Err(NoYaw::NoSky);
+    for i in 0..9 {
+        let pose = look(0.3 + 0.02 * i as f64, 0.12, 0.03 * (i as f64).sin());
+        // Where a cloud over a flat sea was before, in its heights.
+        let before = |a: f64, e: f64| {
+            let along = e.max(0.01).tan().recip();
+            let at = DVec2::new(a.sin(), a.cos()) * along - wind * i as f64;
+            clouds(at.x.atan2(at.y), at.length().recip().atan())
+        };
+        last = skyline.look(at(10 * i), &painted(pose, i as u64, before), &view(pose));
+    }
+    let seen = last.unwrap();
+    assert!(seen.off.abs() < 6e-4 && seen.off.abs() < 3.0 * seen.sigma, "{seen:?}");
+    assert!((seen.wind.0 - wind).length() < 1.5e-3, "{seen:?}");
 }
 
 #[test]
@@ -199,7 +221,7 @@ proptest! {
                     .collect();
                 let Ok(picture) = Picture::new(format, width, height, bytes.into()) else { continue };
                 let q = if broken && i == 1 { DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 1.0) } else { look(azimuth, elevation, roll) };
-                let view = SkyView { lens, eye_height_m: 5.0, world_from_camera: q, sigma };
+                let view = SkyView { lens, eye_height_m: 5.0, world_from_camera: q, sigma, drift: sigma };
                 if let Ok(seen) = skyline.look(at(i as i64), &picture, &view) {
                     prop_assert!(seen.off.is_finite() && seen.sigma.is_finite() && seen.turn.is_finite());
                 }

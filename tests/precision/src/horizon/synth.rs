@@ -84,6 +84,8 @@ pub struct Shown {
     pub heading: f64,
     /// How far wind has turned the clouds, clockwise, radians.
     pub clouds_turned: f64,
+    /// How far wind has carried the clouds, 1 km above a round sea, east and north, kilometres.
+    pub clouds_gone: [f64; 2],
     /// How far the ships have gone, clockwise, radians.
     pub ships_turned: f64,
     /// Height of hills along the horizon, radians; nothing for none.
@@ -114,6 +116,7 @@ impl Shown {
             seed,
             heading: 0.0,
             clouds_turned: 0.0,
+            clouds_gone: [0.0; 2],
             ships_turned: 0.0,
             coast: 0.0,
             picture: 0,
@@ -158,6 +161,11 @@ impl Shown {
         [-roll.sin() * elevation.cos(), -roll.cos() * elevation.cos(), elevation.sin()]
     }
 
+    /// By how much the visible horizon lies below the horizontal, radians. Bowditch: 1.76 minutes of arc by the root of the height in metres.
+    fn dip(&self) -> f64 {
+        (1.76 / 60.0 * self.eye_m.sqrt()).to_radians()
+    }
+
     /// Elevation over the visible horizon, and azimuth clockwise from where heading is nothing, of a pixel's place, radians.
     fn angles(&self, x: f64, y: f64) -> (f64, f64) {
         let (d, u) = (self.ray(x, y), self.up());
@@ -165,8 +173,7 @@ impl Shown {
         let right = [roll.cos(), -roll.sin(), 0.0];
         let sine: f64 = (0..3).map(|i| d[i] * u[i]).sum();
         let across: f64 = (0..3).map(|i| d[i] * right[i]).sum();
-        // Bowditch: 1.76 minutes of arc by the root of the height in metres.
-        let dip = (1.76 / 60.0 * self.eye_m.sqrt()).to_radians();
+        let dip = self.dip();
         let off_axis = across.atan2((1.0 - sine * sine - across * across).max(0.0).sqrt());
         (sine.asin() + dip, self.heading + off_axis)
     }
@@ -220,12 +227,28 @@ impl Shown {
     fn sky(&self, elevation: f64, azimuth: f64) -> f64 {
         let [horizon, zenith, _] = self.codes;
         let clear = zenith + (horizon - zenith) * (-elevation / 0.25).exp();
+        let (elevation, azimuth) = self.before_wind(elevation, azimuth);
         // Clouds are flatter the nearer they are to the horizon.
         let height = (elevation + 0.03).ln() * 6.0;
         let octaves = [(1.0, 1.0), (2.3, 0.5), (5.1, 0.25)];
         let along = (azimuth - self.clouds_turned) * 7.0;
         let cloud: f64 = octaves.iter().map(|(f, a)| a * noise(along * f, height * f, self.seed ^ 11)).sum();
         clear + self.contrast[0] * 1.3 * cloud
+    }
+
+    /// Where clouds that are seen there by now were before wind carried them.
+    fn before_wind(&self, elevation: f64, azimuth: f64) -> (f64, f64) {
+        let [east, north] = self.clouds_gone;
+        if east == 0.0 && north == 0.0 {
+            return (elevation, azimuth);
+        }
+        // Along the sight a height of 1 km is reached after `far` km: far sin(e) + far^2 / 2 R = 1.
+        let radius = 6371.0 * 7.0 / 6.0;
+        let sine = (elevation - self.dip()).sin();
+        let far = radius * ((sine * sine + 2.0 / radius).sqrt() - sine);
+        let (x, y) = (far * azimuth.sin() - east, far * azimuth.cos() - north);
+        let far = x.hypot(y).max(1.0);
+        ((1.0 / far - far / (2.0 * radius)).asin() + self.dip(), x.atan2(y))
     }
 
     fn sea(&self, below: f64, azimuth: f64) -> f64 {

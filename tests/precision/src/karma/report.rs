@@ -6,6 +6,7 @@ use anyhow::{Context as _, Result};
 use bowwave_calibration::alignment::{self, ImuReading, Observation, Options};
 use bowwave_core::{
     geometry::{Lens, look},
+    session::HeadingSettings,
     skyline::{SkyView, Skyline},
     time::Time,
 };
@@ -156,7 +157,13 @@ fn say_what_alignment_says(clip: &Clip, times: &[Time], swing: usize, found: &Fo
 fn orientations(clip: &Clip, times: &[Time], lens: &Lens) -> Result<Vec<Observation>> {
     // All that matters is that the sky is above; which way it looked at first is as good as any other.
     let world_from_camera = look(0.0, 0.0, 0.0);
-    let view = SkyView { lens: *lens, eye_height_m: 40.0, world_from_camera, sigma: 0.01 };
+    let view = SkyView {
+        lens: *lens,
+        eye_height_m: 40.0,
+        world_from_camera,
+        sigma: 0.01,
+        drift: HeadingSettings::default().sky_drift,
+    };
     let (mut skyline, mut chain, mut out) = (Skyline::new(), 0, Vec::new());
     for ((_, jpeg), stamp) in clip.pictures.iter().zip(times) {
         let picture = decoded("picture", jpeg)?.picture()?;

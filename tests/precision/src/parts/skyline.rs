@@ -24,16 +24,19 @@ pub const ABOUT: About = About {
     what: "Follows sky line, coast and clouds through pictures: by how much the believed heading is off since the anchor.",
     truth: "drawn skies of known heading, by the renderer of the horizon's part, seen through a bowed lens while the camera is turned and \
             rolled; the believed heading drifts by .05 deg/s",
-    rivals: "the same without a pyramid; without a prediction of the camera's turn; each picture against the one before, added up; fewer points \
-             and more",
-    why: "against the anchor nothing adds up, where a chain of pictures errs by a random walk and costs twice; without a pyramid it holds only \
-          what is predicted within two pixels, without a prediction it loses a gun that is trained fast. Errors are root mean squares over the series; a \
+    rivals: "the same without a pyramid; without the clouds' wind among what is sought; without a prediction of the camera's turn; each picture \
+             against the one before, added up; fewer points and more",
+    why: "against the anchor nothing adds up, where a chain of pictures errs by a random walk and costs twice; where wind carries clouds it is \
+          carried along if it does not seek the wind too; without a pyramid it holds only what is predicted within two pixels, without a prediction it loses a gun that is trained fast. Errors are root mean squares over the series; a \
           picture without an answer counts with the drift since the last one",
 };
 
 /// Pictures a second, and by how much the believed heading drifts, rad/s clockwise.
 const RATE_HZ: f64 = 10.0;
 const DRIFT: f64 = 0.05 * std::f64::consts::PI / 180.0;
+/// How fast the sky may drift at the horizon as is usual, and for one that is said to stand, rad/s.
+const DRIFTING: f64 = 0.005 * std::f64::consts::PI / 180.0;
+const STANDING: f64 = 1e-7;
 /// What the prediction of a turn may be off by, radians.
 const SIGMA: f64 = 3.5e-3;
 
@@ -83,6 +86,7 @@ impl Series {
             eye_height_m: self.eye_m,
             world_from_camera: self.believed(i, way),
             sigma: if way.pyramid { SIGMA } else { 0.0 },
+            drift: way.drift,
         };
         let time = Time::from_ns((i as f64 / RATE_HZ * 1e9) as i64);
         let seen = skyline.look(time, &self.pictures.get(i)?.0, &view).ok()?;
@@ -125,20 +129,24 @@ struct Follow {
     predicted: bool,
     chained: bool,
     points: usize,
+    /// How fast what is at the horizon may drift, rad/s.
+    drift: f64,
 }
 
 impl Follow {
-    const PRODUCT: Self = Self { pyramid: true, predicted: true, chained: false, points: Skyline::POINTS };
+    const PRODUCT: Self =
+        Self { pyramid: true, predicted: true, chained: false, points: Skyline::POINTS, drift: DRIFTING };
 
     fn skyline(self) -> Skyline {
         Skyline::of_points(self.points)
     }
 }
 
-const WAYS: [(&str, &str, Follow); 6] = [
+const WAYS: [(&str, &str, Follow); 7] = [
     ("anchored", "60 points", Follow::PRODUCT),
     ("anchored", "20 points", Follow { points: 20, ..Follow::PRODUCT }),
     ("anchored", "120 points", Follow { points: 120, ..Follow::PRODUCT }),
+    ("anchored", "no wind", Follow { drift: STANDING, ..Follow::PRODUCT }),
     ("anchored", "no pyramid", Follow { pyramid: false, ..Follow::PRODUCT }),
     ("anchored", "no prediction", Follow { predicted: false, ..Follow::PRODUCT }),
     ("picture to picture", "60 points", Follow { chained: true, ..Follow::PRODUCT }),
@@ -217,7 +225,7 @@ fn half(shown: Shown) -> Shown {
 /// An extreme case: what is shown after so many seconds.
 type Extreme = (&'static str, fn(f64) -> Shown);
 
-const EXTREMES: [Extreme; 10] = [
+const EXTREMES: [Extreme; 12] = [
     ("no texture in the sky", |t| Shown { contrast: [0.0, 10.0], ..trained(t, 10.0, 10.0) }),
     ("faint clouds, a code", |t| Shown { contrast: [0.8, 10.0], ..trained(t, 10.0, 10.0) }),
     ("all water", |t| Shown { attitude: [0.0, -0.8], ..trained(t, 10.0, 10.0) }),
@@ -229,6 +237,12 @@ const EXTREMES: [Extreme; 10] = [
     ("clouds drift by .03 deg/s behind a coast", |t| Shown {
         coast: 0.02,
         clouds_turned: (0.03 * t).to_radians(),
+        ..trained(t, 10.0, 10.0)
+    }),
+    ("clouds 1 km up go by at 10 m/s", |t| Shown { clouds_gone: [0.01 * t, 0.0], ..trained(t, 10.0, 10.0) }),
+    ("the same behind a coast", |t| Shown {
+        coast: 0.02,
+        clouds_gone: [0.01 * t, 0.0],
         ..trained(t, 10.0, 10.0)
     }),
     ("ships pass at 2 deg/s", |t| Shown {
