@@ -12,7 +12,7 @@ use glam::{DMat3, DQuat, DVec3};
 use rayon::prelude::*;
 use vqf_rs::{Params, VQF};
 
-use super::About;
+use super::{About, rms};
 use crate::{
     aided::{CAMERA_FROM_IMU, Estimator, Heading, Horizon, Outcome, Recording, Unit, outcome, product},
     bench::{Bench, Tried, Way},
@@ -203,11 +203,10 @@ fn consistency(bench: &mut Bench) {
             let squares: Vec<f64> = runs.iter().flat_map(|run| run.surprises.iter().copied()).collect();
             let count = squares.len() as f64;
             let inside = squares.iter().filter(|s| **s < 5.99).count() as f64 / count;
-            let of = |pick: &dyn Fn(&Outcome) -> f64| runs.iter().map(pick);
             let note = format!(
                 "up {:.3} deg rms, worst {:.3}; {:.0} % within the 95 % ellipse; {} runs",
-                (of(&|run| run.up_deg[0].powi(2)).sum::<f64>() / runs.len() as f64).sqrt(),
-                of(&|run| run.up_deg[1]).fold(0.0, f64::max),
+                rms(runs.iter().map(|run| run.up_deg[0])),
+                runs.iter().map(|run| run.up_deg[1]).fold(0.0, f64::max),
                 100.0 * inside,
                 runs.len()
             );
