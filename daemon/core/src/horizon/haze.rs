@@ -28,8 +28,8 @@ const PIECES: u32 = 8;
 const PRIOR_SIGMA: f64 = 0.1f64.to_radians();
 
 /// By how much lower than the true horizon the finder sees it with that lens from that height, at a meteorological visibility of
-/// `visibility_m` metres; radians. Nothing where haze leaves no edge that is found.
-pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> f64 {
+/// `visibility_m` metres; radians. `None` where haze, or too coarse a picture, leaves no edge that could be found and believed.
+pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> Option<f64> {
     let height = lens.height.min(ROWS);
     let flat = Lens {
         height,
@@ -51,7 +51,7 @@ pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> f64
             count += 1;
         }
     }
-    if count > 0 { sum / f64::from(count) } else { 0.0 }
+    (count > 0).then(|| sum / f64::from(count))
 }
 
 /// Sky, water and haze, seen level but for `elevation` (radians). Light is summed before it is put in codes, which moves an edge towards
@@ -91,14 +91,15 @@ mod tests {
     #[test]
     fn haze_lowers_the_edge_that_is_seen() {
         let lens = Lens::pinhole(1280, 720, 1.05);
-        let by = |visibility_m| lowered_by_haze(&lens, 8.0, visibility_m).to_degrees();
+        let by = |visibility_m| lowered_by_haze(&lens, 8.0, visibility_m).expect("an edge").to_degrees();
         // A sixth of a pixel is the camera's own tone curve, haze or none.
         assert!(by(500_000.0).abs() < 0.012, "{} deg in clear air", by(500_000.0));
         assert!((0.01..0.05).contains(&by(35_000.0)), "{} deg", by(35_000.0));
         assert!(by(15_000.0) > 1.5 * by(35_000.0), "{} deg", by(15_000.0));
-        // Fog, or a lens that sees nothing, lower nothing.
-        assert!(by(1.0).abs() < 0.3 && by(0.0).abs() < 0.01, "{} {}", by(1.0), by(0.0));
-        assert_eq!(lowered_by_haze(&Lens { width: 8, ..lens }, 8.0, 35_000.0), 0.0);
+        // Fog leaves no edge, nor has a picture of 160 pixels one that is sharp enough.
+        assert_eq!(lowered_by_haze(&lens, 8.0, 300.0), None);
+        assert_eq!(lowered_by_haze(&Lens::pinhole(160, 96, 1.05), 8.0, 35_000.0), None);
+        assert_eq!(lowered_by_haze(&Lens { width: 8, ..lens }, 8.0, 35_000.0), None);
     }
 
     #[test]

@@ -32,8 +32,8 @@ pub struct HorizonCounts {
 pub(super) struct Level {
     finder: HorizonFinder,
     eye_height_m: f64,
-    /// By how much lower than the true horizon the one that is seen stands, radians.
-    lowered: f64,
+    /// By how much lower than the true horizon the one that is seen stands, radians; absent: none is to be seen.
+    lowered: Option<f64>,
     next: Time,
     counts: HorizonCounts,
 }
@@ -57,6 +57,7 @@ impl Level {
         if time < self.next {
             return;
         }
+        let Some(lowered) = self.lowered else { return };
         let (Some(covariance), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return };
         self.next = time.plus_ns(EVERY_NS);
         let world_from_camera = attitude.camera(then.world_from_imu);
@@ -72,7 +73,7 @@ impl Level {
         };
         // An edge that stands too low tilts up towards where the camera looks.
         let right = DVec3::Z.cross(horizon.up).normalize_or_zero();
-        let up_camera = (horizon.up + right.cross(horizon.up) * self.lowered).normalize_or_zero();
+        let up_camera = (horizon.up + right.cross(horizon.up) * lowered).normalize_or_zero();
         let seen = UpSeen { time, up_camera, covariance: horizon.up_covariance() };
         match attitude.see_up(&seen, SURPRISE_MAX) {
             Some(outcome) if outcome.taken => self.counts.taken += 1,

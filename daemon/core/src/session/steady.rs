@@ -19,6 +19,10 @@ pub const SKY_DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
 /// By how much the change of the believed orientation since the last look is wrong at rest, about any axis, radians.
 const CHANGE_SIGMA: f64 = 2e-3;
 
+/// Looks are held against the same patches of the anchor, so that what one errs by the next ones err by, too, seconds: all of them in that
+/// time count as one.
+const LASTING_NS: i64 = 1_000_000_000;
+
 /// How fast the gun turns is told over so long.
 const TURN_NS: i64 = 20_000_000;
 
@@ -115,7 +119,8 @@ impl Steady {
             return;
         }
         self.tell_drift(yaw.drift_sigma, attitude);
-        let variance = yaw.sigma * yaw.sigma + late * late;
+        let alike = LASTING_NS as f64 / EVERY_NS as f64;
+        let variance = alike * (yaw.sigma * yaw.sigma + late * late);
         match attitude.see_anchored_heading(&HeadingSeen { time, off: yaw.off, variance }, SURPRISE_MAX) {
             Some(outcome) if outcome.taken => {
                 self.counts.taken += 1;
