@@ -4,7 +4,6 @@
 //! kernel modules; nothing is changed in the image. The agent plays a recording into the kernel's interfaces and does what the
 //! harness says; they talk over a virtio serial port (`protocol`).
 
-pub mod board;
 pub mod protocol;
 pub mod tape;
 

@@ -123,8 +123,6 @@ pub struct Feed {
     pub saturated: bool,
     /// Share of the unit's packets that are preceded by garbage, or cut.
     pub garbage: f64,
-    /// The camera sees [`crate::board`] in place of the tape's pictures.
-    pub board: bool,
     /// Whether the tape's own pulls of the trigger are played.
     pub trigger: bool,
 }

@@ -16,7 +16,7 @@ use anyhow::{Context, Result};
 use bowwave_core::{event::ImuSample, time::Time};
 use bowwave_devices::{clock, vectornav::CommonOutput};
 use bowwave_hil::{
-    TAPE_SERIAL, board,
+    TAPE_SERIAL,
     protocol::{Feed, Message},
     tape::{Sample, Tape, halved},
 };
@@ -42,8 +42,6 @@ struct Shared {
     link: Arc<Link>,
     gpio: Arc<Gpio>,
     tape: Tape,
-    /// The picture of the board.
-    board: Vec<u8>,
     feed: Mutex<Feed>,
     on: AtomicBool,
     /// Counts `Play`s: threads of an older one end.
@@ -60,10 +58,9 @@ impl Player {
     /// Reads the tape.
     pub fn new(link: Arc<Link>, gpio: Arc<Gpio>) -> Result<Self> {
         let tape = Tape::read(&tape_disk()?)?;
-        let board = board::yuyv((tape.header.width, tape.header.height))?;
         let feed = Mutex::new(Feed::default());
         let (on, play, late) = (AtomicBool::new(false), AtomicU64::new(0), AtomicU64::new(0));
-        Ok(Self { shared: Arc::new(Shared { link, gpio, tape, board, feed, on, play, late }) })
+        Ok(Self { shared: Arc::new(Shared { link, gpio, tape, feed, on, play, late }) })
     }
 
     /// Begins from the tape's beginning, or ends.
@@ -169,12 +166,6 @@ impl Shared {
         let header = &self.tape.header;
         let mut bytes = match mode.fourcc.as_str() {
             "MJPG" => self.tape.jpeg(index).to_vec(),
-            "YUYV" if mode.width == header.width && feed.board => {
-                let mut bytes = self.board.clone();
-                // No camera gives the same picture twice; one that does is frozen.
-                bytes.iter_mut().step_by(64).for_each(|luma| *luma ^= random.random_range(0..4));
-                bytes
-            }
             "YUYV" if mode.width == header.width => self.tape.yuyv(index).to_vec(),
             "YUYV" if mode.width == header.width / 2 => {
                 halved(self.tape.yuyv(index), header.width, header.height)

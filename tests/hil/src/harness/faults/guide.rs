@@ -6,12 +6,11 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
-use bowwave_calibration::{CalibrationFile, parse};
-use bowwave_hil::{board, protocol::Command};
+use bowwave_hil::protocol::Command;
 
 use super::{Own, Row, Seen, computer::off, unit};
 use crate::{
-    bench::{Bench, Configured, PICTURE, configuration},
+    bench::{Bench, Configured, configuration},
     guest::Pending,
     lcd::Plate,
 };
@@ -27,22 +26,16 @@ const DATA: &str = "/run/hil/gathered";
 /// Longest wait for the next thing it says, and for all of it.
 const PATIENCE: Duration = Duration::from_secs(60);
 const TOGETHER: Duration = Duration::from_secs(400);
-/// Distance to the board, metres, and how far off the barrel may be found, radians.
-const RANGE_M: f64 = 40.0;
-const BORE_OFF: f64 = 1e-3;
 /// Between two pulls.
 const APART: Duration = Duration::from_millis(1500);
-/// After pulls were measured the trigger waits for so long before it accepts their result.
-const MEASURED: Duration = Duration::from_millis(3600);
-
 pub fn rows() -> Vec<Row> {
     vec![
         Row::Own(Own {
             number: "W",
             fault: "Guided calibration on live devices",
-            injected: "camera and unit unplugged while it gathers; interlock opened; six pulls at a board",
+            injected: "camera and unit unplugged while it gathers",
             code: "-",
-            target: "says what to do, goes on, finds the boresight, keeps the file before",
+            target: "says what to do, goes on, tells a result; nothing is saved unasked",
             run: guided,
         }),
         Row::Own(Own {
@@ -129,11 +122,6 @@ impl Bench {
         shown.map(|_| ())
     }
 
-    fn file(&mut self, name: &str) -> Result<CalibrationFile> {
-        let text = self.machine.guest.shell(&format!("cat {FOLDER}/{name}"))?;
-        Ok(parse(&text, name)?)
-    }
-
     fn listed(&mut self) -> Result<String> {
         self.machine
             .guest
@@ -145,40 +133,37 @@ fn guided(bench: &mut Bench) -> Result<Seen> {
     bench.ready(bench.scaled(2.0))?;
     off(bench)?;
     bench.lcd(Instant::now(), PATIENCE, "nothing", |p, _| p == Plate::Black)?;
-    bench.machine.guest.shell(&format!("cp {FOLDER}/calibration.toml /run/hil/before.toml"))?;
-    let arguments = format!("--target {} --range {RANGE_M} --data {DATA}", board::NAME);
-    let mut wizard = Wizard::start(bench, &arguments)?;
-    let notes = (|| -> Result<Vec<String>> {
+    let before = bench.listed()?;
+    let mut wizard = Wizard::start(bench, &format!("--data {DATA}"))?;
+    let note = (|| -> Result<String> {
         wizard.says(bench, "== Calibrate\n")?;
-        let notes = vec![moved(bench, &mut wizard)?, aimed(bench, &mut wizard)?];
+        let note = moved(bench, &mut wizard)?;
         Wizard::key(bench, "q")?;
         wizard.says(bench, "-> Ended")?;
-        Ok(notes)
+        Ok(note)
     })();
-    if notes.is_err() {
-        let back = format!("kill $(pidof bowwave); cp /run/hil/before.toml {FOLDER}/calibration.toml");
-        drop(bench.machine.guest.shell(&back));
+    if note.is_err() {
+        drop(bench.machine.guest.shell("kill $(pidof bowwave)"));
     }
     let code = wizard.ends()?;
     let said = Wizard::said(bench)?;
     std::fs::write(bench.out.join("wizard.txt"), &said).context("wizard.txt")?;
-    let mut notes = notes?;
-    let kept =
-        bench.machine.guest.shell(&format!("bowwave calibrate restore {FOLDER}/calibration.toml --list"))?;
-    let back = format!(
-        "cd {FOLDER} && bowwave calibrate restore calibration.toml --number 1 && cmp calibration.toml /run/hil/before.toml"
-    );
-    bench.machine.guest.shell(&back)?;
-    let gathered = bench.machine.guest.shell(&format!("ls {DATA}"))?;
-    let recordings =
-        said.lines().filter(|l| l.starts_with("what was gathered is kept: bowwave calibrate ")).count();
-    bench.machine.guest.shell(&format!("rm -r {DATA} {FOLDER}/calibration.toml.*"))?;
+    let note = note?;
+    let after = bench.listed()?;
+    ensure!(before == after, "before: {before}; after: {after}");
+    let gathered = bench.machine.guest.shell(&format!("ls {DATA}; rm -r {DATA}"))?;
+    let named = said.lines().filter(|l| l.starts_with("what was gathered is kept: bowwave calibrate "));
+    let recordings = named.count();
     ensure!(
-        recordings == 2 && gathered.lines().count() == 2,
+        recordings == 1 && gathered.lines().count() == 1,
         "{recordings} recordings are named: {gathered}"
     );
-    notes.push(format!("exit code {code}; {} files kept", kept.lines().count()));
-    Ok(Seen { lcd: "guide".into(), met: code == 0, note: notes.join("; "), ..Seen::default() })
+    Ok(Seen {
+        lcd: "guide".into(),
+        met: code == 0,
+        note: format!("{note}; exit code {code}"),
+        ..Seen::default()
+    })
 }
 
 /// Camera and unit are gathered from, unplugged and plugged again.
@@ -209,44 +194,6 @@ fn moved(bench: &mut Bench, wizard: &mut Wizard) -> Result<String> {
     wizard.says(bench, "== Calibrate\n")?;
     let verdict = told.lines().skip_while(|l| !matches!(*l, "   FAIL" | "   PASS")).nth(1);
     Ok(format!("movement: {}", verdict.context("no result was told")?.trim()))
-}
-
-/// Pulls at a board whose place in the picture is known.
-fn aimed(bench: &mut Bench, wizard: &mut Wizard) -> Result<String> {
-    bench.feed(|f| f.board = true)?;
-    Wizard::key(bench, "3")?;
-    wizard.says(bench, "> 3 boresight")?;
-    Wizard::pull(bench)?;
-    wizard.says(bench, "-> Aim the bore at the mark anew")?;
-    bench.pull(1, false)?;
-    wizard.says(bench, "!! NOT ARMED: GUN NOT INERT: ")?;
-    bench.pull(1, true)?;
-    wizard.says(bench, "(well again)")?;
-    pulls(bench, wizard, "row-W-boresight")?;
-    bench.feed(|f| f.board = false)?;
-    let found = bench.file("calibration.toml")?.calibration;
-    let mark = found.lens.unproject(board::middle(0, PICTURE)?) * RANGE_M - found.muzzle_in_camera;
-    let truth = glam::DVec2::new((mark.x / mark.z).atan(), (mark.y / mark.z).atan());
-    let off = found.boresight.distance(truth);
-    ensure!(off < BORE_OFF, "a boresight of {} was found, {truth} is true", found.boresight);
-    Ok(format!("boresight off by {:.2} mrad", off * 1e3))
-}
-
-/// Pulls until there are enough, accepts the result, and goes back to the choice.
-fn pulls(bench: &mut Bench, wizard: &mut Wizard, name: &str) -> Result<()> {
-    // Enough are five; one more goes nowhere.
-    for _ in 0..6 {
-        Wizard::pull(bench)?;
-    }
-    wizard.says(bench, "   PASS\n")?;
-    wizard.says(bench, "-> Press Enter to save; what is replaced is kept")?;
-    bench.guide(false, name)?;
-    thread::sleep(MEASURED);
-    Wizard::pull(bench)?;
-    wizard.says(bench, "-> Saved; press Enter")?;
-    thread::sleep(MEASURED);
-    Wizard::pull(bench)?;
-    wizard.says(bench, "== Calibrate\n").map(|_| ())
 }
 
 /// Nobody says where recordings go, and the folder it runs in cannot be written.
