@@ -289,9 +289,10 @@ impl Attitude {
         let (turn, outcome) = self.aids_now()?.see_up(world_from_camera, seen.up_camera, across, limit);
         match &mut self.state {
             State::Running(running) if outcome.taken => running.filter.saw_up(),
-            State::Own(own, _) if outcome.taken => {
+            State::Own(own, _) => {
                 let up = world_from_camera * seen.up_camera;
-                own.watch(DVec2::new(up.y, -up.x), 0.5 * (across.x_axis.x + across.y_axis.y));
+                let variance = 0.5 * (across.x_axis.x + across.y_axis.y);
+                own.watch(DVec2::new(up.y, -up.x), variance, outcome.taken);
             }
             _ => {}
         }

@@ -15,6 +15,8 @@ const STATES: usize = RATE + 1;
 
 /// The mean inclination is wrong by this: data sheets of the class have half a degree at rest, radians.
 const MEAN_SIGMA: f64 = 0.5f64.to_radians();
+/// A unit that is found to be worse than its class is believed to be twice as bad each time, up to this, radians.
+const MEAN_SIGMA_MOST: f64 = 4f64.to_radians();
 /// It forgets itself in this time, seconds.
 const MEAN_TAU_S: f64 = 300.0;
 /// What goes to and fro about it, on an axis, before that has been watched, radians...
@@ -29,6 +31,8 @@ const SWAY_TAU_S: f64 = 3.0;
 const APART_S: f64 = 1.0;
 /// ...over so long, seconds.
 const WATCHED_MOST_S: f64 = 60.0;
+/// So many horizons in a row that are not believed mean that it is what was known of the unit that is wrong, as after its start.
+const REFUSED_MAX: u32 = 10;
 /// What the heading has of that. An inclination is held by gravity, a heading by nothing that a wave turns; radians.
 const HEADING_SWAY: f64 = 0.03f64.to_radians();
 /// A drift forgets itself in this time, seconds.
@@ -48,7 +52,10 @@ pub(super) struct Own {
     growth: f64,
     /// Time since the last prediction, seconds.
     dt_s: f64,
+    /// By what the mean inclination is wrong, radians.
+    mean_sigma: f64,
     sway: Sway,
+    refused_in_a_row: u32,
 }
 
 /// How far inclination goes to and fro, by what was seen of it.
@@ -66,14 +73,30 @@ impl Own {
     /// A unit whose mean heading counts as right now.
     pub(super) fn new(growth: f64, mounting: DVec3) -> Self {
         let mut aided = Aided::new(mounting);
-        for axis in 0..2 {
-            aided.forget(MEAN + axis, MEAN_SIGMA);
-            aided.copy(TURN + axis, MEAN + axis);
-            aided.walk(TURN + axis, SWAY_START * SWAY_START);
-        }
         aided.forget(HEADING, HEADING_SWAY);
         aided.forget(RATE, growth);
-        Self { aided, heading: 0.0, tilt: DVec2::ZERO, growth, dt_s: 0.0, sway: Sway::START }
+        let mut own = Self {
+            aided,
+            heading: 0.0,
+            tilt: DVec2::ZERO,
+            growth,
+            dt_s: 0.0,
+            mean_sigma: MEAN_SIGMA,
+            sway: Sway::START,
+            refused_in_a_row: 0,
+        };
+        own.forget_tilt();
+        own
+    }
+
+    /// Nothing is known of the inclination but the unit's class and how far it has been seen to sway. What it is turned by stays until
+    /// something else is seen.
+    fn forget_tilt(&mut self) {
+        for axis in 0..2 {
+            self.aided.forget(MEAN + axis, self.mean_sigma);
+            self.aided.copy(TURN + axis, MEAN + axis);
+            self.aided.walk(TURN + axis, self.sway.variance);
+        }
     }
 
     /// The unit's own orientation `dt_s` seconds after the one before, without what is known to be wrong with it.
@@ -114,7 +137,7 @@ impl Own {
             // The world turns back towards where the unit's own mean has it.
             self.tilt[axis] += (1.0 - sways) * (mean - self.tilt[axis]);
             self.revert(TURN + axis, MEAN + axis, sways, self.sway.variance);
-            self.aided.fade(MEAN + axis, creeps, MEAN_SIGMA * MEAN_SIGMA);
+            self.aided.fade(MEAN + axis, creeps, self.mean_sigma * self.mean_sigma);
         }
         self.heading += (1.0 - sways) * (self.aided.at(MEAN_HEADING) - self.heading);
         self.revert(HEADING, MEAN_HEADING, sways, HEADING_SWAY * HEADING_SWAY);
@@ -146,9 +169,16 @@ impl Own {
         self.heading += turn.z;
     }
 
-    /// Learns from an error of inclination that was seen, as the turn that the world as it is now believed needs, and its variance on an axis.
-    pub(super) fn watch(&mut self, turn: DVec2, variance: f64) {
+    /// Learns from an error of inclination that was seen, as the turn that the world as it was believed needs, and its variance on an axis;
+    /// whether it was believed or not: else a unit that sways farther than was thought would never be.
+    pub(super) fn watch(&mut self, turn: DVec2, variance: f64, believed: bool) {
         self.sway.watch(self.tilt + turn, variance);
+        self.refused_in_a_row = if believed { 0 } else { self.refused_in_a_row + 1 };
+        if self.refused_in_a_row >= REFUSED_MAX {
+            self.refused_in_a_row = 0;
+            self.mean_sigma = (2.0 * self.mean_sigma).min(MEAN_SIGMA_MOST);
+            self.forget_tilt();
+        }
     }
 }
 
