@@ -34,6 +34,12 @@ pub fn curvature_drop(distance_m: f64) -> f64 {
     distance_m * distance_m * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M)
 }
 
+/// By what a small turn of the world turns it about the vertical, counter-clockwise from above, radians (the twist about z of Dobrowolski
+/// 2015, swing-twist).
+pub fn turn_about_vertical(turn: DQuat) -> f64 {
+    2.0 * turn.z.atan2(turn.w)
+}
+
 /// An angle by at most half a turn either way, radians.
 pub fn wrapped(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()

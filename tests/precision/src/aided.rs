@@ -100,10 +100,10 @@ impl Recording {
     }
 }
 
-/// An estimator as the product has it on the gun.
-pub fn product() -> Attitude {
+/// An estimator as the product has it on the gun, of that orientation.
+pub fn product(source: Source) -> Attitude {
     let settings = AttitudeSettings {
-        source: Source::Fused,
+        source,
         rate: RateKind::Instant,
         inclination: Settings::GUN,
         noise: Noise::USUAL,

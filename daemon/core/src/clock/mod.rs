@@ -23,7 +23,7 @@ const WINDOW_NS: i64 = 60 * NS_PER_S;
 /// The slope is fitted only once the points span this long; before, only the offset is.
 const SLOPE_AFTER_NS: i64 = 5 * NS_PER_S;
 
-/// Crystal clocks do not differ by more than 500 ppm; a line that is steeper than this is an outlier.
+/// Crystal clocks do not differ by more than 500 ppm, and a timer's beat tilts an edge by some more; a line that is steeper is an outlier.
 const SLOPE_MAX: f64 = 600e-6;
 
 /// A device time that disagrees with the map by more than this is a restart of the device, not a delay.

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::{HorizonFinder, Prior, View};
 use crate::{
     event::{Picture, PixelFormat},
-    geometry::{Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
+    geometry::{Distortion, Lens, horizon_dip, look},
     light::linear_to_srgb,
     view::haze_share,
 };
@@ -73,12 +73,12 @@ fn picture(lens: &Lens, elevation: f64, eye_height_m: f64, visibility_m: f64) ->
 
 /// Light at an angle below the horizontal.
 fn seen(depression: f64, eye_height_m: f64, visibility_m: f64) -> f64 {
-    if depression <= horizon_dip(eye_height_m) {
+    let dip = horizon_dip(eye_height_m);
+    if depression <= dip {
         return SKY;
     }
-    // The nearer of the two places where a ray at that angle meets a sea that drops with the square of distance.
-    let drop = (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M);
-    let root = (depression * depression - 4.0 * drop * eye_height_m).max(0.0).sqrt();
+    // The nearer of the two places where a ray at that angle meets a sea that drops with the square of distance; at the dip they are one.
+    let root = (depression * depression - dip * dip).sqrt();
     let range = 2.0 * eye_height_m / (depression + root);
     let haze = f64::from(haze_share(range, visibility_m));
     WATER + haze * (SKY - WATER)
@@ -87,6 +87,7 @@ fn seen(depression: f64, eye_height_m: f64, visibility_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::curvature_drop;
 
     #[test]
     fn haze_lowers_the_edge_that_is_seen() {
@@ -105,7 +106,7 @@ mod tests {
     #[test]
     fn water_is_seen_where_geometry_has_it() {
         // From 8 m, 1 km away: 8 mrad less what the Earth's curve and refraction make, 0.068 mrad.
-        let depression = 8.0 / 1000.0 + 1000.0 * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M);
+        let depression = (8.0 + curvature_drop(1000.0)) / 1000.0;
         let half = 3912.0 / 2f64.ln();
         assert!((seen(depression, 8.0, half) - 0.5 * (SKY + WATER)).abs() < 1e-4);
         assert_eq!(seen(0.0, 8.0, half), SKY);

@@ -23,7 +23,7 @@ use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use crate::{
     event::Picture,
-    geometry::{Lens, horizon_dip, rotation_vector},
+    geometry::{Lens, horizon_dip, rotation_vector, turn_about_vertical},
     horizon::Mask,
     time::Time,
 };
@@ -209,6 +209,13 @@ struct Look {
     pixel: f64,
 }
 
+impl Point {
+    /// How far wind has carried it in `age_s` seconds, heights of the clouds.
+    fn gone(&self, wind: DVec2, age_s: f64) -> DVec2 {
+        if self.stands { DVec2::ZERO } else { wind * age_s }
+    }
+}
+
 impl Look {
     /// What is known of the wind where that was `learnt`: as clouds at the horizon may drift, so may all of their layer.
     fn wind(&self, learnt: &Wind) -> Wind {
@@ -358,13 +365,12 @@ impl Skyline {
         let off_px = 3.0 * look.sigma / look.pixel;
         let coarsest =
             (0..LEVELS - 1).find(|k| off_px <= FORETOLD_PX * f64::from(1u32 << k)).unwrap_or(LEVELS - 1);
-        let settled = |taken: Time| taken == anchor.time;
         self.sights.clear();
         self.places.clear();
         let mut sought = 0;
         for (index, point) in self.points.iter_mut().enumerate() {
             let age_s = look.time.secs_since(point.taken);
-            let gone = if point.stands { DVec2::ZERO } else { anchor.wind * age_s };
+            let gone = point.gone(anchor.wind, age_s);
             let project = |d: DVec3| look.lens.project(camera_from_anchor * carried(d, gone));
             let Some(guess) = project(point.middle) else { continue };
             let in_sky = self.grid.field(guess).is_some_and(|f| self.grid.sky.get(f) == Some(&true));
@@ -381,7 +387,8 @@ impl Skyline {
             };
             let seen = look.world_from_camera * look.lens.unproject(found.place);
             if seen.is_finite() {
-                let trust = if settled(point.taken) { 1.0 } else { (age_s / TRUSTED_S).min(1.0).powi(2) };
+                let with_anchor = point.taken == anchor.time;
+                let trust = if with_anchor { 1.0 } else { (age_s / TRUSTED_S).min(1.0).powi(2) };
                 self.sights.push(Sight {
                     point: index,
                     seen,
@@ -443,7 +450,7 @@ impl Skyline {
         Ok(YawSeen {
             time: look.time,
             anchor: anchor.time,
-            off: 2.0 * fit.turn.z.atan2(fit.turn.w),
+            off: turn_about_vertical(fit.turn),
             sigma: variance.max(0.0).sqrt(),
             drift_sigma: fit.rate_sigma,
             wind: (fit.wind.mean(), fit.wind.sigma()),
@@ -474,7 +481,7 @@ impl Skyline {
             {
                 // The point stays where it was; only the way around it is that of this picture, before wind had carried it there.
                 let age_s = look.time.secs_since(point.taken);
-                let gone = if point.stands { DVec2::ZERO } else { wind * -age_s };
+                let gone = -point.gone(wind, age_s);
                 let ray = |by: DVec2| carried(anchor_from_camera * look.lens.unproject(*place + by), gone);
                 let middle = ray(DVec2::ZERO);
                 point.right = point.middle + ray(DVec2::X * STRETCH_PX) - middle;

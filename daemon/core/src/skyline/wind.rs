@@ -7,7 +7,7 @@
 
 use glam::{DMat2, DQuat, DVec2, DVec3};
 
-use crate::geometry::horizon_dip;
+use crate::geometry::{horizon_dip, turn_about_vertical};
 
 /// Height that clouds are taken to have, metres: it only matters within some degrees of the horizon.
 const HEIGHT_M: f64 = 1500.0;
@@ -82,7 +82,7 @@ impl Wind {
     /// The same in a world that is turned by `turn`.
     #[must_use]
     pub fn turned(&self, turn: DQuat) -> Self {
-        let about = DMat2::from_angle(2.0 * turn.z.atan2(turn.w));
+        let about = DMat2::from_angle(turn_about_vertical(turn));
         Self { information: about * self.information * about.transpose(), pull: about * self.pull }
     }
 }

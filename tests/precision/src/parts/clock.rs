@@ -4,7 +4,7 @@ use bowwave_core::{clock::ClockMap, time::Time};
 
 use anyhow::Result;
 
-use super::{About, even, rms};
+use super::{About, even, rms, worst};
 use crate::bench::{Bench, Tried, Way};
 
 /// What is said of this part.
@@ -83,18 +83,14 @@ impl Errors {
     }
 
     fn worst(&self) -> f64 {
-        worst(&self.0)
+        worst(self.0.iter().map(|e| e.abs()))
     }
 
     /// The worst from five seconds after the change on, and for how many seconds the error is beyond half a millisecond.
     fn after_change(&self) -> (f64, f64) {
         let later = self.0.get((CHANGE_S as usize - 5) * 200..).unwrap_or_default();
-        (worst(later), self.0.iter().filter(|e| e.abs() > 0.5).count() as f64 / 200.0)
+        (worst(later.iter().map(|e| e.abs())), self.0.iter().filter(|e| e.abs() > 0.5).count() as f64 / 200.0)
     }
-}
-
-fn worst(errors: &[f64]) -> f64 {
-    errors.iter().fold(0.0, |worst, e| worst.max(e.abs()))
 }
 
 fn hull() -> impl FnMut(i64, Time) -> i64 {

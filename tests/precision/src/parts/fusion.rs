@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::{Attitude, HeadingSeen, UpSeen, turn_between},
+    attitude::{Attitude, HeadingSeen, Source, UpSeen, turn_between},
     event::ImuSample,
     gunnery::GRAVITY_M_S2,
     time::Time,
@@ -91,8 +91,8 @@ fn ways<'a>(
     const SHARE: &str = "rates and a fixed share";
     let share = |share: f64| -> Begin<'a> { Box::new(move || Box::new(FixedShare { share, last: None })) };
     vec![
-        (OURS, "with horizon", with, Box::new(|| Box::new(product()))),
-        (OURS, "without", without, Box::new(|| Box::new(product()))),
+        (OURS, "with horizon", with, Box::new(|| Box::new(product(Source::Fused)))),
+        (OURS, "without", without, Box::new(|| Box::new(product(Source::Fused)))),
         (SHARE, "0.02 of each horizon", with, share(0.02)),
         (SHARE, "0.2 of each horizon", with, share(0.2)),
         (SHARE, "all of each horizon", with, share(1.0)),
@@ -122,7 +122,7 @@ fn drawn(bench: &Bench, sea: Sea, seen_s: f64) -> Vec<Outcome> {
     let seeds = if bench.is_quick() { 4 } else { 40 };
     let run = |seed| {
         let recording = Recording::new(sea, Unit::Drawn, (horizon(seen_s), Heading::Start), 400.0, seed);
-        outcome(&recording, &mut product())
+        outcome(&recording, &mut product(Source::Fused))
     };
     (0..seeds).into_par_iter().map(run).collect()
 }
@@ -172,8 +172,11 @@ fn headings(bench: &mut Bench) {
         let recording = Recording::new(ship::SEA_4, Unit::Usual, (horizon(10.0), heading), 400.0, 5);
         let tried = [("VQF and error-state filter", true, 0.0), ("rates and a fixed share", false, 0.1)].map(
             |(method, ours, share)| {
-                let mut estimator: Box<dyn Estimator> =
-                    if ours { Box::new(product()) } else { Box::new(FixedShare { share, last: None }) };
+                let mut estimator: Box<dyn Estimator> = if ours {
+                    Box::new(product(Source::Fused))
+                } else {
+                    Box::new(FixedShare { share, last: None })
+                };
                 let [rms, worst] = outcome(&recording, &mut *estimator).heading_deg;
                 let setting = if ours { "for a gun" } else { "a tenth of each" };
                 Tried { default: ours, ..Tried::rival(method, setting, rms) }
@@ -232,7 +235,7 @@ fn damaged(bench: &mut Bench) {
             let tried = [("VQF and error-state filter", true), ("rates and a fixed share", false)].map(
                 |(method, ours)| {
                     let mut estimator: Box<dyn Estimator> = if ours {
-                        Box::new(product())
+                        Box::new(product(Source::Fused))
                     } else {
                         Box::new(FixedShare { share: 0.02, last: None })
                     };
@@ -257,7 +260,7 @@ fn day(bench: &mut Bench) {
     let aids = Aids::usual(horizon(300.0), Heading::Compass(0.3f64.to_radians()));
     let seconds = hours * 3600.0;
     let part_s = (seconds / 4.0).min(3600.0);
-    let mut estimator = product();
+    let mut estimator = product(Source::Fused);
     // Squares of up's error in the first and the last part after a minute; worst; norm; least variance over the largest.
     let (mut first, mut last) = ([0.0; 2], [0.0; 2]);
     let (mut worst, mut heading, mut norm, mut thin) = (0.0f64, 0.0f64, 0.0f64, f64::INFINITY);
@@ -314,7 +317,7 @@ mod tests {
     fn a_horizon_half_of_the_time_is_enough_and_the_filter_knows_its_error() {
         for (sea, seed) in [(ship::CALM, 1), (ship::SEA_4, 2), (ship::SEA_6, 3)] {
             let recording = Recording::new(sea, Unit::Usual, (horizon(20.0), Heading::Start), 300.0, seed);
-            let run = outcome(&recording, &mut product());
+            let run = outcome(&recording, &mut product(Source::Fused));
             assert!(run.up_deg[0] < 0.04 && run.up_deg[1] < 0.15, "{}: {:?}", sea.name, run.up_deg);
             let mean = run.surprises.iter().sum::<f64>() / run.surprises.len() as f64;
             assert!((0.1..4.0).contains(&mean), "{}: {mean}", sea.name);
@@ -325,7 +328,7 @@ mod tests {
     fn a_coast_holds_the_heading_that_a_bias_would_turn() {
         let run = |heading| {
             let recording = Recording::new(ship::SEA_4, Unit::Usual, (horizon(10.0), heading), 400.0, 5);
-            outcome(&recording, &mut product()).heading_deg[0]
+            outcome(&recording, &mut product(Source::Fused)).heading_deg[0]
         };
         let (free, held) = (run(Heading::Start), run(Heading::Anchored(5e-4, 1e-6)));
         assert!(free > 0.5 && held < 0.2 * free, "{free} {held}");

@@ -2,9 +2,7 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::{
-        Attitude, AttitudeSettings, HeadingSeen, Noise, OWN_GROWTH, RateKind, Settings, Source, UpSeen,
-    },
+    attitude::{Attitude, HeadingSeen, Source, UpSeen},
     event::ImuSample,
     time::Time,
 };
@@ -140,26 +138,15 @@ impl Estimator for FixedShare {
     }
 }
 
-fn corrected() -> Attitude {
-    let settings = AttitudeSettings {
-        source: Source::Auto,
-        rate: RateKind::Instant,
-        inclination: Settings::GUN,
-        noise: Noise::USUAL,
-        own_growth: OWN_GROWTH,
-    };
-    Attitude::new(settings, DVec3::ZERO, CAMERA_FROM_IMU)
-}
-
 type Begin = (&'static str, &'static str, fn() -> Box<dyn Estimator>);
 
 /// Method, setting and the estimator at its start; the first is the product's.
 const WAYS: [Begin; 5] = [
-    ("the unit's, and error states", "for a gun", || Box::new(corrected())),
+    ("the unit's, and error states", "for a gun", || Box::new(product(Source::Auto))),
     ("the unit's as it is", "", || Box::new(FixedShare::new(0.0))),
     ("the unit's, and a fixed share", "0.05 of each", || Box::new(FixedShare::new(0.05))),
     ("the unit's, and a fixed share", "0.3 of each", || Box::new(FixedShare::new(0.3))),
-    ("its rates, VQF and error-state filter", "fusion", || Box::new(product())),
+    ("its rates, VQF and error-state filter", "fusion", || Box::new(product(Source::Fused))),
 ];
 
 /// Measures the scenes and extreme cases.
@@ -198,7 +185,7 @@ fn consistency(bench: &mut Bench) {
     let seeds = if bench.is_quick() { 4 } else { 24 };
     for (unit, params) in UNITS {
         for sea in [ship::CALM, ship::SEA_4, ship::SEA_6] {
-            let run = |seed| Told::new(sea, params(), seed).outcome(&|| Box::new(corrected()));
+            let run = |seed| Told::new(sea, params(), seed).outcome(&|| Box::new(product(Source::Auto)));
             let runs: Vec<Outcome> = (0..seeds).into_par_iter().map(run).collect();
             let squares: Vec<f64> = runs.iter().flat_map(|run| run.surprises.iter().copied()).collect();
             let count = squares.len() as f64;
