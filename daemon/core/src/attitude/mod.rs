@@ -292,7 +292,7 @@ impl Attitude {
             State::Own(own, _) => {
                 let up = world_from_camera * seen.up_camera;
                 let variance = 0.5 * (across.x_axis.x + across.y_axis.y);
-                own.watch(DVec2::new(up.y, -up.x), variance, outcome.taken);
+                own.watch(DVec2::new(up.y, -up.x), variance, outcome);
             }
             _ => {}
         }

@@ -5,7 +5,7 @@
 
 use glam::{DQuat, DVec2, DVec3};
 
-use super::aided::{Aided, COMMON, HEADING, TURN};
+use super::aided::{Aided, COMMON, HEADING, Outcome, TURN};
 
 /// Beside what all have: mean of the turn that the world needs (3), the rate of the heading's.
 const MEAN: usize = COMMON;
@@ -15,8 +15,14 @@ const STATES: usize = RATE + 1;
 
 /// The mean inclination is wrong by this: data sheets of the class have half a degree at rest, radians.
 const MEAN_SIGMA: f64 = 0.5f64.to_radians();
-/// A unit that is found to be worse than its class is believed to be twice as bad each time, up to this, radians.
+/// A unit that is found to be worse than its class counts as worse, up to this, radians: twice as bad where horizons are not believed, ...
 const MEAN_SIGMA_MOST: f64 = 4f64.to_radians();
+/// ...and else by how far it has gone while no horizon was seen, for so long at least, seconds, ...
+const UNSEEN_S: f64 = 3.0;
+/// ...of which each time tells so much.
+const UNSEEN_SHARE: f64 = 0.3;
+/// No surprise counts as more than this (chi squared with two degrees of freedom).
+const UNSEEN_MOST: f64 = 20.0;
 /// It forgets itself in this time, seconds.
 const MEAN_TAU_S: f64 = 300.0;
 /// What goes to and fro about it, on an axis, before that has been watched, radians...
@@ -55,6 +61,8 @@ pub(super) struct Own {
     /// By what the mean inclination is wrong, radians.
     mean_sigma: f64,
     sway: Sway,
+    /// Time since a horizon was seen.
+    unseen_s: f64,
     refused_in_a_row: u32,
 }
 
@@ -83,6 +91,7 @@ impl Own {
             dt_s: 0.0,
             mean_sigma: MEAN_SIGMA,
             sway: Sway::START,
+            unseen_s: 0.0,
             refused_in_a_row: 0,
         };
         own.forget_tilt();
@@ -130,6 +139,7 @@ impl Own {
             return;
         }
         self.sway.since_s += dt;
+        self.unseen_s += dt;
         self.aided.pass_time(dt);
         let (creeps, sways) = ((-dt / MEAN_TAU_S).exp(), (-dt / SWAY_TAU_S).exp());
         for axis in 0..2 {
@@ -171,9 +181,15 @@ impl Own {
 
     /// Learns from an error of inclination that was seen, as the turn that the world as it was believed needs, and its variance on an axis;
     /// whether it was believed or not: else a unit that sways farther than was thought would never be.
-    pub(super) fn watch(&mut self, turn: DVec2, variance: f64, believed: bool) {
+    pub(super) fn watch(&mut self, turn: DVec2, variance: f64, outcome: Outcome) {
         self.sway.watch(self.tilt + turn, variance);
-        self.refused_in_a_row = if believed { 0 } else { self.refused_in_a_row + 1 };
+        if std::mem::take(&mut self.unseen_s) >= UNSEEN_S && outcome.surprise.is_finite() {
+            // Two is as far as was expected.
+            let beyond = 0.5 * outcome.surprise.min(UNSEEN_MOST) - 1.0;
+            let now = self.mean_sigma * (1.0 + UNSEEN_SHARE * beyond).sqrt();
+            self.mean_sigma = now.clamp(MEAN_SIGMA, MEAN_SIGMA_MOST);
+        }
+        self.refused_in_a_row = if outcome.taken { 0 } else { self.refused_in_a_row + 1 };
         if self.refused_in_a_row >= REFUSED_MAX {
             self.refused_in_a_row = 0;
             self.mean_sigma = (2.0 * self.mean_sigma).min(MEAN_SIGMA_MOST);
