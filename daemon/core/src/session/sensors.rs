@@ -179,7 +179,8 @@ impl Sensors {
     /// Looks for horizon and sky in the newest picture and corrects the orientation by them.
     pub fn sight(&mut self) {
         if let (Some(frame), Some(time)) = (&self.frame, self.video_time()) {
-            let lens = self.lens_at(time);
+            // How a rolling shutter bent the picture is not known of the first one: an anchor in it would be wrong for as long as it holds.
+            let Some(lens) = self.lens_read(time) else { return };
             self.level.look(time, &frame.picture, &lens, &mut self.attitude);
             self.steady.look(time, &frame.picture, &lens, &mut self.attitude);
             self.counts.horizons = self.level.counts();
@@ -192,12 +193,16 @@ impl Sensors {
         self.attitude.world_from_camera(world_from_imu)
     }
 
-    /// The lens of a picture exposed at `time`: with how the camera turned while a rolling shutter read it.
+    /// The lens of a picture exposed at `time`: with how the camera turned while a rolling shutter read it, where that is known.
     pub fn lens_at(&self, time: Time) -> Lens {
+        self.lens_read(time).unwrap_or(self.lens)
+    }
+
+    fn lens_read(&self, time: Time) -> Option<Lens> {
         if self.readout_ns == 0 {
-            return self.lens;
+            return Some(self.lens);
         }
-        self.attitude.camera_turn(time, self.readout_ns).map_or(self.lens, |turn| self.lens.read_while(turn))
+        self.attitude.camera_turn(time, self.readout_ns).map(|turn| self.lens.read_while(turn))
     }
 
     /// The newest picture.
@@ -263,6 +268,10 @@ mod tests {
     use glam::DVec2;
 
     fn sensors() -> Sensors {
+        sensors_read_in(0)
+    }
+
+    fn sensors_read_in(readout_ns: i64) -> Sensors {
         let calibration = Calibration {
             lens: Lens::pinhole(4, 2, 1.0),
             focal_sigma_px: 1.0,
@@ -270,7 +279,7 @@ mod tests {
             camera_from_imu_sigma: DVec3::ONE,
             time_offset_ns: 2_000_000,
             time_offset_sigma_ns: 1,
-            readout_ns: 0,
+            readout_ns,
             readout_sigma_ns: 0,
             boresight: DVec2::ZERO,
             boresight_sigma: 0.001,
@@ -311,6 +320,19 @@ mod tests {
         s.imu(&ImuSample { world_from_imu: Some(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), ..sample(2) });
         assert_eq!(s.counts().imu_insane, 3);
         assert!(s.newest_orientation().is_none());
+    }
+
+    #[test]
+    fn nothing_is_sought_in_a_picture_whose_first_rows_were_read_before_the_unit_spoke() {
+        for (readout_ns, looked_at) in [(0, 2), (30_000_000, 1)] {
+            let mut s = sensors_read_in(readout_ns);
+            (0..40).for_each(|i| s.imu(&sample(i)));
+            for ms in [10, 150] {
+                assert!(s.frame(&frame(ms, 4)));
+                s.sight();
+            }
+            assert_eq!(s.counts().skyline.none, looked_at, "{readout_ns}");
+        }
     }
 
     #[test]
