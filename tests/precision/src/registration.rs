@@ -246,3 +246,27 @@ fn heading_between(from: DQuat, to: DQuat) -> f64 {
     };
     azimuth(to) - azimuth(from)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boats_stay_put_as_set_by_default() {
+        let folder = tempfile::tempdir().unwrap();
+        for (moved, most_px) in [(Moved::Still, 1.0), (Moved::Swung, 2.0), (Moved::Rolling, 2.0)] {
+            let recipe = moved.recipe(640);
+            let path = folder.path().join(format!("{}.mcap", moved.name().replace('/', " a ")));
+            record(&recipe, &path).unwrap();
+            let how = Replayed {
+                source: Source::Auto,
+                exact: true,
+                sky_drift: None,
+                shutter_unknown: false,
+                seconds: SETTLED_S + 10.0,
+            };
+            let (rms, p99) = summary(&replay(&recipe, &path, how).unwrap().whole);
+            assert!(rms < most_px && p99 < 2.0 * most_px, "{}: {rms} px, 99 % {p99}", moved.name());
+        }
+    }
+}
