@@ -15,6 +15,7 @@ use bowwave_core::{
 };
 use bowwave_record::{Journal, JournalOptions, Run};
 use glam::DVec3;
+use rustix::process::{Resource, Rlimit, setrlimit};
 
 pub const FLAG: &str = "--shoot-into";
 pub const NAME: &str = "hits.sqlite";
@@ -77,6 +78,9 @@ pub fn run(path: &Path, phase: u64) {
     let burst: Vec<u64> = (first + ROUNDS..first + 2 * ROUNDS).collect();
     shoot(&journal, &burst);
     if phase == PHASE_ABORTED {
+        // Meant to crash: an image of its memory would be taken for a defect's.
+        let none = Rlimit { current: Some(0), maximum: Some(0) };
+        setrlimit(Resource::Core, none).unwrap();
         std::process::abort();
     }
     journal.set_wall_clock(1_795_000_000_000_000_000, Time::from_ns(9_000_000_000)).unwrap();
