@@ -1,14 +1,17 @@
 //! What is measured besides the faults.
 
-use std::{thread, time::Duration};
+use std::{fmt::Write, fs, path::Path, thread, time::Duration};
 
 use anyhow::{Context, Result, ensure};
 use bowwave_hil::protocol::Command;
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use hw_sim::make::Motion;
 use serde_json::Value;
 
-use super::bench::{Bench, recipe};
+use super::bench::{Bench, Configured, PICTURE, recipe};
+
+/// Upper share of the picture that is hidden: sky and horizon stay within it while the tape plays, and more a calibration may not hide.
+const HIDDEN_SHARE: f64 = 0.78;
 
 /// A line of the list of figures.
 pub struct Figure {
@@ -71,12 +74,40 @@ pub fn usage(bench: &mut Bench, what: &str) -> Result<Vec<Figure>> {
     ])
 }
 
+/// Fires over a whole round of the tape while nothing that the camera sees can correct the unit: its calibration hides the sky and the
+/// horizon as the own ship. The machine's times before and after.
+pub fn fire_unaided(bench: &mut Bench) -> Result<(i64, i64)> {
+    let mut file = hw_sim::make::calibration(&recipe());
+    let (width, height) = PICTURE;
+    let [right, bottom] = [f64::from(width), (f64::from(height) * HIDDEN_SHARE).floor()];
+    file.own_ship =
+        vec![vec![DVec2::ZERO, DVec2::new(right, 0.0), DVec2::new(right, bottom), DVec2::new(0.0, bottom)]];
+    let path = "/run/hil/etc/unaided.toml".to_owned();
+    bench.machine.guest.call(Command::Write { path, text: bowwave_calibration::to_toml(&file) })?;
+    bench.configure(&Configured { calibration: "unaided.toml".into(), ..Configured::default() })?;
+    bench.service("reload")?;
+    thread::sleep(Duration::from_secs(2));
+    bench.ready(bench.scaled(2.0))?;
+    let from = bench.machine.guest.now_ns();
+    while bench.machine.guest.now_ns() - from < bench.tape.period_ns {
+        bench.shoot(1000)?;
+        thread::sleep(Duration::from_secs(1));
+    }
+    let to = bench.machine.guest.now_ns();
+    bench.configure(&Configured::default())?;
+    bench.service("reload")?;
+    thread::sleep(Duration::from_secs(2));
+    bench.ready(bench.scaled(2.0))?;
+    Ok((from, to))
+}
+
 /// Shots against what the bench did: kernel's time of the edge, order, pose at the time of firing.
 ///
 /// The unit itself errs by half a milliradian, slowly, and the tape's gun moves by a tenth of a radian a second: against the
-/// truth that is milliseconds. What the trainer can be early or late by is held against what the unit said; how far all is from
-/// the truth is told as an angle.
-pub fn shots(bench: &mut Bench, line_delay_ms: f64) -> Result<Vec<Figure>> {
+/// truth that is milliseconds. So does what the camera sees: the machine's small pictures tell the heading to half a milliradian, otherwise at
+/// each place and some tenths of a second later. What the trainer can be early or late by is held against what the unit said while nothing
+/// corrected it (`unaided`, the machine's times); how far all is from the truth is told as an angle.
+pub fn shots(bench: &mut Bench, line_delay_ms: f64, unaided: (i64, i64)) -> Result<Vec<Figure>> {
     let rounds = bench.rounds()?;
     let origin = bench.machine.guest.origin_ns().context("nothing was played")?;
     let fired = |r: &Value| r["fired_ns"].as_i64().unwrap_or(i64::MIN);
@@ -98,38 +129,45 @@ pub fn shots(bench: &mut Bench, line_delay_ms: f64) -> Result<Vec<Figure>> {
             let said = unit.bore_at(tape_ns)?;
             let velocity = (unit.bore_at(tape_ns + 5_000_000)? - unit.bore_at(tape_ns - 5_000_000)?) * 100.0;
             let wrong_rad = bore.angle_between(unit.true_bore_at(tape_ns));
-            Some(Aim { off: bore - said, velocity, wrong_rad })
+            Some(Aim { fired_ns: fired(round), off: bore - said, velocity, wrong_rad })
         })
         .collect();
-    let rms = |square: &dyn Fn(&Aim) -> f64| {
-        (aims.iter().map(square).sum::<f64>() / aims.len().max(1) as f64).sqrt() * 1e3
+    write_aims(&bench.out.join("rounds.csv"), &aims)?;
+    let rms = |aims: &[&Aim], square: &dyn Fn(&Aim) -> f64| {
+        (aims.iter().map(|aim| square(aim)).sum::<f64>() / aims.len().max(1) as f64).sqrt() * 1e3
     };
-    let off_mrad = rms(&|aim| aim.off.length_squared());
-    let wrong_mrad = rms(&|aim| aim.wrong_rad * aim.wrong_rad);
+    let all: Vec<&Aim> = aims.iter().collect();
+    let (from, to) = unaided;
+    let alone: Vec<&Aim> = aims.iter().filter(|aim| (from..to).contains(&aim.fired_ns)).collect();
+    ensure!(alone.len() >= 20, "only {} rounds were scored while nothing corrected the unit", alone.len());
+    let off_mrad = rms(&alone, &|aim| aim.off.length_squared());
+    let wrong_mrad = rms(&all, &|aim| aim.wrong_rad * aim.wrong_rad);
     // The unit's samples are known to the machine this much later than measured, at best: its own way and the line's. The clock
     // map leaves that in the time (a calibration of the mount takes it out), so it is the hardware's.
     let way_ms = recipe().imu.latency_ns[0] as f64 * 1e-6 + line_delay_ms;
-    let raw_ms = late_s(&aims) * 1e3;
+    let raw_ms = late_s(&alone) * 1e3;
     let late_ms = raw_ms + way_ms;
     figures.push(Figure::judged(
         "pose of scored rounds against what the unit said of that time: time error",
         format!(
             "{late_ms:+.2} ms over {} rounds, {off_mrad:.2} mrad rms ({raw_ms:+.2} ms with the {way_ms:.2} ms that the samples are under \
              way at least)",
-            aims.len()
+            alone.len()
         ),
         "1 ms",
         late_ms.abs() <= 1.0,
     ));
     figures.push(Figure::told(
-        "the same against the tape's truth, with the unit's own error",
-        format!("{wrong_mrad:.2} mrad rms"),
+        "pose of scored rounds against the tape's truth, with the unit's own error and what the camera saw",
+        format!("{wrong_mrad:.2} mrad rms over {} rounds", all.len()),
     ));
     Ok(figures)
 }
 
 /// Where a round was aimed: by how much that differs from what the unit said of its time, and how fast that moved.
 struct Aim {
+    /// On the machine's clock.
+    fired_ns: i64,
     off: DVec3,
     /// Per second.
     velocity: DVec3,
@@ -137,10 +175,40 @@ struct Aim {
     wrong_rad: f64,
 }
 
-/// By how many seconds the poses of these rounds are ahead of the rounds, by least squares.
-fn late_s(aims: &[Aim]) -> f64 {
-    let along: f64 = aims.iter().map(|aim| aim.off.dot(aim.velocity)).sum();
-    along / aims.iter().map(|aim| aim.velocity.length_squared()).sum::<f64>().max(f64::MIN_POSITIVE)
+/// Round by round, for whoever looks for the cause of an error.
+fn write_aims(path: &Path, aims: &[Aim]) -> Result<()> {
+    let mut text = String::from(
+        "fired_s,off_x_mrad,off_y_mrad,off_z_mrad,velocity_x,velocity_y,velocity_z,wrong_mrad\n",
+    );
+    for aim in aims {
+        let (off, v) = (aim.off * 1e3, aim.velocity);
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{:.6},{:.4},{:.4},{:.4},{:.5},{:.5},{:.5},{:.4}",
+            aim.fired_ns as f64 * 1e-9,
+            off.x,
+            off.y,
+            off.z,
+            v.x,
+            v.y,
+            v.z,
+            aim.wrong_rad * 1e3
+        );
+    }
+    fs::write(path, text).with_context(|| path.display().to_string())
+}
+
+/// By how many seconds the poses of these rounds are ahead of the rounds, by least squares; what all are off by alike is not of time.
+fn late_s(aims: &[&Aim]) -> f64 {
+    let count = aims.len().max(1) as f64;
+    let mean_off = aims.iter().map(|aim| aim.off).sum::<DVec3>() / count;
+    let mean_velocity = aims.iter().map(|aim| aim.velocity).sum::<DVec3>() / count;
+    let (along, square) = aims.iter().fold((0.0, 0.0), |(along, square), aim| {
+        let velocity = aim.velocity - mean_velocity;
+        (along + (aim.off - mean_off).dot(velocity), square + velocity.length_squared())
+    });
+    along / square.max(f64::MIN_POSITIVE)
 }
 
 /// What the tape's unit says and what is true, by nanoseconds since the tape's beginning.

@@ -74,13 +74,11 @@ fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &
     }
     bench.ready(bench.scaled(5.0))?;
     let figures = only.is_empty() || only.iter().any(|n| n == FIGURES);
-    if figures {
-        steady(bench, report)?;
-    }
+    let unaided = if figures { Some(steady(bench, report)?) } else { None };
     for row in rows().iter().filter(|r| r.number() != "26") {
-        if figures && row.number() == REPLACES_JOURNAL {
+        if let Some(unaided) = unaided.filter(|_| row.number() == REPLACES_JOURNAL) {
             let delay = after_stop(bench)?;
-            report.figures.extend(measure::shots(bench, delay)?);
+            report.figures.extend(measure::shots(bench, delay, unaided)?);
             bench.machine.guest.call(Command::Play { on: true })?;
             bench.settle()?;
         }
@@ -131,8 +129,8 @@ fn start_up(bench: &mut Bench, report: &mut Report) -> Result<()> {
     Ok(())
 }
 
-/// What is measured while nothing is wrong.
-fn steady(bench: &mut Bench, report: &mut Report) -> Result<()> {
+/// What is measured while nothing is wrong; when nothing corrected the unit.
+fn steady(bench: &mut Bench, report: &mut Report) -> Result<(i64, i64)> {
     for (figure, target) in report.figures.iter_mut().zip([15.0, 15.0, 4.0]) {
         let seconds: f64 = figure.value.trim_end_matches(" s").parse().unwrap_or(f64::INFINITY);
         figure.target = format!("{target} s, scaled {:.0} s", target * bench.slow);
@@ -155,11 +153,12 @@ fn steady(bench: &mut Bench, report: &mut Report) -> Result<()> {
         std::thread::sleep(Duration::from_millis(700));
     }
     report.figures.push(measure::committed(bench)?);
+    let unaided = measure::fire_unaided(bench)?;
     // What the tape pulled, the journal must hold as well.
     let played = bench.machine.guest.triggers();
     bench.pulls.extend(played);
     bench.pulls.sort_unstable();
-    Ok(())
+    Ok(unaided)
 }
 
 /// With the trainer off, the unit's line is free: how long its bytes take at least.
