@@ -120,7 +120,7 @@ impl<F: Framing> Scanner<F> {
                 }
             };
             match candidate.get(..bytes) {
-                Some(packet) if F::intact(packet) => match self.rival(at, bytes) {
+                Some(packet) if F::intact(packet) => match self.rival(at, bytes, head) {
                     Rival::None => {
                         let skipped_bytes = self.counters.skipped_bytes;
                         sink(Found { head, bytes: packet, skipped_bytes });
@@ -139,7 +139,7 @@ impl<F: Framing> Scanner<F> {
                     self.counters.bad_crc += 1;
                     at = self.skip(at, at + 1);
                 }
-                None => match self.packet_within(at, head) {
+                None => match self.packet_within(at, bytes, head) {
                     Some(place) => at = self.skip(at, place),
                     None => break,
                 },
@@ -156,9 +156,13 @@ impl<F: Framing> Scanner<F> {
     }
 
     /// Whether another packet claims bytes of the intact one at `at`. A check sum of eight bits is right by chance too often
-    /// to take the first that is, unless it stands directly behind a packet or before one.
-    fn rival(&self, at: usize, bytes: usize) -> Rival {
-        if !F::WEAK || self.in_step {
+    /// to take the first that is, unless it stands directly behind a packet or before one. Of longer ones only a kind that the line
+    /// has not sent before is doubted: had its bytes come one by one, a packet within it would have been taken before its end.
+    fn rival(&self, at: usize, bytes: usize, head: F::Head) -> Rival {
+        if !F::WEAK {
+            return self.packet_within(at, bytes, head).map_or(Rival::None, Rival::At);
+        }
+        if self.in_step {
             return Rival::None;
         }
         let behind = &self.buffer[at + bytes..];
@@ -183,22 +187,20 @@ impl<F: Framing> Scanner<F> {
         Rival::None
     }
 
-    /// A candidate of a kind that the line has not sent before and that lacks bytes may be a false preamble that claims many
-    /// of them. If a whole packet lies behind its first byte, it is one: two packets never overlap.
-    fn packet_within(&self, at: usize, head: F::Head) -> Option<usize> {
+    /// The packet that ends first within a candidate of a kind that the line has not sent before. Such a candidate is a false preamble
+    /// that claims many bytes: two packets never overlap, and what it claims may not be there yet.
+    fn packet_within(&self, at: usize, bytes: usize, head: F::Head) -> Option<usize> {
         if self.known.contains(&Some(head)) {
             return None;
         }
-        (at + 1..self.buffer.len()).find(|&place| {
-            let rest = &self.buffer[place..];
-            if rest.first() != Some(&F::SYNC) {
-                return false;
-            }
-            match F::look(rest) {
-                Look::Packet { bytes, .. } => rest.get(..bytes).is_some_and(F::intact),
-                Look::Incomplete | Look::Invalid => false,
-            }
-        })
+        let end = self.buffer.len().min(at + bytes - 1);
+        let places = (at + 1..end).filter(|&place| self.buffer[place] == F::SYNC);
+        let ends = places.filter_map(|place| {
+            let Look::Packet { bytes, .. } = F::look(&self.buffer[place..]) else { return None };
+            let packet = self.buffer[..end].get(place..place + bytes)?;
+            F::intact(packet).then_some((place + bytes, place))
+        });
+        ends.min().map(|(_, place)| place)
     }
 
     /// Remembers that the line sends packets of this kind.
@@ -209,6 +211,16 @@ impl<F: Framing> Scanner<F> {
         self.known.rotate_right(1);
         self.known[0] = Some(head);
     }
+}
+
+/// Where something with a right check sum begins, real packet or chance.
+#[cfg(test)]
+pub(crate) fn intact_places<F: Framing>(bytes: &[u8]) -> Vec<usize> {
+    let is_packet = |&at: &usize| match F::look(&bytes[at..]) {
+        Look::Packet { bytes: length, .. } => bytes.get(at..at + length).is_some_and(F::intact),
+        _ => false,
+    };
+    (0..bytes.len()).filter(|&at| bytes[at] == F::SYNC).filter(is_packet).collect()
 }
 
 /// Whether an intact packet may be none.

@@ -136,6 +136,22 @@ impl Unit {
         }
     }
 
+    /// How many places of a stream begin something with a right check sum.
+    #[cfg(test)]
+    pub(super) fn intact_places(format: ImuFormat, bytes: &[u8]) -> usize {
+        use crate::framing::intact_places as places;
+        match format {
+            ImuFormat::VectorNav => places::<vectornav::Binary>(bytes),
+            ImuFormat::VectorNavAscii => places::<ascii::Lines>(bytes),
+            ImuFormat::Xsens => places::<xsens::Xbus>(bytes),
+            ImuFormat::MicroStrain => places::<microstrain::Mip>(bytes),
+            ImuFormat::Sbg => places::<sbg::Ecom>(bytes),
+            ImuFormat::Bno08x => places::<bno08x::Rvc>(bytes),
+            ImuFormat::Witmotion => places::<witmotion::Standard>(bytes),
+        }
+        .len()
+    }
+
     pub(super) const fn format(&self) -> ImuFormat {
         self.format
     }

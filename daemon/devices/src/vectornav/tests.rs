@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
 use super::{CommonOutput, Packet, Parser, crc::crc16, layout::MAX_PACKET, parser::Binary};
-use crate::framing::{Framing as _, Look};
+use crate::framing::{Framing as _, Look, intact_places};
 
 fn parse(bytes: &[u8]) -> (Vec<Packet>, Parser) {
     parse_split(bytes, bytes.len().max(1))
@@ -107,6 +107,24 @@ fn a_packet_cut_by_the_next_costs_only_itself() {
     }
 }
 
+/// A false preamble of a kind that the line does not send, which its check sum happens to fit, is none where a packet lies within.
+#[test]
+fn a_chance_packet_costs_none_within_it_however_the_bytes_come() {
+    let mut bytes = stream(0..2);
+    let chance = bytes.len();
+    bytes.extend([0xfa, 0x05, 0x31, 0x01, 0x01, 0x02]);
+    bytes.extend(stream(2..4));
+    let Look::Packet { bytes: length, .. } = Binary::look(&bytes[chance..]) else { panic!("a header") };
+    bytes.truncate(chance + length - 2);
+    let crc = crc16(&bytes[chance + 1..]);
+    bytes.extend(crc.to_be_bytes());
+    bytes.extend(stream(4..6));
+    assert_eq!(intact_places::<Binary>(&bytes).len(), 6, "real ones, less the one cut, and the chance");
+    for piece in 1..=bytes.len() {
+        assert_eq!(times(&parse_split(&bytes, piece).0), [0, 1, 2, 4, 5], "pieces of {piece}");
+    }
+}
+
 #[test]
 fn a_level_unit_that_faces_north_is_level_and_faces_north() {
     let packet = Packet {
@@ -184,11 +202,7 @@ proptest! {
         // The line goes silent with text, which ends a last false preamble.
         bytes.extend([0x20; MAX_PACKET]);
         // Of false preambles one in 65536 is followed by what its check sum fits: such a packet is found as well, and rightly.
-        let is_packet = |at: &usize| match Binary::look(&bytes[*at..]) {
-            Look::Packet { bytes: length, .. } => bytes.get(*at..at + length).is_some_and(Binary::intact),
-            _ => false,
-        };
-        prop_assume!((0..bytes.len()).filter(|at| bytes[*at] == 0xfa && is_packet(at)).eq(starts));
+        prop_assume!(intact_places::<Binary>(&bytes) == starts);
         let (packets, parser) = parse_split(&bytes, piece);
         prop_assert_eq!(times(&packets), (0..sent).collect::<Vec<_>>());
         let garbage: usize = gaps.iter().map(Vec::len).sum();
@@ -211,6 +225,8 @@ proptest! {
     /// After garbage on a line whose layout is known, at most the first packet waits for the second.
     #[test]
     fn back_in_step_within_two_packets(gap in garbage()) {
+        let line = [stream(0..3), gap.clone(), stream(4..7)].concat();
+        prop_assume!(intact_places::<Binary>(&line).len() == 6);
         let mut parser = Parser::new();
         let mut got = Vec::new();
         for n in 0..3 {
