@@ -219,7 +219,8 @@ proptest! {
         }
         let (pieces, _) = parse_split(&bytes, piece);
         let (whole, _) = parse(&bytes);
-        prop_assert_eq!(pieces, whole);
+        // As text, for a chance packet may hold what is no number, which equals nothing.
+        prop_assert_eq!(format!("{pieces:?}"), format!("{whole:?}"));
     }
 
     /// After garbage on a line whose layout is known, at most the first packet waits for the second.
