@@ -107,11 +107,11 @@ pub struct Feed {
     pub freeze: bool,
     /// Share of MJPEG pictures that are cut short or scrambled.
     pub corrupt: f64,
-    /// Share of pictures with the error flag.
+    /// Share of pictures with the error flag, never two in a row.
     pub flagged: f64,
     /// Share of pictures whose time stamp lies a second back.
     pub backwards: f64,
-    /// Share of pictures of which only half the bytes come, though nothing says so.
+    /// Share of pictures of which only half the bytes come, though nothing says so; never two in a row.
     pub short: f64,
     /// No bytes of the unit.
     pub mute: bool,

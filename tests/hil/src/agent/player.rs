@@ -135,7 +135,7 @@ impl Shared {
             return;
         };
         let mut random = Pcg64Mcg::seed_from_u64(0xca3);
-        let mut frozen = None;
+        let (mut frozen, mut spoilt) = (None, false);
         for (round, index) in self.rounds(self.tape.header.frames.len()) {
             let frame = self.tape.header.frames[index];
             let at = |ns: i64| origin.plus_ns(round * self.tape.header.period_ns + ns);
@@ -145,6 +145,7 @@ impl Shared {
             }
             if clock::now().ns_since(at(frame.arrival_ns)) > LATE_MAX_NS {
                 self.late.fetch_add(1, Ordering::Relaxed);
+                spoilt = true;
                 continue;
             }
             let feed = self.feed().clone();
@@ -153,7 +154,9 @@ impl Shared {
             }
             frozen = if feed.freeze { frozen.or(Some(index)) } else { None };
             let exposed = at(frame.exposed_ns);
-            if let Some(bytes) = self.picture(frozen.unwrap_or(index), exposed, &feed, &mut random) {
+            if let Some(bytes) =
+                self.picture(frozen.unwrap_or(index), exposed, &feed, &mut random, &mut spoilt)
+            {
                 // An unplugged camera takes none.
                 drop(device.write_all(&bytes));
             }
@@ -161,7 +164,16 @@ impl Shared {
     }
 
     /// The picture as the running mode wants it, with what the feed does to it.
-    fn picture(&self, index: usize, exposed: Time, feed: &Feed, random: &mut Pcg64Mcg) -> Option<Vec<u8>> {
+    /// `spoilt`: the one before was left out, flagged or short. The next one is neither flagged nor short, for two in a row are 100 ms
+    /// without a picture, which is a stall.
+    fn picture(
+        &self,
+        index: usize,
+        exposed: Time,
+        feed: &Feed,
+        random: &mut Pcg64Mcg,
+        spoilt: &mut bool,
+    ) -> Option<Vec<u8>> {
         let mode = camera_state().ok().filter(|m| m.streaming == 1)?;
         let header = &self.tape.header;
         let mut bytes = match mode.fourcc.as_str() {
@@ -180,13 +192,17 @@ impl Shared {
                 random.fill_bytes(&mut bytes[scan..scan + 200]);
             }
         }
-        if random.random_bool(feed.short.clamp(0.0, 1.0)) {
+        let spared = std::mem::take(spoilt);
+        let short = random.random_bool(feed.short.clamp(0.0, 1.0)) && !spared;
+        if short {
             bytes.truncate(bytes.len() / 2);
         }
         let back = random.random_bool(feed.backwards.clamp(0.0, 1.0));
+        let flagged = random.random_bool(feed.flagged.clamp(0.0, 1.0)) && !spared;
+        *spoilt = short || flagged;
         let fourcc = mode.fourcc.as_bytes();
         let head = PictureHead {
-            flagged: random.random_bool(feed.flagged.clamp(0.0, 1.0)),
+            flagged,
             timestamp_ns: exposed.plus_ns(if back { -2_000_000_000 } else { 0 }).ns(),
             fourcc: fourcc.try_into().ok()?,
             width: mode.width,
