@@ -25,7 +25,7 @@ const BEGIN_PX: f64 = 24.0;
 const APART: f64 = 0.3;
 const APART_PX: f64 = 1.0;
 /// How far any corner may be from the middle of what the nearest other tags expect: by the tag's least height and the distance in tags,
-/// and pixels more; or by the median of all tags, where the lens bends the board.
+/// and pixels more; or by the median of the other tags, where the lens bends the board.
 const STRAY: f64 = 0.1;
 const STRAY_PX: f64 = 0.7;
 const STRAY_MEDIANS: f64 = 4.0;
@@ -56,7 +56,8 @@ impl Pyramid {
         Self { planes, by }
     }
 
-    /// The corners near `quad`, pixels of the whole picture, from scale `level` down to the finest.
+    /// The corners near `quad`, pixels of the whole picture, from scale `level` down to the finest; `None` where one of them is none of a
+    /// tag's.
     fn refine(&self, quad: &Quad, level: usize) -> Option<Quad> {
         let mut found = *quad;
         for (level, plane) in self.planes.iter().enumerate().take(level + 1).rev() {
@@ -66,7 +67,16 @@ impl Pyramid {
                 *corner = corner::refine(plane, *corner / scale, tag_px, self.by)? * scale;
             }
         }
-        Some(found)
+        self.crosses(&found).then_some(found)
+    }
+
+    /// Whether the edges that cross at each corner run along the tag's sides.
+    fn crosses(&self, quad: &Quad) -> bool {
+        let tag_px = height_px(quad);
+        (0..4).all(|i| {
+            let sides = [1, 3].map(|step| quad[(i + step) % 4] - quad[i]);
+            corner::crosses(self.finest(), quad[i], sides, tag_px, self.by)
+        })
     }
 
     /// Where the search for the corners of a tag of that size begins.
@@ -229,16 +239,22 @@ fn stray(target: &Target, found: &BTreeMap<usize, Quad>, id: usize) -> f64 {
     if expected.is_empty() { f64::INFINITY } else { (0..4).map(off).fold(0.0, f64::max) }
 }
 
-/// Drops tags whose corners are not where their neighbours expect them, the worst one first: it may be what spoils the others.
+/// Drops tags whose corners are not where their neighbours expect them, the worst one first: it may be what spoils the others, so these are
+/// judged without it.
 fn settle(target: &Target, found: &mut BTreeMap<usize, Quad>) {
-    loop {
-        let all: Vec<(usize, f64)> = found.keys().map(|id| (*id, stray(target, found, *id))).collect();
-        let limit = (STRAY_MEDIANS * median(all.iter().map(|s| s.1).collect())).clamp(1.0, STRAY_MOST);
-        let Some((worst, _)) = all.into_iter().filter(|s| s.1 > limit).max_by(|a, b| a.1.total_cmp(&b.1))
-        else {
+    let strays = |found: &BTreeMap<usize, Quad>| -> Vec<(usize, f64)> {
+        found.keys().map(|id| (*id, stray(target, found, *id))).collect()
+    };
+    while let Some((worst, off)) = strays(found).into_iter().max_by(|a, b| a.1.total_cmp(&b.1))
+        && off > 1.0
+    {
+        let mut others = found.clone();
+        others.remove(&worst);
+        let usual = median(strays(&others).iter().map(|s| s.1).collect());
+        if off <= (STRAY_MEDIANS * usual).clamp(1.0, STRAY_MOST) {
             return;
-        };
-        found.remove(&worst);
+        }
+        *found = others;
     }
 }
 
