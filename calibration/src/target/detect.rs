@@ -245,12 +245,14 @@ fn settle(target: &Target, found: &mut BTreeMap<usize, Quad>) {
     let strays = |found: &BTreeMap<usize, Quad>| -> Vec<(usize, f64)> {
         found.keys().map(|id| (*id, stray(target, found, *id))).collect()
     };
-    while let Some((worst, off)) = strays(found).into_iter().max_by(|a, b| a.1.total_cmp(&b.1))
+    let mut all = strays(found);
+    while let Some((worst, off)) = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))
         && off > 1.0
     {
         let mut others = found.clone();
         others.remove(&worst);
-        let usual = median(strays(&others).iter().map(|s| s.1).collect());
+        all = strays(&others);
+        let usual = median(all.iter().map(|s| s.1).collect());
         if off <= (STRAY_MEDIANS * usual).clamp(1.0, STRAY_MOST) {
             return;
         }
