@@ -5,10 +5,12 @@
 
 use bowwave_core::{
     calibration::Calibration,
-    clock::ClockMap,
+    estimate::{
+        clock::ClockMap,
+        horizon::{HorizonFinder, Mask, NoHorizon, View},
+    },
     event::{CameraFrame, Event, ImuSample, Picture, TriggerEdge},
     geometry::{Lens, horizon_dip},
-    horizon::{HorizonFinder, Mask, NoHorizon, View},
     time::Time,
 };
 use glam::{DQuat, DVec2, DVec3};

@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use bowwave_core::{calibration::Calibration, horizon::Mask};
+use bowwave_core::{calibration::Calibration, estimate::horizon::Mask};
 use glam::DVec2;
 
 use crate::{CalibrationError, Date, keep, parse, to_toml};

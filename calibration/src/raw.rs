@@ -2,8 +2,8 @@
 
 use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
+    estimate::horizon::Mask,
     geometry::{Distortion, Lens},
-    horizon::Mask,
     text::{line_column, one_line},
 };
 use glam::{DQuat, DVec2, DVec3};

@@ -6,11 +6,10 @@
 use std::sync::Arc;
 
 use bowwave_core::{
-    attitude::Source,
+    estimate::{SensorCounts, attitude::Source, horizon::Mask},
     event::{Event, Picture, PixelFormat},
-    horizon::Mask,
-    scenario::Scenario,
-    session::{SensorCounts, Session, Setup},
+    session::{Session, Setup},
+    world::scenario::Scenario,
 };
 use glam::{DVec2, DVec3};
 use hw_sim::{
@@ -85,7 +84,7 @@ fn played(recipe: &Recipe, drift: f64, sight: &Sight) -> (Vec<(f64, f64)>, Senso
         screen: (lens.width, lens.height),
         video: PixelFormat::Rgb,
         orientation: Source::Fused,
-        heading: bowwave_core::session::HeadingSettings::default(),
+        heading: bowwave_core::estimate::HeadingSettings::default(),
         own_ship: sight.mask.clone(),
     })
     .unwrap();

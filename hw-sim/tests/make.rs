@@ -6,10 +6,12 @@ use std::{collections::BTreeMap, sync::LazyLock};
 
 use bowwave_calibration::parse;
 use bowwave_core::{
-    attitude::{Attitude, AttitudeSettings, Source},
-    clock::ClockMap,
+    estimate::{
+        attitude::{Attitude, AttitudeSettings, Source},
+        clock::ClockMap,
+        pose::registration_error_px,
+    },
     geometry::{Distortion, Lens, horizon_dip},
-    pose::registration_error_px,
 };
 use bowwave_record::{Entry, RecordingReader};
 use glam::{DVec2, DVec3};

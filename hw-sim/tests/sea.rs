@@ -5,11 +5,11 @@
 use std::{path::Path, sync::Arc};
 
 use bowwave_core::{
-    attitude::Source,
+    estimate::{SeaReport, attitude::Source, sea::SeaSource},
     event::PixelFormat,
-    scenario::Scenario,
-    sea::{BeaufortForce, estimate::SeaSource},
-    session::{SeaReport, Session, Setup},
+    sea::BeaufortForce,
+    session::{Session, Setup},
+    world::scenario::Scenario,
 };
 use glam::DVec2;
 use hw_sim::{
@@ -56,7 +56,7 @@ fn watched(path: &Path, seconds: i64, scenario: &str) -> Vec<(SeaReport, DVec2, 
         screen: (lens.width, lens.height),
         video: PixelFormat::Rgb,
         orientation: Source::Auto,
-        heading: bowwave_core::session::HeadingSettings::default(),
+        heading: bowwave_core::estimate::HeadingSettings::default(),
         own_ship: None,
     })
     .unwrap();

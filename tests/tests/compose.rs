@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 use bowwave_tests::{bowwave, expect_code, said};
 use image::{Rgb, RgbImage};
 

@@ -1,6 +1,6 @@
 //! What pictures tell the wizard.
 
-use bowwave_core::{calibration::Calibration, event::CameraFrame, horizon::Mask, time::Time};
+use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, event::CameraFrame, time::Time};
 use glam::DVec2;
 
 use crate::{

@@ -5,7 +5,7 @@ mod mounting;
 
 use std::path::PathBuf;
 
-use bowwave_core::{scene::ReflectionMethod, time::secs_to_ns};
+use bowwave_core::{time::secs_to_ns, water::ReflectionMethod};
 use bowwave_import::Level;
 use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};

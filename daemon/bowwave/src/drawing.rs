@@ -1,6 +1,9 @@
 //! From a scene's plan to a renderer that can do just that.
 
-use bowwave_core::{plan::ScenePlan, scene::Pass, session::ROUNDS_SEEN_MAX};
+use bowwave_core::{
+    frame::{plan::ScenePlan, scene::Pass},
+    session::ROUNDS_SEEN_MAX,
+};
 use bowwave_render::{Needs, PictureShape, RenderConfig, TimeOuts};
 
 /// Frames in flight: one being drawn, one being read, one being filled.

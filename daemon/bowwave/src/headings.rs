@@ -1,6 +1,6 @@
 //! What a run tells of the heading: in the log as its uncertainty crosses limits, and in the summary.
 
-use bowwave_core::session::{HeadingCounts, Session};
+use bowwave_core::{estimate::HeadingCounts, session::Session};
 use serde::Serialize;
 
 /// The log is told when the heading's standard deviation crosses one of these, degrees: what a boat is long at 500 m, a boat's own

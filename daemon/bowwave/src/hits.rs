@@ -86,8 +86,10 @@ fn table(shots: &[StoredShot]) -> String {
         text.push_str(line.join("  ").trim_end());
         text.push('\n');
     }
-    let hits =
-        shots.iter().filter(|s| matches!(s.record.outcome, bowwave_core::score::Outcome::Hit { .. })).count();
+    let hits = shots
+        .iter()
+        .filter(|s| matches!(s.record.outcome, bowwave_core::world::score::Outcome::Hit { .. }))
+        .count();
     text.push_str(&format!("{} rounds, {hits} hits\n", shots.len()));
     text
 }

@@ -22,7 +22,7 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
     if let Some(path) = &arguments.scenario {
         let text = std::fs::read_to_string(path)
             .with_context(|| format!("cannot read the scenario {}; name an existing file", path.display()))?;
-        bowwave_core::scenario::Scenario::parse(&text, &path.display().to_string())?;
+        bowwave_core::world::scenario::Scenario::parse(&text, &path.display().to_string())?;
         options.scenario_toml = Some(text);
     }
     options.bias_from_s = arguments.bias_from;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use bowwave_core::{
     model::{Model, ModelId},
-    scenario::{self, Scenario},
+    world::scenario::{self, Scenario},
 };
 
 /// Text of the scenario that `path` names, a file or a built-in one, and the folder that its models' paths start from.

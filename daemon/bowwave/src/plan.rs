@@ -5,11 +5,14 @@ use std::path::Path;
 use anyhow::Result;
 use bowwave_core::{
     event::PixelFormat,
+    frame::{
+        plan::{Needs, ScenePlan},
+        scene::{Pass, PassDecision},
+    },
     geometry::Optics,
     model::Model,
-    plan::{Needs, ScenePlan},
-    scenario::{self, Scenario},
-    scene::{Pass, PassDecision, ReflectionMethod},
+    water::ReflectionMethod,
+    world::scenario::{self, Scenario},
 };
 use bowwave_render::Renderer;
 use serde::Serialize;

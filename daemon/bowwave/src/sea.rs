@@ -1,8 +1,8 @@
 //! What a run tells of the sea in the video: in the log as it changes, and in the summary.
 
-use bowwave_core::{
-    sea::estimate::{SeaSource, Unknown},
-    session::SeaReport,
+use bowwave_core::estimate::{
+    SeaReport,
+    sea::{SeaSource, Unknown},
 };
 use serde::Serialize;
 

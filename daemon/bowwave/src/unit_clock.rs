@@ -1,6 +1,6 @@
 //! What a run tells of the inertial unit's clock: in the log where it does badly, and in the summary.
 
-use bowwave_core::clock::ClockReport;
+use bowwave_core::estimate::clock::ClockReport;
 use serde::Serialize;
 
 /// The unit's clock at the end of a run.

@@ -1,37 +1,29 @@
 //! The trainer without hardware: no I/O, no clock, no threads, no `unsafe`.
 //!
-//! Events of the devices go in ([`event`]), what is to be drawn ([`scene`]) and recorded ([`score`]) comes out.
+//! Three stages, each of which sees only those before it: [`estimate`] (where the camera points, what the sea and the light are),
+//! [`world`] (boats, weapon, rounds, score) and [`frame`] (what is drawn, and why not). [`session`] steps them. The other modules are
+//! the vocabulary that all of them share.
 
 #![forbid(unsafe_code)]
 
-pub mod attitude;
-pub mod boats;
 pub mod calibration;
-pub mod clock;
+pub mod colour;
+pub mod estimate;
 pub mod event;
 pub mod fault;
+pub mod frame;
 pub mod geometry;
 pub mod guide;
-pub mod gunnery;
-pub mod horizon;
-pub mod light;
 pub mod model;
 pub mod pacing;
-pub mod plan;
-pub mod pose;
-pub mod reflection;
-pub mod scenario;
-pub mod scene;
-pub mod score;
+pub mod physics;
 pub mod sea;
 pub mod session;
-pub mod skyline;
 pub mod still;
 pub mod text;
 pub mod time;
-pub mod view;
-pub mod wake;
-pub mod weapon;
+pub mod water;
+pub mod world;
 
 #[cfg(test)]
 mod test_data;

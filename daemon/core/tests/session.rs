@@ -5,17 +5,19 @@
 use std::sync::Arc;
 
 use bowwave_core::{
-    attitude::Source,
     calibration::{Calibration, TriggerLatency},
+    estimate::attitude::Source,
     event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, TriggerEdge},
     fault::{Fault, FaultChange},
+    frame::scene::{LeftOut, Pass, PassDecision, Status},
     geometry::{Lens, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
-    scenario::Scenario,
-    scene::{LeftOut, Pass, PassDecision, Status},
-    score::{NotScored, Outcome, ShotRecord},
     session::{Session, Setup},
     time::Time,
+    world::{
+        scenario::Scenario,
+        score::{NotScored, Outcome, ShotRecord},
+    },
 };
 use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
 
@@ -101,7 +103,7 @@ fn session_with(text: &str, calibration: Calibration) -> Session {
         screen: (128, 96),
         video: PixelFormat::Rgb,
         orientation: Source::Auto,
-        heading: bowwave_core::session::HeadingSettings::default(),
+        heading: bowwave_core::estimate::HeadingSettings::default(),
         own_ship: None,
     })
     .expect("every boat has a model")

@@ -1,6 +1,6 @@
 use std::{f64::consts::PI, fs, path::Path};
 
-use bowwave_core::{clock::ClockMap, event::ImuSample, time::Time};
+use bowwave_core::{estimate::clock::ClockMap, event::ImuSample, time::Time};
 use glam::{DMat3, DQuat, DVec3};
 use proptest::prelude::*;
 

@@ -1,4 +1,4 @@
-use bowwave_core::{clock::ClockMap, time::Time};
+use bowwave_core::{estimate::clock::ClockMap, time::Time};
 use glam::DVec3;
 use proptest::prelude::*;
 

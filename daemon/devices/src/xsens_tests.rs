@@ -1,6 +1,6 @@
 use std::{fs, path::Path};
 
-use bowwave_core::{clock::ClockMap, time::Time};
+use bowwave_core::{estimate::clock::ClockMap, time::Time};
 use glam::DVec3;
 use proptest::prelude::*;
 

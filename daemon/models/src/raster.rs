@@ -3,7 +3,7 @@
 //! It makes the built-in picture model and contact sheets; the trainer's own pictures come from the renderer.
 
 use bowwave_core::{
-    light::{linear_to_srgb, srgb_to_linear},
+    colour::{linear_to_srgb, srgb_to_linear},
     model::{Model, Texture, Vertex},
 };
 use glam::{Mat4, Vec2, Vec3, Vec4};

@@ -17,8 +17,8 @@ use std::{
 use bowwave_core::{
     fault::Fault,
     model::Zone,
-    score::{NotScored, Outcome, ShotRecord},
     time::Time,
+    world::score::{NotScored, Outcome, ShotRecord},
 };
 use bowwave_record::{
     DirtyEnd, Journal, JournalError, JournalOptions, Run, RunSelection, ShotFilter, StoredShot, boot_id,

@@ -21,8 +21,8 @@ use std::{
 
 use bowwave_core::{
     model::Zone,
-    score::{Outcome, ShotRecord},
     time::Time,
+    world::score::{Outcome, ShotRecord},
 };
 use bowwave_record::{Journal, JournalError, Run, RunSelection, ShotFilter, read_runs, read_shots};
 use glam::DVec3;

@@ -15,8 +15,9 @@ use std::{
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
+    frame::scene::{LeftOut, Pass, PassDecision, RoundView, Scene},
     model::Model,
-    scene::{LeftOut, Pass, PassDecision, ReflectionMethod, RoundView, Scene, ShadowLevel},
+    water::{ReflectionMethod, ShadowLevel},
 };
 use bowwave_render::{Completions, Needs, RenderConfig, Renderer, TimeOuts};
 use glam::{DVec3, Vec3};

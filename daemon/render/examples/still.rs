@@ -5,12 +5,13 @@
 use std::{error::Error, path::Path, sync::Arc, time::Duration};
 
 use bowwave_core::{
+    estimate::light::LightMeter,
     event::{Picture, PixelFormat},
+    frame::scene::{LeftOut, Pass, PassDecision, RoundView},
     geometry::look,
-    light::LightMeter,
-    scene::{LeftOut, Pass, PassDecision, ReflectionMethod, RoundView, ShadowLevel, Water},
     sea::BeaufortForce,
     time::Time,
+    water::{ReflectionMethod, ShadowLevel, Water},
 };
 use bowwave_render::{Needs, RenderConfig, Renderer, TimeOuts};
 use glam::{DVec3, Vec3};
@@ -100,7 +101,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// A tracer towards the first boat, a splash before it and a strike on it.
-fn rounds(scene: &bowwave_core::scene::Scene) -> Vec<RoundView> {
+fn rounds(scene: &bowwave_core::frame::scene::Scene) -> Vec<RoundView> {
     let Some(boat) = scene.boats.first() else { return Vec::new() };
     let (at, eye) = (boat.pose.position, scene.camera.position);
     let on = |share: f64| eye - DVec3::Z * 0.3 + (at + DVec3::Z - eye) * share;

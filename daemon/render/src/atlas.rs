@@ -1,7 +1,7 @@
 //! Where each boat's mirror image lies in the mirror layer. Every boat gets a place of its own, so that one boat's water never
 //! takes another's light; what is blurred anyway is drawn smaller.
 
-use bowwave_core::scene::PixelRect;
+use bowwave_core::frame::scene::PixelRect;
 use glam::DVec2;
 
 /// Places begin and end at multiples of this: the softened layer is the layer at a third of its size.

@@ -3,7 +3,7 @@
 //! pass, one copy, and the few pixels of the head-up display.
 
 use ash::vk;
-use bowwave_core::scene::PixelRect;
+use bowwave_core::frame::scene::PixelRect;
 
 use crate::{
     error::RenderError,

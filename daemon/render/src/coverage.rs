@@ -1,7 +1,7 @@
 //! Which pixels a boat can touch, finer than one rectangle: a mast makes a boat's rectangle tall, but covers little of it. A model
 //! is held by a few dozen boxes; their projections mark cells of the screen, and runs of marked cells become rectangles.
 
-use bowwave_core::{model::Model, scene::PixelRect};
+use bowwave_core::{frame::scene::PixelRect, model::Model};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::{

@@ -9,9 +9,10 @@
 use std::fmt::Write;
 
 use bowwave_core::{
+    estimate::sea::SeaSource,
     fault::Fault,
-    scene::{Hud, PixelRect, Status},
-    sea::{WmoSeaState, estimate::SeaSource},
+    frame::scene::{Hud, PixelRect, Status},
+    sea::WmoSeaState,
 };
 use shaders_spirv::interface::{
     HudQuad, SHAPE_CROSS, SHAPE_DIAMOND, SHAPE_DISC, SHAPE_GLYPH, SHAPE_PLATE, SHAPE_RING, SHAPE_SQUARE,

@@ -1,4 +1,4 @@
-//! The Vulkan renderer: takes a frame's [`Scene`](bowwave_core::scene::Scene) and the camera's picture, gives back sRGB pixels.
+//! The Vulkan renderer: takes a frame's [`Scene`](bowwave_core::frame::scene::Scene) and the camera's picture, gives back sRGB pixels.
 //!
 //! One thread submits frames to a [`Renderer`]; another takes the finished ones from [`Completions`]. Between them lies a ring
 //! of a few frames; nobody waits for the GPU within a frame. Light is linear inside, sRGB at the edges: the screen image is

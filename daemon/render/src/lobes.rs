@@ -1,14 +1,16 @@
 //! The numbers of the method `Waves` for one boat in one frame: what `core::reflection` says of it, as the shaders read it.
 
 use bowwave_core::{
+    frame::{
+        reflection::{
+            BANDS, HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table,
+            grid::{TONE_GAIN, TONE_OUTER},
+            tilt_away, water_light, wind_to_view,
+        },
+        scene::{BoatView, PixelRect, Scene},
+    },
     geometry::curvature_drop,
     model::Model,
-    reflection::{
-        BANDS, HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table,
-        grid::{TONE_GAIN, TONE_OUTER},
-        tilt_away, water_light, wind_to_view,
-    },
-    scene::{BoatView, PixelRect, Scene},
 };
 use glam::{DVec2, DVec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, LAYER_COLUMNS, LOBE_COLUMNS, LobeBlock, ReflectBlock};

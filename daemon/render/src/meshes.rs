@@ -4,8 +4,8 @@ use std::{ops::Range, sync::Arc};
 
 use ash::vk;
 use bowwave_core::{
+    colour::{linear_to_srgb, srgb_to_linear},
     geometry::Bend,
-    light::{linear_to_srgb, srgb_to_linear},
     model::{Model, ModelId, Texture},
 };
 

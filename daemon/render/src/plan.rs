@@ -3,8 +3,9 @@
 
 use ash::vk;
 use bowwave_core::{
+    frame::scene::{BoatView, Pass, PixelRect, Scene},
     model::Model,
-    scene::{BoatView, Pass, PixelRect, ReflectionMethod, Scene},
+    water::ReflectionMethod,
 };
 use glam::DVec2;
 use shaders_spirv::interface::{

@@ -1,7 +1,7 @@
 //! Recording into a command buffer, as far as the passes have it in common.
 
 use ash::vk;
-use bowwave_core::scene::PixelRect;
+use bowwave_core::frame::scene::PixelRect;
 
 use crate::{
     gpu::Gpu,

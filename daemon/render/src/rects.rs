@@ -1,7 +1,7 @@
 //! Rectangles of the screen.
 
 use ash::vk;
-use bowwave_core::scene::PixelRect;
+use bowwave_core::frame::scene::PixelRect;
 
 /// A rectangle as Vulkan has it.
 pub(crate) fn rect(r: PixelRect) -> vk::Rect2D {

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use ash::vk;
 use bowwave_core::{
     event::Picture,
+    frame::scene::{Pass, Scene},
     geometry::Optics,
     model::Model,
-    scene::{Pass, ReflectionMethod, Scene, ShadowLevel, Water},
+    water::{ReflectionMethod, ShadowLevel, Water},
 };
 
 use shaders_spirv::interface::WATERS_MAX;

@@ -12,7 +12,7 @@ use std::{
 };
 
 use ash::vk;
-use bowwave_core::{event::Picture, scene::Pass};
+use bowwave_core::{event::Picture, frame::scene::Pass};
 
 use crate::{
     error::{Named, RenderError},

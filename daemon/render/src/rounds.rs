@@ -1,6 +1,6 @@
 //! Tracers, splashes and strikes on the screen: each an axis in pixels with a width.
 
-use bowwave_core::{
+use bowwave_core::frame::{
     scene::{PixelRect, RoundView, Scene},
     view::NEAR_M,
 };

@@ -1,14 +1,17 @@
 //! Scenes and models that tests are made of.
 
 use bowwave_core::{
-    boats::{CourseState, Hull},
+    estimate::light::{Light, SeaTones, SkyLight},
+    frame::{
+        scene::{Hud, LeftOut, Pass, PassDecision, Scene, Status},
+        view::{Afloat, Eye},
+        wake::Wake,
+    },
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
-    reflection::{SeaTones, SkyLight},
-    scene::{Hud, LeftOut, Light, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Status, Water},
     sea::BeaufortForce,
-    view::{Afloat, Eye},
-    wake::Wake,
+    water::{ReflectionMethod, ShadowLevel, Water},
+    world::boats::{CourseState, Hull},
 };
 use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
 

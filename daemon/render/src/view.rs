@@ -2,10 +2,13 @@
 //! rounded, so nothing loses digits with distance from the mount.
 
 use bowwave_core::{
+    estimate::light::Light,
+    frame::{
+        scene::{BoatView, Scene},
+        view::NEAR_M,
+    },
     geometry::{CameraPose, Distortion, Lens, RigidPose, horizon_dip},
     model::ModelKind,
-    scene::{BoatView, Light, Scene},
-    view::NEAR_M,
 };
 use glam::{DMat3, DQuat, DVec3, DVec4, Vec3};
 use shaders_spirv::interface::{BoatBlock, FrameBlock};

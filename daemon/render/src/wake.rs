@@ -1,17 +1,20 @@
 //! From a boat's track to what the wake's shaders read: relative to the camera before it is rounded.
 
 use bowwave_core::{
-    scene::{BoatView, Light, PixelRect, Scene},
+    estimate::light::Light,
+    frame::{
+        scene::{BoatView, PixelRect, Scene},
+        view::{bounds, clip_to_screen},
+        wake::{FOAM_FROUDE, FOLLOWED_S, SPEED_MIN_M_S, TrackPoint, Wake, froude, height_m},
+    },
     sea::{fresnel, mean_square_slope},
-    view::{bounds, clip_to_screen},
-    wake::{FOAM_FROUDE, FOLLOWED_S, SPEED_MIN_M_S, TrackPoint, Wake, froude, height_m},
 };
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{TRACK_POINTS, WakeBlock, WakeHead, WakePoint};
 
 use crate::water::{SEEN_DOWN, mirrored_sky};
 
-const _: () = assert!(TRACK_POINTS == bowwave_core::wake::TRACK_POINTS);
+const _: () = assert!(TRACK_POINTS == bowwave_core::frame::wake::TRACK_POINTS);
 
 /// Share of the light that fresh foam throws back (Whitlock, Bartlett & Gurganus 1982).
 const FOAM_ALBEDO: f32 = 0.55;
@@ -145,7 +148,7 @@ fn flat_sea(light: &Light, down: f64, rough: f64) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
-    use bowwave_core::boats::{CourseState, Hull};
+    use bowwave_core::world::boats::{CourseState, Hull};
 
     use super::*;
     use crate::testing;

@@ -4,11 +4,14 @@
 use std::f64::consts::TAU;
 
 use bowwave_core::{
+    colour::LUMINANCE,
+    estimate::light::Light,
+    frame::scene::{BoatView, PixelRect, Scene},
     geometry::RigidPose,
-    light::LUMINANCE,
     model::Model,
-    scene::{BoatView, Light, PixelRect, ReflectionMethod, Scene, ShadowLevel},
-    sea::{BeaufortForce, Spectrum, WaveField, WaveSpec, fresnel, mean_square_slope},
+    sea::{BeaufortForce, fresnel, mean_square_slope},
+    water::{ReflectionMethod, ShadowLevel},
+    world::waves::{Spectrum, WaveField, WaveSpec},
 };
 use glam::{DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, LOBE_COLUMNS, WaterBlock};

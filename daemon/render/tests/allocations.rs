@@ -15,7 +15,10 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::scene::{Pass, PassDecision, ReflectionMethod, RoundView};
+use bowwave_core::{
+    frame::scene::{Pass, PassDecision, RoundView},
+    water::ReflectionMethod,
+};
 use common::{
     config, open, sea,
     testing::{add_boat, add_moving_boat, box_model, empty_scene},

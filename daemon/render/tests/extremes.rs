@@ -12,9 +12,10 @@ use std::{sync::Arc, time::Duration};
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
+    frame::scene::{BoatView, Pass, PassDecision, PixelRect, RoundView, Scene},
     geometry::{RigidPose, look},
     model::{Model, ModelId},
-    scene::{BoatView, Pass, PassDecision, PixelRect, ReflectionMethod, RoundView, Scene, ShadowLevel},
+    water::{ReflectionMethod, ShadowLevel},
 };
 use bowwave_render::{Needs, RenderError, Renderer, TIMED_EVERY};
 use common::{
@@ -192,7 +193,8 @@ fn nearer_boats_hide_farther_ones_in_whatever_order_they_come() {
     add_boat(&mut scene, &models, 0, 40.0, 0.0, 0.1);
     add_boat(&mut scene, &models, 1, 50.0, 0.0, 0.1);
     let far_first = draw(&scene, &sea(SIZE.0, SIZE.1), &models);
-    scene.passes[Pass::Water as usize] = PassDecision::LeftOut(bowwave_core::scene::LeftOut::ReflectionOff);
+    scene.passes[Pass::Water as usize] =
+        PassDecision::LeftOut(bowwave_core::frame::scene::LeftOut::ReflectionOff);
     let hulls = draw(&scene, &sea(SIZE.0, SIZE.1), &models);
     scene.boats.reverse();
     assert_eq!(draw(&scene, &sea(SIZE.0, SIZE.1), &models), hulls, "depth decides, not order");
@@ -226,8 +228,8 @@ fn rounds_hide_behind_hulls_that_are_nearer() {
         assert_eq!(changed, seen, "a splash {offset} m behind the hull");
     }
     scene.boats.clear();
-    scene.passes[Pass::Boats as usize] = PassDecision::LeftOut(bowwave_core::scene::LeftOut::NoBoats);
-    scene.passes[Pass::Water as usize] = PassDecision::LeftOut(bowwave_core::scene::LeftOut::NoBoats);
+    scene.passes[Pass::Boats as usize] = PassDecision::LeftOut(bowwave_core::frame::scene::LeftOut::NoBoats);
+    scene.passes[Pass::Water as usize] = PassDecision::LeftOut(bowwave_core::frame::scene::LeftOut::NoBoats);
     let radiance = Vec3::splat(5.0);
     scene.rounds.push(RoundView::Tracer {
         from: DVec3::new(f64::NAN, 5.0, 5.0),

@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    scene::{LeftOut, Pass, PassDecision},
+    frame::scene::{LeftOut, Pass, PassDecision},
 };
 use common::{at, draw, testing::empty_scene};
 use rand_like::Numbers;

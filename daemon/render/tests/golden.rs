@@ -12,11 +12,12 @@ use std::{path::PathBuf, sync::Arc};
 
 use bowwave_core::{
     fault::Fault,
+    frame::scene::{Pass, PassDecision, RoundView, Scene, Status},
     geometry::{Distortion, look},
     guide::{Cell, Coverage, Gauge, Guide, Rating},
     model::{Model, ModelKind, Texture},
-    scene::{Pass, PassDecision, ReflectionMethod, RoundView, Scene, ShadowLevel, Status},
     sea::BeaufortForce,
+    water::{ReflectionMethod, ShadowLevel},
 };
 use common::{
     draw, sea,

@@ -20,7 +20,7 @@ use std::{
 
 use bowwave_core::{
     event::{Lent, Picture, PixelFormat},
-    scene::Scene,
+    frame::scene::Scene,
 };
 use bowwave_render::{PictureCounts, PicturePath, Renderer};
 use common::{assert_clean, config, open, submit, testing::empty_scene};

@@ -10,8 +10,8 @@
 mod common;
 
 use bowwave_core::{
+    frame::scene::Scene,
     geometry::{Distortion, Lens},
-    scene::Scene,
 };
 use common::{draw, testing};
 use glam::{DVec2, DVec3};
@@ -22,8 +22,8 @@ const SIZE: (u32, u32) = (640, 360);
 fn scene(models: &[bowwave_core::model::Model], turn: DVec3, distortion: Distortion) -> Scene {
     let mut scene = testing::empty_scene(SIZE.0, SIZE.1);
     scene.camera.world_from_camera = bowwave_core::geometry::look(0.0, 0.1, 0.2);
-    scene.water.method = bowwave_core::scene::ReflectionMethod::Off;
-    scene.water.shadow = bowwave_core::scene::ShadowLevel::None;
+    scene.water.method = bowwave_core::water::ReflectionMethod::Off;
+    scene.water.shadow = bowwave_core::water::ShadowLevel::None;
     scene.lens = Lens { distortion, ..scene.lens }.read_while(turn);
     testing::add_boat(&mut scene, models, 0, 60.0, 0.1, 0.7);
     scene

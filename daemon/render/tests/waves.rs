@@ -9,9 +9,13 @@
 mod common;
 
 use bowwave_core::{
-    light::{linear_to_srgb, srgb_to_linear},
-    reflection::{BANDS, Billboard, Lobes, Place, SeaTones, Seen, Table, compose, water_light},
-    scene::{Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel},
+    colour::{linear_to_srgb, srgb_to_linear},
+    estimate::light::SeaTones,
+    frame::{
+        reflection::{BANDS, Billboard, Lobes, Place, Seen, Table, compose, water_light},
+        scene::{Pass, PassDecision, Scene},
+    },
+    water::{ReflectionMethod, ShadowLevel},
 };
 use common::{
     draw, sea,

@@ -1,8 +1,8 @@
 //! From light to a JPEG: the camera with its roll and elevation, its lens, its noise and its transfer curve.
 
 use bowwave_core::{
+    colour::linear_to_srgb,
     geometry::{CameraPose, Lens, look},
-    light::linear_to_srgb,
 };
 use glam::{DQuat, DVec2, DVec3, Mat3, Vec3, Vec4};
 use image::{ExtendedColorType, ImageError, codecs::jpeg::JpegEncoder};

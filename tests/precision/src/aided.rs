@@ -2,7 +2,7 @@
 //! it: how wrong orientation is, and whether the filter knows.
 
 use bowwave_core::{
-    attitude::{
+    estimate::attitude::{
         Attitude, AttitudeSettings, DIP_SIGMA, HeadingSeen, Noise, OWN_GROWTH, RateKind, Settings, Source,
         UpSeen,
     },

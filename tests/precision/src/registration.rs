@@ -9,12 +9,12 @@ use std::{path::Path, sync::Arc};
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
-    attitude::Source,
     calibration::Calibration,
+    estimate::{HeadingSettings, attitude::Source},
     event::PixelFormat,
     geometry::Lens,
-    scenario::Scenario,
-    session::{HeadingSettings, Session, Setup},
+    session::{Session, Setup},
+    world::scenario::Scenario,
 };
 use glam::{DQuat, DVec2, DVec3};
 use hw_sim::{

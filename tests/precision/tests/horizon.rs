@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 
-use bowwave_core::horizon::HorizonFinder;
+use bowwave_core::estimate::horizon::HorizonFinder;
 use glam::DVec3;
 use precision::{
     front::quantile,

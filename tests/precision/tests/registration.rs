@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 
-use bowwave_core::attitude::Source;
+use bowwave_core::estimate::attitude::Source;
 use precision::registration::{Errors, Moved, Replayed, SKY_STANDS, record, replay, summary};
 
 const WIDTH: u32 = 480;

@@ -13,7 +13,7 @@ use bowwave_calibration::{
 };
 use bowwave_core::{
     event::{CameraFrame, Event},
-    scenario::Scenario,
+    world::scenario::Scenario,
 };
 use bowwave_devices::camera::jpeg::Decoder;
 use bowwave_import::{ImportOptions, assumed};

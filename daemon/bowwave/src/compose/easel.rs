@@ -5,8 +5,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use bowwave_core::{
     event::Picture,
-    plan::ScenePlan,
-    scene::Scene,
+    frame::{plan::ScenePlan, scene::Scene},
     still::{Composed, Still},
 };
 use bowwave_render::{Completions, Renderer, TimeOuts};

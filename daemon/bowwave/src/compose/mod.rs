@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
-    scene::ReflectionMethod,
     still::{self, Still},
+    water::ReflectionMethod,
 };
 
 use crate::{cli::Compose, loading::load_models, outcome::Outcome, stdout};

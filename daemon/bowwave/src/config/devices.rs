@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Duration};
 
 use anyhow::Result;
-use bowwave_core::attitude::Source as Orientation;
+use bowwave_core::estimate::attitude::Source as Orientation;
 use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
     imu::ImuFormat,

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use bowwave_core::{
+    estimate::{HeadingSettings, Landmark, Stow},
     event::MarkKind,
-    session::{HeadingSettings, Landmark, Stow},
 };
 use bowwave_devices::{
     serial::ShipSettings,

@@ -11,7 +11,7 @@ use std::{
 pub use self::heading::HeadingChoice;
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
-    attitude::Source as Orientation,
+    estimate::attitude::Source as Orientation,
     text::{line_column, one_line},
 };
 use bowwave_devices::{
@@ -224,7 +224,7 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
     let limit_c = source.number(raw.health.limit_c, "health.limit_c", 20.0..=150.0)?;
     // A built-in scenario's name is no path.
     let scenario = raw.files.scenario.map(|p| {
-        let built_in = bowwave_core::scenario::BUILT_IN.iter().any(|(name, _)| p.as_os_str() == *name);
+        let built_in = bowwave_core::world::scenario::BUILT_IN.iter().any(|(name, _)| p.as_os_str() == *name);
         if built_in { p } else { base.join(p) }
     });
     let heading = heading::RawHeadings {

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use bowwave_core::clock::{ClockReport, DRIFT_MUCH_PPM};
+use bowwave_core::estimate::clock::{ClockReport, DRIFT_MUCH_PPM};
 use bowwave_devices::{
     imu::ImuFormat,
     serial::{self, ImuSettings, ImuStatus, LineStatus},

@@ -14,7 +14,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, anyhow};
-use bowwave_core::{event::TriggerEdge, scene::Pass, time::Time};
+use bowwave_core::{event::TriggerEdge, frame::scene::Pass, time::Time};
 use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
 use bowwave_render::{Completions, Finished};
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};

@@ -6,7 +6,7 @@ use anyhow::Result;
 use bowwave_core::{
     event::Event,
     fault::{Fault, FaultChange},
-    scene::Status,
+    frame::scene::Status,
     time::Time,
 };
 use bowwave_devices::{

@@ -12,8 +12,8 @@ use anyhow::{Context, Result};
 use bowwave_core::{
     event::Event,
     fault::{Fault, FaultChange},
-    score::ShotRecord,
     time::{NS_PER_S, Time},
+    world::score::ShotRecord,
 };
 use bowwave_devices::clock::now;
 use bowwave_record::{
@@ -382,7 +382,7 @@ pub fn begin_recording(folder: &Path, what: &str, settings: &Settings) -> Result
 mod tests {
     use super::*;
     use crate::run::settings::Reader;
-    use bowwave_core::score::{NotScored, Outcome};
+    use bowwave_core::world::score::{NotScored, Outcome};
     use bowwave_record::{ShotFilter, read_shots};
     use glam::DVec3;
 

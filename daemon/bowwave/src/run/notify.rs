@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bowwave_core::{
     fault::Fault,
-    scene::{Hud, Status},
+    frame::scene::{Hud, Status},
     time::{NS_PER_S, Time},
 };
 use sd_notify::NotifyState;

@@ -14,8 +14,8 @@ use bowwave_core::{
     fault::{Fault, FaultChange},
     geometry::Lens,
     model::Model,
-    scenario::{self, Scenario},
     session::Setup,
+    world::scenario::{self, Scenario},
 };
 use bowwave_devices::{camera::CameraSettings, clock::now};
 use glam::{DQuat, DVec2, DVec3};

@@ -4,11 +4,11 @@ use std::{collections::BTreeMap, path::Path};
 
 use anyhow::{Context, Result};
 use bowwave_core::{
+    frame::scene::{Pass, Scene},
     pacing::FrameClock,
-    scene::{Pass, Scene},
-    score::{Outcome, ShotRecord},
     session::Session,
     time::Time,
+    world::score::{Outcome, ShotRecord},
 };
 use serde::Serialize;
 

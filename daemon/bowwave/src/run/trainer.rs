@@ -13,9 +13,9 @@ use bowwave_core::{
     event::{Event, Mark, MarkKind, PixelFormat},
     fault::{Change, Fault, FaultChange},
     pacing::{FRAMES_PER_S, FrameClock},
-    scenario::{self, Scenario},
     session::Session,
     time::{NS_PER_S, Time},
+    world::scenario::{self, Scenario},
 };
 use bowwave_devices::clock::{now, sleep_until};
 use bowwave_record::PoseEntry;

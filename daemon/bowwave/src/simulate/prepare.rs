@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use bowwave_calibration::CalibrationFile;
 use bowwave_core::{
-    attitude::Source,
+    estimate::attitude::Source,
     event::PixelFormat,
     model::{Model, ModelId},
-    scenario::{self, Scenario},
     session::Setup,
+    world::scenario::{self, Scenario},
 };
 use bowwave_record::{Properties, RecordingReader};
 

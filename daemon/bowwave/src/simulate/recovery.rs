@@ -1,7 +1,7 @@
 //! Whether each injected fault was seen and ridden out.
 
 use bowwave_core::{
-    scene::Status,
+    frame::scene::Status,
     time::{NS_PER_S, Time},
 };
 use hw_sim::fault::{Fault, FaultKind};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use bowwave_core::{scene::Pass, time::Time};
+use bowwave_core::{frame::scene::Pass, time::Time};
 use sha2::Digest;
 
 use super::{

@@ -13,14 +13,13 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
-    clock::ClockReport,
+    estimate::{SeaReport, SensorCounts, clock::ClockReport, pose::registration_error_px},
     event::{Event, Mark, MarkKind, Picture},
     geometry::CameraPose,
     pacing::{FRAMES_PER_S, Pacer},
-    pose::registration_error_px,
-    score::{Outcome as RoundOutcome, ShotRecord},
-    session::{SeaReport, SensorCounts, Session},
+    session::Session,
     time::{NS_PER_S, Time},
+    world::score::{Outcome as RoundOutcome, ShotRecord},
 };
 use bowwave_devices::clock::now;
 use bowwave_record::{Journal, JournalError, PoseEntry};

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use anyhow::{Context, Result};
-use bowwave_core::scene::{LeftOut, Pass, PassDecision, Scene};
+use bowwave_core::frame::scene::{LeftOut, Pass, PassDecision, Scene};
 use serde::Serialize;
 
 use crate::{

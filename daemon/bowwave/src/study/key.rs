@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 use bowwave_models::Boat;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};

@@ -14,7 +14,7 @@ mod statistics;
 use std::{fs, path::Path};
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 use image::RgbImage;
 
 use crate::{

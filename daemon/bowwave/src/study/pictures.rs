@@ -4,11 +4,12 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
-    boats::facing,
+    frame::scene::BoatView,
     geometry::{CameraPose, Lens, horizon_dip},
     model::{Model, ModelId, ModelKind},
-    scene::{BoatView, ReflectionMethod, ShadowLevel},
     still::{Composed, Place, Still, StillBoat},
+    water::{ReflectionMethod, ShadowLevel},
+    world::boats::facing,
 };
 use bowwave_models::Boat;
 use glam::{DVec2, DVec3};

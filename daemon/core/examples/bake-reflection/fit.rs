@@ -1,6 +1,6 @@
 //! Weighted least squares of numbers that depend on the state of the water at the hull.
 
-use bowwave_core::reflection::grid::STATES;
+use bowwave_core::frame::reflection::grid::STATES;
 
 /// Share of the whole weight that holds each state to the mean one, so that few pixels in a rare state say little.
 const STIFF: f64 = 0.01;

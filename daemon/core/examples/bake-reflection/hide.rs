@@ -1,6 +1,6 @@
 //! How much of a hull the waves before it hide.
 
-use bowwave_core::reflection::grid::{ELEVATIONS, STATES, elevation, state_weights};
+use bowwave_core::frame::reflection::grid::{ELEVATIONS, STATES, elevation, state_weights};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;

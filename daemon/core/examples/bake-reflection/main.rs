@@ -12,7 +12,7 @@ mod sea;
 use std::{f64::consts::FRAC_PI_2, path::PathBuf, process::ExitCode};
 
 use bowwave_core::{
-    reflection::{
+    frame::reflection::{
         encode, encode_hiding,
         grid::{
             DISTANCES, ELEVATIONS, FORCES, RISE_NODES, RISES, STATES, STORED, TONES, WINDS, distance_m,

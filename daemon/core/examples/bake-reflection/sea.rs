@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use bowwave_core::sea::{BeaufortForce, Spectrum};
+use bowwave_core::{sea::BeaufortForce, world::waves::Spectrum};
 use rand::RngExt;
 use rand_pcg::Pcg64;
 use rustfft::{FftPlanner, num_complex::Complex};

@@ -1,13 +1,8 @@
-//! The sea: scales of its state (two different ones), spectrum and waves.
+//! The sea: scales of its state (two different ones) and the optics of its surface.
 
-pub mod estimate;
 mod optics;
-mod spectrum;
-mod waves;
 
 pub use optics::{Facets, SEA_INDEX, fresnel, mean_square_slope, rms_slope};
-pub use spectrum::{Spectrum, WaveSpec};
-pub use waves::{CHANGE_S, WaterPlane, Wave, WaveField};
 
 /// Beaufort wind force, 0 to 12 (WMO-No. 306, code table 1100). What the thesis calls "sea state" 0-4 is this scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -3,9 +3,9 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use crate::{
+    frame::view::Eye,
     geometry::{CameraPose, Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
-    scenario::table::Mark,
-    view::Eye,
+    world::scenario::table::Mark,
 };
 
 /// Diagonal of a 35 mm film frame, millimetres: what "35 mm equivalent" focal lengths count from (CIPA DCG-001).

@@ -8,18 +8,23 @@ mod read;
 use glam::{DVec2, DVec3};
 
 use crate::{
-    boats::{CourseState, Hull, ahead, float},
+    estimate::light::LightMeter,
     event::Picture,
+    frame::{
+        plan::{Needs, ScenePlan},
+        scene::{Hud, LeftOut, Pass, PassDecision, Scene},
+        view::{Afloat, Eye},
+        wake::Wake,
+    },
     geometry::{CameraPose, Lens},
-    light::LightMeter,
     model::{Model, ModelId},
-    plan::{Needs, ScenePlan},
-    scenario::{CAMERA_CLEAR_M, ScenarioError, place, table::Mark},
-    scene::{Hud, LeftOut, Pass, PassDecision, Scene, Water},
-    sea::{WaveField, WaveSpec},
     time::Time,
-    view::{Afloat, Eye},
-    wake::Wake,
+    water::Water,
+    world::{
+        boats::{CourseState, Hull, ahead, float},
+        scenario::{CAMERA_CLEAR_M, ScenarioError, place, table::Mark},
+        waves::{WaveField, WaveSpec},
+    },
 };
 pub use camera::{Attitude, Focal, StillCamera, film_focal_px};
 

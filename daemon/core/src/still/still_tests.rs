@@ -6,7 +6,7 @@ use crate::{
     event::PixelFormat,
     geometry::{curvature_drop, horizon_dip, look},
     model::{ModelKind, Vertex},
-    scene::ReflectionMethod,
+    water::ReflectionMethod,
 };
 
 fn parse(text: &str) -> Result<Still, ScenarioError> {

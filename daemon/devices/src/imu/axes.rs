@@ -15,7 +15,7 @@ pub(crate) const ROLL_OVER: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 pub(crate) const ENU_FROM_NWU: DQuat = DQuat::from_xyzw(0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2);
 
 /// What units that measure in g mean by it.
-pub(crate) use bowwave_core::gunnery::GRAVITY_M_S2 as G;
+pub(crate) use bowwave_core::physics::GRAVITY_M_S2 as G;
 
 /// Three numbers of a wire as a vector.
 pub(crate) fn vector([x, y, z]: [f32; 3]) -> DVec3 {

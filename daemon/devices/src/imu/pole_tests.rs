@@ -2,7 +2,7 @@
 //! angles to where the camera looks.
 
 use bowwave_core::{
-    attitude::{Attitude, AttitudeSettings, Noise, RateKind, Settings, Source},
+    estimate::attitude::{Attitude, AttitudeSettings, Noise, RateKind, Settings, Source},
     event::ImuSample,
     geometry::look,
     time::Time,

@@ -70,7 +70,7 @@ impl SteadyClock {
 
 #[cfg(test)]
 mod tests {
-    use bowwave_core::clock::ClockMap;
+    use bowwave_core::estimate::clock::ClockMap;
 
     use super::*;
 

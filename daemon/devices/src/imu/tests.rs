@@ -1,4 +1,4 @@
-use bowwave_core::{clock::ClockMap, event::ImuSample, time::Time};
+use bowwave_core::{estimate::clock::ClockMap, event::ImuSample, time::Time};
 use proptest::prelude::*;
 
 use super::{

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bowwave_core::{
-    clock::{ClockMap, ClockReport},
+    estimate::clock::{ClockMap, ClockReport},
     event::Event,
     fault::{Fault, FaultChange},
     time::Time,

@@ -25,7 +25,7 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::{clock::ClockReport, event::Event, fault::Fault};
+use bowwave_core::{estimate::clock::ClockReport, event::Event, fault::Fault};
 use crossbeam_channel::Receiver;
 use serialport::SerialPortType;
 

@@ -1,6 +1,6 @@
 //! The paints that the built-in boats are made of.
 
-use bowwave_core::light::srgb_to_linear;
+use bowwave_core::colour::srgb_to_linear;
 use glam::Vec3;
 
 /// A surface: one glTF material.

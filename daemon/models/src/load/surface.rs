@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, io::Cursor};
 
-use bowwave_core::light::srgb_to_linear;
+use bowwave_core::colour::srgb_to_linear;
 use glam::{Mat3, Vec2, Vec3};
 use gltf::material::AlphaMode;
 use image::RgbaImage;

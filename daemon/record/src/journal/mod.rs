@@ -28,7 +28,7 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::{fault::Fault, score::ShotRecord, time::Time};
+use bowwave_core::{fault::Fault, time::Time, world::score::ShotRecord};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 
 use boot::WallClock;

@@ -2,8 +2,8 @@
 
 use bowwave_core::{
     model::Zone,
-    score::{NotScored, Outcome, ShotRecord},
     time::Time,
+    world::score::{NotScored, Outcome, ShotRecord},
 };
 use glam::DVec3;
 use rusqlite::{Connection, Row, params};

@@ -3,8 +3,8 @@
 use std::{fs, time::Duration};
 
 use bowwave_core::{
-    score::{NotScored, Outcome, ShotRecord},
     time::Time,
+    world::score::{NotScored, Outcome, ShotRecord},
 };
 use glam::DVec3;
 use rusqlite::Connection;

@@ -10,7 +10,7 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::{fault::Fault, score::ShotRecord};
+use bowwave_core::{fault::Fault, world::score::ShotRecord};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, after, never, select};
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 

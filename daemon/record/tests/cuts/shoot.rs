@@ -10,8 +10,8 @@ use std::{
 
 use bowwave_core::{
     model::Zone,
-    score::{NotScored, Outcome, ShotRecord},
     time::Time,
+    world::score::{NotScored, Outcome, ShotRecord},
 };
 use bowwave_record::{Journal, JournalOptions, Run};
 use glam::DVec3;

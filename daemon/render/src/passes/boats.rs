@@ -2,7 +2,7 @@
 //! each pixel's samples over the video in linear light.
 
 use ash::vk;
-use bowwave_core::{model::ModelId, scene::PixelRect};
+use bowwave_core::{frame::scene::PixelRect, model::ModelId};
 use shaders_spirv::{
     BOAT_FRAG, BOAT_TEXTURED_FRAG, BOAT_TEXTURED_VERT, BOAT_VERT, COMPOSITE_FRAG, RECT_VERT,
     interface::{DrawBlock, MeshVertex},

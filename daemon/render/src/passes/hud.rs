@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use ash::vk;
-use bowwave_core::scene::{PixelRect, Scene};
+use bowwave_core::frame::scene::{PixelRect, Scene};
 use shaders_spirv::{HUD_FRAG, HUD_VERT, interface::HudQuad};
 
 use crate::{

@@ -2,7 +2,7 @@
 //! the boat's mean water. Each boat has its own place in the layer.
 
 use ash::vk;
-use bowwave_core::scene::PixelRect;
+use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{SCREEN_VERT, SOFTEN_FRAG};
 
 use crate::{

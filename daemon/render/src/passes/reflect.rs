@@ -3,7 +3,7 @@
 //! pixel's brightness; and each pixel takes what belongs to its place and its own brightness. Only the last step is done for every pixel.
 
 use ash::vk;
-use bowwave_core::scene::PixelRect;
+use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{
     BANDS_FRAG, LAYERS_FRAG, REFLECT_FRAG, REFLECT_VERT, SCREEN_VERT, SUMS_FRAG,
     interface::{DrawBlock, LAYER_COLUMNS, LOBE_BANDS, LOBE_COLUMNS, LOBE_STEPS, LobeBlock, ReflectBlock},

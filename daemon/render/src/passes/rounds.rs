@@ -2,7 +2,7 @@
 //! depth is read only where this frame wrote it.
 
 use ash::vk;
-use bowwave_core::scene::PixelRect;
+use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{ROUND_FRAG, ROUND_HIDDEN_FRAG, ROUND_VERT, Shader, interface::DrawBlock};
 
 use crate::{

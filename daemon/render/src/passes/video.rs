@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    scene::PixelRect,
+    frame::scene::PixelRect,
 };
 use shaders_spirv::{SCREEN_VERT, VIDEO_FRAG, VIDEO_OVERLAID_FRAG, interface::VideoBlock};
 

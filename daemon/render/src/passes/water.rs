@@ -2,7 +2,10 @@
 //! first, within the rectangle that its reflection can reach.
 
 use ash::vk;
-use bowwave_core::scene::{PixelRect, ReflectionMethod, ShadowLevel, Water};
+use bowwave_core::{
+    frame::scene::PixelRect,
+    water::{ReflectionMethod, ShadowLevel, Water},
+};
 use shaders_spirv::{FIELD_FRAG, RECT_VERT, WATER_FRAG, interface::DrawBlock};
 
 use crate::{

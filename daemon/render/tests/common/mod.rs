@@ -5,8 +5,8 @@ use std::{sync::Arc, time::Duration};
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
+    frame::scene::Scene,
     model::Model,
-    scene::Scene,
 };
 use bowwave_render::{Completions, Needs, PictureShape, RenderConfig, Renderer, TimeOuts};
 

@@ -1,6 +1,6 @@
 //! The scenario: any text.
 
-use bowwave_core::{
+use bowwave_core::world::{
     boats::{CourseState, Damage},
     scenario::Scenario,
 };

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::Result;
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 use clap::Parser;
 use precision::photograph::{self, CONTROL, Row, mean_of, spec::Assumed};
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 use clap::{Args, Parser, Subcommand};
 use precision::reflection::{cell, cost, draw::Studio, gap, grid, singular, time, wrong};
 

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use anyhow::Result;
-use bowwave_core::attitude::Source;
+use bowwave_core::estimate::attitude::Source;
 use clap::Parser;
 use precision::registration::{Moved, Replayed, SKY_STANDS, record, replay, summary};
 

@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use bowwave_core::horizon::{Horizon, HorizonFinder, NoHorizon, Prior, Quality};
+use bowwave_core::estimate::horizon::{Horizon, HorizonFinder, NoHorizon, Prior, Quality};
 use glam::DVec3;
 use rayon::prelude::*;
 

@@ -2,9 +2,9 @@
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
+    estimate::horizon::{Horizon, HorizonFinder, Mask, NoHorizon, Prior, View},
     event::{Picture, PixelFormat},
     geometry::{Distortion, Lens},
-    horizon::{Horizon, HorizonFinder, Mask, NoHorizon, Prior, View},
 };
 use glam::{DMat2, DQuat, DVec2, DVec3};
 

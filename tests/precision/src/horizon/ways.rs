@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use bowwave_core::{
+    estimate::horizon::HorizonFinder,
     geometry::{Lens, horizon_dip},
-    horizon::HorizonFinder,
 };
 use glam::DVec3;
 

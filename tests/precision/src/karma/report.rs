@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use anyhow::{Context as _, Result};
 use bowwave_calibration::alignment::{self, ImuReading, Observation, Options};
 use bowwave_core::{
+    estimate::{
+        HeadingSettings,
+        skyline::{SkyView, Skyline},
+    },
     geometry::{Lens, look},
-    session::HeadingSettings,
-    skyline::{SkyView, Skyline},
     time::Time,
 };
 use bowwave_import::START;

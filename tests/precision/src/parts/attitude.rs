@@ -1,7 +1,7 @@
 //! Integration of angular rate to orientation.
 
 use anyhow::Result;
-use bowwave_core::attitude::turn_between;
+use bowwave_core::estimate::attitude::turn_between;
 use glam::{DQuat, DVec3, Quat};
 
 use super::About;

@@ -1,6 +1,6 @@
 //! Device clock to host clock.
 
-use bowwave_core::{clock::ClockMap, time::Time};
+use bowwave_core::{estimate::clock::ClockMap, time::Time};
 
 use anyhow::Result;
 

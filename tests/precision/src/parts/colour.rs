@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use bowwave_core::{
+    colour::{linear_to_srgb, srgb_to_linear},
     event::bt601_to_srgb,
-    light::{linear_to_srgb, srgb_to_linear},
 };
 use palette::{IntoColor, Lab, LinSrgb, Srgb, color_difference::Ciede2000, white_point::D65};
 

@@ -1,7 +1,7 @@
 //! What distances the depth buffer tells apart.
 
 use anyhow::Result;
-use bowwave_core::view::NEAR_M;
+use bowwave_core::frame::view::NEAR_M;
 
 use super::{About, worst};
 use crate::bench::{Bench, Tried, Way};

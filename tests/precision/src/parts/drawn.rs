@@ -4,14 +4,13 @@ use std::collections::BTreeSet;
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
-    boats::{CourseState, Hull},
+    estimate::light::SeaTones,
+    frame::{scene::Scene, view::NEAR_M, wake::Wake},
     geometry::{CameraPose, Distortion, Lens, Optics, RigidPose},
     model::Model,
-    reflection::SeaTones,
-    scene::{ReflectionMethod, Scene},
     sea::BeaufortForce,
-    view::NEAR_M,
-    wake::Wake,
+    water::ReflectionMethod,
+    world::boats::{CourseState, Hull},
 };
 use bowwave_models::resolve;
 use bowwave_render::SOFTWARE;

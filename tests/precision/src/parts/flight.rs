@@ -1,7 +1,10 @@
 //! Flight of a virtual round.
 
 use anyhow::{Context, Result, anyhow};
-use bowwave_core::gunnery::{Atmosphere, Flight, GRAVITY_M_S2, Projectile, STEP_S, g7_drag_coefficient};
+use bowwave_core::{
+    physics::GRAVITY_M_S2,
+    world::gunnery::{Atmosphere, Flight, Projectile, STEP_S, g7_drag_coefficient},
+};
 use differential_equations::prelude::*;
 use glam::DVec3;
 

@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::{Attitude, HeadingSeen, Source, UpSeen, turn_between},
+    estimate::attitude::{Attitude, HeadingSeen, Source, UpSeen, turn_between},
     event::ImuSample,
-    gunnery::GRAVITY_M_S2,
+    physics::GRAVITY_M_S2,
     time::Time,
 };
 use glam::{DMat3, DQuat, DVec3};

@@ -2,9 +2,9 @@
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
+    estimate::horizon::{HorizonFinder, Prior, View, lowered_by_haze},
     event::{Picture, PixelFormat},
     geometry::Lens,
-    horizon::{HorizonFinder, Prior, View, lowered_by_haze},
 };
 use glam::{DQuat, DVec3};
 use hw_sim::make::{Recipe, Studio};

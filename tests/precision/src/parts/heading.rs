@@ -4,11 +4,10 @@ use std::f64::consts::{PI, TAU};
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::Source,
     calibration::Calibration,
+    estimate::{HeadingSettings, Sensors, attitude::Source},
     event::{ImuSample, ShipSample},
     geometry::{look, rotation_vector, wrapped},
-    session::{HeadingSettings, Sensors},
     time::Time,
 };
 use glam::{DQuat, DVec3};

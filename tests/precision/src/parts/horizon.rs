@@ -1,7 +1,7 @@
 //! The horizon in pictures.
 
 use anyhow::Result;
-use bowwave_core::horizon::HorizonFinder;
+use bowwave_core::estimate::horizon::HorizonFinder;
 
 use super::{About, worst};
 use crate::{

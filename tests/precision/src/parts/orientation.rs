@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::{Attitude, AttitudeSettings, Noise, OWN_GROWTH, RateKind, Settings, Source},
+    estimate::attitude::{Attitude, AttitudeSettings, Noise, OWN_GROWTH, RateKind, Settings, Source},
     event::ImuSample,
     time::Time,
 };

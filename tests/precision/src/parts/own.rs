@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    attitude::{Attitude, HeadingSeen, Source, UpSeen},
+    estimate::attitude::{Attitude, HeadingSeen, Source, UpSeen},
     event::ImuSample,
     time::Time,
 };

@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result};
 use bowwave_core::{
-    scene::ReflectionMethod,
     still::{EXAMPLE, Still},
+    water::ReflectionMethod,
 };
 use bowwave_render::SOFTWARE;
 

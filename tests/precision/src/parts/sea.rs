@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use anyhow::{Context, Result};
 use bowwave_core::{
-    gunnery::GRAVITY_M_S2,
-    sea::{Spectrum, Wave, WaveField, WaveSpec},
+    physics::GRAVITY_M_S2,
+    world::waves::{Spectrum, Wave, WaveField, WaveSpec},
 };
 use glam::DVec2;
 

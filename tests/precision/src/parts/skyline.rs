@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
+    estimate::skyline::{SkyView, Skyline},
     event::{Picture, PixelFormat},
     geometry::{Distortion, Lens, look},
-    skyline::{SkyView, Skyline},
     time::Time,
 };
 use glam::{DQuat, DVec2};

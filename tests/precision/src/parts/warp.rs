@@ -2,9 +2,10 @@
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
+    frame::scene::Scene,
     geometry::{Distortion, Lens},
     model::Model,
-    scene::{ReflectionMethod, Scene},
+    water::ReflectionMethod,
 };
 use bowwave_render::SOFTWARE;
 use glam::{DVec2, DVec3};

@@ -3,7 +3,10 @@
 use std::f64::consts::TAU;
 
 use anyhow::Result;
-use bowwave_core::sea::{BeaufortForce, Spectrum, Wave, WaveField, WaveSpec};
+use bowwave_core::{
+    sea::BeaufortForce,
+    world::waves::{Spectrum, Wave, WaveField, WaveSpec},
+};
 use glam::DVec2;
 
 use super::{About, even, worst};

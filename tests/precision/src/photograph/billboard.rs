@@ -6,10 +6,11 @@ use bowwave::{
     loading::Models,
 };
 use bowwave_core::{
+    frame::scene::Scene,
     geometry::horizon_dip,
     model::ModelId,
-    scene::{ReflectionMethod, Scene, ShadowLevel},
     still::Still,
+    water::{ReflectionMethod, ShadowLevel},
 };
 use bowwave_models::{Bow, QuadSpec, quad};
 use glam::{DVec2, DVec3, Vec3};

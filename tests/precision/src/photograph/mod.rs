@@ -15,7 +15,7 @@ pub mod spec;
 use std::{fs, path::Path};
 
 use anyhow::{Context, Result};
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 use image::RgbImage;
 
 use compare::Difference;

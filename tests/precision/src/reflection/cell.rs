@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use bowwave_core::{
+    colour::{LUMINANCE, srgb_to_linear},
+    estimate::light::Light,
     geometry::{CameraPose, Lens, RigidPose},
-    light::{LUMINANCE, srgb_to_linear},
-    scene::Light,
 };
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::{GrayImage, Rgb, RgbImage, imageops};

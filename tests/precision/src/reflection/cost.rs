@@ -8,10 +8,11 @@ use std::fmt::Write as _;
 
 use anyhow::{Context, Result};
 use bowwave_core::{
+    frame::scene::{LeftOut, Pass, PassDecision, Scene},
     geometry::Lens,
     model::Model,
-    scene::{LeftOut, Pass, PassDecision, ReflectionMethod, Scene},
     sea::BeaufortForce,
+    water::ReflectionMethod,
 };
 use bowwave_render::{SOFTWARE, TIMED_EVERY};
 use image::RgbImage;

@@ -4,15 +4,18 @@ use std::{sync::Arc, time::Duration};
 
 use anyhow::{Context, Result, ensure};
 use bowwave_core::{
+    colour::LUMINANCE,
+    estimate::light::{SKY_SINES, Sample, SeaTones, SkyLight},
     event::{Picture, PixelFormat},
+    frame::{
+        plan::sea_reflects,
+        scene::{Hud, LeftOut, Pass, PassDecision, Scene},
+        view::{Afloat, Eye},
+    },
     geometry::{CameraPose, Lens, Optics},
-    light::LUMINANCE,
     model::{Model, ModelId},
-    plan::sea_reflects,
-    reflection::{SKY_SINES, Sample, SeaTones, SkyLight},
-    scene::{Hud, LeftOut, Pass, PassDecision, ReflectionMethod, Scene, ShadowLevel, Water},
     sea::BeaufortForce,
-    view::{Afloat, Eye},
+    water::{ReflectionMethod, ShadowLevel, Water},
 };
 use bowwave_render::{Completions, Finished, Needs, RenderConfig, Renderer, SOFTWARE, TimeOuts};
 use glam::{DQuat, DVec2, DVec3, Vec3};
@@ -134,7 +137,12 @@ fn higher(camera: &CameraPose, factor: f64, place: DVec3) -> CameraPose {
 }
 
 /// A scene without boats that runs the passes of boats and water all the same.
-pub fn bare_scene(camera: CameraPose, lens: Lens, water: Water, light: bowwave_core::scene::Light) -> Scene {
+pub fn bare_scene(
+    camera: CameraPose,
+    lens: Lens,
+    water: Water,
+    light: bowwave_core::estimate::light::Light,
+) -> Scene {
     let mut passes = [PassDecision::LeftOut(LeftOut::NoRounds); Pass::COUNT];
     for pass in [Pass::Video, Pass::Mirror, Pass::Water, Pass::Boats] {
         passes[pass as usize] = PassDecision::Run;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result};
-use bowwave_core::{scene::ReflectionMethod, sea::BeaufortForce};
+use bowwave_core::{sea::BeaufortForce, water::ReflectionMethod};
 use bowwave_render::SOFTWARE;
 use image::{RgbImage, imageops};
 

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fmt::Write as _, path::Path};
 
 use anyhow::{Context, Result};
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 
 use super::{
     THESIS,

@@ -14,7 +14,7 @@ pub mod singular;
 pub mod time;
 pub mod wrong;
 
-use bowwave_core::scene::ReflectionMethod;
+use bowwave_core::water::ReflectionMethod;
 
 /// The thesis's shaders: mended ones first.
 pub const THESIS: [ReflectionMethod; 4] = [

@@ -1,12 +1,15 @@
 //! Seas and boats that are made here, where no truth is needed.
 
 use bowwave_core::{
+    estimate::light::{Light, SeaTones},
+    frame::{
+        scene::{BoatView, Scene},
+        view::{Afloat, Eye},
+    },
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId},
-    reflection::SeaTones,
-    scene::{BoatView, Light, ReflectionMethod, Scene, ShadowLevel, Water},
     sea::BeaufortForce,
-    view::{Afloat, Eye},
+    water::{ReflectionMethod, ShadowLevel, Water},
 };
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::{Rgb, RgbImage};

@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, f64::consts::FRAC_PI_4, fmt::Write as _};
 
 use anyhow::{Context, Result};
-use bowwave_core::{scene::ReflectionMethod, sea::BeaufortForce};
+use bowwave_core::{sea::BeaufortForce, water::ReflectionMethod};
 
 use super::{
     THESIS,

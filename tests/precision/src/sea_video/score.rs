@@ -6,11 +6,9 @@ use std::{
 };
 
 use bowwave_core::{
+    estimate::sea::{Frame, SeaEstimate, SeaMeter, Unknown},
     geometry::{Lens, look},
-    sea::{
-        WmoSeaState,
-        estimate::{Frame, SeaEstimate, SeaMeter, Unknown},
-    },
+    sea::WmoSeaState,
     time::Time,
 };
 use glam::{DVec2, DVec3};

@@ -4,9 +4,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use bowwave_core::{
+use bowwave_core::world::{
     boats::{CourseState, Hull, HullForm, Motion, Ride, float},
-    sea::{Wave, WaveField},
+    waves::{Wave, WaveField},
 };
 use glam::{DVec2, DVec3};
 

@@ -5,7 +5,10 @@ mod stiff;
 mod system;
 
 use anyhow::{Context, Result, anyhow};
-use bowwave_core::sea::{BeaufortForce, Spectrum, WaveField, WaveSpec};
+use bowwave_core::{
+    sea::BeaufortForce,
+    world::waves::{Spectrum, WaveField, WaveSpec},
+};
 use differential_equations::prelude::{ExplicitRungeKutta, IVP};
 use glam::DVec3;
 

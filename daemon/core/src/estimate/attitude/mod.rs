@@ -1,0 +1,546 @@
+//! From the inertial unit's samples, and from what else tells which way it looks, to its orientation over time.
+
+mod aided;
+mod filter;
+mod inclination;
+mod lag;
+mod own;
+mod swell;
+#[cfg(test)]
+mod tests;
+
+use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
+
+use self::{
+    aided::{Against, Aids},
+    filter::Filter,
+    inclination::Inclination,
+    own::Own,
+};
+pub use self::{
+    aided::{DIP_SIGMA, Outcome},
+    filter::Noise,
+    inclination::Settings,
+};
+use crate::{
+    calibration::Calibration,
+    estimate::pose::{NoPose, OrientationAt, OrientationSample, PoseHistory},
+    event::ImuSample,
+    geometry::{rotation_vector, wrapped},
+    time::Time,
+};
+
+/// A unit without an orientation of its own is levelled by the mean specific force over this long.
+const LEVEL_NS: i64 = 250_000_000;
+
+/// A gap longer than this is not bridged by integrating: the unit is levelled anew.
+const GAP_NS: i64 = 1_000_000_000;
+
+/// Steps of a filter that are shorter or longer than this are no unit's, seconds.
+const PERIODS_S: [f64; 2] = [1e-4, 0.1];
+
+/// The integrated orientation is held against VQF's inclination this often, seconds.
+const INCLINE_S: f64 = 0.25;
+
+/// No gyro's range is smaller, rad/s (30 deg/s).
+const CLIPPED_LEAST: f64 = 0.52;
+
+/// By what share of it a rate that stands at its range may be exceeded (one standard deviation).
+const CLIPPED_SHARE: f64 = 0.5;
+
+/// Whose estimate of the orientation is used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Source {
+    /// The unit's own where it gives one, else [`Source::Fused`].
+    #[default]
+    Auto,
+    /// Rate and specific force are fused here, whatever the unit thinks.
+    Fused,
+}
+
+/// What a unit's rate tells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RateKind {
+    /// The rate at the sample's time.
+    #[default]
+    Instant,
+    /// The mean rate since the sample before, as of a unit that integrates by itself.
+    Mean,
+}
+
+/// How orientation is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AttitudeSettings {
+    /// Whose estimate is used.
+    pub source: Source,
+    /// What the unit's rate tells.
+    pub rate: RateKind,
+    /// How inclination is found from specific force.
+    pub inclination: Settings,
+    /// How the unit errs.
+    pub noise: Noise,
+    /// By how much the deviation of the heading of a unit's own orientation grows, rad/s.
+    pub own_growth: f64,
+}
+
+/// What units that find their orientation by themselves are good for without a compass (5 deg/h), rad/s.
+pub const OWN_GROWTH: f64 = 5.0 * std::f64::consts::PI / 180.0 / 3600.0;
+
+impl AttitudeSettings {
+    /// For that unit on that camera, of the usual class (a VN-100's: 0.0035 deg/s per square root of a hertz).
+    pub fn new(source: Source, calibration: &Calibration) -> Self {
+        Self {
+            source,
+            rate: RateKind::Instant,
+            inclination: Settings::GUN,
+            own_growth: OWN_GROWTH,
+            noise: Noise {
+                bias: calibration.gyro_bias_sigma,
+                mounting: calibration.camera_from_imu_sigma,
+                ..Noise::USUAL
+            },
+        }
+    }
+}
+
+/// Which way is up, as a camera saw it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UpSeen {
+    /// Middle of the exposure on the inertial unit's clock.
+    pub time: Time,
+    /// Unit vector, camera's axes.
+    pub up_camera: DVec3,
+    /// Covariance of its error, rad^2, in the camera's axes.
+    pub covariance: DMat3,
+}
+
+/// Where something of known direction was seen against where the believed heading has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeadingSeen {
+    /// When it was seen, on the inertial unit's clock.
+    pub time: Time,
+    /// By what the believed world is to be turned about the vertical (counter-clockwise from above), radians; whole turns do not count.
+    pub off: f64,
+    /// Variance of that, rad^2.
+    pub variance: f64,
+}
+
+/// Orientation by the unit's own estimate, with what is wrong with that estimated from what else is seen; or integrated from its rates, with
+/// what is wrong with that estimated from VQF's inclination, too. Its heading then starts at the unit's own, or else at the camera's
+/// "north", and drifts with what is left of the gyro's bias about the vertical.
+#[derive(Debug)]
+pub struct Attitude {
+    gyro_bias: DVec3,
+    camera_from_imu: DQuat,
+    settings: AttitudeSettings,
+    state: State,
+    history: PoseHistory,
+    corrected: f64,
+}
+
+#[derive(Debug)]
+enum State {
+    /// Gathering specific force: since when, the sum and how many.
+    Levelling { since: Option<Time>, sum: DVec3, count: u32 },
+    /// Integrating.
+    Running(Box<Running>),
+    /// The unit's own orientation is taken; when it last told one.
+    Own(Box<Own>, Time),
+}
+
+#[derive(Debug)]
+struct Running {
+    inclination: Inclination,
+    filter: Filter,
+    last: OrientationSample,
+    /// The newest rate less the calibrated bias, and the one before with its distance in time.
+    rate: DVec3,
+    before: Option<(DVec3, i64)>,
+    /// The largest rate so far on each axis.
+    fastest: DVec3,
+    inclined_s: f64,
+}
+
+impl State {
+    const START: Self = Self::Levelling { since: None, sum: DVec3::ZERO, count: 0 };
+}
+
+impl Attitude {
+    /// An estimator for a unit with that bias (rad/s, its own axes) and that place on the camera.
+    pub fn new(settings: AttitudeSettings, gyro_bias: DVec3, camera_from_imu: DQuat) -> Self {
+        Self {
+            gyro_bias,
+            camera_from_imu,
+            settings,
+            state: State::START,
+            history: PoseHistory::new(),
+            corrected: 0.0,
+        }
+    }
+
+    /// Takes in a finite sample whose measurement was made at `time`; the orientation then, `None` while levelling.
+    pub fn observe(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
+        let found = self.find(time, sample)?;
+        self.history.push(found);
+        Some(found)
+    }
+
+    /// The orientation at `time`.
+    pub fn at(&self, time: Time) -> Result<OrientationAt, NoPose> {
+        self.history.at(time)
+    }
+
+    /// How the camera turns in the `span_ns` about `time`, radians about its axes; `None` where that is not known.
+    pub fn camera_turn(&self, time: Time, span_ns: i64) -> Option<DVec3> {
+        Some(self.camera_from_imu() * self.history.turn_over(time, span_ns)?)
+    }
+
+    /// Time of the newest orientation.
+    pub fn newest(&self) -> Option<Time> {
+        self.history.newest()
+    }
+
+    /// Begins anew, as when the unit has restarted.
+    pub fn restart(&mut self) {
+        self.history.clear();
+        self.state = State::START;
+    }
+
+    /// Covariance of the orientation's error as a turn of the world, rad^2; `None` before there is one.
+    pub fn covariance(&self) -> Option<DMat3> {
+        Some(self.aids()?.turn_covariance())
+    }
+
+    /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
+    pub fn heading_sigma(&self) -> Option<f64> {
+        Some(self.covariance()?.z_axis.z.max(0.0).sqrt())
+    }
+
+    /// By how much the heading may drift, standard deviation, rad/s.
+    pub fn drift_sigma(&self) -> Option<f64> {
+        match &self.state {
+            State::Running(running) => Some(running.filter.drift_sigma(running.last.world_from_imu)),
+            State::Own(own, _) => Some(own.drift_sigma()),
+            State::Levelling { .. } => None,
+        }
+    }
+
+    fn aids(&self) -> Option<&dyn Aids> {
+        match &self.state {
+            State::Running(running) => Some(&running.filter.aided),
+            State::Own(own, _) => Some(&own.aided),
+            State::Levelling { .. } => None,
+        }
+    }
+
+    /// What takes in aids, brought to the present.
+    fn aids_now(&mut self) -> Option<&mut dyn Aids> {
+        match &mut self.state {
+            State::Running(running) => {
+                running.filter.predict();
+                Some(&mut running.filter.aided)
+            }
+            State::Own(own, _) => {
+                own.predict();
+                Some(&mut own.aided)
+            }
+            State::Levelling { .. } => None,
+        }
+    }
+
+    /// By how much corrections have turned the world about the vertical in all, radians: with that put back, the orientation's heading is
+    /// what the unit alone makes of it.
+    pub fn corrected(&self) -> f64 {
+        match &self.state {
+            State::Own(own, _) => own.heading(),
+            State::Running(_) | State::Levelling { .. } => self.corrected,
+        }
+    }
+
+    /// Rotation from the unit's axes to the camera's as it is known by now.
+    fn camera_from_imu(&self) -> DQuat {
+        let mounting = self.aids().map_or(DVec3::ZERO, |aids| aids.mounting());
+        DQuat::from_scaled_axis(mounting) * self.camera_from_imu
+    }
+
+    /// Rotation from the camera's axes to the world's with the unit as in `world_from_imu`.
+    pub fn camera(&self, world_from_imu: DQuat) -> DQuat {
+        (world_from_imu * self.camera_from_imu().inverse()).normalize()
+    }
+
+    /// The same for what is drawn: refraction is laid on the camera, so that the horizon that is seen lies where the one that is drawn
+    /// about would.
+    pub fn world_from_camera(&self, world_from_imu: DQuat) -> DQuat {
+        let world_from_camera = self.camera(world_from_imu);
+        let dip = self.aids().map_or(0.0, |aids| aids.dip());
+        let ahead = world_from_camera * DVec3::Z;
+        let right = ahead.cross(DVec3::Z).normalize_or_zero();
+        (DQuat::from_scaled_axis(right * -dip) * world_from_camera).normalize()
+    }
+
+    /// Takes in where a camera saw up, unless that differs by more than `limit` (chi squared with two degrees of freedom) from what
+    /// is known. `None` where nothing is known of that time.
+    pub fn see_up(&mut self, seen: &UpSeen, limit: f64) -> Option<Outcome> {
+        let then = self.history.at(seen.time).ok()?.world_from_imu;
+        let world_from_camera = self.camera(then);
+        let axes = DMat3::from_quat(world_from_camera);
+        let turned = axes * seen.covariance * axes.transpose();
+        let across = DMat2::from_cols(turned.x_axis.truncate(), turned.y_axis.truncate());
+        let (turn, outcome) = self.aids_now()?.see_up(world_from_camera, seen.up_camera, across, limit);
+        match &mut self.state {
+            State::Running(running) if outcome.taken => running.filter.saw_up(),
+            State::Own(own, _) => {
+                let up = world_from_camera * seen.up_camera;
+                let variance = 0.5 * (across.x_axis.x + across.y_axis.y);
+                own.watch(DVec2::new(up.y, -up.x), variance, outcome);
+            }
+            _ => {}
+        }
+        self.turn(turn);
+        Some(outcome)
+    }
+
+    /// Sets the heading: turns the world by `off` about the vertical, which is then known to `sigma`, radians. `false` where there is no
+    /// estimate yet to be turned. What was anchored before ([`Self::anchor_heading`]) no longer is.
+    pub fn set_heading(&mut self, off: f64, sigma: f64) -> bool {
+        if self.aids_now().is_none() {
+            return false;
+        }
+        let turn = DQuat::from_rotation_z(off);
+        match &mut self.state {
+            State::Own(own, _) => own.set_heading(off, sigma),
+            State::Running(running) => {
+                running.filter.set_heading(off, sigma);
+                running.turn(turn);
+            }
+            State::Levelling { .. } => {}
+        }
+        self.turn_history(turn);
+        true
+    }
+
+    /// The gun's bearing on its mount is what its heading and the ship's now make it, which errs by `variance` (rad^2) beyond the gun's
+    /// heading: from now on [`Self::see_mount`] tells of changes of the ship's heading. `false` where there is no heading yet.
+    pub fn anchor_mount(&mut self, variance: f64) -> bool {
+        self.aids_now().map(|aids| aids.anchor_mount(variance)).is_some()
+    }
+
+    /// The gun's bearing on its mount, or what the ship's instruments say of its heading, may have changed by `variance`, rad^2.
+    pub fn walk_mount(&mut self, variance: f64) -> bool {
+        self.aids_now().map(|aids| aids.walk_mount(variance)).is_some()
+    }
+
+    /// Takes in the heading as it is by the ship's and the gun's bearing on its mount; else as [`Self::see_heading`].
+    pub fn see_mount(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
+        self.correct_heading(seen, Against::Mount, limit)
+    }
+
+    /// Takes in a heading, unless that differs by more than `limit` (chi squared with one degree of freedom) from what is known. `None`
+    /// where nothing is known of that time.
+    pub fn see_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
+        self.correct_heading(seen, Against::North, limit)
+    }
+
+    /// From now on [`Self::see_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
+    /// may turn by some `drift` rad/s itself, steadily, as seen from a ship under way; what is learnt of that stays over later anchors.
+    pub fn anchor_heading(&mut self, drift: f64) -> bool {
+        self.aids_now().map(|aids| aids.anchor(drift)).is_some()
+    }
+
+    /// Takes in that what was anchored does not turn itself, known to that variance, (rad/s)^2. `false` where there is no estimate yet.
+    pub fn see_anchor_stand(&mut self, variance: f64) -> bool {
+        let Some(aids) = self.aids_now() else { return false };
+        let turn = aids.see_anchor_stand(variance);
+        self.turn(turn);
+        true
+    }
+
+    /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`].
+    pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
+        self.correct_heading(seen, Against::Anchor, limit)
+    }
+
+    fn correct_heading(&mut self, seen: &HeadingSeen, against: Against, limit: f64) -> Option<Outcome> {
+        self.history.at(seen.time).ok()?;
+        let aids = self.aids_now()?;
+        let (turn, outcome) = aids.see_heading(against, wrapped(seen.off), seen.variance, limit);
+        self.turn(turn);
+        Some(outcome)
+    }
+
+    /// The world is turned by a little, from now on and in what was before.
+    fn turn(&mut self, turn: DQuat) {
+        match &mut self.state {
+            State::Running(running) => running.turn(turn),
+            State::Own(own, _) => own.turn(turn),
+            State::Levelling { .. } => {}
+        }
+        self.turn_history(turn);
+    }
+
+    /// What was before is turned with the world, too.
+    fn turn_history(&mut self, turn: DQuat) {
+        self.corrected += rotation_vector(turn).z;
+        self.history.turn(turn);
+    }
+
+    /// The unit's own orientation at `time`, turned by what is known to be wrong with it.
+    fn own(&mut self, time: Time, world_from_imu: DQuat) -> DQuat {
+        let (growth, mounting) = (self.settings.own_growth, self.settings.noise.mounting);
+        if !matches!(self.state, State::Own(..)) {
+            self.state = State::Own(Box::new(Own::new(growth, mounting)), time);
+        }
+        let State::Own(own, last) = &mut self.state else { return world_from_imu };
+        let dt_s = time.ns_since(*last).max(0) as f64 * 1e-9;
+        *last = time.max(*last);
+        own.corrected(world_from_imu, dt_s)
+    }
+
+    fn find(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
+        let rate = sample.rate - self.gyro_bias;
+        if let (Some(q), Source::Auto) = (sample.world_from_imu, self.settings.source) {
+            let world_from_imu = self.own(time, q.normalize());
+            return Some(OrientationSample { time, world_from_imu, rate });
+        }
+        match &mut self.state {
+            // A unit that tells its orientation now and then tells nothing in between.
+            State::Own(_, last) if time.ns_since(*last).abs() <= GAP_NS => None,
+            State::Running(running) => {
+                let dt_ns = time.ns_since(running.last.time);
+                if dt_ns.abs() > GAP_NS {
+                    self.state = State::START;
+                    return None;
+                }
+                // One that comes twice or after a younger one tells nothing new.
+                if dt_ns > 0 {
+                    let turn = running.step(self.settings.rate, (time, dt_ns), rate, sample.accel);
+                    let last = running.last;
+                    turn.into_iter().for_each(|turn| self.turn_history(turn));
+                    return Some(last);
+                }
+                Some(running.last)
+            }
+            State::Own(..) | State::Levelling { .. } => self.level_out(time, sample, rate),
+        }
+    }
+
+    /// Gathers specific force until it tells which way is up.
+    fn level_out(&mut self, time: Time, sample: &ImuSample, rate: DVec3) -> Option<OrientationSample> {
+        let (since, sum, count) = match self.state {
+            State::Levelling { since, sum, count } => (since.unwrap_or(time), sum, count),
+            State::Running(_) | State::Own(..) => (time, DVec3::ZERO, 0),
+        };
+        let (sum, count) = (sum + sample.accel, count + 1);
+        self.state = State::Levelling { since: Some(since), sum, count };
+        let span_ns = time.ns_since(since);
+        if span_ns < LEVEL_NS {
+            return None;
+        }
+        let levelled = level(sum / f64::from(count), self.camera_from_imu);
+        let world_from_imu = sample.world_from_imu.map_or(levelled, |own| headed(levelled, own));
+        let [shortest, longest] = PERIODS_S;
+        let period_s = (span_ns as f64 * 1e-9 / f64::from(count - 1).max(1.0)).clamp(shortest, longest);
+        let last = OrientationSample { time, world_from_imu, rate };
+        let running = Running {
+            inclination: Inclination::new(&self.settings.inclination, period_s, world_from_imu),
+            filter: Filter::new(self.settings.noise, self.settings.inclination),
+            last,
+            rate,
+            before: None,
+            fastest: DVec3::ZERO,
+            inclined_s: 0.0,
+        };
+        self.state = State::Running(Box::new(running));
+        Some(last)
+    }
+}
+
+impl Running {
+    /// Goes on to a sample; by what the world is to be turned for all that was before.
+    fn step(
+        &mut self,
+        kind: RateKind,
+        (time, dt_ns): (Time, i64),
+        rate: DVec3,
+        accel: DVec3,
+    ) -> Option<DQuat> {
+        let dt_s = dt_ns as f64 * 1e-9;
+        let turn = match kind {
+            RateKind::Mean => rate * dt_s + coning(self.rate, rate, dt_s),
+            RateKind::Instant => {
+                // Times from a shifting clock map differ by microseconds; only about equal steps have a parabola.
+                let even = self.before.filter(|(_, step_ns)| (step_ns - dt_ns).abs() * 5 < dt_ns);
+                turn_between(even.map(|(w, _)| w), self.rate, rate, dt_s)
+            }
+        };
+        if self.is_clipped(rate) {
+            self.filter.miss(rate.length() * CLIPPED_SHARE * dt_s);
+        }
+        self.before = Some((self.rate, dt_ns));
+        self.rate = rate;
+        self.inclination.update(turn, dt_s, accel);
+        let turn = self.filter.corrected(turn, dt_s);
+        let world_from_imu = (self.last.world_from_imu * DQuat::from_scaled_axis(turn)).normalize();
+        self.last = OrientationSample { time, world_from_imu, rate: rate - self.filter.bias() };
+        self.filter.step(world_from_imu, turn, dt_s);
+        self.inclined_s += dt_s;
+        (self.inclined_s >= INCLINE_S).then(|| {
+            let since_s = std::mem::take(&mut self.inclined_s);
+            self.filter.predict();
+            let up_imu = self.inclination.up_imu();
+            let turn = self.filter.incline(world_from_imu, up_imu, since_s);
+            self.turn(turn);
+            turn
+        })
+    }
+
+    /// Whether the gyro stands at its range: on one axis as fast as ever, and exactly as fast as before, which noise would not let it be.
+    fn is_clipped(&mut self, rate: DVec3) -> bool {
+        let size = rate.abs();
+        self.fastest = self.fastest.max(size);
+        let stands = |axis: usize| {
+            size[axis] > CLIPPED_LEAST && size[axis] >= self.fastest[axis] && rate[axis] == self.rate[axis]
+        };
+        stands(0) || stands(1) || stands(2)
+    }
+
+    fn turn(&mut self, turn: DQuat) {
+        self.last.world_from_imu = (turn * self.last.world_from_imu).normalize();
+    }
+}
+
+/// Turn over the `h` seconds from rate `from` to rate `to`, a scaled axis in the body's frame: the integral of the rate and the
+/// first commutator of the Magnus expansion (Iserles & Norsett 1999, eq. 1.2), which is what coning adds. With the rate `h`
+/// seconds `before` the integral is that of the parabola through all three, else of the line.
+pub fn turn_between(before: Option<DVec3>, from: DVec3, to: DVec3, h: f64) -> DVec3 {
+    let integral = match before {
+        Some(before) => (to * 5.0 + from * 8.0 - before) * (h / 12.0),
+        None => (from + to) * (h / 2.0),
+    };
+    integral + coning(from, to, h)
+}
+
+/// What a turn whose axis turns from `from` to `to` in `h` seconds has more than the integral of its rate.
+fn coning(from: DVec3, to: DVec3, h: f64) -> DVec3 {
+    from.cross(to) * (h * h / 12.0)
+}
+
+/// The orientation in which `up_imu` (the direction of the specific force at rest) points up and the camera looks north.
+/// A camera that looks straight up or down keeps the heading of its picture's top.
+pub fn level(up_imu: DVec3, camera_from_imu: DQuat) -> DQuat {
+    let up = up_imu.try_normalize().unwrap_or(DVec3::NEG_Z);
+    let tilted = DQuat::from_rotation_arc(up, DVec3::Z);
+    let axis = |camera: DVec3| tilted * (camera_from_imu.inverse() * camera);
+    let forward = axis(DVec3::Z);
+    let north = if forward.truncate().length() > 1e-3 { forward } else { axis(DVec3::NEG_Y) };
+    let azimuth = north.x.atan2(north.y);
+    (DQuat::from_rotation_z(azimuth) * tilted).normalize()
+}
+
+/// `levelled`, turned about the vertical to the heading of `own`.
+fn headed(levelled: DQuat, own: DQuat) -> DQuat {
+    // The twist about z of what lies between (Dobrowolski 2015, swing-twist).
+    let between = own * levelled.inverse();
+    let twist = DQuat::from_xyzw(0.0, 0.0, between.z, between.w);
+    if twist.length() > 1e-6 { (twist.normalize() * levelled).normalize() } else { levelled }
+}

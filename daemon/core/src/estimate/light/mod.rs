@@ -1,0 +1,329 @@
+//! Light on the boats, taken from the picture itself so that they fit it.
+//!
+//! A few hundred pixels above the horizon give the sky's radiance at the camera's own exposure and white balance; the sun's
+//! share follows from its height. This is an estimate for shading, not a photometric measurement.
+
+mod sky;
+mod tones;
+
+pub use sky::{SKY_SINES, SkyLight};
+pub use tones::{Sample, SeaTones};
+
+use glam::{DVec2, DVec3, Vec3};
+
+use crate::{
+    colour::{LUMINANCE, srgb_to_linear},
+    event::Picture,
+    geometry::{CameraPose, Lens},
+    sea::{Facets, rms_slope},
+    time::Time,
+    water::ReflectionMethod,
+};
+
+/// The estimate follows the picture with this time constant, so that one dark wave or passing bird does not flicker boats.
+const FOLLOW_S: f64 = 1.0;
+
+/// Pixels sampled along the picture's width and height.
+const GRID: (u32, u32) = (24, 18);
+
+/// A white matt surface facing a high sun in clear air is this many times as bright as one that sees only the sky, as
+/// cameras expose it: illuminances of 70-90 klx and 15-20 klx (CIE S 011), less the highlight roll-off of ordinary cameras.
+const SUN_TO_SKY: f32 = 2.6;
+
+/// Optical depth of a clear maritime atmosphere at about 610, 550 and 465 nm (Rayleigh and background aerosol).
+const OPTICAL_DEPTH: Vec3 = Vec3::new(0.10, 0.14, 0.22);
+
+/// Light that comes out of the sea over the light that falls on it: clear to coastal water, 0.01 to 0.03 under the surface (Mobley
+/// 1994, section 3.3), of which the surface lets half out.
+const WATER_ALBEDO: f32 = 0.015;
+
+/// Tangents below the horizontal at which the sea is compared with the sky: farther up waves hide each other, farther down is more of
+/// the water's own light.
+const MIRROR_TANGENTS: [f64; 5] = [0.03, 0.045, 0.07, 0.11, 0.17];
+
+/// Nodes of slope to either side that stand for the facets there.
+const MIRROR_NODES: u8 = 8;
+
+/// Bounds of what the sea may call for over what is seen above the horizon.
+const MATCH: [f32; 2] = [0.3, 2.0];
+
+/// Light, linear, in units in which the video's white is 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Light {
+    /// Unit vector towards the sun, world.
+    pub sun_direction: DVec3,
+    /// Radiance of a white matt surface that faces the sun, without the sky; zero when the sun is down.
+    pub sun: Vec3,
+    /// Radiance of a white matt surface that sees only the upper sky.
+    pub sky: Vec3,
+    /// Radiance of the sky at the horizon: what haze adds and what the sea's lower hemisphere is mixed from.
+    pub horizon: Vec3,
+    /// Radiance that a surface gets from the sea below.
+    pub sea: Vec3,
+}
+
+impl Light {
+    /// Radiance of a white matt surface that lies level under sun and sky.
+    pub fn on_level(&self) -> Vec3 {
+        self.sky + self.sun * self.sun_direction.z.max(0.0) as f32
+    }
+}
+
+/// Mean linear colours of sky and sea as the camera sees them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Means {
+    sky: Vec3,
+    horizon: Vec3,
+    sea: Vec3,
+}
+
+/// Follows the light of the picture.
+#[derive(Clone, Debug)]
+pub struct LightMeter {
+    sun_direction: DVec3,
+    /// Whether the sea's tones are wanted: only reflections by brightness need them.
+    wants_tones: bool,
+    means: Option<(Time, Means)>,
+    tones: Option<(Time, SeaTones)>,
+}
+
+impl LightMeter {
+    /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world) and whose sea mirrors by `method`: what
+    /// only other methods look at is not measured.
+    pub fn new(sun_direction: DVec3, method: ReflectionMethod) -> Self {
+        let wants_tones = method == ReflectionMethod::Waves;
+        Self { sun_direction, wants_tones, means: None, tones: None }
+    }
+
+    /// Takes in a picture whose camera stood at `camera` with `lens` (the picture's own, not the screen's).
+    pub fn observe(&mut self, time: Time, picture: &Picture, lens: &Lens, camera: &CameraPose) {
+        if self.wants_tones
+            && let Some(seen) = tones(picture, lens, camera)
+        {
+            let seen = match self.tones {
+                None => seen,
+                Some((since, old)) => old.towards(&seen, follow(since, time)),
+            };
+            self.tones = Some((time, seen));
+        }
+        let Some(seen) = measure(picture, lens, camera) else { return };
+        let means = match self.means {
+            None => seen,
+            Some((since, old)) => {
+                let share = follow(since, time);
+                Means {
+                    sky: old.sky.lerp(seen.sky, share),
+                    horizon: old.horizon.lerp(seen.horizon, share),
+                    sea: old.sea.lerp(seen.sea, share),
+                }
+            }
+        };
+        self.means = Some((time, means));
+    }
+
+    /// The sky that boats hide from a sea under a wind of `wind_m_s`: what is seen of it above the horizon, as bright and of the colour
+    /// that the sea's own brightness calls for. The picture shows little of what the sea mirrors, and land before it, or none.
+    pub fn sky(&self, wind_m_s: f64) -> SkyLight {
+        let Means { sky, horizon, sea } = self.means();
+        let seen = SkyLight::of_bands(horizon, sky);
+        let Some((_, tones)) = self.tones else { return seen };
+        let from_below = WATER_ALBEDO * self.light().on_level();
+        let hue = sea / sea.dot(LUMINANCE).max(1e-4);
+        let (mut found, mut expected) = (Vec3::ZERO, Vec3::ZERO);
+        for tangent in MIRROR_TANGENTS {
+            let Some(luma) = tones.mean_at(tangent) else { continue };
+            let facets = Facets::seen(-tangent.atan(), 0.0, rms_slope(wind_m_s), MIRROR_NODES);
+            let own = from_below * facets.through as f32;
+            let mirrored = facets.mirrored.iter().map(|m| seen.at(m.sine) * m.share as f32).sum::<Vec3>();
+            // Rows count alike, however bright they are.
+            let scale = 1.0 / mirrored.dot(LUMINANCE).max(1e-4);
+            found += (hue * srgb_to_linear(luma) - own) * scale;
+            expected += mirrored * scale;
+        }
+        if expected.min_element() <= 0.0 {
+            return seen;
+        }
+        let [least, most] = MATCH;
+        seen.scaled((found / expected).clamp(Vec3::splat(least), Vec3::splat(most)))
+    }
+
+    /// How bright the sea is; a default where that is not measured.
+    pub fn tones(&self) -> SeaTones {
+        self.tones.map(|(_, tones)| tones).unwrap_or_default()
+    }
+
+    /// Before the first picture: an overcast grey.
+    fn means(&self) -> Means {
+        self.means.map_or(
+            Means { sky: Vec3::splat(0.4), horizon: Vec3::splat(0.45), sea: Vec3::splat(0.1) },
+            |(_, m)| m,
+        )
+    }
+
+    /// The light to draw boats with. Before the first picture: that of an overcast grey.
+    pub fn light(&self) -> Light {
+        let Means { sky, horizon, sea } = self.means();
+        let sun = sun_colour(self.sun_direction.z) * sky.element_sum() / 3.0 * SUN_TO_SKY;
+        Light { sun_direction: self.sun_direction, sun, sky, horizon, sea }
+    }
+}
+
+/// Share of the way that the estimate goes to what is seen at `time`.
+fn follow(since: Time, time: Time) -> f32 {
+    (1.0 - (-time.secs_since(since).max(0.0) / FOLLOW_S).exp()) as f32
+}
+
+/// Sea is looked at from this far below the horizontal, tangent: what is nearer the horizon is haze and other boats.
+const SEA_FROM: f64 = 0.008;
+/// Pixels looked at along the picture's width, and from the horizon down.
+const SEA_GRID: (usize, usize) = (24, 20);
+
+fn tones(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<SeaTones> {
+    let (w, h) = (f64::from(lens.width), f64::from(lens.height));
+    let down = |pixel: DVec2| camera.tangent_below(lens, pixel);
+    // Rows from the first that shows sea down to the lowest, closer to each other near the horizon. Tangents grow about evenly downwards.
+    let middle = |y: f64| down(DVec2::new(w / 2.0, y * h));
+    let (top, bottom) = (middle(0.0), middle(1.0));
+    let first = ((SEA_FROM - top) / (bottom - top).max(1e-9)).clamp(0.0, 1.0);
+    let mut samples = [Sample { tangent: 0.0, luma: 0.0 }; SEA_GRID.0 * SEA_GRID.1];
+    let mut count = 0;
+    for i in 0..samples.len() {
+        let (column, row) = (i % SEA_GRID.0, i / SEA_GRID.0);
+        let share = ((row as f64 + 0.5) / SEA_GRID.1 as f64).powi(2);
+        let y = (first + share * (1.0 - first)) * h;
+        let x = (column as f64 + 0.5 + 0.4 * (row % 2) as f64) / (SEA_GRID.0 as f64 + 0.5) * w;
+        let tangent = down(DVec2::new(x, y));
+        if tangent < SEA_FROM {
+            continue;
+        }
+        let place = DVec2::new(x / w * f64::from(picture.width()), y / h * f64::from(picture.height()));
+        let code = Vec3::from(picture.srgb_at(place.x as u32, place.y as u32));
+        if let Some(sample) = samples.get_mut(count) {
+            *sample = Sample { tangent, luma: f64::from(code.dot(LUMINANCE)) };
+            count += 1;
+        }
+    }
+    SeaTones::fit(samples.get(..count)?)
+}
+
+/// Colour of direct sun light relative to a high sun's green, for the sine of its elevation; black below the horizon.
+fn sun_colour(sin_elevation: f64) -> Vec3 {
+    let degrees = sin_elevation.clamp(-1.0, 1.0).asin().to_degrees();
+    if degrees <= -0.6 {
+        return Vec3::ZERO;
+    }
+    // Relative air mass, Kasten & Young 1989, eq. 3.
+    let airmass = 1.0 / (sin_elevation.max(0.0) + 0.505_72 * (degrees + 6.079_95).powf(-1.636_4));
+    let transmitted = (-OPTICAL_DEPTH * airmass as f32).exp();
+    let overhead = (-OPTICAL_DEPTH).exp();
+    let risen = ((degrees + 0.6) / 1.2).clamp(0.0, 1.0) as f32;
+    transmitted / overhead * risen
+}
+
+fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<Means> {
+    let mut sums = [Vec3::ZERO; 3];
+    let mut counts = [0u32; 3];
+    for iy in 0..GRID.1 {
+        for ix in 0..GRID.0 {
+            let share = DVec2::new(
+                (f64::from(ix) + 0.5) / f64::from(GRID.0),
+                (f64::from(iy) + 0.5) / f64::from(GRID.1),
+            );
+            let pixel = share * DVec2::new(f64::from(lens.width), f64::from(lens.height));
+            let up = (camera.world_from_camera * lens.unproject(pixel)).z;
+            // Sky; the strip of 0.5 to 6 degrees over the horizon; sea from 2 degrees below it.
+            let class = match up {
+                u if u > 0.105 => 0,
+                u if u > 0.009 => 1,
+                u if u < -0.035 => 2,
+                _ => continue,
+            };
+            let place = share * DVec2::new(f64::from(picture.width()), f64::from(picture.height()));
+            let colour = picture.srgb_at(place.x as u32, place.y as u32).map(srgb_to_linear);
+            sums[class] += Vec3::from_array(colour);
+            counts[class] += 1;
+        }
+    }
+    let mean = |class: usize| (counts[class] > 0).then(|| sums[class] / counts[class] as f32);
+    let horizon = mean(1).or(mean(0));
+    let sky = mean(0).or(mean(1));
+    match (sky, horizon, mean(2)) {
+        (Some(sky), Some(horizon), sea) => Some(Means { sky, horizon, sea: sea.unwrap_or(sky * 0.2) }),
+        // Looking down, no sky: keep what was known of it.
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{colour::linear_to_srgb, event::PixelFormat, geometry::look};
+
+    fn two_tone(sky: u8, sea: u8) -> Picture {
+        let (w, h) = (64u32, 64u32);
+        let bytes: Vec<u8> =
+            (0..h).flat_map(|y| vec![if y < h / 2 { sky } else { sea }; w as usize * 3]).collect();
+        Picture::new(PixelFormat::Rgb, w, h, bytes.into()).unwrap()
+    }
+
+    #[test]
+    fn the_sky_above_the_horizon_is_what_is_measured() {
+        let lens = Lens::pinhole(64, 64, 1.0);
+        let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
+        let mut meter = LightMeter::new(DVec3::new(0.0, 0.6, 0.8), ReflectionMethod::Full);
+        meter.observe(Time::from_ns(0), &two_tone(188, 99), &lens, &camera);
+        let light = meter.light();
+        assert!((light.sky.x - srgb_to_linear(188.0 / 255.0)).abs() < 1e-4);
+        assert!((light.sea.y - srgb_to_linear(99.0 / 255.0)).abs() < 1e-4);
+        // A dark picture ten time constants later is followed.
+        meter.observe(Time::from_ns(0).plus_secs(10.0), &two_tone(60, 30), &lens, &camera);
+        assert!(meter.light().sky.x < 0.06);
+    }
+
+    /// A sea that mirrors `share` of the sky that is seen above it.
+    fn mirroring(share: f64, lens: &Lens, camera: &CameraPose, wind_m_s: f64) -> Picture {
+        let above = srgb_to_linear(200.0 / 255.0);
+        let row = |y: u32| {
+            let up = (camera.world_from_camera * lens.unproject(DVec2::new(32.0, f64::from(y) + 0.5))).z;
+            if up > 0.0 {
+                return 200;
+            }
+            let facets = Facets::seen(up.asin(), 0.0, rms_slope(wind_m_s), MIRROR_NODES);
+            let mirrored: f64 = facets.mirrored.iter().map(|m| m.share).sum();
+            let light = above * (mirrored * share + facets.through * f64::from(WATER_ALBEDO)) as f32;
+            (linear_to_srgb(light) * 255.0).round() as u8
+        };
+        let bytes: Vec<u8> = (0..64).flat_map(|y| vec![row(y); 64 * 3]).collect();
+        Picture::new(PixelFormat::Rgb, 64, 64, bytes.into()).unwrap()
+    }
+
+    #[test]
+    fn the_sky_that_the_sea_mirrors_is_as_bright_as_the_sea_says() {
+        let lens = Lens::pinhole(64, 64, 0.5);
+        let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
+        // The sun is down: nothing but the sky falls on the water.
+        for share in [0.4, 1.0, 1.6] {
+            let mut meter = LightMeter::new(-DVec3::Z, ReflectionMethod::Waves);
+            meter.observe(Time::from_ns(0), &mirroring(share, &lens, &camera, 2.0), &lens, &camera);
+            let times = meter.sky(2.0).at(0.1).y / srgb_to_linear(200.0 / 255.0);
+            assert!((f64::from(times) / share - 1.0).abs() < 0.1, "{share}: {times}");
+        }
+        // However little the two have to do with each other, what is taken stays within bounds.
+        let mut meter = LightMeter::new(-DVec3::Z, ReflectionMethod::Waves);
+        meter.observe(Time::from_ns(0), &two_tone(0, 255), &lens, &camera);
+        assert!(meter.sky(5.0).nodes.iter().all(|n| n.is_finite() && n.min_element() >= 0.0));
+    }
+
+    #[test]
+    fn the_sun_reddens_sets_and_stays_finite() {
+        let noon = sun_colour(1.0);
+        assert!((noon - Vec3::ONE).abs().max_element() < 0.02);
+        let low = sun_colour(3f64.to_radians().sin());
+        assert!(low.x > 2.0 * low.z && low.x < 0.6);
+        for tenth_degrees in -900..=900 {
+            let c = sun_colour((f64::from(tenth_degrees) / 10.0).to_radians().sin());
+            assert!(c.is_finite() && c.min_element() >= 0.0);
+        }
+        assert_eq!(sun_colour(-0.02), Vec3::ZERO);
+    }
+}

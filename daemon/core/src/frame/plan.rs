@@ -1,0 +1,206 @@
+//! What a scene needs, and why the rest is left out.
+
+use crate::{
+    event::PixelFormat,
+    frame::scene::{BoatView, LeftOut, Pass, PassDecision, RoundView},
+    geometry::Optics,
+    sea::BeaufortForce,
+    water::{ReflectionMethod, ShadowLevel, Water},
+};
+
+/// Above this wind force no reflection of a boat is seen (Nelson 2009, III.D.1.c), so none is drawn.
+pub const REFLECTION_FORCE_MAX: u8 = 4;
+
+/// Whether reflections are seen in a sea of that force at all.
+pub fn sea_reflects(force: BeaufortForce) -> bool {
+    force.get() <= REFLECTION_FORCE_MAX
+}
+
+/// What the frames of a scenario can ever need. What is left out here is not compiled, not allocated and never run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScenePlan {
+    /// Screen size in pixels.
+    pub size: (u32, u32),
+    /// For each of [`Pass::ALL`].
+    pub passes: [PassDecision; Pass::COUNT],
+    /// How the sea mirrors.
+    pub water: Water,
+    /// Number of boats.
+    pub boats: usize,
+    /// How many of them ever move.
+    pub moving: usize,
+    /// How the camera's bytes are laid out; one variant of the video pass is compiled.
+    pub video: PixelFormat,
+    /// The camera's picture size; equal to the screen's leaves out the scaling variant.
+    pub picture: (u32, u32),
+    /// What of the lens and shutter has to be followed; one variant of what draws boats is compiled.
+    pub optics: Optics,
+}
+
+/// What decides on a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Screen size in pixels.
+    pub size: (u32, u32),
+    /// How the camera's bytes are laid out.
+    pub video: PixelFormat,
+    /// The camera's picture size.
+    pub picture: (u32, u32),
+    /// What its lens and shutter do.
+    pub optics: Optics,
+    /// How the sea is asked to mirror.
+    pub water: Water,
+    /// Number of boats in the scenario.
+    pub boats: usize,
+    /// How many of them ever move.
+    pub moving: usize,
+    /// Rounds in the belt.
+    pub belt: u32,
+}
+
+impl ScenePlan {
+    /// The plan for these needs.
+    pub fn new(needs: &Needs) -> Self {
+        let boats =
+            if needs.boats == 0 { PassDecision::LeftOut(LeftOut::NoBoats) } else { PassDecision::Run };
+        let mirrors = needs.water.method != ReflectionMethod::Off;
+        let shadows = needs.water.shadow != ShadowLevel::None;
+        let water = match boats {
+            PassDecision::LeftOut(_) => boats,
+            PassDecision::Run if !sea_reflects(needs.water.force) => {
+                PassDecision::LeftOut(LeftOut::SeaTooRough)
+            }
+            PassDecision::Run if !mirrors && !shadows => PassDecision::LeftOut(LeftOut::NoReflectionNoShadow),
+            PassDecision::Run => PassDecision::Run,
+        };
+        let mirror = match water {
+            PassDecision::Run if !mirrors => PassDecision::LeftOut(LeftOut::ReflectionOff),
+            other => other,
+        };
+        let wake = match boats {
+            PassDecision::Run if needs.moving == 0 => PassDecision::LeftOut(LeftOut::NoBoatMoves),
+            other => other,
+        };
+        let rounds =
+            if needs.belt == 0 { PassDecision::LeftOut(LeftOut::NoRounds) } else { PassDecision::Run };
+        let mut passes = [PassDecision::Run; Pass::COUNT];
+        passes[Pass::Mirror as usize] = mirror;
+        passes[Pass::Water as usize] = water;
+        passes[Pass::Wake as usize] = wake;
+        passes[Pass::Boats as usize] = boats;
+        passes[Pass::Rounds as usize] = rounds;
+        Self {
+            size: needs.size,
+            passes,
+            water: needs.water,
+            boats: needs.boats,
+            moving: needs.moving,
+            video: needs.video,
+            picture: needs.picture,
+            optics: needs.optics,
+        }
+    }
+
+    /// Whether a pass can ever run.
+    pub fn has(&self, pass: Pass) -> bool {
+        self.passes[pass as usize] == PassDecision::Run
+    }
+
+    /// The passes of one frame: what the plan allows and what is in view asks for.
+    pub fn frame(
+        &self,
+        pose_known: bool,
+        boats: &[BoatView],
+        rounds: &[RoundView],
+    ) -> [PassDecision; Pass::COUNT] {
+        let mut passes = self.passes;
+        let mut leave_out = |pass: Pass, unless: bool, why: LeftOut| {
+            let decision = &mut passes[pass as usize];
+            if *decision == PassDecision::Run && !unless {
+                *decision = PassDecision::LeftOut(why);
+            }
+        };
+        for pass in [Pass::Mirror, Pass::Water, Pass::Wake, Pass::Boats, Pass::Rounds] {
+            leave_out(pass, pose_known, LeftOut::NoPose);
+        }
+        let reflected = boats.iter().any(|b| b.reflection.is_some());
+        leave_out(Pass::Mirror, reflected, LeftOut::NoReflectionInView);
+        leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);
+        leave_out(Pass::Wake, boats.iter().any(|b| b.wake.is_some()), LeftOut::NoWakeInView);
+        leave_out(Pass::Boats, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
+        leave_out(Pass::Rounds, !rounds.is_empty(), LeftOut::NoRoundInView);
+        passes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn needs() -> Needs {
+        Needs {
+            size: (1280, 720),
+            video: PixelFormat::Rgb,
+            picture: (1280, 720),
+            optics: Optics::default(),
+            water: Water {
+                method: ReflectionMethod::Full,
+                force: BeaufortForce::new(2).unwrap(),
+                shadow: ShadowLevel::Gradual,
+            },
+            boats: 3,
+            moving: 2,
+            belt: 100,
+        }
+    }
+
+    #[test]
+    fn each_thing_left_out_has_its_reason() {
+        let full = ScenePlan::new(&needs());
+        assert!(Pass::ALL.into_iter().all(|p| full.has(p)));
+        let reason = |needs: Needs, pass: Pass| match ScenePlan::new(&needs).passes[pass as usize] {
+            PassDecision::LeftOut(why) => Some(why),
+            PassDecision::Run => None,
+        };
+        let empty = Needs { boats: 0, ..needs() };
+        assert_eq!(reason(empty, Pass::Mirror), Some(LeftOut::NoBoats));
+        assert_eq!(reason(empty, Pass::Water), Some(LeftOut::NoBoats));
+        assert_eq!(reason(empty, Pass::Boats), Some(LeftOut::NoBoats));
+        let rough =
+            Needs { water: Water { force: BeaufortForce::new(5).unwrap(), ..needs().water }, ..needs() };
+        assert_eq!(reason(rough, Pass::Mirror), Some(LeftOut::SeaTooRough));
+        assert_eq!(reason(rough, Pass::Boats), None);
+        let shadow_only =
+            Needs { water: Water { method: ReflectionMethod::Off, ..needs().water }, ..needs() };
+        assert_eq!(reason(shadow_only, Pass::Mirror), Some(LeftOut::ReflectionOff));
+        assert_eq!(reason(shadow_only, Pass::Water), None);
+        let nothing = Water { method: ReflectionMethod::Off, shadow: ShadowLevel::None, ..needs().water };
+        assert_eq!(
+            reason(Needs { water: nothing, ..needs() }, Pass::Water),
+            Some(LeftOut::NoReflectionNoShadow)
+        );
+        assert_eq!(reason(Needs { moving: 0, ..needs() }, Pass::Wake), Some(LeftOut::NoBoatMoves));
+        assert_eq!(reason(empty, Pass::Wake), Some(LeftOut::NoBoats));
+        assert_eq!(reason(Needs { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
+    }
+
+    #[test]
+    fn a_frame_runs_only_what_is_in_view() {
+        let plan = ScenePlan::new(&needs());
+        let frame = plan.frame(true, &[], &[]);
+        assert_eq!(frame[Pass::Video as usize], PassDecision::Run);
+        assert_eq!(frame[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoBoatInView));
+        assert_eq!(frame[Pass::Water as usize], PassDecision::LeftOut(LeftOut::NoReflectionInView));
+        assert_eq!(frame[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoWakeInView));
+        assert_eq!(frame[Pass::Rounds as usize], PassDecision::LeftOut(LeftOut::NoRoundInView));
+        let lost = plan.frame(false, &[], &[]);
+        assert_eq!(lost[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoPose));
+        assert_eq!(lost[Pass::Hud as usize], PassDecision::Run);
+        // The scenario's reason stands before the frame's.
+        let empty = ScenePlan::new(&Needs { boats: 0, ..needs() });
+        assert_eq!(
+            empty.frame(false, &[], &[])[Pass::Boats as usize],
+            PassDecision::LeftOut(LeftOut::NoBoats)
+        );
+    }
+}

@@ -1,0 +1,301 @@
+//! What one frame shows: the session's output, the renderer's only input besides the picture.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3, Vec3};
+
+use crate::{
+    estimate::light::Light,
+    estimate::{
+        light::{SeaTones, SkyLight},
+        sea::SeaSource,
+    },
+    fault::Fault,
+    frame::wake::Wake,
+    geometry::{CameraPose, Lens, RigidPose},
+    guide::Guide,
+    model::ModelId,
+    sea::WmoSeaState,
+    water::Water,
+};
+
+/// One frame.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Counts from 0 within a session.
+    pub frame: u64,
+    /// Camera pose at the drawn picture's mid-exposure.
+    pub camera: CameraPose,
+    /// The lens as seen on the screen: [`Lens::covering`] the screen's size.
+    pub lens: Lens,
+    /// What is run for this frame and what is left out, one for each of [`Pass::ALL`], in that order.
+    pub passes: [PassDecision; Pass::COUNT],
+    /// Boats whose hull or reflection can be seen, farthest first.
+    pub boats: Vec<BoatView>,
+    /// Tracers and splashes in view, farthest first.
+    pub rounds: Vec<RoundView>,
+    /// Light on the boats.
+    pub light: Light,
+    /// How the sea mirrors.
+    pub water: Water,
+    /// Velocity of the wind 10 m above the sea, world x and y, m/s.
+    pub wind: DVec2,
+    /// The sky that boats hide from the sea.
+    pub sky: SkyLight,
+    /// How bright the sea is in the picture.
+    pub tones: SeaTones,
+    /// The head-up display.
+    pub hud: Hud,
+    /// What it shows instead of counts and state, while a maintainer calibrates.
+    pub guide: Option<Arc<Guide>>,
+}
+
+impl Scene {
+    /// Whether `pass` runs in this frame.
+    pub fn runs(&self, pass: Pass) -> bool {
+        self.passes[pass as usize] == PassDecision::Run
+    }
+}
+
+/// The passes in the order in which they run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Pass {
+    /// The camera's picture.
+    Video,
+    /// Boats mirrored in the sea, to a layer of its own.
+    Mirror,
+    /// The mirrored layer distorted and blended onto the sea; shadows on the water.
+    Water,
+    /// Waves and foam of boats under way.
+    Wake,
+    /// The boats.
+    Boats,
+    /// Tracers and splashes.
+    Rounds,
+    /// Text and state.
+    Hud,
+}
+
+impl Pass {
+    /// How many there are.
+    pub const COUNT: usize = 7;
+    /// All of them, in order.
+    pub const ALL: [Self; Self::COUNT] =
+        [Self::Video, Self::Mirror, Self::Water, Self::Wake, Self::Boats, Self::Rounds, Self::Hud];
+
+    /// The name used in summaries.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Video => "video",
+            Self::Mirror => "mirror",
+            Self::Water => "water",
+            Self::Wake => "wake",
+            Self::Boats => "boats",
+            Self::Rounds => "rounds",
+            Self::Hud => "hud",
+        }
+    }
+}
+
+/// Whether a pass runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum PassDecision {
+    /// It runs.
+    Run,
+    /// It does not, at no cost.
+    LeftOut(LeftOut),
+}
+
+/// Why a pass is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LeftOut {
+    /// The scenario has no boats.
+    NoBoats,
+    /// No boat is within the picture.
+    NoBoatInView,
+    /// No reflection or shadow of a boat falls within the picture.
+    NoReflectionInView,
+    /// Above Beaufort 4 no reflection is seen.
+    SeaTooRough,
+    /// The reflection is switched off.
+    ReflectionOff,
+    /// Neither reflection nor shadow is wanted.
+    NoReflectionNoShadow,
+    /// No boat of the scenario ever moves.
+    NoBoatMoves,
+    /// No wake of a boat is within the picture.
+    NoWakeInView,
+    /// No tracer or splash is within the picture.
+    NoRoundInView,
+    /// The weapon has no rounds.
+    NoRounds,
+    /// No usable orientation: boats cannot be placed.
+    NoPose,
+    /// A composed picture tells nobody anything.
+    NoTrainee,
+}
+
+impl LeftOut {
+    /// The name used in summaries.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoBoats => "no_boats",
+            Self::NoBoatInView => "no_boat_in_view",
+            Self::NoReflectionInView => "no_reflection_in_view",
+            Self::SeaTooRough => "sea_above_beaufort_4",
+            Self::ReflectionOff => "reflection_off",
+            Self::NoReflectionNoShadow => "no_reflection_no_shadow",
+            Self::NoBoatMoves => "no_boat_moves",
+            Self::NoWakeInView => "no_wake_in_view",
+            Self::NoRoundInView => "no_round_in_view",
+            Self::NoRounds => "no_rounds",
+            Self::NoPose => "no_pose",
+            Self::NoTrainee => "no_trainee",
+        }
+    }
+}
+
+/// A rectangle of whole pixels on the screen; never empty, always inside the screen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelRect {
+    /// Left edge.
+    pub x: u32,
+    /// Upper edge.
+    pub y: u32,
+    /// At least 1.
+    pub width: u32,
+    /// At least 1.
+    pub height: u32,
+}
+
+/// A boat to draw.
+#[derive(Clone, Debug)]
+pub struct BoatView {
+    /// Index of the boat in the scenario.
+    pub boat: usize,
+    /// Its model.
+    pub model: ModelId,
+    /// Its pose at the picture's time; curvature of the sea already taken off its height.
+    pub pose: RigidPose,
+    /// Height of the water at whose line the hull is seen to end, same space as `pose`: hull below it is hidden, the mirror plane lies
+    /// in it.
+    pub water_level: f64,
+    /// How far that is above the boat's own water, metres: waves before it hide so much of its hull.
+    pub hidden_m: f64,
+    /// Pixels that the hull can cover (two pixels of margin included); `None` where only the reflection is in view.
+    pub hull: Option<PixelRect>,
+    /// Pixels that its reflection or shadow can reach, distortion and blur included; `None` where neither is drawn.
+    pub reflection: Option<PixelRect>,
+    /// What it leaves on the water, curvature of the sea taken off; `None` where it lies still or nothing of it is in view.
+    pub wake: Option<Wake>,
+    /// Distance from the camera, metres.
+    pub range_m: f64,
+    /// Share of its light that haze replaces by the horizon's, 0 to 1.
+    pub haze: f32,
+    /// Beyond the sea horizon: hide what lies below the line of sight over it.
+    pub beyond_horizon: bool,
+}
+
+/// A tracer or a splash.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RoundView {
+    /// The streak of a round in flight over the picture's exposure.
+    Tracer {
+        /// Where the streak begins, world.
+        from: DVec3,
+        /// Where it ends, world.
+        to: DVec3,
+        /// Linear radiance relative to paper white at the video's exposure.
+        radiance: Vec3,
+    },
+    /// A column of water where a round struck the sea.
+    Splash {
+        /// Foot of the column, world.
+        at: DVec3,
+        /// Height now, metres.
+        height_m: f32,
+        /// Radius now, metres.
+        radius_m: f32,
+        /// 1 fresh, 0 gone.
+        opacity: f32,
+    },
+    /// Sparks where a round struck a boat.
+    Strike {
+        /// The place, world.
+        at: DVec3,
+        /// Radius now, metres.
+        radius_m: f32,
+        /// 1 fresh, 0 gone.
+        opacity: f32,
+    },
+}
+
+impl RoundView {
+    /// Where it is now, world.
+    pub const fn place(&self) -> DVec3 {
+        match *self {
+            Self::Tracer { to, .. } => to,
+            Self::Splash { at, .. } | Self::Strike { at, .. } => at,
+        }
+    }
+}
+
+/// What the sailor is told.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Status {
+    /// Ready to train.
+    Ready,
+    /// The last round struck a part that counts.
+    Hit,
+    /// The last round missed.
+    Miss,
+    /// Rounds fired now are not scored.
+    NotScored {
+        /// Short cause, upper case.
+        cause: &'static str,
+        /// One thing to do.
+        action: &'static str,
+    },
+    /// Something is broken.
+    Fault {
+        /// Short cause, upper case.
+        cause: &'static str,
+        /// One thing to do.
+        action: &'static str,
+    },
+}
+
+/// The head-up display. The word TRAINING is always drawn and is no field.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hud {
+    /// State with colour, shape and word.
+    pub status: Status,
+    /// What the sailor should know though training goes on: [`Severity::Warning`](crate::fault::Severity).
+    pub warning: Option<Fault>,
+    /// Rounds left in the belt.
+    pub rounds_left: u32,
+    /// Rounds fired.
+    pub shots: u32,
+    /// Rounds that struck.
+    pub hits: u32,
+    /// Seconds since the scenario began.
+    pub clock_s: f64,
+    /// The sea that is drawn, where it is measured in the video.
+    pub sea: Option<(WmoSeaState, SeaSource)>,
+    /// Standard deviation of the heading in tenths of a degree, where the sailor is to know it.
+    pub heading_tenths_deg: Option<u16>,
+}
+
+impl Hud {
+    /// Nothing has happened yet, and there is nothing to fire.
+    pub const READY: Self = Self {
+        status: Status::Ready,
+        warning: None,
+        rounds_left: 0,
+        shots: 0,
+        hits: 0,
+        clock_s: 0.0,
+        sea: None,
+        heading_tenths_deg: None,
+    };
+}

@@ -1,0 +1,76 @@
+//! How the sea mirrors boats: what a scenario asks for.
+
+use crate::sea::BeaufortForce;
+
+/// How a boat's light is put onto the sea.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ReflectionMethod {
+    /// No reflection.
+    Off,
+    /// The plain mirror picture.
+    Mirror,
+    /// Nelson 2009, Full Reflection shader, eq. 4-6, singular cases as printed.
+    FullAsPrinted,
+    /// The same, singular cases mended and distances tied to the boat's size on the screen.
+    Full,
+    /// Nelson 2009, Physics shader, eq. 9-16 and table 1, as printed.
+    PhysicsAsPrinted,
+    /// The same with the normal from the slope, waves of the wind force's spectrum, and phases that hold at any distance.
+    Physics,
+    /// What waves of that wind throw back, from the table of [`crate::frame::reflection`].
+    Waves,
+}
+
+impl ReflectionMethod {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Off,
+        Self::Mirror,
+        Self::Full,
+        Self::FullAsPrinted,
+        Self::Physics,
+        Self::PhysicsAsPrinted,
+        Self::Waves,
+    ];
+
+    /// The name used in scenarios, on the command line and in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Off => "off",
+            Self::Mirror => "mirror",
+            Self::FullAsPrinted => "full_as_printed",
+            Self::Full => "full",
+            Self::Physics => "physics",
+            Self::PhysicsAsPrinted => "physics_as_printed",
+            Self::Waves => "waves",
+        }
+    }
+
+    /// The method of that name; hyphens stand for underscores, and "none" for "off".
+    pub fn of_name(name: &str) -> Option<Self> {
+        let name = if name == "none" { "off".to_owned() } else { name.replace('-', "_") };
+        Self::ALL.into_iter().find(|method| method.name() == name)
+    }
+}
+
+/// Nelson 2009, eq. 7-8: how a boat darkens the sea at its foot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ShadowLevel {
+    /// Level 0: none.
+    None,
+    /// Level 1: gradual.
+    Gradual,
+    /// Level 2: strong and short.
+    Strong,
+}
+
+/// How the sea mirrors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Water {
+    /// The method.
+    pub method: ReflectionMethod,
+    /// Wind force: which of the five parameterisations.
+    pub force: BeaufortForce,
+    /// How strong the shadow is.
+    pub shadow: ShadowLevel,
+}

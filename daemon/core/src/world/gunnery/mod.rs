@@ -1,0 +1,11 @@
+//! Flight of a virtual round: standard atmosphere, G7 drag, point mass.
+
+mod atmosphere;
+mod dispersion;
+mod drag;
+mod flight;
+
+pub use atmosphere::{Air, Atmosphere};
+pub use dispersion::dispersed;
+pub use drag::g7_drag_coefficient;
+pub use flight::{Flight, FlightState, Projectile, STEP_S, Segment};

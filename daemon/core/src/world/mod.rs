@@ -1,0 +1,12 @@
+//! Stage two: the virtual world. Boats on the sea, the weapon, rounds in flight and what they strike.
+//!
+//! This stage knows nothing of what is drawn.
+
+pub mod boats;
+pub mod fleet;
+pub mod gunnery;
+pub mod rounds;
+pub mod scenario;
+pub mod score;
+pub mod waves;
+pub mod weapon;

@@ -1,0 +1,240 @@
+//! Virtual rounds in the air and what they leave on the sea.
+
+use glam::{DVec3, Vec3};
+
+use super::fleet::Fleet;
+use crate::{
+    frame::scene::RoundView,
+    time::Time,
+    world::{
+        gunnery::{Atmosphere, Flight, dispersed},
+        scenario::WeaponSpec,
+        score::{End, Moving, Outcome, Round, ShotRecord},
+        waves::WaveField,
+    },
+};
+
+/// A stretch of time over which a boat's motion counts as straight, seconds.
+const SPAN_S: f64 = 1.0 / 30.0;
+/// How much of its path a tracer's streak shows: the exposure of an ordinary camera frame, seconds.
+const STREAK_S: f64 = 1.0 / 60.0;
+/// A tracer lights up this far from the muzzle, metres.
+const TRACER_LIT_M: f64 = 25.0;
+/// How long a splash can be seen, seconds.
+const SPLASH_S: f64 = 1.6;
+/// Height of a splash at its highest, metres.
+const SPLASH_HEIGHT_M: f64 = 1.8;
+/// How long sparks can be seen, seconds.
+const STRIKE_S: f64 = 0.35;
+
+/// What flies and how it is aimed.
+#[derive(Clone, Copy, Debug)]
+pub struct Ammunition {
+    /// The weapon that fires it.
+    pub weapon: WeaponSpec,
+    /// Velocity of the air, world, m/s.
+    pub wind: DVec3,
+    /// Seed of the dispersion.
+    pub seed: u64,
+}
+
+/// A round as it left the muzzle.
+#[derive(Clone, Copy, Debug)]
+pub struct Launch {
+    /// Its number.
+    pub shot: u64,
+    /// When.
+    pub fired: Time,
+    /// Where, world, metres.
+    pub muzzle: DVec3,
+    /// Direction of the barrel, world, unit vector.
+    pub bore: DVec3,
+    /// Age of the pose used, nanoseconds.
+    pub pose_age_ns: i64,
+}
+
+impl Launch {
+    fn record(&self, outcome: Outcome) -> ShotRecord {
+        let Self { shot, fired, muzzle, bore, pose_age_ns } = *self;
+        ShotRecord { shot, fired, muzzle, bore, pose_age_ns, outcome }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct InFlight {
+    launch: Launch,
+    round: Round,
+    tracer: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Mark {
+    Splash {
+        at: DVec3,
+    },
+    /// In the boat's own space: it moves with the boat.
+    Strike {
+        boat: usize,
+        point: DVec3,
+    },
+}
+
+/// All rounds of a session.
+#[derive(Clone, Debug)]
+pub struct Rounds {
+    ammunition: Ammunition,
+    sea: WaveField,
+    in_flight: Vec<InFlight>,
+    marks: Vec<(Time, Mark)>,
+    advanced_to: Time,
+}
+
+impl Rounds {
+    /// No round has been fired at `start`.
+    pub fn new(ammunition: Ammunition, sea: WaveField, start: Time) -> Self {
+        Self { ammunition, sea, in_flight: Vec::new(), marks: Vec::new(), advanced_to: start }
+    }
+
+    /// The sea is another from now on.
+    pub fn set_sea(&mut self, sea: WaveField) {
+        self.sea = sea;
+    }
+
+    /// Fires a round. One whose flight cannot be computed (a number is not finite) is recorded as a miss at once.
+    pub fn launch(&mut self, launch: Launch, start: Time, records: &mut Vec<ShotRecord>) {
+        let a = &self.ammunition;
+        let direction = dispersed(launch.bore, a.weapon.dispersion_mrad, a.seed, launch.shot);
+        match Flight::new(a.weapon.projectile, &Atmosphere::ICAO, launch.muzzle, direction, a.wind) {
+            Some(flight) => {
+                let tracer = a.weapon.is_tracer(launch.shot);
+                let round = Round::new(launch.shot, launch.fired.secs_since(start), flight);
+                self.in_flight.push(InFlight { launch, round, tracer });
+            }
+            None => records.push(launch.record(Outcome::Miss {
+                boat: None,
+                miss_m: f64::INFINITY,
+                time: launch.fired,
+                range_m: 0.0,
+            })),
+        }
+    }
+
+    /// Follows all boats and rounds until `until`. Boats that are struck are told; ended rounds are recorded in the order in which they
+    /// were fired.
+    pub fn advance(&mut self, until: Time, start: Time, fleet: &mut Fleet, records: &mut Vec<ShotRecord>) {
+        while self.advanced_to < until {
+            let to = self.advanced_to.plus_secs(SPAN_S).min(until);
+            fleet.follow(to);
+            if !self.in_flight.is_empty() {
+                self.advance_span(self.advanced_to, to, start, fleet, records);
+            }
+            self.advanced_to = to;
+        }
+        self.marks.retain(|(since, _)| until.secs_since(*since) < SPLASH_S);
+    }
+
+    fn advance_span(
+        &mut self,
+        from: Time,
+        to: Time,
+        start: Time,
+        fleet: &mut Fleet,
+        records: &mut Vec<ShotRecord>,
+    ) {
+        let (from_s, to_s) = (from.secs_since(start), to.secs_since(start));
+        let mut struck = Vec::new();
+        let ended = {
+            let boats: Vec<Moving<'_>> = (0..fleet.len())
+                .filter_map(|boat| {
+                    let (a, b) = (fleet.floating(boat, from)?.pose, fleet.floating(boat, to)?.pose);
+                    Some(Moving { model: fleet.model(boat)?, from_s, from: a, to_s, to: b })
+                })
+                .collect();
+            let mut ended = Vec::new();
+            self.in_flight.retain_mut(|f| match f.round.advance(to_s, &boats, &self.sea) {
+                Some(end) => {
+                    ended.push((f.launch, f.round.nearest(), end));
+                    false
+                }
+                None => true,
+            });
+            ended
+        };
+        for (launch, nearest, end) in ended {
+            let time_of = |s: f64| start.plus_secs(s);
+            let miss = |time: Time, at: DVec3| match nearest {
+                Some(n) => Outcome::Miss {
+                    boat: Some(fleet.name(n.boat).to_owned()),
+                    miss_m: n.distance_m,
+                    time: time_of(n.time_s),
+                    range_m: n.range_m,
+                },
+                None => Outcome::Miss {
+                    boat: None,
+                    miss_m: f64::INFINITY,
+                    time,
+                    range_m: at.distance(launch.muzzle),
+                },
+            };
+            let outcome = match end {
+                End::Struck { boat, zone, time_s, range_m, point, .. } => {
+                    let time = time_of(time_s);
+                    struck.push((boat, zone, time));
+                    self.marks.push((time, Mark::Strike { boat, point }));
+                    Outcome::Hit { boat: fleet.name(boat).to_owned(), zone, time, range_m, point }
+                }
+                End::Splashed { at, time_s } => {
+                    self.marks.push((time_of(time_s), Mark::Splash { at }));
+                    miss(time_of(time_s), at)
+                }
+                End::Spent { time_s } => miss(time_of(time_s), launch.muzzle),
+            };
+            records.push(launch.record(outcome));
+        }
+        for (boat, zone, time) in struck {
+            fleet.strike(boat, zone, time);
+        }
+    }
+
+    /// What can be seen of the rounds at `time`, up to which they have been followed.
+    pub fn views(&self, time: Time, start: Time, fleet: &Fleet, into: &mut Vec<RoundView>) {
+        let now_s = time.secs_since(start);
+        for f in self.in_flight.iter().filter(|f| f.tracer) {
+            let (from, to) = (f.round.state_at(now_s - STREAK_S).position, f.round.state_at(now_s).position);
+            if to.distance(f.launch.muzzle) > TRACER_LIT_M {
+                into.push(RoundView::Tracer { from, to, radiance: Vec3::new(8.0, 2.4, 0.7) });
+            }
+        }
+        for (since, mark) in &self.marks {
+            let age = time.secs_since(*since);
+            match *mark {
+                Mark::Splash { at } if (0.0..SPLASH_S).contains(&age) => into.push(splash(at, age)),
+                Mark::Strike { boat, point } if (0.0..STRIKE_S).contains(&age) => {
+                    let Some(floating) = fleet.floating(boat, time) else { continue };
+                    let left = 1.0 - age / STRIKE_S;
+                    into.push(RoundView::Strike {
+                        at: floating.pose.to_world(point),
+                        radius_m: (0.15 + 0.5 * (1.0 - left)) as f32,
+                        opacity: left as f32,
+                    });
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// A column of water thrown up and falling back.
+fn splash(at: DVec3, age_s: f64) -> RoundView {
+    let share = age_s / SPLASH_S;
+    // Thrown up at once, falling back under gravity: a parabola whose top is reached at a third of its life.
+    let rise = (share * 3.0).min(1.0);
+    let height = SPLASH_HEIGHT_M
+        * if share < 1.0 / 3.0 { rise * (2.0 - rise) } else { 1.0 - ((share - 1.0 / 3.0) * 1.5).powi(2) };
+    RoundView::Splash {
+        at,
+        height_m: height.max(0.05) as f32,
+        radius_m: (0.18 + 0.5 * share) as f32,
+        opacity: (1.0 - share * share) as f32,
+    }
+}
