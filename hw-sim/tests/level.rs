@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use bowwave_core::{
     estimate::{SensorCounts, attitude::Source, horizon::Mask},
-    event::{Event, Picture, PixelFormat},
+    event::{Event, Picture, PixelFormat, Tick},
     session::{Session, Setup},
     world::scenario::Scenario,
 };
@@ -95,7 +95,11 @@ fn played(recipe: &Recipe, drift: f64, sight: &Sight) -> (Vec<(f64, f64)>, Senso
         events.clear();
         replay.collect(time, &mut events).unwrap();
         events.iter_mut().for_each(|event| sight.draw(event));
-        let Some(view) = session.step(&events, time).view else { continue };
+        events.iter().for_each(|event| session.event(event));
+        let view = session.tick(Tick::at(time)).view;
+        if view.blind {
+            continue;
+        }
         let truth = replay.truth_at(view.mid_exposure).unwrap().world_from_camera;
         if view.pose_known && frame > SETTLED * 10 {
             let off = view.scene.camera.world_from_camera * truth.inverse();

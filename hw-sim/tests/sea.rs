@@ -6,7 +6,7 @@ use std::{path::Path, sync::Arc};
 
 use bowwave_core::{
     estimate::{SeaReport, attitude::Source, sea::SeaSource},
-    event::PixelFormat,
+    event::{PixelFormat, Tick},
     sea::BeaufortForce,
     session::{Session, Setup},
     world::scenario::Scenario,
@@ -65,8 +65,9 @@ fn watched(path: &Path, seconds: i64, scenario: &str) -> Vec<(SeaReport, DVec2, 
         let time = replay.origin().plus_ns(frame * FRAME_NS);
         events.clear();
         replay.collect(time, &mut events).unwrap();
-        let step = session.step(&events, time);
-        let drawn = step.view.map(|v| (v.scene.wind, v.scene.hud.sea.is_some()));
+        events.iter().for_each(|event| session.event(event));
+        let view = session.tick(Tick::at(time)).view;
+        let drawn = (!view.blind).then(|| (view.scene.wind, view.scene.hud.sea.is_some()));
         if let (0, Some((wind, told)), Some(sea)) = (frame % 10, drawn, session.sea()) {
             known.push((sea, wind, told));
         }

@@ -12,6 +12,7 @@ mod headings;
 mod hits;
 mod import;
 pub mod loading;
+mod notes;
 mod outcome;
 mod output;
 mod plan;

@@ -1,60 +1,7 @@
-//! What a run tells of the sea in the video: in the log as it changes, and in the summary.
+//! What a run tells of the sea in the video: in the summary.
 
-use bowwave_core::estimate::{
-    SeaReport,
-    sea::{SeaSource, Unknown},
-};
+use bowwave_core::estimate::{SeaReport, sea::SeaSource};
 use serde::Serialize;
-
-/// Tells the log.
-#[derive(Debug, Default)]
-pub struct SeaLog {
-    told: Option<(u8, SeaSource)>,
-    refused: Option<std::mem::Discriminant<Unknown>>,
-}
-
-impl SeaLog {
-    /// Takes in what is known after a frame; says what is new of it.
-    pub fn follow(&mut self, report: &SeaReport) {
-        let in_use = report.in_use;
-        let now = (in_use.state.get(), in_use.source);
-        if self.told.replace(now) != Some(now) {
-            log::info!("{}", words(report));
-        }
-        let refused = match &report.newest {
-            // That it takes time is no refusal.
-            Ok(_) | Err(Unknown::TooShort { after: None, .. }) => None,
-            Err(why) => Some(std::mem::discriminant(why)),
-        };
-        if self.refused != refused {
-            self.refused = refused;
-            if let (Some(_), Err(why)) = (refused, &report.newest) {
-                log::info!("the sea is not measured at present: {why}");
-            }
-        }
-    }
-}
-
-fn words(report: &SeaReport) -> String {
-    let c = report.in_use.conditions;
-    let sea = format!(
-        "{:.2} m, {:.1} s, from {:.0} deg",
-        c.significant_height_m,
-        c.peak_period_s,
-        c.from_rad.to_degrees().rem_euclid(360.0)
-    );
-    let source = match report.in_use.source {
-        SeaSource::Ordered => "as ordered",
-        SeaSource::Measured => "measured in the video",
-        SeaSource::Kept => "kept from before, not measured at present",
-        SeaSource::Assumed => "of the scenario, not measured yet",
-    };
-    format!(
-        "sea state {} ({source}): {sea}, wind for reflections {:.1} m/s",
-        report.in_use.state.get(),
-        report.wind_m_s
-    )
-}
 
 /// The sea at the end of a run. Heights in metres, periods in seconds, directions in degrees; sigma is one standard deviation.
 #[derive(Clone, Debug, Serialize)]

@@ -1,4 +1,4 @@
-//! What a run tells of the inertial unit's clock: in the log where it does badly, and in the summary.
+//! What a run tells of the inertial unit's clock: in the summary.
 
 use bowwave_core::estimate::clock::ClockReport;
 use serde::Serialize;
@@ -26,30 +26,6 @@ impl From<ClockReport> for ClockSummary {
             jitter_ms: report.jitter_s * 1e3,
             jitter_max_ms: report.jitter_max_s * 1e3,
             arrival_jitter_ms: report.arrival_jitter_s * 1e3,
-        }
-    }
-}
-
-/// Tells the log once when the clock does badly, and once when it does well again.
-#[derive(Debug, Default)]
-pub struct ClockLog {
-    bad: bool,
-}
-
-impl ClockLog {
-    /// Takes in how it does.
-    pub fn follow(&mut self, report: Option<ClockReport>) {
-        let Some(report) = report else { return };
-        let was = std::mem::replace(&mut self.bad, report.is_bad());
-        match (was, self.bad) {
-            (false, true) => log::warn!(
-                "the inertial unit's clock runs {:+.0} ppm against this computer's and its mapped times jitter by {:.2} ms: boats swim \
-                 by that much; `bowwave doctor imu` says what to do",
-                report.drift_ppm,
-                report.jitter_s * 1e3
-            ),
-            (true, false) => log::info!("the inertial unit's clock does well again"),
-            _ => {}
         }
     }
 }

@@ -6,6 +6,31 @@ use glam::{DQuat, DVec3};
 
 use crate::{fault::FaultChange, time::Time};
 
+/// One input of a session. Records and scenes follow from the inputs alone, live as replayed.
+#[derive(Clone, Debug)]
+pub enum Input {
+    /// A frame is due.
+    Tick(Tick),
+    /// A device reported something, or a fault came or went.
+    Event(Event),
+}
+
+/// A frame is due.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tick {
+    /// When the frame was begun: how old a sensor's report is counts from here.
+    pub time: Time,
+    /// When the frame is expected to be seen.
+    pub shown: Time,
+}
+
+impl Tick {
+    /// A frame that is seen as soon as it is begun: without a display to wait for.
+    pub const fn at(time: Time) -> Self {
+        Self { time, shown: time }
+    }
+}
+
 /// Something that a device reported.
 #[derive(Clone, Debug)]
 pub enum Event {

@@ -1,4 +1,7 @@
-//! A session: a pure function from events and frame times to scenes and records.
+//! A session: a pure function from its inputs (devices' reports and ticks) to scenes and records.
+
+mod digest;
+mod notes;
 
 use std::sync::Arc;
 
@@ -14,8 +17,8 @@ use crate::{
         light::LightMeter,
         pose::{NoPose, OrientationAt, STALE_NS},
     },
-    event::{Event, Picture, PictureError, PixelFormat, TriggerEdge},
-    fault::{Fault, FaultBoard, Severity},
+    event::{Event, Input, Picture, PictureError, PixelFormat, Tick, TriggerEdge},
+    fault::{Fault, FaultBoard, FaultChange, Severity},
     frame::{
         plan::{Needs, ScenePlan, sea_reflects},
         scene::{Hud, Pass, RoundView, Scene, Status},
@@ -39,6 +42,10 @@ use crate::{
         rounds::{Ammunition, Launch, Rounds},
     },
 };
+
+pub use digest::{Digest, SessionDigest};
+pub use notes::Note;
+use notes::Notes;
 
 /// How long the last round's result stays on the display, seconds.
 const RESULT_S: f64 = 1.5;
@@ -91,13 +98,17 @@ pub enum SetupError {
     Picture(#[from] PictureError),
 }
 
-/// What one step gives.
+/// What one tick gives.
 #[derive(Debug)]
 pub struct Step<'a> {
-    /// What to draw; `None` before the first picture.
-    pub view: Option<View<'a>>,
+    /// What to draw.
+    pub view: View<'a>,
     /// Rounds that ended, in the order in which they were fired within the step.
     pub records: &'a [ShotRecord],
+    /// Faults that the session itself has found to come or go. It knows of them already: they are for the log only.
+    pub faults: &'a [FaultChange],
+    /// What else the log is to be told.
+    pub notes: &'a [Note],
 }
 
 /// What to draw.
@@ -107,6 +118,8 @@ pub struct View<'a> {
     pub scene: &'a Scene,
     /// The picture that it is drawn over.
     pub picture: &'a Picture,
+    /// No picture has come yet: the scene is black and says what is wrong.
+    pub blind: bool,
     /// Whether the picture is another than the last step's.
     pub picture_is_new: bool,
     /// The picture's own time stamp, to find it again.
@@ -134,6 +147,11 @@ pub struct Session {
     shots: u64,
     hits: u64,
     last_result: Option<(Time, bool)>,
+    picture_is_new: bool,
+    frames: u64,
+    found: Vec<FaultChange>,
+    notes: Notes,
+    digest: SessionDigest,
 }
 
 /// What exists from the first picture on.
@@ -211,6 +229,11 @@ impl Session {
             shots: 0,
             hits: 0,
             last_result: None,
+            picture_is_new: false,
+            frames: 0,
+            found: Vec::new(),
+            notes: Notes::default(),
+            digest: SessionDigest::default(),
             setup,
         })
     }
@@ -220,23 +243,9 @@ impl Session {
         &self.plan
     }
 
-    /// Pictures come in another layout from now on: the renderer must be made anew from the changed plan.
-    pub fn set_video(&mut self, video: PixelFormat) -> Result<(), SetupError> {
-        let (width, height) = self.plan.picture;
-        self.black = Picture::black(video, width, height)?;
-        self.plan.video = video;
-        self.setup.video = video;
-        Ok(())
-    }
-
     /// What was wrong with the sensors so far.
     pub fn sensor_counts(&self) -> SensorCounts {
         self.sensors.counts()
-    }
-
-    /// For how long the ship's heading has been the very same though the ship moves, seconds; `None` where it is not stuck.
-    pub fn ship_frozen_s(&self, now: Time) -> Option<f64> {
-        self.sensors.ship_frozen_s(now)
     }
 
     /// How the inertial unit's clock does; `None` before that can be told.
@@ -264,59 +273,146 @@ impl Session {
         (self.shots, self.hits)
     }
 
-    /// Takes in `events`, in the order of their arrival, and gives the frame of `frame_time`. Frame times must not go back.
-    pub fn step(&mut self, events: &[Event], frame_time: Time) -> Step<'_> {
-        self.records.clear();
-        let mut picture_is_new = false;
-        for event in events {
-            match event {
-                Event::Imu(sample) => self.sensors.imu(sample),
-                Event::Frame(frame) => picture_is_new |= self.sensors.frame(frame),
-                Event::Trigger(edge) => self.weapon.edge(TriggerEdge {
-                    time: edge.time.plus_ns(self.setup.calibration.trigger.map_or(0, |t| t.latency_ns)),
-                    ..*edge
-                }),
-                Event::Ship(sample) => self.sensors.ship(sample),
-                Event::Mark(mark) => self.sensors.mark(mark),
-                Event::Fault(change) => {
-                    // The line for the log is the caller's affair: this board only knows what is there.
-                    let _ = self.faults.take(change);
-                }
-            }
-        }
-        self.weapon.arm(self.broken().is_none());
-        let Some(video_time) = self.sensors.video_time() else {
-            return Step { view: None, records: &self.records };
-        };
-        if picture_is_new {
-            self.sensors.sight();
-        }
-        self.advance(video_time, frame_time);
-        let pose_known = self.draw(video_time, frame_time, picture_is_new);
-        let view = self.sensors.newest_frame().map(|frame| View {
-            scene: &self.scene,
-            picture: &frame.picture,
-            picture_is_new,
-            mid_exposure: frame.mid_exposure,
-            pose_known,
-        });
-        Step { view, records: &self.records }
+    /// A hash over all that this session gave.
+    pub const fn digest(&self) -> SessionDigest {
+        self.digest
     }
 
-    /// What to show while no picture has come: black, and what is wrong.
-    pub fn blind(&mut self, frame_time: Time) -> View<'_> {
-        let status = self.status(frame_time, frame_time);
+    /// Takes in one input. A tick gives a frame and what became of rounds; tick times must not go back.
+    pub fn input(&mut self, input: &Input) -> Option<Step<'_>> {
+        match input {
+            Input::Event(event) => {
+                self.event(event);
+                None
+            }
+            Input::Tick(tick) => Some(self.tick(*tick)),
+        }
+    }
+
+    /// Takes in what was reported. Reports of one device come in the order of their arrival. Afterwards [`Self::plan`] may be another: a
+    /// renderer made for the old one must be made anew before the next tick's scene is drawn.
+    pub fn event(&mut self, event: &Event) {
+        match event {
+            Event::Imu(sample) => self.sensors.imu(sample),
+            Event::Frame(frame) => {
+                self.follow_layout(&frame.picture);
+                self.picture_is_new |= self.sensors.frame(frame);
+            }
+            Event::Trigger(edge) => self.weapon.edge(TriggerEdge {
+                time: edge.time.plus_ns(self.setup.calibration.trigger.map_or(0, |t| t.latency_ns)),
+                ..*edge
+            }),
+            Event::Ship(sample) => self.sensors.ship(sample),
+            Event::Mark(mark) => self.sensors.mark(mark),
+            Event::Fault(change) => {
+                // The line for the log is the caller's affair: this board only knows what is there.
+                let _ = self.faults.take(change);
+            }
+        }
+    }
+
+    /// A frame is due: gives what to draw, and what became of rounds since the last tick.
+    pub fn tick(&mut self, tick: Tick) -> Step<'_> {
+        self.records.clear();
+        self.found.clear();
+        self.notes.clear();
+        let picture_is_new = std::mem::take(&mut self.picture_is_new);
+        self.weapon.arm(self.broken().is_none());
+        let video_time = self.sensors.video_time();
+        let pose_known = match video_time {
+            Some(video_time) => {
+                if picture_is_new {
+                    self.sensors.sight();
+                }
+                self.advance(video_time, tick.time);
+                self.draw(video_time, tick.time, picture_is_new)
+            }
+            None => {
+                self.draw_black(tick.time);
+                false
+            }
+        };
+        self.scene.frame = self.frames;
+        self.frames += 1;
+        self.watch_ship(tick.time);
+        self.take_notes();
+        self.digest.scenes.take(&self.scene);
+        self.digest_records();
+        let view = match self.sensors.newest_frame() {
+            Some(frame) => View {
+                scene: &self.scene,
+                picture: &frame.picture,
+                blind: false,
+                picture_is_new,
+                mid_exposure: frame.mid_exposure,
+                pose_known,
+            },
+            None => View {
+                scene: &self.scene,
+                picture: &self.black,
+                blind: true,
+                picture_is_new: true,
+                mid_exposure: tick.time,
+                pose_known: false,
+            },
+        };
+        Step { view, records: &self.records, faults: &self.found, notes: self.notes.new_ones() }
+    }
+
+    /// Pictures of the calibrated size that come in another layout than planned change the plan.
+    fn follow_layout(&mut self, picture: &Picture) {
+        let format = picture.format();
+        if format == self.plan.video || (picture.width(), picture.height()) != self.plan.picture {
+            return;
+        }
+        let (width, height) = self.plan.picture;
+        // A picture of that size and layout is here, so a black one can be made.
+        if let Ok(black) = Picture::black(format, width, height) {
+            self.black = black;
+            self.plan.video = format;
+            self.setup.video = format;
+        }
+    }
+
+    /// While no picture has come: nothing but what is wrong.
+    fn draw_black(&mut self, time: Time) {
+        let status = self.status(time, time);
         self.scene.boats.clear();
         self.scene.rounds.clear();
         self.scene.passes = self.plan.frame(false, &[], &[]);
         self.scene.hud.status = status;
         self.scene.hud.warning = self.warning();
-        View {
-            scene: &self.scene,
-            picture: &self.black,
-            picture_is_new: true,
-            mid_exposure: frame_time,
-            pose_known: false,
+    }
+
+    /// Tells that the ship's heading is stuck, or no longer.
+    fn watch_ship(&mut self, time: Time) {
+        let change = match (self.sensors.ship_frozen_s(time), self.faults.is_active(Fault::ShipFrozen)) {
+            (Some(seconds), false) => FaultChange::raised(
+                time,
+                Fault::ShipFrozen,
+                format!(
+                    "the ship's heading has been the very same for {seconds:.0} s though the ship rolls: is the compass settled, and does \
+                     what sends its lines still hear it?"
+                ),
+            ),
+            (None, true) => FaultChange::cleared(time, Fault::ShipFrozen),
+            _ => return,
+        };
+        let _ = self.faults.take(&change);
+        self.found.push(change);
+    }
+
+    fn take_notes(&mut self) {
+        if let Some(watch) = &self.watch {
+            self.notes.sea(&watch.report());
+        }
+        self.notes.heading(self.sensors.heading_sigma(), &self.sensors.counts().headings);
+        self.notes.clock(self.frames, || self.sensors.clock());
+    }
+
+    fn digest_records(&mut self) {
+        for record in &self.records {
+            self.digest.records.take(record);
         }
     }
 
@@ -329,6 +425,7 @@ impl Session {
             running.rounds.advance(end, running.start, &mut running.fleet, &mut self.records);
         }
         self.count_records();
+        self.digest_records();
         &self.records
     }
 
@@ -576,11 +673,6 @@ impl Session {
             RoundView::Tracer { from: at, to: at + DVec3::Y * 10.0, radiance: glam::Vec3::ONE },
         ];
         Scene { camera, passes: self.plan.frame(true, &boats, &rounds), boats, rounds, ..self.scene.clone() }
-    }
-
-    /// Counts one frame as shown: the next scene has the next number.
-    pub fn frame_shown(&mut self) {
-        self.scene.frame += 1;
     }
 }
 

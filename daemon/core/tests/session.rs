@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
     estimate::attitude::Source,
-    event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, TriggerEdge},
+    event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, Tick, TriggerEdge},
     fault::{Fault, FaultChange},
     frame::scene::{LeftOut, Pass, PassDecision, Status},
     geometry::{Lens, look},
@@ -172,14 +172,14 @@ fn play(
         let due = stream.faults.iter().filter(|f| f.time > before && f.time <= now);
         events.extend(due.cloned().map(Event::Fault));
         events.sort_by_key(Event::arrival);
-        let step = session.step(&events, now);
+        events.iter().for_each(|event| session.event(event));
+        let step = session.tick(Tick::at(now));
         let records = step.records.to_vec();
         let (status, passes) = match &step.view {
-            Some(v) => (Some(v.scene.hud.status.clone()), v.scene.passes),
-            None => (None, [PassDecision::LeftOut(LeftOut::NoPose); Pass::COUNT]),
+            v if !v.blind => (Some(v.scene.hud.status.clone()), v.scene.passes),
+            _ => (None, [PassDecision::LeftOut(LeftOut::NoPose); Pass::COUNT]),
         };
         each(session, status, passes, &records);
-        session.frame_shown();
     }
 }
 
@@ -259,8 +259,9 @@ fn the_pose_is_the_one_at_the_pictures_mid_exposure() {
             picture,
             jpeg: None,
         }));
-        let step = s.step(&events, now);
-        if let Some(view) = step.view.filter(|v| v.pose_known) {
+        events.iter().for_each(|event| s.event(event));
+        let step = s.tick(Tick::at(now));
+        if let Some(view) = Some(step.view).filter(|v| v.pose_known) {
             // The calibrated offset moves the exposure by 4 ms on the inertial unit's clock.
             let truth = attitude(mid.plus_ns(4 * MS).ns() as f64 * 1e-9, rate);
             assert!(view.scene.camera.world_from_camera.angle_between(truth) < 1e-6);
@@ -427,8 +428,30 @@ fn a_hot_computer_draws_no_reflection() {
 #[test]
 fn before_the_first_picture_a_black_one_says_what_is_wrong() {
     let mut s = session(SCENARIO);
-    assert!(s.step(&[], Time::from_ns(MS)).view.is_none());
-    let view = s.blind(Time::from_ns(MS));
+    let view = s.tick(Tick::at(Time::from_ns(MS))).view;
+    assert!(view.blind);
     assert!(matches!(view.scene.hud.status, Status::NotScored { cause: "NO CAMERA YET", .. }));
     assert!(view.scene.boats.is_empty() && view.picture.bytes().iter().all(|b| *b == 0));
+}
+
+#[test]
+fn the_same_inputs_give_the_same_digests_and_others_do_not() {
+    let run = |rate: f64, fault_ms: i64| {
+        let mut s = session(SCENARIO);
+        let faults = vec![
+            FaultChange::raised(Time::from_ns(fault_ms * MS), Fault::CamCorrupt, "a"),
+            FaultChange::cleared(Time::from_ns((fault_ms + 400) * MS), Fault::CamCorrupt),
+        ];
+        play(&mut s, 2.0, &Stream { rate, faults, ..ALL }, &burst(500, 750), |_, _, _, _| {});
+        s.finish();
+        s.digest()
+    };
+    let first = run(0.0, 800);
+    assert_eq!(run(0.0, 800), first);
+    let other_rate = run(1e-6, 800);
+    assert_ne!((other_rate.records, other_rate.scenes), (first.records, first.scenes));
+    // A warning changes what is shown and nothing that is scored.
+    let other_fault = run(0.0, 900);
+    assert_eq!(other_fault.records, first.records);
+    assert_ne!(other_fault.scenes, first.scenes);
 }

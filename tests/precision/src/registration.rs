@@ -11,7 +11,7 @@ use anyhow::{Context as _, Result};
 use bowwave_core::{
     calibration::Calibration,
     estimate::{HeadingSettings, attitude::Source},
-    event::PixelFormat,
+    event::{PixelFormat, Tick},
     geometry::Lens,
     session::{Session, Setup},
     world::scenario::Scenario,
@@ -187,7 +187,11 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
         let time = replay.origin().plus_ns(frame * frame_ns);
         events.clear();
         replay.collect(time, &mut events)?;
-        let Some(view) = session.step(&events, time).view.filter(|v| v.pose_known) else { continue };
+        events.iter().for_each(|event| session.event(event));
+        let view = session.tick(Tick::at(time)).view;
+        if !view.pose_known {
+            continue;
+        }
         let middle = replay.truth_at(view.mid_exposure).context("a frame without truth")?.world_from_camera;
         let used = view.scene.camera.world_from_camera;
         let off = heading_between(used, middle);

@@ -2,7 +2,7 @@
 
 use bowwave_core::{
     event::Event,
-    fault::{Change, Fault, FaultBoard, FaultChange, LogEntry, Severity, What},
+    fault::{Fault, FaultBoard, FaultChange, LogEntry, Severity, What},
 };
 
 /// Keeps the board and writes the log.
@@ -20,12 +20,14 @@ impl Faults {
 
     /// Takes in a change: a line to the log where it is one, and the event for the session.
     pub fn take(&mut self, change: FaultChange, events: &mut Vec<Event>) {
-        if let Some(entry) = self.board.take(&change) {
+        self.tell(&change);
+        events.push(Event::Fault(change));
+    }
+
+    /// Takes in a change that the session itself has found: a line to the log where it is one.
+    pub fn tell(&mut self, change: &FaultChange) {
+        if let Some(entry) = self.board.take(change) {
             self.log(&entry);
-        }
-        // Only what lasts concerns the session.
-        if !matches!(change.change, Change::Noted { .. }) {
-            events.push(Event::Fault(change));
         }
     }
 
@@ -103,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_session_hears_of_what_lasts_only() {
+    fn the_session_hears_of_each_change_once() {
         let mut faults = Faults::new(None);
         let mut events = Vec::new();
         faults.set(Fault::DiskFull, Some("a".into()), &mut events);
@@ -112,7 +114,7 @@ mod tests {
         faults.set(Fault::DiskFull, None, &mut events);
         let time = bowwave_devices::clock::now();
         faults.take(FaultChange::noted(time, Fault::CamTimestamp, ""), &mut events);
-        assert_eq!(events.len(), 2);
+        assert_eq!(events.len(), 3);
         assert_eq!(faults.counts().collect::<Vec<_>>(), [("DISK_FULL", 1), ("CAM_TS", 1)]);
     }
 }

@@ -10,7 +10,7 @@ use std::{
 
 use anyhow::{Context, Result};
 use bowwave_core::{
-    event::{Event, Mark, MarkKind, PixelFormat},
+    event::{Event, Mark, MarkKind, PixelFormat, Tick},
     fault::{Change, Fault, FaultChange},
     pacing::{FRAMES_PER_S, FrameClock},
     session::Session,
@@ -32,15 +32,13 @@ use super::{
     starts::Mode,
     summary::{Summary, Tally},
 };
-use crate::{headings::HeadingLog, output::UserEvent, sea::SeaLog, unit_clock::ClockLog};
+use crate::{notes::tell, output::UserEvent};
 
 /// Time between ticks, nanoseconds.
 const PERIOD_NS: i64 = NS_PER_S / FRAMES_PER_S;
 /// So often within a minute the GPU may be lost before the program ends: the driver needs a fresh process then.
 const LOSSES_MAX: usize = 3;
 const LOSSES_WINDOW_NS: i64 = 60 * NS_PER_S;
-/// The unit's clock is looked at once in so many frames: ten seconds.
-const CLOCK_FRAMES: u64 = 300;
 /// How long the end waits for its last frame to be seen.
 const FAREWELL: Duration = Duration::from_millis(120);
 
@@ -102,9 +100,6 @@ pub struct Trainer {
     events: Vec<Event>,
     changes: Vec<FaultChange>,
     tally: Tally,
-    sea: SeaLog,
-    headings: HeadingLog,
-    unit_clock: ClockLog,
 }
 
 impl Trainer {
@@ -171,9 +166,6 @@ impl Trainer {
             events: Vec::with_capacity(256),
             changes,
             tally: Tally::default(),
-            sea: SeaLog::default(),
-            headings: HeadingLog::default(),
-            unit_clock: ClockLog::default(),
         })
     }
 
@@ -185,7 +177,7 @@ impl Trainer {
             notifier.stopping();
         }
         if let Ok(Ended::Stopped) = ended {
-            self.farewell();
+            self.farewell(pulse);
         }
         let summary = self.end(&ended);
         ended.map(|ended| (ended, summary))
@@ -202,8 +194,7 @@ impl Trainer {
                 return Ok(Ended::Reload { lcd: self.hardware.lcd_size() });
             }
             self.collect();
-            self.follow_video(pulse)?;
-            match self.frame(plan.shown) {
+            match self.frame(plan.shown, pulse) {
                 Ok(()) => {}
                 Err(e) if is_lost(&e) => self.rebuild(&e, pulse)?,
                 Err(e) => return Err(e),
@@ -263,23 +254,6 @@ impl Trainer {
         }
     }
 
-    /// Makes the renderer anew where pictures of the calibrated size come in another layout than it was made for.
-    fn follow_video(&mut self, pulse: &Pulse) -> Result<()> {
-        let plan = self.session.plan();
-        let size = plan.picture;
-        let came = self.events.iter().rev().find_map(|event| match event {
-            Event::Frame(f) if (f.picture.width(), f.picture.height()) == size => Some(f.picture.format()),
-            _ => None,
-        });
-        match came {
-            Some(format) if format != plan.video => {
-                self.session.set_video(format)?;
-                self.open_stage_again(pulse)
-            }
-            _ => Ok(()),
-        }
-    }
-
     fn open_stage_again(&mut self, pulse: &Pulse) -> Result<()> {
         let _pulsing = pulse.during();
         let stage = Stage::open(&self.session, &self.settings.setup.models, &self.stage_options)?;
@@ -291,38 +265,30 @@ impl Trainer {
     }
 
     /// One frame, to be seen at `shown`.
-    fn frame(&mut self, shown: Time) -> Result<()> {
+    fn frame(&mut self, shown: Time, pulse: &Pulse) -> Result<()> {
         let begun = now();
         if let Some(keeping) = &mut self.keeping {
             keeping.events(&self.events);
         }
-        let step = self.session.step(&self.events, begun);
+        let planned = *self.session.plan();
+        self.events.iter().for_each(|event| self.session.event(event));
         self.events.clear();
+        if *self.session.plan() != planned {
+            self.open_stage_again(pulse)?;
+        }
+        let step = self.session.tick(Tick { time: begun, shown });
         self.tally.records(step.records);
         if let Some(keeping) = &mut self.keeping {
             keeping.rounds(step.records);
         }
-        let blind = step.view.is_none();
-        let view = match step.view {
-            Some(view) => view,
-            None => self.session.blind(begun),
-        };
+        step.faults.iter().for_each(|change| self.faults.tell(change));
+        step.notes.iter().for_each(tell);
+        let view = step.view;
         if let Some(keeping) = self.keeping.as_mut().filter(|_| view.picture_is_new && view.pose_known) {
             keeping.pose(PoseEntry { time: view.mid_exposure, pose: view.scene.camera });
         }
-        self.tally.frame(view.scene, blind, begun);
-        let announced = self.stage.show(&view, begun, shown)?;
-        self.session.frame_shown();
-        if let Some(report) = self.session.sea() {
-            self.sea.follow(&report);
-        }
-        self.headings.follow(self.session.heading_sigma(), &self.session.sensor_counts().headings);
-        if self.tally.frames.is_multiple_of(CLOCK_FRAMES) {
-            self.unit_clock.follow(self.session.unit_clock());
-        }
-        let frozen = self.session.ship_frozen_s(begun).map(frozen_cause);
-        self.faults.set(Fault::ShipFrozen, frozen, &mut self.events);
-        if !announced {
+        self.tally.frame(view.scene, view.blind, begun);
+        if !self.stage.show(&view, begun, shown)? {
             return Err(self.stage_error());
         }
         if let Some(keeping) = &mut self.keeping {
@@ -378,10 +344,10 @@ impl Trainer {
     }
 
     /// Says STOPPED on the LCD.
-    fn farewell(&mut self) {
+    fn farewell(&mut self, pulse: &Pulse) {
         self.faults.set(Fault::Stop, Some("asked to stop".to_owned()), &mut self.events);
         let frame = self.tally.frames;
-        if let Err(e) = self.frame(now().plus_ns(PERIOD_NS)) {
+        if let Err(e) = self.frame(now().plus_ns(PERIOD_NS), pulse) {
             log::debug!("no last frame: {e:#}");
             return;
         }
@@ -449,14 +415,6 @@ fn gpu(settings: &Settings, mode: Mode) -> Option<String> {
         Mode::Training => settings.config.gpu.clone(),
         Mode::Safe => software().or_else(|| settings.config.gpu.clone()),
     }
-}
-
-/// What the log says of a ship's heading that has been the same for `seconds`.
-fn frozen_cause(seconds: f64) -> String {
-    format!(
-        "the ship's heading has been the very same for {seconds:.0} s though the ship rolls: is the compass settled, and does what sends its \
-         lines still hear it?"
-    )
 }
 
 fn is_lost(e: &anyhow::Error) -> bool {

@@ -14,7 +14,7 @@ use std::{
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
     estimate::{SeaReport, SensorCounts, clock::ClockReport, pose::registration_error_px},
-    event::{Event, Mark, MarkKind, Picture},
+    event::{Event, Mark, MarkKind, Picture, Tick},
     geometry::CameraPose,
     pacing::{FRAMES_PER_S, Pacer},
     session::Session,
@@ -34,12 +34,11 @@ use super::{memory::MemoryWatch, recovery::Recovery, summary::PassCounts};
 use crate::{
     cli::Simulate,
     commits,
-    headings::{HeadingLog, HeadingSummary},
+    headings::HeadingSummary,
+    notes::tell,
     output::{Output, OutputReport, Ticket, UserEvent},
     recorder::Recorder,
-    sea::SeaLog,
     stats::Samples,
-    unit_clock::ClockLog,
 };
 
 /// A tick comes this long after a picture's arrival: pictures that come a little late still make it.
@@ -85,8 +84,6 @@ pub struct Loop {
     replay_error: Option<ReplayError>,
     recovery: Recovery,
     memory: MemoryWatch,
-    sea: SeaLog,
-    headings: HeadingLog,
 }
 
 /// What the loop counts.
@@ -178,8 +175,6 @@ impl Loop {
             replay_error: None,
             recovery,
             memory: MemoryWatch::default(),
-            sea: SeaLog::default(),
-            headings: HeadingLog::default(),
         }
     }
 
@@ -292,15 +287,18 @@ impl Loop {
         let entered = now();
         self.collect(frame_time);
         let collected = now();
-        let step = self.session.step(&self.events, frame_time);
+        self.events.iter().for_each(|event| self.session.event(event));
         self.events.clear();
+        let step = self.session.tick(Tick::at(frame_time));
         let stepped = now();
         self.tally.records(step.records);
         self.waiting.extend(step.records.iter().cloned());
-        let Some(view) = step.view else {
+        step.notes.iter().for_each(tell);
+        let view = step.view;
+        if view.blind {
             self.journal_rounds(arguments)?;
             return Ok(false);
-        };
+        }
         self.recovery.frame(frame_time, &view.scene.hud.status);
         self.memory.frame(view.scene.frame);
         let truth = self.replay.truth_at(view.mid_exposure);
@@ -319,12 +317,9 @@ impl Loop {
             // The output thread has failed; `finish` says why.
             self.stop.store(true, Ordering::Relaxed);
         }
-        self.session.frame_shown();
         if let Some(report) = self.session.sea() {
-            self.sea.follow(&report);
             self.tally.sea(&report);
         }
-        self.headings.follow(self.session.heading_sigma(), &self.session.sensor_counts().headings);
         self.tally.frame(waited, [entered, collected, stepped, now()]);
         self.journal_rounds(arguments)?;
         Ok(true)
@@ -392,7 +387,6 @@ impl Loop {
         let sea = self.session.sea();
         let heading = HeadingSummary::of(&self.session);
         let unit_clock = self.session.unit_clock();
-        ClockLog::default().follow(unit_clock);
         Ok(Finished {
             unit_clock,
             heading,
