@@ -11,7 +11,8 @@ pub use journal::{
     RunSelection, ShotFilter, StoredRun, StoredShot, Unwritten, boot_id, read_runs, read_shots,
 };
 pub use recording::{
-    CameraInfo, Counts, Entries, Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingReader,
-    RecordingWriter, RecoverReport, SENTENCE_MAX_BYTES, ShipEntry, WrittenSummary, recover,
+    CameraInfo, Counts, Entries, Entry, FaultEntry, FrameEntry, PictureEntry, PoseEntry, Properties,
+    RecordError, RecordingReader, RecordingWriter, RecoverReport, SENTENCE_MAX_BYTES, ShipEntry, TickEntry,
+    WrittenSummary, recover,
 };
 pub use space::{Room, SpaceWatch};

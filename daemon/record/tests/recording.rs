@@ -12,12 +12,14 @@ mod support;
 use std::{fs, sync::Arc};
 
 use bowwave_core::{
-    event::{ImuSample, Mark, MarkKind, TriggerEdge},
+    event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipSample, Tick, TriggerEdge},
+    fault::{Change, Fault, FaultChange},
     geometry::CameraPose,
     time::Time,
 };
 use bowwave_record::{
-    Entry, FrameEntry, PoseEntry, Properties, RecordError, RecordingReader, RecordingWriter, ShipEntry,
+    Entry, FaultEntry, FrameEntry, PictureEntry, PoseEntry, Properties, RecordError, RecordingReader,
+    RecordingWriter, ShipEntry, TickEntry,
 };
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
@@ -222,6 +224,42 @@ fn entry(ms: i64) -> impl Strategy<Value = Entry> {
             .prop_map(move |kind| Entry::Mark(Mark { time, kind })),
         pose().prop_map(move |pose| Entry::Truth(PoseEntry { time, pose })),
         pose().prop_map(move |pose| Entry::Pose(PoseEntry { time, pose })),
+        inputs(time),
+    ]
+}
+
+/// What only a session's own recording holds.
+fn inputs(time: Time) -> impl Strategy<Value = Entry> {
+    let stamp = || (-1_000_000_000_i64..1_000_000_000_000_000_000).prop_map(Time::from_ns);
+    let number = || prop::option::of(-10.0..10.0_f64);
+    let fault = (0..Fault::COUNT).prop_map(|i| Fault::ALL[i]);
+    let change = prop_oneof![
+        "\\PC{0,200}".prop_map(|cause| Change::Raised { cause }),
+        Just(Change::Cleared),
+        "\\PC{0,200}".prop_map(|cause| Change::Noted { cause }),
+    ];
+    let layout = prop_oneof![Just(PixelFormat::Yuyv), Just(PixelFormat::Nv12), Just(PixelFormat::Rgb)];
+    prop_oneof![
+        (stamp(), any::<[u64; 3]>()).prop_map(move |(shown, [inputs, records, scenes])| {
+            Entry::Tick(TickEntry { tick: Tick { time, shown }, inputs, records, scenes })
+        }),
+        (stamp(), fault, change).prop_map(move |(own, fault, change)| {
+            Entry::Fault(FaultEntry { logged: time, change: FaultChange { time: own, fault, change } })
+        }),
+        (number(), number(), number(), number(), any::<bool>()).prop_map(
+            move |(heading, roll, pitch, heading_sigma, reduced)| {
+                Entry::ShipValues(ShipSample { arrival: time, heading, roll, pitch, heading_sigma, reduced })
+            }
+        ),
+        (stamp(), any::<u32>(), layout, 1..5_u32, 1..5_u32, any::<u8>()).prop_map(
+            move |(mid_exposure, sequence, format, w, h, first)| {
+                let (width, height) = (2 * w, 2 * h);
+                let bytes: Vec<u8> =
+                    (0..format.byte_len(width, height)).map(|i| first.wrapping_add(i as u8)).collect();
+                let picture = Picture::new(format, width, height, bytes.into()).unwrap();
+                Entry::Picture(PictureEntry { arrival: time, mid_exposure, sequence, picture })
+            }
+        ),
     ]
 }
 
@@ -255,5 +293,7 @@ proptest! {
         let (found, error) = read(&reader);
         prop_assert!(error.is_none(), "{:?}", error);
         prop_assert_eq!(found, sorted(&all));
+        let as_written: Vec<Entry> = reader.entries_as_written().unwrap().map(Result::unwrap).collect();
+        prop_assert_eq!(as_written, all);
     }
 }

@@ -1,7 +1,9 @@
 //! From a recording's coded pictures to pixels: what is left out is counted, and logged once a kind.
 
-use bowwave_core::event::Picture;
+use bowwave_core::event::{CameraFrame, Picture};
 use bowwave_devices::camera::jpeg::{Decoder, JpegError};
+
+use super::wire::RecordedPicture;
 
 /// What became of the pictures of a replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,6 +32,24 @@ impl Default for FrameDecoder {
 impl FrameDecoder {
     pub(super) const fn counters(&self) -> FrameCounters {
         self.counters
+    }
+
+    /// The picture as a camera delivers it; `None`, counted and logged once a kind, where there is none or it has another size than the
+    /// first. It keeps the recorded time of arrival.
+    pub(super) fn frame(&mut self, recorded: RecordedPicture) -> Option<CameraFrame> {
+        match recorded {
+            RecordedPicture::Coded(frame) => Some(CameraFrame {
+                arrival: frame.arrival,
+                mid_exposure: frame.mid_exposure,
+                sequence: frame.sequence,
+                picture: self.decode(&frame.jpeg)?,
+                jpeg: Some(frame.jpeg),
+            }),
+            RecordedPicture::Raw(raw) => {
+                self.counters.decoded += 1;
+                Some(raw.into())
+            }
+        }
     }
 
     /// The picture in `jpeg`; `None`, counted and logged once a kind, where there is none or it has another size than the

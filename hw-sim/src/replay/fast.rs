@@ -6,10 +6,7 @@ use std::{
     thread::{self, JoinHandle},
 };
 
-use bowwave_core::{
-    event::{CameraFrame, Event},
-    time::Time,
-};
+use bowwave_core::{event::Event, time::Time};
 use bowwave_devices::{
     imu::{ImuDecoder, ImuFormat},
     nmea::ShipParser,
@@ -142,15 +139,7 @@ impl Producer {
                 self.imu.push(&bytes, due, |sample| ready.push(Ok(Event::Imu(sample))));
             }
             Item::Frame(frame) => {
-                if let Some(picture) = self.frames.decode(&frame.jpeg) {
-                    ready.push(Ok(Event::Frame(CameraFrame {
-                        arrival: frame.arrival,
-                        mid_exposure: frame.mid_exposure,
-                        sequence: frame.sequence,
-                        picture,
-                        jpeg: Some(frame.jpeg),
-                    })));
-                }
+                ready.extend(self.frames.frame(frame).map(|frame| Ok(Event::Frame(frame))));
             }
             Item::Ship { due, bytes } => {
                 self.ship.push(&bytes, due, |said| ready.push(Ok(Event::Ship(said.sample))));

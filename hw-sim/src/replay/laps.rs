@@ -8,7 +8,7 @@ use std::{
 };
 
 use bowwave_core::time::{NS_PER_S, Time};
-use bowwave_record::{Entries, Entry, RecordError, RecordingReader};
+use bowwave_record::{Entries, Entry, FrameEntry, PictureEntry, RecordError, RecordingReader};
 
 use super::{ReplayError, rate::ClockRate, truth::Truth};
 
@@ -181,9 +181,7 @@ impl Laps {
             Entry::Frame(frame) => {
                 frame.arrival = frame.arrival.plus_ns(shift);
                 frame.mid_exposure = frame.mid_exposure.plus_ns(shift);
-                let (first, last) = self.sequences.unwrap_or_default();
-                let round = last.wrapping_sub(first).wrapping_add(1);
-                frame.sequence = frame.sequence.wrapping_add(round.wrapping_mul(self.lap as u32));
+                frame.sequence = frame.sequence.wrapping_add(self.later_sequence());
             }
             Entry::Trigger(edge) => edge.time = edge.time.plus_ns(shift),
             Entry::Ship(line) => line.arrival = line.arrival.plus_ns(shift),
@@ -195,19 +193,34 @@ impl Laps {
                 }
             }
             Entry::Pose(pose) => pose.time = pose.time.plus_ns(shift),
+            Entry::Picture(picture) => {
+                picture.arrival = picture.arrival.plus_ns(shift);
+                picture.mid_exposure = picture.mid_exposure.plus_ns(shift);
+                picture.sequence = picture.sequence.wrapping_add(self.later_sequence());
+            }
+            // Belong to the run that was recorded.
+            Entry::ShipValues(sample) => sample.arrival = sample.arrival.plus_ns(shift),
+            Entry::Fault(fault) => fault.logged = fault.logged.plus_ns(shift),
+            Entry::Tick(entry) => entry.tick.time = entry.tick.time.plus_ns(shift),
         }
         entry
+    }
+
+    /// How much higher the camera's counter is in this round than in the first.
+    fn later_sequence(&self) -> u32 {
+        let (first, last) = self.sequences.unwrap_or_default();
+        last.wrapping_sub(first).wrapping_add(1).wrapping_mul(self.lap as u32)
     }
 
     /// Learns from the first round what later ones need.
     fn note(&mut self, entry: &Entry) {
         match entry {
             Entry::Imu(sample) => self.rate.note(sample.device_time_ns, sample.arrival.ns()),
-            Entry::Frame(frame) => {
-                let first = self.sequences.map_or(frame.sequence, |(first, _)| first);
-                self.sequences = Some((first, frame.sequence));
+            Entry::Frame(FrameEntry { sequence, .. }) | Entry::Picture(PictureEntry { sequence, .. }) => {
+                let first = self.sequences.map_or(*sequence, |(first, _)| first);
+                self.sequences = Some((first, *sequence));
             }
-            Entry::Trigger(_) | Entry::Ship(_) | Entry::Mark(_) | Entry::Truth(_) | Entry::Pose(_) => {}
+            _ => {}
         }
     }
 }

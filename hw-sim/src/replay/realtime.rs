@@ -18,14 +18,13 @@ use bowwave_devices::{
     queue::{NewestSender, newest},
     serial::{ImuPort, ShipPort},
 };
-use bowwave_record::FrameEntry;
 use crossbeam_channel::{Receiver, Sender, bounded};
 
 use super::{
     ReplayError, ReplayOptions, ReplayStats, Shared, Source,
     decode::FrameDecoder,
     locked,
-    wire::{Item, Wire},
+    wire::{Item, RecordedPicture, Wire},
 };
 use crate::pty::Terminal;
 
@@ -229,7 +228,7 @@ impl Pace {
 struct Reader {
     pace: Pace,
     wire: Wire,
-    coded: Sender<FrameEntry>,
+    coded: Sender<RecordedPicture>,
     due: Sender<Due>,
     errors: Sender<ReplayError>,
 }
@@ -327,7 +326,7 @@ impl Line {
 /// The camera.
 struct Camera {
     pace: Pace,
-    coded: Receiver<FrameEntry>,
+    coded: Receiver<RecordedPicture>,
     decoder: FrameDecoder,
     frames: NewestSender<Event>,
 }
@@ -342,8 +341,8 @@ impl Camera {
     }
 
     /// Decodes ahead of time and delivers in time; `false` where the replay is stopped.
-    fn deliver(&mut self, frame: FrameEntry) -> bool {
-        let due = frame.arrival;
+    fn deliver(&mut self, frame: RecordedPicture) -> bool {
+        let due = frame.arrival();
         if !self.pace.wait(due.plus_ns(-DECODE_LEAD_NS)) {
             return false;
         }
@@ -351,18 +350,12 @@ impl Camera {
             self.pace.count(|stats| stats.frames_late += 1);
             return true;
         }
-        let picture = self.decoder.decode(&frame.jpeg);
+        let frame = self.decoder.frame(frame);
         if !self.pace.wait(due) {
             return false;
         }
-        if let Some(picture) = picture {
-            self.frames.send(Event::Frame(CameraFrame {
-                arrival: clock::now(),
-                mid_exposure: frame.mid_exposure,
-                sequence: frame.sequence,
-                picture,
-                jpeg: Some(frame.jpeg),
-            }));
+        if let Some(frame) = frame {
+            self.frames.send(Event::Frame(CameraFrame { arrival: clock::now(), ..frame }));
         }
         let (counters, overwritten) = (self.decoder.counters(), self.frames.dropped());
         self.pace.count(|stats| {

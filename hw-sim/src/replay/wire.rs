@@ -7,7 +7,7 @@ use bowwave_core::{
     time::Time,
 };
 use bowwave_devices::vectornav::CommonOutput;
-use bowwave_record::{Entry, FrameEntry, RecordError};
+use bowwave_record::{Entry, FrameEntry, PictureEntry, RecordError};
 
 use super::laps::Laps;
 use crate::fault::{FaultPlan, Injector, Picture};
@@ -21,8 +21,8 @@ pub(super) enum Item {
         /// A packet, and what precedes it.
         bytes: Vec<u8>,
     },
-    /// A picture, still coded.
-    Frame(FrameEntry),
+    /// A picture as it is recorded.
+    Frame(RecordedPicture),
     /// A trigger edge.
     Trigger(TriggerEdge),
     /// Bytes on the line of the ship's instruments.
@@ -34,6 +34,24 @@ pub(super) enum Item {
     },
     /// The operator's press.
     Mark(Mark),
+}
+
+/// A picture as it is recorded.
+pub(super) enum RecordedPicture {
+    /// As JPEG.
+    Coded(FrameEntry),
+    /// As pixels.
+    Raw(PictureEntry),
+}
+
+impl RecordedPicture {
+    /// When it reaches the host.
+    pub(super) const fn arrival(&self) -> Time {
+        match self {
+            Self::Coded(frame) => frame.arrival,
+            Self::Raw(picture) => picture.arrival,
+        }
+    }
 }
 
 /// Items by replay time.
@@ -94,9 +112,11 @@ impl Wire {
     fn frame(&mut self, frame: FrameEntry) -> Option<Item> {
         let since = frame.arrival.ns_since(self.origin);
         match self.injector.picture(&frame.jpeg, self.laps.picture(), since) {
-            Picture::Same => Some(Item::Frame(frame)),
+            Picture::Same => Some(Item::Frame(RecordedPicture::Coded(frame))),
             Picture::None => None,
-            Picture::Other(jpeg) => Some(Item::Frame(FrameEntry { jpeg: Arc::from(jpeg), ..frame })),
+            Picture::Other(jpeg) => {
+                Some(Item::Frame(RecordedPicture::Coded(FrameEntry { jpeg: Arc::from(jpeg), ..frame })))
+            }
         }
     }
 }
@@ -114,8 +134,15 @@ impl Iterator for Wire {
                     Some(Item::Ship { due: line.arrival, bytes: line.sentence.into_bytes() })
                 }
                 Ok(Entry::Mark(mark)) => Some(Item::Mark(mark)),
-                // What is known afterwards comes over no wire.
-                Ok(Entry::Truth(_) | Entry::Pose(_)) => None,
+                Ok(Entry::Picture(picture)) => Some(Item::Frame(RecordedPicture::Raw(picture))),
+                // Comes over no wire: known afterwards, or of the run that was recorded.
+                Ok(
+                    Entry::Truth(_)
+                    | Entry::Pose(_)
+                    | Entry::ShipValues(_)
+                    | Entry::Fault(_)
+                    | Entry::Tick(_),
+                ) => None,
                 Err(error) => return Some(Err(error)),
             };
             if let Some(item) = item {

@@ -121,7 +121,11 @@ impl Opened {
                         }
                     }
                 }
-                Entry::Frame(_) | Entry::Truth(_) | Entry::Pose(_) | Entry::Ship(_) | Entry::Mark(_) => {}
+                Entry::Picture(raw) if pictures => {
+                    bar.inc(1);
+                    take(Event::Frame(raw.into()));
+                }
+                _ => {}
             }
             Ok(())
         })?;

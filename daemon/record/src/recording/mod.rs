@@ -8,10 +8,15 @@
 //! | `/trigger` | `std_msgs/msg/Bool` | log: the kernel's time of the edge |
 //! | `/ship` | `nmea_msgs/msg/Sentence` | both: arrival |
 //! | `/mark` | `std_msgs/msg/String`: `stow` or `landmark` | log: when the operator pressed |
+//! | `/camera/image_raw` | `sensor_msgs/msg/Image`: a picture without JPEG, where the session saw one | log: arrival; header: mid-exposure |
+//! | `/ship/values` | `bowwave_msgs/msg/ShipValues`: the numbers of the line before it, exact | both: arrival |
+//! | `/fault` | `diagnostic_msgs/msg/DiagnosticArray` of one status: a fault came, went or happened | log: the next tick's; header: the fault's own |
+//! | `/tick` | `bowwave_msgs/msg/Tick`: a frame was due, after all messages before it in the file | log: when it was begun; header: when it is seen |
 //! | `/truth/pose`, `/pose` | `geometry_msgs/msg/PoseStamped` | both: the pose's time |
 //!
 //! Calibration and scenario are attachments (`calibration.toml`, `scenario.toml`), everything else of [`Properties`] is one
-//! metadata record called `bowwave`. Chunks are not compressed, since pictures already are, and none spans more than half
+//! metadata record called `bowwave`. A session's inputs stand in the file in the order in which it met them
+//! ([`RecordingReader::entries_as_written`]); [`RecordingReader::entries`] gives all entries by time. Chunks are not compressed, since pictures already are, and none spans more than half
 //! a second: a file that was cut short misses less than a second.
 
 mod channels;
@@ -29,13 +34,16 @@ mod write;
 use std::sync::Arc;
 
 use bowwave_core::{
-    event::{ImuSample, Mark, TriggerEdge},
+    event::{CameraFrame, ImuSample, Mark, Picture, ShipSample, Tick, TriggerEdge},
+    fault::FaultChange,
     geometry::CameraPose,
     time::Time,
 };
 
 pub use error::RecordError;
 pub use properties::{CameraInfo, Properties};
+use schema::Topic;
+
 pub use read::{Entries, RecordingReader};
 pub use recover::{RecoverReport, recover};
 pub use write::{RecordingWriter, WrittenSummary};
@@ -69,6 +77,14 @@ pub enum Entry {
     Truth(PoseEntry),
     /// The pose that a session used.
     Pose(PoseEntry),
+    /// A picture as the session saw it, without JPEG.
+    Picture(PictureEntry),
+    /// The exact numbers of the ship's line written just before.
+    ShipValues(ShipSample),
+    /// A fault came, went or happened.
+    Fault(FaultEntry),
+    /// A frame was due.
+    Tick(TickEntry),
 }
 
 impl Entry {
@@ -81,6 +97,10 @@ impl Entry {
             Self::Ship(line) => line.arrival,
             Self::Mark(mark) => mark.time,
             Self::Truth(pose) | Self::Pose(pose) => pose.time,
+            Self::Picture(picture) => picture.arrival,
+            Self::ShipValues(sample) => sample.arrival,
+            Self::Fault(fault) => fault.logged,
+            Self::Tick(entry) => entry.tick.time,
         }
     }
 }
@@ -107,6 +127,48 @@ impl std::fmt::Debug for FrameEntry {
             .field("jpeg_bytes", &self.jpeg.len())
             .finish()
     }
+}
+
+/// A picture without JPEG.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PictureEntry {
+    /// When the picture reached the host.
+    pub arrival: Time,
+    /// Middle of the exposure by the camera's time stamp.
+    pub mid_exposure: Time,
+    /// The camera's frame counter.
+    pub sequence: u32,
+    /// The pixels.
+    pub picture: Picture,
+}
+
+impl From<PictureEntry> for CameraFrame {
+    fn from(entry: PictureEntry) -> Self {
+        let PictureEntry { arrival, mid_exposure, sequence, picture } = entry;
+        Self { arrival, mid_exposure, sequence, picture, jpeg: None }
+    }
+}
+
+/// A change of a fault as the session met it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FaultEntry {
+    /// Time that orders the entry: that of the tick which the change belongs to. The change's own may be older.
+    pub logged: Time,
+    /// The change.
+    pub change: FaultChange,
+}
+
+/// A frame that was due, with what the session had given up to then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickEntry {
+    /// The tick.
+    pub tick: Tick,
+    /// Inputs of the session before this tick, ticks included: where fewer are read, some are lost.
+    pub inputs: u64,
+    /// Hash over the records of rounds before this tick.
+    pub records: u64,
+    /// Hash over the scenes before this tick.
+    pub scenes: u64,
 }
 
 /// A line of the ship's instruments as it came over the wire.
@@ -144,23 +206,43 @@ pub struct Counts {
     pub truths: u64,
     /// Poses that were used.
     pub poses: u64,
+    /// Exact numbers of the ship's lines.
+    pub ship_values: u64,
+    /// Changes of faults.
+    pub faults: u64,
+    /// Ticks.
+    pub ticks: u64,
 }
 
 impl Counts {
     /// All entries together.
     pub const fn total(&self) -> u64 {
-        self.imu + self.frames + self.triggers + self.ship + self.marks + self.truths + self.poses
+        self.imu
+            + self.frames
+            + self.triggers
+            + self.ship
+            + self.marks
+            + self.truths
+            + self.poses
+            + self.ship_values
+            + self.faults
+            + self.ticks
     }
 
-    pub(crate) fn add(&mut self, entry: &Entry) {
-        match entry {
-            Entry::Imu(_) => self.imu += 1,
-            Entry::Frame(_) => self.frames += 1,
-            Entry::Trigger(_) => self.triggers += 1,
-            Entry::Ship(_) => self.ship += 1,
-            Entry::Mark(_) => self.marks += 1,
-            Entry::Truth(_) => self.truths += 1,
-            Entry::Pose(_) => self.poses += 1,
-        }
+    /// The counter of a topic; `None` for what is no entry.
+    pub(crate) const fn of(&mut self, topic: Topic) -> Option<&mut u64> {
+        Some(match topic {
+            Topic::Image | Topic::ImageRaw => &mut self.frames,
+            Topic::Imu => &mut self.imu,
+            Topic::Trigger => &mut self.triggers,
+            Topic::Ship => &mut self.ship,
+            Topic::Mark => &mut self.marks,
+            Topic::Truth => &mut self.truths,
+            Topic::Pose => &mut self.poses,
+            Topic::ShipValues => &mut self.ship_values,
+            Topic::Fault => &mut self.faults,
+            Topic::Tick => &mut self.ticks,
+            Topic::CameraInfo => return None,
+        })
     }
 }

@@ -65,6 +65,36 @@ impl RecordingReader {
         self.counts
     }
 
+    /// The entries in the order of the file, which is that in which a session met its inputs. Reads as it goes; ends after the first
+    /// error.
+    pub fn entries_as_written(
+        &self,
+    ) -> Result<impl Iterator<Item = Result<Entry, RecordError>> + use<>, RecordError> {
+        let mut messages = Messages::new(Records::open(&self.path)?, Channels::default());
+        let path = Arc::clone(&self.path);
+        let mut ended = false;
+        Ok(std::iter::from_fn(move || {
+            while !ended {
+                let given = match messages.next() {
+                    Ok(None) => {
+                        ended = true;
+                        return None;
+                    }
+                    Ok(Some(found)) => match entry(&path, &found) {
+                        Ok(None) => continue,
+                        Ok(Some(entry)) => Ok(entry),
+                        // What a power cut left of a chunk's end need not be what was written.
+                        Err(error) => Err(messages.end_cut_chunk().unwrap_or(error)),
+                    },
+                    Err(error) => Err(error),
+                };
+                ended = given.is_err();
+                return Some(given);
+            }
+            None
+        }))
+    }
+
     /// Where the file was cut short, bytes from its beginning; `None` for a whole file.
     pub const fn cut_at(&self) -> Option<u64> {
         self.cut_at
@@ -192,7 +222,11 @@ impl Entries {
 }
 
 fn held_bytes(entry: &Entry) -> u64 {
-    let picture = if let Entry::Frame(frame) = entry { frame.jpeg.len() } else { 0 };
+    let picture = match entry {
+        Entry::Frame(frame) => frame.jpeg.len(),
+        Entry::Picture(picture) => picture.picture.bytes().len(),
+        _ => 0,
+    };
     (picture + size_of::<Waiting>()) as u64
 }
 

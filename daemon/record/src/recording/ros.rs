@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use bowwave_core::{
-    event::{ImuSample, Mark, MarkKind, TriggerEdge},
+    event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipSample, Tick, TriggerEdge},
+    fault::{Change, Fault, FaultChange},
     geometry::CameraPose,
     time::{NS_PER_S, Time},
 };
@@ -12,7 +13,8 @@ use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::{
-    CameraInfo, Entry, FrameEntry, JPEG_MAX_BYTES, PoseEntry, SENTENCE_MAX_BYTES, ShipEntry, schema::Topic,
+    CameraInfo, Entry, FaultEntry, FrameEntry, JPEG_MAX_BYTES, PictureEntry, PoseEntry, SENTENCE_MAX_BYTES,
+    ShipEntry, TickEntry, schema::Topic,
 };
 
 const FRAME_CAMERA: &str = "camera";
@@ -22,6 +24,17 @@ const FRAME_SHIP: &str = "ship";
 
 /// What the operator's presses are called.
 const MARKS: [(MarkKind, &str); 2] = [(MarkKind::Stow, "stow"), (MarkKind::Landmark, "landmark")];
+
+/// Layouts of pictures by their names in sensor_msgs/image_encodings.hpp.
+const ENCODINGS: [(PixelFormat, &str); 3] =
+    [(PixelFormat::Yuyv, "yuv422_yuy2"), (PixelFormat::Nv12, "nv12"), (PixelFormat::Rgb, "rgb8")];
+
+/// The key and the names of what happened to a fault.
+const CHANGE: &str = "change";
+const CHANGES: [&str; 3] = ["raised", "cleared", "noted"];
+
+/// The longest cause of a fault that is kept, bytes.
+const CAUSE_MAX_BYTES: usize = 4096;
 
 #[derive(Serialize, Deserialize)]
 struct Stamp {
@@ -67,6 +80,57 @@ struct CompressedImage<'a> {
     format: String,
     #[serde(borrow, serialize_with = "as_bytes")]
     data: &'a [u8],
+}
+
+#[derive(Serialize, Deserialize)]
+struct Image<'a> {
+    header: Header,
+    height: u32,
+    width: u32,
+    encoding: String,
+    is_bigendian: u8,
+    step: u32,
+    #[serde(borrow, serialize_with = "as_bytes")]
+    data: &'a [u8],
+}
+
+#[derive(Serialize, Deserialize)]
+struct ShipValues {
+    header: Header,
+    heading: f64,
+    roll: f64,
+    pitch: f64,
+    heading_sigma: f64,
+    reduced: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct DiagnosticArray {
+    header: Header,
+    status: Vec<DiagnosticStatus>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct DiagnosticStatus {
+    level: u8,
+    name: String,
+    message: String,
+    hardware_id: String,
+    values: Vec<KeyValue>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct KeyValue {
+    key: String,
+    value: String,
+}
+
+#[derive(Serialize, Deserialize)]
+struct TickMessage {
+    header: Header,
+    inputs: u64,
+    records: u64,
+    scenes: u64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -163,6 +227,24 @@ pub(crate) fn encode(entry: &Entry, out: &mut Vec<u8>) -> Result<Topic, String> 
             write(out, &pose_message(pose)?)?;
             Ok(Topic::Pose)
         }
+        Entry::Picture(picture) => {
+            out.reserve(picture.picture.bytes().len() + 64);
+            write(out, &image_message(picture)?)?;
+            Ok(Topic::ImageRaw)
+        }
+        Entry::ShipValues(sample) => {
+            write(out, &ship_message(sample)?)?;
+            Ok(Topic::ShipValues)
+        }
+        Entry::Fault(entry) => {
+            write(out, &fault_message(&entry.change)?)?;
+            Ok(Topic::Fault)
+        }
+        Entry::Tick(entry) => {
+            let TickEntry { tick, inputs, records, scenes } = *entry;
+            write(out, &TickMessage { header: header(tick.shown, "")?, inputs, records, scenes })?;
+            Ok(Topic::Tick)
+        }
     }
 }
 
@@ -234,7 +316,104 @@ pub(crate) fn decode(
         }
         Topic::Truth => Entry::Truth(pose_entry(&read(data)?, log_time)?),
         Topic::Pose => Entry::Pose(pose_entry(&read(data)?, log_time)?),
+        Topic::ImageRaw => Entry::Picture(picture_entry(&read(data)?, log_time, sequence)?),
+        Topic::ShipValues => Entry::ShipValues(ship_sample(&read(data)?, log_time)),
+        Topic::Fault => Entry::Fault(fault_entry(read(data)?, log_time)?),
+        Topic::Tick => {
+            let TickMessage { header, inputs, records, scenes } = read(data)?;
+            let tick = Tick { time: log_time, shown: time(&header.stamp)? };
+            Entry::Tick(TickEntry { tick, inputs, records, scenes })
+        }
     }))
+}
+
+fn image_message(entry: &PictureEntry) -> Result<Image<'_>, String> {
+    let picture = &entry.picture;
+    let encoding = ENCODINGS.into_iter().find(|(format, _)| *format == picture.format());
+    let (_, encoding) = encoding.ok_or("a picture of a layout without a name")?;
+    Ok(Image {
+        header: header(entry.mid_exposure, FRAME_CAMERA)?,
+        height: picture.height(),
+        width: picture.width(),
+        encoding: encoding.to_owned(),
+        is_bigendian: 0,
+        step: picture.format().byte_len(picture.width(), 2) as u32
+            / if picture.format() == PixelFormat::Nv12 { 3 } else { 2 },
+        data: picture.bytes(),
+    })
+}
+
+fn picture_entry(message: &Image<'_>, arrival: Time, sequence: u32) -> Result<PictureEntry, String> {
+    let encoding = ENCODINGS.into_iter().find(|(_, name)| *name == message.encoding);
+    let (format, _) =
+        encoding.ok_or_else(|| format!("a picture in encoding {:?}, which is not read", message.encoding))?;
+    let picture = Picture::new(format, message.width, message.height, Arc::from(message.data))
+        .map_err(|e| e.to_string())?;
+    Ok(PictureEntry { arrival, mid_exposure: time(&message.header.stamp)?, sequence, picture })
+}
+
+fn ship_message(sample: &ShipSample) -> Result<ShipValues, String> {
+    let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    Ok(ShipValues {
+        header: header(sample.arrival, FRAME_SHIP)?,
+        heading: number(sample.heading),
+        roll: number(sample.roll),
+        pitch: number(sample.pitch),
+        heading_sigma: number(sample.heading_sigma),
+        reduced: sample.reduced,
+    })
+}
+
+fn ship_sample(message: &ShipValues, arrival: Time) -> ShipSample {
+    let told = |value: f64| value.is_finite().then_some(value);
+    ShipSample {
+        arrival,
+        heading: told(message.heading),
+        roll: told(message.roll),
+        pitch: told(message.pitch),
+        heading_sigma: told(message.heading_sigma),
+        reduced: message.reduced,
+    }
+}
+
+fn fault_message(change: &FaultChange) -> Result<DiagnosticArray, String> {
+    let (what, level, cause) = match &change.change {
+        Change::Raised { cause } => (0, 2, cause.as_str()),
+        Change::Cleared => (1, 0, ""),
+        Change::Noted { cause } => (2, 1, cause.as_str()),
+    };
+    // The cause is for people: its first lines do.
+    let end = cause
+        .char_indices()
+        .map(|(at, c)| at + c.len_utf8())
+        .take_while(|end| *end <= CAUSE_MAX_BYTES)
+        .last();
+    Ok(DiagnosticArray {
+        header: header(change.time, "")?,
+        status: vec![DiagnosticStatus {
+            level,
+            name: change.fault.code().to_owned(),
+            message: cause.get(..end.unwrap_or(0)).unwrap_or_default().to_owned(),
+            hardware_id: String::new(),
+            values: vec![KeyValue { key: CHANGE.to_owned(), value: CHANGES[what].to_owned() }],
+        }],
+    })
+}
+
+fn fault_entry(message: DiagnosticArray, logged: Time) -> Result<FaultEntry, String> {
+    let when = time(&message.header.stamp)?;
+    let [status] = <[DiagnosticStatus; 1]>::try_from(message.status)
+        .map_err(|all| format!("{} states of faults in one message, not 1", all.len()))?;
+    let fault = Fault::from_code(&status.name)
+        .ok_or_else(|| format!("a fault {:?}, which is not known", status.name))?;
+    let value = status.values.iter().find(|pair| pair.key == CHANGE).map_or("", |pair| pair.value.as_str());
+    let change = match CHANGES.iter().position(|name| *name == value) {
+        Some(0) => Change::Raised { cause: status.message },
+        Some(1) => Change::Cleared,
+        Some(2) => Change::Noted { cause: status.message },
+        _ => return Err(format!("a fault that is {value:?}: neither raised, cleared nor noted")),
+    };
+    Ok(FaultEntry { logged, change: FaultChange { time: when, fault, change } })
 }
 
 /// A line that can be kept: one that a wire could have carried.

@@ -17,10 +17,14 @@ pub(crate) enum Topic {
     Mark,
     Truth,
     Pose,
+    ImageRaw,
+    ShipValues,
+    Fault,
+    Tick,
 }
 
 impl Topic {
-    pub(crate) const ALL: [Self; 8] = [
+    pub(crate) const ALL: [Self; 12] = [
         Self::Image,
         Self::CameraInfo,
         Self::Imu,
@@ -29,6 +33,10 @@ impl Topic {
         Self::Mark,
         Self::Truth,
         Self::Pose,
+        Self::ImageRaw,
+        Self::ShipValues,
+        Self::Fault,
+        Self::Tick,
     ];
 
     pub(crate) const fn name(self) -> &'static str {
@@ -41,6 +49,10 @@ impl Topic {
             Self::Mark => "/mark",
             Self::Truth => "/truth/pose",
             Self::Pose => "/pose",
+            Self::ImageRaw => "/camera/image_raw",
+            Self::ShipValues => "/ship/values",
+            Self::Fault => "/fault",
+            Self::Tick => "/tick",
         }
     }
 
@@ -53,6 +65,10 @@ impl Topic {
             Self::Ship => "nmea_msgs/msg/Sentence",
             Self::Mark => "std_msgs/msg/String",
             Self::Truth | Self::Pose => "geometry_msgs/msg/PoseStamped",
+            Self::ImageRaw => "sensor_msgs/msg/Image",
+            Self::ShipValues => "bowwave_msgs/msg/ShipValues",
+            Self::Fault => "diagnostic_msgs/msg/DiagnosticArray",
+            Self::Tick => "bowwave_msgs/msg/Tick",
         }
     }
 
@@ -72,6 +88,10 @@ impl Topic {
             Self::Truth | Self::Pose => {
                 &[("", "std_msgs/Header header\nPose pose\n"), HEADER, TIME, POSE, POINT, QUATERNION]
             }
+            Self::ImageRaw => &[("", IMAGE), HEADER, TIME],
+            Self::ShipValues => &[("", SHIP_VALUES), HEADER, TIME],
+            Self::Fault => &[("", DIAGNOSTIC_ARRAY), HEADER, TIME, DIAGNOSTIC_STATUS, KEY_VALUE],
+            Self::Tick => &[("", TICK), HEADER, TIME],
         };
         let mut text = String::new();
         for (name, body) in parts {
@@ -88,6 +108,36 @@ impl Topic {
 }
 
 const COMPRESSED_IMAGE: &str = "std_msgs/Header header\nstring format\nuint8[] data\n";
+
+const IMAGE: &str = "\
+std_msgs/Header header
+uint32 height
+uint32 width
+string encoding
+uint8 is_bigendian
+uint32 step
+uint8[] data
+";
+
+/// NaN stands for what was not told; angles in radians.
+const SHIP_VALUES: &str = "\
+std_msgs/Header header
+float64 heading
+float64 roll
+float64 pitch
+float64 heading_sigma
+bool reduced
+";
+
+const DIAGNOSTIC_ARRAY: &str = "std_msgs/Header header\nDiagnosticStatus[] status\n";
+const DIAGNOSTIC_STATUS: (&str, &str) = (
+    "diagnostic_msgs/DiagnosticStatus",
+    "byte level\nstring name\nstring message\nstring hardware_id\nKeyValue[] values\n",
+);
+const KEY_VALUE: (&str, &str) = ("diagnostic_msgs/KeyValue", "string key\nstring value\n");
+
+/// The header's stamp is when the frame is seen; `records` and `scenes` are hashes over what the session gave before.
+const TICK: &str = "std_msgs/Header header\nuint64 inputs\nuint64 records\nuint64 scenes\n";
 
 const CAMERA_INFO: &str = "\
 std_msgs/Header header

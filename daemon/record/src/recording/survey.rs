@@ -75,15 +75,8 @@ impl Survey {
 
     fn take_statistics(&mut self, statistics: &Statistics) -> Option<()> {
         for (channel, count) in &statistics.channel_message_counts {
-            let slot = match self.channels.topic(*channel) {
-                Some(Topic::Image) => &mut self.counts.frames,
-                Some(Topic::Imu) => &mut self.counts.imu,
-                Some(Topic::Trigger) => &mut self.counts.triggers,
-                Some(Topic::Ship) => &mut self.counts.ship,
-                Some(Topic::Mark) => &mut self.counts.marks,
-                Some(Topic::Truth) => &mut self.counts.truths,
-                Some(Topic::Pose) => &mut self.counts.poses,
-                Some(Topic::CameraInfo) | None => continue,
+            let Some(slot) = self.channels.topic(*channel).and_then(|topic| self.counts.of(topic)) else {
+                continue;
             };
             *slot = slot.checked_add(*count)?;
         }
@@ -112,19 +105,10 @@ impl Survey {
     }
 
     fn take_message(&mut self, found: &Found<'_>) {
-        match found.topic {
-            Topic::Image => self.counts.frames += 1,
-            Topic::Imu => self.counts.imu += 1,
-            Topic::Trigger => self.counts.triggers += 1,
-            Topic::Ship => self.counts.ship += 1,
-            Topic::Mark => self.counts.marks += 1,
-            Topic::Truth => self.counts.truths += 1,
-            Topic::Pose => self.counts.poses += 1,
-            Topic::CameraInfo => {
-                if self.camera_info.is_none() {
-                    self.camera_info = ros::decode_camera_info(found.data).ok();
-                }
-            }
+        if let Some(count) = self.counts.of(found.topic) {
+            *count += 1;
+        } else if self.camera_info.is_none() {
+            self.camera_info = ros::decode_camera_info(found.data).ok();
         }
         let (first, last) = self.span.unwrap_or((found.time, found.time));
         self.span = Some((first.min(found.time), last.max(found.time)));

@@ -160,6 +160,7 @@ impl RecordingWriter {
         })?;
         let sequence = match entry {
             Entry::Frame(frame) => frame.sequence,
+            Entry::Picture(picture) => picture.sequence,
             _ => {
                 let next = &mut self.sequences[topic as usize];
                 *next = next.wrapping_add(1);
@@ -172,7 +173,9 @@ impl RecordingWriter {
             self.flush()?;
         }
         self.put(topic, time, sequence)?;
-        self.counts.add(entry);
+        if let Some(count) = self.counts.of(topic) {
+            *count += 1;
+        }
         self.first = Some(self.first.map_or(time, |first| first.min(time)));
         self.newest = Some(self.newest.map_or(time, |newest| newest.max(time)));
         Ok(())
