@@ -16,12 +16,12 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the workspace").to_path_buf()
 }
 
-/// The program, built as it is shipped.
+/// The program, built as it is shipped, with the laboratory's program beside it.
 pub fn program() -> &'static Path {
     static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
     PROGRAM.get_or_init(|| {
         let built = Command::new(env!("CARGO"))
-            .args(["build", "--release", "--quiet", "-p", "bowwave"])
+            .args(["build", "--release", "--quiet", "-p", "bowwave", "-p", "bowwave-lab"])
             .current_dir(root())
             .status()
             .expect("cargo runs");

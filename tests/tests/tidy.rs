@@ -25,9 +25,10 @@ const RANKS: &[(&str, u8)] = &[
     ("hw-sim", 3),
     ("bowwave-import", 3),
     ("bowwave", 4),
-    ("bowwave-tests", 5),
-    ("precision", 5),
-    ("bowwave-hil", 5),
+    ("bowwave-lab", 5),
+    ("bowwave-tests", 6),
+    ("precision", 6),
+    ("bowwave-hil", 6),
 ];
 
 fn root() -> PathBuf {

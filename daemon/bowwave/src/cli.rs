@@ -3,10 +3,9 @@
 mod calibrate;
 mod mounting;
 
-use std::path::PathBuf;
+use std::{ffi::OsString, path::PathBuf};
 
-use bowwave_core::{time::secs_to_ns, water::ReflectionMethod};
-use bowwave_import::Level;
+use bowwave_core::time::secs_to_ns;
 use clap::{Args, Parser, Subcommand};
 use hw_sim::fault::{Fault, FaultKind};
 
@@ -36,11 +35,14 @@ pub enum Command {
     /// Run the trainer on a recording, as if its camera, inertial unit and trigger were there
     Simulate(Simulate),
     /// Make a recording from a folder of pictures or from a video
-    Import(Import),
+    #[command(disable_help_flag = true)]
+    Import(LabArguments),
     /// Compose boats into a photograph
-    Compose(Compose),
+    #[command(disable_help_flag = true)]
+    Compose(LabArguments),
     /// Make the user study of real and generated reflections, or score its answers
-    Study(Study),
+    #[command(disable_help_flag = true)]
+    Study(LabArguments),
     /// Print what a scenario needs: passes, shader variants, memory, and why the rest is left out
     Plan(Plan),
     /// Check this computer: GPU, camera, serial lines, trigger lines, disk; each with what to do about it
@@ -148,118 +150,13 @@ pub struct Simulate {
     pub json: bool,
 }
 
-/// Arguments of `import`.
+/// Arguments of a command of the laboratory, which its program `bowwave-lab` reads.
 #[derive(Debug, Args)]
-pub struct Import {
-    /// Folder of JPEG or PNG pictures, or a video file
-    pub source: PathBuf,
-    /// Recording to write (MCAP)
-    #[arg(short, long, value_name = "FILE")]
-    pub out: PathBuf,
-    /// Calibration file (TOML): lens, camera-from-IMU rotation, time offset
-    #[arg(long, value_name = "FILE")]
-    pub calibration: Option<PathBuf>,
-    /// Scenario file (TOML) to keep in the recording
-    #[arg(long, value_name = "FILE")]
-    pub scenario: Option<PathBuf>,
-    /// Pictures a second of a folder of pictures
-    #[arg(long, value_name = "HZ", default_value_t = 30.0)]
-    pub rate: f64,
-    /// Take the gyro's bias from the first S seconds, during which the camera must not turn
-    #[arg(long, value_name = "S")]
-    pub bias_from: Option<f64>,
-    /// How the camera was held at the first picture: degrees above the horizontal, and degrees rolled clockwise.
-    /// Without it the unit is levelled by its accelerometer, which a moving camera misleads
-    #[arg(long, value_name = "UP,ROLL", value_parser = parse_level, allow_hyphen_values = true)]
-    pub level: Option<Level>,
-    /// Replace a recording of that name
-    #[arg(long)]
-    pub force: bool,
-    /// Print what was imported as JSON
-    #[arg(long)]
-    pub json: bool,
+pub struct LabArguments {
+    /// Handed on as they are; --help lists them
+    #[arg(value_name = "ARGUMENTS", trailing_var_arg = true, allow_hyphen_values = true)]
+    pub arguments: Vec<OsString>,
 }
-
-/// Arguments of `compose`.
-#[derive(Debug, Args)]
-pub struct Compose {
-    /// Scene file (TOML): picture, camera, boats, sea and light
-    #[arg(required_unless_present = "example")]
-    pub scene: Option<PathBuf>,
-    /// Print a commented scene to begin with
-    #[arg(long, conflicts_with_all = ["scene", "method", "out"])]
-    pub example: bool,
-    /// Folder for the pictures, which keep their names
-    #[arg(long, value_name = "DIR", default_value = "bowwave-out")]
-    pub out: PathBuf,
-    /// How the sea mirrors, instead of the scene's own method; several, with commas between, or "all" make a picture each
-    #[arg(long, value_name = "METHOD", value_parser = parse_methods)]
-    pub method: Option<Methods>,
-    /// Vulkan device: its number, or part of its name
-    #[arg(long, value_name = "NAME")]
-    pub gpu: Option<String>,
-    /// Run with Vulkan's validation layer; anything it reports makes the run fail
-    #[arg(long)]
-    pub validation: bool,
-}
-
-/// Arguments of `study`.
-#[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true)]
-pub struct Study {
-    /// What to do instead of making one
-    #[command(subcommand)]
-    pub task: Option<StudyTask>,
-    /// Folder for the page, the pictures and the key
-    #[arg(long, value_name = "DIR", default_value = "bowwave-study")]
-    pub out: PathBuf,
-    /// Folder with photographs of real reflections, cut so that neither boat nor horizon is seen; the thesis had 18
-    #[arg(long, value_name = "DIR")]
-    pub real: Option<PathBuf>,
-    /// Scene file as of `bowwave compose` whose picture, or pictures, are a background; twice. Without it two simulated seas
-    #[arg(long, value_name = "FILE")]
-    pub background: Vec<PathBuf>,
-    /// The two ways to mirror that are compared
-    #[arg(long, value_name = "METHOD,METHOD", value_parser = parse_methods)]
-    pub methods: Option<Methods>,
-    /// How many participants get an order of their own
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = parse_participants)]
-    pub participants: usize,
-    /// Seed of orders, names and places
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
-    /// Replace a study that is in the folder
-    #[arg(long)]
-    pub force: bool,
-    /// Vulkan device: its number, or part of its name
-    #[arg(long, value_name = "NAME")]
-    pub gpu: Option<String>,
-}
-
-/// What else to do with a study.
-#[derive(Debug, Subcommand)]
-pub enum StudyTask {
-    /// Compute rates by factor, standard errors and d' from answers
-    Score(StudyScore),
-}
-
-/// Arguments of `study score`.
-#[derive(Debug, Args)]
-pub struct StudyScore {
-    /// Files that the page saved, or filled-in answer sheets
-    #[arg(required = true)]
-    pub answers: Vec<PathBuf>,
-    /// The study's key
-    #[arg(long, value_name = "FILE", default_value = "bowwave-study/key.csv")]
-    pub key: PathBuf,
-    /// Print as JSON
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Ways to mirror, at least one, each once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Methods(pub Vec<ReflectionMethod>);
 
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
@@ -359,21 +256,6 @@ pub struct Hits {
     pub hits_only: bool,
 }
 
-/// `-2.5,0.4`.
-fn parse_level(text: &str) -> Result<Level, String> {
-    let usage = || format!("'{text}' is no attitude: write UP,ROLL in degrees, each -89 to 89, as -2.5,0.4");
-    let (up, roll) = text.split_once(',').ok_or_else(usage)?;
-    let radians = |s: &str| {
-        s.trim()
-            .parse::<f64>()
-            .ok()
-            .filter(|v| (-89.0..=89.0).contains(v))
-            .map(f64::to_radians)
-            .ok_or_else(usage)
-    };
-    Ok(Level { elevation: radians(up)?, roll: radians(roll)? })
-}
-
 /// `imu-freeze@2.5+0.5`.
 fn parse_fault(text: &str) -> Result<Fault, String> {
     let kinds = [
@@ -407,29 +289,6 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// `full`, `mirror,full` or `all`.
-fn parse_methods(text: &str) -> Result<Methods, String> {
-    if text == "all" {
-        return Ok(Methods(ReflectionMethod::ALL.to_vec()));
-    }
-    let mut methods = Vec::new();
-    for name in text.split(',') {
-        let method = ReflectionMethod::of_name(name.trim()).ok_or_else(|| {
-            let names = ReflectionMethod::ALL.map(ReflectionMethod::name).join(", ");
-            format!("'{name}' is no way to mirror; there are {names}, and all")
-        })?;
-        if !methods.contains(&method) {
-            methods.push(method);
-        }
-    }
-    Ok(Methods(methods))
-}
-
-fn parse_participants(text: &str) -> Result<usize, String> {
-    let number = text.parse::<usize>().ok().filter(|n| (1..=1000).contains(n));
-    number.ok_or_else(|| format!("'{text}' is no number of participants: write 1 to 1000"))
-}
-
 fn parse_duration(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if s.is_finite() && s > 0.0 && s <= 30.0 * 86_400.0 => Ok(s),
@@ -455,17 +314,6 @@ mod tests {
             ["", "imu-freeze", "imu-freeze@1", "nothing@1+1", "imu-nan@-1+1", "imu-nan@1+x", "imu-nan@NaN+1"]
         {
             assert!(parse_fault(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn methods() {
-        use ReflectionMethod::{Full, Mirror, Off};
-        assert_eq!(parse_methods("mirror"), Ok(Methods(vec![Mirror])));
-        assert_eq!(parse_methods("none, full,off"), Ok(Methods(vec![Off, Full])));
-        assert_eq!(parse_methods("all"), Ok(Methods(ReflectionMethod::ALL.to_vec())));
-        for bad in ["", "magic", "full,", "all,full"] {
-            assert!(parse_methods(bad).is_err(), "{bad}");
         }
     }
 

@@ -1,33 +1,9 @@
-//! From a scene's plan to a renderer that can do just that.
+//! The renderer's configuration of a scene's plan.
 
-use bowwave_core::{
-    frame::{plan::ScenePlan, scene::Pass},
-    session::ROUNDS_SEEN_MAX,
-};
-use bowwave_render::{Needs, PictureShape, RenderConfig, TimeOuts};
+use bowwave_core::frame::plan::ScenePlan;
+use bowwave_render::RenderConfig;
 
-/// Frames in flight: one being drawn, one being read, one being filled.
-const FRAMES_IN_FLIGHT: usize = 3;
-
-/// How to make the renderer of a plan, on the device that `gpu` names (the first GPU where it names none).
+/// [`RenderConfig::of_plan`].
 pub fn config(plan: &ScenePlan, gpu: Option<String>, validation: bool) -> RenderConfig {
-    let only = |pass: Pass, n: usize| if plan.has(pass) { n } else { 0 };
-    let waters =
-        if plan.has(Pass::Water) { vec![(plan.water.method, plan.water.shadow)] } else { Vec::new() };
-    RenderConfig {
-        width: plan.size.0,
-        height: plan.size.1,
-        device: gpu,
-        validation,
-        frames_in_flight: FRAMES_IN_FLIGHT,
-        needs: Needs {
-            boats_max: only(Pass::Boats, plan.boats),
-            wakes_max: only(Pass::Wake, plan.moving),
-            rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
-            waters,
-            optics: plan.optics,
-        },
-        picture: Some(PictureShape { format: plan.video, width: plan.picture.0, height: plan.picture.1 }),
-        time_outs: TimeOuts::default(),
-    }
+    RenderConfig::of_plan(plan, gpu, validation)
 }

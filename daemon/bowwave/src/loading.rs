@@ -7,6 +7,7 @@ use bowwave_core::{
     model::{Model, ModelId},
     world::scenario::{self, Scenario},
 };
+use bowwave_models::BoatModels;
 
 /// Text of the scenario that `path` names, a file or a built-in one, and the folder that its models' paths start from.
 pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
@@ -29,37 +30,9 @@ pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
     }
 }
 
-/// Models, each once, and which of them each boat has.
-#[derive(Clone, Debug, Default)]
-pub struct Models {
-    /// The models, in the order in which [`ModelId`] counts them.
-    pub list: Vec<Model>,
-    /// The model of each boat.
-    pub of_boats: Vec<ModelId>,
-}
-
-/// Loads the models of `boats`, pairs of a boat's name and its model's. Paths count from `base`.
-pub fn load_models<'a>(boats: impl IntoIterator<Item = (&'a str, &'a str)>, base: &Path) -> Result<Models> {
-    let mut names: Vec<&str> = Vec::new();
-    let mut models = Models::default();
-    for (boat, model) in boats {
-        let place = match names.iter().position(|n| *n == model) {
-            Some(place) => place,
-            None => {
-                let loaded = bowwave_models::resolve(model, base)
-                    .with_context(|| format!("cannot load the model of {boat}"))?;
-                names.push(model);
-                models.list.push(loaded);
-                models.list.len() - 1
-            }
-        };
-        models.of_boats.push(ModelId(u16::try_from(place).context("more than 65536 models")?));
-    }
-    Ok(models)
-}
-
 /// The models of a scenario's boats.
 pub fn scenario_models(scenario: &Scenario, base: &Path) -> Result<(Vec<Model>, Vec<ModelId>)> {
     let boats = scenario.boats.iter().map(|b| (b.name.as_str(), b.model.as_str()));
-    load_models(boats, base).map(|models| (models.list, models.of_boats))
+    let models = BoatModels::load(boats, base)?;
+    Ok((models.list, models.of_boats))
 }

@@ -19,7 +19,6 @@ pub mod pacing;
 pub mod physics;
 pub mod sea;
 pub mod session;
-pub mod still;
 pub mod text;
 pub mod time;
 pub mod water;

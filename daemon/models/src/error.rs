@@ -5,6 +5,20 @@ use std::io;
 /// Why a model cannot be used: which file, what is wrong, what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
+    /// The model of a boat cannot be used.
+    #[error("cannot load the model of {boat}")]
+    OfBoat {
+        /// Name of the boat.
+        boat: String,
+        /// The model's own error.
+        source: Box<ModelError>,
+    },
+    /// More models than [`ModelId`](bowwave_core::model::ModelId) counts.
+    #[error("more than {limit} models; leave boats out")]
+    TooMany {
+        /// Largest number.
+        limit: u16,
+    },
     /// No built-in model and no file of a known kind.
     #[error(
         "there is no model {name:?}; built in are {}; a file of your own ends in .glb, .gltf or .png", known.join(", ")

@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+mod boats;
 mod build;
 mod error;
 mod finish;
@@ -18,6 +19,7 @@ use std::path::Path;
 use bowwave_core::model::Model;
 
 pub use crate::{
+    boats::BoatModels,
     build::{Boat, build_glb},
     error::ModelError,
     load::{load, load_glb},

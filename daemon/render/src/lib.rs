@@ -16,6 +16,7 @@ mod import;
 mod lobes;
 mod memory;
 mod meshes;
+mod of_plan;
 mod parts;
 mod passes;
 mod pipeline;

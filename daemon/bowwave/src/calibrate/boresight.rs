@@ -10,7 +10,7 @@ use bowwave_core::event::{CameraFrame, Event, TriggerEdge};
 use glam::DVec2;
 
 use super::material::{Opened, open, tell, write};
-use crate::{cli::CalibrateBoresight, import::today, outcome::Outcome};
+use crate::{cli::CalibrateBoresight, outcome::Outcome, today::today};
 
 /// A pull of the trigger, with the picture nearest to it.
 type Shown = Pull<CameraFrame>;

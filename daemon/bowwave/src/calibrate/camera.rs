@@ -15,7 +15,7 @@ use super::{
     material::begun,
     pictures::{Looked, look},
 };
-use crate::{cli::CalibrateCamera, import::today, outcome::Outcome, stdout};
+use crate::{cli::CalibrateCamera, outcome::Outcome, stdout, today::today};
 
 /// Most pictures that the lens is solved from: more take longer and tell nothing new.
 const USED_MOST: usize = 40;

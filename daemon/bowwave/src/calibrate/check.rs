@@ -4,7 +4,7 @@ use anyhow::Result;
 use bowwave_calibration::sheet::{Sheet, Verdict};
 
 use super::material::{look, tell};
-use crate::{cli::CalibrateCheck, import::today, outcome::Outcome};
+use crate::{cli::CalibrateCheck, outcome::Outcome, today::today};
 
 /// Checks and tells: done where it holds, failed where it does not, partly where the recording does not tell.
 pub fn run(arguments: &CalibrateCheck) -> Result<Outcome> {

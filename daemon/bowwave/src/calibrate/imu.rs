@@ -4,7 +4,7 @@ use anyhow::Result;
 use bowwave_calibration::sheet::{Sheet, Verdict};
 
 use super::material::{look, tell, write};
-use crate::{cli::CalibrateImu, import::today, outcome::Outcome};
+use crate::{cli::CalibrateImu, outcome::Outcome, today::today};
 
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateImu) -> Result<Outcome> {

@@ -8,7 +8,7 @@ use bowwave_calibration::{
 };
 
 use super::material::{open, tell, write};
-use crate::{cli::CalibrateTrigger, import::today, outcome::Outcome};
+use crate::{cli::CalibrateTrigger, outcome::Outcome, today::today};
 
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateTrigger) -> Result<Outcome> {

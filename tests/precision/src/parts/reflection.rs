@@ -1,10 +1,8 @@
 //! What a method makes of a boat's light on the sea, against the ray tracer.
 
 use anyhow::{Context, Result};
-use bowwave_core::{
-    still::{EXAMPLE, Still},
-    water::ReflectionMethod,
-};
+use bowwave_core::water::ReflectionMethod;
+use bowwave_lab::still::{EXAMPLE, Still};
 use bowwave_render::SOFTWARE;
 
 use super::About;

@@ -1,18 +1,14 @@
 //! A boat cut out of its photograph, as a picture boat of the product.
 
 use anyhow::{Context, Result};
-use bowwave::{
-    compose::{Easel, Photo},
-    loading::Models,
-};
 use bowwave_core::{
     frame::scene::Scene,
     geometry::horizon_dip,
     model::ModelId,
-    still::Still,
     water::{ReflectionMethod, ShadowLevel},
 };
-use bowwave_models::{Bow, QuadSpec, quad};
+use bowwave_lab::{OffscreenRenderer, Photo, still::Still};
+use bowwave_models::{BoatModels, Bow, QuadSpec, quad};
 use glam::{DVec2, DVec3, Vec3};
 use image::{RgbImage, Rgba, RgbaImage};
 
@@ -59,10 +55,12 @@ pub fn draw(
         helm: None,
     };
     let model = quad(&view.series, "cut-out", cut.picture.clone(), &spec)?;
-    let models = Models { list: vec![model], of_boats: vec![ModelId(0)] };
+    let models = BoatModels { list: vec![model], of_boats: vec![ModelId(0)] };
     let mut composed = still.compose(&canvas.picture, 0, (&models.list, &models.of_boats), None)?;
     shine_as_photographed(&mut composed.scene);
-    Easel::new(models, None, false).draw(&composed, &canvas.picture).context("cannot draw the boat")
+    OffscreenRenderer::new(models, None, false)
+        .draw(&composed, &canvas.picture)
+        .context("cannot draw the boat")
 }
 
 /// The camera and the boat's place, as a user of `bowwave compose` writes them. The optical axis goes level to the horizon above

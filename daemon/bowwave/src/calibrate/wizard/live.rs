@@ -30,7 +30,6 @@ use crate::{
     calibrate::material::begun,
     cli::CalibrateWizard,
     config::ScreenOutput,
-    import::today,
     outcome::Outcome,
     recorder::Recorder,
     run::{
@@ -40,6 +39,7 @@ use crate::{
         settings::{Reader, Settings},
         starts::Mode,
     },
+    today::today,
 };
 
 /// Time between looks at devices and keys: that of the display.

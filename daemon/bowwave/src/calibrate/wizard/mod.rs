@@ -70,7 +70,7 @@ impl Guided {
             file,
             out,
             report: arguments.report.clone(),
-            today: crate::import::today()?,
+            today: crate::today::today()?,
             eye_height_m,
             tag: arguments.tag,
             pulls_are_keys: arguments.replay.is_none(),

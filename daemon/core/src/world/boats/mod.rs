@@ -16,7 +16,7 @@ pub use ride::Ride;
 use glam::DVec2;
 
 /// Unit vector (x east, y north) of a heading, radians clockwise from north.
-pub(crate) fn ahead(heading: f64) -> DVec2 {
+pub fn ahead(heading: f64) -> DVec2 {
     DVec2::new(heading.sin(), heading.cos())
 }
 

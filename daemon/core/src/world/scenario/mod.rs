@@ -3,9 +3,9 @@
 //! Degrees, knots and minutes stay outside: everything here is in radians, metres and seconds.
 
 mod boat;
-pub(crate) mod read;
+pub mod read;
 mod sun;
-pub(crate) mod table;
+pub mod table;
 
 use glam::{DVec2, DVec3};
 
@@ -171,7 +171,7 @@ impl Scenario {
 }
 
 /// World x and y of what lies `range_m` away at `bearing`, radians clockwise from north.
-pub(crate) fn place(bearing: f64, range_m: f64) -> DVec2 {
+pub fn place(bearing: f64, range_m: f64) -> DVec2 {
     DVec2::new(bearing.sin(), bearing.cos()) * range_m
 }
 

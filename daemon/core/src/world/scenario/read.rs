@@ -49,7 +49,7 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, ScenarioErr
 }
 
 /// The text as TOML.
-pub(crate) fn document<'a>(text: &'a str, origin: &str) -> Result<Spanned<DeTable<'a>>, ScenarioError> {
+pub fn document<'a>(text: &'a str, origin: &str) -> Result<Spanned<DeTable<'a>>, ScenarioError> {
     DeTable::parse(text).map_err(|e| {
         let place = Mark::at(text, e.span().map_or(0, |span| span.start));
         place.error(origin, "", e.message().to_owned())
@@ -57,7 +57,7 @@ pub(crate) fn document<'a>(text: &'a str, origin: &str) -> Result<Spanned<DeTabl
 }
 
 /// The table `[sea]`, in which the keys `more` are the caller's.
-pub(crate) fn sea(table: &Table<'_>, more: &[&str]) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
+pub fn sea(table: &Table<'_>, more: &[&str]) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
     let keys = ["beaufort", "wind_from_deg", "significant_wave_height_m", "peak_period_s"];
     table.only(&[&keys, more].concat())?;
     let number = table.integer("beaufort", 0..=12)?.unwrap_or(2);
@@ -85,14 +85,14 @@ pub(crate) fn sea(table: &Table<'_>, more: &[&str]) -> Result<(BeaufortForce, Wa
 
 /// The table `[light]`, in which the keys `more` are the caller's: the unit vector towards the sun, world, and the meteorological
 /// visibility, metres.
-pub(crate) fn light(table: &Table<'_>, more: &[&str]) -> Result<(DVec3, f64), ScenarioError> {
+pub fn light(table: &Table<'_>, more: &[&str]) -> Result<(DVec3, f64), ScenarioError> {
     table.only(&[&sun::KEYS, more, &["visibility_km"]].concat())?;
     let visibility_km = table.number("visibility_km", 0.05..=200.0, "km")?.unwrap_or(20.0);
     Ok((sun::direction(table)?, 1000.0 * visibility_km))
 }
 
 /// The table `[reflection]`.
-pub(crate) fn reflection(table: &Table<'_>, force: BeaufortForce) -> Result<Water, ScenarioError> {
+pub fn reflection(table: &Table<'_>, force: BeaufortForce) -> Result<Water, ScenarioError> {
     table.only(&["method", "shadow_level"])?;
     let methods = ReflectionMethod::ALL.map(|method| (method.name(), method));
     let method = table.choice("method", &methods)?.unwrap_or(ReflectionMethod::Waves);

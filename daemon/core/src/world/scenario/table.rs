@@ -12,7 +12,7 @@ use crate::text::{line_column, one_line};
 
 /// A place in the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Mark {
+pub struct Mark {
     line: usize,
     column: usize,
 }
@@ -24,6 +24,7 @@ impl Mark {
         Self { line, column }
     }
 
+    /// An error at this place. `origin` is the name of the text, `key` the path of the key.
     pub fn error(self, origin: &str, key: &str, problem: String) -> ScenarioError {
         let Self { line, column } = self;
         ScenarioError {
@@ -38,14 +39,16 @@ impl Mark {
 
 /// The text that is being read.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Source<'a> {
+pub struct Source<'a> {
+    /// Its characters.
     pub text: &'a str,
+    /// Its name in errors.
     pub origin: &'a str,
 }
 
 /// A table of the text, or the defaults where the text has none.
 #[derive(Clone, Debug)]
-pub(crate) struct Table<'a> {
+pub struct Table<'a> {
     source: Source<'a>,
     /// Path of the table with a dot at its end; empty for the root.
     path: String,
@@ -57,6 +60,7 @@ pub(crate) struct Table<'a> {
 type Value<'a> = &'a Spanned<DeValue<'a>>;
 
 impl<'a> Table<'a> {
+    /// The whole document.
     pub fn root(source: Source<'a>, document: &'a Spanned<DeTable<'a>>) -> Self {
         let (entries, start) = (Some(document.get_ref()), document.span().start);
         Self { source, path: String::new(), entries, start }
@@ -79,6 +83,7 @@ impl<'a> Table<'a> {
         }
     }
 
+    /// Whether the key is there.
     pub fn has(&self, key: &str) -> bool {
         self.get(key).is_some()
     }
@@ -179,6 +184,7 @@ impl<'a> Table<'a> {
         self.choice(key, names)?.ok_or_else(|| self.missing(key, &one_of(names)))
     }
 
+    /// `true` or `false`; `None` where the key is left out.
     pub fn boolean(&self, key: &str) -> Result<Option<bool>, ScenarioError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         match value.get_ref().as_bool() {

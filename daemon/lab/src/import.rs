@@ -1,14 +1,15 @@
 //! `bowwave import`: recordings from pictures and videos.
 
-use std::{ops::ControlFlow, time::SystemTime};
+use std::ops::ControlFlow;
 
 use anyhow::{Context, Result, bail};
-use bowwave_calibration::{CalibrationFile, Date};
+use bowwave::{outcome::Outcome, stdout, today::today};
+use bowwave_calibration::CalibrationFile;
 use bowwave_import::{ImportOptions, ImportReport, Progress, TelemetryReport, import_pictures, import_video};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use crate::{cli::Import, outcome::Outcome, stdout};
+use crate::cli::Import;
 
 /// Imports a folder of pictures or a video.
 pub fn run(arguments: &Import) -> Result<Outcome> {
@@ -58,13 +59,6 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
         log::warn!("{warning}");
     }
     Ok(if report.warnings.is_empty() { Outcome::Done } else { Outcome::Partly })
-}
-
-/// The date in UTC: what is measured now is measured today.
-pub fn today() -> Result<Date> {
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok();
-    now.and_then(|d| Date::from_unix_seconds(i64::try_from(d.as_secs()).ok()?))
-        .context("the clock of this computer is not set: set it, so that what is measured can be dated")
 }
 
 fn as_json(report: &ImportReport) -> serde_json::Value {

@@ -3,11 +3,10 @@
 use std::{io::BufReader, path::Path, sync::Arc};
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::{
-    event::{Picture, PixelFormat},
-    still::{SIZE_RANGE, film_focal_px},
-};
+use bowwave_core::event::{Picture, PixelFormat};
 use image::{DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage, metadata::Orientation};
+
+use crate::still::{SIZE_RANGE, film_focal_px};
 
 /// A photograph.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@ use glam::DVec2;
 use proptest::prelude::*;
 
 use super::*;
-use crate::{
+use bowwave_core::{
     event::PixelFormat,
     geometry::{curvature_drop, horizon_dip, look},
     model::{ModelKind, Vertex},
@@ -152,7 +152,7 @@ proptest! {
         left in -0.42..-0.1f64, right in 0.1..0.42f64, k1 in -0.05..0.05f64,
     ) {
         let mut lens = Lens::pinhole(1200, 900, 1.0);
-        lens.distortion = crate::geometry::Distortion::radial_tangential(DVec2::X * k1, DVec2::ZERO);
+        lens.distortion = bowwave_core::geometry::Distortion::radial_tangential(DVec2::X * k1, DVec2::ZERO);
         let held = look(azimuth, pitch, roll);
         let point = |off: f64| {
             let (a, d) = (azimuth + off, horizon_dip(height));

@@ -14,14 +14,11 @@ mod statistics;
 use std::{fs, path::Path};
 
 use anyhow::{Context, Result, bail};
+use bowwave::{outcome::Outcome, stdout};
 use bowwave_core::water::ReflectionMethod;
 use image::RgbImage;
 
-use crate::{
-    cli::{Study, StudyTask},
-    outcome::Outcome,
-    stdout,
-};
+use crate::cli::{Study, StudyTask};
 use design::{CONDITIONS, Design, Item};
 
 /// The page that shows the pictures.

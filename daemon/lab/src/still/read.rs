@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::{Attitude, BOATS_MAX, Focal, Place, RANGE_MAX_M, Still, StillBoat, StillCamera};
-use crate::world::scenario::{
+use bowwave_core::world::scenario::{
     ScenarioError, place,
     read::{document, light, reflection, sea},
     table::{Source, Table},

@@ -6,20 +6,22 @@ use anyhow::{Context, Result};
 use bowwave_core::{
     event::Picture,
     frame::{plan::ScenePlan, scene::Scene},
-    still::{Composed, Still},
 };
-use bowwave_render::{Completions, Renderer, TimeOuts};
+use bowwave_models::BoatModels;
+use bowwave_render::{Completions, RenderConfig, Renderer, TimeOuts};
 use image::RgbImage;
 
-use super::Photo;
-use crate::{drawing, loading::Models};
+use crate::{
+    photo::Photo,
+    still::{Composed, Still},
+};
 
 /// Longest wait for one picture. A large one with many boats takes seconds on a processor.
 const WAIT: Duration = Duration::from_secs(120);
 
 /// A renderer that is kept as long as pictures ask the same of it.
-pub struct Easel {
-    models: Models,
+pub struct OffscreenRenderer {
+    models: BoatModels,
     gpu: Option<String>,
     validation: bool,
     ready: Option<(ScenePlan, Renderer, Completions)>,
@@ -35,9 +37,9 @@ pub struct Drawn {
     pub boats_seen: usize,
 }
 
-impl Easel {
-    /// An easel for boats of these models, on the device that `gpu` names (the first GPU where it names none).
-    pub fn new(models: Models, gpu: Option<String>, validation: bool) -> Self {
+impl OffscreenRenderer {
+    /// A renderer for boats of these models, on the device that `gpu` names (the first GPU where it names none).
+    pub fn new(models: BoatModels, gpu: Option<String>, validation: bool) -> Self {
         Self { models, gpu, validation, ready: None, messages: Vec::new() }
     }
 
@@ -53,7 +55,7 @@ impl Easel {
     pub fn draw(&mut self, Composed { scene, plan }: &Composed, picture: &Picture) -> Result<RgbImage> {
         if self.ready.as_ref().is_none_or(|(made_for, ..)| made_for != plan) {
             self.put_away();
-            let mut config = drawing::config(plan, self.gpu.clone(), self.validation);
+            let mut config = RenderConfig::of_plan(plan, self.gpu.clone(), self.validation);
             // Nobody waits at 30 Hz: a busy processor that draws slowly is no hung GPU.
             config.time_outs = TimeOuts { frame: WAIT, rehearsal: WAIT };
             let (renderer, completions) = Renderer::new(&config, &self.models.list)?;

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-use crate::{
+use bowwave_core::{
     frame::view::Eye,
     geometry::{CameraPose, Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
     world::scenario::table::Mark,

@@ -6,12 +6,12 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::{sea::BeaufortForce, still::Still};
+use bowwave_core::sea::BeaufortForce;
 use hw_sim::make::{GunMotion, Periodic, Recipe, ShipMotion, Studio};
 use image::RgbImage;
 
 use super::design::REPLICATES;
-use crate::compose::{Photo, pictures};
+use crate::{compose::pictures, photo::Photo, still::Still};
 
 /// A sea and how it was photographed.
 #[derive(Debug)]

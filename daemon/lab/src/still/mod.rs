@@ -1,13 +1,13 @@
 //! A picture with boats composed into it: TOML text in, checked values out, and the [`Scene`] that the renderer draws.
 //!
-//! The same steps as in a [`Session`](crate::session::Session), without time: the camera is given instead of measured.
+//! The same steps as in a [`Session`](bowwave_core::session::Session), without time: the camera is given instead of measured.
 
 mod camera;
 mod read;
 
 use glam::{DVec2, DVec3};
 
-use crate::{
+use bowwave_core::{
     estimate::light::LightMeter,
     event::Picture,
     frame::{

@@ -1,19 +1,18 @@
 //! `bowwave compose`: boats composed into photographs.
 
-mod easel;
-mod photo;
-
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::{
-    still::{self, Still},
-    water::ReflectionMethod,
-};
+use bowwave::{outcome::Outcome, stdout};
+use bowwave_core::water::ReflectionMethod;
+use bowwave_models::BoatModels;
 
-use crate::{cli::Compose, loading::load_models, outcome::Outcome, stdout};
-pub use easel::{Drawn, Easel};
-pub use photo::Photo;
+use crate::{
+    cli::Compose,
+    offscreen::OffscreenRenderer,
+    photo::Photo,
+    still::{self, Still},
+};
 
 /// Most pictures of a folder.
 const PICTURES_MAX: usize = 10_000;
@@ -35,10 +34,10 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
     })?;
     let still = Still::parse(&text, &path.display().to_string())?;
     let base = path.parent().unwrap_or(Path::new(""));
-    let models = load_models(still.boats.iter().map(|b| (b.name.as_str(), b.model.as_str())), base)?;
+    let models = BoatModels::load(still.boats.iter().map(|b| (b.name.as_str(), b.model.as_str())), base)?;
     let pictures = pictures(&base.join(&still.picture))?;
     let methods = arguments.method.as_ref().map_or_else(|| vec![still.water.method], |m| m.0.clone());
-    let mut easel = Easel::new(models, arguments.gpu.clone(), arguments.validation);
+    let mut renderer = OffscreenRenderer::new(models, arguments.gpu.clone(), arguments.validation);
     std::fs::create_dir_all(&arguments.out).with_context(|| {
         format!("cannot make the folder {}; name another with --out", arguments.out.display())
     })?;
@@ -48,10 +47,10 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
         still.water.method = method;
         for (index, picture) in pictures.iter().enumerate() {
             let target = target(&arguments.out, picture, (methods.len() > 1).then_some(method));
-            compose_one(&mut easel, &still, (index, picture), &target)?;
+            compose_one(&mut renderer, &still, (index, picture), &target)?;
         }
     }
-    let messages = easel.validation_messages();
+    let messages = renderer.validation_messages();
     for message in &messages {
         log::error!("{message}");
     }
@@ -60,13 +59,13 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
 
 /// Composes one picture of a series, counted from 0.
 fn compose_one(
-    easel: &mut Easel,
+    renderer: &mut OffscreenRenderer,
     still: &Still,
     (index, picture): (usize, &Path),
     target: &Path,
 ) -> Result<()> {
     refuse_to_replace_source(target, picture)?;
-    let drawn = easel.compose(still, &Photo::read(picture)?, u32::try_from(index).unwrap_or(u32::MAX))?;
+    let drawn = renderer.compose(still, &Photo::read(picture)?, u32::try_from(index).unwrap_or(u32::MAX))?;
     drawn
         .picture
         .save_with_format(target, image::ImageFormat::Png)

@@ -7,11 +7,10 @@ use bowwave_core::{
     frame::scene::BoatView,
     geometry::{CameraPose, Lens, horizon_dip},
     model::{Model, ModelId, ModelKind},
-    still::{Composed, Place, Still, StillBoat},
     water::{ReflectionMethod, ShadowLevel},
     world::boats::facing,
 };
-use bowwave_models::Boat;
+use bowwave_models::{Boat, BoatModels};
 use glam::{DVec2, DVec3};
 use image::{RgbImage, imageops};
 use rand::{RngExt, SeedableRng};
@@ -22,8 +21,10 @@ use super::{
     design::{CONDITIONS, Condition, REPLICATES},
 };
 use crate::{
-    compose::{Easel, Photo, pictures as files_of},
-    loading::Models,
+    compose::pictures as files_of,
+    offscreen::OffscreenRenderer,
+    photo::Photo,
+    still::{Composed, Place, Still, StillBoat},
 };
 
 /// Boats by replicate.
@@ -78,8 +79,8 @@ fn fitted(image: RgbImage) -> RgbImage {
 pub struct Drawer {
     backgrounds: [Background; 2],
     methods: [ReflectionMethod; 2],
-    models: Models,
-    easel: Easel,
+    models: BoatModels,
+    renderer: OffscreenRenderer,
     seed: u64,
 }
 
@@ -91,15 +92,15 @@ impl Drawer {
         gpu: Option<String>,
         seed: u64,
     ) -> Result<Self> {
-        let mut models = Models::default();
+        let mut models = BoatModels::default();
         for boat in BOATS {
             models.list.push(bowwave_models::resolve(boat.name(), Path::new(""))?);
         }
         for boat in BOATS {
             models.list.push(bowwave_models::side_view(boat)?);
         }
-        let easel = Easel::new(models.clone(), gpu, false);
-        Ok(Self { backgrounds, methods, models, easel, seed })
+        let renderer = OffscreenRenderer::new(models.clone(), gpu, false);
+        Ok(Self { backgrounds, methods, models, renderer, seed })
     }
 
     /// The picture of a condition.
@@ -122,7 +123,7 @@ impl Drawer {
         let composed = still
             .compose(&photo.picture, 0, (&self.models.list, &[id]), photo.focal_px)
             .with_context(|| format!("the background {} leaves no room for a boat", background.name))?;
-        let drawn = self.easel.draw(&composed, &photo.picture)?;
+        let drawn = self.renderer.draw(&composed, &photo.picture)?;
         cut(&drawn, &composed, model)
     }
 }

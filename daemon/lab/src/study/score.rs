@@ -6,13 +6,14 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
+use bowwave::{outcome::Outcome, stdout};
 use serde::{Deserialize, Serialize};
 
 use super::{
     key::{self, FACTORS, KeyRow},
     statistics::{Estimate, Tally, d_prime, rate},
 };
-use crate::{cli::StudyScore, outcome::Outcome, stdout};
+use crate::cli::StudyScore;
 
 /// A line of an answer file; further columns are left alone.
 #[derive(Clone, Debug, Deserialize)]
