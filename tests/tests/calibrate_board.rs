@@ -51,6 +51,7 @@ fn record(moved: &Moved, to: &Path) {
             mid_exposure: taken.stamp,
             sequence,
             jpeg: jpeg.into(),
+            is_recoded: false,
         }));
     }
     entries.sort_by_key(Entry::time);

@@ -111,6 +111,7 @@ fn record(to: &Path) {
             mid_exposure: stamp,
             sequence,
             jpeg,
+            is_recoded: false,
         }));
     }
     entries.sort_by_key(Entry::time);

@@ -24,11 +24,12 @@ const RANKS: &[(&str, u8)] = &[
     ("bowwave-calibration", 2),
     ("hw-sim", 3),
     ("bowwave-import", 3),
-    ("bowwave", 4),
-    ("bowwave-lab", 5),
-    ("bowwave-tests", 6),
-    ("precision", 6),
-    ("bowwave-hil", 6),
+    ("bowwave-trainer", 4),
+    ("bowwave", 5),
+    ("bowwave-lab", 6),
+    ("bowwave-tests", 7),
+    ("precision", 7),
+    ("bowwave-hil", 7),
 ];
 
 fn root() -> PathBuf {

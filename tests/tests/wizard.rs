@@ -149,7 +149,7 @@ fn the_lens_is_found_from_a_board_that_is_led_over_the_picture() {
         for _ in 0..2 {
             let time = Time::from_ns(i64::from(sequence) * 100_000_000);
             let jpeg = jpeg.clone().into();
-            let entry = FrameEntry { arrival: time, mid_exposure: time, sequence, jpeg };
+            let entry = FrameEntry { arrival: time, mid_exposure: time, sequence, jpeg, is_recoded: false };
             writer.write(&Entry::Frame(entry)).unwrap();
             sequence += 1;
         }

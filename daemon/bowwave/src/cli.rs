@@ -34,6 +34,8 @@ pub enum Command {
     Run(Run),
     /// Run the trainer on a recording, as if its camera, inertial unit and trigger were there
     Simulate(Simulate),
+    /// Step a session through the inputs of its own recording, and say whether the same records and scenes come out
+    Replay(ReplayRecording),
     /// Make a recording from a folder of pictures or from a video
     #[command(disable_help_flag = true)]
     Import(LabArguments),
@@ -71,6 +73,16 @@ pub struct Run {
     /// Print each committed round's number on standard output as soon as the journal says so
     #[arg(long)]
     pub print_commits: bool,
+}
+
+/// Arguments of `replay`.
+#[derive(Debug, Args)]
+pub struct ReplayRecording {
+    /// Recording of a run (MCAP): made with files.record in the configuration, or by `simulate --record`
+    pub recording: PathBuf,
+    /// Print the result on standard output as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `simulate`.

@@ -3,13 +3,12 @@
 use anyhow::{Context, Result, bail};
 use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots};
 
+use bowwave_trainer::storage::JOURNAL;
+
 use crate::{
     cli::{Format, Hits},
     stdout,
 };
-
-/// Name of the journal in a run's folder.
-pub const JOURNAL: &str = "hits.sqlite";
 
 /// Columns of the table for people: name, index into [`StoredShot::COLUMNS`]'s cells, digits after the point.
 const TABLE: &[(&str, &str, Option<usize>)] = &[

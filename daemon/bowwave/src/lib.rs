@@ -4,28 +4,19 @@
 mod cache;
 mod calibrate;
 mod cli;
-mod commits;
 pub mod config;
 mod doctor;
-mod drawing;
-mod headings;
 mod hits;
 mod laboratory;
 mod loading;
-mod notes;
 pub mod outcome;
-mod output;
 mod plan;
 pub mod program;
-mod recorder;
-mod resident;
+mod replay;
 mod run;
-mod sea;
 mod simulate;
-mod stats;
 pub mod stdout;
 pub mod today;
-mod unit_clock;
 
 use std::process::ExitCode;
 
@@ -46,6 +37,7 @@ pub fn main() -> ExitCode {
 fn dispatch(Cli { command, verbose }: &Cli, program_start: bowwave_core::time::Time) -> Result<Outcome> {
     match command {
         Command::Run(arguments) => run::run(arguments, program_start),
+        Command::Replay(arguments) => replay::run(arguments),
         Command::Simulate(arguments) => simulate::run(arguments, program_start),
         Command::Import(lab) => laboratory::run("import", *verbose, &lab.arguments),
         Command::Compose(lab) => laboratory::run("compose", *verbose, &lab.arguments),

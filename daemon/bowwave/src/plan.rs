@@ -14,12 +14,11 @@ use bowwave_core::{
     water::ReflectionMethod,
     world::scenario::{self, Scenario},
 };
-use bowwave_render::Renderer;
+use bowwave_render::{RenderConfig, Renderer};
 use serde::Serialize;
 
 use crate::{
     cli::Plan,
-    drawing,
     loading::{read_scenario, scenario_models},
     stdout,
 };
@@ -115,7 +114,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
 
 /// What a renderer for the plan allocates, and on which device: made and let go of, not estimated.
 fn memory(plan: &ScenePlan, models: &[Model]) -> (Vec<PrintedMemory>, String) {
-    match Renderer::new(&drawing::config(plan, None, false), models) {
+    match Renderer::new(&RenderConfig::of_plan(plan, None, false), models) {
         Ok((renderer, _)) => {
             let listed = renderer.memory().into_iter().map(|(name, bytes)| PrintedMemory { name, bytes });
             (listed.collect(), renderer.device().name.clone())

@@ -273,6 +273,16 @@ impl Session {
         (self.shots, self.hits)
     }
 
+    /// The seed of all its chance.
+    pub const fn seed(&self) -> u64 {
+        self.setup.scenario.seed
+    }
+
+    /// The name of its scenario.
+    pub fn scenario_name(&self) -> &str {
+        &self.setup.scenario.name
+    }
+
     /// A hash over all that this session gave.
     pub const fn digest(&self) -> SessionDigest {
         self.digest

@@ -66,6 +66,7 @@ pub fn import_pictures(
             mid_exposure,
             sequence: frames,
             jpeg: jpeg.into(),
+            is_recoded: false,
         }))?;
         frames += 1;
         if progress(Progress { frames: frames.into(), frames_total }).is_break() {

@@ -187,6 +187,7 @@ impl<'a> Import<'a> {
             mid_exposure,
             sequence: self.frames,
             jpeg,
+            is_recoded: false,
         }))?;
         self.frames = self.frames.wrapping_add(1);
         Ok(())

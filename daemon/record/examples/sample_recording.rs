@@ -41,6 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             mid_exposure,
             sequence: i,
             jpeg: picture(&lens, i)?,
+            is_recoded: false,
         }));
         if i % 20 == 10 {
             entries.push(Entry::Trigger(TriggerEdge { time: arrival, pressed: i % 40 == 10 }));

@@ -217,6 +217,7 @@ fn entry(ms: i64) -> impl Strategy<Value = Entry> {
                 mid_exposure: Time::from_ns(mid),
                 sequence,
                 jpeg: Arc::from(bytes),
+                is_recoded: false
             })),
         any::<bool>().prop_map(move |pressed| Entry::Trigger(TriggerEdge { time, pressed })),
         "[ -~]{1,80}\r\n".prop_map(move |sentence| Entry::Ship(ShipEntry { arrival: time, sentence })),

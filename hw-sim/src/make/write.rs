@@ -68,6 +68,7 @@ pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) ->
                 mid_exposure: stamp,
                 sequence: frame,
                 jpeg: Arc::from(shot.jpeg),
+                is_recoded: false,
             });
             for entry in [truth, picture] {
                 while let Some(other) = others.next_if(|o| o.time() <= entry.time()) {

@@ -58,6 +58,7 @@ fn entries() -> Vec<Entry> {
             mid_exposure: exposed(n),
             sequence: 100 + n as u32,
             jpeg: jpeg(SIZE, 10 * n as u8),
+            is_recoded: false,
         }));
     }
     for (at, pressed) in [(300, true), (420, false)] {

@@ -17,6 +17,7 @@ use bowwave_core::{
 use bowwave_devices::{
     camera::CameraSettings, lamps::LampSettings, lcd::LcdSettings, serial::ImuSettings, trigger::InputLine,
 };
+use bowwave_trainer::supervisor::HealthSettings;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -42,15 +43,6 @@ pub struct TriggerChoice {
     pub line: InputLine,
     /// How long contacts chatter.
     pub debounce: Duration,
-}
-
-/// What is watched besides the devices.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct HealthChoice {
-    /// File with a temperature in thousandths of a degree; else all thermal zones.
-    pub thermal: Option<PathBuf>,
-    /// From this temperature on the trainer draws less, degrees Celsius.
-    pub limit_c: Option<f64>,
 }
 
 /// Checked settings. Everything has a default; the command line overrides it.
@@ -90,10 +82,12 @@ pub struct Config {
     pub calibration: Option<PathBuf>,
     /// Whether to keep what went in as a recording.
     pub record: bool,
+    /// Whether pictures that come without a JPEG are recorded as they are, so that a replay sees the very same pixels.
+    pub record_exact: bool,
     /// Folder for hits, recordings and the last good configuration; without it the service's state folder.
     pub data: Option<PathBuf>,
     /// What is watched besides the devices.
-    pub health: HealthChoice,
+    pub health: HealthSettings,
 }
 
 #[derive(Default, Deserialize)]
@@ -140,6 +134,7 @@ struct RawFiles {
     scenario: Option<PathBuf>,
     calibration: Option<PathBuf>,
     record: bool,
+    record_exact: bool,
     data: Option<PathBuf>,
 }
 
@@ -253,8 +248,9 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         scenario,
         calibration: raw.files.calibration.map(|p| base.join(p)),
         record: raw.files.record,
+        record_exact: raw.files.record_exact,
         data: raw.files.data.map(|p| base.join(p)),
-        health: HealthChoice { thermal: raw.health.thermal, limit_c },
+        health: HealthSettings { thermal: raw.health.thermal, limit_c },
     })
 }
 

@@ -1,42 +1,41 @@
 //! `bowwave run`: the trainer on the gun computer's own devices, as the service runs it.
 
-mod faults;
-pub(crate) mod hardware;
-mod health;
-pub(crate) mod keeping;
-mod notify;
-mod pulse;
+pub(crate) mod devices;
+mod recording;
 pub mod settings;
-pub(crate) mod stage;
-pub(crate) mod starts;
-mod summary;
-mod trainer;
 
 use std::{
     env,
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::AtomicBool, atomic::Ordering},
     thread,
 };
 
 use anyhow::{Context, Result};
-use bowwave_core::time::Time;
+use bowwave_core::{
+    event::PixelFormat,
+    fault::{Fault, FaultChange},
+    time::Time,
+    world::scenario::{self, Scenario},
+};
 use bowwave_devices::clock::now;
+use bowwave_record::{JournalOptions, Run as JournalRun};
+use bowwave_trainer::{
+    Ended, Signals, TickClock, Trainer, TrainerOptions,
+    presenter::{OutputOptions, PresenterOptions},
+    source::{Devices, Source},
+    storage::{Storage, StorageOptions},
+    summary::SummaryOptions,
+    supervisor::{CrashLoopGuard, Mode, Notifier, Pulse},
+};
 use signal_hook::{
     consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1},
     iterator::Signals as Incoming,
 };
 
-use crate::{cli::Run, outcome::Outcome};
-use notify::Notifier;
-use pulse::Pulse;
-use settings::Reader;
-use starts::Starts;
-pub(crate) use trainer::Signals;
-use trainer::{Ended, Surroundings, Trainer};
+use crate::{cli::Run, config::ScreenOutput, outcome::Outcome};
+pub(crate) use recording::recording_in;
+use settings::{Reader, Settings};
 
 /// Where data go when nobody says: the folder that the package makes.
 pub const DATA: &str = "/var/lib/bowwave";
@@ -44,7 +43,7 @@ pub const DATA: &str = "/var/lib/bowwave";
 /// Runs until a signal ends it.
 pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
     let signals = catch_signals()?;
-    let starts = Arc::new(Starts::begin(env::var_os("RUNTIME_DIRECTORY").map(PathBuf::from), now()));
+    let starts = Arc::new(CrashLoopGuard::begin(env::var_os("RUNTIME_DIRECTORY").map(PathBuf::from), now()));
     let pulse = Pulse::start(Arc::clone(&signals), Arc::clone(&starts))?;
     let mut pulsing = pulse.during_start();
     let mut lcd_size = None;
@@ -65,24 +64,16 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
             // Hits are kept in memory then, and the LCD says so.
             log::error!("cannot make the data folder {}: {e}; name another in files.data", data.display());
         }
-        let surroundings = Surroundings {
-            data: data.clone(),
-            mode: starts.mode(),
-            // The service hides /proc/sys; systemd tells it.
-            boot_id: env::var("BOWWAVE_BOOT_ID").ok().or_else(bowwave_record::boot_id),
-            frame_hashes: arguments.frame_hashes.clone(),
-            print_commits: arguments.print_commits,
-            program_start,
-            lcd_size,
-        };
-        let trainer = Trainer::start(settings, surroundings, Arc::clone(&signals))?;
+        let gun = Gun { arguments, data: &data, mode: starts.mode(), program_start, lcd_size };
+        let trainer = gun.start(settings, Arc::clone(&signals))?;
         drop(pulsing);
-        let (ended, summary) = trainer.run(&mut notifier, &pulse)?;
+        let finished = trainer.run(&mut notifier, Some(&pulse))?;
         pulsing = pulse.during();
-        if let Err(e) = summary.write(&data.join("summary.json")) {
+        if let Err(e) = finished.summary.write(&data.join("summary.json")) {
             log::warn!("{e:#}");
         }
-        match ended {
+        log::info!("ran for {:.1} s", now().secs_since(program_start));
+        match finished.ended {
             Ended::Stopped => {
                 starts.ended_well();
                 return Ok(Outcome::Done);
@@ -92,6 +83,113 @@ pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
                 notifier.reloading();
             }
         }
+    }
+}
+
+/// The trainer on the gun's devices, before it is started.
+struct Gun<'a> {
+    arguments: &'a Run,
+    data: &'a Path,
+    mode: Mode,
+    program_start: Time,
+    /// Size of the LCD before the settings were read anew.
+    lcd_size: Option<(u32, u32)>,
+}
+
+impl Gun<'_> {
+    /// Starts devices, journal and GPU.
+    fn start(&self, mut settings: Settings, signals: Arc<Signals>) -> Result<Trainer> {
+        let mut faults = std::mem::take(&mut settings.faults);
+        if self.mode == Mode::Safe {
+            make_safe(&mut settings)?;
+            let cause = "the program was started too often within a minute: video and this message only until it is stopped; \
+                         the log has the reason (journalctl -u bowwave)";
+            faults.push(FaultChange::raised(now(), Fault::CrashLoop, cause));
+        }
+        let devices =
+            Devices::start(devices::device_settings(&settings, self.mode, &mut faults), &mut faults)?;
+        let lcd_size = || devices.await_lcd_size().or(self.lcd_size);
+        if let Some(size) = settings.config.size.or_else(lcd_size) {
+            settings.setup.screen = size;
+        }
+        // The service hides /proc/sys; systemd tells it.
+        let boot_id = env::var("BOWWAVE_BOOT_ID").ok().or_else(bowwave_record::boot_id);
+        let storage = match self.mode {
+            Mode::Safe => None,
+            Mode::Training => Some(Storage::open(self.storage(&settings, boot_id.clone()), &mut faults)?),
+        };
+        let config = &settings.config;
+        let presenter = PresenterOptions {
+            gpu: gpu(&settings, self.mode),
+            validation: config.validation,
+            gpu_timeout: config.hang,
+            output: OutputOptions {
+                reporter: Some(devices.output_reporter()),
+                lcd: devices.lcd(),
+                frame_hashes: self.arguments.frame_hashes.clone(),
+                window: config.output == ScreenOutput::Window,
+                ..OutputOptions::default()
+            },
+        };
+        let options = TrainerOptions {
+            follow_lcd: config.size.is_none(),
+            setup: settings.setup,
+            presenter,
+            frames: None,
+            plays_to_the_end: false,
+            boot_id,
+            summary: SummaryOptions { program_start: self.program_start, ..SummaryOptions::default() },
+            faults,
+        };
+        Trainer::start(options, Source::Devices(Box::new(devices)), TickClock::paced(), storage, signals)
+    }
+
+    fn storage(&self, settings: &Settings, boot_id: Option<String>) -> StorageOptions {
+        StorageOptions {
+            folder: self.data.to_owned(),
+            run: JournalRun {
+                // Filled in once the clock is known to be set.
+                started_wall_ns: None,
+                scenario: settings.setup.scenario.name.clone(),
+                recording: String::new(),
+                seed: settings.setup.scenario.seed,
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                boot_id,
+                started: Some(now()),
+            },
+            journal: JournalOptions {
+                reserve_bytes: JournalOptions::RESERVE_BYTES,
+                own: true,
+                ..JournalOptions::default()
+            },
+            recording: settings.config.record.then(|| recording_in(self.data, "recording", settings)),
+            strict: false,
+            print_commits: self.arguments.print_commits,
+        }
+    }
+}
+
+/// Video and message only.
+fn make_safe(settings: &mut Settings) -> Result<()> {
+    let empty =
+        scenario::BUILT_IN.iter().find(|(name, _)| *name == "empty").context("no built-in empty scenario")?;
+    settings.setup.scenario = Scenario::parse(empty.1, "built-in empty scenario")?;
+    settings.setup.models = Vec::new().into();
+    settings.setup.boat_models = Vec::new();
+    settings.setup.video = PixelFormat::Yuyv;
+    settings.config.record = false;
+    Ok(())
+}
+
+/// The configured device; in SAFE MODE software where there is one, for it may be the GPU's driver that crashes.
+fn gpu(settings: &Settings, mode: Mode) -> Option<String> {
+    let software = || {
+        let devices = bowwave_render::devices().ok()?;
+        devices.iter().find(|d| d.software).map(|d| d.index.to_string())
+    };
+    match mode {
+        Mode::Training => settings.config.gpu.clone(),
+        Mode::Safe => software().or_else(|| settings.config.gpu.clone()),
     }
 }
 

@@ -43,6 +43,8 @@ pub struct Settings {
     pub calibration_toml: String,
     /// Text of the scenario.
     pub scenario_toml: String,
+    /// Folder that the paths of the scenario's models start from.
+    pub models_base: PathBuf,
     /// What was refused.
     pub faults: Vec<FaultChange>,
 }
@@ -72,7 +74,8 @@ impl Reader {
         };
         let config = self.config(&mut refuse);
         let calibration = self.calibration(&config, &mut refuse);
-        let (scenario, scenario_toml, models, boat_models) = self.scenario(&config, &mut refuse)?;
+        let (scenario, scenario_toml, models, boat_models, models_base) =
+            self.scenario(&config, &mut refuse)?;
         let own_ship = calibration.as_ref().and_then(|c| c.value.own_ship_mask());
         let (calibration, calibration_toml, camera_serial) = match calibration {
             Some(c) => (c.value.calibration, c.text, c.value.camera_serial),
@@ -89,7 +92,7 @@ impl Reader {
             heading: config.heading.settings.clone(),
             own_ship,
         };
-        Ok(Settings { config, setup, camera_serial, calibration_toml, scenario_toml, faults })
+        Ok(Settings { config, setup, camera_serial, calibration_toml, scenario_toml, models_base, faults })
     }
 
     fn config(&self, refuse: &mut impl FnMut(Fault, &anyhow::Error)) -> Config {
@@ -147,7 +150,7 @@ impl Reader {
         &self,
         config: &Config,
         refuse: &mut impl FnMut(Fault, &anyhow::Error),
-    ) -> Result<(Scenario, String, Vec<Model>, Vec<bowwave_core::model::ModelId>)> {
+    ) -> Result<(Scenario, String, Vec<Model>, Vec<bowwave_core::model::ModelId>, PathBuf)> {
         let load = |text: &str, origin: &str, base: &Path| -> Result<_> {
             let scenario = Scenario::parse(text, origin)?;
             let (models, boats) = scenario_models(&scenario, base)?;
@@ -155,7 +158,7 @@ impl Reader {
                 models.get(usize::from(id.0)).map_or(0.0, Model::radius_m)
             };
             scenario.check_clearance(&boats.iter().map(radius).collect::<Vec<_>>())?;
-            Ok((scenario, text.to_owned(), models, boats))
+            Ok((scenario, text.to_owned(), models, boats, base.to_owned()))
         };
         if let Some(path) = &config.scenario {
             let named = read_scenario(path).and_then(|(text, base)| {

@@ -1,40 +1,39 @@
 //! `bowwave simulate`: the trainer on a recording, as if its devices were there.
 
-mod memory;
 pub mod prepare;
-mod recovery;
-mod report;
-mod run;
-mod summary;
 
 use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::Ordering},
     time::SystemTime,
 };
 
-use anyhow::{Context, Result};
-use bowwave_core::{fault::Fault, time::Time};
-use bowwave_record::{Journal, Run};
-use bowwave_render::Renderer;
-
-use crate::{
-    cli::Simulate,
-    drawing,
-    hits::JOURNAL,
-    outcome::Outcome,
-    output::{Output, OutputOptions},
-    recorder::Recorder,
+use anyhow::{Context, Result, bail};
+use bowwave_core::{
+    pacing::FRAMES_PER_S,
+    time::{NS_PER_S, Time},
 };
-use run::Loop;
+use bowwave_record::{JournalOptions, Run};
+use bowwave_trainer::{
+    Finished, Signals, TickClock, Trainer, TrainerOptions,
+    presenter::{OutputOptions, PresenterOptions},
+    source::{RecordingSource, Source},
+    storage::{RecorderOptions, Storage, StorageOptions},
+    summary::SummaryOptions,
+    supervisor::Notifier,
+};
+use hw_sim::{
+    fault::FaultPlan,
+    replay::{Replay, ReplayOptions},
+};
+use prepare::Prepared;
+
+use crate::{cli::Simulate, outcome::Outcome, stdout};
 
 /// Runs the trainer on a recording.
 pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let on_signal = Arc::clone(&stop);
-    ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed))
+    let signals = Arc::new(Signals::default());
+    let on_signal = Arc::clone(&signals);
+    ctrlc::set_handler(move || on_signal.stop.store(true, Ordering::Relaxed))
         .context("cannot catch interrupts")?;
 
     let prepared = prepare::prepare(arguments)?;
@@ -43,42 +42,48 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     })?;
     let frames = expected_frames(arguments, prepared.duration_ns);
     let realtime = arguments.realtime || prepared.window;
-    let replay = run::open_replay(&prepared.recording, realtime, arguments, frames)?;
+    let plan = fault_plan(arguments, frames);
+    let replay = RecordingSource::new(open_replay(&prepared, realtime, arguments, frames, plan.clone())?);
+    let origin = replay.origin();
+    let clock = if realtime { TickClock::paced() } else { TickClock::fast(origin) };
+    let mut faults = Vec::new();
+    let storage = Storage::open(storage(arguments, &prepared, realtime, origin), &mut faults)?;
+    let options = TrainerOptions {
+        setup: prepared.setup.clone(),
+        presenter: presenter(arguments, &prepared, realtime, frames),
+        frames: Some(frames),
+        plays_to_the_end: arguments.frames.is_none() && arguments.duration.is_none(),
+        follow_lcd: false,
+        boot_id: None,
+        summary: SummaryOptions {
+            program_start,
+            recording: Some(prepared.recording.display().to_string()),
+            injected: Some((origin, plan.faults)),
+        },
+        faults,
+    };
+    let source = Source::Recording(Box::new(replay));
+    let trainer = Trainer::start(options, source, clock, Some(storage), signals)?;
+    report(trainer.run(&mut Notifier::from_environment(), None)?, arguments)
+}
 
-    let session = bowwave_core::session::Session::new(prepared.setup.clone())?;
-    let (renderer, completions) = Renderer::new(
-        &drawing::config(session.plan(), prepared.gpu.clone(), prepared.validation),
-        &prepared.setup.models,
-    )?;
-    let options = OutputOptions {
-        folder: arguments.out.clone(),
-        size: prepared.setup.screen,
-        frames,
-        video: arguments.video,
-        sheet: arguments.sheet,
-        stills: arguments.stills.clone(),
-        window: prepared.window,
-        hash: true,
-        ..OutputOptions::default()
-    };
-    let output = Output::start(completions, options)?;
-    let journal = open_journal(arguments, &prepared)?;
-    let recorder = if prepared.record {
-        let properties = prepare::properties_of_run(&prepared, replay.origin());
-        Some(Recorder::start(&arguments.out.join("recording.mcap"), &properties, !realtime)?)
-    } else {
-        None
-    };
-    let faults = run::fault_plan(arguments, frames).faults;
-    let trainer = Loop::new(replay, session, renderer, output, journal, recorder, stop, faults);
-    let finished =
-        if realtime { trainer.realtime(frames, arguments) } else { trainer.fast(frames, arguments) }?;
-    finished.report(arguments, &prepared, program_start)
+/// Writes the summary, tells the user, and says how the run ended.
+fn report(finished: Finished, arguments: &Simulate) -> Result<Outcome> {
+    if !finished.validation.is_empty() {
+        bail!("Vulkan's validation layer reports: {}", finished.validation.join("; "));
+    }
+    let summary = finished.summary;
+    summary.write(&arguments.out.join("summary.json"))?;
+    if arguments.json {
+        stdout::print_json(&summary)?;
+    }
+    eprint!("{}", summary.lines());
+    Ok(if finished.wrong.is_empty() { Outcome::Done } else { Outcome::Partly })
 }
 
 /// Frames of the run: as asked for, else once through the recording.
 fn expected_frames(arguments: &Simulate, recording_ns: i64) -> u64 {
-    let of_seconds = |s: f64| (s * bowwave_core::pacing::FRAMES_PER_S as f64).round().max(1.0) as u64;
+    let of_seconds = |s: f64| (s * FRAMES_PER_S as f64).round().max(1.0) as u64;
     match (arguments.frames, arguments.duration) {
         (Some(frames), _) => frames,
         (None, Some(seconds)) => of_seconds(seconds),
@@ -86,25 +91,71 @@ fn expected_frames(arguments: &Simulate, recording_ns: i64) -> u64 {
     }
 }
 
-fn open_journal(arguments: &Simulate, prepared: &prepare::Prepared) -> Result<Journal> {
-    let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok();
-    let run = Run {
-        started_wall_ns: wall.and_then(|d| i64::try_from(d.as_nanos()).ok()),
-        scenario: prepared.setup.scenario.name.clone(),
-        recording: prepared.properties.source.clone(),
-        seed: prepared.setup.scenario.seed,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        boot_id: bowwave_record::boot_id(),
-        started: Some(bowwave_devices::clock::now()),
-    };
-    let journal = Journal::open(&arguments.out.join(JOURNAL), &run)?;
-    if let Some(damaged) = journal.quarantined() {
-        log::warn!(
-            "{} the journal was damaged ({}); it is kept as {} and a fresh one begun",
-            Fault::DbQuarantine.code(),
-            damaged.reason,
-            damaged.kept_as.display()
-        );
+/// The faults that the arguments ask for.
+fn fault_plan(arguments: &Simulate, frames: u64) -> FaultPlan {
+    let plan = FaultPlan { seed: arguments.seed.unwrap_or(0), faults: arguments.fault.clone() };
+    let until_ns = frames as i64 * NS_PER_S / FRAMES_PER_S;
+    match arguments.fault_every {
+        Some(seconds) => plan.with_one_every((seconds * NS_PER_S as f64) as i64, until_ns),
+        None => plan,
     }
-    Ok(journal)
+}
+
+fn open_replay(
+    prepared: &Prepared,
+    realtime: bool,
+    arguments: &Simulate,
+    frames: u64,
+    faults: FaultPlan,
+) -> Result<Replay> {
+    let asked = arguments.frames.is_some() || arguments.duration.is_some();
+    // A little more than asked for, so that the last frames do not run dry.
+    let duration_ns = asked.then(|| (frames as i64 + FRAMES_PER_S) * NS_PER_S / FRAMES_PER_S);
+    let options = ReplayOptions { duration_ns, looped: asked, faults };
+    let path = &prepared.recording;
+    Ok(if realtime { Replay::realtime(path, &options)? } else { Replay::fast(path, &options)? })
+}
+
+fn presenter(arguments: &Simulate, prepared: &Prepared, realtime: bool, frames: u64) -> PresenterOptions {
+    PresenterOptions {
+        gpu: prepared.gpu.clone(),
+        validation: prepared.validation,
+        gpu_timeout: None,
+        output: OutputOptions {
+            folder: arguments.out.clone(),
+            frames,
+            video: arguments.video,
+            sheet: arguments.sheet,
+            stills: arguments.stills.clone(),
+            window: prepared.window,
+            // A frame's hash costs time that a paced run does not have.
+            hash: !realtime,
+            ..OutputOptions::default()
+        },
+    }
+}
+
+fn storage(arguments: &Simulate, prepared: &Prepared, realtime: bool, origin: Time) -> StorageOptions {
+    let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).ok();
+    StorageOptions {
+        folder: arguments.out.clone(),
+        run: Run {
+            started_wall_ns: wall.and_then(|d| i64::try_from(d.as_nanos()).ok()),
+            scenario: prepared.setup.scenario.name.clone(),
+            recording: prepared.properties.source.clone(),
+            seed: prepared.setup.scenario.seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            boot_id: bowwave_record::boot_id(),
+            started: Some(bowwave_devices::clock::now()),
+        },
+        journal: JournalOptions::default(),
+        recording: prepared.record.then(|| RecorderOptions {
+            path: arguments.out.join("recording.mcap"),
+            properties: prepare::properties_of_run(prepared, origin),
+            lossless: !realtime,
+            exact_pixels: true,
+        }),
+        strict: true,
+        print_commits: arguments.print_commits,
+    }
 }

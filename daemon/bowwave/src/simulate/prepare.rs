@@ -12,6 +12,7 @@ use bowwave_core::{
     world::scenario::{self, Scenario},
 };
 use bowwave_record::{Properties, RecordingReader};
+use bowwave_trainer::replay::session_properties;
 
 use crate::{
     cache,
@@ -38,6 +39,8 @@ pub struct Prepared {
     pub scenario_toml: String,
     /// Text of the calibration in use.
     pub calibration_toml: String,
+    /// Folder that the paths of the scenario's models start from.
+    pub models_base: PathBuf,
     /// Vulkan device by number or part of its name.
     pub gpu: Option<String>,
     /// Whether to validate.
@@ -87,6 +90,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
         },
         scenario_toml,
         calibration_toml,
+        models_base: base,
         gpu: arguments.gpu.clone().or(config.gpu),
         validation: arguments.validation || config.validation,
         window: arguments.window || config.output == ScreenOutput::Window && !arguments.headless,
@@ -137,6 +141,8 @@ fn scenario(
 
 /// The properties of a recording of this run: the same hardware, with the calibration and scenario in use.
 pub fn properties_of_run(prepared: &Prepared, start: bowwave_core::time::Time) -> Properties {
+    let mut extra = prepared.properties.extra.clone();
+    extra.extend(session_properties(&prepared.setup, &prepared.models_base));
     Properties {
         calibration_toml: prepared.calibration_toml.clone(),
         scenario_toml: Some(prepared.scenario_toml.clone()),
@@ -144,6 +150,7 @@ pub fn properties_of_run(prepared: &Prepared, start: bowwave_core::time::Time) -
         loop_ns: None,
         start,
         source: format!("replay of {}", prepared.properties.source),
+        extra,
         ..prepared.properties.clone()
     }
 }

@@ -116,6 +116,8 @@ pub struct FrameEntry {
     pub sequence: u32,
     /// The JPEG file's bytes, at most [`JPEG_MAX_BYTES`].
     pub jpeg: Arc<[u8]>,
+    /// The camera sent no JPEG: the picture was coded for the recording, and its pixels differ a little from those that were seen.
+    pub is_recoded: bool,
 }
 
 impl std::fmt::Debug for FrameEntry {
@@ -125,6 +127,7 @@ impl std::fmt::Debug for FrameEntry {
             .field("mid_exposure", &self.mid_exposure)
             .field("sequence", &self.sequence)
             .field("jpeg_bytes", &self.jpeg.len())
+            .field("is_recoded", &self.is_recoded)
             .finish()
     }
 }

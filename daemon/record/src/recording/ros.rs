@@ -29,6 +29,9 @@ const MARKS: [(MarkKind, &str); 2] = [(MarkKind::Stow, "stow"), (MarkKind::Landm
 const ENCODINGS: [(PixelFormat, &str); 3] =
     [(PixelFormat::Yuyv, "yuv422_yuy2"), (PixelFormat::Nv12, "nv12"), (PixelFormat::Rgb, "rgb8")];
 
+/// Format of a picture that was coded for the recording; readers look for the word jpeg in it.
+const RECODED: &str = "jpeg; recoded";
+
 /// The key and the names of what happened to a fault.
 const CHANGE: &str = "change";
 const CHANGES: [&str; 3] = ["raised", "cleared", "noted"];
@@ -202,7 +205,8 @@ pub(crate) fn encode(entry: &Entry, out: &mut Vec<u8>) -> Result<Topic, String> 
             }
             out.reserve(frame.jpeg.len() + 64);
             let header = header(frame.mid_exposure, FRAME_CAMERA)?;
-            write(out, &CompressedImage { header, format: "jpeg".to_owned(), data: &frame.jpeg })?;
+            let format = if frame.is_recoded { RECODED } else { "jpeg" }.to_owned();
+            write(out, &CompressedImage { header, format, data: &frame.jpeg })?;
             Ok(Topic::Image)
         }
         Entry::Trigger(edge) => {
@@ -300,6 +304,7 @@ pub(crate) fn decode(
                 mid_exposure: time(&message.header.stamp)?,
                 sequence,
                 jpeg: Arc::from(message.data),
+                is_recoded: format == RECODED,
             })
         }
         Topic::Trigger => Entry::Trigger(TriggerEdge { time: log_time, pressed: read::<Bool>(data)?.data }),

@@ -354,7 +354,13 @@ mod tests {
         let frame = |ms: i64| {
             let time = Time::from_ns(ms * 1_000_000);
             let jpeg = Arc::from([[0xff_u8, 0xd8].as_slice(), &[7; 4000], &[0xff, 0xd9]].concat());
-            Entry::Frame(FrameEntry { arrival: time, mid_exposure: time, sequence: ms as u32, jpeg })
+            Entry::Frame(FrameEntry {
+                arrival: time,
+                mid_exposure: time,
+                sequence: ms as u32,
+                jpeg,
+                is_recoded: false,
+            })
         };
         for ms in (0..3000).step_by(100) {
             writer.write(&frame(ms)).unwrap();

@@ -43,6 +43,7 @@ pub fn frame(ms: i64, sequence: u32, bytes: usize) -> Entry {
         mid_exposure: at(ms - 12),
         sequence,
         jpeg: jpeg(bytes, sequence as u8),
+        is_recoded: false,
     })
 }
 

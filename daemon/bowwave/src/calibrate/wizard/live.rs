@@ -13,11 +13,12 @@ use bowwave_calibration::{
     wizard::{Ask, Eyes, Finding, Input, Key, Look, Solved, Step, Task, Work},
 };
 use bowwave_core::{
-    event::{CameraFrame, Event},
+    event::{CameraFrame, Event, Tick},
     fault::{Change, FaultChange},
     time::Time,
 };
 use bowwave_devices::clock::now;
+use bowwave_trainer::{Signals, source::Devices, storage::Recorder, supervisor::Mode};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
 
 use super::{
@@ -31,13 +32,11 @@ use crate::{
     cli::CalibrateWizard,
     config::ScreenOutput,
     outcome::Outcome,
-    recorder::Recorder,
     run::{
-        DATA, Signals, catch_signals,
-        hardware::Hardware,
-        keeping::begin_recording,
+        DATA, catch_signals,
+        devices::device_settings,
+        recording_in,
         settings::{Reader, Settings},
-        starts::Mode,
     },
     today::today,
 };
@@ -50,7 +49,7 @@ const PICTURES: usize = 4;
 
 /// Where events come from.
 enum Source {
-    Devices { hardware: Box<Hardware>, settings: Box<Settings>, data: PathBuf },
+    Devices { devices: Box<Devices>, settings: Box<Settings>, data: PathBuf },
     Recording(Player),
 }
 
@@ -89,11 +88,12 @@ pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
     let guided = Guided::new(arguments, file, out, height)?;
     let signals = catch_signals()?;
     let mut faults = Vec::new();
-    let hardware = Hardware::start(&settings, Mode::Training, &mut faults)?;
+    let devices = device_settings(&settings, Mode::Training, &mut faults);
+    let devices = Devices::start(devices, &mut faults)?;
     let screen = (settings.config.output != ScreenOutput::None)
-        .then(|| Screen::open(&mut settings, Some(&hardware), arguments.window))
+        .then(|| Screen::open(&mut settings, Some(&devices), arguments.window))
         .transpose()?;
-    let source = Source::Devices { hardware: Box::new(hardware), settings: Box::new(settings), data };
+    let source = Source::Devices { devices: Box::new(devices), settings: Box::new(settings), data };
     Loop::new(guided, source, screen, signals, arguments)?.run(faults)
 }
 
@@ -174,7 +174,7 @@ impl<'a> Loop<'a> {
             screen.close();
         }
         match self.source {
-            Source::Devices { hardware, .. } => hardware.stop(),
+            Source::Devices { devices, .. } => devices.stop(),
             // A recording that cannot be played further says so here.
             Source::Recording(player) => drop(player.finish()?),
         }
@@ -239,8 +239,8 @@ impl<'a> Loop<'a> {
 
     fn collect(&mut self, events: &mut Vec<Event>, faults: &mut Vec<FaultChange>) {
         match &mut self.source {
-            Source::Devices { hardware, .. } => {
-                hardware.collect(events, faults);
+            Source::Devices { devices, .. } => {
+                devices.collect(events, faults);
                 events.extend(faults.drain(..).map(Event::Fault));
                 self.guided.wizard.take(Input::Time(now()));
             }
@@ -274,9 +274,10 @@ impl<'a> Loop<'a> {
         let step = self.guided.wizard.step();
         if step == Step::Gather && self.recorder.is_none() && !self.cannot_record {
             let task = self.guided.wizard.task();
-            match begin_recording(data, &format!("calibrate-{}", task.command()), settings) {
-                Ok((recorder, path)) => {
-                    self.recordings.push((path, task));
+            let options = recording_in(data, &format!("calibrate-{}", task.command()), settings);
+            match Recorder::start(&options) {
+                Ok(recorder) => {
+                    self.recordings.push((options.path, task));
                     self.recorder = Some(recorder);
                 }
                 // The calibration does not need it.
@@ -288,14 +289,15 @@ impl<'a> Loop<'a> {
         } else if matches!(step, Step::Choose | Step::Saved | Step::Over)
             && let Some(recorder) = self.recorder.take()
         {
-            let lost = recorder.dropped();
+            let lost = recorder.lost();
             recorder.finish()?;
             if lost > 0 {
                 log::warn!("{lost} pictures or readings are not in the recording: the disk is too slow");
             }
         }
         if let Some(recorder) = &mut self.recorder {
-            events.iter().for_each(|event| recorder.event(event));
+            let tick = Tick::at(now());
+            events.iter().for_each(|event| recorder.event(event, tick));
         }
         Ok(())
     }

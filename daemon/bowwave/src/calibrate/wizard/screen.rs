@@ -9,27 +9,21 @@ use bowwave_core::{
     session::{Session, View},
     time::Time,
 };
-use bowwave_devices::{
-    clock::now,
-    report::{Reporter, reporting},
+use bowwave_devices::clock::now;
+use bowwave_trainer::{
+    presenter::{Handed, OutputOptions, Presenter, PresenterOptions, UserEvent},
+    source::Devices,
 };
 
-use crate::{
-    output::UserEvent,
-    run::{
-        hardware::Hardware,
-        settings::Settings,
-        stage::{Stage, StageOptions},
-    },
-};
+use crate::run::settings::Settings;
 
 /// Nanoseconds that a frame may take.
 const FRAME_NS: i64 = 33_333_333;
 
 /// A screen with the newest picture and the guide over it.
 pub struct Screen {
-    stage: Stage,
-    options: StageOptions,
+    presenter: Presenter,
+    options: PresenterOptions,
     session: Session,
     picture: Option<(Picture, bool)>,
     is_closed: bool,
@@ -37,25 +31,27 @@ pub struct Screen {
 
 impl Screen {
     /// Opens the LCD of the hardware, or a window. The settings' scenario loses its boats.
-    pub fn open(settings: &mut Settings, hardware: Option<&Hardware>, window: bool) -> Result<Self> {
+    pub fn open(settings: &mut Settings, devices: Option<&Devices>, window: bool) -> Result<Self> {
         let setup = &mut settings.setup;
         setup.scenario.boats.clear();
         setup.boat_models.clear();
-        if let Some(size) = settings.config.size.or_else(|| hardware?.await_lcd_size()) {
+        if let Some(size) = settings.config.size.or_else(|| devices?.await_lcd_size()) {
             setup.screen = size;
         }
         let session = Session::new(setup.clone())?;
-        let options = StageOptions {
+        let options = PresenterOptions {
             gpu: settings.config.gpu.clone(),
             validation: settings.config.validation,
-            hang: settings.config.hang,
-            lcd: hardware.and_then(Hardware::lcd),
-            window,
-            frame_hashes: None,
-            reporter: hardware.map_or_else(unheard, Hardware::output_reporter),
+            gpu_timeout: settings.config.hang,
+            output: OutputOptions {
+                reporter: devices.map(Devices::output_reporter),
+                lcd: devices.and_then(Devices::lcd),
+                window,
+                ..OutputOptions::default()
+            },
         };
-        let stage = Stage::open(&session, &[], &options)?;
-        Ok(Self { stage, options, session, picture: None, is_closed: false })
+        let presenter = Presenter::open(&session, &[], &options)?;
+        Ok(Self { presenter, options, session, picture: None, is_closed: false })
     }
 
     /// Takes a picture; the newest is shown.
@@ -75,7 +71,7 @@ impl Screen {
             self.session.event(&Event::Frame(shown_now(picture, begun)));
         }
         if *self.session.plan() != planned {
-            self.stage = Stage::open(&self.session, &[], &self.options)?;
+            self.presenter.reopen(&self.session, &[], &self.options)?;
         }
         let view = self.session.tick(Tick::at(begun)).view;
         let mut scene = view.scene.clone();
@@ -84,10 +80,10 @@ impl Screen {
         if let Some((_, is_new)) = &mut self.picture {
             *is_new = false;
         }
-        let announced = self.stage.show(&view, begun, begun.plus_ns(FRAME_NS))?;
-        self.is_closed |= self.stage.user_events().any(|e| e == UserEvent::Quit);
-        if !announced {
-            return Err(match self.stage.take_error() {
+        let handed = self.presenter.show(&view, begun, Some(begun.plus_ns(FRAME_NS)))?;
+        self.is_closed |= self.presenter.user_events().any(|e| e == UserEvent::Quit);
+        if handed == Handed::OutputEnded {
+            return Err(match self.presenter.take_error() {
                 Some(e) => e,
                 None => anyhow::anyhow!("the output thread has ended without a word; report it with the log"),
             });
@@ -102,7 +98,7 @@ impl Screen {
 
     /// Takes the last frames out.
     pub fn close(self) {
-        if let Err(e) = self.stage.close() {
+        if let Err(e) = self.presenter.close() {
             log::debug!("the output thread ended with: {e:#}");
         }
     }
@@ -111,11 +107,6 @@ impl Screen {
 /// A picture without a time of its own, as one that was exposed now.
 fn shown_now(picture: &Picture, now: Time) -> CameraFrame {
     CameraFrame { arrival: now, mid_exposure: now, sequence: 0, picture: picture.clone(), jpeg: None }
-}
-
-/// A reporter that nobody listens to.
-fn unheard() -> Reporter {
-    reporting().0
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::resident::memory_mb;
+use super::resident::memory_mb;
 
 /// How often it is looked at, frames: twice a minute of the recording.
 const EVERY: u64 = 900;

@@ -1,11 +1,5 @@
 //! The output thread: waits for finished frames and takes them to the LCD, the window, the hash, the video and the pictures.
 
-mod hashes;
-mod lateness;
-mod pictures;
-mod video;
-mod window;
-
 use std::{
     path::PathBuf,
     sync::Arc,
@@ -20,12 +14,14 @@ use bowwave_render::{Completions, Finished};
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use sha2::{Digest, Sha256};
 
-use crate::stats::Samples;
-use hashes::HashLog;
-use lateness::Lateness;
-use pictures::{ContactSheet, copy_frame, write_still};
-use video::VideoWriter;
-use window::{Pressed, Screen};
+use super::{
+    hashes::HashLog,
+    lateness::Lateness,
+    pictures::{ContactSheet, copy_frame, write_still},
+    video::VideoWriter,
+    window::{Pressed, Screen},
+};
+use crate::summary::stats::Samples;
 
 /// How long the thread waits for a frame before it looks whether there will be another.
 const WAIT: Duration = Duration::from_millis(80);
@@ -33,8 +29,8 @@ const WAIT: Duration = Duration::from_millis(80);
 /// Completed frames that wait to be asked for.
 const DONE: usize = 64;
 
-/// What is to be made of the frames.
-#[derive(Debug, Default)]
+/// Uses of the finished frames.
+#[derive(Clone, Debug, Default)]
 pub struct OutputOptions {
     /// Where the thread reports that it lives, if anybody looks.
     pub reporter: Option<Reporter>,
@@ -72,7 +68,7 @@ pub struct Ticket {
     /// When it must be complete.
     pub deadline: Option<Time>,
     /// Drawn so that the driver is warm, not to be shown or counted.
-    pub rehearsal: bool,
+    pub warm_up: bool,
 }
 
 /// What the user did at the window.
@@ -88,7 +84,7 @@ pub enum UserEvent {
 
 /// A frame that is complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Done {
+pub struct CompletedFrame {
     /// The scene's frame number.
     pub frame: u64,
     /// When it was begun.
@@ -112,21 +108,34 @@ pub struct OutputReport {
     pub passes_ms: [Samples; Pass::COUNT],
     /// When the first frame was complete.
     pub first: Option<Time>,
-    /// Over the SHA-256 of each frame.
-    pub frames_sha256: [u8; 32],
+    /// Over the SHA-256 of each frame; `None` where nobody asked for it.
+    pub frames_sha256: Option<[u8; 32]>,
+}
+
+impl OutputReport {
+    /// Adds what a later thread of the same run measured.
+    pub fn add(&mut self, later: Self) {
+        self.frames += later.frames;
+        self.late += later.late;
+        self.frame_ms.add(&later.frame_ms);
+        self.gpu_ms.add(&later.gpu_ms);
+        self.passes_ms.iter_mut().zip(&later.passes_ms).for_each(|(all, more)| all.add(more));
+        self.first = self.first.or(later.first);
+        self.frames_sha256 = later.frames_sha256;
+    }
 }
 
 /// The running thread.
 #[derive(Debug)]
-pub struct Output {
+pub struct OutputThread {
     tickets: Option<Sender<Ticket>>,
     user: Receiver<UserEvent>,
-    rehearsed: Receiver<()>,
-    done: Receiver<Done>,
+    warm: Receiver<()>,
+    done: Receiver<CompletedFrame>,
     thread: Option<JoinHandle<Result<OutputReport>>>,
 }
 
-impl Output {
+impl OutputThread {
     /// Starts the thread. Files are opened here, so that what cannot work says so before the run.
     pub fn start(completions: Completions, options: OutputOptions) -> Result<Self> {
         let video = if options.video {
@@ -136,15 +145,15 @@ impl Output {
         };
         let (tickets, incoming) = unbounded();
         let (user_sender, user) = unbounded();
-        let (rehearsed_sender, rehearsed) = unbounded();
+        let (warm_sender, warm) = unbounded();
         let (done_sender, done) = bounded(DONE);
-        let told = Told { user: user_sender, rehearsed: rehearsed_sender, done: done_sender };
+        let told = LoopQueues { user: user_sender, warm: warm_sender, done: done_sender };
         let hashes = options.frame_hashes.as_deref().map(HashLog::create).transpose()?;
         let thread = thread::Builder::new()
             .name("output".to_owned())
-            .spawn(move || Worker::new(completions, incoming, told, options, (video, hashes)).run())
+            .spawn(move || OutputWorker::new(completions, incoming, told, options, (video, hashes)).run())
             .context("cannot start the output thread; are too many processes running?")?;
-        Ok(Self { tickets: Some(tickets), user, rehearsed, done, thread: Some(thread) })
+        Ok(Self { tickets: Some(tickets), user, warm, done, thread: Some(thread) })
     }
 
     /// Tells the thread of a submitted frame; `false` once the thread has ended.
@@ -152,13 +161,13 @@ impl Output {
         self.tickets.as_ref().is_some_and(|t| t.send(ticket).is_ok())
     }
 
-    /// Waits until a rehearsal is complete, or the thread has ended, but no longer than `timeout`; whether it is complete.
-    pub fn await_rehearsal(&self, timeout: Duration) -> bool {
-        self.rehearsed.recv_timeout(timeout).is_ok()
+    /// Waits until the warm-up is complete, or the thread has ended, but no longer than `timeout`; whether it is complete.
+    pub fn await_warm_up(&self, timeout: Duration) -> bool {
+        self.warm.recv_timeout(timeout).is_ok()
     }
 
     /// Frames completed since the last call. Where nobody asks, none are kept.
-    pub fn done(&self) -> impl Iterator<Item = Done> + '_ {
+    pub fn done(&self) -> impl Iterator<Item = CompletedFrame> + '_ {
         self.done.try_iter()
     }
 
@@ -180,17 +189,17 @@ impl Output {
     }
 }
 
-/// What the thread tells the main loop.
-struct Told {
+/// Ends of the queues to the main loop.
+struct LoopQueues {
     user: Sender<UserEvent>,
-    rehearsed: Sender<()>,
-    done: Sender<Done>,
+    warm: Sender<()>,
+    done: Sender<CompletedFrame>,
 }
 
-struct Worker {
+struct OutputWorker {
     completions: Completions,
     tickets: Receiver<Ticket>,
-    told: Told,
+    told: LoopQueues,
     options: OutputOptions,
     video: Option<VideoWriter>,
     hashes: Option<HashLog>,
@@ -201,11 +210,11 @@ struct Worker {
     report: OutputReport,
 }
 
-impl Worker {
+impl OutputWorker {
     fn new(
         completions: Completions,
         tickets: Receiver<Ticket>,
-        told: Told,
+        told: LoopQueues,
         options: OutputOptions,
         (video, hashes): (Option<VideoWriter>, Option<HashLog>),
     ) -> Self {
@@ -244,15 +253,15 @@ impl Worker {
         if let Some(sheet) = &self.sheet {
             sheet.write(&self.options.folder.join("contact-sheet.png"))?;
         }
-        self.report.frames_sha256 = self.hash.finalize().into();
+        self.report.frames_sha256 = self.options.hash.then(|| self.hash.finalize().into());
         Ok(self.report)
     }
 
     fn take(&mut self, frame: &Finished, complete: Time) -> Result<()> {
         let ticket = self.tickets.recv().context("a frame came out that was not put in")?;
-        if ticket.rehearsal {
-            if self.told.rehearsed.send(()).is_err() {
-                log::debug!("the run ended before its rehearsal");
+        if ticket.warm_up {
+            if self.told.warm.send(()).is_err() {
+                log::debug!("the run ended before its warm-up");
             }
             return Ok(());
         }
@@ -270,7 +279,11 @@ impl Worker {
             let _ = lcd.show(frame.rgba(), self.options.size, ticket.frame);
         }
         // A caller that does not ask gets the first ones only.
-        let _ = self.told.done.try_send(Done { frame: ticket.frame, begun: ticket.begun, complete: now() });
+        let _ = self.told.done.try_send(CompletedFrame {
+            frame: ticket.frame,
+            begun: ticket.begun,
+            complete: now(),
+        });
         self.report.frame_ms.push(ms(ticket.begun));
         self.report.gpu_ms.push(ms(ticket.submitted));
         self.report.first.get_or_insert(complete);

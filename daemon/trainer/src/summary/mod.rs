@@ -1,4 +1,13 @@
-//! What a run reports about itself.
+//! What a run reports about itself when it ends.
+
+pub mod clock;
+pub mod heading;
+pub mod memory;
+pub mod recovery;
+pub mod resident;
+pub mod sea;
+pub mod stats;
+mod tally;
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -6,11 +15,14 @@ use anyhow::{Context, Result};
 use bowwave_core::frame::scene::{LeftOut, Pass, PassDecision, Scene};
 use serde::Serialize;
 
-use crate::{
-    headings::HeadingSummary,
+pub use tally::{SummaryOptions, Tally};
+
+use self::{
+    clock::ClockSummary,
+    heading::HeadingSummary,
+    memory::Growth,
     sea::SeaSummary,
     stats::{Percentiles, Samples},
-    unit_clock::ClockSummary,
 };
 
 /// The summary of a run, `summary.json`. Times are milliseconds.
@@ -18,15 +30,17 @@ use crate::{
 pub struct Summary {
     /// Frames shown.
     pub frames: u64,
-    /// Frames that were not complete when the next was due, or never drawn; null where nothing is due (--fast).
+    /// Frames that were not complete when they were due, or never drawn; null where nothing is due (--fast).
     pub missed_deadlines: Option<u64>,
     /// Screen size, as WIDTHxHEIGHT.
     pub size: String,
     /// Vulkan device and driver.
     pub device: String,
-    /// From when a frame was due until its pixels were complete (--fast: from when it was begun).
+    /// From when a frame was begun until its pixels were complete.
     pub frame_ms: Option<Percentiles>,
-    /// The same, stage by stage.
+    /// From begin to begin.
+    pub begun_apart_ms: Option<Percentiles>,
+    /// A frame's time by stage.
     pub stage_ms: BTreeMap<String, Percentiles>,
     /// From the start of the program to the first complete frame.
     pub first_frame_ms: Option<f64>,
@@ -42,23 +56,27 @@ pub struct Summary {
     pub not_scored: u64,
     /// How far from the recording's truth far things were drawn; null without truth.
     pub registration_px: Option<Registration>,
-    /// SHA-256 over every pose used and every record, in order.
-    pub records_sha256: String,
-    /// SHA-256 over the SHA-256 of every frame's pixels, in order.
-    pub frames_sha256: String,
+    /// Hash over the records of all rounds. `bowwave replay` finds the same one from the run's recording.
+    pub records_digest: String,
+    /// Hash over all scenes.
+    pub scenes_digest: String,
+    /// SHA-256 over the SHA-256 of every frame's pixels, in order; null where it was not asked for.
+    pub frames_sha256: Option<String>,
     /// Largest resident memory, megabytes.
     pub peak_rss_mb: Option<f64>,
     /// Resident memory early and late in the run; null for short runs.
-    pub memory: Option<super::memory::Growth>,
+    pub memory: Option<Growth>,
     /// Seed of all chance.
     pub seed: u64,
-    /// The recording played.
-    pub recording: String,
+    /// The recording played; null on devices.
+    pub recording: Option<String>,
     /// The scenario's name.
     pub scenario: String,
-    /// Video format and how it reached the GPU.
+    /// Layout of the camera's pictures and how they reached the GPU.
     pub video: String,
-    /// What the simulated hardware and the session counted: dropped, late, broken.
+    /// How often each fault came, by its code.
+    pub faults: BTreeMap<String, u64>,
+    /// What source and session counted: dropped, late, broken.
     pub counts: BTreeMap<String, u64>,
     /// The sea in the video; null where the scenario gives the sea.
     pub sea: Option<SeaSummary>,

@@ -22,12 +22,12 @@ pub enum Mode {
 
 /// The file of starts.
 #[derive(Debug)]
-pub struct Starts {
+pub struct CrashLoopGuard {
     path: Option<PathBuf>,
     mode: Mode,
 }
 
-impl Starts {
+impl CrashLoopGuard {
     /// Notes a start at `now`. Without a folder (not under systemd) starts are not counted.
     pub fn begin(folder: Option<PathBuf>, now: Time) -> Self {
         let Some(path) = folder.map(|f| f.join("starts")) else {
@@ -83,11 +83,11 @@ mod tests {
     fn the_fourth_start_in_a_minute_is_careful() {
         let folder = std::env::temp_dir().join(format!("bowwave-starts-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
-        let start = |s| Starts::begin(Some(folder.clone()), at(s)).mode();
+        let start = |s| CrashLoopGuard::begin(Some(folder.clone()), at(s)).mode();
         let modes: Vec<_> = [100, 110, 120, 130, 200, 210].into_iter().map(start).collect();
         use Mode::{Safe, Training};
         assert_eq!(modes, [Training, Training, Training, Safe, Training, Training]);
-        Starts::begin(Some(folder.clone()), at(211)).ended_well();
+        CrashLoopGuard::begin(Some(folder.clone()), at(211)).ended_well();
         assert_eq!(start(212), Training, "an end that was well clears the count");
         fs::remove_dir_all(&folder).unwrap();
     }
@@ -101,6 +101,6 @@ mod tests {
 
     #[test]
     fn without_a_folder_nothing_is_counted() {
-        assert_eq!(Starts::begin(None, at(0)).mode(), Mode::Training);
+        assert_eq!(CrashLoopGuard::begin(None, at(0)).mode(), Mode::Training);
     }
 }

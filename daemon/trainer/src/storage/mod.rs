@@ -1,27 +1,33 @@
-//! What is kept: rounds in the journal, and what went in as a recording where that is wanted. Pictures give way to rounds when
-//! the disk gets full.
+//! Rounds go into the journal, and the session's inputs into a recording where that is wanted. Pictures give way to rounds when the
+//! disk gets full.
+
+mod commits;
+mod recorder;
 
 use std::{
     collections::VecDeque,
     path::{Path, PathBuf},
     thread::{self, JoinHandle},
-    time::{Duration, SystemTime},
+    time::Duration,
 };
 
 use anyhow::{Context, Result};
 use bowwave_core::{
-    event::Event,
+    event::{Event, Tick},
     fault::{Fault, FaultChange},
+    session::SessionDigest,
     time::{NS_PER_S, Time},
     world::score::ShotRecord,
 };
 use bowwave_devices::clock::now;
-use bowwave_record::{
-    CameraInfo, Journal, JournalError, JournalOptions, PoseEntry, Properties, Room, Run, SpaceWatch,
-};
+use bowwave_record::{Journal, JournalError, JournalOptions, PoseEntry, Room, Run, SpaceWatch};
 
-use super::{faults::Faults, health::WallTime, settings::Settings};
-use crate::{hits::JOURNAL, recorder::Recorder};
+pub use recorder::{Recorder, RecorderOptions};
+
+use crate::supervisor::{FaultLog, WallTime};
+
+/// The journal's file in the folder of a run.
+pub const JOURNAL: &str = "hits.sqlite";
 
 /// Rounds that wait for room in the journal's queue; more than any belt has.
 const ROUNDS_WAITING_MAX: usize = 100_000;
@@ -32,26 +38,37 @@ const HITS_BYTES: u64 = 32 << 20;
 /// How long to wait before a journal that cannot be opened is tried again.
 const OPEN_AGAIN_NS: i64 = NS_PER_S;
 
-/// What is needed to open the journal, as often as it takes.
-#[derive(Clone)]
-struct Place {
-    path: PathBuf,
-    run: Run,
+/// Settings of the storage of a run.
+#[derive(Clone, Debug)]
+pub struct StorageOptions {
+    /// Folder of journal and recording.
+    pub folder: PathBuf,
+    /// The run, for the journal.
+    pub run: Run,
+    /// How the journal is opened.
+    pub journal: JournalOptions,
+    /// The recording, where there is to be one.
+    pub recording: Option<RecorderOptions>,
+    /// A journal that cannot be opened ends the run, and its end waits until every round is written. Else rounds wait in memory and the
+    /// end waits for a third of a second.
+    pub strict: bool,
+    /// Print each committed round's number.
+    pub print_commits: bool,
 }
 
-impl Place {
+impl StorageOptions {
+    /// The journal's file.
+    fn journal_path(&self) -> PathBuf {
+        self.folder.join(JOURNAL)
+    }
+
     fn open(&self) -> Result<Journal, JournalError> {
-        let options = JournalOptions {
-            reserve_bytes: JournalOptions::RESERVE_BYTES,
-            own: true,
-            ..JournalOptions::default()
-        };
-        Journal::open_with(&self.path, &self.run, &options)
+        Journal::open_with(&self.journal_path(), &self.run, &self.journal)
     }
 }
 
 /// The journal, or why there is none yet.
-enum Store {
+enum JournalState {
     Open(Journal),
     Shut {
         error: JournalError,
@@ -62,82 +79,76 @@ enum Store {
 }
 
 /// Journal and recording of a run.
-pub struct Keeping {
-    place: Place,
-    store: Store,
+pub struct Storage {
+    options: StorageOptions,
+    store: JournalState,
     waiting: VecDeque<ShotRecord>,
     recorder: Option<Recorder>,
     /// Why nothing is recorded although it should be.
     recording_failed: Option<String>,
+    /// Entries of an ended recording that were lost.
+    lost: u64,
     space: SpaceWatch,
     quarantined: Option<PathBuf>,
     wall: Option<WallTime>,
-    /// Print each committed round's number.
     print_commits: bool,
 }
 
-impl Keeping {
-    /// Opens the journal in `folder` and, where the configuration says so, a recording.
-    pub fn open(
-        folder: &Path,
-        settings: &Settings,
-        boot_id: Option<String>,
-        print_commits: bool,
-        faults: &mut Vec<FaultChange>,
-    ) -> Self {
-        let run = Run {
-            // Filled in once the clock is known to be set.
-            started_wall_ns: None,
-            scenario: settings.setup.scenario.name.clone(),
-            recording: String::new(),
-            seed: settings.setup.scenario.seed,
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            boot_id,
-            started: Some(now()),
-        };
-        let place = Place { path: folder.join(JOURNAL), run };
-        let store = match place.open() {
+impl Storage {
+    /// Opens the journal and begins the recording.
+    ///
+    /// # Errors
+    /// Only strict storage fails; else what is wrong becomes a fault.
+    pub fn open(options: StorageOptions, faults: &mut Vec<FaultChange>) -> Result<Self> {
+        let store = match options.open() {
             Ok(journal) => {
-                faults.extend(dirty(&journal));
-                Store::Open(journal)
+                faults.extend(dirty(&journal).filter(|_| !options.strict));
+                JournalState::Open(journal)
             }
+            Err(error) if options.strict => return Err(error.into()),
             Err(error) => {
                 log::error!("{error}; hits are kept in memory until it can be opened");
-                Store::Shut { error, next: now().plus_ns(OPEN_AGAIN_NS), attempt: None }
+                JournalState::Shut { error, next: now().plus_ns(OPEN_AGAIN_NS), attempt: None }
             }
         };
         let mut recording_failed = None;
-        let recorder = if settings.config.record {
-            let begun = begin_recording(folder, "recording", settings).map(|begun| begun.0);
-            begun.inspect_err(|e| recording_failed = Some(format!("nothing is recorded: {e:#}"))).ok()
-        } else {
-            None
+        let recorder = match options.recording.as_ref().map(Recorder::start).transpose() {
+            Ok(recorder) => recorder,
+            Err(e) if options.strict => return Err(e),
+            Err(e) => {
+                recording_failed = Some(format!("nothing is recorded: {e:#}"));
+                None
+            }
         };
-        let space = SpaceWatch::new(folder, space_limit(folder, recorder.is_some()));
-        Self {
-            place,
+        let space = SpaceWatch::new(&options.folder, space_limit(&options.folder, recorder.is_some()));
+        let print_commits = options.print_commits;
+        Ok(Self {
+            options,
             store,
             waiting: VecDeque::new(),
             recorder,
             recording_failed,
+            lost: 0,
             space,
             quarantined: None,
             wall: None,
             print_commits,
+        })
+    }
+
+    /// Takes in what the session is about to meet with a tick, for the recording. `digest` is over what the session gave before.
+    pub fn inputs(&mut self, events: &[Event], tick: Tick, digest: SessionDigest) {
+        if let Some(recorder) = &mut self.recorder {
+            events.iter().for_each(|event| recorder.event(event, tick));
+            recorder.tick(tick, digest);
         }
     }
 
-    /// Takes in what devices reported, for the recording.
-    pub fn events(&mut self, events: &[Event]) {
+    /// Takes in the pose that was used for a picture, and the true one where that is known.
+    pub fn poses(&mut self, used: Option<PoseEntry>, truth: Option<PoseEntry>) {
         if let Some(recorder) = &mut self.recorder {
-            events.iter().for_each(|e| recorder.event(e));
-        }
-    }
-
-    /// Takes in a pose that was used.
-    pub fn pose(&mut self, entry: PoseEntry) {
-        if let Some(recorder) = &mut self.recorder {
-            recorder.pose(entry);
+            used.into_iter().for_each(|pose| recorder.pose(pose));
+            truth.into_iter().for_each(|pose| recorder.truth(pose));
         }
     }
 
@@ -159,9 +170,9 @@ impl Keeping {
     }
 
     /// Hands on what waits, and tells what is wrong with the disk. Never waits.
-    pub fn tend(&mut self, faults: &mut Faults, events: &mut Vec<Event>) -> Result<()> {
+    pub fn poll(&mut self, faults: &mut FaultLog, events: &mut Vec<Event>) -> Result<()> {
         self.open_again(faults, events);
-        if let Store::Open(journal) = &self.store {
+        if let JournalState::Open(journal) = &self.store {
             while let Some(record) = self.waiting.front() {
                 match journal.shot(record) {
                     Ok(()) => drop(self.waiting.pop_front()),
@@ -176,19 +187,19 @@ impl Keeping {
                 self.wall = None;
             }
             if self.print_commits {
-                crate::commits::print(journal.commits().try_iter())?;
+                commits::print(journal.commits().try_iter())?;
             } else {
                 // Acknowledgements that nobody reads must not pile up.
                 journal.commits().try_iter().for_each(drop);
             }
         }
-        self.tend_disk(faults, events);
+        self.poll_disk(faults, events);
         Ok(())
     }
 
     /// Tries to open a journal that could not be opened.
-    fn open_again(&mut self, faults: &mut Faults, events: &mut Vec<Event>) {
-        let Store::Shut { error, next, attempt } = &mut self.store else { return };
+    fn open_again(&mut self, faults: &mut FaultLog, events: &mut Vec<Event>) {
+        let JournalState::Shut { error, next, attempt } = &mut self.store else { return };
         if let Some(thread) = attempt.take_if(|thread| thread.is_finished()) {
             match thread.join() {
                 Ok(Ok(journal)) => {
@@ -196,7 +207,7 @@ impl Keeping {
                         faults.take(change, events);
                     }
                     log::warn!("the journal is open; {} rounds from memory go into it", self.waiting.len());
-                    self.store = Store::Open(journal);
+                    self.store = JournalState::Open(journal);
                     return;
                 }
                 Ok(Err(e)) => *error = e,
@@ -205,8 +216,8 @@ impl Keeping {
             *next = now().plus_ns(OPEN_AGAIN_NS);
         }
         if attempt.is_none() && now() >= *next {
-            let place = self.place.clone();
-            match thread::Builder::new().name("journal-open".to_owned()).spawn(move || place.open()) {
+            let options = self.options.clone();
+            match thread::Builder::new().name("journal-open".to_owned()).spawn(move || options.open()) {
                 Ok(thread) => *attempt = Some(thread),
                 Err(e) => {
                     log::debug!("no thread to open the journal: {e}");
@@ -219,16 +230,16 @@ impl Keeping {
     /// What is wrong with the journal: code, and why.
     fn broken(&self) -> Option<(Fault, String)> {
         match &self.store {
-            Store::Open(journal) => journal
+            JournalState::Open(journal) => journal
                 .fault()
                 .map(|b| (b.fault, format!("{} ({} rounds wait in memory)", b.message, b.waiting))),
-            Store::Shut { error, .. } => {
+            JournalState::Shut { error, .. } => {
                 Some((error.fault(), format!("{error} ({} rounds wait in memory)", self.waiting.len())))
             }
         }
     }
 
-    fn tend_disk(&mut self, faults: &mut Faults, events: &mut Vec<Event>) {
+    fn poll_disk(&mut self, faults: &mut FaultLog, events: &mut Vec<Event>) {
         let broken = self.broken();
         let cause = |fault| broken.as_ref().filter(|(f, _)| *f == fault).map(|(_, why)| why.clone());
         let room = self.space.room(now());
@@ -238,7 +249,7 @@ impl Keeping {
         if let Some(recorder) = self.recorder.take_if(|r| r.has_ended()) {
             // It ends by itself only where it cannot write.
             self.recording_failed = Some("the recording has ended: see the log".to_owned());
-            end_recording(recorder);
+            self.lost += end_recording(recorder);
         }
         faults.set(Fault::DiskFsync, cause(Fault::DiskFsync).or(self.recording_failed.clone()), events);
         let low = match room {
@@ -252,10 +263,10 @@ impl Keeping {
             && let Some(recorder) = self.recorder.take()
         {
             // What was recorded so far is whole. It is not begun anew within the run.
-            end_recording(recorder);
+            self.lost += end_recording(recorder);
         }
         faults.set(Fault::DiskFull, cause(Fault::DiskFull).or(low), events);
-        if let Store::Open(journal) = &self.store
+        if let JournalState::Open(journal) = &self.store
             && let Some(quarantine) = journal.quarantined()
             && self.quarantined.as_ref() != Some(&quarantine.kept_as)
         {
@@ -277,39 +288,46 @@ impl Keeping {
         }
     }
 
-    /// Writes everything and ends.
-    pub fn finish(mut self) -> Result<()> {
+    /// Writes everything and ends. Tells how many entries the recording lacks, and what went wrong.
+    pub fn finish(mut self) -> (u64, Vec<anyhow::Error>) {
+        let mut wrong = Vec::new();
         let journal = match self.store {
-            Store::Open(journal) => Some(journal),
+            JournalState::Open(journal) => Some(journal),
             // The last chance of rounds that are in memory only.
-            Store::Shut { attempt: None, .. } if !self.waiting.is_empty() => {
-                self.place.open().inspect_err(|e| log::error!("{e}")).ok()
+            JournalState::Shut { attempt: None, .. } if !self.waiting.is_empty() => {
+                self.options.open().inspect_err(|e| log::error!("{e}")).ok()
             }
-            Store::Shut { .. } => None,
+            JournalState::Shut { .. } => None,
         };
         let written = match journal {
-            Some(journal) => write_out(journal, &mut self.waiting, self.print_commits),
+            Some(journal) => write_out(journal, &mut self.waiting, &self.options),
             None if self.waiting.is_empty() => Ok(()),
             None => Err(anyhow::anyhow!(
                 "{} rounds are lost: the journal could not be opened",
                 self.waiting.len()
             )),
         };
+        wrong.extend(written.err());
         if let Some(recorder) = self.recorder.take() {
-            end_recording(recorder);
+            if self.options.strict {
+                self.lost += recorder.lost();
+                wrong.extend(recorder.finish().err());
+            } else {
+                self.lost += end_recording(recorder);
+            }
         }
-        written
+        (self.lost, wrong)
     }
 }
 
 /// Hands what waits to the journal and ends it.
-fn write_out(journal: Journal, waiting: &mut VecDeque<ShotRecord>, print_commits: bool) -> Result<()> {
+fn write_out(journal: Journal, waiting: &mut VecDeque<ShotRecord>, options: &StorageOptions) -> Result<()> {
     // Room comes as the journal writes.
     let give_up = now().plus_secs(0.3);
     while let Some(record) = waiting.front() {
         match journal.shot(record) {
             Ok(()) => drop(waiting.pop_front()),
-            Err(JournalError::QueueFull { .. }) if now() < give_up => {
+            Err(JournalError::QueueFull { .. }) if options.strict || now() < give_up => {
                 thread::sleep(Duration::from_millis(2));
             }
             Err(e) => {
@@ -320,8 +338,8 @@ fn write_out(journal: Journal, waiting: &mut VecDeque<ShotRecord>, print_commits
     }
     let commits = journal.commits().clone();
     let ended = journal.finish();
-    if print_commits {
-        crate::commits::print(commits.try_iter())?;
+    if options.print_commits {
+        commits::print(commits.try_iter())?;
     }
     ended?;
     Ok(())
@@ -347,41 +365,21 @@ fn space_limit(folder: &Path, records: bool) -> u64 {
     }
 }
 
-fn end_recording(recorder: Recorder) {
-    let dropped = recorder.dropped();
-    if dropped > 0 {
-        log::warn!("the recording lacks {dropped} entries that the disk was too slow for");
+/// Ends a recording and tells how many entries it lacks.
+fn end_recording(recorder: Recorder) -> u64 {
+    let lost = recorder.lost();
+    if lost > 0 {
+        log::warn!("the recording lacks {lost} entries that the disk was too slow for");
     }
     if let Err(e) = recorder.finish() {
         log::error!("the recording did not end well: {e:#}; `bowwave simulate` plays what is whole");
     }
-}
-
-/// Begins a recording in `folder` whose name begins with `what`; tells where it lies.
-pub fn begin_recording(folder: &Path, what: &str, settings: &Settings) -> Result<(Recorder, PathBuf)> {
-    let lens = &settings.setup.calibration.lens;
-    let properties = Properties {
-        calibration_toml: settings.calibration_toml.clone(),
-        scenario_toml: Some(settings.scenario_toml.clone()),
-        loop_ns: None,
-        start: Time::from_ns(now().ns().max(0)),
-        source: "live".to_owned(),
-        picture: (lens.width, lens.height),
-        camera_info: Some(CameraInfo::from_lens(lens)),
-        extra: [("eye_height_m".to_owned(), settings.setup.scenario.eye_height_m.to_string())].into(),
-    };
-    // A name of its own for each run: nothing that was recorded is overwritten.
-    let wall = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().as_secs();
-    let name = |n: u32| folder.join(format!("{what}-{wall}-{n}.mcap"));
-    let path =
-        (0..1000).map(name).find(|p| !p.exists()).context("a thousand recordings of this second exist")?;
-    Ok((Recorder::start(&path, &properties, false)?, path))
+    lost
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::run::settings::Reader;
     use bowwave_core::world::score::{NotScored, Outcome};
     use bowwave_record::{ShotFilter, read_shots};
     use glam::DVec3;
@@ -397,33 +395,57 @@ mod tests {
         }
     }
 
+    fn options(folder: &Path) -> StorageOptions {
+        let run = Run {
+            started_wall_ns: None,
+            scenario: "a".to_owned(),
+            recording: String::new(),
+            seed: 1,
+            version: "0".to_owned(),
+            boot_id: None,
+            started: Some(now()),
+        };
+        StorageOptions {
+            folder: folder.to_owned(),
+            run,
+            journal: JournalOptions::default(),
+            recording: None,
+            strict: false,
+            print_commits: false,
+        }
+    }
+
     /// A data folder that is not there at the start, as behind a disk that failed.
     #[test]
     fn rounds_wait_in_memory_until_the_journal_can_be_opened() {
-        let base = std::env::temp_dir().join(format!("bowwave-keeping-{}", std::process::id()));
-        std::fs::create_dir_all(&base).unwrap();
-        let folder = base.join("data");
-        let settings = Reader { config: base.join("bowwave.toml"), last_good: None }.read().unwrap();
-        let mut keeping = Keeping::open(&folder, &settings, None, false, &mut Vec::new());
-        let (mut faults, mut events) = (Faults::new(None), Vec::new());
-        keeping.rounds(&[round(1), round(2)]);
-        keeping.tend(&mut faults, &mut events).unwrap();
-        let (fault, why) = keeping.broken().unwrap();
+        let base = tempfile::tempdir().unwrap();
+        let folder = base.path().join("data");
+        let mut storage = Storage::open(options(&folder), &mut Vec::new()).unwrap();
+        let (mut faults, mut events) = (FaultLog::new(None), Vec::new());
+        storage.rounds(&[round(1), round(2)]);
+        storage.poll(&mut faults, &mut events).unwrap();
+        let (fault, why) = storage.broken().unwrap();
         assert!(why.contains("2 rounds wait"), "{why}");
         assert!(faults.warnings().any(|f| f == fault), "the LCD tells");
 
         std::fs::create_dir_all(&folder).unwrap();
         let until = now().plus_secs(20.0);
-        while keeping.broken().is_some() && now() < until {
-            keeping.tend(&mut faults, &mut events).unwrap();
+        while storage.broken().is_some() && now() < until {
+            storage.poll(&mut faults, &mut events).unwrap();
             thread::sleep(Duration::from_millis(20));
         }
-        keeping.rounds(&[round(3)]);
-        keeping.tend(&mut faults, &mut events).unwrap();
+        storage.rounds(&[round(3)]);
+        storage.poll(&mut faults, &mut events).unwrap();
         assert_eq!(faults.warnings().count(), 0);
-        keeping.finish().unwrap();
+        assert_eq!(storage.finish().1.len(), 0);
         let stored = read_shots(&folder.join(JOURNAL), &ShotFilter::default()).unwrap();
         assert_eq!(stored.iter().map(|s| s.record.shot).collect::<Vec<_>>(), [1, 2, 3]);
-        std::fs::remove_dir_all(&base).unwrap();
+    }
+
+    #[test]
+    fn strict_storage_refuses_what_cannot_be_opened() {
+        let base = tempfile::tempdir().unwrap();
+        let strict = StorageOptions { strict: true, ..options(&base.path().join("absent")) };
+        assert!(Storage::open(strict, &mut Vec::new()).is_err());
     }
 }

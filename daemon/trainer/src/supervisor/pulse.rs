@@ -14,7 +14,8 @@ use anyhow::{Context, Result};
 use bowwave_core::time::{NS_PER_S, Time};
 use bowwave_devices::clock::now;
 
-use super::{notify, starts::Starts, trainer::Signals};
+use super::{CrashLoopGuard, notify};
+use crate::Signals;
 
 /// How often systemd hears that something goes on. Its watchdog waits for seconds.
 const EVERY: Duration = Duration::from_millis(200);
@@ -24,7 +25,7 @@ const LONGEST_NS: i64 = 300 * NS_PER_S;
 const GRACE_NS: i64 = NS_PER_S / 5;
 
 #[derive(Debug, Default)]
-struct State {
+struct PulseState {
     /// Since when something goes on that is not to be interrupted.
     since: Option<Time>,
     /// Whether nothing is recorded yet, so that the process may end at any time.
@@ -34,7 +35,7 @@ struct State {
 /// The thread that gives them.
 #[derive(Debug)]
 pub struct Pulse {
-    state: Arc<Mutex<State>>,
+    state: Arc<Mutex<PulseState>>,
 }
 
 /// Until it is dropped, systemd hears that the trainer lives.
@@ -43,8 +44,8 @@ pub struct Pulsing<'a>(&'a Pulse);
 
 impl Pulse {
     /// Starts the thread. It lives as long as the process.
-    pub fn start(signals: Arc<Signals>, starts: Arc<Starts>) -> Result<Self> {
-        let state = Arc::new(Mutex::new(State::default()));
+    pub fn start(signals: Arc<Signals>, starts: Arc<CrashLoopGuard>) -> Result<Self> {
+        let state = Arc::new(Mutex::new(PulseState::default()));
         let seen = Arc::clone(&state);
         thread::Builder::new()
             .name("pulse".to_owned())
@@ -88,7 +89,7 @@ impl Pulse {
 
 impl Drop for Pulsing<'_> {
     fn drop(&mut self) {
-        *locked(&self.0.state) = State::default();
+        *locked(&self.0.state) = PulseState::default();
         notify::still_starting();
     }
 }
@@ -98,7 +99,7 @@ fn ends(stop: &AtomicBool, asked: &mut Option<Time>, at: Time) -> bool {
     stop.load(Ordering::Relaxed) && at.ns_since(*asked.get_or_insert(at)) >= GRACE_NS
 }
 
-fn locked(state: &Mutex<State>) -> MutexGuard<'_, State> {
+fn locked(state: &Mutex<PulseState>) -> MutexGuard<'_, PulseState> {
     state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -10,30 +10,20 @@ use bowwave_core::{
     time::Time,
 };
 use bowwave_devices::{
-    camera::CameraPort,
+    camera::{CameraPort, CameraSettings},
     clock::now,
-    lamps::{LampState, Lamps},
-    lcd::{LcdPort, Vblanks},
+    lamps::{LampSettings, LampState, Lamps},
+    lcd::{LcdPort, LcdSettings, Vblanks},
     report::{Reporter, Reports, reporting},
-    serial::{ImuPort, ShipPort},
-    trigger::{TriggerPort, TriggerSettings},
+    serial::{ImuPort, ImuSettings, ShipPort, ShipSettings},
+    trigger::{InputLine, TriggerPort, TriggerSettings},
 };
-use bowwave_render::TimeOuts;
 
-use super::{
-    health::Health,
-    settings::{Settings, camera_settings},
-    starts::Mode,
-};
-use crate::config::ScreenOutput;
+use crate::supervisor::{Health, HealthSettings};
 
 /// A thread without a sign of life for so much longer than a GPU may take for a frame hangs: 1 s in all, where nothing is
 /// configured. A computer on which a frame may take seconds is slow at everything.
 const HEARTBEAT_BEYOND: Duration = Duration::from_millis(500);
-/// A trigger held for this long beyond the time that the belt lasts is stuck.
-const STUCK_BEYOND: Duration = Duration::from_secs(3);
-/// The longest that is watched for: nobody holds a trigger for an hour.
-const STUCK_MOST: Duration = Duration::from_secs(3600);
 /// The trigger's thread.
 const TRIGGER: &str = "trigger";
 /// The thread that watches the computer.
@@ -41,8 +31,38 @@ const HEALTH: &str = "health";
 /// How long the first start waits for the LCD, to draw in its size.
 const LCD_WAIT: Duration = Duration::from_millis(1500);
 
+/// Lamps, and the inputs that none of them may be.
+#[derive(Clone, Debug)]
+pub struct LampChoice {
+    /// The lamps.
+    pub lamps: LampSettings,
+    /// All configured inputs with their names, whether they are used now or not.
+    pub inputs: Vec<(&'static str, InputLine)>,
+}
+
+/// The devices of a run. What is absent is not started.
+#[derive(Clone, Debug)]
+pub struct DeviceSettings {
+    /// The LCD.
+    pub lcd: Option<LcdSettings>,
+    /// The camera.
+    pub camera: CameraSettings,
+    /// The inertial unit.
+    pub imu: Option<ImuSettings>,
+    /// The feed of the ship's heading.
+    pub ship: Option<ShipSettings>,
+    /// Trigger, interlock and presses.
+    pub trigger: Option<TriggerSettings>,
+    /// The lamps.
+    pub lamps: Option<LampChoice>,
+    /// What is watched of the computer.
+    pub health: HealthSettings,
+    /// How long the GPU may take over a frame before it counts as hung.
+    pub gpu_timeout: Duration,
+}
+
 /// The devices.
-pub struct Hardware {
+pub struct Devices {
     camera: CameraPort,
     imu: Option<ImuPort>,
     ship: Option<ShipPort>,
@@ -57,27 +77,22 @@ pub struct Hardware {
     fetched: Vec<Event>,
 }
 
-impl Hardware {
-    /// Starts everything that the settings name. What is absent is searched for; only settings that cannot be right fail.
-    pub fn start(settings: &Settings, mode: Mode, faults: &mut Vec<FaultChange>) -> Result<Self> {
-        let config = &settings.config;
+impl Devices {
+    /// Starts everything that the settings name. A device that is not there is searched for; only settings that cannot be right fail.
+    pub fn start(settings: DeviceSettings, faults: &mut Vec<FaultChange>) -> Result<Self> {
+        let DeviceSettings { lcd, camera, imu, ship, trigger, lamps, health, gpu_timeout } = settings;
         let mut threads = Vec::new();
         let mut reporter = |name| {
             let (reporter, reports) = reporting();
             threads.push((name, reports));
             reporter
         };
-        let lcd = (config.output == ScreenOutput::Lcd)
-            .then(|| LcdPort::start(config.lcd.clone(), reporter("lcd")).map(Arc::new))
-            .transpose()?;
-        let camera = CameraPort::start(camera_settings(settings), reporter("camera"))?;
-        let training = mode == Mode::Training;
-        let imu = training.then(|| ImuPort::start(config.imu.clone(), reporter("imu"))).transpose()?;
-        let ship = config.heading.ship.as_ref().filter(|_| training);
-        let ship = ship.map(|ship| ShipPort::start(ship, reporter("ship"))).transpose()?;
-        let trigger = if training { trigger_settings(settings, faults) } else { None };
-        let lamps = lamps(settings, faults);
-        let health = Health::start(&config.health, reporter(HEALTH))?;
+        let lcd = lcd.map(|lcd| LcdPort::start(lcd, reporter("lcd")).map(Arc::new)).transpose()?;
+        let camera = CameraPort::start(camera, reporter("camera"))?;
+        let imu = imu.map(|imu| ImuPort::start(imu, reporter("imu"))).transpose()?;
+        let ship = ship.map(|ship| ShipPort::start(&ship, reporter("ship"))).transpose()?;
+        let lamps = lamps.and_then(|choice| start_lamps(choice, faults));
+        let health = Health::start(&health, reporter(HEALTH))?;
         let output = reporter("output");
         let trigger = match trigger.map(|t| TriggerPort::start(t, reporter(TRIGGER))).transpose() {
             Ok(trigger) => trigger,
@@ -88,8 +103,7 @@ impl Hardware {
                 None
             }
         };
-        let heartbeat = config.hang.unwrap_or(TimeOuts::default().frame) + HEARTBEAT_BEYOND;
-        let heartbeat_ns = i64::try_from(heartbeat.as_nanos()).unwrap_or(i64::MAX);
+        let heartbeat_ns = i64::try_from((gpu_timeout + HEARTBEAT_BEYOND).as_nanos()).unwrap_or(i64::MAX);
         let fetched = Vec::new();
         Ok(Self { camera, imu, ship, trigger, lcd, lamps, health, threads, heartbeat_ns, output, fetched })
     }
@@ -245,47 +259,13 @@ impl Hardware {
     }
 }
 
-/// The lamps. No configured input is one of them, whether it is used now or not.
-fn lamps(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<Lamps> {
-    let config = &settings.config;
-    let inputs = [
-        ("trigger", config.trigger.as_ref().map(|t| &t.line)),
-        ("interlock", config.interlock.as_ref()),
-        ("power-fail", config.power_fail.as_ref()),
-    ];
-    let presses = config.heading.presses.iter().map(|press| (press.name(), Some(&press.line)));
-    let inputs = inputs.into_iter().chain(presses);
-    let inputs = inputs.filter_map(|(name, line)| line.map(|line| (name, line)));
-    match Lamps::start(config.lamps.clone()?, inputs) {
+fn start_lamps(choice: LampChoice, faults: &mut Vec<FaultChange>) -> Option<Lamps> {
+    let inputs = choice.inputs.iter().map(|(name, line)| (*name, line));
+    match Lamps::start(choice.lamps, inputs) {
         Ok(lamps) => Some(lamps),
         Err(e) => {
             faults.push(FaultChange::raised(now(), Fault::Config, format!("{e}; no lamp is lit")));
             None
         }
     }
-}
-
-fn trigger_settings(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<TriggerSettings> {
-    let config = &settings.config;
-    if config.interlock.is_none() {
-        let cause =
-            "no interlock is configured: set [interlock] to the line that tells that the gun is inert";
-        faults.push(FaultChange::raised(now(), Fault::NotInert, cause));
-    }
-    let Some(trigger) = &config.trigger else {
-        let cause = "no trigger is configured: set [trigger] to its line";
-        faults.push(FaultChange::raised(now(), Fault::TriggerLost, cause));
-        return None;
-    };
-    let weapon = settings.setup.scenario.weapon;
-    let belt_s = f64::from(weapon.belt) * 60.0 / weapon.rounds_per_minute.max(1.0);
-    Some(TriggerSettings {
-        debounce: trigger.debounce,
-        stuck_after: (Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_MOST) + STUCK_BEYOND)
-            .min(STUCK_MOST),
-        interlock: config.interlock.clone(),
-        power_fail: config.power_fail.clone(),
-        presses: config.heading.presses.clone(),
-        ..TriggerSettings::new(trigger.line.clone())
-    })
 }

@@ -51,6 +51,21 @@ impl Samples {
         self.max = self.max.max(value);
     }
 
+    /// Adds all values of `more`.
+    pub fn add(&mut self, more: &Self) {
+        if more.counts.is_empty() {
+            return;
+        }
+        if self.counts.is_empty() {
+            *self = more.clone();
+            return;
+        }
+        self.counts.iter_mut().zip(&more.counts).for_each(|(all, n)| *all += n);
+        self.count += more.count;
+        self.sum_of_squares += more.sum_of_squares;
+        self.max = self.max.max(more.max);
+    }
+
     /// Nearest-rank percentiles to a quarter of a per cent, the largest exactly; `None` without values.
     pub fn percentiles(&self) -> Option<Percentiles> {
         let rank = |share: f64| {

@@ -7,12 +7,12 @@ use bowwave_core::{
 
 /// Keeps the board and writes the log.
 #[derive(Debug, Default)]
-pub struct Faults {
+pub struct FaultLog {
     board: FaultBoard,
     boot_id: String,
 }
 
-impl Faults {
+impl FaultLog {
     /// Nothing has happened in this boot.
     pub fn new(boot_id: Option<String>) -> Self {
         Self { board: FaultBoard::new(), boot_id: boot_id.unwrap_or_default() }
@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn nothing_is_left_when_all_is_looked_at_anew() {
-        let mut faults = Faults::new(None);
+        let mut faults = FaultLog::new(None);
         let mut events = Vec::new();
         for fault in [Fault::Config, Fault::ImuLost] {
             faults.set(fault, Some("a".into()), &mut events);
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn the_session_hears_of_each_change_once() {
-        let mut faults = Faults::new(None);
+        let mut faults = FaultLog::new(None);
         let mut events = Vec::new();
         faults.set(Fault::DiskFull, Some("a".into()), &mut events);
         faults.set(Fault::DiskFull, Some("a".into()), &mut events);

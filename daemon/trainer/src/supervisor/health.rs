@@ -20,8 +20,6 @@ use bowwave_core::{
 use bowwave_devices::{clock::now, report::Reporter};
 use crossbeam_channel::{Receiver, Sender, bounded};
 
-use crate::config::HealthChoice;
-
 /// Above this the trainer draws less, unless the configuration says otherwise: most boards throttle from 80 to 85 on.
 const LIMIT_C: f64 = 78.0;
 /// So much cooler it must be until it draws all again.
@@ -38,6 +36,15 @@ const GUESS_NS: i64 = 3 * NS_PER_S;
 /// How often everything is looked at, and how often the thread says that it lives.
 const EVERY: Duration = Duration::from_millis(1000);
 const BEAT: Duration = Duration::from_millis(100);
+
+/// What is watched besides the devices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HealthSettings {
+    /// File with a temperature in thousandths of a degree; else all thermal zones.
+    pub thermal: Option<PathBuf>,
+    /// From this temperature on the trainer draws less, degrees Celsius.
+    pub limit_c: Option<f64>,
+}
 
 /// The wall clock at an instant of the monotonic one, once it is known to be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,11 +65,11 @@ pub struct Health {
 
 impl Health {
     /// Starts to watch.
-    pub fn start(choice: &HealthChoice, reporter: Reporter) -> Result<Self> {
+    pub fn start(settings: &HealthSettings, reporter: Reporter) -> Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, clock_set) = bounded(1);
-        let zones = choice.thermal.clone().map_or_else(thermal_zones, |path| vec![path]);
-        let limit_c = choice.limit_c.unwrap_or(LIMIT_C);
+        let zones = settings.thermal.clone().map_or_else(thermal_zones, |path| vec![path]);
+        let limit_c = settings.limit_c.unwrap_or(LIMIT_C);
         let stopped = Arc::clone(&stop);
         let thread = thread::Builder::new()
             .name("health".to_owned())

@@ -1,0 +1,88 @@
+//! `bowwave replay`: does a recording give the records and scenes of the run that it was made in?
+
+use anyhow::Result;
+use bowwave_trainer::replay::{Replayed, replay};
+use serde::Serialize;
+
+use crate::{cli::ReplayRecording, outcome::Outcome, stdout};
+
+#[derive(Debug, Serialize)]
+struct ReplaySummary {
+    /// Ticks that were stepped.
+    ticks: u64,
+    /// Inputs that were read, ticks included.
+    inputs: u64,
+    /// Inputs that the recording lacks.
+    missing: u64,
+    /// Pictures whose pixels are not those that the session saw.
+    recoded: u64,
+    /// Whether the file was cut short.
+    cut: bool,
+    /// Whether records and scenes were the same up to the last tick.
+    same: bool,
+    /// Seconds of the host's clock at which they were first found to differ.
+    differs_from_s: Option<f64>,
+    /// As in the run's summary.json.
+    records_digest: String,
+    /// As in the run's summary.json.
+    scenes_digest: String,
+    /// Rounds fired.
+    shots: u64,
+    /// Rounds that struck.
+    hits: u64,
+}
+
+/// Replays and tells. Exit code 0: the same; 1: not; 3: the recording does not tell, since not all that the session met is in it.
+pub fn run(arguments: &ReplayRecording) -> Result<Outcome> {
+    let result = replay(&arguments.recording)?;
+    if arguments.json {
+        stdout::print_json(&summary(&result))?;
+    }
+    eprintln!("{}", words(&result));
+    Ok(match (result.differs_from, result.is_complete()) {
+        (None, true) => Outcome::Done,
+        (Some(_), true) => Outcome::Failed,
+        (_, false) => Outcome::Partly,
+    })
+}
+
+fn summary(result: &Replayed) -> ReplaySummary {
+    ReplaySummary {
+        ticks: result.ticks,
+        inputs: result.inputs,
+        missing: result.missing,
+        recoded: result.recoded,
+        cut: result.cut,
+        same: result.differs_from.is_none(),
+        differs_from_s: result.differs_from.map(|t| t.ns() as f64 * 1e-9),
+        records_digest: format!("{:016x}", result.digest.records.get()),
+        scenes_digest: format!("{:016x}", result.digest.scenes.get()),
+        shots: result.score.0,
+        hits: result.score.1,
+    }
+}
+
+fn words(result: &Replayed) -> String {
+    let mut text = match result.differs_from {
+        None => {
+            format!("records and scenes are the same in {} ticks with {} inputs", result.ticks, result.inputs)
+        }
+        Some(from) => format!("records or scenes differ before {from}"),
+    };
+    if result.missing > 0 {
+        text.push_str(&format!(
+            "; {} inputs are missing, since the disk was too slow or an entry could not be written",
+            result.missing
+        ));
+    }
+    if result.recoded > 0 {
+        text.push_str(&format!(
+            "; {} pictures came without a JPEG and were coded for the recording: set files.record_exact to keep their pixels",
+            result.recoded
+        ));
+    }
+    if result.cut {
+        text.push_str("; the file was cut short");
+    }
+    text
+}

@@ -1,0 +1,171 @@
+//! Renderer and output thread. Both are made anew together when the GPU is lost or pictures come in another layout.
+
+mod hashes;
+mod lateness;
+mod output;
+mod pictures;
+mod video;
+mod window;
+
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use bowwave_core::{
+    event::Picture,
+    model::Model,
+    session::{Session, View},
+    time::Time,
+};
+use bowwave_devices::clock::now;
+use bowwave_render::{RenderConfig, RenderError, Renderer, TimeOuts};
+
+use output::{OutputThread, Ticket};
+
+pub use output::{CompletedFrame, OutputOptions, OutputReport, UserEvent};
+
+/// A driver that compiles for longer than this is not waited for, seconds.
+const WARM_UP_S: f64 = 120.0;
+/// How often it is looked whether it still runs.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Settings of a presenter.
+#[derive(Clone, Debug, Default)]
+pub struct PresenterOptions {
+    /// Vulkan device by number or part of its name.
+    pub gpu: Option<String>,
+    /// Whether to run with the validation layer.
+    pub validation: bool,
+    /// How long the GPU may take over a frame before it counts as hung.
+    pub gpu_timeout: Option<Duration>,
+    /// Uses of the finished frames; the size is the plan's.
+    pub output: OutputOptions,
+}
+
+/// Draws scenes and takes the frames to where they are seen.
+pub struct Presenter {
+    renderer: Renderer,
+    output: Option<OutputThread>,
+    before: OutputReport,
+}
+
+impl Presenter {
+    /// Opens the GPU, makes what `session` needs and draws it once to nobody, so that the first frames do not wait for the
+    /// driver's compiler.
+    pub fn open(session: &Session, models: &[Model], options: &PresenterOptions) -> Result<Self> {
+        let mut config = RenderConfig::of_plan(session.plan(), options.gpu.clone(), options.validation);
+        if let Some(frame) = options.gpu_timeout {
+            // A computer that draws so much slower compiles so much slower.
+            config.time_outs = TimeOuts { frame, rehearsal: config.time_outs.rehearsal.max(frame * 120) };
+        }
+        let (renderer, completions) = Renderer::new(&config, models)?;
+        let output = OutputOptions { size: session.plan().size, ..options.output.clone() };
+        let output = OutputThread::start(completions, output)?;
+        let mut presenter = Self { renderer, output: Some(output), before: OutputReport::default() };
+        presenter.warm_up(session)?;
+        Ok(presenter)
+    }
+
+    /// Opens everything anew for what `session` needs now. The old output's report is kept.
+    pub fn reopen(&mut self, session: &Session, models: &[Model], options: &PresenterOptions) -> Result<()> {
+        let new = Self::open(session, models, options)?;
+        let old = std::mem::replace(self, new);
+        match old.close() {
+            Ok(report) => self.before = report,
+            Err(e) => log::debug!("the former renderer ended with: {e:#}"),
+        }
+        Ok(())
+    }
+
+    /// Draws everything that the session can show, to nobody: drivers compile shaders when they are first used.
+    fn warm_up(&mut self, session: &Session) -> Result<()> {
+        let scene = session.rehearsal();
+        let plan = session.plan();
+        let (width, height) = plan.picture;
+        let picture = Picture::black(plan.video, width, height).context("no picture of this size")?;
+        let begun = now();
+        self.renderer.submit(&scene, &picture, true)?;
+        if let Some(output) = &self.output {
+            output.announce(Ticket { frame: 0, begun, submitted: begun, deadline: None, warm_up: true });
+            let begun = now();
+            // A software driver on a slow computer compiles for a long time at its first start; the renderer's own time-out
+            // ends one that hangs.
+            while !output.await_warm_up(PATIENCE) && output.runs() {
+                if now().secs_since(begun) > WARM_UP_S {
+                    log::warn!(
+                        "the warm-up was not complete after {WARM_UP_S} s; the first frames may be late"
+                    );
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Hands a frame over that was begun at `begun` and must be complete at `deadline`.
+    pub fn show(
+        &mut self,
+        view: &View<'_>,
+        begun: Time,
+        deadline: Option<Time>,
+    ) -> Result<Handed, RenderError> {
+        let ticket = Ticket { frame: view.scene.frame, begun, submitted: now(), deadline, warm_up: false };
+        let waited = self.renderer.submit(view.scene, view.picture, view.picture_is_new)?;
+        let taken = self.output.as_ref().is_some_and(|o| o.runs() && o.announce(ticket));
+        Ok(if taken { Handed::Taken { waited } } else { Handed::OutputEnded })
+    }
+
+    /// Frames completed since the last call.
+    pub fn done(&self) -> impl Iterator<Item = CompletedFrame> + '_ {
+        self.output.iter().flat_map(OutputThread::done)
+    }
+
+    /// What the user did at the window.
+    pub fn user_events(&self) -> impl Iterator<Item = UserEvent> + '_ {
+        self.output.iter().flat_map(OutputThread::user_events)
+    }
+
+    /// Why the output thread has ended, where it has.
+    pub fn take_error(&mut self) -> Option<anyhow::Error> {
+        if self.output.as_ref().is_some_and(OutputThread::runs) {
+            return None;
+        }
+        self.output.take()?.finish().err()
+    }
+
+    /// Device and driver.
+    pub fn device(&self) -> String {
+        format!("{} ({})", self.renderer.device().name, self.renderer.device().driver)
+    }
+
+    /// How pictures reach the GPU: copied or imported, with how many of each.
+    pub fn picture_path(&self) -> String {
+        format!("{:?} {:?}", self.renderer.picture_path(), self.renderer.picture_counts()).to_lowercase()
+    }
+
+    /// What Vulkan's validation layer has said.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.renderer.validation_messages()
+    }
+
+    /// Takes the last frames out and ends the thread.
+    pub fn close(self) -> Result<OutputReport> {
+        let Self { renderer, output, before: mut report } = self;
+        drop(renderer);
+        if let Some(output) = output {
+            report.add(output.finish()?);
+        }
+        Ok(report)
+    }
+}
+
+/// Outcome of handing a frame over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Handed {
+    /// The output thread will take it.
+    Taken {
+        /// Whether it had to wait for a slot of the renderer's ring.
+        waited: bool,
+    },
+    /// The output thread has ended: [`Presenter::take_error`] says why.
+    OutputEnded,
+}

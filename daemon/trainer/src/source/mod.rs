@@ -1,0 +1,151 @@
+//! Where a session's events come from: the gun's own devices, or a recording as if its devices were there.
+
+mod devices;
+
+use bowwave_core::{
+    event::Event, fault::FaultChange, frame::scene::Status, geometry::CameraPose, time::Time,
+};
+use hw_sim::replay::{Replay, ReplayError, ReplayStats};
+
+use crate::supervisor::WallTime;
+
+pub use devices::{DeviceSettings, Devices, LampChoice};
+
+/// A source of events.
+pub enum Source {
+    /// The gun's own devices.
+    Devices(Box<Devices>),
+    /// A recording.
+    Recording(Box<RecordingSource>),
+}
+
+/// A recording that is replayed.
+pub struct RecordingSource {
+    replay: Replay,
+    error: Option<ReplayError>,
+}
+
+impl RecordingSource {
+    /// Of a replay that has begun.
+    pub const fn new(replay: Replay) -> Self {
+        Self { replay, error: None }
+    }
+
+    /// When the recording begins, on the clock of its events.
+    pub fn origin(&self) -> Time {
+        self.replay.origin()
+    }
+}
+
+impl Source {
+    /// Fetches what has arrived, by arrival, and the changes of faults. A recording that is replayed as fast as it goes gives what arrived up
+    /// to `until`.
+    pub fn collect(&mut self, until: Time, events: &mut Vec<Event>, faults: &mut Vec<FaultChange>) {
+        match self {
+            Self::Devices(devices) => devices.collect(events, faults),
+            Self::Recording(recording) => {
+                // An error of the recording ends the run; what came before it is still shown.
+                if let Err(e) = recording.replay.collect(until, events) {
+                    recording.error = Some(e);
+                }
+            }
+        }
+    }
+
+    /// Whether no further event will come.
+    pub fn has_ended(&self) -> bool {
+        match self {
+            Self::Devices(_) => false,
+            Self::Recording(recording) => recording.error.is_some() || recording.replay.finished(),
+        }
+    }
+
+    /// Why the recording cannot be read further, once.
+    pub fn take_error(&mut self) -> Option<ReplayError> {
+        match self {
+            Self::Devices(_) => None,
+            Self::Recording(recording) => recording.error.take(),
+        }
+    }
+
+    /// Where the camera really was at a picture's mid-exposure; only recordings with truth know.
+    pub fn truth_at(&self, mid_exposure: Time) -> Option<CameraPose> {
+        match self {
+            Self::Devices(_) => None,
+            Self::Recording(recording) => recording.replay.truth_at(mid_exposure),
+        }
+    }
+
+    /// Size of the LCD that shows now.
+    pub fn lcd_size(&self) -> Option<(u32, u32)> {
+        match self {
+            Self::Devices(devices) => devices.lcd_size(),
+            Self::Recording(_) => None,
+        }
+    }
+
+    /// Vertical blanks at which frames came on the LCD, with their period in nanoseconds.
+    pub fn flips(&self) -> impl Iterator<Item = (Time, i64)> + '_ {
+        match self {
+            Self::Devices(devices) => Some(devices.flips()),
+            Self::Recording(_) => None,
+        }
+        .into_iter()
+        .flatten()
+    }
+
+    /// The wall clock, told once, when it is known to be set.
+    pub fn clock_set(&self) -> Option<WallTime> {
+        match self {
+            Self::Devices(devices) => devices.health().clock_set(),
+            Self::Recording(_) => None,
+        }
+    }
+
+    /// The thread that has given no sign of life for too long, if any.
+    pub fn hanging(&self, now: Time) -> Option<&'static str> {
+        match self {
+            Self::Devices(devices) => devices.hanging(now),
+            Self::Recording(_) => None,
+        }
+    }
+
+    /// Lights the lamps that belong to `status`.
+    pub fn light(&mut self, status: &Status) {
+        if let Self::Devices(devices) = self {
+            devices.light(status);
+        }
+    }
+
+    /// Names and counters for the summary.
+    pub fn counters(&self) -> Vec<(&'static str, u64)> {
+        match self {
+            Self::Devices(devices) => devices.counters(),
+            Self::Recording(recording) => replay_counters(&recording.replay.stats()),
+        }
+    }
+
+    /// Ends all threads of the source.
+    pub fn stop(self) -> Result<(), ReplayError> {
+        match self {
+            Self::Devices(devices) => devices.stop(),
+            Self::Recording(recording) => drop(recording.replay.stop()?),
+        }
+        Ok(())
+    }
+}
+
+fn replay_counters(r: &ReplayStats) -> Vec<(&'static str, u64)> {
+    vec![
+        ("imu_not_finite", r.imu.imu.not_finite),
+        ("imu_bad_checksums", r.imu.imu.bad_crc),
+        ("imu_skipped_bytes", r.imu.imu.skipped_bytes),
+        ("imu_overwritten", r.imu.overflow),
+        ("pictures_other_size", r.frames.other_size),
+        ("pictures_undecodable", r.frames.undecodable),
+        ("pictures_overwritten", r.frames_overwritten),
+        ("pictures_late", r.frames_late),
+        ("faults_injected", r.faults),
+        ("trigger_edges", r.triggers),
+    ]
+}

@@ -1,0 +1,214 @@
+//! Keeps a session's inputs as a recording, on a thread of its own: a slow disk must not delay a frame.
+
+use std::{
+    path::PathBuf,
+    thread::{self, JoinHandle},
+};
+
+use anyhow::{Context, Result, anyhow};
+use bowwave_core::{
+    event::{CameraFrame, Event, Picture, Tick},
+    session::SessionDigest,
+};
+use bowwave_devices::nmea::line_of;
+use bowwave_record::{
+    Entry, FaultEntry, FrameEntry, PictureEntry, PoseEntry, Properties, RecordError, RecordingWriter,
+    ShipEntry, TickEntry, WrittenSummary,
+};
+use crossbeam_channel::{Sender, TrySendError, bounded};
+use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
+
+/// Entries that wait for the disk: about a second.
+const QUEUE: usize = 256;
+
+/// Pictures that come without a JPEG are coded with this quality, of 100, where pixels need not be exact.
+const QUALITY: u8 = 90;
+
+/// Settings of a recorder.
+#[derive(Clone, Debug)]
+pub struct RecorderOptions {
+    /// The file. What is there is replaced.
+    pub path: PathBuf,
+    /// What the recording says about itself.
+    pub properties: Properties,
+    /// Wait for the disk where the queue is full; else entries are lost and counted.
+    pub lossless: bool,
+    /// Keep the pixels of pictures that come without a JPEG, as the session saw them. Else they are coded, which takes a twentieth of the
+    /// room, and a replay sees slightly other pixels.
+    pub exact_pixels: bool,
+}
+
+/// One job of the thread.
+enum RecorderJob {
+    Entry(Box<Entry>),
+    /// A picture that no JPEG came with, to be coded.
+    Code(CameraFrame),
+    Flush,
+}
+
+/// The running thread.
+#[derive(Debug)]
+pub struct Recorder {
+    queue: Option<Sender<RecorderJob>>,
+    thread: Option<JoinHandle<Result<WrittenSummary>>>,
+    lossless: bool,
+    exact_pixels: bool,
+    lost: u64,
+    inputs: u64,
+}
+
+impl Recorder {
+    /// Begins a recording.
+    pub fn start(options: &RecorderOptions) -> Result<Self> {
+        let mut writer = RecordingWriter::replace(&options.path, &options.properties)?;
+        let (queue, jobs) = bounded::<RecorderJob>(QUEUE);
+        let thread = thread::Builder::new()
+            .name("recorder".to_owned())
+            .spawn(move || {
+                for job in jobs {
+                    match job {
+                        RecorderJob::Entry(entry) => write(&mut writer, &entry)?,
+                        RecorderJob::Code(frame) => {
+                            let jpeg = jpeg(&frame.picture)?.into();
+                            write(
+                                &mut writer,
+                                &Entry::Frame(FrameEntry { is_recoded: true, ..frame_entry(&frame, jpeg) }),
+                            )?;
+                        }
+                        RecorderJob::Flush => writer.flush()?,
+                    }
+                }
+                Ok(writer.finish()?)
+            })
+            .context("cannot start the recorder's thread; are too many processes running?")?;
+        Ok(Self {
+            queue: Some(queue),
+            thread: Some(thread),
+            lossless: options.lossless,
+            exact_pixels: options.exact_pixels,
+            lost: 0,
+            inputs: 0,
+        })
+    }
+
+    /// Takes in an event that the session meets with `tick`.
+    pub fn event(&mut self, event: &Event, tick: Tick) {
+        self.inputs += 1;
+        match event {
+            Event::Imu(sample) => self.entry(Entry::Imu(*sample)),
+            Event::Trigger(edge) => self.entry(Entry::Trigger(*edge)),
+            Event::Ship(sample) => {
+                self.entry(Entry::Ship(ShipEntry { arrival: sample.arrival, sentence: line_of(sample) }));
+                self.entry(Entry::ShipValues(*sample));
+            }
+            Event::Mark(mark) => self.entry(Entry::Mark(*mark)),
+            Event::Frame(frame) => match &frame.jpeg {
+                Some(jpeg) => self.entry(Entry::Frame(frame_entry(frame, jpeg.clone()))),
+                None if self.exact_pixels => self.entry(Entry::Picture(PictureEntry {
+                    arrival: frame.arrival,
+                    mid_exposure: frame.mid_exposure,
+                    sequence: frame.sequence,
+                    picture: frame.picture.clone(),
+                })),
+                None => self.put(RecorderJob::Code(frame.clone())),
+            },
+            Event::Fault(change) => {
+                self.entry(Entry::Fault(FaultEntry { logged: tick.time, change: change.clone() }));
+            }
+        }
+    }
+
+    /// Takes in a tick; `digest` is over what the session gave before it.
+    pub fn tick(&mut self, tick: Tick, digest: SessionDigest) {
+        self.entry(Entry::Tick(TickEntry {
+            tick,
+            inputs: self.inputs,
+            records: digest.records.get(),
+            scenes: digest.scenes.get(),
+        }));
+        self.inputs += 1;
+    }
+
+    /// What waits goes to the disk now.
+    pub fn flush(&mut self) {
+        self.put(RecorderJob::Flush);
+    }
+
+    /// Takes in a pose that was used.
+    pub fn pose(&mut self, entry: PoseEntry) {
+        self.entry(Entry::Pose(entry));
+    }
+
+    /// Takes in where the camera really was.
+    pub fn truth(&mut self, entry: PoseEntry) {
+        self.entry(Entry::Truth(entry));
+    }
+
+    fn entry(&mut self, entry: Entry) {
+        self.put(RecorderJob::Entry(Box::new(entry)));
+    }
+
+    fn put(&mut self, job: RecorderJob) {
+        let Some(queue) = &self.queue else { return };
+        // A thread that has ended took its error along: `finish` reports it.
+        let lost = if self.lossless {
+            queue.send(job).is_err()
+        } else {
+            matches!(queue.try_send(job), Err(TrySendError::Full(_) | TrySendError::Disconnected(_)))
+        };
+        self.lost += u64::from(lost);
+    }
+
+    /// Whether its thread has ended before it was asked to: it could not write. [`Self::finish`] says why.
+    pub fn has_ended(&self) -> bool {
+        self.thread.as_ref().is_some_and(JoinHandle::is_finished)
+    }
+
+    /// Entries that found no place.
+    pub const fn lost(&self) -> u64 {
+        self.lost
+    }
+
+    /// Writes what waits and ends the recording.
+    pub fn finish(mut self) -> Result<WrittenSummary> {
+        drop(self.queue.take());
+        let thread = self.thread.take().context("the recorder has already ended")?;
+        thread.join().map_err(|_| anyhow!("the recorder's thread broke down; report it with the log"))?
+    }
+}
+
+/// Writes one entry. One that cannot be represented is left out with a line in the log, and a replay notices that it is missing.
+fn write(writer: &mut RecordingWriter, entry: &Entry) -> Result<()> {
+    match writer.write(entry) {
+        Err(e @ RecordError::Entry { .. }) => {
+            log::warn!("{e}");
+            Ok(())
+        }
+        other => Ok(other?),
+    }
+}
+
+fn frame_entry(frame: &CameraFrame, jpeg: std::sync::Arc<[u8]>) -> FrameEntry {
+    FrameEntry {
+        arrival: frame.arrival,
+        mid_exposure: frame.mid_exposure,
+        sequence: frame.sequence,
+        jpeg,
+        is_recoded: false,
+    }
+}
+
+fn jpeg(picture: &Picture) -> Result<Vec<u8>> {
+    let (width, height) = (picture.width(), picture.height());
+    let mut rgb = Vec::with_capacity(width as usize * height as usize * 3);
+    for y in 0..height {
+        for x in 0..width {
+            rgb.extend(picture.srgb_at(x, y).map(|c| (c * 255.0).round() as u8));
+        }
+    }
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, QUALITY)
+        .encode(&rgb, width, height, ExtendedColorType::Rgb8)
+        .context("cannot code a picture for the recording")?;
+    Ok(bytes)
+}
