@@ -1,4 +1,6 @@
-//! What errors about a text have in common: the place, and that they are one line.
+//! Texts from outside: places in them, errors of one line, and the reader of TOML.
+
+pub mod toml;
 
 /// Line and column of the character at byte `offset`, both from 1; of the text's end where there is none.
 pub fn line_column(text: &str, offset: usize) -> (usize, usize) {
@@ -10,7 +12,7 @@ pub fn line_column(text: &str, offset: usize) -> (usize, usize) {
 }
 
 /// `message` as one line that a terminal and a log show as it is: breaks become spaces, other control characters their escapes.
-/// What is quoted from a file may hold any of them.
+/// A quotation from a file may hold any of them.
 pub fn one_line(message: &str) -> String {
     let mut line = String::with_capacity(message.len());
     for c in message.trim_end().chars() {

@@ -1,0 +1,552 @@
+//! The one way to read TOML: raw structs that serde derives, checked into values in one place.
+//!
+//! A raw struct says which keys a table has ([`Given`] for one that may be left out, [`Needed`] for one that may not). A
+//! [`ValueRule`] says which values a key may have. [`TomlText`] reads the struct and applies the rules. Every refusal is a
+//! [`TomlError`]: origin, line, column, key, the value as it is written, and what is allowed.
+
+use std::{
+    borrow::Cow,
+    fmt::{self, Display},
+    io::{self, Read},
+    ops::{Range, RangeInclusive},
+};
+
+use ::toml::{
+    de::{DeTable, DeValue, Deserializer},
+    value::Datetime,
+};
+use serde::{Deserialize, de::IgnoredAny};
+
+pub use ::toml::Spanned;
+
+use super::{line_column, one_line};
+
+/// Longest text that is read, bytes. The longest scenario of 64 boats and 100 waypoints each has a fifth of it.
+pub const TEXT_BYTES_MAX: usize = 1 << 20;
+/// Longest quotation of a value in an error, characters.
+const QUOTED_MAX: usize = 40;
+
+/// Why a text is refused.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{origin}:{line}:{column}: {}{problem}", if key.is_empty() { String::new() } else { format!("{key}: ") })]
+pub struct TomlError {
+    /// Name of the text: a file name, usually.
+    pub origin: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// Path of the key, as `boat[2].speed_kn`; empty where the text is no TOML.
+    pub key: String,
+    /// What is wrong, with the value, and what is allowed.
+    pub problem: String,
+}
+
+/// Place of a value, for checks that come after reading.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TomlPlace {
+    origin: String,
+    line: usize,
+    column: usize,
+    key: String,
+}
+
+impl TomlPlace {
+    /// The place of a key that no text holds.
+    pub fn nowhere(key: &str) -> Self {
+        Self { origin: String::new(), line: 1, column: 1, key: key.to_owned() }
+    }
+
+    /// An error there.
+    pub fn error(&self, problem: impl Display) -> TomlError {
+        let Self { origin, line, column, key } = self.clone();
+        TomlError { origin, line, column, key: one_line(&key), problem: one_line(&problem.to_string()) }
+    }
+
+    /// The same place for another key.
+    #[must_use]
+    pub fn of_key(self, key: impl Into<String>) -> Self {
+        Self { key: key.into(), ..self }
+    }
+}
+
+/// A value of the expected kind, or of any other, which the rule then refuses with its place.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+pub enum Loose<T> {
+    /// Of the expected kind.
+    Fits(T),
+    /// Of another kind.
+    Other(IgnoredAny),
+}
+
+/// A key that has to be there.
+pub type Needed<T> = Spanned<Loose<T>>;
+/// A key that may be left out.
+pub type Given<T> = Option<Needed<T>>;
+
+/// Former name of a key. It is read, with a warning that names the new one.
+#[derive(Clone, Copy, Debug)]
+pub struct RenamedKey {
+    /// Path of the table, as `gpu`; empty for the root.
+    pub table: &'static str,
+    /// The former name.
+    pub old: &'static str,
+    /// The name.
+    pub new: &'static str,
+}
+
+/// The text that is read.
+#[derive(Clone, Copy, Debug)]
+pub struct TomlText<'a> {
+    text: &'a str,
+    origin: &'a str,
+}
+
+impl<'a> TomlText<'a> {
+    /// A text; `origin` is its name in errors.
+    ///
+    /// # Errors
+    /// Where it is longer than [`TEXT_BYTES_MAX`].
+    pub fn new(text: &'a str, origin: &'a str) -> Result<Self, TomlError> {
+        let whole = Self { text, origin };
+        if text.len() > TEXT_BYTES_MAX {
+            let problem = format!("has {} bytes; give at most {TEXT_BYTES_MAX}", text.len());
+            return Err(whole.at(0).error(problem));
+        }
+        Ok(whole)
+    }
+
+    /// The raw struct of the text, and warnings about former names of keys.
+    ///
+    /// # Errors
+    /// Where the text is no TOML, a key is unknown or missing, or a table is no table.
+    pub fn read<T: for<'de> Deserialize<'de>>(
+        self,
+        renamed: &[RenamedKey],
+    ) -> Result<(T, Vec<String>), TomlError> {
+        let syntax = |e: ::toml::de::Error| self.at(e.span().map_or(0, |s| s.start)).error(e.message());
+        let mut document = DeTable::parse(self.text).map_err(syntax)?;
+        let mut warnings = Vec::new();
+        for key in renamed {
+            warnings.extend(self.rename(document.get_mut(), key)?);
+        }
+        let raw = T::deserialize(Deserializer::from(document)).map_err(|e| self.explain(&e))?;
+        Ok((raw, warnings))
+    }
+
+    /// Gives a key its new name; the warning about it.
+    fn rename(self, root: &mut DeTable<'_>, key: &RenamedKey) -> Result<Option<String>, TomlError> {
+        let table = match key.table {
+            "" => Some(root),
+            path => match root.get_mut(path).map(Spanned::get_mut) {
+                Some(DeValue::Table(table)) => Some(table),
+                _ => None,
+            },
+        };
+        let Some(table) = table else { return Ok(None) };
+        let Some((name, value)) = table.remove_entry(key.old) else { return Ok(None) };
+        let path =
+            if key.table.is_empty() { key.old.to_owned() } else { format!("{}.{}", key.table, key.old) };
+        let place = self.at(name.span().start).of_key(path);
+        if table.contains_key(key.new) {
+            return Err(place.error(format!("is the former name of {}; leave it out", key.new)));
+        }
+        table.insert(Spanned::new(name.span(), Cow::Borrowed(key.new)), value);
+        let warning = format!(
+            "is now called {}; the former name will not be read any longer in the next version",
+            key.new
+        );
+        Ok(Some(place.error(warning).to_string()))
+    }
+
+    /// The value of a key that may be left out.
+    ///
+    /// # Errors
+    /// Where the rule does not allow the value.
+    pub fn given<R: ValueRule>(self, value: &Given<R::Raw>, rule: R) -> Result<Option<R::Value>, TomlError> {
+        value.as_ref().map(|value| self.needed(value, rule)).transpose()
+    }
+
+    /// The value of a key that has to be there.
+    ///
+    /// # Errors
+    /// Where the rule does not allow the value.
+    pub fn needed<R: ValueRule>(self, value: &Needed<R::Raw>, rule: R) -> Result<R::Value, TomlError> {
+        let checked = match value.get_ref() {
+            Loose::Fits(raw) => rule.check(raw),
+            Loose::Other(_) => None,
+        };
+        checked.ok_or_else(|| self.refuse(value, &rule.allowed()))
+    }
+
+    /// The error that a value is not allowed.
+    pub fn refuse<T>(self, value: &Spanned<T>, allowed: &str) -> TomlError {
+        self.error(value, format!("{} is not allowed; give {allowed}", self.written(&value.span())))
+    }
+
+    /// An error about a value.
+    pub fn error<T>(self, value: &Spanned<T>, problem: impl Display) -> TomlError {
+        self.place(value).error(problem)
+    }
+
+    /// Place of a value.
+    pub fn place<T>(self, value: &Spanned<T>) -> TomlPlace {
+        self.at(value.span().start).of_key(self.path(&value.span()))
+    }
+
+    /// A table of the root, `name`; one of defaults where the text has none.
+    pub fn section<T: Default>(self, name: &str, table: Option<Spanned<T>>) -> (TomlSection<'a>, T) {
+        let start = table.as_ref().map_or(0, |table| table.span().start);
+        (
+            TomlSection { text: self, path: name.to_owned(), start },
+            table.map(Spanned::into_inner).unwrap_or_default(),
+        )
+    }
+
+    /// The tables of a list of the root, `name`.
+    ///
+    /// # Errors
+    /// Where there are more than `max`.
+    pub fn sections<T>(
+        self,
+        name: &str,
+        tables: Vec<Spanned<T>>,
+        max: usize,
+    ) -> Result<Vec<(TomlSection<'a>, T)>, TomlError> {
+        if let Some(beyond) = tables.get(max) {
+            let problem = format!("at most {max} tables are allowed: [[{name}]]");
+            return Err(self.at(beyond.span().start).of_key(name).error(problem));
+        }
+        let section = |(i, table): (usize, Spanned<T>)| {
+            let (path, start) = (format!("{name}[{}]", i + 1), table.span().start);
+            (TomlSection { text: self, path, start }, table.into_inner())
+        };
+        Ok(tables.into_iter().enumerate().map(section).collect())
+    }
+
+    /// The place of a byte.
+    fn at(self, offset: usize) -> TomlPlace {
+        let (line, column) = line_column(self.text, offset);
+        TomlPlace { origin: self.origin.to_owned(), line, column, key: String::new() }
+    }
+
+    /// What stands there, cut to one short line.
+    fn written(self, span: &Range<usize>) -> String {
+        let written = self.text.get(span.clone()).unwrap_or_default();
+        let first = written.lines().next().unwrap_or_default();
+        if first.chars().count() > QUOTED_MAX || first.len() < written.len() {
+            format!("{}...", first.chars().take(QUOTED_MAX - 3).collect::<String>())
+        } else {
+            first.to_owned()
+        }
+    }
+
+    /// Path of the key or value that stands there; the deepest of several.
+    fn path(self, span: &Range<usize>) -> String {
+        let mut path = String::new();
+        if let Ok(document) = DeTable::parse(self.text) {
+            find_in_table(document.get_ref(), span, "", &mut path);
+        }
+        path
+    }
+
+    /// The error of a serde type in this text's words. What is not understood is told as it is.
+    fn explain(self, error: &::toml::de::Error) -> TomlError {
+        let span = error.span().unwrap_or(0..0);
+        let place = self.at(span.start).of_key(self.path(&span));
+        let message = error.message();
+        let mut names = message.split('`').skip(1).step_by(2);
+        if message.starts_with("unknown field") {
+            let unknown = names.next().unwrap_or_default().to_owned();
+            let known: Vec<&str> = names.collect();
+            let nearest = known.iter().map(|k| (strsim::damerau_levenshtein(k, &unknown), k)).min();
+            let hint = match nearest {
+                Some((distance, name)) if distance <= 1 + unknown.len() / 3 => {
+                    format!("; did you mean {name}?")
+                }
+                _ => String::new(),
+            };
+            return place.error(format!("unknown key; known are {}{hint}", known.join(", ")));
+        }
+        if message.starts_with("missing field") {
+            let (table, missing) = (place.key.clone(), names.next().unwrap_or_default());
+            let key = if table.is_empty() { missing.to_owned() } else { format!("{table}.{missing}") };
+            return place.of_key(key).error("is missing");
+        }
+        let Some((_, expected)) = message.split_once(", expected ") else { return place.error(message) };
+        let key = place.key.rsplit('.').next().unwrap_or_default().to_owned();
+        let allowed = match expected {
+            "a sequence" => "a list".to_owned(),
+            "a string" => PlainText.allowed(),
+            "a boolean" => YesNo.allowed(),
+            kind if kind.starts_with("struct ") && !key.contains('[') => format!("a table: [{key}]"),
+            kind if kind.starts_with("struct ") => "a table".to_owned(),
+            kind => kind.replace('`', "\""),
+        };
+        place.error(format!("{} is not allowed; give {allowed}", self.written(&span)))
+    }
+}
+
+fn find_in_table(table: &DeTable<'_>, span: &Range<usize>, above: &str, path: &mut String) {
+    for (key, value) in table.iter() {
+        let own =
+            if above.is_empty() { key.get_ref().to_string() } else { format!("{above}.{}", key.get_ref()) };
+        if key.span() == *span {
+            own.clone_into(path);
+        }
+        find_in_value(value, span, &own, path);
+    }
+}
+
+fn find_in_value(value: &Spanned<DeValue<'_>>, span: &Range<usize>, own: &str, path: &mut String) {
+    if value.span() == *span {
+        own.clone_into(path);
+    }
+    match value.get_ref() {
+        DeValue::Table(table) => find_in_table(table, span, own, path),
+        // Only lists of tables number their parts: the parts of a plain list are no keys.
+        DeValue::Array(items) => {
+            for (i, item) in items.iter().enumerate() {
+                let part =
+                    if item.get_ref().is_table() { format!("{own}[{}]", i + 1) } else { own.to_owned() };
+                find_in_value(item, span, &part, path);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// A table of the text: names the keys that it lacks.
+#[derive(Clone, Debug)]
+pub struct TomlSection<'a> {
+    /// The whole text.
+    pub text: TomlText<'a>,
+    path: String,
+    start: usize,
+}
+
+impl TomlSection<'_> {
+    /// The value of a key that has to be there.
+    ///
+    /// # Errors
+    /// Where it is left out, or the rule does not allow the value.
+    pub fn required<R: ValueRule>(
+        &self,
+        key: &str,
+        value: &Given<R::Raw>,
+        rule: R,
+    ) -> Result<R::Value, TomlError> {
+        match value {
+            Some(value) => self.text.needed(value, rule),
+            None => Err(self.missing(key, &rule.allowed())),
+        }
+    }
+
+    /// The error that a key is left out.
+    pub fn missing(&self, key: &str, allowed: &str) -> TomlError {
+        self.error(key, format!("is missing; give {allowed}"))
+    }
+
+    /// An error about a key, at the table's start.
+    pub fn error(&self, key: &str, problem: impl Display) -> TomlError {
+        self.place(key).error(problem)
+    }
+
+    /// Place of the table, under the name of a key.
+    pub fn place(&self, key: &str) -> TomlPlace {
+        self.text.at(self.start).of_key(format!("{}.{key}", self.path))
+    }
+}
+
+/// Which values a key may have.
+pub trait ValueRule {
+    /// Type in the text.
+    type Raw;
+    /// Type of the checked value.
+    type Value;
+    /// The value, where it is allowed.
+    fn check(&self, raw: &Self::Raw) -> Option<Self::Value>;
+    /// What is allowed, in words.
+    fn allowed(&self) -> String;
+}
+
+/// A number within bounds, in a unit. NaN lies within none.
+#[derive(Clone, Debug)]
+pub struct NumberWithin(pub RangeInclusive<f64>, pub &'static str);
+
+impl ValueRule for NumberWithin {
+    type Raw = f64;
+    type Value = f64;
+
+    fn check(&self, raw: &f64) -> Option<f64> {
+        self.0.contains(raw).then_some(*raw)
+    }
+
+    fn allowed(&self) -> String {
+        format!("a number, {} to {}{}", self.0.start(), self.0.end(), InUnit(self.1))
+    }
+}
+
+/// A number above zero and up to a limit, in a unit: a standard deviation.
+#[derive(Clone, Copy, Debug)]
+pub struct PositiveUpTo(pub f64, pub &'static str);
+
+impl ValueRule for PositiveUpTo {
+    type Raw = f64;
+    type Value = f64;
+
+    fn check(&self, raw: &f64) -> Option<f64> {
+        (*raw > 0.0 && *raw <= self.0).then_some(*raw)
+    }
+
+    fn allowed(&self) -> String {
+        format!("a number above 0, up to {}{}", self.0, InUnit(self.1))
+    }
+}
+
+/// `N` values in a list, each of which its rule allows.
+#[derive(Clone, Debug)]
+pub struct ListOf<const N: usize, R>(pub R);
+
+impl<const N: usize, R: ValueRule<Raw = f64, Value = f64>> ValueRule for ListOf<N, R> {
+    type Raw = Vec<f64>;
+    type Value = [f64; N];
+
+    fn check(&self, raw: &Vec<f64>) -> Option<[f64; N]> {
+        let numbers = <[f64; N]>::try_from(raw.as_slice()).ok()?;
+        numbers.iter().all(|n| self.0.check(n).is_some()).then_some(numbers)
+    }
+
+    fn allowed(&self) -> String {
+        format!("a list of {N}, each {}", self.0.allowed())
+    }
+}
+
+/// A whole number within bounds.
+#[derive(Clone, Debug)]
+pub struct WholeWithin<T>(pub RangeInclusive<T>);
+
+impl<T: TryFrom<i64> + PartialOrd + Display> ValueRule for WholeWithin<T> {
+    type Raw = i64;
+    type Value = T;
+
+    fn check(&self, raw: &i64) -> Option<T> {
+        T::try_from(*raw).ok().filter(|n| self.0.contains(n))
+    }
+
+    fn allowed(&self) -> String {
+        format!("a whole number, {} to {}", self.0.start(), self.0.end())
+    }
+}
+
+/// A text of 1 to 200 printable characters.
+#[derive(Clone, Copy, Debug)]
+pub struct PlainText;
+
+impl ValueRule for PlainText {
+    type Raw = String;
+    type Value = String;
+
+    fn check(&self, raw: &String) -> Option<String> {
+        let good =
+            (1..=200).contains(&raw.len()) && !raw.trim().is_empty() && !raw.chars().any(char::is_control);
+        good.then(|| raw.clone())
+    }
+
+    fn allowed(&self) -> String {
+        "a text in quotes, 1 to 200 printable characters".to_owned()
+    }
+}
+
+/// One of a few names, each with its meaning.
+#[derive(Clone, Copy, Debug)]
+pub struct OneOf<'n, T>(pub &'n [(&'n str, T)]);
+
+impl<T: Copy> ValueRule for OneOf<'_, T> {
+    type Raw = String;
+    type Value = T;
+
+    fn check(&self, raw: &String) -> Option<T> {
+        self.0.iter().find(|(name, _)| name == raw).map(|(_, meaning)| *meaning)
+    }
+
+    fn allowed(&self) -> String {
+        let names: Vec<String> = self.0.iter().map(|(name, _)| format!("\"{name}\"")).collect();
+        format!("one of {}", names.join(", "))
+    }
+}
+
+/// True or false.
+#[derive(Clone, Copy, Debug)]
+pub struct YesNo;
+
+impl ValueRule for YesNo {
+    type Raw = bool;
+    type Value = bool;
+
+    fn check(&self, raw: &bool) -> Option<bool> {
+        Some(*raw)
+    }
+
+    fn allowed(&self) -> String {
+        "true or false".to_owned()
+    }
+}
+
+/// A date and time as it stands in a text: bare, or in quotes.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+pub enum BareOrQuoted {
+    /// Without quotes.
+    Bare(Datetime),
+    /// In quotes.
+    Quoted(String),
+}
+
+/// A date, a time or both, bare or in quotes.
+#[derive(Clone, Copy, Debug)]
+pub struct DateAndTime;
+
+impl ValueRule for DateAndTime {
+    type Raw = BareOrQuoted;
+    type Value = Datetime;
+
+    fn check(&self, raw: &BareOrQuoted) -> Option<Datetime> {
+        match raw {
+            BareOrQuoted::Bare(stamp) => Some(*stamp),
+            BareOrQuoted::Quoted(text) => text.parse().ok(),
+        }
+    }
+
+    fn allowed(&self) -> String {
+        "a time like \"2026-06-01T12:00:00Z\"".to_owned()
+    }
+}
+
+/// A unit after a number; nothing where there is none.
+struct InUnit(&'static str);
+
+impl Display for InUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() { Ok(()) } else { write!(f, " {}", self.0) }
+    }
+}
+
+/// The text of a file or another source, of at most [`TEXT_BYTES_MAX`] bytes.
+///
+/// # Errors
+/// Those of the source; and where it is longer, or no UTF-8.
+pub fn bounded_text(source: impl Read) -> io::Result<String> {
+    let mut text = String::new();
+    source.take(TEXT_BYTES_MAX as u64 + 1).read_to_string(&mut text)?;
+    if text.len() > TEXT_BYTES_MAX {
+        let why = format!("it is longer than {TEXT_BYTES_MAX} bytes, the most that are read");
+        return Err(io::Error::new(io::ErrorKind::InvalidData, why));
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+#[path = "toml_tests.rs"]
+mod tests;
