@@ -1,36 +1,15 @@
-//! What can be wrong with a calibration file.
+//! Errors of calibration files.
 
 use std::{io, path::PathBuf};
+
+use bowwave_core::text::toml::TomlError;
 
 /// Why there is no calibration, or why it could not be kept.
 #[derive(Debug, thiserror::Error)]
 pub enum CalibrationError {
-    /// No TOML, an unknown or a missing key, or a value of another kind.
-    #[error("{origin}:{line}:{column}: {message}; mend the calibration file there")]
-    Syntax {
-        /// File name, or what stands for one.
-        origin: String,
-        /// Line, from 1.
-        line: usize,
-        /// Column in characters, from 1.
-        column: usize,
-        /// What is wrong.
-        message: String,
-    },
-    /// A value that cannot be right.
-    #[error("{origin}:{line}:{column}: {key} {problem}; measure it again or mend the calibration file there")]
-    Value {
-        /// File name, or what stands for one.
-        origin: String,
-        /// Line, from 1.
-        line: usize,
-        /// Column in characters, from 1.
-        column: usize,
-        /// Section and key.
-        key: &'static str,
-        /// What it is and what it must be.
-        problem: String,
-    },
+    /// A text that is no calibration: no TOML, an unknown or a missing key, or a value that cannot be right.
+    #[error("{0}; mend the calibration file there, or measure again")]
+    Text(TomlError),
     /// The file could not be read.
     #[error("cannot read the calibration {path}: {source}; check that it exists and may be read")]
     Read {
@@ -62,4 +41,10 @@ pub enum CalibrationError {
     /// A calibration made in memory that a reader would refuse; nothing was written.
     #[error("the calibration is not written, because it could not be read back: {0}")]
     Unreadable(Box<CalibrationError>),
+}
+
+impl From<TomlError> for CalibrationError {
+    fn from(error: TomlError) -> Self {
+        Self::Text(error)
+    }
 }

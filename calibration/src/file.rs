@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use bowwave_core::{calibration::Calibration, estimate::horizon::Mask};
+use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, text::toml::bounded_text};
 use glam::DVec2;
 
 use crate::{CalibrationError, Date, keep, parse, to_toml};
@@ -95,7 +95,8 @@ impl CalibrationFile {
 
     /// Reads and checks a file.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
-        let text = fs::read_to_string(path)
+        let text = fs::File::open(path)
+            .and_then(bounded_text)
             .map_err(|source| CalibrationError::Read { path: path.to_owned(), source })?;
         parse(&text, &path.display().to_string())
     }

@@ -4,18 +4,20 @@ use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
     estimate::horizon::Mask,
     geometry::{Distortion, Lens},
-    text::{line_column, one_line},
+    text::toml::{
+        Given, ListOf, Loose, Needed, NumberWithin, PositiveUpTo, TomlError, TomlText, ValueRule, WholeWithin,
+    },
 };
 use glam::{DQuat, DVec2, DVec3};
 use serde::Deserialize;
-use toml::{Spanned, value::Datetime};
+use toml::value::Datetime;
 
 use crate::{CalibrationError, CalibrationFile, Date, Provenance};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawFile {
-    made: Spanned<Datetime>,
+struct RawCalibration {
+    made: Needed<Datetime>,
     source: String,
     #[serde(default)]
     camera_name: String,
@@ -30,7 +32,7 @@ struct RawFile {
     time_offset: RawTimeOffset,
     shutter: Option<RawShutter>,
     boresight: RawBoresight,
-    trigger: Option<RawTrigger>,
+    trigger: Option<RawTriggerLatency>,
     gyro_bias: RawGyroBias,
     own_ship: Option<RawOwnShip>,
 }
@@ -38,14 +40,14 @@ struct RawFile {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawLens {
-    size_px: Spanned<[u32; 2]>,
-    focal_px: Spanned<[f64; 2]>,
-    focal_sigma_px: Spanned<f64>,
-    centre_px: Spanned<[f64; 2]>,
-    radial: Option<Spanned<[f64; 2]>>,
-    tangential: Option<Spanned<[f64; 2]>>,
-    fisheye: Option<Spanned<[f64; 4]>>,
-    measured: Spanned<Datetime>,
+    size_px: Needed<Vec<i64>>,
+    focal_px: Needed<Vec<f64>>,
+    focal_sigma_px: Needed<f64>,
+    centre_px: Needed<Vec<f64>>,
+    radial: Given<Vec<f64>>,
+    tangential: Given<Vec<f64>>,
+    fisheye: Given<Vec<f64>>,
+    measured: Needed<Datetime>,
     #[serde(default)]
     how: String,
 }
@@ -53,9 +55,9 @@ struct RawLens {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawRotation {
-    rotation_wxyz: Spanned<[f64; 4]>,
-    sigma_mrad: Spanned<[f64; 3]>,
-    measured: Spanned<Datetime>,
+    rotation_wxyz: Needed<Vec<f64>>,
+    sigma_mrad: Needed<Vec<f64>>,
+    measured: Needed<Datetime>,
     #[serde(default)]
     how: String,
 }
@@ -63,9 +65,9 @@ struct RawRotation {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawTimeOffset {
-    offset_ms: Spanned<f64>,
-    sigma_ms: Spanned<f64>,
-    measured: Spanned<Datetime>,
+    offset_ms: Needed<f64>,
+    sigma_ms: Needed<f64>,
+    measured: Needed<Datetime>,
     #[serde(default)]
     how: String,
 }
@@ -73,9 +75,9 @@ struct RawTimeOffset {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawShutter {
-    readout_ms: Spanned<f64>,
-    sigma_ms: Spanned<f64>,
-    measured: Spanned<Datetime>,
+    readout_ms: Needed<f64>,
+    sigma_ms: Needed<f64>,
+    measured: Needed<Datetime>,
     #[serde(default)]
     how: String,
 }
@@ -83,21 +85,21 @@ struct RawShutter {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawBoresight {
-    right_deg: Spanned<f64>,
-    down_deg: Spanned<f64>,
-    sigma_mrad: Spanned<f64>,
-    muzzle_m: Spanned<[f64; 3]>,
-    measured: Spanned<Datetime>,
+    right_deg: Needed<f64>,
+    down_deg: Needed<f64>,
+    sigma_mrad: Needed<f64>,
+    muzzle_m: Needed<Vec<f64>>,
+    measured: Needed<Datetime>,
     #[serde(default)]
     how: String,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawTrigger {
-    latency_ms: Spanned<f64>,
-    sigma_ms: Spanned<f64>,
-    measured: Spanned<Datetime>,
+struct RawTriggerLatency {
+    latency_ms: Needed<f64>,
+    sigma_ms: Needed<f64>,
+    measured: Needed<Datetime>,
     #[serde(default)]
     how: String,
 }
@@ -105,9 +107,9 @@ struct RawTrigger {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawGyroBias {
-    bias_deg_per_s: Spanned<[f64; 3]>,
-    sigma_deg_per_s: Spanned<[f64; 3]>,
-    measured: Spanned<Datetime>,
+    bias_deg_per_s: Needed<Vec<f64>>,
+    sigma_deg_per_s: Needed<Vec<f64>>,
+    measured: Needed<Datetime>,
     #[serde(default)]
     how: String,
 }
@@ -115,40 +117,30 @@ struct RawGyroBias {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawOwnShip {
-    hidden_px: Vec<Spanned<Vec<[f64; 2]>>>,
+    hidden_px: Vec<Needed<Vec<[f64; 2]>>>,
 }
 
-/// Reads a calibration; `origin` (a file name, usually) stands at the head of error messages.
+/// A calibration's text, checked; `origin` (a file name, usually) stands at the head of error messages.
+///
+/// # Errors
+/// Names the place, the key, the value and what is allowed.
 pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationError> {
-    let at = Place { text, origin };
-    let raw: RawFile = toml::from_str(text).map_err(|e| at.syntax(&e))?;
+    let text = TomlText::new(text, origin)?;
+    let (raw, _) = text.read::<RawCalibration>(&[])?;
+    let measured = |day: &Needed<Datetime>, how: &str| -> Result<Provenance, TomlError> {
+        Ok(Provenance::new(text.needed(day, CalendarDay)?, how))
+    };
     Ok(CalibrationFile {
-        made: at.date("made", &raw.made)?,
-        lens: at.provenance("lens.measured", &raw.lens.measured, &raw.lens.how)?,
-        camera_from_imu: at.provenance(
-            "camera_from_imu.measured",
-            &raw.camera_from_imu.measured,
-            &raw.camera_from_imu.how,
-        )?,
-        time_offset: at.provenance(
-            "time_offset.measured",
-            &raw.time_offset.measured,
-            &raw.time_offset.how,
-        )?,
-        shutter: raw
-            .shutter
-            .as_ref()
-            .map(|shutter| at.provenance("shutter.measured", &shutter.measured, &shutter.how))
-            .transpose()?,
-        boresight: at.provenance("boresight.measured", &raw.boresight.measured, &raw.boresight.how)?,
-        trigger: raw
-            .trigger
-            .as_ref()
-            .map(|trigger| at.provenance("trigger.measured", &trigger.measured, &trigger.how))
-            .transpose()?,
-        gyro_bias: at.provenance("gyro_bias.measured", &raw.gyro_bias.measured, &raw.gyro_bias.how)?,
-        calibration: at.calibration(&raw)?,
-        own_ship: at.own_ship(&raw)?,
+        made: text.needed(&raw.made, CalendarDay)?,
+        lens: measured(&raw.lens.measured, &raw.lens.how)?,
+        camera_from_imu: measured(&raw.camera_from_imu.measured, &raw.camera_from_imu.how)?,
+        time_offset: measured(&raw.time_offset.measured, &raw.time_offset.how)?,
+        shutter: raw.shutter.as_ref().map(|s| measured(&s.measured, &s.how)).transpose()?,
+        boresight: measured(&raw.boresight.measured, &raw.boresight.how)?,
+        trigger: raw.trigger.as_ref().map(|t| measured(&t.measured, &t.how)).transpose()?,
+        gyro_bias: measured(&raw.gyro_bias.measured, &raw.gyro_bias.how)?,
+        calibration: calibration(text, &raw)?,
+        own_ship: own_ship(text, &raw)?,
         source: raw.source,
         camera_name: raw.camera_name,
         camera_serial: raw.camera_serial,
@@ -163,7 +155,7 @@ pub(crate) fn radians_from_mrad(mrad: f64) -> f64 {
 }
 
 /// Milliseconds to whole nanoseconds.
-pub(crate) fn ns_from_ms(ms: f64) -> i64 {
+fn ns_from_ms(ms: f64) -> i64 {
     (ms * 1e6).round() as i64
 }
 
@@ -179,264 +171,196 @@ const SHARE_MOST: f64 = 0.8;
 /// No camera of 10 pictures a second or more takes longer to read one.
 const READOUT_MS_MAX: f64 = 100.0;
 
-struct Place<'a> {
-    text: &'a str,
-    origin: &'a str,
+/// A day without a time.
+struct CalendarDay;
+
+impl ValueRule for CalendarDay {
+    type Raw = Datetime;
+    type Value = Date;
+
+    fn check(&self, raw: &Datetime) -> Option<Date> {
+        let date = raw.date.filter(|_| raw.time.is_none() && raw.offset.is_none())?;
+        Date::new(date.year, date.month, date.day)
+    }
+
+    fn allowed(&self) -> String {
+        "a day of the calendar, without quotes and without a time: 2026-11-20".to_owned()
+    }
 }
 
-impl Place<'_> {
-    fn syntax(&self, e: &toml::de::Error) -> CalibrationError {
-        let (line, column) = line_column(self.text, e.span().map_or(0, |s| s.start));
-        let message = one_line(e.message());
-        CalibrationError::Syntax { origin: self.origin.to_owned(), line, column, message }
+/// A duration up to so many milliseconds either way, to nanoseconds.
+struct MillisecondsUpTo(f64);
+
+impl ValueRule for MillisecondsUpTo {
+    type Raw = f64;
+    type Value = i64;
+
+    fn check(&self, raw: &f64) -> Option<i64> {
+        (-self.0..=self.0).contains(raw).then(|| ns_from_ms(*raw))
     }
 
-    fn refuse<T>(&self, key: &'static str, at: &Spanned<T>, problem: impl Into<String>) -> CalibrationError {
-        let (line, column) = line_column(self.text, at.span().start);
-        CalibrationError::Value {
-            origin: self.origin.to_owned(),
-            line,
-            column,
-            key,
-            problem: one_line(&problem.into()),
-        }
+    fn allowed(&self) -> String {
+        NumberWithin(-self.0..=self.0, "ms").allowed()
+    }
+}
+
+/// A standard deviation up to so many milliseconds, to nanoseconds.
+struct SigmaMsUpTo(f64);
+
+impl ValueRule for SigmaMsUpTo {
+    type Raw = f64;
+    type Value = i64;
+
+    fn check(&self, raw: &f64) -> Option<i64> {
+        (*raw <= self.0).then(|| ns_from_ms(*raw)).filter(|ns| *ns >= 1)
     }
 
-    fn date(&self, key: &'static str, raw: &Spanned<Datetime>) -> Result<Date, CalibrationError> {
-        let value = raw.get_ref();
-        if value.time.is_some() || value.offset.is_some() {
-            return Err(self.refuse(key, raw, format!("is {value}, but must be a date without a time")));
-        }
-        value
-            .date
-            .and_then(|d| Date::new(d.year, d.month, d.day))
-            .ok_or_else(|| self.refuse(key, raw, format!("is {value}, but must be a day of the calendar")))
+    fn allowed(&self) -> String {
+        format!("a number above 0, up to {} ms; a nanosecond is the resolution of all times", self.0)
     }
+}
 
-    fn provenance(
-        &self,
-        key: &'static str,
-        measured: &Spanned<Datetime>,
-        how: &str,
-    ) -> Result<Provenance, CalibrationError> {
-        Ok(Provenance::new(self.date(key, measured)?, how))
-    }
+/// Two or more numbers of a vector, each up to `limit` either way.
+fn each_up_to<const N: usize>(limit: f64, unit: &'static str) -> ListOf<N, NumberWithin> {
+    ListOf(NumberWithin(-limit..=limit, unit))
+}
 
-    /// Every number within `low..=high`, which no NaN is.
-    fn within<const N: usize>(
-        &self,
-        key: &'static str,
-        raw: &Spanned<[f64; N]>,
-        low: f64,
-        high: f64,
-    ) -> Result<[f64; N], CalibrationError> {
-        let values = *raw.get_ref();
-        match values.iter().find(|v| !(low..=high).contains(*v)) {
-            Some(v) => Err(self.refuse(key, raw, format!("has {v}, but must lie within {low} and {high}"))),
-            None => Ok(values),
-        }
-    }
-
-    fn one_within(
-        &self,
-        key: &'static str,
-        raw: &Spanned<f64>,
-        low: f64,
-        high: f64,
-    ) -> Result<f64, CalibrationError> {
-        let value = *raw.get_ref();
-        if (low..=high).contains(&value) {
-            Ok(value)
-        } else {
-            Err(self.refuse(key, raw, format!("is {value}, but must lie within {low} and {high}")))
-        }
-    }
-
-    /// Standard deviations: above zero and at most `high`.
-    fn sigma<const N: usize>(
-        &self,
-        key: &'static str,
-        raw: &Spanned<[f64; N]>,
-        high: f64,
-    ) -> Result<[f64; N], CalibrationError> {
-        let values = *raw.get_ref();
-        match values.iter().find(|v| !(**v > 0.0 && **v <= high)) {
-            Some(v) => Err(self.refuse(key, raw, format!("has {v}, but must be above 0 and at most {high}"))),
-            None => Ok(values),
-        }
-    }
-
-    fn one_sigma(&self, key: &'static str, raw: &Spanned<f64>, high: f64) -> Result<f64, CalibrationError> {
-        let value = *raw.get_ref();
-        if value > 0.0 && value <= high {
-            Ok(value)
-        } else {
-            Err(self.refuse(key, raw, format!("is {value}, but must be above 0 and at most {high}")))
-        }
-    }
-
-    /// The same in milliseconds, to nanoseconds.
-    fn sigma_ns(&self, key: &'static str, raw: &Spanned<f64>, high_ms: f64) -> Result<i64, CalibrationError> {
-        let ns = ns_from_ms(self.one_sigma(key, raw, high_ms)?);
-        if ns < 1 {
-            return Err(self.refuse(key, raw, "is below a nanosecond, the resolution of all times"));
-        }
-        Ok(ns)
-    }
-
-    fn calibration(&self, raw: &RawFile) -> Result<Calibration, CalibrationError> {
-        let offset_ms =
-            self.one_within("time_offset.offset_ms", &raw.time_offset.offset_ms, -10_000.0, 10_000.0)?;
-        let time_offset_sigma_ns =
-            self.sigma_ns("time_offset.sigma_ms", &raw.time_offset.sigma_ms, 10_000.0)?;
-        let (readout_ns, readout_sigma_ns) = self.shutter(raw.shutter.as_ref())?;
-        let right = self.one_within("boresight.right_deg", &raw.boresight.right_deg, -80.0, 80.0)?;
-        let down = self.one_within("boresight.down_deg", &raw.boresight.down_deg, -80.0, 80.0)?;
-        let bias = self.within("gyro_bias.bias_deg_per_s", &raw.gyro_bias.bias_deg_per_s, -100.0, 100.0)?;
-        let bias_sigma = self.sigma("gyro_bias.sigma_deg_per_s", &raw.gyro_bias.sigma_deg_per_s, 100.0)?;
-        let rotation_sigma =
-            self.sigma("camera_from_imu.sigma_mrad", &raw.camera_from_imu.sigma_mrad, 4000.0)?;
-        let boresight_sigma = self.one_sigma("boresight.sigma_mrad", &raw.boresight.sigma_mrad, 4000.0)?;
-        Ok(Calibration {
-            lens: self.lens(&raw.lens)?,
-            focal_sigma_px: self.one_sigma("lens.focal_sigma_px", &raw.lens.focal_sigma_px, 1e5)?,
-            camera_from_imu: self.rotation(&raw.camera_from_imu.rotation_wxyz)?,
-            camera_from_imu_sigma: DVec3::from_array(rotation_sigma.map(radians_from_mrad)),
-            time_offset_ns: ns_from_ms(offset_ms),
-            time_offset_sigma_ns,
-            readout_ns,
-            readout_sigma_ns,
-            boresight: DVec2::new(right.to_radians(), down.to_radians()),
-            boresight_sigma: radians_from_mrad(boresight_sigma),
-            muzzle_in_camera: DVec3::from_array(self.within(
-                "boresight.muzzle_m",
-                &raw.boresight.muzzle_m,
-                -100.0,
-                100.0,
-            )?),
-            trigger: raw.trigger.as_ref().map(|t| self.trigger(t)).transpose()?,
-            gyro_bias: DVec3::from_array(bias.map(f64::to_radians)),
-            gyro_bias_sigma: DVec3::from_array(bias_sigma.map(f64::to_radians)),
+fn calibration(text: TomlText<'_>, raw: &RawCalibration) -> Result<Calibration, TomlError> {
+    let angle = NumberWithin(-80.0..=80.0, "degrees");
+    let sigma_mrad = PositiveUpTo(4000.0, "mrad");
+    let (boresight, bias) = (&raw.boresight, &raw.gyro_bias);
+    let turn = [&boresight.right_deg, &boresight.down_deg].map(|deg| text.needed(deg, angle.clone()));
+    let [right, down] = turn;
+    let bias_sigma = text.needed(&bias.sigma_deg_per_s, ListOf(PositiveUpTo(100.0, "degrees/s")))?;
+    let rotation_sigma = text.needed(&raw.camera_from_imu.sigma_mrad, ListOf(sigma_mrad))?;
+    let (readout_ns, readout_sigma_ns) = match &raw.shutter {
+        Some(shutter) => (
+            text.needed(&shutter.readout_ms, MillisecondsUpTo(READOUT_MS_MAX))?,
+            text.needed(&shutter.sigma_ms, SigmaMsUpTo(READOUT_MS_MAX))?,
+        ),
+        // All rows are exposed at once.
+        None => (0, 0),
+    };
+    let trigger = |raw: &RawTriggerLatency| -> Result<TriggerLatency, TomlError> {
+        Ok(TriggerLatency {
+            latency_ns: text.needed(&raw.latency_ms, MillisecondsUpTo(1000.0))?,
+            sigma_ns: text.needed(&raw.sigma_ms, SigmaMsUpTo(1000.0))?,
         })
-    }
+    };
+    Ok(Calibration {
+        lens: lens(text, &raw.lens)?,
+        focal_sigma_px: text.needed(&raw.lens.focal_sigma_px, PositiveUpTo(1e5, "pixels"))?,
+        camera_from_imu: rotation(text, &raw.camera_from_imu.rotation_wxyz)?,
+        camera_from_imu_sigma: DVec3::from_array(rotation_sigma.map(radians_from_mrad)),
+        time_offset_ns: text.needed(&raw.time_offset.offset_ms, MillisecondsUpTo(10_000.0))?,
+        time_offset_sigma_ns: text.needed(&raw.time_offset.sigma_ms, SigmaMsUpTo(10_000.0))?,
+        readout_ns,
+        readout_sigma_ns,
+        boresight: DVec2::new(right?.to_radians(), down?.to_radians()),
+        boresight_sigma: radians_from_mrad(text.needed(&boresight.sigma_mrad, sigma_mrad)?),
+        muzzle_in_camera: text.needed(&boresight.muzzle_m, each_up_to(100.0, "m"))?.into(),
+        trigger: raw.trigger.as_ref().map(trigger).transpose()?,
+        gyro_bias: DVec3::from_array(
+            text.needed(&bias.bias_deg_per_s, each_up_to(100.0, "degrees/s"))?.map(f64::to_radians),
+        ),
+        gyro_bias_sigma: DVec3::from_array(bias_sigma.map(f64::to_radians)),
+    })
+}
 
-    /// Polygons of the own ship in the picture, in pixels.
-    fn own_ship(&self, raw: &RawFile) -> Result<Vec<Vec<DVec2>>, CalibrationError> {
-        const KEY: &str = "own_ship.hidden_px";
-        let Some(own_ship) = &raw.own_ship else { return Ok(Vec::new()) };
-        let [width, height] = raw.lens.size_px.get_ref().map(f64::from);
-        let mut polygons = Vec::new();
-        for polygon in &own_ship.hidden_px {
-            let corners = polygon.get_ref();
-            if !(3..=CORNERS_MOST).contains(&corners.len()) || polygons.len() >= POLYGONS_MOST {
-                let problem = format!(
-                    "has a polygon of {} corners: give 3 to {CORNERS_MOST} for each, and {POLYGONS_MOST} polygons at most",
-                    corners.len()
-                );
-                return Err(self.refuse(KEY, polygon, problem));
-            }
-            let outside = |c: &&[f64; 2]| !((0.0..=width).contains(&c[0]) && (0.0..=height).contains(&c[1]));
-            if let Some([x, y]) = corners.iter().find(outside) {
-                let problem =
-                    format!("has the corner [{x}, {y}], which is not in a picture of {width}x{height}");
-                return Err(self.refuse(KEY, polygon, problem));
-            }
-            polygons.push(corners.iter().map(|c| DVec2::from_array(*c)).collect());
-        }
-        let mask = Mask::of_polygons(&polygons, (width as u32, height as u32));
-        match (own_ship.hidden_px.first(), mask.map(|mask| mask.share())) {
-            (Some(first), Some(share)) if share > SHARE_MOST => {
-                let problem =
-                    format!("hides {:.0} % of the picture: too little is left to see", share * 100.0);
-                Err(self.refuse(KEY, first, problem))
-            }
-            (Some(first), None) => Err(self.refuse(KEY, first, "hides nothing: its polygons have no area")),
-            _ => Ok(polygons),
-        }
-    }
-
-    /// Readout time and its deviation, nanoseconds; without the section all rows are exposed at once.
-    fn shutter(&self, raw: Option<&RawShutter>) -> Result<(i64, i64), CalibrationError> {
-        let Some(raw) = raw else { return Ok((0, 0)) };
-        let readout =
-            self.one_within("shutter.readout_ms", &raw.readout_ms, -READOUT_MS_MAX, READOUT_MS_MAX)?;
-        Ok((ns_from_ms(readout), self.sigma_ns("shutter.sigma_ms", &raw.sigma_ms, READOUT_MS_MAX)?))
-    }
-
-    fn trigger(&self, raw: &RawTrigger) -> Result<TriggerLatency, CalibrationError> {
-        let latency = self.one_within("trigger.latency_ms", &raw.latency_ms, -1000.0, 1000.0)?;
-        let sigma_ns = self.sigma_ns("trigger.sigma_ms", &raw.sigma_ms, 1000.0)?;
-        Ok(TriggerLatency { latency_ns: ns_from_ms(latency), sigma_ns })
-    }
-
-    fn rotation(&self, raw: &Spanned<[f64; 4]>) -> Result<DQuat, CalibrationError> {
-        let key = "camera_from_imu.rotation_wxyz";
-        let [w, x, y, z] = self.within(key, raw, -1.0 - NORM_TOLERANCE, 1.0 + NORM_TOLERANCE)?;
-        let q = DQuat::from_xyzw(x, y, z, w);
-        let excess = (q.length() - 1.0).abs();
-        if excess > NORM_TOLERANCE {
-            let problem = format!("has length {:.6}, but a rotation's quaternion has length 1", q.length());
-            return Err(self.refuse(key, raw, problem));
-        }
-        // Numbers written with full precision stay as they are to the last bit.
-        Ok(if excess <= NORM_EXACT { q } else { q.normalize() })
-    }
-
-    fn lens(&self, raw: &RawLens) -> Result<Lens, CalibrationError> {
-        let [width, height] = *raw.size_px.get_ref();
-        if !(1..=8192).contains(&width) || !(1..=8192).contains(&height) {
-            let problem = format!("is {width} x {height}, but both must be 1 to 8192");
-            return Err(self.refuse("lens.size_px", &raw.size_px, problem));
-        }
-        let (w, h) = (f64::from(width), f64::from(height));
-        let centre = DVec2::from_array(self.within("lens.centre_px", &raw.centre_px, -8192.0, 16_384.0)?);
-        if !(0.0..=w).contains(&centre.x) || !(0.0..=h).contains(&centre.y) {
-            let problem = format!("is outside the picture of {width} x {height} pixels");
-            return Err(self.refuse("lens.centre_px", &raw.centre_px, problem));
-        }
-        let lens = Lens {
-            width,
-            height,
-            focal: DVec2::from_array(self.sigma("lens.focal_px", &raw.focal_px, 1e6)?),
-            centre,
-            distortion: self.distortion(raw)?,
-            row_turn: DVec3::ZERO,
-        };
-        if let Some(corner) = unseen_corner(&lens) {
-            let problem = format!(
-                "makes no picture of {width} x {height} pixels: no direction falls on the corner ({}, {}), the distortion \
-                 folds back or grows too fast before it",
-                corner.x, corner.y
+/// Polygons of the own ship in the picture, in pixels.
+fn own_ship(text: TomlText<'_>, raw: &RawCalibration) -> Result<Vec<Vec<DVec2>>, TomlError> {
+    let Some(own_ship) = &raw.own_ship else { return Ok(Vec::new()) };
+    let [width, height] = text.needed(&raw.lens.size_px, PICTURE_SIZE)?;
+    let size = DVec2::new(f64::from(width), f64::from(height));
+    let mut polygons = Vec::new();
+    for polygon in &own_ship.hidden_px {
+        let Loose::Fits(corners) = polygon.get_ref() else {
+            return Err(
+                text.refuse(polygon, "a list of corners in pixels: [[0, 640], [420, 560], [430, 720]]")
             );
-            return Err(match (&raw.fisheye, &raw.radial) {
-                (Some(k), _) => self.refuse("lens.fisheye", k, problem),
-                (None, Some(k)) => self.refuse("lens.radial", k, problem),
-                (None, None) => self.refuse("lens.size_px", &raw.size_px, problem),
-            });
+        };
+        if !(3..=CORNERS_MOST).contains(&corners.len()) || polygons.len() >= POLYGONS_MOST {
+            let problem = format!(
+                "has a polygon of {} corners: give 3 to {CORNERS_MOST} for each, and {POLYGONS_MOST} polygons at most",
+                corners.len()
+            );
+            return Err(text.error(polygon, problem));
         }
-        Ok(lens)
+        let outside = |[x, y]: &&[f64; 2]| !((0.0..=size.x).contains(x) && (0.0..=size.y).contains(y));
+        if let Some([x, y]) = corners.iter().find(outside) {
+            let problem = format!("has the corner [{x}, {y}], which is not in a picture of {width}x{height}");
+            return Err(text.error(polygon, problem));
+        }
+        polygons.push(corners.iter().map(|c| DVec2::from_array(*c)).collect());
     }
-
-    fn distortion(&self, raw: &RawLens) -> Result<Distortion, CalibrationError> {
-        match (&raw.fisheye, &raw.radial, &raw.tangential) {
-            (Some(k), None, None) => {
-                Ok(Distortion::fisheye(self.within("lens.fisheye", k, -100.0, 100.0)?))
-            }
-            (None, Some(radial), Some(tangential)) => Ok(Distortion::radial_tangential(
-                DVec2::from_array(self.within("lens.radial", radial, -100.0, 100.0)?),
-                DVec2::from_array(self.within("lens.tangential", tangential, -10.0, 10.0)?),
-            )),
-            (Some(k), ..) => Err(self.refuse(
-                "lens.fisheye",
-                k,
-                "stands beside radial or tangential; a lens is one or the other",
-            )),
-            (None, ..) => Err(self.refuse(
-                "lens.size_px",
-                &raw.size_px,
-                "stands in a lens without distortion; give radial and tangential, or fisheye",
-            )),
+    let mask = Mask::of_polygons(&polygons, (width, height));
+    match (own_ship.hidden_px.first(), mask.map(|mask| mask.share())) {
+        (Some(first), Some(share)) if share > SHARE_MOST => {
+            let problem = format!("hides {:.0} % of the picture: too little is left to see", share * 100.0);
+            Err(text.error(first, problem))
         }
+        (Some(first), None) => Err(text.error(first, "hides nothing: its polygons have no area")),
+        _ => Ok(polygons),
+    }
+}
+
+fn rotation(text: TomlText<'_>, raw: &Needed<Vec<f64>>) -> Result<DQuat, TomlError> {
+    let [w, x, y, z] = text.needed(raw, each_up_to(1.0 + NORM_TOLERANCE, ""))?;
+    let q = DQuat::from_xyzw(x, y, z, w);
+    let excess = (q.length() - 1.0).abs();
+    if excess > NORM_TOLERANCE {
+        let problem = format!("has length {:.6}, but a rotation's quaternion has length 1", q.length());
+        return Err(text.error(raw, problem));
+    }
+    // Numbers written with full precision stay as they are to the last bit.
+    Ok(if excess <= NORM_EXACT { q } else { q.normalize() })
+}
+
+/// Width and height of pictures, pixels.
+const PICTURE_SIZE: ListOf<2, WholeWithin<u32>> = ListOf(WholeWithin(1..=8192));
+
+fn lens(text: TomlText<'_>, raw: &RawLens) -> Result<Lens, TomlError> {
+    let [width, height] = text.needed(&raw.size_px, PICTURE_SIZE)?;
+    let centre = DVec2::from(text.needed(&raw.centre_px, each_up_to::<2>(16_384.0, "pixels"))?);
+    let size = DVec2::new(f64::from(width), f64::from(height));
+    if centre.cmplt(DVec2::ZERO).any() || centre.cmpgt(size).any() {
+        let problem = format!("is outside the picture of {width} x {height} pixels");
+        return Err(text.error(&raw.centre_px, problem));
+    }
+    let lens = Lens {
+        width,
+        height,
+        focal: text.needed(&raw.focal_px, ListOf::<2, _>(PositiveUpTo(1e6, "pixels")))?.into(),
+        centre,
+        distortion: distortion(text, raw)?,
+        row_turn: DVec3::ZERO,
+    };
+    if let Some(corner) = unseen_corner(&lens) {
+        let problem = format!(
+            "makes no picture of {width} x {height} pixels: no direction falls on the corner ({}, {}), the distortion \
+             folds back or grows too fast before it",
+            corner.x, corner.y
+        );
+        return Err(match raw.fisheye.as_ref().or(raw.radial.as_ref()) {
+            Some(k) => text.error(k, problem),
+            None => text.error(&raw.size_px, problem),
+        });
+    }
+    Ok(lens)
+}
+
+fn distortion(text: TomlText<'_>, raw: &RawLens) -> Result<Distortion, TomlError> {
+    match (&raw.fisheye, &raw.radial, &raw.tangential) {
+        (Some(k), None, None) => Ok(Distortion::fisheye(text.needed(k, each_up_to(100.0, ""))?)),
+        (None, Some(radial), Some(tangential)) => Ok(Distortion::radial_tangential(
+            text.needed(radial, each_up_to::<2>(100.0, ""))?.into(),
+            text.needed(tangential, each_up_to::<2>(10.0, ""))?.into(),
+        )),
+        (Some(k), ..) => Err(text.error(k, "stands beside radial or tangential; a lens is one or the other")),
+        (None, ..) => Err(text.error(
+            &raw.size_px,
+            "stands in a lens without distortion; give radial and tangential, or fisheye",
+        )),
     }
 }
 

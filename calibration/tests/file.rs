@@ -63,7 +63,7 @@ fn mistakes_are_refused_with_their_place() {
         ("focal_sigma_px = 0.6", "focal_sigma_px = 0", "12:18", "above 0"),
         ("centre_px = [641.7, 358.2]", "centre_px = [641.7, 958.2]", "13:13", "outside the picture"),
         ("radial = [-0.112, 0.034]", "radial = [-3.0, 0.0]", "14:10", "folds back"),
-        ("radial = [-0.112, 0.034]", "radial = [-0.112]", "14:10", "array"),
+        ("radial = [-0.112, 0.034]", "radial = [-0.112]", "14:10", "a list of 2"),
         ("size_px = [1280, 720]", "size_px = [0, 720]", "10:11", "1 to 8192"),
         ("rotation_wxyz = [0.4956172,", "rotation_wxyz = [0.6,", "21:17", "length"),
         (
@@ -77,7 +77,7 @@ fn mistakes_are_refused_with_their_place() {
         ("right_deg = 0.21", "right_deg = 90.0", "33:13", "boresight.right_deg"),
         ("right_deg = 0.21", "right_dge = 0.21", "33:1", "right_dge"),
         ("imu_name = \"VN-100\"", "imu_nmae = \"VN-100\"", "6:1", "imu_nmae"),
-        ("made = 2026-11-20", "made = \"2026-11-20\"", "2:8", "datetime"),
+        ("made = 2026-11-20", "made = \"2026-11-20\"", "2:8", "a day of the calendar, without quotes"),
         ("made = 2026-11-20", "made = 2026-11-20T10:00:00Z", "2:8", "without a time"),
         ("made = 2026-11-20", "made = 2026-02-30", "2:8", ""),
         ("[gyro_bias]", "[gyro_bias", "40:", ""),

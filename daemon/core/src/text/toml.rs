@@ -409,13 +409,12 @@ impl ValueRule for PositiveUpTo {
 #[derive(Clone, Debug)]
 pub struct ListOf<const N: usize, R>(pub R);
 
-impl<const N: usize, R: ValueRule<Raw = f64, Value = f64>> ValueRule for ListOf<N, R> {
-    type Raw = Vec<f64>;
-    type Value = [f64; N];
+impl<const N: usize, R: ValueRule> ValueRule for ListOf<N, R> {
+    type Raw = Vec<R::Raw>;
+    type Value = [R::Value; N];
 
-    fn check(&self, raw: &Vec<f64>) -> Option<[f64; N]> {
-        let numbers = <[f64; N]>::try_from(raw.as_slice()).ok()?;
-        numbers.iter().all(|n| self.0.check(n).is_some()).then_some(numbers)
+    fn check(&self, raw: &Vec<R::Raw>) -> Option<[R::Value; N]> {
+        raw.iter().map(|part| self.0.check(part)).collect::<Option<Vec<_>>>()?.try_into().ok()
     }
 
     fn allowed(&self) -> String {
