@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use bowwave_core::{
     model::{Model, ModelId},
+    text::toml::bounded_text,
     world::scenario::{self, Scenario},
 };
 use bowwave_models::BoatModels;
@@ -12,7 +13,7 @@ use bowwave_models::BoatModels;
 /// Text of the scenario that `path` names, a file or a built-in one, and the folder that its models' paths start from.
 pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
     let built_in = || scenario::BUILT_IN.iter().find(|(name, _)| path.as_os_str() == *name);
-    match std::fs::read_to_string(path) {
+    match std::fs::File::open(path).and_then(bounded_text) {
         Ok(text) => Ok((text, path.parent().unwrap_or(Path::new("")).to_path_buf())),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound && built_in().is_some() => {
             Ok((built_in().map_or_else(String::new, |(_, text)| (*text).to_owned()), PathBuf::new()))
@@ -27,6 +28,13 @@ pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
                 )
             })
         }
+    }
+}
+
+/// Logs the former names that a text uses.
+pub fn warn_of_former_names(warnings: &[String]) {
+    for warning in warnings {
+        log::warn!("{warning}");
     }
 }
 

@@ -1,9 +1,12 @@
-//! The sections of the configuration that say which devices there are.
+//! The sections of the configuration about devices.
 
 use std::{path::PathBuf, time::Duration};
 
 use anyhow::Result;
-use bowwave_core::estimate::attitude::Source as Orientation;
+use bowwave_core::{
+    estimate::attitude::Source as Orientation,
+    text::toml::{Given, Needed, NumberWithin, OneOf, Spanned, TomlError, TomlText, ValueRule, WholeWithin},
+};
 use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
     imu::ImuFormat,
@@ -12,18 +15,9 @@ use bowwave_devices::{
     trigger::{Bias, InputLine},
 };
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::{Source, TriggerChoice};
+use super::TriggerChoice;
 use crate::cli::parse_size;
-
-/// A number, or the word "auto".
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum NumberOrAuto {
-    Number(u32),
-    Word(String),
-}
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -31,69 +25,70 @@ pub(super) struct RawCamera {
     device: Option<PathBuf>,
     serial: Option<String>,
     modes: Vec<Spanned<String>>,
-    exposure_us: Option<Spanned<NumberOrAuto>>,
-    white_balance_k: Option<Spanned<NumberOrAuto>>,
-    focus: Option<u32>,
-    gain: Option<u32>,
-    buffers: Option<Spanned<u32>>,
-    readout_us: Option<u32>,
+    exposure_us: Given<NumberOrWord>,
+    white_balance_k: Given<NumberOrWord>,
+    focus: Given<i64>,
+    gain: Given<i64>,
+    buffers: Given<i64>,
+    readout_us: Given<i64>,
 }
 
 impl RawCamera {
-    pub(super) fn check(self, source: Source<'_>) -> Result<CameraSettings> {
-        let modes = self
-            .modes
-            .iter()
-            .map(|m| mode(m.get_ref()).map_err(|why| source.wrong(&m.span(), format!("camera.modes: {why}"))))
-            .collect::<Result<Vec<_>>>()?;
-        let exposure = match locked(source, self.exposure_us, "camera.exposure_us")? {
+    pub(super) fn check(self, text: TomlText<'_>) -> Result<CameraSettings> {
+        let wanted = |name: &Spanned<String>| mode(name.get_ref()).map_err(|why| text.error(name, why));
+        let exposure = match text.given(&self.exposure_us, LockedOrAuto)? {
             None => Exposure::Leave,
             Some(None) => Exposure::Auto,
             Some(Some(time_us)) => Exposure::Locked { time_us },
         };
-        let white_balance = match locked(source, self.white_balance_k, "camera.white_balance_k")? {
+        let white_balance = match text.given(&self.white_balance_k, LockedOrAuto)? {
             None => WhiteBalance::Leave,
             Some(None) => WhiteBalance::Auto,
             Some(Some(kelvin)) => WhiteBalance::Locked { kelvin },
         };
+        let step = |value| text.given(value, WholeWithin(0..=u32::MAX));
         let defaults = CameraSettings::default();
-        let buffers = match self.buffers {
-            None => defaults.buffers,
-            Some(b) if (3..=32).contains(b.get_ref()) => b.into_inner(),
-            Some(b) => {
-                return Err(
-                    source.wrong(&b.span(), format!("camera.buffers is {}: give 3 to 32", b.get_ref()))
-                );
-            }
-        };
         Ok(CameraSettings {
             device: self.device,
             serial: self.serial,
-            modes,
+            modes: self.modes.iter().map(wanted).collect::<Result<_, _>>()?,
             controls: Controls {
                 exposure,
                 white_balance,
-                focus: self.focus.map_or(Focus::Still, |position| Focus::Locked { position }),
-                gain: self.gain,
+                focus: step(&self.focus)?.map_or(Focus::Still, |position| Focus::Locked { position }),
+                gain: step(&self.gain)?,
             },
-            buffers,
-            readout_us: self.readout_us,
+            buffers: text.given(&self.buffers, WholeWithin(3..=32))?.unwrap_or(defaults.buffers),
+            readout_us: step(&self.readout_us)?,
             ..defaults
         })
     }
 }
 
-/// `None`: not said. `Some(None)`: the camera's own choice. `Some(Some(n))`: locked to `n`.
-fn locked(
-    source: Source<'_>,
-    value: Option<Spanned<NumberOrAuto>>,
-    name: &str,
-) -> Result<Option<Option<u32>>> {
-    let Some(value) = value else { return Ok(None) };
-    match value.get_ref() {
-        NumberOrAuto::Number(n) if *n > 0 => Ok(Some(Some(*n))),
-        NumberOrAuto::Word(word) if word == "auto" => Ok(Some(None)),
-        _ => Err(source.wrong(&value.span(), format!("{name}: give a number above 0, or \"auto\""))),
+/// A number or a word, as they stand in the text.
+#[derive(Deserialize)]
+#[serde(untagged)]
+pub(super) enum NumberOrWord {
+    Number(i64),
+    Word(String),
+}
+
+/// A control locked to a number above 0, or left to the camera (`None`).
+struct LockedOrAuto;
+
+impl ValueRule for LockedOrAuto {
+    type Raw = NumberOrWord;
+    type Value = Option<u32>;
+
+    fn check(&self, raw: &NumberOrWord) -> Option<Option<u32>> {
+        match raw {
+            NumberOrWord::Number(n) => u32::try_from(*n).ok().filter(|n| *n > 0).map(Some),
+            NumberOrWord::Word(word) => (word == "auto").then_some(None),
+        }
+    }
+
+    fn allowed(&self) -> String {
+        "a number above 0, or \"auto\"".to_owned()
     }
 }
 
@@ -120,6 +115,39 @@ fn mode(text: &str) -> Result<WantedMode, String> {
     Ok(wanted)
 }
 
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct RawImu {
+    device: Option<PathBuf>,
+    baud: Given<RawBaud>,
+    format: Given<String>,
+    low_latency: Option<bool>,
+    packet_jitter_ms_max: Given<f64>,
+    orientation: Given<String>,
+}
+
+impl RawImu {
+    /// The orientation that is used: the unit's own or the one estimated here.
+    pub(super) fn orientation(&self, text: TomlText<'_>) -> Result<Orientation, TomlError> {
+        let sources = [("auto", Orientation::Auto), ("fused", Orientation::Fused)];
+        Ok(text.given(&self.orientation, OneOf(&sources))?.unwrap_or_default())
+    }
+
+    pub(super) fn check(self, text: TomlText<'_>) -> Result<ImuSettings> {
+        let formats = ImuFormat::ALL.map(|format| (format.key(), format));
+        let jitter = text.given(&self.packet_jitter_ms_max, NumberWithin(1.0..=1000.0, "ms"))?;
+        let usual = ImuSettings::default();
+        Ok(ImuSettings {
+            device: self.device,
+            baud: text.given(&self.baud, BaudRates)?.unwrap_or_default(),
+            format: text.given(&self.format, OneOf(&formats))?,
+            low_latency: self.low_latency.unwrap_or(usual.low_latency),
+            late: jitter.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
+        })
+    }
+}
+
+/// A rate or several, as they stand in the text.
 #[derive(Deserialize)]
 #[serde(untagged)]
 pub(super) enum RawBaud {
@@ -127,142 +155,89 @@ pub(super) enum RawBaud {
     Several(Vec<u32>),
 }
 
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub(super) struct RawImu {
-    device: Option<PathBuf>,
-    baud: Option<Spanned<RawBaud>>,
-    format: Option<Spanned<String>>,
-    low_latency: Option<bool>,
-    late_ms: Option<Spanned<f64>>,
-    orientation: Option<Spanned<String>>,
-}
+/// The rate of a serial line, or up to 16 that are tried.
+pub(super) struct BaudRates;
 
-impl RawImu {
-    /// Whose estimate of the orientation is used.
-    pub(super) fn orientation(&self, source: Source<'_>) -> Result<Orientation> {
-        let Some(name) = &self.orientation else { return Ok(Orientation::default()) };
-        match name.get_ref().as_str() {
-            "auto" => Ok(Orientation::Auto),
-            "fused" => Ok(Orientation::Fused),
-            other => {
-                let why = format!("imu.orientation: '{other}' is neither \"auto\" nor \"fused\"");
-                Err(source.wrong(&name.span(), why))
+impl ValueRule for BaudRates {
+    type Raw = RawBaud;
+    type Value = Baud;
+
+    fn check(&self, raw: &RawBaud) -> Option<Baud> {
+        match raw {
+            RawBaud::One(rate) => (*rate > 0).then_some(Baud::Fixed(*rate)),
+            RawBaud::Several(rates) => {
+                let good = (1..=16).contains(&rates.len()) && !rates.contains(&0);
+                good.then(|| Baud::Scan(rates.clone()))
             }
         }
     }
 
-    pub(super) fn check(self, source: Source<'_>) -> Result<ImuSettings> {
-        let baud = baud(source, self.baud, "imu.baud")?.unwrap_or_default();
-        let format = self.format.map(|name| imu_format(source, &name)).transpose()?;
-        let late = source.number(self.late_ms, "imu.late_ms", 1.0..=1000.0)?;
-        let usual = ImuSettings::default();
-        Ok(ImuSettings {
-            device: self.device,
-            baud,
-            format,
-            low_latency: self.low_latency.unwrap_or(usual.low_latency),
-            late: late.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
-        })
+    fn allowed(&self) -> String {
+        "a rate such as 115200, or 1 to 16 to try".to_owned()
     }
 }
 
-pub(super) fn baud(source: Source<'_>, value: Option<Spanned<RawBaud>>, name: &str) -> Result<Option<Baud>> {
-    let Some(value) = value else { return Ok(None) };
-    let place = value.span();
-    let (rates, baud) = match value.into_inner() {
-        RawBaud::One(rate) => (vec![rate], Baud::Fixed(rate)),
-        RawBaud::Several(rates) => (rates.clone(), Baud::Scan(rates)),
-    };
-    if rates.is_empty() || rates.len() > 16 || rates.contains(&0) {
-        return Err(source.wrong(&place, format!("{name}: give a rate such as 115200, or 1 to 16 to try")));
-    }
-    Ok(Some(baud))
-}
-
-fn imu_format(source: Source<'_>, name: &Spanned<String>) -> Result<ImuFormat> {
-    ImuFormat::from_key(name.get_ref()).ok_or_else(|| {
-        let known = ImuFormat::ALL.map(ImuFormat::key).join(", ");
-        source.wrong(&name.span(), format!("imu.format: '{}' is none of {known}", name.get_ref()))
-    })
-}
-
+/// An input line of a chip: trigger, interlock, power-fail or a button.
 #[derive(Deserialize)]
-#[serde(untagged)]
-enum RawLineName {
-    Number(u32),
-    Name(String),
+#[serde(deny_unknown_fields)]
+pub(super) struct RawGpioLine {
+    chip: String,
+    line: Needed<NumberOrWord>,
+    #[serde(default)]
+    active_low: bool,
+    #[serde(default)]
+    bias: Given<String>,
+    #[serde(default)]
+    debounce_ms: Given<i64>,
 }
 
-impl RawLineName {
-    fn text(self) -> String {
-        match self {
-            Self::Number(n) => n.to_string(),
-            Self::Name(name) => name,
+/// A line by its number on the chip or by its name.
+struct GpioLineName;
+
+impl ValueRule for GpioLineName {
+    type Raw = NumberOrWord;
+    type Value = String;
+
+    fn check(&self, raw: &NumberOrWord) -> Option<String> {
+        match raw {
+            NumberOrWord::Number(n) => u32::try_from(*n).ok().map(|n| n.to_string()),
+            NumberOrWord::Word(name) => Some(name.clone()),
         }
     }
-}
 
-#[derive(Clone, Copy, Default, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum RawBias {
-    #[default]
-    AsIs,
-    PullUp,
-    PullDown,
-    Disabled,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RawLine {
-    chip: String,
-    line: RawLineName,
-    #[serde(default)]
-    active_low: bool,
-    #[serde(default)]
-    bias: RawBias,
-}
-
-impl RawLine {
-    pub(super) fn input(self) -> InputLine {
-        let bias = match self.bias {
-            RawBias::AsIs => Bias::AsIs,
-            RawBias::PullUp => Bias::PullUp,
-            RawBias::PullDown => Bias::PullDown,
-            RawBias::Disabled => Bias::Disabled,
-        };
-        InputLine { chip: self.chip, line: self.line.text(), active_low: self.active_low, bias }
+    fn allowed(&self) -> String {
+        "the line's number, or its name in quotes".to_owned()
     }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RawTrigger {
-    chip: String,
-    line: RawLineName,
-    #[serde(default)]
-    active_low: bool,
-    #[serde(default)]
-    bias: RawBias,
-    debounce_ms: Option<Spanned<u32>>,
 }
 
 /// A switch of ordinary make chatters for less, and nobody presses twice in that time.
-const DEBOUNCE_MS: u32 = 15;
+const DEBOUNCE_MS: u64 = 15;
 
-impl RawTrigger {
-    pub(super) fn check(self, source: Source<'_>) -> Result<TriggerChoice> {
-        let ms = match self.debounce_ms {
-            None => DEBOUNCE_MS,
-            Some(ms) if (10..=20).contains(ms.get_ref()) => ms.into_inner(),
-            Some(ms) => {
-                let why = format!("trigger.debounce_ms is {}: give 10 to 20", ms.get_ref());
-                return Err(source.wrong(&ms.span(), why));
-            }
-        };
-        let line = RawLine { chip: self.chip, line: self.line, active_low: self.active_low, bias: self.bias };
-        Ok(TriggerChoice { line: line.input(), debounce: Duration::from_millis(u64::from(ms)) })
+impl RawGpioLine {
+    /// An input whose edges are taken as they come.
+    pub(super) fn input(self, text: TomlText<'_>) -> Result<InputLine, TomlError> {
+        match &self.debounce_ms {
+            Some(ms) => Err(text.error(ms, "is for [trigger] alone; leave it out")),
+            None => self.line(text),
+        }
+    }
+
+    /// The trigger's input.
+    pub(super) fn trigger(self, text: TomlText<'_>) -> Result<TriggerChoice, TomlError> {
+        let ms = text.given(&self.debounce_ms, WholeWithin(10..=20))?.unwrap_or(DEBOUNCE_MS);
+        Ok(TriggerChoice { line: self.line(text)?, debounce: Duration::from_millis(ms) })
+    }
+
+    fn line(self, text: TomlText<'_>) -> Result<InputLine, TomlError> {
+        let biases = [
+            ("as-is", Bias::AsIs),
+            ("pull-up", Bias::PullUp),
+            ("pull-down", Bias::PullDown),
+            ("disabled", Bias::Disabled),
+        ];
+        let bias = text.given(&self.bias, OneOf(&biases))?.unwrap_or(Bias::AsIs);
+        let line = text.needed(&self.line, GpioLineName)?;
+        Ok(InputLine { chip: self.chip, line, active_low: self.active_low, bias })
     }
 }
 
@@ -270,21 +245,25 @@ impl RawTrigger {
 #[serde(deny_unknown_fields)]
 pub(super) struct RawLamps {
     chip: String,
-    ready: Option<RawLineName>,
-    hit: Option<RawLineName>,
-    fault: Option<RawLineName>,
+    #[serde(default)]
+    ready: Given<NumberOrWord>,
+    #[serde(default)]
+    hit: Given<NumberOrWord>,
+    #[serde(default)]
+    fault: Given<NumberOrWord>,
     #[serde(default)]
     active_low: bool,
 }
 
 impl RawLamps {
-    pub(super) fn settings(self) -> LampSettings {
-        LampSettings {
+    pub(super) fn settings(self, text: TomlText<'_>) -> Result<LampSettings, TomlError> {
+        let line = |name| text.given(name, GpioLineName);
+        Ok(LampSettings {
+            ready: line(&self.ready)?,
+            hit: line(&self.hit)?,
+            fault: line(&self.fault)?,
             chip: self.chip,
-            ready: self.ready.map(RawLineName::text),
-            hit: self.hit.map(RawLineName::text),
-            fault: self.fault.map(RawLineName::text),
             active_low: self.active_low,
-        }
+        })
     }
 }

@@ -1,4 +1,4 @@
-//! The sections of the configuration that say where headings come from.
+//! The sections of the configuration about sources of heading.
 
 use std::path::PathBuf;
 
@@ -6,60 +6,68 @@ use anyhow::Result;
 use bowwave_core::{
     estimate::{HeadingSettings, Landmark, Stow},
     event::MarkKind,
+    text::toml::{Given, Needed, NumberWithin, Spanned, TomlError, TomlText},
 };
 use bowwave_devices::{
     serial::ShipSettings,
     trigger::{InputLine, Press},
 };
 use serde::Deserialize;
-use toml::Spanned;
 
-use super::{
-    Source,
-    devices::{RawBaud, RawLine, baud},
-};
+use super::devices::{BaudRates, RawBaud, RawGpioLine};
 
-/// Landmarks that one place has at most.
-const LANDMARKS_MOST: usize = 64;
+/// Most landmarks of one place.
+const LANDMARKS_MAX: usize = 64;
+
+/// A bearing: clockwise, from the bow or from north.
+const BEARING: NumberWithin = NumberWithin(-360.0..=360.0, "degrees");
+/// The standard deviation of a heading that somebody gives.
+const SIGMA: NumberWithin = NumberWithin(0.01..=20.0, "degrees");
+/// A rate at which a heading may drift.
+const DRIFT: NumberWithin = NumberWithin(0.0..=3600.0, "degrees/h");
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawShip {
     device: Spanned<PathBuf>,
-    baud: Option<Spanned<RawBaud>>,
-    latency_ms: Option<Spanned<f64>>,
-    sigma_deg: Option<Spanned<f64>>,
+    #[serde(default)]
+    baud: Given<RawBaud>,
+    #[serde(default)]
+    latency_ms: Given<f64>,
+    #[serde(default)]
+    sigma_deg: Given<f64>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 pub(super) struct RawRezero {
-    input: Option<RawLine>,
-    from_bow_deg: Option<Spanned<f64>>,
-    from_north_deg: Option<Spanned<f64>>,
-    sigma_deg: Option<Spanned<f64>>,
+    input: Option<RawGpioLine>,
+    from_bow_deg: Given<f64>,
+    from_north_deg: Given<f64>,
+    sigma_deg: Given<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RawLandmarks {
-    input: Option<RawLine>,
+    input: Option<RawGpioLine>,
     at: Vec<RawLandmark>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawLandmark {
-    bearing_deg: Spanned<f64>,
-    sigma_deg: Option<Spanned<f64>>,
+    bearing_deg: Needed<f64>,
+    #[serde(default)]
+    sigma_deg: Given<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RawHeading {
-    growth_deg_per_h: Option<Spanned<f64>>,
-    sky_drift_deg_per_h: Option<Spanned<f64>>,
-    shown_above_deg: Option<Spanned<f64>>,
+    growth_deg_per_h: Given<f64>,
+    sky_drift_deg_per_h: Given<f64>,
+    display_sigma_above_deg: Given<f64>,
 }
 
 /// The raw sections together.
@@ -70,10 +78,10 @@ pub(super) struct RawHeadings {
     pub(super) heading: RawHeading,
 }
 
-/// Where headings come from.
+/// Sources of heading beside the inertial unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HeadingChoice {
-    /// What the session is told.
+    /// The session's part.
     pub settings: HeadingSettings,
     /// The ship's own heading.
     pub ship: Option<ShipSettings>,
@@ -82,31 +90,26 @@ pub struct HeadingChoice {
 }
 
 impl RawHeadings {
-    pub(super) fn check(self, source: Source<'_>) -> Result<HeadingChoice> {
+    pub(super) fn check(self, text: TomlText<'_>) -> Result<HeadingChoice> {
         let mut choice = HeadingChoice::default();
         if let Some(raw) = self.ship {
-            choice.ship = Some(raw.check(source, &mut choice.settings)?);
+            choice.ship = Some(raw.check(text, &mut choice.settings)?);
         }
-        if let Some(raw) = self.rezero {
-            let place = raw.span();
-            let (stow, input) = raw.into_inner().check(source, &place)?;
+        if self.rezero.is_some() {
+            let (stow, input) = rezero(text, self.rezero)?;
             choice.settings.stow = Some(stow);
             choice.presses.extend(input.map(|line| Press { line, kind: MarkKind::Stow }));
         }
-        let (landmarks, input) = self.landmarks.check(source)?;
+        let (landmarks, input) = self.landmarks.check(text)?;
         choice.settings.landmarks = landmarks;
         choice.presses.extend(input.map(|line| Press { line, kind: MarkKind::Landmark }));
-        let growth =
-            source.number(self.heading.growth_deg_per_h, "heading.growth_deg_per_h", 0.0..=3600.0)?;
-        choice.settings.own_growth = growth.map(|g| g.to_radians() / 3600.0);
-        let drift =
-            source.number(self.heading.sky_drift_deg_per_h, "heading.sky_drift_deg_per_h", 0.0..=3600.0)?;
-        if let Some(deg) = drift {
-            choice.settings.sky_drift = deg.to_radians() / 3600.0;
+        let per_hour = |value| Ok::<_, TomlError>(text.given(value, DRIFT)?.map(|d| d.to_radians() / 3600.0));
+        choice.settings.own_growth = per_hour(&self.heading.growth_deg_per_h)?;
+        if let Some(drift) = per_hour(&self.heading.sky_drift_deg_per_h)? {
+            choice.settings.sky_drift = drift;
         }
-        if let Some(deg) =
-            source.number(self.heading.shown_above_deg, "heading.shown_above_deg", 0.0..=180.0)?
-        {
+        let shown = NumberWithin(0.0..=180.0, "degrees");
+        if let Some(deg) = text.given(&self.heading.display_sigma_above_deg, shown)? {
             choice.settings.shown_above = deg.to_radians();
         }
         Ok(choice)
@@ -114,52 +117,48 @@ impl RawHeadings {
 }
 
 impl RawShip {
-    fn check(self, source: Source<'_>, settings: &mut HeadingSettings) -> Result<ShipSettings> {
+    fn check(self, text: TomlText<'_>, settings: &mut HeadingSettings) -> Result<ShipSettings> {
         let device = self.device.get_ref();
         if let Err(e) = glob::Pattern::new(&device.to_string_lossy()) {
-            return Err(source.wrong(&self.device.span(), format!("ship.device: {e}")));
+            return Err(text.error(&self.device, e).into());
         }
-        if let Some(ms) = source.number(self.latency_ms, "ship.latency_ms", 0.0..=1500.0)? {
+        if let Some(ms) = text.given(&self.latency_ms, NumberWithin(0.0..=1500.0, "ms"))? {
             settings.ship_latency_ns = bowwave_core::time::secs_to_ns(ms * 1e-3);
         }
-        if let Some(deg) = source.number(self.sigma_deg, "ship.sigma_deg", 0.01..=20.0)? {
+        if let Some(deg) = text.given(&self.sigma_deg, SIGMA)? {
             settings.ship_sigma = deg.to_radians();
         }
         let usual = ShipSettings::new(self.device.into_inner());
-        let baud = baud(source, self.baud, "ship.baud")?.unwrap_or_else(|| usual.baud.clone());
+        let baud = text.given(&self.baud, BaudRates)?.unwrap_or_else(|| usual.baud.clone());
         Ok(ShipSettings { baud, ..usual })
     }
 }
 
-impl RawRezero {
-    fn check(self, source: Source<'_>, place: &std::ops::Range<usize>) -> Result<(Stow, Option<InputLine>)> {
-        let bearing = |value, name| {
-            Ok::<_, anyhow::Error>(source.number(value, name, -360.0..=360.0)?.map(f64::to_radians))
-        };
-        let from_bow = bearing(self.from_bow_deg, "rezero.from_bow_deg")?;
-        let from_north = bearing(self.from_north_deg, "rezero.from_north_deg")?;
-        if from_bow.is_none() && from_north.is_none() {
-            let why = "rezero: give from_bow_deg (with a ship feed) or from_north_deg, where the gun stands when it is pressed";
-            return Err(source.wrong(place, why));
-        }
-        let sigma = source.number(self.sigma_deg, "rezero.sigma_deg", 0.01..=20.0)?.unwrap_or(0.5);
-        let stow = Stow { from_bow, from_north, sigma: sigma.to_radians() };
-        Ok((stow, self.input.map(RawLine::input)))
+fn rezero(text: TomlText<'_>, raw: Option<Spanned<RawRezero>>) -> Result<(Stow, Option<InputLine>)> {
+    let (section, raw) = text.section("rezero", raw);
+    let bearing = |value| Ok::<_, TomlError>(text.given(value, BEARING)?.map(f64::to_radians));
+    let (from_bow, from_north) = (bearing(&raw.from_bow_deg)?, bearing(&raw.from_north_deg)?);
+    if from_bow.is_none() && from_north.is_none() {
+        let what = "it (with a ship feed) or from_north_deg: where the gun stands when the operator presses";
+        return Err(section.missing("from_bow_deg", what).into());
     }
+    let sigma = text.given(&raw.sigma_deg, SIGMA)?.unwrap_or(0.5);
+    let stow = Stow { from_bow, from_north, sigma: sigma.to_radians() };
+    Ok((stow, raw.input.map(|line| line.input(text)).transpose()?))
 }
 
 impl RawLandmarks {
-    fn check(self, source: Source<'_>) -> Result<(Vec<Landmark>, Option<InputLine>)> {
-        if let Some(beyond) = self.at.get(LANDMARKS_MOST) {
-            let why = format!("landmarks.at: more than {LANDMARKS_MOST} landmarks");
-            return Err(source.wrong(&beyond.bearing_deg.span(), why));
+    fn check(self, text: TomlText<'_>) -> Result<(Vec<Landmark>, Option<InputLine>)> {
+        if let Some(beyond) = self.at.get(LANDMARKS_MAX) {
+            let why = format!("is beyond {LANDMARKS_MAX} landmarks, the most of one place");
+            return Err(text.error(&beyond.bearing_deg, why).into());
         }
-        let landmark = |raw: RawLandmark| {
-            let bearing = source.number(Some(raw.bearing_deg), "bearing_deg", -360.0..=360.0)?;
-            let sigma = source.number(raw.sigma_deg, "sigma_deg", 0.01..=20.0)?.unwrap_or(0.3);
-            Ok(Landmark { bearing: bearing.unwrap_or_default().to_radians(), sigma: sigma.to_radians() })
+        let landmark = |raw: RawLandmark| -> Result<Landmark, TomlError> {
+            let bearing = text.needed(&raw.bearing_deg, BEARING)?;
+            let sigma = text.given(&raw.sigma_deg, SIGMA)?.unwrap_or(0.3);
+            Ok(Landmark { bearing: bearing.to_radians(), sigma: sigma.to_radians() })
         };
-        let landmarks = self.at.into_iter().map(landmark).collect::<Result<_>>()?;
-        Ok((landmarks, self.input.map(RawLine::input)))
+        let landmarks = self.at.into_iter().map(landmark).collect::<Result<_, _>>()?;
+        Ok((landmarks, self.input.map(|line| line.input(text)).transpose()?))
     }
 }

@@ -9,23 +9,21 @@ use std::{
 };
 
 pub use self::heading::HeadingChoice;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use bowwave_core::{
     estimate::attitude::Source as Orientation,
-    text::{line_column, one_line},
+    text::toml::{Given, NumberWithin, OneOf, RenamedKey, Spanned, TomlError, TomlText, bounded_text},
 };
 use bowwave_devices::{
     camera::CameraSettings, lamps::LampSettings, lcd::LcdSettings, serial::ImuSettings, trigger::InputLine,
 };
 use bowwave_trainer::supervisor::HealthSettings;
 use serde::Deserialize;
-use toml::Spanned;
 
-use crate::cli::parse_size;
+use crate::{cli::parse_size, loading::warn_of_former_names};
 
 /// Where frames are shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ScreenOutput {
     /// On the LCD of the gun computer. `simulate` shows nothing then.
     #[default]
@@ -75,7 +73,7 @@ pub struct Config {
     /// Whether to run with the validation layer.
     pub validation: bool,
     /// How long the GPU may take over a frame before it counts as hung.
-    pub hang: Option<Duration>,
+    pub gpu_timeout: Option<Duration>,
     /// Scenario file or the name of a built-in one.
     pub scenario: Option<PathBuf>,
     /// Calibration file.
@@ -86,13 +84,23 @@ pub struct Config {
     pub record_exact: bool,
     /// Folder for hits, recordings and the last good configuration; without it the service's state folder.
     pub data: Option<PathBuf>,
-    /// What is watched besides the devices.
+    /// Sensors that are watched besides the devices.
     pub health: HealthSettings,
+    /// Former names of keys that the text uses, each with its place and the new name.
+    pub warnings: Vec<String>,
 }
+
+/// Former names of keys.
+const RENAMED: [RenamedKey; 4] = [
+    RenamedKey { table: "heading", old: "shown_above_deg", new: "display_sigma_above_deg" },
+    RenamedKey { table: "imu", old: "late_ms", new: "packet_jitter_ms_max" },
+    RenamedKey { table: "gpu", old: "hang_ms", new: "gpu_timeout_ms" },
+    RenamedKey { table: "health", old: "limit_c", new: "temperature_c_max" },
+];
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct Raw {
+struct RawConfig {
     screen: RawScreen,
     camera: devices::RawCamera,
     imu: devices::RawImu,
@@ -100,9 +108,9 @@ struct Raw {
     rezero: Option<Spanned<heading::RawRezero>>,
     landmarks: heading::RawLandmarks,
     heading: heading::RawHeading,
-    trigger: Option<devices::RawTrigger>,
-    interlock: Option<devices::RawLine>,
-    power_fail: Option<devices::RawLine>,
+    trigger: Option<devices::RawGpioLine>,
+    interlock: Option<devices::RawGpioLine>,
+    power_fail: Option<devices::RawGpioLine>,
     lamps: Option<devices::RawLamps>,
     gpu: RawGpu,
     files: RawFiles,
@@ -112,11 +120,11 @@ struct Raw {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawScreen {
-    output: ScreenOutput,
+    output: Given<String>,
     size: Option<Spanned<String>>,
     card: Option<PathBuf>,
     connector: Option<String>,
-    refresh_hz: Option<Spanned<f64>>,
+    refresh_hz: Given<f64>,
     legacy: bool,
 }
 
@@ -125,7 +133,7 @@ struct RawScreen {
 struct RawGpu {
     device: Option<Spanned<String>>,
     validation: bool,
-    hang_ms: Option<Spanned<f64>>,
+    gpu_timeout_ms: Given<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -142,72 +150,33 @@ struct RawFiles {
 #[serde(deny_unknown_fields, default)]
 struct RawHealth {
     thermal: Option<PathBuf>,
-    limit_c: Option<Spanned<f64>>,
+    temperature_c_max: Given<f64>,
 }
 
 /// Reads and checks a configuration file. Relative paths in it are taken from its own folder.
 pub fn read(path: &Path) -> Result<Config> {
-    let text = std::fs::read_to_string(path).with_context(|| {
+    let text = std::fs::File::open(path).and_then(bounded_text).with_context(|| {
         format!("cannot read the configuration {}; name an existing file with --config", path.display())
     })?;
     let base = path.parent().unwrap_or(Path::new("."));
-    parse(&text, &path.display().to_string(), base)
+    let config = parse(&text, &path.display().to_string(), base)?;
+    warn_of_former_names(&config.warnings);
+    Ok(config)
 }
 
-/// The text that is checked, and what errors call it.
-#[derive(Clone, Copy)]
-struct Source<'a> {
-    text: &'a str,
-    origin: &'a str,
-}
-
-impl Source<'_> {
-    /// An error about the value at `place`.
-    fn wrong(self, place: &std::ops::Range<usize>, why: impl std::fmt::Display) -> anyhow::Error {
-        let (line, column) = line_column(self.text, place.start);
-        anyhow::anyhow!("{}:{line}:{column}: {}", self.origin, one_line(&why.to_string()))
-    }
-
-    /// The value, where `good`; an error that says what it must be.
-    fn number(
-        self,
-        value: Option<Spanned<f64>>,
-        name: &str,
-        range: std::ops::RangeInclusive<f64>,
-    ) -> Result<Option<f64>> {
-        match value {
-            Some(v) if !range.contains(v.get_ref()) => {
-                let why = format!("{name} is {}: give {} to {}", v.get_ref(), range.start(), range.end());
-                Err(self.wrong(&v.span(), why))
-            }
-            v => Ok(v.map(Spanned::into_inner)),
-        }
-    }
-}
-
-/// Checks configuration text; `origin` is what errors call it.
+/// Checks configuration text; `origin` is its name in errors.
 pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
-    let source = Source { text, origin };
-    let raw: Raw = match toml::from_str(text) {
-        Ok(raw) => raw,
-        Err(e) => {
-            let (line, column) = line_column(text, e.span().map_or(0, |s| s.start));
-            bail!(
-                "{origin}:{line}:{column}: {}; systemd/bowwave.toml shows every key",
-                one_line(e.message())
-            );
-        }
-    };
-    let size = match &raw.screen.size {
-        None => None,
-        Some(s) => Some(
-            parse_size(s.get_ref()).map_err(|why| source.wrong(&s.span(), format!("screen.size: {why}")))?,
-        ),
-    };
+    let text = TomlText::new(text, origin)?;
+    let (raw, warnings) = text.read::<RawConfig>(&RENAMED).map_err(|e| {
+        let problem = format!("{}; systemd/bowwave.toml shows every key", e.problem);
+        TomlError { problem, ..e }
+    })?;
     if let Some(device) = raw.gpu.device.as_ref().filter(|d| d.get_ref().trim().is_empty()) {
-        let why = "gpu.device is empty; leave it out or give a number or part of a name";
-        return Err(source.wrong(&device.span(), why));
+        let why = "is empty; leave it out or give a number or part of a name";
+        return Err(text.error(device, why).into());
     }
+    let size = raw.screen.size.as_ref();
+    let size = size.map(|s| parse_size(s.get_ref()).map_err(|why| text.error(s, why))).transpose()?;
     let mut lcd = LcdSettings {
         card: raw.screen.card,
         connector: raw.screen.connector,
@@ -215,8 +184,12 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         ..LcdSettings::default()
     };
     lcd.mode.size = size;
-    lcd.mode.refresh_hz = source.number(raw.screen.refresh_hz, "screen.refresh_hz", 1.0..=1000.0)?;
-    let limit_c = source.number(raw.health.limit_c, "health.limit_c", 20.0..=150.0)?;
+    lcd.mode.refresh_hz = text.given(&raw.screen.refresh_hz, NumberWithin(1.0..=1000.0, "Hz"))?;
+    let outputs =
+        [("lcd", ScreenOutput::Lcd), ("window", ScreenOutput::Window), ("none", ScreenOutput::None)];
+    let temperature_c_max =
+        text.given(&raw.health.temperature_c_max, NumberWithin(20.0..=150.0, "degrees Celsius"))?;
+    let timeout_ms = text.given(&raw.gpu.gpu_timeout_ms, NumberWithin(100.0..=60_000.0, "ms"))?;
     // A built-in scenario's name is no path.
     let scenario = raw.files.scenario.map(|p| {
         let built_in = bowwave_core::world::scenario::BUILT_IN.iter().any(|(name, _)| p.as_os_str() == *name);
@@ -228,29 +201,29 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         landmarks: raw.landmarks,
         heading: raw.heading,
     };
+    let input = |line: Option<devices::RawGpioLine>| line.map(|line| line.input(text)).transpose();
     Ok(Config {
-        heading: heading.check(source)?,
-        output: raw.screen.output,
+        heading: heading.check(text)?,
+        output: text.given(&raw.screen.output, OneOf(&outputs))?.unwrap_or_default(),
         size,
         lcd,
-        camera: raw.camera.check(source)?,
-        orientation: raw.imu.orientation(source)?,
-        imu: raw.imu.check(source)?,
-        trigger: raw.trigger.map(|t| t.check(source)).transpose()?,
-        interlock: raw.interlock.map(devices::RawLine::input),
-        power_fail: raw.power_fail.map(devices::RawLine::input),
-        lamps: raw.lamps.map(devices::RawLamps::settings),
+        camera: raw.camera.check(text)?,
+        orientation: raw.imu.orientation(text)?,
+        imu: raw.imu.check(text)?,
+        trigger: raw.trigger.map(|line| line.trigger(text)).transpose()?,
+        interlock: input(raw.interlock)?,
+        power_fail: input(raw.power_fail)?,
+        lamps: raw.lamps.map(|lamps| lamps.settings(text)).transpose()?,
         gpu: raw.gpu.device.map(Spanned::into_inner),
         validation: raw.gpu.validation,
-        hang: source
-            .number(raw.gpu.hang_ms, "gpu.hang_ms", 100.0..=60_000.0)?
-            .map(|ms| Duration::from_secs_f64(ms * 1e-3)),
+        gpu_timeout: timeout_ms.map(|ms| Duration::from_secs_f64(ms * 1e-3)),
         scenario,
         calibration: raw.files.calibration.map(|p| base.join(p)),
         record: raw.files.record,
         record_exact: raw.files.record_exact,
         data: raw.files.data.map(|p| base.join(p)),
-        health: HealthSettings { thermal: raw.health.thermal, limit_c },
+        health: HealthSettings { thermal: raw.health.thermal, temperature_c_max },
+        warnings,
     })
 }
 

@@ -45,7 +45,7 @@ fn every_key_is_read() {
         format = "xsens"
         orientation = "fused"
         low_latency = false
-        late_ms = 12.5
+        packet_jitter_ms_max = 12.5
         [ship]
         device = "/dev/serial/by-id/usb-Moxa_*-port0"
         baud = [4800, 38400]
@@ -62,7 +62,7 @@ fn every_key_is_read() {
         [heading]
         growth_deg_per_h = 36
         sky_drift_deg_per_h = 1.8
-        shown_above_deg = 0.4
+        display_sigma_above_deg = 0.4
         [trigger]
         chip = "/dev/gpiochip0"
         line = 17
@@ -82,7 +82,7 @@ fn every_key_is_read() {
         [gpu]
         device = "llvm"
         validation = true
-        hang_ms = 900
+        gpu_timeout_ms = 900
         [files]
         scenario = "a.toml"
         calibration = "/b.toml"
@@ -90,7 +90,7 @@ fn every_key_is_read() {
         data = "/var/lib/bowwave"
         [health]
         thermal = "/sys/class/thermal/thermal_zone0/temp"
-        limit_c = 85.0
+        temperature_c_max = 85.0
     "#;
     let config = parse(text, "x.toml", Path::new("/etc")).unwrap();
     assert_eq!((config.output, config.size), (ScreenOutput::Window, Some((800, 480))));
@@ -138,10 +138,10 @@ fn every_key_is_read() {
     let lamps = config.lamps.unwrap();
     assert_eq!((lamps.ready.as_deref(), lamps.hit, lamps.fault.as_deref()), (Some("ready"), None, Some("5")));
     assert_eq!((config.gpu.as_deref(), config.validation), (Some("llvm"), true));
-    assert_eq!(config.hang, Some(std::time::Duration::from_millis(900)));
+    assert_eq!(config.gpu_timeout, Some(std::time::Duration::from_millis(900)));
     assert_eq!(config.scenario, Some("/etc/a.toml".into()));
     assert_eq!((config.calibration, config.record), (Some("/b.toml".into()), true));
-    assert_eq!((config.data, config.health.limit_c), (Some("/var/lib/bowwave".into()), Some(85.0)));
+    assert_eq!((config.data, config.health.temperature_c_max), (Some("/var/lib/bowwave".into()), Some(85.0)));
 }
 
 #[test]
@@ -149,34 +149,98 @@ fn mistakes_are_refused_where_they_are() {
     for (text, said) in [
         (
             "[imu]\norientation = \"unit\"\n",
-            "x.toml:2:15: imu.orientation: 'unit' is neither \"auto\" nor \"fused\"",
+            "x.toml:2:15: imu.orientation: \"unit\" is not allowed; give one of \"auto\", \"fused\"",
         ),
         (
             "[imu]\nformat = \"xens\"\n",
-            "x.toml:2:10: imu.format: 'xens' is none of vectornav, vectornav-ascii, xsens,",
+            "x.toml:2:10: imu.format: \"xens\" is not allowed; give one of \"vectornav\", \"vectornav-ascii\", \"xsens\",",
         ),
-        ("[screen]\nsise = \"1x1\"\n", "x.toml:2:1: unknown field `sise`"),
+        (
+            "[screen]\nsise = \"1x1\"\n",
+            "x.toml:2:1: screen.sise: unknown key; known are output, size, card, connector, refresh_hz, legacy; did you mean size?",
+        ),
         ("[screen]\nsize = \"1x1\"\n", "x.toml:2:8: screen.size: '1x1' is no size"),
-        ("[screen]\noutput = \"tv\"\n", "x.toml:2:10: "),
-        ("[screen]\nrefresh_hz = 0.0\n", "x.toml:2:14: screen.refresh_hz is 0: give 1 to 1000"),
-        ("[gpu]\ndevice = \" \"\n", "x.toml:2:10: gpu.device is empty"),
-        ("[gpu]\nvalidation = 3\n", "x.toml:2:14: "),
+        ("[screen]\noutput = \"tv\"\n", "x.toml:2:10: screen.output: \"tv\" is not allowed; give one of"),
+        (
+            "[screen]\nrefresh_hz = 0.0\n",
+            "x.toml:2:14: screen.refresh_hz: 0.0 is not allowed; give a number, 1 to 1000 Hz",
+        ),
+        ("[gpu]\ndevice = \" \"\n", "x.toml:2:10: gpu.device: is empty"),
+        ("[gpu]\nvalidation = 3\n", "x.toml:2:14: gpu.validation: 3 is not allowed; give true or false"),
         ("[gpu\n", "x.toml:1:5: "),
         ("[camera]\nmodes = [\"YUYV\"]\n", "x.toml:2:10: camera.modes: 'YUYV' is no mode"),
-        ("[camera]\nexposure_us = \"long\"\n", "x.toml:2:15: camera.exposure_us: give a number above 0"),
-        ("[camera]\nbuffers = 1\n", "x.toml:2:11: camera.buffers is 1: give 3 to 32"),
-        ("[imu]\nbaud = []\n", "x.toml:2:8: imu.baud: "),
-        ("[trigger]\nchip = \"a\"\nline = 1\ndebounce_ms = 900\n", "x.toml:4:15: trigger.debounce_ms is 900"),
-        ("[interlock]\nline = 1\n", "x.toml:1:1: missing field `chip`"),
-        ("[ship]\nbaud = 4800\n", "x.toml:1:1: missing field `device`"),
+        (
+            "[camera]\nexposure_us = \"long\"\n",
+            "x.toml:2:15: camera.exposure_us: \"long\" is not allowed; give a number above 0",
+        ),
+        (
+            "[camera]\nbuffers = 1\n",
+            "x.toml:2:11: camera.buffers: 1 is not allowed; give a whole number, 3 to 32",
+        ),
+        (
+            "[imu]\nbaud = []\n",
+            "x.toml:2:8: imu.baud: [] is not allowed; give a rate such as 115200, or 1 to 16 to try",
+        ),
+        (
+            "[trigger]\nchip = \"a\"\nline = 1\ndebounce_ms = 900\n",
+            "x.toml:4:15: trigger.debounce_ms: 900 is not allowed; give a whole number, 10 to 20",
+        ),
+        ("[interlock]\nline = 1\n", "x.toml:1:1: interlock.chip: is missing"),
+        (
+            "[interlock]\nchip = \"a\"\nline = 1\ndebounce_ms = 15\n",
+            "x.toml:4:15: interlock.debounce_ms: is for [trigger] alone",
+        ),
+        (
+            "[trigger]\nchip = \"a\"\nline = -1\n",
+            "x.toml:3:8: trigger.line: -1 is not allowed; give the line's number",
+        ),
+        (
+            "[trigger]\nchip = \"a\"\nline = 1\nbias = \"up\"\n",
+            "x.toml:4:8: trigger.bias: \"up\" is not allowed; give one of",
+        ),
+        ("[ship]\nbaud = 4800\n", "x.toml:1:1: ship.device: is missing"),
         ("[ship]\ndevice = \"/dev/tty[\"\n", "x.toml:2:10: ship.device: "),
-        ("[ship]\ndevice = \"a\"\nlatency_ms = -1\n", "x.toml:3:14: ship.latency_ms is -1: give 0 to 1500"),
+        (
+            "[ship]\ndevice = \"a\"\nlatency_ms = -1\n",
+            "x.toml:3:14: ship.latency_ms: -1 is not allowed; give a number, 0 to 1500 ms",
+        ),
         ("[ship]\ndevice = \"a\"\nbaud = 0\n", "x.toml:3:8: ship.baud: "),
-        ("[rezero]\nsigma_deg = 1\n", "x.toml:1:1: rezero: give from_bow_deg"),
-        ("[landmarks]\nat = [{ bearing_deg = 400 }]\n", "x.toml:2:23: bearing_deg is 400"),
-        ("[heading]\ngrowth_deg_per_h = -1\n", "x.toml:2:20: heading.growth_deg_per_h is -1"),
-        ("[health]\nlimit_c = nan\n", "x.toml:2:11: health.limit_c is NaN"),
+        ("[rezero]\nsigma_deg = 1\n", "x.toml:1:1: rezero.from_bow_deg: is missing; give it"),
+        (
+            "[landmarks]\nat = [{ bearing_deg = 400 }]\n",
+            "x.toml:2:23: landmarks.at[1].bearing_deg: 400 is not allowed; give a number, -360 to 360 degrees",
+        ),
+        ("[heading]\ngrowth_deg_per_h = -1\n", "x.toml:2:20: heading.growth_deg_per_h: -1 is not allowed"),
+        ("[health]\ntemperature_c_max = nan\n", "x.toml:2:21: health.temperature_c_max: nan is not allowed"),
     ] {
         assert!(refused(text).starts_with(said), "{}", refused(text));
+    }
+}
+
+#[test]
+fn former_names_of_keys_are_read_with_a_warning_that_names_the_new_one() {
+    let text = "[heading]\nshown_above_deg = 0.4\n[imu]\nlate_ms = 12.5\n[gpu]\nhang_ms = 900\n[health]\nlimit_c = 85\n";
+    let old = parse(text, "x.toml", Path::new("/etc")).unwrap();
+    let named = [
+        ("2:1: heading.shown_above_deg", "display_sigma_above_deg"),
+        ("4:1: imu.late_ms", "packet_jitter_ms_max"),
+        ("6:1: gpu.hang_ms", "gpu_timeout_ms"),
+        ("8:1: health.limit_c", "temperature_c_max"),
+    ];
+    assert_eq!(old.warnings.len(), named.len(), "{:?}", old.warnings);
+    let mut renamed = text.to_owned();
+    for (warning, (place, new)) in old.warnings.iter().zip(named) {
+        assert!(warning.starts_with(&format!("x.toml:{place}: is now called {new};")), "{warning}");
+        let (_, former) = place.rsplit_once('.').unwrap();
+        renamed = renamed.replace(former, new);
+    }
+    let new = parse(&renamed, "x.toml", Path::new("/etc")).unwrap();
+    assert_eq!(new.warnings, [""; 0]);
+    assert_eq!(Config { warnings: vec![], ..old }, new);
+    for (place, new) in named {
+        let (path, former) = place.rsplit_once('.').unwrap();
+        let table = path.rsplit(' ').next().unwrap();
+        let both = refused(&format!("[{table}]\n{new} = 300\n{former} = 300\n"));
+        assert!(both.contains(&format!("is the former name of {new}; leave it out")), "{both}");
     }
 }

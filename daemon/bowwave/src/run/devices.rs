@@ -33,7 +33,7 @@ pub fn device_settings(settings: &Settings, mode: Mode, faults: &mut Vec<FaultCh
         trigger: if training { trigger(config, &settings.setup.scenario.weapon, faults) } else { None },
         lamps: config.lamps.clone().map(|lamps| LampChoice { lamps, inputs: inputs(config) }),
         health: config.health.clone(),
-        gpu_timeout: config.hang.unwrap_or(TimeOuts::default().frame),
+        gpu_timeout: config.gpu_timeout.unwrap_or(TimeOuts::default().frame),
     }
 }
 

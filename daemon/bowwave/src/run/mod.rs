@@ -122,7 +122,7 @@ impl Gun<'_> {
         let presenter = PresenterOptions {
             gpu: gpu(&settings, self.mode),
             validation: config.validation,
-            gpu_timeout: config.hang,
+            gpu_timeout: config.gpu_timeout,
             output: OutputOptions {
                 reporter: Some(devices.output_reporter()),
                 lcd: devices.lcd(),

@@ -15,6 +15,7 @@ use bowwave_core::{
     geometry::Lens,
     model::Model,
     session::Setup,
+    text::toml::bounded_text,
     world::scenario::{self, Scenario},
 };
 use bowwave_devices::{camera::CameraSettings, clock::now};
@@ -22,7 +23,7 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
     config::{self, Config},
-    loading::{read_scenario, scenario_models},
+    loading::{read_scenario, scenario_models, warn_of_former_names},
 };
 
 /// Where nobody says how large pictures are.
@@ -104,6 +105,7 @@ impl Reader {
                 if let Some(why) = &a.refused {
                     refuse(Fault::Config, &why_and_instead(why, "the last good configuration is used"));
                 }
+                warn_of_former_names(&a.value.warnings);
                 a.value
             }
             None => {
@@ -208,7 +210,7 @@ impl Reader {
     }
 
     fn kept(&self, name: &str) -> Option<String> {
-        fs::read_to_string(self.last_good.as_ref()?.join(name)).ok()
+        read_text(&self.last_good.as_ref()?.join(name)).ok()
     }
 
     /// Keeps a good text: whole or not at all, also when power is cut.
@@ -232,7 +234,7 @@ impl Reader {
 }
 
 fn read_text(path: &Path) -> Result<String> {
-    fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))
+    fs::File::open(path).and_then(bounded_text).with_context(|| format!("cannot read {}", path.display()))
 }
 
 /// Whether there are cameras of this size, in every coding.

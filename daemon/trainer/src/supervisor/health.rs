@@ -43,7 +43,7 @@ pub struct HealthSettings {
     /// File with a temperature in thousandths of a degree; else all thermal zones.
     pub thermal: Option<PathBuf>,
     /// From this temperature on the trainer draws less, degrees Celsius.
-    pub limit_c: Option<f64>,
+    pub temperature_c_max: Option<f64>,
 }
 
 /// The wall clock at an instant of the monotonic one, once it is known to be set.
@@ -69,7 +69,7 @@ impl Health {
         let stop = Arc::new(AtomicBool::new(false));
         let (sender, clock_set) = bounded(1);
         let zones = settings.thermal.clone().map_or_else(thermal_zones, |path| vec![path]);
-        let limit_c = settings.limit_c.unwrap_or(LIMIT_C);
+        let limit_c = settings.temperature_c_max.unwrap_or(LIMIT_C);
         let stopped = Arc::clone(&stop);
         let thread = thread::Builder::new()
             .name("health".to_owned())

@@ -215,12 +215,12 @@ impl Default for Configured {
 pub fn configuration(c: &Configured) -> String {
     let data = c.data.as_ref().map_or_else(String::new, |d| format!("data = \"{d}\"\n"));
     format!(
-        "[screen]\noutput = \"lcd\"\nsize = \"{}x{}\"\n[camera]\nmodes = [{}]\n[imu]\nbaud = [921600, 460800, 230400, 115200]\nlate_ms = 30\n\
+        "[screen]\noutput = \"lcd\"\nsize = \"{}x{}\"\n[camera]\nmodes = [{}]\n[imu]\nbaud = [921600, 460800, 230400, 115200]\npacket_jitter_ms_max = 30\n\
          [trigger]\nchip = \"bench\"\nline = \"trigger\"\n[interlock]\nchip = \"bench\"\nline = \"interlock\"\n\
          [power_fail]\nchip = \"bench\"\nline = \"power-fail\"\n\
          [lamps]\nchip = \"bench\"\nready = \"lamp-ready\"\nhit = \"lamp-hit\"\nfault = \"lamp-fault\"\n\
-         [gpu]\nhang_ms = 15000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
-         [health]\nthermal = \"/run/hil/thermal\"\nlimit_c = 78.0\n{}",
+         [gpu]\ngpu_timeout_ms = 15000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
+         [health]\nthermal = \"/run/hil/thermal\"\ntemperature_c_max = 78.0\n{}",
         LCD.0, LCD.1, c.modes, c.calibration, c.record, c.extra
     )
 }

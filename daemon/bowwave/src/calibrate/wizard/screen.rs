@@ -42,7 +42,7 @@ impl Screen {
         let options = PresenterOptions {
             gpu: settings.config.gpu.clone(),
             validation: settings.config.validation,
-            gpu_timeout: settings.config.hang,
+            gpu_timeout: settings.config.gpu_timeout,
             output: OutputOptions {
                 reporter: devices.map(Devices::output_reporter),
                 lcd: devices.and_then(Devices::lcd),
