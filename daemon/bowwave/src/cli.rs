@@ -6,7 +6,7 @@ mod mounting;
 use std::{ffi::OsString, path::PathBuf};
 
 use bowwave_core::time::secs_to_ns;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use hw_sim::fault::{Fault, FaultKind};
 
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateCamera, CalibrateTask};
@@ -85,6 +85,15 @@ pub struct ReplayRecording {
     pub json: bool,
 }
 
+/// Source of the orientation, on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum OrientationArg {
+    /// The unit's own where it has one.
+    Auto,
+    /// Fused here.
+    Fused,
+}
+
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub struct Simulate {
@@ -120,8 +129,12 @@ pub struct Simulate {
     /// End after so many seconds; without it once through the recording
     #[arg(long, value_name = "S", value_parser = parse_duration)]
     pub duration: Option<f64>,
-    /// Fuse rates and specific force here, and correct by the horizon, though the recording has the unit's own orientation
-    #[arg(long)]
+    /// Source of the orientation: the unit's own where it has one (auto), or its rates and specific force fused here and corrected
+    /// by the horizon (fused); overrides the configuration's
+    #[arg(long, value_name = "SOURCE")]
+    pub orientation: Option<OrientationArg>,
+    /// Former name of --orientation fused
+    #[arg(long, hide = true, conflicts_with = "orientation")]
     pub fuse: bool,
     /// Seed of all chance; overrides the scenario's
     #[arg(long, value_name = "N")]

@@ -8,7 +8,7 @@ pub mod config;
 mod doctor;
 mod hits;
 mod laboratory;
-mod loading;
+pub mod loading;
 pub mod outcome;
 mod plan;
 pub mod program;

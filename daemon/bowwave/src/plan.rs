@@ -19,7 +19,7 @@ use serde::Serialize;
 
 use crate::{
     cli::Plan,
-    loading::{read_scenario, scenario_models},
+    loading::{read_scenario, scenario_models, warn_of_former_names},
     stdout,
 };
 
@@ -70,6 +70,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         None => (scenario::DEFAULT.to_owned(), "built-in scenario".to_owned(), Path::new("").to_path_buf()),
     };
     let scenario = Scenario::parse(&text, &origin)?;
+    warn_of_former_names(&scenario.warnings);
     let (models, of_boats) = scenario_models(&scenario, &base)?;
     let radius =
         |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);

@@ -38,18 +38,36 @@ impl ReflectionMethod {
         match self {
             Self::Off => "off",
             Self::Mirror => "mirror",
-            Self::FullAsPrinted => "full_as_printed",
+            Self::FullAsPrinted => "full_as_published",
             Self::Full => "full",
             Self::Physics => "physics",
-            Self::PhysicsAsPrinted => "physics_as_printed",
-            Self::Waves => "waves",
+            Self::PhysicsAsPrinted => "physics_as_published",
+            Self::Waves => "baked",
         }
     }
 
-    /// The method of that name; hyphens stand for underscores, and "none" for "off".
+    /// The method of that name or former name; hyphens stand for underscores, and "none" for "off".
     pub fn of_name(name: &str) -> Option<Self> {
         let name = if name == "none" { "off".to_owned() } else { name.replace('-', "_") };
-        Self::ALL.into_iter().find(|method| method.name() == name)
+        let current = Self::ALL.into_iter().find(|method| method.name() == name);
+        current.or_else(|| Self::FORMER_NAMES.iter().find(|(old, _)| *old == name).map(|(_, method)| *method))
+    }
+
+    /// Former names, which are read for one version.
+    const FORMER_NAMES: [(&str, Self); 3] = [
+        ("waves", Self::Waves),
+        ("full_as_printed", Self::FullAsPrinted),
+        ("physics_as_printed", Self::PhysicsAsPrinted),
+    ];
+
+    /// The warning about a former name: names the new one. `None` for a name of today.
+    pub fn warning(name: &str) -> Option<String> {
+        let name = name.replace('-', "_");
+        let (_, method) = Self::FORMER_NAMES.iter().find(|(old, _)| *old == name)?;
+        let new = method.name();
+        Some(format!(
+            "\"{name}\" is now called \"{new}\"; the former name will not be read any longer in the next version"
+        ))
     }
 }
 

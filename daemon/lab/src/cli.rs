@@ -139,8 +139,13 @@ pub struct StudyScore {
 }
 
 /// Ways to mirror, at least one, each once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Methods(pub Vec<ReflectionMethod>);
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Methods {
+    /// The methods.
+    pub list: Vec<ReflectionMethod>,
+    /// Former names that were used, each with the new one.
+    pub warnings: Vec<String>,
+}
 
 /// `-2.5,0.4`.
 fn parse_level(text: &str) -> Result<Level, String> {
@@ -160,19 +165,20 @@ fn parse_level(text: &str) -> Result<Level, String> {
 /// `full`, `mirror,full` or `all`.
 fn parse_methods(text: &str) -> Result<Methods, String> {
     if text == "all" {
-        return Ok(Methods(ReflectionMethod::ALL.to_vec()));
+        return Ok(Methods { list: ReflectionMethod::ALL.to_vec(), warnings: Vec::new() });
     }
-    let mut methods = Vec::new();
+    let mut methods = Methods::default();
     for name in text.split(',') {
         let method = ReflectionMethod::of_name(name.trim()).ok_or_else(|| {
             let names = ReflectionMethod::ALL.map(ReflectionMethod::name).join(", ");
             format!("'{name}' is no way to mirror; there are {names}, and all")
         })?;
-        if !methods.contains(&method) {
-            methods.push(method);
+        methods.warnings.extend(ReflectionMethod::warning(name.trim()));
+        if !methods.list.contains(&method) {
+            methods.list.push(method);
         }
     }
-    Ok(Methods(methods))
+    Ok(methods)
 }
 
 fn parse_participants(text: &str) -> Result<usize, String> {
@@ -193,9 +199,17 @@ mod tests {
     #[test]
     fn methods() {
         use ReflectionMethod::{Full, Mirror, Off};
-        assert_eq!(parse_methods("mirror"), Ok(Methods(vec![Mirror])));
-        assert_eq!(parse_methods("none, full,off"), Ok(Methods(vec![Off, Full])));
-        assert_eq!(parse_methods("all"), Ok(Methods(ReflectionMethod::ALL.to_vec())));
+        let list = |text| parse_methods(text).map(|methods| (methods.list, methods.warnings.len()));
+        assert_eq!(list("mirror"), Ok((vec![Mirror], 0)));
+        assert_eq!(list("none, full,off"), Ok((vec![Off, Full], 0)));
+        assert_eq!(list("all"), Ok((ReflectionMethod::ALL.to_vec(), 0)));
+        let former = parse_methods("full,waves").unwrap();
+        assert_eq!(former.list, [Full, ReflectionMethod::Waves]);
+        assert!(
+            former.warnings.len() == 1 && former.warnings[0].contains("\"baked\""),
+            "{:?}",
+            former.warnings
+        );
         for bad in ["", "magic", "full,", "all,full"] {
             assert!(parse_methods(bad).is_err(), "{bad}");
         }

@@ -21,9 +21,11 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
         options.calibration = Some(CalibrationFile::read(path)?);
     }
     if let Some(path) = &arguments.scenario {
-        let text = std::fs::read_to_string(path)
+        let text = std::fs::File::open(path)
+            .and_then(bowwave_core::text::toml::bounded_text)
             .with_context(|| format!("cannot read the scenario {}; name an existing file", path.display()))?;
-        bowwave_core::world::scenario::Scenario::parse(&text, &path.display().to_string())?;
+        let scenario = bowwave_core::world::scenario::Scenario::parse(&text, &path.display().to_string())?;
+        bowwave::loading::warn_of_former_names(&scenario.warnings);
         options.scenario_toml = Some(text);
     }
     options.bias_from_s = arguments.bias_from;

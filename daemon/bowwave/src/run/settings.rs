@@ -155,6 +155,7 @@ impl Reader {
     ) -> Result<(Scenario, String, Vec<Model>, Vec<bowwave_core::model::ModelId>, PathBuf)> {
         let load = |text: &str, origin: &str, base: &Path| -> Result<_> {
             let scenario = Scenario::parse(text, origin)?;
+            warn_of_former_names(&scenario.warnings);
             let (models, boats) = scenario_models(&scenario, base)?;
             let radius = |id: &bowwave_core::model::ModelId| {
                 models.get(usize::from(id.0)).map_or(0.0, Model::radius_m)

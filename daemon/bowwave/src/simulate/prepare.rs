@@ -9,6 +9,7 @@ use bowwave_core::{
     event::PixelFormat,
     model::{Model, ModelId},
     session::Setup,
+    text::toml::bounded_text,
     world::scenario::{self, Scenario},
 };
 use bowwave_record::{Properties, RecordingReader};
@@ -16,9 +17,9 @@ use bowwave_trainer::replay::session_properties;
 
 use crate::{
     cache,
-    cli::Simulate,
+    cli::{OrientationArg, Simulate},
     config::{self, Config, ScreenOutput},
-    loading::{read_scenario, scenario_models},
+    loading::{read_scenario, scenario_models, warn_of_former_names},
 };
 
 /// Screen size where nothing else is said.
@@ -85,7 +86,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
             screen: arguments.size.or(config.size).unwrap_or(SIZE),
             // JPEG pictures are decoded to RGB.
             video: PixelFormat::Rgb,
-            orientation: if arguments.fuse { Source::Fused } else { config.orientation },
+            orientation: orientation(arguments).unwrap_or(config.orientation),
             heading: config.heading.settings.clone(),
         },
         scenario_toml,
@@ -98,6 +99,20 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
     })
 }
 
+/// The source of the orientation that the command line asks for.
+fn orientation(arguments: &Simulate) -> Option<Source> {
+    if arguments.fuse {
+        log::warn!(
+            "--fuse is now called --orientation fused; the former name will not be read any longer in the next version"
+        );
+        return Some(Source::Fused);
+    }
+    arguments.orientation.map(|asked| match asked {
+        OrientationArg::Auto => Source::Auto,
+        OrientationArg::Fused => Source::Fused,
+    })
+}
+
 fn calibration(
     named: Option<&PathBuf>,
     properties: &Properties,
@@ -105,7 +120,7 @@ fn calibration(
 ) -> Result<(CalibrationFile, String)> {
     let (text, origin) = match named {
         Some(path) => {
-            let text = std::fs::read_to_string(path).with_context(|| {
+            let text = std::fs::File::open(path).and_then(bounded_text).with_context(|| {
                 format!(
                     "cannot read the calibration {}; name an existing file with --calibration",
                     path.display()
@@ -136,6 +151,7 @@ fn scenario(
         (None, None) => (scenario::DEFAULT.to_owned(), "built-in scenario".to_owned(), PathBuf::new()),
     };
     let scenario = Scenario::parse(&text, &origin)?;
+    warn_of_former_names(&scenario.warnings);
     Ok((scenario, text, base))
 }
 

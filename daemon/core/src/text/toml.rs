@@ -195,6 +195,11 @@ impl<'a> TomlText<'a> {
         self.at(value.span().start).of_key(self.path(&value.span()))
     }
 
+    /// The root, for keys that it lacks.
+    pub fn root(self) -> TomlSection<'a> {
+        TomlSection { text: self, path: String::new(), start: 0 }
+    }
+
     /// A table of the root, `name`; one of defaults where the text has none.
     pub fn section<T: Default>(self, name: &str, table: Option<Spanned<T>>) -> (TomlSection<'a>, T) {
         let start = table.as_ref().map_or(0, |table| table.span().start);
@@ -355,7 +360,8 @@ impl TomlSection<'_> {
 
     /// Place of the table, under the name of a key.
     pub fn place(&self, key: &str) -> TomlPlace {
-        self.text.at(self.start).of_key(format!("{}.{key}", self.path))
+        let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
+        self.text.at(self.start).of_key(path)
     }
 }
 

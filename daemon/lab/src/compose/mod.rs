@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use bowwave::{outcome::Outcome, stdout};
+use bowwave::{loading::warn_of_former_names, outcome::Outcome, stdout};
 use bowwave_core::water::ReflectionMethod;
 use bowwave_models::BoatModels;
 
@@ -26,17 +26,22 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
     let Some(path) = &arguments.scene else {
         bail!("no scene named; `bowwave compose --example > scene.toml` makes one to begin with");
     };
-    let text = std::fs::read_to_string(path).with_context(|| {
-        format!(
-            "cannot read the scene {}; `bowwave compose --example > scene.toml` makes one to begin with",
-            path.display()
-        )
-    })?;
+    let text =
+        std::fs::File::open(path).and_then(bowwave_core::text::toml::bounded_text).with_context(|| {
+            format!(
+                "cannot read the scene {}; `bowwave compose --example > scene.toml` makes one to begin with",
+                path.display()
+            )
+        })?;
     let still = Still::parse(&text, &path.display().to_string())?;
+    warn_of_former_names(&still.warnings);
     let base = path.parent().unwrap_or(Path::new(""));
     let models = BoatModels::load(still.boats.iter().map(|b| (b.name.as_str(), b.model.as_str())), base)?;
     let pictures = pictures(&base.join(&still.picture))?;
-    let methods = arguments.method.as_ref().map_or_else(|| vec![still.water.method], |m| m.0.clone());
+    if let Some(methods) = &arguments.method {
+        warn_of_former_names(&methods.warnings);
+    }
+    let methods = arguments.method.as_ref().map_or_else(|| vec![still.water.method], |m| m.list.clone());
     let mut renderer = OffscreenRenderer::new(models, arguments.gpu.clone(), arguments.validation);
     std::fs::create_dir_all(&arguments.out).with_context(|| {
         format!("cannot make the folder {}; name another with --out", arguments.out.display())

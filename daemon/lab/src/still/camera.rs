@@ -5,7 +5,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use bowwave_core::{
     frame::view::Eye,
     geometry::{CameraPose, Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
-    world::scenario::table::Mark,
+    text::toml::{TomlError, TomlPlace},
 };
 
 /// Diagonal of a 35 mm film frame, millimetres: what "35 mm equivalent" focal lengths count from (CIPA DCG-001).
@@ -13,9 +13,6 @@ const FILM_DIAGONAL_MM: f64 = 43.266_615_3;
 
 /// Least distance of two points of the horizon, as a share of the picture's width.
 const HORIZON_SHARE: f64 = 0.1;
-
-/// Where in the text, which key, and what is wrong.
-pub(super) type Problem = (Mark, &'static str, String);
 
 /// How the focal length is told.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +47,7 @@ pub enum Attitude {
 }
 
 /// The camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct StillCamera {
     /// Height over the mean sea, metres.
     pub eye_height_m: f64,
@@ -66,15 +63,15 @@ pub struct StillCamera {
     pub azimuth: f64,
     /// How it was held.
     pub attitude: Attitude,
-    pub(super) focal_mark: Mark,
-    pub(super) attitude_mark: Mark,
+    pub(super) focal_at: TomlPlace,
+    pub(super) attitude_at: TomlPlace,
 }
 
 impl StillCamera {
     /// The lens of a picture of that size.
-    pub(super) fn lens(&self, (width, height): (u32, u32), own_px: Option<f64>) -> Result<Lens, Problem> {
+    pub(super) fn lens(&self, (width, height): (u32, u32), own_px: Option<f64>) -> Result<Lens, TomlError> {
         let size = DVec2::new(f64::from(width), f64::from(height));
-        let refuse = |problem: String| Err((self.focal_mark, "camera.focal_px", problem));
+        let refuse = |problem: String| Err(self.focal_at.clone().of_key("camera.focal_px").error(problem));
         let focal = match self.focal {
             Focal::Pixels(px) => px,
             Focal::Across(angle) => size.x / 2.0 / (angle / 2.0).tan(),
@@ -100,7 +97,7 @@ impl StillCamera {
         let centre = self.centre.unwrap_or(size / 2.0);
         if centre.cmplt(DVec2::ZERO).any() || centre.cmpgt(size).any() {
             let problem = format!("{} lies outside the picture of {width}x{height}", pair(centre));
-            return Err((self.focal_mark, "camera.centre_px", problem));
+            return Err(self.focal_at.clone().of_key("camera.centre_px").error(problem));
         }
         Ok(Lens {
             width,
@@ -113,7 +110,7 @@ impl StillCamera {
     }
 
     /// Where the camera stands and looks.
-    pub(super) fn pose(&self, lens: &Lens) -> Result<CameraPose, Problem> {
+    pub(super) fn pose(&self, lens: &Lens) -> Result<CameraPose, TomlError> {
         let position = DVec3::new(0.0, 0.0, self.eye_height_m);
         let world_from_camera = match self.attitude {
             Attitude::Given { pitch, roll } => look(self.azimuth, pitch, roll),
@@ -123,8 +120,8 @@ impl StillCamera {
     }
 
     /// Both points lie the horizon's dip below the horizontal: that gives the vertical in the camera's space.
-    fn levelled_by(&self, lens: &Lens, points: [DVec2; 2]) -> Result<DQuat, Problem> {
-        let refuse = |problem: String| Err((self.attitude_mark, "camera.horizon", problem));
+    fn levelled_by(&self, lens: &Lens, points: [DVec2; 2]) -> Result<DQuat, TomlError> {
+        let refuse = |problem: String| Err(self.attitude_at.clone().of_key("camera.horizon").error(problem));
         let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));
         for point in points {
             if point.cmplt(DVec2::ZERO).any() || point.cmpgt(size).any() {

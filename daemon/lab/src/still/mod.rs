@@ -18,11 +18,12 @@ use bowwave_core::{
     },
     geometry::{CameraPose, Lens},
     model::{Model, ModelId},
+    text::toml::{TomlError, TomlPlace},
     time::Time,
     water::Water,
     world::{
         boats::{CourseState, Hull, ahead, float},
-        scenario::{CAMERA_CLEAR_M, ScenarioError, place, table::Mark},
+        scenario::{CAMERA_CLEAR_M, place},
         waves::{WaveField, WaveSpec},
     },
 };
@@ -61,7 +62,8 @@ pub struct Still {
     pub water: Water,
     /// The boats.
     pub boats: Vec<StillBoat>,
-    origin: String,
+    /// Former names that the text uses, each with its place and the new name.
+    pub warnings: Vec<String>,
 }
 
 /// A boat in the first picture.
@@ -77,8 +79,7 @@ pub struct StillBoat {
     pub heading: f64,
     /// How fast, m/s.
     pub speed_m_s: f64,
-    mark: Mark,
-    key: String,
+    stands: TomlPlace,
 }
 
 impl StillBoat {
@@ -90,8 +91,7 @@ impl StillBoat {
             place,
             heading,
             speed_m_s: 0.0,
-            mark: Mark::at("", 0),
-            key: "boat".to_owned(),
+            stands: TomlPlace::nowhere("boat"),
         }
     }
 }
@@ -115,8 +115,8 @@ pub struct Composed {
 }
 
 impl Still {
-    /// Checks a text. `origin` is what errors call it.
-    pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
+    /// Checks a text. `origin` is its name in errors.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, TomlError> {
         read::still(text, origin)
     }
 
@@ -131,7 +131,7 @@ impl Still {
         index: u32,
         (models, boat_models): (&[Model], &[ModelId]),
         focal_px: Option<f64>,
-    ) -> Result<Composed, ScenarioError> {
+    ) -> Result<Composed, TomlError> {
         let size = (picture.width(), picture.height());
         let (lens, camera) = self.sight(size, focal_px)?;
         let plan = ScenePlan::new(&Needs {
@@ -194,9 +194,9 @@ impl Still {
         eye: &Eye<'_>,
         waves: &WaveField,
         time_s: f64,
-    ) -> Result<Afloat<'a>, ScenarioError> {
+    ) -> Result<Afloat<'a>, TomlError> {
         let boat = &self.boats[number];
-        let refuse = |problem: String| Err(boat.mark.error(&self.origin, &boat.key, problem));
+        let refuse = |problem: String| Err(boat.stands.error(problem));
         let (start, on_mean_sea) = match boat.place {
             Place::World(place) => (place, false),
             Place::Pixel(pixel) => match camera::on_the_sea(eye, pixel) {
@@ -254,14 +254,9 @@ impl Still {
     ///
     /// # Errors
     /// As [`Still::compose`].
-    pub fn sight(
-        &self,
-        size: (u32, u32),
-        focal_px: Option<f64>,
-    ) -> Result<(Lens, CameraPose), ScenarioError> {
-        let named = |(mark, key, problem): camera::Problem| mark.error(&self.origin, key, problem);
-        let lens = self.camera.lens(size, focal_px).map_err(named)?;
-        let pose = self.camera.pose(&lens).map_err(named)?;
+    pub fn sight(&self, size: (u32, u32), focal_px: Option<f64>) -> Result<(Lens, CameraPose), TomlError> {
+        let lens = self.camera.lens(size, focal_px)?;
+        let pose = self.camera.pose(&lens)?;
         Ok((lens, pose))
     }
 }

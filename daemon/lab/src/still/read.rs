@@ -1,152 +1,241 @@
 //! The text of a [`Still`].
 
+use bowwave_core::{
+    text::toml::{
+        BareOrQuoted, Given, Needed, NumberWithin, PlainText, Spanned, TomlError, TomlPlace, TomlSection,
+        TomlText, ValueRule,
+    },
+    world::scenario::{
+        place,
+        read::{ANGLE, LightKeys, M_S_PER_KN, ReflectionKeys, SEED, SeaKeys, light, reflection, sea},
+    },
+};
 use glam::DVec2;
+use serde::Deserialize;
 
 use super::{Attitude, BOATS_MAX, Focal, Place, RANGE_MAX_M, Still, StillBoat, StillCamera};
-use bowwave_core::world::scenario::{
-    ScenarioError, place,
-    read::{document, light, reflection, sea},
-    table::{Source, Table},
-};
-
-/// m/s in a knot.
-const M_S_PER_KN: f64 = 1852.0 / 3600.0;
 
 /// Largest coordinate of a pixel that a text may hold; whether it lies in the picture is checked with the picture.
 const PIXEL_MAX: f64 = 8192.0;
 
-pub(super) fn still(text: &str, origin: &str) -> Result<Still, ScenarioError> {
-    let document = document(text, origin)?;
-    let root = Table::root(Source { text, origin }, &document);
-    root.only(&["picture", "seed", "interval_s", "camera", "boat", "sea", "light", "reflection"])?;
-    let (force, waves) = sea(&root.table("sea")?, &[])?;
-    let sky = root.table("light")?;
-    let (sun_direction, visibility_m) = light(&sky, &["sun_strength"])?;
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawStill {
+    picture: Given<String>,
+    seed: Given<i64>,
+    interval_s: Given<f64>,
+    camera: Option<Spanned<RawStillCamera>>,
+    boat: Vec<Spanned<RawStillBoat>>,
+    sea: Option<Spanned<SeaKeys>>,
+    light: Option<Spanned<RawStillLight>>,
+    reflection: Option<Spanned<ReflectionKeys>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawStillCamera {
+    eye_height_m: Given<f64>,
+    focal_35mm_mm: Given<f64>,
+    hfov_deg: Given<f64>,
+    focal_px: Given<f64>,
+    centre_px: Given<Vec<f64>>,
+    radial: Given<Vec<f64>>,
+    tangential: Given<Vec<f64>>,
+    azimuth_deg: Given<f64>,
+    horizon: Option<Spanned<Vec<Needed<Vec<f64>>>>>,
+    pitch_deg: Given<f64>,
+    roll_deg: Given<f64>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawStillLight {
+    sun_azimuth_deg: Given<f64>,
+    sun_elevation_deg: Given<f64>,
+    latitude_deg: Given<f64>,
+    longitude_deg: Given<f64>,
+    utc: Given<BareOrQuoted>,
+    sun_strength: Given<f64>,
+    visibility_km: Given<f64>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawStillBoat {
+    name: Given<String>,
+    model: Given<String>,
+    waterline_px: Given<Vec<f64>>,
+    range_m: Given<f64>,
+    bearing_deg: Given<f64>,
+    heading_deg: Given<f64>,
+    speed_kn: Given<f64>,
+}
+
+pub(super) fn still(text: &str, origin: &str) -> Result<Still, TomlError> {
+    let text = TomlText::new(text, origin)?;
+    let (raw, mut warnings) = text.read::<RawStill>(&[])?;
+    let (section, keys) = text.section("sea", raw.sea);
+    let (force, waves) = sea(&section, &keys)?;
+    let (section, keys) = text.section("light", raw.light);
+    let RawStillLight { sun_azimuth_deg, sun_elevation_deg, latitude_deg, longitude_deg, utc, .. } = keys;
+    let (sun_strength, visibility_km) = (keys.sun_strength, keys.visibility_km);
+    let keys =
+        LightKeys { sun_azimuth_deg, sun_elevation_deg, latitude_deg, longitude_deg, utc, visibility_km };
+    let (sun_direction, visibility_m) = light(&section, &keys)?;
+    let (_, mirror) = text.section("reflection", raw.reflection);
+    let (section, view) = text.section("camera", raw.camera);
+    let boats = text.sections("boat", raw.boat, BOATS_MAX)?;
+    let Some(picture) = &raw.picture else {
+        return Err(text.root().missing("picture", "the path of a JPEG or PNG file, or of a folder of them"));
+    };
     Ok(Still {
-        picture: root.required_text("picture", "the path of a JPEG or PNG file, or of a folder of them")?,
-        seed: root.integer("seed", 0..=i64::MAX)?.map_or(1, i64::unsigned_abs),
-        interval_s: root.number("interval_s", 0.001..=3600.0, "s")?,
-        camera: camera(&root.table("camera")?)?,
+        picture: text.needed(picture, PlainText)?,
+        seed: text.given(&raw.seed, SEED)?.map_or(1, i64::unsigned_abs),
+        interval_s: text.given(&raw.interval_s, NumberWithin(0.001..=3600.0, "s"))?,
+        camera: camera(&section, &view)?,
         waves,
         sun_direction,
-        sun_strength: sky.number("sun_strength", 0.0..=1.0, "")?.unwrap_or(1.0),
+        sun_strength: text.given(&sun_strength, NumberWithin(0.0..=1.0, ""))?.unwrap_or(1.0),
         visibility_m,
-        water: reflection(&root.table("reflection")?, force)?,
-        boats: boats(&root.tables("boat", BOATS_MAX)?)?,
-        origin: origin.to_owned(),
+        water: reflection(text, &mirror, force, &mut warnings)?,
+        boats: boats
+            .iter()
+            .enumerate()
+            .map(|(i, (section, raw))| boat(section, raw, i + 1))
+            .collect::<Result<_, _>>()?,
+        warnings,
     })
 }
 
-fn camera(table: &Table<'_>) -> Result<StillCamera, ScenarioError> {
-    table.only(&[
-        "eye_height_m",
-        "focal_35mm_mm",
-        "hfov_deg",
-        "focal_px",
-        "centre_px",
-        "radial",
-        "tangential",
-        "azimuth_deg",
-        "horizon",
-        "pitch_deg",
-        "roll_deg",
-    ])?;
+/// A point or two coefficients: a pair of numbers.
+struct NumberPair {
+    range: std::ops::RangeInclusive<f64>,
+    allowed: &'static str,
+}
+
+impl ValueRule for NumberPair {
+    type Raw = Vec<f64>;
+    type Value = DVec2;
+
+    fn check(&self, raw: &Vec<f64>) -> Option<DVec2> {
+        match raw[..] {
+            [x, y] if self.range.contains(&x) && self.range.contains(&y) => Some(DVec2::new(x, y)),
+            _ => None,
+        }
+    }
+
+    fn allowed(&self) -> String {
+        self.allowed.to_owned()
+    }
+}
+
+/// A point of the picture.
+const fn pixel(allowed: &'static str) -> NumberPair {
+    NumberPair { range: 0.0..=PIXEL_MAX, allowed }
+}
+
+/// Two coefficients of the lens.
+const fn coefficients() -> NumberPair {
+    NumberPair { range: -10.0..=10.0, allowed: "a pair of numbers, -10 to 10: [0.01, 0.0]" }
+}
+
+fn camera(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<StillCamera, TomlError> {
+    let text = section.text;
     let ways = [
-        ("focal_px", table.number("focal_px", 1.0..=1e6, "pixels")?.map(Focal::Pixels)),
-        (
-            "hfov_deg",
-            table.number("hfov_deg", 0.2..=150.0, "degrees")?.map(|d| Focal::Across(d.to_radians())),
-        ),
-        ("focal_35mm_mm", table.number("focal_35mm_mm", 5.0..=5000.0, "mm")?.map(Focal::Film)),
+        ("focal_px", &raw.focal_px, NumberWithin(1.0..=1e6, "pixels"), Focal::Pixels as fn(f64) -> Focal),
+        ("hfov_deg", &raw.hfov_deg, NumberWithin(0.2..=150.0, "degrees"), |deg| {
+            Focal::Across(deg.to_radians())
+        }),
+        ("focal_35mm_mm", &raw.focal_35mm_mm, NumberWithin(5.0..=5000.0, "mm"), Focal::Film),
     ];
-    let mut given = ways.into_iter().filter_map(|(key, focal)| Some((key, focal?)));
-    let (key, focal) = given.next().unwrap_or(("focal_px", Focal::OfPicture));
-    if let Some((other, _)) = given.next() {
-        return Err(table.error(other, format!("says the same as {key}; leave one of them out")));
+    let mut told: Option<(&str, Focal, TomlPlace)> = None;
+    for (key, value, rule, focal) in ways {
+        let (Some(number), Some(value)) = (text.given(value, rule)?, value) else { continue };
+        match told {
+            Some((first, ..)) => {
+                return Err(text.error(value, format!("says the same as {first}; leave one of them out")));
+            }
+            None => told = Some((key, focal(number), text.place(value))),
+        }
     }
-    let span = |key: &str| pair(table, key, -10.0..=10.0, "a pair of numbers, -10 to 10: [0.01, 0.0]");
-    let attitude = attitude(table)?;
-    let first = if matches!(attitude, Attitude::Horizon(_)) { "horizon" } else { "pitch_deg" };
+    let (focal, focal_at) = match told {
+        Some((_, focal, at)) => (focal, at),
+        None => (Focal::OfPicture, section.place("focal_px")),
+    };
+    let attitude = attitude(section, raw)?;
+    let attitude_at = match (&raw.horizon, &raw.pitch_deg) {
+        (Some(horizon), _) => text.place(horizon),
+        (None, Some(pitch)) => text.place(pitch),
+        (None, None) => section.place("horizon"),
+    };
     Ok(StillCamera {
-        eye_height_m: table.required_number("eye_height_m", 0.2..=500.0, "m")?,
+        eye_height_m: section.required("eye_height_m", &raw.eye_height_m, NumberWithin(0.2..=500.0, "m"))?,
         focal,
-        centre: pair(table, "centre_px", 0.0..=PIXEL_MAX, "a pair of pixels: [960, 540]")?,
-        radial: span("radial")?.unwrap_or(DVec2::ZERO),
-        tangential: span("tangential")?.unwrap_or(DVec2::ZERO),
-        azimuth: table.number("azimuth_deg", -360.0..=360.0, "degrees")?.unwrap_or(0.0).to_radians(),
+        centre: text.given(&raw.centre_px, pixel("a pair of pixels: [960, 540]"))?,
+        radial: text.given(&raw.radial, coefficients())?.unwrap_or(DVec2::ZERO),
+        tangential: text.given(&raw.tangential, coefficients())?.unwrap_or(DVec2::ZERO),
+        azimuth: text.given(&raw.azimuth_deg, ANGLE)?.unwrap_or(0.0).to_radians(),
         attitude,
-        focal_mark: table.mark(key),
-        attitude_mark: table.mark(first),
+        focal_at,
+        attitude_at,
     })
 }
 
-fn attitude(table: &Table<'_>) -> Result<Attitude, ScenarioError> {
+fn attitude(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<Attitude, TomlError> {
+    let text = section.text;
     let what = "two points of the horizon in pixels: [[100, 410], [1180, 404]]";
-    let points = table.pairs("horizon", [0.0..=PIXEL_MAX, 0.0..=PIXEL_MAX], what)?;
-    let angle = |key: &str| -> Result<Option<f64>, ScenarioError> {
-        Ok(table.number(key, -85.0..=85.0, "degrees")?.map(f64::to_radians))
+    let angle = |value: &Given<f64>| -> Result<Option<f64>, TomlError> {
+        Ok(text.given(value, NumberWithin(-85.0..=85.0, "degrees"))?.map(f64::to_radians))
     };
-    let (pitch, roll) = (angle("pitch_deg")?, angle("roll_deg")?);
-    match points.as_deref() {
-        Some(&[[ax, ay], [bx, by]]) => {
-            if let Some(key) = ["pitch_deg", "roll_deg"].into_iter().find(|key| table.has(key)) {
-                return Err(table.error(key, "follows from horizon; leave out it or that"));
-            }
-            Ok(Attitude::Horizon([DVec2::new(ax, ay), DVec2::new(bx, by)]))
+    let (pitch, roll) = (angle(&raw.pitch_deg)?, angle(&raw.roll_deg)?);
+    if let Some(horizon) = &raw.horizon {
+        let point = |value| text.needed(value, pixel(what));
+        let points = horizon.get_ref().iter().map(point).collect::<Result<Vec<_>, _>>()?;
+        if let Some(value) = raw.pitch_deg.as_ref().or(raw.roll_deg.as_ref()) {
+            return Err(text.error(value, "follows from horizon; leave out it or that"));
         }
-        Some(other) => Err(table.error("horizon", format!("has {} points; give {what}", other.len()))),
-        None => match pitch {
-            Some(pitch) => Ok(Attitude::Given { pitch, roll: roll.unwrap_or(0.0) }),
-            None => Err(table.missing("horizon", &format!("{what}, or pitch_deg and roll_deg"))),
-        },
+        return match points[..] {
+            [a, b] => Ok(Attitude::Horizon([a, b])),
+            _ => Err(text.refuse(horizon, what)),
+        };
+    }
+    match pitch {
+        Some(pitch) => Ok(Attitude::Given { pitch, roll: roll.unwrap_or(0.0) }),
+        None => Err(section.missing("horizon", &format!("{what}, or pitch_deg and roll_deg"))),
     }
 }
 
-fn boats(tables: &[Table<'_>]) -> Result<Vec<StillBoat>, ScenarioError> {
-    tables.iter().enumerate().map(|(index, table)| boat(index, table)).collect()
-}
-
-fn boat(index: usize, table: &Table<'_>) -> Result<StillBoat, ScenarioError> {
-    table.only(&["name", "model", "waterline_px", "range_m", "bearing_deg", "heading_deg", "speed_kn"])?;
-    let pixel = pair(table, "waterline_px", 0.0..=PIXEL_MAX, "a point of the water in pixels: [520, 470]")?;
-    let (key, at) = match pixel {
-        Some(pixel) => {
-            if let Some(key) = ["range_m", "bearing_deg"].into_iter().find(|key| table.has(key)) {
-                return Err(table.error(key, "follows from waterline_px; leave out it or that"));
-            }
-            ("waterline_px", Place::Pixel(pixel))
+fn boat(section: &TomlSection<'_>, raw: &RawStillBoat, number: usize) -> Result<StillBoat, TomlError> {
+    let text = section.text;
+    let range = NumberWithin(1.0..=RANGE_MAX_M, "m");
+    let (at, stands) = match (&raw.waterline_px, &raw.range_m, &raw.bearing_deg) {
+        (Some(_), Some(other), _) | (Some(_), None, Some(other)) => {
+            return Err(text.error(other, "follows from waterline_px; leave out it or that"));
         }
-        None if !table.has("range_m") && !table.has("bearing_deg") => {
+        (Some(value), None, None) => {
+            let rule = pixel("a point of the water in pixels: [520, 470]");
+            (Place::Pixel(text.needed(value, rule)?), text.place(value))
+        }
+        (None, None, None) => {
             let what = "a point of the water in pixels, or range_m and bearing_deg";
-            return Err(table.missing("waterline_px", what));
+            return Err(section.missing("waterline_px", what));
         }
-        None => {
-            let range_m = table.required_number("range_m", 1.0..=RANGE_MAX_M, "m")?;
-            let bearing = table.required_number("bearing_deg", -360.0..=360.0, "degrees")?;
-            ("range_m", Place::World(place(bearing.to_radians(), range_m)))
+        (None, value, bearing) => {
+            let range_m = section.required("range_m", value, range)?;
+            let bearing = section.required("bearing_deg", bearing, ANGLE)?;
+            let stands = value.as_ref().map_or_else(|| section.place("range_m"), |value| text.place(value));
+            (Place::World(place(bearing.to_radians(), range_m)), stands)
         }
+    };
+    let Some(model) = &raw.model else {
+        return Err(section.missing("model", "the name of a model or the path of a glTF or PNG file"));
     };
     Ok(StillBoat {
-        name: table.text("name")?.unwrap_or_else(|| format!("boat {}", index + 1)),
-        model: table.required_text("model", "the name of a model or the path of a glTF or PNG file")?,
+        name: text.given(&raw.name, PlainText)?.unwrap_or_else(|| format!("boat {number}")),
+        model: text.needed(model, PlainText)?,
         place: at,
-        heading: table.required_number("heading_deg", -360.0..=360.0, "degrees")?.to_radians(),
-        speed_m_s: table.number("speed_kn", 0.0..=100.0, "kn")?.unwrap_or(0.0) * M_S_PER_KN,
-        mark: table.mark(key),
-        key: format!("boat[{}].{key}", index + 1),
+        heading: section.required("heading_deg", &raw.heading_deg, ANGLE)?.to_radians(),
+        speed_m_s: text.given(&raw.speed_kn, NumberWithin(0.0..=100.0, "kn"))?.unwrap_or(0.0) * M_S_PER_KN,
+        stands,
     })
-}
-
-/// Two numbers in a list.
-fn pair(
-    table: &Table<'_>,
-    key: &str,
-    range: std::ops::RangeInclusive<f64>,
-    what: &str,
-) -> Result<Option<DVec2>, ScenarioError> {
-    let Some(numbers) = table.numbers(key, range, what)? else { return Ok(None) };
-    match numbers[..] {
-        [x, y] => Ok(Some(DVec2::new(x, y))),
-        _ => Err(table.error(key, format!("has {} numbers; give {what}", numbers.len()))),
-    }
 }

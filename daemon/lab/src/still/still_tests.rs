@@ -9,7 +9,7 @@ use bowwave_core::{
     water::ReflectionMethod,
 };
 
-fn parse(text: &str) -> Result<Still, ScenarioError> {
+fn parse(text: &str) -> Result<Still, TomlError> {
     Still::parse(text, "scene.toml")
 }
 
@@ -72,11 +72,17 @@ fn mistakes_are_named_by_line_and_column() {
         (format!("{PLAIN}[sea]\nsource = \"video\"\n"), "7:1: sea.source: unknown key; known are beaufort"),
         (PLAIN.replace("pitch_deg", "pitsch_deg"), "5:1: camera.pitsch_deg: unknown key"),
         (PLAIN.replace("pitch_deg = -2", ""), "camera.horizon: is missing"),
-        (PLAIN.replace("pitch_deg = -2", "horizon = [[1, 2]]"), "5:11: camera.horizon: has 1 points"),
+        (
+            PLAIN.replace("pitch_deg = -2", "horizon = [[1, 2]]"),
+            "5:11: camera.horizon: [[1, 2]] is not allowed; give two points",
+        ),
         (PLAIN.replace("pitch_deg = -2", "horizon = [[1, 2], [3]]"), "camera.horizon: [3] is not allowed"),
         (format!("{PLAIN}horizon = [[1, 2], [900, 4]]\n"), "camera.pitch_deg: follows from horizon"),
         (boat("heading_deg = 0"), "boat[1].waterline_px: is missing"),
-        (boat("waterline_px = [1, 2, 3]\nheading_deg = 0"), "8:16: boat[1].waterline_px: has 3 numbers"),
+        (
+            boat("waterline_px = [1, 2, 3]\nheading_deg = 0"),
+            "8:16: boat[1].waterline_px: [1, 2, 3] is not allowed; give a point of the water",
+        ),
         (boat("waterline_px = [1, 2]\nrange_m = 9\nheading_deg = 0"), "9:11: boat[1].range_m: follows from"),
         (
             boat("range_m = 1e9\nbearing_deg = 0\nheading_deg = 0"),
@@ -139,7 +145,7 @@ fn boats_of_a_series_move_and_methods_have_names() {
     for method in ReflectionMethod::ALL {
         assert_eq!(ReflectionMethod::of_name(method.name()), Some(method));
     }
-    assert_eq!(ReflectionMethod::of_name("full-as-printed"), Some(ReflectionMethod::FullAsPrinted));
+    assert_eq!(ReflectionMethod::of_name("full-as-published"), Some(ReflectionMethod::FullAsPrinted));
     assert_eq!(ReflectionMethod::of_name("none"), Some(ReflectionMethod::Off));
     assert_eq!(ReflectionMethod::of_name("nothing"), None);
 }

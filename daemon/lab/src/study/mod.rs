@@ -14,7 +14,7 @@ mod statistics;
 use std::{fs, path::Path};
 
 use anyhow::{Context, Result, bail};
-use bowwave::{outcome::Outcome, stdout};
+use bowwave::{loading::warn_of_former_names, outcome::Outcome, stdout};
 use bowwave_core::water::ReflectionMethod;
 use image::RgbImage;
 
@@ -35,7 +35,10 @@ pub fn run(arguments: &Study) -> Result<Outcome> {
 }
 
 fn make(arguments: &Study) -> Result<Outcome> {
-    let [first, second] = arguments.methods.as_ref().map_or(Ok(default_methods()), |m| match m.0[..] {
+    if let Some(methods) = &arguments.methods {
+        warn_of_former_names(&methods.warnings);
+    }
+    let [first, second] = arguments.methods.as_ref().map_or(Ok(default_methods()), |m| match m.list[..] {
         [a, b] => Ok([a, b]),
         ref other => {
             bail!("{} methods given; a study compares two: --methods full,mirror", other.len())

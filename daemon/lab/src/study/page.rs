@@ -43,6 +43,6 @@ mod tests {
         assert_eq!(data["orders"][1].as_array().map(Vec::len), Some(design.items.len()));
         assert_eq!(data["pictures"][3][0], "p004");
         // Nothing in it tells which pictures are real.
-        assert!(!page.contains("full_as_printed") && !page.contains("textured"));
+        assert!(!page.contains("full_as_published") && !page.contains("textured"));
     }
 }

@@ -73,7 +73,7 @@ struct Cells {
     #[arg(long, default_value_t = 1)]
     every: usize,
     /// The method that is judged
-    #[arg(long, default_value = "waves")]
+    #[arg(long, default_value = "baked")]
     ours: String,
     /// Folder for the table of all cells
     #[arg(long, value_name = "DIR", default_value = "target/precision/reflection")]

@@ -130,7 +130,7 @@ pub fn table(turns: usize) -> Result<String> {
     let at = Afloats::at;
     let three = [at(60.0), Afloats { right_m: 30.0, ..at(150.0) }, Afloats { right_m: -60.0, ..at(400.0) }];
     let mut text = format!(
-        "software Vulkan, {turns} turns; times in ms, middle of the turns; ratios to full_as_printed\n"
+        "software Vulkan, {turns} turns; times in ms, middle of the turns; ratios to full_as_published\n"
     );
     for (name, size, boats) in [
         ("one boat, 60 m", SIZES[0], &three[..1]),

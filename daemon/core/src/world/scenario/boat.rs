@@ -1,13 +1,22 @@
 //! The scenario's boats.
 
-use super::{BoatSpec, ScenarioError, Side, place, table::Table};
-use crate::world::boats::{Arrival, Course, CourseError};
+use glam::DVec2;
+use serde::Deserialize;
 
-/// m/s in a knot.
-const M_S_PER_KN: f64 = 1852.0 / 3600.0;
+use super::{
+    BoatSpec, Side, place,
+    read::{ANGLE, M_S_PER_KN},
+};
+use crate::{
+    text::toml::{
+        Given, Needed, NumberWithin, OneOf, PlainText, Spanned, TomlError, TomlSection, ValueRule, YesNo,
+    },
+    world::boats::{Arrival, Course, CourseError},
+};
 
+/// Kind of a boat's course.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum CourseKind {
     Still,
     Straight,
     Weave,
@@ -15,18 +24,15 @@ enum Kind {
     Closing,
 }
 
-const KINDS: [(&str, Kind); 5] = [
-    ("still", Kind::Still),
-    ("straight", Kind::Straight),
-    ("weave", Kind::Weave),
-    ("waypoints", Kind::Waypoints),
-    ("closing", Kind::Closing),
+const KINDS: [(&str, CourseKind); 5] = [
+    ("still", CourseKind::Still),
+    ("straight", CourseKind::Straight),
+    ("weave", CourseKind::Weave),
+    ("waypoints", CourseKind::Waypoints),
+    ("closing", CourseKind::Closing),
 ];
 
-/// Keys of every boat.
-const COMMON: [&str; 6] = ["name", "model", "side", "course", "range_m", "bearing_deg"];
-
-impl Kind {
+impl CourseKind {
     /// Keys of the boats on such a course besides those of all boats.
     const fn keys(self) -> &'static [&'static str] {
         match self {
@@ -37,90 +43,164 @@ impl Kind {
             Self::Closing => &["heading_deg", "speed_kn", "stop_m", "arrival"],
         }
     }
+
+    fn name(self) -> &'static str {
+        KINDS.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
 }
 
-pub(super) fn boats(tables: &[Table<'_>]) -> Result<Vec<BoatSpec>, ScenarioError> {
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct RawBoat {
+    name: Given<String>,
+    model: Given<String>,
+    side: Given<String>,
+    course: Given<String>,
+    range_m: Given<f64>,
+    bearing_deg: Given<f64>,
+    heading_deg: Given<f64>,
+    speed_kn: Given<f64>,
+    weave_amplitude_m: Given<f64>,
+    weave_period_s: Given<f64>,
+    waypoints: Option<Spanned<Vec<Needed<Vec<f64>>>>>,
+    repeat: Given<bool>,
+    stop_m: Given<f64>,
+    arrival: Given<String>,
+}
+
+impl RawBoat {
+    /// The keys that some courses have, each with its place where it is there.
+    fn of_courses(&self) -> [(&'static str, Option<Spanned<()>>); 8] {
+        fn there<T>(value: &Option<Spanned<T>>) -> Option<Spanned<()>> {
+            value.as_ref().map(|value| Spanned::new(value.span(), ()))
+        }
+        [
+            ("heading_deg", there(&self.heading_deg)),
+            ("speed_kn", there(&self.speed_kn)),
+            ("weave_amplitude_m", there(&self.weave_amplitude_m)),
+            ("weave_period_s", there(&self.weave_period_s)),
+            ("waypoints", there(&self.waypoints)),
+            ("repeat", there(&self.repeat)),
+            ("stop_m", there(&self.stop_m)),
+            ("arrival", there(&self.arrival)),
+        ]
+    }
+}
+
+pub(super) fn boats(tables: Vec<(TomlSection<'_>, RawBoat)>) -> Result<Vec<BoatSpec>, TomlError> {
     let mut boats: Vec<BoatSpec> = Vec::with_capacity(tables.len());
-    for table in tables {
-        let boat = boat(table)?;
-        if let Some(other) = boats.iter().position(|b| b.name == boat.name) {
+    for (number, (section, raw)) in tables.iter().enumerate() {
+        let boat = boat(section, raw, number + 1)?;
+        if let (Some(other), Some(name)) = (boats.iter().position(|b| b.name == boat.name), &raw.name) {
             let problem =
                 format!("\"{}\" is the name of boat[{}] too; give each boat its own", boat.name, other + 1);
-            return Err(table.error("name", problem));
+            return Err(section.text.error(name, problem));
         }
         boats.push(boat);
     }
     Ok(boats)
 }
 
-fn boat(table: &Table<'_>) -> Result<BoatSpec, ScenarioError> {
-    // First of all any key that no course knows, so that a slip of the pen is not taken for a missing key.
-    let all: Vec<&str> = KINDS.iter().flat_map(|(_, kind)| kind.keys()).chain(&COMMON).copied().collect();
-    let mut known: Vec<&str> = COMMON.to_vec();
-    for key in all {
-        if !known.contains(&key) {
-            known.push(key);
-        }
-    }
-    table.only(&known)?;
-    let kind = table.required_choice("course", &KINDS)?;
-    for key in known {
-        if table.has(key) && !COMMON.contains(&key) && !kind.keys().contains(&key) {
-            let name = KINDS.iter().find(|(_, k)| *k == kind).map_or("", |(name, _)| name);
+fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatSpec, TomlError> {
+    let text = section.text;
+    let kind = section.required("course", &raw.course, OneOf(&KINDS))?;
+    for (key, value) in raw.of_courses() {
+        if let Some(value) = value.filter(|_| !kind.keys().contains(&key)) {
             let problem = format!(
-                "has no meaning on a {name} course; leave it out (such a boat has {})",
+                "has no meaning on a {} course; leave it out (such a boat has {})",
+                kind.name(),
                 kind.keys().join(", ")
             );
-            return Err(table.error(key, problem));
+            return Err(text.error(&value, problem));
         }
     }
     let sides = [("hostile", Side::Hostile), ("neutral", Side::Neutral)];
+    let named = |key, value: &Given<String>, what| match value {
+        Some(value) => text.needed(value, PlainText),
+        None => Err(section.missing(key, what)),
+    };
+    let course = course(section, raw, kind)?;
+    let range = raw.range_m.as_ref();
+    let stands = range.map_or_else(|| section.place("range_m"), |range| text.place(range));
     Ok(BoatSpec {
-        name: table.required_text("name", "the boat a name of its own")?,
-        model: table.required_text("model", "the name of a model or the path of a glTF or PNG file")?,
-        side: table.choice("side", &sides)?.unwrap_or(Side::Hostile),
-        course: course(table, kind)?,
-        mark: table.mark("range_m"),
+        name: named("name", &raw.name, "the boat a name of its own")?,
+        model: named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?,
+        side: text.given(&raw.side, OneOf(&sides))?.unwrap_or(Side::Hostile),
+        course,
+        stands: stands.of_key(format!("boat[{number}]")),
     })
 }
 
-fn course(table: &Table<'_>, kind: Kind) -> Result<Course, ScenarioError> {
-    let degrees = |key: &str| -> Result<Option<f64>, ScenarioError> {
-        Ok(table.number(key, -360.0..=360.0, "degrees")?.map(f64::to_radians))
-    };
-    let range_m = table.required_number("range_m", 1.0..=20_000.0, "m")?;
-    let bearing = degrees("bearing_deg")?
-        .ok_or_else(|| table.missing("bearing_deg", "a number, -360 to 360 degrees"))?;
+/// A point of a course by bearing and range.
+struct Waypoint;
+
+impl ValueRule for Waypoint {
+    type Raw = Vec<f64>;
+    type Value = DVec2;
+
+    fn check(&self, raw: &Vec<f64>) -> Option<DVec2> {
+        match raw[..] {
+            [bearing, range_m] if ANGLE.0.contains(&bearing) && RANGE.0.contains(&range_m) => {
+                Some(place(bearing.to_radians(), range_m))
+            }
+            _ => None,
+        }
+    }
+
+    fn allowed(&self) -> String {
+        "pairs [bearing_deg, range_m] within -360 to 360 degrees and 1 to 20000 m".to_owned()
+    }
+}
+
+/// Distance of a boat or a point of its course from the camera.
+const RANGE: NumberWithin = NumberWithin(1.0..=20_000.0, "m");
+
+fn course(section: &TomlSection<'_>, raw: &RawBoat, kind: CourseKind) -> Result<Course, TomlError> {
+    let text = section.text;
+    let range_m = section.required("range_m", &raw.range_m, RANGE)?;
+    let bearing = section.required("bearing_deg", &raw.bearing_deg, ANGLE)?.to_radians();
     let start = place(bearing, range_m);
-    let heading = degrees("heading_deg")?;
-    let required_heading =
-        || heading.ok_or_else(|| table.missing("heading_deg", "a number, -360 to 360 degrees"));
-    let speed = || Ok(table.required_number("speed_kn", 0.1..=100.0, "kn")? * M_S_PER_KN);
+    let heading = text.given(&raw.heading_deg, ANGLE)?.map(f64::to_radians);
+    let required_heading = || heading.ok_or_else(|| section.missing("heading_deg", &ANGLE.allowed()));
+    let speed = || {
+        let speed_kn = section.required("speed_kn", &raw.speed_kn, NumberWithin(0.1..=100.0, "kn"))?;
+        Ok(speed_kn * M_S_PER_KN)
+    };
     let built = match kind {
-        Kind::Still => Course::still(start, heading.unwrap_or(0.0)),
-        Kind::Straight => Course::straight(start, required_heading()?, speed()?),
-        Kind::Weave => {
-            let amplitude_m = table.required_number("weave_amplitude_m", 0.0..=500.0, "m")?;
-            let period_s = table.required_number("weave_period_s", 1.0..=600.0, "s")?;
+        CourseKind::Still => Course::still(start, heading.unwrap_or(0.0)),
+        CourseKind::Straight => Course::straight(start, required_heading()?, speed()?),
+        CourseKind::Weave => {
+            let amplitude = NumberWithin(0.0..=500.0, "m");
+            let amplitude_m = section.required("weave_amplitude_m", &raw.weave_amplitude_m, amplitude)?;
+            let period = NumberWithin(1.0..=600.0, "s");
+            let period_s = section.required("weave_period_s", &raw.weave_period_s, period)?;
             Course::weave(start, required_heading()?, speed()?, amplitude_m, period_s)
         }
-        Kind::Waypoints => {
-            let what = "pairs [bearing_deg, range_m] within -360 to 360 degrees and 1 to 20000 m";
-            let pairs = table
-                .pairs("waypoints", [-360.0..=360.0, 1.0..=20_000.0], what)?
-                .ok_or_else(|| table.missing("waypoints", what))?;
-            let points: Vec<_> = pairs.into_iter().map(|[b, r]| place(b.to_radians(), r)).collect();
-            Course::waypoints(start, &points, speed()?, table.boolean("repeat")?.unwrap_or(false))
+        CourseKind::Waypoints => {
+            let points = raw.waypoints.as_ref();
+            let points = points.ok_or_else(|| section.missing("waypoints", &Waypoint.allowed()))?.get_ref();
+            let points =
+                points.iter().map(|point| text.needed(point, Waypoint)).collect::<Result<Vec<_>, _>>()?;
+            let repeat = text.given(&raw.repeat, YesNo)?.unwrap_or(false);
+            Course::waypoints(start, &points, speed()?, repeat)
         }
-        Kind::Closing => {
-            let stop_m = table.number("stop_m", 5.0..=5000.0, "m")?.unwrap_or(50.0);
+        CourseKind::Closing => {
+            let stop_m = text.given(&raw.stop_m, NumberWithin(5.0..=5000.0, "m"))?.unwrap_or(50.0);
             let arrivals = [("stop", Arrival::Stop), ("circle", Arrival::Circle)];
-            let arrival = table.choice("arrival", &arrivals)?.unwrap_or(Arrival::Stop);
+            let arrival = text.given(&raw.arrival, OneOf(&arrivals))?.unwrap_or(Arrival::Stop);
             let inward = bearing + std::f64::consts::PI;
             Course::closing(start, heading.unwrap_or(inward), speed()?, stop_m, arrival)
         }
     };
-    built.map_err(|e| table.error(blamed(&e), e.to_string()))
+    built.map_err(|e| {
+        let key = blamed(&e);
+        let value = raw.of_courses().into_iter().find(|(name, _)| *name == key).and_then(|(_, value)| value);
+        let value = value.or_else(|| match key {
+            "range_m" => raw.range_m.as_ref().map(|range| Spanned::new(range.span(), ())),
+            _ => raw.course.as_ref().map(|course| Spanned::new(course.span(), ())),
+        });
+        value.map_or_else(|| section.error(key, &e), |value| text.error(&value, &e))
+    })
 }
 
 /// The key that a course's error is about.

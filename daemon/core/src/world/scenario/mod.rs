@@ -1,15 +1,15 @@
-//! What the instructor chooses: sea, light, weapon and boats. TOML text in, checked values out.
+//! The instructor's choice: sea, light, weapon and boats. TOML text in, checked values out.
 //!
 //! Degrees, knots and minutes stay outside: everything here is in radians, metres and seconds.
 
 mod boat;
 pub mod read;
 mod sun;
-pub mod table;
 
 use glam::{DVec2, DVec3};
 
 use crate::{
+    text::toml::{TomlError, TomlPlace},
     water::Water,
     world::{
         boats::Course,
@@ -17,7 +17,6 @@ use crate::{
         waves::{WaveField, WaveSpec},
     },
 };
-use table::Mark;
 
 /// Text of the scenario that is played when none is named: three boats, all within a northward camera's sweep.
 pub const DEFAULT: &str = include_str!("../../../scenarios/default.toml");
@@ -63,8 +62,8 @@ pub struct Scenario {
     pub weapon: WeaponSpec,
     /// The boats.
     pub boats: Vec<BoatSpec>,
-    /// What errors call the text.
-    origin: String,
+    /// Former names that the text uses, each with its place and the new name.
+    pub warnings: Vec<String>,
 }
 
 /// The training weapon.
@@ -74,7 +73,7 @@ pub struct WeaponSpec {
     pub rounds_per_minute: f64,
     /// Rounds in the belt.
     pub belt: u32,
-    /// What it fires.
+    /// Its round.
     pub projectile: Projectile,
     /// Scatter, standard deviation along each of two axes, milliradians.
     pub dispersion_mrad: f64,
@@ -113,35 +112,19 @@ impl Side {
 pub struct BoatSpec {
     /// Its name, different from all others.
     pub name: String,
-    /// What it looks like: the name of a model or a path to a file, for the caller to resolve.
+    /// Its looks: the name of a model or a path to a file, for the caller to resolve.
     pub model: String,
     /// Whom it belongs to.
     pub side: Side,
     /// Where it goes.
     pub course: Course,
     /// Where the text places it.
-    mark: Mark,
-}
-
-/// Why a text is no scenario.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{origin}:{line}:{column}: {}{problem}", if key.is_empty() { String::new() } else { format!("{key}: ") })]
-pub struct ScenarioError {
-    /// What the text is called.
-    pub origin: String,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column in characters, from 1.
-    pub column: usize,
-    /// Path of the key, as `boat[2].speed_kn`; empty where the text is no TOML.
-    pub key: String,
-    /// What is wrong, with the value, and what is allowed.
-    pub problem: String,
+    stands: TomlPlace,
 }
 
 impl Scenario {
-    /// Checks a scenario's text. `origin` is what errors call it.
-    pub fn parse(text: &str, origin: &str) -> Result<Self, ScenarioError> {
+    /// Checks a scenario's text. `origin` is its name in errors.
+    pub fn parse(text: &str, origin: &str) -> Result<Self, TomlError> {
         read::scenario(text, origin)
     }
 
@@ -152,9 +135,9 @@ impl Scenario {
 
     /// Whether every boat stays clear of the camera on its whole course. `radii_m` holds for each boat, in order, the radius
     /// about its origin that holds its model; boats without one are not checked.
-    pub fn check_clearance(&self, radii_m: &[f64]) -> Result<(), ScenarioError> {
+    pub fn check_clearance(&self, radii_m: &[f64]) -> Result<(), TomlError> {
         let until_s = self.duration_s.unwrap_or(ENDLESS_S);
-        for (index, (boat, &radius_m)) in self.boats.iter().zip(radii_m).enumerate() {
+        for (boat, &radius_m) in self.boats.iter().zip(radii_m) {
             let clear_m = radius_m + CAMERA_CLEAR_M;
             let Some(time_s) = boat.course.first_within(clear_m, until_s) else { continue };
             let when =
@@ -164,7 +147,7 @@ impl Scenario {
                  start it farther off or change its course",
                 boat.name, boat.model
             );
-            return Err(boat.mark.error(&self.origin, &format!("boat[{}]", index + 1), problem));
+            return Err(boat.stands.error(problem));
         }
         Ok(())
     }

@@ -1,14 +1,19 @@
-//! The scenario's tables other than the boats.
+//! The scenario's tables other than the boats. Those of sea, light and reflection serve other texts with boats as well.
 
 use glam::DVec3;
-use toml::{Spanned, de::DeTable};
+use serde::Deserialize;
 
 use super::{
-    Scenario, ScenarioError, WeaponSpec, boat, place, sun,
-    table::{Mark, Source, Table},
+    Scenario, WeaponSpec,
+    boat::{self, RawBoat},
+    place, sun,
 };
 use crate::{
     sea::BeaufortForce,
+    text::toml::{
+        BareOrQuoted, Given, Loose, NumberWithin, OneOf, PlainText, Spanned, TomlError, TomlSection,
+        TomlText, ValueRule, WholeWithin,
+    },
     water::{ReflectionMethod, ShadowLevel, Water},
     world::{
         gunnery::Projectile,
@@ -18,85 +23,202 @@ use crate::{
 
 /// Most boats of a scenario.
 const BOATS_MAX: usize = 64;
+/// m/s in a knot.
+pub const M_S_PER_KN: f64 = 1852.0 / 3600.0;
+/// A seed of chance.
+pub const SEED: WholeWithin<i64> = WholeWithin(0..=i64::MAX);
+/// An angle clockwise, in either direction.
+pub const ANGLE: NumberWithin = NumberWithin(-360.0..=360.0, "degrees");
 
-pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, ScenarioError> {
-    let document = document(text, origin)?;
-    let root = Table::root(Source { text, origin }, &document);
-    root.only(&["name", "seed", "duration_s", "sea", "mount", "light", "reflection", "weapon", "boat"])?;
-    let sea_table = root.table("sea")?;
-    let (force, waves) = sea(&sea_table, &["source"])?;
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawScenario {
+    name: Given<String>,
+    seed: Given<i64>,
+    duration_s: Given<f64>,
+    sea: Option<Spanned<RawSea>>,
+    mount: Option<Spanned<RawMount>>,
+    light: Option<Spanned<LightKeys>>,
+    reflection: Option<Spanned<ReflectionKeys>>,
+    weapon: Option<Spanned<RawWeapon>>,
+    boat: Vec<Spanned<RawBoat>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawSea {
+    beaufort: Given<i64>,
+    wind_from_deg: Given<f64>,
+    significant_wave_height_m: Given<f64>,
+    peak_period_s: Given<f64>,
+    source: Given<String>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawMount {
+    eye_height_m: Given<f64>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawWeapon {
+    rounds_per_minute: Given<f64>,
+    belt: Given<i64>,
+    muzzle_velocity_m_s: Given<f64>,
+    ballistic_coefficient_g7_lb_in2: Given<f64>,
+    dispersion_mrad: Given<f64>,
+    tracer_every: Given<i64>,
+}
+
+/// Keys of a table `[sea]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SeaKeys {
+    /// Wind force.
+    pub beaufort: Given<i64>,
+    /// Where the wind comes from, degrees clockwise from north.
+    pub wind_from_deg: Given<f64>,
+    /// Significant wave height, metres; of the wind force without it.
+    pub significant_wave_height_m: Given<f64>,
+    /// Period of the highest waves, seconds; goes with the height.
+    pub peak_period_s: Given<f64>,
+}
+
+/// Keys of a table `[light]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct LightKeys {
+    /// Where the sun stands, degrees clockwise from north.
+    pub sun_azimuth_deg: Given<f64>,
+    /// How high it stands, degrees.
+    pub sun_elevation_deg: Given<f64>,
+    /// Latitude, degrees north.
+    pub latitude_deg: Given<f64>,
+    /// Longitude, degrees east.
+    pub longitude_deg: Given<f64>,
+    /// Date and time, UTC.
+    pub utc: Given<BareOrQuoted>,
+    /// Meteorological visibility, kilometres.
+    pub visibility_km: Given<f64>,
+}
+
+/// Keys of a table `[reflection]`.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ReflectionKeys {
+    /// Name of the method.
+    pub method: Given<String>,
+    /// How strong the shadow is, 0 to 2.
+    pub shadow_level: Given<i64>,
+}
+
+pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> {
+    let text = TomlText::new(text, origin)?;
+    let (raw, mut warnings) = text.read::<RawScenario>(&[])?;
+    let (section, keys) = text.section("sea", raw.sea);
+    let RawSea { beaufort, wind_from_deg, significant_wave_height_m, peak_period_s, source } = keys;
+    let keys = SeaKeys { beaufort, wind_from_deg, significant_wave_height_m, peak_period_s };
+    let (force, waves) = sea(&section, &keys)?;
     let sources = [("scenario", false), ("video", true)];
-    let mount = root.table("mount")?;
-    mount.only(&["eye_height_m"])?;
-    let (sun_direction, visibility_m) = light(&root.table("light")?, &[])?;
-    let water = reflection(&root.table("reflection")?, force)?;
-    let boats = boat::boats(&root.tables("boat", BOATS_MAX)?)?;
+    let sea_from_video = text.given(&source, OneOf(&sources))?.unwrap_or(false);
+    let (_, mount) = text.section("mount", raw.mount);
+    let (section, keys) = text.section("light", raw.light);
+    let (sun_direction, visibility_m) = light(&section, &keys)?;
+    let (_, keys) = text.section("reflection", raw.reflection);
+    let water = reflection(text, &keys, force, &mut warnings)?;
+    let (section, keys) = text.section("weapon", raw.weapon);
+    let weapon = weapon(&section, &keys)?;
+    let boats = boat::boats(text.sections("boat", raw.boat, BOATS_MAX)?)?;
     Ok(Scenario {
-        name: root.text("name")?.unwrap_or_else(|| "unnamed".to_owned()),
-        seed: root.integer("seed", 0..=i64::MAX)?.map_or(1, i64::unsigned_abs),
-        duration_s: root.number("duration_s", 0.1..=86_400.0, "s")?,
+        name: text.given(&raw.name, PlainText)?.unwrap_or_else(|| "unnamed".to_owned()),
+        seed: text.given(&raw.seed, SEED)?.map_or(1, i64::unsigned_abs),
+        duration_s: text.given(&raw.duration_s, NumberWithin(0.1..=86_400.0, "s"))?,
         waves,
-        sea_from_video: sea_table.choice("source", &sources)?.unwrap_or(false),
+        sea_from_video,
         wind: -place(waves.wind_from, force.wind_mean_m_s()).extend(0.0),
-        eye_height_m: mount.number("eye_height_m", 0.5..=100.0, "m")?.unwrap_or(8.0),
+        eye_height_m: text.given(&mount.eye_height_m, NumberWithin(0.5..=100.0, "m"))?.unwrap_or(8.0),
         sun_direction,
         visibility_m,
         water,
-        weapon: weapon(&root.table("weapon")?)?,
+        weapon,
         boats,
-        origin: origin.to_owned(),
+        warnings,
     })
 }
 
-/// The text as TOML.
-pub fn document<'a>(text: &'a str, origin: &str) -> Result<Spanned<DeTable<'a>>, ScenarioError> {
-    DeTable::parse(text).map_err(|e| {
-        let place = Mark::at(text, e.span().map_or(0, |span| span.start));
-        place.error(origin, "", e.message().to_owned())
-    })
-}
-
-/// The table `[sea]`, in which the keys `more` are the caller's.
-pub fn sea(table: &Table<'_>, more: &[&str]) -> Result<(BeaufortForce, WaveSpec), ScenarioError> {
-    let keys = ["beaufort", "wind_from_deg", "significant_wave_height_m", "peak_period_s"];
-    table.only(&[&keys, more].concat())?;
-    let number = table.integer("beaufort", 0..=12)?.unwrap_or(2);
-    let force = u8::try_from(number)
-        .ok()
-        .and_then(BeaufortForce::new)
-        .ok_or_else(|| table.error("beaufort", "is beyond the scale"))?;
-    let wind_from = table.number("wind_from_deg", -360.0..=360.0, "degrees")?.unwrap_or(250.0).to_radians();
-    let height = table.number("significant_wave_height_m", 0.0..=20.0, "m")?;
-    let period = table.number("peak_period_s", 0.5..=30.0, "s")?;
-    let spectrum = match (height, period) {
-        (None, None) => Spectrum::of_force(force),
-        // The measured sea rarely is a fully arisen one: the mean peak enhancement of JONSWAP.
-        (Some(height), Some(period)) => Spectrum::jonswap(height, period, 3.3)
-            .ok_or_else(|| table.error("significant_wave_height_m", "makes no sea with that period"))?,
-        (Some(_), None) => {
-            return Err(table.missing("peak_period_s", "it together with significant_wave_height_m"));
+/// Wind force and waves of the table `[sea]`.
+///
+/// # Errors
+/// Names the value that is not allowed, or the key that is missing.
+pub fn sea(section: &TomlSection<'_>, keys: &SeaKeys) -> Result<(BeaufortForce, WaveSpec), TomlError> {
+    let text = section.text;
+    let force = text.given(&keys.beaufort, WholeWithin(0..=12u8))?.unwrap_or(2);
+    let force = BeaufortForce::new(force).ok_or_else(|| section.error("beaufort", "is beyond the scale"))?;
+    let wind_from = text.given(&keys.wind_from_deg, ANGLE)?.unwrap_or(250.0).to_radians();
+    let height = text.given(&keys.significant_wave_height_m, NumberWithin(0.0..=20.0, "m"))?;
+    let period = text.given(&keys.peak_period_s, NumberWithin(0.5..=30.0, "s"))?;
+    let spectrum = match (height, period, &keys.significant_wave_height_m) {
+        (Some(height), Some(period), Some(value)) => {
+            // The measured sea rarely is a fully arisen one: the mean peak enhancement of JONSWAP.
+            let spectrum = Spectrum::jonswap(height, period, 3.3);
+            spectrum.ok_or_else(|| text.error(value, "makes no sea with that period"))?
         }
-        (None, Some(_)) => {
-            return Err(table.missing("significant_wave_height_m", "it together with peak_period_s"));
+        (Some(_), ..) => {
+            return Err(section.missing("peak_period_s", "it together with significant_wave_height_m"));
         }
+        (None, Some(_), _) => {
+            return Err(section.missing("significant_wave_height_m", "it together with peak_period_s"));
+        }
+        (None, None, _) => Spectrum::of_force(force),
     };
     Ok((force, WaveSpec { spectrum, wind_from }))
 }
 
-/// The table `[light]`, in which the keys `more` are the caller's: the unit vector towards the sun, world, and the meteorological
-/// visibility, metres.
-pub fn light(table: &Table<'_>, more: &[&str]) -> Result<(DVec3, f64), ScenarioError> {
-    table.only(&[&sun::KEYS, more, &["visibility_km"]].concat())?;
-    let visibility_km = table.number("visibility_km", 0.05..=200.0, "km")?.unwrap_or(20.0);
-    Ok((sun::direction(table)?, 1000.0 * visibility_km))
+/// The unit vector towards the sun, world, and the meteorological visibility, metres, of the table `[light]`.
+///
+/// # Errors
+/// As [`sea`].
+pub fn light(section: &TomlSection<'_>, keys: &LightKeys) -> Result<(DVec3, f64), TomlError> {
+    let visibility_km =
+        section.text.given(&keys.visibility_km, NumberWithin(0.05..=200.0, "km"))?.unwrap_or(20.0);
+    Ok((sun::direction(section, keys)?, 1000.0 * visibility_km))
 }
 
-/// The table `[reflection]`.
-pub fn reflection(table: &Table<'_>, force: BeaufortForce) -> Result<Water, ScenarioError> {
-    table.only(&["method", "shadow_level"])?;
-    let methods = ReflectionMethod::ALL.map(|method| (method.name(), method));
-    let method = table.choice("method", &methods)?.unwrap_or(ReflectionMethod::Waves);
-    let shadow = match table.integer("shadow_level", 0..=2)? {
+/// The name of a reflection method, or a former name.
+struct MethodName;
+
+impl ValueRule for MethodName {
+    type Raw = String;
+    type Value = ReflectionMethod;
+
+    fn check(&self, raw: &String) -> Option<ReflectionMethod> {
+        ReflectionMethod::of_name(raw)
+    }
+
+    fn allowed(&self) -> String {
+        OneOf(&ReflectionMethod::ALL.map(|method| (method.name(), method))).allowed()
+    }
+}
+
+/// The table `[reflection]`; a former name of a method is warned of.
+///
+/// # Errors
+/// As [`sea`].
+pub fn reflection(
+    text: TomlText<'_>,
+    keys: &ReflectionKeys,
+    force: BeaufortForce,
+    warnings: &mut Vec<String>,
+) -> Result<Water, TomlError> {
+    let method = text.given(&keys.method, MethodName)?.unwrap_or(ReflectionMethod::Waves);
+    if let Some(value) = &keys.method
+        && let Loose::Fits(name) = value.get_ref()
+        && let Some(warning) = ReflectionMethod::warning(name)
+    {
+        warnings.push(text.error(value, warning).to_string());
+    }
+    let shadow = match text.given(&keys.shadow_level, WholeWithin(0..=2))? {
         Some(0) => ShadowLevel::None,
         Some(2) => ShadowLevel::Strong,
         _ => ShadowLevel::Gradual,
@@ -104,29 +226,26 @@ pub fn reflection(table: &Table<'_>, force: BeaufortForce) -> Result<Water, Scen
     Ok(Water { method, force, shadow })
 }
 
-fn weapon(table: &Table<'_>) -> Result<WeaponSpec, ScenarioError> {
-    table.only(&[
-        "rounds_per_minute",
-        "belt",
-        "muzzle_velocity_m_s",
-        "ballistic_coefficient_g7_lb_in2",
-        "dispersion_mrad",
-        "tracer_every",
-    ])?;
-    let velocity = table.number("muzzle_velocity_m_s", 50.0..=2000.0, "m/s")?.unwrap_or(890.0);
-    let coefficient = table.number("ballistic_coefficient_g7_lb_in2", 0.05..=2.0, "lb/in^2")?.unwrap_or(0.33);
+fn weapon(section: &TomlSection<'_>, keys: &RawWeapon) -> Result<WeaponSpec, TomlError> {
+    let text = section.text;
+    let velocity =
+        text.given(&keys.muzzle_velocity_m_s, NumberWithin(50.0..=2000.0, "m/s"))?.unwrap_or(890.0);
+    let coefficient = text
+        .given(&keys.ballistic_coefficient_g7_lb_in2, NumberWithin(0.05..=2.0, "lb/in^2"))?
+        .unwrap_or(0.33);
     let projectile = Projectile::new(coefficient, velocity).ok_or_else(|| {
-        table.error("muzzle_velocity_m_s", "makes no round with that ballistic coefficient")
+        let problem =
+            "makes no round: muzzle_velocity_m_s and ballistic_coefficient_g7_lb_in2 do not go together";
+        section.error("muzzle_velocity_m_s", problem)
     })?;
-    let whole = |key: &str, max: i64, default: u32| -> Result<u32, ScenarioError> {
-        Ok(table.integer(key, 0..=max)?.and_then(|n| u32::try_from(n).ok()).unwrap_or(default))
-    };
-    let tracer_every = whole("tracer_every", 1000, 5)?;
+    let tracer_every = text.given(&keys.tracer_every, WholeWithin(0..=1000))?.unwrap_or(5);
     Ok(WeaponSpec {
-        rounds_per_minute: table.number("rounds_per_minute", 1.0..=6000.0, "a minute")?.unwrap_or(500.0),
-        belt: whole("belt", 100_000, 100)?,
+        rounds_per_minute: text
+            .given(&keys.rounds_per_minute, NumberWithin(1.0..=6000.0, "a minute"))?
+            .unwrap_or(500.0),
+        belt: text.given(&keys.belt, WholeWithin(0..=100_000))?.unwrap_or(100),
         projectile,
-        dispersion_mrad: table.number("dispersion_mrad", 0.0..=50.0, "mrad")?.unwrap_or(0.6),
+        dispersion_mrad: text.given(&keys.dispersion_mrad, NumberWithin(0.0..=50.0, "mrad"))?.unwrap_or(0.6),
         tracer_every: (tracer_every > 0).then_some(tracer_every),
     })
 }

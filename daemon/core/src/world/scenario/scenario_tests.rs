@@ -6,7 +6,7 @@ use crate::{
     world::boats::Damage,
 };
 
-fn parse(text: &str) -> Result<Scenario, ScenarioError> {
+fn parse(text: &str) -> Result<Scenario, TomlError> {
     Scenario::parse(text, "test.toml")
 }
 
@@ -114,6 +114,27 @@ fn the_sea_is_measured_only_where_that_is_asked_for() {
 }
 
 #[test]
+fn former_names_of_methods_are_read_with_a_warning_that_names_the_new_one() {
+    for (former, new) in [
+        ("waves", "baked"),
+        ("full_as_printed", "full_as_published"),
+        ("physics_as_printed", "physics_as_published"),
+    ] {
+        let read = |name: &str| parse(&format!("[reflection]\nmethod = \"{name}\"\n")).expect("valid");
+        let scenario = read(former);
+        assert_eq!(scenario.water, read(new).water);
+        assert_eq!(scenario.water.method.name(), new);
+        let said = format!("test.toml:2:10: reflection.method: \"{former}\" is now called \"{new}\"");
+        assert!(
+            scenario.warnings.len() == 1 && scenario.warnings[0].starts_with(&said),
+            "{:?}",
+            scenario.warnings
+        );
+        assert_eq!(read(new).warnings, [""; 0]);
+    }
+}
+
+#[test]
 fn tracers_are_every_nth_round() {
     let tracers = |text: &str| -> Vec<u64> {
         let weapon = parse(text).expect("valid").weapon;
@@ -156,7 +177,7 @@ fn mistakes_are_refused_with_place_key_value_and_what_is_allowed() {
         ("[light]\nlatitude_deg = 54\nsun_azimuth_deg = 3", "light.sun_azimuth_deg: follows from"),
         (
             "[reflection]\nmethod = \"magic\"",
-            "reflection.method: \"magic\" is not allowed; give one of \"off\", \"mirror\", \"full\", \"full_as_printed\", \"physics\", \"physics_as_printed\", \"waves\"",
+            "reflection.method: \"magic\" is not allowed; give one of \"off\", \"mirror\", \"full\", \"full_as_published\", \"physics\", \"physics_as_published\", \"baked\"",
         ),
         (
             "[reflection]\nshadow_level = 3",

@@ -4,38 +4,35 @@ use glam::DVec3;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t, time::JulianDate};
 use toml::value::{Datetime, Offset};
 
-use super::{ScenarioError, table::Table};
+use super::read::{ANGLE, LightKeys};
+use crate::text::toml::{DateAndTime, NumberWithin, TomlError, TomlSection};
 
 /// Sun where the text names none: high enough for plain light, to the south-west.
 const DEFAULT_DEG: (f64, f64) = (215.0, 35.0);
 
-/// The keys that say where it stands.
-pub(super) const KEYS: [&str; 5] =
-    ["sun_azimuth_deg", "sun_elevation_deg", "latitude_deg", "longitude_deg", "utc"];
-
 /// Unit vector towards the sun.
-pub(super) fn direction(light: &Table<'_>) -> Result<DVec3, ScenarioError> {
-    let azimuth = light.number("sun_azimuth_deg", -360.0..=360.0, "degrees")?;
-    let elevation = light.number("sun_elevation_deg", -90.0..=90.0, "degrees")?;
-    let latitude = light.number("latitude_deg", -90.0..=90.0, "degrees")?;
-    let longitude = light.number("longitude_deg", -180.0..=180.0, "degrees")?;
-    let utc = light.date_time("utc")?;
+pub(super) fn direction(section: &TomlSection<'_>, keys: &LightKeys) -> Result<DVec3, TomlError> {
+    let text = section.text;
+    let quarter = NumberWithin(-90.0..=90.0, "degrees");
+    let azimuth = text.given(&keys.sun_azimuth_deg, ANGLE)?;
+    let elevation = text.given(&keys.sun_elevation_deg, quarter.clone())?;
+    let latitude = text.given(&keys.latitude_deg, quarter)?;
+    let longitude = text.given(&keys.longitude_deg, NumberWithin(-180.0..=180.0, "degrees"))?;
+    let utc = text.given(&keys.utc, DateAndTime)?;
     if let (None, None, None) = (latitude, longitude, utc) {
         let azimuth = azimuth.unwrap_or(DEFAULT_DEG.0);
         return Ok(towards(azimuth, elevation.unwrap_or(DEFAULT_DEG.1)));
     }
-    for key in ["sun_azimuth_deg", "sun_elevation_deg"] {
-        if light.has(key) {
-            let problem = "follows from latitude_deg, longitude_deg and utc; leave out it or them";
-            return Err(light.error(key, problem));
-        }
+    if let Some(value) = keys.sun_azimuth_deg.as_ref().or(keys.sun_elevation_deg.as_ref()) {
+        return Err(
+            text.error(value, "follows from latitude_deg, longitude_deg and utc; leave out it or them")
+        );
     }
     let together = "all of latitude_deg, longitude_deg and utc, or none";
-    let latitude = latitude.ok_or_else(|| light.missing("latitude_deg", together))?;
-    let longitude = longitude.ok_or_else(|| light.missing("longitude_deg", together))?;
-    let utc = utc.ok_or_else(|| light.missing("utc", together))?;
-    let sun = at(Location { latitude, longitude }, &utc);
-    sun.map_err(|problem| light.error("utc", problem))
+    let latitude = latitude.ok_or_else(|| section.missing("latitude_deg", together))?;
+    let longitude = longitude.ok_or_else(|| section.missing("longitude_deg", together))?;
+    let (Some(utc), Some(value)) = (utc, &keys.utc) else { return Err(section.missing("utc", together)) };
+    at(Location { latitude, longitude }, &utc).map_err(|problem| text.error(value, problem))
 }
 
 /// Unit vector towards the sun as it is seen (refraction included) from a place at sea level: NREL's SPA.
