@@ -5,7 +5,8 @@ use bowwave_core::{
     estimate::horizon::Mask,
     geometry::{Distortion, Lens},
     text::toml::{
-        Given, ListOf, Loose, Needed, NumberWithin, PositiveUpTo, TomlError, TomlText, ValueRule, WholeWithin,
+        ListOf, Loose, NumberWithin, OptionalKey, PositiveUpTo, RequiredKey, TomlError, TomlText, ValueRule,
+        WholeWithin,
     },
 };
 use glam::{DQuat, DVec2, DVec3};
@@ -17,7 +18,7 @@ use crate::{CalibrationError, CalibrationFile, Date, Provenance};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawCalibration {
-    made: Needed<Datetime>,
+    made: RequiredKey<Datetime>,
     source: String,
     #[serde(default)]
     camera_name: String,
@@ -37,87 +38,68 @@ struct RawCalibration {
     own_ship: Option<RawOwnShip>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawLens {
-    size_px: Needed<Vec<i64>>,
-    focal_px: Needed<Vec<f64>>,
-    focal_sigma_px: Needed<f64>,
-    centre_px: Needed<Vec<f64>>,
-    radial: Given<Vec<f64>>,
-    tangential: Given<Vec<f64>>,
-    fisheye: Given<Vec<f64>>,
-    measured: Needed<Datetime>,
-    #[serde(default)]
-    how: String,
+/// Sections of measured values. Each says on which day they were measured, and may say how.
+macro_rules! measured {
+    ($($name:ident { $($key:ident: $kind:ty,)* })*) => {$(
+        #[derive(Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct $name {
+            $($key: $kind,)*
+            measured: RequiredKey<Datetime>,
+            #[serde(default)]
+            how: String,
+        }
+
+        impl $name {
+            fn provenance(&self, text: TomlText<'_>) -> Result<Provenance, TomlError> {
+                Ok(Provenance::new(text.needed(&self.measured, CalendarDay)?, self.how.as_str()))
+            }
+        }
+    )*};
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawRotation {
-    rotation_wxyz: Needed<Vec<f64>>,
-    sigma_mrad: Needed<Vec<f64>>,
-    measured: Needed<Datetime>,
-    #[serde(default)]
-    how: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawTimeOffset {
-    offset_ms: Needed<f64>,
-    sigma_ms: Needed<f64>,
-    measured: Needed<Datetime>,
-    #[serde(default)]
-    how: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawShutter {
-    readout_ms: Needed<f64>,
-    sigma_ms: Needed<f64>,
-    measured: Needed<Datetime>,
-    #[serde(default)]
-    how: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawBoresight {
-    right_deg: Needed<f64>,
-    down_deg: Needed<f64>,
-    sigma_mrad: Needed<f64>,
-    muzzle_m: Needed<Vec<f64>>,
-    measured: Needed<Datetime>,
-    #[serde(default)]
-    how: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawTriggerLatency {
-    latency_ms: Needed<f64>,
-    sigma_ms: Needed<f64>,
-    measured: Needed<Datetime>,
-    #[serde(default)]
-    how: String,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawGyroBias {
-    bias_deg_per_s: Needed<Vec<f64>>,
-    sigma_deg_per_s: Needed<Vec<f64>>,
-    measured: Needed<Datetime>,
-    #[serde(default)]
-    how: String,
+measured! {
+    RawLens {
+        size_px: RequiredKey<Vec<i64>>,
+        focal_px: RequiredKey<Vec<f64>>,
+        focal_sigma_px: RequiredKey<f64>,
+        centre_px: RequiredKey<Vec<f64>>,
+        radial: OptionalKey<Vec<f64>>,
+        tangential: OptionalKey<Vec<f64>>,
+        fisheye: OptionalKey<Vec<f64>>,
+    }
+    RawRotation {
+        rotation_wxyz: RequiredKey<Vec<f64>>,
+        sigma_mrad: RequiredKey<Vec<f64>>,
+    }
+    RawTimeOffset {
+        offset_ms: RequiredKey<f64>,
+        sigma_ms: RequiredKey<f64>,
+    }
+    RawShutter {
+        readout_ms: RequiredKey<f64>,
+        sigma_ms: RequiredKey<f64>,
+    }
+    RawBoresight {
+        right_deg: RequiredKey<f64>,
+        down_deg: RequiredKey<f64>,
+        sigma_mrad: RequiredKey<f64>,
+        muzzle_m: RequiredKey<Vec<f64>>,
+    }
+    RawTriggerLatency {
+        latency_ms: RequiredKey<f64>,
+        sigma_ms: RequiredKey<f64>,
+    }
+    RawGyroBias {
+        bias_deg_per_s: RequiredKey<Vec<f64>>,
+        sigma_deg_per_s: RequiredKey<Vec<f64>>,
+    }
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawOwnShip {
-    hidden_px: Vec<Needed<Vec<[f64; 2]>>>,
+    hidden_px: Vec<RequiredKey<Vec<[f64; 2]>>>,
 }
 
 /// A calibration's text, checked; `origin` (a file name, usually) stands at the head of error messages.
@@ -127,18 +109,15 @@ struct RawOwnShip {
 pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationError> {
     let text = TomlText::new(text, origin)?;
     let (raw, _) = text.read::<RawCalibration>(&[])?;
-    let measured = |day: &Needed<Datetime>, how: &str| -> Result<Provenance, TomlError> {
-        Ok(Provenance::new(text.needed(day, CalendarDay)?, how))
-    };
     Ok(CalibrationFile {
         made: text.needed(&raw.made, CalendarDay)?,
-        lens: measured(&raw.lens.measured, &raw.lens.how)?,
-        camera_from_imu: measured(&raw.camera_from_imu.measured, &raw.camera_from_imu.how)?,
-        time_offset: measured(&raw.time_offset.measured, &raw.time_offset.how)?,
-        shutter: raw.shutter.as_ref().map(|s| measured(&s.measured, &s.how)).transpose()?,
-        boresight: measured(&raw.boresight.measured, &raw.boresight.how)?,
-        trigger: raw.trigger.as_ref().map(|t| measured(&t.measured, &t.how)).transpose()?,
-        gyro_bias: measured(&raw.gyro_bias.measured, &raw.gyro_bias.how)?,
+        lens: raw.lens.provenance(text)?,
+        camera_from_imu: raw.camera_from_imu.provenance(text)?,
+        time_offset: raw.time_offset.provenance(text)?,
+        shutter: raw.shutter.as_ref().map(|shutter| shutter.provenance(text)).transpose()?,
+        boresight: raw.boresight.provenance(text)?,
+        trigger: raw.trigger.as_ref().map(|trigger| trigger.provenance(text)).transpose()?,
+        gyro_bias: raw.gyro_bias.provenance(text)?,
         calibration: calibration(text, &raw)?,
         own_ship: own_ship(text, &raw)?,
         source: raw.source,
@@ -304,7 +283,7 @@ fn own_ship(text: TomlText<'_>, raw: &RawCalibration) -> Result<Vec<Vec<DVec2>>,
     }
 }
 
-fn rotation(text: TomlText<'_>, raw: &Needed<Vec<f64>>) -> Result<DQuat, TomlError> {
+fn rotation(text: TomlText<'_>, raw: &RequiredKey<Vec<f64>>) -> Result<DQuat, TomlError> {
     let [w, x, y, z] = text.needed(raw, each_up_to(1.0 + NORM_TOLERANCE, ""))?;
     let q = DQuat::from_xyzw(x, y, z, w);
     let excess = (q.length() - 1.0).abs();

@@ -17,7 +17,7 @@ pub enum ReflectionMethod {
     PhysicsAsPrinted,
     /// The same with the normal from the slope, waves of the wind force's spectrum, and phases that hold at any distance.
     Physics,
-    /// What waves of that wind throw back, from the table of [`crate::frame::reflection`].
+    /// Light thrown back by waves of that wind, from the table of [`crate::frame::reflection`].
     Waves,
 }
 

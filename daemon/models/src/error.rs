@@ -1,6 +1,8 @@
-//! What can be wrong with a model.
+//! Errors of models.
 
 use std::io;
+
+use bowwave_core::text::toml::TomlError;
 
 /// Why a model cannot be used: which file, what is wrong, what to do.
 #[derive(Debug, thiserror::Error)]
@@ -142,17 +144,8 @@ pub enum ModelError {
         row: u32,
     },
     /// The file beside a picture says something that cannot be used.
-    #[error("{file}:{line}:{column}: {problem}")]
-    Sidecar {
-        /// The file.
-        file: String,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// What is wrong and what to do.
-        problem: String,
-    },
+    #[error("{0}")]
+    Sidecar(TomlError),
 }
 
 fn list(found: &[String]) -> String {

@@ -1,10 +1,9 @@
 //! The small TOML file beside a picture.
 
-use std::{ops::Range, path::Path};
+use std::path::Path;
 
-use bowwave_core::text::{line_column, one_line};
+use bowwave_core::text::toml::{NumberWithin, OneOf, OptionalKey, RequiredKey, Spanned, TomlError, TomlText};
 use serde::Deserialize;
-use toml::Spanned;
 
 use crate::{
     error::ModelError,
@@ -14,10 +13,10 @@ use crate::{
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawSpec {
-    length_m: Spanned<f64>,
-    waterline_row: Spanned<f64>,
-    bow: Option<Spanned<String>>,
+struct RawSidecar {
+    length_m: RequiredKey<f64>,
+    waterline_row: RequiredKey<f64>,
+    bow: OptionalKey<String>,
     engine: Option<Spanned<RawRect>>,
     helm: Option<Spanned<RawRect>>,
 }
@@ -31,7 +30,7 @@ struct RawRect {
     bottom: f64,
 }
 
-/// Reads the file beside a picture of `size` pixels.
+/// The checked file beside a picture of `size` pixels.
 pub(crate) fn read(path: &Path, size: (u32, u32)) -> Result<QuadSpec, ModelError> {
     let file = path.display().to_string();
     let bytes = match read_bounded(path) {
@@ -40,49 +39,32 @@ pub(crate) fn read(path: &Path, size: (u32, u32)) -> Result<QuadSpec, ModelError
         }
         other => other?,
     };
-    let text = String::from_utf8_lossy(&bytes);
-    parse(&text, size).map_err(|(at, problem)| {
-        let (line, column) = line_column(&text, at);
-        ModelError::Sidecar { file, line, column, problem: one_line(&problem) }
-    })
+    parse(&String::from_utf8_lossy(&bytes), &file, size).map_err(ModelError::Sidecar)
 }
 
-/// Parses and checks; an error comes with its byte offset.
-fn parse(text: &str, (width, height): (u32, u32)) -> Result<QuadSpec, (usize, String)> {
-    let raw: RawSpec =
-        toml::from_str(text).map_err(|e| (e.span().unwrap_or(0..0).start, e.message().to_owned()))?;
-    let check = |value: &Spanned<f64>, key: &str, range: Range<f64>, unit: &str| {
-        let v = *value.get_ref();
-        let problem = || format!("{key} = {v} must lie between {} and {} {unit}", range.start, range.end);
-        if range.contains(&v) { Ok(v) } else { Err((value.span().start, problem())) }
+fn parse(text: &str, origin: &str, (width, height): (u32, u32)) -> Result<QuadSpec, TomlError> {
+    let text = TomlText::new(text, origin)?;
+    let (raw, _) = text.read::<RawSidecar>(&[])?;
+    let (width, height) = (f64::from(width), f64::from(height));
+    let rect = |raw: &Option<Spanned<RawRect>>| {
+        let Some(value) = raw else { return Ok(None) };
+        let RawRect { left, top, right, bottom } = *value.get_ref();
+        let across = 0.0 <= left && left < right && right <= width;
+        if across && 0.0 <= top && top < bottom && bottom <= height {
+            return Ok(Some(Rect { left, top, right, bottom }));
+        }
+        let allowed = format!("left < right and top < bottom within {width}x{height} pixels");
+        Err(text.error(value, format!("is not allowed; give {allowed}")))
     };
-    let length_m = check(&raw.length_m, "length_m", 0.5..500.0, "metres")?;
-    let waterline_row =
-        check(&raw.waterline_row, "waterline_row", 1.0..f64::from(height) + 1.0, "(a row of the picture)")?;
-    let bow = match raw.bow.as_ref().map(|b| (b.get_ref().as_str(), b.span().start)) {
-        None | Some(("right", _)) => Bow::Right,
-        Some(("left", _)) => Bow::Left,
-        Some((other, at)) => return Err((at, format!("bow = {other:?} must be \"left\" or \"right\""))),
-    };
-    let rect = |raw: &Option<Spanned<RawRect>>, key: &str| {
-        let Some(raw) = raw else { return Ok(None) };
-        let RawRect { left, top, right, bottom } = *raw.get_ref();
-        let fits = 0.0 <= left
-            && left < right
-            && right <= f64::from(width)
-            && 0.0 <= top
-            && top < bottom
-            && bottom <= f64::from(height);
-        let problem =
-            || format!("[{key}] must have left < right and top < bottom within {width}x{height} pixels");
-        if fits { Ok(Some(Rect { left, top, right, bottom })) } else { Err((raw.span().start, problem())) }
-    };
+    let rows = NumberWithin(1.0..=height, "(a row of the picture)");
     Ok(QuadSpec {
-        length_m,
-        waterline_row,
-        bow,
-        engine: rect(&raw.engine, "engine")?,
-        helm: rect(&raw.helm, "helm")?,
+        length_m: text.needed(&raw.length_m, NumberWithin(0.5..=500.0, "m"))?,
+        waterline_row: text.needed(&raw.waterline_row, rows)?,
+        bow: text
+            .given(&raw.bow, OneOf(&[("right", Bow::Right), ("left", Bow::Left)]))?
+            .unwrap_or(Bow::Right),
+        engine: rect(&raw.engine)?,
+        helm: rect(&raw.helm)?,
     })
 }
 
@@ -91,15 +73,14 @@ mod tests {
     use super::*;
 
     fn error(text: &str) -> (usize, usize, String) {
-        let (at, problem) = parse(text, (400, 100)).expect_err("must be refused");
-        let (line, column) = line_column(text, at);
-        (line, column, problem)
+        let error = parse(text, "ship.toml", (400, 100)).expect_err("must be refused");
+        (error.line, error.column, error.to_string())
     }
 
     #[test]
     fn a_full_sidecar_is_read() {
         let text = "length_m = 120.0\nwaterline_row = 90\nbow = \"left\"\n[helm]\nleft = 1\ntop = 2\nright = 30\nbottom = 40\n";
-        let spec = parse(text, (400, 100)).expect("valid");
+        let spec = parse(text, "ship.toml", (400, 100)).expect("valid");
         assert_eq!((spec.length_m, spec.waterline_row, spec.bow), (120.0, 90.0, Bow::Left));
         assert_eq!(spec.helm, Some(Rect { left: 1.0, top: 2.0, right: 30.0, bottom: 40.0 }));
         assert_eq!(spec.engine, None);
@@ -109,7 +90,7 @@ mod tests {
     fn bad_values_are_refused_with_their_place() {
         let (line, column, problem) = error("length_m = 120.0\nwaterline_row = 900\n");
         assert_eq!((line, column), (2, 17));
-        assert!(problem.contains("waterline_row = 900"), "{problem}");
+        assert!(problem.contains("waterline_row: 900 is not allowed; give a number, 1 to 100"), "{problem}");
         let (line, _, problem) = error("length_m = 120.0\nwaterline_row = 90\nlenght = 3\n");
         assert_eq!(line, 3);
         assert!(problem.contains("lenght"), "{problem}");

@@ -4,7 +4,10 @@
 
 use std::{fs, path::Path};
 
-use bowwave_core::model::{Model, ModelKind, Zone};
+use bowwave_core::{
+    model::{Model, ModelKind, Zone},
+    text::toml::TomlError,
+};
 use bowwave_models::{Bow, FRIGATE_QUAD, ModelError, QuadSpec, Rect, load_quad, quad, resolve};
 use image::{Rgba, RgbaImage};
 
@@ -113,7 +116,7 @@ fn a_png_needs_its_sidecar_and_takes_its_values() {
     assert_eq!(m, quad("ship.png", "ship", picture(), &spec()).expect("a model"));
     fs::write(dir.path().join("ship.toml"), "length_m = 16\nwaterline = 80.0\n").expect("written");
     let error = load_quad(&png).expect_err("unknown key");
-    assert!(matches!(error, ModelError::Sidecar { line: 2, column: 1, .. }), "{error}");
+    assert!(matches!(error, ModelError::Sidecar(TomlError { line: 2, column: 1, .. })), "{error}");
     fs::write(&png, b"GIF89a").expect("written");
     let line = load_quad(&png).expect_err("no PNG").to_string();
     assert!(line.contains("ship.png") && line.contains("PNG"), "{line}");

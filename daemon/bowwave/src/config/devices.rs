@@ -5,7 +5,9 @@ use std::{path::PathBuf, time::Duration};
 use anyhow::Result;
 use bowwave_core::{
     estimate::attitude::Source as Orientation,
-    text::toml::{Given, Needed, NumberWithin, OneOf, Spanned, TomlError, TomlText, ValueRule, WholeWithin},
+    text::toml::{
+        NumberWithin, OneOf, OptionalKey, RequiredKey, Spanned, TomlError, TomlText, ValueRule, WholeWithin,
+    },
 };
 use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
@@ -25,12 +27,12 @@ pub(super) struct RawCamera {
     device: Option<PathBuf>,
     serial: Option<String>,
     modes: Vec<Spanned<String>>,
-    exposure_us: Given<NumberOrWord>,
-    white_balance_k: Given<NumberOrWord>,
-    focus: Given<i64>,
-    gain: Given<i64>,
-    buffers: Given<i64>,
-    readout_us: Given<i64>,
+    exposure_us: OptionalKey<NumberOrWord>,
+    white_balance_k: OptionalKey<NumberOrWord>,
+    focus: OptionalKey<i64>,
+    gain: OptionalKey<i64>,
+    buffers: OptionalKey<i64>,
+    readout_us: OptionalKey<i64>,
 }
 
 impl RawCamera {
@@ -119,11 +121,11 @@ fn mode(text: &str) -> Result<WantedMode, String> {
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RawImu {
     device: Option<PathBuf>,
-    baud: Given<RawBaud>,
-    format: Given<String>,
+    baud: OptionalKey<RawBaud>,
+    format: OptionalKey<String>,
     low_latency: Option<bool>,
-    packet_jitter_ms_max: Given<f64>,
-    orientation: Given<String>,
+    packet_jitter_ms_max: OptionalKey<f64>,
+    orientation: OptionalKey<String>,
 }
 
 impl RawImu {
@@ -182,13 +184,11 @@ impl ValueRule for BaudRates {
 #[serde(deny_unknown_fields)]
 pub(super) struct RawGpioLine {
     chip: String,
-    line: Needed<NumberOrWord>,
+    line: RequiredKey<NumberOrWord>,
     #[serde(default)]
     active_low: bool,
-    #[serde(default)]
-    bias: Given<String>,
-    #[serde(default)]
-    debounce_ms: Given<i64>,
+    bias: OptionalKey<String>,
+    debounce_ms: OptionalKey<i64>,
 }
 
 /// A line by its number on the chip or by its name.
@@ -245,12 +245,9 @@ impl RawGpioLine {
 #[serde(deny_unknown_fields)]
 pub(super) struct RawLamps {
     chip: String,
-    #[serde(default)]
-    ready: Given<NumberOrWord>,
-    #[serde(default)]
-    hit: Given<NumberOrWord>,
-    #[serde(default)]
-    fault: Given<NumberOrWord>,
+    ready: OptionalKey<NumberOrWord>,
+    hit: OptionalKey<NumberOrWord>,
+    fault: OptionalKey<NumberOrWord>,
     #[serde(default)]
     active_low: bool,
 }

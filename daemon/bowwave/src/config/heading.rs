@@ -6,7 +6,7 @@ use anyhow::Result;
 use bowwave_core::{
     estimate::{HeadingSettings, Landmark, Stow},
     event::MarkKind,
-    text::toml::{Given, Needed, NumberWithin, Spanned, TomlError, TomlText},
+    text::toml::{NumberWithin, OptionalKey, RequiredKey, Spanned, TomlError, TomlText},
 };
 use bowwave_devices::{
     serial::ShipSettings,
@@ -30,21 +30,18 @@ const DRIFT: NumberWithin = NumberWithin(0.0..=3600.0, "degrees/h");
 #[serde(deny_unknown_fields)]
 pub(super) struct RawShip {
     device: Spanned<PathBuf>,
-    #[serde(default)]
-    baud: Given<RawBaud>,
-    #[serde(default)]
-    latency_ms: Given<f64>,
-    #[serde(default)]
-    sigma_deg: Given<f64>,
+    baud: OptionalKey<RawBaud>,
+    latency_ms: OptionalKey<f64>,
+    sigma_deg: OptionalKey<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RawRezero {
     input: Option<RawGpioLine>,
-    from_bow_deg: Given<f64>,
-    from_north_deg: Given<f64>,
-    sigma_deg: Given<f64>,
+    from_bow_deg: OptionalKey<f64>,
+    from_north_deg: OptionalKey<f64>,
+    sigma_deg: OptionalKey<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -57,17 +54,16 @@ pub(super) struct RawLandmarks {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawLandmark {
-    bearing_deg: Needed<f64>,
-    #[serde(default)]
-    sigma_deg: Given<f64>,
+    bearing_deg: RequiredKey<f64>,
+    sigma_deg: OptionalKey<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RawHeading {
-    growth_deg_per_h: Given<f64>,
-    sky_drift_deg_per_h: Given<f64>,
-    display_sigma_above_deg: Given<f64>,
+    growth_deg_per_h: OptionalKey<f64>,
+    sky_drift_deg_per_h: OptionalKey<f64>,
+    display_sigma_above_deg: OptionalKey<f64>,
 }
 
 /// The raw sections together.

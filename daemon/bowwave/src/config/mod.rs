@@ -12,7 +12,7 @@ pub use self::heading::HeadingChoice;
 use anyhow::{Context, Result};
 use bowwave_core::{
     estimate::attitude::Source as Orientation,
-    text::toml::{Given, NumberWithin, OneOf, RenamedKey, Spanned, TomlError, TomlText, bounded_text},
+    text::toml::{NumberWithin, OneOf, OptionalKey, RenamedKey, Spanned, TomlError, TomlText, bounded_text},
 };
 use bowwave_devices::{
     camera::CameraSettings, lamps::LampSettings, lcd::LcdSettings, serial::ImuSettings, trigger::InputLine,
@@ -120,11 +120,11 @@ struct RawConfig {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawScreen {
-    output: Given<String>,
+    output: OptionalKey<String>,
     size: Option<Spanned<String>>,
     card: Option<PathBuf>,
     connector: Option<String>,
-    refresh_hz: Given<f64>,
+    refresh_hz: OptionalKey<f64>,
     legacy: bool,
 }
 
@@ -133,7 +133,7 @@ struct RawScreen {
 struct RawGpu {
     device: Option<Spanned<String>>,
     validation: bool,
-    gpu_timeout_ms: Given<f64>,
+    gpu_timeout_ms: OptionalKey<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -150,7 +150,7 @@ struct RawFiles {
 #[serde(deny_unknown_fields, default)]
 struct RawHealth {
     thermal: Option<PathBuf>,
-    temperature_c_max: Given<f64>,
+    temperature_c_max: OptionalKey<f64>,
 }
 
 /// Reads and checks a configuration file. Relative paths in it are taken from its own folder.

@@ -49,7 +49,7 @@ impl fmt::Display for Verdict {
 struct Check {
     name: &'static str,
     verdict: Verdict,
-    /// What was found; for a failure, also what to do.
+    /// The finding; for a failure, also what to do.
     found: String,
 }
 

@@ -1,6 +1,6 @@
 //! The one way to read TOML: raw structs that serde derives, checked into values in one place.
 //!
-//! A raw struct says which keys a table has ([`Given`] for one that may be left out, [`Needed`] for one that may not). A
+//! A raw struct says which keys a table has ([`OptionalKey`] for one that may be left out, [`RequiredKey`] for one that may not). A
 //! [`ValueRule`] says which values a key may have. [`TomlText`] reads the struct and applies the rules. Every refusal is a
 //! [`TomlError`]: origin, line, column, key, the value as it is written, and what is allowed.
 
@@ -38,7 +38,7 @@ pub struct TomlError {
     pub column: usize,
     /// Path of the key, as `boat[2].speed_kn`; empty where the text is no TOML.
     pub key: String,
-    /// What is wrong, with the value, and what is allowed.
+    /// The mistake: the value as it is written, and the values that are allowed.
     pub problem: String,
 }
 
@@ -81,9 +81,9 @@ pub enum Loose<T> {
 }
 
 /// A key that has to be there.
-pub type Needed<T> = Spanned<Loose<T>>;
+pub type RequiredKey<T> = Spanned<Loose<T>>;
 /// A key that may be left out.
-pub type Given<T> = Option<Needed<T>>;
+pub type OptionalKey<T> = Option<RequiredKey<T>>;
 
 /// Former name of a key. It is read, with a warning that names the new one.
 #[derive(Clone, Copy, Debug)]
@@ -164,7 +164,11 @@ impl<'a> TomlText<'a> {
     ///
     /// # Errors
     /// Where the rule does not allow the value.
-    pub fn given<R: ValueRule>(self, value: &Given<R::Raw>, rule: R) -> Result<Option<R::Value>, TomlError> {
+    pub fn given<R: ValueRule>(
+        self,
+        value: &OptionalKey<R::Raw>,
+        rule: R,
+    ) -> Result<Option<R::Value>, TomlError> {
         value.as_ref().map(|value| self.needed(value, rule)).transpose()
     }
 
@@ -172,7 +176,7 @@ impl<'a> TomlText<'a> {
     ///
     /// # Errors
     /// Where the rule does not allow the value.
-    pub fn needed<R: ValueRule>(self, value: &Needed<R::Raw>, rule: R) -> Result<R::Value, TomlError> {
+    pub fn needed<R: ValueRule>(self, value: &RequiredKey<R::Raw>, rule: R) -> Result<R::Value, TomlError> {
         let checked = match value.get_ref() {
             Loose::Fits(raw) => rule.check(raw),
             Loose::Other(_) => None,
@@ -236,7 +240,7 @@ impl<'a> TomlText<'a> {
         TomlPlace { origin: self.origin.to_owned(), line, column, key: String::new() }
     }
 
-    /// What stands there, cut to one short line.
+    /// The text of a span, cut to one short line.
     fn written(self, span: &Range<usize>) -> String {
         let written = self.text.get(span.clone()).unwrap_or_default();
         let first = written.lines().next().unwrap_or_default();
@@ -339,7 +343,7 @@ impl TomlSection<'_> {
     pub fn required<R: ValueRule>(
         &self,
         key: &str,
-        value: &Given<R::Raw>,
+        value: &OptionalKey<R::Raw>,
         rule: R,
     ) -> Result<R::Value, TomlError> {
         match value {
@@ -373,7 +377,7 @@ pub trait ValueRule {
     type Value;
     /// The value, where it is allowed.
     fn check(&self, raw: &Self::Raw) -> Option<Self::Value>;
-    /// What is allowed, in words.
+    /// The allowed values, in words.
     fn allowed(&self) -> String;
 }
 

@@ -3,18 +3,18 @@ use super::*;
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawShelf {
-    width_mm: Given<f64>,
-    boards: Given<i64>,
-    label: Given<String>,
-    at_m: Given<Vec<f64>>,
-    hung: Given<bool>,
-    made: Given<BareOrQuoted>,
+    width_mm: OptionalKey<f64>,
+    boards: OptionalKey<i64>,
+    label: OptionalKey<String>,
+    at_m: OptionalKey<Vec<f64>>,
+    hung: OptionalKey<bool>,
+    made: OptionalKey<BareOrQuoted>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawBook {
-    pages: Needed<i64>,
+    pages: RequiredKey<i64>,
     bound: bool,
 }
 

@@ -2,8 +2,8 @@
 
 use bowwave_core::{
     text::toml::{
-        BareOrQuoted, Given, Needed, NumberWithin, PlainText, Spanned, TomlError, TomlPlace, TomlSection,
-        TomlText, ValueRule,
+        BareOrQuoted, NumberWithin, OptionalKey, PlainText, RequiredKey, Spanned, TomlError, TomlPlace,
+        TomlSection, TomlText, ValueRule,
     },
     world::scenario::{
         place,
@@ -21,9 +21,9 @@ const PIXEL_MAX: f64 = 8192.0;
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawStill {
-    picture: Given<String>,
-    seed: Given<i64>,
-    interval_s: Given<f64>,
+    picture: OptionalKey<String>,
+    seed: OptionalKey<i64>,
+    interval_s: OptionalKey<f64>,
     camera: Option<Spanned<RawStillCamera>>,
     boat: Vec<Spanned<RawStillBoat>>,
     sea: Option<Spanned<SeaKeys>>,
@@ -34,41 +34,41 @@ struct RawStill {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawStillCamera {
-    eye_height_m: Given<f64>,
-    focal_35mm_mm: Given<f64>,
-    hfov_deg: Given<f64>,
-    focal_px: Given<f64>,
-    centre_px: Given<Vec<f64>>,
-    radial: Given<Vec<f64>>,
-    tangential: Given<Vec<f64>>,
-    azimuth_deg: Given<f64>,
-    horizon: Option<Spanned<Vec<Needed<Vec<f64>>>>>,
-    pitch_deg: Given<f64>,
-    roll_deg: Given<f64>,
+    eye_height_m: OptionalKey<f64>,
+    focal_35mm_mm: OptionalKey<f64>,
+    hfov_deg: OptionalKey<f64>,
+    focal_px: OptionalKey<f64>,
+    centre_px: OptionalKey<Vec<f64>>,
+    radial: OptionalKey<Vec<f64>>,
+    tangential: OptionalKey<Vec<f64>>,
+    azimuth_deg: OptionalKey<f64>,
+    horizon: Option<Spanned<Vec<RequiredKey<Vec<f64>>>>>,
+    pitch_deg: OptionalKey<f64>,
+    roll_deg: OptionalKey<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawStillLight {
-    sun_azimuth_deg: Given<f64>,
-    sun_elevation_deg: Given<f64>,
-    latitude_deg: Given<f64>,
-    longitude_deg: Given<f64>,
-    utc: Given<BareOrQuoted>,
-    sun_strength: Given<f64>,
-    visibility_km: Given<f64>,
+    sun_azimuth_deg: OptionalKey<f64>,
+    sun_elevation_deg: OptionalKey<f64>,
+    latitude_deg: OptionalKey<f64>,
+    longitude_deg: OptionalKey<f64>,
+    utc: OptionalKey<BareOrQuoted>,
+    sun_strength: OptionalKey<f64>,
+    visibility_km: OptionalKey<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawStillBoat {
-    name: Given<String>,
-    model: Given<String>,
-    waterline_px: Given<Vec<f64>>,
-    range_m: Given<f64>,
-    bearing_deg: Given<f64>,
-    heading_deg: Given<f64>,
-    speed_kn: Given<f64>,
+    name: OptionalKey<String>,
+    model: OptionalKey<String>,
+    waterline_px: OptionalKey<Vec<f64>>,
+    range_m: OptionalKey<f64>,
+    bearing_deg: OptionalKey<f64>,
+    heading_deg: OptionalKey<f64>,
+    speed_kn: OptionalKey<f64>,
 }
 
 pub(super) fn still(text: &str, origin: &str) -> Result<Still, TomlError> {
@@ -184,7 +184,7 @@ fn camera(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<StillCamera
 fn attitude(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<Attitude, TomlError> {
     let text = section.text;
     let what = "two points of the horizon in pixels: [[100, 410], [1180, 404]]";
-    let angle = |value: &Given<f64>| -> Result<Option<f64>, TomlError> {
+    let angle = |value: &OptionalKey<f64>| -> Result<Option<f64>, TomlError> {
         Ok(text.given(value, NumberWithin(-85.0..=85.0, "degrees"))?.map(f64::to_radians))
     };
     let (pitch, roll) = (angle(&raw.pitch_deg)?, angle(&raw.roll_deg)?);

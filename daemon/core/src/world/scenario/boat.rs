@@ -9,7 +9,8 @@ use super::{
 };
 use crate::{
     text::toml::{
-        Given, Needed, NumberWithin, OneOf, PlainText, Spanned, TomlError, TomlSection, ValueRule, YesNo,
+        NumberWithin, OneOf, OptionalKey, PlainText, RequiredKey, Spanned, TomlError, TomlSection, ValueRule,
+        YesNo,
     },
     world::boats::{Arrival, Course, CourseError},
 };
@@ -52,20 +53,20 @@ impl CourseKind {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct RawBoat {
-    name: Given<String>,
-    model: Given<String>,
-    side: Given<String>,
-    course: Given<String>,
-    range_m: Given<f64>,
-    bearing_deg: Given<f64>,
-    heading_deg: Given<f64>,
-    speed_kn: Given<f64>,
-    weave_amplitude_m: Given<f64>,
-    weave_period_s: Given<f64>,
-    waypoints: Option<Spanned<Vec<Needed<Vec<f64>>>>>,
-    repeat: Given<bool>,
-    stop_m: Given<f64>,
-    arrival: Given<String>,
+    name: OptionalKey<String>,
+    model: OptionalKey<String>,
+    side: OptionalKey<String>,
+    course: OptionalKey<String>,
+    range_m: OptionalKey<f64>,
+    bearing_deg: OptionalKey<f64>,
+    heading_deg: OptionalKey<f64>,
+    speed_kn: OptionalKey<f64>,
+    weave_amplitude_m: OptionalKey<f64>,
+    weave_period_s: OptionalKey<f64>,
+    waypoints: Option<Spanned<Vec<RequiredKey<Vec<f64>>>>>,
+    repeat: OptionalKey<bool>,
+    stop_m: OptionalKey<f64>,
+    arrival: OptionalKey<String>,
 }
 
 impl RawBoat {
@@ -115,7 +116,7 @@ fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatS
         }
     }
     let sides = [("hostile", Side::Hostile), ("neutral", Side::Neutral)];
-    let named = |key, value: &Given<String>, what| match value {
+    let named = |key, value: &OptionalKey<String>, what| match value {
         Some(value) => text.needed(value, PlainText),
         None => Err(section.missing(key, what)),
     };

@@ -11,7 +11,7 @@ use super::{
 use crate::{
     sea::BeaufortForce,
     text::toml::{
-        BareOrQuoted, Given, Loose, NumberWithin, OneOf, PlainText, Spanned, TomlError, TomlSection,
+        BareOrQuoted, Loose, NumberWithin, OneOf, OptionalKey, PlainText, Spanned, TomlError, TomlSection,
         TomlText, ValueRule, WholeWithin,
     },
     water::{ReflectionMethod, ShadowLevel, Water},
@@ -33,9 +33,9 @@ pub const ANGLE: NumberWithin = NumberWithin(-360.0..=360.0, "degrees");
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawScenario {
-    name: Given<String>,
-    seed: Given<i64>,
-    duration_s: Given<f64>,
+    name: OptionalKey<String>,
+    seed: OptionalKey<i64>,
+    duration_s: OptionalKey<f64>,
     sea: Option<Spanned<RawSea>>,
     mount: Option<Spanned<RawMount>>,
     light: Option<Spanned<LightKeys>>,
@@ -47,28 +47,28 @@ struct RawScenario {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawSea {
-    beaufort: Given<i64>,
-    wind_from_deg: Given<f64>,
-    significant_wave_height_m: Given<f64>,
-    peak_period_s: Given<f64>,
-    source: Given<String>,
+    beaufort: OptionalKey<i64>,
+    wind_from_deg: OptionalKey<f64>,
+    significant_wave_height_m: OptionalKey<f64>,
+    peak_period_s: OptionalKey<f64>,
+    source: OptionalKey<String>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawMount {
-    eye_height_m: Given<f64>,
+    eye_height_m: OptionalKey<f64>,
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawWeapon {
-    rounds_per_minute: Given<f64>,
-    belt: Given<i64>,
-    muzzle_velocity_m_s: Given<f64>,
-    ballistic_coefficient_g7_lb_in2: Given<f64>,
-    dispersion_mrad: Given<f64>,
-    tracer_every: Given<i64>,
+    rounds_per_minute: OptionalKey<f64>,
+    belt: OptionalKey<i64>,
+    muzzle_velocity_m_s: OptionalKey<f64>,
+    ballistic_coefficient_g7_lb_in2: OptionalKey<f64>,
+    dispersion_mrad: OptionalKey<f64>,
+    tracer_every: OptionalKey<i64>,
 }
 
 /// Keys of a table `[sea]`.
@@ -76,13 +76,13 @@ struct RawWeapon {
 #[serde(deny_unknown_fields, default)]
 pub struct SeaKeys {
     /// Wind force.
-    pub beaufort: Given<i64>,
+    pub beaufort: OptionalKey<i64>,
     /// Where the wind comes from, degrees clockwise from north.
-    pub wind_from_deg: Given<f64>,
+    pub wind_from_deg: OptionalKey<f64>,
     /// Significant wave height, metres; of the wind force without it.
-    pub significant_wave_height_m: Given<f64>,
+    pub significant_wave_height_m: OptionalKey<f64>,
     /// Period of the highest waves, seconds; goes with the height.
-    pub peak_period_s: Given<f64>,
+    pub peak_period_s: OptionalKey<f64>,
 }
 
 /// Keys of a table `[light]`.
@@ -90,17 +90,17 @@ pub struct SeaKeys {
 #[serde(deny_unknown_fields, default)]
 pub struct LightKeys {
     /// Where the sun stands, degrees clockwise from north.
-    pub sun_azimuth_deg: Given<f64>,
+    pub sun_azimuth_deg: OptionalKey<f64>,
     /// How high it stands, degrees.
-    pub sun_elevation_deg: Given<f64>,
+    pub sun_elevation_deg: OptionalKey<f64>,
     /// Latitude, degrees north.
-    pub latitude_deg: Given<f64>,
+    pub latitude_deg: OptionalKey<f64>,
     /// Longitude, degrees east.
-    pub longitude_deg: Given<f64>,
+    pub longitude_deg: OptionalKey<f64>,
     /// Date and time, UTC.
-    pub utc: Given<BareOrQuoted>,
+    pub utc: OptionalKey<BareOrQuoted>,
     /// Meteorological visibility, kilometres.
-    pub visibility_km: Given<f64>,
+    pub visibility_km: OptionalKey<f64>,
 }
 
 /// Keys of a table `[reflection]`.
@@ -108,9 +108,9 @@ pub struct LightKeys {
 #[serde(deny_unknown_fields, default)]
 pub struct ReflectionKeys {
     /// Name of the method.
-    pub method: Given<String>,
+    pub method: OptionalKey<String>,
     /// How strong the shadow is, 0 to 2.
-    pub shadow_level: Given<i64>,
+    pub shadow_level: OptionalKey<i64>,
 }
 
 pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> {
