@@ -169,22 +169,6 @@ fn nothing_is_left_unfinished() {
 }
 
 #[test]
-fn examples_in_the_documents_name_existing_files() {
-    // Links of the form [text](path) in the top-level documents.
-    for name in ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"] {
-        let text = fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
-        for part in text.split("](").skip(1) {
-            let target = part.split(')').next().unwrap_or("");
-            if target.starts_with("http") || target.starts_with('#') || target.is_empty() {
-                continue;
-            }
-            let file = target.split('#').next().unwrap_or(target);
-            assert!(root().join(file).exists(), "{name} points to {file}, which is not there");
-        }
-    }
-}
-
-#[test]
 fn the_repository_stays_small() {
     let bytes: u64 = tracked("*").iter().filter_map(|p| fs::metadata(p).ok()).map(|m| m.len()).sum();
     assert!(bytes < 60_000_000, "{bytes} bytes are tracked");
