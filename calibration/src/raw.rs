@@ -5,8 +5,7 @@ use bowwave_core::{
     estimate::horizon::Mask,
     geometry::{Distortion, Lens},
     text::toml::{
-        ListOf, Loose, NumberWithin, OptionalKey, PositiveUpTo, RequiredKey, TomlError, TomlText, ValueRule,
-        WholeWithin,
+        Loose, OptionalKey, RequiredKey, TomlError, TomlText, ValueRule, list_of, number, positive, whole,
     },
 };
 use glam::{DQuat, DVec2, DVec3};
@@ -52,7 +51,7 @@ macro_rules! measured {
 
         impl $name {
             fn provenance(&self, text: TomlText<'_>) -> Result<Provenance, TomlError> {
-                Ok(Provenance::new(text.needed(&self.measured, CalendarDay)?, self.how.as_str()))
+                Ok(Provenance::new(text.needed(&self.measured, calendar_day())?, self.how.as_str()))
             }
         }
     )*};
@@ -110,7 +109,7 @@ pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationErr
     let text = TomlText::new(text, origin)?;
     let (raw, _) = text.read::<RawCalibration>(&[])?;
     Ok(CalibrationFile {
-        made: text.needed(&raw.made, CalendarDay)?,
+        made: text.needed(&raw.made, calendar_day())?,
         lens: raw.lens.provenance(text)?,
         camera_from_imu: raw.camera_from_imu.provenance(text)?,
         time_offset: raw.time_offset.provenance(text)?,
@@ -151,92 +150,64 @@ const SHARE_MOST: f64 = 0.8;
 const READOUT_MS_MAX: f64 = 100.0;
 
 /// A day without a time.
-struct CalendarDay;
-
-impl ValueRule for CalendarDay {
-    type Raw = Datetime;
-    type Value = Date;
-
-    fn check(&self, raw: &Datetime) -> Option<Date> {
+fn calendar_day() -> ValueRule<'static, Datetime, Date> {
+    let allowed = "a day of the calendar, without quotes and without a time: 2026-11-20";
+    ValueRule::new(allowed, |raw: &Datetime| {
         let date = raw.date.filter(|_| raw.time.is_none() && raw.offset.is_none())?;
         Date::new(date.year, date.month, date.day)
-    }
-
-    fn allowed(&self) -> String {
-        "a day of the calendar, without quotes and without a time: 2026-11-20".to_owned()
-    }
+    })
 }
 
-/// A duration up to so many milliseconds either way, to nanoseconds.
-struct MillisecondsUpTo(f64);
-
-impl ValueRule for MillisecondsUpTo {
-    type Raw = f64;
-    type Value = i64;
-
-    fn check(&self, raw: &f64) -> Option<i64> {
-        (-self.0..=self.0).contains(raw).then(|| ns_from_ms(*raw))
-    }
-
-    fn allowed(&self) -> String {
-        NumberWithin(-self.0..=self.0, "ms").allowed()
-    }
+/// A duration of up to so many milliseconds either way, to nanoseconds.
+fn milliseconds(limit: f64) -> ValueRule<'static, f64, i64> {
+    let rule = number(-limit..=limit, "ms");
+    ValueRule::new(rule.allowed.clone(), move |raw: &f64| rule.check(raw).map(ns_from_ms))
 }
 
-/// A standard deviation up to so many milliseconds, to nanoseconds.
-struct SigmaMsUpTo(f64);
-
-impl ValueRule for SigmaMsUpTo {
-    type Raw = f64;
-    type Value = i64;
-
-    fn check(&self, raw: &f64) -> Option<i64> {
-        (*raw <= self.0).then(|| ns_from_ms(*raw)).filter(|ns| *ns >= 1)
-    }
-
-    fn allowed(&self) -> String {
-        format!("a number above 0, up to {} ms; a nanosecond is the resolution of all times", self.0)
-    }
+/// A standard deviation of up to so many milliseconds, to nanoseconds.
+fn sigma_ms(limit: f64) -> ValueRule<'static, f64, i64> {
+    let allowed = format!("a number above 0, up to {limit} ms; a nanosecond is the resolution of all times");
+    ValueRule::new(allowed, move |raw: &f64| (*raw <= limit).then(|| ns_from_ms(*raw)).filter(|ns| *ns >= 1))
 }
 
-/// Two or more numbers of a vector, each up to `limit` either way.
-fn each_up_to<const N: usize>(limit: f64, unit: &'static str) -> ListOf<N, NumberWithin> {
-    ListOf(NumberWithin(-limit..=limit, unit))
+/// Numbers of a vector, each up to `limit` either way.
+fn each_up_to<const N: usize>(limit: f64, unit: &str) -> ValueRule<'static, Vec<f64>, [f64; N]> {
+    list_of(number(-limit..=limit, unit))
 }
 
 fn calibration(text: TomlText<'_>, raw: &RawCalibration) -> Result<Calibration, TomlError> {
-    let angle = NumberWithin(-80.0..=80.0, "degrees");
-    let sigma_mrad = PositiveUpTo(4000.0, "mrad");
+    let angle = || number(-80.0..=80.0, "degrees");
+    let sigma_mrad = || positive(4000.0, "mrad");
     let (boresight, bias) = (&raw.boresight, &raw.gyro_bias);
-    let turn = [&boresight.right_deg, &boresight.down_deg].map(|deg| text.needed(deg, angle.clone()));
+    let turn = [&boresight.right_deg, &boresight.down_deg].map(|deg| text.needed(deg, angle()));
     let [right, down] = turn;
-    let bias_sigma = text.needed(&bias.sigma_deg_per_s, ListOf(PositiveUpTo(100.0, "degrees/s")))?;
-    let rotation_sigma = text.needed(&raw.camera_from_imu.sigma_mrad, ListOf(sigma_mrad))?;
+    let bias_sigma = text.needed(&bias.sigma_deg_per_s, list_of(positive(100.0, "degrees/s")))?;
+    let rotation_sigma = text.needed(&raw.camera_from_imu.sigma_mrad, list_of(sigma_mrad()))?;
     let (readout_ns, readout_sigma_ns) = match &raw.shutter {
         Some(shutter) => (
-            text.needed(&shutter.readout_ms, MillisecondsUpTo(READOUT_MS_MAX))?,
-            text.needed(&shutter.sigma_ms, SigmaMsUpTo(READOUT_MS_MAX))?,
+            text.needed(&shutter.readout_ms, milliseconds(READOUT_MS_MAX))?,
+            text.needed(&shutter.sigma_ms, sigma_ms(READOUT_MS_MAX))?,
         ),
         // All rows are exposed at once.
         None => (0, 0),
     };
     let trigger = |raw: &RawTriggerLatency| -> Result<TriggerLatency, TomlError> {
         Ok(TriggerLatency {
-            latency_ns: text.needed(&raw.latency_ms, MillisecondsUpTo(1000.0))?,
-            sigma_ns: text.needed(&raw.sigma_ms, SigmaMsUpTo(1000.0))?,
+            latency_ns: text.needed(&raw.latency_ms, milliseconds(1000.0))?,
+            sigma_ns: text.needed(&raw.sigma_ms, sigma_ms(1000.0))?,
         })
     };
     Ok(Calibration {
         lens: lens(text, &raw.lens)?,
-        focal_sigma_px: text.needed(&raw.lens.focal_sigma_px, PositiveUpTo(1e5, "pixels"))?,
+        focal_sigma_px: text.needed(&raw.lens.focal_sigma_px, positive(1e5, "pixels"))?,
         camera_from_imu: rotation(text, &raw.camera_from_imu.rotation_wxyz)?,
         camera_from_imu_sigma: DVec3::from_array(rotation_sigma.map(radians_from_mrad)),
-        time_offset_ns: text.needed(&raw.time_offset.offset_ms, MillisecondsUpTo(10_000.0))?,
-        time_offset_sigma_ns: text.needed(&raw.time_offset.sigma_ms, SigmaMsUpTo(10_000.0))?,
+        time_offset_ns: text.needed(&raw.time_offset.offset_ms, milliseconds(10_000.0))?,
+        time_offset_sigma_ns: text.needed(&raw.time_offset.sigma_ms, sigma_ms(10_000.0))?,
         readout_ns,
         readout_sigma_ns,
         boresight: DVec2::new(right?.to_radians(), down?.to_radians()),
-        boresight_sigma: radians_from_mrad(text.needed(&boresight.sigma_mrad, sigma_mrad)?),
+        boresight_sigma: radians_from_mrad(text.needed(&boresight.sigma_mrad, sigma_mrad())?),
         muzzle_in_camera: text.needed(&boresight.muzzle_m, each_up_to(100.0, "m"))?.into(),
         trigger: raw.trigger.as_ref().map(trigger).transpose()?,
         gyro_bias: DVec3::from_array(
@@ -249,7 +220,7 @@ fn calibration(text: TomlText<'_>, raw: &RawCalibration) -> Result<Calibration, 
 /// Polygons of the own ship in the picture, in pixels.
 fn own_ship(text: TomlText<'_>, raw: &RawCalibration) -> Result<Vec<Vec<DVec2>>, TomlError> {
     let Some(own_ship) = &raw.own_ship else { return Ok(Vec::new()) };
-    let [width, height] = text.needed(&raw.lens.size_px, PICTURE_SIZE)?;
+    let [width, height] = text.needed(&raw.lens.size_px, picture_size())?;
     let size = DVec2::new(f64::from(width), f64::from(height));
     let mut polygons = Vec::new();
     for polygon in &own_ship.hidden_px {
@@ -296,10 +267,12 @@ fn rotation(text: TomlText<'_>, raw: &RequiredKey<Vec<f64>>) -> Result<DQuat, To
 }
 
 /// Width and height of pictures, pixels.
-const PICTURE_SIZE: ListOf<2, WholeWithin<u32>> = ListOf(WholeWithin(1..=8192));
+fn picture_size() -> ValueRule<'static, Vec<i64>, [u32; 2]> {
+    list_of(whole(1..=8192))
+}
 
 fn lens(text: TomlText<'_>, raw: &RawLens) -> Result<Lens, TomlError> {
-    let [width, height] = text.needed(&raw.size_px, PICTURE_SIZE)?;
+    let [width, height] = text.needed(&raw.size_px, picture_size())?;
     let centre = DVec2::from(text.needed(&raw.centre_px, each_up_to::<2>(16_384.0, "pixels"))?);
     let size = DVec2::new(f64::from(width), f64::from(height));
     if centre.cmplt(DVec2::ZERO).any() || centre.cmpgt(size).any() {
@@ -309,7 +282,7 @@ fn lens(text: TomlText<'_>, raw: &RawLens) -> Result<Lens, TomlError> {
     let lens = Lens {
         width,
         height,
-        focal: text.needed(&raw.focal_px, ListOf::<2, _>(PositiveUpTo(1e6, "pixels")))?.into(),
+        focal: text.needed(&raw.focal_px, list_of::<2, _, _>(positive(1e6, "pixels")))?.into(),
         centre,
         distortion: distortion(text, raw)?,
         row_turn: DVec3::ZERO,

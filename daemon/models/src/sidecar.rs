@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bowwave_core::text::toml::{NumberWithin, OneOf, OptionalKey, RequiredKey, Spanned, TomlError, TomlText};
+use bowwave_core::text::toml::{OptionalKey, RequiredKey, Spanned, TomlError, TomlText, number, one_of};
 use serde::Deserialize;
 
 use crate::{
@@ -56,12 +56,12 @@ fn parse(text: &str, origin: &str, (width, height): (u32, u32)) -> Result<QuadSp
         let allowed = format!("left < right and top < bottom within {width}x{height} pixels");
         Err(text.error(value, format!("is not allowed; give {allowed}")))
     };
-    let rows = NumberWithin(1.0..=height, "(a row of the picture)");
+    let rows = number(1.0..=height, "(a row of the picture)");
     Ok(QuadSpec {
-        length_m: text.needed(&raw.length_m, NumberWithin(0.5..=500.0, "m"))?,
+        length_m: text.needed(&raw.length_m, number(0.5..=500.0, "m"))?,
         waterline_row: text.needed(&raw.waterline_row, rows)?,
         bow: text
-            .given(&raw.bow, OneOf(&[("right", Bow::Right), ("left", Bow::Left)]))?
+            .given(&raw.bow, one_of(&[("right", Bow::Right), ("left", Bow::Left)]))?
             .unwrap_or(Bow::Right),
         engine: rect(&raw.engine)?,
         helm: rect(&raw.helm)?,

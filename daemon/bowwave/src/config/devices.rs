@@ -5,9 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use anyhow::Result;
 use bowwave_core::{
     estimate::attitude::Source as Orientation,
-    text::toml::{
-        NumberWithin, OneOf, OptionalKey, RequiredKey, Spanned, TomlError, TomlText, ValueRule, WholeWithin,
-    },
+    text::toml::{OptionalKey, RequiredKey, Spanned, TomlError, TomlText, ValueRule, number, one_of, whole},
 };
 use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
@@ -38,17 +36,17 @@ pub(super) struct RawCamera {
 impl RawCamera {
     pub(super) fn check(self, text: TomlText<'_>) -> Result<CameraSettings> {
         let wanted = |name: &Spanned<String>| mode(name.get_ref()).map_err(|why| text.error(name, why));
-        let exposure = match text.given(&self.exposure_us, LockedOrAuto)? {
+        let exposure = match text.given(&self.exposure_us, locked_or_auto())? {
             None => Exposure::Leave,
             Some(None) => Exposure::Auto,
             Some(Some(time_us)) => Exposure::Locked { time_us },
         };
-        let white_balance = match text.given(&self.white_balance_k, LockedOrAuto)? {
+        let white_balance = match text.given(&self.white_balance_k, locked_or_auto())? {
             None => WhiteBalance::Leave,
             Some(None) => WhiteBalance::Auto,
             Some(Some(kelvin)) => WhiteBalance::Locked { kelvin },
         };
-        let step = |value| text.given(value, WholeWithin(0..=u32::MAX));
+        let step = |value| text.given(value, whole(0..=u32::MAX));
         let defaults = CameraSettings::default();
         Ok(CameraSettings {
             device: self.device,
@@ -60,7 +58,7 @@ impl RawCamera {
                 focus: step(&self.focus)?.map_or(Focus::Still, |position| Focus::Locked { position }),
                 gain: step(&self.gain)?,
             },
-            buffers: text.given(&self.buffers, WholeWithin(3..=32))?.unwrap_or(defaults.buffers),
+            buffers: text.given(&self.buffers, whole(3..=32))?.unwrap_or(defaults.buffers),
             readout_us: step(&self.readout_us)?,
             ..defaults
         })
@@ -76,22 +74,11 @@ pub(super) enum NumberOrWord {
 }
 
 /// A control locked to a number above 0, or left to the camera (`None`).
-struct LockedOrAuto;
-
-impl ValueRule for LockedOrAuto {
-    type Raw = NumberOrWord;
-    type Value = Option<u32>;
-
-    fn check(&self, raw: &NumberOrWord) -> Option<Option<u32>> {
-        match raw {
-            NumberOrWord::Number(n) => u32::try_from(*n).ok().filter(|n| *n > 0).map(Some),
-            NumberOrWord::Word(word) => (word == "auto").then_some(None),
-        }
-    }
-
-    fn allowed(&self) -> String {
-        "a number above 0, or \"auto\"".to_owned()
-    }
+fn locked_or_auto() -> ValueRule<'static, NumberOrWord, Option<u32>> {
+    ValueRule::new("a number above 0, or \"auto\"", |raw: &NumberOrWord| match raw {
+        NumberOrWord::Number(n) => u32::try_from(*n).ok().filter(|n| *n > 0).map(Some),
+        NumberOrWord::Word(word) => (word == "auto").then_some(None),
+    })
 }
 
 /// "YUYV 1280x720@30": coding, size, frames per second (a fraction as 30000/1001 as well).
@@ -132,17 +119,17 @@ impl RawImu {
     /// The orientation that is used: the unit's own or the one estimated here.
     pub(super) fn orientation(&self, text: TomlText<'_>) -> Result<Orientation, TomlError> {
         let sources = [("auto", Orientation::Auto), ("fused", Orientation::Fused)];
-        Ok(text.given(&self.orientation, OneOf(&sources))?.unwrap_or_default())
+        Ok(text.given(&self.orientation, one_of(&sources))?.unwrap_or_default())
     }
 
     pub(super) fn check(self, text: TomlText<'_>) -> Result<ImuSettings> {
         let formats = ImuFormat::ALL.map(|format| (format.key(), format));
-        let jitter = text.given(&self.packet_jitter_ms_max, NumberWithin(1.0..=1000.0, "ms"))?;
+        let jitter = text.given(&self.packet_jitter_ms_max, number(1.0..=1000.0, "ms"))?;
         let usual = ImuSettings::default();
         Ok(ImuSettings {
             device: self.device,
-            baud: text.given(&self.baud, BaudRates)?.unwrap_or_default(),
-            format: text.given(&self.format, OneOf(&formats))?,
+            baud: text.given(&self.baud, baud_rates())?.unwrap_or_default(),
+            format: text.given(&self.format, one_of(&formats))?,
             low_latency: self.low_latency.unwrap_or(usual.low_latency),
             late: jitter.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
         })
@@ -158,25 +145,14 @@ pub(super) enum RawBaud {
 }
 
 /// The rate of a serial line, or up to 16 that are tried.
-pub(super) struct BaudRates;
-
-impl ValueRule for BaudRates {
-    type Raw = RawBaud;
-    type Value = Baud;
-
-    fn check(&self, raw: &RawBaud) -> Option<Baud> {
-        match raw {
-            RawBaud::One(rate) => (*rate > 0).then_some(Baud::Fixed(*rate)),
-            RawBaud::Several(rates) => {
-                let good = (1..=16).contains(&rates.len()) && !rates.contains(&0);
-                good.then(|| Baud::Scan(rates.clone()))
-            }
+pub(super) fn baud_rates() -> ValueRule<'static, RawBaud, Baud> {
+    ValueRule::new("a rate such as 115200, or 1 to 16 to try", |raw: &RawBaud| match raw {
+        RawBaud::One(rate) => (*rate > 0).then_some(Baud::Fixed(*rate)),
+        RawBaud::Several(rates) => {
+            let good = (1..=16).contains(&rates.len()) && !rates.contains(&0);
+            good.then(|| Baud::Scan(rates.clone()))
         }
-    }
-
-    fn allowed(&self) -> String {
-        "a rate such as 115200, or 1 to 16 to try".to_owned()
-    }
+    })
 }
 
 /// An input line of a chip: trigger, interlock, power-fail or a button.
@@ -192,22 +168,11 @@ pub(super) struct RawGpioLine {
 }
 
 /// A line by its number on the chip or by its name.
-struct GpioLineName;
-
-impl ValueRule for GpioLineName {
-    type Raw = NumberOrWord;
-    type Value = String;
-
-    fn check(&self, raw: &NumberOrWord) -> Option<String> {
-        match raw {
-            NumberOrWord::Number(n) => u32::try_from(*n).ok().map(|n| n.to_string()),
-            NumberOrWord::Word(name) => Some(name.clone()),
-        }
-    }
-
-    fn allowed(&self) -> String {
-        "the line's number, or its name in quotes".to_owned()
-    }
+fn gpio_line_name() -> ValueRule<'static, NumberOrWord, String> {
+    ValueRule::new("the line's number, or its name in quotes", |raw: &NumberOrWord| match raw {
+        NumberOrWord::Number(n) => u32::try_from(*n).ok().map(|n| n.to_string()),
+        NumberOrWord::Word(name) => Some(name.clone()),
+    })
 }
 
 /// A switch of ordinary make chatters for less, and nobody presses twice in that time.
@@ -224,7 +189,7 @@ impl RawGpioLine {
 
     /// The trigger's input.
     pub(super) fn trigger(self, text: TomlText<'_>) -> Result<TriggerChoice, TomlError> {
-        let ms = text.given(&self.debounce_ms, WholeWithin(10..=20))?.unwrap_or(DEBOUNCE_MS);
+        let ms = text.given(&self.debounce_ms, whole(10..=20))?.unwrap_or(DEBOUNCE_MS);
         Ok(TriggerChoice { line: self.line(text)?, debounce: Duration::from_millis(ms) })
     }
 
@@ -235,8 +200,8 @@ impl RawGpioLine {
             ("pull-down", Bias::PullDown),
             ("disabled", Bias::Disabled),
         ];
-        let bias = text.given(&self.bias, OneOf(&biases))?.unwrap_or(Bias::AsIs);
-        let line = text.needed(&self.line, GpioLineName)?;
+        let bias = text.given(&self.bias, one_of(&biases))?.unwrap_or(Bias::AsIs);
+        let line = text.needed(&self.line, gpio_line_name())?;
         Ok(InputLine { chip: self.chip, line, active_low: self.active_low, bias })
     }
 }
@@ -254,7 +219,7 @@ pub(super) struct RawLamps {
 
 impl RawLamps {
     pub(super) fn settings(self, text: TomlText<'_>) -> Result<LampSettings, TomlError> {
-        let line = |name| text.given(name, GpioLineName);
+        let line = |name| text.given(name, gpio_line_name());
         Ok(LampSettings {
             ready: line(&self.ready)?,
             hit: line(&self.hit)?,

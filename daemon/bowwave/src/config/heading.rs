@@ -6,7 +6,7 @@ use anyhow::Result;
 use bowwave_core::{
     estimate::{HeadingSettings, Landmark, Stow},
     event::MarkKind,
-    text::toml::{NumberWithin, OptionalKey, RequiredKey, Spanned, TomlError, TomlText},
+    text::toml::{OptionalKey, RequiredKey, Spanned, TomlError, TomlText, ValueRule, number},
 };
 use bowwave_devices::{
     serial::ShipSettings,
@@ -14,17 +14,25 @@ use bowwave_devices::{
 };
 use serde::Deserialize;
 
-use super::devices::{BaudRates, RawBaud, RawGpioLine};
+use super::devices::{RawBaud, RawGpioLine, baud_rates};
 
 /// Most landmarks of one place.
 const LANDMARKS_MAX: usize = 64;
 
 /// A bearing: clockwise, from the bow or from north.
-const BEARING: NumberWithin = NumberWithin(-360.0..=360.0, "degrees");
+fn bearing() -> ValueRule<'static, f64, f64> {
+    number(-360.0..=360.0, "degrees")
+}
+
 /// The standard deviation of a heading that somebody gives.
-const SIGMA: NumberWithin = NumberWithin(0.01..=20.0, "degrees");
+fn sigma() -> ValueRule<'static, f64, f64> {
+    number(0.01..=20.0, "degrees")
+}
+
 /// A rate at which a heading may drift.
-const DRIFT: NumberWithin = NumberWithin(0.0..=3600.0, "degrees/h");
+fn drift() -> ValueRule<'static, f64, f64> {
+    number(0.0..=3600.0, "degrees/h")
+}
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -99,12 +107,13 @@ impl RawHeadings {
         let (landmarks, input) = self.landmarks.check(text)?;
         choice.settings.landmarks = landmarks;
         choice.presses.extend(input.map(|line| Press { line, kind: MarkKind::Landmark }));
-        let per_hour = |value| Ok::<_, TomlError>(text.given(value, DRIFT)?.map(|d| d.to_radians() / 3600.0));
+        let per_hour =
+            |value| Ok::<_, TomlError>(text.given(value, drift())?.map(|d| d.to_radians() / 3600.0));
         choice.settings.own_growth = per_hour(&self.heading.growth_deg_per_h)?;
         if let Some(drift) = per_hour(&self.heading.sky_drift_deg_per_h)? {
             choice.settings.sky_drift = drift;
         }
-        let shown = NumberWithin(0.0..=180.0, "degrees");
+        let shown = number(0.0..=180.0, "degrees");
         if let Some(deg) = text.given(&self.heading.display_sigma_above_deg, shown)? {
             choice.settings.shown_above = deg.to_radians();
         }
@@ -118,27 +127,27 @@ impl RawShip {
         if let Err(e) = glob::Pattern::new(&device.to_string_lossy()) {
             return Err(text.error(&self.device, e).into());
         }
-        if let Some(ms) = text.given(&self.latency_ms, NumberWithin(0.0..=1500.0, "ms"))? {
+        if let Some(ms) = text.given(&self.latency_ms, number(0.0..=1500.0, "ms"))? {
             settings.ship_latency_ns = bowwave_core::time::secs_to_ns(ms * 1e-3);
         }
-        if let Some(deg) = text.given(&self.sigma_deg, SIGMA)? {
+        if let Some(deg) = text.given(&self.sigma_deg, sigma())? {
             settings.ship_sigma = deg.to_radians();
         }
         let usual = ShipSettings::new(self.device.into_inner());
-        let baud = text.given(&self.baud, BaudRates)?.unwrap_or_else(|| usual.baud.clone());
+        let baud = text.given(&self.baud, baud_rates())?.unwrap_or_else(|| usual.baud.clone());
         Ok(ShipSettings { baud, ..usual })
     }
 }
 
 fn rezero(text: TomlText<'_>, raw: Option<Spanned<RawRezero>>) -> Result<(Stow, Option<InputLine>)> {
     let (section, raw) = text.section("rezero", raw);
-    let bearing = |value| Ok::<_, TomlError>(text.given(value, BEARING)?.map(f64::to_radians));
-    let (from_bow, from_north) = (bearing(&raw.from_bow_deg)?, bearing(&raw.from_north_deg)?);
+    let radians = |value| Ok::<_, TomlError>(text.given(value, bearing())?.map(f64::to_radians));
+    let (from_bow, from_north) = (radians(&raw.from_bow_deg)?, radians(&raw.from_north_deg)?);
     if from_bow.is_none() && from_north.is_none() {
         let what = "it (with a ship feed) or from_north_deg: where the gun stands when the operator presses";
         return Err(section.missing("from_bow_deg", what).into());
     }
-    let sigma = text.given(&raw.sigma_deg, SIGMA)?.unwrap_or(0.5);
+    let sigma = text.given(&raw.sigma_deg, sigma())?.unwrap_or(0.5);
     let stow = Stow { from_bow, from_north, sigma: sigma.to_radians() };
     Ok((stow, raw.input.map(|line| line.input(text)).transpose()?))
 }
@@ -150,8 +159,8 @@ impl RawLandmarks {
             return Err(text.error(&beyond.bearing_deg, why).into());
         }
         let landmark = |raw: RawLandmark| -> Result<Landmark, TomlError> {
-            let bearing = text.needed(&raw.bearing_deg, BEARING)?;
-            let sigma = text.given(&raw.sigma_deg, SIGMA)?.unwrap_or(0.3);
+            let bearing = text.needed(&raw.bearing_deg, bearing())?;
+            let sigma = text.given(&raw.sigma_deg, sigma())?.unwrap_or(0.3);
             Ok(Landmark { bearing: bearing.to_radians(), sigma: sigma.to_radians() })
         };
         let landmarks = self.at.into_iter().map(landmark).collect::<Result<_, _>>()?;

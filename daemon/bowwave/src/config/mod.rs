@@ -12,7 +12,7 @@ pub use self::heading::HeadingChoice;
 use anyhow::{Context, Result};
 use bowwave_core::{
     estimate::attitude::Source as Orientation,
-    text::toml::{NumberWithin, OneOf, OptionalKey, RenamedKey, Spanned, TomlError, TomlText, bounded_text},
+    text::toml::{OptionalKey, RenamedKey, Spanned, TomlError, TomlText, bounded_text, number, one_of},
 };
 use bowwave_devices::{
     camera::CameraSettings, lamps::LampSettings, lcd::LcdSettings, serial::ImuSettings, trigger::InputLine,
@@ -184,12 +184,12 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         ..LcdSettings::default()
     };
     lcd.mode.size = size;
-    lcd.mode.refresh_hz = text.given(&raw.screen.refresh_hz, NumberWithin(1.0..=1000.0, "Hz"))?;
+    lcd.mode.refresh_hz = text.given(&raw.screen.refresh_hz, number(1.0..=1000.0, "Hz"))?;
     let outputs =
         [("lcd", ScreenOutput::Lcd), ("window", ScreenOutput::Window), ("none", ScreenOutput::None)];
     let temperature_c_max =
-        text.given(&raw.health.temperature_c_max, NumberWithin(20.0..=150.0, "degrees Celsius"))?;
-    let timeout_ms = text.given(&raw.gpu.gpu_timeout_ms, NumberWithin(100.0..=60_000.0, "ms"))?;
+        text.given(&raw.health.temperature_c_max, number(20.0..=150.0, "degrees Celsius"))?;
+    let timeout_ms = text.given(&raw.gpu.gpu_timeout_ms, number(100.0..=60_000.0, "ms"))?;
     // A built-in scenario's name is no path.
     let scenario = raw.files.scenario.map(|p| {
         let built_in = bowwave_core::world::scenario::BUILT_IN.iter().any(|(name, _)| p.as_os_str() == *name);
@@ -204,7 +204,7 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
     let input = |line: Option<devices::RawGpioLine>| line.map(|line| line.input(text)).transpose();
     Ok(Config {
         heading: heading.check(text)?,
-        output: text.given(&raw.screen.output, OneOf(&outputs))?.unwrap_or_default(),
+        output: text.given(&raw.screen.output, one_of(&outputs))?.unwrap_or_default(),
         size,
         lcd,
         camera: raw.camera.check(text)?,

@@ -4,19 +4,21 @@
 //! [`ValueRule`] says which values a key may have. [`TomlText`] reads the struct and applies the rules. Every refusal is a
 //! [`TomlError`]: origin, line, column, key, the value as it is written, and what is allowed.
 
+mod rules;
+
 use std::{
     borrow::Cow,
-    fmt::{self, Display},
+    fmt::Display,
     io::{self, Read},
-    ops::{Range, RangeInclusive},
+    ops::Range,
 };
 
-use ::toml::{
-    de::{DeTable, DeValue, Deserializer},
-    value::Datetime,
-};
+use ::toml::de::{DeTable, DeValue, Deserializer};
 use serde::{Deserialize, de::IgnoredAny};
 
+pub use self::rules::{
+    BareOrQuoted, ValueRule, date_and_time, list_of, number, one_of, plain_text, positive, whole, yes_no,
+};
 pub use ::toml::Spanned;
 
 use super::{line_column, one_line};
@@ -164,11 +166,11 @@ impl<'a> TomlText<'a> {
     ///
     /// # Errors
     /// Where the rule does not allow the value.
-    pub fn given<R: ValueRule>(
+    pub fn given<R, V>(
         self,
-        value: &OptionalKey<R::Raw>,
-        rule: R,
-    ) -> Result<Option<R::Value>, TomlError> {
+        value: &OptionalKey<R>,
+        rule: ValueRule<'_, R, V>,
+    ) -> Result<Option<V>, TomlError> {
         value.as_ref().map(|value| self.needed(value, rule)).transpose()
     }
 
@@ -176,12 +178,12 @@ impl<'a> TomlText<'a> {
     ///
     /// # Errors
     /// Where the rule does not allow the value.
-    pub fn needed<R: ValueRule>(self, value: &RequiredKey<R::Raw>, rule: R) -> Result<R::Value, TomlError> {
+    pub fn needed<R, V>(self, value: &RequiredKey<R>, rule: ValueRule<'_, R, V>) -> Result<V, TomlError> {
         let checked = match value.get_ref() {
             Loose::Fits(raw) => rule.check(raw),
             Loose::Other(_) => None,
         };
-        checked.ok_or_else(|| self.refuse(value, &rule.allowed()))
+        checked.ok_or_else(|| self.refuse(value, &rule.allowed))
     }
 
     /// The error that a value is not allowed.
@@ -197,6 +199,11 @@ impl<'a> TomlText<'a> {
     /// Place of a value.
     pub fn place<T>(self, value: &Spanned<T>) -> TomlPlace {
         self.at(value.span().start).of_key(self.path(&value.span()))
+    }
+
+    /// Place of a value, under a name of the caller's.
+    pub fn place_as<T>(self, value: &Spanned<T>, key: impl Into<String>) -> TomlPlace {
+        self.at(value.span().start).of_key(key)
     }
 
     /// The root, for keys that it lacks.
@@ -287,8 +294,8 @@ impl<'a> TomlText<'a> {
         let key = place.key.rsplit('.').next().unwrap_or_default().to_owned();
         let allowed = match expected {
             "a sequence" => "a list".to_owned(),
-            "a string" => PlainText.allowed(),
-            "a boolean" => YesNo.allowed(),
+            "a string" => plain_text().allowed,
+            "a boolean" => yes_no().allowed,
             kind if kind.starts_with("struct ") && !key.contains('[') => format!("a table: [{key}]"),
             kind if kind.starts_with("struct ") => "a table".to_owned(),
             kind => kind.replace('`', "\""),
@@ -340,15 +347,15 @@ impl TomlSection<'_> {
     ///
     /// # Errors
     /// Where it is left out, or the rule does not allow the value.
-    pub fn required<R: ValueRule>(
+    pub fn required<R, V>(
         &self,
         key: &str,
-        value: &OptionalKey<R::Raw>,
-        rule: R,
-    ) -> Result<R::Value, TomlError> {
+        value: &OptionalKey<R>,
+        rule: ValueRule<'_, R, V>,
+    ) -> Result<V, TomlError> {
         match value {
             Some(value) => self.text.needed(value, rule),
-            None => Err(self.missing(key, &rule.allowed())),
+            None => Err(self.missing(key, &rule.allowed)),
         }
     }
 
@@ -366,179 +373,6 @@ impl TomlSection<'_> {
     pub fn place(&self, key: &str) -> TomlPlace {
         let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
         self.text.at(self.start).of_key(path)
-    }
-}
-
-/// Which values a key may have.
-pub trait ValueRule {
-    /// Type in the text.
-    type Raw;
-    /// Type of the checked value.
-    type Value;
-    /// The value, where it is allowed.
-    fn check(&self, raw: &Self::Raw) -> Option<Self::Value>;
-    /// The allowed values, in words.
-    fn allowed(&self) -> String;
-}
-
-/// A number within bounds, in a unit. NaN lies within none.
-#[derive(Clone, Debug)]
-pub struct NumberWithin(pub RangeInclusive<f64>, pub &'static str);
-
-impl ValueRule for NumberWithin {
-    type Raw = f64;
-    type Value = f64;
-
-    fn check(&self, raw: &f64) -> Option<f64> {
-        self.0.contains(raw).then_some(*raw)
-    }
-
-    fn allowed(&self) -> String {
-        format!("a number, {} to {}{}", self.0.start(), self.0.end(), InUnit(self.1))
-    }
-}
-
-/// A number above zero and up to a limit, in a unit: a standard deviation.
-#[derive(Clone, Copy, Debug)]
-pub struct PositiveUpTo(pub f64, pub &'static str);
-
-impl ValueRule for PositiveUpTo {
-    type Raw = f64;
-    type Value = f64;
-
-    fn check(&self, raw: &f64) -> Option<f64> {
-        (*raw > 0.0 && *raw <= self.0).then_some(*raw)
-    }
-
-    fn allowed(&self) -> String {
-        format!("a number above 0, up to {}{}", self.0, InUnit(self.1))
-    }
-}
-
-/// `N` values in a list, each of which its rule allows.
-#[derive(Clone, Debug)]
-pub struct ListOf<const N: usize, R>(pub R);
-
-impl<const N: usize, R: ValueRule> ValueRule for ListOf<N, R> {
-    type Raw = Vec<R::Raw>;
-    type Value = [R::Value; N];
-
-    fn check(&self, raw: &Vec<R::Raw>) -> Option<[R::Value; N]> {
-        raw.iter().map(|part| self.0.check(part)).collect::<Option<Vec<_>>>()?.try_into().ok()
-    }
-
-    fn allowed(&self) -> String {
-        format!("a list of {N}, each {}", self.0.allowed())
-    }
-}
-
-/// A whole number within bounds.
-#[derive(Clone, Debug)]
-pub struct WholeWithin<T>(pub RangeInclusive<T>);
-
-impl<T: TryFrom<i64> + PartialOrd + Display> ValueRule for WholeWithin<T> {
-    type Raw = i64;
-    type Value = T;
-
-    fn check(&self, raw: &i64) -> Option<T> {
-        T::try_from(*raw).ok().filter(|n| self.0.contains(n))
-    }
-
-    fn allowed(&self) -> String {
-        format!("a whole number, {} to {}", self.0.start(), self.0.end())
-    }
-}
-
-/// A text of 1 to 200 printable characters.
-#[derive(Clone, Copy, Debug)]
-pub struct PlainText;
-
-impl ValueRule for PlainText {
-    type Raw = String;
-    type Value = String;
-
-    fn check(&self, raw: &String) -> Option<String> {
-        let good =
-            (1..=200).contains(&raw.len()) && !raw.trim().is_empty() && !raw.chars().any(char::is_control);
-        good.then(|| raw.clone())
-    }
-
-    fn allowed(&self) -> String {
-        "a text in quotes, 1 to 200 printable characters".to_owned()
-    }
-}
-
-/// One of a few names, each with its meaning.
-#[derive(Clone, Copy, Debug)]
-pub struct OneOf<'n, T>(pub &'n [(&'n str, T)]);
-
-impl<T: Copy> ValueRule for OneOf<'_, T> {
-    type Raw = String;
-    type Value = T;
-
-    fn check(&self, raw: &String) -> Option<T> {
-        self.0.iter().find(|(name, _)| name == raw).map(|(_, meaning)| *meaning)
-    }
-
-    fn allowed(&self) -> String {
-        let names: Vec<String> = self.0.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-        format!("one of {}", names.join(", "))
-    }
-}
-
-/// True or false.
-#[derive(Clone, Copy, Debug)]
-pub struct YesNo;
-
-impl ValueRule for YesNo {
-    type Raw = bool;
-    type Value = bool;
-
-    fn check(&self, raw: &bool) -> Option<bool> {
-        Some(*raw)
-    }
-
-    fn allowed(&self) -> String {
-        "true or false".to_owned()
-    }
-}
-
-/// A date and time as it stands in a text: bare, or in quotes.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged)]
-pub enum BareOrQuoted {
-    /// Without quotes.
-    Bare(Datetime),
-    /// In quotes.
-    Quoted(String),
-}
-
-/// A date, a time or both, bare or in quotes.
-#[derive(Clone, Copy, Debug)]
-pub struct DateAndTime;
-
-impl ValueRule for DateAndTime {
-    type Raw = BareOrQuoted;
-    type Value = Datetime;
-
-    fn check(&self, raw: &BareOrQuoted) -> Option<Datetime> {
-        match raw {
-            BareOrQuoted::Bare(stamp) => Some(*stamp),
-            BareOrQuoted::Quoted(text) => text.parse().ok(),
-        }
-    }
-
-    fn allowed(&self) -> String {
-        "a time like \"2026-06-01T12:00:00Z\"".to_owned()
-    }
-}
-
-/// A unit after a number; nothing where there is none.
-struct InUnit(&'static str);
-
-impl Display for InUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.0.is_empty() { Ok(()) } else { write!(f, " {}", self.0) }
     }
 }
 

@@ -32,16 +32,16 @@ fn read(text: &str) -> Result<(Option<f64>, Vec<String>), TomlError> {
     let text = TomlText::new(text, "room.toml")?;
     let (raw, warnings) = text.read::<RawRoom>(&RENAMED)?;
     let (_, shelf) = text.section("shelf", raw.shelf);
-    text.given(&shelf.boards, WholeWithin(1..=9u8))?;
-    text.given(&shelf.label, PlainText)?;
-    text.given(&shelf.at_m, ListOf::<2, _>(PositiveUpTo(5.0, "m")))?;
-    text.given(&shelf.hung, YesNo)?;
-    text.given(&shelf.made, DateAndTime)?;
+    text.given(&shelf.boards, whole(1..=9u8))?;
+    text.given(&shelf.label, plain_text())?;
+    text.given(&shelf.at_m, list_of::<2, _, _>(positive(5.0, "m")))?;
+    text.given(&shelf.hung, yes_no())?;
+    text.given(&shelf.made, date_and_time())?;
     for (_, book) in text.sections("book", raw.book, 2)? {
-        text.needed(&book.pages, WholeWithin(1..=2000u16))?;
+        text.needed(&book.pages, whole(1..=2000u16))?;
         assert!(book.bound);
     }
-    Ok((text.given(&shelf.width_mm, NumberWithin(100.0..=2000.0, "mm"))?, warnings))
+    Ok((text.given(&shelf.width_mm, number(100.0..=2000.0, "mm"))?, warnings))
 }
 
 fn refused(text: &str) -> String {

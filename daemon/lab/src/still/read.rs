@@ -1,13 +1,15 @@
 //! The text of a [`Still`].
 
+use std::ops::RangeInclusive;
+
 use bowwave_core::{
     text::toml::{
-        BareOrQuoted, NumberWithin, OptionalKey, PlainText, RequiredKey, Spanned, TomlError, TomlPlace,
-        TomlSection, TomlText, ValueRule,
+        BareOrQuoted, OptionalKey, RequiredKey, Spanned, TomlError, TomlPlace, TomlSection, TomlText,
+        ValueRule, number, plain_text,
     },
     world::scenario::{
         place,
-        read::{ANGLE, LightKeys, M_S_PER_KN, ReflectionKeys, SEED, SeaKeys, light, reflection, sea},
+        read::{LightKeys, M_S_PER_KN, ReflectionKeys, SeaKeys, angle, light, reflection, sea, seed},
     },
 };
 use glam::DVec2;
@@ -89,13 +91,13 @@ pub(super) fn still(text: &str, origin: &str) -> Result<Still, TomlError> {
         return Err(text.root().missing("picture", "the path of a JPEG or PNG file, or of a folder of them"));
     };
     Ok(Still {
-        picture: text.needed(picture, PlainText)?,
-        seed: text.given(&raw.seed, SEED)?.map_or(1, i64::unsigned_abs),
-        interval_s: text.given(&raw.interval_s, NumberWithin(0.001..=3600.0, "s"))?,
+        picture: text.needed(picture, plain_text())?,
+        seed: text.given(&raw.seed, seed())?.unwrap_or(1),
+        interval_s: text.given(&raw.interval_s, number(0.001..=3600.0, "s"))?,
         camera: camera(&section, &view)?,
         waves,
         sun_direction,
-        sun_strength: text.given(&sun_strength, NumberWithin(0.0..=1.0, ""))?.unwrap_or(1.0),
+        sun_strength: text.given(&sun_strength, number(0.0..=1.0, ""))?.unwrap_or(1.0),
         visibility_m,
         water: reflection(text, &mirror, force, &mut warnings)?,
         boats: boats
@@ -107,46 +109,30 @@ pub(super) fn still(text: &str, origin: &str) -> Result<Still, TomlError> {
     })
 }
 
-/// A point or two coefficients: a pair of numbers.
-struct NumberPair {
-    range: std::ops::RangeInclusive<f64>,
-    allowed: &'static str,
-}
-
-impl ValueRule for NumberPair {
-    type Raw = Vec<f64>;
-    type Value = DVec2;
-
-    fn check(&self, raw: &Vec<f64>) -> Option<DVec2> {
-        match raw[..] {
-            [x, y] if self.range.contains(&x) && self.range.contains(&y) => Some(DVec2::new(x, y)),
-            _ => None,
-        }
-    }
-
-    fn allowed(&self) -> String {
-        self.allowed.to_owned()
-    }
+/// A pair of numbers: a point or two coefficients.
+fn pair(range: RangeInclusive<f64>, allowed: &str) -> ValueRule<'static, Vec<f64>, DVec2> {
+    ValueRule::new(allowed, move |raw: &Vec<f64>| match raw[..] {
+        [x, y] if range.contains(&x) && range.contains(&y) => Some(DVec2::new(x, y)),
+        _ => None,
+    })
 }
 
 /// A point of the picture.
-const fn pixel(allowed: &'static str) -> NumberPair {
-    NumberPair { range: 0.0..=PIXEL_MAX, allowed }
+fn pixel(allowed: &str) -> ValueRule<'static, Vec<f64>, DVec2> {
+    pair(0.0..=PIXEL_MAX, allowed)
 }
 
 /// Two coefficients of the lens.
-const fn coefficients() -> NumberPair {
-    NumberPair { range: -10.0..=10.0, allowed: "a pair of numbers, -10 to 10: [0.01, 0.0]" }
+fn coefficients() -> ValueRule<'static, Vec<f64>, DVec2> {
+    pair(-10.0..=10.0, "a pair of numbers, -10 to 10: [0.01, 0.0]")
 }
 
 fn camera(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<StillCamera, TomlError> {
     let text = section.text;
     let ways = [
-        ("focal_px", &raw.focal_px, NumberWithin(1.0..=1e6, "pixels"), Focal::Pixels as fn(f64) -> Focal),
-        ("hfov_deg", &raw.hfov_deg, NumberWithin(0.2..=150.0, "degrees"), |deg| {
-            Focal::Across(deg.to_radians())
-        }),
-        ("focal_35mm_mm", &raw.focal_35mm_mm, NumberWithin(5.0..=5000.0, "mm"), Focal::Film),
+        ("focal_px", &raw.focal_px, number(1.0..=1e6, "pixels"), Focal::Pixels as fn(f64) -> Focal),
+        ("hfov_deg", &raw.hfov_deg, number(0.2..=150.0, "degrees"), |deg| Focal::Across(deg.to_radians())),
+        ("focal_35mm_mm", &raw.focal_35mm_mm, number(5.0..=5000.0, "mm"), Focal::Film),
     ];
     let mut told: Option<(&str, Focal, TomlPlace)> = None;
     for (key, value, rule, focal) in ways {
@@ -169,12 +155,12 @@ fn camera(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<StillCamera
         (None, None) => section.place("horizon"),
     };
     Ok(StillCamera {
-        eye_height_m: section.required("eye_height_m", &raw.eye_height_m, NumberWithin(0.2..=500.0, "m"))?,
+        eye_height_m: section.required("eye_height_m", &raw.eye_height_m, number(0.2..=500.0, "m"))?,
         focal,
         centre: text.given(&raw.centre_px, pixel("a pair of pixels: [960, 540]"))?,
         radial: text.given(&raw.radial, coefficients())?.unwrap_or(DVec2::ZERO),
         tangential: text.given(&raw.tangential, coefficients())?.unwrap_or(DVec2::ZERO),
-        azimuth: text.given(&raw.azimuth_deg, ANGLE)?.unwrap_or(0.0).to_radians(),
+        azimuth: text.given(&raw.azimuth_deg, angle())?.unwrap_or(0.0).to_radians(),
         attitude,
         focal_at,
         attitude_at,
@@ -185,7 +171,7 @@ fn attitude(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<Attitude,
     let text = section.text;
     let what = "two points of the horizon in pixels: [[100, 410], [1180, 404]]";
     let angle = |value: &OptionalKey<f64>| -> Result<Option<f64>, TomlError> {
-        Ok(text.given(value, NumberWithin(-85.0..=85.0, "degrees"))?.map(f64::to_radians))
+        Ok(text.given(value, number(-85.0..=85.0, "degrees"))?.map(f64::to_radians))
     };
     let (pitch, roll) = (angle(&raw.pitch_deg)?, angle(&raw.roll_deg)?);
     if let Some(horizon) = &raw.horizon {
@@ -205,9 +191,9 @@ fn attitude(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<Attitude,
     }
 }
 
-fn boat(section: &TomlSection<'_>, raw: &RawStillBoat, number: usize) -> Result<StillBoat, TomlError> {
+fn boat(section: &TomlSection<'_>, raw: &RawStillBoat, nth: usize) -> Result<StillBoat, TomlError> {
     let text = section.text;
-    let range = NumberWithin(1.0..=RANGE_MAX_M, "m");
+    let range = number(1.0..=RANGE_MAX_M, "m");
     let (at, stands) = match (&raw.waterline_px, &raw.range_m, &raw.bearing_deg) {
         (Some(_), Some(other), _) | (Some(_), None, Some(other)) => {
             return Err(text.error(other, "follows from waterline_px; leave out it or that"));
@@ -222,7 +208,7 @@ fn boat(section: &TomlSection<'_>, raw: &RawStillBoat, number: usize) -> Result<
         }
         (None, value, bearing) => {
             let range_m = section.required("range_m", value, range)?;
-            let bearing = section.required("bearing_deg", bearing, ANGLE)?;
+            let bearing = section.required("bearing_deg", bearing, angle())?;
             let stands = value.as_ref().map_or_else(|| section.place("range_m"), |value| text.place(value));
             (Place::World(place(bearing.to_radians(), range_m)), stands)
         }
@@ -231,11 +217,11 @@ fn boat(section: &TomlSection<'_>, raw: &RawStillBoat, number: usize) -> Result<
         return Err(section.missing("model", "the name of a model or the path of a glTF or PNG file"));
     };
     Ok(StillBoat {
-        name: text.given(&raw.name, PlainText)?.unwrap_or_else(|| format!("boat {number}")),
-        model: text.needed(model, PlainText)?,
+        name: text.given(&raw.name, plain_text())?.unwrap_or_else(|| format!("boat {nth}")),
+        model: text.needed(model, plain_text())?,
         place: at,
-        heading: section.required("heading_deg", &raw.heading_deg, ANGLE)?.to_radians(),
-        speed_m_s: text.given(&raw.speed_kn, NumberWithin(0.0..=100.0, "kn"))?.unwrap_or(0.0) * M_S_PER_KN,
+        heading: section.required("heading_deg", &raw.heading_deg, angle())?.to_radians(),
+        speed_m_s: text.given(&raw.speed_kn, number(0.0..=100.0, "kn"))?.unwrap_or(0.0) * M_S_PER_KN,
         stands,
     })
 }

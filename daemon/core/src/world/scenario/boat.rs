@@ -5,12 +5,12 @@ use serde::Deserialize;
 
 use super::{
     BoatSpec, Side, place,
-    read::{ANGLE, M_S_PER_KN},
+    read::{M_S_PER_KN, angle},
 };
 use crate::{
     text::toml::{
-        NumberWithin, OneOf, OptionalKey, PlainText, RequiredKey, Spanned, TomlError, TomlSection, ValueRule,
-        YesNo,
+        OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, ValueRule, number, one_of, plain_text,
+        yes_no,
     },
     world::boats::{Arrival, Course, CourseError},
 };
@@ -104,7 +104,7 @@ pub(super) fn boats(tables: Vec<(TomlSection<'_>, RawBoat)>) -> Result<Vec<BoatS
 
 fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatSpec, TomlError> {
     let text = section.text;
-    let kind = section.required("course", &raw.course, OneOf(&KINDS))?;
+    let kind = section.required("course", &raw.course, one_of(&KINDS))?;
     for (key, value) in raw.of_courses() {
         if let Some(value) = value.filter(|_| !kind.keys().contains(&key)) {
             let problem = format!(
@@ -117,78 +117,69 @@ fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatS
     }
     let sides = [("hostile", Side::Hostile), ("neutral", Side::Neutral)];
     let named = |key, value: &OptionalKey<String>, what| match value {
-        Some(value) => text.needed(value, PlainText),
+        Some(value) => text.needed(value, plain_text()),
         None => Err(section.missing(key, what)),
     };
     let course = course(section, raw, kind)?;
     let range = raw.range_m.as_ref();
-    let stands = range.map_or_else(|| section.place("range_m"), |range| text.place(range));
+    let key = format!("boat[{number}]");
+    let stands = range.map_or_else(|| section.place("range_m"), |range| text.place_as(range, key));
     Ok(BoatSpec {
         name: named("name", &raw.name, "the boat a name of its own")?,
         model: named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?,
-        side: text.given(&raw.side, OneOf(&sides))?.unwrap_or(Side::Hostile),
+        side: text.given(&raw.side, one_of(&sides))?.unwrap_or(Side::Hostile),
         course,
-        stands: stands.of_key(format!("boat[{number}]")),
+        stands,
     })
 }
 
-/// A point of a course by bearing and range.
-struct Waypoint;
-
-impl ValueRule for Waypoint {
-    type Raw = Vec<f64>;
-    type Value = DVec2;
-
-    fn check(&self, raw: &Vec<f64>) -> Option<DVec2> {
-        match raw[..] {
-            [bearing, range_m] if ANGLE.0.contains(&bearing) && RANGE.0.contains(&range_m) => {
-                Some(place(bearing.to_radians(), range_m))
-            }
-            _ => None,
-        }
-    }
-
-    fn allowed(&self) -> String {
-        "pairs [bearing_deg, range_m] within -360 to 360 degrees and 1 to 20000 m".to_owned()
-    }
+/// Distance of a boat or a point of its course from the camera.
+fn range() -> ValueRule<'static, f64, f64> {
+    number(1.0..=20_000.0, "m")
 }
 
-/// Distance of a boat or a point of its course from the camera.
-const RANGE: NumberWithin = NumberWithin(1.0..=20_000.0, "m");
+/// A point of a course by bearing and range.
+fn waypoint() -> ValueRule<'static, Vec<f64>, DVec2> {
+    let allowed = "pairs [bearing_deg, range_m] within -360 to 360 degrees and 1 to 20000 m";
+    ValueRule::new(allowed, |raw: &Vec<f64>| match raw[..] {
+        [bearing, range_m] => Some(place(angle().check(&bearing)?.to_radians(), range().check(&range_m)?)),
+        _ => None,
+    })
+}
 
 fn course(section: &TomlSection<'_>, raw: &RawBoat, kind: CourseKind) -> Result<Course, TomlError> {
     let text = section.text;
-    let range_m = section.required("range_m", &raw.range_m, RANGE)?;
-    let bearing = section.required("bearing_deg", &raw.bearing_deg, ANGLE)?.to_radians();
+    let range_m = section.required("range_m", &raw.range_m, range())?;
+    let bearing = section.required("bearing_deg", &raw.bearing_deg, angle())?.to_radians();
     let start = place(bearing, range_m);
-    let heading = text.given(&raw.heading_deg, ANGLE)?.map(f64::to_radians);
-    let required_heading = || heading.ok_or_else(|| section.missing("heading_deg", &ANGLE.allowed()));
+    let heading = text.given(&raw.heading_deg, angle())?.map(f64::to_radians);
+    let required_heading = || heading.ok_or_else(|| section.missing("heading_deg", &angle().allowed));
     let speed = || {
-        let speed_kn = section.required("speed_kn", &raw.speed_kn, NumberWithin(0.1..=100.0, "kn"))?;
+        let speed_kn = section.required("speed_kn", &raw.speed_kn, number(0.1..=100.0, "kn"))?;
         Ok(speed_kn * M_S_PER_KN)
     };
     let built = match kind {
         CourseKind::Still => Course::still(start, heading.unwrap_or(0.0)),
         CourseKind::Straight => Course::straight(start, required_heading()?, speed()?),
         CourseKind::Weave => {
-            let amplitude = NumberWithin(0.0..=500.0, "m");
+            let amplitude = number(0.0..=500.0, "m");
             let amplitude_m = section.required("weave_amplitude_m", &raw.weave_amplitude_m, amplitude)?;
-            let period = NumberWithin(1.0..=600.0, "s");
+            let period = number(1.0..=600.0, "s");
             let period_s = section.required("weave_period_s", &raw.weave_period_s, period)?;
             Course::weave(start, required_heading()?, speed()?, amplitude_m, period_s)
         }
         CourseKind::Waypoints => {
             let points = raw.waypoints.as_ref();
-            let points = points.ok_or_else(|| section.missing("waypoints", &Waypoint.allowed()))?.get_ref();
+            let points = points.ok_or_else(|| section.missing("waypoints", &waypoint().allowed))?.get_ref();
             let points =
-                points.iter().map(|point| text.needed(point, Waypoint)).collect::<Result<Vec<_>, _>>()?;
-            let repeat = text.given(&raw.repeat, YesNo)?.unwrap_or(false);
+                points.iter().map(|point| text.needed(point, waypoint())).collect::<Result<Vec<_>, _>>()?;
+            let repeat = text.given(&raw.repeat, yes_no())?.unwrap_or(false);
             Course::waypoints(start, &points, speed()?, repeat)
         }
         CourseKind::Closing => {
-            let stop_m = text.given(&raw.stop_m, NumberWithin(5.0..=5000.0, "m"))?.unwrap_or(50.0);
+            let stop_m = text.given(&raw.stop_m, number(5.0..=5000.0, "m"))?.unwrap_or(50.0);
             let arrivals = [("stop", Arrival::Stop), ("circle", Arrival::Circle)];
-            let arrival = text.given(&raw.arrival, OneOf(&arrivals))?.unwrap_or(Arrival::Stop);
+            let arrival = text.given(&raw.arrival, one_of(&arrivals))?.unwrap_or(Arrival::Stop);
             let inward = bearing + std::f64::consts::PI;
             Course::closing(start, heading.unwrap_or(inward), speed()?, stop_m, arrival)
         }

@@ -11,8 +11,8 @@ use super::{
 use crate::{
     sea::BeaufortForce,
     text::toml::{
-        BareOrQuoted, Loose, NumberWithin, OneOf, OptionalKey, PlainText, Spanned, TomlError, TomlSection,
-        TomlText, ValueRule, WholeWithin,
+        BareOrQuoted, Loose, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number,
+        one_of, plain_text, whole,
     },
     water::{ReflectionMethod, ShadowLevel, Water},
     world::{
@@ -26,9 +26,13 @@ const BOATS_MAX: usize = 64;
 /// m/s in a knot.
 pub const M_S_PER_KN: f64 = 1852.0 / 3600.0;
 /// A seed of chance.
-pub const SEED: WholeWithin<i64> = WholeWithin(0..=i64::MAX);
+pub fn seed() -> ValueRule<'static, i64, u64> {
+    whole(0..=i64::MAX as u64)
+}
 /// An angle clockwise, in either direction.
-pub const ANGLE: NumberWithin = NumberWithin(-360.0..=360.0, "degrees");
+pub fn angle() -> ValueRule<'static, f64, f64> {
+    number(-360.0..=360.0, "degrees")
+}
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -121,7 +125,7 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let keys = SeaKeys { beaufort, wind_from_deg, significant_wave_height_m, peak_period_s };
     let (force, waves) = sea(&section, &keys)?;
     let sources = [("scenario", false), ("video", true)];
-    let sea_from_video = text.given(&source, OneOf(&sources))?.unwrap_or(false);
+    let sea_from_video = text.given(&source, one_of(&sources))?.unwrap_or(false);
     let (_, mount) = text.section("mount", raw.mount);
     let (section, keys) = text.section("light", raw.light);
     let (sun_direction, visibility_m) = light(&section, &keys)?;
@@ -131,13 +135,13 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let weapon = weapon(&section, &keys)?;
     let boats = boat::boats(text.sections("boat", raw.boat, BOATS_MAX)?)?;
     Ok(Scenario {
-        name: text.given(&raw.name, PlainText)?.unwrap_or_else(|| "unnamed".to_owned()),
-        seed: text.given(&raw.seed, SEED)?.map_or(1, i64::unsigned_abs),
-        duration_s: text.given(&raw.duration_s, NumberWithin(0.1..=86_400.0, "s"))?,
+        name: text.given(&raw.name, plain_text())?.unwrap_or_else(|| "unnamed".to_owned()),
+        seed: text.given(&raw.seed, seed())?.unwrap_or(1),
+        duration_s: text.given(&raw.duration_s, number(0.1..=86_400.0, "s"))?,
         waves,
         sea_from_video,
         wind: -place(waves.wind_from, force.wind_mean_m_s()).extend(0.0),
-        eye_height_m: text.given(&mount.eye_height_m, NumberWithin(0.5..=100.0, "m"))?.unwrap_or(8.0),
+        eye_height_m: text.given(&mount.eye_height_m, number(0.5..=100.0, "m"))?.unwrap_or(8.0),
         sun_direction,
         visibility_m,
         water,
@@ -153,11 +157,11 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
 /// Names the value that is not allowed, or the key that is missing.
 pub fn sea(section: &TomlSection<'_>, keys: &SeaKeys) -> Result<(BeaufortForce, WaveSpec), TomlError> {
     let text = section.text;
-    let force = text.given(&keys.beaufort, WholeWithin(0..=12u8))?.unwrap_or(2);
+    let force = text.given(&keys.beaufort, whole(0..=12u8))?.unwrap_or(2);
     let force = BeaufortForce::new(force).ok_or_else(|| section.error("beaufort", "is beyond the scale"))?;
-    let wind_from = text.given(&keys.wind_from_deg, ANGLE)?.unwrap_or(250.0).to_radians();
-    let height = text.given(&keys.significant_wave_height_m, NumberWithin(0.0..=20.0, "m"))?;
-    let period = text.given(&keys.peak_period_s, NumberWithin(0.5..=30.0, "s"))?;
+    let wind_from = text.given(&keys.wind_from_deg, angle())?.unwrap_or(250.0).to_radians();
+    let height = text.given(&keys.significant_wave_height_m, number(0.0..=20.0, "m"))?;
+    let period = text.given(&keys.peak_period_s, number(0.5..=30.0, "s"))?;
     let spectrum = match (height, period, &keys.significant_wave_height_m) {
         (Some(height), Some(period), Some(value)) => {
             // The measured sea rarely is a fully arisen one: the mean peak enhancement of JONSWAP.
@@ -180,25 +184,14 @@ pub fn sea(section: &TomlSection<'_>, keys: &SeaKeys) -> Result<(BeaufortForce, 
 /// # Errors
 /// As [`sea`].
 pub fn light(section: &TomlSection<'_>, keys: &LightKeys) -> Result<(DVec3, f64), TomlError> {
-    let visibility_km =
-        section.text.given(&keys.visibility_km, NumberWithin(0.05..=200.0, "km"))?.unwrap_or(20.0);
+    let visibility_km = section.text.given(&keys.visibility_km, number(0.05..=200.0, "km"))?.unwrap_or(20.0);
     Ok((sun::direction(section, keys)?, 1000.0 * visibility_km))
 }
 
 /// The name of a reflection method, or a former name.
-struct MethodName;
-
-impl ValueRule for MethodName {
-    type Raw = String;
-    type Value = ReflectionMethod;
-
-    fn check(&self, raw: &String) -> Option<ReflectionMethod> {
-        ReflectionMethod::of_name(raw)
-    }
-
-    fn allowed(&self) -> String {
-        OneOf(&ReflectionMethod::ALL.map(|method| (method.name(), method))).allowed()
-    }
+fn method_name() -> ValueRule<'static, String, ReflectionMethod> {
+    let allowed = one_of(&ReflectionMethod::ALL.map(|method| (method.name(), method))).allowed;
+    ValueRule::new(allowed, |raw: &String| ReflectionMethod::of_name(raw))
 }
 
 /// The table `[reflection]`; a former name of a method is warned of.
@@ -211,14 +204,14 @@ pub fn reflection(
     force: BeaufortForce,
     warnings: &mut Vec<String>,
 ) -> Result<Water, TomlError> {
-    let method = text.given(&keys.method, MethodName)?.unwrap_or(ReflectionMethod::Waves);
+    let method = text.given(&keys.method, method_name())?.unwrap_or(ReflectionMethod::Waves);
     if let Some(value) = &keys.method
         && let Loose::Fits(name) = value.get_ref()
         && let Some(warning) = ReflectionMethod::warning(name)
     {
         warnings.push(text.error(value, warning).to_string());
     }
-    let shadow = match text.given(&keys.shadow_level, WholeWithin(0..=2))? {
+    let shadow = match text.given(&keys.shadow_level, whole(0..=2))? {
         Some(0) => ShadowLevel::None,
         Some(2) => ShadowLevel::Strong,
         _ => ShadowLevel::Gradual,
@@ -228,24 +221,22 @@ pub fn reflection(
 
 fn weapon(section: &TomlSection<'_>, keys: &RawWeapon) -> Result<WeaponSpec, TomlError> {
     let text = section.text;
-    let velocity =
-        text.given(&keys.muzzle_velocity_m_s, NumberWithin(50.0..=2000.0, "m/s"))?.unwrap_or(890.0);
-    let coefficient = text
-        .given(&keys.ballistic_coefficient_g7_lb_in2, NumberWithin(0.05..=2.0, "lb/in^2"))?
-        .unwrap_or(0.33);
+    let velocity = text.given(&keys.muzzle_velocity_m_s, number(50.0..=2000.0, "m/s"))?.unwrap_or(890.0);
+    let coefficient =
+        text.given(&keys.ballistic_coefficient_g7_lb_in2, number(0.05..=2.0, "lb/in^2"))?.unwrap_or(0.33);
     let projectile = Projectile::new(coefficient, velocity).ok_or_else(|| {
         let problem =
             "makes no round: muzzle_velocity_m_s and ballistic_coefficient_g7_lb_in2 do not go together";
         section.error("muzzle_velocity_m_s", problem)
     })?;
-    let tracer_every = text.given(&keys.tracer_every, WholeWithin(0..=1000))?.unwrap_or(5);
+    let tracer_every = text.given(&keys.tracer_every, whole(0..=1000))?.unwrap_or(5);
     Ok(WeaponSpec {
         rounds_per_minute: text
-            .given(&keys.rounds_per_minute, NumberWithin(1.0..=6000.0, "a minute"))?
+            .given(&keys.rounds_per_minute, number(1.0..=6000.0, "a minute"))?
             .unwrap_or(500.0),
-        belt: text.given(&keys.belt, WholeWithin(0..=100_000))?.unwrap_or(100),
+        belt: text.given(&keys.belt, whole(0..=100_000))?.unwrap_or(100),
         projectile,
-        dispersion_mrad: text.given(&keys.dispersion_mrad, NumberWithin(0.0..=50.0, "mrad"))?.unwrap_or(0.6),
+        dispersion_mrad: text.given(&keys.dispersion_mrad, number(0.0..=50.0, "mrad"))?.unwrap_or(0.6),
         tracer_every: (tracer_every > 0).then_some(tracer_every),
     })
 }

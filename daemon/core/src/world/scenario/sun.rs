@@ -4,8 +4,8 @@ use glam::DVec3;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t, time::JulianDate};
 use toml::value::{Datetime, Offset};
 
-use super::read::{ANGLE, LightKeys};
-use crate::text::toml::{DateAndTime, NumberWithin, TomlError, TomlSection};
+use super::read::{LightKeys, angle};
+use crate::text::toml::{TomlError, TomlSection, date_and_time, number};
 
 /// Sun where the text names none: high enough for plain light, to the south-west.
 const DEFAULT_DEG: (f64, f64) = (215.0, 35.0);
@@ -13,12 +13,12 @@ const DEFAULT_DEG: (f64, f64) = (215.0, 35.0);
 /// Unit vector towards the sun.
 pub(super) fn direction(section: &TomlSection<'_>, keys: &LightKeys) -> Result<DVec3, TomlError> {
     let text = section.text;
-    let quarter = NumberWithin(-90.0..=90.0, "degrees");
-    let azimuth = text.given(&keys.sun_azimuth_deg, ANGLE)?;
-    let elevation = text.given(&keys.sun_elevation_deg, quarter.clone())?;
-    let latitude = text.given(&keys.latitude_deg, quarter)?;
-    let longitude = text.given(&keys.longitude_deg, NumberWithin(-180.0..=180.0, "degrees"))?;
-    let utc = text.given(&keys.utc, DateAndTime)?;
+    let quarter = || number(-90.0..=90.0, "degrees");
+    let azimuth = text.given(&keys.sun_azimuth_deg, angle())?;
+    let elevation = text.given(&keys.sun_elevation_deg, quarter())?;
+    let latitude = text.given(&keys.latitude_deg, quarter())?;
+    let longitude = text.given(&keys.longitude_deg, number(-180.0..=180.0, "degrees"))?;
+    let utc = text.given(&keys.utc, date_and_time())?;
     if let (None, None, None) = (latitude, longitude, utc) {
         let azimuth = azimuth.unwrap_or(DEFAULT_DEG.0);
         return Ok(towards(azimuth, elevation.unwrap_or(DEFAULT_DEG.1)));
