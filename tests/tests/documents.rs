@@ -73,6 +73,23 @@ fn every_page_of_docs_is_linked() {
     }
 }
 
+#[test]
+fn every_decision_tells_question_choice_figures_and_what_would_change_it() {
+    let mut decisions = 0;
+    for (path, text) in documents() {
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if !path.starts_with(root().join("docs/decisions")) || name == "README.md" {
+            continue;
+        }
+        let heads: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("## ")).collect();
+        assert_eq!(heads, ["Question", "Choice", "Figures", "What would change it"], "{name}");
+        assert!(text.starts_with(&format!("# {} ", &name[..4])), "{name} has another number in its title");
+        assert!(!text.contains("\n\n\n"), "{name} has an empty section");
+        decisions += 1;
+    }
+    assert!(decisions > 40, "only {decisions} decisions");
+}
+
 /// Words in backquotes outside of blocks of code.
 fn quoted(text: &str) -> Vec<String> {
     let mut words = Vec::new();
@@ -200,6 +217,10 @@ fn every_scenario_in_the_documents_is_read() {
             assert_eq!(scenario.warnings, [""; 0], "a document uses a former name");
             read += 1;
         }
+    }
+    for (name, text) in bowwave_core::world::scenario::BUILT_IN {
+        let scenario = Scenario::parse(text, name).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(scenario.warnings, [""; 0], "{name} uses a former name");
     }
     assert!(read >= 2, "only {read} scenarios");
 }

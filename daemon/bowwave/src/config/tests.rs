@@ -19,6 +19,28 @@ fn the_installed_file_is_valid() {
     assert_eq!(config.output, ScreenOutput::Lcd);
 }
 
+/// The installed file shows keys behind a "# ": all of them are taken at once.
+#[test]
+fn every_key_that_the_installed_file_shows_is_valid() {
+    let is_key = |line: &str| {
+        let name = line.split(" = ").next().unwrap_or_default().trim_matches(['[', ']']);
+        (line.contains(" = ") || line.starts_with('['))
+            && name.chars().all(|c| c.is_ascii_lowercase() || c == '_')
+    };
+    let mut shown = 0;
+    let mut whole = String::new();
+    for line in include_str!("../../../../systemd/bowwave.toml").lines() {
+        let key = line.strip_prefix("# ").filter(|line| is_key(line));
+        shown += usize::from(key.is_some());
+        whole += key.unwrap_or(line);
+        whole.push('\n');
+    }
+    assert!(shown > 40, "only {shown} keys");
+    let config = parse(&whole, "systemd/bowwave.toml", Path::new(".")).unwrap();
+    assert_eq!(config.warnings, [""; 0]);
+    assert!(config.trigger.is_some() && config.lamps.is_some() && config.heading.presses.len() == 2);
+}
+
 #[test]
 fn every_key_is_read() {
     let text = r#"

@@ -73,6 +73,10 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
     let (models, boat_models) = scenario_models(&scenario, &base)?;
     let radius = |id: &ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
     scenario.check_clearance(&boat_models.iter().map(radius).collect::<Vec<_>>())?;
+    let (orientation, warning) = orientation(arguments);
+    if let Some(warning) = warning {
+        log::warn!("{warning}");
+    }
     Ok(Prepared {
         recording,
         properties,
@@ -86,7 +90,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
             screen: arguments.size.or(config.size).unwrap_or(SIZE),
             // JPEG pictures are decoded to RGB.
             video: PixelFormat::Rgb,
-            orientation: orientation(arguments).unwrap_or(config.orientation),
+            orientation: orientation.unwrap_or(config.orientation),
             heading: config.heading.settings.clone(),
         },
         scenario_toml,
@@ -99,18 +103,17 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
     })
 }
 
-/// The source of the orientation that the command line asks for.
-fn orientation(arguments: &Simulate) -> Option<Source> {
+/// The source of the orientation that the command line asks for, and the warning about a former name.
+fn orientation(arguments: &Simulate) -> (Option<Source>, Option<&'static str>) {
     if arguments.fuse {
-        log::warn!(
-            "--fuse is now called --orientation fused; the former name will not be read any longer in the next version"
-        );
-        return Some(Source::Fused);
+        let warning = "--fuse is now called --orientation fused; the former name will not be read any longer in the next version";
+        return (Some(Source::Fused), Some(warning));
     }
-    arguments.orientation.map(|asked| match asked {
+    let asked = arguments.orientation.map(|asked| match asked {
         OrientationArg::Auto => Source::Auto,
         OrientationArg::Fused => Source::Fused,
-    })
+    });
+    (asked, None)
 }
 
 fn calibration(
@@ -168,5 +171,31 @@ pub fn properties_of_run(prepared: &Prepared, start: bowwave_core::time::Time) -
         source: format!("replay of {}", prepared.properties.source),
         extra,
         ..prepared.properties.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser as _;
+
+    use super::*;
+    use crate::cli::{Cli, Command};
+
+    #[test]
+    fn the_former_name_of_a_fused_orientation_is_read_with_a_warning() {
+        let asked = |arguments: &[&str]| {
+            let cli = Cli::try_parse_from(["bowwave", "simulate"].iter().chain(arguments)).unwrap();
+            let Command::Simulate(simulate) = cli.command else { panic!("not simulate") };
+            orientation(&simulate)
+        };
+        assert_eq!(asked(&[]), (None, None));
+        assert_eq!(asked(&["--orientation", "fused"]), (Some(Source::Fused), None));
+        assert_eq!(asked(&["--orientation", "auto"]), (Some(Source::Auto), None));
+        let (former, warning) = asked(&["--fuse"]);
+        assert_eq!(former, Some(Source::Fused));
+        assert!(warning.is_some_and(|w| w.contains("--orientation fused")), "{warning:?}");
+        for wrong in [&["--orientation", "unit"][..], &["--fuse", "--orientation", "auto"]] {
+            assert!(Cli::try_parse_from(["bowwave", "simulate"].iter().chain(wrong)).is_err(), "{wrong:?}");
+        }
     }
 }
