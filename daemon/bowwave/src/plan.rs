@@ -9,7 +9,6 @@ use bowwave_core::{
         plan::{Needs, ScenePlan},
         scene::{Pass, PassDecision},
     },
-    geometry::Optics,
     model::Model,
     water::ReflectionMethod,
     world::scenario::{self, Scenario},
@@ -79,11 +78,7 @@ pub fn run(arguments: &Plan) -> Result<()> {
         size: arguments.size,
         video: PixelFormat::Rgb,
         picture: arguments.size,
-        optics: Optics::default(),
-        water: scenario.water,
-        boats: scenario.boats.len(),
-        moving: scenario.boats.iter().filter(|b| b.course.speed_max_m_s() > 0.0).count(),
-        belt: scenario.weapon.belt,
+        ..Needs::of_scenario(&scenario)
     });
     let (memory, device) = memory(&plan, &models);
     let printed = Printed {

@@ -4,6 +4,7 @@
 //! x forward, y to port, z up, z = 0 at the waterline. Quaternions are Hamilton, named `to_from_from`.
 
 mod distortion;
+mod heading;
 mod lens;
 
 use std::f64::consts::TAU;
@@ -11,6 +12,7 @@ use std::f64::consts::TAU;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 pub use distortion::{Distortion, Fisheye, RadialTangential};
+pub use heading::{ahead, heading_of, starboard};
 pub use lens::{Bend, Lens, Optics};
 
 /// Mean Earth radius in metres (IUGG R1).

@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     scene.camera.position = DVec3::new(0.0, 0.0, 5.0);
     scene.water = Water { method, force, shadow: ShadowLevel::Gradual };
     // As the trainer does: light from the picture, to which the lens of the scene belongs.
-    let mut meter = LightMeter::new(scene.light.sun_direction, method);
+    let mut meter = LightMeter::new(scene.light.sun_direction, method == ReflectionMethod::Waves);
     let lens = scene.lens.covering(image.width(), image.height());
     meter.observe(Time::from_ns(0), &picture, &lens, &scene.camera);
     (scene.light, scene.sky, scene.tones) = (meter.light(), meter.sky(force.wind_mean_m_s()), meter.tones());

@@ -4,14 +4,17 @@ use bowwave_core::{
     estimate::light::{Light, SeaTones, SkyLight},
     frame::{
         scene::{Hud, LeftOut, Pass, PassDecision, Scene, Status},
-        view::{Afloat, Eye},
+        view::ViewFrustum,
         wake::Wake,
     },
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
     sea::BeaufortForce,
     water::{ReflectionMethod, ShadowLevel, Water},
-    world::boats::{CourseState, Hull},
+    world::{
+        boats::{CourseState, Hull},
+        fleet::Afloat,
+    },
 };
 use glam::{DQuat, DVec2, DVec3, Vec2, Vec3};
 
@@ -139,7 +142,7 @@ pub fn add_moving_boat(
 
 /// The same with any pose; the mean water is the world's z = 0. A boat that is not seen is not added.
 pub fn add_boat_in(scene: &mut Scene, models: &[Model], model: usize, pose: RigidPose) {
-    let eye = Eye {
+    let eye = ViewFrustum {
         camera: &scene.camera,
         lens: &scene.lens,
         visibility_m: 20_000.0,

@@ -4,6 +4,7 @@
 
 pub mod attitude;
 pub mod clock;
+mod estimator;
 mod heading_aiding;
 pub mod horizon;
 mod horizon_aiding;
@@ -15,6 +16,7 @@ mod sensors;
 pub mod skyline;
 mod visual_compass;
 
+pub use estimator::{CameraEstimate, Estimator, EstimatorSettings, SceneLight};
 pub use heading_aiding::{HeadingCounts, HeadingSettings, Landmark, Stow};
 pub use horizon_aiding::HorizonCounts;
 pub use sea_state::{SeaReport, SeaStateTracker};

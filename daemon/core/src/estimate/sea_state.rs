@@ -6,23 +6,15 @@ use crate::{
     colour::{LUMINANCE, srgb_to_linear},
     estimate::sea::{Frame, SeaConditions, SeaEstimate, SeaFollower, SeaInUse, SeaMeter, SeaSource, Unknown},
     event::Picture,
-    geometry::{CameraPose, Lens},
+    geometry::{CameraPose, Lens, ahead},
     sea::BeaufortForce,
     time::Time,
-    world::{
-        scenario::{Scenario, place},
-        waves::{CHANGE_S, Spectrum, WaveSpec},
-    },
 };
 
 /// The wind that reflections are drawn with follows the measured one with this time constant, seconds.
 const WIND_FOLLOWS_S: f64 = 5.0;
 /// The force goes over to the next where the wind is this share beyond the border.
 const FORCE_BEYOND: f64 = 0.08;
-/// Changes of the sea that waves are made anew for: shares of height and period, radians.
-const CHANGED: (f64, f64, f64) = (0.04, 0.02, 0.05);
-/// Mean peak enhancement of JONSWAP (Hasselmann 1973): what the picture does not tell.
-const GAMMA: f64 = 3.3;
 
 /// What is known of the sea in the video.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +38,6 @@ pub struct SeaStateTracker {
     newest: Result<SeaEstimate, Unknown>,
     estimates: u64,
     refused: u64,
-    /// The conditions that the waves are made of, and when they may change next, seconds.
-    drawn: SeaConditions,
-    changes_from_s: f64,
     wind: DVec2,
     force: BeaufortForce,
     windy_since: Option<Time>,
@@ -61,29 +50,19 @@ impl std::fmt::Debug for SeaStateTracker {
 }
 
 impl SeaStateTracker {
-    /// Watches where the scenario asks for it; `None` where the operator has given the sea.
-    pub fn of(scenario: &Scenario) -> Option<Self> {
-        scenario.sea_from_video.then(|| {
-            let spec = &scenario.waves;
-            let assumed = SeaConditions {
-                significant_height_m: spec.spectrum.significant_height_m(),
-                peak_period_s: spec.spectrum.peak_period_s(),
-                from_rad: spec.wind_from,
-            };
-            let meter = SeaMeter::new();
-            Self {
-                newest: meter.estimate(),
-                meter,
-                follower: SeaFollower::new(assumed),
-                estimates: 0,
-                refused: 0,
-                drawn: assumed,
-                changes_from_s: f64::NEG_INFINITY,
-                wind: scenario.wind.truncate(),
-                force: scenario.water.force,
-                windy_since: None,
-            }
-        })
+    /// A tracker that has seen nothing: the sea and the wind are those assumed.
+    pub fn new(assumed: SeaConditions, wind: DVec2, force: BeaufortForce) -> Self {
+        let meter = SeaMeter::new();
+        Self {
+            newest: meter.estimate(),
+            meter,
+            follower: SeaFollower::new(assumed),
+            estimates: 0,
+            refused: 0,
+            wind,
+            force,
+            windy_since: None,
+        }
     }
 
     /// Takes a picture in and does one piece of work.
@@ -119,7 +98,7 @@ impl SeaStateTracker {
         if source == SeaSource::Assumed {
             return;
         }
-        let wanted = -place(conditions.from_rad, conditions.wind_m_s());
+        let wanted = -ahead(conditions.from_rad) * conditions.wind_m_s();
         let share = 1.0 - (-time.secs_since(since).max(0.0) / WIND_FOLLOWS_S).exp();
         self.wind = self.wind.lerp(wanted, share);
         let speed = self.wind.length();
@@ -129,17 +108,10 @@ impl SeaStateTracker {
         }
     }
 
-    /// The sea to go over to, where it differs from the one drawn and the last change is over at `now_s`.
-    pub fn change(&mut self, now_s: f64) -> Option<WaveSpec> {
+    /// The sea as it was measured; `None` while it is only assumed.
+    pub fn measured(&self) -> Option<SeaConditions> {
         let SeaInUse { conditions, source, .. } = self.follower.in_use();
-        if source == SeaSource::Assumed || now_s < self.changes_from_s || !differs(&self.drawn, &conditions) {
-            return None;
-        }
-        self.drawn = conditions;
-        self.changes_from_s = now_s + CHANGE_S;
-        let (height, period) = (conditions.significant_height_m, conditions.peak_period_s);
-        let spectrum = Spectrum::jonswap(height.clamp(0.0, 20.0), period.clamp(0.5, 30.0), GAMMA);
-        Some(WaveSpec { spectrum: spectrum.unwrap_or(Spectrum::FLAT), wind_from: conditions.from_rad })
+        (source != SeaSource::Assumed).then_some(conditions)
     }
 
     /// Velocity of the air over the water (world x, y), m/s, and its force.
@@ -157,13 +129,4 @@ impl SeaStateTracker {
             refused: self.refused,
         }
     }
-}
-
-fn differs(a: &SeaConditions, b: &SeaConditions) -> bool {
-    let height = (a.significant_height_m - b.significant_height_m).abs();
-    let period = (a.peak_period_s - b.peak_period_s).abs();
-    height > CHANGED.0 * a.significant_height_m.max(0.1)
-        || period > CHANGED.1 * a.peak_period_s
-        || (a.from_rad - b.from_rad).sin().abs() > CHANGED.2
-        || (a.from_rad - b.from_rad).cos() < 0.0
 }

@@ -16,7 +16,7 @@ use crate::{
         pose::{NoPose, OrientationAt, STALE_NS},
     },
     event::{CameraFrame, ImuSample, Mark, ShipSample},
-    frame::scene::Status,
+    fault::Fault,
     geometry::Lens,
     time::Time,
 };
@@ -238,27 +238,19 @@ impl Sensors {
     }
 
     /// What the sailor must know about the sensors at `now`; `None` where all is well.
-    pub fn trouble(&self, now: Time) -> Option<Status> {
-        let status = |cause, action| Some(Status::NotScored { cause, action });
-        if self.frame.is_none() && self.counts.frames_wrong_size > 0 {
-            return Some(Status::Fault { cause: "CAL LOST: PICTURE SIZE", action: "CALIBRATE THIS CAMERA" });
+    pub fn trouble(&self, now: Time) -> Option<Fault> {
+        if self.frame.is_none() {
+            let wrong_size = self.counts.frames_wrong_size > 0;
+            return Some(if wrong_size { Fault::CamFormat } else { Fault::CamAwaited });
         }
-        match self.frame {
-            None => return status("NO CAMERA YET", "WAIT, THEN CHECK ITS CABLE"),
-            Some(_) if !self.frame_fresh(now) => return status("CAMERA LOST", "CHECK THE CAMERA CABLE"),
-            Some(_) => {}
+        if !self.frame_fresh(now) {
+            return Some(Fault::CamLost);
         }
         match self.attitude.newest() {
-            None => status("NO IMU YET", "WAIT, THEN CHECK ITS CABLE"),
-            Some(t) if now.ns_since(t) > STALE_NS => {
-                let stuck = self.last.is_some() && self.counts.imu_frozen > 0;
-                if stuck {
-                    status("IMU STUCK", "SWITCH THE IMU OFF AND ON")
-                } else {
-                    status("IMU LOST", "CHECK THE IMU CABLE")
-                }
-            }
-            Some(_) => None,
+            None => Some(Fault::ImuAwaited),
+            Some(t) if now.ns_since(t) <= STALE_NS => None,
+            Some(_) if self.last.is_some() && self.counts.imu_frozen > 0 => Some(Fault::ImuSanity),
+            Some(_) => Some(Fault::ImuLost),
         }
     }
 }
@@ -349,7 +341,8 @@ mod tests {
         }
         s.frame(&frame(1490, 4));
         let said = s.trouble(now(300));
-        assert_eq!(said, Some(Status::NotScored { cause: "IMU STUCK", action: "SWITCH THE IMU OFF AND ON" }));
+        assert_eq!(said, Some(Fault::ImuSanity));
+        assert_eq!(said.map(Fault::cause), Some("IMU STUCK"));
         s.imu(&sample(301));
         assert_eq!(s.trouble(now(301)), None);
     }

@@ -4,10 +4,12 @@
 //! to be told. Time is an argument here as everywhere in this crate.
 
 mod board;
+mod permission;
 
 use crate::time::Time;
 
 pub use board::{FaultBoard, LogEntry, What};
+pub use permission::{FirePermission, NotScored};
 
 /// How much a fault takes away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -86,6 +88,10 @@ faults! {
     CamQueue = "CAM_QUEUE", NotScored, "CAMERA LOST", "WAIT, THEN REPLUG CAMERA";
     /// Another program holds the camera.
     CamBusy = "CAM_BUSY", NotScored, "CAMERA IN USE", "STOP THE OTHER PROGRAM";
+    /// No picture has come since the start.
+    CamAwaited = "CAM_WAIT", NotScored, "NO CAMERA YET", "WAIT, THEN CHECK ITS CABLE";
+    /// The unit has told nothing since the start.
+    ImuAwaited = "IMU_WAIT", NotScored, "NO IMU YET", "WAIT, THEN CHECK ITS CABLE";
     /// The unit is gone.
     ImuLost = "IMU_LOST", NotScored, "IMU LOST", "CHECK THE IMU CABLE";
     /// A read of the unit's line did not return.

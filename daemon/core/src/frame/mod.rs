@@ -1,7 +1,13 @@
 //! Stage three: what one frame shows, and why the rest is left out.
 
+mod boats;
+mod composer;
 pub mod plan;
 pub mod reflection;
+mod rounds;
 pub mod scene;
 pub mod view;
 pub mod wake;
+
+pub use composer::{Composer, ComposerSettings, FrameMoment};
+pub use rounds::ROUNDS_SEEN_MAX;

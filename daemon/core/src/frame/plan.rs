@@ -6,6 +6,7 @@ use crate::{
     geometry::Optics,
     sea::BeaufortForce,
     water::{ReflectionMethod, ShadowLevel, Water},
+    world::scenario::Scenario,
 };
 
 /// Above this wind force no reflection of a boat is seen (Nelson 2009, III.D.1.c), so none is drawn.
@@ -56,6 +57,27 @@ pub struct Needs {
     pub moving: usize,
     /// Rounds in the belt.
     pub belt: u32,
+}
+
+impl Needs {
+    /// The needs of a scenario, for a screen, camera and lens that are yet to be told. A sea that is to be measured may turn out calm
+    /// enough to mirror.
+    pub fn of_scenario(scenario: &Scenario) -> Self {
+        let mut water = scenario.water;
+        if scenario.sea_from_video && !sea_reflects(water.force) {
+            water.force = BeaufortForce::of_wind(0.0);
+        }
+        Self {
+            size: (0, 0),
+            video: PixelFormat::Rgb,
+            picture: (0, 0),
+            optics: Optics::default(),
+            water,
+            boats: scenario.boats.len(),
+            moving: scenario.boats.iter().filter(|b| b.behaviour.speed_max_m_s() > 0.0).count(),
+            belt: scenario.weapon.belt,
+        }
+    }
 }
 
 impl ScenePlan {

@@ -9,8 +9,9 @@ use crate::{
         wake::Wake,
     },
     geometry::{CameraPose, Lens, RigidPose, curvature_drop, horizon_distance},
-    model::{Model, ModelId, ModelKind},
+    model::{Model, ModelKind},
     physics::haze_share,
+    world::fleet::Afloat,
 };
 
 /// Geometry nearer than this to the camera's plane is cut off, metres: nothing virtual is closer to the muzzle's camera.
@@ -29,9 +30,9 @@ const REFLECTION_MARGIN_PX: f64 = 12.0;
 /// Waves hide no more of a boat's height: in the mean over their phases something of it is always seen.
 const HIDDEN_SHARE_MAX: f64 = 0.7;
 
-/// What is needed to see a boat.
+/// What a camera can see: its view frustum, and how far and what of the sea.
 #[derive(Clone, Copy, Debug)]
-pub struct Eye<'a> {
+pub struct ViewFrustum<'a> {
     /// The camera.
     pub camera: &'a CameraPose,
     /// The lens as seen on the screen.
@@ -46,22 +47,7 @@ pub struct Eye<'a> {
     pub wakes: bool,
 }
 
-/// A boat afloat, before it is known whether it is seen.
-#[derive(Clone, Copy, Debug)]
-pub struct Afloat<'a> {
-    /// Index in the scenario.
-    pub boat: usize,
-    /// Index of the model.
-    pub model_id: ModelId,
-    /// The model.
-    pub model: &'a Model,
-    /// Pose on a flat Earth.
-    pub pose: RigidPose,
-    /// Mean water height at the boat on a flat Earth, metres.
-    pub water_level: f64,
-}
-
-impl Eye<'_> {
+impl ViewFrustum<'_> {
     /// The boat as it is seen; `None` where neither hull nor reflection touches the screen.
     pub fn see(&self, boat: &Afloat<'_>) -> Option<BoatView> {
         self.see_with_wake(boat, || None)
@@ -237,7 +223,7 @@ pub fn clip_to_screen(low: DVec2, high: DVec2, width: u32, height: u32) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::look;
+    use crate::{geometry::look, model::ModelId};
     use glam::{DQuat, Vec3};
     use proptest::prelude::*;
 
@@ -276,7 +262,7 @@ mod tests {
             let model = block();
             let lens = Lens::pinhole(640, 360, 1.0);
             let camera = camera(az, el, roll);
-            let eye = Eye { camera: &camera, lens: &lens, visibility_m: 2e4, wind: DVec2::ZERO, reflections: true, wakes: true };
+            let eye = ViewFrustum { camera: &camera, lens: &lens, visibility_m: 2e4, wind: DVec2::ZERO, reflections: true, wakes: true };
             let pose = RigidPose {
                 world_from_body: DQuat::from_rotation_z(heading) * DQuat::from_rotation_x(tilt),
                 position: DVec3::new(x, y, 0.0),
@@ -309,7 +295,7 @@ mod tests {
     #[test]
     fn a_boat_behind_the_camera_is_not_seen() {
         let (model, lens, camera) = (block(), Lens::pinhole(640, 360, 1.0), camera(0.0, 0.0, 0.0));
-        let eye = Eye {
+        let eye = ViewFrustum {
             camera: &camera,
             lens: &lens,
             visibility_m: 2e4,

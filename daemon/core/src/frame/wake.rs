@@ -6,8 +6,9 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
+    geometry::ahead,
     physics::GRAVITY_M_S2,
-    world::boats::{CourseState, Hull, ahead},
+    world::boats::{CourseState, Hull},
 };
 
 /// Points that a track has at most.

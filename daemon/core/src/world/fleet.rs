@@ -2,44 +2,55 @@
 
 use std::sync::Arc;
 
+use glam::DVec2;
+
 use crate::{
-    frame::{
-        view::{Afloat, Eye},
-        wake::Wake,
-    },
     geometry::RigidPose,
-    model::{Model, ModelId, ModelKind, Zone},
+    model::{Model, ModelId, Zone},
     time::Time,
     world::{
-        boats::{Course, Damage, Floating, Hull, HullForm, Ride, facing, float, ride},
+        boats::{Behaviour, BoatHistory, Floating, Hull, HullForm},
         waves::WaveField,
     },
 };
-use glam::DVec3;
 
-/// One boat.
+/// A boat as a scenario asks for it.
 #[derive(Clone, Debug)]
 pub struct Vessel {
     /// Its name in the scenario.
     pub name: String,
     /// Its model.
     pub model: ModelId,
-    /// Where it goes.
-    pub course: Course,
+    /// What it does.
+    pub behaviour: Behaviour,
+}
+
+/// A boat on the water at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Afloat<'a> {
+    /// Index in the scenario.
+    pub boat: usize,
+    /// Index of the model.
+    pub model_id: ModelId,
+    /// The model.
+    pub model: &'a Model,
+    /// Pose on a flat Earth.
+    pub pose: RigidPose,
+    /// Mean water height at the boat on a flat Earth, metres.
+    pub water_level: f64,
 }
 
 #[derive(Clone, Debug)]
-struct Member {
-    vessel: Vessel,
-    hull: Hull,
-    ride: Ride,
-    damage: Damage,
+struct FleetBoat {
+    name: String,
+    model: ModelId,
+    history: BoatHistory,
 }
 
 /// All boats.
 #[derive(Clone, Debug)]
 pub struct Fleet {
-    members: Vec<Member>,
+    boats: Vec<FleetBoat>,
     models: Arc<[Model]>,
     waves: WaveField,
     start: Time,
@@ -47,27 +58,25 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Boats that begin their courses at `start`. Each vessel's model must be in `models`.
+    /// Boats that begin at `start`. Each vessel's model must be in `models`.
     pub fn new(vessels: Vec<Vessel>, models: Arc<[Model]>, waves: WaveField, start: Time) -> Self {
-        let member = |vessel: Vessel| {
+        let boat = |vessel: Vessel| {
             let model = models.get(usize::from(vessel.model.0));
             let hull = model.map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
             let form = model.map_or_else(|| HullForm::new((-0.5, 0.5), 0.3, 1.2, |_| 0.5), HullForm::of);
-            Member { vessel, hull, ride: Ride::new(form), damage: Damage::NONE }
+            let history = BoatHistory::new(vessel.behaviour, hull, form);
+            FleetBoat { name: vessel.name, model: vessel.model, history }
         };
-        let members = vessels.into_iter().map(member).collect();
-        Self { members, models, waves, start, followed: start }
+        let boats = vessels.into_iter().map(boat).collect();
+        Self { boats, models, waves, start, followed: start }
     }
 
-    /// Follows all boats up to `time`. On a flat sea there is nothing to follow.
+    /// Follows all boats up to `time`.
     pub fn follow(&mut self, time: Time) {
         self.followed = self.followed.max(time);
-        if self.waves.is_flat() {
-            return;
-        }
         let until_s = self.followed.secs_since(self.start);
-        for Member { vessel, ride, damage, .. } in &mut self.members {
-            ride.follow(until_s, |t| vessel.course.state(t, damage), &self.waves);
+        for boat in &mut self.boats {
+            boat.history.follow(until_s, &self.waves);
         }
     }
 
@@ -75,95 +84,64 @@ impl Fleet {
     pub fn set_waves(&mut self, waves: WaveField, from: Time) {
         self.waves = waves;
         let from_s = from.secs_since(self.start);
-        self.members.iter_mut().for_each(|m| m.ride.forget_after(from_s));
+        self.boats.iter_mut().for_each(|b| b.history.forget_waves_after(from_s));
         self.follow(self.followed);
     }
 
     /// How many boats there are.
     pub fn len(&self) -> usize {
-        self.members.len()
+        self.boats.len()
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.members.is_empty()
+        self.boats.is_empty()
     }
 
     /// A boat's name.
     pub fn name(&self, boat: usize) -> &str {
-        self.members.get(boat).map_or("", |m| m.vessel.name.as_str())
+        self.boats.get(boat).map_or("", |b| b.name.as_str())
     }
 
     /// A boat's model.
     pub fn model(&self, boat: usize) -> Option<&Model> {
-        self.models.get(usize::from(self.members.get(boat)?.vessel.model.0))
+        self.models.get(usize::from(self.boats.get(boat)?.model.0))
     }
 
-    /// Where a boat is at `time`. At times that it was not followed to, or that lie too far back, it lies in the mean plane of the
-    /// water.
+    /// How a boat lies on the water at `time`. At times that it was not followed to, or that lie too far back, it lies in the mean plane
+    /// of the water.
     pub fn floating(&self, boat: usize, time: Time) -> Option<Floating> {
-        let Member { vessel, hull, ride: motions, damage } = self.members.get(boat)?;
         let seconds = time.secs_since(self.start);
-        let state = vessel.course.state(seconds, damage);
-        Some(match motions.at(seconds) {
-            Some(motion) => ride(&state, hull, motions.form(), &motion, &self.waves, seconds),
-            None => float(&state, hull, &self.waves, seconds),
+        Some(self.boats.get(boat)?.history.floating(seconds, &self.waves))
+    }
+
+    /// All boats that have a model, as they lie at `time`.
+    pub fn afloat(&self, time: Time) -> impl Iterator<Item = Afloat<'_>> {
+        self.boats.iter().enumerate().filter_map(move |(boat, b)| {
+            let (model, floating) = (self.model(boat)?, self.floating(boat, time)?);
+            let Floating { pose, water_level } = floating;
+            Some(Afloat { boat, model_id: b.model, model, pose, water_level })
         })
     }
 
-    /// What a boat has left on the water at `time`.
-    fn wake(&self, boat: usize, time: Time) -> Option<Wake> {
-        let member = self.members.get(boat)?;
-        let (seconds, model) = (time.secs_since(self.start), self.model(boat)?);
-        let Hull { length_m, beam_m } = member.hull;
-        Wake::of(
-            member.hull,
-            f64::from(-model.min.z),
-            seconds,
-            |t| member.vessel.course.state(t, &member.damage),
-            // Waves shorter than the hull go through its wake without lifting it.
-            |place| self.waves.plane_under(place, 0.0, length_m, beam_m, seconds).height_m,
-        )
+    /// Where a boat was over the last seconds, by seconds since the scenario began.
+    pub fn history(&self, boat: usize) -> Option<&BoatHistory> {
+        Some(&self.boats.get(boat)?.history)
     }
 
-    /// A boat's pose as rounds from `muzzle` meet it: pictures turn towards who looks at them.
-    pub fn target(&self, boat: usize, time: Time, muzzle: DVec3) -> Option<RigidPose> {
-        let pose = self.floating(boat, time)?.pose;
-        let quad = self.model(boat)?.kind == ModelKind::Quad;
-        Some(if quad { facing(&pose, muzzle) } else { pose })
+    /// Height at `time` of the water about a place, metres, in the mean over a hull that points north: waves that are shorter than it go
+    /// through its wake without lifting it.
+    pub fn water_over(&self, place: DVec2, hull: Hull, time: Time) -> f64 {
+        let Hull { length_m, beam_m } = hull;
+        self.waves.plane_under(place, 0.0, length_m, beam_m, time.secs_since(self.start)).height_m
     }
 
     /// Takes in that a boat was struck. A hit on the engine stops it, one on the helm ends its attack; the first counts.
     pub fn strike(&mut self, boat: usize, zone: Zone, time: Time) {
         let seconds = time.secs_since(self.start);
-        if let Some(member) = self.members.get_mut(boat) {
-            let slot = match zone {
-                Zone::Engine => &mut member.damage.engine_s,
-                Zone::Helm => &mut member.damage.helm_s,
-                Zone::Hull => return,
-            };
-            *slot = Some(slot.map_or(seconds, |first| first.min(seconds)));
-            member.ride.forget_after(seconds);
+        if let Some(boat) = self.boats.get_mut(boat) {
+            boat.history.strike(zone, seconds);
         }
         self.follow(self.followed);
-    }
-
-    /// The boats that `eye` sees at `time`, farthest first.
-    pub fn seen(&self, eye: &Eye<'_>, time: Time, into: &mut Vec<crate::frame::scene::BoatView>) {
-        into.clear();
-        for (boat, member) in self.members.iter().enumerate() {
-            let (Some(model), Some(floating)) = (self.model(boat), self.floating(boat, time)) else {
-                continue;
-            };
-            let afloat = Afloat {
-                boat,
-                model_id: member.vessel.model,
-                model,
-                pose: floating.pose,
-                water_level: floating.water_level,
-            };
-            into.extend(eye.see_with_wake(&afloat, || self.wake(boat, time)));
-        }
-        into.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
     }
 }

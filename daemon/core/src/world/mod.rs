@@ -8,5 +8,9 @@ pub mod gunnery;
 pub mod rounds;
 pub mod scenario;
 pub mod score;
+mod sea_change;
+mod stage;
 pub mod waves;
 pub mod weapon;
+
+pub use stage::{Aim, LastResult, RESULT_S, Running, Score, World};

@@ -1,12 +1,11 @@
 //! Virtual rounds in the air and what they leave on the sea.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
-use super::fleet::Fleet;
 use crate::{
-    frame::scene::RoundView,
     time::Time,
     world::{
+        fleet::Fleet,
         gunnery::{Atmosphere, Flight, dispersed},
         scenario::WeaponSpec,
         score::{End, Moving, Outcome, Round, ShotRecord},
@@ -16,16 +15,10 @@ use crate::{
 
 /// A stretch of time over which a boat's motion counts as straight, seconds.
 const SPAN_S: f64 = 1.0 / 30.0;
-/// How much of its path a tracer's streak shows: the exposure of an ordinary camera frame, seconds.
-const STREAK_S: f64 = 1.0 / 60.0;
 /// A tracer lights up this far from the muzzle, metres.
 const TRACER_LIT_M: f64 = 25.0;
-/// How long a splash can be seen, seconds.
-const SPLASH_S: f64 = 1.6;
-/// Height of a splash at its highest, metres.
-const SPLASH_HEIGHT_M: f64 = 1.8;
-/// How long sparks can be seen, seconds.
-const STRIKE_S: f64 = 0.35;
+/// How long a splash stands, seconds. Impacts are kept that long.
+pub const SPLASH_S: f64 = 1.6;
 
 /// What flies and how it is aimed.
 #[derive(Clone, Copy, Debug)]
@@ -67,8 +60,9 @@ struct InFlight {
     tracer: bool,
 }
 
+/// Where a round ended.
 #[derive(Clone, Copy, Debug)]
-enum Mark {
+enum ImpactMark {
     Splash {
         at: DVec3,
     },
@@ -85,7 +79,7 @@ pub struct Rounds {
     ammunition: Ammunition,
     sea: WaveField,
     in_flight: Vec<InFlight>,
-    marks: Vec<(Time, Mark)>,
+    marks: Vec<(Time, ImpactMark)>,
     advanced_to: Time,
 }
 
@@ -180,11 +174,11 @@ impl Rounds {
                 End::Struck { boat, zone, time_s, range_m, point, .. } => {
                     let time = time_of(time_s);
                     struck.push((boat, zone, time));
-                    self.marks.push((time, Mark::Strike { boat, point }));
+                    self.marks.push((time, ImpactMark::Strike { boat, point }));
                     Outcome::Hit { boat: fleet.name(boat).to_owned(), zone, time, range_m, point }
                 }
                 End::Splashed { at, time_s } => {
-                    self.marks.push((time_of(time_s), Mark::Splash { at }));
+                    self.marks.push((time_of(time_s), ImpactMark::Splash { at }));
                     miss(time_of(time_s), at)
                 }
                 End::Spent { time_s } => miss(time_of(time_s), launch.muzzle),
@@ -196,45 +190,47 @@ impl Rounds {
         }
     }
 
-    /// What can be seen of the rounds at `time`, up to which they have been followed.
-    pub fn views(&self, time: Time, start: Time, fleet: &Fleet, into: &mut Vec<RoundView>) {
+    /// The tracers that glow at `time`, up to which rounds have been followed, each with its path over the last `exposure_s`.
+    pub fn tracers(&self, time: Time, start: Time, exposure_s: f64) -> impl Iterator<Item = TracerPath> {
         let now_s = time.secs_since(start);
-        for f in self.in_flight.iter().filter(|f| f.tracer) {
-            let (from, to) = (f.round.state_at(now_s - STREAK_S).position, f.round.state_at(now_s).position);
-            if to.distance(f.launch.muzzle) > TRACER_LIT_M {
-                into.push(RoundView::Tracer { from, to, radiance: Vec3::new(8.0, 2.4, 0.7) });
-            }
-        }
-        for (since, mark) in &self.marks {
-            let age = time.secs_since(*since);
-            match *mark {
-                Mark::Splash { at } if (0.0..SPLASH_S).contains(&age) => into.push(splash(at, age)),
-                Mark::Strike { boat, point } if (0.0..STRIKE_S).contains(&age) => {
-                    let Some(floating) = fleet.floating(boat, time) else { continue };
-                    let left = 1.0 - age / STRIKE_S;
-                    into.push(RoundView::Strike {
-                        at: floating.pose.to_world(point),
-                        radius_m: (0.15 + 0.5 * (1.0 - left)) as f32,
-                        opacity: left as f32,
-                    });
+        self.in_flight.iter().filter(|f| f.tracer).filter_map(move |f| {
+            let at = |time_s: f64| f.round.state_at(time_s).position;
+            let path = TracerPath { from: at(now_s - exposure_s), to: at(now_s) };
+            (path.to.distance(f.launch.muzzle) > TRACER_LIT_M).then_some(path)
+        })
+    }
+
+    /// Where rounds have ended in the last seconds before `time`.
+    pub fn impacts(&self, time: Time, fleet: &Fleet) -> impl Iterator<Item = Impact> {
+        self.marks.iter().filter_map(move |(since, mark)| {
+            let age_s = time.secs_since(*since);
+            let (at, on_boat) = match *mark {
+                ImpactMark::Splash { at } => (at, false),
+                ImpactMark::Strike { boat, point } => {
+                    (fleet.floating(boat, time)?.pose.to_world(point), true)
                 }
-                _ => {}
-            }
-        }
+            };
+            (age_s >= 0.0).then_some(Impact { at, on_boat, age_s })
+        })
     }
 }
 
-/// A column of water thrown up and falling back.
-fn splash(at: DVec3, age_s: f64) -> RoundView {
-    let share = age_s / SPLASH_S;
-    // Thrown up at once, falling back under gravity: a parabola whose top is reached at a third of its life.
-    let rise = (share * 3.0).min(1.0);
-    let height = SPLASH_HEIGHT_M
-        * if share < 1.0 / 3.0 { rise * (2.0 - rise) } else { 1.0 - ((share - 1.0 / 3.0) * 1.5).powi(2) };
-    RoundView::Splash {
-        at,
-        height_m: height.max(0.05) as f32,
-        radius_m: (0.18 + 0.5 * share) as f32,
-        opacity: (1.0 - share * share) as f32,
-    }
+/// The path of a tracer over a picture's exposure, world, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TracerPath {
+    /// Where it was as the exposure began.
+    pub from: DVec3,
+    /// Where it is.
+    pub to: DVec3,
+}
+
+/// Where a round ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact {
+    /// The place now, world, metres: on a boat it moves with the boat.
+    pub at: DVec3,
+    /// Whether it struck a boat; else the sea.
+    pub on_boat: bool,
+    /// Seconds since then.
+    pub age_s: f64,
 }

@@ -3,7 +3,7 @@
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 use bowwave_core::{
-    frame::view::Eye,
+    frame::view::ViewFrustum,
     geometry::{CameraPose, Distortion, EARTH_RADIUS_M, Lens, REFRACTION, horizon_dip, look},
     text::toml::{TomlError, TomlPlace},
 };
@@ -154,7 +154,7 @@ impl StillCamera {
 }
 
 /// World x and y of the water that is seen on `pixel`: where its line of sight meets the curved sea.
-pub(super) fn on_the_sea(eye: &Eye<'_>, pixel: DVec2) -> Result<DVec2, String> {
+pub(super) fn on_the_sea(eye: &ViewFrustum<'_>, pixel: DVec2) -> Result<DVec2, String> {
     let (width, height) = (eye.lens.width, eye.lens.height);
     let size = DVec2::new(f64::from(width), f64::from(height));
     if pixel.cmplt(DVec2::ZERO).any() || pixel.cmpgt(size).any() {

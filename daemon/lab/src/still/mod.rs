@@ -13,16 +13,17 @@ use bowwave_core::{
     frame::{
         plan::{Needs, ScenePlan},
         scene::{Hud, LeftOut, Pass, PassDecision, Scene},
-        view::{Afloat, Eye},
+        view::ViewFrustum,
         wake::Wake,
     },
-    geometry::{CameraPose, Lens},
+    geometry::{CameraPose, Lens, ahead},
     model::{Model, ModelId},
     text::toml::{TomlError, TomlPlace},
     time::Time,
-    water::Water,
+    water::{ReflectionMethod, Water},
     world::{
-        boats::{CourseState, Hull, ahead, float},
+        boats::{CourseState, Hull, quasi_static},
+        fleet::Afloat,
         scenario::{CAMERA_CLEAR_M, place},
         waves::{WaveField, WaveSpec},
     },
@@ -144,7 +145,7 @@ impl Still {
             moving: self.boats.iter().filter(|b| b.speed_m_s > 0.0).count(),
             belt: 0,
         });
-        let eye = Eye {
+        let eye = ViewFrustum {
             camera: &camera,
             lens: &lens,
             visibility_m: self.visibility_m,
@@ -164,7 +165,7 @@ impl Still {
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
         let mut passes = plan.frame(true, &boats, &[]);
         passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
-        let mut meter = LightMeter::new(self.sun_direction, self.water.method);
+        let mut meter = LightMeter::new(self.sun_direction, self.water.method == ReflectionMethod::Waves);
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.sun_strength as f32;
@@ -191,7 +192,7 @@ impl Still {
         &self,
         number: usize,
         (id, model): (ModelId, &'a Model),
-        eye: &Eye<'_>,
+        eye: &ViewFrustum<'_>,
         waves: &WaveField,
         time_s: f64,
     ) -> Result<Afloat<'a>, TomlError> {
@@ -217,7 +218,7 @@ impl Still {
         }
         let state =
             CourseState { position, heading: boat.heading, speed_m_s: boat.speed_m_s, turn_rate: 0.0 };
-        let mut floating = float(&state, &Hull::of(model), waves, time_s);
+        let mut floating = quasi_static(&state, &Hull::of(model), waves, time_s);
         if on_mean_sea {
             // The picture shows where the water is: no wave of ours lifts the boat off it.
             floating.pose.position.z -= floating.water_level;

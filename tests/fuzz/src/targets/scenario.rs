@@ -41,12 +41,12 @@ fn check(scenario: &Scenario) {
             "two boats called {:?}",
             boat.name
         );
-        let top_m_s = boat.course.speed_max_m_s();
+        let top_m_s = boat.behaviour.speed_max_m_s();
         assert!(top_m_s.is_finite() && (0.0..100.0).contains(&top_m_s), "{top_m_s} m/s: {boat:?}");
         let hurt = Damage { engine_s: Some(0.25), helm_s: Some(30.0) };
         for time_s in MOMENTS_S {
             for damage in [Damage::NONE, hurt] {
-                check_state(&boat.course.state(time_s, &damage), top_m_s);
+                check_state(&boat.behaviour.begin(time_s, &damage), top_m_s);
             }
         }
     }

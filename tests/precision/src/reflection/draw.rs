@@ -10,12 +10,13 @@ use bowwave_core::{
     frame::{
         plan::sea_reflects,
         scene::{Hud, LeftOut, Pass, PassDecision, Scene},
-        view::{Afloat, Eye},
+        view::ViewFrustum,
     },
     geometry::{CameraPose, Lens, Optics},
     model::{Model, ModelId},
     sea::BeaufortForce,
     water::{ReflectionMethod, ShadowLevel, Water},
+    world::fleet::Afloat,
 };
 use bowwave_render::{Completions, Finished, Needs, RenderConfig, Renderer, SOFTWARE, TimeOuts};
 use glam::{DQuat, DVec2, DVec3, Vec3};
@@ -105,8 +106,14 @@ pub fn forced_scene(cell: &Cell, method: ReflectionMethod, beliefs: &Beliefs, mo
     };
     let (model_id, model) = models.of(size);
     let wind = -DVec2::new(beliefs.wind_from.sin(), beliefs.wind_from.cos()) * beliefs.wind_m_s;
-    let eye =
-        Eye { camera: &camera, lens: &cell.lens, visibility_m: 1e9, wind, reflections: true, wakes: false };
+    let eye = ViewFrustum {
+        camera: &camera,
+        lens: &cell.lens,
+        visibility_m: 1e9,
+        wind,
+        reflections: true,
+        wakes: false,
+    };
     let water_level = pose.position.z;
     let boat = eye.see(&Afloat { boat: 0, model_id, model, pose, water_level });
     let mut light = cell.light;

@@ -4,12 +4,13 @@ use bowwave_core::{
     estimate::light::{Light, SeaTones},
     frame::{
         scene::{BoatView, Scene},
-        view::{Afloat, Eye},
+        view::ViewFrustum,
     },
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId},
     sea::BeaufortForce,
     water::{ReflectionMethod, ShadowLevel, Water},
+    world::fleet::Afloat,
 };
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::{Rgb, RgbImage};
@@ -139,7 +140,14 @@ pub fn scene(
     scene.tones = tones;
     scene.wind = DVec2::new(0.6, -0.8) * force.wind_mean_m_s();
     let wind = scene.wind;
-    let eye = Eye { camera: &camera, lens: &lens, visibility_m: 1e9, wind, reflections: true, wakes: false };
+    let eye = ViewFrustum {
+        camera: &camera,
+        lens: &lens,
+        visibility_m: 1e9,
+        wind,
+        reflections: true,
+        wakes: false,
+    };
     for (boat, afloat) in boats.iter().enumerate() {
         let (pose, water_level) = (afloat.pose(), afloat.water_level);
         let seen = eye.see(&Afloat { boat, model_id: ModelId(0), model, pose, water_level });

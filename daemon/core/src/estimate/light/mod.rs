@@ -17,7 +17,6 @@ use crate::{
     geometry::{CameraPose, Lens},
     sea::{Facets, rms_slope},
     time::Time,
-    water::ReflectionMethod,
 };
 
 /// The estimate follows the picture with this time constant, so that one dark wave or passing bird does not flicker boats.
@@ -88,10 +87,9 @@ pub struct LightMeter {
 }
 
 impl LightMeter {
-    /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world) and whose sea mirrors by `method`: what
-    /// only other methods look at is not measured.
-    pub fn new(sun_direction: DVec3, method: ReflectionMethod) -> Self {
-        let wants_tones = method == ReflectionMethod::Waves;
+    /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world). The sea's brightness is measured only where
+    /// it is wanted: reflections by brightness need it.
+    pub const fn new(sun_direction: DVec3, wants_tones: bool) -> Self {
         Self { sun_direction, wants_tones, means: None, tones: None }
     }
 
@@ -270,7 +268,7 @@ mod tests {
     fn the_sky_above_the_horizon_is_what_is_measured() {
         let lens = Lens::pinhole(64, 64, 1.0);
         let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
-        let mut meter = LightMeter::new(DVec3::new(0.0, 0.6, 0.8), ReflectionMethod::Full);
+        let mut meter = LightMeter::new(DVec3::new(0.0, 0.6, 0.8), false);
         meter.observe(Time::from_ns(0), &two_tone(188, 99), &lens, &camera);
         let light = meter.light();
         assert!((light.sky.x - srgb_to_linear(188.0 / 255.0)).abs() < 1e-4);
@@ -303,13 +301,13 @@ mod tests {
         let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
         // The sun is down: nothing but the sky falls on the water.
         for share in [0.4, 1.0, 1.6] {
-            let mut meter = LightMeter::new(-DVec3::Z, ReflectionMethod::Waves);
+            let mut meter = LightMeter::new(-DVec3::Z, true);
             meter.observe(Time::from_ns(0), &mirroring(share, &lens, &camera, 2.0), &lens, &camera);
             let times = meter.sky(2.0).at(0.1).y / srgb_to_linear(200.0 / 255.0);
             assert!((f64::from(times) / share - 1.0).abs() < 0.1, "{share}: {times}");
         }
         // However little the two have to do with each other, what is taken stays within bounds.
-        let mut meter = LightMeter::new(-DVec3::Z, ReflectionMethod::Waves);
+        let mut meter = LightMeter::new(-DVec3::Z, true);
         meter.observe(Time::from_ns(0), &two_tone(0, 255), &lens, &camera);
         assert!(meter.sky(5.0).nodes.iter().all(|n| n.is_finite() && n.min_element() >= 0.0));
     }

@@ -4,10 +4,10 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec2;
 
-use super::{
-    ahead, heading_of,
-    path::{self, Ending, Path, wrap},
-    starboard,
+use super::path::{self, Ending, Path, wrap};
+use crate::{
+    geometry::{ahead, heading_of, starboard},
+    model::Zone,
 };
 
 /// Radius of the turns of a boat, metres, where nothing makes them tighter.
@@ -24,7 +24,7 @@ const DRIFT_CLEAR_M: f64 = 30.0;
 const CORNER_MAX: f64 = 150.0 * PI / 180.0;
 
 /// Where a boat is on the sea, before waves.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CourseState {
     /// World x (east) and y (north) of the boat's origin, metres; the own ship is at (0, 0).
     pub position: DVec2,
@@ -34,6 +34,48 @@ pub struct CourseState {
     pub speed_m_s: f64,
     /// Change of heading, rad/s clockwise.
     pub turn_rate: f64,
+}
+
+impl CourseState {
+    /// Between two states `span_s` apart, at `share` (0 to 1) of the way: the cubics (Hermite) with their velocities and turn rates.
+    pub fn between(&self, next: &Self, span_s: f64, share: f64) -> Self {
+        if share <= 0.0 {
+            return *self;
+        }
+        let (s, t) = (share, 1.0 - share);
+        // Share of the way between both ends, and of each end's change over the span.
+        let (to, out, back) = (s * s * (1.0 + 2.0 * t), t * t * s * span_s, s * s * t * span_s);
+        let turn = wrap(next.heading - self.heading);
+        Self {
+            position: self.position + (next.position - self.position) * to + self.velocity() * out
+                - next.velocity() * back,
+            heading: self.heading + turn * to + self.turn_rate * out - next.turn_rate * back,
+            speed_m_s: self.speed_m_s * t + next.speed_m_s * s,
+            turn_rate: self.turn_rate * t + next.turn_rate * s,
+        }
+    }
+
+    /// Velocity over ground, m/s.
+    fn velocity(&self) -> DVec2 {
+        ahead(self.heading) * self.speed_m_s
+    }
+
+    /// The state `seconds` later (earlier where negative) of a boat that goes straight on.
+    #[must_use]
+    pub fn straight_on(&self, seconds: f64) -> Self {
+        Self { position: self.position + self.velocity() * seconds, turn_rate: 0.0, ..*self }
+    }
+
+    /// The state `seconds` later of a boat that keeps its speed and turn rate.
+    #[must_use]
+    pub fn moved(&self, seconds: f64) -> Self {
+        let half = 0.5 * self.turn_rate * seconds;
+        Self {
+            position: self.position + ahead(self.heading + half) * (self.speed_m_s * seconds),
+            heading: self.heading + 2.0 * half,
+            ..*self
+        }
+    }
 }
 
 /// When a boat lost what it needs to go on, seconds since the scenario began.
@@ -104,7 +146,7 @@ pub enum CourseError {
     },
 }
 
-/// Where a boat goes: a closed function of time, so that any instant can be asked for in any order.
+/// A course that is known beforehand: a closed function of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Course {
     track: Track,
@@ -277,6 +319,20 @@ impl Course {
 impl Damage {
     /// No damage.
     pub const NONE: Self = Self { engine_s: None, helm_s: None };
+
+    /// Takes in a hit at `time_s`; says whether it changes what the boat can do. The first hit of each part counts.
+    pub fn add(&mut self, zone: Zone, time_s: f64) -> bool {
+        let slot = match zone {
+            Zone::Engine => &mut self.engine_s,
+            Zone::Helm => &mut self.helm_s,
+            Zone::Hull => return false,
+        };
+        let earlier = slot.is_none_or(|first| time_s < first);
+        if earlier {
+            *slot = Some(time_s);
+        }
+        earlier
+    }
 
     /// Seconds that an undamaged boat would have needed for the way made until `time_s`, and the share of its speed left.
     ///

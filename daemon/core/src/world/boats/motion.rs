@@ -9,10 +9,10 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use glam::DVec3;
 
 use super::{
-    CourseState, ahead,
+    course::CourseState,
     hull::{HullForm, STRIPS, WATER_KG_M3},
 };
-use crate::{physics::GRAVITY_M_S2, world::waves::WaveField};
+use crate::{geometry::ahead, physics::GRAVITY_M_S2, world::waves::WaveField};
 
 /// Cross-flow drag coefficient of a V section, about.
 const CROSS_FLOW: f64 = 1.0;
@@ -61,8 +61,8 @@ struct Water {
     side: [[f64; 2]; STRIPS],
 }
 
-/// What moves a hull: accelerations, and how fast damping alone would bring each rate to rest (1/s).
-struct Push {
+/// Accelerations of a hull, and how fast damping alone would bring each rate to rest (1/s).
+struct Forces {
     acceleration: DVec3,
     damping: DVec3,
 }
@@ -111,7 +111,7 @@ impl HullForm {
         water
     }
 
-    fn push(&self, course: &CourseState, motion: &Motion, waves: &WaveField, t: f64) -> Push {
+    fn forces(&self, course: &CourseState, motion: &Motion, waves: &WaveField, t: f64) -> Forces {
         let DVec3 { x: heave, y: roll, z: pitch } = motion.at;
         let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) = (roll.sin_cos(), pitch.sin_cos());
         let water = self.water(course, pitch, waves, t);
@@ -161,7 +161,7 @@ impl HullForm {
             self.roll_inertia_kg_m2,
             self.pitch_inertia_kg_m2 + added_kg_m2,
         );
-        Push { acceleration: force / inertia, damping: damping / inertia }
+        Forces { acceleration: force / inertia, damping: damping / inertia }
     }
 
     /// One step from `t` to `t` + `h`, the course given at both.
@@ -177,10 +177,10 @@ impl HullForm {
         motion: &Motion,
         h: f64,
     ) -> Motion {
-        let now = self.push(courses[0], motion, waves, t);
+        let now = self.forces(courses[0], motion, waves, t);
         let first = |damping: DVec3| now.acceleration / (DVec3::ONE + damping * (GAMMA * h));
         let ahead = Motion { at: motion.at + motion.rate * h, rate: motion.rate + first(now.damping) * h };
-        let then = self.push(courses[1], &ahead, waves, t + h);
+        let then = self.forces(courses[1], &ahead, waves, t + h);
         // A hull that strikes the water within the step is damped there, not before.
         let damping = now.damping.max(then.damping);
         let one = first(damping);

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
-use super::{ahead, heading_of, starboard};
+use crate::geometry::{ahead, heading_of, starboard};
 
 /// A place on a path.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,7 +12,7 @@ use crate::{
         OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, ValueRule, number, one_of, plain_text,
         yes_no,
     },
-    world::boats::{Arrival, Course, CourseError},
+    world::boats::{Arrival, Behaviour, Course, CourseError},
 };
 
 /// Kind of a boat's course.
@@ -128,7 +128,7 @@ fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatS
         name: named("name", &raw.name, "the boat a name of its own")?,
         model: named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?,
         side: text.given(&raw.side, one_of(&sides))?.unwrap_or(Side::Hostile),
-        course,
+        behaviour: Behaviour::ScriptedCourse(course),
         stands,
     })
 }

@@ -12,7 +12,7 @@ use crate::{
     text::toml::{TomlError, TomlPlace},
     water::Water,
     world::{
-        boats::Course,
+        boats::Behaviour,
         gunnery::Projectile,
         waves::{WaveField, WaveSpec},
     },
@@ -116,8 +116,8 @@ pub struct BoatSpec {
     pub model: String,
     /// Whom it belongs to.
     pub side: Side,
-    /// Where it goes.
-    pub course: Course,
+    /// What it does.
+    pub behaviour: Behaviour,
     /// Where the text places it.
     stands: TomlPlace,
 }
@@ -139,7 +139,7 @@ impl Scenario {
         let until_s = self.duration_s.unwrap_or(ENDLESS_S);
         for (boat, &radius_m) in self.boats.iter().zip(radii_m) {
             let clear_m = radius_m + CAMERA_CLEAR_M;
-            let Some(time_s) = boat.course.first_within(clear_m, until_s) else { continue };
+            let Some(time_s) = boat.behaviour.first_within(clear_m, until_s) else { continue };
             let when =
                 if time_s > 0.0 { format!("after {time_s:.0} s") } else { "from the start".to_owned() };
             let problem = format!(

@@ -8,7 +8,8 @@ use glam::DVec3;
 pub use hit::{Closest, Moving, Strike, closest_to_box, strike};
 pub use round::{Approach, End, Round};
 
-use crate::{fault::Fault, model::Zone, time::Time};
+pub use crate::fault::NotScored;
+use crate::{model::Zone, time::Time};
 
 /// One virtual round, from trigger to end.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,35 +60,4 @@ pub enum Outcome {
         /// Why, for the sailor.
         cause: NotScored,
     },
-}
-
-/// Why a round is not scored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum NotScored {
-    /// No orientation younger than 100 ms.
-    ImuStale,
-    /// No picture younger than 100 ms.
-    CameraStale,
-    /// This fault was there.
-    Fault(Fault),
-}
-
-impl NotScored {
-    /// The name used in databases and tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::ImuStale => "imu_stale",
-            Self::CameraStale => "camera_stale",
-            Self::Fault(fault) => fault.code(),
-        }
-    }
-
-    /// The cause with that name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        match name {
-            "imu_stale" => Some(Self::ImuStale),
-            "camera_stale" => Some(Self::CameraStale),
-            code => Fault::from_code(code).map(Self::Fault),
-        }
-    }
 }

@@ -5,7 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use bowwave_core::world::{
-    boats::{CourseState, Hull, HullForm, Motion, Ride, float},
+    boats::{CourseState, Hull, HullForm, Motion, SeakeepingState, quasi_static},
     waves::{Wave, WaveField},
 };
 use glam::{DVec2, DVec3};
@@ -134,7 +134,7 @@ impl Boat {
 
     /// What the product makes of it, so many times a second: heave, pitch, roll.
     pub fn ridden(&self, hz: usize, frames: usize) -> Vec<[f64; 3]> {
-        let mut ride = Ride::new(self.form());
+        let mut ride = SeakeepingState::new(self.form());
         let frame = |i: usize| {
             let t = i as f64 / hz as f64;
             ride.follow(t, |t| self.course(t), &self.waves);
@@ -148,7 +148,7 @@ impl Boat {
         // Trim and rise on the plane are constants that the strip model leaves out.
         let state = CourseState { speed_m_s: 0.0, ..self.course(t) };
         let hull = Hull { length_m: LENGTH_M, beam_m: 2.0 * self.rest_half_beam_m() };
-        let pose = float(&state, &hull, &self.waves, t).pose;
+        let pose = quasi_static(&state, &hull, &self.waves, t).pose;
         let pitch = (pose.world_from_body * DVec3::X).z.asin();
         [pose.position.z, pitch, (pose.world_from_body * DVec3::Y).z.asin(), 0.0, 0.0, 0.0]
     }

@@ -41,7 +41,7 @@ fn course(heading: f64, speed_m_s: f64) -> impl Fn(f64) -> CourseState {
 }
 
 /// Follows it in stretches that are no gaps.
-fn follow(ride: &mut Ride, until_s: f64, course: impl Fn(f64) -> CourseState, waves: &WaveField) {
+fn follow(ride: &mut SeakeepingState, until_s: f64, course: impl Fn(f64) -> CourseState, waves: &WaveField) {
     for i in 0..=10 {
         ride.follow(until_s * f64::from(i) / 10.0, &course, waves);
     }
@@ -50,9 +50,9 @@ fn follow(ride: &mut Ride, until_s: f64, course: impl Fn(f64) -> CourseState, wa
 #[test]
 fn frames_at_any_pace_show_the_same_motion() {
     let (waves, course) = (sea(4, 3), course(0.4, 8.0));
-    let mut whole = Ride::new(skiff());
+    let mut whole = SeakeepingState::new(skiff());
     follow(&mut whole, 20.0, &course, &waves);
-    let mut stuttering = Ride::new(skiff());
+    let mut stuttering = SeakeepingState::new(skiff());
     let mut t = 0.0;
     for i in 0..10_000 {
         stuttering.follow(t, &course, &waves);
@@ -85,9 +85,9 @@ fn a_boat_that_is_struck_moves_as_if_its_new_course_had_always_been_known() {
         }
         state
     };
-    let mut known = Ride::new(skiff());
+    let mut known = SeakeepingState::new(skiff());
     follow(&mut known, 14.0, struck, &waves);
-    let mut told = Ride::new(skiff());
+    let mut told = SeakeepingState::new(skiff());
     follow(&mut told, 12.4, &fast, &waves);
     told.forget_after(12.34);
     told.follow(14.0, struck, &waves);
@@ -100,7 +100,7 @@ fn a_boat_that_is_struck_moves_as_if_its_new_course_had_always_been_known() {
 #[test]
 fn a_long_swell_carries_boats_as_its_surface_goes() {
     let (waves, course) = (swell(1.5, 14.0), course(0.9, 0.0));
-    let mut ride = Ride::new(skiff());
+    let mut ride = SeakeepingState::new(skiff());
     let (mut off, mut size) = (DVec3::ZERO, DVec3::ZERO);
     for i in 0..3000 {
         let t = 10.0 + 0.1 * f64::from(i);
@@ -152,7 +152,7 @@ fn hulls_float_at_their_waterline_and_swing_as_such_boats_do() {
 fn a_frigate_hardly_moves_where_a_skiff_is_thrown_about() {
     let (waves, course) = (sea(4, 9), course(0.9, 0.0));
     let spread = |form: HullForm| {
-        let mut ride = Ride::new(form);
+        let mut ride = SeakeepingState::new(form);
         let mut sum = DVec3::ZERO;
         for i in 0..3000 {
             let t = 30.0 + 0.1 * f64::from(i);
@@ -174,13 +174,13 @@ fn a_frigate_hardly_moves_where_a_skiff_is_thrown_about() {
 #[test]
 fn a_gap_of_an_hour_is_not_followed_through() {
     let (waves, course) = (sea(3, 3), course(0.4, 0.0));
-    let mut ride = Ride::new(skiff());
+    let mut ride = SeakeepingState::new(skiff());
     ride.follow(1.0, &course, &waves);
     ride.follow(3601.0, &course, &waves);
     let jumped = ride.at(3600.5).expect("followed");
     assert!(ride.motions.len() <= KEPT);
     // What it does then is what the sea of that time makes of any boat.
-    let mut other = Ride::new(skiff());
+    let mut other = SeakeepingState::new(skiff());
     other.follow(3592.0, &course, &waves);
     other.follow(3601.0, &course, &waves);
     let gap = (other.at(3600.5).expect("followed").at - jumped.at).abs();
@@ -225,7 +225,7 @@ proptest! {
     ) {
         let waves = sea(force, seed);
         let course = course(heading, speed);
-        let mut ride = Ride::new(hull(length, length / slender, deep * length / slender));
+        let mut ride = SeakeepingState::new(hull(length, length / slender, deep * length / slender));
         for i in 0..50 {
             let t = f64::from(i) * hitch.min(0.4);
             ride.follow(t, &course, &waves);

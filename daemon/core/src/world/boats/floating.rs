@@ -2,8 +2,16 @@
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
-use super::{CourseState, Hull, HullForm, Motion, ahead};
-use crate::{geometry::RigidPose, physics::GRAVITY_M_S2, world::waves::WaveField};
+use super::{
+    course::CourseState,
+    hull::{Hull, HullForm},
+    motion::Motion,
+};
+use crate::{
+    geometry::{RigidPose, ahead},
+    physics::GRAVITY_M_S2,
+    world::waves::WaveField,
+};
 
 /// Bow-up trim of a boat that planes, radians.
 const PLANING_TRIM: f64 = 4.0 * std::f64::consts::PI / 180.0;
@@ -25,16 +33,16 @@ pub struct Floating {
     pub water_level: f64,
 }
 
-/// Puts a boat into the mean plane of the water under its hull: what a boat without inertia does. It rises and trims as it planes,
+/// Puts a boat into the mean plane of the water under its hull: a quasi-static attitude, that of a boat without inertia. It rises and trims as it planes,
 /// and leans into its turns.
-pub fn float(state: &CourseState, hull: &Hull, waves: &WaveField, time_s: f64) -> Floating {
+pub fn quasi_static(state: &CourseState, hull: &Hull, waves: &WaveField, time_s: f64) -> Floating {
     let water = waves.plane_under(state.position, state.heading, hull.length_m, hull.beam_m, time_s);
     let at = DVec3::new(water.height_m, water.port_slope.atan(), water.forward_slope.atan());
     lay(state, hull, at, water.height_m)
 }
 
-/// Puts a boat onto the waves where its motion has brought it; it rises, trims and leans by itself as in [`float`].
-pub fn ride(
+/// Puts a boat onto the waves where its motion has brought it; it rises, trims and leans by itself as in [`quasi_static`].
+pub fn afloat_in_waves(
     state: &CourseState,
     hull: &Hull,
     form: &HullForm,
@@ -96,7 +104,7 @@ mod tests {
 
     #[test]
     fn on_a_flat_sea_a_boat_at_rest_is_level_and_points_where_it_heads() {
-        let boat = float(&at(0.5, 0.0, 0.0), &SKIFF, &WaveField::FLAT, 3.0);
+        let boat = quasi_static(&at(0.5, 0.0, 0.0), &SKIFF, &WaveField::FLAT, 3.0);
         let bow = boat.pose.world_from_body * DVec3::X;
         assert!((bow - DVec3::new(0.5_f64.sin(), 0.5_f64.cos(), 0.0)).length() < 1e-12, "{bow}");
         let port = boat.pose.world_from_body * DVec3::Y;
@@ -106,12 +114,12 @@ mod tests {
 
     #[test]
     fn a_boat_on_the_plane_lifts_its_bow_and_leans_into_the_turn() {
-        let boat = float(&at(0.0, 15.0, 0.3), &SKIFF, &WaveField::FLAT, 0.0);
+        let boat = quasi_static(&at(0.0, 15.0, 0.3), &SKIFF, &WaveField::FLAT, 0.0);
         let trim = (boat.pose.world_from_body * DVec3::X).z.asin();
         assert!((trim - PLANING_TRIM).abs() < 1e-9, "{trim}");
         assert!((boat.pose.world_from_body * DVec3::Y).z > 0.1, "port rises in a turn to starboard");
         assert!(boat.pose.position.z > 0.05);
-        let ship = float(&at(0.0, 15.0, 0.01), &FRIGATE, &WaveField::FLAT, 0.0);
+        let ship = quasi_static(&at(0.0, 15.0, 0.01), &FRIGATE, &WaveField::FLAT, 0.0);
         assert!((ship.pose.world_from_body * DVec3::X).z < 1e-3, "a frigate does not plane");
     }
 
@@ -123,7 +131,7 @@ mod tests {
             let (mut heave, mut pitch) = (0.0, 0.0);
             for i in 0..3000 {
                 let t = f64::from(i) * 0.77;
-                let boat = float(&at(0.9, 0.0, 0.0), hull, &waves, t);
+                let boat = quasi_static(&at(0.9, 0.0, 0.0), hull, &waves, t);
                 heave += boat.pose.position.z.powi(2) / 3000.0;
                 pitch += (boat.pose.world_from_body * DVec3::X).z.powi(2) / 3000.0;
             }
@@ -142,7 +150,7 @@ mod tests {
         let (mut gap, mut sea) = (0.0, 0.0);
         for i in 0..500 {
             let t = f64::from(i) * 1.3;
-            let boat = float(&at(f64::from(i), 0.0, 0.0), &SKIFF, &waves, t);
+            let boat = quasi_static(&at(f64::from(i), 0.0, 0.0), &SKIFF, &waves, t);
             for corner in [DVec3::X * 3.0, DVec3::X * -3.0, DVec3::Y * 0.9, DVec3::Y * -0.9] {
                 let world = boat.pose.to_world(corner);
                 let water = waves.height(world.truncate(), t);
@@ -161,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_picture_shows_its_starboard_side_to_the_eye() {
-        let pose = float(&at(2.2, 9.0, 0.1), &SKIFF, &WaveField::FLAT, 0.0).pose;
+        let pose = quasi_static(&at(2.2, 9.0, 0.1), &SKIFF, &WaveField::FLAT, 0.0).pose;
         let eye = DVec3::new(-3.0, 5.0, 8.0);
         let turned = facing(&pose, eye);
         let to_eye = (eye - pose.position).truncate().normalize().extend(0.0);

@@ -1,0 +1,273 @@
+//! Stage three as a whole: estimates and world in, the scene of a frame out.
+
+use std::sync::Arc;
+
+use glam::{DQuat, DVec3, Vec3};
+
+use super::{
+    boats::boats_in_view,
+    plan::{Needs, ScenePlan, sea_reflects},
+    rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
+    scene::{BoatView, Hud, Pass, RoundView, Scene, Status},
+    view::ViewFrustum,
+    wake::Wake,
+};
+use crate::{
+    calibration::Calibration,
+    estimate::Estimator,
+    event::{Picture, PictureError, PixelFormat},
+    fault::{Fault, FirePermission, NotScored},
+    geometry::{CameraPose, Lens, RigidPose, look},
+    model::{Model, ModelId},
+    time::Time,
+    world::{
+        LastResult, RESULT_S, World,
+        boats::{CourseState, Hull},
+        fleet::Afloat,
+        scenario::Scenario,
+    },
+};
+
+/// Settings of a composer.
+#[derive(Clone, Copy, Debug)]
+pub struct ComposerSettings<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// The calibration of the camera.
+    pub calibration: &'a Calibration,
+    /// Screen size in pixels.
+    pub screen: (u32, u32),
+    /// How the camera's bytes are laid out.
+    pub video: PixelFormat,
+    /// All models in use.
+    pub models: &'a Arc<[Model]>,
+    /// The model of each of the scenario's boats, in order.
+    pub boat_models: &'a [ModelId],
+}
+
+/// The moment that a frame shows, and what the sailor is to be told.
+#[derive(Clone, Copy, Debug)]
+pub struct FrameMoment {
+    /// When the picture was exposed (middle); `None` before the first picture.
+    pub video_time: Option<Time>,
+    /// Whether the weapon may fire.
+    pub permission: FirePermission,
+    /// What the sailor should know though training goes on.
+    pub warning: Option<Fault>,
+    /// Whether reflections and wakes are drawn: a computer that is too hot leaves them out, half of the work.
+    pub cool: bool,
+}
+
+/// Composes the scenes of a session, one after the other.
+#[derive(Debug)]
+pub struct Composer {
+    plan: ScenePlan,
+    screen_lens: Lens,
+    visibility_m: f64,
+    eye_height_m: f64,
+    models: Arc<[Model]>,
+    boat_models: Vec<ModelId>,
+    black: Picture,
+    scene: Scene,
+    frames: u64,
+}
+
+impl Composer {
+    /// A composer whose first frame has yet to come. No picture may have the calibrated size in that layout: then there is none.
+    pub fn new(settings: &ComposerSettings<'_>, estimator: &Estimator) -> Result<Self, PictureError> {
+        let ComposerSettings { scenario, calibration, screen, video, models, boat_models } = *settings;
+        let picture = (calibration.lens.width, calibration.lens.height);
+        let black = Picture::black(video, picture.0, picture.1)?;
+        let plan = ScenePlan::new(&Needs {
+            size: screen,
+            video,
+            picture,
+            optics: calibration.optics(),
+            ..Needs::of_scenario(scenario)
+        });
+        let screen_lens = calibration.lens.covering(screen.0, screen.1);
+        let light = estimator.light();
+        let camera =
+            CameraPose { world_from_camera: DQuat::IDENTITY, position: DVec3::Z * scenario.eye_height_m };
+        let scene = Scene {
+            frame: 0,
+            camera,
+            lens: screen_lens,
+            passes: plan.frame(false, &[], &[]),
+            boats: Vec::with_capacity(scenario.boats.len()),
+            rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
+            light: light.boats,
+            water: scenario.water,
+            wind: scenario.wind.truncate(),
+            sky: light.sky,
+            tones: light.tones,
+            hud: Hud { rounds_left: scenario.weapon.belt, ..Hud::READY },
+            guide: None,
+        };
+        Ok(Self {
+            plan,
+            screen_lens,
+            visibility_m: scenario.visibility_m,
+            eye_height_m: scenario.eye_height_m,
+            models: Arc::clone(models),
+            boat_models: boat_models.to_vec(),
+            black,
+            scene,
+            frames: 0,
+        })
+    }
+
+    /// What the renderer must be able to do.
+    pub const fn plan(&self) -> &ScenePlan {
+        &self.plan
+    }
+
+    /// The scene that was composed last.
+    pub const fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// A black picture of the planned size and layout.
+    pub const fn black(&self) -> &Picture {
+        &self.black
+    }
+
+    /// Plans for pictures of the calibrated size that come in another layout than planned.
+    pub fn follow_layout(&mut self, picture: &Picture) {
+        let format = picture.format();
+        if format == self.plan.video || (picture.width(), picture.height()) != self.plan.picture {
+            return;
+        }
+        let (width, height) = self.plan.picture;
+        // A picture of that size and layout is here, so a black one can be made.
+        if let Ok(black) = Picture::black(format, width, height) {
+            self.black = black;
+            self.plan.video = format;
+        }
+    }
+
+    /// Composes the next frame's scene; says whether the camera's pose was known.
+    pub fn compose(&mut self, moment: &FrameMoment, estimator: &Estimator, world: &World) -> bool {
+        let camera = match moment.video_time {
+            Some(time) => self.compose_view(time, moment, estimator, world),
+            None => {
+                self.compose_black(moment);
+                None
+            }
+        };
+        self.scene.frame = self.frames;
+        self.frames += 1;
+        camera.is_some()
+    }
+
+    /// While no picture has come: nothing but what is wrong.
+    fn compose_black(&mut self, moment: &FrameMoment) {
+        let scene = &mut self.scene;
+        scene.boats.clear();
+        scene.rounds.clear();
+        scene.passes = self.plan.frame(false, &[], &[]);
+        scene.hud.status = status(moment.permission, None);
+        scene.hud.warning = moment.warning;
+    }
+
+    fn compose_view(
+        &mut self,
+        time: Time,
+        moment: &FrameMoment,
+        estimator: &Estimator,
+        world: &World,
+    ) -> Option<CameraPose> {
+        let camera = estimator.camera(time).ok().map(|camera| camera.pose);
+        let scene = &mut self.scene;
+        (scene.wind, scene.water.force) = estimator.wind();
+        scene.boats.clear();
+        scene.rounds.clear();
+        if let (Some(camera), Some(running)) = (&camera, world.running()) {
+            scene.camera = *camera;
+            scene.lens = estimator.lens_at(time).covering(self.plan.size.0, self.plan.size.1);
+            let frustum = ViewFrustum {
+                camera,
+                lens: &scene.lens,
+                visibility_m: self.visibility_m,
+                wind: scene.wind,
+                reflections: moment.cool && self.plan.has(Pass::Water) && sea_reflects(scene.water.force),
+                wakes: moment.cool && self.plan.has(Pass::Wake),
+            };
+            boats_in_view(&running.fleet, &frustum, time, running.start, &mut scene.boats);
+            rounds_in_view(running, &frustum, time, &mut scene.rounds);
+        }
+        scene.passes = self.plan.frame(camera.is_some(), &scene.boats, &scene.rounds);
+        let light = estimator.light();
+        (scene.light, scene.sky, scene.tones) = (light.boats, light.sky, light.tones);
+        let result = world.last_result().filter(|result| time.secs_since(result.time) < RESULT_S);
+        let score = world.score();
+        scene.hud = Hud {
+            status: status(moment.permission, result),
+            warning: moment.warning,
+            rounds_left: world.rounds_left(),
+            shots: u32::try_from(score.shots).unwrap_or(u32::MAX),
+            hits: u32::try_from(score.hits).unwrap_or(u32::MAX),
+            clock_s: world.clock_s(time),
+            sea: estimator.sea().map(|sea| (sea.in_use.state, sea.in_use.source)),
+            heading_tenths_deg: estimator.heading_shown(),
+        };
+        camera
+    }
+
+    /// A scene in which everything that this session can ever show is in view. Drawn once and thrown away before the first
+    /// frame, it lets drivers finish compiling what they put off until it is used.
+    pub fn warm_up(&self) -> Scene {
+        let camera = CameraPose {
+            world_from_camera: look(0.0, -0.08, 0.0),
+            position: DVec3::new(0.0, 0.0, self.eye_height_m),
+        };
+        let frustum = ViewFrustum {
+            camera: &camera,
+            lens: &self.screen_lens,
+            visibility_m: self.visibility_m,
+            wind: self.scene.wind,
+            reflections: self.plan.has(Pass::Water),
+            wakes: self.plan.has(Pass::Wake),
+        };
+        let boats = self.boat_models.iter().enumerate();
+        let boats: Vec<_> = boats.filter_map(|(boat, id)| self.warm_up_boat(&frustum, boat, *id)).collect();
+        let at = DVec3::new(0.0, self.eye_height_m * 10.0, 0.5);
+        let rounds = vec![
+            RoundView::Splash { at, height_m: 1.0, radius_m: 0.5, opacity: 1.0 },
+            RoundView::Strike { at, radius_m: 0.5, opacity: 1.0 },
+            RoundView::Tracer { from: at, to: at + DVec3::Y * 10.0, radiance: Vec3::ONE },
+        ];
+        Scene { camera, passes: self.plan.frame(true, &boats, &rounds), boats, rounds, ..self.scene.clone() }
+    }
+
+    /// A boat under way, broadside before the camera.
+    fn warm_up_boat(&self, frustum: &ViewFrustum<'_>, boat: usize, model_id: ModelId) -> Option<BoatView> {
+        let model = self.models.get(usize::from(model_id.0))?;
+        let ahead_m = (self.eye_height_m * 10.0).max(4.0 * model.radius_m());
+        let pose = RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::new(0.0, ahead_m, 0.0) };
+        let under_way = CourseState {
+            position: pose.position.truncate(),
+            heading: std::f64::consts::FRAC_PI_2,
+            speed_m_s: 5.0,
+            turn_rate: 0.0,
+        };
+        let wake = || Wake::of(Hull::of(model), f64::from(-model.min.z), 0.0, |_| under_way, |_| 0.0);
+        frustum.see_with_wake(&Afloat { boat, model_id, model, pose, water_level: 0.0 }, wake)
+    }
+}
+
+/// What the sailor is told: what keeps the weapon from scoring, else the newest result.
+fn status(permission: FirePermission, result: Option<LastResult>) -> Status {
+    match permission {
+        FirePermission::Safe(f) => Status::Fault { cause: f.cause(), action: f.action() },
+        FirePermission::NotScored(why) => {
+            let fault = NotScored::fault(why);
+            Status::NotScored { cause: fault.cause(), action: fault.action() }
+        }
+        FirePermission::Armed => match result {
+            Some(LastResult { hit: true, .. }) => Status::Hit,
+            Some(LastResult { hit: false, .. }) => Status::Miss,
+            None => Status::Ready,
+        },
+    }
+}

@@ -1,0 +1,108 @@
+//! Where one boat was over the last seconds: states on a fixed grid, each made from the one before.
+
+use super::{
+    behaviour::{Behaviour, BehaviourStep},
+    course::{CourseState, Damage},
+    floating::{Floating, afloat_in_waves, quasi_static},
+    grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
+    hull::{Hull, HullForm},
+    seakeeping::{GAP, SeakeepingState},
+};
+use crate::{model::Zone, world::waves::WaveField};
+
+/// Seconds of a boat's past that can be asked for: the foam of its wake (15 s), as it lies behind a picture that is as old as
+/// orientations are kept (2 s), and a second more.
+pub const HISTORY_S: f64 = 18.0;
+/// States kept.
+const KEPT: usize = (HISTORY_S / STEP_S) as usize;
+
+/// One boat: what it does, what has struck it, and where it was.
+#[derive(Clone, Debug)]
+pub struct BoatHistory {
+    behaviour: Behaviour,
+    damage: Damage,
+    hull: Hull,
+    states: GridHistory<CourseState>,
+    seakeeping: SeakeepingState,
+}
+
+impl BoatHistory {
+    /// A boat as the scenario begins.
+    pub fn new(behaviour: Behaviour, hull: Hull, form: HullForm) -> Self {
+        let mut states = GridHistory::new(KEPT);
+        states.restart(0, behaviour.begin(0.0, &Damage::NONE));
+        Self { behaviour, damage: Damage::NONE, hull, states, seakeeping: SeakeepingState::new(form) }
+    }
+
+    /// The hull's size at the waterline.
+    pub const fn hull(&self) -> Hull {
+        self.hull
+    }
+
+    /// Steps the boat up to `until_s`, seconds since the scenario began. Does nothing for what is already stepped. A stretch of more than
+    /// 10 s is not stepped through.
+    pub fn follow(&mut self, until_s: f64, waves: &WaveField) {
+        let last = step_after(until_s);
+        if self.states.newest().is_none_or(|newest| last.saturating_sub(newest) > GAP) {
+            let first = if last <= GAP { 0 } else { last.saturating_sub(KEPT as i64 - 1).max(0) };
+            self.states.restart(first, self.behaviour.begin(seconds(first), &self.damage));
+        }
+        while let (Some(newest), Some(from)) = (self.states.newest(), self.states.last())
+            && newest < last
+        {
+            let step = BehaviourStep { from, to_s: seconds(newest + 1), damage: &self.damage };
+            let next = self.behaviour.next(&step);
+            self.states.push(next);
+        }
+        if !waves.is_flat() {
+            let states = &self.states;
+            self.seakeeping.follow(until_s, |time_s| state_in(states, time_s), waves);
+        }
+    }
+
+    /// Where the boat is or was at a time. Before the oldest state that is kept, and so before the scenario began, it came straight on;
+    /// after the newest it goes on as it does there.
+    pub fn state(&self, time_s: f64) -> CourseState {
+        state_in(&self.states, time_s)
+    }
+
+    /// How the boat lies on the water at a time. Where its motion in waves is not known (on a flat sea there is none), it lies in the
+    /// mean plane of the water.
+    pub fn floating(&self, time_s: f64, waves: &WaveField) -> Floating {
+        let state = self.state(time_s);
+        match self.seakeeping.at(time_s) {
+            Some(motion) => {
+                afloat_in_waves(&state, &self.hull, self.seakeeping.form(), &motion, waves, time_s)
+            }
+            None => quasi_static(&state, &self.hull, waves, time_s),
+        }
+    }
+
+    /// Takes in that the boat was struck at `time_s`: what is stepped after that follows from it. A hit on the engine stops it, one on
+    /// the helm ends its attack; the first of each counts.
+    pub fn strike(&mut self, zone: Zone, time_s: f64) {
+        if self.damage.add(zone, time_s) {
+            self.states.forget_after(time_s);
+            self.seakeeping.forget_after(time_s);
+        }
+    }
+
+    /// Forgets how waves moved the boat after `time_s`: the sea is another from there on.
+    pub fn forget_waves_after(&mut self, time_s: f64) {
+        self.seakeeping.forget_after(time_s);
+    }
+}
+
+fn state_in(states: &GridHistory<CourseState>, time_s: f64) -> CourseState {
+    match states.around(time_s) {
+        Some(Lookup::Between(from, to, share)) => from.between(to, STEP_S, share),
+        Some(Lookup::Before(first, before_s)) => first.straight_on(-before_s),
+        Some(Lookup::After(last, past_s)) => last.moved(past_s),
+        // A history holds at least the state that it began with.
+        None => CourseState::default(),
+    }
+}
+
+#[cfg(test)]
+#[path = "history_tests.rs"]
+mod tests;

@@ -1,0 +1,220 @@
+//! Stage two as a whole: the trigger's edges and where the barrel points in, boats, rounds and records out.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::{
+    fleet::{Fleet, Vessel},
+    rounds::{Ammunition, Launch, Rounds},
+    scenario::Scenario,
+    score::{NotScored, Outcome, ShotRecord},
+    sea_change::{SeaChange, conditions_of},
+    waves::WaveField,
+    weapon::Weapon,
+};
+use crate::{
+    estimate::sea::SeaConditions,
+    event::TriggerEdge,
+    model::{Model, ModelId},
+    time::Time,
+};
+
+/// The longest time that a round is followed, seconds, and a second more.
+const ROUND_OVER_S: f64 = 21.0;
+/// How long a result stands, seconds: it is shown, and a hit is not replaced by a miss.
+pub const RESULT_S: f64 = 1.5;
+
+/// Where the barrel pointed as a round left it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// The muzzle, world, metres.
+    pub muzzle: DVec3,
+    /// Direction of the barrel, world, unit vector.
+    pub bore: DVec3,
+    /// Age of the pose used, nanoseconds; negative where it was interpolated.
+    pub pose_age_ns: i64,
+    /// Why the round is not scored; `None` where it is.
+    pub unscored: Option<NotScored>,
+}
+
+/// Rounds of a session so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Score {
+    /// Rounds fired.
+    pub shots: u64,
+    /// Rounds that struck.
+    pub hits: u64,
+}
+
+/// The result of the round that counts as the newest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LastResult {
+    /// When it struck, or was closest.
+    pub time: Time,
+    /// Whether it struck.
+    pub hit: bool,
+}
+
+/// The virtual world.
+#[derive(Debug)]
+pub struct World {
+    vessels: Vec<Vessel>,
+    models: Arc<[Model]>,
+    ammunition: Ammunition,
+    weapon: Weapon,
+    waves: WaveField,
+    sea_change: SeaChange,
+    running: Option<Running>,
+    score: Score,
+    last_result: Option<LastResult>,
+}
+
+/// What there is from the first picture on.
+#[derive(Debug)]
+pub struct Running {
+    /// When the scenario began.
+    pub start: Time,
+    /// Up to when boats and rounds were followed.
+    pub now: Time,
+    /// The boats.
+    pub fleet: Fleet,
+    /// The rounds.
+    pub rounds: Rounds,
+}
+
+impl World {
+    /// The world of a scenario before it begins. `boat_models` names the model of each of its boats.
+    pub fn new(scenario: &Scenario, models: Arc<[Model]>, boat_models: &[ModelId]) -> Self {
+        let vessels = scenario.boats.iter().zip(boat_models).map(|(boat, model)| Vessel {
+            name: boat.name.clone(),
+            model: *model,
+            behaviour: boat.behaviour.clone(),
+        });
+        Self {
+            vessels: vessels.collect(),
+            models,
+            ammunition: Ammunition { weapon: scenario.weapon, wind: scenario.wind, seed: scenario.seed },
+            weapon: Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt),
+            waves: scenario.wave_field(),
+            sea_change: SeaChange::new(&scenario.waves),
+            running: None,
+            score: Score::default(),
+            last_result: None,
+        }
+    }
+
+    /// The sea that a scenario assumes until it is measured; `None` where it is not to be measured.
+    pub fn sea_assumed(scenario: &Scenario) -> Option<SeaConditions> {
+        scenario.sea_from_video.then(|| conditions_of(&scenario.waves))
+    }
+
+    /// Takes in an edge of the trigger.
+    pub fn trigger(&mut self, edge: TriggerEdge) {
+        self.weapon.edge(edge);
+    }
+
+    /// Arms or disarms the weapon.
+    pub fn arm(&mut self, armed: bool) {
+        self.weapon.arm(armed);
+    }
+
+    /// Fires what the trigger asks for up to `known` and follows boats and rounds up to `until`, or as far as they were followed
+    /// already. The first call begins the scenario, at `begin`. `aim` tells where the barrel pointed at a time.
+    pub fn advance(
+        &mut self,
+        begin: Time,
+        until: Time,
+        known: Time,
+        mut aim: impl FnMut(Time) -> Aim,
+        records: &mut Vec<ShotRecord>,
+    ) {
+        let mut running = self.running.take().unwrap_or_else(|| self.begin(begin));
+        let now = running.now.max(until);
+        while let Some(fired) = self.weapon.fire(known.min(now)) {
+            self.score.shots += 1;
+            let Aim { muzzle, bore, pose_age_ns, unscored } = aim(fired);
+            let shot = self.score.shots;
+            match unscored {
+                None => {
+                    let launch = Launch { shot, fired, muzzle, bore, pose_age_ns };
+                    running.rounds.launch(launch, running.start, records);
+                }
+                Some(cause) => {
+                    let outcome = Outcome::NotScored { cause };
+                    records.push(ShotRecord { shot, fired, muzzle, bore, pose_age_ns, outcome });
+                }
+            }
+        }
+        running.rounds.advance(now, running.start, &mut running.fleet, records);
+        running.now = now;
+        self.running = Some(running);
+        self.count(records);
+    }
+
+    fn begin(&self, start: Time) -> Running {
+        let fleet = Fleet::new(self.vessels.clone(), Arc::clone(&self.models), self.waves.clone(), start);
+        let rounds = Rounds::new(self.ammunition, self.waves.clone(), start);
+        Running { start, now: start, fleet, rounds }
+    }
+
+    /// Rounds still in the air are recorded as misses: the session ends here.
+    pub fn finish(&mut self, records: &mut Vec<ShotRecord>) {
+        if let Some(Running { start, now, fleet, rounds }) = &mut self.running {
+            rounds.advance(now.plus_secs(ROUND_OVER_S), *start, fleet, records);
+        }
+        self.count(records);
+    }
+
+    /// Lets the waves, and with them boats, go over to a sea that was measured. What was followed up to now stays as it was.
+    pub fn follow_sea(&mut self, measured: &SeaConditions) {
+        let Some(running) = &mut self.running else { return };
+        let now_s = running.now.secs_since(running.start);
+        if let Some(spec) = self.sea_change.next(measured, now_s) {
+            let next = WaveField::new(&spec, self.ammunition.seed);
+            self.waves = std::mem::replace(&mut self.waves, WaveField::FLAT).changing_to(next, now_s);
+            running.fleet.set_waves(self.waves.clone(), running.now);
+            running.rounds.set_sea(self.waves.clone());
+        }
+    }
+
+    fn count(&mut self, records: &[ShotRecord]) {
+        for record in records {
+            let (time, hit) = match &record.outcome {
+                Outcome::Hit { time, .. } => (*time, true),
+                Outcome::Miss { time, .. } => (*time, false),
+                Outcome::NotScored { .. } => continue,
+            };
+            self.score.hits += u64::from(hit);
+            // Of several results at once a hit is what the sailor wants to see.
+            if hit || self.last_result.is_none_or(|r| !r.hit || time.secs_since(r.time) > RESULT_S) {
+                self.last_result = Some(LastResult { time, hit });
+            }
+        }
+    }
+
+    /// Boats and rounds; `None` before the first picture.
+    pub const fn running(&self) -> Option<&Running> {
+        self.running.as_ref()
+    }
+
+    /// Rounds left in the belt.
+    pub const fn rounds_left(&self) -> u32 {
+        self.weapon.rounds_left()
+    }
+
+    /// Rounds fired and rounds that struck.
+    pub const fn score(&self) -> Score {
+        self.score
+    }
+
+    /// The result that counts as the newest; `None` before there is one.
+    pub const fn last_result(&self) -> Option<LastResult> {
+        self.last_result
+    }
+
+    /// Seconds from the scenario's begin to `time`; 0 before it.
+    pub fn clock_s(&self, time: Time) -> f64 {
+        self.running.as_ref().map_or(0.0, |r| time.secs_since(r.start))
+    }
+}
