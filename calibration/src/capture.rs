@@ -7,7 +7,7 @@ use bowwave_core::{
     calibration::Calibration,
     estimate::{
         clock::ClockMap,
-        horizon::{HorizonFinder, Mask, NoHorizon, View},
+        horizon::{HorizonFinder, HorizonView, Mask, NoHorizon},
     },
     event::{CameraFrame, Event, ImuSample, Picture, TriggerEdge},
     geometry::{Lens, horizon_dip},
@@ -156,7 +156,7 @@ impl Watcher {
         if !fits {
             return seen;
         }
-        let view = View { lens: *lens, eye_height_m: self.eye_height_m, prior: None };
+        let view = HorizonView { lens: *lens, eye_height_m: self.eye_height_m, prior: None };
         match self.finder.find(picture, &view) {
             Ok(horizon) => {
                 let covariance = horizon.up_covariance();

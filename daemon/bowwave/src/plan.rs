@@ -6,7 +6,7 @@ use anyhow::Result;
 use bowwave_core::{
     event::PixelFormat,
     frame::{
-        plan::{Needs, ScenePlan},
+        plan::{SceneNeeds, ScenePlan},
         scene::{Pass, PassDecision},
     },
     model::Model,
@@ -74,11 +74,11 @@ pub fn run(arguments: &Plan) -> Result<()> {
     let radius =
         |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
     scenario.check_clearance(&of_boats.iter().map(radius).collect::<Vec<_>>())?;
-    let plan = ScenePlan::new(&Needs {
+    let plan = ScenePlan::new(&SceneNeeds {
         size: arguments.size,
         video: PixelFormat::Rgb,
         picture: arguments.size,
-        ..Needs::of_scenario(&scenario)
+        ..SceneNeeds::of_scenario(&scenario)
     });
     let (memory, device) = memory(&plan, &models);
     let printed = Printed {

@@ -27,7 +27,7 @@ use crate::{
     model::{Model, ModelId},
     time::Time,
     water::ReflectionMethod,
-    world::{Aim, World, scenario::Scenario, score::ShotRecord},
+    world::{BoreAim, World, scenario::Scenario, score::ShotRecord},
 };
 
 pub use crate::frame::ROUNDS_SEEN_MAX;
@@ -82,7 +82,7 @@ pub enum SetupError {
 
 /// The answer to one tick.
 #[derive(Debug)]
-pub struct Step<'a> {
+pub struct TickAnswer<'a> {
     /// What to draw.
     pub view: View<'a>,
     /// Rounds that ended, in the order in which they were fired within the step.
@@ -220,7 +220,7 @@ impl Session {
     }
 
     /// Takes in one input. A tick gives a frame and what became of rounds; tick times must not go back.
-    pub fn input(&mut self, input: &Input) -> Option<Step<'_>> {
+    pub fn input(&mut self, input: &Input) -> Option<TickAnswer<'_>> {
         match input {
             Input::Event(event) => {
                 self.event(event);
@@ -253,7 +253,7 @@ impl Session {
     }
 
     /// A frame is due: gives what to draw, and what became of rounds since the last tick.
-    pub fn tick(&mut self, tick: Tick) -> Step<'_> {
+    pub fn tick(&mut self, tick: Tick) -> TickAnswer<'_> {
         self.records.clear();
         self.found.clear();
         self.notes.clear();
@@ -287,7 +287,7 @@ impl Session {
             mid_exposure: frame.map_or(tick.time, |frame| frame.mid_exposure),
             pose_known,
         };
-        Step { view, records: &self.records, faults: &self.found, notes: self.notes.new_ones() }
+        TickAnswer { view, records: &self.records, faults: &self.found, notes: self.notes.new_ones() }
     }
 
     /// Fires what the trigger asks for and follows boats and rounds up to the picture's time.
@@ -355,10 +355,10 @@ fn aim(
     drawn: CameraPose,
     faults: &FaultBoard,
     fired: Time,
-) -> Aim {
+) -> BoreAim {
     let camera = estimator.camera(fired);
     let pose = camera.map_or(drawn, |camera| camera.pose);
-    Aim {
+    BoreAim {
         muzzle: pose.position + pose.world_from_camera * calibration.muzzle_in_camera,
         bore: pose.world_from_camera * calibration.bore_in_camera(),
         pose_age_ns: camera.map_or_else(NoPose::age_ns, |camera| camera.age_ns),

@@ -115,7 +115,7 @@ fn attitude(t_s: f64, rate: f64) -> DQuat {
     look(rate * t_s, -drop, 0.0)
 }
 
-struct Stream {
+struct DeviceStream {
     rate: f64,
     imu: std::ops::Range<i64>,
     frames: std::ops::Range<i64>,
@@ -126,7 +126,7 @@ struct Stream {
 fn play(
     session: &mut Session,
     seconds: f64,
-    stream: &Stream,
+    stream: &DeviceStream,
     edges: &[TriggerEdge],
     mut each: impl FnMut(&Session, Option<Status>, [PassDecision; Pass::COUNT], &[ShotRecord]),
 ) {
@@ -190,7 +190,8 @@ fn burst(from_ms: i64, to_ms: i64) -> [TriggerEdge; 2] {
     ]
 }
 
-const ALL: Stream = Stream { rate: 0.0, imu: 0..i64::MAX, frames: 0..i64::MAX, faults: Vec::new() };
+const ALL: DeviceStream =
+    DeviceStream { rate: 0.0, imu: 0..i64::MAX, frames: 0..i64::MAX, faults: Vec::new() };
 
 #[test]
 fn rounds_at_the_block_strike_it() {
@@ -274,7 +275,7 @@ fn the_pose_is_the_one_at_the_pictures_mid_exposure() {
 #[test]
 fn without_orientation_no_boat_is_drawn_and_no_round_is_scored() {
     let mut s = session(SCENARIO);
-    let stream = Stream { imu: 0..1000, ..ALL };
+    let stream = DeviceStream { imu: 0..1000, ..ALL };
     let mut records = Vec::new();
     let mut last = None;
     play(&mut s, 2.0, &stream, &burst(1500, 1650), |_, status, passes, r| {
@@ -294,7 +295,7 @@ fn without_orientation_no_boat_is_drawn_and_no_round_is_scored() {
 #[test]
 fn without_pictures_no_round_is_scored() {
     let mut s = session(SCENARIO);
-    let stream = Stream { frames: 0..1000, ..ALL };
+    let stream = DeviceStream { frames: 0..1000, ..ALL };
     let mut records = Vec::new();
     let mut last = None;
     play(&mut s, 2.5, &stream, &burst(1500, 1550), |_, status, _, r| {
@@ -311,7 +312,7 @@ fn the_same_events_give_the_same_records_however_they_are_cut() {
     let run = || {
         let mut s = session(&SCENARIO.replace("dispersion_mrad = 0.0", "dispersion_mrad = 4.0"));
         let mut all = String::new();
-        play(&mut s, 3.0, &Stream { rate: 0.02, ..ALL }, &burst(300, 900), |_, _, _, r| {
+        play(&mut s, 3.0, &DeviceStream { rate: 0.02, ..ALL }, &burst(300, 900), |_, _, _, r| {
             all += &format!("{r:?}")
         });
         all
@@ -369,7 +370,7 @@ fn with_fault(fault: Fault) -> (Vec<Outcome>, Vec<Status>, Vec<Option<Fault>>) {
     let faults = vec![FaultChange::raised(at(1200), fault, "test"), FaultChange::cleared(at(2200), fault)];
     let edges = [burst(500, 550), burst(1500, 1550), burst(2500, 2550)].concat();
     let (mut outcomes, mut states, mut warnings, mut tick) = (Vec::new(), Vec::new(), Vec::new(), 0);
-    play(&mut s, 4.0, &Stream { faults, ..ALL }, &edges, |s, status, _, r| {
+    play(&mut s, 4.0, &DeviceStream { faults, ..ALL }, &edges, |s, status, _, r| {
         outcomes.extend(r.iter().map(|r| r.outcome.clone()));
         tick += 1;
         if (40..60).contains(&tick) {
@@ -415,7 +416,7 @@ fn a_hot_computer_draws_no_reflection() {
     let water = |faults: Vec<FaultChange>| {
         let mut s = session(SCENARIO);
         let mut last = None;
-        play(&mut s, 1.0, &Stream { faults, ..ALL }, &[], |_, _, passes, _| last = Some(passes));
+        play(&mut s, 1.0, &DeviceStream { faults, ..ALL }, &[], |_, _, passes, _| last = Some(passes));
         last.map(|passes| (passes[Pass::Water as usize], passes[Pass::Boats as usize]))
     };
     let cool = water(Vec::new());
@@ -442,7 +443,7 @@ fn the_same_inputs_give_the_same_digests_and_others_do_not() {
             FaultChange::raised(Time::from_ns(fault_ms * MS), Fault::CamCorrupt, "a"),
             FaultChange::cleared(Time::from_ns((fault_ms + 400) * MS), Fault::CamCorrupt),
         ];
-        play(&mut s, 2.0, &Stream { rate, faults, ..ALL }, &burst(500, 750), |_, _, _, _| {});
+        play(&mut s, 2.0, &DeviceStream { rate, faults, ..ALL }, &burst(500, 750), |_, _, _, _| {});
         s.finish();
         s.digest()
     };

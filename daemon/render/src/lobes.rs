@@ -3,7 +3,8 @@
 use bowwave_core::{
     frame::{
         reflection::{
-            BANDS, HALF_WIDTH_MIN_PX, Lobe, Lobes, STEPS, SeaLobes, Seen, Table,
+            BANDS, HALF_WIDTH_MIN_PX, Lobes, ReflectionTable, ReflectionTransfer, ReflectionView, STEPS,
+            SeaLobes,
             grid::{TONE_GAIN, TONE_OUTER},
             tilt_away, water_light, wind_to_view,
         },
@@ -40,7 +41,7 @@ const COLUMNS_MIN: u32 = 12;
 
 /// The sea of the frames, and room for one boat's lobes.
 pub(crate) struct Waves {
-    table: Table,
+    table: ReflectionTable,
     sea: SeaLobes,
     wind_m_s: f64,
     lobes: Lobes,
@@ -48,7 +49,7 @@ pub(crate) struct Waves {
 
 impl Waves {
     pub(crate) fn new() -> Self {
-        let table = Table::baked();
+        let table = ReflectionTable::baked();
         let sea = table.sea(0.0);
         let mut lobes = Lobes::default();
         lobes.steps.reserve_exact(STEPS);
@@ -76,7 +77,7 @@ impl Waves {
         let tangent = eye_m / away.length();
         let pixels = focal / away.length();
         let (first, last) = line.ends();
-        let seen = Seen {
+        let seen = ReflectionView {
             wind_to_view: wind_to_view(scene.wind, away),
             sky: scene.sky,
             water: water_light(&scene.light),
@@ -109,7 +110,7 @@ impl Waves {
         for (step, bands) in out.lobes.iter_mut().zip(&self.lobes.steps) {
             let seen = seen_bands(bands);
             for (vectors, lobe) in step.iter_mut().zip(&bands[..seen]) {
-                let Lobe { thrown, taken, aside_m, half_width_m, hue, .. } = *lobe;
+                let ReflectionTransfer { thrown, taken, aside_m, half_width_m, hue, .. } = *lobe;
                 *vectors = [
                     [thrown.mean, thrown.slope, aside_m, half_width_m],
                     (hue * taken.mean).extend(taken.slope).to_array(),
@@ -219,7 +220,7 @@ fn focal_px(scene: &Scene, boat: &BoatView) -> Option<f64> {
 }
 
 /// How many bands from the water up are seen: close to the hull, water that is seen from above mirrors little that is high.
-fn seen_bands(bands: &[Lobe; BANDS]) -> usize {
+fn seen_bands(bands: &[ReflectionTransfer; BANDS]) -> usize {
     let above = bands.iter().rev().scan(0.0, |sum, l| {
         *sum += l.thrown.most().max(l.taken.most());
         Some(*sum)

@@ -12,7 +12,9 @@ use bowwave_core::{
     colour::{linear_to_srgb, srgb_to_linear},
     estimate::light::SeaTones,
     frame::{
-        reflection::{BANDS, Billboard, Lobes, Place, Seen, Table, compose, water_light},
+        reflection::{
+            BANDS, Billboard, HullFoot, Lobes, ReflectionTable, ReflectionView, compose, water_light,
+        },
         scene::{Pass, PassDecision, Scene},
     },
     water::{ReflectionMethod, ShadowLevel},
@@ -81,7 +83,7 @@ fn composed(before: &[u8], scene: &Scene) -> (Vec<Vec3>, Vec<bool>) {
     let (left, right) = (side(-4.0), side(4.0));
     let eye_m = scene.camera.position.z - level;
     let focal_px = dropped.length() / lift * RANGE_M;
-    let place = Place {
+    let place = HullFoot {
         anchor,
         down,
         first: left.x,
@@ -95,7 +97,7 @@ fn composed(before: &[u8], scene: &Scene) -> (Vec<Vec3>, Vec<bool>) {
     let light = (scene.light.sky * Vec3::new(0.1, 0.05, 0.02)).extend(1.0);
     let billboard = billboard(left.x, right.x, light);
     let wind_to_view = scene.wind.x.atan2(scene.wind.y);
-    let seen = Seen {
+    let seen = ReflectionView {
         wind_to_view,
         sky: scene.sky,
         water: water_light(&scene.light),
@@ -107,7 +109,7 @@ fn composed(before: &[u8], scene: &Scene) -> (Vec<Vec3>, Vec<bool>) {
         tilt: 0.0,
         pixel: 1.0 / focal_px,
     };
-    let lobes = Lobes::of(&Table::baked().sea(scene.wind.length()), &seen);
+    let lobes = Lobes::of(&ReflectionTable::baked().sea(scene.wind.length()), &seen);
     compose(&mut picture, SIZE.0 as usize, &place, &billboard, &lobes, &scene.tones);
     let hidden = (0..picture.len()).map(|n| {
         let at = DVec2::new((n % SIZE.0 as usize) as f64, (n / SIZE.0 as usize) as f64) + 0.5 - anchor;

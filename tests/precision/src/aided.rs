@@ -3,8 +3,8 @@
 
 use bowwave_core::{
     estimate::attitude::{
-        Attitude, AttitudeSettings, DIP_SIGMA, HeadingSeen, Noise, OWN_GROWTH, RateKind, Settings, Source,
-        UpSeen,
+        Attitude, AttitudeSettings, HeadingSeen, InclinationSettings, Noise, OWN_GROWTH, REFRACTION_SIGMA,
+        RateKind, Source, UpSeen,
     },
     event::ImuSample,
     geometry::wrapped,
@@ -105,7 +105,7 @@ pub fn product(source: Source) -> Attitude {
     let settings = AttitudeSettings {
         source,
         rate: RateKind::Instant,
-        inclination: Settings::GUN,
+        inclination: InclinationSettings::GUN,
         noise: Noise::USUAL,
         own_growth: OWN_GROWTH,
     };
@@ -131,7 +131,7 @@ impl Unit {
                     accel_bias: drawn(DVec3::splat(noise.force)),
                     ..Errors::usual()
                 };
-                (errors, drawn(noise.mounting), drawn(DVec3::splat(DIP_SIGMA)).x)
+                (errors, drawn(noise.mounting), drawn(DVec3::splat(REFRACTION_SIGMA)).x)
             }
         }
     }
@@ -170,10 +170,10 @@ impl Aids {
             }
             let late = |seen: Time| time.secs_since(seen) > SEEN_LATE_S;
             if let Some(seen) = up_waits.take_if(|seen| late(seen.time)) {
-                aided.see_up(&seen);
+                aided.update_vertical(&seen);
             }
             if let Some(seen) = heading_waits.take_if(|seen| late(seen.time)) {
-                aided.see_heading(&seen, matches!(self.heading, Heading::Anchored(..)));
+                aided.update_heading(&seen, matches!(self.heading, Heading::Anchored(..)));
             }
             tell(&s, found, aided);
         }
@@ -228,11 +228,11 @@ pub trait Estimator {
     /// The orientation at a sample.
     fn observe(&mut self, time: Time, sample: &ImuSample) -> Option<DQuat>;
     /// Takes in where up was seen.
-    fn see_up(&mut self, seen: &UpSeen);
+    fn update_vertical(&mut self, seen: &UpSeen);
     /// Remembers the heading; what is anchored turns by about `drift` rad/s.
     fn anchor(&mut self, drift: f64);
     /// Takes in a heading, absolute or since it was anchored.
-    fn see_heading(&mut self, seen: &HeadingSeen, anchored: bool);
+    fn update_heading(&mut self, seen: &HeadingSeen, anchored: bool);
     /// Covariance of the turn of the world by which it is wrong.
     fn covariance(&self) -> Option<DMat3>;
 }
@@ -242,18 +242,18 @@ impl Estimator for Attitude {
         self.observe(time, sample).map(|o| o.world_from_imu)
     }
 
-    fn see_up(&mut self, seen: &UpSeen) {
-        self.see_up(seen, LIMIT_UP);
+    fn update_vertical(&mut self, seen: &UpSeen) {
+        self.update_vertical(seen, LIMIT_UP);
     }
 
     fn anchor(&mut self, drift: f64) {
         self.anchor_heading(drift);
     }
 
-    fn see_heading(&mut self, seen: &HeadingSeen, anchored: bool) {
+    fn update_heading(&mut self, seen: &HeadingSeen, anchored: bool) {
         match anchored {
-            true => self.see_anchored_heading(seen, LIMIT_HEADING),
-            false => self.see_heading(seen, LIMIT_HEADING),
+            true => self.update_anchored_heading(seen, LIMIT_HEADING),
+            false => self.update_heading(seen, LIMIT_HEADING),
         };
     }
 
@@ -293,7 +293,7 @@ pub fn outcome(recording: &Recording, aided: &mut dyn Estimator) -> Outcome {
         count += 1.0;
         if s.time_s >= next {
             next += INDEPENDENT_S;
-            out.surprises.extend(aided.covariance().map(|c| surprise(truth, found, c)));
+            out.surprises.extend(aided.covariance().map(|c| nis(truth, found, c)));
         }
     });
     out.up_deg[0] = (out.up_deg[0] / count).sqrt();
@@ -301,7 +301,7 @@ pub fn outcome(recording: &Recording, aided: &mut dyn Estimator) -> Outcome {
     out
 }
 
-fn surprise(truth: DQuat, found: DQuat, covariance: DMat3) -> f64 {
+fn nis(truth: DQuat, found: DQuat, covariance: DMat3) -> f64 {
     let off = truth * found.inverse();
     let turn = (off * off.w.signum()).to_scaled_axis().truncate();
     let across = DMat2::from_cols(covariance.x_axis.truncate(), covariance.y_axis.truncate());

@@ -7,7 +7,7 @@ const STIFF: f64 = 0.01;
 
 /// Sums of the normal equations for so many numbers.
 #[derive(Clone)]
-pub struct Fit<const N: usize> {
+pub struct NormalEquations<const N: usize> {
     weight: f64,
     states: [[f64; STATES]; STATES],
     values: [[f64; N]; STATES],
@@ -20,7 +20,7 @@ fn terms(states: &[f64; STATES]) -> [f64; STATES] {
     terms
 }
 
-impl<const N: usize> Fit<N> {
+impl<const N: usize> NormalEquations<N> {
     /// Nothing yet.
     pub fn new() -> Self {
         Self { weight: 0.0, states: [[0.0; STATES]; STATES], values: [[0.0; N]; STATES] }

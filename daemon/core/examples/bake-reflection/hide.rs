@@ -5,7 +5,7 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use crate::{HALF_BEAM_M, fit::Fit, sea::Sea};
+use crate::{HALF_BEAM_M, fit::NormalEquations, sea::BakedSea};
 
 /// Places of a hull on each patch.
 const PLACES: usize = 600;
@@ -15,18 +15,18 @@ const STEP_M: f64 = 0.2;
 const ASLANT: f64 = 0.137;
 
 /// By elevation and state: height over a hull's own water up to which it is hidden, metres.
-pub fn hidden(seas: &[Sea], spread: [f64; 2]) -> Vec<f64> {
+pub fn hidden(seas: &[BakedSea], spread: [f64; 2]) -> Vec<f64> {
     let sums = seas.par_iter().enumerate().map(|(n, sea)| on_patch(sea, spread, n as u128));
-    let merge = |mut a: Vec<Fit<1>>, b: Vec<Fit<1>>| {
+    let merge = |mut a: Vec<NormalEquations<1>>, b: Vec<NormalEquations<1>>| {
         a.iter_mut().zip(&b).for_each(|(a, b)| a.join(b));
         a
     };
-    let fits = sums.reduce(|| vec![Fit::new(); ELEVATIONS], merge);
+    let fits = sums.reduce(|| vec![NormalEquations::new(); ELEVATIONS], merge);
     fits.iter().flat_map(|fit| fit.solve().map(|[v]| v)).collect()
 }
 
-fn on_patch(sea: &Sea, spread: [f64; 2], seed: u128) -> Vec<Fit<1>> {
-    let mut fits = vec![Fit::new(); ELEVATIONS];
+fn on_patch(sea: &BakedSea, spread: [f64; 2], seed: u128) -> Vec<NormalEquations<1>> {
+    let mut fits = vec![NormalEquations::new(); ELEVATIONS];
     if sea.reach_m <= 0.0 {
         return fits;
     }
@@ -44,7 +44,7 @@ fn on_patch(sea: &Sea, spread: [f64; 2], seed: u128) -> Vec<Fit<1>> {
 }
 
 /// Height at the hull of the lowest line of sight that passes over all waves before it, by elevation.
-fn highest(sea: &Sea, x: f64, y: f64) -> [f64; ELEVATIONS] {
+fn highest(sea: &BakedSea, x: f64, y: f64) -> [f64; ELEVATIONS] {
     let tangents: [f64; ELEVATIONS] = std::array::from_fn(|e| elevation(e).tan());
     let mut out = [f64::NEG_INFINITY; ELEVATIONS];
     let mut before = 0.0;

@@ -25,9 +25,9 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-use fit::Fit;
-use path::{Segment, follow};
-use sea::{Sea, SeaSpec};
+use fit::NormalEquations;
+use path::{PathSegment, follow};
+use sea::{BakedSea, SeaSpec};
 
 /// Angle that a pixel of the camera spans, radians, and the camera's height over the sea, metres.
 const PIXEL: f64 = 1e-3;
@@ -50,7 +50,7 @@ const VALUES: usize = 2 * RISES;
 /// What a pixel's rays see of hulls at a node's distance, by halves of the rays. A ray has a hull of its own, any that ends at that
 /// distance from it, and counts for as many places as such hulls could have.
 #[derive(Clone, Copy, Default)]
-struct Seen {
+struct CountedHull {
     /// By rise, what is thrown back and what is taken away.
     cells: [[f32; VALUES]; 2],
     /// Weight of the rays, of which those that meet water before the hull: the others meet the hull, and show no water.
@@ -63,7 +63,7 @@ struct Seen {
 /// the chance of the draw in one does not look like a law.
 struct Pixel {
     light: [f64; 2],
-    seen: [Seen; DISTANCES],
+    seen: [CountedHull; DISTANCES],
 }
 
 /// Where light comes from, by distance and rise.
@@ -85,7 +85,7 @@ struct Places {
 
 impl Places {
     /// Along x, for pixels whose lines of sight meet the mean water about y. A hull is seen to end where waves before it hide its foot.
-    fn along(sea: &Sea, x: f64, y: f64, elevation: f64) -> Self {
+    fn along(sea: &BakedSea, x: f64, y: f64, elevation: f64) -> Self {
         let (tangent, cot) = (elevation.tan(), 1.0 / elevation.tan());
         let reach = sea.reach_m * cot;
         let half = 0.5 * PIXEL * EYE_M / elevation.sin().powi(2);
@@ -121,9 +121,9 @@ impl Places {
     }
 }
 
-fn pixel(sea: &Sea, elevation: f64, spread: [f64; 2], rng: &mut Pcg64, from: &mut [From]) -> Pixel {
+fn pixel(sea: &BakedSea, elevation: f64, spread: [f64; 2], rng: &mut Pcg64, from: &mut [From]) -> Pixel {
     let part = 2.0 / RAYS as f64;
-    let mut path: Vec<Segment> = Vec::new();
+    let mut path: Vec<PathSegment> = Vec::new();
     let (x0, y0) = (rng.random::<f64>() * 1000.0, rng.random::<f64>() * 1000.0);
     let places = Places::along(sea, x0, y0, elevation);
     let mut out = Pixel { light: [0.0; 2], seen: Default::default() };
@@ -182,13 +182,13 @@ fn pixel(sea: &Sea, elevation: f64, spread: [f64; 2], rng: &mut Pcg64, from: &mu
 }
 
 /// What is thrown back and taken away, fitted to all pixels: by distance and tone.
-fn fits(pixels: &[Pixel]) -> Vec<Fit<VALUES>> {
+fn fits(pixels: &[Pixel]) -> Vec<NormalEquations<VALUES>> {
     let tone = |light: f64| light.max(0.0).powf(1.0 / 2.2);
     let tones = || pixels.iter().flat_map(|p| p.light.map(tone));
     let count = 2.0 * pixels.len() as f64;
     let mean = tones().sum::<f64>() / count;
     let deviation = (tones().map(|t| (t - mean).powi(2)).sum::<f64>() / count).sqrt().max(1e-9);
-    let mut out = vec![Fit::new(); DISTANCES * TONES];
+    let mut out = vec![NormalEquations::new(); DISTANCES * TONES];
     for (pixel, half) in pixels.iter().flat_map(|p| [(p, 0), (p, 1)]) {
         let weights = tone_weights((tone(pixel.light[half]) - mean) / deviation);
         for (node, seen) in pixel.seen.iter().enumerate() {
@@ -204,7 +204,7 @@ fn fits(pixels: &[Pixel]) -> Vec<Fit<VALUES>> {
 }
 
 /// All records of one force, wind and elevation.
-fn bake(seas: &[Sea], elevation: f64, seed: u128) -> Vec<f32> {
+fn bake(seas: &[BakedSea], elevation: f64, seed: u128) -> Vec<f32> {
     let mut rng = Pcg64::new(seed, 0x7ab1e);
     let mut from = vec![From::default(); CELLS];
     let mut pixels = Vec::new();
@@ -213,7 +213,7 @@ fn bake(seas: &[Sea], elevation: f64, seed: u128) -> Vec<f32> {
         pixels.extend((0..PIXELS).map(|_| pixel(sea, elevation, spread, &mut rng, &mut from)));
     }
     // By distance and tone: by state and rise what is thrown back and taken away.
-    let fitted: Vec<_> = fits(&pixels).iter().map(Fit::solve).collect();
+    let fitted: Vec<_> = fits(&pixels).iter().map(NormalEquations::solve).collect();
     let mut out = Vec::with_capacity(CELLS * STORED);
     for (cell, From { aside: a, sky }) in from.iter().enumerate() {
         let (distance, rise) = (cell / RISES, cell % RISES);
@@ -232,7 +232,7 @@ fn bake(seas: &[Sea], elevation: f64, seed: u128) -> Vec<f32> {
 }
 
 /// Standard deviations of a small boat's level (metres) and tilt (tangent) over all patches.
-fn spread(seas: &[Sea]) -> [f64; 2] {
+fn spread(seas: &[BakedSea]) -> [f64; 2] {
     let mean = |i: usize| seas.iter().map(|s| s.spread[i].powi(2)).sum::<f64>() / seas.len().max(1) as f64;
     [mean(0).sqrt(), mean(1).sqrt()]
 }
@@ -254,9 +254,9 @@ fn all() -> Baked {
         let mut sum = [0.0; 2];
         for wind in 0..WINDS {
             let started = std::time::Instant::now();
-            let seas: Vec<Sea> = (0..PATCHES)
+            let seas: Vec<BakedSea> = (0..PATCHES)
                 .map(|n| {
-                    Sea::new(&SeaSpec {
+                    BakedSea::new(&SeaSpec {
                         force: BeaufortForce::new(force as u8).unwrap_or_else(|| unreachable!()),
                         wind_to_view: std::f64::consts::FRAC_PI_4 * wind as f64,
                         seed: n + 100 * (force * WINDS + wind) as u64,

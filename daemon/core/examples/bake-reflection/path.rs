@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use rand::RngExt;
 use rand_pcg::Pcg64;
 
-use crate::sea::Sea;
+use crate::sea::BakedSea;
 
 /// Refractive index of sea water.
 const SEA_INDEX: f64 = 1.34;
@@ -14,7 +14,7 @@ const BOUNCES: usize = 5;
 
 /// A straight piece of a path, backwards from the eye.
 #[derive(Clone, Copy, Debug)]
-pub struct Segment {
+pub struct PathSegment {
     /// Where it begins, on the water.
     pub from: [f64; 3],
     /// Where it goes.
@@ -27,7 +27,7 @@ pub struct Segment {
 
 /// Follows the ray of sight that goes down by `down` (sine) away from the eye and meets the mean water at (x, y). `path` gets the
 /// pieces after each facet; the last is open unless the light was lost.
-pub fn follow(sea: &Sea, at: [f64; 2], down: f64, rng: &mut Pcg64, path: &mut Vec<Segment>) {
+pub fn follow(sea: &BakedSea, at: [f64; 2], down: f64, rng: &mut Pcg64, path: &mut Vec<PathSegment>) {
     path.clear();
     let across = (1.0 - down * down).sqrt();
     let mut dir = [0.0, across, -down];
@@ -51,12 +51,12 @@ pub fn follow(sea: &Sea, at: [f64; 2], down: f64, rng: &mut Pcg64, path: &mut Ve
             return;
         }
         if rng.random::<f64>() > open {
-            path.push(Segment { from, dir, end: 0.0, share });
+            path.push(PathSegment { from, dir, end: 0.0, share });
             continue;
         }
         let start = [from[0], from[1], from[2] + 1e-4];
         let hit = sea.hit(start, dir, 1e-3);
-        path.push(Segment { from, dir, end: hit.unwrap_or(f64::INFINITY), share });
+        path.push(PathSegment { from, dir, end: hit.unwrap_or(f64::INFINITY), share });
         let Some(t) = hit else { return };
         step(&mut from, dir, t);
     }
@@ -80,7 +80,7 @@ pub fn fresnel(cos: f64) -> f64 {
 
 /// A facet that light coming along `dir` sees, and the cosine under which it does: fine slopes are normally distributed about the
 /// resolved one, and are seen in proportion to their projection (Ross and Dion 2007; Heitz 2014 calls it the distribution of visible normals).
-fn facet(sea: &Sea, slope: [f64; 2], dir: [f64; 3], rng: &mut Pcg64) -> ([f64; 3], f64) {
+fn facet(sea: &BakedSea, slope: [f64; 2], dir: [f64; 3], rng: &mut Pcg64) -> ([f64; 3], f64) {
     let flat = dir[0].hypot(dir[1]).max(1e-9);
     let (ux, uy) = (dir[0] / flat, dir[1] / flat);
     // Slopes along the ray and across it.
@@ -141,7 +141,7 @@ fn visible_normal(a: f64, rng: &mut Pcg64) -> f64 {
 
 /// Share of the fine facets about a place from which light leaves along `dir` unhidden by others: Smith 1967 for normally distributed
 /// slopes.
-fn unhidden(sea: &Sea, slope: [f64; 2], dir: [f64; 3]) -> f64 {
+fn unhidden(sea: &BakedSea, slope: [f64; 2], dir: [f64; 3]) -> f64 {
     let flat = dir[0].hypot(dir[1]);
     if flat < 1e-6 {
         return 1.0;

@@ -35,7 +35,7 @@ pub struct SeaSpec {
 }
 
 /// A sea in the space of the view: x to the right, y away from the eye, z up, metres.
-pub struct Sea {
+pub struct BakedSea {
     pitch_m: f64,
     /// Height, and slopes to x and y, at each grid point.
     points: Vec<[f32; 3]>,
@@ -51,7 +51,7 @@ pub struct Sea {
     pub fine: [f64; 3],
 }
 
-impl Sea {
+impl BakedSea {
     /// Waves that the wind raises in time (Pierson and Moskowitz), spread by cos^2; the tail beyond three times the peak's wave number is
     /// scaled so that resolved waves have at most 60 % of Cox and Munk's mean square slope, and what is missing from it is unresolved.
     pub fn new(spec: &SeaSpec) -> Self {

@@ -119,7 +119,7 @@ const CREEP_RATE: f64 = 0.075 * std::f64::consts::PI / 180.0;
 const GATE: f64 = 3.5;
 
 /// Chi squared with one degree of freedom that is exceeded once in a thousand.
-const SURPRISE_MAX: f64 = 10.8;
+const NIS_GATE: f64 = 10.8;
 
 /// So many headings in a row that are not believed mean that the gun was moved.
 const REFUSED_MAX: u32 = 10;
@@ -138,7 +138,7 @@ type Bearing = (Time, f64);
 
 /// What the gun does on its mount.
 #[derive(Clone, Copy, Debug)]
-enum Motion {
+enum MountMotion {
     /// It cannot be told yet.
     Unknown,
     Moves,
@@ -155,10 +155,10 @@ pub(super) struct HeadingAiding {
     watched: VecDeque<Bearing>,
     /// The newest heading of the ship with the bearing that the filter's orientation gave with it, and its standard deviation.
     newest: Option<Newest>,
-    /// The bearing that [`Attitude::see_mount`] counts from.
+    /// The bearing that [`Attitude::update_mount_yaw`] counts from.
     anchored: Option<f64>,
     refused_in_a_row: u32,
-    same: Option<Same>,
+    same: Option<FrozenHeading>,
     counts: HeadingCounts,
 }
 
@@ -171,7 +171,7 @@ struct Newest {
 
 /// Since when the ship has said the very same, and the gun's heading by gyro and the picture's tilt then.
 #[derive(Clone, Copy, Debug)]
-struct Same {
+struct FrozenHeading {
     heading: f64,
     since: Time,
     gun: f64,
@@ -245,14 +245,14 @@ impl HeadingAiding {
         self.watch(time, bearing + attitude.corrected());
         let drift = attitude.drift_sigma().unwrap_or(0.0);
         match self.rests(line, drift) {
-            Motion::Moves => {
+            MountMotion::Moves => {
                 // What was before it moved says nothing of the next rest.
                 let moving = self.watched.len().saturating_sub(1);
                 self.watched.drain(..moving);
                 self.release();
             }
-            Motion::Unknown => {}
-            Motion::Rests { off } => match self.anchored {
+            MountMotion::Unknown => {}
+            MountMotion::Rests { off } => match self.anchored {
                 None => self.tie(bearing - off, line, attitude),
                 Some(anchored) => self.hold(time, bearing - anchored, line, attitude),
             },
@@ -281,7 +281,7 @@ impl HeadingAiding {
                 time.ns_since(same.since) > FROZEN_NS && same.turned > FROZEN_TURN
             }
             _ => {
-                self.same = Some(Same { heading, since: time, gun, tilt, turned: 0.0, tilted: 0.0 });
+                self.same = Some(FrozenHeading { heading, since: time, gun, tilt, turned: 0.0, tilted: 0.0 });
                 false
             }
         }
@@ -306,9 +306,9 @@ impl HeadingAiding {
     }
 
     /// Whether the gun rests on its mount, as far as can be told. One line errs by `line`, and the gyro may drift by `drift` rad/s.
-    fn rests(&self, line: f64, drift: f64) -> Motion {
+    fn rests(&self, line: f64, drift: f64) -> MountMotion {
         let (Some(&(first, _)), Some(&(last, newest))) = (self.watched.front(), self.watched.back()) else {
-            return Motion::Unknown;
+            return MountMotion::Unknown;
         };
         let count = self.watched.len() as f64;
         let seconds = |time: &Time| time.secs_since(first);
@@ -330,12 +330,12 @@ impl HeadingAiding {
         let most = (REST_RATE + GATE * uncertain.hypot(drift)).min(CREEP_RATE);
         let off = newest - mean - slope * (last.secs_since(first) - mean_s);
         if slope.abs() > most + GATE * uncertain || off.abs() > GATE * line.hypot(sigma) {
-            return Motion::Moves;
+            return MountMotion::Moves;
         }
         if last.ns_since(first) < REST_NS || uncertain > CREEP_RATE / 4.0 {
-            return Motion::Unknown;
+            return MountMotion::Unknown;
         }
-        if slope.abs() <= most { Motion::Rests { off } } else { Motion::Moves }
+        if slope.abs() <= most { MountMotion::Rests { off } } else { MountMotion::Moves }
     }
 
     fn release(&mut self) {
@@ -355,7 +355,7 @@ impl HeadingAiding {
     /// The ship's heading holds the gun's: the world is to be turned by `off`.
     fn hold(&mut self, time: Time, off: f64, line: f64, attitude: &mut Attitude) {
         let seen = HeadingSeen { time, off, variance: line * line };
-        match attitude.see_mount(&seen, SURPRISE_MAX) {
+        match attitude.update_mount_yaw(&seen, NIS_GATE) {
             Some(outcome) if outcome.taken => {
                 self.counts.ship_taken += 1;
                 self.refused_in_a_row = 0;
@@ -412,7 +412,7 @@ impl HeadingAiding {
             return None;
         }
         let seen = HeadingSeen { time, off: off(&nearest), variance: nearest.sigma * nearest.sigma };
-        match attitude.see_heading(&seen, SURPRISE_MAX) {
+        match attitude.update_heading(&seen, NIS_GATE) {
             Some(outcome) if outcome.taken => Some(()),
             // Who looks through the camera knows better than what has drifted.
             _ => self.set(off(&nearest), nearest.sigma, attitude),

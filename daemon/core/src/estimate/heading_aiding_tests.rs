@@ -13,7 +13,7 @@ use crate::{
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
 /// A unit that finds its orientation by itself and drifts, on a gun on a ship that yaws about north.
-struct Rig {
+struct HeadingRig {
     attitude: Attitude,
     aid: HeadingAiding,
     drift_deg_s: f64,
@@ -50,7 +50,7 @@ fn calibration() -> Calibration {
     }
 }
 
-impl Rig {
+impl HeadingRig {
     fn new(
         drift_deg_s: f64,
         bearing: fn(f64) -> f64,
@@ -131,7 +131,7 @@ fn stow() -> HeadingSettings {
 
 #[test]
 fn a_gun_that_rests_is_held_by_the_ship() {
-    let mut rig = Rig::new(0.02, |_| 30.0, every, HeadingSettings::default());
+    let mut rig = HeadingRig::new(0.02, |_| 30.0, every, HeadingSettings::default());
     rig.run(120.0);
     assert!(rig.error_deg().abs() < 0.2, "{} deg, alone 2.4", rig.error_deg());
     let counts = rig.aid.counts();
@@ -141,7 +141,7 @@ fn a_gun_that_rests_is_held_by_the_ship() {
 
 #[test]
 fn a_constant_offset_of_the_ships_does_nothing() {
-    let mut rig = Rig::new(0.02, |_| 30.0, |_, deg| Some(deg + 20.0), HeadingSettings::default());
+    let mut rig = HeadingRig::new(0.02, |_| 30.0, |_, deg| Some(deg + 20.0), HeadingSettings::default());
     rig.run(120.0);
     assert!(rig.error_deg().abs() < 0.2, "{} deg", rig.error_deg());
 }
@@ -150,7 +150,7 @@ fn a_constant_offset_of_the_ships_does_nothing() {
 #[test]
 fn a_gun_that_is_moved_coasts_and_is_tied_again() {
     let swung = |t: f64| 30.0 + 40.0 * ((t - 30.0) / 30.0).clamp(0.0, 1.0);
-    let mut rig = Rig::new(0.02, swung, every, HeadingSettings::default());
+    let mut rig = HeadingRig::new(0.02, swung, every, HeadingSettings::default());
     let mut worst: f64 = 0.0;
     for step in 0..240 {
         rig.run(f64::from(step) * 0.5 + 0.5);
@@ -164,7 +164,7 @@ fn a_gun_that_is_moved_coasts_and_is_tied_again() {
 #[test]
 fn a_feed_that_freezes_is_left() {
     let frozen = |t: f64, deg| Some(if t > 30.0 { 5.0 } else { deg });
-    let mut rig = Rig::new(0.0, |_| 30.0, frozen, HeadingSettings::default());
+    let mut rig = HeadingRig::new(0.0, |_| 30.0, frozen, HeadingSettings::default());
     let mut worst: f64 = 0.0;
     for step in 0..300 {
         rig.run(f64::from(step) * 0.5 + 0.5);
@@ -176,7 +176,7 @@ fn a_feed_that_freezes_is_left() {
 #[test]
 fn a_feed_that_is_frozen_is_told_of_until_it_goes_on() {
     let frozen = |t: f64, deg| Some(if (30.0..150.0).contains(&t) { 5.0 } else { deg });
-    let mut rig = Rig::new(0.0, |_| 30.0, frozen, HeadingSettings::default());
+    let mut rig = HeadingRig::new(0.0, |_| 30.0, frozen, HeadingSettings::default());
     rig.roll_deg = 4.0;
     rig.run(85.0);
     assert_eq!(rig.aid.frozen_s(rig.time()), None, "a minute must pass");
@@ -190,11 +190,13 @@ fn a_feed_that_is_frozen_is_told_of_until_it_goes_on() {
 #[test]
 fn a_ship_that_lies_still_has_no_frozen_feed() {
     // At a pier: the gun is trained, the ship stands; then at sea with a feed that has gone silent, which another fault tells.
-    let mut rig = Rig::new(0.0, |t| 40.0 * (0.3 * t).sin(), |_, _| Some(5.0), HeadingSettings::default());
+    let mut rig =
+        HeadingRig::new(0.0, |t| 40.0 * (0.3 * t).sin(), |_, _| Some(5.0), HeadingSettings::default());
     rig.run(150.0);
     assert_eq!(rig.aid.frozen_s(rig.time()), None);
     let silent = |t: f64, _| (t < 100.0).then_some(5.0);
-    let mut rig = Rig { roll_deg: 4.0, ..Rig::new(0.0, |_| 30.0, silent, HeadingSettings::default()) };
+    let mut rig =
+        HeadingRig { roll_deg: 4.0, ..HeadingRig::new(0.0, |_| 30.0, silent, HeadingSettings::default()) };
     rig.run(99.0);
     assert!(rig.aid.frozen_s(rig.time()).is_some());
     rig.run(115.0);
@@ -204,7 +206,7 @@ fn a_ship_that_lies_still_has_no_frozen_feed() {
 #[test]
 fn a_drop_out_is_ridden_through() {
     let gone = |t: f64, deg| (!(40.0..100.0).contains(&t)).then_some(deg);
-    let mut rig = Rig::new(0.01, |_| 30.0, gone, HeadingSettings::default());
+    let mut rig = HeadingRig::new(0.01, |_| 30.0, gone, HeadingSettings::default());
     rig.run(100.0);
     let coasted = rig.error_deg();
     // A minute of the unit's drift is 0.6 deg; it was learnt while the ship held the heading.
@@ -217,7 +219,7 @@ fn a_drop_out_is_ridden_through() {
 #[test]
 fn the_operators_press_sets_the_heading() {
     // With the ship's heading: 30 deg from the bow.
-    let mut rig = Rig::new(0.0, |_| 30.0, every, stow());
+    let mut rig = HeadingRig::new(0.0, |_| 30.0, every, stow());
     rig.run(1.0);
     rig.attitude.set_heading(7.0 * DEG, 0.0);
     rig.aid.forget();
@@ -234,7 +236,7 @@ fn the_operators_press_sets_the_heading() {
         "no number of lines makes the ship's heading better"
     );
     // Without it: 10 deg from north.
-    let mut alone = Rig::new(0.0, |t| 10.0 - ship_deg(t), |_, _| None, stow());
+    let mut alone = HeadingRig::new(0.0, |t| 10.0 - ship_deg(t), |_, _| None, stow());
     alone.run(2.0);
     alone.attitude.set_heading(-3.0 * DEG, 0.0);
     alone.aid.mark(MarkKind::Stow, alone.time(), &mut alone.attitude);
@@ -244,7 +246,7 @@ fn the_operators_press_sets_the_heading() {
 
 #[test]
 fn a_landmark_is_the_one_that_is_near_and_none_where_two_are() {
-    let mut rig = Rig::new(0.0, |t| 30.0 - ship_deg(t), |_, _| None, stow());
+    let mut rig = HeadingRig::new(0.0, |t| 30.0 - ship_deg(t), |_, _| None, stow());
     rig.run(2.0);
     rig.attitude.set_heading(-2.0 * DEG, 1.0 * DEG);
     rig.aid.mark(MarkKind::Landmark, rig.time(), &mut rig.attitude);
@@ -259,7 +261,7 @@ fn a_landmark_is_the_one_that_is_near_and_none_where_two_are() {
 
 #[test]
 fn presses_that_nothing_is_configured_for_do_nothing() {
-    let mut rig = Rig::new(0.0, |_| 30.0, every, HeadingSettings::default());
+    let mut rig = HeadingRig::new(0.0, |_| 30.0, every, HeadingSettings::default());
     rig.run(2.0);
     for kind in [MarkKind::Stow, MarkKind::Landmark] {
         rig.aid.mark(kind, rig.time(), &mut rig.attitude);

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::{
     estimate::{
         attitude::{self, Attitude, UpSeen},
-        horizon::{HorizonFinder, Mask, Prior, View, lowered_by_haze},
+        horizon::{HorizonFinder, HorizonView, Mask, Prior, lowered_by_haze},
     },
     event::Picture,
     geometry::Lens,
@@ -16,7 +16,7 @@ use crate::{
 const EVERY_NS: i64 = 100_000_000;
 
 /// Chi squared with two degrees of freedom that a horizon exceeds once in a thousand: beyond it is a shore, a cloud or a ship's side.
-const SURPRISE_MAX: f64 = 13.8;
+const NIS_GATE: f64 = 13.8;
 
 /// What became of the horizons of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,9 +66,9 @@ impl HorizonAiding {
         let tilt = covariance.x_axis.x.max(covariance.y_axis.y);
         let prior = Prior {
             up: world_from_camera.inverse() * DVec3::Z,
-            sigma: (tilt + attitude::DIP_SIGMA * attitude::DIP_SIGMA).sqrt(),
+            sigma: (tilt + attitude::REFRACTION_SIGMA * attitude::REFRACTION_SIGMA).sqrt(),
         };
-        let view = View { lens: *lens, eye_height_m: self.eye_height_m, prior: Some(prior) };
+        let view = HorizonView { lens: *lens, eye_height_m: self.eye_height_m, prior: Some(prior) };
         let Ok(horizon) = self.finder.find(picture, &view) else {
             self.counts.none += 1;
             return;
@@ -77,7 +77,7 @@ impl HorizonAiding {
         let right = DVec3::Z.cross(horizon.up).normalize_or_zero();
         let up_camera = (horizon.up + right.cross(horizon.up) * lowered).normalize_or_zero();
         let seen = UpSeen { time, up_camera, covariance: horizon.up_covariance() };
-        match attitude.see_up(&seen, SURPRISE_MAX) {
+        match attitude.update_vertical(&seen, NIS_GATE) {
             Some(outcome) if outcome.taken => self.counts.taken += 1,
             _ => self.counts.refused += 1,
         }

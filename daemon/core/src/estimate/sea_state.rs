@@ -4,7 +4,9 @@ use glam::DVec2;
 
 use crate::{
     colour::{LUMINANCE, srgb_to_linear},
-    estimate::sea::{Frame, SeaConditions, SeaEstimate, SeaFollower, SeaInUse, SeaMeter, SeaSource, Unknown},
+    estimate::sea::{
+        SeaConditions, SeaEstimate, SeaFollower, SeaFrame, SeaInUse, SeaMeter, SeaSource, Unknown,
+    },
     event::Picture,
     geometry::{CameraPose, Lens, ahead},
     sea::BeaufortForce,
@@ -77,7 +79,7 @@ impl SeaStateTracker {
                 glam::Vec3::from(coded.map(srgb_to_linear)).dot(LUMINANCE)
             })
         };
-        self.meter.observe(&Frame { time, camera: *camera, lens, luminance: &luminance });
+        self.meter.observe(&SeaFrame { time, camera: *camera, lens, luminance: &luminance });
         let outcome = self.meter.estimate();
         if outcome != self.newest {
             match outcome {

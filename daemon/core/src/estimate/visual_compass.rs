@@ -32,7 +32,7 @@ const TURN_NS: i64 = 20_000_000;
 const TOLD_ANEW: f64 = 0.9;
 
 /// Chi squared with one degree of freedom that a heading exceeds once in a thousand.
-const SURPRISE_MAX: f64 = 10.8;
+const NIS_GATE: f64 = 10.8;
 
 /// So many headings in a row that are not believed mean that it is the anchor that is wrong.
 const REFUSED_MAX: u32 = 20;
@@ -123,7 +123,7 @@ impl VisualCompass {
         self.tell_drift(yaw.drift_sigma, attitude);
         let alike = LASTING_NS as f64 / EVERY_NS as f64;
         let variance = alike * (yaw.sigma * yaw.sigma + late * late);
-        match attitude.see_anchored_heading(&HeadingSeen { time, off: yaw.off, variance }, SURPRISE_MAX) {
+        match attitude.update_anchored_heading(&HeadingSeen { time, off: yaw.off, variance }, NIS_GATE) {
             Some(outcome) if outcome.taken => {
                 self.counts.taken += 1;
                 self.refused_in_a_row = 0;
@@ -141,7 +141,7 @@ impl VisualCompass {
     /// Tells the filter what the sky has shown of its own drift beyond what was told before.
     fn tell_drift(&mut self, sigma: f64, attitude: &mut Attitude) {
         let more = sigma.powi(-2) - self.told.powi(-2);
-        if sigma < TOLD_ANEW * self.told && attitude.see_anchor_stand(1.0 / more) {
+        if sigma < TOLD_ANEW * self.told && attitude.update_anchor_still(1.0 / more) {
             self.told = sigma;
         }
     }

@@ -14,14 +14,14 @@ pub struct LogEntry {
     /// Which fault.
     pub fault: Fault,
     /// What happened.
-    pub what: What,
+    pub what: LogEvent,
     /// Lines of this fault that were left out since the last one, because there were too many.
     pub left_out: u32,
 }
 
 /// What a line of the log says.
 #[derive(Clone, Debug, PartialEq)]
-pub enum What {
+pub enum LogEvent {
     /// It came.
     Raised {
         /// What exactly.
@@ -40,7 +40,7 @@ pub enum What {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Row {
+struct FaultRow {
     since: Option<Time>,
     times: u64,
     window: Option<Time>,
@@ -51,7 +51,7 @@ struct Row {
 /// The faults of a running trainer.
 #[derive(Clone, Debug)]
 pub struct FaultBoard {
-    rows: [Row; Fault::COUNT],
+    rows: [FaultRow; Fault::COUNT],
 }
 
 impl Default for FaultBoard {
@@ -63,7 +63,7 @@ impl Default for FaultBoard {
 impl FaultBoard {
     /// Nothing has happened.
     pub const fn new() -> Self {
-        Self { rows: [Row { since: None, times: 0, window: None, lines: 0, left_out: 0 }; Fault::COUNT] }
+        Self { rows: [FaultRow { since: None, times: 0, window: None, lines: 0, left_out: 0 }; Fault::COUNT] }
     }
 
     /// Takes in a change. Gives the line for the log, unless nothing changed or the log has had enough of this fault.
@@ -74,15 +74,15 @@ impl FaultBoard {
             (Change::Raised { cause }, None) => {
                 row.since = Some(change.time);
                 row.times += 1;
-                What::Raised { cause: cause.clone() }
+                LogEvent::Raised { cause: cause.clone() }
             }
             (Change::Cleared, Some(since)) => {
                 row.since = None;
-                What::Cleared { after_s: change.time.secs_since(since) }
+                LogEvent::Cleared { after_s: change.time.secs_since(since) }
             }
             (Change::Noted { cause }, _) => {
                 row.times += 1;
-                What::Noted { cause: cause.clone() }
+                LogEvent::Noted { cause: cause.clone() }
             }
         };
         if row.window.is_none_or(|begun| change.time.ns_since(begun) >= WINDOW_NS) {
@@ -136,11 +136,11 @@ mod tests {
     fn one_line_when_it_comes_and_one_when_it_goes() {
         let mut board = FaultBoard::new();
         let came = board.take(&FaultChange::raised(at(1), Fault::ImuLost, "a")).unwrap();
-        assert_eq!(came.what, What::Raised { cause: "a".into() });
+        assert_eq!(came.what, LogEvent::Raised { cause: "a".into() });
         assert_eq!(board.take(&FaultChange::raised(at(2), Fault::ImuLost, "b")), None);
         assert_eq!((board.since(Fault::ImuLost), board.times(Fault::ImuLost)), (Some(at(1)), 1));
         let went = board.take(&FaultChange::cleared(at(4), Fault::ImuLost)).unwrap();
-        assert_eq!(went.what, What::Cleared { after_s: 3.0 });
+        assert_eq!(went.what, LogEvent::Cleared { after_s: 3.0 });
         assert_eq!(board.take(&FaultChange::cleared(at(5), Fault::ImuLost)), None);
         assert!(!board.is_active(Fault::ImuLost));
     }

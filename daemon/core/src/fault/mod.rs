@@ -8,7 +8,7 @@ mod permission;
 
 use crate::time::Time;
 
-pub use board::{FaultBoard, LogEntry, What};
+pub use board::{FaultBoard, LogEntry, LogEvent};
 pub use permission::{FirePermission, NotScored};
 
 /// How much a fault takes away.

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3, Vec3};
 
 use super::{
     boats::boats_in_view,
-    plan::{Needs, ScenePlan, sea_reflects},
+    plan::{SceneNeeds, ScenePlan, sea_reflects},
     rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
     scene::{BoatView, Hud, Pass, RoundView, Scene, Status},
     view::ViewFrustum,
@@ -78,12 +78,12 @@ impl Composer {
         let ComposerSettings { scenario, calibration, screen, video, models, boat_models } = *settings;
         let picture = (calibration.lens.width, calibration.lens.height);
         let black = Picture::black(video, picture.0, picture.1)?;
-        let plan = ScenePlan::new(&Needs {
+        let plan = ScenePlan::new(&SceneNeeds {
             size: screen,
             video,
             picture,
             optics: calibration.optics(),
-            ..Needs::of_scenario(scenario)
+            ..SceneNeeds::of_scenario(scenario)
         });
         let screen_lens = calibration.lens.covering(screen.0, screen.1);
         let light = estimator.light();

@@ -40,7 +40,7 @@ pub struct ScenePlan {
 
 /// What decides on a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Needs {
+pub struct SceneNeeds {
     /// Screen size in pixels.
     pub size: (u32, u32),
     /// How the camera's bytes are laid out.
@@ -59,7 +59,7 @@ pub struct Needs {
     pub belt: u32,
 }
 
-impl Needs {
+impl SceneNeeds {
     /// The needs of a scenario, for a screen, camera and lens that are yet to be told. A sea that is to be measured may turn out calm
     /// enough to mirror.
     pub fn of_scenario(scenario: &Scenario) -> Self {
@@ -82,7 +82,7 @@ impl Needs {
 
 impl ScenePlan {
     /// The plan for these needs.
-    pub fn new(needs: &Needs) -> Self {
+    pub fn new(needs: &SceneNeeds) -> Self {
         let boats =
             if needs.boats == 0 { PassDecision::LeftOut(LeftOut::NoBoats) } else { PassDecision::Run };
         let mirrors = needs.water.method != ReflectionMethod::Off;
@@ -159,8 +159,8 @@ impl ScenePlan {
 mod tests {
     use super::*;
 
-    fn needs() -> Needs {
-        Needs {
+    fn needs() -> SceneNeeds {
+        SceneNeeds {
             size: (1280, 720),
             video: PixelFormat::Rgb,
             picture: (1280, 720),
@@ -180,30 +180,30 @@ mod tests {
     fn each_thing_left_out_has_its_reason() {
         let full = ScenePlan::new(&needs());
         assert!(Pass::ALL.into_iter().all(|p| full.has(p)));
-        let reason = |needs: Needs, pass: Pass| match ScenePlan::new(&needs).passes[pass as usize] {
+        let reason = |needs: SceneNeeds, pass: Pass| match ScenePlan::new(&needs).passes[pass as usize] {
             PassDecision::LeftOut(why) => Some(why),
             PassDecision::Run => None,
         };
-        let empty = Needs { boats: 0, ..needs() };
+        let empty = SceneNeeds { boats: 0, ..needs() };
         assert_eq!(reason(empty, Pass::Mirror), Some(LeftOut::NoBoats));
         assert_eq!(reason(empty, Pass::Water), Some(LeftOut::NoBoats));
         assert_eq!(reason(empty, Pass::Boats), Some(LeftOut::NoBoats));
         let rough =
-            Needs { water: Water { force: BeaufortForce::new(5).unwrap(), ..needs().water }, ..needs() };
+            SceneNeeds { water: Water { force: BeaufortForce::new(5).unwrap(), ..needs().water }, ..needs() };
         assert_eq!(reason(rough, Pass::Mirror), Some(LeftOut::SeaTooRough));
         assert_eq!(reason(rough, Pass::Boats), None);
         let shadow_only =
-            Needs { water: Water { method: ReflectionMethod::Off, ..needs().water }, ..needs() };
+            SceneNeeds { water: Water { method: ReflectionMethod::Off, ..needs().water }, ..needs() };
         assert_eq!(reason(shadow_only, Pass::Mirror), Some(LeftOut::ReflectionOff));
         assert_eq!(reason(shadow_only, Pass::Water), None);
         let nothing = Water { method: ReflectionMethod::Off, shadow: ShadowLevel::None, ..needs().water };
         assert_eq!(
-            reason(Needs { water: nothing, ..needs() }, Pass::Water),
+            reason(SceneNeeds { water: nothing, ..needs() }, Pass::Water),
             Some(LeftOut::NoReflectionNoShadow)
         );
-        assert_eq!(reason(Needs { moving: 0, ..needs() }, Pass::Wake), Some(LeftOut::NoBoatMoves));
+        assert_eq!(reason(SceneNeeds { moving: 0, ..needs() }, Pass::Wake), Some(LeftOut::NoBoatMoves));
         assert_eq!(reason(empty, Pass::Wake), Some(LeftOut::NoBoats));
-        assert_eq!(reason(Needs { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
+        assert_eq!(reason(SceneNeeds { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
     }
 
     #[test]
@@ -219,7 +219,7 @@ mod tests {
         assert_eq!(lost[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoPose));
         assert_eq!(lost[Pass::Hud as usize], PassDecision::Run);
         // The scenario's reason stands before the frame's.
-        let empty = ScenePlan::new(&Needs { boats: 0, ..needs() });
+        let empty = ScenePlan::new(&SceneNeeds { boats: 0, ..needs() });
         assert_eq!(
             empty.frame(false, &[], &[])[Pass::Boats as usize],
             PassDecision::LeftOut(LeftOut::NoBoats)

@@ -6,7 +6,7 @@ use crate::{
     frame::{scene::RoundView, view::ViewFrustum},
     time::Time,
     world::{
-        Running,
+        RunningWorld,
         rounds::{Impact, SPLASH_S},
     },
 };
@@ -25,13 +25,13 @@ const STRIKE_S: f64 = 0.35;
 
 /// What `view` sees of the rounds at `time`, farthest first.
 pub(super) fn rounds_in_view(
-    running: &Running,
+    running: &RunningWorld,
     view: &ViewFrustum<'_>,
     time: Time,
     into: &mut Vec<RoundView>,
 ) {
     into.clear();
-    let Running { rounds, fleet, start, .. } = running;
+    let RunningWorld { rounds, fleet, start, .. } = running;
     let tracers = rounds.tracers(time, *start, STREAK_S).map(|path| RoundView::Tracer {
         from: path.from,
         to: path.to,

@@ -179,12 +179,12 @@ pub fn froude(speed_m_s: f64, length_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::boats::{Course, Damage};
+    use crate::world::boats::{BoatDamage, Course};
 
     const SKIFF: Hull = Hull { length_m: 7.0, beam_m: 2.0 };
 
     fn wake(course: &Course, time_s: f64) -> Option<Wake> {
-        Wake::of(SKIFF, 0.4, time_s, |t| course.state(t, &Damage::NONE), |_| 0.0)
+        Wake::of(SKIFF, 0.4, time_s, |t| course.state(t, &BoatDamage::NONE), |_| 0.0)
     }
 
     #[test]
@@ -194,7 +194,7 @@ mod tests {
         let points = [DVec2::new(100.0, 80.0)];
         let arriving = Course::waypoints(DVec2::new(0.0, 80.0), &points, 8.0, false).unwrap();
         let stopped = wake(&arriving, 22.0).expect("it was under way");
-        assert!(arriving.state(22.0, &Damage::NONE).speed_m_s < SPEED_MIN_M_S);
+        assert!(arriving.state(22.0, &BoatDamage::NONE).speed_m_s < SPEED_MIN_M_S);
         assert!(stopped.points()[0].speed_m_s < SPEED_MIN_M_S);
         assert!(stopped.points().iter().any(|p| p.speed_m_s > 7.0));
         assert_eq!(wake(&arriving, 90.0), None, "long after it lies still");
@@ -207,10 +207,11 @@ mod tests {
             [(100.0, 100.0), (100.0, -100.0), (-100.0, -100.0)].map(|(x, y)| DVec2::new(x, y) + centre);
         let course = Course::waypoints(DVec2::new(-100.0, 100.0), &square, 9.0, true).unwrap();
         // Some seconds after the first corner the boat goes another way than it came.
-        let time = (0..60).map(f64::from).find(|t| course.state(*t, &Damage::NONE).heading > 3.0).unwrap();
+        let time =
+            (0..60).map(f64::from).find(|t| course.state(*t, &BoatDamage::NONE).heading > 3.0).unwrap();
         let wake = wake(&course, time + 2.0).unwrap();
         for p in wake.points().iter().filter(|p| p.age_s > 0.0 && p.age_s < time) {
-            let was = course.state(time + 2.0 - p.age_s, &Damage::NONE);
+            let was = course.state(time + 2.0 - p.age_s, &BoatDamage::NONE);
             assert!((p.position.truncate() - was.position).length() < 1e-9, "age {}", p.age_s);
             assert!(p.starboard.dot(DVec2::new(was.heading.cos(), -was.heading.sin())) > 0.999_999);
         }

@@ -13,4 +13,4 @@ mod stage;
 pub mod waves;
 pub mod weapon;
 
-pub use stage::{Aim, LastResult, RESULT_S, Running, Score, World};
+pub use stage::{BoreAim, LastResult, RESULT_S, RunningWorld, Score, World};

@@ -27,7 +27,7 @@ pub const RESULT_S: f64 = 1.5;
 
 /// Where the barrel pointed as a round left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aim {
+pub struct BoreAim {
     /// The muzzle, world, metres.
     pub muzzle: DVec3,
     /// Direction of the barrel, world, unit vector.
@@ -65,14 +65,14 @@ pub struct World {
     weapon: Weapon,
     waves: WaveField,
     sea_change: SeaChange,
-    running: Option<Running>,
+    running: Option<RunningWorld>,
     score: Score,
     last_result: Option<LastResult>,
 }
 
 /// What there is from the first picture on.
 #[derive(Debug)]
-pub struct Running {
+pub struct RunningWorld {
     /// When the scenario began.
     pub start: Time,
     /// Up to when boats and rounds were followed.
@@ -126,14 +126,14 @@ impl World {
         begin: Time,
         until: Time,
         known: Time,
-        mut aim: impl FnMut(Time) -> Aim,
+        mut aim: impl FnMut(Time) -> BoreAim,
         records: &mut Vec<ShotRecord>,
     ) {
         let mut running = self.running.take().unwrap_or_else(|| self.begin(begin));
         let now = running.now.max(until);
         while let Some(fired) = self.weapon.fire(known.min(now)) {
             self.score.shots += 1;
-            let Aim { muzzle, bore, pose_age_ns, unscored } = aim(fired);
+            let BoreAim { muzzle, bore, pose_age_ns, unscored } = aim(fired);
             let shot = self.score.shots;
             match unscored {
                 None => {
@@ -152,15 +152,15 @@ impl World {
         self.count(records);
     }
 
-    fn begin(&self, start: Time) -> Running {
+    fn begin(&self, start: Time) -> RunningWorld {
         let fleet = Fleet::new(self.vessels.clone(), Arc::clone(&self.models), self.waves.clone(), start);
         let rounds = Rounds::new(self.ammunition, self.waves.clone(), start);
-        Running { start, now: start, fleet, rounds }
+        RunningWorld { start, now: start, fleet, rounds }
     }
 
     /// Rounds still in the air are recorded as misses: the session ends here.
     pub fn finish(&mut self, records: &mut Vec<ShotRecord>) {
-        if let Some(Running { start, now, fleet, rounds }) = &mut self.running {
+        if let Some(RunningWorld { start, now, fleet, rounds }) = &mut self.running {
             rounds.advance(now.plus_secs(ROUND_OVER_S), *start, fleet, records);
         }
         self.count(records);
@@ -194,7 +194,7 @@ impl World {
     }
 
     /// Boats and rounds; `None` before the first picture.
-    pub const fn running(&self) -> Option<&Running> {
+    pub const fn running(&self) -> Option<&RunningWorld> {
         self.running.as_ref()
     }
 

@@ -2,7 +2,7 @@
 //! angles to where the camera looks.
 
 use bowwave_core::{
-    estimate::attitude::{Attitude, AttitudeSettings, Noise, RateKind, Settings, Source},
+    estimate::attitude::{Attitude, AttitudeSettings, InclinationSettings, Noise, RateKind, Source},
     event::ImuSample,
     geometry::look,
     time::Time,
@@ -89,7 +89,7 @@ fn truth(format: ImuFormat, motion: Motion, n: i64) -> ImuSample {
 
 /// Worst errors through a motion, radians: where the camera looks and how its picture is turned, both at samples and halfway between.
 fn worst(format: ImuFormat, motion: Motion, source: Source) -> [f64; 2] {
-    let inclination = Settings::GUN;
+    let inclination = InclinationSettings::GUN;
     let settings = AttitudeSettings {
         source,
         rate: RateKind::Instant,

@@ -11,7 +11,7 @@ use bowwave_core::{
     estimate::light::LightMeter,
     event::Picture,
     frame::{
-        plan::{Needs, ScenePlan},
+        plan::{SceneNeeds, ScenePlan},
         scene::{Hud, LeftOut, Pass, PassDecision, Scene},
         view::ViewFrustum,
         wake::Wake,
@@ -135,7 +135,7 @@ impl Still {
     ) -> Result<Composed, TomlError> {
         let size = (picture.width(), picture.height());
         let (lens, camera) = self.sight(size, focal_px)?;
-        let plan = ScenePlan::new(&Needs {
+        let plan = ScenePlan::new(&SceneNeeds {
             size,
             video: picture.format(),
             picture: size,

@@ -2,7 +2,7 @@
 
 use bowwave_core::{
     event::Event,
-    fault::{Fault, FaultBoard, FaultChange, LogEntry, Severity, What},
+    fault::{Fault, FaultBoard, FaultChange, LogEntry, Severity, LogEvent},
 };
 
 /// Keeps the board and writes the log.
@@ -70,19 +70,19 @@ impl FaultLog {
             String::new()
         };
         match &entry.what {
-            What::Raised { cause } if entry.fault.severity() > Severity::Note => {
+            LogEvent::Raised { cause } if entry.fault.severity() > Severity::Note => {
                 log::error!(fault_code = code, fault_state = "raised", trainer_boot = boot; "{code} {cause}{more}");
             }
-            What::Raised { cause } => {
+            LogEvent::Raised { cause } => {
                 log::warn!(fault_code = code, fault_state = "raised", trainer_boot = boot; "{code} {cause}{more}");
             }
-            What::Cleared { after_s } => {
+            LogEvent::Cleared { after_s } => {
                 log::warn!(
                     fault_code = code, fault_state = "cleared", fault_seconds = after_s, trainer_boot = boot;
                     "{code} over after {after_s:.3} s{more}"
                 );
             }
-            What::Noted { cause } => {
+            LogEvent::Noted { cause } => {
                 log::warn!(fault_code = code, fault_state = "noted", trainer_boot = boot; "{code} {cause}{more}");
             }
         }

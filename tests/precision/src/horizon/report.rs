@@ -7,7 +7,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use bowwave_core::estimate::horizon::{Horizon, HorizonFinder, NoHorizon, Prior, Quality};
+use bowwave_core::estimate::horizon::{Horizon, HorizonFinder, LineQuality, NoHorizon, Prior};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ use crate::front::quantile;
 
 type Answer = std::result::Result<Horizon, NoHorizon>;
 
-fn qualities(answer: &Answer) -> Option<Quality> {
+fn qualities(answer: &Answer) -> Option<LineQuality> {
     match answer {
         Ok(found) => Some(found.quality),
         Err(
@@ -34,7 +34,7 @@ fn qualities(answer: &Answer) -> Option<Quality> {
 
 fn described(answer: &Answer) -> String {
     let why = answer.as_ref().err().map(|e| format!(" ({e})")).unwrap_or_default();
-    let numbers = |q: Quality| {
+    let numbers = |q: LineQuality| {
         format!(
             "score {:.2}, solid {:.2} of {:.2}, step {:.1}, peak {:.1}, texture {:.2}/{:.2}, sharp {:.2}, scatter {:.2}",
             q.score,

@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
-    estimate::horizon::{Horizon, HorizonFinder, Mask, NoHorizon, Prior, View},
+    estimate::horizon::{Horizon, HorizonFinder, HorizonView, Mask, NoHorizon, Prior},
     event::{Picture, PixelFormat},
     geometry::{Distortion, Lens},
 };
@@ -71,7 +71,7 @@ pub fn find(
     prior: Option<Prior>,
 ) -> Result<std::result::Result<Horizon, NoHorizon>> {
     finder.set_mask(None);
-    let view = View { lens: frame.picture_lens(), eye_height_m: frame.eye_m, prior };
+    let view = HorizonView { lens: frame.picture_lens(), eye_height_m: frame.eye_m, prior };
     Ok(finder.find(&frame.picture()?, &view))
 }
 
@@ -82,7 +82,7 @@ pub struct Drawn {
     /// The picture.
     pub picture: Picture,
     /// What is told.
-    pub view: View,
+    pub view: HorizonView,
     /// What is masked.
     pub mask: Option<Mask>,
 }
@@ -100,7 +100,7 @@ impl Drawn {
             ..Lens::pinhole(w as u32, h as u32, 1.0)
         };
         let mask = if shown.barrel { Some(barrel_mask().context("a mask")?) } else { None };
-        let view = View { lens, eye_height_m: shown.eye_m, prior: None };
+        let view = HorizonView { lens, eye_height_m: shown.eye_m, prior: None };
         Ok(Self { shown, picture, view, mask })
     }
 
@@ -111,7 +111,7 @@ impl Drawn {
         prior: Option<Prior>,
     ) -> std::result::Result<Horizon, NoHorizon> {
         finder.set_mask(self.mask.clone());
-        finder.find(&self.picture, &View { prior, ..self.view })
+        finder.find(&self.picture, &HorizonView { prior, ..self.view })
     }
 
     /// How far a found direction of up is from the truth.

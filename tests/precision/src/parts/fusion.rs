@@ -55,7 +55,7 @@ impl Estimator for FixedShare {
         Some(found)
     }
 
-    fn see_up(&mut self, seen: &UpSeen) {
+    fn update_vertical(&mut self, seen: &UpSeen) {
         // The horizon is 45 ms old: what the unit turned by since is small beside what a share of it says.
         if let Some((_, _, q)) = &mut self.last {
             let up = *q * CAMERA_FROM_IMU.inverse() * seen.up_camera;
@@ -65,7 +65,7 @@ impl Estimator for FixedShare {
 
     fn anchor(&mut self, _: f64) {}
 
-    fn see_heading(&mut self, seen: &HeadingSeen, _: bool) {
+    fn update_heading(&mut self, seen: &HeadingSeen, _: bool) {
         if let Some((_, _, q)) = &mut self.last {
             *q = DQuat::from_rotation_z(seen.off * self.share) * *q;
         }

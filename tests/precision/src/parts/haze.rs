@@ -2,7 +2,7 @@
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
-    estimate::horizon::{HorizonFinder, Prior, View, lowered_by_haze},
+    estimate::horizon::{HorizonFinder, HorizonView, Prior, lowered_by_haze},
     event::{Picture, PixelFormat},
     geometry::Lens,
 };
@@ -64,7 +64,7 @@ impl Drawn {
         let error = |(picture, truth): &(Picture, DQuat)| {
             let up = truth.inverse() * DVec3::Z;
             let prior = Some(Prior { up, sigma: 0.2f64.to_radians() });
-            let view = View { lens: self.lens, eye_height_m: self.eye_height_m, prior };
+            let view = HorizonView { lens: self.lens, eye_height_m: self.eye_height_m, prior };
             let found = *truth * finder.find(picture, &view).ok()?.up;
             let ahead = (*truth * DVec3::Z).truncate().normalize_or_zero();
             Some(found.truncate().dot(ahead))

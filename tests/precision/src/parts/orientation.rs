@@ -2,7 +2,9 @@
 
 use anyhow::Result;
 use bowwave_core::{
-    estimate::attitude::{Attitude, AttitudeSettings, Noise, OWN_GROWTH, RateKind, Settings, Source},
+    estimate::attitude::{
+        Attitude, AttitudeSettings, InclinationSettings, Noise, OWN_GROWTH, RateKind, Source,
+    },
     event::ImuSample,
     time::Time,
 };
@@ -71,9 +73,11 @@ fn ship_trial(sea: Sea, gun: bool, seconds: f64, errors: Errors) -> Trial {
 
 type Tell<'a> = &'a mut dyn FnMut(usize, DQuat);
 
-fn settings(inclination: Settings, rate: RateKind) -> AttitudeSettings {
+fn settings(inclination: InclinationSettings, rate: RateKind) -> AttitudeSettings {
     let noise = match inclination {
-        Settings::HAND => Noise { bias: DVec3::splat(9e-3), scale: 5e-3, force: 0.02, ..Noise::USUAL },
+        InclinationSettings::HAND => {
+            Noise { bias: DVec3::splat(9e-3), scale: 5e-3, force: 0.02, ..Noise::USUAL }
+        }
         _ => Noise::USUAL,
     };
     AttitudeSettings { source: Source::Fused, rate, inclination, noise, own_growth: OWN_GROWTH }
@@ -132,19 +136,22 @@ fn gun_params() -> Params {
 type Run<'a> = Box<dyn Fn(&Trial, Tell<'_>) + 'a>;
 
 /// Method, setting, whether the product uses it, itself.
-fn ways<'a>(default: Settings, rate: RateKind) -> Vec<(&'static str, &'static str, bool, Run<'a>)> {
-    let (gun, hand) = (settings(Settings::GUN, rate), settings(Settings::HAND, rate));
+fn ways<'a>(
+    default: InclinationSettings,
+    rate: RateKind,
+) -> Vec<(&'static str, &'static str, bool, Run<'a>)> {
+    let (gun, hand) = (settings(InclinationSettings::GUN, rate), settings(InclinationSettings::HAND, rate));
     vec![
         (
             "VQF and error-state filter",
             "for a gun",
-            default == Settings::GUN,
+            default == InclinationSettings::GUN,
             Box::new(move |t, tell| ours(gun, t, tell)),
         ),
         (
             "VQF and error-state filter",
             "in hands",
-            default == Settings::HAND,
+            default == InclinationSettings::HAND,
             Box::new(move |t, tell| ours(hand, t, tell)),
         ),
         ("VQF", "its authors'", false, Box::new(|t, tell| vqf(Params::default(), t, tell))),
@@ -160,15 +167,21 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     let mut trials = Vec::new();
     for name in BROAD {
         let Some(trial) = broad(name)? else { continue };
-        extreme(bench, &format!("BROAD {name}"), &trial, Settings::HAND, RateKind::Mean);
+        extreme(bench, &format!("BROAD {name}"), &trial, InclinationSettings::HAND, RateKind::Mean);
         trials.push(trial);
     }
     if !trials.is_empty() {
-        scene(bench, "in hands, trials of BROAD", &trials, Settings::HAND, RateKind::Mean);
+        scene(bench, "in hands, trials of BROAD", &trials, InclinationSettings::HAND, RateKind::Mean);
     }
     for sea in [ship::SEA_4, ship::SEA_6] {
         let trial = ship_trial(sea, true, 300.0, Errors::usual());
-        scene(bench, &format!("gun on a ship, {}", sea.name), &[trial], Settings::GUN, RateKind::Instant);
+        scene(
+            bench,
+            &format!("gun on a ship, {}", sea.name),
+            &[trial],
+            InclinationSettings::GUN,
+            RateKind::Instant,
+        );
     }
     let usual = Errors::usual();
     let slow = Errors { rate_hz: 100.0, ..usual };
@@ -181,12 +194,12 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("sea 4, bias of 0.3 deg/s on each axis", ship::SEA_4, biased),
     ] {
         let trial = ship_trial(sea, true, 300.0, errors);
-        extreme(bench, case, &trial, Settings::GUN, RateKind::Instant);
+        extreme(bench, case, &trial, InclinationSettings::GUN, RateKind::Instant);
     }
     Ok(())
 }
 
-fn extreme(bench: &mut Bench, case: &str, trial: &Trial, default: Settings, rate: RateKind) {
+fn extreme(bench: &mut Bench, case: &str, trial: &Trial, default: InclinationSettings, rate: RateKind) {
     let tried = ways(default, rate).into_iter().map(|(method, setting, default, run)| Tried {
         default,
         ..Tried::rival(method, setting, error_deg(trial, run))
@@ -195,7 +208,7 @@ fn extreme(bench: &mut Bench, case: &str, trial: &Trial, default: Settings, rate
 }
 
 /// The error is the mean over the trials.
-fn scene(bench: &mut Bench, name: &str, trials: &[Trial], default: Settings, rate: RateKind) {
+fn scene(bench: &mut Bench, name: &str, trials: &[Trial], default: InclinationSettings, rate: RateKind) {
     let samples = trials.iter().map(|t| t.samples.len()).sum();
     let ways = ways(default, rate).into_iter().map(|(method, setting, is_default, run)| {
         let error = trials.iter().map(|t| error_deg(t, &run)).sum::<f64>() / trials.len() as f64;

@@ -85,16 +85,16 @@ impl Estimator for Unasked<'_> {
         self.estimator.observe(time, &ImuSample { world_from_imu, ..*sample })
     }
 
-    fn see_up(&mut self, seen: &UpSeen) {
-        self.estimator.see_up(seen);
+    fn update_vertical(&mut self, seen: &UpSeen) {
+        self.estimator.update_vertical(seen);
     }
 
     fn anchor(&mut self, drift: f64) {
         self.estimator.anchor(drift);
     }
 
-    fn see_heading(&mut self, seen: &HeadingSeen, anchored: bool) {
-        self.estimator.see_heading(seen, anchored);
+    fn update_heading(&mut self, seen: &HeadingSeen, anchored: bool) {
+        self.estimator.update_heading(seen, anchored);
     }
 
     fn covariance(&self) -> Option<DMat3> {
@@ -121,7 +121,7 @@ impl Estimator for FixedShare {
         Some(self.found)
     }
 
-    fn see_up(&mut self, seen: &UpSeen) {
+    fn update_vertical(&mut self, seen: &UpSeen) {
         // The horizon is 45 ms old: what the unit turned by since is small beside what a share of it says.
         let up = self.found * CAMERA_FROM_IMU.inverse() * seen.up_camera;
         self.turn = DQuat::from_scaled_axis(up.cross(DVec3::Z) * self.share) * self.turn;
@@ -129,7 +129,7 @@ impl Estimator for FixedShare {
 
     fn anchor(&mut self, _: f64) {}
 
-    fn see_heading(&mut self, seen: &HeadingSeen, _: bool) {
+    fn update_heading(&mut self, seen: &HeadingSeen, _: bool) {
         self.turn = DQuat::from_rotation_z(seen.off * self.share) * self.turn;
     }
 

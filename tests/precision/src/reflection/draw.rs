@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Duration};
 use anyhow::{Context, Result, ensure};
 use bowwave_core::{
     colour::LUMINANCE,
-    estimate::light::{SKY_SINES, Sample, SeaTones, SkyLight},
+    estimate::light::{SKY_SINES, SeaTones, SkyLight, ToneSample},
     event::{Picture, PixelFormat},
     frame::{
         plan::sea_reflects,
@@ -177,9 +177,9 @@ pub fn tones(picture: &RgbImage, lens: &Lens, camera: &CameraPose) -> SeaTones {
         let at = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let code = Vec3::from_array(pixel.0.map(|c| f32::from(c) / 255.0));
         let tangent = camera.tangent_below(lens, at);
-        (tangent > TANGENT_MIN).then(|| Sample { tangent, luma: f64::from(code.dot(LUMINANCE)) })
+        (tangent > TANGENT_MIN).then(|| ToneSample { tangent, luma: f64::from(code.dot(LUMINANCE)) })
     };
-    let samples: Vec<Sample> = picture.enumerate_pixels().filter_map(sample).collect();
+    let samples: Vec<ToneSample> = picture.enumerate_pixels().filter_map(sample).collect();
     SeaTones::fit(&samples).unwrap_or_default()
 }
 

@@ -6,7 +6,7 @@ use std::{
 };
 
 use bowwave_core::{
-    estimate::sea::{Frame, SeaEstimate, SeaMeter, Unknown},
+    estimate::sea::{SeaEstimate, SeaFrame, SeaMeter, Unknown},
     geometry::{Lens, look},
     sea::WmoSeaState,
     time::Time,
@@ -85,7 +85,7 @@ pub fn run(clip: Clip, seconds: f64) -> Outcome {
         }
         let (camera, lens) = (video.told_pose(t), video.clip.lens);
         let seen = &video;
-        meter.observe(&Frame { time, camera, lens: &lens, luminance: &|p| seen.luminance(p) });
+        meter.observe(&SeaFrame { time, camera, lens: &lens, luminance: &|p| seen.luminance(p) });
     }
     let main = video.clip.systems[0];
     Outcome {
@@ -232,7 +232,7 @@ pub fn cost() -> Cost {
             (x < 1280 && y < 720).then(|| picture[y * 1280 + x] * wave)
         };
         let begin = thread_ns();
-        meter.observe(&Frame { time, camera, lens: &lens, luminance: &look_up });
+        meter.observe(&SeaFrame { time, camera, lens: &lens, luminance: &look_up });
         times.push(thread_ns() - begin);
         memory_bytes = memory_bytes.max(meter.memory_bytes());
     }

@@ -4,10 +4,10 @@
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use super::{
-    aided::{Aided, COMMON, Correction, Row, TURN, up_rows},
-    inclination::Settings,
+    error_state::{COMMON, Correction, ErrorState, MeasurementRow, TURN, up_rows},
+    heave::HeaveAcceleration,
+    inclination::InclinationSettings,
     lag::Lag,
-    swell::Swell,
 };
 use crate::physics::GRAVITY_M_S2;
 
@@ -54,12 +54,12 @@ impl Noise {
 #[derive(Clone, Debug)]
 pub(super) struct Filter {
     /// States and how far they are known.
-    pub(super) aided: Aided<STATES>,
+    pub(super) error_state: ErrorState<STATES>,
     noise: Noise,
     /// The unit's axis that pointed up when it was looked at last.
     upright: DVec3,
     lag: Lag,
-    swell: Swell,
+    heave: HeaveAcceleration,
     /// Since the last prediction: integral of the unit's axes in the world, of them times the rate about the upright axis, the turn about
     /// others, how long.
     axes: DMat3,
@@ -76,7 +76,7 @@ pub(super) struct Filter {
     /// For how long the inclination still settles, s, and whether up was seen otherwise since that began.
     settling_s: f64,
     seen: bool,
-    inclination: Settings,
+    inclination: InclinationSettings,
 }
 
 /// VQF's inclination has settled after so many of its time constants: until then what it lags by is not that of the filter alone.
@@ -98,20 +98,20 @@ const START_TILT: f64 = 0.06;
 
 impl Filter {
     /// Nothing learnt yet about an orientation that is held against an inclination so set.
-    pub(super) fn new(noise: Noise, inclination: Settings) -> Self {
+    pub(super) fn new(noise: Noise, inclination: InclinationSettings) -> Self {
         let tau_s = inclination.tau_accel_s;
-        let mut aided = Aided::new(noise.mounting);
+        let mut error_state = ErrorState::new(noise.mounting);
         for axis in 0..3 {
-            aided.forget(BIAS + axis, noise.bias[axis]);
-            aided.forget(FORCE + axis, noise.force / GRAVITY_M_S2);
-            aided.forget(SCREW + axis, noise.scale);
+            error_state.forget(BIAS + axis, noise.bias[axis]);
+            error_state.forget(FORCE + axis, noise.force / GRAVITY_M_S2);
+            error_state.forget(SCREW + axis, noise.scale);
         }
         let mut filter = Self {
-            aided,
+            error_state,
             noise,
             upright: DVec3::ZERO,
             lag: Lag::new(tau_s),
-            swell: Swell::new(tau_s),
+            heave: HeaveAcceleration::new(tau_s),
             axes: DMat3::ZERO,
             screws: DMat3::ZERO,
             turned: DVec3::ZERO,
@@ -130,12 +130,12 @@ impl Filter {
 
     /// The bias beyond the calibrated one, rad/s, the unit's axes.
     pub(super) fn bias(&self) -> DVec3 {
-        self.aided.three(BIAS)
+        self.error_state.three(BIAS)
     }
 
     /// A turn (scaled axis, radians, the unit's axes) that was measured over `dt_s` seconds, without what is known to be wrong with it.
     pub(super) fn corrected(&self, turn: DVec3, dt_s: f64) -> DVec3 {
-        turn - self.bias() * dt_s - self.aided.three(SCREW) * turn.dot(self.upright)
+        turn - self.bias() * dt_s - self.error_state.three(SCREW) * turn.dot(self.upright)
     }
 
     /// A step by `turn` (scaled axis, radians) over `dt_s` seconds, with the unit's axes in the world.
@@ -158,7 +158,7 @@ impl Filter {
         self.screws = DMat3::ZERO;
         self.lag.forget_screw();
         for axis in 0..3 {
-            self.aided.forget(SCREW + axis, self.noise.scale);
+            self.error_state.forget(SCREW + axis, self.noise.scale);
         }
     }
 
@@ -180,7 +180,7 @@ impl Filter {
         self.turn_by(SCREW, &screws);
         self.lag.step(axes, screws, dt);
         self.sway_on(dt);
-        self.aided.pass_time(dt);
+        self.error_state.pass_time(dt);
         let missed = std::mem::take(&mut self.missed);
         // The inclination it is held against has missed the same turn.
         if missed > MISSED_MUCH {
@@ -188,8 +188,8 @@ impl Filter {
             self.seen = false;
         }
         for axis in 0..3 {
-            self.aided.walk(TURN + axis, self.noise.gyro.powi(2) * dt + missed * missed);
-            self.aided.walk(BIAS + axis, self.noise.bias_walk.powi(2) * dt);
+            self.error_state.walk(TURN + axis, self.noise.gyro.powi(2) * dt + missed * missed);
+            self.error_state.walk(BIAS + axis, self.noise.bias_walk.powi(2) * dt);
         }
         let before = self.swing * (-dt / SWING_TAU_S).exp();
         self.swing = before + turned;
@@ -201,7 +201,7 @@ impl Filter {
     /// add up.
     fn turn_by_axes(&mut self, farther: f64) {
         for axis in 0..3 {
-            self.aided.walk(TURN + axis, self.noise.scale.powi(2) * farther);
+            self.error_state.walk(TURN + axis, self.noise.scale.powi(2) * farther);
         }
     }
 
@@ -210,23 +210,23 @@ impl Filter {
     fn turn_by(&mut self, state: usize, axes: &DMat3) {
         for row in 0..3 {
             for column in 0..3 {
-                self.aided.add(TURN + row, state + column, -axes.col(column)[row]);
+                self.error_state.add(TURN + row, state + column, -axes.col(column)[row]);
             }
         }
     }
 
     /// The inclination's error goes on to and fro.
     fn sway_on(&mut self, dt: f64) {
-        let (change, added) = self.swell.step(dt);
+        let (change, added) = self.heave.step(dt);
         for axis in 0..2 {
-            self.aided.mix([SWAY + axis, REFERENCE + axis], change, added * self.reference_variance);
+            self.error_state.mix([SWAY + axis, REFERENCE + axis], change, added * self.reference_variance);
         }
     }
 
     /// Holds `world_from_imu` against an inclination that errs by itself: where up is in the unit's axes, `since_s` after the last one.
     pub(super) fn incline(&mut self, world_from_imu: DQuat, up_imu: DVec3, since_s: f64) -> Correction {
-        let swung = self.lag.behind() * self.bias() + self.lag.screwed() * self.aided.three(SCREW);
-        let felt = self.lag.axes() * self.aided.three(FORCE);
+        let swung = self.lag.behind() * self.bias() + self.lag.screwed() * self.error_state.three(SCREW);
+        let felt = self.lag.axes() * self.error_state.three(FORCE);
         let up = (world_from_imu * up_imu - felt + swung.cross(DVec3::Z)).truncate();
         if self.settling_s > 0.0 {
             self.settling_s -= since_s;
@@ -238,12 +238,12 @@ impl Filter {
             self.watch(up, since_s);
         }
         let noise = DMat2::from_diagonal(DVec2::splat(REFERENCE_NOISE * REFERENCE_NOISE));
-        let differ = up - self.aided.two(REFERENCE);
-        self.aided.update(&self.inclined_rows(), differ, noise, f64::INFINITY).0
+        let differ = up - self.error_state.two(REFERENCE);
+        self.error_state.update(&self.inclined_rows(), differ, noise, f64::INFINITY).0
     }
 
     /// How the horizontal parts of that inclination change with the states.
-    fn inclined_rows(&self) -> [Row<STATES>; 2] {
+    fn inclined_rows(&self) -> [MeasurementRow<STATES>; 2] {
         let mut rows = up_rows();
         for column in 0..3 {
             let (felt, behind, screwed) =
@@ -263,11 +263,11 @@ impl Filter {
 
     /// Until the inclination has settled, nothing that it said before is worth more than what it says now.
     fn forget_tilt(&mut self) {
-        let place = REFERENCE_START * self.swell.place_variance().sqrt();
+        let place = REFERENCE_START * self.heave.place_variance().sqrt();
         for axis in 0..2 {
-            self.aided.forget(TURN + axis, START_TILT);
-            self.aided.forget(REFERENCE + axis, REFERENCE_START);
-            self.aided.forget(SWAY + axis, place);
+            self.error_state.forget(TURN + axis, START_TILT);
+            self.error_state.forget(REFERENCE + axis, REFERENCE_START);
+            self.error_state.forget(SWAY + axis, place);
         }
     }
 
@@ -288,13 +288,13 @@ impl Filter {
 
     /// The heading is set from outside: the world is turned by `off` about the vertical, which is then known to `deviation`.
     pub(super) fn set_heading(&mut self, off: f64, deviation: f64) {
-        self.aided.set_heading(off, deviation, &[REFERENCE, SWAY]);
+        self.error_state.set_heading(off, deviation, &[REFERENCE, SWAY]);
         self.lag.turn(DMat3::from_rotation_z(off));
     }
 
     /// By how much the bias turns the world about the vertical, standard deviation, rad/s, with the unit as in `world_from_imu`.
     pub(super) fn drift_sigma(&self, world_from_imu: DQuat) -> f64 {
         let vertical = world_from_imu.inverse() * DVec3::Z;
-        vertical.dot(self.aided.covariance(BIAS) * vertical).max(0.0).sqrt()
+        vertical.dot(self.error_state.covariance(BIAS) * vertical).max(0.0).sqrt()
     }
 }

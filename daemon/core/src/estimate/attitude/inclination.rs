@@ -20,14 +20,14 @@ const SHOCK_MOST_S: f64 = 1.0;
 
 /// How VQF is set, and how well it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct InclinationSettings {
     /// Time constant of the specific force's low-pass filter, seconds: longer than the waves.
     pub tau_accel_s: f64,
     /// Its inclination is never better than this, radians, beside what errors of the unit that are estimated do to it.
     pub error_least: f64,
 }
 
-impl Settings {
+impl InclinationSettings {
     /// For a gun on a ship in waves.
     pub const GUN: Self = Self { tau_accel_s: 10.0, error_least: 1e-3 };
 
@@ -56,7 +56,7 @@ const SLACK: f64 = 0.2;
 /// VQF between the samples of one unit without interruption.
 pub(super) struct Inclination {
     vqf: VQF,
-    gathered: Gathered,
+    gathered: GatheredMotion,
     /// Seconds for which specific force is still left out, and for which it has been.
     ringing_s: f64,
     shaken_s: f64,
@@ -64,7 +64,7 @@ pub(super) struct Inclination {
 
 /// What came since VQF's last step: the turn, the sum of specific force in the axes at its end and of how many samples, how long.
 #[derive(Clone, Copy, Debug, Default)]
-struct Gathered {
+struct GatheredMotion {
     turn: DVec3,
     accel: DVec3,
     count: u32,
@@ -73,12 +73,12 @@ struct Gathered {
 
 impl Inclination {
     /// A filter for samples `period_s` apart, begun with the unit as in `world_from_imu`.
-    pub(super) fn new(settings: &Settings, period_s: f64, world_from_imu: DQuat) -> Self {
+    pub(super) fn new(settings: &InclinationSettings, period_s: f64, world_from_imu: DQuat) -> Self {
         let steps = (STEP_S / period_s - SLACK).ceil().max(1.0);
         let mut vqf = VQF::new(steps * period_s, None, None, Some(settings.params()));
         // The filter takes its first sample's direction for up.
         vqf.update_acc((world_from_imu.inverse() * (DVec3::Z * GRAVITY_M_S2)).to_array());
-        Self { vqf, gathered: Gathered::default(), ringing_s: 0.0, shaken_s: 0.0 }
+        Self { vqf, gathered: GatheredMotion::default(), ringing_s: 0.0, shaken_s: 0.0 }
     }
 
     /// Takes in a turn (scaled axis, radians, the unit's axes) over `dt_s` seconds and the specific force at its end.

@@ -1,26 +1,26 @@
 //! From the inertial unit's samples, and from what else tells which way it looks, to its orientation over time.
 
-mod aided;
+mod error_state;
+mod external_ahrs;
 mod filter;
+mod heave;
 mod inclination;
 mod lag;
-mod own;
-mod swell;
 #[cfg(test)]
 mod tests;
 
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use self::{
-    aided::{Against, Aids},
+    error_state::{Against, AidingUpdate},
+    external_ahrs::ExternalAhrs,
     filter::Filter,
     inclination::Inclination,
-    own::Own,
 };
 pub use self::{
-    aided::{DIP_SIGMA, Outcome},
+    error_state::{REFRACTION_SIGMA, UpdateOutcome},
     filter::Noise,
-    inclination::Settings,
+    inclination::InclinationSettings,
 };
 use crate::{
     calibration::Calibration,
@@ -76,7 +76,7 @@ pub struct AttitudeSettings {
     /// What the unit's rate tells.
     pub rate: RateKind,
     /// How inclination is found from specific force.
-    pub inclination: Settings,
+    pub inclination: InclinationSettings,
     /// How the unit errs.
     pub noise: Noise,
     /// By how much the deviation of the heading of a unit's own orientation grows, rad/s.
@@ -92,7 +92,7 @@ impl AttitudeSettings {
         Self {
             source,
             rate: RateKind::Instant,
-            inclination: Settings::GUN,
+            inclination: InclinationSettings::GUN,
             own_growth: OWN_GROWTH,
             noise: Noise {
                 bias: calibration.gyro_bias_sigma,
@@ -133,23 +133,23 @@ pub struct Attitude {
     gyro_bias: DVec3,
     camera_from_imu: DQuat,
     settings: AttitudeSettings,
-    state: State,
+    state: FilterState,
     history: PoseHistory,
     corrected: f64,
 }
 
 #[derive(Debug)]
-enum State {
+enum FilterState {
     /// Gathering specific force: since when, the sum and how many.
     Levelling { since: Option<Time>, sum: DVec3, count: u32 },
     /// Integrating.
-    Running(Box<Running>),
+    Running(Box<RunningFilter>),
     /// The unit's own orientation is taken; when it last told one.
-    Own(Box<Own>, Time),
+    External(Box<ExternalAhrs>, Time),
 }
 
 #[derive(Debug)]
-struct Running {
+struct RunningFilter {
     inclination: Inclination,
     filter: Filter,
     last: OrientationSample,
@@ -161,7 +161,7 @@ struct Running {
     inclined_s: f64,
 }
 
-impl State {
+impl FilterState {
     const START: Self = Self::Levelling { since: None, sum: DVec3::ZERO, count: 0 };
 }
 
@@ -172,7 +172,7 @@ impl Attitude {
             gyro_bias,
             camera_from_imu,
             settings,
-            state: State::START,
+            state: FilterState::START,
             history: PoseHistory::new(),
             corrected: 0.0,
         }
@@ -203,12 +203,12 @@ impl Attitude {
     /// Begins anew, as when the unit has restarted.
     pub fn restart(&mut self) {
         self.history.clear();
-        self.state = State::START;
+        self.state = FilterState::START;
     }
 
     /// Covariance of the orientation's error as a turn of the world, rad^2; `None` before there is one.
     pub fn covariance(&self) -> Option<DMat3> {
-        Some(self.aids()?.turn_covariance())
+        Some(self.update()?.turn_covariance())
     }
 
     /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
@@ -219,32 +219,32 @@ impl Attitude {
     /// By how much the heading may drift, standard deviation, rad/s.
     pub fn drift_sigma(&self) -> Option<f64> {
         match &self.state {
-            State::Running(running) => Some(running.filter.drift_sigma(running.last.world_from_imu)),
-            State::Own(own, _) => Some(own.drift_sigma()),
-            State::Levelling { .. } => None,
+            FilterState::Running(running) => Some(running.filter.drift_sigma(running.last.world_from_imu)),
+            FilterState::External(external_ahrs, _) => Some(external_ahrs.drift_sigma()),
+            FilterState::Levelling { .. } => None,
         }
     }
 
-    fn aids(&self) -> Option<&dyn Aids> {
+    fn update(&self) -> Option<&dyn AidingUpdate> {
         match &self.state {
-            State::Running(running) => Some(&running.filter.aided),
-            State::Own(own, _) => Some(&own.aided),
-            State::Levelling { .. } => None,
+            FilterState::Running(running) => Some(&running.filter.error_state),
+            FilterState::External(external_ahrs, _) => Some(&external_ahrs.error_state),
+            FilterState::Levelling { .. } => None,
         }
     }
 
     /// What takes in aids, brought to the present.
-    fn aids_now(&mut self) -> Option<&mut dyn Aids> {
+    fn update_now(&mut self) -> Option<&mut dyn AidingUpdate> {
         match &mut self.state {
-            State::Running(running) => {
+            FilterState::Running(running) => {
                 running.filter.predict();
-                Some(&mut running.filter.aided)
+                Some(&mut running.filter.error_state)
             }
-            State::Own(own, _) => {
-                own.predict();
-                Some(&mut own.aided)
+            FilterState::External(external_ahrs, _) => {
+                external_ahrs.predict();
+                Some(&mut external_ahrs.error_state)
             }
-            State::Levelling { .. } => None,
+            FilterState::Levelling { .. } => None,
         }
     }
 
@@ -252,14 +252,14 @@ impl Attitude {
     /// what the unit alone makes of it.
     pub fn corrected(&self) -> f64 {
         match &self.state {
-            State::Own(own, _) => own.heading(),
-            State::Running(_) | State::Levelling { .. } => self.corrected,
+            FilterState::External(external_ahrs, _) => external_ahrs.heading(),
+            FilterState::Running(_) | FilterState::Levelling { .. } => self.corrected,
         }
     }
 
     /// Rotation from the unit's axes to the camera's as it is known by now.
     fn camera_from_imu(&self) -> DQuat {
-        let mounting = self.aids().map_or(DVec3::ZERO, |aids| aids.mounting());
+        let mounting = self.update().map_or(DVec3::ZERO, |update| update.mounting());
         DQuat::from_scaled_axis(mounting) * self.camera_from_imu
     }
 
@@ -272,27 +272,28 @@ impl Attitude {
     /// about would.
     pub fn world_from_camera(&self, world_from_imu: DQuat) -> DQuat {
         let world_from_camera = self.camera(world_from_imu);
-        let dip = self.aids().map_or(0.0, |aids| aids.dip());
+        let refraction = self.update().map_or(0.0, |update| update.refraction());
         let ahead = world_from_camera * DVec3::Z;
         let right = ahead.cross(DVec3::Z).normalize_or_zero();
-        (DQuat::from_scaled_axis(right * -dip) * world_from_camera).normalize()
+        (DQuat::from_scaled_axis(right * -refraction) * world_from_camera).normalize()
     }
 
-    /// Takes in where a camera saw up, unless that differs by more than `limit` (chi squared with two degrees of freedom) from what
+    /// Takes in where a camera saw up, unless that differs by more than `gate` (chi squared with two degrees of freedom) from what
     /// is known. `None` where nothing is known of that time.
-    pub fn see_up(&mut self, seen: &UpSeen, limit: f64) -> Option<Outcome> {
+    pub fn update_vertical(&mut self, seen: &UpSeen, gate: f64) -> Option<UpdateOutcome> {
         let then = self.history.at(seen.time).ok()?.world_from_imu;
         let world_from_camera = self.camera(then);
         let axes = DMat3::from_quat(world_from_camera);
         let turned = axes * seen.covariance * axes.transpose();
         let across = DMat2::from_cols(turned.x_axis.truncate(), turned.y_axis.truncate());
-        let (turn, outcome) = self.aids_now()?.see_up(world_from_camera, seen.up_camera, across, limit);
+        let (turn, outcome) =
+            self.update_now()?.update_vertical(world_from_camera, seen.up_camera, across, gate);
         match &mut self.state {
-            State::Running(running) if outcome.taken => running.filter.saw_up(),
-            State::Own(own, _) => {
+            FilterState::Running(running) if outcome.taken => running.filter.saw_up(),
+            FilterState::External(external_ahrs, _) => {
                 let up = world_from_camera * seen.up_camera;
                 let variance = 0.5 * (across.x_axis.x + across.y_axis.y);
-                own.watch(DVec2::new(up.y, -up.x), variance, outcome);
+                external_ahrs.watch(DVec2::new(up.y, -up.x), variance, outcome);
             }
             _ => {}
         }
@@ -303,67 +304,67 @@ impl Attitude {
     /// Sets the heading: turns the world by `off` about the vertical, which is then known to `sigma`, radians. `false` where there is no
     /// estimate yet to be turned. What was anchored before ([`Self::anchor_heading`]) no longer is.
     pub fn set_heading(&mut self, off: f64, sigma: f64) -> bool {
-        if self.aids_now().is_none() {
+        if self.update_now().is_none() {
             return false;
         }
         let turn = DQuat::from_rotation_z(off);
         match &mut self.state {
-            State::Own(own, _) => own.set_heading(off, sigma),
-            State::Running(running) => {
+            FilterState::External(external_ahrs, _) => external_ahrs.set_heading(off, sigma),
+            FilterState::Running(running) => {
                 running.filter.set_heading(off, sigma);
                 running.turn(turn);
             }
-            State::Levelling { .. } => {}
+            FilterState::Levelling { .. } => {}
         }
         self.turn_history(turn);
         true
     }
 
     /// The gun's bearing on its mount is what its heading and the ship's now make it, which errs by `variance` (rad^2) beyond the gun's
-    /// heading: from now on [`Self::see_mount`] tells of changes of the ship's heading. `false` where there is no heading yet.
+    /// heading: from now on [`Self::update_mount_yaw`] tells of changes of the ship's heading. `false` where there is no heading yet.
     pub fn anchor_mount(&mut self, variance: f64) -> bool {
-        self.aids_now().map(|aids| aids.anchor_mount(variance)).is_some()
+        self.update_now().map(|update| update.anchor_mount(variance)).is_some()
     }
 
     /// The gun's bearing on its mount, or what the ship's instruments say of its heading, may have changed by `variance`, rad^2.
     pub fn walk_mount(&mut self, variance: f64) -> bool {
-        self.aids_now().map(|aids| aids.walk_mount(variance)).is_some()
+        self.update_now().map(|update| update.walk_mount(variance)).is_some()
     }
 
-    /// Takes in the heading as it is by the ship's and the gun's bearing on its mount; else as [`Self::see_heading`].
-    pub fn see_mount(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        self.correct_heading(seen, Against::Mount, limit)
+    /// Takes in the heading as it is by the ship's and the gun's bearing on its mount; else as [`Self::update_heading`].
+    pub fn update_mount_yaw(&mut self, seen: &HeadingSeen, gate: f64) -> Option<UpdateOutcome> {
+        self.correct_heading(seen, Against::Mount, gate)
     }
 
-    /// Takes in a heading, unless that differs by more than `limit` (chi squared with one degree of freedom) from what is known. `None`
+    /// Takes in a heading, unless that differs by more than `gate` (chi squared with one degree of freedom) from what is known. `None`
     /// where nothing is known of that time.
-    pub fn see_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        self.correct_heading(seen, Against::North, limit)
+    pub fn update_heading(&mut self, seen: &HeadingSeen, gate: f64) -> Option<UpdateOutcome> {
+        self.correct_heading(seen, Against::North, gate)
     }
 
-    /// From now on [`Self::see_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
+    /// From now on [`Self::update_anchored_heading`] tells of changes since now: what is far away holds its direction, wherever that is. It
     /// may turn by some `drift` rad/s itself, steadily, as seen from a ship under way; what is learnt of that stays over later anchors.
     pub fn anchor_heading(&mut self, drift: f64) -> bool {
-        self.aids_now().map(|aids| aids.anchor(drift)).is_some()
+        self.update_now().map(|update| update.anchor(drift)).is_some()
     }
 
     /// Takes in that what was anchored does not turn itself, known to that variance, (rad/s)^2. `false` where there is no estimate yet.
-    pub fn see_anchor_stand(&mut self, variance: f64) -> bool {
-        let Some(aids) = self.aids_now() else { return false };
-        let turn = aids.see_anchor_stand(variance);
+    pub fn update_anchor_still(&mut self, variance: f64) -> bool {
+        let Some(update) = self.update_now() else { return false };
+        let turn = update.update_anchor_still(variance);
         self.turn(turn);
         true
     }
 
-    /// Takes in the heading as it is by what was anchored; else as [`Self::see_heading`].
-    pub fn see_anchored_heading(&mut self, seen: &HeadingSeen, limit: f64) -> Option<Outcome> {
-        self.correct_heading(seen, Against::Anchor, limit)
+    /// Takes in the heading as it is by what was anchored; else as [`Self::update_heading`].
+    pub fn update_anchored_heading(&mut self, seen: &HeadingSeen, gate: f64) -> Option<UpdateOutcome> {
+        self.correct_heading(seen, Against::Anchor, gate)
     }
 
-    fn correct_heading(&mut self, seen: &HeadingSeen, against: Against, limit: f64) -> Option<Outcome> {
+    fn correct_heading(&mut self, seen: &HeadingSeen, against: Against, gate: f64) -> Option<UpdateOutcome> {
         self.history.at(seen.time).ok()?;
-        let aids = self.aids_now()?;
-        let (turn, outcome) = aids.see_heading(against, wrapped(seen.off), seen.variance, limit);
+        let update = self.update_now()?;
+        let (turn, outcome) = update.update_heading(against, wrapped(seen.off), seen.variance, gate);
         self.turn(turn);
         Some(outcome)
     }
@@ -371,9 +372,9 @@ impl Attitude {
     /// The world is turned by a little, from now on and in what was before.
     fn turn(&mut self, turn: DQuat) {
         match &mut self.state {
-            State::Running(running) => running.turn(turn),
-            State::Own(own, _) => own.turn(turn),
-            State::Levelling { .. } => {}
+            FilterState::Running(running) => running.turn(turn),
+            FilterState::External(external_ahrs, _) => external_ahrs.turn(turn),
+            FilterState::Levelling { .. } => {}
         }
         self.turn_history(turn);
     }
@@ -385,30 +386,30 @@ impl Attitude {
     }
 
     /// The unit's own orientation at `time`, turned by what is known to be wrong with it.
-    fn own(&mut self, time: Time, world_from_imu: DQuat) -> DQuat {
+    fn external_ahrs(&mut self, time: Time, world_from_imu: DQuat) -> DQuat {
         let (growth, mounting) = (self.settings.own_growth, self.settings.noise.mounting);
-        if !matches!(self.state, State::Own(..)) {
-            self.state = State::Own(Box::new(Own::new(growth, mounting)), time);
+        if !matches!(self.state, FilterState::External(..)) {
+            self.state = FilterState::External(Box::new(ExternalAhrs::new(growth, mounting)), time);
         }
-        let State::Own(own, last) = &mut self.state else { return world_from_imu };
+        let FilterState::External(external_ahrs, last) = &mut self.state else { return world_from_imu };
         let dt_s = time.ns_since(*last).max(0) as f64 * 1e-9;
         *last = time.max(*last);
-        own.corrected(world_from_imu, dt_s)
+        external_ahrs.corrected(world_from_imu, dt_s)
     }
 
     fn find(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
         let rate = sample.rate - self.gyro_bias;
         if let (Some(q), Source::Auto) = (sample.world_from_imu, self.settings.source) {
-            let world_from_imu = self.own(time, q.normalize());
+            let world_from_imu = self.external_ahrs(time, q.normalize());
             return Some(OrientationSample { time, world_from_imu, rate });
         }
         match &mut self.state {
             // A unit that tells its orientation now and then tells nothing in between.
-            State::Own(_, last) if time.ns_since(*last).abs() <= GAP_NS => None,
-            State::Running(running) => {
+            FilterState::External(_, last) if time.ns_since(*last).abs() <= GAP_NS => None,
+            FilterState::Running(running) => {
                 let dt_ns = time.ns_since(running.last.time);
                 if dt_ns.abs() > GAP_NS {
-                    self.state = State::START;
+                    self.state = FilterState::START;
                     return None;
                 }
                 // One that comes twice or after a younger one tells nothing new.
@@ -420,28 +421,29 @@ impl Attitude {
                 }
                 Some(running.last)
             }
-            State::Own(..) | State::Levelling { .. } => self.level_out(time, sample, rate),
+            FilterState::External(..) | FilterState::Levelling { .. } => self.level_out(time, sample, rate),
         }
     }
 
     /// Gathers specific force until it tells which way is up.
     fn level_out(&mut self, time: Time, sample: &ImuSample, rate: DVec3) -> Option<OrientationSample> {
         let (since, sum, count) = match self.state {
-            State::Levelling { since, sum, count } => (since.unwrap_or(time), sum, count),
-            State::Running(_) | State::Own(..) => (time, DVec3::ZERO, 0),
+            FilterState::Levelling { since, sum, count } => (since.unwrap_or(time), sum, count),
+            FilterState::Running(_) | FilterState::External(..) => (time, DVec3::ZERO, 0),
         };
         let (sum, count) = (sum + sample.accel, count + 1);
-        self.state = State::Levelling { since: Some(since), sum, count };
+        self.state = FilterState::Levelling { since: Some(since), sum, count };
         let span_ns = time.ns_since(since);
         if span_ns < LEVEL_NS {
             return None;
         }
         let levelled = level(sum / f64::from(count), self.camera_from_imu);
-        let world_from_imu = sample.world_from_imu.map_or(levelled, |own| headed(levelled, own));
+        let world_from_imu =
+            sample.world_from_imu.map_or(levelled, |external_ahrs| headed(levelled, external_ahrs));
         let [shortest, longest] = PERIODS_S;
         let period_s = (span_ns as f64 * 1e-9 / f64::from(count - 1).max(1.0)).clamp(shortest, longest);
         let last = OrientationSample { time, world_from_imu, rate };
-        let running = Running {
+        let running = RunningFilter {
             inclination: Inclination::new(&self.settings.inclination, period_s, world_from_imu),
             filter: Filter::new(self.settings.noise, self.settings.inclination),
             last,
@@ -450,12 +452,12 @@ impl Attitude {
             fastest: DVec3::ZERO,
             inclined_s: 0.0,
         };
-        self.state = State::Running(Box::new(running));
+        self.state = FilterState::Running(Box::new(running));
         Some(last)
     }
 }
 
-impl Running {
+impl RunningFilter {
     /// Goes on to a sample; by what the world is to be turned for all that was before.
     fn step(
         &mut self,
@@ -537,10 +539,10 @@ pub fn level(up_imu: DVec3, camera_from_imu: DQuat) -> DQuat {
     (DQuat::from_rotation_z(azimuth) * tilted).normalize()
 }
 
-/// `levelled`, turned about the vertical to the heading of `own`.
-fn headed(levelled: DQuat, own: DQuat) -> DQuat {
+/// `levelled`, turned about the vertical to the heading of `external_ahrs`.
+fn headed(levelled: DQuat, external_ahrs: DQuat) -> DQuat {
     // The twist about z of what lies between (Dobrowolski 2015, swing-twist).
-    let between = own * levelled.inverse();
+    let between = external_ahrs * levelled.inverse();
     let twist = DQuat::from_xyzw(0.0, 0.0, between.z, between.w);
     if twist.length() > 1e-6 { (twist.normalize() * levelled).normalize() } else { levelled }
 }

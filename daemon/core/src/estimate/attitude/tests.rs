@@ -10,7 +10,7 @@ fn attitude(source: Source, gyro_bias: DVec3) -> Attitude {
     let settings = AttitudeSettings {
         source,
         rate: RateKind::Instant,
-        inclination: Settings::GUN,
+        inclination: InclinationSettings::GUN,
         noise: Noise::USUAL,
         own_growth: 0.0,
     };
@@ -107,11 +107,11 @@ fn a_horizon_is_believed_where_it_can_be_true() {
     assert!(error(&fused) > 0.2, "{}", error(&fused));
     let shore = DQuat::from_rotation_y(0.2) * up(now);
     let seen = UpSeen { time: now, up_camera: shore, covariance };
-    assert!(!fused.see_up(&seen, 13.8).unwrap().taken);
+    assert!(!fused.update_vertical(&seen, 13.8).unwrap().taken);
     assert!(error(&fused) > 0.2);
     for _ in 0..10 {
         let seen = UpSeen { time: now, up_camera: up(now), covariance };
-        assert!(fused.see_up(&seen, 13.8).unwrap().taken);
+        assert!(fused.update_vertical(&seen, 13.8).unwrap().taken);
     }
     // What is drawn follows the horizon wholly, though a part of what differs may be refraction.
     let drawn = fused.world_from_camera(fused.at(now).unwrap().world_from_imu);
@@ -121,9 +121,9 @@ fn a_horizon_is_believed_where_it_can_be_true() {
     let deviations = fused.covariance().unwrap();
     assert!((0.0..0.07f64.to_radians().powi(2)).contains(&deviations.x_axis.x), "{deviations}");
     let early = UpSeen { time: Time::from_ns(0), up_camera: DVec3::Y, covariance };
-    assert_eq!(fused.see_up(&early, 13.8), None);
+    assert_eq!(fused.update_vertical(&early, 13.8), None);
     let broken = UpSeen { time: now, up_camera: DVec3::NAN, covariance };
-    assert!(!fused.see_up(&broken, 13.8).unwrap().taken);
+    assert!(!fused.update_vertical(&broken, 13.8).unwrap().taken);
 }
 
 /// By what the heading found is wrong at its newest time, radians.
@@ -146,14 +146,14 @@ fn a_heading_is_set_and_held_by_what_was_anchored() {
     // What is anchored in tells of changes only: it makes nothing surer than the heading was.
     let time = fused.newest().unwrap();
     let seen = |off| HeadingSeen { time, off, variance: 1e-8 };
-    assert!(fused.see_anchored_heading(&seen(2e-5), 10.8).unwrap().taken);
+    assert!(fused.update_anchored_heading(&seen(2e-5), 10.8).unwrap().taken);
     assert!(deviation(&fused) > 0.99e-3, "{}", deviation(&fused));
-    assert!(!fused.see_anchored_heading(&seen(0.1), 10.8).unwrap().taken, "another island");
-    assert!(fused.see_heading(&seen(1e-3), 10.8).unwrap().taken);
+    assert!(!fused.update_anchored_heading(&seen(0.1), 10.8).unwrap().taken, "another island");
+    assert!(fused.update_heading(&seen(1e-3), 10.8).unwrap().taken);
     assert!(deviation(&fused) < 2e-4, "{}", deviation(&fused));
     assert!((heading_error(&fused) + 1e-3).abs() < 1e-4, "{}", heading_error(&fused));
     let broken = HeadingSeen { off: f64::NAN, ..seen(0.0) };
-    assert!(!fused.see_heading(&broken, 10.8).unwrap().taken);
+    assert!(!fused.update_heading(&broken, 10.8).unwrap().taken);
 }
 
 #[test]
@@ -199,7 +199,7 @@ fn the_units_own_orientation_is_taken_as_it_is() {
 /// A unit's own orientation, sent 100 times a second while it looks the same way, wrong by a turn of the world that `wrong` tells by the
 /// second; `aid` is told of each tenth with the time and with what is believed. Gives root mean square and largest error after `settle_s`,
 /// radians, with the heading's and without.
-fn own(
+fn external_ahrs(
     estimator: &mut Attitude,
     (from_s, to_s, settle_s): (f64, f64, f64),
     wrong: impl Fn(f64) -> DVec3,
@@ -241,16 +241,16 @@ fn a_units_own_inclination_is_held_by_horizons() {
     let wrong = |t: f64| DVec3::new(0.5 + 0.1 * (0.9 * t).sin(), -0.3 + 0.1 * (0.7 * t).cos(), 0.0) * DEG;
     let mut estimator = attitude(Source::Auto, DVec3::ZERO);
     let sigma = 0.03 * DEG;
-    let (rms, worst) = own(&mut estimator, (0.0, 60.0, 10.0), wrong, |estimator, time, _| {
-        let outcome = estimator.see_up(&horizon_seen(&mut rng, time, sigma), 13.8).unwrap();
-        assert!(outcome.surprise < 25.0, "{outcome:?}");
+    let (rms, worst) = external_ahrs(&mut estimator, (0.0, 60.0, 10.0), wrong, |estimator, time, _| {
+        let outcome = estimator.update_vertical(&horizon_seen(&mut rng, time, sigma), 13.8).unwrap();
+        assert!(outcome.nis < 25.0, "{outcome:?}");
     });
     assert!(rms < 0.05 * DEG && worst < 0.15 * DEG, "{} {} deg", rms / DEG, worst / DEG);
     // It knows how wrong it is: refraction is nothing here, but may have been.
     let known = estimator.covariance().unwrap();
     assert!((0.02 * DEG..0.2 * DEG).contains(&known.x_axis.x.sqrt()), "{known}");
     // Without a horizon its mean is held.
-    let (rms, _) = own(&mut estimator, (60.0, 80.0, 60.0), wrong, |_, _, _| ());
+    let (rms, _) = external_ahrs(&mut estimator, (60.0, 80.0, 60.0), wrong, |_, _, _| ());
     assert!(rms < 0.15 * DEG, "{} deg", rms / DEG);
 }
 
@@ -262,7 +262,7 @@ fn a_units_own_heading_is_averaged_where_the_sky_holds_it() {
         let mut estimator = attitude(Source::Auto, DVec3::ZERO);
         let truth = look(0.4, -0.1, 0.02);
         let mut held = None;
-        own(&mut estimator, (0.0, 60.0, 20.0), wrong, |estimator, time, _| {
+        external_ahrs(&mut estimator, (0.0, 60.0, 20.0), wrong, |estimator, time, _| {
             if !with_sky {
                 return;
             }
@@ -275,7 +275,7 @@ fn a_units_own_heading_is_averaged_where_the_sky_holds_it() {
                 }
                 Some(then) => {
                     let seen = HeadingSeen { time, off: off - then, variance: (0.005 * DEG).powi(2) };
-                    estimator.see_anchored_heading(&seen, 1e3).unwrap();
+                    estimator.update_anchored_heading(&seen, 1e3).unwrap();
                 }
             }
         })
@@ -295,9 +295,9 @@ fn a_unit_that_errs_otherwise_than_was_thought_is_not_left_to_itself() {
     };
     let mut estimator = attitude(Source::Auto, DVec3::ZERO);
     let seen_up = |t: f64| t % 20.0 < 10.0;
-    let (rms, _) = own(&mut estimator, (0.0, 160.0, 30.0), wrong, |estimator, time, t| {
+    let (rms, _) = external_ahrs(&mut estimator, (0.0, 160.0, 30.0), wrong, |estimator, time, t| {
         if seen_up(t) {
-            estimator.see_up(&horizon_seen(&mut rng, time, 0.03 * DEG), 13.8);
+            estimator.update_vertical(&horizon_seen(&mut rng, time, 0.03 * DEG), 13.8);
         }
     });
     // Alone it errs by .62 deg; half of the time nothing helps.
@@ -311,8 +311,8 @@ fn a_heading_that_is_set_turns_what_is_known_of_up() {
     let wrong = |_: f64| DVec3::new(0.5, 0.0, 0.0) * DEG;
     let mut rng = <rand_pcg::Pcg64 as rand::SeedableRng>::seed_from_u64(3);
     let mut estimator = attitude(Source::Auto, DVec3::ZERO);
-    own(&mut estimator, (0.0, 20.0, 0.0), wrong, |estimator, time, _| {
-        estimator.see_up(&horizon_seen(&mut rng, time, 0.01 * DEG), 13.8);
+    external_ahrs(&mut estimator, (0.0, 20.0, 0.0), wrong, |estimator, time, _| {
+        estimator.update_vertical(&horizon_seen(&mut rng, time, 0.01 * DEG), 13.8);
     });
     let up = |estimator: &Attitude| {
         let found = estimator.at(estimator.newest().unwrap()).unwrap().world_from_imu;
@@ -322,6 +322,6 @@ fn a_heading_that_is_set_turns_what_is_known_of_up() {
     assert!(estimator.set_heading(100.0 * DEG, 0.1 * DEG));
     assert!((estimator.heading_sigma().unwrap() - 0.1 * DEG).abs() < 1e-12);
     assert!((estimator.corrected() - 100.0 * DEG).abs() < 0.1 * DEG);
-    own(&mut estimator, (20.0, 25.0, 99.0), wrong, |_, _, _| ());
+    external_ahrs(&mut estimator, (20.0, 25.0, 99.0), wrong, |_, _, _| ());
     assert!(up(&estimator) < 0.08 * DEG, "{} deg", up(&estimator) / DEG);
 }

@@ -72,7 +72,7 @@ impl ClockReport {
 /// Lower convex hull of (device time, lag) points; lag is arrival less device time. Both relative to the first point, so
 /// that f64 keeps nanoseconds.
 #[derive(Clone, Debug)]
-struct Hull {
+struct ConvexHull {
     device_origin: i64,
     lag_origin: i64,
     points: Vec<(f64, f64)>,
@@ -81,7 +81,7 @@ struct Hull {
     last_x: f64,
 }
 
-impl Hull {
+impl ConvexHull {
     fn new(device_ns: i64, lag_ns: i64) -> Self {
         Self {
             device_origin: device_ns,
@@ -170,8 +170,8 @@ impl Hull {
 /// Running map from the device's clock to the host's.
 #[derive(Clone, Debug, Default)]
 pub struct ClockMap {
-    current: Option<Hull>,
-    younger: Option<Hull>,
+    current: Option<ConvexHull>,
+    younger: Option<ConvexHull>,
     restarts: u32,
     /// Tells when the line no longer is what arrivals come down to.
     floor: Floor,
@@ -216,7 +216,7 @@ impl ClockMap {
 
     /// Takes in a point and returns the lag that is taken for the least at its device time.
     fn map(&mut self, device_ns: i64, lag: i64) -> i64 {
-        let current = self.current.get_or_insert_with(|| Hull::new(device_ns, lag));
+        let current = self.current.get_or_insert_with(|| ConvexHull::new(device_ns, lag));
         current.push(device_ns, lag);
         let mut mapped = current.lag_at(device_ns);
         if current.span_ns() < SLOPE_AFTER_NS {
@@ -224,7 +224,7 @@ impl ClockMap {
         }
         let mut aged = false;
         if current.span_ns() >= WINDOW_NS / 2 {
-            let younger = self.younger.get_or_insert_with(|| Hull::new(device_ns, lag));
+            let younger = self.younger.get_or_insert_with(|| ConvexHull::new(device_ns, lag));
             younger.push(device_ns, lag);
             aged = younger.span_ns() >= WINDOW_NS / 2;
         }

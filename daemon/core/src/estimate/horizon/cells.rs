@@ -20,7 +20,7 @@ const BLOCK: usize = 16;
 
 /// Column sums of the rows of a picture that are looked at.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Cells {
+pub(super) struct PictureCells {
     /// Columns of cells.
     pub columns: usize,
     /// Rows of the whole reduced picture.
@@ -35,8 +35,8 @@ pub(super) struct Cells {
     block: Vec<i32>,
 }
 
-impl Cells {
-    /// Takes on the size of `picture`; its rows are read by [`Cells::fill`].
+impl PictureCells {
+    /// Takes on the size of `picture`; its rows are read by [`PictureCells::fill`].
     pub fn measure(&mut self, picture: &Picture) {
         let reduction = ((picture.width() + WIDTH / 2) / WIDTH).max(1) as usize;
         self.reduction = reduction;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DVec2, Vec2};
 
-use super::{cells::Cells, mask::Hidden, rays::Rays};
+use super::{cells::PictureCells, mask::MaskedRows, rays::Rays};
 
 /// Rows that steps are taken over, and how much a step counts: the shorter, the more of it is noise.
 const SCALES: [(usize, f32); 3] = [(3, 0.7), (8, 1.0), (20, 1.0)];
@@ -38,7 +38,7 @@ const BINS_MAX: usize = 1024;
 
 /// A step of brightness.
 #[derive(Clone, Copy, Debug)]
-struct Edge {
+struct BrightnessStep {
     /// Where it lies on the plane at a distance of one before the camera.
     place: Vec2,
     weight: f32,
@@ -46,7 +46,7 @@ struct Edge {
 
 /// A line that many steps lie on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Candidate {
+pub(super) struct LineCandidate {
     /// Roll and elevation of the camera, radians.
     pub angles: DVec2,
     /// Whether the sea is brighter than the sky.
@@ -55,19 +55,19 @@ pub(super) struct Candidate {
 
 /// Where lines are sought: rolls, elevations (radians).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Span {
+pub(super) struct LineSpan {
     pub roll: (f64, f64),
     pub elevation: (f64, f64),
 }
 
 /// How quiet the rows above `row` are, from 1 (sky) to 0: `floor` is what noise alone would give.
-pub(super) fn quiet(cells: &Cells, column: usize, row: usize, floor: f32) -> Option<f32> {
+pub(super) fn quiet(cells: &PictureCells, column: usize, row: usize, floor: f32) -> Option<f32> {
     let wiggle = above(cells, column, row)?;
     Some(1.0 / (1.0 + (wiggle / (1.5 * floor)).powi(2)))
 }
 
 /// How much the rows above `row` that should be sky differ from one to the next, codes; `None` too near the upper edge.
-pub(super) fn above(cells: &Cells, column: usize, row: usize) -> Option<f32> {
+pub(super) fn above(cells: &PictureCells, column: usize, row: usize) -> Option<f32> {
     let top = row.saturating_sub(SKY.end).max(cells.rows().start);
     let bottom = row.checked_sub(SKY.start)?;
     if bottom < top + 6 {
@@ -80,8 +80,8 @@ pub(super) fn above(cells: &Cells, column: usize, row: usize) -> Option<f32> {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Seeker {
     response: Vec<f32>,
-    edges: [Vec<Edge>; 2],
-    taken: Vec<Edge>,
+    edges: [Vec<BrightnessStep>; 2],
+    taken: Vec<BrightnessStep>,
     votes: Vec<f32>,
 }
 
@@ -89,9 +89,9 @@ impl Seeker {
     /// Collects steps; `rows` gives the rows of a column that are looked at. Returns how many there are.
     pub fn collect(
         &mut self,
-        cells: &Cells,
+        cells: &PictureCells,
         rays: &Rays,
-        hidden: &Hidden,
+        hidden: &MaskedRows,
         floor: f32,
         rows: impl Fn(usize) -> Range<usize>,
     ) -> usize {
@@ -106,14 +106,14 @@ impl Seeker {
                 let quiet = quiet(cells, column, row, floor).unwrap_or(0.5);
                 let weight = step.abs().min(STEP_MAX) * quiet;
                 let place = (ray.truncate() / ray.z.max(1e-3)).as_vec2();
-                self.edges[usize::from(step > 0.0)].push(Edge { place, weight });
+                self.edges[usize::from(step > 0.0)].push(BrightnessStep { place, weight });
             }
         }
         self.edges.iter().map(Vec::len).sum()
     }
 
     /// The largest step at each row that was read, over any number of rows, in codes.
-    fn respond(&mut self, cells: &Cells, column: usize) {
+    fn respond(&mut self, cells: &PictureCells, column: usize) {
         let sums = cells.column(column);
         self.response.clear();
         self.response.resize(sums.len(), 0.0);
@@ -131,7 +131,7 @@ impl Seeker {
     }
 
     /// The strongest steps of the column responded to, with their rows.
-    fn strongest(&self, cells: &Cells, rows: Range<usize>) -> [Option<(usize, f32)>; PER_COLUMN] {
+    fn strongest(&self, cells: &PictureCells, rows: Range<usize>) -> [Option<(usize, f32)>; PER_COLUMN] {
         let offset = cells.rows().start;
         let mut kept: [Option<(usize, f32)>; PER_COLUMN] = [None; PER_COLUMN];
         let from = rows.start.saturating_sub(offset);
@@ -161,13 +161,18 @@ impl Seeker {
 
     /// The `N` lines with most steps on them, best first. The steps on a line that was found are not counted for those after
     /// it: a skyline would else be found again and again, turned a little about one of its points.
-    pub fn lines<const N: usize>(&mut self, rays: &Rays, dip: f64, span: Span) -> [Option<Candidate>; N] {
+    pub fn lines<const N: usize>(
+        &mut self,
+        rays: &Rays,
+        dip: f64,
+        span: LineSpan,
+    ) -> [Option<LineCandidate>; N] {
         let bin_size = (BIN_PX / rays.focal).max(2.0 * rays.reach / BINS_MAX as f64);
         let low = (span.elevation.0.tan() + dip).max(-rays.reach);
         let high = (span.elevation.1.tan() + dip).min(rays.reach);
         let bins = (((high - low) / bin_size).ceil().max(0.0) as usize + 1).min(BINS_MAX);
         let rolls = ((span.roll.1 - span.roll.0) / ROLL_STEP).ceil().max(0.0) as usize + 1;
-        let grid = Grid { low, bin_size, bins, roll_0: span.roll.0 };
+        let grid = LineHistogram { low, bin_size, bins, roll_0: span.roll.0 };
         self.votes.clear();
         self.votes.resize(2 * bins * rolls, 0.0);
         for (edges, votes) in self.edges.iter().zip(self.votes.chunks_exact_mut(bins * rolls)) {
@@ -179,7 +184,7 @@ impl Seeker {
             let peaks = self.votes.chunks_exact(bins * rolls).enumerate().filter_map(peak);
             let Some((sign, peak)) = peaks.max_by(|a, b| a.1.votes.total_cmp(&b.1.votes)) else { break };
             let angles = grid.angles(&peak, dip);
-            *slot = Some(Candidate { angles, brighter_below: sign == 1 });
+            *slot = Some(LineCandidate { angles, brighter_below: sign == 1 });
             let (edges, taken) = (&mut self.edges[sign], &mut self.taken);
             taken.clear();
             edges.retain(|edge| {
@@ -198,7 +203,7 @@ impl Seeker {
 }
 
 /// Rolls, and heights at the picture's middle, that lines are counted by.
-struct Grid {
+struct LineHistogram {
     low: f64,
     bin_size: f64,
     bins: usize,
@@ -212,13 +217,13 @@ struct Peak {
     votes: f32,
 }
 
-impl Grid {
+impl LineHistogram {
     fn roll(&self, roll: usize) -> f64 {
         self.roll_0 + roll as f64 * ROLL_STEP
     }
 
     /// Adds the edges' weights, times `sign`, to all lines through them.
-    fn vote(&self, edges: &[Edge], votes: &mut [f32], sign: f32) {
+    fn vote(&self, edges: &[BrightnessStep], votes: &mut [f32], sign: f32) {
         let per_bin = 1.0 / self.bin_size as f32;
         let low = self.low as f32 * per_bin;
         for (roll, votes) in votes.chunks_exact_mut(self.bins).enumerate() {
@@ -256,7 +261,7 @@ impl Grid {
     }
 
     /// Whether the edge lies on that line, or next to it.
-    fn is_on(&self, edge: &Edge, peak: &Peak) -> bool {
+    fn is_on(&self, edge: &BrightnessStep, peak: &Peak) -> bool {
         let (sin, cos) = self.roll(peak.roll).sin_cos();
         let tangent = f64::from(edge.place.x) * sin + f64::from(edge.place.y) * cos;
         let bin = (tangent - self.low) / self.bin_size;

@@ -3,9 +3,9 @@
 use glam::{DMat2, DVec2, DVec3};
 
 use super::{
-    cells::{CELL, Cells},
+    cells::{CELL, PictureCells},
     edges::quiet,
-    mask::Hidden,
+    mask::MaskedRows,
     rays::Rays,
 };
 
@@ -68,10 +68,10 @@ fn through(a: DVec3, b: DVec3, sin_dip: f64) -> Option<DVec2> {
 
 /// What a line is looked for in.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scene<'a> {
-    pub cells: &'a Cells,
+pub(super) struct LineSearch<'a> {
+    pub cells: &'a PictureCells,
     pub rays: &'a Rays,
-    pub hidden: &'a Hidden,
+    pub hidden: &'a MaskedRows,
     pub sin_dip: f64,
     /// How much noise alone makes rows differ, codes.
     pub floor: f32,
@@ -79,12 +79,12 @@ pub(super) struct Scene<'a> {
 
 /// A line, as roll and elevation of the camera.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Line {
+pub(super) struct HorizonLine {
     pub angles: DVec2,
     pub brighter_below: bool,
 }
 
-impl Line {
+impl HorizonLine {
     pub fn up(&self) -> DVec3 {
         up_of(self.angles.x, self.angles.y)
     }
@@ -95,7 +95,7 @@ impl Line {
     }
 
     /// Row at which a column crosses the line, where both lie in the picture and are not hidden.
-    pub fn row(&self, scene: &Scene<'_>, column: usize) -> Option<f64> {
+    pub fn row(&self, scene: &LineSearch<'_>, column: usize) -> Option<f64> {
         let row = scene.rays.crossing(column, self.up(), scene.sin_dip)?;
         let margin = 4.0;
         let inside = row >= margin && row <= scene.cells.height as f64 - margin;
@@ -110,7 +110,7 @@ impl Line {
 
 /// Where a column has its edge.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Point {
+pub(super) struct EdgePoint {
     pub column: usize,
     /// Row of the edge.
     pub row: f64,
@@ -123,8 +123,8 @@ pub(super) struct Point {
 
 /// How well a line fits.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fit {
-    pub line: Line,
+pub(super) struct HorizonFit {
+    pub line: HorizonLine,
     /// Covariance of roll and elevation, rad^2.
     pub covariance: DMat2,
 }
@@ -132,14 +132,14 @@ pub(super) struct Fit {
 /// Fits lines; keeps its points' memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Fitter {
-    points: Vec<Point>,
+    points: Vec<EdgePoint>,
     offs: Vec<f64>,
 }
 
 impl Fitter {
     /// The strongest edges of a wider stretch about a line: what merely is strongest somewhere in it lies anywhere, what
     /// belongs to a line lies on it.
-    pub fn survey(&mut self, scene: &Scene<'_>, line: &Line) -> &[Point] {
+    pub fn survey(&mut self, scene: &LineSearch<'_>, line: &HorizonLine) -> &[EdgePoint] {
         self.gather(scene, line, SURVEY.0, SURVEY.1);
         self.measure(scene, line);
         &self.points
@@ -147,7 +147,12 @@ impl Fitter {
 
     /// Fits `line` to the edges within ever smaller windows: (rows to either side, rows that steps are taken over). `None`
     /// where too few columns have an edge there.
-    pub fn refine(&mut self, scene: &Scene<'_>, mut line: Line, windows: &[(usize, usize)]) -> Option<Fit> {
+    pub fn refine(
+        &mut self,
+        scene: &LineSearch<'_>,
+        mut line: HorizonLine,
+        windows: &[(usize, usize)],
+    ) -> Option<HorizonFit> {
         let mut fit = None;
         for (window, size) in windows {
             self.gather(scene, &line, *window, *size);
@@ -161,7 +166,7 @@ impl Fitter {
         fit
     }
 
-    fn gather(&mut self, scene: &Scene<'_>, line: &Line, window: usize, size: usize) {
+    fn gather(&mut self, scene: &LineSearch<'_>, line: &HorizonLine, window: usize, size: usize) {
         self.points.clear();
         let size = line.step_rows(size);
         let window = window.max(size);
@@ -171,13 +176,13 @@ impl Fitter {
             let Some((ray, down)) = scene.rays.at(column, row) else { continue };
             let quiet = quiet(scene.cells, column, row as usize, scene.floor).unwrap_or(0.5);
             let weight = f64::from(quiet * step.min(STEP_FULL) / STEP_FULL);
-            self.points.push(Point { column, row, off: 0.0, ray, down, weight });
+            self.points.push(EdgePoint { column, row, off: 0.0, ray, down, weight });
         }
     }
 
     /// The line through two of the points that most others agree with, where they agree with it better than with `line`: half
     /// of the columns may show land, which no average forgives.
-    fn consensus(&mut self, scene: &Scene<'_>, line: Line) -> Line {
+    fn consensus(&mut self, scene: &LineSearch<'_>, line: HorizonLine) -> HorizonLine {
         let mut best = (self.agreement(scene, &line), line);
         let count = self.points.len();
         for lag in [count / 2, count / 3, count / 5] {
@@ -186,7 +191,7 @@ impl Fitter {
                     break;
                 };
                 let Some(angles) = through(a.ray, b.ray, scene.sin_dip) else { continue };
-                let line = Line { angles, ..line };
+                let line = HorizonLine { angles, ..line };
                 let agreement = self.agreement(scene, &line);
                 if agreement > best.0 {
                     best = (agreement, line);
@@ -197,16 +202,16 @@ impl Fitter {
     }
 
     /// Weight of the points near the line, those on it most.
-    fn agreement(&self, scene: &Scene<'_>, line: &Line) -> f64 {
+    fn agreement(&self, scene: &LineSearch<'_>, line: &HorizonLine) -> f64 {
         let up = line.up();
-        let share = |p: &Point| {
+        let share = |p: &EdgePoint| {
             let off = (p.ray.dot(up) + scene.sin_dip) / -p.down.dot(up).min(-1e-9) / AGREE;
             p.weight * (1.0 - off * off).max(0.0)
         };
         self.points.iter().map(share).sum()
     }
 
-    fn solve(&mut self, scene: &Scene<'_>, mut line: Line) -> Option<Fit> {
+    fn solve(&mut self, scene: &LineSearch<'_>, mut line: HorizonLine) -> Option<HorizonFit> {
         let mut scatter = f64::INFINITY;
         let mut covariance = DMat2::IDENTITY;
         for _ in 0..ROUNDS {
@@ -227,11 +232,11 @@ impl Fitter {
         }
         self.measure(scene, &line);
         let covariance = covariance * (scatter * scatter * self.likeness(scatter));
-        Some(Fit { line, covariance })
+        Some(HorizonFit { line, covariance })
     }
 
     /// How far each point lies from the line, in rows.
-    fn measure(&mut self, scene: &Scene<'_>, line: &Line) {
+    fn measure(&mut self, scene: &LineSearch<'_>, line: &HorizonLine) {
         let up = line.up();
         for point in &mut self.points {
             point.off = (point.ray.dot(up) + scene.sin_dip) / -point.down.dot(up).min(-1e-9);
@@ -248,7 +253,7 @@ impl Fitter {
     }
 
     /// Normal equations of roll and elevation with Tukey's weights.
-    fn equations(&self, line: &Line, scatter: f64) -> (DMat2, DVec2) {
+    fn equations(&self, line: &HorizonLine, scatter: f64) -> (DMat2, DVec2) {
         let (up, [by_roll, by_elevation]) = (line.up(), turns(line.angles));
         let (mut normal, mut right) = (DMat2::ZERO, DVec2::ZERO);
         for point in &self.points {
@@ -264,7 +269,7 @@ impl Fitter {
     /// How many times the variance is larger because neighbouring columns err alike: (1 + r) / (1 - r) for a correlation of r.
     fn likeness(&self, scatter: f64) -> f64 {
         let (mut squares, mut products, mut pairs, mut count) = (0.0, 0.0, 0.0, 0.0);
-        let kept = |p: &Point| p.off.abs() < 3.0 * scatter;
+        let kept = |p: &EdgePoint| p.off.abs() < 3.0 * scatter;
         for pair in self.points.windows(2) {
             let [a, b] = pair else { continue };
             if kept(a) {
@@ -292,8 +297,8 @@ fn tukey(off: f64, scatter: f64) -> f64 {
 /// The largest step in the line's sense within `window` rows of `row`, to a fraction of a row by a parabola, and its size.
 /// `None` where it still grows at the window's edge.
 fn edge_near(
-    scene: &Scene<'_>,
-    line: &Line,
+    scene: &LineSearch<'_>,
+    line: &HorizonLine,
     column: usize,
     row: f64,
     window: usize,

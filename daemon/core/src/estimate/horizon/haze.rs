@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use super::{HorizonFinder, Prior, View};
+use super::{HorizonFinder, HorizonView, Prior};
 use crate::{
     colour::linear_to_srgb,
     event::{Picture, PixelFormat},
@@ -44,7 +44,7 @@ pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> Opt
         let elevation = f64::from(phase) / f64::from(PHASES) / lens.focal.y;
         let Some(picture) = picture(&flat, elevation, eye_height_m, visibility_m) else { continue };
         let prior = Prior { up: look(0.0, elevation, 0.0).inverse() * DVec3::Z, sigma: PRIOR_SIGMA };
-        let view = View { lens: flat, eye_height_m, prior: Some(prior) };
+        let view = HorizonView { lens: flat, eye_height_m, prior: Some(prior) };
         if let Ok(found) = finder.find(&picture, &view) {
             // An edge that lies lower makes the camera look higher.
             sum += found.elevation() - elevation;

@@ -1,9 +1,9 @@
 //! Whether a line is the sea's horizon.
 
 use super::{
-    CONTRAST_FULL, Quality,
+    CONTRAST_FULL, LineQuality,
     edges::above,
-    fit::{Fit, Point, Scene},
+    fit::{EdgePoint, HorizonFit, LineSearch},
 };
 
 /// Rows from the line to the parallels that it is compared with.
@@ -32,22 +32,22 @@ const NEIGHBOURS_MIN: usize = 6;
 
 /// Memory of the judgement.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Judge {
+pub(super) struct HorizonJudge {
     on_line: Vec<bool>,
     /// Columns whose neighbours agree with them.
     solid: Vec<bool>,
     values: Vec<f32>,
 }
 
-impl Judge {
+impl HorizonJudge {
     /// What speaks for and against the line, of which `points` are the strongest edges around it.
-    pub fn weigh(&mut self, scene: &Scene<'_>, fit: &Fit, points: &[Point]) -> Quality {
+    pub fn weigh(&mut self, scene: &LineSearch<'_>, fit: &HorizonFit, points: &[EdgePoint]) -> LineQuality {
         self.mark(scene, fit, points);
         let columns = scene.cells.columns.max(1) as f64;
         let visible = (0..scene.cells.columns).filter(|c| fit.line.row(scene, *c).is_some()).count();
         let solid = self.solid.iter().filter(|s| **s).count();
         let (contrast, peak_ratio) = self.contrast(scene, fit);
-        let mut quality = Quality {
+        let mut quality = LineQuality {
             columns: solid,
             solid_share: solid as f64 / visible.max(1) as f64,
             visible_share: visible as f64 / columns,
@@ -67,7 +67,7 @@ impl Judge {
         quality
     }
 
-    fn mark(&mut self, scene: &Scene<'_>, fit: &Fit, points: &[Point]) {
+    fn mark(&mut self, scene: &LineSearch<'_>, fit: &HorizonFit, points: &[EdgePoint]) {
         self.on_line.clear();
         self.on_line.resize(scene.cells.columns, false);
         let across = fit.line.angles.x.cos();
@@ -92,7 +92,7 @@ impl Judge {
     }
 
     /// Mean step of the solid columns on the line, codes, and that over the root mean square of those on its parallels.
-    fn contrast(&self, scene: &Scene<'_>, fit: &Fit) -> (f64, f64) {
+    fn contrast(&self, scene: &LineSearch<'_>, fit: &HorizonFit) -> (f64, f64) {
         let line = &fit.line;
         let size = line.step_rows(STEP);
         let mut on = (0.0_f32, 0_usize);
@@ -120,14 +120,14 @@ impl Judge {
     }
 
     /// Standard deviation of the solid columns' points about the line, rows: by the mean distance.
-    fn scatter(&self, points: &[Point]) -> f64 {
+    fn scatter(&self, points: &[EdgePoint]) -> f64 {
         let offs = points.iter().filter(|p| self.is_solid(p.column)).map(|p| p.off.abs());
         let (sum, count) = offs.fold((0.0, 0.0), |(sum, n), off| (sum + off, n + 1.0));
         (std::f64::consts::PI / 2.0).sqrt() * sum / f64::max(count, 1.0)
     }
 
     /// How much rows above the solid columns' points differ, codes: the median.
-    fn texture(&mut self, scene: &Scene<'_>, points: &[Point]) -> f64 {
+    fn texture(&mut self, scene: &LineSearch<'_>, points: &[EdgePoint]) -> f64 {
         let (values, solid) = (&mut self.values, &self.solid);
         let points = points.iter().filter(|p| solid.get(p.column).copied().unwrap_or(false));
         values.clear();
@@ -140,7 +140,7 @@ impl Judge {
     }
 
     /// Share of the change over 20 rows that lies within 3: 1 for a crisp edge, less for one blurred by motion or haze.
-    fn sharpness(&self, scene: &Scene<'_>, fit: &Fit, points: &[Point]) -> f64 {
+    fn sharpness(&self, scene: &LineSearch<'_>, fit: &HorizonFit, points: &[EdgePoint]) -> f64 {
         let (mut short, mut long) = (0.0, 0.0);
         for point in points.iter().filter(|p| self.is_solid(p.column)) {
             let row = point.row.round() as usize;

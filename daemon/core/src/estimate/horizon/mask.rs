@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::cells::{CELL, Cells};
+use super::cells::{CELL, PictureCells};
 
 /// Fields of a mask that polygons are laid on, across and down: of 8 pixels in a picture of 1280 x 720.
 const FIELDS: (usize, usize) = (160, 90);
@@ -69,13 +69,13 @@ fn is_inside(polygon: &[DVec2], place: DVec2) -> bool {
 
 /// A mask on the cells of a picture: how many rows of each column are hidden from the top on.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Hidden {
+pub(super) struct MaskedRows {
     mask: Option<Mask>,
     size: (usize, usize),
     counts: Vec<u16>,
 }
 
-impl Hidden {
+impl MaskedRows {
     /// Hides something else from now on.
     pub fn set(&mut self, mask: Option<Mask>) {
         self.mask = mask;
@@ -83,7 +83,7 @@ impl Hidden {
     }
 
     /// Lays the mask on cells of this size.
-    pub fn lay(&mut self, cells: &Cells) {
+    pub fn lay(&mut self, cells: &PictureCells) {
         let size = (cells.columns, cells.height);
         let Some(mask) = self.mask.as_ref().filter(|_| self.size != size) else { return };
         self.size = size;

@@ -28,11 +28,11 @@ use crate::{
     event::Picture,
     geometry::{Lens, horizon_dip, look},
 };
-use cells::Cells;
-use edges::{Candidate, ROLL_MAX, Seeker, Span};
-use fit::{Fit, Fitter, Line, Scene, angles_of};
-use judge::Judge;
-use mask::Hidden;
+use cells::PictureCells;
+use edges::{LineCandidate, LineSpan, ROLL_MAX, Seeker};
+use fit::{Fitter, HorizonFit, HorizonLine, LineSearch, angles_of};
+use judge::HorizonJudge;
+use mask::MaskedRows;
 use rays::Rays;
 
 /// Contrast at which a line is no worse for being faint, codes.
@@ -85,7 +85,7 @@ pub struct Prior {
 
 /// What is known when a picture is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct HorizonView {
     /// The camera's lens; where it is given for another size than the picture has, it is scaled.
     pub lens: Lens,
     /// Height of the eye above the sea, metres.
@@ -102,7 +102,7 @@ pub struct Horizon {
     /// Covariance of roll and elevation, rad^2.
     pub covariance: DMat2,
     /// What spoke for it.
-    pub quality: Quality,
+    pub quality: LineQuality,
 }
 
 impl Horizon {
@@ -135,7 +135,7 @@ impl Horizon {
 
 /// What speaks for a line and against it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Quality {
+pub struct LineQuality {
     /// Columns of eight pixels with an edge on the line, and neighbours that have too.
     pub columns: usize,
     /// These over the columns that the line crosses.
@@ -172,27 +172,27 @@ pub enum NoHorizon {
     Featureless,
     /// The best line is not clear enough, or too faint.
     #[error("the best line scores only {:.2}, with a step of {:.1} codes", .0.score, .0.contrast)]
-    Unclear(Quality),
+    Unclear(LineQuality),
     /// The best line is smeared, by motion or fog.
     #[error("the best line is blurred, its sharpness is {:.2}", .0.sharpness)]
-    Blurred(Quality),
+    Blurred(LineQuality),
     /// What is above the best line is no sky: a shore's water line.
     #[error("above the best line rows differ by {:.1} codes, which is no sky", .0.texture)]
-    Textured(Quality),
+    Textured(LineQuality),
     /// The best line is not where the horizon is predicted.
     #[error("the best line is not where the horizon is predicted")]
-    Elsewhere(Quality),
+    Elsewhere(LineQuality),
 }
 
 /// Finds horizons; keeps its memory from picture to picture.
 #[derive(Clone, Debug, Default)]
 pub struct HorizonFinder {
-    cells: Cells,
+    cells: PictureCells,
     rays: Rays,
-    hidden: Hidden,
+    hidden: MaskedRows,
     seeker: Seeker,
     fitter: Fitter,
-    judge: Judge,
+    judge: HorizonJudge,
     scratch: Vec<f32>,
 }
 
@@ -208,7 +208,7 @@ impl HorizonFinder {
     }
 
     /// The horizon of `picture`.
-    pub fn find(&mut self, picture: &Picture, view: &View) -> Result<Horizon, NoHorizon> {
+    pub fn find(&mut self, picture: &Picture, view: &HorizonView) -> Result<Horizon, NoHorizon> {
         self.cells.measure(picture);
         if self.cells.columns < SIZE_MIN.0 || self.cells.height < SIZE_MIN.1 {
             return Err(NoHorizon::TooSmall);
@@ -231,7 +231,7 @@ impl HorizonFinder {
         if count == 0 {
             return Err(NoHorizon::Featureless);
         }
-        let lines: [Option<Candidate>; 4] = self.seeker.lines(&self.rays, dip, span(gate.as_ref()));
+        let lines: [Option<LineCandidate>; 4] = self.seeker.lines(&self.rays, dip, span(gate.as_ref()));
         let (fit, quality) = self.best(&lines, dip.sin(), floor).ok_or(NoHorizon::Featureless)?;
         refusal(&quality).map_or(Ok(()), Err)?;
         let up = fit.line.up();
@@ -243,11 +243,16 @@ impl HorizonFinder {
     }
 
     /// Refines the lines roughly, and the best of them finely.
-    fn best(&mut self, lines: &[Option<Candidate>], sin_dip: f64, floor: f32) -> Option<(Fit, Quality)> {
-        let scene = Scene { cells: &self.cells, rays: &self.rays, hidden: &self.hidden, sin_dip, floor };
-        let mut best: Option<(Fit, Quality)> = None;
+    fn best(
+        &mut self,
+        lines: &[Option<LineCandidate>],
+        sin_dip: f64,
+        floor: f32,
+    ) -> Option<(HorizonFit, LineQuality)> {
+        let scene = LineSearch { cells: &self.cells, rays: &self.rays, hidden: &self.hidden, sin_dip, floor };
+        let mut best: Option<(HorizonFit, LineQuality)> = None;
         for candidate in lines.iter().flatten() {
-            let line = Line { angles: candidate.angles, brighter_below: candidate.brighter_below };
+            let line = HorizonLine { angles: candidate.angles, brighter_below: candidate.brighter_below };
             let Some(fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)]) else { continue };
             let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
             if best.is_none_or(|(_, b)| b.score < quality.score) {
@@ -281,7 +286,7 @@ impl HorizonFinder {
 }
 
 /// Why a line with these qualities is not the horizon; `None` if it is.
-fn refusal(quality: &Quality) -> Option<NoHorizon> {
+fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
     let (noises, steps) = TEXTURE_MAX;
     let texture_max = (noises * quality.noise).max(steps * quality.contrast);
     if quality.score < SCORE_MIN || quality.contrast < CONTRAST_MIN {
@@ -297,7 +302,7 @@ fn refusal(quality: &Quality) -> Option<NoHorizon> {
 
 /// Covariance of what the scatter of the columns does not show: haze and swell move all of an edge, and the more the softer
 /// it is.
-fn unseen(quality: &Quality, focal_px: f64, width_px: f64) -> DMat2 {
+fn unseen(quality: &LineQuality, focal_px: f64, width_px: f64) -> DMat2 {
     let softness = (1.0 / quality.sharpness.clamp(SHARPNESS_MIN, 1.0) - 1.0).max(0.0);
     let shift = (SHIFT_PX + SHIFT_SOFT_PX * softness) / focal_px;
     let turn = TURN_PX * 2.0 / (quality.visible_share * width_px).max(1.0);
@@ -323,7 +328,7 @@ impl Gate {
     }
 
     /// Rows in which a column may cross the horizon.
-    fn rows(&self, rays: &Rays, cells: &Cells, column: usize) -> Option<Range<usize>> {
+    fn rows(&self, rays: &Rays, cells: &PictureCells, column: usize) -> Option<Range<usize>> {
         let row = rays.crossing(column, self.up, self.sin_dip)?;
         let (ray, down) = rays.at(column, row)?;
         // Pitch moves a column's row by this much, roll by as much as it lies off the axis.
@@ -335,7 +340,7 @@ impl Gate {
     }
 
     /// Rows that have to be read.
-    fn all_rows(&self, rays: &Rays, cells: &Cells) -> Option<Range<usize>> {
+    fn all_rows(&self, rays: &Rays, cells: &PictureCells) -> Option<Range<usize>> {
         let rows = (0..cells.columns).filter_map(|column| self.rows(rays, cells, column));
         let all = rows.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))?;
         let margin = MARGIN as usize;
@@ -344,13 +349,13 @@ impl Gate {
 }
 
 /// Rolls and elevations that lines are sought at.
-fn span(gate: Option<&Gate>) -> Span {
+fn span(gate: Option<&Gate>) -> LineSpan {
     match gate {
         Some(g) => {
             let around = |angle: f64| (angle - g.half, angle + g.half);
-            Span { roll: around(g.angles.x), elevation: around(g.angles.y) }
+            LineSpan { roll: around(g.angles.x), elevation: around(g.angles.y) }
         }
-        None => Span { roll: (-ROLL_MAX, ROLL_MAX), elevation: (-1.4, 1.4) },
+        None => LineSpan { roll: (-ROLL_MAX, ROLL_MAX), elevation: (-1.4, 1.4) },
     }
 }
 

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::cells::{CELL, Cells};
+use super::cells::{CELL, PictureCells};
 use crate::geometry::Lens;
 
 /// Rows between the entries of a column: between them a line errs by .02 px with the strongest lens of an action camera.
@@ -24,7 +24,7 @@ pub(super) struct Rays {
 
 impl Rays {
     /// Makes the table where lens or size have changed; how the camera turned is another for each picture.
-    pub fn make(&mut self, lens: &Lens, cells: &Cells) {
+    pub fn make(&mut self, lens: &Lens, cells: &PictureCells) {
         self.make_still(&Lens { row_turn: DVec3::ZERO, ..*lens }, cells);
         self.turned.clear();
         if lens.row_turn == DVec3::ZERO {
@@ -38,7 +38,7 @@ impl Rays {
         }
     }
 
-    fn make_still(&mut self, lens: &Lens, cells: &Cells) {
+    fn make_still(&mut self, lens: &Lens, cells: &PictureCells) {
         let key = (*lens, cells.size);
         if self.made_for == Some(key) {
             return;

@@ -23,8 +23,8 @@ fn lens(k1: f64) -> Lens {
     }
 }
 
-fn view(lens: Lens, prior: Option<Prior>) -> View {
-    View { lens, eye_height_m: EYE_M, prior }
+fn view(lens: Lens, prior: Option<Prior>) -> HorizonView {
+    HorizonView { lens, eye_height_m: EYE_M, prior }
 }
 
 /// Luma of what `paint` gives for the angle over the horizon, in pixels, and the pixel's index.

@@ -7,7 +7,7 @@ mod sky;
 mod tones;
 
 pub use sky::{SKY_SINES, SkyLight};
-pub use tones::{Sample, SeaTones};
+pub use tones::{SeaTones, ToneSample};
 
 use glam::{DVec2, DVec3, Vec3};
 
@@ -183,7 +183,7 @@ fn tones(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<SeaTones
     let middle = |y: f64| down(DVec2::new(w / 2.0, y * h));
     let (top, bottom) = (middle(0.0), middle(1.0));
     let first = ((SEA_FROM - top) / (bottom - top).max(1e-9)).clamp(0.0, 1.0);
-    let mut samples = [Sample { tangent: 0.0, luma: 0.0 }; SEA_GRID.0 * SEA_GRID.1];
+    let mut samples = [ToneSample { tangent: 0.0, luma: 0.0 }; SEA_GRID.0 * SEA_GRID.1];
     let mut count = 0;
     for i in 0..samples.len() {
         let (column, row) = (i % SEA_GRID.0, i / SEA_GRID.0);
@@ -197,7 +197,7 @@ fn tones(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<SeaTones
         let place = DVec2::new(x / w * f64::from(picture.width()), y / h * f64::from(picture.height()));
         let code = Vec3::from(picture.srgb_at(place.x as u32, place.y as u32));
         if let Some(sample) = samples.get_mut(count) {
-            *sample = Sample { tangent, luma: f64::from(code.dot(LUMINANCE)) };
+            *sample = ToneSample { tangent, luma: f64::from(code.dot(LUMINANCE)) };
             count += 1;
         }
     }

@@ -7,7 +7,7 @@ const SPREAD_MIN: f32 = 0.004;
 
 /// One pixel of sea.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct ToneSample {
     /// Tangent of the angle below the horizontal under which it is seen.
     pub tangent: f64,
     /// Luma of its sRGB code, 0 to 1.
@@ -35,7 +35,7 @@ impl Default for SeaTones {
 
 impl SeaTones {
     /// Fits the pixels. `None` for fewer than a dozen, or ones that all lie in one row.
-    pub fn fit(samples: &[Sample]) -> Option<Self> {
+    pub fn fit(samples: &[ToneSample]) -> Option<Self> {
         let roots = || samples.iter().map(|s| s.tangent.max(0.0).sqrt());
         let (low, high) = roots().fold((f64::MAX, f64::MIN), |(a, b), r| (a.min(r), b.max(r)));
         if samples.len() < 12 || (high - low).is_nan() || high - low <= 1e-3 {
@@ -43,7 +43,7 @@ impl SeaTones {
         }
         let mean = quadratic(roots().zip(samples.iter().map(|s| s.luma)))?;
         // A normal distribution's mean deviation is sqrt(2 / pi) of its standard deviation.
-        let off = |(root, s): (f64, &Sample)| (root, 1.2533 * (s.luma - value(mean, root)).abs());
+        let off = |(root, s): (f64, &ToneSample)| (root, 1.2533 * (s.luma - value(mean, root)).abs());
         let spread = quadratic(roots().zip(samples).map(off))?;
         let single = |v: DVec3| v.as_vec3().to_array();
         Some(Self { mean: single(mean), spread: single(spread), roots: [low as f32, high as f32] })
@@ -100,11 +100,11 @@ mod tests {
 
     #[test]
     fn a_sea_that_darkens_towards_the_eye_is_fitted() {
-        let samples: Vec<Sample> = (0..400)
+        let samples: Vec<ToneSample> = (0..400)
             .map(|i| {
                 let tangent = 0.01 + 0.001 * f64::from(i % 100);
                 let noise = if i % 2 == 0 { 0.03 } else { -0.03 };
-                Sample { tangent, luma: 0.6 - 0.5 * tangent.sqrt() + noise }
+                ToneSample { tangent, luma: 0.6 - 0.5 * tangent.sqrt() + noise }
             })
             .collect();
         let tones = SeaTones::fit(&samples).expect("enough");
@@ -112,7 +112,7 @@ mod tests {
         // Two values 0.03 on either side: the normal distribution of that mean deviation.
         assert!((tones.tone(0.04, 0.53) - 0.03 / (0.03 * 1.2533)).abs() < 0.02);
         assert_eq!(SeaTones::fit(&samples[..11]), None);
-        assert_eq!(SeaTones::fit(&[Sample { tangent: 0.1, luma: 0.3 }; 50]), None);
+        assert_eq!(SeaTones::fit(&[ToneSample { tangent: 0.1, luma: 0.3 }; 50]), None);
         for tangent in [0.0, -1.0, 1e9, f64::NAN] {
             assert!(tones.tone(tangent, 0.4).is_finite(), "{tangent}");
         }

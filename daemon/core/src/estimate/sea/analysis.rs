@@ -6,11 +6,11 @@ use rustfft::{Fft, FftPlanner, num_complex::Complex32};
 
 use super::{
     Unknown,
-    grid::Grid,
+    grid::SeaGrid,
     profile::unevenness,
-    radiance::{Gains, Radiance, Row, Search},
+    radiance::{Gains, Radiance, RadianceRow, Search},
     record::{Record, SLOT_NS},
-    shell::{self, Line},
+    shell::{self, ShellLine},
     sky::SkyRows,
 };
 
@@ -43,9 +43,9 @@ const NEAR_LEAST: usize = 20;
 
 /// What a finished analysis found.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Found {
+pub(super) struct AnalysisResult {
     /// By rising frequency.
-    pub lines: Vec<Line>,
+    pub lines: Vec<ShellLine>,
     /// Power of noise of a near patch, slope squared by Hz.
     pub noise: f64,
     /// Length of the window, seconds.
@@ -59,14 +59,14 @@ pub(super) struct Found {
 }
 
 /// The end of an analysis.
-pub(super) struct Finished {
-    pub found: Result<Found, Unknown>,
+pub(super) struct FinishedAnalysis {
+    pub found: Result<AnalysisResult, Unknown>,
     /// The slot after the window.
     pub end: usize,
 }
 
 /// How far the calibration of brightness to slope is.
-enum Calibration {
+enum SlopeCalibration {
     /// Patches are still transformed.
     Waits,
     /// Skies and roughnesses are tried.
@@ -88,17 +88,17 @@ pub(super) struct Analysis {
     power: Vec<f64>,
     /// By line, taper and patch.
     values: Vec<Vec<Vec<Complex32>>>,
-    calibration: Calibration,
+    calibration: SlopeCalibration,
     weights: Vec<f32>,
     near: Vec<bool>,
-    found: Found,
+    found: AnalysisResult,
     series: Vec<f32>,
     buffer: Vec<Complex32>,
 }
 
 impl Analysis {
     /// An analysis of the newest `slots` of the record.
-    pub fn new(grid: &Grid, record: &Record, slots: usize) -> Self {
+    pub fn new(grid: &SeaGrid, record: &Record, slots: usize) -> Self {
         let seconds = slots as f64 * SLOT_NS as f64 * 1e-9;
         let count = (seconds / 30.0).floor().clamp(2.0, 4.0) as usize;
         // Sine tapers, Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188).
@@ -122,17 +122,21 @@ impl Analysis {
             next_line: 0,
             means: vec![f64::NAN; cells],
             power: vec![0.0; cells],
-            calibration: Calibration::Waits,
+            calibration: SlopeCalibration::Waits,
             weights: Vec::new(),
             near: vec![false; cells],
-            found: Found { seconds, window_hz2: squares / (4.0 * seconds * seconds), ..Found::default() },
+            found: AnalysisResult {
+                seconds,
+                window_hz2: squares / (4.0 * seconds * seconds),
+                ..AnalysisResult::default()
+            },
             series: vec![0.0; slots],
             buffer: vec![Complex32::default(); 2 * slots],
         }
     }
 
     /// Does one piece of work; what was found once all is done.
-    pub fn step(&mut self, grid: &Grid, record: &Record, sky: &SkyRows) -> Option<Finished> {
+    pub fn step(&mut self, grid: &SeaGrid, record: &Record, sky: &SkyRows) -> Option<FinishedAnalysis> {
         let end = self.start + self.slots;
         let cells = grid.cells.len();
         if self.next_cell < cells {
@@ -142,7 +146,7 @@ impl Analysis {
             return None;
         }
         if self.weights.is_empty() {
-            return self.light(grid, sky).err().map(|why| Finished { found: Err(why), end });
+            return self.light(grid, sky).err().map(|why| FinishedAnalysis { found: Err(why), end });
         }
         if self.next_line < self.bins.len() {
             self.line(grid);
@@ -150,7 +154,7 @@ impl Analysis {
         }
         let mut found = std::mem::take(&mut self.found);
         found.noise /= NOISE_HZ.2 as f64;
-        Some(Finished { found: Ok(found), end })
+        Some(FinishedAnalysis { found: Ok(found), end })
     }
 
     fn transform(&mut self, record: &Record, cell: usize) {
@@ -177,20 +181,20 @@ impl Analysis {
     }
 
     /// One piece of the calibration of brightness to slope, or why the picture does not allow it.
-    fn light(&mut self, grid: &Grid, sky: &SkyRows) -> Result<(), Unknown> {
+    fn light(&mut self, grid: &SeaGrid, sky: &SkyRows) -> Result<(), Unknown> {
         match &mut self.calibration {
-            Calibration::Waits => {
+            SlopeCalibration::Waits => {
                 self.check(grid)?;
                 let mut rows = sky.rows(1);
                 rows.extend(self.water_rows(grid));
-                self.calibration = Calibration::Searches(Search::new(rows, grid.eye_m));
+                self.calibration = SlopeCalibration::Searches(Search::new(rows, grid.eye_m));
             }
-            Calibration::Searches(search) => {
+            SlopeCalibration::Searches(search) => {
                 if !search.step() {
-                    self.calibration = Calibration::Averages(search.likely(), Gains::default());
+                    self.calibration = SlopeCalibration::Averages(search.likely(), Gains::default());
                 }
             }
-            Calibration::Averages(fits, gains) => {
+            SlopeCalibration::Averages(fits, gains) => {
                 let rest = fits.split_off(fits.len().saturating_sub(FITS_A_STEP));
                 rest.iter().for_each(|(fit, weight)| gains.add(fit, *weight));
                 if fits.is_empty() {
@@ -203,7 +207,7 @@ impl Analysis {
     }
 
     /// Whether the water is bright and even enough.
-    fn check(&self, grid: &Grid) -> Result<(), Unknown> {
+    fn check(&self, grid: &SeaGrid) -> Result<(), Unknown> {
         let seen: Vec<f64> = self.means.iter().copied().filter(|m| m.is_finite()).collect();
         let luminance = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
         if luminance < DARK {
@@ -214,7 +218,7 @@ impl Analysis {
     }
 
     /// Turns contrast into slope.
-    fn calibrate(&mut self, grid: &Grid, gains: &Gains) -> Result<(), Unknown> {
+    fn calibrate(&mut self, grid: &SeaGrid, gains: &Gains) -> Result<(), Unknown> {
         let sigma = gains.sigma();
         // No number where there was no fit at all.
         if sigma.is_nan() || sigma >= UNSURE {
@@ -241,7 +245,7 @@ impl Analysis {
     }
 
     /// Marks the patches from which heights are taken.
-    fn choose_near(&mut self, grid: &Grid, rough: f64) {
+    fn choose_near(&mut self, grid: &SeaGrid, rough: f64) {
         let mut by_depression: Vec<usize> =
             (0..grid.cells.len()).filter(|&i| self.weights[i] > 0.0).collect();
         by_depression.sort_by(|&a, &b| grid.cells[b].depression.total_cmp(&grid.cells[a].depression));
@@ -251,7 +255,7 @@ impl Analysis {
     }
 
     /// Looks for waves at the next frequency, or takes the noise there.
-    fn line(&mut self, grid: &Grid) {
+    fn line(&mut self, grid: &SeaGrid) {
         let hz = self.bins[self.next_line] as f64 / (2.0 * self.found.seconds);
         let values = &self.values[self.next_line];
         let (weights, near) = (&self.weights, &self.near);
@@ -265,7 +269,7 @@ impl Analysis {
     }
 
     /// Mean brightness of the water in a dozen depressions.
-    fn water_rows(&self, grid: &Grid) -> Vec<Row> {
+    fn water_rows(&self, grid: &SeaGrid) -> Vec<RadianceRow> {
         let mut sums = [(0.0, 0.0, 0.0); 12];
         for (cell, mean) in grid.cells.iter().zip(&self.means).filter(|(_, m)| m.is_finite() && **m > 1e-6) {
             let bin = ((cell.depression / 0.045).ln() / 0.23).clamp(0.0, 11.0) as usize;
@@ -274,7 +278,7 @@ impl Analysis {
             *light += mean.ln();
             *n += 1.0;
         }
-        let row = |(depression, light, n): &(f64, f64, f64)| Row {
+        let row = |(depression, light, n): &(f64, f64, f64)| RadianceRow {
             elevation: -f64::exp(depression / n),
             light: f64::exp(light / n),
             weight: 3.0,

@@ -21,9 +21,9 @@ fn sky(elevation: f64) -> f64 {
 }
 
 /// Plane waves of one sea, smooth between them: amplitude, wave vector, phase.
-struct Waves(Vec<(f64, DVec2, f64)>);
+struct PlaneWaves(Vec<(f64, DVec2, f64)>);
 
-impl Waves {
+impl PlaneWaves {
     fn new(height_m: f64, peak_s: f64, from: f64) -> Self {
         let n = 16;
         let one = |i: usize| {
@@ -48,7 +48,7 @@ impl Waves {
 }
 
 /// Luminance along a ray: smooth facets on the plane z = 0 under an even sky, tilted by the waves.
-fn light(waves: &Waves, camera: &CameraPose, ray: DVec3, t: f64) -> f32 {
+fn light(waves: &PlaneWaves, camera: &CameraPose, ray: DVec3, t: f64) -> f32 {
     if ray.z > -0.01 {
         return sky(ray.z.max(0.0).asin()) as f32;
     }
@@ -59,14 +59,14 @@ fn light(waves: &Waves, camera: &CameraPose, ray: DVec3, t: f64) -> f32 {
     (mirror * sky((depression + 2.0 * slope).abs()) + (1.0 - mirror) * 0.03) as f32
 }
 
-fn watch(meter: &mut SeaMeter, waves: &Waves, seconds: std::ops::Range<f64>, step_s: f64) {
+fn watch(meter: &mut SeaMeter, waves: &PlaneWaves, seconds: std::ops::Range<f64>, step_s: f64) {
     let lens = Lens::pinhole(640, 360, 1.0);
     let mut t = seconds.start;
     while t < seconds.end {
         let time = Time::from_ns(0).plus_secs(t);
         let camera = CameraPose { world_from_camera: look(0.3, -0.12, 0.0), position: DVec3::Z * EYE_M };
         let see = |p: DVec2| Some(light(waves, &camera, camera.world_from_camera * lens.unproject(p), t));
-        meter.observe(&Frame { time, camera, lens: &lens, luminance: &see });
+        meter.observe(&SeaFrame { time, camera, lens: &lens, luminance: &see });
         t += step_s;
     }
 }
@@ -75,7 +75,7 @@ fn watch(meter: &mut SeaMeter, waves: &Waves, seconds: std::ops::Range<f64>, ste
 fn waves_of_known_height_period_and_direction_are_found() {
     for (height_m, peak_s, from) in [(0.3, 3.5, 0.3), (0.8, 5.5, 3.6), (0.5, 4.5, 1.3)] {
         let mut meter = SeaMeter::new();
-        watch(&mut meter, &Waves::new(height_m, peak_s, from), 0.0..72.0, 0.1);
+        watch(&mut meter, &PlaneWaves::new(height_m, peak_s, from), 0.0..72.0, 0.1);
         let e = meter.estimate().expect("an estimate");
         let turn = (e.direction_from_rad.value - from + PI).rem_euclid(TAU) - PI;
         let said = format!("{height_m} m, {peak_s} s, {from} rad: {e:?}");
@@ -89,7 +89,7 @@ fn waves_of_known_height_period_and_direction_are_found() {
 fn a_glassy_sea_is_state_0_and_not_a_swell() {
     let mut meter = SeaMeter::new();
     // A ripple of 2 mm, or nothing in the picture would change.
-    watch(&mut meter, &Waves::new(0.002, 2.5, 0.0), 0.0..70.0, 0.1);
+    watch(&mut meter, &PlaneWaves::new(0.002, 2.5, 0.0), 0.0..70.0, 0.1);
     let e = meter.estimate().expect("an estimate");
     assert!(e.state.get() <= 1, "{e:?}");
 }
@@ -97,7 +97,7 @@ fn a_glassy_sea_is_state_0_and_not_a_swell() {
 #[test]
 fn the_pieces_of_an_estimate_come_one_by_one_and_memory_stays() {
     let mut meter = SeaMeter::new();
-    let waves = Waves::new(0.4, 4.0, 2.0);
+    let waves = PlaneWaves::new(0.4, 4.0, 2.0);
     watch(&mut meter, &waves, 0.0..20.0, 0.1);
     assert!(matches!(meter.estimate(), Err(Unknown::TooShort { after: None, .. })), "{:?}", meter.estimate());
     watch(&mut meter, &waves, 20.0..150.0, 0.2);
@@ -108,7 +108,7 @@ fn the_pieces_of_an_estimate_come_one_by_one_and_memory_stays() {
 
 #[test]
 fn gaps_a_standing_picture_and_no_pose_end_the_watch_and_say_so() {
-    let waves = Waves::new(0.4, 4.0, 2.0);
+    let waves = PlaneWaves::new(0.4, 4.0, 2.0);
     let mut meter = SeaMeter::new();
     watch(&mut meter, &waves, 0.0..10.0, 0.1);
     watch(&mut meter, &waves, 20.0..24.0, 0.1);
@@ -118,7 +118,7 @@ fn gaps_a_standing_picture_and_no_pose_end_the_watch_and_say_so() {
     let mut camera = CameraPose { world_from_camera: look(0.3, -0.12, 0.0), position: DVec3::Z * EYE_M };
     for i in 0..40 {
         let time = Time::from_ns(0).plus_secs(24.0 + 0.2 * f64::from(i));
-        meter.observe(&Frame { time, camera, lens: &lens, luminance: &|_| Some(0.3) });
+        meter.observe(&SeaFrame { time, camera, lens: &lens, luminance: &|_| Some(0.3) });
         if meter.estimate() == Err(Unknown::Frozen { seconds: 2.0 }) {
             break;
         }
@@ -126,7 +126,7 @@ fn gaps_a_standing_picture_and_no_pose_end_the_watch_and_say_so() {
     assert!(matches!(meter.estimate(), Err(Unknown::Frozen { .. })), "{:?}", meter.estimate());
 
     camera.world_from_camera = DQuat::from_xyzw(f64::NAN, 0.0, 0.0, 1.0);
-    meter.observe(&Frame {
+    meter.observe(&SeaFrame {
         time: Time::from_ns(40_000_000_000),
         camera,
         lens: &lens,
@@ -146,10 +146,15 @@ fn a_gun_that_sweeps_the_horizon_is_given_no_sea() {
         let camera = CameraPose { world_from_camera: look(azimuth, -0.12, 0.0), position: DVec3::Z * EYE_M };
         let see = |p: DVec2| {
             let ray = lens.unproject(p);
-            let level = light(&Waves::new(0.002, 2.5, 0.0), &camera, camera.world_from_camera * ray, t);
+            let level = light(&PlaneWaves::new(0.002, 2.5, 0.0), &camera, camera.world_from_camera * ray, t);
             Some(level * ray.z.powi(4) as f32)
         };
-        meter.observe(&Frame { time: Time::from_ns(0).plus_secs(t), camera, lens: &lens, luminance: &see });
+        meter.observe(&SeaFrame {
+            time: Time::from_ns(0).plus_secs(t),
+            camera,
+            lens: &lens,
+            luminance: &see,
+        });
         assert!(meter.estimate().is_err(), "{:?}", meter.estimate());
     }
 }
@@ -161,13 +166,13 @@ fn a_night_without_light_is_told_as_dark() {
     let mut meter = SeaMeter::new();
     for i in 0..600 {
         let time = Time::from_ns(0).plus_secs(0.1 * f64::from(i));
-        meter.observe(&Frame { time, camera, lens: &lens, luminance: &|_| Some(0.000_3) });
+        meter.observe(&SeaFrame { time, camera, lens: &lens, luminance: &|_| Some(0.000_3) });
     }
     assert!(matches!(meter.estimate(), Err(Unknown::Dark { .. })), "{:?}", meter.estimate());
 }
 
 fn found(height_m: f64) -> Result<SeaEstimate, Unknown> {
-    let one = |value: f64, sigma: f64| Measured { value, sigma };
+    let one = |value: f64, sigma: f64| MeasuredValue { value, sigma };
     Ok(SeaEstimate {
         time: Time::from_ns(0),
         seconds: 60.0,
@@ -216,7 +221,7 @@ fn the_state_in_use_does_not_flicker_and_the_operator_has_the_last_word() {
 fn a_sky_cut_off_at_white_is_read_from_the_water() {
     let lens = Lens::pinhole(640, 360, 1.0);
     let camera = CameraPose { world_from_camera: look(0.3, -0.05, 0.0), position: DVec3::Z * EYE_M };
-    let waves = Waves::new(0.1, 4.0, 0.0);
+    let waves = PlaneWaves::new(0.1, 4.0, 0.0);
     for exposure in [0.9, 2.5] {
         let mut meter = SkyMeter::new();
         for i in 0..40 {
@@ -274,7 +279,7 @@ proptest! {
                 (noise >= 0.9 * mask).then_some(gain * (0.2 + noise as f32))
             };
             let time = Time::from_ns(0).plus_secs(t);
-            meter.observe(&Frame { time, camera, lens: &lens, luminance: &see });
+            meter.observe(&SeaFrame { time, camera, lens: &lens, luminance: &see });
             if i % 50 == 0 {
                 sky.observe(&SkyFrame { camera, lens: &lens, colour: &|p| see(p).map(|l| [l; 3]) });
             }

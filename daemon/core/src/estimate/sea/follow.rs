@@ -1,6 +1,6 @@
 //! Which sea is drawn: the measured one, steadied, or the one that the operator orders.
 
-use super::{Measured, SeaEstimate, Unknown, summary::wind_m_s};
+use super::{MeasuredValue, SeaEstimate, Unknown, summary::wind_m_s};
 use crate::sea::WmoSeaState;
 
 /// Share of a new estimate in the conditions in use.
@@ -106,7 +106,7 @@ impl SeaFollower {
         let c = &mut self.conditions;
         c.significant_height_m = blend(c.significant_height_m, estimate.significant_height_m.value);
         c.peak_period_s = blend(c.peak_period_s, estimate.peak_period_s.value);
-        let Measured { value: from, sigma } = estimate.direction_from_rad;
+        let MeasuredValue { value: from, sigma } = estimate.direction_from_rad;
         if sigma < 1.0 {
             let turn = (from - c.from_rad + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
                 - std::f64::consts::PI;

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Frame, Unknown};
+use super::{SeaFrame, Unknown};
 use crate::geometry::{CameraPose, Lens};
 
 /// Depression angles between which water is looked at, radians: nearer the horizon crests hide troughs.
@@ -18,7 +18,7 @@ const TAPS_SEEN: u32 = 6;
 
 /// A patch of the plane z = 0.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Cell {
+pub(super) struct SeaPatch {
     /// Middle, metres east and north of the eye's foot.
     pub at: DVec2,
     /// Angle under the horizontal at which it is seen, radians.
@@ -33,8 +33,8 @@ pub(super) struct Cell {
 
 /// All patches, as they lie in the world.
 #[derive(Clone, Debug)]
-pub(super) struct Grid {
-    pub cells: Vec<Cell>,
+pub(super) struct SeaGrid {
+    pub cells: Vec<SeaPatch>,
     /// Azimuth of its middle, radians clockwise from north.
     pub azimuth: f64,
     /// Height of the eye, metres.
@@ -47,7 +47,7 @@ pub(super) fn azimuth_of(camera: &CameraPose) -> Option<f64> {
     (forward.length() > 0.05).then(|| forward.x.atan2(forward.y))
 }
 
-impl Grid {
+impl SeaGrid {
     /// Patches over the water that the camera sees, as wide in angle as they are long against their range.
     pub fn lay(camera: &CameraPose, lens: &Lens) -> Result<Self, Unknown> {
         let azimuth = azimuth_of(camera).ok_or(Unknown::NoWater)?;
@@ -71,7 +71,7 @@ impl Grid {
     }
 
     /// Mean luminance of each patch; NaN where it is hidden or outside of the picture. Answers the share that is seen.
-    pub fn sample(&self, frame: &Frame<'_>, out: &mut [f32]) -> f64 {
+    pub fn sample(&self, frame: &SeaFrame<'_>, out: &mut [f32]) -> f64 {
         let camera_from_world = frame.camera.world_from_camera.inverse();
         let mut seen_cells = 0;
         for (cell, out) in self.cells.iter().zip(out.iter_mut()) {
@@ -96,7 +96,7 @@ impl Grid {
     }
 }
 
-fn cells(camera: &CameraPose, lens: &Lens, azimuth: f64, step: f64) -> Vec<Cell> {
+fn cells(camera: &CameraPose, lens: &Lens, azimuth: f64, step: f64) -> Vec<SeaPatch> {
     let height = camera.position.z;
     let camera_from_world = camera.world_from_camera.inverse();
     let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));
@@ -118,7 +118,7 @@ fn cells(camera: &CameraPose, lens: &Lens, azimuth: f64, step: f64) -> Vec<Cell>
                 .into_iter()
                 .all(|(a, b)| inside(corner(a, b)))
             {
-                cells.push(Cell {
+                cells.push(SeaPatch {
                     at,
                     depression: (height / range).atan(),
                     side,

@@ -1,9 +1,9 @@
 //! Takes pictures in, keeps the record, and runs one analysis after the other in small pieces.
 
 use super::{
-    Frame, LEAST_S, Restart, SeaEstimate, Unknown,
-    analysis::{Analysis, Finished},
-    grid::{Grid, azimuth_of},
+    LEAST_S, Restart, SeaEstimate, SeaFrame, Unknown,
+    analysis::{Analysis, FinishedAnalysis},
+    grid::{SeaGrid, azimuth_of},
     record::{Record, SLOT_NS, WINDOW},
     sky::SkyRows,
     summary::summarise,
@@ -33,8 +33,8 @@ const EYE_M: std::ops::RangeInclusive<f64> = 0.5..=200.0;
 const DARK: f32 = 0.0012;
 
 /// One watch over the same water.
-struct Watch {
-    grid: Grid,
+struct SeaWatch {
+    grid: SeaGrid,
     start: Time,
     record: Record,
     row: Vec<f32>,
@@ -51,7 +51,7 @@ struct Watch {
 ///
 /// Call [`Self::observe`] with every picture; what it costs is spread over them. Memory is fixed once a watch has begun.
 pub struct SeaMeter {
-    watch: Option<Watch>,
+    watch: Option<SeaWatch>,
     newest: Option<Time>,
     after: Option<Restart>,
     outcome: Result<SeaEstimate, Unknown>,
@@ -82,13 +82,13 @@ impl SeaMeter {
 
     /// Memory held, bytes.
     pub fn memory_bytes(&self) -> usize {
-        let of = |w: &Watch| w.record.bytes() + w.analysis.as_ref().map_or(0, Analysis::bytes);
+        let of = |w: &SeaWatch| w.record.bytes() + w.analysis.as_ref().map_or(0, Analysis::bytes);
         size_of::<Self>() + self.watch.as_ref().map_or(0, of)
     }
 
     /// Takes a picture in, and does a small piece of the analysis. Times must not run backwards; a picture older than the newest
     /// is passed over, unless time itself has jumped.
-    pub fn observe(&mut self, frame: &Frame<'_>) {
+    pub fn observe(&mut self, frame: &SeaFrame<'_>) {
         let step_ns = self.newest.map_or(0, |newest| frame.time.ns_since(newest));
         if step_ns < 0 && step_ns > -GAP * SLOT_NS {
             return;
@@ -103,7 +103,7 @@ impl SeaMeter {
             return;
         }
         if self.watch.is_none() {
-            match Watch::begin(frame) {
+            match SeaWatch::begin(frame) {
                 Ok(watch) => self.watch = Some(watch),
                 Err(why) => {
                     self.outcome = Err(why);
@@ -146,7 +146,7 @@ fn turn(a: f64, b: f64) -> f64 {
     (a - b).sin().atan2((a - b).cos()).abs()
 }
 
-fn usable(frame: &Frame<'_>) -> bool {
+fn usable(frame: &SeaFrame<'_>) -> bool {
     let (camera, lens) = (&frame.camera, frame.lens);
     let turned =
         camera.world_from_camera.is_finite() && (camera.world_from_camera.length() - 1.0).abs() < 1e-3;
@@ -157,9 +157,9 @@ fn usable(frame: &Frame<'_>) -> bool {
     turned && glass && camera.position.is_finite() && EYE_M.contains(&camera.position.z)
 }
 
-impl Watch {
-    fn begin(frame: &Frame<'_>) -> Result<Self, Unknown> {
-        let grid = Grid::lay(&frame.camera, frame.lens)?;
+impl SeaWatch {
+    fn begin(frame: &SeaFrame<'_>) -> Result<Self, Unknown> {
+        let grid = SeaGrid::lay(&frame.camera, frame.lens)?;
         let cells = grid.cells.len();
         Ok(Self {
             grid,
@@ -185,7 +185,7 @@ impl Watch {
     }
 
     /// Keeps the picture's samples if they are due; says why the watch ends if it does.
-    fn take(&mut self, frame: &Frame<'_>) -> Result<(), Restart> {
+    fn take(&mut self, frame: &SeaFrame<'_>) -> Result<(), Restart> {
         let (slot, due) = (self.slot(frame.time), self.record.written as i64);
         if slot < due {
             return Ok(());
@@ -233,7 +233,7 @@ impl Watch {
                 self.analysis = None;
                 return None;
             }
-            let Finished { found, end } = analysis.step(&self.grid, &self.record, &self.sky)?;
+            let FinishedAnalysis { found, end } = analysis.step(&self.grid, &self.record, &self.sky)?;
             self.analysis = None;
             let time = self.start.plus_ns(end as i64 * SLOT_NS);
             return Some(found.and_then(|found| summarise(&found, self.grid.eye_m, time)));

@@ -38,7 +38,7 @@ use crate::{
 pub const LEAST_S: f64 = 40.0;
 
 /// One picture as the estimator sees it.
-pub struct Frame<'a> {
+pub struct SeaFrame<'a> {
     /// Mid-exposure.
     pub time: Time,
     /// The camera; its z is the height of the eye above the mean sea.
@@ -52,7 +52,7 @@ pub struct Frame<'a> {
 
 /// A value and its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Measured {
+pub struct MeasuredValue {
     /// The value.
     pub value: f64,
     /// One standard deviation.
@@ -67,18 +67,18 @@ pub struct SeaEstimate {
     /// Length of the record used, seconds.
     pub seconds: f64,
     /// Four standard deviations of the water's height, metres.
-    pub significant_height_m: Measured,
+    pub significant_height_m: MeasuredValue,
     /// Period at the peak of the spectrum of height, seconds; of a flat sea: the longest that was looked for.
-    pub peak_period_s: Measured,
+    pub peak_period_s: MeasuredValue,
     /// Mean direction from which the waves about the peak come, radians clockwise from north; sigma pi where unknown.
-    pub direction_from_rad: Measured,
+    pub direction_from_rad: MeasuredValue,
     /// The state that holds that height.
     pub state: WmoSeaState,
     /// Probability that the true height lies in that state, taking its error for normal.
     pub state_probability: f64,
     /// Wind that would raise such waves (Toba 1972, J. Oceanogr. Soc. Japan 28, eq. 3.7), m/s 10 m above the sea. Of swell it is
     /// not the local wind.
-    pub wind_m_s: Measured,
+    pub wind_m_s: MeasuredValue,
     /// That wind's force.
     pub force: BeaufortForce,
     /// Root mean square slope per axis of all that roughens the water, from its mean brightness.

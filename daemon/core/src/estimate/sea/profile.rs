@@ -3,7 +3,7 @@
 //! Open water under any sky does; the sun's glitter, a shore, shallows or a wake do not. A smooth surface in depression and azimuth is
 //! fitted; what differs from it is a measure of what does not belong.
 
-use super::{grid::Cell, linear::solve};
+use super::{grid::SeaPatch, linear::solve};
 
 /// Terms of the fitted profile.
 const TERMS: usize = 6;
@@ -15,7 +15,7 @@ fn basis(depression: f64, side: f64) -> [f64; TERMS] {
 
 /// Root mean square misfit of the logarithms of the patches' mean luminances (NaN: not seen) to a smooth surface; `None` where
 /// too few are seen.
-pub(super) fn unevenness(cells: &[Cell], means: &[f64]) -> Option<f64> {
+pub(super) fn unevenness(cells: &[SeaPatch], means: &[f64]) -> Option<f64> {
     let points: Vec<([f64; TERMS], f64)> = cells
         .iter()
         .zip(means)

@@ -36,7 +36,7 @@ const TERMS: usize = 3;
 
 /// Brightness of one direction: elevation above the horizon, negative on the water.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Row {
+pub(super) struct RadianceRow {
     /// Elevation, radians.
     pub elevation: f64,
     /// Linear luminance.
@@ -106,7 +106,7 @@ fn hazed(terms: [f64; TERMS], elevation: f64, haze: f64, eye_m: f64) -> [f64; TE
 impl Radiance {
     /// The sky, water, roughness and haze that fit the rows best in relative terms, from `eye_m` above the sea; `None` below four
     /// rows of water.
-    pub fn fit(rows: &[Row], eye_m: f64) -> Option<Self> {
+    pub fn fit(rows: &[RadianceRow], eye_m: f64) -> Option<Self> {
         if rows.iter().filter(|r| r.elevation < 0.0).count() < 4 {
             return None;
         }
@@ -116,7 +116,7 @@ impl Radiance {
     }
 
     /// The same sky and water in another colour channel.
-    pub fn recolour(&self, rows: &[Row]) -> Option<Self> {
+    pub fn recolour(&self, rows: &[RadianceRow]) -> Option<Self> {
         let table: Vec<[f64; TERMS]> = rows
             .iter()
             .map(|r| {
@@ -147,7 +147,7 @@ impl Radiance {
 /// The search for the fits that explain the rows, roughness by roughness.
 #[derive(Clone, Debug)]
 pub(super) struct Search {
-    rows: Vec<Row>,
+    rows: Vec<RadianceRow>,
     eye_m: f64,
     next: usize,
     fits: Vec<Radiance>,
@@ -155,7 +155,7 @@ pub(super) struct Search {
 
 impl Search {
     /// A search that has not begun.
-    pub fn new(rows: Vec<Row>, eye_m: f64) -> Self {
+    pub fn new(rows: Vec<RadianceRow>, eye_m: f64) -> Self {
         Self { rows, eye_m, next: 0, fits: Vec::new() }
     }
 
@@ -169,7 +169,7 @@ impl Search {
             .map(|r| (r.elevation <= 0.0).then(|| Facets::seen(r.elevation, 0.0, rough, ALONG)))
             .collect();
         for scale in SCALES {
-            let of = |(r, f): (&Row, &Option<Facets>)| match f {
+            let of = |(r, f): (&RadianceRow, &Option<Facets>)| match f {
                 Some(facets) => water_terms(facets, scale),
                 None => sky_terms(r.elevation, scale),
             };
@@ -248,7 +248,7 @@ impl Gains {
 }
 
 /// Parts, none negative, of least relative error, and its root mean square.
-fn fit_parts(rows: &[Row], table: &[[f64; TERMS]]) -> Option<([f64; TERMS], f64)> {
+fn fit_parts(rows: &[RadianceRow], table: &[[f64; TERMS]]) -> Option<([f64; TERMS], f64)> {
     let mut best: Option<([f64; TERMS], f64)> = None;
     for subset in 1..1_usize << TERMS {
         let Some(parts) = solve_subset(rows, table, subset) else { continue };
@@ -270,7 +270,7 @@ fn fit_parts(rows: &[Row], table: &[[f64; TERMS]]) -> Option<([f64; TERMS], f64)
 }
 
 /// Least squares with the parts whose bit is set; the others are nothing.
-fn solve_subset(rows: &[Row], table: &[[f64; TERMS]], subset: usize) -> Option<[f64; TERMS]> {
+fn solve_subset(rows: &[RadianceRow], table: &[[f64; TERMS]], subset: usize) -> Option<[f64; TERMS]> {
     let (mut m, mut right) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
     for (row, t) in rows.iter().zip(table) {
         let scale = row.weight / (row.light * row.light).max(1e-12);

@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use glam::DVec2;
 use rustfft::num_complex::Complex32;
 
-use super::grid::Cell;
+use super::grid::SeaPatch;
 use crate::physics::GRAVITY_M_S2;
 
 /// Directions of beams.
@@ -26,7 +26,7 @@ const TOTAL_WEIGHT: f64 = 6.0;
 
 /// What was found at one frequency.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Line {
+pub(super) struct ShellLine {
     /// Frequency, Hz.
     pub hz: f64,
     /// Direction the waves run to, radians clockwise from north.
@@ -44,7 +44,7 @@ pub(super) struct Line {
 /// Spectra of all patches at one frequency, in slope: `values[taper][cell]`.
 pub(super) struct Observed<'a> {
     pub hz: f64,
-    pub cells: &'a [Cell],
+    pub cells: &'a [SeaPatch],
     /// Weight of each patch: 0 leaves it out.
     pub weights: &'a [f32],
     /// Patches that are near enough to tell heights.
@@ -69,7 +69,7 @@ fn power(observed: &Observed<'_>, some: &[usize]) -> f64 {
 }
 
 /// Fits waves and noise to one frequency; `None` where too few patches resolve such waves.
-pub(super) fn fit(observed: &Observed<'_>) -> Option<Line> {
+pub(super) fn fit(observed: &Observed<'_>) -> Option<ShellLine> {
     let k = (TAU * observed.hz).powi(2) / GRAVITY_M_S2;
     let used: Vec<usize> = (0..observed.cells.len())
         .filter(|&i| observed.weights[i] > 0.0 && sinc(k * observed.cells[i].size.x / 2.0) > LEAST_RESPONSE)
@@ -95,7 +95,7 @@ pub(super) fn fit(observed: &Observed<'_>) -> Option<Line> {
     let shares = spread_shares(best.mean, best.spread);
     let explained = table[BEAMS].iter().zip(&shares).map(|(t, s)| t * s).sum::<f64>() * best.density;
     let units: Vec<f64> = (0..BEAMS).map(|j| unit(observed, &near, k, j)).collect();
-    let line = Line {
+    let line = ShellLine {
         hz: observed.hz,
         towards: best.mean,
         share: explained / (explained + best.noise).max(1e-30),
@@ -137,7 +137,7 @@ fn run_of(j: usize) -> DVec2 {
 }
 
 /// Slope towards the eye, averaged over a patch, of waves of `k` radians a metre and unit height that run along `run`.
-fn slope_response(cell: &Cell, k: f64, run: DVec2) -> f64 {
+fn slope_response(cell: &SeaPatch, k: f64, run: DVec2) -> f64 {
     let (along, across) = (k * run.dot(cell.view), k * run.dot(cell.view.perp()));
     along * sinc((along * cell.size.x / 2.0).abs()) * sinc((across * cell.size.y / 2.0).abs())
 }
@@ -179,7 +179,7 @@ fn spread_shares(mean: f64, s: f64) -> [f64; BEAMS] {
 
 /// Waves and noise of one frequency.
 #[derive(Clone, Copy, Debug)]
-struct Fit {
+struct ShellFit {
     score: f64,
     mean: f64,
     spread: f64,
@@ -188,8 +188,8 @@ struct Fit {
 }
 
 /// Most likely mean direction, spread, density and noise.
-fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<Fit> {
-    let mut best: Option<Fit> = None;
+fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<ShellFit> {
+    let mut best: Option<ShellFit> = None;
     for m in 0..MEANS {
         let mean = TAU * m as f64 / MEANS as f64;
         for spread in SPREADS {
@@ -203,7 +203,7 @@ fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<Fit> {
             };
             let score: f64 = waves.iter().zip(powers).enumerate().map(misfit).sum();
             if score.is_finite() && best.is_none_or(|b| score < b.score) {
-                best = Some(Fit { score, mean, spread, density, noise });
+                best = Some(ShellFit { score, mean, spread, density, noise });
             }
         }
     }

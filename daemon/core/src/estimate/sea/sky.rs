@@ -4,7 +4,7 @@ use glam::{DQuat, DVec2, DVec3, Vec3};
 
 use super::{
     grid::azimuth_of,
-    radiance::{Radiance, Row},
+    radiance::{Radiance, RadianceRow},
 };
 use crate::geometry::{CameraPose, Lens};
 
@@ -26,7 +26,7 @@ const SKY_WEIGHT: f64 = 0.3;
 
 /// Running means of one direction.
 #[derive(Clone, Copy, Debug, Default)]
-struct Look {
+struct SkyMean {
     light: [f64; 3],
     seen: bool,
     cut_off: f64,
@@ -35,7 +35,7 @@ struct Look {
 /// Mean light by elevation and side.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SkyRows {
-    looks: [[Look; SIDES.len()]; ELEVATIONS.len()],
+    looks: [[SkyMean; SIDES.len()]; ELEVATIONS.len()],
 }
 
 impl SkyRows {
@@ -69,7 +69,7 @@ impl SkyRows {
     }
 
     /// What was seen of one channel, where it was not cut off.
-    pub fn rows(&self, channel: usize) -> Vec<Row> {
+    pub fn rows(&self, channel: usize) -> Vec<RadianceRow> {
         let mut rows = Vec::new();
         for (looks, elevation) in self.looks.iter().zip(ELEVATIONS) {
             for look in looks {
@@ -77,7 +77,7 @@ impl SkyRows {
                 let fits = look.seen && look.cut_off < CUT_OFF_SHARE && light > 1e-5;
                 if fits {
                     let weight = if elevation > 0.0 { SKY_WEIGHT } else { 1.0 };
-                    rows.push(Row { elevation, light, weight });
+                    rows.push(RadianceRow { elevation, light, weight });
                 }
             }
         }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::{Measured, SeaEstimate, Unknown, analysis::Found, shell::Line};
+use super::{MeasuredValue, SeaEstimate, Unknown, analysis::AnalysisResult, shell::ShellLine};
 use crate::{
     physics::GRAVITY_M_S2,
     sea::{BeaufortForce, WmoSeaState},
@@ -30,11 +30,11 @@ const FLAT_M: f64 = 0.1;
 const FLAT_FROM_HZ: f64 = 0.25;
 
 /// Height, period and direction from what was found.
-pub(super) fn summarise(found: &Found, eye_m: f64, time: Time) -> Result<SeaEstimate, Unknown> {
+pub(super) fn summarise(found: &AnalysisResult, eye_m: f64, time: Time) -> Result<SeaEstimate, Unknown> {
     if found.lines.iter().filter(|l| counts(l)).count() < LEAST_LINES {
         return flat(found, time);
     }
-    let density = |l: &Line| {
+    let density = |l: &ShellLine| {
         if counts(l) { (l.slope - found.noise - POSE_DENSITY).max(0.0) / l.unit.max(1e-12) } else { 0.0 }
     };
     let moments = moments(&found.lines, density);
@@ -52,7 +52,7 @@ pub(super) fn summarise(found: &Found, eye_m: f64, time: Time) -> Result<SeaEsti
 }
 
 /// Whether a line shows waves.
-fn counts(line: &Line) -> bool {
+fn counts(line: &ShellLine) -> bool {
     line.share > LEAST_SHARE && line.slope > ABOVE_POSE * POSE_DENSITY
 }
 
@@ -70,7 +70,7 @@ struct Moments {
     leverage: f64,
 }
 
-fn moments(lines: &[Line], density: impl Fn(&Line) -> f64) -> Moments {
+fn moments(lines: &[ShellLine], density: impl Fn(&ShellLine) -> f64) -> Moments {
     let step = |i: usize| {
         let low = if i > 0 { lines[i - 1].hz } else { lines[i].hz };
         let high = lines.get(i + 1).map_or(lines[i].hz, |l| l.hz);
@@ -110,7 +110,7 @@ fn moments(lines: &[Line], density: impl Fn(&Line) -> f64) -> Moments {
 
 /// Puts errors to the values.
 fn judged(
-    found: &Found,
+    found: &AnalysisResult,
     m: &Moments,
     (height_m, period_s): (f64, f64),
     eye_m: f64,
@@ -134,8 +134,8 @@ fn judged(
         + (1.5 * low_eye).powi(2)
         + (0.1 / m.leverage.max(0.05)).powi(2))
     .sqrt();
-    let height = Measured { value: height_m, sigma: height_m * height_share };
-    let period = Measured { value: period_s, sigma: period_s * period_share };
+    let height = MeasuredValue { value: height_m, sigma: height_m * height_share };
+    let period = MeasuredValue { value: period_s, sigma: period_s * period_share };
     let state = WmoSeaState::of_wave_height(height_m);
     let wind = wind(height, period);
     SeaEstimate {
@@ -143,7 +143,7 @@ fn judged(
         seconds: found.seconds,
         significant_height_m: height,
         peak_period_s: period,
-        direction_from_rad: Measured {
+        direction_from_rad: MeasuredValue {
             value: (m.towards.x.atan2(m.towards.y) + PI).rem_euclid(TAU),
             sigma: direction_sigma.min(PI),
         },
@@ -157,7 +157,7 @@ fn judged(
 }
 
 /// No waves found: a flat sea where short waves of [`FLAT_M`] would have shown, else no answer.
-fn flat(found: &Found, time: Time) -> Result<SeaEstimate, Unknown> {
+fn flat(found: &AnalysisResult, time: Time) -> Result<SeaEstimate, Unknown> {
     let mut hidden = 0.0;
     for pair in found.lines.windows(2).filter(|p| p[0].hz > FLAT_FROM_HZ) {
         // A wave that explained this share of the power would have counted.
@@ -167,16 +167,16 @@ fn flat(found: &Found, time: Time) -> Result<SeaEstimate, Unknown> {
     if !(found.lines.len() >= LEAST_LINES && limit_m < FLAT_M) {
         return Err(Unknown::NoPattern { limit_m });
     }
-    let height = Measured { value: 0.0, sigma: 0.5 * limit_m };
+    let height = MeasuredValue { value: 0.0, sigma: 0.5 * limit_m };
     Ok(SeaEstimate {
         time,
         seconds: found.seconds,
         significant_height_m: height,
-        peak_period_s: Measured { value: 1.0 / FLAT_FROM_HZ, sigma: 1.0 / FLAT_FROM_HZ },
-        direction_from_rad: Measured { value: 0.0, sigma: PI },
+        peak_period_s: MeasuredValue { value: 1.0 / FLAT_FROM_HZ, sigma: 1.0 / FLAT_FROM_HZ },
+        direction_from_rad: MeasuredValue { value: 0.0, sigma: PI },
         state: WmoSeaState::of_wave_height(0.0),
         state_probability: 0.5,
-        wind_m_s: Measured { value: 0.0, sigma: 1.5 },
+        wind_m_s: MeasuredValue { value: 0.0, sigma: 1.5 },
         force: BeaufortForce::of_wind(0.0),
         rough_slope: found.rough,
         wave_share: 0.0,
@@ -184,7 +184,7 @@ fn flat(found: &Found, time: Time) -> Result<SeaEstimate, Unknown> {
 }
 
 /// Probability that a normal variable lies in a state.
-fn probability(height: Measured, state: WmoSeaState) -> f64 {
+fn probability(height: MeasuredValue, state: WmoSeaState) -> f64 {
     let (low, high) = state.wave_height_range_m();
     let below =
         |x: f64| if x.is_finite() { logistic((x - height.value) / height.sigma.max(1e-9)) } else { 1.0 };
@@ -207,8 +207,8 @@ pub(super) fn wind_m_s(height_m: f64, period_s: f64) -> f64 {
     wind.clamp(0.0, 60.0)
 }
 
-fn wind(height: Measured, period: Measured) -> Measured {
+fn wind(height: MeasuredValue, period: MeasuredValue) -> MeasuredValue {
     let wind = wind_m_s(height.value, period.value);
     let (h, t) = (height.sigma / height.value.max(1e-9), period.sigma / period.value.max(1e-9));
-    Measured { value: wind, sigma: wind * ((1.6 * h).powi(2) + (2.4 * t).powi(2) + 0.0625).sqrt() + 0.5 }
+    MeasuredValue { value: wind, sigma: wind * ((1.6 * h).powi(2) + (2.4 * t).powi(2) + 0.0625).sqrt() + 0.5 }
 }

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::{
     grid::FIELD,
-    pyramid::{Level, Pyramid},
+    pyramid::{GreyPyramid, PyramidLevel},
 };
 
 /// Half the side of the window that a point is judged by, pixels of the second level: as much as a patch's on the finest.
@@ -18,7 +18,7 @@ const WIDE: usize = SIDE + 2 * WINDOW;
 /// The best point of the field with this corner (pixels of the finest level), found on the second; a place of the finest level. `usable`
 /// says which places may be taken.
 pub(super) fn best(
-    pyramid: &Pyramid,
+    pyramid: &GreyPyramid,
     corner: (usize, usize),
     usable: impl Fn(DVec2) -> bool,
 ) -> Option<DVec2> {
@@ -52,7 +52,7 @@ pub(super) fn best(
 }
 
 /// Squared and mixed slopes about the pixel that lies `WINDOW` to the left of and above (x, y), so that fields at the edge need no sign.
-fn slopes(level: &Level, x: usize, y: usize) -> Option<[f32; 3]> {
+fn slopes(level: &PyramidLevel, x: usize, y: usize) -> Option<[f32; 3]> {
     let (x, y) = (x.checked_sub(WINDOW)?, y.checked_sub(WINDOW)?);
     let across = level.code(x + 1, y)? - level.code(x.checked_sub(1)?, y)?;
     let down = level.code(x, y + 1)? - level.code(x, y.checked_sub(1)?)?;

@@ -8,7 +8,7 @@ use crate::geometry::rotation_vector;
 
 /// A point of the sky that was found.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sight {
+pub(super) struct SkyTrack {
     /// Which point.
     pub point: usize,
     /// Unit vector towards it as it was seen, in the believed world.
@@ -31,7 +31,7 @@ pub(super) struct Sight {
     pub weight: f64,
 }
 
-impl Sight {
+impl SkyTrack {
     /// Whether it may be coast: what is higher is cloud.
     fn may_stand(&self) -> bool {
         self.held.z < STANDS_BELOW
@@ -53,7 +53,7 @@ impl Sight {
 
 /// A turn from the believed world to the anchor's.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fit {
+pub(super) struct SkylineFit {
     pub turn: DQuat,
     /// Covariance of its error, rad^2.
     pub covariance: DMat3,
@@ -71,7 +71,7 @@ pub(super) struct Fit {
 
 /// What is known beforehand.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Expected {
+pub(super) struct SkylinePrior {
     /// The turn of the picture before.
     pub turn: DQuat,
     /// How far inclination may have changed since, radians.
@@ -104,22 +104,22 @@ const AGE_LEAST_S: f64 = 0.05;
 const UNKNOWNS: usize = 6;
 const WIND: usize = 3;
 const RATE: usize = 5;
-type Matrix = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
-type Vector = SVector<f64, UNKNOWNS>;
+type NormalMatrix = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+type NormalVector = SVector<f64, UNKNOWNS>;
 
 /// What the sights say of the unknowns together.
 #[derive(Default)]
-struct Sums {
-    normal: Matrix,
-    pull: Vector,
+struct NormalSums {
+    normal: NormalMatrix,
+    pull: NormalVector,
     /// What all clouds that are nearer than they are taken for would pull by.
-    nearer: Vector,
+    nearer: NormalVector,
     weight: f64,
     aged: f64,
 }
 
-impl Sums {
-    fn add(&mut self, sight: &Sight, turn: DQuat, wind: DVec2, expected: DVec3) {
+impl NormalSums {
+    fn add(&mut self, sight: &SkyTrack, turn: DQuat, wind: DVec2, expected: DVec3) {
         let (seen, age_s) = (turn * sight.seen, sight.age_s);
         let mut columns = SMatrix::<f64, 3, UNKNOWNS>::zeros();
         let mut set = |at: usize, by: DVec3| columns.set_column(at, &SVector::from(by.to_array()));
@@ -148,11 +148,11 @@ impl Sums {
 /// The turn that most of `sights` agree on: one sight proposes (Fischler & Bolles 1981; all are tried), Tukey's weights refine. Weights and
 /// distances of the sights are set. `None` where fewer than `least` or less than half of them agree.
 pub(super) fn fit(
-    sights: &mut [Sight],
-    expected: &Expected,
+    sights: &mut [SkyTrack],
+    expected: &SkylinePrior,
     least: usize,
     scratch: &mut Vec<f64>,
-) -> Option<Fit> {
+) -> Option<SkylineFit> {
     let mut turn = consensus(sights, expected)?;
     let floor = SCATTER_LEAST_PX * expected.pixel;
     let mut scatter = Scatter { px: AGREE_PX * expected.pixel / 2.0, share: SPREAD };
@@ -164,10 +164,17 @@ pub(super) fn fit(
         // What inclination, wind and coast were found before is still about right.
         let unit = 1.0 / (SHARED * scatter.px * scatter.px);
         let known = of_wind(expected.wind.information)
-            + Matrix::from_diagonal(&Vector::from([tilt, tilt, 0.0, 0.0, 0.0, expected.rate_sigma.powi(-2)]));
+            + NormalMatrix::from_diagonal(&NormalVector::from([
+                tilt,
+                tilt,
+                0.0,
+                0.0,
+                0.0,
+                expected.rate_sigma.powi(-2),
+            ]));
         let tilted = rotation_vector(turn * expected.turn.inverse());
         let blown = expected.wind.pull - expected.wind.information * wind;
-        let held = Vector::from([
+        let held = NormalVector::from([
             -tilted.x * tilt,
             -tilted.y * tilt,
             0.0,
@@ -202,7 +209,7 @@ pub(super) fn fit(
     let of_drift = (whole[(2, 2)] - alone.inverse().z_axis.z).max(0.0);
     let age_s = (sums.aged / sums.weight).max(AGE_LEAST_S);
     let told = told(&covariance, &expected.wind, wind)?;
-    Some(Fit {
+    Some(SkylineFit {
         turn,
         covariance: block(&whole),
         inliers,
@@ -214,8 +221,8 @@ pub(super) fn fit(
 }
 
 /// Sets how much each sight counts, and adds them up.
-fn weigh(sights: &mut [Sight], turn: DQuat, (wind, rate): (DVec2, f64), scatter: Scatter) -> Sums {
-    let mut sums = Sums::default();
+fn weigh(sights: &mut [SkyTrack], turn: DQuat, (wind, rate): (DVec2, f64), scatter: Scatter) -> NormalSums {
+    let mut sums = NormalSums::default();
     for sight in sights {
         let seen = turn * sight.seen;
         let [cloud, coast] = sight.expected(wind, rate);
@@ -234,15 +241,15 @@ fn weigh(sights: &mut [Sight], turn: DQuat, (wind, rate): (DVec2, f64), scatter:
 }
 
 /// What the sights alone tell of the wind, whatever the turn: what was known beforehand is taken off what is known now.
-fn told(covariance: &Matrix, before: &Wind, wind: DVec2) -> Option<Wind> {
+fn told(covariance: &NormalMatrix, before: &Wind, wind: DVec2) -> Option<Wind> {
     let c = |row: usize, column: usize| covariance[(WIND + row, WIND + column)];
     let known = DMat2::from_cols_array(&[c(0, 0), c(1, 0), c(0, 1), c(1, 1)]).inverse();
     let told = Wind { information: known - before.information, pull: known * wind - before.pull };
     (told.information.is_finite() && told.pull.is_finite()).then_some(told)
 }
 
-fn of_wind(information: DMat2) -> Matrix {
-    let mut out = Matrix::zeros();
+fn of_wind(information: DMat2) -> NormalMatrix {
+    let mut out = NormalMatrix::zeros();
     for (row, column) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
         out[(WIND + row, WIND + column)] = information.col(column)[row];
     }
@@ -250,12 +257,12 @@ fn of_wind(information: DMat2) -> Matrix {
 }
 
 /// The part that is the turn's.
-fn block(of: &Matrix) -> DMat3 {
+fn block(of: &NormalMatrix) -> DMat3 {
     DMat3::from_cols_array_2d(&[0, 1, 2].map(|c| [0, 1, 2].map(|r| of[(r, c)])))
 }
 
 /// The smallest turn that puts one sight right and most of the others about right.
-fn consensus(sights: &[Sight], expected: &Expected) -> Option<DQuat> {
+fn consensus(sights: &[SkyTrack], expected: &SkylinePrior) -> Option<DQuat> {
     let agree = AGREE_PX * expected.pixel;
     let wind = expected.wind.mean();
     let covariance = expected.wind.covariance();
@@ -306,14 +313,15 @@ struct Scatter {
 
 impl Scatter {
     /// That of the sights that count: the first by the half that wind has carried the least far, the second by the other.
-    fn of(sights: &[Sight], wind: DVec2, floor: f64, scratch: &mut Vec<f64>) -> Option<Self> {
+    fn of(sights: &[SkyTrack], wind: DVec2, floor: f64, scratch: &mut Vec<f64>) -> Option<Self> {
         let counting = || sights.iter().filter(|s| s.weight > 0.0);
         let far = median(counting().map(|s| s.gone(wind)), scratch)?;
         // The median of the length of a two-dimensional normal one is 1.1774 of its deviation.
         let near = counting().filter(|s| s.gone(wind) <= far).map(|s| s.off / s.unit);
         let px = (median(near, scratch)? / 1.1774).max(floor);
-        let rest =
-            |s: &Sight| ((s.off / 1.1774).powi(2) - (s.unit * px).powi(2)) / s.gone(wind).max(floor).powi(2);
+        let rest = |s: &SkyTrack| {
+            ((s.off / 1.1774).powi(2) - (s.unit * px).powi(2)) / s.gone(wind).max(floor).powi(2)
+        };
         let share = median(counting().filter(|s| s.gone(wind) >= far).map(rest), scratch)?;
         Some(Self { px, share: share.max(0.0).sqrt().min(SPREAD_MOST) })
     }

@@ -13,7 +13,7 @@ pub(super) const FIELD: usize = 40;
 
 /// The fields of a picture.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Grid {
+pub(super) struct FieldGrid {
     made_for: Option<(Lens, (usize, usize))>,
     pub columns: usize,
     pub rows: usize,
@@ -26,7 +26,7 @@ pub(super) struct Grid {
     pub sky: Vec<bool>,
 }
 
-impl Grid {
+impl FieldGrid {
     pub fn set_mask(&mut self, mask: Option<Mask>) {
         self.mask = mask;
         self.made_for = None;

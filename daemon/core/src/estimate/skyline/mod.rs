@@ -27,10 +27,10 @@ use crate::{
     geometry::{Lens, horizon_dip, rotation_vector, turn_about_vertical},
     time::Time,
 };
-use fit::{Expected, Fit, Sight};
-use grid::{FIELD, Grid};
-use patch::{HALF, Patch};
-use pyramid::{LEVELS, Pyramid};
+use fit::{SkyTrack, SkylineFit, SkylinePrior};
+use grid::{FIELD, FieldGrid};
+use patch::{HALF, SkyPatch};
+use pyramid::{GreyPyramid, LEVELS};
 use wind::{Wind, carried, nearness};
 
 /// For each point that is followed in a picture, so many are remembered, those out of view included.
@@ -153,12 +153,12 @@ pub enum NoYaw {
 
 /// A point of the sky. Directions are unit vectors, or nearly, in the anchor's world.
 #[derive(Clone, Debug)]
-struct Point {
+struct SkyPoint {
     /// Towards its middle, and a little to the right and down of it in the picture that its patch is from.
     middle: DVec3,
     right: DVec3,
     down: DVec3,
-    patch: Patch,
+    patch: SkyPatch,
     /// When it had that direction, and when it was seen last.
     taken: Time,
     seen: Time,
@@ -173,10 +173,10 @@ struct Point {
 #[derive(Clone, Debug)]
 pub struct Skyline {
     points_most: usize,
-    pyramid: Pyramid,
-    grid: Grid,
-    points: Vec<Point>,
-    sights: Vec<Sight>,
+    pyramid: GreyPyramid,
+    grid: FieldGrid,
+    points: Vec<SkyPoint>,
+    sights: Vec<SkyTrack>,
     places: Vec<DVec2>,
     taken: Vec<bool>,
     scratch: Vec<f64>,
@@ -197,7 +197,7 @@ struct Anchor {
 }
 
 /// A picture under the lens that made it, both reduced.
-struct Look {
+struct ReducedPicture {
     time: Time,
     lens: Lens,
     world_from_camera: DQuat,
@@ -209,14 +209,14 @@ struct Look {
     pixel: f64,
 }
 
-impl Point {
+impl SkyPoint {
     /// How far wind has carried it in `age_s` seconds, heights of the clouds.
     fn gone(&self, wind: DVec2, age_s: f64) -> DVec2 {
         if self.stands { DVec2::ZERO } else { wind * age_s }
     }
 }
 
-impl Look {
+impl ReducedPicture {
     /// What is known of the wind where that was `learnt`: as clouds at the horizon may drift, so may all of their layer.
     fn wind(&self, learnt: &Wind) -> Wind {
         Wind::calm(self.drift / nearness(DVec3::X)).and(learnt)
@@ -242,8 +242,8 @@ impl Skyline {
     pub fn of_points(points: usize) -> Self {
         Self {
             points_most: points.clamp(POINTS_LEAST, 1000),
-            pyramid: Pyramid::default(),
-            grid: Grid::default(),
+            pyramid: GreyPyramid::default(),
+            grid: FieldGrid::default(),
             points: Vec::new(),
             sights: Vec::new(),
             places: Vec::new(),
@@ -290,7 +290,7 @@ impl Skyline {
         }
     }
 
-    fn prepare(&self, time: Time, picture: &Picture, view: &SkyView) -> Result<Look, NoYaw> {
+    fn prepare(&self, time: Time, picture: &Picture, view: &SkyView) -> Result<ReducedPicture, NoYaw> {
         let full = DVec2::new(f64::from(picture.width()), f64::from(picture.height()));
         let scale = full
             / DVec2::new(f64::from(view.lens.width), f64::from(view.lens.height))
@@ -321,11 +321,11 @@ impl Skyline {
         // A patch must lie above the horizon, wherever that may be.
         let sine = (f64::from(HALF) * pixel + sigma).sin() - horizon_dip(view.eye_height_m).sin();
         let drift = view.drift.abs().clamp(DRIFTS[0], DRIFTS[1]);
-        Ok(Look { time, lens, world_from_camera: q.normalize(), sigma, drift, sine, pixel })
+        Ok(ReducedPicture { time, lens, world_from_camera: q.normalize(), sigma, drift, sine, pixel })
     }
 
     /// Makes this picture the anchor, where it has enough to hold on to.
-    fn begin(&mut self, look: &Look) -> Result<YawSeen, NoYaw> {
+    fn begin(&mut self, look: &ReducedPicture) -> Result<YawSeen, NoYaw> {
         let before = self.points.len();
         self.points.reserve(((KEPT + 1) * self.points_most).saturating_sub(before));
         self.taken.clear();
@@ -359,7 +359,7 @@ impl Skyline {
     }
 
     /// Seeks all points that should be in view; how many these are.
-    fn seek(&mut self, look: &Look, anchor: &Anchor) -> usize {
+    fn seek(&mut self, look: &ReducedPicture, anchor: &Anchor) -> usize {
         let camera_from_anchor = (anchor.turn * look.world_from_camera).inverse();
         // How far a prediction may be off decides how coarse the search begins.
         let off_px = 3.0 * look.sigma / look.pixel;
@@ -389,7 +389,7 @@ impl Skyline {
             if seen.is_finite() {
                 let with_anchor = point.taken == anchor.time;
                 let trust = if with_anchor { 1.0 } else { (age_s / TRUSTED_S).min(1.0).powi(2) };
-                self.sights.push(Sight {
+                self.sights.push(SkyTrack {
                     point: index,
                     seen,
                     held: point.middle,
@@ -397,7 +397,7 @@ impl Skyline {
                     trust,
                     likeness: f64::from(found.likeness),
                     unit: point.patch.unit(),
-                    ..Sight::default()
+                    ..SkyTrack::default()
                 });
                 self.places.push(found.place);
             }
@@ -406,12 +406,12 @@ impl Skyline {
     }
 
     /// The turn that the sights agree on.
-    fn agree(&mut self, look: &Look, anchor: &Anchor, sought: usize) -> Result<Fit, NoYaw> {
+    fn agree(&mut self, look: &ReducedPicture, anchor: &Anchor, sought: usize) -> Result<SkylineFit, NoYaw> {
         let found = self.sights.len();
         let fit = if found < POINTS_LEAST {
             Err(NoYaw::Missed { found, sought })
         } else {
-            let expected = Expected {
+            let expected = SkylinePrior {
                 turn: anchor.turn,
                 tilt_sigma: look.sigma,
                 pixel: look.pixel,
@@ -432,7 +432,13 @@ impl Skyline {
         fit
     }
 
-    fn answer(&mut self, look: &Look, anchor: &Anchor, fit: &Fit, sought: usize) -> Result<YawSeen, NoYaw> {
+    fn answer(
+        &mut self,
+        look: &ReducedPicture,
+        anchor: &Anchor,
+        fit: &SkylineFit,
+        sought: usize,
+    ) -> Result<YawSeen, NoYaw> {
         let (mut tied, mut weights) = (0.0, 0.0);
         for sight in &self.sights {
             if let Some(point) = self.points.get(sight.point) {
@@ -462,7 +468,7 @@ impl Skyline {
     }
 
     /// Notes which points were seen, takes patches anew that have changed, and lets go of points that are not where they should be.
-    fn keep(&mut self, look: &Look, fit: &Fit) {
+    fn keep(&mut self, look: &ReducedPicture, fit: &SkylineFit) {
         self.taken.clear();
         self.taken.resize(self.grid.sky.len(), false);
         let anchor_from_camera = fit.turn * look.world_from_camera;
@@ -477,7 +483,7 @@ impl Skyline {
             point.misses = 0;
             point.stands = sight.stands;
             if sight.likeness < f64::from(LIKENESS_RENEW)
-                && let Some(patch) = Patch::take(&self.pyramid, *place)
+                && let Some(patch) = SkyPatch::take(&self.pyramid, *place)
             {
                 // The point stays where it was; only the way around it is that of this picture, before wind had carried it there.
                 let age_s = look.time.secs_since(point.taken);
@@ -497,7 +503,7 @@ impl Skyline {
 
     /// Takes points where there are none, with the directions that `turn` gives them, from the horizon up; of `fields_most` fields, and
     /// of the next ones in the next picture.
-    fn tie_in(&mut self, look: &Look, turn: DQuat, variance: f64, fields_most: usize) {
+    fn tie_in(&mut self, look: &ReducedPicture, turn: DQuat, variance: f64, fields_most: usize) {
         let count = self.grid.sky.len();
         let mut room = self.points_most.saturating_sub(self.taken.iter().filter(|t| **t).count());
         let mut searched = 0;
@@ -512,26 +518,26 @@ impl Skyline {
             }
             searched += 1;
             if let Some(point) = self.take(look, turn, field) {
-                self.points.push(Point { tied: variance, ..point });
+                self.points.push(SkyPoint { tied: variance, ..point });
                 room -= 1;
             }
         }
     }
 
     /// The best point of a field.
-    fn take(&self, look: &Look, turn: DQuat, field: usize) -> Option<Point> {
+    fn take(&self, look: &ReducedPicture, turn: DQuat, field: usize) -> Option<SkyPoint> {
         let corner = (field % self.grid.columns * FIELD, field / self.grid.columns * FIELD);
         let up = look.world_from_camera.inverse() * DVec3::Z;
         let usable =
             |place: DVec2| look.lens.unproject(place).dot(up) > look.sine && self.grid.is_open(place);
         let place = corners::best(&self.pyramid, corner, usable)?;
-        let patch = Patch::take(&self.pyramid, place)?;
+        let patch = SkyPatch::take(&self.pyramid, place)?;
         let anchor_from_camera = turn * look.world_from_camera;
         let ray = |by: DVec2| anchor_from_camera * look.lens.unproject(place + by);
         let middle = ray(DVec2::ZERO);
         let (right, down) = (ray(DVec2::X * STRETCH_PX), ray(DVec2::Y * STRETCH_PX));
         let sound = [middle, right, down].iter().all(|d| d.is_finite());
-        sound.then_some(Point {
+        sound.then_some(SkyPoint {
             middle,
             right,
             down,

@@ -6,7 +6,7 @@
 
 use glam::{DMat2, DVec2, Vec2};
 
-use super::pyramid::{LEVELS, Level, Pyramid};
+use super::pyramid::{GreyPyramid, LEVELS, PyramidLevel};
 
 /// Half the side of a patch without its middle, pixels.
 pub(super) const HALF: i32 = 7;
@@ -28,7 +28,7 @@ const REACH: f32 = 6.0;
 
 /// How a patch looks on one level.
 #[derive(Clone, Debug)]
-struct Template {
+struct PatchTemplate {
     codes: [f32; COUNT],
     across: [f32; COUNT],
     down: [f32; COUNT],
@@ -43,15 +43,15 @@ struct Template {
 
 /// How a patch looks on the levels on which it is whole and stands out from the noise.
 #[derive(Clone, Debug)]
-pub(super) struct Patch {
-    levels: [Option<Template>; LEVELS],
+pub(super) struct SkyPatch {
+    levels: [Option<PatchTemplate>; LEVELS],
     /// The finest of these.
     finest: usize,
 }
 
 /// Where a patch was found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Found {
+pub(super) struct PatchMatch {
     /// Pixels of the finest level.
     pub place: DVec2,
     /// Correlation coefficient with what it looked like.
@@ -60,22 +60,22 @@ pub(super) struct Found {
 
 /// Sums over what a patch is held against.
 #[derive(Default)]
-struct Sums {
+struct MatchSums {
     codes: f32,
     squares: f32,
     likeness: f32,
     pull: Vec2,
 }
 
-impl Patch {
+impl SkyPatch {
     /// The patch about a place of the finest level; `None` where it is not whole or has no texture but noise.
-    pub fn take(pyramid: &Pyramid, place: DVec2) -> Option<Self> {
+    pub fn take(pyramid: &GreyPyramid, place: DVec2) -> Option<Self> {
         let mut levels = [const { None }; LEVELS];
         for (k, (slot, level)) in levels.iter_mut().zip(&pyramid.levels).enumerate() {
             // A mean over four pixels has half of their noise.
             let noise = pyramid.noise / f32::from(1u8 << k);
             let least = COUNT_F * noise * noise / NOISE_SHARE_MAX;
-            *slot = Template::take(level, on_level(place, k)).filter(|t| t.power > least);
+            *slot = PatchTemplate::take(level, on_level(place, k)).filter(|t| t.power > least);
         }
         let finest = levels.iter().position(Option::is_some).filter(|k| *k <= FINEST_MAX)?;
         Some(Self { levels, finest })
@@ -87,7 +87,13 @@ impl Patch {
     }
 
     /// Seeks the patch from level `coarsest` down, near `guess`; `turned` takes offsets in the patch to offsets in this picture.
-    pub fn find(&self, pyramid: &Pyramid, guess: DVec2, turned: DMat2, coarsest: usize) -> Option<Found> {
+    pub fn find(
+        &self,
+        pyramid: &GreyPyramid,
+        guess: DVec2,
+        turned: DMat2,
+        coarsest: usize,
+    ) -> Option<PatchMatch> {
         let turned = turned.as_mat2().to_cols_array();
         let mut place = guess;
         let mut likeness = 0.0;
@@ -106,7 +112,7 @@ impl Patch {
                 None => return None,
             }
         }
-        Some(Found { place, likeness })
+        Some(PatchMatch { place, likeness })
     }
 }
 
@@ -114,8 +120,8 @@ fn on_level(place: DVec2, level: usize) -> Vec2 {
     (place / f64::from(1u32 << level)).as_vec2()
 }
 
-impl Template {
-    fn take(level: &Level, place: Vec2) -> Option<Self> {
+impl PatchTemplate {
+    fn take(level: &PyramidLevel, place: Vec2) -> Option<Self> {
         const WIDE: usize = SIDE + 2;
         let mut wide = [0.0; WIDE * WIDE];
         let from = place - Vec2::splat(HALF as f32 + 1.0);
@@ -161,7 +167,7 @@ impl Template {
         Some(out)
     }
 
-    fn find(&self, level: &Level, guess: Vec2, turned: [f32; 4], small: f32) -> Option<(Vec2, f32)> {
+    fn find(&self, level: &PyramidLevel, guess: Vec2, turned: [f32; 4], small: f32) -> Option<(Vec2, f32)> {
         let [xx, xy, yx, yy] = turned;
         let mut at = guess;
         for _ in 0..STEPS {
@@ -187,11 +193,11 @@ impl Template {
     }
 
     /// `turned` in columns.
-    fn compare(&self, level: &Level, at: Vec2, turned: [f32; 4]) -> Option<Sums> {
+    fn compare(&self, level: &PyramidLevel, at: Vec2, turned: [f32; 4]) -> Option<MatchSums> {
         let [xx, xy, yx, yy] = turned;
         let half = HALF as f32;
         let from = at - Vec2::new(xx + yx, xy + yy) * half;
-        let mut sums = Sums::default();
+        let mut sums = MatchSums::default();
         let mut own = self.codes.iter().zip(self.across.iter().zip(&self.down));
         level.visit(from, turned, SIDE, |code| {
             if let Some((template, (across, down))) = own.next() {
@@ -206,7 +212,7 @@ impl Template {
     }
 }
 
-impl Level {
+impl PyramidLevel {
     /// Shows `see` the bilinear codes of `side` by `side` places from `from` on, row by row; `steps` are a step to the right and one down.
     /// `None` where not all of them were read.
     fn visit(&self, from: Vec2, steps: [f32; 4], side: usize, mut see: impl FnMut(f32)) -> Option<()> {

@@ -15,7 +15,7 @@ const ALIGN: usize = 1 << (LEVELS - 1);
 
 /// A strip of a grey picture, codes of 255. Places are pixels of the whole level; the centre of its first pixel is (0.5, 0.5).
 #[derive(Clone, Debug, Default)]
-pub(super) struct Level {
+pub(super) struct PyramidLevel {
     pub width: usize,
     /// Rows of the whole level that are there.
     pub rows: Range<usize>,
@@ -24,12 +24,12 @@ pub(super) struct Level {
 
 /// All levels, the finest first.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Pyramid {
+pub(super) struct GreyPyramid {
     /// Size of the whole finest level, pixels.
     pub size: (usize, usize),
     /// Pixels of the picture in one of the finest level's.
     pub reduction: usize,
-    pub levels: [Level; LEVELS],
+    pub levels: [PyramidLevel; LEVELS],
     /// Standard deviation of the finest level's noise, codes.
     pub noise: f32,
     sums: Vec<u32>,
@@ -41,8 +41,8 @@ const NOISE_EVERY: usize = 8;
 /// What rounding leaves of noise at least, codes.
 const NOISE_MIN: f32 = 0.15;
 
-impl Pyramid {
-    /// Takes on the size of `picture`; its rows are read by [`Pyramid::fill`].
+impl GreyPyramid {
+    /// Takes on the size of `picture`; its rows are read by [`GreyPyramid::fill`].
     pub fn measure(&mut self, picture: &Picture) {
         let reduction = ((picture.width() + WIDTH / 2) / WIDTH).max(1) as usize;
         self.reduction = reduction.min(REDUCTION_MAX);
@@ -96,7 +96,7 @@ impl Pyramid {
     }
 }
 
-impl Level {
+impl PyramidLevel {
     /// Becomes the means of two by two pixels of `finer`.
     fn halve(&mut self, finer: &Self) {
         self.width = finer.width / 2;

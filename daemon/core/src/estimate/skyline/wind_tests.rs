@@ -1,7 +1,7 @@
 //! The fit alone, on sights that need no pictures: clouds on a plane that wind takes along.
 
 use super::{
-    fit::{Expected, Fit, Sight, fit},
+    fit::{SkyTrack, SkylineFit, SkylinePrior, fit},
     tests::grain,
     wind::Wind,
     *,
@@ -28,32 +28,32 @@ fn blown(wind: DVec2) -> impl Fn(DVec3, f64) -> DVec3 {
 }
 
 /// Sights of `count` points between these elevations (degrees), seen in a world that is believed turned by `turn`.
-fn sights(count: i64, between: (f64, f64), turn: DQuat, seed: u64, goes: Goes) -> Vec<Sight> {
+fn sights(count: i64, between: (f64, f64), turn: DQuat, seed: u64, goes: Goes) -> Vec<SkyTrack> {
     let sight = |i: i64| {
         let elevation = between.0 + (between.1 - between.0) * grain(i, 20, seed);
         let held = look(1.1 * grain(i, 21, seed) - 0.55, elevation.to_radians(), 0.0) * DVec3::Z;
         let off =
             0.2 * PIXEL * DVec3::new(normal(3 * i, seed), normal(3 * i + 1, seed), normal(3 * i + 2, seed));
         let seen = turn.inverse() * (goes(held, AGE_S) + off).normalize();
-        Sight { seen, held, age_s: AGE_S, trust: 1.0, likeness: 1.0, unit: 1.0, ..Sight::default() }
+        SkyTrack { seen, held, age_s: AGE_S, trust: 1.0, likeness: 1.0, unit: 1.0, ..SkyTrack::default() }
     };
     (0..count).map(sight).collect()
 }
 
 /// Those of them that lie straight ahead.
-fn ahead(mut sights: Vec<Sight>) -> Vec<Sight> {
+fn ahead(mut sights: Vec<SkyTrack>) -> Vec<SkyTrack> {
     sights.retain(|s| s.held.x.abs() < 0.04);
     sights
 }
 
-fn fitted(sights: Vec<Sight>, wind: Wind) -> Option<Fit> {
+fn fitted(sights: Vec<SkyTrack>, wind: Wind) -> Option<SkylineFit> {
     fitted_where(sights, wind, DRIFT)
 }
 
 /// The same where what lies at the sky line may go by at `drift` rad/s.
-fn fitted_where(mut sights: Vec<Sight>, wind: Wind, drift: f64) -> Option<Fit> {
+fn fitted_where(mut sights: Vec<SkyTrack>, wind: Wind, drift: f64) -> Option<SkylineFit> {
     let turn = DQuat::IDENTITY;
-    let expected = Expected { turn, tilt_sigma: 2e-3, pixel: PIXEL, wind, rate_sigma: drift };
+    let expected = SkylinePrior { turn, tilt_sigma: 2e-3, pixel: PIXEL, wind, rate_sigma: drift };
     fit(&mut sights, &expected, 7, &mut Vec::new())
 }
 
@@ -62,7 +62,7 @@ fn calm() -> Wind {
 }
 
 /// By how much a fit's heading is wrong, and the square of that over its variance.
-fn wrong(fit: &Fit, turn: DQuat) -> (f64, f64) {
+fn wrong(fit: &SkylineFit, turn: DQuat) -> (f64, f64) {
     let off = rotation_vector(fit.turn * turn.inverse()).z;
     (off, off * off / fit.covariance.z_axis.z)
 }

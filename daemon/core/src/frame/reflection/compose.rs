@@ -4,7 +4,7 @@ use glam::{DVec2, Vec3, Vec4};
 
 use super::{
     grid::outer_tones,
-    lobes::{BANDS, Lobe, Lobes},
+    lobes::{BANDS, Lobes, ReflectionTransfer},
 };
 use crate::colour::{LUMINANCE, linear_to_srgb};
 use crate::estimate::light::SeaTones;
@@ -14,7 +14,7 @@ pub const HALF_WIDTH_MIN_PX: f64 = 1.5;
 
 /// Where a boat's hull meets the water in a picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Place {
+pub struct HullFoot {
     /// The point from which the line is measured, pixels.
     pub anchor: DVec2,
     /// Unit vector in which gravity pulls.
@@ -65,7 +65,7 @@ impl Billboard {
 pub fn compose(
     picture: &mut [Vec3],
     width: usize,
-    place: &Place,
+    place: &HullFoot,
     billboard: &Billboard,
     lobes: &Lobes,
     tones: &SeaTones,
@@ -104,7 +104,7 @@ pub fn compose(
     }
 }
 
-impl Place {
+impl HullFoot {
     /// Pixels below the anchor of the line at a position across, the tangent under which it is seen there, and whether that is beside the
     /// hull.
     fn hull(&self, across: f64) -> (f64, f64, bool) {
@@ -120,10 +120,10 @@ impl Place {
 
 /// Light thrown back, and share of the pixel's own light that is taken away, at a tone, over all bands.
 fn gather(
-    lobes: &[Lobe; BANDS],
+    lobes: &[ReflectionTransfer; BANDS],
     tone: f32,
     luminance: f32,
-    mean: impl Fn(&Lobe, usize) -> Vec4,
+    mean: impl Fn(&ReflectionTransfer, usize) -> Vec4,
 ) -> (Vec3, Vec3) {
     let (mut thrown, mut taken) = ([Vec3::ZERO; 2], [Vec3::ZERO; 2]);
     for (band, lobe) in lobes.iter().enumerate() {

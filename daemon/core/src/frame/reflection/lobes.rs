@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use super::{
     grid::{DISTANCE_MIN_M, RISE_NODES, RISES, TONES},
-    table::{SeaLobes, Sight},
+    table::{SeaLobes, SightLine},
 };
 use crate::{
     colour::LUMINANCE,
@@ -41,7 +41,7 @@ const SKY_MOST: f32 = 1.5;
 
 /// A share that changes with a pixel's brightness.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Toned {
+pub struct LuminanceWeight {
     /// Its mean over the pixels of a sea.
     pub mean: f32,
     /// By how much more a bright pixel has it (one that is [`TONE_OUTER`](super::grid::TONE_OUTER) beyond the mean), and a dark one less.
@@ -51,7 +51,7 @@ pub struct Toned {
 /// How many of a sea's pixels are dark, middling and bright, where brightness is distributed normally.
 const TONE_SHARES: [f32; TONES] = [0.293, 0.414, 0.293];
 
-impl Toned {
+impl LuminanceWeight {
     /// Of a dark, a middling and a bright pixel.
     fn of(tones: [f32; TONES]) -> Self {
         let mean = tones.iter().zip(TONE_SHARES).map(|(v, share)| v * share).sum();
@@ -71,11 +71,11 @@ impl Toned {
 
 /// What a pixel of water throws back of one band of a boat.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lobe {
+pub struct ReflectionTransfer {
     /// Share of the band's light.
-    pub thrown: Toned,
+    pub thrown: LuminanceWeight,
     /// Share of the pixel's own luminance that the band hides from it.
-    pub taken: Toned,
+    pub taken: LuminanceWeight,
     /// Colour of what is hidden over the pixel's own: its luminance is 1.
     pub hue: Vec3,
     /// Luminance above which a pixel's light is not the sky's: the sun's glitter, of which a boat hides little. The same for all bands.
@@ -94,7 +94,7 @@ pub struct Lobes {
     /// How many bands of height there are: as many as the boat is large in the picture.
     pub bands: usize,
     /// By distance from the hull, at [`Lobes::step_m`], and by band from the water up; bands that there are not throw back nothing.
-    pub steps: Vec<[Lobe; BANDS]>,
+    pub steps: Vec<[ReflectionTransfer; BANDS]>,
     /// How far to either side of the hull it is seen at each step, metres at the hull.
     pub aside_m: Vec<f64>,
 }
@@ -116,16 +116,16 @@ impl Lobes {
     }
 
     /// The lobes at a place among the steps, interpolated.
-    pub fn at(&self, place: f64) -> [Lobe; BANDS] {
+    pub fn at(&self, place: f64) -> [ReflectionTransfer; BANDS] {
         let first = (place as usize).min(self.steps.len().saturating_sub(2));
         let part = (place - first as f64).clamp(0.0, 1.0) as f32;
-        let none = [Lobe::default(); BANDS];
+        let none = [ReflectionTransfer::default(); BANDS];
         let (a, b) = (self.steps.get(first).unwrap_or(&none), self.steps.get(first + 1).unwrap_or(&none));
         std::array::from_fn(|i| a[i].mix(&b[i], part))
     }
 }
 
-impl Lobe {
+impl ReflectionTransfer {
     /// Share of the band's light that water throws back which lies so far beyond an end of a hull.
     fn seen_beyond(&self, beyond_m: f32, width_m: f32) -> f32 {
         let half = self.half_width_m.max(1e-6);
@@ -164,7 +164,7 @@ fn divisions(whole_px: f64, least_px: f64, power: f64, (fewest, most): (usize, u
 
 /// How a boat is seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct ReflectionView {
     /// Angle from the line of sight to the direction in which the wind blows, radians clockwise; a sea looks the same half a turn on.
     pub wind_to_view: f64,
     /// The sky behind the boat.
@@ -187,7 +187,7 @@ pub struct Seen {
     pub pixel: f64,
 }
 
-impl Seen {
+impl ReflectionView {
     /// How high the boat stands in the picture, pixels.
     fn height_px(&self) -> f64 {
         self.height_m / (self.range_m * self.pixel)
@@ -206,14 +206,14 @@ pub fn water_light(light: &Light) -> Vec3 {
 
 impl Lobes {
     /// The lobes of a boat.
-    pub fn of(sea: &SeaLobes, seen: &Seen) -> Self {
+    pub fn of(sea: &SeaLobes, seen: &ReflectionView) -> Self {
         let mut lobes = Self::default();
         lobes.set(sea, seen);
         lobes
     }
 
     /// The same into what is there. Empty where the sea throws back nothing that is seen.
-    pub fn set(&mut self, sea: &SeaLobes, seen: &Seen) {
+    pub fn set(&mut self, sea: &SeaLobes, seen: &ReflectionView) {
         self.steps.clear();
         self.aside_m.clear();
         self.reach_m = 0.0;
@@ -237,19 +237,23 @@ impl Lobes {
             let step = pixel_bands(sea, seen, distance_m, self.bands);
             self.aside_m.push(f64::from(aside(&step, width)));
             // It ends at nothing.
-            let end = |l: Lobe| Lobe { thrown: Toned::default(), taken: Toned::default(), ..l };
+            let end = |l: ReflectionTransfer| ReflectionTransfer {
+                thrown: LuminanceWeight::default(),
+                taken: LuminanceWeight::default(),
+                ..l
+            };
             self.steps.push(if i == last { step.map(end) } else { step });
         }
     }
 }
 
 /// Share of the boat's light that water throws back which lies so far beyond an end of the hull.
-fn seen_beyond(bands: &[Lobe; BANDS], beyond_m: f32, width_m: f32) -> f32 {
+fn seen_beyond(bands: &[ReflectionTransfer; BANDS], beyond_m: f32, width_m: f32) -> f32 {
     bands.iter().map(|l| l.seen_beyond(beyond_m, width_m)).sum()
 }
 
 /// How far beyond an end of the hull more than [`SHARE_ASIDE`] is seen, metres.
-fn aside(bands: &[Lobe; BANDS], width_m: f32) -> f32 {
+fn aside(bands: &[ReflectionTransfer; BANDS], width_m: f32) -> f32 {
     let widest = bands.iter().map(|l| l.half_width_m + l.aside_m.abs()).fold(0.0, f32::max);
     let (mut seen, mut unseen) = (0.0, widest);
     for _ in 0..8 {
@@ -261,7 +265,12 @@ fn aside(bands: &[Lobe; BANDS], width_m: f32) -> f32 {
 }
 
 /// The lobes of a pixel whose middle is at a distance from the hull: far off it sees a long stretch of water, over which they change.
-fn pixel_bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; BANDS] {
+fn pixel_bands(
+    sea: &SeaLobes,
+    seen: &ReflectionView,
+    distance_m: f64,
+    count: usize,
+) -> [ReflectionTransfer; BANDS] {
     let to_water = (seen.range_m - distance_m).max(0.05 * seen.range_m);
     let length_m = seen.pixel * to_water * to_water / seen.eye_m;
     // Two points of Gauss's formula.
@@ -275,7 +284,7 @@ fn pixel_bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [L
 
 /// What comes from one of the table's cells.
 #[derive(Clone, Copy, Default)]
-struct Cell {
+struct TableCell {
     thrown: [f32; TONES],
     /// Light of the sky that is mirrored from there.
     sky: [Vec3; TONES],
@@ -284,14 +293,19 @@ struct Cell {
 }
 
 /// The lobes at one distance from the hull, of so many bands.
-fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; BANDS] {
+fn bands(
+    sea: &SeaLobes,
+    seen: &ReflectionView,
+    distance_m: f64,
+    count: usize,
+) -> [ReflectionTransfer; BANDS] {
     // Nearer than the table reaches, waves between hull and water no longer change what is seen.
     let distance_m = distance_m.max(DISTANCE_MIN_M);
     let to_water = (seen.range_m - distance_m).max(0.05 * seen.range_m);
     let elevation = (seen.eye_m / to_water).atan();
-    let Seen { wind_to_view, level_m, tilt, .. } = *seen;
-    let column = sea.column(&Sight { wind_to_view, level_m, tilt, elevation, distance_m });
-    let mut cells = [Cell::default(); RISES];
+    let ReflectionView { wind_to_view, level_m, tilt, .. } = *seen;
+    let column = sea.column(&SightLine { wind_to_view, level_m, tilt, elevation, distance_m });
+    let mut cells = [TableCell::default(); RISES];
     let (mut sky, mut mirrored) = ([Vec3::ZERO; TONES], [0.0; TONES]);
     for (cell, record) in cells.iter_mut().zip(&column) {
         let light = seen.sky.at(f64::from(record[2 * TONES + 2]));
@@ -311,7 +325,7 @@ fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; B
     });
     std::array::from_fn(|b| {
         if b >= count {
-            return Lobe::default();
+            return ReflectionTransfer::default();
         }
         let edge = |b| band_edge_m(seen.height_m, b, count) / distance_m;
         let lower = if b == 0 { f64::NEG_INFINITY } else { edge(b) };
@@ -320,8 +334,13 @@ fn bands(sea: &SeaLobes, seen: &Seen, distance_m: f64, count: usize) -> [Lobe; B
 }
 
 /// Sum of the cells between two rises.
-fn band(cells: &[Cell; RISES], whole: &[Vec3; TONES], [from, to]: [f64; 2], distance_m: f64) -> Lobe {
-    let mut lobe = Lobe::default();
+fn band(
+    cells: &[TableCell; RISES],
+    whole: &[Vec3; TONES],
+    [from, to]: [f64; 2],
+    distance_m: f64,
+) -> ReflectionTransfer {
+    let mut lobe = ReflectionTransfer::default();
     let (mut thrown, mut hidden) = ([0.0; TONES], [Vec3::ZERO; TONES]);
     let mut below = f64::NEG_INFINITY;
     for (cell, node) in cells.iter().zip(RISE_NODES) {
@@ -346,8 +365,8 @@ fn band(cells: &[Cell; RISES], whole: &[Vec3; TONES], [from, to]: [f64; 2], dist
     lobe.aside_m *= scale;
     // A box as wide has the spread's standard deviation.
     lobe.half_width_m *= scale * 3.0_f32.sqrt();
-    lobe.thrown = Toned::of(thrown);
-    lobe.taken = Toned::of(hidden.map(|h| h.dot(LUMINANCE)));
+    lobe.thrown = LuminanceWeight::of(thrown);
+    lobe.taken = LuminanceWeight::of(hidden.map(|h| h.dot(LUMINANCE)));
     let middling = hidden[TONES / 2];
     lobe.hue = middling / middling.dot(LUMINANCE).max(1e-9);
     lobe.sky_most = SKY_MOST * whole[TONES - 1].dot(LUMINANCE);
@@ -357,12 +376,12 @@ fn band(cells: &[Cell; RISES], whole: &[Vec3; TONES], [from, to]: [f64; 2], dist
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::reflection::table::Table;
+    use crate::frame::reflection::table::ReflectionTable;
 
-    fn seen(eye_m: f64, range_m: f64, height_m: f64) -> Seen {
+    fn seen(eye_m: f64, range_m: f64, height_m: f64) -> ReflectionView {
         let sky = SkyLight::of_bands(Vec3::new(0.6, 0.66, 0.72), Vec3::new(0.35, 0.42, 0.52));
         let water = Vec3::new(0.004, 0.016, 0.023);
-        Seen {
+        ReflectionView {
             wind_to_view: 0.4,
             sky,
             water,
@@ -378,7 +397,7 @@ mod tests {
 
     #[test]
     fn lobes_are_finite_wherever_a_boat_is_and_end_at_nothing() {
-        let table = Table::baked();
+        let table = ReflectionTable::baked();
         for wind in [0.0, 0.84, 3.3, 6.7, 12.0, f64::NAN] {
             let sea = table.sea(wind);
             for eye in [0.0, 0.01, 4.0, 15.0, -2.0, f64::NAN] {
@@ -412,12 +431,12 @@ mod tests {
     #[test]
     fn a_far_boats_few_steps_hold_what_many_would() {
         for wind in [0.84, 3.3, 6.7] {
-            let sea = Table::baked().sea(wind);
+            let sea = ReflectionTable::baked().sea(wind);
             for range in [30.0, 60.0, 150.0, 400.0] {
                 let seen = seen(8.0, range, 3.0);
                 let lobes = Lobes::of(&sea, &seen);
-                let all = |lobes: &[Lobe; BANDS]| {
-                    let sum = |of: fn(&Lobe) -> f32| lobes.iter().map(of).sum::<f32>();
+                let all = |lobes: &[ReflectionTransfer; BANDS]| {
+                    let sum = |of: fn(&ReflectionTransfer) -> f32| lobes.iter().map(of).sum::<f32>();
                     [sum(|l| l.thrown.mean + l.taken.mean), sum(|l| l.thrown.slope + l.taken.slope)]
                 };
                 let mut worst: f32 = 0.0;
@@ -440,7 +459,7 @@ mod tests {
     /// On a calm a boat's whole height is mirrored as far off as geometry has it, and light is what Fresnel's formula leaves of it.
     #[test]
     fn a_calm_mirrors_a_tall_boat_by_fresnels_share() {
-        let sea = Table::baked().sea(0.0);
+        let sea = ReflectionTable::baked().sea(0.0);
         let lobes = Lobes::of(&sea, &seen(8.0, 60.0, 30.0));
         let near = lobes.at(lobes.place(5.0));
         let sum: f32 = near.iter().map(|l| l.thrown.mean).sum();
@@ -448,7 +467,7 @@ mod tests {
         // angle of 10 degrees: 0.349 (mean of 0.407 and 0.291).
         assert!((0.3..0.62).contains(&sum), "{sum}");
         // Rougher water throws back less, and less far up.
-        let rough = Lobes::of(&Table::baked().sea(6.7), &seen(8.0, 60.0, 30.0));
+        let rough = Lobes::of(&ReflectionTable::baked().sea(6.7), &seen(8.0, 60.0, 30.0));
         let rough: f32 = rough.at(rough.place(5.0)).iter().map(|l| l.thrown.mean).sum();
         assert!(rough < 0.8 * sum, "{rough} {sum}");
     }

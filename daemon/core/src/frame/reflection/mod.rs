@@ -1,4 +1,4 @@
-//! What the sea does to the light of a boat. [`Table`] says, for a sea and a line of sight, how much of what stands how high at
+//! What the sea does to the light of a boat. [`ReflectionTable`] says, for a sea and a line of sight, how much of what stands how high at
 //! which distance a pixel of water throws towards the eye, and how much of the sky's light the boat takes from it; [`Lobes`] is that for one
 //! boat; [`compose`] draws with it, as the GPU's shaders do. [`hidden_m`] says how much of a hull stands behind waves.
 //!
@@ -10,10 +10,10 @@ mod hiding;
 mod lobes;
 mod table;
 
-pub use compose::{Billboard, HALF_WIDTH_MIN_PX, Place, compose};
+pub use compose::{Billboard, HALF_WIDTH_MIN_PX, HullFoot, compose};
 pub use hiding::{Sighted, encode_hiding, hidden_m};
-pub use lobes::{BANDS, Lobe, Lobes, STEPS, Seen, Toned, water_light};
-pub use table::{SeaLobes, Table, encode};
+pub use lobes::{BANDS, Lobes, LuminanceWeight, ReflectionTransfer, ReflectionView, STEPS, water_light};
+pub use table::{ReflectionTable, SeaLobes, encode};
 
 use glam::{DVec2, DVec3};
 

@@ -52,7 +52,7 @@ fn decode(bytes: &[u8]) -> Vec<f32> {
 
 /// How waves of all forces and winds mirror.
 #[derive(Clone, Debug)]
-pub struct Table {
+pub struct ReflectionTable {
     values: Vec<f32>,
     spreads: [[f64; 2]; FORCES],
 }
@@ -67,7 +67,7 @@ pub struct SeaLobes {
 
 /// From where to where a line of sight goes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sight {
+pub(super) struct SightLine {
     /// Angle from it to the direction in which the wind blows, radians clockwise.
     pub(super) wind_to_view: f64,
     /// Level of the water at the hull over the mean one, metres.
@@ -81,9 +81,9 @@ pub(super) struct Sight {
 }
 
 /// The records of all rises for one line of sight.
-pub(super) type Column = [[f32; RECORD]; RISES];
+pub(super) type TableColumn = [[f32; RECORD]; RISES];
 
-impl Table {
+impl ReflectionTable {
     /// The table that comes with the program.
     pub fn baked() -> Self {
         let (values, spreads) = BAKED.split_at(TOTAL.min(BAKED.len()));
@@ -121,7 +121,7 @@ impl Table {
 
 impl SeaLobes {
     /// The records of a line of sight.
-    pub(super) fn column(&self, sight: &Sight) -> Column {
+    pub(super) fn column(&self, sight: &SightLine) -> TableColumn {
         let mut out = [[0.0; RECORD]; RISES];
         let (wind, mirrored) = wind_place(sight.wind_to_view);
         let [level, tilt] = self.spread.map(|s| s.max(1e-3));
@@ -201,14 +201,14 @@ mod tests {
         }
     }
 
-    fn sight(wind_to_view: f64, elevation: f64, distance_m: f64) -> Sight {
-        Sight { wind_to_view, level_m: 0.0, tilt: 0.0, elevation, distance_m }
+    fn sight(wind_to_view: f64, elevation: f64, distance_m: f64) -> SightLine {
+        SightLine { wind_to_view, level_m: 0.0, tilt: 0.0, elevation, distance_m }
     }
 
     #[test]
     fn the_table_is_whole_and_its_shares_are_shares() {
         assert_eq!(BAKED.len(), TOTAL + 4 * FORCES);
-        let table = Table::baked();
+        let table = ReflectionTable::baked();
         for (i, column) in table.values.chunks_exact(RISES * STORED).enumerate() {
             for kind in 0..STATES * TONES {
                 let thrown: f32 = column.chunks_exact(STORED).map(|r| r[2 * kind]).sum();
@@ -221,7 +221,7 @@ mod tests {
 
     #[test]
     fn places_off_the_grid_take_its_ends_and_a_wind_from_behind_is_one_from_before() {
-        let table = Table::baked();
+        let table = ReflectionTable::baked();
         let close = |a: &[f32], b: &[f32]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
         let alike = |a: f64, b: f64| close(&table.sea(a).values, &table.sea(b).values);
         // Force 4, and calm.
@@ -236,7 +236,8 @@ mod tests {
         for elevation in [0.0, 1e-9, 3.0, f64::NAN] {
             for distance_m in [-5.0, 0.0, 1e9, f64::NAN] {
                 for level_m in [-1e9, 0.0, 2.0, f64::NAN] {
-                    let sight = Sight { wind_to_view: 0.1, level_m, tilt: -level_m, elevation, distance_m };
+                    let sight =
+                        SightLine { wind_to_view: 0.1, level_m, tilt: -level_m, elevation, distance_m };
                     assert!(sea.column(&sight).as_flattened().iter().all(|v| v.is_finite()));
                 }
             }

@@ -1,6 +1,6 @@
 //! What boats do: each behaviour gives a boat's next state from its last.
 
-use super::course::{Course, CourseState, Damage};
+use super::course::{BoatDamage, Course, CourseState};
 
 /// What a boat does. A behaviour holds no state of its own: what it does next follows from the boat's last state, the time and the
 /// damage, so that a stretch can be stepped anew after a round has struck.
@@ -18,13 +18,13 @@ pub struct BehaviourStep<'a> {
     /// Seconds since the scenario began at the end of the step.
     pub to_s: f64,
     /// What has struck it.
-    pub damage: &'a Damage,
+    pub damage: &'a BoatDamage,
 }
 
 impl Behaviour {
     /// The state from which the boat is stepped on at `time_s`, where nothing is known of the time before: at the scenario's begin, or
     /// after a stretch that nobody followed.
-    pub fn begin(&self, time_s: f64, damage: &Damage) -> CourseState {
+    pub fn begin(&self, time_s: f64, damage: &BoatDamage) -> CourseState {
         match self {
             Self::ScriptedCourse(course) => course.state(time_s, damage),
         }

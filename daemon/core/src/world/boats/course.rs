@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec2;
 
-use super::path::{self, Ending, Path, wrap};
+use super::path::{self, CoursePath, Ending, wrap};
 use crate::{
     geometry::{ahead, heading_of, starboard},
     model::Zone,
@@ -80,7 +80,7 @@ impl CourseState {
 
 /// When a boat lost what it needs to go on, seconds since the scenario began.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Damage {
+pub struct BoatDamage {
     /// The engine was hit: the boat loses its way along its course.
     pub engine_s: Option<f64>,
     /// The helm was hit: the boat goes straight on and slowly loses its way.
@@ -149,30 +149,30 @@ pub enum CourseError {
 /// A course that is known beforehand: a closed function of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Course {
-    track: Track,
+    track: CourseTrack,
     speed_m_s: f64,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Track {
-    Path(Path),
+enum CourseTrack {
+    CoursePath(CoursePath),
     Weave { start: DVec2, heading: f64, forward_m_s: f64, amplitude_m: f64, rad_s: f64 },
 }
 
 impl Course {
     /// Lies still.
     pub fn still(start: DVec2, heading: f64) -> Result<Self, CourseError> {
-        Self::of(Path::start(start, heading), start, heading, 0.0)
+        Self::of(CoursePath::start(start, heading), start, heading, 0.0)
     }
 
     /// Goes straight on.
     pub fn straight(start: DVec2, heading: f64, speed_m_s: f64) -> Result<Self, CourseError> {
-        Self::of(Path::start(start, heading).line(f64::INFINITY), start, heading, speed_m_s)
+        Self::of(CoursePath::start(start, heading).line(f64::INFINITY), start, heading, speed_m_s)
     }
 
-    fn of(path: Path, start: DVec2, heading: f64, speed_m_s: f64) -> Result<Self, CourseError> {
+    fn of(path: CoursePath, start: DVec2, heading: f64, speed_m_s: f64) -> Result<Self, CourseError> {
         check_finite(start, heading, speed_m_s)?;
-        Ok(Self { track: Track::Path(path), speed_m_s })
+        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s })
     }
 
     /// Weaves about a straight line: `amplitude_m` to each side, once in `period_s`. The root mean square of its speed over
@@ -192,7 +192,7 @@ impl Course {
             return Err(CourseError::Weave { amplitude_m, period_s, sideways_m_s, speed_m_s });
         }
         let forward_m_s = (speed_m_s * speed_m_s - sideways_m_s * sideways_m_s / 2.0).sqrt();
-        Ok(Self { track: Track::Weave { start, heading, forward_m_s, amplitude_m, rad_s }, speed_m_s })
+        Ok(Self { track: CourseTrack::Weave { start, heading, forward_m_s, amplitude_m, rad_s }, speed_m_s })
     }
 
     /// Sails from `start` along `points` and lies still at the last, or goes back to the start and round again for ever.
@@ -223,7 +223,7 @@ impl Course {
             return Err(CourseError::SharpCorner { index: (index + 1) % n });
         }
         let path = path::along(&all, TURN_RADIUS_M, repeat);
-        Ok(Self { track: Track::Path(path), speed_m_s })
+        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s })
     }
 
     /// Turns towards the own ship at (0, 0), closes to `stop_m` and then lies still or circles at that distance.
@@ -246,23 +246,25 @@ impl Course {
             return Err(CourseError::TooClose { range_m, stop_m });
         }
         let (angle, run_m) = turn_in(start, heading, radius);
-        let mut path = Path::start(start, heading).turn(angle, radius).line(run_m - run_end);
+        let mut path = CoursePath::start(start, heading).turn(angle, radius).line(run_m - run_end);
         if arrival == Arrival::Circle {
             path = path.turn(-(radius / (stop_m + radius)).acos(), radius).turn(f64::INFINITY, stop_m);
         }
-        Ok(Self { track: Track::Path(path), speed_m_s })
+        Ok(Self { track: CourseTrack::CoursePath(path), speed_m_s })
     }
 
     /// Greatest speed over ground on this course, m/s.
     pub fn speed_max_m_s(&self) -> f64 {
         match self.track {
-            Track::Path(_) => self.speed_m_s,
-            Track::Weave { forward_m_s, amplitude_m, rad_s, .. } => forward_m_s.hypot(amplitude_m * rad_s),
+            CourseTrack::CoursePath(_) => self.speed_m_s,
+            CourseTrack::Weave { forward_m_s, amplitude_m, rad_s, .. } => {
+                forward_m_s.hypot(amplitude_m * rad_s)
+            }
         }
     }
 
     /// Where the boat is `time_s` seconds after the scenario began (the start before that).
-    pub fn state(&self, time_s: f64, damage: &Damage) -> CourseState {
+    pub fn state(&self, time_s: f64, damage: &BoatDamage) -> CourseState {
         let time_s = time_s.max(0.0);
         let (under_way_s, share) = damage.under_way(time_s);
         let helm_s = damage.helm_s.map(|s| s.max(0.0)).filter(|&s| s < time_s);
@@ -279,8 +281,8 @@ impl Course {
 
     fn undamaged(&self, time_s: f64) -> CourseState {
         match &self.track {
-            Track::Path(path) => on_path(path, self.speed_m_s, time_s),
-            &Track::Weave { start, heading, forward_m_s, amplitude_m, rad_s } => {
+            CourseTrack::CoursePath(path) => on_path(path, self.speed_m_s, time_s),
+            &CourseTrack::Weave { start, heading, forward_m_s, amplitude_m, rad_s } => {
                 let (sin, cos) = ((rad_s * time_s) % TAU).sin_cos();
                 let sideways = amplitude_m * rad_s * cos;
                 let speed_m_s = forward_m_s.hypot(sideways);
@@ -316,7 +318,7 @@ impl Course {
     }
 }
 
-impl Damage {
+impl BoatDamage {
     /// No damage.
     pub const NONE: Self = Self { engine_s: None, helm_s: None };
 
@@ -381,7 +383,7 @@ fn drift(at_helm: &CourseState, way_s: f64, share: f64) -> CourseState {
     }
 }
 
-fn on_path(path: &Path, speed_m_s: f64, time_s: f64) -> CourseState {
+fn on_path(path: &CoursePath, speed_m_s: f64, time_s: f64) -> CourseState {
     let (mut sailed_m, mut speed) = (speed_m_s * time_s, speed_m_s);
     if path.ending() == Ending::Stay && path.length_m().is_finite() {
         // Comes to rest exponentially over the last stretch.

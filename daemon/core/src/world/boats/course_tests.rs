@@ -19,7 +19,7 @@ fn samples() -> Vec<(&'static str, Course)> {
 }
 
 /// Position, heading, speed and turn rate must belong together at every time.
-fn check_consistent(name: &str, course: &Course, damage: &Damage, until_s: f64) {
+fn check_consistent(name: &str, course: &Course, damage: &BoatDamage, until_s: f64) {
     let h = 1e-4;
     let mut t = h;
     while t < until_s {
@@ -37,18 +37,18 @@ fn check_consistent(name: &str, course: &Course, damage: &Damage, until_s: f64) 
 #[test]
 fn states_are_consistent() {
     for (name, course) in samples() {
-        check_consistent(name, &course, &Damage::NONE, 120.0);
+        check_consistent(name, &course, &BoatDamage::NONE, 120.0);
     }
 }
 
 #[test]
 fn states_are_consistent_after_damage() {
     let cases = [
-        Damage { engine_s: Some(20.0), helm_s: None },
-        Damage { engine_s: None, helm_s: Some(20.0) },
-        Damage { engine_s: Some(15.0), helm_s: Some(16.5) },
-        Damage { engine_s: Some(16.5), helm_s: Some(15.0) },
-        Damage { engine_s: Some(0.0), helm_s: None },
+        BoatDamage { engine_s: Some(20.0), helm_s: None },
+        BoatDamage { engine_s: None, helm_s: Some(20.0) },
+        BoatDamage { engine_s: Some(15.0), helm_s: Some(16.5) },
+        BoatDamage { engine_s: Some(16.5), helm_s: Some(15.0) },
+        BoatDamage { engine_s: Some(0.0), helm_s: None },
     ];
     for (name, course) in samples() {
         for damage in &cases {
@@ -63,7 +63,7 @@ fn states_are_consistent_after_damage() {
 #[test]
 fn an_engine_hit_costs_the_way_of_its_time_constant() {
     let course = Course::straight(DVec2::ZERO, 0.0, 10.0).expect("can be sailed");
-    let end = course.state(1e6, &Damage { engine_s: Some(30.0), helm_s: None });
+    let end = course.state(1e6, &BoatDamage { engine_s: Some(30.0), helm_s: None });
     assert!((end.position.y - (300.0 + 10.0 * ENGINE_LOST_S)).abs() < 1e-9, "{end:?}");
 }
 
@@ -72,7 +72,7 @@ fn an_attacker_stops_where_it_is_told() {
     for start_heading in [0.0, 0.5, 1.5, 3.0, PI, -0.5, -2.0, -PI] {
         let course =
             Course::closing(NORTH_250, start_heading, 7.7, 60.0, Arrival::Stop).expect("can be sailed");
-        let end = course.state(500.0, &Damage::NONE);
+        let end = course.state(500.0, &BoatDamage::NONE);
         assert!((end.position.length() - 60.0).abs() < 1e-6, "{start_heading}: {end:?}");
         assert!(
             wrap(end.heading - heading_of(-end.position)).abs() < 1e-6,
@@ -85,7 +85,7 @@ fn an_attacker_stops_where_it_is_told() {
 fn at_15_knots_200_yards_take_24_seconds() {
     // Nelson 2009, chapter I: 0.1 nautical miles by 15 knots.
     let course = Course::closing(DVec2::new(0.0, 185.2), PI, 15.0 * 1852.0 / 3600.0, 1.0, Arrival::Stop);
-    let state = course.expect("can be sailed").state(12.0, &Damage::NONE);
+    let state = course.expect("can be sailed").state(12.0, &BoatDamage::NONE);
     assert!((state.position.y - 92.6).abs() < 1e-9, "{state:?}");
 }
 
@@ -94,7 +94,7 @@ fn a_circling_boat_keeps_its_distance_for_ever() {
     for start in [NORTH_250, DVec2::new(-120.0, -90.0)] {
         let course = Course::closing(start, 0.3, 9.0, 60.0, Arrival::Circle).expect("can be sailed");
         for t in [200.0, 1e3, 1e5, 1e7] {
-            let state = course.state(t, &Damage::NONE);
+            let state = course.state(t, &BoatDamage::NONE);
             assert!((state.position.length() - 60.0).abs() < 1e-5, "{start} at {t} s: {state:?}");
             assert!(state.position.dot(ahead(state.heading)).abs() < 1e-4, "tangential");
         }
@@ -105,7 +105,7 @@ fn a_circling_boat_keeps_its_distance_for_ever() {
 fn a_boat_without_helmsman_does_not_run_into_the_own_ship() {
     let course = Course::closing(NORTH_250, PI, 15.0, 40.0, Arrival::Stop).expect("can be sailed");
     for hit in [5.0, 10.0, 12.0, 14.0, 60.0] {
-        let damage = Damage { engine_s: None, helm_s: Some(hit) };
+        let damage = BoatDamage { engine_s: None, helm_s: Some(hit) };
         for t in 0..200 {
             let at = course.state(f64::from(t), &damage).position;
             assert!(at.length() >= DRIFT_CLEAR_M - 1e-9, "hit at {hit} s: {at} at {t} s");
@@ -116,8 +116,8 @@ fn a_boat_without_helmsman_does_not_run_into_the_own_ship() {
 #[test]
 fn positions_stay_exact_after_days() {
     let course = Course::weave(DVec2::ZERO, 0.6, 8.0, 10.0, 8.0).expect("can be sailed");
-    let forward = course.state(8.0, &Damage::NONE).position / 8.0;
-    let days = course.state(8.0 * 100_000.0, &Damage::NONE).position;
+    let forward = course.state(8.0, &BoatDamage::NONE).position / 8.0;
+    let days = course.state(8.0 * 100_000.0, &BoatDamage::NONE).position;
     assert!((days - forward * 8.0 * 100_000.0).length() < 1e-5);
 }
 
@@ -147,14 +147,14 @@ proptest! {
         prop_assume!(start.length() > radius + 1.0);
         let course = Course::weave(start, heading, speed, amplitude, 20.0 + 7.0 * amplitude / speed).expect("can be sailed");
         let by_steps = (0..60_000).map(|i| f64::from(i) * 0.005)
-            .find(|&t| course.state(t, &Damage::NONE).position.length() < radius - 0.11);
+            .find(|&t| course.state(t, &BoatDamage::NONE).position.length() < radius - 0.11);
         let found = course.first_within(radius, 300.0);
         if let Some(t) = by_steps {
             let found = found.expect("found by steps");
             prop_assert!(found <= t + 1e-9);
         }
         if let Some(t) = found {
-            prop_assert!(course.state(t, &Damage::NONE).position.length() < radius);
+            prop_assert!(course.state(t, &BoatDamage::NONE).position.length() < radius);
         }
     }
 
@@ -164,14 +164,14 @@ proptest! {
     ) {
         let arrival = if circle { Arrival::Circle } else { Arrival::Stop };
         let course = Course::closing(ahead(bearing) * range, heading, 10.0, 20.0, arrival).expect("can be sailed");
-        let mut last = course.state(0.0, &Damage::NONE);
+        let mut last = course.state(0.0, &BoatDamage::NONE);
         for i in 1..1500 {
-            let now = course.state(f64::from(i) * 0.2, &Damage::NONE);
+            let now = course.state(f64::from(i) * 0.2, &BoatDamage::NONE);
             prop_assert!((now.position - last.position).length() <= 2.0 + 1e-6, "jump at step {i}");
             prop_assert!(wrap(now.heading - last.heading).abs() < 0.4, "spin at step {i}");
             prop_assert!(now.position.length() > 20.0 - 1e-6, "closer than told at step {i}");
             last = now;
         }
-        prop_assert!((course.state(1e4, &Damage::NONE).position.length() - 20.0).abs() < 1e-5);
+        prop_assert!((course.state(1e4, &BoatDamage::NONE).position.length() - 20.0).abs() < 1e-5);
     }
 }

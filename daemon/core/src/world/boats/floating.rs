@@ -5,7 +5,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 use super::{
     course::CourseState,
     hull::{Hull, HullForm},
-    motion::Motion,
+    motion::BoatMotion,
 };
 use crate::{
     geometry::{RigidPose, ahead},
@@ -46,7 +46,7 @@ pub fn afloat_in_waves(
     state: &CourseState,
     hull: &Hull,
     form: &HullForm,
-    motion: &Motion,
+    motion: &BoatMotion,
     waves: &WaveField,
     time_s: f64,
 ) -> Floating {

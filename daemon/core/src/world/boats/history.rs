@@ -2,7 +2,7 @@
 
 use super::{
     behaviour::{Behaviour, BehaviourStep},
-    course::{CourseState, Damage},
+    course::{BoatDamage, CourseState},
     floating::{Floating, afloat_in_waves, quasi_static},
     grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
     hull::{Hull, HullForm},
@@ -20,7 +20,7 @@ const KEPT: usize = (HISTORY_S / STEP_S) as usize;
 #[derive(Clone, Debug)]
 pub struct BoatHistory {
     behaviour: Behaviour,
-    damage: Damage,
+    damage: BoatDamage,
     hull: Hull,
     states: GridHistory<CourseState>,
     seakeeping: SeakeepingState,
@@ -30,8 +30,8 @@ impl BoatHistory {
     /// A boat as the scenario begins.
     pub fn new(behaviour: Behaviour, hull: Hull, form: HullForm) -> Self {
         let mut states = GridHistory::new(KEPT);
-        states.restart(0, behaviour.begin(0.0, &Damage::NONE));
-        Self { behaviour, damage: Damage::NONE, hull, states, seakeeping: SeakeepingState::new(form) }
+        states.restart(0, behaviour.begin(0.0, &BoatDamage::NONE));
+        Self { behaviour, damage: BoatDamage::NONE, hull, states, seakeeping: SeakeepingState::new(form) }
     }
 
     /// The hull's size at the waterline.

@@ -43,7 +43,7 @@ fn between_its_states_a_boat_is_where_its_course_has_it() {
         follow(&mut boat, 60.0, &WaveField::FLAT);
         for i in 0..17_000 {
             let t = 42.5 + 1e-3 * f64::from(i);
-            let (is, was) = (boat.state(t), course.state(t, &Damage::NONE));
+            let (is, was) = (boat.state(t), course.state(t, &BoatDamage::NONE));
             assert!((is.position - was.position).length() < off_m, "{t}: {is:?}, {was:?}");
             let turned = (is.heading - was.heading).sin().abs();
             assert!(turned < 2e-3 && (is.speed_m_s - was.speed_m_s).abs() < 1e-3, "{t}: {is:?}, {was:?}");
@@ -100,7 +100,7 @@ fn the_past_is_bounded_and_before_it_a_boat_came_straight_on() {
     assert!(boat.states.len() <= KEPT);
     let course = Course::straight(DVec2::new(5.0, 90.0), 1.0, 6.0).expect("it can be sailed");
     for age in [0.0, 7.3, 15.0, 17.5] {
-        let off = boat.state(60.0 - age).position - course.state(60.0 - age, &Damage::NONE).position;
+        let off = boat.state(60.0 - age).position - course.state(60.0 - age, &BoatDamage::NONE).position;
         assert!(off.length() < 1e-9, "{age} s ago: {off}");
     }
 }
@@ -113,7 +113,7 @@ fn after_a_gap_a_boat_is_where_its_course_has_it_with_all_of_its_wake() {
     boat.follow(3601.0, &waves);
     for age in [0.0, 1.0, 15.0, 17.0] {
         let t = 3601.0 - age;
-        let off = boat.state(t).position - course.state(t, &Damage::NONE).position;
+        let off = boat.state(t).position - course.state(t, &BoatDamage::NONE).position;
         assert!(off.length() < 2e-4, "{age} s ago: {off}");
     }
     boat.follow(f64::NAN, &waves);

@@ -11,9 +11,9 @@ mod path;
 mod seakeeping;
 
 pub use behaviour::{Behaviour, BehaviourStep};
-pub use course::{Arrival, Course, CourseError, CourseState, Damage};
+pub use course::{Arrival, BoatDamage, Course, CourseError, CourseState};
 pub use floating::{Floating, afloat_in_waves, facing, quasi_static};
 pub use history::{BoatHistory, HISTORY_S};
 pub use hull::{Hull, HullForm};
-pub use motion::Motion;
+pub use motion::BoatMotion;
 pub use seakeeping::SeakeepingState;

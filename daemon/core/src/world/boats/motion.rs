@@ -24,14 +24,14 @@ const GAMMA: f64 = 0.292_893_218_813_452_4;
 
 /// Heave of the centre of buoyancy (metres, up from rest), roll (radians, port up) and pitch (radians, bow up), and their rates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Motion {
+pub struct BoatMotion {
     /// Heave, roll, pitch.
     pub at: DVec3,
     /// Their changes a second.
     pub rate: DVec3,
 }
 
-impl Motion {
+impl BoatMotion {
     /// In the mean plane of the water under the hull, going along with it.
     pub fn of_plane(form: &HullForm, course: impl Fn(f64) -> CourseState, waves: &WaveField, t: f64) -> Self {
         const APART_S: f64 = 0.02;
@@ -56,7 +56,7 @@ impl Motion {
 }
 
 /// Height of the water and its rate at each strip: at the middle, and half the difference between port and starboard.
-struct Water {
+struct HullWater {
     middle: [[f64; 2]; STRIPS],
     side: [[f64; 2]; STRIPS],
 }
@@ -79,10 +79,10 @@ impl HullForm {
         0.5 * RADIATION * WATER_KG_M3 * self.draught_m * (GRAVITY_M_S2 / beam_m).sqrt()
     }
 
-    fn water(&self, course: &CourseState, pitch: f64, waves: &WaveField, t: f64) -> Water {
+    fn water(&self, course: &CourseState, pitch: f64, waves: &WaveField, t: f64) -> HullWater {
         let forward = ahead(course.heading);
         let centre = course.position + forward * self.centre_m;
-        let mut water = Water { middle: [[0.0; 2]; STRIPS], side: [[0.0; 2]; STRIPS] };
+        let mut water = HullWater { middle: [[0.0; 2]; STRIPS], side: [[0.0; 2]; STRIPS] };
         let first_m = self.strips[0].x_m;
         for (factor, wave) in waves.waves_at(t) {
             let k = wave.cycles_per_m * TAU;
@@ -111,7 +111,7 @@ impl HullForm {
         water
     }
 
-    fn forces(&self, course: &CourseState, motion: &Motion, waves: &WaveField, t: f64) -> Forces {
+    fn forces(&self, course: &CourseState, motion: &BoatMotion, waves: &WaveField, t: f64) -> Forces {
         let DVec3 { x: heave, y: roll, z: pitch } = motion.at;
         let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) = (roll.sin_cos(), pitch.sin_cos());
         let water = self.water(course, pitch, waves, t);
@@ -174,25 +174,26 @@ impl HullForm {
         courses: [&CourseState; 2],
         waves: &WaveField,
         t: f64,
-        motion: &Motion,
+        motion: &BoatMotion,
         h: f64,
-    ) -> Motion {
+    ) -> BoatMotion {
         let now = self.forces(courses[0], motion, waves, t);
         let first = |damping: DVec3| now.acceleration / (DVec3::ONE + damping * (GAMMA * h));
-        let ahead = Motion { at: motion.at + motion.rate * h, rate: motion.rate + first(now.damping) * h };
+        let ahead =
+            BoatMotion { at: motion.at + motion.rate * h, rate: motion.rate + first(now.damping) * h };
         let then = self.forces(courses[1], &ahead, waves, t + h);
         // A hull that strikes the water within the step is damped there, not before.
         let damping = now.damping.max(then.damping);
         let one = first(damping);
         let two = (then.acceleration - 2.0 * one) / (DVec3::ONE + damping * (GAMMA * h));
-        Motion {
+        BoatMotion {
             at: motion.at + motion.rate * h + one * (0.5 * h * h),
             rate: motion.rate + one * (1.5 * h) + two * (0.5 * h),
         }
     }
 
     /// Whether a motion is one that a boat can have on a sea with crests of that height; else the numbers have gone wrong.
-    pub(super) fn is_sane(&self, motion: &Motion, crest_m: f64) -> bool {
+    pub(super) fn is_sane(&self, motion: &BoatMotion, crest_m: f64) -> bool {
         let reach = crest_m + 3.0 + 2.0 * self.draught_m + self.strip_m * STRIPS as f64;
         motion.at.x.abs() < reach
             && motion.at.y.abs() < 0.4 * PI

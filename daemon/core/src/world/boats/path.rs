@@ -8,7 +8,7 @@ use crate::geometry::{ahead, heading_of, starboard};
 
 /// A place on a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Place {
+pub(super) struct PathPlace {
     pub position: DVec2,
     /// Radians clockwise from north.
     pub heading: f64,
@@ -18,25 +18,25 @@ pub(super) struct Place {
 
 /// One stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Piece {
+struct PathPiece {
     /// Distance sailed where it starts, metres.
     start_m: f64,
     /// Infinite for a last piece that goes on for ever.
     length_m: f64,
-    place: Place,
+    place: PathPlace,
 }
 
-impl Piece {
-    fn at(&self, along_m: f64) -> Place {
-        let Place { position, heading, curvature } = self.place;
+impl PathPiece {
+    fn at(&self, along_m: f64) -> PathPlace {
+        let PathPlace { position, heading, curvature } = self.place;
         if curvature == 0.0 {
-            return Place { position: position + ahead(heading) * along_m, ..self.place };
+            return PathPlace { position: position + ahead(heading) * along_m, ..self.place };
         }
         // An endless circle must not lose digits, so whole turns are taken off first.
         let turned = (along_m * curvature) % TAU;
         let centre = position + starboard(heading) / curvature;
         let now = heading + turned;
-        Place { position: centre - starboard(now) / curvature, heading: now, curvature }
+        PathPlace { position: centre - starboard(now) / curvature, heading: now, curvature }
     }
 }
 
@@ -51,17 +51,17 @@ pub(super) enum Ending {
 
 /// Pieces one after the other.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Path {
-    pieces: Vec<Piece>,
+pub(super) struct CoursePath {
+    pieces: Vec<PathPiece>,
     /// Where the next piece starts.
-    end: Place,
+    end: PathPlace,
     length_m: f64,
     ending: Ending,
 }
 
-impl Path {
+impl CoursePath {
     pub fn start(position: DVec2, heading: f64) -> Self {
-        let end = Place { position, heading, curvature: 0.0 };
+        let end = PathPlace { position, heading, curvature: 0.0 };
         Self { pieces: Vec::new(), end, length_m: 0.0, ending: Ending::Stay }
     }
 
@@ -79,9 +79,10 @@ impl Path {
 
     fn piece(mut self, curvature: f64, length_m: f64) -> Self {
         if length_m > 0.0 {
-            let piece = Piece { start_m: self.length_m, length_m, place: Place { curvature, ..self.end } };
+            let piece =
+                PathPiece { start_m: self.length_m, length_m, place: PathPlace { curvature, ..self.end } };
             if length_m.is_finite() {
-                self.end = Place { curvature: 0.0, ..piece.at(length_m) };
+                self.end = PathPlace { curvature: 0.0, ..piece.at(length_m) };
             }
             self.pieces.push(piece);
             self.length_m += length_m;
@@ -106,7 +107,7 @@ impl Path {
     }
 
     /// The place after `sailed_m` metres.
-    pub fn at(&self, sailed_m: f64) -> Place {
+    pub fn at(&self, sailed_m: f64) -> PathPlace {
         let sailed_m = match self.ending {
             Ending::Repeat(from_m) if sailed_m > from_m => {
                 from_m + (sailed_m - from_m).rem_euclid(self.length_m - from_m)
@@ -123,7 +124,7 @@ impl Path {
 
 /// A path along corners with each corner cut by an arc of at most `radius_m`. At least two points, neighbours apart, no turn
 /// near 180 degrees: the caller has checked.
-pub(super) fn along(points: &[DVec2], radius_m: f64, closed: bool) -> Path {
+pub(super) fn along(points: &[DVec2], radius_m: f64, closed: bool) -> CoursePath {
     let n = points.len();
     let leg = |i: usize| points[(i + 1) % n] - points[i % n];
     // The corner at the end of leg i: angle turned, and length of both legs that the arc takes.
@@ -134,12 +135,12 @@ pub(super) fn along(points: &[DVec2], radius_m: f64, closed: bool) -> Path {
         let cut = (radius_m * half).min(0.45 * a.length().min(b.length()));
         (angle, cut, if half > 1e-9 { cut / half } else { f64::INFINITY })
     };
-    let turn = |path: Path, (angle, _, radius): (f64, f64, f64)| {
+    let turn = |path: CoursePath, (angle, _, radius): (f64, f64, f64)| {
         if radius.is_finite() { path.turn(angle, radius) } else { path }
     };
     let legs = if closed { n } else { n - 1 };
     let before_first = if closed { corner(n - 1).1 } else { 0.0 };
-    let mut path = Path::start(points[0], heading_of(leg(0))).line(before_first);
+    let mut path = CoursePath::start(points[0], heading_of(leg(0))).line(before_first);
     let mut cut_before = before_first;
     for i in 0..legs {
         let last = !closed && i + 1 == legs;
@@ -165,7 +166,7 @@ mod tests {
 
     use super::*;
 
-    fn check_smooth(path: &Path, until_m: f64) {
+    fn check_smooth(path: &CoursePath, until_m: f64) {
         let step = 0.01;
         let mut last = path.at(0.0);
         for i in 1..(until_m / step) as u32 {
@@ -199,7 +200,7 @@ mod tests {
 
     #[test]
     fn an_endless_circle_keeps_its_radius() {
-        let path = Path::start(DVec2::new(0.0, 80.0), PI / 2.0).turn(f64::INFINITY, 80.0);
+        let path = CoursePath::start(DVec2::new(0.0, 80.0), PI / 2.0).turn(f64::INFINITY, 80.0);
         for sailed in [0.0, 1.0, 1e4, 1e9] {
             assert!((path.at(sailed).position.length() - 80.0).abs() < 1e-6, "{sailed}");
         }

@@ -7,7 +7,7 @@ use super::{
     course::CourseState,
     grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
     hull::HullForm,
-    motion::Motion,
+    motion::BoatMotion,
 };
 use crate::world::waves::WaveField;
 
@@ -23,7 +23,7 @@ const FAR_M: f64 = 2500.0;
 #[derive(Clone, Debug)]
 pub struct SeakeepingState {
     form: HullForm,
-    motions: GridHistory<Motion>,
+    motions: GridHistory<BoatMotion>,
 }
 
 impl SeakeepingState {
@@ -57,8 +57,8 @@ impl SeakeepingState {
         }
     }
 
-    fn plane(&self, number: i64, course: &impl Fn(f64) -> CourseState, waves: &WaveField) -> Motion {
-        Motion::of_plane(&self.form, course, waves, seconds(number))
+    fn plane(&self, number: i64, course: &impl Fn(f64) -> CourseState, waves: &WaveField) -> BoatMotion {
+        BoatMotion::of_plane(&self.form, course, waves, seconds(number))
     }
 
     /// Forgets what comes after `time_s`: the boat's course or sea is another from there on.
@@ -67,7 +67,7 @@ impl SeakeepingState {
     }
 
     /// The motion at a time; `None` where it is not followed yet or no longer kept.
-    pub fn at(&self, time_s: f64) -> Option<Motion> {
+    pub fn at(&self, time_s: f64) -> Option<BoatMotion> {
         match self.motions.around(time_s)? {
             Lookup::Between(from, to, share) => Some(from.between(to, STEP_S, share)),
             Lookup::After(last, past_s) => (past_s <= 0.0).then_some(*last),

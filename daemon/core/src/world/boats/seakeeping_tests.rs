@@ -105,7 +105,7 @@ fn a_long_swell_carries_boats_as_its_surface_goes() {
     for i in 0..3000 {
         let t = 10.0 + 0.1 * f64::from(i);
         ride.follow(t, &course, &waves);
-        let plane = Motion::of_plane(ride.form(), &course, &waves, t).at;
+        let plane = BoatMotion::of_plane(ride.form(), &course, &waves, t).at;
         let gap = ride.at(t).expect("followed").at - plane;
         off += gap * gap;
         size += plane * plane;
@@ -119,7 +119,7 @@ fn a_long_swell_carries_boats_as_its_surface_goes() {
 fn own_period(form: &HullForm, push: DVec3, axis: usize) -> f64 {
     let state = course(0.0, 0.0)(0.0);
     let h = STEP_S;
-    let mut motion = Motion { at: push, rate: DVec3::ZERO };
+    let mut motion = BoatMotion { at: push, rate: DVec3::ZERO };
     let mut crossings = Vec::new();
     for i in 0..3600 {
         let next = form.step([&state, &state], &WaveField::FLAT, 0.0, &motion, h);
@@ -137,7 +137,7 @@ fn hulls_float_at_their_waterline_and_swing_as_such_boats_do() {
     let rest = course(0.0, 0.0)(0.0);
     let frigate = hull(120.0, 14.0, 4.5);
     for form in [skiff(), hull(14.0, 4.5, 1.2), frigate.clone()] {
-        let next = form.step([&rest, &rest], &WaveField::FLAT, 0.0, &Motion::default(), STEP_S);
+        let next = form.step([&rest, &rest], &WaveField::FLAT, 0.0, &BoatMotion::default(), STEP_S);
         assert!(next.at.length() < 1e-9 && next.rate.length() < 1e-9, "{next:?}");
     }
     // Rolling periods of open boats and of frigates (IMO 2008 IS Code, 2.3: 2 C B / sqrt GM).
@@ -201,7 +201,7 @@ fn boats_of_scenarios_at_full_speed_never_leave_the_water_for_good() {
     for (form, speed, force) in cases {
         for heading in [0.7, 2.3, 3.8] {
             let (waves, course) = (sea(force, 5), course(heading, speed));
-            let mut motion = Motion::of_plane(&form, &course, &waves, 0.0);
+            let mut motion = BoatMotion::of_plane(&form, &course, &waves, 0.0);
             for number in 0..3600 {
                 let (a, b) = (course(seconds(number)), course(seconds(number + 1)));
                 motion = form.step([&a, &b], &waves, seconds(number), &motion, STEP_S);

@@ -56,7 +56,7 @@ pub struct FlightState {
 
 /// A short stretch of a flight, close to straight: at 900 m/s the path leaves the chord by less than a millimetre.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Segment {
+pub struct FlightSegment {
     /// Its start.
     pub from: FlightState,
     /// Its end.
@@ -119,7 +119,7 @@ impl Flight {
 
     /// The next stretch of the path that was not handed out yet, at most one step long and not beyond `until_s` seconds
     /// since the muzzle; `None` once the path is handed out up to there. Call until `None`.
-    pub fn next_segment(&mut self, until_s: f64) -> Option<Segment> {
+    pub fn next_segment(&mut self, until_s: f64) -> Option<FlightSegment> {
         if until_s.is_nan() || until_s <= self.swept_s {
             return None;
         }
@@ -133,7 +133,7 @@ impl Flight {
         }
         let from = self.state_at(self.swept_s);
         self.swept_s = until_s.min(end as f64 * STEP_S);
-        Some(Segment { from, to: self.state_at(self.swept_s) })
+        Some(FlightSegment { from, to: self.state_at(self.swept_s) })
     }
 
     /// Seconds since the muzzle up to which the path has been handed out.

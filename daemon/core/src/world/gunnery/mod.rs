@@ -8,4 +8,4 @@ mod flight;
 pub use atmosphere::{Air, Atmosphere};
 pub use dispersion::dispersed;
 pub use drag::g7_drag_coefficient;
-pub use flight::{Flight, FlightState, Projectile, STEP_S, Segment};
+pub use flight::{Flight, FlightSegment, FlightState, Projectile, STEP_S};

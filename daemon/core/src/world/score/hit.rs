@@ -133,9 +133,9 @@ fn touches_box(model: &Model, a: DVec3, b: DVec3) -> bool {
     enter <= leave
 }
 
-type Triangle<'a> = [&'a Vertex; 3];
+type HullTriangle<'a> = [&'a Vertex; 3];
 
-fn corners<'a>(model: &'a Model, indices: &[u32]) -> Option<Triangle<'a>> {
+fn corners<'a>(model: &'a Model, indices: &[u32]) -> Option<HullTriangle<'a>> {
     let corner = |i: usize| indices.get(i).and_then(|&index| model.vertices.get(index as usize));
     Some([corner(0)?, corner(1)?, corner(2)?])
 }
@@ -149,7 +149,7 @@ struct Pierced {
 }
 
 /// Moller and Trumbore 1997, both sides. Triangles without area, or seen exactly edge-on, are not pierced.
-fn pierce(triangle: Triangle<'_>, from: DVec3, ray: DVec3) -> Option<Pierced> {
+fn pierce(triangle: HullTriangle<'_>, from: DVec3, ray: DVec3) -> Option<Pierced> {
     let [p0, p1, p2] = triangle.map(|v| v.position.as_dvec3());
     let (e1, e2) = (p1 - p0, p2 - p0);
     let across = ray.cross(e2);
@@ -166,7 +166,7 @@ fn pierce(triangle: Triangle<'_>, from: DVec3, ray: DVec3) -> Option<Pierced> {
     (inside && (0.0..=1.0).contains(&fraction)).then_some(Pierced { fraction, weights: DVec2::new(u, v) })
 }
 
-fn is_solid(texture: Option<&Texture>, triangle: Triangle<'_>, pierced: Pierced) -> bool {
+fn is_solid(texture: Option<&Texture>, triangle: HullTriangle<'_>, pierced: Pierced) -> bool {
     let Some(texture) = texture else { return true };
     let [t0, t1, t2] = triangle.map(|v| v.uv.as_dvec2());
     let uv = t0 + (t1 - t0) * pierced.weights.x + (t2 - t0) * pierced.weights.y;

@@ -6,7 +6,7 @@ use super::hit::{Closest, Moving, closest_to_box, strike};
 use crate::{
     model::Zone,
     world::{
-        gunnery::{Flight, FlightState, Segment},
+        gunnery::{Flight, FlightSegment, FlightState},
         waves::WaveField,
     },
 };
@@ -118,7 +118,7 @@ impl Round {
         spent.then_some(End::Spent { time_s: self.fired_s + LIFE_S })
     }
 
-    fn sweep(&mut self, segment: &Segment, boats: &[Moving<'_>], sea: &WaveField) -> Option<End> {
+    fn sweep(&mut self, segment: &FlightSegment, boats: &[Moving<'_>], sea: &WaveField) -> Option<End> {
         let clock = |fraction: f64| {
             self.fired_s + segment.from.time_s + fraction * (segment.to.time_s - segment.from.time_s)
         };
@@ -163,7 +163,7 @@ impl Round {
 
 /// Where along the segment the round strikes the boat, which part, and the place in the boat's space.
 fn sweep_boat(
-    segment: &Segment,
+    segment: &FlightSegment,
     moving: &Moving<'_>,
     eye: DVec3,
     from_s: f64,
@@ -201,7 +201,7 @@ fn distance_to_origin(a: DVec3, b: DVec3) -> f64 {
 }
 
 /// How far along the segment the round meets the water.
-fn water_fraction(segment: &Segment, sea: &WaveField, from_s: f64, to_s: f64) -> Option<f64> {
+fn water_fraction(segment: &FlightSegment, sea: &WaveField, from_s: f64, to_s: f64) -> Option<f64> {
     let (a, b) = (segment.from.position, segment.to.position);
     let crest = sea.crest_max_m();
     if a.z.min(b.z) > crest {

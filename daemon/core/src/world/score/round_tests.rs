@@ -6,7 +6,7 @@ use crate::{
     geometry::RigidPose,
     model::Model,
     world::{
-        boats::{Course, Damage, Hull, quasi_static},
+        boats::{BoatDamage, Course, Hull, quasi_static},
         gunnery::{Atmosphere, Projectile},
         score::hit::tests::boxed,
         waves::{Spectrum, WaveSpec},
@@ -170,7 +170,7 @@ fn a_boat_on_waves_is_struck_where_it_floats() {
     let sea = WaveField::new(&WaveSpec { spectrum, wind_from: 1.0 }, 8);
     let model = boxed(Vec3::new(-3.0, -1.0, -0.5), Vec3::new(3.0, 1.0, 1.5));
     let course = Course::straight(DVec2::new(0.0, 200.0), 1.2, 6.0).expect("can be sailed");
-    let pose = |t: f64| quasi_static(&course.state(t, &Damage::NONE), &Hull::of(&model), &sea, t).pose;
+    let pose = |t: f64| quasi_static(&course.state(t, &BoatDamage::NONE), &Hull::of(&model), &sea, t).pose;
     for i in 0..20 {
         let fired = 0.9 * f64::from(i);
         // Where a point of the boat will be when the round gets there.

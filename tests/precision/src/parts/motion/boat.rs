@@ -5,7 +5,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use bowwave_core::world::{
-    boats::{CourseState, Hull, HullForm, Motion, SeakeepingState, quasi_static},
+    boats::{BoatMotion, CourseState, Hull, HullForm, SeakeepingState, quasi_static},
     waves::{Wave, WaveField},
 };
 use glam::{DVec2, DVec3};
@@ -128,7 +128,8 @@ impl Boat {
 
     /// How the product has the boat begin.
     pub fn start(&self) -> State {
-        let Motion { at, rate } = Motion::of_plane(&self.form(), |t| self.course(t), &self.waves, 0.0);
+        let BoatMotion { at, rate } =
+            BoatMotion::of_plane(&self.form(), |t| self.course(t), &self.waves, 0.0);
         [at.x, at.z, at.y, rate.x, rate.z, rate.y]
     }
 
@@ -138,7 +139,7 @@ impl Boat {
         let frame = |i: usize| {
             let t = i as f64 / hz as f64;
             ride.follow(t, |t| self.course(t), &self.waves);
-            ride.at(t).map_or([f64::NAN; 3], |Motion { at, .. }| [at.x, at.z, at.y])
+            ride.at(t).map_or([f64::NAN; 3], |BoatMotion { at, .. }| [at.x, at.z, at.y])
         };
         (0..frames).map(frame).collect()
     }

@@ -14,7 +14,7 @@ pub(super) const HEADING: usize = 2;
 /// ...turn of the camera against the unit in the camera's axes (3), ...
 const MOUNTING: usize = 3;
 /// ...how much higher the horizon stands than geometry has it, ...
-const DIP: usize = 6;
+const REFRACTION: usize = 6;
 /// ...turn about the vertical of the anchor and its rate, ...
 const ANCHOR: usize = 7;
 const ANCHOR_RATE: usize = 8;
@@ -24,18 +24,19 @@ const MOUNT: usize = 9;
 pub(super) const COMMON: usize = 10;
 
 /// Refraction moves the true horizon by as much from day to day and hour to hour (design figures: 0.08 to 0.12 deg in daytime), radians.
-pub const DIP_SIGMA: f64 = 0.1f64.to_radians();
+pub const REFRACTION_SIGMA: f64 = 0.1f64.to_radians();
 /// It forgets itself in this time, seconds.
-const DIP_TAU_S: f64 = 3600.0;
+const REFRACTION_TAU_S: f64 = 3600.0;
 
 /// How a measured number changes with the states.
-pub(super) type Row<const N: usize> = SVector<f64, N>;
+pub(super) type MeasurementRow<const N: usize> = SVector<f64, N>;
 
 /// By what a measurement differs from what was expected, and whether it was believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
-    /// Square of the difference over its expected variance: chi squared with as many degrees of freedom as the measurement has.
-    pub surprise: f64,
+pub struct UpdateOutcome {
+    /// Normalised innovation squared: the square of the difference over its expected variance, chi squared with as many degrees of
+    /// freedom as the measurement has.
+    pub nis: f64,
     /// Whether it was taken in.
     pub taken: bool,
 }
@@ -57,13 +58,13 @@ pub(super) enum Against {
 /// `N` states: estimates and the covariance of their errors. What of the estimates is a turn of the world is put into the orientation at
 /// once and kept there.
 #[derive(Clone, Debug)]
-pub(super) struct Aided<const N: usize> {
+pub(super) struct ErrorState<const N: usize> {
     covariance: SMatrix<f64, N, N>,
     estimate: SVector<f64, N>,
 }
 
 /// What cameras and ships tell, whatever else the states are.
-pub(super) trait Aids {
+pub(super) trait AidingUpdate {
     /// Covariance of the turn of the world, rad^2.
     fn turn_covariance(&self) -> DMat3;
 
@@ -71,21 +72,26 @@ pub(super) trait Aids {
     fn mounting(&self) -> DVec3;
 
     /// By how much the horizon stands higher than geometry has it, radians.
-    fn dip(&self) -> f64;
+    fn refraction(&self) -> f64;
 
     /// Takes in the direction of up that the camera saw, in the camera's axes, with the covariance of its part across up, rad^2, in the
-    /// world's horizontal axes; `limit` is the surprise beyond which it is not believed.
-    fn see_up(
+    /// world's horizontal axes; `gate` is the chi-square gate: the NIS beyond which it is not believed.
+    fn update_vertical(
         &mut self,
         world_from_camera: DQuat,
         up_camera: DVec3,
         covariance: DMat2,
-        limit: f64,
-    ) -> (Correction, Outcome);
+        gate: f64,
+    ) -> (Correction, UpdateOutcome);
 
     /// Takes in that by what is seen the world is to be turned by `off` about the vertical, rad, known to that variance.
-    fn see_heading(&mut self, against: Against, off: f64, variance: f64, limit: f64)
-    -> (Correction, Outcome);
+    fn update_heading(
+        &mut self,
+        against: Against,
+        off: f64,
+        variance: f64,
+        gate: f64,
+    ) -> (Correction, UpdateOutcome);
 
     /// The gun's bearing on its mount is what heading and the ship's heading now make it, which errs by `variance` beyond the heading.
     fn anchor_mount(&mut self, variance: f64);
@@ -97,18 +103,18 @@ pub(super) trait Aids {
     fn anchor(&mut self, drift: f64);
 
     /// Takes in that what is anchored in does not turn itself, to that variance, (rad/s)^2.
-    fn see_anchor_stand(&mut self, variance: f64) -> Correction;
+    fn update_anchor_still(&mut self, variance: f64) -> Correction;
 }
 
-impl<const N: usize> Aided<N> {
+impl<const N: usize> ErrorState<N> {
     /// Nothing learnt yet of a camera that is mounted on the unit to within `mounting`, rad.
     pub fn new(mounting: DVec3) -> Self {
-        let mut aided = Self { covariance: SMatrix::zeros(), estimate: SVector::zeros() };
+        let mut error_state = Self { covariance: SMatrix::zeros(), estimate: SVector::zeros() };
         for axis in 0..3 {
-            aided.forget(MOUNTING + axis, mounting[axis]);
+            error_state.forget(MOUNTING + axis, mounting[axis]);
         }
-        aided.forget(DIP, DIP_SIGMA);
-        aided
+        error_state.forget(REFRACTION, REFRACTION_SIGMA);
+        error_state
     }
 
     /// What is known of a state.
@@ -144,7 +150,7 @@ impl<const N: usize> Aided<N> {
 
     /// What `dt_s` seconds do to the states that all have, but for the turn.
     pub fn pass_time(&mut self, dt_s: f64) {
-        self.fade(DIP, (-dt_s / DIP_TAU_S).exp(), DIP_SIGMA * DIP_SIGMA);
+        self.fade(REFRACTION, (-dt_s / REFRACTION_TAU_S).exp(), REFRACTION_SIGMA * REFRACTION_SIGMA);
         self.carry(ANCHOR, ANCHOR_RATE, dt_s);
     }
 
@@ -233,41 +239,41 @@ impl<const N: usize> Aided<N> {
     /// Takes in a number that differs by `differ` from what was expected.
     pub fn update_one(
         &mut self,
-        row: &Row<N>,
+        row: &MeasurementRow<N>,
         differ: f64,
         variance: f64,
-        limit: f64,
-    ) -> (Correction, Outcome) {
+        gate: f64,
+    ) -> (Correction, UpdateOutcome) {
         let gain = self.covariance * row;
         let expected = row.dot(&gain) + variance;
-        let surprise = differ * differ / expected;
-        if surprise.is_nan() || surprise > limit {
-            return (DQuat::IDENTITY, Outcome { surprise, taken: false });
+        let nis = differ * differ / expected;
+        if nis.is_nan() || nis > gate {
+            return (DQuat::IDENTITY, UpdateOutcome { nis, taken: false });
         }
         self.covariance -= gain * gain.transpose() / expected;
         self.hold_symmetric();
-        (self.put_in(&(gain * (differ / expected))), Outcome { surprise, taken: true })
+        (self.put_in(&(gain * (differ / expected))), UpdateOutcome { nis, taken: true })
     }
 
     /// Takes in two numbers.
     pub fn update(
         &mut self,
-        rows: &[Row<N>; 2],
+        rows: &[MeasurementRow<N>; 2],
         differ: DVec2,
         noise: DMat2,
-        limit: f64,
-    ) -> (Correction, Outcome) {
+        gate: f64,
+    ) -> (Correction, UpdateOutcome) {
         let rows = SMatrix::<f64, N, 2>::from_columns(rows);
         let differ = SVector::<f64, 2>::new(differ.x, differ.y);
         let noise = SMatrix::<f64, 2, 2>::from_fn(|r, c| noise.col(c)[r]);
         let across = self.covariance * rows;
         let expected = rows.transpose() * across + noise;
         let Some(inverse) = expected.try_inverse() else {
-            return (DQuat::IDENTITY, Outcome { surprise: f64::NAN, taken: false });
+            return (DQuat::IDENTITY, UpdateOutcome { nis: f64::NAN, taken: false });
         };
-        let surprise = (differ.transpose() * inverse * differ)[(0, 0)];
-        if surprise.is_nan() || surprise > limit {
-            return (DQuat::IDENTITY, Outcome { surprise, taken: false });
+        let nis = (differ.transpose() * inverse * differ)[(0, 0)];
+        if nis.is_nan() || nis > gate {
+            return (DQuat::IDENTITY, UpdateOutcome { nis, taken: false });
         }
         let gain = across * inverse;
         // Joseph's form, (I - K H) P (I - K H)' + K R K', from the left: what rounding left of the second factor is taken off by it.
@@ -275,7 +281,7 @@ impl<const N: usize> Aided<N> {
         let rest = self.covariance * rows - gain * noise;
         self.covariance -= rest * gain.transpose();
         self.hold_symmetric();
-        (self.put_in(&(gain * differ)), Outcome { surprise, taken: true })
+        (self.put_in(&(gain * differ)), UpdateOutcome { nis, taken: true })
     }
 
     fn hold_symmetric(&mut self) {
@@ -291,7 +297,7 @@ impl<const N: usize> Aided<N> {
     }
 }
 
-impl<const N: usize> Aids for Aided<N> {
+impl<const N: usize> AidingUpdate for ErrorState<N> {
     fn turn_covariance(&self) -> DMat3 {
         self.covariance(TURN)
     }
@@ -300,17 +306,17 @@ impl<const N: usize> Aids for Aided<N> {
         self.three(MOUNTING)
     }
 
-    fn dip(&self) -> f64 {
-        self.at(DIP)
+    fn refraction(&self) -> f64 {
+        self.at(REFRACTION)
     }
 
-    fn see_up(
+    fn update_vertical(
         &mut self,
         world_from_camera: DQuat,
         up_camera: DVec3,
         covariance: DMat2,
-        limit: f64,
-    ) -> (Correction, Outcome) {
+        gate: f64,
+    ) -> (Correction, UpdateOutcome) {
         let up = world_from_camera * up_camera;
         let mut rows = up_rows();
         let axes = DMat3::from_quat(world_from_camera);
@@ -321,20 +327,20 @@ impl<const N: usize> Aids for Aided<N> {
             rows[0][MOUNTING + column] = turned.y;
             rows[1][MOUNTING + column] = -turned.x;
         }
-        rows[0][DIP] = -ahead.x;
-        rows[1][DIP] = -ahead.y;
-        let differ = up.truncate() + ahead * self.dip();
-        self.update(&rows, differ, covariance, limit)
+        rows[0][REFRACTION] = -ahead.x;
+        rows[1][REFRACTION] = -ahead.y;
+        let differ = up.truncate() + ahead * self.refraction();
+        self.update(&rows, differ, covariance, gate)
     }
 
-    fn see_heading(
+    fn update_heading(
         &mut self,
         against: Against,
         off: f64,
         variance: f64,
-        limit: f64,
-    ) -> (Correction, Outcome) {
-        let mut row = Row::zeros();
+        gate: f64,
+    ) -> (Correction, UpdateOutcome) {
+        let mut row = MeasurementRow::zeros();
         row[HEADING] = 1.0;
         let reference = match against {
             Against::North => None,
@@ -346,7 +352,7 @@ impl<const N: usize> Aids for Aided<N> {
             row[state] = -1.0;
             turned = self.at(state);
         }
-        self.update_one(&row, off + turned, variance, limit)
+        self.update_one(&row, off + turned, variance, gate)
     }
 
     fn anchor_mount(&mut self, variance: f64) {
@@ -366,16 +372,16 @@ impl<const N: usize> Aids for Aided<N> {
         self.walk(ANCHOR_RATE, (drift * drift - self.variance(ANCHOR_RATE)).max(0.0));
     }
 
-    fn see_anchor_stand(&mut self, variance: f64) -> Correction {
-        let mut row = Row::zeros();
+    fn update_anchor_still(&mut self, variance: f64) -> Correction {
+        let mut row = MeasurementRow::zeros();
         row[ANCHOR_RATE] = 1.0;
         self.update_one(&row, -self.at(ANCHOR_RATE), variance, f64::INFINITY).0
     }
 }
 
 /// How the horizontal parts of where up is found change with the turn of the world: `up + up x turn`.
-pub(super) fn up_rows<const N: usize>() -> [Row<N>; 2] {
-    let mut rows = [Row::zeros(); 2];
+pub(super) fn up_rows<const N: usize>() -> [MeasurementRow<N>; 2] {
+    let mut rows = [MeasurementRow::zeros(); 2];
     rows[0][TURN + 1] = -1.0;
     rows[1][TURN] = 1.0;
     rows

@@ -5,7 +5,7 @@
 
 use glam::{DQuat, DVec2, DVec3};
 
-use super::aided::{Aided, COMMON, HEADING, Outcome, TURN};
+use super::error_state::{COMMON, ErrorState, HEADING, TURN, UpdateOutcome};
 
 /// Beside what all have: mean of the turn that the world needs (3), the rate of the heading's.
 const MEAN: usize = COMMON;
@@ -21,7 +21,7 @@ const MEAN_SIGMA_MOST: f64 = 4f64.to_radians();
 const UNSEEN_S: f64 = 3.0;
 /// ...of which each time tells so much.
 const UNSEEN_SHARE: f64 = 0.3;
-/// No surprise counts as more than this (chi squared with two degrees of freedom).
+/// No normalised innovation squared counts as more than this (chi squared with two degrees of freedom).
 const UNSEEN_MOST: f64 = 20.0;
 /// It forgets itself in this time, seconds.
 const MEAN_TAU_S: f64 = 300.0;
@@ -48,9 +48,9 @@ const STEP_S: f64 = 0.1;
 
 /// A filter of the turn by which a unit's own world is to be turned.
 #[derive(Clone, Debug)]
-pub(super) struct Own {
+pub(super) struct ExternalAhrs {
     /// States and how far they are known.
-    pub(super) aided: Aided<STATES>,
+    pub(super) error_state: ErrorState<STATES>,
     /// By what the unit's world is turned: about the vertical first, then by a small tilt; radians.
     heading: f64,
     tilt: DVec2,
@@ -60,7 +60,7 @@ pub(super) struct Own {
     dt_s: f64,
     /// By what the mean inclination is wrong, radians.
     mean_sigma: f64,
-    sway: Sway,
+    bias: GaussMarkovBias,
     /// Time since a horizon was seen.
     unseen_s: f64,
     refused_in_a_row: u32,
@@ -68,7 +68,7 @@ pub(super) struct Own {
 
 /// How far inclination goes to and fro, by what was seen of it.
 #[derive(Clone, Copy, Debug)]
-struct Sway {
+struct GaussMarkovBias {
     /// Variance on an axis, rad^2.
     variance: f64,
     watched_s: f64,
@@ -77,34 +77,34 @@ struct Sway {
     since_s: f64,
 }
 
-impl Own {
+impl ExternalAhrs {
     /// A unit whose mean heading counts as right now.
     pub(super) fn new(growth: f64, mounting: DVec3) -> Self {
-        let mut aided = Aided::new(mounting);
-        aided.forget(HEADING, HEADING_SWAY);
-        aided.forget(RATE, growth);
-        let mut own = Self {
-            aided,
+        let mut error_state = ErrorState::new(mounting);
+        error_state.forget(HEADING, HEADING_SWAY);
+        error_state.forget(RATE, growth);
+        let mut external_ahrs = Self {
+            error_state,
             heading: 0.0,
             tilt: DVec2::ZERO,
             growth,
             dt_s: 0.0,
             mean_sigma: MEAN_SIGMA,
-            sway: Sway::START,
+            bias: GaussMarkovBias::START,
             unseen_s: 0.0,
             refused_in_a_row: 0,
         };
-        own.forget_tilt();
-        own
+        external_ahrs.forget_tilt();
+        external_ahrs
     }
 
     /// Nothing is known of the inclination but the unit's class and how far it has been seen to sway. What it is turned by stays until
     /// something else is seen.
     fn forget_tilt(&mut self) {
         for axis in 0..2 {
-            self.aided.forget(MEAN + axis, self.mean_sigma);
-            self.aided.copy(TURN + axis, MEAN + axis);
-            self.aided.walk(TURN + axis, self.sway.variance);
+            self.error_state.forget(MEAN + axis, self.mean_sigma);
+            self.error_state.copy(TURN + axis, MEAN + axis);
+            self.error_state.walk(TURN + axis, self.bias.variance);
         }
     }
 
@@ -129,7 +129,7 @@ impl Own {
 
     /// By how much the heading may drift, standard deviation, rad/s.
     pub(super) fn drift_sigma(&self) -> f64 {
-        self.aided.variance(RATE).max(0.0).sqrt()
+        self.error_state.variance(RATE).max(0.0).sqrt()
     }
 
     /// Brings all to the present.
@@ -138,38 +138,38 @@ impl Own {
         if dt <= 0.0 {
             return;
         }
-        self.sway.since_s += dt;
+        self.bias.since_s += dt;
         self.unseen_s += dt;
-        self.aided.pass_time(dt);
+        self.error_state.pass_time(dt);
         let (creeps, sways) = ((-dt / MEAN_TAU_S).exp(), (-dt / SWAY_TAU_S).exp());
         for axis in 0..2 {
-            let mean = self.aided.at(MEAN + axis);
+            let mean = self.error_state.at(MEAN + axis);
             // The world turns back towards where the unit's own mean has it.
             self.tilt[axis] += (1.0 - sways) * (mean - self.tilt[axis]);
-            self.revert(TURN + axis, MEAN + axis, sways, self.sway.variance);
-            self.aided.fade(MEAN + axis, creeps, self.mean_sigma * self.mean_sigma);
+            self.revert(TURN + axis, MEAN + axis, sways, self.bias.variance);
+            self.error_state.fade(MEAN + axis, creeps, self.mean_sigma * self.mean_sigma);
         }
-        self.heading += (1.0 - sways) * (self.aided.at(MEAN_HEADING) - self.heading);
+        self.heading += (1.0 - sways) * (self.error_state.at(MEAN_HEADING) - self.heading);
         self.revert(HEADING, MEAN_HEADING, sways, HEADING_SWAY * HEADING_SWAY);
-        self.aided.carry(MEAN_HEADING, RATE, dt);
-        self.aided.fade(RATE, (-dt / RATE_TAU_S).exp(), self.growth * self.growth);
+        self.error_state.carry(MEAN_HEADING, RATE, dt);
+        self.error_state.fade(RATE, (-dt / RATE_TAU_S).exp(), self.growth * self.growth);
     }
 
     /// A state keeps that share of how it differs from its mean, and chance makes up what its variance loses. What is known of it is kept
     /// elsewhere.
     fn revert(&mut self, state: usize, mean: usize, kept: f64, variance: f64) {
-        self.aided.fade(state, kept, variance);
-        self.aided.add(state, mean, 1.0 - kept);
+        self.error_state.fade(state, kept, variance);
+        self.error_state.add(state, mean, 1.0 - kept);
     }
 
     /// The heading is set from outside: the world is turned by `off` about the vertical, which is then known to `deviation`.
     pub(super) fn set_heading(&mut self, off: f64, deviation: f64) {
-        self.aided.set_heading(off, deviation, &[MEAN]);
+        self.error_state.set_heading(off, deviation, &[MEAN]);
         self.heading += off;
         self.tilt = DVec2::from_angle(off).rotate(self.tilt);
-        self.aided.copy(MEAN_HEADING, HEADING);
-        self.aided.walk(MEAN_HEADING, HEADING_SWAY * HEADING_SWAY);
-        self.aided.set(MEAN_HEADING, self.heading);
+        self.error_state.copy(MEAN_HEADING, HEADING);
+        self.error_state.walk(MEAN_HEADING, HEADING_SWAY * HEADING_SWAY);
+        self.error_state.set(MEAN_HEADING, self.heading);
     }
 
     /// The world has been turned by what an aid told; where that was up, `seen` is by what it was to be turned, with that variance.
@@ -181,11 +181,11 @@ impl Own {
 
     /// Learns from an error of inclination that was seen, as the turn that the world as it was believed needs, and its variance on an axis;
     /// whether it was believed or not: else a unit that sways farther than was thought would never be.
-    pub(super) fn watch(&mut self, turn: DVec2, variance: f64, outcome: Outcome) {
-        self.sway.watch(self.tilt + turn, variance);
-        if std::mem::take(&mut self.unseen_s) >= UNSEEN_S && outcome.surprise.is_finite() {
+    pub(super) fn watch(&mut self, turn: DVec2, variance: f64, outcome: UpdateOutcome) {
+        self.bias.watch(self.tilt + turn, variance);
+        if std::mem::take(&mut self.unseen_s) >= UNSEEN_S && outcome.nis.is_finite() {
             // Two is as far as was expected.
-            let beyond = 0.5 * outcome.surprise.min(UNSEEN_MOST) - 1.0;
+            let beyond = 0.5 * outcome.nis.min(UNSEEN_MOST) - 1.0;
             let now = self.mean_sigma * (1.0 + UNSEEN_SHARE * beyond).sqrt();
             self.mean_sigma = now.clamp(MEAN_SIGMA, MEAN_SIGMA_MOST);
         }
@@ -198,7 +198,7 @@ impl Own {
     }
 }
 
-impl Sway {
+impl GaussMarkovBias {
     const START: Self =
         Self { variance: SWAY_START * SWAY_START, watched_s: 0.0, before: None, since_s: 0.0 };
 

@@ -6,7 +6,7 @@ use glam::DMat2;
 /// stays: `x'' + 2 z w x' + w^2 x = noise`, whose slope `x'` has nothing at the lowest frequencies. A filter that takes it for what forgets
 /// itself in the same time holds a gun that no camera helps three times worse.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Swell {
+pub(super) struct HeaveAcceleration {
     /// Frequency without damping, rad/s.
     frequency: f64,
 }
@@ -16,7 +16,7 @@ const DAMPING: f64 = 0.5;
 /// The frequency times the time constant of the filter that waves come through. From 4 to 9 the simulated gun's error changes by a third.
 const FREQUENCY_TAUS: f64 = 5.0;
 
-impl Swell {
+impl HeaveAcceleration {
     /// Of an inclination with that time constant.
     pub fn new(tau_s: f64) -> Self {
         Self { frequency: FREQUENCY_TAUS / tau_s }
@@ -47,13 +47,13 @@ mod tests {
 
     #[test]
     fn two_steps_are_one_of_twice_the_length() {
-        let swell = Swell::new(10.0);
-        let ((half, added), (whole, all)) = (swell.step(0.2), swell.step(0.4));
+        let heave = HeaveAcceleration::new(10.0);
+        let ((half, added), (whole, all)) = (heave.step(0.2), heave.step(0.4));
         assert!((half * half).abs_diff_eq(whole, 1e-12), "{whole}");
         assert!((half * added * half.transpose() + added).abs_diff_eq(all, 1e-12), "{all}");
         assert!(added.determinant() > 0.0 && all.y_axis.y > added.y_axis.y, "{added} {all}");
         // The slope is the slope.
-        let (change, _) = swell.step(1e-6);
+        let (change, _) = heave.step(1e-6);
         assert!((change.y_axis.x - 1e-6).abs() < 1e-11, "{change}");
     }
 }
