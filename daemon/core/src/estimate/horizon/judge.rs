@@ -1,10 +1,13 @@
 //! Whether a line is the sea's horizon.
 
 use super::{
-    CONTRAST_FULL, LineQuality,
+    answer::LineQuality,
     edges::above,
     fit::{EdgePoint, HorizonFit, LineSearch},
 };
+
+/// Contrast at which a line is no worse for being faint, codes.
+const CONTRAST_FULL: f64 = 15.0;
 
 /// Rows from the line to the parallels that it is compared with.
 const PARALLELS: [i32; 11] = [8, 12, 16, 20, 24, 28, 32, 36, 40, 44, 48];

@@ -1,9 +1,13 @@
 use std::sync::Arc;
 
+use glam::{DVec2, DVec3};
 use proptest::prelude::*;
 
 use super::{fit::up_of, *};
-use crate::{event::PixelFormat, geometry::Distortion};
+use crate::{
+    event::{Picture, PixelFormat},
+    geometry::{Distortion, Lens, horizon_dip},
+};
 
 /// Evenly spread numbers from -1 to 1, by place.
 fn grain(i: usize, seed: u64) -> f64 {

@@ -1,10 +1,15 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::{geometry::look, physics::GRAVITY_M_S2};
+use crate::{
+    geometry::{CameraPose, Lens, look},
+    physics::GRAVITY_M_S2,
+    sea::{BeaufortForce, WmoSeaState},
+    time::Time,
+};
 
 const EYE_M: f64 = 8.0;
 
