@@ -45,7 +45,11 @@ impl BoatHistory {
         let last = step_after(until_s);
         if self.states.newest().is_none_or(|newest| last.saturating_sub(newest) > GAP) {
             let first = if last <= GAP { 0 } else { last.saturating_sub(KEPT as i64 - 1).max(0) };
-            self.states.restart(first, self.behaviour.begin(seconds(first), &self.damage));
+            let state = match self.states.last() {
+                Some(before) if first > 0 => self.behaviour.resume(before, seconds(first), &self.damage),
+                _ => self.behaviour.begin(seconds(first), &self.damage),
+            };
+            self.states.restart(first, state);
         }
         while let (Some(newest), Some(from)) = (self.states.newest(), self.states.last())
             && newest < last

@@ -1,6 +1,6 @@
 //! Boats: what they do, where they were, and how waves move them.
 
-mod behaviour;
+pub mod behaviour;
 mod course;
 mod floating;
 mod grid;

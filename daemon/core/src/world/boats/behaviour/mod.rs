@@ -1,4 +1,10 @@
-//! What boats do: each behaviour gives a boat's next state from its last.
+//! The behaviours of boats: each gives a boat's next state from its last.
+//!
+//! A new one is a file in this folder, an entry of [`Behaviour`], and a course of the scenario's reader.
+
+mod step;
+
+pub use step::BehaviourStep;
 
 use super::course::{BoatDamage, Course, CourseState};
 
@@ -10,21 +16,16 @@ pub enum Behaviour {
     ScriptedCourse(Course),
 }
 
-/// A boat at the begin of a step.
-#[derive(Clone, Copy, Debug)]
-pub struct BehaviourStep<'a> {
-    /// Where it is.
-    pub from: &'a CourseState,
-    /// Seconds since the scenario began at the end of the step.
-    pub to_s: f64,
-    /// What has struck it.
-    pub damage: &'a BoatDamage,
-}
-
 impl Behaviour {
-    /// The state from which the boat is stepped on at `time_s`, where nothing is known of the time before: at the scenario's begin, or
-    /// after a stretch that nobody followed.
+    /// The state from which the boat is stepped on at `time_s`, where nothing is known of the time before: at the scenario's begin.
     pub fn begin(&self, time_s: f64, damage: &BoatDamage) -> CourseState {
+        match self {
+            Self::ScriptedCourse(course) => course.state(time_s, damage),
+        }
+    }
+
+    /// The state from which the boat is stepped on at `time_s`, after a stretch that nobody followed; `last` is from before it.
+    pub fn resume(&self, _last: &CourseState, time_s: f64, damage: &BoatDamage) -> CourseState {
         match self {
             Self::ScriptedCourse(course) => course.state(time_s, damage),
         }

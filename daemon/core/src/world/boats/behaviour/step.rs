@@ -1,0 +1,14 @@
+//! A step of a boat.
+
+use crate::world::boats::course::{BoatDamage, CourseState};
+
+/// A boat at the begin of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct BehaviourStep<'a> {
+    /// Where it is.
+    pub from: &'a CourseState,
+    /// Seconds since the scenario began at the end of the step.
+    pub to_s: f64,
+    /// What has struck it.
+    pub damage: &'a BoatDamage,
+}
