@@ -26,7 +26,7 @@ pub enum ModelError {
         "there is no model {name:?}; built in are {}; a file of your own ends in .glb, .gltf or .png", known.join(", ")
     )]
     Unknown {
-        /// What was asked for.
+        /// Name that was asked for.
         name: String,
         /// Names that would do.
         known: Vec<&'static str>,
@@ -58,7 +58,7 @@ pub enum ModelError {
     Gltf {
         /// The file.
         file: String,
-        /// What is wrong, and where.
+        /// The fault, and its place.
         problem: String,
     },
     /// Named parts are missing.
@@ -129,7 +129,7 @@ pub enum ModelError {
     Picture {
         /// The file.
         file: String,
-        /// What is wrong and what to do.
+        /// The fault and its remedy.
         problem: String,
     },
     /// The file beside a picture is missing.

@@ -46,7 +46,7 @@ pub struct Rect {
     pub bottom: f64,
 }
 
-/// What a picture does not say itself.
+/// Facts that a picture does not hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QuadSpec {
     /// Length over all, metres: from the first to the last column that has an opaque pixel.

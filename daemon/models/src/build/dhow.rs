@@ -5,98 +5,14 @@ use glam::Vec3;
 
 use super::{
     assembly::Assembly,
-    figure::{Clothes, Head, Pose, figure},
-    loft::{Hull, Line, smooth},
+    figure::{Clothes, FigurePose, Headwear, figure},
+    loft::{HullLine, LinesPlan, Offsets, beside, offsets, smooth},
     paint::Paint,
     solid::{Solid, bar, block, drum, ellipsoid, pipe, prism, tapered},
 };
 
-// Control points from the stern: transom aft, transom fore (filled), the same open, quarter, break of the poop twice,
-// amidships, fore shoulder, bow, stem.
-type Curve = [[f32; 3]; 9];
-
-const KEEL: Curve = [
-    [-7.40, 0.0, -1.30],
-    [-7.28, 0.0, -1.31],
-    [-7.28, 0.0, -1.31],
-    [-5.50, 0.0, -1.38],
-    [-3.00, 0.0, -1.42],
-    [-3.00, 0.0, -1.42],
-    [0.50, 0.0, -1.40],
-    [3.60, 0.0, -1.30],
-    [5.30, 0.0, -1.05],
-];
-const BILGE: Curve = [
-    [-7.50, 0.42, -0.62],
-    [-7.38, 0.46, -0.63],
-    [-7.38, 0.46, -0.63],
-    [-5.50, 1.15, -0.85],
-    [-3.00, 1.62, -0.95],
-    [-3.00, 1.62, -0.95],
-    [0.50, 1.72, -0.98],
-    [4.00, 0.98, -0.78],
-    [6.25, 0.0, -0.22],
-];
-const WATER: Curve = [
-    [-7.66, 1.22, 0.22],
-    [-7.54, 1.27, 0.20],
-    [-7.54, 1.27, 0.20],
-    [-5.55, 1.88, 0.10],
-    [-3.00, 2.24, 0.05],
-    [-3.00, 2.24, 0.05],
-    [0.50, 2.34, 0.05],
-    [4.25, 1.66, 0.15],
-    [7.00, 0.0, 0.48],
-];
-const WALE: Curve = [
-    [-8.05, 1.72, 1.86],
-    [-7.93, 1.75, 1.83],
-    [-7.93, 1.75, 1.83],
-    [-5.65, 2.22, 1.42],
-    [-3.00, 2.43, 1.14],
-    [-3.00, 2.43, 1.14],
-    [0.60, 2.50, 1.02],
-    [4.70, 2.12, 1.36],
-    [8.35, 0.0, 2.02],
-];
-const RAIL: Curve = [
-    [-8.42, 1.90, 3.05],
-    [-8.30, 1.92, 3.00],
-    [-8.30, 1.92, 3.00],
-    [-5.75, 2.30, 2.48],
-    [-3.00, 2.46, 2.02],
-    [-3.00, 2.46, 2.02],
-    [0.70, 2.53, 1.68],
-    [5.00, 2.26, 2.12],
-    [9.05, 0.0, 2.98],
-];
-/// Foot of the bulwark's inner side; the top of the transom where the boat is not open.
-const DECK: Curve = [
-    [-8.42, 0.60, 3.18],
-    [-8.30, 0.60, 3.13],
-    [-7.97, 1.70, 2.05],
-    [-5.75, 2.14, 2.00],
-    [-3.00, 2.28, 1.98],
-    [-3.00, 2.26, 0.92],
-    [0.70, 2.34, 0.86],
-    [4.70, 1.86, 1.26],
-    [8.00, 0.0, 2.16],
-];
-const CENTRE: Curve = [
-    [-8.42, 0.0, 3.20],
-    [-8.30, 0.0, 3.15],
-    [-7.97, 0.0, 2.12],
-    [-5.75, 0.0, 2.08],
-    [-3.00, 0.0, 2.06],
-    [-3.00, 0.0, 1.00],
-    [0.70, 0.0, 0.95],
-    [4.70, 0.0, 1.34],
-    [8.00, 0.0, 2.16],
-];
-
-fn beside(line: &Curve, out: f32, up: f32) -> Curve {
-    line.map(|[x, y, z]| if y > 0.0 { [x, y + out, z + up] } else { [x + out, y, z + up] })
-}
+/// Keel, bilge, water, wale, rail, deck and centre line.
+const OFFSETS: Offsets<7, 9> = offsets(include_str!("dhow.txt"));
 
 /// The whole boat.
 pub(crate) fn build() -> Assembly {
@@ -119,22 +35,20 @@ pub(crate) fn build() -> Assembly {
 }
 
 fn hull() -> Solid {
-    let rail_out = beside(&RAIL, 0.06, 0.0);
-    let rail_top = beside(&RAIL, 0.06, 0.09);
-    let rail_in = beside(&RAIL, -0.14, 0.09);
-    let line = |points, corner, rows, paint| Line { points, corner, rows, paint };
-    Hull {
+    let [keel, bilge, water, wale, rail, deck, centre] = &OFFSETS;
+    let rail_at = |out: f32, up: f32| beside(rail, out, up, out);
+    LinesPlan {
         lines: &[
-            line(&KEEL, true, 2, Paint::Teak),
-            line(&BILGE, false, 2, Paint::Teak),
-            line(&WATER, false, 3, Paint::Teak),
-            line(&WALE, true, 2, Paint::GreenStrake),
-            line(&RAIL, true, 1, Paint::DeckHouse),
-            line(&rail_out, true, 1, Paint::DeckHouse),
-            line(&rail_top, true, 1, Paint::DeckHouse),
-            line(&rail_in, true, 1, Paint::DeckHouse),
-            line(&DECK, true, 1, Paint::Planks),
-            line(&CENTRE, true, 0, Paint::Planks),
+            HullLine::edge(keel, 2, Paint::Teak),
+            HullLine::round(bilge, 2, Paint::Teak),
+            HullLine::round(water, 3, Paint::Teak),
+            HullLine::edge(wale, 2, Paint::GreenStrake),
+            HullLine::edge(rail, 1, Paint::DeckHouse),
+            HullLine::edge(&rail_at(0.06, 0.0), 1, Paint::DeckHouse),
+            HullLine::edge(&rail_at(0.06, 0.09), 1, Paint::DeckHouse),
+            HullLine::edge(&rail_at(-0.14, 0.09), 1, Paint::DeckHouse),
+            HullLine::edge(deck, 1, Paint::Planks),
+            HullLine::edge(centre, 0, Paint::Planks),
         ],
         steps: 3,
         crease: 32.0,
@@ -151,7 +65,8 @@ fn stem_and_rudder() -> Vec<Solid> {
     let rudder = [(-8.35, -1.25), (-7.42, -1.30), (-7.75, 0.4), (-8.12, 1.95), (-8.36, 1.95), (-8.25, 0.2)];
     let blade = |y: f32| rudder.iter().map(|&(x, z)| Vec3::new(x, y, z)).collect::<Vec<_>>();
     let wale = |side: f32| {
-        let path: Vec<(Vec3, f32)> = WALE[1..]
+        let [_, _, _, wale, ..] = &OFFSETS;
+        let path: Vec<(Vec3, f32)> = wale[1..]
             .iter()
             .filter(|p| p[1] > 0.0)
             .map(|&[x, y, z]| (Vec3::new(x, (y + 0.03) * side, z), 0.07))
@@ -308,14 +223,14 @@ fn gear() -> Vec<Solid> {
 
 /// Two men on deck.
 fn hands() -> Vec<Solid> {
-    let standing = Pose {
+    let standing = FigurePose {
         pelvis: Vec3::new(1.0, -1.35, 1.85),
         facing: Vec3::new(0.2, -1.0, 0.0),
         lean: 0.10,
         hands: [Vec3::new(1.35, -2.05, 1.82), Vec3::new(0.80, -2.10, 1.82)],
         feet: [Vec3::new(1.15, -1.40, 1.02), Vec3::new(0.85, -1.32, 1.02)],
     };
-    let seated = Pose {
+    let seated = FigurePose {
         pelvis: Vec3::new(5.75, 0.9, 1.78),
         facing: Vec3::new(-1.0, -0.3, 0.0),
         lean: 0.12,
@@ -323,7 +238,7 @@ fn hands() -> Vec<Solid> {
         feet: [Vec3::new(5.22, 0.55, 1.40), Vec3::new(5.18, 0.90, 1.40)],
     };
     let wear = |top, head| Clothes { top, trousers: Paint::Sand, shoes: Paint::Skin, head, vest: None };
-    let mut solids = figure(&standing, &wear(Paint::White, Head::Wrap(Paint::RedShirt)));
-    solids.extend(figure(&seated, &wear(Paint::BlueDrum, Head::Wrap(Paint::White))));
+    let mut solids = figure(&standing, &wear(Paint::White, Headwear::Wrap(Paint::RedShirt)));
+    solids.extend(figure(&seated, &wear(Paint::BlueDrum, Headwear::Wrap(Paint::White))));
     solids
 }

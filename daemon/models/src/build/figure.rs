@@ -16,9 +16,9 @@ const FOREARM: f32 = 0.26;
 const THIGH: f32 = 0.43;
 const SHIN: f32 = 0.43;
 
-/// What is worn on the head.
+/// Headwear.
 #[derive(Clone, Copy)]
-pub(crate) enum Head {
+pub(crate) enum Headwear {
     /// Cloth wound about the head.
     Wrap(Paint),
     /// Cap with a peak.
@@ -27,20 +27,20 @@ pub(crate) enum Head {
     Helmet(Paint),
 }
 
-/// What is worn.
+/// Clothes of a figure.
 #[derive(Clone, Copy)]
 pub(crate) struct Clothes {
     pub(crate) top: Paint,
     pub(crate) trousers: Paint,
     pub(crate) shoes: Paint,
-    pub(crate) head: Head,
+    pub(crate) head: Headwear,
     /// Life jacket.
     pub(crate) vest: Option<Paint>,
 }
 
 /// Where the joints are, boat axes.
 #[derive(Clone, Copy)]
-pub(crate) struct Pose {
+pub(crate) struct FigurePose {
     /// Middle between the hip joints.
     pub(crate) pelvis: Vec3,
     /// Direction of the chest, horizontal.
@@ -54,7 +54,7 @@ pub(crate) struct Pose {
 }
 
 /// The figure's solids.
-pub(crate) fn figure(pose: &Pose, wear: &Clothes) -> Vec<Solid> {
+pub(crate) fn figure(pose: &FigurePose, wear: &Clothes) -> Vec<Solid> {
     let forward = pose.facing.normalize_or(Vec3::X);
     let left = Vec3::Z.cross(forward);
     let neck = pose.pelvis
@@ -104,7 +104,7 @@ fn life_jacket(pelvis: Vec3, neck: Vec3, forward: Vec3, left: Vec3, paint: Paint
     skin(&rings, paint, 50.0)
 }
 
-fn head(neck: Vec3, forward: Vec3, worn: Head) -> Vec<Solid> {
+fn head(neck: Vec3, forward: Vec3, worn: Headwear) -> Vec<Solid> {
     let throat = neck + Vec3::Z * 0.04;
     let skull = neck + Vec3::Z * 0.195 + forward * 0.025;
     let mut solids = vec![
@@ -112,20 +112,20 @@ fn head(neck: Vec3, forward: Vec3, worn: Head) -> Vec<Solid> {
         ellipsoid(skull, Vec3::new(0.088, 0.080, 0.118), 8, 6, Paint::Skin),
     ];
     match worn {
-        Head::Wrap(paint) => {
+        Headwear::Wrap(paint) => {
             let at = skull + Vec3::Z * 0.055 - forward * 0.012;
             solids.push(ellipsoid(at, Vec3::new(0.112, 0.108, 0.078), 8, 5, paint));
             let nape = skull - forward * 0.055 - Vec3::Z * 0.06;
             solids.push(ellipsoid(nape, Vec3::new(0.06, 0.085, 0.10), 8, 4, paint));
         }
-        Head::Cap(paint) => {
+        Headwear::Cap(paint) => {
             let at = skull + Vec3::Z * 0.048 - forward * 0.008;
             solids.push(ellipsoid(at, Vec3::new(0.100, 0.092, 0.085), 8, 5, paint));
             let peak = skull + Vec3::Z * 0.055 + forward * 0.10;
             solids.push(ellipsoid(peak, Vec3::new(0.075, 0.075, 0.012), 8, 3, paint));
             solids.push(hair(skull, forward));
         }
-        Head::Helmet(paint) => {
+        Headwear::Helmet(paint) => {
             let at = skull + Vec3::Z * 0.042 - forward * 0.012;
             solids.push(ellipsoid(at, Vec3::new(0.128, 0.118, 0.108), 8, 5, paint));
         }

@@ -6,74 +6,13 @@ use glam::Vec3;
 use super::{
     assembly::Assembly,
     frigate_top,
-    loft::{Hull, Line},
+    loft::{HullLine, LinesPlan, Offsets, offsets},
     paint::Paint,
     solid::{Solid, skin},
 };
 
-// Control points from the transom to the stem.
-type Curve = [[f32; 3]; 8];
-
-const KEEL: Curve = [
-    [-63.0, 0.0, -0.9],
-    [-45.0, 0.0, -2.8],
-    [-22.0, 0.0, -4.7],
-    [5.0, 0.0, -4.9],
-    [28.0, 0.0, -4.9],
-    [44.0, 0.0, -4.8],
-    [52.0, 0.0, -4.5],
-    [56.0, 0.0, -3.7],
-];
-const BILGE: Curve = [
-    [-63.0, 4.8, -0.7],
-    [-45.0, 5.7, -2.3],
-    [-22.0, 6.3, -3.8],
-    [5.0, 6.3, -4.1],
-    [28.0, 4.6, -4.1],
-    [44.0, 2.0, -4.0],
-    [52.0, 0.8, -3.6],
-    [57.0, 0.0, -2.4],
-];
-const WATER: Curve = [
-    [-63.3, 6.1, 0.3],
-    [-45.0, 7.0, 0.2],
-    [-22.0, 7.45, 0.1],
-    [5.0, 7.45, 0.0],
-    [28.0, 6.2, 0.0],
-    [44.0, 3.3, 0.0],
-    [52.0, 1.6, 0.0],
-    [58.6, 0.0, 0.0],
-];
-const KNUCKLE: Curve = [
-    [-64.2, 6.9, 3.5],
-    [-45.0, 7.5, 3.5],
-    [-22.0, 7.75, 3.6],
-    [5.0, 7.75, 3.8],
-    [28.0, 7.0, 4.3],
-    [44.0, 4.9, 4.9],
-    [53.0, 2.7, 5.4],
-    [61.6, 0.0, 5.8],
-];
-const SHEER: Curve = [
-    [-64.9, 6.8, 5.5],
-    [-45.0, 7.45, 5.5],
-    [-22.0, 7.6, 5.6],
-    [5.0, 7.6, 6.0],
-    [28.0, 7.1, 6.9],
-    [44.0, 5.5, 7.9],
-    [54.0, 3.4, 8.7],
-    [65.0, 0.0, 9.7],
-];
-const CENTRE: Curve = [
-    [-64.9, 0.0, 5.6],
-    [-45.0, 0.0, 5.65],
-    [-22.0, 0.0, 5.75],
-    [5.0, 0.0, 6.15],
-    [28.0, 0.0, 7.05],
-    [44.0, 0.0, 8.0],
-    [54.0, 0.0, 8.78],
-    [65.0, 0.0, 9.7],
-];
+/// Keel, bilge, water, knuckle, sheer and centre line.
+const OFFSETS: Offsets<6, 8> = offsets(include_str!("frigate.txt"));
 
 /// The whole ship.
 pub(crate) fn build() -> Assembly {
@@ -96,15 +35,15 @@ pub(crate) fn build() -> Assembly {
 }
 
 fn hull() -> Solid {
-    let line = |points, corner, rows, paint| Line { points, corner, rows, paint };
-    Hull {
+    let [keel, bilge, water, knuckle, sheer, centre] = &OFFSETS;
+    LinesPlan {
         lines: &[
-            line(&KEEL, true, 2, Paint::Haze),
-            line(&BILGE, false, 2, Paint::Haze),
-            line(&WATER, false, 2, Paint::Haze),
-            line(&KNUCKLE, true, 1, Paint::Haze),
-            line(&SHEER, true, 1, Paint::DeckGrey),
-            line(&CENTRE, true, 0, Paint::DeckGrey),
+            HullLine::edge(keel, 2, Paint::Haze),
+            HullLine::round(bilge, 2, Paint::Haze),
+            HullLine::round(water, 2, Paint::Haze),
+            HullLine::edge(knuckle, 1, Paint::Haze),
+            HullLine::edge(sheer, 1, Paint::DeckGrey),
+            HullLine::edge(centre, 0, Paint::DeckGrey),
         ],
         steps: 4,
         crease: 14.0,
@@ -117,10 +56,11 @@ fn hull() -> Solid {
 
 /// Stanchions with two wires along the deck's edge, where men work: forecastle and quarterdeck.
 fn bulwark_and_rails() -> Vec<Solid> {
+    let [_, _, _, _, sheer, _] = &OFFSETS;
     let mut solids = Vec::new();
     for side in [1.0, -1.0] {
         let edge: Vec<Vec3> =
-            SHEER.iter().map(|&[x, y, z]| Vec3::new(x, (y - 0.12).max(0.0) * side, z)).collect();
+            sheer.iter().map(|&[x, y, z]| Vec3::new(x, (y - 0.12).max(0.0) * side, z)).collect();
         for pair in [[edge[4], edge[5]], [edge[5], edge[6]], [edge[6], Vec3::new(63.6, 0.3 * side, 9.58)]] {
             for height in [0.55, 1.05] {
                 let up = Vec3::Z * height;

@@ -7,22 +7,92 @@ use super::{
     solid::{Solid, key},
 };
 
+/// Control points of a hull's lines: x, y to port and z up, metres, from the stern to the stem.
+pub(crate) type Offsets<const LINES: usize, const POINTS: usize> = [[[f32; 3]; POINTS]; LINES];
+
+/// Reads a table of offsets when the program is built: comments begin with `#`, a line of the hull begins with its name, and the
+/// numbers of its control points follow. A table of another size does not compile.
+pub(crate) const fn offsets<const LINES: usize, const POINTS: usize>(text: &str) -> Offsets<LINES, POINTS> {
+    let bytes = text.as_bytes();
+    let mut table = [[[0.0; 3]; POINTS]; LINES];
+    let (mut at, mut count) = (0, 0);
+    while at < bytes.len() {
+        match bytes[at] {
+            b'#' => {
+                while at < bytes.len() && bytes[at] != b'\n' {
+                    at += 1;
+                }
+            }
+            b'-' | b'0'..=b'9' => {
+                assert!(count < LINES * POINTS * 3, "the table has more points than its hull");
+                let (value, end) = decimal(bytes, at);
+                table[count / (POINTS * 3)][count / 3 % POINTS][count % 3] = value;
+                (at, count) = (end, count + 1);
+            }
+            _ => at += 1,
+        }
+    }
+    assert!(count == LINES * POINTS * 3, "the table has fewer points than its hull");
+    table
+}
+
+/// The decimal number that begins at `at`, and where it ends.
+const fn decimal(bytes: &[u8], mut at: usize) -> (f32, usize) {
+    let negative = bytes[at] == b'-';
+    at += negative as usize;
+    let (mut digits, mut scale, mut broken) = (0u32, 1u32, false);
+    while at < bytes.len() && (bytes[at].is_ascii_digit() || bytes[at] == b'.') {
+        if bytes[at] == b'.' {
+            broken = true;
+        } else {
+            digits = digits * 10 + (bytes[at] - b'0') as u32;
+            scale *= if broken { 10 } else { 1 };
+        }
+        at += 1;
+    }
+    // Both are whole numbers below 2^53, so that the quotient is the nearest number to what is written.
+    let value = digits as f64 / scale as f64;
+    ((if negative { -value } else { value }) as f32, at)
+}
+
+/// `line` moved outwards (inwards where negative) and up; its points in the centre plane move forward by `ahead` instead.
+pub(crate) fn beside<const POINTS: usize>(
+    line: &[[f32; 3]; POINTS],
+    out: f32,
+    up: f32,
+    ahead: f32,
+) -> [[f32; 3]; POINTS] {
+    line.map(|[x, y, z]| if y > 0.0 { [x, y + out, z + up] } else { [x + ahead, y, z + up] })
+}
+
 /// One fore-and-aft curve of the port half, by control points from the stern to the stem.
-pub(crate) struct Line<'a> {
+pub(crate) struct HullLine<'a> {
     /// x, y (to port), z of each control point; every line of a hull has as many.
-    pub(crate) points: &'a [[f32; 3]],
+    points: &'a [[f32; 3]],
     /// Whether sections have a corner here.
-    pub(crate) corner: bool,
+    corner: bool,
     /// Rows of faces between this line and the next.
-    pub(crate) rows: usize,
+    rows: usize,
     /// Paint of those rows.
-    pub(crate) paint: Paint,
+    paint: Paint,
+}
+
+impl<'a> HullLine<'a> {
+    /// A line along which sections have a corner.
+    pub(crate) const fn edge(points: &'a [[f32; 3]], rows: usize, paint: Paint) -> Self {
+        Self { points, corner: true, rows, paint }
+    }
+
+    /// A line across which sections are smooth.
+    pub(crate) const fn round(points: &'a [[f32; 3]], rows: usize, paint: Paint) -> Self {
+        Self { points, corner: false, rows, paint }
+    }
 }
 
 /// A lines plan.
-pub(crate) struct Hull<'a> {
+pub(crate) struct LinesPlan<'a> {
     /// From the keel outwards and up, then inwards; the first and the last lie in the centre plane.
-    pub(crate) lines: &'a [Line<'a>],
+    pub(crate) lines: &'a [HullLine<'a>],
     /// Sections between two control points that are not close together.
     pub(crate) steps: usize,
     /// Faces that meet at more than this stay hard, degrees.
@@ -31,7 +101,7 @@ pub(crate) struct Hull<'a> {
     pub(crate) transom: Paint,
 }
 
-impl Hull<'_> {
+impl LinesPlan<'_> {
     /// The closed surface of both halves.
     pub(crate) fn build(&self) -> Solid {
         let sections = self.sections();
@@ -68,7 +138,7 @@ impl Hull<'_> {
 
     /// Bulkheads and transoms are short; only real lengths of hull are divided.
     fn steps_after(&self, i: usize) -> usize {
-        let at = |l: &Line<'_>, i: usize| Vec3::from_array(l.points[i]);
+        let at = |l: &HullLine<'_>, i: usize| Vec3::from_array(l.points[i]);
         let length = self
             .lines
             .first()

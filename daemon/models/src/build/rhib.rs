@@ -5,45 +5,15 @@ use glam::Vec3;
 
 use super::{
     assembly::Assembly,
-    figure::{Clothes, Head, Pose, figure},
-    loft::{Hull, Line, smooth},
+    figure::{Clothes, FigurePose, Headwear, figure},
+    loft::{HullLine, LinesPlan, Offsets, offsets, smooth},
     outboard::outboard,
     paint::Paint,
     solid::{Solid, bar, block, drum, ellipsoid, pipe, tapered},
 };
 
-const KEEL: [[f32; 3]; 6] = [
-    [-3.10, 0.0, -0.40],
-    [-1.50, 0.0, -0.42],
-    [0.50, 0.0, -0.42],
-    [1.90, 0.0, -0.32],
-    [2.75, 0.0, -0.08],
-    [3.22, 0.0, 0.26],
-];
-const CHINE: [[f32; 3]; 6] = [
-    [-3.10, 0.92, -0.02],
-    [-1.50, 0.95, -0.02],
-    [0.50, 0.92, 0.04],
-    [1.90, 0.74, 0.16],
-    [2.75, 0.40, 0.32],
-    [3.30, 0.0, 0.48],
-];
-const EDGE: [[f32; 3]; 6] = [
-    [-3.10, 0.98, 0.24],
-    [-1.50, 1.00, 0.25],
-    [0.50, 0.98, 0.30],
-    [1.90, 0.80, 0.44],
-    [2.75, 0.44, 0.58],
-    [3.34, 0.0, 0.70],
-];
-const SOLE: [[f32; 3]; 6] = [
-    [-3.10, 0.0, 0.26],
-    [-1.50, 0.0, 0.27],
-    [0.50, 0.0, 0.32],
-    [1.90, 0.0, 0.46],
-    [2.75, 0.0, 0.60],
-    [3.34, 0.0, 0.70],
-];
+/// Keel, chine, edge of the sole and its centre line.
+const OFFSETS: Offsets<4, 6> = offsets(include_str!("rhib.txt"));
 
 /// Middle of the port tube and its radius, from the cone at the stern to the bow.
 const TUBE: [(f32, f32, f32, f32); 9] = [
@@ -65,23 +35,26 @@ pub(crate) fn build() -> Assembly {
     boat.add_all(Zone::Hull, collar());
     boat.add_all(Zone::Hull, fittings());
     boat.add_all(Zone::Hull, frame());
-    boat.add_all(Zone::Hull, crew(Vec3::new(-1.62, 0.0, 1.02), -1.12, 1.22, Head::Helmet(Paint::GreyHull)));
+    boat.add_all(
+        Zone::Hull,
+        crew(Vec3::new(-1.62, 0.0, 1.02), -1.12, 1.22, Headwear::Helmet(Paint::GreyHull)),
+    );
     for y in [-0.40, 0.40] {
         boat.add_all(Zone::Engine, outboard(Vec3::new(-3.16, y, 0.60), 1.12, 0.06, 0.0));
     }
     boat.add_all(Zone::Helm, console());
-    boat.add_all(Zone::Helm, crew(Vec3::new(-0.66, 0.0, 1.08), -0.16, 1.30, Head::Helmet(Paint::White)));
+    boat.add_all(Zone::Helm, crew(Vec3::new(-0.66, 0.0, 1.08), -0.16, 1.30, Headwear::Helmet(Paint::White)));
     boat
 }
 
 fn hull() -> Solid {
-    let line = |points, rows, paint| Line { points, corner: true, rows, paint };
-    Hull {
+    let [keel, chine, edge, sole] = &OFFSETS;
+    LinesPlan {
         lines: &[
-            line(&KEEL, 2, Paint::GreyHull),
-            line(&CHINE, 1, Paint::GreyHull),
-            line(&EDGE, 1, Paint::SoleGrey),
-            line(&SOLE, 0, Paint::SoleGrey),
+            HullLine::edge(keel, 2, Paint::GreyHull),
+            HullLine::edge(chine, 1, Paint::GreyHull),
+            HullLine::edge(edge, 1, Paint::SoleGrey),
+            HullLine::edge(sole, 0, Paint::SoleGrey),
         ],
         steps: 4,
         crease: 32.0,
@@ -222,8 +195,8 @@ fn frame() -> Vec<Solid> {
 }
 
 /// A man astride a seat, his hands on what is in front of him.
-fn crew(pelvis: Vec3, hands_x: f32, hands_z: f32, head: Head) -> Vec<Solid> {
-    let pose = Pose {
+fn crew(pelvis: Vec3, hands_x: f32, hands_z: f32, head: Headwear) -> Vec<Solid> {
+    let pose = FigurePose {
         pelvis,
         facing: Vec3::X,
         lean: 0.10,

@@ -5,93 +5,15 @@ use glam::Vec3;
 
 use super::{
     assembly::Assembly,
-    figure::{Clothes, Head, Pose, figure},
-    loft::{Hull, Line},
+    figure::{Clothes, FigurePose, Headwear, figure},
+    loft::{HullLine, LinesPlan, Offsets, beside, offsets},
     outboard::outboard,
     paint::Paint,
     solid::{Solid, bar, block, capsule, drum, ellipsoid, pipe, tapered},
 };
 
-// Control points from the stern: transom aft, transom fore (filled), the same open, three amidships, fore bulkhead open,
-// the same decked, foredeck, stem.
-const KEEL: [[f32; 3]; 10] = [
-    [-3.50, 0.0, -0.22],
-    [-3.43, 0.0, -0.22],
-    [-3.43, 0.0, -0.22],
-    [-2.00, 0.0, -0.26],
-    [0.00, 0.0, -0.28],
-    [1.50, 0.0, -0.26],
-    [2.30, 0.0, -0.20],
-    [2.30, 0.0, -0.20],
-    [2.70, 0.0, -0.12],
-    [3.00, 0.0, 0.05],
-];
-const CHINE: [[f32; 3]; 10] = [
-    [-3.50, 0.72, -0.07],
-    [-3.43, 0.72, -0.07],
-    [-3.43, 0.72, -0.07],
-    [-2.00, 0.77, -0.07],
-    [0.00, 0.77, -0.04],
-    [1.50, 0.60, 0.06],
-    [2.40, 0.35, 0.18],
-    [2.40, 0.35, 0.18],
-    [2.82, 0.18, 0.27],
-    [3.18, 0.0, 0.40],
-];
-const STRIPE: [[f32; 3]; 10] = [
-    [-3.51, 0.805, 0.33],
-    [-3.43, 0.81, 0.33],
-    [-3.43, 0.81, 0.33],
-    [-2.00, 0.885, 0.33],
-    [0.00, 0.91, 0.38],
-    [1.50, 0.80, 0.50],
-    [2.43, 0.52, 0.65],
-    [2.43, 0.52, 0.65],
-    [2.93, 0.265, 0.74],
-    [3.38, 0.0, 0.84],
-];
-const SHEER: [[f32; 3]; 10] = [
-    [-3.52, 0.84, 0.50],
-    [-3.43, 0.845, 0.50],
-    [-3.43, 0.845, 0.50],
-    [-2.00, 0.93, 0.50],
-    [0.00, 0.97, 0.56],
-    [1.50, 0.90, 0.70],
-    [2.45, 0.62, 0.86],
-    [2.45, 0.62, 0.86],
-    [3.00, 0.33, 0.96],
-    [3.50, 0.0, 1.07],
-];
-/// Foot of the inner side; the top of the transom and the foredeck where the boat is not open.
-const INSIDE: [[f32; 3]; 10] = [
-    [-3.52, 0.40, 0.575],
-    [-3.43, 0.40, 0.575],
-    [-3.43, 0.68, 0.07],
-    [-2.00, 0.74, 0.07],
-    [0.00, 0.75, 0.09],
-    [1.50, 0.58, 0.15],
-    [2.45, 0.34, 0.26],
-    [2.45, 0.30, 0.935],
-    [3.00, 0.16, 1.03],
-    [3.50, 0.0, 1.12],
-];
-const CENTRE: [[f32; 3]; 10] = [
-    [-3.52, 0.0, 0.585],
-    [-3.43, 0.0, 0.585],
-    [-3.43, 0.0, 0.07],
-    [-2.00, 0.0, 0.07],
-    [0.00, 0.0, 0.09],
-    [1.50, 0.0, 0.15],
-    [2.45, 0.0, 0.26],
-    [2.45, 0.0, 0.95],
-    [3.00, 0.0, 1.04],
-    [3.50, 0.0, 1.12],
-];
-
-/// The sheer moved outwards (inwards where negative) and up; at the stem forward instead.
-fn beside(line: &[[f32; 3]; 10], out: f32, up: f32) -> [[f32; 3]; 10] {
-    line.map(|[x, y, z]| if y > 0.0 { [x, y + out, z + up] } else { [x + out.max(0.0), y, z + up] })
-}
+/// Keel, chine, stripe, sheer, foot of the inner side and centre line.
+const OFFSETS: Offsets<6, 10> = offsets(include_str!("skiff.txt"));
 
 /// The whole boat.
 pub(crate) fn build() -> Assembly {
@@ -107,21 +29,19 @@ pub(crate) fn build() -> Assembly {
 }
 
 fn hull() -> Solid {
-    let under = beside(&SHEER, 0.035, 0.0);
-    let top = beside(&SHEER, 0.035, 0.06);
-    let inner = beside(&SHEER, -0.05, 0.06);
-    let line = |points, rows, paint| Line { points, corner: true, rows, paint };
-    Hull {
+    let [keel, chine, stripe, sheer, inside, centre] = &OFFSETS;
+    let sheer_at = |out: f32, up: f32| beside(sheer, out, up, out.max(0.0));
+    LinesPlan {
         lines: &[
-            line(&KEEL, 2, Paint::WhiteHull),
-            line(&CHINE, 2, Paint::WhiteHull),
-            line(&STRIPE, 1, Paint::BlueHull),
-            line(&SHEER, 1, Paint::BlueHull),
-            line(&under, 1, Paint::WhiteHull),
-            line(&top, 1, Paint::WhiteHull),
-            line(&inner, 2, Paint::Inside),
-            line(&INSIDE, 1, Paint::Inside),
-            line(&CENTRE, 0, Paint::Inside),
+            HullLine::edge(keel, 2, Paint::WhiteHull),
+            HullLine::edge(chine, 2, Paint::WhiteHull),
+            HullLine::edge(stripe, 1, Paint::BlueHull),
+            HullLine::edge(sheer, 1, Paint::BlueHull),
+            HullLine::edge(&sheer_at(0.035, 0.0), 1, Paint::WhiteHull),
+            HullLine::edge(&sheer_at(0.035, 0.06), 1, Paint::WhiteHull),
+            HullLine::edge(&sheer_at(-0.05, 0.06), 2, Paint::Inside),
+            HullLine::edge(inside, 1, Paint::Inside),
+            HullLine::edge(centre, 0, Paint::Inside),
         ],
         steps: 4,
         crease: 32.0,
@@ -156,7 +76,7 @@ fn fittings() -> Vec<Solid> {
 }
 
 fn helmsman() -> Vec<Solid> {
-    let pose = Pose {
+    let pose = FigurePose {
         pelvis: Vec3::new(-2.50, -0.30, 0.53),
         facing: Vec3::new(1.0, 0.12, 0.0),
         lean: 0.05,
@@ -167,14 +87,14 @@ fn helmsman() -> Vec<Solid> {
         top: Paint::RedShirt,
         trousers: Paint::Navy,
         shoes: Paint::Black,
-        head: Head::Wrap(Paint::White),
+        head: Headwear::Wrap(Paint::White),
         vest: None,
     };
     figure(&pose, &wear)
 }
 
 fn passenger() -> Vec<Solid> {
-    let pose = Pose {
+    let pose = FigurePose {
         pelvis: Vec3::new(1.08, 0.16, 0.62),
         facing: Vec3::X,
         lean: 0.14,
@@ -185,7 +105,7 @@ fn passenger() -> Vec<Solid> {
         top: Paint::Sand,
         trousers: Paint::Olive,
         shoes: Paint::Black,
-        head: Head::Cap(Paint::Navy),
+        head: Headwear::Cap(Paint::Navy),
         vest: None,
     };
     figure(&pose, &wear)

@@ -11,7 +11,7 @@ use super::paint::Paint;
 pub(crate) struct Tri {
     /// Corners.
     pub(crate) p: [Vec3; 3],
-    /// What covers it.
+    /// Its paint.
     pub(crate) paint: Paint,
 }
 

@@ -27,11 +27,11 @@ const NAMES_MAX: usize = 20;
 /// Loads a `.glb` or `.gltf` file: metres, y up, +z forward, the waterline at height 0. Buffers and pictures that it names are
 /// looked for in its folder and below.
 ///
-/// What is read: all triangles of the default scene with their nodes' transforms, normals (flat where there are none),
+/// Contents that are read: all triangles of the default scene with their nodes' transforms, normals (flat where there are none),
 /// colours and base-colour textures. Part names: a node, its mesh or the nearest named ancestor called `engine` or `helm`
 /// (any case, a suffix such as `.001` or `_left` is fine) gives its triangles to that part; all else is hull.
 ///
-/// What is made of it: materials' base-colour factors and vertex colours go into the vertices. A model has one texture at
+/// Result: materials' base-colour factors and vertex colours go into the vertices. A model has one texture at
 /// most: one picture is kept as it is; more than one, or one beside materials without, are put into one atlas. A texture
 /// that repeats over a surface has no place in an atlas: its mean colour is taken. Skins and animations stay in the rest
 /// pose; points and lines are left out; see-through materials are drawn opaque.

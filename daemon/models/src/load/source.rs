@@ -18,7 +18,7 @@ use crate::error::ModelError;
 
 /// A document and the bytes that it refers to.
 pub(crate) struct Source<'a> {
-    /// What errors name.
+    /// Name in errors.
     pub(crate) file: &'a str,
     /// The validated document.
     pub(crate) document: Document,

@@ -16,7 +16,7 @@ use crate::error::ModelError;
 /// Most pixels of all pictures together.
 const PIXELS_MAX: u64 = 4 * (TEXTURE_SIDE_MAX as u64) * (TEXTURE_SIDE_MAX as u64);
 
-/// What a material comes down to.
+/// The properties of a material that are used.
 #[derive(Clone, Copy)]
 pub(crate) struct Surface {
     /// Linear base colour.
@@ -71,7 +71,7 @@ pub(crate) struct Pictures {
 }
 
 impl Pictures {
-    /// What `material` looks like.
+    /// Surface of `material`.
     pub(crate) fn surface(
         &mut self,
         source: &Source<'_>,
