@@ -8,14 +8,14 @@ use serde_json::Value;
 pub struct Request {
     /// Comes back with the reply.
     pub id: u64,
-    /// What to do.
-    pub command: Command,
+    /// The command.
+    pub command: AgentCommand,
 }
 
-/// What the agent can do. Times are of the machine's monotonic clock, nanoseconds.
+/// Commands of the agent. Times are of the machine's monotonic clock, nanoseconds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Command {
+pub enum AgentCommand {
     /// Reply with the time.
     Ping,
     /// Run a program and wait for it: `{code, out, err, ms}`.
@@ -54,7 +54,7 @@ pub enum Command {
         on: bool,
     },
     /// How the tape is played from now on.
-    Feed(Feed),
+    Feed(PlayerFeed),
     /// Set an input of the simulated GPIO chip, step after step: `[[before, after], ...]` for each.
     Pull {
         /// Which of [`crate::LINES`].
@@ -100,7 +100,7 @@ pub enum Command {
 /// How the tape is played.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Feed {
+pub struct PlayerFeed {
     /// No pictures.
     pub stall: bool,
     /// The same picture again and again.
@@ -127,10 +127,10 @@ pub struct Feed {
     pub trigger: bool,
 }
 
-/// What the agent says.
+/// Messages of the agent.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Message {
+pub enum AgentMessage {
     /// The agent is ready.
     Hello {
         /// Time since the kernel started, nanoseconds.
@@ -140,7 +140,7 @@ pub enum Message {
         /// Name of the GPIO chip's device, as gpiochip0.
         gpio_chip: String,
     },
-    /// What came of a request.
+    /// Result of a request.
     Reply {
         /// Of the request.
         id: u64,
@@ -191,14 +191,15 @@ mod tests {
     #[test]
     fn requests_and_messages_survive_the_wire() {
         let request =
-            Request { id: 7, command: Command::Pull { line: 0, steps: vec![(5, true), (1000, false)] } };
+            Request { id: 7, command: AgentCommand::Pull { line: 0, steps: vec![(5, true), (1000, false)] } };
         let text = serde_json::to_string(&request).unwrap();
         assert!(!text.contains('\n'));
         let back: Request = serde_json::from_str(&text).unwrap();
         assert_eq!((back.id, back.command), (request.id, request.command));
-        let feed: Feed = serde_json::from_str(r#"{"stall":true}"#).unwrap();
-        assert_eq!(feed, Feed { stall: true, ..Feed::default() });
-        let text = serde_json::to_string(&Message::Reply { id: 1, result: Err("no\nsuch".into()) }).unwrap();
+        let feed: PlayerFeed = serde_json::from_str(r#"{"stall":true}"#).unwrap();
+        assert_eq!(feed, PlayerFeed { stall: true, ..PlayerFeed::default() });
+        let text =
+            serde_json::to_string(&AgentMessage::Reply { id: 1, result: Err("no\nsuch".into()) }).unwrap();
         assert!(!text.contains('\n'));
     }
 }

@@ -19,7 +19,7 @@ const HEADER_MAX: u64 = 64 << 20;
 
 /// A picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Frame {
+pub struct TapeFrame {
     /// Middle of the exposure, nanoseconds since the tape's beginning; may be before it.
     pub exposed_ns: i64,
     /// When the host has it.
@@ -30,7 +30,7 @@ pub struct Frame {
 
 /// A measurement of the unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Sample {
+pub struct TapePacket {
     /// When its last byte reaches the host, nanoseconds since the tape's beginning.
     pub arrival_ns: i64,
     /// The unit's own clock.
@@ -45,7 +45,7 @@ pub struct Sample {
 
 /// Where the camera really was.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Truth {
+pub struct TapeTruth {
     /// The exposure that it belongs to, nanoseconds since the tape's beginning.
     pub exposed_ns: i64,
     /// x, y, z, w of `world_from_camera`.
@@ -54,7 +54,7 @@ pub struct Truth {
 
 /// All but the pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Header {
+pub struct TapeHeader {
     /// Pixels.
     pub width: u32,
     /// Pixels.
@@ -64,13 +64,13 @@ pub struct Header {
     /// How far the unit's clock gets in that time.
     pub device_period_ns: i64,
     /// Pictures by arrival.
-    pub frames: Vec<Frame>,
+    pub frames: Vec<TapeFrame>,
     /// Measurements by arrival.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<TapePacket>,
     /// Pulls of the trigger: time, pressed.
     pub triggers: Vec<(i64, bool)>,
     /// True attitudes by exposure.
-    pub truth: Vec<Truth>,
+    pub truth: Vec<TapeTruth>,
     /// Its calibration file.
     pub calibration_toml: String,
 }
@@ -78,7 +78,7 @@ pub struct Header {
 /// A tape in memory.
 pub struct Tape {
     /// All but the pictures.
-    pub header: Header,
+    pub header: TapeHeader,
     yuyv: Vec<u8>,
     jpeg: Vec<u8>,
     jpeg_at: Vec<usize>,
@@ -94,7 +94,7 @@ impl Tape {
         let key = hw_sim::make::DEVICE_LOOP_KEY;
         let device_period_ns = properties.extra.get(key).and_then(|v| v.parse().ok());
         let mut tape = Self {
-            header: Header {
+            header: TapeHeader {
                 width,
                 height,
                 period_ns: properties.loop_ns.context("the recording does not loop")?,
@@ -112,7 +112,7 @@ impl Tape {
         for entry in reader.entries()? {
             match entry? {
                 Entry::Frame(frame) => {
-                    tape.header.frames.push(Frame {
+                    tape.header.frames.push(TapeFrame {
                         exposed_ns: frame.mid_exposure.ns_since(start),
                         arrival_ns: frame.arrival.ns_since(start),
                         jpeg_bytes: frame.jpeg.len(),
@@ -120,7 +120,7 @@ impl Tape {
                     tape.yuyv.extend(yuyv_of(&frame.jpeg, width, height)?);
                     tape.jpeg.extend_from_slice(&frame.jpeg);
                 }
-                Entry::Imu(s) => tape.header.samples.push(Sample {
+                Entry::Imu(s) => tape.header.samples.push(TapePacket {
                     arrival_ns: s.arrival.ns_since(start),
                     device_ns: s.device_time_ns,
                     rate: s.rate.to_array(),
@@ -130,7 +130,7 @@ impl Tape {
                 Entry::Trigger(edge) => {
                     tape.header.triggers.push((edge.time.ns_since(start), edge.pressed));
                 }
-                Entry::Truth(pose) => tape.header.truth.push(Truth {
+                Entry::Truth(pose) => tape.header.truth.push(TapeTruth {
                     exposed_ns: pose.time.ns_since(start),
                     attitude: pose.pose.world_from_camera.to_array(),
                 }),
@@ -187,7 +187,7 @@ impl Tape {
             file.read_exact(&mut bytes).with_context(|| format!("{} ends early", path.display()))?;
             Ok(bytes)
         };
-        let header: Header = serde_json::from_slice(&bytes(length as usize)?)?;
+        let header: TapeHeader = serde_json::from_slice(&bytes(length as usize)?)?;
         let yuyv = bytes(header.frames.len() * (header.width * header.height * 2) as usize)?;
         let jpeg = bytes(header.frames.iter().map(|f| f.jpeg_bytes).sum())?;
         if header.frames.is_empty() || header.samples.is_empty() || header.period_ns <= 0 {
@@ -299,7 +299,7 @@ mod tests {
         tape.write(&path).unwrap();
         let back = Tape::read(&path).unwrap();
         // Numbers with a fraction come back to the last digit but one, so the rest is compared exactly.
-        let exact = |h: &Header| {
+        let exact = |h: &TapeHeader| {
             (h.width, h.height, h.period_ns, h.device_period_ns, h.frames.clone(), h.calibration_toml.clone())
         };
         assert_eq!(exact(&tape.header), exact(&back.header));

@@ -21,9 +21,9 @@ use crate::{
 /// Names the control file.
 const VARIABLE: &str = "BOWWAVE_GPU_FAULT";
 
-/// What a device does.
+/// Condition of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Health {
+enum GpuHealth {
     Well,
     Lost,
     Hung,
@@ -31,17 +31,17 @@ enum Health {
 
 /// A device and the way to the functions below.
 #[derive(Clone, Copy)]
-struct Below {
+struct DeviceBelow {
     device: vk::Device,
     get: GetDeviceProcAddr,
-    health: Health,
+    health: GpuHealth,
 }
 
-static DEVICES: Mutex<BTreeMap<usize, Below>> = Mutex::new(BTreeMap::new());
+static DEVICES: Mutex<BTreeMap<usize, DeviceBelow>> = Mutex::new(BTreeMap::new());
 /// The control file that was carried out last and could not be deleted: inode and time of change.
 static DONE: Mutex<Option<(u64, i64, i64)>> = Mutex::new(None);
 
-fn devices() -> MutexGuard<'static, BTreeMap<usize, Below>> {
+fn devices() -> MutexGuard<'static, BTreeMap<usize, DeviceBelow>> {
     DEVICES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -95,7 +95,7 @@ unsafe extern "system" fn create_device(
         let create = transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
         let result = create(physical, info, allocator, device);
         if result == vk::Result::SUCCESS {
-            let below = Below { device: *device, get, health: Health::Well };
+            let below = DeviceBelow { device: *device, get, health: GpuHealth::Well };
             devices().insert(key(*device), below);
         }
         result
@@ -109,7 +109,7 @@ unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const v
     // SAFETY: the device is live until the function below has destroyed it; that function has the type of its name.
     unsafe {
         let Some(below) = devices().remove(&key(device)) else { return };
-        if below.health == Health::Hung {
+        if below.health == GpuHealth::Hung {
             forever();
         }
         if let Some(destroy) = (below.get)(device, c"vkDestroyDevice".as_ptr()) {
@@ -118,8 +118,8 @@ unsafe extern "system" fn destroy_device(device: vk::Device, allocator: *const v
     }
 }
 
-/// What the control file says, if it is there and new; it is used up then.
-fn command() -> Option<Health> {
+/// Command of the control file, if it is there and new; it is used up then.
+fn command() -> Option<GpuHealth> {
     let path = std::env::var_os(VARIABLE)?;
     let text = fs::read_to_string(&path).ok()?;
     let about = fs::metadata(&path).ok()?;
@@ -129,11 +129,11 @@ fn command() -> Option<Health> {
         return None;
     }
     let health = match text.trim() {
-        "lost" => Health::Lost,
-        "hang" => Health::Hung,
+        "lost" => GpuHealth::Lost,
+        "hang" => GpuHealth::Hung,
         other => {
             eprintln!("{VARIABLE}: {other:?} in {} is neither lost nor hang", path.display());
-            Health::Well
+            GpuHealth::Well
         }
     };
     if fs::remove_file(&path).is_err() {
@@ -146,11 +146,11 @@ fn command() -> Option<Health> {
 ///
 /// # Safety
 /// The device is live, and its queues are the caller's as in `vkQueueSubmit`.
-unsafe fn before_submission(key: usize) -> Option<Below> {
+unsafe fn before_submission(key: usize) -> Option<DeviceBelow> {
     let below = devices().get(&key).copied()?;
-    let Some(health) = command().filter(|_| below.health == Health::Well) else { return Some(below) };
+    let Some(health) = command().filter(|_| below.health == GpuHealth::Well) else { return Some(below) };
     eprintln!("{VARIABLE}: the device is {health:?} from now on");
-    if health == Health::Lost {
+    if health == GpuHealth::Lost {
         // On a lost device nothing runs any more.
         // SAFETY: the function has the type of its name.
         unsafe {
@@ -198,9 +198,9 @@ macro_rules! submission {
                     return vk::Result::ERROR_DEVICE_LOST;
                 };
                 match below.health {
-                    Health::Lost => vk::Result::ERROR_DEVICE_LOST,
-                    Health::Hung => vk::Result::SUCCESS,
-                    Health::Well => pass_on!(below, $name, $kind, (queue, count, submits, fence)),
+                    GpuHealth::Lost => vk::Result::ERROR_DEVICE_LOST,
+                    GpuHealth::Hung => vk::Result::SUCCESS,
+                    GpuHealth::Well => pass_on!(below, $name, $kind, (queue, count, submits, fence)),
                 }
             }
         }
@@ -219,7 +219,7 @@ macro_rules! wait {
             unsafe {
                 let below = devices().get(&key(device)).copied();
                 match below {
-                    Some(below) if below.health != Health::Lost => {
+                    Some(below) if below.health != GpuHealth::Lost => {
                         pass_on!(below, $name, $kind, (device, $($argument),*))
                     }
                     _ => vk::Result::ERROR_DEVICE_LOST,
@@ -244,32 +244,22 @@ wait!(
 );
 wait!(get_fence_status, c"vkGetFenceStatus", vk::PFN_vkGetFenceStatus, (fence: vk::Fence));
 
-unsafe extern "system" fn queue_wait_idle(queue: vk::Queue) -> vk::Result {
-    // SAFETY: the caller's promises are passed on; the function below has the type of its name.
-    unsafe {
-        let below = devices().get(&key(queue)).copied();
-        match below {
-            Some(below) => match below.health {
-                Health::Lost => vk::Result::ERROR_DEVICE_LOST,
-                Health::Hung => forever(),
-                Health::Well => pass_on!(below, c"vkQueueWaitIdle", vk::PFN_vkQueueWaitIdle, (queue)),
-            },
-            None => vk::Result::ERROR_DEVICE_LOST,
+/// A wait without a time-out: on a hung device it never ends.
+macro_rules! wait_idle {
+    ($function:ident, $name:literal, $kind:ty, $handle:ty) => {
+        unsafe extern "system" fn $function(handle: $handle) -> vk::Result {
+            // SAFETY: the caller's promises are passed on; the function below has the type of its name.
+            unsafe {
+                let below = devices().get(&key(handle)).copied();
+                match below.map(|below| (below, below.health)) {
+                    None | Some((_, GpuHealth::Lost)) => vk::Result::ERROR_DEVICE_LOST,
+                    Some((_, GpuHealth::Hung)) => forever(),
+                    Some((below, GpuHealth::Well)) => pass_on!(below, $name, $kind, (handle)),
+                }
+            }
         }
-    }
+    };
 }
 
-unsafe extern "system" fn device_wait_idle(device: vk::Device) -> vk::Result {
-    // SAFETY: the caller's promises are passed on; the function below has the type of its name.
-    unsafe {
-        let below = devices().get(&key(device)).copied();
-        match below {
-            Some(below) => match below.health {
-                Health::Lost => vk::Result::ERROR_DEVICE_LOST,
-                Health::Hung => forever(),
-                Health::Well => pass_on!(below, c"vkDeviceWaitIdle", vk::PFN_vkDeviceWaitIdle, (device)),
-            },
-            None => vk::Result::ERROR_DEVICE_LOST,
-        }
-    }
-}
+wait_idle!(queue_wait_idle, c"vkQueueWaitIdle", vk::PFN_vkQueueWaitIdle, vk::Queue);
+wait_idle!(device_wait_idle, c"vkDeviceWaitIdle", vk::PFN_vkDeviceWaitIdle, vk::Device);

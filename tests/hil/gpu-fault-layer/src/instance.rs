@@ -13,16 +13,16 @@ use crate::link::{GetInstanceProcAddr, InstanceLink, erase, find_link, key};
 
 /// An instance and the way to the functions below.
 #[derive(Clone, Copy)]
-struct Below {
+struct InstanceBelow {
     instance: vk::Instance,
     get: GetInstanceProcAddr,
     /// Looked up when the instance was made: later the loader answers with the whole chain's, which layers above are part of.
     destroy: vk::PFN_vkDestroyInstance,
 }
 
-static INSTANCES: Mutex<BTreeMap<usize, Below>> = Mutex::new(BTreeMap::new());
+static INSTANCES: Mutex<BTreeMap<usize, InstanceBelow>> = Mutex::new(BTreeMap::new());
 
-fn instances() -> MutexGuard<'static, BTreeMap<usize, Below>> {
+fn instances() -> MutexGuard<'static, BTreeMap<usize, InstanceBelow>> {
     INSTANCES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -79,7 +79,7 @@ unsafe extern "system" fn create_instance(
         if result == vk::Result::SUCCESS {
             let Some(destroy) = get(*instance, c"vkDestroyInstance".as_ptr()) else { return FAILED };
             let destroy = transmute::<unsafe extern "system" fn(), vk::PFN_vkDestroyInstance>(destroy);
-            instances().insert(key(*instance), Below { instance: *instance, get, destroy });
+            instances().insert(key(*instance), InstanceBelow { instance: *instance, get, destroy });
         }
         result
     }

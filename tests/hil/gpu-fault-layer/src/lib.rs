@@ -38,7 +38,7 @@ use link::NegotiateLayerInterface;
 /// The version of the interface between loader and layers that this layer speaks.
 const INTERFACE_VERSION: u32 = 2;
 
-/// What the loader asks first.
+/// The loader's first question.
 ///
 /// # Safety
 /// `interface` is null or points to a valid structure, as the loader promises.

@@ -30,7 +30,7 @@ pub fn load_modules() -> Result<()> {
     Ok(())
 }
 
-/// What /dev/hilcam tells.
+/// State of /dev/hilcam.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CameraState {
     /// 1: there.

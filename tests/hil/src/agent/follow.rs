@@ -12,7 +12,7 @@ use std::{
 
 use anyhow::{Context, Result};
 use bowwave_devices::clock;
-use bowwave_hil::protocol::Message;
+use bowwave_hil::protocol::AgentMessage;
 use serde_json::{Map, Value};
 
 use crate::link::Link;
@@ -33,7 +33,7 @@ pub fn journal(link: &Arc<Link>) -> Result<Value> {
             thread::sleep(LOOK);
         }
         let ended = follow_journal(&link).err().map_or_else(String::new, |e| format!(": {e:#}"));
-        link.say(&Message::Failure { what: format!("journalctl has ended{ended}") });
+        link.say(&AgentMessage::Failure { what: format!("journalctl has ended{ended}") });
     });
     Ok(Value::Null)
 }
@@ -56,7 +56,7 @@ fn follow_journal(link: &Link) -> Result<()> {
 }
 
 /// The fields that matter, of the kernel, of the service manager on the trainer, and of the trainer.
-fn journal_message(line: &str) -> Option<Message> {
+fn journal_message(line: &str) -> Option<AgentMessage> {
     let Value::Object(all) = serde_json::from_str(line).ok()? else { return None };
     let text = |name: &str| all.get(name).and_then(Value::as_str).unwrap_or_default().to_owned();
     let at_us: i64 = text("__MONOTONIC_TIMESTAMP").parse().ok()?;
@@ -73,7 +73,7 @@ fn journal_message(line: &str) -> Option<Message> {
                 && name != "INVOCATION_ID")
     };
     let fields: Map<String, Value> = all.into_iter().filter(|(name, _)| keep(name)).collect();
-    Some(Message::Journal { at_ns: at_us.saturating_mul(1000), fields: Value::Object(fields) })
+    Some(AgentMessage::Journal { at_ns: at_us.saturating_mul(1000), fields: Value::Object(fields) })
 }
 
 /// Follows a file from its beginning, over truncation and replacement.
@@ -86,7 +86,7 @@ pub fn file(link: &Arc<Link>, path: String) -> Result<Value> {
             while let Some(end) = rest.iter().position(|b| *b == b'\n') {
                 let line: Vec<u8> = rest.drain(..=end).collect();
                 let text = String::from_utf8_lossy(&line[..end]).into_owned();
-                link.say(&Message::Line { at_ns: clock::now().ns(), path: path.clone(), text });
+                link.say(&AgentMessage::Line { at_ns: clock::now().ns(), path: path.clone(), text });
             }
             if rest.len() > LINE_MAX {
                 rest.clear();
@@ -116,7 +116,7 @@ pub fn pipe(link: &Arc<Link>, path: String) -> Result<Value> {
     let link = Arc::clone(link);
     thread::spawn(move || {
         for text in BufReader::new(pipe).lines().map_while(Result::ok) {
-            link.say(&Message::Line { at_ns: clock::now().ns(), path: path.clone(), text });
+            link.say(&AgentMessage::Line { at_ns: clock::now().ns(), path: path.clone(), text });
         }
     });
     Ok(Value::Null)

@@ -10,7 +10,7 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use bowwave_hil::{PORT_CONTROL, PORT_IMU, protocol::Message};
+use bowwave_hil::{PORT_CONTROL, PORT_IMU, protocol::AgentMessage};
 
 /// How long the ports may take to appear after the driver is there.
 const APPEAR: Duration = Duration::from_secs(120);
@@ -31,7 +31,7 @@ impl Link {
     }
 
     /// Tells the host. One that does not listen any more has seen enough.
-    pub fn say(&self, message: &Message) {
+    pub fn say(&self, message: &AgentMessage) {
         let Ok(mut line) = serde_json::to_vec(message) else { return };
         line.push(b'\n');
         let mut control = self.control.lock().unwrap_or_else(PoisonError::into_inner);

@@ -16,17 +16,17 @@ use anyhow::{Context, Result};
 use bowwave_devices::clock;
 use bowwave_hil::{
     LINES,
-    protocol::{Command, Message, Request},
+    protocol::{AgentCommand, AgentMessage, Request},
 };
 use serde_json::{Value, json};
 
-use crate::{bench::Gpio, link::Link, player::Player};
+use crate::{bench::Gpio, link::Link, player::TapePlayer};
 
 /// Everything that requests act on.
 struct Agent {
     link: Arc<Link>,
     gpio: Arc<Gpio>,
-    player: Player,
+    player: TapePlayer,
 }
 
 fn main() -> Result<()> {
@@ -34,18 +34,18 @@ fn main() -> Result<()> {
     let modules = bench::load_modules();
     let (link, control) = Link::open()?;
     if let Err(e) = modules {
-        link.say(&Message::Failure { what: format!("{e:#}") });
+        link.say(&AgentMessage::Failure { what: format!("{e:#}") });
         return Err(e);
     }
     let agent = match Agent::start(Arc::clone(&link)) {
         Ok(agent) => Arc::new(agent),
         Err(e) => {
-            link.say(&Message::Failure { what: format!("{e:#}") });
+            link.say(&AgentMessage::Failure { what: format!("{e:#}") });
             return Err(e);
         }
     };
     let kernel = std::fs::read_to_string("/proc/sys/kernel/osrelease").unwrap_or_default();
-    link.say(&Message::Hello {
+    link.say(&AgentMessage::Hello {
         now_ns: clock::now().ns(),
         kernel: kernel.trim().to_owned(),
         gpio_chip: agent.gpio.chip().to_owned(),
@@ -58,10 +58,10 @@ fn main() -> Result<()> {
                 let agent = Arc::clone(&agent);
                 thread::spawn(move || {
                     let result = agent.execute(request.command).map_err(|e| format!("{e:#}"));
-                    agent.link.say(&Message::Reply { id: request.id, result });
+                    agent.link.say(&AgentMessage::Reply { id: request.id, result });
                 });
             }
-            Err(e) => link.say(&Message::Failure { what: format!("no request: {line}: {e}") }),
+            Err(e) => link.say(&AgentMessage::Failure { what: format!("no request: {line}: {e}") }),
         }
     }
     Ok(())
@@ -70,32 +70,32 @@ fn main() -> Result<()> {
 impl Agent {
     fn start(link: Arc<Link>) -> Result<Self> {
         let gpio = Arc::new(Gpio::make()?);
-        let player = Player::new(Arc::clone(&link), Arc::clone(&gpio))?;
+        let player = TapePlayer::new(Arc::clone(&link), Arc::clone(&gpio))?;
         Ok(Self { link, gpio, player })
     }
 
-    fn execute(&self, command: Command) -> Result<Value> {
+    fn execute(&self, command: AgentCommand) -> Result<Value> {
         match command {
-            Command::Ping => Ok(json!(clock::now().ns())),
-            Command::Run { argv, timeout_ms } => system::run(&argv, timeout_ms),
-            Command::Write { path, text } => system::write(&path, &text),
-            Command::Patch { path, offset, count } => system::patch(&path, offset, count),
-            Command::Camera { line } => bench::camera_command(&line).map(|()| Value::Null),
-            Command::CameraState => Ok(serde_json::to_value(bench::camera_state()?)?),
-            Command::Play { on } => self.player.play(on),
-            Command::Feed(feed) => {
+            AgentCommand::Ping => Ok(json!(clock::now().ns())),
+            AgentCommand::Run { argv, timeout_ms } => system::run(&argv, timeout_ms),
+            AgentCommand::Write { path, text } => system::write(&path, &text),
+            AgentCommand::Patch { path, offset, count } => system::patch(&path, offset, count),
+            AgentCommand::Camera { line } => bench::camera_command(&line).map(|()| Value::Null),
+            AgentCommand::CameraState => Ok(serde_json::to_value(bench::camera_state()?)?),
+            AgentCommand::Play { on } => self.player.play(on),
+            AgentCommand::Feed(feed) => {
                 self.player.feed(feed);
                 Ok(json!(clock::now().ns()))
             }
-            Command::Pull { line, steps } => Ok(serde_json::to_value(self.gpio.pull(line, &steps)?)?),
-            Command::Level { line } => Ok(json!(self.gpio.level(line)?)),
-            Command::Hold { thread, ms } => system::hold(&thread, ms),
-            Command::Usage => system::usage(),
-            Command::Spin => Ok(json!(bowwave_hil::spin())),
-            Command::FollowJournal => follow::journal(&self.link),
-            Command::FollowFile { path } => follow::file(&self.link, path),
-            Command::FollowPipe { path } => follow::pipe(&self.link, path),
-            Command::LineDelay { device } => self.player.line_delay(&device),
+            AgentCommand::Pull { line, steps } => Ok(serde_json::to_value(self.gpio.pull(line, &steps)?)?),
+            AgentCommand::Level { line } => Ok(json!(self.gpio.level(line)?)),
+            AgentCommand::Hold { thread, ms } => system::hold(&thread, ms),
+            AgentCommand::Usage => system::usage(),
+            AgentCommand::Spin => Ok(json!(bowwave_hil::spin())),
+            AgentCommand::FollowJournal => follow::journal(&self.link),
+            AgentCommand::FollowFile { path } => follow::file(&self.link, path),
+            AgentCommand::FollowPipe { path } => follow::pipe(&self.link, path),
+            AgentCommand::LineDelay { device } => self.player.line_delay(&device),
         }
     }
 }

@@ -17,8 +17,8 @@ use bowwave_core::{event::ImuSample, time::Time};
 use bowwave_devices::{clock, vectornav::CommonOutput};
 use bowwave_hil::{
     TAPE_SERIAL,
-    protocol::{Feed, Message},
-    tape::{Sample, Tape, halved},
+    protocol::{AgentMessage, PlayerFeed},
+    tape::{Tape, TapePacket, halved},
 };
 use glam::{DQuat, DVec3};
 use rand::{Rng, RngExt, SeedableRng};
@@ -37,12 +37,12 @@ const LATE_MAX_NS: i64 = 60_000_000;
 /// Full scale of the unit's gyro, rad/s.
 const FULL_SCALE: f64 = 34.9;
 
-/// What the threads share.
-struct Shared {
+/// State that the threads share.
+struct PlayerState {
     link: Arc<Link>,
     gpio: Arc<Gpio>,
     tape: Tape,
-    feed: Mutex<Feed>,
+    feed: Mutex<PlayerFeed>,
     on: AtomicBool,
     /// Counts `Play`s: threads of an older one end.
     play: AtomicU64,
@@ -50,17 +50,17 @@ struct Shared {
 }
 
 /// The player.
-pub struct Player {
-    shared: Arc<Shared>,
+pub struct TapePlayer {
+    shared: Arc<PlayerState>,
 }
 
-impl Player {
+impl TapePlayer {
     /// Reads the tape.
     pub fn new(link: Arc<Link>, gpio: Arc<Gpio>) -> Result<Self> {
         let tape = Tape::read(&tape_disk()?)?;
-        let feed = Mutex::new(Feed::default());
+        let feed = Mutex::new(PlayerFeed::default());
         let (on, play, late) = (AtomicBool::new(false), AtomicU64::new(0), AtomicU64::new(0));
-        Ok(Self { shared: Arc::new(Shared { link, gpio, tape, feed, on, play, late }) })
+        Ok(Self { shared: Arc::new(PlayerState { link, gpio, tape, feed, on, play, late }) })
     }
 
     /// Begins from the tape's beginning, or ends.
@@ -77,12 +77,12 @@ impl Player {
         thread::Builder::new().name("camera".into()).spawn(move || camera.camera(number, origin))?;
         thread::Builder::new().name("unit".into()).spawn(move || unit.unit(number, origin))?;
         thread::Builder::new().name("trigger".into()).spawn(move || trigger.trigger(number, origin))?;
-        self.shared.link.say(&Message::Origin { at_ns: origin.ns() });
+        self.shared.link.say(&AgentMessage::Origin { at_ns: origin.ns() });
         Ok(json!(origin.ns()))
     }
 
     /// How to play from now on.
-    pub fn feed(&self, feed: Feed) {
+    pub fn feed(&self, feed: PlayerFeed) {
         *self.shared.feed() = feed;
     }
 
@@ -114,8 +114,8 @@ impl Player {
     }
 }
 
-impl Shared {
-    fn feed(&self) -> MutexGuard<'_, Feed> {
+impl PlayerState {
+    fn feed(&self) -> MutexGuard<'_, PlayerFeed> {
         self.feed.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -131,7 +131,7 @@ impl Shared {
 
     fn camera(&self, number: u64, origin: Time) {
         let Ok(mut device) = open_camera() else {
-            self.link.say(&Message::Failure { what: "the camera's bench side is gone".into() });
+            self.link.say(&AgentMessage::Failure { what: "the camera's bench side is gone".into() });
             return;
         };
         let mut random = Pcg64Mcg::seed_from_u64(0xca3);
@@ -170,7 +170,7 @@ impl Shared {
         &self,
         index: usize,
         exposed: Time,
-        feed: &Feed,
+        feed: &PlayerFeed,
         random: &mut Pcg64Mcg,
         spoilt: &mut bool,
     ) -> Option<Vec<u8>> {
@@ -213,7 +213,7 @@ impl Shared {
 
     fn unit(&self, number: u64, origin: Time) {
         let mut random = Pcg64Mcg::seed_from_u64(0x1b0);
-        let mut last: Option<Sample> = None;
+        let mut last: Option<TapePacket> = None;
         let header = &self.tape.header;
         for (round, index) in self.rounds(header.samples.len()) {
             let sample = header.samples[index];
@@ -257,15 +257,17 @@ impl Shared {
             match self.gpio.pull(0, &[(0, pressed)]).as_deref() {
                 Ok([[before_ns, after_ns]]) => {
                     let (before_ns, after_ns) = (*before_ns, *after_ns);
-                    self.link.say(&Message::Trigger { before_ns, after_ns, pressed });
+                    self.link.say(&AgentMessage::Trigger { before_ns, after_ns, pressed });
                 }
-                other => self.link.say(&Message::Failure { what: format!("the trigger's line: {other:?}") }),
+                other => {
+                    self.link.say(&AgentMessage::Failure { what: format!("the trigger's line: {other:?}") })
+                }
             }
         }
     }
 }
 
-fn packet(sample: &Sample, device_ns: i64, feed: &Feed) -> Vec<u8> {
+fn packet(sample: &TapePacket, device_ns: i64, feed: &PlayerFeed) -> Vec<u8> {
     let mut rate = DVec3::from_array(sample.rate);
     if feed.saturated {
         rate = DVec3::splat(FULL_SCALE);

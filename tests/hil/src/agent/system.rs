@@ -134,7 +134,7 @@ pub fn hold(name: &str, ms: u64) -> Result<Value> {
     Ok(json!({ "begun_ns": begun, "ended_ns": bowwave_devices::clock::now().ns(), "went_on": detached }))
 }
 
-/// What the trainer uses.
+/// Resources that the trainer uses.
 pub fn usage() -> Result<Value> {
     let pid = trainer()?;
     let status = fs::read_to_string(format!("/proc/{pid}/status"))?;

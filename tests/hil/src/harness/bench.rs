@@ -9,14 +9,14 @@ use std::{
 
 use anyhow::{Context, Result, bail, ensure};
 use bowwave_hil::{
-    protocol::{Command, Feed},
-    tape::{Header, Tape},
+    protocol::{AgentCommand, PlayerFeed},
+    tape::{Tape, TapeHeader},
 };
 use serde_json::Value;
 
 use super::{
     lcd::Plate,
-    machine::{Machine, Parts, Start},
+    machine::{MachineParts, MachineStart, VirtualMachine},
 };
 
 /// Pictures of the tape. Small, because the machine's processor is emulated.
@@ -36,14 +36,14 @@ pub const HASHES: &str = "/run/bowwave/frames";
 /// The file that the layer which breaks the GPU looks for.
 pub const GPU_FAULT: &str = "/run/bowwave/gpu-fault";
 
-/// What is built once for all machines.
+/// Everything that is built once for all machines.
 pub struct Shop {
     /// For what is left.
     pub out: PathBuf,
-    /// What machines are made of.
-    pub parts: Parts,
+    /// Parts of the machines.
+    pub parts: MachineParts,
     /// The tape, without its pictures.
-    pub tape: Header,
+    pub tape: TapeHeader,
 }
 
 impl Shop {
@@ -56,7 +56,7 @@ impl Shop {
             Err(_) => make_tape(&out.join("tape.mcap"), &tape_path)?,
         };
         let beside = std::env::current_exe().context("this program's path")?;
-        let mut parts = Parts {
+        let mut parts = MachineParts {
             image: image.to_owned(),
             modules: modules.to_owned(),
             agent: beside.with_file_name("hil-agent"),
@@ -90,7 +90,7 @@ impl Shop {
             eprintln!("first start, which compiles the shaders");
             let (w, h) = PICTURE;
             let data = self.fresh_data("first-data.img")?;
-            let mut bench = Bench::switch_on(self, &data, "utc")?;
+            let mut bench = HilBench::switch_on(self, &data, "utc")?;
             bench.pull(1, true)?;
             bench.play()?;
             bench.started(FIRST_START)?;
@@ -137,7 +137,7 @@ fn make_tape(recording: &Path, out: &Path) -> Result<Tape> {
     Ok(tape)
 }
 
-/// What the tape is made from.
+/// Recipe of the tape.
 pub fn recipe() -> hw_sim::make::Recipe {
     let mut recipe =
         hw_sim::make::Recipe { width: PICTURE.0, height: PICTURE.1, ..hw_sim::make::Recipe::default() };
@@ -168,22 +168,9 @@ Environment=BOWWAVE_GPU_FAULT=/run/bowwave/gpu-fault
 ";
 
 /// One boat that the tape's gun sweeps over, near enough to be struck, and ammunition for the whole test.
-const SCENARIO: &str = r#"name = "bench"
-[weapon]
-rounds_per_minute = 600
-belt = 400
-dispersion_mrad = 1.0
-[[boat]]
-name = "skiff-1"
-model = "skiff"
-side = "hostile"
-course = "still"
-range_m = 74
-bearing_deg = 4
-heading_deg = 90
-"#;
+const SCENARIO: &str = include_str!("../../data/bench.toml");
 
-/// What differs between configurations.
+/// Settings that differ between configurations.
 #[derive(Clone, Debug)]
 pub struct Configured {
     /// Modes of the camera, preferred first.
@@ -225,9 +212,9 @@ pub fn configuration(c: &Configured) -> String {
     )
 }
 
-/// What a line of the journal says of a fault.
+/// Change of a fault by a line of the journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum FaultChange {
     /// It is there, or has happened.
     Came,
     /// It is gone.
@@ -235,15 +222,15 @@ pub enum Told {
 }
 
 /// A running test.
-pub struct Bench {
+pub struct HilBench {
     /// The machine.
-    pub machine: Machine,
+    pub machine: VirtualMachine,
     /// How many times slower a core of the machine is than one of the host.
     pub slow: f64,
-    /// What the tape feeds.
-    pub feed: Feed,
+    /// Feed of the tape.
+    pub feed: PlayerFeed,
     /// The tape, without its pictures.
-    pub tape: Header,
+    pub tape: TapeHeader,
     /// Pulls of the trigger: machine times before and after each edge, pressed.
     pub pulls: Vec<(i64, i64, bool)>,
     /// Times of the machine between which no round may be scored.
@@ -254,20 +241,20 @@ pub struct Bench {
     pub adapter: u32,
 }
 
-impl Bench {
+impl HilBench {
     /// Switches a machine on and waits for its agent.
     pub fn switch_on(shop: &Shop, data: &Path, clock: &str) -> Result<Self> {
         let folder = shop.out.join("machine");
-        let start = Start { folder: &folder, data, lcd: LCD, clock };
-        let mut machine = Machine::start(&shop.parts, &start)?;
+        let start = MachineStart { folder: &folder, data, lcd: LCD, clock };
+        let mut machine = VirtualMachine::start(&shop.parts, &start)?;
         if let Err(e) = machine.guest.greet(Duration::from_secs(180)) {
             let console = machine.console();
             let tail: Vec<&str> = console.lines().rev().take(30).collect();
             bail!("{e:#}; its console: {}", tail.into_iter().rev().collect::<Vec<_>>().join("\n"));
         }
-        machine.guest.call(Command::FollowPipe { path: "/run/hil/output".into() })?;
-        machine.guest.call(Command::FollowJournal)?;
-        let (feed, adapter) = (Feed::default(), 0);
+        machine.guest.call(AgentCommand::FollowPipe { path: "/run/hil/output".into() })?;
+        machine.guest.call(AgentCommand::FollowJournal)?;
+        let (feed, adapter) = (PlayerFeed::default(), 0);
         Ok(Self {
             machine,
             slow: 20.0,
@@ -285,21 +272,21 @@ impl Bench {
         let (w, h) = PICTURE;
         self.camera(&format!("modes YUYV:{w}x{h}@30 MJPG:{w}x{h}@30 YUYV:{}x{}@30", w / 2, h / 2))?;
         self.camera("plug 0")?;
-        self.machine.guest.call(Command::Play { on: true })?;
+        self.machine.guest.call(AgentCommand::Play { on: true })?;
         Ok(())
     }
 
     /// A command for the camera's driver.
     pub fn camera(&mut self, line: &str) -> Result<i64> {
         let at = self.machine.guest.now_ns();
-        self.machine.guest.call(Command::Camera { line: line.to_owned() })?;
+        self.machine.guest.call(AgentCommand::Camera { line: line.to_owned() })?;
         Ok(at)
     }
 
     /// Changes how the tape is played; the machine's time of the change.
-    pub fn feed(&mut self, change: impl FnOnce(&mut Feed)) -> Result<i64> {
+    pub fn feed(&mut self, change: impl FnOnce(&mut PlayerFeed)) -> Result<i64> {
         change(&mut self.feed);
-        let at = self.machine.guest.call(Command::Feed(self.feed.clone()))?;
+        let at = self.machine.guest.call(AgentCommand::Feed(self.feed.clone()))?;
         at.as_i64().context("a time")
     }
 
@@ -311,7 +298,7 @@ impl Bench {
 
     /// Sets an input step after step.
     pub fn pulls(&mut self, line: usize, steps: Vec<(u64, bool)>) -> Result<Vec<[i64; 2]>> {
-        let value = self.machine.guest.call(Command::Pull { line, steps: steps.clone() })?;
+        let value = self.machine.guest.call(AgentCommand::Pull { line, steps: steps.clone() })?;
         let times: Vec<[i64; 2]> = serde_json::from_value(value)?;
         if line == 0 {
             let edges = times.iter().zip(&steps);
@@ -327,14 +314,14 @@ impl Bench {
     }
 
     /// Waits until the journal says that the fault came or went, at `since_ns` or later; the machine's time of that.
-    pub fn told(&self, code: &str, told: Told, since_ns: i64, patience: Duration) -> Result<i64> {
+    pub fn told(&self, code: &str, told: FaultChange, since_ns: i64, patience: Duration) -> Result<i64> {
         let what = format!("{code} {told:?} in the journal");
         let entry =
             self.machine.guest.journal(since_ns, patience, &what, |e| says(&e.fields, code) == Some(told))?;
         Ok(entry.at_ns)
     }
 
-    /// What the LCD says, by the service's status line.
+    /// Text of the LCD, by the service's status line.
     pub fn status(&mut self) -> Result<String> {
         let argv = ["/bin/systemctl", "show", "-P", "StatusText", "bowwave.service"];
         Ok(self.machine.guest.run(&argv)?.trim().to_owned())
@@ -442,7 +429,7 @@ impl Bench {
     /// Writes the trainer's configuration.
     pub fn configure(&mut self, c: &Configured) -> Result<()> {
         let (path, text) = ("/run/hil/etc/bowwave.toml".to_owned(), configuration(c));
-        self.machine.guest.call(Command::Write { path, text }).map(|_| ())
+        self.machine.guest.call(AgentCommand::Write { path, text }).map(|_| ())
     }
 
     /// A native time in the machine's terms, at most.
@@ -461,8 +448,8 @@ impl Bench {
     }
 }
 
-/// What fields of the journal say of a fault.
-pub fn says(fields: &Value, code: &str) -> Option<Told> {
+/// Change of a fault by fields of the journal.
+pub fn says(fields: &Value, code: &str) -> Option<FaultChange> {
     let field = |name: &str| fields[name].as_str().unwrap_or_default();
     let message = field("MESSAGE");
     let named = match field("FAULT_CODE") {
@@ -473,7 +460,7 @@ pub fn says(fields: &Value, code: &str) -> Option<Told> {
         return None;
     }
     let over = message.get(code.len()..).is_some_and(|rest| rest.starts_with(" over "));
-    Some(if field("FAULT_STATE") == "cleared" || over { Told::Went } else { Told::Came })
+    Some(if field("FAULT_STATE") == "cleared" || over { FaultChange::Went } else { FaultChange::Came })
 }
 
 #[cfg(test)]
@@ -484,10 +471,10 @@ mod tests {
     #[test]
     fn the_journal_is_understood() {
         let raised = json!({ "FAULT_CODE": "CAM_LOST", "FAULT_STATE": "raised", "MESSAGE": "CAM_LOST gone" });
-        assert_eq!(says(&raised, "CAM_LOST"), Some(Told::Came));
+        assert_eq!(says(&raised, "CAM_LOST"), Some(FaultChange::Came));
         assert_eq!(says(&raised, "CAM"), None);
         let cleared = json!({ "MESSAGE": "CAM_LOST over after 1.203 s" });
-        assert_eq!(says(&cleared, "CAM_LOST"), Some(Told::Went));
+        assert_eq!(says(&cleared, "CAM_LOST"), Some(FaultChange::Went));
         assert_eq!(says(&json!({ "MESSAGE": "it is CAM_LOST" }), "CAM_LOST"), None);
     }
 

@@ -12,7 +12,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::Value;
 
-use super::bench::{Bench, Shop, configuration};
+use super::bench::{HilBench, Shop, configuration};
 
 /// Longest time from the first commit to the cut.
 const SHOOT_MAX_MS: u64 = 6000;
@@ -20,20 +20,7 @@ const SHOOT_MAX_MS: u64 = 6000;
 const CLOCKS_APART_NS: i64 = 60_000_000;
 
 /// Ten rounds a second from the start to the cut.
-const SCENARIO: &str = r#"name = "cuts"
-[weapon]
-rounds_per_minute = 1200
-belt = 20000
-dispersion_mrad = 3.0
-[[boat]]
-name = "skiff-1"
-model = "skiff"
-side = "hostile"
-course = "still"
-range_m = 60
-bearing_deg = 0
-heading_deg = 90
-"#;
+const SCENARIO: &str = include_str!("../../data/cuts.toml");
 
 /// Numbers of rounds that the program reported committed.
 pub fn committed(lines: &[(i64, String)]) -> Vec<u64> {
@@ -46,7 +33,7 @@ pub fn lost(acknowledged: &[u64], rounds: &[Value]) -> usize {
     acknowledged.iter().filter(|shot| !there(**shot)).count()
 }
 
-/// What a cut left, as found at the next start.
+/// Remains of a cut, as found at the next start.
 #[derive(Debug, Default)]
 struct Left {
     acknowledged: Vec<u64>,
@@ -82,7 +69,7 @@ pub fn run(shop: &mut Shop, count: u32, seed: u64) -> Result<bool> {
     let mut shot_for = 0;
     for cut in done + 1..=done + count + 1 {
         let begun = Instant::now();
-        let mut bench = Bench::switch_on(shop, &data, "utc")?;
+        let mut bench = HilBench::switch_on(shop, &data, "utc")?;
         bench.pull(1, true)?;
         bench.play()?;
         // By then the data partition is mounted. A trigger that was pressed before the trainer looked at it would be no shot.
@@ -126,11 +113,11 @@ pub fn run(shop: &mut Shop, count: u32, seed: u64) -> Result<bool> {
 }
 
 /// Number of the newest run that holds rounds.
-fn newest_run(bench: &mut Bench) -> Result<Option<i64>> {
+fn newest_run(bench: &mut HilBench) -> Result<Option<i64>> {
     Ok(rounds(bench)?.iter().filter_map(|r| r["run"].as_i64()).max())
 }
 
-fn rounds(bench: &mut Bench) -> Result<Vec<Value>> {
+fn rounds(bench: &mut HilBench) -> Result<Vec<Value>> {
     // Before the first shot there is no journal.
     match bench.rounds() {
         Err(e) if format!("{e:#}").contains("no journal") => Ok(Vec::new()),
@@ -138,7 +125,7 @@ fn rounds(bench: &mut Bench) -> Result<Vec<Value>> {
     }
 }
 
-fn first_commit(bench: &Bench) -> Result<()> {
+fn first_commit(bench: &HilBench) -> Result<()> {
     let until = Instant::now() + Duration::from_secs(240);
     while committed(&bench.machine.guest.lines()).is_empty() {
         ensure!(
@@ -159,14 +146,14 @@ fn first_commit(bench: &Bench) -> Result<()> {
     Ok(())
 }
 
-struct Verdict {
+struct CutVerdict {
     stored: usize,
     lost: usize,
     twice: usize,
     invented: usize,
 }
 
-fn check(bench: &mut Bench, left: &Left, newest: Option<i64>) -> Result<Verdict> {
+fn check(bench: &mut HilBench, left: &Left, newest: Option<i64>) -> Result<CutVerdict> {
     let all = rounds(bench)?;
     let run = newest.context("the journal holds no round at all")?;
     let rows: Vec<&Value> = all.iter().filter(|r| r["run"].as_i64() == Some(run)).collect();
@@ -178,7 +165,7 @@ fn check(bench: &mut Bench, left: &Left, newest: Option<i64>) -> Result<Verdict>
     let (from, to) = (left.pressed.0, left.pressed.1 + CLOCKS_APART_NS);
     let outside = |r: &&&Value| r["fired_ns"].as_i64().is_none_or(|f| !(from..to).contains(&f));
     let gaps = seen.keys().zip(seen.keys().skip(1)).filter(|(a, b)| **b != **a + 1).count();
-    Ok(Verdict {
+    Ok(CutVerdict {
         stored: rows.len(),
         lost: left.acknowledged.iter().filter(|shot| !seen.contains_key(shot)).count(),
         twice: seen.values().filter(|n| **n > 1).count(),

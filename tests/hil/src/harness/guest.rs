@@ -14,7 +14,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, anyhow, bail};
-use bowwave_hil::protocol::{Command, Message, Request};
+use bowwave_hil::protocol::{AgentCommand, AgentMessage, Request};
 use serde_json::Value;
 
 /// Longest wait for a reply to a request that takes no time of its own.
@@ -22,25 +22,25 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A line of the machine's journal.
 #[derive(Clone, Debug)]
-pub struct Entry {
+pub struct JournalEntry {
     /// On the machine's monotonic clock.
     pub at_ns: i64,
     /// Its fields.
     pub fields: Value,
 }
 
-impl Entry {
+impl JournalEntry {
     /// Its text.
     pub fn text(&self) -> &str {
         self.fields["MESSAGE"].as_str().unwrap_or_default()
     }
 }
 
-/// What the agent has told.
+/// Messages that the agent has sent.
 #[derive(Default)]
 struct Heard {
     hello: Option<(i64, String, String)>,
-    journal: Vec<Entry>,
+    journal: Vec<JournalEntry>,
     lines: Vec<(i64, String)>,
     triggers: Vec<(i64, i64, bool)>,
     origin_ns: Option<i64>,
@@ -48,7 +48,7 @@ struct Heard {
     ended: bool,
 }
 
-struct Shared {
+struct GuestState {
     heard: Mutex<Heard>,
     news: Condvar,
     waiting: Mutex<HashMap<u64, Sender<Result<Value, String>>>>,
@@ -73,7 +73,7 @@ impl Pending {
 /// The connection.
 pub struct Guest {
     socket: UnixStream,
-    shared: Arc<Shared>,
+    shared: Arc<GuestState>,
     next: u64,
     /// Host time of the machine's monotonic zero, and how well it is known.
     zero: Option<(Instant, Duration)>,
@@ -83,7 +83,7 @@ impl Guest {
     /// Listens on the agent's port. The machine's journal goes into `journal` as it comes, for whoever looks what is going on.
     pub fn new(socket: UnixStream, journal: File) -> Result<Self> {
         let shared =
-            Arc::new(Shared { heard: Mutex::default(), news: Condvar::new(), waiting: Mutex::default() });
+            Arc::new(GuestState { heard: Mutex::default(), news: Condvar::new(), waiting: Mutex::default() });
         let lines = BufReader::new(socket.try_clone()?);
         let listener = Arc::clone(&shared);
         let mut journal = LineWriter::new(journal);
@@ -106,7 +106,7 @@ impl Guest {
         let hello = self.wait(patience, "the agent", |heard| heard.hello.clone())?;
         for _ in 0..10 {
             let begun = Instant::now();
-            let now_ns = self.call(Command::Ping)?.as_i64().context("a time")?;
+            let now_ns = self.call(AgentCommand::Ping)?.as_i64().context("a time")?;
             let way = begun.elapsed();
             let zero = begun + way / 2 - Duration::from_nanos(now_ns.unsigned_abs());
             if self.zero.is_none_or(|(_, best)| way < best) {
@@ -134,17 +134,17 @@ impl Guest {
     }
 
     /// A request that takes no time of its own.
-    pub fn call(&mut self, command: Command) -> Result<Value> {
+    pub fn call(&mut self, command: AgentCommand) -> Result<Value> {
         self.call_within(command, PATIENCE)
     }
 
     /// A request, and how long it may take.
-    pub fn call_within(&mut self, command: Command, patience: Duration) -> Result<Value> {
+    pub fn call_within(&mut self, command: AgentCommand, patience: Duration) -> Result<Value> {
         self.send(command)?.answer(patience)
     }
 
     /// A request whose answer is fetched later: the agent carries out several at a time.
-    pub fn send(&mut self, command: Command) -> Result<Pending> {
+    pub fn send(&mut self, command: AgentCommand) -> Result<Pending> {
         let what = format!("{command:?}");
         self.next += 1;
         let (sender, reply) = channel();
@@ -167,7 +167,7 @@ impl Guest {
     /// Runs a program in the machine: exit code, standard output and error.
     pub fn run_any(&mut self, argv: &[&str], patience: Duration) -> Result<(i64, String, String)> {
         let argv = argv.iter().map(|a| (*a).to_owned()).collect();
-        let command = Command::Run { argv, timeout_ms: patience.as_millis() as u64 };
+        let command = AgentCommand::Run { argv, timeout_ms: patience.as_millis() as u64 };
         let value = self.call_within(command, patience + Duration::from_secs(5))?;
         let text = |key: &str| value[key].as_str().unwrap_or_default().to_owned();
         Ok((value["code"].as_i64().unwrap_or(-1), text("out"), text("err")))
@@ -208,8 +208,8 @@ impl Guest {
         since_ns: i64,
         patience: Duration,
         what: &str,
-        wanted: impl Fn(&Entry) -> bool,
-    ) -> Result<Entry> {
+        wanted: impl Fn(&JournalEntry) -> bool,
+    ) -> Result<JournalEntry> {
         self.wait(patience, what, |heard| {
             // Lines come nearly by time; the newest are at the end.
             let recent = heard.journal.iter().rev().take_while(|e| e.at_ns + 5_000_000_000 >= since_ns);
@@ -218,7 +218,7 @@ impl Guest {
     }
 
     /// Lines of the journal that have come, at `since_ns` or later.
-    pub fn journal_since(&self, since_ns: i64) -> Vec<Entry> {
+    pub fn journal_since(&self, since_ns: i64) -> Vec<JournalEntry> {
         self.shared.heard().journal.iter().filter(|e| e.at_ns >= since_ns).cloned().collect()
     }
 
@@ -237,20 +237,20 @@ impl Guest {
         self.shared.heard().origin_ns
     }
 
-    /// What the agent could not do.
+    /// Failures that the agent told of.
     pub fn failures(&self) -> Vec<String> {
         self.shared.heard().failures.clone()
     }
 }
 
-impl Shared {
+impl GuestState {
     fn heard(&self) -> MutexGuard<'_, Heard> {
         locked(&self.heard)
     }
 
     /// Takes a message in; the journal's line, where it is one.
-    fn hear(&self, line: &str) -> Option<Entry> {
-        let message = match serde_json::from_str::<Message>(line) {
+    fn hear(&self, line: &str) -> Option<JournalEntry> {
+        let message = match serde_json::from_str::<AgentMessage>(line) {
             Ok(message) => message,
             Err(e) => {
                 self.heard().failures.push(format!("no message ({e}): {}", shortened(line)));
@@ -260,23 +260,25 @@ impl Shared {
         let mut written = None;
         let mut heard = self.heard();
         match message {
-            Message::Hello { now_ns, kernel, gpio_chip } => heard.hello = Some((now_ns, kernel, gpio_chip)),
-            Message::Reply { id, result } => {
+            AgentMessage::Hello { now_ns, kernel, gpio_chip } => {
+                heard.hello = Some((now_ns, kernel, gpio_chip))
+            }
+            AgentMessage::Reply { id, result } => {
                 if let Some(sender) = locked(&self.waiting).remove(&id) {
                     drop(sender.send(result));
                 }
             }
-            Message::Journal { at_ns, fields } => {
-                let entry = Entry { at_ns, fields };
+            AgentMessage::Journal { at_ns, fields } => {
+                let entry = JournalEntry { at_ns, fields };
                 written = Some(entry.clone());
                 heard.journal.push(entry);
             }
-            Message::Line { at_ns, text, .. } => heard.lines.push((at_ns, text)),
-            Message::Origin { at_ns } => heard.origin_ns = Some(at_ns),
-            Message::Trigger { before_ns, after_ns, pressed } => {
+            AgentMessage::Line { at_ns, text, .. } => heard.lines.push((at_ns, text)),
+            AgentMessage::Origin { at_ns } => heard.origin_ns = Some(at_ns),
+            AgentMessage::Trigger { before_ns, after_ns, pressed } => {
                 heard.triggers.push((before_ns, after_ns, pressed));
             }
-            Message::Failure { what } => heard.failures.push(what),
+            AgentMessage::Failure { what } => heard.failures.push(what),
         }
         drop(heard);
         self.news.notify_all();

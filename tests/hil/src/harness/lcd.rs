@@ -33,7 +33,7 @@ pub struct Dump {
     pub rgb: Vec<u8>,
 }
 
-/// What the state's plate shows.
+/// State that the plate shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Plate {
     /// Green.
@@ -52,7 +52,7 @@ pub enum Plate {
 
 /// Something that was seen.
 #[derive(Clone, Copy, Debug)]
-pub struct Sight {
+pub struct LcdSight {
     /// When.
     pub at: Instant,
     /// State.
@@ -133,14 +133,14 @@ fn near(pixel: [u8; 3], colour: [u8; 3]) -> bool {
 }
 
 /// Looks at the LCD again and again.
-pub struct Watch {
-    sights: Arc<Mutex<Vec<Sight>>>,
+pub struct LcdWatch {
+    sights: Arc<Mutex<Vec<LcdSight>>>,
     newest: Arc<Mutex<Option<Dump>>>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-impl Watch {
+impl LcdWatch {
     /// Begins to look.
     pub fn start(mut qmp: Qmp, folder: &Path, size: (u32, u32)) -> Result<Self> {
         let sights = Arc::new(Mutex::new(Vec::new()));
@@ -156,7 +156,7 @@ impl Watch {
                     // Before the machine has set a mode, QEMU shows a text of its own.
                     let own = (dump.width as u32, dump.height as u32) == size;
                     let (plate, warning) = if own { dump.plate() } else { (Plate::Black, false) };
-                    locked(&sights).push(Sight { at, plate, warning });
+                    locked(&sights).push(LcdSight { at, plate, warning });
                     *locked(&newest) = Some(dump);
                 }
                 thread::sleep(LOOK);
@@ -166,12 +166,12 @@ impl Watch {
     }
 
     /// The first sight after `since` for which `wanted` holds.
-    pub fn first(&self, since: Instant, wanted: impl Fn(&Sight) -> bool) -> Option<Sight> {
+    pub fn first(&self, since: Instant, wanted: impl Fn(&LcdSight) -> bool) -> Option<LcdSight> {
         locked(&self.sights).iter().find(|s| s.at >= since && wanted(s)).copied()
     }
 
-    /// What was seen last.
-    pub fn last(&self) -> Option<Sight> {
+    /// The last sight.
+    pub fn last(&self) -> Option<LcdSight> {
         locked(&self.sights).last().copied()
     }
 
@@ -181,7 +181,7 @@ impl Watch {
     }
 }
 
-impl Drop for Watch {
+impl Drop for LcdWatch {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {

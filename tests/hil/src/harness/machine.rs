@@ -14,16 +14,16 @@ use serde_json::json;
 use super::{
     cpio::{Archive, stripped},
     guest::Guest,
-    lcd::Watch,
+    lcd::LcdWatch,
     qmp::{Qmp, wait_for_socket},
-    unit::Unit,
+    unit::SerialUnit,
 };
 
-/// What a machine is made of.
-pub struct Parts {
-    /// What systemd/image/build left.
+/// Parts of a machine.
+pub struct MachineParts {
+    /// Output folder of systemd/image/build.
     pub image: PathBuf,
-    /// What tests/hil/modules/build left.
+    /// Output folder of tests/hil/modules/build.
     pub modules: PathBuf,
     /// The agent's program.
     pub agent: PathBuf,
@@ -38,7 +38,7 @@ pub struct Parts {
 }
 
 /// How it is started.
-pub struct Start<'a> {
+pub struct MachineStart<'a> {
     /// Folder for sockets and logs.
     pub folder: &'a Path,
     /// The data partition, written to.
@@ -50,17 +50,17 @@ pub struct Start<'a> {
 }
 
 /// A running machine.
-pub struct Machine {
+pub struct VirtualMachine {
     /// The program.
     process: Child,
     /// Its controls.
     pub qmp: Qmp,
     /// Its LCD.
-    pub lcd: Watch,
+    pub lcd: LcdWatch,
     /// Its agent.
     pub guest: Guest,
     /// Its inertial unit.
-    pub unit: Unit,
+    pub unit: SerialUnit,
     /// When it was switched on.
     pub power_on: Instant,
     folder: PathBuf,
@@ -89,7 +89,7 @@ Nice=-15
 WantedBy=sysinit.target
 ";
 
-impl Parts {
+impl MachineParts {
     /// The kernel that the modules must fit.
     pub fn release(image: &Path) -> Result<String> {
         let path = image.join("release");
@@ -136,9 +136,9 @@ fn put(archive: &mut Archive, root: &str, name: &str, content: &[u8]) {
     archive.file(&format!("{root}/{name}"), 0o644, content);
 }
 
-impl Machine {
+impl VirtualMachine {
     /// Switches it on. It is not waited for.
-    pub fn start(parts: &Parts, start: &Start<'_>) -> Result<Self> {
+    pub fn start(parts: &MachineParts, start: &MachineStart<'_>) -> Result<Self> {
         let folder = start.folder;
         fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         for name in ["qmp", "watch", "ctl", "imu"] {
@@ -146,7 +146,7 @@ impl Machine {
         }
         let initrd = folder.join("initrd.img");
         parts.initrd(&initrd)?;
-        let (unit, terminal) = Unit::new()?;
+        let (unit, terminal) = SerialUnit::new()?;
         let log = |name: &str| fs::File::create(folder.join(name)).with_context(|| format!("{name} of QEMU"));
         // Whatever becomes of the harness, the machine does not outlive it.
         let mut qemu = Command::new("setpriv");
@@ -161,7 +161,7 @@ impl Machine {
             .context("qemu-system-x86_64 cannot be run; ./check setup installs it")?;
         let connected = || -> Result<_> {
             let qmp = Qmp::connect(&folder.join("qmp"))?;
-            let lcd = Watch::start(Qmp::connect(&folder.join("watch"))?, folder, start.lcd)?;
+            let lcd = LcdWatch::start(Qmp::connect(&folder.join("watch"))?, folder, start.lcd)?;
             let guest = Guest::new(wait_for_socket(&folder.join("ctl"))?, log("journal.txt")?)?;
             unit.relay(wait_for_socket(&folder.join("imu"))?, terminal)?;
             Ok((qmp, lcd, guest))
@@ -210,13 +210,13 @@ impl Machine {
         bail!("the machine did not switch itself off within {} s", patience.as_secs());
     }
 
-    /// What was written to its serial console.
+    /// Text of its serial console.
     pub fn console(&self) -> String {
         String::from_utf8_lossy(&fs::read(self.folder.join("console")).unwrap_or_default()).into_owned()
     }
 }
 
-impl Drop for Machine {
+impl Drop for VirtualMachine {
     fn drop(&mut self) {
         drop(self.process.kill());
         drop(self.process.wait());
@@ -228,7 +228,7 @@ impl Drop for Machine {
 /// tests of every write boundary (`./check cuts`) cover the unkind ones.
 const WRITTEN: &str = "format=raw,if=none,cache=writeback,aio=threads";
 
-fn arguments(parts: &Parts, start: &Start<'_>, initrd: &Path, line: &Path) -> Vec<String> {
+fn arguments(parts: &MachineParts, start: &MachineStart<'_>, initrd: &Path, line: &Path) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     let mut add = |words: &str| all.extend(words.split(' ').map(str::to_owned));
     let socket = |name: &str| start.folder.join(name).display().to_string();

@@ -16,19 +16,19 @@ mod unit;
 use std::{path::PathBuf, process::ExitCode, thread, time::Duration};
 
 use anyhow::{Context, Result};
-use bowwave_hil::protocol::Command;
+use bowwave_hil::protocol::AgentCommand;
 use clap::{Args, Parser};
 
-use crate::bench::{Bench, Shop};
+use crate::bench::{HilBench, Shop};
 
 /// Hardware in the loop: see tests/hil/README.md.
 #[derive(Parser)]
-enum Cli {
+enum HilCli {
     /// Boots the image, plays a recording in, injects every fault, writes the table
     Run {
         /// What to test
         #[command(flatten)]
-        what: What,
+        what: BenchInputs,
         /// Only the rows of these numbers
         #[arg(long, value_delimiter = ',', value_name = "N,N,...")]
         only: Vec<String>,
@@ -37,7 +37,7 @@ enum Cli {
     Cuts {
         /// What to test
         #[command(flatten)]
-        what: What,
+        what: BenchInputs,
         /// How many cuts
         count: u32,
         /// Seed of the moments
@@ -48,14 +48,14 @@ enum Cli {
     Boot {
         /// What to test
         #[command(flatten)]
-        what: What,
+        what: BenchInputs,
         /// Lines
         lines: Vec<String>,
     },
 }
 
 #[derive(Args)]
-struct What {
+struct BenchInputs {
     /// Folder that systemd/image/build left
     #[arg(long, default_value = "target/image", value_name = "DIR")]
     image: PathBuf,
@@ -67,17 +67,19 @@ struct What {
     out: PathBuf,
 }
 
-impl What {
+impl BenchInputs {
     fn shop(&self) -> Result<Shop> {
         Shop::open(&self.image, &self.modules, &self.out)
     }
 }
 
 fn main() -> ExitCode {
-    let passed = match Cli::parse() {
-        Cli::Run { what, only } => what.shop().and_then(|shop| run::run(&shop, &only)),
-        Cli::Cuts { what, count, seed } => what.shop().and_then(|mut shop| cuts::run(&mut shop, count, seed)),
-        Cli::Boot { what, lines } => what.shop().and_then(|shop| boot(&shop, &lines)),
+    let passed = match HilCli::parse() {
+        HilCli::Run { what, only } => what.shop().and_then(|shop| run::run(&shop, &only)),
+        HilCli::Cuts { what, count, seed } => {
+            what.shop().and_then(|mut shop| cuts::run(&mut shop, count, seed))
+        }
+        HilCli::Boot { what, lines } => what.shop().and_then(|shop| boot(&shop, &lines)),
     };
     match passed {
         Ok(true) => ExitCode::SUCCESS,
@@ -91,7 +93,7 @@ fn main() -> ExitCode {
 
 fn boot(shop: &Shop, lines: &[String]) -> Result<bool> {
     let data = shop.fresh_data("boot-data.img")?;
-    let mut bench = Bench::switch_on(shop, &data, "utc")?;
+    let mut bench = HilBench::switch_on(shop, &data, "utc")?;
     println!("agent after {:.1} s", bench.machine.power_on.elapsed().as_secs_f64());
     for line in lines {
         println!("\n$ {line}");
@@ -111,7 +113,7 @@ fn boot(shop: &Shop, lines: &[String]) -> Result<bool> {
     Ok(true)
 }
 
-fn execute(bench: &mut Bench, line: &str) -> Result<()> {
+fn execute(bench: &mut HilBench, line: &str) -> Result<()> {
     let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
     match word {
         "sleep" => thread::sleep(Duration::from_secs_f64(rest.parse().context("seconds")?)),
@@ -134,7 +136,7 @@ fn execute(bench: &mut Bench, line: &str) -> Result<()> {
             }
         }
         "!" => {
-            let command: Command = serde_json::from_str(rest)?;
+            let command: AgentCommand = serde_json::from_str(rest)?;
             println!("{}", bench.machine.guest.call_within(command, Duration::from_secs(90))?);
         }
         _ => {

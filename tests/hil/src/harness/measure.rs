@@ -3,12 +3,12 @@
 use std::{fmt::Write, fs, path::Path, thread, time::Duration};
 
 use anyhow::{Context, Result, ensure};
-use bowwave_hil::protocol::Command;
+use bowwave_hil::protocol::AgentCommand;
 use glam::{DQuat, DVec2, DVec3};
 use hw_sim::make::Motion;
 use serde_json::Value;
 
-use super::bench::{Bench, Configured, PICTURE, recipe};
+use super::bench::{Configured, HilBench, PICTURE, recipe};
 
 /// Upper share of the picture that is hidden: sky and horizon stay within it while the tape plays, and more a calibration may not hide.
 const HIDDEN_SHARE: f64 = 0.78;
@@ -45,10 +45,10 @@ pub fn percentile(values: &mut [f64], share: f64) -> f64 {
 }
 
 /// How much of the machine's two cores the trainer uses over some seconds, by thread, and its memory.
-pub fn usage(bench: &mut Bench, what: &str) -> Result<Vec<Figure>> {
-    let before = bench.machine.guest.call(Command::Usage)?;
+pub fn usage(bench: &mut HilBench, what: &str) -> Result<Vec<Figure>> {
+    let before = bench.machine.guest.call(AgentCommand::Usage)?;
     thread::sleep(Duration::from_secs(6));
-    let after = bench.machine.guest.call(Command::Usage)?;
+    let after = bench.machine.guest.call(AgentCommand::Usage)?;
     let ns = |v: &Value| v["now_ns"].as_i64().unwrap_or(0);
     let seconds = (ns(&after) - ns(&before)) as f64 * 1e-9;
     let threads = |v: &Value| v["threads"].as_object().cloned().unwrap_or_default();
@@ -76,14 +76,14 @@ pub fn usage(bench: &mut Bench, what: &str) -> Result<Vec<Figure>> {
 
 /// Fires over a whole round of the tape while nothing that the camera sees can correct the unit: its calibration hides the sky and the
 /// horizon as the own ship. The machine's times before and after.
-pub fn fire_unaided(bench: &mut Bench) -> Result<(i64, i64)> {
+pub fn fire_unaided(bench: &mut HilBench) -> Result<(i64, i64)> {
     let mut file = hw_sim::make::calibration(&recipe());
     let (width, height) = PICTURE;
     let [right, bottom] = [f64::from(width), (f64::from(height) * HIDDEN_SHARE).floor()];
     file.own_ship =
         vec![vec![DVec2::ZERO, DVec2::new(right, 0.0), DVec2::new(right, bottom), DVec2::new(0.0, bottom)]];
     let path = "/run/hil/etc/unaided.toml".to_owned();
-    bench.machine.guest.call(Command::Write { path, text: bowwave_calibration::to_toml(&file) })?;
+    bench.machine.guest.call(AgentCommand::Write { path, text: bowwave_calibration::to_toml(&file) })?;
     bench.configure(&Configured { calibration: "unaided.toml".into(), ..Configured::default() })?;
     bench.service("reload")?;
     thread::sleep(Duration::from_secs(2));
@@ -107,18 +107,18 @@ pub fn fire_unaided(bench: &mut Bench) -> Result<(i64, i64)> {
 /// truth that is milliseconds. So does what the camera sees: the machine's small pictures tell the heading to half a milliradian, otherwise at
 /// each place and some tenths of a second later. What the trainer can be early or late by is held against what the unit said while nothing
 /// corrected it (`unaided`, the machine's times); how far all is from the truth is told as an angle.
-pub fn shots(bench: &mut Bench, line_delay_ms: f64, unaided: (i64, i64)) -> Result<Vec<Figure>> {
+pub fn shots(bench: &mut HilBench, line_delay_ms: f64, unaided: (i64, i64)) -> Result<Vec<Figure>> {
     let rounds = bench.rounds()?;
     let origin = bench.machine.guest.origin_ns().context("nothing was played")?;
     let fired = |r: &Value| r["fired_ns"].as_i64().unwrap_or(i64::MIN);
     let mut figures = Vec::new();
     figures.extend(edges(bench, &rounds));
     figures.push(order(bench, &rounds));
-    let unit = Unit::of(bench);
+    let unit = UnitTrack::of(bench);
     let scored: Vec<&Value> =
         rounds.iter().filter(|r| r["outcome"] != "not_scored" && fired(r) > origin).collect();
     ensure!(scored.len() >= 20, "only {} scored rounds", scored.len());
-    let aims: Vec<Aim> = scored
+    let aims: Vec<BoreAim> = scored
         .iter()
         .filter_map(|round| {
             let numbers: Vec<f64> =
@@ -129,16 +129,16 @@ pub fn shots(bench: &mut Bench, line_delay_ms: f64, unaided: (i64, i64)) -> Resu
             let said = unit.bore_at(tape_ns)?;
             let velocity = (unit.bore_at(tape_ns + 5_000_000)? - unit.bore_at(tape_ns - 5_000_000)?) * 100.0;
             let wrong_rad = bore.angle_between(unit.true_bore_at(tape_ns));
-            Some(Aim { fired_ns: fired(round), off: bore - said, velocity, wrong_rad })
+            Some(BoreAim { fired_ns: fired(round), off: bore - said, velocity, wrong_rad })
         })
         .collect();
     write_aims(&bench.out.join("rounds.csv"), &aims)?;
-    let rms = |aims: &[&Aim], square: &dyn Fn(&Aim) -> f64| {
+    let rms = |aims: &[&BoreAim], square: &dyn Fn(&BoreAim) -> f64| {
         (aims.iter().map(|aim| square(aim)).sum::<f64>() / aims.len().max(1) as f64).sqrt() * 1e3
     };
-    let all: Vec<&Aim> = aims.iter().collect();
+    let all: Vec<&BoreAim> = aims.iter().collect();
     let (from, to) = unaided;
-    let alone: Vec<&Aim> = aims.iter().filter(|aim| (from..to).contains(&aim.fired_ns)).collect();
+    let alone: Vec<&BoreAim> = aims.iter().filter(|aim| (from..to).contains(&aim.fired_ns)).collect();
     ensure!(alone.len() >= 20, "only {} rounds were scored while nothing corrected the unit", alone.len());
     let off_mrad = rms(&alone, &|aim| aim.off.length_squared());
     let wrong_mrad = rms(&all, &|aim| aim.wrong_rad * aim.wrong_rad);
@@ -165,7 +165,7 @@ pub fn shots(bench: &mut Bench, line_delay_ms: f64, unaided: (i64, i64)) -> Resu
 }
 
 /// Where a round was aimed: by how much that differs from what the unit said of its time, and how fast that moved.
-struct Aim {
+struct BoreAim {
     /// On the machine's clock.
     fired_ns: i64,
     off: DVec3,
@@ -176,7 +176,7 @@ struct Aim {
 }
 
 /// Round by round, for whoever looks for the cause of an error.
-fn write_aims(path: &Path, aims: &[Aim]) -> Result<()> {
+fn write_aims(path: &Path, aims: &[BoreAim]) -> Result<()> {
     let mut text = String::from(
         "fired_s,off_x_mrad,off_y_mrad,off_z_mrad,velocity_x,velocity_y,velocity_z,wrong_mrad\n",
     );
@@ -200,7 +200,7 @@ fn write_aims(path: &Path, aims: &[Aim]) -> Result<()> {
 }
 
 /// By how many seconds the poses of these rounds are ahead of the rounds, by least squares; what all are off by alike is not of time.
-fn late_s(aims: &[&Aim]) -> f64 {
+fn late_s(aims: &[&BoreAim]) -> f64 {
     let count = aims.len().max(1) as f64;
     let mean_off = aims.iter().map(|aim| aim.off).sum::<DVec3>() / count;
     let mean_velocity = aims.iter().map(|aim| aim.velocity).sum::<DVec3>() / count;
@@ -211,16 +211,16 @@ fn late_s(aims: &[&Aim]) -> f64 {
     along / square.max(f64::MIN_POSITIVE)
 }
 
-/// What the tape's unit says and what is true, by nanoseconds since the tape's beginning.
-struct Unit {
+/// Readings of the tape's unit and the truth, by nanoseconds since the tape's beginning.
+struct UnitTrack {
     period_ns: i64,
     attitudes: Vec<DQuat>,
     camera_from_imu: DQuat,
     truth: Motion,
 }
 
-impl Unit {
-    fn of(bench: &Bench) -> Self {
+impl UnitTrack {
+    fn of(bench: &HilBench) -> Self {
         let recipe = recipe();
         Self {
             period_ns: bench.tape.period_ns.max(1),
@@ -246,7 +246,7 @@ impl Unit {
 }
 
 /// The first round of each pull against the time of the pull.
-fn edges(bench: &Bench, rounds: &[Value]) -> Vec<Figure> {
+fn edges(bench: &HilBench, rounds: &[Value]) -> Vec<Figure> {
     let mut late = Vec::new();
     let presses = bench.pulls.iter().filter(|(.., pressed)| *pressed);
     let blind = |at: i64| bench.blind.iter().any(|(from, to)| (*from..=*to).contains(&at));
@@ -276,7 +276,7 @@ fn edges(bench: &Bench, rounds: &[Value]) -> Vec<Figure> {
 }
 
 /// Times rise, no round is twice, none was fired without a pull, none scored in the dark.
-fn order(bench: &Bench, rounds: &[Value]) -> Figure {
+fn order(bench: &HilBench, rounds: &[Value]) -> Figure {
     let fired = |r: &Value| r["fired_ns"].as_i64().unwrap_or(0);
     let key = |r: &Value| (r["run"].as_i64(), r["shot"].as_i64());
     let backwards =
@@ -317,7 +317,7 @@ fn order(bench: &Bench, rounds: &[Value]) -> Figure {
 }
 
 /// From the pull to the committed round: commits as the program reports them.
-pub fn committed(bench: &mut Bench) -> Result<Figure> {
+pub fn committed(bench: &mut HilBench) -> Result<Figure> {
     let mut delays = Vec::new();
     for _ in 0..6 {
         let seen = bench.machine.guest.lines().len();

@@ -5,24 +5,24 @@ use std::{fmt::Write, fs, path::Path};
 use anyhow::{Context, Result};
 
 use super::{
-    faults::{Line, Verdict},
+    faults::{FaultLine, FaultVerdict},
     measure::Figure,
 };
 
-/// What a run came to.
+/// Result of a run.
 #[derive(Default)]
-pub struct Report {
-    /// What the machine is, for the heading.
+pub struct HilReport {
+    /// Description of the machine, for the heading.
     pub machine: String,
     /// How many times slower it is.
     pub slow: f64,
     /// Figures.
     pub figures: Vec<Figure>,
     /// Faults.
-    pub lines: Vec<Line>,
+    pub lines: Vec<FaultLine>,
 }
 
-impl Report {
+impl HilReport {
     /// Whether nothing was missed.
     pub fn passed(&self) -> bool {
         self.missed() == 0
@@ -30,7 +30,7 @@ impl Report {
 
     /// How much was missed.
     pub fn missed(&self) -> usize {
-        self.lines.iter().filter(|l| l.verdict == Verdict::Missed).count()
+        self.lines.iter().filter(|l| l.verdict == FaultVerdict::Missed).count()
             + self.figures.iter().filter(|f| f.met == Some(false)).count()
     }
 
@@ -61,51 +61,19 @@ impl Report {
                 Some(true) => "met",
                 Some(false) => "MISSED",
             };
-            row(&mut text, &[&f.what, &f.value, &f.target, verdict]);
+            row(&mut text, &[f.what.as_str(), &f.value, &f.target, verdict]);
         }
         text.push_str(
             "\n| # | Fault | Injected | On the LCD | Code | To the LCD, s | Recovery, s | Target | Verdict | Note |\n\
              |---|---|---|---|---|---|---|---|---|---|\n",
         );
-        for l in &self.lines {
-            let (seen, back) = (seconds(l.seen_s), seconds(l.back_s));
-            row(
-                &mut text,
-                &[
-                    &l.number,
-                    &l.fault,
-                    &l.injected,
-                    &l.lcd,
-                    &l.code,
-                    &seen,
-                    &back,
-                    &l.target,
-                    l.verdict.text(),
-                    &l.note,
-                ],
-            );
-        }
+        self.lines.iter().for_each(|line| row(&mut text, &line.cells()));
         text
     }
 
     fn fault_csv(&self) -> String {
         let mut text = String::from("number,fault,injected,lcd,code,seen_s,back_s,target,verdict,note\n");
-        for l in &self.lines {
-            let (seen, back) = (seconds(l.seen_s), seconds(l.back_s));
-            let cells = [
-                &l.number,
-                &l.fault,
-                &l.injected,
-                &l.lcd,
-                &l.code,
-                &seen,
-                &back,
-                &l.target,
-                l.verdict.text(),
-                &l.note,
-            ];
-            csv_row(&mut text, &cells);
-        }
+        self.lines.iter().for_each(|line| csv_row(&mut text, &line.cells()));
         text
     }
 
@@ -113,24 +81,21 @@ impl Report {
         let mut text = String::from("what,value,target,met\n");
         for f in &self.figures {
             let met = f.met.map_or("", |m| if m { "yes" } else { "no" });
-            csv_row(&mut text, &[&f.what, &f.value, &f.target, met]);
+            csv_row(&mut text, &[f.what.as_str(), &f.value, &f.target, met]);
         }
         text
     }
 }
 
-fn seconds(value: Option<f64>) -> String {
-    value.map_or_else(|| "-".into(), |v| format!("{v:.2}"))
-}
-
-fn row(text: &mut String, cells: &[&str]) {
-    let cells: Vec<String> = cells.iter().map(|c| c.replace('|', "/").replace('\n', " ")).collect();
+fn row(text: &mut String, cells: &[impl AsRef<str>]) {
+    let cells: Vec<String> = cells.iter().map(|c| c.as_ref().replace('|', "/").replace('\n', " ")).collect();
     // Writing to a String cannot fail.
     let _ = writeln!(text, "| {} |", cells.join(" | "));
 }
 
-fn csv_row(text: &mut String, cells: &[&str]) {
-    let cells: Vec<String> = cells.iter().map(|c| format!("\"{}\"", c.replace('"', "\"\""))).collect();
+fn csv_row(text: &mut String, cells: &[impl AsRef<str>]) {
+    let cells: Vec<String> =
+        cells.iter().map(|c| format!("\"{}\"", c.as_ref().replace('"', "\"\""))).collect();
     text.push_str(&cells.join(","));
     text.push('\n');
 }
@@ -141,7 +106,7 @@ mod tests {
 
     #[test]
     fn a_missed_row_is_counted_and_cells_cannot_break_the_table() {
-        let line = Line {
+        let line = FaultLine {
             number: "1".into(),
             fault: "a | b".into(),
             injected: "x\ny".into(),
@@ -150,10 +115,10 @@ mod tests {
             seen_s: Some(0.1234),
             back_s: None,
             target: "seen 0.1 s".into(),
-            verdict: Verdict::Missed,
+            verdict: FaultVerdict::Missed,
             note: String::new(),
         };
-        let report = Report { lines: vec![line], ..Report::default() };
+        let report = HilReport { lines: vec![line], ..HilReport::default() };
         assert!(!report.passed());
         let last = report.markdown().lines().last().unwrap_or_default().to_owned();
         assert_eq!(last.matches('|').count(), 11);

@@ -7,14 +7,14 @@ use std::{
 };
 
 use anyhow::{Context, Result};
-use bowwave_hil::protocol::Command;
+use bowwave_hil::protocol::AgentCommand;
 
 use super::{
-    bench::{Bench, LCD, Shop, Told},
-    faults::{Row, Seen, Verdict, rows},
+    bench::{FaultChange, HilBench, LCD, Shop},
+    faults::{CaseResult, FaultRow, FaultVerdict, rows},
     lcd::Plate,
     measure::{self, Figure},
-    report::Report,
+    report::HilReport,
 };
 
 /// A machine's hardware clock that was never set.
@@ -31,8 +31,8 @@ pub fn run(shop: &Shop, only: &[String]) -> Result<bool> {
     let begun = Instant::now();
     let host = bowwave_hil::spin();
     let data = shop.used_data("data.img")?;
-    let mut bench = Bench::switch_on(shop, &data, NO_CLOCK)?;
-    let mut report = Report::default();
+    let mut bench = HilBench::switch_on(shop, &data, NO_CLOCK)?;
+    let mut report = HilReport::default();
     let outcome = tried(shop, &mut bench, &mut report, host, only);
     if let Err(e) = &outcome {
         eprintln!("{e:#}");
@@ -55,9 +55,15 @@ pub fn run(shop: &Shop, only: &[String]) -> Result<bool> {
     Ok(report.passed())
 }
 
-fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &[String]) -> Result<()> {
+fn tried(
+    shop: &Shop,
+    bench: &mut HilBench,
+    report: &mut HilReport,
+    host: f64,
+    only: &[String],
+) -> Result<()> {
     // Before anything is drawn, so that it is the processor that is measured.
-    let guest = bench.machine.guest.call_within(Command::Spin, Duration::from_secs(120))?;
+    let guest = bench.machine.guest.call_within(AgentCommand::Spin, Duration::from_secs(120))?;
     bench.slow = (guest.as_f64().context("seconds")? / host).max(1.0);
     report.slow = bench.slow;
     bench.pull(1, true)?;
@@ -66,7 +72,7 @@ fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &
     let (w, h) = LCD;
     report.machine = format!(
         "QEMU without KVM, two cores, LCD {w}x{h} (virtio-gpu), kernel {}",
-        crate::machine::Parts::release(&shop.parts.image)?
+        crate::machine::MachineParts::release(&shop.parts.image)?
     );
     // A machine without a clock battery says so until its clock is set: that row goes first.
     for row in rows().iter().filter(|r| r.number() == "26") {
@@ -79,7 +85,7 @@ fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &
         if let Some(unaided) = unaided.filter(|_| row.number() == REPLACES_JOURNAL) {
             let delay = after_stop(bench)?;
             report.figures.extend(measure::shots(bench, delay, unaided)?);
-            bench.machine.guest.call(Command::Play { on: true })?;
+            bench.machine.guest.call(AgentCommand::Play { on: true })?;
             bench.settle()?;
         }
         if only.is_empty() || only.iter().any(|n| n == row.number()) {
@@ -89,10 +95,10 @@ fn tried(shop: &Shop, bench: &mut Bench, report: &mut Report, host: f64, only: &
     Ok(())
 }
 
-fn try_row(row: &Row, bench: &mut Bench, report: &mut Report) {
+fn try_row(row: &FaultRow, bench: &mut HilBench, report: &mut HilReport) {
     let begun = Instant::now();
     let mut line = row.run(bench);
-    if line.verdict == Verdict::Missed && !row.only_once() {
+    if line.verdict == FaultVerdict::Missed && !row.only_once() {
         // The host may have been busy: once more, and the table says so.
         eprintln!("{:>4} {} was missed: {}; once more", line.number, line.fault, line.note);
         let first = std::mem::replace(&mut line, row.run(bench));
@@ -111,11 +117,11 @@ fn try_row(row: &Row, bench: &mut Bench, report: &mut Report) {
 }
 
 /// From power-on to the first picture and to READY.
-fn start_up(bench: &mut Bench, report: &mut Report) -> Result<()> {
+fn start_up(bench: &mut HilBench, report: &mut HilReport) -> Result<()> {
     let on = bench.machine.power_on;
     let picture = bench.lcd(on, Duration::from_secs(240), "a picture", |p, _| p != Plate::Black)?;
     let ready = bench.lcd(on, Duration::from_secs(240), "READY", |p, _| p == Plate::Ready)?;
-    let show = |bench: &mut Bench, property: &str| -> Result<f64> {
+    let show = |bench: &mut HilBench, property: &str| -> Result<f64> {
         let text = bench.machine.guest.run(&["/bin/systemctl", "show", "-P", property, "bowwave.service"])?;
         Ok(text.trim().parse::<f64>().context("microseconds")? * 1e-6)
     };
@@ -129,8 +135,8 @@ fn start_up(bench: &mut Bench, report: &mut Report) -> Result<()> {
     Ok(())
 }
 
-/// What is measured while nothing is wrong; when nothing corrected the unit.
-fn steady(bench: &mut Bench, report: &mut Report) -> Result<(i64, i64)> {
+/// Figures while nothing is wrong; when nothing corrected the unit.
+fn steady(bench: &mut HilBench, report: &mut HilReport) -> Result<(i64, i64)> {
     for (figure, target) in report.figures.iter_mut().zip([15.0, 15.0, 4.0]) {
         let seconds: f64 = figure.value.trim_end_matches(" s").parse().unwrap_or(f64::INFINITY);
         figure.target = format!("{target} s, scaled {:.0} s", target * bench.slow);
@@ -162,23 +168,23 @@ fn steady(bench: &mut Bench, report: &mut Report) -> Result<(i64, i64)> {
 }
 
 /// With the trainer off, the unit's line is free: how long its bytes take at least.
-fn after_stop(bench: &mut Bench) -> Result<f64> {
+fn after_stop(bench: &mut HilBench) -> Result<f64> {
     bench.machine.guest.run(&["/bin/systemctl", "stop", "bowwave.service"])?;
-    bench.machine.guest.call(Command::Play { on: false })?;
-    let command = Command::LineDelay { device: "/dev/bowwave/imu".into() };
+    bench.machine.guest.call(AgentCommand::Play { on: false })?;
+    let command = AgentCommand::LineDelay { device: "/dev/bowwave/imu".into() };
     let delay = bench.machine.guest.call_within(command, Duration::from_secs(60))?;
     Ok(delay["least_ns"].as_f64().context("no byte came back through the unit's line")? * 1e-6)
 }
 
 /// Row 32: the machine's process is killed while it shoots, and started again.
-fn power_cut(shop: &Shop, mut bench: Bench, data: &Path, report: &mut Report) -> Result<()> {
-    let row = |seen: Seen, slow: f64| {
+fn power_cut(shop: &Shop, mut bench: HilBench, data: &Path, report: &mut HilReport) -> Result<()> {
+    let row = |seen: CaseResult, slow: f64| {
         let verdict = match seen.back_s {
-            Some(s) if seen.met && s <= 15.0 => Verdict::Met,
-            Some(s) if seen.met && s <= 15.0 * slow => Verdict::MetScaled,
-            _ => Verdict::Missed,
+            Some(s) if seen.met && s <= 15.0 => FaultVerdict::Met,
+            Some(s) if seen.met && s <= 15.0 * slow => FaultVerdict::MetScaled,
+            _ => FaultVerdict::Missed,
         };
-        super::faults::Line {
+        super::faults::FaultLine {
             number: "32".into(),
             fault: "Power cut".into(),
             injected: "QEMU's process is killed while rounds are fired; started again".into(),
@@ -192,8 +198,8 @@ fn power_cut(shop: &Shop, mut bench: Bench, data: &Path, report: &mut Report) ->
         }
     };
     let slow = bench.slow;
-    let tried = (|| -> Result<Seen> {
-        bench.play().or_else(|_| bench.machine.guest.call(Command::Play { on: true }).map(|_| ()))?;
+    let tried = (|| -> Result<CaseResult> {
+        bench.play().or_else(|_| bench.machine.guest.call(AgentCommand::Play { on: true }).map(|_| ()))?;
         bench.machine.guest.run(&["/bin/systemctl", "--no-block", "start", "bowwave.service"])?;
         bench.ready(bench.scaled(15.0))?;
         let seen = bench.machine.guest.lines().len();
@@ -201,11 +207,11 @@ fn power_cut(shop: &Shop, mut bench: Bench, data: &Path, report: &mut Report) ->
         std::thread::sleep(Duration::from_millis(2700));
         let acknowledged = super::cuts::committed(&bench.machine.guest.lines()[seen..]);
         bench.machine.cut()?;
-        let mut again = Bench::switch_on(shop, data, "utc")?;
+        let mut again = HilBench::switch_on(shop, data, "utc")?;
         again.slow = slow;
         again.pull(1, true)?;
         again.play()?;
-        let dirty = again.told("BOOT_DIRTY", Told::Came, 0, again.scaled(15.0));
+        let dirty = again.told("BOOT_DIRTY", FaultChange::Came, 0, again.scaled(15.0));
         let on = again.machine.power_on;
         let ready = again.lcd(on, again.scaled(15.0), "READY", |p, _| p == Plate::Ready)?;
         let lcd = again.status()?;
@@ -215,21 +221,22 @@ fn power_cut(shop: &Shop, mut bench: Bench, data: &Path, report: &mut Report) ->
         let lost = super::cuts::lost(&acknowledged, &rounds);
         let note = format!("{} rounds reported committed, {lost} of them lost", acknowledged.len());
         let back_s = ready.saturating_duration_since(on).as_secs_f64();
-        Ok(Seen {
+        Ok(CaseResult {
             lcd,
             back_s: Some(back_s),
             met: lost == 0 && !acknowledged.is_empty(),
             note,
-            ..Seen::default()
+            ..CaseResult::default()
         })
     })();
-    report
-        .lines
-        .push(row(tried.unwrap_or_else(|e| Seen { note: format!("{e:#}"), ..Seen::default() }), slow));
+    report.lines.push(row(
+        tried.unwrap_or_else(|e| CaseResult { note: format!("{e:#}"), ..CaseResult::default() }),
+        slow,
+    ));
     Ok(())
 }
 
-fn keep_journal(bench: &Bench, path: &Path) -> Result<()> {
+fn keep_journal(bench: &HilBench, path: &Path) -> Result<()> {
     let text: String = bench
         .machine
         .guest

@@ -33,21 +33,21 @@ pub enum Passage {
     Cut,
 }
 
-struct Shared {
+struct LineState {
     passage: Mutex<Passage>,
     baud: AtomicU64,
     lost: AtomicU64,
 }
 
 /// The unit's line.
-pub struct Unit {
-    shared: Arc<Shared>,
+pub struct SerialUnit {
+    shared: Arc<LineState>,
     slave: PathBuf,
     port: File,
 }
 
-impl Unit {
-    /// A line that nobody listens to yet; its relay starts with [`Unit::relay`].
+impl SerialUnit {
+    /// A line that nobody listens to yet; its relay starts with [`SerialUnit::relay`].
     pub fn new() -> Result<(Self, Terminal)> {
         let terminal = Terminal::open().context("no pseudo-terminal for the unit's line")?;
         let slave = terminal.slave().to_owned();
@@ -56,7 +56,7 @@ impl Unit {
         let mut attributes = tcgetattr(&port).context("the unit's line")?;
         attributes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &attributes).context("the unit's line")?;
-        let shared = Shared {
+        let shared = LineState {
             passage: Mutex::new(Passage::Straight),
             baud: AtomicU64::new(921_600),
             lost: AtomicU64::new(0),
@@ -127,6 +127,6 @@ impl Unit {
     }
 }
 
-fn passage_of(shared: &Shared) -> MutexGuard<'_, Passage> {
+fn passage_of(shared: &LineState) -> MutexGuard<'_, Passage> {
     shared.passage.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -6,26 +6,26 @@ use std::{
 };
 
 use anyhow::{Context, Result, ensure};
-use bowwave_hil::protocol::Command;
+use bowwave_hil::protocol::AgentCommand;
 
-use super::{Case, Own, Row, Seen, Shown, trigger::shots};
+use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase, trigger::shots};
 use crate::{
-    bench::{Bench, Configured, GPU_FAULT, STATE, Told},
-    guest::Entry,
+    bench::{Configured, FaultChange, GPU_FAULT, HilBench, STATE},
+    guest::JournalEntry,
     lcd::Plate,
 };
 
-fn write(bench: &mut Bench, path: &str, text: &str) -> Result<i64> {
-    bench.machine.guest.call(Command::Write { path: path.into(), text: text.into() })?;
+fn write(bench: &mut HilBench, path: &str, text: &str) -> Result<i64> {
+    bench.machine.guest.call(AgentCommand::Write { path: path.into(), text: text.into() })?;
     Ok(bench.machine.guest.now_ns())
 }
 
-fn shell(bench: &mut Bench, line: &str) -> Result<i64> {
+fn shell(bench: &mut HilBench, line: &str) -> Result<i64> {
     bench.machine.guest.shell(line)?;
     Ok(bench.machine.guest.now_ns())
 }
 
-pub fn rows() -> Vec<Row> {
+pub fn rows() -> Vec<FaultRow> {
     let mut all = clock_and_heat();
     all.extend(screen_and_disk());
     // From here on the trainer is started anew, with a full belt.
@@ -35,9 +35,9 @@ pub fn rows() -> Vec<Row> {
     all
 }
 
-fn clock_and_heat() -> Vec<Row> {
+fn clock_and_heat() -> Vec<FaultRow> {
     vec![
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "26",
             fault: "No clock battery",
             injected: "the machine started with its hardware clock at 2020; then the clock is set",
@@ -45,7 +45,7 @@ fn clock_and_heat() -> Vec<Row> {
             target: "warning until set",
             run: clock_unset,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "25",
             fault: "Wall clock steps an hour",
             injected: "date --set '+1 hour', and back",
@@ -53,25 +53,22 @@ fn clock_and_heat() -> Vec<Row> {
             target: "no missed frame: READY throughout",
             run: clock_step,
         }),
-        Row::Case(Case {
+        FaultRow::Case(FaultCase {
             number: "36",
             fault: "Thermal throttling",
             injected: "the configured temperature file says 95 C",
             code: "THERMAL",
-            shown: Shown::Warning("HOT"),
-            seen_s: None,
-            back_s: None,
-            lasts: true,
-            stays_s: 0.5,
+            shown: LcdShown::Warning("HOT"),
             inject: |b| write(b, "/run/hil/thermal", "95000\n"),
             end: |b| write(b, "/run/hil/thermal", "41000\n"),
+            ..FaultCase::USUAL
         }),
     ]
 }
 
-fn screen_and_disk() -> Vec<Row> {
+fn screen_and_disk() -> Vec<FaultRow> {
     vec![
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "29",
             fault: "LCD unplugged and back",
             injected: "the connector's status is forced off in sysfs, and detected again",
@@ -79,15 +76,12 @@ fn screen_and_disk() -> Vec<Row> {
             target: "back 2 s",
             run: lcd_unplugged,
         }),
-        Row::Case(Case {
+        FaultRow::Case(FaultCase {
             number: "30",
             fault: "Disk full",
             injected: "a file takes all of the data partition",
             code: "DISK_FULL",
-            shown: Shown::Warning("REC: DISK FULL"),
-            seen_s: None,
-            back_s: None,
-            lasts: true,
+            shown: LcdShown::Warning("REC: DISK FULL"),
             stays_s: 1.0,
             inject: |b| {
                 let at = shell(
@@ -98,8 +92,9 @@ fn screen_and_disk() -> Vec<Row> {
                 Ok(at)
             },
             end: |b| shell(b, "rm -f /data/fill /data/fill2"),
+            ..FaultCase::USUAL
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "31",
             fault: "File system read-only",
             injected: "all disks are remounted read-only (SysRq) while rounds are fired, later the data partition writable",
@@ -110,9 +105,9 @@ fn screen_and_disk() -> Vec<Row> {
     ]
 }
 
-fn program() -> Vec<Row> {
+fn program() -> Vec<FaultRow> {
     vec![
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "41",
             fault: "Bad configuration",
             injected: "an unknown key, SIGHUP; then the good one, SIGHUP",
@@ -120,7 +115,7 @@ fn program() -> Vec<Row> {
             target: "last good one kept, line:column in the journal",
             run: bad_configuration,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "27",
             fault: "Vulkan device lost",
             injected: "a Vulkan layer answers VK_ERROR_DEVICE_LOST",
@@ -128,7 +123,7 @@ fn program() -> Vec<Row> {
             target: "rebuilt in 2 s",
             run: gpu_lost,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "28",
             fault: "GPU hangs",
             injected: "a Vulkan layer never carries out what is submitted",
@@ -136,7 +131,7 @@ fn program() -> Vec<Row> {
             target: "restart, pictures again",
             run: gpu_hang,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "38",
             fault: "SIGTERM",
             injected: "systemctl stop",
@@ -144,7 +139,7 @@ fn program() -> Vec<Row> {
             target: "0.5 s",
             run: stop,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "33",
             fault: "Database corrupt",
             injected: "while the trainer is off, bytes within hits.sqlite are overwritten",
@@ -152,7 +147,7 @@ fn program() -> Vec<Row> {
             target: "fresh one, old kept",
             run: database,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "39",
             fault: "A thread hangs",
             injected: "the camera's thread is stopped with ptrace for 60 s",
@@ -160,7 +155,7 @@ fn program() -> Vec<Row> {
             target: "systemd restarts the trainer",
             run: hang,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "40",
             fault: "Crash loop",
             injected: "SIGKILL as soon as it runs, four times",
@@ -171,19 +166,19 @@ fn program() -> Vec<Row> {
     ]
 }
 
-fn absent() -> Vec<Row> {
+fn absent() -> Vec<FaultRow> {
     vec![
-        Row::Not(
+        FaultRow::Not(
             "34",
             "fsync fails",
             "the journal's tests of every write, where a file system that fails is put beneath SQLite, cover it",
         ),
-        Row::Not(
+        FaultRow::Not(
             "35",
             "Recording cut short",
             "no device is involved: tests/tests/bad_input.rs cuts recordings, and `recover` reads them",
         ),
-        Row::Not(
+        FaultRow::Not(
             "42",
             "Network down",
             "the gun computer has no network: nothing is queued because nothing is sent",
@@ -191,62 +186,62 @@ fn absent() -> Vec<Row> {
     ]
 }
 
-fn clock_unset(bench: &mut Bench) -> Result<Seen> {
-    let told = bench.told("CLK_UNSET", Told::Came, 0, Duration::from_secs(5))?;
+fn clock_unset(bench: &mut HilBench) -> Result<CaseResult> {
+    let told = bench.told("CLK_UNSET", FaultChange::Came, 0, Duration::from_secs(5))?;
     let lcd = bench.says("CLOCK NOT SET").or_else(|_| bench.status())?;
     let set = shell(bench, "date -u -s '2026-06-01 12:00:00'")?;
-    let went = bench.told("CLK_UNSET", Told::Went, set - 2_000_000_000, bench.scaled(1.0))?;
+    let went = bench.told("CLK_UNSET", FaultChange::Went, set - 2_000_000_000, bench.scaled(1.0))?;
     let note = format!("told {:.1} s after the kernel's start", told as f64 * 1e-9);
-    Ok(Seen {
+    Ok(CaseResult {
         met: lcd.contains("CLOCK NOT SET"),
         lcd,
         back_s: Some((went - set) as f64 * 1e-9),
         note,
-        ..Seen::default()
+        ..CaseResult::default()
     })
 }
 
-fn clock_step(bench: &mut Bench) -> Result<Seen> {
+fn clock_step(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let since = Instant::now();
     let from = bench.machine.guest.now_ns();
     shell(bench, "date -s '+1 hour'")?;
-    bench.told("CLK_STEP", Told::Came, from, bench.scaled(1.0))?;
+    bench.told("CLK_STEP", FaultChange::Came, from, bench.scaled(1.0))?;
     let between = bench.machine.guest.now_ns();
     shell(bench, "date -s '-1 hour'")?;
-    bench.told("CLK_STEP", Told::Came, between, bench.scaled(1.0))?;
+    bench.told("CLK_STEP", FaultChange::Came, between, bench.scaled(1.0))?;
     let lcd = bench.status()?;
     let lost = bench.machine.lcd.first(since, |s| s.plate == Plate::NotScored || s.plate == Plate::Fault);
-    Ok(Seen { met: lost.is_none() && lcd.starts_with("READY"), lcd, ..Seen::default() })
+    Ok(CaseResult { met: lost.is_none() && lcd.starts_with("READY"), lcd, ..CaseResult::default() })
 }
 
-fn lcd_unplugged(bench: &mut Bench) -> Result<Seen> {
+fn lcd_unplugged(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let path =
         bench.machine.guest.shell("ls -d /sys/class/drm/card*-Virtual-1/status | head -1")?.trim().to_owned();
     let from = write(bench, &path, "off")?;
-    let told = bench.told("DISP_LOST", Told::Came, from, bench.scaled(2.0));
+    let told = bench.told("DISP_LOST", FaultChange::Came, from, bench.scaled(2.0));
     thread::sleep(Duration::from_secs(1));
     let back = write(bench, &path, "detect")?;
-    let over = bench.told("DISP_LOST", Told::Went, back, bench.scaled(2.0))?;
+    let over = bench.told("DISP_LOST", FaultChange::Went, back, bench.scaled(2.0))?;
     let seen = bench
         .lcd(bench.machine.guest.host_time(back), bench.scaled(2.0), "READY", |p, _| p == Plate::Ready)?;
     let told = told?;
     let back_s = ((over - back) as f64 * 1e-9)
         .max(seen.saturating_duration_since(bench.machine.guest.host_time(back)).as_secs_f64());
     let note = format!("noticed after {:.0} ms", (told - from) as f64 * 1e-6);
-    Ok(Seen {
+    Ok(CaseResult {
         lcd: "-".into(),
         back_s: Some(back_s),
         within_s: Some(2.0),
         met: true,
         note,
-        ..Seen::default()
+        ..CaseResult::default()
     })
 }
 
 /// The system's journal is on the same disk: what it could not write is lost, and the LCD alone tells.
-fn read_only(bench: &mut Bench) -> Result<Seen> {
+fn read_only(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let stored = bench.rounds()?.len();
     let at = shell(bench, "echo u > /proc/sysrq-trigger; sleep 0.5")?;
@@ -270,15 +265,22 @@ fn read_only(bench: &mut Bench) -> Result<Seen> {
         "{fired} rounds meanwhile, {kept} more in the database afterwards; the system's journal is on the same disk and cannot hold the code"
     );
     let met = fired > 0 && kept as u64 >= fired && !bench.status()?.contains("READ-ONLY");
-    Ok(Seen { lcd: lcd?, seen_s: Some(seen_s), back_s: Some(back_s), met, note, ..Seen::default() })
+    Ok(CaseResult {
+        lcd: lcd?,
+        seen_s: Some(seen_s),
+        back_s: Some(back_s),
+        met,
+        note,
+        ..CaseResult::default()
+    })
 }
 
-fn bad_configuration(bench: &mut Bench) -> Result<Seen> {
+fn bad_configuration(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let from = bench.machine.guest.now_ns();
     bench.configure(&Configured { extra: "no_such_key = 1\n".into(), ..Configured::default() })?;
     bench.service("reload")?;
-    let told = bench.told("CFG", Told::Came, from, bench.scaled(2.0));
+    let told = bench.told("CFG", FaultChange::Came, from, bench.scaled(2.0));
     let lcd = bench.says("CONFIGURATION REFUSED").or_else(|_| bench.status())?;
     let lines = bench.machine.guest.journal_since(from);
     let place =
@@ -286,19 +288,19 @@ fn bad_configuration(bench: &mut Bench) -> Result<Seen> {
     let between = bench.machine.guest.now_ns();
     bench.configure(&Configured::default())?;
     bench.service("reload")?;
-    let went = bench.told("CFG", Told::Went, between, bench.scaled(2.0));
+    let went = bench.told("CFG", FaultChange::Went, between, bench.scaled(2.0));
     bench.settle()?;
     told?;
     went?;
-    Ok(Seen {
+    Ok(CaseResult {
         met: lcd.contains("CONFIGURATION REFUSED") && !place.is_empty(),
         lcd,
         note: place,
-        ..Seen::default()
+        ..CaseResult::default()
     })
 }
 
-fn gpu(bench: &mut Bench, fault: &str, code: &str) -> Result<(i64, i64, String)> {
+fn gpu(bench: &mut HilBench, fault: &str, code: &str) -> Result<(i64, i64, String)> {
     bench.ready(bench.scaled(2.0))?;
     let from = bench.machine.guest.now_ns();
     // The trainer's user deletes it.
@@ -306,29 +308,29 @@ fn gpu(bench: &mut Bench, fault: &str, code: &str) -> Result<(i64, i64, String)>
         "echo {fault} > {GPU_FAULT}.new && chown bowwave {GPU_FAULT}.new && mv {GPU_FAULT}.new {GPU_FAULT}"
     );
     let caused = shell(bench, &line)?;
-    let told = bench.told(code, Told::Came, from, bench.scaled(3.0))?;
+    let told = bench.told(code, FaultChange::Came, from, bench.scaled(3.0))?;
     let lcd = bench.status()?;
     Ok((caused, told, lcd))
 }
 
-fn gpu_lost(bench: &mut Bench) -> Result<Seen> {
+fn gpu_lost(bench: &mut HilBench) -> Result<CaseResult> {
     let (caused, told, lcd) = gpu(bench, "lost", "GPU_LOST")?;
-    let back = bench.told("GPU_LOST", Told::Went, caused, bench.scaled(4.0))?;
+    let back = bench.told("GPU_LOST", FaultChange::Went, caused, bench.scaled(4.0))?;
     bench.settle()?;
     let back_s = (back - told) as f64 * 1e-9;
-    Ok(Seen { lcd, back_s: Some(back_s), within_s: Some(2.0), met: true, ..Seen::default() })
+    Ok(CaseResult { lcd, back_s: Some(back_s), within_s: Some(2.0), met: true, ..CaseResult::default() })
 }
 
-fn gpu_hang(bench: &mut Bench) -> Result<Seen> {
+fn gpu_hang(bench: &mut HilBench) -> Result<CaseResult> {
     let (_, told, lcd) = gpu(bench, "hang", "GPU_HANG")?;
     thread::sleep(Duration::from_secs(2));
     let ready = bench.ready(bench.scaled(15.0))?;
     let back_s = ready.saturating_duration_since(bench.machine.guest.host_time(told)).as_secs_f64();
-    Ok(Seen { lcd, back_s: Some(back_s), within_s: Some(15.0), met: true, ..Seen::default() })
+    Ok(CaseResult { lcd, back_s: Some(back_s), within_s: Some(15.0), met: true, ..CaseResult::default() })
 }
 
 /// The trainer is off: seconds that it took by systemd's account.
-pub(super) fn off(bench: &mut Bench) -> Result<f64> {
+pub(super) fn off(bench: &mut HilBench) -> Result<f64> {
     let begun = Instant::now();
     bench.service("stop")?;
     let until = Instant::now() + Duration::from_secs(60);
@@ -340,12 +342,12 @@ pub(super) fn off(bench: &mut Bench) -> Result<f64> {
     Ok(begun.elapsed().as_secs_f64())
 }
 
-fn stop(bench: &mut Bench) -> Result<Seen> {
+fn stop(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let from = bench.machine.guest.now_ns();
     off(bench)?;
     // The journal may be behind.
-    let ended = |e: &Entry| e.text().starts_with("Stopped bowwave.service");
+    let ended = |e: &JournalEntry| e.text().starts_with("Stopped bowwave.service");
     bench.machine.guest.journal(from, Duration::from_secs(20), "systemd's line of the end", ended)?;
     let lines = bench.machine.guest.journal_since(from);
     let at = |text: &str| lines.iter().find(|e| e.text().starts_with(text)).map(|e| e.at_ns);
@@ -353,31 +355,31 @@ fn stop(bench: &mut Bench) -> Result<Seen> {
     let ended = at("Stopped bowwave.service")
         .or_else(|| at("bowwave.service: Deactivated"))
         .context("systemd's line of the end")?;
-    let told = lines.iter().any(|e| crate::bench::says(&e.fields, "STOP") == Some(Told::Came));
+    let told = lines.iter().any(|e| crate::bench::says(&e.fields, "STOP") == Some(FaultChange::Came));
     let seconds = (ended - begun) as f64 * 1e-9;
     let clean =
         !lines.iter().any(|e| e.text().contains("Failed with result") || e.text().contains("timed out"));
     let note =
         format!("{seconds:.2} s from systemd's request to its end{}", if clean { "" } else { ", not clean" });
-    Ok(Seen {
+    Ok(CaseResult {
         lcd: "-".into(),
         back_s: Some(seconds),
         within_s: Some(0.5),
         met: told && clean,
         note,
-        ..Seen::default()
+        ..CaseResult::default()
     })
 }
 
-fn database(bench: &mut Bench) -> Result<Seen> {
+fn database(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     off(bench)?;
     let path = format!("{STATE}/hits.sqlite");
     shell(bench, &format!("rm -f {path}-wal {path}-shm"))?;
-    bench.machine.guest.call(Command::Patch { path, offset: 0, count: 8192 })?;
+    bench.machine.guest.call(AgentCommand::Patch { path, offset: 0, count: 8192 })?;
     let from = bench.machine.guest.now_ns();
     bench.service("start")?;
-    let told = bench.told("DB_QUARANTINE", Told::Came, from, bench.scaled(15.0))?;
+    let told = bench.told("DB_QUARANTINE", FaultChange::Came, from, bench.scaled(15.0))?;
     bench
         .lcd(Instant::now(), bench.scaled(15.0), "a state", |p, _| p != Plate::Black && p != Plate::Plain)?;
     let lcd = bench.status()?;
@@ -388,32 +390,32 @@ fn database(bench: &mut Bench) -> Result<Seen> {
     let seen_s = (told - from) as f64 * 1e-9;
     // The warning lasts as long as the run.
     off(bench)?;
-    Ok(Seen { lcd, seen_s: Some(seen_s), met, note: kept, ..Seen::default() })
+    Ok(CaseResult { lcd, seen_s: Some(seen_s), met, note: kept, ..CaseResult::default() })
 }
 
-fn main_pid(bench: &mut Bench) -> Result<u64> {
+fn main_pid(bench: &mut HilBench) -> Result<u64> {
     let pid = bench.machine.guest.run(&["/bin/systemctl", "show", "-P", "MainPID", "bowwave.service"])?;
     pid.trim().parse().context("a process")
 }
 
-fn hang(bench: &mut Bench) -> Result<Seen> {
+fn hang(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let before = main_pid(bench)?;
     let from = bench.machine.guest.now_ns();
     bench
         .machine
         .guest
-        .call_within(Command::Hold { thread: "camera".into(), ms: 60_000 }, Duration::from_secs(100))?;
+        .call_within(AgentCommand::Hold { thread: "camera".into(), ms: 60_000 }, Duration::from_secs(100))?;
     let lines = bench.machine.guest.journal_since(from);
-    let own = lines.iter().any(|e| crate::bench::says(&e.fields, "WATCHDOG") == Some(Told::Came));
+    let own = lines.iter().any(|e| crate::bench::says(&e.fields, "WATCHDOG") == Some(FaultChange::Came));
     let systemd = lines.iter().any(|e| e.text().to_lowercase().contains("watchdog timeout"));
     bench.ready(bench.scaled(15.0))?;
     let after = main_pid(bench)?;
     let note = format!("told by the trainer: {own}, by systemd: {systemd}; process {before}, then {after}");
-    Ok(Seen { lcd: "frozen".into(), met: systemd && after != before, note, ..Seen::default() })
+    Ok(CaseResult { lcd: "frozen".into(), met: systemd && after != before, note, ..CaseResult::default() })
 }
 
-fn crash_loop(bench: &mut Bench) -> Result<Seen> {
+fn crash_loop(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let from = bench.machine.guest.now_ns();
     for _ in 0..4 {
@@ -421,12 +423,12 @@ fn crash_loop(bench: &mut Bench) -> Result<Seen> {
         bench.machine.guest.shell(line)?;
         thread::sleep(Duration::from_millis(1500));
     }
-    let told = bench.told("CRASHLOOP", Told::Came, from, bench.scaled(10.0))?;
+    let told = bench.told("CRASHLOOP", FaultChange::Came, from, bench.scaled(10.0))?;
     let at = bench.machine.guest.host_time(told);
     bench.lcd(at, bench.scaled(10.0), "FAULT", |p, _| p == Plate::Fault)?;
     thread::sleep(Duration::from_secs(1));
     let lcd = bench.status()?;
     bench.keep_picture("row-40");
     off(bench)?;
-    Ok(Seen { met: lcd.contains("SAFE MODE"), lcd, ..Seen::default() })
+    Ok(CaseResult { met: lcd.contains("SAFE MODE"), lcd, ..CaseResult::default() })
 }

@@ -6,11 +6,11 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail, ensure};
-use bowwave_hil::protocol::Command;
+use bowwave_hil::protocol::AgentCommand;
 
-use super::{Own, Row, Seen, computer::off, unit};
+use super::{CaseResult, FaultRow, SpecialCase, computer::off, unit};
 use crate::{
-    bench::{Bench, Configured, configuration},
+    bench::{Configured, HilBench, configuration},
     guest::Pending,
     lcd::Plate,
 };
@@ -19,7 +19,7 @@ use crate::{
 const FOLDER: &str = "/run/hil/etc";
 /// Where keys go in.
 const KEYS: &str = "/run/hil/keys";
-/// What it says.
+/// File of its output.
 const SAID: &str = "/run/hil/said";
 /// Where it keeps what it gathers.
 const DATA: &str = "/run/hil/gathered";
@@ -28,9 +28,9 @@ const PATIENCE: Duration = Duration::from_secs(60);
 const TOGETHER: Duration = Duration::from_secs(400);
 /// Between two pulls.
 const APART: Duration = Duration::from_millis(1500);
-pub fn rows() -> Vec<Row> {
+pub fn rows() -> Vec<FaultRow> {
     vec![
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "W",
             fault: "Guided calibration on live devices",
             injected: "camera and unit unplugged while it gathers",
@@ -38,7 +38,7 @@ pub fn rows() -> Vec<Row> {
             target: "says what to do, goes on, tells a result; nothing is saved unasked",
             run: guided,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "Wq",
             fault: "Guided calibration ended early",
             injected: "SIGTERM while it gathers, by a folder that cannot be written",
@@ -50,35 +50,35 @@ pub fn rows() -> Vec<Row> {
 }
 
 /// The program while it runs.
-struct Wizard {
+struct GuestWizard {
     pending: Pending,
     /// So much of what it says was looked at.
     seen: usize,
 }
 
-impl Wizard {
+impl GuestWizard {
     /// Starts it in the trainer's place, with the trainer's compiled shaders.
-    fn start(bench: &mut Bench, arguments: &str) -> Result<Self> {
+    fn start(bench: &mut HilBench, arguments: &str) -> Result<Self> {
         bench.machine.guest.shell(&format!("rm -f {KEYS} {SAID}; mkfifo {KEYS}"))?;
         // Of a machine as slow as this one IMU LATE would be said all the time.
         let text = configuration(&Configured::default()).replace("packet_jitter_ms_max = 30", "packet_jitter_ms_max = 800");
-        bench.machine.guest.call(Command::Write { path: format!("{FOLDER}/guided.toml"), text })?;
+        bench.machine.guest.call(AgentCommand::Write { path: format!("{FOLDER}/guided.toml"), text })?;
         let line = format!(
             "cd / && GALLIVM_PERF=nopt MESA_SHADER_CACHE_DIR=/var/cache/bowwave CACHE_DIRECTORY=/var/cache/bowwave \
              exec bowwave calibrate wizard --config {FOLDER}/guided.toml {arguments} <>{KEYS} >{SAID} 2>&1"
         );
         let argv = ["/bin/sh", "-c", &line].map(str::to_owned).to_vec();
         let timeout_ms = TOGETHER.as_millis() as u64;
-        let pending = bench.machine.guest.send(Command::Run { argv, timeout_ms })?;
+        let pending = bench.machine.guest.send(AgentCommand::Run { argv, timeout_ms })?;
         Ok(Self { pending, seen: 0 })
     }
 
-    fn said(bench: &mut Bench) -> Result<String> {
+    fn said(bench: &mut HilBench) -> Result<String> {
         bench.machine.guest.shell(&format!("cat {SAID} 2>/dev/null; true"))
     }
 
     /// Waits until it says these words after those that were waited for before; all that it said between.
-    fn says(&mut self, bench: &mut Bench, words: &str) -> Result<String> {
+    fn says(&mut self, bench: &mut HilBench, words: &str) -> Result<String> {
         let until = Instant::now() + PATIENCE;
         loop {
             let said = Self::said(bench)?;
@@ -94,16 +94,16 @@ impl Wizard {
         }
     }
 
-    fn key(bench: &mut Bench, key: &str) -> Result<()> {
+    fn key(bench: &mut HilBench, key: &str) -> Result<()> {
         bench.machine.guest.shell(&format!("echo '{key}' >{KEYS}")).map(|_| ())
     }
 
     /// Pulls the trigger, a while after what was done before: a pull at once would belong to that. These pulls are none of the trainer's,
     /// which the journal of hits must hold.
-    fn pull(bench: &mut Bench) -> Result<()> {
+    fn pull(bench: &mut HilBench) -> Result<()> {
         thread::sleep(APART);
         let steps = vec![(0, true), (150_000, false)];
-        bench.machine.guest.call(Command::Pull { line: 0, steps }).map(|_| ())
+        bench.machine.guest.call(AgentCommand::Pull { line: 0, steps }).map(|_| ())
     }
 
     /// Waits for its end; its exit code.
@@ -112,7 +112,7 @@ impl Wizard {
     }
 }
 
-impl Bench {
+impl HilBench {
     /// Waits until the LCD shows a page of the guide, one that tells of a problem where that is asked for, and keeps it. Nobody else shows
     /// anything: the trainer is off, and what is to be done has the green shape of READY.
     fn guide(&self, problem: bool, name: &str) -> Result<()> {
@@ -129,16 +129,16 @@ impl Bench {
     }
 }
 
-fn guided(bench: &mut Bench) -> Result<Seen> {
+fn guided(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     off(bench)?;
     bench.lcd(Instant::now(), PATIENCE, "nothing", |p, _| p == Plate::Black)?;
     let before = bench.listed()?;
-    let mut wizard = Wizard::start(bench, &format!("--data {DATA}"))?;
+    let mut wizard = GuestWizard::start(bench, &format!("--data {DATA}"))?;
     let note = (|| -> Result<String> {
         wizard.says(bench, "== Calibrate\n")?;
         let note = moved(bench, &mut wizard)?;
-        Wizard::key(bench, "q")?;
+        GuestWizard::key(bench, "q")?;
         wizard.says(bench, "-> Ended")?;
         Ok(note)
     })();
@@ -146,7 +146,7 @@ fn guided(bench: &mut Bench) -> Result<Seen> {
         drop(bench.machine.guest.shell("kill $(pidof bowwave)"));
     }
     let code = wizard.ends()?;
-    let said = Wizard::said(bench)?;
+    let said = GuestWizard::said(bench)?;
     std::fs::write(bench.out.join("wizard.txt"), &said).context("wizard.txt")?;
     let note = note?;
     let after = bench.listed()?;
@@ -159,20 +159,20 @@ fn guided(bench: &mut Bench) -> Result<Seen> {
         recordings == 1 && gathered.lines().count() == 1,
         "{recordings} recordings are named: {gathered}"
     );
-    Ok(Seen {
+    Ok(CaseResult {
         lcd: "guide".into(),
         met: code == 1,
         note: format!("{note}; exit code {code}"),
-        ..Seen::default()
+        ..CaseResult::default()
     })
 }
 
 /// Camera and unit are gathered from, unplugged and plugged again.
-fn moved(bench: &mut Bench, wizard: &mut Wizard) -> Result<String> {
+fn moved(bench: &mut HilBench, wizard: &mut GuestWizard) -> Result<String> {
     bench.guide(false, "row-W-choose")?;
-    Wizard::key(bench, "2")?;
+    GuestWizard::key(bench, "2")?;
     wizard.says(bench, "> 2 inertial unit to camera")?;
-    Wizard::pull(bench)?;
+    GuestWizard::pull(bench)?;
     wizard.says(bench, "-> Swing the gun left and right, up and down")?;
     wizard.says(bench, " s, horizon in ")?;
     bench.guide(false, "row-W-gather")?;
@@ -187,31 +187,31 @@ fn moved(bench: &mut Bench, wizard: &mut Wizard) -> Result<String> {
     wizard.says(bench, "(well again)")?;
     wizard.says(bench, "   elevation: ")?;
     bench.guide(false, "row-W-gauges")?;
-    Wizard::pull(bench)?;
+    GuestWizard::pull(bench)?;
     // Whether such small pictures and so late packets are good enough is no question here: it is not saved.
     let told = wizard.says(bench, "-> Press Enter to ")?;
-    Wizard::key(bench, "b")?;
-    Wizard::key(bench, "b")?;
+    GuestWizard::key(bench, "b")?;
+    GuestWizard::key(bench, "b")?;
     wizard.says(bench, "== Calibrate\n")?;
     let verdict = told.lines().skip_while(|l| !matches!(*l, "   FAIL" | "   PASS")).nth(1);
     Ok(format!("movement: {}", verdict.context("no result was told")?.trim()))
 }
 
 /// Nobody says where recordings go, and the folder it runs in cannot be written.
-fn ended(bench: &mut Bench) -> Result<Seen> {
+fn ended(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     off(bench)?;
     let before = bench.listed()?;
-    let mut wizard = Wizard::start(bench, "imu --data /proc/bowwave")?;
+    let mut wizard = GuestWizard::start(bench, "imu --data /proc/bowwave")?;
     let told = wizard.says(bench, "cannot make the folder /proc/bowwave");
     let refused = wizard.ends()?;
     told?;
-    let mut wizard = Wizard::start(bench, "imu --data /sys")?;
+    let mut wizard = GuestWizard::start(bench, "imu --data /sys")?;
     let gathers = wizard.says(bench, " s, horizon in ");
     bench.machine.guest.shell("kill $(pidof bowwave)")?;
     let told = wizard.says(bench, "-> Ended");
     let code = wizard.ends()?;
-    let said = Wizard::said(bench)?;
+    let said = GuestWizard::said(bench)?;
     std::fs::write(bench.out.join("wizard-ended.txt"), &said).context("wizard-ended.txt")?;
     gathers?;
     told?;
@@ -219,5 +219,5 @@ fn ended(bench: &mut Bench) -> Result<Seen> {
     ensure!(before == after, "before: {before}; after: {after}");
     ensure!(said.contains("what is gathered is not kept"), "it does not say that nothing is kept: {said}");
     let note = format!("exit code {refused} for a folder that cannot be made, {code} after SIGTERM");
-    Ok(Seen { lcd: "guide".into(), met: (refused, code) == (1, 1), note, ..Seen::default() })
+    Ok(CaseResult { lcd: "guide".into(), met: (refused, code) == (1, 1), note, ..CaseResult::default() })
 }

@@ -10,15 +10,16 @@ mod unit;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
+use bowwave_hil::protocol::{AgentCommand, PlayerFeed};
 
 use crate::{
-    bench::{Bench, PICTURE, Told},
+    bench::{FaultChange, HilBench, PICTURE},
     lcd::Plate,
 };
 
-/// What the LCD must show.
+/// Indication that the LCD must show.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shown {
+pub enum LcdShown {
     /// Amber NOT SCORED with this cause; an empty one where it may be over before anybody can ask which.
     NotScored(&'static str),
     /// Red FAULT with this cause.
@@ -30,7 +31,7 @@ pub enum Shown {
 }
 
 /// A row that is injected, seen, ended and recovered from.
-pub struct Case {
+pub struct FaultCase {
     /// Number in the list of faults, and a letter where there are several.
     pub number: &'static str,
     /// The fault.
@@ -39,8 +40,8 @@ pub struct Case {
     pub injected: &'static str,
     /// Code that the journal must carry.
     pub code: &'static str,
-    /// What the LCD must show.
-    pub shown: Shown,
+    /// Indication that the LCD must show.
+    pub shown: LcdShown,
     /// Within so many seconds on a gun computer it must be seen.
     pub seen_s: Option<f64>,
     /// Within so many seconds after the cause is gone it must be over.
@@ -50,14 +51,31 @@ pub struct Case {
     /// For so long the cause stays after it was seen, seconds.
     pub stays_s: f64,
     /// Brings the cause about; the machine's time of that.
-    pub inject: fn(&mut Bench) -> Result<i64>,
+    pub inject: fn(&mut HilBench) -> Result<i64>,
     /// Takes the cause away; the machine's time of that. 0 where it goes by itself: then times count from its coming.
-    pub end: fn(&mut Bench) -> Result<i64>,
+    pub end: fn(&mut HilBench) -> Result<i64>,
+}
+
+impl FaultCase {
+    /// A fault that lasts, has no target in seconds, stays for half a second after it was seen and goes by itself.
+    const USUAL: Self = Self {
+        number: "",
+        fault: "",
+        injected: "",
+        code: "-",
+        shown: LcdShown::Nothing,
+        seen_s: None,
+        back_s: None,
+        lasts: true,
+        stays_s: 0.5,
+        inject: |bench| Ok(bench.machine.guest.now_ns()),
+        end: |_| Ok(0),
+    };
 }
 
 /// A row of another kind.
-pub struct Own {
-    /// As for [`Case`].
+pub struct SpecialCase {
+    /// As for [`FaultCase`].
     pub number: &'static str,
     /// The fault.
     pub fault: &'static str,
@@ -68,13 +86,13 @@ pub struct Own {
     /// The target, in words.
     pub target: &'static str,
     /// Does all of it.
-    pub run: fn(&mut Bench) -> Result<Seen>,
+    pub run: fn(&mut HilBench) -> Result<CaseResult>,
 }
 
-/// What came of a row of another kind.
+/// Result of a row of another kind.
 #[derive(Clone, Debug, Default)]
-pub struct Seen {
-    /// What was seen on the LCD.
+pub struct CaseResult {
+    /// Indication that was seen on the LCD.
     pub lcd: String,
     /// Seconds until it was seen.
     pub seen_s: Option<f64>,
@@ -86,30 +104,30 @@ pub struct Seen {
     pub met: bool,
     /// Whether that is so only for a machine as slow as this one.
     pub scaled: bool,
-    /// What else there is to say.
+    /// Anything else to say.
     pub note: String,
 }
 
 /// One of both.
-pub enum Row {
+pub enum FaultRow {
     /// The usual kind.
-    Case(Case),
+    Case(FaultCase),
     /// Another kind.
-    Own(Own),
+    Own(SpecialCase),
     /// It cannot be brought about: number, fault, why.
     Not(&'static str, &'static str, &'static str),
 }
 
 /// A line of the table.
 #[derive(Clone, Debug)]
-pub struct Line {
+pub struct FaultLine {
     /// Number.
     pub number: String,
     /// The fault.
     pub fault: String,
     /// How it was injected.
     pub injected: String,
-    /// What the LCD showed.
+    /// Indication that the LCD showed.
     pub lcd: String,
     /// The journal's code.
     pub code: String,
@@ -119,15 +137,50 @@ pub struct Line {
     pub back_s: Option<f64>,
     /// The target.
     pub target: String,
-    /// What it came to.
-    pub verdict: Verdict,
+    /// Its verdict.
+    pub verdict: FaultVerdict,
     /// More to say.
     pub note: String,
 }
 
-/// What a row came to.
+impl FaultLine {
+    /// The line of a row before it is tried: its number, fault, way of injection and code.
+    fn missed([number, fault, injected, code]: [&str; 4]) -> Self {
+        Self {
+            number: number.into(),
+            fault: fault.into(),
+            injected: injected.into(),
+            lcd: String::new(),
+            code: code.into(),
+            seen_s: None,
+            back_s: None,
+            target: String::new(),
+            verdict: FaultVerdict::Missed,
+            note: String::new(),
+        }
+    }
+
+    /// Its cells, in the order of both tables' columns.
+    pub fn cells(&self) -> [String; 10] {
+        let seconds = |value: Option<f64>| value.map_or_else(|| "-".into(), |v| format!("{v:.2}"));
+        [
+            self.number.clone(),
+            self.fault.clone(),
+            self.injected.clone(),
+            self.lcd.clone(),
+            self.code.clone(),
+            seconds(self.seen_s),
+            seconds(self.back_s),
+            self.target.clone(),
+            self.verdict.text().into(),
+            self.note.clone(),
+        ]
+    }
+}
+
+/// Verdict of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum FaultVerdict {
     /// The target was met as it stands.
     Met,
     /// It was met, in the machine's terms.
@@ -138,7 +191,7 @@ pub enum Verdict {
     Not,
 }
 
-impl Verdict {
+impl FaultVerdict {
     /// For the table.
     pub const fn text(self) -> &'static str {
         match self {
@@ -151,7 +204,7 @@ impl Verdict {
 }
 
 /// Every row, in the order in which they are tried.
-pub fn rows() -> Vec<Row> {
+pub fn rows() -> Vec<FaultRow> {
     let mut all = Vec::new();
     all.extend(trigger::first());
     all.extend(camera::rows());
@@ -163,7 +216,7 @@ pub fn rows() -> Vec<Row> {
     all
 }
 
-impl Row {
+impl FaultRow {
     /// Its number.
     pub const fn number(&self) -> &'static str {
         match self {
@@ -179,31 +232,26 @@ impl Row {
     }
 
     /// Tries it.
-    pub fn run(&self, bench: &mut Bench) -> Line {
+    pub fn run(&self, bench: &mut HilBench) -> FaultLine {
         match self {
             Self::Case(case) => case.line(bench),
             Self::Own(own) => own.line(bench),
-            Self::Not(number, fault, why) => Line {
-                number: (*number).into(),
-                fault: (*fault).into(),
-                injected: "-".into(),
+            Self::Not(number, fault, why) => FaultLine {
                 lcd: "-".into(),
-                code: "-".into(),
-                seen_s: None,
-                back_s: None,
                 target: "-".into(),
-                verdict: Verdict::Not,
+                verdict: FaultVerdict::Not,
                 note: (*why).into(),
+                ..FaultLine::missed([number, fault, "-", "-"])
             },
         }
     }
 }
 
-impl Own {
-    fn line(&self, bench: &mut Bench) -> Line {
+impl SpecialCase {
+    fn line(&self, bench: &mut HilBench) -> FaultLine {
         let mut seen = (self.run)(bench).unwrap_or_else(|e| {
             bench.keep_picture(&format!("row-{}-missed", self.number));
-            Seen { note: format!("{e:#}"), ..Seen::default() }
+            CaseResult { note: format!("{e:#}"), ..CaseResult::default() }
         });
         if let Err(e) = bench.settle() {
             seen.note = format!("{}; afterwards: {e:#}", seen.note);
@@ -212,21 +260,18 @@ impl Own {
             seen.within_s.is_none_or(|t| seen.back_s.or(seen.seen_s).is_some_and(|v| v <= t * factor))
         };
         let verdict = match (seen.met, within(1.0) && !seen.scaled, within(bench.slow)) {
-            (true, true, _) => Verdict::Met,
-            (true, _, true) => Verdict::MetScaled,
-            _ => Verdict::Missed,
+            (true, true, _) => FaultVerdict::Met,
+            (true, _, true) => FaultVerdict::MetScaled,
+            _ => FaultVerdict::Missed,
         };
-        Line {
-            number: self.number.into(),
-            fault: self.fault.into(),
-            injected: self.injected.into(),
+        FaultLine {
             lcd: seen.lcd,
-            code: self.code.into(),
             seen_s: seen.seen_s,
             back_s: seen.back_s,
             target: self.target.into(),
             verdict,
             note: seen.note,
+            ..FaultLine::missed([self.number, self.fault, self.injected, self.code])
         }
     }
 }
@@ -234,19 +279,11 @@ impl Own {
 /// Beyond scaled targets nobody waits this much longer.
 const EXTRA: Duration = Duration::from_secs(20);
 
-impl Case {
-    fn line(&self, bench: &mut Bench) -> Line {
-        let mut line = Line {
-            number: self.number.into(),
-            fault: self.fault.into(),
-            injected: self.injected.into(),
-            lcd: String::new(),
-            code: self.code.into(),
-            seen_s: None,
-            back_s: None,
+impl FaultCase {
+    fn line(&self, bench: &mut HilBench) -> FaultLine {
+        let mut line = FaultLine {
             target: self.target(),
-            verdict: Verdict::Missed,
-            note: String::new(),
+            ..FaultLine::missed([self.number, self.fault, self.injected, self.code])
         };
         if let Err(e) = self.try_it(bench, &mut line) {
             line.note = format!("{}{e:#}", if line.note.is_empty() { "" } else { "; " });
@@ -268,7 +305,7 @@ impl Case {
         if all.is_empty() { "-".into() } else { all.join(", ") }
     }
 
-    fn verdict(&self, bench: &Bench, line: &Line) -> Verdict {
+    fn verdict(&self, bench: &HilBench, line: &FaultLine) -> FaultVerdict {
         let within = |value: Option<f64>, target: Option<f64>, factor: f64| match (value, target) {
             (Some(v), Some(t)) => v <= t * factor,
             (None, Some(_)) => false,
@@ -277,25 +314,25 @@ impl Case {
         let all =
             |factor| within(line.seen_s, self.seen_s, factor) && within(line.back_s, self.back_s, factor);
         match (all(1.0), all(bench.slow)) {
-            (true, _) => Verdict::Met,
-            (_, true) => Verdict::MetScaled,
-            _ => Verdict::Missed,
+            (true, _) => FaultVerdict::Met,
+            (_, true) => FaultVerdict::MetScaled,
+            _ => FaultVerdict::Missed,
         }
     }
 
-    fn try_it(&self, bench: &mut Bench, line: &mut Line) -> Result<()> {
+    fn try_it(&self, bench: &mut HilBench, line: &mut FaultLine) -> Result<()> {
         bench.ready(bench.scaled(2.0) + EXTRA)?;
         let from = bench.machine.guest.now_ns();
         let caused = (self.inject)(bench)?;
         let at = bench.machine.guest.host_time(caused);
         let patience = bench.scaled(self.seen_s.unwrap_or(1.0)) + EXTRA;
-        let came = bench.told(self.code, Told::Came, from, patience)?;
+        let came = bench.told(self.code, FaultChange::Came, from, patience)?;
         if let Some(seen) = bench.shown(self.shown, at, patience)? {
             line.seen_s = Some(seen.saturating_duration_since(at).as_secs_f64());
         }
         let cause = match self.shown {
-            Shown::NotScored(cause) | Shown::Fault(cause) | Shown::Warning(cause) => cause,
-            Shown::Nothing => "",
+            LcdShown::NotScored(cause) | LcdShown::Fault(cause) | LcdShown::Warning(cause) => cause,
+            LcdShown::Nothing => "",
         };
         line.lcd = bench.says(cause)?;
         bench.keep_picture(&format!("row-{}", self.number));
@@ -308,10 +345,10 @@ impl Case {
         };
         if self.lasts {
             let patience = bench.scaled(self.back_s.unwrap_or(2.0)) + EXTRA;
-            let went = bench.told(self.code, Told::Went, over_from, patience)?;
+            let went = bench.told(self.code, FaultChange::Went, over_from, patience)?;
             let over = bench.machine.guest.host_time(ended);
             let mut back = (went - ended) as f64 * 1e-9;
-            if self.shown != Shown::Nothing {
+            if self.shown != LcdShown::Nothing {
                 let lcd = bench.lcd(over, patience, "READY", |p, _| p == Plate::Ready)?;
                 back = back.max(lcd.saturating_duration_since(over).as_secs_f64());
             }
@@ -321,7 +358,20 @@ impl Case {
     }
 }
 
-impl Bench {
+/// Ends what the tape's player does to pictures and packets.
+fn quiet(bench: &mut HilBench) -> Result<i64> {
+    bench.feed(|f| *f = PlayerFeed { trigger: f.trigger, ..PlayerFeed::default() })
+}
+
+impl HilBench {
+    /// Fires for `ms` while a cause stands, some time after it came: none of these rounds may be scored.
+    fn shoot_blind(&mut self, after: Duration, ms: u64) -> Result<()> {
+        std::thread::sleep(after);
+        let from = self.shoot(ms)?;
+        self.blind.push((from, self.machine.guest.now_ns()));
+        Ok(())
+    }
+
     /// Waits until the LCD gives `cause`; all that it says then, by the service's status line, which follows a frame later.
     pub fn says(&mut self, cause: &str) -> Result<String> {
         self.says_within(cause, self.scaled(0.2))
@@ -342,12 +392,16 @@ impl Bench {
     }
 
     /// Waits until the LCD itself shows it; nothing to wait for where it must go on as if nothing were.
-    fn shown(&self, shown: Shown, since: Instant, patience: Duration) -> Result<Option<Instant>> {
+    fn shown(&self, shown: LcdShown, since: Instant, patience: Duration) -> Result<Option<Instant>> {
         let seen = match shown {
-            Shown::NotScored(_) => self.lcd(since, patience, "NOT SCORED", |p, _| p == Plate::NotScored)?,
-            Shown::Fault(_) => self.lcd(since, patience, "FAULT", |p, _| p == Plate::Fault)?,
-            Shown::Warning(_) => self.lcd(since, patience, "a warning", |p, w| w && p != Plate::NotScored)?,
-            Shown::Nothing => return Ok(None),
+            LcdShown::NotScored(_) => {
+                self.lcd(since, patience, "NOT SCORED", |p, _| p == Plate::NotScored)?
+            }
+            LcdShown::Fault(_) => self.lcd(since, patience, "FAULT", |p, _| p == Plate::Fault)?,
+            LcdShown::Warning(_) => {
+                self.lcd(since, patience, "a warning", |p, w| w && p != Plate::NotScored)?
+            }
+            LcdShown::Nothing => return Ok(None),
         };
         Ok(Some(seen))
     }
@@ -355,14 +409,14 @@ impl Bench {
     /// Takes all causes away and waits for READY.
     pub fn settle(&mut self) -> Result<()> {
         let trigger = self.feed.trigger;
-        self.feed(|feed| *feed = bowwave_hil::protocol::Feed { trigger, ..Default::default() })?;
+        self.feed(|feed| *feed = PlayerFeed { trigger, ..PlayerFeed::default() })?;
         self.pull(0, false)?;
         self.pull(1, true)?;
         self.pull(2, false)?;
         for line in ["fail streamon 0", "fail control 0", "bandwidth 0"] {
             self.camera(line)?;
         }
-        let state = self.machine.guest.call(bowwave_hil::protocol::Command::CameraState)?;
+        let state = self.machine.guest.call(AgentCommand::CameraState)?;
         if state["plugged"] == 0 || state["fourcc"] != "YUYV" || state["width"] != PICTURE.0 {
             if state["plugged"] != 0 {
                 self.camera("unplug")?;

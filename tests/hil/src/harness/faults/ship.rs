@@ -13,9 +13,9 @@ use anyhow::{Context, Result, ensure};
 use hw_sim::pty::Terminal;
 use serde_json::json;
 
-use super::{Own, Row, Seen};
+use super::{CaseResult, FaultRow, SpecialCase};
 use crate::{
-    bench::{Bench, Configured, Told},
+    bench::{Configured, FaultChange, HilBench},
     lcd::Plate,
 };
 
@@ -23,11 +23,11 @@ use crate::{
 const PERIOD: Duration = Duration::from_millis(100);
 /// The heading of the tape's ship, roughly.
 const HEADING: &str = "HEHDT,318.0,T";
-/// What a compass says that does not know.
+/// Line of a compass that does not know the heading.
 const INVALID: &str = "HEHDT,,T";
 
-pub fn rows() -> Vec<Row> {
-    vec![Row::Own(Own {
+pub fn rows() -> Vec<FaultRow> {
+    vec![FaultRow::Own(SpecialCase {
         number: "S",
         fault: "Ship's heading lost",
         injected: "its USB adapter is removed and plugged again; its compass says no heading for a while",
@@ -73,13 +73,13 @@ impl Drop for Compass {
     }
 }
 
-fn plug(bench: &mut Bench) -> Result<i64> {
+fn plug(bench: &mut HilBench) -> Result<i64> {
     let device = json!({ "driver": "usb-serial", "id": "ship0", "chardev": "ship", "bus": "usb.0", "serial": "ship1" });
     bench.machine.qmp.execute("device_add", device)?;
     Ok(bench.machine.guest.now_ns())
 }
 
-fn lost(bench: &mut Bench) -> Result<Seen> {
+fn lost(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let compass = Compass::start()?;
     let backend = json!({ "type": "serial", "data": { "device": compass.slave } });
@@ -97,37 +97,37 @@ fn lost(bench: &mut Bench) -> Result<Seen> {
     seen
 }
 
-fn tried(bench: &mut Bench, compass: &Compass) -> Result<Seen> {
+fn tried(bench: &mut HilBench, compass: &Compass) -> Result<CaseResult> {
     thread::sleep(Duration::from_secs(2));
     bench.ready(bench.scaled(5.0))?;
     bench.without_warning()?;
     let from = bench.machine.guest.now_ns();
     let at = Instant::now();
     bench.machine.qmp.remove("ship0")?;
-    bench.told("SHIP_LOST", Told::Came, from, bench.scaled(2.0))?;
+    bench.told("SHIP_LOST", FaultChange::Came, from, bench.scaled(2.0))?;
     let warned = bench.lcd(at, bench.scaled(2.0), "a warning", |p, warning| p == Plate::Ready && warning)?;
     let lcd = bench.says("SHIP HEADING LOST")?;
     bench.keep_picture("row-S");
     let plugged = plug(bench)?;
-    let back = bench.told("SHIP_LOST", Told::Went, plugged, bench.scaled(2.0))?;
+    let back = bench.told("SHIP_LOST", FaultChange::Went, plugged, bench.scaled(2.0))?;
     bench.without_warning()?;
     let asked = bench.machine.guest.now_ns();
     compass.knows.store(false, Ordering::Relaxed);
-    bench.told("SHIP_INVALID", Told::Came, asked, bench.scaled(2.0))?;
+    bench.told("SHIP_INVALID", FaultChange::Came, asked, bench.scaled(2.0))?;
     compass.knows.store(true, Ordering::Relaxed);
-    bench.told("SHIP_INVALID", Told::Went, asked, bench.scaled(2.0))?;
-    Ok(Seen {
+    bench.told("SHIP_INVALID", FaultChange::Went, asked, bench.scaled(2.0))?;
+    Ok(CaseResult {
         lcd,
         seen_s: Some(warned.saturating_duration_since(at).as_secs_f64()),
         back_s: Some((back - plugged) as f64 * 1e-9),
         within_s: Some(2.0),
         met: true,
         note: "SHIP_INVALID came and went with the compass that does not know".into(),
-        ..Seen::default()
+        ..CaseResult::default()
     })
 }
 
-impl Bench {
+impl HilBench {
     /// Waits until the status line warns of nothing about the ship.
     fn without_warning(&mut self) -> Result<()> {
         let until = Instant::now() + self.scaled(2.0);

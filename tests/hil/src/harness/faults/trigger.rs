@@ -3,42 +3,40 @@
 use std::{thread, time::Duration};
 
 use anyhow::{Context, Result};
-use bowwave_hil::protocol::Command;
+use bowwave_hil::protocol::AgentCommand;
 use serde_json::Value;
 
-use super::{Case, Own, Row, Seen, Shown};
+use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase};
 use crate::{
-    bench::{Bench, Told},
+    bench::{FaultChange, HilBench},
     lcd::Plate,
 };
 
-/// What is tried before all else.
-pub fn first() -> Vec<Row> {
-    vec![Row::Case(Case {
+/// Rows that are tried before all others.
+pub fn first() -> Vec<FaultRow> {
+    vec![FaultRow::Case(FaultCase {
         number: "I",
         fault: "Interlock open: gun not inert",
         injected: "the interlock's line goes low",
         code: "NOT_INERT",
-        shown: Shown::Fault("NOT ARMED"),
+        shown: LcdShown::Fault("NOT ARMED"),
         seen_s: Some(0.1),
         back_s: Some(0.1),
-        lasts: true,
         stays_s: 0.3,
         inject: |b| {
             let at = b.pull(1, false)?;
             // Nothing may be fired.
-            thread::sleep(Duration::from_millis(300));
-            let from = b.shoot(200)?;
-            b.blind.push((from, b.machine.guest.now_ns()));
+            b.shoot_blind(Duration::from_millis(300), 200)?;
             Ok(at)
         },
         end: |b| b.pull(1, true),
+        ..FaultCase::USUAL
     })]
 }
 
-pub fn rows() -> Vec<Row> {
+pub fn rows() -> Vec<FaultRow> {
     vec![
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "21",
             fault: "Trigger bounce",
             injected: "12 edges within 6 ms, then pressed for 30 ms, then 12 edges again",
@@ -46,7 +44,7 @@ pub fn rows() -> Vec<Row> {
             target: "one shot",
             run: bounce,
         }),
-        Row::Own(Own {
+        FaultRow::Own(SpecialCase {
             number: "23",
             fault: "GPIO events lost",
             injected: "the trigger's thread is stopped for 4 s while 61 edges come, the last a press; the kernel keeps 16",
@@ -54,58 +52,55 @@ pub fn rows() -> Vec<Row> {
             target: "no phantom shots",
             run: overrun,
         }),
-        Row::Not(
+        FaultRow::Not(
             "24",
             "GPIO clock is not monotonic",
             "kernels before 5.7 only; the image's stamps edges with the monotonic clock. Unit tests of the trigger cover it",
         ),
-        Row::Case(Case {
+        FaultRow::Case(FaultCase {
             number: "37",
             fault: "Low voltage",
             injected: "the power-fail line goes high",
             code: "BROWNOUT",
-            shown: Shown::Warning("PWR"),
+            shown: LcdShown::Warning("PWR"),
             seen_s: Some(0.05),
-            back_s: None,
-            lasts: true,
             stays_s: 0.3,
             inject: |b| b.pull(2, true),
             end: |b| b.pull(2, false),
+            ..FaultCase::USUAL
         }),
     ]
 }
 
-/// What is tried when no round is needed any more: it uses up the belt.
-pub fn last() -> Vec<Row> {
-    vec![Row::Case(Case {
+/// Rows that are tried when no round is needed any more: they use up the belt.
+pub fn last() -> Vec<FaultRow> {
+    vec![FaultRow::Case(FaultCase {
         number: "22",
         fault: "Trigger held over 3 s beyond the belt",
         injected: "the trigger's line stays high; the belt is 400 rounds long",
         code: "TRG_STUCK",
-        shown: Shown::Warning("TRIGGER STUCK"),
-        seen_s: None,
-        back_s: None,
-        lasts: true,
+        shown: LcdShown::Warning("TRIGGER STUCK"),
         stays_s: 0.2,
         inject: |b| b.pull(0, true),
         end: |b| b.pull(0, false),
+        ..FaultCase::USUAL
     })]
 }
 
 /// Shots as the status line counts them.
-pub fn shots(bench: &mut Bench) -> Result<u64> {
+pub fn shots(bench: &mut HilBench) -> Result<u64> {
     let status = bench.status()?;
     let text = status.split("shots ").nth(1).and_then(|t| t.split(',').next());
     text.and_then(|t| t.trim().parse().ok()).with_context(|| format!("no count of shots in \"{status}\""))
 }
 
 /// Rounds take a second to fly, and the status line a second to follow.
-fn settled_shots(bench: &mut Bench) -> Result<u64> {
+fn settled_shots(bench: &mut HilBench) -> Result<u64> {
     thread::sleep(Duration::from_millis(2500));
     shots(bench)
 }
 
-fn bounce(bench: &mut Bench) -> Result<Seen> {
+fn bounce(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let before = settled_shots(bench)?;
     let chatter = |up: bool| (0..12).map(move |i| (500, (i % 2 == 0) == up));
@@ -126,7 +121,7 @@ fn bounce(bench: &mut Bench) -> Result<Seen> {
         "{} rounds for one press; all edges within {took:.0} ms; {said} lines in the journal",
         after - before
     );
-    Ok(Seen { lcd, met, note, ..Seen::default() })
+    Ok(CaseResult { lcd, met, note, ..CaseResult::default() })
 }
 
 /// How long the lost edges may stay unnoticed once the thread runs again. The line stays pressed meanwhile.
@@ -145,14 +140,14 @@ struct Lost {
 }
 
 /// A round for each press that was kept, and as many as the weapon fires where the line is pressed and that is known.
-fn lose_edges(bench: &mut Bench) -> Result<Lost> {
+fn lose_edges(bench: &mut HilBench) -> Result<Lost> {
     let before = settled_shots(bench)?;
     let from = bench.machine.guest.now_ns();
-    let hold = bench.machine.guest.send(Command::Hold { thread: "trigger".into(), ms: 4000 })?;
+    let hold = bench.machine.guest.send(AgentCommand::Hold { thread: "trigger".into(), ms: 4000 })?;
     thread::sleep(Duration::from_millis(2000));
     let edges = bench.pulls(0, (0..61).map(|i| (2000, i % 2 == 0)).collect())?;
     let held = hold.answer(Duration::from_secs(20))?;
-    let told_ns = bench.told("TRG_OVERRUN", Told::Came, from, PATIENCE);
+    let told_ns = bench.told("TRG_OVERRUN", FaultChange::Came, from, PATIENCE);
     let released = bench.pull(0, false)?;
     let last = edges.last().map_or(from, |edge| edge[1]);
     let pressed_s = (released - told_ns.as_ref().map_or(last, |told| *told)).max(0) as f64 * 1e-9;
@@ -160,7 +155,7 @@ fn lose_edges(bench: &mut Bench) -> Result<Lost> {
     Ok(Lost { held, told_ns, fired, allowed: KEPT + CYCLIC * (pressed_s + 0.5) })
 }
 
-fn overrun(bench: &mut Bench) -> Result<Seen> {
+fn overrun(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     // Which edges the kernel keeps depends on how many were read before the thread stood still. Where the last one kept is the
     // last one there was, nothing is lost that anybody could miss.
@@ -179,5 +174,5 @@ fn overrun(bench: &mut Bench) -> Result<Seen> {
     let note = format!(
         "{fired} rounds for 31 presses of which most were lost, {allowed:.0} at most; the thread stood still: {held}"
     );
-    Ok(Seen { lcd, met: fired as f64 <= allowed && seen, note, ..Seen::default() })
+    Ok(CaseResult { lcd, met: fired as f64 <= allowed && seen, note, ..CaseResult::default() })
 }
