@@ -6,7 +6,7 @@ use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// What goes wrong.
+/// Kind of the fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum FaultKind {
     /// The inertial unit sends nothing.
@@ -41,7 +41,7 @@ impl FaultKind {
 /// One fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What goes wrong.
+    /// Kind of the fault.
     pub kind: FaultKind,
     /// When it begins, nanoseconds after the replay's origin; later rounds of a loop count on.
     pub from_ns: i64,
@@ -135,7 +135,7 @@ impl Injector {
         }
     }
 
-    /// What the unit sends in place of `sample`; `None` for nothing.
+    /// Sample that the unit sends in place of `sample`; `None` for nothing.
     pub(crate) fn sample(&mut self, sample: ImuSample, since_origin_ns: i64) -> Option<ImuSample> {
         let active = |kind| self.active(kind, since_origin_ns);
         let (drop_out, nan) = (active(FaultKind::ImuDropOut), active(FaultKind::ImuNan));
@@ -159,7 +159,7 @@ impl Injector {
         Some(sent)
     }
 
-    /// What the camera delivers in place of `jpeg`, whose picture has `size`.
+    /// Bytes that the camera delivers in place of `jpeg`, whose picture has `size`.
     pub(crate) fn picture(&mut self, jpeg: &[u8], size: (u32, u32), since_origin_ns: i64) -> Picture {
         let active = |kind| self.active(kind, since_origin_ns);
         let fate = if active(FaultKind::FrameDropOut) {
@@ -187,7 +187,7 @@ impl Injector {
     }
 }
 
-/// What became of a picture.
+/// Fate of a picture.
 pub(crate) enum Picture {
     /// It is as it was.
     Same,

@@ -2,5 +2,6 @@
 
 pub mod fault;
 pub mod make;
+pub mod ocean;
 pub mod pty;
 pub mod replay;

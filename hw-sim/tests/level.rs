@@ -38,7 +38,7 @@ fn recipe() -> Recipe {
 const SECONDS: i64 = 60;
 const SETTLED: i64 = 25;
 
-/// What is in the pictures beside the recording.
+/// Masks and settings of a session beside the recording.
 #[derive(Default)]
 struct Sight {
     /// A rail of the own ship, rows from the top.

@@ -143,7 +143,7 @@ fn a_rolling_shutter_sees_each_row_at_its_own_time() {
     }
 }
 
-/// What a session would make of the default's samples: clock mapped, orientation at each frame's exposure.
+/// A session's view of the default's samples: clock mapped, orientation at each frame's exposure.
 #[test]
 fn the_default_registers_within_two_pixels() {
     let recipe = Recipe::default();

@@ -88,7 +88,7 @@ pub fn bowwave<I: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = I>
     Command::new(program()).args(arguments).env_remove("RUST_LOG").output().expect("the program runs")
 }
 
-/// What a run said on standard error.
+/// Standard error of a run.
 pub fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }

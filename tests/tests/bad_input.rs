@@ -152,42 +152,15 @@ fn a_model_without_its_parts_is_refused() {
         "bufferViews":[{"buffer":0,"byteLength":36}],
         "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,-1,-1],"max":[0.5,1,1]}]}"#;
     file(folder.path(), "blob.gltf", json.as_bytes());
-    let scenario = file(
-        folder.path(),
-        "scenario.toml",
-        br#"
-name = "blob"
-[[boat]]
-name = "blob-1"
-model = "blob.gltf"
-side = "neutral"
-course = "still"
-range_m = 100
-bearing_deg = 0
-heading_deg = 0
-"#,
-    );
+    let scenario = file(folder.path(), "scenario.toml", include_bytes!("../data/model_without_parts.toml"));
     refused(&["--scenario", &scenario], &["blob-1", "blob.gltf", "engine", "helm"]);
 }
 
 #[test]
 fn a_boat_inside_the_camera_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
-    let scenario = file(
-        folder.path(),
-        "scenario.toml",
-        br#"
-name = "too close"
-[[boat]]
-name = "skiff-1"
-model = "skiff"
-side = "hostile"
-course = "still"
-range_m = 2
-bearing_deg = 0
-heading_deg = 0
-"#,
-    );
+    let scenario =
+        file(folder.path(), "scenario.toml", include_bytes!("../data/boat_inside_the_camera.toml"));
     refused(&["--scenario", &scenario], &["scenario.toml:", "skiff-1", "camera"]);
 }
 
@@ -214,9 +187,9 @@ fn hits_without_a_journal_says_where_it_looked() {
 }
 
 /// A file system of a given size; `None`, said so, where this user may not mount one.
-struct SmallDisk(tempfile::TempDir);
+struct SmallVolume(tempfile::TempDir);
 
-impl SmallDisk {
+impl SmallVolume {
     fn new(kilobytes: u32) -> Option<Self> {
         let folder = tempfile::tempdir().expect("a folder");
         let mounted = Command::new("mount")
@@ -232,7 +205,7 @@ impl SmallDisk {
     }
 }
 
-impl Drop for SmallDisk {
+impl Drop for SmallVolume {
     fn drop(&mut self) {
         let unmounted = Command::new("umount").arg("-l").arg(self.0.path()).status();
         assert!(unmounted.is_ok_and(|s| s.success()), "the small file system stays mounted");
@@ -241,7 +214,7 @@ impl Drop for SmallDisk {
 
 #[test]
 fn a_full_disk_loses_no_round() {
-    let Some(disk) = SmallDisk::new(600) else { return };
+    let Some(disk) = SmallVolume::new(600) else { return };
     let out = disk.0.path().join("out");
     let recording = small_recording().to_str().expect("a plain path");
     let out_text = out.to_str().expect("a plain path");

@@ -1,11 +1,6 @@
 //! Calibration as a maintainer does it: recordings of a simulated sea whose truth is known, and what can be wrong with them.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot go on has failed"
-)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a failed step fails the test")]
 
 use std::{
     fs,
@@ -21,9 +16,9 @@ use bowwave_tests::{bowwave, by_hand, expect_code, traverse_only};
 use glam::{DQuat, DVec3};
 use hw_sim::make::{self, Recipe};
 
-struct Folder(tempfile::TempDir);
+struct TestFolder(tempfile::TempDir);
 
-impl Folder {
+impl TestFolder {
     fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
@@ -35,9 +30,9 @@ impl Folder {
 
 /// The recording of the movement by hand, made once.
 fn recording() -> &'static Path {
-    static RECORDING: OnceLock<(Folder, PathBuf)> = OnceLock::new();
+    static RECORDING: OnceLock<(TestFolder, PathBuf)> = OnceLock::new();
     let (_, path) = RECORDING.get_or_init(|| {
-        let folder = Folder::new();
+        let folder = TestFolder::new();
         let path = folder.path("hand.mcap");
         make::make(&by_hand(), &path, &mut |_, _| {}).unwrap();
         (folder, path)
@@ -71,7 +66,7 @@ fn truth() -> CalibrationFile {
 
 /// Calibrates from `recording` and holds the result against the truth: within three of its own standard deviations.
 fn holds(recording: &Path, camera_from_imu: DQuat, time_offset_ns: i64) {
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let out = folder.path("new.toml");
     let output = calibrate("imu", recording, &["--out", out.to_str().unwrap()]);
     expect_code(&output, 0);
@@ -95,7 +90,7 @@ fn holds(recording: &Path, camera_from_imu: DQuat, time_offset_ns: i64) {
 fn the_truth_is_found_from_the_horizon_alone_written_and_restored() {
     let truth = truth().calibration;
     holds(recording(), truth.camera_from_imu, truth.time_offset_ns);
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let (file, page) = (folder.path("gun.toml"), folder.path("report.html"));
     let old = bowwave_calibration::to_toml(&make::calibration(&by_hand()));
     fs::write(&file, &old).unwrap();
@@ -120,7 +115,7 @@ fn the_truth_is_found_from_the_horizon_alone_written_and_restored() {
 
 #[test]
 fn a_stale_calibration_is_found_out_and_a_good_one_is_not() {
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let file = folder.path("gun.toml");
     let at = file.to_str().unwrap();
     let output = calibrate("check", recording(), &[]);
@@ -148,7 +143,7 @@ fn a_stale_calibration_is_found_out_and_a_good_one_is_not() {
 
 #[test]
 fn traverse_alone_is_refused_with_what_is_missing_and_checks_nothing() {
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let path = folder.path("traverse.mcap");
     make::make(&traverse_only(), &path, &mut |_, _| {}).unwrap();
     let out = folder.path("new.toml");
@@ -165,7 +160,7 @@ fn traverse_alone_is_refused_with_what_is_missing_and_checks_nothing() {
 #[test]
 fn mounted_upside_down_and_half_a_second_late() {
     let truth = truth().calibration;
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let path = folder.path("odd.mcap");
     let half_turn = DQuat::from_rotation_z(std::f64::consts::PI);
     changed(&path, |_, entry| match entry {
@@ -182,7 +177,7 @@ fn mounted_upside_down_and_half_a_second_late() {
 #[test]
 fn a_wrong_stamp_flag_comes_out_as_offset_and_as_stale() {
     let truth = truth().calibration;
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let path = folder.path("flag.mcap");
     // The exposure's begin instead of its middle.
     changed(&path, |_, entry| {
@@ -199,7 +194,7 @@ fn a_wrong_stamp_flag_comes_out_as_offset_and_as_stale() {
 #[test]
 fn stamps_that_repeat_and_run_backwards_do_no_harm() {
     let truth = truth().calibration;
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let path = folder.path("stamps.mcap");
     changed(&path, |number, entry| match entry {
         Entry::Frame(frame) if frame.sequence % 17 == 3 => {
@@ -213,7 +208,7 @@ fn stamps_that_repeat_and_run_backwards_do_no_harm() {
 
 #[test]
 fn mirrored_axes_are_refused_and_stale() {
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let path = folder.path("mirrored.mcap");
     changed(&path, |_, entry| {
         if let Entry::Imu(sample) = entry {
@@ -257,7 +252,7 @@ fn with_pulls(to: &Path, count: usize, late_s: f64, jolt: f64) {
 
 #[test]
 fn dry_shots_tell_the_triggers_latency() {
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let (path, out) = (folder.path("dry.mcap"), folder.path("gun.toml"));
     with_pulls(&path, 8, 0.023, 40.0);
     expect_code(&calibrate("trigger", &path, &["--out", out.to_str().unwrap()]), 0);
@@ -273,7 +268,7 @@ fn dry_shots_tell_the_triggers_latency() {
 
 #[test]
 fn pulls_at_a_mark_tell_the_boresight_with_its_parallax() {
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let (path, out) = (folder.path("aimed.mcap"), folder.path("gun.toml"));
     with_pulls(&path, 3, 0.0, 0.0);
     let marks = ["--mark", "141.2,80.1", "--mark", "141.6,79.7", "--mark", "141.1,80.2"];
@@ -292,7 +287,7 @@ fn pulls_at_a_mark_tell_the_boresight_with_its_parallax() {
 
 #[test]
 fn what_cannot_be_looked_at_says_why() {
-    let folder = Folder::new();
+    let folder = TestFolder::new();
     let path = folder.path("absent.mcap");
     let output = calibrate("check", &path, &[]);
     expect_code(&output, 1);

@@ -12,13 +12,13 @@ use bowwave_tests::{bowwave, expect_code};
 use glam::DQuat;
 use hw_sim::make::{self, CameraRecipe, GunMotion, Periodic, Recipe, ShipMotion};
 use image::codecs::jpeg::JpegEncoder;
-use precision::target::{moved::Moved, shots::board};
+use precision::target::{moved::MovedBoard, shots::board};
 
 /// How long a camera's picture takes to reach the host.
 const LATE_S: f64 = 0.02;
 
 /// A file that knows the lens and nothing of the mounting.
-fn lens_alone(moved: &Moved) -> CalibrationFile {
+fn lens_alone(moved: &MovedBoard) -> CalibrationFile {
     let mut file = make::calibration(&Recipe::default());
     file.calibration.lens = moved.lens();
     file.calibration.camera_from_imu = DQuat::IDENTITY;
@@ -27,7 +27,7 @@ fn lens_alone(moved: &Moved) -> CalibrationFile {
 }
 
 /// Writes what was moved as a camera and a unit would record it.
-fn record(moved: &Moved, to: &Path) {
+fn record(moved: &MovedBoard, to: &Path) {
     let properties = Properties {
         calibration_toml: to_toml(&lens_alone(moved)),
         scenario_toml: None,
@@ -84,7 +84,7 @@ fn a_board_moved_by_hand_tells_rotation_and_offset_within_the_goals() {
     let target = board().to_string();
     for (seed, readout_s) in [(1, 0.0), (2, 0.03)] {
         let [path, out] = ["mcap", "toml"].map(|kind| folder.path().join(format!("board-{seed}.{kind}")));
-        let mut moved = Moved::by_hand(board(), 9.0, 12.0, seed);
+        let mut moved = MovedBoard::by_hand(board(), 9.0, 12.0, seed);
         moved.recipe.readout_s = readout_s;
         record(&moved, &path);
         let found = calibrated(&path, &["--target", &target], &out);

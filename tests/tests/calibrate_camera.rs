@@ -9,7 +9,7 @@ use bowwave_tests::{bowwave, expect_code, said};
 use glam::DQuat;
 use image::GrayImage;
 use precision::target::{
-    draw::{Shot, TrueLens, draw},
+    draw::{BoardShot, TrueLens, draw},
     shots::{board, held},
 };
 
@@ -21,7 +21,7 @@ const LENS: TrueLens = TrueLens {
 };
 
 /// Draws the board as `shots` have it into a folder.
-fn pictures(folder: &Path, lens: &TrueLens, shots: &[Shot]) {
+fn pictures(folder: &Path, lens: &TrueLens, shots: &[BoardShot]) {
     fs::create_dir_all(folder).expect("a folder");
     let directions = lens.directions();
     for (i, shot) in shots.iter().enumerate() {
@@ -109,13 +109,13 @@ fn what_tells_no_lens_is_refused_with_what_is_missing() {
     let shots = held(&LENS, &board(), 6, 0.6, 8);
     pictures(&at("few"), &LENS, &shots[..3]);
     refused(&calibrate(&at("few"), &out, &["--target", &target]), &out, &["3 pictures", "at least 4"]);
-    let frontal: Vec<Shot> =
-        (0..6).map(|i| Shot { seed: i, ..Shot::frontal(0.62 + 0.02 * i as f64) }).collect();
+    let frontal: Vec<BoardShot> =
+        (0..6).map(|i| BoardShot { seed: i, ..BoardShot::frontal(0.62 + 0.02 * i as f64) }).collect();
     pictures(&at("frontal"), &LENS, &frontal);
     refused(&calibrate(&at("frontal"), &out, &["--target", &target]), &out, &["tilt"]);
     // Five pictures with the board in the left half: a lens, and what it lacks.
     let left = held(&LENS, &board(), 60, 0.5, 9).into_iter().filter(|s| s.middle.x < -0.05);
-    let left: Vec<Shot> = left.map(|s| Shot { noise: 12.0, ..s }).take(5).collect();
+    let left: Vec<BoardShot> = left.map(|s| BoardShot { noise: 12.0, ..s }).take(5).collect();
     pictures(&at("left"), &LENS, &left);
     let output = calibrate(&at("left"), &out, &["--target", &target, "--dry-run"]);
     expect_code(&output, 0);

@@ -18,21 +18,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// A gun that fires a hundred times a second, so that a kill meets a transaction.
-const SCENARIO: &str = r#"
-name = "shooting"
-[weapon]
-rounds_per_minute = 6000
-belt = 100000
-dispersion_mrad = 3.0
-[[boat]]
-name = "skiff-1"
-model = "skiff"
-side = "hostile"
-course = "still"
-range_m = 80
-bearing_deg = 0
-heading_deg = 90
-"#;
+const SCENARIO: &str = include_str!("../data/kill.toml");
 
 /// Runs until `kill_after` the first commit; gives the numbers that were reported.
 fn shoot(scenario: &Path, out: &Path, kill_after: Duration) -> Vec<u64> {

@@ -18,7 +18,7 @@ use bowwave_tests::{bowwave, expect_code, program};
 use glam::{DVec2, DVec3};
 use hw_sim::make::{self, Burst, GunMotion, ImuRecipe, Jolt, Recipe, START, ShipMotion, imu_samples};
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
-use precision::target::draw::{Shot, TrueLens, draw};
+use precision::target::draw::{BoardShot, TrueLens, draw};
 
 /// The board, and the tag at which the bore is aimed.
 const BOARD: &str = "2x2:600";
@@ -64,11 +64,11 @@ fn mark(off: DVec2) -> DVec3 {
 /// The picture of a camera that sees the tag's middle there.
 fn picture(mark: DVec3, lens: &TrueLens, directions: &[DVec3], seed: u64) -> Arc<[u8]> {
     let target: Target = BOARD.parse().unwrap();
-    let frontal = Shot::frontal(mark.z);
+    let frontal = BoardShot::frontal(mark.z);
     let [low, _, high, _] = target.corners(TAG);
     let middle = target.size_m() / 2.0 - target.tag_m() * target.spacing();
     let aside = frontal.camera_from_board * (middle - 0.5 * (low + high)).extend(0.0);
-    let shown = Shot { middle: mark + aside, seed, ..frontal };
+    let shown = BoardShot { middle: mark + aside, seed, ..frontal };
     let drawn = draw(&target, lens, directions, &shown);
     let mut jpeg = Vec::new();
     let (width, height) = (drawn.size.0 as u32, drawn.size.1 as u32);

@@ -5,33 +5,7 @@ use bowwave_record::journal::{RunSelection, ShotFilter, read_shots};
 use bowwave_tests::{bowwave, expect_code, play, small_recipe};
 use hw_sim::make::{self, Burst, Recipe};
 
-const SCENARIO: &str = r#"
-name = "Soak"
-[sea]
-beaufort = 2
-wind_from_deg = 250
-[mount]
-eye_height_m = 8.0
-[weapon]
-rounds_per_minute = 600
-belt = 100000
-[[boat]]
-name = "skiff"
-model = "skiff"
-side = "hostile"
-course = "still"
-range_m = 120
-bearing_deg = 0
-heading_deg = 80
-[[boat]]
-name = "dhow"
-model = "dhow"
-side = "neutral"
-course = "still"
-range_m = 250
-bearing_deg = 5
-heading_deg = 100
-"#;
+const SCENARIO: &str = include_str!("../data/soak.toml");
 
 #[test]
 fn hours_with_a_fault_every_half_minute() {

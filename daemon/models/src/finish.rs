@@ -12,14 +12,14 @@ const LENGTH_M: Range<f32> = 0.5..500.0;
 
 /// Triangles with the part that they belong to.
 #[derive(Default)]
-pub(crate) struct Mesh {
+pub(crate) struct FinishedMesh {
     /// Corners, boat axes.
     pub(crate) vertices: Vec<Vertex>,
     /// Triangles of each of [`Zone::ALL`].
     pub(crate) triangles: [Vec<[u32; 3]>; 3],
 }
 
-impl Mesh {
+impl FinishedMesh {
     /// Checks the mesh and makes the model. `file` is what errors name.
     pub(crate) fn finish(
         self,

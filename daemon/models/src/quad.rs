@@ -12,7 +12,7 @@ use crate::{
     build::{Boat, build_glb},
     error::ModelError,
     load::{decode_picture, load_glb, read_bounded},
-    raster::Canvas,
+    raster::SideCanvas,
     sidecar,
 };
 
@@ -86,7 +86,7 @@ pub fn load_quad(path: &Path) -> Result<Model, ModelError> {
 /// Makes a model of a picture. `file` is what errors name.
 pub fn quad(file: &str, name: &str, picture: RgbaImage, spec: &QuadSpec) -> Result<Model, ModelError> {
     let bad = |problem: &str| ModelError::Picture { file: file.to_owned(), problem: problem.to_owned() };
-    let frame = Frame::new(&picture, spec).map_err(bad)?;
+    let frame = QuadFrame::new(&picture, spec).map_err(bad)?;
     let cut = imageops::crop_imm(&picture, frame.left, frame.top, frame.width, frame.height).to_image();
     let cut = if spec.bow == Bow::Left { imageops::flip_horizontal(&cut) } else { cut };
     let (vertices, cells) = frame.grid(spec);
@@ -118,7 +118,7 @@ pub fn quad(file: &str, name: &str, picture: RgbaImage, spec: &QuadSpec) -> Resu
 }
 
 /// The opaque part of a picture and how it lies in metres.
-struct Frame {
+struct QuadFrame {
     left: u32,
     top: u32,
     width: u32,
@@ -126,7 +126,7 @@ struct Frame {
     metres_per_px: f64,
 }
 
-impl Frame {
+impl QuadFrame {
     fn new(picture: &RgbaImage, spec: &QuadSpec) -> Result<Self, &'static str> {
         let opaque =
             || picture.enumerate_pixels().filter(|(_, _, p)| p.0[3] >= OPAQUE).map(|(x, y, _)| (x, y));
@@ -265,7 +265,7 @@ fn side_view_as(boat: Boat, name: &str) -> Result<Model, ModelError> {
     ]);
     // A bright sky with a weak sun high on the bow: the side that is seen comes out near its albedo.
     let sun = Vec3::new(0.45, -0.60, 0.66);
-    let mut canvas = Canvas::new(WIDTH, height, 3);
+    let mut canvas = SideCanvas::new(WIDTH, height, 3);
     canvas.draw(&ship, clip, |_, normal, albedo| {
         Some(albedo * (0.42 + 0.18 * normal.z + 0.55 * normal.dot(sun).max(0.0)))
     });

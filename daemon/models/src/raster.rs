@@ -10,7 +10,7 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 use image::{Rgba, RgbaImage};
 
 /// A picture in the making: linear colour, coverage and depth, several samples a pixel.
-pub struct Canvas {
+pub struct SideCanvas {
     width: u32,
     height: u32,
     /// Samples along each side of a pixel.
@@ -19,7 +19,7 @@ pub struct Canvas {
     depth: Vec<f32>,
 }
 
-impl Canvas {
+impl SideCanvas {
     /// An empty, see-through canvas with `samples` x `samples` samples a pixel.
     pub fn new(width: u32, height: u32, samples: u32) -> Self {
         let (width, height, samples) = (width.max(1), height.max(1), samples.max(1));

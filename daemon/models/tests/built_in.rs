@@ -124,10 +124,10 @@ fn corners_are_finite_and_lit_from_outside() {
 }
 
 /// A corner in steps of 0.1 mm.
-type Key = (i64, i64, i64);
+type CornerKey = (i64, i64, i64);
 
 /// Triangles by the closed piece that they belong to: pieces share no corner.
-fn pieces(m: &Model) -> HashMap<usize, Vec<[Key; 3]>> {
+fn pieces(m: &Model) -> HashMap<usize, Vec<[CornerKey; 3]>> {
     let key = |p: Vec3| {
         let k = |v: f32| (f64::from(v) * 1e4).round() as i64;
         (k(p.x), k(p.y), k(p.z))
@@ -183,7 +183,7 @@ fn every_piece_is_closed_and_holds_a_volume() {
                 edges.len(),
                 open[0]
             );
-            let at = |(x, y, z): Key| glam::DVec3::new(x as f64, y as f64, z as f64) * 1e-4;
+            let at = |(x, y, z): CornerKey| glam::DVec3::new(x as f64, y as f64, z as f64) * 1e-4;
             let origin = at(piece[0][0]);
             let volume: f64 = piece
                 .iter()

@@ -20,12 +20,12 @@ fn box_corners(min: [f32; 3], max: [f32; 3]) -> (Vec<[f32; 3]>, Vec<u32>) {
 }
 
 /// glTF under construction: one buffer, a node and a mesh for each part.
-struct File {
+struct GltfFile {
     json: Value,
     bin: Vec<u8>,
 }
 
-impl File {
+impl GltfFile {
     fn new() -> Self {
         let json = json!({
             "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}], "nodes": [], "meshes": [],
@@ -120,7 +120,7 @@ fn triangle_count(m: &Model, zone: Zone) -> usize {
 
 #[test]
 fn a_plain_boat_is_read_in_boat_axes() {
-    let m = File::boat().load().expect("loads");
+    let m = GltfFile::boat().load().expect("loads");
     assert_eq!(m.kind, ModelKind::Mesh);
     assert_eq!((m.min, m.max), (Vec3::new(-4.5, -1.0, -0.6), Vec3::new(4.0, 1.0, 2.0)));
     for zone in Zone::ALL {
@@ -142,7 +142,7 @@ fn a_plain_boat_is_read_in_boat_axes() {
 
 #[test]
 fn names_are_found_on_nodes_meshes_and_ancestors() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     // The engine's name moves to its mesh, the helm's to a parent.
     file.json["nodes"][1]["name"] = json!("Cube");
     file.json["meshes"][1]["name"] = json!("Engine.001");
@@ -156,7 +156,7 @@ fn names_are_found_on_nodes_meshes_and_ancestors() {
 
 #[test]
 fn missing_parts_are_named_with_what_was_found() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     file.json["nodes"][1]["name"] = json!("motor");
     let error = file.load().expect_err("no engine");
     let ModelError::MissingPart { needed, found, .. } = &error else { panic!("{error}") };
@@ -174,7 +174,7 @@ fn missing_parts_are_named_with_what_was_found() {
 
 #[test]
 fn transforms_apply_along_the_tree_and_mirroring_keeps_fronts_outside() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     file.json["nodes"][0]["scale"] = json!([-1.0, 1.0, 1.0]);
     file.json["nodes"][2]["translation"] = json!([0.0, 0.0, 1.0]);
     let parent =
@@ -195,9 +195,9 @@ fn transforms_apply_along_the_tree_and_mirroring_keeps_fronts_outside() {
 
 #[test]
 fn indices_of_every_width_strips_and_fans_give_the_same_triangles() {
-    let want = triangle_count(&File::boat().load().expect("loads"), Zone::Hull);
+    let want = triangle_count(&GltfFile::boat().load().expect("loads"), Zone::Hull);
     for (component, width) in [(5121, 1), (5123, 2), (5125, 4)] {
-        let mut file = File::boat();
+        let mut file = GltfFile::boat();
         let (_, indices) = box_corners([0.0; 3], [1.0; 3]);
         let bytes = indices.iter().flat_map(|i| i.to_le_bytes()[..width].to_vec()).collect();
         let accessor = file.accessor(bytes, component, "SCALAR", indices.len());
@@ -206,7 +206,7 @@ fn indices_of_every_width_strips_and_fans_give_the_same_triangles() {
     }
     // A square on the water as strip and as fan beside the hull: two triangles more.
     for (mode, order) in [(5, [0_u16, 1, 3, 2]), (6, [0, 1, 2, 3])] {
-        let mut file = File::boat();
+        let mut file = GltfFile::boat();
         let square = [[-1.0, -1.0, 4.0], [1.0, -1.0, 4.0], [1.0, 1.0, 4.0], [-1.0, 1.0, 4.0]];
         let position = file.floats(&square);
         let bytes = order.iter().flat_map(|i| i.to_le_bytes()).collect();
@@ -221,7 +221,7 @@ fn indices_of_every_width_strips_and_fans_give_the_same_triangles() {
 
 #[test]
 fn colours_of_materials_and_corners_multiply() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     let material =
         file.push("materials", json!({"pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 1.0, 1.0]}}));
     let colours = file.accessor([255, 51, 0, 255].repeat(8), 5121, "VEC4", 8);
@@ -242,7 +242,7 @@ fn png(width: u32, height: u32, colour: [u8; 4]) -> Vec<u8> {
 }
 
 /// Gives the part of mesh `mesh` an embedded picture, its coordinates from 0 to `reach`.
-fn add_picture(file: &mut File, mesh: usize, picture: &[u8], reach: f32) {
+fn add_picture(file: &mut GltfFile, mesh: usize, picture: &[u8], reach: f32) {
     let uri = format!("data:image/png;base64,{}", STANDARD.encode(picture));
     let image = file.push("images", json!({"uri": uri}));
     let texture = file.push("textures", json!({"source": image}));
@@ -264,7 +264,7 @@ fn texel(m: &Model, uv: Vec2) -> [u8; 3] {
 
 #[test]
 fn several_pictures_share_one_texture_and_plain_parts_stay_plain() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     add_picture(&mut file, 0, &png(40, 20, [255, 0, 0, 255]), 1.0);
     add_picture(&mut file, 1, &png(8, 64, [0, 0, 255, 255]), 1.0);
     let m = file.load().expect("loads");
@@ -282,7 +282,7 @@ fn several_pictures_share_one_texture_and_plain_parts_stay_plain() {
 
 #[test]
 fn texture_transforms_move_and_scale_the_coordinates() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     add_picture(&mut file, 0, &png(8, 8, [10, 20, 30, 255]), 1.0);
     file.json["extensionsUsed"] = json!(["KHR_texture_transform"]);
     file.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] =
@@ -303,7 +303,7 @@ fn texture_transforms_move_and_scale_the_coordinates() {
 
 #[test]
 fn a_picture_that_repeats_becomes_its_mean_colour() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     add_picture(&mut file, 0, &png(4, 4, [188, 188, 0, 255]), 3.0);
     let m = file.load().expect("loads");
     assert!(m.texture.is_none());
@@ -314,7 +314,7 @@ fn a_picture_that_repeats_becomes_its_mean_colour() {
 #[test]
 fn buffers_and_pictures_are_found_beside_the_file_and_nowhere_else() {
     let dir = tempfile::tempdir().expect("folder");
-    let file = File::boat();
+    let file = GltfFile::boat();
     fs::create_dir(dir.path().join("data files")).expect("folder");
     fs::write(dir.path().join("data files/boat.bin"), &file.bin).expect("written");
     fs::write(dir.path().join("own.gltf"), file.text(Some("data%20files/boat.bin"))).expect("written");
@@ -340,7 +340,7 @@ fn buffers_and_pictures_are_found_beside_the_file_and_nowhere_else() {
 #[test]
 fn boats_in_the_wrong_place_or_size_are_refused() {
     let shifted = |y: f32| {
-        let mut file = File::boat();
+        let mut file = GltfFile::boat();
         let top = file.push("nodes", json!({"children": [0, 1, 2], "translation": [0.0, y, 0.0]}));
         file.json["scenes"][0]["nodes"] = json!([top]);
         file.load().expect_err("must be refused")
@@ -348,7 +348,7 @@ fn boats_in_the_wrong_place_or_size_are_refused() {
     assert!(matches!(shifted(3.0), ModelError::Afloat { lowest_m, .. } if (lowest_m - 2.4).abs() < 1e-5));
     assert!(matches!(shifted(-3.0), ModelError::Sunk { highest_m, .. } if (highest_m + 1.0).abs() < 1e-5));
     let with = |key: &str, value: Value| {
-        let mut file = File::boat();
+        let mut file = GltfFile::boat();
         let top = file.push("nodes", json!({"children": [0, 1, 2], key: value}));
         file.json["scenes"][0]["nodes"] = json!([top]);
         file.load().expect_err("must be refused")
@@ -362,7 +362,7 @@ fn boats_in_the_wrong_place_or_size_are_refused() {
 
 #[test]
 fn files_that_contradict_themselves_are_refused_with_a_reason() {
-    type Spoil = fn(&mut File);
+    type Spoil = fn(&mut GltfFile);
     let cases: [(&str, Spoil); 14] = [
         ("reached twice", |f| f.json["nodes"][0]["children"] = json!([0])),
         ("accessor", |f| f.primitive(0)["attributes"]["POSITION"] = json!(999)),
@@ -391,7 +391,7 @@ fn files_that_contradict_themselves_are_refused_with_a_reason() {
         }),
     ];
     for (what, spoil) in cases {
-        let mut file = File::boat();
+        let mut file = GltfFile::boat();
         spoil(&mut file);
         let line = file.problem();
         assert!(line.contains(what) && line.starts_with("own.gltf"), "{what}: {line}");
@@ -401,11 +401,11 @@ fn files_that_contradict_themselves_are_refused_with_a_reason() {
 
 #[test]
 fn an_image_without_a_source_and_a_missing_blob_are_errors() {
-    let mut file = File::boat();
+    let mut file = GltfFile::boat();
     add_picture(&mut file, 0, &png(2, 2, [1, 2, 3, 255]), 1.0);
     file.json["images"][0] = json!({"name": "nothing"});
     assert!(file.problem().contains("picture 0"));
-    let mut json: Value = serde_json::from_slice(&File::boat().text(None)).expect("JSON");
+    let mut json: Value = serde_json::from_slice(&GltfFile::boat().text(None)).expect("JSON");
     json["buffers"][0].as_object_mut().expect("buffer").remove("uri");
     let line = load_glb(&serde_json::to_vec(&json).expect("JSON"), "own").expect_err("no blob").to_string();
     assert!(line.contains("binary chunk"), "{line}");
@@ -462,7 +462,7 @@ proptest! {
             Just(json!(1_u64 << 33)), Just(json!(u64::MAX)), Just(json!(1e30)), Just(json!("VEC4")), Just(json!([])),
         ]), 1..4),
     ) {
-        let mut file = File::boat();
+        let mut file = GltfFile::boat();
         add_picture(&mut file, 0, &png(4, 4, [9, 9, 9, 200]), 1.0);
         let mut json: Value = serde_json::from_slice(&file.text(None)).expect("JSON");
         let mut paths = Vec::new();

@@ -9,11 +9,14 @@ use image::{ExtendedColorType, ImageError, codecs::jpeg::JpegEncoder};
 use rand_pcg::{Pcg32, rand_core::Rng};
 
 use super::{
-    field::{Surface, split},
     march::{LevelView, SeaPicture, SeaShader},
-    noise::{mix, upper_quantile},
     recipe::Recipe,
-    sky::{Panorama, Sky, arctangent},
+};
+use crate::ocean::{
+    cloudy::{CloudySky, Panorama, arctangent},
+    looped::{LoopedSurface, split},
+    noise::{smoothstep, upper_quantile},
+    random::mix,
 };
 
 /// Steps of the transfer table over 0 to [`LIGHT_MAX`].
@@ -27,15 +30,15 @@ const DEVIATIONS: usize = 128;
 /// Half the sun's diameter, radians.
 const SUN_RADIUS: f32 = 0.004_65;
 
-/// What there is to see, all but the waves.
-pub(super) struct Scene {
-    pub sky: Sky,
+/// Everything to see but the waves.
+pub(super) struct SeaScene {
+    pub sky: CloudySky,
     pub panorama: Panorama,
     pub water: SeaShader,
 }
 
-/// What of the camera stays the same from frame to frame.
-pub(super) struct Camera {
+/// The properties of the camera that stay the same from frame to frame.
+pub(super) struct RecipeCamera {
     lens: Lens,
     /// Undistorted normalised coordinates of every pixel's centre, and its share of light.
     rays: Vec<[f32; 3]>,
@@ -57,7 +60,7 @@ pub(super) struct FrameMemory {
     pub rgb: Vec<u8>,
 }
 
-impl Camera {
+impl RecipeCamera {
     pub fn new(recipe: &Recipe) -> Self {
         let lens = recipe.lens();
         let rays = (0..lens.height)
@@ -101,8 +104,8 @@ impl Camera {
     /// Draws what the camera sees of `scene` from `pose` into `memory.rgb`; `turned` is how it is turned so many seconds later.
     pub fn expose(
         &self,
-        scene: &Scene,
-        surface: &Surface,
+        scene: &SeaScene,
+        surface: &LoopedSurface,
         (pose, turned): (&CameraPose, &dyn Fn(f64) -> DQuat),
         frame: u32,
         memory: &mut FrameMemory,
@@ -192,7 +195,7 @@ impl Camera {
 
 /// Light that falls on the sensor along a ray of the camera, turned into the level view.
 #[inline(always)]
-fn light(scene: &Scene, turn: Mat3, ray: [f32; 3], view: &LevelView, sea: &SeaPicture, sun: Vec3) -> Vec4 {
+fn light(scene: &SeaScene, turn: Mat3, ray: [f32; 3], view: &LevelView, sea: &SeaPicture, sun: Vec3) -> Vec4 {
     let d = turn * Vec3::new(ray[0], ray[1], 1.0);
     let inverse = 1.0 / d.z;
     let (nx, ny) = (d.x * inverse, d.y * inverse);
@@ -206,7 +209,7 @@ fn light(scene: &Scene, turn: Mat3, ray: [f32; 3], view: &LevelView, sea: &SeaPi
     let towards = d.dot(sun);
     if towards > 0.0 && towards * towards > d.length_squared() * (1.0 - 6.0 * SUN_RADIUS * SUN_RADIUS) {
         let off = d.normalize().cross(sun).length();
-        let disc = 1.0 - super::noise::smoothstep(0.9 * SUN_RADIUS, 1.15 * SUN_RADIUS, off);
+        let disc = 1.0 - smoothstep(0.9 * SUN_RADIUS, 1.15 * SUN_RADIUS, off);
         sky += 50.0 * disc;
     }
     water + open * sky
@@ -239,15 +242,15 @@ pub(super) fn level_focal(lens: &Lens) -> f32 {
     0.88 * lens.focal.x as f32
 }
 
-/// What the camera sees over a whole recording: azimuths from the first to the last (clockwise), and the largest tangents
+/// Extent of a whole recording's view: azimuths from the first to the last (clockwise), and the largest tangents
 /// of elevation above and below the horizontal.
-pub(super) struct Coverage {
+pub(super) struct ViewCoverage {
     pub azimuth: [f32; 2],
     pub above: f32,
     pub below: f32,
 }
 
-impl Coverage {
+impl ViewCoverage {
     pub fn new(recipe: &Recipe) -> Self {
         let (lens, motion) = (recipe.lens(), recipe.motion());
         let (w, h) = (f64::from(lens.width), f64::from(lens.height));

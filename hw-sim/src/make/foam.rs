@@ -2,8 +2,8 @@
 
 use glam::Vec4;
 
-use super::{
-    field::{CASCADES, LEVELS, Surface},
+use crate::ocean::{
+    looped::{CASCADES, LEVELS, LoopedSurface},
     noise::{smoothstep, upper_quantile},
 };
 
@@ -21,7 +21,7 @@ pub(super) struct Foam {
 impl Foam {
     /// `None` where the wind is too light. The covered share is that of Monahan and O'Muircheartaigh 1980,
     /// 3.84e-6 U^3.41 (U in m/s).
-    pub fn new(wind: f64, surface: &Surface) -> Option<Self> {
+    pub fn new(wind: f64, surface: &LoopedSurface) -> Option<Self> {
         if wind < ONSET {
             return None;
         }

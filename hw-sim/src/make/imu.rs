@@ -8,9 +8,9 @@ use rand_pcg::Pcg64;
 
 use super::{
     motion::{GRAVITY, Motion},
-    noise::{gaussian, stream, uniform},
     recipe::{Jolt, Recipe},
 };
+use crate::ocean::random::{gaussian, stream, uniform};
 
 /// Slow errors with a whole number of cycles in the recording: mean zero, deviation one on each axis.
 struct SlowError {
@@ -95,7 +95,7 @@ struct Exact {
     world_from_imu: DQuat,
 }
 
-/// What a perfect unit measures.
+/// Readings of a perfect unit.
 fn exact(motion: &Motion, imu_from_camera: DQuat, time_s: f64) -> Exact {
     let state = motion.at(time_s);
     let world_from_imu = state.pose.world_from_camera * imu_from_camera.inverse();

@@ -10,11 +10,13 @@ use bowwave_core::geometry::curvature_drop;
 use glam::{Vec3, Vec4};
 
 use super::{
-    field::{CASCADES, Covariance, Field, LEVELS, Surface},
     foam::Foam,
     patches::Patches,
     shade::{COLUMNS_PER_RADIAN, Glitter, Roughness, Slice, WaterTable},
-    sky::{Dome, Rgb, Sky},
+};
+use crate::ocean::{
+    cloudy::{CloudyDome, CloudySky, Rgb},
+    looped::{CASCADES, Covariance, LEVELS, LoopedSea, LoopedSurface},
 };
 
 /// Pieces of water per row of the picture where waves are drawn one by one.
@@ -37,7 +39,7 @@ const BLOCK: usize = 64;
 const STRIDE_MAX: usize = 16;
 
 /// One distance from the camera.
-struct Step {
+struct MarchStep {
     range: f32,
     /// Metres from column to column.
     spacing: f32,
@@ -73,11 +75,11 @@ pub(super) struct LevelView {
 pub(super) struct SeaPicture {
     pub texels: Vec<Vec4>,
     highest: Vec<f32>,
-    columns: Vec<Column>,
+    columns: Vec<SeaColumn>,
 }
 
 #[derive(Clone, Copy)]
-struct Column {
+struct SeaColumn {
     east: f32,
     north: f32,
     /// Rows per tangent of elevation.
@@ -86,17 +88,17 @@ struct Column {
     haze: Vec4,
 }
 
-/// What is looked at in one frame, and from where.
-struct Look<'a> {
-    surface: &'a Surface,
-    sky: &'a Sky,
+/// Subject and eye of one frame.
+struct SeaLook<'a> {
+    surface: &'a LoopedSurface,
+    sky: &'a CloudySky,
     view: &'a LevelView,
     eye_height: f32,
 }
 
-/// What stays the same over a recording.
+/// The part of the drawing that stays the same over a recording.
 pub(super) struct SeaShader {
-    steps: Vec<Step>,
+    steps: Vec<MarchStep>,
     table: WaterTable,
     patches: Patches,
     foam: Option<Foam>,
@@ -104,7 +106,7 @@ pub(super) struct SeaShader {
     haze: Vec<Vec4>,
 }
 
-/// What the shader is built for.
+/// Settings of a [`SeaShader`].
 pub(super) struct SeaShaderInput {
     pub eye_height: f32,
     pub focal: f32,
@@ -120,8 +122,8 @@ pub(super) struct SeaShaderInput {
 }
 
 impl SeaShader {
-    pub fn new(input: &SeaShaderInput, sky: &Sky, dome: &Dome, surface: &Surface) -> Self {
-        let (resolved, height_variance) = Field::statistics(surface);
+    pub fn new(input: &SeaShaderInput, sky: &CloudySky, dome: &CloudyDome, surface: &LoopedSurface) -> Self {
+        let (resolved, height_variance) = LoopedSea::statistics(surface);
         let whole = rotate_slopes(input.slopes, input.wind_from);
         let crest = 3.0 * height_variance.sqrt() as f32;
         let start =
@@ -164,8 +166,8 @@ impl SeaShader {
     /// Paints the sea of `surface` seen by `view` from `eye_height` metres into `picture`.
     pub fn draw(
         &self,
-        surface: &Surface,
-        sky: &Sky,
+        surface: &LoopedSurface,
+        sky: &CloudySky,
         view: &LevelView,
         eye_height: f32,
         picture: &mut SeaPicture,
@@ -176,7 +178,7 @@ impl SeaShader {
         picture.highest.resize(view.width, f32::MAX);
         self.columns(view, &mut picture.columns);
         // Some columns at a time, so that the part of the tiles that they walk over stays in the nearest cache.
-        let look = Look { surface, sky, view, eye_height };
+        let look = SeaLook { surface, sky, view, eye_height };
         for first in (0..view.width).step_by(BLOCK) {
             let block = first..(first + BLOCK).min(view.width);
             for step in &self.steps {
@@ -185,7 +187,7 @@ impl SeaShader {
         }
     }
 
-    fn columns(&self, view: &LevelView, columns: &mut Vec<Column>) {
+    fn columns(&self, view: &LevelView, columns: &mut Vec<SeaColumn>) {
         let (sin, cos) = view.azimuth.sin_cos();
         columns.clear();
         // The last block looks up to one column beyond itself.
@@ -196,7 +198,7 @@ impl SeaShader {
             let degree = azimuth.to_degrees();
             let (low, fraction) = (degree as usize % 360, degree.fract());
             let (a, b) = (self.haze[low], self.haze[(low + 1) % 360]);
-            Column {
+            SeaColumn {
                 east: (sin + n * cos) / secant,
                 north: (cos - n * sin) / secant,
                 scale: view.focal * secant,
@@ -207,7 +209,7 @@ impl SeaShader {
     }
 
     /// A block of columns at one distance.
-    fn ring(&self, step: &Step, look: &Look<'_>, block: Range<usize>, picture: &mut SeaPicture) {
+    fn ring(&self, step: &MarchStep, look: &SeaLook<'_>, block: Range<usize>, picture: &mut SeaPicture) {
         let first = block.start;
         let columns = &picture.columns[first..=first + BLOCK];
         // All look-ups first: they wait for memory side by side, which the branches below would prevent.
@@ -247,8 +249,8 @@ impl SeaShader {
     #[inline(always)]
     fn colour(
         &self,
-        step: &Step,
-        column: &Column,
+        step: &MarchStep,
+        column: &SeaColumn,
         water: Vec4,
         patch: f32,
         slice: &Slice<'_>,
@@ -276,7 +278,7 @@ impl SeaShader {
 }
 
 /// Height, slopes and squeeze under each of a block's columns at one distance.
-fn sample(step: &Step, surface: &Surface, columns: &[Column], waters: &mut [Vec4; BLOCK]) {
+fn sample(step: &MarchStep, surface: &LoopedSurface, columns: &[SeaColumn], waters: &mut [Vec4; BLOCK]) {
     for (tile, &(level, share, shows)) in surface.tiles.iter().zip(&step.levels) {
         if !shows {
             continue;
@@ -305,8 +307,8 @@ fn stride(column_m: f32, point_m: f32) -> usize {
 /// straight between.
 #[inline(always)]
 fn interpolate<T>(
-    step: &Step,
-    columns: &[Column],
+    step: &MarchStep,
+    columns: &[SeaColumn],
     stride: usize,
     values: &mut [T; BLOCK],
     look_up: impl Fn(f32, f32) -> T,
@@ -363,13 +365,13 @@ fn step_at(input: &SeaShaderInput, range: f32) -> f32 {
 
 fn make_step(
     input: &SeaShaderInput,
-    surface: &Surface,
+    surface: &LoopedSurface,
     resolved: &[[Covariance; LEVELS]; CASCADES],
     whole: Covariance,
     foam: Option<&Foam>,
     range: f32,
     step: f32,
-) -> Step {
+) -> MarchStep {
     let spacing = range / input.focal;
     // Waves much shorter than a step would be met at random places: they belong to what is not resolved.
     let finest = spacing.max(SHORTEST * step);
@@ -403,7 +405,7 @@ fn make_step(
     let grazing = (slant - bend).max(2e-4);
     let grazing = grazing / (1.0 + grazing * grazing).sqrt();
     let transmittance = (-3.912 * range / input.visibility_m).exp();
-    Step {
+    MarchStep {
         range,
         spacing,
         drop,

@@ -16,31 +16,25 @@
 //! waves (only their dimming), shadows of clouds, spray, the ship's own wake. Believable up to about Beaufort 7.
 
 mod camera;
-mod field;
 mod foam;
-mod fresnel;
 mod imu;
 mod march;
 mod motion;
-mod noise;
 mod patches;
 mod recipe;
 mod shade;
 mod ship;
-mod sky;
-mod spectrum;
 mod studio;
 mod write;
 
-pub use fresnel::{SEA_WATER_INDEX, reflectance};
 pub use imu::samples as imu_samples;
 pub use motion::{GRAVITY, GunMotion, Harmonic, Motion, MotionState, Periodic, ShipMotion};
 pub use recipe::{Burst, CameraRecipe, ImuRecipe, Jolt, Recipe, ShipFeedRecipe};
 pub use ship::samples as ship_samples;
-pub use sky::SkyRecipe;
-pub use spectrum::{Swell, angular_frequency, cox_munk, wind_speed};
-pub use studio::{Shot, Studio};
-pub use write::{DEVICE_LOOP_KEY, Made, START, calibration, make};
+pub use studio::{StudioShot, Studio};
+pub use write::{DEVICE_LOOP_KEY, MadeRecording, START, calibration, make};
+
+pub use crate::ocean::{cloudy::SkyRecipe, spectrum::Swell};
 
 /// Raised whenever the same recipe makes another recording than before, so that kept ones are made anew.
 pub const REVISION: u32 = 1;
@@ -55,7 +49,7 @@ pub enum MakeError {
         what: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Range of values that it may have.
         range: &'static str,
     },
     /// A picture could not be encoded.

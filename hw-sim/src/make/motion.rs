@@ -7,7 +7,7 @@ use bowwave_core::geometry::CameraPose;
 use glam::{DMat3, DQuat, DVec3};
 
 /// Standard gravity, m/s^2 (CGPM 1901).
-pub const GRAVITY: f64 = 9.806_65;
+pub use crate::ocean::spectrum::GRAVITY;
 
 /// One sine of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Harmonic {
 pub struct Periodic {
     /// Mean value.
     pub mean: f64,
-    /// What swings about it.
+    /// Swings about it.
     pub harmonics: Vec<Harmonic>,
 }
 

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use super::{
-    field::split,
-    noise::{stream, uniform},
+use crate::ocean::{
+    looped::split,
+    random::{stream, uniform},
 };
 
 const POINTS: usize = 256;

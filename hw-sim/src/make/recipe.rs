@@ -1,4 +1,4 @@
-//! What to make: all numbers of a recording.
+//! The recipe: all numbers of a recording.
 
 use bowwave_core::{
     event::MarkKind,
@@ -10,8 +10,10 @@ use glam::{DQuat, DVec3};
 use super::{
     MakeError,
     motion::{GunMotion, Motion, Periodic, ShipMotion},
-    sky::SkyRecipe,
-    spectrum::{Swell, WindSea, wind_speed},
+};
+use crate::ocean::{
+    cloudy::SkyRecipe,
+    spectrum::{Swell, WindSea, wind_of_beaufort},
 };
 
 /// A recording to be made. The default is the trainer's embedded one: 20 s of a light breeze (Beaufort 2) that loop without a
@@ -114,7 +116,7 @@ pub struct ImuRecipe {
     pub clock_start_ns: i64,
     /// From the measurement to the packet's arrival at the host, nanoseconds, least and most.
     pub latency_ns: [i64; 2],
-    /// What it feels when the trigger is pressed: dry shots; nothing without.
+    /// Jolt when the trigger is pressed: dry shots; nothing without.
     pub jolt: Option<Jolt>,
 }
 
@@ -130,7 +132,7 @@ pub struct Jolt {
 }
 
 impl Jolt {
-    /// What is felt so many seconds after the sear let go, m/s^2: it rings out.
+    /// Acceleration so many seconds after the sear let go, m/s^2: it rings out.
     pub fn felt(&self, since_s: f64) -> f64 {
         if since_s < 0.0 { 0.0 } else { self.peak * (-since_s / 0.04).exp() * (300.0 * since_s).cos() }
     }
@@ -143,7 +145,7 @@ pub struct ShipFeedRecipe {
     pub rate_hz: f64,
     /// Deviation of the heading's white noise, radians.
     pub noise: f64,
-    /// What it is wrong by all the time, radians.
+    /// Constant error, radians.
     pub offset: f64,
     /// Smallest step of what is told, degrees.
     pub step_deg: f64,
@@ -293,7 +295,7 @@ impl Recipe {
 
     /// Significant height of wind sea and swell together (their energies add), metres.
     pub fn significant_height_m(&self) -> f64 {
-        let wind_sea = WindSea::new(wind_speed(self.beaufort)).significant_height();
+        let wind_sea = WindSea::new(wind_of_beaufort(self.beaufort.get())).significant_height();
         wind_sea.hypot(self.swell.map_or(0.0, |swell| swell.height_m))
     }
 

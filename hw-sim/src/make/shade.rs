@@ -6,10 +6,10 @@ use std::f32::consts::TAU;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
-use super::{
-    field::split,
+use crate::ocean::{
+    cloudy::{CloudyDome, CloudySky, Rgb},
     fresnel::reflectance,
-    sky::{Dome, Rgb, Sky},
+    looped::split,
 };
 
 /// Azimuths in the table; it closes around the compass.
@@ -57,7 +57,7 @@ pub(super) struct Slice<'a> {
 
 impl WaterTable {
     /// Sums over visible facets for each of `rows`.
-    pub fn new(rows: &[Roughness], dome: &Dome, upwelling: Rgb) -> Self {
+    pub fn new(rows: &[Roughness], dome: &CloudyDome, upwelling: Rgb) -> Self {
         let facets = facets();
         let texels = (0..rows.len() * SLOPES * STRIDE)
             .into_par_iter()
@@ -122,7 +122,7 @@ fn water(
     azimuth: f32,
     slope: f32,
     facets: &[(f32, f32, f32)],
-    dome: &Dome,
+    dome: &CloudyDome,
     upwelling: Rgb,
 ) -> Vec4 {
     let (east, north) = azimuth.sin_cos();
@@ -166,7 +166,7 @@ pub(super) struct Glitter {
 }
 
 impl Glitter {
-    pub fn new(row: &Roughness, east: f32, north: f32, sky: &Sky) -> Self {
+    pub fn new(row: &Roughness, east: f32, north: f32, sky: &CloudySky) -> Self {
         let sin = row.grazing;
         let cos = (1.0 - sin * sin).max(0.0).sqrt();
         let half = sky.sun + Vec3::new(-cos * east, -cos * north, sin);
@@ -208,11 +208,12 @@ impl Glitter {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::sky::SkyRecipe, *};
+    use super::*;
+    use crate::ocean::cloudy::SkyRecipe;
 
-    fn sky() -> Sky {
+    fn sky() -> CloudySky {
         let recipe = SkyRecipe { sun_azimuth: 1.5, sun_elevation: 0.7, turbidity: 3.0, cloud_cover: 0.0 };
-        Sky::new(&recipe, 1).unwrap()
+        CloudySky::new(&recipe, 1).unwrap()
     }
 
     fn row(grazing: f32, variance: f32) -> Roughness {
@@ -222,7 +223,7 @@ mod tests {
     #[test]
     fn flat_water_mirrors_the_sky_by_fresnel() {
         let (sky, upwelling) = (sky(), [0.01, 0.02, 0.03]);
-        let dome = Dome::new(&sky);
+        let dome = CloudyDome::new(&sky);
         let row = row(0.3, 0.0);
         let got = water(&row, 0.4, 0.0, &facets(), &dome, upwelling);
         let cos = (1.0f32 - 0.09).sqrt();
@@ -238,7 +239,7 @@ mod tests {
     #[test]
     fn faces_turned_to_the_eye_are_darker() {
         let sky = sky();
-        let dome = Dome::new(&sky);
+        let dome = CloudyDome::new(&sky);
         let table = WaterTable::new(&[row(0.05, 0.004), row(0.02, 0.006)], &dome, [0.01, 0.02, 0.03]);
         let (back, face) = (table.slice(0.5).at(-0.02, 3.0), table.slice(0.5).at(0.3, 3.0));
         assert!(face[1] < 0.8 * back[1], "{face:?} {back:?}");

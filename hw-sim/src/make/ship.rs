@@ -7,11 +7,8 @@ use bowwave_core::{
     time::{Time, secs_to_ns},
 };
 
-use super::{
-    imu::draw_latency,
-    noise::{gaussian, stream},
-    recipe::Recipe,
-};
+use super::{imu::draw_latency, recipe::Recipe};
+use crate::ocean::random::{gaussian, stream};
 
 /// All lines of a recording, in the order of measurement; none where the recipe has no feed. `start` is the recording's start on the
 /// host's clock.

@@ -6,31 +6,33 @@ use bowwave_core::geometry::CameraPose;
 
 use super::{
     MakeError,
-    camera::{Camera, Coverage, FrameMemory, Scene, level_focal},
-    field::{Field, Surface},
+    camera::{FrameMemory, RecipeCamera, SeaScene, ViewCoverage, level_focal},
     march::{SeaShader, SeaShaderInput},
     motion::Motion,
     recipe::Recipe,
-    sky::{Dome, Panorama, Sky},
-    spectrum::{WindSea, cox_munk, wind_speed},
+};
+use crate::ocean::{
+    cloudy::{CloudyDome, CloudySky, Panorama},
+    looped::{LoopedSea, LoopedSurface},
+    spectrum::{WindSea, cox_munk_fits, wind_of_beaufort},
 };
 
 /// Draws the frames of one recipe. Frames may be drawn in any order and from several threads.
 pub struct Studio {
     motion: Motion,
-    field: Field,
-    scene: Scene,
-    camera: Camera,
+    field: LoopedSea,
+    scene: SeaScene,
+    camera: RecipeCamera,
     exposure_delay_s: f64,
     frame_rate_hz: f64,
     frames: u32,
     size: (u32, u32),
     /// Tiles and pictures of threads that are done with a frame, for the next one.
-    spare: Mutex<Vec<(Surface, FrameMemory)>>,
+    spare: Mutex<Vec<(LoopedSurface, FrameMemory)>>,
 }
 
 /// One drawn frame.
-pub struct Shot {
+pub struct StudioShot {
     /// The picture as the camera delivers it.
     pub jpeg: Vec<u8>,
     /// Where the camera was at its exposure.
@@ -41,27 +43,28 @@ impl Studio {
     /// Prepares waves, sky and camera; about a second of work.
     pub fn new(recipe: &Recipe) -> Result<Self, MakeError> {
         recipe.check()?;
-        let wind = wind_speed(recipe.beaufort);
+        let wind = wind_of_beaufort(recipe.beaufort.get());
         let sea = WindSea::new(wind);
-        let field = Field::new(&sea, recipe.wind_from, recipe.swell.as_ref(), recipe.duration_s, recipe.seed);
+        let field =
+            LoopedSea::new(&sea, recipe.wind_from, recipe.swell.as_ref(), recipe.duration_s, recipe.seed);
         let mut surface = field.surface();
         field.evaluate(0.0, &mut surface);
-        let sky = Sky::new(&recipe.sky, recipe.seed).ok_or(MakeError::Recipe {
+        let sky = CloudySky::new(&recipe.sky, recipe.seed).ok_or(MakeError::Recipe {
             what: "sky.turbidity",
             value: recipe.sky.turbidity,
             range: "1 to 10",
         })?;
-        let camera = Camera::new(recipe);
-        let coverage = Coverage::new(recipe);
+        let camera = RecipeCamera::new(recipe);
+        let coverage = ViewCoverage::new(recipe);
         let focal = recipe.lens().focal.x as f32;
         let panorama = Panorama::new(&sky, coverage.azimuth, coverage.above, focal);
-        let dome = Dome::new(&sky);
+        let dome = CloudyDome::new(&sky);
         let input = SeaShaderInput {
             eye_height: recipe.eye_height_m as f32,
             focal: level_focal(&recipe.lens()),
             steepest: coverage.below,
             visibility_m: recipe.visibility_m as f32,
-            slopes: cox_munk(wind),
+            slopes: cox_munk_fits(wind),
             wind_from: recipe.wind_from,
             wind,
             upwelling: upwelling(&sky),
@@ -71,7 +74,7 @@ impl Studio {
         Ok(Self {
             motion: recipe.motion(),
             field,
-            scene: Scene { sky, panorama, water },
+            scene: SeaScene { sky, panorama, water },
             camera,
             exposure_delay_s: recipe.exposure_delay_s(),
             frame_rate_hz: recipe.frame_rate_hz,
@@ -92,10 +95,10 @@ impl Studio {
     }
 
     /// Frame number `frame`, from 0, as JPEG. Numbers beyond the last begin the loop again, with other noise.
-    pub fn shoot(&self, frame: u32) -> Result<Shot, MakeError> {
+    pub fn shoot(&self, frame: u32) -> Result<StudioShot, MakeError> {
         let (truth, jpeg) = self.draw(frame, |rgb| self.camera.encode(rgb));
         let jpeg = jpeg.map_err(|source| MakeError::Encode { frame, source })?;
-        Ok(Shot { jpeg, truth })
+        Ok(StudioShot { jpeg, truth })
     }
 
     /// The same frame before it is encoded: 8-bit sRGB, rows from the top.
@@ -122,7 +125,7 @@ impl Studio {
 
 /// Light that comes up out of clear deep water, in the picture's units: 2 to 5 % of what falls on it, blue-green (Mobley
 /// 1994, irradiance reflectance of open water at 450, 550 and 620 nm, spread over the hemisphere and dimmed by the surface).
-fn upwelling(sky: &Sky) -> [f32; 3] {
+fn upwelling(sky: &CloudySky) -> [f32; 3] {
     let overhead = sky.clear(glam::Vec3::Z);
     let sin = sky.sun.z;
     std::array::from_fn(|c| {

@@ -16,10 +16,10 @@ use rayon::prelude::*;
 use super::{
     MakeError, Recipe,
     imu::{self, draw_latency},
-    noise::stream,
     ship,
-    studio::{Shot, Studio},
+    studio::{StudioShot, Studio},
 };
+use crate::ocean::random::stream;
 
 /// When made recordings begin on the host's clock. Later than zero, so that nothing before the start is negative.
 pub const START: Time = Time::from_ns(100_000_000_000);
@@ -30,9 +30,9 @@ pub const DEVICE_LOOP_KEY: &str = "device_loop_ns";
 /// Frames drawn at once before they are written.
 const BATCH: u32 = 48;
 
-/// What was made.
+/// Summary of a made recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Made {
+pub struct MadeRecording {
     /// Frames.
     pub frames: u64,
     /// Samples of the inertial unit.
@@ -47,7 +47,7 @@ pub struct Made {
 
 /// Makes the recording of `recipe` in a new file at `path`; `progress` hears of (frames done, frames in all). An existing
 /// file is not overwritten; a failure leaves the file cut short.
-pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) -> Result<Made, MakeError> {
+pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) -> Result<MadeRecording, MakeError> {
     let studio = Studio::new(recipe)?;
     let mut writer = RecordingWriter::create(path, &properties(recipe))?;
     let mut others = measurements(recipe).into_iter().peekable();
@@ -56,7 +56,7 @@ pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) ->
     progress(0, u64::from(frames));
     for first in (0..frames).step_by(BATCH as usize) {
         let batch = first..frames.min(first + BATCH);
-        let shots: Vec<Result<Shot, MakeError>> =
+        let shots: Vec<Result<StudioShot, MakeError>> =
             batch.clone().into_par_iter().with_max_len(1).map(|frame| studio.shoot(frame)).collect();
         for (frame, shot) in batch.clone().zip(shots) {
             let shot = shot?;
@@ -83,7 +83,7 @@ pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) ->
         writer.write(&other)?;
     }
     let written = writer.finish()?;
-    Ok(Made {
+    Ok(MadeRecording {
         frames: written.counts.frames,
         imu_samples: written.counts.imu,
         trigger_edges: written.counts.triggers,
@@ -139,7 +139,7 @@ fn properties(recipe: &Recipe) -> Properties {
     }
 }
 
-/// What a perfect calibration of the recipe's hardware would say, with the uncertainties of a good one.
+/// A perfect calibration of the recipe's hardware, with the uncertainties of a good one.
 pub fn calibration(recipe: &Recipe) -> CalibrationFile {
     let numbers = Calibration {
         lens: recipe.lens(),

@@ -11,10 +11,11 @@ use bowwave_core::{
     time::Time,
 };
 use glam::{DMat2, DMat3, DQuat, DVec3};
+use hw_sim::ocean::random::gaussian;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 
-use crate::ship::{self, Errors, Sample, Sea, Ship, gaussian, inclination_error};
+use crate::ship::{self, Ship, ShipReading, ShipSea, UnitErrors, inclination_error};
 
 /// How the calibration has the camera against the unit.
 pub const CAMERA_FROM_IMU: DQuat = DQuat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
@@ -30,16 +31,16 @@ pub const SETTLED_S: f64 = 60.0;
 /// Errors so far apart in time are nearly independent, seconds.
 const INDEPENDENT_S: f64 = 20.0;
 
-/// What a camera sees, ten times a second.
+/// Horizon that a camera sees ten times a second.
 #[derive(Clone, Copy, Debug)]
-pub struct Horizon {
+pub struct AidedHorizon {
     /// It is seen for so long, then not for as long, seconds.
     pub seen_s: f64,
     /// White noise on each of its axes, radians.
     pub sigma: f64,
 }
 
-/// What tells the heading.
+/// Source of the heading.
 #[derive(Clone, Copy, Debug)]
 pub enum Heading {
     /// Nothing after the start.
@@ -50,39 +51,39 @@ pub enum Heading {
     Compass(f64),
 }
 
-/// What is seen beside the samples of a unit.
+/// Aiding observations beside the samples of a unit.
 #[derive(Clone, Copy, Debug)]
-pub struct Aids {
+pub struct SeenAids {
     camera_from_imu: DQuat,
     dip: f64,
-    horizon: Option<Horizon>,
+    horizon: Option<AidedHorizon>,
     heading: Heading,
     seed: u64,
 }
 
 /// One simulated recording with its aids.
 #[derive(Debug)]
-pub struct Recording {
+pub struct AidedRecording {
     /// The unit's samples, to be damaged where that is what is tried.
-    pub samples: Vec<Sample>,
-    aids: Aids,
+    pub samples: Vec<ShipReading>,
+    aids: SeenAids,
 }
 
 /// How a recording's errors come about.
 #[derive(Clone, Copy, Debug)]
-pub enum Unit {
-    /// Those of [`Errors::usual`], with a camera that sits as much beside its place as is usual.
+pub enum AidedUnit {
+    /// Those of [`UnitErrors::usual`], with a camera that sits as much beside its place as is usual.
     Usual,
     /// Drawn from what the filter assumes.
     Drawn,
 }
 
-impl Recording {
+impl AidedRecording {
     /// `seconds` in that sea.
     pub fn new(
-        sea: Sea,
-        unit: Unit,
-        (horizon, heading): (Option<Horizon>, Heading),
+        sea: ShipSea,
+        unit: AidedUnit,
+        (horizon, heading): (Option<AidedHorizon>, Heading),
         seconds: f64,
         seed: u64,
     ) -> Self {
@@ -90,12 +91,12 @@ impl Recording {
         let camera_from_imu = DQuat::from_scaled_axis(mounted_wrong) * CAMERA_FROM_IMU;
         Self {
             samples: ship::samples(&Ship::new(sea, true, seed), &errors, seconds, seed + 100),
-            aids: Aids { camera_from_imu, dip, horizon, heading, seed },
+            aids: SeenAids { camera_from_imu, dip, horizon, heading, seed },
         }
     }
 
     /// Goes through it; tells each sample with the orientation that was known then.
-    pub fn run(&self, aided: &mut dyn Estimator, tell: impl FnMut(&Sample, DQuat, &dyn Estimator)) {
+    pub fn run(&self, aided: &mut dyn Estimator, tell: impl FnMut(&ShipReading, DQuat, &dyn Estimator)) {
         self.aids.run(self.samples.iter().copied(), aided, tell);
     }
 }
@@ -112,24 +113,24 @@ pub fn product(source: Source) -> Attitude {
     Attitude::new(settings, DVec3::ZERO, CAMERA_FROM_IMU)
 }
 
-impl Unit {
+impl AidedUnit {
     /// The unit's errors, by what the camera sits beside its place (radians, the camera's axes), and by what the horizon stands too high.
-    fn errors(self, seed: u64) -> (Errors, DVec3, f64) {
+    fn errors(self, seed: u64) -> (UnitErrors, DVec3, f64) {
         let noise = Noise::USUAL;
         let mut rng = Pcg64::seed_from_u64(seed + 1000);
         let mut drawn =
             |sigma: DVec3| DVec3::new(gaussian(&mut rng), gaussian(&mut rng), gaussian(&mut rng)) * sigma;
         let scale = DVec3::splat(noise.scale);
         match self {
-            Self::Usual => (Errors::usual(), DVec3::new(7e-4, -6e-4, 5e-4), 0.0),
+            Self::Usual => (UnitErrors::usual(), DVec3::new(7e-4, -6e-4, 5e-4), 0.0),
             Self::Drawn => {
-                let errors = Errors {
+                let errors = UnitErrors {
                     gyro_noise: noise.gyro,
                     gyro_bias: drawn(noise.bias),
                     gyro_walk: noise.bias_walk,
                     gyro_matrix: DMat3::from_cols(drawn(scale), drawn(scale), drawn(scale)),
                     accel_bias: drawn(DVec3::splat(noise.force)),
-                    ..Errors::usual()
+                    ..UnitErrors::usual()
                 };
                 (errors, drawn(noise.mounting), drawn(DVec3::splat(REFRACTION_SIGMA)).x)
             }
@@ -137,18 +138,18 @@ impl Unit {
     }
 }
 
-impl Aids {
+impl SeenAids {
     /// A horizon as it is with the usual unit, and a heading.
-    pub const fn usual(horizon: Option<Horizon>, heading: Heading) -> Self {
+    pub const fn usual(horizon: Option<AidedHorizon>, heading: Heading) -> Self {
         Self { camera_from_imu: CAMERA_FROM_IMU, dip: 0.0, horizon, heading, seed: 1 }
     }
 
     /// Goes through `samples`; tells each with the orientation that was known then.
     pub fn run(
         &self,
-        samples: impl Iterator<Item = Sample>,
+        samples: impl Iterator<Item = ShipReading>,
         aided: &mut dyn Estimator,
-        mut tell: impl FnMut(&Sample, DQuat, &dyn Estimator),
+        mut tell: impl FnMut(&ShipReading, DQuat, &dyn Estimator),
     ) {
         let mut rng = Pcg64::seed_from_u64(self.seed);
         let (mut up_waits, mut heading_waits): (Option<UpSeen>, Option<HeadingSeen>) = (None, None);
@@ -179,7 +180,7 @@ impl Aids {
         }
     }
 
-    fn up(&self, s: &Sample, rng: &mut Pcg64) -> Option<(DVec3, DMat3)> {
+    fn up(&self, s: &ShipReading, rng: &mut Pcg64) -> Option<(DVec3, DMat3)> {
         let horizon = self.horizon.filter(|h| s.time_s % (2.0 * h.seen_s) < h.seen_s)?;
         let world_from_camera = s.truth.world_from_imu * self.camera_from_imu.inverse();
         let noise = DVec3::new(gaussian(rng), gaussian(rng), 0.0) * horizon.sigma;
@@ -191,7 +192,7 @@ impl Aids {
     /// `anchored`: when, and by how much the believed heading was wrong then.
     fn heading(
         &self,
-        s: &Sample,
+        s: &ShipReading,
         found: DQuat,
         aided: &mut dyn Estimator,
         anchored: &mut Option<(f64, f64)>,
@@ -223,7 +224,7 @@ impl Aids {
     }
 }
 
-/// What finds orientation from samples and aids.
+/// An estimator of orientation from samples and aids.
 pub trait Estimator {
     /// The orientation at a sample.
     fn observe(&mut self, time: Time, sample: &ImuSample) -> Option<DQuat>;
@@ -264,7 +265,7 @@ impl Estimator for Attitude {
 
 /// How wrong a run was after a minute.
 #[derive(Clone, Debug, Default)]
-pub struct Outcome {
+pub struct AidedOutcome {
     /// Root mean square and worst of the angle by which up is wrong, degrees.
     pub up_deg: [f64; 2],
     /// The same of the heading less what it was wrong by at the start.
@@ -274,8 +275,8 @@ pub struct Outcome {
 }
 
 /// Runs the estimator through the recording.
-pub fn outcome(recording: &Recording, aided: &mut dyn Estimator) -> Outcome {
-    let mut out = Outcome::default();
+pub fn outcome(recording: &AidedRecording, aided: &mut dyn Estimator) -> AidedOutcome {
+    let mut out = AidedOutcome::default();
     let (mut count, mut next, mut start) = (0.0, SETTLED_S, None);
     recording.run(aided, |s, found, aided| {
         let truth = s.truth.world_from_imu;

@@ -1,5 +1,8 @@
 //! Many simulated recordings solved, errors held against what the solver says of them.
 
+use std::collections::BTreeMap;
+
+use anyhow::Result;
 use bowwave_calibration::{
     alignment::{Alignment, AlignmentError, Options, solve},
     simulated::{Motion, Recipe},
@@ -7,18 +10,18 @@ use bowwave_calibration::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::front::quantile;
+use crate::{front::quantile, parts::rms, table::TextTable};
 
 /// One simulated recording and what became of it.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct SolvedRecording {
     /// The truth.
     pub recipe: Recipe,
-    /// What was found, or why nothing was.
-    pub found: Result<Alignment, AlignmentError>,
+    /// The solution, or the reason that there is none.
+    pub found: std::result::Result<Alignment, AlignmentError>,
 }
 
-impl Run {
+impl SolvedRecording {
     /// Simulates and solves.
     pub fn of(recipe: Recipe) -> Self {
         let recording = recipe.record();
@@ -78,13 +81,103 @@ pub const SERIES: [(&str, Motion, f64, f64); 8] = [
 ];
 
 /// Solves seeds `first..first + runs` of one of the series, on all processors.
-pub fn series(motion: Motion, degrees: f64, jitter_s: f64, first: u64, runs: u64) -> Vec<Run> {
+pub fn series(motion: Motion, degrees: f64, jitter_s: f64, first: u64, runs: u64) -> Vec<SolvedRecording> {
     let recipe = |seed| Recipe::minute(motion, degrees.to_radians(), jitter_s, seed);
-    (first..first + runs).into_par_iter().map(|seed| Run::of(recipe(seed))).collect()
+    (first..first + runs).into_par_iter().map(|seed| SolvedRecording::of(recipe(seed))).collect()
 }
 
 /// A value below which that share of all numbers lies; NaN of none.
 pub fn percentile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
     let known: Vec<f64> = values.into_iter().filter(|v| !v.is_nan()).collect();
     quantile(&known, share)
+}
+
+/// Solves simulated recordings and compares errors with the stated uncertainty.
+#[derive(Debug, clap::Args)]
+pub struct CalibrationStudy {
+    /// Recordings of each motion and noise
+    #[arg(long, default_value_t = 100)]
+    runs: u64,
+    /// First seed
+    #[arg(long, default_value_t = 1000)]
+    first: u64,
+    /// Only series whose name has this in it
+    #[arg(long, default_value = "")]
+    only: String,
+}
+
+impl CalibrationStudy {
+    /// Prints the table of every series.
+    pub fn run(&self) -> Result<()> {
+        for (name, motion, degrees, jitter_s) in SERIES {
+            if name.contains(&self.only) {
+                print!("{}", summary(name, &series(motion, degrees, jitter_s, self.first, self.runs)));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A quantity of the table.
+struct Quantity {
+    name: &'static str,
+    error: fn(&SolvedRecording) -> f64,
+    stated: fn(&Alignment) -> f64,
+    /// Place among the answers of [`SolvedRecording::within`].
+    within: usize,
+}
+
+const QUANTITIES: [Quantity; 3] = [
+    Quantity {
+        name: "rotation, mrad",
+        error: SolvedRecording::mrad,
+        stated: |a| a.rotation_sigma().length() * 1e3,
+        within: 0,
+    },
+    Quantity {
+        name: "offset, ms",
+        error: SolvedRecording::ms,
+        stated: |a| a.offset_sigma_s * 1e3,
+        within: 1,
+    },
+    Quantity {
+        name: "bias, deg/s",
+        error: SolvedRecording::bias_deg_per_s,
+        stated: |a| a.gyro_bias_sigma.length().to_degrees(),
+        within: 2,
+    },
+];
+
+fn summary(name: &str, runs: &[SolvedRecording]) -> String {
+    let solved = runs.iter().filter(|r| r.found.is_ok()).count();
+    let mut table = TextTable::new(
+        1,
+        [(format!("{name}: {solved} of {} solved", runs.len()), 48)].into_iter().chain(
+            // The stated sigma is that of all three axes together.
+            ["rms", "median", "95 %", "99 %", "stated", "in 3 sigma"].map(|t| (t.to_owned(), 9)),
+        ),
+    );
+    for q in QUANTITIES.iter().filter(|_| solved > 0) {
+        let at = |share| percentile(runs.iter().map(q.error), share);
+        let rms = rms(runs.iter().map(q.error).filter(|e| !e.is_nan()));
+        let inside = runs.iter().filter_map(SolvedRecording::within).filter(|w| w[q.within]).count();
+        let stated = percentile(runs.iter().filter_map(|r| r.found.as_ref().ok()).map(q.stated), 0.5);
+        let errors = [rms, at(0.5), at(0.95), at(0.99), stated].map(|v| format!("{v:.4}"));
+        let share = format!("{:.1} %", 100.0 * inside as f64 / solved as f64);
+        table.row([format!("    {}", q.name)].into_iter().chain(errors).chain([share]));
+    }
+    let mut apart: BTreeMap<String, usize> = BTreeMap::new();
+    for run in runs {
+        let reason = match &run.found {
+            // What differs from run to run comes after the first colon.
+            Err(e) => format!("refused: {}", e.to_string().split(':').next().unwrap_or_default()),
+            Ok(a) if !a.findings().is_empty() => format!("graded {} for what was found", a.grade),
+            Ok(_) => continue,
+        };
+        *apart.entry(reason).or_default() += 1;
+    }
+    for (reason, count) in apart {
+        table.row([format!("    {count} {reason}")]);
+    }
+    table.take()
 }

@@ -6,7 +6,7 @@ use rustix::time::{ClockId, clock_gettime};
 
 use crate::{
     HEAP,
-    row::{Kind, Row, Timing},
+    row::{ReportRow, RowKind, Timing},
 };
 
 /// One way of doing a thing with one setting, and how wrong it is.
@@ -19,11 +19,11 @@ pub struct Way<'a> {
     held_bytes: usize,
     note: String,
     uses: f64,
-    work: Work<'a>,
+    work: WayCall<'a>,
 }
 
-/// One call of a way, and how long it took, nanoseconds.
-type Work<'a> = Box<dyn FnMut() -> f64 + 'a>;
+/// One call of a way: the nanoseconds that it took elsewhere.
+type WayCall<'a> = Box<dyn FnMut() -> f64 + 'a>;
 
 impl<'a> Way<'a> {
     /// A way that errs by `error`. One call of `work` is `uses` uses of it: what it returns is kept from being optimised away.
@@ -82,10 +82,45 @@ impl<'a> Way<'a> {
         self
     }
 
-    /// What else there is to say.
+    /// Anything else to say.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
+    }
+}
+
+/// A method under test: its name, its setting, whether the product uses it, and its code.
+#[derive(Clone, Copy, Debug)]
+pub struct Candidate<F> {
+    /// The method.
+    pub method: &'static str,
+    /// Its setting.
+    pub setting: &'static str,
+    /// Whether the product uses it.
+    pub default: bool,
+    /// Its code.
+    pub run: F,
+}
+
+impl<F> Candidate<F> {
+    /// A method that the product does not use.
+    pub const fn rival(method: &'static str, setting: &'static str, run: F) -> Self {
+        Self { method, setting, default: false, run }
+    }
+
+    /// The method that the product uses.
+    pub const fn product(method: &'static str, setting: &'static str, run: F) -> Self {
+        Self { method, setting, default: true, run }
+    }
+
+    /// The method in a ranked scene; see [`Way::new`].
+    pub fn way<'a, T>(&self, error: f64, uses: usize, work: impl FnMut() -> T + 'a) -> Way<'a> {
+        Way::new(self.method, self.setting, error, uses, work).default_if(self.default)
+    }
+
+    /// The method in an extreme case.
+    pub fn tried(&self, error: f64) -> ExtremeResult {
+        ExtremeResult { default: self.default, ..ExtremeResult::rival(self.method, self.setting, error) }
     }
 }
 
@@ -109,19 +144,19 @@ impl Effort {
 
 /// Takes in the scenes and extreme cases of one part after another.
 #[derive(Debug)]
-pub struct Bench {
+pub struct PartBench {
     effort: Effort,
     part: &'static str,
-    rows: Vec<Row>,
+    rows: Vec<ReportRow>,
 }
 
-impl Bench {
+impl PartBench {
     /// Nothing measured yet.
     pub fn new(effort: Effort) -> Self {
         Self { effort, part: "", rows: Vec::new() }
     }
 
-    /// What follows belongs to this part.
+    /// Rows that follow belong to this part.
     pub fn begin(&mut self, part: &'static str) {
         self.part = part;
     }
@@ -141,20 +176,20 @@ impl Bench {
         let noise = samples.get(twin).map_or(1.0, |own| noise(own, &twin_samples));
         for ((way, samples), memory_bytes) in ways.into_iter().zip(samples).zip(memory) {
             let timing = Timing { samples, noise };
-            self.push(scene, unit, truth_error, way, Kind::Ranked(timing), memory_bytes);
+            self.push(scene, unit, truth_error, way, RowKind::Ranked(timing), memory_bytes);
         }
     }
 
     /// Lists a stiff or extreme case: each way that was tried, with its worst error. Nothing is timed.
-    pub fn extreme(&mut self, case: &str, unit: &'static str, tried: Vec<Tried>) {
+    pub fn extreme(&mut self, case: &str, unit: &'static str, tried: Vec<ExtremeResult>) {
         for t in tried {
             let way = Way::new(&t.method, &t.setting, t.error, 1, || ()).default_if(t.default).note(t.note);
-            self.push(case, unit, 0.0, way, Kind::Extreme, 0);
+            self.push(case, unit, 0.0, way, RowKind::Extreme, 0);
         }
     }
 
     /// Everything measured, the front marked.
-    pub fn finish(mut self) -> Vec<Row> {
+    pub fn finish(mut self) -> Vec<ReportRow> {
         crate::front::mark(&mut self.rows);
         self.rows
     }
@@ -165,18 +200,18 @@ impl Bench {
         unit: &'static str,
         truth_error: f64,
         way: Way<'_>,
-        kind: Kind,
+        kind: RowKind,
         memory_bytes: usize,
     ) {
         let uses = way.uses;
         let kind = match kind {
-            Kind::Ranked(mut timing) => {
+            RowKind::Ranked(mut timing) => {
                 timing.samples.iter_mut().for_each(|ns| *ns /= uses);
-                Kind::Ranked(timing)
+                RowKind::Ranked(timing)
             }
-            Kind::Extreme => Kind::Extreme,
+            RowKind::Extreme => RowKind::Extreme,
         };
-        self.rows.push(Row {
+        self.rows.push(ReportRow {
             part: self.part,
             scene: scene.into(),
             method: way.method,
@@ -194,9 +229,9 @@ impl Bench {
     }
 }
 
-/// What one way made of an extreme case.
+/// Result of one way in an extreme case.
 #[derive(Clone, Debug)]
-pub struct Tried {
+pub struct ExtremeResult {
     /// The method.
     pub method: String,
     /// Its setting.
@@ -205,11 +240,11 @@ pub struct Tried {
     pub error: f64,
     /// Whether the product uses it.
     pub default: bool,
-    /// What else there is to say.
+    /// Anything else to say.
     pub note: String,
 }
 
-impl Tried {
+impl ExtremeResult {
     /// A rival's worst error.
     pub fn rival(method: &str, setting: &str, error: f64) -> Self {
         Self { method: method.into(), setting: setting.into(), error, default: false, note: String::new() }
@@ -220,7 +255,7 @@ impl Tried {
         Self { default: true, ..Self::rival(method, setting, error) }
     }
 
-    /// What else there is to say.
+    /// Anything else to say.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.note = note.into();
         self
@@ -228,7 +263,7 @@ impl Tried {
 }
 
 /// Most heap that one call has at a time beyond what was there before.
-fn heap_taken(work: &mut Work<'_>) -> usize {
+fn heap_taken(work: &mut WayCall<'_>) -> usize {
     HEAP.reset_peak_usage();
     let before = HEAP.current_usage();
     work();
@@ -268,7 +303,7 @@ pub(crate) fn thread_ns() -> f64 {
 }
 
 /// Nanoseconds of one call: this thread's, and what the calls tell of elsewhere.
-fn time_calls(work: &mut Work<'_>, calls: usize) -> f64 {
+fn time_calls(work: &mut WayCall<'_>, calls: usize) -> f64 {
     let start = thread_ns();
     let elsewhere: f64 = (0..calls).map(|_| work()).sum();
     (thread_ns() - start + elsewhere) / calls as f64
@@ -290,7 +325,7 @@ mod tests {
 
     #[test]
     fn ways_are_timed_in_turns_and_told_apart() {
-        let mut bench = Bench::new(Effort { rounds: 15, slice_ns: 5e4, scene_ns: 1e9 });
+        let mut bench = PartBench::new(Effort { rounds: 15, slice_ns: 5e4, scene_ns: 1e9 });
         bench.begin("spin");
         let way = |n: u64| Way::new("spin", &n.to_string(), 1.0, 1, move || spin(n));
         bench.scene("s", "-", 0.0, vec![way(2000).default_if(true), way(8000)]);
@@ -302,7 +337,7 @@ mod tests {
 
     #[test]
     fn time_elsewhere_counts() {
-        let mut bench = Bench::new(Effort { rounds: 5, slice_ns: 1e4, scene_ns: 1e8 });
+        let mut bench = PartBench::new(Effort { rounds: 5, slice_ns: 1e4, scene_ns: 1e8 });
         bench.scene("s", "-", 0.0, vec![Way::telling("gpu", "", 0.0, 2, || 5e6)]);
         let time = bench.finish()[0].time_ns().unwrap();
         assert!((2.5e6..2.6e6).contains(&time), "{time}");
@@ -310,13 +345,13 @@ mod tests {
 
     #[test]
     fn a_scene_or_case_with_an_error_that_is_no_number_fails() {
-        let mut bench = Bench::new(Effort { rounds: 5, slice_ns: 1e4, scene_ns: 1e8 });
+        let mut bench = PartBench::new(Effort { rounds: 5, slice_ns: 1e4, scene_ns: 1e8 });
         bench.begin("part");
         bench.scene("s", "-", 0.0, vec![Way::new("broken", "", f64::NAN, 1, || ())]);
         bench.extreme(
             "e",
             "-",
-            vec![Tried::rival("broken too", "", f64::NAN), Tried::rival("fine", "", 1.0)],
+            vec![ExtremeResult::rival("broken too", "", f64::NAN), ExtremeResult::rival("fine", "", 1.0)],
         );
         let told = crate::front::complaints(&bench.finish());
         assert_eq!(told.len(), 2, "{told:?}");
@@ -325,7 +360,7 @@ mod tests {
 
     #[test]
     fn the_heap_that_a_way_takes_is_told() {
-        let mut bench = Bench::new(Effort { rounds: 5, slice_ns: 1e4, scene_ns: 1e8 });
+        let mut bench = PartBench::new(Effort { rounds: 5, slice_ns: 1e4, scene_ns: 1e8 });
         let ways = vec![Way::new("vector", "", 0.0, 1, || vec![1_u8; 5_000_000]).holds(7)];
         bench.scene("s", "-", 0.0, ways);
         let memory = bench.finish()[0].memory_bytes;

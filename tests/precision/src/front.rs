@@ -1,6 +1,6 @@
 //! Which ways nothing else beats. Errors are compared as they are; times only as ratios within one run.
 
-use crate::row::{Kind, Row};
+use crate::row::{ReportRow, RowKind};
 
 /// How two ways' times compare.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,36 +45,36 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
 }
 
 /// Time of `a` over that of `b`, two rows of one scene.
-pub fn ratio(a: &Row, b: &Row) -> Ratio {
+pub fn ratio(a: &ReportRow, b: &ReportRow) -> Ratio {
     match (&a.kind, &b.kind) {
-        (Kind::Ranked(a), Kind::Ranked(b)) => Ratio::of(&a.samples, &b.samples),
+        (RowKind::Ranked(a), RowKind::Ranked(b)) => Ratio::of(&a.samples, &b.samples),
         _ => Ratio::of(&[], &[]),
     }
 }
 
-/// What is less than a tenth slower is not slower.
+/// Factor of the time below which a way counts as no slower.
 const TIE: f64 = 1.1;
 
 /// Whether `other` beats `row`: it errs less and is surely not slower, or errs no more and is faster by more than the scene's
 /// noise. Surely: two standard errors of the median ratio away. What cannot be told on a busy machine beats nobody.
-fn beats(other: &Row, row: &Row) -> bool {
-    let (Kind::Ranked(a), Kind::Ranked(b)) = (&other.kind, &row.kind) else { return false };
+fn beats(other: &ReportRow, row: &ReportRow) -> bool {
+    let (RowKind::Ranked(a), RowKind::Ranked(b)) = (&other.kind, &row.kind) else { return false };
     let ratio = Ratio::of(&a.samples, &b.samples);
     let at_most = ratio.log + 2.0 * ratio.log_error;
     let (mine, its) = (row.error.max(row.truth_error), other.error.max(other.truth_error));
     its < mine && at_most < TIE.ln() || its <= mine && at_most < -a.noise.max(b.noise).ln()
 }
 
-fn same_scene(a: &Row, b: &Row) -> bool {
+fn same_scene(a: &ReportRow, b: &ReportRow) -> bool {
     a.part == b.part && a.scene == b.scene
 }
 
 /// Marks the rows that no other row of their scene beats.
-pub fn mark(rows: &mut [Row]) {
+pub fn mark(rows: &mut [ReportRow]) {
     let on_front: Vec<bool> = rows
         .iter()
         .map(|r| {
-            matches!(r.kind, Kind::Ranked(_))
+            matches!(r.kind, RowKind::Ranked(_))
                 && r.error.is_finite()
                 && !rows.iter().any(|o| same_scene(o, r) && beats(o, r))
         })
@@ -86,7 +86,7 @@ pub fn mark(rows: &mut [Row]) {
 
 /// What is wrong with the rows: an error that is no number, a default that diverges, a default that something beats without
 /// an excuse.
-pub fn complaints(rows: &[Row]) -> Vec<String> {
+pub fn complaints(rows: &[ReportRow]) -> Vec<String> {
     let mut found = Vec::new();
     for r in rows {
         let name = format!("{}: {} ({}) on {}", r.part, r.method, r.setting, r.scene);
@@ -119,13 +119,13 @@ mod tests {
     use crate::row::{Timing, testing::row};
 
     /// Times about `ns` with the same disturbance in each turn, as a machine that others use has.
-    fn timed(method: &str, error: f64, ns: f64) -> Row {
+    fn timed(method: &str, error: f64, ns: f64) -> ReportRow {
         let disturbed = |i: i32| ns * if i % 3 == 0 { 4.0 } else { 1.0 } * (1.0 + 0.01 * f64::from(i % 5));
         let timing = Timing { samples: (0..15).map(disturbed).collect(), noise: 1.1 };
-        Row { kind: Kind::Ranked(timing), ..row(method, error) }
+        ReportRow { kind: RowKind::Ranked(timing), ..row(method, error) }
     }
 
-    fn front(mut rows: Vec<Row>) -> Vec<String> {
+    fn front(mut rows: Vec<ReportRow>) -> Vec<String> {
         mark(&mut rows);
         rows.into_iter().filter(|r| r.on_front).map(|r| r.method).collect()
     }
@@ -154,42 +154,43 @@ mod tests {
 
     #[test]
     fn errors_below_the_truths_own_are_equal() {
-        let floor = |r: Row| Row { truth_error: 1e-3, ..r };
+        let floor = |r: ReportRow| ReportRow { truth_error: 1e-3, ..r };
         assert_eq!(front(vec![floor(timed("a", 1e-9, 100.0)), floor(timed("b", 1e-4, 50.0))]), ["b"]);
     }
 
     #[test]
     fn scenes_and_extreme_cases_do_not_compete() {
-        let other = Row { scene: "another".into(), ..timed("b", 0.0, 1.0) };
-        let extreme = Row { kind: Kind::Extreme, ..timed("c", 0.0, 1.0) };
+        let other = ReportRow { scene: "another".into(), ..timed("b", 0.0, 1.0) };
+        let extreme = ReportRow { kind: RowKind::Extreme, ..timed("c", 0.0, 1.0) };
         assert_eq!(front(vec![timed("a", 1.0, 10.0), other, extreme]), ["a", "b"]);
     }
 
     #[test]
     fn a_beaten_default_is_told_and_one_on_the_front_is_not() {
-        let default = Row { default: true, ..timed("default", 0.1, 100.0) };
+        let default = ReportRow { default: true, ..timed("default", 0.1, 100.0) };
         assert!(complaints(&[default.clone(), timed("cheap", 1.0, 10.0)]).is_empty());
         let told = complaints(&[default.clone(), timed("better", 0.05, 100.0)]);
         assert!(told.len() == 1 && told[0].contains("better"), "{told:?}");
         let told = complaints(&[default.clone(), timed("faster", 0.1, 60.0)]);
         assert!(told.len() == 1 && told[0].contains("faster"), "{told:?}");
-        let excused = Row { excuse: "known".into(), ..default.clone() };
+        let excused = ReportRow { excuse: "known".into(), ..default.clone() };
         assert!(complaints(&[excused, timed("faster", 0.1, 60.0)]).is_empty());
         // Where the ratio is all over the place, nothing can be said.
         let wild = Timing { samples: (0..15).map(|i| 60.0 * 4f64.powi(i % 5 - 2)).collect(), noise: 1.1 };
         assert!(
-            complaints(&[default, Row { kind: Kind::Ranked(wild), ..timed("wild", 0.05, 1.0) }]).is_empty()
+            complaints(&[default, ReportRow { kind: RowKind::Ranked(wild), ..timed("wild", 0.05, 1.0) }])
+                .is_empty()
         );
     }
 
     #[test]
     fn an_error_that_is_no_number_is_told_wherever_it_is() {
-        let extreme = Row { kind: Kind::Extreme, ..row("x", f64::NAN) };
+        let extreme = ReportRow { kind: RowKind::Extreme, ..row("x", f64::NAN) };
         assert_eq!(complaints(&[extreme]).len(), 1);
         assert_eq!(complaints(&[timed("y", f64::NAN, 1.0)]).len(), 1);
         // A rival may diverge, the product may not.
         assert!(complaints(&[timed("z", f64::INFINITY, 1.0)]).is_empty());
-        let default = Row { default: true, kind: Kind::Extreme, ..row("z", f64::INFINITY) };
+        let default = ReportRow { default: true, kind: RowKind::Extreme, ..row("z", f64::INFINITY) };
         assert_eq!(complaints(&[default]).len(), 1);
     }
 

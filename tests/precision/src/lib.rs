@@ -1,7 +1,9 @@
 //! Error against run time of every numerical part.
 //!
-//! A [`parts::Part`] holds the ways of doing one thing against a truth that shares no code with them: [`mod@bench`] times the ways
-//! of a scene in turns, [`front`] finds those that nothing beats, [`row`] writes the table and [`page`] the page.
+//! A [`parts::NumericalPart`] holds the ways of doing one thing against a truth that shares no code with them: [`mod@bench`] times the ways
+//! of a scene in turns, [`front`] finds those that nothing beats, [`row`] writes the table and [`page`] the page. A study goes into one
+//! part in full and is a command of its own ([`alignment`], [`horizon`], [`karma`], [`photograph`], [`reflection`], [`registration`],
+//! [`sea_video`], [`truth`]). The sea of the truths is `hw_sim::ocean`'s. [`table`] prints all tables.
 
 pub mod aided;
 pub mod alignment;
@@ -20,9 +22,10 @@ pub mod registration;
 pub mod row;
 pub mod sea_video;
 pub mod ship;
+pub mod table;
 pub mod target;
 pub mod truth;
 
-/// Counts the heap, so that what a way takes of it can be told.
+/// Counter of the heap that a way takes.
 #[global_allocator]
 static HEAP: peak_alloc::PeakAlloc = peak_alloc::PeakAlloc;

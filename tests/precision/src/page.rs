@@ -4,7 +4,7 @@ use std::{fmt::Write as _, path::Path};
 
 use anyhow::{Context, Result};
 
-use crate::{front, parts::About, plot, row::Row};
+use crate::{front, parts::About, plot, row::ReportRow};
 
 const STYLE: &str = "body{font:16px/1.45 system-ui,sans-serif;max-width:62rem;margin:2rem auto;padding:0 1rem;color:#222}\
 h1{font-size:1.9rem}h2{margin-top:3rem;border-bottom:2px solid #ddd}h3{margin:1.8rem 0 .3rem}\
@@ -61,7 +61,7 @@ fn bytes(count: usize) -> String {
     }
 }
 
-fn ranked_table(html: &mut String, rows: &[&Row]) -> Result<()> {
+fn ranked_table(html: &mut String, rows: &[&ReportRow]) -> Result<()> {
     let unit = rows.first().map_or("", |r| r.error_unit);
     let default = rows.iter().find(|r| r.default);
     write!(
@@ -98,7 +98,7 @@ fn ranked_table(html: &mut String, rows: &[&Row]) -> Result<()> {
     Ok(())
 }
 
-fn extreme_table(html: &mut String, rows: &[&Row]) -> Result<()> {
+fn extreme_table(html: &mut String, rows: &[&ReportRow]) -> Result<()> {
     html.push_str(
         "<div class=box><table><tr><th>case<th>tried<th>setting<th class=n>worst error<th>unit<th>note</tr>\n",
     );
@@ -121,16 +121,16 @@ fn extreme_table(html: &mut String, rows: &[&Row]) -> Result<()> {
     Ok(())
 }
 
-/// What the defaults do, one line a scene.
-fn summary(html: &mut String, rows: &[Row]) -> Result<()> {
+/// The defaults, one line a scene.
+fn summary(html: &mut String, rows: &[ReportRow]) -> Result<()> {
     html.push_str(
         "<h2>Summary</h2><div class=box><table><tr><th>part<th>scene<th>default<th class=n>error<th>unit\
          <th class=n>time<th>front<th class=n>noise</tr>\n",
     );
     for r in rows.iter().filter(|r| r.default && !r.is_extreme()) {
         let noise = match &r.kind {
-            crate::row::Kind::Ranked(t) => format!("{:.0}&nbsp;%", (t.noise - 1.0) * 100.0),
-            crate::row::Kind::Extreme => String::new(),
+            crate::row::RowKind::Ranked(t) => format!("{:.0}&nbsp;%", (t.noise - 1.0) * 100.0),
+            crate::row::RowKind::Extreme => String::new(),
         };
         writeln!(
             html,
@@ -154,7 +154,7 @@ fn summary(html: &mut String, rows: &[Row]) -> Result<()> {
     Ok(())
 }
 
-fn section(html: &mut String, about: &About, rows: &[Row]) -> Result<()> {
+fn section(html: &mut String, about: &About, rows: &[ReportRow]) -> Result<()> {
     writeln!(
         html,
         "<h2 id=\"{0}\">{0}</h2><p>{1}</p><dl><dt>Truth<dd>{2}<dt>Rivals<dd>{3}<dt>Default<dd>{4}</dl>",
@@ -164,7 +164,7 @@ fn section(html: &mut String, about: &About, rows: &[Row]) -> Result<()> {
         escape(about.rivals),
         escape(about.why)
     )?;
-    let of_part: Vec<&Row> = rows.iter().filter(|r| r.part == about.part).collect();
+    let of_part: Vec<&ReportRow> = rows.iter().filter(|r| r.part == about.part).collect();
     let mut scenes: Vec<&str> = Vec::new();
     for r in of_part.iter().filter(|r| !r.is_extreme()) {
         if !scenes.contains(&r.scene.as_str()) {
@@ -172,12 +172,12 @@ fn section(html: &mut String, about: &About, rows: &[Row]) -> Result<()> {
         }
     }
     for scene in scenes {
-        let ranked: Vec<&Row> =
+        let ranked: Vec<&ReportRow> =
             of_part.iter().copied().filter(|r| !r.is_extreme() && r.scene == scene).collect();
         writeln!(html, "<h3>{}</h3>{}", escape(scene), plot::svg(&ranked)?)?;
         ranked_table(html, &ranked)?;
     }
-    let extreme: Vec<&Row> = of_part.iter().copied().filter(|r| r.is_extreme()).collect();
+    let extreme: Vec<&ReportRow> = of_part.iter().copied().filter(|r| r.is_extreme()).collect();
     if !extreme.is_empty() {
         html.push_str("<h3>Stiff and extreme cases</h3>");
         extreme_table(html, &extreme)?;
@@ -186,7 +186,7 @@ fn section(html: &mut String, about: &About, rows: &[Row]) -> Result<()> {
 }
 
 /// The page, plots and style inside it, so that it opens from disk.
-pub fn html(abouts: &[About], rows: &[Row]) -> Result<String> {
+pub fn html(abouts: &[About], rows: &[ReportRow]) -> Result<String> {
     let mut html = format!(
         "<!doctype html><html lang=en><meta charset=utf-8><meta name=viewport content=\"width=device-width\">\
          <title>Bowwave: error against run time</title><style>{STYLE}</style>{INTRODUCTION}\n"
@@ -208,7 +208,7 @@ pub fn html(abouts: &[About], rows: &[Row]) -> Result<String> {
 }
 
 /// Writes [`html`] to a file.
-pub fn write(path: &Path, abouts: &[About], rows: &[Row]) -> Result<()> {
+pub fn write(path: &Path, abouts: &[About], rows: &[ReportRow]) -> Result<()> {
     std::fs::write(path, html(abouts, rows)?).with_context(|| format!("cannot write {}", path.display()))
 }
 
@@ -217,7 +217,7 @@ mod tests {
     use super::*;
     use crate::{
         parts::PARTS,
-        row::{Kind, Timing, testing::row},
+        row::{RowKind, Timing, testing::row},
     };
 
     #[test]
@@ -226,9 +226,9 @@ mod tests {
         let mut rows = Vec::new();
         for about in &abouts {
             let timing = Timing { samples: vec![5.0], noise: 1.1 };
-            let ranked = Row { part: about.part, kind: Kind::Ranked(timing), ..row("a < b", 0.25) };
+            let ranked = ReportRow { part: about.part, kind: RowKind::Ranked(timing), ..row("a < b", 0.25) };
             rows.push(ranked);
-            rows.push(Row { part: about.part, scene: "odd & hard".into(), ..row("tried", 2.0) });
+            rows.push(ReportRow { part: about.part, scene: "odd & hard".into(), ..row("tried", 2.0) });
         }
         let page = html(&abouts, &rows).unwrap();
         for about in &abouts {

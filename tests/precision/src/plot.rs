@@ -3,7 +3,7 @@
 use anyhow::{Result, anyhow};
 use plotters::{coord::Shift, prelude::*};
 
-use crate::row::Row;
+use crate::row::ReportRow;
 
 const SIZE: (u32, u32) = (980, 440);
 /// Width of the list of methods beside the plot, pixels.
@@ -23,7 +23,7 @@ const COLOURS: [RGBColor; 9] = [
     RGBColor(160, 160, 160),
 ];
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+type PlotArea<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a, 'b> = ChartContext<
     'a,
     SVGBackend<'b>,
@@ -31,7 +31,7 @@ type Chart<'a, 'b> = ChartContext<
 >;
 
 /// The plot of a scene's ranked rows as SVG.
-pub fn svg(rows: &[&Row]) -> Result<String> {
+pub fn svg(rows: &[&ReportRow]) -> Result<String> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
@@ -42,8 +42,8 @@ pub fn svg(rows: &[&Row]) -> Result<String> {
 }
 
 /// One point of the plot.
-struct Point<'r> {
-    row: &'r Row,
+struct PlotPoint<'r> {
+    row: &'r ReportRow,
     method: usize,
     time: f64,
     error: f64,
@@ -62,7 +62,7 @@ fn decades(low: f64, high: f64) -> (f64, f64) {
     (10f64.powf(low - pad), 10f64.powf(high + pad))
 }
 
-fn ranges(rows: &[&Row]) -> Ranges {
+fn ranges(rows: &[&ReportRow]) -> Ranges {
     let span = |values: &mut dyn Iterator<Item = f64>| {
         values
             .filter(|v| v.is_finite() && *v > 0.0)
@@ -75,7 +75,7 @@ fn ranges(rows: &[&Row]) -> Ranges {
     Ranges { time, error }
 }
 
-fn methods<'r>(rows: &[&'r Row]) -> Vec<&'r str> {
+fn methods<'r>(rows: &[&'r ReportRow]) -> Vec<&'r str> {
     let mut names: Vec<&str> = Vec::new();
     for r in rows {
         if !names.contains(&r.method.as_str()) {
@@ -85,17 +85,17 @@ fn methods<'r>(rows: &[&'r Row]) -> Vec<&'r str> {
     names
 }
 
-fn draw(area: &Area<'_>, rows: &[&Row]) -> Result<(), Box<dyn std::error::Error>> {
+fn draw(area: &PlotArea<'_>, rows: &[&ReportRow]) -> Result<(), Box<dyn std::error::Error>> {
     area.fill(&WHITE)?;
     let names = methods(rows);
     let ranges = ranges(rows);
-    let points: Vec<Point<'_>> = rows
+    let points: Vec<PlotPoint<'_>> = rows
         .iter()
         .filter_map(|r| {
             let method = names.iter().position(|n| *n == r.method)?;
             // What diverged stands at the upper edge, what errs less than the truth on the truth's own error.
             let error = r.error.max(r.truth_error).clamp(ranges.error.0, ranges.error.1);
-            Some(Point { row: r, method, time: r.time_ns()?.max(ranges.time.0), error })
+            Some(PlotPoint { row: r, method, time: r.time_ns()?.max(ranges.time.0), error })
         })
         .collect();
     let (left, right) = area.split_horizontally(SIZE.0 - LEGEND);
@@ -116,8 +116,8 @@ fn draw(area: &Area<'_>, rows: &[&Row]) -> Result<(), Box<dyn std::error::Error>
 }
 
 fn axes<'a, 'b>(
-    area: &'a Area<'b>,
-    rows: &[&Row],
+    area: &'a PlotArea<'b>,
+    rows: &[&ReportRow],
     ranges: &Ranges,
 ) -> Result<Chart<'a, 'b>, Box<dyn std::error::Error>>
 where
@@ -146,7 +146,7 @@ where
 /// Steps through the front: what is above and to the right of them is beaten.
 fn draw_front(
     chart: &mut Chart<'_, '_>,
-    points: &[Point<'_>],
+    points: &[PlotPoint<'_>],
     ranges: &Ranges,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let mut front: Vec<(f64, f64)> =
@@ -172,7 +172,7 @@ fn draw_front(
 /// Joins the settings of each method.
 fn draw_lines(
     chart: &mut Chart<'_, '_>,
-    points: &[Point<'_>],
+    points: &[PlotPoint<'_>],
     methods: usize,
 ) -> Result<(), Box<dyn std::error::Error>> {
     for method in 0..methods {
@@ -188,7 +188,7 @@ fn colour(method: usize) -> RGBColor {
 }
 
 fn marker(
-    area: &Area<'_>,
+    area: &PlotArea<'_>,
     at: (i32, i32),
     method: usize,
     default: bool,
@@ -205,7 +205,7 @@ fn marker(
     Ok(())
 }
 
-fn label_text(row: &Row) -> String {
+fn label_text(row: &ReportRow) -> String {
     let mut text = if row.setting.is_empty() { String::new() } else { row.setting.clone() };
     if row.error.is_infinite() {
         text.push_str(" ∞");
@@ -215,7 +215,7 @@ fn label_text(row: &Row) -> String {
 
 /// Writes `text` where nothing is yet, near the point; nowhere when there is no room.
 fn label(
-    area: &Area<'_>,
+    area: &PlotArea<'_>,
     (x, y): (i32, i32),
     text: &str,
     taken: &mut Vec<(i32, i32, i32, i32)>,
@@ -250,7 +250,11 @@ fn label(
     Ok(())
 }
 
-fn legend(area: &Area<'_>, names: &[&str], rows: &[&Row]) -> Result<(), Box<dyn std::error::Error>> {
+fn legend(
+    area: &PlotArea<'_>,
+    names: &[&str],
+    rows: &[&ReportRow],
+) -> Result<(), Box<dyn std::error::Error>> {
     let text = |s: &str, y: i32, size: i32| Text::new(s.to_string(), (26, y - 7), ("sans-serif", size));
     let mut y = 28;
     for (i, name) in names.iter().enumerate() {
@@ -296,10 +300,10 @@ fn power(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::row::{Kind, Timing, testing::row};
+    use crate::row::{RowKind, Timing, testing::row};
 
-    fn timed(method: &str, error: f64, ns: f64) -> Row {
-        Row { kind: Kind::Ranked(Timing { samples: vec![ns], noise: 1.1 }), ..row(method, error) }
+    fn timed(method: &str, error: f64, ns: f64) -> ReportRow {
+        ReportRow { kind: RowKind::Ranked(Timing { samples: vec![ns], noise: 1.1 }), ..row(method, error) }
     }
 
     #[test]

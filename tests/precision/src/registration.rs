@@ -22,7 +22,7 @@ use hw_sim::{
     replay::{Replay, ReplayOptions},
 };
 
-use crate::{front::quantile, parts::rms};
+use crate::{front::quantile, parts::rms, table::TextTable};
 
 /// Pictures a second of the recordings.
 const FRAME_RATE_HZ: f64 = 10.0;
@@ -36,7 +36,7 @@ pub const SKY_STANDS: f64 = 0.0005 * std::f64::consts::PI / 180.0;
 
 /// How the gun moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
-pub enum Moved {
+pub enum GunMovement {
     /// It points at one place while the ship rolls and pitches by 0.2 deg, as at a pier.
     Still,
     /// The ship's usual motion, the gun points at one place of the deck.
@@ -49,7 +49,7 @@ pub enum Moved {
     RollingUnknown,
 }
 
-impl Moved {
+impl GunMovement {
     /// All of them.
     pub const ALL: [Self; 5] = [Self::Still, Self::Ship, Self::Swung, Self::Rolling, Self::RollingUnknown];
 
@@ -101,7 +101,7 @@ impl Moved {
 
 /// Registration errors, pixels of 1920 over 60 deg, one for each picture.
 #[derive(Clone, Debug, Default)]
-pub struct Errors {
+pub struct RegistrationErrors {
     /// As drawn.
     pub whole: Vec<f64>,
     /// With the error of the first heading taken off all that follow: what is left where the heading is set at the start and the sky, which
@@ -147,7 +147,7 @@ pub struct Replayed {
 }
 
 /// Replays the recording of `recipe` at `path`.
-pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
+pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<RegistrationErrors> {
     let seconds = how.seconds;
     let frame_ns = (1e9 / recipe.frame_rate_hz).round() as i64;
     let options = ReplayOptions {
@@ -182,7 +182,7 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
     })?;
     let motion = recipe.motion();
     let least = if recipe.gun.traverse.harmonics.is_empty() { 0.0 } else { SWUNG_DEG_S.to_radians() };
-    let (mut errors, mut first, mut events) = (Errors::default(), None, Vec::new());
+    let (mut errors, mut first, mut events) = (RegistrationErrors::default(), None, Vec::new());
     for frame in 1..=(seconds * recipe.frame_rate_hz) as i64 {
         let time = replay.origin().plus_ns(frame * frame_ns);
         events.clear();
@@ -201,7 +201,7 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
         if since < SETTLED_S || motion.at(exposed_s).rate.length() < least {
             continue;
         }
-        let seen = Seen {
+        let seen = TruePicture {
             middle,
             turned: &|after_s| motion.at(exposed_s + after_s).pose.world_from_camera,
             readout_s: recipe.camera.readout_ns as f64 * 1e-9,
@@ -216,8 +216,8 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Errors> {
     Ok(errors)
 }
 
-/// What a picture truly shows.
-struct Seen<'a> {
+/// The truth of a picture.
+struct TruePicture<'a> {
     /// `world_from_camera` of the middle row.
     middle: DQuat,
     /// The same so many seconds later.
@@ -225,7 +225,7 @@ struct Seen<'a> {
     readout_s: f64,
 }
 
-impl Seen<'_> {
+impl TruePicture<'_> {
     /// How far from where rows saw it things far away are drawn with a lens by a middle row's pose: root mean square over 5 x 5 places.
     fn off_px(&self, lens: &Lens, used: DQuat) -> f64 {
         let global = Lens { row_turn: DVec3::ZERO, ..*lens };
@@ -251,6 +251,64 @@ fn heading_between(from: DQuat, to: DQuat) -> f64 {
     azimuth(to) - azimuth(from)
 }
 
+/// Makes recordings, replays them and lists how far off things far away are drawn, in pixels of 1920 over 60 deg.
+#[derive(Debug, clap::Args)]
+pub struct RegistrationStudy {
+    /// Width of the pictures; smaller ones are sooner made, and their horizon is coarser
+    #[arg(long, default_value_t = 1920)]
+    width: u32,
+    /// Seconds that are replayed, the first 25 of which do not count
+    #[arg(long, default_value_t = 125.0)]
+    seconds: f64,
+    /// How the gun moves, more than once for several; absent: in all ways
+    #[arg(long)]
+    moved: Vec<GunMovement>,
+}
+
+impl RegistrationStudy {
+    /// Prints rms and 99th percentile of the errors, session by session.
+    pub fn run(&self) -> Result<()> {
+        println!(
+            "pixels of 1920 over 60 deg, rms and 99th percentile; the target is 1 and 2 still, 2 and 4 at 40 deg/s"
+        );
+        let titles = [("gun", 12), ("orientation", 12), ("calibration", 12)];
+        let parts = [("as drawn", 15), ("from its start", 15), ("up alone", 15)];
+        let mut table = TextTable::new(3, titles.into_iter().chain(parts));
+        let folder = tempfile::tempdir()?;
+        for moved in GunMovement::ALL.into_iter().filter(|m| self.moved.is_empty() || self.moved.contains(m))
+        {
+            let recipe = moved.recipe(self.width);
+            let path = folder.path().join("registration.mcap");
+            record(&recipe, &path)?;
+            for (source, sky_drift, orientation) in [
+                (Source::Auto, None, "unit's own"),
+                (Source::Fused, None, "fused"),
+                (Source::Fused, Some(SKY_STANDS), "sky stands"),
+            ] {
+                for (exact, calibration) in [(true, "exact"), (false, "1 sigma off")] {
+                    let how = Replayed {
+                        source,
+                        exact,
+                        sky_drift,
+                        shutter_unknown: moved == GunMovement::RollingUnknown,
+                        seconds: self.seconds,
+                    };
+                    let errors = replay(&recipe, &path, how)?;
+                    let cells = [&errors.whole, &errors.aided, &errors.up].map(|errors| {
+                        let (rms, p99) = summary(errors);
+                        format!("{rms:7.2} {p99:7.2}")
+                    });
+                    let names = [moved.name(), orientation, calibration].map(str::to_owned);
+                    table.row(names.into_iter().chain(cells));
+                    print!("{}", table.take());
+                }
+            }
+            std::fs::remove_file(&path)?;
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,7 +316,9 @@ mod tests {
     #[test]
     fn boats_stay_put_as_set_by_default() {
         let folder = tempfile::tempdir().unwrap();
-        for (moved, most_px) in [(Moved::Still, 1.0), (Moved::Swung, 2.0), (Moved::Rolling, 2.0)] {
+        for (moved, most_px) in
+            [(GunMovement::Still, 1.0), (GunMovement::Swung, 2.0), (GunMovement::Rolling, 2.0)]
+        {
             let recipe = moved.recipe(640);
             let path = folder.path().join(format!("{}.mcap", moved.name().replace('/', " a ")));
             record(&recipe, &path).unwrap();

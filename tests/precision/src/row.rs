@@ -8,10 +8,10 @@ use crate::front;
 
 /// One way with one setting on one scene.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct ReportRow {
     /// The numerical part.
     pub part: &'static str,
-    /// What it was tried on.
+    /// Scene that it was tried on.
     pub scene: String,
     /// The method.
     pub method: String,
@@ -21,25 +21,25 @@ pub struct Row {
     pub error: f64,
     /// The error's unit.
     pub error_unit: &'static str,
-    /// What the truth itself is uncertain by, in the same unit.
+    /// Uncertainty of the truth itself, in the same unit.
     pub truth_error: f64,
     /// Ranked by error and time, or only listed.
-    pub kind: Kind,
+    pub kind: RowKind,
     /// Bytes that it holds and takes of the heap.
     pub memory_bytes: usize,
     /// Whether the product uses this.
     pub default: bool,
     /// Why the product uses this though something beats it here; empty otherwise.
     pub excuse: String,
-    /// What else there is to say.
+    /// Anything else to say.
     pub note: String,
     /// Whether no other row of the scene beats it; see [`front::mark`].
     pub on_front: bool,
 }
 
-/// What a row is for.
+/// Purpose of a row.
 #[derive(Clone, Debug)]
-pub enum Kind {
+pub enum RowKind {
     /// Competes in its scene.
     Ranked(Timing),
     /// Stands for a stiff or extreme case: listed, not timed.
@@ -55,18 +55,18 @@ pub struct Timing {
     pub noise: f64,
 }
 
-impl Row {
+impl ReportRow {
     /// Median run time of one use, nanoseconds; `None` where nothing was timed.
     pub fn time_ns(&self) -> Option<f64> {
         match &self.kind {
-            Kind::Ranked(timing) => Some(front::median(&mut timing.samples.clone())),
-            Kind::Extreme => None,
+            RowKind::Ranked(timing) => Some(front::median(&mut timing.samples.clone())),
+            RowKind::Extreme => None,
         }
     }
 
     /// Whether this is a stiff or extreme case.
     pub fn is_extreme(&self) -> bool {
-        matches!(self.kind, Kind::Extreme)
+        matches!(self.kind, RowKind::Extreme)
     }
 }
 
@@ -90,14 +90,14 @@ const HEADINGS: [&str; 16] = [
 ];
 
 /// The table as CSV (RFC 4180). `time_ratio` is the time over that of the scene's default, taken turn by turn.
-pub fn csv(rows: &[Row]) -> Result<Vec<u8>> {
+pub fn csv(rows: &[ReportRow]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(HEADINGS)?;
     for r in rows {
         let default =
             rows.iter().find(|d| d.default && !d.is_extreme() && d.part == r.part && d.scene == r.scene);
         let (mut time, mut ratio, mut noise) = (String::new(), String::new(), String::new());
-        if let Kind::Ranked(timing) = &r.kind {
+        if let RowKind::Ranked(timing) = &r.kind {
             time = r.time_ns().map(|t| format!("{t:.2}")).unwrap_or_default();
             ratio = default.map(|d| format!("{:.4}", front::ratio(r, d).log.exp())).unwrap_or_default();
             noise = format!("{:.3}", timing.noise);
@@ -125,7 +125,7 @@ pub fn csv(rows: &[Row]) -> Result<Vec<u8>> {
 }
 
 /// Writes the table of [`csv()`] to a file.
-pub fn write_csv(path: &Path, rows: &[Row]) -> Result<()> {
+pub fn write_csv(path: &Path, rows: &[ReportRow]) -> Result<()> {
     std::fs::write(path, csv(rows)?).with_context(|| format!("cannot write {}", path.display()))
 }
 
@@ -134,8 +134,8 @@ pub(crate) mod testing {
     use super::*;
 
     /// A row of part "part" and scene "scene".
-    pub fn row(method: &str, error: f64) -> Row {
-        Row {
+    pub fn row(method: &str, error: f64) -> ReportRow {
+        ReportRow {
             part: "part",
             scene: "scene".into(),
             method: method.into(),
@@ -143,7 +143,7 @@ pub(crate) mod testing {
             error,
             error_unit: "m",
             truth_error: 0.0,
-            kind: Kind::Extreme,
+            kind: RowKind::Extreme,
             memory_bytes: 0,
             default: false,
             excuse: String::new(),
@@ -162,8 +162,13 @@ mod tests {
         let note = "worst at \"2 km\", then\nnone; a,b";
         let timing = Timing { samples: vec![30.0, 10.0, 20.0], noise: 1.25 };
         let rows = vec![
-            Row { note: note.into(), kind: Kind::Ranked(timing), default: true, ..testing::row("a, b", 0.5) },
-            Row { scene: "\"".into(), ..testing::row("c", f64::INFINITY) },
+            ReportRow {
+                note: note.into(),
+                kind: RowKind::Ranked(timing),
+                default: true,
+                ..testing::row("a, b", 0.5)
+            },
+            ReportRow { scene: "\"".into(), ..testing::row("c", f64::INFINITY) },
         ];
         let text = csv(&rows).unwrap();
         let mut reader = csv::Reader::from_reader(text.as_slice());

@@ -1,10 +1,11 @@
-//! A gun on a ship in waves, and what a perfect or a real inertial unit on it measures: closed functions of time, sharing nothing with
-//! the simulated hardware.
+//! A gun on a ship in waves, and what a perfect or a real inertial unit on it measures: closed functions of time, sharing no more with
+//! the simulated hardware than its random numbers.
 
 use std::f64::consts::TAU;
 
 use bowwave_core::geometry::wrapped;
 use glam::{DMat3, DQuat, DVec3};
+use hw_sim::ocean::random::gaussian;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
@@ -15,8 +16,8 @@ const STEP_WIDE_S: f64 = 2e-3;
 
 /// Angles, metres and seconds of a sea that the ship lies in.
 #[derive(Clone, Copy, Debug)]
-pub struct Sea {
-    /// What it is called.
+pub struct ShipSea {
+    /// Its name.
     pub name: &'static str,
     /// Deviation of roll, pitch and yaw, degrees.
     pub turns_deg: [f64; 3],
@@ -27,24 +28,32 @@ pub struct Sea {
 }
 
 /// No waves to speak of.
-pub const CALM: Sea = Sea {
+pub const CALM: ShipSea = ShipSea {
     name: "calm",
     turns_deg: [0.4, 0.15, 0.1],
     moves_m: [0.02, 0.03, 0.05],
     periods_s: [8.0, 5.0, 9.0],
 };
 /// Sea state 4: about 2 m, 8 s.
-pub const SEA_4: Sea =
-    Sea { name: "sea 4", turns_deg: [3.5, 1.3, 0.7], moves_m: [0.3, 0.4, 0.5], periods_s: [9.0, 7.5, 9.0] };
+pub const SEA_4: ShipSea = ShipSea {
+    name: "sea 4",
+    turns_deg: [3.5, 1.3, 0.7],
+    moves_m: [0.3, 0.4, 0.5],
+    periods_s: [9.0, 7.5, 9.0],
+};
 /// Sea state 6: about 5 m, 12 s.
-pub const SEA_6: Sea =
-    Sea { name: "sea 6", turns_deg: [7.0, 2.8, 1.5], moves_m: [0.9, 1.1, 1.4], periods_s: [11.0, 9.0, 11.0] };
+pub const SEA_6: ShipSea = ShipSea {
+    name: "sea 6",
+    turns_deg: [7.0, 2.8, 1.5],
+    moves_m: [0.9, 1.1, 1.4],
+    periods_s: [11.0, 9.0, 11.0],
+};
 
 /// A narrow band of waves: sines about a period, with unit deviation.
 #[derive(Clone, Debug)]
-struct Band(Vec<[f64; 3]>);
+struct WaveBand(Vec<[f64; 3]>);
 
-impl Band {
+impl WaveBand {
     fn new(rng: &mut Pcg64, period_s: f64) -> Self {
         const WAVES: usize = 24;
         // A third of the peak's frequency to each side, evenly but not commensurably spaced; weights fall off from the peak.
@@ -89,7 +98,7 @@ impl Slew {
 
 /// The unit's true state.
 #[derive(Clone, Copy, Debug)]
-pub struct State {
+pub struct ShipState {
     /// Rotation from the unit's axes (x forward, y right, z down) to the world's (x east, y north, z up).
     pub world_from_imu: DQuat,
     /// Angular rate in the unit's axes, rad/s.
@@ -101,8 +110,8 @@ pub struct State {
 /// Ship, gun and lever arm.
 #[derive(Clone, Debug)]
 pub struct Ship {
-    turns: [(Band, f64); 3],
-    moves: [(Band, f64); 3],
+    turns: [(WaveBand, f64); 3],
+    moves: [(WaveBand, f64); 3],
     slews: Vec<Slew>,
     lever_m: DVec3,
 }
@@ -110,10 +119,10 @@ pub struct Ship {
 impl Ship {
     /// A ship in `sea` whose gun stands 12 m from her middle and, where `gun` says so, traverses: slews of 60 deg/s, and creep of 0.1
     /// to 2 deg/s for a minute at a time.
-    pub fn new(sea: Sea, gun: bool, seed: u64) -> Self {
+    pub fn new(sea: ShipSea, gun: bool, seed: u64) -> Self {
         let mut rng = Pcg64::seed_from_u64(seed);
         let [roll, pitch, rest] = sea.periods_s;
-        let mut band = |period, size| (Band::new(&mut rng, period), size);
+        let mut band = |period, size| (WaveBand::new(&mut rng, period), size);
         let [a, b, c] = sea.turns_deg.map(f64::to_radians);
         let turns = [band(roll, a), band(pitch, b), band(rest, c)];
         let [a, b, c] = sea.moves_m;
@@ -147,7 +156,7 @@ impl Ship {
     }
 
     /// The unit's true state at `t` seconds.
-    pub fn at(&self, t: f64) -> State {
+    pub fn at(&self, t: f64) -> ShipState {
         let world_from_imu = self.world_from_imu(t);
         let turn = self.world_from_imu(t - STEP_S).inverse() * self.world_from_imu(t + STEP_S);
         // Twice the vector part: an arc cosine would round such small turns away.
@@ -155,7 +164,7 @@ impl Ship {
         let h = STEP_WIDE_S;
         let acceleration = (self.place(t + h) - self.place(t) * 2.0 + self.place(t - h)) / (h * h);
         let accel = world_from_imu.inverse() * (acceleration + DVec3::Z * GRAVITY);
-        State { world_from_imu, rate, accel }
+        ShipState { world_from_imu, rate, accel }
     }
 }
 
@@ -186,7 +195,7 @@ fn slews(rng: &mut Pcg64) -> Vec<Slew> {
 
 /// How a real unit errs.
 #[derive(Clone, Copy, Debug)]
-pub struct Errors {
+pub struct UnitErrors {
     /// Samples a second.
     pub rate_hz: f64,
     /// White noise of the rate, rad/s/sqrt(Hz).
@@ -205,7 +214,7 @@ pub struct Errors {
     pub accel_bias: DVec3,
 }
 
-impl Errors {
+impl UnitErrors {
     /// A unit of the VN-100's class (0.0035 deg/s and 0.14 mg per square root of a hertz) with a bias of 0.05 deg/s on each axis.
     pub fn usual() -> Self {
         Self {
@@ -221,31 +230,31 @@ impl Errors {
     }
 }
 
-/// What a unit measured.
+/// Reading of a unit.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub struct ShipReading {
     /// When, seconds.
     pub time_s: f64,
     /// Angular rate, rad/s, the unit's axes.
     pub rate: DVec3,
     /// Specific force, m/s^2, the unit's axes.
     pub accel: DVec3,
-    /// What is true then.
-    pub truth: State,
+    /// The truth then.
+    pub truth: ShipState,
 }
 
 /// The samples of a unit that errs so on that ship.
-pub fn samples(ship: &Ship, errors: &Errors, seconds: f64, seed: u64) -> Vec<Sample> {
+pub fn samples(ship: &Ship, errors: &UnitErrors, seconds: f64, seed: u64) -> Vec<ShipReading> {
     stream(ship, errors, seconds, seed).collect()
 }
 
 /// The same one after the other.
 pub fn stream<'a>(
     ship: &'a Ship,
-    errors: &'a Errors,
+    errors: &'a UnitErrors,
     seconds: f64,
     seed: u64,
-) -> impl Iterator<Item = Sample> + use<'a> {
+) -> impl Iterator<Item = ShipReading> + use<'a> {
     let mut rng = Pcg64::seed_from_u64(seed ^ 0x51a7);
     let dt = 1.0 / errors.rate_hz;
     let mut walk = DVec3::ZERO;
@@ -262,14 +271,8 @@ pub fn stream<'a>(
             + walk
             + white() * errors.gyro_noise / dt.sqrt();
         let accel = truth.accel + errors.accel_bias + white() * errors.accel_noise / dt.sqrt();
-        Sample { time_s, rate, accel, truth }
+        ShipReading { time_s, rate, accel, truth }
     })
-}
-
-/// Box and Muller's (1958).
-pub fn gaussian(rng: &mut Pcg64) -> f64 {
-    let (u, v): (f64, f64) = (rng.random(), rng.random());
-    (-2.0 * (1.0 - u).ln()).sqrt() * (TAU * v).cos()
 }
 
 /// Angle by which up is wrong, radians.

@@ -9,7 +9,7 @@ use precision::{
     horizon::{
         cases::{SET_WITH, with_horizon, without_horizon},
         frames,
-        score::{Drawn, find, miss, predicted},
+        score::{DrawnHorizon, find, miss, predicted},
     },
 };
 
@@ -18,7 +18,7 @@ fn drawn_horizons_are_found_and_their_covariance_is_right() {
     let mut finder = HorizonFinder::new();
     let (mut px, mut squares, mut count) = (Vec::new(), Vec::new(), 0.0);
     for i in 0..40 {
-        let drawn = Drawn::new(with_horizon(SET_WITH + 5000, i)).unwrap();
+        let drawn = DrawnHorizon::new(with_horizon(SET_WITH + 5000, i)).unwrap();
         let up = DVec3::from(drawn.shown.up());
         for prior in [None, Some(predicted(up, i))] {
             count += 1.0;
@@ -41,7 +41,7 @@ fn nothing_drawn_without_a_horizon_is_taken_for_one() {
     let mut finder = HorizonFinder::new();
     let mut taken = Vec::new();
     for i in 0..42 {
-        let drawn = Drawn::new(without_horizon(SET_WITH + 5000, i)).unwrap();
+        let drawn = DrawnHorizon::new(without_horizon(SET_WITH + 5000, i)).unwrap();
         let up = DVec3::from(drawn.shown.up());
         for prior in [None, Some(predicted(up, i))] {
             if let Ok(found) = drawn.find(&mut finder, prior) {

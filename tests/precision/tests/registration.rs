@@ -3,11 +3,13 @@
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 
 use bowwave_core::estimate::attitude::Source;
-use precision::registration::{Errors, Moved, Replayed, SKY_STANDS, record, replay, summary};
+use precision::registration::{
+    GunMovement, RegistrationErrors, Replayed, SKY_STANDS, record, replay, summary,
+};
 
 const WIDTH: u32 = 480;
 
-fn errors(moved: Moved, sources: &[(Source, bool)]) -> Vec<Errors> {
+fn errors(moved: GunMovement, sources: &[(Source, bool)]) -> Vec<RegistrationErrors> {
     let recipe = moved.recipe(WIDTH);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("registration.mcap");
@@ -24,7 +26,7 @@ fn errors(moved: Moved, sources: &[(Source, bool)]) -> Vec<Errors> {
 
 #[test]
 fn a_gun_that_is_swung_at_40_deg_s_registers() {
-    let found = errors(Moved::Swung, &[(Source::Auto, false), (Source::Fused, false)]);
+    let found = errors(GunMovement::Swung, &[(Source::Auto, false), (Source::Fused, false)]);
     let ((rms, p99), (held, held_p99)) = (summary(&found[0].whole), summary(&found[1].aided));
     println!(
         "the unit's own: {rms:.2} px rms, p99 {p99:.2}; fused, from its start: {held:.2}, {held_p99:.2}"
@@ -37,7 +39,7 @@ fn a_gun_that_is_swung_at_40_deg_s_registers() {
 
 #[test]
 fn a_rolling_shutter_registers_where_it_is_known() {
-    let found = errors(Moved::Rolling, &[(Source::Auto, false), (Source::Auto, true)]);
+    let found = errors(GunMovement::Rolling, &[(Source::Auto, false), (Source::Auto, true)]);
     let [(known, p99), (unknown, _)] = [summary(&found[0].whole), summary(&found[1].whole)];
     println!("30 ms at 40 deg/s: {known:.2} px rms, p99 {p99:.2}; nothing known of it: {unknown:.2}");
     assert!(known < 2.0 && p99 < 4.0, "{known} px rms, p99 {p99}");

@@ -8,18 +8,16 @@ use std::{
 
 use bowwave_core::geometry::RigidPose;
 use glam::{DQuat, DVec2, DVec3};
-use precision::truth::{
-    boat,
-    cell::Setup,
-    field::{Resolution, Sea, Waves},
-    files, grid, masks,
-    mesh::Mesh,
-    micro::{Micro, WATER, fresnel},
-    rng,
-    sky::{Sky, SkySpec, Weather},
+use hw_sim::ocean::{
+    fresnel::{SEA_WATER_INDEX, fresnel},
+    micro::Micro,
+    random::LightPath,
+    sky::{Daylight, SkySpec, SkyWeather},
     spectrum::{LongWaves, Spectrum, cox_munk, frequency, jonswap},
-    trace::{Body, Scene},
+    trace::{TracedScene, WaterBody},
+    waves::{Resolution, TracedSea, Waves},
 };
+use precision::truth::{boat, cell::CellSetup, files, grid, masks};
 
 /// Rows of numbers of a table with a comment line and a heading; what is no number is NaN.
 fn rows(text: &str) -> Vec<Vec<f64>> {
@@ -38,7 +36,7 @@ fn fresnel_agrees_with_the_table() {
     let table = rows(include_str!("../data/fresnel_seawater.csv"));
     assert!(table.len() > 20);
     for row in table {
-        let r = fresnel(row[0].to_radians().cos(), WATER);
+        let r = fresnel(row[0].to_radians().cos(), SEA_WATER_INDEX);
         // The table prints angles to 5 digits, which counts at grazing incidence.
         assert!((r - row[3]).abs() < 1e-7 * (1.0 + row[0]), "{row:?}: {r}");
     }
@@ -114,7 +112,7 @@ fn moments(waves: &Waves, along: DVec2) -> (f64, DVec2) {
 fn waves_have_the_height_and_with_the_unresolved_ones_the_slopes_of_their_spectrum() {
     for state in 0..=4u8 {
         let spec = grid::cell(60.0, state, 8.0, "overcast", 80.0).unwrap();
-        let setup = Setup::new(&spec).unwrap();
+        let setup = CellSetup::new(&spec).unwrap();
         let (spectrum, waves) = (&setup.spectrum, &setup.scene.waves);
         let (square, slopes) = moments(waves, spectrum.downwind());
         let wanted = spectrum.significant_height_m();
@@ -141,7 +139,7 @@ fn waves_run_with_the_wind_by_the_dispersion_relation() {
     let spectrum = Spectrum::new(6.0, 1.0, LongWaves::Jonswap { height_m: 0.8, period_s: 4.0, gamma: 3.3 });
     let resolution = Resolution { shortest_m: 0.8, cells: 512, ..Resolution::default() };
     let step = 0.02;
-    let sea = Sea::new(&spectrum, &resolution, 5);
+    let sea = TracedSea::new(&spectrum, &resolution, 5);
     let at: Vec<Waves> = (-1..=1).map(|i| sea.at(40.0 + f64::from(i) * step)).collect();
     let (mut rate, mut acceleration, mut with_wind) = (0.0, 0.0, 0.0);
     let n = 60_000;
@@ -173,10 +171,10 @@ fn waves_run_with_the_wind_by_the_dispersion_relation() {
 #[test]
 fn rays_meet_the_water_where_dense_sampling_says() {
     let spectrum = Spectrum::new(6.7, 2.0, OLD_SEA);
-    let waves = Sea::new(&spectrum, &coarse(), 3).at(0.0);
+    let waves = TracedSea::new(&spectrum, &coarse(), 3).at(0.0);
     let (mut missed, mut rays) = (0, 0);
     for i in 0..300u32 {
-        let mut path = rng::Path::new(4, u64::from(i), 0);
+        let mut path = LightPath::new(4, u64::from(i), 0);
         let down = 0.012 + 0.15 * path.unit();
         let flat = DVec2::from_angle(TAU * path.unit());
         let origin = DVec3::new(path.unit() * 500.0, path.unit() * 500.0, 8.0);
@@ -200,25 +198,28 @@ fn rays_meet_the_water_where_dense_sampling_says() {
 }
 
 /// A scene without waves, with the box boat 40 m off, for an eye 6 m up.
-fn calm(waves: Waves, sky: Sky, body: Body) -> Scene {
+fn calm(waves: Waves, sky: Daylight, body: WaterBody) -> TracedScene {
     let model = boat::box_boat();
     let pose =
         RigidPose { world_from_body: DQuat::from_rotation_z(0.3), position: DVec3::new(0.0, 40.0, 0.0) };
-    let light = Scene::boat_light(&sky, &body);
-    Scene { sky, waves, body, boat: Some(Mesh::new(&model, pose)), light }
+    let light = TracedScene::boat_light(&sky, &body);
+    TracedScene { sky, waves, body, boat: Some(boat::mesh(&model, pose)), light }
 }
 
 #[test]
 fn a_mirror_sea_gives_the_exact_mirror_image() {
-    let sky =
-        Sky::new(&SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 })
-            .unwrap();
-    let black = Body { reflectance: [0.0; 3], depth_m: 1.0 };
+    let sky = Daylight::new(&SkySpec {
+        weather: SkyWeather::Overcast,
+        sun_elevation_deg: 40.0,
+        sun_azimuth_deg: 0.0,
+    })
+    .unwrap();
+    let black = WaterBody { reflectance: [0.0; 3], depth_m: 1.0 };
     let scene = calm(Waves::mirror(), sky, black);
     let eye = DVec3::new(0.0, 0.0, 6.0);
     let mut reflected = 0;
     for i in 0..4000u32 {
-        let mut path = rng::Path::new(1, u64::from(i), 0);
+        let mut path = LightPath::new(1, u64::from(i), 0);
         let aim = DVec3::new(16.0 * path.unit() - 8.0, 40.0, -9.0 * path.unit());
         let direction = (aim - eye).normalize();
         let seen = scene.trace(eye, direction, &mut path);
@@ -228,7 +229,7 @@ fn a_mirror_sea_gives_the_exact_mirror_image() {
         // The same ray from under the water, of a world turned upside down.
         let up = direction * DVec3::new(1.0, 1.0, -1.0);
         let surface = eye + direction * (eye.z / -direction.z);
-        let share = fresnel(-direction.z, WATER);
+        let share = fresnel(-direction.z, SEA_WATER_INDEX);
         let expected = match scene.boat.as_ref().unwrap().meet(surface, up, f64::INFINITY) {
             Some(hit) => {
                 reflected += 1;
@@ -248,15 +249,15 @@ fn no_light_is_lost_or_made() {
     // In a world that is equally bright everywhere, water that gives back all that it lets in is that bright too.
     for state in 0..=4u8 {
         let spec = grid::cell(60.0, state, 8.0, "overcast", 80.0).unwrap();
-        let mut scene = Setup::new(&spec).unwrap().scene;
-        scene.sky = Sky::uniform(DVec3::ONE);
-        scene.body = Body { reflectance: [1.0; 3], depth_m: 1.0 };
+        let mut scene = CellSetup::new(&spec).unwrap().scene;
+        scene.sky = Daylight::uniform(DVec3::ONE);
+        scene.body = WaterBody { reflectance: [1.0; 3], depth_m: 1.0 };
         scene.boat = None;
         for down in [0.01, 0.05, 0.3, 0.9f64] {
             let direction = DVec3::new(0.0, (1.0 - down * down).sqrt(), -down);
             let mut sum = 0.0;
             for i in 0..3000 {
-                let mut path = rng::Path::new(2, i, 0);
+                let mut path = LightPath::new(2, i, 0);
                 let origin = DVec3::new(path.unit() * 400.0, path.unit() * 400.0, 8.0);
                 sum += scene.trace(origin, direction, &mut path).without.y / 3000.0;
             }
@@ -268,14 +269,14 @@ fn no_light_is_lost_or_made() {
 #[test]
 fn the_glitter_holds_the_light_that_facets_mirror_once() {
     let spec = grid::cell(60.0, 0, 8.0, "overcast", 80.0).unwrap();
-    let unresolved = Setup::new(&spec).unwrap().scene.waves.unresolved();
+    let unresolved = CellSetup::new(&spec).unwrap().scene.waves.unresolved();
     let micro = Micro::new(&unresolved, DVec2::new(0.02, -0.03));
     for down in [0.03, 0.2, 0.7f64] {
         let to_eye = DVec3::new(0.0, -(1.0 - down * down).sqrt(), down);
         let n = 100_000;
         let (mut followed, mut summed) = (0.0, 0.0);
         for i in 0..n {
-            let mut path = rng::Path::new(3, i, 0);
+            let mut path = LightPath::new(3, i, 0);
             let height = micro.strike(-to_eye, 1.0, &mut path).expect("a ray from above strikes");
             let normal = micro.visible_normal(to_eye, &mut path);
             let cos = to_eye.dot(normal);
@@ -283,7 +284,7 @@ fn the_glitter_holds_the_light_that_facets_mirror_once() {
             let left = micro.strike(onward, height, &mut path).is_none();
             // Light from below the horizon, over a falling facet, is no sun.
             if left && onward.z > 0.0 {
-                followed += fresnel(cos, WATER) / n as f64;
+                followed += fresnel(cos, SEA_WATER_INDEX) / n as f64;
             }
             // Directions even over a window about the mirror direction that holds all but a millionth of the lobe.
             let (low, high) = ((down - 0.45).max(0.0), (down + 0.45).min(1.0));
@@ -298,15 +299,16 @@ fn the_glitter_holds_the_light_that_facets_mirror_once() {
 
 #[test]
 fn the_boat_darkens_the_water_in_its_shadow() {
-    let sky = Sky::new(&SkySpec { weather: Weather::Clear, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 })
-        .unwrap();
+    let sky =
+        Daylight::new(&SkySpec { weather: SkyWeather::Clear, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 })
+            .unwrap();
     let spec = grid::cell(60.0, 0, 8.0, "overcast", 80.0).unwrap();
-    let waves = Setup::new(&spec).unwrap().scene.waves;
-    let scene = calm(waves, sky, Body { reflectance: [0.3; 3], depth_m: 0.5 });
+    let waves = CellSetup::new(&spec).unwrap().scene.waves;
+    let scene = calm(waves, sky, WaterBody { reflectance: [0.3; 3], depth_m: 0.5 });
     // The sun stands behind the boat: the water before it is in its shadow, seen steeply so that the body dominates.
     let (mut with, mut without) = (0.0, 0.0);
     for i in 0..2000 {
-        let mut path = rng::Path::new(5, i, 0);
+        let mut path = LightPath::new(5, i, 0);
         let sample =
             scene.trace(DVec3::new(0.0, 36.0, 5.0), DVec3::new(0.0, 0.3, -1.0).normalize(), &mut path);
         with += sample.with.y;
@@ -323,7 +325,7 @@ fn extreme_views_stay_finite() {
         let mut spec = grid::cell(range, state, eye, light, 215.0).unwrap();
         (spec.samples, spec.resolution) = (2, coarse());
         spec.resolution.shortest_m = 0.3;
-        let pictures = Setup::new(&spec).unwrap().render();
+        let pictures = CellSetup::new(&spec).unwrap().render();
         let all = pictures.with.iter().chain(&pictures.without).flatten();
         assert!(all.clone().all(|v| v.is_finite() && *v >= 0.0), "{spec:?}");
         assert!(all.fold(0f32, |m, v| m.max(*v)) > 0.01, "{spec:?} is black");
@@ -332,15 +334,19 @@ fn extreme_views_stay_finite() {
 
 #[test]
 fn overcast_and_clear_skies_light_the_sea_as_tables_say() {
-    let overcast =
-        Sky::new(&SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 0.0 })
-            .unwrap();
+    let overcast = Daylight::new(&SkySpec {
+        weather: SkyWeather::Overcast,
+        sun_elevation_deg: 40.0,
+        sun_azimuth_deg: 0.0,
+    })
+    .unwrap();
     let lux = |e: DVec3| e.dot(DVec3::new(0.2126, 0.7152, 0.0722)) * 683.0;
     assert!((lux(overcast.sky_irradiance) / 15_000.0 - 1.0).abs() < 0.02);
     let zenith = overcast.radiance(DVec3::Z).y;
     assert!((overcast.radiance(DVec3::Y).y / zenith - 1.0 / 3.0).abs() < 1e-12);
-    let clear = Sky::new(&SkySpec { weather: Weather::Clear, sun_elevation_deg: 50.0, sun_azimuth_deg: 0.0 })
-        .unwrap();
+    let clear =
+        Daylight::new(&SkySpec { weather: SkyWeather::Clear, sun_elevation_deg: 50.0, sun_azimuth_deg: 0.0 })
+            .unwrap();
     // CIE S 011 and handbooks: 10 to 20 klx of blue sky, 60 to 90 klx of sun on the horizontal.
     assert!((10_000.0..20_000.0).contains(&lux(clear.sky_irradiance)), "{}", lux(clear.sky_irradiance));
     assert!((60_000.0..90_000.0).contains(&lux(clear.sun_horizontal())), "{}", lux(clear.sun_horizontal()));
@@ -363,7 +369,7 @@ fn a_cell_on_disk_tells_what_made_it_and_is_kept() {
     let folder = out.join(grid::name(&spec));
     grid::make(&[spec.clone()], 1.0, &out).unwrap();
     assert_eq!(files::read_spec(&folder.join("cell.toml")).unwrap(), spec);
-    let setup = Setup::new(&spec).unwrap();
+    let setup = CellSetup::new(&spec).unwrap();
     let size = (setup.region.width, setup.region.height);
     for name in ["with.png", "without.png", "hull.png", "region.png"] {
         assert_eq!(image::image_dimensions(folder.join(name)).unwrap(), size, "{name}");
@@ -383,7 +389,7 @@ fn a_cell_on_disk_tells_what_made_it_and_is_kept() {
 fn the_reflection_is_judged_on_the_water_below_the_hull() {
     let mut spec = grid::cell(150.0, 0, 8.0, "overcast", 80.0).unwrap();
     spec.samples = 16;
-    let setup = Setup::new(&spec).unwrap();
+    let setup = CellSetup::new(&spec).unwrap();
     let pictures = setup.render();
     let region = masks::reflection(&setup, &pictures);
     let width = pictures.size.0 as usize;

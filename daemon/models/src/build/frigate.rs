@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::{
     assembly::Assembly,
     frigate_top,
-    loft::{HullLine, LinesPlan, Offsets, offsets},
+    loft::{LinesPlan, Offsets, offsets},
     paint::Paint,
     solid::{Solid, skin},
 };
@@ -37,14 +37,10 @@ pub(crate) fn build() -> Assembly {
 fn hull() -> Solid {
     let [keel, bilge, water, knuckle, sheer, centre] = &OFFSETS;
     LinesPlan {
-        lines: &[
-            HullLine::edge(keel, 2, Paint::Haze),
-            HullLine::round(bilge, 2, Paint::Haze),
-            HullLine::round(water, 2, Paint::Haze),
-            HullLine::edge(knuckle, 1, Paint::Haze),
-            HullLine::edge(sheer, 1, Paint::DeckGrey),
-            HullLine::edge(centre, 0, Paint::DeckGrey),
-        ],
+        lines: &[keel, bilge, water, knuckle, sheer, centre],
+        round: &[1, 2],
+        rows: &[2, 2, 2, 1, 1, 0],
+        paints: &[(Paint::Haze, 4), (Paint::DeckGrey, 2)],
         steps: 4,
         crease: 14.0,
         transom: Paint::Haze,

@@ -65,34 +65,17 @@ pub(crate) fn beside<const POINTS: usize>(
     line.map(|[x, y, z]| if y > 0.0 { [x, y + out, z + up] } else { [x + ahead, y, z + up] })
 }
 
-/// One fore-and-aft curve of the port half, by control points from the stern to the stem.
-pub(crate) struct HullLine<'a> {
-    /// x, y (to port), z of each control point; every line of a hull has as many.
-    points: &'a [[f32; 3]],
-    /// Whether sections have a corner here.
-    corner: bool,
-    /// Rows of faces between this line and the next.
-    rows: usize,
-    /// Paint of those rows.
-    paint: Paint,
-}
-
-impl<'a> HullLine<'a> {
-    /// A line along which sections have a corner.
-    pub(crate) const fn edge(points: &'a [[f32; 3]], rows: usize, paint: Paint) -> Self {
-        Self { points, corner: true, rows, paint }
-    }
-
-    /// A line across which sections are smooth.
-    pub(crate) const fn round(points: &'a [[f32; 3]], rows: usize, paint: Paint) -> Self {
-        Self { points, corner: false, rows, paint }
-    }
-}
-
-/// A lines plan.
+/// A lines plan: fore-and-aft curves of the port half, from the keel outwards and up, then inwards; the first and the last lie in the
+/// centre plane.
 pub(crate) struct LinesPlan<'a> {
-    /// From the keel outwards and up, then inwards; the first and the last lie in the centre plane.
-    pub(crate) lines: &'a [HullLine<'a>],
+    /// x, y (to port), z of each control point of each line, from the stern to the stem; every line has as many.
+    pub(crate) lines: &'a [&'a [[f32; 3]]],
+    /// The lines at which sections have no corner.
+    pub(crate) round: &'a [usize],
+    /// Rows of faces between each line and the next.
+    pub(crate) rows: &'a [usize],
+    /// Paints of those rows, each with the number of lines that it begins at.
+    pub(crate) paints: &'a [(Paint, usize)],
     /// Sections between two control points that are not close together.
     pub(crate) steps: usize,
     /// Faces that meet at more than this stay hard, degrees.
@@ -123,10 +106,9 @@ impl LinesPlan<'_> {
 
     /// Sections of the port half from the stern forward, points from the keel outwards.
     fn sections(&self) -> Vec<Vec<Vec3>> {
-        let count = self.lines.iter().map(|l| l.points.len()).min().unwrap_or(0);
+        let count = self.lines.iter().map(|l| l.len()).min().unwrap_or(0);
         let steps: Vec<usize> = (0..count.saturating_sub(1)).map(|i| self.steps_after(i)).collect();
-        let lines: Vec<Vec<Vec3>> =
-            self.lines.iter().map(|l| sample_line(&l.points[..count], &steps)).collect();
+        let lines: Vec<Vec<Vec3>> = self.lines.iter().map(|l| sample_line(&l[..count], &steps)).collect();
         let stations = lines.first().map_or(0, Vec::len);
         (0..stations)
             .map(|s| {
@@ -138,21 +120,21 @@ impl LinesPlan<'_> {
 
     /// Bulkheads and transoms are short; only real lengths of hull are divided.
     fn steps_after(&self, i: usize) -> usize {
-        let at = |l: &HullLine<'_>, i: usize| Vec3::from_array(l.points[i]);
+        let at = |l: &[[f32; 3]], i: usize| Vec3::from_array(l[i]);
         let length = self
             .lines
             .first()
-            .map_or(0.0, |l| l.points.last().map_or(0.0, |&last| Vec3::from_array(last).distance(at(l, 0))));
+            .map_or(0.0, |l| l.last().map_or(0.0, |&last| Vec3::from_array(last).distance(at(l, 0))));
         let fore_and_aft = self.lines.iter().map(|l| (at(l, i + 1).x - at(l, i).x).abs()).fold(0.0, f32::max);
         if fore_and_aft < 0.03 * length { 1 } else { self.steps }
     }
 
     fn sample_section(&self, through: &[Vec3]) -> Vec<Vec3> {
-        let corner = |i: usize| self.lines[i].corner;
+        let corner = |i: usize| !self.round.contains(&i);
         let mut out = Vec::new();
-        for (i, line) in self.lines.iter().enumerate().take(through.len().saturating_sub(1)) {
-            for row in 0..line.rows {
-                let mut p = spline(through, i, row as f32 / line.rows as f32, corner);
+        for (i, &rows) in self.rows.iter().enumerate().take(through.len().saturating_sub(1)) {
+            for row in 0..rows {
+                let mut p = spline(through, i, row as f32 / rows as f32, corner);
                 p.y = p.y.max(0.0);
                 out.push(p);
             }
@@ -162,8 +144,9 @@ impl LinesPlan<'_> {
     }
 
     fn row_paints(&self) -> Vec<Paint> {
-        let all_but_last = self.lines.split_last().map_or(&[][..], |(_, rest)| rest);
-        all_but_last.iter().flat_map(|l| std::iter::repeat_n(l.paint, l.rows)).collect()
+        let paints = self.paints.iter().flat_map(|&(paint, lines)| std::iter::repeat_n(paint, lines));
+        let all_but_last = self.rows.split_last().map_or(&[][..], |(_, rest)| rest);
+        paints.zip(all_but_last).flat_map(|(paint, &rows)| std::iter::repeat_n(paint, rows)).collect()
     }
 }
 

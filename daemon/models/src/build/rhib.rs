@@ -6,7 +6,7 @@ use glam::Vec3;
 use super::{
     assembly::Assembly,
     figure::{Clothes, FigurePose, Headwear, figure},
-    loft::{HullLine, LinesPlan, Offsets, offsets, smooth},
+    loft::{LinesPlan, Offsets, offsets, smooth},
     outboard::outboard,
     paint::Paint,
     solid::{Solid, bar, block, drum, ellipsoid, pipe, tapered},
@@ -50,12 +50,10 @@ pub(crate) fn build() -> Assembly {
 fn hull() -> Solid {
     let [keel, chine, edge, sole] = &OFFSETS;
     LinesPlan {
-        lines: &[
-            HullLine::edge(keel, 2, Paint::GreyHull),
-            HullLine::edge(chine, 1, Paint::GreyHull),
-            HullLine::edge(edge, 1, Paint::SoleGrey),
-            HullLine::edge(sole, 0, Paint::SoleGrey),
-        ],
+        lines: &[keel, chine, edge, sole],
+        round: &[],
+        rows: &[2, 1, 1, 0],
+        paints: &[(Paint::GreyHull, 2), (Paint::SoleGrey, 2)],
         steps: 4,
         crease: 32.0,
         transom: Paint::GreyHull,

@@ -6,10 +6,10 @@ use gltf::json::{
     validation::Checked,
 };
 
-use super::source::Source;
+use super::source::ModelSource;
 use crate::error::ModelError;
 
-impl Source<'_> {
+impl ModelSource<'_> {
     /// Elements as floats, integers scaled to 0 to 1 (-1 to 1 where signed); components that the accessor does not have
     /// are 1. `types` are the shapes that are taken.
     pub(crate) fn floats(&self, index: Index<Accessor>, types: &[Type]) -> Result<Vec<[f32; 4]>, ModelError> {

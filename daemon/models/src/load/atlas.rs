@@ -4,7 +4,7 @@ use bowwave_core::model::Texture;
 use glam::Vec2;
 use image::{Rgba, RgbaImage, imageops};
 
-use super::{TEXTURE_SIDE_MAX, surface::Picture};
+use super::{TEXTURE_SIDE_MAX, surface::TexturePicture};
 
 /// Pixels of repeated border about each picture, so that filtering takes nothing from its neighbours.
 const GUTTER: u32 = 4;
@@ -13,12 +13,12 @@ const WHITE: u32 = 4;
 
 /// Where a picture lies in the atlas: `uv * scale + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct AtlasPlace {
     pub(crate) scale: Vec2,
     pub(crate) offset: Vec2,
 }
 
-impl Place {
+impl AtlasPlace {
     /// The whole picture.
     pub(crate) const WHOLE: Self = Self { scale: Vec2::ONE, offset: Vec2::ZERO };
 
@@ -29,7 +29,7 @@ impl Place {
 }
 
 /// One picture with all of `pictures` in it, the place of each, and a coordinate that is white.
-pub(crate) fn pack(pictures: &[&Picture]) -> (Texture, Vec<Place>, Vec2) {
+pub(crate) fn pack(pictures: &[&TexturePicture]) -> (Texture, Vec<AtlasPlace>, Vec2) {
     let mut images: Vec<RgbaImage> = pictures.iter().map(|p| p.rgba.clone()).collect();
     let layout = loop {
         let sizes: Vec<(u32, u32)> = images.iter().map(|i| i.dimensions()).chain([(WHITE, WHITE)]).collect();
@@ -49,7 +49,7 @@ pub(crate) fn pack(pictures: &[&Picture]) -> (Texture, Vec<Place>, Vec2) {
     for (image, &(x, y)) in images.iter().zip(&layout.corners) {
         blit(&mut atlas, image, x, y);
         let (w, h) = image.dimensions();
-        places.push(Place {
+        places.push(AtlasPlace {
             scale: Vec2::new(w as f32, h as f32) / size,
             offset: Vec2::new(x as f32, y as f32) / size,
         });
@@ -77,14 +77,14 @@ fn blit(atlas: &mut RgbaImage, image: &RgbaImage, x: u32, y: u32) {
     }
 }
 
-struct Layout {
+struct AtlasLayout {
     width: u32,
     height: u32,
     corners: Vec<(u32, u32)>,
 }
 
 /// Places rectangles on shelves, tallest first; `None` where they do not fit the largest texture.
-fn shelves(sizes: &[(u32, u32)]) -> Option<Layout> {
+fn shelves(sizes: &[(u32, u32)]) -> Option<AtlasLayout> {
     let padded = |v: u32| v + 2 * GUTTER;
     let area: u64 = sizes.iter().map(|&(w, h)| u64::from(padded(w)) * u64::from(padded(h))).sum();
     let widest = sizes.iter().map(|s| padded(s.0)).max()?;
@@ -107,7 +107,7 @@ fn shelves(sizes: &[(u32, u32)]) -> Option<Layout> {
         shelf = shelf.max(h);
     }
     let height = y + shelf;
-    (height <= TEXTURE_SIDE_MAX).then_some(Layout { width, height, corners })
+    (height <= TEXTURE_SIDE_MAX).then_some(AtlasLayout { width, height, corners })
 }
 
 #[cfg(test)]
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn a_coordinate_finds_its_own_picture_in_the_atlas() {
-        let plain = |c: [u8; 4], w, h| Picture { rgba: RgbaImage::from_pixel(w, h, Rgba(c)) };
+        let plain = |c: [u8; 4], w, h| TexturePicture { rgba: RgbaImage::from_pixel(w, h, Rgba(c)) };
         let pictures = [plain([200, 0, 0, 255], 17, 9), plain([0, 200, 0, 255], 5, 31)];
         let (atlas, places, white) = pack(&pictures.iter().collect::<Vec<_>>());
         let at = |uv: Vec2| {
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn pictures_too_large_together_are_halved() {
-        let big = || Picture { rgba: RgbaImage::new(4000, 3000) };
+        let big = || TexturePicture { rgba: RgbaImage::new(4000, 3000) };
         let pictures = [big(), big()];
         let (atlas, _, _) = pack(&pictures.iter().collect::<Vec<_>>());
         assert!(atlas.width <= TEXTURE_SIDE_MAX && atlas.height <= TEXTURE_SIDE_MAX);

@@ -6,13 +6,13 @@ use gltf::{Semantic, json::accessor::Type, mesh::Mode};
 
 use super::{
     TRIANGLES_MAX, VERTICES_MAX,
-    atlas::{self, Place},
-    source::{Source, limit},
-    surface::{Picture, Pictures},
+    atlas::{self, AtlasPlace},
+    source::{ModelSource, limit},
+    surface::{TexturePicture, TexturePictures},
 };
 use crate::{
     error::ModelError,
-    finish::{Mesh, zone_index},
+    finish::{FinishedMesh, zone_index},
 };
 
 /// Deepest tree of nodes.
@@ -21,15 +21,15 @@ const DEPTH_MAX: usize = 64;
 const BOAT_FROM_GLTF: Mat3 = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::X);
 
 /// Everything that a scene holds.
-pub(crate) struct Gathered {
-    pub(crate) mesh: Mesh,
+pub(crate) struct GatheredMesh {
+    pub(crate) mesh: FinishedMesh,
     pub(crate) texture: Option<Texture>,
     /// Names of nodes and meshes with triangles, each once.
     pub(crate) names: Vec<String>,
 }
 
 /// One primitive in boat axes; `uv` still belongs to its own picture.
-struct Piece {
+struct MeshPiece {
     zone: Zone,
     vertices: Vec<Vertex>,
     triangles: Vec<[u32; 3]>,
@@ -37,10 +37,10 @@ struct Piece {
 }
 
 /// Reads the default scene; the first where none is the default; all nodes that are nobody's child where there is none.
-pub(crate) fn gather(source: &Source<'_>) -> Result<Gathered, ModelError> {
-    let mut walk = Walk {
+pub(crate) fn gather(source: &ModelSource<'_>) -> Result<GatheredMesh, ModelError> {
+    let mut walk = NodeWalk {
         source,
-        pictures: Pictures::default(),
+        pictures: TexturePictures::default(),
         pieces: Vec::new(),
         names: Vec::new(),
         vertices: 0,
@@ -67,17 +67,17 @@ pub(crate) fn gather(source: &Source<'_>) -> Result<Gathered, ModelError> {
     walk.finish()
 }
 
-struct Walk<'a, 'b> {
-    source: &'a Source<'b>,
-    pictures: Pictures,
-    pieces: Vec<Piece>,
+struct NodeWalk<'a, 'b> {
+    source: &'a ModelSource<'b>,
+    pictures: TexturePictures,
+    pieces: Vec<MeshPiece>,
     names: Vec<String>,
     vertices: u64,
     triangles: u64,
     seen: Vec<bool>,
 }
 
-impl Walk<'_, '_> {
+impl NodeWalk<'_, '_> {
     fn node(
         &mut self,
         node: &gltf::Node<'_>,
@@ -140,15 +140,15 @@ impl Walk<'_, '_> {
         }
         let mirrored = linear.determinant() < 0.0;
         let picture = surface.picture.map(|m| m.picture).filter(|_| attributes.has_uv);
-        let mut piece = Piece { zone, vertices, triangles, picture };
+        let mut piece = MeshPiece { zone, vertices, triangles, picture };
         piece.shade(mirrored, attributes.normals.is_some());
         self.pieces.push(piece);
         Ok(())
     }
 
     /// Puts pieces and pictures together.
-    fn finish(mut self) -> Result<Gathered, ModelError> {
-        let means: Vec<Vec3> = self.pictures.all.iter().map(Picture::mean).collect();
+    fn finish(mut self) -> Result<GatheredMesh, ModelError> {
+        let means: Vec<Vec3> = self.pictures.all.iter().map(TexturePicture::mean).collect();
         for piece in &mut self.pieces {
             if let Some(picture) = piece.picture
                 && !piece.fits_unit_square()
@@ -159,7 +159,7 @@ impl Walk<'_, '_> {
             }
         }
         let texture = self.join_pictures();
-        let mut mesh = Mesh::default();
+        let mut mesh = FinishedMesh::default();
         for piece in self.pieces {
             let first = mesh.vertices.len() as u32;
             mesh.vertices.extend(piece.vertices);
@@ -169,7 +169,7 @@ impl Walk<'_, '_> {
         if mesh.triangles.iter().all(Vec::is_empty) {
             return Err(self.source.error("its scene has no triangles"));
         }
-        Ok(Gathered { mesh, texture, names: self.names })
+        Ok(GatheredMesh { mesh, texture, names: self.names })
     }
 
     /// One texture for all pieces, and their coordinates in it.
@@ -181,7 +181,7 @@ impl Walk<'_, '_> {
         let (texture, places, white) = match used[..] {
             [] => return None,
             [only] if everywhere => {
-                (atlas::texture(self.pictures.all[only].rgba.clone()), vec![Place::WHOLE], Vec2::ZERO)
+                (atlas::texture(self.pictures.all[only].rgba.clone()), vec![AtlasPlace::WHOLE], Vec2::ZERO)
             }
             _ => atlas::pack(&used.iter().map(|&i| &self.pictures.all[i]).collect::<Vec<_>>()),
         };
@@ -195,7 +195,7 @@ impl Walk<'_, '_> {
     }
 }
 
-impl Piece {
+impl MeshPiece {
     /// Drops triangles without area, turns mirrored ones over, and gives flat normals where there are none.
     fn shade(&mut self, mirrored: bool, has_normals: bool) {
         let at = |v: &[Vertex], i: u32| v[i as usize].position;
@@ -253,7 +253,7 @@ struct Attributes {
 
 impl Attributes {
     fn read(
-        source: &Source<'_>,
+        source: &ModelSource<'_>,
         primitive: &gltf::Primitive<'_>,
         uv_set: Option<u32>,
         total: &mut u64,
@@ -309,7 +309,7 @@ impl Attributes {
 
 /// The triangles of a list, strip or fan.
 fn triangles(
-    source: &Source<'_>,
+    source: &ModelSource<'_>,
     primitive: &gltf::Primitive<'_>,
     vertices: usize,
 ) -> Result<Vec<[u32; 3]>, ModelError> {

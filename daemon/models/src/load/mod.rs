@@ -48,7 +48,7 @@ pub fn load_glb(bytes: &[u8], name: &str) -> Result<Model, ModelError> {
 }
 
 fn from_bytes(bytes: &[u8], file: &str, name: &str, folder: Option<&Path>) -> Result<Model, ModelError> {
-    let source = source::Source::open(bytes, file, folder)?;
+    let source = source::ModelSource::open(bytes, file, folder)?;
     let gathered = mesh::gather(&source)?;
     let needed: Vec<&'static str> = [Zone::Engine, Zone::Helm]
         .into_iter()

@@ -17,7 +17,7 @@ use super::FILE_BYTES_MAX;
 use crate::error::ModelError;
 
 /// A document and the bytes that it refers to.
-pub(crate) struct Source<'a> {
+pub(crate) struct ModelSource<'a> {
     /// Name in errors.
     pub(crate) file: &'a str,
     /// The validated document.
@@ -27,7 +27,7 @@ pub(crate) struct Source<'a> {
     folder: Option<&'a Path>,
 }
 
-impl<'a> Source<'a> {
+impl<'a> ModelSource<'a> {
     /// Parses `bytes` and reads all buffers.
     pub(crate) fn open(bytes: &[u8], file: &'a str, folder: Option<&'a Path>) -> Result<Self, ModelError> {
         limit(file, "the file's size in bytes", bytes.len() as u64, FILE_BYTES_MAX)?;

@@ -9,7 +9,7 @@ use image::RgbaImage;
 
 use super::{
     TEXTURE_SIDE_MAX,
-    source::{Source, limit},
+    source::{ModelSource, limit},
 };
 use crate::error::ModelError;
 
@@ -28,7 +28,7 @@ pub(crate) struct Surface {
 /// How a picture is laid on.
 #[derive(Clone, Copy)]
 pub(crate) struct Mapped {
-    /// Index into [`Pictures::all`].
+    /// Index into [`TexturePictures::all`].
     pub(crate) picture: usize,
     /// Which set of texture coordinates.
     pub(crate) set: u32,
@@ -44,11 +44,11 @@ impl Mapped {
 }
 
 /// A decoded picture, sRGB-coded.
-pub(crate) struct Picture {
+pub(crate) struct TexturePicture {
     pub(crate) rgba: RgbaImage,
 }
 
-impl Picture {
+impl TexturePicture {
     /// Mean linear colour of what is not see-through.
     pub(crate) fn mean(&self) -> Vec3 {
         let (mut sum, mut weight) = (Vec3::ZERO, 0.0_f32);
@@ -63,18 +63,18 @@ impl Picture {
 
 /// Pictures that have been met, each decoded once for each way that its alpha is used.
 #[derive(Default)]
-pub(crate) struct Pictures {
+pub(crate) struct TexturePictures {
     /// All of them.
-    pub(crate) all: Vec<Picture>,
+    pub(crate) all: Vec<TexturePicture>,
     known: HashMap<(usize, u16), usize>,
     pixels: u64,
 }
 
-impl Pictures {
+impl TexturePictures {
     /// Surface of `material`.
     pub(crate) fn surface(
         &mut self,
-        source: &Source<'_>,
+        source: &ModelSource<'_>,
         material: &gltf::Material<'_>,
     ) -> Result<Surface, ModelError> {
         let pbr = material.pbr_metallic_roughness();
@@ -106,7 +106,7 @@ impl Pictures {
 
     fn picture(
         &mut self,
-        source: &Source<'_>,
+        source: &ModelSource<'_>,
         image: usize,
         material: &gltf::Material<'_>,
         alpha: f32,
@@ -130,13 +130,13 @@ impl Pictures {
             let opaque = cutoff == 0 || u16::from(p.0[3]) >= cutoff - 1;
             p.0[3] = if opaque { 255 } else { 0 };
         }
-        self.all.push(Picture { rgba });
+        self.all.push(TexturePicture { rgba });
         self.known.insert((image, cutoff), self.all.len() - 1);
         Ok(self.all.len() - 1)
     }
 }
 
-fn decode(source: &Source<'_>, index: usize) -> Result<RgbaImage, ModelError> {
+fn decode(source: &ModelSource<'_>, index: usize) -> Result<RgbaImage, ModelError> {
     let missing = || source.error(format!("picture {index} is not there"));
     let image = source.root().images.get(index).ok_or_else(missing)?;
     let fetched;

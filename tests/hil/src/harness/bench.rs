@@ -214,7 +214,7 @@ pub fn configuration(c: &Configured) -> String {
 
 /// Change of a fault by a line of the journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FaultChange {
+pub enum JournalChange {
     /// It is there, or has happened.
     Came,
     /// It is gone.
@@ -314,7 +314,7 @@ impl HilBench {
     }
 
     /// Waits until the journal says that the fault came or went, at `since_ns` or later; the machine's time of that.
-    pub fn told(&self, code: &str, told: FaultChange, since_ns: i64, patience: Duration) -> Result<i64> {
+    pub fn told(&self, code: &str, told: JournalChange, since_ns: i64, patience: Duration) -> Result<i64> {
         let what = format!("{code} {told:?} in the journal");
         let entry =
             self.machine.guest.journal(since_ns, patience, &what, |e| says(&e.fields, code) == Some(told))?;
@@ -449,7 +449,7 @@ impl HilBench {
 }
 
 /// Change of a fault by fields of the journal.
-pub fn says(fields: &Value, code: &str) -> Option<FaultChange> {
+pub fn says(fields: &Value, code: &str) -> Option<JournalChange> {
     let field = |name: &str| fields[name].as_str().unwrap_or_default();
     let message = field("MESSAGE");
     let named = match field("FAULT_CODE") {
@@ -460,7 +460,7 @@ pub fn says(fields: &Value, code: &str) -> Option<FaultChange> {
         return None;
     }
     let over = message.get(code.len()..).is_some_and(|rest| rest.starts_with(" over "));
-    Some(if field("FAULT_STATE") == "cleared" || over { FaultChange::Went } else { FaultChange::Came })
+    Some(if field("FAULT_STATE") == "cleared" || over { JournalChange::Went } else { JournalChange::Came })
 }
 
 #[cfg(test)]
@@ -471,10 +471,10 @@ mod tests {
     #[test]
     fn the_journal_is_understood() {
         let raised = json!({ "FAULT_CODE": "CAM_LOST", "FAULT_STATE": "raised", "MESSAGE": "CAM_LOST gone" });
-        assert_eq!(says(&raised, "CAM_LOST"), Some(FaultChange::Came));
+        assert_eq!(says(&raised, "CAM_LOST"), Some(JournalChange::Came));
         assert_eq!(says(&raised, "CAM"), None);
         let cleared = json!({ "MESSAGE": "CAM_LOST over after 1.203 s" });
-        assert_eq!(says(&cleared, "CAM_LOST"), Some(FaultChange::Went));
+        assert_eq!(says(&cleared, "CAM_LOST"), Some(JournalChange::Went));
         assert_eq!(says(&json!({ "MESSAGE": "it is CAM_LOST" }), "CAM_LOST"), None);
     }
 

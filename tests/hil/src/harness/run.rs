@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use bowwave_hil::protocol::AgentCommand;
 
 use super::{
-    bench::{FaultChange, HilBench, LCD, Shop},
+    bench::{JournalChange, HilBench, LCD, Shop},
     faults::{CaseResult, FaultRow, FaultVerdict, rows},
     lcd::Plate,
     measure::{self, Figure},
@@ -211,7 +211,7 @@ fn power_cut(shop: &Shop, mut bench: HilBench, data: &Path, report: &mut HilRepo
         again.slow = slow;
         again.pull(1, true)?;
         again.play()?;
-        let dirty = again.told("BOOT_DIRTY", FaultChange::Came, 0, again.scaled(15.0));
+        let dirty = again.told("BOOT_DIRTY", JournalChange::Came, 0, again.scaled(15.0));
         let on = again.machine.power_on;
         let ready = again.lcd(on, again.scaled(15.0), "READY", |p, _| p == Plate::Ready)?;
         let lcd = again.status()?;

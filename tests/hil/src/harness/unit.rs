@@ -33,7 +33,7 @@ pub enum Passage {
     Cut,
 }
 
-struct LineState {
+struct SerialLineState {
     passage: Mutex<Passage>,
     baud: AtomicU64,
     lost: AtomicU64,
@@ -41,7 +41,7 @@ struct LineState {
 
 /// The unit's line.
 pub struct SerialUnit {
-    shared: Arc<LineState>,
+    shared: Arc<SerialLineState>,
     slave: PathBuf,
     port: File,
 }
@@ -56,7 +56,7 @@ impl SerialUnit {
         let mut attributes = tcgetattr(&port).context("the unit's line")?;
         attributes.make_raw();
         tcsetattr(&port, OptionalActions::Now, &attributes).context("the unit's line")?;
-        let shared = LineState {
+        let shared = SerialLineState {
             passage: Mutex::new(Passage::Straight),
             baud: AtomicU64::new(921_600),
             lost: AtomicU64::new(0),
@@ -127,6 +127,6 @@ impl SerialUnit {
     }
 }
 
-fn passage_of(shared: &LineState) -> MutexGuard<'_, Passage> {
+fn passage_of(shared: &SerialLineState) -> MutexGuard<'_, Passage> {
     shared.passage.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,14 +1,14 @@
 //! Series of drawn pictures, with a horizon and without.
 
-use super::synth::{DrawnLens, Glare, Shown};
+use super::synth::{DrawnLens, DrawnScene, Glare};
 
 /// Pictures of a series that served to set the finder's constants: those with a smaller seed than this.
 pub const SET_WITH: u64 = 1000;
 
 /// A picture with a horizon: the `i`th of the series that begins at `seed`.
-pub fn with_horizon(seed: u64, i: u64) -> Shown {
-    let mut shown = Shown::fair(seed + i);
-    let spread = |k: u64, low: f64, high: f64| Shown::fair(seed + i).even(k).mul_add(high - low, low);
+pub fn with_horizon(seed: u64, i: u64) -> DrawnScene {
+    let mut shown = DrawnScene::fair(seed + i);
+    let spread = |k: u64, low: f64, high: f64| DrawnScene::fair(seed + i).even(k).mul_add(high - low, low);
     shown.attitude = [spread(1, -0.2, 0.2), spread(2, -0.18, 0.18)];
     shown.eye_m = spread(3, 2.0, 20.0);
     shown.codes = [spread(4, 130.0, 220.0), spread(5, 90.0, 180.0), spread(6, 40.0, 100.0)];
@@ -59,9 +59,9 @@ pub fn with_horizon(seed: u64, i: u64) -> Shown {
 
 /// A picture with the sun low over a horizon of which it washes out a sixth to two thirds, with lens flare: the `i`th of the series that
 /// begins at `seed`.
-pub fn with_glare(seed: u64, i: u64) -> Shown {
+pub fn with_glare(seed: u64, i: u64) -> DrawnScene {
     let mut shown = with_horizon(seed, 8 * i);
-    let spread = |k: u64, low: f64, high: f64| Shown::fair(seed + i).even(k).mul_add(high - low, low);
+    let spread = |k: u64, low: f64, high: f64| DrawnScene::fair(seed + i).even(k).mul_add(high - low, low);
     shown.kind = "glare";
     shown.glitter = Some(spread(41, -0.35, 0.35));
     shown.glare = Some(Glare {
@@ -73,9 +73,9 @@ pub fn with_glare(seed: u64, i: u64) -> Shown {
 }
 
 /// A picture with a washed-out strip over all of its horizon: the `i`th of the series that begins at `seed`.
-pub fn all_glare(seed: u64, i: u64) -> Shown {
+pub fn all_glare(seed: u64, i: u64) -> DrawnScene {
     let mut shown = with_glare(seed, i);
-    let spread = |k: u64, low: f64, high: f64| Shown::fair(seed + i).even(k).mul_add(high - low, low);
+    let spread = |k: u64, low: f64, high: f64| DrawnScene::fair(seed + i).even(k).mul_add(high - low, low);
     shown.kind = "all glare";
     shown.attitude[0] = spread(46, -0.05, 0.05);
     shown.glare = Some(Glare {
@@ -87,9 +87,9 @@ pub fn all_glare(seed: u64, i: u64) -> Shown {
 }
 
 /// A picture without a horizon, or one that is not to be used: the `i`th of the series that begins at `seed`.
-pub fn without_horizon(seed: u64, i: u64) -> Shown {
+pub fn without_horizon(seed: u64, i: u64) -> DrawnScene {
     let mut shown = with_horizon(seed, 8 * i);
-    let spread = |k: u64, low: f64, high: f64| Shown::fair(seed + i).even(k).mul_add(high - low, low);
+    let spread = |k: u64, low: f64, high: f64| DrawnScene::fair(seed + i).even(k).mul_add(high - low, low);
     match i % 7 {
         0 => {
             shown.kind = "sky only";

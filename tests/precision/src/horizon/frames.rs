@@ -14,7 +14,7 @@ use crate::recorded;
 
 /// A grey picture and what is known of its camera.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub struct SeaFrame {
     /// Which one it is.
     pub name: String,
     /// Width and height, pixels.
@@ -29,7 +29,7 @@ pub struct Frame {
     pub mark: Option<[DVec2; 2]>,
 }
 
-impl Frame {
+impl SeaFrame {
     /// The picture as a camera would deliver it.
     pub fn picture(&self) -> Result<Picture> {
         // A column or row is left out where chroma needs an even number.
@@ -42,7 +42,7 @@ impl Frame {
         Picture::new(PixelFormat::Nv12, w as u32, h as u32, bytes.into()).context(self.name.clone())
     }
 
-    /// The lens of [`Frame::picture`].
+    /// The lens of [`SeaFrame::picture`].
     pub fn picture_lens(&self) -> Lens {
         Lens { width: self.lens.width & !1, height: self.lens.height & !1, ..self.lens }
     }
@@ -66,7 +66,7 @@ impl Frame {
 }
 
 /// All pictures whose horizon was marked.
-pub fn marked() -> Result<Vec<Frame>> {
+pub fn marked() -> Result<Vec<SeaFrame>> {
     let Some(marks) = recorded::find_reference("horizon_marks.csv") else { return Ok(Vec::new()) };
     let text = fs::read_to_string(&marks).with_context(|| format!("cannot read {}", marks.display()))?;
     let mut sources = Sources::default();
@@ -90,12 +90,12 @@ const MARK_ORIGIN: f64 = 0.5;
 
 #[derive(Default)]
 struct Sources {
-    ship: Option<Vec<Frame>>,
-    drone: Option<Vec<Frame>>,
+    ship: Option<Vec<SeaFrame>>,
+    drone: Option<Vec<SeaFrame>>,
 }
 
 impl Sources {
-    fn frame(&mut self, name: &str) -> Result<Option<Frame>> {
+    fn frame(&mut self, name: &str) -> Result<Option<SeaFrame>> {
         let index = |prefix: &str| name.strip_prefix(prefix).and_then(|n| n.parse::<usize>().ok());
         if let Some(i) = index("schw_") {
             if self.ship.is_none() {
@@ -116,7 +116,7 @@ impl Sources {
 }
 
 /// Thirteen frames from a rolling ship.
-pub fn ship() -> Result<Vec<Frame>> {
+pub fn ship() -> Result<Vec<SeaFrame>> {
     let Some(path) = recorded::find("sea/schwendeman_ship_horizon/SampleVideoFrames.mat") else {
         return Ok(Vec::new());
     };
@@ -131,27 +131,27 @@ pub fn ship() -> Result<Vec<Frame>> {
     let frame = |i: usize| {
         let at = |p: usize| video.values[(i * width + p % width) * height + p / width];
         let luma = (0..width * height).map(|p| at(p).clamp(0.0, 255.0) as u8).collect();
-        Frame { name: format!("schw_{i:02}"), size: (width, height), luma, lens, eye_m: 10.0, mark: None }
+        SeaFrame { name: format!("schw_{i:02}"), size: (width, height), luma, lens, eye_m: 10.0, mark: None }
     };
     Ok((0..count).map(frame).collect())
 }
 
 /// A still of an unknown lens, taken to cover 70 degrees.
-pub fn still(name: &str, path: &Path) -> Result<Frame> {
+pub fn still(name: &str, path: &Path) -> Result<SeaFrame> {
     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     decoded(name, &bytes)
 }
 
 /// A compressed picture of an unknown lens, taken to cover 70 degrees.
-pub fn decoded(name: &str, bytes: &[u8]) -> Result<Frame> {
+pub fn decoded(name: &str, bytes: &[u8]) -> Result<SeaFrame> {
     let picture = image::load_from_memory(bytes).with_context(|| name.to_owned())?.to_luma8();
     let size = (picture.width() as usize, picture.height() as usize);
     let lens = Lens::pinhole(picture.width(), picture.height(), 70f64.to_radians());
-    Ok(Frame { name: name.into(), size, luma: picture.into_raw(), lens, eye_m: 3.0, mark: None })
+    Ok(SeaFrame { name: name.into(), size, luma: picture.into_raw(), lens, eye_m: 3.0, mark: None })
 }
 
 /// Pictures in which no horizon is to be seen: shores, harbours, canals.
-pub fn without_horizon() -> Result<Vec<Frame>> {
+pub fn without_horizon() -> Result<Vec<SeaFrame>> {
     let mut frames = Vec::new();
     for (folder, prefix) in [("sea/davis_boat_1080p", "davis"), ("sea/wasr_stills", "wasr")] {
         let Some(folder) = recorded::find(folder) else { continue };
@@ -167,7 +167,7 @@ pub fn without_horizon() -> Result<Vec<Frame>> {
 }
 
 /// Pieces of marked frames that show sky or water only, scaled to nothing: as they are.
-pub fn crops(frames: &[Frame]) -> Vec<Frame> {
+pub fn crops(frames: &[SeaFrame]) -> Vec<SeaFrame> {
     let mut all = Vec::new();
     for frame in frames {
         let Some([a, b]) = frame.mark else { continue };
@@ -182,7 +182,7 @@ pub fn crops(frames: &[Frame]) -> Vec<Frame> {
                 let luma = frame.luma[rows.start * w..rows.end * w].to_vec();
                 let lens = Lens::pinhole(w as u32, rows.len() as u32, 70f64.to_radians());
                 let name = format!("{} {kind}", frame.name);
-                all.push(Frame { name, size: (w, rows.len()), luma, lens, eye_m: 3.0, mark: None });
+                all.push(SeaFrame { name, size: (w, rows.len()), luma, lens, eye_m: 3.0, mark: None });
             }
         }
     }

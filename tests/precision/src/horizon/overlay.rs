@@ -6,11 +6,11 @@ use anyhow::{Context as _, Result};
 use glam::DVec3;
 use image::{Rgb, RgbImage};
 
-use super::frames::Frame;
+use super::frames::SeaFrame;
 
 /// Writes the frame into `folder`: the mark in green, the line of `found` in red, or a red frame around it where nothing was
 /// found.
-pub fn write(folder: &Path, frame: &Frame, found: Option<DVec3>) -> Result<()> {
+pub fn write(folder: &Path, frame: &SeaFrame, found: Option<DVec3>) -> Result<()> {
     let (w, h) = (frame.size.0 as u32, frame.size.1 as u32);
     let grey = |x: u32, y: u32| frame.luma.get((y * w + x) as usize).copied().unwrap_or(0);
     let mut picture = RgbImage::from_fn(w, h, |x, y| Rgb([grey(x, y); 3]));

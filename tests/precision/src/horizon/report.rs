@@ -1,10 +1,10 @@
 //! The whole table of the real frames and drawn pictures, in words.
 //!
-//! What served to set the finder's constants: every other marked frame (the first, third, ...), every fourth of the boat
+//! These pictures served to set the finder's constants: every other marked frame (the first, third, ...), every fourth of the boat
 //! before a shore, all stills, the pieces cut from all marked frames, and drawn pictures of seeds below [`SET_WITH`]. The
 //! other frames and seeds were held out.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use bowwave_core::estimate::horizon::{Horizon, HorizonFinder, LineQuality, NoHorizon, Prior};
@@ -13,16 +13,41 @@ use rayon::prelude::*;
 
 use super::{
     cases::{SET_WITH, with_horizon, without_horizon},
-    frames::{self, Frame},
+    frames::{self, SeaFrame},
     overlay,
-    score::{Drawn, Miss, PRIOR_SIGMA, find, miss, predicted},
+    score::{DrawnHorizon, Miss, PRIOR_SIGMA, find, miss, predicted},
     video,
 };
 use crate::front::quantile;
 
-type Answer = std::result::Result<Horizon, NoHorizon>;
+type HorizonAnswer = std::result::Result<Horizon, NoHorizon>;
 
-fn qualities(answer: &Answer) -> Option<LineQuality> {
+/// Shows pictures to the horizon finder and lists what it makes of them.
+#[derive(Debug, clap::Args)]
+pub struct HorizonStudy {
+    /// Folder for the marked frames, and those taken wrongly, with what was found drawn over them
+    #[arg(long, value_name = "DIR")]
+    overlays: Option<PathBuf>,
+    /// Drawn pictures with a horizon, and as many without
+    #[arg(long, default_value_t = 400)]
+    drawn: u64,
+    /// Draw those pictures that served to set the finder's constants
+    #[arg(long)]
+    set: bool,
+}
+
+impl HorizonStudy {
+    /// Prints all of it.
+    pub fn run(&self) -> Result<()> {
+        cost()?;
+        marked(self.overlays.as_deref())?;
+        jitter()?;
+        without(self.overlays.as_deref())?;
+        drawn(self.drawn, self.set)
+    }
+}
+
+fn qualities(answer: &HorizonAnswer) -> Option<LineQuality> {
     match answer {
         Ok(found) => Some(found.quality),
         Err(
@@ -32,7 +57,7 @@ fn qualities(answer: &Answer) -> Option<LineQuality> {
     }
 }
 
-fn described(answer: &Answer) -> String {
+fn described(answer: &HorizonAnswer) -> String {
     let why = answer.as_ref().err().map(|e| format!(" ({e})")).unwrap_or_default();
     let numbers = |q: LineQuality| {
         format!(
@@ -71,7 +96,7 @@ fn summary(what: &str, misses: &[Option<Miss>]) -> String {
 }
 
 /// Frames whose horizon was marked, one by one, without and with predictions.
-pub fn marked(overlays: Option<&Path>) -> Result<()> {
+fn marked(overlays: Option<&Path>) -> Result<()> {
     let frames = frames::marked()?;
     let mut finder = HorizonFinder::new();
     // Without and with prediction; of frames that set constants, and held out.
@@ -110,7 +135,7 @@ pub fn marked(overlays: Option<&Path>) -> Result<()> {
 }
 
 /// Turning from frame to frame of the clip from the drone, whose gimbal hardly turns before its last half second.
-pub fn jitter() -> Result<()> {
+fn jitter() -> Result<()> {
     let frames = video::karma()?;
     let mut finder = HorizonFinder::new();
     let mut ups = Vec::new();
@@ -135,7 +160,7 @@ pub fn jitter() -> Result<()> {
 }
 
 /// Predictions laid all over a frame: twelve heights, five rolls.
-fn laid(frame: &Frame) -> Vec<Prior> {
+fn laid(frame: &SeaFrame) -> Vec<Prior> {
     let lens = frame.picture_lens();
     let prior = |i: usize| {
         let row = ((i / 5) as f64 + 0.5) / 12.0 * f64::from(lens.height);
@@ -148,7 +173,7 @@ fn laid(frame: &Frame) -> Vec<Prior> {
 }
 
 /// Real pictures that show none: shores, harbours, pieces of sky and water.
-pub fn without(overlays: Option<&Path>) -> Result<()> {
+fn without(overlays: Option<&Path>) -> Result<()> {
     let mut frames = frames::without_horizon()?;
     frames.extend(frames::crops(&frames::marked()?));
     let mut finder = HorizonFinder::new();
@@ -178,14 +203,14 @@ pub fn without(overlays: Option<&Path>) -> Result<()> {
 }
 
 /// Drawn pictures by kind, and whether the stated covariance is right.
-pub fn drawn(count: u64, set: bool) -> Result<()> {
+fn drawn(count: u64, set: bool) -> Result<()> {
     let seed = if set { 0 } else { SET_WITH };
-    let show = |drawn: &Drawn, prior: Option<Prior>| drawn.find(&mut HorizonFinder::new(), prior);
+    let show = |drawn: &DrawnHorizon, prior: Option<Prior>| drawn.find(&mut HorizonFinder::new(), prior);
     for (told, is_told) in [("no prediction", false), ("prediction", true)] {
         let rows: Vec<_> = (0..count)
             .into_par_iter()
             .map(|i| {
-                let drawn = Drawn::new(with_horizon(seed, i))?;
+                let drawn = DrawnHorizon::new(with_horizon(seed, i))?;
                 let up = DVec3::from(drawn.shown.up());
                 let found = show(&drawn, is_told.then(|| predicted(up, seed + i))).ok();
                 let off = found.map(|h| (drawn.miss(h.up), drawn.normalised(&h)));
@@ -202,7 +227,7 @@ pub fn drawn(count: u64, set: bool) -> Result<()> {
         let none: Vec<_> = (0..count)
             .into_par_iter()
             .map(|i| {
-                let drawn = Drawn::new(without_horizon(seed, i))?;
+                let drawn = DrawnHorizon::new(without_horizon(seed, i))?;
                 let up = DVec3::from(drawn.shown.up());
                 Ok(show(&drawn, is_told.then(|| predicted(up, seed + i))).is_ok().then_some(drawn.shown.kind))
             })
@@ -218,11 +243,11 @@ const KINDS: [&str; 9] =
 
 /// Time of a picture of 1280 x 720, milliseconds of this thread: least, median. One that is clear, and one of water only, on which all
 /// that could be a line is tried.
-pub fn cost() -> Result<()> {
+fn cost() -> Result<()> {
     for (what, shown) in
         [("horizon", with_horizon(SET_WITH, 0)), ("water only", without_horizon(SET_WITH, 1))]
     {
-        let drawn = Drawn::new(shown)?;
+        let drawn = DrawnHorizon::new(shown)?;
         let up = if what == "horizon" { DVec3::from(drawn.shown.up()) } else { DVec3::NEG_Y };
         for (told, prior) in [("no prediction", None), ("prediction", Some(predicted(up, 3)))] {
             let mut finder = HorizonFinder::new();

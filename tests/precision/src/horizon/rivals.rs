@@ -6,7 +6,7 @@ use glam::DVec2;
 
 /// Grey pictures by rows.
 #[derive(Clone, Copy, Debug)]
-pub struct Grey<'a> {
+pub struct GreyPicture<'a> {
     /// Luma codes.
     pub luma: &'a [u8],
     /// Width and height.
@@ -14,25 +14,25 @@ pub struct Grey<'a> {
 }
 
 /// Two points of a line, at the left and right side of the picture.
-pub type Ends = [DVec2; 2];
+pub type LineEnds = [DVec2; 2];
 
 /// Rolls that are tried, in degrees to either side, as the finder does.
 const ROLL_MAX: i32 = 65;
 
-impl Grey<'_> {
+impl GreyPicture<'_> {
     fn at(&self, x: usize, y: usize) -> f32 {
         self.luma.get(y * self.size.0 + x).copied().map_or(0.0, f32::from)
     }
 
     /// The line `x sin + y cos = distance` at the picture's sides.
-    fn ends(&self, angle: f64, distance: f64) -> Ends {
+    fn ends(&self, angle: f64, distance: f64) -> LineEnds {
         let at = |x: f64| DVec2::new(x, (distance - x * angle.sin()) / angle.cos());
         [at(0.0), at(self.size.0 as f64)]
     }
 }
 
 /// Edges after Canny (1986), lines after Hough (1962): the one with most edges on it.
-pub fn canny_hough(grey: Grey<'_>) -> Option<Ends> {
+pub fn canny_hough(grey: GreyPicture<'_>) -> Option<LineEnds> {
     let (w, h) = grey.size;
     let edges = canny(grey);
     let reach = ((w + h) as f64).ceil() as usize;
@@ -54,7 +54,7 @@ pub fn canny_hough(grey: Grey<'_>) -> Option<Ends> {
 }
 
 /// Places where the slope of the smoothed picture is largest along itself and strong, or joined to one that is.
-fn canny(grey: Grey<'_>) -> Vec<(usize, usize)> {
+fn canny(grey: GreyPicture<'_>) -> Vec<(usize, usize)> {
     const STRONG: f32 = 80.0;
     const WEAK: f32 = 40.0;
     let (w, h) = grey.size;
@@ -107,7 +107,7 @@ fn canny(grey: Grey<'_>) -> Vec<(usize, usize)> {
 }
 
 /// The line that divides the picture into two parts of the most different brightness (Otsu 1979), over angle and offset.
-pub fn otsu(grey: Grey<'_>) -> Option<Ends> {
+pub fn otsu(grey: GreyPicture<'_>) -> Option<LineEnds> {
     const FIELD: usize = 8;
     let (columns, rows) = (grey.size.0 / FIELD, grey.size.1 / FIELD);
     let mean = |c: usize, r: usize| {
@@ -151,7 +151,7 @@ pub fn otsu(grey: Grey<'_>) -> Option<Ends> {
 
 /// The strongest step of each column of eight pixels, and the line through two of them that most agree with; least squares of
 /// these.
-pub fn column_steps(grey: Grey<'_>) -> Option<Ends> {
+pub fn column_steps(grey: GreyPicture<'_>) -> Option<LineEnds> {
     const FIELD: usize = 8;
     const ROWS: usize = 8;
     let (w, h) = grey.size;

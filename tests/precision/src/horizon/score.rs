@@ -1,4 +1,4 @@
-//! What a way makes of a picture, and how wrong that is.
+//! The answer of a way to a picture, and how wrong it is.
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
@@ -8,7 +8,7 @@ use bowwave_core::{
 };
 use glam::{DMat2, DQuat, DVec2, DVec3};
 
-use super::{frames::Frame, synth::Shown};
+use super::{frames::SeaFrame, synth::DrawnScene};
 
 /// Width at which errors are stated, pixels.
 pub const WIDTH: f64 = 1280.0;
@@ -33,7 +33,7 @@ impl Miss {
 }
 
 /// How far a found direction of up is from the frame's mark; `None` without one.
-pub fn miss(frame: &Frame, up: DVec3) -> Option<Miss> {
+pub fn miss(frame: &SeaFrame, up: DVec3) -> Option<Miss> {
     let [a, b] = frame.mark?;
     let off = |at: DVec2| frame.horizon_row(up, at.x) - at.y;
     let (left, right) = (off(a), off(b));
@@ -57,7 +57,7 @@ impl Miss {
 
 /// A direction as an inertial unit might predict it: turned by normal deviates of [`PRIOR_SIGMA`] about the axes across `up`.
 pub fn predicted(up: DVec3, draw: u64) -> Prior {
-    let even = |i: u64| Shown::fair(draw.wrapping_mul(13).wrapping_add(i)).even(900 + i);
+    let even = |i: u64| DrawnScene::fair(draw.wrapping_mul(13).wrapping_add(i)).even(900 + i);
     let size = (-2.0 * even(1).max(1e-9).ln()).sqrt().min(2.5) * PRIOR_SIGMA;
     let (sin, cos) = (std::f64::consts::TAU * even(2)).sin_cos();
     let (x, y) = up.any_orthonormal_pair();
@@ -67,7 +67,7 @@ pub fn predicted(up: DVec3, draw: u64) -> Prior {
 /// Shows a frame to the finder.
 pub fn find(
     finder: &mut HorizonFinder,
-    frame: &Frame,
+    frame: &SeaFrame,
     prior: Option<Prior>,
 ) -> Result<std::result::Result<Horizon, NoHorizon>> {
     finder.set_mask(None);
@@ -76,20 +76,20 @@ pub fn find(
 }
 
 /// A drawn picture as a camera would deliver it, and what the finder is told of it.
-pub struct Drawn {
-    /// What it shows.
-    pub shown: Shown,
+pub struct DrawnHorizon {
+    /// Its contents.
+    pub shown: DrawnScene,
     /// The picture.
     pub picture: Picture,
-    /// What is told.
+    /// View that the finder is told.
     pub view: HorizonView,
-    /// What is masked.
+    /// Part that is masked.
     pub mask: Option<Mask>,
 }
 
-impl Drawn {
+impl DrawnHorizon {
     /// Draws it.
-    pub fn new(shown: Shown) -> Result<Self> {
+    pub fn new(shown: DrawnScene) -> Result<Self> {
         let (w, h) = shown.size;
         let mut bytes = shown.draw();
         bytes.resize(w * h * 3 / 2, 128);
@@ -139,7 +139,7 @@ impl Drawn {
 /// Fields that the drawn barrel touches, and a little around it.
 fn barrel_mask() -> Option<Mask> {
     let (width, height) = (64, 36);
-    let (half, top) = Shown::BARREL;
+    let (half, top) = DrawnScene::BARREL;
     let hides = |i: usize| {
         let x = ((i % width) as f64 + 0.5) / width as f64;
         let up = 1.0 - ((i / width) as f64 + 0.5) / height as f64;

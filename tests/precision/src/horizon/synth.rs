@@ -45,9 +45,9 @@ impl Glare {
     }
 }
 
-/// What a picture shows.
+/// Contents of a picture.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct DrawnScene {
     /// Its kind, under which errors are gathered.
     pub kind: &'static str,
     /// Width and height, pixels.
@@ -94,7 +94,7 @@ pub struct Shown {
     pub picture: u64,
 }
 
-impl Shown {
+impl DrawnScene {
     /// A plain fair day.
     pub fn fair(seed: u64) -> Self {
         Self {

@@ -8,7 +8,7 @@ use bowwave_core::time::Time;
 use bowwave_import::{ImportError, ImportOptions, import_video};
 use bowwave_record::{Entry, RecordingReader};
 
-use super::frames::{Frame, decoded};
+use super::frames::{SeaFrame, decoded};
 use crate::recorded;
 
 /// Height of the drone over the sea, metres: guessed from the houses on the cliff.
@@ -18,10 +18,10 @@ const DRONE_M: f64 = 40.0;
 pub const KARMA: &str = "camera_imu/gopro_karma/karma.mp4";
 
 /// When a picture was taken, and its bytes.
-pub type Timed = (Time, Vec<u8>);
+pub type TimedFrame = (Time, Vec<u8>);
 
 /// Time on the container's clock and JPEG of all pictures. None, with a word of it, where clip or ffmpeg is absent.
-pub fn karma_pictures() -> Result<Option<Vec<Timed>>> {
+pub fn karma_pictures() -> Result<Option<Vec<TimedFrame>>> {
     let Some(video) = recorded::find(KARMA) else { return Ok(None) };
     let folder = tempfile::tempdir().context("no folder for the recording")?;
     let recording = folder.path().join("karma.mcap");
@@ -46,7 +46,7 @@ pub fn karma_pictures() -> Result<Option<Vec<Timed>>> {
 
 /// All frames, with the lens of the calibration that goes with the clip. None, with a word of it, where clip or ffmpeg is
 /// absent.
-pub fn karma() -> Result<Vec<Frame>> {
+pub fn karma() -> Result<Vec<SeaFrame>> {
     let calibration = concat!(env!("CARGO_MANIFEST_DIR"), "/../../calibration/examples/gopro_karma.toml");
     let calibration = CalibrationFile::read(calibration.as_ref())?;
     let mut frames = Vec::new();

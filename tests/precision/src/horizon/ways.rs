@@ -8,34 +8,35 @@ use bowwave_core::{
 use glam::DVec3;
 
 use super::{
-    frames::Frame,
-    rivals::{self, Ends, Grey},
-    score::{self, Drawn, Miss},
+    frames::SeaFrame,
+    rivals::{self, GreyPicture, LineEnds},
+    score::{self, DrawnHorizon, Miss},
 };
+use crate::bench::Candidate;
 
 /// A way to find a horizon.
 #[derive(Clone, Copy, Debug)]
-pub enum Method {
+pub enum HorizonMethod {
     /// The product's, told nothing, or told a prediction.
     Finder {
         /// Whether a prediction is told.
         prior: bool,
     },
     /// One of the rivals.
-    Rival(fn(Grey<'_>) -> Option<Ends>),
+    Rival(fn(GreyPicture<'_>) -> Option<LineEnds>),
 }
 
 /// All ways, with their names and settings; what the product uses is first.
-pub const METHODS: [(&str, &str, Method); 5] = [
-    ("column steps, judged", "with prediction", Method::Finder { prior: true }),
-    ("column steps, judged", "no prediction", Method::Finder { prior: false }),
-    ("column steps, best line", "", Method::Rival(rivals::column_steps)),
-    ("Canny and Hough", "", Method::Rival(rivals::canny_hough)),
-    ("Otsu", "", Method::Rival(rivals::otsu)),
+pub const METHODS: [Candidate<HorizonMethod>; 5] = [
+    Candidate::product("column steps, judged", "with prediction", HorizonMethod::Finder { prior: true }),
+    Candidate::rival("column steps, judged", "no prediction", HorizonMethod::Finder { prior: false }),
+    Candidate::rival("column steps, best line", "", HorizonMethod::Rival(rivals::column_steps)),
+    Candidate::rival("Canny and Hough", "", HorizonMethod::Rival(rivals::canny_hough)),
+    Candidate::rival("Otsu", "", HorizonMethod::Rival(rivals::otsu)),
 ];
 
 /// Up of a camera whose horizon falls on two pixels, the first on the left.
-pub fn up_through(lens: &Lens, ends: Ends, eye_m: f64) -> DVec3 {
+pub fn up_through(lens: &Lens, ends: LineEnds, eye_m: f64) -> DVec3 {
     let [a, b] = ends.map(|place| lens.unproject(place));
     let level = b.cross(a).normalize();
     // Both rays lie below the horizontal by the dip, not in one plane with the eye.
@@ -43,38 +44,38 @@ pub fn up_through(lens: &Lens, ends: Ends, eye_m: f64) -> DVec3 {
     (level - middle * (horizon_dip(eye_m).sin() / middle.dot(a))).normalize()
 }
 
-/// What a way finds in a marked frame; `None` for no horizon.
+/// Up as a way finds it in a marked frame; `None` for no horizon.
 pub fn in_frame(
-    method: Method,
+    method: HorizonMethod,
     finder: &mut HorizonFinder,
-    frame: &Frame,
+    frame: &SeaFrame,
     draw: u64,
 ) -> Result<Option<DVec3>> {
     match method {
-        Method::Finder { prior } => {
+        HorizonMethod::Finder { prior } => {
             let prior = frame.marked_up().filter(|_| prior).map(|up| score::predicted(up, draw));
             Ok(score::find(finder, frame, prior)?.ok().map(|h| h.up))
         }
-        Method::Rival(find) => {
-            let ends = find(Grey { luma: &frame.luma, size: frame.size });
+        HorizonMethod::Rival(find) => {
+            let ends = find(GreyPicture { luma: &frame.luma, size: frame.size });
             Ok(ends.map(|ends| up_through(&frame.lens, ends, frame.eye_m)))
         }
     }
 }
 
-/// What a way finds in a drawn picture; `None` for no horizon.
-pub fn in_drawn(method: Method, finder: &mut HorizonFinder, drawn: &Drawn) -> Option<DVec3> {
+/// Up as a way finds it in a drawn picture; `None` for no horizon.
+pub fn in_drawn(method: HorizonMethod, finder: &mut HorizonFinder, drawn: &DrawnHorizon) -> Option<DVec3> {
     match method {
-        Method::Finder { prior } => {
+        HorizonMethod::Finder { prior } => {
             let up = DVec3::from(drawn.shown.up());
             let prior = prior.then(|| score::predicted(up, drawn.shown.seed));
             drawn.find(finder, prior).ok().map(|h| h.up)
         }
-        Method::Rival(find) => {
+        HorizonMethod::Rival(find) => {
             let (w, h) = drawn.shown.size;
             let luma = drawn.picture.bytes().get(..w * h)?;
             // Lines of a lens that bows them are taken where they cross the middle third.
-            let [a, b] = find(Grey { luma, size: (w, h) })?;
+            let [a, b] = find(GreyPicture { luma, size: (w, h) })?;
             let at = |share: f64| a + (b - a) * share;
             Some(up_through(&drawn.view.lens, [at(1.0 / 3.0), at(2.0 / 3.0)], drawn.shown.eye_m))
         }

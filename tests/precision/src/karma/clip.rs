@@ -11,7 +11,7 @@ use glam::DVec2;
 use crate::{horizon::video, recorded};
 
 /// Pictures and gyro on one clock, the container's.
-pub struct Clip {
+pub struct KarmaClip {
     /// Time and JPEG of each picture.
     pub pictures: Vec<(Time, Vec<u8>)>,
     /// The gyro's samples by `arrival`, bias included.
@@ -20,7 +20,7 @@ pub struct Clip {
 
 /// A cloud as it was followed.
 #[derive(Clone, Debug)]
-pub struct Track {
+pub struct CloudTrack {
     /// Picture and place, pixels.
     pub seen: Vec<(usize, DVec2)>,
     /// Whether no fit sees it.
@@ -32,7 +32,7 @@ const CLOUDS: f64 = 0.36;
 /// Stripes of the picture that are turn about used and held out.
 const STRIPES: f64 = 9.0;
 
-impl Clip {
+impl KarmaClip {
     /// The clip; `None`, with a word of it, where it or ffmpeg is absent.
     pub fn load() -> Result<Option<Self>> {
         let Some(path) = recorded::find(video::KARMA) else { return Ok(None) };
@@ -43,9 +43,9 @@ impl Clip {
 
     /// Clouds of picture `first`, followed up to picture `end`; those in the odd stripes (`held` 1) or in the even ones (0) are
     /// held out.
-    pub fn follow(&self, first: usize, end: usize, held: usize) -> Result<Vec<Track>> {
+    pub fn follow(&self, first: usize, end: usize, held: usize) -> Result<Vec<CloudTrack>> {
         let mut tracker: Option<Tracker> = None;
-        let mut tracks: Vec<Track> = Vec::new();
+        let mut tracks: Vec<CloudTrack> = Vec::new();
         for (i, (_, jpeg)) in self.pictures.iter().enumerate().take(end).skip(first) {
             let picture = Gray::from_jpeg(jpeg)?;
             let places = match &mut tracker {
@@ -57,7 +57,7 @@ impl Clip {
             };
             if tracks.is_empty() {
                 let stripe = |at: &DVec2| (at.x / picture.width() as f64 * STRIPES) as usize;
-                let track = |p: &Option<DVec2>| Track {
+                let track = |p: &Option<DVec2>| CloudTrack {
                     seen: Vec::new(),
                     held_out: p.is_some_and(|at| stripe(&at) % 2 == held),
                 };

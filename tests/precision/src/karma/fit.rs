@@ -17,7 +17,7 @@ use glam::{DQuat, DVec2, DVec3};
 use nalgebra::{SMatrix, SVector};
 use rayon::prelude::*;
 
-use super::clip::Track;
+use super::clip::CloudTrack;
 
 /// Rotation (3), offset, bias (3), logarithm of the focal length, k1, k2, read-out time, growth of the bias (3).
 pub const UNKNOWNS: usize = 14;
@@ -37,12 +37,12 @@ const GROWTH: usize = 11;
 const ASSUMED: [f64; UNKNOWNS] =
     [0.05, 0.05, 0.05, 0.5, 0.05, 0.05, 0.05, 0.3, 0.3, 0.2, 0.02, 1e-4, 1e-4, 1e-4];
 
-type Vector = SVector<f64, UNKNOWNS>;
-type Matrix = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+type KarmaVector = SVector<f64, UNKNOWNS>;
+type KarmaMatrix = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
-/// What is solved for.
+/// Unknowns of the fit.
 #[derive(Clone, Copy, Debug)]
-pub struct Unknowns {
+pub struct KarmaUnknowns {
     /// Rotation from the unit's axes to the camera's.
     pub camera_from_imu: DQuat,
     /// Added to a picture's time for the unit's time of its middle row, seconds.
@@ -57,7 +57,7 @@ pub struct Unknowns {
     pub readout_s: f64,
 }
 
-impl Unknowns {
+impl KarmaUnknowns {
     /// The lens's k1 and k2.
     pub fn radial(&self) -> DVec2 {
         match self.lens.distortion {
@@ -66,7 +66,7 @@ impl Unknowns {
         }
     }
 
-    fn plus(&self, step: &Vector) -> Self {
+    fn plus(&self, step: &KarmaVector) -> Self {
         let three = |i: usize| DVec3::new(step[i], step[i + 1], step[i + 2]);
         let lens = Lens {
             focal: self.lens.focal * step[FOCAL].exp(),
@@ -87,41 +87,41 @@ impl Unknowns {
     }
 }
 
-/// What was found.
+/// Result of the fit.
 #[derive(Clone, Debug)]
-pub struct Found {
+pub struct KarmaFit {
     /// The unknowns.
-    pub at: Unknowns,
+    pub at: KarmaUnknowns,
     /// Their covariance.
-    pub covariance: Matrix,
+    pub covariance: KarmaMatrix,
     /// Root mean square of the residuals on an axis, pixels of the picture, outliers bounded.
     pub rms_px: f64,
 }
 
-impl Found {
+impl KarmaFit {
     /// Standard deviation of an unknown.
     pub fn sigma(&self, unknown: usize) -> f64 {
         self.covariance[(unknown, unknown)].max(0.0).sqrt()
     }
 }
 
-/// What is measured.
-pub struct Measured<'a> {
+/// Measurements of the fit.
+pub struct KarmaMeasured<'a> {
     /// Time of each picture.
     pub times: &'a [Time],
     /// The gyro.
     pub samples: &'a [ImuSample],
     /// Clouds.
-    pub tracks: Vec<&'a Track>,
+    pub tracks: Vec<&'a CloudTrack>,
 }
 
 /// Residuals beyond this pull no harder, pixels (Huber 1964).
 const ROBUST_PX: f64 = 1.0;
 const ITERATIONS: usize = 25;
 
-impl Measured<'_> {
+impl KarmaMeasured<'_> {
     /// The orientation at which a place of picture `i` was exposed, and where in the world it looks.
-    fn world(&self, at: &Unknowns, path: &GyroPath, i: usize, place: DVec2) -> Option<(DQuat, DVec3)> {
+    fn world(&self, at: &KarmaUnknowns, path: &GyroPath, i: usize, place: DVec2) -> Option<(DQuat, DVec3)> {
         let row = place.y / f64::from(at.lens.height) - 0.5;
         let time = self.times.get(i)?.plus_secs(at.offset_s + row * at.readout_s);
         let world_from_camera = path.world_from_imu(time) * at.camera_from_imu.inverse();
@@ -129,7 +129,13 @@ impl Measured<'_> {
     }
 
     /// By how much a cloud that stands in direction `world` was seen elsewhere, pixels, picture by picture.
-    pub fn misses(&self, at: &Unknowns, path: &GyroPath, track: &Track, world: DVec3) -> Vec<DVec2> {
+    pub fn misses(
+        &self,
+        at: &KarmaUnknowns,
+        path: &GyroPath,
+        track: &CloudTrack,
+        world: DVec3,
+    ) -> Vec<DVec2> {
         let miss = |(i, place): &(usize, DVec2)| {
             let (world_from_camera, _) = self.world(at, path, *i, *place)?;
             Some(at.lens.project(world_from_camera.inverse() * world)? - *place)
@@ -139,22 +145,22 @@ impl Measured<'_> {
     }
 
     /// The mean direction of a cloud over its first `count` pictures.
-    pub fn direction(&self, at: &Unknowns, path: &GyroPath, track: &Track, count: usize) -> DVec3 {
+    pub fn direction(&self, at: &KarmaUnknowns, path: &GyroPath, track: &CloudTrack, count: usize) -> DVec3 {
         let all = track.seen.iter().take(count).filter_map(|(i, place)| self.world(at, path, *i, *place));
         all.map(|(_, d)| d).sum::<DVec3>().normalize_or_zero()
     }
 
     /// The gyro's path with that bias.
-    pub fn path(&self, at: &Unknowns) -> GyroPath {
+    pub fn path(&self, at: &KarmaUnknowns) -> GyroPath {
         let first = self.samples.first().map_or(Time::MIN, |s| s.arrival);
         let grown =
             |s: &ImuSample| ImuSample { rate: s.rate - at.growth * s.arrival.secs_since(first), ..*s };
         GyroPath::integrate(&self.samples.iter().map(grown).collect::<Vec<_>>(), at.bias)
     }
 
-    fn residuals(&self, at: &Unknowns) -> Vec<Vec<DVec2>> {
+    fn residuals(&self, at: &KarmaUnknowns) -> Vec<Vec<DVec2>> {
         let path = self.path(at);
-        let of = |track: &&Track| {
+        let of = |track: &&CloudTrack| {
             let mean = self.direction(at, &path, track, usize::MAX);
             self.misses(at, &path, track, mean)
         };
@@ -162,15 +168,15 @@ impl Measured<'_> {
     }
 
     /// The unknowns that leave least, from `start`, which also stands for what is assumed.
-    pub fn solve(&self, start: &Unknowns) -> Option<Found> {
-        let assumed = Matrix::from_diagonal(&Vector::from_fn(|i, _| ASSUMED[i].powi(-2)));
-        let mut total = Vector::zeros();
+    pub fn solve(&self, start: &KarmaUnknowns) -> Option<KarmaFit> {
+        let assumed = KarmaMatrix::from_diagonal(&KarmaVector::from_fn(|i, _| ASSUMED[i].powi(-2)));
+        let mut total = KarmaVector::zeros();
         let mut damping = 1e-3;
         let mut now = self.normal(start, &total, &assumed);
         for _ in 0..ITERATIONS {
             let mut better = None;
             for _ in 0..8 {
-                let damped = now.matrix + Matrix::from_diagonal(&(now.matrix.diagonal() * damping));
+                let damped = now.matrix + KarmaMatrix::from_diagonal(&(now.matrix.diagonal() * damping));
                 let step = -damped.try_inverse()? * now.gradient;
                 let next = total + step;
                 if self.cost(start, &next, &assumed) < now.cost {
@@ -190,17 +196,17 @@ impl Measured<'_> {
         let inverse = now.matrix.try_inverse()?;
         let covariance = inverse * (now.groups + assumed) * inverse;
         let rms_px = (now.squares / now.count.max(1.0)).sqrt();
-        Some(Found { at: start.plus(&total), covariance, rms_px })
+        Some(KarmaFit { at: start.plus(&total), covariance, rms_px })
     }
 
-    fn cost(&self, start: &Unknowns, total: &Vector, assumed: &Matrix) -> f64 {
+    fn cost(&self, start: &KarmaUnknowns, total: &KarmaVector, assumed: &KarmaMatrix) -> f64 {
         let huber = |r: f64| if r < ROBUST_PX { r * r } else { ROBUST_PX * (2.0 * r - ROBUST_PX) };
         let seen: f64 = self.residuals(&start.plus(total)).iter().flatten().map(|r| huber(r.length())).sum();
         seen / SIGMA_PX.powi(2) + (total.transpose() * assumed * total)[(0, 0)]
     }
 
-    fn normal(&self, start: &Unknowns, total: &Vector, assumed: &Matrix) -> Normal {
-        let step = Vector::from_fn(|i, _| ASSUMED[i] * 1e-4);
+    fn normal(&self, start: &KarmaUnknowns, total: &KarmaVector, assumed: &KarmaMatrix) -> KarmaNormal {
+        let step = KarmaVector::from_fn(|i, _| ASSUMED[i] * 1e-4);
         let side = |i: usize, sign: f64| {
             let mut moved = *total;
             moved[i] += sign * step[i];
@@ -208,29 +214,29 @@ impl Measured<'_> {
         };
         let sides: Vec<_> = (0..UNKNOWNS).into_par_iter().map(|i| (side(i, 1.0), side(i, -1.0))).collect();
         let now = self.residuals(&start.plus(total));
-        let mut out = Normal {
+        let mut out = KarmaNormal {
             matrix: *assumed,
             gradient: assumed * total,
-            groups: Matrix::zeros(),
+            groups: KarmaMatrix::zeros(),
             cost: self.cost(start, total, assumed),
             squares: 0.0,
             count: 0.0,
         };
-        let mut seconds: BTreeMap<i64, Vector> = BTreeMap::new();
+        let mut seconds: BTreeMap<i64, KarmaVector> = BTreeMap::new();
         for (t, residuals) in now.iter().enumerate() {
-            let mut group = Vector::zeros();
+            let mut group = KarmaVector::zeros();
             for (s, r) in residuals.iter().enumerate() {
                 let weight = ROBUST_PX / r.length().max(ROBUST_PX);
                 let slope = |u: usize| (sides[u].0[t][s] - sides[u].1[t][s]) / (2.0 * step[u]);
                 let slopes: [DVec2; UNKNOWNS] = std::array::from_fn(slope);
                 for axis in 0..2 {
-                    let j = Vector::from_fn(|u, _| slopes[u][axis]) / SIGMA_PX;
+                    let j = KarmaVector::from_fn(|u, _| slopes[u][axis]) / SIGMA_PX;
                     out.matrix += j * j.transpose() * weight;
                     let pull = j * (r[axis] / SIGMA_PX * weight);
                     group += pull;
                     let time = self.tracks[t].seen.get(s).and_then(|(i, _)| self.times.get(*i));
                     let second = time.map_or(0, |time| time.ns() / NS_PER_S);
-                    *seconds.entry(second).or_insert_with(Vector::zeros) += pull;
+                    *seconds.entry(second).or_insert_with(KarmaVector::zeros) += pull;
                     out.squares += r[axis] * r[axis] * weight;
                     out.count += 1.0;
                 }
@@ -245,13 +251,13 @@ impl Measured<'_> {
     }
 }
 
-/// What a sight is taken to err by, pixels: it weighs sights against what is assumed.
+/// Assumed error of a sight, pixels: it weighs sights against the prior.
 const SIGMA_PX: f64 = 0.5;
 
-struct Normal {
-    matrix: Matrix,
-    gradient: Vector,
-    groups: Matrix,
+struct KarmaNormal {
+    matrix: KarmaMatrix,
+    gradient: KarmaVector,
+    groups: KarmaMatrix,
     cost: f64,
     squares: f64,
     count: f64,

@@ -5,9 +5,9 @@ use bowwave_core::estimate::attitude::turn_between;
 use glam::{DQuat, DVec3, Quat};
 
 use super::About;
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, PartBench};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "attitude",
     what: "Turns a gyro's angular rates into the orientation of the gun.",
@@ -47,11 +47,11 @@ fn samples(motion: Coning, seconds: f64) -> Vec<(f64, DVec3)> {
 }
 
 /// Told the number of a sample and the orientation then.
-type Tell<'a> = &'a mut dyn FnMut(usize, DQuat);
+type TellSample<'a> = &'a mut dyn FnMut(usize, DQuat);
 /// Tells the orientation at every sample, started from the truth at the first.
-type Integrator = fn(DQuat, &[(f64, DVec3)], Tell<'_>);
+type Integrator = fn(DQuat, &[(f64, DVec3)], TellSample<'_>);
 
-fn product(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+fn product(start: DQuat, samples: &[(f64, DVec3)], tell: TellSample<'_>) {
     let mut q = start;
     let mut before = None;
     for (i, w) in samples.windows(2).enumerate() {
@@ -66,7 +66,7 @@ fn product(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
 fn step_by_step(
     start: DQuat,
     samples: &[(f64, DVec3)],
-    tell: Tell<'_>,
+    tell: TellSample<'_>,
     turn: impl Fn(DVec3, DVec3, f64) -> DVec3,
 ) {
     let mut q = start;
@@ -76,15 +76,15 @@ fn step_by_step(
     }
 }
 
-fn euler(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+fn euler(start: DQuat, samples: &[(f64, DVec3)], tell: TellSample<'_>) {
     step_by_step(start, samples, tell, |a, _, h| a * h);
 }
 
-fn mean_rate(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+fn mean_rate(start: DQuat, samples: &[(f64, DVec3)], tell: TellSample<'_>) {
     step_by_step(start, samples, tell, |a, b, h| (a + b) * (0.5 * h));
 }
 
-fn single_precision(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+fn single_precision(start: DQuat, samples: &[(f64, DVec3)], tell: TellSample<'_>) {
     let mut q = start.as_quat();
     for (i, w) in samples.windows(2).enumerate() {
         let turn = (w[0].1 + w[1].1) * 0.5 * (w[1].0 - w[0].0);
@@ -95,7 +95,7 @@ fn single_precision(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
 
 /// Classical Runge-Kutta on the quaternion's differential equation, two gyro samples a step. The sample between is answered
 /// by the mean rate from the step before: no later sample is known then.
-fn runge_kutta(start: DQuat, samples: &[(f64, DVec3)], tell: Tell<'_>) {
+fn runge_kutta(start: DQuat, samples: &[(f64, DVec3)], tell: TellSample<'_>) {
     let derivative = |q: DQuat, w: DVec3| q * DQuat::from_xyzw(w.x, w.y, w.z, 0.0) * 0.5;
     let mut q = start;
     let mut at = 0;
@@ -126,30 +126,30 @@ fn error_deg(motion: Coning, seconds: f64, integrate: Integrator) -> f64 {
     worst.to_degrees()
 }
 
-const METHODS: [(&str, &str, Integrator); 5] = [
-    ("Euler", "f64", euler),
-    ("mean rate", "f32", single_precision),
-    ("mean rate", "f64", mean_rate),
-    ("Magnus, parabola", "f64", product),
-    ("Runge-Kutta 4", "f64, double step", runge_kutta),
+const METHODS: [Candidate<Integrator>; 5] = [
+    Candidate::rival("Euler", "f64", euler),
+    Candidate::rival("mean rate", "f32", single_precision),
+    Candidate::rival("mean rate", "f64", mean_rate),
+    Candidate::product("Magnus, parabola", "f64", product),
+    Candidate::rival("Runge-Kutta 4", "f64, double step", runge_kutta),
 ];
 
 const EXCUSE: &str = "Runge-Kutta needs pairs of even steps, and either errs far less than a gyro drifts";
 
 /// Measures the scene and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let gun = Coning { a: 0.3, b: 0.15, c: 0.6 };
     let sampled = samples(gun, 60.0);
     let sampled = &sampled;
-    let ways = METHODS.map(|(method, setting, integrate)| {
-        let error = error_deg(gun, 60.0, integrate);
+    let ways = METHODS.map(|m| {
+        let error = error_deg(gun, 60.0, m.run);
         let work = move || {
             let mut last = DQuat::IDENTITY;
-            integrate(gun.at(0.0), sampled, &mut |_, q| last = q);
+            (m.run)(gun.at(0.0), sampled, &mut |_, q| last = q);
             last
         };
-        let way = Way::new(method, setting, error, sampled.len(), work).holds(size_of::<(DQuat, DVec3)>());
-        if method.starts_with("Magnus") { way.default_although(EXCUSE) } else { way }
+        let way = m.way(error, sampled.len(), work).holds(size_of::<(DQuat, DVec3)>());
+        if m.default { way.default_although(EXCUSE) } else { way }
     });
     bench.scene("gun and ship turning, 60 s", "deg", 1e-12, ways.into());
     for (case, motion, seconds) in [
@@ -157,11 +157,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("creep of 0.1 deg/s, 10 min", Coning { a: 1.745e-3, b: 0.1, c: 0.0 }, 600.0),
         ("coning at 20 rad/s, 10 s", Coning { a: 5.0, b: 0.3, c: 20.0 }, 10.0),
     ] {
-        let tried = METHODS.map(|(method, setting, integrate)| Tried {
-            default: method.starts_with("Magnus"),
-            ..Tried::rival(method, setting, error_deg(motion, seconds, integrate))
-        });
-        bench.extreme(case, "deg", tried.into());
+        bench.extreme(case, "deg", METHODS.map(|m| m.tried(error_deg(motion, seconds, m.run))).into());
     }
     Ok(())
 }

@@ -13,14 +13,14 @@ use glam::DQuat;
 
 use super::About;
 use crate::{
-    bench::{Bench, Tried, thread_ns},
+    bench::{ExtremeResult, PartBench, thread_ns},
     target::{
-        moved::{Moved, Taken},
+        moved::{BoardFilm, MovedBoard},
         shots::board,
     },
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "board",
     what: "Calibrates camera and inertial unit from pictures of a board, taken while both are moved by hand.",
@@ -34,7 +34,7 @@ pub const ABOUT: About = About {
 /// How the read-out is taken into account.
 const WAYS: [&str; 3] = ["ignored", "given", "found from the board"];
 
-fn solve(moved: &Moved, pictures: &[Taken], way: &str) -> Option<(DQuat, f64, String)> {
+fn solve(moved: &MovedBoard, pictures: &[BoardFilm], way: &str) -> Option<(DQuat, f64, String)> {
     let mut watcher = Watcher::new(moved.lens(), 5.0).with_board(Box::new(BoardFinder::new(moved.target)));
     let plain = Capture::new(moved.lens(), 5.0);
     let mut capture = match way {
@@ -66,11 +66,11 @@ fn solve(moved: &Moved, pictures: &[Taken], way: &str) -> Option<(DQuat, f64, St
 }
 
 /// Measures the extreme cases; none is timed against another, since a maintainer waits for it once.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let (seconds, readouts_ms): (f64, &[f64]) =
         if bench.is_quick() { (4.4, &[30.0]) } else { (9.4, &[0.0, 10.0, 30.0]) };
     for readout_ms in readouts_ms {
-        let mut moved = Moved::by_hand(board(), seconds, 30.0, 21);
+        let mut moved = MovedBoard::by_hand(board(), seconds, 30.0, 21);
         moved.recipe.readout_s = readout_ms * 1e-3;
         let pictures = moved.pictures()?;
         let found: Vec<_> = WAYS.iter().map(|way| (*way, solve(&moved, &pictures, way))).collect();
@@ -85,8 +85,9 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
                     }
                 });
                 let note = found.as_ref().map_or(String::new(), |f| f.2.clone());
-                let tried = Tried::rival("board moved by hand", &format!("read-out {way}"), error).note(note);
-                Tried { default: *way != "ignored", ..tried }
+                let tried =
+                    ExtremeResult::rival("board moved by hand", &format!("read-out {way}"), error).note(note);
+                ExtremeResult { default: *way != "ignored", ..tried }
             });
             bench.extreme(&format!("read-out of {readout_ms} ms, {what}"), unit, tried.collect());
         }

@@ -9,9 +9,9 @@ use bowwave_core::time::Time;
 use glam::{DQuat, DVec3};
 
 use super::{About, rms};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, PartBench};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "calibration",
     what: "Finds how the inertial unit sits on the camera and how far their clocks are apart, from a minute of pictures of a target.",
@@ -25,27 +25,27 @@ pub const ABOUT: About = About {
           takes a fraction of a second once in a calibration, so that its time does not count",
 };
 
-type Answer = (DQuat, f64);
-type Method = fn(&[ImuReading], &[Observation]) -> Option<Answer>;
+type SolvedPair = (DQuat, f64);
+type PairSolver = fn(&[ImuReading], &[Observation]) -> Option<SolvedPair>;
 
-fn ours(readings: &[ImuReading], observations: &[Observation]) -> Option<Answer> {
+fn ours(readings: &[ImuReading], observations: &[Observation]) -> Option<SolvedPair> {
     let options = Options::default();
     solve(readings, observations, &options).ok().map(|a| (a.camera_from_imu, a.offset_s))
 }
 
-fn singular_values(readings: &[ImuReading], observations: &[Observation]) -> Option<Answer> {
+fn singular_values(readings: &[ImuReading], observations: &[Observation]) -> Option<SolvedPair> {
     let options = Options::default();
     closed_form(readings, observations, &options).ok().map(|s| (s.camera_from_imu, s.offset_s))
 }
 
 /// Hand-eye calibration that believes the stamps.
-fn hand_eye(readings: &[ImuReading], observations: &[Observation]) -> Option<Answer> {
+fn hand_eye(readings: &[ImuReading], observations: &[Observation]) -> Option<SolvedPair> {
     let options = Options { offset_range_s: 0.01, ..Options::default() };
     closed_form(readings, observations, &options).ok().map(|s| (s.camera_from_imu, 0.0))
 }
 
 /// Everything through single precision, stamps in seconds since a start six hours ago.
-fn single(readings: &[ImuReading], observations: &[Observation]) -> Option<Answer> {
+fn single(readings: &[ImuReading], observations: &[Observation]) -> Option<SolvedPair> {
     let origin = readings.first()?.time.plus_secs(-6.0 * 3600.0);
     let time = |t: Time| origin.plus_secs(f64::from(t.secs_since(origin) as f32));
     let readings: Vec<ImuReading> = readings
@@ -65,15 +65,15 @@ fn single(readings: &[ImuReading], observations: &[Observation]) -> Option<Answe
     ours(&readings, &observations)
 }
 
-const METHODS: [(&str, &str, Method); 4] = [
-    ("hand-eye, singular values", "stamps believed", hand_eye),
-    ("hand-eye, singular values", "correlated offset", singular_values),
-    ("filtered least squares", "through f32", single),
-    ("filtered least squares", "f64", ours),
+const METHODS: [Candidate<PairSolver>; 4] = [
+    Candidate::rival("hand-eye, singular values", "stamps believed", hand_eye),
+    Candidate::rival("hand-eye, singular values", "correlated offset", singular_values),
+    Candidate::rival("filtered least squares", "through f32", single),
+    Candidate::product("filtered least squares", "f64", ours),
 ];
 
 /// Errors of an answer: milliradians and milliseconds; half a turn and the search's range where there is none.
-fn errors(recipe: &Recipe, answer: Option<Answer>) -> (f64, f64) {
+fn errors(recipe: &Recipe, answer: Option<SolvedPair>) -> (f64, f64) {
     answer.map_or((std::f64::consts::PI * 1e3, 600.0), |(q, offset)| {
         let off = (recipe.camera_from_imu * q.inverse()).to_array();
         let half = off[..3].iter().map(|v| v * v).sum::<f64>().sqrt().min(1.0).asin();
@@ -81,14 +81,14 @@ fn errors(recipe: &Recipe, answer: Option<Answer>) -> (f64, f64) {
     })
 }
 
-fn both(recordings: &[Recording], method: Method) -> (f64, f64) {
+fn both(recordings: &[Recording], method: PairSolver) -> (f64, f64) {
     let all: Vec<(f64, f64)> =
         recordings.iter().map(|r| errors(&r.recipe, method(&r.readings, &r.orientations))).collect();
     (rms(all.iter().map(|e| e.0)), rms(all.iter().map(|e| e.1)))
 }
 
 /// An extreme case: its name and how it changes half a minute by hand.
-type Case = (&'static str, fn(Recipe) -> Recipe, fn(&mut Recording));
+type SpoiltMinute = (&'static str, fn(Recipe) -> Recipe, fn(&mut Recording));
 
 fn same(recipe: Recipe) -> Recipe {
     recipe
@@ -124,7 +124,7 @@ fn backward(recording: &mut Recording) {
     }
 }
 
-const CASES: [Case; 14] = [
+const CASES: [SpoiltMinute; 14] = [
     ("a minute by hand, 0.1 deg, 2 ms", |r| Recipe { seconds: 60.0, ..r }, whole),
     ("500 ms of offset", |r| Recipe { offset_s: 0.5, ..r }, whole),
     (
@@ -152,7 +152,7 @@ const CASES: [Case; 14] = [
 ];
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let seeds = if bench.is_quick() { 3 } else { 12 };
     let record = |motion, seconds, seed| {
         let minute = Recipe::minute(motion, 0.1f64.to_radians(), 2e-3, seed);
@@ -162,15 +162,15 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     let recordings: Vec<Recording> = (0..seeds)
         .map(|seed| Recipe::minute(Motion::ByHand, 0.02f64.to_radians(), 0.0, seed).record())
         .collect();
-    let measured = METHODS.map(|(_, _, method)| both(&recordings, method));
+    let measured = METHODS.map(|m| both(&recordings, m.run));
     let first = &recordings[..1];
     for (scene, unit, pick) in [
         ("a minute by hand, 0.02 deg, steady stamps, rotation", "mrad", (|e| e.0) as fn((f64, f64)) -> f64),
         ("a minute by hand, 0.02 deg, steady stamps, offset", "ms", |e| e.1),
     ] {
-        let ways = METHODS.iter().zip(measured).map(|((method, setting, solve), errors)| {
-            let work = move || first.iter().map(|r| solve(&r.readings, &r.orientations)).collect::<Vec<_>>();
-            Way::new(method, setting, pick(errors), 1, work).default_if(*setting == "f64")
+        let ways = METHODS.iter().zip(measured).map(|(m, errors)| {
+            let work = || first.iter().map(|r| (m.run)(&r.readings, &r.orientations)).collect::<Vec<_>>();
+            m.way(pick(errors), 1, work)
         });
         bench.scene(scene, unit, 1e-6, ways.collect());
     }
@@ -182,12 +182,9 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
                 recording
             })
             .collect();
-        let measured = METHODS.map(|(method, setting, solve)| (method, setting, both(&recordings, solve)));
+        let measured = METHODS.map(|m| (m, both(&recordings, m.run)));
         for (unit, pick) in [("mrad", (|e| e.0) as fn((f64, f64)) -> f64), ("ms", |e| e.1)] {
-            let tried = measured.map(|(method, setting, errors)| Tried {
-                default: setting == "f64",
-                ..Tried::rival(method, setting, pick(errors))
-            });
+            let tried = measured.map(|(m, errors)| m.tried(pick(errors)));
             let what = if unit == "mrad" { "rotation" } else { "offset" };
             bench.extreme(&format!("{case}, {what}"), unit, tried.into());
         }
@@ -196,8 +193,8 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     Ok(())
 }
 
-/// What must be refused: the error is the share that was not.
-fn refusals(bench: &mut Bench, record: impl Fn(Motion, f64, u64) -> Recipe) {
+/// Recordings that must be refused: the error is the share that was not.
+fn refusals(bench: &mut PartBench, record: impl Fn(Motion, f64, u64) -> Recipe) {
     let count = 4;
     for (case, motion, flip) in [
         ("traverse only must be refused", Motion::TraverseOnly, DVec3::ONE),
@@ -212,14 +209,10 @@ fn refusals(bench: &mut Bench, record: impl Fn(Motion, f64, u64) -> Recipe) {
                 recording
             })
             .collect();
-        let taken = |method: Method| {
+        let taken = |method: PairSolver| {
             let taken = recordings.iter().filter(|r| method(&r.readings, &r.orientations).is_some()).count();
             taken as f64 / count as f64
         };
-        let tried = METHODS.map(|(method, setting, solve)| Tried {
-            default: setting == "f64",
-            ..Tried::rival(method, setting, taken(solve))
-        });
-        bench.extreme(case, "share taken", tried.into());
+        bench.extreme(case, "share taken", METHODS.map(|m| m.tried(taken(m.run))).into());
     }
 }

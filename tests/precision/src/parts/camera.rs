@@ -10,14 +10,14 @@ use glam::DVec2;
 
 use super::{About, rms, worst};
 use crate::{
-    bench::{Bench, Tried, Way},
+    bench::{ExtremeResult, PartBench, Way},
     target::{
-        draw::{Shot, TrueLens, draw, true_corners},
+        draw::{BoardShot, TrueLens, draw, true_corners},
         shots::{board, exact, held},
     },
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "camera",
     what: "Finds focal length, centre and distortion from pictures of the board, which of two models the lens is, and how sure that is.",
@@ -30,7 +30,7 @@ pub const ABOUT: About = About {
 };
 
 fn views(lens: &TrueLens, target: &Target, count: usize, tilt: f64, noise: f64, seed: u64) -> Vec<View> {
-    let seen = |(i, shot): (usize, &Shot)| {
+    let seen = |(i, shot): (usize, &BoardShot)| {
         exact(target, &true_corners(target, lens, shot), noise, seed * 991 + i as u64)
     };
     held(lens, target, count, tilt, seed).iter().enumerate().map(seen).collect()
@@ -54,7 +54,7 @@ fn centre_error(lens: &TrueLens, camera: Option<&Camera>) -> f64 {
 const LENSES: [(&str, TrueLens); 2] = [("a pinhole", TrueLens::PINHOLE), ("a fisheye", TrueLens::FISHEYE)];
 
 /// Error against the number of pictures.
-fn pictures(bench: &mut Bench, target: &Target, seeds: u64) {
+fn pictures(bench: &mut PartBench, target: &Target, seeds: u64) {
     for (name, lens) in LENSES {
         let ways = [6, 12, 24, 40, 80].map(|count| {
             let all: Vec<Vec<View>> =
@@ -88,9 +88,9 @@ fn wild(views: &mut [View]) {
 }
 
 /// An extreme case: pictures, tilt, noise, and what is done to the corners.
-type Case = (&'static str, usize, f64, f64, fn(&mut [View]));
+type LensCase = (&'static str, usize, f64, f64, fn(&mut [View]));
 
-const CASES: [Case; 8] = [
+const CASES: [LensCase; 8] = [
     ("noise of .02 px", 24, 0.6, 0.02, |_| ()),
     ("noise of .5 px", 24, 0.6, 0.5, |_| ()),
     ("noise of 1 px", 24, 0.6, 1.0, |_| ()),
@@ -103,7 +103,7 @@ const CASES: [Case; 8] = [
     ("twelve corners a picture", 24, 0.6, 0.1, |v| v.iter_mut().for_each(|v| v.corners.truncate(12))),
 ];
 
-fn extremes(bench: &mut Bench, target: &Target, seeds: u64) {
+fn extremes(bench: &mut PartBench, target: &Target, seeds: u64) {
     for (name, lens) in LENSES {
         for (case, count, tilt, noise, spoil) in CASES {
             let found: Vec<Option<Camera>> = (0..seeds)
@@ -117,14 +117,15 @@ fn extremes(bench: &mut Bench, target: &Target, seeds: u64) {
             let error = worst(solved.iter().map(|c| focal_error(&lens, Some(c))));
             let beyond = worst(solved.iter().map(|c| focal_error(&lens, Some(c)) / c.focal_sigma_px()));
             let note = format!("{} of {seeds} solved; at most {beyond:.1} stated sigmas off", solved.len());
-            let tried = vec![Tried::product("bundle adjustment", "chosen by evidence", error).note(note)];
+            let tried =
+                vec![ExtremeResult::product("bundle adjustment", "chosen by evidence", error).note(note)];
             bench.extreme(&format!("{name}: {case}"), "px of focal length", tried);
         }
     }
 }
 
 /// How often the wrong model is chosen, and what it leaves where it took no part.
-fn models(bench: &mut Bench, target: &Target, seeds: u64) {
+fn models(bench: &mut PartBench, target: &Target, seeds: u64) {
     let mild = TrueLens { numbers: [905.0, 902.0, 652.0, 349.0, -0.05, 0.0, 0.0, 0.0], ..TrueLens::PINHOLE };
     for (name, lens) in [LENSES[0], LENSES[1], ("a pinhole with little distortion", mild)] {
         let truth = if lens.fisheye { Model::Fisheye } else { Model::RadialTangential };
@@ -138,9 +139,9 @@ fn models(bench: &mut Bench, target: &Target, seeds: u64) {
             &format!("{name}: taken for the other"),
             "%",
             vec![
-                Tried::product("two models", "chosen by evidence", share),
-                Tried::rival("one model", "pinhole", always(Model::RadialTangential)),
-                Tried::rival("one model", "fisheye", always(Model::Fisheye)),
+                ExtremeResult::product("two models", "chosen by evidence", share),
+                ExtremeResult::rival("one model", "pinhole", always(Model::RadialTangential)),
+                ExtremeResult::rival("one model", "fisheye", always(Model::Fisheye)),
             ],
         );
         let left = |model: Model| {
@@ -151,22 +152,26 @@ fn models(bench: &mut Bench, target: &Target, seeds: u64) {
             &format!("{name}: left over where it took no part"),
             "px",
             vec![
-                Tried::product("two models", "chosen by evidence", rms(chosen.map(|e| e.held_out_px))),
-                Tried::rival("one model", "pinhole", left(Model::RadialTangential)),
-                Tried::rival("one model", "fisheye", left(Model::Fisheye)),
+                ExtremeResult::product(
+                    "two models",
+                    "chosen by evidence",
+                    rms(chosen.map(|e| e.held_out_px)),
+                ),
+                ExtremeResult::rival("one model", "pinhole", left(Model::RadialTangential)),
+                ExtremeResult::rival("one model", "fisheye", left(Model::Fisheye)),
             ],
         );
     }
 }
 
 /// From drawn pictures to the lens.
-fn whole_way(bench: &mut Bench, target: &Target, count: usize) {
+fn whole_way(bench: &mut PartBench, target: &Target, count: usize) {
     for (name, lens) in LENSES {
         let directions = lens.directions();
         for (case, blur_px, noise) in [("sharp", 0.7, 2.0), ("dim and blurred", 1.8, 12.0)] {
             let found: Vec<View> = held(&lens, target, count, 0.7, 40)
                 .into_iter()
-                .map(|shot| draw(target, &lens, &directions, &Shot { blur_px, noise, ..shot }))
+                .map(|shot| draw(target, &lens, &directions, &BoardShot { blur_px, noise, ..shot }))
                 .filter_map(|p| Some(view(target, &detect(target, &Grey::new(p.size.0, p.size.1, &p.grey)?))))
                 .filter(|v| !v.corners.is_empty())
                 .collect();
@@ -184,7 +189,8 @@ fn whole_way(bench: &mut Bench, target: &Target, count: usize) {
             );
             let error = focal_error(&lens, camera.as_ref());
             let tried = vec![
-                Tried::product("detection and adjustment", &format!("{count} pictures"), error).note(note),
+                ExtremeResult::product("detection and adjustment", &format!("{count} pictures"), error)
+                    .note(note),
             ];
             bench.extreme(&format!("{name}: from drawn pictures, {case}"), "px of focal length", tried);
         }
@@ -192,7 +198,7 @@ fn whole_way(bench: &mut Bench, target: &Target, count: usize) {
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let target = board();
     let seeds = if bench.is_quick() { 3 } else { 12 };
     pictures(bench, &target, seeds);

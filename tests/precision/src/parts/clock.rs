@@ -5,9 +5,9 @@ use bowwave_core::{estimate::clock::ClockMap, time::Time};
 use anyhow::Result;
 
 use super::{About, even, rms, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, PartBench};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "clock",
     what: "Tells when, on the host's clock, a packet's device time was, from arrivals that are late by unknown delays.",
@@ -20,14 +20,14 @@ pub const ABOUT: About = About {
 };
 
 /// One packet: device time, arrival, truth.
-type Packet = (i64, Time, i64);
+type TimedPacket = (i64, Time, i64);
 
-fn packets(ppm: f64, seconds: i64, delay_ms: impl Fn(i64, f64) -> f64) -> Vec<Packet> {
+fn packets(ppm: f64, seconds: i64, delay_ms: impl Fn(i64, f64) -> f64) -> Vec<TimedPacket> {
     drifting(|_| ppm, seconds, delay_ms)
 }
 
 /// The device's clock is fast by `ppm` of the seconds since the start.
-fn drifting(ppm: impl Fn(f64) -> f64, seconds: i64, delay_ms: impl Fn(i64, f64) -> f64) -> Vec<Packet> {
+fn drifting(ppm: impl Fn(f64) -> f64, seconds: i64, delay_ms: impl Fn(i64, f64) -> f64) -> Vec<TimedPacket> {
     const STEP_NS: f64 = 5e6;
     let mut ahead_ns = 0.0;
     (0..seconds * 200)
@@ -66,12 +66,12 @@ fn timer(i: i64, u: f64) -> f64 {
     waits + 0.3 * u + busy
 }
 
-/// Errors after ten seconds in milliseconds, least constant removed.
-struct Errors(Vec<f64>);
+/// MapErrors after ten seconds in milliseconds, least constant removed.
+struct MapErrors(Vec<f64>);
 
-impl Errors {
-    fn of(packets: &[Packet], map: &mut dyn FnMut(i64, Time) -> i64) -> Self {
-        let of = |(device, arrival, truth): &Packet| (map(*device, *arrival) - truth) as f64 * 1e-6;
+impl MapErrors {
+    fn of(packets: &[TimedPacket], map: &mut dyn FnMut(i64, Time) -> i64) -> Self {
+        let of = |(device, arrival, truth): &TimedPacket| (map(*device, *arrival) - truth) as f64 * 1e-6;
         let mut errors: Vec<f64> = packets.iter().map(of).skip(2000).collect();
         let mean = errors.iter().sum::<f64>() / errors.len() as f64;
         errors.iter_mut().for_each(|e| *e -= mean);
@@ -130,35 +130,36 @@ fn least_lag(window: usize) -> impl FnMut(i64, Time) -> i64 {
     }
 }
 
-type Map = Box<dyn FnMut(i64, Time) -> i64>;
+type TimeMap = Box<dyn FnMut(i64, Time) -> i64>;
 
-/// One way: method, setting, bytes held, maker.
-type Method = (&'static str, &'static str, usize, fn() -> Map);
+/// Bytes held, and the maker.
+type MapMaker = (usize, fn() -> TimeMap);
 
-const METHODS: [Method; 5] = [
-    ("raw arrival", "", 0, || Box::new(|_, arrival: Time| arrival.ns())),
-    ("moving average", "10 s", 16_000, || Box::new(moving_average(2000))),
-    ("moving average", "60 s", 96_000, || Box::new(moving_average(12_000))),
-    ("least lag", "10 s", 0, || Box::new(least_lag(2000))),
-    ("lower hull", "30-60 s", size_of::<ClockMap>(), || Box::new(hull())),
+const METHODS: [Candidate<MapMaker>; 5] = [
+    Candidate::rival("raw arrival", "", (0, || Box::new(|_, arrival: Time| arrival.ns()))),
+    Candidate::rival("moving average", "10 s", (16_000, || Box::new(moving_average(2000)))),
+    Candidate::rival("moving average", "60 s", (96_000, || Box::new(moving_average(12_000)))),
+    Candidate::rival("least lag", "10 s", (0, || Box::new(least_lag(2000)))),
+    Candidate::product("lower hull", "30-60 s", (size_of::<ClockMap>(), || Box::new(hull()))),
 ];
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     for (scene, delay) in
         [("USB, exponential delay 0.5 ms", usb as fn(i64, f64) -> f64), ("16 ms timer, 80 ms bursts", timer)]
     {
         let packets = packets(35.0, 600, delay);
         let packets = &packets;
-        let ways = METHODS.map(|(method, setting, bytes, make)| {
-            let errors = Errors::of(packets, &mut make());
-            Way::new(method, setting, errors.rms(), packets.len(), move || {
-                let mut map = make();
-                packets.iter().map(|(d, a, _)| map(*d, *a)).fold(0i64, i64::wrapping_add)
-            })
-            .holds(bytes)
-            .note(format!("worst {:.3} ms", errors.worst()))
-            .default_if(method == "lower hull")
+        let ways = METHODS.map(|candidate| {
+            let (bytes, make) = candidate.run;
+            let errors = MapErrors::of(packets, &mut make());
+            candidate
+                .way(errors.rms(), packets.len(), move || {
+                    let mut map = make();
+                    packets.iter().map(|(d, a, _)| map(*d, *a)).fold(0i64, i64::wrapping_add)
+                })
+                .holds(bytes)
+                .note(format!("worst {:.3} ms", errors.worst()))
         });
         bench.scene(scene, "ms rms", 0.0, ways.into());
     }
@@ -198,12 +199,10 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
 }
 
 /// The worst errors of all methods.
-fn extreme(bench: &mut Bench, case: &str, packets: &[Packet], note: impl Fn(&Errors) -> String) {
-    let tried = METHODS.map(|(method, setting, _, make)| {
-        let errors = Errors::of(packets, &mut make());
-        let tried =
-            Tried { default: method == "lower hull", ..Tried::rival(method, setting, errors.worst()) };
-        tried.note(note(&errors))
+fn extreme(bench: &mut PartBench, case: &str, packets: &[TimedPacket], note: impl Fn(&MapErrors) -> String) {
+    let tried = METHODS.map(|candidate| {
+        let errors = MapErrors::of(packets, &mut candidate.run.1());
+        candidate.tried(errors.worst()).note(note(&errors))
     });
     bench.extreme(case, "ms", tried.into());
 }

@@ -8,9 +8,9 @@ use bowwave_core::{
 use palette::{IntoColor, Lab, LinSrgb, Srgb, color_difference::Ciede2000, white_point::D65};
 
 use super::{About, even, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "colour",
     what: "sRGB codes to linear light and back, and the camera's YUV to sRGB codes.",
@@ -52,17 +52,17 @@ fn colours() -> Vec<[f64; 3]> {
 }
 
 /// Ways of one conversion of a channel, collected with their errors.
-struct Collected<'a> {
+struct ColourWays<'a> {
     colours: &'a [[f64; 3]],
     used: &'a [f32],
     /// Into linear light of what this conversion answers, for the difference.
     answer_to_linear: fn(f64) -> f64,
     truth: fn(f64) -> f64,
     ways: Vec<Way<'a>>,
-    dark: Vec<Tried>,
+    dark: Vec<ExtremeResult>,
 }
 
-impl<'a> Collected<'a> {
+impl<'a> ColourWays<'a> {
     fn add(
         &mut self,
         default: bool,
@@ -75,14 +75,17 @@ impl<'a> Collected<'a> {
             apart(answered, exact)
         };
         let dark = (0..=400).map(|i| [f64::from(i) * 1e-4; 3]);
-        self.dark.push(Tried { default, ..Tried::rival(method, setting, worst(dark.map(|c| error(&c)))) });
+        self.dark.push(ExtremeResult {
+            default,
+            ..ExtremeResult::rival(method, setting, worst(dark.map(|c| error(&c))))
+        });
         let worst = worst(self.colours.iter().map(error));
         let used = self.used;
         let work = move || used.iter().map(|c| f(*c)).sum::<f32>();
         self.ways.push(Way::new(method, setting, worst, used.len(), work).holds(bytes).default_if(default));
     }
 
-    /// What two roundings of an f32 answer differ by: nothing finer can be asked for.
+    /// Difference of two roundings of an f32 answer: nothing finer can be asked for.
     fn floor(&self) -> f64 {
         let light = |c: f64| (self.answer_to_linear)(c);
         let rounded = |c: f64| f64::from((self.truth)(c) as f32);
@@ -105,9 +108,9 @@ fn table(steps: usize, f: fn(f64) -> f64, between: bool) -> impl Fn(f32) -> f32 
     }
 }
 
-fn codes_to_light(bench: &mut Bench, colours: &[[f64; 3]], used: &[f32]) {
+fn codes_to_light(bench: &mut PartBench, colours: &[[f64; 3]], used: &[f32]) {
     let (ways, dark) = (Vec::new(), Vec::new());
-    let mut all = Collected { colours, used, answer_to_linear: |l| l, truth: to_linear, ways, dark };
+    let mut all = ColourWays { colours, used, answer_to_linear: |l| l, truth: to_linear, ways, dark };
     all.add(false, ("square", "", 0), |c| c * c);
     // Chilliant 2012.
     all.add(false, ("cubic", "0.3053, 0.6822, 0.0125", 0), |c| {
@@ -122,9 +125,9 @@ fn codes_to_light(bench: &mut Bench, colours: &[[f64; 3]], used: &[f32]) {
     bench.extreme("sRGB code to light, greys below code 10 of 255", "CIEDE2000", all.dark);
 }
 
-fn light_to_codes(bench: &mut Bench, colours: &[[f64; 3]], used: &[f32]) {
+fn light_to_codes(bench: &mut PartBench, colours: &[[f64; 3]], used: &[f32]) {
     let (ways, dark) = (Vec::new(), Vec::new());
-    let mut all = Collected { colours, used, answer_to_linear: to_linear, truth: to_code, ways, dark };
+    let mut all = ColourWays { colours, used, answer_to_linear: to_linear, truth: to_code, ways, dark };
     all.add(false, ("square root", "", 0), f32::sqrt);
     // Chilliant 2012.
     all.add(false, ("three square roots", "", 0), |c| {
@@ -199,7 +202,7 @@ fn coded_apart(answered: [f32; 3], exact: [f64; 3]) -> f64 {
     apart(light(answered.map(f64::from)), light(exact))
 }
 
-fn camera_codes(bench: &mut Bench) {
+fn camera_codes(bench: &mut PartBench) {
     let all = yuv_codes();
     let inside = |c: &[f64; 3]| c.iter().all(|v| (0.0..=1.0).contains(v));
     let (inner, outer): (Vec<_>, Vec<_>) = all.into_iter().partition(|(_, rgb)| inside(rgb));
@@ -215,9 +218,9 @@ fn camera_codes(bench: &mut Bench) {
     // As above: the way in f64 is only rounded.
     let floor = 2.0 * of(YUV[3].2, &inner);
     bench.scene("BT.601 YUV to sRGB code", "CIEDE2000", floor, ways.into());
-    let tried = YUV.map(|(method, setting, f)| Tried {
+    let tried = YUV.map(|(method, setting, f)| ExtremeResult {
         default: setting == "f32",
-        ..Tried::rival(method, setting, of(f, &outer))
+        ..ExtremeResult::rival(method, setting, of(f, &outer))
     });
     bench.extreme("YUV codes outside the colour cube, clamped", "CIEDE2000", tried.into());
     let other = worst(
@@ -235,7 +238,7 @@ fn camera_codes(bench: &mut Bench) {
         "BT.709 video read as BT.601",
         "CIEDE2000",
         vec![
-            Tried::rival("wrong matrix", setting, other)
+            ExtremeResult::rival("wrong matrix", setting, other)
                 .note("what a camera costs that does not say its matrix"),
         ],
     );
@@ -243,14 +246,14 @@ fn camera_codes(bench: &mut Bench) {
         "limited range read as full",
         "CIEDE2000",
         vec![
-            Tried::rival("wrong range", setting, full)
+            ExtremeResult::rival("wrong range", setting, full)
                 .note("what a camera costs that does not say its range"),
         ],
     );
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let colours = colours();
     let used: Vec<f32> = (0..1024).map(|i| even(i) as f32).collect();
     codes_to_light(bench, &colours, &used);

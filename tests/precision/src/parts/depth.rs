@@ -1,12 +1,12 @@
-//! What distances the depth buffer tells apart.
+//! Distances that the depth buffer tells apart.
 
 use anyhow::Result;
 use bowwave_core::frame::view::NEAR_M;
 
 use super::{About, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, PartBench};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "depth",
     what: "Turns the distance of a point into the number by which the depth buffer orders points.",
@@ -41,32 +41,28 @@ fn logarithmic(z: f32) -> f32 {
     ((z / NEAR).log2() * (1.0 / (FAR_M / NEAR).log2())).min(1.0)
 }
 
-/// One way: method, setting, the stored number by the distance, whether it grows with the distance.
-type Method = (&'static str, &'static str, fn(f32) -> f32, bool);
+/// The stored number by the distance, and whether it grows with the distance.
+type DepthCode = (fn(f32) -> f32, bool);
 
-const METHODS: [Method; 8] = [
-    ("conventional", "24 bits", |z| bits24(conventional(z)), true),
-    ("conventional", "f32", conventional, true),
-    ("linear", "24 bits", |z| bits24(z / FAR_M), true),
-    ("reversed", "24 bits", |z| bits24(NEAR / z), false),
-    ("reversed, far plane", "f32", reversed_to_far, false),
-    ("reversed, infinite", "f32", |z| NEAR / z, false),
-    ("logarithmic", "24 bits", |z| bits24(logarithmic(z)), true),
-    ("logarithmic", "f32", logarithmic, true),
+const METHODS: [Candidate<DepthCode>; 8] = [
+    Candidate::rival("conventional", "24 bits", (|z| bits24(conventional(z)), true)),
+    Candidate::rival("conventional", "f32", (conventional, true)),
+    Candidate::rival("linear", "24 bits", (|z| bits24(z / FAR_M), true)),
+    Candidate::rival("reversed", "24 bits", (|z| bits24(NEAR / z), false)),
+    Candidate::rival("reversed, far plane", "f32", (reversed_to_far, false)),
+    Candidate::product("reversed, infinite", "f32", (|z| NEAR / z, false)),
+    Candidate::rival("logarithmic", "24 bits", (|z| bits24(logarithmic(z)), true)),
+    Candidate::rival("logarithmic", "f32", (logarithmic, true)),
 ];
 
-fn is_default(method: &Method) -> bool {
-    method.0 == "reversed, infinite"
-}
-
 /// Whether what is `step` behind `z` is stored as behind it, there and a little farther.
-fn ordered(method: &Method, z: f64, step: f64) -> bool {
-    let (here, sign) = ((method.2)(z as f32), if method.3 { 1.0 } else { -1.0 });
-    (0..4).all(|i| ((method.2)((z + step * (1.0 + 0.07 * f64::from(i))) as f32) - here) * sign > 0.0)
+fn ordered((code, grows): DepthCode, z: f64, step: f64) -> bool {
+    let (here, sign) = (code(z as f32), if grows { 1.0 } else { -1.0 });
+    (0..4).all(|i| (code((z + step * (1.0 + 0.07 * f64::from(i))) as f32) - here) * sign > 0.0)
 }
 
 /// Least step behind `z` that is told apart, metres.
-fn resolved(method: &Method, z: f64) -> f64 {
+fn resolved(method: DepthCode, z: f64) -> f64 {
     let mut high = z * 1e-9;
     while !ordered(method, z, high) {
         high *= 2.0;
@@ -87,12 +83,12 @@ fn distances(from: f64, to: f64) -> impl Iterator<Item = f64> {
     (0..400).map(move |i| from * (to / from).powf((f64::from(i) + 0.37) / 400.0))
 }
 
-fn coarsest(method: &Method, from: f64, to: f64) -> f64 {
+fn coarsest(method: DepthCode, from: f64, to: f64) -> f64 {
     worst(distances(from, to).map(|z| resolved(method, z)))
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let used: Vec<f32> = distances(0.5, 20_000.0).map(|z| z as f32).collect();
     let used = &used;
     for (scene, from, to) in [
@@ -100,11 +96,10 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("least step told apart, 0.5 m to 2 km", 0.5, 2000.0),
         ("least step told apart, 0.5 m to 20 km", 0.5, 20_000.0),
     ] {
-        let way = |m: &Method| {
-            let f = m.2;
+        let way = |m: &Candidate<DepthCode>| {
+            let (f, _) = m.run;
             let work = move || used.iter().map(|z| f(*z)).sum::<f32>();
-            let bytes = size_of::<f32>();
-            Way::new(m.0, m.1, coarsest(m, from, to), used.len(), work).default_if(is_default(m)).holds(bytes)
+            m.way(coarsest(m.run, from, to), used.len(), work).holds(size_of::<f32>())
         };
         // The distance itself is an f32: nothing finer than two of its steps can be asked for.
         let own = 2.0 * (f64::from((to as f32).next_up()) - to);
@@ -115,10 +110,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("a boat's far side, 19.9 to 20 km", 19_900.0, 20_000.0),
         ("beyond a far plane of 30 km, 40 to 100 km", 40_000.0, 100_000.0),
     ] {
-        let tried = METHODS
-            .iter()
-            .map(|m| Tried { default: is_default(m), ..Tried::rival(m.0, m.1, coarsest(m, from, to)) });
-        bench.extreme(case, "m", tried.collect());
+        bench.extreme(case, "m", METHODS.map(|m| m.tried(coarsest(m.run, from, to))).into());
     }
     Ok(())
 }
@@ -130,11 +122,11 @@ mod tests {
     #[test]
     fn steps_of_24_bits_are_those_of_the_textbook() {
         // Conventional depth: z^2 / (near * 2^24) far from the near plane, within a step's rounding.
-        let step = resolved(&METHODS[0], 1000.0);
+        let step = resolved(METHODS[0].run, 1000.0);
         let textbook = 1e6 / (0.1 * 16_777_216.0);
         assert!((0.4..1.6).contains(&(step / textbook)), "{step} m, {textbook} m");
         // Linear depth: the same everywhere.
-        let step = resolved(&METHODS[2], 1000.0);
+        let step = resolved(METHODS[2].run, 1000.0);
         assert!((0.3..1.3).contains(&(step / (30_000.0 / 16_777_216.0))), "{step} m");
     }
 }

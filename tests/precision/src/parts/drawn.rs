@@ -22,7 +22,7 @@ use super::{
     worst,
 };
 use crate::{
-    bench::{Bench, Tried, Way},
+    bench::{ExtremeResult, PartBench, Way},
     reflection::{
         cost::process_ms,
         draw::{Painter, picture},
@@ -30,7 +30,7 @@ use crate::{
     },
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "drawn lens",
     what: "Draws boats and wakes where the lens puts them.",
@@ -83,13 +83,13 @@ fn edges(model: &Model) -> Vec<[DVec3; 2]> {
 
 /// Where a boat lies: metres off, share of half the picture's width to the right, heading against the line of sight.
 #[derive(Clone, Copy)]
-struct Place {
+struct DrawnPlace {
     range_m: f64,
     right: f64,
     heading_deg: f64,
 }
 
-fn afloat(lens: &Lens, place: Place) -> Afloats {
+fn afloat(lens: &Lens, place: DrawnPlace) -> Afloats {
     let ray =
         lens.unproject(DVec2::new(0.5 * (1.0 + place.right) * f64::from(SIZE.0), f64::from(SIZE.1) / 2.0));
     let bearing = ray.x.atan2(ray.z);
@@ -197,10 +197,10 @@ fn view(lens: &Lens, camera: CameraPose, model: &Model, boats: &[Afloats]) -> Re
     Ok(scenes::scene((camera, *lens), SeaTones::default(), model, boats, (ReflectionMethod::Waves, force)))
 }
 
-fn timed(bench: &mut Bench, lens: &Lens) -> Result<()> {
+fn timed(bench: &mut PartBench, lens: &Lens) -> Result<()> {
     let model = resolve("dhow", std::path::Path::new(""))?;
     let boats: Vec<Afloats> = [(30.0, -0.6), (60.0, 0.1), (90.0, 0.5), (40.0, 0.8)]
-        .map(|(range_m, right)| afloat(lens, Place { range_m, right, heading_deg: 70.0 }))
+        .map(|(range_m, right)| afloat(lens, DrawnPlace { range_m, right, heading_deg: 70.0 }))
         .into();
     let camera = scenes::camera(EYE_M, 40.0);
     let straight = Lens { distortion: Distortion::None, ..*lens };
@@ -238,16 +238,16 @@ fn timed(bench: &mut Bench, lens: &Lens) -> Result<()> {
 }
 
 /// Measures a scene, and near and far boats and wakes through each lens.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     timed(bench, &strong())?;
     let lenses =
         [("60 deg, k1 -0.12", mild()), ("90 deg, k1 -0.25", strong()), ("fisheye of 120 deg", fisheye())];
     for (name, lens) in &lenses {
         let scales = [1.0, 2.0];
         let (chords, warped) = edge_errors(lens, SPLIT_PX, scales);
-        let mut tried = vec![Tried::product(BENT, "long edges split", chords)];
+        let mut tried = vec![ExtremeResult::product(BENT, "long edges split", chords)];
         tried.extend(scales.iter().zip(warped).map(|(scale, error)| {
-            Tried::rival("rectified and warped", &format!("{scale} px for one of the middle"), error)
+            ExtremeResult::rival("rectified and warped", &format!("{scale} px for one of the middle"), error)
         }));
         bench.extreme(&format!("pixels on a black edge, {name}"), "codes", tried);
         for (boat, range_m) in [
@@ -263,15 +263,15 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
             let edges: Vec<_> = [(0.0, 80.0), (0.75, 80.0), (0.75, 20.0), (-0.9, 130.0)]
                 .into_iter()
                 .flat_map(|(right, heading_deg)| {
-                    boat_edges(&model, &afloat(lens, Place { range_m, right, heading_deg }).pose())
+                    boat_edges(&model, &afloat(lens, DrawnPlace { range_m, right, heading_deg }).pose())
                 })
                 .collect();
             push(bench, &format!("{boat} at {range_m} m, {name}"), true, errors(lens, &camera, &edges));
-            let pose = afloat(lens, Place { range_m, right: 0.7, heading_deg: 80.0 }).pose();
+            let pose = afloat(lens, DrawnPlace { range_m, right: 0.7, heading_deg: 80.0 }).pose();
             let straight = Lens { distortion: Distortion::None, ..*lens };
             let tried = vec![
-                Tried::product("straight down", "by boat", aside_px(lens, &camera, &model, &pose)),
-                Tried::rival(
+                ExtremeResult::product("straight down", "by boat", aside_px(lens, &camera, &model, &pose)),
+                ExtremeResult::rival(
                     "straight down",
                     "without the lens",
                     aside_px(&straight, &camera, &model, &pose),
@@ -293,10 +293,10 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
 }
 
 /// Lists a case whose edges the product does or does not split.
-fn push(bench: &mut Bench, case: &str, split: bool, errors: [(&'static str, &'static str, f64); 4]) {
-    let tried = errors.map(|(method, setting, error)| Tried {
+fn push(bench: &mut PartBench, case: &str, split: bool, errors: [(&'static str, &'static str, f64); 4]) {
+    let tried = errors.map(|(method, setting, error)| ExtremeResult {
         default: method == BENT && split != setting.is_empty(),
-        ..Tried::rival(method, setting, error)
+        ..ExtremeResult::rival(method, setting, error)
     });
     bench.extreme(case, "px", tried.into());
 }

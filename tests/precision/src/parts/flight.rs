@@ -9,9 +9,9 @@ use differential_equations::prelude::*;
 use glam::DVec3;
 
 use super::{About, table, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "flight",
     what: "Flies a round as a point mass under gravity, drag and wind; the hit test sweeps its path.",
@@ -32,12 +32,12 @@ type Mass = [f64; 6];
 
 /// A round with drag in air that moves.
 #[derive(Clone, Copy)]
-struct Round {
+struct FlownRound {
     bc: f64,
     wind: DVec3,
 }
 
-impl Round {
+impl FlownRound {
     fn rate(&self, s: &Mass) -> Mass {
         let air = Atmosphere::ICAO.at(s[2]);
         let v = DVec3::new(s[3], s[4], s[5]);
@@ -50,7 +50,7 @@ impl Round {
     }
 }
 
-impl ODE<f64, Mass> for Round {
+impl ODE<f64, Mass> for FlownRound {
     fn diff(&self, _t: f64, y: &Mass, dydt: &mut Mass) {
         *dydt = self.rate(y);
     }
@@ -65,7 +65,7 @@ fn position(s: &Mass) -> DVec3 {
 }
 
 /// By the library's step control.
-fn dop853(round: &Round, velocity: DVec3, seconds: f64, tolerance: f64) -> Result<DVec3> {
+fn dop853(round: &FlownRound, velocity: DVec3, seconds: f64, tolerance: f64) -> Result<DVec3> {
     let method = ExplicitRungeKutta::dop853().rtol(tolerance).atol(tolerance).max_steps(1_000_000);
     let solution = IVP::ode(round, 0.0, seconds, start(velocity))
         .method(method)
@@ -78,13 +78,13 @@ fn plus(s: &Mass, rate: &Mass, h: f64) -> Mass {
     std::array::from_fn(|i| s[i] + rate[i] * h)
 }
 
-type Step = fn(&Round, &Mass, f64) -> Mass;
+type FlightStep = fn(&FlownRound, &Mass, f64) -> Mass;
 
-fn euler(round: &Round, s: &Mass, h: f64) -> Mass {
+fn euler(round: &FlownRound, s: &Mass, h: f64) -> Mass {
     plus(s, &round.rate(s), h)
 }
 
-fn semi_implicit(round: &Round, s: &Mass, h: f64) -> Mass {
+fn semi_implicit(round: &FlownRound, s: &Mass, h: f64) -> Mass {
     let mut next = plus(s, &round.rate(s), h);
     for i in 0..3 {
         next[i] = s[i] + next[i + 3] * h;
@@ -92,13 +92,13 @@ fn semi_implicit(round: &Round, s: &Mass, h: f64) -> Mass {
     next
 }
 
-fn heun(round: &Round, s: &Mass, h: f64) -> Mass {
+fn heun(round: &FlownRound, s: &Mass, h: f64) -> Mass {
     let k1 = round.rate(s);
     let k2 = round.rate(&plus(s, &k1, h));
     std::array::from_fn(|i| s[i] + (k1[i] + k2[i]) * (h / 2.0))
 }
 
-fn runge_kutta(round: &Round, s: &Mass, h: f64) -> Mass {
+fn runge_kutta(round: &FlownRound, s: &Mass, h: f64) -> Mass {
     let k1 = round.rate(s);
     let k2 = round.rate(&plus(s, &k1, h / 2.0));
     let k3 = round.rate(&plus(s, &k2, h / 2.0));
@@ -106,12 +106,12 @@ fn runge_kutta(round: &Round, s: &Mass, h: f64) -> Mass {
     std::array::from_fn(|i| s[i] + (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) * (h / 6.0))
 }
 
-fn fly(step: Step, round: &Round, velocity: DVec3, seconds: f64, h: f64) -> DVec3 {
+fn fly(step: FlightStep, round: &FlownRound, velocity: DVec3, seconds: f64, h: f64) -> DVec3 {
     let steps = (seconds / h).round() as usize;
     position(&(0..steps).fold(start(velocity), |s, _| step(round, &s, h)))
 }
 
-fn product(round: &Round, velocity: DVec3, seconds: f64) -> Option<DVec3> {
+fn product(round: &FlownRound, velocity: DVec3, seconds: f64) -> Option<DVec3> {
     let projectile = Projectile::new(round.bc, velocity.length())?;
     let direction = velocity.try_normalize().unwrap_or(DVec3::X);
     let mut flight = Flight::new(projectile, &Atmosphere::ICAO, DVec3::ZERO, direction, round.wind)?;
@@ -123,7 +123,7 @@ fn apart_mm(a: Option<DVec3>, b: DVec3) -> f64 {
     a.map_or(f64::NAN, |a| a.distance(b) * 1e3)
 }
 
-const STEPS: [(&str, Step, f64); 12] = [
+const STEPS: [(&str, FlightStep, f64); 12] = [
     ("Euler", euler, 0.01),
     ("Euler", euler, 0.001),
     ("semi-implicit Euler", semi_implicit, 0.01),
@@ -144,12 +144,12 @@ fn product_setting() -> String {
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     for (scene, velocity, seconds) in [
         ("BC 0.3, 850 m/s, 1 s, above Mach 1.5", DVec3::X * 850.0, 1.0),
         ("BC 0.3, 850 m/s, 2.4 s, through Mach 1", DVec3::X * 850.0, 2.4),
     ] {
-        let round = Round { bc: 0.3, wind: DVec3::new(0.0, 5.0, 0.0) };
+        let round = FlownRound { bc: 0.3, wind: DVec3::new(0.0, 5.0, 0.0) };
         let truth = dop853(&round, velocity, seconds, 1e-12)?;
         let coarse = dop853(&round, velocity, seconds, 1e-10)?;
         let mut ways = Vec::new();
@@ -200,13 +200,13 @@ fn crossing(mut advance: impl FnMut() -> DVec3, range: f64, h: f64) -> f64 {
 }
 
 /// Height at the ranges of the table from elsewhere.
-fn reference_case(bench: &mut Bench) {
+fn reference_case(bench: &mut PartBench) {
     let rows = table(REFERENCE);
     let case = format!("{} points of trajectories from elsewhere, 100 to 1500 m; height", rows.len());
     let mut tried = Vec::new();
     for (method, step, h) in STEPS {
         let error = worst(rows.iter().map(|row| {
-            let (round, mut s) = (Round { bc: row[0], wind: DVec3::ZERO }, start(DVec3::X * row[1]));
+            let (round, mut s) = (FlownRound { bc: row[0], wind: DVec3::ZERO }, start(DVec3::X * row[1]));
             let mut at = 0;
             let path = || {
                 // The muzzle itself is the first point.
@@ -218,13 +218,13 @@ fn reference_case(bench: &mut Bench) {
             };
             (crossing(path, row[2], h) - row[4]).abs() * 1e3
         }));
-        tried.push(Tried::rival(method, &format!("{} ms", h * 1e3), error));
+        tried.push(ExtremeResult::rival(method, &format!("{} ms", h * 1e3), error));
     }
     let error =
         worst(rows.iter().map(|row| {
             product_height(row[0], row[1], row[2]).map_or(f64::NAN, |z| (z - row[4]).abs() * 1e3)
         }));
-    tried.push(Tried::product(PRODUCT, &product_setting(), error));
+    tried.push(ExtremeResult::product(PRODUCT, &product_setting(), error));
     bench.extreme(&case, "mm", tried);
 }
 
@@ -249,7 +249,7 @@ fn product_height(bc: f64, v0: f64, range: f64) -> Option<f64> {
 type Hard = (&'static str, [f64; 3], DVec3, f64);
 
 /// Flights without a closed form, against DOP853.
-fn hard_flights(bench: &mut Bench) -> Result<()> {
+fn hard_flights(bench: &mut PartBench) -> Result<()> {
     let up = |degrees: f64, speed: f64| {
         let (sin, cos) = degrees.to_radians().sin_cos();
         DVec3::new(cos, 0.0, sin) * speed
@@ -265,43 +265,47 @@ fn hard_flights(bench: &mut Bench) -> Result<()> {
     for (case, coefficients, velocity, seconds) in cases {
         let mut truths = Vec::new();
         for bc in coefficients {
-            let round = Round { bc, wind: DVec3::new(0.0, 5.0, 0.0) };
+            let round = FlownRound { bc, wind: DVec3::new(0.0, 5.0, 0.0) };
             truths.push((round, dop853(&round, velocity, seconds, 1e-12)?));
         }
         let mut tried = Vec::new();
         for (method, step, h) in STEPS {
-            let fly = |(round, truth): &(Round, DVec3)| {
+            let fly = |(round, truth): &(FlownRound, DVec3)| {
                 let error = apart_mm(Some(fly(step, round, velocity, seconds, h)), *truth);
                 if error.is_finite() { error } else { f64::INFINITY }
             };
-            tried.push(Tried::rival(method, &format!("{} ms", h * 1e3), worst(truths.iter().map(fly))));
+            tried.push(ExtremeResult::rival(
+                method,
+                &format!("{} ms", h * 1e3),
+                worst(truths.iter().map(fly)),
+            ));
         }
         let error = worst(truths.iter().map(|(r, truth)| apart_mm(product(r, velocity, seconds), *truth)));
-        tried.push(Tried::product(PRODUCT, &product_setting(), error));
+        tried.push(ExtremeResult::product(PRODUCT, &product_setting(), error));
         bench.extreme(&format!("{case}; BC {coefficients:?}"), "mm", tried);
     }
     Ok(())
 }
 
 /// Cases with a closed form.
-fn closed_forms(bench: &mut Bench) {
-    let vacuum = Round { bc: f64::INFINITY, wind: DVec3::ZERO };
+fn closed_forms(bench: &mut PartBench) {
+    let vacuum = FlownRound { bc: f64::INFINITY, wind: DVec3::ZERO };
     let velocity = DVec3::new(1.0, 0.0, 1.0).normalize() * 850.0;
     let exact = velocity * 60.0 - DVec3::Z * (0.5 * GRAVITY_M_S2 * 3600.0);
-    let mut tried: Vec<Tried> = STEPS
+    let mut tried: Vec<ExtremeResult> = STEPS
         .map(|(method, step, h)| {
             let error = apart_mm(Some(fly(step, &vacuum, velocity, 60.0, h)), exact);
-            Tried::rival(method, &format!("{} ms", h * 1e3), error)
+            ExtremeResult::rival(method, &format!("{} ms", h * 1e3), error)
         })
         .into();
     let error = apart_mm(product(&vacuum, velocity, 60.0), exact);
-    tried.push(Tried::product(PRODUCT, &product_setting(), error));
+    tried.push(ExtremeResult::product(PRODUCT, &product_setting(), error));
     bench.extreme("vacuum parabola, 45 deg, 60 s", "mm", tried);
 
-    let rested = Round { bc: 0.05, wind: DVec3::ZERO };
+    let rested = FlownRound { bc: 0.05, wind: DVec3::ZERO };
     let fallen = product(&rested, DVec3::ZERO, 0.2).map_or(f64::NAN, |p| p.z);
     let error = (fallen + 0.5 * GRAVITY_M_S2 * 0.04).abs() * 1e3;
-    let tried = Tried::product(PRODUCT, &product_setting(), error);
+    let tried = ExtremeResult::product(PRODUCT, &product_setting(), error);
     bench.extreme(
         "dropped from rest, 0.2 s, against free fall",
         "mm",
@@ -309,18 +313,19 @@ fn closed_forms(bench: &mut Bench) {
     );
 
     // In the air's own frame the round flies straight, so the wind W moves it by W (t - x / v0), gravity or not.
-    let lag = |round: &Round, p: DVec3, v0: f64, t: f64| (p.y - round.wind.y * (t - p.x / v0)).abs() * 1e3;
-    let winds = [0.1, 5.0, 25.0].map(|w| Round { bc: 0.3, wind: DVec3::new(0.0, w, 0.0) });
-    let mut tried: Vec<Tried> = STEPS
+    let lag =
+        |round: &FlownRound, p: DVec3, v0: f64, t: f64| (p.y - round.wind.y * (t - p.x / v0)).abs() * 1e3;
+    let winds = [0.1, 5.0, 25.0].map(|w| FlownRound { bc: 0.3, wind: DVec3::new(0.0, w, 0.0) });
+    let mut tried: Vec<ExtremeResult> = STEPS
         .map(|(method, step, h)| {
             let errors = winds.map(|r| lag(&r, fly(step, &r, DVec3::X * 850.0, 3.0, h), 850.0, 3.0));
-            Tried::rival(method, &format!("{} ms", h * 1e3), worst(errors))
+            ExtremeResult::rival(method, &format!("{} ms", h * 1e3), worst(errors))
         })
         .into();
     let errors =
         winds.map(|r| product(&r, DVec3::X * 850.0, 3.0).map_or(f64::NAN, |p| lag(&r, p, 850.0, 3.0)));
     tried.push(
-        Tried::product(PRODUCT, &product_setting(), worst(errors))
+        ExtremeResult::product(PRODUCT, &product_setting(), worst(errors))
             .note("every one-step method keeps the rule: it shows mistakes, not steps"),
     );
     bench.extreme("crosswind of 0.1, 5, 25 m/s against the lag rule, 3 s", "mm", tried);

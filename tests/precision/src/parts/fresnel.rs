@@ -4,9 +4,9 @@ use anyhow::{Result, ensure};
 use bowwave_core::sea::{SEA_INDEX, fresnel};
 
 use super::{About, table, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "fresnel",
     what: "Share of light that the sea's surface reflects by the angle of view.",
@@ -71,9 +71,9 @@ impl Polynomial {
 }
 
 /// A table over the cosine, linear between its steps.
-struct Steps(Vec<f32>);
+struct StepTable(Vec<f32>);
 
-impl Steps {
+impl StepTable {
     fn of(count: usize) -> Self {
         Self((0..=count).map(|i| truth(i as f64 / count as f64) as f32).collect())
     }
@@ -90,10 +90,10 @@ fn cosines(count: usize, from: f64, to: f64) -> Vec<f64> {
 }
 
 /// An extreme case: its name, from which cosine to which.
-type Case = (&'static str, f64, f64);
+type CosineCase = (&'static str, f64, f64);
 
 /// A grazing angle of 0.05 degrees has a cosine of 8.7e-4.
-const CASES: [Case; 4] = [
+const CASES: [CosineCase; 4] = [
     ("grazing, 0 to 0.05 deg above the water", 0.0, 8.73e-4),
     ("40 to 60 deg, Brewster's angle within", 0.5, 0.766),
     ("normal view, 0 to 1 deg", 0.999_85, 1.0),
@@ -101,20 +101,20 @@ const CASES: [Case; 4] = [
 ];
 
 /// Ways and what they made of the extreme cases.
-struct Collected<'a> {
+struct FresnelWays<'a> {
     views: &'a [f64],
     used: &'a [f64],
     ways: Vec<Way<'a>>,
-    tried: [Vec<Tried>; CASES.len()],
+    tried: [Vec<ExtremeResult>; CASES.len()],
 }
 
-impl<'a> Collected<'a> {
+impl<'a> FresnelWays<'a> {
     fn add(&mut self, method: &str, setting: &str, bytes: usize, f: impl Fn(f64) -> f64 + 'a) {
         let worst_of = |views: &[f64]| worst(views.iter().map(|c| (f(*c) - truth(*c)).abs()));
         let default = method == "exact" && setting == "f64";
         for ((_, from, to), tried) in CASES.iter().zip(&mut self.tried) {
             let error = worst_of(&cosines(501, *from, *to));
-            tried.push(Tried { default, ..Tried::rival(method, setting, error) });
+            tried.push(ExtremeResult { default, ..ExtremeResult::rival(method, setting, error) });
         }
         let error = worst_of(self.views);
         let used = self.used;
@@ -125,7 +125,7 @@ impl<'a> Collected<'a> {
 }
 
 /// Measures the scene and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     for row in table(TABLE) {
         let cos = row[0].to_radians().cos();
         let (by_laws, by_product) = (truth(cos), fresnel(cos));
@@ -139,7 +139,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         );
     }
     let (views, used) = (cosines(4096, 0.0, 1.0), cosines(256, 0.0, 1.0));
-    let mut all = Collected { views: &views, used: &used, ways: Vec::new(), tried: Default::default() };
+    let mut all = FresnelWays { views: &views, used: &used, ways: Vec::new(), tried: Default::default() };
     all.add("constant", "at normal view", 0, |_| normal());
     all.add("Schlick", "power 5", 0, |c| {
         let x = 1.0 - c;
@@ -152,7 +152,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         all.add("polynomial", &format!("degree {degree}"), bytes, move |c| p.at(c));
     }
     for count in [64, 1024] {
-        let steps = Steps::of(count);
+        let steps = StepTable::of(count);
         all.add("table", &format!("{count} steps"), (count + 1) * size_of::<f32>(), move |c| steps.at(c));
     }
     all.add("exact", "f32", 0, exact_f32);

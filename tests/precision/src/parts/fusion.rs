@@ -13,14 +13,14 @@ use rayon::prelude::*;
 use super::About;
 use crate::{
     aided::{
-        Aids, CAMERA_FROM_IMU, Estimator, Heading, Horizon, Outcome, Recording, Unit, bounds, outcome,
-        product,
+        AidedHorizon, AidedOutcome, AidedRecording, AidedUnit, CAMERA_FROM_IMU, Estimator, Heading, SeenAids,
+        bounds, outcome, product,
     },
-    bench::{Bench, Tried, Way},
-    ship::{self, Errors, Sample, Sea, Ship},
+    bench::{ExtremeResult, PartBench, Way},
+    ship::{self, Ship, ShipReading, ShipSea, UnitErrors},
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "fusion",
     what: "Corrects the gun's orientation by a horizon that is seen now and then, and its heading by what stands far away or by a compass; \
@@ -33,7 +33,7 @@ pub const ABOUT: About = About {
           What a run draws once (mounting, biases, axes, refraction) is in all of its squares, so that runs count for the bounds, not squares",
 };
 
-/// What is known of a horizon in the picture, radians.
+/// Standard deviation of a horizon in the picture, radians.
 const HORIZON_SIGMA: f64 = 0.03f64.to_radians();
 
 /// Rates integrated, and a fixed share of each horizon's and heading's difference taken.
@@ -76,20 +76,21 @@ impl Estimator for FixedShare {
     }
 }
 
-fn horizon(seen_s: f64) -> Option<Horizon> {
-    Some(Horizon { seen_s, sigma: HORIZON_SIGMA })
+fn horizon(seen_s: f64) -> Option<AidedHorizon> {
+    Some(AidedHorizon { seen_s, sigma: HORIZON_SIGMA })
 }
 
-type Begin<'a> = Box<dyn Fn() -> Box<dyn Estimator> + 'a>;
+type EstimatorMaker<'a> = Box<dyn Fn() -> Box<dyn Estimator> + 'a>;
 
 /// Method, setting, on what, and the estimator at its start; the first is the product's.
 fn ways<'a>(
-    with: &'a Recording,
-    without: &'a Recording,
-) -> Vec<(&'static str, &'static str, &'a Recording, Begin<'a>)> {
+    with: &'a AidedRecording,
+    without: &'a AidedRecording,
+) -> Vec<(&'static str, &'static str, &'a AidedRecording, EstimatorMaker<'a>)> {
     const OURS: &str = "VQF and error-state filter";
     const SHARE: &str = "rates and a fixed share";
-    let share = |share: f64| -> Begin<'a> { Box::new(move || Box::new(FixedShare { share, last: None })) };
+    let share =
+        |share: f64| -> EstimatorMaker<'a> { Box::new(move || Box::new(FixedShare { share, last: None })) };
     vec![
         (OURS, "with horizon", with, Box::new(|| Box::new(product(Source::Fused)))),
         (OURS, "without", without, Box::new(|| Box::new(product(Source::Fused)))),
@@ -99,8 +100,8 @@ fn ways<'a>(
     ]
 }
 
-fn half_seen(bench: &mut Bench, sea: Sea, seen_s: f64) {
-    let recording = |aid| Recording::new(sea, Unit::Usual, (aid, Heading::Start), 300.0, 3);
+fn half_seen(bench: &mut PartBench, sea: ShipSea, seen_s: f64) {
+    let recording = |aid| AidedRecording::new(sea, AidedUnit::Usual, (aid, Heading::Start), 300.0, 3);
     let (with, without) = (recording(horizon(seen_s)), recording(None));
     let ways =
         ways(&with, &without).into_iter().enumerate().map(|(i, (method, setting, recording, begin))| {
@@ -118,16 +119,17 @@ fn half_seen(bench: &mut Bench, sea: Sea, seen_s: f64) {
 }
 
 /// Runs of several seeds.
-fn drawn(bench: &Bench, sea: Sea, seen_s: f64) -> Vec<Outcome> {
+fn drawn(bench: &PartBench, sea: ShipSea, seen_s: f64) -> Vec<AidedOutcome> {
     let seeds = if bench.is_quick() { 4 } else { 40 };
     let run = |seed| {
-        let recording = Recording::new(sea, Unit::Drawn, (horizon(seen_s), Heading::Start), 400.0, seed);
+        let recording =
+            AidedRecording::new(sea, AidedUnit::Drawn, (horizon(seen_s), Heading::Start), 400.0, seed);
         outcome(&recording, &mut product(Source::Fused))
     };
     (0..seeds).into_par_iter().map(run).collect()
 }
 
-fn consistency(bench: &mut Bench) {
+fn consistency(bench: &mut PartBench) {
     for (sea, seen_s) in [
         (ship::CALM, 10.0),
         (ship::SEA_4, 10.0),
@@ -138,12 +140,12 @@ fn consistency(bench: &mut Bench) {
     ] {
         let runs = drawn(bench, sea, seen_s);
         let n = runs.len() as f64;
-        let over = |of: &dyn Fn(&Outcome) -> f64| runs.iter().map(of).sum::<f64>() / n;
-        let of_run = |run: &Outcome| run.surprises.iter().sum::<f64>() / run.surprises.len() as f64;
+        let over = |of: &dyn Fn(&AidedOutcome) -> f64| runs.iter().map(of).sum::<f64>() / n;
+        let of_run = |run: &AidedOutcome| run.surprises.iter().sum::<f64>() / run.surprises.len() as f64;
         let mean = over(&of_run);
         let deviation = (over(&|run| (of_run(run) - mean).powi(2)) / (n - 1.0)).sqrt();
         let [low, high] = bounds(runs.len());
-        let inside = |run: &Outcome| {
+        let inside = |run: &AidedOutcome| {
             run.surprises.iter().filter(|s| **s < 5.99).count() as f64 / run.surprises.len() as f64
         };
         let note = format!(
@@ -154,14 +156,14 @@ fn consistency(bench: &mut Bench) {
             1.96 * deviation,
             100.0 * over(&inside)
         );
-        let tried =
-            Tried::product("VQF and error-state filter", "errors drawn from its own", mean).note(note);
+        let tried = ExtremeResult::product("VQF and error-state filter", "errors drawn from its own", mean)
+            .note(note);
         let case = format!("square over variance, two is right: {}, horizon {seen_s} s, then none", sea.name);
         bench.extreme(&case, "", vec![tried]);
     }
 }
 
-fn headings(bench: &mut Bench) {
+fn headings(bench: &mut PartBench) {
     let noise = 0.05f64.to_radians();
     for (case, heading) in [
         ("heading, nothing sees it", Heading::Start),
@@ -169,7 +171,8 @@ fn headings(bench: &mut Bench) {
         ("heading, a coast is seen that turns by 0.02 deg/s", Heading::Anchored(noise, 0.02f64.to_radians())),
         ("heading, a compass with 0.3 deg of noise", Heading::Compass(0.3f64.to_radians())),
     ] {
-        let recording = Recording::new(ship::SEA_4, Unit::Usual, (horizon(10.0), heading), 400.0, 5);
+        let recording =
+            AidedRecording::new(ship::SEA_4, AidedUnit::Usual, (horizon(10.0), heading), 400.0, 5);
         let tried = [("VQF and error-state filter", true, 0.0), ("rates and a fixed share", false, 0.1)].map(
             |(method, ours, share)| {
                 let mut estimator: Box<dyn Estimator> = if ours {
@@ -179,7 +182,7 @@ fn headings(bench: &mut Bench) {
                 };
                 let [rms, worst] = outcome(&recording, &mut *estimator).heading_deg;
                 let setting = if ours { "for a gun" } else { "a tenth of each" };
-                Tried { default: ours, ..Tried::rival(method, setting, rms) }
+                ExtremeResult { default: ours, ..ExtremeResult::rival(method, setting, rms) }
                     .note(format!("worst {worst:.3} deg in 400 s"))
             },
         );
@@ -187,10 +190,10 @@ fn headings(bench: &mut Bench) {
     }
 }
 
-/// What is wrong with a recording's samples: its name and what does it.
-type Damage = (&'static str, fn(&mut Vec<Sample>));
+/// A damage to a recording's samples: its name and the code that does it.
+type SampleDamage = (&'static str, fn(&mut Vec<ShipReading>));
 
-const DAMAGES: [Damage; 10] = [
+const DAMAGES: [SampleDamage; 10] = [
     ("nothing wrong", |_| ()),
     ("10 ms missing once a second", |all| all.retain(|s| s.time_s % 1.0 > 0.010)),
     ("0.8 s missing once in 20 s", |all| all.retain(|s| s.time_s % 20.0 > 0.8)),
@@ -221,16 +224,17 @@ const DAMAGES: [Damage; 10] = [
     }),
 ];
 
-fn recoil(all: &mut [Sample]) {
+fn recoil(all: &mut [ShipReading]) {
     for s in all.iter_mut().filter(|s| s.time_s % 30.0 < 3.0 && s.time_s % 0.1 < 0.005) {
         s.accel += DVec3::new(-300.0, 0.0, 40.0);
     }
 }
 
-fn damaged(bench: &mut Bench) {
+fn damaged(bench: &mut PartBench) {
     for (name, damage) in DAMAGES {
         for (aid, aids) in [("no horizon", None), ("horizon for 10 s of 20", horizon(10.0))] {
-            let mut recording = Recording::new(ship::SEA_4, Unit::Usual, (aids, Heading::Start), 300.0, 9);
+            let mut recording =
+                AidedRecording::new(ship::SEA_4, AidedUnit::Usual, (aids, Heading::Start), 300.0, 9);
             damage(&mut recording.samples);
             let tried = [("VQF and error-state filter", true), ("rates and a fixed share", false)].map(
                 |(method, ours)| {
@@ -240,7 +244,7 @@ fn damaged(bench: &mut Bench) {
                         Box::new(FixedShare { share: 0.02, last: None })
                     };
                     let out = outcome(&recording, &mut *estimator);
-                    Tried { default: ours, ..Tried::rival(method, aid, out.up_deg[1]) }
+                    ExtremeResult { default: ours, ..ExtremeResult::rival(method, aid, out.up_deg[1]) }
                         .note(format!("up {:.3} deg rms", out.up_deg[0]))
                 },
             );
@@ -253,11 +257,11 @@ fn damaged(bench: &mut Bench) {
 const EARTH: DVec3 = DVec3::new(0.0, 4.687e-5, 5.586e-5);
 
 /// A day at sea with the Earth's turn, a horizon half of the time and a compass: nothing may grow.
-fn day(bench: &mut Bench) {
+fn day(bench: &mut PartBench) {
     let hours: f64 = if bench.is_quick() { 1.0 } else { 24.0 };
-    let errors = Errors { rate_hz: 50.0, earth: EARTH, ..Errors::usual() };
+    let errors = UnitErrors { rate_hz: 50.0, earth: EARTH, ..UnitErrors::usual() };
     let ship = Ship::new(ship::SEA_4, true, 3);
-    let aids = Aids::usual(horizon(300.0), Heading::Compass(0.3f64.to_radians()));
+    let aids = SeenAids::usual(horizon(300.0), Heading::Compass(0.3f64.to_radians()));
     let seconds = hours * 3600.0;
     let part_s = (seconds / 4.0).min(3600.0);
     let mut estimator = product(Source::Fused);
@@ -293,12 +297,13 @@ fn day(bench: &mut Bench) {
         heap[1].saturating_sub(heap[0])
     );
     let tried =
-        Tried::product("VQF and error-state filter", "horizon half of the time, compass", worst).note(note);
+        ExtremeResult::product("VQF and error-state filter", "horizon half of the time, compass", worst)
+            .note(note);
     bench.extreme(&format!("{hours} h in sea 4 with the Earth's turn"), "deg", vec![tried]);
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     half_seen(bench, ship::SEA_4, 10.0);
     half_seen(bench, ship::SEA_6, 10.0);
     half_seen(bench, ship::SEA_6, 60.0);
@@ -316,7 +321,8 @@ mod tests {
     #[test]
     fn a_horizon_half_of_the_time_is_enough_and_the_filter_knows_its_error() {
         for (sea, seed) in [(ship::CALM, 1), (ship::SEA_4, 2), (ship::SEA_6, 3)] {
-            let recording = Recording::new(sea, Unit::Usual, (horizon(20.0), Heading::Start), 300.0, seed);
+            let recording =
+                AidedRecording::new(sea, AidedUnit::Usual, (horizon(20.0), Heading::Start), 300.0, seed);
             let run = outcome(&recording, &mut product(Source::Fused));
             assert!(run.up_deg[0] < 0.04 && run.up_deg[1] < 0.15, "{}: {:?}", sea.name, run.up_deg);
             let mean = run.surprises.iter().sum::<f64>() / run.surprises.len() as f64;
@@ -327,7 +333,8 @@ mod tests {
     #[test]
     fn a_coast_holds_the_heading_that_a_bias_would_turn() {
         let run = |heading| {
-            let recording = Recording::new(ship::SEA_4, Unit::Usual, (horizon(10.0), heading), 400.0, 5);
+            let recording =
+                AidedRecording::new(ship::SEA_4, AidedUnit::Usual, (horizon(10.0), heading), 400.0, 5);
             outcome(&recording, &mut product(Source::Fused)).heading_deg[0]
         };
         let (free, held) = (run(Heading::Start), run(Heading::Anchored(5e-4, 1e-6)));

@@ -10,9 +10,9 @@ use glam::{DQuat, DVec3};
 use hw_sim::make::{Recipe, Studio};
 
 use super::{About, rms};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "haze",
     what: "Tells by how much lower than the true horizon the edge stands that is found in haze, so that inclination is not bent to it.",
@@ -28,13 +28,13 @@ const WIDTH: u32 = 960;
 const PX: f64 = 1662.8;
 
 /// Pictures in one haze.
-struct Drawn {
+struct HazyPictures {
     pictures: Vec<(Picture, DQuat)>,
     lens: Lens,
     eye_height_m: f64,
 }
 
-impl Drawn {
+impl HazyPictures {
     fn new(eye_height_m: f64, visibility_m: f64, count: u32) -> Result<Self> {
         let recipe = Recipe {
             width: WIDTH,
@@ -74,13 +74,13 @@ impl Drawn {
 }
 
 /// Measures the scenes.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let count = if bench.is_quick() { 3 } else { 10 };
     for (eye_height_m, visibility_km) in
         [(8.0, 60.0), (8.0, 35.0), (8.0, 20.0), (8.0, 10.0), (3.0, 20.0), (20.0, 20.0)]
     {
         let visibility_m = 1000.0 * visibility_km;
-        let drawn = Drawn::new(eye_height_m, visibility_m, count)?;
+        let drawn = HazyPictures::new(eye_height_m, visibility_m, count)?;
         let errors = drawn.errors();
         let left = |lowered: f64| PX * rms(errors.iter().map(|e| e - lowered));
         let lowered =
@@ -96,7 +96,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ];
         bench.scene(&case, "px of 1920", 0.02, ways);
         let wrong = [1.0 / 1.3, 1.3].map(|share| left(lowered(share))).into_iter().fold(0.0, f64::max);
-        let tried = Tried::product("the finder asked", "visibility wrong by a third", wrong);
+        let tried = ExtremeResult::product("the finder asked", "visibility wrong by a third", wrong);
         bench.extreme(&case, "px of 1920", vec![tried]);
     }
     Ok(())
@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn what_haze_does_is_known() {
-        let drawn = Drawn::new(8.0, 20_000.0, 2).unwrap();
+        let drawn = HazyPictures::new(8.0, 20_000.0, 2).unwrap();
         let errors = drawn.errors();
         assert_eq!(errors.len(), 2);
         let lowered = lowered_by_haze(&drawn.lens, 8.0, 20_000.0).expect("an edge");

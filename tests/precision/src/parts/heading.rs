@@ -12,17 +12,18 @@ use bowwave_core::{
 };
 use glam::{DQuat, DVec3};
 use hw_sim::make::{Recipe, calibration};
+use hw_sim::ocean::random::gaussian;
 use rand::SeedableRng as _;
 use rand_pcg::Pcg64;
 
 use super::{About, rms, worst};
 use crate::{
     aided::CAMERA_FROM_IMU,
-    bench::{Bench, Tried},
-    ship::{GRAVITY, gaussian},
+    bench::{ExtremeResult, PartBench},
+    ship::GRAVITY,
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "heading",
     what: "Holds the gun's heading by the ship's compass (ten lines a second in tenths of a degree) while the gun rests on its mount, which \
@@ -41,7 +42,7 @@ const SECONDS: f64 = 300.0;
 const START_S: f64 = 5.0;
 
 /// A motion and a feed: the gun's bearing on its mount and the ship's heading (degrees) over time, and what the line says of the latter.
-struct Case {
+struct HeadingCase {
     name: &'static str,
     bearing: fn(f64) -> f64,
     ship: fn(f64) -> f64,
@@ -72,35 +73,45 @@ fn every(_: f64, deg: f64) -> Option<f64> {
     Some(deg)
 }
 
-const CASES: [Case; 10] = [
-    Case { name: "the gun rests", bearing: rests, ship: yaws, line: every },
-    Case { name: "the gun moves by 30 deg every half minute", bearing: moves, ship: yaws, line: every },
-    Case { name: "the gun creeps by 0.1 deg/s", bearing: |t| 0.1 * t, ship: yaws, line: every },
-    Case { name: "the gun creeps by 0.5 deg/s", bearing: |t| 0.5 * t, ship: yaws, line: every },
-    Case { name: "the gun creeps by 2 deg/s", bearing: |t| 2.0 * t, ship: yaws, line: every },
-    Case { name: "the ship turns by 90 deg", bearing: rests, ship: turns, line: every },
-    Case {
+const CASES: [HeadingCase; 10] = [
+    HeadingCase { name: "the gun rests", bearing: rests, ship: yaws, line: every },
+    HeadingCase {
+        name: "the gun moves by 30 deg every half minute",
+        bearing: moves,
+        ship: yaws,
+        line: every,
+    },
+    HeadingCase { name: "the gun creeps by 0.1 deg/s", bearing: |t| 0.1 * t, ship: yaws, line: every },
+    HeadingCase { name: "the gun creeps by 0.5 deg/s", bearing: |t| 0.5 * t, ship: yaws, line: every },
+    HeadingCase { name: "the gun creeps by 2 deg/s", bearing: |t| 2.0 * t, ship: yaws, line: every },
+    HeadingCase { name: "the ship turns by 90 deg", bearing: rests, ship: turns, line: every },
+    HeadingCase {
         name: "drop-outs of 5 s every 20 s",
         bearing: rests,
         ship: yaws,
         line: |t, deg| (t % 20.0 < 15.0).then_some(deg),
     },
-    Case {
+    HeadingCase {
         name: "a drop-out of 60 s",
         bearing: rests,
         ship: yaws,
         line: |t, deg| (!(100.0..160.0).contains(&t)).then_some(deg),
     },
-    Case {
+    HeadingCase {
         name: "the feed freezes after 100 s",
         bearing: rests,
         ship: yaws,
         line: |t, deg| Some(if t > 100.0 { 354.0 } else { deg }),
     },
-    Case { name: "the feed is off by 20 deg", bearing: rests, ship: yaws, line: |_, deg| Some(deg + 20.0) },
+    HeadingCase {
+        name: "the feed is off by 20 deg",
+        bearing: rests,
+        ship: yaws,
+        line: |_, deg| Some(deg + 20.0),
+    },
 ];
 
-impl Case {
+impl HeadingCase {
     fn roll_pitch(t: f64) -> (f64, f64) {
         (7.0 * DEG * (t * 0.7).sin(), 2.8 * DEG * (t * 0.84 + 1.0).sin())
     }
@@ -114,11 +125,11 @@ impl Case {
     }
 
     /// Heading errors, degrees, of the product and of the naive rival, once a second; with a feed or none, that tells roll and pitch or not.
-    fn run(&self, known: &Calibration, fed: bool, attitude: bool) -> Found {
+    fn run(&self, known: &Calibration, fed: bool, attitude: bool) -> HeadingErrors {
         let settings = HeadingSettings { ship_latency_ns: 60_000_000, ..HeadingSettings::default() };
         let mut sensors = Sensors::new(known, Source::Fused, &settings, None, 8.0, 20_000.0);
         let mut rng = Pcg64::seed_from_u64(5);
-        let mut found = Found::default();
+        let mut found = HeadingErrors::default();
         let (mut first, mut naive) = (None, None);
         for i in 0..(SECONDS * RATE_HZ) as i64 {
             let t = i as f64 / RATE_HZ;
@@ -173,7 +184,7 @@ impl Case {
 }
 
 #[derive(Default)]
-struct Found {
+struct HeadingErrors {
     ours: Vec<f64>,
     naive: Vec<f64>,
     sigma_deg: f64,
@@ -185,7 +196,7 @@ fn heading(world_from_camera: DQuat) -> f64 {
 }
 
 /// Measures the cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let mut known = calibration(&Recipe::default()).calibration;
     known.camera_from_imu = CAMERA_FROM_IMU;
     known.gyro_bias = DVec3::ZERO;
@@ -193,18 +204,18 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     for case in &CASES {
         let (ours, with, alone) =
             (case.run(&known, true, false), case.run(&known, true, true), case.run(&known, false, false));
-        let said = |found: &Found, errors: &[f64]| {
+        let said = |found: &HeadingErrors, errors: &[f64]| {
             let most = worst(errors.iter().map(|e| e.abs()));
             format!("worst {most:.2} deg, at the end its own sigma is {:.2} deg", found.sigma_deg)
         };
         let of = |errors: &[f64]| rms(errors.iter().copied());
         let tried = vec![
-            Tried::product("mount's bearing as a state", "heading", of(&ours.ours))
+            ExtremeResult::product("mount's bearing as a state", "heading", of(&ours.ours))
                 .note(said(&ours, &ours.ours)),
-            Tried::rival("mount's bearing as a state", "heading, roll and pitch", of(&with.ours))
+            ExtremeResult::rival("mount's bearing as a state", "heading, roll and pitch", of(&with.ours))
                 .note(said(&with, &with.ours)),
-            Tried::rival("gyro alone", "", of(&alone.ours)).note(said(&alone, &alone.ours)),
-            Tried::rival("ship and first bearing", "", of(&ours.naive))
+            ExtremeResult::rival("gyro alone", "", of(&alone.ours)).note(said(&alone, &alone.ours)),
+            ExtremeResult::rival("ship and first bearing", "", of(&ours.naive))
                 .note(format!("worst {:.2} deg", worst(ours.naive.iter().map(|e| e.abs())))),
         ];
         bench.extreme(case.name, "deg", tried);

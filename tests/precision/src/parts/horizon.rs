@@ -5,17 +5,17 @@ use bowwave_core::estimate::horizon::HorizonFinder;
 
 use super::{About, worst};
 use crate::{
-    bench::{Bench, Tried, Way},
+    bench::PartBench,
     front::quantile,
     horizon::{
         cases::{SET_WITH, all_glare, with_glare, with_horizon, without_horizon},
-        frames::{self, Frame},
-        score::{Drawn, miss},
-        ways::{METHODS, Method, in_drawn, in_frame, px},
+        frames::{self, SeaFrame},
+        score::{DrawnHorizon, miss},
+        ways::{HorizonMethod, METHODS, in_drawn, in_frame, px},
     },
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "horizon",
     what: "Finds the sea's horizon in a picture, or says that there is none: roll and pitch of the camera.",
@@ -29,43 +29,40 @@ pub const ABOUT: About = About {
 };
 
 /// Drawn pictures of one kind of eight.
-fn drawn(quick: bool) -> Result<Vec<Drawn>> {
+fn drawn(quick: bool) -> Result<Vec<DrawnHorizon>> {
     let count = if quick { 24 } else { 96 };
-    (0..count).map(|i| Drawn::new(with_horizon(SET_WITH, i))).collect()
+    (0..count).map(|i| DrawnHorizon::new(with_horizon(SET_WITH, i))).collect()
 }
 
-fn drawn_errors(method: Method, pictures: &[Drawn]) -> Vec<f64> {
+fn drawn_errors(method: HorizonMethod, pictures: &[DrawnHorizon]) -> Vec<f64> {
     let mut finder = HorizonFinder::new();
     pictures.iter().map(|d| px(in_drawn(method, &mut finder, d).map(|up| d.miss(up)))).collect()
 }
 
-fn drawn_scene(bench: &mut Bench, pictures: &[Drawn]) {
+fn drawn_scene(bench: &mut PartBench, pictures: &[DrawnHorizon]) {
     let Some(first) = pictures.first() else { return };
-    let ways = METHODS.map(|(name, setting, method)| {
-        let errors = drawn_errors(method, pictures);
+    let ways = METHODS.map(|m| {
+        let errors = drawn_errors(m.run, pictures);
         let mut finder = HorizonFinder::new();
-        Way::new(name, setting, quantile(&errors, 0.95), 1, move || in_drawn(method, &mut finder, first))
-            .default_if(matches!(method, Method::Finder { prior: true }))
+        m.way(quantile(&errors, 0.95), 1, move || in_drawn(m.run, &mut finder, first))
             .note(format!("median {:.2} px", quantile(&errors, 0.5)))
     });
     bench.scene("drawn seas, 1280x720", "px", 0.02, ways.into());
 }
 
-fn real_scene(bench: &mut Bench, marked: &[Frame]) -> Result<()> {
+fn real_scene(bench: &mut PartBench, marked: &[SeaFrame]) -> Result<()> {
     let Some(first) = marked.first() else { return Ok(()) };
     let mut ways = Vec::new();
-    for (name, setting, method) in METHODS {
+    for m in METHODS {
         let mut finder = HorizonFinder::new();
         let mut errors = Vec::new();
         for (i, frame) in marked.iter().enumerate() {
-            let found = in_frame(method, &mut finder, frame, i as u64)?;
+            let found = in_frame(m.run, &mut finder, frame, i as u64)?;
             errors.push(px(found.and_then(|up| miss(frame, up))));
         }
-        let way = Way::new(name, setting, quantile(&errors, 0.95), 1, move || {
-            in_frame(method, &mut finder, first, 0).ok()
-        })
-        .default_if(matches!(method, Method::Finder { prior: true }))
-        .note(format!("median {:.2} px; timed with the copy of a frame", quantile(&errors, 0.5)));
+        let way = m
+            .way(quantile(&errors, 0.95), 1, move || in_frame(m.run, &mut finder, first, 0).ok())
+            .note(format!("median {:.2} px; timed with the copy of a frame", quantile(&errors, 0.5)));
         ways.push(way);
     }
     bench.scene("marked frames", "px", 0.4, ways);
@@ -73,54 +70,48 @@ fn real_scene(bench: &mut Bench, marked: &[Frame]) -> Result<()> {
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let pictures = drawn(bench.is_quick())?;
     drawn_scene(bench, &pictures);
     real_scene(bench, &frames::marked()?)?;
     for kind in ["lens bow", "glitter", "ships, barrel", "steep", "edge", "part", "haze"] {
-        let of_kind: Vec<&Drawn> = pictures.iter().filter(|d| d.shown.kind == kind).collect();
+        let of_kind: Vec<&DrawnHorizon> = pictures.iter().filter(|d| d.shown.kind == kind).collect();
         worst_of(bench, kind, &of_kind, px(None));
     }
     let few = if bench.is_quick() { 8 } else { 32 };
-    let glare: Vec<Drawn> = (0..few).map(|i| Drawn::new(with_glare(SET_WITH, i))).collect::<Result<_>>()?;
+    let glare: Vec<DrawnHorizon> =
+        (0..few).map(|i| DrawnHorizon::new(with_glare(SET_WITH, i))).collect::<Result<_>>()?;
     // To say nothing is right where the sun has taken too much of it.
     worst_of(bench, "glare: sun over it, flare, a part washed out", &glare.iter().collect::<Vec<_>>(), 0.0);
-    let washed: Vec<Drawn> = (0..few).map(|i| Drawn::new(all_glare(SET_WITH, i))).collect::<Result<_>>()?;
+    let washed: Vec<DrawnHorizon> =
+        (0..few).map(|i| DrawnHorizon::new(all_glare(SET_WITH, i))).collect::<Result<_>>()?;
     taken_for_one(bench, "none seen: glare has washed out all of it", &washed);
     let count = if bench.is_quick() { 21 } else { 84 };
-    let without: Vec<Drawn> =
-        (0..count).map(|i| Drawn::new(without_horizon(SET_WITH, i))).collect::<Result<_>>()?;
+    let without: Vec<DrawnHorizon> =
+        (0..count).map(|i| DrawnHorizon::new(without_horizon(SET_WITH, i))).collect::<Result<_>>()?;
     taken_for_one(bench, "none there: sky, water, fog, night, noise, smear, blank", &without);
     Ok(())
 }
 
 /// The worst error on pictures with a horizon; one that is not answered counts as `unanswered_px`.
-fn worst_of(bench: &mut Bench, case: &str, pictures: &[&Drawn], unanswered_px: f64) {
-    let tried = METHODS.map(|(name, setting, method)| {
+fn worst_of(bench: &mut PartBench, case: &str, pictures: &[&DrawnHorizon], unanswered_px: f64) {
+    let tried = METHODS.map(|m| {
         let mut finder = HorizonFinder::new();
-        let mut find = |d: &&Drawn| in_drawn(method, &mut finder, d).map(|up| px(Some(d.miss(up))));
+        let mut find = |d: &&DrawnHorizon| in_drawn(m.run, &mut finder, d).map(|up| px(Some(d.miss(up))));
         let found: Vec<Option<f64>> = pictures.iter().map(&mut find).collect();
         let answered = found.iter().flatten().count();
         let error = worst(found.iter().map(|px| px.unwrap_or(unanswered_px)));
-        let tried = Tried {
-            default: matches!(method, Method::Finder { prior: true }),
-            ..Tried::rival(name, setting, error)
-        };
-        tried.note(format!("{answered} of {} answered", pictures.len()))
+        m.tried(error).note(format!("{answered} of {} answered", pictures.len()))
     });
     bench.extreme(case, "px", tried.into());
 }
 
 /// The share of pictures without one in which a horizon is found.
-fn taken_for_one(bench: &mut Bench, case: &str, pictures: &[Drawn]) {
-    let tried = METHODS.map(|(name, setting, method)| {
+fn taken_for_one(bench: &mut PartBench, case: &str, pictures: &[DrawnHorizon]) {
+    let tried = METHODS.map(|m| {
         let mut finder = HorizonFinder::new();
-        let taken = pictures.iter().filter(|d| in_drawn(method, &mut finder, d).is_some()).count();
-        let share = 100.0 * taken as f64 / pictures.len().max(1) as f64;
-        Tried {
-            default: matches!(method, Method::Finder { prior: true }),
-            ..Tried::rival(name, setting, share)
-        }
+        let taken = pictures.iter().filter(|d| in_drawn(m.run, &mut finder, d).is_some()).count();
+        m.tried(100.0 * taken as f64 / pictures.len().max(1) as f64)
     });
     bench.extreme(case, "% taken for one", tried.into());
 }

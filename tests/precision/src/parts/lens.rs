@@ -5,9 +5,9 @@ use bowwave_core::geometry::{Distortion, Lens};
 use glam::{DVec2, DVec3};
 
 use super::{About, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "lens",
     what: "Finds the direction that a pixel sees: the inverse of the lens's distortion.",
@@ -40,7 +40,7 @@ fn directions(lens: &Lens) -> Vec<(DVec3, DVec2)> {
         .collect()
 }
 
-/// What the model makes of undistorted normalised coordinates, before the focal length.
+/// The model's image of undistorted normalised coordinates, before the focal length.
 fn bend(lens: &Lens, n: DVec2) -> DVec2 {
     lens.project(n.extend(1.0)).map_or(DVec2::NAN, |pixel| (pixel - lens.centre) / lens.focal)
 }
@@ -100,17 +100,17 @@ fn worst_px(lens: &Lens, invert: &dyn Fn(&Lens, DVec2) -> DVec3) -> f64 {
 }
 
 /// One way to invert, of that lens.
-type Method<'a> = (&'static str, &'static str, Box<dyn Fn(&Lens, DVec2) -> DVec3 + 'a>);
+type Inverse<'a> = Box<dyn Fn(&Lens, DVec2) -> DVec3 + 'a>;
 
-fn methods(of: &Lens) -> [Method<'_>; 6] {
+fn methods(of: &Lens) -> [Candidate<Inverse<'_>>; 6] {
     let rays = table(of);
     [
-        ("ignore distortion", "", Box::new(|l, p| steps(l, p, 0))),
-        ("fixed point", "5 steps", Box::new(|l, p| steps(l, p, 5))),
-        ("fixed point", "60 steps at most", Box::new(|l, p| steps(l, p, 60))),
-        ("Newton", "6 steps, numerical", Box::new(newton)),
-        ("table", "33 x 19", Box::new(move |l, p| looked_up(l, &rays, p))),
-        ("Newton", "bracketed", Box::new(|l, p| l.unproject(p))),
+        Candidate::rival("ignore distortion", "", Box::new(|l, p| steps(l, p, 0))),
+        Candidate::rival("fixed point", "5 steps", Box::new(|l, p| steps(l, p, 5))),
+        Candidate::rival("fixed point", "60 steps at most", Box::new(|l, p| steps(l, p, 60))),
+        Candidate::rival("Newton", "6 steps, numerical", Box::new(newton)),
+        Candidate::rival("table", "33 x 19", Box::new(move |l, p| looked_up(l, &rays, p))),
+        Candidate::product("Newton", "bracketed", Box::new(|l, p| l.unproject(p))),
     ]
 }
 
@@ -151,16 +151,16 @@ fn fitted_px(truth: &Lens, terms: &dyn Fn(f64) -> Vec<f64>) -> f64 {
 }
 
 /// Measures scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let scenes =
         [("k1 -0.12, k2 0.02, 70 deg", lens(70.0, -0.12, 0.02)), ("fisheye, 120 deg", fisheye(120.0))];
     for (scene, lens) in &scenes {
         let points = &directions(lens);
-        let ways = methods(lens).map(|(method, setting, invert)| {
-            Way::new(method, setting, worst_px(lens, &invert), points.len(), move || {
-                points.iter().map(|(_, p)| invert(lens, *p)).sum::<DVec3>()
-            })
-            .default_if(setting == "bracketed")
+        let ways = methods(lens).map(|m| {
+            let way = Way::new(m.method, m.setting, worst_px(lens, &m.run), points.len(), move || {
+                points.iter().map(|(_, p)| (m.run)(lens, *p)).sum::<DVec3>()
+            });
+            way.default_if(m.default)
         });
         bench.scene(scene, "px", 1e-9, ways.into());
     }
@@ -172,10 +172,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("fisheye, 190 deg", fisheye(190.0)),
         ("no distortion", lens(70.0, 0.0, 0.0)),
     ] {
-        let tried = methods(&lens).map(|(method, setting, invert)| Tried {
-            default: setting == "bracketed",
-            ..Tried::rival(method, setting, worst_px(&lens, &invert))
-        });
+        let tried = methods(&lens).map(|m| m.tried(worst_px(&lens, &m.run)));
         bench.extreme(case, "px", tried.into());
     }
     for (case, truth) in [
@@ -187,9 +184,9 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     ] {
         let odd = |x: f64, count: i32| (0..count).map(|i| x.powi(2 * i + 1)).collect::<Vec<_>>();
         let tried = vec![
-            Tried::rival("pinhole", "focal length", fitted_px(&truth, &|a| odd(a.tan(), 1))),
-            Tried::rival("Brown-Conrady", "k1, k2", fitted_px(&truth, &|a| odd(a.tan(), 3))),
-            Tried::rival("Kannala-Brandt", "k1 to k4", fitted_px(&truth, &|a| odd(a, 5))),
+            ExtremeResult::rival("pinhole", "focal length", fitted_px(&truth, &|a| odd(a.tan(), 1))),
+            ExtremeResult::rival("Brown-Conrady", "k1, k2", fitted_px(&truth, &|a| odd(a.tan(), 3))),
+            ExtremeResult::rival("Kannala-Brandt", "k1 to k4", fitted_px(&truth, &|a| odd(a, 5))),
         ];
         bench.extreme(case, "px", tried);
     }

@@ -29,60 +29,61 @@ mod warp;
 mod wavefield;
 
 use anyhow::Result;
+use hw_sim::ocean::random;
 
-use crate::bench::Bench;
+use crate::bench::PartBench;
 
-/// What is said of a part above its rows.
+/// Description of a part above its rows.
 #[derive(Clone, Copy, Debug)]
 pub struct About {
     /// The part's name, as in the rows.
     pub part: &'static str,
-    /// What it does in the product.
+    /// Its task in the product.
     pub what: &'static str,
-    /// What the truth is and why it shares nothing with what is tested.
+    /// The truth, and why it shares nothing with the code under test.
     pub truth: &'static str,
-    /// What it is held against.
+    /// The rivals that it is held against.
     pub rivals: &'static str,
     /// Why the default was chosen.
     pub why: &'static str,
 }
 
 /// One numerical part.
-pub struct Part {
-    /// What is said of it.
+pub struct NumericalPart {
+    /// Its description.
     pub about: About,
     /// Measures its scenes and extreme cases.
-    pub measure: fn(&mut Bench) -> Result<()>,
+    pub measure: fn(&mut PartBench) -> Result<()>,
 }
 
 /// All of them, in the order of the report.
-pub const PARTS: &[Part] = &[
-    Part { about: clock::ABOUT, measure: clock::measure },
-    Part { about: attitude::ABOUT, measure: attitude::measure },
-    Part { about: orientation::ABOUT, measure: orientation::measure },
-    Part { about: fusion::ABOUT, measure: fusion::measure },
-    Part { about: own::ABOUT, measure: own::measure },
-    Part { about: heading::ABOUT, measure: heading::measure },
-    Part { about: horizon::ABOUT, measure: horizon::measure },
-    Part { about: haze::ABOUT, measure: haze::measure },
-    Part { about: skyline::ABOUT, measure: skyline::measure },
-    Part { about: lens::ABOUT, measure: lens::measure },
-    Part { about: drawn::ABOUT, measure: drawn::measure },
-    Part { about: shutter::ABOUT, measure: shutter::measure },
-    Part { about: calibration::ABOUT, measure: calibration::measure },
-    Part { about: target::ABOUT, measure: target::measure },
-    Part { about: camera::ABOUT, measure: camera::measure },
-    Part { about: board::ABOUT, measure: board::measure },
-    Part { about: mount::ABOUT, measure: mount::measure },
-    Part { about: pacing::ABOUT, measure: pacing::measure },
-    Part { about: flight::ABOUT, measure: flight::measure },
-    Part { about: sea::ABOUT, measure: sea::measure },
-    Part { about: wavefield::ABOUT, measure: wavefield::measure },
-    Part { about: motion::ABOUT, measure: motion::measure },
-    Part { about: reflection::ABOUT, measure: reflection::measure },
-    Part { about: fresnel::ABOUT, measure: fresnel::measure },
-    Part { about: colour::ABOUT, measure: colour::measure },
-    Part { about: depth::ABOUT, measure: depth::measure },
+pub const PARTS: &[NumericalPart] = &[
+    NumericalPart { about: clock::ABOUT, measure: clock::measure },
+    NumericalPart { about: attitude::ABOUT, measure: attitude::measure },
+    NumericalPart { about: orientation::ABOUT, measure: orientation::measure },
+    NumericalPart { about: fusion::ABOUT, measure: fusion::measure },
+    NumericalPart { about: own::ABOUT, measure: own::measure },
+    NumericalPart { about: heading::ABOUT, measure: heading::measure },
+    NumericalPart { about: horizon::ABOUT, measure: horizon::measure },
+    NumericalPart { about: haze::ABOUT, measure: haze::measure },
+    NumericalPart { about: skyline::ABOUT, measure: skyline::measure },
+    NumericalPart { about: lens::ABOUT, measure: lens::measure },
+    NumericalPart { about: drawn::ABOUT, measure: drawn::measure },
+    NumericalPart { about: shutter::ABOUT, measure: shutter::measure },
+    NumericalPart { about: calibration::ABOUT, measure: calibration::measure },
+    NumericalPart { about: target::ABOUT, measure: target::measure },
+    NumericalPart { about: camera::ABOUT, measure: camera::measure },
+    NumericalPart { about: board::ABOUT, measure: board::measure },
+    NumericalPart { about: mount::ABOUT, measure: mount::measure },
+    NumericalPart { about: pacing::ABOUT, measure: pacing::measure },
+    NumericalPart { about: flight::ABOUT, measure: flight::measure },
+    NumericalPart { about: sea::ABOUT, measure: sea::measure },
+    NumericalPart { about: wavefield::ABOUT, measure: wavefield::measure },
+    NumericalPart { about: motion::ABOUT, measure: motion::measure },
+    NumericalPart { about: reflection::ABOUT, measure: reflection::measure },
+    NumericalPart { about: fresnel::ABOUT, measure: fresnel::measure },
+    NumericalPart { about: colour::ABOUT, measure: colour::measure },
+    NumericalPart { about: depth::ABOUT, measure: depth::measure },
 ];
 
 /// The numeric rows of a CSV text: comments and the heading aside; cells that are no numbers become NaN.
@@ -96,10 +97,7 @@ fn table(csv: &str) -> Vec<Vec<f64>> {
 
 /// Uniform numbers 0 to 1 from splitmix64 of `i`: the product draws from another generator.
 fn even(i: u64) -> f64 {
-    let mut z = i.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    random::unit(random::mix(i.wrapping_mul(random::GOLDEN)))
 }
 
 /// The largest; NaN where one of them is none, so that no broken value hides.

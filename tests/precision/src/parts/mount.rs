@@ -1,4 +1,4 @@
-//! What else is measured on the mount: boresight, the trigger's latency, and whether a calibration still holds.
+//! Further measurements on the mount: boresight, the trigger's latency, and whether a calibration still holds.
 
 use anyhow::Result;
 use bowwave_calibration::{
@@ -11,9 +11,9 @@ use bowwave_core::{event::TriggerEdge, time::Time};
 use glam::{DQuat, DVec2, DVec3};
 
 use super::{About, rms};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "mount",
     what: "Finds where the barrel points from pulls at a mark and when rounds leave from dry shots, and tells a stale calibration from a good one.",
@@ -61,7 +61,7 @@ const BORES: [(&str, &str, Bore); 3] = [
     }),
 ];
 
-fn bores(bench: &mut Bench) {
+fn bores(bench: &mut PartBench) {
     let off = |way: Bore, count, range_m, wild| {
         let one =
             |seed: u64| way(&pulls(count, range_m, wild, seed)).map_or(f64::NAN, |a| a.distance(BORE) * 1e3);
@@ -79,9 +79,9 @@ fn bores(bench: &mut Bench) {
         ("boresight, five pulls at 1000 m", 5, 1000.0, false),
         ("boresight, one of five pulls is 6 mrad off", 5, 100.0, true),
     ] {
-        let tried = BORES.iter().enumerate().map(|(i, (method, setting, way))| Tried {
+        let tried = BORES.iter().enumerate().map(|(i, (method, setting, way))| ExtremeResult {
             default: i == 0,
-            ..Tried::rival(method, setting, off(*way, count, range_m, wild))
+            ..ExtremeResult::rival(method, setting, off(*way, count, range_m, wild))
         });
         bench.extreme(case, "mrad rms", tried.collect());
     }
@@ -104,7 +104,7 @@ fn dry(late_s: f64, jolt: f64, sway: f64, seed: u64) -> (Vec<ImuReading>, Vec<Tr
     (readings, edges.collect())
 }
 
-type Late = fn(&[ImuReading], &[TriggerEdge]) -> Option<f64>;
+type LatePress = fn(&[ImuReading], &[TriggerEdge]) -> Option<f64>;
 
 /// The median over the presses of when `is_it` first holds of the force less gravity.
 fn first_where(
@@ -129,14 +129,14 @@ fn first_where(
     all.get(all.len() / 2).copied()
 }
 
-const LATES: [(&str, &str, Late); 3] = [
+const LATES: [(&str, &str, LatePress); 3] = [
     ("stands out of what was before", "", |r, e| Some(trigger::solve(r, e).ok()?.latency_s)),
     ("largest force", "", |r, e| first_where(r, e, |force, most| force >= most)),
     ("first force beyond a limit", "2 m/s^2", |r, e| first_where(r, e, |force, _| force > 2.0)),
 ];
 
-fn triggers(bench: &mut Bench) {
-    let off = |way: Late, jolt, sway| {
+fn triggers(bench: &mut PartBench) {
+    let off = |way: LatePress, jolt, sway| {
         let one = |seed: u64| {
             let (late_s, (readings, edges)) = (0.02, dry(0.02, jolt, sway, seed));
             // Nothing found is as wrong as what is looked at is long.
@@ -158,9 +158,9 @@ fn triggers(bench: &mut Bench) {
     for (case, jolt, sway) in
         [("trigger, a weak jolt of 4 m/s^2", 4.0, 0.0), ("trigger, a gun that sways by 3 m/s^2", 30.0, 3.0)]
     {
-        let tried = LATES.iter().enumerate().map(|(i, (method, setting, way))| Tried {
+        let tried = LATES.iter().enumerate().map(|(i, (method, setting, way))| ExtremeResult {
             default: i == 0,
-            ..Tried::rival(method, setting, off(*way, jolt, sway))
+            ..ExtremeResult::rival(method, setting, off(*way, jolt, sway))
         });
         bench.extreme(case, "ms rms", tried.collect());
     }
@@ -168,7 +168,7 @@ fn triggers(bench: &mut Bench) {
 
 /// Chi-squared with four degrees of freedom that one in a thousand exceeds.
 const SURPRISE: f64 = 18.47;
-/// What a calibration states of itself, radians and seconds.
+/// Standard deviations that a calibration states, radians and seconds.
 const STATED: (f64, f64) = (0.25e-3, 0.1e-3);
 
 /// A calibration with an error of its own deviation, and changed since.
@@ -196,7 +196,7 @@ fn by_limits(recording: &Recording, known: &Known) -> Option<bool> {
     Some(turn > 2e-3 || (found.offset_s - known.offset_s).abs() > 1e-3)
 }
 
-fn checks(bench: &mut Bench) {
+fn checks(bench: &mut PartBench) {
     let count: u64 = if bench.is_quick() { 6 } else { 60 };
     let noise = 0.1f64.to_radians();
     for (movement, motion) in [("by hand", Motion::ByHand), ("trained slowly", Motion::SlowMount)] {
@@ -217,8 +217,8 @@ fn checks(bench: &mut Bench) {
                 100.0 * wrong.count() as f64 / count as f64
             };
             let tried = vec![
-                Tried::product("by the covariances", "", wrong(by_covariance)),
-                Tried::rival("by limits", "2 mrad, 1 ms", wrong(by_limits)),
+                ExtremeResult::product("by the covariances", "", wrong(by_covariance)),
+                ExtremeResult::rival("by limits", "2 mrad, 1 ms", wrong(by_limits)),
             ];
             bench.extreme(&format!("check, {movement}: {case}"), "% told wrong", tried);
         }
@@ -226,7 +226,7 @@ fn checks(bench: &mut Bench) {
 }
 
 /// Measures all of it.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     bores(bench);
     triggers(bench);
     checks(bench);

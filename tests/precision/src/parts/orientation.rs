@@ -13,12 +13,12 @@ use vqf_rs::{Params, VQF};
 
 use super::About;
 use crate::{
-    bench::{Bench, Tried, Way},
+    bench::{ExtremeResult, PartBench, Way},
     recorded,
-    ship::{self, Errors, Sea, Ship, inclination_error},
+    ship::{self, Ship, ShipSea, UnitErrors, inclination_error},
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "orientation",
     what: "Finds which way is up for the inertial unit from its angular rate and specific force, while ship and gun move.",
@@ -62,7 +62,7 @@ fn broad(name: &str) -> Result<Option<Trial>> {
     Ok(Some(Trial { rate_hz: rate.values[0], samples }))
 }
 
-fn ship_trial(sea: Sea, gun: bool, seconds: f64, errors: Errors) -> Trial {
+fn ship_trial(sea: ShipSea, gun: bool, seconds: f64, errors: UnitErrors) -> Trial {
     let samples = ship::samples(&Ship::new(sea, gun, 7), &errors, seconds, 11);
     let samples = samples
         .iter()
@@ -71,7 +71,7 @@ fn ship_trial(sea: Sea, gun: bool, seconds: f64, errors: Errors) -> Trial {
     Trial { rate_hz: errors.rate_hz, samples }
 }
 
-type Tell<'a> = &'a mut dyn FnMut(usize, DQuat);
+type TellAttitude<'a> = &'a mut dyn FnMut(usize, DQuat);
 
 fn settings(inclination: InclinationSettings, rate: RateKind) -> AttitudeSettings {
     let noise = match inclination {
@@ -83,7 +83,7 @@ fn settings(inclination: InclinationSettings, rate: RateKind) -> AttitudeSetting
     AttitudeSettings { source: Source::Fused, rate, inclination, noise, own_growth: OWN_GROWTH }
 }
 
-fn ours(settings: AttitudeSettings, trial: &Trial, tell: Tell<'_>) {
+fn ours(settings: AttitudeSettings, trial: &Trial, tell: TellAttitude<'_>) {
     let mut attitude = Attitude::new(settings, DVec3::ZERO, DQuat::IDENTITY);
     for (i, (rate, accel, _)) in trial.samples.iter().enumerate() {
         let time = Time::from_ns(0).plus_secs(i as f64 / trial.rate_hz);
@@ -100,7 +100,7 @@ fn ours(settings: AttitudeSettings, trial: &Trial, tell: Tell<'_>) {
     }
 }
 
-fn vqf(params: Params, trial: &Trial, tell: Tell<'_>) {
+fn vqf(params: Params, trial: &Trial, tell: TellAttitude<'_>) {
     let mut filter = VQF::new(1.0 / trial.rate_hz, None, None, Some(params));
     for (i, (rate, accel, _)) in trial.samples.iter().enumerate() {
         filter.update(rate.to_array(), accel.to_array(), None);
@@ -110,7 +110,7 @@ fn vqf(params: Params, trial: &Trial, tell: Tell<'_>) {
 }
 
 /// Mahony, Hamel & Pflimlin 2008, the passive complementary filter with that gain and no integral, 1/s.
-fn complementary(gain: f64, trial: &Trial, tell: Tell<'_>) {
+fn complementary(gain: f64, trial: &Trial, tell: TellAttitude<'_>) {
     let dt = 1.0 / trial.rate_hz;
     let mut q: Option<DQuat> = None;
     for (i, (rate, accel, _)) in trial.samples.iter().enumerate() {
@@ -124,7 +124,7 @@ fn complementary(gain: f64, trial: &Trial, tell: Tell<'_>) {
 }
 
 /// The same with rates alone after a levelled start.
-fn rates_alone(trial: &Trial, tell: Tell<'_>) {
+fn rates_alone(trial: &Trial, tell: TellAttitude<'_>) {
     complementary(0.0, trial, tell);
 }
 
@@ -133,13 +133,10 @@ fn gun_params() -> Params {
     Params { tau_acc: 10.0, rest_th_gyr: 0.2, rest_th_acc: 0.05, bias_clip: 0.5, ..Params::default() }
 }
 
-type Run<'a> = Box<dyn Fn(&Trial, Tell<'_>) + 'a>;
+type AttitudeRun<'a> = Box<dyn Fn(&Trial, TellAttitude<'_>) + 'a>;
 
 /// Method, setting, whether the product uses it, itself.
-fn ways<'a>(
-    default: InclinationSettings,
-    rate: RateKind,
-) -> Vec<(&'static str, &'static str, bool, Run<'a>)> {
+fn ways<'a>(default: InclinationSettings, rate: RateKind) -> Vec<(&'static str, &'static str, bool, AttitudeRun<'a>)> {
     let (gun, hand) = (settings(InclinationSettings::GUN, rate), settings(InclinationSettings::HAND, rate));
     vec![
         (
@@ -163,7 +160,7 @@ fn ways<'a>(
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let mut trials = Vec::new();
     for name in BROAD {
         let Some(trial) = broad(name)? else { continue };
@@ -174,19 +171,13 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         scene(bench, "in hands, trials of BROAD", &trials, InclinationSettings::HAND, RateKind::Mean);
     }
     for sea in [ship::SEA_4, ship::SEA_6] {
-        let trial = ship_trial(sea, true, 300.0, Errors::usual());
-        scene(
-            bench,
-            &format!("gun on a ship, {}", sea.name),
-            &[trial],
-            InclinationSettings::GUN,
-            RateKind::Instant,
-        );
+        let trial = ship_trial(sea, true, 300.0, UnitErrors::usual());
+        scene(bench, &format!("gun on a ship, {}", sea.name), &[trial], InclinationSettings::GUN, RateKind::Instant);
     }
-    let usual = Errors::usual();
-    let slow = Errors { rate_hz: 100.0, ..usual };
-    let fast = Errors { rate_hz: 1000.0, ..usual };
-    let biased = Errors { gyro_bias: usual.gyro_bias * 6.0, ..usual };
+    let usual = UnitErrors::usual();
+    let slow = UnitErrors { rate_hz: 100.0, ..usual };
+    let fast = UnitErrors { rate_hz: 1000.0, ..usual };
+    let biased = UnitErrors { gyro_bias: usual.gyro_bias * 6.0, ..usual };
     for (case, sea, errors) in [
         ("calm, creep of 0.1 to 2 deg/s", ship::CALM, usual),
         ("sea 6 at 100 Hz", ship::SEA_6, slow),
@@ -199,16 +190,16 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     Ok(())
 }
 
-fn extreme(bench: &mut Bench, case: &str, trial: &Trial, default: InclinationSettings, rate: RateKind) {
-    let tried = ways(default, rate).into_iter().map(|(method, setting, default, run)| Tried {
+fn extreme(bench: &mut PartBench, case: &str, trial: &Trial, default: InclinationSettings, rate: RateKind) {
+    let tried = ways(default, rate).into_iter().map(|(method, setting, default, run)| ExtremeResult {
         default,
-        ..Tried::rival(method, setting, error_deg(trial, run))
+        ..ExtremeResult::rival(method, setting, error_deg(trial, run))
     });
     bench.extreme(case, "deg", tried.collect());
 }
 
 /// The error is the mean over the trials.
-fn scene(bench: &mut Bench, name: &str, trials: &[Trial], default: InclinationSettings, rate: RateKind) {
+fn scene(bench: &mut PartBench, name: &str, trials: &[Trial], default: InclinationSettings, rate: RateKind) {
     let samples = trials.iter().map(|t| t.samples.len()).sum();
     let ways = ways(default, rate).into_iter().map(|(method, setting, is_default, run)| {
         let error = trials.iter().map(|t| error_deg(t, &run)).sum::<f64>() / trials.len() as f64;
@@ -224,7 +215,7 @@ fn scene(bench: &mut Bench, name: &str, trials: &[Trial], default: InclinationSe
 }
 
 /// Root mean square of the inclination's error, degrees.
-fn error_deg(trial: &Trial, run: impl Fn(&Trial, Tell<'_>)) -> f64 {
+fn error_deg(trial: &Trial, run: impl Fn(&Trial, TellAttitude<'_>)) -> f64 {
     let (mut sum, mut count) = (0.0, 0u32);
     run(trial, &mut |i, q| {
         if let Some(truth) = trial.samples[i].2 {

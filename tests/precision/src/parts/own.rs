@@ -12,12 +12,15 @@ use vqf_rs::{Params, VQF};
 
 use super::{About, rms};
 use crate::{
-    aided::{CAMERA_FROM_IMU, Estimator, Heading, Horizon, Outcome, Recording, Unit, outcome, product},
-    bench::{Bench, Tried, Way},
-    ship::{self, Sea},
+    aided::{
+        AidedHorizon, AidedOutcome, AidedRecording, AidedUnit, CAMERA_FROM_IMU, Estimator, Heading, outcome,
+        product,
+    },
+    bench::{ExtremeResult, PartBench, Way},
+    ship::{self, ShipSea},
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "own",
     what: "Corrects the orientation that a unit finds by itself, whose ways it does not tell, by a horizon that is seen now and then and by \
@@ -30,36 +33,36 @@ pub const ABOUT: About = About {
           is followed as fast as the unit errs, and a good unit is not made worse by the horizon's noise",
 };
 
-/// What is known of a horizon and of a heading in the picture, radians.
+/// Standard deviations of a horizon and of a heading in the picture, radians.
 const SEEN_SIGMA: f64 = 0.03f64.to_radians();
 /// How long it is seen, and then not, seconds.
 const SEEN_S: f64 = 10.0;
 const SECONDS: f64 = 300.0;
 
 /// A unit: its name and how its filter is set.
-type Made = (&'static str, fn() -> Params);
+type OwnRecording = (&'static str, fn() -> Params);
 
-const UNITS: [Made; 2] = [
+const UNITS: [OwnRecording; 2] = [
     ("good unit", || Params { rest_bias_est_enabled: false, tau_acc: 10.0, ..Params::default() }),
     ("unit that learns wrong biases", Params::default),
 ];
 
 /// A recording, and what the unit made of it by itself.
-struct Told {
-    recording: Recording,
+struct OwnTold {
+    recording: AidedRecording,
     told: Vec<DQuat>,
 }
 
-impl Told {
-    fn new(sea: Sea, params: Params, seed: u64) -> Self {
+impl OwnTold {
+    fn new(sea: ShipSea, params: Params, seed: u64) -> Self {
         let aids = (
-            Some(Horizon { seen_s: SEEN_S, sigma: SEEN_SIGMA }),
+            Some(AidedHorizon { seen_s: SEEN_S, sigma: SEEN_SIGMA }),
             Heading::Anchored(SEEN_SIGMA, 0.001f64.to_radians()),
         );
-        let recording = Recording::new(sea, Unit::Usual, aids, SECONDS, seed);
+        let recording = AidedRecording::new(sea, AidedUnit::Usual, aids, SECONDS, seed);
         let period_s = recording.samples.get(1).map_or(0.005, |s| s.time_s);
         let mut filter = VQF::new(period_s, None, None, Some(params));
-        let tell = |s: &ship::Sample| {
+        let tell = |s: &ship::ShipReading| {
             filter.update(s.rate.to_array(), s.accel.to_array(), None);
             let q = filter.quat_6d();
             DQuat::from_xyzw(q.1, q.2, q.3, q.0)
@@ -68,7 +71,7 @@ impl Told {
         Self { recording, told }
     }
 
-    fn outcome(&self, corrected: &dyn Fn() -> Box<dyn Estimator>) -> Outcome {
+    fn outcome(&self, corrected: &dyn Fn() -> Box<dyn Estimator>) -> AidedOutcome {
         outcome(&self.recording, &mut Unasked { told: self.told.iter(), estimator: corrected() })
     }
 }
@@ -103,19 +106,19 @@ impl Estimator for Unasked<'_> {
 }
 
 /// The unit as it is, turned by a fixed share of what each horizon and heading differs by.
-struct FixedShare {
+struct OwnFixedShare {
     share: f64,
     turn: DQuat,
     found: DQuat,
 }
 
-impl FixedShare {
+impl OwnFixedShare {
     const fn new(share: f64) -> Self {
         Self { share, turn: DQuat::IDENTITY, found: DQuat::IDENTITY }
     }
 }
 
-impl Estimator for FixedShare {
+impl Estimator for OwnFixedShare {
     fn observe(&mut self, _: Time, sample: &ImuSample) -> Option<DQuat> {
         self.found = (self.turn * sample.world_from_imu?).normalize();
         Some(self.found)
@@ -138,22 +141,22 @@ impl Estimator for FixedShare {
     }
 }
 
-type Begin = (&'static str, &'static str, fn() -> Box<dyn Estimator>);
+type OwnBegin = (&'static str, &'static str, fn() -> Box<dyn Estimator>);
 
 /// Method, setting and the estimator at its start; the first is the product's.
-const WAYS: [Begin; 5] = [
+const WAYS: [OwnBegin; 5] = [
     ("the unit's, and error states", "for a gun", || Box::new(product(Source::Auto))),
-    ("the unit's as it is", "", || Box::new(FixedShare::new(0.0))),
-    ("the unit's, and a fixed share", "0.05 of each", || Box::new(FixedShare::new(0.05))),
-    ("the unit's, and a fixed share", "0.3 of each", || Box::new(FixedShare::new(0.3))),
+    ("the unit's as it is", "", || Box::new(OwnFixedShare::new(0.0))),
+    ("the unit's, and a fixed share", "0.05 of each", || Box::new(OwnFixedShare::new(0.05))),
+    ("the unit's, and a fixed share", "0.3 of each", || Box::new(OwnFixedShare::new(0.3))),
     ("its rates, VQF and error-state filter", "fusion", || Box::new(product(Source::Fused))),
 ];
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     for sea in [ship::CALM, ship::SEA_4, ship::SEA_6] {
         for (unit, params) in UNITS {
-            let told = Told::new(sea, params(), 3);
+            let told = OwnTold::new(sea, params(), 3);
             let ways = WAYS.into_iter().enumerate().map(|(i, (method, setting, begin))| {
                 let out = told.outcome(&|| begin());
                 let told = &told;
@@ -181,12 +184,12 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
     Ok(())
 }
 
-fn consistency(bench: &mut Bench) {
+fn consistency(bench: &mut PartBench) {
     let seeds = if bench.is_quick() { 4 } else { 24 };
     for (unit, params) in UNITS {
         for sea in [ship::CALM, ship::SEA_4, ship::SEA_6] {
-            let run = |seed| Told::new(sea, params(), seed).outcome(&|| Box::new(product(Source::Auto)));
-            let runs: Vec<Outcome> = (0..seeds).into_par_iter().map(run).collect();
+            let run = |seed| OwnTold::new(sea, params(), seed).outcome(&|| Box::new(product(Source::Auto)));
+            let runs: Vec<AidedOutcome> = (0..seeds).into_par_iter().map(run).collect();
             let squares: Vec<f64> = runs.iter().flat_map(|run| run.surprises.iter().copied()).collect();
             let count = squares.len() as f64;
             let inside = squares.iter().filter(|s| **s < 5.99).count() as f64 / count;
@@ -198,7 +201,8 @@ fn consistency(bench: &mut Bench) {
                 runs.len()
             );
             let (method, setting, _) = WAYS[0];
-            let tried = Tried::product(method, setting, squares.iter().sum::<f64>() / count).note(note);
+            let tried =
+                ExtremeResult::product(method, setting, squares.iter().sum::<f64>() / count).note(note);
             bench.extreme(
                 &format!("square over variance, two is right: {unit}, {}", sea.name),
                 "",
@@ -215,7 +219,7 @@ mod tests {
     #[test]
     fn horizons_make_a_units_own_inclination_better() {
         for ((unit, params), most) in UNITS.into_iter().zip([0.12, 1.0]) {
-            let told = Told::new(ship::SEA_4, params(), 4);
+            let told = OwnTold::new(ship::SEA_4, params(), 4);
             let [[ours, worst], [alone, _]] = [0, 1].map(|i| told.outcome(&|| WAYS[i].2()).up_deg);
             assert!(ours < most && ours < 0.6 * alone, "{unit}: {ours} (worst {worst}), alone {alone} deg");
         }

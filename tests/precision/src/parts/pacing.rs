@@ -7,9 +7,9 @@ use bowwave_core::{
 };
 
 use super::{About, even};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, PartBench};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "pacing",
     what: "Decides when the next frame begins, between the camera's clock and the display's.",
@@ -30,7 +30,7 @@ fn at(s: f64) -> Time {
 }
 
 /// Decides when frames begin. Told of what has happened before it is asked.
-trait Tick {
+trait TickRule {
     fn arrived(&mut self, _at: Time) {}
     fn flipped(&mut self, _at: Time, _period_ns: i64) {}
     fn rendered(&mut self, _ns: i64) {}
@@ -38,7 +38,7 @@ trait Tick {
     fn next(&mut self, now: Time) -> Time;
 }
 
-impl Tick for FrameClock {
+impl TickRule for FrameClock {
     fn arrived(&mut self, at: Time) {
         self.picture_arrived(at);
     }
@@ -57,7 +57,7 @@ impl Tick for FrameClock {
 }
 
 /// A clock of its own at exactly 30 Hz.
-impl Tick for Pacer {
+impl TickRule for Pacer {
     fn next(&mut self, now: Time) -> Time {
         let next = self.next_time().max(now);
         self.tick(next).map_or(next, |t| t.time)
@@ -66,13 +66,13 @@ impl Tick for Pacer {
 
 /// Begins a fixed time before every second blank, whatever the camera does.
 #[derive(Default)]
-struct Late {
+struct LateTick {
     flip: Option<(Time, i64)>,
     longest_ns: i64,
     last: Option<Time>,
 }
 
-impl Tick for Late {
+impl TickRule for LateTick {
     fn flipped(&mut self, at: Time, period_ns: i64) {
         self.flip = Some((at, period_ns));
     }
@@ -94,7 +94,7 @@ impl Tick for Late {
     }
 }
 
-struct Seen {
+struct ShownPictures {
     p99_ms: f64,
     dropped: u64,
     doubled: u64,
@@ -102,7 +102,7 @@ struct Seen {
     steps: Vec<u64>,
 }
 
-impl Seen {
+impl ShownPictures {
     /// Pictures dropped or doubled beyond the difference of the rates: by how much frames went on unevenly.
     fn beats(&self, camera_fps: f64, tick_fps: f64) -> f64 {
         let even = (camera_fps / tick_fps).round();
@@ -112,7 +112,7 @@ impl Seen {
 }
 
 /// Runs `tick` between a camera and a display.
-fn watch(tick: &mut dyn Tick, camera_fps: f64, display_hz: f64) -> Seen {
+fn watch(tick: &mut dyn TickRule, camera_fps: f64, display_hz: f64) -> ShownPictures {
     let arrival = |i: u64| at(0.003 + i as f64 / camera_fps + 0.8e-3 * even(i));
     let blank_after =
         |t: Time| at(((t.ns() as f64 * 1e-9 - 0.0042) * display_hz).ceil() / display_hz + 0.0042);
@@ -120,7 +120,7 @@ fn watch(tick: &mut dyn Tick, camera_fps: f64, display_hz: f64) -> Seen {
     let (mut now, mut next, mut frame) = (at(0.0), 0u64, 0u64);
     let (mut waiting, mut last_flip) = (std::collections::VecDeque::new(), at(0.0));
     let (mut shown, mut waits) = (None::<u64>, Vec::new());
-    let mut seen = Seen { p99_ms: 0.0, dropped: 0, doubled: 0, steps: Vec::new() };
+    let mut seen = ShownPictures { p99_ms: 0.0, dropped: 0, doubled: 0, steps: Vec::new() };
     while now < at(SECONDS + SETTLE_S) {
         while waiting.front().is_some_and(|flip| *flip <= now) {
             waiting.pop_front().into_iter().for_each(|flip| tick.flipped(flip, period_ns));
@@ -156,17 +156,17 @@ fn watch(tick: &mut dyn Tick, camera_fps: f64, display_hz: f64) -> Seen {
     seen
 }
 
-/// One way: method, setting, maker.
-type Method = (&'static str, &'static str, fn() -> Box<dyn Tick>);
+/// Maker of a tick.
+type TickMaker = fn() -> Box<dyn TickRule>;
 
-const METHODS: [Method; 3] = [
-    ("free tick", "30 Hz", || Box::new(Pacer::new(at(0.0011)))),
-    ("late begin", "every second blank", || Box::new(Late::default())),
-    ("locked tick", "camera and display", || Box::new(FrameClock::new())),
+const METHODS: [Candidate<TickMaker>; 3] = [
+    Candidate::rival("free tick", "30 Hz", || Box::new(Pacer::new(at(0.0011)))),
+    Candidate::rival("late begin", "every second blank", || Box::new(LateTick::default())),
+    Candidate::product("locked tick", "camera and display", || Box::new(FrameClock::new())),
 ];
 
 /// Error of a way and what is said of it.
-fn judged(make: fn() -> Box<dyn Tick>, camera_fps: f64, display_hz: f64) -> (f64, String) {
+fn judged(make: TickMaker, camera_fps: f64, display_hz: f64) -> (f64, String) {
     let seen = watch(make().as_mut(), camera_fps, display_hz);
     let tick_fps = if display_hz > 50.0 { display_hz / 2.0 } else { display_hz };
     let beats = seen.beats(camera_fps, tick_fps);
@@ -178,23 +178,21 @@ fn judged(make: fn() -> Box<dyn Tick>, camera_fps: f64, display_hz: f64) -> (f64
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     for (camera_fps, display_hz) in
         [(29.97, 60.0), (30.0, 59.94), (30.03, 60.0), (60.0, 59.94), (29.97, 30.0)]
     {
-        let ways = METHODS.map(|(method, setting, make)| {
-            let (error, note) = judged(make, camera_fps, display_hz);
-            Way::new(method, setting, error, FRAMES, move || decide(make().as_mut()))
-                .default_if(method == "locked tick")
-                .note(note)
+        let ways = METHODS.map(|m| {
+            let (error, note) = judged(m.run, camera_fps, display_hz);
+            m.way(error, FRAMES, move || decide((m.run)().as_mut())).note(note)
         });
         bench.scene(&format!("camera {camera_fps} Hz, display {display_hz} Hz"), "ms", 0.0, ways.into());
     }
     // A camera of another rate than the tick's cannot be followed: this shows what happens then.
     for (camera_fps, display_hz) in [(25.0, 60.0), (15.0, 60.0), (120.0, 59.94)] {
-        let tried = METHODS.map(|(method, setting, make)| {
-            let (error, note) = judged(make, camera_fps, display_hz);
-            Tried { default: method == "locked tick", ..Tried::rival(method, setting, error) }.note(note)
+        let tried = METHODS.map(|m| {
+            let (error, note) = judged(m.run, camera_fps, display_hz);
+            m.tried(error).note(note)
         });
         bench.extreme(&format!("camera {camera_fps} Hz, display {display_hz} Hz"), "ms", tried.into());
     }
@@ -204,7 +202,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
 const FRAMES: usize = 1000;
 
 /// Plans that many frames.
-fn decide(tick: &mut dyn Tick) -> i64 {
+fn decide(tick: &mut dyn TickRule) -> i64 {
     let mut sum = 0i64;
     for i in 0..FRAMES as i64 {
         let t = Time::from_ns(i * 33_333_333);

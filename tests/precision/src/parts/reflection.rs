@@ -1,4 +1,4 @@
-//! What a method makes of a boat's light on the sea, against the ray tracer.
+//! A boat's light on the sea by every method, against the ray tracer.
 
 use anyhow::{Context, Result};
 use bowwave_core::water::ReflectionMethod;
@@ -7,17 +7,17 @@ use bowwave_render::SOFTWARE;
 
 use super::About;
 use crate::{
-    bench::{Bench, Tried, Way},
+    bench::{ExtremeResult, PartBench, Way},
     reflection::{
-        cell::Cell,
+        cell::TruthCell,
         cost::process_ms,
-        draw::{Beliefs, Models, Painter, forced_scene, picture},
+        draw::{Beliefs, DrawnModels, Painter, forced_scene, picture},
         singular::{self, TrueCase},
     },
     truth::{cell::CellSpec, grid},
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "reflection",
     what: "Puts a boat's light onto the filmed sea: mean FLIP where the reflection is, against the time of the whole frame on software \
@@ -34,11 +34,11 @@ const EXCUSE: &str = "beaten: the table of waves is closer, and beyond 100 m in 
                       method takes more than twice its time (`reflection cost`)";
 
 /// Range in metres, sea state, light, and paths over the grid's.
-type Scene = (f64, u8, &'static str, f64);
+type CellScene = (f64, u8, &'static str, f64);
 
-const QUICK: [Scene; 3] =
+const QUICK: [CellScene; 3] =
     [(150.0, 0, "overcast", 0.06), (150.0, 2, "overcast", 0.06), (400.0, 1, "high", 0.06)];
-const FULL: [Scene; 7] = [
+const FULL: [CellScene; 7] = [
     (60.0, 0, "overcast", 0.25),
     (60.0, 1, "overcast", 0.25),
     (60.0, 3, "high", 0.25),
@@ -48,13 +48,13 @@ const FULL: [Scene; 7] = [
     (400.0, 1, "high", 0.25),
 ];
 
-/// What a scenario gets that names no method.
+/// The method of a scenario that names none.
 fn default_method() -> Result<ReflectionMethod> {
     let silent: Vec<&str> = EXAMPLE.lines().filter(|line| !line.starts_with("method")).collect();
     Ok(Still::parse(&silent.join("\n"), "example")?.water.method)
 }
 
-fn spec((range_m, state, light, paths): Scene) -> Result<CellSpec> {
+fn spec((range_m, state, light, paths): CellScene) -> Result<CellSpec> {
     let (eye_m, heading_deg) = (grid::EYES_M[0], grid::HEADINGS_DEG[0]);
     let mut spec = grid::cell(range_m, state, eye_m, light, heading_deg).context("no such cell")?;
     spec.samples = ((f64::from(spec.samples) * paths) as u32).max(1);
@@ -62,8 +62,8 @@ fn spec((range_m, state, light, paths): Scene) -> Result<CellSpec> {
 }
 
 /// One method in one scene: its error, and a frame of it as work.
-fn way(cell: &Cell, method: ReflectionMethod, default: ReflectionMethod) -> Result<Way<'static>> {
-    let models = Models::named(&cell.boat)?;
+fn way(cell: &TruthCell, method: ReflectionMethod, default: ReflectionMethod) -> Result<Way<'static>> {
+    let models = DrawnModels::named(&cell.boat)?;
     let scene = forced_scene(cell, method, &Beliefs::right(cell), &models);
     let video = picture(&cell.without)?;
     let mut painter = Painter::new(cell.size(), models.list(), &[method], (1, Some(SOFTWARE)))?;
@@ -83,11 +83,11 @@ fn way(cell: &Cell, method: ReflectionMethod, default: ReflectionMethod) -> Resu
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let default = default_method()?;
-    let scenes: &[Scene] = if bench.is_quick() { &QUICK } else { &FULL };
+    let scenes: &[CellScene] = if bench.is_quick() { &QUICK } else { &FULL };
     for scene in scenes {
-        let cell = Cell::render(&spec(*scene)?)?;
+        let cell = TruthCell::render(&spec(*scene)?)?;
         let ways =
             ReflectionMethod::ALL.iter().map(|m| way(&cell, *m, default)).collect::<Result<Vec<_>>>()?;
         let (range_m, state, light, _) = scene;
@@ -105,20 +105,20 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
 }
 
 fn tried(
-    studio: &mut crate::reflection::draw::Studio,
+    studio: &mut crate::reflection::draw::DrawingStudio,
     case: &TrueCase,
     default: ReflectionMethod,
-) -> Result<Vec<Tried>> {
+) -> Result<Vec<ExtremeResult>> {
     let found = singular::outcomes(studio, case)?;
-    let one = |(method, outcome): (&ReflectionMethod, &singular::Outcome)| {
+    let one = |(method, outcome): (&ReflectionMethod, &singular::SingularOutcome)| {
         // What writes pixels of nothing has an error that is no number.
         let mean = outcome.flip.filter(|_| outcome.zeros == 0).map_or(f64::NAN, |f| f.0);
         let note = match outcome.flip {
             Some((_, most)) => format!("worst pixel {most:.2}, {} pixels of nothing", outcome.zeros),
             None => "no reflection in the picture".to_owned(),
         };
-        let t = Tried::rival(method.name(), "one boat", mean).note(note);
-        Tried { default: *method == default, ..t }
+        let t = ExtremeResult::rival(method.name(), "one boat", mean).note(note);
+        ExtremeResult { default: *method == default, ..t }
     };
     Ok(ReflectionMethod::ALL.iter().zip(&found).map(one).collect())
 }

@@ -10,9 +10,9 @@ use bowwave_core::{
 use glam::DVec2;
 
 use super::{About, even, rms, table, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "sea",
     what: "Makes a sea of a spectrum: a sum of so many long-crested waves, whose height is asked for at boats and strikes.",
@@ -133,10 +133,17 @@ fn spec(height_m: f64, period_s: f64, gamma: f64) -> Result<WaveSpec> {
     Ok(WaveSpec { spectrum, wind_from: 0.7 })
 }
 
-/// What an error of a way to make a sea is, over the seeds.
-type Judge<'a> = &'a dyn Fn(&dyn Fn(u64) -> WaveField) -> f64;
+/// Error of a way to make a sea, over the seeds.
+type SeaError<'a> = &'a dyn Fn(&dyn Fn(u64) -> WaveField) -> f64;
 
-fn scene(bench: &mut Bench, name: &str, unit: &'static str, sea: &WaveSpec, excuse: &str, judge: Judge<'_>) {
+fn scene(
+    bench: &mut PartBench,
+    name: &str,
+    unit: &'static str,
+    sea: &WaveSpec,
+    excuse: &str,
+    judge: SeaError<'_>,
+) {
     // Many places, so that no processor learns them by heart.
     let places: Vec<DVec2> = (0..256).map(|i| DVec2::new(even(2 * i), even(2 * i + 1)) * 2000.0).collect();
     let places = &places;
@@ -156,7 +163,7 @@ fn scene(bench: &mut Bench, name: &str, unit: &'static str, sea: &WaveSpec, excu
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let sea = spec(1.44, 6.0, 1.0)?;
     scene(bench, "share of water beyond two standard deviations", "relative", &sea, "", &|make| {
         rms((0..SEEDS).map(|seed| share_beyond_two(make(seed).waves()) / GAUSSIAN_BEYOND_TWO - 1.0))
@@ -185,7 +192,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
 }
 
 /// Peaked spectra: the product's number of waves, and others.
-fn peaked(bench: &mut Bench) -> Result<()> {
+fn peaked(bench: &mut PartBench) -> Result<()> {
     for gamma in [3.3, 7.0] {
         let rows: Vec<Vec<f64>> = table(MOMENTS).into_iter().filter(|r| r[1] == gamma).collect();
         let mut tried = Vec::new();
@@ -200,8 +207,8 @@ fn peaked(bench: &mut Bench) -> Result<()> {
                 }
             }
             let error = worst(errors);
-            let t = Tried::rival(METHODS[0].0, &count.to_string(), error);
-            tried.push(Tried { default: count == DEFAULT, ..t });
+            let t = ExtremeResult::rival(METHODS[0].0, &count.to_string(), error);
+            tried.push(ExtremeResult { default: count == DEFAULT, ..t });
         }
         bench.extreme(&format!("zero-crossing period of a JONSWAP sea, gamma {gamma}"), "relative", tried);
     }
@@ -219,7 +226,7 @@ fn e1(x: f64) -> f64 {
 }
 
 /// Mean square slopes: of the product's waves against their band in closed form, and of both against the sea's.
-fn slopes(bench: &mut Bench) -> Result<()> {
+fn slopes(bench: &mut PartBench) -> Result<()> {
     // Pierson-Moskowitz up to six peaks: alpha / 4 E1(1.25 / 6^4), whatever the wind.
     let band = 0.0081 / 4.0 * e1(1.25 / 6f64.powi(4));
     let mean = |wind: f64, count: usize| -> Result<f64> {
@@ -229,8 +236,9 @@ fn slopes(bench: &mut Bench) -> Result<()> {
     };
     let mut tried = Vec::new();
     for count in COUNTS {
-        let t = Tried::rival(METHODS[0].0, &count.to_string(), (mean(10.0, count)? / band - 1.0).abs());
-        tried.push(Tried { default: count == DEFAULT, ..t });
+        let t =
+            ExtremeResult::rival(METHODS[0].0, &count.to_string(), (mean(10.0, count)? / band - 1.0).abs());
+        tried.push(ExtremeResult { default: count == DEFAULT, ..t });
     }
     bench.extreme("mean square slope up to six peaks against its closed form", "relative", tried);
     for row in table(COX_MUNK).iter().filter(|r| [2.0, 6.0, 10.0, 14.0].contains(&r[0])) {
@@ -240,9 +248,9 @@ fn slopes(bench: &mut Bench) -> Result<()> {
             &format!("mean square slope at {} m/s against Cox and Munk", row[0]),
             "relative",
             vec![
-                Tried::product(METHODS[0].0, "32", (held / row[1] - 1.0).abs()).note(note),
-                Tried::rival("spectrum up to six peaks", "closed form", (band / row[1] - 1.0).abs()),
-                Tried::rival(
+                ExtremeResult::product(METHODS[0].0, "32", (held / row[1] - 1.0).abs()).note(note),
+                ExtremeResult::rival("spectrum up to six peaks", "closed form", (band / row[1] - 1.0).abs()),
+                ExtremeResult::rival(
                     "spectrum up to 1 cm waves",
                     "closed form",
                     (slope_to_centimetre(row[0]) / row[1] - 1.0).abs(),

@@ -5,9 +5,9 @@ use bowwave_core::geometry::Lens;
 use glam::{DQuat, DVec2, DVec3};
 
 use super::{About, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, PartBench};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "shutter",
     what: "Puts a point onto the row of the picture that is read just when the turning camera sees it there.",
@@ -30,7 +30,7 @@ const NODES: usize = 9;
 const EXACT: &str = "what core finds in a picture must lead back to where it was seen; a frame asks for hundreds of points only";
 
 /// How the camera is turned so many seconds after the middle row was read.
-type Attitude = fn(f64) -> DQuat;
+type TurnedBy = fn(f64) -> DQuat;
 
 /// 60 deg/s about an axis that is mostly the vertical.
 fn swing(t: f64) -> DQuat {
@@ -54,11 +54,11 @@ fn recoil(t: f64) -> DQuat {
     swing(t) * DQuat::from_rotation_x(shake)
 }
 
-struct Scene {
+struct ShutterScene {
     /// The lens as the product has it: with the turn over the whole readout.
     lens: Lens,
     global: Lens,
-    attitude: Attitude,
+    attitude: TurnedBy,
     nodes: [DQuat; NODES],
     points: Vec<(DVec3, DVec2)>,
 }
@@ -68,8 +68,8 @@ fn read_at(row: f64) -> f64 {
     (row / f64::from(SIZE.1) - 0.5) * READOUT_S
 }
 
-impl Scene {
-    fn new(attitude: Attitude) -> Self {
+impl ShutterScene {
+    fn new(attitude: TurnedBy) -> Self {
         let global = Lens::pinhole(SIZE.0, SIZE.1, 60f64.to_radians());
         let [from, to] = [-0.5, 0.5].map(|share| attitude(share * READOUT_S));
         let lens = global.read_while((from.inverse() * to).to_scaled_axis());
@@ -114,48 +114,44 @@ impl Scene {
         seen(seen(rows).y - middle)
     }
 
-    fn worst_px(&self, way: Method) -> f64 {
+    fn worst_px(&self, way: PointFinder) -> f64 {
         worst(self.points.iter().map(|(p, pixel)| way(self, *p).distance(*pixel)))
     }
 }
 
-type Method = fn(&Scene, DVec3) -> DVec2;
+type PointFinder = fn(&ShutterScene, DVec3) -> DVec2;
 
-/// Method, setting, whether the product uses it, itself.
-const METHODS: [(&str, &str, bool, Method); 7] = [
-    ("the middle row's attitude", "", false, |s, p| s.global.project(p).unwrap_or(DVec2::NAN)),
-    ("one rate", "1 round", false, |s, p| s.rounds(p, 1, |row| s.one_rate(row))),
-    ("one rate", "2 rounds", false, |s, p| s.rounds(p, 2, |row| s.one_rate(row))),
-    ("one rate", "Newton and a round, as shaders", true, Scene::newton),
-    ("one rate", "until still, as core", true, |s, p| s.lens.project(p).unwrap_or(DVec2::NAN)),
-    ("nine attitudes", "3 rounds", false, |s, p| s.rounds(p, 3, |row| s.interpolated(row))),
-    ("each row's attitude", "4 rounds", false, |s, p| s.rounds(p, 4, |row| (s.attitude)(read_at(row)))),
+const METHODS: [Candidate<PointFinder>; 7] = [
+    Candidate::rival("the middle row's attitude", "", |s, p| s.global.project(p).unwrap_or(DVec2::NAN)),
+    Candidate::rival("one rate", "1 round", |s, p| s.rounds(p, 1, |row| s.one_rate(row))),
+    Candidate::rival("one rate", "2 rounds", |s, p| s.rounds(p, 2, |row| s.one_rate(row))),
+    Candidate::product("one rate", "Newton and a round, as shaders", ShutterScene::newton),
+    Candidate::product("one rate", "until still, as core", |s, p| s.lens.project(p).unwrap_or(DVec2::NAN)),
+    Candidate::rival("nine attitudes", "3 rounds", |s, p| s.rounds(p, 3, |row| s.interpolated(row))),
+    Candidate::rival("each row's attitude", "4 rounds", |s, p| {
+        s.rounds(p, 4, |row| (s.attitude)(read_at(row)))
+    }),
 ];
 
 /// Measures the swing and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
-    let scene = Scene::new(swing);
+pub fn measure(bench: &mut PartBench) -> Result<()> {
+    let scene = ShutterScene::new(swing);
     let scene = &scene;
-    let ways = METHODS.map(|(method, setting, default, way)| {
-        let way = Way::new(method, setting, scene.worst_px(way), scene.points.len(), move || {
-            scene.points.iter().map(|(p, _)| way(scene, *p)).sum::<DVec2>()
-        })
-        .default_if(default);
-        match setting {
+    let ways = METHODS.map(|m| {
+        let way = m.way(scene.worst_px(m.run), scene.points.len(), move || {
+            scene.points.iter().map(|(p, _)| (m.run)(scene, *p)).sum::<DVec2>()
+        });
+        match m.setting {
             "until still, as core" => way.default_although(EXACT),
             _ => way,
         }
     });
     bench.scene("30 ms, 60 deg/s", "px", 0.01, ways.into());
-    let cases: [(&str, Attitude); 3] =
+    let cases: [(&str, TurnedBy); 3] =
         [("60 deg/s up", lift), ("60 deg/s down", drop), ("recoil while swung at 60 deg/s", recoil)];
     for (case, attitude) in cases {
-        let scene = Scene::new(attitude);
-        let tried = METHODS.map(|(method, setting, default, way)| Tried {
-            default,
-            ..Tried::rival(method, setting, scene.worst_px(way))
-        });
-        bench.extreme(case, "px", tried.into());
+        let scene = ShutterScene::new(attitude);
+        bench.extreme(case, "px", METHODS.map(|m| m.tried(scene.worst_px(m.run))).into());
     }
     Ok(())
 }

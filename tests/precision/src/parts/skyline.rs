@@ -14,11 +14,11 @@ use rayon::prelude::*;
 
 use super::{About, rms, worst};
 use crate::{
-    bench::{Bench, Tried, Way},
-    horizon::synth::{DrawnLens, Shown},
+    bench::{ExtremeResult, PartBench, Way},
+    horizon::synth::{DrawnLens, DrawnScene},
 };
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "skyline",
     what: "Follows sky line, coast and clouds through pictures: by how much the believed heading is off since the anchor.",
@@ -37,7 +37,7 @@ const DRIFT: f64 = 0.05 * std::f64::consts::PI / 180.0;
 /// How fast the sky may drift at the horizon as is usual, and for one that is said to stand, rad/s.
 const DRIFTING: f64 = 0.005 * std::f64::consts::PI / 180.0;
 const STANDING: f64 = 1e-7;
-/// What the prediction of a turn may be off by, radians.
+/// Standard deviation of the predicted turn, radians.
 const SIGMA: f64 = 3.5e-3;
 
 /// A series of pictures of a drawn sky.
@@ -48,7 +48,7 @@ struct Series {
 }
 
 impl Series {
-    fn new(count: usize, shown: impl Fn(f64) -> Shown + Sync) -> Result<Self> {
+    fn new(count: usize, shown: impl Fn(f64) -> DrawnScene + Sync) -> Result<Self> {
         let drawn = (0..count).into_par_iter().map(|i| {
             let mut shown = shown(i as f64 / RATE_HZ);
             shown.picture = i as u64;
@@ -153,19 +153,19 @@ const WAYS: [(&str, &str, Follow); 7] = [
 ];
 
 /// A fair sky through a bowed lens.
-fn fair() -> Shown {
-    Shown { lens: DrawnLens { focal: 1108.5, radial: [-0.1, 0.02] }, ..Shown::fair(7003) }
+fn fair() -> DrawnScene {
+    DrawnScene { lens: DrawnLens { focal: 1108.5, radial: [-0.1, 0.02] }, ..DrawnScene::fair(7003) }
 }
 
 /// A gun that is trained to and fro by `degrees`, at `deg_s` at most, on a ship that rolls.
-fn trained(t: f64, degrees: f64, deg_s: f64) -> Shown {
+fn trained(t: f64, degrees: f64, deg_s: f64) -> DrawnScene {
     let roll = 4f64.to_radians() * (0.9 * t).sin();
     let elevation = (-2.0 + 1.5 * (1.3 * t).sin()).to_radians();
     let heading = degrees.to_radians() * (deg_s / degrees.max(1e-9) * t).sin();
-    Shown { attitude: [roll, elevation], heading, ..fair() }
+    DrawnScene { attitude: [roll, elevation], heading, ..fair() }
 }
 
-fn scene(bench: &mut Bench, name: &str, series: &Series) {
+fn scene(bench: &mut PartBench, name: &str, series: &Series) {
     let ways = WAYS.map(|(method, setting, way)| {
         let (errors, answered) = series.errors(way);
         let end = errors.last().copied().unwrap_or(f64::NAN).abs();
@@ -196,18 +196,18 @@ fn scene(bench: &mut Bench, name: &str, series: &Series) {
 const EXACT: &str = "the turn is predicted exactly here; the pyramid is for predictions that are not";
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let count = if bench.is_quick() { 16 } else { 150 };
     scene(bench, "clouds, trained at 15 deg/s, 1280x720", &Series::new(count, |t| trained(t, 20.0, 15.0))?);
-    let coast = |t: f64| Shown { coast: 0.02, ..trained(t, 40.0, 60.0) };
+    let coast = |t: f64| DrawnScene { coast: 0.02, ..trained(t, 40.0, 60.0) };
     scene(bench, "coast and clouds, trained at 60 deg/s, 1280x720", &Series::new(count, coast)?);
     for (name, shown) in EXTREMES {
         let series = Series::new(count, |t| half(shown(t)))?;
         let tried = WAYS.map(|(method, setting, way)| {
             let (errors, answered) = series.errors(way);
-            Tried {
+            ExtremeResult {
                 default: setting == "60 points" && method == "anchored",
-                ..Tried::rival(method, setting, worst(errors.into_iter().map(f64::abs)))
+                ..ExtremeResult::rival(method, setting, worst(errors.into_iter().map(f64::abs)))
             }
             .note(format!("{answered} of {} answered", series.pictures.len() - 1))
         });
@@ -217,43 +217,46 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
 }
 
 /// The same in half the size, which is drawn in a quarter of the time.
-fn half(shown: Shown) -> Shown {
+fn half(shown: DrawnScene) -> DrawnScene {
     let lens = DrawnLens { focal: 0.5 * shown.lens.focal, ..shown.lens };
-    Shown { size: (shown.size.0 / 2, shown.size.1 / 2), lens, ..shown }
+    DrawnScene { size: (shown.size.0 / 2, shown.size.1 / 2), lens, ..shown }
 }
 
 /// An extreme case: what is shown after so many seconds.
-type Extreme = (&'static str, fn(f64) -> Shown);
+type Extreme = (&'static str, fn(f64) -> DrawnScene);
 
 const EXTREMES: [Extreme; 12] = [
-    ("no texture in the sky", |t| Shown { contrast: [0.0, 10.0], ..trained(t, 10.0, 10.0) }),
-    ("faint clouds, a code", |t| Shown { contrast: [0.8, 10.0], ..trained(t, 10.0, 10.0) }),
-    ("all water", |t| Shown { attitude: [0.0, -0.8], ..trained(t, 10.0, 10.0) }),
-    ("all sky", |t| Shown { attitude: [0.0, 0.5], ..trained(t, 10.0, 10.0) }),
-    ("glare: sky at the sensor's limit", |t| Shown {
+    ("no texture in the sky", |t| DrawnScene { contrast: [0.0, 10.0], ..trained(t, 10.0, 10.0) }),
+    ("faint clouds, a code", |t| DrawnScene { contrast: [0.8, 10.0], ..trained(t, 10.0, 10.0) }),
+    ("all water", |t| DrawnScene { attitude: [0.0, -0.8], ..trained(t, 10.0, 10.0) }),
+    ("all sky", |t| DrawnScene { attitude: [0.0, 0.5], ..trained(t, 10.0, 10.0) }),
+    ("glare: sky at the sensor's limit", |t| DrawnScene {
         codes: [280.0, 270.0, 120.0],
         ..trained(t, 10.0, 10.0)
     }),
-    ("clouds drift by .03 deg/s behind a coast", |t| Shown {
+    ("clouds drift by .03 deg/s behind a coast", |t| DrawnScene {
         coast: 0.02,
         clouds_turned: (0.03 * t).to_radians(),
         ..trained(t, 10.0, 10.0)
     }),
-    ("clouds 1 km up go by at 10 m/s", |t| Shown { clouds_gone: [0.01 * t, 0.0], ..trained(t, 10.0, 10.0) }),
-    ("the same behind a coast", |t| Shown {
+    ("clouds 1 km up go by at 10 m/s", |t| DrawnScene {
+        clouds_gone: [0.01 * t, 0.0],
+        ..trained(t, 10.0, 10.0)
+    }),
+    ("the same behind a coast", |t| DrawnScene {
         coast: 0.02,
         clouds_gone: [0.01 * t, 0.0],
         ..trained(t, 10.0, 10.0)
     }),
-    ("ships pass at 2 deg/s", |t| Shown {
+    ("ships pass at 2 deg/s", |t| DrawnScene {
         ships: 5,
         ships_turned: (2.0 * t).to_radians(),
         ..trained(t, 10.0, 10.0)
     }),
-    ("jump by 40 deg after a second", |t| Shown {
+    ("jump by 40 deg after a second", |t| DrawnScene {
         heading: if t < 1.0 { 0.0 } else { 0.7 },
         ..trained(0.0, 10.0, 0.0)
     }),
-    ("smeared over 12 rows", |t| Shown { smear: 12, ..trained(t, 10.0, 10.0) }),
-    ("noise of 8 codes", |t| Shown { noise: 8.0, ..trained(t, 10.0, 10.0) }),
+    ("smeared over 12 rows", |t| DrawnScene { smear: 12, ..trained(t, 10.0, 10.0) }),
+    ("noise of 8 codes", |t| DrawnScene { noise: 8.0, ..trained(t, 10.0, 10.0) }),
 ];

@@ -61,11 +61,11 @@ fn flat(ray: DVec3) -> Option<DVec2> {
 
 /// A straight edge on the plane at a distance of one: what lies to its right is black.
 #[derive(Clone, Copy)]
-struct Edge {
+struct WarpEdge {
     ends: [DVec2; 2],
 }
 
-impl Edge {
+impl WarpEdge {
     /// The `i`th, up to `longest` pixels long in the picture.
     fn drawn(lens: &Lens, i: u64, longest: f64) -> Option<Self> {
         let draw = |k: u64| even(8 * i + k);
@@ -89,8 +89,8 @@ fn coverage(centre: DVec2, is_black: impl Fn(DVec2) -> bool) -> f64 {
     black.count() as f64 / (FINE * FINE) as f64
 }
 
-/// What a rectified picture shows at `at`, blended from the four pixels around.
-fn blended(at: DVec2, edge: &Edge, straight: &Lens) -> f64 {
+/// Value of a rectified picture at `at`, blended from the four pixels around.
+fn blended(at: DVec2, edge: &WarpEdge, straight: &Lens) -> f64 {
     let first = (at - 0.5).floor() + 0.5;
     let share = at - first;
     let pixel = |x: f64, y: f64| {
@@ -106,7 +106,7 @@ pub fn edge_errors<const N: usize>(lens: &Lens, longest: f64, scales: [f64; N]) 
     let straight = scales.map(|scale| rectified(lens, scale));
     let mut chords = Vec::new();
     let mut warped = [const { Vec::new() }; N];
-    for edge in (0..EDGES).filter_map(|i| Edge::drawn(lens, i, longest)) {
+    for edge in (0..EDGES).filter_map(|i| WarpEdge::drawn(lens, i, longest)) {
         let [Some(a), Some(b)] = edge.ends.map(|n| lens.project(n.extend(1.0))) else { continue };
         for centre in pixels_along(lens, a, b) {
             let seen = |p: DVec2| flat(lens.unproject(p));

@@ -10,9 +10,9 @@ use bowwave_core::{
 use glam::DVec2;
 
 use super::{About, even, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{Candidate, PartBench};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "wavefield",
     what: "Height of one wave at a place and time: thousands of cycles away, of which only the fraction counts.",
@@ -25,32 +25,34 @@ pub const ABOUT: About = About {
 };
 
 /// A place and a time.
-type Event = (DVec2, f64);
+type WaveEvent = (DVec2, f64);
 /// Height over amplitude.
-type Method = (&'static str, &'static str, fn(&Wave, DVec2, f64) -> f64);
+type WaveHeight = fn(&Wave, DVec2, f64) -> f64;
 
-const METHODS: [Method; 7] = [
-    ("f32", "as written", |w, p, t| {
+const METHODS: [Candidate<WaveHeight>; 7] = [
+    Candidate::rival("f32", "as written", |w, p, t| {
         let k = (w.cycles_per_m * TAU).as_vec2();
         let phase = k.dot(p.as_vec2()) - (TAU * w.hz) as f32 * t as f32 + (TAU * w.phase) as f32;
         f64::from(phase.cos())
     }),
-    ("f32", "whole cycles off", |w, p, t| {
+    Candidate::rival("f32", "whole cycles off", |w, p, t| {
         let (c, p) = (w.cycles_per_m.as_vec2(), p.as_vec2());
         let cycles = (c.x * p.x).fract() + (c.y * p.y).fract() - (w.hz as f32 * t as f32).fract();
         f64::from(((cycles + w.phase as f32).fract() * std::f32::consts::TAU).cos())
     }),
-    ("f32", "anchor of 64 m", |w, p, t| {
+    Candidate::rival("f32", "anchor of 64 m", |w, p, t| {
         // As a shader would: the phase at the anchor comes from f64, once a frame; only the way from there is f32.
         let anchor = (p / 64.0).round() * 64.0;
         let start = w.phase(anchor, t) as f32;
         let way = (w.cycles_per_m * TAU).as_vec2().dot((p - anchor).as_vec2());
         f64::from((start + way).cos())
     }),
-    ("f64", "as written", |w, p, t| (TAU * (w.cycles_per_m.dot(p) - w.hz * t + w.phase)).cos()),
-    ("f64", "cosine in f32", |w, p, t| f64::from((w.phase(p, t) as f32).cos())),
-    ("f64", "whole cycles off", |w, p, t| w.phase(p, t).cos()),
-    ("f64", "two-product", |w, p, t| {
+    Candidate::rival("f64", "as written", |w, p, t| {
+        (TAU * (w.cycles_per_m.dot(p) - w.hz * t + w.phase)).cos()
+    }),
+    Candidate::rival("f64", "cosine in f32", |w, p, t| f64::from((w.phase(p, t) as f32).cos())),
+    Candidate::product("f64", "whole cycles off", |w, p, t| w.phase(p, t).cos()),
+    Candidate::rival("f64", "two-product", |w, p, t| {
         let part = |a: f64, b: f64| {
             let product = a * b;
             (product - product.floor()) + a.mul_add(b, -product)
@@ -59,10 +61,6 @@ const METHODS: [Method; 7] = [
         (TAU * (cycles - cycles.floor())).cos()
     }),
 ];
-
-fn is_default(method: &Method) -> bool {
-    method.0 == "f64" && method.1 == "whole cycles off"
-}
 
 /// Fraction of a * b, exact: the product of two mantissas is an integer of 106 bits.
 fn exact_fraction(a: f64, b: f64) -> f64 {
@@ -95,7 +93,7 @@ fn truth(w: &Wave, p: DVec2, t: f64) -> f64 {
     (TAU * cycles).cos()
 }
 
-fn events(reach_m: f64, from_s: f64, to_s: f64) -> Vec<Event> {
+fn events(reach_m: f64, from_s: f64, to_s: f64) -> Vec<WaveEvent> {
     (0..512)
         .map(|i| {
             let at = DVec2::new(even(3 * i) * 2.0 - 1.0, even(3 * i + 1) * 2.0 - 1.0) * reach_m;
@@ -104,8 +102,8 @@ fn events(reach_m: f64, from_s: f64, to_s: f64) -> Vec<Event> {
         .collect()
 }
 
-fn error(method: &Method, waves: &[Wave], events: &[Event]) -> f64 {
-    let of = |w: &Wave| worst(events.iter().map(|(p, t)| (method.2(w, *p, *t) - truth(w, *p, *t)).abs()));
+fn error(height: WaveHeight, waves: &[Wave], events: &[WaveEvent]) -> f64 {
+    let of = |w: &Wave| worst(events.iter().map(|(p, t)| (height(w, *p, *t) - truth(w, *p, *t)).abs()));
     worst(waves.iter().map(of))
 }
 
@@ -116,7 +114,7 @@ fn sea(force: u8) -> Vec<Wave> {
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     let waves = &sea(2);
     for (scene, events) in [
         ("force 2, within 200 m, first minute", events(200.0, 0.0, 60.0)),
@@ -126,15 +124,15 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         let ways = METHODS
             .iter()
             .map(|m| {
-                let work = move || events.iter().map(|(p, t)| (m.2)(&waves[7], *p, *t)).sum::<f64>();
-                Way::new(m.0, m.1, error(m, waves, events), events.len(), work).default_if(is_default(m))
+                let work = move || events.iter().map(|(p, t)| (m.run)(&waves[7], *p, *t)).sum::<f64>();
+                m.way(error(m.run, waves, events), events.len(), work)
             })
             .collect();
         bench.scene(scene, "amplitudes", 1e-15, ways);
     }
     let ripple = Wave { amplitude_m: 1e-3, cycles_per_m: DVec2::new(60.0, 80.0), hz: 23.1, phase: 0.25 };
     let steady = |t: f64| (0..512).map(move |i| (DVec2::new(1e5, -1e5) * even(i), t)).collect();
-    let cases: [(&str, Vec<Wave>, Vec<Event>); 5] = [
+    let cases: [(&str, Vec<Wave>, Vec<WaveEvent>); 5] = [
         ("force 1, within 100 km, after 30 days", sea(1), events(1e5, 2.592e6, 2.6e6)),
         ("force 8, within 100 km, after 30 days", sea(8), events(1e5, 2.592e6, 2.6e6)),
         ("ripple of 1 cm at 2 km, after an hour", vec![ripple], events(2e3, 3600.0, 3700.0)),
@@ -142,10 +140,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         ("force 2, 141 km off, at time -1 day", sea(2), steady(-86_400.0)),
     ];
     for (case, waves, events) in cases {
-        let tried = METHODS
-            .iter()
-            .map(|m| Tried { default: is_default(m), ..Tried::rival(m.0, m.1, error(m, &waves, &events)) });
-        bench.extreme(case, "amplitudes", tried.collect());
+        bench.extreme(case, "amplitudes", METHODS.map(|m| m.tried(error(m.run, &waves, &events))).into());
     }
     Ok(())
 }

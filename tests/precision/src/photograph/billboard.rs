@@ -14,7 +14,7 @@ use image::{RgbImage, Rgba, RgbaImage};
 
 use super::{
     mask,
-    spec::{Assumed, Polygon, View},
+    spec::{Assumed, PhotographView, Polygon},
 };
 
 /// A boat cut out above its water line.
@@ -29,7 +29,7 @@ pub struct CutOut {
 
 /// Draws the boat and its reflection over `cleaned` by one method.
 pub fn draw(
-    (view, index): (&View, usize),
+    (view, index): (&PhotographView, usize),
     assumed: &Assumed,
     method: ReflectionMethod,
     cleaned: &RgbImage,
@@ -65,7 +65,13 @@ pub fn draw(
 
 /// The camera and the boat's place, as a user of `bowwave compose` writes them. The optical axis goes level to the horizon above
 /// the boat: upright and seen square, the cut-out falls on its own pixels, whatever the camera's perspective did to it already.
-fn still(view: &View, index: usize, assumed: &Assumed, size: (u32, u32), foot: DVec2) -> Result<Still> {
+fn still(
+    view: &PhotographView,
+    index: usize,
+    assumed: &Assumed,
+    size: (u32, u32),
+    foot: DVec2,
+) -> Result<Still> {
     let horizon = view.waterline(index) - (view.waterline(index) - view.horizon(index)) * assumed.height;
     let eye_height_m = view.eye_height_m * assumed.height;
     let focal_px = f64::from(size.0) / 2.0 / (view.hfov_deg * assumed.hfov / 2.0).to_radians().tan();

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use image::{RgbImage, imageops};
 
-use super::mask::Mask;
+use super::mask::OutlineMask;
 use crate::metric::flip_mean;
 
 /// Pixels around the region that FLIP's filters look at.
@@ -22,7 +22,7 @@ pub struct Difference {
 }
 
 /// Holds `test` against `truth` in `region`.
-pub fn compare(truth: &RgbImage, test: &RgbImage, region: &Mask) -> Result<Difference> {
+pub fn compare(truth: &RgbImage, test: &RgbImage, region: &OutlineMask) -> Result<Difference> {
     anyhow::ensure!(truth.dimensions() == test.dimensions(), "the pictures have different sizes");
     let [left, top, right, bottom] =
         region.bounds().ok_or_else(|| anyhow::anyhow!("the region lies outside the picture"))?;
@@ -102,8 +102,8 @@ mod tests {
         })
     }
 
-    fn whole() -> Mask {
-        Mask::of_polygon((96, 96), &[[0.0, 0.0], [96.0, 0.0], [96.0, 96.0], [0.0, 96.0]])
+    fn whole() -> OutlineMask {
+        OutlineMask::of_polygon((96, 96), &[[0.0, 0.0], [96.0, 0.0], [96.0, 96.0], [0.0, 96.0]])
     }
 
     #[test]
@@ -138,7 +138,7 @@ mod tests {
         let truth = stripes(4, 60);
         let mut test = truth.clone();
         (60..96).for_each(|x| (0..96).for_each(|y| test.put_pixel(x, y, Rgb([0, 0, 0]))));
-        let left = Mask::of_polygon((96, 96), &[[0.0, 0.0], [24.0, 0.0], [24.0, 96.0], [0.0, 96.0]]);
+        let left = OutlineMask::of_polygon((96, 96), &[[0.0, 0.0], [24.0, 0.0], [24.0, 96.0], [0.0, 96.0]]);
         let difference = compare(&truth, &test, &left).unwrap();
         assert!(difference.flip < 1e-3 && difference.spectrum < 1e-9, "{difference:?}");
     }

@@ -7,21 +7,21 @@
 
 use image::{Rgb, RgbImage};
 
-use super::mask::Mask;
+use super::mask::OutlineMask;
 
 /// Rows above and below over which a side's mean colour is taken.
 const MEAN_ROWS: u32 = 6;
 
 /// The picture with `region` filled from at most `source_px` pixels left and right of `no_water`, which holds the region and
 /// whatever else beside it is no open water.
-pub fn without(picture: &RgbImage, region: &Mask, no_water: &Mask, source_px: u32) -> RgbImage {
-    let bands: Vec<[Option<Band>; 2]> = (0..picture.height())
-        .map(|y| region.span(y).map_or([None, None], |_| Band::beside(picture, no_water, y, source_px)))
+pub fn without(picture: &RgbImage, region: &OutlineMask, no_water: &OutlineMask, source_px: u32) -> RgbImage {
+    let bands: Vec<[Option<FillBand>; 2]> = (0..picture.height())
+        .map(|y| region.span(y).map_or([None, None], |_| FillBand::beside(picture, no_water, y, source_px)))
         .collect();
     let mut filled = picture.clone();
     for y in 0..picture.height() {
         let (Some((first, last)), true) = (no_water.span(y), region.span(y).is_some()) else { continue };
-        let [left, right] = [0, 1].map(|side| Side::new(&bands, y, side));
+        let [left, right] = [0, 1].map(|side| FillSide::new(&bands, y, side));
         for x in first..=last {
             if region.has(x, y) {
                 let share = (f64::from(x - first) + 0.5) / f64::from(last - first + 1);
@@ -36,15 +36,15 @@ pub fn without(picture: &RgbImage, region: &Mask, no_water: &Mask, source_px: u3
 
 /// Columns `from` to before `to` of a row, and their mean colour.
 #[derive(Clone, Copy)]
-struct Band {
+struct FillBand {
     from: u32,
     to: u32,
     mean: [f64; 3],
 }
 
-impl Band {
+impl FillBand {
     /// What lies left and right of the region in a row; nothing where it is not in the row, or where too little is left.
-    fn beside(picture: &RgbImage, region: &Mask, y: u32, source_px: u32) -> [Option<Self>; 2] {
+    fn beside(picture: &RgbImage, region: &OutlineMask, y: u32, source_px: u32) -> [Option<Self>; 2] {
         let Some((first, last)) = region.span(y) else { return [None, None] };
         let right = (last + 1, (last + 1 + source_px).min(picture.width()));
         [(first.saturating_sub(source_px), first), right].map(|(from, to)| {
@@ -66,8 +66,8 @@ fn mixed(
     y: u32,
     x: u32,
     share: f64,
-    left: Option<&Side>,
-    right: Option<&Side>,
+    left: Option<&FillSide>,
+    right: Option<&FillSide>,
 ) -> Option<Rgb<u8>> {
     let (near_left, near_right) = match (left, right) {
         (Some(_), Some(_)) => (1.0 - share, share),
@@ -88,17 +88,17 @@ fn mixed(
 }
 
 /// The water on one side of the reflection in one row.
-struct Side {
+struct FillSide {
     from: u32,
     to: u32,
     on_the_left: bool,
     mean: [f64; 3],
 }
 
-impl Side {
+impl FillSide {
     /// Side 0 (left) or 1 (right) of row `y`, its mean taken over a few rows.
-    fn new(bands: &[[Option<Band>; 2]], y: u32, side: usize) -> Option<Self> {
-        let Band { from, to, .. } = bands[y as usize][side]?;
+    fn new(bands: &[[Option<FillBand>; 2]], y: u32, side: usize) -> Option<Self> {
+        let FillBand { from, to, .. } = bands[y as usize][side]?;
         let rows = y.saturating_sub(MEAN_ROWS) as usize..bands.len().min((y + MEAN_ROWS + 1) as usize);
         let near: Vec<[f64; 3]> = bands[rows].iter().filter_map(|b| Some(b[side]?.mean)).collect();
         let mean = std::array::from_fn(|c| near.iter().map(|m| m[c]).sum::<f64>() / near.len() as f64);
@@ -141,7 +141,7 @@ mod tests {
         let clean = water(300, 80);
         let mut dark = clean.clone();
         let outline = [[100.0, 10.0], [200.0, 10.0], [200.0, 70.0], [100.0, 70.0]];
-        let region = Mask::of_polygon((300, 80), &outline);
+        let region = OutlineMask::of_polygon((300, 80), &outline);
         for y in 10..70 {
             for x in 100..200 {
                 dark.put_pixel(x, y, Rgb([5, 5, 5]));
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn a_region_at_the_edge_is_filled_from_its_other_side() {
         let picture = water(60, 20);
-        let region = Mask::of_polygon((60, 20), &[[0.0, 5.0], [20.0, 5.0], [20.0, 15.0], [0.0, 15.0]]);
+        let region = OutlineMask::of_polygon((60, 20), &[[0.0, 5.0], [20.0, 5.0], [20.0, 15.0], [0.0, 15.0]]);
         let filled = without(&picture, &region, &region, 15);
         // Folded over the edge at column 20.
         assert_eq!(filled.get_pixel(19, 10), picture.get_pixel(20, 10));

@@ -2,7 +2,7 @@
 
 /// A set of pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Mask {
+pub struct OutlineMask {
     /// Width and height.
     pub size: (u32, u32),
     inside: Vec<bool>,
@@ -52,7 +52,7 @@ pub fn bounds<'a>(polygons: impl IntoIterator<Item = &'a Vec<[f64; 2]>>) -> [f64
         })
 }
 
-impl Mask {
+impl OutlineMask {
     /// The pixels of a picture of `size` whose middle lies in the polygon.
     pub fn of_polygon(size: (u32, u32), polygon: &[[f64; 2]]) -> Self {
         let inside = (0..size.1)
@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_triangle_has_half_of_its_box() {
         let triangle = vec![[0.0, 0.0], [40.0, 0.0], [0.0, 40.0]];
-        let mask = Mask::of_polygon((50, 50), &triangle);
+        let mask = OutlineMask::of_polygon((50, 50), &triangle);
         assert!((mask.count() as f64 - 800.0).abs() <= 20.0, "{}", mask.count());
         // Pixels whose centres lie on the edge do not belong to it.
         assert_eq!(mask.bounds(), Some([0, 0, 38, 38]));

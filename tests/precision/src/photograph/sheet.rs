@@ -3,7 +3,7 @@
 use ab_glyph::{Font, FontRef, ScaleFont, point};
 use image::{Rgb, RgbImage, imageops};
 
-use super::mask::{self, Mask};
+use super::mask::{self, OutlineMask};
 
 /// Height of the line with a picture's name.
 const LABEL_PX: u32 = 30;
@@ -13,7 +13,7 @@ const WIDTH_MIN_PX: u32 = 480;
 const COLUMNS: u32 = 2;
 
 /// Left, top, width and height of what shows the boat and its reflection.
-pub fn around(boat: &[Vec<[f64; 2]>], region: &Mask) -> [u32; 4] {
+pub fn around(boat: &[Vec<[f64; 2]>], region: &OutlineMask) -> [u32; 4] {
     let [x0, y0, x1, y1] = mask::bounds(boat);
     let [left, top, right, bottom] = region.bounds().unwrap_or([0; 4]);
     let margin = 0.04 * (x1 - x0);

@@ -9,7 +9,7 @@ pub type Polygon = Vec<[f64; 2]>;
 /// One boat before one camera, in one picture or several.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct View {
+pub struct PhotographView {
     /// Folder of the pictures.
     pub series: String,
     /// Horizontal field of view, degrees.
@@ -26,20 +26,20 @@ pub struct View {
     pub wind_from_deg: f64,
     /// How far left and right of the reflection the water is like it was under it, pixels.
     pub source_px: u32,
-    /// What stands above the water; several polygons are one boat.
+    /// Outlines of everything above the water; several polygons are one boat.
     pub boat: Vec<Polygon>,
     /// Where the real reflection is.
     pub reflection: Polygon,
     /// From the reflection to water without one, pixels.
     pub control_shift: [f64; 2],
     /// The pictures.
-    pub picture: Vec<Placed>,
+    pub picture: Vec<PlacedBoat>,
 }
 
-/// How the outlines lie in a picture: scaled about `Placed::ORIGIN`, then moved.
+/// How the outlines lie in a picture: scaled about `PlacedBoat::ORIGIN`, then moved.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Placed {
+pub struct PlacedBoat {
     /// File name.
     pub file: String,
     /// Scale.
@@ -48,8 +48,8 @@ pub struct Placed {
     pub shift: [f64; 2],
 }
 
-impl Placed {
-    /// What outlines are scaled about.
+impl PlacedBoat {
+    /// Point about which outlines are scaled.
     const ORIGIN: [f64; 2] = [600.0, 700.0];
 
     /// A point of the outlines in this picture.
@@ -60,13 +60,13 @@ impl Placed {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
-    view: Vec<View>,
+struct PhotographFile {
+    view: Vec<PhotographView>,
 }
 
 /// All photographs.
-pub fn views() -> Result<Vec<View>> {
-    let file: File =
+pub fn views() -> Result<Vec<PhotographView>> {
+    let file: PhotographFile =
         toml::from_str(include_str!("photographs.toml")).context("photographs.toml cannot be read")?;
     for view in &file.view {
         ensure!(!view.picture.is_empty(), "{} has no picture", view.series);
@@ -76,7 +76,7 @@ pub fn views() -> Result<Vec<View>> {
     Ok(file.view)
 }
 
-impl View {
+impl PhotographView {
     /// The boat's polygons and the reflection's in picture number `index`.
     pub fn outlines(&self, index: usize) -> (Vec<Polygon>, Polygon) {
         let placed = &self.picture[index];
@@ -106,7 +106,7 @@ impl View {
 /// What is assumed of a camera that nobody measured: the estimate, or an error of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Assumed {
-    /// What reports call it.
+    /// Its name in reports.
     pub name: &'static str,
     /// Factor on the field of view.
     pub hfov: f64,
@@ -117,7 +117,7 @@ pub struct Assumed {
 }
 
 impl Assumed {
-    /// What the estimate is called.
+    /// Name of the estimate.
     pub const ESTIMATE: &'static str = "as estimated";
 
     /// The estimate first, then its errors; the estimate alone for a quick look.

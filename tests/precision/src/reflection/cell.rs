@@ -14,8 +14,8 @@ use image::{GrayImage, Rgb, RgbImage, imageops};
 use crate::{
     metric::flip_mean,
     truth::{
-        cell::{CellSpec, Setup},
-        files::{self, Described},
+        cell::{CellSetup, CellSpec},
+        files::{self, CellFile},
         grid, masks,
     },
 };
@@ -25,10 +25,10 @@ const HORIZON_DEG: f64 = 3.0;
 
 /// A cell.
 #[derive(Clone, Debug)]
-pub struct Cell {
+pub struct TruthCell {
     /// Its folder's name.
     pub name: String,
-    /// What made it.
+    /// Its specification.
     pub spec: CellSpec,
     /// The lens of its pictures.
     pub lens: Lens,
@@ -46,7 +46,7 @@ pub struct Cell {
     pub light: Light,
     /// Radiance of the sky in the direction of view by elevation, degrees, ascending.
     pub sky: Vec<(f64, Vec3)>,
-    /// What a method gets.
+    /// Picture that a method gets.
     pub without: RgbImage,
     /// The truth.
     pub with: RgbImage,
@@ -56,7 +56,7 @@ pub struct Cell {
     pub region: Vec<bool>,
 }
 
-impl Cell {
+impl TruthCell {
     /// Reads a folder that `truth` wrote.
     pub fn load(folder: &Path) -> Result<Self> {
         let open = |name: &str| {
@@ -80,7 +80,7 @@ impl Cell {
 
     /// Renders a cell.
     pub fn render(spec: &CellSpec) -> Result<Self> {
-        let setup = Setup::new(spec)?;
+        let setup = CellSetup::new(spec)?;
         let pictures = setup.render();
         let region = masks::reflection(&setup, &pictures);
         let described = files::describe(&setup, &pictures, &region, 0.0);
@@ -96,7 +96,7 @@ impl Cell {
 
     fn new(
         name: String,
-        of: &Described,
+        of: &CellFile,
         sky_rows: &[[f64; 5]],
         [without, with]: [RgbImage; 2],
         [hull, region]: [GrayImage; 2],
@@ -157,7 +157,7 @@ impl Cell {
         between(&self.sky, degrees)
     }
 
-    /// What a camera with a smaller picture sees of it: `width` x `height` pixels from (`x`, `y`) on.
+    /// The part of it that a camera with a smaller picture sees: `width` x `height` pixels from (`x`, `y`) on.
     pub fn cropped(&self, x: u32, y: u32, width: u32, height: u32) -> Self {
         let rgb = |p: &RgbImage| imageops::crop_imm(p, x, y, width, height).to_image();
         let hull = imageops::crop_imm(&self.hull, x, y, width, height).to_image();
@@ -189,7 +189,7 @@ impl Cell {
         out
     }
 
-    /// What a method draws that is right but for noise: what the boat changes along other paths, put onto this cell's picture without it.
+    /// Picture of a method that is right but for noise: the boat's change along other paths, put onto this cell's picture without it.
     /// Renders the cell again.
     pub fn renewed(&self) -> Result<RgbImage> {
         let other = Self::render(&CellSpec { noise_seed: self.spec.noise_seed + 1, ..self.spec.clone() })?;
@@ -203,20 +203,20 @@ impl Cell {
         Ok(drawn)
     }
 
-    /// Mean FLIP of [`Cell::renewed`]. A method that knows the exact change errs by less, about this over the root of two.
+    /// Mean FLIP of [`TruthCell::renewed`]. A method that knows the exact change errs by less, about this over the root of two.
     pub fn noise(&self) -> Result<f64> {
         Ok(self.errors(&self.renewed()?)?.flip)
     }
 
     /// How far a drawn picture is from the truth where the reflection is.
-    pub fn errors(&self, drawn: &RgbImage) -> Result<Errors> {
+    pub fn errors(&self, drawn: &RgbImage) -> Result<CellErrors> {
         let drawn = self.with_hull(drawn);
         let flip = flip_mean(self.with.as_raw(), drawn.as_raw(), self.size(), &self.region)?;
         let sum = |of: &RgbImage| -> f64 {
             of.pixels().zip(&self.region).filter(|(_, judged)| **judged).map(|(p, _)| luminance(p)).sum()
         };
         let truth = sum(&self.with);
-        Ok(Errors {
+        Ok(CellErrors {
             flip: flip.unwrap_or(0.0),
             bias: sum(&drawn) - truth,
             change: truth - sum(&self.with_hull(&self.without)),
@@ -226,7 +226,7 @@ impl Cell {
 
 /// How far a drawn picture is from the truth where the reflection is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Errors {
+pub struct CellErrors {
     /// Mean FLIP.
     pub flip: f64,
     /// Sum over the pixels of linear luminance beyond the truth's.

@@ -1,4 +1,4 @@
-//! What each method takes of software Vulkan, the methods in turns over the same picture.
+//! Time of each method on software Vulkan, the methods in turns over the same picture.
 //!
 //! Two clocks. The **processor time of the process** counts what the driver's threads do for a frame and not what other programs take
 //! meanwhile; a reflection's is the frame's less that of the same turn's frame without one. The renderer's own **timestamps** around the
@@ -26,6 +26,7 @@ use super::{
 };
 use crate::{
     front::median,
+    table::TextTable,
     truth::{boat::box_boat, cell::HFOV_DEG},
 };
 
@@ -38,7 +39,7 @@ pub const SIZES: [(u32, u32); 2] = [(1280, 720), (1920, 1080)];
 
 /// Times of one method, milliseconds.
 #[derive(Clone, Debug, Default)]
-pub struct Times {
+pub struct MethodTimes {
     /// Processor time of the whole frame, turn by turn.
     pub frame_cpu: Vec<f64>,
     /// Timestamps around the whole frame.
@@ -77,9 +78,9 @@ impl Bed {
     }
 
     /// Draws turns of [`TIMED_EVERY`] frames a method; the first turn compiles and does not count.
-    fn run(&mut self, turns: usize) -> Result<[Times; METHODS]> {
+    fn run(&mut self, turns: usize) -> Result<[MethodTimes; METHODS]> {
         let video = picture(&self.sea)?;
-        let mut times: [Times; METHODS] = Default::default();
+        let mut times: [MethodTimes; METHODS] = Default::default();
         for turn in 0..=turns {
             for i in 0..METHODS {
                 // Each turn begins with another method.
@@ -140,8 +141,7 @@ pub fn table(turns: usize) -> Result<String> {
         ("three boats", SIZES[1], &three[..]),
     ] {
         let times = Bed::new(size, &model, boats)?.run(turns)?;
-        writeln!(text, "\n{name}, {}x{}", size.0, size.1)?;
-        lines(&mut text, &times)?;
+        writeln!(text, "\n{name}, {}x{}\n{}", size.0, size.1, lines(&times).trim_end())?;
     }
     for size in SIZES {
         let ratio = boatless(size, &model, turns)?;
@@ -150,12 +150,19 @@ pub fn table(turns: usize) -> Result<String> {
     Ok(text)
 }
 
-fn lines(text: &mut String, times: &[Times; METHODS]) -> Result<()> {
-    writeln!(
-        text,
-        "{:20}{:>16}{:>20}{:>10}{:>20}{:>20}{:>10}",
-        "", "frame, CPU", "reflection, CPU", "ratio", "frame, stamps", "mirror and water", "ratio"
-    )?;
+fn lines(times: &[MethodTimes; METHODS]) -> String {
+    let mut table = TextTable::new(
+        1,
+        [
+            ("", 20),
+            ("frame, CPU", 15),
+            ("reflection, CPU", 19),
+            ("ratio", 9),
+            ("frame, stamps", 19),
+            ("mirror and water", 19),
+            ("ratio", 9),
+        ],
+    );
     let off = &times[index(ReflectionMethod::Off)];
     let printed = &times[index(ReflectionMethod::FullAsPrinted)];
     let (printed_cpu, printed_gpu) =
@@ -163,17 +170,11 @@ fn lines(text: &mut String, times: &[Times; METHODS]) -> Result<()> {
     for (method, t) in ReflectionMethod::ALL.iter().zip(times) {
         let middle = |v: &[f64]| median(&mut v.to_vec());
         let (cpu, gpu) = (beyond(&t.frame_cpu, &off.frame_cpu), middle(&t.mirror_gpu));
-        writeln!(
-            text,
-            "{:20}{:16.2}{cpu:20.2}{:10.2}{:20.2}{gpu:20.2}{:10.2}",
-            method.name(),
-            middle(&t.frame_cpu),
-            cpu / printed_cpu,
-            middle(&t.frame_gpu),
-            gpu / printed_gpu
-        )?;
+        let (frame_cpu, frame_gpu) = (middle(&t.frame_cpu), middle(&t.frame_gpu));
+        let numbers = [frame_cpu, cpu, cpu / printed_cpu, frame_gpu, gpu, gpu / printed_gpu];
+        table.row([method.name().to_owned()].into_iter().chain(numbers.map(|v| format!("{v:.2}"))));
     }
-    Ok(())
+    table.take()
 }
 
 /// Processor time of a frame of a renderer that could draw three boats and has none in view, over one of a renderer that can draw

@@ -22,13 +22,13 @@ use bowwave_render::{Completions, Finished, Needs, RenderConfig, Renderer, SOFTW
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::RgbImage;
 
-use super::{cell::Cell, scenes::flat};
+use super::{cell::TruthCell, scenes::flat};
 use crate::truth::boat;
 
 /// Sea closer to the horizon than this is not measured, tangent.
 const TANGENT_MIN: f64 = 0.004;
 
-/// What the trainer believes of a scene, beside what it sees.
+/// Estimates of a scene that the trainer has beside the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beliefs {
     /// Wind 10 m above the sea, m/s.
@@ -43,7 +43,7 @@ pub struct Beliefs {
     pub skylight: f32,
     /// The eye's height.
     pub eye: EyeHeight,
-    /// What holds with a wrong eye height: the boat's place in the picture, from which its range and size follow, so that everything is
+    /// Which quantity holds with a wrong eye height: the boat's place in the picture, from which its range and size follow, so that everything is
     /// larger or smaller, seen alike; or its range and size, so that the water is seen under another angle. Either way the
     /// boat stands where the truth has it.
     pub range_kept: bool,
@@ -73,8 +73,8 @@ impl EyeHeight {
 }
 
 impl Beliefs {
-    /// What is right.
-    pub fn right(cell: &Cell) -> Self {
+    /// The right ones.
+    pub fn right(cell: &TruthCell) -> Self {
         Self {
             wind_m_s: cell.wind_m_s,
             wind_from: cell.wind_from,
@@ -89,13 +89,18 @@ impl Beliefs {
 
 /// The scene of a cell, seen through the region of interest alone. A method that a session would leave out in a sea of that force is
 /// left out here as well.
-pub fn scene(cell: &Cell, method: ReflectionMethod, beliefs: &Beliefs, models: &Models) -> Scene {
+pub fn scene(cell: &TruthCell, method: ReflectionMethod, beliefs: &Beliefs, models: &DrawnModels) -> Scene {
     let seen = if sea_reflects(beliefs.force) { method } else { ReflectionMethod::Off };
     forced_scene(cell, seen, beliefs, models)
 }
 
 /// The same in any sea.
-pub fn forced_scene(cell: &Cell, method: ReflectionMethod, beliefs: &Beliefs, models: &Models) -> Scene {
+pub fn forced_scene(
+    cell: &TruthCell,
+    method: ReflectionMethod,
+    beliefs: &Beliefs,
+    models: &DrawnModels,
+) -> Scene {
     let (camera, pose, size) = if beliefs.range_kept {
         (higher(&cell.camera, beliefs.eye.scale(), cell.pose.position), cell.pose, EyeHeight::Right)
     } else {
@@ -184,12 +189,12 @@ pub fn tones(picture: &RgbImage, lens: &Lens, camera: &CameraPose) -> SeaTones {
 }
 
 /// A boat in the sizes that eye heights make of it.
-pub struct Models {
+pub struct DrawnModels {
     name: String,
     list: Vec<Model>,
 }
 
-impl Models {
+impl DrawnModels {
     /// Of the truth's boat of that name.
     pub fn named(name: &str) -> Result<Self> {
         Ok(Self::of_model(&boat::model(name)?))
@@ -264,7 +269,7 @@ impl Painter {
         Ok(Self { renderer, done, size })
     }
 
-    /// What is allocated on the device, bytes.
+    /// Memory on the device, bytes.
     pub fn bytes(&self) -> usize {
         self.renderer.memory().iter().map(|(_, bytes)| *bytes as usize).sum()
     }
@@ -292,21 +297,26 @@ pub fn picture(of: &RgbImage) -> Result<Picture> {
 
 /// Draws cells with software Vulkan, whose frames are the same everywhere. One renderer stays until a cell of another size or boat comes.
 #[derive(Default)]
-pub struct Studio {
-    models: Option<Models>,
+pub struct DrawingStudio {
+    models: Option<DrawnModels>,
     painter: Option<Painter>,
 }
 
-impl Studio {
+impl DrawingStudio {
     /// Draws a cell.
-    pub fn draw(&mut self, cell: &Cell, method: ReflectionMethod, beliefs: &Beliefs) -> Result<RgbImage> {
+    pub fn draw(
+        &mut self,
+        cell: &TruthCell,
+        method: ReflectionMethod,
+        beliefs: &Beliefs,
+    ) -> Result<RgbImage> {
         self.draw_scene(cell, |models| scene(cell, method, beliefs, models))
     }
 
     /// The same in any sea.
     pub fn draw_forced(
         &mut self,
-        cell: &Cell,
+        cell: &TruthCell,
         method: ReflectionMethod,
         beliefs: &Beliefs,
     ) -> Result<RgbImage> {
@@ -314,12 +324,16 @@ impl Studio {
     }
 
     /// Draws a scene over a cell's picture.
-    pub fn draw_scene(&mut self, cell: &Cell, scene: impl FnOnce(&Models) -> Scene) -> Result<RgbImage> {
+    pub fn draw_scene(
+        &mut self,
+        cell: &TruthCell,
+        scene: impl FnOnce(&DrawnModels) -> Scene,
+    ) -> Result<RgbImage> {
         let models = match self.models.take() {
             Some(models) if models.name == cell.boat => models,
             _ => {
                 self.painter = None;
-                Models::named(&cell.boat)?
+                DrawnModels::named(&cell.boat)?
             }
         };
         ensure!(!models.list.is_empty(), "{}: no model", cell.name);
@@ -358,7 +372,7 @@ mod tests {
 
     #[test]
     fn a_boat_seen_from_higher_up_is_larger_and_seen_alike() {
-        let models = Models::of_model(&scenes::grey_boat(0.1));
+        let models = DrawnModels::of_model(&scenes::grey_boat(0.1));
         let lengths = EyeHeight::ALL.map(|eye| models.of(eye).1.length_m());
         assert!((lengths[1] / lengths[0] - 0.9).abs() < 1e-6 && (lengths[2] / lengths[0] - 1.1).abs() < 1e-6);
     }

@@ -1,7 +1,5 @@
 //! Whether a reflection hangs together with its hull: bare water between them at the water line, in the drawn pictures.
 
-use std::fmt::Write as _;
-
 use anyhow::{Context, Result};
 use bowwave_core::{sea::BeaufortForce, water::ReflectionMethod};
 use bowwave_render::SOFTWARE;
@@ -10,7 +8,7 @@ use image::{RgbImage, imageops};
 use super::{
     cell::luminance,
     draw::{Painter, picture, tones},
-    heading,
+    methods_table,
     scenes::{self, Afloats},
 };
 
@@ -28,8 +26,8 @@ const BEGINS: f64 = 0.5;
 const SEEN: f64 = 0.03;
 
 /// A way to lie in the water.
-pub struct Case {
-    /// What it is called.
+pub struct GapCase {
+    /// Its name.
     pub name: &'static str,
     /// Force of the wind.
     pub force: u8,
@@ -38,9 +36,9 @@ pub struct Case {
 }
 
 /// All of them.
-pub fn cases() -> Vec<Case> {
+pub fn cases() -> Vec<GapCase> {
     let level = Afloats::at(60.0);
-    let case = |name, force, afloat| Case { name, force, afloat };
+    let case = |name, force, afloat| GapCase { name, force, afloat };
     vec![
         case("level", 0, level),
         case("on a crest, 0.5 m", 0, Afloats { water_level: 0.5, ..level }),
@@ -51,9 +49,9 @@ pub fn cases() -> Vec<Case> {
     ]
 }
 
-/// Gap by columns of one picture, pixels.
+/// ReflectionGap by columns of one picture, pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gap {
+pub struct ReflectionGap {
     /// The middle one.
     pub median: f64,
     /// The widest but for one column in twenty.
@@ -63,7 +61,7 @@ pub struct Gap {
 }
 
 /// Measures the gap under a black boat. `off` has the hull alone over `sea`, `drawn` its reflection too. `None` without a hull.
-pub fn measure(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage, reach_px: u32) -> Option<Gap> {
+pub fn measure(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage, reach_px: u32) -> Option<ReflectionGap> {
     let (width, height) = sea.dimensions();
     let light = |of: &RgbImage, x: u32, y: u32| luminance(of.get_pixel(x, y));
     let covered = |x, y| 1.0 - light(off, x, y) / light(sea, x, y).max(1e-6);
@@ -86,7 +84,7 @@ pub fn measure(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage, reach_px: u32) 
     gaps.sort_by(f64::total_cmp);
     let seen = gaps.len() as f64 / inner.len() as f64;
     let at = |share: f64| gaps.get(((gaps.len() as f64 * share) as usize).min(gaps.len().saturating_sub(1)));
-    (!inner.is_empty()).then(|| Gap {
+    (!inner.is_empty()).then(|| ReflectionGap {
         median: at(0.5).copied().unwrap_or(f64::NAN),
         most: at(0.95).copied().unwrap_or(f64::NAN),
         seen,
@@ -105,7 +103,7 @@ pub fn table() -> Result<String> {
     );
     let mut worst = [0.0_f64; ReflectionMethod::ALL.len()];
     for case in cases() {
-        writeln!(text, "{}", heading(case.name, 32))?;
+        let mut table = methods_table(case.name, 32, &[]);
         for range_m in RANGES_M {
             let camera = scenes::camera(EYE_M, range_m);
             let sea = scenes::sea(&lens, &camera, 150.0, 12.0);
@@ -124,24 +122,24 @@ pub fn table() -> Result<String> {
                 painter.paint(&scene, &video).map(|drawn| cut(&drawn))
             };
             let (sea, off) = (cut(&sea), paint(ReflectionMethod::Off)?);
-            write!(text, "{:32}", format!("  {range_m} m"))?;
+            let mut cells = vec![format!("  {range_m} m")];
             for (method, worst) in ReflectionMethod::ALL.into_iter().zip(&mut worst) {
                 let gap = measure(&sea, &off, &paint(method)?, reach_px)
                     .context("the hull is not in the picture")?;
                 *worst = worst.max(gap.most);
-                let shown = if gap.seen > 0.0 {
+                cells.push(if gap.seen > 0.0 {
                     format!("{:.2} / {:.2} ({:3.0} %)", gap.median, gap.most, 100.0 * gap.seen)
                 } else {
                     "none".to_owned()
-                };
-                write!(text, "{shown:>20}")?;
+                });
             }
-            writeln!(text)?;
+            table.row(cells);
         }
+        text += &table.take();
     }
-    let worst = worst.map(|w| format!("{w:20.2}")).concat();
-    writeln!(text, "{:32}{worst}", "worst 95 %")?;
-    Ok(text)
+    let mut table = methods_table("all", 32, &[]);
+    table.row(["worst 95 %".to_owned()].into_iter().chain(worst.map(|w| format!("{w:.2}"))));
+    Ok(text + &table.take())
 }
 
 #[cfg(test)]
@@ -168,7 +166,7 @@ mod tests {
         for gap in [0, 1, 3] {
             let [sea, off, drawn] = drawn(20 + gap);
             let found = measure(&sea, &off, &drawn, 12).unwrap();
-            assert_eq!(found, Gap { median: f64::from(gap), most: f64::from(gap), seen: 1.0 });
+            assert_eq!(found, ReflectionGap { median: f64::from(gap), most: f64::from(gap), seen: 1.0 });
         }
         let [sea, off, _] = drawn(20);
         assert_eq!(measure(&sea, &off, &off, 12).unwrap().seen, 0.0);

@@ -7,35 +7,36 @@ use bowwave_core::water::ReflectionMethod;
 
 use super::{
     THESIS,
-    cell::{Cell, Errors},
-    draw::{Beliefs, Studio},
-    heading, index, mean,
+    cell::{CellErrors, TruthCell},
+    draw::{Beliefs, DrawingStudio},
+    index, mean, methods_table,
 };
+use crate::table::{self, TextTable};
 
 /// Number of methods.
 pub const METHODS: usize = ReflectionMethod::ALL.len();
 
 /// A cell and what each method of [`ReflectionMethod::ALL`] makes of it.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct GridRow {
     /// The cell's name.
     pub name: String,
     /// Distance of the boat, whole metres.
     pub range_m: u32,
     /// Sea state of the thesis.
     pub state: u8,
-    /// Errors by method.
-    pub errors: [Errors; METHODS],
+    /// CellErrors by method.
+    pub errors: [CellErrors; METHODS],
 }
 
-impl Measured {
+impl GridRow {
     fn flip(&self, method: ReflectionMethod) -> f64 {
         self.errors[index(method)].flip
     }
 }
 
 /// Draws a cell with every method. Pictures go to `pictures` as CELL-METHOD.png.
-pub fn measure(studio: &mut Studio, cell: &Cell, pictures: Option<&Path>) -> Result<Measured> {
+pub fn measure(studio: &mut DrawingStudio, cell: &TruthCell, pictures: Option<&Path>) -> Result<GridRow> {
     let beliefs = Beliefs::right(cell);
     let mut errors = Vec::with_capacity(METHODS);
     for method in ReflectionMethod::ALL {
@@ -47,7 +48,7 @@ pub fn measure(studio: &mut Studio, cell: &Cell, pictures: Option<&Path>) -> Res
         }
     }
     let errors = errors.try_into().ok().context("a method is missing")?;
-    Ok(Measured {
+    Ok(GridRow {
         name: cell.name.clone(),
         range_m: cell.spec.range_m.round() as u32,
         state: cell.spec.state,
@@ -56,23 +57,21 @@ pub fn measure(studio: &mut Studio, cell: &Cell, pictures: Option<&Path>) -> Res
 }
 
 /// The rows as CSV: one line for each cell and method.
-pub fn csv(rows: &[Measured]) -> Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(["cell", "range_m", "state", "method", "flip", "bias", "change"])?;
-    for row in rows {
-        for (method, e) in ReflectionMethod::ALL.iter().zip(&row.errors) {
-            writer.write_record([
-                row.name.as_str(),
-                &row.range_m.to_string(),
-                &row.state.to_string(),
-                method.name(),
-                &format!("{:.5}", e.flip),
-                &format!("{:.4}", e.bias),
-                &format!("{:.4}", e.change),
-            ])?;
-        }
-    }
-    writer.into_inner().context("cannot finish the table")
+pub fn csv(rows: &[GridRow]) -> Result<Vec<u8>> {
+    let cells = rows.iter().flat_map(|row| {
+        ReflectionMethod::ALL.iter().zip(&row.errors).map(|(method, e)| {
+            vec![
+                row.name.clone(),
+                row.range_m.to_string(),
+                row.state.to_string(),
+                method.name().to_owned(),
+                format!("{:.5}", e.flip),
+                format!("{:.4}", e.bias),
+                format!("{:.4}", e.change),
+            ]
+        })
+    });
+    table::csv(&["cell", "range_m", "state", "method", "flip", "bias", "change"], cells)
 }
 
 /// Mean FLIP that a cell of that range and state may have at most, where one is set.
@@ -89,7 +88,7 @@ pub fn target(range_m: u32, state: u8) -> Option<f64> {
 
 /// Signed bias of a method over the cells' change, and the mean size of the cells' biases over the same: both relative to the sum of
 /// what the boat changes, so that cells in which it changes nothing weigh nothing.
-pub fn relative_bias<'a>(rows: impl Iterator<Item = &'a Measured>, method: ReflectionMethod) -> (f64, f64) {
+pub fn relative_bias<'a>(rows: impl Iterator<Item = &'a GridRow>, method: ReflectionMethod) -> (f64, f64) {
     let (mut signed, mut size, mut change) = (0.0, 0.0, 0.0);
     for e in rows.map(|r| r.errors[index(method)]) {
         signed += e.bias * e.change.signum();
@@ -100,33 +99,32 @@ pub fn relative_bias<'a>(rows: impl Iterator<Item = &'a Measured>, method: Refle
 }
 
 /// The lowest of the means of some methods.
-fn best(rows: &[&Measured], of: &[ReflectionMethod]) -> f64 {
+fn best(rows: &[&GridRow], of: &[ReflectionMethod]) -> f64 {
     of.iter().map(|m| mean(rows.iter().map(|r| r.flip(*m)))).fold(f64::INFINITY, f64::min)
 }
 
-fn groups<K: Ord>(rows: &[Measured], key: impl Fn(&Measured) -> K) -> BTreeMap<K, Vec<&Measured>> {
-    let mut out: BTreeMap<K, Vec<&Measured>> = BTreeMap::new();
+fn groups<K: Ord>(rows: &[GridRow], key: impl Fn(&GridRow) -> K) -> BTreeMap<K, Vec<&GridRow>> {
+    let mut out: BTreeMap<K, Vec<&GridRow>> = BTreeMap::new();
     rows.iter().for_each(|row| out.entry(key(row)).or_default().push(row));
     out
 }
 
-/// What the figures say of `ours`.
-pub fn summary(rows: &[Measured], ours: ReflectionMethod) -> Result<String> {
-    let mut text = format!("{} cells\n{}", rows.len(), heading("mean FLIP", 14));
-    writeln!(text, "{:>12}{:>12}{:>12}", "/ mended", "/ printed", "/ better")?;
-    let mut line = |name: &str, rows: &[&Measured]| {
-        write!(text, "{name:14}")?;
-        for method in ReflectionMethod::ALL {
-            write!(text, "{:20.4}", mean(rows.iter().map(|r| r.flip(method))))?;
-        }
+/// The figures by range and state, and how `ours` does among them.
+pub fn summary(rows: &[GridRow], ours: ReflectionMethod) -> Result<String> {
+    let mut table =
+        methods_table("mean FLIP", 14, &[("/ corrected", 11), ("/ published", 11), ("/ better", 11)]);
+    let mut line = |name: &str, rows: &[&GridRow]| {
+        let flips = ReflectionMethod::ALL.map(|method| mean(rows.iter().map(|r| r.flip(method))));
         let own = mean(rows.iter().map(|r| r.flip(ours)));
-        let [mended, printed, all] = [&THESIS[..2], &THESIS[2..], &THESIS[..]].map(|of| own / best(rows, of));
-        writeln!(text, "{mended:12.3}{printed:12.3}{all:12.3}")
+        let ratios = [&THESIS[..2], &THESIS[2..], &THESIS[..]].map(|of| own / best(rows, of));
+        let cells = flips.map(|f| format!("{f:.4}")).into_iter().chain(ratios.map(|r| format!("{r:.3}")));
+        table.row([name.to_owned()].into_iter().chain(cells));
     };
     for ((range, state), rows) in groups(rows, |r| (r.range_m, r.state)) {
-        line(&format!("{range} m, {state}"), &rows)?;
+        line(&format!("{range} m, {state}"), &rows);
     }
-    line("all", &rows.iter().collect::<Vec<_>>())?;
+    line("all", &rows.iter().collect::<Vec<_>>());
+    let mut text = format!("{} cells\n{}", rows.len(), table.take());
     let per_cell = mean(
         rows.iter().map(|r| r.flip(ours) / THESIS.iter().map(|m| r.flip(*m)).fold(f64::INFINITY, f64::min)),
     );
@@ -142,8 +140,8 @@ pub fn summary(rows: &[Measured], ours: ReflectionMethod) -> Result<String> {
 }
 
 /// Cells in which nothing at all is closer than `ours`.
-fn worst(text: &mut String, rows: &[Measured], ours: ReflectionMethod) -> Result<()> {
-    let mut worse: Vec<(f64, &Measured)> =
+fn worst(text: &mut String, rows: &[GridRow], ours: ReflectionMethod) -> Result<()> {
+    let mut worse: Vec<(f64, &GridRow)> =
         rows.iter().map(|r| (r.flip(ours) - r.flip(ReflectionMethod::Off), r)).collect();
     worse.sort_by(|a, b| b.0.total_cmp(&a.0));
     let beyond = worse.iter().filter(|(by, _)| *by > 0.01).count();
@@ -160,8 +158,8 @@ fn worst(text: &mut String, rows: &[Measured], ours: ReflectionMethod) -> Result
 }
 
 /// How many cells keep their target.
-fn shares(text: &mut String, rows: &[Measured], ours: ReflectionMethod) -> Result<()> {
-    let name = |r: &Measured| match (r.range_m, r.state) {
+fn shares(text: &mut String, rows: &[GridRow], ours: ReflectionMethod) -> Result<()> {
+    let name = |r: &GridRow| match (r.range_m, r.state) {
         (_, 0) => "state 0".to_owned(),
         (60, 1) => "60 m, state 1".to_owned(),
         (60, _) => "60 m, states 2-4".to_owned(),
@@ -183,39 +181,39 @@ fn shares(text: &mut String, rows: &[Measured], ours: ReflectionMethod) -> Resul
     Ok(())
 }
 
-fn biases(text: &mut String, rows: &[Measured]) -> Result<()> {
+fn biases(text: &mut String, rows: &[GridRow]) -> Result<()> {
     writeln!(text, "\nbias over the change that the boat makes: signed, and (mean size over the cells)")?;
-    writeln!(text, "{}", heading("state", 14))?;
+    let mut table = methods_table("state", 14, &[]);
     for (state, rows) in groups(rows, |r| r.state) {
-        write!(text, "{state:<14}")?;
-        for method in ReflectionMethod::ALL {
+        let cells = ReflectionMethod::ALL.map(|method| {
             let (signed, size) = relative_bias(rows.iter().copied(), method);
-            write!(text, "{:>20}", format!("{signed:+.3} ({size:.3})"))?;
-        }
-        writeln!(text)?;
+            format!("{signed:+.3} ({size:.3})")
+        });
+        table.row([state.to_string()].into_iter().chain(cells));
     }
+    *text += &table.take();
     Ok(())
 }
 
 /// Mean FLIP of the truth's own noise by range and state; rows are range in metres, state and FLIP.
-pub fn noise_summary(rows: &[(u32, u8, f64)]) -> Result<String> {
-    let mut text = format!("{} cells; mean FLIP of the truth's own noise\n", rows.len());
+pub fn noise_summary(rows: &[(u32, u8, f64)]) -> String {
     let mut found: BTreeMap<(u32, u8), Vec<f64>> = BTreeMap::new();
     rows.iter().for_each(|(range, state, flip)| found.entry((*range, *state)).or_default().push(*flip));
+    let mut table = TextTable::new(1, [("the truth's own noise", 22), ("mean FLIP", 9)]);
     for ((range, state), flips) in found {
-        writeln!(text, "{:14}{:8.4}", format!("{range} m, {state}"), mean(flips))?;
+        table.row([format!("{range} m, {state}"), format!("{:.4}", mean(flips))]);
     }
-    writeln!(text, "{:14}{:8.4}", "all", mean(rows.iter().map(|r| r.2)))?;
-    Ok(text)
+    table.row(["all".to_owned(), format!("{:.4}", mean(rows.iter().map(|r| r.2)))]);
+    format!("{} cells\n{}", rows.len(), table.take())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn row(range_m: u32, state: u8, flips: [f64; METHODS], bias: f64, change: f64) -> Measured {
-        let errors = flips.map(|flip| Errors { flip, bias, change });
-        Measured { name: format!("r{range_m:03}-s{state}"), range_m, state, errors }
+    fn row(range_m: u32, state: u8, flips: [f64; METHODS], bias: f64, change: f64) -> GridRow {
+        let errors = flips.map(|flip| CellErrors { flip, bias, change });
+        GridRow { name: format!("r{range_m:03}-s{state}"), range_m, state, errors }
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! moves, [`gap`] whether it hangs together with the hull, [`singular`] what becomes of it where formulas break, and [`cost`] what it takes.
 
 pub mod cell;
+pub mod commands;
 pub mod cost;
 pub mod draw;
 pub mod gap;
@@ -15,6 +16,8 @@ pub mod time;
 pub mod wrong;
 
 use bowwave_core::water::ReflectionMethod;
+
+use crate::table::TextTable;
 
 /// The thesis's shaders: mended ones first.
 pub const THESIS: [ReflectionMethod; 4] = [
@@ -35,8 +38,8 @@ pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
     sum / count
 }
 
-/// The heading of a table whose columns are the methods.
-pub fn heading(first: &str, width: usize) -> String {
-    let names = ReflectionMethod::ALL.map(|m| format!("{:>20}", m.name())).concat();
-    format!("{first:width$}{names}")
+/// A table whose columns are the methods, after one of names of `width` letters and before some more.
+pub fn methods_table(title: &str, width: usize, more: &[(&str, usize)]) -> TextTable {
+    let methods = ReflectionMethod::ALL.map(|m| (m.name(), 19));
+    TextTable::new(1, [(title, width)].into_iter().chain(methods).chain(more.iter().copied()))
 }

@@ -4,32 +4,28 @@
 //! A frame of eight bits holds no NaN. A driver writes zero for one, so that zeros where neither sea nor boat is black are counted, and the
 //! greatest difference of one pixel's change from its neighbours' is listed.
 
-use std::fmt::Write as _;
-
 use anyhow::{Context, Result};
 use bowwave_core::{sea::BeaufortForce, water::ReflectionMethod};
 use bowwave_render::SOFTWARE;
+use hw_sim::ocean::sky::{SkySpec, SkyWeather};
 use image::{Rgb, RgbImage};
 
 use super::{
-    cell::Cell,
-    draw::{Beliefs, Painter, Studio, picture, tones},
+    cell::TruthCell,
+    draw::{Beliefs, DrawingStudio, Painter, picture, tones},
     grid::METHODS,
-    heading,
+    methods_table,
     scenes::{self, Afloats},
 };
 use crate::{
     metric::flip_map,
-    truth::{
-        cell::CellSpec,
-        grid,
-        sky::{SkySpec, Weather},
-    },
+    table::TextTable,
+    truth::{cell::CellSpec, grid},
 };
 
-/// What one method made of one case.
+/// Result of one method in one case.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outcome {
+pub struct SingularOutcome {
     /// Mean and greatest FLIP of a pixel where the reflection is; `None` without a truth.
     pub flip: Option<(f64, f64)>,
     /// Pixels with a channel of nothing that the sea alone does not have.
@@ -40,19 +36,25 @@ pub struct Outcome {
 
 /// A case with a truth.
 pub struct TrueCase {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
     /// The truth.
-    pub cell: Cell,
+    pub cell: TruthCell,
 }
 
 /// The cell of a case, rendered with `paths` times the grid's paths.
-fn cell(paths: f64, range_m: f64, state: u8, eye_m: f64, edit: impl FnOnce(&mut CellSpec)) -> Result<Cell> {
+fn cell(
+    paths: f64,
+    range_m: f64,
+    state: u8,
+    eye_m: f64,
+    edit: impl FnOnce(&mut CellSpec),
+) -> Result<TruthCell> {
     let mut spec =
         grid::cell(range_m, state, eye_m, "overcast", grid::HEADINGS_DEG[0]).context("no such cell")?;
     spec.samples = ((f64::from(spec.samples) * paths) as u32).max(1);
     edit(&mut spec);
-    Cell::render(&spec)
+    TruthCell::render(&spec)
 }
 
 /// The far and steep cases, which are small pictures.
@@ -74,7 +76,7 @@ pub fn far_cases(paths: f64) -> Result<Vec<TrueCase>> {
 pub fn near_cases(paths: f64) -> Result<Vec<TrueCase>> {
     let case = |name, cell| TrueCase { name, cell };
     let sun = SkySpec {
-        weather: Weather::Clear,
+        weather: SkyWeather::Clear,
         sun_elevation_deg: (8.0_f64 / 60.0).atan().to_degrees(),
         sun_azimuth_deg: 0.0,
     };
@@ -94,7 +96,7 @@ pub fn near_cases(paths: f64) -> Result<Vec<TrueCase>> {
 }
 
 /// Draws a case with every method, above force 4 too, where a session leaves reflections out.
-pub fn outcomes(studio: &mut Studio, case: &TrueCase) -> Result<[Outcome; METHODS]> {
+pub fn outcomes(studio: &mut DrawingStudio, case: &TrueCase) -> Result<[SingularOutcome; METHODS]> {
     let cell = &case.cell;
     let beliefs = Beliefs::right(cell);
     let off = studio.draw_forced(cell, ReflectionMethod::Off, &beliefs)?;
@@ -109,13 +111,13 @@ pub fn outcomes(studio: &mut Studio, case: &TrueCase) -> Result<[Outcome; METHOD
             (sum, count, most) = (sum + f64::from(*value), count + 1.0, most.max(f64::from(*value)));
         }
         let flip = (count > 0.0).then(|| (sum / count, most));
-        out.push(Outcome { flip, ..searched(&cell.without, &off, &drawn) });
+        out.push(SingularOutcome { flip, ..searched(&cell.without, &off, &drawn) });
     }
     out.try_into().ok().context("a method is missing")
 }
 
 /// Looks for pixels that are no light in the water of `drawn`: `off` has the hull alone over `sea`.
-fn searched(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage) -> Outcome {
+fn searched(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage) -> SingularOutcome {
     let (width, height) = sea.dimensions();
     let water = |x: u32, y: u32| sea.get_pixel(x, y) == off.get_pixel(x, y);
     let luma = |p: &Rgb<u8>| p.0.iter().map(|c| f64::from(*c)).sum::<f64>() / 3.0;
@@ -138,7 +140,7 @@ fn searched(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage) -> Outcome {
             speck = speck.max((change(x, y) - near[near.len() / 2]).abs());
         }
     }
-    Outcome { flip: None, zeros, speck }
+    SingularOutcome { flip: None, zeros, speck }
 }
 
 /// A case without a truth: its name, the eye's height in metres, mean code of the sea and height of its waves in codes, the boat, and
@@ -167,13 +169,10 @@ fn made_cases() -> Vec<MadeCase> {
 
 /// Every case by every method.
 pub fn table(paths: f64) -> Result<String> {
-    let mut text = String::from(
-        "mean FLIP, worst pixel's FLIP / pixels of nothing / greatest difference of a pixel's change from its neighbours', codes\n",
-    );
-    writeln!(text, "{}", heading("case", 34))?;
-    let mut studio = Studio::default();
+    let mut table = methods_table("case", 34, &[]);
+    let mut studio = DrawingStudio::default();
     for case in near_cases(paths)?.iter().chain(&far_cases(paths)?) {
-        write_line(&mut text, case.name, &outcomes(&mut studio, case)?)?;
+        add_row(&mut table, case.name, &outcomes(&mut studio, case)?);
     }
     let lens = scenes::lens();
     let model = scenes::grey_boat(0.5);
@@ -194,19 +193,20 @@ pub fn table(paths: f64) -> Result<String> {
         for method in ReflectionMethod::ALL {
             found.push(searched(&sea, &off, &paint(method)?));
         }
-        write_line(&mut text, name, &found)?;
+        add_row(&mut table, name, &found);
     }
-    Ok(text)
+    Ok(format!(
+        "mean FLIP, worst pixel's FLIP / pixels of nothing / greatest difference of a pixel's change from its neighbours', codes\n{}",
+        table.take()
+    ))
 }
 
-fn write_line(text: &mut String, name: &str, found: &[Outcome]) -> Result<()> {
-    write!(text, "{name:34}")?;
-    for Outcome { flip, zeros, speck } in found {
+fn add_row(table: &mut TextTable, name: &str, found: &[SingularOutcome]) {
+    let cells = found.iter().map(|SingularOutcome { flip, zeros, speck }| {
         let flip = flip.map_or("-".to_owned(), |(mean, most)| format!("{mean:.3} {most:.2}"));
-        write!(text, "{:>20}", format!("{flip}/{zeros}/{speck:.0}"))?;
-    }
-    writeln!(text)?;
-    Ok(())
+        format!("{flip}/{zeros}/{speck:.0}")
+    });
+    table.row([name.to_owned()].into_iter().chain(cells));
 }
 
 #[cfg(test)]
@@ -218,10 +218,10 @@ mod tests {
         let sea = RgbImage::from_pixel(20, 20, Rgb([90; 3]));
         let mut off = sea.clone();
         (0..20).for_each(|x| off.put_pixel(x, 0, Rgb([0; 3])));
-        assert_eq!(searched(&sea, &off, &off), Outcome { flip: None, zeros: 0, speck: 0.0 });
+        assert_eq!(searched(&sea, &off, &off), SingularOutcome { flip: None, zeros: 0, speck: 0.0 });
         let mut drawn = off.clone();
         drawn.put_pixel(7, 9, Rgb([90, 0, 90]));
-        assert_eq!(searched(&sea, &off, &drawn), Outcome { flip: None, zeros: 1, speck: 30.0 });
+        assert_eq!(searched(&sea, &off, &drawn), SingularOutcome { flip: None, zeros: 1, speck: 30.0 });
         // A reflection with an edge is no speck.
         let mut drawn = off.clone();
         (5..20).for_each(|y| (0..20).for_each(|x| drawn.put_pixel(x, y, Rgb([40; 3]))));

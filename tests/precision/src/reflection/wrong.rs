@@ -1,16 +1,17 @@
-//! What wrong estimates of sea, sky and eye height do to a method.
+//! CellErrors of a method under wrong estimates of sea, sky and eye height.
 
-use std::{collections::BTreeMap, f64::consts::FRAC_PI_4, fmt::Write as _};
+use std::{collections::BTreeMap, f64::consts::FRAC_PI_4};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bowwave_core::{sea::BeaufortForce, water::ReflectionMethod};
 
 use super::{
     THESIS,
-    cell::Cell,
-    draw::{Beliefs, EyeHeight, Studio},
+    cell::TruthCell,
+    draw::{Beliefs, DrawingStudio, EyeHeight},
     mean,
 };
+use crate::table::{self, TextTable};
 
 /// A wrong estimate: what it is called, and what it makes of what is right; `None` where there is no such thing.
 type Wrong = (&'static str, fn(&Beliefs) -> Option<Beliefs>);
@@ -47,7 +48,7 @@ fn wind(right: &Beliefs, factor: f64) -> Beliefs {
 
 /// FLIP of one cell.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct WrongRow {
     /// The cell's name.
     pub name: String,
     /// Distance of the boat, whole metres.
@@ -61,12 +62,12 @@ pub struct Measured {
 }
 
 /// Draws a cell with the thesis's shaders under right conditions and with `ours` under wrong ones.
-pub fn measure(studio: &mut Studio, cell: &Cell, ours: ReflectionMethod) -> Result<Measured> {
+pub fn measure(studio: &mut DrawingStudio, cell: &TruthCell, ours: ReflectionMethod) -> Result<WrongRow> {
     let right = Beliefs::right(cell);
     let mut flip = |method, beliefs: &Beliefs| -> Result<f64> {
         Ok(cell.errors(&studio.draw(cell, method, beliefs)?)?.flip)
     };
-    let mut out = Measured {
+    let mut out = WrongRow {
         name: cell.name.clone(),
         range_m: cell.spec.range_m.round() as u32,
         state: cell.spec.state,
@@ -83,55 +84,49 @@ pub fn measure(studio: &mut Studio, cell: &Cell, ours: ReflectionMethod) -> Resu
 }
 
 /// The rows as CSV: one line for each cell and condition.
-pub fn csv(rows: &[Measured]) -> Result<Vec<u8>> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.write_record(["cell", "range_m", "state", "condition", "flip", "better_thesis_flip"])?;
-    for row in rows {
+pub fn csv(rows: &[WrongRow]) -> Result<Vec<u8>> {
+    let titles = ["cell", "range_m", "state", "condition", "flip", "better_thesis_flip"];
+    let cells = rows.iter().flat_map(|row| {
         let better = row.thesis.iter().copied().fold(f64::INFINITY, f64::min);
-        for ((name, _), flip) in WRONG.iter().zip(row.ours) {
-            let Some(flip) = flip else { continue };
-            writer.write_record([
-                row.name.as_str(),
-                &row.range_m.to_string(),
-                &row.state.to_string(),
-                name,
-                &format!("{flip:.5}"),
-                &format!("{better:.5}"),
-            ])?;
-        }
-    }
-    writer.into_inner().context("cannot finish the table")
+        WRONG.iter().zip(row.ours).filter_map(move |((name, _), flip)| {
+            Some(vec![
+                row.name.clone(),
+                row.range_m.to_string(),
+                row.state.to_string(),
+                (*name).to_owned(),
+                format!("{:.5}", flip?),
+                format!("{better:.5}"),
+            ])
+        })
+    });
+    table::csv(&titles, cells)
 }
 
 /// The mean of the cells for which there is such a condition, against the thesis's better shader in the same cells, by range and state
 /// and in all.
-pub fn summary(rows: &[Measured], ours: ReflectionMethod) -> Result<String> {
-    let mut text = format!(
-        "{} cells; mean FLIP of {} under wrong conditions (over that of the better thesis shader, right)\n",
-        rows.len(),
-        ours.name()
-    );
-    let mut groups: BTreeMap<(u32, u8), Vec<&Measured>> = BTreeMap::new();
+pub fn summary(rows: &[WrongRow], ours: ReflectionMethod) -> String {
+    let mut groups: BTreeMap<(u32, u8), Vec<&WrongRow>> = BTreeMap::new();
     rows.iter().for_each(|r| groups.entry((r.range_m, r.state)).or_default().push(r));
-    let mut columns: Vec<(String, Vec<&Measured>)> = vec![("all".to_owned(), rows.iter().collect())];
+    let mut columns: Vec<(String, Vec<&WrongRow>)> = vec![("all".to_owned(), rows.iter().collect())];
     columns.extend(groups.into_iter().map(|((range, state), rows)| (format!("{range} m, {state}"), rows)));
-    write!(text, "{:24}", "")?;
-    columns.iter().try_for_each(|(name, _)| write!(text, "{name:>15}"))?;
-    writeln!(text, "{:>22}", "cells beyond thesis")?;
+    let titles = [("", 24)].into_iter().chain(columns.iter().map(|(name, _)| (name.as_str(), 14)));
+    let mut table = TextTable::new(1, titles.chain([("cells beyond thesis", 21)]));
     for (i, (name, _)) in WRONG.iter().enumerate() {
-        write!(text, "{name:24}")?;
-        for (_, rows) in &columns {
-            write!(text, "{:>15}", ratio(rows, i))?;
-        }
         let beyond =
             rows.iter().filter(|r| r.ours[i].is_some_and(|f| r.thesis.iter().any(|t| f > *t))).count();
-        writeln!(text, "{beyond:>22}")?;
+        let ratios = columns.iter().map(|(_, rows)| ratio(rows, i));
+        table.row([(*name).to_owned()].into_iter().chain(ratios).chain([beyond.to_string()]));
     }
-    Ok(text)
+    format!(
+        "{} cells; mean FLIP of {} under wrong conditions (over that of the better thesis shader, right)\n{}",
+        rows.len(),
+        ours.name(),
+        table.take()
+    )
 }
 
-fn ratio(rows: &[&Measured], condition: usize) -> String {
-    let there: Vec<&&Measured> = rows.iter().filter(|r| r.ours[condition].is_some()).collect();
+fn ratio(rows: &[&WrongRow], condition: usize) -> String {
+    let there: Vec<&&WrongRow> = rows.iter().filter(|r| r.ours[condition].is_some()).collect();
     if there.is_empty() {
         return "-".to_owned();
     }
@@ -176,7 +171,7 @@ mod tests {
 
     #[test]
     fn a_missing_condition_is_left_out_of_both_means() {
-        let row = |ours: Option<f64>, thesis: f64| Measured {
+        let row = |ours: Option<f64>, thesis: f64| WrongRow {
             name: String::new(),
             range_m: 60,
             state: 0,

@@ -1,4 +1,4 @@
-//! What a minute of the water itself tells of its spectrum: the limit for any estimator that sees that water no longer.
+//! The spectrum of a minute of the water itself: the limit for any estimator that sees that water no longer.
 //!
 //! Buoys that weigh nothing are laid out in the view and write down height and slopes exactly. Peak and direction are taken from them
 //! by the definitions of the estimator (`sea::estimate`): the fourth power's mean frequency (Young 1995) of sine-tapered spectra, and the
@@ -27,7 +27,7 @@ pub struct Gauges {
     times: Vec<f64>,
 }
 
-/// What they say.
+/// Peak and direction by the buoys.
 #[derive(Clone, Copy, Debug)]
 pub struct Gauged {
     /// Peak period, seconds.

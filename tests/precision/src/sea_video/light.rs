@@ -1,15 +1,15 @@
 //! Skies, and what water mirrors of them.
 
 use glam::{DVec2, DVec3};
-
-use super::ocean::{Facet, uniform};
-
-/// Refractive index of sea water.
-const WATER: f64 = 1.34;
+use hw_sim::ocean::{
+    fresnel::{SEA_WATER_INDEX, fresnel},
+    random::keyed_uniform,
+    systems::SeaFacet,
+};
 
 /// The light of a scene. Luminances relative to the brightest part of the sky's gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sky {
+pub enum SeaSky {
     /// Bright horizon that fades to a darker zenith, sun outside of the picture.
     Clear,
     /// The same with the sun this high (radians) straight ahead of the mean view: glitter.
@@ -22,7 +22,7 @@ pub enum Sky {
     Dusk,
 }
 
-impl Sky {
+impl SeaSky {
     /// Luminance in a direction (unit vector; below the horizon: as at the horizon).
     pub fn luminance(self, d: DVec3) -> f64 {
         let e = d.z.clamp(0.0, 1.0).asin();
@@ -55,20 +55,11 @@ fn clouds(d: DVec3, e: f64) -> f64 {
     let f = p - base;
     let f = f * f * (3.0 - 2.0 * f);
     let at = |dx: f64, dy: f64| {
-        uniform(((base.x + dx) as i64 as u64).wrapping_mul(7919) ^ ((base.y + dy) as i64 as u64))
+        keyed_uniform(((base.x + dx) as i64 as u64).wrapping_mul(7919) ^ ((base.y + dy) as i64 as u64))
     };
     let (a, b) = (at(0.0, 0.0), at(1.0, 0.0));
     let (c, g) = (at(0.0, 1.0), at(1.0, 1.0));
     (a + (b - a) * f.x) * (1.0 - f.y) + (c + (g - c) * f.x) * f.y
-}
-
-/// Unpolarised reflectance by the cosine of incidence (Fresnel).
-pub fn fresnel(cosine: f64) -> f64 {
-    let c = cosine.clamp(0.0, 1.0);
-    let t = (1.0 - (1.0 - c * c) / (WATER * WATER)).sqrt();
-    let s = (c - WATER * t) / (c + WATER * t);
-    let p = (WATER * c - t) / (WATER * c + t);
-    0.5 * (s * s + p * p)
 }
 
 /// Nodes and weights of Gauss and Hermite for a standard normal distribution, order 5 and 3.
@@ -82,7 +73,7 @@ const ALONG: [(f64, f64); 5] = [
 const ACROSS: [(f64, f64); 3] = [(-1.732_051, 1.0 / 6.0), (0.0, 2.0 / 3.0), (1.732_051, 1.0 / 6.0)];
 
 /// Light from a patch of water along `ray` (unit, from the eye), sky mirrored by its facets and light out of the water.
-pub fn water(sky: Sky, ray: DVec3, facet: &Facet, upwelling: f64) -> f64 {
+pub fn water(sky: SeaSky, ray: DVec3, facet: &SeaFacet, upwelling: f64) -> f64 {
     let view = ray.truncate().normalize_or(DVec2::Y);
     let sigma = facet.rough.sqrt();
     let (mut sum, mut weight) = (0.0, 0.0);
@@ -97,7 +88,7 @@ pub fn water(sky: Sky, ray: DVec3, facet: &Facet, upwelling: f64) -> f64 {
             }
             let w = p * q * seen;
             let size = normal.length();
-            let f = fresnel(seen / size);
+            let f = fresnel(seen / size, SEA_WATER_INDEX);
             let mirrored = ray + normal * (2.0 * seen / (size * size));
             // What is mirrored downwards meets the water again: darker.
             let light = sky.luminance(mirrored) * if mirrored.z > 0.0 { 1.0 } else { 0.5 };
@@ -111,7 +102,7 @@ pub fn water(sky: Sky, ray: DVec3, facet: &Facet, upwelling: f64) -> f64 {
 }
 
 /// The sun's light from the facets that mirror it (Cox and Munk 1954, eq. 9).
-fn glitter(sky: Sky, ray: DVec3, facet: &Facet) -> f64 {
+fn glitter(sky: SeaSky, ray: DVec3, facet: &SeaFacet) -> f64 {
     let Some((sun, illuminance)) = sky.sun() else { return 0.0 };
     let half = (sun - ray).normalize();
     if half.z <= 0.05 {
@@ -121,6 +112,6 @@ fn glitter(sky: Sky, ray: DVec3, facet: &Facet) -> f64 {
     let rough = facet.rough + 1e-4;
     let density =
         (-(slope - facet.slope).length_squared() / (2.0 * rough)).exp() / (std::f64::consts::TAU * rough);
-    let f = fresnel(-half.dot(ray));
+    let f = fresnel(-half.dot(ray), SEA_WATER_INDEX);
     illuminance * f * density / (4.0 * half.z.powi(4) * (-ray.z).max(0.02))
 }

@@ -3,6 +3,5 @@
 pub mod clips;
 pub mod gauges;
 pub mod light;
-pub mod ocean;
 pub mod score;
 pub mod video;

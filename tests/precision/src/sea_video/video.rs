@@ -4,24 +4,28 @@ use std::f64::consts::TAU;
 
 use bowwave_core::geometry::{CameraPose, Lens, look};
 use glam::{DVec2, DVec3};
+use hw_sim::ocean::{
+    random::{keyed_normal, keyed_uniform},
+    spectrum::cox_munk_total,
+    systems::{SystemSea, WaveSystem},
+};
 
 use super::{
     gauges::{Gauged, Gauges},
-    light::{Sky, water},
-    ocean::{Ocean, System, normal, uniform},
+    light::{SeaSky, water},
 };
 
-/// What a clip shows.
+/// Contents of a clip.
 #[derive(Clone, Debug)]
-pub struct Clip {
+pub struct SeaClip {
     /// Class under which the errors are gathered.
     pub class: &'static str,
     /// The waves.
-    pub systems: Vec<System>,
+    pub systems: Vec<WaveSystem>,
     /// Wind that roughens the water, m/s.
     pub wind_m_s: f64,
     /// The light.
-    pub sky: Sky,
+    pub sky: SeaSky,
     /// Light that comes out of the water.
     pub upwelling: f64,
     /// Height of the eye above the mean sea, metres.
@@ -54,10 +58,10 @@ fn encode(linear: f64) -> f64 {
 }
 
 /// The clip at one time after the other.
-pub struct Video {
-    /// What it shows.
-    pub clip: Clip,
-    ocean: Ocean,
+pub struct SeaVideo {
+    /// Its contents.
+    pub clip: SeaClip,
+    ocean: SystemSea,
     time_s: f64,
     codes: Vec<f32>,
     squares: f64,
@@ -65,10 +69,10 @@ pub struct Video {
     gauges: Gauges,
 }
 
-impl Video {
+impl SeaVideo {
     /// The first picture.
-    pub fn new(clip: Clip) -> Self {
-        let ocean = Ocean::new(&clip.systems, 0.5 * (0.003 + 0.005_12 * clip.wind_m_s), clip.seed);
+    pub fn new(clip: SeaClip) -> Self {
+        let ocean = SystemSea::new(&clip.systems, 0.5 * cox_munk_total(clip.wind_m_s), clip.seed);
         let codes = (0..256).map(|i| decode(f64::from(i) / 255.0) as f32).collect();
         let gauges = Gauges::lay(clip.eye_m, clip.look.0);
         Self { clip, ocean, time_s: 0.0, codes, squares: 0.0, count: 0.0, gauges }
@@ -79,7 +83,7 @@ impl Video {
         self.time_s = t;
         self.ocean.advance(t);
         for i in 0..400 {
-            let (u, v) = (uniform(2 * i + 1), uniform(2 * i + 2));
+            let (u, v) = (keyed_uniform(2 * i + 1), keyed_uniform(2 * i + 2));
             let azimuth = self.clip.look.0 + (u - 0.5) * 0.7;
             let range = self.clip.eye_m * 2.0 * 6f64.powf(v);
             self.squares += self.ocean.height(DVec2::new(azimuth.sin(), azimuth.cos()) * range).powi(2);
@@ -88,7 +92,7 @@ impl Video {
         self.gauges.write(t, |place| self.ocean.water(place));
     }
 
-    /// What the water that was in view says of its own peak and direction.
+    /// Peak and direction of the water that was in view, by its buoys.
     pub fn gauged(&self) -> Option<Gauged> {
         self.gauges.read()
     }
@@ -105,7 +109,7 @@ impl Video {
 
     fn wobble(&self, t: f64, axis: u64, periods: [f64; 3]) -> f64 {
         let wave = |(i, p): (usize, f64)| {
-            let phase = uniform(self.clip.seed.wrapping_mul(31).wrapping_add(axis * 8 + i as u64));
+            let phase = keyed_uniform(self.clip.seed.wrapping_mul(31).wrapping_add(axis * 8 + i as u64));
             (TAU * (t / p + phase)).sin()
         };
         periods.into_iter().enumerate().map(wave).sum::<f64>() * (2.0_f64 / 3.0).sqrt()
@@ -127,9 +131,9 @@ impl Video {
         let pose = self.pose(t);
         let key = self.clip.seed.wrapping_mul(0x51ed).wrapping_add((t * 1000.0) as u64 * 3);
         let axis = |i: u64| {
-            let constant = 2.0 * uniform(self.clip.seed ^ (0xabc + i)) - 1.0;
+            let constant = 2.0 * keyed_uniform(self.clip.seed ^ (0xabc + i)) - 1.0;
             let slow = self.wobble(t, 40 + i, [2.3, 7.3, 21.0]);
-            (0.8 * constant + 0.6 * slow + 0.4 * normal(key + i).0) * self.clip.pose_error_rad * 1.1
+            (0.8 * constant + 0.6 * slow + 0.4 * keyed_normal(key + i)[0]) * self.clip.pose_error_rad * 1.1
         };
         let error = glam::DQuat::from_scaled_axis(DVec3::new(axis(0), axis(1), axis(2)));
         CameraPose { world_from_camera: (pose.world_from_camera * error).normalize(), ..pose }
@@ -164,7 +168,7 @@ impl Video {
         let ray = pose.world_from_camera * lens.unproject(place + 0.5);
         let light = self.radiance(ray) / self.clip.white;
         let key = (place.y as u64) << 32 | (place.x as u64) << 12;
-        let noise = normal(key ^ ((self.time_s * 1000.0) as u64).wrapping_mul(0x2545_f491)).0;
+        let noise = keyed_normal(key ^ ((self.time_s * 1000.0) as u64).wrapping_mul(0x2545_f491))[0];
         let noisy = light + noise * self.clip.noise * (light.max(0.0) + 0.02).sqrt();
         let code = (encode(noisy.clamp(0.0, 1.0)) * 255.0).round() as usize;
         self.codes.get(code).copied()

@@ -88,7 +88,7 @@ impl TrueLens {
 
 /// Where the board is, how it is lit and what the camera makes of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shot {
+pub struct BoardShot {
     /// From the board's axes (x right, y up, z towards the viewer) to the camera's.
     pub camera_from_board: DQuat,
     /// The middle of the board in the camera's space, metres.
@@ -109,7 +109,7 @@ pub struct Shot {
     pub seed: u64,
 }
 
-impl Shot {
+impl BoardShot {
     /// A board seen from the front by a middling camera, `distance_m` away.
     pub fn frontal(distance_m: f64) -> Self {
         Self {
@@ -135,7 +135,7 @@ impl Shot {
 
 /// A drawn picture and the truth about its corners.
 #[derive(Clone, Debug)]
-pub struct Drawn {
+pub struct DrawnBoard {
     /// Width and height, pixels.
     pub size: (usize, usize),
     /// Codes, row by row.
@@ -144,7 +144,7 @@ pub struct Drawn {
     pub corners: Vec<(usize, usize, DVec2)>,
 }
 
-/// What colour the board has: 1 white, 0 black; beyond its edge a wall of middling grey.
+/// Colour of the board: 1 white, 0 black; beyond its edge a wall of middling grey.
 fn albedo(target: &Target, at: DVec2) -> f64 {
     let (tag, gap) = (target.tag_m(), target.tag_m() * target.spacing());
     let end = target.size_m() - gap;
@@ -170,7 +170,7 @@ fn albedo(target: &Target, at: DVec2) -> f64 {
 }
 
 /// Draws what `lens` (its `directions` made once) sees.
-pub fn draw(target: &Target, lens: &TrueLens, directions: &[DVec3], shot: &Shot) -> Drawn {
+pub fn draw(target: &Target, lens: &TrueLens, directions: &[DVec3], shot: &BoardShot) -> DrawnBoard {
     draw_by_rows(target, lens, directions, shot, &vec![(shot.camera_from_board, shot.middle); lens.size.1])
 }
 
@@ -179,9 +179,9 @@ pub fn draw_by_rows(
     target: &Target,
     lens: &TrueLens,
     directions: &[DVec3],
-    shot: &Shot,
+    shot: &BoardShot,
     rows: &[(DQuat, DVec3)],
-) -> Drawn {
+) -> DrawnBoard {
     let (w, h) = lens.size;
     let half = target.size_m() / 2.0 - target.tag_m() * target.spacing();
     let hit = |i: usize, direction: DVec3| -> Option<DVec2> {
@@ -216,11 +216,11 @@ pub fn draw_by_rows(
         }
         (code + shot.noise * random.gauss()).round().clamp(0.0, 255.0) as u8
     });
-    Drawn { size: lens.size, grey: grey.collect(), corners: true_corners(target, lens, shot) }
+    DrawnBoard { size: lens.size, grey: grey.collect(), corners: true_corners(target, lens, shot) }
 }
 
 /// Tag, corner of the tag and place, pixels, of all corners that fall into the picture.
-pub fn true_corners(target: &Target, lens: &TrueLens, shot: &Shot) -> Vec<(usize, usize, DVec2)> {
+pub fn true_corners(target: &Target, lens: &TrueLens, shot: &BoardShot) -> Vec<(usize, usize, DVec2)> {
     let half = target.size_m() / 2.0 - target.tag_m() * target.spacing();
     let mut out = Vec::new();
     for id in 0..target.tags() {

@@ -14,16 +14,16 @@ use bowwave_core::{
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::draw::{Shot, TrueLens, draw_by_rows};
+use super::draw::{BoardShot, TrueLens, draw_by_rows};
 
 /// From the camera to the board where both look at each other, metres.
 const AWAY_M: f64 = 0.62;
 /// Share of the camera's turn that the hand makes up for by going round the board, so that it stays in the picture.
 const ROUND: f64 = 0.65;
 
-/// What is moved and for how long.
+/// Object that is moved, and for how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moved {
+pub struct MovedBoard {
     /// Movement, inertial unit, offset and read-out; the camera's noise comes from its pictures.
     pub recipe: Recipe,
     /// The camera.
@@ -34,14 +34,14 @@ pub struct Moved {
 
 /// One picture.
 #[derive(Clone, Debug)]
-pub struct Taken {
+pub struct BoardFilm {
     /// Mid-exposure of the middle row by the camera's stamp.
     pub stamp: Time,
-    /// What was seen.
+    /// Pictures that were seen.
     pub picture: Picture,
 }
 
-impl Moved {
+impl MovedBoard {
     /// By hand before the usual board: `hz` pictures a second of a small camera, 0.5 ms of stamp jitter.
     pub fn by_hand(target: Target, seconds: f64, hz: f64, seed: u64) -> Self {
         let recipe = Recipe { seconds, camera_hz: hz, ..Recipe::minute(Motion::ByHand, 1e-3, 5e-4, seed) };
@@ -100,7 +100,7 @@ impl Moved {
     ///
     /// # Errors
     /// None, as long as a drawn picture has as many codes as pixels.
-    pub fn pictures(&self) -> Result<Vec<Taken>, PictureError> {
+    pub fn pictures(&self) -> Result<Vec<BoardFilm>, PictureError> {
         let Recipe { seconds, camera_hz, offset_s, jitter_s, seed, .. } = self.recipe;
         let directions = self.lens.directions();
         let count = ((seconds - 1.4) * camera_hz) as usize;
@@ -108,13 +108,15 @@ impl Moved {
         let late: Vec<f64> = (0..count).map(|_| jitter_s * random.gauss()).collect();
         let one = |(i, late): (usize, &f64)| {
             let at = 0.7 + i as f64 / camera_hz;
-            let shot =
-                Shot { seed: seed.wrapping_mul(100_000).wrapping_add(i as u64), ..Shot::frontal(AWAY_M) };
+            let shot = BoardShot {
+                seed: seed.wrapping_mul(100_000).wrapping_add(i as u64),
+                ..BoardShot::frontal(AWAY_M)
+            };
             let drawn = draw_by_rows(&self.target, &self.lens, &directions, &shot, &self.rows(at));
             let rgb: Vec<u8> = drawn.grey.iter().flat_map(|v| [*v; 3]).collect();
             let (w, h) = (drawn.size.0 as u32, drawn.size.1 as u32);
             let picture = Picture::new(PixelFormat::Rgb, w, h, Arc::from(rgb))?;
-            Ok(Taken { stamp: Recipe::EPOCH.plus_secs(at - offset_s + late), picture })
+            Ok(BoardFilm { stamp: Recipe::EPOCH.plus_secs(at - offset_s + late), picture })
         };
         late.par_iter().enumerate().map(one).collect()
     }

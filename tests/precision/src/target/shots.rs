@@ -7,7 +7,7 @@ use bowwave_calibration::{
 };
 use glam::{DQuat, DVec2, DVec3};
 
-use super::draw::{Drawn, Shot, TrueLens};
+use super::draw::{BoardShot, DrawnBoard, TrueLens};
 
 /// The usual board, in A3: 6 x 6 tags of 34 mm.
 pub fn board() -> Target {
@@ -15,7 +15,7 @@ pub fn board() -> Target {
 }
 
 /// `count` ways to hold the board: the nine parts of the picture in turn, near and far, tilted by up to `tilt` radians to all sides.
-pub fn held(lens: &TrueLens, target: &Target, count: usize, tilt: f64, seed: u64) -> Vec<Shot> {
+pub fn held(lens: &TrueLens, target: &Target, count: usize, tilt: f64, seed: u64) -> Vec<BoardShot> {
     let mut random = Random::new(seed ^ 0x6b8b_4567);
     let size = DVec2::new(lens.size.0 as f64, lens.size.1 as f64);
     (0..count)
@@ -28,10 +28,10 @@ pub fn held(lens: &TrueLens, target: &Target, count: usize, tilt: f64, seed: u64
             let around =
                 DVec2::from_angle(std::f64::consts::TAU * random.unit()) * tilt * random.unit().sqrt();
             let turn = DQuat::from_rotation_z(0.3 * random.gauss());
-            Shot {
+            BoardShot {
                 middle: lens.direction(share * size) * distance,
                 seed: seed.wrapping_mul(1000).wrapping_add(i as u64),
-                ..Shot::frontal(distance)
+                ..BoardShot::frontal(distance)
             }
             .turned(turn)
             .turned(DQuat::from_scaled_axis(DVec3::new(around.x, around.y, 0.0)))
@@ -52,7 +52,7 @@ pub fn exact(target: &Target, drawn: &[(usize, usize, DVec2)], noise: f64, seed:
 }
 
 /// Distances of found corners to the true ones, pixels.
-pub fn misses(drawn: &Drawn, found: &[(usize, [DVec2; 4])]) -> Vec<f64> {
+pub fn misses(drawn: &DrawnBoard, found: &[(usize, [DVec2; 4])]) -> Vec<f64> {
     let miss = |id: usize, corner: usize, at: DVec2| {
         let truth = drawn.corners.iter().find(|c| (c.0, c.1) == (id, corner));
         // A corner where none can be is as wrong as the picture is wide.

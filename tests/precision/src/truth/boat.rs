@@ -8,8 +8,10 @@ use bowwave_core::{
     model::{Model, ModelKind, Part, Vertex, Zone},
 };
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec2, Vec3};
-
-use super::field::Waves;
+use hw_sim::ocean::{
+    mesh::{BoatFrame, BoatMesh, MeshCorner},
+    waves::Waves,
+};
 
 /// Name of the box boat.
 pub const BOX_BOAT: &str = "box8";
@@ -23,6 +25,22 @@ pub fn model(name: &str) -> Result<Model> {
         .with_context(|| format!("no boat '{name}' ({BOX_BOAT} is one)"))
 }
 
+/// `model` at `pose` for rays to meet. A texture is not looked at: models with one keep their corners' colours.
+pub fn mesh(model: &Model, pose: RigidPose) -> BoatMesh {
+    let triangles = model.indices.chunks_exact(3).map(|i| {
+        [0, 1, 2].map(|j| {
+            let v = model.vertices[i[j] as usize];
+            MeshCorner {
+                position: pose.to_world(v.position.as_dvec3()),
+                normal: pose.world_from_body * v.normal.as_dvec3(),
+                albedo: v.albedo.as_dvec3(),
+            }
+        })
+    });
+    let frame = BoatFrame { world_from_boat: pose.world_from_body, position: pose.position };
+    BoatMesh::new(triangles, frame, model.waterline.clone())
+}
+
 /// A boat of boxes, 8 m long and 2.6 m wide: red below, navy, white with an orange line, a cabin with windows and a mast. Its stripes
 /// make it plain what a reflection shows.
 pub fn box_boat() -> Model {
@@ -32,7 +50,7 @@ pub fn box_boat() -> Model {
     let orange = Vec3::new(0.55, 0.14, 0.02);
     let yellow = Vec3::new(0.60, 0.36, 0.06);
     let dark = Vec3::splat(0.02);
-    let mut made = Maker::default();
+    let mut made = BoxMaker::default();
     for (low, high, colour) in
         [(-0.6, 0.3, red), (0.3, 0.6, navy), (0.6, 0.95, white), (0.95, 1.05, orange), (1.05, 1.25, white)]
     {
@@ -52,12 +70,12 @@ pub fn box_boat() -> Model {
 }
 
 #[derive(Default)]
-struct Maker {
+struct BoxMaker {
     vertices: Vec<Vertex>,
     indices: Vec<u32>,
 }
 
-impl Maker {
+impl BoxMaker {
     fn block(&mut self, low: Vec3, high: Vec3, albedo: Vec3) {
         for axis in 0..3 {
             for sign in [-1.0f32, 1.0] {

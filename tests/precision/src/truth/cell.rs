@@ -1,23 +1,22 @@
 //! One cell of the grid: a boat on a sea under a sky seen by a camera, and its two pictures.
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::Model,
     sea::BeaufortForce,
 };
 use glam::{DVec2, DVec3};
+use hw_sim::ocean::{
+    random::LightPath,
+    sky::{Daylight, SkySpec},
+    spectrum::{LongWaves, Spectrum},
+    trace::{BoatLight, TracedScene, WaterBody},
+    waves::{Resolution, TracedSea, Waves},
+};
 use rayon::prelude::*;
 
-use super::{
-    boat,
-    field::{Resolution, Sea, Waves},
-    mesh::Mesh,
-    rng::Path,
-    sky::{Sky, SkySpec},
-    spectrum::{LongWaves, Spectrum},
-    trace::{BoatLight, Body, Scene},
-};
+use super::boat;
 
 /// Width and height of the whole picture, pixels.
 pub const PICTURE: (u32, u32) = (1280, 720);
@@ -60,12 +59,12 @@ pub struct CellSpec {
     /// How finely waves are traced.
     pub resolution: Resolution,
     /// Water below the surface.
-    pub body: Body,
+    pub body: WaterBody,
 }
 
 /// A rectangle of the whole picture, pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Region {
+pub struct CellRegion {
     /// First column.
     pub x: u32,
     /// First row.
@@ -77,8 +76,8 @@ pub struct Region {
 }
 
 /// A cell made ready: camera, scene, and where to look.
-pub struct Setup {
-    /// What it was made of.
+pub struct CellSetup {
+    /// Its specification.
     pub spec: CellSpec,
     /// Spectrum of the sea.
     pub spectrum: Spectrum,
@@ -87,19 +86,19 @@ pub struct Setup {
     /// Where the camera is.
     pub camera: CameraPose,
     /// Light, water and boat.
-    pub scene: Scene,
+    pub scene: TracedScene,
     /// The boat's model.
     pub model: Model,
     /// Where the boat is.
     pub pose: RigidPose,
-    /// What is rendered.
-    pub region: Region,
+    /// Rectangle that is rendered.
+    pub region: CellRegion,
     /// Factor from radiance to linear picture values.
     pub gain: f64,
 }
 
-/// Pictures of one cell, row by row from the top, linear and exposed.
-pub struct Pictures {
+/// CellPictures of one cell, row by row from the top, linear and exposed.
+pub struct CellPictures {
     /// Columns and rows.
     pub size: (u32, u32),
     /// Without the boat.
@@ -117,7 +116,12 @@ pub fn sea_of_state(state: u8) -> Option<(f64, LongWaves)> {
     Some((wind, long))
 }
 
-impl Setup {
+/// The light of `spec`.
+pub fn daylight(spec: &SkySpec) -> Result<Daylight> {
+    Daylight::new(spec).with_context(|| format!("no clear sky for a sun at {} deg", spec.sun_elevation_deg))
+}
+
+impl CellSetup {
     /// Makes the waves, puts the boat afloat and points the camera.
     pub fn new(spec: &CellSpec) -> Result<Self> {
         let finite = [spec.range_m, spec.eye_m, spec.heading_deg, spec.wind_from_deg, spec.time_s];
@@ -128,8 +132,8 @@ impl Setup {
             anyhow::bail!("sea state {} is not on the scale of 0 to 12", spec.state)
         };
         let spectrum = Spectrum::new(wind, spec.wind_from_deg.to_radians(), spec.long_waves);
-        let waves = Sea::new(&spectrum, &spec.resolution, spec.wave_seed).at(spec.time_s);
-        let sky = Sky::new(&spec.sky)?;
+        let waves = TracedSea::new(&spectrum, &spec.resolution, spec.wave_seed).at(spec.time_s);
+        let sky = daylight(&spec.sky)?;
         let model = boat::model(&spec.boat)?;
         let (place, heading) = (DVec2::new(0.0, spec.range_m), spec.heading_deg.to_radians());
         let pose = boat::float(&model, place, heading, &waves);
@@ -139,14 +143,14 @@ impl Setup {
             world_from_camera: look(0.0, -depression / 2.0, 0.0),
             position: DVec3::new(0.0, 0.0, spec.eye_m),
         };
-        // Region and exposure are those of the mean water, so that they stay while waves move.
+        // CellRegion and exposure are those of the mean water, so that they stay while waves move.
         let level = boat::float(&model, place, heading, &Waves::mirror());
         let region = region_of(&model, &level, &lens, &camera);
-        let light = Scene::boat_light(&sky, &spec.body);
+        let light = TracedScene::boat_light(&sky, &spec.body);
         let mut scene =
-            Scene { sky, waves: Waves::statistical(&spectrum), body: spec.body, boat: None, light };
+            TracedScene { sky, waves: Waves::statistical(&spectrum), body: spec.body, boat: None, light };
         let gain = exposure(&scene, &lens, &camera);
-        (scene.waves, scene.boat) = (waves, Some(Mesh::new(&model, pose)));
+        (scene.waves, scene.boat) = (waves, Some(boat::mesh(&model, pose)));
         Ok(Self { spec: spec.clone(), spectrum, lens, camera, scene, model, pose, region, gain })
     }
 
@@ -156,20 +160,20 @@ impl Setup {
         BoatLight { sun: sun * self.gain, sky: sky * self.gain, sea: sea * self.gain }
     }
 
-    fn sample(&self, pixel: DVec2, path: &mut Path) -> (DVec3, DVec3, bool) {
+    fn sample(&self, pixel: DVec2, path: &mut LightPath) -> (DVec3, DVec3, bool) {
         let direction = self.camera.world_from_camera * self.lens.unproject(pixel);
         let sample = self.scene.trace(self.camera.position, direction, path);
         (sample.without, sample.with, sample.hull)
     }
 
     /// Renders the region.
-    pub fn render(&self) -> Pictures {
+    pub fn render(&self) -> CellPictures {
         let r = self.region;
         let pixels: Vec<([f32; 3], [f32; 3], f32)> = (0..r.width * r.height)
             .into_par_iter()
             .map(|i| self.pixel(r.x + i % r.width, r.y + i / r.width))
             .collect();
-        Pictures {
+        CellPictures {
             size: (r.width, r.height),
             without: pixels.iter().map(|p| p.0).collect(),
             with: pixels.iter().map(|p| p.1).collect(),
@@ -182,7 +186,7 @@ impl Setup {
         // The same pixel of the whole picture draws the same paths whatever the region.
         let number = u64::from(y) * u64::from(PICTURE.0) + u64::from(x);
         for index in 0..self.spec.samples {
-            let mut path = Path::new(self.spec.noise_seed, number, u64::from(index));
+            let mut path = LightPath::new(self.spec.noise_seed, number, u64::from(index));
             let pixel = DVec2::new(f64::from(x) + path.unit(), f64::from(y) + path.unit());
             let (a, b, c) = self.sample(pixel, &mut path);
             without += a;
@@ -198,7 +202,7 @@ impl Setup {
     }
 
     /// The whole boat-free picture, `width` pixels wide, with `samples` paths a pixel: context for whoever measures light in it.
-    pub fn overview(&self, width: u32, samples: u32) -> Pictures {
+    pub fn overview(&self, width: u32, samples: u32) -> CellPictures {
         let height = width * PICTURE.1 / PICTURE.0;
         let scale = f64::from(PICTURE.0) / f64::from(width);
         let without: Vec<[f32; 3]> = (0..width * height)
@@ -206,7 +210,8 @@ impl Setup {
             .map(|i| {
                 let mut sum = DVec3::ZERO;
                 for index in 0..samples {
-                    let mut path = Path::new(self.spec.noise_seed ^ 0x0f, u64::from(i), u64::from(index));
+                    let mut path =
+                        LightPath::new(self.spec.noise_seed ^ 0x0f, u64::from(i), u64::from(index));
                     let place =
                         DVec2::new(f64::from(i % width) + path.unit(), f64::from(i / width) + path.unit());
                     sum += self.sample(place * scale, &mut path).0;
@@ -215,7 +220,7 @@ impl Setup {
             })
             .collect();
         let hull = vec![0.0; without.len()];
-        Pictures { size: (width, height), with: without.clone(), without, hull }
+        CellPictures { size: (width, height), with: without.clone(), without, hull }
     }
 
     /// Where a world point falls in the region, pixels.
@@ -227,7 +232,7 @@ impl Setup {
 
 /// The gain that brings the mean of the whole boat-free picture to `EXPOSED_MEAN`, as a camera's meter would, from a coarse rendering
 /// in which what is brighter than white (the sun) counts as white.
-pub fn exposure(scene: &Scene, lens: &Lens, camera: &CameraPose) -> f64 {
+pub fn exposure(scene: &TracedScene, lens: &Lens, camera: &CameraPose) -> f64 {
     let grid = (24u32, 18u32);
     let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));
     let values: Vec<f64> = (0..grid.0 * grid.1)
@@ -236,7 +241,7 @@ pub fn exposure(scene: &Scene, lens: &Lens, camera: &CameraPose) -> f64 {
             let corner = DVec2::new(f64::from(i % grid.0), f64::from(i / grid.0));
             let mut sum = 0.0;
             for sample in 0..16 {
-                let mut path = Path::new(91, u64::from(i), sample);
+                let mut path = LightPath::new(91, u64::from(i), sample);
                 let place = corner + DVec2::new(path.unit(), path.unit());
                 let pixel = place / DVec2::new(f64::from(grid.0), f64::from(grid.1)) * size;
                 let direction = camera.world_from_camera * lens.unproject(pixel);
@@ -261,7 +266,7 @@ pub fn luminance(c: DVec3) -> f64 {
 
 /// The rectangle that holds the boat, its mirror image about the water and half as much below it, cut where it is too large: from the top
 /// first, since the reflection is what matters.
-fn region_of(model: &Model, pose: &RigidPose, lens: &Lens, camera: &CameraPose) -> Region {
+fn region_of(model: &Model, pose: &RigidPose, lens: &Lens, camera: &CameraPose) -> CellRegion {
     let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
     for vertex in &model.vertices {
         let world = pose.to_world(vertex.position.as_dvec3());
@@ -292,7 +297,7 @@ fn region_of(model: &Model, pose: &RigidPose, lens: &Lens, camera: &CameraPose) 
     let picture = DVec2::new(f64::from(PICTURE.0), f64::from(PICTURE.1));
     let low = low.floor().clamp(DVec2::ZERO, picture - 16.0);
     let high = high.ceil().clamp(low + 16.0, picture);
-    Region {
+    CellRegion {
         x: low.x as u32,
         y: low.y as u32,
         width: (high.x - low.x) as u32,

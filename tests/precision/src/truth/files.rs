@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use image::{GrayImage, RgbImage};
 
 use super::{
-    cell::{CellSpec, PICTURE, Pictures, Region, Setup},
+    cell::{CellPictures, CellRegion, CellSetup, CellSpec, PICTURE},
     masks,
 };
 
@@ -28,28 +28,28 @@ pub fn coded(pixels: &[[f32; 3]]) -> Vec<u8> {
     pixels.iter().flat_map(|p| p.map(code)).collect()
 }
 
-/// What `cell.toml` says.
+/// Contents of `cell.toml`.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Described {
+pub struct CellFile {
     /// Everything that made the cell.
     pub spec: CellSpec,
     /// The camera of the whole picture.
-    pub camera: Camera,
-    /// What of it is rendered.
-    pub region: Region,
+    pub camera: CellCamera,
+    /// Rectangle of it that is rendered.
+    pub region: CellRegion,
     /// The boat.
-    pub boat: Boat,
+    pub boat: CellBoat,
     /// The sea.
-    pub sea: Sea,
+    pub sea: CellSea,
     /// Light in the picture's linear values.
-    pub light: Light,
+    pub light: CellLight,
     /// About the truth itself.
-    pub truth: Own,
+    pub truth: CellMaking,
 }
 
 /// The camera of the whole picture.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Camera {
+pub struct CellCamera {
     /// Columns.
     pub width: u32,
     /// Rows.
@@ -72,7 +72,7 @@ pub struct Camera {
 
 /// The boat.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Boat {
+pub struct CellBoat {
     /// Name of its model.
     pub model: String,
     /// Its origin in the world, metres.
@@ -83,7 +83,7 @@ pub struct Boat {
 
 /// The sea.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Sea {
+pub struct CellSea {
     /// Wind 10 m above it, m/s.
     pub wind_m_s: f64,
     /// Where the wind comes from, degrees clockwise from north.
@@ -96,15 +96,15 @@ pub struct Sea {
     pub slope_variance_along: f64,
     /// Mean square slope across it.
     pub slope_variance_across: f64,
-    /// What of the former has a shape.
+    /// Part of the former that has a shape.
     pub resolved_along: f64,
-    /// What of the latter has a shape.
+    /// Part of the latter that has a shape.
     pub resolved_across: f64,
 }
 
 /// Light in the picture's linear values.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Light {
+pub struct CellLight {
     /// Unit vector towards the sun, world.
     pub sun_direction: [f64; 3],
     /// Factor from radiance to linear picture values.
@@ -121,7 +121,7 @@ pub struct Light {
 
 /// About the truth itself.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Own {
+pub struct CellMaking {
     /// Paths a pixel.
     pub samples: u32,
     /// Time that it took, seconds.
@@ -135,7 +135,7 @@ pub struct Own {
 /// Renders the cell and writes it as `folder`, which appears when it is complete and replaces one that was there.
 pub fn make(spec: &CellSpec, folder: &Path) -> Result<()> {
     let start = std::time::Instant::now();
-    let setup = Setup::new(spec)?;
+    let setup = CellSetup::new(spec)?;
     let pictures = setup.render();
     let render_s = start.elapsed().as_secs_f64();
     let part = folder.with_extension("part");
@@ -149,7 +149,7 @@ pub fn make(spec: &CellSpec, folder: &Path) -> Result<()> {
     fs::rename(&part, folder).with_context(|| format!("cannot rename {} to its name", part.display()))
 }
 
-fn write(setup: &Setup, pictures: &Pictures, render_s: f64, folder: &Path) -> Result<()> {
+fn write(setup: &CellSetup, pictures: &CellPictures, render_s: f64, folder: &Path) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;
     let region = masks::reflection(setup, pictures);
     rgb(&folder.join("without.png"), pictures.size, coded(&pictures.without))?;
@@ -175,8 +175,8 @@ fn write(setup: &Setup, pictures: &Pictures, render_s: f64, folder: &Path) -> Re
     put(&folder.join("cell.toml"), text.as_bytes())
 }
 
-/// What a cell's file says of it; `region` is [`masks::reflection`]'s.
-pub fn describe(setup: &Setup, pictures: &Pictures, region: &[bool], render_s: f64) -> Described {
+/// Contents of a cell's file; `region` is [`masks::reflection`]'s.
+pub fn describe(setup: &CellSetup, pictures: &CellPictures, region: &[bool], render_s: f64) -> CellFile {
     let (lens, light, spec) = (&setup.lens, setup.exposed_light(), &setup.spec);
     let waves = &setup.scene.waves;
     let all = waves.all_slopes().sigma * waves.all_slopes().sigma;
@@ -189,9 +189,9 @@ pub fn describe(setup: &Setup, pictures: &Pictures, region: &[bool], render_s: f
         change +=
             DVec3::from_array([0, 1, 2].map(|c| f64::from(pictures.with[i][c] - pictures.without[i][c])));
     }
-    Described {
+    CellFile {
         spec: spec.clone(),
-        camera: Camera {
+        camera: CellCamera {
             width: PICTURE.0,
             height: PICTURE.1,
             fx: lens.focal.x,
@@ -203,12 +203,12 @@ pub fn describe(setup: &Setup, pictures: &Pictures, region: &[bool], render_s: f
             world_from_camera: setup.camera.world_from_camera.to_array(),
         },
         region: setup.region,
-        boat: Boat {
+        boat: CellBoat {
             model: spec.boat.clone(),
             position: setup.pose.position.to_array(),
             world_from_boat: setup.pose.world_from_body.to_array(),
         },
-        sea: Sea {
+        sea: CellSea {
             wind_m_s: setup.spectrum.wind_m_s,
             wind_from_deg: spec.wind_from_deg,
             significant_height_m: setup.spectrum.significant_height_m(),
@@ -218,7 +218,7 @@ pub fn describe(setup: &Setup, pictures: &Pictures, region: &[bool], render_s: f
             resolved_along: waves.resolved().x,
             resolved_across: waves.resolved().y,
         },
-        light: Light {
+        light: CellLight {
             sun_direction: setup.scene.sky.sun_direction.to_array(),
             gain: setup.gain,
             boat_sun: light.sun.to_array(),
@@ -226,7 +226,7 @@ pub fn describe(setup: &Setup, pictures: &Pictures, region: &[bool], render_s: f
             boat_sea: light.sea.to_array(),
             water_body: body.to_array(),
         },
-        truth: Own {
+        truth: CellMaking {
             samples: spec.samples,
             render_s,
             reflection_pixels: count,
@@ -237,7 +237,7 @@ pub fn describe(setup: &Setup, pictures: &Pictures, region: &[bool], render_s: f
 
 /// Radiance of the sky, in the picture's linear values: azimuth and elevation in degrees (clockwise from the direction of view), red, green,
 /// blue. The sun's disc is not in it.
-pub fn sky_rows(setup: &Setup) -> Vec<[f64; 5]> {
+pub fn sky_rows(setup: &CellSetup) -> Vec<[f64; 5]> {
     const ELEVATIONS: [f64; 15] =
         [0.25, 0.5, 1.0, 2.0, 3.0, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, 45.0, 60.0, 75.0, 90.0];
     let row = |azimuth: f64, elevation: f64| {
@@ -250,8 +250,8 @@ pub fn sky_rows(setup: &Setup) -> Vec<[f64; 5]> {
     azimuths.flat_map(|azimuth| ELEVATIONS.map(|elevation| row(azimuth, elevation))).collect()
 }
 
-/// What a folder's `cell.toml` says.
-pub fn read(folder: &Path) -> Result<Described> {
+/// Contents of a folder's `cell.toml`.
+pub fn read(folder: &Path) -> Result<CellFile> {
     let path = folder.join("cell.toml");
     let text = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
     toml::from_str(&text).with_context(|| format!("{} is no cell", path.display()))

@@ -4,13 +4,16 @@ use std::path::Path;
 
 use anyhow::Result;
 
+use hw_sim::ocean::{
+    sky::{SkySpec, SkyWeather},
+    trace::WaterBody,
+    waves::Resolution,
+};
+
 use super::{
     boat::BOX_BOAT,
     cell::{CellSpec, sea_of_state},
-    field::Resolution,
     files,
-    sky::{SkySpec, Weather},
-    trace::Body,
 };
 
 /// Distances, metres.
@@ -24,11 +27,11 @@ pub const WIND_FROM_DEG: f64 = 320.0;
 
 /// Named lights. Azimuths are clockwise from the direction of view, which is north.
 pub const LIGHTINGS: [(&str, SkySpec); 5] = [
-    ("overcast", SkySpec { weather: Weather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 180.0 }),
-    ("high", SkySpec { weather: Weather::Clear, sun_elevation_deg: 50.0, sun_azimuth_deg: 230.0 }),
-    ("front", SkySpec { weather: Weather::Clear, sun_elevation_deg: 25.0, sun_azimuth_deg: 12.0 }),
-    ("behind", SkySpec { weather: Weather::Clear, sun_elevation_deg: 25.0, sun_azimuth_deg: 190.0 }),
-    ("low", SkySpec { weather: Weather::Clear, sun_elevation_deg: 5.0, sun_azimuth_deg: 75.0 }),
+    ("overcast", SkySpec { weather: SkyWeather::Overcast, sun_elevation_deg: 40.0, sun_azimuth_deg: 180.0 }),
+    ("high", SkySpec { weather: SkyWeather::Clear, sun_elevation_deg: 50.0, sun_azimuth_deg: 230.0 }),
+    ("front", SkySpec { weather: SkyWeather::Clear, sun_elevation_deg: 25.0, sun_azimuth_deg: 12.0 }),
+    ("behind", SkySpec { weather: SkyWeather::Clear, sun_elevation_deg: 25.0, sun_azimuth_deg: 190.0 }),
+    ("low", SkySpec { weather: SkyWeather::Clear, sun_elevation_deg: 5.0, sun_azimuth_deg: 75.0 }),
 ];
 
 /// The light of that name.
@@ -63,7 +66,7 @@ pub fn cell(range_m: f64, state: u8, eye_m: f64, lighting_name: &str, heading_de
         sky: lighting(lighting_name)?,
         long_waves,
         resolution: Resolution { shortest_m, ..Resolution::default() },
-        body: Body::default(),
+        body: WaterBody::default(),
     })
 }
 

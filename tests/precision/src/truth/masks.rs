@@ -9,9 +9,9 @@ use bowwave_core::geometry::RigidPose;
 use glam::{DVec2, DVec3};
 
 use super::{
-    cell::{Pictures, Setup},
+    boat,
+    cell::{CellPictures, CellSetup},
     files::code,
-    mesh::Mesh,
 };
 
 /// Mean change of the code that counts as one.
@@ -20,7 +20,7 @@ pub const CHANGE_CODES: f64 = 1.5;
 pub const MARGIN: i64 = 2;
 
 /// The region of the reflection, one flag a pixel.
-pub fn reflection(setup: &Setup, pictures: &Pictures) -> Vec<bool> {
+pub fn reflection(setup: &CellSetup, pictures: &CellPictures) -> Vec<bool> {
     let (w, h) = (pictures.size.0 as usize, pictures.size.1 as usize);
     let change: Vec<DVec3> = pictures
         .without
@@ -60,8 +60,8 @@ fn neighbours(x: usize, y: usize, reach: i64, size: (usize, usize)) -> impl Iter
 }
 
 /// Pixels whose centres lie in the boat's image mirrored about the level water at its hull.
-fn mirror_image(setup: &Setup, size: (usize, usize)) -> Vec<bool> {
-    let mesh = Mesh::new(&setup.model, RigidPose { ..setup.pose });
+fn mirror_image(setup: &CellSetup, size: (usize, usize)) -> Vec<bool> {
+    let mesh = boat::mesh(&setup.model, RigidPose { ..setup.pose });
     let level = setup.pose.position.z;
     let mut eye = setup.camera.position;
     eye.z = 2.0 * level - eye.z;

@@ -1,6 +1,6 @@
 //! The truth: a CPU ray tracer of a boat on a sea, which shares no code with the trainer's reflections.
 //!
-//! * **Sea** ([`spectrum`], [`field`], [`micro`]): Gaussian heights of a directional Elfouhaily or JONSWAP spectrum, in tiles made by
+//! * **Sea** ([`spectrum`], [`waves`], [`micro`]): Gaussian heights of a directional Elfouhaily or JONSWAP spectrum, in tiles made by
 //!   Fourier transform, down to waves about two pixels wide; below that slopes drawn from a Gaussian with Smith's masking, so that
 //!   resolved and unresolved slopes together have the variance of Cox & Munk. Where Elfouhaily's spectrum alone holds more (winds below
 //!   4 m/s) its short waves are damped to that total. Waves run with the wind by the dispersion relation.
@@ -10,7 +10,7 @@
 //! * **Cells** ([`cell`], [`grid`], [`files`], [`masks`]): pictures without and with the boat from the same paths; [`study`] says what noise
 //!   and resolution do to them; [`video`] films the sea alone.
 //!
-//! Its own error (`truth study` with 48, 96 and 192 paths a pixel at 60, 150 and 400 m, a quarter to an eighth of the grid's; mean FLIP in
+//! Its own error (`precision truth study` with 48, 96 and 192 paths a pixel at 60, 150 and 400 m, a quarter to an eighth of the grid's; mean FLIP in
 //! the reflection's region, and the change that the boat makes there relative to the unrefined one):
 //!
 //! | | 60 m, state 2, overcast | 150 m, state 2, overcast | 400 m, state 3, high sun |
@@ -28,17 +28,14 @@
 //! Not in it: foam, sharpened crests and wave groups beyond linear waves, the boat's own bow wave and wake, haze, the curvature of the Earth,
 //! polarisation, textures, a boat's shadow on itself, and inertia of the boat (it follows the plane that fits the water under it).
 
+#[cfg(doc)]
+use hw_sim::ocean::{micro, sky, spectrum, trace, waves};
+
 pub mod boat;
 pub mod cell;
-pub mod field;
+pub mod commands;
 pub mod files;
 pub mod grid;
 pub mod masks;
-pub mod mesh;
-pub mod micro;
-pub mod rng;
-pub mod sky;
-pub mod spectrum;
 pub mod study;
-pub mod trace;
 pub mod video;

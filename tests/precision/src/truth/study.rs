@@ -3,16 +3,16 @@
 use anyhow::Result;
 
 use super::{
-    cell::{CellSpec, Pictures, Setup, luminance},
+    cell::{CellPictures, CellSetup, CellSpec, luminance},
     files::coded,
     masks,
 };
-use crate::metric::flip_mean;
+use crate::{metric::flip_mean, table};
 
 /// One line of the study.
 #[derive(Clone, Debug)]
-pub struct Line {
-    /// What was changed.
+pub struct StudyLine {
+    /// The change.
     pub what: &'static str,
     /// Mean FLIP in the reflection's region, against the cell as the grid renders it, of the picture with the boat.
     pub flip: f64,
@@ -24,38 +24,38 @@ pub struct Line {
     pub cost: f64,
 }
 
-struct Made {
-    pictures: Pictures,
+struct TimedPictures {
+    pictures: CellPictures,
     seconds: f64,
 }
 
-fn made(spec: &CellSpec) -> Result<(Setup, Made)> {
-    let setup = Setup::new(spec)?;
+fn made(spec: &CellSpec) -> Result<(CellSetup, TimedPictures)> {
+    let setup = CellSetup::new(spec)?;
     let start = std::time::Instant::now();
     let pictures = setup.render();
-    Ok((setup, Made { pictures, seconds: start.elapsed().as_secs_f64() }))
+    Ok((setup, TimedPictures { pictures, seconds: start.elapsed().as_secs_f64() }))
 }
 
-fn change(pictures: &Pictures, mask: &[bool]) -> f64 {
+fn change(pictures: &CellPictures, mask: &[bool]) -> f64 {
     let value = |p: [f32; 3]| luminance(glam::Vec3::from_array(p).as_dvec3());
     let pairs = pictures.with.iter().zip(&pictures.without).zip(mask).filter(|(_, m)| **m);
     pairs.map(|((a, b), _)| value(*a) - value(*b)).sum()
 }
 
 /// Renders `spec` and its refinements.
-pub fn lines(spec: &CellSpec) -> Result<Vec<Line>> {
+pub fn lines(spec: &CellSpec) -> Result<Vec<StudyLine>> {
     let (setup, base) = made(spec)?;
     let mask = masks::reflection(&setup, &base.pictures);
     let size = base.pictures.size;
     let whole = change(&base.pictures, &mask);
-    let variant = |what: &'static str, edit: &dyn Fn(&mut CellSpec)| -> Result<Line> {
+    let variant = |what: &'static str, edit: &dyn Fn(&mut CellSpec)| -> Result<StudyLine> {
         let mut other = spec.clone();
         edit(&mut other);
-        let (_, Made { pictures, seconds }) = made(&other)?;
+        let (_, TimedPictures { pictures, seconds }) = made(&other)?;
         let flip = |a: &[[f32; 3]], b: &[[f32; 3]]| -> Result<f64> {
             Ok(flip_mean(&coded(a), &coded(b), size, &mask)?.unwrap_or(0.0))
         };
-        Ok(Line {
+        Ok(StudyLine {
             what,
             flip: flip(&base.pictures.with, &pictures.with)?,
             flip_without: flip(&base.pictures.without, &pictures.without)?,
@@ -79,15 +79,16 @@ pub fn lines(spec: &CellSpec) -> Result<Vec<Line>> {
 }
 
 /// The lines as text.
-pub fn table(name: &str, lines: &[Line]) -> String {
-    let mut text = format!(
-        "{name}\n| against the grid's cell | FLIP | without boat | change | cost |\n|---|---|---|---|---|\n"
-    );
-    for l in lines {
-        text.push_str(&format!(
-            "| {} | {:.4} | {:.4} | {:.3} | {:.2} |\n",
-            l.what, l.flip, l.flip_without, l.change, l.cost
-        ));
-    }
-    text
+pub fn table(name: &str, lines: &[StudyLine]) -> String {
+    let titles = ["against the grid's cell", "FLIP", "without boat", "change", "cost"];
+    let rows = lines.iter().map(|l| {
+        vec![
+            l.what.to_owned(),
+            format!("{:.4}", l.flip),
+            format!("{:.4}", l.flip_without),
+            format!("{:.3}", l.change),
+            format!("{:.2}", l.cost),
+        ]
+    });
+    format!("{name}\n{}", table::markdown(&titles, rows))
 }

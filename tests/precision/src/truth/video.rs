@@ -5,18 +5,21 @@ use std::{fmt::Write as _, fs, path::Path};
 use anyhow::{Context, Result, ensure};
 use bowwave_core::geometry::{CameraPose, Lens, look};
 use glam::{DVec2, DVec3};
+use hw_sim::ocean::{
+    random::LightPath,
+    sky::SkySpec,
+    spectrum::{LongWaves, Spectrum, frequency},
+    trace::{TracedScene, WaterBody},
+    waves::{Resolution, TracedSea, Waves},
+};
 use rayon::prelude::*;
 
 use super::{
-    cell::exposure,
-    field::{Resolution, Sea, Waves},
-    files, rng,
-    sky::{Sky, SkySpec},
-    spectrum::{LongWaves, Spectrum, frequency},
-    trace::{Body, Scene},
+    cell::{daylight, exposure},
+    files,
 };
 
-/// What to film.
+/// Settings of a film.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct VideoSpec {
     /// Wind 10 m above the sea, m/s.
@@ -50,7 +53,7 @@ pub struct VideoSpec {
 }
 
 #[derive(serde::Serialize)]
-struct Known<'a> {
+struct VideoFacts<'a> {
     significant_height_m: f64,
     peak_period_s: f64,
     peak_wavelength_m: f64,
@@ -77,15 +80,15 @@ pub fn make(spec: &VideoSpec, out: &Path) -> Result<()> {
     let frames = (spec.seconds * spec.fps).round().clamp(1.0, 1e6) as u32;
     let spectrum = Spectrum::new(spec.wind_m_s, spec.wind_from_deg.to_radians(), spec.long_waves);
     let resolution = Resolution { shortest_m: spec.shortest_m, cells: 512, ..Resolution::default() };
-    let sea = Sea::new(&spectrum, &resolution, spec.wave_seed);
+    let sea = TracedSea::new(&spectrum, &resolution, spec.wave_seed);
     let lens = Lens::pinhole(spec.width, spec.width * 9 / 16, spec.hfov_deg.to_radians());
     let camera = CameraPose {
         world_from_camera: look(0.0, spec.pitch_deg.to_radians(), 0.0),
         position: DVec3::new(0.0, 0.0, spec.eye_m),
     };
-    let (sky, body) = (Sky::new(&spec.sky)?, Body::default());
-    let light = Scene::boat_light(&sky, &body);
-    let mut scene = Scene { sky, waves: Waves::statistical(&spectrum), body, boat: None, light };
+    let (sky, body) = (daylight(&spec.sky)?, WaterBody::default());
+    let light = TracedScene::boat_light(&sky, &body);
+    let mut scene = TracedScene { sky, waves: Waves::statistical(&spectrum), body, boat: None, light };
     let gain = exposure(&scene, &lens, &camera);
     fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
     put(&out.join("spectrum.csv"), &spectrum_table(&spectrum)?)?;
@@ -102,7 +105,13 @@ pub fn make(spec: &VideoSpec, out: &Path) -> Result<()> {
     Ok(())
 }
 
-fn picture(scene: &Scene, lens: &Lens, camera: &CameraPose, gain: f64, draw: (u32, u32)) -> Vec<[f32; 3]> {
+fn picture(
+    scene: &TracedScene,
+    lens: &Lens,
+    camera: &CameraPose,
+    gain: f64,
+    draw: (u32, u32),
+) -> Vec<[f32; 3]> {
     let (samples, frame) = draw;
     (0..lens.width * lens.height)
         .into_par_iter()
@@ -111,7 +120,7 @@ fn picture(scene: &Scene, lens: &Lens, camera: &CameraPose, gain: f64, draw: (u3
             let mut sum = DVec3::ZERO;
             for index in 0..samples {
                 // Frames draw other paths, as a camera's noise is new in each.
-                let mut path = rng::Path::new(u64::from(frame), u64::from(i), u64::from(index));
+                let mut path = LightPath::new(u64::from(frame), u64::from(i), u64::from(index));
                 let pixel = corner + DVec2::new(path.unit(), path.unit());
                 let direction = camera.world_from_camera * lens.unproject(pixel);
                 sum += scene.trace(camera.position, direction, &mut path).without;
@@ -124,7 +133,7 @@ fn picture(scene: &Scene, lens: &Lens, camera: &CameraPose, gain: f64, draw: (u3
 fn known(spec: &VideoSpec, spectrum: &Spectrum, lens: &Lens, frames: u32) -> Result<String> {
     let kp = spectrum.peak();
     let waves = kp.is_finite();
-    let known = Known {
+    let known = VideoFacts {
         significant_height_m: spectrum.significant_height_m(),
         peak_period_s: if waves { std::f64::consts::TAU / frequency(kp) } else { 0.0 },
         peak_wavelength_m: if waves { std::f64::consts::TAU / kp } else { 0.0 },

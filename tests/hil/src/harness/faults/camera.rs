@@ -7,7 +7,7 @@ use bowwave_hil::protocol::AgentCommand;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase, quiet};
 use crate::{
-    bench::{Configured, FaultChange, HilBench, PICTURE},
+    bench::{Configured, JournalChange, HilBench, PICTURE},
     guest::JournalEntry,
 };
 
@@ -188,7 +188,7 @@ pub fn rows() -> Vec<FaultRow> {
             },
             end: |b| {
                 let at = quiet(b)?;
-                b.told("CAM_CORRUPT", FaultChange::Went, at, b.scaled(2.0))?;
+                b.told("CAM_CORRUPT", JournalChange::Went, at, b.scaled(2.0))?;
                 plug_with(b, &modes())?;
                 Ok(at)
             },
@@ -228,11 +228,11 @@ fn goes_on(bench: &mut HilBench, change: fn(&mut bowwave_hil::protocol::PlayerFe
 fn renumbered(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let from = bench.camera("unplug")?;
-    bench.told("CAM_LOST", FaultChange::Came, from, bench.scaled(1.0))?;
+    bench.told("CAM_LOST", JournalChange::Came, from, bench.scaled(1.0))?;
     let lcd = bench.status()?;
     let plugged = bench.camera("plug 7")?;
-    let renamed = bench.told("CAM_RENUM", FaultChange::Came, plugged, bench.scaled(2.0))?;
-    let back = bench.told("CAM_LOST", FaultChange::Went, plugged, bench.scaled(2.0))?;
+    let renamed = bench.told("CAM_RENUM", JournalChange::Came, plugged, bench.scaled(2.0))?;
+    let back = bench.told("CAM_LOST", JournalChange::Went, plugged, bench.scaled(2.0))?;
     bench.ready(bench.scaled(2.0))?;
     let back_s = (back.max(renamed) - plugged) as f64 * 1e-9;
     Ok(CaseResult { lcd, back_s: Some(back_s), within_s: Some(1.0), met: true, ..CaseResult::default() })
@@ -244,7 +244,7 @@ fn no_bandwidth(bench: &mut HilBench) -> Result<CaseResult> {
     bench.camera("bandwidth 1000000")?;
     bench.camera("unplug")?;
     let plugged = bench.camera("plug 0")?;
-    let told = bench.told("CAM_BW", FaultChange::Came, from, bench.scaled(3.0))?;
+    let told = bench.told("CAM_BW", JournalChange::Came, from, bench.scaled(3.0))?;
     bench.ready(bench.scaled(2.0))?;
     let streams = bench.machine.guest.now_ns();
     let state = bench.machine.guest.call(AgentCommand::CameraState)?;
@@ -275,7 +275,7 @@ fn mismatch(bench: &mut HilBench) -> Result<CaseResult> {
     bench.configure(&Configured { calibration: "other.toml".into(), ..Configured::default() })?;
     let from = bench.machine.guest.now_ns();
     bench.service("reload")?;
-    let told = bench.told("CAL_MISMATCH", FaultChange::Came, from, bench.scaled(2.0));
+    let told = bench.told("CAL_MISMATCH", JournalChange::Came, from, bench.scaled(2.0));
     let lcd = bench.says("CAL MISMATCH").or_else(|_| bench.status())?;
     bench.keep_picture("row-12");
     bench.configure(&Configured::default())?;

@@ -10,7 +10,7 @@ use bowwave_hil::protocol::AgentCommand;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase, trigger::shots};
 use crate::{
-    bench::{Configured, FaultChange, GPU_FAULT, HilBench, STATE},
+    bench::{Configured, JournalChange, GPU_FAULT, HilBench, STATE},
     guest::JournalEntry,
     lcd::Plate,
 };
@@ -187,10 +187,10 @@ fn absent() -> Vec<FaultRow> {
 }
 
 fn clock_unset(bench: &mut HilBench) -> Result<CaseResult> {
-    let told = bench.told("CLK_UNSET", FaultChange::Came, 0, Duration::from_secs(5))?;
+    let told = bench.told("CLK_UNSET", JournalChange::Came, 0, Duration::from_secs(5))?;
     let lcd = bench.says("CLOCK NOT SET").or_else(|_| bench.status())?;
     let set = shell(bench, "date -u -s '2026-06-01 12:00:00'")?;
-    let went = bench.told("CLK_UNSET", FaultChange::Went, set - 2_000_000_000, bench.scaled(1.0))?;
+    let went = bench.told("CLK_UNSET", JournalChange::Went, set - 2_000_000_000, bench.scaled(1.0))?;
     let note = format!("told {:.1} s after the kernel's start", told as f64 * 1e-9);
     Ok(CaseResult {
         met: lcd.contains("CLOCK NOT SET"),
@@ -206,10 +206,10 @@ fn clock_step(bench: &mut HilBench) -> Result<CaseResult> {
     let since = Instant::now();
     let from = bench.machine.guest.now_ns();
     shell(bench, "date -s '+1 hour'")?;
-    bench.told("CLK_STEP", FaultChange::Came, from, bench.scaled(1.0))?;
+    bench.told("CLK_STEP", JournalChange::Came, from, bench.scaled(1.0))?;
     let between = bench.machine.guest.now_ns();
     shell(bench, "date -s '-1 hour'")?;
-    bench.told("CLK_STEP", FaultChange::Came, between, bench.scaled(1.0))?;
+    bench.told("CLK_STEP", JournalChange::Came, between, bench.scaled(1.0))?;
     let lcd = bench.status()?;
     let lost = bench.machine.lcd.first(since, |s| s.plate == Plate::NotScored || s.plate == Plate::Fault);
     Ok(CaseResult { met: lost.is_none() && lcd.starts_with("READY"), lcd, ..CaseResult::default() })
@@ -220,10 +220,10 @@ fn lcd_unplugged(bench: &mut HilBench) -> Result<CaseResult> {
     let path =
         bench.machine.guest.shell("ls -d /sys/class/drm/card*-Virtual-1/status | head -1")?.trim().to_owned();
     let from = write(bench, &path, "off")?;
-    let told = bench.told("DISP_LOST", FaultChange::Came, from, bench.scaled(2.0));
+    let told = bench.told("DISP_LOST", JournalChange::Came, from, bench.scaled(2.0));
     thread::sleep(Duration::from_secs(1));
     let back = write(bench, &path, "detect")?;
-    let over = bench.told("DISP_LOST", FaultChange::Went, back, bench.scaled(2.0))?;
+    let over = bench.told("DISP_LOST", JournalChange::Went, back, bench.scaled(2.0))?;
     let seen = bench
         .lcd(bench.machine.guest.host_time(back), bench.scaled(2.0), "READY", |p, _| p == Plate::Ready)?;
     let told = told?;
@@ -280,7 +280,7 @@ fn bad_configuration(bench: &mut HilBench) -> Result<CaseResult> {
     let from = bench.machine.guest.now_ns();
     bench.configure(&Configured { extra: "no_such_key = 1\n".into(), ..Configured::default() })?;
     bench.service("reload")?;
-    let told = bench.told("CFG", FaultChange::Came, from, bench.scaled(2.0));
+    let told = bench.told("CFG", JournalChange::Came, from, bench.scaled(2.0));
     let lcd = bench.says("CONFIGURATION REFUSED").or_else(|_| bench.status())?;
     let lines = bench.machine.guest.journal_since(from);
     let place =
@@ -288,7 +288,7 @@ fn bad_configuration(bench: &mut HilBench) -> Result<CaseResult> {
     let between = bench.machine.guest.now_ns();
     bench.configure(&Configured::default())?;
     bench.service("reload")?;
-    let went = bench.told("CFG", FaultChange::Went, between, bench.scaled(2.0));
+    let went = bench.told("CFG", JournalChange::Went, between, bench.scaled(2.0));
     bench.settle()?;
     told?;
     went?;
@@ -308,14 +308,14 @@ fn gpu(bench: &mut HilBench, fault: &str, code: &str) -> Result<(i64, i64, Strin
         "echo {fault} > {GPU_FAULT}.new && chown bowwave {GPU_FAULT}.new && mv {GPU_FAULT}.new {GPU_FAULT}"
     );
     let caused = shell(bench, &line)?;
-    let told = bench.told(code, FaultChange::Came, from, bench.scaled(3.0))?;
+    let told = bench.told(code, JournalChange::Came, from, bench.scaled(3.0))?;
     let lcd = bench.status()?;
     Ok((caused, told, lcd))
 }
 
 fn gpu_lost(bench: &mut HilBench) -> Result<CaseResult> {
     let (caused, told, lcd) = gpu(bench, "lost", "GPU_LOST")?;
-    let back = bench.told("GPU_LOST", FaultChange::Went, caused, bench.scaled(4.0))?;
+    let back = bench.told("GPU_LOST", JournalChange::Went, caused, bench.scaled(4.0))?;
     bench.settle()?;
     let back_s = (back - told) as f64 * 1e-9;
     Ok(CaseResult { lcd, back_s: Some(back_s), within_s: Some(2.0), met: true, ..CaseResult::default() })
@@ -355,7 +355,7 @@ fn stop(bench: &mut HilBench) -> Result<CaseResult> {
     let ended = at("Stopped bowwave.service")
         .or_else(|| at("bowwave.service: Deactivated"))
         .context("systemd's line of the end")?;
-    let told = lines.iter().any(|e| crate::bench::says(&e.fields, "STOP") == Some(FaultChange::Came));
+    let told = lines.iter().any(|e| crate::bench::says(&e.fields, "STOP") == Some(JournalChange::Came));
     let seconds = (ended - begun) as f64 * 1e-9;
     let clean =
         !lines.iter().any(|e| e.text().contains("Failed with result") || e.text().contains("timed out"));
@@ -379,7 +379,7 @@ fn database(bench: &mut HilBench) -> Result<CaseResult> {
     bench.machine.guest.call(AgentCommand::Patch { path, offset: 0, count: 8192 })?;
     let from = bench.machine.guest.now_ns();
     bench.service("start")?;
-    let told = bench.told("DB_QUARANTINE", FaultChange::Came, from, bench.scaled(15.0))?;
+    let told = bench.told("DB_QUARANTINE", JournalChange::Came, from, bench.scaled(15.0))?;
     bench
         .lcd(Instant::now(), bench.scaled(15.0), "a state", |p, _| p != Plate::Black && p != Plate::Plain)?;
     let lcd = bench.status()?;
@@ -407,7 +407,7 @@ fn hang(bench: &mut HilBench) -> Result<CaseResult> {
         .guest
         .call_within(AgentCommand::Hold { thread: "camera".into(), ms: 60_000 }, Duration::from_secs(100))?;
     let lines = bench.machine.guest.journal_since(from);
-    let own = lines.iter().any(|e| crate::bench::says(&e.fields, "WATCHDOG") == Some(FaultChange::Came));
+    let own = lines.iter().any(|e| crate::bench::says(&e.fields, "WATCHDOG") == Some(JournalChange::Came));
     let systemd = lines.iter().any(|e| e.text().to_lowercase().contains("watchdog timeout"));
     bench.ready(bench.scaled(15.0))?;
     let after = main_pid(bench)?;
@@ -423,7 +423,7 @@ fn crash_loop(bench: &mut HilBench) -> Result<CaseResult> {
         bench.machine.guest.shell(line)?;
         thread::sleep(Duration::from_millis(1500));
     }
-    let told = bench.told("CRASHLOOP", FaultChange::Came, from, bench.scaled(10.0))?;
+    let told = bench.told("CRASHLOOP", JournalChange::Came, from, bench.scaled(10.0))?;
     let at = bench.machine.guest.host_time(told);
     bench.lcd(at, bench.scaled(10.0), "FAULT", |p, _| p == Plate::Fault)?;
     thread::sleep(Duration::from_secs(1));

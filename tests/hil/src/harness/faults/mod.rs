@@ -13,7 +13,7 @@ use anyhow::{Result, bail};
 use bowwave_hil::protocol::{AgentCommand, PlayerFeed};
 
 use crate::{
-    bench::{FaultChange, HilBench, PICTURE},
+    bench::{JournalChange, HilBench, PICTURE},
     lcd::Plate,
 };
 
@@ -326,7 +326,7 @@ impl FaultCase {
         let caused = (self.inject)(bench)?;
         let at = bench.machine.guest.host_time(caused);
         let patience = bench.scaled(self.seen_s.unwrap_or(1.0)) + EXTRA;
-        let came = bench.told(self.code, FaultChange::Came, from, patience)?;
+        let came = bench.told(self.code, JournalChange::Came, from, patience)?;
         if let Some(seen) = bench.shown(self.shown, at, patience)? {
             line.seen_s = Some(seen.saturating_duration_since(at).as_secs_f64());
         }
@@ -345,7 +345,7 @@ impl FaultCase {
         };
         if self.lasts {
             let patience = bench.scaled(self.back_s.unwrap_or(2.0)) + EXTRA;
-            let went = bench.told(self.code, FaultChange::Went, over_from, patience)?;
+            let went = bench.told(self.code, JournalChange::Went, over_from, patience)?;
             let over = bench.machine.guest.host_time(ended);
             let mut back = (went - ended) as f64 * 1e-9;
             if self.shown != LcdShown::Nothing {

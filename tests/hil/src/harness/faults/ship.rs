@@ -15,7 +15,7 @@ use serde_json::json;
 
 use super::{CaseResult, FaultRow, SpecialCase};
 use crate::{
-    bench::{Configured, FaultChange, HilBench},
+    bench::{Configured, JournalChange, HilBench},
     lcd::Plate,
 };
 
@@ -104,18 +104,18 @@ fn tried(bench: &mut HilBench, compass: &Compass) -> Result<CaseResult> {
     let from = bench.machine.guest.now_ns();
     let at = Instant::now();
     bench.machine.qmp.remove("ship0")?;
-    bench.told("SHIP_LOST", FaultChange::Came, from, bench.scaled(2.0))?;
+    bench.told("SHIP_LOST", JournalChange::Came, from, bench.scaled(2.0))?;
     let warned = bench.lcd(at, bench.scaled(2.0), "a warning", |p, warning| p == Plate::Ready && warning)?;
     let lcd = bench.says("SHIP HEADING LOST")?;
     bench.keep_picture("row-S");
     let plugged = plug(bench)?;
-    let back = bench.told("SHIP_LOST", FaultChange::Went, plugged, bench.scaled(2.0))?;
+    let back = bench.told("SHIP_LOST", JournalChange::Went, plugged, bench.scaled(2.0))?;
     bench.without_warning()?;
     let asked = bench.machine.guest.now_ns();
     compass.knows.store(false, Ordering::Relaxed);
-    bench.told("SHIP_INVALID", FaultChange::Came, asked, bench.scaled(2.0))?;
+    bench.told("SHIP_INVALID", JournalChange::Came, asked, bench.scaled(2.0))?;
     compass.knows.store(true, Ordering::Relaxed);
-    bench.told("SHIP_INVALID", FaultChange::Went, asked, bench.scaled(2.0))?;
+    bench.told("SHIP_INVALID", JournalChange::Went, asked, bench.scaled(2.0))?;
     Ok(CaseResult {
         lcd,
         seen_s: Some(warned.saturating_duration_since(at).as_secs_f64()),

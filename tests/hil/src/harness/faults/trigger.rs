@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase};
 use crate::{
-    bench::{FaultChange, HilBench},
+    bench::{JournalChange, HilBench},
     lcd::Plate,
 };
 
@@ -147,7 +147,7 @@ fn lose_edges(bench: &mut HilBench) -> Result<Lost> {
     thread::sleep(Duration::from_millis(2000));
     let edges = bench.pulls(0, (0..61).map(|i| (2000, i % 2 == 0)).collect())?;
     let held = hold.answer(Duration::from_secs(20))?;
-    let told_ns = bench.told("TRG_OVERRUN", FaultChange::Came, from, PATIENCE);
+    let told_ns = bench.told("TRG_OVERRUN", JournalChange::Came, from, PATIENCE);
     let released = bench.pull(0, false)?;
     let last = edges.last().map_or(from, |edge| edge[1]);
     let pressed_s = (released - told_ns.as_ref().map_or(last, |told| *told)).max(0) as f64 * 1e-9;

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase, quiet};
 use crate::{
-    bench::{FaultChange, HilBench},
+    bench::{JournalChange, HilBench},
     lcd::Plate,
     unit::Passage,
 };
@@ -151,7 +151,7 @@ fn threads_ticks(bench: &mut HilBench, prefix: &str) -> Result<(u64, i64)> {
 fn idle_without(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let from = unplug(bench)?;
-    bench.told("IMU_LOST", FaultChange::Came, from, bench.scaled(2.0))?;
+    bench.told("IMU_LOST", JournalChange::Came, from, bench.scaled(2.0))?;
     let (before, begun) = threads_ticks(bench, "imu")?;
     thread::sleep(Duration::from_secs(5));
     let (after, ended) = threads_ticks(bench, "imu")?;
@@ -172,7 +172,7 @@ fn idle_without(bench: &mut HilBench) -> Result<CaseResult> {
 fn renumbered(bench: &mut HilBench) -> Result<CaseResult> {
     bench.ready(bench.scaled(2.0))?;
     let from = unplug(bench)?;
-    bench.told("IMU_LOST", FaultChange::Came, from, bench.scaled(2.0))?;
+    bench.told("IMU_LOST", JournalChange::Came, from, bench.scaled(2.0))?;
     let lcd = bench.status()?;
     // Something else on a USB port, with another serial number.
     let null = json!({ "id": "other", "backend": { "type": "null", "data": {} } });
@@ -181,8 +181,8 @@ fn renumbered(bench: &mut HilBench) -> Result<CaseResult> {
     bench.machine.qmp.execute("device_add", other)?;
     thread::sleep(Duration::from_secs(3));
     let plugged = plug(bench)?;
-    let back = bench.told("IMU_LOST", FaultChange::Went, plugged, bench.scaled(2.0));
-    let renamed = bench.told("IMU_RENUM", FaultChange::Came, plugged, bench.scaled(1.0));
+    let back = bench.told("IMU_LOST", JournalChange::Went, plugged, bench.scaled(2.0));
+    let renamed = bench.told("IMU_RENUM", JournalChange::Came, plugged, bench.scaled(1.0));
     let nodes = bench.machine.guest.shell("ls -l /dev/ttyUSB* /dev/bowwave | cut -d ' ' -f 5-")?;
     bench.machine.qmp.remove("other0")?;
     bench.machine.qmp.execute("chardev-remove", json!({ "id": "other" }))?;
@@ -204,7 +204,7 @@ fn blocked(bench: &mut HilBench) -> Result<CaseResult> {
     let from = bench.machine.guest.now_ns();
     let held = bench.machine.guest.call(AgentCommand::Hold { thread: "imu-serial".into(), ms: 3000 })?;
     let begun = held["begun_ns"].as_i64().unwrap_or(from);
-    let told = bench.told("IMU_BLOCKED", FaultChange::Came, from, bench.scaled(1.0))?;
+    let told = bench.told("IMU_BLOCKED", JournalChange::Came, from, bench.scaled(1.0))?;
     let at = bench.machine.guest.host_time(begun);
     let seen = bench.lcd(at, Duration::from_secs(5), "NOT SCORED", |p, _| p == Plate::NotScored)?;
     bench.settle()?;

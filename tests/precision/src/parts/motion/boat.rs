@@ -10,7 +10,7 @@ use bowwave_core::world::{
 };
 use glam::{DVec2, DVec3};
 
-use super::system::System;
+use super::system::RigidSystem;
 
 /// Acceleration of free fall, m/s^2.
 pub const GRAVITY: f64 = 9.806_65;
@@ -31,9 +31,9 @@ const RADIATION: f64 = 0.7;
 /// Radius of gyration in roll: 0.4 of the beam.
 const ROLL_INERTIA_KG_M2: f64 = MASS_KG * (0.8 * HALF_BEAM_M) * (0.8 * HALF_BEAM_M);
 
-/// What the boat meets.
+/// Waves that the boat meets.
 #[derive(Clone, Debug)]
-pub struct Boat {
+pub struct DrivenBoat {
     /// The sea.
     pub waves: WaveField,
     /// Speed northwards, m/s.
@@ -43,7 +43,7 @@ pub struct Boat {
 }
 
 /// Heave of the middle (metres, up from rest), pitch (radians, bow up), roll (radians, port up), and their rates.
-pub type State = [f64; 6];
+pub type BoatState = [f64; 6];
 
 /// Mean of a cosine over -a to a.
 fn mean(a: f64) -> f64 {
@@ -67,7 +67,7 @@ fn half_beam(d: f64) -> f64 {
     (d / DEADRISE).clamp(0.0, HALF_BEAM_M)
 }
 
-impl Boat {
+impl DrivenBoat {
     /// A boat of that speed on that sea.
     pub fn new(waves: WaveField, speed_m_s: f64) -> Self {
         // The draught whose displacement is its weight, by bisection.
@@ -127,13 +127,12 @@ impl Boat {
     }
 
     /// How the product has the boat begin.
-    pub fn start(&self) -> State {
-        let BoatMotion { at, rate } =
-            BoatMotion::of_plane(&self.form(), |t| self.course(t), &self.waves, 0.0);
+    pub fn start(&self) -> BoatState {
+        let BoatMotion { at, rate } = BoatMotion::of_plane(&self.form(), |t| self.course(t), &self.waves, 0.0);
         [at.x, at.z, at.y, rate.x, rate.z, rate.y]
     }
 
-    /// What the product makes of it, so many times a second: heave, pitch, roll.
+    /// Motion by the product, so many times a second: heave, pitch, roll.
     pub fn ridden(&self, hz: usize, frames: usize) -> Vec<[f64; 3]> {
         let mut ride = SeakeepingState::new(self.form());
         let frame = |i: usize| {
@@ -145,7 +144,7 @@ impl Boat {
     }
 
     /// The boat in the mean plane of the water, without inertia.
-    pub fn quasi_static(&self, t: f64) -> State {
+    pub fn quasi_static(&self, t: f64) -> BoatState {
         // Trim and rise on the plane are constants that the strip model leaves out.
         let state = CourseState { speed_m_s: 0.0, ..self.course(t) };
         let hull = Hull { length_m: LENGTH_M, beam_m: 2.0 * self.rest_half_beam_m() };
@@ -155,8 +154,8 @@ impl Boat {
     }
 }
 
-impl System<6> for Boat {
-    fn rate(&self, t: f64, y: &State) -> State {
+impl RigidSystem<6> for DrivenBoat {
+    fn rate(&self, t: f64, y: &BoatState) -> BoatState {
         let [heave, pitch, roll, heave_rate, pitch_rate, roll_rate] = *y;
         let strip_m = LENGTH_M / STRIPS as f64;
         let rest = self.rest_half_beam_m();
@@ -209,7 +208,7 @@ mod tests {
 
     #[test]
     fn at_rest_on_flat_water_nothing_moves() {
-        let boat = Boat::in_regular_waves(0.0, 3.0, 0.0);
+        let boat = DrivenBoat::in_regular_waves(0.0, 3.0, 0.0);
         let rate = boat.rate(0.0, &[0.0; 6]);
         assert!(rate.iter().all(|r| r.abs() < 1e-9), "{rate:?}, draught {} m", boat.draught_m);
         let pushed = |i: usize, by: f64| {
@@ -225,7 +224,7 @@ mod tests {
     #[test]
     fn long_waves_carry_it_as_the_quasi_static_boat_goes() {
         // A swell of 20 s: the boat follows the water.
-        let boat = Boat::in_regular_waves(1.0, 20.0, 0.0);
+        let boat = DrivenBoat::in_regular_waves(1.0, 20.0, 0.0);
         let mut y = boat.quasi_static(0.0);
         let h = 1.0 / 240.0;
         let mut worst = 0f64;

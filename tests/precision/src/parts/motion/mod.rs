@@ -13,13 +13,13 @@ use differential_equations::prelude::{ExplicitRungeKutta, IVP};
 use glam::DVec3;
 
 use self::{
-    boat::{Boat, GRAVITY, State},
-    system::{Library, System as _, euler, heun, rosenbrock, runge_kutta, semi_implicit, tr_bdf2},
+    boat::{BoatState, DrivenBoat, GRAVITY},
+    system::{Library, RigidSystem as _, euler, heun, rosenbrock, runge_kutta, semi_implicit, tr_bdf2},
 };
 use super::{About, rms, worst};
-use crate::bench::{Bench, Tried, Way};
+use crate::bench::{ExtremeResult, PartBench, Way};
 
-/// What is said of this part.
+/// Description of this part.
 pub const ABOUT: About = About {
     part: "motion",
     what: "Heave, pitch and roll of a boat: strips in the waves, stepped 60 times a second on a fixed grid by Heun's method with its \
@@ -48,12 +48,12 @@ const COMPARED_HZ: usize = 30;
 const FRAMES: usize = SECONDS as usize * COMPARED_HZ;
 
 /// Heave, pitch and roll at each frame; empty where the way diverged.
-type Track = Vec<[f64; 3]>;
+type MotionTrack = Vec<[f64; 3]>;
 
 /// A fixed step.
-type Step = fn(&Boat, f64, &State, f64) -> State;
+type StepRule = fn(&DrivenBoat, f64, &BoatState, f64) -> BoatState;
 
-const STEPS: [(&str, Step); 6] = [
+const STEPS: [(&str, StepRule); 6] = [
     ("Euler", euler),
     ("semi-implicit Euler", semi_implicit),
     ("Heun", heun),
@@ -69,7 +69,7 @@ fn quick_limit(method: &str) -> usize {
     if method.starts_with("Rosenbrock") || method.starts_with("TR") { 30 } else { 120 }
 }
 
-fn fixed(boat: &Boat, step: Step, start: State, hz: usize) -> Track {
+fn fixed(boat: &DrivenBoat, step: StepRule, start: BoatState, hz: usize) -> MotionTrack {
     let h = 1.0 / hz as f64;
     let (mut y, mut track) = (start, Vec::with_capacity(FRAMES));
     for i in 0..FRAMES * hz / COMPARED_HZ {
@@ -85,7 +85,7 @@ fn fixed(boat: &Boat, step: Step, start: State, hz: usize) -> Track {
     track
 }
 
-fn truth(boat: &Boat, start: State, tolerance: f64) -> Result<Track> {
+fn truth(boat: &DrivenBoat, start: BoatState, tolerance: f64) -> Result<MotionTrack> {
     let times: Vec<f64> = (0..FRAMES).map(|i| i as f64 / COMPARED_HZ as f64).collect();
     // Kinks between long steps would be missed: none is longer than two milliseconds.
     let method =
@@ -95,7 +95,7 @@ fn truth(boat: &Boat, start: State, tolerance: f64) -> Result<Track> {
         .t_eval(&times)
         .solve()
         .map_err(|e| anyhow!("DOP853 gave up: {e:?}"))?;
-    let track: Track = solution.y.iter().take(FRAMES).map(|y| [y[0], y[1], y[2]]).collect();
+    let track: MotionTrack = solution.y.iter().take(FRAMES).map(|y| [y[0], y[1], y[2]]).collect();
     (track.len() == FRAMES).then_some(track).context("DOP853 skipped times")
 }
 
@@ -119,7 +119,7 @@ fn weighed(off: DVec3) -> DVec3 {
     off * DVec3::new(1.0, 3.0, 1.0)
 }
 
-fn mean_plane(boat: &Boat) -> Track {
+fn mean_plane(boat: &DrivenBoat) -> MotionTrack {
     (0..FRAMES)
         .map(|i| {
             let y = boat.quasi_static(i as f64 / COMPARED_HZ as f64);
@@ -129,7 +129,7 @@ fn mean_plane(boat: &Boat) -> Track {
 }
 
 /// Largest rate of change of the rates along the way, by the Jacobian's norm, and largest acceleration, in g.
-fn hardness(boat: &Boat, track: &[[f64; 3]]) -> (f64, f64) {
+fn hardness(boat: &DrivenBoat, track: &[[f64; 3]]) -> (f64, f64) {
     let states = track.windows(2).enumerate().map(|(i, w)| {
         let hz = COMPARED_HZ as f64;
         let rate = |j: usize| (w[1][j] - w[0][j]) * hz;
@@ -144,25 +144,25 @@ fn hardness(boat: &Boat, track: &[[f64; 3]]) -> (f64, f64) {
 }
 
 /// A problem: name, boat, start.
-fn problems() -> Result<Vec<(&'static str, Boat, State)>> {
-    let named = |(name, boat): (&'static str, Boat)| {
+fn problems() -> Result<Vec<(&'static str, DrivenBoat, BoatState)>> {
+    let named = |(name, boat): (&'static str, DrivenBoat)| {
         let start = boat.start();
         (name, boat, start)
     };
     let force = BeaufortForce::new(4).context("force 4")?;
     let sea = WaveSpec { spectrum: Spectrum::of_force(force), wind_from: 0.0 };
     let problems = [
-        ("chop of 0.5 m and 2.5 s at 5 m/s", Boat::in_regular_waves(0.5, 2.5, 5.0)),
-        ("slamming: 1.5 m and 4 s at 12 m/s", Boat::in_regular_waves(1.5, 4.0, 12.0)),
-        ("extreme: 3 m and 5 s at 15 m/s", Boat::in_regular_waves(3.0, 5.0, 15.0)),
-        ("force 4, the product's sea, at rest", Boat::new(WaveField::new(&sea, 3), 0.0)),
-        ("force 4, the product's sea, at 5 m/s", Boat::new(WaveField::new(&sea, 3), 5.0)),
+        ("chop of 0.5 m and 2.5 s at 5 m/s", DrivenBoat::in_regular_waves(0.5, 2.5, 5.0)),
+        ("slamming: 1.5 m and 4 s at 12 m/s", DrivenBoat::in_regular_waves(1.5, 4.0, 12.0)),
+        ("extreme: 3 m and 5 s at 15 m/s", DrivenBoat::in_regular_waves(3.0, 5.0, 15.0)),
+        ("force 4, the product's sea, at rest", DrivenBoat::new(WaveField::new(&sea, 3), 0.0)),
+        ("force 4, the product's sea, at 5 m/s", DrivenBoat::new(WaveField::new(&sea, 3), 5.0)),
     ];
     Ok(problems.map(named).into())
 }
 
 /// Measures the scenes and extreme cases.
-pub fn measure(bench: &mut Bench) -> Result<()> {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
     for (scene, boat, start) in problems()? {
         let exact = truth(&boat, start, 1e-11)?;
         let own = apart(&truth(&boat, start, 1e-9)?, &exact);
@@ -180,7 +180,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
                 let note = if unsettled { "Newton's iteration does not settle at the kinks" } else { "" };
                 ways.push(
                     Way::new(method, &format!("1/{hz} s"), error, seconds, work)
-                        .holds(size_of::<State>())
+                        .holds(size_of::<BoatState>())
                         .note(note),
                 );
             }
@@ -206,7 +206,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
 }
 
 /// The same kinds of problem with a model and integrators made elsewhere, so that both may be compared.
-fn elsewhere(bench: &mut Bench) {
+fn elsewhere(bench: &mut PartBench) {
     let text = include_str!("../../../data/boat_heave_pitch_work_precision.csv");
     let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
     for case in ["calm_drop", "chop_H0.5_T2.5_U5", "slam_H1.5_T4_U12", "extreme_H3_T5_U15"] {
@@ -214,16 +214,16 @@ fn elsewhere(bench: &mut Bench) {
         let tried = of_case.map(|r| {
             let setting = if r[2] == "0.008333" { "1/120 s" } else { "1/30 s" };
             let error = r.get(4).and_then(|e| e.parse().ok()).unwrap_or(f64::NAN);
-            Tried::rival(r[1], setting, error)
+            ExtremeResult::rival(r[1], setting, error)
         });
         bench.extreme(&format!("{case}, as found elsewhere; error after 10 s"), "m", tried.collect());
     }
 }
 
 /// The fall onto flat water, where the mean plane has nothing to say.
-fn drop_on_calm_water(bench: &mut Bench) -> Result<()> {
+fn drop_on_calm_water(bench: &mut PartBench) -> Result<()> {
     for (case, height_m) in [("dropped from 0.5 m onto flat water", 0.5), ("dropped from 5 m", 5.0)] {
-        let boat = Boat::in_regular_waves(0.0, 3.0, 0.0);
+        let boat = DrivenBoat::in_regular_waves(0.0, 3.0, 0.0);
         let start = [height_m, 0.1, 0.0, 0.0, 0.0, 0.0];
         let exact = truth(&boat, start, 1e-11)?;
         let all = |track: &[[f64; 3]]| {
@@ -235,7 +235,11 @@ fn drop_on_calm_water(bench: &mut Bench) -> Result<()> {
         let mut tried = Vec::new();
         for (method, step) in STEPS {
             for hz in [30, 120] {
-                tried.push(Tried::rival(method, &format!("1/{hz} s"), all(&fixed(&boat, step, start, hz))));
+                tried.push(ExtremeResult::rival(
+                    method,
+                    &format!("1/{hz} s"),
+                    all(&fixed(&boat, step, start, hz)),
+                ));
             }
         }
         bench.extreme(case, "m", tried);

@@ -5,9 +5,9 @@ use std::fmt::Debug;
 use anyhow::{Result, ensure};
 use differential_equations::prelude::*;
 
-use super::system::{Library, System, Tolerance, controlled, rosenbrock, runge_kutta, tr_bdf2};
+use super::system::{Library, RigidSystem, Tolerance, controlled, rosenbrock, runge_kutta, tr_bdf2};
 use crate::{
-    bench::{Bench, Tried, Way},
+    bench::{ExtremeResult, PartBench, Way},
     parts::worst,
 };
 
@@ -16,7 +16,7 @@ const REFERENCE: &str = include_str!("../../../data/ode_stiff_reference.csv");
 /// Van der Pol's oscillator with the parameter 1e-6, to t = 2.
 struct VanDerPol;
 
-impl System<2> for VanDerPol {
+impl RigidSystem<2> for VanDerPol {
     fn rate(&self, _t: f64, y: &[f64; 2]) -> [f64; 2] {
         [y[1], ((1.0 - y[0] * y[0]) * y[1] - y[0]) / 1e-6]
     }
@@ -29,7 +29,7 @@ impl System<2> for VanDerPol {
 /// Robertson's reaction, to t = 1e11.
 struct Robertson;
 
-impl System<3> for Robertson {
+impl RigidSystem<3> for Robertson {
     fn rate(&self, _t: f64, y: &[f64; 3]) -> [f64; 3] {
         let (slow, fast, square) = (0.04 * y[0], 1e4 * y[1] * y[2], 3e7 * y[1] * y[1]);
         [fast - slow, slow - fast - square, square]
@@ -42,7 +42,7 @@ impl System<3> for Robertson {
 }
 
 /// A problem with its reference.
-struct Problem<const N: usize, S> {
+struct StiffProblem<const N: usize, S> {
     name: &'static str,
     system: S,
     start: [f64; N],
@@ -62,7 +62,7 @@ fn reference<const N: usize>(problem: &str) -> Result<[f64; N]> {
     Ok(std::array::from_fn(|i| values[i]))
 }
 
-impl<const N: usize, S: System<N>> Problem<N, S> {
+impl<const N: usize, S: RigidSystem<N>> StiffProblem<N, S> {
     fn error(&self, end: Option<[f64; N]>) -> f64 {
         end.map_or(f64::INFINITY, |end| {
             let off = worst((0..N).map(|i| (end[i] / self.reference[i] - 1.0).abs()));
@@ -94,7 +94,7 @@ impl<const N: usize, S: System<N>> Problem<N, S> {
         last(IVP::ode(&Library(&self.system), 0.0, self.until, self.start).method(method).solve())
     }
 
-    fn measure(&self, bench: &mut Bench) {
+    fn measure(&self, bench: &mut PartBench) {
         let mut ways = Vec::new();
         let bytes = size_of::<[f64; N]>();
         for relative in [1e-3, 1e-5, 1e-7] {
@@ -121,7 +121,7 @@ impl<const N: usize, S: System<N>> Problem<N, S> {
     }
 
     /// Explicit methods, which need steps shorter than the fastest time of the problem.
-    fn explicit(&self, bench: &mut Bench) {
+    fn explicit(&self, bench: &mut PartBench) {
         let steps = 2_000_000;
         let fixed = |count: usize| {
             let h = self.until / count as f64;
@@ -134,11 +134,12 @@ impl<const N: usize, S: System<N>> Problem<N, S> {
             }
             Some(y)
         };
-        let mut tried = vec![Tried::rival("Runge-Kutta 4", "1e5 steps", self.error(fixed(100_000)))];
-        tried.push(Tried::rival("Runge-Kutta 4", "2e6 steps", self.error(fixed(steps))));
+        let mut tried = vec![ExtremeResult::rival("Runge-Kutta 4", "1e5 steps", self.error(fixed(100_000)))];
+        tried.push(ExtremeResult::rival("Runge-Kutta 4", "2e6 steps", self.error(fixed(steps))));
         let end = self.dopri5(1e-5, steps);
         let note = if end.is_none() { "gave up after 2e6 steps" } else { "" };
-        tried.push(Tried::rival("DOPRI5 (library)", "1e-5, step control", self.error(end)).note(note));
+        tried
+            .push(ExtremeResult::rival("DOPRI5 (library)", "1e-5, step control", self.error(end)).note(note));
         bench.extreme(&format!("{}, explicit", self.name), "relative", tried);
     }
 }
@@ -148,8 +149,8 @@ fn last<const N: usize, E: Debug>(solved: Result<Solution<f64, [f64; N]>, E>) ->
 }
 
 /// Measures both problems.
-pub fn measure(bench: &mut Bench) -> Result<()> {
-    Problem {
+pub fn measure(bench: &mut PartBench) -> Result<()> {
+    StiffProblem {
         name: "van der Pol, 1e-6, to t = 2",
         system: VanDerPol,
         start: [2.0, 0.0],
@@ -158,7 +159,7 @@ pub fn measure(bench: &mut Bench) -> Result<()> {
         scale: [1.0, 1.0],
     }
     .measure(bench);
-    Problem {
+    StiffProblem {
         name: "Robertson, to t = 1e11",
         system: Robertson,
         start: [1.0, 0.0, 0.0],

@@ -3,7 +3,7 @@
 use differential_equations::prelude::{Matrix, ODE};
 
 /// y' = f(t, y).
-pub trait System<const N: usize> {
+pub trait RigidSystem<const N: usize> {
     /// f(t, y).
     fn rate(&self, t: f64, y: &[f64; N]) -> [f64; N];
 
@@ -31,7 +31,7 @@ pub trait System<const N: usize> {
 /// The same system for the library's solvers.
 pub struct Library<'a, S>(pub &'a S);
 
-impl<const N: usize, S: System<N>> ODE<f64, [f64; N]> for Library<'_, S> {
+impl<const N: usize, S: RigidSystem<N>> ODE<f64, [f64; N]> for Library<'_, S> {
     fn diff(&self, t: f64, y: &[f64; N], dydt: &mut [f64; N]) {
         *dydt = self.0.rate(t, y);
     }
@@ -52,12 +52,12 @@ pub fn plus<const N: usize>(y: &[f64; N], k: &[f64; N], h: f64) -> [f64; N] {
 }
 
 /// Explicit Euler.
-pub fn euler<const N: usize>(s: &impl System<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
+pub fn euler<const N: usize>(s: &impl RigidSystem<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
     plus(y, &s.rate(t, y), h)
 }
 
 /// Semi-implicit Euler for a state of positions, then their speeds: the new speeds move the positions.
-pub fn semi_implicit<const N: usize>(s: &impl System<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
+pub fn semi_implicit<const N: usize>(s: &impl RigidSystem<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
     let mut next = plus(y, &s.rate(t, y), h);
     for i in 0..N / 2 {
         next[i] = y[i] + h * next[i + N / 2];
@@ -66,14 +66,14 @@ pub fn semi_implicit<const N: usize>(s: &impl System<N>, t: f64, y: &[f64; N], h
 }
 
 /// Heun's method of order 2.
-pub fn heun<const N: usize>(s: &impl System<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
+pub fn heun<const N: usize>(s: &impl RigidSystem<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
     let k1 = s.rate(t, y);
     let k2 = s.rate(t + h, &plus(y, &k1, h));
     std::array::from_fn(|i| y[i] + h / 2.0 * (k1[i] + k2[i]))
 }
 
 /// The classical Runge-Kutta method of order 4.
-pub fn runge_kutta<const N: usize>(s: &impl System<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
+pub fn runge_kutta<const N: usize>(s: &impl RigidSystem<N>, t: f64, y: &[f64; N], h: f64) -> [f64; N] {
     let k1 = s.rate(t, y);
     let k2 = s.rate(t + h / 2.0, &plus(y, &k1, h / 2.0));
     let k3 = s.rate(t + h / 2.0, &plus(y, &k2, h / 2.0));
@@ -87,7 +87,7 @@ const D: f64 = 0.292_893_218_813_452_5;
 /// One step of the Rosenbrock method of ode23s (Shampine and Reichelt 1997): order 2, L-stable. With the estimate of its
 /// error; `None` where the matrix is singular.
 pub fn rosenbrock<const N: usize>(
-    s: &impl System<N>,
+    s: &impl RigidSystem<N>,
     t: f64,
     y: &[f64; N],
     h: f64,
@@ -116,7 +116,7 @@ pub fn rosenbrock<const N: usize>(
 /// One step of TR-BDF2 (Bank 1985, with the error estimate of Hosea and Shampine 1996): order 2, L-stable. `None` where
 /// Newton's iteration does not settle.
 pub fn tr_bdf2<const N: usize>(
-    s: &impl System<N>,
+    s: &impl RigidSystem<N>,
     t: f64,
     y: &[f64; N],
     h: f64,
@@ -202,7 +202,7 @@ impl<const N: usize> Factors<N> {
 /// A step with an estimate of its error.
 pub type Estimating<S, const N: usize> = fn(&S, f64, &[f64; N], f64) -> Option<([f64; N], [f64; N])>;
 
-/// What a step's error may be, by component: absolute, and relative to the component.
+/// Tolerance of a step, by component: absolute, and relative to the component.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance<const N: usize> {
     /// Absolute.
@@ -212,7 +212,7 @@ pub struct Tolerance<const N: usize> {
 }
 
 /// Steps of a length that keeps each one's error within the tolerance; `None` after too many of them.
-pub fn controlled<const N: usize, S: System<N>>(
+pub fn controlled<const N: usize, S: RigidSystem<N>>(
     system: &S,
     step: Estimating<S, N>,
     start: [f64; N],
@@ -253,7 +253,7 @@ mod tests {
     /// y'' = -y - 0.1 y' + cos 2t, as position and speed.
     struct Spring;
 
-    impl System<2> for Spring {
+    impl RigidSystem<2> for Spring {
         fn rate(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
             [y[1], -y[0] - 0.1 * y[1] + (2.0 * t).cos()]
         }

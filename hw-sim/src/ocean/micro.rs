@@ -8,19 +8,12 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 use glam::{DVec2, DVec3};
 
-use super::{field::Unresolved, rng::Path};
-
-/// Refractive index of sea water.
-pub const WATER: f64 = 1.34;
-
-/// Exact unpolarised reflectance from air on a surface of index `n` at a cosine of incidence.
-pub fn fresnel(cos_in: f64, n: f64) -> f64 {
-    let c = cos_in.clamp(0.0, 1.0);
-    let g = (n * n - 1.0 + c * c).sqrt();
-    let s = (c - g) / (c + g);
-    let p = (n * n * c - g) / (n * n * c + g);
-    (s * s + p * p) / 2.0
-}
+use super::{
+    fresnel::{SEA_WATER_INDEX, fresnel},
+    noise::normal_quantile,
+    random::LightPath,
+    waves::Unresolved,
+};
 
 fn density(x: f64) -> f64 {
     (-0.5 * x * x).exp() * 0.398_942_280_401_432_7
@@ -41,14 +34,14 @@ pub struct Micro {
 
 /// Direction as the surface sees it.
 #[derive(Clone, Copy)]
-struct Seen {
+struct SeenSlope {
     /// Sine of the elevation over the mean facet, sheared.
     up: f64,
     /// Standard deviation of the slope along the direction times its horizontal length.
     spread: f64,
 }
 
-impl Seen {
+impl SeenSlope {
     fn t(self) -> f64 {
         self.up / self.spread.max(1e-9)
     }
@@ -82,13 +75,13 @@ impl Micro {
         DVec2::new(v.dot(self.along), self.along.perp_dot(v))
     }
 
-    fn seen(&self, d: DVec3) -> Seen {
+    fn seen(&self, d: DVec3) -> SeenSlope {
         let flat = d.truncate();
-        Seen { up: d.z - flat.dot(self.slope), spread: (self.wind_axes(flat) * self.sigma).length() }
+        SeenSlope { up: d.z - flat.dot(self.slope), spread: (self.wind_axes(flat) * self.sigma).length() }
     }
 
     /// A facet's normal, as often as its area is seen from `to_eye`.
-    pub fn visible_normal(&self, to_eye: DVec3, path: &mut Path) -> DVec3 {
+    pub fn visible_normal(&self, to_eye: DVec3, path: &mut LightPath) -> DVec3 {
         let (first, second) = (path.unit(), path.unit());
         if self.is_mirror() {
             return (-self.slope).extend(1.0).normalize();
@@ -118,12 +111,12 @@ impl Micro {
         }
         let slopes = (-exponent).exp() / (2.0 * PI * self.sigma.x * self.sigma.y);
         let unshadowed = cumulative.powf(light.hidden());
-        fresnel(to_eye.dot(half), WATER) * slopes / (4.0 * half.z.powi(4) * area) * unshadowed
+        fresnel(to_eye.dot(half), SEA_WATER_INDEX) * slopes / (4.0 * half.z.powi(4) * area) * unshadowed
     }
 
     /// Share of heights below the place where a ray in `direction`, which set out at share `from`, strikes the surface; `None` when it
     /// leaves it.
-    pub fn strike(&self, direction: DVec3, from: f64, path: &mut Path) -> Option<f64> {
+    pub fn strike(&self, direction: DVec3, from: f64, path: &mut LightPath) -> Option<f64> {
         let u = path.unit();
         let seen = self.seen(direction);
         if self.is_mirror() {
@@ -165,46 +158,4 @@ fn visible_slope(t: f64, quantile: f64) -> f64 {
         u = next;
     }
     u
-}
-
-/// Quantile of the standard normal distribution (Acklam 2003, relative error 1.2e-9).
-fn normal_quantile(p: f64) -> f64 {
-    const A: [f64; 6] = [
-        -3.969_683_028_665_376e1,
-        2.209_460_984_245_205e2,
-        -2.759_285_104_469_687e2,
-        1.383_577_518_672_69e2,
-        -3.066_479_806_614_716e1,
-        2.506_628_277_459_239,
-    ];
-    const B: [f64; 5] = [
-        -5.447_609_879_822_406e1,
-        1.615_858_368_580_409e2,
-        -1.556_989_798_598_866e2,
-        6.680_131_188_771_972e1,
-        -1.328_068_155_288_572e1,
-    ];
-    const C: [f64; 6] = [
-        -7.784_894_002_430_293e-3,
-        -3.223_964_580_411_365e-1,
-        -2.400_758_277_161_838,
-        -2.549_732_539_343_734,
-        4.374_664_141_464_968,
-        2.938_163_982_698_783,
-    ];
-    const D: [f64; 4] =
-        [7.784_695_709_041_462e-3, 3.224_671_290_700_398e-1, 2.445_134_137_142_996, 3.754_408_661_907_416];
-    let poly = |c: &[f64], x: f64| c.iter().fold(0.0, |sum, &c| sum * x + c);
-    let tail = |p: f64| {
-        let q = (-2.0 * p.ln()).sqrt();
-        poly(&C, q) / (poly(&D, q) * q + 1.0)
-    };
-    if p < 0.02425 {
-        tail(p)
-    } else if p > 1.0 - 0.02425 {
-        -tail(1.0 - p)
-    } else {
-        let (q, r) = (p - 0.5, (p - 0.5) * (p - 0.5));
-        poly(&A, r) * q / (poly(&B, r) * r + 1.0)
-    }
 }

@@ -4,7 +4,6 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use anyhow::{Context, Result};
 use glam::{DVec2, DVec3};
 use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 
@@ -18,36 +17,51 @@ const OPTICAL_DEPTH: DVec3 = DVec3::new(0.195, 0.245, 0.345);
 /// Horizontal illuminance under a heavy cloud cover with a sun of some 40 degrees, lux.
 const OVERCAST_LUX: f64 = 15_000.0;
 
-/// What kind of sky.
+/// Kind of sky.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Weather {
+pub enum SkyWeather {
     /// Hosek and Wilkie 2012 with turbidity 3, and the sun.
     Clear,
     /// CIE overcast sky (Moon and Spencer 1942), no sun.
     Overcast,
 }
 
-/// Sky and sun of a scene.
+/// Daylight and sun of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SkySpec {
     /// Clear or overcast.
-    pub weather: Weather,
+    pub weather: SkyWeather,
     /// Elevation of the sun, degrees.
     pub sun_elevation_deg: f64,
     /// Azimuth of the sun, degrees clockwise from north.
     pub sun_azimuth_deg: f64,
 }
 
-enum Dome {
-    Clear(Box<SkyState>),
+/// Hosek and Wilkie's clear sky (2012) in linear sRGB.
+pub(super) struct ClearSky(Box<SkyState>);
+
+impl ClearSky {
+    /// For a sun's elevation (radians), a turbidity from 1 to 10 and the ground's albedo; `None` outside of what the model covers.
+    pub(super) fn new(elevation: f32, turbidity: f32, albedo: [f32; 3]) -> Option<Self> {
+        SkyState::new(&SkyParams { elevation, turbidity, albedo }).ok().map(|state| Self(Box::new(state)))
+    }
+
+    /// Radiance from `theta` off the zenith and `gamma` off the sun, radians.
+    pub(super) fn radiance(&self, theta: f32, gamma: f32) -> [f32; 3] {
+        [Channel::R, Channel::G, Channel::B].map(|c| self.0.radiance(theta, gamma, c).max(0.0))
+    }
+}
+
+enum SkyDome {
+    Clear(ClearSky),
     Overcast { zenith: DVec3 },
     Uniform(DVec3),
 }
 
 /// The light of a scene.
-pub struct Sky {
-    dome: Dome,
+pub struct Daylight {
+    dome: SkyDome,
     /// Unit vector towards the sun.
     pub sun_direction: DVec3,
     /// Irradiance of the sun on a plane that faces it; black without a sun.
@@ -56,34 +70,31 @@ pub struct Sky {
     pub sky_irradiance: DVec3,
 }
 
-impl Sky {
-    /// The light of `spec`.
-    pub fn new(spec: &SkySpec) -> Result<Self> {
+impl Daylight {
+    /// The light of `spec`; `None` for a sun outside of what the model covers.
+    pub fn new(spec: &SkySpec) -> Option<Self> {
         let elevation = spec.sun_elevation_deg.to_radians();
         let azimuth = spec.sun_azimuth_deg.to_radians();
         let flat = DVec2::new(azimuth.sin(), azimuth.cos()) * elevation.cos();
         let sun_direction = flat.extend(elevation.sin());
         let (dome, sun) = match spec.weather {
-            Weather::Clear => {
-                let params =
-                    SkyParams { elevation: elevation.max(0.0) as f32, turbidity: 3.0, albedo: [0.06; 3] };
-                let state = SkyState::new(&params)
-                    .with_context(|| format!("no clear sky for a sun at {} deg", spec.sun_elevation_deg))?;
-                (Dome::Clear(Box::new(state)), sunlight(elevation))
+            SkyWeather::Clear => {
+                let clear = ClearSky::new(elevation.max(0.0) as f32, 3.0, [0.06; 3])?;
+                (SkyDome::Clear(clear), sunlight(elevation))
             }
-            Weather::Overcast => {
+            SkyWeather::Overcast => {
                 // Horizontal irradiance of the dome is 7 pi / 9 of its zenith radiance.
                 let zenith = OVERCAST_LUX / 683.0 * 9.0 / (7.0 * PI);
-                (Dome::Overcast { zenith: zenith * DVec3::new(0.97, 1.0, 1.05) }, DVec3::ZERO)
+                (SkyDome::Overcast { zenith: zenith * DVec3::new(0.97, 1.0, 1.05) }, DVec3::ZERO)
             }
         };
-        Ok(Self::finish(Self { dome, sun_direction, sun, sky_irradiance: DVec3::ZERO }))
+        Some(Self::finish(Self { dome, sun_direction, sun, sky_irradiance: DVec3::ZERO }))
     }
 
     /// The same radiance from everywhere, and no sun: for tests of energy.
     pub fn uniform(radiance: DVec3) -> Self {
         let sky = Self {
-            dome: Dome::Uniform(radiance),
+            dome: SkyDome::Uniform(radiance),
             sun_direction: DVec3::Z,
             sun: DVec3::ZERO,
             sky_irradiance: DVec3::ZERO,
@@ -111,9 +122,9 @@ impl Sky {
     pub fn radiance(&self, direction: DVec3) -> DVec3 {
         let sin = direction.z.clamp(0.0, 1.0);
         match &self.dome {
-            Dome::Uniform(radiance) => *radiance,
-            Dome::Overcast { zenith } => *zenith * (1.0 + 2.0 * sin) / 3.0,
-            Dome::Clear(state) => {
+            SkyDome::Uniform(radiance) => *radiance,
+            SkyDome::Overcast { zenith } => *zenith * (1.0 + 2.0 * sin) / 3.0,
+            SkyDome::Clear(clear) => {
                 let theta = (FRAC_PI_2 - sin.asin()) as f32;
                 let level = if direction.z < 0.0 {
                     direction.truncate().normalize_or_zero().extend(0.0)
@@ -121,8 +132,7 @@ impl Sky {
                     direction
                 };
                 let gamma = level.dot(self.sun_direction).clamp(-1.0, 1.0).acos() as f32;
-                let value = |c: Channel| f64::from(state.radiance(theta, gamma, c)).max(0.0);
-                DVec3::new(value(Channel::R), value(Channel::G), value(Channel::B))
+                DVec3::from_array(clear.radiance(theta, gamma).map(f64::from))
             }
         }
     }

@@ -1,11 +1,30 @@
 //! The boat's triangles in the world, and where rays meet them.
 
-use bowwave_core::{geometry::RigidPose, model::Model};
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
+
+/// A corner of a boat's triangle, in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshCorner {
+    /// Place, metres.
+    pub position: DVec3,
+    /// Unit normal on the outer side.
+    pub normal: DVec3,
+    /// Diffuse reflectance.
+    pub albedo: DVec3,
+}
+
+/// Place of a boat's axes in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct BoatFrame {
+    /// Rotation from the boat's axes to the world's.
+    pub world_from_boat: DQuat,
+    /// Origin, metres.
+    pub position: DVec3,
+}
 
 /// One triangle.
 #[derive(Clone, Copy, Debug)]
-struct Triangle {
+struct MeshTriangle {
     corner: DVec3,
     edges: [DVec3; 2],
     normals: [DVec3; 3],
@@ -13,12 +32,12 @@ struct Triangle {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Bounds {
+struct MeshBounds {
     low: DVec3,
     high: DVec3,
 }
 
-impl Bounds {
+impl MeshBounds {
     const EMPTY: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
 
     fn with(self, p: DVec3) -> Self {
@@ -33,14 +52,14 @@ impl Bounds {
     }
 }
 
-enum Node {
+enum MeshNode {
     Leaf {
-        bounds: Bounds,
+        bounds: MeshBounds,
         range: std::ops::Range<usize>,
     },
     /// Children are the next node and `right`.
     Inner {
-        bounds: Bounds,
+        bounds: MeshBounds,
         right: usize,
     },
 }
@@ -57,46 +76,48 @@ pub struct MeshHit {
 }
 
 /// A boat in the world.
-pub struct Mesh {
-    triangles: Vec<Triangle>,
-    nodes: Vec<Node>,
-    pose: RigidPose,
+pub struct BoatMesh {
+    triangles: Vec<MeshTriangle>,
+    nodes: Vec<MeshNode>,
+    frame: BoatFrame,
     waterline: Vec<DVec2>,
 }
 
 const LEAF: usize = 4;
 
-impl Mesh {
-    /// `model` at `pose`. A texture is not looked at: models with one keep their corners' colours.
-    pub fn new(model: &Model, pose: RigidPose) -> Self {
-        let mut triangles: Vec<Triangle> = model
-            .indices
-            .chunks_exact(3)
-            .map(|i| {
-                let v = [0, 1, 2].map(|j| model.vertices[i[j] as usize]);
-                let p = v.map(|v| pose.to_world(v.position.as_dvec3()));
-                Triangle {
+impl BoatMesh {
+    /// A boat of these triangles, with its outline at the waterline in its own axes, counter-clockwise from above.
+    pub fn new(
+        triangles: impl IntoIterator<Item = [MeshCorner; 3]>,
+        frame: BoatFrame,
+        waterline: Vec<DVec2>,
+    ) -> Self {
+        let mut triangles: Vec<MeshTriangle> = triangles
+            .into_iter()
+            .map(|corners| {
+                let p = corners.map(|c| c.position);
+                MeshTriangle {
                     corner: p[0],
                     edges: [p[1] - p[0], p[2] - p[0]],
-                    normals: v.map(|v| pose.world_from_body * v.normal.as_dvec3()),
-                    albedo: v.map(|v| v.albedo.as_dvec3()),
+                    normals: corners.map(|c| c.normal),
+                    albedo: corners.map(|c| c.albedo),
                 }
             })
             .collect();
         let mut nodes = Vec::new();
         let count = triangles.len();
         split(&mut triangles, 0..count, &mut nodes);
-        Self { triangles, nodes, pose, waterline: model.waterline.clone() }
+        Self { triangles, nodes, frame, waterline }
     }
 
-    /// Where the boat is.
-    pub fn pose(&self) -> &RigidPose {
-        &self.pose
+    /// The boat's axes.
+    pub fn frame(&self) -> &BoatFrame {
+        &self.frame
     }
 
     /// Whether water at `point` would stand inside the hull: within its outline at the waterline and not far above it.
     pub fn holds_water(&self, point: DVec3) -> bool {
-        let p = self.pose.to_body(point);
+        let p = self.frame.world_from_boat.inverse() * (point - self.frame.position);
         self.waterline.len() > 2
             && p.z.abs() < 3.0
             && (0..self.waterline.len()).all(|i| {
@@ -116,7 +137,7 @@ impl Mesh {
             depth -= 1;
             let index = stack[depth];
             match &self.nodes[index] {
-                Node::Leaf { bounds, range } => {
+                MeshNode::Leaf { bounds, range } => {
                     if bounds.entry(origin, inverse, limit).is_none() {
                         continue;
                     }
@@ -129,7 +150,7 @@ impl Mesh {
                         }
                     }
                 }
-                Node::Inner { bounds, right } => {
+                MeshNode::Inner { bounds, right } => {
                     if bounds.entry(origin, inverse, limit).is_some() && depth + 2 <= stack.len() {
                         stack[depth] = *right;
                         stack[depth + 1] = index + 1;
@@ -151,7 +172,7 @@ impl Mesh {
     }
 }
 
-impl Triangle {
+impl MeshTriangle {
     /// Moeller and Trumbore 1997.
     fn meet(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64, f64)> {
         let p = direction.cross(self.edges[1]);
@@ -167,8 +188,11 @@ impl Triangle {
         (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 1e-6).then_some((t, u, v))
     }
 
-    fn bounds(&self) -> Bounds {
-        Bounds::EMPTY.with(self.corner).with(self.corner + self.edges[0]).with(self.corner + self.edges[1])
+    fn bounds(&self) -> MeshBounds {
+        MeshBounds::EMPTY
+            .with(self.corner)
+            .with(self.corner + self.edges[0])
+            .with(self.corner + self.edges[1])
     }
 
     fn middle(&self) -> DVec3 {
@@ -176,15 +200,15 @@ impl Triangle {
     }
 }
 
-fn split(triangles: &mut [Triangle], range: std::ops::Range<usize>, nodes: &mut Vec<Node>) {
+fn split(triangles: &mut [MeshTriangle], range: std::ops::Range<usize>, nodes: &mut Vec<MeshNode>) {
     let part = &mut triangles[range.clone()];
-    let bounds = part.iter().fold(Bounds::EMPTY, |b, t| {
+    let bounds = part.iter().fold(MeshBounds::EMPTY, |b, t| {
         let o = t.bounds();
-        Bounds { low: b.low.min(o.low), high: b.high.max(o.high) }
+        MeshBounds { low: b.low.min(o.low), high: b.high.max(o.high) }
     });
     if range.len() <= LEAF {
         if !range.is_empty() {
-            nodes.push(Node::Leaf { bounds, range });
+            nodes.push(MeshNode::Leaf { bounds, range });
         }
         return;
     }
@@ -192,9 +216,9 @@ fn split(triangles: &mut [Triangle], range: std::ops::Range<usize>, nodes: &mut 
     let half = range.len() / 2;
     part.select_nth_unstable_by(half, |a, b| a.middle()[axis].total_cmp(&b.middle()[axis]));
     let here = nodes.len();
-    nodes.push(Node::Inner { bounds, right: 0 });
+    nodes.push(MeshNode::Inner { bounds, right: 0 });
     split(triangles, range.start..range.start + half, nodes);
     let right = nodes.len();
     split(triangles, range.start + half..range.end, nodes);
-    nodes[here] = Node::Inner { bounds, right };
+    nodes[here] = MeshNode::Inner { bounds, right };
 }

@@ -1,25 +1,23 @@
 //! The sea's surface at one instant: heights and slopes on periodic tiles of three sizes, summed from waves whose
 //! frequencies all fit into the recording a whole number of times.
 
-use std::{
-    f64::consts::{PI, TAU},
-    sync::Arc,
-};
+use std::f64::consts::{PI, TAU};
 
 use glam::Vec4;
-use rustfft::{Fft, FftPlanner, num_complex::Complex};
+use rustfft::num_complex::Complex;
 
 use super::{
-    noise::{gaussian, stream},
-    spectrum::{Swell, WindSea, angular_frequency},
+    lattice::Transform,
+    random::{gaussian, stream},
+    spectrum::{Swell, WindSea, frequency},
 };
 
 /// Points along a tile's side.
 const N: usize = 256;
 /// Tiles, from the longest waves to the shortest.
-pub(super) const CASCADES: usize = 3;
+pub const CASCADES: usize = 3;
 /// Mip levels of a tile, down to 2 x 2.
-pub(super) const LEVELS: usize = 8;
+pub const LEVELS: usize = 8;
 /// Side of the smallest tile, metres: 2.6 cm a point, about a pixel's width at the nearest water.
 const SMALLEST_M: f64 = 6.7;
 /// Points on the shortest wave that a tile carries.
@@ -28,12 +26,12 @@ const POINTS_PER_WAVE: f64 = 3.6;
 /// How much each tile has to say about where crests break: the longest waves break, the shortest only fray the edge.
 const SQUEEZE: [f32; CASCADES] = [1.6, 0.8, 0.25];
 
-/// What is stored at a point: height in metres, slope to the east, slope to the north, and how much the surface is being
+/// Numbers at a point: height in metres, slope to the east, slope to the north, and how much the surface is being
 /// pushed together there, weighted by [`SQUEEZE`].
-pub(super) type Texel = Vec4;
+pub type Texel = Vec4;
 
 /// One wave and its opposite on a tile's lattice.
-struct Mode {
+struct LoopedWave {
     index: u32,
     opposite: u32,
     /// Whole cycles in the recording.
@@ -44,14 +42,14 @@ struct Mode {
     direction: [f32; 2],
 }
 
-struct Cascade {
+struct LoopedBand {
     size_m: f64,
     rotation: f64,
-    modes: Vec<Mode>,
+    modes: Vec<LoopedWave>,
 }
 
 /// One tile at one instant, with its mip levels.
-pub(super) struct Tile {
+pub struct LoopedTile {
     /// Points per metre at level 0.
     per_metre: f32,
     axis: [f32; 2],
@@ -59,28 +57,28 @@ pub(super) struct Tile {
 }
 
 /// All tiles at one instant and the memory to make them.
-pub(super) struct Surface {
-    pub tiles: [Tile; CASCADES],
+pub struct LoopedSurface {
+    /// From the longest waves to the shortest.
+    pub tiles: [LoopedTile; CASCADES],
     along: Vec<Complex<f32>>,
     across: Vec<Complex<f32>>,
     swap: Vec<Complex<f32>>,
-    fft_scratch: Vec<Complex<f32>>,
     heights: Vec<f32>,
     phases: Vec<Complex<f32>>,
 }
 
 /// Covariance of the slopes that a tile's level still resolves: east-east, north-north, east-north.
-pub(super) type Covariance = [f32; 3];
+pub type Covariance = [f32; 3];
 
 /// The waves.
-pub(super) struct Field {
-    cascades: [Cascade; CASCADES],
-    fft: Arc<dyn Fft<f32>>,
+pub struct LoopedSea {
+    cascades: [LoopedBand; CASCADES],
+    transform: Transform<f32>,
     period_s: f64,
     cycles_max: u32,
 }
 
-impl Field {
+impl LoopedSea {
     /// Draws the waves of a wind sea running before a wind from `wind_from` and of a swell.
     pub fn new(sea: &WindSea, wind_from: f64, swell: Option<&Swell>, period_s: f64, seed: u64) -> Self {
         let longest = swell.map_or(sea.peak(), |s| s.peak().min(sea.peak()));
@@ -92,28 +90,28 @@ impl Field {
         let mut lower = 0.0;
         let cascades = std::array::from_fn(|c| {
             let upper = TAU * N as f64 / (POINTS_PER_WAVE * sizes[c]);
-            let frame = Band { size_m: sizes[c], rotation: rotations[c], lower, upper };
+            let frame = TileBand { size_m: sizes[c], rotation: rotations[c], lower, upper };
             lower = upper;
             let swell = if c == 0 { swell } else { None };
-            Cascade {
+            LoopedBand {
                 size_m: sizes[c],
                 rotation: rotations[c],
                 modes: draw_modes(&frame, sea, wind_from, swell, period_s, seed.wrapping_add(c as u64)),
             }
         });
         let cycles_max =
-            cascades.iter().flat_map(|c: &Cascade| &c.modes).map(|m| m.cycles).max().unwrap_or(0);
-        Self { cascades, fft: FftPlanner::new().plan_fft_inverse(N), period_s, cycles_max }
+            cascades.iter().flat_map(|c: &LoopedBand| &c.modes).map(|m| m.cycles).max().unwrap_or(0);
+        Self { cascades, transform: Transform::new(N), period_s, cycles_max }
     }
 
     /// Memory for one instant.
-    pub fn surface(&self) -> Surface {
+    pub fn surface(&self) -> LoopedSurface {
         let zeros = vec![Complex::default(); N * N];
-        Surface {
+        LoopedSurface {
             tiles: std::array::from_fn(|c| {
                 let cascade = &self.cascades[c];
                 let (sin, cos) = cascade.rotation.sin_cos();
-                Tile {
+                LoopedTile {
                     per_metre: (N as f64 / cascade.size_m) as f32,
                     axis: [cos as f32, sin as f32],
                     levels: (0..LEVELS).map(|l| vec![Vec4::ZERO; (N >> l) * (N >> l)]).collect(),
@@ -122,14 +120,13 @@ impl Field {
             along: zeros.clone(),
             across: zeros.clone(),
             swap: zeros,
-            fft_scratch: vec![Complex::default(); self.fft.get_inplace_scratch_len()],
             heights: vec![0.0; N * N],
             phases: Vec::with_capacity(self.cycles_max as usize + 1),
         }
     }
 
     /// Makes `surface` that of `time_s` after the recording's start.
-    pub fn evaluate(&self, time_s: f64, surface: &mut Surface) {
+    pub fn evaluate(&self, time_s: f64, surface: &mut LoopedSurface) {
         let turn = (time_s / self.period_s).rem_euclid(1.0);
         surface.phases.clear();
         surface.phases.extend((0..=self.cycles_max).map(|n| {
@@ -137,7 +134,7 @@ impl Field {
             Complex::new(cos as f32, -sin as f32)
         }));
         for (c, squeeze) in SQUEEZE.into_iter().enumerate() {
-            self.transform(c, surface);
+            self.displacements(c, surface);
             let per_metre = surface.tiles[c].per_metre;
             displace(surface, per_metre);
             fill_tile(&mut surface.tiles[c], &surface.heights, &surface.along, &surface.across, squeeze);
@@ -145,7 +142,7 @@ impl Field {
     }
 
     /// Leaves in `along` height + i * displacement in x, in `across` displacement in y (tile axes, metres).
-    fn transform(&self, c: usize, surface: &mut Surface) {
+    fn displacements(&self, c: usize, surface: &mut LoopedSurface) {
         surface.along.fill(Complex::default());
         surface.across.fill(Complex::default());
         for mode in &self.cascades[c].modes {
@@ -160,16 +157,12 @@ impl Field {
             surface.across[here] = dy;
             surface.across[there] = dy.conj();
         }
-        for buffer in [&mut surface.along, &mut surface.across] {
-            self.fft.process_with_scratch(buffer, &mut surface.fft_scratch);
-            transpose(buffer, &mut surface.swap);
-            self.fft.process_with_scratch(&mut surface.swap, &mut surface.fft_scratch);
-            std::mem::swap(buffer, &mut surface.swap);
-        }
+        self.transform.run(&mut surface.along, &mut surface.swap);
+        self.transform.run(&mut surface.across, &mut surface.swap);
     }
 
     /// Slope covariance that each level of each tile resolves, and the variance of the height, measured at one instant.
-    pub fn statistics(surface: &Surface) -> ([[Covariance; LEVELS]; CASCADES], f64) {
+    pub fn statistics(surface: &LoopedSurface) -> ([[Covariance; LEVELS]; CASCADES], f64) {
         let mut height = 0.0;
         let slopes = std::array::from_fn(|c| {
             let tile = &surface.tiles[c];
@@ -192,7 +185,7 @@ fn mean(level: &[Texel], f: impl Fn(&Texel) -> f32) -> f64 {
 }
 
 /// The part of the spectrum that one tile carries.
-struct Band {
+struct TileBand {
     size_m: f64,
     rotation: f64,
     lower: f64,
@@ -200,13 +193,13 @@ struct Band {
 }
 
 fn draw_modes(
-    band: &Band,
+    band: &TileBand,
     sea: &WindSea,
     wind_from: f64,
     swell: Option<&Swell>,
     period_s: f64,
     seed: u64,
-) -> Vec<Mode> {
+) -> Vec<LoopedWave> {
     let lattice = TAU / band.size_m;
     let half = N as i32 / 2;
     let (sin, cos) = band.rotation.sin_cos();
@@ -250,10 +243,10 @@ fn draw_modes(
         }
         let cell = |i: i32, j: i32| (i.rem_euclid(N as i32) * N as i32 + j.rem_euclid(N as i32)) as u32;
         let length = f64::from(i).hypot(f64::from(j));
-        modes.push(Mode {
+        modes.push(LoopedWave {
             index: cell(i, j),
             opposite: cell(-i, -j),
-            cycles: (angular_frequency(k) * period_s / TAU).round().max(1.0) as u32,
+            cycles: (frequency(k) * period_s / TAU).round().max(1.0) as u32,
             amplitude: amplitude(forward),
             amplitude_opposite: amplitude(backward),
             direction: [(f64::from(i) / length) as f32, (f64::from(j) / length) as f32],
@@ -262,22 +255,9 @@ fn draw_modes(
     modes
 }
 
-fn transpose(from: &[Complex<f32>], to: &mut [Complex<f32>]) {
-    const BLOCK: usize = 16;
-    for by in (0..N).step_by(BLOCK) {
-        for bx in (0..N).step_by(BLOCK) {
-            for y in by..by + BLOCK {
-                for x in bx..bx + BLOCK {
-                    to[x * N + y] = from[y * N + x];
-                }
-            }
-        }
-    }
-}
-
 /// Heights where the water is after moving towards the crests (Tessendorf 2004, eq. 44, with the displacement taken at the
 /// place where the water ends up instead of where it comes from, so that the surface stays a function of place).
-fn displace(surface: &mut Surface, per_metre: f32) {
+fn displace(surface: &mut LoopedSurface, per_metre: f32) {
     let (along, across) = (&surface.along, &surface.across);
     for y in 0..N {
         for x in 0..N {
@@ -294,7 +274,13 @@ fn displace(surface: &mut Surface, per_metre: f32) {
     }
 }
 
-fn fill_tile(tile: &mut Tile, heights: &[f32], along: &[Complex<f32>], across: &[Complex<f32>], weight: f32) {
+fn fill_tile(
+    tile: &mut LoopedTile,
+    heights: &[f32],
+    along: &[Complex<f32>],
+    across: &[Complex<f32>],
+    weight: f32,
+) {
     let scale = tile.per_metre;
     let [cos, sin] = tile.axis;
     let level = &mut tile.levels[0];
@@ -335,25 +321,25 @@ fn fill_tile(tile: &mut Tile, heights: &[f32], along: &[Complex<f32>], across: &
     }
 }
 
-impl Tile {
+impl LoopedTile {
     /// Mean square of one number of a level's texels.
     pub fn mean_square(&self, level: usize, channel: usize) -> f32 {
         self.levels.get(level).map_or(0.0, |texels| mean(texels, |t| t[channel] * t[channel]) as f32)
     }
 
-    /// Level on which points are `spacing_m` apart, with its fraction; negative where even level 0 is coarser.
+    /// TileLevel on which points are `spacing_m` apart, with its fraction; negative where even level 0 is coarser.
     pub fn level_for(&self, spacing_m: f32) -> f32 {
         (spacing_m * self.per_metre).log2()
     }
 
     /// One level, 0 the finest.
     #[inline(always)]
-    pub fn level(&self, level: usize) -> Level<'_> {
+    pub fn level(&self, level: usize) -> TileLevel<'_> {
         let level = level.min(LEVELS - 1);
         let width = N >> level;
         let shrink = 1.0 / (1u32 << level) as f32;
         let scale = self.per_metre * shrink;
-        Level {
+        TileLevel {
             texels: &self.levels[level][..width * width],
             width,
             axis: self.axis.map(|a| a * scale),
@@ -365,14 +351,14 @@ impl Tile {
 
 /// One level of a tile, ready for many look-ups.
 #[derive(Clone, Copy)]
-pub(super) struct Level<'a> {
+pub struct TileLevel<'a> {
     texels: &'a [Texel],
     width: usize,
     axis: [f32; 2],
     centre: f32,
 }
 
-impl Level<'_> {
+impl TileLevel<'_> {
     /// Metres from point to point.
     pub fn spacing_m(&self) -> f32 {
         1.0 / self.axis[0].hypot(self.axis[1])
@@ -397,7 +383,7 @@ impl Level<'_> {
 /// may be (n - 1, 1) as well as (n, 0), which is the same to an interpolation. A conversion proper costs several times as
 /// much, and this is done a hundred million times a second.
 #[inline(always)]
-pub(super) fn split(x: f32) -> (usize, f32) {
+pub fn split(x: f32) -> (usize, f32) {
     // Where floats are one apart, adding rounds to a whole number and leaves it in the low bits.
     const MAGIC: f32 = 12_582_912.0;
     let whole = (x - 0.5) + MAGIC;
@@ -406,13 +392,11 @@ pub(super) fn split(x: f32) -> (usize, f32) {
 
 #[cfg(test)]
 mod tests {
-    use bowwave_core::sea::BeaufortForce;
+    use super::{super::spectrum::wind_of_beaufort, *};
 
-    use super::{super::spectrum::wind_speed, *};
-
-    fn field(force: u8, seed: u64) -> (Field, Surface, WindSea) {
-        let sea = WindSea::new(wind_speed(BeaufortForce::new(force).unwrap()));
-        let field = Field::new(&sea, 0.4, None, 20.0, seed);
+    fn field(force: u8, seed: u64) -> (LoopedSea, LoopedSurface, WindSea) {
+        let sea = WindSea::new(wind_of_beaufort(force));
+        let field = LoopedSea::new(&sea, 0.4, None, 20.0, seed);
         let surface = field.surface();
         (field, surface, sea)
     }
@@ -436,7 +420,7 @@ mod tests {
             let mut variance = 0.0;
             for i in 0..4 {
                 field.evaluate(f64::from(i) * 4.7, &mut surface);
-                variance += Field::statistics(&surface).1 / 4.0;
+                variance += LoopedSea::statistics(&surface).1 / 4.0;
             }
             let ratio = 4.0 * variance.sqrt() / sea.significant_height();
             assert!((ratio - 1.0).abs() < 0.1, "Beaufort {force}: {ratio} of the spectrum's height");
@@ -447,7 +431,7 @@ mod tests {
     fn tiles_carry_the_slopes_up_to_their_shortest_wave() {
         let (field, mut surface, sea) = field(3, 5);
         field.evaluate(1.0, &mut surface);
-        let (slopes, _) = Field::statistics(&surface);
+        let (slopes, _) = LoopedSea::statistics(&surface);
         let got: f32 = slopes.iter().map(|levels| levels[0][0] + levels[0][1]).sum();
         let shortest = TAU * N as f64 / (POINTS_PER_WAVE * SMALLEST_M);
         let ratio = f64::from(got) / sea.slope_variance(shortest);

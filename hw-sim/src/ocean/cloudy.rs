@@ -4,18 +4,19 @@
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Vec3, Vec4};
-use hw_skymodel::rgb::{Channel, SkyParams, SkyState};
 use rayon::prelude::*;
 
 use super::{
-    field::split,
-    noise::{fractal_noise, gradient_noise, mix, smoothstep},
+    looped::split,
+    noise::{fractal_noise, gradient_noise, smoothstep},
+    random::mix,
+    sky::ClearSky,
 };
 
 /// Linear colour; the fourth number is free for the user.
-pub(super) type Rgb = [f32; 3];
+pub type Rgb = [f32; 3];
 
-/// What the sky is like.
+/// Sun, air and clouds of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyRecipe {
     /// Sun's azimuth, radians clockwise from north.
@@ -32,8 +33,8 @@ pub struct SkyRecipe {
 const PALE: f32 = 0.07;
 
 /// The sky as a function of direction.
-pub(super) struct Sky {
-    state: SkyState,
+pub struct CloudySky {
+    clear: ClearSky,
     scale: f32,
     /// Unit vector towards the sun.
     pub sun: Vec3,
@@ -43,20 +44,16 @@ pub(super) struct Sky {
     seed: u32,
 }
 
-impl Sky {
+impl CloudySky {
     /// `None` where the recipe's numbers are outside what the model covers.
     pub fn new(recipe: &SkyRecipe, seed: u64) -> Option<Self> {
-        let params = SkyParams {
-            elevation: (recipe.sun_elevation as f32).clamp(0.01, FRAC_PI_2 - 0.01),
-            turbidity: recipe.turbidity as f32,
-            albedo: [0.06, 0.08, 0.1],
-        };
-        let state = SkyState::new(&params).ok()?;
+        let elevation = (recipe.sun_elevation as f32).clamp(0.01, FRAC_PI_2 - 0.01);
+        let clear = ClearSky::new(elevation, recipe.turbidity as f32, [0.06, 0.08, 0.1])?;
         let (sin_a, cos_a) = (recipe.sun_azimuth as f32).sin_cos();
-        let (sin_e, cos_e) = params.elevation.sin_cos();
+        let (sin_e, cos_e) = elevation.sin_cos();
         let sun = Vec3::new(sin_a * cos_e, cos_a * cos_e, sin_e);
         let mut sky = Self {
-            state,
+            clear,
             scale: 1.0,
             sun,
             sun_irradiance: [0.0; 3],
@@ -86,8 +83,7 @@ impl Sky {
         let z = direction.z.clamp(0.0, 1.0);
         let theta = z.max(PALE).acos();
         let gamma = direction.dot(self.sun).clamp(-1.0, 1.0).acos();
-        let model = [Channel::R, Channel::G, Channel::B]
-            .map(|c| self.scale * self.state.radiance(theta, gamma, c).max(0.0));
+        let model = self.clear.radiance(theta, gamma).map(|c| self.scale * c);
         let grey = 1.18 * luminance(model);
         let share = 0.75 * (1.0 - smoothstep(0.0, 2.2 * PALE, z));
         std::array::from_fn(|c| model[c] + share * (grey * [0.97, 1.05, 1.16][c] - model[c]))
@@ -113,7 +109,7 @@ impl Sky {
         })
     }
 
-    /// What haze adds along a long level line of sight.
+    /// Light that haze adds along a long level line of sight.
     pub fn haze(&self, direction: Vec3) -> Rgb {
         let level = Vec3::new(direction.x, direction.y, 0.02).normalize_or(Vec3::Y);
         self.clear(level)
@@ -140,20 +136,21 @@ impl Sky {
 }
 
 /// Relative luminance of a linear sRGB colour (IEC 61966-2-1).
-pub(super) fn luminance(c: Rgb) -> f32 {
+pub fn luminance(c: Rgb) -> f32 {
     0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2]
 }
 
 /// The upper hemisphere in small, for what the sea mirrors.
-pub(super) struct Dome {
+pub struct CloudyDome {
     texels: Vec<Vec4>,
 }
 
 const DOME_AROUND: usize = 180;
 const DOME_UP: usize = 64;
 
-impl Dome {
-    pub fn new(sky: &Sky) -> Self {
+impl CloudyDome {
+    /// Of that sky.
+    pub fn new(sky: &CloudySky) -> Self {
         // Clouds in cells of 2 by 1.4 degrees: 3 x 3 directions in each.
         let cell = |i: usize| {
             let (up, around) = (i / DOME_AROUND, i % DOME_AROUND);
@@ -185,7 +182,7 @@ impl Dome {
 }
 
 /// The part of the sky that the camera sees, at its resolution: a cylinder of azimuth against the tangent of elevation.
-pub(super) struct Panorama {
+pub struct Panorama {
     texels: Vec<Vec4>,
     columns: usize,
     rows: usize,
@@ -198,7 +195,7 @@ pub(super) struct Panorama {
 impl Panorama {
     /// `azimuth` may run over more than a turn's worth of numbers but not more than a turn; `tangent_max` is the highest
     /// tangent of elevation in view; `focal_px` the camera's focal length.
-    pub fn new(sky: &Sky, azimuth: [f32; 2], tangent_max: f32, focal_px: f32) -> Self {
+    pub fn new(sky: &CloudySky, azimuth: [f32; 2], tangent_max: f32, focal_px: f32) -> Self {
         let [start, end] = azimuth;
         let columns = (((end - start).min(TAU) * focal_px) as usize + 2).clamp(2, 8192);
         let tangent_start = -0.01;
@@ -247,7 +244,7 @@ impl Panorama {
 
 /// Angle whose tangent is `t`, radians, to 2e-6 (odd minimax polynomial after folding at 1).
 #[inline(always)]
-pub(super) fn arctangent(t: f32) -> f32 {
+pub fn arctangent(t: f32) -> f32 {
     let a = t.abs();
     let x = if a > 1.0 { 1.0 / a } else { a };
     let s = x * x;
@@ -263,9 +260,9 @@ pub(super) fn arctangent(t: f32) -> f32 {
 mod tests {
     use super::*;
 
-    fn sky() -> Sky {
+    fn sky() -> CloudySky {
         let recipe = SkyRecipe { sun_azimuth: 1.2, sun_elevation: 0.6, turbidity: 3.0, cloud_cover: 0.4 };
-        Sky::new(&recipe, 1).unwrap()
+        CloudySky::new(&recipe, 1).unwrap()
     }
 
     #[test]
@@ -287,9 +284,9 @@ mod tests {
         let direction = Vec3::new(0.2f32.sin(), 0.2f32.cos(), 0.15);
         let (got, expected) = (panorama.at(0.2, 0.15), sky.radiance(direction.normalize()));
         assert!((got[1] - expected[1]).abs() < 0.02, "{got:?} {expected:?}");
-        let cloudless = Sky { threshold: 9.0, ..sky };
+        let cloudless = CloudySky { threshold: 9.0, ..sky };
         let up = Vec3::new(-0.3, 0.5, 0.6).normalize();
-        let (got, expected) = (Dome::new(&cloudless).at(up), cloudless.clear(up));
+        let (got, expected) = (CloudyDome::new(&cloudless).at(up), cloudless.clear(up));
         assert!((got[2] / expected[2] - 1.0).abs() < 0.02, "{got:?} {expected:?}");
     }
 

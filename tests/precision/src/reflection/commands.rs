@@ -1,46 +1,43 @@
-//! Reflections against the truth: every line of the table of targets by a sub-command.
+//! The commands that hold drawn reflections against the truth: every line of the table of targets by one of them.
 
-use std::{
-    path::{Path, PathBuf},
-    process::ExitCode,
-};
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::water::ReflectionMethod;
-use clap::{Args, Parser, Subcommand};
-use precision::reflection::{cell, cost, draw::Studio, gap, grid, singular, time, wrong};
+use clap::{Args, Subcommand};
 
-/// Holds drawn reflections against ray-traced ones.
-#[derive(Debug, Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    what: What,
-}
+use super::{cell, cost, draw::DrawingStudio, gap, grid, singular, time, wrong};
+use crate::truth::files;
 
+/// Commands that hold drawn reflections against ray-traced ones.
 #[derive(Debug, Subcommand)]
-enum What {
+pub enum ReflectionStudy {
     /// FLIP and bias of every method on every cell
     Grid {
+        /// Cells and method
         #[command(flatten)]
-        cells: Cells,
+        cells: CellChoice,
         /// Folder to put what the methods draw into
         #[arg(long, value_name = "DIR")]
         pictures: Option<PathBuf>,
     },
     /// FLIP that the truth's own noise makes: renders every cell again with other paths
     Noise {
+        /// Cells and method
         #[command(flatten)]
-        cells: Cells,
+        cells: CellChoice,
     },
     /// FLIP of one method under wrongly estimated conditions
     Wrong {
+        /// Cells and method
         #[command(flatten)]
-        cells: Cells,
+        cells: CellChoice,
     },
     /// Frame-to-frame change against the truth's, of cells that differ in time alone
     Time {
+        /// Cells and method
         #[command(flatten)]
-        cells: Cells,
+        cells: CellChoice,
         /// Renders every frame again for what a method shows that is right but for the truth's noise
         #[arg(long)]
         noise: bool,
@@ -61,8 +58,9 @@ enum What {
     },
 }
 
+/// Cells that are judged, and the method.
 #[derive(Debug, Args)]
-struct Cells {
+pub struct CellChoice {
     /// Folder of the cells
     #[arg(default_value = "target/truth")]
     folder: PathBuf,
@@ -80,7 +78,7 @@ struct Cells {
     out: PathBuf,
 }
 
-impl Cells {
+impl CellChoice {
     fn method(&self) -> Result<ReflectionMethod> {
         ReflectionMethod::of_name(&self.ours).with_context(|| {
             let names = ReflectionMethod::ALL.map(|m| m.name()).join(", ");
@@ -92,11 +90,14 @@ impl Cells {
         Ok(cell::folders(&self.folder, &self.only)?.into_iter().step_by(self.every.max(1)).collect())
     }
 
-    /// What `measure` makes of every cell at time 0, those of one size after another.
-    fn each<T>(&self, mut measure: impl FnMut(&mut Studio, &cell::Cell) -> Result<T>) -> Result<Vec<T>> {
+    /// Result of `measure` for every cell at time 0, those of one size after another.
+    fn each<T>(
+        &self,
+        mut measure: impl FnMut(&mut DrawingStudio, &cell::TruthCell) -> Result<T>,
+    ) -> Result<Vec<T>> {
         let mut sized = Vec::new();
         for folder in self.folders()? {
-            let described = precision::truth::files::read(&folder)?;
+            let described = files::read(&folder)?;
             if described.spec.time_s == 0.0 {
                 sized.push(((described.region.width, described.region.height), folder));
             }
@@ -105,10 +106,10 @@ impl Cells {
             bail!("{} holds no cell of time 0", self.folder.display());
         }
         sized.sort();
-        let (mut studio, count) = (Studio::default(), sized.len());
+        let (mut studio, count) = (DrawingStudio::default(), sized.len());
         let mut rows = Vec::with_capacity(count);
         for (i, (_, folder)) in sized.iter().enumerate() {
-            rows.push(measure(&mut studio, &cell::Cell::load(folder)?)?);
+            rows.push(measure(&mut studio, &cell::TruthCell::load(folder)?)?);
             if (i + 1) % 20 == 0 {
                 eprintln!("reflection: {} of {count} cells", i + 1);
             }
@@ -131,56 +132,49 @@ fn make(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    match &arguments.what {
-        What::Grid { cells, pictures } => {
-            let ours = cells.method()?;
-            pictures.as_deref().map_or(Ok(()), make)?;
-            let mut rows = cells.each(|studio, cell| grid::measure(studio, cell, pictures.as_deref()))?;
-            rows.sort_by(|a, b| a.name.cmp(&b.name));
-            cells.put("grid", &grid::csv(&rows)?, &grid::summary(&rows, ours)?)
-        }
-        What::Noise { cells } => {
-            let rows =
-                cells.each(|_, cell| Ok((cell.spec.range_m as u32, cell.spec.state, cell.noise()?)))?;
-            print!("{}", grid::noise_summary(&rows)?);
-            Ok(())
-        }
-        What::Wrong { cells } => {
-            let ours = cells.method()?;
-            let mut rows = cells.each(|studio, cell| wrong::measure(studio, cell, ours))?;
-            rows.sort_by(|a, b| a.name.cmp(&b.name));
-            cells.put("wrong", &wrong::csv(&rows)?, &wrong::summary(&rows, ours)?)
-        }
-        What::Time { cells, noise } => {
-            let mut studio = Studio::default();
-            let pairs = time::pairs(&cells.folders()?)?;
-            let measured = pairs.iter().map(|pair| time::measure(&mut studio, pair, *noise));
-            let rows = measured.collect::<Result<Vec<_>>>()?;
-            print!("{}", time::summary(&rows)?);
-            Ok(())
-        }
-        What::Gap => {
-            print!("{}", gap::table()?);
-            Ok(())
-        }
-        What::Singular { paths } => {
-            print!("{}", singular::table(*paths)?);
-            Ok(())
-        }
-        What::Cost { turns } => {
-            print!("{}", cost::table(*turns)?);
-            Ok(())
-        }
-    }
-}
-
-fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("reflection: {e:#}");
-            ExitCode::FAILURE
+impl ReflectionStudy {
+    /// Prints the tables that are asked for.
+    pub fn run(&self) -> Result<()> {
+        match self {
+            Self::Grid { cells, pictures } => {
+                let ours = cells.method()?;
+                pictures.as_deref().map_or(Ok(()), make)?;
+                let mut rows = cells.each(|studio, cell| grid::measure(studio, cell, pictures.as_deref()))?;
+                rows.sort_by(|a, b| a.name.cmp(&b.name));
+                cells.put("grid", &grid::csv(&rows)?, &grid::summary(&rows, ours)?)
+            }
+            Self::Noise { cells } => {
+                let rows =
+                    cells.each(|_, cell| Ok((cell.spec.range_m as u32, cell.spec.state, cell.noise()?)))?;
+                print!("{}", grid::noise_summary(&rows));
+                Ok(())
+            }
+            Self::Wrong { cells } => {
+                let ours = cells.method()?;
+                let mut rows = cells.each(|studio, cell| wrong::measure(studio, cell, ours))?;
+                rows.sort_by(|a, b| a.name.cmp(&b.name));
+                cells.put("wrong", &wrong::csv(&rows)?, &wrong::summary(&rows, ours))
+            }
+            Self::Time { cells, noise } => {
+                let mut studio = DrawingStudio::default();
+                let pairs = time::pairs(&cells.folders()?)?;
+                let measured = pairs.iter().map(|pair| time::measure(&mut studio, pair, *noise));
+                let rows = measured.collect::<Result<Vec<_>>>()?;
+                print!("{}", time::summary(&rows));
+                Ok(())
+            }
+            Self::Gap => {
+                print!("{}", gap::table()?);
+                Ok(())
+            }
+            Self::Singular { paths } => {
+                print!("{}", singular::table(*paths)?);
+                Ok(())
+            }
+            Self::Cost { turns } => {
+                print!("{}", cost::table(*turns)?);
+                Ok(())
+            }
         }
     }
 }

@@ -5,11 +5,12 @@ use std::f64::consts::{PI, TAU};
 use glam::{DVec2, DVec3};
 
 use super::{
-    field::{Hit, Waves},
-    mesh::{Mesh, MeshHit},
-    micro::{Micro, WATER, fresnel},
-    rng::Path,
-    sky::Sky,
+    fresnel::{SEA_WATER_INDEX, fresnel},
+    mesh::{BoatMesh, MeshHit},
+    micro::Micro,
+    random::LightPath,
+    sky::Daylight,
+    waves::{WaterHit, Waves},
 };
 
 /// Bounces of a path over the resolved water.
@@ -19,16 +20,16 @@ const STRIKES: usize = 6;
 /// Contributions below this share of white are not followed further.
 const FAINT: f64 = 2e-3;
 
-/// What sends light back out of the water.
+/// The water below the surface, which sends light back out.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Body {
+pub struct WaterBody {
     /// Diffuse reflectance of the water below the surface (linear sRGB), as seen from above without the surface's own reflection.
     pub reflectance: [f64; 3],
     /// Light scatters back from this depth on average, metres.
     pub depth_m: f64,
 }
 
-impl Default for Body {
+impl Default for WaterBody {
     /// Clear coastal water: green-blue, 1 to 3 % (Mobley 1994, section 3.8).
     fn default() -> Self {
         Self { reflectance: [0.006, 0.022, 0.030], depth_m: 3.0 }
@@ -48,22 +49,22 @@ pub struct BoatLight {
 }
 
 /// Everything that light meets.
-pub struct Scene {
+pub struct TracedScene {
     /// Sky and sun.
-    pub sky: Sky,
+    pub sky: Daylight,
     /// Water surface.
     pub waves: Waves,
     /// Water below it.
-    pub body: Body,
+    pub body: WaterBody,
     /// The boat, where there is one.
-    pub boat: Option<Mesh>,
+    pub boat: Option<BoatMesh>,
     /// Light on it.
     pub light: BoatLight,
 }
 
 /// Radiance along one path.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
+pub struct TracedSample {
     /// Without the boat.
     pub without: DVec3,
     /// With it.
@@ -72,14 +73,14 @@ pub struct Sample {
     pub hull: bool,
 }
 
-struct State {
-    sample: Sample,
+struct TraceState {
+    sample: TracedSample,
     through: DVec3,
     /// Whether the boat has not yet ended the path of the picture with it.
     open: bool,
 }
 
-impl State {
+impl TraceState {
     fn add(&mut self, radiance: DVec3, boat_visibility: f64) {
         self.sample.without += self.through * radiance;
         if self.open {
@@ -88,17 +89,18 @@ impl State {
     }
 }
 
-impl Scene {
+impl TracedScene {
     /// Light on boats of this scene: sun and sky on matt white; the sea as a flat one reflects the mean sky (6.6 % diffuse) and its body.
-    pub fn boat_light(sky: &Sky, body: &Body) -> BoatLight {
+    pub fn boat_light(sky: &Daylight, body: &WaterBody) -> BoatLight {
         let down = sky.sky_irradiance + sky.sun_horizontal();
         let sea = sky.sky_irradiance / PI * 0.066 + down / PI * DVec3::from_array(body.reflectance);
         BoatLight { sun: sky.sun / PI, sky: sky.sky_irradiance / PI, sea }
     }
 
     /// Follows light back from the eye.
-    pub fn trace(&self, mut origin: DVec3, mut direction: DVec3, path: &mut Path) -> Sample {
-        let mut state = State { sample: Sample::default(), through: DVec3::ONE, open: self.boat.is_some() };
+    pub fn trace(&self, mut origin: DVec3, mut direction: DVec3, path: &mut LightPath) -> TracedSample {
+        let mut state =
+            TraceState { sample: TracedSample::default(), through: DVec3::ONE, open: self.boat.is_some() };
         let mut disc_counts = true;
         for bounce in 0..BOUNCES {
             let from = if bounce == 0 { 0.0 } else { 1e-4 };
@@ -142,7 +144,7 @@ impl Scene {
         state.sample
     }
 
-    fn boat_before(&self, origin: DVec3, direction: DVec3, water: Option<&Hit>) -> Option<MeshHit> {
+    fn boat_before(&self, origin: DVec3, direction: DVec3, water: Option<&WaterHit>) -> Option<MeshHit> {
         let boat = self.boat.as_ref()?;
         let limit = match water {
             Some(hit) if !boat.holds_water(hit.point) => hit.t,
@@ -160,11 +162,11 @@ impl Scene {
     /// Adds what the water at `hit` itself sends to the eye, and says where the mirrored light comes from.
     fn scatter(
         &self,
-        state: &mut State,
+        state: &mut TraceState,
         micro: &Micro,
-        hit: &Hit,
+        hit: &WaterHit,
         to_eye: DVec3,
-        path: &mut Path,
+        path: &mut LightPath,
     ) -> Option<DVec3> {
         let mut to_eye = to_eye;
         let mut height = 1.0;
@@ -179,7 +181,7 @@ impl Scene {
             self.add_sun(state, micro, hit, to_eye, height, &mut sunlit);
             let normal = micro.visible_normal(to_eye, path);
             let cos = to_eye.dot(normal).clamp(0.0, 1.0);
-            let mirrored = fresnel(cos, WATER);
+            let mirrored = fresnel(cos, SEA_WATER_INDEX);
             self.add_body(state, hit, to_eye, normal, 1.0 - mirrored, path);
             state.through *= mirrored;
             to_eye -= 2.0 * cos * normal;
@@ -189,9 +191,9 @@ impl Scene {
 
     fn add_sun(
         &self,
-        state: &mut State,
+        state: &mut TraceState,
         micro: &Micro,
-        hit: &Hit,
+        hit: &WaterHit,
         to_eye: DVec3,
         height: f64,
         sunlit: &mut Option<(f64, f64)>,
@@ -215,12 +217,12 @@ impl Scene {
     /// Light that went into the water, scattered once at a depth and came back: the boat takes sun and sky away from where it entered.
     fn add_body(
         &self,
-        state: &mut State,
-        hit: &Hit,
+        state: &mut TraceState,
+        hit: &WaterHit,
         to_eye: DVec3,
         normal: DVec3,
         passed: f64,
-        path: &mut Path,
+        path: &mut LightPath,
     ) {
         let shares = DVec3::from_array(self.body.reflectance) / PI * passed;
         let (sun, sky) = (self.sky.sun_horizontal() * shares, self.sky.sky_irradiance * shares);
@@ -231,7 +233,7 @@ impl Scene {
         let (mut sun_seen, mut sky_seen) = (1.0, 1.0);
         if let Some(boat) = &self.boat {
             let draw = [path.unit(), path.unit(), path.unit()];
-            let near = (hit.point - boat.pose().position).length() < 60.0 && hit.t < self.waves.far_m;
+            let near = (hit.point - boat.frame().position).length() < 60.0 && hit.t < self.waves.far_m;
             if near {
                 let depth = -self.body.depth_m * draw[0].ln();
                 let up = refracted(to_eye, normal);
@@ -256,6 +258,6 @@ impl Scene {
 /// Direction inside the water of light that comes from or goes to `outside` over the surface's `normal`.
 fn refracted(outside: DVec3, normal: DVec3) -> DVec3 {
     let cos = outside.dot(normal).clamp(0.0, 1.0);
-    let tangent = (outside - normal * cos) / WATER;
+    let tangent = (outside - normal * cos) / SEA_WATER_INDEX;
     (tangent + normal * (1.0 - tangent.length_squared()).max(0.0).sqrt()).normalize()
 }

@@ -8,10 +8,11 @@ use std::f64::consts::{FRAC_PI_8, PI, TAU};
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use rustfft::{FftPlanner, num_complex::Complex64};
+use rustfft::num_complex::Complex64;
 
 use super::{
-    rng,
+    lattice::Transform,
+    random::gauss_pair,
     spectrum::{Spectrum, cox_munk, frequency},
 };
 
@@ -46,7 +47,8 @@ impl Default for Resolution {
     }
 }
 
-struct Tile {
+/// One tile at one time.
+pub(super) struct WaveTile {
     cells: usize,
     cells_per_m: f64,
     turn: DVec2,
@@ -69,17 +71,17 @@ pub struct Unresolved {
 
 /// The sea surface at one time.
 pub struct Waves {
-    tiles: Vec<Tile>,
+    tiles: Vec<WaveTile>,
     /// No wave is higher, metres.
     pub highest_m: f64,
     /// Beyond this distance along a ray the sea is the plane z = 0 with [`Self::all_slopes`].
     pub far_m: f64,
-    still: Still,
+    still: SeaConstants,
 }
 
 /// Where a ray meets the water.
 #[derive(Clone, Copy, Debug)]
-pub struct Hit {
+pub struct WaterHit {
     /// Distance along the ray, metres.
     pub t: f64,
     /// The place.
@@ -91,14 +93,14 @@ pub struct Hit {
 }
 
 /// The resolved waves of a sea at all times.
-pub struct Sea {
+pub struct TracedSea {
     tiles: Vec<TileModes>,
-    still: Still,
+    still: SeaConstants,
 }
 
-/// What of a sea does not change with time.
+/// Properties of a sea that do not change with time.
 #[derive(Clone, Copy)]
-struct Still {
+struct SeaConstants {
     unresolved: Unresolved,
     all_slopes: Unresolved,
     resolved: DVec2,
@@ -106,7 +108,7 @@ struct Still {
     step_refine: f64,
 }
 
-impl Sea {
+impl TracedSea {
     /// The sea of `spectrum`. The same seed gives the same waves at every resolution.
     pub fn new(spectrum: &Spectrum, resolution: &Resolution, seed: u64) -> Self {
         let mut tiles = Vec::new();
@@ -124,7 +126,8 @@ impl Sea {
                 let shortest = (size_m / cells as f64 * CELLS_A_WAVE).max(resolution.shortest_m);
                 let band = (TAU / longest, TAU / shortest);
                 let cells = cells * resolution.oversample;
-                let tile = Maker { spectrum, size_m, cells, index: tiles.len(), band, seed }.make();
+                let tile = TilePlan { size_m, cells, turn: DVec2::from_angle(TURNS[tiles.len()]), band }
+                    .of_spectrum(spectrum, seed, tiles.len() as i64);
                 resolved += tile.delivered;
                 finest = (size_m / cells as f64).min(finest);
                 tiles.push(tile);
@@ -140,7 +143,7 @@ impl Sea {
         // The observed total governs; its axes only as far as the resolved waves leave room in both.
         let rest = (up + across - resolved.x - resolved.y).max(0.0);
         let share = if rest > 0.0 { ((up - resolved.x) / rest).clamp(0.35, 0.65) } else { 0.5 };
-        let still = Still {
+        let still = SeaConstants {
             unresolved: Unresolved { along, sigma: sigma(rest * share, rest * (1.0 - share)) },
             all_slopes: Unresolved { along, sigma: sigma(up, across) },
             resolved,
@@ -152,7 +155,7 @@ impl Sea {
 
     /// The surface at `time_s`.
     pub fn at(&self, time_s: f64) -> Waves {
-        let mut tiles: Vec<Tile> = self.tiles.iter().map(|t| t.at(time_s)).collect();
+        let mut tiles: Vec<WaveTile> = self.tiles.iter().map(|t| t.at(time_s)).collect();
         finish_bounds(&mut tiles);
         Waves { highest_m: tiles.first().map_or(0.0, |t| t.rest_m), tiles, far_m: FAR_M, still: self.still }
     }
@@ -172,7 +175,7 @@ impl Waves {
     }
 
     fn flat_sea(slopes: Unresolved) -> Self {
-        let still = Still {
+        let still = SeaConstants {
             unresolved: slopes,
             all_slopes: slopes,
             resolved: DVec2::ZERO,
@@ -208,7 +211,7 @@ impl Waves {
     }
 
     /// First place from `from` on where the ray (unit `direction`) goes below the water.
-    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<Hit> {
+    pub fn meet(&self, origin: DVec3, direction: DVec3, from: f64) -> Option<WaterHit> {
         let plane_t = |z: f64| (z - origin.z) / direction.z;
         if self.tiles.is_empty() {
             let t = plane_t(0.0);
@@ -264,7 +267,7 @@ impl Waves {
         (gap, 0.0)
     }
 
-    fn refine(&self, origin: DVec3, direction: DVec3, above: (f64, f64), below: (f64, f64)) -> Hit {
+    fn refine(&self, origin: DVec3, direction: DVec3, above: (f64, f64), below: (f64, f64)) -> WaterHit {
         let ((mut t0, mut g0), (mut t1, mut g1)) = (above, below);
         for i in 0..12 {
             // Regula falsi, with a bisection now and then so that it cannot hang at one end.
@@ -282,15 +285,15 @@ impl Waves {
         }
         let t = if g0 < -g1 { t0 } else { t1 };
         let point = origin + direction * t;
-        Hit { t, point, slope: self.slope(point.truncate()), unresolved: self.still.unresolved }
+        WaterHit { t, point, slope: self.slope(point.truncate()), unresolved: self.still.unresolved }
     }
 
-    fn flat(&self, origin: DVec3, direction: DVec3, t: f64) -> Hit {
-        Hit { t, point: origin + direction * t, slope: DVec2::ZERO, unresolved: self.still.all_slopes }
+    fn flat(&self, origin: DVec3, direction: DVec3, t: f64) -> WaterHit {
+        WaterHit { t, point: origin + direction * t, slope: DVec2::ZERO, unresolved: self.still.all_slopes }
     }
 }
 
-fn finish_bounds(tiles: &mut [Tile]) {
+fn finish_bounds(tiles: &mut [WaveTile]) {
     let mut rest = 0.0;
     for tile in tiles.iter_mut().rev() {
         rest += tile.rest_m;
@@ -303,7 +306,7 @@ fn finish_bounds(tiles: &mut [Tile]) {
     }
 }
 
-impl Tile {
+impl WaveTile {
     /// Cell and shares between it and the next ones.
     fn locate(&self, place: DVec2) -> ([usize; 4], DVec2) {
         let p = self.turn.rotate(place) * self.cells_per_m;
@@ -315,7 +318,7 @@ impl Tile {
         ([y0 + x0, y0 + x1, y1 + x0, y1 + x1], p - floor)
     }
 
-    fn height(&self, place: DVec2) -> f64 {
+    pub(super) fn height(&self, place: DVec2) -> f64 {
         let ([a, b, c, d], f) = self.locate(place);
         let h = |i: usize| f64::from(self.heights[i]);
         let low = h(a) + (h(b) - h(a)) * f.x;
@@ -323,7 +326,7 @@ impl Tile {
         low + (high - low) * f.y
     }
 
-    fn slope(&self, place: DVec2) -> DVec2 {
+    pub(super) fn slope(&self, place: DVec2) -> DVec2 {
         let ([a, b, c, d], f) = self.locate(place);
         let s = |i: usize| DVec2::new(f64::from(self.slopes[i][0]), f64::from(self.slopes[i][1]));
         let low = s(a) + (s(b) - s(a)) * f.x;
@@ -333,7 +336,7 @@ impl Tile {
 }
 
 /// One wave of a tile and the one that runs against it.
-struct Mode {
+struct TracedWave {
     cell: (u32, u32),
     k: DVec2,
     omega: f64,
@@ -342,17 +345,25 @@ struct Mode {
 }
 
 /// The waves of one tile.
-struct TileModes {
+pub(super) struct TileModes {
     cells: usize,
     size_m: f64,
     turn: DVec2,
-    modes: Vec<Mode>,
+    modes: Vec<TracedWave>,
+    transform: Transform<f64>,
     /// Mean square slopes that survive interpolation (along, across the wind).
     delivered: DVec2,
 }
 
 impl TileModes {
-    fn at(&self, time_s: f64) -> Tile {
+    /// Variances of the slope (both axes together) and of the height, where `variance` is what a wave carries of the latter.
+    pub(super) fn expected(&self, variance: impl Fn(DVec2) -> f64 + Sync) -> (f64, f64) {
+        let of = |m: &TracedWave| (m.k.length_squared(), variance(m.k));
+        self.modes.iter().map(of).fold((0.0, 0.0), |(slope, height), (k2, v)| (slope + v * k2, height + v))
+    }
+
+    /// The tile at `time_s`.
+    pub(super) fn at(&self, time_s: f64) -> WaveTile {
         let n = self.cells;
         let mut height = vec![Complex64::ZERO; n * n];
         let mut slope = vec![Complex64::ZERO; n * n];
@@ -364,84 +375,103 @@ impl TileModes {
             // Two real transforms in one: east in the real part, north in the imaginary one.
             slope[i] = Complex64::i() * m.k.x * h - m.k.y * h;
         }
-        let (heights, slopes) = (transform(height, n), transform(slope, n));
-        let heights: Vec<f32> = heights.iter().map(|c| c.re as f32).collect();
-        Tile {
+        let mut swap = vec![Complex64::ZERO; n * n];
+        self.transform.run_in_place(&mut height, &mut swap);
+        self.transform.run_in_place(&mut slope, &mut swap);
+        let heights: Vec<f32> = height.iter().map(|c| c.re as f32).collect();
+        WaveTile {
             cells: n,
             cells_per_m: n as f64 / self.size_m,
             turn: self.turn,
             rest_m: heights.iter().fold(0f32, |m, h| m.max(h.abs())).into(),
             heights,
-            slopes: slopes.iter().map(|c| [c.re as f32, c.im as f32]).collect(),
+            slopes: slope.iter().map(|c| [c.re as f32, c.im as f32]).collect(),
             // One standard deviation for now; summed by finish_bounds.
             steepest: self.delivered.max_element().sqrt(),
         }
     }
 }
 
-struct Maker<'a> {
-    spectrum: &'a Spectrum,
-    size_m: f64,
-    cells: usize,
-    index: usize,
-    band: (f64, f64),
-    seed: u64,
+/// Size, direction and band of a tile.
+pub(super) struct TilePlan {
+    /// Side, metres.
+    pub(super) size_m: f64,
+    /// Cells along the side.
+    pub(super) cells: usize,
+    /// The rotation from the world's axes to the tile's.
+    pub(super) turn: DVec2,
+    /// Wave numbers that it carries, rad/m: the first is in it, the last is not.
+    pub(super) band: (f64, f64),
 }
 
-impl Maker<'_> {
-    fn make(&self) -> TileModes {
-        let turn = DVec2::from_angle(TURNS[self.index]);
+impl TilePlan {
+    /// The waves within the band. `amplitude` gives that of the wave in a cell of the plane of wave numbers that runs along a vector
+    /// (rad/m, east and north): half of the height of its crests.
+    pub(super) fn waves(
+        self,
+        omega: impl Fn(f64) -> f64 + Sync,
+        amplitude: impl Fn(i64, i64, DVec2) -> Complex64 + Sync,
+    ) -> TileModes {
         let unit = TAU / self.size_m;
+        let within = |ix: i64, iy: i64, k: DVec2| {
+            let length = k.length();
+            let outside = length < self.band.0 || length >= self.band.1 || length == 0.0;
+            if outside { Complex64::ZERO } else { amplitude(ix, iy, k) }
+        };
         // Wave numbers that a tile of half as many cells would fold are left out by the band already.
         let reach = ((self.band.1 / unit).ceil() as i64 + 1).min(self.cells as i64 / 2 - 1);
-        let modes =
+        let plane =
             (-reach..=reach).into_par_iter().flat_map_iter(|iy| (-reach..=reach).map(move |ix| (ix, iy)));
-        let modes = modes.filter_map(|(ix, iy)| {
-            let k = turn.conjugate_rotate(DVec2::new(ix as f64, iy as f64) * unit);
-            let (with, against) = (self.amplitude(ix, iy, k), self.amplitude(-ix, -iy, -k));
+        let modes = plane.filter_map(|(ix, iy)| {
+            let k = self.turn.conjugate_rotate(DVec2::new(ix as f64, iy as f64) * unit);
+            let (with, against) = (within(ix, iy, k), within(-ix, -iy, -k));
             let wrap = |i: i64| i.rem_euclid(self.cells as i64) as u32;
-            let cell = (wrap(ix), wrap(iy));
-            (with != Complex64::ZERO || against != Complex64::ZERO).then(|| Mode {
-                cell,
+            (with != Complex64::ZERO || against != Complex64::ZERO).then(|| TracedWave {
+                cell: (wrap(ix), wrap(iy)),
                 k,
-                omega: frequency(k.length()),
+                omega: omega(k.length()),
                 with,
                 against,
             })
         });
         let modes = modes.collect();
-        TileModes { cells: self.cells, size_m: self.size_m, turn, modes, delivered: self.delivered() }
+        TileModes {
+            cells: self.cells,
+            size_m: self.size_m,
+            turn: self.turn,
+            modes,
+            transform: Transform::new(self.cells),
+            delivered: DVec2::ZERO,
+        }
     }
 
-    /// Amplitude of the wave that runs along `k`: both sine and cosine part normally distributed.
-    fn amplitude(&self, ix: i64, iy: i64, k: DVec2) -> Complex64 {
-        let length = k.length();
-        if length < self.band.0 || length >= self.band.1 || length == 0.0 {
-            return Complex64::ZERO;
-        }
+    /// The waves of a spectrum: both sine and cosine part of each normally distributed. WaveTile `number` of a seed.
+    fn of_spectrum(self, spectrum: &Spectrum, seed: u64, number: i64) -> TileModes {
         let unit = TAU / self.size_m;
-        let power =
-            self.spectrum.directional(length, k.angle_to(self.spectrum.downwind())) * unit * unit / 2.0;
-        let gauss = rng::gauss_pair(self.seed, &[self.index as i64, ix, iy]);
-        Complex64::new(gauss[0], gauss[1]) * (power / 2.0).sqrt()
+        let delivered = self.delivered(spectrum);
+        let modes = self.waves(frequency, |ix, iy, k| {
+            let power = spectrum.directional(k.length(), k.angle_to(spectrum.downwind())) * unit * unit / 2.0;
+            let gauss = gauss_pair(seed, &[number, ix, iy]);
+            Complex64::new(gauss[0], gauss[1]) * (power / 2.0).sqrt()
+        });
+        TileModes { delivered, ..modes }
     }
 
     /// Expected mean square slopes along and across the wind, less what linear interpolation takes: a wave that advances by `a`
     /// radians a cell keeps (2 + cos a) / 3 of its power on average.
-    fn delivered(&self) -> DVec2 {
-        let along = self.spectrum.downwind();
-        let (from, to) = (self.band.0.max(self.spectrum.peak() / 30.0), self.band.1);
+    fn delivered(&self, spectrum: &Spectrum) -> DVec2 {
+        let along = spectrum.downwind();
+        let (from, to) = (self.band.0.max(spectrum.peak() / 30.0), self.band.1);
         let (steps, angles) = (200, 90);
         let d_log = (to / from).ln() / f64::from(steps);
         let cell = self.size_m / self.cells as f64;
-        let turn = DVec2::from_angle(TURNS[self.index]);
         let mut sum = DVec2::ZERO;
         for i in 0..steps {
             let k = from * ((f64::from(i) + 0.5) * d_log).exp();
             for j in 0..angles {
                 let angle = PI * ((f64::from(j) + 0.5) / f64::from(angles) - 0.5);
-                let power = self.spectrum.directional(k, angle) * k * k * d_log * PI / f64::from(angles);
-                let phase = turn.rotate(DVec2::from_angle(angle).rotate(along) * k) * cell;
+                let power = spectrum.directional(k, angle) * k * k * d_log * PI / f64::from(angles);
+                let phase = self.turn.rotate(DVec2::from_angle(angle).rotate(along) * k) * cell;
                 let kept = (2.0 + phase.x.cos()) * (2.0 + phase.y.cos()) / 9.0;
                 let slope = DVec2::new(angle.cos(), angle.sin()) * k;
                 sum += slope * slope * power * kept;
@@ -449,16 +479,6 @@ impl Maker<'_> {
         }
         sum
     }
-}
-
-/// Inverse transform over rows and columns, without scaling.
-fn transform(mut data: Vec<Complex64>, n: usize) -> Vec<Complex64> {
-    let fft = FftPlanner::new().plan_fft_inverse(n);
-    for _ in 0..2 {
-        data.par_chunks_mut(n).for_each(|row| fft.process(row));
-        data = (0..n * n).into_par_iter().map(|i| data[(i % n) * n + i / n]).collect();
-    }
-    data
 }
 
 /// Rotation back by the unit complex number `self`.

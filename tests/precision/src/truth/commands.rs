@@ -1,28 +1,22 @@
-//! Renders the truth that reflections are held against.
+//! The commands that render the truth.
 
-use std::{path::PathBuf, process::ExitCode};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use clap::{Args, Parser, Subcommand};
-use precision::truth::{
-    cell::sea_of_state,
-    files, grid,
-    spectrum::LongWaves,
-    study,
+use clap::{Args, Subcommand};
+use hw_sim::ocean::spectrum::LongWaves;
+
+use super::{
+    cell::{CellSpec, sea_of_state},
+    files, grid, study,
     video::{self, VideoSpec},
 };
 
-/// A ray-traced sea with a boat on it.
-#[derive(Debug, Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    what: What,
-}
-
+/// Commands of the ray-traced sea with a boat on it.
 #[derive(Debug, Subcommand)]
-enum What {
+pub enum TruthStudy {
     /// Renders one cell
-    Cell(Cell),
+    Cell(CellArgs),
     /// Renders all cells of the grid that the folder does not yet hold
     Grid {
         /// Only 8 m eye height, two lights, one heading
@@ -36,13 +30,14 @@ enum What {
         out: PathBuf,
     },
     /// Renders one cell again with other paths and finer waves, and prints what that changes
-    Study(Cell),
+    Study(CellArgs),
     /// Films a boat-free sea
-    Video(Video),
+    Video(FilmArgs),
 }
 
+/// Settings of one cell.
 #[derive(Debug, Args)]
-struct Cell {
+pub struct CellArgs {
     /// Distance to the boat, metres
     #[arg(long, default_value_t = 60.0)]
     range: f64,
@@ -75,8 +70,9 @@ struct Cell {
     out: PathBuf,
 }
 
+/// Settings of a film.
 #[derive(Debug, Args)]
-struct Video {
+pub struct FilmArgs {
     /// Beaufort force; gives wind and waves unless --hs and --tp do
     #[arg(long, default_value_t = 3)]
     state: u8,
@@ -124,7 +120,7 @@ struct Video {
     out: PathBuf,
 }
 
-fn film(a: &Video) -> Result<()> {
+fn film(a: &FilmArgs) -> Result<()> {
     let (wind_m_s, by_wind) =
         sea_of_state(a.state).with_context(|| format!("no sea state {}; there are 0 to 12", a.state))?;
     let long_waves = match (a.hs, a.tp) {
@@ -151,7 +147,7 @@ fn film(a: &Video) -> Result<()> {
     video::make(&spec, &a.out)
 }
 
-fn spec_of(a: &Cell) -> Result<precision::truth::cell::CellSpec> {
+fn spec_of(a: &CellArgs) -> Result<CellSpec> {
     let mut spec = grid::cell(a.range, a.state, a.eye, &a.light, a.heading)
         .with_context(|| format!("no sea state {} or light '{}'", a.state, a.light))?;
     spec.time_s = a.time;
@@ -161,7 +157,7 @@ fn spec_of(a: &Cell) -> Result<precision::truth::cell::CellSpec> {
     Ok(spec)
 }
 
-fn one(a: &Cell) -> Result<()> {
+fn one(a: &CellArgs) -> Result<()> {
     let spec = spec_of(a)?;
     let folder = a.out.join(grid::name(&spec));
     files::make(&spec, &folder)?;
@@ -169,25 +165,18 @@ fn one(a: &Cell) -> Result<()> {
     Ok(())
 }
 
-fn run(arguments: &Arguments) -> Result<()> {
-    match &arguments.what {
-        What::Cell(cell) => one(cell),
-        What::Study(cell) => {
-            let spec = spec_of(cell)?;
-            println!("{}", study::table(&grid::name(&spec), &study::lines(&spec)?));
-            Ok(())
-        }
-        What::Video(video) => film(video),
-        What::Grid { quick, paths, out } => grid::make(&grid::cells(*quick), *paths, out),
-    }
-}
-
-fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(e) => {
-            eprintln!("truth: {e:#}");
-            ExitCode::FAILURE
+impl TruthStudy {
+    /// Renders what is asked for.
+    pub fn run(&self) -> Result<()> {
+        match self {
+            Self::Cell(cell) => one(cell),
+            Self::Study(cell) => {
+                let spec = spec_of(cell)?;
+                println!("{}", study::table(&grid::name(&spec), &study::lines(&spec)?));
+                Ok(())
+            }
+            Self::Video(video) => film(video),
+            Self::Grid { quick, paths, out } => grid::make(&grid::cells(*quick), *paths, out),
         }
     }
 }
