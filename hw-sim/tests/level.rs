@@ -3,21 +3,15 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::sync::Arc;
+mod common;
 
 use bowwave_core::{
     estimate::{SensorCounts, attitude::Source, horizon::Mask},
-    event::{Event, Picture, PixelFormat, Tick},
-    session::{Session, Setup},
-    world::scenario::Scenario,
+    event::{Event, Picture, PixelFormat},
 };
+use common::Played;
 use glam::{DVec2, DVec3};
-use hw_sim::{
-    make::{GunMotion, Periodic, Recipe, make},
-    replay::{Replay, ReplayOptions},
-};
-
-const FRAME_NS: i64 = 100_000_000;
+use hw_sim::make::{GunMotion, Periodic, Recipe, make};
 
 /// A gun that traverses by 17 degrees and back and looks a little down.
 fn recipe() -> Recipe {
@@ -40,13 +34,13 @@ const SETTLED: i64 = 25;
 
 /// Masks and settings of a session beside the recording.
 #[derive(Default)]
-struct Sight {
+struct SightObstacles {
     /// A rail of the own ship, rows from the top.
     rail: std::ops::Range<usize>,
     mask: Option<Mask>,
 }
 
-impl Sight {
+impl SightObstacles {
     /// Draws the rail.
     fn draw(&self, event: &mut Event) {
         let Event::Frame(frame) = event else { return };
@@ -59,46 +53,22 @@ impl Sight {
 
 /// By what up and heading were wrong in the pictures after it has settled, degrees; the gyro has a bias of `drift` deg/s about the vertical
 /// that the calibration does not know.
-fn played(recipe: &Recipe, drift: f64, sight: &Sight) -> (Vec<(f64, f64)>, SensorCounts) {
+fn played(recipe: &Recipe, drift: f64, sight: &SightObstacles) -> (Vec<(f64, f64)>, SensorCounts) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("level.mcap");
     make(recipe, &path, &mut |_, _| {}).unwrap();
-    let options = ReplayOptions {
-        duration_ns: Some((SECONDS + 1) * 1_000_000_000),
-        looped: true,
-        ..ReplayOptions::default()
-    };
-    let mut replay = Replay::fast(&path, &options).unwrap();
-    let mut calibration =
-        bowwave_calibration::parse(&replay.properties().calibration_toml, "recording").unwrap().calibration;
+    let mut played = Played::open(&path, SECONDS);
     // The unit's z points down.
-    calibration.gyro_bias += DVec3::Z * drift.to_radians();
-    calibration.gyro_bias_sigma = DVec3::splat(0.1f64.to_radians());
-    let lens = calibration.lens;
+    played.calibration.gyro_bias += DVec3::Z * drift.to_radians();
+    played.calibration.gyro_bias_sigma = DVec3::splat(0.1f64.to_radians());
     let scenario = format!("[mount]\neye_height_m = {:?}\n", recipe.eye_height_m);
-    let mut session = Session::new(Setup {
-        scenario: Scenario::parse(&scenario, "test").unwrap(),
-        calibration,
-        models: Arc::new([]),
-        boat_models: Vec::new(),
-        screen: (lens.width, lens.height),
-        video: PixelFormat::Rgb,
-        orientation: Source::Fused,
-        heading: bowwave_core::estimate::HeadingSettings::default(),
-        own_ship: sight.mask.clone(),
-    })
-    .unwrap();
-    let mut events = Vec::new();
+    let mut session = played.session(&scenario, Source::Fused, sight.mask.clone());
     let mut errors = Vec::new();
-    for frame in 1..=SECONDS * 10 {
-        let time = replay.origin().plus_ns(frame * FRAME_NS);
-        events.clear();
-        replay.collect(time, &mut events).unwrap();
-        events.iter_mut().for_each(|event| sight.draw(event));
-        events.iter().for_each(|event| session.event(event));
-        let view = session.tick(Tick::at(time)).view;
+    let change = |event: &mut Event| sight.draw(event);
+    played.play(&mut session, change, |frame, session, tick, replay| {
+        let view = session.tick(tick).view;
         if view.blind {
-            continue;
+            return;
         }
         let truth = replay.truth_at(view.mid_exposure).unwrap().world_from_camera;
         if view.pose_known && frame > SETTLED * 10 {
@@ -106,14 +76,14 @@ fn played(recipe: &Recipe, drift: f64, sight: &Sight) -> (Vec<(f64, f64)>, Senso
             let up = off * DVec3::Z;
             errors.push((up.truncate().length().to_degrees(), (2.0 * off.z.atan2(off.w)).to_degrees()));
         }
-    }
-    replay.stop().unwrap();
+    });
+    played.replay.stop().unwrap();
     (errors, session.sensor_counts())
 }
 
 #[test]
 fn up_comes_from_the_horizon_in_the_picture() {
-    let (errors, counts) = played(&recipe(), 0.0, &Sight::default());
+    let (errors, counts) = played(&recipe(), 0.0, &SightObstacles::default());
     let (count, horizons) = (errors.len() as f64, counts.horizons);
     let rms = (errors.iter().map(|e| e.0 * e.0).sum::<f64>() / count.max(1.0)).sqrt();
     let worst = errors.iter().map(|e| e.0).fold(0.0, f64::max);
@@ -125,7 +95,7 @@ fn up_comes_from_the_horizon_in_the_picture() {
 #[test]
 fn heading_is_held_by_the_sky_in_the_picture() {
     let (errors, counts) =
-        played(&Recipe { duration_s: SECONDS as f64 + 1.0, ..recipe() }, 0.05, &Sight::default());
+        played(&Recipe { duration_s: SECONDS as f64 + 1.0, ..recipe() }, 0.05, &SightObstacles::default());
     let headings = || errors.iter().map(|e| e.1);
     let (first, last) = (headings().next().unwrap(), headings().next_back().unwrap());
     let swing = headings().fold(f64::MIN, f64::max) - headings().fold(f64::MAX, f64::min);
@@ -147,7 +117,7 @@ fn a_rail_of_the_own_ship_is_no_horizon_where_it_is_hidden() {
     let polygon = vec![corner(0.0, top), corner(480.0, top), corner(480.0, bottom), corner(0.0, bottom)];
     let mask = Mask::of_polygons(&[polygon], (480, 270));
     let of = |mask| {
-        let (errors, counts) = played(&recipe(), 0.0, &Sight { rail: rail.clone(), mask });
+        let (errors, counts) = played(&recipe(), 0.0, &SightObstacles { rail: rail.clone(), mask });
         let square = errors.iter().map(|e| e.0 * e.0).sum::<f64>();
         ((square / errors.len() as f64).sqrt(), counts.horizons)
     };

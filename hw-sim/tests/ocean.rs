@@ -1,7 +1,5 @@
 //! The ocean shares no code with the product.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::{fs, path::Path};
 
 #[test]

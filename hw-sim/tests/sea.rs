@@ -2,22 +2,17 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{path::Path, sync::Arc};
+mod common;
+
+use std::path::Path;
 
 use bowwave_core::{
     estimate::{SeaReport, attitude::Source, sea::SeaSource},
-    event::{PixelFormat, Tick},
     sea::BeaufortForce,
-    session::{Session, Setup},
-    world::scenario::Scenario,
 };
+use common::Played;
 use glam::DVec2;
-use hw_sim::{
-    make::{GunMotion, Periodic, Recipe, make},
-    replay::{Replay, ReplayOptions},
-};
-
-const FRAME_NS: i64 = 100_000_000;
+use hw_sim::make::{GunMotion, Periodic, Recipe, make};
 
 /// A moderate breeze from ahead on the left, seen from a gun that points northwards and is held as steadily as hands do.
 fn recipe() -> Recipe {
@@ -40,39 +35,21 @@ const SCENARIO: &str =
 
 /// Plays the recording round and round; what is known every second.
 fn watched(path: &Path, seconds: i64, scenario: &str) -> Vec<(SeaReport, DVec2, bool)> {
-    let options = ReplayOptions {
-        duration_ns: Some((seconds + 1) * 1_000_000_000),
-        looped: true,
-        ..ReplayOptions::default()
-    };
-    let mut replay = Replay::fast(path, &options).unwrap();
-    let calibration = bowwave_calibration::parse(&replay.properties().calibration_toml, "recording").unwrap();
-    let lens = calibration.calibration.lens;
-    let mut session = Session::new(Setup {
-        scenario: Scenario::parse(scenario, "test").unwrap(),
-        calibration: calibration.calibration,
-        models: Arc::new([]),
-        boat_models: Vec::new(),
-        screen: (lens.width, lens.height),
-        video: PixelFormat::Rgb,
-        orientation: Source::Auto,
-        heading: bowwave_core::estimate::HeadingSettings::default(),
-        own_ship: None,
-    })
-    .unwrap();
-    let (mut events, mut known) = (Vec::new(), Vec::new());
-    for frame in 1..=seconds * 10 {
-        let time = replay.origin().plus_ns(frame * FRAME_NS);
-        events.clear();
-        replay.collect(time, &mut events).unwrap();
-        events.iter().for_each(|event| session.event(event));
-        let view = session.tick(Tick::at(time)).view;
-        let drawn = (!view.blind).then(|| (view.scene.wind, view.scene.hud.sea.is_some()));
-        if let (0, Some((wind, told)), Some(sea)) = (frame % 10, drawn, session.sea()) {
-            known.push((sea, wind, told));
-        }
-    }
-    replay.stop().unwrap();
+    let mut played = Played::open(path, seconds);
+    let mut session = played.session(scenario, Source::Auto, None);
+    let mut known = Vec::new();
+    played.play(
+        &mut session,
+        |_| (),
+        |frame, session, tick, _| {
+            let view = session.tick(tick).view;
+            let drawn = (!view.blind).then(|| (view.scene.wind, view.scene.hud.sea.is_some()));
+            if let (0, Some((wind, told)), Some(sea)) = (frame % 10, drawn, session.sea()) {
+                known.push((sea, wind, told));
+            }
+        },
+    );
+    played.replay.stop().unwrap();
     known
 }
 

@@ -4,7 +4,7 @@
 use std::{env, error::Error, path::Path, process::ExitCode};
 
 use bowwave_core::model::{Model, ModelKind, Zone};
-use bowwave_models::{built_in_names, raster::Canvas, resolve};
+use bowwave_models::{built_in_names, raster::SideCanvas, resolve};
 use glam::{Mat4, Vec2, Vec3};
 use image::{RgbaImage, imageops};
 
@@ -102,7 +102,7 @@ fn view(m: &Model, azimuth: f32, distance: f32, eye_height: f32, fov: f32, enlar
     let aspect = w as f32 / h as f32;
     let fov_y = 2.0 * ((fov / 2.0).tan() / aspect).atan();
     let clip = glam::camera::rh::proj::directx::perspective_infinite(fov_y, aspect, 0.1) * look;
-    let mut canvas = Canvas::new(w, h, 3);
+    let mut canvas = SideCanvas::new(w, h, 3);
     let from_clip = clip.inverse();
     canvas.backdrop(|p| sea_and_sky(from_clip, eye, p));
     let sun = Vec3::new(0.35, -0.62, 0.70).normalize();

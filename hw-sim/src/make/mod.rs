@@ -31,7 +31,7 @@ pub use imu::samples as imu_samples;
 pub use motion::{GRAVITY, GunMotion, Harmonic, Motion, MotionState, Periodic, ShipMotion};
 pub use recipe::{Burst, CameraRecipe, ImuRecipe, Jolt, Recipe, ShipFeedRecipe};
 pub use ship::samples as ship_samples;
-pub use studio::{StudioShot, Studio};
+pub use studio::{Studio, StudioShot};
 pub use write::{DEVICE_LOOP_KEY, MadeRecording, START, calibration, make};
 
 pub use crate::ocean::{cloudy::SkyRecipe, spectrum::Swell};

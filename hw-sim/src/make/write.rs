@@ -17,7 +17,7 @@ use super::{
     MakeError, Recipe,
     imu::{self, draw_latency},
     ship,
-    studio::{StudioShot, Studio},
+    studio::{Studio, StudioShot},
 };
 use crate::ocean::random::stream;
 
@@ -47,7 +47,11 @@ pub struct MadeRecording {
 
 /// Makes the recording of `recipe` in a new file at `path`; `progress` hears of (frames done, frames in all). An existing
 /// file is not overwritten; a failure leaves the file cut short.
-pub fn make(recipe: &Recipe, path: &Path, progress: &mut dyn FnMut(u64, u64)) -> Result<MadeRecording, MakeError> {
+pub fn make(
+    recipe: &Recipe,
+    path: &Path,
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<MadeRecording, MakeError> {
     let studio = Studio::new(recipe)?;
     let mut writer = RecordingWriter::create(path, &properties(recipe))?;
     let mut others = measurements(recipe).into_iter().peekable();

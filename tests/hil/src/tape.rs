@@ -134,8 +134,14 @@ impl Tape {
                     exposed_ns: pose.time.ns_since(start),
                     attitude: pose.pose.world_from_camera.to_array(),
                 }),
-                // The bench has no ship and nobody who presses.
-                Entry::Pose(_) | Entry::Ship(_) | Entry::Mark(_) => {}
+                // A made recording has nothing else that the bench could play: no ship, nobody who presses, no session.
+                Entry::Pose(_)
+                | Entry::Ship(_)
+                | Entry::ShipValues(_)
+                | Entry::Mark(_)
+                | Entry::Picture(_)
+                | Entry::Fault(_)
+                | Entry::Tick(_) => {}
             }
         }
         tape.index();

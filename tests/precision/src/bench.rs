@@ -91,7 +91,7 @@ impl<'a> Way<'a> {
 
 /// A method under test: its name, its setting, whether the product uses it, and its code.
 #[derive(Clone, Copy, Debug)]
-pub struct Candidate<F> {
+pub struct PartMethod<F> {
     /// The method.
     pub method: &'static str,
     /// Its setting.
@@ -102,7 +102,7 @@ pub struct Candidate<F> {
     pub run: F,
 }
 
-impl<F> Candidate<F> {
+impl<F> PartMethod<F> {
     /// A method that the product does not use.
     pub const fn rival(method: &'static str, setting: &'static str, run: F) -> Self {
         Self { method, setting, default: false, run }

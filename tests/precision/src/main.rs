@@ -26,7 +26,7 @@ use precision::{
 #[command(args_conflicts_with_subcommands = true)]
 struct PrecisionArgs {
     #[command(subcommand)]
-    study: Option<Study>,
+    study: Option<PrecisionStudy>,
     #[command(flatten)]
     report: ReportArgs,
 }
@@ -47,7 +47,7 @@ struct ReportArgs {
 }
 
 #[derive(Debug, Subcommand)]
-enum Study {
+enum PrecisionStudy {
     /// Calibration of many simulated recordings: percentiles of the errors, and how often the stated uncertainty holds
     Calibration(CalibrationStudy),
     /// The horizon in real frames and drawn pictures: errors frame by frame, false ones, the time of a picture
@@ -69,7 +69,7 @@ enum Study {
     Truth(TruthStudy),
 }
 
-impl Study {
+impl PrecisionStudy {
     fn run(&self) -> Result<()> {
         match self {
             Self::Calibration(study) => study.run(),
@@ -146,9 +146,9 @@ mod tests {
         let names: Vec<&str> = report.report.parts().unwrap().iter().map(|p| p.about.part).collect();
         assert_eq!(names, ["clock", "horizon"]);
         assert!(parsed("--part nothing").report.parts().is_err());
-        assert!(matches!(parsed("horizon --drawn 3").study, Some(Study::Horizon(_))));
-        assert!(matches!(parsed("sea_video --cost").study, Some(Study::SeaVideo(_))));
-        assert!(matches!(parsed("reflection gap").study, Some(Study::Reflection(_))));
-        assert!(matches!(parsed("truth cell --range 60").study, Some(Study::Truth(_))));
+        assert!(matches!(parsed("horizon --drawn 3").study, Some(PrecisionStudy::Horizon(_))));
+        assert!(matches!(parsed("sea_video --cost").study, Some(PrecisionStudy::SeaVideo(_))));
+        assert!(matches!(parsed("reflection gap").study, Some(PrecisionStudy::Reflection(_))));
+        assert!(matches!(parsed("truth cell --range 60").study, Some(PrecisionStudy::Truth(_))));
     }
 }

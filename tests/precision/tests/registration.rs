@@ -1,4 +1,4 @@
-//! Whole sessions on simulated recordings draw things far away where they belong; `precision --bin registration` has the table.
+//! Whole sessions on simulated recordings draw things far away where they belong; `precision registration` has the table.
 
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 

@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use bowwave_hil::protocol::AgentCommand;
 
 use super::{
-    bench::{JournalChange, HilBench, LCD, Shop},
+    bench::{HilBench, JournalChange, LCD, Shop},
     faults::{CaseResult, FaultRow, FaultVerdict, rows},
     lcd::Plate,
     measure::{self, Figure},

@@ -12,7 +12,7 @@ use super::{
     rivals::{self, GreyPicture, LineEnds},
     score::{self, DrawnHorizon, Miss},
 };
-use crate::bench::Candidate;
+use crate::bench::PartMethod;
 
 /// A way to find a horizon.
 #[derive(Clone, Copy, Debug)]
@@ -27,12 +27,12 @@ pub enum HorizonMethod {
 }
 
 /// All ways, with their names and settings; what the product uses is first.
-pub const METHODS: [Candidate<HorizonMethod>; 5] = [
-    Candidate::product("column steps, judged", "with prediction", HorizonMethod::Finder { prior: true }),
-    Candidate::rival("column steps, judged", "no prediction", HorizonMethod::Finder { prior: false }),
-    Candidate::rival("column steps, best line", "", HorizonMethod::Rival(rivals::column_steps)),
-    Candidate::rival("Canny and Hough", "", HorizonMethod::Rival(rivals::canny_hough)),
-    Candidate::rival("Otsu", "", HorizonMethod::Rival(rivals::otsu)),
+pub const METHODS: [PartMethod<HorizonMethod>; 5] = [
+    PartMethod::product("column steps, judged", "with prediction", HorizonMethod::Finder { prior: true }),
+    PartMethod::rival("column steps, judged", "no prediction", HorizonMethod::Finder { prior: false }),
+    PartMethod::rival("column steps, best line", "", HorizonMethod::Rival(rivals::column_steps)),
+    PartMethod::rival("Canny and Hough", "", HorizonMethod::Rival(rivals::canny_hough)),
+    PartMethod::rival("Otsu", "", HorizonMethod::Rival(rivals::otsu)),
 ];
 
 /// Up of a camera whose horizon falls on two pixels, the first on the left.

@@ -5,7 +5,7 @@ use bowwave_core::estimate::attitude::turn_between;
 use glam::{DQuat, DVec3, Quat};
 
 use super::About;
-use crate::bench::{Candidate, PartBench};
+use crate::bench::{PartBench, PartMethod};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -126,12 +126,12 @@ fn error_deg(motion: Coning, seconds: f64, integrate: Integrator) -> f64 {
     worst.to_degrees()
 }
 
-const METHODS: [Candidate<Integrator>; 5] = [
-    Candidate::rival("Euler", "f64", euler),
-    Candidate::rival("mean rate", "f32", single_precision),
-    Candidate::rival("mean rate", "f64", mean_rate),
-    Candidate::product("Magnus, parabola", "f64", product),
-    Candidate::rival("Runge-Kutta 4", "f64, double step", runge_kutta),
+const METHODS: [PartMethod<Integrator>; 5] = [
+    PartMethod::rival("Euler", "f64", euler),
+    PartMethod::rival("mean rate", "f32", single_precision),
+    PartMethod::rival("mean rate", "f64", mean_rate),
+    PartMethod::product("Magnus, parabola", "f64", product),
+    PartMethod::rival("Runge-Kutta 4", "f64, double step", runge_kutta),
 ];
 
 const EXCUSE: &str = "Runge-Kutta needs pairs of even steps, and either errs far less than a gyro drifts";

@@ -9,7 +9,7 @@ use bowwave_core::time::Time;
 use glam::{DQuat, DVec3};
 
 use super::{About, rms};
-use crate::bench::{Candidate, PartBench};
+use crate::bench::{PartBench, PartMethod};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -65,11 +65,11 @@ fn single(readings: &[ImuReading], observations: &[Observation]) -> Option<Solve
     ours(&readings, &observations)
 }
 
-const METHODS: [Candidate<PairSolver>; 4] = [
-    Candidate::rival("hand-eye, singular values", "stamps believed", hand_eye),
-    Candidate::rival("hand-eye, singular values", "correlated offset", singular_values),
-    Candidate::rival("filtered least squares", "through f32", single),
-    Candidate::product("filtered least squares", "f64", ours),
+const METHODS: [PartMethod<PairSolver>; 4] = [
+    PartMethod::rival("hand-eye, singular values", "stamps believed", hand_eye),
+    PartMethod::rival("hand-eye, singular values", "correlated offset", singular_values),
+    PartMethod::rival("filtered least squares", "through f32", single),
+    PartMethod::product("filtered least squares", "f64", ours),
 ];
 
 /// Errors of an answer: milliradians and milliseconds; half a turn and the search's range where there is none.

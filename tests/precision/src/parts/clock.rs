@@ -5,7 +5,7 @@ use bowwave_core::{estimate::clock::ClockMap, time::Time};
 use anyhow::Result;
 
 use super::{About, even, rms, worst};
-use crate::bench::{Candidate, PartBench};
+use crate::bench::{PartBench, PartMethod};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -135,12 +135,12 @@ type TimeMap = Box<dyn FnMut(i64, Time) -> i64>;
 /// Bytes held, and the maker.
 type MapMaker = (usize, fn() -> TimeMap);
 
-const METHODS: [Candidate<MapMaker>; 5] = [
-    Candidate::rival("raw arrival", "", (0, || Box::new(|_, arrival: Time| arrival.ns()))),
-    Candidate::rival("moving average", "10 s", (16_000, || Box::new(moving_average(2000)))),
-    Candidate::rival("moving average", "60 s", (96_000, || Box::new(moving_average(12_000)))),
-    Candidate::rival("least lag", "10 s", (0, || Box::new(least_lag(2000)))),
-    Candidate::product("lower hull", "30-60 s", (size_of::<ClockMap>(), || Box::new(hull()))),
+const METHODS: [PartMethod<MapMaker>; 5] = [
+    PartMethod::rival("raw arrival", "", (0, || Box::new(|_, arrival: Time| arrival.ns()))),
+    PartMethod::rival("moving average", "10 s", (16_000, || Box::new(moving_average(2000)))),
+    PartMethod::rival("moving average", "60 s", (96_000, || Box::new(moving_average(12_000)))),
+    PartMethod::rival("least lag", "10 s", (0, || Box::new(least_lag(2000)))),
+    PartMethod::product("lower hull", "30-60 s", (size_of::<ClockMap>(), || Box::new(hull()))),
 ];
 
 /// Measures the scenes and extreme cases.

@@ -4,7 +4,7 @@ use anyhow::Result;
 use bowwave_core::frame::view::NEAR_M;
 
 use super::{About, worst};
-use crate::bench::{Candidate, PartBench};
+use crate::bench::{PartBench, PartMethod};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -44,15 +44,15 @@ fn logarithmic(z: f32) -> f32 {
 /// The stored number by the distance, and whether it grows with the distance.
 type DepthCode = (fn(f32) -> f32, bool);
 
-const METHODS: [Candidate<DepthCode>; 8] = [
-    Candidate::rival("conventional", "24 bits", (|z| bits24(conventional(z)), true)),
-    Candidate::rival("conventional", "f32", (conventional, true)),
-    Candidate::rival("linear", "24 bits", (|z| bits24(z / FAR_M), true)),
-    Candidate::rival("reversed", "24 bits", (|z| bits24(NEAR / z), false)),
-    Candidate::rival("reversed, far plane", "f32", (reversed_to_far, false)),
-    Candidate::product("reversed, infinite", "f32", (|z| NEAR / z, false)),
-    Candidate::rival("logarithmic", "24 bits", (|z| bits24(logarithmic(z)), true)),
-    Candidate::rival("logarithmic", "f32", (logarithmic, true)),
+const METHODS: [PartMethod<DepthCode>; 8] = [
+    PartMethod::rival("conventional", "24 bits", (|z| bits24(conventional(z)), true)),
+    PartMethod::rival("conventional", "f32", (conventional, true)),
+    PartMethod::rival("linear", "24 bits", (|z| bits24(z / FAR_M), true)),
+    PartMethod::rival("reversed", "24 bits", (|z| bits24(NEAR / z), false)),
+    PartMethod::rival("reversed, far plane", "f32", (reversed_to_far, false)),
+    PartMethod::product("reversed, infinite", "f32", (|z| NEAR / z, false)),
+    PartMethod::rival("logarithmic", "24 bits", (|z| bits24(logarithmic(z)), true)),
+    PartMethod::rival("logarithmic", "f32", (logarithmic, true)),
 ];
 
 /// Whether what is `step` behind `z` is stored as behind it, there and a little farther.
@@ -96,7 +96,7 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
         ("least step told apart, 0.5 m to 2 km", 0.5, 2000.0),
         ("least step told apart, 0.5 m to 20 km", 0.5, 20_000.0),
     ] {
-        let way = |m: &Candidate<DepthCode>| {
+        let way = |m: &PartMethod<DepthCode>| {
             let (f, _) = m.run;
             let work = move || used.iter().map(|z| f(*z)).sum::<f32>();
             m.way(coarsest(m.run, from, to), used.len(), work).holds(size_of::<f32>())

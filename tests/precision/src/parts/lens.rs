@@ -5,7 +5,7 @@ use bowwave_core::geometry::{Distortion, Lens};
 use glam::{DVec2, DVec3};
 
 use super::{About, worst};
-use crate::bench::{Candidate, ExtremeResult, PartBench, Way};
+use crate::bench::{ExtremeResult, PartBench, PartMethod, Way};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -102,15 +102,15 @@ fn worst_px(lens: &Lens, invert: &dyn Fn(&Lens, DVec2) -> DVec3) -> f64 {
 /// One way to invert, of that lens.
 type Inverse<'a> = Box<dyn Fn(&Lens, DVec2) -> DVec3 + 'a>;
 
-fn methods(of: &Lens) -> [Candidate<Inverse<'_>>; 6] {
+fn methods(of: &Lens) -> [PartMethod<Inverse<'_>>; 6] {
     let rays = table(of);
     [
-        Candidate::rival("ignore distortion", "", Box::new(|l, p| steps(l, p, 0))),
-        Candidate::rival("fixed point", "5 steps", Box::new(|l, p| steps(l, p, 5))),
-        Candidate::rival("fixed point", "60 steps at most", Box::new(|l, p| steps(l, p, 60))),
-        Candidate::rival("Newton", "6 steps, numerical", Box::new(newton)),
-        Candidate::rival("table", "33 x 19", Box::new(move |l, p| looked_up(l, &rays, p))),
-        Candidate::product("Newton", "bracketed", Box::new(|l, p| l.unproject(p))),
+        PartMethod::rival("ignore distortion", "", Box::new(|l, p| steps(l, p, 0))),
+        PartMethod::rival("fixed point", "5 steps", Box::new(|l, p| steps(l, p, 5))),
+        PartMethod::rival("fixed point", "60 steps at most", Box::new(|l, p| steps(l, p, 60))),
+        PartMethod::rival("Newton", "6 steps, numerical", Box::new(newton)),
+        PartMethod::rival("table", "33 x 19", Box::new(move |l, p| looked_up(l, &rays, p))),
+        PartMethod::product("Newton", "bracketed", Box::new(|l, p| l.unproject(p))),
     ]
 }
 

@@ -7,7 +7,7 @@ use bowwave_core::{
 };
 
 use super::{About, even};
-use crate::bench::{Candidate, PartBench};
+use crate::bench::{PartBench, PartMethod};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -159,10 +159,10 @@ fn watch(tick: &mut dyn TickRule, camera_fps: f64, display_hz: f64) -> ShownPict
 /// Maker of a tick.
 type TickMaker = fn() -> Box<dyn TickRule>;
 
-const METHODS: [Candidate<TickMaker>; 3] = [
-    Candidate::rival("free tick", "30 Hz", || Box::new(Pacer::new(at(0.0011)))),
-    Candidate::rival("late begin", "every second blank", || Box::new(LateTick::default())),
-    Candidate::product("locked tick", "camera and display", || Box::new(FrameClock::new())),
+const METHODS: [PartMethod<TickMaker>; 3] = [
+    PartMethod::rival("free tick", "30 Hz", || Box::new(Pacer::new(at(0.0011)))),
+    PartMethod::rival("late begin", "every second blank", || Box::new(LateTick::default())),
+    PartMethod::product("locked tick", "camera and display", || Box::new(FrameClock::new())),
 ];
 
 /// Error of a way and what is said of it.

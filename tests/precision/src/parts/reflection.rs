@@ -25,13 +25,13 @@ pub const ABOUT: About = About {
     truth: "a ray tracer of a boat on a directional sea (precision::truth), which shares no code with the renderer; its cells are \
             rendered here with a few paths and fixed seeds. Its own error is that of the change along other paths, put onto the same picture",
     rivals: "nothing, the plain mirror, the source thesis's Full Reflection and Physics shaders as printed and mended, and what waves \
-             of that wind throw back by a baked table. The whole grid is measured by `reflection grid`",
+             of that wind throw back by a baked table. The whole grid is measured by `precision reflection grid`",
     why: "the closest to the truth in every sea and at every range, of those that a frame has time for",
 };
 
 /// Why a shader of the thesis is the default though another one is closer.
 const EXCUSE: &str = "beaten: the table of waves is closer, and beyond 100 m in waves nothing at all is; it stays while the table's \
-                      method takes more than twice its time (`reflection cost`)";
+                      method takes more than twice its time (`precision reflection cost`)";
 
 /// Range in metres, sea state, light, and paths over the grid's.
 type CellScene = (f64, u8, &'static str, f64);

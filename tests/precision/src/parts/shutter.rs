@@ -5,7 +5,7 @@ use bowwave_core::geometry::Lens;
 use glam::{DQuat, DVec2, DVec3};
 
 use super::{About, worst};
-use crate::bench::{Candidate, PartBench};
+use crate::bench::{PartBench, PartMethod};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -121,14 +121,14 @@ impl ShutterScene {
 
 type PointFinder = fn(&ShutterScene, DVec3) -> DVec2;
 
-const METHODS: [Candidate<PointFinder>; 7] = [
-    Candidate::rival("the middle row's attitude", "", |s, p| s.global.project(p).unwrap_or(DVec2::NAN)),
-    Candidate::rival("one rate", "1 round", |s, p| s.rounds(p, 1, |row| s.one_rate(row))),
-    Candidate::rival("one rate", "2 rounds", |s, p| s.rounds(p, 2, |row| s.one_rate(row))),
-    Candidate::product("one rate", "Newton and a round, as shaders", ShutterScene::newton),
-    Candidate::product("one rate", "until still, as core", |s, p| s.lens.project(p).unwrap_or(DVec2::NAN)),
-    Candidate::rival("nine attitudes", "3 rounds", |s, p| s.rounds(p, 3, |row| s.interpolated(row))),
-    Candidate::rival("each row's attitude", "4 rounds", |s, p| {
+const METHODS: [PartMethod<PointFinder>; 7] = [
+    PartMethod::rival("the middle row's attitude", "", |s, p| s.global.project(p).unwrap_or(DVec2::NAN)),
+    PartMethod::rival("one rate", "1 round", |s, p| s.rounds(p, 1, |row| s.one_rate(row))),
+    PartMethod::rival("one rate", "2 rounds", |s, p| s.rounds(p, 2, |row| s.one_rate(row))),
+    PartMethod::product("one rate", "Newton and a round, as shaders", ShutterScene::newton),
+    PartMethod::product("one rate", "until still, as core", |s, p| s.lens.project(p).unwrap_or(DVec2::NAN)),
+    PartMethod::rival("nine attitudes", "3 rounds", |s, p| s.rounds(p, 3, |row| s.interpolated(row))),
+    PartMethod::rival("each row's attitude", "4 rounds", |s, p| {
         s.rounds(p, 4, |row| (s.attitude)(read_at(row)))
     }),
 ];

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec2, DVec3};
 
 use super::{About, rms};
 use crate::{
-    bench::{Candidate, PartBench},
+    bench::{PartBench, PartMethod},
     horizon::frames,
     target::{
         draw::{BoardShot, DrawnBoard, TrueLens, draw},
@@ -59,14 +59,14 @@ fn ours(target: &Target, picture: &DrawnBoard) -> FoundTags {
 
 type TagFinder = fn(&Target, &DrawnBoard) -> FoundTags;
 
-const METHODS: [Candidate<TagFinder>; 7] = [
-    Candidate::rival("nearest pixel", "", nearest_pixel),
-    Candidate::rival("half the picture", "symmetry", halved),
-    Candidate::rival("edges", "5 x 5 pixels", |t, p| by(t, p, Refinement::Edges(2.0))),
-    Candidate::rival("edges", "17 x 17 pixels", |t, p| by(t, p, Refinement::Edges(8.0))),
-    Candidate::rival("symmetry", "9 x 9 pixels", |t, p| by(t, p, Refinement::Symmetry(4.0))),
-    Candidate::product("symmetry", "17 x 17 pixels", ours),
-    Candidate::rival("symmetry", "25 x 25 pixels", |t, p| by(t, p, Refinement::Symmetry(12.0))),
+const METHODS: [PartMethod<TagFinder>; 7] = [
+    PartMethod::rival("nearest pixel", "", nearest_pixel),
+    PartMethod::rival("half the picture", "symmetry", halved),
+    PartMethod::rival("edges", "5 x 5 pixels", |t, p| by(t, p, Refinement::Edges(2.0))),
+    PartMethod::rival("edges", "17 x 17 pixels", |t, p| by(t, p, Refinement::Edges(8.0))),
+    PartMethod::rival("symmetry", "9 x 9 pixels", |t, p| by(t, p, Refinement::Symmetry(4.0))),
+    PartMethod::product("symmetry", "17 x 17 pixels", ours),
+    PartMethod::rival("symmetry", "25 x 25 pixels", |t, p| by(t, p, Refinement::Symmetry(12.0))),
 ];
 
 /// Pictures that were looked at by nobody who set a constant.

@@ -8,9 +8,10 @@ use bowwave_core::{
     world::waves::{Spectrum, Wave, WaveField, WaveSpec},
 };
 use glam::DVec2;
+use rustfft::num_traits::Float as _;
 
 use super::{About, even, worst};
-use crate::bench::{Candidate, PartBench};
+use crate::bench::{PartBench, PartMethod};
 
 /// Description of this part.
 pub const ABOUT: About = About {
@@ -29,30 +30,30 @@ type WaveEvent = (DVec2, f64);
 /// Height over amplitude.
 type WaveHeight = fn(&Wave, DVec2, f64) -> f64;
 
-const METHODS: [Candidate<WaveHeight>; 7] = [
-    Candidate::rival("f32", "as written", |w, p, t| {
+const METHODS: [PartMethod<WaveHeight>; 7] = [
+    PartMethod::rival("f32", "as written", |w, p, t| {
         let k = (w.cycles_per_m * TAU).as_vec2();
         let phase = k.dot(p.as_vec2()) - (TAU * w.hz) as f32 * t as f32 + (TAU * w.phase) as f32;
         f64::from(phase.cos())
     }),
-    Candidate::rival("f32", "whole cycles off", |w, p, t| {
+    PartMethod::rival("f32", "whole cycles off", |w, p, t| {
         let (c, p) = (w.cycles_per_m.as_vec2(), p.as_vec2());
         let cycles = (c.x * p.x).fract() + (c.y * p.y).fract() - (w.hz as f32 * t as f32).fract();
         f64::from(((cycles + w.phase as f32).fract() * std::f32::consts::TAU).cos())
     }),
-    Candidate::rival("f32", "anchor of 64 m", |w, p, t| {
+    PartMethod::rival("f32", "anchor of 64 m", |w, p, t| {
         // As a shader would: the phase at the anchor comes from f64, once a frame; only the way from there is f32.
         let anchor = (p / 64.0).round() * 64.0;
         let start = w.phase(anchor, t) as f32;
         let way = (w.cycles_per_m * TAU).as_vec2().dot((p - anchor).as_vec2());
         f64::from((start + way).cos())
     }),
-    Candidate::rival("f64", "as written", |w, p, t| {
+    PartMethod::rival("f64", "as written", |w, p, t| {
         (TAU * (w.cycles_per_m.dot(p) - w.hz * t + w.phase)).cos()
     }),
-    Candidate::rival("f64", "cosine in f32", |w, p, t| f64::from((w.phase(p, t) as f32).cos())),
-    Candidate::product("f64", "whole cycles off", |w, p, t| w.phase(p, t).cos()),
-    Candidate::rival("f64", "two-product", |w, p, t| {
+    PartMethod::rival("f64", "cosine in f32", |w, p, t| f64::from((w.phase(p, t) as f32).cos())),
+    PartMethod::product("f64", "whole cycles off", |w, p, t| w.phase(p, t).cos()),
+    PartMethod::rival("f64", "two-product", |w, p, t| {
         let part = |a: f64, b: f64| {
             let product = a * b;
             (product - product.floor()) + a.mul_add(b, -product)
@@ -68,10 +69,8 @@ fn exact_fraction(a: f64, b: f64) -> f64 {
         return 0.0;
     }
     let parts = |v: f64| {
-        let bits = v.to_bits();
-        let exponent = ((bits >> 52) & 0x7ff) as i32 - 1075;
-        let mantissa = i128::from((bits & ((1 << 52) - 1)) | (1 << 52));
-        (if v < 0.0 { -mantissa } else { mantissa }, exponent)
+        let (mantissa, exponent, sign) = v.integer_decode();
+        (i128::from(mantissa) * i128::from(sign), i32::from(exponent))
     };
     let ((ma, ea), (mb, eb)) = (parts(a), parts(b));
     let (product, exponent) = (ma * mb, ea + eb);

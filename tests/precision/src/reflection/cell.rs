@@ -257,7 +257,7 @@ pub fn folders(folder: &Path, part: &str) -> Result<Vec<PathBuf>> {
     cells.sort();
     if cells.is_empty() {
         bail!(
-            "{} holds no finished cell whose name contains '{part}'; `truth grid --out {0}` makes them",
+            "{} holds no finished cell whose name contains '{part}'; `precision truth grid --out {0}` makes them",
             folder.display()
         );
     }

@@ -7,7 +7,7 @@ use bowwave_hil::protocol::AgentCommand;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase, quiet};
 use crate::{
-    bench::{Configured, JournalChange, HilBench, PICTURE},
+    bench::{Configured, HilBench, JournalChange, PICTURE},
     guest::JournalEntry,
 };
 

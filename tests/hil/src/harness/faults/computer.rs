@@ -10,7 +10,7 @@ use bowwave_hil::protocol::AgentCommand;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase, trigger::shots};
 use crate::{
-    bench::{Configured, JournalChange, GPU_FAULT, HilBench, STATE},
+    bench::{Configured, GPU_FAULT, HilBench, JournalChange, STATE},
     guest::JournalEntry,
     lcd::Plate,
 };

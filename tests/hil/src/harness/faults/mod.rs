@@ -13,7 +13,7 @@ use anyhow::{Result, bail};
 use bowwave_hil::protocol::{AgentCommand, PlayerFeed};
 
 use crate::{
-    bench::{JournalChange, HilBench, PICTURE},
+    bench::{HilBench, JournalChange, PICTURE},
     lcd::Plate,
 };
 

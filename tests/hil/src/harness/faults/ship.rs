@@ -15,7 +15,7 @@ use serde_json::json;
 
 use super::{CaseResult, FaultRow, SpecialCase};
 use crate::{
-    bench::{Configured, JournalChange, HilBench},
+    bench::{Configured, HilBench, JournalChange},
     lcd::Plate,
 };
 

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase};
 use crate::{
-    bench::{JournalChange, HilBench},
+    bench::{HilBench, JournalChange},
     lcd::Plate,
 };
 

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase, quiet};
 use crate::{
-    bench::{JournalChange, HilBench},
+    bench::{HilBench, JournalChange},
     lcd::Plate,
     unit::Passage,
 };
