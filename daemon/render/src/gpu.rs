@@ -187,6 +187,7 @@ pub struct Gpu {
     /// Calls on the device.
     pub(crate) device: ash::Device,
     instance: Instance,
+    physical: vk::PhysicalDevice,
     /// The queue; only the renderer's thread submits to it.
     pub(crate) queue: vk::Queue,
     /// The queue's family.
@@ -246,6 +247,7 @@ impl Gpu {
         Ok(Self {
             device,
             instance,
+            physical,
             queue,
             family,
             timestamp_ns,
@@ -293,6 +295,14 @@ impl Gpu {
             unsafe { self.device.allocate_memory(&info, None) }.named_for("vkAllocateMemory", what)?;
         self.ledger.lock().unwrap_or_else(PoisonError::into_inner).push((what, needs.size));
         Ok(memory)
+    }
+
+    /// Whether images of `format` can be drawn to and copied from that lie row by row, as the host has them.
+    pub(crate) fn draws_linear(&self, format: vk::Format) -> bool {
+        // SAFETY: `physical` comes from this instance.
+        let has = unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) };
+        has.linear_tiling_features
+            .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::TRANSFER_SRC)
     }
 
     /// The first memory type of those in `bits` that has all of `flags`.

@@ -5,7 +5,6 @@
 //! seen as codes by the video pass and as linear light by everything that blends.
 
 mod atlas;
-mod canvas;
 mod coverage;
 mod error;
 mod frame_data;
@@ -28,6 +27,7 @@ mod ring;
 mod rounds;
 mod simplify;
 mod split;
+mod target;
 #[cfg(test)]
 mod testing;
 mod upload;

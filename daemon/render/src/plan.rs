@@ -114,10 +114,8 @@ pub(crate) struct Plan {
     touched: Vec<PixelRect>,
     /// The same, each pixel once.
     pub(crate) rects: Vec<PixelRect>,
-    /// The same as copies between buffer and screen.
-    pub(crate) regions: Vec<vk::BufferImageCopy>,
     /// What of the video the water's shader compares.
-    pub(crate) backdrop_regions: Vec<vk::BufferImageCopy>,
+    pub(crate) backdrop_regions: Vec<vk::ImageCopy>,
     /// Plates, shapes and glyphs of the head-up display that are drawn over the frame.
     pub(crate) quads: [u32; KINDS],
     /// Texels of the video pass that take the display from its layer instead, all others, and what is drawn anew in the layer.
@@ -165,7 +163,6 @@ impl Plan {
             cells: Cells::new(size),
             touched: Vec::with_capacity(touched),
             rects: Vec::with_capacity(rects),
-            regions: Vec::with_capacity(rects),
             backdrop_regions: Vec::with_capacity(boats),
             wanted: Vec::with_capacity(boats),
             lines: Vec::with_capacity(boats),

@@ -10,6 +10,9 @@ use crate::{
     rects::rect,
 };
 
+/// Most image steps of one barrier.
+const STEPS_MAX: usize = 12;
+
 /// Recording into one command buffer.
 #[derive(Clone, Copy)]
 pub(crate) struct Recorder<'a> {
@@ -38,6 +41,56 @@ impl Begin {
     }
 }
 
+/// An image of colours that is drawn to.
+#[derive(Clone, Copy)]
+pub(crate) struct Colour {
+    pub(crate) view: vk::ImageView,
+    pub(crate) layout: vk::ImageLayout,
+    pub(crate) begin: Begin,
+}
+
+impl Colour {
+    /// In the layout of what is drawn to.
+    pub(crate) fn new(view: vk::ImageView, begin: Begin) -> Self {
+        Self { view, layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, begin }
+    }
+}
+
+/// A stage and what it does with memory.
+pub(crate) type Reach = (vk::PipelineStageFlags2, vk::AccessFlags2);
+
+/// A few image steps, and a dependency of all other memory, for one barrier.
+#[derive(Default)]
+pub(crate) struct Steps<'a> {
+    steps: [Option<Step<'a>>; STEPS_MAX],
+    count: usize,
+    memory: vk::MemoryBarrier2<'static>,
+}
+
+impl<'a> Steps<'a> {
+    pub(crate) fn add(&mut self, steps: impl IntoIterator<Item = Step<'a>>) {
+        for step in steps {
+            if let Some(place) = self.steps.get_mut(self.count) {
+                *place = Some(step);
+                self.count += 1;
+            }
+        }
+    }
+
+    /// What was done to any memory comes before what is done to any.
+    pub(crate) fn add_memory(&mut self, from: Reach, to: Reach) {
+        self.memory.src_stage_mask |= from.0;
+        self.memory.src_access_mask |= from.1;
+        self.memory.dst_stage_mask |= to.0;
+        self.memory.dst_access_mask |= to.1;
+    }
+
+    /// Records the barrier, where there is anything in it.
+    pub(crate) fn record(&self, to: Recorder<'_>) {
+        to.barrier_with(self.steps.iter().flatten().copied(), self.memory);
+    }
+}
+
 /// One step of an image from one use to the next.
 #[derive(Clone, Copy)]
 pub(crate) struct Step<'a> {
@@ -47,9 +100,19 @@ pub(crate) struct Step<'a> {
 }
 
 impl Recorder<'_> {
-    /// A barrier for up to eight images at once.
+    /// A barrier for up to [`STEPS_MAX`] images at once.
     pub(crate) fn barrier<'a>(&self, steps: impl IntoIterator<Item = Step<'a>>) {
-        let mut barriers = [vk::ImageMemoryBarrier2::default(); 8];
+        self.barrier_with(steps, vk::MemoryBarrier2::default());
+    }
+
+    /// The same with a dependency of all other memory. On a driver that runs on the processor each barrier waits for all that was drawn
+    /// before, so that there should be few.
+    fn barrier_with<'a>(
+        &self,
+        steps: impl IntoIterator<Item = Step<'a>>,
+        memory: vk::MemoryBarrier2<'static>,
+    ) {
+        let mut barriers = [vk::ImageMemoryBarrier2::default(); STEPS_MAX];
         let mut count = 0;
         for (barrier, step) in barriers.iter_mut().zip(steps) {
             count += 1;
@@ -71,18 +134,19 @@ impl Recorder<'_> {
                     layer_count: 1,
                 });
         }
-        let info = vk::DependencyInfo::default().image_memory_barriers(&barriers[..count]);
+        let memories = [memory];
+        let memories = if memory.dst_stage_mask.is_empty() { &memories[..0] } else { &memories[..] };
+        if count == 0 && memories.is_empty() {
+            return;
+        }
+        let info =
+            vk::DependencyInfo::default().image_memory_barriers(&barriers[..count]).memory_barriers(memories);
         // SAFETY: the command buffer is being recorded, outside of a rendering; the images are live.
         unsafe { self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info) };
     }
 
     /// Begins drawing to one colour image and, maybe, a depth image, within `area`.
-    pub(crate) fn begin(
-        &self,
-        area: PixelRect,
-        colour: (vk::ImageView, Begin),
-        depth: Option<(vk::ImageView, Begin)>,
-    ) {
+    pub(crate) fn begin(&self, area: PixelRect, colour: Colour, depth: Option<(vk::ImageView, Begin)>) {
         self.begin_all(area, [colour], depth);
     }
 
@@ -90,14 +154,14 @@ impl Recorder<'_> {
     pub(crate) fn begin_all<const N: usize>(
         &self,
         area: PixelRect,
-        colours: [(vk::ImageView, Begin); N],
+        colours: [Colour; N],
         depth: Option<(vk::ImageView, Begin)>,
     ) {
-        let colours = colours.map(|(view, begin)| {
+        let colours = colours.map(|colour| {
             vk::RenderingAttachmentInfo::default()
-                .image_view(view)
-                .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-                .load_op(begin.op())
+                .image_view(colour.view)
+                .image_layout(colour.layout)
+                .load_op(colour.begin.op())
                 .store_op(vk::AttachmentStoreOp::STORE)
         });
         let mut info =
@@ -134,32 +198,27 @@ impl Recorder<'_> {
         unsafe { self.gpu.device.cmd_copy_buffer_to_image(self.cmd, from.raw, image.raw, layout, regions) };
     }
 
-    /// Copies parts of an image to a buffer.
-    pub(crate) fn copy_from_image(&self, image: &Image, buffer: &Buffer, regions: &[vk::BufferImageCopy]) {
-        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-        // SAFETY: both are live and the regions lie within them; the image is in this layout.
-        unsafe { self.gpu.device.cmd_copy_image_to_buffer(self.cmd, image.raw, layout, buffer.raw, regions) };
+    /// Copies parts of an image to another, which is in the layout for that.
+    pub(crate) fn copy_image(
+        &self,
+        (from, layout): (&Image, vk::ImageLayout),
+        image: &Image,
+        regions: &[vk::ImageCopy],
+    ) {
+        let target = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        // SAFETY: both are live, of texels of the same size, in these layouts, and the regions lie within them.
+        unsafe { self.gpu.device.cmd_copy_image(self.cmd, from.raw, layout, image.raw, target, regions) };
     }
 
-    /// Makes what was copied to or from the buffer, with `was`, come before what `stage` does with `access`.
-    pub(crate) fn copied(
+    /// Copies parts of an image to a buffer.
+    pub(crate) fn copy_from_image(
         &self,
+        (image, layout): (&Image, vk::ImageLayout),
         buffer: &Buffer,
-        was: vk::AccessFlags2,
-        (stage, access): (vk::PipelineStageFlags2, vk::AccessFlags2),
+        regions: &[vk::BufferImageCopy],
     ) {
-        let barriers = [vk::BufferMemoryBarrier2::default()
-            .src_stage_mask(vk::PipelineStageFlags2::COPY)
-            .src_access_mask(was)
-            .dst_stage_mask(stage)
-            .dst_access_mask(access)
-            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-            .buffer(buffer.raw)
-            .size(vk::WHOLE_SIZE)];
-        let info = vk::DependencyInfo::default().buffer_memory_barriers(&barriers);
-        // SAFETY: the command buffer is being recorded, outside of a rendering; the buffer is live.
-        unsafe { self.gpu.device.cmd_pipeline_barrier2(self.cmd, &info) };
+        // SAFETY: both are live and the regions lie within them; the image is in this layout.
+        unsafe { self.gpu.device.cmd_copy_image_to_buffer(self.cmd, image.raw, layout, buffer.raw, regions) };
     }
 
     /// Ends drawing.

@@ -14,11 +14,9 @@ use bowwave_core::{
 use shaders_spirv::interface::WATERS_MAX;
 
 use crate::{
-    canvas::Canvas,
     error::{Named, RenderError},
     frame_data::{Capacity, FrameData, frame_set_layout},
     gpu::{DeviceInfo, Gpu},
-    memory::Buffer,
     meshes::Meshes,
     passes::{
         Making,
@@ -34,9 +32,10 @@ use crate::{
     },
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
-    recorder::{Recorder, Step},
+    recorder::{Reach, Recorder, Steps},
     rects::overlap,
     ring::{Completions, FRAME_QUERY, QUERIES, SLOTS_MAX, Shared, Span, TimeOuts},
+    target::{DrawTarget, same_place},
     view,
 };
 
@@ -107,7 +106,6 @@ pub struct Renderer {
     needs: Needs,
     models: Vec<Outline>,
     slots: Vec<Slot>,
-    canvas: Canvas,
     passes: Passes,
     plan: Plan,
     _frame_set: SetLayout,
@@ -176,10 +174,10 @@ impl Renderer {
             frame_set: &frame_set,
             pool: &sets,
             size,
+            words: shared.target(0).words,
             slots: count,
             optics: config.needs.optics,
         };
-        let canvas = Canvas::new(&making)?;
         let passes = Passes::new(&making, config, models)?;
         let needs = config.needs.clone();
         let capacity = Capacity {
@@ -198,7 +196,6 @@ impl Renderer {
             shared: shared.clone(),
             models: models.iter().map(Outline::of).collect(),
             slots,
-            canvas,
             passes,
             plan: Plan::with_capacity(capacity, size),
             needs,
@@ -338,14 +335,12 @@ impl Renderer {
         }
         let overlaid = self.passes.hud.rects().filter(|_| !covered);
         self.passes.video.divide(overlaid, &mut plan.overlaid, &mut plan.bare);
-        plan.regions.clear();
-        plan.regions.extend(plan.rects.iter().map(|r| self.canvas.region(*r)));
         plan.backdrop_regions.clear();
         if WaterPass::reads_video(scene.water.method) {
             let compares = scene.water.method != ReflectionMethod::Waves;
             let below = |r| if compares { with_gradients(r, size) } else { r };
             let below = plan.waters.iter().map(|w| below(w.rect));
-            plan.backdrop_regions.extend(below.map(|r| self.canvas.region(r)));
+            plan.backdrop_regions.extend(below.map(same_place));
         }
     }
 
@@ -366,42 +361,57 @@ impl Renderer {
             device.cmd_reset_query_pool(slot.cmd, out.queries, 0, QUERIES);
         }
         stamps.write(FRAME_QUERY);
-        self.record_layers(to, &stamps, slot.data.set, &out.download, water);
+        let target = self.shared.target(index);
+        self.record_layers(to, &stamps, slot.data.set, target, water);
         if !self.plan.rects.is_empty() {
-            self.record_blends(to, &stamps, slot.data.set, &out.download, water);
+            self.record_water(to, &stamps, slot.data.set, target, water);
+            self.record_blends(to, &stamps, slot.data.set, target, water);
         }
-        let host = (vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
-        to.copied(&out.download, vk::AccessFlags2::TRANSFER_WRITE, host);
+        let mut steps = Steps::default();
+        match &out.download {
+            None => steps.add_memory(PIXELS_DRAWN, PIXELS_READ),
+            Some(_) => steps.add_memory(PIXELS_DRAWN, PIXELS_COPIED),
+        }
+        steps.record(to);
+        if let Some(download) = &out.download {
+            stamps.around(Span::Download, || target.record_download(to, download));
+            let mut steps = Steps::default();
+            steps.add_memory((PIXELS_COPIED.0, vk::AccessFlags2::TRANSFER_WRITE), PIXELS_READ);
+            steps.record(to);
+        }
         stamps.write(FRAME_QUERY + 1);
         // SAFETY: recording was begun above.
         unsafe { device.end_command_buffer(slot.cmd) }.named("vkEndCommandBuffer")?;
         Ok(slot.cmd)
     }
 
-    /// What does not depend on what is on the screen: the video, the mirrored boats, the boats.
+    /// Records what does not depend on what is on the screen: the video, the mirrored boats, the boats.
     fn record_layers(
         &self,
         to: Recorder<'_>,
         stamps: &Stamps<'_>,
         frame: vk::DescriptorSet,
-        screen: &Buffer,
+        target: &DrawTarget,
         how: Water,
     ) {
-        let Passes { video, meshes, .. } = &self.passes;
+        let Passes { video, meshes, hud, .. } = &self.passes;
         let plan = &self.plan;
         let mirror = self.passes.mirror.as_ref().filter(|_| !plan.mirrors.is_empty());
         let boats = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty());
+        let water = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty());
+        let reflect = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty());
         let mut steps = Steps::default();
-        steps.add([video.before()]);
+        steps.add_memory((PIXELS_DRAWN.0 | PIXELS_COPIED.0, vk::AccessFlags2::NONE), PIXELS_DRAWN);
         steps.add(mirror.iter().flat_map(|m| m.before()).flatten());
         steps.add(boats.iter().flat_map(|b| b.before()));
+        steps.add(water.iter().flat_map(|w| w.before(how)).flatten());
+        steps.add(reflect.iter().flat_map(|r| r.before()));
         steps.record(to);
-        let hud = &self.passes.hud;
         if plan.renewed != [0; 3] {
             stamps.around(Span::Hud, || hud.record_layer(to, frame, plan.renewed));
         }
         // No barrier between these three: a driver that runs on the processor sorts one's triangles while it fills another.
-        stamps.around(Span::Video, || video.record(to, hud.overlay(), &plan.overlaid, &plan.bare));
+        stamps.around(Span::Video, || video.record(to, target, hud.overlay(), &plan.overlaid, &plan.bare));
         if let Some(pass) = mirror {
             stamps
                 .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));
@@ -410,53 +420,73 @@ impl Renderer {
             stamps
                 .around(Span::BoatLayer, || pass.record_layer(to, frame, meshes, &plan.boats, &plan.clears));
         }
+        if plan.rects.is_empty() {
+            return;
+        }
         let mut steps = Steps::default();
-        steps.add([video.between()]);
+        steps.add_memory(PIXELS_DRAWN, PIXELS_DRAWN);
+        steps.add_memory(PIXELS_DRAWN, PIXELS_COPIED);
         steps.add(mirror.map(MirrorPass::between));
         steps.add(boats.iter().flat_map(|b| b.between()));
         steps.record(to);
-        if let Some(pass) = mirror.filter(|_| how.method == ReflectionMethod::Full) {
-            stamps.around(Span::Soften, || pass.record_soft(to, &plan.mirror_places));
-        }
-        if let Some(pass) = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty()) {
-            stamps.around(Span::Soften, || {
-                pass.record_layers(to, frame, &plan.waters, &plan.lobe_blocks);
-            });
-        }
-        stamps.around(Span::VideoCopy, || video.record_copy(to, screen));
     }
 
-    /// What blends onto the screen, in one rendering.
+    /// Records what the water needs before it is drawn, in as few steps that wait for each other as there can be.
+    fn record_water(
+        &self,
+        to: Recorder<'_>,
+        stamps: &Stamps<'_>,
+        frame: vk::DescriptorSet,
+        target: &DrawTarget,
+        how: Water,
+    ) {
+        let plan = &self.plan;
+        let Some(water) = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty()) else { return };
+        let soft = self.passes.mirror.as_ref().filter(|_| how.method == ReflectionMethod::Full);
+        let reflect = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty());
+        let (waters, lobes) = (&plan.waters, &plan.lobe_blocks);
+        let mut steps = Steps::default();
+        stamps.around(Span::Soften, || {
+            steps.add(soft.and_then(|pass| pass.record_soft(to, &plan.mirror_places)));
+            steps.add(reflect.and_then(|pass| pass.record_bands(to, frame, waters, lobes)));
+        });
+        if !plan.backdrop_regions.is_empty() {
+            stamps.around(Span::Backdrop, || {
+                target.record_copy_of(to, &water.backdrop, &plan.backdrop_regions);
+            });
+        }
+        steps.add([water.copied()]);
+        // Nothing is drawn over what is still being copied.
+        steps.add_memory((PIXELS_COPIED.0, vk::AccessFlags2::NONE), PIXELS_DRAWN);
+        steps.record(to);
+        let mut steps = Steps::default();
+        stamps.around(Span::Field, || {
+            water.record_field(to, frame, how, waters);
+            steps.add(water.found(how));
+            steps.add(reflect.and_then(|pass| pass.record_sums(to, waters, lobes)));
+        });
+        steps.record(to);
+        let mut steps = Steps::default();
+        if let Some(pass) = reflect {
+            stamps.around(Span::Layers, || {
+                steps.add(pass.record_layers(to, frame, waters, lobes).into_iter().flatten());
+            });
+        }
+        steps.record(to);
+    }
+
+    /// Records what blends onto the screen, in one rendering.
     fn record_blends(
         &self,
         to: Recorder<'_>,
         stamps: &Stamps<'_>,
         frame: vk::DescriptorSet,
-        screen: &Buffer,
+        target: &DrawTarget,
         how: Water,
     ) {
         let plan = &self.plan;
         let water = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty());
-        let written = vk::AccessFlags2::TRANSFER_WRITE;
-        let copies = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_READ | written);
-        to.copied(screen, written, copies);
-        let mut steps = Steps::default();
-        steps.add([self.canvas.before()]);
-        steps.add(water.map(WaterPass::before));
-        steps.record(to);
-        self.canvas.record_in(to, screen, &plan.regions);
-        if let Some(pass) = water.filter(|_| !plan.backdrop_regions.is_empty()) {
-            to.copy_to_image(screen, &pass.backdrop, &plan.backdrop_regions);
-        }
-        let mut steps = Steps::default();
-        steps.add([self.canvas.between()]);
-        steps.add(water.iter().flat_map(|w| w.between(how)).flatten());
-        steps.add(water.and(self.passes.mirror.as_ref()).and_then(MirrorPass::softened));
-        steps.record(to);
-        if let Some(pass) = water {
-            stamps.around(Span::Field, || pass.record_field(to, frame, how, &plan.waters));
-        }
-        if !self.canvas.begin(to, &plan.rects) {
+        if !target.begin_light(to, &plan.rects) {
             return;
         }
         if let Some(pass) = water {
@@ -483,7 +513,6 @@ impl Renderer {
             stamps.around(Span::Hud, || self.passes.hud.record(to, frame, plan.quads));
         }
         to.end();
-        self.canvas.record_out(to, screen, &plan.regions);
     }
 }
 
@@ -542,25 +571,14 @@ impl Stamps<'_> {
     }
 }
 
-/// A few image steps for one barrier.
-#[derive(Default)]
-struct Steps<'a> {
-    steps: [Option<Step<'a>>; 8],
-    count: usize,
-}
-
-impl<'a> Steps<'a> {
-    fn add(&mut self, steps: impl IntoIterator<Item = Step<'a>>) {
-        for step in steps {
-            if let Some(place) = self.steps.get_mut(self.count) {
-                *place = Some(step);
-                self.count += 1;
-            }
-        }
-    }
-
-    fn record(&self, to: Recorder<'_>) {
-        let steps = self.steps.iter().flatten().copied();
-        to.barrier(steps);
-    }
-}
+/// Pixels of the target are written, or blended with what is there.
+const PIXELS_DRAWN: Reach = (
+    vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+    vk::AccessFlags2::from_raw(
+        vk::AccessFlags2::COLOR_ATTACHMENT_READ.as_raw() | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE.as_raw(),
+    ),
+);
+/// Pixels of the target are copied.
+const PIXELS_COPIED: Reach = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_READ);
+/// A finished frame is read by the host.
+const PIXELS_READ: Reach = (vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);

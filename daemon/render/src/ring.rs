@@ -18,6 +18,7 @@ use crate::{
     error::{Named, RenderError},
     gpu::Gpu,
     memory::{Access, Buffer},
+    target::DrawTarget,
 };
 
 /// Most slots a ring can have.
@@ -56,11 +57,13 @@ fn hung(after: Duration) -> RenderError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Span {
     Video,
-    VideoCopy,
+    Download,
+    Backdrop,
     Mirror,
     Soften,
     BoatLayer,
     Field,
+    Layers,
     Water,
     Wake,
     Composite,
@@ -70,13 +73,15 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 14] = [
         Self::Video,
-        Self::VideoCopy,
+        Self::Download,
+        Self::Backdrop,
         Self::Mirror,
         Self::Soften,
         Self::BoatLayer,
         Self::Field,
+        Self::Layers,
         Self::Water,
         Self::Wake,
         Self::Composite,
@@ -88,9 +93,9 @@ impl Span {
     /// The pass whose time it is part of.
     fn pass(self) -> Pass {
         match self {
-            Self::Video | Self::VideoCopy => Pass::Video,
+            Self::Video | Self::Download => Pass::Video,
             Self::Mirror | Self::Soften => Pass::Mirror,
-            Self::Field | Self::Water => Pass::Water,
+            Self::Backdrop | Self::Field | Self::Layers | Self::Water => Pass::Water,
             Self::Wake | Self::Spray => Pass::Wake,
             Self::BoatLayer | Self::Composite => Pass::Boats,
             Self::Rounds => Pass::Rounds,
@@ -111,7 +116,8 @@ pub(crate) const FRAME_QUERY: u32 = QUERIES - 2;
 
 /// What one slot gives back.
 pub(crate) struct SlotOut {
-    pub(crate) download: Buffer,
+    /// Where the frame is copied to when it is drawn; without one, the target is the slot's own and finished in place.
+    pub(crate) download: Option<Buffer>,
     pub(crate) queries: vk::QueryPool,
 }
 
@@ -120,6 +126,8 @@ pub(crate) struct Shared {
     pub(crate) gpu: Arc<Gpu>,
     pub(crate) timeline: vk::Semaphore,
     pub(crate) slots: Vec<SlotOut>,
+    /// One for each slot, or one for all.
+    targets: Vec<DrawTarget>,
     pub(crate) size: (u32, u32),
     time_outs: TimeOuts,
     state: Mutex<State>,
@@ -162,15 +170,21 @@ impl Shared {
             gpu: gpu.clone(),
             timeline,
             slots: Vec::with_capacity(slots),
+            targets: Vec::with_capacity(slots),
             size,
             time_outs,
             state: Mutex::default(),
             changed: Condvar::new(),
         };
         for _ in 0..slots.clamp(1, SLOTS_MAX) {
+            if shared.targets.is_empty() || shared.targets[0].is_finished_in_place() {
+                shared.targets.push(DrawTarget::new(gpu, size)?);
+            }
             let bytes = u64::from(size.0) * u64::from(size.1) * 4;
-            let usage = vk::BufferUsageFlags::TRANSFER_DST | vk::BufferUsageFlags::TRANSFER_SRC;
-            let download = Buffer::new(gpu, "finished frames", bytes, usage, Access::Download)?;
+            let usage = vk::BufferUsageFlags::TRANSFER_DST;
+            let download = (!shared.targets[0].is_finished_in_place())
+                .then(|| Buffer::new(gpu, "finished frames", bytes, usage, Access::Download))
+                .transpose()?;
             let info =
                 vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(QUERIES);
             // SAFETY: `info` is complete.
@@ -178,6 +192,11 @@ impl Shared {
             shared.slots.push(SlotOut { download, queries });
         }
         Ok(shared)
+    }
+
+    /// What a slot's frame is drawn to.
+    pub(crate) fn target(&self, slot: usize) -> &DrawTarget {
+        &self.targets[slot.min(self.targets.len() - 1)]
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -440,10 +459,10 @@ impl Finished {
 
     /// The picture: sRGB codes, R, G, B, A, rows from the top, no padding.
     pub fn rgba(&self) -> &[u8] {
-        match self.shared.slots.get(self.slot) {
-            // SAFETY: the GPU has finished this slot and does not write it again before `self` is dropped.
-            Some(slot) => unsafe { slot.download.bytes() },
-            None => &[],
+        // SAFETY: the GPU has finished this slot and does not write it again before `self` is dropped.
+        match self.shared.slots.get(self.slot).and_then(|slot| slot.download.as_ref()) {
+            Some(download) => unsafe { download.bytes() },
+            None => unsafe { self.shared.target(self.slot).bytes() },
         }
     }
 }

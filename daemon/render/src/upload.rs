@@ -8,7 +8,7 @@ use crate::{
     error::{Named, RenderError},
     gpu::Gpu,
     memory::{Access, Buffer, Image},
-    passes::{COPIED_TO, SAMPLED},
+    passes::{COPIED_TO, NOTHING, SAMPLED},
     recorder::{Recorder, Step},
 };
 
@@ -27,11 +27,46 @@ impl Drop for Once {
         if self.gpu.is_abandoned() {
             return;
         }
-        // SAFETY: `upload_image` waits for the fence before it returns, or gives the device up; null handles are allowed.
+        // SAFETY: `run_once` waits for the fence before it returns, or gives the device up; null handles are allowed.
         unsafe {
             self.gpu.device.destroy_command_pool(self.pool, None);
             self.gpu.device.destroy_fence(self.fence, None);
         }
+    }
+}
+
+/// Runs what `record` records, and waits for it.
+pub(crate) fn run_once(gpu: &Arc<Gpu>, record: impl FnOnce(Recorder<'_>)) -> Result<(), RenderError> {
+    let device = &gpu.device;
+    let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.family);
+    // SAFETY: `info` is complete.
+    let pool = unsafe { device.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
+    let mut once = Once { gpu: gpu.clone(), pool, fence: vk::Fence::null() };
+    // SAFETY: the info is complete.
+    once.fence =
+        unsafe { device.create_fence(&vk::FenceCreateInfo::default(), None) }.named("vkCreateFence")?;
+    let info = vk::CommandBufferAllocateInfo::default().command_pool(once.pool).command_buffer_count(1);
+    // SAFETY: the pool is live.
+    let cmds = unsafe { device.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?;
+    let cmd = cmds.first().copied().unwrap_or_default();
+    // SAFETY: a fresh command buffer; what is recorded outlives the wait below.
+    unsafe {
+        device
+            .begin_command_buffer(cmd, &vk::CommandBufferBeginInfo::default())
+            .named("vkBeginCommandBuffer")?;
+        record(Recorder { gpu, cmd });
+        device.end_command_buffer(cmd).named("vkEndCommandBuffer")?;
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
+        let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
+        device.queue_submit2(gpu.queue, &[submit], once.fence).named("vkQueueSubmit2")?;
+    }
+    // SAFETY: the fence is live and was submitted above.
+    match unsafe { device.wait_for_fences(&[once.fence], true, UPLOAD_MS * 1_000_000) } {
+        Err(vk::Result::TIMEOUT) => {
+            gpu.abandon();
+            Err(RenderError::Hung { what: "an upload", after_ms: UPLOAD_MS })
+        }
+        result => result.named("vkWaitForFences"),
     }
 }
 
@@ -63,39 +98,9 @@ pub(crate) fn upload_image(gpu: &Arc<Gpu>, image: &Image, levels: &[&[u8]]) -> R
         });
         offset += bytes.len().next_multiple_of(16) as u64;
     }
-    let device = &gpu.device;
-    let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.family);
-    // SAFETY: `info` is complete.
-    let pool = unsafe { device.create_command_pool(&info, None) }.named("vkCreateCommandPool")?;
-    let mut once = Once { gpu: gpu.clone(), pool, fence: vk::Fence::null() };
-    // SAFETY: the info is complete.
-    once.fence =
-        unsafe { device.create_fence(&vk::FenceCreateInfo::default(), None) }.named("vkCreateFence")?;
-    let info = vk::CommandBufferAllocateInfo::default().command_pool(once.pool).command_buffer_count(1);
-    // SAFETY: the pool is live.
-    let cmds = unsafe { device.allocate_command_buffers(&info) }.named("vkAllocateCommandBuffers")?;
-    let cmd = cmds.first().copied().unwrap_or_default();
-    let to = Recorder { gpu, cmd };
-    let nothing = (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
-    // SAFETY: a fresh command buffer; buffer, image and pool outlive the wait below.
-    unsafe {
-        device
-            .begin_command_buffer(cmd, &vk::CommandBufferBeginInfo::default())
-            .named("vkBeginCommandBuffer")?;
-        to.barrier([Step { image, from: nothing, to: COPIED_TO }]);
-        device.cmd_copy_buffer_to_image(cmd, staging.raw, image.raw, COPIED_TO.2, &regions);
+    run_once(gpu, |to| {
+        to.barrier([Step { image, from: NOTHING, to: COPIED_TO }]);
+        to.copy_to_image(&staging, image, &regions);
         to.barrier([Step { image, from: COPIED_TO, to: SAMPLED }]);
-        device.end_command_buffer(cmd).named("vkEndCommandBuffer")?;
-        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
-        let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
-        device.queue_submit2(gpu.queue, &[submit], once.fence).named("vkQueueSubmit2")?;
-    }
-    // SAFETY: the fence is live and was submitted above.
-    match unsafe { device.wait_for_fences(&[once.fence], true, UPLOAD_MS * 1_000_000) } {
-        Err(vk::Result::TIMEOUT) => {
-            gpu.abandon();
-            Err(RenderError::Hung { what: "an upload", after_ms: UPLOAD_MS })
-        }
-        result => result.named("vkWaitForFences"),
-    }
+    })
 }

@@ -14,7 +14,7 @@ use crate::{
     meshes::Meshes,
     passes::{DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED},
     pipeline::{Blend, Bound, DEPTH, Pipeline, PipelineShape, SAMPLES, Sampler, SetLayout, UNORM},
-    recorder::{Begin, Recorder, Step},
+    recorder::{Begin, Colour, Recorder, Step},
     rects::joined,
 };
 
@@ -199,7 +199,7 @@ impl BoatsPass {
         clears: &[vk::ClearRect],
     ) {
         let Some(area) = boats.iter().map(|b| b.rect).reduce(joined) else { return };
-        to.begin(area, (self.colour.view, Begin::Keep), Some((self.depth.view, Begin::Keep)));
+        to.begin(area, Colour::new(self.colour.view, Begin::Keep), Some((self.depth.view, Begin::Keep)));
         let (width, height) = self.size;
         to.window([0.0, 0.0, width as f32, height as f32], area);
         to.clear(clears);

@@ -16,7 +16,7 @@ use crate::{
     memory::{Image, ImageShape},
     passes::{DRAWN, FORGET_READ, Making, SAMPLED},
     pipeline::{Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
-    recorder::{Begin, Recorder, Step},
+    recorder::{Begin, Colour, Recorder, Step},
     upload::upload_image,
 };
 
@@ -123,7 +123,7 @@ impl HudPass {
         let area = PixelRect { x: 0, y: 0, width, height };
         let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
         to.barrier([Step { image: &self.layer, from: was, to: DRAWN }]);
-        to.begin(area, (self.layer.view, Begin::Zero), None);
+        to.begin(area, Colour::new(self.layer.view, Begin::Zero), None);
         to.window([0.0, 0.0, width as f32, height as f32], area);
         self.record(to, frame, counts);
         to.end();

@@ -15,7 +15,7 @@ use crate::{
         boats::{BoatDraw, BoatPipelines},
     },
     pipeline::{Blend, Bound, DEPTH, LIGHT, Pipeline, PipelineShape, Sampler, SetLayout},
-    recorder::{Begin, Recorder, Step},
+    recorder::{Begin, Colour, Recorder, Step},
     rects::joined,
 };
 
@@ -89,20 +89,15 @@ impl MirrorPass {
         Step { image: &self.colour, from: DRAWN, to: SAMPLED }
     }
 
-    /// Step of the softened layer from being drawn to being sampled.
-    pub(crate) fn softened(&self) -> Option<Step<'_>> {
-        self.soft.as_ref().map(|s| Step { image: &s.image, from: DRAWN, to: SAMPLED })
-    }
-
     /// The softened layer, where there is one.
     pub(crate) fn soft_view(&self) -> Option<vk::ImageView> {
         self.soft.as_ref().map(|s| s.image.view)
     }
 
-    /// Softens what was drawn on `places`.
-    pub(crate) fn record_soft(&self, to: Recorder<'_>, places: &[Placed]) {
-        let Some(soft) = &self.soft else { return };
-        let Some(used) = places.iter().map(|p| p.place).reduce(joined) else { return };
+    /// Softens what was drawn on `places`; returns the step that makes it ready to be sampled.
+    pub(crate) fn record_soft(&self, to: Recorder<'_>, places: &[Placed]) -> Option<Step<'_>> {
+        let soft = self.soft.as_ref()?;
+        let used = places.iter().map(|p| p.place).reduce(joined)?;
         let third = |v: u32| v / SOFT;
         let area = PixelRect {
             x: third(used.x),
@@ -111,11 +106,12 @@ impl MirrorPass {
             height: third(used.height),
         };
         let (width, height) = (soft.image.shape.width, soft.image.shape.height);
-        to.begin(area, (soft.image.view, Begin::Forget), None);
+        to.begin(area, Colour::new(soft.image.view, Begin::Forget), None);
         to.window([0.0, 0.0, width as f32, height as f32], area);
         to.bind(&soft.pipeline, &[soft.set]);
         to.draw(3, 1);
         to.end();
+        Some(Step { image: &soft.image, from: DRAWN, to: SAMPLED })
     }
 
     /// Draws the mirrored boats, each onto its place.
@@ -128,7 +124,7 @@ impl MirrorPass {
         places: &[Placed],
     ) {
         let Some(area) = places.iter().map(|p| p.place).reduce(joined) else { return };
-        to.begin(area, (self.colour.view, Begin::Zero), Some((self.depth.view, Begin::Zero)));
+        to.begin(area, Colour::new(self.colour.view, Begin::Zero), Some((self.depth.view, Begin::Zero)));
         meshes.bind(to);
         for (boat, placed) in boats.iter().zip(places) {
             to.window(placed.viewport(self.size), placed.place);

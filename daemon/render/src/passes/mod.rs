@@ -18,6 +18,7 @@ use bowwave_core::geometry::{Bend, Optics};
 use crate::{
     gpu::Gpu,
     pipeline::{SetLayout, SetPool},
+    target::Words,
 };
 
 /// What every pass is made from.
@@ -29,6 +30,8 @@ pub(crate) struct Making<'a> {
     pub(crate) pool: &'a SetPool,
     /// The screen, pixels.
     pub(crate) size: (u32, u32),
+    /// How the video pass sees what frames are drawn to.
+    pub(crate) words: Words,
     /// Frames in flight.
     pub(crate) slots: usize,
     /// What lens and shutter of the camera do.
@@ -50,6 +53,9 @@ impl Making<'_> {
 /// A stage, an access and a layout of an image.
 pub(crate) type Use = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);
 
+/// Before an image's first use.
+pub(crate) const NOTHING: Use =
+    (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
 /// Contents do not matter, but what came before must be over.
 pub(crate) const FORGET_READ: Use =
     (vk::PipelineStageFlags2::FRAGMENT_SHADER, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
@@ -79,9 +85,6 @@ pub(crate) const SAMPLED: Use = (
     vk::AccessFlags2::SHADER_SAMPLED_READ,
     vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
 );
-/// Source of a copy.
-pub(crate) const COPIED_FROM: Use =
-    (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_READ, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
 /// Target of a copy.
 pub(crate) const COPIED_TO: Use =
     (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE, vk::ImageLayout::TRANSFER_DST_OPTIMAL);

@@ -14,7 +14,7 @@ use crate::{
     memory::{Image, ImageShape},
     passes::{DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass, water::WaterDraw},
     pipeline::{Blend, Bound, LIGHT, Pipeline, PipelineShape, SRGB, SUMS, Sampler, SetLayout, UNORM},
-    recorder::{Begin, Recorder, Step},
+    recorder::{Begin, Colour, Recorder, Step},
 };
 
 /// A boat's strips of water, and what is thrown back there.
@@ -86,6 +86,12 @@ impl Stage {
             },
         )?;
         Ok(Self { pipeline, set, _layout: layout })
+    }
+}
+
+impl Stage {
+    fn push_index(&self, to: Recorder<'_>, index: u32) {
+        to.push(&self.pipeline, &DrawBlock { rect: [0.0; 4], index, first: 0 });
     }
 }
 
@@ -164,58 +170,70 @@ impl ReflectPass {
         Ok(Self { bands, sums, layers, to_bands, to_sums, to_layers, to_screen, _samplers: samplers })
     }
 
-    /// Finds what water throws back. The mirror layer is ready to be sampled; `lobes` go with `boats`.
+    /// Steps from what the frame before did to being drawn.
+    pub(crate) fn before(&self) -> [Step<'_>; 4] {
+        let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
+        let [thrown, taken] = &self.layers;
+        [&self.bands, &self.sums, thrown, taken].map(|image| Step { image, from: was, to: DRAWN })
+    }
+
+    /// Collapses the mirrored boats, whose layer is ready to be sampled, to bands. `lobes` go with `boats`.
+    pub(crate) fn record_bands(
+        &self,
+        to: Recorder<'_>,
+        frame: vk::DescriptorSet,
+        boats: &[WaterDraw],
+        lobes: &[LobeBlock],
+    ) -> Option<Step<'_>> {
+        let area = strip(0, 0, LOBE_COLUMNS, rows(boats, LOBE_BANDS)?);
+        to.begin(area, Colour::new(self.bands.view, Begin::Forget), None);
+        to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
+        for (boat, [bands, _, columns, _]) in with_sizes(boats, lobes) {
+            to.window(viewport(&self.bands), strip(boat.index, LOBE_BANDS, columns, bands));
+            self.to_bands.push_index(to, boat.index);
+            to.draw(3, 1);
+        }
+        to.end();
+        Some(sampled(&self.bands))
+    }
+
+    /// Sums the bands, which are ready to be sampled.
+    pub(crate) fn record_sums(
+        &self,
+        to: Recorder<'_>,
+        boats: &[WaterDraw],
+        lobes: &[LobeBlock],
+    ) -> Option<Step<'_>> {
+        let area = strip(0, 0, LOBE_COLUMNS + 1, rows(boats, LOBE_BANDS)?);
+        to.begin(area, Colour::new(self.sums.view, Begin::Forget), None);
+        to.bind(&self.to_sums.pipeline, &[self.to_sums.set]);
+        for (boat, [bands, _, columns, _]) in with_sizes(boats, lobes) {
+            to.window(viewport(&self.sums), strip(boat.index, LOBE_BANDS, columns + 1, bands));
+            to.draw(3, 1);
+        }
+        to.end();
+        Some(sampled(&self.sums))
+    }
+
+    /// Finds what water throws back from the sums, which are ready to be sampled.
     pub(crate) fn record_layers(
         &self,
         to: Recorder<'_>,
         frame: vk::DescriptorSet,
         boats: &[WaterDraw],
         lobes: &[LobeBlock],
-    ) {
-        let Some(count) = boats.iter().map(|b| b.index + 1).max() else { return };
-        let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
-        let drawn = |image| Step { image, from: was, to: DRAWN };
-        let sampled = |image| Step { image, from: DRAWN, to: SAMPLED };
+    ) -> Option<[Step<'_>; 2]> {
         let layers = self.layers.each_ref();
-        to.barrier([&self.bands, &self.sums].map(drawn));
-        to.barrier(layers.map(drawn));
-        let boats = || boats.iter().zip(lobes.iter().map(|l| l.sizes.map(i32::unsigned_abs)));
-        // Each boat has a strip of its own, and draws in as much of it as it has.
-        let strip =
-            |index: u32, of: usize, width, height| PixelRect { x: 0, y: index * of as u32, width, height };
-        let viewport = |image: &Image| [0.0, 0.0, image.shape.width as f32, image.shape.height as f32];
-        let push = |stage: &Stage, index| {
-            to.push(&stage.pipeline, &DrawBlock { rect: [0.0; 4], index, first: 0 });
-        };
-        let rows = count * LOBE_BANDS as u32;
-        to.begin(strip(0, 0, LOBE_COLUMNS, rows), (self.bands.view, Begin::Forget), None);
-        to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
-        for (boat, [bands, _, columns, _]) in boats() {
-            to.window(viewport(&self.bands), strip(boat.index, LOBE_BANDS, columns, bands));
-            push(&self.to_bands, boat.index);
-            to.draw(3, 1);
-        }
-        to.end();
-        to.barrier([sampled(&self.bands)]);
-        to.begin(strip(0, 0, LOBE_COLUMNS + 1, rows), (self.sums.view, Begin::Forget), None);
-        to.bind(&self.to_sums.pipeline, &[self.to_sums.set]);
-        for (boat, [bands, _, columns, _]) in boats() {
-            to.window(viewport(&self.sums), strip(boat.index, LOBE_BANDS, columns + 1, bands));
-            to.draw(3, 1);
-        }
-        to.end();
-        to.barrier([sampled(&self.sums)]);
-        let rows = count * LOBE_STEPS as u32;
-        let targets = layers.map(|l| (l.view, Begin::Forget));
-        to.begin_all(strip(0, 0, LAYER_COLUMNS, rows), targets, None);
+        let area = strip(0, 0, LAYER_COLUMNS, rows(boats, LOBE_STEPS)?);
+        to.begin_all(area, layers.map(|l| Colour::new(l.view, Begin::Forget)), None);
         to.bind(&self.to_layers.pipeline, &[frame, self.to_layers.set]);
-        for (boat, [_, steps, _, columns]) in boats() {
+        for (boat, [_, steps, _, columns]) in with_sizes(boats, lobes) {
             to.window(viewport(layers[0]), strip(boat.index, LOBE_STEPS, columns, steps));
-            push(&self.to_layers, boat.index);
+            self.to_layers.push_index(to, boat.index);
             to.draw(3, 1);
         }
         to.end();
-        to.barrier(layers.map(sampled));
+        Some(layers.map(sampled))
     }
 
     /// Draws, within a rendering to the screen.
@@ -228,4 +246,31 @@ impl ReflectPass {
             to.draw(4, boat.strips);
         }
     }
+}
+
+/// A step from being drawn to being sampled.
+fn sampled(image: &Image) -> Step<'_> {
+    Step { image, from: DRAWN, to: SAMPLED }
+}
+
+/// Each boat has a strip of its own, and draws in as much of it as it has.
+fn strip(index: u32, of: usize, width: u32, height: u32) -> PixelRect {
+    PixelRect { x: 0, y: index * of as u32, width, height }
+}
+
+fn viewport(image: &Image) -> [f32; 4] {
+    [0.0, 0.0, image.shape.width as f32, image.shape.height as f32]
+}
+
+/// Rows that the strips of all boats take up, of so many each; `None` without boats.
+fn rows(boats: &[WaterDraw], each: usize) -> Option<u32> {
+    boats.iter().map(|b| (b.index + 1) * each as u32).max()
+}
+
+/// Each boat with its bands, steps, columns of its picture and columns of its layers.
+fn with_sizes<'a>(
+    boats: &'a [WaterDraw],
+    lobes: &'a [LobeBlock],
+) -> impl Iterator<Item = (&'a WaterDraw, [u32; 4])> {
+    boats.iter().zip(lobes.iter().map(|l| l.sizes.map(i32::unsigned_abs)))
 }

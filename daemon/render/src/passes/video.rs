@@ -1,6 +1,5 @@
 //! The camera's picture on the whole screen. The shader reads its bytes as words (see [`super::pictures`]); conversion, scaling
-//! and cropping happen there. A fragment makes up to four pixels and writes them as one packed texel: on a driver that runs on
-//! the processor that takes 0.4 times the time of a pixel each.
+//! and cropping happen there. A fragment writes as many pixels as a word of the target holds.
 
 use std::sync::Arc;
 
@@ -14,14 +13,14 @@ use shaders_spirv::{SCREEN_VERT, VIDEO_FRAG, VIDEO_OVERLAID_FRAG, interface::Vid
 use crate::{
     error::RenderError,
     gpu::Gpu,
-    memory::{Buffer, Image, ImageShape},
     passes::{
-        COPIED_FROM, DRAWN, Making,
+        Making,
         pictures::{PictureCounts, PicturePath, PictureShape, Pictures},
     },
     pipeline::{Blend, Pipeline, PipelineShape, SetLayout},
-    recorder::{Begin, Recorder, Step},
+    recorder::Recorder,
     rects::around_all,
+    target::{DrawTarget, Words},
 };
 
 /// The video pass.
@@ -29,10 +28,8 @@ pub(crate) struct VideoPass {
     gpu: Arc<Gpu>,
     size: (u32, u32),
     slots: usize,
-    /// Pixels a fragment.
-    run: u32,
-    /// The screen as texels of `run` pixels.
-    packed: Image,
+    /// What a fragment writes.
+    words: Words,
     layout: SetLayout,
     pictures: Option<Pictures>,
     path: PicturePath,
@@ -52,12 +49,8 @@ impl VideoPass {
     ) -> Result<Self, RenderError> {
         let kinds = [vk::DescriptorType::UNIFORM_TEXEL_BUFFER; 2];
         let layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let (run, format) = run_of(making.size.0);
-        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
-        let shape = ImageShape::new((making.size.0 / run, making.size.1), format, usage);
         let mut pass = Self {
-            run,
-            packed: Image::new(making.gpu, "video", shape)?,
+            words: making.words,
             gpu: making.gpu.clone(),
             size: making.size,
             slots: making.slots,
@@ -78,7 +71,7 @@ impl VideoPass {
     fn reshape(&mut self, shape: PictureShape) -> Result<(), RenderError> {
         self.pictures = None;
         // The shader takes words, and where it can, pairs of them.
-        let in_pairs = shape.format == PixelFormat::Yuyv && self.run == 4 && !self.is_scaled(shape);
+        let in_pairs = shape.format == PixelFormat::Yuyv && self.words.run == 4 && !self.is_scaled(shape);
         self.pictures = Some(Pictures::new(&self.gpu, &self.layout, shape, in_pairs, self.slots)?);
         self.make_pipeline(shape)
     }
@@ -101,12 +94,12 @@ impl VideoPass {
                         vertex: SCREEN_VERT,
                         fragment,
                         vertex_constants: &[],
-                        constants: &[format_constant(shape.format), u32::from(scaled), self.run],
+                        constants: &[format_constant(shape.format), u32::from(scaled), self.words.run],
                         sets,
                         push: size_of::<VideoBlock>(),
                         vertices: None,
                         topology: vk::PrimitiveTopology::TRIANGLE_LIST,
-                        colour: self.packed.shape.format,
+                        colour: self.words.format,
                         targets: 1,
                         blend: Blend::Replace,
                         cull: None,
@@ -163,38 +156,27 @@ impl VideoPass {
         (self.path, self.counts)
     }
 
-    /// Step of the packed pixels from the frame before to being drawn.
-    pub(crate) fn before(&self) -> Step<'_> {
-        let was = (COPIED_FROM.0, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED);
-        Step { image: &self.packed, from: was, to: DRAWN }
-    }
-
-    /// Step of the packed pixels to being copied.
-    pub(crate) fn between(&self) -> Step<'_> {
-        Step { image: &self.packed, from: DRAWN, to: COPIED_FROM }
-    }
-
-    /// The packed pixels, as rectangles of texels: those that hold some of `overlaid`, and all others.
+    /// The screen as rectangles of words: those that hold some of `overlaid`, and all others.
     pub(crate) fn divide(
         &self,
         overlaid: impl Iterator<Item = PixelRect>,
         over: &mut Vec<PixelRect>,
         rest: &mut Vec<PixelRect>,
     ) {
-        let (width, height) = (self.packed.shape.width, self.packed.shape.height);
+        let (run, width, height) = (self.words.run, self.size.0 / self.words.run, self.size.1);
         over.clear();
         over.extend(overlaid.map(|r| {
-            let (first, end) = (r.x / self.run, (r.x + r.width).div_ceil(self.run).min(width));
+            let (first, end) = (r.x / run, (r.x + r.width).div_ceil(run).min(width));
             PixelRect { x: first, width: end - first, ..r }
         }));
         around_all(PixelRect { x: 0, y: 0, width, height }, over, rest);
     }
 
-    /// Draws the current picture over the whole screen, as packed pixels divided by [`VideoPass::divide`], with `overlay` over it
-    /// where it is wanted.
+    /// Draws the current picture over all of `target`, divided by [`VideoPass::divide`], with `overlay` over it where it is wanted.
     pub(crate) fn record(
         &self,
         to: Recorder<'_>,
+        target: &DrawTarget,
         overlay: vk::DescriptorSet,
         overlaid: &[PixelRect],
         rest: &[PixelRect],
@@ -203,10 +185,7 @@ impl VideoPass {
         let shape = pictures.shape;
         let index = pipeline_index(shape.format, self.is_scaled(shape));
         let (Some([alone, both]), Some(set)) = (&self.pipelines[index], pictures.set()) else { return };
-        let (width, height) = (self.packed.shape.width, self.packed.shape.height);
-        let area = PixelRect { x: 0, y: 0, width, height };
-        to.begin(area, (self.packed.view, Begin::Forget), None);
-        to.window([0.0, 0.0, width as f32, height as f32], area);
+        target.begin_words(to);
         let block = covering(shape, self.size);
         to.bind(alone, &[set]);
         to.push(alone, &block);
@@ -224,25 +203,6 @@ impl VideoPass {
         }
         to.end();
     }
-
-    /// Copies the whole screen to a frame's buffer.
-    pub(crate) fn record_copy(&self, to: Recorder<'_>, buffer: &Buffer) {
-        let region = vk::BufferImageCopy {
-            image_subresource: vk::ImageSubresourceLayers {
-                aspect_mask: vk::ImageAspectFlags::COLOR,
-                mip_level: 0,
-                base_array_layer: 0,
-                layer_count: 1,
-            },
-            image_extent: vk::Extent3D {
-                width: self.packed.shape.width,
-                height: self.packed.shape.height,
-                depth: 1,
-            },
-            ..vk::BufferImageCopy::default()
-        };
-        to.copy_from_image(&self.packed, buffer, &[region]);
-    }
 }
 
 /// The shader's number of a format.
@@ -256,15 +216,6 @@ fn format_constant(format: PixelFormat) -> u32 {
 
 fn pipeline_index(format: PixelFormat, scaled: bool) -> usize {
     format_constant(format) as usize * 2 + usize::from(scaled)
-}
-
-/// Pixels a fragment, and the format of a texel that holds them.
-fn run_of(width: u32) -> (u32, vk::Format) {
-    match width {
-        w if w.is_multiple_of(4) => (4, vk::Format::R32G32B32A32_UINT),
-        w if w.is_multiple_of(2) => (2, vk::Format::R32G32_UINT),
-        _ => (1, vk::Format::R32_UINT),
-    }
 }
 
 /// How a picture of `shape` covers a screen of `size`: as `Lens::covering`, scaled to leave nothing free, centred.

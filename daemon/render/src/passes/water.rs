@@ -13,7 +13,7 @@ use crate::{
     memory::{Image, ImageShape},
     passes::{COPIED_TO, DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass},
     pipeline::{Blend, Bound, Pipeline, PipelineShape, Sampler, SetLayout, UNORM},
-    recorder::{Begin, Recorder, Step},
+    recorder::{Begin, Colour, Recorder, Step},
     rects::joined,
 };
 
@@ -129,20 +129,26 @@ impl WaterPass {
         self.variants.iter().find(|v| (v.method, v.shadow) == wanted)
     }
 
-    /// Step of the backdrop from what the frame before did to being copied to.
-    pub(crate) fn before(&self) -> Step<'_> {
+    /// Steps from what the frame before did: of the backdrop to being copied to, and of the field to being drawn.
+    pub(crate) fn before(&self, water: Water) -> [Option<Step<'_>>; 2] {
         let was = (FORGET_READ.0 | COPIED_TO.0, COPIED_TO.1, vk::ImageLayout::UNDEFINED);
-        Step { image: &self.backdrop, from: was, to: COPIED_TO }
-    }
-
-    /// Steps of the backdrop to being sampled, and of the field to being drawn.
-    pub(crate) fn between(&self, water: Water) -> [Option<Step<'_>>; 2] {
-        let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
+        let was_drawn = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
         let field = self.field.as_ref().filter(|_| has_field(water.method));
         [
-            Some(Step { image: &self.backdrop, from: COPIED_TO, to: SAMPLED }),
-            field.map(|f| Step { image: &f.image, from: was, to: DRAWN }),
+            Some(Step { image: &self.backdrop, from: was, to: COPIED_TO }),
+            field.map(|f| Step { image: &f.image, from: was_drawn, to: DRAWN }),
         ]
+    }
+
+    /// Step of the backdrop to being sampled.
+    pub(crate) fn copied(&self) -> Step<'_> {
+        Step { image: &self.backdrop, from: COPIED_TO, to: SAMPLED }
+    }
+
+    /// Step of the field from being drawn to being sampled, where the method needs it.
+    pub(crate) fn found(&self, water: Water) -> Option<Step<'_>> {
+        let field = self.field.as_ref().filter(|_| has_field(water.method));
+        field.map(|f| Step { image: &f.image, from: DRAWN, to: SAMPLED })
     }
 
     /// Finds how the video changes beneath the boats' reflections, where the method needs it.
@@ -157,7 +163,7 @@ impl WaterPass {
             return;
         };
         let Some(area) = boats.iter().map(|b| field.cells(b.rect)).reduce(joined) else { return };
-        to.begin(area, (field.image.view, Begin::Forget), None);
+        to.begin(area, Colour::new(field.image.view, Begin::Forget), None);
         let (width, height) = (self.size.0 as f32, self.size.1 as f32);
         to.window([0.0, 0.0, width / FIELD_CELL.0 as f32, height / FIELD_CELL.1 as f32], area);
         to.bind(&field.pipeline, &[frame, field.set]);
@@ -169,7 +175,6 @@ impl WaterPass {
             to.draw(4, boat.count);
         }
         to.end();
-        to.barrier([Step { image: &field.image, from: DRAWN, to: SAMPLED }]);
     }
 
     /// Draws, within a rendering to the screen.
