@@ -15,7 +15,7 @@ layout(location = 0) out vec4 colour;
 
 void main() {
     vec2 moved = fwidth(spray.xy);
-    if (texelFetch(boats_depth, ivec2(gl_FragCoord.xy), 0).r > gl_FragCoord.z) {
+    if (spray.w < 0.01 || texelFetch(boats_depth, ivec2(gl_FragCoord.xy), 0).r > gl_FragCoord.z) {
         discard;
     }
     float unused;

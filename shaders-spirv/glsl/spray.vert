@@ -9,7 +9,7 @@ layout(location = 1) flat out WakeHead head;
 layout(location = 0) out vec4 spray;  // place on the water, height in the sheet (0 to 1), cover
 
 // Steps along a sheet.
-const int STEPS = 16;
+const int STEPS = 10;
 
 // The track so many metres behind the bow.
 WakePoint on_track(float along) {

@@ -26,13 +26,14 @@ layout(set = 1, binding = 0) uniform usampler2D overlay;
 
 layout(location = 0) out uvec4 pixels;
 
+// Codes to the nearest byte. By signed numbers: processors convert these in one step, and unsigned ones in many.
 uint pack(vec3 c) {
-    uvec3 u = uvec3(clamp(c + 0.5, 0.0, 255.5));
-    return u.x | (u.y << 8) | (u.z << 16) | 0xff000000u;
+    ivec3 u = ivec3(clamp(c + 0.5, 0.0, 255.5));
+    return uint(u.x | (u.y << 8) | (u.z << 16)) | 0xff000000u;
 }
 
 vec4 bytes(uint w) {
-    return vec4(w & 255u, (w >> 8) & 255u, (w >> 16) & 255u, w >> 24);
+    return vec4(ivec4(w & 255u, (w >> 8) & 255u, (w >> 16) & 255u, w >> 24));
 }
 
 uint byte(uint w, int i) {

@@ -206,7 +206,8 @@ impl Running {
             picture: None,
             time_outs: TimeOuts::default(),
         };
-        let (renderer, completions) = Renderer::new(&config, models)?;
+        let (mut renderer, completions) = Renderer::new(&config, models)?;
+        renderer.time_every(4);
         let pictures = (0..4)
             .map(|phase| picture(case.format, case.size.0, case.size.1, phase))
             .collect::<Result<Vec<_>, _>>()?;

@@ -27,10 +27,10 @@ use crate::{
         wake::WakeDraw,
         water::WaterDraw,
     },
-    rects::{corners, cut, joined, overlap, rect},
+    rects::{around_all, corners, cut, joined, overlap, rect},
     rounds::round_block,
     view,
-    wake::{spray_rect, strip_rects, wake_block},
+    wake::{WakePlan, spray_rect, strip_rects, wake_plan},
     water::{self, HullLine, PHYSICS_WAVES, PhysicsSea, hull_line, mirror_scale, physics_waves, water_block},
 };
 
@@ -108,6 +108,8 @@ pub(crate) struct Plan {
     pub(crate) hulls: Vec<PixelRect>,
     /// The same for clearing.
     pub(crate) clears: Vec<vk::ClearRect>,
+    /// Pixels beside hulls whose depth alone is asked for.
+    pub(crate) depth_clears: Vec<vk::ClearRect>,
     /// The frame's list: rectangles of `hulls`, then for each of `waters` its strips and its rectangles.
     pub(crate) list: Vec<[f32; 4]>,
     /// What is blended into, as it comes: rectangles may overlap.
@@ -128,6 +130,7 @@ pub(crate) struct Plan {
     /// Boats of the scene beside whose hull foam stands.
     sprayed: Vec<(usize, PixelRect)>,
     rest: Vec<PixelRect>,
+    outside: Vec<PixelRect>,
     waves: Option<Waves>,
     physics_sea: PhysicsSea,
 }
@@ -157,7 +160,8 @@ impl Plan {
             wakes: Vec::with_capacity(wakes),
             rounds: Vec::with_capacity(rounds * 4),
             hulls: Vec::with_capacity(HULL_RECTS_MAX),
-            clears: Vec::with_capacity(2 * HULL_RECTS_MAX),
+            clears: Vec::with_capacity(HULL_RECTS_MAX),
+            depth_clears: Vec::with_capacity(HULL_RECTS_MAX),
             // The boat that is one too many is found once its strips are written.
             list: Vec::with_capacity(RECTS_MAX + STRIP_VECTORS_MAX),
             cells: Cells::new(size),
@@ -168,6 +172,7 @@ impl Plan {
             lines: Vec::with_capacity(boats),
             sprayed: Vec::with_capacity(wakes),
             rest: Vec::with_capacity(WATER_RECTS_MAX.max(HULL_RECTS_MAX)),
+            outside: Vec::with_capacity(HULL_RECTS_MAX),
             quads: [0; KINDS],
             overlaid: Vec::with_capacity(16),
             bare: Vec::with_capacity(64),
@@ -213,6 +218,7 @@ impl Plan {
         self.rounds.clear();
         self.hulls.clear();
         self.clears.clear();
+        self.depth_clears.clear();
         self.list.clear();
         self.touched.clear();
         self.rects.clear();
@@ -269,7 +275,11 @@ impl Plan {
         self.rest.clear();
         self.cells.take(&mut self.rest, HULL_RECTS_MAX);
         let inside = |r: &PixelRect| around.and_then(|a| overlap(*r, a));
-        self.clears.extend(self.rest.iter().filter_map(inside).map(|r| clear(&r)));
+        for r in self.rest.iter().filter_map(inside) {
+            // Each pixel once: what a hull can cover was cleared with it.
+            around_all(r, &self.hulls, &mut self.outside);
+            self.depth_clears.extend(self.outside.iter().map(clear));
+        }
         self.touched.extend_from_slice(&self.rest);
     }
 
@@ -384,9 +394,9 @@ impl Plan {
     fn plan_wakes(&mut self, scene: &Scene) {
         for (i, boat) in scene.boats.iter().enumerate().filter(|(_, b)| !b.beyond_horizon) {
             let Some(wake) = &boat.wake else { continue };
-            let (block, strips) = wake_block(scene, boat, wake);
+            let WakePlan { block, strips, covered } = wake_plan(scene, boat, wake);
             let before = self.touched.len();
-            self.touched.extend(strip_rects(scene, wake).take(strips as usize).flatten());
+            self.touched.extend(strip_rects(scene, wake).take(covered).flatten());
             let spray = self.sprayed.iter().any(|(n, _)| *n == i);
             let strips = if self.touched.len() > before { strips } else { 0 };
             if strips > 0 || spray {

@@ -180,14 +180,14 @@ impl Recorder<'_> {
         unsafe { self.gpu.device.cmd_begin_rendering(self.cmd, &info) };
     }
 
-    /// Sets both attachments to zero (no light, no coverage, infinitely far) in some rectangles, within a rendering.
-    pub(crate) fn clear(&self, areas: &[vk::ClearRect]) {
+    /// Sets attachments to zero (no light, no coverage, infinitely far) in some rectangles, within a rendering.
+    pub(crate) fn clear<const N: usize>(&self, aspects: [vk::ImageAspectFlags; N], areas: &[vk::ClearRect]) {
         if areas.is_empty() {
             return;
         }
         let zero = |aspect_mask| vk::ClearAttachment { aspect_mask, ..vk::ClearAttachment::default() };
-        let what = [zero(vk::ImageAspectFlags::COLOR), zero(vk::ImageAspectFlags::DEPTH)];
-        // SAFETY: a rendering with a colour and a depth attachment was begun; the rectangles lie in its area.
+        let what = aspects.map(zero);
+        // SAFETY: a rendering with such attachments was begun; the rectangles lie in its area.
         unsafe { self.gpu.device.cmd_clear_attachments(self.cmd, &what, areas) };
     }
 

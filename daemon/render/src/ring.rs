@@ -445,7 +445,7 @@ pub struct Finished {
     /// The scene's frame number.
     pub frame: u64,
     /// GPU milliseconds by pass, in the order of [`Pass::ALL`]; `None` for passes that did not run or that the video pass did with
-    /// its own work, in frames that were not timed (all but one in [`crate::TIMED_EVERY`]), and on devices without timestamps.
+    /// its own work, in frames that were not timed (see [`crate::Renderer::time_every`]), and on devices without timestamps.
     pub passes_ms: [Option<f64>; Pass::COUNT],
     /// GPU milliseconds from the frame's first command to its last; `None` likewise.
     pub frame_ms: Option<f64>,

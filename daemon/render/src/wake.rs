@@ -37,8 +37,24 @@ const AT_HULL: f64 = 1.7;
 /// Spray of fewer rows of pixels fades, and of fewer than the first is none.
 const SPRAY_ROWS: (f64, f64) = (0.2, 0.6);
 
-/// A boat's block and how many strips of it are drawn.
-pub(crate) fn wake_block(scene: &Scene, boat: &BoatView, wake: &Wake) -> (WakeBlock, u32) {
+/// A strip is no thinner than this where it can be longer instead, pixels: what runs on the processor shades whole blocks of four by four.
+const THIN_PX: f64 = 8.0;
+/// No strip is longer than this for that, seconds: in between, foam's decay is taken for straight.
+const LONG_S: f64 = 1.4;
+/// Points of the track beside the hull: all of them are drawn.
+const HULL_POINTS: usize = 4;
+
+/// What is drawn of a boat's wake.
+pub(crate) struct WakePlan {
+    pub(crate) block: WakeBlock,
+    /// Strips of the block that are drawn.
+    pub(crate) strips: u32,
+    /// Strips of the track that they cover.
+    pub(crate) covered: usize,
+}
+
+/// What is drawn of a boat's wake: where points of the track are seen close to each other, some are left out.
+pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan {
     let camera = &scene.camera;
     let camera_from_world = DMat3::from_quat(camera.world_from_camera.inverse());
     let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
@@ -52,9 +68,17 @@ pub(crate) fn wake_block(scene: &Scene, boat: &BoatView, wake: &Wake) -> (WakeBl
         sea: light(sea_fit(&scene.light, rough), 0.0),
     };
     let mut block = WakeBlock { head, ..WakeBlock::default() };
-    let mut last = 0;
-    for (i, (point, out)) in wake.points().iter().zip(&mut block.points).enumerate() {
+    let points = wake.points();
+    let (mut count, mut covered) = (0, 0);
+    let mut kept: Option<&TrackPoint> = None;
+    for (i, point) in points.iter().enumerate() {
         let share = share(scene, wake, point);
+        let needed = i < HULL_POINTS || i + 1 == points.len();
+        if !needed && share > 0.0 && kept.is_some_and(|before| is_thin(scene, wake, before, &points[i..])) {
+            continue;
+        }
+        kept = Some(point);
+        let Some(out) = block.points.get_mut(count) else { break };
         let starboard = point.starboard;
         let height = height_m(point.speed_m_s, &wake.hull, wake.draught_m);
         let pair = |a: DVec2, b: DVec2| [a.x, a.y, b.x, b.y].map(|v| v as f32);
@@ -64,12 +88,35 @@ pub(crate) fn wake_block(scene: &Scene, boat: &BoatView, wake: &Wake) -> (WakeBl
             world: pair(point.position.truncate(), starboard),
             track: [point.along_m, point.speed_m_s, point.age_s, share].map(|v| v as f32),
         };
+        count += 1;
         if share > 0.0 {
-            last = i + 1;
+            covered = i + 1;
         }
     }
-    let strips = last.min(wake.points().len().saturating_sub(1));
-    (block, strips as u32)
+    let drawn = |p: &&WakePoint| p.track[3] > 0.0;
+    let last = block.points[..count].iter().rposition(|p| drawn(&p)).map_or(0, |i| i + 1);
+    WakePlan {
+        block,
+        strips: last.min(count.saturating_sub(1)) as u32,
+        covered: covered.min(points.len().saturating_sub(1)),
+    }
+}
+
+/// Whether the strip from a point to the next is seen so thin that it may go on to the one after that.
+fn is_thin(scene: &Scene, wake: &Wake, before: &TrackPoint, points: &[TrackPoint]) -> bool {
+    let [point, after, ..] = points else { return false };
+    if after.age_s - before.age_s > LONG_S {
+        return false;
+    }
+    let on_screen = |p: DVec3| scene.lens.project(scene.camera.to_camera(p));
+    let aside = (point.starboard * wake.half_width_m(point)).extend(0.0);
+    let (Some(from), Some(to), Some(side)) =
+        (on_screen(before.position), on_screen(point.position), on_screen(point.position + aside))
+    else {
+        return false;
+    };
+    let across = (side - to).normalize_or_zero();
+    (to - from).perp_dot(across).abs() < THIN_PX
 }
 
 /// Height of what the bow throws up, metres, and how much of it is drawn.
@@ -176,8 +223,7 @@ mod tests {
     fn a_wake_finer_than_the_picture_is_left_out_and_fades_before() {
         let share_at = |range: f64| {
             let (scene, boat) = seen(range);
-            let block = wake_block(&scene, &boat, &wake(range, 7.0));
-            block.0.points[3].track[3]
+            wake_plan(&scene, &boat, &wake(range, 7.0)).block.points[3].track[3]
         };
         let (near, far, gone) = (share_at(60.0), share_at(200.0), share_at(900.0));
         assert!(near > 0.9 && far < near && far > 0.0, "{near} {far}");
@@ -191,21 +237,23 @@ mod tests {
         testing::add_moving_boat(&mut scene, &models, 0, [70.0, 0.0, 0.4], [7.0, 0.1]);
         let boat = scene.boats.remove(0);
         let wake = boat.wake.unwrap();
-        let (block, strips) = wake_block(&scene, &boat, &wake);
-        for (strip, rect) in strip_rects(&scene, &wake).take(strips as usize).enumerate() {
-            let p = &block.points[strip];
+        let plan = wake_plan(&scene, &boat, &wake);
+        assert!(plan.strips >= 8 && (plan.strips as usize) < plan.covered, "{}", plan.strips);
+        let rects: Vec<_> = strip_rects(&scene, &wake).take(plan.covered).flatten().collect();
+        for p in &plan.block.points[..plan.strips as usize] {
             for side in [-0.99, 0.0, 0.99] {
                 let at = Vec3::from_slice(&p.place) + Vec3::from_slice(&p.side) * (side * p.place[3]);
                 let Some(pixel) = scene.lens.project(at.as_dvec3()) else { continue };
                 if pixel.cmplt(DVec2::ZERO).any() || pixel.x >= 640.0 || pixel.y >= 360.0 {
                     continue;
                 }
-                let r = rect.unwrap();
-                let holds = pixel.x >= f64::from(r.x)
-                    && pixel.y >= f64::from(r.y)
-                    && pixel.x <= f64::from(r.x + r.width)
-                    && pixel.y <= f64::from(r.y + r.height);
-                assert!(holds, "strip {strip}, {pixel} not in {r:?}");
+                let holds = rects.iter().any(|r| {
+                    pixel.x >= f64::from(r.x)
+                        && pixel.y >= f64::from(r.y)
+                        && pixel.x <= f64::from(r.x + r.width)
+                        && pixel.y <= f64::from(r.y + r.height)
+                });
+                assert!(holds, "{pixel} not in {rects:?}");
             }
         }
     }

@@ -17,7 +17,7 @@ use bowwave_core::{
     model::{Model, ModelId},
     water::{ReflectionMethod, ShadowLevel},
 };
-use bowwave_render::{Needs, RenderError, Renderer, TIMED_EVERY};
+use bowwave_render::{Needs, RenderError, Renderer};
 use common::{
     assert_clean, at, config, draw, grey, open, sea, submit,
     testing::{add_boat, add_moving_boat, box_model, empty_scene},
@@ -267,11 +267,15 @@ fn same_frames_twice_are_equal_and_pictures_may_change_their_shape() {
     assert_ne!(first[0], first[1]);
 }
 
+/// One frame in so many is timed.
+const EVERY: u64 = 4;
+
 #[test]
 fn ring_hands_out_frames_in_order_while_the_reader_lags_and_ends_cleanly() {
     let scene = empty_scene(SIZE.0, SIZE.1);
     let picture = sea(SIZE.0, SIZE.1);
     let (mut renderer, mut completions) = open(&config(&scene), &[]);
+    renderer.time_every(EVERY);
     let reader = std::thread::spawn(move || {
         let mut seen = Vec::new();
         let mut held = None;
@@ -280,7 +284,7 @@ fn ring_hands_out_frames_in_order_while_the_reader_lags_and_ends_cleanly() {
                 seen.push(frame.frame);
                 assert_eq!(frame.size(), SIZE);
                 assert_eq!(frame.rgba().len(), (SIZE.0 * SIZE.1 * 4) as usize);
-                let timed = frame.frame % TIMED_EVERY == 0;
+                let timed = frame.frame % EVERY == 0;
                 assert_eq!(frame.frame_ms.is_some_and(|ms| ms > 0.0), timed);
                 assert_eq!(frame.passes_ms[Pass::Video as usize].is_some(), timed);
                 assert!(frame.passes_ms[Pass::Boats as usize].is_none());

@@ -196,13 +196,14 @@ impl BoatsPass {
         frame: vk::DescriptorSet,
         meshes: &Meshes,
         boats: &[BoatDraw],
-        clears: &[vk::ClearRect],
+        (clears, depth_clears): (&[vk::ClearRect], &[vk::ClearRect]),
     ) {
         let Some(area) = boats.iter().map(|b| b.rect).reduce(joined) else { return };
         to.begin(area, Colour::new(self.colour.view, Begin::Keep), Some((self.depth.view, Begin::Keep)));
         let (width, height) = self.size;
         to.window([0.0, 0.0, width as f32, height as f32], area);
-        to.clear(clears);
+        to.clear([vk::ImageAspectFlags::COLOR, vk::ImageAspectFlags::DEPTH], clears);
+        to.clear([vk::ImageAspectFlags::DEPTH], depth_clears);
         meshes.bind(to);
         for boat in boats {
             to.scissor(boat.rect);

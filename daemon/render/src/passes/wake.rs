@@ -14,10 +14,10 @@ use crate::{
     recorder::Recorder,
 };
 
-/// Corners of a strip: two for each of the nine columns of `wake.vert`.
-const CORNERS: u32 = 18;
-/// Corners of a sheet of spray: two at each end of the sixteen steps of `spray.vert`.
-const SHEET_CORNERS: u32 = 34;
+/// Corners of a strip: two for each of the five columns of `wake.vert`.
+const CORNERS: u32 = 10;
+/// Corners of a sheet of spray: two at each end of the ten steps of `spray.vert`.
+const SHEET_CORNERS: u32 = 22;
 /// Sheets of spray: to port, to starboard, behind.
 const SHEETS: u32 = 3;
 

@@ -14,12 +14,12 @@ use bowwave_core::{
     sea::BeaufortForce,
     water::ReflectionMethod,
 };
-use bowwave_render::{SOFTWARE, TIMED_EVERY};
+use bowwave_render::SOFTWARE;
 use image::RgbImage;
 use rustix::time::{ClockId, clock_gettime};
 
 use super::{
-    draw::{Painter, picture, tones},
+    draw::{Painter, TIMED_EVERY, picture, tones},
     grid::METHODS,
     index,
     scenes::{self, Afloats},

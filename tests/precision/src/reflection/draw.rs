@@ -227,6 +227,9 @@ fn scaled(model: &Model, scale: f64) -> Model {
     out
 }
 
+/// One frame in so many has the times of its passes.
+pub const TIMED_EVERY: u64 = 4;
+
 /// A renderer for pictures of one size that can mirror in every way; nothing but compiled shaders stays from frame to frame.
 pub struct Painter {
     renderer: Renderer,
@@ -265,7 +268,8 @@ impl Painter {
             // Others may keep the processor that draws.
             time_outs: TimeOuts { frame: Duration::from_secs(60), rehearsal: Duration::from_secs(120) },
         };
-        let (renderer, done) = Renderer::new(&config, models)?;
+        let (mut renderer, done) = Renderer::new(&config, models)?;
+        renderer.time_every(TIMED_EVERY);
         Ok(Self { renderer, done, size })
     }
 
