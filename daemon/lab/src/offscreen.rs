@@ -8,7 +8,7 @@ use bowwave_core::{
     frame::{plan::ScenePlan, scene::Scene},
 };
 use bowwave_models::BoatModels;
-use bowwave_render::{Completions, RenderConfig, Renderer, TimeOuts};
+use bowwave_render::{Completions, DrawRequest, RenderConfig, Renderer, TimeOuts};
 use image::RgbImage;
 
 use crate::{
@@ -57,7 +57,7 @@ impl OffscreenRenderer {
             self.put_away();
             let mut config = RenderConfig::of_plan(plan, self.gpu.clone(), self.validation);
             // Nobody waits at 30 Hz: a busy processor that draws slowly is no hung GPU.
-            config.time_outs = TimeOuts { frame: WAIT, rehearsal: WAIT };
+            config.time_outs = TimeOuts { frame: WAIT, warm_up: WAIT };
             let (renderer, completions) = Renderer::new(&config, &self.models.list)?;
             self.ready = Some((*plan, renderer, completions));
         }
@@ -84,7 +84,7 @@ fn draw_one(
     scene: &Scene,
     picture: &Picture,
 ) -> Result<RgbImage> {
-    renderer.submit(scene, picture, true)?;
+    renderer.submit(DrawRequest::new(scene, picture, true))?;
     let frame = completions.wait_next(WAIT)?.context("the GPU did not finish the picture in two minutes")?;
     let (width, height) = (picture.width(), picture.height());
     let rgb = frame.rgba().chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();

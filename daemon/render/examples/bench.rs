@@ -19,7 +19,7 @@ use bowwave_core::{
     model::Model,
     water::{ReflectionMethod, ShadowLevel},
 };
-use bowwave_render::{Completions, Needs, RenderConfig, Renderer, TimeOuts};
+use bowwave_render::{Completions, DrawRequest, Needs, RenderConfig, Renderer, TimeOuts};
 use glam::{DVec3, Vec3};
 use rustix::time::{ClockId, clock_gettime};
 
@@ -217,7 +217,7 @@ impl Running {
 
     fn frame(&mut self, i: usize, counts: bool) -> Result<(), Box<dyn Error>> {
         let (begun, cpu) = (Instant::now(), cpu_ms());
-        self.renderer.submit(&self.case.scene, &self.pictures[i % 4], true)?;
+        self.renderer.submit(DrawRequest::new(&self.case.scene, &self.pictures[i % 4], true))?;
         let frame = self.completions.wait_next(Duration::from_secs(20))?.ok_or("no frame within 20 s")?;
         let (wall, cpu) = (begun.elapsed().as_secs_f64() * 1e3, cpu_ms() - cpu);
         if !counts {

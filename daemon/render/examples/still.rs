@@ -13,7 +13,7 @@ use bowwave_core::{
     time::Time,
     water::{ReflectionMethod, ShadowLevel, Water},
 };
-use bowwave_render::{Needs, RenderConfig, Renderer, TimeOuts};
+use bowwave_render::{DrawRequest, Needs, RenderConfig, Renderer, TimeOuts};
 use glam::{DVec3, Vec3};
 
 #[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
@@ -91,7 +91,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         time_outs: TimeOuts::default(),
     };
     let (mut renderer, mut completions) = Renderer::new(&config, &models)?;
-    renderer.submit(&scene, &picture, true)?;
+    renderer.submit(DrawRequest::new(&scene, &picture, true))?;
     let frame = completions.wait_next(Duration::from_secs(10))?.ok_or("no frame")?;
     image::save_buffer(out, frame.rgba(), width, height, image::ExtendedColorType::Rgba8)?;
     for message in renderer.validation_messages() {

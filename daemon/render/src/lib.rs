@@ -6,6 +6,7 @@
 
 mod atlas;
 mod coverage;
+mod encoder;
 mod error;
 mod frame_data;
 mod glyphs;
@@ -20,7 +21,6 @@ mod parts;
 mod passes;
 mod pipeline;
 mod plan;
-mod recorder;
 mod rects;
 mod renderer;
 mod ring;
@@ -38,5 +38,5 @@ mod water;
 pub use error::RenderError;
 pub use gpu::{DeviceInfo, SOFTWARE, devices, find_device};
 pub use passes::pictures::{PictureCounts, PicturePath, PictureShape};
-pub use renderer::{Needs, RenderConfig, Renderer, TIMED_EVERY};
-pub use ring::{Completions, Finished, TimeOuts};
+pub use renderer::{DrawRequest, Needs, RenderConfig, Renderer, TIMED_EVERY};
+pub use ring::{Completions, FinishedFrame, TimeOuts};

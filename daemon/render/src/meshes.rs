@@ -10,12 +10,12 @@ use bowwave_core::{
 };
 
 use crate::{
+    encoder::CommandEncoder,
     error::RenderError,
     gpu::Gpu,
     memory::{Access, Buffer, Image, ImageShape},
-    passes::Making,
+    passes::PassContext,
     pipeline::{Bound, SRGB, Sampler, SetLayout},
-    recorder::Recorder,
     simplify::{Level, simplify},
     upload::upload_image,
 };
@@ -40,14 +40,14 @@ pub(crate) struct Meshes {
 }
 
 impl Meshes {
-    pub(crate) fn new(making: &Making<'_>, models: &[Model]) -> Result<Self, RenderError> {
-        let gpu = making.gpu;
+    pub(crate) fn new(context: &PassContext<'_>, models: &[Model]) -> Result<Self, RenderError> {
+        let gpu = context.gpu;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
         let skin_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         let sampler = Sampler::new(gpu, vk::Filter::LINEAR, true)?;
         let skin_of = |image: &Image| {
             let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
-            making
+            context
                 .pool
                 .set(&skin_layout, &[Bound::Texture { view: image.view, sampler: sampler.raw, layout }])
         };
@@ -58,7 +58,7 @@ impl Meshes {
             let skin = texture.as_ref().map(skin_of).transpose()?;
             let too_big =
                 |_| RenderError::Model { name: model.name.clone(), why: "too many corners".to_owned() };
-            let made = simplify(model, making.optics.bend != Bend::None);
+            let made = simplify(model, context.optics.bend != Bend::None);
             meshes.push(Mesh {
                 first_index: u32::try_from(indices.len()).map_err(too_big)?,
                 first_vertex: i32::try_from(vertices.len()).map_err(too_big)?,
@@ -90,7 +90,7 @@ impl Meshes {
     }
 
     /// Binds the shared buffers.
-    pub(crate) fn bind(&self, to: Recorder<'_>) {
+    pub(crate) fn bind(&self, to: CommandEncoder<'_>) {
         // SAFETY: both buffers are live and have the usage.
         unsafe {
             to.gpu.device.cmd_bind_vertex_buffers(to.cmd, 0, &[self.vertices.raw], &[0]);
@@ -105,7 +105,7 @@ impl Meshes {
     }
 
     /// Draws some of a model's triangles.
-    pub(crate) fn draw(&self, to: Recorder<'_>, model: ModelId, indices: &Range<u32>) {
+    pub(crate) fn draw(&self, to: CommandEncoder<'_>, model: ModelId, indices: &Range<u32>) {
         let Some(mesh) = self.meshes.get(usize::from(model.0)) else { return };
         let (count, first) = (indices.end - indices.start, mesh.first_index + indices.start);
         // SAFETY: within a rendering, with buffers and pipeline bound; the ranges were checked when the model was taken.

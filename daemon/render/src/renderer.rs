@@ -14,12 +14,13 @@ use bowwave_core::{
 use shaders_spirv::interface::WATERS_MAX;
 
 use crate::{
+    encoder::{CommandEncoder, Reach, Steps},
     error::{Named, RenderError},
     frame_data::{Capacity, FrameData, frame_set_layout},
     gpu::{DeviceInfo, Gpu},
     meshes::Meshes,
     passes::{
-        Making,
+        PassContext,
         boats::BoatsPass,
         hud::HudPass,
         mirror::MirrorPass,
@@ -32,9 +33,8 @@ use crate::{
     },
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
-    recorder::{Reach, Recorder, Steps},
     rects::overlap,
-    ring::{Completions, FRAME_QUERY, QUERIES, SLOTS_MAX, Shared, Span, TimeOuts},
+    ring::{Completions, FRAME_QUERY, InFlight, QUERIES, SLOTS_MAX, Shared, Span, TimeOuts},
     target::{DrawTarget, same_place},
     view,
 };
@@ -100,10 +100,24 @@ struct Slot {
     data: FrameData,
 }
 
-/// Draws frames. Belongs to one thread; finished frames come out of [`Completions`], usually on another.
-pub struct Renderer {
+/// One frame to be drawn.
+pub struct DrawRequest<'a, T = ()> {
+    /// What is drawn over the picture.
+    pub scene: &'a Scene,
+    /// The camera's picture.
+    pub picture: &'a Picture,
+    /// Whether the picture is another than that of the request before. If not, and if that one is still there, its bytes are not taken
+    /// over again.
+    pub picture_is_new: bool,
+    /// Comes out again with the finished frame: what its reader must know of it.
+    pub ticket: T,
+}
+
+/// Draws frames. Belongs to one thread; finished frames come out of [`Completions`], usually on another, each with the ticket of type
+/// `T` that it was submitted with.
+pub struct Renderer<T = ()> {
     gpu: Arc<Gpu>,
-    shared: Arc<Shared>,
+    shared: Arc<Shared<T>>,
     needs: Needs,
     models: Vec<Outline>,
     slots: Vec<Slot>,
@@ -128,38 +142,49 @@ struct Passes {
 }
 
 impl Passes {
-    fn new(making: &Making<'_>, config: &RenderConfig, models: &[Model]) -> Result<Self, RenderError> {
+    fn new(context: &PassContext<'_>, config: &RenderConfig, models: &[Model]) -> Result<Self, RenderError> {
         let needs = &config.needs;
         let any_boat = needs.boats_max > 0;
         let textured = models.iter().any(|m| m.texture.is_some());
-        let meshes = Meshes::new(making, if any_boat { models } else { &[] })?;
+        let meshes = Meshes::new(context, if any_boat { models } else { &[] })?;
         let reflects = needs.waters.iter().any(|(method, _)| *method != ReflectionMethod::Off);
         let softens = needs.waters.iter().any(|(method, _)| *method == ReflectionMethod::Full);
         let mirror = (any_boat && reflects)
-            .then(|| MirrorPass::new(making, &meshes, textured, softens))
+            .then(|| MirrorPass::new(context, &meshes, textured, softens))
             .transpose()?;
         let water = (any_boat && !needs.waters.is_empty())
-            .then(|| WaterPass::new(making, mirror.as_ref(), &needs.waters))
+            .then(|| WaterPass::new(context, mirror.as_ref(), &needs.waters))
             .transpose()?;
         let reflect = match (&mirror, &water) {
             (Some(mirror), Some(water)) if needs.lobes() > 0 => {
-                Some(ReflectPass::new(making, mirror, &water.backdrop, needs.lobes())?)
+                Some(ReflectPass::new(context, mirror, &water.backdrop, needs.lobes())?)
             }
             _ => None,
         };
-        let boats = any_boat.then(|| BoatsPass::new(making, &meshes, textured)).transpose()?;
+        let boats = any_boat.then(|| BoatsPass::new(context, &meshes, textured)).transpose()?;
         let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
-        let wake = wake.map(|boats| WakePass::new(making, boats)).transpose()?;
-        let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(making, boats.as_ref())).transpose()?;
-        let hud = HudPass::new(making)?;
-        let video = VideoPass::new(making, config.picture, &hud.layer_layout)?;
+        let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
+        let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(context, boats.as_ref())).transpose()?;
+        let hud = HudPass::new(context)?;
+        let video = VideoPass::new(context, config.picture, &hud.layer_layout)?;
         Ok(Self { video, meshes, mirror, water, reflect, wake, boats, rounds, hud })
     }
 }
 
 impl Renderer {
-    /// Opens the device and makes everything that `config.needs`. `models` are what [`bowwave_core::model::ModelId`] counts.
+    /// Opens the device and makes everything that `config.needs`. `models` are what [`bowwave_core::model::ModelId`] counts. Frames have
+    /// no tickets.
     pub fn new(config: &RenderConfig, models: &[Model]) -> Result<(Self, Completions), RenderError> {
+        Self::with_tickets(config, models)
+    }
+}
+
+impl<T> Renderer<T> {
+    /// The same where each frame has a ticket.
+    pub fn with_tickets(
+        config: &RenderConfig,
+        models: &[Model],
+    ) -> Result<(Self, Completions<T>), RenderError> {
         let gpu = Arc::new(Gpu::open(config.device.as_deref(), config.validation)?);
         let max = gpu.limits.max_image_dimension2_d.min(gpu.limits.max_framebuffer_width);
         let size = (config.width, config.height);
@@ -171,7 +196,7 @@ impl Renderer {
         let textured = models.iter().filter(|m| m.texture.is_some()).count();
         let sets = SetPool::new(&gpu, u32::try_from(count + textured + 16).unwrap_or(u32::MAX), 4)?;
         let frame_set = frame_set_layout(&gpu)?;
-        let making = Making {
+        let context = PassContext {
             gpu: &gpu,
             frame_set: &frame_set,
             pool: &sets,
@@ -180,7 +205,7 @@ impl Renderer {
             slots: count,
             optics: config.needs.optics,
         };
-        let passes = Passes::new(&making, config, models)?;
+        let passes = Passes::new(&context, config, models)?;
         let needs = config.needs.clone();
         let capacity = Capacity {
             boats: needs.boats_max,
@@ -238,28 +263,19 @@ impl Renderer {
         self.passes.video.path().1
     }
 
-    /// Hands one frame to the GPU: `scene` over `picture`, whose bytes are taken over unless `picture_is_new` is false and the
-    /// last picture is still there. A picture that is read where its driver put it is kept until the frame is finished. Returns
-    /// whether it had to wait for a slot of the ring; it waits for nothing else, unless the picture's shape changed.
+    /// Hands one frame to the GPU, which takes over its picture's bytes. A picture that is read where its driver put it is kept until
+    /// the frame is finished. Returns whether it had to wait for a slot of the ring; it waits for nothing else, unless the picture's
+    /// shape changed.
     ///
     /// [`RenderError::DeviceLost`] and [`RenderError::Hung`] as from [`Completions::wait_next`].
-    pub fn submit(
-        &mut self,
-        scene: &Scene,
-        picture: &Picture,
-        picture_is_new: bool,
-    ) -> Result<bool, RenderError> {
-        self.check(scene)?;
+    pub fn submit(&mut self, request: DrawRequest<'_, T>) -> Result<bool, RenderError> {
+        self.check(request.scene)?;
         let shared = self.shared.clone();
-        self.submit_checked(scene, picture, picture_is_new).map_err(|error| shared.fail(error))
+        self.submit_checked(request).map_err(|error| shared.fail(error))
     }
 
-    fn submit_checked(
-        &mut self,
-        scene: &Scene,
-        picture: &Picture,
-        picture_is_new: bool,
-    ) -> Result<bool, RenderError> {
+    fn submit_checked(&mut self, request: DrawRequest<'_, T>) -> Result<bool, RenderError> {
+        let DrawRequest { scene, picture, picture_is_new, ticket } = request;
         let (index, waited) = self.shared.acquire()?;
         let value = self.shared.next_value();
         let kept = !picture_is_new && self.passes.video.still_has(picture);
@@ -283,7 +299,8 @@ impl Renderer {
         unsafe { self.gpu.device.queue_submit2(self.gpu.queue, &[submit], vk::Fence::null()) }
             .named("vkQueueSubmit2")?;
         let held = (path == PicturePath::Imported).then(|| picture.clone());
-        self.shared.submitted(index, scene.frame, value == 1 || !prepared, held);
+        let warm_up = value == 1 || !prepared;
+        self.shared.submitted(index, InFlight { frame: scene.frame, warm_up, picture: held, ticket });
         Ok(waited)
     }
 
@@ -356,7 +373,7 @@ impl Renderer {
     fn record(&self, index: usize, water: Water) -> Result<vk::CommandBuffer, RenderError> {
         let device = &self.gpu.device;
         let (slot, out) = (&self.slots[index], &self.shared.slots[index]);
-        let to = Recorder { gpu: &self.gpu, cmd: slot.cmd };
+        let to = CommandEncoder { gpu: &self.gpu, cmd: slot.cmd };
         let on = self.gpu.timestamp_ns.is_some()
             && self.shared.next_value() % self.timed_every == 1 % self.timed_every;
         let stamps = Stamps { to, queries: out.queries, on };
@@ -397,7 +414,7 @@ impl Renderer {
     /// Records what does not depend on what is on the screen: the video, the mirrored boats, the boats.
     fn record_layers(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         stamps: &Stamps<'_>,
         frame: vk::DescriptorSet,
         target: &DrawTarget,
@@ -443,7 +460,7 @@ impl Renderer {
     /// Records what the water needs before it is drawn, in as few steps that wait for each other as there can be.
     fn record_water(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         stamps: &Stamps<'_>,
         frame: vk::DescriptorSet,
         target: &DrawTarget,
@@ -487,7 +504,7 @@ impl Renderer {
     /// Records what blends onto the screen, in one rendering.
     fn record_blends(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         stamps: &Stamps<'_>,
         frame: vk::DescriptorSet,
         target: &DrawTarget,
@@ -525,13 +542,20 @@ impl Renderer {
     }
 }
 
-impl Drop for Renderer {
+impl<T> Drop for Renderer<T> {
     fn drop(&mut self) {
         if let Err(error) = self.shared.rest() {
             log::error!("the GPU did not come to rest, what is on it stays: {error}");
             self.gpu.abandon();
         }
         self.shared.close();
+    }
+}
+
+impl<'a> DrawRequest<'a> {
+    /// A request without a ticket.
+    pub fn new(scene: &'a Scene, picture: &'a Picture, picture_is_new: bool) -> Self {
+        Self { scene, picture, picture_is_new, ticket: () }
     }
 }
 
@@ -559,7 +583,7 @@ impl Drop for Slot {
 
 /// Timestamps of one frame.
 struct Stamps<'a> {
-    to: Recorder<'a>,
+    to: CommandEncoder<'a>,
     queries: vk::QueryPool,
     on: bool,
 }

@@ -1,10 +1,10 @@
 //! The ring of frames in flight, shared by the thread that submits and the thread that takes finished frames.
 //!
 //! Frame n (counted from 0) uses slot n modulo the ring's length and signals n + 1 on the timeline semaphore. A slot is free
-//! again when its [`Finished`] is dropped. The submitting thread waits for a free slot and for nothing else.
+//! again when its [`FinishedFrame`] is dropped. The submitting thread waits for a free slot and for nothing else.
 //!
 //! A device that is lost, or that does not finish a frame in time, fails both ends for good: the first to notice writes it down
-//! in [`State::failed`], the other is woken and says the same.
+//! in [`RingState::failed`], the other is woken and says the same.
 
 use std::{
     sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError},
@@ -32,19 +32,19 @@ pub struct TimeOuts {
     /// For one frame, counted from when the reader has the frame before and waits for this one.
     pub frame: Duration,
     /// For a frame whose shaders may still have to be compiled: the first, and the first after the picture's shape changed.
-    pub rehearsal: Duration,
+    pub warm_up: Duration,
 }
 
 impl Default for TimeOuts {
     /// Half a second, fifteen frames at 30 Hz; and a minute for drivers that compile on a busy processor.
     fn default() -> Self {
-        Self { frame: Duration::from_millis(500), rehearsal: Duration::from_secs(60) }
+        Self { frame: Duration::from_millis(500), warm_up: Duration::from_secs(60) }
     }
 }
 
 impl TimeOuts {
-    fn of(&self, rehearsal: bool) -> Duration {
-        if rehearsal { self.rehearsal } else { self.frame }
+    fn of(&self, warm_up: bool) -> Duration {
+        if warm_up { self.warm_up } else { self.frame }
     }
 }
 
@@ -114,15 +114,15 @@ pub(crate) const QUERIES: u32 = Span::ALL.len() as u32 * 2 + 2;
 /// The first of the two queries around the whole frame.
 pub(crate) const FRAME_QUERY: u32 = QUERIES - 2;
 
-/// What one slot gives back.
+/// Memory of one slot that its reader and its timings come from.
 pub(crate) struct SlotOut {
     /// Where the frame is copied to when it is drawn; without one, the target is the slot's own and finished in place.
     pub(crate) download: Option<Buffer>,
     pub(crate) queries: vk::QueryPool,
 }
 
-/// What both threads see.
-pub(crate) struct Shared {
+/// The ring, as both threads see it. `T` is what the caller gives along with each frame.
+pub(crate) struct Shared<T> {
     pub(crate) gpu: Arc<Gpu>,
     pub(crate) timeline: vk::Semaphore,
     pub(crate) slots: Vec<SlotOut>,
@@ -130,32 +130,72 @@ pub(crate) struct Shared {
     targets: Vec<DrawTarget>,
     pub(crate) size: (u32, u32),
     time_outs: TimeOuts,
-    state: Mutex<State>,
+    state: Mutex<RingState<T>>,
     changed: Condvar,
 }
 
-#[derive(Default)]
-struct State {
+/// A frame between its submission and its reader.
+pub(crate) struct InFlight<T> {
+    /// The scene's frame number.
+    pub(crate) frame: u64,
+    /// Whether shaders may have to be compiled for it.
+    pub(crate) warm_up: bool,
+    /// The picture whose memory the GPU reads where it lies, until the frame is finished: the camera's driver must not fill it again
+    /// before.
+    pub(crate) picture: Option<Picture>,
+    /// The caller's own.
+    pub(crate) ticket: T,
+}
+
+/// Life of a slot: free, in flight, held, and free again.
+enum SlotState<T> {
+    /// Nobody uses it: the next frame that comes round may.
+    Free,
+    /// Its frame was submitted. The GPU draws it, or has and nobody took it yet.
+    InFlight(InFlight<T>),
+    /// The reader has its frame as a [`FinishedFrame`], whose drop frees it.
+    Held {
+        /// Whether shaders may have been compiled for it, so that its reader may have waited long.
+        warm_up: bool,
+    },
+}
+
+impl<T> SlotState<T> {
+    fn is_free(&self) -> bool {
+        matches!(self, Self::Free)
+    }
+
+    fn warms_up(&self) -> bool {
+        matches!(self, Self::InFlight(InFlight { warm_up: true, .. }) | Self::Held { warm_up: true })
+    }
+}
+
+struct RingState<T> {
     /// Frames submitted so far.
     submitted: u64,
     /// Frames handed to the reader so far.
     taken: u64,
-    /// Slots that the GPU or a `Finished` uses.
-    busy: [bool; SLOTS_MAX],
-    /// Scene's frame number by slot.
-    frame: [u64; SLOTS_MAX],
-    /// Whether shaders may have to be compiled for it, by slot.
-    rehearsal: [bool; SLOTS_MAX],
-    /// The picture whose memory the GPU reads where it lies, by slot, until the frame is finished: the camera's driver must not
-    /// fill it again before.
-    held: [Option<Picture>; SLOTS_MAX],
+    slots: [SlotState<T>; SLOTS_MAX],
     /// Why no frame will come any more: the device was lost, or hangs.
     failed: Option<RenderError>,
     reader_gone: bool,
     renderer_gone: bool,
 }
 
-impl Shared {
+impl<T> Default for RingState<T> {
+    fn default() -> Self {
+        Self {
+            submitted: 0,
+            taken: 0,
+            slots: [const { SlotState::Free }; SLOTS_MAX],
+            failed: None,
+            reader_gone: false,
+            renderer_gone: false,
+        }
+    }
+}
+
+impl<T> Shared<T> {
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         size: (u32, u32),
@@ -173,7 +213,7 @@ impl Shared {
             targets: Vec::with_capacity(slots),
             size,
             time_outs,
-            state: Mutex::default(),
+            state: Mutex::new(RingState::default()),
             changed: Condvar::new(),
         };
         for _ in 0..slots.clamp(1, SLOTS_MAX) {
@@ -199,7 +239,7 @@ impl Shared {
         &self.targets[slot.min(self.targets.len() - 1)]
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, RingState<T>> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -227,12 +267,11 @@ impl Shared {
             if let Some(error) = &state.failed {
                 return Err(error.clone());
             }
-            if !state.busy.get(slot).copied().unwrap_or(false) {
+            if state.slots[slot].is_free() {
                 break;
             }
             waited = true;
-            let compiling =
-                state.busy.iter().zip(state.rehearsal).any(|(busy, rehearsal)| *busy && rehearsal);
+            let compiling = state.slots.iter().any(SlotState::warms_up);
             if state.reader_gone && state.taken <= state.submitted.saturating_sub(self.slots.len() as u64) {
                 // Nobody reads any more: the slot is free when the GPU is done with it.
                 let value = state.submitted + 1 - self.slots.len() as u64;
@@ -243,12 +282,16 @@ impl Shared {
                 }
                 state = self.lock();
                 state.taken = state.taken.max(value);
-                state.busy[slot] = false;
+                // What was in flight goes outside the lock: it may give a picture back to the camera's driver.
+                let gone = std::mem::replace(&mut state.slots[slot], SlotState::Free);
+                drop(state);
+                drop(gone);
+                state = self.lock();
                 continue;
             }
             let mut allowed = Duration::from_secs(STALL_S).max(self.time_outs.frame);
             if compiling {
-                allowed = allowed.max(self.time_outs.rehearsal);
+                allowed = allowed.max(self.time_outs.warm_up);
             }
             let (next, timeout) =
                 self.changed.wait_timeout(state, allowed).unwrap_or_else(PoisonError::into_inner);
@@ -265,18 +308,13 @@ impl Shared {
         self.lock().submitted + 1
     }
 
-    /// Hands the frame just submitted to the reader. `held` is kept until the frame is finished.
-    pub(crate) fn submitted(&self, slot: usize, frame: u64, rehearsal: bool, held: Option<Picture>) {
+    /// Hands the frame just submitted to the reader.
+    pub(crate) fn submitted(&self, slot: usize, frame: InFlight<T>) {
         let mut state = self.lock();
-        state.busy[slot] = true;
-        state.frame[slot] = frame;
-        state.rehearsal[slot] = rehearsal;
-        // Where nobody took the frame that was here before, its picture goes now, outside the lock.
-        let before = std::mem::replace(&mut state.held[slot], held);
+        state.slots[slot] = SlotState::InFlight(frame);
         state.submitted += 1;
         drop(state);
         self.changed.notify_all();
-        drop(before);
     }
 
     /// How many frames the GPU has finished.
@@ -290,7 +328,7 @@ impl Shared {
     pub(crate) fn rest(&self) -> Result<(), RenderError> {
         let state = self.lock();
         let (value, failed) = (state.submitted, state.failed.clone());
-        let compiling = state.busy.iter().zip(state.rehearsal).any(|(busy, rehearsal)| *busy && rehearsal);
+        let compiling = state.slots.iter().any(SlotState::warms_up);
         drop(state);
         let allowed = self.time_outs.of(compiling);
         let result = match failed {
@@ -350,12 +388,16 @@ impl Shared {
     }
 }
 
-impl Drop for Shared {
+impl<T> Drop for Shared<T> {
     fn drop(&mut self) {
         if self.gpu.is_abandoned() {
             // The GPU may still read them: the driver never gets them back.
             let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
-            state.held.iter_mut().for_each(|picture| std::mem::forget(picture.take()));
+            for slot in &mut state.slots {
+                if let SlotState::InFlight(frame) = slot {
+                    std::mem::forget(frame.picture.take());
+                }
+            }
             return;
         }
         // SAFETY: the renderer waits for the device before it lets go of `self`; a reader holds only finished frames.
@@ -369,14 +411,14 @@ impl Drop for Shared {
 }
 
 /// The reading end: gives finished frames in order. For a thread of its own.
-pub struct Completions {
-    shared: Arc<Shared>,
+pub struct Completions<T = ()> {
+    shared: Arc<Shared<T>>,
     /// How long the frame that comes next was waited for.
     waited: Duration,
 }
 
-impl Completions {
-    pub(crate) fn new(shared: Arc<Shared>) -> Self {
+impl<T> Completions<T> {
+    pub(crate) fn new(shared: Arc<Shared<T>>) -> Self {
         Self { shared, waited: Duration::ZERO }
     }
 
@@ -386,10 +428,10 @@ impl Completions {
     /// [`RenderError::DeviceLost`] once the device is lost: drop both ends and make new ones, which neither waits nor leaks.
     /// [`RenderError::Hung`] once a frame was waited for, in one call or several, for longer than
     /// [`TimeOuts`] allow: dropping both ends does not wait for the device, but leaks what is on it. End the process soon.
-    pub fn wait_next(&mut self, timeout: Duration) -> Result<Option<Finished>, RenderError> {
+    pub fn wait_next(&mut self, timeout: Duration) -> Result<Option<FinishedFrame<T>>, RenderError> {
         let shared = &self.shared;
         let state = shared.lock();
-        let waiting = |s: &mut State| s.submitted == s.taken && !s.renderer_gone && s.failed.is_none();
+        let waiting = |s: &mut RingState<T>| s.submitted == s.taken && !s.renderer_gone && s.failed.is_none();
         let (state, _) = shared
             .changed
             .wait_timeout_while(state, timeout, waiting)
@@ -402,7 +444,8 @@ impl Completions {
         }
         let next = state.taken;
         let slot = shared.slot_of(next);
-        let allowed = shared.time_outs.of(state.rehearsal[slot]);
+        let warm_up = state.slots[slot].warms_up();
+        let allowed = shared.time_outs.of(warm_up);
         drop(state);
         let step = timeout.min(allowed.saturating_sub(self.waited));
         if !shared.wait_value(next + 1, step).map_err(|e| shared.fail(e))? {
@@ -416,12 +459,12 @@ impl Completions {
         let (passes_ms, frame_ms) = shared.timings(slot);
         let mut state = shared.lock();
         state.taken = next + 1;
-        let frame = state.frame[slot];
-        let held = state.held[slot].take();
+        let taken = std::mem::replace(&mut state.slots[slot], SlotState::Held { warm_up });
         drop(state);
+        let SlotState::InFlight(InFlight { frame, picture, ticket, .. }) = taken else { return Ok(None) };
         // Back to the camera's driver, outside the lock.
-        drop(held);
-        Ok(Some(Finished { shared: shared.clone(), slot, frame, passes_ms, frame_ms }))
+        drop(picture);
+        Ok(Some(FinishedFrame { shared: shared.clone(), slot, frame, ticket, passes_ms, frame_ms }))
     }
 
     /// Whether the renderer is gone and every frame was given.
@@ -431,7 +474,7 @@ impl Completions {
     }
 }
 
-impl Drop for Completions {
+impl<T> Drop for Completions<T> {
     fn drop(&mut self) {
         self.shared.lock().reader_gone = true;
         self.shared.changed.notify_all();
@@ -439,11 +482,13 @@ impl Drop for Completions {
 }
 
 /// A finished frame. Dropping it frees its slot of the ring.
-pub struct Finished {
-    shared: Arc<Shared>,
+pub struct FinishedFrame<T = ()> {
+    shared: Arc<Shared<T>>,
     slot: usize,
     /// The scene's frame number.
     pub frame: u64,
+    /// What the caller gave along with it.
+    pub ticket: T,
     /// GPU milliseconds by pass, in the order of [`Pass::ALL`]; `None` for passes that did not run or that the video pass did with
     /// its own work, in frames that were not timed (see [`crate::Renderer::time_every`]), and on devices without timestamps.
     pub passes_ms: [Option<f64>; Pass::COUNT],
@@ -451,7 +496,7 @@ pub struct Finished {
     pub frame_ms: Option<f64>,
 }
 
-impl Finished {
+impl<T> FinishedFrame<T> {
     /// Width and height in pixels.
     pub fn size(&self) -> (u32, u32) {
         self.shared.size
@@ -467,9 +512,9 @@ impl Finished {
     }
 }
 
-impl Drop for Finished {
+impl<T> Drop for FinishedFrame<T> {
     fn drop(&mut self) {
-        self.shared.lock().busy[self.slot] = false;
+        self.shared.lock().slots[self.slot] = SlotState::Free;
         self.shared.changed.notify_all();
     }
 }

@@ -12,12 +12,12 @@ use ash::vk;
 use bowwave_core::frame::scene::PixelRect;
 
 use crate::{
+    encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     gpu::Gpu,
     memory::{Buffer, Image, ImageShape, MappedImages},
     passes::{NOTHING, Use},
     pipeline::SRGB,
-    recorder::{Begin, Colour, Recorder, Step},
     rects::{joined, rect},
     upload::run_once,
 };
@@ -110,7 +110,7 @@ impl DrawTarget {
     }
 
     /// Begins to write words, all of them.
-    pub(crate) fn begin_words(&self, to: Recorder<'_>) {
+    pub(crate) fn begin_words(&self, to: CommandEncoder<'_>) {
         let view = match &self.pixels {
             Pixels::Device(image) => image.view,
             Pixels::Host(images) => images.images[0].view,
@@ -127,7 +127,7 @@ impl DrawTarget {
     }
 
     /// Begins to blend linear light within the rectangles; `false` where there are none.
-    pub(crate) fn begin_light(&self, to: Recorder<'_>, rects: &[PixelRect]) -> bool {
+    pub(crate) fn begin_light(&self, to: CommandEncoder<'_>, rects: &[PixelRect]) -> bool {
         let Some(area) = rects.iter().copied().reduce(joined) else { return false };
         let view = match &self.pixels {
             Pixels::Device(image) => image.second_view,
@@ -139,12 +139,12 @@ impl DrawTarget {
     }
 
     /// Copies parts of it to the same place of another image.
-    pub(crate) fn record_copy_of(&self, to: Recorder<'_>, image: &Image, regions: &[vk::ImageCopy]) {
+    pub(crate) fn record_copy_of(&self, to: CommandEncoder<'_>, image: &Image, regions: &[vk::ImageCopy]) {
         to.copy_image((self.image(), GENERAL.2), image, regions);
     }
 
     /// Copies all of it to a frame's buffer.
-    pub(crate) fn record_download(&self, to: Recorder<'_>, buffer: &Buffer) {
+    pub(crate) fn record_download(&self, to: CommandEncoder<'_>, buffer: &Buffer) {
         let region = vk::BufferImageCopy {
             image_subresource: COLOUR_LAYER,
             image_extent: vk::Extent3D { width: self.size.0, height: self.size.1, depth: 1 },

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::{
+    encoder::{CommandEncoder, Step},
     error::{Named, RenderError},
     gpu::Gpu,
     memory::{Access, Buffer, Image},
     passes::{COPIED_TO, NOTHING, SAMPLED},
-    recorder::{Recorder, Step},
 };
 
 /// How long copying one picture or mesh may take; a driver on a busy processor needs a while.
@@ -36,7 +36,7 @@ impl Drop for Once {
 }
 
 /// Runs what `record` records, and waits for it.
-pub(crate) fn run_once(gpu: &Arc<Gpu>, record: impl FnOnce(Recorder<'_>)) -> Result<(), RenderError> {
+pub(crate) fn run_once(gpu: &Arc<Gpu>, record: impl FnOnce(CommandEncoder<'_>)) -> Result<(), RenderError> {
     let device = &gpu.device;
     let info = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.family);
     // SAFETY: `info` is complete.
@@ -54,7 +54,7 @@ pub(crate) fn run_once(gpu: &Arc<Gpu>, record: impl FnOnce(Recorder<'_>)) -> Res
         device
             .begin_command_buffer(cmd, &vk::CommandBufferBeginInfo::default())
             .named("vkBeginCommandBuffer")?;
-        record(Recorder { gpu, cmd });
+        record(CommandEncoder { gpu, cmd });
         device.end_command_buffer(cmd).named("vkEndCommandBuffer")?;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(cmd)];
         let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);

@@ -417,7 +417,7 @@ pub(crate) fn mirrored_sky(light: &Light, down: f64, rough: f64) -> Vec3 {
     fresnel(up) as f32 * light.horizon.lerp(light.sky, t * t * (3.0 - 2.0 * t))
 }
 
-/// The sea of the mended Physics shader, made anew only when force or wind change: making it allocates.
+/// The sea of the mended Physics shader, made anew only when force or wind change: context it allocates.
 #[derive(Default)]
 pub(crate) struct PhysicsSea(Option<(BeaufortForce, f64, WaveField)>);
 

@@ -19,6 +19,7 @@ use bowwave_core::{
     frame::scene::{Pass, PassDecision, RoundView},
     water::ReflectionMethod,
 };
+use bowwave_render::DrawRequest;
 use common::{
     config, open, sea,
     testing::{add_boat, add_moving_boat, box_model, empty_scene},
@@ -87,7 +88,7 @@ fn check(method: ReflectionMethod) {
             memory = renderer.memory();
             COUNT.set(0);
         }
-        renderer.submit(&scene, &pictures[n as usize % 2], true).unwrap();
+        renderer.submit(DrawRequest::new(&scene, &pictures[n as usize % 2], true)).unwrap();
         let frame = completions.wait_next(Duration::from_secs(20)).unwrap().unwrap();
         assert_eq!(frame.frame, n);
     }

@@ -17,7 +17,7 @@ use bowwave_core::{
     model::{Model, ModelId},
     water::{ReflectionMethod, ShadowLevel},
 };
-use bowwave_render::{Needs, RenderError, Renderer};
+use bowwave_render::{DrawRequest, Needs, RenderError, Renderer};
 use common::{
     assert_clean, at, config, draw, grey, open, sea, submit,
     testing::{add_boat, add_moving_boat, box_model, empty_scene},
@@ -255,7 +255,7 @@ fn same_frames_twice_are_equal_and_pictures_may_change_their_shape() {
         }
         // The last picture again, without its bytes.
         let odd = Picture::new(PixelFormat::Nv12, 4, 4, Arc::from(vec![0; 24])).unwrap();
-        renderer.submit(&scene, &odd, false).unwrap();
+        renderer.submit(DrawRequest::new(&scene, &odd, false)).unwrap();
         frames.push(completions.wait_next(Duration::from_secs(20)).unwrap().unwrap().rgba().to_vec());
         assert_clean(&renderer);
         frames
@@ -299,7 +299,7 @@ fn ring_hands_out_frames_in_order_while_the_reader_lags_and_ends_cleanly() {
     for n in 0..40 {
         let mut scene = scene.clone();
         scene.frame = n;
-        waits += u32::from(renderer.submit(&scene, &picture, n % 3 == 0).unwrap());
+        waits += u32::from(renderer.submit(DrawRequest::new(&scene, &picture, n % 3 == 0)).unwrap());
     }
     assert_clean(&renderer);
     drop(renderer);
@@ -313,7 +313,7 @@ fn renderer_goes_on_without_a_reader() {
     let (mut renderer, completions) = open(&config(&scene), &[]);
     drop(completions);
     for _ in 0..7 {
-        renderer.submit(&scene, &sea(SIZE.0, SIZE.1), true).unwrap();
+        renderer.submit(DrawRequest::new(&scene, &sea(SIZE.0, SIZE.1), true)).unwrap();
     }
     assert_clean(&renderer);
 }
@@ -336,11 +336,14 @@ fn what_is_not_needed_is_not_allocated_and_asking_for_it_is_an_error() {
     no_reflections.needs = Needs { waters: vec![], ..no_reflections.needs };
     let (mut dry, _completions) = open(&no_reflections, &models);
     assert!(bytes(&dry) < bytes(&full));
-    let error = dry.submit(&scene, &sea(SIZE.0, SIZE.1), true).unwrap_err();
+    let error = dry.submit(DrawRequest::new(&scene, &sea(SIZE.0, SIZE.1), true)).unwrap_err();
     assert_eq!(error, RenderError::NotPrepared { what: "another way to mirror" });
     let mut other = empty_scene(SIZE.0 + 2, SIZE.1);
     other.frame = 1;
-    assert!(matches!(dry.submit(&other, &sea(8, 8), true), Err(RenderError::NotPrepared { .. })));
+    assert!(matches!(
+        dry.submit(DrawRequest::new(&other, &sea(8, 8), true)),
+        Err(RenderError::NotPrepared { .. })
+    ));
 }
 
 #[test]

@@ -20,7 +20,7 @@ use std::{
 };
 
 use bowwave_core::model::Model;
-use bowwave_render::{RenderConfig, RenderError, TimeOuts};
+use bowwave_render::{DrawRequest, RenderConfig, RenderError, TimeOuts};
 use common::{
     config, open, sea, submit,
     testing::{add_boat, empty_scene},
@@ -140,14 +140,14 @@ fn case_lost() {
         // Two frames on their way and one with the reader when it happens.
         for frame in [1, 2] {
             scene.frame = frame;
-            renderer.submit(&scene, &picture, true).unwrap();
+            renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap();
         }
         let held = completions.wait_next(Duration::from_secs(20)).unwrap().unwrap();
         command("lost");
-        let lost = renderer.submit(&scene, &picture, true).unwrap_err();
+        let lost = renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap_err();
         assert_eq!(lost, RenderError::DeviceLost { call: "vkQueueSubmit2" });
         assert_eq!(completions.wait_next(Duration::from_secs(20)).err(), Some(lost.clone()));
-        assert_eq!(renderer.submit(&scene, &picture, true).unwrap_err(), lost);
+        assert_eq!(renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap_err(), lost);
         assert!(lost.to_string().contains("made anew"));
         let begun = Instant::now();
         drop(renderer);
@@ -177,7 +177,7 @@ fn case_hang() {
     let (mut renderer, mut completions) = open(&config(&scene), &[]);
     submit(&mut renderer, &mut completions, &scene, &picture);
     command("hang");
-    renderer.submit(&scene, &picture, true).unwrap();
+    renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap();
     let begun = Instant::now();
     // In steps, as the output thread waits.
     let error = loop {
@@ -189,7 +189,7 @@ fn case_hang() {
     let told = begun.elapsed();
     assert_eq!(error, RenderError::Hung { what: "a frame", after_ms: 500 });
     assert!(told >= Duration::from_millis(490) && told < Duration::from_secs(5), "told after {told:?}");
-    assert_eq!(renderer.submit(&scene, &picture, true).unwrap_err(), error);
+    assert_eq!(renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap_err(), error);
     drop(renderer);
     drop(completions);
     let gone = begun.elapsed() - told;
@@ -205,7 +205,7 @@ fn case_hang_at_drop() {
     let (mut renderer, mut completions) = open(&RenderConfig { time_outs, ..config(&scene) }, &[]);
     submit(&mut renderer, &mut completions, &scene, &picture);
     command("hang");
-    renderer.submit(&scene, &picture, true).unwrap();
+    renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap();
     let begun = Instant::now();
     drop(renderer);
     let gone = begun.elapsed();

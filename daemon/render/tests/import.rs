@@ -22,7 +22,7 @@ use bowwave_core::{
     event::{Lent, Picture, PixelFormat},
     frame::scene::Scene,
 };
-use bowwave_render::{PictureCounts, PicturePath, Renderer};
+use bowwave_render::{DrawRequest, PictureCounts, PicturePath, Renderer};
 use common::{assert_clean, config, open, submit, testing::empty_scene};
 use rustix::mm::{MapFlags, MprotectFlags, ProtFlags, mmap_anonymous, mprotect, munmap};
 
@@ -202,7 +202,7 @@ fn a_buffer_is_kept_while_a_frame_reads_it_and_no_longer() {
     let mut before = Vec::new();
     for n in 0..12_u64 {
         let picture = driver.lend(shape, &pages[n as usize % 4], 0, true);
-        renderer.submit(frame(&mut scene, n), &picture, true).unwrap();
+        renderer.submit(DrawRequest::new(frame(&mut scene, n), &picture, true)).unwrap();
         drop(picture);
         assert_eq!(driver.lent(), 1, "the frame in flight keeps its picture");
         let done = completions.wait_next(Duration::from_secs(20)).unwrap().unwrap();
@@ -216,7 +216,7 @@ fn a_buffer_is_kept_while_a_frame_reads_it_and_no_longer() {
     assert_eq!(renderer.picture_counts(), PictureCounts { copied: 0, imported: 12 });
     // The same picture once more, without being new.
     let again = driver.lend(shape, &pages[3], 0, true);
-    renderer.submit(frame(&mut scene, 12), &again, false).unwrap();
+    renderer.submit(DrawRequest::new(frame(&mut scene, 12), &again, false)).unwrap();
     assert_eq!(completions.wait_next(Duration::from_secs(20)).unwrap().unwrap().rgba()[..4096], before[11]);
     assert_eq!(renderer.picture_counts().imported, 12);
     drop(again);

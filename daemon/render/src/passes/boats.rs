@@ -9,12 +9,12 @@ use shaders_spirv::{
 };
 
 use crate::{
+    encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     memory::{Image, ImageShape},
     meshes::Meshes,
-    passes::{DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED},
+    passes::{DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED},
     pipeline::{Blend, Bound, DEPTH, Pipeline, PipelineShape, SAMPLES, Sampler, SetLayout, UNORM},
-    recorder::{Begin, Colour, Recorder, Step},
     rects::joined,
 };
 
@@ -47,7 +47,7 @@ pub(crate) struct BoatPipelines {
 impl BoatPipelines {
     /// `front` is the way round in which the corners of a front face are seen: mirrored, it is the other one.
     pub(crate) fn new(
-        making: &Making<'_>,
+        context: &PassContext<'_>,
         meshes: &Meshes,
         samples: vk::SampleCountFlags,
         front: vk::FrontFace,
@@ -62,11 +62,11 @@ impl BoatPipelines {
         ];
         // A layer of codes holds roots, one of light is filtered as it is.
         let constants = [u32::from(colour == UNORM), samples.as_raw()];
-        let lens = making.lens_constants();
-        let sets = [making.frame_set, &meshes.skin_layout];
+        let lens = context.lens_constants();
+        let sets = [context.frame_set, &meshes.skin_layout];
         let make = |textured: bool, cull: Option<vk::FrontFace>| {
             Pipeline::new(
-                making.gpu,
+                context.gpu,
                 &PipelineShape {
                     vertex: if textured { BOAT_TEXTURED_VERT } else { BOAT_VERT },
                     fragment: if textured { BOAT_TEXTURED_FRAG } else { BOAT_FRAG },
@@ -90,7 +90,13 @@ impl BoatPipelines {
     }
 
     /// Draws one boat's mesh, within a rendering with depth. The shared buffers are bound.
-    pub(crate) fn draw(&self, to: Recorder<'_>, frame: vk::DescriptorSet, meshes: &Meshes, boat: &BoatDraw) {
+    pub(crate) fn draw(
+        &self,
+        to: CommandEncoder<'_>,
+        frame: vk::DescriptorSet,
+        meshes: &Meshes,
+        boat: &BoatDraw,
+    ) {
         let Some(level) = meshes.level(boat.model, boat.detail_m) else { return };
         let block = DrawBlock { index: boat.index, ..DrawBlock::default() };
         if let (Some(skin), Some(pipeline)) = (meshes.skin(boat.model), &self.textured) {
@@ -122,10 +128,14 @@ pub(crate) struct BoatsPass {
 }
 
 impl BoatsPass {
-    pub(crate) fn new(making: &Making<'_>, meshes: &Meshes, any_textured: bool) -> Result<Self, RenderError> {
-        let gpu = making.gpu;
+    pub(crate) fn new(
+        context: &PassContext<'_>,
+        meshes: &Meshes,
+        any_textured: bool,
+    ) -> Result<Self, RenderError> {
+        let gpu = context.gpu;
         let layer =
-            |format, usage| ImageShape { samples: SAMPLES, ..ImageShape::new(making.size, format, usage) };
+            |format, usage| ImageShape { samples: SAMPLES, ..ImageShape::new(context.size, format, usage) };
         let sampled = vk::ImageUsageFlags::SAMPLED;
         let colour =
             Image::new(gpu, "boats' layer", layer(UNORM, vk::ImageUsageFlags::COLOR_ATTACHMENT | sampled))?;
@@ -135,22 +145,22 @@ impl BoatsPass {
             layer(DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | sampled),
         )?;
         let front = vk::FrontFace::COUNTER_CLOCKWISE;
-        let pipelines = BoatPipelines::new(making, meshes, SAMPLES, front, UNORM, any_textured)?;
+        let pipelines = BoatPipelines::new(context, meshes, SAMPLES, front, UNORM, any_textured)?;
         let sampler = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         let bound = Bound::Texture { view: colour.view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let set = making.pool.set(&set_layout, &[bound])?;
+        let set = context.pool.set(&set_layout, &[bound])?;
         let composite = Pipeline::new(
             gpu,
             &PipelineShape {
                 vertex_constants: &[],
                 constants: &[SAMPLES.as_raw()],
-                ..PipelineShape::over_screen(RECT_VERT, COMPOSITE_FRAG, &[making.frame_set, &set_layout])
+                ..PipelineShape::over_screen(RECT_VERT, COMPOSITE_FRAG, &[context.frame_set, &set_layout])
             },
         )?;
         Ok(Self {
-            size: making.size,
+            size: context.size,
             colour,
             depth,
             pipelines,
@@ -180,19 +190,19 @@ impl BoatsPass {
     }
 
     /// What lets another pass hide behind hulls.
-    pub(crate) fn hull_depth(&self, making: &Making<'_>) -> Result<HullDepth, RenderError> {
-        let sampler = Sampler::new(making.gpu, vk::Filter::NEAREST, false)?;
+    pub(crate) fn hull_depth(&self, context: &PassContext<'_>) -> Result<HullDepth, RenderError> {
+        let sampler = Sampler::new(context.gpu, vk::Filter::NEAREST, false)?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let layout = SetLayout::new(context.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         let bound = Bound::Texture { view: self.depth.view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let set = making.pool.set(&layout, &[bound])?;
+        let set = context.pool.set(&layout, &[bound])?;
         Ok(HullDepth { set, layout, _sampler: sampler })
     }
 
     /// Draws the boats into the layer. Only the pixels that they can cover are cleared.
     pub(crate) fn record_layer(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         frame: vk::DescriptorSet,
         meshes: &Meshes,
         boats: &[BoatDraw],
@@ -214,7 +224,7 @@ impl BoatsPass {
 
     /// Puts the layer onto the screen, within a rendering to it: the first `pieces` rectangles of the frame's list, which do not
     /// overlap.
-    pub(crate) fn record_composite(&self, to: Recorder<'_>, frame: vk::DescriptorSet, pieces: u32) {
+    pub(crate) fn record_composite(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, pieces: u32) {
         to.bind(&self.composite, &[frame, self.set]);
         to.push(&self.composite, &DrawBlock::default());
         to.draw(4, pieces);

@@ -9,14 +9,14 @@ use bowwave_core::frame::scene::{PixelRect, Scene};
 use shaders_spirv::{HUD_FRAG, HUD_VERT, interface::HudQuad};
 
 use crate::{
+    encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     frame_data::{FrameData, QUADS_MAX},
     glyphs::Glyphs,
     hud_layout::{HudLayout, KINDS, text_px},
     memory::{Image, ImageShape},
-    passes::{DRAWN, FORGET_READ, Making, SAMPLED},
+    passes::{DRAWN, FORGET_READ, PassContext, SAMPLED},
     pipeline::{Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
-    recorder::{Begin, Colour, Recorder, Step},
     upload::upload_image,
 };
 
@@ -40,9 +40,9 @@ pub(crate) struct HudPass {
 }
 
 impl HudPass {
-    pub(crate) fn new(making: &Making<'_>) -> Result<Self, RenderError> {
-        let gpu = making.gpu;
-        let (large, small) = text_px(making.size);
+    pub(crate) fn new(context: &PassContext<'_>) -> Result<Self, RenderError> {
+        let gpu = context.gpu;
+        let (large, small) = text_px(context.size);
         let mut glyphs = Glyphs::new(large, small)?;
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
         let shape = ImageShape::new((glyphs.width, glyphs.height), vk::Format::R8_UNORM, usage);
@@ -54,7 +54,7 @@ impl HudPass {
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
         let bound = Bound::Texture { view: atlas.view, sampler: sampler.raw, layout };
-        let set = making.pool.set(&set_layout, &[bound])?;
+        let set = context.pool.set(&set_layout, &[bound])?;
         let pipeline = |kind: u32| {
             Pipeline::new(
                 gpu,
@@ -62,7 +62,7 @@ impl HudPass {
                     vertex_constants: &[],
                     constants: &[kind],
                     push: 0,
-                    ..PipelineShape::over_screen(HUD_VERT, HUD_FRAG, &[making.frame_set, &set_layout])
+                    ..PipelineShape::over_screen(HUD_VERT, HUD_FRAG, &[context.frame_set, &set_layout])
                 },
             )
         };
@@ -70,20 +70,20 @@ impl HudPass {
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         // The video pass takes its codes as whole words: a driver that runs on the processor converts slowly.
         let shape =
-            ImageShape { second: Some(vk::Format::R32_UINT), ..ImageShape::new(making.size, SRGB, usage) };
+            ImageShape { second: Some(vk::Format::R32_UINT), ..ImageShape::new(context.size, SRGB, usage) };
         let layer = Image::new(gpu, "head-up display", shape)?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
         let layer_layout = Arc::new(SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?);
         let bound = Bound::Texture { view: layer.second_view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let layer_set = making.pool.set(&layer_layout, &[bound])?;
+        let layer_set = context.pool.set(&layer_layout, &[bound])?;
         Ok(Self {
             held: Vec::with_capacity(QUADS_MAX),
             layer,
             layer_layout,
             layer_set,
-            size: making.size,
+            size: context.size,
             glyphs,
-            layout: HudLayout::new(making.size),
+            layout: HudLayout::new(context.size),
             pipelines,
             set,
             _atlas: atlas,
@@ -118,7 +118,12 @@ impl HudPass {
     }
 
     /// Draws them into the layer.
-    pub(crate) fn record_layer(&self, to: Recorder<'_>, frame: vk::DescriptorSet, counts: [u32; KINDS]) {
+    pub(crate) fn record_layer(
+        &self,
+        to: CommandEncoder<'_>,
+        frame: vk::DescriptorSet,
+        counts: [u32; KINDS],
+    ) {
         let (width, height) = self.size;
         let area = PixelRect { x: 0, y: 0, width, height };
         let was = (FORGET_READ.0 | DRAWN.0, DRAWN.1, vk::ImageLayout::UNDEFINED);
@@ -136,7 +141,7 @@ impl HudPass {
     }
 
     /// Draws them, within a rendering to the screen.
-    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, counts: [u32; KINDS]) {
+    pub(crate) fn record(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, counts: [u32; KINDS]) {
         let (width, height) = self.size;
         to.scissor(PixelRect { x: 0, y: 0, width, height });
         let mut first = 0;

@@ -7,15 +7,15 @@ use shaders_spirv::{SCREEN_VERT, SOFTEN_FRAG};
 
 use crate::{
     atlas::{Placed, SOFT},
+    encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     memory::{Image, ImageShape},
     meshes::Meshes,
     passes::{
-        DEPTH_TESTED, DRAWN, FORGET_READ, Making, SAMPLED,
+        DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED,
         boats::{BoatDraw, BoatPipelines},
     },
     pipeline::{Blend, Bound, DEPTH, LIGHT, Pipeline, PipelineShape, Sampler, SetLayout},
-    recorder::{Begin, Colour, Recorder, Step},
     rects::joined,
 };
 
@@ -41,24 +41,24 @@ struct Soft {
 impl MirrorPass {
     /// `softens` if a method that needs it may be asked for.
     pub(crate) fn new(
-        making: &Making<'_>,
+        context: &PassContext<'_>,
         meshes: &Meshes,
         any_textured: bool,
         softens: bool,
     ) -> Result<Self, RenderError> {
-        let size = Self::layer_size(making.size);
+        let size = Self::layer_size(context.size);
         let sampled = vk::ImageUsageFlags::SAMPLED;
         let colour = ImageShape::new(size, LIGHT, vk::ImageUsageFlags::COLOR_ATTACHMENT | sampled);
         let depth = ImageShape::new(size, DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT);
-        let colour = Image::new(making.gpu, "mirror layer", colour)?;
-        let soft = softens.then(|| Soft::new(making, &colour)).transpose()?;
+        let colour = Image::new(context.gpu, "mirror layer", colour)?;
+        let soft = softens.then(|| Soft::new(context, &colour)).transpose()?;
         Ok(Self {
-            size: making.size,
+            size: context.size,
             soft,
             colour,
-            depth: Image::new(making.gpu, "mirror depth", depth)?,
+            depth: Image::new(context.gpu, "mirror depth", depth)?,
             pipelines: BoatPipelines::new(
-                making,
+                context,
                 meshes,
                 vk::SampleCountFlags::TYPE_1,
                 vk::FrontFace::CLOCKWISE,
@@ -95,7 +95,7 @@ impl MirrorPass {
     }
 
     /// Softens what was drawn on `places`; returns the step that makes it ready to be sampled.
-    pub(crate) fn record_soft(&self, to: Recorder<'_>, places: &[Placed]) -> Option<Step<'_>> {
+    pub(crate) fn record_soft(&self, to: CommandEncoder<'_>, places: &[Placed]) -> Option<Step<'_>> {
         let soft = self.soft.as_ref()?;
         let used = places.iter().map(|p| p.place).reduce(joined)?;
         let third = |v: u32| v / SOFT;
@@ -117,7 +117,7 @@ impl MirrorPass {
     /// Draws the mirrored boats, each onto its place.
     pub(crate) fn record(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         frame: vk::DescriptorSet,
         meshes: &Meshes,
         boats: &[BoatDraw],
@@ -135,8 +135,8 @@ impl MirrorPass {
 }
 
 impl Soft {
-    fn new(making: &Making<'_>, layer: &Image) -> Result<Self, RenderError> {
-        let gpu = making.gpu;
+    fn new(context: &PassContext<'_>, layer: &Image) -> Result<Self, RenderError> {
+        let gpu = context.gpu;
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         let size = (layer.shape.width / SOFT, layer.shape.height / SOFT);
         let image = Image::new(gpu, "mirror layer, softened", ImageShape::new(size, LIGHT, usage))?;
@@ -144,7 +144,7 @@ impl Soft {
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         let bound = Bound::Texture { view: layer.view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let set = making.pool.set(&set_layout, &[bound])?;
+        let set = context.pool.set(&set_layout, &[bound])?;
         let pipeline = Pipeline::new(
             gpu,
             &PipelineShape {

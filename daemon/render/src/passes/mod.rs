@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// What every pass is made from.
-pub(crate) struct Making<'a> {
+pub(crate) struct PassContext<'a> {
     pub(crate) gpu: &'a Arc<Gpu>,
     /// Layout of set 0.
     pub(crate) frame_set: &'a SetLayout,
@@ -38,7 +38,7 @@ pub(crate) struct Making<'a> {
     pub(crate) optics: Optics,
 }
 
-impl Making<'_> {
+impl PassContext<'_> {
     /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`).
     pub(crate) fn lens_constants(&self) -> [u32; 2] {
         let bend = match self.optics.bend {

@@ -10,11 +10,11 @@ use shaders_spirv::{
 };
 
 use crate::{
+    encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     memory::{Image, ImageShape},
-    passes::{DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass, water::WaterDraw},
+    passes::{DRAWN, FORGET_READ, PassContext, SAMPLED, mirror::MirrorPass, water::WaterDraw},
     pipeline::{Blend, Bound, LIGHT, Pipeline, PipelineShape, SRGB, SUMS, Sampler, SetLayout, UNORM},
-    recorder::{Begin, Colour, Recorder, Step},
 };
 
 /// A boat's strips of water, and what is thrown back there.
@@ -57,13 +57,13 @@ struct StageShape<'a> {
 }
 
 impl Stage {
-    fn new(making: &Making<'_>, shape: &StageShape<'_>) -> Result<Self, RenderError> {
+    fn new(context: &PassContext<'_>, shape: &StageShape<'_>) -> Result<Self, RenderError> {
         let kinds = vec![vk::DescriptorType::COMBINED_IMAGE_SAMPLER; shape.sampled.len()];
-        let layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let set = making.pool.set(&layout, shape.sampled)?;
-        let sets = [making.frame_set, &layout];
+        let layout = SetLayout::new(context.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let set = context.pool.set(&layout, shape.sampled)?;
+        let sets = [context.frame_set, &layout];
         let pipeline = Pipeline::new(
-            making.gpu,
+            context.gpu,
             &PipelineShape {
                 vertex: shape.vertex,
                 fragment: shape.fragment,
@@ -90,7 +90,7 @@ impl Stage {
 }
 
 impl Stage {
-    fn push_index(&self, to: Recorder<'_>, index: u32) {
+    fn push_index(&self, to: CommandEncoder<'_>, index: u32) {
         to.push(&self.pipeline, &DrawBlock { rect: [0.0; 4], index, first: 0 });
     }
 }
@@ -98,12 +98,12 @@ impl Stage {
 impl ReflectPass {
     /// `backdrop` holds the video beneath; `boats` is how many there can be.
     pub(crate) fn new(
-        making: &Making<'_>,
+        context: &PassContext<'_>,
         mirror: &MirrorPass,
         backdrop: &Image,
         boats: usize,
     ) -> Result<Self, RenderError> {
-        let gpu = making.gpu;
+        let gpu = context.gpu;
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         let image = |what, size, format| Image::new(gpu, what, ImageShape::new(size, format, usage));
         let rows = u32::try_from(boats.max(1) * LOBE_BANDS).unwrap_or(u32::MAX);
@@ -130,9 +130,9 @@ impl ReflectPass {
             targets: 1,
             blend: Blend::Replace,
         };
-        let to_bands = Stage::new(making, &replace)?;
+        let to_bands = Stage::new(context, &replace)?;
         let to_sums = Stage::new(
-            making,
+            context,
             &StageShape {
                 fragment: SUMS_FRAG,
                 sampled: &[bound(&bands, &nearest)],
@@ -143,7 +143,7 @@ impl ReflectPass {
             },
         )?;
         let to_layers = Stage::new(
-            making,
+            context,
             &StageShape {
                 fragment: LAYERS_FRAG,
                 sampled: &[bound(&sums, &nearest)],
@@ -155,7 +155,7 @@ impl ReflectPass {
         let [thrown, taken] = layers.each_ref().map(|layer| bound(layer, &linear));
         let sampled = [bound(backdrop, &nearest), thrown, taken];
         let to_screen = Stage::new(
-            making,
+            context,
             &StageShape {
                 vertex: REFLECT_VERT,
                 fragment: REFLECT_FRAG,
@@ -180,7 +180,7 @@ impl ReflectPass {
     /// Collapses the mirrored boats, whose layer is ready to be sampled, to bands. `lobes` go with `boats`.
     pub(crate) fn record_bands(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         frame: vk::DescriptorSet,
         boats: &[WaterDraw],
         lobes: &[LobeBlock],
@@ -200,7 +200,7 @@ impl ReflectPass {
     /// Sums the bands, which are ready to be sampled.
     pub(crate) fn record_sums(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         boats: &[WaterDraw],
         lobes: &[LobeBlock],
     ) -> Option<Step<'_>> {
@@ -218,7 +218,7 @@ impl ReflectPass {
     /// Finds what water throws back from the sums, which are ready to be sampled.
     pub(crate) fn record_layers(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         frame: vk::DescriptorSet,
         boats: &[WaterDraw],
         lobes: &[LobeBlock],
@@ -237,7 +237,7 @@ impl ReflectPass {
     }
 
     /// Draws, within a rendering to the screen.
-    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, boats: &[ReflectDraw]) {
+    pub(crate) fn record(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, boats: &[ReflectDraw]) {
         to.bind(&self.to_screen.pipeline, &[frame, self.to_screen.set]);
         let shape = &self.layers[0].shape;
         let texel = [1.0 / shape.width as f32, 1.0 / shape.height as f32];

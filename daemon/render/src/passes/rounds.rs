@@ -6,13 +6,13 @@ use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{ROUND_FRAG, ROUND_HIDDEN_FRAG, ROUND_VERT, Shader, interface::DrawBlock};
 
 use crate::{
+    encoder::CommandEncoder,
     error::RenderError,
     passes::{
-        Making,
+        PassContext,
         boats::{BoatsPass, HullDepth},
     },
     pipeline::{Pipeline, PipelineShape, SetLayout},
-    recorder::Recorder,
     rects::{around_all, corners, overlap},
 };
 
@@ -57,14 +57,14 @@ pub(crate) struct RoundsPass {
 
 impl RoundsPass {
     /// `boats` is there if there can be any to hide rounds.
-    pub(crate) fn new(making: &Making<'_>, boats: Option<&BoatsPass>) -> Result<Self, RenderError> {
-        let open = pipeline(making, ROUND_FRAG, &[making.frame_set])?;
-        let hidden = boats.map(|boats| Hidden::new(making, boats)).transpose()?;
+    pub(crate) fn new(context: &PassContext<'_>, boats: Option<&BoatsPass>) -> Result<Self, RenderError> {
+        let open = pipeline(context, ROUND_FRAG, &[context.frame_set])?;
+        let hidden = boats.map(|boats| Hidden::new(context, boats)).transpose()?;
         Ok(Self { open, hidden })
     }
 
     /// Draws, within a rendering to the screen.
-    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, draws: &[RoundDraw]) {
+    pub(crate) fn record(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, draws: &[RoundDraw]) {
         for draw in draws {
             let pipeline = match self.hidden.as_ref().filter(|_| draw.hidden) {
                 Some(hidden) => {
@@ -84,15 +84,19 @@ impl RoundsPass {
 }
 
 impl Hidden {
-    fn new(making: &Making<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
-        let depth = boats.hull_depth(making)?;
-        let pipeline = pipeline(making, ROUND_HIDDEN_FRAG, &[making.frame_set, &depth.layout])?;
+    fn new(context: &PassContext<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
+        let depth = boats.hull_depth(context)?;
+        let pipeline = pipeline(context, ROUND_HIDDEN_FRAG, &[context.frame_set, &depth.layout])?;
         Ok(Self { pipeline, depth })
     }
 }
 
-fn pipeline(making: &Making<'_>, fragment: Shader, sets: &[&SetLayout]) -> Result<Pipeline, RenderError> {
-    Pipeline::new(making.gpu, &PipelineShape::over_screen(ROUND_VERT, fragment, sets))
+fn pipeline(
+    context: &PassContext<'_>,
+    fragment: Shader,
+    sets: &[&SetLayout],
+) -> Result<Pipeline, RenderError> {
+    Pipeline::new(context.gpu, &PipelineShape::over_screen(ROUND_VERT, fragment, sets))
 }
 
 #[cfg(test)]

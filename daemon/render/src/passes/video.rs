@@ -11,14 +11,14 @@ use bowwave_core::{
 use shaders_spirv::{SCREEN_VERT, VIDEO_FRAG, VIDEO_OVERLAID_FRAG, interface::VideoBlock};
 
 use crate::{
+    encoder::CommandEncoder,
     error::RenderError,
     gpu::Gpu,
     passes::{
-        Making,
+        PassContext,
         pictures::{PictureCounts, PicturePath, PictureShape, Pictures},
     },
     pipeline::{Blend, Pipeline, PipelineShape, SetLayout},
-    recorder::Recorder,
     rects::around_all,
     target::{DrawTarget, Words},
 };
@@ -43,17 +43,17 @@ pub(crate) struct VideoPass {
 impl VideoPass {
     /// `overlay` is the layout of what lies over the picture.
     pub(crate) fn new(
-        making: &Making<'_>,
+        context: &PassContext<'_>,
         expected: Option<PictureShape>,
         overlay: &Arc<SetLayout>,
     ) -> Result<Self, RenderError> {
         let kinds = [vk::DescriptorType::UNIFORM_TEXEL_BUFFER; 2];
-        let layout = SetLayout::new(making.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
+        let layout = SetLayout::new(context.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         let mut pass = Self {
-            words: making.words,
-            gpu: making.gpu.clone(),
-            size: making.size,
-            slots: making.slots,
+            words: context.words,
+            gpu: context.gpu.clone(),
+            size: context.size,
+            slots: context.slots,
             layout,
             overlay: overlay.clone(),
             pictures: None,
@@ -175,7 +175,7 @@ impl VideoPass {
     /// Draws the current picture over all of `target`, divided by [`VideoPass::divide`], with `overlay` over it where it is wanted.
     pub(crate) fn record(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         target: &DrawTarget,
         overlay: vk::DescriptorSet,
         overlaid: &[PixelRect],

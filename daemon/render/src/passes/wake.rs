@@ -5,13 +5,13 @@ use ash::vk;
 use shaders_spirv::{SPRAY_FRAG, SPRAY_VERT, Shader, WAKE_FRAG, WAKE_VERT, interface::DrawBlock};
 
 use crate::{
+    encoder::CommandEncoder,
     error::RenderError,
     passes::{
-        Making,
+        PassContext,
         boats::{BoatsPass, HullDepth},
     },
     pipeline::{Pipeline, PipelineShape, SetLayout},
-    recorder::Recorder,
 };
 
 /// Corners of a strip: two for each of the five columns of `wake.vert`.
@@ -40,22 +40,22 @@ pub(crate) struct WakePass {
 }
 
 impl WakePass {
-    pub(crate) fn new(making: &Making<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
-        let depth = boats.hull_depth(making)?;
-        let lens = making.lens_constants();
+    pub(crate) fn new(context: &PassContext<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
+        let depth = boats.hull_depth(context)?;
+        let lens = context.lens_constants();
         let pipeline = |vertex: Shader, fragment: Shader, sets: &[&SetLayout]| {
             let shape = PipelineShape::over_screen(vertex, fragment, sets);
-            Pipeline::new(making.gpu, &PipelineShape { vertex_constants: &lens, ..shape })
+            Pipeline::new(context.gpu, &PipelineShape { vertex_constants: &lens, ..shape })
         };
         Ok(Self {
-            pipeline: pipeline(WAKE_VERT, WAKE_FRAG, &[making.frame_set])?,
-            spray: pipeline(SPRAY_VERT, SPRAY_FRAG, &[making.frame_set, &depth.layout])?,
+            pipeline: pipeline(WAKE_VERT, WAKE_FRAG, &[context.frame_set])?,
+            spray: pipeline(SPRAY_VERT, SPRAY_FRAG, &[context.frame_set, &depth.layout])?,
             depth,
         })
     }
 
     /// Draws, within a rendering to the screen.
-    pub(crate) fn record(&self, to: Recorder<'_>, frame: vk::DescriptorSet, wakes: &[WakeDraw]) {
+    pub(crate) fn record(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, wakes: &[WakeDraw]) {
         to.bind(&self.pipeline, &[frame]);
         for wake in wakes.iter().filter(|w| w.strips > 0) {
             to.push(&self.pipeline, &DrawBlock { index: wake.index, ..DrawBlock::default() });
@@ -64,7 +64,7 @@ impl WakePass {
     }
 
     /// Draws what stands up beside the hulls, within a rendering to the screen. The boats' depth is ready to be sampled.
-    pub(crate) fn record_spray(&self, to: Recorder<'_>, frame: vk::DescriptorSet, wakes: &[WakeDraw]) {
+    pub(crate) fn record_spray(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, wakes: &[WakeDraw]) {
         to.bind(&self.spray, &[frame, self.depth.set]);
         for wake in wakes.iter().filter(|w| w.spray) {
             to.push(&self.spray, &DrawBlock { index: wake.index, ..DrawBlock::default() });

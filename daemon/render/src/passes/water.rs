@@ -9,11 +9,11 @@ use bowwave_core::{
 use shaders_spirv::{FIELD_FRAG, RECT_VERT, WATER_FRAG, interface::DrawBlock};
 
 use crate::{
+    encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     memory::{Image, ImageShape},
-    passes::{COPIED_TO, DRAWN, FORGET_READ, Making, SAMPLED, mirror::MirrorPass},
+    passes::{COPIED_TO, DRAWN, FORGET_READ, PassContext, SAMPLED, mirror::MirrorPass},
     pipeline::{Blend, Bound, Pipeline, PipelineShape, Sampler, SetLayout, UNORM},
-    recorder::{Begin, Colour, Recorder, Step},
     rects::joined,
 };
 
@@ -64,30 +64,30 @@ pub(crate) struct WaterPass {
 impl WaterPass {
     /// `mirror` is there unless only shadows are wanted.
     pub(crate) fn new(
-        making: &Making<'_>,
+        context: &PassContext<'_>,
         mirror: Option<&MirrorPass>,
         waters: &[(ReflectionMethod, ShadowLevel)],
     ) -> Result<Self, RenderError> {
-        let gpu = making.gpu;
+        let gpu = context.gpu;
         let compares = waters.iter().any(|(method, _)| Self::reads_video(*method));
         let usage = vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST;
-        let size = if compares { making.size } else { (1, 1) };
+        let size = if compares { context.size } else { (1, 1) };
         let backdrop = Image::new(gpu, "video beneath reflections", ImageShape::new(size, UNORM, usage))?;
         let linear = Sampler::new(gpu, vk::Filter::LINEAR, false)?;
         let bound = |view: vk::ImageView| Bound::Texture { view, sampler: linear.raw, layout: SAMPLED.2 };
         let field = waters
             .iter()
             .any(|(method, _)| has_field(*method))
-            .then(|| Field::new(making, bound(backdrop.view)))
+            .then(|| Field::new(context, bound(backdrop.view)))
             .transpose()?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER; 3];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
         // Variants that read no mirror layer or no field still name one.
         let plain = mirror.map_or(backdrop.view, |m| m.colour.view);
         let field_view = field.as_ref().map_or(backdrop.view, |f| f.image.view);
-        let set = making.pool.set(&set_layout, &[backdrop.view, plain, field_view].map(bound))?;
+        let set = context.pool.set(&set_layout, &[backdrop.view, plain, field_view].map(bound))?;
         let soft = match mirror.and_then(MirrorPass::soft_view) {
-            Some(soft) => Some(making.pool.set(&set_layout, &[backdrop.view, soft, field_view].map(bound))?),
+            Some(soft) => Some(context.pool.set(&set_layout, &[backdrop.view, soft, field_view].map(bound))?),
             None => None,
         };
         let mut variants = Vec::with_capacity(waters.len());
@@ -97,13 +97,13 @@ impl WaterPass {
                 &PipelineShape {
                     vertex_constants: &[],
                     constants: &[method_constant(method), shadow_constant(shadow)],
-                    ..PipelineShape::over_screen(RECT_VERT, WATER_FRAG, &[making.frame_set, &set_layout])
+                    ..PipelineShape::over_screen(RECT_VERT, WATER_FRAG, &[context.frame_set, &set_layout])
                 },
             )?;
             variants.push(Variant { method, shadow, pipeline });
         }
         Ok(Self {
-            size: making.size,
+            size: context.size,
             variants,
             field,
             backdrop,
@@ -154,7 +154,7 @@ impl WaterPass {
     /// Finds how the video changes beneath the boats' reflections, where the method needs it.
     pub(crate) fn record_field(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         frame: vk::DescriptorSet,
         water: Water,
         boats: &[WaterDraw],
@@ -180,7 +180,7 @@ impl WaterPass {
     /// Draws, within a rendering to the screen.
     pub(crate) fn record(
         &self,
-        to: Recorder<'_>,
+        to: CommandEncoder<'_>,
         frame: vk::DescriptorSet,
         water: Water,
         boats: &[WaterDraw],
@@ -198,21 +198,21 @@ impl WaterPass {
 }
 
 impl Field {
-    fn new(making: &Making<'_>, backdrop: Bound) -> Result<Self, RenderError> {
-        let gpu = making.gpu;
+    fn new(context: &PassContext<'_>, backdrop: Bound) -> Result<Self, RenderError> {
+        let gpu = context.gpu;
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
-        let size = (making.size.0.div_ceil(FIELD_CELL.0), making.size.1.div_ceil(FIELD_CELL.1));
+        let size = (context.size.0.div_ceil(FIELD_CELL.0), context.size.1.div_ceil(FIELD_CELL.1));
         let format = vk::Format::R8G8_UNORM;
         let image = Image::new(gpu, "gradients of the video", ImageShape::new(size, format, usage))?;
         let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
         let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let set = making.pool.set(&set_layout, &[backdrop])?;
+        let set = context.pool.set(&set_layout, &[backdrop])?;
         let pipeline = Pipeline::new(
             gpu,
             &PipelineShape {
                 colour: format,
                 blend: Blend::Replace,
-                ..PipelineShape::over_screen(RECT_VERT, FIELD_FRAG, &[making.frame_set, &set_layout])
+                ..PipelineShape::over_screen(RECT_VERT, FIELD_FRAG, &[context.frame_set, &set_layout])
             },
         )?;
         Ok(Self { pipeline, image, set, _set_layout: set_layout })

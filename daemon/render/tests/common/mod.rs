@@ -8,7 +8,7 @@ use bowwave_core::{
     frame::scene::Scene,
     model::Model,
 };
-use bowwave_render::{Completions, Needs, PictureShape, RenderConfig, Renderer, TimeOuts};
+use bowwave_render::{Completions, DrawRequest, Needs, PictureShape, RenderConfig, Renderer, TimeOuts};
 
 #[path = "../../src/testing.rs"]
 pub mod testing;
@@ -59,7 +59,7 @@ pub fn submit(
     scene: &Scene,
     picture: &Picture,
 ) -> Vec<u8> {
-    renderer.submit(scene, picture, true).unwrap();
+    renderer.submit(DrawRequest::new(scene, picture, true)).unwrap();
     let frame = completions.wait_next(Duration::from_secs(20)).unwrap().expect("a frame within 20 s");
     assert_eq!(frame.frame, scene.frame);
     frame.rgba().to_vec()

@@ -17,7 +17,7 @@ use bowwave_core::{
     time::Time,
 };
 use bowwave_devices::clock::now;
-use bowwave_render::{RenderConfig, RenderError, Renderer, TimeOuts};
+use bowwave_render::{DrawRequest, RenderConfig, RenderError, Renderer, TimeOuts};
 
 use output::{OutputThread, Ticket};
 
@@ -55,7 +55,7 @@ impl Presenter {
         let mut config = RenderConfig::of_plan(session.plan(), options.gpu.clone(), options.validation);
         if let Some(frame) = options.gpu_timeout {
             // A computer that draws so much slower compiles so much slower.
-            config.time_outs = TimeOuts { frame, rehearsal: config.time_outs.rehearsal.max(frame * 120) };
+            config.time_outs = TimeOuts { frame, warm_up: config.time_outs.warm_up.max(frame * 120) };
         }
         let (renderer, completions) = Renderer::new(&config, models)?;
         let output = OutputOptions { size: session.plan().size, ..options.output.clone() };
@@ -83,7 +83,7 @@ impl Presenter {
         let (width, height) = plan.picture;
         let picture = Picture::black(plan.video, width, height).context("no picture of this size")?;
         let begun = now();
-        self.renderer.submit(&scene, &picture, true)?;
+        self.renderer.submit(DrawRequest::new(&scene, &picture, true))?;
         if let Some(output) = &self.output {
             output.announce(Ticket { frame: 0, begun, submitted: begun, deadline: None, warm_up: true });
             let begun = now();
@@ -109,7 +109,7 @@ impl Presenter {
         deadline: Option<Time>,
     ) -> Result<Handed, RenderError> {
         let ticket = Ticket { frame: view.scene.frame, begun, submitted: now(), deadline, warm_up: false };
-        let waited = self.renderer.submit(view.scene, view.picture, view.picture_is_new)?;
+        let waited = self.renderer.submit(DrawRequest::new(view.scene, view.picture, view.picture_is_new))?;
         let taken = self.output.as_ref().is_some_and(|o| o.runs() && o.announce(ticket));
         Ok(if taken { Handed::Taken { waited } } else { Handed::OutputEnded })
     }

@@ -10,7 +10,7 @@ use std::{
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::{event::TriggerEdge, frame::scene::Pass, time::Time};
 use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
-use bowwave_render::{Completions, Finished};
+use bowwave_render::{Completions, FinishedFrame};
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use sha2::{Digest, Sha256};
 
@@ -257,7 +257,7 @@ impl OutputWorker {
         Ok(self.report)
     }
 
-    fn take(&mut self, frame: &Finished, complete: Time) -> Result<()> {
+    fn take(&mut self, frame: &FinishedFrame, complete: Time) -> Result<()> {
         let ticket = self.tickets.recv().context("a frame came out that was not put in")?;
         if ticket.warm_up {
             if self.told.warm.send(()).is_err() {
@@ -317,7 +317,7 @@ impl OutputWorker {
         self.pictures(frame, ticket.frame)
     }
 
-    fn pictures(&mut self, frame: &Finished, index: u64) -> Result<()> {
+    fn pictures(&mut self, frame: &FinishedFrame, index: u64) -> Result<()> {
         let on_sheet = self.sheet.as_ref().is_some_and(|s| s.wants(index));
         let still = self.options.stills.contains(&index);
         if !on_sheet && !still {

@@ -18,7 +18,7 @@ use bowwave_core::{
     water::{ReflectionMethod, ShadowLevel, Water},
     world::fleet::Afloat,
 };
-use bowwave_render::{Completions, Finished, Needs, RenderConfig, Renderer, SOFTWARE, TimeOuts};
+use bowwave_render::{Completions, DrawRequest, FinishedFrame, Needs, RenderConfig, Renderer, TimeOuts, SOFTWARE};
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::RgbImage;
 
@@ -287,8 +287,8 @@ impl Painter {
     }
 
     /// The same, with what is known of the frame.
-    pub fn frame(&mut self, scene: &Scene, picture: &Picture) -> Result<Finished> {
-        self.renderer.submit(scene, picture, true)?;
+    pub fn frame(&mut self, scene: &Scene, picture: &Picture) -> Result<FinishedFrame> {
+        self.renderer.submit(DrawRequest::new(scene, picture, true))?;
         self.done.wait_next(Duration::from_secs(120))?.context("no frame within two minutes")
     }
 }

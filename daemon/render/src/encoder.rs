@@ -15,7 +15,7 @@ const STEPS_MAX: usize = 12;
 
 /// Recording into one command buffer.
 #[derive(Clone, Copy)]
-pub(crate) struct Recorder<'a> {
+pub(crate) struct CommandEncoder<'a> {
     pub(crate) gpu: &'a Gpu,
     pub(crate) cmd: vk::CommandBuffer,
 }
@@ -86,7 +86,7 @@ impl<'a> Steps<'a> {
     }
 
     /// Records the barrier, where there is anything in it.
-    pub(crate) fn record(&self, to: Recorder<'_>) {
+    pub(crate) fn record(&self, to: CommandEncoder<'_>) {
         to.barrier_with(self.steps.iter().flatten().copied(), self.memory);
     }
 }
@@ -99,7 +99,7 @@ pub(crate) struct Step<'a> {
     pub(crate) to: (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout),
 }
 
-impl Recorder<'_> {
+impl CommandEncoder<'_> {
     /// A barrier for up to [`STEPS_MAX`] images at once.
     pub(crate) fn barrier<'a>(&self, steps: impl IntoIterator<Item = Step<'a>>) {
         self.barrier_with(steps, vk::MemoryBarrier2::default());
