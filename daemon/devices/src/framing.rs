@@ -4,12 +4,21 @@
 //! byte is thrown away before it is clear that no packet begins there, so a false preamble costs no packet behind it, and a
 //! claimed length never makes memory grow beyond the longest packet that the format knows.
 
+use std::ops::Range;
+
 /// Bytes taken in at a time; with one unfinished packet they bound the buffer.
 pub(crate) const CHUNK: usize = 1024;
 /// Kinds of packets remembered. Units send a handful.
 const KNOWN: usize = 8;
 
-/// What a scanner has met.
+/// Takes the next piece from the front of `input`; `None` where it is used up.
+pub(crate) fn chunk<'a>(input: &mut &'a [u8]) -> Option<&'a [u8]> {
+    let (piece, rest) = input.split_at(input.len().min(CHUNK));
+    *input = rest;
+    (!piece.is_empty()).then_some(piece)
+}
+
+/// Counts of what a scanner has met.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounters {
     /// Packets with a right check sum.
@@ -34,6 +43,11 @@ pub(crate) enum Look<Head> {
         /// Its length; never above [`Framing::MAX_BYTES`].
         bytes: usize,
     },
+}
+
+/// The sum of bytes, modulo 256: the check sum of several formats.
+pub(crate) fn byte_sum(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0u8, |sum, &byte| sum.wrapping_add(byte))
 }
 
 /// How a format's packets are told from other bytes.
@@ -65,10 +79,12 @@ pub(crate) struct Found<'a, Head> {
     pub(crate) skipped_bytes: u64,
 }
 
-/// Takes bytes in pieces of any size and reports the packets in them. Memory is bounded.
+/// A pull decoder: bytes of any pieces in, packets out, one at a time. Memory is bounded.
 #[derive(Debug)]
 pub(crate) struct Scanner<F: Framing> {
     buffer: Vec<u8>,
+    /// Where in the buffer what has not been looked through begins.
+    start: usize,
     /// The newest kinds of good packets.
     known: [Option<F::Head>; KNOWN],
     /// The last thing met was a packet: what follows begins where one may.
@@ -79,7 +95,13 @@ pub(crate) struct Scanner<F: Framing> {
 impl<F: Framing> Scanner<F> {
     /// A scanner that has met nothing.
     pub(crate) fn new() -> Self {
-        Self { buffer: Vec::new(), known: [None; KNOWN], in_step: false, counters: LineCounters::default() }
+        Self {
+            buffer: Vec::new(),
+            start: 0,
+            known: [None; KNOWN],
+            in_step: false,
+            counters: LineCounters::default(),
+        }
     }
 
     /// What has been met so far. Bytes of a packet still incomplete are not counted yet.
@@ -90,69 +112,85 @@ impl<F: Framing> Scanner<F> {
     /// Bytes of a packet still incomplete, and bytes of memory for them.
     #[cfg(test)]
     pub(crate) fn held(&self) -> (usize, usize) {
-        (self.buffer.len(), self.buffer.capacity())
+        (self.buffer.len() - self.start, self.buffer.capacity())
     }
 
-    /// Takes the next bytes of the stream and calls `sink` with each packet that they complete, in order.
-    pub(crate) fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(Found<'_, F::Head>)) {
-        for chunk in bytes.chunks(CHUNK) {
-            self.buffer.extend_from_slice(chunk);
-            self.advance(&mut sink);
-        }
+    /// Takes bytes in. To be called where [`Self::next_packet`] has no more: at most [`CHUNK`] at a time keep the memory bounded.
+    pub(crate) fn insert(&mut self, bytes: &[u8]) {
+        self.buffer.drain(..self.start);
+        self.start = 0;
+        self.buffer.extend_from_slice(bytes);
     }
 
-    /// Reports every complete packet in the buffer and keeps the unfinished rest.
-    fn advance(&mut self, sink: &mut impl FnMut(Found<'_, F::Head>)) {
-        let mut at = 0;
-        while let Some(rest) = self.buffer.get(at..).filter(|rest| !rest.is_empty()) {
+    /// The next packet of the bytes that were taken in; `None`: more are needed.
+    pub(crate) fn next_packet(&mut self) -> Option<Found<'_, F::Head>> {
+        let (head, packet) = self.advance()?;
+        Some(Found { head, bytes: self.buffer.get(packet)?, skipped_bytes: self.counters.skipped_bytes })
+    }
+
+    /// The next packet, for which bytes are taken from the front of `input` as far as they are needed; `None`: `input` is used up.
+    pub(crate) fn next_of(&mut self, input: &mut &[u8]) -> Option<Found<'_, F::Head>> {
+        let (head, packet) = loop {
+            match self.advance() {
+                Some(found) => break found,
+                None => self.insert(chunk(input)?),
+            }
+        };
+        Some(Found { head, bytes: self.buffer.get(packet)?, skipped_bytes: self.counters.skipped_bytes })
+    }
+
+    /// Goes on to behind the next packet; its head and where it lies in the buffer.
+    fn advance(&mut self) -> Option<(F::Head, Range<usize>)> {
+        loop {
+            let rest = self.buffer.get(self.start..).filter(|rest| !rest.is_empty())?;
             let Some(sync) = rest.iter().position(|&b| b == F::SYNC) else {
-                at = self.skip(at, self.buffer.len());
-                break;
+                let left = rest.len();
+                self.skip(left);
+                return None;
             };
-            at = self.skip(at, at + sync);
+            self.skip(sync);
+            let at = self.start;
             let candidate = &self.buffer[at..];
             let (head, bytes) = match F::look(candidate) {
-                Look::Incomplete => break,
+                Look::Incomplete => return None,
                 Look::Packet { head, bytes } if bytes <= F::MAX_BYTES => (head, bytes),
                 Look::Packet { .. } | Look::Invalid => {
-                    at = self.skip(at, at + 1);
+                    self.skip(1);
                     continue;
                 }
             };
             match candidate.get(..bytes) {
                 Some(packet) if F::intact(packet) => match self.rival(at, bytes, head) {
                     Rival::None => {
-                        let skipped_bytes = self.counters.skipped_bytes;
-                        sink(Found { head, bytes: packet, skipped_bytes });
                         self.counters.packets += 1;
                         self.in_step = true;
                         self.learn(head);
-                        at += bytes;
+                        self.start = at + bytes;
+                        return Some((head, at..self.start));
                     }
-                    Rival::Perhaps => break,
+                    Rival::Perhaps => return None,
                     Rival::At(place) => {
                         self.counters.bad_crc += 1;
-                        at = self.skip(at, place);
+                        self.skip(place - at);
                     }
                 },
                 Some(_) => {
                     self.counters.bad_crc += 1;
-                    at = self.skip(at, at + 1);
+                    self.skip(1);
                 }
-                None => match self.packet_within(at, bytes, head) {
-                    Some(place) => at = self.skip(at, place),
-                    None => break,
-                },
+                None => {
+                    let place = self.packet_within(at, bytes, head)?;
+                    self.skip(place - at);
+                }
             }
         }
-        self.buffer.drain(..at);
     }
 
-    /// Counts the bytes from `from` to `to` as skipped; `to`.
-    fn skip(&mut self, from: usize, to: usize) -> usize {
-        self.in_step &= from == to;
-        self.counters.skipped_bytes += (to - from) as u64;
-        to
+    /// Leaves out the next `bytes` bytes.
+    fn skip(&mut self, bytes: usize) {
+        self.in_step &= bytes == 0;
+        self.counters.skipped_bytes += bytes as u64;
+        self.start += bytes;
     }
 
     /// Whether another packet claims bytes of the intact one at `at`. A check sum of eight bits is right by chance too often

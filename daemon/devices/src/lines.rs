@@ -1,6 +1,6 @@
 //! Lines of text in the style of NMEA 0183: `$`, an address, fields between commas, `*`, a check sum, the end of the line.
 
-use crate::{framing::Look, vectornav::crc16};
+use crate::framing::Look;
 
 /// The longest line that is taken: NMEA 0183 allows 82, makers' own lines have up to 200, bytes.
 pub(crate) const LINE_MAX_BYTES: usize = 256;
@@ -34,33 +34,27 @@ pub(crate) fn look(bytes: &[u8], prefix: &[u8]) -> Look<()> {
 /// What stands between `$` and `*`, where the two digits behind are its bytes' exclusive or.
 pub(crate) fn checked(line: &[u8]) -> Option<&str> {
     let (body, sum) = parts(line)?;
-    (sum.len() == 2 && hex(sum)? == xor(body)).then_some(body)
+    (sum.len() == 2 && hex(sum)? == u32::from(xor(body.as_bytes()))).then_some(body)
 }
 
-/// The same for VectorNav's lines, whose check sum may also be a CRC of four digits, or left unchecked.
-pub(crate) fn checked_vectornav(line: &[u8]) -> Option<&str> {
-    let (body, sum) = parts(line)?;
-    let right = match sum.len() {
-        // A unit whose check sums are off writes the letters themselves.
-        2 if sum == "XX" => true,
-        2 => hex(sum)? == xor(body),
-        4 => hex(sum)? == u32::from(crc16(body.as_bytes())),
-        _ => false,
-    };
-    right.then_some(body)
+/// The line whose bytes between `$` and `*` are `body`, with its check sum.
+pub(crate) fn seal(body: &[u8]) -> Vec<u8> {
+    [b"$", body, format!("*{:02X}\r\n", xor(body)).as_bytes()].concat()
 }
 
-fn xor(body: &str) -> u32 {
-    body.bytes().fold(0, |sum, byte| sum ^ u32::from(byte))
+/// The check sum: the bytes' exclusive or.
+pub(crate) fn xor(body: &[u8]) -> u8 {
+    body.iter().fold(0, |sum, byte| sum ^ byte)
 }
 
-fn parts(line: &[u8]) -> Option<(&str, &str)> {
+/// What stands between `$` and `*`, and the check sum behind, unchecked.
+pub(crate) fn parts(line: &[u8]) -> Option<(&str, &str)> {
     let text = std::str::from_utf8(line).ok()?.trim_end_matches(['\r', '\n']);
     text.strip_prefix('$')?.rsplit_once('*')
 }
 
 /// `from_str_radix` alone would take a sign.
-fn hex(digits: &str) -> Option<u32> {
+pub(crate) fn hex(digits: &str) -> Option<u32> {
     let all = digits.bytes().all(|b| b.is_ascii_hexdigit());
     if all { u32::from_str_radix(digits, 16).ok() } else { None }
 }
@@ -75,26 +69,6 @@ pub(crate) fn number(field: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn check_sums_of_two_and_four_digits_and_none() {
-        let checked = checked_vectornav;
-        // A real line with its own sum.
-        let line = b"$VNYMR,-165.918,-008.770,+000.198*7D\r\n";
-        assert_eq!(checked(line), Some("VNYMR,-165.918,-008.770,+000.198"));
-        let crc = format!("$VNRRG,05*{:04X}\r\n", crc16(b"VNRRG,05"));
-        assert_eq!(checked(crc.as_bytes()), Some("VNRRG,05"));
-        assert_eq!(checked(b"$VNRRG,05*XX\n"), Some("VNRRG,05"));
-        for wrong in [
-            &b"$VNRRG,05*77\r\n"[..],
-            b"$VNRRG,05*+6\r\n",
-            b"$VNRRG,05*761\r\n",
-            b"$VNRRG,05\r\n",
-            b"$VNRRG,05*0000\r\n",
-        ] {
-            assert_eq!(checked(wrong), None, "{}", String::from_utf8_lossy(wrong));
-        }
-    }
 
     #[test]
     fn other_lines_have_one_sum_only() {

@@ -17,9 +17,9 @@ use crate::{
 
 /// The framing of any line.
 #[derive(Debug)]
-struct Sentences;
+struct AnyLine;
 
-impl Framing for Sentences {
+impl Framing for AnyLine {
     type Head = ();
     const SYNC: u8 = b'$';
     const MAX_BYTES: usize = LINE_MAX_BYTES;
@@ -68,9 +68,9 @@ pub struct ShipAttitude {
     pub sample: ShipSample,
 }
 
-/// Quality of `$PSXN,20`: 0 normal, 1 reduced, 2 invalid.
+/// PsxnQuality of `$PSXN,20`: 0 normal, 1 reduced, 2 invalid.
 #[derive(Clone, Copy, Debug, Default)]
-struct Quality {
+struct PsxnQuality {
     heading: u8,
     roll_pitch: u8,
 }
@@ -78,8 +78,8 @@ struct Quality {
 /// Takes bytes in pieces of any size and reports what the ship's instruments say in them. Memory is bounded.
 #[derive(Debug)]
 pub struct ShipParser {
-    scanner: Scanner<Sentences>,
-    quality: Quality,
+    scanner: Scanner<AnyLine>,
+    quality: PsxnQuality,
 }
 
 impl Default for ShipParser {
@@ -91,7 +91,7 @@ impl Default for ShipParser {
 impl ShipParser {
     /// A parser that has met nothing.
     pub fn new() -> Self {
-        Self { scanner: Scanner::new(), quality: Quality::default() }
+        Self { scanner: Scanner::new(), quality: PsxnQuality::default() }
     }
 
     /// Lines with a right check sum (of all kinds), damaged ones, and bytes that belonged to none.
@@ -101,23 +101,34 @@ impl ShipParser {
 
     /// The line was interrupted: what an instrument said of its quality before may no longer hold.
     pub fn restart(&mut self) {
-        self.quality = Quality::default();
+        self.quality = PsxnQuality::default();
     }
 
-    /// Takes bytes that arrived together at `arrival` and calls `sink` with what each line that they complete says.
-    pub fn push(&mut self, bytes: &[u8], arrival: Time, mut sink: impl FnMut(ShipAttitude)) {
+    /// What the next line says that says something, of bytes that arrived together at `arrival`. Bytes are taken from the front of
+    /// `input` as far as they are needed; `None`: they are used up.
+    pub fn next_line(&mut self, input: &mut &[u8], arrival: Time) -> Option<ShipAttitude> {
         let Self { scanner, quality } = self;
-        scanner.push(bytes, |found| {
-            if let Some(attitude) = lines::checked(found.bytes).and_then(|body| read(body, quality, arrival))
-            {
-                sink(attitude);
+        while let Some(found) = scanner.next_of(input) {
+            let said = lines::checked(found.bytes).and_then(|body| read(body, quality, arrival));
+            if said.is_some() {
+                return said;
             }
-        });
+        }
+        None
+    }
+
+    /// What all lines say that bytes that arrived together at `arrival` complete. The bytes are taken as that is.
+    pub fn lines<'a>(
+        &'a mut self,
+        mut bytes: &'a [u8],
+        arrival: Time,
+    ) -> impl Iterator<Item = ShipAttitude> + 'a {
+        std::iter::from_fn(move || self.next_line(&mut bytes, arrival))
     }
 }
 
 /// What a line without `$` and check sum says; `None` for other lines and those that say nothing.
-fn read(body: &str, quality: &mut Quality, arrival: Time) -> Option<ShipAttitude> {
+fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAttitude> {
     let mut fields = body.split(',');
     let address = fields.next()?;
     let fields: [&str; 11] = std::array::from_fn(|_| fields.next().unwrap_or_default());
@@ -141,7 +152,7 @@ fn read(body: &str, quality: &mut Quality, arrival: Time) -> Option<ShipAttitude
         ("PSXN", ["20", _, _, heading, roll_pitch, ..]) => {
             // What is no number is as good as invalid.
             let of = |field: &str| field.parse().unwrap_or(2);
-            *quality = Quality { heading: of(heading), roll_pitch: of(roll_pitch) };
+            *quality = PsxnQuality { heading: of(heading), roll_pitch: of(roll_pitch) };
             return None;
         }
         ("PSXN", ["23", roll, pitch, degrees, ..]) => {
@@ -178,7 +189,7 @@ pub fn line_of(sample: &ShipSample) -> String {
         let aligned = u8::from(!sample.reduced);
         format!("PASHR,,{heading},T,{roll},{pitch},,,,{sigma},1,{aligned}")
     };
-    let sum = body.bytes().fold(0, |sum, byte| sum ^ byte);
+    let sum = lines::xor(body.as_bytes());
     format!("${body}*{sum:02X}\r\n")
 }
 
@@ -220,13 +231,13 @@ mod tests {
         let mut parser = ShipParser::new();
         let mut said = Vec::new();
         for piece in bytes.chunks(piece) {
-            parser.push(piece, Time::from_ns(3), |a| said.push(a));
+            said.extend(parser.lines(piece, Time::from_ns(3)));
         }
         (said, parser.counters())
     }
 
     fn line(body: &str) -> String {
-        format!("${body}*{:02X}\r\n", body.bytes().fold(0, |sum, byte| sum ^ byte))
+        format!("${body}*{:02X}\r\n", lines::xor(body.as_bytes()))
     }
 
     /// Lines as ships' loggers have published them, check sums included.
@@ -303,7 +314,7 @@ mod tests {
         fn any_bytes_are_survived_in_bounded_memory(bytes in prop::collection::vec(any::<u8>(), 0..4000), piece in 1usize..2000) {
             let mut parser = ShipParser::new();
             for piece in bytes.chunks(piece) {
-                parser.push(piece, Time::MIN, |_| {});
+                parser.lines(piece, Time::MIN).for_each(drop);
             }
             prop_assert!(parser.scanner.held().0 <= LINE_MAX_BYTES);
         }

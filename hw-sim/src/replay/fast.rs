@@ -136,13 +136,13 @@ impl Producer {
     fn receive(&mut self, item: Item, ready: &mut Vec<Result<Event, ReplayError>>) {
         match item {
             Item::Bytes { due, bytes } => {
-                self.imu.push(&bytes, due, |sample| ready.push(Ok(Event::Imu(sample))));
+                ready.extend(self.imu.samples(&bytes, due).map(|sample| Ok(Event::Imu(sample))));
             }
             Item::Frame(frame) => {
                 ready.extend(self.frames.frame(frame).map(|frame| Ok(Event::Frame(frame))));
             }
             Item::Ship { due, bytes } => {
-                self.ship.push(&bytes, due, |said| ready.push(Ok(Event::Ship(said.sample))));
+                ready.extend(self.ship.lines(&bytes, due).map(|said| Ok(Event::Ship(said.sample))));
             }
             Item::Mark(mark) => ready.push(Ok(Event::Mark(mark))),
             Item::Trigger(edge) => {

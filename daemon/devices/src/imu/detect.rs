@@ -8,46 +8,33 @@ use std::collections::VecDeque;
 
 use bowwave_core::{event::ImuSample, time::Time};
 
-use super::{
-    ImuFormat,
-    unit::{Place, Unit},
-};
-
-/// Packets that prove a format. Chance makes a packet of random bytes with a check sum of sixteen bits (and a preamble) less
-/// than once in 10^8 bytes, one of eight bits about once in 10^6: as many close together never.
-pub(super) const fn proof(format: ImuFormat) -> usize {
-    match format {
-        ImuFormat::VectorNav | ImuFormat::VectorNavAscii | ImuFormat::MicroStrain | ImuFormat::Sbg => 2,
-        ImuFormat::Xsens => 3,
-        ImuFormat::Bno08x => 5,
-        ImuFormat::Witmotion => 6,
-    }
-}
+use super::{ImuFormat, formats::PacketPlace, unit::ImuUnit};
 
 /// One format that reads along.
 #[derive(Debug)]
-struct Candidate {
-    unit: Unit,
+struct FormatCandidate {
+    unit: ImuUnit,
     /// The newest packets, as many as prove the format, and the samples that they completed.
-    newest: VecDeque<(Place, Option<ImuSample>)>,
+    newest: VecDeque<(PacketPlace, Option<ImuSample>)>,
     /// Samples of packets before: chance made them, or they came long before the proof.
     dropped: u64,
     /// Samples from the proof on; `None`: it is not proven.
     proven: Option<Vec<ImuSample>>,
 }
 
-impl Candidate {
+impl FormatCandidate {
     fn new(format: ImuFormat) -> Self {
-        Self { unit: Unit::new(format), newest: VecDeque::new(), dropped: 0, proven: None }
+        Self { unit: ImuUnit::new(format), newest: VecDeque::new(), dropped: 0, proven: None }
     }
 
-    fn push(&mut self, bytes: &[u8], arrival: Time) {
+    fn take(&mut self, bytes: &[u8], arrival: Time) {
         let Self { unit, newest, dropped, proven } = self;
-        let proof = proof(unit.format());
-        unit.push(bytes, arrival, &mut |sample, place| {
+        let proof = unit.format().proof_packets();
+        unit.insert(bytes);
+        while let Some((sample, place)) = unit.next_packet(arrival) {
             if let Some(samples) = proven {
                 samples.extend(sample);
-                return;
+                continue;
             }
             if newest.len() >= proof
                 && let Some((_, Some(_))) = newest.pop_front()
@@ -58,12 +45,12 @@ impl Candidate {
             if is_proof(newest, proof) {
                 *proven = Some(newest.iter().filter_map(|(_, sample)| *sample).collect());
             }
-        });
+        }
     }
 }
 
 /// As many packets as prove it, with fewer bytes skipped between them than are in them.
-fn is_proof(newest: &VecDeque<(Place, Option<ImuSample>)>, proof: usize) -> bool {
+fn is_proof(newest: &VecDeque<(PacketPlace, Option<ImuSample>)>, proof: usize) -> bool {
     let (Some((first, _)), Some((last, _))) = (newest.front(), newest.back()) else { return false };
     let bytes: usize = newest.iter().map(|(place, _)| place.bytes).sum();
     newest.len() >= proof && last.skipped_bytes - first.skipped_bytes <= bytes as u64
@@ -72,22 +59,22 @@ fn is_proof(newest: &VecDeque<(Place, Option<ImuSample>)>, proof: usize) -> bool
 /// A line whose format is not known yet.
 #[derive(Debug)]
 pub(super) struct Detection {
-    candidates: Vec<Candidate>,
+    candidates: Vec<FormatCandidate>,
 }
 
 impl Detection {
     pub(super) fn new() -> Self {
-        Self { candidates: ImuFormat::ALL.into_iter().map(Candidate::new).collect() }
+        Self { candidates: ImuFormat::ALL.into_iter().map(FormatCandidate::new).collect() }
     }
 
     /// Takes bytes that arrived together; the unit once its format is proven, with the samples of the packets that proved it
     /// and those behind.
-    pub(super) fn push(&mut self, bytes: &[u8], arrival: Time) -> Option<(Unit, Vec<ImuSample>)> {
+    pub(super) fn take(&mut self, bytes: &[u8], arrival: Time) -> Option<(ImuUnit, Vec<ImuSample>)> {
         for candidate in &mut self.candidates {
-            candidate.push(bytes, arrival);
+            candidate.take(bytes, arrival);
         }
         let place = self.candidates.iter().position(|c| c.proven.is_some())?;
-        let Candidate { mut unit, dropped, proven, .. } = self.candidates.swap_remove(place);
+        let FormatCandidate { mut unit, dropped, proven, .. } = self.candidates.swap_remove(place);
         unit.disown(dropped);
         Some((unit, proven.unwrap_or_default()))
     }

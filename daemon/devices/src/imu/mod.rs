@@ -1,115 +1,36 @@
 //! From bytes of the inertial unit to samples that can be trusted, sans-io: shared by the serial line and by replays.
 //!
-//! A format's module knows its framing, its fields and its axes, and gives a `Reading`; `finish` makes samples of these,
-//! `steady` and `wrap` see to the clocks, `detect` finds out which format a line carries.
+//! A format's file in [`formats`] knows its framing, its fields and its axes, and gives a `Reading`; `assembler` makes samples of
+//! these, `packet_clock` and `unwrap` see to the clocks, `detect` finds out which format a line carries. All of them are pull
+//! decoders: bytes in, and the next event for the asking.
 
+mod assembler;
 pub(crate) mod axes;
 mod detect;
-mod finish;
+pub mod formats;
+mod packet_clock;
 #[cfg(test)]
 mod pole_tests;
 pub(crate) mod reading;
-mod steady;
 #[cfg(test)]
 pub(crate) mod streams;
 #[cfg(test)]
 mod tests;
 mod unit;
-pub(crate) mod wrap;
+pub(crate) mod unwrap;
 
-use std::fmt;
+use std::collections::VecDeque;
 
 use bowwave_core::{event::ImuSample, time::Time};
 
-pub use self::reading::Fields;
-use self::{detect::Detection, unit::Unit};
+use self::{detect::Detection, unit::ImuUnit};
+pub use self::{formats::ImuFormat, reading::Fields};
+use crate::framing::chunk;
 
 /// So many bytes without a packet put the format in doubt: more than any packet and its gaps.
 const DOUBT_BYTES: u64 = 4096;
 
-/// Bytes that are looked at together: what is kept of a line whose format is not known yet follows from it.
-const PIECE_BYTES: usize = 1024;
-
-/// A format that is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ImuFormat {
-    /// VectorNav's binary output.
-    VectorNav,
-    /// VectorNav's lines of text.
-    VectorNavAscii,
-    /// Xsens MTData2.
-    Xsens,
-    /// MicroStrain MIP.
-    MicroStrain,
-    /// SBG Systems' sbgECom.
-    Sbg,
-    /// UART-RVC of the BNO08x.
-    Bno08x,
-    /// Witmotion's standard protocol.
-    Witmotion,
-}
-
-impl ImuFormat {
-    /// All of them.
-    pub const ALL: [Self; 7] = [
-        Self::VectorNav,
-        Self::VectorNavAscii,
-        Self::Xsens,
-        Self::MicroStrain,
-        Self::Sbg,
-        Self::Bno08x,
-        Self::Witmotion,
-    ];
-
-    /// Its name in the configuration.
-    pub const fn key(self) -> &'static str {
-        match self {
-            Self::VectorNav => "vectornav",
-            Self::VectorNavAscii => "vectornav-ascii",
-            Self::Xsens => "xsens",
-            Self::MicroStrain => "microstrain",
-            Self::Sbg => "sbg",
-            Self::Bno08x => "bno08x-rvc",
-            Self::Witmotion => "witmotion",
-        }
-    }
-
-    /// The format of that name.
-    pub fn from_key(key: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|format| format.key() == key)
-    }
-
-    /// What to set on a unit of this format whose output lacks something.
-    const fn remedy(self) -> &'static str {
-        match self {
-            Self::VectorNav => "add it to its binary output (common group, bits 0, 5 and 8)",
-            Self::VectorNavAscii => "set its asynchronous output to VNYMR",
-            Self::Xsens => "add it to its output configuration (1060, 2010, 4020, 8020)",
-            Self::MicroStrain => {
-                "add it to its message format (set 80: D5, 04, 05, 0A, or set 82: D5, 03, 0E, 1C)"
-            }
-            Self::Sbg => "switch its logs 3 (IMU data) and 7 (quaternion) on",
-            Self::Bno08x => "power-cycle it",
-            Self::Witmotion => "switch acceleration, rate and quaternion on in its output content",
-        }
-    }
-}
-
-impl fmt::Display for ImuFormat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::VectorNav => "VectorNav binary",
-            Self::VectorNavAscii => "VectorNav ASCII",
-            Self::Xsens => "Xsens MTData2",
-            Self::MicroStrain => "MicroStrain MIP",
-            Self::Sbg => "SBG sbgECom",
-            Self::Bno08x => "BNO08x UART-RVC",
-            Self::Witmotion => "Witmotion",
-        })
-    }
-}
-
-/// What came over the line and what became of it.
+/// Counts of what came over the line and what became of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImuCounters {
     /// Packets with a right check sum.
@@ -142,24 +63,35 @@ impl ImuCounters {
     }
 }
 
-/// What a line is known to carry.
+/// An event that [`ImuDecoder::next_event`] gives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImuEvent {
+    /// The format of the line is proven. The samples of the packets that proved it follow.
+    Recognised(ImuFormat),
+    /// A good sample.
+    Sample(ImuSample),
+}
+
+/// The knowledge of what a line carries.
 #[derive(Debug)]
-enum Line {
+enum LineFormat {
     /// Nothing is proven yet: all formats read along.
     Detecting(Detection),
     /// A unit of this format, and the bytes that came since its last packet.
-    Known(Box<Unit>, u64),
+    Known(Box<ImuUnit>, u64),
 }
 
 /// Turns the bytes of a unit's line into samples. Memory is bounded.
 #[derive(Debug)]
 pub struct ImuDecoder {
-    line: Line,
+    line: LineFormat,
+    /// Samples of the packets that proved the format.
+    ready: VecDeque<ImuSample>,
     /// The only format that is read; `None`: it is detected.
     fixed: Option<ImuFormat>,
-    /// Of units before.
+    /// Counts of the units before.
     before: ImuCounters,
-    /// What was warned of.
+    /// It was warned of numbers that are not finite, and of packets that lack something.
     warned_not_finite: bool,
     warned_unusable: bool,
 }
@@ -185,6 +117,7 @@ impl ImuDecoder {
     pub fn with(format: Option<ImuFormat>) -> Self {
         Self {
             line: start(format),
+            ready: VecDeque::new(),
             fixed: format,
             before: ImuCounters::default(),
             warned_not_finite: false,
@@ -195,8 +128,8 @@ impl ImuDecoder {
     /// What has been met so far. Packets count once their format is known.
     pub fn counters(&self) -> ImuCounters {
         self.before.plus(match &self.line {
-            Line::Known(unit, _) => unit.counters(),
-            Line::Detecting(detection) => {
+            LineFormat::Known(unit, _) => unit.counters(),
+            LineFormat::Detecting(detection) => {
                 let (bad_crc, skipped_bytes) = detection.least();
                 ImuCounters { bad_crc, skipped_bytes, ..ImuCounters::default() }
             }
@@ -206,16 +139,16 @@ impl ImuDecoder {
     /// The format that the line carries, once it is known.
     pub fn format(&self) -> Option<ImuFormat> {
         match &self.line {
-            Line::Known(unit, _) => Some(unit.format()),
-            Line::Detecting(_) => None,
+            LineFormat::Known(unit, _) => Some(unit.format()),
+            LineFormat::Detecting(_) => None,
         }
     }
 
     /// What the unit sends, as far as it has sent it.
     pub fn fields(&self) -> Fields {
         match &self.line {
-            Line::Known(unit, _) => unit.fields(),
-            Line::Detecting(_) => Fields::default(),
+            LineFormat::Known(unit, _) => unit.fields(),
+            LineFormat::Detecting(_) => Fields::default(),
         }
     }
 
@@ -225,43 +158,67 @@ impl ImuDecoder {
         self.line = start(self.fixed);
     }
 
-    /// Takes bytes that arrived together at `arrival` and calls `sink` with each good sample that they complete. A detected
-    /// format's first few come together, each with its own arrival.
-    pub fn push(&mut self, bytes: &[u8], arrival: Time, mut sink: impl FnMut(ImuSample)) {
-        for piece in bytes.chunks(PIECE_BYTES) {
-            self.take(piece, arrival, &mut sink);
+    /// The next event of bytes that arrived together at `arrival`. Bytes are taken from the front of `input` as far as they are
+    /// needed; `None`: they are used up. A detected format's first few samples come together, each with its own arrival.
+    pub fn next_event(&mut self, input: &mut &[u8], arrival: Time) -> Option<ImuEvent> {
+        loop {
+            if let Some(sample) = self.ready.pop_front() {
+                return Some(ImuEvent::Sample(sample));
+            }
+            let event = match &mut self.line {
+                LineFormat::Known(unit, since_packet) => match unit.next_packet(arrival) {
+                    Some((sample, _)) => {
+                        *since_packet = 0;
+                        sample.map(ImuEvent::Sample)
+                    }
+                    None if *since_packet > DOUBT_BYTES && self.fixed.is_none() => {
+                        self.restart();
+                        None
+                    }
+                    None => {
+                        let Some(piece) = chunk(input) else { break };
+                        *since_packet += piece.len() as u64;
+                        unit.insert(piece);
+                        None
+                    }
+                },
+                LineFormat::Detecting(detection) => {
+                    let Some(piece) = chunk(input) else { break };
+                    detection.take(piece, arrival).map(|(unit, samples)| {
+                        let format = unit.format();
+                        self.ready.extend(samples);
+                        self.line = LineFormat::Known(Box::new(unit), 0);
+                        ImuEvent::Recognised(format)
+                    })
+                }
+            };
+            if event.is_some() {
+                return event;
+            }
         }
         self.warn();
+        None
     }
 
-    fn take(&mut self, bytes: &[u8], arrival: Time, sink: &mut impl FnMut(ImuSample)) {
-        match &mut self.line {
-            Line::Known(unit, since_packet) => {
-                let packets = unit.counters().packets;
-                unit.push(bytes, arrival, &mut |sample, _| {
-                    if let Some(sample) = sample {
-                        sink(sample);
-                    }
-                });
-                *since_packet =
-                    if unit.counters().packets > packets { 0 } else { *since_packet + bytes.len() as u64 };
-                if *since_packet > DOUBT_BYTES && self.fixed.is_none() {
-                    self.restart();
+    /// The samples alone of bytes that arrived together at `arrival`. The bytes are taken as the samples are.
+    pub fn samples<'a>(
+        &'a mut self,
+        mut bytes: &'a [u8],
+        arrival: Time,
+    ) -> impl Iterator<Item = ImuSample> + 'a {
+        std::iter::from_fn(move || {
+            loop {
+                match self.next_event(&mut bytes, arrival)? {
+                    ImuEvent::Sample(sample) => return Some(sample),
+                    ImuEvent::Recognised(_) => {}
                 }
             }
-            Line::Detecting(detection) => {
-                if let Some((unit, samples)) = detection.push(bytes, arrival) {
-                    log::info!("the inertial unit speaks {}", unit.format());
-                    self.line = Line::Known(Box::new(unit), 0);
-                    samples.into_iter().for_each(sink);
-                }
-            }
-        }
+        })
     }
 
     /// Says once what is wrong with what the unit sends.
     fn warn(&mut self) {
-        let Line::Known(unit, _) = &self.line else { return };
+        let LineFormat::Known(unit, _) = &self.line else { return };
         let counters = unit.counters();
         if counters.unusable > 0 && !self.warned_unusable {
             self.warned_unusable = true;
@@ -278,9 +235,9 @@ impl ImuDecoder {
     }
 }
 
-fn start(fixed: Option<ImuFormat>) -> Line {
+fn start(fixed: Option<ImuFormat>) -> LineFormat {
     match fixed {
-        Some(format) => Line::Known(Box::new(Unit::new(format)), 0),
-        None => Line::Detecting(Detection::new()),
+        Some(format) => LineFormat::Known(Box::new(ImuUnit::new(format)), 0),
+        None => LineFormat::Detecting(Detection::new()),
     }
 }

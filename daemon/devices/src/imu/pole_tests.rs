@@ -9,10 +9,7 @@ use bowwave_core::{
 };
 use glam::{DQuat, DVec3};
 
-use super::{
-    ImuDecoder, ImuFormat,
-    streams::{period_ns, send},
-};
+use super::{ImuDecoder, ImuFormat};
 
 /// The unit sits x forward, y right, z down behind the camera.
 const CAMERA_FROM_IMU: DQuat = DQuat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
@@ -69,7 +66,7 @@ fn world_from_imu(motion: Motion, s: f64) -> DQuat {
 }
 
 fn seconds(format: ImuFormat, n: i64) -> f64 {
-    (n - SAMPLES / 2) as f64 * period_ns(format) as f64 * 1e-9
+    (n - SAMPLES / 2) as f64 * format.simulated().period_ns as f64 * 1e-9
 }
 
 fn truth(format: ImuFormat, motion: Motion, n: i64) -> ImuSample {
@@ -77,7 +74,7 @@ fn truth(format: ImuFormat, motion: Motion, n: i64) -> ImuSample {
     let at = world_from_imu(motion, s);
     let turn = world_from_imu(motion, s - h).inverse() * world_from_imu(motion, s + h);
     let turn = if turn.w < 0.0 { -turn } else { turn };
-    let ns = n * period_ns(format);
+    let ns = n * format.simulated().period_ns;
     ImuSample {
         arrival: Time::from_ns(1_000_000_000 + ns),
         device_time_ns: ns,
@@ -103,18 +100,20 @@ fn worst(format: ImuFormat, motion: Motion, source: Source) -> [f64; 2] {
     for n in 0..SAMPLES {
         let s = truth(format, motion, n);
         let mut samples = Vec::new();
-        decoder.push(&send(format, &s, n, true), s.arrival, |sample| samples.push(sample));
+        samples.extend(decoder.samples(&format.send(&s, n, true), s.arrival));
         for sample in samples {
-            let number = sample.arrival.ns_since(truth(format, motion, 0).arrival) / period_ns(format);
-            if attitude.observe(Time::from_ns(number * period_ns(format)), &sample).is_none() {
+            let number =
+                sample.arrival.ns_since(truth(format, motion, 0).arrival) / format.simulated().period_ns;
+            if attitude.observe(Time::from_ns(number * format.simulated().period_ns), &sample).is_none() {
                 continue;
             }
             for back in [0.0, 0.5] {
-                let time = Time::from_ns(((number as f64 - back) * period_ns(format) as f64) as i64);
+                let time =
+                    Time::from_ns(((number as f64 - back) * format.simulated().period_ns as f64) as i64);
                 let Ok(found) = attitude.at(time) else { continue };
                 let true_camera = world_from_camera(
                     motion,
-                    seconds(format, number) - back * period_ns(format) as f64 * 1e-9,
+                    seconds(format, number) - back * format.simulated().period_ns as f64 * 1e-9,
                 );
                 let camera = attitude.camera(found.world_from_imu);
                 assert!(camera.is_finite() && (camera.length() - 1.0).abs() < 1e-12, "{camera}");

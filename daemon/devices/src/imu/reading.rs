@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 
 /// When a packet's measurement was made, as the unit tells it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Stamp {
+pub(crate) enum ReadingStamp {
     /// By its clock, nanoseconds since its start-up, unwrapped.
     Device {
         /// Nanoseconds.
@@ -25,7 +25,7 @@ pub(crate) enum Stamp {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
     /// When.
-    pub(crate) stamp: Stamp,
+    pub(crate) stamp: ReadingStamp,
     /// Angular rate, rad/s.
     pub(crate) rate: Option<DVec3>,
     /// Specific force, m/s^2.
@@ -36,7 +36,7 @@ pub(crate) struct Reading {
 
 impl Reading {
     /// A reading that says nothing yet.
-    pub(crate) const fn at(stamp: Stamp) -> Self {
+    pub(crate) const fn at(stamp: ReadingStamp) -> Self {
         Self { stamp, rate: None, accel: None, world_from_imu: None }
     }
 }
@@ -59,8 +59,8 @@ pub struct Fields {
 impl Fields {
     /// Remembers what `reading` has.
     pub(crate) fn note(&mut self, reading: &Reading) {
-        self.clock |= matches!(reading.stamp, Stamp::Device { .. });
-        self.counter |= matches!(reading.stamp, Stamp::Count { .. });
+        self.clock |= matches!(reading.stamp, ReadingStamp::Device { .. });
+        self.counter |= matches!(reading.stamp, ReadingStamp::Count { .. });
         self.rate |= reading.rate.is_some();
         self.accel |= reading.accel.is_some();
         self.attitude |= reading.world_from_imu.is_some();

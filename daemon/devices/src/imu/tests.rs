@@ -3,9 +3,8 @@ use proptest::prelude::*;
 
 use super::{
     ImuCounters, ImuDecoder, ImuFormat,
-    detect::proof,
-    streams::{encode, packets, period_ns, truth},
-    unit::Unit,
+    formats::PacketReader,
+    streams::{Tolerance, encode, truth},
 };
 
 /// Decodes what a unit sends, each packet (or group) at the time of the truth, in pieces of `piece` bytes.
@@ -19,23 +18,10 @@ fn decode(
     for n in numbers {
         let arrival = truth(format, n).arrival;
         for bytes in encode(format, n).chunks(piece) {
-            decoder.push(bytes, arrival, |s| samples.push(s));
+            samples.extend(decoder.samples(bytes, arrival));
         }
     }
     samples
-}
-
-/// What a format's numbers are rounded to: rate (rad/s), force (m/s^2), attitude (rad), and time (ns) where it has no clock.
-fn tolerance(format: ImuFormat) -> (f64, f64, f64, i64) {
-    match format {
-        ImuFormat::VectorNav | ImuFormat::Xsens | ImuFormat::MicroStrain => (1e-6, 2e-6, 1e-6, 0),
-        // An attitude of its own log is carried over one period.
-        ImuFormat::Sbg => (1e-6, 2e-6, 2e-6, 0),
-        ImuFormat::VectorNavAscii => (1e-6, 1e-3, 2e-5, 1_000_000),
-        // Hundredths of a degree; the rate is their difference over 10 ms, half of that old.
-        ImuFormat::Bno08x => (0.04, 0.006, 2e-4, 1_000_000),
-        ImuFormat::Witmotion => (6e-4, 0.003, 8e-5, 1_000_000),
-    }
 }
 
 #[test]
@@ -43,11 +29,11 @@ fn every_format_tells_the_same_motion() {
     for format in ImuFormat::ALL {
         let mut decoder = ImuDecoder::fixed(format);
         let samples = decode(&mut decoder, format, 0..2_000, 1 << 12);
-        let (rate, accel, attitude, time_ns) = tolerance(format);
+        let Tolerance { rate, accel, attitude, time_ns } = format.simulated().tolerance;
         let mut compared = 0;
         // A first sample may lack what comes from two, a learned clock settles.
         for sample in samples.iter().filter(|s| s.device_time_ns > 2_000_000_000) {
-            let n = sample.arrival.ns_since(truth(format, 0).arrival) / period_ns(format);
+            let n = sample.arrival.ns_since(truth(format, 0).arrival) / format.simulated().period_ns;
             let expected = truth(format, n);
             assert!(
                 (sample.device_time_ns - expected.device_time_ns).abs() <= time_ns,
@@ -70,11 +56,11 @@ fn every_format_tells_the_same_motion() {
             assert!(angle < attitude, "{format}: {angle} rad");
             compared += 1;
         }
-        let most = 2_000 - 2_000_000_000 / period_ns(format) - 2;
+        let most = 2_000 - 2_000_000_000 / format.simulated().period_ns - 2;
         assert!(compared >= most, "{format}: {compared} of {most}");
         let counters = decoder.counters();
         assert_eq!((counters.bad_crc, counters.skipped_bytes, counters.unusable), (0, 0, 0), "{format}");
-        assert_eq!(counters.packets, 2_000 * packets(format), "{format}");
+        assert_eq!(counters.packets, 2_000 * format.simulated().packets, "{format}");
     }
 }
 
@@ -107,16 +93,16 @@ fn each_format_is_recognised_and_loses_no_sample() {
             for n in 0..40 {
                 let arrival = truth(format, n).arrival;
                 if text && n % 8 == 0 {
-                    decoder.push(TEXT, arrival, |_| panic!("text is no sample"));
+                    decoder.samples(TEXT, arrival).for_each(|_| panic!("text is no sample"));
                 }
-                decoder.push(&encode(format, n), arrival, |s| samples.push(s));
+                samples.extend(decoder.samples(&encode(format, n), arrival));
                 if decoder.format().is_some() && recognised.is_none() {
-                    recognised = Some((n + 1) as u64 * packets(format));
+                    recognised = Some((n + 1) as u64 * format.simulated().packets);
                 }
             }
             assert_eq!(decoder.format(), Some(format), "text: {text}");
             // Whole groups are pushed, and one packet behind noise may wait for what follows it.
-            let at_most = (proof(format) as u64 + 1).next_multiple_of(packets(format));
+            let at_most = (format.proof_packets() as u64 + 1).next_multiple_of(format.simulated().packets);
             assert!(recognised.expect("recognised") <= at_most, "{format}: {recognised:?}, text: {text}");
             assert_eq!(samples, known, "{format}, text: {text}");
         }
@@ -151,14 +137,16 @@ fn noise_and_other_devices_are_no_unit() {
         noise.chunks(11).take(100_000).flat_map(|c| [words[usize::from(c[0] % 8)], c].concat()).collect();
     for bytes in [&noise, &laced] {
         for piece in bytes.chunks(512) {
-            decoder.push(piece, Time::MIN, |s| panic!("noise made {s:?}"));
+            decoder.samples(piece, Time::MIN).for_each(|s| panic!("noise made {s:?}"));
             assert_eq!(decoder.format(), None);
         }
     }
     for n in 0..20_000 {
         // A receiver's text and its binary protocol.
-        decoder.push(TEXT, Time::from_ns(n), |s| panic!("text made {s:?}"));
-        decoder.push(&[0xb5, 0x62, 0x01, 0x07, 0x5c, 0x00, n as u8, 0xff, 0xaa], Time::from_ns(n), |_| {});
+        decoder.samples(TEXT, Time::from_ns(n)).for_each(|s| panic!("text made {s:?}"));
+        decoder
+            .samples(&[0xb5, 0x62, 0x01, 0x07, 0x5c, 0x00, n as u8, 0xff, 0xaa], Time::from_ns(n))
+            .for_each(drop);
     }
     assert_eq!(decoder.format(), None);
     let counters = decoder.counters();
@@ -177,10 +165,12 @@ fn no_format_is_taken_for_another() {
         for n in 0..5_000 {
             let bytes = encode(format, n);
             let mut decoder = ImuDecoder::new();
-            decoder.push(&bytes, Time::from_ns(n), |_| {});
+            decoder.samples(&bytes, Time::from_ns(n)).for_each(drop);
             assert!(decoder.format().is_none_or(|found| found == format));
             for (other, candidate) in &mut candidates {
-                candidate.push(&bytes, Time::from_ns(n), |s| panic!("{other} made {s:?} of {format}"));
+                candidate
+                    .samples(&bytes, Time::from_ns(n))
+                    .for_each(|s| panic!("{other} made {s:?} of {format}"));
             }
         }
         for (other, candidate) in &candidates {
@@ -211,11 +201,12 @@ fn another_unit_on_the_line_is_recognised() {
 #[test]
 fn what_came_before_the_proof_is_left_out() {
     // SBG's rate and attitude are two packets, and with that a proof.
-    for format in ImuFormat::ALL.into_iter().filter(|f| (packets(*f) as usize) < proof(*f)) {
+    for format in ImuFormat::ALL.into_iter().filter(|f| (f.simulated().packets as usize) < f.proof_packets())
+    {
         let mut decoder = ImuDecoder::new();
         let mut samples = Vec::new();
-        decoder.push(&encode(format, 0), Time::from_ns(0), |s| samples.push(s));
-        decoder.push(&[b' '; 3000], Time::from_ns(1), |s| samples.push(s));
+        samples.extend(decoder.samples(&encode(format, 0), Time::from_ns(0)));
+        samples.extend(decoder.samples(&[b' '; 3000], Time::from_ns(1)));
         assert_eq!(decoder.format(), None, "{format}");
         samples.extend(decode(&mut decoder, format, 100..130, 1 << 12));
         assert!(samples.iter().all(|s| s.arrival >= truth(format, 100).arrival), "{format}");
@@ -261,14 +252,14 @@ fn made_up_clocks_are_even() {
         for n in 0..12_000 {
             let due = truth(format, n).arrival.ns();
             let arrival = Time::from_ns((due + 15_999_999) / 16_000_000 * 16_000_000);
-            decoder.push(&encode(format, n), arrival, |s| {
+            for s in decoder.samples(&encode(format, n), arrival) {
                 let error_ms = (map.observe(s.device_time_ns, arrival).ns() - due) as f64 * 1e-6;
                 if n > 4_000 {
                     errors.push(error_ms);
                     mean += error_ms;
                     count += 1.0;
                 }
-            });
+            }
         }
         mean /= count;
         for error in errors {
@@ -294,15 +285,15 @@ fn consistent(c: &ImuCounters) -> bool {
 
 proptest! {
     #[test]
-    fn any_bytes_are_survived(bytes in prop::collection::vec(noise(), 0..60), piece in 1usize..2000, fixed in 0usize..8) {
+    fn any_bytes_are_survived(bytes in prop::collection::vec(noise(), 0..60), piece in 1usize..2000, fixed in 0usize..=ImuFormat::ALL.len()) {
         let bytes = bytes.concat();
         let mut decoder = ImuDecoder::with(ImuFormat::ALL.get(fixed).copied());
         let mut samples = 0;
         for piece in bytes.chunks(piece) {
-            decoder.push(piece, Time::from_ns(5), |s| {
+            for s in decoder.samples(piece, Time::from_ns(5)) {
                 assert!(s.is_finite());
                 samples += 1;
-            });
+            }
         }
         let counters = decoder.counters();
         prop_assert!(consistent(&counters), "{counters:?}");
@@ -313,7 +304,7 @@ proptest! {
     /// Whatever lies between them, each packet is found in order and once, unless a chance packet with a right check sum lay
     /// over it.
     #[test]
-    fn noise_between_packets_loses_none(gaps in prop::collection::vec(noise(), 1..20), piece in 1usize..400, at in 0usize..7) {
+    fn noise_between_packets_loses_none(gaps in prop::collection::vec(noise(), 1..20), piece in 1usize..400, at in 0usize..ImuFormat::ALL.len()) {
         let format = ImuFormat::ALL[at];
         let mut bytes = Vec::new();
         let mut sent = Vec::new();
@@ -325,12 +316,15 @@ proptest! {
         }
         // The line goes on with what begins no packet.
         bytes.extend([0x20; 4200]);
-        let mut unit = Unit::new(format);
+        let mut unit = PacketReader::new(format);
         let mut found = 0;
         for piece in bytes.chunks(piece) {
-            unit.push(piece, Time::from_ns(5), &mut |_, _| found += 1);
+            unit.insert(piece);
+            while unit.next_packet().is_some() {
+                found += 1;
+            }
         }
-        let expected = sent.len() as u64 * packets(format);
+        let expected = sent.len() as u64 * format.simulated().packets;
         let counters = unit.counters();
         prop_assert_eq!(found, counters.packets);
         let skipped: usize = gaps.iter().map(Vec::len).sum::<usize>() + 4200;
@@ -339,8 +333,8 @@ proptest! {
         } else {
             // A chance packet, once in a few thousand streams where sums have sixteen bits: how many real ones it lay over is bounded by
             // its length.
-            let chances = Unit::intact_places(format, &bytes) as u64 - expected;
-            prop_assume!(chances == 0 || matches!(format, ImuFormat::Xsens | ImuFormat::Bno08x | ImuFormat::Witmotion));
+            let chances = format.intact_places(&bytes) as u64 - expected;
+            prop_assume!(chances == 0 || format.is_weak());
             prop_assert!(chances > 0 && counters.packets + 3 >= expected, "{format}: {counters:?}, {expected} were sent");
         }
     }

@@ -16,7 +16,7 @@ use super::{
     timing::Arrivals,
 };
 use crate::{
-    imu::{Fields, ImuCounters, ImuDecoder, ImuFormat},
+    imu::{Fields, ImuCounters, ImuDecoder, ImuEvent, ImuFormat},
     queue::NewestSender,
     report::Reporter,
 };
@@ -71,12 +71,18 @@ impl Feed for ImuFeed {
     fn take(&mut self, bytes: &[u8], arrival: Time, queue: &mut NewestSender<Event>) -> u64 {
         let before = self.decoder.counters();
         let Self { decoder, sanity, arrivals, clock, .. } = self;
-        decoder.push(bytes, arrival, |sample| {
-            sanity.sample(&sample);
-            arrivals.sample(&sample);
-            clock.observe(sample.device_time_ns, sample.arrival);
-            queue.send(Event::Imu(sample));
-        });
+        let mut bytes = bytes;
+        while let Some(event) = decoder.next_event(&mut bytes, arrival) {
+            match event {
+                ImuEvent::Recognised(format) => log::info!("the inertial unit speaks {format}"),
+                ImuEvent::Sample(sample) => {
+                    sanity.sample(&sample);
+                    arrivals.sample(&sample);
+                    clock.observe(sample.device_time_ns, sample.arrival);
+                    queue.send(Event::Imu(sample));
+                }
+            }
+        }
         let after = self.decoder.counters();
         if after.not_finite > before.not_finite {
             self.sanity.bad(arrival, Insane::NotFinite);

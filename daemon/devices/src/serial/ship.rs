@@ -157,7 +157,7 @@ impl Feed for ShipFeed {
     fn take(&mut self, bytes: &[u8], arrival: Time, queue: &mut NewestSender<Event>) -> u64 {
         let before = self.parser.counters().packets;
         let Self { parser, said, last, without, .. } = self;
-        parser.push(bytes, arrival, |line| {
+        for line in parser.lines(bytes, arrival) {
             said.newest = Some((line.sentence, line.sample));
             if line.sample.heading.is_some() {
                 said.headings += 1;
@@ -169,7 +169,7 @@ impl Feed for ShipFeed {
                 }
             }
             queue.send(Event::Ship(line.sample));
-        });
+        }
         let lines = self.parser.counters();
         self.said.lines = lines;
         if lines.packets > before && self.last.is_none_or(|last| last < arrival) {

@@ -145,7 +145,7 @@ fn the_scan_of_rates_finds_every_format() {
                 }
             }
             let before = decoder.counters().packets;
-            decoder.push(&bytes, now, |_| {});
+            decoder.samples(&bytes, now).for_each(drop);
             health.received(now, bytes.len(), decoder.counters().packets - before);
             if let Action::SetBaud(_) = health.tick(now, false) {
                 decoder.restart();

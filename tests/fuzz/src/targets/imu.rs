@@ -23,7 +23,7 @@ const MEMORY_BYTES: usize = 16 << 10;
 /// Whatever came before: samples are finite, everything is counted, and good packets come through again.
 pub fn run(input: &[u8]) {
     let Some((&piece, mut rest)) = input.split_first() else { return };
-    let mut line = Line {
+    let mut line = FuzzedLine {
         decoder: ImuDecoder::fixed(ImuFormat::VectorNav),
         piece: usize::from(piece),
         ms: 0,
@@ -61,7 +61,7 @@ fn crc16(bytes: &[u8]) -> u16 {
     })
 }
 
-struct Line {
+struct FuzzedLine {
     decoder: ImuDecoder,
     piece: usize,
     ms: i64,
@@ -69,7 +69,7 @@ struct Line {
     samples: u64,
 }
 
-impl Line {
+impl FuzzedLine {
     fn push(&mut self, bytes: &[u8], mut sink: impl FnMut(&ImuSample)) {
         let piece = if self.piece == 0 { bytes.len().max(1) } else { self.piece };
         for part in bytes.chunks(piece) {
@@ -77,11 +77,11 @@ impl Line {
             let arrival = Time::from_ns(self.ms * 1_000_000);
             let samples = &mut self.samples;
             super::memory::within(MEMORY_BYTES, || {
-                self.decoder.push(part, arrival, |sample| {
+                for sample in self.decoder.samples(part, arrival) {
                     check_sample(&sample, arrival);
                     *samples += 1;
                     sink(&sample);
-                });
+                }
             });
             self.sent += part.len() as u64;
         }

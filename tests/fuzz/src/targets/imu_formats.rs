@@ -1,8 +1,9 @@
 //! The inertial unit's line, whatever the unit: any bytes, and packets of every format with right check sums.
 //!
-//! Input: one byte that says which format is read (0 to 6: one alone; else it is detected), one with the size of the pieces in
-//! which everything is pushed (0: steps at once); then steps. A step is two bytes and its content: the four highest bits say
-//! whether it is sent as it is (0, 8 to 15) or as a packet of a format (1 to 7), the lowest ten how many bytes it has.
+//! Input: one byte that says which format is read (its place in the list of formats, from 0: that alone; beyond it: detected), one
+//! with the size of the pieces in which everything is pushed (0: steps at once); then steps. A step is two bytes and its content: the
+//! four highest bits say whether it is sent as it is (0, and beyond the list) or as a packet of a format (its place, from 1), the lowest
+//! ten how many bytes it has.
 
 use bowwave_core::{event::ImuSample, time::Time};
 use bowwave_devices::{
@@ -22,7 +23,7 @@ const SILENCE_BYTES: usize = 3 * 4096;
 pub fn run(input: &[u8]) {
     let Some((&[format, piece], mut rest)) = input.split_first_chunk() else { return };
     let fixed = ImuFormat::ALL.get(usize::from(format)).copied();
-    let mut line = Line {
+    let mut line = FuzzedLines {
         decoder: ImuDecoder::with(fixed),
         ship: ShipParser::new(),
         piece: usize::from(piece),
@@ -46,75 +47,11 @@ fn step(input: &[u8]) -> Option<(Vec<u8>, &[u8])> {
     let (&[low, high], rest) = input.split_first_chunk()?;
     let head = u16::from_le_bytes([low, high]);
     let (content, rest) = rest.split_at(usize::from(head & 0x3ff).min(rest.len()));
-    Some((packet(head >> 12, content), rest))
+    let format = usize::from(head >> 12).checked_sub(1).and_then(|n| ImuFormat::ALL.get(n));
+    Some((format.map_or_else(|| content.to_vec(), |format| format.wrap(content)), rest))
 }
 
-fn sum(bytes: &[u8]) -> u8 {
-    bytes.iter().fold(0, |sum, &b| sum.wrapping_add(b))
-}
-
-/// Packets around any content; check sums bit by bit, so that they share nothing with the decoders'.
-fn packet(kind: u16, content: &[u8]) -> Vec<u8> {
-    let sized = |size: usize| {
-        let mut content = content.to_vec();
-        content.resize(size, 0);
-        content
-    };
-    match kind {
-        1 => {
-            let crc = content.iter().fold(0u16, |crc, byte| {
-                (0..8).fold(crc ^ u16::from(*byte) << 8, |c, _| {
-                    if c >> 15 == 0 { c << 1 } else { (c << 1) ^ 0x1021 }
-                })
-            });
-            [&[0xfa], content, &crc.to_be_bytes()].concat()
-        }
-        2 => {
-            let body = [b"VN", content].concat();
-            let xor = body.iter().fold(0, |xor, b| xor ^ b);
-            [b"$", &body[..], format!("*{xor:02X}\r\n").as_bytes()].concat()
-        }
-        3 => {
-            let short = &content[..content.len().min(254)];
-            let body = [&[0xff, 0x36, short.len() as u8], short].concat();
-            [&[0xfa], &body[..], &[sum(&body).wrapping_neg()]].concat()
-        }
-        4 => {
-            // Set, then fields.
-            let (set, fields) = content.split_first().map_or((0x80, content), |(s, f)| (0x80 | s & 3, f));
-            let fields = &fields[..fields.len().min(255)];
-            let mut bytes = [&[0x75, 0x65, set, fields.len() as u8], fields].concat();
-            let sums = bytes.iter().fold((0u8, 0u8), |(a, b), byte| {
-                let a = a.wrapping_add(*byte);
-                (a, b.wrapping_add(a))
-            });
-            bytes.extend([sums.0, sums.1]);
-            bytes
-        }
-        5 => {
-            let (message, data) = content.split_first().map_or((3, content), |(m, d)| (*m, d));
-            let body = [&[message, 0], &(data.len() as u16).to_le_bytes()[..], data].concat();
-            let crc = body.iter().fold(0u16, |crc, byte| {
-                (0..8)
-                    .fold(crc ^ u16::from(*byte), |c, _| if c & 1 == 0 { c >> 1 } else { (c >> 1) ^ 0x8408 })
-            });
-            [&[0xff, 0x5a], &body[..], &crc.to_le_bytes(), &[0x33]].concat()
-        }
-        6 => {
-            let body = sized(16);
-            [&[0xaa, 0xaa], &body[..], &[sum(&body)]].concat()
-        }
-        7 => {
-            let mut bytes = [&[0x55], &sized(9)[..]].concat();
-            bytes[1] = 0x50 + bytes[1] % 11;
-            bytes.push(sum(&bytes));
-            bytes
-        }
-        _ => content.to_vec(),
-    }
-}
-
-struct Line {
+struct FuzzedLines {
     decoder: ImuDecoder,
     ship: ShipParser,
     piece: usize,
@@ -123,7 +60,7 @@ struct Line {
     samples: u64,
 }
 
-impl Line {
+impl FuzzedLines {
     fn push(&mut self, bytes: &[u8]) {
         let piece = if self.piece == 0 { bytes.len().max(1) } else { self.piece };
         for part in bytes.chunks(piece) {
@@ -131,11 +68,11 @@ impl Line {
             let arrival = Time::from_ns(self.ms * 1_000_000);
             let Self { decoder, ship, samples, .. } = self;
             super::memory::within(MEMORY_BYTES, || {
-                decoder.push(part, arrival, |sample| {
+                for sample in decoder.samples(part, arrival) {
                     check_sample(&sample);
                     *samples += 1;
-                });
-                ship.push(part, arrival, |said| check_ship(&said));
+                }
+                ship.lines(part, arrival).for_each(|said| check_ship(&said));
             });
             self.sent += part.len() as u64;
         }

@@ -8,12 +8,13 @@
 
 use glam::{DQuat, DVec3};
 
+use super::ImuCodec;
 use crate::{
-    framing::{Framing, Look},
+    framing::{Found, Framing, Look, byte_sum},
     imu::{
         axes::{ENU_FROM_NWU, ROLL_OVER, SWAP, from_yaw_pitch_roll, unit},
-        reading::{Reading, Stamp},
-        wrap::Unwrap,
+        reading::{Reading, ReadingStamp},
+        unwrap::Unwrap,
     },
 };
 
@@ -27,25 +28,21 @@ const PAYLOAD_MAX_BYTES: usize = 2048;
 /// Nanoseconds of the fine sample time's tick (10 kHz).
 const FINE_TICK_NS: i64 = 100_000;
 
-/// The framing of all Xbus messages that a single unit sends.
-#[derive(Debug)]
-pub(crate) struct Xbus;
-
-/// What a message is, and its payload's length.
+/// Kind of a message, and its payload's place and length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Head {
+pub(crate) struct XsensHead {
     message: u8,
     payload_at: usize,
     payload_bytes: usize,
 }
 
-impl Framing for Xbus {
-    type Head = Head;
+impl Framing for XsensCodec {
+    type Head = XsensHead;
     const SYNC: u8 = SYNC;
     const MAX_BYTES: usize = PAYLOAD_MAX_BYTES + 7;
     const WEAK: bool = true;
 
-    fn look(bytes: &[u8]) -> Look<Head> {
+    fn look(bytes: &[u8]) -> Look<XsensHead> {
         // A unit on a line of its own is its bus's master.
         match bytes.get(1) {
             None => return Look::Incomplete,
@@ -61,20 +58,20 @@ impl Framing for Xbus {
         if payload_bytes > PAYLOAD_MAX_BYTES {
             return Look::Invalid;
         }
-        let head = Head { message, payload_at, payload_bytes };
+        let head = XsensHead { message, payload_at, payload_bytes };
         Look::Packet { head, bytes: payload_at + payload_bytes + 1 }
     }
 
     /// The byte sum, and for measurements that the items fill the payload: eight bits alone are little.
     fn intact(packet: &[u8]) -> bool {
-        let sum = packet.iter().skip(1).fold(0u8, |sum, &b| sum.wrapping_add(b));
+        let sum = packet.get(1..).map_or(0, byte_sum);
         let Look::Packet { head, .. } = Self::look(packet) else { return false };
         sum == 0 && (head.message != MTDATA2 || items(packet, head).all(|item| item.is_some()))
     }
 }
 
 /// The items of a message: id and data. `None` once where they do not fill the payload.
-fn items(packet: &[u8], head: Head) -> impl Iterator<Item = Option<(u16, &[u8])>> {
+fn items(packet: &[u8], head: XsensHead) -> impl Iterator<Item = Option<(u16, &[u8])>> {
     let mut rest = packet.get(head.payload_at..head.payload_at + head.payload_bytes).unwrap_or_default();
     std::iter::from_fn(move || {
         if rest.is_empty() {
@@ -94,8 +91,8 @@ fn items(packet: &[u8], head: Head) -> impl Iterator<Item = Option<(u16, &[u8])>
 
 /// The measurements of one message, in the unit's own units and axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Packet {
-    /// Packet counter.
+pub(crate) struct XsensMessage {
+    /// XsensMessage counter.
     pub(crate) counter: Option<u16>,
     /// Fine sample time, ticks of 100 us.
     pub(crate) sample_time_fine: Option<u32>,
@@ -109,9 +106,9 @@ pub(crate) struct Packet {
     pub(crate) rate: Option<[f64; 3]>,
 }
 
-impl Packet {
+impl XsensMessage {
     /// Reads a whole message; `None` for one that carries no measurements.
-    pub(crate) fn parse(packet: &[u8], head: Head) -> Option<Self> {
+    pub(crate) fn parse(packet: &[u8], head: XsensHead) -> Option<Self> {
         if head.message != MTDATA2 {
             return None;
         }
@@ -169,23 +166,41 @@ fn world_from_reference(low: u16) -> Option<DQuat> {
     }
 }
 
-/// What is remembered between messages.
+/// All messages that a single unit sends: its clock and its counter.
 #[derive(Debug, Default)]
-pub(crate) struct Unit {
+pub(crate) struct XsensCodec {
     fine: Unwrap<32>,
     counter: Unwrap<16>,
 }
 
-impl Unit {
+impl ImuCodec for XsensCodec {
+    const KEY: &'static str = "xsens";
+    const NAME: &'static str = "Xsens MTData2";
+    const REMEDY: &'static str = "add it to its output configuration (1060, 2010, 4020, 8020)";
+    const PROOF_PACKETS: usize = 3;
+
+    fn reading(&mut self, packet: &Found<'_, XsensHead>) -> Option<Reading> {
+        Some(self.convert(&XsensMessage::parse(packet.bytes, packet.head)?))
+    }
+
+    /// The payload of a measurement, at most 254 bytes.
+    fn wrap(content: &[u8]) -> Vec<u8> {
+        let payload = &content[..content.len().min(254)];
+        let body = [&[MASTER, MTDATA2, payload.len() as u8], payload].concat();
+        [&[SYNC], &body[..], &[byte_sum(&body).wrapping_neg()]].concat()
+    }
+}
+
+impl XsensCodec {
     /// The measurements in our axes: the body's y and z are turned over, the reference becomes east-north-up.
-    pub(crate) fn reading(&mut self, packet: &Packet) -> Reading {
+    fn convert(&mut self, packet: &XsensMessage) -> Reading {
         let count = packet.counter.map(|n| self.counter.next(u64::from(n)));
         let stamp = match (packet.sample_time_fine, count) {
             (Some(ticks), _) => {
-                Stamp::Device { ns: self.fine.next(u64::from(ticks)).saturating_mul(FINE_TICK_NS) }
+                ReadingStamp::Device { ns: self.fine.next(u64::from(ticks)).saturating_mul(FINE_TICK_NS) }
             }
-            (None, Some(n)) => Stamp::Count { n },
-            (None, None) => Stamp::Arrival,
+            (None, Some(n)) => ReadingStamp::Count { n },
+            (None, None) => ReadingStamp::Arrival,
         };
         let quaternion = packet.quaternion.and_then(|([w, x, y, z], low)| {
             Some((unit(DQuat::from_xyzw(x, y, z, w)), world_from_reference(low)?))
@@ -206,5 +221,4 @@ impl Unit {
 }
 
 #[cfg(test)]
-#[path = "xsens_tests.rs"]
 mod tests;

@@ -1,11 +1,56 @@
 use bowwave_core::{event::ImuSample, time::Time};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 use super::*;
 use crate::{
     framing::Scanner,
-    imu::{ImuDecoder, ImuFormat, streams::witmotion_packet},
+    imu::{
+        ImuDecoder, ImuFormat,
+        streams::{
+            G, Simulated, SimulatedUnit, Tolerance, i16s as words, rfu, world_of, wxyz, yaw_pitch_roll,
+        },
+    },
 };
+
+impl SimulatedUnit for WitmotionCodec {
+    const SENDS: Simulated = Simulated {
+        period_ns: 10_000_000,
+        packets: 5,
+        tolerance: Tolerance { rate: 6e-4, accel: 0.003, attitude: 8e-5, time_ns: 1_000_000 },
+    };
+
+    fn send(s: &ImuSample, _: i64, by_angles: bool) -> Vec<u8> {
+        let world = world_of(s);
+        let m = rfu(world);
+        let [yaw, pitch, roll] = yaw_pitch_roll(m).map(f64::to_degrees);
+        let part = |values: [f64; 3], full: f64| words(values.map(|v| v / full * 32_768.0));
+        let body = |v: DVec3| [v.y, v.x, -v.z];
+        let quaternion: Vec<u8> = wxyz(DQuat::from_mat3(&m))
+            .iter()
+            .flat_map(|v| ((v * 32_768.0).round().min(32_767.0) as i16).to_le_bytes())
+            .collect();
+        let mut bytes = [
+            witmotion_packet(0x51, &part(body(s.accel / G), 16.0)),
+            witmotion_packet(0x52, &part(body(s.rate * 1f64.to_degrees()), 2000.0)),
+            witmotion_packet(0x53, &part([roll, pitch, yaw], 180.0)),
+            witmotion_packet(0x54, &[1, 2, 3, 4]),
+        ]
+        .concat();
+        if !by_angles {
+            bytes.extend(witmotion_packet(0x59, &quaternion));
+        }
+        bytes
+    }
+}
+
+/// A packet of Witmotion's.
+pub(crate) fn witmotion_packet(kind: u8, data: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0x55, kind];
+    bytes.extend(data);
+    bytes.resize(10, 0);
+    bytes.push(bytes.iter().fold(0u8, |sum, &b| sum.wrapping_add(b)));
+    bytes
+}
 
 fn i16s(values: [i16; 4]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
@@ -19,7 +64,7 @@ fn decode(groups: &[Vec<u8>]) -> Vec<ImuSample> {
     let mut decoder = ImuDecoder::fixed(ImuFormat::Witmotion);
     let mut samples = Vec::new();
     for (n, group) in (0..).zip(groups) {
-        decoder.push(group, Time::from_ns(n * 10_000_000), |s| samples.push(s));
+        samples.extend(decoder.samples(group, Time::from_ns(n * 10_000_000)));
     }
     samples
 }
@@ -28,16 +73,19 @@ fn decode(groups: &[Vec<u8>]) -> Vec<ImuSample> {
 fn full_scales_are_those_of_the_specification() {
     let read = |kind, values| {
         let bytes = packet(kind, values);
-        let mut scanner = Scanner::<Standard>::new();
+        let mut scanner = Scanner::<WitmotionCodec>::new();
         let mut got = None;
-        scanner.push(&bytes, |found| got = Packet::parse(found.bytes, found.head));
+        let mut bytes = &bytes[..];
+        while let Some(found) = scanner.next_of(&mut bytes) {
+            got = WitmotionPacket::parse(found.bytes, found.head);
+        }
         got.expect("a packet")
     };
-    assert_eq!(read(0x51, [2048, -2048, -32_768, 2500]), Packet::Accel([1.0, -1.0, -16.0]));
-    assert_eq!(read(0x52, [16_384, -32_768, 0, 0]), Packet::Rate([1000.0, -2000.0, 0.0]));
-    assert_eq!(read(0x53, [16_384, -8192, -32_768, 0]), Packet::Angles([90.0, -45.0, -180.0]));
-    assert_eq!(read(0x59, [16_384, 0, -16_384, 0]), Packet::Quaternion([0.5, 0.0, -0.5, 0.0]));
-    assert_eq!(read(0x54, [1; 4]), Packet::Other);
+    assert_eq!(read(0x51, [2048, -2048, -32_768, 2500]), WitmotionPacket::Accel([1.0, -1.0, -16.0]));
+    assert_eq!(read(0x52, [16_384, -32_768, 0, 0]), WitmotionPacket::Rate([1000.0, -2000.0, 0.0]));
+    assert_eq!(read(0x53, [16_384, -8192, -32_768, 0]), WitmotionPacket::Angles([90.0, -45.0, -180.0]));
+    assert_eq!(read(0x59, [16_384, 0, -16_384, 0]), WitmotionPacket::Quaternion([0.5, 0.0, -0.5, 0.0]));
+    assert_eq!(read(0x54, [1; 4]), WitmotionPacket::Other);
 }
 
 #[test]

@@ -1,32 +1,75 @@
 //! VectorNav's binary output: sync byte `FA`, a byte that names the groups, a little-endian mask of fields for each group,
 //! the fields in the order of their bits, a CRC16-CCITT. Sans-io: bytes in, packets out.
 //!
-//! Body axes: x forward, y right, z down. The unit's reference is north, east, down; see [`Packet::to_sample`] for the way
+//! Body axes: x forward, y right, z down. The unit's reference is north, east, down; see [`VectorNavPacket::to_sample`] for the way
 //! into our world.
 
 pub(crate) mod ascii;
-mod crc;
 mod layout;
-mod parser;
 #[cfg(test)]
 mod tests;
 
 use bowwave_core::{event::ImuSample, time::Time};
+use crc::{CRC_16_XMODEM, Crc};
 use glam::DVec3;
 
-pub(crate) use self::crc::crc16;
-use self::layout::{Field, Layout, SYNC};
-pub(crate) use self::parser::Binary;
-pub use self::parser::Parser;
-use crate::imu::{
-    axes::{SWAP, from_yaw_pitch_roll, rotation, vector},
-    reading::{Reading, Stamp},
+use self::layout::{MAX_PACKET, PacketField, PacketHeader, PacketLayout, SYNC};
+use super::ImuCodec;
+use crate::{
+    framing::{Found, Framing, Look},
+    imu::{
+        axes::{SWAP, from_yaw_pitch_roll, rotation, vector},
+        reading::{Reading, ReadingStamp},
+    },
 };
+
+/// CRC16-CCITT as VectorNav uses it (CRC-16/XMODEM in the catalogue of Greg Cook): polynomial 1021, most significant bit first,
+/// from 0. Over a packet's bytes after the sync byte, its own two CRC bytes included, the result is 0.
+pub(crate) const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_XMODEM);
+
+/// VectorNav's binary output.
+#[derive(Debug, Default)]
+pub(crate) struct VectorNavCodec;
+
+impl Framing for VectorNavCodec {
+    type Head = PacketLayout;
+    const SYNC: u8 = SYNC;
+    const MAX_BYTES: usize = MAX_PACKET;
+    const WEAK: bool = false;
+
+    fn look(bytes: &[u8]) -> Look<PacketLayout> {
+        match PacketLayout::parse(bytes) {
+            PacketHeader::Incomplete => Look::Incomplete,
+            PacketHeader::Invalid => Look::Invalid,
+            PacketHeader::Valid(layout) => Look::Packet { head: layout, bytes: layout.packet_bytes() },
+        }
+    }
+
+    fn intact(packet: &[u8]) -> bool {
+        packet.get(1..).is_some_and(|body| CRC.checksum(body) == 0)
+    }
+}
+
+impl ImuCodec for VectorNavCodec {
+    const KEY: &'static str = "vectornav";
+    const NAME: &'static str = "VectorNav binary";
+    const REMEDY: &'static str = "add it to its binary output (common group, bits 0, 5 and 8)";
+    const PROOF_PACKETS: usize = 2;
+
+    fn reading(&mut self, packet: &Found<'_, PacketLayout>) -> Option<Reading> {
+        Some(VectorNavPacket::decode(packet.bytes, &packet.head).reading())
+    }
+
+    /// Groups, masks and fields.
+    fn wrap(content: &[u8]) -> Vec<u8> {
+        [&[SYNC], content, &CRC.checksum(content).to_be_bytes()].concat()
+    }
+}
 
 /// The fields of one packet that the trainer can use, in the unit's own units and axes. Fields of the packet that are
 /// not listed here are skipped by their length.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Packet {
+pub struct VectorNavPacket {
     /// Time since start-up, nanoseconds.
     pub time_startup_ns: Option<u64>,
     /// Yaw, pitch and roll (3-2-1 Euler angles, body with respect to north-east-down), degrees.
@@ -55,11 +98,11 @@ pub struct Packet {
     pub accel_ned: Option<[f32; 3]>,
 }
 
-impl Packet {
+impl VectorNavPacket {
     /// Decodes a whole packet whose check sum is right and whose header is `layout`.
-    fn decode(bytes: &[u8], layout: &Layout) -> Self {
+    fn decode(bytes: &[u8], layout: &PacketLayout) -> Self {
         let mut packet = Self::default();
-        for Field { group, bit, offset, bytes: length } in layout.fields() {
+        for PacketField { group, bit, offset, bytes: length } in layout.fields() {
             if let Some(field) = bytes.get(offset..offset + length) {
                 packet.set(group, bit, field);
             }
@@ -86,7 +129,7 @@ impl Packet {
         }
     }
 
-    /// What it says in our axes. Rate and specific force (compensated ones are preferred) stay in the body's axes. The
+    /// The measurement in our axes. Rate and specific force (compensated ones are preferred) stay in the body's axes. The
     /// attitude comes from the quaternion, or else from yaw, pitch and roll, and is turned from north-east-down into our world.
     pub(crate) fn reading(&self) -> Reading {
         let ned_from_imu = self.quaternion.map(rotation).or_else(|| {
@@ -95,7 +138,7 @@ impl Packet {
         });
         let time_ns = self.time_startup_ns.and_then(|ns| i64::try_from(ns).ok());
         Reading {
-            stamp: time_ns.map_or(Stamp::Arrival, |ns| Stamp::Device { ns }),
+            stamp: time_ns.map_or(ReadingStamp::Arrival, |ns| ReadingStamp::Device { ns }),
             rate: self.angular_rate.or(self.raw_rate).map(vector),
             accel: self.accel.or(self.raw_accel).map(vector),
             world_from_imu: ned_from_imu.map(|q| SWAP * q),
@@ -105,7 +148,8 @@ impl Packet {
     /// The packet as a sample that arrived at `arrival`; `None` unless it has the time since start-up, a rate and an
     /// acceleration.
     pub fn to_sample(&self, arrival: Time) -> Option<ImuSample> {
-        let Reading { stamp: Stamp::Device { ns }, rate, accel, world_from_imu } = self.reading() else {
+        let Reading { stamp: ReadingStamp::Device { ns }, rate, accel, world_from_imu } = self.reading()
+        else {
             return None;
         };
         Some(ImuSample { arrival, device_time_ns: ns, rate: rate?, accel: accel?, world_from_imu })
@@ -119,7 +163,7 @@ fn floats<const N: usize>(bytes: &[u8]) -> Option<[f32; N]> {
     Some(values.map(f32::from_le_bytes))
 }
 
-/// What the simulated unit sends: fields of the common group.
+/// Output of the simulated unit: fields of the common group.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommonOutput {
     /// Time since start-up, nanoseconds.
@@ -136,7 +180,7 @@ impl CommonOutput {
     /// The longest encoding: header, time, quaternion, rate, acceleration, CRC.
     pub const MAX_BYTES: usize = 4 + 8 + 16 + 12 + 12 + 2;
 
-    /// What a unit would send for `sample`; `None` where its device time is before the unit's start-up.
+    /// The output of a unit for `sample`; `None` where its device time is before the unit's start-up.
     pub fn from_sample(sample: &ImuSample) -> Option<Self> {
         let narrow = |v: DVec3| [v.x as f32, v.y as f32, v.z as f32];
         Some(Self {
@@ -165,7 +209,7 @@ impl CommonOutput {
         for value in attitude.chain(&self.angular_rate).chain(&self.accel) {
             out.extend(value.to_le_bytes());
         }
-        let crc = crc16(&out[begin..]);
+        let crc = CRC.checksum(&out[begin..]);
         out.extend(crc.to_be_bytes());
     }
 }

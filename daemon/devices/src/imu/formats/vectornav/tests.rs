@@ -4,20 +4,61 @@ use bowwave_core::{event::ImuSample, time::Time};
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
-use super::{CommonOutput, Packet, Parser, crc::crc16, layout::MAX_PACKET, parser::Binary};
-use crate::framing::{Framing as _, Look, intact_places};
+use super::{CRC, CommonOutput, VectorNavCodec, VectorNavPacket, layout::MAX_PACKET};
+use crate::{
+    framing::{CHUNK, Framing as _, Look, Scanner, intact_places},
+    imu::streams::{Simulated, SimulatedUnit, Tolerance},
+};
 
-fn parse(bytes: &[u8]) -> (Vec<Packet>, Parser) {
+impl SimulatedUnit for VectorNavCodec {
+    const SENDS: Simulated = Simulated {
+        period_ns: 5_000_000,
+        packets: 1,
+        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
+    };
+
+    fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        if let Some(output) = CommonOutput::from_sample(s) {
+            output.encode(&mut bytes);
+        }
+        bytes
+    }
+}
+
+/// Check value of CRC-16/XMODEM (same polynomial, start and order) in the CRC catalogue of Greg Cook.
+#[test]
+fn the_check_sum_matches_the_catalogue() {
+    assert_eq!(CRC.checksum(b"123456789"), 0x31c3);
+}
+
+#[test]
+fn the_check_sum_is_zero_over_data_and_itself() {
+    let mut bytes = vec![0x01, 0x29, 0x01, 0xfa, 0x00];
+    bytes.extend(CRC.checksum(&bytes).to_be_bytes());
+    assert_eq!(CRC.checksum(&bytes), 0);
+}
+
+/// A scanner of the binary output, as its lines' scanner.
+type BinaryScanner = Scanner<VectorNavCodec>;
+
+/// Takes `bytes` in; the packets that they complete.
+fn pull(scanner: &mut BinaryScanner, mut bytes: &[u8]) -> Vec<VectorNavPacket> {
+    let mut packets = Vec::new();
+    while let Some(found) = scanner.next_of(&mut bytes) {
+        packets.push(VectorNavPacket::decode(found.bytes, &found.head));
+    }
+    packets
+}
+
+fn parse(bytes: &[u8]) -> (Vec<VectorNavPacket>, BinaryScanner) {
     parse_split(bytes, bytes.len().max(1))
 }
 
-fn parse_split(bytes: &[u8], piece: usize) -> (Vec<Packet>, Parser) {
-    let mut parser = Parser::new();
-    let mut packets = Vec::new();
-    for piece in bytes.chunks(piece) {
-        parser.push(piece, |p| packets.push(*p));
-    }
-    (packets, parser)
+fn parse_split(bytes: &[u8], piece: usize) -> (Vec<VectorNavPacket>, BinaryScanner) {
+    let mut scanner = Scanner::new();
+    let packets = bytes.chunks(piece).flat_map(|piece| pull(&mut scanner, piece)).collect();
+    (packets, scanner)
 }
 
 /// The n-th of a series of distinct packets; every fourth lacks the attitude, as a second output of the unit would.
@@ -39,13 +80,13 @@ fn stream(range: std::ops::Range<u32>) -> Vec<u8> {
     bytes
 }
 
-fn times(packets: &[Packet]) -> Vec<u64> {
+fn times(packets: &[VectorNavPacket]) -> Vec<u64> {
     packets.iter().filter_map(|p| p.time_startup_ns).map(|t| t / 5_000_000).collect()
 }
 
 #[test]
 fn encoded_packets_come_back_whole() {
-    let (packets, parser) = parse(&stream(0..100));
+    let (packets, scanner) = parse(&stream(0..100));
     assert_eq!(packets.len(), 100);
     for (n, packet) in packets.iter().enumerate() {
         let sent = output(n as u32);
@@ -54,16 +95,16 @@ fn encoded_packets_come_back_whole() {
         assert_eq!(packet.angular_rate, Some(sent.angular_rate));
         assert_eq!(packet.accel, Some(sent.accel));
     }
-    assert_eq!((parser.counters().bad_crc, parser.counters().skipped_bytes), (0, 0));
+    assert_eq!((scanner.counters().bad_crc, scanner.counters().skipped_bytes), (0, 0));
 }
 
 #[test]
 fn every_place_to_split_a_packet_is_fine() {
     let bytes = stream(0..6);
     for piece in 1..=bytes.len() {
-        let (packets, parser) = parse_split(&bytes, piece);
+        let (packets, scanner) = parse_split(&bytes, piece);
         assert_eq!(times(&packets), [0, 1, 2, 3, 4, 5], "pieces of {piece}");
-        assert_eq!(parser.counters().skipped_bytes, 0);
+        assert_eq!(scanner.counters().skipped_bytes, 0);
     }
 }
 
@@ -75,9 +116,9 @@ fn a_damaged_packet_costs_only_itself() {
         let mut bytes = clean.clone();
         bytes[at] ^= 0x55;
         // A damaged mask can claim a longer packet; a live line then goes on.
-        let (packets, parser) = parse(&bytes);
+        let (packets, scanner) = parse(&bytes);
         assert_eq!(times(&packets), [0, 2, 3, 4, 5], "byte {at}");
-        assert_eq!(parser.counters().skipped_bytes, second as u64);
+        assert_eq!(scanner.counters().skipped_bytes, second as u64);
     }
 }
 
@@ -85,14 +126,14 @@ fn a_damaged_packet_costs_only_itself() {
 #[test]
 fn a_long_false_preamble_holds_back_no_more_than_one_packet() {
     let long = [0xfa, 0x21, 0xff, 0x7f, 0xff, 0x03];
-    let mut parser = Parser::new();
+    let mut scanner = BinaryScanner::new();
     let mut got = Vec::new();
-    parser.push(&stream(0..1), |p| got.push(*p));
-    parser.push(&long, |p| got.push(*p));
-    parser.push(&stream(1..2), |p| got.push(*p));
-    parser.push(&stream(2..3), |p| got.push(*p));
+    got.extend(pull(&mut scanner, &stream(0..1)));
+    got.extend(pull(&mut scanner, &long));
+    got.extend(pull(&mut scanner, &stream(1..2)));
+    got.extend(pull(&mut scanner, &stream(2..3)));
     assert_eq!(times(&got), [0, 1, 2]);
-    assert_eq!(parser.counters().skipped_bytes, long.len() as u64);
+    assert_eq!(scanner.counters().skipped_bytes, long.len() as u64);
 }
 
 #[test]
@@ -114,12 +155,18 @@ fn a_chance_packet_costs_none_within_it_however_the_bytes_come() {
     let chance = bytes.len();
     bytes.extend([0xfa, 0x05, 0x31, 0x01, 0x01, 0x02]);
     bytes.extend(stream(2..4));
-    let Look::Packet { bytes: length, .. } = Binary::look(&bytes[chance..]) else { panic!("a header") };
+    let Look::Packet { bytes: length, .. } = VectorNavCodec::look(&bytes[chance..]) else {
+        panic!("a header")
+    };
     bytes.truncate(chance + length - 2);
-    let crc = crc16(&bytes[chance + 1..]);
+    let crc = CRC.checksum(&bytes[chance + 1..]);
     bytes.extend(crc.to_be_bytes());
     bytes.extend(stream(4..6));
-    assert_eq!(intact_places::<Binary>(&bytes).len(), 6, "real ones, less the one cut, and the chance");
+    assert_eq!(
+        intact_places::<VectorNavCodec>(&bytes).len(),
+        6,
+        "real ones, less the one cut, and the chance"
+    );
     for piece in 1..=bytes.len() {
         assert_eq!(times(&parse_split(&bytes, piece).0), [0, 1, 2, 4, 5], "pieces of {piece}");
     }
@@ -127,12 +174,12 @@ fn a_chance_packet_costs_none_within_it_however_the_bytes_come() {
 
 #[test]
 fn a_level_unit_that_faces_north_is_level_and_faces_north() {
-    let packet = Packet {
+    let packet = VectorNavPacket {
         time_startup_ns: Some(1),
         quaternion: Some([0.0, 0.0, 0.0, 1.0]),
         angular_rate: Some([0.0; 3]),
         accel: Some([0.0, 0.0, -9.81]),
-        ..Packet::default()
+        ..VectorNavPacket::default()
     };
     let sample = packet.to_sample(Time::from_ns(7)).expect("complete");
     let attitude = sample.world_from_imu.expect("given");
@@ -142,7 +189,7 @@ fn a_level_unit_that_faces_north_is_level_and_faces_north() {
     assert!((attitude * sample.accel).z > 9.8, "the force felt at rest is upwards");
     // 90 degrees of yaw turn the nose to the east; pitch lifts it; roll lowers the right side.
     let turned = |ypr: [f32; 3]| {
-        let packet = Packet { quaternion: None, yaw_pitch_roll_deg: Some(ypr), ..packet };
+        let packet = VectorNavPacket { quaternion: None, yaw_pitch_roll_deg: Some(ypr), ..packet };
         packet.to_sample(Time::MIN).and_then(|s| s.world_from_imu).expect("given")
     };
     assert!((turned([90.0, 0.0, 0.0]) * DVec3::X).abs_diff_eq(DVec3::X, 1e-7));
@@ -152,18 +199,18 @@ fn a_level_unit_that_faces_north_is_level_and_faces_north() {
 
 #[test]
 fn packets_without_what_a_sample_needs_give_none() {
-    let whole = Packet {
+    let whole = VectorNavPacket {
         time_startup_ns: Some(1),
         angular_rate: Some([0.0; 3]),
         accel: Some([0.0; 3]),
-        ..Packet::default()
+        ..VectorNavPacket::default()
     };
     assert!(whole.to_sample(Time::MIN).is_some());
     for lacking in [
-        Packet { time_startup_ns: None, ..whole },
-        Packet { time_startup_ns: Some(u64::MAX), ..whole },
-        Packet { angular_rate: None, ..whole },
-        Packet { accel: None, ..whole },
+        VectorNavPacket { time_startup_ns: None, ..whole },
+        VectorNavPacket { time_startup_ns: Some(u64::MAX), ..whole },
+        VectorNavPacket { angular_rate: None, ..whole },
+        VectorNavPacket { accel: None, ..whole },
     ] {
         assert_eq!(lacking.to_sample(Time::MIN), None);
     }
@@ -180,13 +227,13 @@ proptest! {
     #[test]
     fn any_bytes_are_survived_in_bounded_memory(bytes in prop::collection::vec(garbage(), 0..40), piece in 1usize..2000) {
         let bytes = bytes.concat();
-        let (packets, parser) = parse_split(&bytes, piece);
-        let c = parser.counters();
+        let (packets, scanner) = parse_split(&bytes, piece);
+        let c = scanner.counters();
         prop_assert_eq!(packets.len() as u64, c.packets);
         prop_assert!(c.skipped_bytes <= bytes.len() as u64);
-        let (bytes, memory) = parser.scanner.held();
+        let (bytes, memory) = scanner.held();
         prop_assert!(bytes < MAX_PACKET);
-        prop_assert!(memory <= 2 * (MAX_PACKET + crate::framing::CHUNK));
+        prop_assert!(memory <= 2 * (MAX_PACKET + CHUNK));
     }
 
     /// Whatever lies between them, every packet is found, in order and once; none is invented.
@@ -202,11 +249,11 @@ proptest! {
         // The line goes silent with text, which ends a last false preamble.
         bytes.extend([0x20; MAX_PACKET]);
         // Of false preambles one in 65536 is followed by what its check sum fits: such a packet is found as well, and rightly.
-        prop_assume!(intact_places::<Binary>(&bytes) == starts);
-        let (packets, parser) = parse_split(&bytes, piece);
+        prop_assume!(intact_places::<VectorNavCodec>(&bytes) == starts);
+        let (packets, scanner) = parse_split(&bytes, piece);
         prop_assert_eq!(times(&packets), (0..sent).collect::<Vec<_>>());
         let garbage: usize = gaps.iter().map(Vec::len).sum();
-        prop_assert_eq!(parser.counters().skipped_bytes, (garbage + MAX_PACKET) as u64);
+        prop_assert_eq!(scanner.counters().skipped_bytes, (garbage + MAX_PACKET) as u64);
     }
 
     /// How the bytes are cut into reads changes nothing.
@@ -227,18 +274,18 @@ proptest! {
     #[test]
     fn back_in_step_within_two_packets(gap in garbage()) {
         let line = [stream(0..3), gap.clone(), stream(4..7)].concat();
-        prop_assume!(intact_places::<Binary>(&line).len() == 6);
-        let mut parser = Parser::new();
+        prop_assume!(intact_places::<VectorNavCodec>(&line).len() == 6);
+        let mut scanner = BinaryScanner::new();
         let mut got = Vec::new();
         for n in 0..3 {
-            parser.push(&stream(n..n + 1), |p| got.push(*p));
+            got.extend(pull(&mut scanner, &stream(n..n + 1)));
         }
-        parser.push(&gap, |p| got.push(*p));
+        got.extend(pull(&mut scanner, &gap));
         // Packets 4 to 6 have the layout of packet 2.
-        parser.push(&stream(4..5), |p| got.push(*p));
-        parser.push(&stream(5..6), |p| got.push(*p));
+        got.extend(pull(&mut scanner, &stream(4..5)));
+        got.extend(pull(&mut scanner, &stream(5..6)));
         prop_assert!(times(&got).starts_with(&[0, 1, 2, 4]), "{:?}", times(&got));
-        parser.push(&stream(6..7), |p| got.push(*p));
+        got.extend(pull(&mut scanner, &stream(6..7)));
         prop_assert!(times(&got).starts_with(&[0, 1, 2, 4, 5]), "{:?}", times(&got));
     }
 
@@ -302,7 +349,7 @@ proptest! {
         let imu_len = imu_before + 4 + sum(imu & 0x07c0, &[(1 << 6, 16), (0x0780, 12)]);
         let payload = &payload[..common_len + imu_len];
         bytes.extend(payload);
-        let crc = crc16(&bytes[1..]);
+        let crc = CRC.checksum(&bytes[1..]);
         bytes.extend(crc.to_be_bytes());
         let (packets, _) = parse(&bytes);
         prop_assert_eq!(packets.len(), 1);
@@ -328,7 +375,7 @@ fn recorded(bytes: &str, decoded: &str) -> Option<(Vec<u8>, Vec<Vec<f32>>)> {
     Some((bytes, rows.collect()))
 }
 
-fn row(p: &Packet) -> Option<Vec<f32>> {
+fn row(p: &VectorNavPacket) -> Option<Vec<f32>> {
     let mut row = Vec::new();
     row.extend(p.raw_mag?);
     row.extend(p.raw_accel?);
@@ -342,7 +389,7 @@ fn row(p: &Packet) -> Option<Vec<f32>> {
 }
 
 /// How many packets the authors decoded to the same numbers (printed with seven digits), in the same order.
-fn equal_to_authors(packets: &[Packet], authors: &[Vec<f32>]) -> usize {
+fn equal_to_authors(packets: &[VectorNavPacket], authors: &[Vec<f32>]) -> usize {
     let mut next = 0;
     let mut matched = 0;
     for packet in packets {
@@ -363,8 +410,8 @@ fn a_real_unit_is_decoded_as_its_authors_did() {
         [("F00294", "F00294_B"), ("F00379_first_400000_bytes", "F00379_B_first_2400_lines")]
     {
         let Some((bytes, decoded)) = recorded(bytes, decoded) else { return };
-        let (packets, parser) = parse_split(&bytes, 61);
-        let c = parser.counters();
+        let (packets, scanner) = parse_split(&bytes, 61);
+        let c = scanner.counters();
         let authors: Vec<_> = decoded.into_iter().filter(|row| row.len() == 29).collect();
         let equal = equal_to_authors(&packets, &authors);
         eprintln!("{c:?}, the authors decoded {}, equal {equal}", authors.len());
@@ -379,7 +426,7 @@ fn the_real_unit_feels_gravity_upwards_in_our_world() {
     let Some((bytes, _)) = recorded("F00294", "F00294_B") else { return };
     let (packets, _) = parse(&bytes);
     for packet in packets {
-        let dated = Packet { time_startup_ns: Some(0), ..packet };
+        let dated = VectorNavPacket { time_startup_ns: Some(0), ..packet };
         let sample = dated.to_sample(Time::MIN).expect("raw rate and acceleration are there");
         let attitude = sample.world_from_imu.expect("yaw, pitch and roll are there");
         let up = attitude * sample.accel;

@@ -7,13 +7,57 @@ use proptest::prelude::*;
 use super::*;
 use crate::{
     framing::{LineCounters, Scanner},
-    imu::{ImuDecoder, ImuFormat, streams::mip_packet},
+    imu::{
+        ImuDecoder, ImuFormat,
+        streams::{G, Simulated, SimulatedUnit, Tolerance, be, ned, world_of, wxyz},
+    },
 };
 
-fn parse(stream: &[u8]) -> (Vec<Packet>, LineCounters) {
-    let mut scanner = Scanner::<Mip>::new();
+impl SimulatedUnit for MicroStrainCodec {
+    const SENDS: Simulated = Simulated {
+        period_ns: 5_000_000,
+        packets: 1,
+        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
+    };
+
+    fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {
+        let world = world_of(s);
+        let q = DQuat::from_mat3(&ned(world));
+        mip_packet(
+            0x80,
+            &[
+                (0xd5, (s.device_time_ns as u64).to_be_bytes().to_vec()),
+                (0x04, be((s.accel / G).to_array())),
+                (0x05, be(s.rate.to_array())),
+                (0x0a, be(wxyz(q))),
+            ],
+        )
+    }
+}
+
+/// A packet of MicroStrain's.
+pub(crate) fn mip_packet(set: u8, fields: &[(u8, Vec<u8>)]) -> Vec<u8> {
+    let payload: Vec<u8> = fields
+        .iter()
+        .flat_map(|(descriptor, data)| [&[data.len() as u8 + 2, *descriptor], &data[..]].concat())
+        .collect();
+    let mut bytes = vec![0x75, 0x65, set, payload.len() as u8];
+    bytes.extend(payload);
+    let (mut a, mut b) = (0u8, 0u8);
+    for &byte in &bytes {
+        a = a.wrapping_add(byte);
+        b = b.wrapping_add(a);
+    }
+    bytes.extend([a, b]);
+    bytes
+}
+
+fn parse(mut stream: &[u8]) -> (Vec<MipPacket>, LineCounters) {
+    let mut scanner = Scanner::<MicroStrainCodec>::new();
     let mut packets = Vec::new();
-    scanner.push(stream, |found| packets.extend(Packet::parse(found.bytes, found.head)));
+    while let Some(found) = scanner.next_of(&mut stream) {
+        packets.extend(MipPacket::parse(found.bytes, found.head));
+    }
     (packets, scanner.counters())
 }
 
@@ -31,7 +75,7 @@ fn decode(bytes: &[u8]) -> (Vec<ImuSample>, ImuDecoder) {
     let mut decoder = ImuDecoder::new();
     let mut samples = Vec::new();
     for (n, piece) in (0..).zip(bytes.chunks(97)) {
-        decoder.push(piece, Time::from_ns(n * 8_000_000), |s| samples.push(s));
+        samples.extend(decoder.samples(piece, Time::from_ns(n * 8_000_000)));
     }
     (samples, decoder)
 }
@@ -43,7 +87,7 @@ fn a_real_unit_is_decoded_whole() {
     let (packets, counters) = parse(&bytes);
     assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (4155, 0, 0));
     let moving = packets.iter().filter(|p| !p.from_filter && p.moves()).count();
-    let filtered: Vec<&Packet> = packets.iter().filter(|p| p.from_filter).collect();
+    let filtered: Vec<&MipPacket> = packets.iter().filter(|p| p.from_filter).collect();
     assert_eq!((moving, filtered.len()), (2265, 361));
     // The first of its bytes, worked out by hand: 282.809 s, and 15.6 mg along x.
     let first = packets.iter().find(|p| p.moves()).expect("one of them");
@@ -74,10 +118,10 @@ fn the_real_units_attitude_agrees_with_gravity_and_with_its_rates() {
     assert!(mean < 0.1, "{mean} degrees");
     // From one filter packet to the next the carried attitude must arrive where the filter says.
     let (packets, _) = parse(&bytes);
-    let mut unit = Unit::default();
+    let mut unit = MicroStrainCodec::default();
     let filtered = packets.iter().filter(|p| p.from_filter).map(|p| {
-        let reading = unit.reading(p);
-        let Stamp::Device { ns } = reading.stamp else { panic!("{reading:?}") };
+        let reading = unit.convert(p);
+        let ReadingStamp::Device { ns } = reading.stamp else { panic!("{reading:?}") };
         (ns, reading.world_from_imu.expect("valid"))
     });
     let mut last: Option<DQuat> = None;
@@ -103,10 +147,6 @@ fn the_real_units_attitude_agrees_with_gravity_and_with_its_rates() {
     assert!(carried < held / 5.0 && carried < 0.3, "{carried} {held}");
 }
 
-fn be(values: &[f64]) -> Vec<u8> {
-    values.iter().flat_map(|v| (*v as f32).to_be_bytes()).collect()
-}
-
 /// Quaternion and Euler angles of one attitude, in both sets: the same attitude.
 #[test]
 fn quaternions_and_angles_agree() {
@@ -120,7 +160,7 @@ fn quaternions_and_angles_agree() {
             DVec3::new(cr * sp * cy + sr * sy, cr * sp * sy - sr * cy, cr * cp),
         );
         let q = DQuat::from_mat3(&ned_from_body);
-        let (wxyz, angles) = (be(&[q.w, q.x, q.y, q.z]), be(&[roll, pitch, yaw]));
+        let (wxyz, angles) = (be([q.w, q.x, q.y, q.z]), be([roll, pitch, yaw]));
         let good = |data: &[u8]| [data, &[0, 1]].concat();
         for packet in [
             mip_packet(0x80, &[(0x0a, wxyz.clone())]),
@@ -128,7 +168,8 @@ fn quaternions_and_angles_agree() {
             mip_packet(0x82, &[(0x03, good(&wxyz))]),
             mip_packet(0x82, &[(0x05, good(&angles))]),
         ] {
-            let attitude = Unit::default().reading(&parse(&packet).0[0]).world_from_imu.expect("given");
+            let attitude =
+                MicroStrainCodec::default().convert(&parse(&packet).0[0]).world_from_imu.expect("given");
             let forward = attitude * DVec3::X;
             let expected =
                 DVec3::new(ned_from_body.x_axis.y, ned_from_body.x_axis.x, -ned_from_body.x_axis.z);
@@ -139,21 +180,22 @@ fn quaternions_and_angles_agree() {
             assert!(down.abs_diff_eq(expected, 1e-6), "{down} {expected}");
         }
     }
-    let invalid = [&be(&[1.0, 0.0, 0.0, 0.0])[..], &[0, 0]].concat();
+    let invalid = [&be([1.0, 0.0, 0.0, 0.0])[..], &[0, 0]].concat();
     assert_eq!(parse(&mip_packet(0x82, &[(0x03, invalid)])).0[0].quaternion, None);
 }
 
 #[test]
 fn the_filter_is_believed_where_both_sets_come() {
-    let mut unit = Unit::default();
-    let sensor = |unit: &mut Unit| {
+    let mut unit = MicroStrainCodec::default();
+    let sensor = |unit: &mut MicroStrainCodec| {
         let fields =
-            [(0x04, be(&[0.0, 0.0, -1.0])), (0x05, be(&[0.1, 0.0, 0.0])), (0x0a, be(&[1.0, 0.0, 0.0, 0.0]))];
-        unit.reading(&parse(&mip_packet(0x80, &fields)).0[0])
+            [(0x04, be([0.0, 0.0, -1.0])), (0x05, be([0.1, 0.0, 0.0])), (0x0a, be([1.0, 0.0, 0.0, 0.0]))];
+        unit.convert(&parse(&mip_packet(0x80, &fields)).0[0])
     };
-    let filter =
-        |unit: &mut Unit, fields: &[(u8, Vec<u8>)]| unit.reading(&parse(&mip_packet(0x82, fields)).0[0]);
-    let good = |values: &[f64]| [&be(values)[..], &[0, 1]].concat();
+    let filter = |unit: &mut MicroStrainCodec, fields: &[(u8, Vec<u8>)]| {
+        unit.convert(&parse(&mip_packet(0x82, fields)).0[0])
+    };
+    let good = |values: &[f64]| [&be(values.iter().copied())[..], &[0, 1]].concat();
     let first = sensor(&mut unit);
     assert!(first.world_from_imu.is_some());
     assert!(first.accel.expect("given").abs_diff_eq(DVec3::NEG_Z * 9.806_65, 1e-6));
@@ -171,13 +213,13 @@ fn the_filter_is_believed_where_both_sets_come() {
 fn times_of_gps_are_taken_where_there_is_no_clock() {
     let gps = |tow_s: f64, week: u16| [&tow_s.to_be_bytes()[..], &week.to_be_bytes(), &[0, 7]].concat();
     let time = |field| parse(&mip_packet(0x80, &[field])).0[0].stamp();
-    assert_eq!(time((0x12, gps(1.5, 0))), Stamp::Device { ns: 1_500_000_000 });
-    assert_eq!(time((0xd3, gps(0.25, 2))), Stamp::Device { ns: 1_209_600_250_000_000 });
+    assert_eq!(time((0x12, gps(1.5, 0))), ReadingStamp::Device { ns: 1_500_000_000 });
+    assert_eq!(time((0xd3, gps(0.25, 2))), ReadingStamp::Device { ns: 1_209_600_250_000_000 });
     for wrong in [f64::NAN, -1.0, 604_800.0, f64::INFINITY] {
-        assert_eq!(time((0xd3, gps(wrong, 2))), Stamp::Arrival);
+        assert_eq!(time((0xd3, gps(wrong, 2))), ReadingStamp::Arrival);
     }
-    assert_eq!(time((0xd3, gps(1.0, u16::MAX))), Stamp::Arrival);
-    assert_eq!(time((0xd5, u64::MAX.to_be_bytes().to_vec())), Stamp::Arrival);
+    assert_eq!(time((0xd3, gps(1.0, u16::MAX))), ReadingStamp::Arrival);
+    assert_eq!(time((0xd5, u64::MAX.to_be_bytes().to_vec())), ReadingStamp::Arrival);
 }
 
 #[test]
@@ -185,8 +227,8 @@ fn a_unit_that_begins_anew_restarts_the_map() {
     let still = |ns: u64| {
         let fields = [
             (0xd5, ns.to_be_bytes().to_vec()),
-            (0x04, be(&[0.0, 0.0, -1.0])),
-            (0x05, be(&[0.0, 0.0, ns as f64 * 1e-12])),
+            (0x04, be([0.0, 0.0, -1.0])),
+            (0x05, be([0.0, 0.0, ns as f64 * 1e-12])),
         ];
         mip_packet(0x80, &fields)
     };
@@ -195,9 +237,9 @@ fn a_unit_that_begins_anew_restarts_the_map() {
     for n in 0..400u64 {
         let ns = if n < 200 { 60_000_000_000 + n * 5_000_000 } else { (n - 200) * 5_000_000 };
         let arrival = Time::from_ns(n as i64 * 5_000_000);
-        decoder.push(&still(ns), arrival, |s| {
+        for s in decoder.samples(&still(ns), arrival) {
             map.observe(s.device_time_ns, s.arrival);
-        });
+        }
     }
     assert_eq!((map.restarts(), decoder.counters().samples), (1, 400));
 }
@@ -215,6 +257,6 @@ proptest! {
         bytes.extend([a, b]);
         let (packets, counters) = parse(&bytes);
         prop_assert_eq!((packets.len(), counters.packets), (1, 1));
-        Unit::default().reading(&packets[0]);
+        MicroStrainCodec::default().convert(&packets[0]);
     }
 }

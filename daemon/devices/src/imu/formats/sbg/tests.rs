@@ -1,24 +1,65 @@
-use bowwave_core::{estimate::clock::ClockMap, time::Time};
-use glam::DVec3;
+use bowwave_core::{estimate::clock::ClockMap, event::ImuSample, time::Time};
+use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 
 use super::*;
 use crate::{
     framing::{LineCounters, Scanner},
-    imu::{ImuDecoder, ImuFormat, streams::sbg_frame},
+    imu::{
+        ImuDecoder, ImuFormat,
+        streams::{Simulated, SimulatedUnit, Tolerance, le, ned, world_of, wxyz, yaw_pitch_roll},
+    },
 };
 
-fn parse(stream: &[u8]) -> (Vec<Log>, LineCounters) {
-    let mut scanner = Scanner::<Ecom>::new();
+impl SimulatedUnit for SbgCodec {
+    const SENDS: Simulated = Simulated {
+        period_ns: 5_000_000,
+        packets: 2,
+        // An attitude of its own log is carried over one period.
+        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 2e-6, time_ns: 0 },
+    };
+
+    fn send(s: &ImuSample, _: i64, by_angles: bool) -> Vec<u8> {
+        let world = world_of(s);
+        let time = ((s.device_time_ns / 1000) as u32).to_le_bytes();
+        let motion =
+            [&time[..], &[0xff, 0x01], &le(s.accel.to_array()), &le(s.rate.to_array()), &le([0.0; 7])]
+                .concat();
+        let (log, numbers) = if by_angles {
+            let [yaw, pitch, roll] = yaw_pitch_roll(ned(world));
+            (6, le([roll, pitch, yaw]))
+        } else {
+            (7, le(wxyz(DQuat::from_mat3(&ned(world)))))
+        };
+        let attitude = [&time[..], &numbers, &le([0.01; 3]), &[0x32, 0, 0, 0]].concat();
+        [sbg_frame(3, &motion), sbg_frame(log, &attitude)].concat()
+    }
+}
+
+/// A frame of SBG's own logs.
+pub(crate) fn sbg_frame(message: u8, data: &[u8]) -> Vec<u8> {
+    let mut body = vec![message, 0];
+    body.extend((data.len() as u16).to_le_bytes());
+    body.extend(data);
+    let crc = body.iter().fold(0u16, |crc, &byte| {
+        (0..8).fold(crc ^ u16::from(byte), |c, _| if c & 1 == 1 { (c >> 1) ^ 0x8408 } else { c >> 1 })
+    });
+    [&[0xff, 0x5a][..], &body, &crc.to_le_bytes(), &[0x33]].concat()
+}
+
+fn parse(mut stream: &[u8]) -> (Vec<SbgLog>, LineCounters) {
+    let mut scanner = Scanner::<SbgCodec>::new();
     let mut logs = Vec::new();
-    scanner.push(stream, |found| logs.extend(Log::parse(found.bytes, found.head)));
+    while let Some(found) = scanner.next_of(&mut stream) {
+        logs.extend(SbgLog::parse(found.bytes, found.head));
+    }
     (logs, scanner.counters())
 }
 
 /// Check value of CRC-16/KERMIT in the CRC catalogue of Greg Cook.
 #[test]
 fn the_check_sum_matches_the_catalogue() {
-    assert_eq!(crc16(b"123456789"), 0x2189);
+    assert_eq!(CRC.checksum(b"123456789"), 0x2189);
 }
 
 fn f32s(values: &[f32]) -> Vec<u8> {
@@ -63,24 +104,24 @@ fn logs_are_read_by_the_manuals_tables() {
     ];
     let (logs, counters) = parse(&stream.concat());
     assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (8, 0, 0));
-    let motion = |time_us, accel, rate| Log::Motion { time_us, accel, rate };
+    let motion = |time_us, accel, rate| SbgLog::Motion { time_us, accel, rate };
     assert_eq!(
         logs,
         [
             motion(7, [1.0, 2.0, -9.5], [0.25, -0.5, 4.0]),
             motion(9, [1.0, 0.0, -9.0], [1.0, -0.5, 0.0]),
             motion(9, [0.0; 3], [1.0, 0.0, 0.0]),
-            Log::Euler { time_us: 8, roll_pitch_yaw: [0.5, 0.25, -1.0] },
-            Log::Quaternion { time_us: 9, wxyz: [1.0, 0.0, 0.0, 0.0] },
+            SbgLog::Euler { time_us: 8, roll_pitch_yaw: [0.5, 0.25, -1.0] },
+            SbgLog::Quaternion { time_us: 9, wxyz: [1.0, 0.0, 0.0, 0.0] },
         ]
     );
 }
 
 #[test]
 fn axes_and_the_choice_of_attitude() {
-    let mut unit = Unit::default();
+    let mut unit = SbgCodec::default();
     let mut attitude =
-        |frame: &[u8]| unit.reading(&parse(frame).0[0]).map(|r| r.world_from_imu.expect("given"));
+        |frame: &[u8]| unit.convert(&parse(frame).0[0]).map(|r| r.world_from_imu.expect("given"));
     let east = std::f32::consts::FRAC_PI_2;
     let angles = attitude(&euler(1, [0.0, 0.0, east], 2)).expect("angles alone");
     assert!((angles * DVec3::X).abs_diff_eq(DVec3::X, 1e-6), "yaw of 90 degrees looks east");
@@ -102,10 +143,10 @@ fn the_clock_goes_on_where_it_wraps_and_back_where_the_unit_begins_anew() {
         let time_us =
             if n < 1_500 { (u32::MAX - 999_999).wrapping_add(n * 5_000) } else { (n - 1_500) * 5_000 };
         let arrival = Time::from_ns(i64::from(n) * 5_000_000);
-        decoder.push(&imu_data(time_us, [0.0, 0.0, -9.8], [0.0, 0.0, n as f32]), arrival, |s| {
+        for s in decoder.samples(&imu_data(time_us, [0.0, 0.0, -9.8], [0.0, 0.0, n as f32]), arrival) {
             map.observe(s.device_time_ns, arrival);
             times.push(s.device_time_ns);
-        });
+        }
         assert_eq!(map.restarts(), u32::from(n >= 1_500), "frame {n}");
     }
     assert!(times[..1_500].windows(2).all(|w| w[1] - w[0] == 5_000_000));
@@ -122,7 +163,7 @@ fn lengths_beyond_the_protocol_are_refused_and_long_ones_hold_nothing_back() {
     }
     let longest = sbg_frame(3, &[0; 4_086]);
     assert_eq!(parse(&longest).1.packets, 1);
-    assert_eq!(longest.len(), Ecom::MAX_BYTES);
+    assert_eq!(longest.len(), SbgCodec::MAX_BYTES);
     let mut unended = imu_data(1, [0.0; 3], [0.0; 3]);
     if let Some(end) = unended.last_mut() {
         *end = 0x34;
@@ -136,7 +177,7 @@ proptest! {
         let (logs, counters) = parse(&sbg_frame(message, &data));
         prop_assert_eq!(counters.packets, 1);
         for log in logs {
-            Unit::default().reading(&log);
+            SbgCodec::default().convert(&log);
         }
     }
 }

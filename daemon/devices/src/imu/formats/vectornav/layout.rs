@@ -24,26 +24,26 @@ const FIELD_BYTES: [[u8; 16]; GROUPS] = [
 
 /// The fields of a packet, as its header states them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Layout {
+pub struct PacketLayout {
     masks: [u16; GROUPS],
     header_bytes: usize,
     packet_bytes: usize,
 }
 
-/// What the first bytes after a sync byte turned out to be.
+/// Reading of the first bytes after a sync byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Header {
+pub enum PacketHeader {
     /// More bytes are needed to tell.
     Incomplete,
     /// No header that a unit sends.
     Invalid,
     /// A header.
-    Valid(Layout),
+    Valid(PacketLayout),
 }
 
 /// One field's place in a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Field {
+pub struct PacketField {
     /// Group, 1 to 7.
     pub group: usize,
     /// Bit in the group's mask.
@@ -54,13 +54,15 @@ pub struct Field {
     pub bytes: usize,
 }
 
-impl Layout {
+impl PacketLayout {
     /// Reads the header at the start of `bytes` (sync byte included).
-    pub fn parse(bytes: &[u8]) -> Header {
-        let (Some(&sync), Some(&groups)) = (bytes.first(), bytes.get(1)) else { return Header::Incomplete };
+    pub fn parse(bytes: &[u8]) -> PacketHeader {
+        let (Some(&sync), Some(&groups)) = (bytes.first(), bytes.get(1)) else {
+            return PacketHeader::Incomplete;
+        };
         // Bit 7 announces a second group byte, which no supported unit sends.
         if sync != SYNC || groups == 0 || groups & 0x80 != 0 {
-            return Header::Invalid;
+            return PacketHeader::Invalid;
         }
         let mut masks = [0; GROUPS];
         let mut header_bytes = 2;
@@ -70,20 +72,20 @@ impl Layout {
                 continue;
             }
             let Some(&[low, high]) = bytes.get(header_bytes..header_bytes + 2) else {
-                return Header::Incomplete;
+                return PacketHeader::Incomplete;
             };
             *mask = u16::from_le_bytes([low, high]);
             header_bytes += 2;
             match group_bytes(group, *mask) {
                 Some(bytes) => payload_bytes += bytes,
-                None => return Header::Invalid,
+                None => return PacketHeader::Invalid,
             }
         }
         let packet_bytes = header_bytes + payload_bytes + 2;
         if packet_bytes > MAX_PACKET {
-            return Header::Invalid;
+            return PacketHeader::Invalid;
         }
-        Header::Valid(Self { masks, header_bytes, packet_bytes })
+        PacketHeader::Valid(Self { masks, header_bytes, packet_bytes })
     }
 
     /// Length of the whole packet, sync byte and CRC included.
@@ -92,7 +94,7 @@ impl Layout {
     }
 
     /// The packet's fields in the order of the wire.
-    pub fn fields(&self) -> impl Iterator<Item = Field> + '_ {
+    pub fn fields(&self) -> impl Iterator<Item = PacketField> + '_ {
         let mut offset = self.header_bytes;
         (0..GROUPS * 16).filter_map(move |i| {
             let (group, bit) = (i / 16, i % 16);
@@ -100,7 +102,7 @@ impl Layout {
                 return None;
             }
             let bytes = usize::from(FIELD_BYTES[group][bit]);
-            let field = Field { group: group + 1, bit, offset, bytes };
+            let field = PacketField { group: group + 1, bit, offset, bytes };
             offset += bytes;
             Some(field)
         })
@@ -125,7 +127,7 @@ mod tests {
     /// The header that the wave logger of the recorded stream documents, and its stated length of 124 bytes.
     #[test]
     fn length_of_a_documented_header() {
-        let Header::Valid(layout) = Layout::parse(&[0xfa, 0x14, 0x3e, 0x00, 0x3a, 0x00]) else {
+        let PacketHeader::Valid(layout) = PacketLayout::parse(&[0xfa, 0x14, 0x3e, 0x00, 0x3a, 0x00]) else {
             panic!("a valid header")
         };
         assert_eq!(layout.packet_bytes(), 124);
@@ -148,10 +150,10 @@ mod tests {
 
     #[test]
     fn cut_headers_wait_and_impossible_ones_are_refused() {
-        assert_eq!(Layout::parse(&[0xfa]), Header::Incomplete);
-        assert_eq!(Layout::parse(&[0xfa, 0x01, 0x08]), Header::Incomplete);
+        assert_eq!(PacketLayout::parse(&[0xfa]), PacketHeader::Incomplete);
+        assert_eq!(PacketLayout::parse(&[0xfa, 0x01, 0x08]), PacketHeader::Incomplete);
         assert!(
-            matches!(Layout::parse(&[0xfa, 0x01, 0x08, 0x00]), Header::Valid(l) if l.packet_bytes() == 18)
+            matches!(PacketLayout::parse(&[0xfa, 0x01, 0x08, 0x00]), PacketHeader::Valid(l) if l.packet_bytes() == 18)
         );
         for invalid in [
             &[0x24, 0x01, 0x08, 0x00][..],
@@ -161,9 +163,13 @@ mod tests {
             &[0xfa, 0x01, 0x00, 0x80],
             &[0xfa, 0x08, 0x00, 0x40],
         ] {
-            assert_eq!(Layout::parse(invalid), Header::Invalid, "{invalid:02x?}");
+            assert_eq!(PacketLayout::parse(invalid), PacketHeader::Invalid, "{invalid:02x?}");
         }
         let everything = [0xfa, 0x3f, 0xff, 0x7f, 0xff, 0x03, 0xff, 0x1f, 0xff, 0x3f, 0xff, 0x1f, 0xff, 0x1f];
-        assert_eq!(Layout::parse(&everything), Header::Invalid, "1039 bytes exceed what a unit sends");
+        assert_eq!(
+            PacketLayout::parse(&everything),
+            PacketHeader::Invalid,
+            "1039 bytes exceed what a unit sends"
+        );
     }
 }

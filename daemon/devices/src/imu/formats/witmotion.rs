@@ -7,49 +7,44 @@
 
 use glam::{DQuat, DVec3};
 
+use super::{ImuCodec, PATIENCE_PARTS};
 use crate::{
-    framing::{Framing, Look},
+    framing::{Found, Framing, Look, byte_sum},
     imu::{
         axes::{G, SWAP, from_yaw_pitch_roll, unit},
-        reading::{Reading, Stamp},
+        reading::{Reading, ReadingStamp},
     },
 };
 
 /// Bytes of a packet.
 const PACKET_BYTES: usize = 11;
 
-/// The framing of the standard protocol.
-#[derive(Debug)]
-pub(crate) struct Standard;
-
 /// A packet's kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Kind(u8);
+pub(crate) struct WitmotionKind(u8);
 
-impl Framing for Standard {
-    type Head = Kind;
+impl Framing for WitmotionCodec {
+    type Head = WitmotionKind;
     const SYNC: u8 = 0x55;
     const MAX_BYTES: usize = PACKET_BYTES;
     const WEAK: bool = true;
 
-    fn look(bytes: &[u8]) -> Look<Kind> {
+    fn look(bytes: &[u8]) -> Look<WitmotionKind> {
         match bytes.get(1) {
             None => Look::Incomplete,
-            Some(&kind @ 0x50..=0x5a) => Look::Packet { head: Kind(kind), bytes: PACKET_BYTES },
+            Some(&kind @ 0x50..=0x5a) => Look::Packet { head: WitmotionKind(kind), bytes: PACKET_BYTES },
             Some(_) => Look::Invalid,
         }
     }
 
     fn intact(packet: &[u8]) -> bool {
-        packet
-            .split_last()
-            .is_some_and(|(&sum, body)| body.iter().fold(0u8, |sum, &b| sum.wrapping_add(b)) == sum)
+        packet.split_last().is_some_and(|(&sum, body)| byte_sum(body) == sum)
     }
 }
 
 /// A packet in the unit's own units and axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Packet {
+pub(crate) enum WitmotionPacket {
     /// Specific force, g.
     Accel([f64; 3]),
     /// Angular rate, degrees a second.
@@ -62,9 +57,9 @@ pub(crate) enum Packet {
     Other,
 }
 
-impl Packet {
+impl WitmotionPacket {
     /// Reads a whole packet.
-    pub(crate) fn parse(packet: &[u8], kind: Kind) -> Option<Self> {
+    pub(crate) fn parse(packet: &[u8], kind: WitmotionKind) -> Option<Self> {
         let (words, _) = packet.get(2..10)?.as_chunks::<2>();
         let shares: [f64; 4] = words.first_chunk::<4>()?.map(|w| f64::from(i16::from_le_bytes(w)) / 32_768.0);
         let [x, y, z, _] = shares;
@@ -78,9 +73,9 @@ impl Packet {
     }
 }
 
-/// The measurement that is being put together, and which packet of it comes last.
+/// The standard protocol: the measurement that is being put together, and which packet of it comes last.
 #[derive(Debug, Default)]
-pub(crate) struct Unit {
+pub(crate) struct WitmotionCodec {
     accel: Option<DVec3>,
     rate: Option<DVec3>,
     attitude: Option<DQuat>,
@@ -91,31 +86,52 @@ pub(crate) struct Unit {
     seen_angles: bool,
 }
 
-impl Unit {
-    /// What the packet completes, in our axes: right, forward, up become forward, right, down. Angles of a unit that sends
+impl ImuCodec for WitmotionCodec {
+    const KEY: &'static str = "witmotion";
+    const NAME: &'static str = "Witmotion";
+    const REMEDY: &'static str = "switch acceleration, rate and quaternion on in its output content";
+    const PROOF_PACKETS: usize = 6;
+    const PATIENCE: u32 = PATIENCE_PARTS;
+
+    fn reading(&mut self, packet: &Found<'_, WitmotionKind>) -> Option<Reading> {
+        self.take(&WitmotionPacket::parse(packet.bytes, packet.head)?)
+    }
+
+    /// Kind and data.
+    fn wrap(content: &[u8]) -> Vec<u8> {
+        let mut bytes = [&[0x55], content].concat();
+        bytes.resize(PACKET_BYTES - 1, 0);
+        bytes[1] = 0x50 + bytes[1] % 11;
+        bytes.push(byte_sum(&bytes));
+        bytes
+    }
+}
+
+impl WitmotionCodec {
+    /// The measurement that the packet completes, in our axes: right, forward, up become forward, right, down. Angles of a unit that sends
     /// quaternions as well are left aside.
-    pub(crate) fn reading(&mut self, packet: &Packet) -> Option<Reading> {
+    fn take(&mut self, packet: &WitmotionPacket) -> Option<Reading> {
         let body = |v: [f64; 3], scale: f64| SWAP * (DVec3::from_array(v) * scale);
         match *packet {
-            Packet::Accel(v) => {
+            WitmotionPacket::Accel(v) => {
                 // The first of a group. Where the one before had no attitude, that is no longer waited for.
                 (self.quaternions, self.angles) = (self.seen_quaternion, self.seen_angles);
                 (self.seen_quaternion, self.seen_angles) = (false, false);
                 (self.accel, self.rate, self.attitude) = (Some(body(v, G)), None, None);
             }
-            Packet::Rate(v) => self.rate = Some(body(v, 1f64.to_radians())),
-            Packet::Angles([roll, pitch, yaw]) => {
+            WitmotionPacket::Rate(v) => self.rate = Some(body(v, 1f64.to_radians())),
+            WitmotionPacket::Angles([roll, pitch, yaw]) => {
                 self.seen_angles = true;
                 if !self.quaternions {
                     let angles = [yaw, pitch, roll].map(f64::to_radians);
                     self.attitude = Some(from_yaw_pitch_roll(angles) * SWAP);
                 }
             }
-            Packet::Quaternion([w, x, y, z]) => {
+            WitmotionPacket::Quaternion([w, x, y, z]) => {
                 self.seen_quaternion = true;
                 self.attitude = Some(unit(DQuat::from_xyzw(x, y, z, w)) * SWAP);
             }
-            Packet::Other => return None,
+            WitmotionPacket::Other => return None,
         }
         let waits = self.attitude.is_none() && (self.quaternions || self.angles);
         if waits || self.accel.is_none() || (self.rate.is_none() && self.attitude.is_none()) {
@@ -126,11 +142,10 @@ impl Unit {
             rate: self.rate.take(),
             accel: self.accel.take(),
             world_from_imu: self.attitude.take(),
-            ..Reading::at(Stamp::Arrival)
+            ..Reading::at(ReadingStamp::Arrival)
         })
     }
 }
 
 #[cfg(test)]
-#[path = "witmotion_tests.rs"]
 mod tests;

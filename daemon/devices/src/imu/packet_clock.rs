@@ -17,7 +17,7 @@ const ASTRAY_NS: f64 = 250e6;
 /// from 0 at the first packet. It never runs backward, and follows arrivals over gaps: a unit without a clock cannot tell
 /// that it began anew.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SteadyClock {
+pub(crate) struct PacketClock {
     /// Between these the period may be, nanoseconds.
     range_ns: (f64, f64),
     origin: Option<Time>,
@@ -26,7 +26,7 @@ pub(crate) struct SteadyClock {
     packets: u32,
 }
 
-impl SteadyClock {
+impl PacketClock {
     /// A clock whose packets come every `nominal_ns`; `None`: that is to be found out.
     pub(crate) fn new(nominal_ns: Option<u32>) -> Self {
         let range = |ns| (f64::from(ns) * (1.0 - PULL), f64::from(ns) * (1.0 + PULL));
@@ -78,7 +78,7 @@ mod tests {
 
     /// Largest error of the mapped time after `settle` packets, milliseconds, its mean taken off, of a unit whose period is
     /// `period_ns`, read in batches of `batch_ns`.
-    fn worst_ms(clock: &mut SteadyClock, period_ns: i64, batch_ns: i64, packets: i64, settle: i64) -> f64 {
+    fn worst_ms(clock: &mut PacketClock, period_ns: i64, batch_ns: i64, packets: i64, settle: i64) -> f64 {
         let mut map = ClockMap::new();
         let mut errors = Vec::new();
         for n in 0..packets {
@@ -98,10 +98,10 @@ mod tests {
     /// slope for an outlier and drift by 30 ms a second.
     #[test]
     fn a_unit_far_from_its_nominal_rate_is_followed() {
-        let mut clock = SteadyClock::new(Some(10 * MS as u32));
+        let mut clock = PacketClock::new(Some(10 * MS as u32));
         let worst = worst_ms(&mut clock, 10_300_000, 16 * MS, 20_000, 100);
         assert!(worst < 3.0, "{worst} ms");
-        let mut even = SteadyClock::new(Some(10 * MS as u32));
+        let mut even = PacketClock::new(Some(10 * MS as u32));
         let worst = worst_ms(&mut even, 10 * MS, MS, 20_000, 1_000);
         assert!(worst < 0.2, "{worst} ms");
     }
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn an_unknown_rate_is_learned() {
         for period_ns in [1_000_000, 2_500_000, 25_000_000, 100_000_000] {
-            let mut clock = SteadyClock::new(None);
+            let mut clock = PacketClock::new(None);
             let worst = worst_ms(&mut clock, period_ns, MS, 10_000, 1_000);
             assert!(worst < 1.0, "{worst} ms at {period_ns} ns");
         }
@@ -117,7 +117,7 @@ mod tests {
 
     #[test]
     fn time_goes_on_over_gaps_and_never_back() {
-        let mut clock = SteadyClock::new(Some(10 * MS as u32));
+        let mut clock = PacketClock::new(Some(10 * MS as u32));
         let mut last = -1;
         let mut arrival = 0;
         for n in 0..5_000i64 {

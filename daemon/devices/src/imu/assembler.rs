@@ -6,8 +6,8 @@ use bowwave_core::{event::ImuSample, geometry::rotation_vector, time::Time};
 use glam::{DQuat, DVec3};
 
 use super::{
-    reading::{Fields, Reading, Stamp},
-    steady::SteadyClock,
+    packet_clock::PacketClock,
+    reading::{Fields, Reading, ReadingStamp},
 };
 
 /// Rates kept to carry an attitude forward.
@@ -16,9 +16,10 @@ const RATES: usize = 64;
 const CARRY_NS: i64 = 250_000_000;
 /// Attitudes so far apart give a rate, nanoseconds: nearer ones only noise, farther ones a mean that says nothing.
 const RATE_NS: std::ops::RangeInclusive<i64> = 500_000..=250_000_000;
-/// What became of a packet.
+
+/// Outcome of a packet.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Outcome {
+pub(crate) enum Assembled {
     /// It completed a sample.
     Sample(ImuSample),
     /// It is part of one, or about something else.
@@ -29,8 +30,8 @@ pub(crate) enum Outcome {
 
 /// Makes samples of a unit's readings.
 #[derive(Debug)]
-pub(crate) struct Finisher {
-    clock: SteadyClock,
+pub(crate) struct SampleAssembler {
+    clock: PacketClock,
     count: Option<i64>,
     fields: Fields,
     /// The newest attitude and its time.
@@ -42,13 +43,13 @@ pub(crate) struct Finisher {
     without_sample: u32,
 }
 
-impl Finisher {
+impl SampleAssembler {
     /// For a unit that has sent nothing. `period_ns`: of a unit without a clock, where the format fixes it. `patience`: so
     /// many packets may come that complete no sample; with more the unit's output must lack something.
     pub(crate) fn new(period_ns: Option<u32>, patience: u32) -> Self {
         Self {
             patience,
-            clock: SteadyClock::new(period_ns),
+            clock: PacketClock::new(period_ns),
             count: None,
             fields: Fields::default(),
             attitude: None,
@@ -64,15 +65,15 @@ impl Finisher {
     }
 
     /// Takes in what a packet that arrived at `arrival` says; `None`: nothing that is used.
-    pub(crate) fn take(&mut self, reading: Option<Reading>, arrival: Time) -> Outcome {
+    pub(crate) fn take(&mut self, reading: Option<Reading>, arrival: Time) -> Assembled {
         match reading.and_then(|r| self.sample(&r, arrival)) {
             Some(sample) => {
                 self.without_sample = 0;
-                Outcome::Sample(sample)
+                Assembled::Sample(sample)
             }
             None => {
                 self.without_sample = self.without_sample.saturating_add(1);
-                if self.without_sample > self.patience { Outcome::Unusable } else { Outcome::Other }
+                if self.without_sample > self.patience { Assembled::Unusable } else { Assembled::Other }
             }
         }
     }
@@ -83,9 +84,9 @@ impl Finisher {
         if !whole {
             if let (Some(attitude), None, None) = (reading.world_from_imu, reading.rate, reading.accel) {
                 let time_ns = match reading.stamp {
-                    Stamp::Device { ns } => Some(ns),
+                    ReadingStamp::Device { ns } => Some(ns),
                     // It belongs to the sample before it.
-                    Stamp::Count { .. } | Stamp::Arrival => self.last_ns,
+                    ReadingStamp::Count { .. } | ReadingStamp::Arrival => self.last_ns,
                 };
                 if let Some(time_ns) = time_ns {
                     self.keep_attitude(time_ns, attitude);
@@ -120,14 +121,14 @@ impl Finisher {
         Some(ImuSample { arrival, device_time_ns, rate, accel: reading.accel?, world_from_imu })
     }
 
-    fn time(&mut self, stamp: Stamp, arrival: Time) -> i64 {
+    fn time(&mut self, stamp: ReadingStamp, arrival: Time) -> i64 {
         match stamp {
-            Stamp::Device { ns } => ns,
-            Stamp::Count { n } => {
+            ReadingStamp::Device { ns } => ns,
+            ReadingStamp::Count { n } => {
                 let ticks = self.count.replace(n).map_or(1, |last| n.saturating_sub(last));
                 self.clock.tick(ticks, arrival)
             }
-            Stamp::Arrival => self.clock.tick(1, arrival),
+            ReadingStamp::Arrival => self.clock.tick(1, arrival),
         }
     }
 
@@ -194,8 +195,8 @@ mod tests {
         DVec3::Z * 1.6 * (2.0 * t_s).cos()
     }
 
-    fn at(ms: i64) -> Stamp {
-        Stamp::Device { ns: ms * MS }
+    fn at(ms: i64) -> ReadingStamp {
+        ReadingStamp::Device { ns: ms * MS }
     }
 
     fn motion(ms: i64) -> Reading {
@@ -209,22 +210,22 @@ mod tests {
     /// Rates at 200 Hz and attitudes at 20 Hz that come 12 ms late: every sample has the attitude of its own time.
     #[test]
     fn an_attitude_of_its_own_packet_is_carried_to_the_samples() {
-        let mut finisher = Finisher::new(None, 16);
+        let mut assembler = SampleAssembler::new(None, 16);
         let mut worst: f64 = 0.0;
         for ms in (0..20_000).step_by(5) {
-            let outcome = finisher.take(Some(motion(ms)), Time::from_ns(ms * MS));
-            let Outcome::Sample(sample) = outcome else { panic!("{outcome:?}") };
+            let outcome = assembler.take(Some(motion(ms)), Time::from_ns(ms * MS));
+            let Assembled::Sample(sample) = outcome else { panic!("{outcome:?}") };
             if ms > 100 {
                 let got = sample.world_from_imu.expect("carried");
                 worst = worst.max(got.angle_between(turned(ms as f64 * 1e-3)));
             }
             if ms % 50 == 15 {
-                assert_eq!(finisher.take(Some(attitude(ms - 12)), Time::from_ns(ms * MS)), Outcome::Other);
+                assert_eq!(assembler.take(Some(attitude(ms - 12)), Time::from_ns(ms * MS)), Assembled::Other);
             }
         }
         assert!(worst < 2e-5, "{worst} rad");
         // The attitude stays away: nothing is carried for ever.
-        let Outcome::Sample(sample) = finisher.take(Some(motion(20_300)), Time::MIN) else {
+        let Assembled::Sample(sample) = assembler.take(Some(motion(20_300)), Time::MIN) else {
             panic!("a sample")
         };
         assert_eq!(sample.world_from_imu, None);
@@ -232,35 +233,35 @@ mod tests {
 
     #[test]
     fn a_unit_without_a_gyro_has_the_rate_of_its_attitudes() {
-        let mut finisher = Finisher::new(None, 16);
+        let mut assembler = SampleAssembler::new(None, 16);
         for ms in (0..3_000).step_by(10) {
             let mut reading = Reading { accel: Some(DVec3::NEG_Z), ..attitude(ms) };
             if ms % 30 == 0 {
                 reading.world_from_imu = reading.world_from_imu.map(|q| -q);
             }
-            match finisher.take(Some(reading), Time::from_ns(ms * MS)) {
-                Outcome::Sample(sample) => {
+            match assembler.take(Some(reading), Time::from_ns(ms * MS)) {
+                Assembled::Sample(sample) => {
                     let middle_s = (ms as f64 - 5.0) * 1e-3;
                     assert!(sample.rate.abs_diff_eq(rate(middle_s), 1e-3), "{} at {ms} ms", sample.rate);
                 }
-                other => assert_eq!((other, ms), (Outcome::Other, 0)),
+                other => assert_eq!((other, ms), (Assembled::Other, 0)),
             }
         }
         // A gap has no rate, and the next attitude has one again.
         let late = Reading { accel: Some(DVec3::NEG_Z), ..attitude(9_000) };
-        assert_eq!(finisher.take(Some(late), Time::MIN), Outcome::Other);
+        assert_eq!(assembler.take(Some(late), Time::MIN), Assembled::Other);
         let next = Reading { accel: Some(DVec3::NEG_Z), ..attitude(9_010) };
-        assert!(matches!(finisher.take(Some(next), Time::MIN), Outcome::Sample(_)));
+        assert!(matches!(assembler.take(Some(next), Time::MIN), Assembled::Sample(_)));
     }
 
     #[test]
     fn a_unit_that_begins_anew_carries_nothing_over() {
-        let mut finisher = Finisher::new(None, 16);
+        let mut assembler = SampleAssembler::new(None, 16);
         for ms in (60_000..60_200).step_by(5) {
-            finisher.take(Some(motion(ms)), Time::from_ns(ms * MS));
-            finisher.take(Some(attitude(ms)), Time::from_ns(ms * MS));
+            assembler.take(Some(motion(ms)), Time::from_ns(ms * MS));
+            assembler.take(Some(attitude(ms)), Time::from_ns(ms * MS));
         }
-        let Outcome::Sample(sample) = finisher.take(Some(motion(3)), Time::from_ns(61_000 * MS)) else {
+        let Assembled::Sample(sample) = assembler.take(Some(motion(3)), Time::from_ns(61_000 * MS)) else {
             panic!("a sample")
         };
         assert_eq!((sample.device_time_ns, sample.world_from_imu), (3 * MS, None));
@@ -268,11 +269,11 @@ mod tests {
 
     #[test]
     fn packets_that_never_become_a_sample_are_unusable() {
-        let mut finisher = Finisher::new(None, 16);
+        let mut assembler = SampleAssembler::new(None, 16);
         let outcomes: Vec<_> =
-            (0..100).map(|ms| finisher.take(Some(attitude(ms * 5)), Time::from_ns(ms))).collect();
-        assert!(outcomes[..16].iter().all(|o| *o == Outcome::Other));
-        assert!(outcomes[16..].iter().all(|o| *o == Outcome::Unusable));
-        assert_eq!(finisher.fields().missing(), ["acceleration"]);
+            (0..100).map(|ms| assembler.take(Some(attitude(ms * 5)), Time::from_ns(ms))).collect();
+        assert!(outcomes[..16].iter().all(|o| *o == Assembled::Other));
+        assert!(outcomes[16..].iter().all(|o| *o == Assembled::Unusable));
+        assert_eq!(assembler.fields().missing(), ["acceleration"]);
     }
 }

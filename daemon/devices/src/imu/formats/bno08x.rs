@@ -9,25 +9,26 @@
 
 use glam::{DQuat, DVec3};
 
+use super::ImuCodec;
 use crate::{
-    framing::{Framing, Look},
+    framing::{Found, Framing, Look, byte_sum},
     imu::{
         axes::{G, SWAP},
-        reading::{Reading, Stamp},
-        wrap::Unwrap,
+        reading::{Reading, ReadingStamp},
+        unwrap::Unwrap,
     },
 };
 
 /// Bytes of a packet.
-pub(crate) const PACKET_BYTES: usize = 19;
-/// Nanoseconds from one packet to the next, nominally.
-pub(crate) const PERIOD_NS: u32 = 10_000_000;
+const PACKET_BYTES: usize = 19;
 
-/// The framing of UART-RVC.
-#[derive(Debug)]
-pub(crate) struct Rvc;
+/// UART-RVC, and the count of its packets.
+#[derive(Debug, Default)]
+pub(crate) struct Bno08xCodec {
+    index: Unwrap<8>,
+}
 
-impl Framing for Rvc {
+impl Framing for Bno08xCodec {
     type Head = ();
     const SYNC: u8 = 0xaa;
     const MAX_BYTES: usize = PACKET_BYTES;
@@ -44,9 +45,9 @@ impl Framing for Rvc {
     /// The byte sum, and angles within their ranges: eight bits alone are little.
     fn intact(packet: &[u8]) -> bool {
         let Some((&sum, body)) = packet.split_last() else { return false };
-        let right = body.iter().skip(2).fold(0u8, |sum, &b| sum.wrapping_add(b)) == sum;
+        let right = body.get(2..).map(byte_sum) == Some(sum);
         right
-            && Packet::parse(packet).is_some_and(|p| {
+            && Bno08xPacket::parse(packet).is_some_and(|p| {
                 let [yaw, pitch, roll] = p.yaw_pitch_roll_deg.map(f64::abs);
                 yaw <= 180.0 && pitch <= 90.0 && roll <= 180.0
             })
@@ -55,7 +56,7 @@ impl Framing for Rvc {
 
 /// A packet in the unit's own units and axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Packet {
+pub(crate) struct Bno08xPacket {
     /// Counts packets.
     pub(crate) index: u8,
     /// Yaw, pitch and roll, degrees.
@@ -64,7 +65,7 @@ pub(crate) struct Packet {
     pub(crate) accel_g: [f64; 3],
 }
 
-impl Packet {
+impl Bno08xPacket {
     /// Reads a whole packet.
     pub(crate) fn parse(packet: &[u8]) -> Option<Self> {
         let &index = packet.get(2)?;
@@ -79,26 +80,37 @@ impl Packet {
     }
 }
 
-/// What is remembered between packets.
-#[derive(Debug, Default)]
-pub(crate) struct Unit {
-    index: Unwrap<8>,
+impl ImuCodec for Bno08xCodec {
+    const KEY: &'static str = "bno08x-rvc";
+    const NAME: &'static str = "BNO08x UART-RVC";
+    const REMEDY: &'static str = "power-cycle it";
+    const PROOF_PACKETS: usize = 5;
+    const PERIOD_NS: Option<u32> = Some(10_000_000);
+
+    fn reading(&mut self, packet: &Found<'_, ()>) -> Option<Reading> {
+        Some(self.convert(&Bno08xPacket::parse(packet.bytes)?))
+    }
+
+    fn wrap(content: &[u8]) -> Vec<u8> {
+        let mut body = content.to_vec();
+        body.resize(PACKET_BYTES - 3, 0);
+        [&[0xaa, 0xaa], &body[..], &[byte_sum(&body)]].concat()
+    }
 }
 
-impl Unit {
-    /// In our axes: right, forward, up become forward, right, down. Where yaw is zero the unit is taken to face north.
-    pub(crate) fn reading(&mut self, packet: &Packet) -> Reading {
+impl Bno08xCodec {
+    /// A packet in our axes: right, forward, up become forward, right, down. Where yaw is zero the unit is taken to face north.
+    fn convert(&mut self, packet: &Bno08xPacket) -> Reading {
         let [yaw, pitch, roll] = packet.yaw_pitch_roll_deg.map(f64::to_radians);
         let world_from_unit =
             DQuat::from_rotation_z(yaw) * DQuat::from_rotation_x(pitch) * DQuat::from_rotation_y(roll);
         Reading {
             accel: Some(SWAP * (DVec3::from_array(packet.accel_g) * G)),
             world_from_imu: Some(world_from_unit * SWAP),
-            ..Reading::at(Stamp::Count { n: self.index.next(u64::from(packet.index)) })
+            ..Reading::at(ReadingStamp::Count { n: self.index.next(u64::from(packet.index)) })
         }
     }
 }
 
 #[cfg(test)]
-#[path = "bno08x_tests.rs"]
 mod tests;

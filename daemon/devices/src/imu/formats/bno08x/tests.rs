@@ -8,14 +8,44 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{encode, truth},
+        streams::{G, POLE, Simulated, SimulatedUnit, Tolerance, encode, i16s, rfu, truth, world_of},
     },
 };
 
-fn parse(stream: &[u8]) -> Vec<Packet> {
-    let mut scanner = Scanner::<Rvc>::new();
+impl SimulatedUnit for Bno08xCodec {
+    const SENDS: Simulated = Simulated {
+        period_ns: 10_000_000,
+        packets: 1,
+        // Hundredths of a degree; the rate is their difference over 10 ms, half of that old.
+        tolerance: Tolerance { rate: 0.04, accel: 0.006, attitude: 2e-4, time_ns: 1_000_000 },
+    };
+
+    fn send(s: &ImuSample, n: i64, _: bool) -> Vec<u8> {
+        let world = world_of(s);
+        let m = rfu(world);
+        let at = |row: usize, column: usize| m.col(column)[row];
+        // About z, then x, then y.
+        let pitch = at(2, 1).clamp(-1.0, 1.0).asin();
+        let (yaw, roll) = if at(2, 0).hypot(at(2, 2)) < POLE {
+            (at(1, 0).atan2(at(0, 0)), 0.0)
+        } else {
+            ((-at(0, 1)).atan2(at(1, 1)), (-at(2, 0)).atan2(at(2, 2)))
+        };
+        let mut bytes = vec![0xaa, 0xaa, n as u8];
+        bytes.extend(i16s([yaw, pitch, roll].map(|v| v.to_degrees() * 100.0)));
+        bytes.extend(i16s([s.accel.y, s.accel.x, -s.accel.z].map(|v| v / G * 1000.0)));
+        bytes.extend([0; 3]);
+        bytes.push(bytes[2..].iter().fold(0u8, |sum, &b| sum.wrapping_add(b)));
+        bytes
+    }
+}
+
+fn parse(mut stream: &[u8]) -> Vec<Bno08xPacket> {
+    let mut scanner = Scanner::<Bno08xCodec>::new();
     let mut packets = Vec::new();
-    scanner.push(stream, |found| packets.extend(Packet::parse(found.bytes)));
+    while let Some(found) = scanner.next_of(&mut stream) {
+        packets.extend(Bno08xPacket::parse(found.bytes));
+    }
     packets
 }
 
@@ -31,10 +61,14 @@ fn the_data_sheets_example_is_decoded_as_it_says() {
     let packets = parse(&bytes);
     assert_eq!(
         packets,
-        [Packet { index: 222, yaw_pitch_roll_deg: [0.01, -1.1, 20.85], accel_g: [-0.371, -0.02, 0.977] }]
+        [Bno08xPacket {
+            index: 222,
+            yaw_pitch_roll_deg: [0.01, -1.1, 20.85],
+            accel_g: [-0.371, -0.02, 0.977]
+        }]
     );
     // Its acceleration is gravity in the axes that we take its angles for.
-    let reading = Unit::default().reading(&packets[0]);
+    let reading = Bno08xCodec::default().convert(&packets[0]);
     let up = reading.world_from_imu.expect("given") * reading.accel.expect("given");
     let off = up.angle_between(DVec3::Z).to_degrees();
     eprintln!("the example's acceleration is {off:.3} degrees from its own vertical");
@@ -43,8 +77,9 @@ fn the_data_sheets_example_is_decoded_as_it_says() {
 
 #[test]
 fn angles_lie_where_the_axes_say() {
-    let packet = |yaw_pitch_roll_deg| Packet { index: 0, yaw_pitch_roll_deg, accel_g: [0.1, 0.2, 0.97] };
-    let attitude = |angles| Unit::default().reading(&packet(angles)).world_from_imu.expect("given");
+    let packet =
+        |yaw_pitch_roll_deg| Bno08xPacket { index: 0, yaw_pitch_roll_deg, accel_g: [0.1, 0.2, 0.97] };
+    let attitude = |angles| Bno08xCodec::default().convert(&packet(angles)).world_from_imu.expect("given");
     let level = attitude([0.0; 3]);
     assert!((level * DVec3::X).abs_diff_eq(DVec3::Y, 1e-12), "forward is north");
     assert!((level * DVec3::Y).abs_diff_eq(DVec3::X, 1e-12), "right is east");
@@ -54,7 +89,7 @@ fn angles_lie_where_the_axes_say() {
     );
     assert!((attitude([0.0, 30.0, 0.0]) * DVec3::X).z > 0.49, "the nose goes up");
     assert!((attitude([0.0, 0.0, 30.0]) * DVec3::Y).z < -0.49, "the right side goes down");
-    let accel = Unit::default().reading(&packet([0.0; 3])).accel.expect("given");
+    let accel = Bno08xCodec::default().convert(&packet([0.0; 3])).accel.expect("given");
     assert!(accel.abs_diff_eq(DVec3::new(0.2, 0.1, -0.97) * G, 1e-12), "forward, right, down");
 }
 
@@ -64,7 +99,7 @@ fn the_index_wraps_and_tells_what_is_lost() {
     let mut decoder = ImuDecoder::fixed(ImuFormat::Bno08x);
     let mut samples: Vec<ImuSample> = Vec::new();
     for n in (0..3_000).filter(|n| n % 500 != 499) {
-        decoder.push(&encode(ImuFormat::Bno08x, n), truth(ImuFormat::Bno08x, n).arrival, |s| samples.push(s));
+        samples.extend(decoder.samples(&encode(ImuFormat::Bno08x, n), truth(ImuFormat::Bno08x, n).arrival));
     }
     let steps: Vec<i64> = samples.windows(2).map(|w| w[1].device_time_ns - w[0].device_time_ns).collect();
     let of = |ms: i64| steps.iter().filter(|s| (**s - ms * 1_000_000).abs() < 100_000).count();
@@ -84,12 +119,12 @@ fn an_index_that_begins_anew_breaks_nothing() {
         let change = (index as u8).wrapping_sub(bytes[2]);
         bytes[2] = index as u8;
         bytes[18] = bytes[18].wrapping_add(change);
-        decoder.push(&bytes, arrival, |s| {
+        for s in decoder.samples(&bytes, arrival) {
             assert!(s.device_time_ns > last, "packet {n}");
             last = s.device_time_ns;
             let expected = arrival.ns_since(truth(ImuFormat::Bno08x, 0).arrival);
             assert!((last - expected).abs() < 1_000_000, "packet {n}: {last} {expected}");
-        });
+        }
     }
     assert!(decoder.counters().samples > 1_990);
 }

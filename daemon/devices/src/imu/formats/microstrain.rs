@@ -4,11 +4,12 @@
 //! Body axes: x forward, y right, z down; reference north-east-down. Sets `80` (sensor) and `82` (filter) are read; both may
 //! carry a time of the unit's clock (`D5`) or of GPS (`D3`, `12`, `11`).
 
+use super::{ImuCodec, PATIENCE_PARTS};
 use crate::{
-    framing::{Framing, Look},
+    framing::{Found, Framing, Look},
     imu::{
         axes::{G, SWAP, from_yaw_pitch_roll, rotation, vector},
-        reading::{Reading, Stamp},
+        reading::{Reading, ReadingStamp},
     },
 };
 
@@ -16,24 +17,20 @@ const SENSOR: u8 = 0x80;
 const FILTER: u8 = 0x82;
 const WEEK_S: f64 = 604_800.0;
 
-/// The framing of all MIP packets.
-#[derive(Debug)]
-pub(crate) struct Mip;
-
 /// Descriptor set and payload length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Head {
+pub(crate) struct MipHead {
     set: u8,
     payload_bytes: u8,
 }
 
-impl Framing for Mip {
-    type Head = Head;
+impl Framing for MicroStrainCodec {
+    type Head = MipHead;
     const SYNC: u8 = 0x75;
     const MAX_BYTES: usize = 4 + 255 + 2;
     const WEAK: bool = false;
 
-    fn look(bytes: &[u8]) -> Look<Head> {
+    fn look(bytes: &[u8]) -> Look<MipHead> {
         match bytes.get(1) {
             None => return Look::Incomplete,
             Some(0x65) => {}
@@ -41,25 +38,30 @@ impl Framing for Mip {
         }
         match (bytes.get(2), bytes.get(3)) {
             (Some(0), _) | (_, Some(0)) => Look::Invalid,
-            (Some(&set), Some(&payload_bytes)) => {
-                Look::Packet { head: Head { set, payload_bytes }, bytes: 4 + usize::from(payload_bytes) + 2 }
-            }
+            (Some(&set), Some(&payload_bytes)) => Look::Packet {
+                head: MipHead { set, payload_bytes },
+                bytes: 4 + usize::from(payload_bytes) + 2,
+            },
             _ => Look::Incomplete,
         }
     }
 
     fn intact(packet: &[u8]) -> bool {
         let Some((body, &[first, second])) = packet.split_last_chunk() else { return false };
-        let sums = body.iter().fold((0u8, 0u8), |(a, b), &byte| {
-            let a = a.wrapping_add(byte);
-            (a, b.wrapping_add(a))
-        });
-        sums == (first, second)
+        fletcher(body) == [first, second]
     }
 }
 
+/// Fletcher's check sum.
+fn fletcher(bytes: &[u8]) -> [u8; 2] {
+    bytes.iter().fold([0u8; 2], |[a, b], &byte| {
+        let a = a.wrapping_add(byte);
+        [a, b.wrapping_add(a)]
+    })
+}
+
 /// The fields of a packet: descriptor and data. Ends early where a length is impossible.
-fn fields(packet: &[u8], head: Head) -> impl Iterator<Item = (u8, &[u8])> {
+fn fields(packet: &[u8], head: MipHead) -> impl Iterator<Item = (u8, &[u8])> {
     let mut rest = packet.get(4..4 + usize::from(head.payload_bytes)).unwrap_or_default();
     std::iter::from_fn(move || {
         let &length = rest.first()?;
@@ -72,7 +74,7 @@ fn fields(packet: &[u8], head: Head) -> impl Iterator<Item = (u8, &[u8])> {
 
 /// The measurements of one packet, in the unit's own units and axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Packet {
+pub(crate) struct MipPacket {
     /// The unit's own clock, nanoseconds.
     pub(crate) reference_ns: Option<u64>,
     /// Time of week of GPS and the week, as far as the unit knows them.
@@ -88,9 +90,9 @@ pub(crate) struct Packet {
     from_filter: bool,
 }
 
-impl Packet {
+impl MipPacket {
     /// Reads a whole packet; `None` for one of another set.
-    pub(crate) fn parse(packet: &[u8], head: Head) -> Option<Self> {
+    pub(crate) fn parse(packet: &[u8], head: MipHead) -> Option<Self> {
         if head.set != SENSOR && head.set != FILTER {
             return None;
         }
@@ -118,7 +120,7 @@ impl Packet {
         self.rate.is_some() && self.accel.is_some()
     }
 
-    fn stamp(&self) -> Stamp {
+    fn stamp(&self) -> ReadingStamp {
         let own_ns = self.reference_ns.and_then(|ns| i64::try_from(ns).ok());
         let gps_ns = self.gps.and_then(|(tow_s, week)| {
             let whole = tow_s.floor();
@@ -126,21 +128,43 @@ impl Packet {
             // A week beyond the year 2272 is none.
             since_s.checked_mul(1_000_000_000)?.checked_add(((tow_s - whole) * 1e9) as i64)
         });
-        own_ns.or(gps_ns).map_or(Stamp::Arrival, |ns| Stamp::Device { ns })
+        own_ns.or(gps_ns).map_or(ReadingStamp::Arrival, |ns| ReadingStamp::Device { ns })
     }
 }
 
-/// Which set of a unit that sends two is believed. Both have an attitude of their own (and they differ by degrees), at
+/// MIP: which set of a unit that sends two is believed. Both have an attitude of their own (and they differ by degrees), at
 /// times of their own; the filter's is the better one.
 #[derive(Debug, Default)]
-pub(crate) struct Unit {
+pub(crate) struct MicroStrainCodec {
     filter_attitude: bool,
     filter_motion: bool,
 }
 
-impl Unit {
+impl ImuCodec for MicroStrainCodec {
+    const KEY: &'static str = "microstrain";
+    const NAME: &'static str = "MicroStrain MIP";
+    const REMEDY: &'static str =
+        "add it to its message format (set 80: D5, 04, 05, 0A, or set 82: D5, 03, 0E, 1C)";
+    const PROOF_PACKETS: usize = 2;
+    const PATIENCE: u32 = PATIENCE_PARTS;
+
+    fn reading(&mut self, packet: &Found<'_, MipHead>) -> Option<Reading> {
+        Some(self.convert(&MipPacket::parse(packet.bytes, packet.head)?))
+    }
+
+    /// Set (one of 80 to 83) and fields.
+    fn wrap(content: &[u8]) -> Vec<u8> {
+        let (set, fields) = content.split_first().map_or((SENSOR, content), |(s, f)| (SENSOR | s & 3, f));
+        let fields = &fields[..fields.len().min(255)];
+        let mut bytes = [&[0x75, 0x65, set, fields.len() as u8], fields].concat();
+        bytes.extend(fletcher(&bytes));
+        bytes
+    }
+}
+
+impl MicroStrainCodec {
     /// In our axes: forces in m/s^2, the attitude turned from north-east-down into our world.
-    pub(crate) fn reading(&mut self, packet: &Packet) -> Reading {
+    fn convert(&mut self, packet: &MipPacket) -> Reading {
         let quaternion = packet.quaternion.map(|[w, x, y, z]| rotation([x, y, z, w]));
         let euler =
             packet.euler.map(|[roll, pitch, yaw]| from_yaw_pitch_roll([yaw, pitch, roll].map(f64::from)));
@@ -190,5 +214,4 @@ fn gps(data: &[u8]) -> Option<(f64, u16)> {
 }
 
 #[cfg(test)]
-#[path = "microstrain_tests.rs"]
 mod tests;

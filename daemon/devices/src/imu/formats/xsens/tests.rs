@@ -1,14 +1,62 @@
 use std::{fs, path::Path};
 
-use bowwave_core::{estimate::clock::ClockMap, time::Time};
-use glam::DVec3;
+use bowwave_core::{estimate::clock::ClockMap, event::ImuSample, time::Time};
+use glam::{DMat3, DQuat, DVec3};
 use proptest::prelude::*;
 
 use super::*;
 use crate::{
     framing::Scanner,
-    imu::{ImuDecoder, ImuFormat, streams::xbus},
+    imu::{
+        ImuDecoder, ImuFormat,
+        streams::{Simulated, SimulatedUnit, Tolerance, be, world_of, wxyz},
+    },
 };
+
+impl SimulatedUnit for XsensCodec {
+    const SENDS: Simulated = Simulated {
+        period_ns: 5_000_000,
+        packets: 1,
+        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
+    };
+
+    fn send(s: &ImuSample, n: i64, _: bool) -> Vec<u8> {
+        let world = world_of(s);
+        // Forward, left, up.
+        let unit = DMat3::from_cols(world.x_axis, -world.y_axis, -world.z_axis);
+        let flu = |v: DVec3| be([v.x, -v.y, -v.z]);
+        let payload = [
+            item(0x1020, &(n as u16).to_be_bytes()),
+            item(0x1060, &((s.device_time_ns / 100_000) as u32).to_be_bytes()),
+            item(0x2010, &be(wxyz(DQuat::from_mat3(&unit)))),
+            item(0x4020, &flu(s.accel)),
+            item(0x8020, &flu(s.rate)),
+            item(0xe020, &[0, 0, 0, 3]),
+        ]
+        .concat();
+        xbus(0x36, &payload)
+    }
+}
+
+/// A message of a single unit.
+pub(crate) fn xbus(message: u8, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = vec![0xfa, 0xff, message];
+    match u8::try_from(payload.len()) {
+        Ok(short) if short < 0xff => bytes.push(short),
+        _ => {
+            bytes.push(0xff);
+            bytes.extend((payload.len() as u16).to_be_bytes());
+        }
+    }
+    bytes.extend(payload);
+    let sum = bytes[1..].iter().fold(0u8, |sum, &b| sum.wrapping_add(b));
+    bytes.push(sum.wrapping_neg());
+    bytes
+}
+
+fn item(id: u16, data: &[u8]) -> Vec<u8> {
+    [&id.to_be_bytes()[..], &[data.len() as u8], data].concat()
+}
 
 /// The payloads that the maker's own program decoded, and its words for them, by turns.
 fn golden() -> Option<Vec<(Vec<u8>, String)>> {
@@ -40,10 +88,12 @@ fn decoded<const N: usize>(words: &str, name: &str) -> Option<[f64; N]> {
     Some(values)
 }
 
-fn parse(stream: &[u8]) -> (Vec<Packet>, crate::framing::LineCounters) {
-    let mut scanner = Scanner::<Xbus>::new();
+fn parse(mut stream: &[u8]) -> (Vec<XsensMessage>, crate::framing::LineCounters) {
+    let mut scanner = Scanner::<XsensCodec>::new();
     let mut packets = Vec::new();
-    scanner.push(stream, |found| packets.extend(Packet::parse(found.bytes, found.head)));
+    while let Some(found) = scanner.next_of(&mut stream) {
+        packets.extend(XsensMessage::parse(found.bytes, found.head));
+    }
     (packets, scanner.counters())
 }
 
@@ -79,19 +129,15 @@ fn the_makers_packets_are_decoded_as_its_program_does() {
 #[test]
 fn the_real_unit_feels_gravity_upwards_in_our_world() {
     let Some(golden) = golden() else { return };
-    let mut unit = Unit::default();
+    let mut unit = XsensCodec::default();
     for (payload, _) in &golden[..4] {
-        let reading = unit.reading(&parse(&xbus(MTDATA2, payload)).0[0]);
+        let reading = unit.convert(&parse(&xbus(MTDATA2, payload)).0[0]);
         let (attitude, accel) = (reading.world_from_imu.expect("given"), reading.accel.expect("given"));
         let up = attitude * accel;
         assert!((9.7..9.9).contains(&up.z) && up.truncate().length() < 0.1, "{up}");
         // The same turn, by its own words: free acceleration is what is left without gravity.
         assert!((up - DVec3::Z * 9.812).length() < 0.05, "{up}");
     }
-}
-
-fn item(id: u16, data: &[u8]) -> Vec<u8> {
-    [&id.to_be_bytes()[..], &[data.len() as u8], data].concat()
 }
 
 fn f32s(values: &[f32]) -> Vec<u8> {
@@ -109,17 +155,17 @@ fn the_same_attitude_in_each_reference() {
         (0x8, [1.0, 0.0, 0.0, 0.0]),
     ] {
         let packet = parse(&xbus(MTDATA2, &item(0x2010 | low, &f32s(&wxyz)))).0[0];
-        let attitude = Unit::default().reading(&packet).world_from_imu.expect("given");
+        let attitude = XsensCodec::default().convert(&packet).world_from_imu.expect("given");
         assert!((attitude * DVec3::X).abs_diff_eq(DVec3::Y, 1e-7), "reference {low:x}: forward is north");
         assert!((attitude * DVec3::Y).abs_diff_eq(DVec3::X, 1e-7), "reference {low:x}: right is east");
         assert!((attitude * DVec3::Z).abs_diff_eq(DVec3::NEG_Z, 1e-7), "reference {low:x}: down is down");
     }
     // Euler angles: roll, pitch, yaw; a positive pitch is nose down with y to the left.
     let packet = parse(&xbus(MTDATA2, &item(0x2030, &f32s(&[0.0, 30.0, 90.0])))).0[0];
-    let forward = Unit::default().reading(&packet).world_from_imu.expect("given") * DVec3::X;
+    let forward = XsensCodec::default().convert(&packet).world_from_imu.expect("given") * DVec3::X;
     assert!(forward.abs_diff_eq(DVec3::new(0.0, 0.75f64.sqrt(), -0.5), 1e-7), "{forward}");
     let unassigned = parse(&xbus(MTDATA2, &item(0x201c, &f32s(&[1.0, 0.0, 0.0, 0.0])))).0[0];
-    assert_eq!(Unit::default().reading(&unassigned).world_from_imu, None);
+    assert_eq!(XsensCodec::default().convert(&unassigned).world_from_imu, None);
 }
 
 #[test]
@@ -164,10 +210,10 @@ fn the_clock_goes_on_where_it_wraps_and_back_where_the_unit_begins_anew() {
         (0..1_000u32).map(|n| (u32::MAX - 9_999).wrapping_add(n * 50)).chain((0..100).map(|n| 7 + n * 50));
     for (n, fine) in (0..).zip(ticks) {
         let arrival = Time::from_ns(n * 5_000_000);
-        decoder.push(&still(fine), arrival, |s| {
+        for s in decoder.samples(&still(fine), arrival) {
             map.observe(s.device_time_ns, arrival);
             times.push(s.device_time_ns);
-        });
+        }
         assert_eq!(map.restarts(), u32::from(n >= 1_000), "packet {n}");
     }
     assert!(times[..1_000].windows(2).all(|w| w[1] - w[0] == 5_000_000));
@@ -188,9 +234,9 @@ fn a_unit_without_a_clock_goes_on_where_its_packet_counter_wraps() {
             item(0x8020, &f32s(&[0.0, 0.0, n as f32 * 1e-9])),
         ];
         let arrival = Time::from_ns(n * 5_000_000);
-        decoder.push(&xbus(MTDATA2, &payload.concat()), arrival, |s| {
+        for s in decoder.samples(&xbus(MTDATA2, &payload.concat()), arrival) {
             times.push((map.observe(s.device_time_ns, arrival).ns_since(arrival), s.device_time_ns));
-        });
+        }
     }
     assert_eq!((times.len(), map.restarts()), (139_998, 0));
     assert!(times.windows(2).all(|w| w[1].1 > w[0].1), "never back");
@@ -222,10 +268,10 @@ fn lengths_beyond_a_payload_and_the_protocol_are_refused() {
 fn other_messages_and_attitudes_alone_are_no_samples() {
     let mut decoder = ImuDecoder::fixed(ImuFormat::Xsens);
     let mut samples = 0;
-    decoder.push(&xbus(0x11, &[]), Time::MIN, |_| samples += 1);
+    samples += decoder.samples(&xbus(0x11, &[]), Time::MIN).count();
     for n in 0..100u16 {
         let payload = [item(0x1020, &n.to_be_bytes()), item(0x2010, &f32s(&[1.0, 0.0, 0.0, 0.0]))].concat();
-        decoder.push(&xbus(MTDATA2, &payload), Time::from_ns(i64::from(n)), |_| samples += 1);
+        samples += decoder.samples(&xbus(MTDATA2, &payload), Time::from_ns(i64::from(n))).count();
     }
     let counters = decoder.counters();
     assert_eq!((samples, counters.packets, counters.other + counters.unusable), (0, 101, 101));
@@ -239,7 +285,7 @@ proptest! {
         let (packets, counters) = parse(&xbus(MTDATA2, &payload));
         prop_assert!(packets.len() as u64 <= counters.packets);
         for packet in packets {
-            Unit::default().reading(&packet);
+            XsensCodec::default().convert(&packet);
         }
     }
 }

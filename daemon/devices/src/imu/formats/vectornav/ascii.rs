@@ -4,20 +4,21 @@
 
 use glam::{DQuat, DVec3};
 
+use super::{super::ImuCodec, CRC};
 use crate::{
-    framing::{Framing, Look},
+    framing::{Found, Framing, Look},
     imu::{
         axes::{SWAP, from_yaw_pitch_roll, unit},
-        reading::{Reading, Stamp},
+        reading::{Reading, ReadingStamp},
     },
     lines::{self, LINE_MAX_BYTES, number},
 };
 
-/// The framing of the lines.
-#[derive(Debug)]
-pub(crate) struct Lines;
+/// VectorNav's lines.
+#[derive(Debug, Default)]
+pub(crate) struct VectorNavLines;
 
-impl Framing for Lines {
+impl Framing for VectorNavLines {
     type Head = ();
     const SYNC: u8 = b'$';
     const MAX_BYTES: usize = LINE_MAX_BYTES;
@@ -29,13 +30,42 @@ impl Framing for Lines {
     }
 
     fn intact(packet: &[u8]) -> bool {
-        lines::checked_vectornav(packet).is_some()
+        checked(packet).is_some()
     }
+}
+
+impl ImuCodec for VectorNavLines {
+    const KEY: &'static str = "vectornav-ascii";
+    const NAME: &'static str = "VectorNav ASCII";
+    const REMEDY: &'static str = "set its asynchronous output to VNYMR";
+    const PROOF_PACKETS: usize = 2;
+
+    fn reading(&mut self, packet: &Found<'_, ()>) -> Option<Reading> {
+        Some(VectorNavLine::parse(packet.bytes)?.reading())
+    }
+
+    /// The line behind `$VN`.
+    fn wrap(content: &[u8]) -> Vec<u8> {
+        lines::seal(&[b"VN", content].concat())
+    }
+}
+
+/// The line between `$` and its check sum, which may also be a CRC of four digits, or left unchecked.
+fn checked(line: &[u8]) -> Option<&str> {
+    let (body, sum) = lines::parts(line)?;
+    let right = match sum.len() {
+        // A unit whose check sums are off writes the letters themselves.
+        2 if sum == "XX" => true,
+        2 => lines::hex(sum)? == u32::from(lines::xor(body.as_bytes())),
+        4 => lines::hex(sum)? == u32::from(CRC.checksum(body.as_bytes())),
+        _ => false,
+    };
+    right.then_some(body)
 }
 
 /// A measurement in the unit's own units and axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Line {
+pub(crate) struct VectorNavLine {
     /// Yaw, pitch and roll, degrees.
     pub(crate) yaw_pitch_roll_deg: Option<[f64; 3]>,
     /// Attitude of the body with respect to north-east-down, scalar last.
@@ -48,10 +78,10 @@ pub(crate) struct Line {
     pub(crate) rate: Option<[f64; 3]>,
 }
 
-impl Line {
+impl VectorNavLine {
     /// Reads a whole line; `None` for one of another kind. Fields that are missing or no numbers are absent.
     pub(crate) fn parse(line: &[u8]) -> Option<Self> {
-        let mut fields = lines::checked_vectornav(line)?.split(',');
+        let mut fields = checked(line)?.split(',');
         let address = fields.next()?;
         let mut numbers = fields.map(number);
         let mut parsed = Self::default();
@@ -75,7 +105,7 @@ impl Line {
             rate: self.rate.map(DVec3::from_array),
             accel: self.accel.map(DVec3::from_array),
             world_from_imu: quaternion.or(attitude).map(|ned_from_imu| SWAP * ned_from_imu),
-            ..Reading::at(Stamp::Arrival)
+            ..Reading::at(ReadingStamp::Arrival)
         }
     }
 }
@@ -98,12 +128,53 @@ mod tests {
     use super::*;
     use crate::{
         framing::Scanner,
-        imu::{ImuDecoder, ImuFormat},
+        imu::{
+            ImuDecoder, ImuFormat,
+            streams::{Simulated, SimulatedUnit, Tolerance, ned, world_of, yaw_pitch_roll},
+        },
     };
 
+    impl SimulatedUnit for VectorNavLines {
+        const SENDS: Simulated = Simulated {
+            period_ns: 5_000_000,
+            packets: 1,
+            tolerance: Tolerance { rate: 1e-6, accel: 1e-3, attitude: 2e-5, time_ns: 1_000_000 },
+        };
+
+        fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {
+            let world = world_of(s);
+            let [yaw, pitch, roll] = yaw_pitch_roll(ned(world)).map(f64::to_degrees);
+            let (a, w) = (s.accel, s.rate);
+            let body = format!(
+                "VNYMR,{yaw:+08.3},{pitch:+08.3},{roll:+08.3},+00.1000,-00.2000,+00.3000,{:+07.3},{:+07.3},{:+07.3},\
+                 {:+010.6},{:+010.6},{:+010.6}",
+                a.x, a.y, a.z, w.x, w.y, w.z
+            );
+            lines::seal(body.as_bytes())
+        }
+    }
+
     fn line(body: &str) -> Vec<u8> {
-        let sum = body.bytes().fold(0, |sum, byte| sum ^ byte);
-        format!("${body}*{sum:02X}\r\n").into_bytes()
+        lines::seal(body.as_bytes())
+    }
+
+    #[test]
+    fn check_sums_of_two_and_four_digits_and_none() {
+        // A real line with its own sum.
+        let line = b"$VNYMR,-165.918,-008.770,+000.198*7D\r\n";
+        assert_eq!(checked(line), Some("VNYMR,-165.918,-008.770,+000.198"));
+        let crc = format!("$VNRRG,05*{:04X}\r\n", CRC.checksum(b"VNRRG,05"));
+        assert_eq!(checked(crc.as_bytes()), Some("VNRRG,05"));
+        assert_eq!(checked(b"$VNRRG,05*XX\n"), Some("VNRRG,05"));
+        for wrong in [
+            &b"$VNRRG,05*77\r\n"[..],
+            b"$VNRRG,05*+6\r\n",
+            b"$VNRRG,05*761\r\n",
+            b"$VNRRG,05\r\n",
+            b"$VNRRG,05*0000\r\n",
+        ] {
+            assert_eq!(checked(wrong), None, "{}", String::from_utf8_lossy(wrong));
+        }
     }
 
     /// Lines that others quote in public drivers: what is decoded is what they print, and gravity points down in ours.
@@ -115,9 +186,12 @@ mod tests {
             eprintln!("skipped: {} is not there", path.display());
             return;
         };
-        let mut scanner = Scanner::<Lines>::new();
+        let mut scanner = Scanner::<VectorNavLines>::new();
         let mut lines = Vec::new();
-        scanner.push(&text, |found| lines.push(Line::parse(found.bytes).expect("a measurement")));
+        let mut text = &text[..];
+        while let Some(found) = scanner.next_of(&mut text) {
+            lines.push(VectorNavLine::parse(found.bytes).expect("a measurement"));
+        }
         let counters = scanner.counters();
         assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (9, 0, 0));
         assert_eq!(lines[0].yaw_pitch_roll_deg, Some([-165.918, -8.770, 0.198]));
@@ -148,7 +222,7 @@ mod tests {
             format!("VNYMR,+090.000,+000.000,+000.000,{rest},T0001234567"),
         ] {
             let mut decoder = ImuDecoder::fixed(ImuFormat::VectorNavAscii);
-            decoder.push(&line(&body), Time::from_ns(5), |s| samples.push(s));
+            samples.extend(decoder.samples(&line(&body), Time::from_ns(5)));
         }
         assert_eq!(samples.len(), 4);
         for sample in &samples {
@@ -164,10 +238,10 @@ mod tests {
 
     #[test]
     fn other_lines_and_fields_that_are_no_numbers_give_nothing() {
-        assert_eq!(Line::parse(&line("VNRRG,05,115200")), None);
-        let odd = Line::parse(&line("VNYMR,nan,0,0,0,0,0,0,0,0,0,0,0")).expect("a line");
+        assert_eq!(VectorNavLine::parse(&line("VNRRG,05,115200")), None);
+        let odd = VectorNavLine::parse(&line("VNYMR,nan,0,0,0,0,0,0,0,0,0,0,0")).expect("a line");
         assert_eq!(odd.yaw_pitch_roll_deg, None);
-        let short = Line::parse(&line("VNYMR,1,2,3,4,5,6,7,8")).expect("a line");
+        let short = VectorNavLine::parse(&line("VNYMR,1,2,3,4,5,6,7,8")).expect("a line");
         assert_eq!((short.mag, short.accel, short.rate), (Some([4.0, 5.0, 6.0]), None, None));
     }
 }

@@ -4,12 +4,15 @@
 //! Body axes: x forward, y right, z down; reference north-east-down. All logs carry the unit's clock in microseconds, which
 //! wraps in 71.6 minutes. Rates and attitudes come in logs of their own.
 
+use crc::{CRC_16_KERMIT, Crc};
+
+use super::{ImuCodec, PATIENCE_PARTS};
 use crate::{
-    framing::{Framing, Look},
+    framing::{Found, Framing, Look},
     imu::{
         axes::{SWAP, from_yaw_pitch_roll, rotation, vector},
-        reading::{Reading, Stamp},
-        wrap::Unwrap,
+        reading::{Reading, ReadingStamp},
+        unwrap::Unwrap,
     },
 };
 
@@ -20,25 +23,21 @@ const HIGH_RATES: u8 = 1 << 2;
 /// Class of the unit's own logs.
 const LOGS: u8 = 0;
 
-/// The framing of all sbgECom frames.
-#[derive(Debug)]
-pub(crate) struct Ecom;
-
 /// Message, class and data length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Head {
+pub(crate) struct SbgHead {
     message: u8,
     class: u8,
     data_bytes: usize,
 }
 
-impl Framing for Ecom {
-    type Head = Head;
+impl Framing for SbgCodec {
+    type Head = SbgHead;
     const SYNC: u8 = 0xff;
     const MAX_BYTES: usize = DATA_MAX_BYTES + 9;
     const WEAK: bool = false;
 
-    fn look(bytes: &[u8]) -> Look<Head> {
+    fn look(bytes: &[u8]) -> Look<SbgHead> {
         match bytes.get(1) {
             None => return Look::Incomplete,
             Some(0x5a) => {}
@@ -49,26 +48,22 @@ impl Framing for Ecom {
         if data_bytes > DATA_MAX_BYTES {
             return Look::Invalid;
         }
-        Look::Packet { head: Head { message, class, data_bytes }, bytes: data_bytes + 9 }
+        Look::Packet { head: SbgHead { message, class, data_bytes }, bytes: data_bytes + 9 }
     }
 
     fn intact(packet: &[u8]) -> bool {
         let Some((front, &[low, high, end])) = packet.split_last_chunk() else { return false };
         let body = front.get(2..).unwrap_or_default();
-        end == 0x33 && crc16(body) == u16::from_le_bytes([low, high])
+        end == 0x33 && CRC.checksum(body) == u16::from_le_bytes([low, high])
     }
 }
 
-/// CRC-16/KERMIT in the catalogue of Greg Cook, bit by bit: some thousand frames a second cost less than a table is worth.
-pub(crate) fn crc16(bytes: &[u8]) -> u16 {
-    bytes.iter().fold(0, |crc, &byte| {
-        (0..8).fold(crc ^ u16::from(byte), |crc, _| if crc & 1 == 0 { crc >> 1 } else { crc >> 1 ^ 0x8408 })
-    })
-}
+/// The frames' check sum: CRC-16/KERMIT in the catalogue of Greg Cook.
+const CRC: Crc<u16> = Crc::<u16>::new(&CRC_16_KERMIT);
 
 /// A log in the unit's own units and axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Log {
+pub(crate) enum SbgLog {
     /// Specific force (m/s^2) and angular rate (rad/s): logs 3 and 44.
     Motion {
         /// Microseconds since power-up.
@@ -94,10 +89,10 @@ pub(crate) enum Log {
     },
 }
 
-impl Log {
+impl SbgLog {
     /// Reads a whole frame; `None` for another log, one that is too short, and an attitude before the filter has started.
     /// Later firmware appends fields, so a longer one is read.
-    pub(crate) fn parse(frame: &[u8], head: Head) -> Option<Self> {
+    pub(crate) fn parse(frame: &[u8], head: SbgHead) -> Option<Self> {
         let data = frame.get(6..6 + head.data_bytes)?;
         if head.class != LOGS {
             return None;
@@ -147,33 +142,53 @@ fn started(status: &[u8]) -> bool {
     status.first().is_some_and(|low| low & 0x0f != 0)
 }
 
-/// What is remembered between frames.
+/// The protocol: the clock of its logs, and whether quaternions come.
 #[derive(Debug, Default)]
-pub(crate) struct Unit {
+pub(crate) struct SbgCodec {
     time_us: Unwrap<32>,
     quaternions: bool,
 }
 
-impl Unit {
+impl ImuCodec for SbgCodec {
+    const KEY: &'static str = "sbg";
+    const NAME: &'static str = "SBG sbgECom";
+    const REMEDY: &'static str = "switch its logs 3 (IMU data) and 7 (quaternion) on";
+    const PROOF_PACKETS: usize = 2;
+    const PATIENCE: u32 = PATIENCE_PARTS;
+
+    fn reading(&mut self, packet: &Found<'_, SbgHead>) -> Option<Reading> {
+        self.convert(&SbgLog::parse(packet.bytes, packet.head)?)
+    }
+
+    /// Message and data, of the unit's own logs; of log 3 where nothing is given.
+    fn wrap(content: &[u8]) -> Vec<u8> {
+        let (message, data) = content.split_first().map_or((3, content), |(m, d)| (*m, d));
+        let body = [&[message, LOGS], &(data.len() as u16).to_le_bytes()[..], data].concat();
+        [&[0xff, 0x5a], &body[..], &CRC.checksum(&body).to_le_bytes(), &[0x33]].concat()
+    }
+}
+
+impl SbgCodec {
     /// The log in our axes, the attitude turned from north-east-down into our world. Angles of a unit that sends quaternions
     /// as well are left aside.
-    pub(crate) fn reading(&mut self, log: &Log) -> Option<Reading> {
-        let (Log::Motion { time_us, .. } | Log::Euler { time_us, .. } | Log::Quaternion { time_us, .. }) =
-            *log;
+    fn convert(&mut self, log: &SbgLog) -> Option<Reading> {
+        let (SbgLog::Motion { time_us, .. }
+        | SbgLog::Euler { time_us, .. }
+        | SbgLog::Quaternion { time_us, .. }) = *log;
         let ns = self.time_us.next(u64::from(time_us)).saturating_mul(1000);
-        let at = Reading::at(Stamp::Device { ns });
+        let at = Reading::at(ReadingStamp::Device { ns });
         Some(match *log {
-            Log::Motion { accel, rate, .. } => {
+            SbgLog::Motion { accel, rate, .. } => {
                 Reading { rate: Some(vector(rate)), accel: Some(vector(accel)), ..at }
             }
-            Log::Euler { roll_pitch_yaw: [roll, pitch, yaw], .. } => {
+            SbgLog::Euler { roll_pitch_yaw: [roll, pitch, yaw], .. } => {
                 if self.quaternions {
                     return None;
                 }
                 let ned_from_imu = from_yaw_pitch_roll([yaw, pitch, roll].map(f64::from));
                 Reading { world_from_imu: Some(SWAP * ned_from_imu), ..at }
             }
-            Log::Quaternion { wxyz: [w, x, y, z], .. } => {
+            SbgLog::Quaternion { wxyz: [w, x, y, z], .. } => {
                 self.quaternions = true;
                 Reading { world_from_imu: Some(SWAP * rotation([x, y, z, w])), ..at }
             }
@@ -182,5 +197,4 @@ impl Unit {
 }
 
 #[cfg(test)]
-#[path = "sbg_tests.rs"]
 mod tests;
