@@ -31,7 +31,7 @@ pub struct LineCounters {
 
 /// What begins where a packet may begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Look<Head> {
+pub(crate) enum PacketLook<Head> {
     /// More bytes are needed to tell.
     Incomplete,
     /// No packet of this format.
@@ -62,7 +62,7 @@ pub(crate) trait Framing {
     const WEAK: bool;
 
     /// Looks at bytes that begin with [`Self::SYNC`] and go on beyond the packet, or end before it does.
-    fn look(bytes: &[u8]) -> Look<Self::Head>;
+    fn look(bytes: &[u8]) -> PacketLook<Self::Head>;
 
     /// Whether a packet of the length that it claims has the right check sum.
     fn intact(packet: &[u8]) -> bool;
@@ -70,7 +70,7 @@ pub(crate) trait Framing {
 
 /// A packet in the stream.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Found<'a, Head> {
+pub(crate) struct FoundPacket<'a, Head> {
     /// What its first bytes say.
     pub(crate) head: Head,
     /// The whole packet.
@@ -123,20 +123,28 @@ impl<F: Framing> Scanner<F> {
     }
 
     /// The next packet of the bytes that were taken in; `None`: more are needed.
-    pub(crate) fn next_packet(&mut self) -> Option<Found<'_, F::Head>> {
+    pub(crate) fn next_packet(&mut self) -> Option<FoundPacket<'_, F::Head>> {
         let (head, packet) = self.advance()?;
-        Some(Found { head, bytes: self.buffer.get(packet)?, skipped_bytes: self.counters.skipped_bytes })
+        Some(FoundPacket {
+            head,
+            bytes: self.buffer.get(packet)?,
+            skipped_bytes: self.counters.skipped_bytes,
+        })
     }
 
     /// The next packet, for which bytes are taken from the front of `input` as far as they are needed; `None`: `input` is used up.
-    pub(crate) fn next_of(&mut self, input: &mut &[u8]) -> Option<Found<'_, F::Head>> {
+    pub(crate) fn next_of(&mut self, input: &mut &[u8]) -> Option<FoundPacket<'_, F::Head>> {
         let (head, packet) = loop {
             match self.advance() {
                 Some(found) => break found,
                 None => self.insert(chunk(input)?),
             }
         };
-        Some(Found { head, bytes: self.buffer.get(packet)?, skipped_bytes: self.counters.skipped_bytes })
+        Some(FoundPacket {
+            head,
+            bytes: self.buffer.get(packet)?,
+            skipped_bytes: self.counters.skipped_bytes,
+        })
     }
 
     /// Goes on to behind the next packet; its head and where it lies in the buffer.
@@ -152,9 +160,9 @@ impl<F: Framing> Scanner<F> {
             let at = self.start;
             let candidate = &self.buffer[at..];
             let (head, bytes) = match F::look(candidate) {
-                Look::Incomplete => return None,
-                Look::Packet { head, bytes } if bytes <= F::MAX_BYTES => (head, bytes),
-                Look::Packet { .. } | Look::Invalid => {
+                PacketLook::Incomplete => return None,
+                PacketLook::Packet { head, bytes } if bytes <= F::MAX_BYTES => (head, bytes),
+                PacketLook::Packet { .. } | PacketLook::Invalid => {
                     self.skip(1);
                     continue;
                 }
@@ -204,7 +212,7 @@ impl<F: Framing> Scanner<F> {
             return Rival::None;
         }
         let behind = &self.buffer[at + bytes..];
-        if behind.first() == Some(&F::SYNC) && F::look(behind) != Look::Invalid {
+        if behind.first() == Some(&F::SYNC) && F::look(behind) != PacketLook::Invalid {
             return Rival::None;
         }
         for place in at + 1..at + bytes {
@@ -213,9 +221,9 @@ impl<F: Framing> Scanner<F> {
                 continue;
             }
             match F::look(rest) {
-                Look::Invalid => {}
-                Look::Incomplete => return Rival::Perhaps,
-                Look::Packet { bytes, .. } => match rest.get(..bytes) {
+                PacketLook::Invalid => {}
+                PacketLook::Incomplete => return Rival::Perhaps,
+                PacketLook::Packet { bytes, .. } => match rest.get(..bytes) {
                     None => return Rival::Perhaps,
                     Some(packet) if F::intact(packet) => return Rival::At(place),
                     Some(_) => {}
@@ -234,7 +242,7 @@ impl<F: Framing> Scanner<F> {
         let end = self.buffer.len().min(at + bytes - 1);
         let places = (at + 1..end).filter(|&place| self.buffer[place] == F::SYNC);
         let ends = places.filter_map(|place| {
-            let Look::Packet { bytes, .. } = F::look(&self.buffer[place..]) else { return None };
+            let PacketLook::Packet { bytes, .. } = F::look(&self.buffer[place..]) else { return None };
             let packet = self.buffer[..end].get(place..place + bytes)?;
             F::intact(packet).then_some((place + bytes, place))
         });
@@ -255,7 +263,7 @@ impl<F: Framing> Scanner<F> {
 #[cfg(test)]
 pub(crate) fn intact_places<F: Framing>(bytes: &[u8]) -> Vec<usize> {
     let is_packet = |&at: &usize| match F::look(&bytes[at..]) {
-        Look::Packet { bytes: length, .. } => bytes.get(at..at + length).is_some_and(F::intact),
+        PacketLook::Packet { bytes: length, .. } => bytes.get(at..at + length).is_some_and(F::intact),
         _ => false,
     };
     (0..bytes.len()).filter(|&at| bytes[at] == F::SYNC).filter(is_packet).collect()

@@ -1,34 +1,34 @@
 //! Lines of text in the style of NMEA 0183: `$`, an address, fields between commas, `*`, a check sum, the end of the line.
 
-use crate::framing::Look;
+use crate::framing::PacketLook;
 
 /// The longest line that is taken: NMEA 0183 allows 82, makers' own lines have up to 200, bytes.
 pub(crate) const LINE_MAX_BYTES: usize = 256;
 
 /// Looks at what a `$` begins; the address behind it begins with `prefix`.
-pub(crate) fn look(bytes: &[u8], prefix: &[u8]) -> Look<()> {
-    let Some(body) = bytes.get(1..) else { return Look::Incomplete };
+pub(crate) fn look(bytes: &[u8], prefix: &[u8]) -> PacketLook<()> {
+    let Some(body) = bytes.get(1..) else { return PacketLook::Incomplete };
     let shared = body.len().min(prefix.len());
     if body[..shared] != prefix[..shared] {
-        return Look::Invalid;
+        return PacketLook::Invalid;
     }
     for (i, &byte) in bytes.iter().enumerate().skip(1) {
         match byte {
-            _ if i >= LINE_MAX_BYTES => return Look::Invalid,
-            b'\n' => return Look::Packet { head: (), bytes: i + 1 },
+            _ if i >= LINE_MAX_BYTES => return PacketLook::Invalid,
+            b'\n' => return PacketLook::Packet { head: (), bytes: i + 1 },
             b'\r' => {
                 return match bytes.get(i + 1) {
-                    Some(b'\n') => Look::Packet { head: (), bytes: i + 2 },
-                    Some(_) => Look::Packet { head: (), bytes: i + 1 },
-                    None => Look::Incomplete,
+                    Some(b'\n') => PacketLook::Packet { head: (), bytes: i + 2 },
+                    Some(_) => PacketLook::Packet { head: (), bytes: i + 1 },
+                    None => PacketLook::Incomplete,
                 };
             }
-            b'$' => return Look::Invalid,
+            b'$' => return PacketLook::Invalid,
             b' '..=b'~' => {}
-            _ => return Look::Invalid,
+            _ => return PacketLook::Invalid,
         }
     }
-    if bytes.len() >= LINE_MAX_BYTES { Look::Invalid } else { Look::Incomplete }
+    if bytes.len() >= LINE_MAX_BYTES { PacketLook::Invalid } else { PacketLook::Incomplete }
 }
 
 /// What stands between `$` and `*`, where the two digits behind are its bytes' exclusive or.
@@ -79,17 +79,17 @@ mod tests {
     #[test]
     fn a_line_ends_where_it_ends() {
         let bytes = |b: &[u8]| look(b, b"VN");
-        assert_eq!(bytes(b"$VN"), Look::Incomplete);
-        assert_eq!(bytes(b"$"), Look::Incomplete);
-        assert_eq!(bytes(b"$G"), Look::Invalid);
-        assert_eq!(bytes(b"$VNA*00\r\n$V"), Look::Packet { head: (), bytes: 9 });
-        assert_eq!(bytes(b"$VNA*00\r"), Look::Incomplete);
-        assert_eq!(bytes(b"$VNA*00\r$"), Look::Packet { head: (), bytes: 8 });
-        assert_eq!(bytes(b"$VNA*0$VN"), Look::Invalid);
-        assert_eq!(bytes(b"$VNA\xfa"), Look::Invalid);
+        assert_eq!(bytes(b"$VN"), PacketLook::Incomplete);
+        assert_eq!(bytes(b"$"), PacketLook::Incomplete);
+        assert_eq!(bytes(b"$G"), PacketLook::Invalid);
+        assert_eq!(bytes(b"$VNA*00\r\n$V"), PacketLook::Packet { head: (), bytes: 9 });
+        assert_eq!(bytes(b"$VNA*00\r"), PacketLook::Incomplete);
+        assert_eq!(bytes(b"$VNA*00\r$"), PacketLook::Packet { head: (), bytes: 8 });
+        assert_eq!(bytes(b"$VNA*0$VN"), PacketLook::Invalid);
+        assert_eq!(bytes(b"$VNA\xfa"), PacketLook::Invalid);
         let endless = [&b"$VN"[..], &[b'1'; LINE_MAX_BYTES]].concat();
-        assert_eq!(bytes(&endless), Look::Invalid);
-        assert_eq!(bytes(&endless[..LINE_MAX_BYTES - 1]), Look::Incomplete);
+        assert_eq!(bytes(&endless), PacketLook::Invalid);
+        assert_eq!(bytes(&endless[..LINE_MAX_BYTES - 1]), PacketLook::Incomplete);
     }
 
     #[test]

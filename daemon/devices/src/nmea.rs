@@ -11,7 +11,7 @@ use bowwave_core::{event::ShipSample, time::Time};
 
 pub use crate::framing::LineCounters;
 use crate::{
-    framing::{Framing, Look, Scanner},
+    framing::{Framing, PacketLook, Scanner},
     lines::{self, LINE_MAX_BYTES, number},
 };
 
@@ -26,7 +26,7 @@ impl Framing for AnyLine {
     // A '$' within a line ends it, so that no false beginning can swallow one.
     const WEAK: bool = false;
 
-    fn look(bytes: &[u8]) -> Look<()> {
+    fn look(bytes: &[u8]) -> PacketLook<()> {
         lines::look(bytes, b"")
     }
 
@@ -37,7 +37,7 @@ impl Framing for AnyLine {
 
 /// Which line a measurement came in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Sentence {
+pub enum NmeaSentence {
     /// `$--HDT`.
     Hdt,
     /// `$PASHR`.
@@ -46,7 +46,7 @@ pub enum Sentence {
     Psxn,
 }
 
-impl Sentence {
+impl NmeaSentence {
     /// Its name for people.
     pub const fn name(self) -> &'static str {
         match self {
@@ -61,7 +61,7 @@ impl Sentence {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShipAttitude {
     /// The line.
-    pub sentence: Sentence,
+    pub sentence: NmeaSentence,
     /// Time of the measurement, seconds of the UTC day, where the line tells it.
     pub utc_day_s: Option<f64>,
     /// What it says.
@@ -136,7 +136,7 @@ fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAtti
         ShipSample { arrival, heading: None, roll: None, pitch: None, heading_sigma: None, reduced: false };
     let (sentence, utc_day_s, sample) = match (address, fields) {
         (address, [degrees, "T", ..]) if address.len() == 5 && address.ends_with("HDT") => {
-            (Sentence::Hdt, None, ShipSample { heading: heading(degrees), ..nothing })
+            (NmeaSentence::Hdt, None, ShipSample { heading: heading(degrees), ..nothing })
         }
         ("PASHR", [time, degrees, "T", roll, pitch, _, _, _, sigma, _, aligned]) => {
             let sample = ShipSample {
@@ -147,7 +147,7 @@ fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAtti
                 reduced: aligned == "0",
                 ..nothing
             };
-            (Sentence::Pashr, utc_day_s(time), sample)
+            (NmeaSentence::Pashr, utc_day_s(time), sample)
         }
         ("PSXN", ["20", _, _, heading, roll_pitch, ..]) => {
             // What is no number is as good as invalid.
@@ -163,7 +163,7 @@ fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAtti
                 reduced: quality.heading.max(quality.roll_pitch) > 0,
                 ..nothing
             };
-            (Sentence::Psxn, None, sample)
+            (NmeaSentence::Psxn, None, sample)
         }
         _ => return None,
     };
@@ -257,9 +257,9 @@ mod tests {
             let [hdt, psxn, pashr] = said[..] else { panic!("{said:?}") };
             assert_eq!(
                 (hdt.sentence, degrees(hdt.sample.heading), hdt.sample.roll),
-                (Sentence::Hdt, Some(235.18), None)
+                (NmeaSentence::Hdt, Some(235.18), None)
             );
-            assert_eq!(psxn.sentence, Sentence::Psxn);
+            assert_eq!(psxn.sentence, NmeaSentence::Psxn);
             assert_eq!(
                 [psxn.sample.roll, psxn.sample.pitch, psxn.sample.heading].map(degrees),
                 [Some(-2.82), Some(1.0), Some(235.18)]

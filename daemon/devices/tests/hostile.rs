@@ -41,9 +41,9 @@ fn packet(n: u64) -> Vec<u8> {
 }
 
 /// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
+struct HostileRandom(u64);
 
-impl Random {
+impl HostileRandom {
     fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -54,8 +54,9 @@ impl Random {
 }
 
 /// Noise, headers with any groups and fields, packets with a wrong byte, cut ones, and whole ones with rates that no body turns at.
-fn attack(random: &mut Random, n: u64) -> Vec<u8> {
-    let noise = |random: &mut Random, count: u64| (0..count).map(|_| random.next() as u8).collect::<Vec<_>>();
+fn attack(random: &mut HostileRandom, n: u64) -> Vec<u8> {
+    let noise =
+        |random: &mut HostileRandom, count: u64| (0..count).map(|_| random.next() as u8).collect::<Vec<_>>();
     match random.next() % 6 {
         0 => {
             let count = random.next() % 512;
@@ -75,7 +76,7 @@ fn attack(random: &mut Random, n: u64) -> Vec<u8> {
             bytes
         }
         _ => {
-            let any = |random: &mut Random| f32::from_bits(random.next() as u32);
+            let any = |random: &mut HostileRandom| f32::from_bits(random.next() as u32);
             let mut bytes = Vec::new();
             CommonOutput {
                 time_startup_ns: random.next(),
@@ -104,11 +105,11 @@ fn an_hour_of_hostile_bytes_costs_nothing_but_time() {
     let port = ImuPort::start(settings, reporter).expect("starts");
     // Until the port is open, the terminal would answer.
     let opened = Instant::now() + Duration::from_secs(10);
-    while port.status().line != LineStatus::Listening {
+    while port.status().line.status != LineStatus::Listening {
         assert!(Instant::now() < opened, "not opened: {:?}", port.status());
         std::thread::sleep(Duration::from_millis(5));
     }
-    let (mut random, mut sent, mut n, mut told) = (Random(7), 0, 0, 0usize);
+    let (mut random, mut sent, mut n, mut told) = (HostileRandom(7), 0, 0, 0usize);
     let mut before = None;
     while sent < bytes {
         let some = attack(&mut random, n);
@@ -138,7 +139,7 @@ fn an_hour_of_hostile_bytes_costs_nothing_but_time() {
         let sound = |e: &Event| matches!(e, Event::Imu(s) if s.rate.length() < 1.0 && s.device_time_ns % 5_000_000 == 0);
         heard += port.events().try_iter().filter(sound).count();
     }
-    let counters = port.stop().expect("stops").imu;
+    let counters = port.stop().expect("stops").said.counters;
     println!("{sent} bytes: {counters:?}, {told} changes of faults");
     assert!(counters.skipped_bytes > sent / 4, "{counters:?}");
 }

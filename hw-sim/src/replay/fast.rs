@@ -155,7 +155,7 @@ impl Producer {
     fn publish(&self) {
         let mut stats = locked(&self.stats);
         stats.frames = self.frames.counters();
-        stats.imu.imu = self.imu.counters();
+        stats.imu = self.imu.counters();
         stats.ship = self.ship.counters();
         stats.triggers = self.triggers;
         stats.take(self.wire.counters());

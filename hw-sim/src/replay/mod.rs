@@ -23,10 +23,7 @@ use std::{
 };
 
 use bowwave_core::{event::Event, geometry::CameraPose, time::Time};
-use bowwave_devices::{
-    nmea::LineCounters,
-    serial::{PortCounters, SerialError},
-};
+use bowwave_devices::{imu::ImuCounters, nmea::LineCounters, serial::SerialError};
 use bowwave_record::{Properties, RecordError, RecordingReader};
 
 pub use self::{decode::FrameCounters, fast::FastReplay, realtime::RealtimeReplay};
@@ -63,8 +60,10 @@ pub struct ReplayStats {
     pub frames_overwritten: u64,
     /// Pictures left out because they were due more than 100 ms ago: the computer is too slow.
     pub frames_late: u64,
-    /// What the inertial unit's line carried.
-    pub imu: PortCounters,
+    /// What the decoder of the inertial unit's line met.
+    pub imu: ImuCounters,
+    /// Samples dropped, oldest first, because nobody drained the queue.
+    pub imu_overflow: u64,
     /// What the line of the ship's instruments carried.
     pub ship: LineCounters,
     /// Samples that no unit could have sent.

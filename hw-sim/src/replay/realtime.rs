@@ -155,7 +155,8 @@ impl RealtimeReplay {
     /// What was delivered and left out so far.
     pub fn stats(&self) -> ReplayStats {
         let ship = self.ship.as_ref().map(|ship| ship.status().said.lines).unwrap_or_default();
-        ReplayStats { imu: self.port.counters(), ship, ..*locked(&self.stats) }
+        let imu = self.port.status();
+        ReplayStats { imu: imu.said.counters, imu_overflow: imu.line.overflow, ship, ..*locked(&self.stats) }
     }
 
     /// Ends the threads and closes the line.
@@ -171,7 +172,8 @@ impl RealtimeReplay {
         drop(line?);
         camera?;
         reader?;
-        Ok(ReplayStats { imu, ship, ..*locked(&self.stats) })
+        let (imu, imu_overflow) = (imu.said.counters, imu.line.overflow);
+        Ok(ReplayStats { imu, imu_overflow, ship, ..*locked(&self.stats) })
     }
 }
 

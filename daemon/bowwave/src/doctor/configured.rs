@@ -6,10 +6,11 @@ use bowwave_core::fault::{Change, Fault};
 use bowwave_devices::{
     camera::CameraPort,
     clock::{now, sleep_until},
+    gpio::{self, InputLine},
     lcd,
     report::reporting,
     serial,
-    trigger::{self, InputLine, TriggerSettings},
+    trigger::TriggerSettings,
 };
 
 use super::{Check, Verdict, check, failed};
@@ -155,24 +156,24 @@ fn imu(config: &Config) -> Check {
         Ok(found) => found,
         Err(e) => return failed("imu", e),
     };
-    let status = &found.status;
+    let (status, counters) = (&found.status, found.status.said.counters);
     let text = format!(
         "{}: {} samples in {:.1} s, {} damaged packets, low latency {:?}",
         super::imu::unit(status),
-        status.counters.imu.samples,
+        counters.samples,
         LISTEN.as_secs_f64(),
-        status.counters.imu.bad_crc,
-        status.low_latency
+        counters.bad_crc,
+        status.line.low_latency
     );
-    verdict("imu", &found.faults, text, status.counters.imu.samples >= PICTURES_MIN)
+    verdict("imu", &found.faults, text, counters.samples >= PICTURES_MIN)
 }
 
 fn lines(config: &Config) -> Vec<Check> {
     let mut checks = Vec::new();
-    if let Err(e) = trigger::clock_is_monotonic() {
+    if let Err(e) = gpio::clock_is_monotonic() {
         checks.push(failed("trigger", e));
     }
-    let one = |name: &'static str, input: &InputLine, active: &str, inactive: &str| match trigger::check(
+    let one = |name: &'static str, input: &InputLine, active: &str, inactive: &str| match gpio::check(
         Path::new(&input.chip),
         &input.line,
     ) {

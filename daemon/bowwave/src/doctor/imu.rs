@@ -30,17 +30,18 @@ pub(super) fn checks(arguments: &DoctorImu) -> Result<Vec<Check>> {
         Err(e) => return Ok(vec![failed("imu", e)]),
     };
     let status = &found.status;
-    let enough = status.counters.imu.samples >= SAMPLES_MIN;
+    let enough = status.said.counters.samples >= SAMPLES_MIN;
     let mut checks = vec![configured::verdict("imu", &found.faults, unit(status), enough)];
-    if status.format.is_some() {
-        let verdict = if status.fields.clock && status.fields.rate && status.fields.accel {
+    let fields = status.said.fields;
+    if status.said.format.is_some() {
+        let verdict = if fields.clock && fields.rate && fields.accel {
             Verdict::Ok
         } else {
             Verdict::Warning
         };
-        checks.push(check("output", verdict, status.fields.to_string()));
+        checks.push(check("output", verdict, fields.to_string()));
         checks.push(check("timing", Verdict::Ok, timing(status)));
-        checks.push(clock(status));
+        checks.push(clock(status, found.clock.as_ref()));
     }
     checks.push(check("line", Verdict::Ok, line(status)));
     Ok(checks)
@@ -48,14 +49,15 @@ pub(super) fn checks(arguments: &DoctorImu) -> Result<Vec<Check>> {
 
 /// Which unit answers, where and how fast.
 pub(super) fn unit(status: &ImuStatus) -> String {
-    let (Some(node), Some(baud)) = (&status.node, status.baud) else { return "no unit answers".to_owned() };
+    let (line, said) = (&status.line, &status.said);
+    let (Some(node), Some(baud)) = (&line.node, line.baud) else { return "no unit answers".to_owned() };
     let place = format!("{} at {baud} baud", node.display());
-    match status.format {
-        Some(format) if status.timing.period_ms > 0.0 => {
-            format!("{place}: {format}, {:.1} samples a second", 1e3 / status.timing.period_ms)
+    match said.format {
+        Some(format) if said.timing.period_ms > 0.0 => {
+            format!("{place}: {format}, {:.1} samples a second", 1e3 / said.timing.period_ms)
         }
         Some(format) => format!("{place}: {format}"),
-        None if status.line == LineStatus::Garbled || status.counters.imu.skipped_bytes > 0 => {
+        None if line.status == LineStatus::Garbled || said.counters.skipped_bytes > 0 => {
             let known = ImuFormat::ALL.map(|f| f.to_string()).join(", ");
             format!("{place}: bytes come that are none of {known}")
         }
@@ -64,24 +66,24 @@ pub(super) fn unit(status: &ImuStatus) -> String {
 }
 
 fn timing(status: &ImuStatus) -> String {
-    let t = status.timing;
+    let t = status.said.timing;
     if t.period_ms <= 0.0 {
         return "too few samples to tell".to_owned();
     }
     format!(
         "a sample every {:.2} ms by the unit's time; arrivals up to {:.1} ms apart (99 %), {:.2} ms off in the median; {} \
          samples missing",
-        t.period_ms, t.gap_p99_ms, t.jitter_p50_ms, status.counters.lost_samples
+        t.period_ms, t.gap_p99_ms, t.jitter_p50_ms, status.said.lost_samples
     )
 }
 
 /// How the unit's clock does, and what to do where it does badly.
-fn clock(status: &ImuStatus) -> Check {
-    if !status.fields.clock {
+fn clock(status: &ImuStatus, report: Option<&ClockReport>) -> Check {
+    if !status.said.fields.clock {
         let found = "the unit tells no time: its samples are timed by their own beat";
         return check("clock", Verdict::Ok, found);
     }
-    let Some(clock) = status.clock else {
+    let Some(clock) = report else {
         return check("clock", Verdict::Ok, "too short to tell its drift (--seconds 20)");
     };
     let verdict = if clock.is_bad() { Verdict::Warning } else { Verdict::Ok };
@@ -92,7 +94,7 @@ fn clock(status: &ImuStatus) -> Check {
     } else {
         ""
     };
-    check("clock", verdict, format!("{}{advice}", in_words(&clock)))
+    check("clock", verdict, format!("{}{advice}", in_words(clock)))
 }
 
 /// A clock's report for people.
@@ -110,20 +112,20 @@ fn in_words(clock: &ClockReport) -> String {
 }
 
 fn line(status: &ImuStatus) -> String {
-    let c = status.counters;
+    let (line, c) = (&status.line, status.said.counters);
     format!(
         "{} packets, of them {} samples, {} parts and other ones, {} that lack something, {} with numbers that are none; {} \
          damaged, {} bytes of no packet; {} framing errors, {} overruns; low latency {:?}",
-        c.imu.packets,
-        c.imu.samples,
-        c.imu.other,
-        c.imu.unusable,
-        c.imu.not_finite,
-        c.imu.bad_crc,
-        c.imu.skipped_bytes,
-        c.framing_errors,
-        c.overruns,
-        status.low_latency
+        c.packets,
+        c.samples,
+        c.other,
+        c.unusable,
+        c.not_finite,
+        c.bad_crc,
+        c.skipped_bytes,
+        line.framing_errors,
+        line.overruns,
+        line.low_latency
     )
 }
 
@@ -131,43 +133,47 @@ fn line(status: &ImuStatus) -> String {
 mod tests {
     use bowwave_devices::{
         imu::Fields,
-        serial::{ArrivalTiming, PortCounters},
+        serial::{ArrivalTiming, ImuReport, LineReport},
     };
 
     use super::*;
 
     fn status() -> ImuStatus {
         ImuStatus {
-            node: Some("/dev/ttyUSB0".into()),
-            baud: Some(115_200),
-            format: Some(ImuFormat::Bno08x),
-            fields: Fields { counter: true, accel: true, attitude: true, ..Fields::default() },
-            timing: ArrivalTiming {
-                period_ms: 10.0,
-                gap_p99_ms: 16.2,
-                jitter_p50_ms: 1.5,
-                jitter_p99_ms: 6.0,
+            line: LineReport {
+                node: Some("/dev/ttyUSB0".into()),
+                baud: Some(115_200),
+                ..LineReport::default()
             },
-            ..ImuStatus::default()
+            said: ImuReport {
+                format: Some(ImuFormat::Bno08x),
+                fields: Fields { counter: true, accel: true, attitude: true, ..Fields::default() },
+                timing: ArrivalTiming {
+                    period_ms: 10.0,
+                    gap_p99_ms: 16.2,
+                    jitter_p50_ms: 1.5,
+                    jitter_p99_ms: 6.0,
+                },
+                ..ImuReport::default()
+            },
         }
     }
 
     #[test]
     fn what_answers_is_told_in_words() {
-        let told = status();
+        let mut told = status();
         assert_eq!(unit(&told), "/dev/ttyUSB0 at 115200 baud: BNO08x UART-RVC, 100.0 samples a second");
         assert!(
             timing(&told)
                 .starts_with("a sample every 10.00 ms by the unit's time; arrivals up to 16.2 ms apart")
         );
         assert_eq!(unit(&ImuStatus::default()), "no unit answers");
-        let silent = ImuStatus { format: None, ..status() };
-        assert_eq!(unit(&silent), "/dev/ttyUSB0 at 115200 baud: nothing comes");
-        let mut counters = PortCounters::default();
-        counters.imu.skipped_bytes = 900;
-        let strange = unit(&ImuStatus { counters, ..silent });
+        told.said.format = None;
+        assert_eq!(unit(&told), "/dev/ttyUSB0 at 115200 baud: nothing comes");
+        told.said.counters.skipped_bytes = 900;
+        let strange = unit(&told);
         assert!(strange.contains("none of VectorNav binary") && strange.contains("Witmotion"), "{strange}");
-        assert!(line(&ImuStatus { counters, ..status() }).contains("900 bytes of no packet"));
+        assert!(line(&told).contains("900 bytes of no packet"));
     }
 
     #[test]
@@ -180,9 +186,10 @@ mod tests {
             arrival_jitter_s: 1.6e-3,
             restarts: 0,
         };
-        let of = |report| {
-            let fields = Fields { clock: true, ..Fields::default() };
-            clock(&ImuStatus { fields, clock: report, ..status() })
+        let of = |report: Option<ClockReport>| {
+            let mut status = status();
+            status.said.fields.clock = true;
+            clock(&status, report.as_ref())
         };
         let told = of(Some(good));
         assert_eq!(told.verdict, Verdict::Ok);
@@ -199,7 +206,7 @@ mod tests {
             shaken.found
         );
         assert!(of(None).found.contains("too short"));
-        assert!(clock(&status()).found.contains("tells no time"));
+        assert!(clock(&status(), None).found.contains("tells no time"));
     }
 
     #[test]

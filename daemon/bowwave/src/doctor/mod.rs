@@ -7,7 +7,7 @@ mod ship;
 use std::{fmt, path::Path, process::Command};
 
 use anyhow::Result;
-use bowwave_devices::{camera, lcd, serial, trigger};
+use bowwave_devices::{camera, gpio, lcd, serial};
 use serde::Serialize;
 
 use crate::{
@@ -198,18 +198,18 @@ fn triggers(wanted: Option<&str>) -> Vec<Check> {
                 format!("'{text}' names no line: write CHIP:LINE, as /dev/gpiochip0:17"),
             )];
         };
-        return vec![match trigger::check(Path::new(chip), line) {
+        return vec![match gpio::check(Path::new(chip), line) {
             Ok(info) => {
                 check("trigger", Verdict::Ok, format!("{chip} line {} is there and free", info.offset))
             }
             Err(e) => failed("trigger", e),
         }];
     }
-    let chips = trigger::list();
+    let chips = gpio::list();
     if chips.is_empty() {
         return vec![check("trigger", Verdict::Absent, "no GPIO chip; the trigger needs a line of one")];
     }
-    let one = |chip: Result<trigger::ChipInfo, trigger::TriggerError>| match chip {
+    let one = |chip: Result<gpio::ChipInfo, gpio::GpioError>| match chip {
         Ok(c) => {
             let free = c.lines.iter().filter(|l| !l.used).count();
             check(

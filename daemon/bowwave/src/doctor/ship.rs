@@ -50,7 +50,7 @@ fn told(status: &ShipStatus) -> String {
 mod tests {
     use bowwave_core::{event::ShipSample, time::Time};
     use bowwave_devices::{
-        nmea::{LineCounters, Sentence},
+        nmea::{LineCounters, NmeaSentence},
         serial::{LineReport, ShipReport},
     };
 
@@ -67,7 +67,7 @@ mod tests {
             reduced: true,
         };
         let said = ShipReport {
-            newest: Some((Sentence::Hdt, sample)),
+            newest: Some((NmeaSentence::Hdt, sample)),
             period_s: Some(0.1),
             headings: 25,
             lines: LineCounters { packets: 50, bad_crc: 1, skipped_bytes: 7 },

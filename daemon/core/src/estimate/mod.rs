@@ -9,6 +9,7 @@ mod heading_aiding;
 pub mod horizon;
 mod horizon_aiding;
 pub mod light;
+pub mod plausibility;
 pub mod pose;
 pub mod sea;
 mod sea_state;

@@ -1,6 +1,6 @@
 //! What the devices said last, made sense of: orientation over time, the newest picture, and whether they can be trusted.
 
-use glam::{DQuat, DVec3};
+use glam::DQuat;
 
 use super::{
     heading_aiding::{HeadingAiding, HeadingCounts, HeadingSettings},
@@ -13,6 +13,7 @@ use crate::{
         attitude::{Attitude, AttitudeSettings, Source},
         clock::{ClockMap, ClockReport},
         horizon::Mask,
+        plausibility::{Plausibility, is_possible},
         pose::{NoPose, OrientationAt, STALE_NS},
     },
     event::{CameraFrame, ImuSample, Mark, ShipSample},
@@ -21,19 +22,13 @@ use crate::{
     time::Time,
 };
 
-/// An inertial unit that repeats the very same numbers for this long is stuck: noise alone would change them.
-const FROZEN_NS: i64 = 300_000_000;
-
-/// Angular rate beyond which the unit is taken for broken, rad/s (4000 deg/s: twice what gun-mount units measure).
-const RATE_MAX: f64 = 70.0;
-
 /// Counters of what was not used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorCounts {
     /// Samples taken in.
     pub imu: u64,
     /// Samples with a number that is not finite or not possible.
-    pub imu_insane: u64,
+    pub imu_implausible: u64,
     /// Samples while the unit was stuck.
     pub imu_frozen: u64,
     /// Restarts of the unit's clock.
@@ -63,8 +58,7 @@ pub struct Sensors {
     aid: HeadingAiding,
     clock: ClockMap,
     attitude: Attitude,
-    last: Option<(DVec3, DVec3)>,
-    changed: Time,
+    plausibility: Plausibility,
     frame: Option<CameraFrame>,
     counts: SensorCounts,
 }
@@ -96,8 +90,7 @@ impl Sensors {
             aid: HeadingAiding::new(heading.clone()),
             clock: ClockMap::new(),
             attitude: Attitude::new(settings, calibration.gyro_bias, calibration.camera_from_imu),
-            last: None,
-            changed: Time::MIN,
+            plausibility: Plausibility::default(),
             frame: None,
             counts: SensorCounts::default(),
         }
@@ -106,15 +99,12 @@ impl Sensors {
     /// Takes in a sample of the inertial unit.
     pub fn imu(&mut self, sample: &ImuSample) {
         self.counts.imu += 1;
-        if !sample.is_finite() || sample.rate.abs().max_element() > RATE_MAX {
-            self.counts.imu_insane += 1;
+        if !is_possible(sample) {
+            self.counts.imu_implausible += 1;
             return;
         }
-        let now = Some((sample.rate, sample.accel));
-        if self.last != now {
-            self.last = now;
-            self.changed = sample.arrival;
-        } else if sample.arrival.ns_since(self.changed) > FROZEN_NS {
+        self.plausibility.sample(sample);
+        if self.plausibility.is_stuck() {
             self.counts.imu_frozen += 1;
             return;
         }
@@ -249,7 +239,7 @@ impl Sensors {
         match self.attitude.newest() {
             None => Some(Fault::ImuAwaited),
             Some(t) if now.ns_since(t) <= STALE_NS => None,
-            Some(_) if self.last.is_some() && self.counts.imu_frozen > 0 => Some(Fault::ImuSanity),
+            Some(_) if self.counts.imu_frozen > 0 => Some(Fault::ImuSanity),
             Some(_) => Some(Fault::ImuLost),
         }
     }
@@ -259,7 +249,7 @@ impl Sensors {
 mod tests {
     use super::*;
     use crate::event::{Picture, PixelFormat};
-    use glam::DVec2;
+    use glam::{DVec2, DVec3};
 
     fn sensors() -> Sensors {
         sensors_read_in(0)
@@ -312,7 +302,7 @@ mod tests {
         s.imu(&ImuSample { rate: DVec3::NAN, ..sample(0) });
         s.imu(&ImuSample { rate: DVec3::X * 100.0, ..sample(1) });
         s.imu(&ImuSample { world_from_imu: Some(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0)), ..sample(2) });
-        assert_eq!(s.counts().imu_insane, 3);
+        assert_eq!(s.counts().imu_implausible, 3);
         assert!(s.newest_orientation().is_none());
     }
 

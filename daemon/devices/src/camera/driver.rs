@@ -6,15 +6,15 @@ use bowwave_core::event::Lent;
 
 use super::{
     Coding, Rate,
-    identity::Found,
-    negotiate::{Candidate, Offer},
+    identity::FoundCamera,
+    negotiate::{ModeCandidate, Offer},
     settings::{CameraSettings, Controls},
-    timing::Stamp,
+    timing::BufferStamp,
 };
 
 /// What an opened node says about itself.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Opened {
+pub(super) struct OpenedCamera {
     /// What the maker calls it.
     pub card: String,
     /// Whether it delivers pictures: a camera has other nodes too.
@@ -25,7 +25,7 @@ pub(super) struct Opened {
 
 /// The format that a driver really set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Format {
+pub(super) struct SetFormat {
     /// How pictures are coded.
     pub coding: Coding,
     /// Pixels across.
@@ -40,7 +40,7 @@ pub(super) struct Format {
 
 /// A buffer that the driver gave back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Filled {
+pub(super) struct FilledBuffer {
     /// Which.
     pub index: u32,
     /// Bytes in it, as the driver says.
@@ -50,7 +50,7 @@ pub(super) struct Filled {
     /// The driver's frame counter.
     pub sequence: u32,
     /// When.
-    pub stamp: Stamp,
+    pub stamp: BufferStamp,
 }
 
 /// What woke the thread.
@@ -64,17 +64,17 @@ pub(super) struct Ready {
     pub failed: bool,
 }
 
-/// One camera at a time. Errors are the kernel's; their numbers decide what is done. The device is closed by [`Driver::close`]
+/// One camera at a time. Errors are the kernel's; their numbers decide what is done. The device is closed by [`CameraDriver::close`]
 /// or by opening another.
-pub(super) trait Driver {
+pub(super) trait CameraDriver {
     /// The video nodes of this computer, by number.
-    fn find(&mut self, settings: &CameraSettings) -> Vec<Found>;
+    fn find(&mut self, settings: &CameraSettings) -> Vec<FoundCamera>;
     /// Opens a node and asks what it can deliver, also at the sizes of `settings` where it gives only ranges.
-    fn open(&mut self, node: &Path, settings: &CameraSettings) -> io::Result<Opened>;
+    fn open(&mut self, node: &Path, settings: &CameraSettings) -> io::Result<OpenedCamera>;
     /// Asks for a mode; answers what was set, and the rate where the driver tells it.
-    fn set_mode(&mut self, wanted: &Candidate) -> io::Result<(Format, Option<Rate>)>;
+    fn set_mode(&mut self, wanted: &ModeCandidate) -> io::Result<(SetFormat, Option<Rate>)>;
     /// The format that is set.
-    fn format(&mut self) -> io::Result<Format>;
+    fn format(&mut self) -> io::Result<SetFormat>;
     /// Locks what is to be locked; answers what the camera refused.
     fn set_controls(&mut self, controls: &Controls) -> Vec<&'static str>;
     /// Exposure time, nanoseconds, where the camera tells it.
@@ -86,12 +86,12 @@ pub(super) trait Driver {
     /// Stops and gives up the buffers, so that another mode can be set. Pictures that are lent stay as they are.
     fn stop(&mut self);
     /// The next filled buffer, oldest first; `None` where none waits.
-    fn dequeue(&mut self) -> io::Result<Option<Filled>>;
+    fn dequeue(&mut self) -> io::Result<Option<FilledBuffer>>;
     /// The memory of a buffer that was dequeued and not yet queued; empty for any other.
     fn bytes(&self, index: u32) -> &[u8];
     /// Gives a dequeued buffer back to the driver.
     fn queue(&mut self, index: u32) -> io::Result<()>;
-    /// Lends a dequeued buffer; it comes back with [`Driver::reclaim`] after the last handle is gone.
+    /// Lends a dequeued buffer; it comes back with [`CameraDriver::reclaim`] after the last handle is gone.
     fn lend(&mut self, index: u32) -> Option<Arc<dyn Lent>>;
     /// Gives the driver the buffers that came back.
     fn reclaim(&mut self) -> io::Result<()>;
@@ -102,5 +102,5 @@ pub(super) trait Driver {
     /// Stops and closes.
     fn close(&mut self);
     /// Resets the camera's USB device, as replugging would.
-    fn reset(&mut self, camera: &Found) -> io::Result<()>;
+    fn reset(&mut self, camera: &FoundCamera) -> io::Result<()>;
 }

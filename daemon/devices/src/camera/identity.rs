@@ -8,7 +8,7 @@ use super::CameraSettings;
 
 /// A video node that the system has.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Found {
+pub(super) struct FoundCamera {
     /// Its node, such as `/dev/video0`.
     pub node: PathBuf,
     /// Names that survive replugging, where udev gives any.
@@ -23,7 +23,7 @@ pub(super) struct Found {
     pub usb: Option<PathBuf>,
 }
 
-impl Found {
+impl FoundCamera {
     /// What is compared with the calibration's serial number: the USB serial number, or the card's name where there is none.
     pub fn identity(&self) -> &str {
         self.serial.as_deref().unwrap_or(&self.name)
@@ -51,23 +51,23 @@ const OTHER_CAMERA_NS: i64 = 5 * NS_PER_S;
 
 /// What to do about what is there.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Choice {
+pub(super) enum CameraChoice {
     /// No camera that is meant.
     Absent,
     /// One is there, but not the calibrated one.
-    Mismatch(Found),
+    Mismatch(FoundCamera),
     /// These may be it, best first: a camera has nodes that deliver no pictures beside the one that does.
-    Try(Vec<Found>),
+    Try(Vec<FoundCamera>),
 }
 
 /// Chooses among `found` (by node number). `known` is the camera that was in use, `lost_ns` for how long it has been away.
 pub(super) fn choose(
-    found: &[Found],
+    found: &[FoundCamera],
     settings: &CameraSettings,
-    known: Option<&Found>,
+    known: Option<&FoundCamera>,
     lost_ns: i64,
-) -> Choice {
-    let those = |wanted: &dyn Fn(&Found) -> bool| -> Vec<Found> {
+) -> CameraChoice {
+    let those = |wanted: &dyn Fn(&FoundCamera) -> bool| -> Vec<FoundCamera> {
         found.iter().filter(|f| wanted(f)).cloned().collect()
     };
     let surely = known.map(|known| those(&|f| f.is_surely(known))).unwrap_or_default();
@@ -89,33 +89,37 @@ pub(super) fn choose(
         && let Some(other) = meant.iter().find(|f| f.identity() != serial)
     {
         let right: Vec<_> = meant.iter().filter(|f| f.identity() == serial).cloned().collect();
-        return if right.is_empty() { Choice::Mismatch(other.clone()) } else { Choice::Try(right) };
+        return if right.is_empty() {
+            CameraChoice::Mismatch(other.clone())
+        } else {
+            CameraChoice::Try(right)
+        };
     }
-    if meant.is_empty() { Choice::Absent } else { Choice::Try(meant) }
+    if meant.is_empty() { CameraChoice::Absent } else { CameraChoice::Try(meant) }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn usb(node: &str, serial: &str) -> Found {
-        Found {
+    fn usb(node: &str, serial: &str) -> FoundCamera {
+        FoundCamera {
             node: node.into(),
             links: vec![format!("/dev/v4l/by-id/usb-Cam_{serial}").into()],
             serial: Some(serial.to_owned()),
             name: "Sea Cam".to_owned(),
             usb: Some("/dev/bus/usb/001/004".into()),
-            ..Found::default()
+            ..FoundCamera::default()
         }
     }
 
-    fn platform(node: &str, name: &str) -> Found {
-        Found { node: node.into(), name: name.to_owned(), ..Found::default() }
+    fn platform(node: &str, name: &str) -> FoundCamera {
+        FoundCamera { node: node.into(), name: name.to_owned(), ..FoundCamera::default() }
     }
 
-    fn nodes(choice: &Choice) -> Vec<&str> {
+    fn nodes(choice: &CameraChoice) -> Vec<&str> {
         match choice {
-            Choice::Try(list) => list.iter().map(|f| f.node.to_str().unwrap()).collect(),
+            CameraChoice::Try(list) => list.iter().map(|f| f.node.to_str().unwrap()).collect(),
             _ => Vec::new(),
         }
     }
@@ -125,7 +129,7 @@ mod tests {
         let found = [platform("/dev/video0", "codec"), usb("/dev/video1", "A")];
         let choice = choose(&found, &CameraSettings::default(), None, 0);
         assert_eq!(nodes(&choice), ["/dev/video0", "/dev/video1"]);
-        assert_eq!(choose(&[], &CameraSettings::default(), None, 0), Choice::Absent);
+        assert_eq!(choose(&[], &CameraSettings::default(), None, 0), CameraChoice::Absent);
     }
 
     #[test]
@@ -133,24 +137,24 @@ mod tests {
         let settings = CameraSettings { serial: Some("B".to_owned()), ..CameraSettings::default() };
         let found = [usb("/dev/video0", "A"), usb("/dev/video2", "B"), usb("/dev/video3", "B")];
         assert_eq!(nodes(&choose(&found, &settings, None, 0)), ["/dev/video2", "/dev/video3"]);
-        assert_eq!(choose(&found[..1], &settings, None, 0), Choice::Mismatch(found[0].clone()));
-        assert_eq!(choose(&[platform("/dev/video9", "codec")], &settings, None, 0), Choice::Absent);
+        assert_eq!(choose(&found[..1], &settings, None, 0), CameraChoice::Mismatch(found[0].clone()));
+        assert_eq!(choose(&[platform("/dev/video9", "codec")], &settings, None, 0), CameraChoice::Absent);
         // A camera without a serial number goes by its name.
         let settings = CameraSettings {
             serial: Some("B".to_owned()),
             device: Some("/dev/video0".into()),
             ..CameraSettings::default()
         };
-        let named = |name| Found { named: true, ..platform("/dev/video0", name) };
+        let named = |name| FoundCamera { named: true, ..platform("/dev/video0", name) };
         assert_eq!(nodes(&choose(&[named("B")], &settings, None, 0)), ["/dev/video0"]);
-        assert!(matches!(choose(&[named("C")], &settings, None, 0), Choice::Mismatch(_)));
+        assert!(matches!(choose(&[named("C")], &settings, None, 0), CameraChoice::Mismatch(_)));
     }
 
     #[test]
     fn a_lost_camera_is_found_under_another_node_even_if_its_old_one_is_taken() {
         let known = usb("/dev/video0", "A");
         let settings = CameraSettings { device: Some("/dev/video0".into()), ..CameraSettings::default() };
-        let taken = Found { named: true, ..usb("/dev/video0", "Z") };
+        let taken = FoundCamera { named: true, ..usb("/dev/video0", "Z") };
         let found = [taken.clone(), usb("/dev/video4", "A")];
         assert_eq!(nodes(&choose(&found, &settings, Some(&known), 0)), ["/dev/video4"]);
         assert_eq!(nodes(&choose(&[taken], &settings, Some(&known), 0)), ["/dev/video0"]);
@@ -160,7 +164,7 @@ mod tests {
     fn the_next_best_camera_has_to_wait_for_the_one_in_use() {
         let (known, other) = (usb("/dev/video0", "A"), [usb("/dev/video1", "Z")]);
         let settings = CameraSettings::default();
-        assert_eq!(choose(&other, &settings, Some(&known), NS_PER_S), Choice::Absent);
+        assert_eq!(choose(&other, &settings, Some(&known), NS_PER_S), CameraChoice::Absent);
         assert_eq!(nodes(&choose(&other, &settings, Some(&known), 6 * NS_PER_S)), ["/dev/video1"]);
         // Nothing tells two virtual cameras of one name apart.
         let again = [platform("/dev/video7", "vivid")];

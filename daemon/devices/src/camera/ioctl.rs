@@ -22,9 +22,9 @@ use v4l::{
 
 use super::{
     Coding, Rate, Size,
-    driver::{Filled, Format},
-    negotiate::{Candidate, Rates},
-    timing::Stamp,
+    driver::{FilledBuffer, SetFormat},
+    negotiate::{ModeCandidate, Rates},
+    timing::BufferStamp,
 };
 
 const CAPTURE: u32 = v4l2_buf_type_V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -193,7 +193,7 @@ const fn rate(interval: v4l2_fract) -> Option<Rate> {
 }
 
 /// The format that is set.
-pub(super) fn format(fd: BorrowedFd<'_>) -> io::Result<Format> {
+pub(super) fn format(fd: BorrowedFd<'_>) -> io::Result<SetFormat> {
     let mut raw = v4l2_format { type_: CAPTURE, ..v4l2_format::zeroed() };
     // SAFETY: VIDIOC_G_FMT reads and writes one v4l2_format.
     unsafe { call(fd, vidioc::VIDIOC_G_FMT, &mut raw)? };
@@ -201,7 +201,7 @@ pub(super) fn format(fd: BorrowedFd<'_>) -> io::Result<Format> {
 }
 
 /// Asks for a format; answers the one that the driver set instead.
-pub(super) fn set_format(fd: BorrowedFd<'_>, wanted: &Candidate) -> io::Result<Format> {
+pub(super) fn set_format(fd: BorrowedFd<'_>, wanted: &ModeCandidate) -> io::Result<SetFormat> {
     let mut raw = v4l2_format { type_: CAPTURE, ..v4l2_format::zeroed() };
     // SAFETY: `pix` is the variant of this type of buffer; its integers are valid whatever the bytes are.
     let pix = unsafe { &mut raw.fmt.pix };
@@ -214,10 +214,10 @@ pub(super) fn set_format(fd: BorrowedFd<'_>, wanted: &Candidate) -> io::Result<F
     Ok(checked(&raw))
 }
 
-fn checked(raw: &v4l2_format) -> Format {
+fn checked(raw: &v4l2_format) -> SetFormat {
     // SAFETY: `pix` is the variant of this type of buffer; its integers are valid whatever the bytes are.
     let pix = unsafe { raw.fmt.pix };
-    Format {
+    SetFormat {
         coding: Coding::from_fourcc(pix.pixelformat.to_le_bytes()),
         width: pix.width,
         height: pix.height,
@@ -290,7 +290,7 @@ pub(super) fn queue_buffer(fd: BorrowedFd<'_>, index: u32) -> io::Result<()> {
 }
 
 /// Takes a filled buffer; `None` where none is filled.
-pub(super) fn dequeue_buffer(fd: BorrowedFd<'_>) -> io::Result<Option<Filled>> {
+pub(super) fn dequeue_buffer(fd: BorrowedFd<'_>) -> io::Result<Option<FilledBuffer>> {
     let mut raw = buffer(0);
     // SAFETY: VIDIOC_DQBUF reads and writes one v4l2_buffer, which points to nothing.
     match unsafe { call(fd, vidioc::VIDIOC_DQBUF, &mut raw) } {
@@ -300,12 +300,12 @@ pub(super) fn dequeue_buffer(fd: BorrowedFd<'_>) -> io::Result<Option<Filled>> {
     let ns =
         i128::from(raw.timestamp.tv_sec) * i128::from(NS_PER_S) + i128::from(raw.timestamp.tv_usec) * 1000;
     let source = raw.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK;
-    Ok(Some(Filled {
+    Ok(Some(FilledBuffer {
         index: raw.index,
         bytes_used: raw.bytesused as usize,
         damaged: raw.flags & V4L2_BUF_FLAG_ERROR != 0,
         sequence: raw.sequence,
-        stamp: Stamp {
+        stamp: BufferStamp {
             time: Time::from_ns(i64::try_from(ns).unwrap_or(i64::MAX)),
             monotonic: raw.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC,
             start_of_exposure: source == V4L2_BUF_FLAG_TSTAMP_SRC_SOE,

@@ -11,7 +11,7 @@ const SIDE_MAX: u32 = 8192;
 
 /// What a JPEG says about itself before its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Header {
+pub struct JpegHeader {
     /// Pixels across, at least 1.
     pub width: u32,
     /// Pixels down, at least 1.
@@ -58,7 +58,7 @@ pub enum JpegError {
 }
 
 /// Reads the header: everything up to the coded pixels. Allocates nothing.
-pub fn header(jpeg: &[u8]) -> Result<Header, JpegError> {
+pub fn header(jpeg: &[u8]) -> Result<JpegHeader, JpegError> {
     const CUT: JpegError = JpegError::Malformed("it ends within its header");
     if !jpeg.starts_with(&[0xff, 0xd8]) {
         return Err(JpegError::Malformed("it does not begin with a start marker"));
@@ -93,7 +93,13 @@ pub fn header(jpeg: &[u8]) -> Result<Header, JpegError> {
                 let Some((width, height, components, progressive)) = frame else {
                     return Err(JpegError::Malformed("pixels before a frame header"));
                 };
-                return Ok(Header { width, height, components, progressive, scan_start: at + length.max(2) });
+                return Ok(JpegHeader {
+                    width,
+                    height,
+                    components,
+                    progressive,
+                    scan_start: at + length.max(2),
+                });
             }
             _ => {}
         }

@@ -13,12 +13,12 @@ const PICTURES_MAX: usize = 240;
 
 /// Share of damaged pictures over the last two seconds, with hysteresis.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Damage {
+pub(super) struct PictureDamage {
     seen: VecDeque<(Time, bool)>,
     raised: bool,
 }
 
-impl Damage {
+impl PictureDamage {
     /// Takes in one picture. Whether too many are damaged: above 30 % until below 10 %.
     pub fn push(&mut self, now: Time, damaged: bool) -> bool {
         self.seen.push_back((now, damaged));
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn damage_is_raised_above_thirty_percent_and_cleared_below_ten() {
-        let mut damage = Damage::default();
+        let mut damage = PictureDamage::default();
         assert!((0..60).all(|n| !damage.push(at(n), n % 4 == 0)), "25 %");
         assert!((60..120).any(|n| damage.push(at(n), n % 2 == 0)), "50 %");
         assert!((120..180).all(|n| damage.push(at(n), n % 5 == 0)), "20 % is not better yet");
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn one_damaged_picture_of_few_says_nothing() {
-        let mut damage = Damage::default();
+        let mut damage = PictureDamage::default();
         assert!(!damage.push(at(0), true) && !damage.push(at(1), true));
         damage.restart();
         assert_eq!(damage.share(), (0, 0));

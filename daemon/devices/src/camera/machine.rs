@@ -1,4 +1,4 @@
-//! The life of the camera: a state machine over a [`Driver`], with time as an argument.
+//! The life of the camera: a state machine over a [`CameraDriver`], with time as an argument.
 
 mod pictures;
 
@@ -11,12 +11,12 @@ use bowwave_core::{
 };
 
 use super::{
-    CameraCounters, CameraSettings, CameraStatus, InUse, Life,
-    driver::{Driver, Format, Opened, Ready},
-    identity::{Choice, Found, choose},
+    CameraCounters, CameraLife, CameraSettings, CameraStatus, InUse,
+    driver::{CameraDriver, OpenedCamera, Ready, SetFormat},
+    identity::{CameraChoice, FoundCamera, choose},
     jpeg,
-    judge::{Damage, Stillness},
-    negotiate::{Candidate, candidates, next_smaller},
+    judge::{PictureDamage, Stillness},
+    negotiate::{ModeCandidate, candidates, next_smaller},
     pool::Pool,
     settings::usable_size,
     trouble::Trouble,
@@ -64,27 +64,27 @@ const WRONG_WITH_PICTURES: [Fault; 3] = [Fault::CamFormat, Fault::CamStatic, Fau
 
 /// What a step brought about.
 #[derive(Default)]
-pub(super) struct Output {
+pub(super) struct CameraOutput {
     /// Pictures, oldest first.
     pub frames: Vec<CameraFrame>,
     /// Faults that came and went, in their order.
     pub faults: Vec<FaultChange>,
 }
 
-enum State {
+enum CameraState {
     /// Nothing is open; the next try is at `next`.
     Away {
-        life: Life,
+        life: CameraLife,
         next: Time,
     },
-    Streaming(Box<Stream>),
+    Streaming(Box<CameraStream>),
     Stopped,
 }
 
 /// What is known of a stream that runs.
-struct Stream {
-    found: Found,
-    format: Format,
+struct CameraStream {
+    found: FoundCamera,
+    format: SetFormat,
     /// Period of the mode, nanoseconds.
     nominal_ns: i64,
     /// That or the mean of late, whichever is longer, nanoseconds.
@@ -109,7 +109,7 @@ struct Stream {
     act_at: Option<Time>,
 }
 
-impl Stream {
+impl CameraStream {
     /// The time at which the absence of frames is a stall.
     fn stalls_at(&self, first_frame_ns: i64) -> Time {
         if self.frames == 0 {
@@ -120,11 +120,11 @@ impl Stream {
 }
 
 /// The camera's life.
-pub(super) struct Machine {
+pub(super) struct CameraMachine {
     settings: CameraSettings,
-    state: State,
+    state: CameraState,
     /// The camera that was last in use, and since when it has been away.
-    known: Option<Found>,
+    known: Option<FoundCamera>,
     lost_at: Option<Time>,
     raised: BTreeSet<Fault>,
     /// Failures of the link, and stalls, in a row.
@@ -135,18 +135,18 @@ pub(super) struct Machine {
     last_mid: Time,
     decoder: jpeg::Decoder,
     packed: Pool,
-    damage: Damage,
+    damage: PictureDamage,
     stillness: Stillness,
     counters: CameraCounters,
     in_use: Option<Arc<InUse>>,
 }
 
-impl Machine {
+impl CameraMachine {
     /// A camera that is looked for from `now` on.
     pub fn new(settings: CameraSettings, now: Time) -> Self {
         Self {
             settings,
-            state: State::Away { life: Life::Searching, next: now },
+            state: CameraState::Away { life: CameraLife::Searching, next: now },
             known: None,
             lost_at: None,
             raised: BTreeSet::new(),
@@ -156,7 +156,7 @@ impl Machine {
             last_mid: Time::MIN,
             decoder: jpeg::Decoder::for_camera(),
             packed: Pool::default(),
-            damage: Damage::default(),
+            damage: PictureDamage::default(),
             stillness: Stillness::default(),
             counters: CameraCounters::default(),
             in_use: None,
@@ -166,44 +166,50 @@ impl Machine {
     /// How it stands.
     pub fn status(&self) -> CameraStatus {
         let life = match &self.state {
-            State::Away { life, .. } => *life,
-            State::Stopped => Life::Stopped,
-            State::Streaming(s) if s.act_at.is_some() => Life::Stalled,
-            State::Streaming(s) if s.frames == 0 => Life::Opening,
-            State::Streaming(_) => Life::Streaming,
+            CameraState::Away { life, .. } => *life,
+            CameraState::Stopped => CameraLife::Stopped,
+            CameraState::Streaming(s) if s.act_at.is_some() => CameraLife::Stalled,
+            CameraState::Streaming(s) if s.frames == 0 => CameraLife::Opening,
+            CameraState::Streaming(_) => CameraLife::Streaming,
         };
         CameraStatus { life, in_use: self.in_use.clone(), counters: self.counters }
     }
 
     /// Does what is due at `now`, after the thread was woken by `ready`. Answers when it has to be called again at the
     /// latest.
-    pub fn step(&mut self, now: Time, ready: Ready, driver: &mut impl Driver, out: &mut Output) -> Time {
-        match std::mem::replace(&mut self.state, State::Stopped) {
-            State::Stopped => return Time::from_ns(i64::MAX),
-            State::Away { life, next } if now < next => self.state = State::Away { life, next },
-            State::Away { .. } => self.look(now, driver, out),
-            State::Streaming(mut stream) => match self.stream(&mut stream, now, ready, driver, out) {
-                Ok(true) => self.state = State::Streaming(stream),
+    pub fn step(
+        &mut self,
+        now: Time,
+        ready: Ready,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
+    ) -> Time {
+        match std::mem::replace(&mut self.state, CameraState::Stopped) {
+            CameraState::Stopped => return Time::from_ns(i64::MAX),
+            CameraState::Away { life, next } if now < next => self.state = CameraState::Away { life, next },
+            CameraState::Away { .. } => self.look(now, driver, out),
+            CameraState::Streaming(mut stream) => match self.stream(&mut stream, now, ready, driver, out) {
+                Ok(true) => self.state = CameraState::Streaming(stream),
                 // Something decided on another state already.
                 Ok(false) => {}
                 Err((what, error)) => self.fail(now, &stream.found, what, &error, driver, out),
             },
         }
         match &self.state {
-            State::Stopped => Time::from_ns(i64::MAX),
-            State::Away { next, .. } => *next,
-            State::Streaming(s) => s.act_at.unwrap_or_else(|| s.stalls_at(self.first_frame_ns)),
+            CameraState::Stopped => Time::from_ns(i64::MAX),
+            CameraState::Away { next, .. } => *next,
+            CameraState::Streaming(s) => s.act_at.unwrap_or_else(|| s.stalls_at(self.first_frame_ns)),
         }
     }
 
     /// Ends for good.
-    pub fn stop(&mut self, driver: &mut impl Driver) {
+    pub fn stop(&mut self, driver: &mut impl CameraDriver) {
         driver.close();
         self.in_use = None;
-        self.state = State::Stopped;
+        self.state = CameraState::Stopped;
     }
 
-    fn raise(&mut self, now: Time, fault: Fault, cause: String, out: &mut Output) {
+    fn raise(&mut self, now: Time, fault: Fault, cause: String, out: &mut CameraOutput) {
         let over: Vec<Fault> = self.raised.iter().copied().filter(|old| replaces(fault, *old)).collect();
         for old in over {
             self.clear(now, old, out);
@@ -213,23 +219,23 @@ impl Machine {
         }
     }
 
-    fn clear(&mut self, now: Time, fault: Fault, out: &mut Output) {
+    fn clear(&mut self, now: Time, fault: Fault, out: &mut CameraOutput) {
         if self.raised.remove(&fault) {
             out.faults.push(FaultChange::cleared(now, fault));
         }
     }
 
-    fn away(&mut self, life: Life, next: Time) {
+    fn away(&mut self, life: CameraLife, next: Time) {
         self.in_use = None;
-        self.state = State::Away { life, next };
+        self.state = CameraState::Away { life, next };
     }
 
     /// Looks for the camera and starts it.
-    fn look(&mut self, now: Time, driver: &mut impl Driver, out: &mut Output) {
+    fn look(&mut self, now: Time, driver: &mut impl CameraDriver, out: &mut CameraOutput) {
         let found = driver.find(&self.settings);
         let lost_ns = self.lost_at.map_or(0, |at| now.ns_since(at));
         match choose(&found, &self.settings, self.known.as_ref(), lost_ns) {
-            Choice::Absent => {
+            CameraChoice::Absent => {
                 let cause = match (&self.settings.device, &self.settings.serial) {
                     (Some(device), _) => format!("no camera at {}: plug it in", device.display()),
                     (None, Some(serial)) => format!("no camera with serial number {serial}: plug it in"),
@@ -237,9 +243,9 @@ impl Machine {
                 };
                 self.raise(now, Fault::CamLost, cause, out);
                 self.lost_at.get_or_insert(now);
-                self.away(Life::Searching, now.plus_ns(SEARCH_NS));
+                self.away(CameraLife::Searching, now.plus_ns(SEARCH_NS));
             }
-            Choice::Mismatch(other) => {
+            CameraChoice::Mismatch(other) => {
                 let cause = format!(
                     "{} is {}, the calibration is for {}: fit that camera, or calibrate this one",
                     other.node.display(),
@@ -247,13 +253,19 @@ impl Machine {
                     self.settings.serial.as_deref().unwrap_or_default()
                 );
                 self.raise(now, Fault::CalMismatch, cause, out);
-                self.away(Life::Mismatched, now.plus_ns(MISMATCH_NS));
+                self.away(CameraLife::Mismatched, now.plus_ns(MISMATCH_NS));
             }
-            Choice::Try(list) => self.try_each(now, &list, driver, out),
+            CameraChoice::Try(list) => self.try_each(now, &list, driver, out),
         }
     }
 
-    fn try_each(&mut self, now: Time, list: &[Found], driver: &mut impl Driver, out: &mut Output) {
+    fn try_each(
+        &mut self,
+        now: Time,
+        list: &[FoundCamera],
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
+    ) {
         for found in list {
             match self.begin(now, found, driver, out) {
                 Ok(Some(stream)) => return self.begun(now, stream, driver, out),
@@ -269,17 +281,17 @@ impl Machine {
             names.join(", ")
         );
         self.raise(now, Fault::CamLost, cause, out);
-        self.away(Life::Searching, now.plus_ns(MISMATCH_NS));
+        self.away(CameraLife::Searching, now.plus_ns(MISMATCH_NS));
     }
 
     /// Opens `found` and starts it in the best mode that works; `None` where it delivers nothing usable.
     fn begin(
         &mut self,
         now: Time,
-        found: &Found,
-        driver: &mut impl Driver,
-        out: &mut Output,
-    ) -> Result<Option<Stream>, Failure> {
+        found: &FoundCamera,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
+    ) -> Result<Option<CameraStream>, Failure> {
         let opened = driver.open(&found.node, &self.settings).map_err(during("open it"))?;
         if !opened.captures {
             return Ok(None);
@@ -328,7 +340,7 @@ impl Machine {
             let rate = rate.unwrap_or(candidate.mode.rate);
             self.in_use = Some(Arc::new(in_use(found, &opened, &format, rate, refused)));
             let nominal_ns = rate.period_ns().clamp(MS, 1000 * MS);
-            return Ok(Some(Stream {
+            return Ok(Some(CameraStream {
                 found: found.clone(),
                 format,
                 nominal_ns,
@@ -350,7 +362,13 @@ impl Machine {
     }
 
     /// A stream was started: notes what is other than before.
-    fn begun(&mut self, now: Time, stream: Stream, driver: &mut impl Driver, out: &mut Output) {
+    fn begun(
+        &mut self,
+        now: Time,
+        stream: CameraStream,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
+    ) {
         if let Some(known) = self.known.replace(stream.found.clone())
             && known.node != stream.found.node
         {
@@ -373,11 +391,17 @@ impl Machine {
             let found = stream.found;
             return self.fail(now, &found, "get buffers", &error, driver, out);
         }
-        self.state = State::Streaming(Box::new(stream));
+        self.state = CameraState::Streaming(Box::new(stream));
     }
 
     /// Tells whether pictures have the calibrated size.
-    fn check_size(&mut self, now: Time, size: (u32, u32), found: &Found, out: &mut Output) -> bool {
+    fn check_size(
+        &mut self,
+        now: Time,
+        size: (u32, u32),
+        found: &FoundCamera,
+        out: &mut CameraOutput,
+    ) -> bool {
         match self.settings.calibrated_size {
             Some(wanted) if wanted != size => {
                 let cause = format!(
@@ -398,11 +422,11 @@ impl Machine {
     /// One round of a running stream. `false` where another state was entered.
     fn stream(
         &mut self,
-        stream: &mut Stream,
+        stream: &mut CameraStream,
         now: Time,
         ready: Ready,
-        driver: &mut impl Driver,
-        out: &mut Output,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
     ) -> Result<bool, Failure> {
         if ready.event && driver.source_changed() {
             return Ok(self.reopen(now, driver));
@@ -435,10 +459,10 @@ impl Machine {
     /// Looks for a stall and acts on it, more roughly each time.
     fn stalled(
         &mut self,
-        stream: &mut Stream,
+        stream: &mut CameraStream,
         now: Time,
-        driver: &mut impl Driver,
-        out: &mut Output,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
     ) -> Result<bool, Failure> {
         let Some(act_at) = stream.act_at else {
             if now >= stream.stalls_at(self.first_frame_ns) {
@@ -479,31 +503,31 @@ impl Machine {
     }
 
     /// Closes, to open again at once. Always `false`: the stream is over.
-    fn reopen(&mut self, now: Time, driver: &mut impl Driver) -> bool {
+    fn reopen(&mut self, now: Time, driver: &mut impl CameraDriver) -> bool {
         driver.close();
-        self.away(Life::Opening, now);
+        self.away(CameraLife::Opening, now);
         false
     }
 
-    fn reset(&mut self, now: Time, found: &Found, driver: &mut impl Driver) {
+    fn reset(&mut self, now: Time, found: &FoundCamera, driver: &mut impl CameraDriver) {
         driver.close();
         match driver.reset(found) {
             Ok(()) => self.counters.resets += 1,
             // Without the right to reset, opening it again is all that can be done; the log has the fault already.
             Err(e) => log::debug!("{}: cannot be reset: {e}", found.node.display()),
         }
-        self.away(Life::Resetting, now.plus_ns(RESET_NS));
+        self.away(CameraLife::Resetting, now.plus_ns(RESET_NS));
     }
 
     /// Something failed: tells, and decides when to try again.
     fn fail(
         &mut self,
         now: Time,
-        found: &Found,
+        found: &FoundCamera,
         what: &'static str,
         error: &io::Error,
-        driver: &mut impl Driver,
-        out: &mut Output,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
     ) {
         let trouble = Trouble::of(error);
         let name = found.best_name().display();
@@ -512,18 +536,18 @@ impl Machine {
         self.lost_at.get_or_insert(now);
         driver.close();
         match trouble {
-            Trouble::Gone => self.away(Life::Searching, now.plus_ns(SEARCH_NS / 2)),
-            Trouble::Denied => self.away(Life::Searching, now.plus_ns(SEARCH_NS)),
-            Trouble::Busy => self.away(Life::Busy, now.plus_ns(BUSY_NS)),
-            Trouble::Bandwidth => self.away(Life::Opening, now.plus_ns(BUSY_NS)),
-            Trouble::Queue => self.away(Life::Opening, now.plus_ns(AGAIN_NS)),
+            Trouble::Gone => self.away(CameraLife::Searching, now.plus_ns(SEARCH_NS / 2)),
+            Trouble::Denied => self.away(CameraLife::Searching, now.plus_ns(SEARCH_NS)),
+            Trouble::Busy => self.away(CameraLife::Busy, now.plus_ns(BUSY_NS)),
+            Trouble::Bandwidth => self.away(CameraLife::Opening, now.plus_ns(BUSY_NS)),
+            Trouble::Queue => self.away(CameraLife::Opening, now.plus_ns(AGAIN_NS)),
             Trouble::Protocol => {
                 self.protocol_failures += 1;
                 if self.protocol_failures >= PROTOCOL_FAILURES {
                     self.protocol_failures = 0;
                     self.reset(now, found, driver);
                 } else {
-                    self.away(Life::Opening, now.plus_ns(AGAIN_NS));
+                    self.away(CameraLife::Opening, now.plus_ns(AGAIN_NS));
                 }
             }
         }
@@ -554,23 +578,23 @@ fn during(what: &'static str) -> impl FnOnce(io::Error) -> Failure {
     move |error| (what, error)
 }
 
-impl Format {
-    fn is(&self, candidate: &Candidate) -> bool {
+impl SetFormat {
+    fn is(&self, candidate: &ModeCandidate) -> bool {
         let mode = &candidate.mode;
         (self.coding, self.width, self.height) == (mode.coding, mode.width, mode.height)
     }
 }
 
 /// Whether a picture of that format can be what the driver says.
-fn plausible(format: &Format) -> bool {
+fn plausible(format: &SetFormat) -> bool {
     usable_size(format.coding, format.width, format.height)
         && pictures::layout(format).is_none_or(|layout| layout.bytes <= format.size_image as usize)
 }
 
 fn in_use(
-    found: &Found,
-    opened: &Opened,
-    format: &Format,
+    found: &FoundCamera,
+    opened: &OpenedCamera,
+    format: &SetFormat,
     rate: super::Rate,
     refused: Vec<&'static str>,
 ) -> InUse {

@@ -3,17 +3,16 @@
 use std::{
     any::Any,
     io,
-    os::fd::{AsRawFd, BorrowedFd, OwnedFd},
+    os::fd::{AsRawFd, BorrowedFd},
     ptr::{self, NonNull},
     sync::{Arc, Mutex, PoisonError},
 };
 
 use bowwave_core::event::Lent;
-use rustix::{
-    event::{EventfdFlags, eventfd},
-    param::page_size,
-};
+use rustix::param::page_size;
 use v4l::v4l2;
+
+use crate::worker::WakeEvent;
 
 /// Linux's values (asm-generic/mman-common.h): readable and writable, because importing it into a GPU asks for both; shared.
 const READ_WRITE: i32 = 0x1 | 0x2;
@@ -71,11 +70,11 @@ impl Drop for Mapping {
 #[derive(Debug)]
 pub(super) struct Returns {
     back: Mutex<Vec<u32>>,
-    wake: Arc<Wake>,
+    wake: Arc<WakeEvent>,
 }
 
 impl Returns {
-    pub fn new(wake: Arc<Wake>) -> Arc<Self> {
+    pub fn new(wake: Arc<WakeEvent>) -> Arc<Self> {
         Arc::new(Self { back: Mutex::new(Vec::new()), wake })
     }
 
@@ -106,31 +105,7 @@ impl Drop for LentBuffer {
     fn drop(&mut self) {
         // If its stream is over, nobody looks there any more, and that is right: the memory goes with the last handle.
         self.returns.back.lock().unwrap_or_else(PoisonError::into_inner).push(self.index);
-        self.returns.wake.signal();
-    }
-}
-
-/// Ends a poll from another thread.
-#[derive(Debug)]
-pub(super) struct Wake(OwnedFd);
-
-impl Wake {
-    pub fn new() -> io::Result<Self> {
-        Ok(Self(eventfd(0, EventfdFlags::NONBLOCK | EventfdFlags::CLOEXEC)?))
-    }
-
-    pub fn signal(&self) {
-        // A counter that is full wakes as well.
-        let _ = rustix::io::write(&self.0, &1u64.to_ne_bytes());
-    }
-
-    /// Takes the signals back.
-    pub fn clear(&self) {
-        let _ = rustix::io::read(&self.0, &mut [0u8; 8]);
-    }
-
-    pub const fn fd(&self) -> &OwnedFd {
-        &self.0
+        self.returns.wake.notify();
     }
 }
 
@@ -152,7 +127,7 @@ mod tests {
 
     #[test]
     fn a_lent_picture_outlives_its_device_and_comes_back_with_its_last_clone() {
-        let returns = Returns::new(Arc::new(Wake::new().unwrap()));
+        let returns = Returns::new(Arc::new(WakeEvent::new().unwrap()));
         let mapping = Arc::new(mapped(&[7; 64]));
         let lent = LentBuffer { mapping: Arc::clone(&mapping), index: 3, returns: Arc::clone(&returns) };
         let picture = Picture::lent(PixelFormat::Yuyv, 8, 4, Arc::new(lent)).unwrap();
@@ -164,8 +139,7 @@ mod tests {
         assert_eq!(clone.mapping().map(<[u8]>::len), Some(page_size()));
         drop(clone);
         assert_eq!((returns.take(), returns.take()), (vec![3], vec![]));
-        let mut signals = [0; 8];
-        assert!(rustix::io::read(returns.wake.fd(), &mut signals).is_ok(), "the thread was woken");
+        assert!(returns.wake.clear(), "the thread was woken");
     }
 
     #[test]

@@ -31,7 +31,7 @@ use std::{
 
 pub use port::{CameraPort, QUEUE_FRAMES};
 pub use settings::{CameraSettings, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance};
-pub use status::{CameraCounters, CameraStatus, InUse, Life};
+pub use status::{CameraCounters, CameraLife, CameraStatus, InUse};
 
 use crate::nodes;
 
@@ -107,7 +107,7 @@ impl fmt::Display for Size {
 
 /// One coding with its sizes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Mode {
+pub struct CameraMode {
     /// The coding.
     pub coding: Coding,
     /// The sizes that the camera offers in it; empty where the driver does not list them.
@@ -128,7 +128,7 @@ pub struct CameraInfo {
     /// Where it is plugged in.
     pub bus: String,
     /// What it can deliver.
-    pub modes: Vec<Mode>,
+    pub modes: Vec<CameraMode>,
 }
 
 /// Why a camera cannot be used.
@@ -265,9 +265,12 @@ fn describe(dev: &Path, node: &Path) -> Result<CameraInfo, CameraError> {
     })
 }
 
-fn mode(device: BorrowedFd<'_>, code: [u8; 4]) -> Mode {
+fn mode(device: BorrowedFd<'_>, code: [u8; 4]) -> CameraMode {
     // Some drivers list no sizes: then they are unknown, not none.
-    Mode { coding: Coding::from_fourcc(code), sizes: ioctl::frame_sizes(device, code).unwrap_or_default() }
+    CameraMode {
+        coding: Coding::from_fourcc(code),
+        sizes: ioctl::frame_sizes(device, code).unwrap_or_default(),
+    }
 }
 
 fn open(dev: &Path, node: &Path) -> Result<OwnedFd, CameraError> {

@@ -31,14 +31,14 @@ pub(super) struct Offer {
 
 /// A mode to ask the driver for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Candidate {
+pub(super) struct ModeCandidate {
     /// The driver's code of the coding.
     pub fourcc: [u8; 4],
     /// The mode.
     pub mode: WantedMode,
 }
 
-impl Candidate {
+impl ModeCandidate {
     /// What it takes of the bus, bits a second; a JPEG is taken for an eighth of its YUYV picture.
     fn bits_per_second(&self) -> f64 {
         let bits = match self.mode.coding {
@@ -56,7 +56,7 @@ pub(super) fn candidates(
     offers: &[Offer],
     wanted: &[WantedMode],
     calibrated: Option<(u32, u32)>,
-) -> Vec<Candidate> {
+) -> Vec<ModeCandidate> {
     let Some(first) = wanted.first() else { return Vec::new() };
     let mut list = List::default();
     for exact in [true, false] {
@@ -91,13 +91,13 @@ pub(super) fn candidates(
 }
 
 /// The next candidate after `failed` that takes less of the bus.
-pub(super) fn next_smaller(list: &[Candidate], failed: usize) -> Option<usize> {
+pub(super) fn next_smaller(list: &[ModeCandidate], failed: usize) -> Option<usize> {
     let limit = list.get(failed)?.bits_per_second();
     (0..list.len()).find(|i| *i != failed && list[*i].bits_per_second() < limit)
 }
 
 #[derive(Default)]
-struct List(Vec<Candidate>);
+struct List(Vec<ModeCandidate>);
 
 impl List {
     /// Adds `mode` if `offer` has its size and, where `exact`, its rate; else at the nearest rate.
@@ -113,7 +113,7 @@ impl List {
             }
         }
         let Some(rate) = best.filter(|r| !exact || r.same(mode.rate)) else { return };
-        let candidate = Candidate { fourcc: offer.fourcc, mode: WantedMode { rate, ..mode } };
+        let candidate = ModeCandidate { fourcc: offer.fourcc, mode: WantedMode { rate, ..mode } };
         if !self.0.contains(&candidate) {
             self.0.push(candidate);
         }
@@ -229,7 +229,10 @@ mod tests {
     fn a_driver_that_lists_nothing_is_asked_for_what_is_wanted() {
         let wanted = [mode(Coding::Nv12, 640, 480, 30)];
         let offers = [Offer { fourcc: *b"NV12", sizes: Vec::new() }];
-        assert_eq!(candidates(&offers, &wanted, None)[0], Candidate { fourcc: *b"NV12", mode: wanted[0] });
+        assert_eq!(
+            candidates(&offers, &wanted, None)[0],
+            ModeCandidate { fourcc: *b"NV12", mode: wanted[0] }
+        );
         assert!(candidates(&[], &wanted, None).is_empty());
         assert!(candidates(&offers, &[], None).is_empty());
     }

@@ -6,7 +6,7 @@ use super::WantedMode;
 
 /// Where the camera is in its life.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Life {
+pub enum CameraLife {
     /// None that is meant is there; looked for ten times a second.
     #[default]
     Searching,
@@ -82,7 +82,7 @@ pub struct InUse {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CameraStatus {
     /// Where it is in its life.
-    pub life: Life,
+    pub life: CameraLife,
     /// The camera that runs, where one does.
     pub in_use: Option<Arc<InUse>>,
     /// What has been met.

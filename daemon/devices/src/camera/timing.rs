@@ -4,7 +4,7 @@ use bowwave_core::time::{NS_PER_S, Time};
 
 /// What a driver says about the time of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Stamp {
+pub(super) struct BufferStamp {
     /// The time.
     pub time: Time,
     /// Whether it is of `CLOCK_MONOTONIC`.
@@ -34,7 +34,7 @@ const BEHIND_MAX_NS: i64 = NS_PER_S;
 
 /// Middle of the exposure of a picture that reached the host at `arrival`, and whether the stamp could be believed. Where it
 /// could not (another clock, or nowhere near the arrival) the arrival is taken for the end of the frame.
-pub(super) fn mid_exposure(stamp: Stamp, arrival: Time, sensor: Sensor) -> (Time, bool) {
+pub(super) fn mid_exposure(stamp: BufferStamp, arrival: Time, sensor: Sensor) -> (Time, bool) {
     let half = sensor.exposure_ns.unwrap_or(EXPOSURE_UNKNOWN_NS).clamp(0, sensor.period_ns.max(0)) / 2;
     let behind = arrival.ns_since(stamp.time);
     let believed = stamp.monotonic && (-AHEAD_MAX_NS..=BEHIND_MAX_NS).contains(&behind);
@@ -58,8 +58,8 @@ mod tests {
     const SENSOR: Sensor =
         Sensor { exposure_ns: Some(4_000_000), readout_ns: 16_000_000, period_ns: 33_333_333 };
 
-    fn stamp(ms: i64, monotonic: bool, start_of_exposure: bool) -> Stamp {
-        Stamp { time: Time::from_ns(ms * 1_000_000), monotonic, start_of_exposure }
+    fn stamp(ms: i64, monotonic: bool, start_of_exposure: bool) -> BufferStamp {
+        BufferStamp { time: Time::from_ns(ms * 1_000_000), monotonic, start_of_exposure }
     }
 
     #[test]
@@ -86,7 +86,7 @@ mod tests {
             start_of_exposure in any::<bool>(),
             exposure_ns in prop::option::of(any::<i64>()),
         ) {
-            let stamp = Stamp { time: Time::from_ns(time), monotonic, start_of_exposure };
+            let stamp = BufferStamp { time: Time::from_ns(time), monotonic, start_of_exposure };
             let arrival = Time::from_ns(arrival);
             let (middle, _) = mid_exposure(stamp, arrival, Sensor { exposure_ns, ..SENSOR });
             prop_assert!(middle <= arrival && arrival.ns_since(middle) < 2 * NS_PER_S);

@@ -9,7 +9,7 @@ use std::{
 
 use bowwave_core::{event::Lent, time::Time};
 use rustix::{
-    event::{PollFd, PollFlags, Timespec, poll},
+    event::PollFlags,
     fs::{Mode as Permissions, OFlags},
     io::Errno,
 };
@@ -21,14 +21,14 @@ use v4l::v4l_sys::{
 
 use super::{
     Coding, Rate, Size,
-    driver::{Driver, Filled, Format, Opened, Ready},
-    identity::Found,
+    driver::{CameraDriver, FilledBuffer, OpenedCamera, Ready, SetFormat},
+    identity::FoundCamera,
     ioctl,
-    mapping::{LentBuffer, Mapping, Returns, Wake},
-    negotiate::{Candidate, Offer, Rates},
+    mapping::{LentBuffer, Mapping, Returns},
+    negotiate::{ModeCandidate, Offer, Rates},
     settings::{CameraSettings, Controls, Exposure, Focus, WhiteBalance},
 };
-use crate::{clock, nodes};
+use crate::{clock, nodes, worker::WakeEvent};
 
 /// Opens a node for streaming: never waits, and no child inherits it.
 pub(super) fn open_node(node: &Path) -> io::Result<OwnedFd> {
@@ -38,50 +38,47 @@ pub(super) fn open_node(node: &Path) -> io::Result<OwnedFd> {
 
 /// Where a buffer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Place {
+enum BufferPlace {
     Driver,
     Here,
     Lent,
 }
 
 #[derive(Debug)]
-struct Buffer {
+struct DriverBuffer {
     mapping: Arc<Mapping>,
-    place: Place,
+    place: BufferPlace,
 }
 
 /// An open camera.
 #[derive(Debug)]
-struct Camera {
+struct OpenCamera {
     fd: OwnedFd,
-    buffers: Vec<Buffer>,
+    buffers: Vec<DriverBuffer>,
     returns: Arc<Returns>,
     streaming: bool,
 }
 
 /// V4L2 on this computer.
 pub(super) struct V4l2 {
-    wake: Arc<Wake>,
-    camera: Option<Camera>,
+    wake: Arc<WakeEvent>,
+    camera: Option<OpenCamera>,
 }
 
 impl V4l2 {
     /// Nothing is open; `wake` ends [`V4l2::wait`] early.
-    pub const fn new(wake: Arc<Wake>) -> Self {
+    pub const fn new(wake: Arc<WakeEvent>) -> Self {
         Self { wake, camera: None }
     }
 
     /// Waits for the camera or for a signal, until `due` at the latest.
     pub fn wait(&self, due: Time) -> Ready {
-        let ns = due.ns_since(clock::now()).max(0);
-        let timeout = Timespec { tv_sec: ns / 1_000_000_000, tv_nsec: ns % 1_000_000_000 };
-        let mut fds = vec![PollFd::new(self.wake.fd(), PollFlags::IN)];
-        let streaming = self.camera.as_ref().filter(|c| c.streaming);
-        fds.extend(streaming.map(|c| PollFd::new(&c.fd, PollFlags::IN | PollFlags::PRI)));
-        // An interrupted wait is a short one.
-        let _ = poll(&mut fds, Some(&timeout));
+        let streaming: Vec<_> = self.camera.iter().filter(|c| c.streaming).map(|c| c.fd.as_fd()).collect();
+        let wanted = PollFlags::IN | PollFlags::PRI;
+        // A wait that fails is a short one.
+        let ready = self.wake.wait(&streaming, wanted, due.ns_since(clock::now())).unwrap_or_default();
         self.wake.clear();
-        let events = fds.get(1).map_or(PollFlags::empty(), PollFd::revents);
+        let events = ready.first().copied().unwrap_or(PollFlags::empty());
         Ready {
             filled: events.contains(PollFlags::IN),
             event: events.contains(PollFlags::PRI),
@@ -89,7 +86,7 @@ impl V4l2 {
         }
     }
 
-    fn camera(&mut self) -> io::Result<&mut Camera> {
+    fn camera(&mut self) -> io::Result<&mut OpenCamera> {
         self.camera.as_mut().ok_or_else(|| Errno::NODEV.into())
     }
 
@@ -98,11 +95,11 @@ impl V4l2 {
     }
 }
 
-impl Camera {
+impl OpenCamera {
     /// Gives the driver every buffer that is here, then starts.
     fn stream_on(&mut self) -> io::Result<()> {
         for index in 0..self.buffers.len() {
-            if self.buffers[index].place == Place::Here {
+            if self.buffers[index].place == BufferPlace::Here {
                 self.queue(index as u32)?;
             }
         }
@@ -114,17 +111,17 @@ impl Camera {
     /// Stops; every buffer that nobody holds is here afterwards.
     fn stream_off(&mut self) -> io::Result<()> {
         self.streaming = false;
-        for buffer in self.buffers.iter_mut().filter(|b| b.place == Place::Driver) {
-            buffer.place = Place::Here;
+        for buffer in self.buffers.iter_mut().filter(|b| b.place == BufferPlace::Driver) {
+            buffer.place = BufferPlace::Here;
         }
         ioctl::stream(self.fd.as_fd(), false)
     }
 
     fn queue(&mut self, index: u32) -> io::Result<()> {
-        let buffer = self.buffers.get_mut(index as usize).filter(|b| b.place == Place::Here);
+        let buffer = self.buffers.get_mut(index as usize).filter(|b| b.place == BufferPlace::Here);
         let buffer = buffer.ok_or_else(|| io::Error::other("a buffer that is not here to be given back"))?;
         ioctl::queue_buffer(self.fd.as_fd(), index)?;
-        buffer.place = Place::Driver;
+        buffer.place = BufferPlace::Driver;
         Ok(())
     }
 
@@ -140,28 +137,29 @@ impl Camera {
     }
 }
 
-impl Driver for V4l2 {
-    fn find(&mut self, settings: &CameraSettings) -> Vec<Found> {
-        let system = System { dev: Path::new("/dev"), sys: Path::new("/sys") };
+impl CameraDriver for V4l2 {
+    fn find(&mut self, settings: &CameraSettings) -> Vec<FoundCamera> {
+        let system = CameraSystem { dev: Path::new("/dev"), sys: Path::new("/sys") };
         system.find(settings.device.as_deref())
     }
 
-    fn open(&mut self, node: &Path, settings: &CameraSettings) -> io::Result<Opened> {
+    fn open(&mut self, node: &Path, settings: &CameraSettings) -> io::Result<OpenedCamera> {
         self.close();
         let fd = open_node(node)?;
         let capability = ioctl::query_capability(fd.as_fd())?;
-        let mut opened = Opened { card: capability.card, captures: capability.captures, offers: Vec::new() };
+        let mut opened =
+            OpenedCamera { card: capability.card, captures: capability.captures, offers: Vec::new() };
         if opened.captures {
             opened.offers = offers(fd.as_fd(), settings)?;
             // Most cameras have no such event, and need none.
             let _ = ioctl::subscribe_source_change(fd.as_fd());
         }
         let returns = Returns::new(Arc::clone(&self.wake));
-        self.camera = Some(Camera { fd, buffers: Vec::new(), returns, streaming: false });
+        self.camera = Some(OpenCamera { fd, buffers: Vec::new(), returns, streaming: false });
         Ok(opened)
     }
 
-    fn set_mode(&mut self, wanted: &Candidate) -> io::Result<(Format, Option<Rate>)> {
+    fn set_mode(&mut self, wanted: &ModeCandidate) -> io::Result<(SetFormat, Option<Rate>)> {
         let fd = self.fd()?;
         let format = ioctl::set_format(fd, wanted)?;
         // ENOTTY: the driver has no rate to set; then it is as it is.
@@ -173,7 +171,7 @@ impl Driver for V4l2 {
         Ok((ioctl::format(fd).unwrap_or(format), rate))
     }
 
-    fn format(&mut self) -> io::Result<Format> {
+    fn format(&mut self) -> io::Result<SetFormat> {
         ioctl::format(self.fd()?)
     }
 
@@ -203,7 +201,7 @@ impl Driver for V4l2 {
         for index in 0..granted.min(32) {
             let (offset, len) = ioctl::query_buffer(fd, index)?;
             let mapping = Arc::new(Mapping::new(fd, offset, len)?);
-            camera.buffers.push(Buffer { mapping, place: Place::Here });
+            camera.buffers.push(DriverBuffer { mapping, place: BufferPlace::Here });
         }
         if camera.buffers.is_empty() {
             return Err(Errno::NOMEM.into());
@@ -226,19 +224,19 @@ impl Driver for V4l2 {
         }
     }
 
-    fn dequeue(&mut self) -> io::Result<Option<Filled>> {
+    fn dequeue(&mut self) -> io::Result<Option<FilledBuffer>> {
         let camera = self.camera()?;
         let Some(filled) = ioctl::dequeue_buffer(camera.fd.as_fd())? else { return Ok(None) };
-        let buffer = camera.buffers.get_mut(filled.index as usize).filter(|b| b.place == Place::Driver);
+        let buffer = camera.buffers.get_mut(filled.index as usize).filter(|b| b.place == BufferPlace::Driver);
         let buffer =
             buffer.ok_or_else(|| io::Error::other("the driver gave a buffer that it did not have"))?;
-        buffer.place = Place::Here;
+        buffer.place = BufferPlace::Here;
         Ok(Some(filled))
     }
 
     fn bytes(&self, index: u32) -> &[u8] {
         let buffer = self.camera.as_ref().and_then(|c| c.buffers.get(index as usize));
-        buffer.filter(|b| b.place == Place::Here).map_or(&[], |b| b.mapping.bytes())
+        buffer.filter(|b| b.place == BufferPlace::Here).map_or(&[], |b| b.mapping.bytes())
     }
 
     fn queue(&mut self, index: u32) -> io::Result<()> {
@@ -247,8 +245,8 @@ impl Driver for V4l2 {
 
     fn lend(&mut self, index: u32) -> Option<Arc<dyn Lent>> {
         let camera = self.camera.as_mut()?;
-        let buffer = camera.buffers.get_mut(index as usize).filter(|b| b.place == Place::Here)?;
-        buffer.place = Place::Lent;
+        let buffer = camera.buffers.get_mut(index as usize).filter(|b| b.place == BufferPlace::Here)?;
+        buffer.place = BufferPlace::Lent;
         let (mapping, returns) = (Arc::clone(&buffer.mapping), Arc::clone(&camera.returns));
         Some(Arc::new(LentBuffer { mapping, index, returns }))
     }
@@ -256,9 +254,9 @@ impl Driver for V4l2 {
     fn reclaim(&mut self) -> io::Result<()> {
         let camera = self.camera()?;
         for index in camera.returns.take() {
-            let buffer = camera.buffers.get_mut(index as usize).filter(|b| b.place == Place::Lent);
+            let buffer = camera.buffers.get_mut(index as usize).filter(|b| b.place == BufferPlace::Lent);
             if let Some(buffer) = buffer {
-                buffer.place = Place::Here;
+                buffer.place = BufferPlace::Here;
                 camera.queue(index)?;
             }
         }
@@ -267,7 +265,7 @@ impl Driver for V4l2 {
 
     fn queued(&self) -> usize {
         let buffers = self.camera.as_ref().map_or(&[][..], |c| &c.buffers);
-        buffers.iter().filter(|b| b.place == Place::Driver).count()
+        buffers.iter().filter(|b| b.place == BufferPlace::Driver).count()
     }
 
     fn source_changed(&mut self) -> bool {
@@ -282,7 +280,7 @@ impl Driver for V4l2 {
         }
     }
 
-    fn reset(&mut self, camera: &Found) -> io::Result<()> {
+    fn reset(&mut self, camera: &FoundCamera) -> io::Result<()> {
         let node = camera.usb.as_ref().ok_or(Errno::NOTTY)?;
         let fd = rustix::fs::open(node, OFlags::WRONLY | OFlags::CLOEXEC, Permissions::empty())?;
         ioctl::reset_usb(fd.as_fd())
@@ -359,14 +357,14 @@ fn control_settings(controls: &Controls) -> Vec<(u32, i32, &'static str)> {
 }
 
 /// The folders of the kernel.
-struct System<'a> {
+struct CameraSystem<'a> {
     dev: &'a Path,
     sys: &'a Path,
 }
 
-impl System<'_> {
+impl CameraSystem<'_> {
     /// The video nodes; those that `device` leads to are marked.
-    fn find(&self, device: Option<&Path>) -> Vec<Found> {
+    fn find(&self, device: Option<&Path>) -> Vec<FoundCamera> {
         let named = device.and_then(|device| fs::canonicalize(device).ok());
         let links = links(&self.dev.join("v4l/by-id"));
         let nodes = nodes::numbered(self.dev, "video").unwrap_or_default();
@@ -374,7 +372,7 @@ impl System<'_> {
             let entry = node.file_name().map(|name| self.sys.join("class/video4linux").join(name));
             let usb = entry.as_ref().and_then(|e| usb_device(&fs::canonicalize(e.join("device")).ok()?));
             let resolved = fs::canonicalize(&node).unwrap_or_else(|_| node.clone());
-            Found {
+            FoundCamera {
                 links: links.iter().filter(|(_, to)| *to == resolved).map(|(from, _)| from.clone()).collect(),
                 named: named.as_ref() == Some(&resolved),
                 serial: usb.as_ref().and_then(|usb| line(&usb.join("serial"))),
@@ -443,8 +441,8 @@ mod tests {
         }
         let link = dev.join("v4l/by-id/usb-Sea_Cam_5A3C-index0");
         symlink("../../video3", &link).unwrap();
-        let found = System { dev: &dev, sys: &sys }.find(Some(&link));
-        let camera = Found {
+        let found = CameraSystem { dev: &dev, sys: &sys }.find(Some(&link));
+        let camera = FoundCamera {
             node: dev.join("video3"),
             links: vec![link],
             named: true,
@@ -452,7 +450,7 @@ mod tests {
             name: "Sea Cam".to_owned(),
             usb: Some(dev.join("bus/usb/001/014")),
         };
-        let other = Found { node: dev.join("video4"), ..Found::default() };
+        let other = FoundCamera { node: dev.join("video4"), ..FoundCamera::default() };
         assert_eq!(found, [camera, other]);
     }
 
@@ -477,7 +475,7 @@ mod tests {
 
     #[test]
     fn nothing_open_is_a_device_that_is_gone() {
-        let mut driver = V4l2::new(Arc::new(Wake::new().unwrap()));
+        let mut driver = V4l2::new(Arc::new(WakeEvent::new().unwrap()));
         let gone = |e: io::Error| e.raw_os_error() == Some(Errno::NODEV.raw_os_error());
         assert!(driver.dequeue().is_err_and(gone));
         assert!(driver.start(4).is_err_and(gone));

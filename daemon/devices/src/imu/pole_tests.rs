@@ -19,7 +19,7 @@ const G: f64 = 9.806_65;
 const SAMPLES: i64 = 1200;
 
 /// Traverse, elevation and roll, radians, so many seconds from the middle of the recording.
-type Motion = fn(f64) -> [f64; 3];
+type PoleMotion = fn(f64) -> [f64; 3];
 
 fn over_the_top(s: f64) -> [f64; 3] {
     [0.7, 90.0 * DEG + 20.0 * DEG * s, 0.2]
@@ -45,7 +45,7 @@ fn through_south(s: f64) -> [f64; 3] {
     [std::f64::consts::PI + 40.0 * DEG * s, 0.3, 0.1]
 }
 
-const MOTIONS: [(&str, Motion); 5] = [
+const MOTIONS: [(&str, PoleMotion); 5] = [
     ("over the top", over_the_top),
     ("under the bottom", under_the_bottom),
     ("past the top", past_the_top),
@@ -54,14 +54,14 @@ const MOTIONS: [(&str, Motion); 5] = [
 ];
 
 /// The camera so many seconds from the middle; at rest at first, so that what is fused can be levelled.
-fn world_from_camera(motion: Motion, s: f64) -> DQuat {
+fn world_from_camera(motion: PoleMotion, s: f64) -> DQuat {
     let since = (s + 2.5).max(0.0);
     let eased = if since < 0.5 { since * since } else { since - 0.25 };
     let [traverse, elevation, roll] = motion(eased - 2.25);
     look(traverse, elevation, roll)
 }
 
-fn world_from_imu(motion: Motion, s: f64) -> DQuat {
+fn world_from_imu(motion: PoleMotion, s: f64) -> DQuat {
     world_from_camera(motion, s) * CAMERA_FROM_IMU
 }
 
@@ -69,7 +69,7 @@ fn seconds(format: ImuFormat, n: i64) -> f64 {
     (n - SAMPLES / 2) as f64 * format.simulated().period_ns as f64 * 1e-9
 }
 
-fn truth(format: ImuFormat, motion: Motion, n: i64) -> ImuSample {
+fn truth(format: ImuFormat, motion: PoleMotion, n: i64) -> ImuSample {
     let (s, h) = (seconds(format, n), 1e-5);
     let at = world_from_imu(motion, s);
     let turn = world_from_imu(motion, s - h).inverse() * world_from_imu(motion, s + h);
@@ -85,7 +85,7 @@ fn truth(format: ImuFormat, motion: Motion, n: i64) -> ImuSample {
 }
 
 /// Worst errors through a motion, radians: where the camera looks and how its picture is turned, both at samples and halfway between.
-fn worst(format: ImuFormat, motion: Motion, source: Source) -> [f64; 2] {
+fn worst(format: ImuFormat, motion: PoleMotion, source: Source) -> [f64; 2] {
     let inclination = InclinationSettings::GUN;
     let settings = AttitudeSettings {
         source,

@@ -17,12 +17,12 @@ pub(crate) struct Simulated {
     /// Packets of one sample.
     pub(crate) packets: u64,
     /// How far the samples read may be from those sent.
-    pub(crate) tolerance: Tolerance,
+    pub(crate) tolerance: FormatTolerance,
 }
 
 /// Rounding of a format's numbers.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Tolerance {
+pub(crate) struct FormatTolerance {
     /// Angular rate, rad/s.
     pub(crate) rate: f64,
     /// Specific force, m/s^2.

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use super::{
     ImuCounters, ImuDecoder, ImuFormat,
     formats::PacketReader,
-    streams::{Tolerance, encode, truth},
+    streams::{FormatTolerance, encode, truth},
 };
 
 /// Decodes what a unit sends, each packet (or group) at the time of the truth, in pieces of `piece` bytes.
@@ -29,7 +29,7 @@ fn every_format_tells_the_same_motion() {
     for format in ImuFormat::ALL {
         let mut decoder = ImuDecoder::fixed(format);
         let samples = decode(&mut decoder, format, 0..2_000, 1 << 12);
-        let Tolerance { rate, accel, attitude, time_ns } = format.simulated().tolerance;
+        let FormatTolerance { rate, accel, attitude, time_ns } = format.simulated().tolerance;
         let mut compared = 0;
         // A first sample may lack what comes from two, a learned clock settles.
         for sample in samples.iter().filter(|s| s.device_time_ns > 2_000_000_000) {

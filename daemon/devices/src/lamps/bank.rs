@@ -1,42 +1,46 @@
 //! The lamps' lines: taken, lost, and taken again.
 
-use std::time::Duration;
-
 use bowwave_core::time::{NS_PER_S, Time};
 
 use super::{
     LampError, LampSettings, LampState,
-    chips::{self, Chips, Known},
+    chips::{self, KnownLine, LampChips},
 };
 
 /// How often lamps that are dark for want of a line are looked for.
-pub(super) const RETRY: Duration = Duration::from_secs(1);
-const RETRY_NS: i64 = NS_PER_S;
+pub(super) const RETRY_NS: i64 = NS_PER_S;
 
 /// One lamp.
 struct Lamp<H> {
-    line: Known,
+    line: KnownLine,
     handle: Option<H>,
     /// Told as broken.
     told: bool,
 }
 
 /// The lamps. All go dark when this is dropped.
-pub(super) struct Bank<C: Chips> {
+pub(super) struct LampBank<C: LampChips> {
     chips: C,
     active_low: bool,
     lamps: Vec<Lamp<C::Handle>>,
-    inputs: Vec<Known>,
+    inputs: Vec<KnownLine>,
     shown: Option<LampState>,
     retry: Time,
 }
 
-impl<C: Chips> Bank<C> {
+impl<C: LampChips> LampBank<C> {
     /// Fails only where a lamp is one of `inputs`, or two are one line. Takes no line yet.
-    pub(super) fn new(chips: C, settings: LampSettings, mut inputs: Vec<Known>) -> Result<Self, LampError> {
+    pub(super) fn new(
+        chips: C,
+        settings: LampSettings,
+        mut inputs: Vec<KnownLine>,
+    ) -> Result<Self, LampError> {
         chips::check(&chips, &settings, &mut inputs)?;
-        let lamp =
-            |(name, line)| Lamp { line: Known::new(name, &settings.chip, line), handle: None, told: false };
+        let lamp = |(name, line)| Lamp {
+            line: KnownLine::new(name, &settings.chip, line),
+            handle: None,
+            told: false,
+        };
         let lamps = settings.wired().map(lamp).collect();
         Ok(Self { chips, active_low: settings.active_low, lamps, inputs, shown: None, retry: Time::MIN })
     }
@@ -72,9 +76,9 @@ impl<H> Lamp<H> {
     /// from: neither need have been there before.
     fn take(
         &mut self,
-        chips: &impl Chips<Handle = H>,
+        chips: &impl LampChips<Handle = H>,
         active_low: bool,
-        inputs: &mut [Known],
+        inputs: &mut [KnownLine],
     ) -> Result<(), LampError> {
         if self.handle.is_some() {
             return Ok(());
@@ -87,7 +91,7 @@ impl<H> Lamp<H> {
         Ok(())
     }
 
-    fn show(&mut self, chips: &impl Chips<Handle = H>, state: LampState) -> Result<(), LampError> {
+    fn show(&mut self, chips: &impl LampChips<Handle = H>, state: LampState) -> Result<(), LampError> {
         let Some(handle) = &self.handle else { return Ok(()) };
         let lamp = self.line.name;
         let lit = match lamp {
@@ -108,7 +112,7 @@ impl<H> Lamp<H> {
     }
 }
 
-impl<C: Chips> Drop for Bank<C> {
+impl<C: LampChips> Drop for LampBank<C> {
     fn drop(&mut self) {
         for lamp in &self.lamps {
             if let Some(handle) = &lamp.handle
@@ -125,9 +129,9 @@ mod tests {
     use std::{cell::RefCell, collections::BTreeMap, io, rc::Rc};
 
     use super::*;
-    use crate::{lamps::chips::Spot, trigger::TriggerError};
+    use crate::{gpio::GpioError, lamps::chips::LineSpot};
 
-    /// Chips by the number of their node, with their labels, and the lines that are driven, by chip and number.
+    /// LampChips by the number of their node, with their labels, and the lines that are driven, by chip and number.
     #[derive(Clone, Default)]
     struct Board {
         chips: Rc<RefCell<BTreeMap<u32, &'static str>>>,
@@ -153,7 +157,7 @@ mod tests {
         }
     }
 
-    impl Chips for Board {
+    impl LampChips for Board {
         type Place = (String, u32);
         type Handle = (String, u32);
 
@@ -162,20 +166,20 @@ mod tests {
             chip: &str,
             line: &str,
             known: Option<&str>,
-        ) -> Result<(Spot, Self::Place), TriggerError> {
+        ) -> Result<(LineSpot, Self::Place), GpioError> {
             let chips = self.chips.borrow();
             let named = |wanted: &str| {
                 let is = |n: &u32, label: &str| label == wanted || format!("/dev/gpiochip{n}") == wanted;
                 chips.iter().find(|(n, label)| is(n, label) && known.is_none_or(|k| k == **label))
             };
-            let gone = || TriggerError::NoChip { chip: chip.to_owned(), present: String::new() };
+            let gone = || GpioError::NoChip { chip: chip.to_owned(), present: String::new() };
             let (n, label) = named(chip).or_else(|| named(known?)).ok_or_else(gone)?;
             let offset = line.parse().expect("a number");
-            let spot = Spot { chip: format!("gpiochip{n}"), label: (*label).to_owned(), offset };
+            let spot = LineSpot { chip: format!("gpiochip{n}"), label: (*label).to_owned(), offset };
             Ok((spot, ((*label).to_owned(), offset)))
         }
 
-        fn take(&self, place: &Self::Place, _: bool) -> Result<Self::Handle, TriggerError> {
+        fn take(&self, place: &Self::Place, _: bool) -> Result<Self::Handle, GpioError> {
             self.driven.borrow_mut().insert(place.clone(), false);
             Ok(place.clone())
         }
@@ -200,15 +204,15 @@ mod tests {
         LampSettings { chip: chip.to_owned(), ready, hit: None, fault: None, active_low: false }
     }
 
-    fn trigger(chip: &str, line: &str) -> Vec<Known> {
-        vec![Known::new("trigger", chip, line)]
+    fn trigger(chip: &str, line: &str) -> Vec<KnownLine> {
+        vec![KnownLine::new("trigger", chip, line)]
     }
 
     #[test]
     fn lamps_whose_chip_comes_late_are_lit_a_second_later() {
         let board = Board::new(&[]);
         let mut bank =
-            Bank::new(board.clone(), lamp("pinctrl", "5"), trigger("pinctrl", "17")).expect("may come");
+            LampBank::new(board.clone(), lamp("pinctrl", "5"), trigger("pinctrl", "17")).expect("may come");
         let told: Vec<_> = [0, 500, 1000].iter().flat_map(|ms| bank.show(at(*ms), LIT)).collect();
         assert!(matches!(told.as_slice(), [LampError::Line { lamp: "READY", .. }]), "once: {told:?}");
         board.rewire(&[(0, "pinctrl")]);
@@ -224,13 +228,13 @@ mod tests {
         assert_eq!(board.driven(), [("pinctrl".into(), 5, false)], "dark at the end");
     }
 
-    /// Chips that come late are compared when they come: by then a lamp may prove to be an input.
+    /// LampChips that come late are compared when they come: by then a lamp may prove to be an input.
     #[test]
     fn no_input_is_driven_whenever_its_chip_comes() {
         let board = Board::new(&[]);
         let inputs = trigger("/dev/gpiochip0", "17");
         let mut bank =
-            Bank::new(board.clone(), lamp("pinctrl", "17"), inputs).expect("two chips, as written");
+            LampBank::new(board.clone(), lamp("pinctrl", "17"), inputs).expect("two chips, as written");
         bank.show(at(0), LIT);
         board.rewire(&[(0, "pinctrl")]);
         bank.show(at(1000), LIT);
@@ -246,7 +250,7 @@ mod tests {
     fn a_lamp_does_not_follow_its_node_to_another_chip() {
         let board = Board::new(&[(0, "pinctrl"), (1, "lamps")]);
         let inputs = trigger("/dev/gpiochip0", "17");
-        let mut bank = Bank::new(board.clone(), lamp("/dev/gpiochip1", "17"), inputs).expect("two chips");
+        let mut bank = LampBank::new(board.clone(), lamp("/dev/gpiochip1", "17"), inputs).expect("two chips");
         bank.show(at(0), LIT);
         assert_eq!(board.driven(), [("lamps".into(), 17, true)]);
         board.rewire(&[(1, "pinctrl")]);

@@ -2,23 +2,22 @@
 
 use std::path::Path;
 
-use gpio_cdev::{LineHandle, LineRequestFlags};
-
 use super::{LampError, LampSettings};
-use crate::trigger::{InputLine, PlacedLine, TriggerError, place_again, request_error};
+use crate::gpio::{GpioError, InputLine, OutputHandle, PlacedLine, place_again};
 
 /// The GPIO chips: the kernel's, or a test's.
-pub(super) trait Chips {
+pub(super) trait LampChips {
     /// A line to be asked for.
     type Place;
     /// A line that is held.
     type Handle;
 
     /// Finds `line` of `chip`; where that chip's label is `known` from before, on that one only.
-    fn find(&self, chip: &str, line: &str, known: Option<&str>) -> Result<(Spot, Self::Place), TriggerError>;
+    fn find(&self, chip: &str, line: &str, known: Option<&str>)
+    -> Result<(LineSpot, Self::Place), GpioError>;
 
     /// Asks for the line as an output, dark.
-    fn take(&self, place: &Self::Place, active_low: bool) -> Result<Self::Handle, TriggerError>;
+    fn take(&self, place: &Self::Place, active_low: bool) -> Result<Self::Handle, GpioError>;
 
     /// Lights the lamp, or switches it off.
     fn set(&self, handle: &Self::Handle, lit: bool) -> Result<(), gpio_cdev::Error>;
@@ -26,7 +25,7 @@ pub(super) trait Chips {
 
 /// Where a line is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Spot {
+pub(super) struct LineSpot {
     /// The kernel's name of its chip, which is one chip's as long as that is there.
     pub(super) chip: String,
     /// What the maker calls its chip.
@@ -37,35 +36,30 @@ pub(super) struct Spot {
 
 /// The kernel's chips.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Kernel;
+pub(super) struct KernelChips;
 
-impl Chips for Kernel {
+impl LampChips for KernelChips {
     type Place = PlacedLine;
-    type Handle = LineHandle;
+    type Handle = OutputHandle;
 
-    fn find(&self, chip: &str, line: &str, known: Option<&str>) -> Result<(Spot, PlacedLine), TriggerError> {
+    fn find(&self, chip: &str, line: &str, known: Option<&str>) -> Result<(LineSpot, PlacedLine), GpioError> {
         let placed = place_again(Path::new("/dev"), chip, line, known)?;
         let (chip, label) = (placed.chip.name().to_owned(), placed.chip.label().to_owned());
-        Ok((Spot { chip, label, offset: placed.offset }, placed))
+        Ok((LineSpot { chip, label, offset: placed.offset }, placed))
     }
 
-    fn take(&self, place: &PlacedLine, active_low: bool) -> Result<LineHandle, TriggerError> {
-        let level = if active_low { LineRequestFlags::ACTIVE_LOW } else { LineRequestFlags::empty() };
-        // The default is a logical value: dark.
-        place
-            .line()
-            .and_then(|line| line.request(LineRequestFlags::OUTPUT | level, 0, "bowwave-lamp"))
-            .map_err(|e| request_error(place, e))
+    fn take(&self, place: &PlacedLine, active_low: bool) -> Result<OutputHandle, GpioError> {
+        OutputHandle::open(place, active_low, "bowwave-lamp")
     }
 
-    fn set(&self, handle: &LineHandle, lit: bool) -> Result<(), gpio_cdev::Error> {
-        handle.set_value(lit.into())
+    fn set(&self, handle: &OutputHandle, lit: bool) -> Result<(), gpio_cdev::Error> {
+        handle.set(lit)
     }
 }
 
 /// A line by what it is called, with what was learnt of its chip.
 #[derive(Clone, Debug)]
-pub(super) struct Known {
+pub(super) struct KnownLine {
     pub(super) name: &'static str,
     chip: String,
     pub(super) line: String,
@@ -73,7 +67,7 @@ pub(super) struct Known {
     label: Option<String>,
 }
 
-impl Known {
+impl KnownLine {
     pub(super) fn new(name: &'static str, chip: &str, line: &str) -> Self {
         Self { name, chip: chip.to_owned(), line: line.to_owned(), label: None }
     }
@@ -84,7 +78,7 @@ impl Known {
     }
 
     /// Where it is now.
-    pub(super) fn find<C: Chips>(&mut self, chips: &C) -> Result<(Spot, C::Place), TriggerError> {
+    pub(super) fn find<C: LampChips>(&mut self, chips: &C) -> Result<(LineSpot, C::Place), GpioError> {
         let found = chips.find(&self.chip, &self.line, self.label.as_deref())?;
         if self.label.is_none() {
             self.label = Some(found.0.label.clone()).filter(|label| !label.is_empty());
@@ -93,7 +87,7 @@ impl Known {
     }
 
     /// Whether it is the line `other`, which is at `spot`. What is not there now is compared as it is written.
-    fn is(&mut self, chips: &impl Chips, other: &Self, spot: Option<&Spot>) -> bool {
+    fn is(&mut self, chips: &impl LampChips, other: &Self, spot: Option<&LineSpot>) -> bool {
         let is_there = spot.is_some_and(|spot| {
             self.find(chips).is_ok_and(|(own, _)| (&own.chip, own.offset) == (&spot.chip, spot.offset))
         });
@@ -103,10 +97,10 @@ impl Known {
 
 /// The lamp's own error where it is at `spot` and that is one of `inputs`.
 pub(super) fn no_input(
-    chips: &impl Chips,
-    lamp: &Known,
-    spot: Option<&Spot>,
-    inputs: &mut [Known],
+    chips: &impl LampChips,
+    lamp: &KnownLine,
+    spot: Option<&LineSpot>,
+    inputs: &mut [KnownLine],
 ) -> Result<(), LampError> {
     let met = inputs.iter_mut().find_map(|input| input.is(chips, lamp, spot).then_some(input.name));
     met.map_or(Ok(()), |input| {
@@ -121,13 +115,13 @@ pub(super) fn no_input(
 
 /// Refuses a lamp on one of `inputs`, and two lamps on one line.
 pub(super) fn check(
-    chips: &impl Chips,
+    chips: &impl LampChips,
     settings: &LampSettings,
-    inputs: &mut [Known],
+    inputs: &mut [KnownLine],
 ) -> Result<(), LampError> {
-    let mut seen: Vec<Known> = Vec::new();
+    let mut seen: Vec<KnownLine> = Vec::new();
     for (name, line) in settings.wired() {
-        let mut lamp = Known::new(name, &settings.chip, line);
+        let mut lamp = KnownLine::new(name, &settings.chip, line);
         let spot = lamp.find(chips).ok().map(|(spot, _)| spot);
         no_input(chips, &lamp, spot.as_ref(), inputs)?;
         let other = seen.iter_mut().find_map(|o| o.is(chips, &lamp, spot.as_ref()).then_some(o.name));

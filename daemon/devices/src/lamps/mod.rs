@@ -7,26 +7,17 @@
 mod bank;
 mod chips;
 
-use std::{
-    io,
-    thread::{self, JoinHandle},
-};
-
-use crossbeam_channel::{Receiver, RecvTimeoutError};
+use std::{io, sync::Arc};
 
 use self::{
-    bank::{Bank, RETRY},
-    chips::{Chips, Kernel, Known},
+    bank::{LampBank, RETRY_NS},
+    chips::{KernelChips, KnownLine, LampChips},
 };
 use crate::{
     clock,
-    queue::{self, NewestSender},
-    trigger::{InputLine, TriggerError},
-    wake::{Ended, join_within},
+    gpio::{GpioError, InputLine},
+    worker::{PortLink, PortWorker, STOP_NS, StopError},
 };
-
-/// How long [`Lamps::stop`] waits for the lamps to go dark.
-const STOP_NS: i64 = 180_000_000;
 
 /// Which lines light which lamps. Lamps that are not wired are left out.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -54,7 +45,7 @@ pub struct LampState {
     pub fault: bool,
 }
 
-/// Why there is no light.
+/// Reasons why there is no light.
 #[derive(Debug, thiserror::Error)]
 pub enum LampError {
     /// A lamp on an input.
@@ -90,7 +81,7 @@ pub enum LampError {
         /// The lamp.
         lamp: &'static str,
         /// What is wrong.
-        source: TriggerError,
+        source: GpioError,
     },
     /// The lamp cannot be switched.
     #[error("cannot switch the lamp {lamp}: {source}; is its chip still there?")]
@@ -126,7 +117,7 @@ impl LampSettings {
         &self,
         inputs: impl IntoIterator<Item = (&'static str, &'a InputLine)>,
     ) -> Result<(), LampError> {
-        chips::check(&Kernel, self, &mut Known::inputs(inputs))
+        chips::check(&KernelChips, self, &mut KnownLine::inputs(inputs))
     }
 }
 
@@ -134,10 +125,8 @@ impl LampSettings {
 /// program is killed they keep their last state.
 #[derive(Debug)]
 pub struct Lamps {
-    /// Taken at the end: that nobody can give a state any more is what ends the thread.
-    states: Option<NewestSender<LampState>>,
-    shown: LampState,
-    thread: Option<JoinHandle<()>>,
+    /// The status is the state to be shown. `None` once they are dark.
+    worker: Option<PortWorker<LampState>>,
 }
 
 impl Lamps {
@@ -149,28 +138,25 @@ impl Lamps {
         settings: LampSettings,
         inputs: impl IntoIterator<Item = (&'static str, &'a InputLine)>,
     ) -> Result<Self, LampError> {
-        Self::start_on(Kernel, settings, Known::inputs(inputs))
+        Self::start_on(KernelChips, settings, KnownLine::inputs(inputs))
     }
 
-    fn start_on<C>(chips: C, settings: LampSettings, inputs: Vec<Known>) -> Result<Self, LampError>
+    fn start_on<C>(chips: C, settings: LampSettings, inputs: Vec<KnownLine>) -> Result<Self, LampError>
     where
-        C: Chips<Handle: Send> + Send + 'static,
+        C: LampChips<Handle: Send> + Send + 'static,
     {
-        let bank = Bank::new(chips, settings, inputs)?;
-        let (states, given) = queue::newest(1);
-        let thread = thread::Builder::new()
-            .name("lamps".to_owned())
-            .spawn(move || light(bank, &given))
-            .map_err(LampError::Thread)?;
-        Ok(Self { states: Some(states), shown: LampState::default(), thread: Some(thread) })
+        let bank = LampBank::new(chips, settings, inputs)?;
+        let link = PortLink::new(LampState::default()).map_err(LampError::Thread)?;
+        let worker = PortWorker::start("lamps", Arc::clone(&link), move || light(bank, &link));
+        Ok(Self { worker: Some(worker.map_err(LampError::Thread)?) })
     }
 
     /// Shows `state` soon. Never waits; the newest wins.
     pub fn set(&mut self, state: LampState) {
-        if std::mem::replace(&mut self.shown, state) != state
-            && let Some(states) = &mut self.states
-        {
-            states.send(state);
+        let Some(worker) = &self.worker else { return };
+        let link = worker.link();
+        if std::mem::replace(&mut *link.status(), state) != state {
+            link.waker().notify();
         }
     }
 
@@ -180,12 +166,11 @@ impl Lamps {
     }
 
     fn end(&mut self) -> Result<(), LampError> {
-        drop(self.states.take());
-        match join_within(self.thread.take().into_iter().collect(), STOP_NS) {
-            Ended::Well => Ok(()),
-            Ended::BrokeDown => Err(LampError::BrokeDown),
-            Ended::NotInTime => Err(LampError::Blocked),
-        }
+        let Some(worker) = self.worker.take() else { return Ok(()) };
+        worker.stop_within(STOP_NS).map_err(|e| match e {
+            StopError::BrokeDown => LampError::BrokeDown,
+            StopError::Blocked => LampError::Blocked,
+        })
     }
 }
 
@@ -197,37 +182,34 @@ impl Drop for Lamps {
     }
 }
 
-/// Until nobody gives a state any more.
-fn light(mut bank: Bank<impl Chips>, given: &Receiver<LampState>) {
+/// Until the lamps are to go dark.
+fn light(mut bank: LampBank<impl LampChips>, link: &PortLink<LampState>) {
     let mut state = LampState::default();
-    loop {
+    while !link.is_stopping() {
         bank.show(clock::now(), state).iter().for_each(|e| log::warn!("{e}"));
-        match given.recv_timeout(RETRY) {
-            Ok(newer) => state = newer,
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return,
-        }
+        link.pause(RETRY_NS);
+        state = *link.status();
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{chips::Spot, *};
-    use crate::trigger::{Bias, TriggerSettings};
+    use super::{chips::LineSpot, *};
+    use crate::{gpio::LineBias, trigger::TriggerSettings};
 
     /// A chip that keeps each call for a while, as one on a bus that is stuck, and tells of each.
     struct Slow(crossbeam_channel::Sender<bool>);
 
-    impl Chips for Slow {
+    impl LampChips for Slow {
         type Place = u32;
         type Handle = ();
 
-        fn find(&self, _: &str, line: &str, _: Option<&str>) -> Result<(Spot, u32), TriggerError> {
+        fn find(&self, _: &str, line: &str, _: Option<&str>) -> Result<(LineSpot, u32), GpioError> {
             let offset = line.parse().expect("a number");
-            Ok((Spot { chip: "gpiochip0".into(), label: "pinctrl".into(), offset }, offset))
+            Ok((LineSpot { chip: "gpiochip0".into(), label: "pinctrl".into(), offset }, offset))
         }
 
-        fn take(&self, _: &u32, _: bool) -> Result<(), TriggerError> {
+        fn take(&self, _: &u32, _: bool) -> Result<(), GpioError> {
             Ok(())
         }
 
@@ -239,7 +221,7 @@ mod tests {
     }
 
     fn input(line: &str) -> InputLine {
-        InputLine { chip: "pinctrl".into(), line: line.into(), active_low: true, bias: Bias::AsIs }
+        InputLine { chip: "pinctrl".into(), line: line.into(), active_low: true, bias: LineBias::AsIs }
     }
 
     fn lamps(ready: &str, hit: &str) -> LampSettings {

@@ -23,7 +23,7 @@ const BITS: u32 = 32;
 
 /// A buffer's memory. It may go to another thread, and may outlive the screen: the kernel keeps the memory until it is
 /// unmapped.
-pub(super) struct Canvas {
+pub(super) struct ScanoutBuffer {
     memory: DumbMapping<'static>,
     pitch: usize,
     size: (u32, u32),
@@ -32,7 +32,7 @@ pub(super) struct Canvas {
     last: Option<Placement>,
 }
 
-impl Canvas {
+impl ScanoutBuffer {
     /// What the kernel calls it.
     pub(super) const fn framebuffer(&self) -> framebuffer::Handle {
         self.framebuffer
@@ -62,11 +62,11 @@ impl Buffers {
         card: &Card,
         size: (u32, u32),
         count: usize,
-    ) -> Result<Vec<Canvas>, LcdError> {
+    ) -> Result<Vec<ScanoutBuffer>, LcdError> {
         (0..count).map(|_| self.make_one(card, size)).collect()
     }
 
-    fn make_one(&mut self, card: &Card, size: (u32, u32)) -> Result<Canvas, LcdError> {
+    fn make_one(&mut self, card: &Card, size: (u32, u32)) -> Result<ScanoutBuffer, LcdError> {
         let made = card.create_dumb_buffer(size, DrmFourcc::Xrgb8888, BITS);
         let mut buffer = card.tried("make a buffer", made)?;
         self.made.push((buffer, None));
@@ -82,7 +82,7 @@ impl Buffers {
         // Black, and every page is there before the first picture needs it.
         memory.fill(0);
         let pitch = (buffer.pitch() as usize).max(size.0 as usize * PIXEL);
-        Ok(Canvas { memory, pitch, size, framebuffer, last: None })
+        Ok(ScanoutBuffer { memory, pitch, size, framebuffer, last: None })
     }
 
     /// Frees them all. Nothing may show them any more.
@@ -97,8 +97,8 @@ impl Buffers {
     }
 }
 
-impl std::fmt::Debug for Canvas {
+impl std::fmt::Debug for ScanoutBuffer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Canvas({}x{}, {:?})", self.size.0, self.size.1, self.framebuffer)
+        write!(f, "ScanoutBuffer({}x{}, {:?})", self.size.0, self.size.1, self.framebuffer)
     }
 }

@@ -16,7 +16,7 @@ use drm::{
 };
 use rustix::fs::OFlags;
 
-use super::{CardInfo, Choice, Connection, ConnectorInfo, LcdError, LcdSettings, Mode};
+use super::{CardInfo, Connection, ConnectorInfo, LcdChoice, LcdError, LcdMode, LcdSettings};
 use crate::nodes;
 
 const DRI: &str = "/dev/dri";
@@ -39,13 +39,13 @@ impl control::Device for Card {}
 
 /// The path from picture to display: what the kernel calls its parts.
 #[derive(Clone, Debug)]
-pub(super) struct Target {
+pub(super) struct LcdTarget {
     pub(super) connector: connector::Handle,
     pub(super) crtc: crtc::Handle,
     /// The place of `crtc` among the card's, by which vblanks are asked for.
     pub(super) crtc_index: u32,
     pub(super) kernel_mode: control::Mode,
-    pub(super) choice: Choice,
+    pub(super) choice: LcdChoice,
 }
 
 impl Card {
@@ -118,7 +118,7 @@ impl Card {
     }
 
     /// The path to the display that the settings mean.
-    pub(super) fn target(&self, settings: &LcdSettings) -> Result<Target, LcdError> {
+    pub(super) fn target(&self, settings: &LcdSettings) -> Result<LcdTarget, LcdError> {
         let connectors = self.connectors()?;
         let infos: Vec<_> = connectors.iter().map(ConnectorInfo::from_kernel).collect();
         let place = pick(&self.node, &infos, settings.connector.as_deref())?;
@@ -127,19 +127,19 @@ impl Card {
         };
         let no_mode = || LcdError::NoMode { node: self.node.clone(), name: info.name.clone() };
         let usable: Vec<_> =
-            connector.modes().iter().filter_map(|m| Some((*m, Mode::from_kernel(m)?))).collect();
+            connector.modes().iter().filter_map(|m| Some((*m, LcdMode::from_kernel(m)?))).collect();
         let modes: Vec<_> = usable.iter().map(|(_, mode)| *mode).collect();
         let place = settings.mode.choose(&modes).ok_or_else(no_mode)?;
         let (kernel_mode, mode) = *usable.get(place).ok_or_else(no_mode)?;
         let (crtc, crtc_index) = self.crtc_for(connector, &connectors)?;
-        let choice = Choice {
+        let choice = LcdChoice {
             card: self.node.clone(),
             driver: self.driver(),
             connector: info.name.clone(),
             mode,
             remark: settings.mode.shortfall(&mode),
         };
-        Ok(Target { connector: connector.handle(), crtc, crtc_index, kernel_mode, choice })
+        Ok(LcdTarget { connector: connector.handle(), crtc, crtc_index, kernel_mode, choice })
     }
 
     /// The scan-out engine for `wanted`: the one it has, otherwise one that serves no other display.
@@ -189,7 +189,7 @@ impl ConnectorInfo {
                 connector::State::Disconnected => Connection::Disconnected,
                 connector::State::Unknown => Connection::Unknown,
             },
-            modes: info.modes().iter().filter_map(Mode::from_kernel).collect(),
+            modes: info.modes().iter().filter_map(LcdMode::from_kernel).collect(),
         }
     }
 }
@@ -225,7 +225,10 @@ fn cards() -> Vec<PathBuf> {
 
 /// The first card with a display that the settings mean. `held` is looked at first, and given back open as long as it is
 /// there, so that nobody else becomes its master meanwhile.
-pub(super) fn search(settings: &LcdSettings, held: Option<Card>) -> (Option<Card>, Result<Target, LcdError>) {
+pub(super) fn search(
+    settings: &LcdSettings,
+    held: Option<Card>,
+) -> (Option<Card>, Result<LcdTarget, LcdError>) {
     let mut why = None;
     let mut held = held;
     if let Some(card) = &held {
@@ -276,7 +279,7 @@ mod tests {
     use super::*;
 
     fn connector(name: &str, connection: Connection, modes: usize) -> ConnectorInfo {
-        let mode = Mode {
+        let mode = LcdMode {
             width: 800,
             height: 480,
             clock_khz: 33_300,

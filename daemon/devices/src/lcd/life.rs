@@ -2,7 +2,7 @@
 
 use bowwave_core::time::{NS_PER_S, Time};
 
-use super::{LcdState, Mode};
+use super::{LcdMode, LcdState};
 
 /// Between two looks at the connector: a display that was unplugged is noticed, and one that came back is found, within
 /// this time.
@@ -14,7 +14,7 @@ const SLEEP_NS: i64 = 50_000_000;
 
 /// What is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Due {
+pub(super) enum LcdDue {
     /// Nothing but to wait for the kernel or a picture.
     Nothing,
     /// A look at the connector, or for one.
@@ -25,7 +25,7 @@ pub(super) enum Due {
 
 /// What the supervisor is to be told.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Tell {
+pub(super) enum DisplayChange {
     /// No display, and why.
     Raised(String),
     /// It is there again.
@@ -34,7 +34,7 @@ pub(super) enum Tell {
 
 /// The life of the display's connection.
 #[derive(Debug)]
-pub(super) struct Life {
+pub(super) struct LcdLife {
     state: LcdState,
     next_look: Time,
     flip_begun: Option<Time>,
@@ -42,7 +42,7 @@ pub(super) struct Life {
     losses: u64,
 }
 
-impl Life {
+impl LcdLife {
     /// Looks at once.
     pub(super) const fn new(now: Time) -> Self {
         Self { state: LcdState::Searching, next_look: now, flip_begun: None, is_raised: false, losses: 0 }
@@ -58,15 +58,15 @@ impl Life {
     }
 
     /// What is due at `now`. A look counts as taken.
-    pub(super) fn due(&mut self, now: Time) -> Due {
+    pub(super) fn due(&mut self, now: Time) -> LcdDue {
         if self.flip_begun.is_some_and(|begun| now.ns_since(begun) > FLIP_NS) {
-            return Due::FlipOverdue;
+            return LcdDue::FlipOverdue;
         }
         if now < self.next_look {
-            return Due::Nothing;
+            return LcdDue::Nothing;
         }
         self.next_look = now.plus_ns(LOOK_NS);
-        Due::Look
+        LcdDue::Look
     }
 
     /// How long there is nothing to do unless something happens, nanoseconds.
@@ -80,21 +80,21 @@ impl Life {
     }
 
     /// A picture is on the screen, in `mode`.
-    pub(super) fn flipped(&mut self, mode: Mode) -> Option<Tell> {
+    pub(super) fn flipped(&mut self, mode: LcdMode) -> Option<DisplayChange> {
         self.flip_begun = None;
         self.state = LcdState::Showing(mode);
-        std::mem::take(&mut self.is_raised).then_some(Tell::Cleared)
+        std::mem::take(&mut self.is_raised).then_some(DisplayChange::Cleared)
     }
 
     /// There is no display: none was found, or the one that was there is gone. Looks again after the usual time.
-    pub(super) fn missing(&mut self, now: Time, why: impl Into<String>) -> Option<Tell> {
+    pub(super) fn missing(&mut self, now: Time, why: impl Into<String>) -> Option<DisplayChange> {
         self.flip_begun = None;
         if let LcdState::Showing(_) = self.state {
             self.state = LcdState::Lost { since: now };
             self.losses += 1;
         }
         self.next_look = now.plus_ns(LOOK_NS);
-        (!std::mem::replace(&mut self.is_raised, true)).then(|| Tell::Raised(why.into()))
+        (!std::mem::replace(&mut self.is_raised, true)).then(|| DisplayChange::Raised(why.into()))
     }
 
     /// The end.
@@ -110,7 +110,7 @@ mod tests {
 
     use super::*;
 
-    const MODE: Mode = Mode {
+    const MODE: LcdMode = LcdMode {
         width: 800,
         height: 480,
         clock_khz: 33_300,
@@ -126,10 +126,10 @@ mod tests {
 
     #[test]
     fn a_missing_display_is_raised_once_and_looked_for_twice_a_second() {
-        let mut life = Life::new(at_ms(0));
+        let mut life = LcdLife::new(at_ms(0));
         let (mut told, mut looks) = (0, 0);
         for ms in 0..10_000 {
-            if life.due(at_ms(ms)) == Due::Look {
+            if life.due(at_ms(ms)) == LcdDue::Look {
                 looks += 1;
                 told += usize::from(life.missing(at_ms(ms), "no cable").is_some());
             }
@@ -140,32 +140,32 @@ mod tests {
 
     #[test]
     fn a_display_that_comes_back_clears_its_fault_within_two_seconds() {
-        let mut life = Life::new(at_ms(0));
-        assert_eq!(life.due(at_ms(0)), Due::Look);
+        let mut life = LcdLife::new(at_ms(0));
+        assert_eq!(life.due(at_ms(0)), LcdDue::Look);
         life.flip_begun(at_ms(1));
         assert_eq!(life.flipped(MODE), None, "there was no fault");
-        assert_eq!(life.missing(at_ms(1000), "unplugged"), Some(Tell::Raised("unplugged".into())));
+        assert_eq!(life.missing(at_ms(1000), "unplugged"), Some(DisplayChange::Raised("unplugged".into())));
         assert_eq!(life.state(), LcdState::Lost { since: at_ms(1000) });
-        let back = (1001..).find(|ms| life.due(at_ms(*ms)) == Due::Look).expect("looked for");
+        let back = (1001..).find(|ms| life.due(at_ms(*ms)) == LcdDue::Look).expect("looked for");
         assert!(back <= 1500, "{back}");
         life.flip_begun(at_ms(back));
-        assert_eq!(life.flipped(MODE), Some(Tell::Cleared));
+        assert_eq!(life.flipped(MODE), Some(DisplayChange::Cleared));
         assert_eq!((life.state(), life.losses()), (LcdState::Showing(MODE), 1));
     }
 
     #[test]
     fn a_flip_that_never_comes_is_given_up() {
-        let mut life = Life::new(at_ms(0));
+        let mut life = LcdLife::new(at_ms(0));
         life.flip_begun(at_ms(0));
-        let given_up = (0..).find(|ms| life.due(at_ms(*ms)) == Due::FlipOverdue).expect("given up");
+        let given_up = (0..).find(|ms| life.due(at_ms(*ms)) == LcdDue::FlipOverdue).expect("given up");
         assert_eq!(given_up, FLIP_NS / 1_000_000 + 1);
         life.missing(at_ms(given_up), "no flip");
-        assert_eq!(life.due(at_ms(given_up)), Due::Nothing, "not twice");
+        assert_eq!(life.due(at_ms(given_up)), LcdDue::Nothing, "not twice");
     }
 
     #[test]
     fn the_end_is_final_in_the_status() {
-        let mut life = Life::new(at_ms(0));
+        let mut life = LcdLife::new(at_ms(0));
         life.flipped(MODE);
         life.stop();
         assert_eq!(life.state(), LcdState::Stopped);
@@ -175,7 +175,7 @@ mod tests {
         /// Raised and cleared alternate, whatever happens, and the thread never sleeps longer than its heartbeat allows.
         #[test]
         fn faults_come_and_go_in_turn(steps in prop::collection::vec((0u8..3, 0i64..2_000), 0..100)) {
-            let (mut life, mut now, mut raised) = (Life::new(at_ms(0)), 0, false);
+            let (mut life, mut now, mut raised) = (LcdLife::new(at_ms(0)), 0, false);
             for (step, ms) in steps {
                 now += ms;
                 let told = match step {
@@ -184,8 +184,8 @@ mod tests {
                     _ => { life.flip_begun(at_ms(now)); life.due(at_ms(now)); None }
                 };
                 match told {
-                    Some(Tell::Raised(_)) => { prop_assert!(!raised); raised = true; }
-                    Some(Tell::Cleared) => { prop_assert!(raised); raised = false; }
+                    Some(DisplayChange::Raised(_)) => { prop_assert!(!raised); raised = true; }
+                    Some(DisplayChange::Cleared) => { prop_assert!(raised); raised = false; }
                     None => {}
                 }
                 prop_assert!((0..=SLEEP_NS).contains(&life.sleep_ns(at_ms(now))));

@@ -26,7 +26,6 @@ mod thread;
 use std::{
     path::PathBuf,
     sync::Arc,
-    thread::JoinHandle,
     time::{Duration, Instant},
 };
 
@@ -34,10 +33,10 @@ use bowwave_core::time::{NS_PER_S, Time};
 use crossbeam_channel::Receiver;
 
 pub use error::LcdError;
-pub use mode::{Mode, ModeWish};
+pub use mode::{LcdMode, ModeWish};
 
-use crate::{queue, report::Reporter};
-use thread::Shared;
+use crate::{queue, report::Reporter, worker::PortWorker};
+use thread::{LcdShared, LcdThread, Scanout};
 
 /// Flips that may wait for the caller: two seconds at 30 Hz.
 const FLIPS: usize = 64;
@@ -66,7 +65,7 @@ pub enum LcdState {
     /// No display has been found yet, or the first picture is not yet on it. Looks for one twice a second.
     Searching,
     /// Pictures show, in this mode.
-    Showing(Mode),
+    Showing(LcdMode),
     /// The display was there and is gone. Looks for it twice a second.
     Lost {
         /// When that was noticed.
@@ -78,7 +77,7 @@ pub enum LcdState {
 
 /// The display that was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
+pub struct LcdChoice {
     /// The card's node.
     pub card: PathBuf,
     /// The card's driver.
@@ -86,7 +85,7 @@ pub struct Choice {
     /// The connector.
     pub connector: String,
     /// The mode.
-    pub mode: Mode,
+    pub mode: LcdMode,
     /// Why this is not the mode that was asked for, where it is not.
     pub remark: Option<String>,
 }
@@ -151,7 +150,7 @@ pub struct LcdStatus {
     /// Where its life is.
     pub state: LcdState,
     /// The display in use, or used last.
-    pub choice: Option<Choice>,
+    pub choice: Option<LcdChoice>,
     /// Whether the kernel's atomic interface is used. `false` also while nothing shows.
     pub is_atomic: bool,
     /// Where the times of flips come from, once that is known: with the first or second flip.
@@ -211,7 +210,7 @@ pub struct ConnectorInfo {
     /// Whether a display is plugged in.
     pub connection: Connection,
     /// The display's modes.
-    pub modes: Vec<Mode>,
+    pub modes: Vec<LcdMode>,
 }
 
 /// A display card.
@@ -233,33 +232,29 @@ pub fn list() -> Vec<Result<CardInfo, LcdError>> {
 }
 
 /// Whether there is the display that `settings` mean, and which mode would be set. Sets none.
-pub fn check(settings: &LcdSettings) -> Result<Choice, LcdError> {
+pub fn check(settings: &LcdSettings) -> Result<LcdChoice, LcdError> {
     card::search(settings, None).1.map(|target| target.choice)
 }
 
 /// The display. See the [module](self).
 #[derive(Debug)]
 pub struct LcdPort {
-    shared: Arc<Shared>,
+    shared: Arc<LcdShared>,
     flips: Receiver<Flip>,
-    thread: Option<JoinHandle<Result<(), LcdError>>>,
-    /// Gives signs of life while the other is within the kernel.
-    pulse: Option<JoinHandle<()>>,
+    /// `None` once it is stopped.
+    worker: Option<PortWorker<Scanout, Result<(), LcdError>>>,
 }
 
 impl LcdPort {
     /// Starts the threads, which look for the display for ever. Fails only where no thread can be made.
     pub fn start(settings: LcdSettings, reporter: Reporter) -> Result<Self, LcdError> {
-        let shared = Arc::new(Shared::new().map_err(|e| LcdError::Thread(e.into()))?);
+        let shared = Arc::new(LcdShared::new().map_err(LcdError::Thread)?);
         let (sender, flips) = queue::newest(FLIPS);
-        let spawn = |name: &str| std::thread::Builder::new().name(name.to_owned());
-        let worker = thread::Worker::new(settings, reporter.clone(), Arc::clone(&shared), sender);
-        let thread = spawn("lcd").spawn(move || worker.run()).map_err(LcdError::Thread)?;
-        // What is there ends when this is dropped.
-        let mut port = Self { shared: Arc::clone(&shared), flips, thread: Some(thread), pulse: None };
-        let pulse = spawn("lcd-pulse").spawn(move || shared.calls.beat(&reporter, CALL_MAX_NS));
-        port.pulse = Some(pulse.map_err(LcdError::Thread)?);
-        Ok(port)
+        let thread = LcdThread::new(settings, reporter.clone(), Arc::clone(&shared), sender);
+        let mut worker = PortWorker::start("lcd", Arc::clone(&shared.link), move || thread.run())
+            .map_err(LcdError::Thread)?;
+        worker.beat_during_calls("lcd-pulse", reporter, CALL_MAX_NS).map_err(LcdError::Thread)?;
+        Ok(Self { shared, flips, worker: Some(worker) })
     }
 
     /// Gives a picture: `rgba` are sRGB bytes R, G, B, A from the top left, without padding; `size` its width and height in
@@ -269,7 +264,7 @@ impl LcdPort {
     }
 
     /// Waits until a display shows (black at first), at most `timeout`: its mode, for a picture of the right size.
-    pub fn await_mode(&self, timeout: Duration) -> Option<Mode> {
+    pub fn await_mode(&self, timeout: Duration) -> Option<LcdMode> {
         self.shared.await_mode(Instant::now() + timeout)
     }
 
@@ -291,15 +286,8 @@ impl LcdPort {
     }
 
     fn end(&mut self) -> Result<(), LcdError> {
-        let Some(thread) = self.thread.take() else { return Ok(()) };
-        self.shared.ask_to_stop();
-        let ended = thread.join();
-        self.shared.calls.end();
-        if let Some(pulse) = self.pulse.take() {
-            pulse.thread().unpark();
-            pulse.join().map_err(|_| LcdError::ThreadDied)?;
-        }
-        ended.map_err(|_| LcdError::ThreadDied)?
+        let Some(worker) = self.worker.take() else { return Ok(()) };
+        worker.stop().map_err(|_| LcdError::ThreadDied)?
     }
 }
 

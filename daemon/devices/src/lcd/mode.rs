@@ -12,7 +12,7 @@ const SAME_HZ: f64 = 0.5;
 
 /// Size and timing of a display mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Mode {
+pub struct LcdMode {
     /// Visible width, pixels.
     pub width: u32,
     /// Visible height, pixels.
@@ -29,7 +29,7 @@ pub struct Mode {
     pub preferred: bool,
 }
 
-impl Mode {
+impl LcdMode {
     /// The kernel's mode, unless it states no timing (no pixel clock or no total size).
     pub(super) fn from_kernel(mode: &control::Mode) -> Option<Self> {
         let (width, height) = mode.size();
@@ -63,7 +63,7 @@ impl Mode {
     }
 }
 
-impl fmt::Display for Mode {
+impl fmt::Display for LcdMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let interlaced = if self.interlaced { "i" } else { "" };
         write!(f, "{}x{}{interlaced} at {:.2} Hz", self.width, self.height, self.refresh_hz())
@@ -82,7 +82,7 @@ pub struct ModeWish {
 impl ModeWish {
     /// The place of the best of `modes` for this wish: the wanted size where the display has it, otherwise its own; then
     /// progressive before interlaced, then the nearest rate. `None` only where there is no mode at all.
-    pub(super) fn choose(&self, modes: &[Mode]) -> Option<usize> {
+    pub(super) fn choose(&self, modes: &[LcdMode]) -> Option<usize> {
         let own = modes
             .iter()
             .find(|m| m.preferred)
@@ -92,7 +92,7 @@ impl ModeWish {
             .size
             .filter(|size| modes.iter().any(|m| (m.width, m.height) == *size))
             .unwrap_or((own.width, own.height));
-        let rank = |m: &Mode| {
+        let rank = |m: &LcdMode| {
             let off_hz = (m.refresh_hz() - self.refresh_hz.unwrap_or(USUAL_HZ)).abs();
             (m.interlaced, self.refresh_hz.is_none() && !m.preferred, off_hz)
         };
@@ -108,7 +108,7 @@ impl ModeWish {
     }
 
     /// In what `mode` differs from the wish, for the status; `None` where it is what was asked for.
-    pub(super) fn shortfall(&self, mode: &Mode) -> Option<String> {
+    pub(super) fn shortfall(&self, mode: &LcdMode) -> Option<String> {
         let size = self.size.is_some_and(|size| size != (mode.width, mode.height));
         let rate = self.refresh_hz.is_some_and(|hz| (hz - mode.refresh_hz()).abs() > SAME_HZ);
         let wanted = match (self.size, self.refresh_hz) {
@@ -129,16 +129,16 @@ mod tests {
 
     use super::*;
 
-    fn mode(width: u32, height: u32, clock_khz: u32, h_total: u32, v_total: u32) -> Mode {
-        Mode { width, height, clock_khz, h_total, v_total, interlaced: false, preferred: false }
+    fn mode(width: u32, height: u32, clock_khz: u32, h_total: u32, v_total: u32) -> LcdMode {
+        LcdMode { width, height, clock_khz, h_total, v_total, interlaced: false, preferred: false }
     }
 
     /// A television's list (CTA-861): 1080p60, 1080p59.94, 1080i60, 720p60, 720p50, and a panel's own 800x480.
-    fn list() -> Vec<Mode> {
+    fn list() -> Vec<LcdMode> {
         vec![
-            Mode { preferred: true, ..mode(1920, 1080, 148_500, 2200, 1125) },
+            LcdMode { preferred: true, ..mode(1920, 1080, 148_500, 2200, 1125) },
             mode(1920, 1080, 148_352, 2200, 1125),
-            Mode { interlaced: true, ..mode(1920, 1080, 74_250, 2200, 1125) },
+            LcdMode { interlaced: true, ..mode(1920, 1080, 74_250, 2200, 1125) },
             mode(1280, 720, 74_250, 1650, 750),
             mode(1280, 720, 74_250, 1980, 750),
             mode(800, 480, 33_300, 1056, 525),
@@ -199,7 +199,7 @@ mod tests {
             let modes: Vec<_> = modes
                 .into_iter()
                 .map(|(w, h, clock, ht, vt, interlaced, preferred)| {
-                    Mode { interlaced, preferred, ..mode(w, h, clock, ht, vt) }
+                    LcdMode { interlaced, preferred, ..mode(w, h, clock, ht, vt) }
                 })
                 .collect();
             let place = ModeWish { size, refresh_hz }.choose(&modes);

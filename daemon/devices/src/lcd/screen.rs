@@ -13,8 +13,8 @@ use rustix::io::Errno;
 
 use super::{
     LcdError, Vblanks,
-    canvas::{Buffers, Canvas},
-    card::{Card, Target},
+    canvas::{Buffers, ScanoutBuffer},
+    card::{Card, LcdTarget},
 };
 
 /// On the screen, handed over, and drawn in.
@@ -58,7 +58,7 @@ impl Saved {
 
 /// How the kernel is told what to show.
 #[derive(Debug)]
-enum Path {
+enum KmsInterface {
     /// All at once, tested before, without waiting.
     Atomic { plane: plane::Handle, ids: Box<Ids>, mode_blob: u64 },
     /// Drivers without the above.
@@ -90,21 +90,24 @@ pub(super) enum Started {
 
 /// A display in use.
 #[derive(Debug)]
-pub(super) struct Screen {
-    target: Target,
-    path: Path,
+pub(super) struct LcdScreen {
+    target: LcdTarget,
+    path: KmsInterface,
     buffers: Buffers,
 }
 
-impl Screen {
+impl LcdScreen {
     /// Makes the buffers and finds the path. Shows nothing yet.
     pub(super) fn make(
         card: &Card,
-        target: Target,
+        target: LcdTarget,
         use_atomic: bool,
-    ) -> Result<(Self, Vec<Canvas>), LcdError> {
-        let path =
-            if use_atomic && card.enable_atomic() { Path::atomic(card, &target)? } else { Path::Legacy };
+    ) -> Result<(Self, Vec<ScanoutBuffer>), LcdError> {
+        let path = if use_atomic && card.enable_atomic() {
+            KmsInterface::atomic(card, &target)?
+        } else {
+            KmsInterface::Legacy
+        };
         let mut screen = Self { target, path, buffers: Buffers::default() };
         let mode = screen.target.choice.mode;
         match screen.buffers.make(card, (mode.width, mode.height), BUFFERS) {
@@ -116,19 +119,19 @@ impl Screen {
         }
     }
 
-    pub(super) const fn target(&self) -> &Target {
+    pub(super) const fn target(&self) -> &LcdTarget {
         &self.target
     }
 
     pub(super) const fn is_atomic(&self) -> bool {
-        matches!(self.path, Path::Atomic { .. })
+        matches!(self.path, KmsInterface::Atomic { .. })
     }
 
     /// Sets the mode with a first picture.
     pub(super) fn start(&self, card: &Card, first: framebuffer::Handle) -> Result<Started, LcdError> {
         let what = "set the mode";
-        let Path::Atomic { plane, ids, mode_blob } = &self.path else {
-            let Target { connector, crtc, kernel_mode, .. } = self.target;
+        let KmsInterface::Atomic { plane, ids, mode_blob } = &self.path else {
+            let LcdTarget { connector, crtc, kernel_mode, .. } = self.target;
             let set = card.set_crtc(crtc, Some(first), (0, 0), &[connector], Some(kernel_mode));
             card.tried(what, set)?;
             return Ok(Started::Shown);
@@ -148,12 +151,12 @@ impl Screen {
     /// Shows a picture from the next vblank on. `false` where the kernel is busy with an earlier change.
     pub(super) fn flip(&self, card: &Card, next: framebuffer::Handle) -> Result<bool, LcdError> {
         let flipped = match &self.path {
-            Path::Atomic { plane, ids, .. } => {
+            KmsInterface::Atomic { plane, ids, .. } => {
                 let mut request = AtomicModeReq::new();
                 set(&mut request, *plane, ids.plane_framebuffer, u32::from(next));
                 card.atomic_commit(AtomicCommitFlags::NONBLOCK | AtomicCommitFlags::PAGE_FLIP_EVENT, request)
             }
-            Path::Legacy => card.page_flip(self.target.crtc, next, PageFlipFlags::EVENT, None),
+            KmsInterface::Legacy => card.page_flip(self.target.crtc, next, PageFlipFlags::EVENT, None),
         };
         match flipped {
             Err(e) if Errno::from_io_error(&e) == Some(Errno::BUSY) => Ok(false),
@@ -175,7 +178,7 @@ impl Screen {
     /// Switches the display off, so that the mode is set anew when it comes back.
     pub(super) fn switch_off(&self, card: &Card) {
         let off = match &self.path {
-            Path::Atomic { plane, ids, .. } => {
+            KmsInterface::Atomic { plane, ids, .. } => {
                 let mut request = AtomicModeReq::new();
                 set(&mut request, self.target.connector, ids.connector_crtc, 0u32);
                 set(&mut request, self.target.crtc, ids.crtc_active, false);
@@ -184,7 +187,7 @@ impl Screen {
                 set(&mut request, *plane, ids.plane_crtc, 0u32);
                 card.atomic_commit(AtomicCommitFlags::ALLOW_MODESET, request)
             }
-            Path::Legacy => card.set_crtc(self.target.crtc, None, (0, 0), &[], None),
+            KmsInterface::Legacy => card.set_crtc(self.target.crtc, None, (0, 0), &[], None),
         };
         if let Err(e) = off {
             log::debug!("{}: the display was not switched off: {e}", card.node().display());
@@ -194,7 +197,7 @@ impl Screen {
     /// Frees what the screen holds. Something else must be shown, or nothing.
     pub(super) fn free(mut self, card: &Card) {
         self.buffers.destroy(card);
-        if let Path::Atomic { mode_blob, .. } = self.path
+        if let KmsInterface::Atomic { mode_blob, .. } = self.path
             && let Err(e) = card.destroy_property_blob(mode_blob)
         {
             log::debug!("{}: a mode was not freed: {e}", card.node().display());
@@ -208,7 +211,7 @@ impl Screen {
         mode_blob: u64,
         framebuffer: framebuffer::Handle,
     ) -> AtomicModeReq {
-        let Target { connector, crtc, ref choice, .. } = self.target;
+        let LcdTarget { connector, crtc, ref choice, .. } = self.target;
         let (width, height) = (choice.mode.width, choice.mode.height);
         let mut request = AtomicModeReq::new();
         set(&mut request, connector, ids.connector_crtc, u32::from(crtc));
@@ -227,12 +230,12 @@ impl Screen {
     }
 }
 
-impl Path {
-    fn atomic(card: &Card, target: &Target) -> Result<Self, LcdError> {
+impl KmsInterface {
+    fn atomic(card: &Card, target: &LcdTarget) -> Result<Self, LcdError> {
         let plane = primary_plane(card, target)?;
-        let of_connector = Properties::of(card, target.connector)?;
-        let of_crtc = Properties::of(card, target.crtc)?;
-        let of_plane = Properties::of(card, plane)?;
+        let of_connector = KmsProperties::of(card, target.connector)?;
+        let of_crtc = KmsProperties::of(card, target.crtc)?;
+        let of_plane = KmsProperties::of(card, plane)?;
         let ids = Ids {
             connector_crtc: of_connector.id("CRTC_ID")?,
             crtc_mode: of_crtc.id("MODE_ID")?,
@@ -248,7 +251,7 @@ impl Path {
 }
 
 /// The plane that fills the screen: the one in use there, otherwise the first that can be.
-fn primary_plane(card: &Card, target: &Target) -> Result<plane::Handle, LcdError> {
+fn primary_plane(card: &Card, target: &LcdTarget) -> Result<plane::Handle, LcdError> {
     let resources = card.tried("list the connectors", card.resource_handles())?;
     let mut found = None;
     for handle in card.tried("list the planes", card.plane_handles())? {
@@ -258,7 +261,7 @@ fn primary_plane(card: &Card, target: &Target) -> Result<plane::Handle, LcdError
         if !serves || !is_free || !info.formats().contains(&XRGB8888) {
             continue;
         }
-        let properties = Properties::of(card, handle)?;
+        let properties = KmsProperties::of(card, handle)?;
         if properties.value("type") != Some(u64::from(PlaneType::Primary as u32)) {
             continue;
         }
@@ -275,12 +278,12 @@ fn primary_plane(card: &Card, target: &Target) -> Result<plane::Handle, LcdError
 }
 
 /// The properties of one object of a card.
-struct Properties<'a> {
+struct KmsProperties<'a> {
     card: &'a Card,
     found: Vec<(String, property::Handle, u64)>,
 }
 
-impl<'a> Properties<'a> {
+impl<'a> KmsProperties<'a> {
     fn of(card: &'a Card, object: impl ResourceHandle) -> Result<Self, LcdError> {
         let what = "list properties";
         let mut found = Vec::new();

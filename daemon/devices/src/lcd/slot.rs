@@ -8,7 +8,7 @@ use bowwave_core::time::Time;
 
 /// A buffer with a picture in it.
 #[derive(Debug)]
-pub(super) struct Filled<B> {
+pub(super) struct FilledScanout<B> {
     /// The buffer.
     pub(super) buffer: B,
     /// The caller's number of the picture; `None` for the black one with which a mode is set.
@@ -17,9 +17,9 @@ pub(super) struct Filled<B> {
     pub(super) given: Time,
 }
 
-/// A buffer lent to a caller, to be given back with [`Slot::give_back`].
+/// A buffer lent to a caller, to be given back with [`ScanoutSlot::give_back`].
 #[derive(Debug)]
-pub(super) struct Lent<B> {
+pub(super) struct LentScanout<B> {
     /// The buffer.
     pub(super) buffer: B,
     /// Which screen it is of.
@@ -30,23 +30,23 @@ pub(super) struct Lent<B> {
 
 /// The buffers of the screen that is there now, if any.
 #[derive(Debug)]
-pub(super) struct Slot<B> {
+pub(super) struct ScanoutSlot<B> {
     /// Counts screens: a buffer of an earlier one is not taken back.
     screen: u64,
     is_open: bool,
     free: Vec<B>,
-    ready: Option<Filled<B>>,
-    pending: Option<Filled<B>>,
-    front: Option<Filled<B>>,
+    ready: Option<FilledScanout<B>>,
+    pending: Option<FilledScanout<B>>,
+    front: Option<FilledScanout<B>>,
 }
 
-impl<B> Default for Slot<B> {
+impl<B> Default for ScanoutSlot<B> {
     fn default() -> Self {
         Self { screen: 0, is_open: false, free: Vec::new(), ready: None, pending: None, front: None }
     }
 }
 
-impl<B> Slot<B> {
+impl<B> ScanoutSlot<B> {
     /// A new screen with its buffers.
     pub(super) fn open(&mut self, buffers: Vec<B>) {
         let screen = self.screen.wrapping_add(1);
@@ -62,23 +62,23 @@ impl<B> Slot<B> {
     }
 
     /// A buffer to draw in. `None` without a screen, or while another caller draws in the last one.
-    pub(super) fn lend(&mut self) -> Option<Lent<B>> {
+    pub(super) fn lend(&mut self) -> Option<LentScanout<B>> {
         let screen = self.screen;
         if let Some(buffer) = self.free.pop() {
-            return Some(Lent { buffer, screen, takes_ready: false });
+            return Some(LentScanout { buffer, screen, takes_ready: false });
         }
         let old = self.ready.take()?;
-        Some(Lent { buffer: old.buffer, screen, takes_ready: true })
+        Some(LentScanout { buffer: old.buffer, screen, takes_ready: true })
     }
 
     /// The drawn buffer comes back and is ready. Gives how many waiting pictures gave way to it; where the screen has gone
     /// meanwhile, as an error, how many pictures went with the buffer.
-    pub(super) fn give_back(&mut self, lent: Lent<B>, frame: u64, given: Time) -> Result<u64, u64> {
+    pub(super) fn give_back(&mut self, lent: LentScanout<B>, frame: u64, given: Time) -> Result<u64, u64> {
         let overwritten = u64::from(lent.takes_ready);
         if !self.is_open || lent.screen != self.screen {
             return Err(1 + overwritten);
         }
-        let old = self.ready.replace(Filled { buffer: lent.buffer, frame: Some(frame), given });
+        let old = self.ready.replace(FilledScanout { buffer: lent.buffer, frame: Some(frame), given });
         let gave_way = overwritten + u64::from(old.is_some());
         self.free.extend(old.map(|f| f.buffer));
         Ok(gave_way)
@@ -86,7 +86,7 @@ impl<B> Slot<B> {
 
     /// The picture to be handed to the kernel now: the ready one, unless another is still pending. It is pending from here
     /// on.
-    pub(super) fn hand_over(&mut self) -> Option<&Filled<B>> {
+    pub(super) fn hand_over(&mut self) -> Option<&FilledScanout<B>> {
         if self.pending.is_some() {
             return None;
         }
@@ -95,9 +95,9 @@ impl<B> Slot<B> {
     }
 
     /// A free buffer, as it is, becomes pending: the black picture with which a mode is set.
-    pub(super) fn hand_over_blank(&mut self, now: Time) -> Option<&Filled<B>> {
+    pub(super) fn hand_over_blank(&mut self, now: Time) -> Option<&FilledScanout<B>> {
         let buffer = self.free.pop()?;
-        self.pending = Some(Filled { buffer, frame: None, given: now });
+        self.pending = Some(FilledScanout { buffer, frame: None, given: now });
         self.pending.as_ref()
     }
 
@@ -128,21 +128,21 @@ mod tests {
 
     use super::*;
 
-    fn opened() -> Slot<u8> {
-        let mut slot = Slot::default();
+    fn opened() -> ScanoutSlot<u8> {
+        let mut slot = ScanoutSlot::default();
         slot.open(vec![0, 1, 2]);
         slot
     }
 
     /// Shows a picture; gives whether another one gave way.
-    fn show(slot: &mut Slot<u8>, frame: u64) -> bool {
+    fn show(slot: &mut ScanoutSlot<u8>, frame: u64) -> bool {
         let lent = slot.lend().expect("a buffer");
         slot.give_back(lent, frame, Time::from_ns(frame as i64)).expect("the screen is there") == 1
     }
 
     #[test]
     fn without_a_screen_nothing_is_taken() {
-        let mut slot = Slot::<u8>::default();
+        let mut slot = ScanoutSlot::<u8>::default();
         assert!(slot.lend().is_none() && slot.hand_over().is_none());
         assert_eq!(slot.flipped(), None);
     }

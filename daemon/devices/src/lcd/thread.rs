@@ -1,51 +1,48 @@
 //! The port's thread, and what it shares with the callers.
 
 use std::{
-    os::fd::{AsFd, OwnedFd},
-    sync::{
-        Arc, Condvar, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
+    io,
+    os::fd::AsFd,
+    sync::{Arc, Condvar, PoisonError},
     time::Instant,
 };
 
 use bowwave_core::{fault::Fault, time::Time};
 use drm::control::{Device as _, Event, PageFlipEvent};
-use rustix::{
-    event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll},
-    io::Errno,
-};
+use rustix::io::Errno;
 
 use super::{
-    Flip, Given, LcdCounters, LcdError, LcdSettings, LcdState, LcdStatus, Mode, Vblanks,
-    canvas::Canvas,
+    Flip, Given, LcdCounters, LcdError, LcdMode, LcdSettings, LcdState, LcdStatus, Vblanks,
+    canvas::ScanoutBuffer,
     card::{self, Card},
-    life::{Due, Life, Tell},
+    life::{DisplayChange, LcdDue, LcdLife},
     pixels,
-    screen::{Saved, Screen, Started},
-    slot::Slot,
+    screen::{LcdScreen, Saved, Started},
+    slot::ScanoutSlot,
 };
-use crate::{clock, pulse::Calls, queue::NewestSender, report::Reporter};
+use crate::{
+    clock,
+    queue::NewestSender,
+    report::Reporter,
+    worker::{Calls, PortLink},
+};
 
-/// What the callers and the thread both see.
+/// State that the callers and the thread both see.
 #[derive(Debug)]
-pub(super) struct Shared {
-    inner: Mutex<Inner>,
+pub(super) struct LcdShared {
+    pub(super) link: Arc<PortLink<Scanout>>,
     changed: Condvar,
-    wake: OwnedFd,
-    stopping: AtomicBool,
-    /// What the thread asks of the kernel.
-    pub(super) calls: Calls,
 }
 
+/// The buffers of the display, and the port's status.
 #[derive(Debug)]
-struct Inner {
-    slot: Slot<Canvas>,
+pub(super) struct Scanout {
+    slot: ScanoutSlot<ScanoutBuffer>,
     status: LcdStatus,
 }
 
-impl Shared {
-    pub(super) fn new() -> Result<Self, Errno> {
+impl LcdShared {
+    pub(super) fn new() -> io::Result<Self> {
         let status = LcdStatus {
             state: LcdState::Searching,
             choice: None,
@@ -55,24 +52,14 @@ impl Shared {
             trouble: None,
             counters: LcdCounters::default(),
         };
-        Ok(Self {
-            inner: Mutex::new(Inner { slot: Slot::default(), status }),
-            changed: Condvar::new(),
-            wake: eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?,
-            stopping: AtomicBool::new(false),
-            calls: Calls::default(),
-        })
-    }
-
-    /// Whoever died holding the lock left whole values behind: nothing under it can fail half-way.
-    fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+        let link = PortLink::new(Scanout { slot: ScanoutSlot::default(), status })?;
+        Ok(Self { link, changed: Condvar::new() })
     }
 
     pub(super) fn show(&self, rgba: &[u8], size: (u32, u32), frame: u64) -> Given {
         let given = clock::now();
         let is_whole = rgba.len() as u64 == u64::from(size.0) * u64::from(size.1) * pixels::PIXEL as u64;
-        let mut inner = self.lock();
+        let mut inner = self.link.status();
         inner.status.counters.given += 1;
         if !is_whole || rgba.is_empty() {
             inner.status.counters.malformed += 1;
@@ -91,7 +78,7 @@ impl Shared {
         // Without the lock: the thread goes on flipping meanwhile.
         lent.buffer.draw(rgba, size);
         let copy_ns = clock::now().ns_since(given);
-        let mut inner = self.lock();
+        let mut inner = self.link.status();
         let counters = &mut inner.status.counters;
         counters.copy_ns_max = counters.copy_ns_max.max(copy_ns);
         match inner.slot.give_back(lent, frame, given) {
@@ -102,12 +89,12 @@ impl Shared {
             }
         }
         drop(inner);
-        self.wake();
+        self.link.waker().notify();
         Given::Taken
     }
 
-    pub(super) fn await_mode(&self, until: Instant) -> Option<Mode> {
-        let mut inner = self.lock();
+    pub(super) fn await_mode(&self, until: Instant) -> Option<LcdMode> {
+        let mut inner = self.link.status();
         loop {
             match inner.status.state {
                 LcdState::Showing(mode) => return Some(mode),
@@ -120,21 +107,11 @@ impl Shared {
     }
 
     pub(super) fn status(&self) -> LcdStatus {
-        self.lock().status.clone()
+        self.link.status().status.clone()
     }
 
-    pub(super) fn ask_to_stop(&self) {
-        self.stopping.store(true, Ordering::Release);
-        self.wake();
-    }
-
-    fn wake(&self) {
-        // Fails only where the counter is full: the thread is then awake anyway.
-        let _ = rustix::io::write(&self.wake, &1u64.to_ne_bytes());
-    }
-
-    fn update(&self, life: &Life, change: impl FnOnce(&mut Inner)) {
-        let mut inner = self.lock();
+    fn update(&self, life: &LcdLife, change: impl FnOnce(&mut Scanout)) {
+        let mut inner = self.link.status();
         change(&mut inner);
         inner.status.state = life.state();
         inner.status.counters.losses = life.losses();
@@ -144,24 +121,24 @@ impl Shared {
 }
 
 /// The thread.
-pub(super) struct Worker {
+pub(super) struct LcdThread {
     settings: LcdSettings,
     reporter: Reporter,
-    shared: Arc<Shared>,
+    shared: Arc<LcdShared>,
     flips: NewestSender<Flip>,
-    life: Life,
+    life: LcdLife,
     card: Option<Card>,
     saved: Vec<Saved>,
-    screen: Option<Screen>,
+    screen: Option<LcdScreen>,
     vblanks: Option<Vblanks>,
     last_sequence: Option<u32>,
 }
 
-impl Worker {
+impl LcdThread {
     pub(super) fn new(
         settings: LcdSettings,
         reporter: Reporter,
-        shared: Arc<Shared>,
+        shared: Arc<LcdShared>,
         flips: NewestSender<Flip>,
     ) -> Self {
         Self {
@@ -169,7 +146,7 @@ impl Worker {
             reporter,
             shared,
             flips,
-            life: Life::new(clock::now()),
+            life: LcdLife::new(clock::now()),
             card: None,
             saved: Vec::new(),
             screen: None,
@@ -180,7 +157,7 @@ impl Worker {
 
     /// Until asked to stop. Fails only in putting back what was shown before.
     pub(super) fn run(mut self) -> Result<(), LcdError> {
-        while !self.shared.stopping.load(Ordering::Acquire) {
+        while !self.shared.link.is_stopping() {
             self.reporter.beat();
             if let Err(e) = self.turn() {
                 self.lose(&e);
@@ -192,10 +169,10 @@ impl Worker {
     /// One turn: what is due, then a flip, then sleep until something happens.
     fn turn(&mut self) -> Result<(), LcdError> {
         match self.life.due(clock::now()) {
-            Due::Nothing => {}
-            Due::Look if self.screen.is_some() => self.look()?,
-            Due::Look => self.search()?,
-            Due::FlipOverdue => {
+            LcdDue::Nothing => {}
+            LcdDue::Look if self.screen.is_some() => self.look()?,
+            LcdDue::Look => self.search()?,
+            LcdDue::FlipOverdue => {
                 let node = self.card.as_ref().map(|c| c.node().to_owned()).unwrap_or_default();
                 return Err(LcdError::FlipOverdue { node });
             }
@@ -207,7 +184,7 @@ impl Worker {
 
     /// Looks for a display and sets its mode.
     fn search(&mut self) -> Result<(), LcdError> {
-        let calls = &self.shared.calls;
+        let calls = &self.shared.link.calls;
         let (card, target) = calls.during(|| card::search(&self.settings, self.card.take()));
         if card.is_none() {
             self.saved.clear();
@@ -219,7 +196,7 @@ impl Worker {
             self.saved.push(calls.during(|| Saved::of(card, target.crtc))?);
         }
         let choice = target.choice.clone();
-        let (screen, canvases) = calls.during(|| Screen::make(card, target, !self.settings.legacy))?;
+        let (screen, canvases) = calls.during(|| LcdScreen::make(card, target, !self.settings.legacy))?;
         let is_atomic = screen.is_atomic();
         let screen = self.screen.insert(screen);
         let now = clock::now();
@@ -244,7 +221,7 @@ impl Worker {
         let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
         let target = screen.target();
         // The kernel may be probing it for another program.
-        if self.shared.calls.during(|| card.is_connected(target.connector))? {
+        if self.shared.link.calls.during(|| card.is_connected(target.connector))? {
             return Ok(());
         }
         let names = target.choice.connector.clone();
@@ -254,13 +231,13 @@ impl Worker {
     /// Hands the newest picture to the kernel, unless it still holds one back.
     fn flip(&mut self) -> Result<(), LcdError> {
         let (Some(card), Some(screen)) = (&self.card, &self.screen) else { return Ok(()) };
-        let next = self.shared.lock().slot.hand_over().map(|f| f.buffer.framebuffer());
+        let next = self.shared.link.status().slot.hand_over().map(|f| f.buffer.framebuffer());
         let Some(next) = next else { return Ok(()) };
-        match self.shared.calls.during(|| screen.flip(card, next)) {
+        match self.shared.link.calls.during(|| screen.flip(card, next)) {
             Ok(true) => self.life.flip_begun(clock::now()),
             // Whether that lasts, the next look tells.
             Ok(false) => {
-                let mut inner = self.shared.lock();
+                let mut inner = self.shared.link.status();
                 inner.status.counters.replaced += u64::from(inner.slot.take_back());
             }
             Err(e) => return Err(e),
@@ -269,16 +246,9 @@ impl Worker {
     }
 
     fn sleep(&self) {
-        let ns = self.life.sleep_ns(clock::now());
-        let timeout = Timespec { tv_sec: 0, tv_nsec: ns };
-        let mut fds = vec![PollFd::new(&self.shared.wake, PollFlags::IN)];
-        if let Some(card) = &self.card {
-            fds.push(PollFd::from_borrowed_fd(card.as_fd(), PollFlags::IN));
-        }
+        let files: Vec<_> = self.card.iter().map(AsFd::as_fd).collect();
         // An interrupted or failed wait only makes the turn shorter.
-        if poll(&mut fds, Some(&timeout)).is_ok() {
-            let _ = rustix::io::read(&self.shared.wake, &mut [0u8; 8]);
-        }
+        let _ = self.shared.link.wait(&files, self.life.sleep_ns(clock::now()));
     }
 
     /// Takes what the kernel tells of flips.
@@ -338,8 +308,8 @@ impl Worker {
         self.tell(told);
         (self.vblanks, self.last_sequence) = (None, None);
         if let (Some(card), Some(screen)) = (&self.card, self.screen.take()) {
-            self.shared.calls.during(|| screen.switch_off(card));
-            self.shared.calls.during(|| screen.free(card));
+            self.shared.link.calls.during(|| screen.switch_off(card));
+            self.shared.link.calls.during(|| screen.free(card));
             // What is still told of this screen is not of the next one.
             while card.receive_events().is_ok_and(|events| events.count() > 0) {}
         }
@@ -352,10 +322,10 @@ impl Worker {
         }
     }
 
-    fn tell(&self, told: Option<Tell>) {
+    fn tell(&self, told: Option<DisplayChange>) {
         match told {
-            Some(Tell::Raised(cause)) => self.reporter.raised(Fault::DisplayLost, cause),
-            Some(Tell::Cleared) => self.reporter.cleared(Fault::DisplayLost),
+            Some(DisplayChange::Raised(cause)) => self.reporter.raised(Fault::DisplayLost, cause),
+            Some(DisplayChange::Cleared) => self.reporter.cleared(Fault::DisplayLost),
             None => {}
         }
     }
@@ -363,9 +333,9 @@ impl Worker {
     /// Puts back what was shown before, and closes the card.
     fn restore(&mut self) -> Result<(), LcdError> {
         let Some(card) = self.card.take() else { return Ok(()) };
-        let result = put_back(&self.shared.calls, &mut self.saved, &card);
+        let result = put_back(&self.shared.link.calls, &mut self.saved, &card);
         // The card is closed within the call too: its last user's screens are switched off.
-        self.shared.calls.during(|| drop(card));
+        self.shared.link.calls.during(|| drop(card));
         result
     }
 
@@ -375,12 +345,12 @@ impl Worker {
             inner.status.counters.lost += inner.slot.close();
         });
         let Some(card) = self.card.take() else { return Ok(()) };
-        let result = put_back(&self.shared.calls, &mut self.saved, &card);
+        let result = put_back(&self.shared.link.calls, &mut self.saved, &card);
         // Only now: a buffer that is shown must not be freed.
         if let Some(screen) = self.screen.take() {
-            self.shared.calls.during(|| screen.free(&card));
+            self.shared.link.calls.during(|| screen.free(&card));
         }
-        self.shared.calls.during(|| drop(card));
+        self.shared.link.calls.during(|| drop(card));
         result
     }
 }

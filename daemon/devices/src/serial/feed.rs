@@ -8,7 +8,7 @@ use crate::{queue::NewestSender, report::Reporter};
 
 /// How the device on a line is called, which faults tell of it, and how fast it speaks.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Kind {
+pub(super) struct LineKind {
     /// Its name in messages.
     pub(super) name: &'static str,
     /// Names of its threads.
@@ -32,7 +32,7 @@ pub(super) struct Kind {
 }
 
 /// The inertial unit: forty packets a second or more.
-pub(super) static IMU: Kind = Kind {
+pub(super) static IMU: LineKind = LineKind {
     name: "inertial unit",
     threads: ["imu-serial", "imu-watch"],
     lost: Fault::ImuLost,
@@ -46,7 +46,7 @@ pub(super) static IMU: Kind = Kind {
 };
 
 /// The ship's instruments: a line a second or more.
-pub(super) static SHIP: Kind = Kind {
+pub(super) static SHIP: LineKind = LineKind {
     name: "ship feed",
     threads: ["ship-serial", "ship-watch"],
     lost: Fault::ShipLost,
@@ -59,13 +59,13 @@ pub(super) static SHIP: Kind = Kind {
     roam_ns: 6_000_000_000,
 };
 
-/// The codec of a line, and what it tells beside the line's own health.
-pub(super) trait Feed: Send + 'static {
-    /// What it tells its owner.
-    type Status: Clone + Default + Send + std::fmt::Debug;
+/// The codec of a line, with judgement of what is said on it.
+pub(super) trait LineFeed: Send + 'static {
+    /// Its report to its owner.
+    type Report: Clone + Default + Send + std::fmt::Debug;
 
     /// The kind of device.
-    const KIND: &'static Kind;
+    const KIND: &'static LineKind;
 
     /// Takes bytes and puts what they complete into `queue`. Gives how many packets that were, those of no concern included.
     fn take(&mut self, bytes: &[u8], arrival: Time, queue: &mut NewestSender<Event>) -> u64;
@@ -80,5 +80,5 @@ pub(super) trait Feed: Send + 'static {
     fn judge(&mut self, path: &Path, now: Time, reporter: &Reporter);
 
     /// How it does.
-    fn status(&self) -> Self::Status;
+    fn report(&self) -> Self::Report;
 }

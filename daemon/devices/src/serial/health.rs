@@ -5,7 +5,7 @@ use bowwave_core::{
     time::Time,
 };
 
-use super::{Baud, feed::Kind};
+use super::{Baud, feed::LineKind};
 
 /// Bytes without a packet for this long come at another rate...
 const GARBLED_NS: i64 = 500_000_000;
@@ -20,16 +20,16 @@ const PROOF: u64 = 2;
 /// A port that says it can be read and gives nothing for this long is opened anew.
 const SPURIOUS_NS: i64 = 150_000_000;
 
-/// What the reader is to do.
+/// Next step of the reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Action {
+pub(super) enum LineAction {
     /// Go on.
     Keep,
     /// Set this rate.
     SetBaud(u32),
     /// Close the port and open it again.
     Reopen,
-    /// Try the next port, where there is another: [`Health::leave`].
+    /// Try the next port, where there is another: [`LineHealth::leave`].
     NextPort,
 }
 
@@ -52,7 +52,7 @@ pub enum LineStatus {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Open {
+struct OpenRate {
     /// When this rate was set.
     since: Time,
     opened: Time,
@@ -71,15 +71,15 @@ struct Open {
 
 /// The line's health. Changes of faults are collected for the caller to fetch.
 #[derive(Debug)]
-pub(super) struct Health {
-    kind: &'static Kind,
+pub(super) struct LineHealth {
+    kind: &'static LineKind,
     rates: Vec<u32>,
     rate: usize,
     /// The rate that last proved right.
     good: Option<usize>,
     /// The rate that the scan looks at in turn with the good one.
     turn: usize,
-    open: Option<Open>,
+    open: Option<OpenRate>,
     /// Why no samples come: the unit lost, or its rate wrong. One at a time.
     trouble: Option<Fault>,
     blocked: bool,
@@ -88,8 +88,8 @@ pub(super) struct Health {
     changes: Vec<FaultChange>,
 }
 
-impl Health {
-    pub(super) fn new(baud: &Baud, kind: &'static Kind) -> Self {
+impl LineHealth {
+    pub(super) fn new(baud: &Baud, kind: &'static LineKind) -> Self {
         let rates = baud.rates().to_vec();
         Self {
             kind,
@@ -133,7 +133,7 @@ impl Health {
 
     /// A port was opened at [`Self::baud`].
     pub(super) fn opened(&mut self, now: Time) {
-        self.open = Some(Open::at(now));
+        self.open = Some(OpenRate::at(now));
     }
 
     /// The port does not take [`Self::baud`]: the next rate takes its place.
@@ -190,15 +190,15 @@ impl Health {
     }
 
     /// To be called often. `roam`: another port may be the right one, as long as no unit answered on this one.
-    pub(super) fn tick(&mut self, now: Time, roam: bool) -> Action {
-        let Some(open) = self.open else { return Action::Keep };
+    pub(super) fn tick(&mut self, now: Time, roam: bool) -> LineAction {
+        let Some(open) = self.open else { return LineAction::Keep };
         if open.spurious.is_some_and(|since| now.ns_since(since) >= SPURIOUS_NS) {
             if !std::mem::replace(&mut self.blocked, true) {
                 let cause = "the port says that bytes wait and gives none; it is opened anew";
                 self.changes.push(FaultChange::raised(now, self.kind.blocked, cause));
             }
             self.open = None;
-            return Action::Reopen;
+            return LineAction::Reopen;
         }
         if roam
             && !open.proven
@@ -206,7 +206,7 @@ impl Health {
             && let Some(open) = &mut self.open
         {
             open.roamed = now;
-            return Action::NextPort;
+            return LineAction::NextPort;
         }
         let silent_ns = now.ns_since(open.last_bytes.unwrap_or(open.opened));
         if open.scanning { self.scan(now, &open, silent_ns) } else { self.watch(now, &open, silent_ns) }
@@ -220,7 +220,7 @@ impl Health {
     }
 
     /// Long enough for every rate, where something comes at all.
-    fn roam_ns(&self, open: &Open) -> i64 {
+    fn roam_ns(&self, open: &OpenRate) -> i64 {
         let rates = i64::try_from(self.rates.len()).unwrap_or(1);
         if open.last_bytes.is_none() {
             self.kind.roam_ns
@@ -229,7 +229,7 @@ impl Health {
         }
     }
 
-    fn watch(&mut self, now: Time, open: &Open, silent_ns: i64) -> Action {
+    fn watch(&mut self, now: Time, open: &OpenRate, silent_ns: i64) -> LineAction {
         if silent_ns >= self.kind.silent_ns {
             if let Some(open) = &mut self.open {
                 (open.garbage, open.garbage_bytes) = (None, 0);
@@ -239,13 +239,13 @@ impl Health {
                 self.kind.lost,
                 &format!("the line is silent: is the {} powered, is its output on?", self.kind.name),
             );
-            return Action::Keep;
+            return LineAction::Keep;
         }
-        let Some(since) = open.garbage else { return Action::Keep };
+        let Some(since) = open.garbage else { return LineAction::Keep };
         let framing = open.framing.saturating_mul(FRAMING_SHARE) >= open.garbage_bytes;
         let wait_ns = if framing { GARBLED_FRAMING_NS } else { GARBLED_NS };
         if now.ns_since(since) < wait_ns || open.garbage_bytes < GARBLED_BYTES_MIN {
-            return Action::Keep;
+            return LineAction::Keep;
         }
         let baud = self.baud();
         let cause = if self.rates.len() > 1 {
@@ -260,7 +260,7 @@ impl Health {
         self.next_rate(now)
     }
 
-    fn scan(&mut self, now: Time, open: &Open, silent_ns: i64) -> Action {
+    fn scan(&mut self, now: Time, open: &OpenRate, silent_ns: i64) -> LineAction {
         if silent_ns >= self.kind.dead_ns {
             self.trouble(
                 now,
@@ -271,14 +271,14 @@ impl Health {
                 open.scanning = false;
             }
             let home = self.good.unwrap_or(0);
-            return if home == self.rate { Action::Keep } else { self.set(now, home) };
+            return if home == self.rate { LineAction::Keep } else { self.set(now, home) };
         }
-        if now.ns_since(open.since) >= self.kind.dwell_ns { self.next_rate(now) } else { Action::Keep }
+        if now.ns_since(open.since) >= self.kind.dwell_ns { self.next_rate(now) } else { LineAction::Keep }
     }
 
-    fn next_rate(&mut self, now: Time) -> Action {
+    fn next_rate(&mut self, now: Time) -> LineAction {
         if self.rates.len() < 2 {
-            return Action::Keep;
+            return LineAction::Keep;
         }
         let next = self.rotate();
         self.set(now, next)
@@ -301,18 +301,18 @@ impl Health {
         self.rate
     }
 
-    fn set(&mut self, now: Time, rate: usize) -> Action {
+    fn set(&mut self, now: Time, rate: usize) -> LineAction {
         self.rate = rate;
         if let Some(open) = &mut self.open {
-            *open = Open {
+            *open = OpenRate {
                 opened: open.opened,
                 roamed: open.roamed,
                 last_bytes: open.last_bytes,
                 scanning: open.scanning,
-                ..Open::at(now)
+                ..OpenRate::at(now)
             };
         }
-        Action::SetBaud(self.baud())
+        LineAction::SetBaud(self.baud())
     }
 
     fn wrong_rate(&mut self, now: Time, cause: &str) {
@@ -338,7 +338,7 @@ impl Health {
     }
 }
 
-impl Open {
+impl OpenRate {
     const fn at(now: Time) -> Self {
         Self {
             since: now,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bowwave_core::{
-    estimate::clock::{ClockMap, ClockReport},
+    estimate::plausibility::{Implausible, Plausibility},
     event::Event,
     fault::{Fault, FaultChange},
     time::Time,
@@ -11,8 +11,7 @@ use bowwave_core::{
 
 use super::{
     ArrivalTiming, ImuSettings,
-    feed::{Feed, IMU, Kind},
-    sanity::{Insane, Sanity},
+    feed::{IMU, LineFeed, LineKind},
     timing::Arrivals,
 };
 use crate::{
@@ -21,73 +20,67 @@ use crate::{
     report::Reporter,
 };
 
-/// How often the unit's clock is looked at.
-const CLOCK_NS: i64 = 500_000_000;
-
-/// What the unit tells beside its samples.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct ImuReport {
-    pub(super) format: Option<ImuFormat>,
-    pub(super) fields: Fields,
-    pub(super) timing: ArrivalTiming,
-    pub(super) counters: ImuCounters,
-    pub(super) lost_samples: u64,
-    pub(super) clock: Option<ClockReport>,
+/// Report of the inertial unit beside its samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ImuReport {
+    /// The format, once it is known.
+    pub format: Option<ImuFormat>,
+    /// The fields that the unit sends.
+    pub fields: Fields,
+    /// How evenly samples arrive.
+    pub timing: ArrivalTiming,
+    /// What the decoder met.
+    pub counters: ImuCounters,
+    /// Samples that the unit's own clock shows to be missing.
+    pub lost_samples: u64,
 }
 
 /// An inertial unit on a line.
+#[derive(Debug)]
 pub(super) struct ImuFeed {
     decoder: ImuDecoder,
-    sanity: Sanity,
-    insane: bool,
+    plausibility: Plausibility,
+    implausible: bool,
     arrivals: Arrivals,
     late: bool,
-    clock: ClockMap,
-    reported: Option<ClockReport>,
-    /// When that was.
-    looked: Time,
 }
 
 impl ImuFeed {
     pub(super) fn new(settings: &ImuSettings) -> Self {
         Self {
             decoder: ImuDecoder::with(settings.format),
-            sanity: Sanity::default(),
-            insane: false,
+            plausibility: Plausibility::default(),
+            implausible: false,
             arrivals: Arrivals::late_above(settings.late),
             late: false,
-            clock: ClockMap::new(),
-            reported: None,
-            looked: Time::MIN,
         }
     }
 }
 
-impl Feed for ImuFeed {
-    type Status = ImuReport;
+impl LineFeed for ImuFeed {
+    type Report = ImuReport;
 
-    const KIND: &'static Kind = &IMU;
+    const KIND: &'static LineKind = &IMU;
 
     fn take(&mut self, bytes: &[u8], arrival: Time, queue: &mut NewestSender<Event>) -> u64 {
         let before = self.decoder.counters();
-        let Self { decoder, sanity, arrivals, clock, .. } = self;
+        let Self { decoder, plausibility, arrivals, .. } = self;
         let mut bytes = bytes;
         while let Some(event) = decoder.next_event(&mut bytes, arrival) {
             match event {
                 ImuEvent::Recognised(format) => log::info!("the inertial unit speaks {format}"),
                 ImuEvent::Sample(sample) => {
-                    sanity.sample(&sample);
+                    plausibility.sample(&sample);
                     arrivals.sample(&sample);
-                    clock.observe(sample.device_time_ns, sample.arrival);
                     queue.send(Event::Imu(sample));
                 }
             }
         }
         let after = self.decoder.counters();
         if after.not_finite > before.not_finite {
-            self.sanity.bad(arrival, Insane::NotFinite);
+            self.plausibility.bad(arrival, Implausible::NotFinite);
         } else if after.unusable > before.unusable && after.samples == before.samples {
-            self.sanity.bad(arrival, Insane::Unusable);
+            self.plausibility.bad(arrival, Implausible::Unusable);
         }
         after.packets - before.packets
     }
@@ -97,22 +90,21 @@ impl Feed for ImuFeed {
     }
 
     fn forget(&mut self) {
-        self.sanity.forget();
+        self.plausibility.forget();
         self.arrivals.forget();
-        self.clock = ClockMap::new();
     }
 
     fn judge(&mut self, path: &Path, now: Time, reporter: &Reporter) {
-        let verdict = self.sanity.verdict(now);
-        if let Some(insane) = verdict
-            && !self.insane
+        let verdict = self.plausibility.verdict(now);
+        if let Some(implausible) = verdict
+            && !self.implausible
         {
-            let cause = format!("the inertial unit on {}: {insane}", path.display());
+            let cause = format!("the inertial unit on {}: {implausible}", path.display());
             reporter.send(FaultChange::raised(now, Fault::ImuSanity, cause));
-        } else if verdict.is_none() && self.insane {
+        } else if verdict.is_none() && self.implausible {
             reporter.send(FaultChange::cleared(now, Fault::ImuSanity));
         }
-        self.insane = verdict.is_some();
+        self.implausible = verdict.is_some();
         let late = self.arrivals.look(now);
         if late && !self.late {
             let timing = self.arrivals.timing();
@@ -127,20 +119,15 @@ impl Feed for ImuFeed {
             reporter.send(FaultChange::cleared(now, Fault::ImuLatency));
         }
         self.late = late;
-        if now.ns_since(self.looked) >= CLOCK_NS {
-            self.looked = now;
-            self.reported = self.clock.report();
-        }
     }
 
-    fn status(&self) -> ImuReport {
+    fn report(&self) -> ImuReport {
         ImuReport {
             format: self.decoder.format(),
             fields: self.decoder.fields(),
             timing: self.arrivals.timing(),
             counters: self.decoder.counters(),
             lost_samples: self.arrivals.lost(),
-            clock: self.reported,
         }
     }
 }

@@ -3,18 +3,16 @@
 use std::{
     fs,
     io::{self, ErrorKind},
-    os::fd::{AsFd, BorrowedFd, OwnedFd},
+    os::fd::{AsFd, AsRawFd, BorrowedFd},
     path::{Path, PathBuf},
 };
 
 use rustix::{
-    fs::{Mode, OFlags},
+    fs::{Mode, OFlags, fcntl_getfl, fcntl_setfl},
     io::Errno,
-    termios::{
-        ControlModes, InputModes, OptionalActions, QueueSelector, SpecialCodeIndex, ioctl_tiocexcl, isatty,
-        tcflush, tcgetattr, tcsetattr,
-    },
+    termios::{InputModes, OptionalActions, tcgetattr, tcsetattr},
 };
+use serialport::{ClearBuffer, SerialPort as _, TTYPort};
 
 use super::{
     LowLatency, SerialError,
@@ -26,9 +24,9 @@ use crate::nodes;
 /// Deviation of the rate that an asynchronous receiver bears, as a divisor: 3 %.
 const RATE_TOLERANCE_DIVISOR: u32 = 33;
 
-/// What a read gave.
+/// Result of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Read {
+pub(super) enum LineRead {
     /// So many bytes.
     Bytes(usize),
     /// Nothing is there now.
@@ -41,8 +39,8 @@ pub(super) enum Read {
 
 /// A serial port opened for this program alone: 8 data bits, no parity, one stop bit, no flow control.
 #[derive(Debug)]
-pub(super) struct Line {
-    fd: OwnedFd,
+pub(super) struct SerialLine {
+    port: TTYPort,
     /// The name it was opened by.
     path: PathBuf,
     /// The node behind that name.
@@ -50,58 +48,65 @@ pub(super) struct Line {
     low_latency: LowLatency,
 }
 
-impl Line {
+impl SerialLine {
     /// Opens the port at `path`. Bytes from before are discarded. Never waits for a carrier.
     pub(super) fn open(path: &Path, baud: u32, low_latency: bool) -> Result<Self, SerialError> {
-        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
-        let fd = rustix::fs::open(path, flags, Mode::empty()).map_err(|e| open_error(path, e))?;
-        if !isatty(&fd) {
-            return Err(open_error(path, Errno::NOTTY));
+        if baud == 0 {
+            return Err(SerialError::Baud { baud });
         }
-        ioctl_tiocexcl(&fd).map_err(|e| open_error(path, e))?;
+        // A raw line with 8 data bits, no parity, one stop bit and no flow control is what the crate sets where nothing else is asked for.
+        let port =
+            TTYPort::open(&serialport::new(path.to_string_lossy(), baud)).map_err(|e| open_error(path, e))?;
         let mut line = Self {
-            fd,
+            port,
             path: path.to_owned(),
             node: fs::canonicalize(path).unwrap_or_else(|_| path.to_owned()),
             low_latency: LowLatency::NotAsked,
         };
-        line.configure(baud)?;
+        line.check_rate(baud)?;
+        line.adjust().map_err(|e| SerialError::Open { node: path.to_owned(), source: e.into() })?;
         if low_latency {
             line.low_latency = line.ask_low_latency();
         }
         // What came in at another rate, or long ago.
-        tcflush(&line.fd, QueueSelector::IFlush).map_err(|e| open_error(path, e))?;
+        line.flush();
         Ok(line)
     }
 
-    /// Sets the rate and raw mode, and makes sure that the port took the rate: a UART quietly keeps to what it can.
-    pub(super) fn configure(&self, baud: u32) -> Result<(), SerialError> {
-        let failed = |e| open_error(&self.path, e);
-        let mut settings = tcgetattr(&self.fd).map_err(failed)?;
-        settings.make_raw();
-        settings.control_modes |= ControlModes::CREAD | ControlModes::CLOCAL;
-        settings.control_modes -= ControlModes::CSTOPB | ControlModes::CRTSCTS;
-        settings.input_modes -= InputModes::IXOFF;
-        // A read of nothing then says EAGAIN, and 0 bytes mean that the line hung up.
-        settings.special_codes[SpecialCodeIndex::VMIN] = 1;
-        settings.special_codes[SpecialCodeIndex::VTIME] = 0;
-        settings.set_speed(baud).map_err(|_| SerialError::Baud { baud })?;
-        tcsetattr(&self.fd, OptionalActions::Now, &settings).map_err(failed)?;
-        let got = tcgetattr(&self.fd).map_err(failed)?.input_speed();
+    /// Sets the rate.
+    pub(super) fn configure(&mut self, baud: u32) -> Result<(), SerialError> {
+        let failed = |e: serialport::Error| SerialError::Open { node: self.path.clone(), source: e.into() };
+        self.port.set_baud_rate(baud).map_err(failed)?;
+        self.check_rate(baud)
+    }
+
+    /// Makes sure that the port took the rate: a UART quietly keeps to what it can.
+    fn check_rate(&self, baud: u32) -> Result<(), SerialError> {
+        let failed = |e: serialport::Error| SerialError::Open { node: self.path.clone(), source: e.into() };
+        let got = self.port.baud_rate().map_err(failed)?;
         if got.abs_diff(baud) > baud / RATE_TOLERANCE_DIVISOR {
             return Err(SerialError::BaudNotTaken { node: self.path.clone(), baud, got });
         }
         Ok(())
     }
 
+    /// Two settings of the crate's that are not ours. Its reads wait and cannot be woken: here a read of nothing says EAGAIN, and 0 bytes
+    /// mean that the line hung up. It has the kernel drop broken bytes (IGNPAR): here they are a sign of a wrong rate.
+    fn adjust(&self) -> Result<(), Errno> {
+        fcntl_setfl(self, fcntl_getfl(self)? | OFlags::NONBLOCK)?;
+        let mut settings = tcgetattr(self)?;
+        settings.input_modes -= InputModes::IGNPAR;
+        tcsetattr(self, OptionalActions::Now, &settings)
+    }
+
     /// Discards what has come in.
     pub(super) fn flush(&self) {
         // Bytes that stay are skipped by the parser.
-        let _ = tcflush(&self.fd, QueueSelector::IFlush);
+        let _ = self.port.clear(ClearBuffer::Input);
     }
 
     fn ask_low_latency(&self) -> LowLatency {
-        let flag = ioctl::set_low_latency(&self.fd);
+        let flag = ioctl::set_low_latency(self);
         // FTDI adapters hold bytes back for this many milliseconds; the flag sets 1 ms where the driver heeds it.
         if let Some(name) = self.node.file_name() {
             let timer = Path::new("/sys/class/tty").join(name).join("device/latency_timer");
@@ -120,18 +125,18 @@ impl Line {
     }
 
     /// What is there now, at most `bytes.len()` bytes.
-    pub(super) fn read(&self, bytes: &mut [u8]) -> Read {
-        match rustix::io::read(&self.fd, bytes) {
-            Ok(0) | Err(Errno::IO | Errno::NODEV | Errno::NXIO) => Read::HungUp,
-            Ok(count) => Read::Bytes(count),
-            Err(Errno::AGAIN | Errno::INTR) => Read::Empty,
-            Err(e) => Read::Failed(e),
+    pub(super) fn read(&self, bytes: &mut [u8]) -> LineRead {
+        match rustix::io::read(self, bytes) {
+            Ok(0) | Err(Errno::IO | Errno::NODEV | Errno::NXIO) => LineRead::HungUp,
+            Ok(count) => LineRead::Bytes(count),
+            Err(Errno::AGAIN | Errno::INTR) => LineRead::Empty,
+            Err(e) => LineRead::Failed(e),
         }
     }
 
     /// The port's own counts, where it keeps some.
     pub(super) fn errors(&self) -> Option<LineErrors> {
-        ioctl::line_errors(&self.fd).ok()
+        ioctl::line_errors(self).ok()
     }
 
     /// The name that it was opened by.
@@ -150,16 +155,24 @@ impl Line {
     }
 }
 
-impl AsFd for Line {
+impl AsFd for SerialLine {
     fn as_fd(&self) -> BorrowedFd<'_> {
-        self.fd.as_fd()
+        // SAFETY: the port owns the descriptor and is borrowed for as long as this: it stays open.
+        unsafe { BorrowedFd::borrow_raw(self.port.as_raw_fd()) }
     }
 }
 
-fn open_error(path: &Path, errno: Errno) -> SerialError {
-    let source = io::Error::from(errno);
+/// Why the port could not be opened. The crate tells neither a busy port from one that is locked nor a file of another kind from a
+/// failing port: the kernel is asked once more.
+fn open_error(path: &Path, error: serialport::Error) -> SerialError {
     let node = path.to_owned();
-    match source.kind() {
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+    let kind = match rustix::fs::open(path, flags, Mode::empty()) {
+        Err(errno) => io::Error::from(errno).kind(),
+        Ok(_) if error.kind() == serialport::ErrorKind::NoDevice => ErrorKind::ResourceBusy,
+        Ok(_) => ErrorKind::Other,
+    };
+    match kind {
         ErrorKind::NotFound => {
             let present = list().unwrap_or_default();
             let present = nodes::listed(present.iter().map(|p| p.node.display().to_string()));
@@ -167,6 +180,6 @@ fn open_error(path: &Path, errno: Errno) -> SerialError {
         }
         ErrorKind::PermissionDenied => SerialError::Permission { node },
         ErrorKind::ResourceBusy => SerialError::Busy { node },
-        _ => SerialError::Open { node, source },
+        _ => SerialError::Open { node, source: error.into() },
     }
 }

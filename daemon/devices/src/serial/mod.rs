@@ -2,7 +2,7 @@
 //! trainer runs.
 //!
 //! `health` decides, as a function of what came and of time; `line` and `ioctl` speak to the kernel; `reader` joins them in a
-//! thread, `port` owns it. What the bytes mean is a `feed`: `imu_feed`, whose samples `sanity` and `timing` judge, and `ship`.
+//! thread, `port` owns it. What the bytes mean is a `feed`: `imu_feed`, whose arrivals `timing` judges, and `ship`.
 
 mod feed;
 mod find;
@@ -12,7 +12,6 @@ mod ioctl;
 mod line;
 mod port;
 mod reader;
-mod sanity;
 mod ship;
 #[cfg(test)]
 mod tests;
@@ -25,22 +24,24 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::{estimate::clock::ClockReport, event::Event, fault::Fault};
+use bowwave_core::{
+    estimate::clock::{ClockMap, ClockReport},
+    event::Event,
+    fault::Fault,
+};
 use crossbeam_channel::Receiver;
 use serialport::SerialPortType;
 
+pub use self::imu_feed::ImuReport;
 pub use self::{
     health::LineStatus,
     ship::{ShipPort, ShipReport, ShipSettings, ShipStatus, check_ship},
     timing::ArrivalTiming,
 };
-use self::{
-    imu_feed::{ImuFeed, ImuReport},
-    line::Line,
-    port::Port,
-};
+use self::{imu_feed::ImuFeed, line::SerialLine, port::LinePort};
 use crate::{
-    imu::{Fields, ImuCounters, ImuFormat},
+    clock,
+    imu::ImuFormat,
     nodes,
     report::{Reporter, reporting},
 };
@@ -308,26 +309,7 @@ pub enum LowLatency {
     Refused,
 }
 
-/// What a line has carried.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct PortCounters {
-    /// What the decoder met.
-    pub imu: ImuCounters,
-    /// Samples dropped, oldest first, because nobody drained the queue.
-    pub overflow: u64,
-    /// Samples that the unit's own clock shows to be missing.
-    pub lost_samples: u64,
-    /// Bytes without a stop bit, where the port counts them.
-    pub framing_errors: u64,
-    /// Bytes lost in the port or in the kernel, where the port counts them.
-    pub overruns: u64,
-    /// Times that a port was opened.
-    pub opened: u64,
-    /// Times that the port said it could be read and gave nothing.
-    pub spurious: u64,
-}
-
-/// How a line does.
+/// Report of a line's health.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LineReport {
     /// Its life.
@@ -350,33 +332,22 @@ pub struct LineReport {
     pub spurious: u64,
 }
 
-/// How the inertial unit does.
+/// Status of a device on a serial line.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct ImuStatus {
-    /// The line's life.
-    pub line: LineStatus,
-    /// The node that is open.
-    pub node: Option<PathBuf>,
-    /// The rate in use.
-    pub baud: Option<u32>,
-    /// The format, once it is known.
-    pub format: Option<ImuFormat>,
-    /// What the unit sends.
-    pub fields: Fields,
-    /// Whether the adapter hands bytes on at once.
-    pub low_latency: LowLatency,
-    /// How evenly samples arrive.
-    pub timing: ArrivalTiming,
-    /// How the unit's clock does; absent before that can be told.
-    pub clock: Option<ClockReport>,
-    /// What was carried so far.
-    pub counters: PortCounters,
+pub struct SerialStatus<R> {
+    /// The line.
+    pub line: LineReport,
+    /// What was said on it.
+    pub said: R,
 }
+
+/// Status of the inertial unit.
+pub type ImuStatus = SerialStatus<ImuReport>;
 
 /// An inertial unit on a serial line, read by a thread of its own into a bounded queue.
 #[derive(Debug)]
 pub struct ImuPort {
-    port: Port<ImuFeed>,
+    port: LinePort<ImuFeed>,
 }
 
 impl ImuPort {
@@ -393,12 +364,16 @@ impl ImuPort {
         let settings =
             ImuSettings { device: Some(node.to_owned()), baud: Baud::Fixed(baud), ..ImuSettings::default() };
         settings.baud.check()?;
-        let line = Line::open(node, baud, settings.low_latency)?;
+        let line = SerialLine::open(node, baud, settings.low_latency)?;
         Self::spawn(&settings, Some(line), reporting().0)
     }
 
-    fn spawn(settings: &ImuSettings, line: Option<Line>, reporter: Reporter) -> Result<Self, SerialError> {
-        let port = Port::spawn(settings.line(), ImuFeed::new(settings), line, reporter, QUEUE_SAMPLES)?;
+    fn spawn(
+        settings: &ImuSettings,
+        line: Option<SerialLine>,
+        reporter: Reporter,
+    ) -> Result<Self, SerialError> {
+        let port = LinePort::spawn(settings.line(), ImuFeed::new(settings), line, reporter, QUEUE_SAMPLES)?;
         Ok(Self { port })
     }
 
@@ -408,63 +383,54 @@ impl ImuPort {
         self.port.events()
     }
 
-    /// How the line does.
+    /// How the unit and its line do.
     pub fn status(&self) -> ImuStatus {
-        let (line, said) = self.port.status();
-        let counters = counters(&line, &said);
-        ImuStatus {
-            line: line.status,
-            node: line.node,
-            baud: line.baud,
-            format: said.format,
-            fields: said.fields,
-            low_latency: line.low_latency,
-            timing: said.timing,
-            clock: said.clock,
-            counters,
-        }
-    }
-
-    /// What it has carried so far.
-    pub fn counters(&self) -> PortCounters {
-        self.status().counters
+        self.port.status()
     }
 
     /// Ends the reading and closes the port, within 200 ms. Samples not drained are lost.
-    pub fn stop(self) -> Result<PortCounters, SerialError> {
-        let Self { port } = self;
-        let (line, said) = port.stop()?;
-        Ok(counters(&line, &said))
+    pub fn stop(self) -> Result<ImuStatus, SerialError> {
+        self.port.stop()
     }
 }
 
-fn counters(line: &LineReport, said: &ImuReport) -> PortCounters {
-    PortCounters {
-        imu: said.counters,
-        overflow: line.overflow,
-        lost_samples: said.lost_samples,
-        framing_errors: line.framing_errors,
-        overruns: line.overruns,
-        opened: line.opened,
-        spurious: line.spurious,
-    }
-}
-
-/// What a check found: how the device did at the end, and the faults that were there then with their causes.
+/// Findings of a check by hand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checked<S> {
-    /// How it did at the end.
+    /// The status at the end.
     pub status: S,
     /// The faults that were there at the end, with their causes.
     pub faults: Vec<(Fault, String)>,
+    /// How a unit's clock does; absent before that can be told, and of a ship feed, which has none.
+    pub clock: Option<ClockReport>,
+}
+
+/// How often a check drains what it listens to: less than what fills the queue of the fastest unit.
+const DRAIN: Duration = Duration::from_millis(50);
+
+/// Calls `drain` for `time`.
+fn listen(time: Duration, mut drain: impl FnMut()) {
+    let end = clock::now().plus_ns(i64::try_from(time.as_nanos()).unwrap_or(i64::MAX));
+    while clock::now() < end {
+        thread::sleep(DRAIN.min(time));
+        drain();
+    }
 }
 
 /// Reads the unit for `time` and tells how it does: for a check by hand.
 pub fn check(settings: ImuSettings, time: Duration) -> Result<Checked<ImuStatus>, SerialError> {
     let (reporter, reports) = reporting();
     let port = ImuPort::start(settings, reporter)?;
-    thread::sleep(time);
+    // Without a session the check itself maps the unit's time, as the session does.
+    let mut clock = ClockMap::new();
+    listen(time, || {
+        for event in port.events().try_iter() {
+            if let Event::Imu(sample) = event {
+                clock.observe(sample.device_time_ns, sample.arrival);
+            }
+        }
+    });
     let status = port.status();
     port.stop()?;
-    Ok(Checked { status, faults: reports.left() })
+    Ok(Checked { status, faults: reports.left(), clock: clock.report() })
 }

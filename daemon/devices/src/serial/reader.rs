@@ -1,31 +1,28 @@
 //! The thread that reads a line, and the one that sees to it that the first has not been swallowed by a driver.
 
 use std::{
-    os::fd::{AsFd, BorrowedFd, OwnedFd},
+    os::fd::AsFd,
     path::{Path, PathBuf},
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, AtomicI32, AtomicI64, Ordering},
-    },
+    sync::Arc,
 };
 
 use bowwave_core::{event::Event, fault::FaultChange, time::Time};
-use rustix::{
-    event::{PollFd, PollFlags, poll},
-    io::Errno,
-    thread::gettid,
-    time::Timespec,
-};
+use rustix::event::PollFlags;
 
 use super::{
-    LineReport, LineSettings, LineStatus, SerialError,
-    feed::{Feed, Kind},
+    LineSettings, LineStatus, SerialError, SerialStatus,
+    feed::{LineFeed, LineKind},
     find::Finder,
-    health::{Action, Health},
+    health::{LineAction, LineHealth},
     ioctl::LineErrors,
-    line::{Line, Read},
+    line::{LineRead, SerialLine},
 };
-use crate::{clock, queue::NewestSender, report::Reporter};
+use crate::{
+    clock,
+    queue::NewestSender,
+    report::Reporter,
+    worker::{PortLink, ThreadLife},
+};
 
 /// How often a port that is not there is looked for.
 const SEARCH_NS: i64 = 100_000_000;
@@ -42,59 +39,13 @@ const WATCH_NS: i64 = 25_000_000;
 /// Bytes of a read: 44 ms at 921600 baud.
 const READ_BYTES: usize = 4096;
 
-/// What the port's threads and its owner share.
-#[derive(Debug)]
-pub(super) struct Shared {
-    pub(super) stop: AtomicBool,
-    /// Readable once the threads are to stop.
-    pub(super) wake: OwnedFd,
-    /// When the reader was last seen outside a kernel call that may hang, nanoseconds.
-    pub(super) alive_ns: AtomicI64,
-    /// The reader's thread as the kernel numbers it; 0 until it runs.
-    pub(super) thread: AtomicI32,
-    /// The reader ended, as asked or by a panic.
-    pub(super) ended: AtomicBool,
-    pub(super) line: Mutex<LineReport>,
-}
-
-impl Shared {
-    /// Plain numbers: whole even where a holder panicked.
-    pub(super) fn line(&self) -> MutexGuard<'_, LineReport> {
-        self.line.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    pub(super) fn stopping(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-
-    fn alive(&self, now: Time) {
-        self.alive_ns.store(now.ns(), Ordering::Relaxed);
-    }
-}
-
-/// Waits for `fd` to be readable, for the stop, or for `wait_ns`. Gives what `fd` is ready for.
-fn wait_for(fd: Option<BorrowedFd<'_>>, wake: &OwnedFd, wait_ns: i64) -> Result<PollFlags, Errno> {
-    let timeout = Timespec { tv_sec: 0, tv_nsec: wait_ns.clamp(0, 999_999_999) };
-    let wake = PollFd::new(wake, PollFlags::IN);
-    let polled = |fds: &mut [PollFd<'_>]| match poll(fds, Some(&timeout)) {
-        // A poll that was interrupted says nothing of its files.
-        Err(Errno::INTR) | Ok(0) => Ok(PollFlags::empty()),
-        Ok(_) => Ok(fds.get(1).map_or(PollFlags::empty(), PollFd::revents)),
-        Err(e) => Err(e),
-    };
-    match fd {
-        Some(fd) => polled(&mut [wake, PollFd::from_borrowed_fd(fd, PollFlags::IN)]),
-        None => polled(&mut [wake]),
-    }
-}
-
 /// The reading thread.
-pub(super) struct Reader<F: Feed> {
+pub(super) struct LineReader<F: LineFeed> {
     settings: LineSettings,
     feed: F,
-    line: Option<Line>,
-    shared: Arc<Shared>,
-    said: Arc<Mutex<F::Status>>,
+    line: Option<SerialLine>,
+    link: Arc<PortLink<SerialStatus<F::Report>>>,
+    life: Arc<ThreadLife>,
     reporter: Reporter,
     queue: NewestSender<Event>,
     finder: Finder,
@@ -102,39 +53,38 @@ pub(super) struct Reader<F: Feed> {
     attempt: usize,
     /// There were several candidates.
     several: bool,
-    health: Health,
+    health: LineHealth,
     errors: Option<LineErrors>,
     counted: Time,
 }
 
-/// Sets [`Shared::ended`] however the thread ends.
-struct Ended(Arc<Shared>);
+/// Says that the line is stopped, however the thread ends.
+struct StoppedMark<R>(Arc<PortLink<SerialStatus<R>>>);
 
-impl Drop for Ended {
+impl<R> Drop for StoppedMark<R> {
     fn drop(&mut self) {
-        self.0.line().status = LineStatus::Stopped;
-        self.0.ended.store(true, Ordering::Relaxed);
+        self.0.status().line.status = LineStatus::Stopped;
     }
 }
 
-impl<F: Feed> Reader<F> {
+impl<F: LineFeed> LineReader<F> {
     pub(super) fn new(
         settings: LineSettings,
         feed: F,
-        line: Option<Line>,
-        shared: Arc<Shared>,
-        said: Arc<Mutex<F::Status>>,
+        line: Option<SerialLine>,
+        link: Arc<PortLink<SerialStatus<F::Report>>>,
+        life: Arc<ThreadLife>,
         reporter: Reporter,
         queue: NewestSender<Event>,
     ) -> Self {
         Self {
             finder: Finder::new(settings.device.clone()),
-            health: Health::new(&settings.baud, F::KIND),
+            health: LineHealth::new(&settings.baud, F::KIND),
             settings,
             feed,
             line,
-            shared,
-            said,
+            link,
+            life,
             reporter,
             queue,
             attempt: 0,
@@ -145,35 +95,34 @@ impl<F: Feed> Reader<F> {
     }
 
     pub(super) fn run(mut self) {
-        self.shared.thread.store(gettid().as_raw_nonzero().get(), Ordering::Relaxed);
-        let ended = Ended(Arc::clone(&self.shared));
+        self.life.begin();
+        let _mark = StoppedMark(Arc::clone(&self.link));
         if self.line.is_some() {
             self.opened(clock::now());
         }
         let mut bytes = vec![0; READ_BYTES];
-        while !self.shared.stopping() {
-            self.shared.alive(clock::now());
+        while !self.link.is_stopping() {
+            self.life.alive(clock::now());
             match self.line.take() {
                 None => self.search(),
                 Some(line) => self.line = self.serve(line, &mut bytes),
             }
             self.publish();
         }
-        drop(ended);
     }
 
     /// Tries to open a port once, and waits a little where there is none. Every step gives a sign of life of its own: on a
     /// loaded computer they and the wait together may take longer than a call that hangs.
     pub(super) fn search(&mut self) {
         let found = self.finder.candidates();
-        self.shared.alive(clock::now());
+        self.life.alive(clock::now());
         let opened = found.and_then(|found| {
             self.several = found.len() > 1;
             let path = found.get(self.attempt % found.len().max(1)).cloned().unwrap_or_default();
-            Line::open(&path, self.health.baud(), self.settings.low_latency)
+            SerialLine::open(&path, self.health.baud(), self.settings.low_latency)
         });
         let now = clock::now();
-        self.shared.alive(now);
+        self.life.alive(now);
         match opened {
             Ok(line) => {
                 self.line = Some(line);
@@ -190,22 +139,14 @@ impl<F: Feed> Reader<F> {
                 self.health.absent(now, &e.to_string());
             }
         }
-        self.pause(SEARCH_NS);
-    }
-
-    /// Waits, unless the stop comes.
-    fn pause(&self, ns: i64) {
-        // A poll that fails would make the search a busy loop.
-        if wait_for(None, &self.shared.wake, ns).is_err() {
-            clock::sleep_until(clock::now().plus_ns(ns));
-        }
+        self.link.pause(SEARCH_NS);
     }
 
     fn opened(&mut self, now: Time) {
         self.health.opened(now);
         self.feed.restart();
         self.feed.forget();
-        self.errors = self.line.as_ref().and_then(Line::errors);
+        self.errors = self.line.as_ref().and_then(SerialLine::errors);
         self.counted = now;
         let Some(line) = &self.line else { return };
         log::debug!(
@@ -214,37 +155,37 @@ impl<F: Feed> Reader<F> {
             self.health.baud(),
             line.low_latency()
         );
-        let mut status = self.shared.line();
-        status.node = Some(line.node().to_owned());
-        status.low_latency = line.low_latency();
-        status.opened += 1;
+        let report = &mut self.link.status().line;
+        report.node = Some(line.node().to_owned());
+        report.low_latency = line.low_latency();
+        report.opened += 1;
     }
 
     /// One wait and one read. Gives the line back while it is good.
-    fn serve(&mut self, line: Line, bytes: &mut [u8]) -> Option<Line> {
-        let ready = match wait_for(Some(line.as_fd()), &self.shared.wake, WAIT_NS) {
-            Ok(ready) => ready,
+    fn serve(&mut self, mut line: SerialLine, bytes: &mut [u8]) -> Option<SerialLine> {
+        let ready = match self.link.wait(&[line.as_fd()], WAIT_NS) {
+            Ok(ready) => ready.first().copied().unwrap_or(PollFlags::empty()),
             Err(e) => return self.lost(&line, &format!("waiting for bytes failed: {e}")),
         };
-        self.shared.alive(clock::now());
+        self.life.alive(clock::now());
         let mut spurious = false;
         if !ready.is_empty() {
             match line.read(bytes) {
-                Read::Bytes(count) => self.take(&line, bytes.get(..count).unwrap_or_default()),
-                Read::Empty if ready.contains(PollFlags::HUP) => {
+                LineRead::Bytes(count) => self.take(&line, bytes.get(..count).unwrap_or_default()),
+                LineRead::Empty if ready.contains(PollFlags::HUP) => {
                     return self.lost(&line, "the line hung up: the adapter was unplugged");
                 }
-                Read::Empty => {
+                LineRead::Empty => {
                     self.health.spurious(clock::now());
                     spurious = true;
                 }
-                Read::HungUp => return self.lost(&line, "the line hung up: the adapter was unplugged"),
-                Read::Failed(e) => return self.lost(&line, &format!("reading failed: {e}")),
+                LineRead::HungUp => return self.lost(&line, "the line hung up: the adapter was unplugged"),
+                LineRead::Failed(e) => return self.lost(&line, &format!("reading failed: {e}")),
             }
         }
         if spurious {
-            self.shared.line().spurious += 1;
-            self.pause(SPURIOUS_PAUSE_NS);
+            self.link.status().line.spurious += 1;
+            self.link.pause(SPURIOUS_PAUSE_NS);
         }
         let now = clock::now();
         self.count(&line, now);
@@ -252,8 +193,8 @@ impl<F: Feed> Reader<F> {
         // Where no port is configured another one may come: an adapter that is there at first may be any device's.
         let roam = self.several || self.settings.device.is_none();
         match self.health.tick(now, roam) {
-            Action::Keep => Some(line),
-            Action::SetBaud(baud) => {
+            LineAction::Keep => Some(line),
+            LineAction::SetBaud(baud) => {
                 match line.configure(baud) {
                     // What came at the old rate is garbage, and what it was taken for was chance.
                     Ok(()) => {
@@ -264,19 +205,19 @@ impl<F: Feed> Reader<F> {
                 }
                 Some(line)
             }
-            Action::Reopen => {
+            LineAction::Reopen => {
                 self.interrupted();
                 None
             }
-            Action::NextPort => self.next_port(line),
+            LineAction::NextPort => self.next_port(line),
         }
     }
 
     /// Leaves the port for the next one. Where there is no other it is kept: to open it anew would only lose bytes.
-    fn next_port(&mut self, line: Line) -> Option<Line> {
+    fn next_port(&mut self, line: SerialLine) -> Option<SerialLine> {
         let found = self.finder.candidates();
         let now = clock::now();
-        self.shared.alive(now);
+        self.life.alive(now);
         if !found.is_ok_and(|found| others(&found, line.path())) {
             return Some(line);
         }
@@ -286,7 +227,7 @@ impl<F: Feed> Reader<F> {
         None
     }
 
-    fn lost(&mut self, line: &Line, why: &str) -> Option<Line> {
+    fn lost(&mut self, line: &SerialLine, why: &str) -> Option<SerialLine> {
         self.health.lost(clock::now(), &format!("{}: {why}", line.path().display()));
         self.interrupted();
         None
@@ -298,7 +239,7 @@ impl<F: Feed> Reader<F> {
     }
 
     /// Bytes arrived.
-    fn take(&mut self, line: &Line, bytes: &[u8]) {
+    fn take(&mut self, line: &SerialLine, bytes: &[u8]) {
         let arrival = clock::now();
         let packets = self.feed.take(bytes, arrival, &mut self.queue);
         let was = self.health.status();
@@ -309,7 +250,7 @@ impl<F: Feed> Reader<F> {
     }
 
     /// The device is known to be on this line.
-    fn found(&mut self, line: &Line, now: Time) {
+    fn found(&mut self, line: &SerialLine, now: Time) {
         if let Some(before) = self.finder.found(line.node()) {
             let cause =
                 format!("the {} was {} and now is {}", F::KIND.name, before.display(), line.node().display());
@@ -318,7 +259,7 @@ impl<F: Feed> Reader<F> {
     }
 
     /// Looks at the port's own counters now and then.
-    fn count(&mut self, line: &Line, now: Time) {
+    fn count(&mut self, line: &SerialLine, now: Time) {
         if now.ns_since(self.counted) < COUNT_NS {
             return;
         }
@@ -327,9 +268,9 @@ impl<F: Feed> Reader<F> {
         if let Some(before) = self.errors.replace(errors) {
             let framing = errors.framing.wrapping_sub(before.framing);
             self.health.framing(framing);
-            let mut status = self.shared.line();
-            status.framing_errors += u64::from(framing);
-            status.overruns += u64::from(errors.overrun.wrapping_sub(before.overrun));
+            let report = &mut self.link.status().line;
+            report.framing_errors += u64::from(framing);
+            report.overruns += u64::from(errors.overrun.wrapping_sub(before.overrun));
         }
     }
 
@@ -338,14 +279,15 @@ impl<F: Feed> Reader<F> {
         for change in self.health.changes() {
             self.reporter.send(change);
         }
-        *self.said.lock().unwrap_or_else(PoisonError::into_inner) = self.feed.status();
-        let mut status = self.shared.line();
-        status.status = self.health.status();
-        status.baud = self.line.is_some().then(|| self.health.baud());
+        let mut status = self.link.status();
+        status.said = self.feed.report();
+        let report = &mut status.line;
+        report.status = self.health.status();
+        report.baud = self.line.is_some().then(|| self.health.baud());
         if self.line.is_none() {
-            status.node = None;
+            report.node = None;
         }
-        status.overflow = self.queue.dropped();
+        report.overflow = self.queue.dropped();
     }
 }
 
@@ -357,34 +299,39 @@ fn others(found: &[PathBuf], open: &Path) -> bool {
 /// Gives the port's sign of life, and tells when a kernel call of the reader does not return. The reader's file is
 /// non-blocking: its reads cannot wait by design, so one that does is a driver's defect, and opening, setting and closing
 /// have no such promise at all. A thread in such a call cannot be ended from outside: it is waited for.
-pub(super) struct Watcher {
-    shared: Arc<Shared>,
+pub(super) struct LineWatcher<R> {
+    link: Arc<PortLink<SerialStatus<R>>>,
+    life: Arc<ThreadLife>,
     reporter: Reporter,
-    kind: &'static Kind,
+    kind: &'static LineKind,
     blocked: bool,
 }
 
-impl Watcher {
-    pub(super) const fn new(shared: Arc<Shared>, reporter: Reporter, kind: &'static Kind) -> Self {
-        Self { shared, reporter, kind, blocked: false }
+impl<R> LineWatcher<R> {
+    pub(super) const fn new(
+        link: Arc<PortLink<SerialStatus<R>>>,
+        life: Arc<ThreadLife>,
+        reporter: Reporter,
+        kind: &'static LineKind,
+    ) -> Self {
+        Self { link, life, reporter, kind, blocked: false }
     }
 
     pub(super) fn run(mut self) {
-        while !self.shared.stopping() && !self.shared.ended.load(Ordering::Relaxed) {
+        while !self.link.is_stopping() && !self.link.has_ended() {
             self.reporter.beat();
             self.look(clock::now());
-            if wait_for(None, &self.shared.wake, WATCH_NS).is_err() {
-                clock::sleep_until(clock::now().plus_ns(WATCH_NS));
-            }
+            self.link.pause(WATCH_NS);
         }
     }
 
     fn look(&mut self, now: Time) {
-        let still = now.ns_since(Time::from_ns(self.shared.alive_ns.load(Ordering::Relaxed))) >= BLOCKED_NS;
+        let still = now.ns_since(self.life.last()) >= BLOCKED_NS;
         // A thread that could run and is not let is no matter of the port: the device's silence is told by its own fault.
-        let blocked = still && (self.blocked || !runnable(self.shared.thread.load(Ordering::Relaxed)));
+        let blocked = still && (self.blocked || !self.life.is_runnable());
         if blocked && !self.blocked {
-            let node = self.shared.line().node.clone().unwrap_or_else(|| PathBuf::from("the serial port"));
+            let node =
+                self.link.status().line.node.clone().unwrap_or_else(|| PathBuf::from("the serial port"));
             let cause = format!("a kernel call on {} does not return; unplug the adapter", node.display());
             self.reporter.send(FaultChange::raised(now, self.kind.blocked, cause));
         } else if self.blocked && !blocked {
@@ -392,14 +339,6 @@ impl Watcher {
         }
         self.blocked = blocked;
     }
-}
-
-/// Whether the thread waits for a processor, and for nothing else (proc(5), the state in `stat`). Where that cannot be read,
-/// it does not.
-fn runnable(thread: i32) -> bool {
-    let stat = std::fs::read_to_string(format!("/proc/self/task/{thread}/stat")).unwrap_or_default();
-    // The name before the state is in parentheses and may hold anything, parentheses too.
-    stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('R'))
 }
 
 #[cfg(test)]

@@ -13,14 +13,14 @@ use bowwave_core::{
 use crossbeam_channel::Receiver;
 
 use super::{
-    Baud, LineReport, LineSettings, SerialError,
-    feed::{Feed, Kind, SHIP},
-    line::Line,
-    port::Port,
+    Baud, LineSettings, SerialError, SerialStatus,
+    feed::{LineFeed, LineKind, SHIP},
+    line::SerialLine,
+    port::LinePort,
 };
 use crate::{
     framing::LineCounters,
-    nmea::{Sentence, ShipParser},
+    nmea::{NmeaSentence, ShipParser},
     queue::NewestSender,
     report::{Reporter, reporting},
 };
@@ -54,11 +54,11 @@ impl ShipSettings {
     }
 }
 
-/// What the ship's lines said.
+/// Report of what the ship's lines said.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShipReport {
     /// The newest line that said something of heading or attitude.
-    pub newest: Option<(Sentence, ShipSample)>,
+    pub newest: Option<(NmeaSentence, ShipSample)>,
     /// Mean time between headings, seconds; nothing before enough came.
     pub period_s: Option<f64>,
     /// Lines with a valid heading.
@@ -67,19 +67,13 @@ pub struct ShipReport {
     pub lines: LineCounters,
 }
 
-/// How the ship feed does.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ShipStatus {
-    /// The line.
-    pub line: LineReport,
-    /// What it said.
-    pub said: ShipReport,
-}
+/// Status of the ship feed.
+pub type ShipStatus = SerialStatus<ShipReport>;
 
 /// The ship's instruments, read by a thread of its own into a bounded queue.
 #[derive(Debug)]
 pub struct ShipPort {
-    port: Port<ShipFeed>,
+    port: LinePort<ShipFeed>,
 }
 
 impl ShipPort {
@@ -93,18 +87,22 @@ impl ShipPort {
     pub fn open(node: &Path, baud: u32) -> Result<Self, SerialError> {
         let settings = ShipSettings { device: node.to_owned(), baud: Baud::Fixed(baud) };
         settings.baud.check()?;
-        let line = Line::open(node, baud, true)?;
+        let line = SerialLine::open(node, baud, true)?;
         Self::spawn(&settings, Some(line), reporting().0)
     }
 
-    fn spawn(settings: &ShipSettings, line: Option<Line>, reporter: Reporter) -> Result<Self, SerialError> {
+    fn spawn(
+        settings: &ShipSettings,
+        line: Option<SerialLine>,
+        reporter: Reporter,
+    ) -> Result<Self, SerialError> {
         settings.baud.check()?;
         let wanted = LineSettings {
             device: Some(settings.device.clone()),
             baud: settings.baud.clone(),
             low_latency: true,
         };
-        let port = Port::spawn(wanted, ShipFeed::default(), line, reporter, QUEUE_LINES)?;
+        let port = LinePort::spawn(wanted, ShipFeed::default(), line, reporter, QUEUE_LINES)?;
         Ok(Self { port })
     }
 
@@ -115,13 +113,12 @@ impl ShipPort {
 
     /// How the feed does.
     pub fn status(&self) -> ShipStatus {
-        let (line, said) = self.port.status();
-        ShipStatus { line, said }
+        self.port.status()
     }
 
     /// Ends the reading and closes the port, within 200 ms. What was not drained is lost.
     pub fn stop(self) -> Result<ShipStatus, SerialError> {
-        self.port.stop().map(|(line, said)| ShipStatus { line, said })
+        self.port.stop()
     }
 }
 
@@ -132,10 +129,10 @@ pub fn check_ship(
 ) -> Result<super::Checked<ShipStatus>, SerialError> {
     let (reporter, reports) = reporting();
     let port = ShipPort::start(settings, reporter)?;
-    std::thread::sleep(time);
+    super::listen(time, || port.events().try_iter().for_each(drop));
     let status = port.status();
     port.stop()?;
-    Ok(super::Checked { status, faults: reports.left() })
+    Ok(super::Checked { status, faults: reports.left(), clock: None })
 }
 
 /// The codec, and what its lines told.
@@ -149,10 +146,10 @@ pub(super) struct ShipFeed {
     invalid: bool,
 }
 
-impl Feed for ShipFeed {
-    type Status = ShipReport;
+impl LineFeed for ShipFeed {
+    type Report = ShipReport;
 
-    const KIND: &'static Kind = &SHIP;
+    const KIND: &'static LineKind = &SHIP;
 
     fn take(&mut self, bytes: &[u8], arrival: Time, queue: &mut NewestSender<Event>) -> u64 {
         let before = self.parser.counters().packets;
@@ -201,7 +198,7 @@ impl Feed for ShipFeed {
         self.invalid = invalid;
     }
 
-    fn status(&self) -> ShipReport {
+    fn report(&self) -> ShipReport {
         self.said
     }
 }

@@ -6,8 +6,8 @@ use std::{
     os::unix::{ffi::OsStringExt, fs::symlink},
     path::{Path, PathBuf},
     sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, AtomicI32, AtomicI64, Ordering},
+        Arc,
+        atomic::{AtomicBool, Ordering},
     },
     time::{Duration, Instant},
 };
@@ -18,17 +18,16 @@ use bowwave_core::{
     time::Time,
 };
 use rustix::{
-    event::{EventfdFlags, eventfd},
     pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
     time::{ClockId, clock_gettime},
 };
 
 use super::{
-    Baud, ImuPort, ImuSettings, LineReport, LineStatus, QUEUE_SAMPLES, SerialError, ShipPort, ShipSettings,
+    Baud, ImuPort, ImuSettings, LineStatus, QUEUE_SAMPLES, SerialError, SerialStatus, ShipPort, ShipSettings,
     feed::IMU,
-    health::{Action, Health},
-    imu_feed::ImuFeed,
-    reader::{BLOCKED_NS, Reader, Shared, Watcher},
+    health::{LineAction, LineHealth},
+    imu_feed::{ImuFeed, ImuReport},
+    reader::{BLOCKED_NS, LineReader, LineWatcher},
 };
 use crate::{
     clock,
@@ -37,6 +36,7 @@ use crate::{
     queue,
     report::{Reports, reporting},
     vectornav::CommonOutput,
+    worker::{PortLink, ThreadLife},
 };
 
 /// A pseudo-terminal's master and the path of its slave.
@@ -99,9 +99,9 @@ fn bytes_become_stamped_samples() {
         assert!((before..=after).contains(&sample.arrival));
     }
     assert!(samples.is_sorted_by_key(|s| s.arrival));
-    wait_for(|| port.status().line == LineStatus::Streaming);
-    let counters = port.stop().expect("stops");
-    assert_eq!((counters.imu.samples, counters.imu.skipped_bytes, counters.overflow), (50, 50 * 8, 0));
+    wait_for(|| port.status().line.status == LineStatus::Streaming);
+    let SerialStatus { line, said } = port.stop().expect("stops");
+    assert_eq!((said.counters.samples, said.counters.skipped_bytes, line.overflow), (50, 50 * 8, 0));
 }
 
 #[test]
@@ -116,10 +116,10 @@ fn every_format_comes_through_the_port() {
         let samples = receive(&port, 59);
         assert!(samples.len() >= 59, "{format}: {}", samples.len());
         assert!(samples.is_sorted_by_key(|s| s.arrival));
-        wait_for(|| port.status().line == LineStatus::Streaming);
-        let status = port.status();
+        wait_for(|| port.status().line.status == LineStatus::Streaming);
+        let status = port.status().said;
         assert_eq!((status.format, status.fields.accel), (Some(format), true));
-        assert_eq!(port.stop().expect("stops").imu.skipped_bytes, 0, "{format}");
+        assert_eq!(port.stop().expect("stops").said.counters.skipped_bytes, 0, "{format}");
     }
 }
 
@@ -129,7 +129,7 @@ fn the_scan_of_rates_finds_every_format() {
     for format in ImuFormat::ALL {
         let Baud::Scan(rates) = Baud::default() else { panic!("several rates") };
         let right = rates[rates.len() - 1];
-        let mut health = Health::new(&Baud::default(), &IMU);
+        let mut health = LineHealth::new(&Baud::default(), &IMU);
         let mut decoder = ImuDecoder::new();
         health.opened(Time::from_ns(0));
         let mut noise = 7u32;
@@ -147,7 +147,7 @@ fn the_scan_of_rates_finds_every_format() {
             let before = decoder.counters().packets;
             decoder.samples(&bytes, now).for_each(drop);
             health.received(now, bytes.len(), decoder.counters().packets - before);
-            if let Action::SetBaud(_) = health.tick(now, false) {
+            if let LineAction::SetBaud(_) = health.tick(now, false) {
                 decoder.restart();
             }
             if health.status() == LineStatus::Streaming {
@@ -175,7 +175,7 @@ fn numbers_that_are_not_finite_are_dropped_and_counted() {
     bytes.extend(packet(7));
     master.write_all(&bytes).expect("written");
     assert_eq!(receive(&port, 1).iter().map(|s| s.device_time_ns).collect::<Vec<_>>(), [35_000_000]);
-    assert_eq!(port.stop().expect("stops").imu.not_finite, 2);
+    assert_eq!(port.stop().expect("stops").said.counters.not_finite, 2);
 }
 
 fn settings(device: &Path) -> ImuSettings {
@@ -197,7 +197,7 @@ fn codes(reports: &Reports) -> Vec<String> {
 
 /// Waits until the port has settled on `line`.
 fn settle(port: &ImuPort, line: LineStatus) {
-    wait_for(|| port.status().line == line);
+    wait_for(|| port.status().line.status == line);
 }
 
 /// CPU time that this process has used, nanoseconds.
@@ -217,7 +217,7 @@ fn an_unplugged_unit_is_found_again_under_another_name() {
     settle(&port, LineStatus::Listening);
     (0..3).for_each(|n| master.write_all(&packet(n)).expect("written"));
     settle(&port, LineStatus::Streaming);
-    assert_eq!(port.status().node.as_deref(), Some(slave.as_path()));
+    assert_eq!(port.status().line.node.as_deref(), Some(slave.as_path()));
     assert!(codes(&reports).is_empty(), "nothing wrong so far");
     // What the line still holds when it is pulled is lost with it.
     assert_eq!(receive(&port, 3).len(), 3);
@@ -243,10 +243,10 @@ fn an_unplugged_unit_is_found_again_under_another_name() {
     settle(&port, LineStatus::Streaming);
     assert!(clock::now().ns_since(plugged) < 1_000_000_000, "back within a second");
     assert_eq!(receive(&port, 3).len(), 3);
-    wait_for(|| port.status().node.as_deref() == Some(slave2.as_path()));
+    wait_for(|| port.status().line.node.as_deref() == Some(slave2.as_path()));
     let codes = codes(&reports);
     assert!(codes.contains(&"-IMU_LOST".to_owned()) && codes.contains(&"!IMU_RENUM".to_owned()), "{codes:?}");
-    assert_eq!(port.stop().expect("stops").opened, 2);
+    assert_eq!(port.stop().expect("stops").line.opened, 2);
 }
 
 #[test]
@@ -256,7 +256,7 @@ fn a_port_that_is_not_there_yet_is_waited_for_without_a_busy_loop() {
     let (reporter, reports) = reporting();
     let port = ImuPort::start(settings(&link), reporter).expect("absence is no error of the start");
     wait_for(|| reports.changes().any(|c| c.fault == Fault::ImuLost));
-    assert_eq!(port.status().line, LineStatus::Searching);
+    assert_eq!(port.status().line.status, LineStatus::Searching);
     let (mut master, slave) = terminal();
     symlink(&slave, &link).expect("link");
     settle(&port, LineStatus::Listening);
@@ -282,36 +282,34 @@ fn the_thread_lives_in_every_state() {
     port.stop().expect("stops");
 }
 
-/// What a watcher sees of a reader that was last seen now.
-fn shared_of(thread: i32) -> Arc<Shared> {
-    Arc::new(Shared {
-        stop: AtomicBool::new(false),
-        wake: eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK).expect("eventfd"),
-        alive_ns: AtomicI64::new(clock::now().ns()),
-        thread: AtomicI32::new(thread),
-        ended: AtomicBool::new(false),
-        line: Mutex::new(LineReport::default()),
-    })
+type ImuLink = Arc<PortLink<SerialStatus<ImuReport>>>;
+
+fn link() -> ImuLink {
+    PortLink::new(SerialStatus::default()).expect("a link")
 }
 
 /// A reader that is kept from running by others is not one that the port keeps.
 #[test]
 fn a_reader_without_a_processor_is_not_blocked() {
     let stop = Arc::new(AtomicBool::new(false));
-    let (number, numbers) = std::sync::mpsc::channel();
+    let life = Arc::new(ThreadLife::new(clock::now()));
+    let (begun, begins) = std::sync::mpsc::channel();
     let busy = std::thread::spawn({
-        let stop = Arc::clone(&stop);
+        let (stop, life) = (Arc::clone(&stop), Arc::clone(&life));
         move || {
-            number.send(rustix::thread::gettid().as_raw_nonzero().get()).expect("is awaited");
+            life.begin();
+            life.alive(clock::now());
+            begun.send(()).expect("is awaited");
             // Always ready to run, as a thread that waits for a processor.
             while !stop.load(Ordering::Relaxed) {
                 std::hint::spin_loop();
             }
         }
     });
-    let shared = shared_of(numbers.recv().expect("runs"));
+    begins.recv().expect("runs");
+    let link = link();
     let (reporter, reports) = reporting();
-    let watcher = Watcher::new(Arc::clone(&shared), reporter, &IMU);
+    let watcher = LineWatcher::new(Arc::clone(&link), life, reporter, &IMU);
     let watching = std::thread::spawn(move || watcher.run());
     std::thread::sleep(Duration::from_nanos(2 * BLOCKED_NS as u64));
     assert_eq!(codes(&reports), Vec::<String>::new());
@@ -319,16 +317,16 @@ fn a_reader_without_a_processor_is_not_blocked() {
     busy.join().expect("ends");
     // Its thread is gone without a word: now nobody reads.
     wait_for(|| codes(&reports).contains(&"+IMU_BLOCKED".to_owned()));
-    shared.stop.store(true, Ordering::Relaxed);
+    link.ask_to_stop();
     watching.join().expect("ends");
 }
 
 /// A reader that does not move, as one that a driver has swallowed.
 #[test]
 fn a_call_that_does_not_return_is_told_within_200_ms() {
-    let shared = shared_of(0);
+    let (link, life) = (link(), Arc::new(ThreadLife::new(clock::now())));
     let (reporter, reports) = reporting();
-    let watcher = Watcher::new(Arc::clone(&shared), reporter, &IMU);
+    let watcher = LineWatcher::new(Arc::clone(&link), Arc::clone(&life), reporter, &IMU);
     let begin = clock::now();
     let thread = std::thread::spawn(move || watcher.run());
     let raised = loop {
@@ -340,9 +338,9 @@ fn a_call_that_does_not_return_is_told_within_200_ms() {
     assert_eq!(raised.fault, Fault::ImuBlocked);
     assert!(raised.time.ns_since(begin) >= BLOCKED_NS);
     assert!(clock::now().ns_since(reports.last_beat()) < 250_000_000, "the port lives on");
-    shared.alive_ns.store(clock::now().ns(), Ordering::Relaxed);
+    life.alive(clock::now());
     wait_for(|| codes(&reports).contains(&"-IMU_BLOCKED".to_owned()));
-    shared.stop.store(true, Ordering::Relaxed);
+    link.ask_to_stop();
     thread.join().expect("ends");
 }
 
@@ -353,25 +351,17 @@ fn a_reader_that_searches_gives_a_sign_of_life_before_it_pauses() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let (_master, slave) = terminal();
     for device in [folder.path().join("not-there"), slave] {
-        let shared = shared_of(0);
-        shared.alive_ns.store(0, Ordering::Relaxed);
+        let (link, life) = (link(), Arc::new(ThreadLife::new(Time::from_ns(0))));
         // The pause ends at once.
-        rustix::io::write(&shared.wake, &1u64.to_ne_bytes()).expect("woken");
+        link.waker().notify();
         let (queue, _events) = queue::newest(1);
         let settings = settings(&device);
         let feed = ImuFeed::new(&settings);
-        let mut reader = Reader::new(
-            settings.line(),
-            feed,
-            None,
-            Arc::clone(&shared),
-            Arc::default(),
-            reporting().0,
-            queue,
-        );
+        let mut reader =
+            LineReader::new(settings.line(), feed, None, link, Arc::clone(&life), reporting().0, queue);
         let begin = clock::now();
         reader.search();
-        assert!(shared.alive_ns.load(Ordering::Relaxed) >= begin.ns(), "{}", device.display());
+        assert!(life.last() >= begin, "{}", device.display());
     }
 }
 
@@ -395,11 +385,11 @@ fn a_line_full_of_garbage_recovers() {
         master.write_all(&garbage).expect("written");
         std::thread::sleep(Duration::from_millis(1));
     }
-    wait_for(|| port.status().line == LineStatus::Garbled);
+    wait_for(|| port.status().line.status == LineStatus::Garbled);
     assert!(codes(&reports).contains(&"+IMU_BAUD".to_owned()));
     wait_for(|| {
         master.write_all(&packet(1)).expect("written");
-        port.status().line == LineStatus::Streaming
+        port.status().line.status == LineStatus::Streaming
     });
     assert!(codes(&reports).contains(&"-IMU_BAUD".to_owned()));
     port.stop().expect("stops");
@@ -430,8 +420,8 @@ fn the_oldest_samples_give_way() {
     for n in 0..count {
         master.write_all(&packet(n)).expect("written");
     }
-    wait_for(|| port.counters().imu.samples == u64::from(count));
-    assert_eq!(port.counters().overflow, 500);
+    wait_for(|| port.status().said.counters.samples == u64::from(count));
+    assert_eq!(port.status().line.overflow, 500);
     let samples = receive(&port, QUEUE_SAMPLES);
     assert_eq!(samples.first().map(|s| s.device_time_ns), Some(500 * 5_000_000));
     assert_eq!(samples.last().map(|s| s.device_time_ns), Some(i64::from(count - 1) * 5_000_000));
@@ -452,10 +442,8 @@ fn what_cannot_be_opened_is_refused_in_words() {
     let (_master, slave) = terminal();
     assert!(matches!(refused(&slave, 0), SerialError::Baud { baud: 0 }));
     let _held = ImuPort::open(&slave, 115_200).expect("opens");
-    // Root may open it all the same.
-    if !rustix::process::geteuid().is_root() {
-        assert!(matches!(refused(&slave, 115_200), SerialError::Busy { .. }));
-    }
+    // Locked for root, too, who may open what is exclusive.
+    assert!(matches!(refused(&slave, 115_200), SerialError::Busy { .. }));
     let (reporter, _) = reporting();
     let none = ImuSettings { baud: Baud::Scan(Vec::new()), ..ImuSettings::default() };
     assert!(matches!(ImuPort::start(none, reporter), Err(SerialError::NoRates)));

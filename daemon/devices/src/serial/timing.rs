@@ -30,7 +30,7 @@ pub struct ArrivalTiming {
 }
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Gap {
+struct ArrivalGap {
     /// Between this arrival and the one before, nanoseconds.
     host_ns: i64,
     /// Between the newest samples of both by the unit's clock.
@@ -43,7 +43,7 @@ struct Gap {
 #[derive(Clone, Debug)]
 pub(super) struct Arrivals {
     late_ms: f64,
-    gaps: Vec<Gap>,
+    gaps: Vec<ArrivalGap>,
     next: usize,
     last: Option<(Time, i64)>,
     /// Of the arrival that is being taken in.
@@ -100,12 +100,12 @@ impl Arrivals {
             let device_ns = device.saturating_sub(last_device);
             // A unit that began anew: no gap.
             if device_ns > 0 {
-                self.push(Gap { host_ns: arrival.ns_since(last), device_ns, samples });
+                self.push(ArrivalGap { host_ns: arrival.ns_since(last), device_ns, samples });
             }
         }
     }
 
-    fn push(&mut self, gap: Gap) {
+    fn push(&mut self, gap: ArrivalGap) {
         let period_ns = (self.timing.period_ms * 1e6) as i64;
         if period_ns > 0 {
             // The unit's time may be anything.
@@ -147,7 +147,7 @@ impl Arrivals {
     }
 
     fn measure(&self) -> ArrivalTiming {
-        let sorted = |of: &dyn Fn(&Gap) -> i64| {
+        let sorted = |of: &dyn Fn(&ArrivalGap) -> i64| {
             let mut values: Vec<i64> = self.gaps.iter().map(of).collect();
             values.sort_unstable();
             values

@@ -75,13 +75,13 @@ impl Interlock {
 
 /// The supply's warning: active means that power is about to fail.
 #[derive(Debug, Default)]
-pub(super) struct Power {
+pub(super) struct PowerSupply {
     raised: bool,
     good: Option<Time>,
     out: Vec<FaultChange>,
 }
 
-impl Power {
+impl PowerSupply {
     pub(super) fn out(&mut self) -> impl Iterator<Item = FaultChange> + '_ {
         self.out.drain(..)
     }
@@ -168,7 +168,7 @@ mod tests {
 
     #[test]
     fn the_supply_warns_at_once_and_is_trusted_after_a_second() {
-        let mut power = Power::default();
+        let mut power = PowerSupply::default();
         power.level(at(0), false);
         power.tick(at(5000));
         power.level(at(6000), true);

@@ -1,28 +1,65 @@
 //! The trigger switch, the inert interlock and the power supply's warning, over the GPIO character device.
 //!
-//! Edges carry the kernel's `CLOCK_MONOTONIC` time, taken in the interrupt. `debounce`, `switch` and `guard` decide
-//! what they mean, as functions of edges and of time; `input` asks the kernel; a thread joins them. Nothing here drives
-//! a line.
+//! Edges carry the kernel's `CLOCK_MONOTONIC` time, taken in the interrupt. `switch` and `guard` decide what they mean, as functions
+//! of edges and of time; [`gpio`](crate::gpio) asks the kernel; a thread joins them. Nothing here drives a line.
 
-mod chips;
-mod debounce;
 mod guard;
-mod input;
 mod port;
 mod switch;
 
-use std::time::Duration;
+use std::{io, time::Duration};
 
 use bowwave_core::event::MarkKind;
 
 pub use self::{
-    chips::{ChipInfo, LineInfo, TriggerError, check, clock_is_monotonic, list},
-    debounce::Debouncer,
-    input::{Bias, InputLine},
     port::TriggerPort,
     switch::{TriggerCounters, TriggerLife},
 };
-pub(crate) use chips::{PlacedLine, place_again, request_error};
+use crate::gpio::GpioError;
+pub use crate::gpio::{InputLine, LineBias as Bias};
+
+/// Reasons why the trigger cannot be watched.
+#[derive(Debug, thiserror::Error)]
+pub enum TriggerError {
+    /// Its line cannot be used.
+    #[error(transparent)]
+    Gpio(#[from] GpioError),
+    /// The window is too short for contacts, or too long for a finger.
+    #[error("a debounce of {ms} ms is out of range: give 10 to 20")]
+    Debounce {
+        /// What was asked for.
+        ms: u128,
+    },
+    /// The time is no time that a belt takes.
+    #[error("a trigger that is stuck after {s} s is out of range: give 1 to 3600")]
+    StuckAfter {
+        /// What was asked for.
+        s: f64,
+    },
+    /// One line for two things.
+    #[error("{name} and {other} are both line {line} of {chip}: give each its own")]
+    SameLine {
+        /// The one.
+        name: &'static str,
+        /// The other.
+        other: &'static str,
+        /// The chip.
+        chip: String,
+        /// The line.
+        line: String,
+    },
+    /// The thread could not be started.
+    #[error("cannot start the thread that watches the trigger: {0}; are too many processes running?")]
+    Thread(#[source] io::Error),
+    /// The thread panicked: a defect of this program.
+    #[error("the thread that watches the trigger broke down: report it with the log")]
+    BrokeDown,
+    /// A kernel call of the thread does not return.
+    #[error(
+        "a kernel call on the trigger's chip does not return: its thread is left behind; look at the kernel's log (dmesg)"
+    )]
+    Blocked,
+}
 
 /// A button of the operator.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,7 +80,7 @@ impl Press {
     }
 }
 
-/// What is wired where.
+/// Wiring of the trigger and the inputs beside it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TriggerSettings {
     /// The trigger switch: active is pressed.
@@ -110,7 +147,7 @@ impl TriggerSettings {
     }
 }
 
-/// How a line does.
+/// Level of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LineState {
     /// It is not open.
@@ -122,7 +159,7 @@ pub enum LineState {
     Active,
 }
 
-/// How the trigger and the inputs beside it do.
+/// Status of the trigger and the inputs beside it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TriggerStatus {
     /// The trigger's life.

@@ -3,11 +3,8 @@
 use std::{
     os::fd::AsFd,
     path::{Path, PathBuf},
-    sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::{self, JoinHandle},
+    sync::Arc,
+    time::Duration,
 };
 
 use bowwave_core::{
@@ -19,17 +16,15 @@ use crossbeam_channel::Receiver;
 
 use super::{
     LineState, TriggerCounters, TriggerError, TriggerSettings, TriggerStatus,
-    chips::clock_is_monotonic,
-    debounce::Debouncer,
-    guard::{Interlock, Power},
-    input::{Edge, Input, InputLine},
-    switch::{Output, Switch},
+    guard::{Interlock, PowerSupply},
+    switch::{Switch, SwitchOutput},
 };
 use crate::{
     clock,
+    gpio::{Debouncer, GpioEdge, GpioError, InputHandle, InputLine, clock_is_monotonic},
     queue::{self, NewestSender},
     report::Reporter,
-    wake::{Ended, Wake, join_within},
+    worker::{PortLink, PortWorker, STOP_NS, StopError},
 };
 
 /// Edges that wait to be drained.
@@ -42,33 +37,12 @@ const WAIT_NS: i64 = 25_000_000;
 const SEARCH_NS: i64 = 200_000_000;
 /// How often a quiet line's level is read back.
 const LEVEL_NS: i64 = 1_000_000_000;
-/// How long [`TriggerPort::stop`] waits.
-const STOP_NS: i64 = 180_000_000;
-
-struct Shared {
-    stop: AtomicBool,
-    wake: Wake,
-    status: Mutex<TriggerStatus>,
-}
-
-impl Shared {
-    /// Plain numbers: whole even where a holder panicked.
-    fn status(&self) -> MutexGuard<'_, TriggerStatus> {
-        self.status.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 /// The trigger and the inputs beside it, watched by a thread of their own.
+#[derive(Debug)]
 pub struct TriggerPort {
     events: Receiver<Event>,
-    shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl std::fmt::Debug for TriggerPort {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_tuple("TriggerPort").field(&self.status()).finish()
-    }
+    worker: PortWorker<TriggerStatus>,
 }
 
 impl TriggerPort {
@@ -85,72 +59,51 @@ impl TriggerPort {
     ) -> Result<Self, TriggerError> {
         settings.check()?;
         let (queue, events) = queue::newest(QUEUE_EDGES);
-        let wake = Wake::new().map_err(TriggerError::Thread)?;
-        let shared = Arc::new(Shared {
-            stop: AtomicBool::new(false),
-            wake,
-            status: Mutex::new(TriggerStatus::default()),
-        });
-        let mut watch = Watch::new(dev.to_owned(), &settings, Arc::clone(&shared), reporter, queue);
+        let link = PortLink::new(TriggerStatus::default()).map_err(TriggerError::Thread)?;
+        let mut watch = TriggerWatch::new(dev.to_owned(), &settings, Arc::clone(&link), reporter, queue);
         watch.publish();
-        let thread = thread::Builder::new()
-            .name("trigger".to_owned())
-            .spawn(move || watch.run())
-            .map_err(TriggerError::Thread)?;
-        Ok(Self { events, shared, thread: Some(thread) })
+        let worker = PortWorker::start("trigger", link, move || watch.run()).map_err(TriggerError::Thread)?;
+        Ok(Self { events, worker })
     }
 
     /// Edges not yet drained, [`Event::Trigger`] with the kernel's times, without chatter, presses and releases in turn; and
     /// [`Event::Mark`] for each press of a button.
-    pub fn events(&self) -> &Receiver<Event> {
+    pub const fn events(&self) -> &Receiver<Event> {
         &self.events
     }
 
     /// How the lines do.
     pub fn status(&self) -> TriggerStatus {
-        *self.shared.status()
+        *self.worker.link().status()
     }
 
     /// Ends the watch and gives the lines back, within 200 ms.
-    pub fn stop(mut self) -> Result<TriggerCounters, TriggerError> {
-        self.ask_to_stop();
-        match join_within(self.thread.take().into_iter().collect(), STOP_NS) {
-            Ended::Well => Ok(self.status().counters),
-            Ended::BrokeDown => Err(TriggerError::BrokeDown),
-            Ended::NotInTime => Err(TriggerError::Blocked),
-        }
-    }
-
-    fn ask_to_stop(&self) {
-        self.shared.stop.store(true, Ordering::Relaxed);
-        self.shared.wake.notify();
+    pub fn stop(self) -> Result<TriggerCounters, TriggerError> {
+        let link = Arc::clone(self.worker.link());
+        self.worker.stop_within(STOP_NS).map_err(|e| match e {
+            StopError::BrokeDown => TriggerError::BrokeDown,
+            StopError::Blocked => TriggerError::Blocked,
+        })?;
+        let counters = link.status().counters;
+        Ok(counters)
     }
 }
 
-impl Drop for TriggerPort {
-    fn drop(&mut self) {
-        if self.thread.is_some() {
-            log::warn!("the trigger's port was dropped without stop()");
-            self.ask_to_stop();
-        }
-    }
-}
-
-/// What a line is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Purpose of a line, and what is kept for it alone.
 enum Role {
     Trigger,
     Interlock,
     PowerFail,
-    Press(MarkKind),
+    /// A button of the operator; its contacts while the line is open.
+    Button(MarkKind, Option<Debouncer>),
 }
 
 /// A line that is wanted, and open where it can be.
-struct Place {
+struct WatchedLine {
     role: Role,
     wanted: InputLine,
-    input: Option<Input>,
-    /// Of the chip that it was on: it is looked for on no other, because another line read as the interlock would arm a gun
+    input: Option<InputHandle>,
+    /// Label of the chip that it was on: it is looked for on no other, because another line read as the interlock would arm a gun
     /// that is not inert.
     label: Option<String>,
     /// Earliest time of the next try, or of the next look at a quiet line.
@@ -158,257 +111,250 @@ struct Place {
     /// Its loss has been told.
     told: bool,
     state: LineState,
-    /// Of a button of the operator.
-    button: Option<Debouncer>,
+}
+
+impl WatchedLine {
+    const fn new(role: Role, wanted: InputLine) -> Self {
+        Self {
+            role,
+            wanted,
+            input: None,
+            label: None,
+            next: Time::MIN,
+            told: false,
+            state: LineState::Absent,
+        }
+    }
+
+    /// Tries to open the line where it is not and the time has come.
+    fn search(&mut self, dev: &Path, meaning: &mut Meaning) {
+        let now = clock::now();
+        if self.input.is_some() || now < self.next {
+            return;
+        }
+        let opened = InputHandle::open(dev, &self.wanted, self.label.as_deref()).and_then(|input| {
+            let level = input.level()?;
+            Ok((input, level))
+        });
+        match opened {
+            Ok((input, (now, level))) => {
+                self.label = Some(input.label().to_owned()).filter(|label| !label.is_empty());
+                self.told = false;
+                self.next = now.plus_ns(LEVEL_NS);
+                self.state = state(level);
+                meaning.opened(&mut self.role, input.asked(), now, level);
+                self.input = Some(input);
+            }
+            Err(e) => self.lost(&e, meaning),
+        }
+    }
+
+    /// Takes the edges that wait, then reads the level back.
+    fn read(&mut self, meaning: &mut Meaning) -> Result<(), GpioError> {
+        let Some(input) = &mut self.input else { return Ok(()) };
+        for _ in 0..BURST {
+            let Some(edge) = input.edge()? else { break };
+            self.state = state(edge.active);
+            meaning.edge(&mut self.role, edge);
+        }
+        let (now, level) = input.level()?;
+        // One that came meanwhile belongs before the level.
+        let late = input.edge()?;
+        self.next = now.plus_ns(LEVEL_NS);
+        if let Some(edge) = late {
+            self.state = state(edge.active);
+            meaning.edge(&mut self.role, edge);
+        } else {
+            self.state = state(level);
+            meaning.level(&mut self.role, now, level);
+        }
+        Ok(())
+    }
+
+    fn lost(&mut self, error: &GpioError, meaning: &mut Meaning) {
+        let now = clock::now();
+        self.input = None;
+        self.state = LineState::Absent;
+        self.next = now.plus_ns(SEARCH_NS);
+        let first = !std::mem::replace(&mut self.told, true);
+        meaning.lost(&mut self.role, now, error, first);
+    }
 }
 
 /// The watching thread.
-struct Watch {
+struct TriggerWatch {
     dev: PathBuf,
-    shared: Arc<Shared>,
-    reporter: Reporter,
-    queue: NewestSender<Event>,
-    places: Vec<Place>,
-    switch: Switch,
-    interlock: Option<Interlock>,
-    power: Power,
-    /// How long contacts chatter, nanoseconds.
-    debounce_ns: i64,
+    link: Arc<PortLink<TriggerStatus>>,
+    lines: Vec<WatchedLine>,
+    meaning: Meaning,
 }
 
-impl Watch {
+impl TriggerWatch {
     fn new(
         dev: PathBuf,
         settings: &TriggerSettings,
-        shared: Arc<Shared>,
+        link: Arc<PortLink<TriggerStatus>>,
         reporter: Reporter,
         queue: NewestSender<Event>,
     ) -> Self {
-        let now = clock::now();
-        let presses = settings.presses.iter().map(|press| (Role::Press(press.kind), Some(&press.line)));
+        let presses = settings.presses.iter().map(|p| (Role::Button(p.kind, None), Some(&p.line)));
         let lines = [
             (Role::Trigger, Some(&settings.trigger)),
             (Role::Interlock, settings.interlock.as_ref()),
             (Role::PowerFail, settings.power_fail.as_ref()),
-        ];
-        let place = |(role, wanted): (Role, Option<&InputLine>)| {
-            let wanted = wanted?.clone();
-            Some(Place {
-                role,
-                wanted,
-                input: None,
-                label: None,
-                next: Time::MIN,
-                told: false,
-                state: LineState::Absent,
-                button: None,
-            })
-        };
-        let ns = |d: std::time::Duration| i64::try_from(d.as_nanos()).unwrap_or(i64::MAX);
-        let mut switch =
-            Switch::new(ns(settings.debounce), ns(settings.stuck_after), settings.interlock.is_none());
-        if let Err(e) = clock_is_monotonic() {
-            switch.refuse(now, &e.to_string());
-        }
-        Self {
-            dev,
-            shared,
-            reporter,
-            queue,
-            places: lines.into_iter().chain(presses).filter_map(place).collect(),
-            switch,
-            interlock: settings.interlock.as_ref().map(|_| Interlock::new(now)),
-            power: Power::default(),
-            debounce_ns: ns(settings.debounce),
-        }
+        ]
+        .into_iter()
+        .chain(presses)
+        .filter_map(|(role, wanted)| Some(WatchedLine::new(role, wanted?.clone())))
+        .collect();
+        Self { dev, link, lines, meaning: Meaning::new(settings, reporter, queue) }
     }
 
     fn run(mut self) {
-        while !self.shared.stop.load(Ordering::Relaxed) {
-            self.reporter.beat();
-            self.search();
+        while !self.link.is_stopping() {
+            self.meaning.reporter.beat();
+            let Self { dev, lines, meaning, .. } = &mut self;
+            lines.iter_mut().for_each(|line| line.search(dev, meaning));
             self.wait();
-            self.tick();
+            self.meaning.tick(&mut self.lines);
             self.publish();
-        }
-    }
-
-    /// Tries to open what is not open.
-    fn search(&mut self) {
-        for i in 0..self.places.len() {
-            let now = clock::now();
-            let Some(place) = self.places.get_mut(i).filter(|p| p.input.is_none() && now >= p.next) else {
-                continue;
-            };
-            place.next = now.plus_ns(SEARCH_NS);
-            let opened = Input::open(&self.dev, &place.wanted, place.label.as_deref()).and_then(|input| {
-                let level = input.level()?;
-                Ok((input, level))
-            });
-            match opened {
-                Ok((input, (now, level))) => {
-                    let asked = input.asked();
-                    place.label = Some(input.label().to_owned()).filter(|label| !label.is_empty());
-                    place.input = Some(input);
-                    place.told = false;
-                    place.next = now.plus_ns(LEVEL_NS);
-                    self.opened(i, asked, now, level);
-                }
-                Err(e) => self.lost(i, &e),
-            }
         }
     }
 
     /// Waits for edges and takes them in.
     fn wait(&mut self) {
+        let Self { link, lines, meaning, .. } = self;
+        let deadline = meaning.switch.deadline();
         let now = clock::now();
-        let until = self.switch.deadline().map_or(WAIT_NS, |t| t.ns_since(now).clamp(0, WAIT_NS));
-        let open: Vec<_> = (0..self.places.len()).filter(|i| self.input(*i).is_some()).collect();
-        let files: Vec<_> = open.iter().filter_map(|i| self.input(*i).map(AsFd::as_fd)).collect();
-        let ready = self.shared.wake.wait(&files, until);
-        let Ok(ready) = ready else {
-            self.shared.wake.pause(WAIT_NS);
+        let until_ns = deadline.map_or(WAIT_NS, |t| t.ns_since(now).clamp(0, WAIT_NS));
+        let files: Vec<_> = lines.iter().filter_map(|l| l.input.as_ref()).map(AsFd::as_fd).collect();
+        let Ok(ready) = link.wait(&files, until_ns) else {
+            link.pause(WAIT_NS);
             return;
         };
         let now = clock::now();
-        let soon = self.switch.deadline().is_some_and(|t| now >= t);
-        for (i, ready) in open.into_iter().zip(ready) {
-            let due = self.places.get(i).is_some_and(|p| now >= p.next || (soon && p.role == Role::Trigger));
+        let soon = deadline.is_some_and(|t| now >= t);
+        for (line, ready) in lines.iter_mut().filter(|l| l.input.is_some()).zip(ready) {
+            let due = now >= line.next || (soon && matches!(line.role, Role::Trigger));
             if (!ready.is_empty() || due)
-                && let Err(e) = self.read(i)
+                && let Err(e) = line.read(meaning)
             {
-                self.lost(i, &e);
+                line.lost(&e, meaning);
             }
         }
     }
 
-    fn input(&self, i: usize) -> Option<&Input> {
-        self.places.get(i)?.input.as_ref()
+    /// Hands on what has come of it.
+    fn publish(&mut self) {
+        self.meaning.send();
+        let of = |is: fn(&Role) -> bool| self.lines.iter().find(|l| is(&l.role)).map(|l| l.state);
+        let Meaning { switch, interlock, queue, .. } = &self.meaning;
+        *self.link.status() = TriggerStatus {
+            life: switch.life(),
+            trigger: of(|role| matches!(role, Role::Trigger)).unwrap_or_default(),
+            interlock: of(|role| matches!(role, Role::Interlock)),
+            power_fail: of(|role| matches!(role, Role::PowerFail)),
+            armed: interlock.as_ref().map(Interlock::armed),
+            counters: TriggerCounters { overflow: queue.dropped(), ..switch.counters() },
+        };
     }
+}
 
-    /// Takes the edges that wait on a line, then reads its level back.
-    fn read(&mut self, i: usize) -> Result<(), TriggerError> {
-        for _ in 0..BURST {
-            let Some(input) = self.places.get_mut(i).and_then(|p| p.input.as_mut()) else { return Ok(()) };
-            let Some(edge) = input.edge()? else { break };
-            self.edge(i, edge);
-        }
-        let Some(place) = self.places.get_mut(i) else { return Ok(()) };
-        let Some(input) = &mut place.input else { return Ok(()) };
-        let (now, level) = input.level()?;
-        // One that came meanwhile belongs before the level.
-        let late = input.edge()?;
-        place.next = now.plus_ns(LEVEL_NS);
-        if let Some(edge) = late {
-            self.edge(i, edge);
-        } else {
-            self.level(i, now, level);
-        }
-        Ok(())
-    }
+/// Meaning of the lines: what each edge and level does, and to whom it is told.
+struct Meaning {
+    switch: Switch,
+    interlock: Option<Interlock>,
+    power: PowerSupply,
+    /// How long contacts chatter, nanoseconds.
+    debounce_ns: i64,
+    reporter: Reporter,
+    queue: NewestSender<Event>,
+}
 
-    fn role(&self, i: usize) -> Option<Role> {
-        self.places.get(i).map(|p| p.role)
-    }
-
-    fn show(&mut self, i: usize, state: LineState) {
-        if let Some(place) = self.places.get_mut(i) {
-            place.state = state;
-        }
-    }
-
-    fn opened(&mut self, i: usize, asked: Time, now: Time, level: bool) {
-        self.show(i, state(level));
-        match self.role(i) {
-            Some(Role::Trigger) => self.switch.opened(asked, now, level),
-            Some(Role::Press(_)) => {
-                let button = Debouncer::new(self.debounce_ns, level, now);
-                if let Some(place) = self.places.get_mut(i) {
-                    place.button = Some(button);
-                }
-            }
-            Some(Role::Interlock | Role::PowerFail) | None => self.level(i, now, level),
-        }
-    }
-
-    fn edge(&mut self, i: usize, edge: Edge) {
+impl Meaning {
+    fn new(settings: &TriggerSettings, reporter: Reporter, queue: NewestSender<Event>) -> Self {
         let now = clock::now();
-        self.show(i, state(edge.active));
-        match self.role(i) {
-            Some(Role::Trigger) => self.switch.edge(now, edge.time, edge.active),
-            Some(Role::Interlock) => {
-                if let Some(interlock) = &mut self.interlock {
-                    interlock.edge(now, edge.active);
-                    self.switch.arm(now, interlock.armed());
-                }
-            }
-            Some(Role::PowerFail) => self.power.level(now, edge.active),
-            Some(Role::Press(kind)) => {
-                let Self { places, queue, .. } = self;
-                if let Some(button) = places.get_mut(i).and_then(|p| p.button.as_mut()) {
-                    button.edge(edge.time, edge.active, |time, pressed| press(queue, kind, time, pressed));
-                }
-            }
-            None => {}
+        let ns = |d: Duration| i64::try_from(d.as_nanos()).unwrap_or(i64::MAX);
+        let debounce_ns = ns(settings.debounce);
+        let mut switch = Switch::new(debounce_ns, ns(settings.stuck_after), settings.interlock.is_none());
+        if let Err(e) = clock_is_monotonic() {
+            switch.refuse(now, &e.to_string());
         }
-        self.publish();
-    }
-
-    fn level(&mut self, i: usize, now: Time, level: bool) {
-        self.show(i, state(level));
-        match self.role(i) {
-            Some(Role::Trigger) => self.switch.level(now, level),
-            Some(Role::Interlock) => {
-                if let Some(interlock) = &mut self.interlock {
-                    interlock.level(now, level);
-                    self.switch.arm(now, interlock.armed());
-                }
-            }
-            Some(Role::PowerFail) => self.power.level(now, level),
-            Some(Role::Press(_)) => {
-                if let Some(button) = self.places.get_mut(i).and_then(|p| p.button.as_mut())
-                    && button.level() != level
-                {
-                    button.correct(now, level);
-                }
-            }
-            None => {}
+        Self {
+            switch,
+            interlock: settings.interlock.as_ref().map(|_| Interlock::new(now)),
+            power: PowerSupply::default(),
+            debounce_ns,
+            reporter,
+            queue,
         }
     }
 
-    fn lost(&mut self, i: usize, error: &TriggerError) {
+    fn opened(&mut self, role: &mut Role, asked: Time, now: Time, level: bool) {
+        match role {
+            Role::Trigger => self.switch.opened(asked, now, level),
+            Role::Button(_, contacts) => *contacts = Some(Debouncer::new(self.debounce_ns, level, now)),
+            Role::Interlock | Role::PowerFail => self.level(role, now, level),
+        }
+    }
+
+    fn edge(&mut self, role: &mut Role, edge: GpioEdge) {
         let now = clock::now();
-        let Some(place) = self.places.get_mut(i) else { return };
-        place.input = None;
-        place.state = LineState::Absent;
-        place.next = now.plus_ns(SEARCH_NS);
-        let first = !std::mem::replace(&mut place.told, true);
-        match place.role {
-            Role::Trigger => self.switch.lost(now, &format!("trigger: {error}")),
+        match role {
+            Role::Trigger => self.switch.edge(now, edge.time, edge.active),
+            Role::Interlock => self.guard(now, |interlock| interlock.edge(now, edge.active)),
+            Role::PowerFail => self.power.level(now, edge.active),
+            Role::Button(kind, contacts) => {
+                if let Some(contacts) = contacts {
+                    contacts.edge(edge.time, edge.active, |time, pressed| {
+                        press(&mut self.queue, *kind, time, pressed);
+                    });
+                }
+            }
+        }
+        self.send();
+    }
+
+    fn level(&mut self, role: &mut Role, now: Time, level: bool) {
+        match role {
+            Role::Trigger => self.switch.level(now, level),
+            Role::Interlock => self.guard(now, |interlock| interlock.level(now, level)),
+            Role::PowerFail => self.power.level(now, level),
+            Role::Button(_, contacts) => {
+                if let Some(contacts) = contacts.as_mut().filter(|c| c.level() != level) {
+                    contacts.correct(now, level);
+                }
+            }
+        }
+    }
+
+    fn lost(&mut self, role: &mut Role, now: Time, error: &GpioError, first: bool) {
+        let noted = match role {
+            Role::Trigger => return self.switch.lost(now, &format!("trigger: {error}")),
             Role::Interlock => {
-                if let Some(interlock) = &mut self.interlock {
-                    interlock.lost(now, &format!("interlock: {error}"));
-                    self.switch.arm(now, false);
-                }
+                return self.guard(now, |interlock| interlock.lost(now, &format!("interlock: {error}")));
             }
-            Role::Press(_) => {
-                if first {
-                    let cause = format!("button: {error}; the heading cannot be set by it");
-                    self.reporter.send(FaultChange::noted(now, Fault::TriggerLost, cause));
-                }
-            }
+            Role::Button(..) => format!("button: {error}; the heading cannot be set by it"),
             Role::PowerFail => {
                 self.power.lost();
-                if first {
-                    // Training goes on: the log is told that power may fail unannounced.
-                    let cause = format!("power-fail input: {error}; a power cut will not be announced");
-                    self.reporter.send(FaultChange::noted(now, Fault::TriggerLost, cause));
-                }
+                // Training goes on: the log is told that power may fail unannounced.
+                format!("power-fail input: {error}; a power cut will not be announced")
             }
+        };
+        if first {
+            self.reporter.send(FaultChange::noted(now, Fault::TriggerLost, noted));
         }
     }
 
-    fn tick(&mut self) {
+    /// Something happens to the interlock: the switch is armed as that is.
+    fn guard(&mut self, now: Time, happens: impl FnOnce(&mut Interlock)) {
+        if let Some(interlock) = &mut self.interlock {
+            happens(interlock);
+            self.switch.arm(now, interlock.armed());
+        }
+    }
+
+    fn tick(&mut self, lines: &mut [WatchedLine]) {
         let now = clock::now();
         if let Some(interlock) = &mut self.interlock {
             interlock.tick(now);
@@ -417,17 +363,15 @@ impl Watch {
             }
         }
         self.power.tick(now);
-        let Self { places, queue, .. } = self;
-        for place in places {
-            if let (Role::Press(kind), Some(button)) = (place.role, &mut place.button) {
-                button.settle(now, |time, pressed| press(queue, kind, time, pressed));
+        for line in lines {
+            if let Role::Button(kind, Some(contacts)) = &mut line.role {
+                contacts.settle(now, |time, pressed| press(&mut self.queue, *kind, time, pressed));
             }
         }
         self.switch.tick(now);
     }
 
-    /// Hands on what has come of it.
-    fn publish(&mut self) {
+    fn send(&mut self) {
         let Self { switch, queue, reporter, interlock, power, .. } = self;
         if let Some(interlock) = interlock {
             interlock.out().for_each(|change| reporter.send(change));
@@ -435,19 +379,10 @@ impl Watch {
         power.out().for_each(|change| reporter.send(change));
         for output in switch.out() {
             match output {
-                Output::Edge(edge) => queue.send(Event::Trigger(edge)),
-                Output::Fault(change) => reporter.send(change),
+                SwitchOutput::Edge(edge) => queue.send(Event::Trigger(edge)),
+                SwitchOutput::Fault(change) => reporter.send(change),
             }
         }
-        let of = |role| self.places.iter().find(|p| p.role == role).map(|p| p.state);
-        *self.shared.status() = TriggerStatus {
-            life: self.switch.life(),
-            trigger: of(Role::Trigger).unwrap_or_default(),
-            interlock: of(Role::Interlock),
-            power_fail: of(Role::PowerFail),
-            armed: self.interlock.as_ref().map(Interlock::armed),
-            counters: TriggerCounters { overflow: self.queue.dropped(), ..self.switch.counters() },
-        };
     }
 }
 
@@ -468,12 +403,13 @@ mod tests {
 
     use super::*;
     use crate::{
+        gpio::LineBias,
         report::reporting,
-        trigger::{Bias, Press, TriggerLife},
+        trigger::{Press, TriggerLife},
     };
 
     fn line(line: &str) -> InputLine {
-        InputLine { chip: "no-such-chip".into(), line: line.into(), active_low: true, bias: Bias::PullUp }
+        InputLine { chip: "no-such-chip".into(), line: line.into(), active_low: true, bias: LineBias::PullUp }
     }
 
     #[test]

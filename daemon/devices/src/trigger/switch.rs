@@ -6,7 +6,7 @@ use bowwave_core::{
     time::{NS_PER_S, Time},
 };
 
-use super::debounce::Debouncer;
+use crate::gpio::Debouncer;
 
 /// How long a level may differ from the newest edge before edges were lost: the kernel reads the level in a thread.
 const RECHECK_NS: i64 = 5_000_000;
@@ -18,9 +18,9 @@ const CLOCK_GROSS_NS: i64 = NS_PER_S;
 /// refused, until it is started again.
 const STRANGE_EDGES: u32 = 3;
 
-/// What the switch says.
+/// Output of the switch.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Output {
+pub(super) enum SwitchOutput {
     /// For the session.
     Edge(TriggerEdge),
     /// For the supervisor.
@@ -44,7 +44,7 @@ pub enum TriggerLife {
     Refused,
 }
 
-/// What has become of edges.
+/// Counts of what became of edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TriggerCounters {
     /// Presses handed on.
@@ -61,8 +61,9 @@ pub struct TriggerCounters {
     pub overflow: u64,
 }
 
+/// The line while it is open.
 #[derive(Clone, Debug)]
-struct Open {
+struct OpenLine {
     /// When the line was asked for: the kernel keeps edges from somewhere after this.
     asked: Time,
     /// When its level had been read.
@@ -72,6 +73,55 @@ struct Open {
     debouncer: Debouncer,
     /// Since when the level has differed from the newest edge.
     mismatch: Option<Time>,
+    contact: SwitchContact,
+}
+
+/// Life of the switch's line.
+#[derive(Debug)]
+enum LineLife {
+    /// It was not opened yet.
+    Unopened,
+    /// It cannot be opened, or is gone, and that was told.
+    Lost,
+    /// It is open.
+    Open(OpenLine),
+}
+
+/// Contacts of the switch, without chatter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum SwitchContact {
+    /// Nobody presses it.
+    Released,
+    /// It is pressed, and its press was handed on: its release is, too.
+    Firing(PressHold),
+    /// It is held, and that counts for nothing before it was released: it was held when the line was opened, when the interlock was
+    /// open, or its press was lost.
+    Held(PressHold),
+}
+
+/// A press that lasts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct PressHold {
+    since: Time,
+    /// It was told as stuck.
+    stuck: bool,
+}
+
+impl PressHold {
+    const fn since(since: Time) -> Self {
+        Self { since, stuck: false }
+    }
+}
+
+/// Whether presses count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Permit {
+    /// They do: the interlock, if there is one, is closed.
+    Armed,
+    /// They do not: the interlock is open.
+    Disarmed,
+    /// They never do again: the kernel's times are those of another clock.
+    Refused,
 }
 
 /// The trigger switch.
@@ -79,96 +129,107 @@ struct Open {
 pub(super) struct Switch {
     debounce_ns: i64,
     stuck_after_ns: i64,
-    armed: bool,
-    refused: bool,
-    open: Option<Open>,
-    /// A press was handed on, its release was not yet.
-    firing: bool,
-    /// What is held counts only after a release.
-    blocked: bool,
-    held_since: Option<Time>,
-    stuck: bool,
-    lost: bool,
+    permit: Permit,
+    line: LineLife,
     counters: TriggerCounters,
     /// Chatter of lines that were closed since.
     chatter: u64,
-    out: Vec<Output>,
+    out: Vec<SwitchOutput>,
 }
 
 impl Switch {
     /// `armed`: whether an interlock, if there is one, is known to be closed.
-    pub(super) fn new(debounce_ns: i64, stuck_after_ns: i64, armed: bool) -> Self {
+    pub(super) const fn new(debounce_ns: i64, stuck_after_ns: i64, armed: bool) -> Self {
         Self {
             debounce_ns,
             stuck_after_ns,
-            armed,
-            refused: false,
-            open: None,
-            firing: false,
-            blocked: false,
-            held_since: None,
-            stuck: false,
-            lost: false,
-            counters: TriggerCounters::default(),
+            permit: if armed { Permit::Armed } else { Permit::Disarmed },
+            line: LineLife::Unopened,
+            counters: TriggerCounters {
+                presses: 0,
+                chatter: 0,
+                withheld: 0,
+                overruns: 0,
+                opened: 0,
+                overflow: 0,
+            },
             chatter: 0,
             out: Vec::new(),
         }
     }
 
-    pub(super) fn out(&mut self) -> impl Iterator<Item = Output> + '_ {
+    pub(super) fn out(&mut self) -> impl Iterator<Item = SwitchOutput> + '_ {
         self.out.drain(..)
     }
 
+    const fn open(&self) -> Option<&OpenLine> {
+        match &self.line {
+            LineLife::Open(open) => Some(open),
+            LineLife::Unopened | LineLife::Lost => None,
+        }
+    }
+
+    const fn open_mut(&mut self) -> Option<&mut OpenLine> {
+        match &mut self.line {
+            LineLife::Open(open) => Some(open),
+            LineLife::Unopened | LineLife::Lost => None,
+        }
+    }
+
     pub(super) fn life(&self) -> TriggerLife {
-        match &self.open {
-            _ if self.refused => TriggerLife::Refused,
-            None => TriggerLife::Searching,
-            Some(_) if self.firing => TriggerLife::Pressed,
-            Some(open) if open.debouncer.reported() => TriggerLife::Held,
-            Some(_) => TriggerLife::Released,
+        match (self.permit, self.open().map(|open| open.contact)) {
+            (Permit::Refused, _) => TriggerLife::Refused,
+            (_, None) => TriggerLife::Searching,
+            (_, Some(SwitchContact::Released)) => TriggerLife::Released,
+            (_, Some(SwitchContact::Firing(_))) => TriggerLife::Pressed,
+            (_, Some(SwitchContact::Held(_))) => TriggerLife::Held,
         }
     }
 
     pub(super) fn counters(&self) -> TriggerCounters {
-        let open = self.open.as_ref().map_or(0, |o| o.debouncer.chatter());
+        let open = self.open().map_or(0, |o| o.debouncer.chatter());
         TriggerCounters { chatter: self.chatter + open, ..self.counters }
     }
 
     /// The kernel's edges carry no monotonic time: nothing fires any more.
     pub(super) fn refuse(&mut self, now: Time, cause: &str) {
-        if !std::mem::replace(&mut self.refused, true) {
+        if self.permit != Permit::Refused {
+            self.permit = Permit::Refused;
             self.stop_firing(now);
-            self.out.push(Output::Fault(FaultChange::raised(now, Fault::TriggerClock, cause)));
+            self.fault(FaultChange::raised(now, Fault::TriggerClock, cause));
         }
     }
 
     /// The line was asked for at `asked`; it is open and at `level`.
     pub(super) fn opened(&mut self, asked: Time, now: Time, level: bool) {
-        self.stop_firing(now);
         self.released(now);
         let debouncer = Debouncer::new(self.debounce_ns, level, now);
-        self.open = Some(Open { asked, since: now, strange: 0, debouncer, mismatch: None });
+        let contact =
+            if level { SwitchContact::Held(PressHold::since(now)) } else { SwitchContact::Released };
+        let open = OpenLine { asked, since: now, strange: 0, debouncer, mismatch: None, contact };
         self.counters.opened += 1;
-        self.blocked = level;
-        self.held_since = level.then_some(now);
-        if std::mem::take(&mut self.lost) {
-            self.out.push(Output::Fault(FaultChange::cleared(now, Fault::TriggerLost)));
+        if let LineLife::Lost = std::mem::replace(&mut self.line, LineLife::Open(open)) {
+            self.fault(FaultChange::cleared(now, Fault::TriggerLost));
         }
     }
 
     /// The line is gone, or cannot be opened. Whatever fires stops.
     pub(super) fn lost(&mut self, now: Time, cause: &str) {
-        self.chatter += self.open.take().map_or(0, |o| o.debouncer.chatter());
-        self.stop_firing(now);
         self.released(now);
-        if !std::mem::replace(&mut self.lost, true) {
-            self.out.push(Output::Fault(FaultChange::raised(now, Fault::TriggerLost, cause)));
+        self.chatter += self.open().map_or(0, |o| o.debouncer.chatter());
+        match std::mem::replace(&mut self.line, LineLife::Lost) {
+            LineLife::Lost => {}
+            LineLife::Unopened | LineLife::Open(_) => {
+                self.fault(FaultChange::raised(now, Fault::TriggerLost, cause));
+            }
         }
     }
 
     /// The interlock closed or opened.
     pub(super) fn arm(&mut self, now: Time, armed: bool) {
-        self.armed = armed;
+        if self.permit != Permit::Refused {
+            self.permit = if armed { Permit::Armed } else { Permit::Disarmed };
+        }
         if !armed {
             self.stop_firing(now);
         }
@@ -176,7 +237,7 @@ impl Switch {
 
     /// An edge, read at `now`.
     pub(super) fn edge(&mut self, now: Time, time: Time, level: bool) {
-        let Some(open) = &mut self.open else { return };
+        let Some(open) = self.open_mut() else { return };
         let outside_ns = open.asked.ns_since(time).max(time.ns_since(now));
         if outside_ns > CLOCK_SLACK_NS {
             self.strange(now, time, outside_ns);
@@ -195,7 +256,7 @@ impl Switch {
 
     /// An edge whose time lies outside of what is possible: it does not count, and another clock is refused.
     fn strange(&mut self, now: Time, time: Time, outside_ns: i64) {
-        let Some(open) = &mut self.open else { return };
+        let Some(open) = self.open_mut() else { return };
         open.strange += 1;
         if outside_ns < CLOCK_GROSS_NS && open.strange < STRANGE_EDGES {
             return;
@@ -210,7 +271,7 @@ impl Switch {
 
     /// The line's level, read at `now` when all edges were taken in.
     pub(super) fn level(&mut self, now: Time, level: bool) {
-        let Some(open) = &mut self.open else { return };
+        let Some(open) = self.open_mut() else { return };
         if open.debouncer.level() == level {
             open.mismatch = None;
             return;
@@ -220,48 +281,45 @@ impl Switch {
             return;
         }
         open.mismatch = None;
-        let was = open.debouncer.reported();
         open.debouncer.correct(now, level);
+        let was = open.contact;
+        if level && was == SwitchContact::Released {
+            open.contact = SwitchContact::Held(PressHold::since(now));
+        }
         self.counters.overruns += 1;
         let cause = if level {
             "the trigger is pressed and no edge told so: not counted as a shot"
         } else {
             "the trigger is released and no edge told so"
         };
-        self.out.push(Output::Fault(FaultChange::noted(now, Fault::TriggerOverrun, cause)));
-        match (was, level) {
-            (true, false) => {
-                self.stop_firing(now);
-                self.released(now);
-            }
-            (false, true) => {
-                self.blocked = true;
-                self.held_since = Some(now);
-            }
-            _ => {}
+        self.fault(FaultChange::noted(now, Fault::TriggerOverrun, cause));
+        if !level {
+            self.released(now);
         }
     }
 
     /// Time has come to `now`.
     pub(super) fn tick(&mut self, now: Time) {
-        if let Some(open) = &mut self.open {
-            let mut changes = Vec::new();
-            open.debouncer.settle(now, |t, pressed| changes.push((t, pressed)));
-            self.changed(&changes);
-        }
-        if let Some(since) = self.held_since
-            && !self.stuck
-            && now.ns_since(since) > self.stuck_after_ns
+        let stuck_after_ns = self.stuck_after_ns;
+        let Some(open) = self.open_mut() else { return };
+        let mut changes = Vec::new();
+        open.debouncer.settle(now, |t, pressed| changes.push((t, pressed)));
+        self.changed(&changes);
+        let Some(open) = self.open_mut() else { return };
+        if let SwitchContact::Firing(hold) | SwitchContact::Held(hold) = &mut open.contact
+            && !hold.stuck
+            && now.ns_since(hold.since) > stuck_after_ns
         {
-            self.stuck = true;
-            let cause = format!("the trigger has been held for {:.1} s: release it", now.secs_since(since));
-            self.out.push(Output::Fault(FaultChange::raised(now, Fault::TriggerStuck, cause)));
+            hold.stuck = true;
+            let held_s = now.secs_since(hold.since);
+            let cause = format!("the trigger has been held for {held_s:.1} s: release it");
+            self.fault(FaultChange::raised(now, Fault::TriggerStuck, cause));
         }
     }
 
     /// When the level is to be read and [`Self::tick`] called at the latest, where that is soon.
     pub(super) fn deadline(&self) -> Option<Time> {
-        let open = self.open.as_ref()?;
+        let open = self.open()?;
         let recheck = open.mismatch.map(|since| since.plus_ns(RECHECK_NS));
         recheck.into_iter().chain(open.debouncer.deadline()).min()
     }
@@ -269,35 +327,45 @@ impl Switch {
     fn changed(&mut self, changes: &[(Time, bool)]) {
         for &(time, pressed) in changes {
             if !pressed {
-                self.stop_firing(time);
                 self.released(time);
                 continue;
             }
-            self.held_since = Some(time);
-            if self.refused || !self.armed {
-                self.blocked = true;
-                self.counters.withheld += 1;
-            } else if !self.blocked {
-                self.firing = true;
+            let may_fire = self.permit == Permit::Armed;
+            let Some(open) = self.open_mut() else { return };
+            let hold = PressHold::since(time);
+            if may_fire {
+                open.contact = SwitchContact::Firing(hold);
                 self.counters.presses += 1;
-                self.out.push(Output::Edge(TriggerEdge { time, pressed: true }));
+                self.out.push(SwitchOutput::Edge(TriggerEdge { time, pressed: true }));
+            } else {
+                open.contact = SwitchContact::Held(hold);
+                self.counters.withheld += 1;
             }
         }
     }
 
+    /// What fires stops, and counts no more before it was released.
     fn stop_firing(&mut self, time: Time) {
-        if std::mem::take(&mut self.firing) {
-            self.blocked = true;
-            self.out.push(Output::Edge(TriggerEdge { time, pressed: false }));
+        if let Some(open) = self.open_mut()
+            && let SwitchContact::Firing(hold) = open.contact
+        {
+            open.contact = SwitchContact::Held(hold);
+            self.out.push(SwitchOutput::Edge(TriggerEdge { time, pressed: false }));
         }
     }
 
     fn released(&mut self, time: Time) {
-        self.blocked = false;
-        self.held_since = None;
-        if std::mem::take(&mut self.stuck) {
-            self.out.push(Output::Fault(FaultChange::cleared(time, Fault::TriggerStuck)));
+        self.stop_firing(time);
+        let Some(open) = self.open_mut() else { return };
+        if let SwitchContact::Held(PressHold { stuck: true, .. }) =
+            std::mem::replace(&mut open.contact, SwitchContact::Released)
+        {
+            self.fault(FaultChange::cleared(time, Fault::TriggerStuck));
         }
+    }
+
+    fn fault(&mut self, change: FaultChange) {
+        self.out.push(SwitchOutput::Fault(change));
     }
 }
 
@@ -323,8 +391,8 @@ mod tests {
     /// What came out: `P`ress or `R`elease with its time in milliseconds, or a fault.
     fn out(switch: &mut Switch) -> Vec<String> {
         let text = |output| match output {
-            Output::Edge(e) => format!("{}{}", if e.pressed { 'P' } else { 'R' }, e.time.ns() / MS),
-            Output::Fault(c) => match c.change {
+            SwitchOutput::Edge(e) => format!("{}{}", if e.pressed { 'P' } else { 'R' }, e.time.ns() / MS),
+            SwitchOutput::Fault(c) => match c.change {
                 Change::Raised { .. } => format!("+{}", c.fault.code()),
                 Change::Cleared => format!("-{}", c.fault.code()),
                 Change::Noted { .. } => format!("!{}", c.fault.code()),
@@ -540,7 +608,7 @@ mod tests {
                 }
                 may_fire &= armed && open;
                 for output in s.out() {
-                    let Output::Edge(e) = output else { continue };
+                    let SwitchOutput::Edge(e) = output else { continue };
                     prop_assert!(e.pressed != firing, "alternate");
                     firing = e.pressed;
                     if e.pressed {

@@ -206,14 +206,15 @@ impl Devices {
             ("camera_opened", camera.opened),
         ];
         if let Some(imu) = &self.imu {
-            let c = imu.counters();
+            let status = imu.status();
+            let (line, unit) = (status.line, status.said);
             counters.extend([
-                ("imu_samples", c.imu.samples),
-                ("imu_bad_crc", c.imu.bad_crc),
-                ("imu_skipped_bytes", c.imu.skipped_bytes),
-                ("imu_lost_samples", c.lost_samples),
-                ("imu_overflow", c.overflow),
-                ("imu_opened", c.opened),
+                ("imu_samples", unit.counters.samples),
+                ("imu_bad_crc", unit.counters.bad_crc),
+                ("imu_skipped_bytes", unit.counters.skipped_bytes),
+                ("imu_lost_samples", unit.lost_samples),
+                ("imu_overflow", line.overflow),
+                ("imu_opened", line.opened),
             ]);
         }
         if let Some(ship) = &self.ship {

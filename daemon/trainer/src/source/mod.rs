@@ -137,10 +137,10 @@ impl Source {
 
 fn replay_counters(r: &ReplayStats) -> Vec<(&'static str, u64)> {
     vec![
-        ("imu_not_finite", r.imu.imu.not_finite),
-        ("imu_bad_checksums", r.imu.imu.bad_crc),
-        ("imu_skipped_bytes", r.imu.imu.skipped_bytes),
-        ("imu_overwritten", r.imu.overflow),
+        ("imu_not_finite", r.imu.not_finite),
+        ("imu_bad_checksums", r.imu.bad_crc),
+        ("imu_skipped_bytes", r.imu.skipped_bytes),
+        ("imu_overwritten", r.imu_overflow),
         ("pictures_other_size", r.frames.other_size),
         ("pictures_undecodable", r.frames.undecodable),
         ("pictures_overwritten", r.frames_overwritten),

@@ -213,7 +213,7 @@ impl Tally {
         let (not_finite, other_size) =
             (also(&counts, "imu_not_finite"), also(&counts, "pictures_other_size"));
         let of_session = [
-            ("imu_insane", s.imu_insane + not_finite),
+            ("imu_insane", s.imu_implausible + not_finite),
             ("imu_frozen", s.imu_frozen),
             ("imu_restarts", u64::from(s.imu_restarts)),
             ("horizons_taken", s.horizons.taken),

@@ -16,10 +16,10 @@ pub mod recording;
 pub mod scenario;
 
 /// The name of a target's binary and folders, and its function.
-pub type Target = (&'static str, fn(&[u8]));
+pub type FuzzTarget = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const ALL: &[Target] = &[
+pub const ALL: &[FuzzTarget] = &[
     ("imu", imu::run),
     ("imu_formats", imu_formats::run),
     ("calibration", calibration::run),

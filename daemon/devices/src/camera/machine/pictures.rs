@@ -8,10 +8,10 @@ use bowwave_core::{
     time::Time,
 };
 
-use super::{Failure, MS, Machine, Output, Stream, during};
+use super::{CameraMachine, CameraOutput, CameraStream, Failure, MS, during};
 use crate::camera::{
     Coding, Exposure,
-    driver::{Driver, Filled, Format},
+    driver::{CameraDriver, FilledBuffer, SetFormat},
     jpeg::JpegError,
     timing::{Sensor, mid_exposure},
 };
@@ -24,7 +24,7 @@ const FORMAT_NS: i64 = 500 * MS;
 const EXPOSURE_NS: i64 = 100 * MS;
 
 /// How the rows of an uncompressed picture lie.
-pub(super) struct Layout {
+pub(super) struct PictureLayout {
     pub pixels: PixelFormat,
     /// Bytes of a row that are pixels.
     row: usize,
@@ -37,7 +37,7 @@ pub(super) struct Layout {
 }
 
 /// The layout, where the format is uncompressed. A row can be no shorter than its pixels, whatever the driver says.
-pub(super) fn layout(format: &Format) -> Option<Layout> {
+pub(super) fn layout(format: &SetFormat) -> Option<PictureLayout> {
     let (width, height) = (format.width as usize, format.height as usize);
     let (pixels, row, rows) = match format.coding {
         Coding::Yuyv => (PixelFormat::Yuyv, width * 2, height),
@@ -46,7 +46,7 @@ pub(super) fn layout(format: &Format) -> Option<Layout> {
     };
     let stride = (format.bytes_per_line as usize).max(row);
     // The last row need not be padded.
-    Some(Layout { pixels, row, stride, rows, bytes: stride * rows.saturating_sub(1) + row })
+    Some(PictureLayout { pixels, row, stride, rows, bytes: stride * rows.saturating_sub(1) + row })
 }
 
 /// So many pictures in a row may be left out because of their time stamps: fewer than 100 ms of video at 30 Hz.
@@ -56,14 +56,14 @@ const ODD_STAMPS: u32 = 2;
 const OTHER_SIZES: u32 = 3;
 
 /// What became of a buffer.
-enum Taken {
+enum TakenPicture {
     Picture(Picture, Option<Arc<[u8]>>),
     /// Damaged, or of another size.
     Damaged,
     OtherSize,
 }
 
-impl Stream {
+impl CameraStream {
     /// An undamaged buffer came.
     pub(super) fn live(&mut self, now: Time) {
         if self.frames > 0 {
@@ -84,16 +84,16 @@ impl Stream {
     }
 }
 
-impl Machine {
+impl CameraMachine {
     /// Takes every filled buffer and gives all but the newest sound one back.
     pub(super) fn drain(
         &mut self,
-        stream: &mut Stream,
+        stream: &mut CameraStream,
         now: Time,
-        driver: &mut impl Driver,
-        out: &mut Output,
-    ) -> Result<Option<Filled>, Failure> {
-        let mut newest: Option<Filled> = None;
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
+    ) -> Result<Option<FilledBuffer>, Failure> {
+        let mut newest: Option<FilledBuffer> = None;
         // Bounded: a driver may fill faster than this gives back.
         for _ in 0..=self.settings.buffers {
             let Some(filled) = driver.dequeue().map_err(during("get a picture"))? else { break };
@@ -123,11 +123,11 @@ impl Machine {
     /// Makes a picture of the newest buffer and hands it on. `false` where the format has changed.
     pub(super) fn take(
         &mut self,
-        stream: &mut Stream,
-        filled: Filled,
+        stream: &mut CameraStream,
+        filled: FilledBuffer,
         now: Time,
-        driver: &mut impl Driver,
-        out: &mut Output,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
     ) -> Result<bool, Failure> {
         let locked = matches!(self.settings.controls.exposure, Exposure::Locked { .. });
         if !locked && now.ns_since(stream.exposure_asked) >= EXPOSURE_NS {
@@ -160,7 +160,7 @@ impl Machine {
             Some(layout) => self.raw(&layout, stream, filled, driver)?,
             None => self.jpeg(stream, filled, driver)?,
         };
-        let Taken::Picture(picture, jpeg) = taken else {
+        let TakenPicture::Picture(picture, jpeg) = taken else {
             return self.refuse(&taken, stream, now, driver, out);
         };
         self.last_mid = mid;
@@ -180,14 +180,15 @@ impl Machine {
     /// A buffer that is no picture. `false` where that is because the format has changed.
     fn refuse(
         &mut self,
-        taken: &Taken,
-        stream: &mut Stream,
+        taken: &TakenPicture,
+        stream: &mut CameraStream,
         now: Time,
-        driver: &mut impl Driver,
-        out: &mut Output,
+        driver: &mut impl CameraDriver,
+        out: &mut CameraOutput,
     ) -> Result<bool, Failure> {
         self.counters.damaged_pictures += 1;
-        stream.other_sizes = if matches!(taken, Taken::OtherSize) { stream.other_sizes + 1 } else { 0 };
+        stream.other_sizes =
+            if matches!(taken, TakenPicture::OtherSize) { stream.other_sizes + 1 } else { 0 };
         // A damaged header says any size.
         if stream.other_sizes >= OTHER_SIZES {
             let cause = format!(
@@ -207,7 +208,7 @@ impl Machine {
     }
 
     /// What a sound picture says about the camera.
-    fn judge(&mut self, now: Time, picture: &Picture, stream: &Stream, out: &mut Output) {
+    fn judge(&mut self, now: Time, picture: &Picture, stream: &CameraStream, out: &mut CameraOutput) {
         for fault in super::GONE_WITH_FRAMES {
             self.clear(now, fault, out);
         }
@@ -226,7 +227,7 @@ impl Machine {
         }
     }
 
-    fn tell_damage(&mut self, now: Time, damaged: bool, stream: &Stream, out: &mut Output) {
+    fn tell_damage(&mut self, now: Time, damaged: bool, stream: &CameraStream, out: &mut CameraOutput) {
         if self.damage.push(now, damaged) {
             let (bad, all) = self.damage.share();
             let cause = format!(
@@ -242,18 +243,18 @@ impl Machine {
     /// An uncompressed picture: lent where it lies packed and the driver can spare the buffer, else copied.
     fn raw(
         &mut self,
-        layout: &Layout,
-        stream: &Stream,
-        filled: Filled,
-        driver: &mut impl Driver,
-    ) -> Result<Taken, Failure> {
-        let Format { width, height, .. } = stream.format;
+        layout: &PictureLayout,
+        stream: &CameraStream,
+        filled: FilledBuffer,
+        driver: &mut impl CameraDriver,
+    ) -> Result<TakenPicture, Failure> {
+        let SetFormat { width, height, .. } = stream.format;
         let back = during("give a buffer back");
         let memory = driver.bytes(filled.index);
         // `bytes_used` is the driver's word; the mapping is what there is.
         if filled.bytes_used < layout.bytes || memory.len() < layout.bytes {
             driver.queue(filled.index).map_err(back)?;
-            return Ok(Taken::Damaged);
+            return Ok(TakenPicture::Damaged);
         }
         if layout.stride == layout.row
             && driver.queued() >= DRIVER_KEEPS
@@ -262,7 +263,7 @@ impl Machine {
             self.counters.lent += 1;
             // Its size was checked; a picture that is none gives the buffer back by itself.
             return Ok(Picture::lent(layout.pixels, width, height, memory)
-                .map_or(Taken::Damaged, |picture| Taken::Picture(picture, None)));
+                .map_or(TakenPicture::Damaged, |picture| TakenPicture::Picture(picture, None)));
         }
         let memory = driver.bytes(filled.index);
         let packed = self.packed.filled(layout.row * layout.rows, |target| {
@@ -275,22 +276,27 @@ impl Machine {
         self.counters.copied += 1;
         driver.queue(filled.index).map_err(back)?;
         let picture = packed.ok().and_then(|bytes| Picture::new(layout.pixels, width, height, bytes).ok());
-        Ok(picture.map_or(Taken::Damaged, |picture| Taken::Picture(picture, None)))
+        Ok(picture.map_or(TakenPicture::Damaged, |picture| TakenPicture::Picture(picture, None)))
     }
 
-    fn jpeg(&mut self, stream: &Stream, filled: Filled, driver: &mut impl Driver) -> Result<Taken, Failure> {
+    fn jpeg(
+        &mut self,
+        stream: &CameraStream,
+        filled: FilledBuffer,
+        driver: &mut impl CameraDriver,
+    ) -> Result<TakenPicture, Failure> {
         let memory = driver.bytes(filled.index);
         let bytes: Option<Arc<[u8]>> = memory.get(..filled.bytes_used).map(Arc::from);
         // The copy is small; the buffer need not wait for the decoder.
         driver.queue(filled.index).map_err(during("give a buffer back"))?;
-        let Some(bytes) = bytes else { return Ok(Taken::Damaged) };
-        let Format { width, height, .. } = stream.format;
+        let Some(bytes) = bytes else { return Ok(TakenPicture::Damaged) };
+        let SetFormat { width, height, .. } = stream.format;
         Ok(match self.decoder.decode(&bytes, Some((width, height))) {
-            Ok(picture) => Taken::Picture(picture, Some(bytes)),
-            Err(JpegError::Size { .. }) => Taken::OtherSize,
+            Ok(picture) => TakenPicture::Picture(picture, Some(bytes)),
+            Err(JpegError::Size { .. }) => TakenPicture::OtherSize,
             Err(e) => {
                 log::debug!("{}: {e}", stream.found.node.display());
-                Taken::Damaged
+                TakenPicture::Damaged
             }
         })
     }

@@ -11,7 +11,7 @@ use glam::{DQuat, DVec3};
 
 use super::ImuCodec;
 use crate::{
-    framing::{Found, Framing, Look, byte_sum},
+    framing::{FoundPacket, Framing, PacketLook, byte_sum},
     imu::{
         axes::{G, SWAP},
         reading::{Reading, ReadingStamp},
@@ -34,11 +34,11 @@ impl Framing for Bno08xCodec {
     const MAX_BYTES: usize = PACKET_BYTES;
     const WEAK: bool = true;
 
-    fn look(bytes: &[u8]) -> Look<()> {
+    fn look(bytes: &[u8]) -> PacketLook<()> {
         match bytes.get(1) {
-            None => Look::Incomplete,
-            Some(0xaa) => Look::Packet { head: (), bytes: PACKET_BYTES },
-            Some(_) => Look::Invalid,
+            None => PacketLook::Incomplete,
+            Some(0xaa) => PacketLook::Packet { head: (), bytes: PACKET_BYTES },
+            Some(_) => PacketLook::Invalid,
         }
     }
 
@@ -87,7 +87,7 @@ impl ImuCodec for Bno08xCodec {
     const PROOF_PACKETS: usize = 5;
     const PERIOD_NS: Option<u32> = Some(10_000_000);
 
-    fn reading(&mut self, packet: &Found<'_, ()>) -> Option<Reading> {
+    fn reading(&mut self, packet: &FoundPacket<'_, ()>) -> Option<Reading> {
         Some(self.convert(&Bno08xPacket::parse(packet.bytes)?))
     }
 

@@ -6,7 +6,7 @@
 
 use super::{ImuCodec, PATIENCE_PARTS};
 use crate::{
-    framing::{Found, Framing, Look},
+    framing::{FoundPacket, Framing, PacketLook},
     imu::{
         axes::{G, SWAP, from_yaw_pitch_roll, rotation, vector},
         reading::{Reading, ReadingStamp},
@@ -30,19 +30,19 @@ impl Framing for MicroStrainCodec {
     const MAX_BYTES: usize = 4 + 255 + 2;
     const WEAK: bool = false;
 
-    fn look(bytes: &[u8]) -> Look<MipHead> {
+    fn look(bytes: &[u8]) -> PacketLook<MipHead> {
         match bytes.get(1) {
-            None => return Look::Incomplete,
+            None => return PacketLook::Incomplete,
             Some(0x65) => {}
-            Some(_) => return Look::Invalid,
+            Some(_) => return PacketLook::Invalid,
         }
         match (bytes.get(2), bytes.get(3)) {
-            (Some(0), _) | (_, Some(0)) => Look::Invalid,
-            (Some(&set), Some(&payload_bytes)) => Look::Packet {
+            (Some(0), _) | (_, Some(0)) => PacketLook::Invalid,
+            (Some(&set), Some(&payload_bytes)) => PacketLook::Packet {
                 head: MipHead { set, payload_bytes },
                 bytes: 4 + usize::from(payload_bytes) + 2,
             },
-            _ => Look::Incomplete,
+            _ => PacketLook::Incomplete,
         }
     }
 
@@ -148,7 +148,7 @@ impl ImuCodec for MicroStrainCodec {
     const PROOF_PACKETS: usize = 2;
     const PATIENCE: u32 = PATIENCE_PARTS;
 
-    fn reading(&mut self, packet: &Found<'_, MipHead>) -> Option<Reading> {
+    fn reading(&mut self, packet: &FoundPacket<'_, MipHead>) -> Option<Reading> {
         Some(self.convert(&MipPacket::parse(packet.bytes, packet.head)?))
     }
 

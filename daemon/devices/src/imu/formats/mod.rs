@@ -13,7 +13,7 @@ mod xsens;
 use std::fmt;
 
 use super::reading::Reading;
-use crate::framing::{Found, Framing, LineCounters, Scanner};
+use crate::framing::{FoundPacket, Framing, LineCounters, Scanner};
 
 /// Packets without a sample that a unit may send whose packets are samples...
 const PATIENCE_WHOLE: u32 = 4;
@@ -38,7 +38,7 @@ pub(super) trait ImuCodec: Framing + Default {
     const PERIOD_NS: Option<u32> = None;
 
     /// The measurement in one intact packet, in our axes and units; `None`: nothing that is used.
-    fn reading(&mut self, packet: &Found<'_, Self::Head>) -> Option<Reading>;
+    fn reading(&mut self, packet: &FoundPacket<'_, Self::Head>) -> Option<Reading>;
 
     /// A packet around any `content`, with the right check sum: for simulated lines and fuzzers.
     fn wrap(content: &[u8]) -> Vec<u8>;

@@ -8,7 +8,7 @@ use crc::{CRC_16_KERMIT, Crc};
 
 use super::{ImuCodec, PATIENCE_PARTS};
 use crate::{
-    framing::{Found, Framing, Look},
+    framing::{FoundPacket, Framing, PacketLook},
     imu::{
         axes::{SWAP, from_yaw_pitch_roll, rotation, vector},
         reading::{Reading, ReadingStamp},
@@ -37,18 +37,18 @@ impl Framing for SbgCodec {
     const MAX_BYTES: usize = DATA_MAX_BYTES + 9;
     const WEAK: bool = false;
 
-    fn look(bytes: &[u8]) -> Look<SbgHead> {
+    fn look(bytes: &[u8]) -> PacketLook<SbgHead> {
         match bytes.get(1) {
-            None => return Look::Incomplete,
+            None => return PacketLook::Incomplete,
             Some(0x5a) => {}
-            Some(_) => return Look::Invalid,
+            Some(_) => return PacketLook::Invalid,
         }
-        let Some(&[message, class, low, high]) = bytes.get(2..6) else { return Look::Incomplete };
+        let Some(&[message, class, low, high]) = bytes.get(2..6) else { return PacketLook::Incomplete };
         let data_bytes = usize::from(u16::from_le_bytes([low, high]));
         if data_bytes > DATA_MAX_BYTES {
-            return Look::Invalid;
+            return PacketLook::Invalid;
         }
-        Look::Packet { head: SbgHead { message, class, data_bytes }, bytes: data_bytes + 9 }
+        PacketLook::Packet { head: SbgHead { message, class, data_bytes }, bytes: data_bytes + 9 }
     }
 
     fn intact(packet: &[u8]) -> bool {
@@ -156,7 +156,7 @@ impl ImuCodec for SbgCodec {
     const PROOF_PACKETS: usize = 2;
     const PATIENCE: u32 = PATIENCE_PARTS;
 
-    fn reading(&mut self, packet: &Found<'_, SbgHead>) -> Option<Reading> {
+    fn reading(&mut self, packet: &FoundPacket<'_, SbgHead>) -> Option<Reading> {
         self.convert(&SbgLog::parse(packet.bytes, packet.head)?)
     }
 

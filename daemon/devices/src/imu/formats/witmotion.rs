@@ -9,7 +9,7 @@ use glam::{DQuat, DVec3};
 
 use super::{ImuCodec, PATIENCE_PARTS};
 use crate::{
-    framing::{Found, Framing, Look, byte_sum},
+    framing::{FoundPacket, Framing, PacketLook, byte_sum},
     imu::{
         axes::{G, SWAP, from_yaw_pitch_roll, unit},
         reading::{Reading, ReadingStamp},
@@ -29,11 +29,13 @@ impl Framing for WitmotionCodec {
     const MAX_BYTES: usize = PACKET_BYTES;
     const WEAK: bool = true;
 
-    fn look(bytes: &[u8]) -> Look<WitmotionKind> {
+    fn look(bytes: &[u8]) -> PacketLook<WitmotionKind> {
         match bytes.get(1) {
-            None => Look::Incomplete,
-            Some(&kind @ 0x50..=0x5a) => Look::Packet { head: WitmotionKind(kind), bytes: PACKET_BYTES },
-            Some(_) => Look::Invalid,
+            None => PacketLook::Incomplete,
+            Some(&kind @ 0x50..=0x5a) => {
+                PacketLook::Packet { head: WitmotionKind(kind), bytes: PACKET_BYTES }
+            }
+            Some(_) => PacketLook::Invalid,
         }
     }
 
@@ -93,7 +95,7 @@ impl ImuCodec for WitmotionCodec {
     const PROOF_PACKETS: usize = 6;
     const PATIENCE: u32 = PATIENCE_PARTS;
 
-    fn reading(&mut self, packet: &Found<'_, WitmotionKind>) -> Option<Reading> {
+    fn reading(&mut self, packet: &FoundPacket<'_, WitmotionKind>) -> Option<Reading> {
         self.take(&WitmotionPacket::parse(packet.bytes, packet.head)?)
     }
 

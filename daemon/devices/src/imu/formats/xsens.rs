@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 
 use super::ImuCodec;
 use crate::{
-    framing::{Found, Framing, Look, byte_sum},
+    framing::{FoundPacket, Framing, PacketLook, byte_sum},
     imu::{
         axes::{ENU_FROM_NWU, ROLL_OVER, SWAP, from_yaw_pitch_roll, unit},
         reading::{Reading, ReadingStamp},
@@ -42,30 +42,32 @@ impl Framing for XsensCodec {
     const MAX_BYTES: usize = PAYLOAD_MAX_BYTES + 7;
     const WEAK: bool = true;
 
-    fn look(bytes: &[u8]) -> Look<XsensHead> {
+    fn look(bytes: &[u8]) -> PacketLook<XsensHead> {
         // A unit on a line of its own is its bus's master.
         match bytes.get(1) {
-            None => return Look::Incomplete,
+            None => return PacketLook::Incomplete,
             Some(&MASTER) => {}
-            Some(_) => return Look::Invalid,
+            Some(_) => return PacketLook::Invalid,
         }
-        let (Some(&message), Some(&short)) = (bytes.get(2), bytes.get(3)) else { return Look::Incomplete };
+        let (Some(&message), Some(&short)) = (bytes.get(2), bytes.get(3)) else {
+            return PacketLook::Incomplete;
+        };
         let (payload_at, payload_bytes) = match (short, bytes.get(4..6)) {
-            (0xff, None) => return Look::Incomplete,
+            (0xff, None) => return PacketLook::Incomplete,
             (0xff, Some(&[high, low])) => (6, usize::from(u16::from_be_bytes([high, low]))),
             _ => (4, usize::from(short)),
         };
         if payload_bytes > PAYLOAD_MAX_BYTES {
-            return Look::Invalid;
+            return PacketLook::Invalid;
         }
         let head = XsensHead { message, payload_at, payload_bytes };
-        Look::Packet { head, bytes: payload_at + payload_bytes + 1 }
+        PacketLook::Packet { head, bytes: payload_at + payload_bytes + 1 }
     }
 
     /// The byte sum, and for measurements that the items fill the payload: eight bits alone are little.
     fn intact(packet: &[u8]) -> bool {
         let sum = packet.get(1..).map_or(0, byte_sum);
-        let Look::Packet { head, .. } = Self::look(packet) else { return false };
+        let PacketLook::Packet { head, .. } = Self::look(packet) else { return false };
         sum == 0 && (head.message != MTDATA2 || items(packet, head).all(|item| item.is_some()))
     }
 }
@@ -179,7 +181,7 @@ impl ImuCodec for XsensCodec {
     const REMEDY: &'static str = "add it to its output configuration (1060, 2010, 4020, 8020)";
     const PROOF_PACKETS: usize = 3;
 
-    fn reading(&mut self, packet: &Found<'_, XsensHead>) -> Option<Reading> {
+    fn reading(&mut self, packet: &FoundPacket<'_, XsensHead>) -> Option<Reading> {
         Some(self.convert(&XsensMessage::parse(packet.bytes, packet.head)?))
     }
 

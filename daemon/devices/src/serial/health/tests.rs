@@ -13,8 +13,8 @@ fn at(ms: i64) -> Time {
 }
 
 /// A line with a unit that sends 200 packets of 50 bytes a second at `unit_baud`, stepped every 5 ms.
-struct Rig {
-    health: Health,
+struct LineRig {
+    health: LineHealth,
     now_ms: i64,
     unit_baud: Option<u32>,
     garbage: bool,
@@ -23,9 +23,9 @@ struct Rig {
     set: Vec<u32>,
 }
 
-impl Rig {
+impl LineRig {
     fn new(baud: Baud, unit_baud: Option<u32>) -> Self {
-        let mut health = Health::new(&baud, &IMU);
+        let mut health = LineHealth::new(&baud, &IMU);
         health.opened(at(0));
         Self {
             health,
@@ -51,7 +51,7 @@ impl Rig {
                     self.health.framing(20);
                 }
             }
-            if let Action::SetBaud(baud) = self.health.tick(now, false) {
+            if let LineAction::SetBaud(baud) = self.health.tick(now, false) {
                 self.set.push(baud);
             }
             self.fetch();
@@ -72,7 +72,7 @@ impl Rig {
 
 #[test]
 fn the_right_rate_raises_nothing() {
-    let mut rig = Rig::new(Baud::Fixed(115_200), Some(115_200));
+    let mut rig = LineRig::new(Baud::Fixed(115_200), Some(115_200));
     rig.run(3000);
     assert_eq!(rig.codes(), [""; 0]);
     assert_eq!(rig.health.status(), LineStatus::Streaming);
@@ -81,7 +81,7 @@ fn the_right_rate_raises_nothing() {
 #[test]
 fn a_wrong_rate_is_told_after_500_ms_and_the_right_one_is_found_and_kept() {
     for (unit, framing) in [(9_600, false), (460_800, false), (460_800, true)] {
-        let mut rig = Rig::new(Baud::default(), Some(unit));
+        let mut rig = LineRig::new(Baud::default(), Some(unit));
         rig.framing = framing;
         rig.run(4000);
         assert_eq!(rig.codes(), ["+IMU_BAUD", "-IMU_BAUD"], "{unit}");
@@ -96,7 +96,7 @@ fn a_wrong_rate_is_told_after_500_ms_and_the_right_one_is_found_and_kept() {
 
 #[test]
 fn a_fixed_rate_is_not_changed() {
-    let mut rig = Rig::new(Baud::Fixed(115_200), Some(9_600));
+    let mut rig = LineRig::new(Baud::Fixed(115_200), Some(9_600));
     rig.run(3000);
     assert_eq!(rig.codes(), ["+IMU_BAUD"]);
     assert!(rig.set.is_empty());
@@ -108,7 +108,7 @@ fn a_fixed_rate_is_not_changed() {
 /// After a burst of garbage the rate that was right is looked at every other time.
 #[test]
 fn a_long_burst_of_garbage_does_not_lose_the_rate() {
-    let mut rig = Rig::new(Baud::default(), Some(230_400));
+    let mut rig = LineRig::new(Baud::default(), Some(230_400));
     rig.run(4000);
     for burst_ms in [200, 700, 1100, 2500, 60_000] {
         rig.garbage = true;
@@ -125,7 +125,7 @@ fn a_long_burst_of_garbage_does_not_lose_the_rate() {
 
 #[test]
 fn silence_is_told_after_100_ms_and_ends_with_the_first_packet() {
-    let mut rig = Rig::new(Baud::default(), Some(115_200));
+    let mut rig = LineRig::new(Baud::default(), Some(115_200));
     rig.run(1000);
     rig.unit_baud = None;
     rig.run(300);
@@ -140,10 +140,10 @@ fn silence_is_told_after_100_ms_and_ends_with_the_first_packet() {
 /// A unit without power and one that is switched off during the scan: lost, not at another rate.
 #[test]
 fn silence_is_no_wrong_rate() {
-    let mut rig = Rig::new(Baud::default(), None);
+    let mut rig = LineRig::new(Baud::default(), None);
     rig.run(3000);
     assert_eq!(rig.codes(), ["+IMU_LOST"]);
-    let mut rig = Rig::new(Baud::default(), Some(19_200));
+    let mut rig = LineRig::new(Baud::default(), Some(19_200));
     rig.run(1000);
     rig.unit_baud = None;
     rig.run(2000);
@@ -153,14 +153,14 @@ fn silence_is_no_wrong_rate() {
 
 #[test]
 fn a_port_that_lies_about_bytes_is_opened_anew() {
-    let mut health = Health::new(&Baud::Fixed(9_600), &IMU);
+    let mut health = LineHealth::new(&Baud::Fixed(9_600), &IMU);
     health.opened(at(0));
     health.spurious(at(10));
-    assert_eq!(health.tick(at(20), false), Action::Keep);
+    assert_eq!(health.tick(at(20), false), LineAction::Keep);
     health.received(at(30), 50, 2);
     health.spurious(at(40));
-    assert_eq!(health.tick(at(180), false), Action::Keep);
-    assert_eq!(health.tick(at(190), false), Action::Reopen);
+    assert_eq!(health.tick(at(180), false), LineAction::Keep);
+    assert_eq!(health.tick(at(190), false), LineAction::Reopen);
     let raised: Vec<_> = health.changes().map(|c| c.fault).collect();
     assert_eq!(raised, [Fault::ImuLost, Fault::ImuBlocked], "nothing came, and why");
     health.opened(at(300));
@@ -171,32 +171,32 @@ fn a_port_that_lies_about_bytes_is_opened_anew() {
 
 #[test]
 fn where_any_port_may_be_it_the_next_one_is_tried() {
-    let mut health = Health::new(&Baud::default(), &IMU);
+    let mut health = LineHealth::new(&Baud::default(), &IMU);
     health.opened(at(0));
-    assert_eq!(health.tick(at(1400), true), Action::Keep);
-    assert_eq!(health.tick(at(1500), true), Action::NextPort);
+    assert_eq!(health.tick(at(1400), true), LineAction::Keep);
+    assert_eq!(health.tick(at(1500), true), LineAction::NextPort);
     health.leave(at(1500));
     health.opened(at(1600));
     health.received(at(1700), 100, 2);
-    assert_eq!(health.tick(at(9000), true), Action::Keep, "the unit was here");
+    assert_eq!(health.tick(at(9000), true), LineAction::Keep, "the unit was here");
     // It is back under another name, and another adapter has its own.
     health.lost(at(9100), "unplugged");
     health.opened(at(9200));
-    assert_eq!(health.tick(at(10_699), true), Action::Keep);
-    assert_eq!(health.tick(at(10_700), true), Action::NextPort);
+    assert_eq!(health.tick(at(10_699), true), LineAction::Keep);
+    assert_eq!(health.tick(at(10_700), true), LineAction::NextPort);
 }
 
 /// There may be no other port yet: the question comes again and again, and nothing else does.
 #[test]
 fn a_port_that_stays_the_only_one_is_kept_and_told_of_once() {
     for (bytes, every_ms) in [(0, 1500), (50, 3200)] {
-        let mut rig = Rig::new(Baud::default(), None);
+        let mut rig = LineRig::new(Baud::default(), None);
         let mut asked = Vec::new();
         for ms in (5..10_000).step_by(5) {
             if bytes > 0 {
                 rig.health.received(at(ms), bytes, 0);
             }
-            if rig.health.tick(at(ms), true) == Action::NextPort {
+            if rig.health.tick(at(ms), true) == LineAction::NextPort {
                 asked.push(ms);
             }
             rig.now_ms = ms;
@@ -211,13 +211,13 @@ fn a_port_that_stays_the_only_one_is_kept_and_told_of_once() {
 /// A talking adapter and a silent one in turn, and then the unit.
 #[test]
 fn ports_without_a_unit_are_left_without_a_to_and_fro_of_faults() {
-    let mut rig = Rig::new(Baud::default(), None);
+    let mut rig = LineRig::new(Baud::default(), None);
     let mut left = 0;
     for ms in (5..60_000).step_by(5) {
         if left % 2 == 0 {
             rig.health.received(at(ms), 50, 0);
         }
-        if rig.health.tick(at(ms), true) == Action::NextPort {
+        if rig.health.tick(at(ms), true) == LineAction::NextPort {
             rig.health.leave(at(ms));
             rig.health.opened(at(ms));
             left += 1;
@@ -241,10 +241,10 @@ proptest! {
     fn faults_alternate_and_the_unit_is_found(
         happenings in prop::collection::vec((0u8..6, 1i64..200, 0u64..3), 0..200),
     ) {
-        let mut health = Health::new(&Baud::Scan(vec![1, 2, 3]), &IMU);
+        let mut health = LineHealth::new(&Baud::Scan(vec![1, 2, 3]), &IMU);
         let mut active = std::collections::HashSet::new();
         let mut now_ms = 0;
-        let mut follow = |health: &mut Health| {
+        let mut follow = |health: &mut LineHealth| {
             for c in health.changes() {
                 let fresh = if c.change == Change::Cleared { active.remove(&c.fault) } else { active.insert(c.fault) };
                 assert!(fresh, "{c:?}");

@@ -9,10 +9,10 @@ use rustix::io::Errno;
 use super::super::*;
 use crate::camera::{
     Coding, Rate, Size,
-    driver::Filled,
+    driver::FilledBuffer,
     negotiate::{Offer, Rates},
     settings::Controls,
-    timing::Stamp,
+    timing::BufferStamp,
 };
 
 pub(super) const PERIOD_NS: i64 = 33_333_333;
@@ -38,21 +38,21 @@ impl Drop for Memory {
 
 /// A camera that does what the test says.
 pub(super) struct Fake {
-    pub(super) found: Vec<Found>,
+    pub(super) found: Vec<FoundCamera>,
     pub(super) offers: Vec<Offer>,
     /// Answers of the next calls, where they are not good.
     pub(super) open_fails: VecDeque<Errno>,
-    pub(super) start_fails: fn(&Candidate) -> Option<Errno>,
+    pub(super) start_fails: fn(&ModeCandidate) -> Option<Errno>,
     pub(super) restart_fails: Option<Errno>,
     pub(super) dequeue_fails: Option<Errno>,
     pub(super) reset_works: bool,
     /// What the driver sets instead of what it is asked for.
-    pub(super) format_set: Option<Format>,
+    pub(super) format_set: Option<SetFormat>,
     /// What it says later.
-    pub(super) format_now: Option<Format>,
-    pub(super) mode: Option<Candidate>,
+    pub(super) format_now: Option<SetFormat>,
+    pub(super) mode: Option<ModeCandidate>,
     pub(super) exposure_ns: i64,
-    pub(super) filled: VecDeque<(Filled, Vec<u8>)>,
+    pub(super) filled: VecDeque<(FilledBuffer, Vec<u8>)>,
     pub(super) here: Vec<Option<Vec<u8>>>,
     pub(super) at_driver: usize,
     pub(super) back: (crossbeam_channel::Sender<u32>, crossbeam_channel::Receiver<u32>),
@@ -85,10 +85,10 @@ impl Fake {
         }
     }
 
-    pub(super) fn agreed(&self) -> Format {
+    pub(super) fn agreed(&self) -> SetFormat {
         let mode = self.mode.unwrap().mode;
         let bytes_per_line = if mode.coding == Coding::Yuyv { mode.width * 2 } else { mode.width };
-        Format {
+        SetFormat {
             coding: mode.coding,
             width: mode.width,
             height: mode.height,
@@ -98,8 +98,8 @@ impl Fake {
     }
 }
 
-pub(super) fn camera(node: &str, serial: &str) -> Found {
-    Found {
+pub(super) fn camera(node: &str, serial: &str) -> FoundCamera {
+    FoundCamera {
         node: node.into(),
         links: vec![format!("/dev/v4l/by-id/usb-{serial}").into()],
         serial: Some(serial.to_owned()),
@@ -109,12 +109,12 @@ pub(super) fn camera(node: &str, serial: &str) -> Found {
     }
 }
 
-impl Driver for Fake {
-    fn find(&mut self, _: &CameraSettings) -> Vec<Found> {
+impl CameraDriver for Fake {
+    fn find(&mut self, _: &CameraSettings) -> Vec<FoundCamera> {
         self.found.clone()
     }
 
-    fn open(&mut self, node: &Path, _: &CameraSettings) -> io::Result<Opened> {
+    fn open(&mut self, node: &Path, _: &CameraSettings) -> io::Result<OpenedCamera> {
         self.log.push("open");
         if let Some(errno) = self.open_fails.pop_front() {
             return Err(error(errno));
@@ -123,15 +123,15 @@ impl Driver for Fake {
         if !there {
             return Err(error(Errno::NODEV));
         }
-        Ok(Opened { card: "Cam".to_owned(), captures: true, offers: self.offers.clone() })
+        Ok(OpenedCamera { card: "Cam".to_owned(), captures: true, offers: self.offers.clone() })
     }
 
-    fn set_mode(&mut self, wanted: &Candidate) -> io::Result<(Format, Option<Rate>)> {
+    fn set_mode(&mut self, wanted: &ModeCandidate) -> io::Result<(SetFormat, Option<Rate>)> {
         self.mode = Some(*wanted);
         Ok((self.format_set.unwrap_or_else(|| self.agreed()), Some(wanted.mode.rate)))
     }
 
-    fn format(&mut self) -> io::Result<Format> {
+    fn format(&mut self) -> io::Result<SetFormat> {
         Ok(self.format_now.or(self.format_set).unwrap_or_else(|| self.agreed()))
     }
 
@@ -166,7 +166,7 @@ impl Driver for Fake {
         self.at_driver = 0;
     }
 
-    fn dequeue(&mut self) -> io::Result<Option<Filled>> {
+    fn dequeue(&mut self) -> io::Result<Option<FilledBuffer>> {
         if let Some(errno) = self.dequeue_fails {
             return Err(error(errno));
         }
@@ -216,29 +216,29 @@ impl Driver for Fake {
         self.filled.clear();
     }
 
-    fn reset(&mut self, _: &Found) -> io::Result<()> {
+    fn reset(&mut self, _: &FoundCamera) -> io::Result<()> {
         self.log.push("reset");
         if self.reset_works { Ok(()) } else { Err(error(Errno::ACCESS)) }
     }
 }
 
 /// A machine with its driver and its clock.
-pub(super) struct Bench {
+pub(super) struct CameraBench {
     pub(super) fake: Fake,
-    pub(super) machine: Machine,
+    pub(super) machine: CameraMachine,
     pub(super) now: Time,
     pub(super) sequence: u32,
     pub(super) frames: Vec<CameraFrame>,
     pub(super) faults: Vec<FaultChange>,
 }
 
-impl Bench {
+impl CameraBench {
     pub(super) fn new(coding: &[u8; 4], settings: CameraSettings) -> Self {
         settings.check().unwrap();
         let now = Time::from_ns(10_000_000_000);
         Self {
             fake: Fake::new(coding),
-            machine: Machine::new(settings, now),
+            machine: CameraMachine::new(settings, now),
             now,
             sequence: 0,
             frames: Vec::new(),
@@ -247,7 +247,7 @@ impl Bench {
     }
 
     pub(super) fn step(&mut self, ready: Ready) -> Time {
-        let mut out = Output::default();
+        let mut out = CameraOutput::default();
         let due = self.machine.step(self.now, ready, &mut self.fake, &mut out);
         self.frames.extend(out.frames);
         self.faults.extend(out.faults);
@@ -273,14 +273,16 @@ impl Bench {
 
     pub(super) fn fill(&mut self, bytes: Vec<u8>, damaged: bool) {
         self.sequence += 1;
-        let stamp = Stamp { time: self.now.plus_ns(-10 * MS), monotonic: true, start_of_exposure: true };
-        let filled = Filled { index: 0, bytes_used: bytes.len(), damaged, sequence: self.sequence, stamp };
+        let stamp =
+            BufferStamp { time: self.now.plus_ns(-10 * MS), monotonic: true, start_of_exposure: true };
+        let filled =
+            FilledBuffer { index: 0, bytes_used: bytes.len(), damaged, sequence: self.sequence, stamp };
         self.fake.filled.push_back((filled, bytes));
     }
 
     /// A picture unlike the last one.
     pub(super) fn picture(&self) -> Vec<u8> {
-        let Candidate { mode, .. } = self.fake.mode.unwrap();
+        let ModeCandidate { mode, .. } = self.fake.mode.unwrap();
         let value = (self.sequence % 200) as u8;
         if mode.coding == Coding::Mjpeg {
             jpeg(mode.width, value)
@@ -303,7 +305,7 @@ impl Bench {
     pub(super) fn streaming(mut self) -> Self {
         self.step(Ready::default());
         self.frames(20);
-        assert_eq!(self.machine.status().life, Life::Streaming);
+        assert_eq!(self.machine.status().life, CameraLife::Streaming);
         self.frames.clear();
         self.faults.clear();
         self.fake.log.clear();
@@ -326,7 +328,7 @@ impl Bench {
         self.faults.drain(..).map(told).collect()
     }
 
-    pub(super) fn life(&self) -> Life {
+    pub(super) fn life(&self) -> CameraLife {
         self.machine.status().life
     }
 
@@ -345,10 +347,10 @@ pub(super) fn jpeg(width: u32, value: u8) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn yuyv() -> Bench {
-    Bench::new(b"YUYV", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() })
+pub(super) fn yuyv() -> CameraBench {
+    CameraBench::new(b"YUYV", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() })
 }
 
-pub(super) fn mjpeg() -> Bench {
-    Bench::new(b"MJPG", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() })
+pub(super) fn mjpeg() -> CameraBench {
+    CameraBench::new(b"MJPG", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() })
 }

@@ -8,7 +8,7 @@ use bowwave_core::event::Picture;
 use rustix::io::Errno;
 
 use super::*;
-use crate::camera::{Coding, Rate, WantedMode, negotiate::Rates, timing::Stamp};
+use crate::camera::{Coding, Rate, WantedMode, negotiate::Rates, timing::BufferStamp};
 use bench::*;
 
 /// Rows 1: unplugged and back.
@@ -23,7 +23,7 @@ fn an_unplugged_camera_is_told_at_once_and_back_within_a_second() {
         assert_eq!(bench.told(unplugged), [(Fault::CamLost, "raised", 0)]);
         assert_eq!(bench.fake.log, ["close"]);
         bench.pass(3000);
-        assert_eq!((bench.life(), bench.told(unplugged)), (Life::Searching, vec![]));
+        assert_eq!((bench.life(), bench.told(unplugged)), (CameraLife::Searching, vec![]));
         bench.fake.found = known;
         bench.fake.dequeue_fails = None;
         let back = bench.now;
@@ -31,7 +31,7 @@ fn an_unplugged_camera_is_told_at_once_and_back_within_a_second() {
         bench.frames(1);
         let told = bench.told(back);
         assert!(matches!(told[..], [(Fault::CamLost, "cleared", ..1000)]), "{told:?}");
-        assert_eq!(bench.life(), Life::Streaming);
+        assert_eq!(bench.life(), CameraLife::Streaming);
     }
 }
 
@@ -58,7 +58,7 @@ fn a_stall_is_seen_in_100_ms_and_ended_more_and_more_roughly() {
     let last = bench.now;
     bench.pass(101);
     assert_eq!(bench.told(last), [(Fault::CamStall, "raised", 100)]);
-    assert_eq!((bench.life(), bench.fake.log.len()), (Life::Stalled, 0), "it may go on by itself");
+    assert_eq!((bench.life(), bench.fake.log.len()), (CameraLife::Stalled, 0), "it may go on by itself");
     bench.pass(150);
     assert_eq!(bench.fake.log, ["restart"]);
     let restarted = bench.now;
@@ -91,7 +91,8 @@ fn a_stall_ends_by_itself_when_frames_come_in_time() {
 fn a_slow_camera_does_not_stall() {
     let rate = Rate::hz(10).unwrap();
     let wanted = WantedMode { coding: Coding::Yuyv, width: 64, height: 48, rate };
-    let mut bench = Bench::new(b"YUYV", CameraSettings { modes: vec![wanted], ..CameraSettings::default() });
+    let mut bench =
+        CameraBench::new(b"YUYV", CameraSettings { modes: vec![wanted], ..CameraSettings::default() });
     bench.fake.offers[0].sizes[0].1 = Rates::Listed(vec![rate]);
     bench.step(Ready::default());
     for _ in 0..10 {
@@ -117,7 +118,7 @@ fn three_failures_of_the_link_lead_to_a_reset() {
         bench.fake.dequeue_fails = None;
         bench.pass(500);
         assert_eq!(bench.fake.log.last(), Some(&"reset"));
-        assert_eq!(bench.life(), Life::Resetting);
+        assert_eq!(bench.life(), CameraLife::Resetting);
         assert_eq!(bench.counters().resets, u64::from(reset_works));
         bench.pass(500);
         bench.frames(1);
@@ -143,7 +144,7 @@ fn a_damaged_buffer_is_counted_and_the_next_frame_comes() {
 #[test]
 fn damaged_jpegs_are_counted_told_above_thirty_percent_and_forgotten_below_ten() {
     let mut bench = mjpeg().streaming();
-    let send = |bench: &mut Bench, cut: bool| {
+    let send = |bench: &mut CameraBench, cut: bool| {
         bench.now = bench.now.plus_ns(PERIOD_NS);
         let mut picture = bench.picture();
         if cut {
@@ -192,7 +193,7 @@ fn a_queue_that_only_says_that_it_failed_is_opened_again() {
 #[test]
 fn another_size_than_the_calibrated_one_is_told_until_it_is_back() {
     let mut bench = yuyv().streaming();
-    let other = Format { width: 32, height: 24, bytes_per_line: 64, ..bench.fake.agreed() };
+    let other = SetFormat { width: 32, height: 24, bytes_per_line: 64, ..bench.fake.agreed() };
     (bench.fake.format_set, bench.fake.changed) = (Some(other), true);
     let changed = bench.now;
     bench.step(Ready { event: true, ..Ready::default() });
@@ -211,7 +212,7 @@ fn another_size_than_the_calibrated_one_is_told_until_it_is_back() {
 #[test]
 fn jpegs_of_another_size_are_no_pictures_and_told_when_it_is_no_single_one() {
     let mut bench = mjpeg().streaming();
-    let other = |bench: &mut Bench| {
+    let other = |bench: &mut CameraBench| {
         bench.now = bench.now.plus_ns(PERIOD_NS);
         bench.fill(jpeg(32, 9), false);
         bench.step(Ready { filled: true, ..Ready::default() });
@@ -244,7 +245,7 @@ fn a_camera_that_lies_about_its_format_gives_no_pictures_and_no_panic() {
     bench.step(Ready { filled: true, ..Ready::default() });
     assert_eq!((bench.frames.len(), bench.counters().damaged_pictures), (0, 4));
     // The driver's format has changed without a word.
-    bench.fake.format_now = Some(Format { width: 32, ..bench.fake.agreed() });
+    bench.fake.format_now = Some(SetFormat { width: 32, ..bench.fake.agreed() });
     for _ in 0..15 {
         bench.now = bench.now.plus_ns(PERIOD_NS);
         bench.fill(vec![1; 100], false);
@@ -253,8 +254,13 @@ fn a_camera_that_lies_about_its_format_gives_no_pictures_and_no_panic() {
     assert!(bench.fake.log.contains(&"open"), "{:?}", bench.fake.log);
     // A size that no camera has is not even started.
     let mut bench = yuyv();
-    bench.fake.format_set =
-        Some(Format { coding: Coding::Yuyv, width: u32::MAX, height: 2, bytes_per_line: 0, size_image: 0 });
+    bench.fake.format_set = Some(SetFormat {
+        coding: Coding::Yuyv,
+        width: u32::MAX,
+        height: 2,
+        bytes_per_line: 0,
+        size_image: 0,
+    });
     bench.pass(1000);
     assert!(!bench.fake.log.contains(&"start"));
     assert!(matches!(bench.told(Time::MIN)[..], [(Fault::CamLost, "raised", _)]));
@@ -268,7 +274,10 @@ fn a_busy_camera_is_tried_each_second() {
     let begun = bench.now;
     bench.pass(1500);
     assert_eq!(bench.told(begun), [(Fault::CamBusy, "raised", 0)]);
-    assert_eq!((bench.life(), bench.fake.log.iter().filter(|l| **l == "open").count()), (Life::Busy, 2));
+    assert_eq!(
+        (bench.life(), bench.fake.log.iter().filter(|l| **l == "open").count()),
+        (CameraLife::Busy, 2)
+    );
     bench.pass(600);
     bench.frames(1);
     let told = bench.told(begun);
@@ -352,7 +361,7 @@ fn the_middle_of_an_exposure_that_changes_is_followed() {
             let stamp = &mut bench.fake.filled[0].0.stamp;
             let begun = bench.now.plus_ns(-2 * MS - READOUT_NS - exposure_ns);
             let ended = bench.now.plus_ns(-2 * MS);
-            *stamp = Stamp {
+            *stamp = BufferStamp {
                 time: if start_of_exposure { begun } else { ended },
                 monotonic: true,
                 start_of_exposure,
@@ -394,7 +403,7 @@ fn a_camera_that_is_gone_is_lost_and_nothing_else() {
 #[test]
 fn a_few_odd_stamps_are_left_out_and_many_are_not_believed() {
     let mut bench = yuyv().streaming();
-    let odd = |bench: &mut Bench| {
+    let odd = |bench: &mut CameraBench| {
         bench.now = bench.now.plus_ns(PERIOD_NS);
         let picture = bench.picture();
         bench.fill(picture, false);
@@ -420,16 +429,16 @@ fn a_few_odd_stamps_are_left_out_and_many_are_not_believed() {
 #[test]
 fn another_camera_is_not_opened() {
     let settings = CameraSettings { serial: Some("B".to_owned()), ..CameraSettings::default() };
-    let mut bench = Bench::new(b"YUYV", settings);
+    let mut bench = CameraBench::new(b"YUYV", settings);
     let begun = bench.now;
     bench.pass(1000);
     assert_eq!(bench.told(begun), [(Fault::CalMismatch, "raised", 0)]);
-    assert_eq!((bench.life(), bench.fake.log.len()), (Life::Mismatched, 0));
+    assert_eq!((bench.life(), bench.fake.log.len()), (CameraLife::Mismatched, 0));
     bench.fake.found = vec![camera("/dev/video0", "B")];
     bench.pass(300);
     assert!(matches!(bench.told(begun)[..], [(Fault::CalMismatch, "cleared", _)]));
     bench.frames(1);
-    assert_eq!(bench.life(), Life::Streaming);
+    assert_eq!(bench.life(), CameraLife::Streaming);
 }
 
 /// Row 13: covered or frozen.
@@ -482,10 +491,12 @@ fn pictures_are_lent_while_the_driver_keeps_two_buffers_then_copied() {
 
 #[test]
 fn padded_rows_are_packed() {
-    let mut bench =
-        Bench::new(b"NV12", CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() });
+    let mut bench = CameraBench::new(
+        b"NV12",
+        CameraSettings { calibrated_size: Some(SIZE), ..CameraSettings::default() },
+    );
     let format =
-        Format { coding: Coding::Nv12, width: 64, height: 48, bytes_per_line: 80, size_image: 80 * 72 };
+        SetFormat { coding: Coding::Nv12, width: 64, height: 48, bytes_per_line: 80, size_image: 80 * 72 };
     bench.fake.format_set = Some(format);
     bench.step(Ready::default());
     bench.now = bench.now.plus_ns(PERIOD_NS);
@@ -522,6 +533,6 @@ fn a_camera_that_needs_long_to_begin_is_given_longer_each_time() {
 fn stopping_closes_the_camera() {
     let mut bench = yuyv().streaming();
     bench.machine.stop(&mut bench.fake);
-    assert_eq!((bench.life(), bench.fake.log.last()), (Life::Stopped, Some(&"close")));
+    assert_eq!((bench.life(), bench.fake.log.last()), (CameraLife::Stopped, Some(&"close")));
     assert_eq!(bench.step(Ready::default()), Time::from_ns(i64::MAX));
 }

@@ -8,7 +8,7 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{G, POLE, Simulated, SimulatedUnit, Tolerance, encode, i16s, rfu, truth, world_of},
+        streams::{FormatTolerance, G, POLE, Simulated, SimulatedUnit, encode, i16s, rfu, truth, world_of},
     },
 };
 
@@ -17,7 +17,7 @@ impl SimulatedUnit for Bno08xCodec {
         period_ns: 10_000_000,
         packets: 1,
         // Hundredths of a degree; the rate is their difference over 10 ms, half of that old.
-        tolerance: Tolerance { rate: 0.04, accel: 0.006, attitude: 2e-4, time_ns: 1_000_000 },
+        tolerance: FormatTolerance { rate: 0.04, accel: 0.006, attitude: 2e-4, time_ns: 1_000_000 },
     };
 
     fn send(s: &ImuSample, n: i64, _: bool) -> Vec<u8> {

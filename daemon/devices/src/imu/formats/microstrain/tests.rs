@@ -9,7 +9,7 @@ use crate::{
     framing::{LineCounters, Scanner},
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{G, Simulated, SimulatedUnit, Tolerance, be, ned, world_of, wxyz},
+        streams::{FormatTolerance, G, Simulated, SimulatedUnit, be, ned, world_of, wxyz},
     },
 };
 
@@ -17,7 +17,7 @@ impl SimulatedUnit for MicroStrainCodec {
     const SENDS: Simulated = Simulated {
         period_ns: 5_000_000,
         packets: 1,
-        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
+        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
     };
 
     fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {

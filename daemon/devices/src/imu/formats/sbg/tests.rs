@@ -7,7 +7,7 @@ use crate::{
     framing::{LineCounters, Scanner},
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{Simulated, SimulatedUnit, Tolerance, le, ned, world_of, wxyz, yaw_pitch_roll},
+        streams::{FormatTolerance, Simulated, SimulatedUnit, le, ned, world_of, wxyz, yaw_pitch_roll},
     },
 };
 
@@ -16,7 +16,7 @@ impl SimulatedUnit for SbgCodec {
         period_ns: 5_000_000,
         packets: 2,
         // An attitude of its own log is carried over one period.
-        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 2e-6, time_ns: 0 },
+        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 2e-6, time_ns: 0 },
     };
 
     fn send(s: &ImuSample, _: i64, by_angles: bool) -> Vec<u8> {

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 
 use super::{super::ImuCodec, CRC};
 use crate::{
-    framing::{Found, Framing, Look},
+    framing::{FoundPacket, Framing, PacketLook},
     imu::{
         axes::{SWAP, from_yaw_pitch_roll, unit},
         reading::{Reading, ReadingStamp},
@@ -25,7 +25,7 @@ impl Framing for VectorNavLines {
     // A '$' within a line ends it, so that no false beginning can swallow one.
     const WEAK: bool = false;
 
-    fn look(bytes: &[u8]) -> Look<()> {
+    fn look(bytes: &[u8]) -> PacketLook<()> {
         lines::look(bytes, b"VN")
     }
 
@@ -40,7 +40,7 @@ impl ImuCodec for VectorNavLines {
     const REMEDY: &'static str = "set its asynchronous output to VNYMR";
     const PROOF_PACKETS: usize = 2;
 
-    fn reading(&mut self, packet: &Found<'_, ()>) -> Option<Reading> {
+    fn reading(&mut self, packet: &FoundPacket<'_, ()>) -> Option<Reading> {
         Some(VectorNavLine::parse(packet.bytes)?.reading())
     }
 
@@ -130,7 +130,7 @@ mod tests {
         framing::Scanner,
         imu::{
             ImuDecoder, ImuFormat,
-            streams::{Simulated, SimulatedUnit, Tolerance, ned, world_of, yaw_pitch_roll},
+            streams::{FormatTolerance, Simulated, SimulatedUnit, ned, world_of, yaw_pitch_roll},
         },
     };
 
@@ -138,7 +138,7 @@ mod tests {
         const SENDS: Simulated = Simulated {
             period_ns: 5_000_000,
             packets: 1,
-            tolerance: Tolerance { rate: 1e-6, accel: 1e-3, attitude: 2e-5, time_ns: 1_000_000 },
+            tolerance: FormatTolerance { rate: 1e-6, accel: 1e-3, attitude: 2e-5, time_ns: 1_000_000 },
         };
 
         fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {

@@ -16,7 +16,7 @@ use glam::DVec3;
 use self::layout::{MAX_PACKET, PacketField, PacketHeader, PacketLayout, SYNC};
 use super::ImuCodec;
 use crate::{
-    framing::{Found, Framing, Look},
+    framing::{FoundPacket, Framing, PacketLook},
     imu::{
         axes::{SWAP, from_yaw_pitch_roll, rotation, vector},
         reading::{Reading, ReadingStamp},
@@ -37,11 +37,11 @@ impl Framing for VectorNavCodec {
     const MAX_BYTES: usize = MAX_PACKET;
     const WEAK: bool = false;
 
-    fn look(bytes: &[u8]) -> Look<PacketLayout> {
+    fn look(bytes: &[u8]) -> PacketLook<PacketLayout> {
         match PacketLayout::parse(bytes) {
-            PacketHeader::Incomplete => Look::Incomplete,
-            PacketHeader::Invalid => Look::Invalid,
-            PacketHeader::Valid(layout) => Look::Packet { head: layout, bytes: layout.packet_bytes() },
+            PacketHeader::Incomplete => PacketLook::Incomplete,
+            PacketHeader::Invalid => PacketLook::Invalid,
+            PacketHeader::Valid(layout) => PacketLook::Packet { head: layout, bytes: layout.packet_bytes() },
         }
     }
 
@@ -56,7 +56,7 @@ impl ImuCodec for VectorNavCodec {
     const REMEDY: &'static str = "add it to its binary output (common group, bits 0, 5 and 8)";
     const PROOF_PACKETS: usize = 2;
 
-    fn reading(&mut self, packet: &Found<'_, PacketLayout>) -> Option<Reading> {
+    fn reading(&mut self, packet: &FoundPacket<'_, PacketLayout>) -> Option<Reading> {
         Some(VectorNavPacket::decode(packet.bytes, &packet.head).reading())
     }
 

@@ -6,15 +6,15 @@ use proptest::prelude::*;
 
 use super::{CRC, CommonOutput, VectorNavCodec, VectorNavPacket, layout::MAX_PACKET};
 use crate::{
-    framing::{CHUNK, Framing as _, Look, Scanner, intact_places},
-    imu::streams::{Simulated, SimulatedUnit, Tolerance},
+    framing::{CHUNK, Framing as _, PacketLook, Scanner, intact_places},
+    imu::streams::{FormatTolerance, Simulated, SimulatedUnit},
 };
 
 impl SimulatedUnit for VectorNavCodec {
     const SENDS: Simulated = Simulated {
         period_ns: 5_000_000,
         packets: 1,
-        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
+        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
     };
 
     fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {
@@ -155,7 +155,7 @@ fn a_chance_packet_costs_none_within_it_however_the_bytes_come() {
     let chance = bytes.len();
     bytes.extend([0xfa, 0x05, 0x31, 0x01, 0x01, 0x02]);
     bytes.extend(stream(2..4));
-    let Look::Packet { bytes: length, .. } = VectorNavCodec::look(&bytes[chance..]) else {
+    let PacketLook::Packet { bytes: length, .. } = VectorNavCodec::look(&bytes[chance..]) else {
         panic!("a header")
     };
     bytes.truncate(chance + length - 2);

@@ -7,7 +7,7 @@ use crate::{
     imu::{
         ImuDecoder, ImuFormat,
         streams::{
-            G, Simulated, SimulatedUnit, Tolerance, i16s as words, rfu, world_of, wxyz, yaw_pitch_roll,
+            FormatTolerance, G, Simulated, SimulatedUnit, i16s as words, rfu, world_of, wxyz, yaw_pitch_roll,
         },
     },
 };
@@ -16,7 +16,7 @@ impl SimulatedUnit for WitmotionCodec {
     const SENDS: Simulated = Simulated {
         period_ns: 10_000_000,
         packets: 5,
-        tolerance: Tolerance { rate: 6e-4, accel: 0.003, attitude: 8e-5, time_ns: 1_000_000 },
+        tolerance: FormatTolerance { rate: 6e-4, accel: 0.003, attitude: 8e-5, time_ns: 1_000_000 },
     };
 
     fn send(s: &ImuSample, _: i64, by_angles: bool) -> Vec<u8> {

@@ -9,7 +9,7 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{Simulated, SimulatedUnit, Tolerance, be, world_of, wxyz},
+        streams::{FormatTolerance, Simulated, SimulatedUnit, be, world_of, wxyz},
     },
 };
 
@@ -17,7 +17,7 @@ impl SimulatedUnit for XsensCodec {
     const SENDS: Simulated = Simulated {
         period_ns: 5_000_000,
         packets: 1,
-        tolerance: Tolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
+        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
     };
 
     fn send(s: &ImuSample, n: i64, _: bool) -> Vec<u8> {

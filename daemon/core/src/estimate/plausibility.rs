@@ -1,15 +1,19 @@
-//! Whether what the inertial unit says can be so.
+//! Whether the samples of an inertial unit can be true: the one definition, with one set of limits, for the port that tells of a
+//! unit that fails and for the orientation that leaves its samples out.
 
 use std::fmt;
 
-use bowwave_core::{event::ImuSample, time::Time};
+use crate::{event::ImuSample, time::Time};
 
-/// After this long one is sure: before the 300 ms within which the sailor is to be told.
+/// What repeats or stands still for this long does so for good: the noise of any sensor changes its last digits within a few
+/// samples, and the sailor is to be told within 300 ms.
 const SURE_NS: i64 = 250_000_000;
-/// Fewer samples than this say nothing, however long they take.
+/// Fewer samples than this say nothing, however long they take: two that are alike on both sides of a gap are no evidence.
 const SAMPLES_MIN: u32 = 5;
 /// No good sample for this long while bad ones come.
 const BAD_NS: i64 = 150_000_000;
+/// Angular rate beyond which a sample is impossible, rad/s (4000 deg/s: twice what gun-mount units measure).
+const RATE_MAX: f64 = 70.0;
 /// Rates beyond this may be a sensor's end stop (the smallest usual range is 250 deg/s), rad/s.
 const RAIL_RATE: f64 = 4.0;
 /// Specific forces beyond this may be a sensor's end stop (the smallest usual range is 2 g), m/s^2.
@@ -17,9 +21,9 @@ const RAIL_ACCEL: f64 = 19.0;
 /// How still a sensor at its end stop is, although the unit compensates bias and temperature, relative.
 const RAIL_STILL: f64 = 1e-3;
 
-/// What is wrong with the samples.
+/// Reasons why samples cannot be true.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Insane {
+pub enum Implausible {
     /// Numbers that are none.
     NotFinite,
     /// The fields that the trainer needs are missing.
@@ -37,7 +41,7 @@ pub(super) enum Insane {
     },
 }
 
-impl fmt::Display for Insane {
+impl fmt::Display for Implausible {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFinite => f.write_str("it sends numbers that are not finite; power-cycle it"),
@@ -55,13 +59,13 @@ impl fmt::Display for Insane {
 
 /// Since when something has been as it is.
 #[derive(Clone, Copy, Debug)]
-struct Run {
+struct Standstill {
     value: f64,
     since: Time,
     samples: u32,
 }
 
-impl Run {
+impl Standstill {
     const fn new(value: f64, since: Time) -> Self {
         Self { value, since, samples: 1 }
     }
@@ -80,18 +84,23 @@ impl Run {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Seen {
+struct SampleHistory {
     sample: ImuSample,
-    same: Run,
-    clock: Run,
-    axes: [Run; 6],
+    same: Standstill,
+    clock: Standstill,
+    axes: [Standstill; 6],
 }
 
 /// Looks at every sample. Time is the samples' arrival.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sanity {
-    seen: Option<Seen>,
-    bad_since: Option<(Time, Insane)>,
+pub struct Plausibility {
+    seen: Option<SampleHistory>,
+    bad_since: Option<(Time, Implausible)>,
+}
+
+/// Whether the numbers of a sample are ones that a unit can measure.
+pub fn is_possible(sample: &ImuSample) -> bool {
+    sample.is_finite() && sample.rate.abs().max_element() <= RATE_MAX
 }
 
 const AXES: [&str; 6] = ["rate x", "rate y", "rate z", "acceleration x", "acceleration y", "acceleration z"];
@@ -101,24 +110,24 @@ fn axes(sample: &ImuSample) -> [f64; 6] {
     [r.x, r.y, r.z, a.x, a.y, a.z]
 }
 
-impl Sanity {
+impl Plausibility {
     /// A sample whose numbers are finite.
-    pub(super) fn sample(&mut self, sample: &ImuSample) {
+    pub fn sample(&mut self, sample: &ImuSample) {
         self.bad_since = None;
         let now = sample.arrival;
         let values = axes(sample);
         let Some(seen) = &mut self.seen else {
-            self.seen = Some(Seen {
+            self.seen = Some(SampleHistory {
                 sample: *sample,
-                same: Run::new(0.0, now),
-                clock: Run::new(0.0, now),
-                axes: values.map(|v| Run::new(v, now)),
+                same: Standstill::new(0.0, now),
+                clock: Standstill::new(0.0, now),
+                axes: values.map(|v| Standstill::new(v, now)),
             });
             return;
         };
         let last = std::mem::replace(&mut seen.sample, *sample);
-        let same = (last.rate, last.accel, last.world_from_imu)
-            == (sample.rate, sample.accel, sample.world_from_imu);
+        // Rate and force alone: the attitude may be carried on by rates that are stuck themselves.
+        let same = (last.rate, last.accel) == (sample.rate, sample.accel);
         seen.same.take(0.0, now, same);
         seen.clock.take(0.0, now, last.device_time_ns == sample.device_time_ns);
         for (run, value) in seen.axes.iter_mut().zip(values) {
@@ -128,17 +137,22 @@ impl Sanity {
     }
 
     /// A packet at `now` that gave no sample.
-    pub(super) fn bad(&mut self, now: Time, why: Insane) {
+    pub fn bad(&mut self, now: Time, why: Implausible) {
         self.bad_since.get_or_insert((now, why));
     }
 
     /// The line was interrupted: what was the same before says nothing.
-    pub(super) fn forget(&mut self) {
+    pub fn forget(&mut self) {
         *self = Self::default();
     }
 
+    /// Whether the newest sample repeats the very same rate and force as for some time before.
+    pub fn is_stuck(&self) -> bool {
+        self.seen.is_some_and(|seen| seen.same.sure(seen.sample.arrival))
+    }
+
     /// What is wrong, by what came until `now`.
-    pub(super) fn verdict(&self, now: Time) -> Option<Insane> {
+    pub fn verdict(&self, now: Time) -> Option<Implausible> {
         if let Some((since, why)) = self.bad_since
             && now.ns_since(since) >= BAD_NS
         {
@@ -147,15 +161,15 @@ impl Sanity {
         let seen = self.seen?;
         let last = seen.sample.arrival;
         if seen.same.sure(last) {
-            return Some(Insane::Stuck);
+            return Some(Implausible::Stuck);
         }
         if seen.clock.sure(last) {
-            return Some(Insane::ClockStopped);
+            return Some(Implausible::ClockStopped);
         }
         seen.axes.iter().zip(AXES).enumerate().find_map(|(i, (run, axis))| {
             let rail = if i < 3 { RAIL_RATE } else { RAIL_ACCEL };
             (run.value.abs() >= rail && run.sure(last))
-                .then_some(Insane::Saturated { axis, value: run.value })
+                .then_some(Implausible::Saturated { axis, value: run.value })
         })
     }
 }
@@ -183,11 +197,11 @@ mod tests {
     }
 
     /// When a verdict comes, in samples of 5 ms, if it does within a second.
-    fn verdict_after(samples: impl Fn(i64) -> ImuSample) -> Option<(i64, Insane)> {
-        let mut sanity = Sanity::default();
+    fn verdict_after(samples: impl Fn(i64) -> ImuSample) -> Option<(i64, Implausible)> {
+        let mut plausibility = Plausibility::default();
         (0..200).find_map(|n| {
-            sanity.sample(&samples(n));
-            sanity.verdict(Time::from_ns(n * 5 * MS)).map(|v| (n, v))
+            plausibility.sample(&samples(n));
+            plausibility.verdict(Time::from_ns(n * 5 * MS)).map(|v| (n, v))
         })
     }
 
@@ -204,53 +218,68 @@ mod tests {
     #[test]
     fn the_same_numbers_again_are_noticed_within_300_ms() {
         let (n, what) = verdict_after(|n| sample(n, noise(1), noise(2))).expect("stuck");
-        assert_eq!(what, Insane::Stuck);
+        assert_eq!(what, Implausible::Stuck);
         assert!((50..60).contains(&n), "{n}");
+        // An attitude that stuck rates carry on is no sign of life.
+        let carried = |n: i64| ImuSample {
+            world_from_imu: Some(glam::DQuat::from_rotation_z(0.001 * n as f64)),
+            ..sample(n, noise(1), noise(2))
+        };
+        assert_eq!(verdict_after(carried), Some((n, Implausible::Stuck)));
+    }
+
+    #[test]
+    fn impossible_numbers_are_known_by_themselves() {
+        let good = sample(0, noise(1), noise(2));
+        assert!(is_possible(&good));
+        for rate in [DVec3::NAN, DVec3::Y * -100.0] {
+            assert!(!is_possible(&ImuSample { rate, ..good }));
+        }
     }
 
     #[test]
     fn a_clock_that_stands_is_noticed() {
         let still = |n| ImuSample { device_time_ns: 17, ..sample(n, noise(n), noise(n + 1)) };
-        assert_eq!(verdict_after(still).map(|v| v.1), Some(Insane::ClockStopped));
+        assert_eq!(verdict_after(still).map(|v| v.1), Some(Implausible::ClockStopped));
     }
 
     #[test]
     fn an_end_stop_is_noticed_and_left_again() {
         let railed = |n: i64| sample(n, noise(n) + DVec3::Y * (34.9 - noise(n).y), noise(n));
         let (n, what) = verdict_after(railed).expect("saturated");
-        assert!(matches!(what, Insane::Saturated { axis: "rate y", .. }), "{what}");
+        assert!(matches!(what, Implausible::Saturated { axis: "rate y", .. }), "{what}");
         assert!(n < 60, "{n}");
-        let mut sanity = Sanity::default();
-        (0..100).for_each(|n| sanity.sample(&railed(n)));
-        assert!(sanity.verdict(Time::from_ns(500 * MS)).is_some());
-        sanity.sample(&sample(100, noise(5), noise(6)));
-        assert_eq!(sanity.verdict(Time::from_ns(505 * MS)), None);
+        let mut plausibility = Plausibility::default();
+        (0..100).for_each(|n| plausibility.sample(&railed(n)));
+        assert!(plausibility.verdict(Time::from_ns(500 * MS)).is_some());
+        plausibility.sample(&sample(100, noise(5), noise(6)));
+        assert_eq!(plausibility.verdict(Time::from_ns(505 * MS)), None);
         let shaken = |n: i64| sample(n, noise(n), noise(n) + DVec3::X * (-156.0 + noise(n).x));
-        assert!(matches!(verdict_after(shaken), Some((_, Insane::Saturated { axis: "acceleration x", .. }))));
+        assert!(matches!(verdict_after(shaken), Some((_, Implausible::Saturated { axis: "acceleration x", .. }))));
     }
 
     #[test]
     fn one_bad_packet_is_none_and_many_are() {
-        let mut sanity = Sanity::default();
+        let mut plausibility = Plausibility::default();
         let at = |ms: i64| Time::from_ns(ms * MS);
-        sanity.bad(at(0), Insane::NotFinite);
-        assert_eq!(sanity.verdict(at(100)), None);
-        sanity.sample(&sample(22, noise(1), noise(2)));
-        assert_eq!(sanity.verdict(at(400)), None, "a good one between");
+        plausibility.bad(at(0), Implausible::NotFinite);
+        assert_eq!(plausibility.verdict(at(100)), None);
+        plausibility.sample(&sample(22, noise(1), noise(2)));
+        assert_eq!(plausibility.verdict(at(400)), None, "a good one between");
         for ms in (400..600).step_by(5) {
-            sanity.bad(at(ms), Insane::NotFinite);
+            plausibility.bad(at(ms), Implausible::NotFinite);
         }
-        assert_eq!(sanity.verdict(at(600)), Some(Insane::NotFinite));
-        sanity.sample(&sample(121, noise(3), noise(4)));
-        assert_eq!(sanity.verdict(at(606)), None);
+        assert_eq!(plausibility.verdict(at(600)), Some(Implausible::NotFinite));
+        plausibility.sample(&sample(121, noise(3), noise(4)));
+        assert_eq!(plausibility.verdict(at(606)), None);
     }
 
     #[test]
     fn a_gap_is_no_evidence() {
-        let mut sanity = Sanity::default();
-        (0..10).for_each(|_| sanity.sample(&sample(0, noise(1), noise(2))));
-        sanity.forget();
-        sanity.sample(&sample(1000, noise(1), noise(2)));
-        assert_eq!(sanity.verdict(Time::from_ns(5000 * MS)), None);
+        let mut plausibility = Plausibility::default();
+        (0..10).for_each(|_| plausibility.sample(&sample(0, noise(1), noise(2))));
+        plausibility.forget();
+        plausibility.sample(&sample(1000, noise(1), noise(2)));
+        assert_eq!(plausibility.verdict(Time::from_ns(5000 * MS)), None);
     }
 }

@@ -1,4 +1,4 @@
-//! One input line with its edges.
+//! One line: an input with its edges, or an output.
 
 use std::{
     error::Error as _,
@@ -8,18 +8,18 @@ use std::{
 };
 
 use bowwave_core::time::Time;
-use gpio_cdev::{EventRequestFlags, EventType, LineEventHandle, LineRequestFlags};
+use gpio_cdev::{EventRequestFlags, EventType, LineEventHandle, LineHandle, LineRequestFlags};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 
-use super::chips::{self, TriggerError, place_again};
+use super::chip::{self, GpioError, PlacedLine, place_again};
 use crate::clock;
 
-/// What the kernel tells of who uses a line.
-pub(crate) const CONSUMER: &str = "bowwave";
+/// Name under which the kernel lists the user of a line.
+pub(super) const CONSUMER: &str = "bowwave";
 
-/// What holds an input where nothing drives it.
+/// Bias of an input where nothing drives it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Bias {
+pub enum LineBias {
     /// As it is set up: by the board, or outside.
     #[default]
     AsIs,
@@ -42,26 +42,25 @@ pub struct InputLine {
     /// Active is low, as with a switch to ground.
     pub active_low: bool,
     /// What holds it.
-    pub bias: Bias,
+    pub bias: LineBias,
 }
 
 impl InputLine {
-    pub(super) fn flags(&self) -> LineRequestFlags {
+    fn flags(&self) -> LineRequestFlags {
         // GPIOHANDLE_REQUEST_BIAS_* of linux/gpio.h (Linux 5.5 and newer), which the crate does not name.
         let bias = match self.bias {
-            Bias::AsIs => 0,
-            Bias::PullUp => 1 << 5,
-            Bias::PullDown => 1 << 6,
-            Bias::Disabled => 1 << 7,
+            LineBias::AsIs => 0,
+            LineBias::PullUp => 1 << 5,
+            LineBias::PullDown => 1 << 6,
+            LineBias::Disabled => 1 << 7,
         };
-        let level = if self.active_low { LineRequestFlags::ACTIVE_LOW } else { LineRequestFlags::empty() };
-        LineRequestFlags::INPUT | level | LineRequestFlags::from_bits_retain(bias)
+        LineRequestFlags::INPUT | polarity(self.active_low) | LineRequestFlags::from_bits_retain(bias)
     }
 }
 
 /// An edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Edge {
+pub(crate) struct GpioEdge {
     /// The kernel's time.
     pub time: Time,
     /// The level that it brought.
@@ -70,7 +69,7 @@ pub(super) struct Edge {
 
 /// An open input line.
 #[derive(Debug)]
-pub(super) struct Input {
+pub(crate) struct InputHandle {
     handle: LineEventHandle,
     node: PathBuf,
     label: String,
@@ -78,12 +77,12 @@ pub(super) struct Input {
     asked: Time,
 }
 
-impl Input {
+impl InputHandle {
     /// Opens the line for both edges. Where its chip is `known` by its label from before, it is on that one or nowhere.
-    pub(super) fn open(dev: &Path, wanted: &InputLine, known: Option<&str>) -> Result<Self, TriggerError> {
+    pub(crate) fn open(dev: &Path, wanted: &InputLine, known: Option<&str>) -> Result<Self, GpioError> {
         let placed = place_again(dev, &wanted.chip, &wanted.line, known)?;
         let (node, offset) = (placed.node.clone(), placed.offset);
-        let failed = |source| chips::request_error(&placed, source);
+        let failed = |source| chip::request_error(&placed, source);
         let asked = clock::now();
         let handle = placed
             .line()
@@ -91,31 +90,31 @@ impl Input {
             .map_err(failed)?;
         let flags = fcntl_getfl(&handle).unwrap_or(OFlags::empty()) | OFlags::NONBLOCK;
         fcntl_setfl(&handle, flags)
-            .map_err(|e| TriggerError::Io { node: node.clone(), source: io::Error::from(e) })?;
+            .map_err(|e| GpioError::Io { node: node.clone(), source: io::Error::from(e) })?;
         Ok(Self { handle, node, label: placed.chip.label().to_owned(), offset, asked })
     }
 
     /// When the line was asked for: no edge of it is older.
-    pub(super) const fn asked(&self) -> Time {
+    pub(crate) const fn asked(&self) -> Time {
         self.asked
     }
 
     /// What the maker calls its chip.
-    pub(super) fn label(&self) -> &str {
+    pub(crate) fn label(&self) -> &str {
         &self.label
     }
 
     /// The next edge that waits, if one does.
-    pub(super) fn edge(&mut self) -> Result<Option<Edge>, TriggerError> {
+    pub(crate) fn edge(&mut self) -> Result<Option<GpioEdge>, GpioError> {
         match self.handle.next() {
-            Some(Ok(event)) => Ok(Some(Edge {
+            Some(Ok(event)) => Ok(Some(GpioEdge {
                 // A time beyond 292 years is no time since start-up: the check of the clock refuses it.
                 time: Time::from_ns(i64::try_from(event.timestamp()).unwrap_or(i64::MAX)),
                 active: event.event_type() == EventType::RisingEdge,
             })),
             Some(Err(e)) if would_block(&e) => Ok(None),
             Some(Err(source)) => Err(self.lost(source)),
-            None => Err(TriggerError::Io {
+            None => Err(GpioError::Io {
                 node: self.node.clone(),
                 source: io::Error::new(io::ErrorKind::UnexpectedEof, "half an edge"),
             }),
@@ -123,22 +122,44 @@ impl Input {
     }
 
     /// The line's level, and when it was read.
-    pub(super) fn level(&self) -> Result<(Time, bool), TriggerError> {
+    pub(crate) fn level(&self) -> Result<(Time, bool), GpioError> {
         match self.handle.get_value() {
             Ok(value) => Ok((clock::now(), value != 0)),
             Err(source) => Err(self.lost(source)),
         }
     }
 
-    fn lost(&self, source: gpio_cdev::Error) -> TriggerError {
-        TriggerError::Line { node: self.node.clone(), offset: self.offset, source }
+    fn lost(&self, source: gpio_cdev::Error) -> GpioError {
+        GpioError::Line { node: self.node.clone(), offset: self.offset, source }
     }
 }
 
-impl AsFd for Input {
+impl AsFd for InputHandle {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.handle.as_fd()
     }
+}
+
+/// An output line.
+#[derive(Debug)]
+pub(crate) struct OutputHandle(LineHandle);
+
+impl OutputHandle {
+    /// Asks for the line as an output, not active: the default is a logical value.
+    pub(crate) fn open(placed: &PlacedLine, active_low: bool, consumer: &str) -> Result<Self, GpioError> {
+        let flags = LineRequestFlags::OUTPUT | polarity(active_low);
+        let handle = placed.line().and_then(|line| line.request(flags, 0, consumer));
+        handle.map(Self).map_err(|e| chip::request_error(placed, e))
+    }
+
+    /// Sets whether it is active.
+    pub(crate) fn set(&self, active: bool) -> Result<(), gpio_cdev::Error> {
+        self.0.set_value(active.into())
+    }
+}
+
+fn polarity(active_low: bool) -> LineRequestFlags {
+    if active_low { LineRequestFlags::ACTIVE_LOW } else { LineRequestFlags::empty() }
 }
 
 fn would_block(error: &gpio_cdev::Error) -> bool {
@@ -158,7 +179,7 @@ mod tests {
 
     #[test]
     fn an_input_is_never_asked_to_be_an_output() {
-        for bias in [Bias::AsIs, Bias::PullUp, Bias::PullDown, Bias::Disabled] {
+        for bias in [LineBias::AsIs, LineBias::PullUp, LineBias::PullDown, LineBias::Disabled] {
             for active_low in [false, true] {
                 let line = InputLine { chip: String::new(), line: String::new(), active_low, bias };
                 let flags = line.flags();

@@ -1,4 +1,4 @@
-//! What a switch does, out of the edges that its contacts make.
+//! Changes of a switch, out of the edges that its contacts make.
 
 use bowwave_core::time::Time;
 

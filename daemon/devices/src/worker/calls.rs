@@ -8,7 +8,7 @@ use std::{
 
 use bowwave_core::time::Time;
 
-use crate::{clock, report::Reporter};
+use crate::{clock, worker::report::Reporter};
 
 /// How often a sign of life is given.
 const LOOK: Duration = Duration::from_millis(50);
@@ -60,7 +60,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::report::reporting;
+    use crate::worker::report::reporting;
 
     const MS: i64 = 1_000_000;
 

@@ -40,9 +40,9 @@ pub struct ChipInfo {
     pub lines: Vec<LineInfo>,
 }
 
-/// Why the trigger line cannot be watched.
+/// Reasons why a line cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum TriggerError {
+pub enum GpioError {
     /// No such chip.
     #[error("no GPIO chip {}: chips here: {present}; name one that is there", node.display())]
     NotFound {
@@ -78,7 +78,7 @@ pub enum TriggerError {
         present: String,
     },
     /// Somebody else uses the line.
-    #[error("line {line} of {} is in use by {consumer}: free it there, or wire the trigger to another", node.display())]
+    #[error("line {line} of {} is in use by {consumer}: free it there, or wire to another line", node.display())]
     LineInUse {
         /// The chip.
         node: PathBuf,
@@ -136,47 +136,12 @@ pub enum TriggerError {
         /// What the GPIO layer says.
         source: gpio_cdev::Error,
     },
-    /// The window is too short for contacts, or too long for a finger.
-    #[error("a debounce of {ms} ms is out of range: give 10 to 20")]
-    Debounce {
-        /// What was asked for.
-        ms: u128,
-    },
-    /// The time is no time that a belt takes.
-    #[error("a trigger that is stuck after {s} s is out of range: give 1 to 3600")]
-    StuckAfter {
-        /// What was asked for.
-        s: f64,
-    },
-    /// One line for two things.
-    #[error("{name} and {other} are both line {line} of {chip}: give each its own")]
-    SameLine {
-        /// The one.
-        name: &'static str,
-        /// The other.
-        other: &'static str,
-        /// The chip.
-        chip: String,
-        /// The line.
-        line: String,
-    },
     /// Edges carry no monotonic time.
     #[error("Linux {release} dates GPIO edges by the wall clock: Linux 5.7 or newer is needed")]
     Clock {
         /// The kernel's release.
         release: String,
     },
-    /// The thread could not be started.
-    #[error("cannot start the thread that watches the trigger: {0}; are too many processes running?")]
-    Thread(#[source] io::Error),
-    /// The thread panicked: a defect of this program.
-    #[error("the thread that watches the trigger broke down: report it with the log")]
-    BrokeDown,
-    /// A kernel call of the thread does not return.
-    #[error(
-        "a kernel call on the trigger's chip does not return: its thread is left behind; look at the kernel's log (dmesg)"
-    )]
-    Blocked,
     /// The kernel reports something else.
     #[error("cannot open {}: {source}; look at the kernel's log (dmesg)", node.display())]
     Io {
@@ -188,38 +153,34 @@ pub enum TriggerError {
 }
 
 /// Every GPIO chip of this computer: its lines, or why it cannot be opened.
-pub fn list() -> Vec<Result<ChipInfo, TriggerError>> {
+pub fn list() -> Vec<Result<ChipInfo, GpioError>> {
     let dev = Path::new("/dev");
     match nodes::numbered(dev, "gpiochip") {
         Ok(nodes) => nodes.iter().map(|node| describe(dev, node)).collect(),
-        Err(source) => vec![Err(TriggerError::Io { node: dev.to_owned(), source })],
+        Err(source) => vec![Err(GpioError::Io { node: dev.to_owned(), source })],
     }
 }
 
 /// Whether `line` (a name or a number) of the chip at `node` is there and free, and its level. The line is neither turned
 /// round nor changed.
-pub fn check(node: &Path, line: &str) -> Result<LineInfo, TriggerError> {
+pub fn check(node: &Path, line: &str) -> Result<LineInfo, GpioError> {
     check_in(Path::new("/dev"), node, line)
 }
 
-fn check_in(dev: &Path, node: &Path, line: &str) -> Result<LineInfo, TriggerError> {
+fn check_in(dev: &Path, node: &Path, line: &str) -> Result<LineInfo, GpioError> {
     let info = find_line(&describe(dev, node)?, line)?;
     let placed = PlacedLine { node: node.to_owned(), offset: info.offset, chip: open(dev, node)? };
     // Asked for neither as an input nor as an output, a line stays what it is.
-    let handle = placed.line().and_then(|l| l.request(LineRequestFlags::empty(), 0, super::input::CONSUMER));
+    let handle = placed.line().and_then(|l| l.request(LineRequestFlags::empty(), 0, super::line::CONSUMER));
     let value = handle.and_then(|handle| handle.get_value()).map_err(|e| request_error(&placed, e))?;
     Ok(LineInfo { high: Some(value != 0), ..info })
 }
 
 /// Whether the kernel dates edges by `CLOCK_MONOTONIC`, as it does since Linux 5.7.
-pub fn clock_is_monotonic() -> Result<(), TriggerError> {
+pub fn clock_is_monotonic() -> Result<(), GpioError> {
     let uname = rustix::system::uname();
     let release = uname.release().to_string_lossy();
-    if monotonic_since(&release) {
-        Ok(())
-    } else {
-        Err(TriggerError::Clock { release: release.into_owned() })
-    }
+    if monotonic_since(&release) { Ok(()) } else { Err(GpioError::Clock { release: release.into_owned() }) }
 }
 
 fn monotonic_since(release: &str) -> bool {
@@ -250,7 +211,7 @@ impl PlacedLine {
 }
 
 /// Finds `line` (a name or a number) on `chip` (a node, a label or a name), whoever uses it.
-pub(crate) fn place(dev: &Path, chip: &str, line: &str) -> Result<PlacedLine, TriggerError> {
+pub(crate) fn place(dev: &Path, chip: &str, line: &str) -> Result<PlacedLine, GpioError> {
     let (node, chip) = find_chip(dev, chip)?;
     let offset = match line.parse::<u32>().ok().filter(|offset| *offset < chip.num_lines()) {
         // A number may also be a name; names come first.
@@ -271,7 +232,7 @@ pub(crate) fn place_again(
     chip: &str,
     line: &str,
     known: Option<&str>,
-) -> Result<PlacedLine, TriggerError> {
+) -> Result<PlacedLine, GpioError> {
     match known {
         None => place(dev, chip, line),
         Some(known) => on_known(chip, known, |chip| {
@@ -287,11 +248,11 @@ pub(crate) fn place_again(
 fn on_known<T>(
     chip: &str,
     known: &str,
-    find: impl Fn(&str) -> Result<(T, String), TriggerError>,
-) -> Result<T, TriggerError> {
+    find: impl Fn(&str) -> Result<(T, String), GpioError>,
+) -> Result<T, GpioError> {
     let why = match find(chip) {
         Ok((found, label)) if label == known => return Ok(found),
-        Ok((_, found)) => TriggerError::OtherChip { chip: chip.to_owned(), known: known.to_owned(), found },
+        Ok((_, found)) => GpioError::OtherChip { chip: chip.to_owned(), known: known.to_owned(), found },
         Err(e) => e,
     };
     if chip == known {
@@ -308,14 +269,14 @@ fn find_name(chip: &Chip, name: &str) -> Option<u32> {
     chip.lines().find(|l| l.info().is_ok_and(|info| info.name() == Some(name))).map(|l| l.offset())
 }
 
-fn find_chip(dev: &Path, wanted: &str) -> Result<(PathBuf, Chip), TriggerError> {
+fn find_chip(dev: &Path, wanted: &str) -> Result<(PathBuf, Chip), GpioError> {
     if wanted.starts_with('/') {
         let node = PathBuf::from(wanted);
         let chip = open(dev, &node)?;
         return Ok((node, chip));
     }
-    let nodes = nodes::numbered(dev, "gpiochip")
-        .map_err(|source| TriggerError::Io { node: dev.to_owned(), source })?;
+    let nodes =
+        nodes::numbered(dev, "gpiochip").map_err(|source| GpioError::Io { node: dev.to_owned(), source })?;
     let mut present = Vec::new();
     let mut found = Vec::new();
     for node in nodes {
@@ -328,28 +289,26 @@ fn find_chip(dev: &Path, wanted: &str) -> Result<(PathBuf, Chip), TriggerError> 
     // The wrong chip's line read as an interlock would arm a gun that is not inert.
     if found.len() > 1 {
         let present = nodes::listed(found.iter().map(|(node, _)| node.display().to_string()));
-        return Err(TriggerError::ChipsAlike { chip: wanted.to_owned(), present });
+        return Err(GpioError::ChipsAlike { chip: wanted.to_owned(), present });
     }
-    found
-        .pop()
-        .ok_or_else(|| TriggerError::NoChip { chip: wanted.to_owned(), present: nodes::listed(present) })
+    found.pop().ok_or_else(|| GpioError::NoChip { chip: wanted.to_owned(), present: nodes::listed(present) })
 }
 
 /// Why a line that is there cannot be had.
-pub(crate) fn request_error(placed: &PlacedLine, source: gpio_cdev::Error) -> TriggerError {
+pub(crate) fn request_error(placed: &PlacedLine, source: gpio_cdev::Error) -> GpioError {
     let info = placed.line().and_then(|line| line.info());
     match info {
-        Ok(info) if info.is_kernel() => TriggerError::LineInUse {
+        Ok(info) if info.is_kernel() => GpioError::LineInUse {
             node: placed.node.clone(),
             line: placed.offset.to_string(),
             consumer: info.consumer().unwrap_or("the kernel").to_owned(),
         },
-        _ => TriggerError::Request { node: placed.node.clone(), offset: placed.offset, source },
+        _ => GpioError::Request { node: placed.node.clone(), offset: placed.offset, source },
     }
 }
 
 /// The free line of `chip` that is called `line` or has that number.
-fn find_line(chip: &ChipInfo, line: &str) -> Result<LineInfo, TriggerError> {
+fn find_line(chip: &ChipInfo, line: &str) -> Result<LineInfo, GpioError> {
     let number = line.parse::<u32>().ok();
     let found = chip
         .lines
@@ -357,13 +316,13 @@ fn find_line(chip: &ChipInfo, line: &str) -> Result<LineInfo, TriggerError> {
         .find(|l| l.name.as_deref() == Some(line))
         .or_else(|| chip.lines.iter().find(|l| Some(l.offset) == number));
     match found {
-        None => Err(TriggerError::NoLine {
+        None => Err(GpioError::NoLine {
             node: chip.node.clone(),
             line: line.to_owned(),
             last: chip.lines.last().map_or(0, |l| l.offset),
             present: nodes::listed(chip.lines.iter().filter_map(|l| l.name.clone())),
         }),
-        Some(found) if found.used => Err(TriggerError::LineInUse {
+        Some(found) if found.used => Err(GpioError::LineInUse {
             node: chip.node.clone(),
             line: line.to_owned(),
             consumer: found.consumer.clone().unwrap_or_else(|| "the kernel".to_owned()),
@@ -372,12 +331,12 @@ fn find_line(chip: &ChipInfo, line: &str) -> Result<LineInfo, TriggerError> {
     }
 }
 
-fn describe(dev: &Path, node: &Path) -> Result<ChipInfo, TriggerError> {
+fn describe(dev: &Path, node: &Path) -> Result<ChipInfo, GpioError> {
     let chip = open(dev, node)?;
     let lines = chip
         .lines()
         .map(|line| {
-            let info = line.info().map_err(|source| TriggerError::Line {
+            let info = line.info().map_err(|source| GpioError::Line {
                 node: node.to_owned(),
                 offset: line.offset(),
                 source,
@@ -401,19 +360,19 @@ fn describe(dev: &Path, node: &Path) -> Result<ChipInfo, TriggerError> {
 }
 
 /// Opens the chip. The file is opened by itself first, because the GPIO crate does not tell what went wrong.
-fn open(dev: &Path, node: &Path) -> Result<Chip, TriggerError> {
+fn open(dev: &Path, node: &Path) -> Result<Chip, GpioError> {
     File::open(node).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => {
             let present = nodes::numbered(dev, "gpiochip").unwrap_or_default();
-            TriggerError::NotFound {
+            GpioError::NotFound {
                 node: node.to_owned(),
                 present: nodes::listed(present.iter().map(|p| p.display().to_string())),
             }
         }
-        io::ErrorKind::PermissionDenied => TriggerError::Permission { node: node.to_owned() },
-        _ => TriggerError::Io { node: node.to_owned(), source },
+        io::ErrorKind::PermissionDenied => GpioError::Permission { node: node.to_owned() },
+        _ => GpioError::Io { node: node.to_owned(), source },
     })?;
-    Chip::new(node).map_err(|source| TriggerError::NotAChip { node: node.to_owned(), source })
+    Chip::new(node).map_err(|source| GpioError::NotAChip { node: node.to_owned(), source })
 }
 
 #[cfg(test)]
@@ -451,7 +410,7 @@ mod tests {
     fn a_line_that_is_not_there_or_not_free_is_refused_in_words() {
         let message = find_line(&chip(), "FIRE").expect_err("not there").to_string();
         assert!(message.contains("no line FIRE") && message.contains("ID_SDA, TRIGGER"), "{message}");
-        assert!(matches!(find_line(&chip(), "3"), Err(TriggerError::NoLine { last: 2, .. })));
+        assert!(matches!(find_line(&chip(), "3"), Err(GpioError::NoLine { last: 2, .. })));
         let message = find_line(&chip(), "ID_SDA").expect_err("in use").to_string();
         assert!(message.contains("in use by i2c"), "{message}");
     }
@@ -463,8 +422,8 @@ mod tests {
         let message = check_in(dev.path(), &node, "1").expect_err("not there").to_string();
         assert!(message.contains("no GPIO chip") && message.contains("chips here: none"), "{message}");
         std::fs::write(&node, []).expect("file");
-        assert!(matches!(check_in(dev.path(), &node, "1"), Err(TriggerError::NotAChip { .. })));
-        assert!(matches!(check(Path::new("/dev/null"), "1"), Err(TriggerError::NotAChip { .. })));
+        assert!(matches!(check_in(dev.path(), &node, "1"), Err(GpioError::NotAChip { .. })));
+        assert!(matches!(check(Path::new("/dev/null"), "1"), Err(GpioError::NotAChip { .. })));
     }
 
     #[test]
@@ -477,18 +436,15 @@ mod tests {
     }
 
     /// Chips by what they are called: each as its label, or why it cannot be used.
-    fn again(chips: &[(&str, Result<&str, &str>)]) -> Result<String, TriggerError> {
+    fn again(chips: &[(&str, Result<&str, &str>)]) -> Result<String, GpioError> {
         on_known("/dev/gpiochip0", "pinctrl", |wanted| {
             let present = String::new();
             match chips.iter().find(|(name, _)| *name == wanted) {
                 Some((name, Ok(label))) => Ok(((*name).to_owned(), (*label).to_owned())),
-                Some((name, Err(line))) => Err(TriggerError::NoLine {
-                    node: name.into(),
-                    line: (*line).to_owned(),
-                    last: 7,
-                    present,
-                }),
-                None => Err(TriggerError::NoChip { chip: wanted.to_owned(), present }),
+                Some((name, Err(line))) => {
+                    Err(GpioError::NoLine { node: name.into(), line: (*line).to_owned(), last: 7, present })
+                }
+                None => Err(GpioError::NoChip { chip: wanted.to_owned(), present }),
             }
         })
     }
@@ -504,8 +460,8 @@ mod tests {
         }
         let message = again(&[(node, Ok("expander"))]).expect_err("another chip").to_string();
         assert!(message.contains("it was pinctrl") && message.contains("is expander"), "{message}");
-        assert!(matches!(again(&[(node, Err("17"))]), Err(TriggerError::NoLine { .. })));
-        assert!(matches!(again(&[]), Err(TriggerError::NoChip { chip, .. }) if chip == node));
+        assert!(matches!(again(&[(node, Err("17"))]), Err(GpioError::NoLine { .. })));
+        assert!(matches!(again(&[]), Err(GpioError::NoChip { chip, .. }) if chip == node));
         assert!(again(&[(label, Ok("another"))]).is_err(), "a name that is another's label");
     }
 
