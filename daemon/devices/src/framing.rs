@@ -29,7 +29,7 @@ pub struct LineCounters {
     pub skipped_bytes: u64,
 }
 
-/// What begins where a packet may begin.
+/// Reading of bytes where a packet may begin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PacketLook<Head> {
     /// More bytes are needed to tell.
@@ -38,7 +38,7 @@ pub(crate) enum PacketLook<Head> {
     Invalid,
     /// A packet that claims this many bytes, from its first to its last.
     Packet {
-        /// What its first bytes say.
+        /// Its head, of its first bytes.
         head: Head,
         /// Its length; never above [`Framing::MAX_BYTES`].
         bytes: usize,
@@ -52,7 +52,7 @@ pub(crate) fn byte_sum(bytes: &[u8]) -> u8 {
 
 /// How a format's packets are told from other bytes.
 pub(crate) trait Framing {
-    /// What tells one kind of packet from another, its length included.
+    /// Head of a packet: it tells one kind from another, its length included.
     type Head: Copy + PartialEq + std::fmt::Debug;
     /// The first byte of every packet.
     const SYNC: u8;
@@ -71,7 +71,7 @@ pub(crate) trait Framing {
 /// A packet in the stream.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FoundPacket<'a, Head> {
-    /// What its first bytes say.
+    /// Its head, of its first bytes.
     pub(crate) head: Head,
     /// The whole packet.
     pub(crate) bytes: &'a [u8],
@@ -104,7 +104,7 @@ impl<F: Framing> Scanner<F> {
         }
     }
 
-    /// What has been met so far. Bytes of a packet still incomplete are not counted yet.
+    /// Counts so far. Bytes of a packet still incomplete are not counted yet.
     pub(crate) const fn counters(&self) -> LineCounters {
         self.counters
     }

@@ -20,5 +20,4 @@ pub mod trigger;
 mod worker;
 
 pub use imu::formats::vectornav;
-pub(crate) use worker::queue;
-pub use worker::report;
+pub use worker::{queue, report};

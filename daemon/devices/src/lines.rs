@@ -31,7 +31,7 @@ pub(crate) fn look(bytes: &[u8], prefix: &[u8]) -> PacketLook<()> {
     if bytes.len() >= LINE_MAX_BYTES { PacketLook::Invalid } else { PacketLook::Incomplete }
 }
 
-/// What stands between `$` and `*`, where the two digits behind are its bytes' exclusive or.
+/// The text between `$` and `*`, where the two digits behind are its bytes' exclusive or.
 pub(crate) fn checked(line: &[u8]) -> Option<&str> {
     let (body, sum) = parts(line)?;
     (sum.len() == 2 && hex(sum)? == u32::from(xor(body.as_bytes()))).then_some(body)
@@ -47,7 +47,7 @@ pub(crate) fn xor(body: &[u8]) -> u8 {
     body.iter().fold(0, |sum, byte| sum ^ byte)
 }
 
-/// What stands between `$` and `*`, and the check sum behind, unchecked.
+/// The text between `$` and `*`, and the check sum behind, unchecked.
 pub(crate) fn parts(line: &[u8]) -> Option<(&str, &str)> {
     let text = std::str::from_utf8(line).ok()?.trim_end_matches(['\r', '\n']);
     text.strip_prefix('$')?.rsplit_once('*')

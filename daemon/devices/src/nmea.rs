@@ -57,14 +57,14 @@ impl NmeaSentence {
     }
 }
 
-/// What one line says of the ship.
+/// Measurement in one line of the ship's instruments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShipAttitude {
     /// The line.
     pub sentence: NmeaSentence,
     /// Time of the measurement, seconds of the UTC day, where the line tells it.
     pub utc_day_s: Option<f64>,
-    /// What it says.
+    /// The measurement.
     pub sample: ShipSample,
 }
 
@@ -104,7 +104,7 @@ impl ShipParser {
         self.quality = PsxnQuality::default();
     }
 
-    /// What the next line says that says something, of bytes that arrived together at `arrival`. Bytes are taken from the front of
+    /// The measurement in the next line that has one, of bytes that arrived together at `arrival`. Bytes are taken from the front of
     /// `input` as far as they are needed; `None`: they are used up.
     pub fn next_line(&mut self, input: &mut &[u8], arrival: Time) -> Option<ShipAttitude> {
         let Self { scanner, quality } = self;
@@ -117,7 +117,7 @@ impl ShipParser {
         None
     }
 
-    /// What all lines say that bytes that arrived together at `arrival` complete. The bytes are taken as that is.
+    /// The measurements in all lines that bytes complete which arrived together at `arrival`. The bytes are taken as those are.
     pub fn lines<'a>(
         &'a mut self,
         mut bytes: &'a [u8],
@@ -127,7 +127,7 @@ impl ShipParser {
     }
 }
 
-/// What a line without `$` and check sum says; `None` for other lines and those that say nothing.
+/// The measurement in a line without `$` and check sum; `None` for other lines and those without one.
 fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAttitude> {
     let mut fields = body.split(',');
     let address = fields.next()?;
@@ -319,7 +319,7 @@ mod tests {
             prop_assert!(parser.scanner.held().0 <= LINE_MAX_BYTES);
         }
 
-        /// What a recording keeps is what was said.
+        /// A line written is read again as the same measurement.
         #[test]
         fn a_line_says_what_was_read(
             heading in prop::option::of(0i64..360_000),

@@ -1,4 +1,4 @@
-//! What the state machine needs of a camera: the real one is [`super::v4l2`], the tests have a scripted one.
+//! The camera as the state machine needs it: the real one is [`super::v4l2`], the tests have a scripted one.
 
 use std::{io, path::Path, sync::Arc};
 
@@ -12,14 +12,14 @@ use super::{
     timing::BufferStamp,
 };
 
-/// What an opened node says about itself.
+/// Description of an opened node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct OpenedCamera {
-    /// What the maker calls it.
+    /// Its name by the maker.
     pub card: String,
     /// Whether it delivers pictures: a camera has other nodes too.
     pub captures: bool,
-    /// What it can deliver.
+    /// The modes that it can deliver.
     pub offers: Vec<Offer>,
 }
 
@@ -53,7 +53,7 @@ pub(super) struct FilledBuffer {
     pub stamp: BufferStamp,
 }
 
-/// What woke the thread.
+/// Reasons for which the thread woke.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Ready {
     /// A buffer is filled.

@@ -17,14 +17,14 @@ pub(super) struct FoundCamera {
     pub named: bool,
     /// USB serial number, where it has one.
     pub serial: Option<String>,
-    /// What the driver calls it.
+    /// Its name by the driver.
     pub name: String,
     /// The USB device's node for a reset, where it is one.
     pub usb: Option<PathBuf>,
 }
 
 impl FoundCamera {
-    /// What is compared with the calibration's serial number: the USB serial number, or the card's name where there is none.
+    /// The identity compared with the calibration's serial number: the USB serial number, or the card's name where there is none.
     pub fn identity(&self) -> &str {
         self.serial.as_deref().unwrap_or(&self.name)
     }
@@ -49,7 +49,7 @@ impl FoundCamera {
 /// How long another camera has to wait for the one that was in use.
 const OTHER_CAMERA_NS: i64 = 5 * NS_PER_S;
 
-/// What to do about what is there.
+/// Choice among the cameras that are there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum CameraChoice {
     /// No camera that is meant.

@@ -91,7 +91,7 @@ plain!(
     v4l2_event_subscription
 );
 
-/// What `VIDIOC_QUERYCAP` says.
+/// Answer of `VIDIOC_QUERYCAP`.
 pub(super) struct Capability {
     pub driver: String,
     pub card: String,

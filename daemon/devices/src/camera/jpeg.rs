@@ -9,7 +9,7 @@ use super::pool::Pool;
 /// Most pixels a side that a picture may declare.
 const SIDE_MAX: u32 = 8192;
 
-/// What a JPEG says about itself before its pixels.
+/// Header of a JPEG.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JpegHeader {
     /// Pixels across, at least 1.
@@ -131,7 +131,7 @@ fn be16(bytes: &[u8], at: usize) -> Option<u16> {
 enum Manner {
     /// Whole baseline pictures only.
     Camera,
-    /// What other programs wrote, too.
+    /// JPEGs of other programs, too.
     Recording,
 }
 

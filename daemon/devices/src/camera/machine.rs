@@ -16,9 +16,8 @@ use super::{
     identity::{CameraChoice, FoundCamera, choose},
     jpeg,
     judge::{PictureDamage, Stillness},
-    negotiate::{ModeCandidate, candidates, next_smaller},
+    negotiate::{candidates, next_smaller},
     pool::Pool,
-    settings::usable_size,
     trouble::Trouble,
 };
 
@@ -31,7 +30,7 @@ const MISMATCH_NS: i64 = 250 * MS;
 const BUSY_NS: i64 = 1000 * MS;
 /// Before a camera is opened again whose queue or link failed.
 const AGAIN_NS: i64 = 200 * MS;
-/// What a camera needs to appear again after a reset.
+/// Time that a camera needs to appear again after a reset.
 const RESET_NS: i64 = 500 * MS;
 /// Failures of the link in a row before the device is reset.
 const PROTOCOL_FAILURES: u32 = 3;
@@ -56,13 +55,13 @@ const GONE_WITH_FRAMES: [Fault; 6] = [
     Fault::CalMismatch,
 ];
 
-/// What a camera that is there may suffer from, so that no pictures come.
+/// Faults of a camera that is there, for which no pictures come.
 const WRONG_WITH_IT: [Fault; 5] =
     [Fault::CamStall, Fault::CamProtocol, Fault::CamQueue, Fault::CamBusy, Fault::CalMismatch];
-/// What its pictures may suffer from. That it is over cannot be seen once there are none.
+/// Faults of its pictures. That it is over cannot be seen once there are none.
 const WRONG_WITH_PICTURES: [Fault; 3] = [Fault::CamFormat, Fault::CamStatic, Fault::CamCorrupt];
 
-/// What a step brought about.
+/// Results of a step.
 #[derive(Default)]
 pub(super) struct CameraOutput {
     /// Pictures, oldest first.
@@ -71,7 +70,7 @@ pub(super) struct CameraOutput {
     pub faults: Vec<FaultChange>,
 }
 
-enum CameraState {
+enum MachineState {
     /// Nothing is open; the next try is at `next`.
     Away {
         life: CameraLife,
@@ -81,7 +80,7 @@ enum CameraState {
     Stopped,
 }
 
-/// What is known of a stream that runs.
+/// State of a stream that runs.
 struct CameraStream {
     found: FoundCamera,
     format: SetFormat,
@@ -122,7 +121,7 @@ impl CameraStream {
 /// The camera's life.
 pub(super) struct CameraMachine {
     settings: CameraSettings,
-    state: CameraState,
+    state: MachineState,
     /// The camera that was last in use, and since when it has been away.
     known: Option<FoundCamera>,
     lost_at: Option<Time>,
@@ -146,7 +145,7 @@ impl CameraMachine {
     pub fn new(settings: CameraSettings, now: Time) -> Self {
         Self {
             settings,
-            state: CameraState::Away { life: CameraLife::Searching, next: now },
+            state: MachineState::Away { life: CameraLife::Searching, next: now },
             known: None,
             lost_at: None,
             raised: BTreeSet::new(),
@@ -166,11 +165,11 @@ impl CameraMachine {
     /// How it stands.
     pub fn status(&self) -> CameraStatus {
         let life = match &self.state {
-            CameraState::Away { life, .. } => *life,
-            CameraState::Stopped => CameraLife::Stopped,
-            CameraState::Streaming(s) if s.act_at.is_some() => CameraLife::Stalled,
-            CameraState::Streaming(s) if s.frames == 0 => CameraLife::Opening,
-            CameraState::Streaming(_) => CameraLife::Streaming,
+            MachineState::Away { life, .. } => *life,
+            MachineState::Stopped => CameraLife::Stopped,
+            MachineState::Streaming(s) if s.act_at.is_some() => CameraLife::Stalled,
+            MachineState::Streaming(s) if s.frames == 0 => CameraLife::Opening,
+            MachineState::Streaming(_) => CameraLife::Streaming,
         };
         CameraStatus { life, in_use: self.in_use.clone(), counters: self.counters }
     }
@@ -184,21 +183,21 @@ impl CameraMachine {
         driver: &mut impl CameraDriver,
         out: &mut CameraOutput,
     ) -> Time {
-        match std::mem::replace(&mut self.state, CameraState::Stopped) {
-            CameraState::Stopped => return Time::from_ns(i64::MAX),
-            CameraState::Away { life, next } if now < next => self.state = CameraState::Away { life, next },
-            CameraState::Away { .. } => self.look(now, driver, out),
-            CameraState::Streaming(mut stream) => match self.stream(&mut stream, now, ready, driver, out) {
-                Ok(true) => self.state = CameraState::Streaming(stream),
+        match std::mem::replace(&mut self.state, MachineState::Stopped) {
+            MachineState::Stopped => return Time::from_ns(i64::MAX),
+            MachineState::Away { life, next } if now < next => self.state = MachineState::Away { life, next },
+            MachineState::Away { .. } => self.look(now, driver, out),
+            MachineState::Streaming(mut stream) => match self.stream(&mut stream, now, ready, driver, out) {
+                Ok(true) => self.state = MachineState::Streaming(stream),
                 // Something decided on another state already.
                 Ok(false) => {}
                 Err((what, error)) => self.fail(now, &stream.found, what, &error, driver, out),
             },
         }
         match &self.state {
-            CameraState::Stopped => Time::from_ns(i64::MAX),
-            CameraState::Away { next, .. } => *next,
-            CameraState::Streaming(s) => s.act_at.unwrap_or_else(|| s.stalls_at(self.first_frame_ns)),
+            MachineState::Stopped => Time::from_ns(i64::MAX),
+            MachineState::Away { next, .. } => *next,
+            MachineState::Streaming(s) => s.act_at.unwrap_or_else(|| s.stalls_at(self.first_frame_ns)),
         }
     }
 
@@ -206,7 +205,7 @@ impl CameraMachine {
     pub fn stop(&mut self, driver: &mut impl CameraDriver) {
         driver.close();
         self.in_use = None;
-        self.state = CameraState::Stopped;
+        self.state = MachineState::Stopped;
     }
 
     fn raise(&mut self, now: Time, fault: Fault, cause: String, out: &mut CameraOutput) {
@@ -227,7 +226,7 @@ impl CameraMachine {
 
     fn away(&mut self, life: CameraLife, next: Time) {
         self.in_use = None;
-        self.state = CameraState::Away { life, next };
+        self.state = MachineState::Away { life, next };
     }
 
     /// Looks for the camera and starts it.
@@ -311,7 +310,7 @@ impl CameraMachine {
                 continue;
             };
             let last = at + 1 >= list.len();
-            if !plausible(&format) || (!last && !format.is(candidate)) {
+            if !pictures::plausible(&format) || (!last && !format.is(candidate)) {
                 at += 1;
                 continue;
             }
@@ -391,7 +390,7 @@ impl CameraMachine {
             let found = stream.found;
             return self.fail(now, &found, "get buffers", &error, driver, out);
         }
-        self.state = CameraState::Streaming(Box::new(stream));
+        self.state = MachineState::Streaming(Box::new(stream));
     }
 
     /// Tells whether pictures have the calibrated size.
@@ -571,24 +570,11 @@ fn replaces(new: Fault, old: Fault) -> bool {
         }
 }
 
-/// What was tried, and the kernel's answer.
+/// The attempt that failed, and the kernel's answer.
 type Failure = (&'static str, io::Error);
 
 fn during(what: &'static str) -> impl FnOnce(io::Error) -> Failure {
     move |error| (what, error)
-}
-
-impl SetFormat {
-    fn is(&self, candidate: &ModeCandidate) -> bool {
-        let mode = &candidate.mode;
-        (self.coding, self.width, self.height) == (mode.coding, mode.width, mode.height)
-    }
-}
-
-/// Whether a picture of that format can be what the driver says.
-fn plausible(format: &SetFormat) -> bool {
-    usable_size(format.coding, format.width, format.height)
-        && pictures::layout(format).is_none_or(|layout| layout.bytes <= format.size_image as usize)
 }
 
 fn in_use(

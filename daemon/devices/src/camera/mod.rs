@@ -121,13 +121,13 @@ pub struct CameraInfo {
     pub node: PathBuf,
     /// A name that survives replugging, where udev gives one.
     pub by_id: Option<PathBuf>,
-    /// What the maker calls it.
+    /// Its name by the maker.
     pub card: String,
     /// The kernel's driver.
     pub driver: String,
     /// Where it is plugged in.
     pub bus: String,
-    /// What it can deliver.
+    /// The modes that it can deliver.
     pub modes: Vec<CameraMode>,
 }
 
@@ -169,7 +169,7 @@ pub enum CameraError {
     NoUsableFormat {
         /// The name asked for.
         node: PathBuf,
-        /// What the maker calls it.
+        /// Its name by the maker.
         card: String,
         /// The codings that it offers.
         offered: String,
@@ -177,7 +177,7 @@ pub enum CameraError {
     /// The settings cannot be right.
     #[error("camera settings: {what}")]
     Settings {
-        /// What is wrong and what to give instead.
+        /// The setting that is wrong, and what to give instead.
         what: String,
     },
     /// The camera's thread could not be started.
@@ -197,7 +197,7 @@ pub enum CameraError {
     Io {
         /// The name asked for.
         node: PathBuf,
-        /// What was tried.
+        /// The attempt that failed.
         what: &'static str,
         /// The kernel's answer.
         source: io::Error,

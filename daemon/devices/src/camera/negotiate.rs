@@ -39,7 +39,7 @@ pub(super) struct ModeCandidate {
 }
 
 impl ModeCandidate {
-    /// What it takes of the bus, bits a second; a JPEG is taken for an eighth of its YUYV picture.
+    /// Load of the bus, bits a second; a JPEG is taken for an eighth of its YUYV picture.
     fn bits_per_second(&self) -> f64 {
         let bits = match self.mode.coding {
             Coding::Yuyv => 16.0,
@@ -198,7 +198,7 @@ mod tests {
         Offer { fourcc: *fourcc, sizes }
     }
 
-    /// What a usual USB 2 camera offers: raw pictures of full size only slowly.
+    /// Modes of a usual USB 2 camera: raw pictures of full size only slowly.
     fn usual() -> Vec<Offer> {
         vec![
             offer(b"YUYV", &[(1280, 720, &[10]), (640, 480, &[30, 15])]),

@@ -1,4 +1,4 @@
-//! What is wanted of the camera.
+//! Settings of the camera.
 
 use std::{fmt, path::PathBuf};
 
@@ -120,7 +120,7 @@ pub enum Focus {
     },
 }
 
-/// What is locked so that the picture stays the calibrated one.
+/// Controls that are locked so that the picture stays the calibrated one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Controls {
     /// Exposure time.
@@ -133,7 +133,7 @@ pub struct Controls {
     pub gain: Option<u32>,
 }
 
-/// What is wanted of the camera.
+/// Settings of the camera.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CameraSettings {
     /// A node or a link to one (best in `/dev/v4l/by-id`); `None` for the first camera that fits.
@@ -145,7 +145,7 @@ pub struct CameraSettings {
     pub calibrated_size: Option<(u32, u32)>,
     /// Modes by preference; where empty, the calibrated size (or 1280x720) at 30 Hz in any coding.
     pub modes: Vec<WantedMode>,
-    /// What is locked.
+    /// The controls that are locked.
     pub controls: Controls,
     /// Buffers to ask for: two that the driver fills, and as many as the trainer holds at once; 3 to 32.
     pub buffers: u32,

@@ -26,7 +26,7 @@ pub enum CameraLife {
     Stopped,
 }
 
-/// What has been met since the start.
+/// Counts since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CameraCounters {
     /// Pictures handed on.
@@ -70,11 +70,11 @@ pub struct InUse {
     pub by_id: Option<PathBuf>,
     /// USB serial number, where it has one.
     pub serial: Option<String>,
-    /// What the maker calls it.
+    /// Its name by the maker.
     pub card: String,
     /// The mode that the driver set.
     pub mode: WantedMode,
-    /// What was to be locked and the camera refused, such as "exposure time".
+    /// Controls that the camera refused to have locked, such as "exposure time".
     pub refused_controls: Vec<&'static str>,
 }
 
@@ -85,6 +85,6 @@ pub struct CameraStatus {
     pub life: CameraLife,
     /// The camera that runs, where one does.
     pub in_use: Option<Arc<InUse>>,
-    /// What has been met.
+    /// Counts since the start.
     pub counters: CameraCounters,
 }

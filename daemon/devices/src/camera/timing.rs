@@ -2,7 +2,7 @@
 
 use bowwave_core::time::{NS_PER_S, Time};
 
-/// What a driver says about the time of a buffer.
+/// A driver's stamp of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BufferStamp {
     /// The time.
@@ -13,7 +13,7 @@ pub(super) struct BufferStamp {
     pub start_of_exposure: bool,
 }
 
-/// What is known of the sensor.
+/// Timing of the sensor, as far as it is known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sensor {
     /// Exposure time, nanoseconds, where the camera tells it.

@@ -1,11 +1,11 @@
-//! What a kernel's error number means for the camera.
+//! Meaning of the kernel's error numbers for the camera.
 
 use std::io;
 
 use bowwave_core::fault::Fault;
 use rustix::io::Errno;
 
-/// What is wrong.
+/// Trouble with the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Trouble {
     /// The device is gone.
@@ -56,7 +56,7 @@ impl Trouble {
         }
     }
 
-    /// What to do about it, for the log.
+    /// Advice on it, for the log.
     pub(super) const fn advice(self) -> &'static str {
         match self {
             Self::Gone => "plug it in again",

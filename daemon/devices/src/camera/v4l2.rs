@@ -287,7 +287,7 @@ impl CameraDriver for V4l2 {
     }
 }
 
-/// What the device offers; where it gives a range of sizes, also the wanted ones in it with their rates.
+/// The modes that the device offers; where it gives a range of sizes, also the wanted ones in it with their rates.
 fn offers(fd: BorrowedFd<'_>, settings: &CameraSettings) -> io::Result<Vec<Offer>> {
     let mut asked: Vec<(u32, u32)> = settings.wanted().iter().map(|m| (m.width, m.height)).collect();
     asked.extend(settings.calibrated_size);

@@ -34,7 +34,7 @@ pub struct ChipInfo {
     pub node: PathBuf,
     /// The kernel's name for it.
     pub name: String,
-    /// What the maker calls it.
+    /// Its name by the maker.
     pub label: String,
     /// Its lines.
     pub lines: Vec<LineInfo>,
@@ -62,7 +62,7 @@ pub enum GpioError {
     NotAChip {
         /// The name asked for.
         node: PathBuf,
-        /// What the GPIO layer says.
+        /// The GPIO layer's answer.
         source: gpio_cdev::Error,
     },
     /// The chip has no such line.
@@ -94,7 +94,7 @@ pub enum GpioError {
         node: PathBuf,
         /// The line's number.
         offset: u32,
-        /// What the GPIO layer says.
+        /// The GPIO layer's answer.
         source: gpio_cdev::Error,
     },
     /// No chip is called that.
@@ -133,7 +133,7 @@ pub enum GpioError {
         node: PathBuf,
         /// The line's number.
         offset: u32,
-        /// What the GPIO layer says.
+        /// The GPIO layer's answer.
         source: gpio_cdev::Error,
     },
     /// Edges carry no monotonic time.
@@ -243,7 +243,7 @@ pub(crate) fn place_again(
     }
 }
 
-/// What `find` gives for `chip` where that is the one with the label `known`, or else for the one that has it.
+/// The finding of `find` for `chip` where that is the one with the label `known`, or else for the one that has it.
 /// `find` also tells the label of the chip that it found.
 fn on_known<T>(
     chip: &str,

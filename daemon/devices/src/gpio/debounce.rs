@@ -98,7 +98,7 @@ mod tests {
         Time::from_ns(us * 1000)
     }
 
-    /// What is reported of edges (microseconds, level), settled a second later.
+    /// Reports of a switch whose edges (microseconds, level) are settled a second later.
     fn reported(edges: &[(i64, bool)]) -> (Vec<(i64, bool)>, u64) {
         let mut switch = Debouncer::new(WINDOW_MS * MS, false, at(0));
         let mut out = Vec::new();

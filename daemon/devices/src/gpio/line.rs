@@ -41,7 +41,7 @@ pub struct InputLine {
     pub line: String,
     /// Active is low, as with a switch to ground.
     pub active_low: bool,
-    /// What holds it.
+    /// Its bias.
     pub bias: LineBias,
 }
 
@@ -99,7 +99,7 @@ impl InputHandle {
         self.asked
     }
 
-    /// What the maker calls its chip.
+    /// The label of its chip.
     pub(crate) fn label(&self) -> &str {
         &self.label
     }

@@ -59,7 +59,7 @@ impl SampleAssembler {
         }
     }
 
-    /// What the unit has sent so far.
+    /// The fields that the unit has sent so far.
     pub(crate) const fn fields(&self) -> Fields {
         self.fields
     }

@@ -14,7 +14,7 @@ pub(crate) const ROLL_OVER: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 /// Quarter of a turn about the vertical: east-north-up from north-west-up.
 pub(crate) const ENU_FROM_NWU: DQuat = DQuat::from_xyzw(0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2);
 
-/// What units that measure in g mean by it.
+/// Standard gravity, which units that measure in g mean by it, m/s^2.
 pub(crate) use bowwave_core::physics::GRAVITY_M_S2 as G;
 
 /// Three numbers of a wire as a vector.

@@ -125,7 +125,7 @@ impl ImuDecoder {
         }
     }
 
-    /// What has been met so far. Packets count once their format is known.
+    /// Counts so far. Packets count once their format is known.
     pub fn counters(&self) -> ImuCounters {
         self.before.plus(match &self.line {
             LineFormat::Known(unit, _) => unit.counters(),
@@ -144,7 +144,7 @@ impl ImuDecoder {
         }
     }
 
-    /// What the unit sends, as far as it has sent it.
+    /// The fields that the unit sends, as far as it has sent them.
     pub fn fields(&self) -> Fields {
         match &self.line {
             LineFormat::Known(unit, _) => unit.fields(),

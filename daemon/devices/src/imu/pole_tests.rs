@@ -66,7 +66,7 @@ fn world_from_imu(motion: PoleMotion, s: f64) -> DQuat {
 }
 
 fn seconds(format: ImuFormat, n: i64) -> f64 {
-    (n - SAMPLES / 2) as f64 * format.simulated().period_ns as f64 * 1e-9
+    (n - SAMPLES / 2) as f64 * format.simulated_period_ns() as f64 * 1e-9
 }
 
 fn truth(format: ImuFormat, motion: PoleMotion, n: i64) -> ImuSample {
@@ -74,7 +74,7 @@ fn truth(format: ImuFormat, motion: PoleMotion, n: i64) -> ImuSample {
     let at = world_from_imu(motion, s);
     let turn = world_from_imu(motion, s - h).inverse() * world_from_imu(motion, s + h);
     let turn = if turn.w < 0.0 { -turn } else { turn };
-    let ns = n * format.simulated().period_ns;
+    let ns = n * format.simulated_period_ns();
     ImuSample {
         arrival: Time::from_ns(1_000_000_000 + ns),
         device_time_ns: ns,
@@ -103,17 +103,17 @@ fn worst(format: ImuFormat, motion: PoleMotion, source: Source) -> [f64; 2] {
         samples.extend(decoder.samples(&format.send(&s, n, true), s.arrival));
         for sample in samples {
             let number =
-                sample.arrival.ns_since(truth(format, motion, 0).arrival) / format.simulated().period_ns;
-            if attitude.observe(Time::from_ns(number * format.simulated().period_ns), &sample).is_none() {
+                sample.arrival.ns_since(truth(format, motion, 0).arrival) / format.simulated_period_ns();
+            if attitude.observe(Time::from_ns(number * format.simulated_period_ns()), &sample).is_none() {
                 continue;
             }
             for back in [0.0, 0.5] {
                 let time =
-                    Time::from_ns(((number as f64 - back) * format.simulated().period_ns as f64) as i64);
+                    Time::from_ns(((number as f64 - back) * format.simulated_period_ns() as f64) as i64);
                 let Ok(found) = attitude.at(time) else { continue };
                 let true_camera = world_from_camera(
                     motion,
-                    seconds(format, number) - back * format.simulated().period_ns as f64 * 1e-9,
+                    seconds(format, number) - back * format.simulated_period_ns() as f64 * 1e-9,
                 );
                 let camera = attitude.camera(found.world_from_imu);
                 assert!(camera.is_finite() && (camera.length() - 1.0).abs() < 1e-12, "{camera}");
@@ -133,7 +133,7 @@ fn worst(format: ImuFormat, motion: PoleMotion, source: Source) -> [f64; 2] {
     worst
 }
 
-/// What is told to half a unit of the format's last digit in three angles, of which two add up at the pole, is known that well and no
+/// An attitude that is told to half a unit of the format's last digit in three angles, of which two add up at the pole, is known that well and no
 /// worse: yaw and roll by themselves mean nothing there, but what they make together does.
 #[test]
 fn angles_at_the_pole_lose_nothing_of_where_the_camera_looks() {
@@ -165,7 +165,7 @@ fn what_is_fused_here_passes_the_pole() {
     }
 }
 
-/// What is lost is lost in the unit: one that makes its angles of a matrix of f32 has a pitch that is off by a hundredth of a degree and
+/// Precision is lost in the unit, not here: one that makes its angles of a matrix of f32 has a pitch that is off by a hundredth of a degree and
 /// more near the pole, where the sine hardly changes.
 #[test]
 fn a_unit_that_reckons_in_f32_is_off_near_the_pole() {

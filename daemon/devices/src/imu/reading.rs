@@ -1,4 +1,4 @@
-//! What one packet of any format says, in our axes and units.
+//! Measurement in one packet of any format, in our axes and units.
 
 use std::fmt;
 
@@ -21,7 +21,7 @@ pub(crate) enum ReadingStamp {
     Arrival,
 }
 
-/// What a packet says of the body's motion: axes x forward, y right, z down; world x east, y north, z up.
+/// Measurement of the body's motion: axes x forward, y right, z down; world x east, y north, z up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
     /// When.
@@ -41,7 +41,7 @@ impl Reading {
     }
 }
 
-/// What a unit sends of what the trainer uses.
+/// Fields that a unit sends, of those that the trainer uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Fields {
     /// A clock of its own.
@@ -66,7 +66,7 @@ impl Fields {
         self.attitude |= reading.world_from_imu.is_some();
     }
 
-    /// What no sample can be made without.
+    /// The fields without which no sample can be made.
     pub(crate) fn missing(self) -> Vec<&'static str> {
         let rate = self.rate || self.attitude;
         [(!rate).then_some("angular rate"), (!self.accel).then_some("acceleration")]
@@ -76,7 +76,7 @@ impl Fields {
     }
 }
 
-/// What it sends, then what it lacks and what is done instead.
+/// The fields that it sends, then those that it lacks and how they are made instead.
 impl fmt::Display for Fields {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { clock, counter, rate, accel, attitude } = *self;

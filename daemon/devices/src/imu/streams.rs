@@ -9,18 +9,7 @@ use super::ImuFormat;
 /// Standard gravity, m/s^2.
 pub(crate) const G: f64 = 9.806_65;
 
-/// How the simulated unit of a format sends.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Simulated {
-    /// Nanoseconds from one packet (or group of packets) to the next.
-    pub(crate) period_ns: i64,
-    /// Packets of one sample.
-    pub(crate) packets: u64,
-    /// How far the samples read may be from those sent.
-    pub(crate) tolerance: FormatTolerance,
-}
-
-/// Rounding of a format's numbers.
+/// How far the samples read may be from those sent: the rounding of a format's numbers.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FormatTolerance {
     /// Angular rate, rad/s.
@@ -33,10 +22,15 @@ pub(crate) struct FormatTolerance {
     pub(crate) time_ns: i64,
 }
 
-/// A format whose unit can be simulated.
+/// A format whose unit can be simulated: one with a clock, that sends 200 packets a second in f32, where nothing else is said.
 pub(crate) trait SimulatedUnit {
-    /// How that sends.
-    const SENDS: Simulated;
+    /// Nanoseconds from one packet (or group of packets) to the next.
+    const PERIOD_NS: i64 = 5_000_000;
+    /// Packets of one sample.
+    const PACKETS: u64 = 1;
+    /// Rounding of its numbers.
+    const TOLERANCE: FormatTolerance =
+        FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 };
 
     /// The bytes that it sends for sample `n` of any motion. `by_angles`: one that chooses between quaternion and Euler angles tells
     /// the angles.
@@ -56,7 +50,7 @@ fn attitude(t_s: f64) -> DQuat {
 
 /// The true sample `n`: a gun on a ship, forces of gravity alone.
 pub(crate) fn truth(format: ImuFormat, n: i64) -> ImuSample {
-    let ns = n * format.simulated().period_ns;
+    let ns = n * format.simulated_period_ns();
     let (t_s, h) = (ns as f64 * 1e-9, 1e-4);
     let turn = attitude(t_s - h).inverse() * attitude(t_s + h);
     let turn = if turn.w < 0.0 { -turn } else { turn };
@@ -69,7 +63,7 @@ pub(crate) fn truth(format: ImuFormat, n: i64) -> ImuSample {
     }
 }
 
-/// What a unit of that format sends for [`truth`]'s sample `n`.
+/// Bytes of a unit of that format for [`truth`]'s sample `n`.
 pub(crate) fn encode(format: ImuFormat, n: i64) -> Vec<u8> {
     format.send(&truth(format, n), n, false)
 }

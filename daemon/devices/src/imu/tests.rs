@@ -29,11 +29,11 @@ fn every_format_tells_the_same_motion() {
     for format in ImuFormat::ALL {
         let mut decoder = ImuDecoder::fixed(format);
         let samples = decode(&mut decoder, format, 0..2_000, 1 << 12);
-        let FormatTolerance { rate, accel, attitude, time_ns } = format.simulated().tolerance;
+        let FormatTolerance { rate, accel, attitude, time_ns } = format.tolerance();
         let mut compared = 0;
         // A first sample may lack what comes from two, a learned clock settles.
         for sample in samples.iter().filter(|s| s.device_time_ns > 2_000_000_000) {
-            let n = sample.arrival.ns_since(truth(format, 0).arrival) / format.simulated().period_ns;
+            let n = sample.arrival.ns_since(truth(format, 0).arrival) / format.simulated_period_ns();
             let expected = truth(format, n);
             assert!(
                 (sample.device_time_ns - expected.device_time_ns).abs() <= time_ns,
@@ -56,11 +56,11 @@ fn every_format_tells_the_same_motion() {
             assert!(angle < attitude, "{format}: {angle} rad");
             compared += 1;
         }
-        let most = 2_000 - 2_000_000_000 / format.simulated().period_ns - 2;
+        let most = 2_000 - 2_000_000_000 / format.simulated_period_ns() - 2;
         assert!(compared >= most, "{format}: {compared} of {most}");
         let counters = decoder.counters();
         assert_eq!((counters.bad_crc, counters.skipped_bytes, counters.unusable), (0, 0, 0), "{format}");
-        assert_eq!(counters.packets, 2_000 * format.simulated().packets, "{format}");
+        assert_eq!(counters.packets, 2_000 * format.simulated_packets(), "{format}");
     }
 }
 
@@ -97,12 +97,12 @@ fn each_format_is_recognised_and_loses_no_sample() {
                 }
                 samples.extend(decoder.samples(&encode(format, n), arrival));
                 if decoder.format().is_some() && recognised.is_none() {
-                    recognised = Some((n + 1) as u64 * format.simulated().packets);
+                    recognised = Some((n + 1) as u64 * format.simulated_packets());
                 }
             }
             assert_eq!(decoder.format(), Some(format), "text: {text}");
             // Whole groups are pushed, and one packet behind noise may wait for what follows it.
-            let at_most = (format.proof_packets() as u64 + 1).next_multiple_of(format.simulated().packets);
+            let at_most = (format.proof_packets() as u64 + 1).next_multiple_of(format.simulated_packets());
             assert!(recognised.expect("recognised") <= at_most, "{format}: {recognised:?}, text: {text}");
             assert_eq!(samples, known, "{format}, text: {text}");
         }
@@ -201,7 +201,7 @@ fn another_unit_on_the_line_is_recognised() {
 #[test]
 fn what_came_before_the_proof_is_left_out() {
     // SBG's rate and attitude are two packets, and with that a proof.
-    for format in ImuFormat::ALL.into_iter().filter(|f| (f.simulated().packets as usize) < f.proof_packets())
+    for format in ImuFormat::ALL.into_iter().filter(|f| (f.simulated_packets() as usize) < f.proof_packets())
     {
         let mut decoder = ImuDecoder::new();
         let mut samples = Vec::new();
@@ -216,7 +216,7 @@ fn what_came_before_the_proof_is_left_out() {
     }
 }
 
-/// What a unit sends and what is done about the rest, in words.
+/// Fields of a unit, and the remedy for the rest, in words.
 #[test]
 fn what_a_unit_sends_and_lacks_is_told() {
     let told = |format| {
@@ -324,7 +324,7 @@ proptest! {
                 found += 1;
             }
         }
-        let expected = sent.len() as u64 * format.simulated().packets;
+        let expected = sent.len() as u64 * format.simulated_packets();
         let counters = unit.counters();
         prop_assert_eq!(found, counters.packets);
         let skipped: usize = gaps.iter().map(Vec::len).sum::<usize>() + 4200;

@@ -28,7 +28,7 @@ pub(super) trait LampChips {
 pub(super) struct LineSpot {
     /// The kernel's name of its chip, which is one chip's as long as that is there.
     pub(super) chip: String,
-    /// What the maker calls its chip.
+    /// The label of its chip.
     pub(super) label: String,
     /// Its number there.
     pub(super) offset: u32,

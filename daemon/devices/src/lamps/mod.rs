@@ -80,7 +80,7 @@ pub enum LampError {
     Line {
         /// The lamp.
         lamp: &'static str,
-        /// What is wrong.
+        /// The reason.
         source: GpioError,
     },
     /// The lamp cannot be switched.
@@ -88,7 +88,7 @@ pub enum LampError {
     Switch {
         /// The lamp.
         lamp: &'static str,
-        /// What the GPIO layer says.
+        /// The GPIO layer's answer.
         source: gpio_cdev::Error,
     },
     /// The thread could not be started.

@@ -33,7 +33,7 @@ pub(super) struct ScanoutBuffer {
 }
 
 impl ScanoutBuffer {
-    /// What the kernel calls it.
+    /// The kernel's number of it.
     pub(super) const fn framebuffer(&self) -> framebuffer::Handle {
         self.framebuffer
     }

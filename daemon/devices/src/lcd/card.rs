@@ -100,7 +100,7 @@ impl Card {
         self.tried("list the connectors", self.resource_handles())
     }
 
-    /// What is plugged in. Asks the displays anew where this file is the card's master (which takes some milliseconds and
+    /// The displays that are plugged in. Asks the displays anew where this file is the card's master (which takes some milliseconds and
     /// may make a display that shows something flicker), otherwise tells what the kernel knows.
     fn connectors(&self) -> Result<Vec<connector::Info>, LcdError> {
         let handles = self.resources()?;
@@ -279,15 +279,7 @@ mod tests {
     use super::*;
 
     fn connector(name: &str, connection: Connection, modes: usize) -> ConnectorInfo {
-        let mode = LcdMode {
-            width: 800,
-            height: 480,
-            clock_khz: 33_300,
-            h_total: 1056,
-            v_total: 525,
-            interlaced: false,
-            preferred: true,
-        };
+        let mode = LcdMode::PANEL;
         ConnectorInfo { name: name.to_owned(), connection, modes: vec![mode; modes] }
     }
 

@@ -7,6 +7,12 @@ use rustix::io::Errno;
 /// Why a display cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LcdError {
+    /// The daemon's user may not open it.
+    #[error("may not open {}: add the user to group video (usermod -aG video USER), then log in again", node.display())]
+    Permission {
+        /// The card.
+        node: PathBuf,
+    },
     /// The kernel has no display driver for anything in this computer.
     #[error(
         "no display card in /dev/dri: load its kernel driver (dmesg | grep drm), or enable it in the firmware"
@@ -19,12 +25,6 @@ pub enum LcdError {
         node: PathBuf,
         /// Cards that are there.
         present: String,
-    },
-    /// The daemon's user may not open it.
-    #[error("may not open {}: add the user to group video (usermod -aG video USER), then log in again", node.display())]
-    Permission {
-        /// The card.
-        node: PathBuf,
     },
     /// It drives no display: a GPU that only computes, or no DRM node at all.
     #[error("{} drives no display ({source}): name another card in [screen] (bowwave doctor lists them)", node.display())]
@@ -39,7 +39,7 @@ pub enum LcdError {
     Unsupported {
         /// The card.
         node: PathBuf,
-        /// What is missing.
+        /// The thing that is missing.
         what: &'static str,
     },
     /// Another program is master of the card.
@@ -81,7 +81,7 @@ pub enum LcdError {
         node: PathBuf,
         /// The connector.
         name: String,
-        /// What is missing.
+        /// The thing that is missing.
         what: &'static str,
     },
     /// The card is gone.
@@ -95,7 +95,7 @@ pub enum LcdError {
     Io {
         /// The card.
         node: PathBuf,
-        /// What was tried.
+        /// The attempt that failed.
         what: &'static str,
         /// The kernel's answer.
         source: io::Error,

@@ -12,7 +12,7 @@ const FLIP_NS: i64 = 3 * NS_PER_S;
 /// Longest sleep, so that the heartbeat goes on.
 const SLEEP_NS: i64 = 50_000_000;
 
-/// What is due.
+/// Action that is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LcdDue {
     /// Nothing but to wait for the kernel or a picture.
@@ -23,7 +23,7 @@ pub(super) enum LcdDue {
     FlipOverdue,
 }
 
-/// What the supervisor is to be told.
+/// Change to tell the supervisor of.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum DisplayChange {
     /// No display, and why.
@@ -57,7 +57,7 @@ impl LcdLife {
         self.losses
     }
 
-    /// What is due at `now`. A look counts as taken.
+    /// The action that is due at `now`. A look counts as taken.
     pub(super) fn due(&mut self, now: Time) -> LcdDue {
         if self.flip_begun.is_some_and(|begun| now.ns_since(begun) > FLIP_NS) {
             return LcdDue::FlipOverdue;
@@ -110,15 +110,7 @@ mod tests {
 
     use super::*;
 
-    const MODE: LcdMode = LcdMode {
-        width: 800,
-        height: 480,
-        clock_khz: 33_300,
-        h_total: 1056,
-        v_total: 525,
-        interlaced: false,
-        preferred: true,
-    };
+    const MODE: LcdMode = LcdMode::PANEL;
 
     fn at_ms(ms: i64) -> Time {
         Time::from_ns(ms * 1_000_000)

@@ -120,7 +120,7 @@ pub enum Vblanks {
     Absent,
 }
 
-/// What the port did so far. Each picture given is in exactly one of `shown`, `replaced`, `without_screen`, `lost`,
+/// Counts of what the port did so far. Each picture given is in exactly one of `shown`, `replaced`, `without_screen`, `lost`,
 /// `malformed`, or still under way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LcdCounters {
@@ -159,11 +159,11 @@ pub struct LcdStatus {
     pub fit: Option<LcdFit>,
     /// Why nothing shows, and what to do; `None` while something does.
     pub trouble: Option<String>,
-    /// What happened so far.
+    /// Counts so far.
     pub counters: LcdCounters,
 }
 
-/// What became of a picture that was given.
+/// Fate of a picture that was given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Given {
     /// It shows from the next vblank on, unless a newer one comes before.

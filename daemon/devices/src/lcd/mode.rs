@@ -63,6 +63,20 @@ impl LcdMode {
     }
 }
 
+#[cfg(test)]
+impl LcdMode {
+    /// The mode of a usual panel, for tests.
+    pub(super) const PANEL: Self = Self {
+        width: 800,
+        height: 480,
+        clock_khz: 33_300,
+        h_total: 1056,
+        v_total: 525,
+        interlaced: false,
+        preferred: true,
+    };
+}
+
 impl fmt::Display for LcdMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let interlaced = if self.interlaced { "i" } else { "" };

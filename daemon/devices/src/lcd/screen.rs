@@ -22,7 +22,7 @@ const BUFFERS: usize = 3;
 /// `XR24`: the format of the buffers.
 const XRGB8888: u32 = drm::buffer::DrmFourcc::Xrgb8888 as u32;
 
-/// What a CRTC showed before: the console, as a rule.
+/// Former picture of a CRTC: the console, as a rule.
 #[derive(Debug)]
 pub(super) struct Saved {
     crtc: crtc::Info,
@@ -79,7 +79,7 @@ struct Ids {
     plane_to: [property::Handle; 4],
 }
 
-/// What became of a mode that was set.
+/// Outcome of setting a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Started {
     /// A flip will tell when it shows.

@@ -1,4 +1,4 @@
-//! What a serial line carries, as far as its reader must know.
+//! Content of a serial line, as far as its reader must know.
 
 use std::path::Path;
 

@@ -66,7 +66,7 @@ fn is_pattern(wanted: &Path) -> bool {
     wanted.to_string_lossy().contains(['*', '?', '['])
 }
 
-/// What is there now of a pattern.
+/// The ports there now that fit a pattern.
 fn matching(pattern: &Path) -> Result<Vec<PathBuf>, SerialError> {
     let pattern = pattern.to_string_lossy();
     // A pattern that is none was refused with the configuration; here it fits nothing.

@@ -1,4 +1,4 @@
-//! What the thread that reads a line does next, as a function of what came over the line and of time.
+//! Next step of the thread that reads a line, as a function of what came over the line and of time.
 
 use bowwave_core::{
     fault::{Fault, FaultChange},

@@ -29,7 +29,7 @@ pub struct ImuReport {
     pub fields: Fields,
     /// How evenly samples arrive.
     pub timing: ArrivalTiming,
-    /// What the decoder met.
+    /// Counts of the decoder.
     pub counters: ImuCounters,
     /// Samples that the unit's own clock shows to be missing.
     pub lost_samples: u64,

@@ -62,7 +62,7 @@ struct InputCounts {
 
 const _: () = assert!(mem::size_of::<InputCounts>() == 80);
 
-/// What the port has counted since it was made, or since it last wrapped.
+/// Errors that the port has counted since it was made, or since it last wrapped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct LineErrors {
     /// Bytes without a stop bit: most often a wrong baud rate.

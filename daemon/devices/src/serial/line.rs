@@ -124,7 +124,7 @@ impl SerialLine {
         }
     }
 
-    /// What is there now, at most `bytes.len()` bytes.
+    /// Reads the bytes that are there now, at most `bytes.len()`.
     pub(super) fn read(&self, bytes: &mut [u8]) -> LineRead {
         match rustix::io::read(self, bytes) {
             Ok(0) | Err(Errno::IO | Errno::NODEV | Errno::NXIO) => LineRead::HungUp,

@@ -59,13 +59,13 @@ pub struct PortInfo {
     pub node: PathBuf,
     /// A name that survives replugging, where udev gives one.
     pub by_id: Option<PathBuf>,
-    /// What it is: USB identity, PCI, or built in.
+    /// Its kind: USB identity, PCI, or built in.
     pub kind: String,
-    /// What tells its adapter from others, where it is one on USB.
+    /// Identity of its adapter, where it is one on USB.
     pub usb: Option<UsbIdentity>,
 }
 
-/// What tells one USB adapter from another, whatever its node is called.
+/// Identity of a USB adapter, whatever its node is called.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbIdentity {
     /// Vendor number.
@@ -118,7 +118,7 @@ pub enum SerialError {
     Open {
         /// The name asked for.
         node: PathBuf,
-        /// What the serial layer says.
+        /// The serial layer's answer.
         source: io::Error,
     },
     /// Another program has it.
@@ -162,7 +162,7 @@ pub enum SerialError {
     /// The adapter that carried the device is gone.
     #[error("the adapter ({adapter}) is gone: ports here: {present}; plug it in again")]
     Gone {
-        /// What it was.
+        /// The adapter that it was.
         adapter: String,
         /// Ports that are there.
         present: String,
@@ -320,7 +320,7 @@ pub struct LineReport {
     pub baud: Option<u32>,
     /// Whether the adapter hands bytes on at once.
     pub low_latency: LowLatency,
-    /// What was read and dropped, oldest first, because nobody drained the queue.
+    /// Events dropped, oldest first, because nobody drained the queue.
     pub overflow: u64,
     /// Bytes without a stop bit, where the port counts them.
     pub framing_errors: u64,
@@ -337,7 +337,7 @@ pub struct LineReport {
 pub struct SerialStatus<R> {
     /// The line.
     pub line: LineReport,
-    /// What was said on it.
+    /// Report of what was said on it.
     pub said: R,
 }
 

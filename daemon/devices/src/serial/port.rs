@@ -9,7 +9,7 @@ use super::{
     LineSettings, SerialError, SerialStatus,
     feed::LineFeed,
     line::SerialLine,
-    reader::{LineReader, LineWatcher},
+    reader::{LineReader, LineWatcher, ReaderEnds},
 };
 use crate::{
     clock, queue,
@@ -37,7 +37,8 @@ impl<F: LineFeed> LinePort<F> {
         let link = PortLink::new(SerialStatus::default()).map_err(SerialError::Thread)?;
         let life = Arc::new(ThreadLife::new(clock::now()));
         let watcher = LineWatcher::new(Arc::clone(&link), Arc::clone(&life), reporter.clone(), F::KIND);
-        let reader = LineReader::new(settings, feed, line, Arc::clone(&link), life, reporter, queue);
+        let ends = ReaderEnds { link: Arc::clone(&link), life, reporter, queue };
+        let reader = LineReader::new(settings, feed, line, ends);
         let [reading, watching] = F::KIND.threads;
         let mut worker =
             PortWorker::start(reading, link, move || reader.run()).map_err(SerialError::Thread)?;

@@ -30,7 +30,7 @@ const SEARCH_NS: i64 = 100_000_000;
 const WAIT_NS: i64 = 20_000_000;
 /// How often the port's own counters are read.
 const COUNT_NS: i64 = 100_000_000;
-/// What a port that lies about bytes costs: no busy loop.
+/// Pause after a port that lies about bytes, so that it causes no busy loop.
 const SPURIOUS_PAUSE_NS: i64 = 5_000_000;
 /// A round of the reader that takes longer hangs in the kernel.
 pub(super) const BLOCKED_NS: i64 = 150_000_000;
@@ -39,15 +39,20 @@ const WATCH_NS: i64 = 25_000_000;
 /// Bytes of a read: 44 ms at 921600 baud.
 const READ_BYTES: usize = 4096;
 
+/// The ends on which the reading thread tells what it finds.
+pub(super) struct ReaderEnds<R> {
+    pub(super) link: Arc<PortLink<SerialStatus<R>>>,
+    pub(super) life: Arc<ThreadLife>,
+    pub(super) reporter: Reporter,
+    pub(super) queue: NewestSender<Event>,
+}
+
 /// The reading thread.
 pub(super) struct LineReader<F: LineFeed> {
     settings: LineSettings,
     feed: F,
     line: Option<SerialLine>,
-    link: Arc<PortLink<SerialStatus<F::Report>>>,
-    life: Arc<ThreadLife>,
-    reporter: Reporter,
-    queue: NewestSender<Event>,
+    ends: ReaderEnds<F::Report>,
     finder: Finder,
     /// Which of the candidates is tried.
     attempt: usize,
@@ -72,10 +77,7 @@ impl<F: LineFeed> LineReader<F> {
         settings: LineSettings,
         feed: F,
         line: Option<SerialLine>,
-        link: Arc<PortLink<SerialStatus<F::Report>>>,
-        life: Arc<ThreadLife>,
-        reporter: Reporter,
-        queue: NewestSender<Event>,
+        ends: ReaderEnds<F::Report>,
     ) -> Self {
         Self {
             finder: Finder::new(settings.device.clone()),
@@ -83,10 +85,7 @@ impl<F: LineFeed> LineReader<F> {
             settings,
             feed,
             line,
-            link,
-            life,
-            reporter,
-            queue,
+            ends,
             attempt: 0,
             several: false,
             errors: None,
@@ -95,14 +94,14 @@ impl<F: LineFeed> LineReader<F> {
     }
 
     pub(super) fn run(mut self) {
-        self.life.begin();
-        let _mark = StoppedMark(Arc::clone(&self.link));
+        self.ends.life.begin();
+        let _mark = StoppedMark(Arc::clone(&self.ends.link));
         if self.line.is_some() {
             self.opened(clock::now());
         }
         let mut bytes = vec![0; READ_BYTES];
-        while !self.link.is_stopping() {
-            self.life.alive(clock::now());
+        while !self.ends.link.is_stopping() {
+            self.ends.life.alive(clock::now());
             match self.line.take() {
                 None => self.search(),
                 Some(line) => self.line = self.serve(line, &mut bytes),
@@ -115,14 +114,14 @@ impl<F: LineFeed> LineReader<F> {
     /// loaded computer they and the wait together may take longer than a call that hangs.
     pub(super) fn search(&mut self) {
         let found = self.finder.candidates();
-        self.life.alive(clock::now());
+        self.ends.life.alive(clock::now());
         let opened = found.and_then(|found| {
             self.several = found.len() > 1;
             let path = found.get(self.attempt % found.len().max(1)).cloned().unwrap_or_default();
             SerialLine::open(&path, self.health.baud(), self.settings.low_latency)
         });
         let now = clock::now();
-        self.life.alive(now);
+        self.ends.life.alive(now);
         match opened {
             Ok(line) => {
                 self.line = Some(line);
@@ -139,7 +138,7 @@ impl<F: LineFeed> LineReader<F> {
                 self.health.absent(now, &e.to_string());
             }
         }
-        self.link.pause(SEARCH_NS);
+        self.ends.link.pause(SEARCH_NS);
     }
 
     fn opened(&mut self, now: Time) {
@@ -155,7 +154,7 @@ impl<F: LineFeed> LineReader<F> {
             self.health.baud(),
             line.low_latency()
         );
-        let report = &mut self.link.status().line;
+        let report = &mut self.ends.link.status().line;
         report.node = Some(line.node().to_owned());
         report.low_latency = line.low_latency();
         report.opened += 1;
@@ -163,11 +162,11 @@ impl<F: LineFeed> LineReader<F> {
 
     /// One wait and one read. Gives the line back while it is good.
     fn serve(&mut self, mut line: SerialLine, bytes: &mut [u8]) -> Option<SerialLine> {
-        let ready = match self.link.wait(&[line.as_fd()], WAIT_NS) {
+        let ready = match self.ends.link.wait(&[line.as_fd()], WAIT_NS) {
             Ok(ready) => ready.first().copied().unwrap_or(PollFlags::empty()),
             Err(e) => return self.lost(&line, &format!("waiting for bytes failed: {e}")),
         };
-        self.life.alive(clock::now());
+        self.ends.life.alive(clock::now());
         let mut spurious = false;
         if !ready.is_empty() {
             match line.read(bytes) {
@@ -184,12 +183,12 @@ impl<F: LineFeed> LineReader<F> {
             }
         }
         if spurious {
-            self.link.status().line.spurious += 1;
-            self.link.pause(SPURIOUS_PAUSE_NS);
+            self.ends.link.status().line.spurious += 1;
+            self.ends.link.pause(SPURIOUS_PAUSE_NS);
         }
         let now = clock::now();
         self.count(&line, now);
-        self.feed.judge(line.path(), now, &self.reporter);
+        self.feed.judge(line.path(), now, &self.ends.reporter);
         // Where no port is configured another one may come: an adapter that is there at first may be any device's.
         let roam = self.several || self.settings.device.is_none();
         match self.health.tick(now, roam) {
@@ -217,7 +216,7 @@ impl<F: LineFeed> LineReader<F> {
     fn next_port(&mut self, line: SerialLine) -> Option<SerialLine> {
         let found = self.finder.candidates();
         let now = clock::now();
-        self.life.alive(now);
+        self.ends.life.alive(now);
         if !found.is_ok_and(|found| others(&found, line.path())) {
             return Some(line);
         }
@@ -241,7 +240,7 @@ impl<F: LineFeed> LineReader<F> {
     /// Bytes arrived.
     fn take(&mut self, line: &SerialLine, bytes: &[u8]) {
         let arrival = clock::now();
-        let packets = self.feed.take(bytes, arrival, &mut self.queue);
+        let packets = self.feed.take(bytes, arrival, &mut self.ends.queue);
         let was = self.health.status();
         self.health.received(arrival, bytes.len(), packets);
         if was != LineStatus::Streaming && self.health.status() == LineStatus::Streaming {
@@ -254,7 +253,7 @@ impl<F: LineFeed> LineReader<F> {
         if let Some(before) = self.finder.found(line.node()) {
             let cause =
                 format!("the {} was {} and now is {}", F::KIND.name, before.display(), line.node().display());
-            self.reporter.send(FaultChange::noted(now, F::KIND.renumbered, cause));
+            self.ends.reporter.send(FaultChange::noted(now, F::KIND.renumbered, cause));
         }
     }
 
@@ -268,7 +267,7 @@ impl<F: LineFeed> LineReader<F> {
         if let Some(before) = self.errors.replace(errors) {
             let framing = errors.framing.wrapping_sub(before.framing);
             self.health.framing(framing);
-            let report = &mut self.link.status().line;
+            let report = &mut self.ends.link.status().line;
             report.framing_errors += u64::from(framing);
             report.overruns += u64::from(errors.overrun.wrapping_sub(before.overrun));
         }
@@ -277,9 +276,9 @@ impl<F: LineFeed> LineReader<F> {
     /// Tells the supervisor and the owner.
     fn publish(&mut self) {
         for change in self.health.changes() {
-            self.reporter.send(change);
+            self.ends.reporter.send(change);
         }
-        let mut status = self.link.status();
+        let mut status = self.ends.link.status();
         status.said = self.feed.report();
         let report = &mut status.line;
         report.status = self.health.status();
@@ -287,7 +286,7 @@ impl<F: LineFeed> LineReader<F> {
         if self.line.is_none() {
             report.node = None;
         }
-        report.overflow = self.queue.dropped();
+        report.overflow = self.ends.queue.dropped();
     }
 }
 

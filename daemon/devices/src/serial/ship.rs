@@ -106,7 +106,7 @@ impl ShipPort {
         Ok(Self { port })
     }
 
-    /// What was said and not yet drained, [`Event::Ship`] in the order of arrival; the oldest give way.
+    /// Measurements not yet drained, [`Event::Ship`] in the order of arrival; the oldest give way.
     pub fn events(&self) -> &Receiver<Event> {
         self.port.events()
     }

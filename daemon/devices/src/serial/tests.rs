@@ -27,7 +27,7 @@ use super::{
     feed::IMU,
     health::{LineAction, LineHealth},
     imu_feed::{ImuFeed, ImuReport},
-    reader::{BLOCKED_NS, LineReader, LineWatcher},
+    reader::{BLOCKED_NS, LineReader, LineWatcher, ReaderEnds},
 };
 use crate::{
     clock,
@@ -357,8 +357,8 @@ fn a_reader_that_searches_gives_a_sign_of_life_before_it_pauses() {
         let (queue, _events) = queue::newest(1);
         let settings = settings(&device);
         let feed = ImuFeed::new(&settings);
-        let mut reader =
-            LineReader::new(settings.line(), feed, None, link, Arc::clone(&life), reporting().0, queue);
+        let ends = ReaderEnds { link, life: Arc::clone(&life), reporter: reporting().0, queue };
+        let mut reader = LineReader::new(settings.line(), feed, None, ends);
         let begin = clock::now();
         reader.search();
         assert!(life.last() >= begin, "{}", device.display());

@@ -165,7 +165,7 @@ impl Arrivals {
         }
     }
 
-    /// What the last look found.
+    /// Result of the last look.
     pub(super) const fn timing(&self) -> ArrivalTiming {
         self.timing
     }

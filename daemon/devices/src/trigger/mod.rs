@@ -27,13 +27,13 @@ pub enum TriggerError {
     /// The window is too short for contacts, or too long for a finger.
     #[error("a debounce of {ms} ms is out of range: give 10 to 20")]
     Debounce {
-        /// What was asked for.
+        /// The value asked for.
         ms: u128,
     },
     /// The time is no time that a belt takes.
     #[error("a trigger that is stuck after {s} s is out of range: give 1 to 3600")]
     StuckAfter {
-        /// What was asked for.
+        /// The value asked for.
         s: f64,
     },
     /// One line for two things.
@@ -66,12 +66,12 @@ pub enum TriggerError {
 pub struct Press {
     /// Its line: active is pressed.
     pub line: InputLine,
-    /// What the gun stands at when it is pressed.
+    /// Where the gun points when it is pressed.
     pub kind: MarkKind,
 }
 
 impl Press {
-    /// What it is called.
+    /// Its name.
     pub const fn name(&self) -> &'static str {
         match self.kind {
             MarkKind::Stow => "re-zero",
@@ -172,6 +172,6 @@ pub struct TriggerStatus {
     pub power_fail: Option<LineState>,
     /// The interlock is closed: presses count. `None` where none is wired: they count always.
     pub armed: Option<bool>,
-    /// What was met so far.
+    /// Counts so far.
     pub counters: TriggerCounters,
 }

@@ -6,7 +6,7 @@
 
 mod calls;
 mod life;
-pub(crate) mod queue;
+pub mod queue;
 pub mod report;
 mod wake;
 
@@ -69,7 +69,7 @@ impl<S> PortLink<S> {
         self.wake.notify();
     }
 
-    /// What wakes the working thread.
+    /// The wake of the working thread.
     pub(crate) const fn waker(&self) -> &Arc<WakeEvent> {
         &self.wake
     }

@@ -38,7 +38,7 @@ impl Heartbeat {
     }
 }
 
-/// What a device's thread reports with. Never blocks.
+/// The end that a device's thread reports with. Never blocks.
 #[derive(Clone, Debug)]
 pub struct Reporter {
     changes: Sender<FaultChange>,

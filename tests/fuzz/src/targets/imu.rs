@@ -22,7 +22,7 @@ const MEMORY_BYTES: usize = 16 << 10;
 
 /// Whatever came before: samples are finite, everything is counted, and good packets come through again.
 pub fn run(input: &[u8]) {
-    let Some((&piece, mut rest)) = input.split_first() else { return };
+    let Some((&piece, steps)) = input.split_first() else { return };
     let mut line = FuzzedLine {
         decoder: ImuDecoder::fixed(ImuFormat::VectorNav),
         piece: usize::from(piece),
@@ -30,26 +30,19 @@ pub fn run(input: &[u8]) {
         sent: 0,
         samples: 0,
     };
-    while let Some((bytes, behind)) = step(rest) {
-        rest = behind;
-        line.push(&bytes, |_| {});
-    }
+    super::steps::of(steps, wire).for_each(|bytes| line.push(&bytes, |_| {}));
     line.check_counters();
     line.check_recovery();
     line.check_counters();
 }
 
-/// The next step's bytes on the wire and the steps behind it.
-fn step(input: &[u8]) -> Option<(Vec<u8>, &[u8])> {
-    let (&[low, high], rest) = input.split_first_chunk()?;
-    let head = u16::from_le_bytes([low, high]);
-    let (content, rest) = rest.split_at(usize::from(head & 0x3ff).min(rest.len()));
-    let bytes = if head & 0x8000 == 0 {
+/// A step's bytes on the wire.
+fn wire(head: u16, content: &[u8]) -> Vec<u8> {
+    if head & 0x8000 == 0 {
         content.to_vec()
     } else {
         [&[SYNC], content, &crc16(content).to_be_bytes()].concat()
-    };
-    Some((bytes, rest))
+    }
 }
 
 /// CRC16-CCITT bit by bit, so that it shares nothing with the decoder's.
@@ -78,7 +71,8 @@ impl FuzzedLine {
             let samples = &mut self.samples;
             super::memory::within(MEMORY_BYTES, || {
                 for sample in self.decoder.samples(part, arrival) {
-                    check_sample(&sample, arrival);
+                    assert_eq!(sample.arrival, arrival);
+                    super::steps::check_sample(&sample);
                     *samples += 1;
                     sink(&sample);
                 }
@@ -125,14 +119,5 @@ impl FuzzedLine {
         let others = (self.decoder.counters().packets - before).saturating_sub(came);
         let overlap = others * (PACKET_MAX_BYTES / CommonOutput::MAX_BYTES + 2) as u64;
         assert!(came + overlap >= GOOD, "{came} of {GOOD} good packets came through, {others} others");
-    }
-}
-
-fn check_sample(sample: &ImuSample, arrival: Time) {
-    assert_eq!(sample.arrival, arrival);
-    assert!(sample.device_time_ns >= 0, "{sample:?}");
-    assert!(sample.rate.is_finite() && sample.accel.is_finite(), "{sample:?}");
-    if let Some(attitude) = sample.world_from_imu {
-        assert!((attitude.length() - 1.0).abs() < 1e-6, "an attitude that is no rotation: {sample:?}");
     }
 }

@@ -5,7 +5,7 @@
 //! four highest bits say whether it is sent as it is (0, and beyond the list) or as a packet of a format (its place, from 1), the lowest
 //! ten how many bytes it has.
 
-use bowwave_core::{event::ImuSample, time::Time};
+use bowwave_core::time::Time;
 use bowwave_devices::{
     imu::{ImuDecoder, ImuFormat},
     nmea::{ShipAttitude, ShipParser},
@@ -21,7 +21,7 @@ const SILENCE_BYTES: usize = 3 * 4096;
 
 /// Whatever came before: samples are finite, everything is counted, and a good unit is recognised.
 pub fn run(input: &[u8]) {
-    let Some((&[format, piece], mut rest)) = input.split_first_chunk() else { return };
+    let Some((&[format, piece], steps)) = input.split_first_chunk() else { return };
     let fixed = ImuFormat::ALL.get(usize::from(format)).copied();
     let mut line = FuzzedLines {
         decoder: ImuDecoder::with(fixed),
@@ -31,8 +31,7 @@ pub fn run(input: &[u8]) {
         sent: 0,
         samples: 0,
     };
-    while let Some((bytes, behind)) = step(rest) {
-        rest = behind;
+    for bytes in super::steps::of(steps, wire) {
         line.push(&bytes);
     }
     line.check_counters();
@@ -42,13 +41,10 @@ pub fn run(input: &[u8]) {
     }
 }
 
-/// The next step's bytes on the wire and the steps behind it.
-fn step(input: &[u8]) -> Option<(Vec<u8>, &[u8])> {
-    let (&[low, high], rest) = input.split_first_chunk()?;
-    let head = u16::from_le_bytes([low, high]);
-    let (content, rest) = rest.split_at(usize::from(head & 0x3ff).min(rest.len()));
+/// A step's bytes on the wire.
+fn wire(head: u16, content: &[u8]) -> Vec<u8> {
     let format = usize::from(head >> 12).checked_sub(1).and_then(|n| ImuFormat::ALL.get(n));
-    Some((format.map_or_else(|| content.to_vec(), |format| format.wrap(content)), rest))
+    format.map_or_else(|| content.to_vec(), |format| format.wrap(content))
 }
 
 struct FuzzedLines {
@@ -69,7 +65,7 @@ impl FuzzedLines {
             let Self { decoder, ship, samples, .. } = self;
             super::memory::within(MEMORY_BYTES, || {
                 for sample in decoder.samples(part, arrival) {
-                    check_sample(&sample);
+                    super::steps::check_sample(&sample);
                     *samples += 1;
                 }
                 ship.lines(part, arrival).for_each(|said| check_ship(&said));
@@ -109,14 +105,6 @@ impl FuzzedLines {
         }
         assert_eq!(self.decoder.format(), Some(ImuFormat::VectorNav));
         assert_eq!(self.samples - before, GOOD, "{:?}", self.decoder.counters());
-    }
-}
-
-fn check_sample(sample: &ImuSample) {
-    assert!(sample.device_time_ns >= 0, "{sample:?}");
-    assert!(sample.rate.is_finite() && sample.accel.is_finite(), "{sample:?}");
-    if let Some(attitude) = sample.world_from_imu {
-        assert!((attitude.length() - 1.0).abs() < 1e-6, "an attitude that is no rotation: {sample:?}");
     }
 }
 

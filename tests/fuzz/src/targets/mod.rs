@@ -14,6 +14,7 @@ pub mod model;
 mod place;
 pub mod recording;
 pub mod scenario;
+mod steps;
 
 /// The name of a target's binary and folders, and its function.
 pub type FuzzTarget = (&'static str, fn(&[u8]));

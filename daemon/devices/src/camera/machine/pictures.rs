@@ -13,6 +13,8 @@ use crate::camera::{
     Coding, Exposure,
     driver::{CameraDriver, FilledBuffer, SetFormat},
     jpeg::JpegError,
+    negotiate::ModeCandidate,
+    settings::usable_size,
     timing::{Sensor, mid_exposure},
 };
 
@@ -55,7 +57,7 @@ const ODD_STAMPS: u32 = 2;
 /// So many pictures in a row are of another size until that is believed.
 const OTHER_SIZES: u32 = 3;
 
-/// What became of a buffer.
+/// Fate of a buffer.
 enum TakenPicture {
     Picture(Picture, Option<Arc<[u8]>>),
     /// Damaged, or of another size.
@@ -207,7 +209,7 @@ impl CameraMachine {
         Ok(true)
     }
 
-    /// What a sound picture says about the camera.
+    /// Takes in that a picture was sound.
     fn judge(&mut self, now: Time, picture: &Picture, stream: &CameraStream, out: &mut CameraOutput) {
         for fault in super::GONE_WITH_FRAMES {
             self.clear(now, fault, out);
@@ -300,4 +302,17 @@ impl CameraMachine {
             }
         })
     }
+}
+
+impl SetFormat {
+    pub(super) fn is(&self, candidate: &ModeCandidate) -> bool {
+        let mode = &candidate.mode;
+        (self.coding, self.width, self.height) == (mode.coding, mode.width, mode.height)
+    }
+}
+
+/// Whether a picture of that format can be what the driver says.
+pub(super) fn plausible(format: &SetFormat) -> bool {
+    usable_size(format.coding, format.width, format.height)
+        && layout(format).is_none_or(|layout| layout.bytes <= format.size_image as usize)
 }

@@ -150,9 +150,19 @@ macro_rules! imu_formats {
 
         #[cfg(test)]
         impl ImuFormat {
-            /// How the unit that the tests simulate sends.
-            pub(crate) const fn simulated(self) -> super::streams::Simulated {
-                match self { $(Self::$format => <$codec as super::streams::SimulatedUnit>::SENDS,)* }
+            /// Nanoseconds from one packet (or group of packets) of the unit that the tests simulate to the next.
+            pub(crate) const fn simulated_period_ns(self) -> i64 {
+                match self { $(Self::$format => <$codec as super::streams::SimulatedUnit>::PERIOD_NS,)* }
+            }
+
+            /// Packets of one of its samples.
+            pub(crate) const fn simulated_packets(self) -> u64 {
+                match self { $(Self::$format => <$codec as super::streams::SimulatedUnit>::PACKETS,)* }
+            }
+
+            /// How far the samples read may be from those sent.
+            pub(crate) const fn tolerance(self) -> super::streams::FormatTolerance {
+                match self { $(Self::$format => <$codec as super::streams::SimulatedUnit>::TOLERANCE,)* }
             }
 
             /// The bytes that such a unit sends for sample `n` of a motion.

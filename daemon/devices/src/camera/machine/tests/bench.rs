@@ -10,7 +10,7 @@ use super::super::*;
 use crate::camera::{
     Coding, Rate, Size,
     driver::FilledBuffer,
-    negotiate::{Offer, Rates},
+    negotiate::{ModeCandidate, Offer, Rates},
     settings::Controls,
     timing::BufferStamp,
 };
@@ -46,9 +46,9 @@ pub(super) struct Fake {
     pub(super) restart_fails: Option<Errno>,
     pub(super) dequeue_fails: Option<Errno>,
     pub(super) reset_works: bool,
-    /// What the driver sets instead of what it is asked for.
+    /// The mode that the driver sets instead of the one asked for.
     pub(super) format_set: Option<SetFormat>,
-    /// What it says later.
+    /// The mode that it tells later.
     pub(super) format_now: Option<SetFormat>,
     pub(super) mode: Option<ModeCandidate>,
     pub(super) exposure_ns: i64,
@@ -312,7 +312,7 @@ impl CameraBench {
         self
     }
 
-    /// What was reported since the last call, and when, milliseconds from `since`.
+    /// The reports since the last call, and when, milliseconds from `since`.
     pub(super) fn told(&mut self, since: Time) -> Vec<(Fault, &'static str, i64)> {
         let told = |c: FaultChange| {
             let kind = match c.change {

@@ -381,7 +381,7 @@ fn the_middle_of_an_exposure_that_changes_is_followed() {
     }
 }
 
-/// What was wrong with a camera's pictures says nothing of it once it is gone.
+/// Trouble with a camera's pictures says nothing of it once it is gone.
 #[test]
 fn a_camera_that_is_gone_is_lost_and_nothing_else() {
     let mut bench = mjpeg().streaming();

@@ -8,17 +8,15 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{FormatTolerance, G, POLE, Simulated, SimulatedUnit, encode, i16s, rfu, truth, world_of},
+        streams::{FormatTolerance, G, POLE, SimulatedUnit, encode, i16s, rfu, truth, world_of},
     },
 };
 
 impl SimulatedUnit for Bno08xCodec {
-    const SENDS: Simulated = Simulated {
-        period_ns: 10_000_000,
-        packets: 1,
-        // Hundredths of a degree; the rate is their difference over 10 ms, half of that old.
-        tolerance: FormatTolerance { rate: 0.04, accel: 0.006, attitude: 2e-4, time_ns: 1_000_000 },
-    };
+    const PERIOD_NS: i64 = 10_000_000;
+    // Hundredths of a degree; the rate is their difference over 10 ms, half of that old.
+    const TOLERANCE: FormatTolerance =
+        FormatTolerance { rate: 0.04, accel: 0.006, attitude: 2e-4, time_ns: 1_000_000 };
 
     fn send(s: &ImuSample, n: i64, _: bool) -> Vec<u8> {
         let world = world_of(s);

@@ -9,17 +9,11 @@ use crate::{
     framing::{LineCounters, Scanner},
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{FormatTolerance, G, Simulated, SimulatedUnit, be, ned, world_of, wxyz},
+        streams::{G, SimulatedUnit, be, ned, world_of, wxyz},
     },
 };
 
 impl SimulatedUnit for MicroStrainCodec {
-    const SENDS: Simulated = Simulated {
-        period_ns: 5_000_000,
-        packets: 1,
-        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
-    };
-
     fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {
         let world = world_of(s);
         let q = DQuat::from_mat3(&ned(world));
@@ -41,8 +35,12 @@ pub(crate) fn mip_packet(set: u8, fields: &[(u8, Vec<u8>)]) -> Vec<u8> {
         .iter()
         .flat_map(|(descriptor, data)| [&[data.len() as u8 + 2, *descriptor], &data[..]].concat())
         .collect();
-    let mut bytes = vec![0x75, 0x65, set, payload.len() as u8];
-    bytes.extend(payload);
+    sealed(set, &payload)
+}
+
+/// A packet with any payload.
+fn sealed(set: u8, payload: &[u8]) -> Vec<u8> {
+    let mut bytes = [&[0x75, 0x65, set, payload.len() as u8], payload].concat();
     let (mut a, mut b) = (0u8, 0u8);
     for &byte in &bytes {
         a = a.wrapping_add(byte);
@@ -247,14 +245,7 @@ fn a_unit_that_begins_anew_restarts_the_map() {
 proptest! {
     #[test]
     fn fields_of_any_bytes_are_survived(payload in prop::collection::vec(any::<u8>(), 1..255), filter in any::<bool>()) {
-        let mut bytes = vec![0x75, 0x65, if filter { 0x82 } else { 0x80 }, payload.len() as u8];
-        bytes.extend(payload);
-        let (mut a, mut b) = (0u8, 0u8);
-        for &byte in &bytes {
-            a = a.wrapping_add(byte);
-            b = b.wrapping_add(a);
-        }
-        bytes.extend([a, b]);
+        let bytes = sealed(if filter { FILTER } else { SENSOR }, &payload);
         let (packets, counters) = parse(&bytes);
         prop_assert_eq!((packets.len(), counters.packets), (1, 1));
         MicroStrainCodec::default().convert(&packets[0]);

@@ -7,17 +7,15 @@ use crate::{
     framing::{LineCounters, Scanner},
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{FormatTolerance, Simulated, SimulatedUnit, le, ned, world_of, wxyz, yaw_pitch_roll},
+        streams::{FormatTolerance, SimulatedUnit, le, ned, world_of, wxyz, yaw_pitch_roll},
     },
 };
 
 impl SimulatedUnit for SbgCodec {
-    const SENDS: Simulated = Simulated {
-        period_ns: 5_000_000,
-        packets: 2,
-        // An attitude of its own log is carried over one period.
-        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 2e-6, time_ns: 0 },
-    };
+    const PACKETS: u64 = 2;
+    // An attitude of its own log is carried over one period.
+    const TOLERANCE: FormatTolerance =
+        FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 2e-6, time_ns: 0 };
 
     fn send(s: &ImuSample, _: i64, by_angles: bool) -> Vec<u8> {
         let world = world_of(s);

@@ -130,16 +130,13 @@ mod tests {
         framing::Scanner,
         imu::{
             ImuDecoder, ImuFormat,
-            streams::{FormatTolerance, Simulated, SimulatedUnit, ned, world_of, yaw_pitch_roll},
+            streams::{FormatTolerance, SimulatedUnit, ned, world_of, yaw_pitch_roll},
         },
     };
 
     impl SimulatedUnit for VectorNavLines {
-        const SENDS: Simulated = Simulated {
-            period_ns: 5_000_000,
-            packets: 1,
-            tolerance: FormatTolerance { rate: 1e-6, accel: 1e-3, attitude: 2e-5, time_ns: 1_000_000 },
-        };
+        const TOLERANCE: FormatTolerance =
+            FormatTolerance { rate: 1e-6, accel: 1e-3, attitude: 2e-5, time_ns: 1_000_000 };
 
         fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {
             let world = world_of(s);

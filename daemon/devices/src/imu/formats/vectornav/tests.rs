@@ -7,16 +7,10 @@ use proptest::prelude::*;
 use super::{CRC, CommonOutput, VectorNavCodec, VectorNavPacket, layout::MAX_PACKET};
 use crate::{
     framing::{CHUNK, Framing as _, PacketLook, Scanner, intact_places},
-    imu::streams::{FormatTolerance, Simulated, SimulatedUnit},
+    imu::streams::SimulatedUnit,
 };
 
 impl SimulatedUnit for VectorNavCodec {
-    const SENDS: Simulated = Simulated {
-        period_ns: 5_000_000,
-        packets: 1,
-        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
-    };
-
     fn send(s: &ImuSample, _: i64, _: bool) -> Vec<u8> {
         let mut bytes = Vec::new();
         if let Some(output) = CommonOutput::from_sample(s) {

@@ -6,18 +6,15 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{
-            FormatTolerance, G, Simulated, SimulatedUnit, i16s as words, rfu, world_of, wxyz, yaw_pitch_roll,
-        },
+        streams::{FormatTolerance, G, SimulatedUnit, i16s as words, rfu, world_of, wxyz, yaw_pitch_roll},
     },
 };
 
 impl SimulatedUnit for WitmotionCodec {
-    const SENDS: Simulated = Simulated {
-        period_ns: 10_000_000,
-        packets: 5,
-        tolerance: FormatTolerance { rate: 6e-4, accel: 0.003, attitude: 8e-5, time_ns: 1_000_000 },
-    };
+    const PERIOD_NS: i64 = 10_000_000;
+    const PACKETS: u64 = 5;
+    const TOLERANCE: FormatTolerance =
+        FormatTolerance { rate: 6e-4, accel: 0.003, attitude: 8e-5, time_ns: 1_000_000 };
 
     fn send(s: &ImuSample, _: i64, by_angles: bool) -> Vec<u8> {
         let world = world_of(s);

@@ -9,17 +9,11 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{FormatTolerance, Simulated, SimulatedUnit, be, world_of, wxyz},
+        streams::{SimulatedUnit, be, world_of, wxyz},
     },
 };
 
 impl SimulatedUnit for XsensCodec {
-    const SENDS: Simulated = Simulated {
-        period_ns: 5_000_000,
-        packets: 1,
-        tolerance: FormatTolerance { rate: 1e-6, accel: 2e-6, attitude: 1e-6, time_ns: 0 },
-    };
-
     fn send(s: &ImuSample, n: i64, _: bool) -> Vec<u8> {
         let world = world_of(s);
         // Forward, left, up.
