@@ -27,7 +27,7 @@ fn main() -> anyhow::Result<()> {
     };
     let report = import_video(&video, &recording, &options, &mut |_| ControlFlow::Continue(()))?;
     println!("{report:#?}");
-    let clip = measure::Clip::read(&recording)?;
+    let clip = measure::DriftClip::read(&recording)?;
     let tracks = measure::Tracks::follow(&clip, 200)?;
     println!("drift in pixels at {} wide:", measure::SCREEN_WIDTH);
     for (name, from, to) in

@@ -19,8 +19,8 @@ use std::path::Path;
 pub const SCREEN_WIDTH: f64 = 1280.0;
 
 /// A recording in memory, pictures in grey.
-pub struct Clip {
-    /// What the recording says about camera and gyro.
+pub struct DriftClip {
+    /// Calibration of camera and gyro in the recording.
     pub calibration: Calibration,
     /// Samples in the order of their arrival.
     pub samples: Vec<ImuSample>,
@@ -28,7 +28,7 @@ pub struct Clip {
     pub frames: Vec<(Time, Gray)>,
 }
 
-impl Clip {
+impl DriftClip {
     /// Reads a recording whole.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let reader = RecordingReader::open(path)?;
@@ -58,7 +58,7 @@ pub struct Tracks {
 
 impl Tracks {
     /// Follows patches of the sky above `row_max` through the clip.
-    pub fn follow(clip: &Clip, row_max: usize) -> anyhow::Result<Self> {
+    pub fn follow(clip: &DriftClip, row_max: usize) -> anyhow::Result<Self> {
         let (_, first) = clip.frames.first().context("no pictures")?;
         let mut tracker = Tracker::start(first, row_max);
         let mut seen = vec![tracker.places()];
@@ -71,7 +71,7 @@ impl Tracks {
 
 /// Drift over a part of the clip, pixels at [`SCREEN_WIDTH`].
 #[derive(Clone, Copy, Debug)]
-pub struct Drift {
+pub struct OverlayDrift {
     /// Root mean square over pictures of the mean shift of all patches: how far the overlay as a whole is off.
     pub overlay_rms: f64,
     /// The largest such shift.
@@ -86,7 +86,7 @@ pub struct Drift {
     pub pictures: usize,
 }
 
-impl std::fmt::Display for Drift {
+impl std::fmt::Display for OverlayDrift {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { overlay_rms, overlay_max, at_end, patch_rms, patches, pictures } = self;
         write!(
@@ -99,7 +99,7 @@ impl std::fmt::Display for Drift {
 }
 
 /// Where the gyro says that what was seen first at `first` is seen at each time.
-pub fn predict(clip: &Clip, times: &[Time], first: DVec2) -> Vec<Option<DVec2>> {
+pub fn predict(clip: &DriftClip, times: &[Time], first: DVec2) -> Vec<Option<DVec2>> {
     let c = &clip.calibration;
     let attitude = GyroPath::integrate(&clip.samples, c.gyro_bias);
     let at = |t: Time| attitude.world_from_imu(t.plus_ns(c.time_offset_ns)) * c.camera_from_imu.inverse();
@@ -110,7 +110,7 @@ pub fn predict(clip: &Clip, times: &[Time], first: DVec2) -> Vec<Option<DVec2>> 
 
 /// Compares gyro and tracks over the pictures `from_s..=to_s` after the first one; the overlay is put in place at the first
 /// picture of that span.
-pub fn drift(clip: &Clip, tracks: &Tracks, from_s: f64, to_s: f64) -> anyhow::Result<Drift> {
+pub fn drift(clip: &DriftClip, tracks: &Tracks, from_s: f64, to_s: f64) -> anyhow::Result<OverlayDrift> {
     let zero = *tracks.times.first().context("no pictures")?;
     let inside = |t: &Time| (from_s..=to_s).contains(&t.secs_since(zero));
     let span: Vec<usize> = (0..tracks.times.len()).filter(|i| inside(&tracks.times[*i])).collect();
@@ -134,7 +134,7 @@ pub fn drift(clip: &Clip, tracks: &Tracks, from_s: f64, to_s: f64) -> anyhow::Re
     }
     let pictures = span.len();
     let mean_square = shift.iter().map(|s| s.length_squared()).sum::<f64>() / pictures as f64;
-    Ok(Drift {
+    Ok(OverlayDrift {
         overlay_rms: mean_square.sqrt(),
         overlay_max: shift.iter().map(|s| s.length()).fold(0.0, f64::max),
         at_end: shift[pictures - 1],

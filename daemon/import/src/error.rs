@@ -11,7 +11,7 @@ pub enum ImportError {
     /// The folder or a file in it cannot be read.
     #[error("cannot read {path}: {source}; check that it exists and may be read")]
     Read {
-        /// What could not be read.
+        /// The file or folder.
         path: PathBuf,
         /// The system's reason.
         source: io::Error,
@@ -27,7 +27,7 @@ pub enum ImportError {
     Picture {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
     /// A picture of another size than those before it.
@@ -68,7 +68,7 @@ pub enum ImportError {
     NotVideo {
         /// The file.
         path: PathBuf,
-        /// What was found instead.
+        /// Content that was found instead.
         what: String,
     },
     /// The video has no pictures.
@@ -78,7 +78,7 @@ pub enum ImportError {
     NoFrames {
         /// The file.
         path: PathBuf,
-        /// What the reader said.
+        /// The reader's message.
         what: String,
     },
     /// The reader ended before the video did.
@@ -90,7 +90,7 @@ pub enum ImportError {
         path: PathBuf,
         /// Pictures that were read.
         frames: u64,
-        /// What the reader said.
+        /// The reader's message.
         what: String,
     },
     /// There is a gyro track, but it cannot be understood.
@@ -98,7 +98,7 @@ pub enum ImportError {
     Telemetry {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
     /// The bias cannot be taken from the first seconds.
@@ -136,7 +136,7 @@ pub enum ImportError {
     Record(#[from] RecordError),
     /// The finished recording could not be given its name.
     #[error("cannot write {path}: {source}; check the folder's permissions and space")]
-    Output {
+    RecordingOutput {
         /// The file.
         path: PathBuf,
         /// The system's reason.

@@ -19,7 +19,7 @@ const COMPLAINTS_MAX: usize = 5;
 /// Times that may be known before their pictures; the reader is never more than a few dozen ahead.
 const TIMES_AHEAD_MAX: usize = 65_536;
 
-/// What `ffprobe` says about a video.
+/// Properties of a video by `ffprobe`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VideoInfo {
     /// Pictures, where the container knows.
@@ -72,6 +72,74 @@ pub(crate) fn probe(ffmpeg: &Path, video: &Path) -> Result<VideoInfo, ImportErro
     Ok(VideoInfo {
         frames: fields.get("nb_frames").and_then(|n| n.parse().ok()).filter(|n| *n > 0),
         interval_ns: (interval * 1e9).round() as i64,
+    })
+}
+
+/// Place and time of a payload of a GPMF track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct GpmfPacket {
+    /// First byte in the file.
+    pub offset: u64,
+    /// Length in bytes.
+    pub bytes: u64,
+    /// When it begins, milliseconds on the container's clock.
+    pub start_ms: f64,
+    /// How long it lasts, milliseconds; zero where the container does not say.
+    pub duration_ms: f64,
+}
+
+/// Asks `ffprobe`, which lies beside `ffmpeg`, for the payloads of the first GPMF track; `None` where there is none.
+pub(crate) fn gpmf_packets(ffmpeg: &Path, video: &Path) -> Result<Option<Vec<GpmfPacket>>, ImportError> {
+    let tracks = ffprobe(ffmpeg, video, "d", "stream=index,codec_tag_string,nb_frames")?;
+    let tracks = tracks.lines().map(compact);
+    let Some(track) = tracks.into_iter().find(|t| t.get("codec_tag_string") == Some(&"gpmd")) else {
+        return Ok(None);
+    };
+    let fail = |what: String| ImportError::Telemetry { path: video.to_owned(), what };
+    let index = track.get("index").copied().unwrap_or_default();
+    let listed = ffprobe(ffmpeg, video, index, "packet=pts_time,duration_time,pos,size")?;
+    let packets: Vec<GpmfPacket> = listed.lines().filter_map(|line| gpmf_packet(&compact(line))).collect();
+    let expected = track.get("nb_frames").and_then(|n| n.parse().ok()).unwrap_or(packets.len());
+    if packets.is_empty() || packets.len() < expected {
+        let what = format!(
+            "of its {expected} payloads {} can be read, because the index is damaged or the file is cut short",
+            packets.len()
+        );
+        return Err(fail(what));
+    }
+    Ok(Some(packets))
+}
+
+/// Output of `ffprobe` for the chosen tracks, an entry a line, fields as `name=value` with bars between.
+fn ffprobe(ffmpeg: &Path, video: &Path, tracks: &str, entries: &str) -> Result<String, ImportError> {
+    let program = ffprobe_beside(ffmpeg);
+    let output = Command::new(&program)
+        .args(["-v", "error", "-protocol_whitelist", "file", "-select_streams", tracks])
+        .args(["-show_entries", entries, "-of", "compact=p=0"])
+        .arg(file_url(video))
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|e| start_error(&program, e))?;
+    if !output.status.success() {
+        let text = String::from_utf8_lossy(&output.stderr);
+        let what =
+            text.lines().next_back().map_or_else(|| "no reason was given".to_owned(), |l| plain(l, video));
+        return Err(ImportError::NotVideo { path: video.to_owned(), what });
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+fn compact(line: &str) -> HashMap<&str, &str> {
+    line.split('|').filter_map(|field| field.split_once('=')).collect()
+}
+
+fn gpmf_packet(fields: &HashMap<&str, &str>) -> Option<GpmfPacket> {
+    let ms = |name: &str| Some(fields.get(name)?.parse::<f64>().ok()? * 1000.0);
+    Some(GpmfPacket {
+        offset: fields.get("pos")?.parse().ok()?,
+        bytes: fields.get("size")?.parse().ok()?,
+        start_ms: ms("pts_time")?,
+        duration_ms: ms("duration_time").unwrap_or(0.0),
     })
 }
 
@@ -271,7 +339,26 @@ fn start_error(program: &Path, source: io::Error) -> ImportError {
 
 #[cfg(test)]
 mod tests {
-    use super::{Path, picture_pts, plain, pts_ns, time_base};
+    use super::{GpmfPacket, Path, compact, gpmf_packet, picture_pts, plain, pts_ns, time_base};
+
+    #[test]
+    fn a_payload_is_a_line() {
+        let packet = |line| gpmf_packet(&compact(line));
+        let (bytes, offset) = (7824, 691_944);
+        let expected = GpmfPacket { offset, bytes, start_ms: 1001.0, duration_ms: 1001.0 };
+        let line = "pts_time=1.001000|duration_time=1.001000|size=7824|pos=691944";
+        assert_eq!(
+            packet(line).map(|p| GpmfPacket {
+                start_ms: p.start_ms.round(),
+                duration_ms: p.duration_ms.round(),
+                ..p
+            }),
+            Some(expected)
+        );
+        assert_eq!(packet("pts_time=N/A|duration_time=1.001000|size=7824|pos=691944"), None);
+        assert_eq!(packet("pts_time=0|duration_time=N/A|size=1|pos=2").unwrap().duration_ms, 0.0);
+        assert_eq!(packet("codec_tag_string=gpmd|nb_frames=13"), None);
+    }
 
     #[test]
     fn the_log_is_understood() {

@@ -1,4 +1,4 @@
-//! What the importers are told and what they tell.
+//! Options and reports of the importers.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use bowwave_calibration::{CalibrationFile, Date};
 
 use crate::Bias;
 
-/// What an import is told.
+/// Options of an import.
 #[derive(Clone, Debug)]
 pub struct ImportOptions {
     /// The camera's calibration. Without it an undistorted lens of [`ImportOptions::assumed_hfov_deg`] is assumed.
@@ -65,7 +65,7 @@ pub struct Progress {
     pub frames_total: Option<u64>,
 }
 
-/// What became of the video's gyro.
+/// Use of the video's gyro.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TelemetryReport {
     /// Pictures have none.
@@ -76,7 +76,7 @@ pub enum TelemetryReport {
     LeftOut,
     /// It is in the recording.
     Used {
-        /// What the camera calls itself; may be empty.
+        /// The camera's own name; may be empty.
         camera: String,
         /// Gyro samples a second by the camera's clock.
         rate_hz: f64,
@@ -85,7 +85,7 @@ pub enum TelemetryReport {
     },
 }
 
-/// What an import made.
+/// Report of an import.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ImportReport {
     /// The recording.
@@ -100,8 +100,8 @@ pub struct ImportReport {
     pub bytes: u64,
     /// Width and height of the pictures.
     pub picture: (u32, u32),
-    /// What became of the video's gyro.
+    /// Use of the video's gyro.
     pub telemetry: TelemetryReport,
-    /// What the video's reader complained of without stopping.
+    /// Complaints of the video's reader that did not stop it.
     pub warnings: Vec<String>,
 }

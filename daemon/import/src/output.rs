@@ -14,15 +14,15 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::{Bias, BiasSource, ImportError, ImportOptions};
 
-/// A recording under construction, beside its final place. Dropped before [`Output::finish`], it goes away.
-pub(crate) struct Output {
+/// A recording under construction, beside its final place. Dropped before [`RecordingOutput::finish`], it goes away.
+pub(crate) struct RecordingOutput {
     path: PathBuf,
     partial: PathBuf,
     replace: bool,
     writer: Option<RecordingWriter>,
 }
 
-impl Output {
+impl RecordingOutput {
     /// Begins a recording that will be called `path`.
     pub(crate) fn create(path: &Path, replace: bool, properties: &Properties) -> Result<Self, ImportError> {
         refuse_existing(path, replace)?;
@@ -45,7 +45,7 @@ impl Output {
 
     /// Makes the recording whole and gives it its name.
     pub(crate) fn finish(mut self) -> Result<WrittenSummary, ImportError> {
-        let fail = |source| ImportError::Output { path: self.path.clone(), source };
+        let fail = |source| ImportError::RecordingOutput { path: self.path.clone(), source };
         let Some(writer) = self.writer.take() else {
             return Err(fail(io::Error::other("the recording was never begun")));
         };
@@ -56,7 +56,7 @@ impl Output {
     }
 }
 
-impl Drop for Output {
+impl Drop for RecordingOutput {
     fn drop(&mut self) {
         // Closed first: its last bytes need not be written any more.
         drop(self.writer.take());
@@ -126,7 +126,7 @@ pub(crate) fn set_bias(file: &mut CalibrationFile, bias: &Bias, options: &Import
     file.gyro_bias = Provenance::new(options.today, how);
 }
 
-/// What a recording of such pictures says about itself.
+/// Properties of a recording of such pictures.
 pub(crate) fn properties(
     file: &CalibrationFile,
     start: Time,

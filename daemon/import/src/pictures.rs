@@ -16,7 +16,7 @@ use image::{ImageFormat, ImageReader, codecs::jpeg::JpegEncoder};
 
 use crate::{
     ImportError, ImportOptions, ImportReport, Progress, START, TelemetryReport, natural,
-    output::{Output, calibration_for, properties, refuse_existing},
+    output::{RecordingOutput, calibration_for, properties, refuse_existing},
 };
 
 /// Quality of pictures that were not JPEG, on the encoder's scale to 100.
@@ -44,7 +44,7 @@ pub fn import_pictures(
     let calibration = calibration_for(picture, options)?;
     let source = format!("pictures of {}", folder.display());
     let extra = BTreeMap::from([("rate_hz".to_owned(), rate_hz.to_string())]);
-    let mut output = Output::create(
+    let mut output = RecordingOutput::create(
         out,
         options.replace,
         &properties(&calibration, START, source, picture, extra, options),

@@ -35,13 +35,13 @@ pub(crate) struct Sightings {
 }
 
 /// Gathers sightings as pictures come.
-pub(crate) struct Watch {
+pub(crate) struct PatchWatch {
     tracker: Option<Tracker>,
     times: Vec<Time>,
     seen: Vec<Vec<Option<DVec2>>>,
 }
 
-impl Watch {
+impl PatchWatch {
     pub(crate) const fn new() -> Self {
         Self { tracker: None, times: Vec::new(), seen: Vec::new() }
     }

@@ -7,185 +7,128 @@
 
 use std::{
     fs::File,
-    panic::{self, PanicHookInfo},
+    io::{self, Read as _, Seek as _, SeekFrom},
     path::Path,
-    sync::Once,
 };
 
 use bowwave_core::event::ImuSample;
 use glam::DVec3;
-use telemetry_parser::tags_impl::{
-    GetWithType as _, GroupId, GroupedTagMap, TagId, TagMap, TagValue, Vector3,
-};
 
-use crate::{ImportError, START, clock_fit::ClockFit, mp4};
+use crate::{
+    ImportError, START,
+    clock_fit::ClockFit,
+    ffmpeg::{GpmfPacket, gpmf_packets},
+    gpmf::{self, SensorBlock},
+};
 
 /// A camera's gyro and accelerometer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Telemetry {
-    /// What the camera calls itself; may be empty.
+    /// The camera's own name; may be empty.
     pub camera: String,
     /// Gyro samples a second by the camera's clock.
     pub rate_hz: f64,
     /// In the order of their time, the accelerometer interpolated to the gyro's times. `device_time_ns` is the camera's own
     /// clock, `arrival` the recording's, on which the first picture was taken at [`START`]. Axes are the track's channels,
-    /// put in the library's order where the camera says how it is turned.
+    /// turned where the camera says how its sensor is.
     pub samples: Vec<ImuSample>,
 }
 
-/// The name of the thread that runs the reader, by which its panics are known.
-const THREAD: &str = "telemetry";
-/// Containers nest, and the reader follows them on the stack. The largest payload that is let through, full of nothing else,
-/// takes less than a quarter of this; what is not used is not there.
-const STACK_BYTES: usize = 256 << 20;
 /// Stamps farther than this off the line through them belong to no one clock.
 const STAMP_WORST_MS: f64 = 100.0;
+/// One payload holds about a second: tens of kilobytes.
+const PAYLOAD_MAX_BYTES: u64 = 512 << 10;
 
-/// The gyro and accelerometer of a video; `None` where it has no GPMF track.
-pub fn read_telemetry(path: &Path) -> Result<Option<Telemetry>, ImportError> {
+/// The gyro and accelerometer of a video; `None` where it has no GPMF track. `ffmpeg` is the program beside which `ffprobe` lies.
+///
+/// # Errors
+/// Where the file cannot be read, `ffprobe` cannot be run, or the track's content makes no sense.
+pub fn read_telemetry(ffmpeg: &Path, path: &Path) -> Result<Option<Telemetry>, ImportError> {
     let read = |source| ImportError::Read { path: path.to_owned(), source };
     let fail = |what: String| ImportError::Telemetry { path: path.to_owned(), what };
     let mut file = File::open(path).map_err(read)?;
-    let file_bytes = file.metadata().map_err(read)?.len();
-    let Some(index) = mp4::read_index(&mut file).map_err(read)?.filter(|i| mp4::mentions_gpmf(i)) else {
-        return Ok(None);
-    };
-    keep_reader_panics_quiet();
-    let owned = path.to_owned();
-    let reader = std::thread::Builder::new()
-        .name(THREAD.to_owned())
-        .stack_size(STACK_BYTES)
-        .spawn(move || read_blocks(file, &owned, &index, file_bytes))
-        .map_err(read)?;
-    let blocks = match reader.join() {
-        Ok(result) => result.map_err(fail)?,
-        Err(_) => return Err(fail("its content makes no sense".to_owned())),
-    };
-    assemble(&blocks).map(Some).map_err(fail)
+    let Some(packets) = gpmf_packets(ffmpeg, path)? else { return Ok(None) };
+    log::debug!("{}: {} payloads in the gyro track", path.display(), packets.len());
+    let model = gpmf::camera_model(&ends(&mut file).map_err(read)?).unwrap_or_default();
+    let mut blocks = Vec::with_capacity(packets.len());
+    for packet in &packets {
+        if packet.bytes > PAYLOAD_MAX_BYTES {
+            let what = format!("a payload of it has {} bytes, more than any camera writes", packet.bytes);
+            return Err(fail(what));
+        }
+        let payload = read_payload(&mut file, packet).map_err(read)?;
+        blocks.extend(PayloadBlock::of(&payload, packet, &model).map_err(fail)?);
+    }
+    let camera = if model.is_empty() { model } else { format!("GoPro {model}") };
+    assemble(camera, &blocks).map(Some).map_err(fail)
 }
 
-/// The reader panics on some damaged files. That is caught where it is joined and becomes an error of one line; the
-/// hook keeps the default report of a panic off the user's screen, for that thread only.
-fn keep_reader_panics_quiet() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let usual = panic::take_hook();
-        panic::set_hook(Box::new(move |info: &PanicHookInfo<'_>| {
-            if std::thread::current().name() != Some(THREAD) {
-                usual(info);
-            }
-        }));
-    });
+/// The first and last bytes of a file, in which its camera is named: the larger the file, the larger its index.
+fn ends(file: &mut File) -> io::Result<Vec<u8>> {
+    let length = file.seek(SeekFrom::End(0))?;
+    let reach = match length >> 30 {
+        0..5 => 2 << 20,
+        5..30 => 10 << 20,
+        _ => 30 << 20,
+    };
+    let mut out = Vec::new();
+    file.rewind()?;
+    file.by_ref().take(if length > 2 * reach { reach } else { length }).read_to_end(&mut out)?;
+    if length > 2 * reach {
+        file.seek(SeekFrom::Start(length - reach))?;
+        file.by_ref().take(reach).read_to_end(&mut out)?;
+    }
+    Ok(out)
 }
 
-/// What one payload holds.
+fn read_payload(file: &mut File, packet: &GpmfPacket) -> io::Result<Vec<u8>> {
+    let mut out = Vec::new();
+    file.seek(SeekFrom::Start(packet.offset))?;
+    file.by_ref().take(packet.bytes).read_to_end(&mut out)?;
+    Ok(out)
+}
+
+/// Gyro and accelerometer of one payload.
 #[derive(Clone, Debug, Default)]
-struct Block {
+struct PayloadBlock {
     start_ms: f64,
     duration_ms: f64,
-    gyro: Stream,
-    accel: Stream,
+    gyro: SensorBlock,
+    accel: SensorBlock,
 }
 
-/// A stream's share of a payload.
-#[derive(Clone, Debug, Default)]
-struct Stream {
-    /// In SI units, oriented.
-    values: Vec<DVec3>,
-    /// The camera's clock at the first sample, milliseconds.
-    stamp_ms: Option<f64>,
-    /// Samples since the camera began, up to and with this payload.
-    total: Option<u32>,
-}
-
-#[derive(Debug)]
-struct Blocks {
-    camera: String,
-    blocks: Vec<Block>,
-}
-
-/// Runs the library over the file. May panic on damaged files; it runs in a thread of its own.
-fn read_blocks(mut file: File, path: &Path, index: &[u8], file_bytes: u64) -> Result<Blocks, String> {
-    let places = mp4::payload_places(index, file_bytes)?;
-    log::debug!("{}: {} payloads in the gyro track", path.display(), places.len());
-    let size = usize::try_from(file_bytes).map_err(|e| e.to_string())?;
-    let input = telemetry_parser::Input::from_stream(&mut file, size, path, |_| (), Default::default())
-        .map_err(|e| e.to_string())?;
-    if input.camera_type() != "GoPro" {
-        return Err(format!("it was taken for that of a {} camera", input.camera_type()));
+impl PayloadBlock {
+    /// `None` for a payload that is none: what was lost of it leaves a gap, which the camera's count tells.
+    fn of(payload: &[u8], packet: &GpmfPacket, model: &str) -> Result<Option<Self>, String> {
+        let streams = match gpmf::streams(payload) {
+            Ok(streams) => streams,
+            Err(e) => {
+                log::debug!("the payload at byte {} is left out: {e}", packet.offset);
+                return Ok(None);
+            }
+        };
+        let sensor = |key: &[u8; 4]| match streams.iter().rev().find(|s| s.key() == Some(*key)) {
+            Some(stream) => stream
+                .sensor(model)
+                .map_err(|what| format!("its {} block {what}", String::from_utf8_lossy(key))),
+            None => Ok(SensorBlock::default()),
+        };
+        let (gyro, accel) = (sensor(b"GYRO")?, sensor(b"ACCL")?);
+        Ok(Some(Self { start_ms: packet.start_ms, duration_ms: packet.duration_ms, gyro, accel }))
     }
-    let samples = input.samples.as_deref().ok_or("it is cut short or damaged")?;
-    let mut blocks = Vec::with_capacity(samples.len());
-    for sample in samples {
-        // The library puts settings without a time in front of the payloads.
-        let Some(tags) = sample.tag_map.as_ref().filter(|_| sample.duration_ms > 0.0) else { continue };
-        blocks.push(Block {
-            start_ms: sample.timestamp_ms,
-            duration_ms: sample.duration_ms,
-            gyro: vectors(tags, &GroupId::Gyroscope)?,
-            accel: vectors(tags, &GroupId::Accelerometer)?,
-        });
-    }
-    let camera = input.camera_model().map_or_else(String::new, |m| format!("GoPro {m}"));
-    Ok(Blocks { camera, blocks })
-}
-
-fn vectors(tags: &GroupedTagMap, group: &GroupId) -> Result<Stream, String> {
-    let Some(map) = tags.get(group) else { return Ok(Stream::default()) };
-    let Some(raw): Option<&Vec<Vector3<i16>>> = map.get_t(TagId::Data) else {
-        return Err(format!("its {group:?} block is not made of three 16-bit numbers a sample"));
-    };
-    let scale = match map.get(&TagId::Scale).map(|t| &t.value) {
-        None => 1.0,
-        Some(TagValue::i16(v)) => f64::from(*v.get()),
-        Some(TagValue::f32(v)) => f64::from(*v.get()),
-        Some(_) => f64::NAN,
-    };
-    let unit: Option<&String> = map.get_t(TagId::Unit);
-    let to_si = match unit.map_or("", String::as_str) {
-        "" | "rad/s" | "m/s\u{b2}" | "m/s2" => 1.0,
-        "deg/s" | "\u{b0}/s" => 1.0_f64.to_radians(),
-        "g" => 9.80665,
-        other => return Err(format!("its {group:?} block is in {other:?}, not in rad/s or m/s\u{b2}")),
-    };
-    if !(scale.is_finite() && scale != 0.0) {
-        return Err(format!("its {group:?} block has no usable scale"));
-    }
-    let turned: Option<&String> = map.get_t(TagId::Orientation);
-    let turned = turned.map_or("XYZ", String::as_str).as_bytes();
-    let values = raw
-        .iter()
-        .map(|v| {
-            let v = v.clone().into_scaled(&scale, &to_si).orient(turned);
-            DVec3::new(v.x, v.y, v.z)
-        })
-        .collect();
-    Ok(Stream { values, stamp_ms: stamp_ms(map), total: total(map) })
-}
-
-fn stamp_ms(map: &TagMap) -> Option<f64> {
-    /// Four-character code `TICK`.
-    const TICK: TagId = TagId::Unknown(u32::from_be_bytes(*b"TICK"));
-    let micros: Option<&u64> = map.get_t(TagId::TimestampUs);
-    let ticks: Option<&u32> = map.get_t(TICK);
-    micros.map(|us| *us as f64 / 1000.0).or(ticks.map(|ms| f64::from(*ms)))
-}
-
-fn total(map: &TagMap) -> Option<u32> {
-    (map.get_t(TagId::Count) as Option<&u32>).copied()
 }
 
 /// A stream's samples with the camera's count of the sample that each block begins with, and its clock.
-struct Timed<'a> {
+struct TimedStream<'a> {
     runs: Vec<(f64, &'a [DVec3])>,
     clock: ClockFit,
 }
 
 fn timed<'a>(
-    blocks: &'a [Block],
-    stream: impl Fn(&'a Block) -> &'a Stream,
+    blocks: &'a [PayloadBlock],
+    stream: impl Fn(&'a PayloadBlock) -> &'a SensorBlock,
     by_container: bool,
-) -> Option<Timed<'a>> {
+) -> Option<TimedStream<'a>> {
     let mut runs = Vec::new();
     let mut stamps = Vec::new();
     let mut counted = 0.0;
@@ -209,7 +152,7 @@ fn timed<'a>(
         stamps.push((only.0 + only.1.len() as f64, stamps.first()?.1 + block.duration_ms));
     }
     let clock = ClockFit::through(&stamps)?;
-    Some(Timed { runs, clock })
+    Some(TimedStream { runs, clock })
 }
 
 /// Value at `time_ms`, linear between samples, held at the ends.
@@ -222,7 +165,7 @@ fn value_at(points: &[(f64, DVec3)], time_ms: f64) -> DVec3 {
     }
 }
 
-fn points(stream: &Timed<'_>) -> Vec<(f64, DVec3)> {
+fn points(stream: &TimedStream<'_>) -> Vec<(f64, DVec3)> {
     let each = |(first, values): &(f64, &[DVec3])| {
         let first = *first;
         values
@@ -234,8 +177,7 @@ fn points(stream: &Timed<'_>) -> Vec<(f64, DVec3)> {
     stream.runs.iter().flat_map(each).collect()
 }
 
-fn assemble(read: &Blocks) -> Result<Telemetry, String> {
-    let blocks = &read.blocks;
+fn assemble(camera: String, blocks: &[PayloadBlock]) -> Result<Telemetry, String> {
     let stamped = blocks
         .iter()
         .all(|b| [&b.gyro, &b.accel].iter().all(|s| s.values.is_empty() || s.stamp_ms.is_some()));
@@ -266,5 +208,5 @@ fn assemble(read: &Blocks) -> Result<Telemetry, String> {
         })
         .filter(|s| s.arrival.ns() >= 0)
         .collect::<Vec<_>>();
-    Ok(Telemetry { camera: read.camera.clone(), rate_hz: 1000.0 / gyro.clock.interval_ms, samples })
+    Ok(Telemetry { camera, rate_hz: 1000.0 / gyro.clock.interval_ms, samples })
 }

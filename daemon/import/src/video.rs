@@ -10,9 +10,9 @@ use crate::{
     Bias, ImportError, ImportOptions, ImportReport, Level, Progress, START, Telemetry, TelemetryReport, bias,
     ffmpeg::{VideoFrame, VideoInfo, VideoReader, probe},
     gyro::GyroPath,
-    output::{Output, calibration_for, properties, refuse_existing, set_bias},
+    output::{RecordingOutput, calibration_for, properties, refuse_existing, set_bias},
     pictures::jpeg_size,
-    sight::{self, Watch},
+    sight::{self, PatchWatch},
     telemetry::read_telemetry,
     track::Gray,
 };
@@ -29,13 +29,13 @@ pub fn import_video(
     // The system's own reason is better than what a program makes of it.
     File::open(video).map_err(|source| ImportError::Read { path: video.to_owned(), source })?;
     let info = probe(&options.ffmpeg, video)?;
-    let gyro = Gyro::read(video, options)?;
+    let gyro = VideoGyro::read(video, options)?;
     let mut reader = VideoReader::start(&options.ffmpeg, video, None)?;
     let Some(first) = reader.next_frame()? else {
         reader.finish()?;
         return Err(ImportError::NoFrames { path: video.to_owned(), what: "the track is empty".to_owned() });
     };
-    let mut import = Import::begin(video, out, options, info, &gyro, first)?;
+    let mut import = VideoImport::begin(video, out, options, info, &gyro, first)?;
     loop {
         if progress(Progress { frames: import.frames.into(), frames_total: info.frames }).is_break() {
             return Err(ImportError::Stopped);
@@ -54,18 +54,18 @@ pub fn import_video(
 }
 
 /// The video's gyro and what became of it.
-struct Gyro {
+struct VideoGyro {
     telemetry: Option<Telemetry>,
     bias: Option<Bias>,
     report: TelemetryReport,
 }
 
-impl Gyro {
+impl VideoGyro {
     fn read(video: &Path, options: &ImportOptions) -> Result<Self, ImportError> {
         if options.without_gyro {
             return Ok(Self { telemetry: None, bias: None, report: TelemetryReport::LeftOut });
         }
-        let Some(mut telemetry) = read_telemetry(video)? else {
+        let Some(mut telemetry) = read_telemetry(&options.ffmpeg, video)? else {
             return Ok(Self { telemetry: None, bias: None, report: TelemetryReport::Absent });
         };
         let bias =
@@ -113,7 +113,7 @@ fn find_bias(
     if !(2.0..=60.0).contains(&seconds) {
         return rest;
     }
-    let mut watch = Watch::new();
+    let mut watch = PatchWatch::new();
     let mut reader = VideoReader::start(&options.ffmpeg, video, Some(seconds))?;
     while let Some(frame) = reader.next_frame()? {
         let unreadable =
@@ -134,8 +134,8 @@ fn find_bias(
 }
 
 /// An import under way.
-struct Import<'a> {
-    output: Output,
+struct VideoImport<'a> {
+    output: RecordingOutput,
     /// Samples that are not yet written.
     samples: &'a [ImuSample],
     picture: (u32, u32),
@@ -143,13 +143,13 @@ struct Import<'a> {
     frames: u32,
 }
 
-impl<'a> Import<'a> {
+impl<'a> VideoImport<'a> {
     fn begin(
         video: &Path,
         out: &Path,
         options: &ImportOptions,
         info: VideoInfo,
-        gyro: &'a Gyro,
+        gyro: &'a VideoGyro,
         first: VideoFrame,
     ) -> Result<Self, ImportError> {
         let jpeg: Arc<[u8]> = first.jpeg.as_slice().into();
@@ -169,8 +169,11 @@ impl<'a> Import<'a> {
         let samples = gyro.samples();
         let start = samples.first().map_or(START, |s| s.arrival.min(START));
         let source = format!("video {}", video.display());
-        let output =
-            Output::create(out, options.replace, &properties(&file, start, source, picture, extra, options))?;
+        let output = RecordingOutput::create(
+            out,
+            options.replace,
+            &properties(&file, start, source, picture, extra, options),
+        )?;
         let mut import = Self { output, samples, picture, interval_ns: info.interval_ns, frames: 0 };
         import.add(&first)?;
         Ok(import)
@@ -203,7 +206,7 @@ impl<'a> Import<'a> {
         Ok(())
     }
 
-    fn finish(mut self, gyro: &Gyro, warnings: Vec<String>) -> Result<ImportReport, ImportError> {
+    fn finish(mut self, gyro: &VideoGyro, warnings: Vec<String>) -> Result<ImportReport, ImportError> {
         // What came after the last picture is of no use, but for the few samples that its pose needs.
         let written = self.output.finish()?;
         self.samples = &[];

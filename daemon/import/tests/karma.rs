@@ -72,7 +72,7 @@ fn a_boat_carried_by_the_gyro_stays_put() {
     assert!(embedded.calibration.gyro_bias.distance(bias.rate) < 1e-12);
     assert!(embedded.gyro_bias.how.contains("first 5.0 s"), "{}", embedded.gyro_bias.how);
 
-    let clip = measure::Clip::read(&out).unwrap();
+    let clip = measure::DriftClip::read(&out).unwrap();
     let tracks = measure::Tracks::follow(&clip, 200).unwrap();
     let steady = measure::drift(&clip, &tracks, 0.0, 11.0).unwrap();
     let ahead = measure::drift(&clip, &tracks, 5.0, 11.0).unwrap();
@@ -88,7 +88,7 @@ fn a_boat_carried_by_the_gyro_stays_put() {
 #[test]
 fn gyro_and_pictures_share_a_time_base() {
     let Some(video) = clip() else { return };
-    let telemetry = read_telemetry(&video).unwrap().unwrap();
+    let telemetry = read_telemetry(Path::new("ffmpeg"), &video).unwrap().unwrap();
     let (first, last) = (telemetry.samples[0], telemetry.samples[4794]);
     assert_eq!(first.arrival, START);
     assert!((last.arrival.secs_since(START) - 12.059).abs() < 0.002, "{}", last.arrival);
@@ -151,7 +151,7 @@ fn garbled_telemetry_is_one_line() {
     ];
     for (name, change) in cases {
         let (_folder, path) = damaged(&video, change);
-        match read_telemetry(&path) {
+        match read_telemetry(Path::new("ffmpeg"), &path) {
             Err(e @ ImportError::Telemetry { .. }) => {
                 let message = e.to_string();
                 assert!(!message.contains('\n') && message.contains("damaged.mp4"), "{name}: {message}");
@@ -183,7 +183,7 @@ fn nesting_without_end_is_survived() {
         bytes.extend(nest);
     });
     // The other payloads are there as before.
-    let telemetry = read_telemetry(&path).unwrap().unwrap();
+    let telemetry = read_telemetry(Path::new("ffmpeg"), &path).unwrap().unwrap();
     assert_eq!(telemetry.samples.len(), 4795 - 392);
 }
 
@@ -209,7 +209,7 @@ fn random_damage_never_panics() {
                 bytes.truncate(random(bytes.len()));
             }
         });
-        if let Err(e) = read_telemetry(&path) {
+        if let Err(e) = read_telemetry(Path::new("ffmpeg"), &path) {
             assert!(!e.to_string().contains('\n'), "{e}");
         }
     }

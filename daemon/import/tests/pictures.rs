@@ -75,7 +75,7 @@ fn pictures_come_in_the_order_of_their_numbers() {
     assert_eq!(properties.picture, (64, 48));
 }
 
-/// What an import that must fail says; nothing may be left of the recording.
+/// Error of an import that must fail; nothing may be left of the recording.
 fn failure(folder: &Path, out: &Path, options: &ImportOptions) -> String {
     let error = import_pictures(folder, 25.0, out, options, &mut go_on).unwrap_err();
     let left: Vec<_> = fs::read_dir(out.parent().unwrap())

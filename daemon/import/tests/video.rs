@@ -42,7 +42,7 @@ fn ffmpeg(arguments: &[&str], out: &Path) {
     assert!(status.success());
 }
 
-/// What an import that must fail says; nothing may be left of the recording.
+/// Error of an import that must fail; nothing may be left of the recording.
 fn failure(video: &Path, options: &ImportOptions) -> ImportError {
     let folder = tempfile::tempdir().unwrap();
     let error = import_video(video, &folder.path().join("out.mcap"), options, &mut go_on).unwrap_err();
