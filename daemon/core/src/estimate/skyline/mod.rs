@@ -29,9 +29,12 @@ use crate::{
 };
 use fit::{SkyTrack, SkylineFit, SkylinePrior};
 use grid::{FIELD, FieldGrid};
-use patch::{HALF, SkyPatch};
-use pyramid::{GreyPyramid, LEVELS};
+use patch::HALF;
+use pyramid::LEVELS;
 use wind::{Wind, carried, nearness};
+
+pub use patch::{PatchMatch, SkyPatch};
+pub use pyramid::GreyPyramid;
 
 /// For each point that is followed in a picture, so many are remembered, those out of view included.
 const KEPT: usize = 3;

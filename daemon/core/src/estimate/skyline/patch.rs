@@ -41,9 +41,9 @@ struct PatchTemplate {
     power: f32,
 }
 
-/// How a patch looks on the levels on which it is whole and stands out from the noise.
+/// A patch of a picture to be found in others: how it looks on the levels on which it is whole and stands out from the noise.
 #[derive(Clone, Debug)]
-pub(super) struct SkyPatch {
+pub struct SkyPatch {
     levels: [Option<PatchTemplate>; LEVELS],
     /// The finest of these.
     finest: usize,
@@ -51,7 +51,7 @@ pub(super) struct SkyPatch {
 
 /// Where a patch was found.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PatchMatch {
+pub struct PatchMatch {
     /// Pixels of the finest level.
     pub place: DVec2,
     /// Correlation coefficient with what it looked like.

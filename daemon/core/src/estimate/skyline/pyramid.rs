@@ -22,14 +22,15 @@ pub(super) struct PyramidLevel {
     pub codes: Vec<f32>,
 }
 
-/// All levels, the finest first.
+/// A grey picture, reduced to about 640 pixels across, with levels that are each reduced by half.
 #[derive(Clone, Debug, Default)]
-pub(super) struct GreyPyramid {
+pub struct GreyPyramid {
     /// Size of the whole finest level, pixels.
     pub size: (usize, usize),
     /// Pixels of the picture in one of the finest level's.
     pub reduction: usize,
-    pub levels: [PyramidLevel; LEVELS],
+    /// All levels, the finest first.
+    pub(super) levels: [PyramidLevel; LEVELS],
     /// Standard deviation of the finest level's noise, codes.
     pub noise: f32,
     sums: Vec<u32>,
