@@ -1,4 +1,4 @@
-//! What outlives a session: the journal of hits ([`journal`]) and MCAP recordings ([`recording`]).
+//! Storage that outlives a session: the journal of hits ([`journal`]) and MCAP recordings ([`recording`]).
 
 #![forbid(unsafe_code)]
 

@@ -32,7 +32,7 @@ const EVERY_NS: i64 = NS_PER_S;
 pub enum Room {
     /// Pictures may be recorded.
     Enough,
-    /// What is left is for hits: the recording ends.
+    /// Too little for a recording: the rest is kept for hits.
     Low {
         /// Bytes that are free.
         free_bytes: u64,

@@ -354,7 +354,7 @@ fn a_run_that_was_cut_off_is_told_with_its_boot() {
 #[test]
 fn space_that_was_kept_takes_rounds_when_the_disk_is_full() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(disk) = SmallDisk::mount(folder.path(), "4m") else { return };
+    let Some(disk) = SmallJournalDisk::mount(folder.path(), "4m") else { return };
     let path = disk.0.join("hits.db");
     let options = JournalOptions { reserve_bytes: 512 << 10, ..JournalOptions::default() };
     let journal = Journal::open_with(&path, &run(), &options).unwrap();
@@ -391,7 +391,7 @@ fn space_that_was_kept_takes_rounds_when_the_disk_is_full() {
 #[test]
 fn a_disk_that_fills_up_loses_nothing_and_is_used_again_once_there_is_space() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(disk) = SmallDisk::mount(folder.path(), "300k") else { return };
+    let Some(disk) = SmallJournalDisk::mount(folder.path(), "300k") else { return };
     let path = disk.0.join("hits.db");
     let ballast = disk.0.join("ballast");
     let journal = Journal::open(&path, &run()).unwrap();
@@ -428,7 +428,7 @@ fn a_disk_that_fills_up_loses_nothing_and_is_used_again_once_there_is_space() {
 #[test]
 fn a_disk_that_cannot_be_written_is_named() {
     let folder = tempfile::tempdir().unwrap();
-    let Some(disk) = SmallDisk::mount(folder.path(), "1m") else { return };
+    let Some(disk) = SmallJournalDisk::mount(folder.path(), "1m") else { return };
     let path = disk.0.join("hits of #1?.db");
     shoot(&path, &[shot(1)]);
     disk.remount_read_only();
@@ -438,9 +438,9 @@ fn a_disk_that_cannot_be_written_is_named() {
 }
 
 /// A file system of its own in memory; only root can make one.
-struct SmallDisk(PathBuf);
+struct SmallJournalDisk(PathBuf);
 
-impl SmallDisk {
+impl SmallJournalDisk {
     fn mount(folder: &Path, size: &str) -> Option<Self> {
         let mounted = Command::new("mount")
             .args(["-t", "tmpfs", "-o", &format!("size={size}"), "tmpfs"])
@@ -459,7 +459,7 @@ impl SmallDisk {
     }
 }
 
-impl Drop for SmallDisk {
+impl Drop for SmallJournalDisk {
     fn drop(&mut self) {
         let unmounted = Command::new("umount").arg(&self.0).status();
         assert!(unmounted.is_ok_and(|status| status.success()));

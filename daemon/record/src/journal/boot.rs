@@ -20,11 +20,11 @@ pub struct DirtyRun {
     pub run: i64,
     /// The boot it ran in, where it is known.
     pub boot_id: Option<String>,
-    /// What ended it.
+    /// How it ended.
     pub end: DirtyEnd,
 }
 
-/// What ended a run before its time.
+/// Kind of an improper end of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DirtyEnd {
     /// The same boot: the program crashed or was killed.
@@ -52,7 +52,7 @@ pub(super) fn last_dirty(
     Ok(Some(DirtyRun { run, boot_id: its_boot, end }))
 }
 
-/// What the wall clock showed at a time since boot.
+/// Reading of the wall clock at a time since boot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct WallClock {
     pub(super) wall_ns: i64,

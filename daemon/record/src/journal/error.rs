@@ -1,4 +1,4 @@
-//! What can go wrong with the journal.
+//! Errors of the journal.
 
 use std::{
     fmt, io,
@@ -11,7 +11,7 @@ use rustix::fs::{StatVfsMountFlags, statvfs};
 
 use crate::space::free_bytes;
 
-/// What is wrong with the journal, where, and what to do.
+/// Error of the journal: cause, place and remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum JournalError {
     /// There is no such file.
@@ -99,7 +99,7 @@ pub enum JournalError {
     File {
         /// The database.
         path: PathBuf,
-        /// What was being done.
+        /// Operation that failed.
         doing: &'static str,
         /// The system's reason.
         source: io::Error,
@@ -113,7 +113,7 @@ pub enum JournalError {
         run: i64,
         /// The round.
         shot: i64,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
     /// No such run.
@@ -191,7 +191,7 @@ impl JournalError {
         matches!(self, Self::Corrupt { .. } | Self::NotADatabase { .. })
     }
 
-    /// What an error of the system means for the database at `path`.
+    /// Journal error for an error of the system at `path`.
     pub(crate) fn from_io(path: &Path, doing: &'static str, source: io::Error) -> Self {
         let path = path.to_path_buf();
         match source.kind() {
@@ -201,7 +201,7 @@ impl JournalError {
         }
     }
 
-    /// What an error of SQLite means for the database at `path`.
+    /// Journal error for an error of SQLite at `path`.
     pub(crate) fn from_sql(path: &Path, error: &rusqlite::Error) -> Self {
         let path = path.to_path_buf();
         let reason = error.to_string();

@@ -36,12 +36,12 @@ pub use boot::{DirtyEnd, DirtyRun, boot_id};
 pub use error::{JournalError, Unwritten};
 pub use query::{RunSelection, ShotFilter, StoredRun, read_runs, read_shots};
 pub use row::StoredShot;
-use worker::{Ended, Ends, Worker};
+use worker::{JournalChannels, JournalEnd, JournalWorker};
 
 /// Rounds that may wait for the writing thread before [`Journal::shot`] refuses: minutes of firing.
 const QUEUE: usize = 4096;
 
-/// What a run of the trainer was about.
+/// Description of a run of the trainer.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Run {
     /// Wall time of its beginning, nanoseconds since 1970, where the clock is known to be set. [`Journal::set_wall_clock`]
@@ -85,12 +85,12 @@ impl Default for JournalOptions {
     }
 }
 
-/// What is wrong with keeping the journal at present.
+/// Present fault of the journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JournalFault {
     /// One of [`Fault::DiskFull`], [`Fault::DiskReadOnly`] and [`Fault::DiskFsync`].
     pub fault: Fault,
-    /// What is wrong and what to do, one line.
+    /// Cause and remedy, one line.
     pub message: String,
     /// Rounds that wait in memory. 0 where rounds are still written, into the space that was kept for them.
     pub waiting: usize,
@@ -107,7 +107,7 @@ pub struct Quarantine {
     pub rounds_left_there: u64,
 }
 
-/// What a finished journal holds of its run.
+/// Summary of a finished journal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct JournalSummary {
     /// The database.
@@ -120,7 +120,7 @@ pub struct JournalSummary {
 
 /// Bounds and patience; others than the defaults only in tests.
 #[derive(Clone, Copy, Debug)]
-struct Settings {
+struct JournalSettings {
     /// Most pages of the database.
     pages_max: Option<u32>,
     /// Pages of the database that SQLite may keep in memory.
@@ -143,7 +143,7 @@ struct Settings {
     finish_attempts: u32,
 }
 
-impl From<&JournalOptions> for Settings {
+impl From<&JournalOptions> for JournalSettings {
     fn from(options: &JournalOptions) -> Self {
         Self {
             pages_max: None,
@@ -160,16 +160,16 @@ impl From<&JournalOptions> for Settings {
     }
 }
 
-/// What the thread tells.
+/// State that the thread reports.
 #[derive(Debug, Default)]
-struct Told {
+struct JournalStatus {
     fault: Option<JournalFault>,
     quarantine: Option<Quarantine>,
 }
 
-/// What the thread is told.
+/// Message to the thread.
 #[derive(Debug)]
-enum Message {
+enum JournalMessage {
     Shot(ShotRecord),
     Clock(WallClock),
 }
@@ -179,12 +179,12 @@ pub struct Journal {
     path: PathBuf,
     run: i64,
     previous: Option<DirtyRun>,
-    queue: Option<Sender<Message>>,
+    queue: Option<Sender<JournalMessage>>,
     /// Never carries anything; its end tells the thread to finish.
     open: Option<Sender<Infallible>>,
     commits: Receiver<u64>,
-    told: Arc<Mutex<Told>>,
-    thread: Option<JoinHandle<Ended>>,
+    told: Arc<Mutex<JournalStatus>>,
+    thread: Option<JoinHandle<JournalEnd>>,
 }
 
 impl Journal {
@@ -196,10 +196,10 @@ impl Journal {
 
     /// The same with other options.
     pub fn open_with(path: &Path, run: &Run, options: &JournalOptions) -> Result<Self, JournalError> {
-        Self::start(path, run, Settings::from(options))
+        Self::start(path, run, JournalSettings::from(options))
     }
 
-    fn start(path: &Path, run: &Run, settings: Settings) -> Result<Self, JournalError> {
+    fn start(path: &Path, run: &Run, settings: JournalSettings) -> Result<Self, JournalError> {
         let opened = open::for_writing(path, &settings)?;
         let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
         let previous = boot::last_dirty(&opened.connection, run.boot_id.as_deref()).map_err(fail)?;
@@ -208,9 +208,9 @@ impl Journal {
         // Eight bytes a round, and rounds are bounded by belts: not worth losing an acknowledgement for.
         let (committed, commits) = unbounded();
         let (open, closing) = bounded(0);
-        let told = Arc::new(Mutex::new(Told { fault: None, quarantine: opened.quarantined }));
-        let ends = Ends { incoming, closing, commits: committed, told: Arc::clone(&told) };
-        let worker = Worker::new(opened.connection, path, (id, run.clone()), ends, settings);
+        let told = Arc::new(Mutex::new(JournalStatus { fault: None, quarantine: opened.quarantined }));
+        let ends = JournalChannels { incoming, closing, commits: committed, told: Arc::clone(&told) };
+        let worker = JournalWorker::new(opened.connection, path, (id, run.clone()), ends, settings);
         let thread =
             std::thread::Builder::new().name("journal".to_owned()).spawn(move || worker.run()).map_err(
                 |source| JournalError::File { path: path.into(), doing: "start the thread for", source },
@@ -252,16 +252,16 @@ impl Journal {
     /// Queues a round; never waits. [`JournalError::QueueFull`] means that the round was not taken and the caller still has
     /// it.
     pub fn shot(&self, shot: &ShotRecord) -> Result<(), JournalError> {
-        self.send(Message::Shot(shot.clone()), shot.shot)
+        self.send(JournalMessage::Shot(shot.clone()), shot.shot)
     }
 
     /// Tells what the wall clock shows, nanoseconds since 1970, at a time since boot, once it is known to be set. All runs of
     /// this boot without a wall time get theirs. Never waits; where the queue is full, say it again later.
     pub fn set_wall_clock(&self, wall_ns: i64, at: Time) -> Result<(), JournalError> {
-        self.send(Message::Clock(WallClock { wall_ns, at }), 0)
+        self.send(JournalMessage::Clock(WallClock { wall_ns, at }), 0)
     }
 
-    fn send(&self, message: Message, shot: u64) -> Result<(), JournalError> {
+    fn send(&self, message: JournalMessage, shot: u64) -> Result<(), JournalError> {
         let Some(queue) = &self.queue else { return Err(self.stopped()) };
         queue.try_send(message).map_err(|error| match error {
             TrySendError::Full(_) => JournalError::QueueFull { path: self.path.clone(), shot },
@@ -274,12 +274,12 @@ impl Journal {
         &self.commits
     }
 
-    /// What is wrong with keeping the journal at present, if anything.
+    /// Present fault of the journal, if any.
     pub fn fault(&self) -> Option<JournalFault> {
         self.told().fault.clone()
     }
 
-    fn told(&self) -> MutexGuard<'_, Told> {
+    fn told(&self) -> MutexGuard<'_, JournalStatus> {
         self.told.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -13,7 +13,7 @@ use bowwave_core::text::one_line;
 use rusqlite::{Connection, ErrorCode, OpenFlags, config::DbConfig};
 
 use super::{
-    JournalError, Quarantine, Settings, quarantine,
+    JournalError, JournalSettings, Quarantine, quarantine,
     schema::{self, APPLICATION_ID, VERSION},
 };
 
@@ -24,15 +24,15 @@ const PAGE_BYTES: u64 = 4096;
 const MAGIC: &[u8; 16] = b"SQLite format 3\0";
 
 /// A database that is ready to be written.
-pub(super) struct Opened {
+pub(super) struct OpenedJournal {
     pub(super) connection: Connection,
     pub(super) quarantined: Option<Quarantine>,
 }
 
 /// Opens or makes the database for writing; puts a damaged one aside.
-pub(super) fn for_writing(path: &Path, settings: &Settings) -> Result<Opened, JournalError> {
+pub(super) fn for_writing(path: &Path, settings: &JournalSettings) -> Result<OpenedJournal, JournalError> {
     if let Some(resumed) = quarantine::resume(path)? {
-        return Ok(Opened { connection: connect(path, settings)?, quarantined: Some(resumed) });
+        return Ok(OpenedJournal { connection: connect(path, settings)?, quarantined: Some(resumed) });
     }
     let head = head(path)?;
     if head.looks_foreign() && !settings.own {
@@ -50,11 +50,11 @@ pub(super) fn for_writing(path: &Path, settings: &Settings) -> Result<Opened, Jo
         check(path)?
     };
     let Err(reason) = broken else {
-        return Ok(Opened { connection: connect(path, settings)?, quarantined: None });
+        return Ok(OpenedJournal { connection: connect(path, settings)?, quarantined: None });
     };
     let kept_as = quarantine::replace(path, settings, |_| Ok(()))?;
     let quarantined = Some(Quarantine { kept_as, reason, rounds_left_there: 0 });
-    Ok(Opened { connection: connect(path, settings)?, quarantined })
+    Ok(OpenedJournal { connection: connect(path, settings)?, quarantined })
 }
 
 /// Opens an existing journal for reading.
@@ -119,9 +119,9 @@ fn immutable_uri(path: &Path) -> PathBuf {
 }
 
 /// The first bytes of a file, as far as there are any.
-struct Head(Vec<u8>);
+struct FileHead(Vec<u8>);
 
-impl Head {
+impl FileHead {
     fn is_blank(&self) -> bool {
         !self.0.is_empty() && self.0.iter().all(|byte| *byte == 0)
     }
@@ -132,7 +132,7 @@ impl Head {
     }
 }
 
-fn head(path: &Path) -> Result<Head, JournalError> {
+fn head(path: &Path) -> Result<FileHead, JournalError> {
     let mut bytes = Vec::new();
     match File::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {}
@@ -145,7 +145,7 @@ fn head(path: &Path) -> Result<Head, JournalError> {
             })?;
         }
     }
-    Ok(Head(bytes))
+    Ok(FileHead(bytes))
 }
 
 /// Whether the file is what a power cut leaves of a database that was just being made: one page without its bytes, and no
@@ -195,7 +195,7 @@ fn check(path: &Path) -> Result<Result<(), String>, JournalError> {
 }
 
 /// Connects to a database that is intact, or makes it. Everything that can be read over the connection is on the disk.
-pub(super) fn connect(path: &Path, settings: &Settings) -> Result<Connection, JournalError> {
+pub(super) fn connect(path: &Path, settings: &JournalSettings) -> Result<Connection, JournalError> {
     let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
     let mut connection = Connection::open(path).map_err(fail)?;
     connection.busy_timeout(BUSY).map_err(fail)?;

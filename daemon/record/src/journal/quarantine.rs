@@ -12,7 +12,7 @@ use std::{
 use rusqlite::Connection;
 
 use super::{
-    JournalError, Quarantine, Settings,
+    JournalError, JournalSettings, Quarantine,
     open::{connect, empty_log_at_end, sync_folder, with_suffix},
 };
 
@@ -23,7 +23,7 @@ const PARTS: [&str; 2] = ["-wal", "-shm"];
 /// Nobody may have either open.
 pub(super) fn replace(
     path: &Path,
-    settings: &Settings,
+    settings: &JournalSettings,
     fill: impl FnOnce(&mut Connection) -> rusqlite::Result<()>,
 ) -> Result<PathBuf, JournalError> {
     let making = with_suffix(path, ".making");

@@ -33,7 +33,7 @@ pub struct ShotFilter {
 pub struct StoredRun {
     /// Its number.
     pub id: i64,
-    /// What it was about.
+    /// Its description.
     pub run: Run,
     /// Whether it was ended properly.
     pub finished: bool,

@@ -1,5 +1,7 @@
 //! Rounds as rows, cells and JSON.
 
+use std::borrow::Cow;
+
 use bowwave_core::{
     model::Zone,
     time::Time,
@@ -22,42 +24,66 @@ pub struct StoredShot {
     pub record: ShotRecord,
 }
 
-/// What the outcomes have of the columns.
+/// The columns that make an outcome, in a database as in a table.
 #[derive(Default)]
-struct Parts<'a> {
-    outcome: &'static str,
-    boat: Option<&'a str>,
-    zone: Option<&'static str>,
+struct OutcomeColumns<'a> {
+    outcome: Cow<'a, str>,
+    boat: Option<Cow<'a, str>>,
+    zone: Option<Cow<'a, str>>,
     time: Option<Time>,
     range_m: Option<f64>,
     point: Option<DVec3>,
     miss_m: Option<f64>,
-    cause: Option<&'static str>,
+    cause: Option<Cow<'a, str>>,
 }
 
-impl<'a> Parts<'a> {
-    fn of(outcome: &'a Outcome) -> Self {
+impl<'a> From<&'a Outcome> for OutcomeColumns<'a> {
+    fn from(outcome: &'a Outcome) -> Self {
         match outcome {
             Outcome::Hit { boat, zone, time, range_m, point } => Self {
-                outcome: "hit",
-                boat: Some(boat),
-                zone: Some(zone.name()),
+                outcome: "hit".into(),
+                boat: Some(boat.into()),
+                zone: Some(zone.name().into()),
                 time: Some(*time),
                 range_m: Some(*range_m),
                 point: Some(*point),
                 ..Self::default()
             },
             Outcome::Miss { boat, miss_m, time, range_m } => Self {
-                outcome: "miss",
-                boat: boat.as_deref(),
+                outcome: "miss".into(),
+                boat: boat.as_deref().map(Cow::from),
                 time: Some(*time),
                 range_m: Some(*range_m),
                 miss_m: Some(*miss_m),
                 ..Self::default()
             },
             Outcome::NotScored { cause } => {
-                Self { outcome: "not_scored", cause: Some(cause.name()), ..Self::default() }
+                Self { outcome: "not_scored".into(), cause: Some(cause.name().into()), ..Self::default() }
             }
+        }
+    }
+}
+
+impl OutcomeColumns<'_> {
+    /// The outcome, or what is wrong with the columns. Numbers that are absent are NaN.
+    fn outcome(self) -> Result<Outcome, String> {
+        let Self { outcome, boat, zone, cause, .. } = self;
+        let (time, range_m) = (self.time.unwrap_or(Time::from_ns(0)), self.range_m.unwrap_or(f64::NAN));
+        let boat = boat.map(Cow::into_owned);
+        match &*outcome {
+            "hit" => {
+                let known = Zone::ALL.into_iter().find(|known| Some(known.name()) == zone.as_deref());
+                let zone = known.ok_or_else(|| format!("unknown zone {zone:?}"))?;
+                let boat = boat.ok_or("a hit without a boat")?;
+                Ok(Outcome::Hit { boat, zone, time, range_m, point: self.point.unwrap_or(DVec3::NAN) })
+            }
+            "miss" => Ok(Outcome::Miss { boat, miss_m: self.miss_m.unwrap_or(f64::NAN), time, range_m }),
+            "not_scored" => cause
+                .as_deref()
+                .and_then(NotScored::from_name)
+                .map(|cause| Outcome::NotScored { cause })
+                .ok_or_else(|| format!("unknown cause {cause:?}")),
+            other => Err(format!("unknown outcome {other:?}")),
         }
     }
 }
@@ -91,8 +117,8 @@ impl StoredShot {
     /// Numbers have their full precision.
     pub fn cells(&self) -> [String; 20] {
         let record = &self.record;
-        let parts = Parts::of(&record.outcome);
-        let text = |value: Option<&str>| value.unwrap_or_default().to_owned();
+        let parts = OutcomeColumns::from(&record.outcome);
+        let text = |value: &Option<Cow<'_, str>>| value.as_deref().unwrap_or_default().to_owned();
         let number =
             |value: Option<f64>| value.filter(|v| v.is_finite()).map_or_else(String::new, |v| v.to_string());
         let [mx, my, mz] = record.muzzle.to_array().map(|v| number(Some(v)));
@@ -102,13 +128,13 @@ impl StoredShot {
             self.run.to_string(),
             record.shot.to_string(),
             seconds(record.fired),
-            parts.outcome.to_owned(),
-            text(parts.boat),
-            text(parts.zone),
+            parts.outcome.to_string(),
+            text(&parts.boat),
+            text(&parts.zone),
             parts.time.map_or_else(String::new, seconds),
             number(parts.range_m),
             number(parts.miss_m),
-            text(parts.cause),
+            text(&parts.cause),
             mx,
             my,
             mz,
@@ -125,7 +151,7 @@ impl StoredShot {
     /// The round as a JSON object; null where a column does not apply or a number is not finite.
     pub fn to_json(&self) -> Value {
         let record = &self.record;
-        let parts = Parts::of(&record.outcome);
+        let parts = OutcomeColumns::from(&record.outcome);
         json!({
             "run": self.run,
             "shot": record.shot,
@@ -155,7 +181,7 @@ fn seconds(time: Time) -> String {
 
 /// Adds a round; `false` where the run already has one of that number.
 pub(super) fn insert(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Result<bool> {
-    let parts = Parts::of(&shot.outcome);
+    let parts = OutcomeColumns::from(&shot.outcome);
     let point = parts.point.map_or([None; 3], |p| p.to_array().map(Some));
     let sql = format!(
         "INSERT INTO shots ({COLUMNS}) VALUES \
@@ -199,56 +225,22 @@ pub(super) fn parse(row: &Row<'_>) -> rusqlite::Result<Parsed> {
         Ok(DVec3::new(number(column)?, number(column + 1)?, number(column + 2)?))
     };
     let (run, shot): (i64, i64) = (row.get(0)?, row.get(1)?);
-    let cells = Cells {
-        outcome: row.get(10)?,
-        boat: row.get(11)?,
-        zone: row.get(12)?,
-        time: Time::from_ns(row.get::<_, Option<i64>>(13)?.unwrap_or_default()),
-        range_m: number(14)?,
-        point: vector(15)?,
-        miss_m: number(18)?,
-        cause: row.get(19)?,
+    let text = |column: usize| row.get::<_, Option<String>>(column).map(|text| text.map(Cow::from));
+    let columns = OutcomeColumns {
+        outcome: row.get::<_, String>(10)?.into(),
+        boat: text(11)?,
+        zone: text(12)?,
+        time: row.get::<_, Option<i64>>(13)?.map(Time::from_ns),
+        range_m: row.get(14)?,
+        point: Some(vector(15)?),
+        miss_m: row.get(18)?,
+        cause: text(19)?,
     };
     let (fired, muzzle, bore) = (Time::from_ns(row.get(2)?), vector(3)?, vector(6)?);
     let pose_age_ns = row.get(9)?;
-    let record = cells.outcome().and_then(|outcome| {
+    let record = columns.outcome().and_then(|outcome| {
         let shot = u64::try_from(shot).map_err(|_| "a negative number".to_owned())?;
         Ok(ShotRecord { shot, fired, muzzle, bore, pose_age_ns, outcome })
     });
     Ok((run, shot, record))
-}
-
-/// The columns that make an outcome.
-struct Cells {
-    outcome: String,
-    boat: Option<String>,
-    zone: Option<String>,
-    time: Time,
-    range_m: f64,
-    point: DVec3,
-    miss_m: f64,
-    cause: Option<String>,
-}
-
-impl Cells {
-    fn outcome(self) -> Result<Outcome, String> {
-        let Self { outcome, boat, zone, time, range_m, point, miss_m, cause } = self;
-        match outcome.as_str() {
-            "hit" => {
-                let zone = Zone::ALL
-                    .into_iter()
-                    .find(|known| Some(known.name()) == zone.as_deref())
-                    .ok_or_else(|| format!("unknown zone {zone:?}"))?;
-                let boat = boat.ok_or("a hit without a boat")?;
-                Ok(Outcome::Hit { boat, zone, time, range_m, point })
-            }
-            "miss" => Ok(Outcome::Miss { boat, miss_m, time, range_m }),
-            "not_scored" => cause
-                .as_deref()
-                .and_then(NotScored::from_name)
-                .map(|cause| Outcome::NotScored { cause })
-                .ok_or_else(|| format!("unknown cause {cause:?}")),
-            other => Err(format!("unknown outcome {other:?}")),
-        }
-    }
 }

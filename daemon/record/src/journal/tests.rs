@@ -22,15 +22,15 @@ fn shot(number: u64) -> ShotRecord {
     }
 }
 
-fn impatient(pages_max: Option<u32>) -> Settings {
+fn impatient(pages_max: Option<u32>) -> JournalSettings {
     let retry = Duration::from_millis(5);
-    Settings {
+    JournalSettings {
         pages_max,
         held_max: 2000,
         retry_first: retry,
         retry_max: retry,
         finish_attempts: 3,
-        ..Settings::from(&JournalOptions::default())
+        ..JournalSettings::from(&JournalOptions::default())
     }
 }
 
@@ -121,7 +121,7 @@ fn a_database_damaged_while_in_use_is_put_aside_and_this_runs_rounds_written_aga
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hits.db");
     // A cache of a few pages, and a log that is emptied at once: SQLite has to read what was damaged.
-    let settings = Settings { pages_cached: Some(2), checkpoint_pages: 1, ..impatient(None) };
+    let settings = JournalSettings { pages_cached: Some(2), checkpoint_pages: 1, ..impatient(None) };
     let run = Run { scenario: "three skiffs".to_owned(), ..Run::default() };
     let journal = Journal::start(&path, &run, settings).unwrap();
     let shoot = |from: u64, to: u64| {

@@ -15,7 +15,8 @@ use crossbeam_channel::{Receiver, Sender, TryRecvError, after, never, select};
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
 use super::{
-    JournalError, JournalFault, Message, Quarantine, Run, Settings, StoredShot, Told, Unwritten,
+    JournalError, JournalFault, JournalMessage, JournalSettings, JournalStatus, Quarantine, Run, StoredShot,
+    Unwritten,
     boot::WallClock,
     open::{connect, empty_log_at_end, keep_log, with_suffix},
     quarantine,
@@ -35,25 +36,25 @@ const RESERVE_PAUSE: Duration = Duration::from_secs(2);
 /// Longest pause between attempts while the journal is being finished.
 const FINISH_PAUSE_MAX: Duration = Duration::from_millis(500);
 
-/// What the thread leaves.
-pub(super) struct Ended {
+/// Result of the thread.
+pub(super) struct JournalEnd {
     pub(super) committed: u64,
     pub(super) unwritten: Option<Unwritten>,
 }
 
 /// The state of the thread.
-pub(super) struct Worker {
+pub(super) struct JournalWorker {
     /// `None` after a failure that leaves in doubt what it would read: it is opened anew.
     connection: Option<Connection>,
     path: PathBuf,
     id: i64,
     run: Run,
-    incoming: Receiver<Message>,
+    incoming: Receiver<JournalMessage>,
     /// Disconnected once the journal is being finished. The queue cannot tell while it is full.
     closing: Receiver<Infallible>,
     commits: Sender<u64>,
-    told: Arc<Mutex<Told>>,
-    settings: Settings,
+    told: Arc<Mutex<JournalStatus>>,
+    settings: JournalSettings,
     reserve: Reserve,
     /// The reserve is not there: the disk is full, or was and has not got room enough yet.
     low: bool,
@@ -65,9 +66,9 @@ pub(super) struct Worker {
     not_kept: u64,
     /// Wall time to be filled in.
     clock: Option<WallClock>,
-    /// What is wrong with the database, until it has been put aside.
+    /// Damage of the database, until it has been put aside.
     damage: Option<String>,
-    /// What the database refuses for good, with the reason.
+    /// Rounds that the database refuses for good, with the reason.
     rejected: Vec<(ShotRecord, String)>,
     committed: u64,
     /// Failures since the last success.
@@ -75,22 +76,22 @@ pub(super) struct Worker {
 }
 
 /// The thread's ends of the journal's channels.
-pub(super) struct Ends {
-    pub(super) incoming: Receiver<Message>,
+pub(super) struct JournalChannels {
+    pub(super) incoming: Receiver<JournalMessage>,
     pub(super) closing: Receiver<Infallible>,
     pub(super) commits: Sender<u64>,
-    pub(super) told: Arc<Mutex<Told>>,
+    pub(super) told: Arc<Mutex<JournalStatus>>,
 }
 
-impl Worker {
+impl JournalWorker {
     pub(super) fn new(
         connection: Connection,
         path: &Path,
         (id, run): (i64, Run),
-        ends: Ends,
-        settings: Settings,
+        ends: JournalChannels,
+        settings: JournalSettings,
     ) -> Self {
-        let Ends { incoming, closing, commits, told } = ends;
+        let JournalChannels { incoming, closing, commits, told } = ends;
         Self {
             connection: Some(connection),
             path: path.into(),
@@ -114,7 +115,7 @@ impl Worker {
         }
     }
 
-    pub(super) fn run(mut self) -> Ended {
+    pub(super) fn run(mut self) -> JournalEnd {
         if let Some(connection) = &self.connection {
             be_patient(connection, &self.path);
         }
@@ -161,10 +162,10 @@ impl Worker {
         true
     }
 
-    fn take(&mut self, message: Message) {
+    fn take(&mut self, message: JournalMessage) {
         match message {
-            Message::Shot(shot) => self.held.push_back(shot),
-            Message::Clock(clock) => {
+            JournalMessage::Shot(shot) => self.held.push_back(shot),
+            JournalMessage::Clock(clock) => {
                 // A fresh database would begin this run with it.
                 self.run.started_wall_ns = self
                     .run
@@ -333,7 +334,7 @@ impl Worker {
         self.tell(|told| told.fault = fault);
     }
 
-    fn tell(&self, change: impl FnOnce(&mut Told)) {
+    fn tell(&self, change: impl FnOnce(&mut JournalStatus)) {
         change(&mut self.told.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
@@ -362,7 +363,7 @@ impl Worker {
     }
 
     /// Closes the run, or saves what could not be written.
-    fn end(mut self, cause: Option<String>) -> Ended {
+    fn end(mut self, cause: Option<String>) -> JournalEnd {
         // After giving up, more than may be held can still be queued.
         while let Ok(message) = self.incoming.try_recv() {
             self.take(message);
@@ -371,7 +372,7 @@ impl Worker {
             if let Err(error) = self.close_run() {
                 log::warn!("{error}; its last run stays marked as unfinished");
             }
-            return Ended { committed: self.committed, unwritten: None };
+            return JournalEnd { committed: self.committed, unwritten: None };
         }
         if let Some(connection) = &self.connection {
             empty_log_at_end(connection);
@@ -394,7 +395,7 @@ impl Worker {
         };
         let unwritten =
             Unwritten { path: self.path, run: self.id, committed: self.committed, cause, rows, side_file };
-        Ended { committed: self.committed, unwritten: Some(unwritten) }
+        JournalEnd { committed: self.committed, unwritten: Some(unwritten) }
     }
 
     /// Marks the run as finished and moves the log into the database.

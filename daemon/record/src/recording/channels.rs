@@ -1,4 +1,4 @@
-//! What a file declares: channels, schemas, metadata, attachments.
+//! Declarations of a file: channels, schemas, metadata, attachments.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -10,7 +10,7 @@ use super::{
     schema::{MESSAGE_ENCODING, SCHEMA_ENCODING, Topic},
 };
 
-/// What channels and schemas mean.
+/// Meaning of channels and schemas.
 #[derive(Clone, Default)]
 pub(crate) struct Channels {
     schemas: BTreeMap<u16, (String, String)>,

@@ -1,10 +1,10 @@
-//! What can be wrong with a recording.
+//! Errors of a recording.
 
 use std::{io, path::PathBuf};
 
 use bowwave_core::time::Time;
 
-/// What is wrong with a recording, where, and what to do.
+/// Error of a recording: cause, place and remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     /// The file cannot be opened.
@@ -82,7 +82,7 @@ pub enum RecordError {
         path: PathBuf,
         /// Where.
         offset: u64,
-        /// What is wrong there.
+        /// Description of the error.
         what: String,
     },
     /// A record claims a size beyond what is read.
@@ -96,7 +96,7 @@ pub enum RecordError {
         path: PathBuf,
         /// Where.
         offset: u64,
-        /// What is too large.
+        /// The part that is too large.
         what: String,
         /// Claimed bytes.
         bytes: u64,
@@ -131,7 +131,7 @@ pub enum RecordError {
         topic: &'static str,
         /// Its log time.
         time: Time,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
     /// Messages are farther out of order than writers may leave them.
@@ -154,7 +154,7 @@ pub enum RecordError {
         path: PathBuf,
         /// Which one.
         name: String,
-        /// What is wrong with it.
+        /// Description of the error.
         what: String,
     },
     /// A recording of a newer Bowwave.

@@ -129,7 +129,7 @@ impl Messages {
         Ok(Some((opcode, body..end)))
     }
 
-    /// What the message at `body` is; `None` for a topic that is not ours.
+    /// Head of the message at `body`; `None` for a topic that is not ours.
     fn message(&self, body: &Range<usize>) -> Result<Option<Head>, RecordError> {
         let data = self.data.get(body.clone()).unwrap_or_default();
         let (Some(prefix), Some(log_time)) = (u64_at(data, 0), u64_at(data, 6)) else {

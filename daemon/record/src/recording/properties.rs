@@ -1,4 +1,4 @@
-//! What a recording says about itself.
+//! Properties of a recording.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -19,7 +19,7 @@ const FORMAT: u32 = 1;
 /// Prefix of the keys in [`Properties::extra`].
 const EXTRA: &str = "extra.";
 
-/// What a recording says about itself.
+/// Properties of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Properties {
     /// The calibration file of camera, inertial unit and mount.
@@ -30,7 +30,7 @@ pub struct Properties {
     pub loop_ns: Option<i64>,
     /// When the recording begins; not negative.
     pub start: Time,
-    /// What it was made from, for people.
+    /// Its source, for people.
     pub source: String,
     /// Width and height of the pictures in pixels.
     pub picture: (u32, u32),

@@ -6,10 +6,10 @@ use super::{
     Counts, RecordError, RecordingWriter, messages::Messages, read::entry, records::Records, survey::Survey,
 };
 
-/// What became of a damaged recording.
+/// Result of recovering a damaged recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecoverReport {
-    /// What was saved.
+    /// Counts of what was saved.
     pub saved: Counts,
     /// From the first saved entry to the last, nanoseconds.
     pub saved_ns: i64,
@@ -36,7 +36,7 @@ pub fn recover(path: &Path, out: &Path) -> Result<RecoverReport, RecordError> {
     let bytes = records.file_bytes();
     let mut messages = Messages::new(records, survey.channels);
     let mut writer = RecordingWriter::create(out, &properties)?;
-    let mut faults = Faults::default();
+    let mut faults = RecoveryFaults::default();
     loop {
         let result = match messages.next() {
             Ok(None) => break,
@@ -64,12 +64,12 @@ pub fn recover(path: &Path, out: &Path) -> Result<RecoverReport, RecordError> {
 }
 
 #[derive(Default)]
-struct Faults {
+struct RecoveryFaults {
     lines: Vec<String>,
     count: u64,
 }
 
-impl Faults {
+impl RecoveryFaults {
     fn add(&mut self, fault: &RecordError) {
         self.count += 1;
         if self.lines.len() < RecoverReport::MAX_FAULTS {

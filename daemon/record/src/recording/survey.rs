@@ -1,4 +1,4 @@
-//! What is known about a file before its entries are read: from its index, or by reading all of it once.
+//! Survey of a file before its entries are read: from its index, or by reading all of it once.
 
 use std::{
     fs::File,
@@ -20,7 +20,7 @@ use super::{
     schema::Topic,
 };
 
-/// What is known about a file before its entries are read.
+/// Survey of a file before its entries are read.
 pub(crate) struct Survey {
     pub(crate) channels: Channels,
     pub(crate) notes: Notes,

@@ -1,4 +1,4 @@
-//! What a disk may hold after the power was cut.
+//! States of a disk after a power cut.
 //!
 //! Assumed: what was written to a file before an fsync of it that returned is there, and so are the names that were given or
 //! taken in the folder before an fsync of the folder. Of everything since, anything may be there or not: of writes any
@@ -12,11 +12,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::trace::Step;
+use crate::trace::TraceStep;
 
 const SECTOR: usize = 512;
 
-/// What of the writes that were not synced survives.
+/// Fate of writes that were not synced.
 #[derive(Clone, Copy, Debug)]
 pub enum Survival {
     /// Nothing.
@@ -28,9 +28,9 @@ pub enum Survival {
 }
 
 /// Numbers that look random and are the same each time (SplitMix64).
-pub struct Random(pub u64);
+pub struct DiskRandom(pub u64);
 
-impl Random {
+impl DiskRandom {
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -49,7 +49,7 @@ impl Random {
 }
 
 #[derive(Clone)]
-enum Change {
+enum DiskChange {
     Write { offset: usize, bytes: Vec<u8> },
     Resize(usize),
 }
@@ -62,11 +62,11 @@ enum Naming {
 }
 
 #[derive(Default)]
-struct File {
+struct DiskFile {
     /// On the disk for sure.
     synced: Vec<u8>,
     /// Since then.
-    changes: Vec<Change>,
+    changes: Vec<DiskChange>,
 }
 
 type Names = BTreeMap<String, usize>;
@@ -74,44 +74,44 @@ type Names = BTreeMap<String, usize>;
 /// Files and names, synced and not.
 #[derive(Default)]
 pub struct Disk {
-    files: Vec<File>,
+    files: Vec<DiskFile>,
     names: Names,
     namings: Vec<Naming>,
 }
 
 impl Disk {
-    pub fn apply(&mut self, step: &Step) {
+    pub fn apply(&mut self, step: &TraceStep) {
         match step {
-            Step::Create { name } => {
+            TraceStep::Create { name } => {
                 self.namings.push(Naming::Create { name: name.clone(), file: self.files.len() });
-                self.files.push(File::default());
+                self.files.push(DiskFile::default());
             }
-            Step::Write { file, offset, bytes } => {
-                self.files[*file].changes.push(Change::Write { offset: *offset, bytes: bytes.clone() });
+            TraceStep::Write { file, offset, bytes } => {
+                self.files[*file].changes.push(DiskChange::Write { offset: *offset, bytes: bytes.clone() });
             }
-            Step::Resize { file, length } => self.files[*file].changes.push(Change::Resize(*length)),
-            Step::Sync { file } => {
-                let File { synced, changes } = &mut self.files[*file];
+            TraceStep::Resize { file, length } => self.files[*file].changes.push(DiskChange::Resize(*length)),
+            TraceStep::Sync { file } => {
+                let DiskFile { synced, changes } = &mut self.files[*file];
                 for change in changes.drain(..) {
                     apply(synced, &change, |_| true);
                 }
             }
-            Step::SyncFailed { file } => self.files[*file].changes.clear(),
-            Step::SyncFolder => {
+            TraceStep::SyncFailed { file } => self.files[*file].changes.clear(),
+            TraceStep::SyncFolder => {
                 for naming in self.namings.drain(..) {
                     rename(&mut self.names, &naming);
                 }
             }
-            Step::Remove { name } => self.namings.push(Naming::Remove(name.clone())),
-            Step::Rename { from, to } => {
+            TraceStep::Remove { name } => self.namings.push(Naming::Remove(name.clone())),
+            TraceStep::Rename { from, to } => {
                 self.namings.push(Naming::Rename { from: from.clone(), to: to.clone() });
             }
-            Step::Fired(_) | Step::Committed(_) | Step::Damage => {}
+            TraceStep::Fired(_) | TraceStep::Committed(_) | TraceStep::Damage => {}
         }
     }
 
-    /// What is found when the power is back: bytes by name.
-    pub fn after_cut(&self, survival: Survival, random: &mut Random) -> BTreeMap<String, Vec<u8>> {
+    /// Files when the power is back: bytes by name.
+    pub fn after_cut(&self, survival: Survival, random: &mut DiskRandom) -> BTreeMap<String, Vec<u8>> {
         let mut names = self.names.clone();
         let in_order = random.coin();
         let last = random.below(self.namings.len() + 1);
@@ -133,8 +133,8 @@ impl Disk {
     }
 }
 
-impl File {
-    fn after_cut(&self, survival: Survival, random: &mut Random) -> Vec<u8> {
+impl DiskFile {
+    fn after_cut(&self, survival: Survival, random: &mut DiskRandom) -> Vec<u8> {
         let mut bytes = self.synced.clone();
         match survival {
             Survival::Nothing => return bytes,
@@ -183,10 +183,10 @@ fn rename(names: &mut Names, naming: &Naming) {
 
 /// Applies a change; `keep` says which of the sectors that a write touches (numbered from its first) reach the disk. The
 /// length does in any case.
-fn apply(bytes: &mut Vec<u8>, change: &Change, mut keep: impl FnMut(usize) -> bool) {
+fn apply(bytes: &mut Vec<u8>, change: &DiskChange, mut keep: impl FnMut(usize) -> bool) {
     match change {
-        Change::Resize(length) => bytes.resize(*length, 0),
-        Change::Write { offset, bytes: written } => {
+        DiskChange::Resize(length) => bytes.resize(*length, 0),
+        DiskChange::Write { offset, bytes: written } => {
             let end = offset + written.len();
             if bytes.len() < end {
                 bytes.resize(end, 0);

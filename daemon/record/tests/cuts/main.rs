@@ -21,9 +21,9 @@ mod verify;
 
 use std::{env, path::Path, process::Command, time::Instant};
 
-use disk::{Disk, Random, Survival};
-use trace::Step;
-use verify::Expected;
+use disk::{Disk, DiskRandom, Survival};
+use trace::TraceStep;
+use verify::ExpectedShots;
 
 const CUTS: usize = 300;
 
@@ -68,12 +68,12 @@ fn main() {
 }
 
 /// Everything that the phases of the shooting program did to the files.
-fn record() -> Vec<Step> {
+fn record() -> Vec<TraceStep> {
     let folder = tempfile::tempdir().unwrap();
     let data = folder.path().join("data");
     std::fs::create_dir(&data).unwrap();
     let mut steps = Vec::new();
-    let mut reader = trace::Reader::new(&data);
+    let mut reader = trace::TraceReader::new(&data);
     for phase in 0..shoot::PHASES {
         let file = folder.path().join(format!("trace-{phase}"));
         let output = Command::new("strace")
@@ -93,9 +93,10 @@ fn record() -> Vec<Step> {
         assert_eq!(output.status.success(), !killed, "phase {phase}: {said}");
         reader.read(&std::fs::read_to_string(&file).unwrap(), &mut steps);
     }
-    let syncs = steps.iter().filter(|step| matches!(step, Step::Sync { .. } | Step::SyncFolder)).count();
-    let reports = steps.iter().filter(|step| matches!(step, Step::Committed(_))).count();
-    let failed = steps.iter().filter(|step| matches!(step, Step::SyncFailed { .. })).count();
+    let syncs =
+        steps.iter().filter(|step| matches!(step, TraceStep::Sync { .. } | TraceStep::SyncFolder)).count();
+    let reports = steps.iter().filter(|step| matches!(step, TraceStep::Committed(_))).count();
+    let failed = steps.iter().filter(|step| matches!(step, TraceStep::SyncFailed { .. })).count();
     assert!(failed >= 3, "{failed} syncs failed");
     // Each round fired by itself is a transaction of its own.
     assert!(reports >= 400 && syncs >= reports / 2, "{reports} reports, {syncs} syncs: is strace blind?");
@@ -103,7 +104,7 @@ fn record() -> Vec<Step> {
 }
 
 #[derive(Debug, Default)]
-struct Report {
+struct CutReport {
     cuts: usize,
     points: usize,
     lost: usize,
@@ -113,12 +114,12 @@ struct Report {
 }
 
 /// Cuts after each step, or after as many as are asked for, evenly spread.
-fn cut(steps: &[Step], cuts: usize) -> Report {
+fn cut(steps: &[TraceStep], cuts: usize) -> CutReport {
     let folder = scratch();
     let mut disk = Disk::default();
-    let mut expected = Expected::default();
-    let mut random = Random(0x0b0e_ca75);
-    let mut report = Report::default();
+    let mut expected = ExpectedShots::default();
+    let mut random = DiskRandom(0x0b0e_ca75);
+    let mut report = CutReport::default();
     for (index, step) in steps.iter().enumerate() {
         disk.apply(step);
         expected.apply(step);

@@ -105,7 +105,7 @@ fn say(line: &str) {
     io::stdout().lock().write_all(format!("{line}\n").as_bytes()).unwrap();
 }
 
-/// What a failing disk does to all pages but the first.
+/// Damage by a failing disk to all pages but the first.
 fn damage(path: &Path) {
     say("damage");
     let file = OpenOptions::new().read(true).write(true).open(path).unwrap();

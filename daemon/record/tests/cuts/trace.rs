@@ -8,7 +8,7 @@ pub const CALLS: &str = "openat,open,creat,close,lseek,write,pwrite64,writev,pwr
 
 /// Something that happened to the journal's folder, or was reported.
 #[derive(Clone, Debug)]
-pub enum Step {
+pub enum TraceStep {
     /// A new empty file.
     Create { name: String },
     /// Bytes of a file; files are named by the number of their creation.
@@ -33,7 +33,7 @@ pub enum Step {
     Damage,
 }
 
-impl fmt::Display for Step {
+impl fmt::Display for TraceStep {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Write { file, offset, bytes } => {
@@ -44,23 +44,23 @@ impl fmt::Display for Step {
     }
 }
 
-enum Open {
-    File { file: usize, position: usize },
+enum OpenFile {
+    DiskFile { file: usize, position: usize },
     Folder,
 }
 
 /// Turns traces of programs that ran one after the other into steps.
-pub struct Reader {
+pub struct TraceReader {
     folder: String,
     /// File of each name that is there.
     names: HashMap<String, usize>,
     created: usize,
-    open: HashMap<i64, Open>,
+    open: HashMap<i64, OpenFile>,
     /// Calls that had not returned when another thread's came, by thread.
     unfinished: HashMap<String, String>,
 }
 
-impl Reader {
+impl TraceReader {
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_str().unwrap().to_owned(),
@@ -72,7 +72,7 @@ impl Reader {
     }
 
     /// Adds the steps of one program.
-    pub fn read(&mut self, trace: &str, steps: &mut Vec<Step>) {
+    pub fn read(&mut self, trace: &str, steps: &mut Vec<TraceStep>) {
         self.open.clear();
         self.unfinished.clear();
         for line in trace.lines() {
@@ -98,20 +98,20 @@ impl Reader {
     }
 
     /// Whether the call is a report on standard output.
-    fn report(&self, call: &str, steps: &mut Vec<Step>) -> bool {
+    fn report(&self, call: &str, steps: &mut Vec<TraceStep>) -> bool {
         let Some(rest) = call.strip_prefix("write(1, ") else { return false };
         let text = String::from_utf8(bytes(rest.split(", ").next().unwrap())).unwrap();
         let number = |text: &str| text.trim().parse().unwrap();
         match text.trim().split_once(' ') {
-            Some(("fired", shot)) => steps.push(Step::Fired(number(shot))),
-            Some(("committed", shot)) => steps.push(Step::Committed(number(shot))),
-            None if text.trim() == "damage" => steps.push(Step::Damage),
+            Some(("fired", shot)) => steps.push(TraceStep::Fired(number(shot))),
+            Some(("committed", shot)) => steps.push(TraceStep::Committed(number(shot))),
+            None if text.trim() == "damage" => steps.push(TraceStep::Damage),
             _ => panic!("the program said {text:?}"),
         }
         true
     }
 
-    fn call(&mut self, call: &str, steps: &mut Vec<Step>) {
+    fn call(&mut self, call: &str, steps: &mut Vec<TraceStep>) {
         let (head, result) = call.rsplit_once(" = ").unwrap_or_else(|| panic!("strace: {call:.200}"));
         let result: i64 = result.split(' ').next().unwrap().parse().unwrap_or(-1);
         let (name, arguments) = head.trim_end().split_once('(').unwrap();
@@ -124,40 +124,42 @@ impl Reader {
             "openat" => self.opened(&arguments, result, steps),
             "close" => drop(self.open.remove(&number(0))),
             "lseek" => {
-                if let Some(Open::File { position, .. }) = self.open.get_mut(&number(0)) {
+                if let Some(OpenFile::DiskFile { position, .. }) = self.open.get_mut(&number(0)) {
                     *position = result as usize;
                 }
             }
             "write" => {
-                if let Some(Open::File { file, position }) = self.open.get_mut(&number(0)) {
+                if let Some(OpenFile::DiskFile { file, position }) = self.open.get_mut(&number(0)) {
                     let bytes = bytes(arguments[1])[..result as usize].to_vec();
-                    steps.push(Step::Write { file: *file, offset: *position, bytes });
+                    steps.push(TraceStep::Write { file: *file, offset: *position, bytes });
                     *position += result as usize;
                 }
             }
             "pwrite64" => {
-                if let Some(Open::File { file, .. }) = self.open.get(&number(0)) {
+                if let Some(OpenFile::DiskFile { file, .. }) = self.open.get(&number(0)) {
                     let bytes = bytes(arguments[1])[..result as usize].to_vec();
-                    steps.push(Step::Write { file: *file, offset: number(3) as usize, bytes });
+                    steps.push(TraceStep::Write { file: *file, offset: number(3) as usize, bytes });
                 }
             }
             "ftruncate" | "fallocate" => {
-                if let Some(Open::File { file, .. }) = self.open.get(&number(0)) {
+                if let Some(OpenFile::DiskFile { file, .. }) = self.open.get(&number(0)) {
                     let length = arguments.last().unwrap().parse().unwrap();
-                    steps.push(Step::Resize { file: *file, length });
+                    steps.push(TraceStep::Resize { file: *file, length });
                 }
             }
             "fsync" | "fdatasync" => match self.open.get(&number(0)) {
-                Some(Open::File { file, .. }) if result < 0 => steps.push(Step::SyncFailed { file: *file }),
-                Some(Open::File { file, .. }) => steps.push(Step::Sync { file: *file }),
-                Some(Open::Folder) if result == 0 => steps.push(Step::SyncFolder),
-                Some(Open::Folder) | None => {}
+                Some(OpenFile::DiskFile { file, .. }) if result < 0 => {
+                    steps.push(TraceStep::SyncFailed { file: *file })
+                }
+                Some(OpenFile::DiskFile { file, .. }) => steps.push(TraceStep::Sync { file: *file }),
+                Some(OpenFile::Folder) if result == 0 => steps.push(TraceStep::SyncFolder),
+                Some(OpenFile::Folder) | None => {}
             },
             "unlink" | "unlinkat" => {
                 let path = arguments.iter().find(|argument| argument.starts_with('"')).unwrap();
                 if let Some(name) = self.name(path) {
                     self.names.remove(&name);
-                    steps.push(Step::Remove { name });
+                    steps.push(TraceStep::Remove { name });
                 }
             }
             "rename" | "renameat" | "renameat2" => {
@@ -166,7 +168,7 @@ impl Reader {
                 if let (Some(from), Some(to)) = (from, to) {
                     let file = self.names.remove(&from).unwrap();
                     self.names.insert(to.clone(), file);
-                    steps.push(Step::Rename { from, to });
+                    steps.push(TraceStep::Rename { from, to });
                 }
             }
             other => self.refuse(other, &arguments),
@@ -182,10 +184,10 @@ impl Reader {
         assert!(!ours, "the journal uses {call}, which this test does not know");
     }
 
-    fn opened(&mut self, arguments: &[&str], fd: i64, steps: &mut Vec<Step>) {
+    fn opened(&mut self, arguments: &[&str], fd: i64, steps: &mut Vec<TraceStep>) {
         let path = String::from_utf8(bytes(arguments[1])).unwrap();
         if path == self.folder {
-            self.open.insert(fd, Open::Folder);
+            self.open.insert(fd, OpenFile::Folder);
             return;
         }
         let Some(name) = self.name(arguments[1]) else { return };
@@ -193,13 +195,13 @@ impl Reader {
         let file = *self.names.entry(name.clone()).or_insert_with(|| {
             assert!(flags.contains("O_CREAT"), "{name} came from nowhere");
             self.created += 1;
-            steps.push(Step::Create { name });
+            steps.push(TraceStep::Create { name });
             self.created - 1
         });
         if flags.contains("O_TRUNC") {
-            steps.push(Step::Resize { file, length: 0 });
+            steps.push(TraceStep::Resize { file, length: 0 });
         }
-        self.open.insert(fd, Open::File { file, position: 0 });
+        self.open.insert(fd, OpenFile::DiskFile { file, position: 0 });
     }
 
     /// The name in the folder that a quoted path means, unless it is another place, or SQLite's map of the log: what that one

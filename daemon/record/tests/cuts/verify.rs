@@ -8,25 +8,25 @@ use std::{
 
 use bowwave_record::{Journal, Run, ShotFilter, read_shots};
 
-use crate::{shoot, trace::Step};
+use crate::{shoot, trace::TraceStep};
 
 /// A round that is fired after the cut.
 const NEXT: u64 = 1_000_000;
 
-/// What must be, and what may be, in the journal.
+/// Rounds that must be, and that may be, in the journal.
 #[derive(Default)]
-pub struct Expected {
+pub struct ExpectedShots {
     fired: BTreeSet<u64>,
     committed: BTreeSet<u64>,
     /// From the damage on until the next report: the disk itself has lost rounds, and nobody has said otherwise yet.
     damaged: bool,
 }
 
-impl Expected {
-    pub fn apply(&mut self, step: &Step) {
+impl ExpectedShots {
+    pub fn apply(&mut self, step: &TraceStep) {
         match step {
-            Step::Fired(shot) => drop(self.fired.insert(*shot)),
-            Step::Committed(shot) => {
+            TraceStep::Fired(shot) => drop(self.fired.insert(*shot)),
+            TraceStep::Committed(shot) => {
                 if self.damaged {
                     // Earlier runs are in the database that was put aside; this one is whole again.
                     self.committed.retain(|earlier| earlier / 1000 == shot / 1000);
@@ -34,15 +34,15 @@ impl Expected {
                 }
                 self.committed.insert(*shot);
             }
-            Step::Damage => self.damaged = true,
+            TraceStep::Damage => self.damaged = true,
             _ => {}
         }
     }
 }
 
-/// What was found.
+/// Rounds found in the journal.
 #[derive(Default)]
-pub struct Found {
+pub struct FoundShots {
     pub lost: usize,
     pub invented: usize,
     pub unopened: bool,
@@ -52,7 +52,7 @@ pub struct Found {
 }
 
 /// Puts the files into `folder`, opens the journal there, and compares.
-pub fn look(folder: &Path, image: &BTreeMap<String, Vec<u8>>, expected: &Expected) -> Found {
+pub fn look(folder: &Path, image: &BTreeMap<String, Vec<u8>>, expected: &ExpectedShots) -> FoundShots {
     for entry in fs::read_dir(folder).unwrap() {
         fs::remove_file(entry.unwrap().path()).unwrap();
     }
@@ -66,8 +66,8 @@ pub fn look(folder: &Path, image: &BTreeMap<String, Vec<u8>>, expected: &Expecte
     }
     let path = folder.join(shoot::NAME);
     match open_and_shoot(&path, expected.damaged) {
-        Err(fault) => Found { unopened: true, fault: Some(fault), ..Found::default() },
-        Ok(quarantined) if expected.damaged => Found { quarantined, ..Found::default() },
+        Err(fault) => FoundShots { unopened: true, fault: Some(fault), ..FoundShots::default() },
+        Ok(quarantined) if expected.damaged => FoundShots { quarantined, ..FoundShots::default() },
         Ok(_) => compare(&path, expected),
     }
 }
@@ -87,13 +87,15 @@ fn open_and_shoot(path: &Path, damaged: bool) -> Result<bool, String> {
     Ok(quarantined.is_some())
 }
 
-fn compare(path: &Path, expected: &Expected) -> Found {
+fn compare(path: &Path, expected: &ExpectedShots) -> FoundShots {
     let stored = match read_shots(path, &ShotFilter::default()) {
         Ok(stored) => stored,
-        Err(error) => return Found { unopened: true, fault: Some(error.to_string()), ..Found::default() },
+        Err(error) => {
+            return FoundShots { unopened: true, fault: Some(error.to_string()), ..FoundShots::default() };
+        }
     };
     let mut numbers = BTreeSet::new();
-    let mut found = Found::default();
+    let mut found = FoundShots::default();
     let mut fault = |what: String| {
         found.fault.get_or_insert(what);
     };

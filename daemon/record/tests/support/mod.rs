@@ -1,4 +1,4 @@
-//! What the tests of recordings share.
+//! Helpers of the recordings' tests.
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
