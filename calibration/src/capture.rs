@@ -17,17 +17,17 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
     alignment::{self, Alignment, AlignmentError, Comparison, ImuReading, Known, Observation, Options},
-    camera::Corner,
-    rows::{self, Rows},
+    lens::Corner,
+    rolling_shutter::{RollingMeasurements, RollingShutter},
 };
 
-/// What moves all horizons of a recording alike, one standard deviation: refraction, by 0.08 to 0.12 deg in daytime, radians...
+/// Errors that all horizons of a recording share, one standard deviation: refraction, by 0.08 to 0.12 deg in daytime, radians...
 const REFRACTION: f64 = 0.1f64.to_radians();
 /// ...and where in its haze the edge is found, pixels.
 const EDGE_PX: f64 = 0.5;
 /// Pictures with a board from which on horizons are not needed to tell the rotation.
 const BOARDS_ENOUGH: usize = 30;
-/// What is taken at most: half an hour at 1000 readings and 60 pictures a second.
+/// Most readings and observations that are taken: half an hour at 1000 readings and 60 pictures a second.
 const READINGS_MOST: usize = 1_800_000;
 const OBSERVATIONS_MOST: usize = 108_000;
 
@@ -55,7 +55,7 @@ pub struct BoardSeen {
     pub sigma: f64,
     /// Its middle, pixels.
     pub pixel: DVec2,
-    /// What of it was seen where.
+    /// Corners that were found.
     pub corners: Vec<Corner>,
 }
 
@@ -74,9 +74,9 @@ pub struct Sighting {
     pub pixel: DVec2,
 }
 
-/// What has come so far.
+/// Counts of what was captured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
+pub struct CaptureCounts {
     /// Readings of the inertial unit.
     pub readings: usize,
     /// Pictures of the calibrated size.
@@ -104,9 +104,9 @@ pub struct HorizonSeen {
     pub pixel: DVec2,
 }
 
-/// What a picture tells.
+/// Horizon and board found in one picture.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Seen {
+pub struct PictureSeen {
     /// The picture's mid-exposure by the camera's stamp.
     pub stamp: Time,
     /// Whether it has the calibrated size; nothing is looked for in others.
@@ -147,12 +147,12 @@ impl Watcher {
         self
     }
 
-    /// What the picture tells.
-    pub fn look(&mut self, frame: &CameraFrame) -> Seen {
+    /// Horizon and board in a picture.
+    pub fn look(&mut self, frame: &CameraFrame) -> PictureSeen {
         let (picture, lens) = (&frame.picture, &self.lens);
         let fits = (picture.width(), picture.height()) == (lens.width, lens.height);
         let mut seen =
-            Seen { stamp: frame.mid_exposure, fits, horizon: None, is_blurred: false, board: None };
+            PictureSeen { stamp: frame.mid_exposure, fits, horizon: None, is_blurred: false, board: None };
         if !fits {
             return seen;
         }
@@ -195,7 +195,7 @@ pub struct Capture {
     corners: usize,
     readout: Readout,
     edges: Vec<TriggerEdge>,
-    counts: Counts,
+    counts: CaptureCounts,
 }
 
 impl Capture {
@@ -212,7 +212,7 @@ impl Capture {
             corners: 0,
             readout: Readout::Unknown,
             edges: Vec::new(),
-            counts: Counts::default(),
+            counts: CaptureCounts::default(),
         }
     }
 
@@ -244,7 +244,7 @@ impl Capture {
     }
 
     /// Takes in what a picture told.
-    pub fn see(&mut self, seen: &Seen) {
+    pub fn see(&mut self, seen: &PictureSeen) {
         if !seen.fits {
             self.counts.other_size += 1;
             return;
@@ -281,8 +281,8 @@ impl Capture {
         &self.lens
     }
 
-    /// What has come so far.
-    pub const fn counts(&self) -> Counts {
+    /// Counts of what was captured.
+    pub const fn counts(&self) -> CaptureCounts {
         self.counts
     }
 
@@ -291,7 +291,7 @@ impl Capture {
         &self.readings
     }
 
-    /// What pictures told.
+    /// Observations of the camera's orientation.
     pub fn observations(&self) -> &[Observation] {
         &self.observations
     }
@@ -322,7 +322,7 @@ impl Capture {
         self.is_by_horizon().then(|| self.horizon_sigma())
     }
 
-    /// What an alignment was made from, in words.
+    /// Description of the measurements behind an alignment.
     pub fn how(&self, found: &Alignment) -> String {
         let by = if self.is_by_horizon() { "horizon" } else { "board" };
         format!("{:.0} s of movement, {by}, {}", self.seconds(), found.grade)
@@ -375,12 +375,12 @@ impl Capture {
         }
     }
 
-    fn rows(&self, found: &Alignment) -> Rows<'_> {
+    fn rows(&self, found: &Alignment) -> RollingShutter<'_> {
         self.rows_by(found.camera_from_imu, found.offset_s, found.gyro_bias)
     }
 
-    fn rows_by(&self, camera_from_imu: DQuat, offset_s: f64, bias: DVec3) -> Rows<'_> {
-        Rows::new(rows::Measured {
+    fn rows_by(&self, camera_from_imu: DQuat, offset_s: f64, bias: DVec3) -> RollingShutter<'_> {
+        RollingShutter::new(RollingMeasurements {
             lens: self.lens,
             dip: horizon_dip(self.eye_height_m),
             readings: &self.readings,
@@ -498,8 +498,8 @@ mod tests {
 
     #[test]
     fn a_board_that_was_seen_often_needs_no_horizon() {
-        struct Same;
-        impl FindBoard for Same {
+        struct SteadyBoard;
+        impl FindBoard for SteadyBoard {
             fn find(&mut self, _: &Picture, _: &Lens) -> Option<BoardSeen> {
                 let pixel = DVec2::new(160.0, 45.0);
                 Some(BoardSeen {
@@ -513,7 +513,7 @@ mod tests {
         let lens = Lens::pinhole(320, 180, 1.0);
         let mut capture = Capture::new(lens, 10.0);
         let seen = Watcher::new(lens, 10.0)
-            .with_board(Box::new(Same))
+            .with_board(Box::new(SteadyBoard))
             .look(&frame(picture(&lens, look(0.0, 0.0, 0.0))));
         (0..29).for_each(|_| capture.see(&seen));
         assert_eq!(capture.best(capture.observations()).len(), 58);

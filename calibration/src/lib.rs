@@ -1,5 +1,5 @@
 //! The calibration file: what maintainers measured about one camera and one inertial unit on one mount; and the solvers that its
-//! numbers come from ([`alignment`], [`camera`] from pictures of a [`target`], [`boresight`]).
+//! numbers come from ([`alignment`], [`lens`] from pictures of a [`target`], [`boresight`]).
 //!
 //! A file is TOML with human units (pixels, degrees, milliradians, milliseconds, metres); in memory everything is a checked
 //! [`bowwave_core::calibration::Calibration`] in radians and nanoseconds. Every measured value comes with its uncertainty
@@ -28,29 +28,14 @@
 //! by one unit in the last place (2e-16 of the value) when it is first written, because not every number of radians is a
 //! number of degrees.
 
-mod adopt;
-pub mod alignment;
-pub mod boresight;
-pub mod camera;
 pub mod capture;
-mod date;
-mod error;
 mod file;
-pub mod keep;
-pub mod page;
-mod raw;
-mod rows;
-pub mod sheet;
+pub mod report;
+mod rolling_shutter;
 pub mod simulated;
-mod so3;
-mod statistics;
+mod solve;
 pub mod target;
-pub mod trigger;
 pub mod wizard;
-mod write;
 
-pub use date::Date;
-pub use error::CalibrationError;
-pub use file::{CalibrationFile, Provenance};
-pub use raw::parse;
-pub use write::to_toml;
+pub use file::{CalibrationError, CalibrationFile, Date, Provenance, history, parse, to_toml};
+pub use solve::{alignment, boresight, lens, trigger};

@@ -50,7 +50,7 @@ impl Motion {
     }
 }
 
-/// What is recorded. Angles in radians.
+/// Recipe of a simulated recording. Angles in radians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Recipe {
     /// The movement.
@@ -73,7 +73,7 @@ pub struct Recipe {
     pub gyro_bias: DVec3,
     /// Rotation from the unit to the camera.
     pub camera_from_imu: DQuat,
-    /// What must be added to the camera's stamps.
+    /// Time offset, added to the camera's stamps.
     pub offset_s: f64,
     /// Read-out time of the picture; where the target is in it differs from picture to picture.
     pub readout_s: f64,
@@ -188,7 +188,7 @@ fn pose(sines: &[Vec<[f64; 3]>; 3], t: f64) -> (DQuat, DVec3) {
     (look(traverse.0, elevation.0, roll.0), rate)
 }
 
-/// What was recorded and what is true.
+/// A simulated recording with its truth.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// The truth.
@@ -246,7 +246,7 @@ mod tests {
             for t in [0.0, 1.7, 33.3] {
                 let h = 1e-5;
                 let turn = pose(&sines, t - h).0.inverse() * pose(&sines, t + h).0;
-                let off = crate::so3::log(turn) / (2.0 * h) - pose(&sines, t).1;
+                let off = crate::solve::so3::log(turn) / (2.0 * h) - pose(&sines, t).1;
                 assert!(off.length() < 1e-8, "{motion:?} at {t}: {off}");
             }
         }

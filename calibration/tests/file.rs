@@ -9,7 +9,7 @@
 
 use std::{fs, path::Path};
 
-use bowwave_calibration::{CalibrationError, CalibrationFile, Date, Provenance, keep, parse, to_toml};
+use bowwave_calibration::{CalibrationError, CalibrationFile, Date, Provenance, history, parse, to_toml};
 use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
     geometry::{Distortion, Lens},
@@ -147,7 +147,7 @@ fn writing_keeps_the_former_file() {
     second.calibration.time_offset_ns = 7_000_001;
     second.write(&path).unwrap();
     assert_eq!(CalibrationFile::read(&path).unwrap(), second);
-    let kept = keep::kept(&path).unwrap();
+    let kept = history::copies(&path).unwrap();
     assert_eq!(CalibrationFile::read(&kept[0].path).unwrap(), first);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "temporary files stay behind");
 }

@@ -9,7 +9,7 @@ use std::{
     sync::OnceLock,
 };
 
-use bowwave_calibration::{CalibrationFile, keep, parse};
+use bowwave_calibration::{CalibrationFile, history, parse};
 use bowwave_core::event::TriggerEdge;
 use bowwave_record::{Entry, RecordingReader, RecordingWriter};
 use bowwave_tests::{bowwave, by_hand, expect_code, traverse_only};
@@ -68,7 +68,7 @@ fn truth() -> CalibrationFile {
 fn holds(recording: &Path, camera_from_imu: DQuat, time_offset_ns: i64) {
     let folder = TestFolder::new();
     let out = folder.path("new.toml");
-    let output = calibrate("imu", recording, &["--out", out.to_str().unwrap()]);
+    let output = calibrate("extrinsics", recording, &["--out", out.to_str().unwrap()]);
     expect_code(&output, 0);
     let found = CalibrationFile::read(&out).unwrap().calibration;
     let turn = (camera_from_imu * found.camera_from_imu.inverse()).to_scaled_axis();
@@ -95,7 +95,7 @@ fn the_truth_is_found_from_the_horizon_alone_written_and_restored() {
     let old = bowwave_calibration::to_toml(&make::calibration(&by_hand()));
     fs::write(&file, &old).unwrap();
     let at = file.to_str().unwrap();
-    let output = calibrate("imu", recording(), &["--calibration", at, "--report", page.to_str().unwrap()]);
+    let output = calibrate("extrinsics", recording(), &["--calibration", at, "--report", page.to_str().unwrap()]);
     expect_code(&output, 0);
     assert!(told(&output).starts_with("PASS: usable; boats lie within"), "{}", told(&output));
     let written = CalibrationFile::read(&file).unwrap();
@@ -103,7 +103,7 @@ fn the_truth_is_found_from_the_horizon_alone_written_and_restored() {
     assert_eq!(written.calibration.lens, truth.lens);
     let page = fs::read_to_string(page).unwrap();
     assert!(page.contains("<b>PASS</b>") && page.matches("<svg").count() == 2);
-    assert_eq!(keep::kept(&file).unwrap().len(), 1);
+    assert_eq!(history::copies(&file).unwrap().len(), 1);
     expect_code(&bowwave(["calibrate", "restore", at]), 0);
     assert_eq!(fs::read_to_string(&file).unwrap(), old);
     expect_code(&bowwave(["calibrate", "restore", at]), 0);
@@ -147,7 +147,7 @@ fn traverse_alone_is_refused_with_what_is_missing_and_checks_nothing() {
     let path = folder.path("traverse.mcap");
     make::make(&traverse_only(), &path, &mut |_, _| {}).unwrap();
     let out = folder.path("new.toml");
-    let output = calibrate("imu", &path, &["--accept-poor", "--out", out.to_str().unwrap()]);
+    let output = calibrate("extrinsics", &path, &["--accept-poor", "--out", out.to_str().unwrap()]);
     expect_code(&output, 1);
     let said = told(&output);
     assert!(said.starts_with("FAIL: ") && said.contains("missing: "), "{said}");
@@ -217,8 +217,11 @@ fn mirrored_axes_are_refused_and_stale() {
             sample.accel.y = -sample.accel.y;
         }
     });
+    // By its former name, which still does it and says what it is called now.
     let output = calibrate("imu", &path, &[]);
     expect_code(&output, 1);
+    let warned = String::from_utf8_lossy(&output.stderr);
+    assert!(warned.contains("`calibrate imu` is now called extrinsics"), "{warned}");
     let said = told(&output);
     assert!(said.starts_with("FAIL: "), "{said}");
     let output = calibrate("check", &path, &[]);

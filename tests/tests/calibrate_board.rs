@@ -70,7 +70,7 @@ fn errors(found: &CalibrationFile, camera_from_imu: DQuat, offset_s: f64) -> [(f
 }
 
 fn calibrated(recording: &Path, further: &[&str], out: &Path) -> CalibrationFile {
-    let arguments = ["calibrate", "imu", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
+    let arguments = ["calibrate", "extrinsics", recording.to_str().unwrap(), "--out", out.to_str().unwrap()];
     let output = bowwave(arguments.into_iter().chain(further.iter().copied()));
     expect_code(&output, 0);
     println!("{}", String::from_utf8_lossy(&output.stdout));
@@ -134,7 +134,7 @@ fn a_rolling_shutter_is_taken_into_account_at_the_horizon() {
         begun.shutter = shutter;
         begun.write(&file).unwrap();
         let given = ["--calibration", file.to_str().unwrap(), "--accept-poor"];
-        let arguments = ["calibrate", "imu", path.to_str().unwrap()];
+        let arguments = ["calibrate", "extrinsics", path.to_str().unwrap()];
         bowwave(arguments.into_iter().chain(given));
         let found = CalibrationFile::read(&file).unwrap();
         let offset_s = truth.calibration.time_offset_ns as f64 * 1e-9;

@@ -35,7 +35,7 @@ fn pictures(folder: &Path, lens: &TrueLens, shots: &[BoardShot]) {
 fn calibrate(pictures: &Path, out: &Path, further: &[&str]) -> std::process::Output {
     let mut arguments = vec![
         "calibrate".as_ref(),
-        "camera".as_ref(),
+        "intrinsics".as_ref(),
         pictures.as_os_str(),
         "--out".as_ref(),
         out.as_os_str(),
@@ -137,7 +137,7 @@ fn what_tells_no_lens_is_refused_with_what_is_missing() {
     refused(&calibrate(&at("not-there"), &out, &[]), &out, &["not-there"]);
     fs::write(at("nothing").join("text.png"), b"no picture").expect("a file");
     refused(&calibrate(&at("nothing"), &out, &[]), &out, &["text.png"]);
-    expect_code(&bowwave(["calibrate", "camera", "x", "--target", "7"]), 2);
+    expect_code(&bowwave(["calibrate", "intrinsics", "x", "--target", "7"]), 2);
     expect_code(&bowwave(["calibrate", "nothing"]), 2);
 }
 

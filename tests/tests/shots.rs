@@ -11,7 +11,7 @@ use std::{
     sync::{Arc, OnceLock},
 };
 
-use bowwave_calibration::{CalibrationFile, keep, simulated::Random, target::Target, to_toml};
+use bowwave_calibration::{CalibrationFile, history, simulated::Random, target::Target, to_toml};
 use bowwave_core::{event::TriggerEdge, time::secs_to_ns};
 use bowwave_record::{Entry, FrameEntry, Properties, RecordingWriter};
 use bowwave_tests::{bowwave, expect_code, program};
@@ -191,7 +191,7 @@ fn the_latency_of_five_dry_shots_is_the_true_one() {
         let (late_s, sigma_s) = (found.latency_ns as f64 * 1e-9, found.sigma_ns as f64 * 1e-9);
         println!("{}: {:.2} +- {:.2} ms of {:.2}", file.display(), late_s * 1e3, sigma_s * 1e3, LATE_S * 1e3);
         assert!((late_s - LATE_S).abs() < LATE_OFF_S.min(3.0 * sigma_s) && sigma_s < 2e-3, "{found:?}");
-        assert_eq!(keep::kept(file).unwrap().len(), 1);
+        assert_eq!(history::copies(file).unwrap().len(), 1);
     }
 }
 
@@ -214,7 +214,7 @@ fn the_boresight_of_five_pulls_at_a_tag_is_the_true_one() {
         println!("{}: off by {} mrad, stated {:.2}", file.display(), off * 1e3, found.boresight_sigma * 1e3);
         assert!(off.length() < BORE_OFF, "{off}");
         assert!(off.abs().max_element() < 3.0 * found.boresight_sigma && found.boresight_sigma < 2e-3);
-        assert_eq!(keep::kept(file).unwrap().len(), 2);
+        assert_eq!(history::copies(file).unwrap().len(), 2);
     }
     // Without its parallax the barrel would be somewhere else.
     let muzzle = make::calibration(&recipe()).calibration.muzzle_in_camera;

@@ -15,7 +15,7 @@ use std::{
     sync::OnceLock,
 };
 
-use bowwave_calibration::{CalibrationFile, keep, to_toml};
+use bowwave_calibration::{CalibrationFile, history, to_toml};
 use bowwave_core::time::Time;
 use bowwave_record::{Entry, FrameEntry, Properties, RecordingWriter};
 use bowwave_tests::{bowwave, by_hand, expect_code, program, traverse_only};
@@ -89,9 +89,9 @@ fn a_good_movement_passes_and_is_saved_as_the_recordings_own_command_does() {
         assert!(said.contains(words), "'{words}' is missing:\n{said}");
     }
     let recorded = recording().to_str().unwrap();
-    expect_code(&bowwave(["calibrate", "imu", recorded, "--calibration", other.to_str().unwrap()]), 0);
+    expect_code(&bowwave(["calibrate", "extrinsics", recorded, "--calibration", other.to_str().unwrap()]), 0);
     assert_eq!(CalibrationFile::read(&file).unwrap(), CalibrationFile::read(&other).unwrap());
-    assert_eq!(keep::kept(&file).unwrap().len(), 1);
+    assert_eq!(history::copies(&file).unwrap().len(), 1);
     assert!(fs::read_to_string(&page).unwrap().contains("<b>PASS</b>"));
     // The same recording and keys say the same.
     fs::write(&file, to_toml(&make::calibration(&by_hand()))).unwrap();
@@ -102,7 +102,7 @@ fn a_good_movement_passes_and_is_saved_as_the_recordings_own_command_does() {
 fn traverse_only_names_what_is_missing_and_saves_nothing() {
     let (folder, path) = made(&traverse_only(), "traverse.mcap");
     let out = folder.path().join("new.toml");
-    let output = wizard(&path, "\n\n\n", &["imu", "--out", out.to_str().unwrap()]);
+    let output = wizard(&path, "\n\n\n", &["extrinsics", "--out", out.to_str().unwrap()]);
     expect_code(&output, 1);
     let said = told(&output);
     for words in [
@@ -156,7 +156,7 @@ fn the_lens_is_found_from_a_board_that_is_led_over_the_picture() {
     }
     writer.finish().unwrap();
     let target = board().to_string();
-    let further = ["camera", "--target", &target, "--out", out.to_str().unwrap()];
+    let further = ["intrinsics", "--target", &target, "--out", out.to_str().unwrap()];
     let output = wizard(&path, "\n\n\n", &further);
     expect_code(&output, 0);
     let said = told(&output);
@@ -187,7 +187,7 @@ fn devices_that_are_not_there_are_said_and_what_was_gathered_is_kept() {
     )
     .unwrap();
     let mut child = Command::new(program())
-        .args(["calibrate", "wizard", "imu", "--config", config.to_str().unwrap()])
+        .args(["calibrate", "wizard", "extrinsics", "--config", config.to_str().unwrap()])
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -201,9 +201,9 @@ fn devices_that_are_not_there_are_said_and_what_was_gathered_is_kept() {
     let output = child.wait_with_output().unwrap();
     expect_code(&output, 1);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let kept = said.lines().find_map(|l| l.strip_prefix("what was gathered is kept: bowwave calibrate imu "));
+    let kept = said.lines().find_map(|l| l.strip_prefix("what was gathered is kept: bowwave calibrate extrinsics "));
     let kept = kept.unwrap_or_else(|| panic!("{said}"));
-    assert!(kept.contains("calibrate-imu-") && fs::metadata(kept).is_ok_and(|m| m.len() > 0), "{kept}");
+    assert!(kept.contains("calibrate-extrinsics-") && fs::metadata(kept).is_ok_and(|m| m.len() > 0), "{kept}");
 }
 
 #[test]
@@ -216,7 +216,7 @@ fn what_cannot_be_done_is_said_and_nothing_is_written() {
         told(&without_board)
     );
     // Keys that end are an end, also where something could be saved.
-    let ended = wizard(recording(), "", &["imu"]);
+    let ended = wizard(recording(), "", &["extrinsics"]);
     expect_code(&ended, 1);
     assert!(told(&ended).contains("PASS"), "{}", told(&ended));
     let nowhere = wizard(recording(), "\nq\n", &["imu"]);

@@ -1,14 +1,14 @@
 //! Where a tag is expected, through a lens that bends the board.
 //!
 //! The view of one tag carried on to the next errs by the square of the distance: by a tenth of a tag and more near the rim of a fisheye.
-//! What it errs by at the other tags around is known, and goes on smoothly: a parabola through that is taken off.
+//! The error at the tags around is known and changes smoothly: a parabola through it is subtracted.
 
 use std::collections::BTreeMap;
 
 use glam::DVec2;
 use nalgebra::{Matrix6, Matrix6x2, Vector6};
 
-use super::{Target, detect::steps, quads::Quad, read::Sight};
+use super::{Target, detect::steps, quads::Quad, read::TagView};
 
 /// Tags up to so many steps away say how the lens bends.
 const AROUND: usize = 1;
@@ -27,7 +27,7 @@ pub(super) fn expected(
     id: usize,
     other: usize,
 ) -> Option<Quad> {
-    let sight = Sight::of(found.get(&id)?)?;
+    let sight = TagView::of(found.get(&id)?)?;
     let mut quad = sight.expected(target, id, other)?;
     let middle = target.corners(other).iter().sum::<DVec2>() / 4.0;
     let place = |corner: DVec2| terms((corner - middle) / target.tag_m());
@@ -83,7 +83,7 @@ mod tests {
             let truth = all[&other];
             let worst = |quad: Quad| (0..4).map(|i| quad[i].distance(truth[i])).fold(0.0, f64::max);
             bent = bent.max(worst(expected(&target, &found, id, other).unwrap()));
-            flat = flat.max(worst(Sight::of(&all[&id]).unwrap().expected(&target, id, other).unwrap()));
+            flat = flat.max(worst(TagView::of(&all[&id]).unwrap().expected(&target, id, other).unwrap()));
         }
         assert!(bent < 0.5 * flat && bent < 2.0, "{bent} px, {flat} px without");
     }
@@ -92,7 +92,7 @@ mod tests {
     fn one_tag_alone_is_carried_on_as_it_is_seen() {
         let target = Target::A4;
         let found = BTreeMap::from([(7, seen(&target)[&7])]);
-        let plain = Sight::of(&found[&7]).unwrap().expected(&target, 7, 8).unwrap();
+        let plain = TagView::of(&found[&7]).unwrap().expected(&target, 7, 8).unwrap();
         let carried = expected(&target, &found, 7, 8).unwrap();
         assert!((0..4).all(|i| carried[i].distance(plain[i]) < 1e-9), "{carried:?} {plain:?}");
         assert_eq!(expected(&target, &found, 8, 7), None, "not found");

@@ -9,9 +9,9 @@ use nalgebra::{Matrix2x3, Matrix2x6, Matrix3, Matrix6, Vector2, Vector6};
 
 use super::{Grey, Target, detect, view};
 use crate::{
-    camera::{BoardPose, Corner, View, pose_from},
     capture::{BoardSeen, FindBoard},
-    so3::{exp, matrix, vector},
+    lens::{BoardPose, BoardView, Corner, pose_from},
+    solve::so3::{exp, matrix, vector},
 };
 
 /// Fewest corners of a pose: two tags.
@@ -47,7 +47,7 @@ impl FindBoard for BoardFinder {
 }
 
 /// The board's corners in a picture; `None` where the picture is too large. `grey` is memory that is used again.
-pub fn look_for(target: &Target, picture: &Picture, grey: &mut Vec<u8>) -> Option<View> {
+pub fn look_for(target: &Target, picture: &Picture, grey: &mut Vec<u8>) -> Option<BoardView> {
     to_grey(picture, grey);
     let grey = Grey::new(picture.width() as usize, picture.height() as usize, grey)?;
     Some(view(target, &detect(target, &grey)))
@@ -164,7 +164,7 @@ pub(crate) fn orient(lens: &Lens, corners: &[Corner], most_px: f64) -> Option<Or
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{simulated::Random, so3::log};
+    use crate::{simulated::Random, solve::so3::log};
     use bowwave_core::geometry::Distortion;
 
     #[test]

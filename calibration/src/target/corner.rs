@@ -18,7 +18,7 @@ pub enum Refinement {
 }
 
 impl Refinement {
-    /// What [`super::detect`] does: larger windows err hardly less.
+    /// Choice of [`super::detect`]: larger windows err hardly less.
     pub const DEFAULT: Self = Self::Symmetry(8.0);
 
     const fn reach_px(self) -> f64 {
@@ -47,13 +47,13 @@ const CROSSING: f64 = 0.9;
 const EDGES: f64 = 0.04;
 
 /// Pixels around a place, sampled between pixels.
-struct Patch {
+struct CornerPatch {
     reach: i32,
     side: usize,
     values: Vec<f64>,
 }
 
-impl Patch {
+impl CornerPatch {
     fn around(plane: &Plane, place: DVec2, reach: i32) -> Self {
         let side = (2 * reach + 3) as usize;
         let step = |i: usize| i as f64 - f64::from(reach) - 1.0;
@@ -90,14 +90,14 @@ impl Patch {
 
 /// Two equations for two unknowns, from sums of products.
 #[derive(Default)]
-struct Sums {
+struct CornerSums {
     xx: f64,
     xy: f64,
     yy: f64,
     right: DVec2,
 }
 
-impl Sums {
+impl CornerSums {
     fn add(&mut self, slope: DVec2, value: f64, weight: f64) {
         self.xx += weight * slope.x * slope.x;
         self.xy += weight * slope.x * slope.y;
@@ -128,8 +128,8 @@ fn window(tag_px: f64, most: f64) -> i32 {
 
 /// One step towards where the edges' lines meet.
 fn towards_edges(plane: &Plane, place: DVec2, reach: i32) -> Option<DVec2> {
-    let patch = Patch::around(plane, place, reach);
-    let mut sums = Sums::default();
+    let patch = CornerPatch::around(plane, place, reach);
+    let mut sums = CornerSums::default();
     for (x, y, weight) in patch.offsets() {
         let slope = patch.slope(x, y);
         sums.add(slope, slope.dot(DVec2::new(f64::from(x), f64::from(y))), weight);
@@ -139,9 +139,9 @@ fn towards_edges(plane: &Plane, place: DVec2, reach: i32) -> Option<DVec2> {
 
 /// One step towards where the picture is most like itself turned by half a turn, and how like it is now.
 fn towards_symmetry(plane: &Plane, place: DVec2, reach: i32) -> Option<(DVec2, f64)> {
-    let patch = Patch::around(plane, place, reach);
+    let patch = CornerPatch::around(plane, place, reach);
     let mean = patch.mean();
-    let mut sums = Sums::default();
+    let mut sums = CornerSums::default();
     let (mut both, mut own) = (0.0, 1e-9);
     for (x, y, weight) in patch.offsets() {
         let (here, there) = (patch.get(x, y), patch.get(-x, -y));
@@ -155,7 +155,7 @@ fn towards_symmetry(plane: &Plane, place: DVec2, reach: i32) -> Option<(DVec2, f
 /// Whether the edges that cross at `place` run along `sides`: what covers a corner makes others with the tag's.
 pub(super) fn crosses(plane: &Plane, place: DVec2, sides: [DVec2; 2], tag_px: f64, by: Refinement) -> bool {
     let reach = window(tag_px, by.reach_px());
-    let patch = Patch::around(plane, place, reach);
+    let patch = CornerPatch::around(plane, place, reach);
     let mean = patch.mean();
     // Noise is another half a turn on, so that it does not count.
     let mut own = 0.0;

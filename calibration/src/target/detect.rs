@@ -12,9 +12,9 @@ use super::{
     corner::{self, Refinement},
     picture::{Grey, Plane},
     quads::{self, Quad},
-    read::{self, Sight, WRONG_EXPECTED},
+    read::{self, TagView, WRONG_EXPECTED},
 };
-use crate::camera::{Corner, View};
+use crate::lens::{BoardView, Corner};
 
 /// Smallest side of a picture of the pyramid, pixels.
 const LEAST_PX: usize = 100;
@@ -42,12 +42,12 @@ pub struct Tag {
 }
 
 /// The picture and its halves, the whole first, and how corners are refined in them.
-struct Pyramid {
+struct TagPyramid {
     planes: Vec<Plane>,
     by: Refinement,
 }
 
-impl Pyramid {
+impl TagPyramid {
     fn new(picture: &Grey, by: Refinement) -> Self {
         let mut planes = vec![Plane::smoothed(picture)];
         while let Some(last) = planes.last().filter(|p| p.width.min(p.height) >= 2 * LEAST_PX) {
@@ -107,7 +107,7 @@ pub fn detect_by(target: &Target, picture: &Grey, by: Refinement) -> Vec<Tag> {
     if width < 32 || height < 32 {
         return Vec::new();
     }
-    let pyramid = Pyramid::new(picture, by);
+    let pyramid = TagPyramid::new(picture, by);
     let mut found = together(target, &seeds(target, &pyramid));
     if target.tags() == 1 {
         return found.into_iter().map(|(id, corners)| Tag { id, corners }).collect();
@@ -121,7 +121,7 @@ pub fn detect_by(target: &Target, picture: &Grey, by: Refinement) -> Vec<Tag> {
 }
 
 /// Tags that are read by themselves.
-fn seeds(target: &Target, pyramid: &Pyramid) -> BTreeMap<usize, Quad> {
+fn seeds(target: &Target, pyramid: &TagPyramid) -> BTreeMap<usize, Quad> {
     let mut best: BTreeMap<usize, (u32, Quad)> = BTreeMap::new();
     for (level, plane) in pyramid.planes.iter().enumerate() {
         let scale = (1_u32 << level) as f64;
@@ -162,7 +162,7 @@ fn beyond(target: &Target, id: usize, place: DVec2) -> f64 {
 
 /// Whether two tags beside each other on the board stand in the picture as the board says.
 fn agree(target: &Target, (a, one): (usize, &Quad), (b, other): (usize, &Quad)) -> bool {
-    let Some(expected) = Sight::of(one).and_then(|s| s.expected(target, a, b)) else { return false };
+    let Some(expected) = TagView::of(one).and_then(|s| s.expected(target, a, b)) else { return false };
     let away = target.corners(b).map(|place| beyond(target, a, place));
     let nearest = (0..4).min_by(|i, k| away[*i].total_cmp(&away[*k])).unwrap_or(0);
     let allowed = APART * height_px(other) * away[nearest] + APART_PX;
@@ -193,7 +193,7 @@ fn together(target: &Target, all: &BTreeMap<usize, Quad>) -> BTreeMap<usize, Qua
 }
 
 /// Adds the tags beside those that were found, and beside these.
-fn grow(target: &Target, pyramid: &Pyramid, found: &mut BTreeMap<usize, Quad>) {
+fn grow(target: &Target, pyramid: &TagPyramid, found: &mut BTreeMap<usize, Quad>) {
     let mut open: Vec<usize> = found.keys().copied().collect();
     while let Some(id) = open.pop() {
         for other in (0..target.tags()).filter(|o| steps(target, id, *o) == 1) {
@@ -261,10 +261,10 @@ fn settle(target: &Target, found: &mut BTreeMap<usize, Quad>) {
 }
 
 /// The corners of the board as the solvers take them.
-pub fn view(target: &Target, tags: &[Tag]) -> View {
+pub fn view(target: &Target, tags: &[Tag]) -> BoardView {
     let corners = tags.iter().flat_map(|tag| {
         let places = target.corners(tag.id).into_iter().zip(tag.corners);
         places.map(|(board, pixel)| Corner { board, pixel })
     });
-    View { corners: corners.collect() }
+    BoardView { corners: corners.collect() }
 }

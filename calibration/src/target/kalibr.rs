@@ -5,7 +5,7 @@ use saphyr::{LoadableYamlNode as _, MarkedYaml};
 
 use super::{Target, TargetError};
 
-/// What such a file must have.
+/// Keys of such a file.
 const FORM: &str = "a board's file has target_type: 'aprilgrid', tagCols, tagRows, tagSize (metres) and tagSpacing, each in a line of \
                     its own";
 

@@ -52,7 +52,7 @@ impl Tiles {
         Self { across, extremes: (0..own.len()).map(around).collect() }
     }
 
-    /// What is darker than this is dark.
+    /// Brightness below which a pixel is dark.
     fn limit(&self, x: usize, y: usize, share: f32) -> f32 {
         let [dark, bright] = self.extremes[y / TILE * self.across + x / TILE];
         if bright - dark < CONTRAST { f32::MIN } else { dark + share * (bright - dark) }
@@ -60,9 +60,9 @@ impl Tiles {
 }
 
 /// Dark pixels side by side in one row: row, first, beyond the last.
-type Run = (usize, usize, usize);
+type EdgeRun = (usize, usize, usize);
 
-fn runs(plane: &Plane, tiles: &Tiles, share: f32) -> Vec<Run> {
+fn runs(plane: &Plane, tiles: &Tiles, share: f32) -> Vec<EdgeRun> {
     let mut runs = Vec::new();
     for (y, row) in plane.values.chunks_exact(plane.width).enumerate() {
         let mut first = None;
@@ -90,7 +90,7 @@ fn root(parents: &mut [usize], mut i: usize) -> usize {
 }
 
 /// Runs that hang together side by side (not across corners), each with all others of its piece, from above to below.
-fn pieces(runs: &[Run]) -> Vec<Vec<Run>> {
+fn pieces(runs: &[EdgeRun]) -> Vec<Vec<EdgeRun>> {
     let mut parents: Vec<usize> = (0..runs.len()).collect();
     let mut above = 0;
     for (i, (y, from, to)) in runs.iter().copied().enumerate() {
@@ -106,7 +106,7 @@ fn pieces(runs: &[Run]) -> Vec<Vec<Run>> {
     }
     // Roots come before what hangs on them.
     let mut number = vec![usize::MAX; runs.len()];
-    let mut pieces: Vec<Vec<Run>> = Vec::new();
+    let mut pieces: Vec<Vec<EdgeRun>> = Vec::new();
     for (i, run) in runs.iter().enumerate() {
         let r = root(&mut parents, i);
         if number[r] == usize::MAX {
@@ -123,7 +123,7 @@ fn cross(a: DVec2, b: DVec2, c: DVec2) -> f64 {
 }
 
 /// Convex hull of a piece (Andrew 1979), its sharpest corners only.
-fn hull(piece: &[Run]) -> Vec<DVec2> {
+fn hull(piece: &[EdgeRun]) -> Vec<DVec2> {
     // Points sorted by y: the left ends of the rows bound one side, the right ends the other.
     let chain = |left: bool| {
         let mut chain: Vec<DVec2> = Vec::new();
@@ -200,7 +200,7 @@ pub(super) fn find(plane: &Plane) -> Vec<Quad> {
     let mut quads = Vec::new();
     for share in LIMITS {
         let mut pieces = pieces(&runs(plane, &tiles, share));
-        let tall = |p: &Vec<Run>| p.last().map_or(0, |r| r.0 + 1) - p.first().map_or(0, |r| r.0);
+        let tall = |p: &Vec<EdgeRun>| p.last().map_or(0, |r| r.0 + 1) - p.first().map_or(0, |r| r.0);
         pieces.retain(|p| tall(p) as f64 >= SIDE_MIN);
         pieces.sort_by_key(|p| std::cmp::Reverse(p.len()));
         quads.extend(pieces.iter().take(CANDIDATES).filter_map(|p| quad(&hull(p))));

@@ -5,8 +5,8 @@ use nalgebra::Matrix3;
 
 use super::{BORDER, DATA, MODULES, Target, codes::TAG36H11, picture::Plane, quads::Quad};
 use crate::{
-    camera::homography,
-    so3::{dvec, vector},
+    lens::homography,
+    solve::so3::{dvec, vector},
 };
 
 /// Wrong modules that are allowed: a mirrored tag has four at least.
@@ -19,9 +19,9 @@ const CONTRAST: f64 = 8.0;
 const FRAME_WRONG: usize = 6;
 
 /// The view of a tag: its modules' places to pixels. Places count modules from the lower left corner, x right, y up.
-pub(super) struct Sight(Matrix3<f64>);
+pub(super) struct TagView(Matrix3<f64>);
 
-impl Sight {
+impl TagView {
     /// From the pixels of lower left, lower right, upper right and upper left corner.
     pub fn of(quad: &Quad) -> Option<Self> {
         let side = MODULES as f64;
@@ -52,12 +52,12 @@ impl Sight {
 
 /// A plane through brightnesses at places: how bright black or white is where.
 #[derive(Default)]
-struct Level {
+struct BrightnessPlane {
     normal: Matrix3<f64>,
     right: DVec3,
 }
 
-impl Level {
+impl BrightnessPlane {
     fn add(&mut self, place: DVec2, value: f64) {
         let row = place.extend(1.0);
         self.normal += vector(row) * vector(row).transpose();
@@ -70,9 +70,10 @@ impl Level {
 }
 
 /// The 36 modules as a code, the first in the highest bit, as if the quadrilateral's first corner were the lower left one.
-fn code(plane: &Plane, sight: &Sight, spacing: f64) -> Option<u64> {
+fn code(plane: &Plane, sight: &TagView, spacing: f64) -> Option<u64> {
     let (side, border) = (MODULES as f64, BORDER as f64);
-    let (mut black, mut white, mut frame) = (Level::default(), Level::default(), Vec::new());
+    let (mut black, mut white, mut frame) =
+        (BrightnessPlane::default(), BrightnessPlane::default(), Vec::new());
     // Along the middle of the border, and of the gap where it is narrow; between the corners' black squares only.
     let beyond = (0.5 * spacing * side).min(1.0);
     for i in 0..12 {
@@ -112,7 +113,7 @@ fn code(plane: &Plane, sight: &Sight, spacing: f64) -> Option<u64> {
 
 /// Wrong modules where `quad` is taken for tag `id`.
 pub(super) fn wrong_as(plane: &Plane, quad: &Quad, target: &Target, id: usize) -> Option<u32> {
-    let code = code(plane, &Sight::of(quad)?, target.spacing())?;
+    let code = code(plane, &TagView::of(quad)?, target.spacing())?;
     TAG36H11.get(id).map(|own| (own ^ code).count_ones())
 }
 
@@ -121,7 +122,7 @@ pub(super) fn read(plane: &Plane, quad: &Quad, target: &Target) -> Option<(usize
     let mut best: Option<(usize, u32, Quad)> = None;
     let mut turned = *quad;
     for _ in 0..4 {
-        let code = code(plane, &Sight::of(&turned)?, target.spacing())?;
+        let code = code(plane, &TagView::of(&turned)?, target.spacing())?;
         for (id, own) in TAG36H11.iter().take(target.tags()).enumerate() {
             let wrong = (own ^ code).count_ones();
             if wrong <= WRONG_MOST && best.is_none_or(|b| wrong < b.1) {

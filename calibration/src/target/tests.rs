@@ -9,7 +9,7 @@ use super::*;
 use crate::{
     capture::FindBoard,
     simulated::Random,
-    so3::{exp, log},
+    solve::so3::{exp, log},
 };
 
 fn turned(code: u64) -> u64 {

@@ -16,12 +16,12 @@ const PULLS_MOST: usize = 100;
 
 /// Pulls, and where the mark was.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Aim {
+pub(super) struct AimWatch {
     pulls: Vec<Pull<Option<DVec2>>>,
     marks: Vec<(Time, Option<DVec2>)>,
 }
 
-impl Aim {
+impl AimWatch {
     pub(super) fn pull(&mut self, edge: Time, calibration: &Calibration) {
         if self.pulls.len() >= PULLS_MOST {
             return;

@@ -5,8 +5,8 @@ use bowwave_core::guide::{Gauge, Rating};
 use crate::{
     alignment::{Alignment, Grade, Movement},
     boresight::Boresight,
-    camera::{Camera, enough},
-    sheet::{AXES, RANGE_M},
+    lens::{LensCalibration, enough},
+    report::{AXES, RANGE_M},
     trigger::Latency,
 };
 
@@ -48,7 +48,7 @@ fn angle(name: &'static str, sigma: f64) -> Gauge {
     gauge(name, value, sigma, Grade::ROTATION)
 }
 
-/// What is to be known of the alignment, before anything is.
+/// Gauges of the alignment before the first solution.
 pub(super) fn of_nothing() -> Vec<Gauge> {
     let names = AXES.into_iter().chain(["time offset"]);
     names.map(|name| Gauge { name, value: "not known yet".to_owned(), share: 0.0, rating: None }).collect()
@@ -62,7 +62,7 @@ pub(super) fn of_alignment(a: &Alignment) -> Vec<Gauge> {
     gauges
 }
 
-pub(super) fn of_lens(camera: &Camera) -> Vec<Gauge> {
+pub(super) fn of_lens(camera: &LensCalibration) -> Vec<Gauge> {
     let tilt = camera.coverage.tilt[1];
     let mut gauges = vec![angle("picture's edge", camera.edge_sigma())];
     gauges.extend([

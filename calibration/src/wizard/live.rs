@@ -5,12 +5,12 @@ use std::collections::VecDeque;
 use bowwave_core::{event::ImuSample, time::Time};
 use glam::{DQuat, DVec3};
 
-use super::Finding;
+use super::Detection;
 use crate::alignment::Movement;
 
 /// A device that says nothing for so long is gone, seconds.
 const SILENT_S: f64 = 1.0;
-/// What was seen lately: so long, seconds, and so many pictures.
+/// Span of the newest pictures, seconds, and the fewest that a share is told from.
 const LATELY_S: f64 = 2.0;
 const LATELY_LEAST: usize = 5;
 /// More than this share of smeared pictures is too fast.
@@ -27,14 +27,14 @@ const ONLY: f64 = 0.9;
 const TURNED_LEAST: f64 = 0.02;
 
 /// A picture: when, whether it told something, whether it was smeared, whether it has the right size.
-type Picture = (Time, bool, bool, bool);
+type PictureState = (Time, bool, bool, bool);
 
 #[derive(Clone, Debug)]
 pub(super) struct Live {
     camera_from_imu: DQuat,
     last_sample: Option<Time>,
     last_picture: Option<Time>,
-    lately: VecDeque<Picture>,
+    lately: VecDeque<PictureState>,
     /// Squared rate of late.
     present: f64,
     /// Squares of rates about the camera's axes, and how many.
@@ -73,9 +73,9 @@ impl Live {
         self.present += ((rate - self.mean).length_squared() - self.present) * (step / FOLLOW_S);
     }
 
-    pub(super) fn picture(&mut self, arrival: Time, finding: &Finding) {
+    pub(super) fn picture(&mut self, arrival: Time, finding: &Detection) {
         self.last_picture = Some(arrival);
-        if let Finding::Orientation(seen) = finding {
+        if let Detection::Orientation(seen) = finding {
             let told = seen.horizon.is_some() || seen.board.is_some();
             self.lately.push_back((arrival, told, seen.is_blurred, seen.fits));
         }
@@ -95,7 +95,7 @@ impl Live {
     }
 
     /// Share of the pictures of late for which `is` holds; `None` where there are too few.
-    fn share(&self, is: impl Fn(&Picture) -> bool) -> Option<f64> {
+    fn share(&self, is: impl Fn(&PictureState) -> bool) -> Option<f64> {
         let count = self.lately.len();
         (count >= LATELY_LEAST).then(|| self.lately.iter().filter(|p| is(p)).count() as f64 / count as f64)
     }

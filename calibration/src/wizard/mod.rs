@@ -1,11 +1,11 @@
 //! The guided calibration, step by step, as a state machine without I/O, clock or threads.
 //!
-//! What devices reported, what pictures told ([`Eyes`] look at them), keys and time go in as [`Input`]s; out come a
+//! Events of devices, detections in pictures ([`Detector`]), keys and time go in as [`Input`]s; out come a
 //! [`Guide`], which terminal and display show alike, and what is to be done outside: [`Ask`]. Results come from the same solvers as those of
 //! recordings, and what is missing is what these say is missing.
 
 mod aim;
-mod eyes;
+mod detector;
 mod gauges;
 mod live;
 mod page;
@@ -22,15 +22,15 @@ use bowwave_core::{
     time::Time,
 };
 
-use crate::{capture::Capture, sheet::Verdict, target::Target};
-use aim::Aim;
+use crate::{capture::Capture, report::CalibrationVerdict, target::Target};
+use aim::AimWatch;
 use live::Live;
-use views::Views;
+use views::WizardViews;
 
-pub use eyes::{Eyes, Finding, Look};
-pub use work::{Found, Solved, Work};
+pub use detector::{Detection, Detector, DetectorMode};
+pub use work::{Solved, WizardSolution, Work};
 
-/// What can be calibrated, in the order in which each needs the ones before.
+/// Part of the calibration; each needs the ones before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Task {
     /// The camera's lens.
@@ -50,8 +50,8 @@ impl Task {
     /// The command that does it with a recording: `bowwave calibrate` and this.
     pub const fn command(self) -> &'static str {
         match self {
-            Self::Lens => "camera",
-            Self::Alignment => "imu",
+            Self::Lens => "intrinsics",
+            Self::Alignment => "extrinsics",
             Self::Boresight => "boresight",
             Self::Trigger => "trigger",
         }
@@ -74,7 +74,7 @@ impl fmt::Display for Task {
     }
 }
 
-/// What a maintainer can press.
+/// Key of the wizard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Key {
     /// Go on, accept. A pull of the trigger does the same where no pull is measured.
@@ -87,15 +87,15 @@ pub enum Key {
     Pick(Task),
 }
 
-/// What goes in.
+/// Input of the wizard.
 #[derive(Clone, Debug)]
 pub enum Input {
     /// A measurement of the inertial unit.
     Sample(ImuSample),
     /// The trigger's line changed.
     Edge(TriggerEdge),
-    /// What a picture that reached the host at that time told.
-    Seen(Time, Finding),
+    /// Detection in a picture, with the picture's time of arrival.
+    Seen(Time, Detection),
     /// A fault came or went.
     Fault(FaultChange),
     /// A key was pressed.
@@ -110,20 +110,20 @@ pub enum Input {
     Ended,
 }
 
-/// What is to be done outside.
+/// Request to whoever runs the wizard.
 #[derive(Clone, Debug)]
 pub enum Ask {
     /// Run it, beside the pictures, and hand back its result.
     Solve(Box<Work>),
     /// Write it into the calibration.
-    Save(Box<Found>),
+    Save(Box<WizardSolution>),
     /// End.
     End,
 }
 
 /// Where it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Step {
+pub enum WizardStep {
     /// A task is chosen.
     Choose,
     /// Material is gathered; meanwhile it is solved again and again.
@@ -140,7 +140,7 @@ pub enum Step {
     Over,
 }
 
-/// What is known beforehand.
+/// Settings of the wizard.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// The calibration that is begun with.
@@ -171,15 +171,15 @@ const MEASURED_AFTER_S: f64 = 3.0;
 #[derive(Debug)]
 pub struct Wizard {
     setup: Setup,
-    step: Step,
+    step: WizardStep,
     /// When the step began.
     since: Time,
     now: Time,
     task: Task,
     done: [bool; Task::ALL.len()],
     capture: Capture,
-    views: Views,
-    aim: Aim,
+    views: WizardViews,
+    aim: AimWatch,
     live: Live,
     faults: FaultBoard,
     /// The newest solution of what is being gathered.
@@ -190,7 +190,7 @@ pub struct Wizard {
     /// How much there was when it was last solved.
     solved_at: f64,
     asks: Vec<Ask>,
-    /// What could not be done.
+    /// Reason why a request could not be met.
     refused: Option<String>,
     has_ended: bool,
 }
@@ -200,14 +200,14 @@ impl Wizard {
     pub fn new(setup: Setup, task: Option<Task>) -> Self {
         let first = if setup.target.is_some() { Task::Lens } else { Task::Alignment };
         let mut wizard = Self {
-            step: Step::Choose,
+            step: WizardStep::Choose,
             since: Time::MIN,
             now: Time::MIN,
             task: task.unwrap_or(first),
             done: [false; Task::ALL.len()],
             capture: setup.capture(),
-            views: Views::default(),
-            aim: Aim::default(),
+            views: WizardViews::default(),
+            aim: AimWatch::default(),
             live: Live::new(setup.calibration.camera_from_imu),
             faults: FaultBoard::new(),
             solved: None,
@@ -226,7 +226,7 @@ impl Wizard {
     }
 
     /// Where it is.
-    pub const fn step(&self) -> Step {
+    pub const fn step(&self) -> WizardStep {
         self.step
     }
 
@@ -242,16 +242,16 @@ impl Wizard {
 
     /// Whether it goes on only by a key.
     pub const fn waits(&self) -> bool {
-        matches!(self.step, Step::Choose | Step::Result | Step::Saved)
+        matches!(self.step, WizardStep::Choose | WizardStep::Result | WizardStep::Saved)
     }
 
-    /// What to look for in pictures now.
-    pub fn look(&self) -> Look {
+    /// Kind of detection that the present step needs.
+    pub fn look(&self) -> DetectorMode {
         match (self.step, self.task) {
-            (Step::Gather, Task::Lens) => Look::Corners,
-            (Step::Gather, Task::Alignment) => Look::Orientation,
-            (Step::Gather, Task::Boresight) => Look::Mark,
-            _ => Look::Nothing,
+            (WizardStep::Gather, Task::Lens) => DetectorMode::Corners,
+            (WizardStep::Gather, Task::Alignment) => DetectorMode::Orientation,
+            (WizardStep::Gather, Task::Boresight) => DetectorMode::Mark,
+            _ => DetectorMode::Nothing,
         }
     }
 
@@ -260,14 +260,14 @@ impl Wizard {
         (!self.asks.is_empty()).then(|| self.asks.remove(0))
     }
 
-    /// What to tell the maintainer.
+    /// Page for the maintainer.
     pub fn guide(&self) -> Guide {
         page::page(self)
     }
 
     /// Takes something in.
     pub fn take(&mut self, input: Input) {
-        if self.step == Step::Over {
+        if self.step == WizardStep::Over {
             return;
         }
         match input {
@@ -287,12 +287,12 @@ impl Wizard {
                 self.has_ended = true;
                 // Nothing more will come for the last pull.
                 self.pass(self.now.plus_secs(2.0 * aim::SETTLE_S));
-                if self.step == Step::Gather {
+                if self.step == WizardStep::Gather {
                     self.finish();
                 }
             }
         }
-        if self.step == Step::Gather {
+        if self.step == WizardStep::Gather {
             self.solve_meanwhile();
         }
     }
@@ -305,7 +305,7 @@ impl Wizard {
         self.now = self.now.max(time);
     }
 
-    fn enter(&mut self, step: Step) {
+    fn enter(&mut self, step: WizardStep) {
         self.step = step;
         self.since = self.now;
         self.refused = None;
@@ -313,16 +313,16 @@ impl Wizard {
 
     fn gather_anew(&mut self) {
         self.capture = self.setup.capture();
-        self.views = Views::default();
-        self.aim = Aim::default();
+        self.views = WizardViews::default();
+        self.aim = AimWatch::default();
         self.live = Live::new(self.setup.calibration.camera_from_imu);
         self.solved = None;
         // What is still under way belongs to what was gathered before.
         self.awaited = None;
         self.solved_at = 0.0;
-        self.enter(Step::Gather);
+        self.enter(WizardStep::Gather);
         if let Some(lacks) = self.lacks(self.task) {
-            self.enter(Step::Choose);
+            self.enter(WizardStep::Choose);
             self.refused = Some(lacks.to_owned());
         }
     }
@@ -344,15 +344,15 @@ impl Wizard {
     fn sample(&mut self, sample: &ImuSample) {
         self.pass(sample.arrival);
         self.live.sample(sample);
-        if self.step == Step::Gather && self.task != Task::Lens {
+        if self.step == WizardStep::Gather && self.task != Task::Lens {
             self.capture.take(&Event::Imu(*sample));
         }
     }
 
     fn edge(&mut self, edge: TriggerEdge) {
         self.pass(edge.time);
-        if matches!(self.step, Step::Gather | Step::Solve) && self.task.wants_pulls() {
-            if self.step == Step::Gather {
+        if matches!(self.step, WizardStep::Gather | WizardStep::Solve) && self.task.wants_pulls() {
+            if self.step == WizardStep::Gather {
                 self.capture.take(&Event::Trigger(edge));
                 if edge.pressed {
                     self.aim.pull(edge.time, &self.setup.calibration);
@@ -366,17 +366,17 @@ impl Wizard {
         }
     }
 
-    fn seen(&mut self, arrival: Time, finding: Finding) {
+    fn seen(&mut self, arrival: Time, finding: Detection) {
         self.pass(arrival);
         self.live.picture(arrival, &finding);
-        if self.step != Step::Gather {
+        if self.step != WizardStep::Gather {
             return;
         }
         // What was looked for when another task was under way is of no use.
         match (self.task, finding) {
-            (Task::Alignment, Finding::Orientation(seen)) => self.capture.see(&seen),
-            (Task::Lens, Finding::Corners { view, size }) => self.views.take(view, size),
-            (Task::Boresight, Finding::Mark { stamp, pixel }) => {
+            (Task::Alignment, Detection::Orientation(seen)) => self.capture.see(&seen),
+            (Task::Lens, Detection::Corners { view, size }) => self.views.take(view, size),
+            (Task::Boresight, Detection::Mark { stamp, pixel }) => {
                 self.aim.mark(stamp, pixel, &self.setup.calibration);
             }
             _ => {}
@@ -386,47 +386,47 @@ impl Wizard {
     fn key(&mut self, key: Key) {
         match (self.step, key) {
             (_, Key::Quit) => {
-                self.enter(Step::Over);
+                self.enter(WizardStep::Over);
                 self.asks.push(Ask::End);
             }
-            (Step::Choose, Key::Pick(task)) => {
+            (WizardStep::Choose, Key::Pick(task)) => {
                 self.task = task;
                 self.refused = self.lacks(task).map(str::to_owned);
             }
-            (Step::Choose, Key::Next) => self.gather_anew(),
-            (Step::Gather, Key::Next) => self.finish(),
-            (Step::Gather | Step::Solve, Key::Back) => {
+            (WizardStep::Choose, Key::Next) => self.gather_anew(),
+            (WizardStep::Gather, Key::Next) => self.finish(),
+            (WizardStep::Gather | WizardStep::Solve, Key::Back) => {
                 self.awaited = None;
-                self.enter(Step::Choose);
+                self.enter(WizardStep::Choose);
             }
-            (Step::Result, Key::Next) if self.passed() => {
+            (WizardStep::Result, Key::Next) if self.passed() => {
                 if let Some(found) = self.solved.as_ref().and_then(|s| s.found.clone()) {
-                    self.enter(Step::Saving);
+                    self.enter(WizardStep::Saving);
                     self.asks.push(Ask::Save(Box::new(found)));
                 }
             }
-            (Step::Result, Key::Next | Key::Back) if !self.has_ended => self.enter(Step::Gather),
-            (Step::Result, Key::Next | Key::Back) | (Step::Saved, Key::Next | Key::Back)
+            (WizardStep::Result, Key::Next | Key::Back) if !self.has_ended => self.enter(WizardStep::Gather),
+            (WizardStep::Result, Key::Next | Key::Back) | (WizardStep::Saved, Key::Next | Key::Back)
                 if self.has_ended =>
             {
                 self.key(Key::Quit);
             }
-            (Step::Saved, Key::Next | Key::Back) => {
+            (WizardStep::Saved, Key::Next | Key::Back) => {
                 let is_left = |t: &Task| !self.done[*t as usize] && self.lacks(*t).is_none();
                 self.task = Task::ALL.into_iter().find(is_left).unwrap_or(self.task);
-                self.enter(Step::Choose);
+                self.enter(WizardStep::Choose);
             }
             _ => {}
         }
     }
 
     fn passed(&self) -> bool {
-        self.solved.as_ref().is_some_and(|s| s.sheet.verdict == Verdict::Pass)
+        self.solved.as_ref().is_some_and(|s| s.report.verdict == CalibrationVerdict::Pass)
     }
 
     /// Solves all that was gathered, for the result.
     fn finish(&mut self) {
-        self.enter(Step::Solve);
+        self.enter(WizardStep::Solve);
         self.order();
     }
 
@@ -464,8 +464,8 @@ impl Wizard {
         }
         self.awaited = None;
         self.solved = Some(solved);
-        if self.step == Step::Solve || self.step == Step::Gather && self.has_enough() {
-            self.enter(Step::Result);
+        if self.step == WizardStep::Solve || self.step == WizardStep::Gather && self.has_enough() {
+            self.enter(WizardStep::Result);
         }
     }
 
@@ -475,17 +475,17 @@ impl Wizard {
     }
 
     fn saved(&mut self, saved: Result<Box<Calibration>, String>) {
-        if self.step != Step::Saving {
+        if self.step != WizardStep::Saving {
             return;
         }
         match saved {
             Ok(calibration) => {
                 self.setup.calibration = *calibration;
                 self.done[self.task as usize] = true;
-                self.enter(Step::Saved);
+                self.enter(WizardStep::Saved);
             }
             Err(why) => {
-                self.enter(Step::Result);
+                self.enter(WizardStep::Result);
                 self.refused = Some(why);
             }
         }

@@ -1,14 +1,22 @@
-//! What the maintainer is told, from the state of the wizard.
+//! Pages of the wizard, made from its state.
 
 use bowwave_core::{
     fault::{Fault, Severity},
     guide::{Coverage, Gauge, Guide},
 };
 
-use super::{Step, Task, Wizard, aim::PULLS, gauges, live::Live, views::Shown, work::pace};
+use super::{
+    Task, Wizard, WizardStep,
+    aim::PULLS,
+    gauges,
+    live::Live,
+    views::BoardShown,
+    work::{Solved, pace},
+};
 use crate::{
     alignment::Movement,
-    camera::{CELLS, enough},
+    lens::{CELLS, enough},
+    report::hud,
 };
 
 const GATHERING: &str = "Enter or trigger: result   b: back   q: end";
@@ -16,20 +24,22 @@ const PULLING: &str = "Enter: result   b: back   q: end";
 
 pub(super) fn page(w: &Wizard) -> Guide {
     let guide = match w.step {
-        Step::Choose => choose(w),
-        Step::Gather => gather(w),
-        Step::Solve => Guide {
+        WizardStep::Choose => choose(w),
+        WizardStep::Gather => gather(w),
+        WizardStep::Solve => Guide {
             says: "Wait: the result is computed".to_owned(),
             keys: "b: back   q: end",
             ..Guide::default()
         },
-        Step::Result => result(w),
-        Step::Saving => Guide { says: "Wait: the calibration is written".to_owned(), ..Guide::default() },
-        Step::Saved => saved(w),
-        Step::Over => Guide { says: "Ended".to_owned(), ..Guide::default() },
+        WizardStep::Result => result(w),
+        WizardStep::Saving => {
+            Guide { says: "Wait: the calibration is written".to_owned(), ..Guide::default() }
+        }
+        WizardStep::Saved => saved(w),
+        WizardStep::Over => Guide { says: "Ended".to_owned(), ..Guide::default() },
     };
     let title = match w.step {
-        Step::Choose => "Calibrate".to_owned(),
+        WizardStep::Choose => "Calibrate".to_owned(),
         _ => format!("Calibrate: {}", w.task),
     };
     Guide { title, ..guide }
@@ -51,26 +61,9 @@ fn choose(w: &Wizard) -> Guide {
 }
 
 fn result(w: &Wizard) -> Guide {
-    let Some(solved) = &w.solved else { return Guide::default() };
-    let passed = w.passed();
-    let says = match (passed, w.has_ended) {
-        (true, _) => "Press Enter to save; what is replaced is kept",
-        (false, false) => "Press Enter to gather more",
-        (false, true) => "Record again as the lines say; press Enter to end",
-    };
-    Guide {
-        says: says.to_owned(),
-        problem: w.refused.clone(),
-        gauges: solved.gauges.clone(),
-        passed: Some(passed),
-        lines: [&solved.sheet.says].into_iter().chain(&solved.sheet.notes).cloned().collect(),
-        keys: if passed {
-            "Enter or trigger: save   b: gather more   q: end"
-        } else {
-            "Enter or trigger: gather more   q: end"
-        },
-        ..Guide::default()
-    }
+    let result =
+        |solved: &Solved| hud::guide(&solved.report, solved.gauges.clone(), w.refused.clone(), w.has_ended);
+    w.solved.as_deref().map(result).unwrap_or_default()
 }
 
 fn saved(w: &Wizard) -> Guide {
@@ -95,7 +88,7 @@ fn device(w: &Wizard) -> Option<String> {
         _ => false,
     };
     let raised = w.faults.active().filter(|f| f.severity() > Severity::Note).find(matters);
-    let gathers = w.step == Step::Gather && !w.has_ended;
+    let gathers = w.step == WizardStep::Gather && !w.has_ended;
     let silent = || {
         if gathers && w.live.no_pictures(w.since, w.now) && w.task != Task::Trigger {
             Some(Fault::CamStall)
@@ -123,7 +116,7 @@ fn gather(w: &Wizard) -> Guide {
     Guide { problem, keys, ..guide }
 }
 
-/// What was solved last; `None` before the first time.
+/// Advice and gauges of the newest solution; `None` before the first.
 fn told(w: &Wizard) -> Option<(&str, &[Gauge])> {
     w.solved.as_ref().map(|s| (s.says.as_str(), s.gauges.as_slice()))
 }
@@ -193,10 +186,10 @@ fn lens(w: &Wizard) -> Guide {
     let views = &w.views;
     let coverage = views.coverage();
     let problem = match views.shown() {
-        Shown::Absent => Some("THE BOARD IS NOT SEEN: HOLD IT INTO THE PICTURE, WHOLE AND LIT"),
-        Shown::Far => Some("THE BOARD IS TOO FAR: BRING IT NEARER"),
-        Shown::Moving => Some("HOLD THE BOARD STILL"),
-        Shown::Known | Shown::New => None,
+        BoardShown::Absent => Some("THE BOARD IS NOT SEEN: HOLD IT INTO THE PICTURE, WHOLE AND LIT"),
+        BoardShown::Far => Some("THE BOARD IS TOO FAR: BRING IT NEARER"),
+        BoardShown::Moving => Some("HOLD THE BOARD STILL"),
+        BoardShown::Known | BoardShown::New => None,
     };
     let count = views.kept().len();
     let first = || {
@@ -265,6 +258,6 @@ fn pulls(w: &Wizard, count: usize, says: &str, problem: Option<String>) -> Guide
     let mut gauges = vec![gauges::of_share("pulls", count as f64, PULLS as f64, |n| format!("{n:.0}"))];
     gauges.extend(told(w).iter().flat_map(|(_, gauges)| gauges.iter().cloned()));
     // Why what there is does not do.
-    let lines = w.solved.iter().filter(|s| s.found.is_none()).map(|s| s.sheet.says.clone()).collect();
+    let lines = w.solved.iter().filter(|s| s.found.is_none()).map(|s| s.report.says.clone()).collect();
     Guide { says: says.to_owned(), problem, gauges, lines, ..Guide::default() }
 }

@@ -5,11 +5,11 @@ use proptest::prelude::*;
 use super::*;
 use crate::{
     alignment::Observation,
-    camera::{Corner, View},
-    capture::{BoardSeen, HorizonSeen, Seen},
+    capture::{BoardSeen, HorizonSeen, PictureSeen},
+    lens::{BoardView, Corner},
     parse,
     simulated::{Motion, Random, Recipe, Recording},
-    so3::exp,
+    solve::so3::exp,
 };
 
 fn setup() -> Setup {
@@ -17,7 +17,7 @@ fn setup() -> Setup {
     Setup { calibration, eye_height_m: 10.0, target: Some(Target::A4), range_m: Some(40.0) }
 }
 
-/// What the devices say in a made recording, in the order of arrival: by the board or by the horizon.
+/// Events of a simulated recording in the order of arrival: with the board or with the horizon.
 fn inputs(recording: &Recording, by_board: bool) -> Vec<Input> {
     let samples = recording.readings.iter().map(|r| {
         let sample = ImuSample {
@@ -32,7 +32,8 @@ fn inputs(recording: &Recording, by_board: bool) -> Vec<Input> {
     let told = if by_board { &recording.orientations } else { &recording.ups };
     let pixel = DVec2::new(640.0, 360.0);
     let pictures = told.iter().map(|o| {
-        let mut seen = Seen { stamp: o.stamp(), fits: true, horizon: None, is_blurred: false, board: None };
+        let mut seen =
+            PictureSeen { stamp: o.stamp(), fits: true, horizon: None, is_blurred: false, board: None };
         match *o {
             Observation::Up { up_in_camera, sigma, .. } => {
                 seen.horizon = Some(HorizonSeen { up_in_camera, sigma, pixel });
@@ -47,7 +48,7 @@ fn inputs(recording: &Recording, by_board: bool) -> Vec<Input> {
             }
         }
         let arrival = seen.stamp.plus_ns(15_000_000);
-        (arrival, Input::Seen(arrival, Finding::Orientation(seen)))
+        (arrival, Input::Seen(arrival, Detection::Orientation(seen)))
     });
     let mut all: Vec<(Time, Input)> = samples.chain(pictures).collect();
     all.sort_by_key(|i| i.0);
@@ -55,7 +56,7 @@ fn inputs(recording: &Recording, by_board: bool) -> Vec<Input> {
 }
 
 /// Does what is asked for at once; what was saved last comes back.
-fn serve(wizard: &mut Wizard) -> Option<Found> {
+fn serve(wizard: &mut Wizard) -> Option<WizardSolution> {
     let mut saved = None;
     while let Some(ask) = wizard.ask() {
         match ask {
@@ -82,7 +83,7 @@ fn minute(motion: Motion) -> Recording {
     Recipe::minute(motion, 2e-3, 1e-3, 11).record()
 }
 
-fn press(wizard: &mut Wizard, key: Key) -> Option<Found> {
+fn press(wizard: &mut Wizard, key: Key) -> Option<WizardSolution> {
     wizard.take(Input::Key(key));
     serve(wizard)
 }
@@ -91,11 +92,11 @@ fn press(wizard: &mut Wizard, key: Key) -> Option<Found> {
 fn a_good_movement_ends_in_a_pass_that_is_saved() {
     let recording = minute(Motion::ByHand);
     let mut wizard = Wizard::new(setup(), None);
-    assert_eq!(wizard.step(), Step::Choose);
+    assert_eq!(wizard.step(), WizardStep::Choose);
     assert!(wizard.guide().lines[0].starts_with("> 1 camera lens"), "{:?}", wizard.guide());
     press(&mut wizard, Key::Pick(Task::Alignment));
     press(&mut wizard, Key::Next);
-    assert_eq!((wizard.step(), wizard.look()), (Step::Gather, Look::Orientation));
+    assert_eq!((wizard.step(), wizard.look()), (WizardStep::Gather, DetectorMode::Orientation));
     assert!(wizard.guide().gauges.iter().all(|g| g.rating.is_none() && g.share == 0.0));
     play(&mut wizard, inputs(&recording, true));
     let guide = wizard.guide();
@@ -104,16 +105,18 @@ fn a_good_movement_ends_in_a_pass_that_is_saved() {
     assert!(guide.gauges[0].value.contains("mrad") && guide.gauges[0].value.contains("m at 500 m"));
     assert_eq!(press(&mut wizard, Key::Next), None);
     let guide = wizard.guide();
-    assert_eq!((wizard.step(), guide.passed), (Step::Result, Some(true)));
+    assert_eq!((wizard.step(), guide.passed), (WizardStep::Result, Some(true)));
     assert!(guide.lines[0].starts_with("good"), "{guide:?}");
-    let Some(Found::Alignment(found, how)) = press(&mut wizard, Key::Next) else { panic!("{guide:?}") };
+    let Some(WizardSolution::Alignment(found, how)) = press(&mut wizard, Key::Next) else {
+        panic!("{guide:?}")
+    };
     let off = recording.recipe.camera_from_imu.angle_between(found.camera_from_imu);
     assert!(off < 1e-3 && how.contains("board, good"), "{off} {how}");
-    assert_eq!(wizard.step(), Step::Saved);
+    assert_eq!(wizard.step(), WizardStep::Saved);
     press(&mut wizard, Key::Next);
     assert!(wizard.guide().lines[1].ends_with("(done)"), "{:?}", wizard.guide());
     press(&mut wizard, Key::Quit);
-    assert_eq!(wizard.step(), Step::Over);
+    assert_eq!(wizard.step(), WizardStep::Over);
 }
 
 #[test]
@@ -134,7 +137,7 @@ fn traverse_only_is_never_good_and_names_what_is_missing() {
     assert!(guide.lines.iter().any(|l| l.contains("missing: elevation")), "{guide:?}");
     // Nothing is saved; more is gathered, and then it passes.
     assert_eq!(press(&mut wizard, Key::Next), None);
-    assert_eq!(wizard.step(), Step::Gather);
+    assert_eq!(wizard.step(), WizardStep::Gather);
     let mut recipe = minute(Motion::ByHand).recipe;
     recipe.seconds = 30.0;
     let later = inputs(&recipe.record(), true).into_iter().map(|input| later(input, 60.0));
@@ -151,9 +154,9 @@ fn later(input: Input, seconds: f64) -> Input {
             device_time_ns: s.device_time_ns + (seconds * 1e9) as i64,
             ..s
         }),
-        Input::Seen(arrival, Finding::Orientation(seen)) => Input::Seen(
+        Input::Seen(arrival, Detection::Orientation(seen)) => Input::Seen(
             arrival.plus_secs(seconds),
-            Finding::Orientation(Seen { stamp: seen.stamp.plus_secs(seconds), ..seen }),
+            Detection::Orientation(PictureSeen { stamp: seen.stamp.plus_secs(seconds), ..seen }),
         ),
         other => other,
     }
@@ -168,9 +171,9 @@ fn a_picture_that_tells_nothing_or_is_smeared_is_said() {
     ] {
         let mut wizard = Wizard::new(setup(), Some(Task::Alignment));
         let blind = inputs(&minute(Motion::ByHand), true).into_iter().take(1500).map(|input| match input {
-            Input::Seen(arrival, Finding::Orientation(seen)) => {
-                let seen = Seen { board: None, is_blurred: blurred, fits, ..seen };
-                Input::Seen(arrival, Finding::Orientation(seen))
+            Input::Seen(arrival, Detection::Orientation(seen)) => {
+                let seen = PictureSeen { board: None, is_blurred: blurred, fits, ..seen };
+                Input::Seen(arrival, Detection::Orientation(seen))
             }
             other => other,
         });
@@ -220,12 +223,12 @@ fn the_trigger_is_a_key_but_not_where_pulls_are_measured() {
     let mut wizard = Wizard::new(setup(), None);
     wizard.take(Input::Time(Time::from_ns(0)));
     wizard.take(edge(0.3));
-    assert_eq!(wizard.step(), Step::Choose, "a pull at once belonged to what was before");
+    assert_eq!(wizard.step(), WizardStep::Choose, "a pull at once belonged to what was before");
     wizard.take(Input::Key(Key::Pick(Task::Boresight)));
     wizard.take(edge(4.0));
-    assert_eq!(wizard.step(), Step::Gather);
+    assert_eq!(wizard.step(), WizardStep::Gather);
     (0..9).for_each(|i| wizard.take(edge(5.0 + f64::from(i))));
-    assert_eq!(wizard.step(), Step::Gather);
+    assert_eq!(wizard.step(), WizardStep::Gather);
     wizard.take(Input::Fault(FaultChange::raised(wizard.now, Fault::NotInert, "test")));
     let inert = "NOT ARMED: GUN NOT INERT: FIT THE INERT PLUG";
     assert_eq!(wizard.guide().problem.as_deref(), Some(inert));
@@ -242,7 +245,7 @@ fn pulls_at_the_marked_tag_become_a_boresight_by_themselves() {
         let aimed = DVec2::new(700.0, 380.0) + DVec2::new(random.gauss(), random.gauss()) * 0.5;
         while f64::from(picture) / 30.0 < from + 1.9 {
             let stamp = at(f64::from(picture) / 30.0);
-            let finding = Finding::Mark { stamp, pixel: (pull != 2).then_some(aimed) };
+            let finding = Detection::Mark { stamp, pixel: (pull != 2).then_some(aimed) };
             wizard.take(Input::Seen(stamp.plus_ns(9_000_000), finding));
             picture += 1;
             if picture % 60 == 30 {
@@ -255,8 +258,10 @@ fn pulls_at_the_marked_tag_become_a_boresight_by_themselves() {
         }
     }
     let guide = wizard.guide();
-    assert_eq!((wizard.step(), guide.passed), (Step::Result, Some(true)), "{guide:?}");
-    let Some(Found::Boresight(found, range_m)) = press(&mut wizard, Key::Next) else { panic!("{guide:?}") };
+    assert_eq!((wizard.step(), guide.passed), (WizardStep::Result, Some(true)), "{guide:?}");
+    let Some(WizardSolution::Boresight(found, range_m)) = press(&mut wizard, Key::Next) else {
+        panic!("{guide:?}")
+    };
     assert_eq!((found.residuals.len(), range_m), (5, 40.0));
 }
 
@@ -282,13 +287,13 @@ fn dry_shots_become_a_latency_by_themselves() {
         serve(&mut wizard);
     }
     let guide = wizard.guide();
-    assert_eq!((wizard.step(), guide.passed), (Step::Result, Some(true)), "{guide:?}");
-    let Some(Found::Trigger(found)) = press(&mut wizard, Key::Next) else { panic!("{guide:?}") };
+    assert_eq!((wizard.step(), guide.passed), (WizardStep::Result, Some(true)), "{guide:?}");
+    let Some(WizardSolution::Trigger(found)) = press(&mut wizard, Key::Next) else { panic!("{guide:?}") };
     assert!((found.latency_s - 0.02).abs() < 0.006, "{found:?}");
 }
 
 /// Corners of the board seen through a lens.
-fn view(lens: &Lens, turn: DVec3, place: DVec3, random: &mut Random) -> View {
+fn view(lens: &Lens, turn: DVec3, place: DVec3, random: &mut Random) -> BoardView {
     let camera_from_board = exp(turn) * DQuat::from_rotation_x(std::f64::consts::PI);
     let middle = camera_from_board * (Target::A4.size_m() / 2.0).extend(0.0);
     let corners = (0..Target::A4.tags()).flat_map(|id| Target::A4.corners(id)).filter_map(|board| {
@@ -297,7 +302,7 @@ fn view(lens: &Lens, turn: DVec3, place: DVec3, random: &mut Random) -> View {
         let noise = DVec2::new(random.gauss(), random.gauss()) * 0.1;
         inside.then_some(Corner { board, pixel: pixel + noise })
     });
-    View { corners: corners.collect() }
+    BoardView { corners: corners.collect() }
 }
 
 #[test]
@@ -306,15 +311,15 @@ fn the_lens_is_found_while_the_board_is_led_over_the_picture() {
     let mut random = Random::new(2);
     let mut wizard = Wizard::new(setup(), Some(Task::Lens));
     let mut now = Time::from_ns(1);
-    let mut show = |wizard: &mut Wizard, view: &View| {
+    let mut show = |wizard: &mut Wizard, view: &BoardView| {
         now = now.plus_ns(33_000_000);
-        let finding = Finding::Corners { view: view.clone(), size: (1280, 720) };
+        let finding = Detection::Corners { view: view.clone(), size: (1280, 720) };
         wizard.take(Input::Seen(now, finding));
         serve(wizard);
         wizard.guide()
     };
     let far = view(&lens, DVec3::ZERO, DVec3::new(0.0, 0.0, 3.0), &mut random);
-    assert!(show(&mut wizard, &View::default()).problem.unwrap().contains("NOT SEEN"));
+    assert!(show(&mut wizard, &BoardView::default()).problem.unwrap().contains("NOT SEEN"));
     assert!(show(&mut wizard, &far).problem.unwrap().contains("TOO FAR"));
     let mut covered = Vec::new();
     for i in 0..30 {
@@ -332,7 +337,7 @@ fn the_lens_is_found_while_the_board_is_led_over_the_picture() {
     press(&mut wizard, Key::Next);
     let guide = wizard.guide();
     assert_eq!(guide.passed, Some(true), "{guide:?}");
-    let Some(Found::Lens(found)) = press(&mut wizard, Key::Next) else { panic!("{guide:?}") };
+    let Some(WizardSolution::Lens(found)) = press(&mut wizard, Key::Next) else { panic!("{guide:?}") };
     assert!((found.intrinsics[0] - lens.focal.x).abs() < 4.0 * found.sigma[0], "{found:?}");
 }
 
@@ -340,11 +345,11 @@ fn the_lens_is_found_while_the_board_is_led_over_the_picture() {
 fn what_cannot_be_begun_says_why() {
     let bare = Setup { target: None, range_m: None, ..setup() };
     let mut wizard = Wizard::new(bare.clone(), Some(Task::Lens));
-    assert_eq!(wizard.step(), Step::Choose);
+    assert_eq!(wizard.step(), WizardStep::Choose);
     assert!(wizard.guide().problem.unwrap().contains("--target"));
     press(&mut wizard, Key::Pick(Task::Boresight));
     press(&mut wizard, Key::Next);
-    assert_eq!(wizard.step(), Step::Choose);
+    assert_eq!(wizard.step(), WizardStep::Choose);
     let with_board = Setup { target: Some(Target::A4), ..bare };
     let mut wizard = Wizard::new(with_board, Some(Task::Boresight));
     assert!(wizard.guide().problem.unwrap().contains("--range"));
@@ -358,7 +363,10 @@ fn a_result_that_cannot_be_written_is_not_lost() {
     press(&mut wizard, Key::Next);
     wizard.take(Input::Key(Key::Next));
     wizard.take(Input::Saved(Err("the disk is full".to_owned())));
-    assert_eq!((wizard.step(), wizard.guide().problem.as_deref()), (Step::Result, Some("the disk is full")));
+    assert_eq!(
+        (wizard.step(), wizard.guide().problem.as_deref()),
+        (WizardStep::Result, Some("the disk is full"))
+    );
     assert!(press(&mut wizard, Key::Next).is_some());
 }
 
@@ -378,17 +386,20 @@ fn anything() -> impl Strategy<Value = Input> {
             let horizon = horizon.then_some(HorizonSeen { up_in_camera: v, sigma, pixel });
             let board_from_camera = DQuat::from_xyzw(v.x, v.y, v.z, sigma);
             let board = board.then_some(BoardSeen { board_from_camera, sigma, pixel, corners: Vec::new() });
-            Input::Seen(arrival, Finding::Orientation(Seen { stamp, fits, horizon, is_blurred, board }))
+            Input::Seen(
+                arrival,
+                Detection::Orientation(PictureSeen { stamp, fits, horizon, is_blurred, board }),
+            )
         },
     );
     let corner = (pixel(), pixel()).prop_map(|(board, pixel)| Corner { board, pixel });
     let corners =
         (time(), prop::collection::vec(corner, 0..20), any::<bool>()).prop_map(|(at, corners, wide)| {
             let size = if wide { (1280, 720) } else { (0, 1) };
-            Input::Seen(at, Finding::Corners { view: View { corners }, size })
+            Input::Seen(at, Detection::Corners { view: BoardView { corners }, size })
         });
     let mark = (time(), time(), prop::option::of(pixel()))
-        .prop_map(|(at, stamp, pixel)| Input::Seen(at, Finding::Mark { stamp, pixel }));
+        .prop_map(|(at, stamp, pixel)| Input::Seen(at, Detection::Mark { stamp, pixel }));
     let key = prop_oneof![
         3 => Just(Key::Next),
         1 => Just(Key::Back),
@@ -449,7 +460,7 @@ proptest! {
     }
 }
 
-/// A frame's own type is not needed here but by [`Eyes`].
+/// A frame's own type is not needed here but by [`Detector`].
 #[test]
 fn eyes_find_only_what_is_looked_for() {
     let Setup { calibration, target, .. } = setup();
@@ -458,11 +469,14 @@ fn eyes_find_only_what_is_looked_for() {
         bowwave_core::event::Picture::black(bowwave_core::event::PixelFormat::Rgb, width, height).unwrap();
     let stamp = Time::from_ns(3);
     let frame = CameraFrame { arrival: stamp, mid_exposure: stamp, sequence: 0, picture, jpeg: None };
-    let mut eyes = Eyes::new(&calibration, 8.0, target, 0);
-    assert_eq!(eyes.look(Look::Nothing, &frame), Finding::Picture);
-    assert_eq!(eyes.look(Look::Mark, &frame), Finding::Mark { stamp, pixel: None });
+    let mut eyes = Detector::new(&calibration, 8.0, target, 0);
+    assert_eq!(eyes.look(DetectorMode::Nothing, &frame), Detection::Picture);
+    assert_eq!(eyes.look(DetectorMode::Mark, &frame), Detection::Mark { stamp, pixel: None });
     let size = (width, height);
-    assert_eq!(eyes.look(Look::Corners, &frame), Finding::Corners { view: View::default(), size });
-    let Finding::Orientation(seen) = eyes.look(Look::Orientation, &frame) else { panic!() };
+    assert_eq!(
+        eyes.look(DetectorMode::Corners, &frame),
+        Detection::Corners { view: BoardView::default(), size }
+    );
+    let Detection::Orientation(seen) = eyes.look(DetectorMode::Orientation, &frame) else { panic!() };
     assert!(seen.fits && seen.horizon.is_none() && seen.board.is_none());
 }

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::{
-    camera::{CORNERS_LEAST, Coverage, View},
+    lens::{BoardView, CORNERS_LEAST, LensCoverage},
     target::{apart, lie},
 };
 
@@ -18,7 +18,7 @@ const KEPT_MOST: usize = 120;
 
 /// How the board was in the last picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Shown {
+pub(super) enum BoardShown {
     /// Not to be seen.
     #[default]
     Absent,
@@ -32,27 +32,27 @@ pub(super) enum Shown {
     New,
 }
 
-/// What was kept.
+/// Pictures of the board that differ from each other.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Views {
-    kept: Vec<View>,
+pub(super) struct WizardViews {
+    kept: Vec<BoardView>,
     lies: Vec<[f64; 5]>,
     size: Option<(u32, u32)>,
     last: Option<[f64; 5]>,
-    shown: Shown,
+    shown: BoardShown,
     /// Smallest and largest share of the picture that the board filled.
     filled: Option<[f64; 2]>,
 }
 
-impl Views {
-    pub(super) fn take(&mut self, view: View, size: (u32, u32)) {
+impl WizardViews {
+    pub(super) fn take(&mut self, view: BoardView, size: (u32, u32)) {
         if *self.size.get_or_insert(size) != size {
             // Pictures of another camera, or of another mode, tell of another lens.
             *self = Self { size: Some(size), ..Self::default() };
         }
         let before = self.last.take();
         if view.corners.len() < CORNERS_LEAST {
-            self.shown = Shown::Absent;
+            self.shown = BoardShown::Absent;
             return;
         }
         let now = lie(&view);
@@ -60,21 +60,21 @@ impl Views {
         let width = f64::from(size.0);
         let fills = fills(&view, size);
         self.shown = if fills < FAR {
-            Shown::Far
+            BoardShown::Far
         } else if before.is_none_or(|b| apart(&b, &now) > STILL * width) {
-            Shown::Moving
+            BoardShown::Moving
         } else if self.lies.iter().any(|l| apart(l, &now) < OTHER * width) || self.kept.len() >= KEPT_MOST {
-            Shown::Known
+            BoardShown::Known
         } else {
             let [least, most] = self.filled.unwrap_or([fills; 2]);
             self.filled = Some([least.min(fills), most.max(fills)]);
             self.kept.push(view);
             self.lies.push(now);
-            Shown::New
+            BoardShown::New
         };
     }
 
-    pub(super) fn kept(&self) -> &[View] {
+    pub(super) fn kept(&self) -> &[BoardView] {
         &self.kept
     }
 
@@ -82,7 +82,7 @@ impl Views {
         self.size.unwrap_or((1, 1))
     }
 
-    pub(super) const fn shown(&self) -> Shown {
+    pub(super) const fn shown(&self) -> BoardShown {
         self.shown
     }
 
@@ -90,14 +90,14 @@ impl Views {
         self.filled
     }
 
-    pub(super) fn coverage(&self) -> Coverage {
+    pub(super) fn coverage(&self) -> LensCoverage {
         let (width, height) = self.size();
-        Coverage::of(&self.kept, DVec2::new(width.into(), height.into()), [0.0; 2])
+        LensCoverage::of(&self.kept, DVec2::new(width.into(), height.into()), [0.0; 2])
     }
 }
 
 /// Share of the picture that the rectangle around the corners fills.
-fn fills(view: &View, (width, height): (u32, u32)) -> f64 {
+fn fills(view: &BoardView, (width, height): (u32, u32)) -> f64 {
     let (low, high) = view
         .corners
         .iter()

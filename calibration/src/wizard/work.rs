@@ -8,9 +8,9 @@ use crate::{
     CalibrationFile, Date,
     alignment::{Alignment, AlignmentError, Movement},
     boresight::{self, Boresight, Shot},
-    camera::{self, Camera, View},
     capture::Capture,
-    sheet::{Sheet, Wanting},
+    lens::{self, BoardView, LensCalibration},
+    report::{CalibrationReport, Wanting},
     target::varied,
     trigger::{self, Latency},
 };
@@ -18,11 +18,11 @@ use crate::{
 /// Most pictures that the lens is solved from: more take longer and tell nothing new.
 pub const PICTURES_MOST: usize = 40;
 
-/// What was found, to be written.
+/// Solution that can be written into the calibration file.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Found {
+pub enum WizardSolution {
     /// A lens.
-    Lens(Box<Camera>),
+    Lens(Box<LensCalibration>),
     /// Camera and inertial unit, and from what.
     Alignment(Box<Alignment>, String),
     /// A boresight, by a mark so many metres away.
@@ -31,7 +31,7 @@ pub enum Found {
     Trigger(Latency),
 }
 
-impl Found {
+impl WizardSolution {
     /// Takes it over into a calibration file.
     pub fn write_into(&self, file: &mut CalibrationFile, day: Date) {
         match self {
@@ -43,18 +43,18 @@ impl Found {
     }
 }
 
-/// What a solution says.
+/// Result of one solver run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solved {
     /// Of which [`Work`].
     pub number: u32,
     /// The result; without a verdict of PASS it is not to be written.
-    pub sheet: Sheet,
-    /// What can be written.
-    pub found: Option<Found>,
+    pub report: CalibrationReport,
+    /// Solution that can be written, if any.
+    pub found: Option<WizardSolution>,
     /// How far each quantity has come.
     pub(super) gauges: Vec<Gauge>,
-    /// What to do next.
+    /// Advice for the maintainer.
     pub(super) says: String,
     /// The movement without which nothing can be solved.
     pub(super) missing: Option<Movement>,
@@ -64,12 +64,12 @@ pub struct Solved {
 #[derive(Clone, Debug)]
 pub struct Work {
     number: u32,
-    what: What,
+    what: WizardMaterial,
 }
 
 #[derive(Clone, Debug)]
-enum What {
-    Lens { views: Vec<View>, size: (u32, u32) },
+enum WizardMaterial {
+    Lens { views: Vec<BoardView>, size: (u32, u32) },
     Alignment(Capture),
     Boresight { marks: Vec<DVec2>, calibration: Calibration, range_m: f64 },
     Trigger(Capture),
@@ -88,14 +88,16 @@ pub(super) const fn pace(task: Task) -> (f64, f64) {
 impl Work {
     pub(super) fn of(wizard: &Wizard, number: u32) -> Self {
         let what = match wizard.task {
-            Task::Lens => What::Lens { views: wizard.views.kept().to_vec(), size: wizard.views.size() },
-            Task::Alignment => What::Alignment(wizard.capture.clone()),
-            Task::Boresight => What::Boresight {
+            Task::Lens => {
+                WizardMaterial::Lens { views: wizard.views.kept().to_vec(), size: wizard.views.size() }
+            }
+            Task::Alignment => WizardMaterial::Alignment(wizard.capture.clone()),
+            Task::Boresight => WizardMaterial::Boresight {
                 marks: wizard.aim.aimed(wizard.now),
                 calibration: wizard.setup.calibration.clone(),
                 range_m: wizard.setup.range_m.unwrap_or_default(),
             },
-            Task::Trigger => What::Trigger(wizard.capture.clone()),
+            Task::Trigger => WizardMaterial::Trigger(wizard.capture.clone()),
         };
         Self { number, what }
     }
@@ -104,30 +106,32 @@ impl Work {
     pub fn run(self) -> Solved {
         let number = self.number;
         match self.what {
-            What::Lens { views, size } => lens(number, &views, size),
-            What::Alignment(capture) => alignment(number, &capture),
-            What::Boresight { marks, calibration, range_m } => aimed(number, &marks, &calibration, range_m),
-            What::Trigger(capture) => dry_shots(number, &capture),
+            WizardMaterial::Lens { views, size } => lens(number, &views, size),
+            WizardMaterial::Alignment(capture) => alignment(number, &capture),
+            WizardMaterial::Boresight { marks, calibration, range_m } => {
+                aimed(number, &marks, &calibration, range_m)
+            }
+            WizardMaterial::Trigger(capture) => dry_shots(number, &capture),
         }
     }
 }
 
-fn lens(number: u32, views: &[View], size: (u32, u32)) -> Solved {
-    let used: Vec<View> = varied(views, PICTURES_MOST).into_iter().map(|i| views[i].clone()).collect();
-    let found = camera::solve(&used, size);
-    let sheet = Sheet::of_lens("Camera lens", &found);
+fn lens(number: u32, views: &[BoardView], size: (u32, u32)) -> Solved {
+    let used: Vec<BoardView> = varied(views, PICTURES_MOST).into_iter().map(|i| views[i].clone()).collect();
+    let found = lens::solve(&used, size);
+    let report = CalibrationReport::of_lens("Camera lens", &found);
     let says = match &found {
         Ok(camera) => camera.missing().first().map_or_else(|| gauges::ENOUGH.to_owned(), ToString::to_string),
         Err(why) => why.to_string(),
     };
     let gauges = found.as_ref().map_or_else(|_| Vec::new(), gauges::of_lens);
-    let found = found.ok().map(|camera| Found::Lens(Box::new(camera)));
-    Solved { number, sheet, found, gauges, says, missing: None }
+    let found = found.ok().map(|camera| WizardSolution::Lens(Box::new(camera)));
+    Solved { number, report, found, gauges, says, missing: None }
 }
 
 fn alignment(number: u32, capture: &Capture) -> Solved {
     let found = capture.solve();
-    let sheet = Sheet::of_alignment("Inertial unit to camera", capture, &found);
+    let report = CalibrationReport::of_alignment("Inertial unit to camera", capture, &found);
     let (says, missing) = match &found {
         Ok(a) => match Wanting::of(a, capture.shared_sigma()) {
             None => (gauges::ENOUGH.to_owned(), None),
@@ -143,25 +147,25 @@ fn alignment(number: u32, capture: &Capture) -> Solved {
     let gauges = found.as_ref().map_or_else(|_| gauges::of_nothing(), gauges::of_alignment);
     let found = found.ok().map(|a| {
         let how = capture.how(&a);
-        Found::Alignment(Box::new(a), how)
+        WizardSolution::Alignment(Box::new(a), how)
     });
-    Solved { number, sheet, found, gauges, says, missing }
+    Solved { number, report, found, gauges, says, missing }
 }
 
 fn aimed(number: u32, marks: &[DVec2], calibration: &Calibration, range_m: f64) -> Solved {
     let shots: Vec<Shot> = marks.iter().map(|m| Shot::aimed(&calibration.lens, *m, range_m)).collect();
     let sigma = boresight::pointing_sigma(calibration, &shots);
     let found = boresight::solve(&shots, calibration.muzzle_in_camera, sigma);
-    let sheet = Sheet::of_boresight("Boresight", &found, calibration);
+    let report = CalibrationReport::of_boresight("Boresight", &found, calibration);
     let gauges = found.as_ref().map_or_else(|_| Vec::new(), gauges::of_boresight);
-    let found = found.ok().map(|b| Found::Boresight(b, range_m));
-    Solved { number, sheet, found, gauges, says: gauges::AIM.to_owned(), missing: None }
+    let found = found.ok().map(|b| WizardSolution::Boresight(b, range_m));
+    Solved { number, report, found, gauges, says: gauges::AIM.to_owned(), missing: None }
 }
 
 fn dry_shots(number: u32, capture: &Capture) -> Solved {
     let found = trigger::solve(capture.readings(), capture.edges());
-    let sheet = Sheet::of_trigger("Trigger latency", &found);
+    let report = CalibrationReport::of_trigger("Trigger latency", &found);
     let gauges = found.as_ref().map_or_else(|_| Vec::new(), gauges::of_trigger);
-    let found = found.ok().map(Found::Trigger);
-    Solved { number, sheet, found, gauges, says: gauges::DRY.to_owned(), missing: None }
+    let found = found.ok().map(WizardSolution::Trigger);
+    Solved { number, report, found, gauges, says: gauges::DRY.to_owned(), missing: None }
 }

@@ -9,10 +9,10 @@ use bowwave_core::time::secs_to_ns;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use hw_sim::fault::{Fault, FaultKind};
 
-pub use calibrate::{Calibrate, CalibrateBoard, CalibrateCamera, CalibrateTask};
+pub use calibrate::{Calibrate, CalibrateBoard, CalibrateIntrinsics, CalibrateTask};
 pub use mounting::{
-    CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger, CalibrateWizard,
-    Files, Material, Told, WizardTask,
+    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
+    CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
 };
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.

@@ -6,6 +6,7 @@
 mod distortion;
 mod heading;
 mod lens;
+mod linearise;
 
 use std::f64::consts::TAU;
 
@@ -14,6 +15,7 @@ use glam::{DMat3, DQuat, DVec2, DVec3};
 pub use distortion::{Distortion, Fisheye, RadialTangential};
 pub use heading::{ahead, heading_of, starboard};
 pub use lens::{Bend, Lens, Optics};
+pub use linearise::{INTRINSICS, LinearisedPixel};
 
 /// Mean Earth radius in metres (IUGG R1).
 pub const EARTH_RADIUS_M: f64 = 6_371_008.8;

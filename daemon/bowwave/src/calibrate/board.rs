@@ -129,7 +129,7 @@ fn tag(out: &mut String, target: &Target, id: usize) -> fmt::Result {
     )
 }
 
-/// What the maintainer needs to know, and a line to measure.
+/// Text for the maintainer, and a line to measure.
 fn words(out: &mut String, target: &Target) -> fmt::Result {
     let (left, mut y) = (MARGIN_MM, MARGIN_MM + target.size_m().y * 1e3 + 8.0);
     let ruler_mm = if target.size_m().x >= 0.1 { 100.0 } else { 10.0 };

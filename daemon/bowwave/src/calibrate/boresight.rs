@@ -3,13 +3,13 @@
 use anyhow::{Result, bail};
 use bowwave_calibration::{
     boresight::{Pull, Shot, pointing_sigma, solve},
-    sheet::{Sheet, Verdict},
+    report::{CalibrationReport, CalibrationVerdict},
     target::{Target, find_tag},
 };
 use bowwave_core::event::{CameraFrame, Event, TriggerEdge};
 use glam::DVec2;
 
-use super::material::{Opened, open, tell, write};
+use super::input::{OpenedRecording, open, tell, write};
 use crate::{cli::CalibrateBoresight, outcome::Outcome, today::today};
 
 /// A pull of the trigger, with the picture nearest to it.
@@ -37,13 +37,13 @@ pub fn run(arguments: &CalibrateBoresight) -> Result<Outcome> {
     let found = solve(&shots, calibration.muzzle_in_camera, pointing_sigma(calibration, &shots));
     let today = today()?;
     let title = format!("Boresight from {}, {today}", arguments.recording.display());
-    let mut sheet = Sheet::of_boresight(&title, &found, calibration);
+    let mut report = CalibrationReport::of_boresight(&title, &found, calibration);
     if missed > 0 {
-        sheet.notes.push(format!("in {missed} of {} pulls the mark was not seen", pulls.len()));
+        report.notes.push(format!("in {missed} of {} pulls the mark was not seen", pulls.len()));
     }
-    opened.warn(&mut sheet, is_cut, today);
-    tell(&sheet, &arguments.told)?;
-    let passed = sheet.verdict == Verdict::Pass;
+    opened.warn(&mut report, is_cut, today);
+    tell(&report, &arguments.output)?;
+    let passed = report.verdict == CalibrationVerdict::Pass;
     if let (Ok(found), true) = (&found, passed) {
         let mut file = opened.file;
         file.set_boresight(found, arguments.range, today);
@@ -53,7 +53,7 @@ pub fn run(arguments: &CalibrateBoresight) -> Result<Outcome> {
 }
 
 /// Every pull of the trigger with its picture, and whether the recording was cut short.
-fn pulls(opened: &Opened) -> Result<(Vec<Shown>, bool)> {
+fn pulls(opened: &OpenedRecording) -> Result<(Vec<Shown>, bool)> {
     let calibration = &opened.file.calibration;
     let mut pulls: Vec<Shown> = Vec::new();
     opened.play(false, |event| {

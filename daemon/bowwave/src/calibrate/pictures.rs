@@ -4,30 +4,30 @@ use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
-    camera::View,
+    lens::BoardView,
     target::{Grey, Target, detect, view},
 };
 use bowwave_import::picture_names;
 use bowwave_record::{Entry, RecordingReader};
 use image::{GrayImage, ImageFormat, ImageReader, Limits};
 
-use super::material::{progress, read};
+use super::input::{progress, read};
 
 /// Most pictures of a recording that are looked at, evenly over its length.
 const LOOKED_MOST: u64 = 240;
 
-/// What was seen in pictures of one camera.
+/// Boards found in pictures of one camera.
 #[derive(Clone, Debug, Default)]
-pub struct Looked {
+pub struct BoardPictures {
     /// Their width and height, pixels.
     pub size: (u32, u32),
     /// Each with the board's corners in it, none where it shows no board.
-    pub views: Vec<(String, View)>,
+    pub views: Vec<(String, BoardView)>,
     /// The recording's own calibration, where it has one.
     pub calibration_toml: Option<String>,
 }
 
-impl Looked {
+impl BoardPictures {
     fn take(&mut self, name: String, picture: &GrayImage, target: &Target) -> Result<()> {
         let size = picture.dimensions();
         if self.views.is_empty() {
@@ -50,14 +50,14 @@ impl Looked {
 }
 
 /// Looks for the board in all pictures of a folder, or in many of a recording.
-pub fn look(source: &Path, target: &Target) -> Result<Looked> {
+pub fn look(source: &Path, target: &Target) -> Result<BoardPictures> {
     if !source.exists() {
         bail!(
             "no file or folder {}; name a folder of pictures of the board, or a recording",
             source.display()
         );
     }
-    let mut looked = Looked::default();
+    let mut looked = BoardPictures::default();
     if source.is_dir() {
         folder(source, target, &mut looked)?;
     } else {
@@ -66,7 +66,7 @@ pub fn look(source: &Path, target: &Target) -> Result<Looked> {
     Ok(looked)
 }
 
-fn folder(source: &Path, target: &Target, looked: &mut Looked) -> Result<()> {
+fn folder(source: &Path, target: &Target, looked: &mut BoardPictures) -> Result<()> {
     let names = picture_names(source)?;
     if names.is_empty() {
         bail!("{} has no JPEG or PNG pictures; put those of the board into it", source.display());
@@ -90,7 +90,7 @@ fn folder(source: &Path, target: &Target, looked: &mut Looked) -> Result<()> {
     Ok(())
 }
 
-fn recording(source: &Path, target: &Target, looked: &mut Looked) -> Result<()> {
+fn recording(source: &Path, target: &Target, looked: &mut BoardPictures) -> Result<()> {
     let reader = RecordingReader::open(source)?;
     looked.calibration_toml = Some(reader.properties().calibration_toml.clone());
     let frames = reader.counts().frames;

@@ -1,7 +1,7 @@
 //! `bowwave calibrate restore`: puts a calibration back that was replaced.
 
 use anyhow::{Result, bail};
-use bowwave_calibration::keep;
+use bowwave_calibration::history;
 
 use crate::{cli::CalibrateRestore, outcome::Outcome, stdout};
 
@@ -9,13 +9,13 @@ use crate::{cli::CalibrateRestore, outcome::Outcome, stdout};
 pub fn run(arguments: &CalibrateRestore) -> Result<Outcome> {
     let path = &arguments.calibration;
     if arguments.list {
-        for kept in keep::kept(path)? {
+        for kept in history::copies(path)? {
             let made = kept.made.map_or_else(|| "cannot be read".to_owned(), |d| format!("made on {d}"));
             stdout::print(format!("{:4}  {made}  {}\n", kept.number, kept.path.display()))?;
         }
         return Ok(Outcome::Done);
     }
-    let Some(kept) = keep::restore(path, arguments.number)? else {
+    let Some(kept) = history::restore(path, arguments.number)? else {
         bail!("nothing else is kept of {}: no calibration has replaced one there", path.display());
     };
     eprintln!(

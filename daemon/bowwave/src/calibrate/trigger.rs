@@ -3,11 +3,11 @@
 use anyhow::Result;
 use bowwave_calibration::{
     capture::Capture,
-    sheet::{Sheet, Verdict},
+    report::{CalibrationReport, CalibrationVerdict},
     trigger,
 };
 
-use super::material::{open, tell, write};
+use super::input::{open, tell, write};
 use crate::{cli::CalibrateTrigger, outcome::Outcome, today::today};
 
 /// Solves, tells and writes.
@@ -18,13 +18,13 @@ pub fn run(arguments: &CalibrateTrigger) -> Result<Outcome> {
     let found = trigger::solve(capture.readings(), capture.edges());
     let today = today()?;
     let title = format!("Trigger from {}, {today}", arguments.recording.display());
-    let mut sheet = Sheet::of_trigger(&title, &found);
-    opened.warn(&mut sheet, is_cut, today);
-    tell(&sheet, &arguments.told)?;
+    let mut report = CalibrationReport::of_trigger(&title, &found);
+    opened.warn(&mut report, is_cut, today);
+    tell(&report, &arguments.output)?;
     if let Ok(found) = &found {
         let mut file = opened.file;
         file.set_trigger(found, today);
         write(file, today, &arguments.files)?;
     }
-    Ok(if sheet.verdict == Verdict::Pass { Outcome::Done } else { Outcome::Failed })
+    Ok(if report.verdict == CalibrationVerdict::Pass { Outcome::Done } else { Outcome::Failed })
 }

@@ -6,7 +6,8 @@ use bowwave_calibration::target::{Target, TargetError};
 use clap::{Args, Subcommand};
 
 use super::mounting::{
-    CalibrateBoresight, CalibrateCheck, CalibrateImu, CalibrateRestore, CalibrateTrigger, CalibrateWizard,
+    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
+    CalibrateWizard,
 };
 
 /// Arguments of `calibrate`.
@@ -17,7 +18,7 @@ pub struct Calibrate {
     pub task: Option<CalibrateTask>,
 }
 
-/// What to measure or make.
+/// Task of `calibrate`.
 #[derive(Debug, Subcommand)]
 pub enum CalibrateTask {
     /// Be guided through all of it, on this computer's devices or on a recording
@@ -25,9 +26,11 @@ pub enum CalibrateTask {
     /// Make the board whose pictures tell the lens, ready to print
     Board(CalibrateBoard),
     /// Measure the lens from pictures of the board: focal length, centre, distortion
-    Camera(CalibrateCamera),
+    #[command(visible_alias = "camera")]
+    Intrinsics(CalibrateIntrinsics),
     /// Measure how the inertial unit is turned against the camera, how far their clocks are apart, and the gyro's bias
-    Imu(CalibrateImu),
+    #[command(visible_alias = "imu")]
+    Extrinsics(CalibrateExtrinsics),
     /// Measure where the barrel points, by trigger pulls with the bore aimed at a mark
     Boresight(CalibrateBoresight),
     /// Measure how long after the trigger's edge a round leaves, by dry shots
@@ -56,9 +59,9 @@ pub struct CalibrateBoard {
     pub force: bool,
 }
 
-/// Arguments of `calibrate camera`.
+/// Arguments of `calibrate intrinsics`.
 #[derive(Debug, Args)]
-pub struct CalibrateCamera {
+pub struct CalibrateIntrinsics {
     /// Folder of JPEG or PNG pictures of the board, or a recording (MCAP) in which it is shown
     pub pictures: PathBuf,
     /// The board, as `calibrate board` prints below it, or Kalibr's file of it. Its size does not matter to the lens, its layout does

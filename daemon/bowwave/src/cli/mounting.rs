@@ -8,9 +8,9 @@ use glam::DVec2;
 
 use super::calibrate::{BOARD, parse_board};
 
-/// How a result is told.
+/// Arguments that say how a result is shown.
 #[derive(Clone, Debug, Args)]
-pub struct Told {
+pub struct OutputArgs {
     /// Also write the result as a page (HTML), with what is left over plotted
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
@@ -19,9 +19,9 @@ pub struct Told {
     pub json: bool,
 }
 
-/// Which calibration is begun with and which is written.
+/// Arguments that name the calibration to begin with and the one to write.
 #[derive(Clone, Debug, Args)]
-pub struct Files {
+pub struct CalibrationFiles {
     /// Calibration file (TOML); without it the recording's own
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
@@ -30,9 +30,9 @@ pub struct Files {
     pub out: Option<PathBuf>,
 }
 
-/// What all of them look at.
+/// Arguments that say how a recording is looked at, and how the result is shown.
 #[derive(Clone, Debug, Args)]
-pub struct Material {
+pub struct InputArgs {
     /// The camera's height above the sea; without it what the recording or its scenario says
     #[arg(long, value_name = "M", value_parser = parse_height)]
     pub eye_height: Option<f64>,
@@ -41,18 +41,18 @@ pub struct Material {
     #[arg(long, value_name = BOARD, value_parser = parse_board)]
     pub target: Option<Target>,
     #[command(flatten)]
-    pub told: Told,
+    pub output: OutputArgs,
 }
 
-/// Arguments of `calibrate imu`.
+/// Arguments of `calibrate extrinsics`.
 #[derive(Debug, Args)]
-pub struct CalibrateImu {
+pub struct CalibrateExtrinsics {
     /// Recording (MCAP) in which camera and unit are moved together, seeing the sea's horizon or the board
     pub recording: PathBuf,
     #[command(flatten)]
-    pub material: Material,
+    pub input: InputArgs,
     #[command(flatten)]
-    pub files: Files,
+    pub files: CalibrationFiles,
     /// Write the file although the result is poor
     #[arg(long)]
     pub accept_poor: bool,
@@ -67,7 +67,7 @@ pub struct CalibrateCheck {
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
     #[command(flatten)]
-    pub material: Material,
+    pub input: InputArgs,
 }
 
 /// Arguments of `calibrate restore`.
@@ -89,9 +89,9 @@ pub struct CalibrateTrigger {
     /// Recording (MCAP) of dry shots: gun cocked and held still, a second of rest between presses, five times or more
     pub recording: PathBuf,
     #[command(flatten)]
-    pub files: Files,
+    pub files: CalibrationFiles,
     #[command(flatten)]
-    pub told: Told,
+    pub output: OutputArgs,
 }
 
 /// Arguments of `calibrate boresight`.
@@ -113,18 +113,20 @@ pub struct CalibrateBoresight {
     #[arg(long, value_name = "X,Y", value_parser = parse_mark, required_unless_present = "target")]
     pub mark: Vec<Mark>,
     #[command(flatten)]
-    pub files: Files,
+    pub files: CalibrationFiles,
     #[command(flatten)]
-    pub told: Told,
+    pub output: OutputArgs,
 }
 
-/// What the wizard can calibrate.
+/// Task of the wizard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum WizardTask {
-    /// The camera's lens, by the board
-    Camera,
-    /// Inertial unit to camera, by the horizon or the board
-    Imu,
+    /// The camera's lens, by the board (formerly `camera`)
+    #[value(alias = "camera")]
+    Intrinsics,
+    /// Inertial unit to camera, by the horizon or the board (formerly `imu`)
+    #[value(alias = "imu")]
+    Extrinsics,
     /// Where the barrel points, by pulls at a tag of the board
     Boresight,
     /// When a round leaves, by dry shots
@@ -167,7 +169,7 @@ pub struct CalibrateWizard {
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
-    pub files: Files,
+    pub files: CalibrationFiles,
 }
 
 impl CalibrateWizard {

@@ -88,7 +88,7 @@ impl Distortion {
 }
 
 impl RadialTangential {
-    fn new(radial: DVec2, tangential: DVec2) -> Self {
+    pub(super) fn new(radial: DVec2, tangential: DVec2) -> Self {
         // Smallest positive root of 1 + 3 k1 s + 5 k2 s^2, the radius's growth; by the stable formula, which needs no k2.
         let (b, c) = (3.0 * radial.x, 5.0 * radial.y);
         let discriminant = b * b - 4.0 * c;
@@ -126,7 +126,7 @@ impl RadialTangential {
     }
 
     /// Derivative of [`RadialTangential::bend`].
-    fn slope(&self, n: DVec2) -> DMat2 {
+    pub(super) fn slope(&self, n: DVec2) -> DMat2 {
         let r2 = n.length_squared();
         let radial = 1.0 + r2 * (self.radial.x + r2 * self.radial.y);
         let growth = 2.0 * (self.radial.x + 2.0 * r2 * self.radial.y);
@@ -213,7 +213,7 @@ impl Fisheye {
 }
 
 /// Distorted radius of a fisheye at an angle from the axis, and its growth.
-fn radius(k: &[f64; 4], angle: f64) -> (f64, f64) {
+pub(super) fn radius(k: &[f64; 4], angle: f64) -> (f64, f64) {
     let a2 = angle * angle;
     let value = 1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])));
     let slope = 1.0 + a2 * (3.0 * k[0] + a2 * (5.0 * k[1] + a2 * (7.0 * k[2] + a2 * 9.0 * k[3])));

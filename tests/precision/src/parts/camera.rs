@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use bowwave_calibration::{
-    camera::{Camera, Model, View, solve},
+    lens::{LensCalibration, LensModel, BoardView, solve},
     simulated::Random,
     target::{Grey, Target, detect, varied, view},
 };
@@ -29,7 +29,7 @@ pub const ABOUT: About = About {
           over, in the fit and in pictures that took no part",
 };
 
-fn views(lens: &TrueLens, target: &Target, count: usize, tilt: f64, noise: f64, seed: u64) -> Vec<View> {
+fn views(lens: &TrueLens, target: &Target, count: usize, tilt: f64, noise: f64, seed: u64) -> Vec<BoardView> {
     let seen = |(i, shot): (usize, &BoardShot)| {
         exact(target, &true_corners(target, lens, shot), noise, seed * 991 + i as u64)
     };
@@ -41,12 +41,12 @@ fn size(lens: &TrueLens) -> (u32, u32) {
 }
 
 /// Error of the focal length, pixels; the whole of it where there is none.
-fn focal_error(lens: &TrueLens, camera: Option<&Camera>) -> f64 {
+fn focal_error(lens: &TrueLens, camera: Option<&LensCalibration>) -> f64 {
     let truth = 0.5 * (lens.numbers[0] + lens.numbers[1]);
     camera.map_or(truth, |c| (0.5 * (c.intrinsics[0] + c.intrinsics[1]) - truth).abs())
 }
 
-fn centre_error(lens: &TrueLens, camera: Option<&Camera>) -> f64 {
+fn centre_error(lens: &TrueLens, camera: Option<&LensCalibration>) -> f64 {
     let truth = DVec2::new(lens.numbers[2], lens.numbers[3]);
     camera.map_or(truth.length(), |c| DVec2::new(c.intrinsics[2], c.intrinsics[3]).distance(truth))
 }
@@ -57,12 +57,12 @@ const LENSES: [(&str, TrueLens); 2] = [("a pinhole", TrueLens::PINHOLE), ("a fis
 fn pictures(bench: &mut PartBench, target: &Target, seeds: u64) {
     for (name, lens) in LENSES {
         let ways = [6, 12, 24, 40, 80].map(|count| {
-            let all: Vec<Vec<View>> =
+            let all: Vec<Vec<BoardView>> =
                 (0..seeds).map(|seed| views(&lens, target, count, 0.6, 0.1, seed)).collect();
-            let found: Vec<Option<Camera>> = all.iter().map(|v| solve(v, size(&lens)).ok()).collect();
+            let found: Vec<Option<LensCalibration>> = all.iter().map(|v| solve(v, size(&lens)).ok()).collect();
             let error = rms(found.iter().map(|c| focal_error(&lens, c.as_ref())));
             let centre = rms(found.iter().map(|c| centre_error(&lens, c.as_ref())));
-            let stated = rms(found.iter().flatten().map(Camera::focal_sigma_px));
+            let stated = rms(found.iter().flatten().map(LensCalibration::focal_sigma_px));
             let first = all.into_iter().next().unwrap_or_default();
             let work = move || solve(&first, size(&lens)).is_ok();
             let way = Way::new("bundle adjustment", &format!("{count} pictures"), error, 1, work)
@@ -80,7 +80,7 @@ fn pictures(bench: &mut PartBench, target: &Target, seeds: u64) {
 }
 
 /// One corner in twenty anywhere within 30 pixels.
-fn wild(views: &mut [View]) {
+fn wild(views: &mut [BoardView]) {
     let mut random = Random::new(17);
     for corner in views.iter_mut().flat_map(|v| &mut v.corners).step_by(20) {
         corner.pixel += DVec2::new(random.unit() - 0.5, random.unit() - 0.5) * 60.0;
@@ -88,7 +88,7 @@ fn wild(views: &mut [View]) {
 }
 
 /// An extreme case: pictures, tilt, noise, and what is done to the corners.
-type LensCase = (&'static str, usize, f64, f64, fn(&mut [View]));
+type LensCase = (&'static str, usize, f64, f64, fn(&mut [BoardView]));
 
 const CASES: [LensCase; 8] = [
     ("noise of .02 px", 24, 0.6, 0.02, |_| ()),
@@ -106,14 +106,14 @@ const CASES: [LensCase; 8] = [
 fn extremes(bench: &mut PartBench, target: &Target, seeds: u64) {
     for (name, lens) in LENSES {
         for (case, count, tilt, noise, spoil) in CASES {
-            let found: Vec<Option<Camera>> = (0..seeds)
+            let found: Vec<Option<LensCalibration>> = (0..seeds)
                 .map(|seed| {
                     let mut views = views(&lens, target, count, tilt, noise, 100 + seed);
                     spoil(&mut views);
                     solve(&views, size(&lens)).ok()
                 })
                 .collect();
-            let solved: Vec<&Camera> = found.iter().flatten().collect();
+            let solved: Vec<&LensCalibration> = found.iter().flatten().collect();
             let error = worst(solved.iter().map(|c| focal_error(&lens, Some(c))));
             let beyond = worst(solved.iter().map(|c| focal_error(&lens, Some(c)) / c.focal_sigma_px()));
             let note = format!("{} of {seeds} solved; at most {beyond:.1} stated sigmas off", solved.len());
@@ -128,23 +128,23 @@ fn extremes(bench: &mut PartBench, target: &Target, seeds: u64) {
 fn models(bench: &mut PartBench, target: &Target, seeds: u64) {
     let mild = TrueLens { numbers: [905.0, 902.0, 652.0, 349.0, -0.05, 0.0, 0.0, 0.0], ..TrueLens::PINHOLE };
     for (name, lens) in [LENSES[0], LENSES[1], ("a pinhole with little distortion", mild)] {
-        let truth = if lens.fisheye { Model::Fisheye } else { Model::RadialTangential };
-        let found: Vec<Camera> = (0..seeds)
+        let truth = if lens.fisheye { LensModel::Fisheye } else { LensModel::RadialTangential };
+        let found: Vec<LensCalibration> = (0..seeds)
             .filter_map(|seed| solve(&views(&lens, target, 16, 0.6, 0.1, 300 + seed), size(&lens)).ok())
             .collect();
         let wrong = found.iter().filter(|c| c.model != truth).count();
         let share = if found.is_empty() { 100.0 } else { 100.0 * wrong as f64 / found.len() as f64 };
-        let always = |model: Model| if model == truth { 0.0 } else { 100.0 };
+        let always = |model: LensModel| if model == truth { 0.0 } else { 100.0 };
         bench.extreme(
             &format!("{name}: taken for the other"),
             "%",
             vec![
                 ExtremeResult::product("two models", "chosen by evidence", share),
-                ExtremeResult::rival("one model", "pinhole", always(Model::RadialTangential)),
-                ExtremeResult::rival("one model", "fisheye", always(Model::Fisheye)),
+                ExtremeResult::rival("one model", "pinhole", always(LensModel::RadialTangential)),
+                ExtremeResult::rival("one model", "fisheye", always(LensModel::Fisheye)),
             ],
         );
-        let left = |model: Model| {
+        let left = |model: LensModel| {
             rms(found.iter().flat_map(|c| &c.evidence).filter(|e| e.model == model).map(|e| e.held_out_px))
         };
         let chosen = found.iter().filter_map(|c| c.evidence.iter().find(|e| e.model == c.model));
@@ -152,13 +152,9 @@ fn models(bench: &mut PartBench, target: &Target, seeds: u64) {
             &format!("{name}: left over where it took no part"),
             "px",
             vec![
-                ExtremeResult::product(
-                    "two models",
-                    "chosen by evidence",
-                    rms(chosen.map(|e| e.held_out_px)),
-                ),
-                ExtremeResult::rival("one model", "pinhole", left(Model::RadialTangential)),
-                ExtremeResult::rival("one model", "fisheye", left(Model::Fisheye)),
+                ExtremeResult::product("two models", "chosen by evidence", rms(chosen.map(|e| e.held_out_px))),
+                ExtremeResult::rival("one model", "pinhole", left(LensModel::RadialTangential)),
+                ExtremeResult::rival("one model", "fisheye", left(LensModel::Fisheye)),
             ],
         );
     }
@@ -169,13 +165,13 @@ fn whole_way(bench: &mut PartBench, target: &Target, count: usize) {
     for (name, lens) in LENSES {
         let directions = lens.directions();
         for (case, blur_px, noise) in [("sharp", 0.7, 2.0), ("dim and blurred", 1.8, 12.0)] {
-            let found: Vec<View> = held(&lens, target, count, 0.7, 40)
+            let found: Vec<BoardView> = held(&lens, target, count, 0.7, 40)
                 .into_iter()
                 .map(|shot| draw(target, &lens, &directions, &BoardShot { blur_px, noise, ..shot }))
                 .filter_map(|p| Some(view(target, &detect(target, &Grey::new(p.size.0, p.size.1, &p.grey)?))))
                 .filter(|v| !v.corners.is_empty())
                 .collect();
-            let some: Vec<View> = varied(&found, 40).into_iter().map(|i| found[i].clone()).collect();
+            let some: Vec<BoardView> = varied(&found, 40).into_iter().map(|i| found[i].clone()).collect();
             let camera = solve(&some, size(&lens)).ok();
             let note = camera.as_ref().map_or_else(
                 || "no lens".to_owned(),

@@ -1,7 +1,7 @@
 //! Boards held before a camera as somebody who calibrates it holds them.
 
 use bowwave_calibration::{
-    camera::{Corner, View},
+    lens::{Corner, BoardView},
     simulated::Random,
     target::Target,
 };
@@ -42,13 +42,13 @@ pub fn held(lens: &TrueLens, target: &Target, count: usize, tilt: f64, seed: u64
 }
 
 /// The true corners of a picture, each off by `noise` pixels: what a detector of that precision would give.
-pub fn exact(target: &Target, drawn: &[(usize, usize, DVec2)], noise: f64, seed: u64) -> View {
+pub fn exact(target: &Target, drawn: &[(usize, usize, DVec2)], noise: f64, seed: u64) -> BoardView {
     let mut random = Random::new(seed);
     let corners = drawn.iter().map(|(id, corner, pixel)| Corner {
         board: target.corners(*id)[*corner],
         pixel: *pixel + DVec2::new(random.gauss(), random.gauss()) * noise,
     });
-    View { corners: corners.collect() }
+    BoardView { corners: corners.collect() }
 }
 
 /// Distances of found corners to the true ones, pixels.

@@ -10,7 +10,7 @@ use std::{
 use anyhow::{Context, Result};
 use bowwave_calibration::{
     CalibrationFile,
-    wizard::{Ask, Eyes, Finding, Input, Key, Look, Solved, Step, Task, Work},
+    wizard::{Ask, Detection, Detector, DetectorMode, Input, Key, Solved, Task, WizardStep, Work},
 };
 use bowwave_core::{
     event::{CameraFrame, Event, Tick},
@@ -25,10 +25,10 @@ use super::{
     Guided,
     player::Player,
     screen::Screen,
-    teller::{Deaf, Teller},
+    terminal::{StdinClosed, TerminalUi},
 };
 use crate::{
-    calibrate::material::begun,
+    calibrate::input::begun,
     cli::CalibrateWizard,
     config::ScreenOutput,
     outcome::Outcome,
@@ -113,7 +113,7 @@ pub fn paced(guided: Guided, player: Player, arguments: &CalibrateWizard) -> Res
 }
 
 /// Pictures on their way to the eyes, and what these found.
-type Watched = (Sender<(Look, CameraFrame)>, Receiver<(Time, Finding)>);
+type Watched = (Sender<(DetectorMode, CameraFrame)>, Receiver<(Time, Detection)>);
 
 /// The wizard with everything around it.
 struct Loop<'a> {
@@ -122,15 +122,15 @@ struct Loop<'a> {
     screen: Option<Screen>,
     signals: Arc<Signals>,
     arguments: &'a CalibrateWizard,
-    teller: Teller,
+    teller: TerminalUi,
     /// Pictures that are looked at beside.
-    pictures: Sender<(Look, CameraFrame)>,
-    findings: Receiver<(Time, Finding)>,
+    pictures: Sender<(DetectorMode, CameraFrame)>,
+    findings: Receiver<(Time, Detection)>,
     solved: (Sender<Solved>, Receiver<Solved>),
     recorder: Option<Recorder>,
     /// No recording could be begun.
     cannot_record: bool,
-    /// What was gathered so far.
+    /// Recordings made so far.
     recordings: Vec<(PathBuf, Task)>,
 }
 
@@ -149,7 +149,7 @@ impl<'a> Loop<'a> {
             screen,
             signals,
             arguments,
-            teller: Teller::new(),
+            teller: TerminalUi::new(),
             pictures,
             findings,
             solved: unbounded(),
@@ -184,7 +184,7 @@ impl<'a> Loop<'a> {
 
     fn rounds(&mut self, faults: &mut Vec<FaultChange>) -> Result<()> {
         let mut events = Vec::new();
-        while self.guided.wizard.step() != Step::Over {
+        while self.guided.wizard.step() != WizardStep::Over {
             self.keys();
             self.collect(&mut events, faults);
             self.record(&events)?;
@@ -195,9 +195,9 @@ impl<'a> Loop<'a> {
                 self.guided.wizard.take(Input::Seen(arrival, finding));
             }
             for solved in self.solved.1.try_iter() {
-                let sheet = solved.sheet.clone();
+                let report = solved.report.clone();
                 self.guided.wizard.take(Input::Solved(Box::new(solved)));
-                self.guided.report(&sheet);
+                self.guided.report(&report);
             }
             self.serve()?;
             self.show()?;
@@ -225,7 +225,7 @@ impl<'a> Loop<'a> {
             match self.teller.key() {
                 Ok(Some(key)) => self.guided.wizard.take(Input::Key(key)),
                 Ok(None) => break false,
-                Err(Deaf) => break true,
+                Err(StdinClosed) => break true,
             }
         };
         // At the gun the trigger goes on; a recording has nobody who could.
@@ -268,11 +268,11 @@ impl<'a> Loop<'a> {
         let _ = self.pictures.try_send((self.guided.wizard.look(), frame));
     }
 
-    /// What is gathered on devices is a recording, so that it can be solved again.
+    /// Records the devices' events, so that they can be solved again.
     fn record(&mut self, events: &[Event]) -> Result<()> {
         let Source::Devices { settings, data, .. } = &self.source else { return Ok(()) };
         let step = self.guided.wizard.step();
-        if step == Step::Gather && self.recorder.is_none() && !self.cannot_record {
+        if step == WizardStep::Gather && self.recorder.is_none() && !self.cannot_record {
             let task = self.guided.wizard.task();
             let options = recording_in(data, &format!("calibrate-{}", task.command()), settings);
             match Recorder::start(&options) {
@@ -286,7 +286,7 @@ impl<'a> Loop<'a> {
                     self.cannot_record = true;
                 }
             }
-        } else if matches!(step, Step::Choose | Step::Saved | Step::Over)
+        } else if matches!(step, WizardStep::Choose | WizardStep::Saved | WizardStep::Over)
             && let Some(recorder) = self.recorder.take()
         {
             let lost = recorder.lost();
@@ -321,8 +321,8 @@ impl<'a> Loop<'a> {
 }
 
 /// Looks at pictures in a thread of its own, which ends when no more can come.
-fn watch(mut eyes: Eyes) -> Result<Watched> {
-    let (pictures, incoming) = bounded::<(Look, CameraFrame)>(PICTURES);
+fn watch(mut eyes: Detector) -> Result<Watched> {
+    let (pictures, incoming) = bounded::<(DetectorMode, CameraFrame)>(PICTURES);
     let (told, findings) = unbounded();
     thread::Builder::new()
         .name("eyes".to_owned())

@@ -6,16 +6,15 @@ mod live;
 mod player;
 mod replay;
 mod screen;
-mod teller;
+mod terminal;
 
 use std::path::PathBuf;
 
 use anyhow::Result;
 use bowwave_calibration::{
     CalibrationFile, Date,
-    page::page,
-    sheet::Sheet,
-    wizard::{Eyes, Found, Input, Setup, Step, Task, Wizard},
+    report::{CalibrationReport, html},
+    wizard::{Detector, Input, Setup, Task, Wizard, WizardSolution, WizardStep},
 };
 use bowwave_core::event::Event;
 
@@ -60,8 +59,8 @@ impl Guided {
             range_m: arguments.range,
         };
         let task = arguments.task.map(|task| match task {
-            WizardTask::Camera => Task::Lens,
-            WizardTask::Imu => Task::Alignment,
+            WizardTask::Intrinsics => Task::Lens,
+            WizardTask::Extrinsics => Task::Alignment,
             WizardTask::Boresight => Task::Boresight,
             WizardTask::Trigger => Task::Trigger,
         });
@@ -78,8 +77,8 @@ impl Guided {
         })
     }
 
-    fn eyes(&self, arguments: &CalibrateWizard) -> Eyes {
-        Eyes::new(self.wizard.calibration(), self.eye_height_m, arguments.target, self.tag)
+    fn eyes(&self, arguments: &CalibrateWizard) -> Detector {
+        Detector::new(self.wizard.calibration(), self.eye_height_m, arguments.target, self.tag)
             .with_mask(self.file.own_ship_mask())
     }
 
@@ -97,7 +96,7 @@ impl Guided {
     }
 
     /// Writes what was found, and tells the wizard.
-    fn save(&mut self, found: &Found) {
+    fn save(&mut self, found: &WizardSolution) {
         let mut file = self.file.clone();
         found.write_into(&mut file, self.today);
         let written = match &self.out {
@@ -115,9 +114,11 @@ impl Guided {
     }
 
     /// Shows a result as a page, where that is wanted.
-    fn report(&self, sheet: &Sheet) {
-        let Some(path) = self.report.as_ref().filter(|_| self.wizard.step() == Step::Result) else { return };
-        if let Err(e) = std::fs::write(path, page(sheet)) {
+    fn report(&self, report: &CalibrationReport) {
+        let Some(path) = self.report.as_ref().filter(|_| self.wizard.step() == WizardStep::Result) else {
+            return;
+        };
+        if let Err(e) = std::fs::write(path, html(report)) {
             log::error!("cannot write {}: {e}; check the folder and its permissions", path.display());
         }
     }

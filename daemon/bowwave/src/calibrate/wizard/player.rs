@@ -10,14 +10,14 @@ use bowwave_core::{event::Event, time::Time};
 use bowwave_devices::clock::{now, sleep_until};
 use crossbeam_channel::{Receiver, bounded};
 
-use crate::calibrate::material::open;
+use crate::calibrate::input::open;
 
 /// Events played ahead: more than a unit of 1000 Hz sends between two looks, with few pictures among them.
 const AHEAD: usize = 64;
 
 /// A recording that is being played. Nobody takes its events while the wizard waits for a key: it stands still meanwhile.
 pub struct Player {
-    /// What the devices said; closed at the end.
+    /// Events of the devices; closed at the end.
     pub events: Receiver<Event>,
     thread: JoinHandle<Result<bool>>,
 }

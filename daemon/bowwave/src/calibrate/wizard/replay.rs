@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use bowwave_calibration::wizard::{Ask, Input, Key, Step};
+use bowwave_calibration::wizard::{Ask, Input, Key, WizardStep};
 use bowwave_core::event::Event;
 
-use super::{Guided, live, player::Player, teller::Teller};
-use crate::{calibrate::material::open, cli::CalibrateWizard, outcome::Outcome};
+use super::{Guided, live, player::Player, terminal::TerminalUi};
+use crate::{calibrate::input::open, cli::CalibrateWizard, outcome::Outcome};
 
 /// Runs on a recording: at its own pace, or as fast as it goes.
 pub fn run(recording: &Path, arguments: &CalibrateWizard) -> Result<Outcome> {
@@ -25,9 +25,9 @@ pub fn run(recording: &Path, arguments: &CalibrateWizard) -> Result<Outcome> {
 
 /// Without a clock, and keys only where one is waited for: the same recording and keys give the same pages.
 fn fast(mut guided: Guided, player: Player, arguments: &CalibrateWizard) -> Result<Outcome> {
-    let mut teller = Teller::new();
+    let mut teller = TerminalUi::new();
     let mut eyes = guided.eyes(arguments);
-    while guided.wizard.step() != Step::Over {
+    while guided.wizard.step() != WizardStep::Over {
         teller.show(&guided.wizard.guide())?;
         if teller.is_interrupted() {
             guided.wizard.take(Input::Key(Key::Quit));
@@ -35,9 +35,9 @@ fn fast(mut guided: Guided, player: Player, arguments: &CalibrateWizard) -> Resu
             match ask {
                 Ask::Solve(work) => {
                     let solved = work.run();
-                    let sheet = solved.sheet.clone();
+                    let report = solved.report.clone();
                     guided.wizard.take(Input::Solved(Box::new(solved)));
-                    guided.report(&sheet);
+                    guided.report(&report);
                 }
                 Ask::Save(found) => {
                     guided.save(&found);

@@ -1,0 +1,391 @@
+//! The measurements as residuals, and how these depend on what is solved for.
+
+use std::collections::BTreeMap;
+
+use glam::{DMat3, DQuat, DVec3};
+use nalgebra::Vector3;
+
+use super::{
+    Options,
+    filter::{Jacobian, ResidualKind, ResidualRow, UnknownsStep, place},
+    input::{GyroTrace, LeftOutCounts, Observation},
+    start::AlignmentStart,
+    track::{GyroTrack, TrackState},
+};
+use crate::solve::so3::{dvec, exp, log, matrix, vector};
+
+/// Cleaned measurements.
+#[derive(Clone, Debug)]
+pub(super) struct AlignmentProblem {
+    pub gyro: GyroTrace,
+    pub observations: Vec<Observation>,
+    /// Where up is in the unit's axes, at which second.
+    pub levels: Vec<(f64, DVec3)>,
+    pub options: Options,
+    pub left: LeftOutCounts,
+    /// Weak prior ([`known`]).
+    pub known: Option<AlignmentStart>,
+}
+
+/// Unknowns of the least-squares problem.
+#[derive(Clone, Debug)]
+pub(super) struct AlignmentUnknowns {
+    pub camera_from_imu: DQuat,
+    pub offset_s: f64,
+    pub bias: DVec3,
+    pub readout_s: f64,
+    /// Up in the reference.
+    pub up: DVec3,
+    /// Rotation from the first reading's frame to the reference, for each segment.
+    pub anchors: BTreeMap<TrackSegment, DQuat>,
+}
+
+/// Breaks of the gyro before, and the chain of orientations.
+type TrackSegment = (usize, u32);
+
+/// Standard deviation of a level by half a second of specific force, radians: a start, the scatter tells the rest.
+const LEVEL_SIGMA: f64 = 0.02;
+/// Standard deviation of the error that all levels share, radians: data sheets of units of the class (VN-100, MTi) state 5 mg of bias.
+const LEVEL_COMMON: f64 = 5e-3;
+
+impl AlignmentProblem {
+    pub(super) fn has_orientations(&self) -> bool {
+        self.observations.iter().any(|o| matches!(o, Observation::Orientation { .. }))
+    }
+
+    pub(super) fn has_ups(&self) -> bool {
+        self.observations.iter().any(|o| matches!(o, Observation::Up { .. }))
+    }
+
+    /// Of several chains, the one with most orientations: up in the reference is that in its own.
+    fn main_chain(&self) -> u32 {
+        let mut count = BTreeMap::<u32, usize>::new();
+        for o in &self.observations {
+            if let Observation::Orientation { chain, .. } = o {
+                *count.entry(*chain).or_default() += 1;
+            }
+        }
+        count.into_iter().max_by_key(|(_, n)| *n).map_or(0, |(chain, _)| chain)
+    }
+
+    /// Which parameters are solved for.
+    pub(super) fn active(&self) -> Vec<usize> {
+        let mut out: Vec<usize> = (0..7).collect();
+        if self.options.estimate_readout {
+            out.push(place::READOUT);
+        }
+        if self.has_ups() && self.has_orientations() {
+            out.extend([place::UP, place::UP + 1]);
+        }
+        out
+    }
+
+    /// Unknowns from a start: references are set by what was seen.
+    pub(super) fn unknowns(&self, start: &AlignmentStart) -> AlignmentUnknowns {
+        let mut unknowns = AlignmentUnknowns {
+            camera_from_imu: start.camera_from_imu,
+            offset_s: start.offset_s,
+            bias: start.bias,
+            readout_s: 0.0,
+            up: DVec3::Z,
+            anchors: BTreeMap::new(),
+        };
+        self.set_references(&mut unknowns);
+        unknowns
+    }
+
+    /// Anchors by the median of what was seen; up in the reference by the mean of the horizons.
+    fn set_references(&self, unknowns: &mut AlignmentUnknowns) {
+        let track = GyroTrack::new(&self.gyro, unknowns.bias);
+        let mut seen: BTreeMap<TrackSegment, Vec<DQuat>> = BTreeMap::new();
+        let mut ups: BTreeMap<TrackSegment, Vec<DVec3>> = BTreeMap::new();
+        let main = self.main_chain();
+        for o in &self.observations {
+            let Some(state) = self.state(&track, unknowns, o) else { continue };
+            let start_from_camera = state.start_from_imu * unknowns.camera_from_imu.inverse();
+            match o {
+                Observation::Orientation { reference_from_camera, chain, .. } => seen
+                    .entry((state.segment, *chain))
+                    .or_default()
+                    .push(*reference_from_camera * start_from_camera.inverse()),
+                Observation::Up { up_in_camera, .. } => {
+                    ups.entry((state.segment, main)).or_default().push(start_from_camera * *up_in_camera);
+                }
+            }
+        }
+        unknowns.anchors = seen.into_iter().map(|(k, all)| (k, median(&all))).collect();
+        let in_reference: DVec3 = ups
+            .iter()
+            .filter_map(|(k, all)| unknowns.anchors.get(k).map(|a| *a * all.iter().sum::<DVec3>()))
+            .sum();
+        unknowns.up = in_reference.try_normalize().unwrap_or(DVec3::Z);
+        for (key, all) in ups {
+            let level = all.iter().sum::<DVec3>().try_normalize().unwrap_or(DVec3::Z);
+            unknowns.anchors.entry(key).or_insert_with(|| DQuat::from_rotation_arc(level, unknowns.up));
+        }
+    }
+
+    fn state(
+        &self,
+        track: &GyroTrack<'_>,
+        unknowns: &AlignmentUnknowns,
+        o: &Observation,
+    ) -> Option<TrackState> {
+        let row = match o {
+            Observation::Orientation { row, .. } | Observation::Up { row, .. } => *row,
+        };
+        track.at(o.stamp().secs_since(self.gyro.epoch) + unknowns.offset_s + row * unknowns.readout_s)
+    }
+
+    /// Residuals in order of time.
+    pub(super) fn rows(&self, unknowns: &AlignmentUnknowns, weights: &Weights) -> Vec<ResidualRow> {
+        let track = GyroTrack::new(&self.gyro, unknowns.bias);
+        let main = self.main_chain();
+        let mut keys: BTreeMap<TrackSegment, usize> = BTreeMap::new();
+        for key in unknowns.anchors.keys() {
+            let number = keys.len();
+            keys.insert(*key, number);
+        }
+        let place = |state: &TrackState, chain: u32| {
+            let key = (state.segment, chain);
+            Some((*unknowns.anchors.get(&key)?, *keys.get(&key)?))
+        };
+        let mut rows = Vec::with_capacity(self.observations.len() + self.levels.len());
+        for (index, o) in self.observations.iter().enumerate() {
+            let Some(state) = self.state(&track, unknowns, o) else { continue };
+            let chain = match o {
+                Observation::Orientation { chain, .. } => *chain,
+                Observation::Up { .. } => main,
+            };
+            if let Some((anchor, segment)) = place(&state, chain) {
+                let weight = weights.observations.get(index).copied().unwrap_or(1.0);
+                rows.push(observed(o, index, unknowns, &state, (anchor, segment), weight));
+            }
+        }
+        for (index, (time, up)) in self.levels.iter().enumerate() {
+            let Some(state) = track.at(*time) else { continue };
+            if let Some((anchor, segment)) = place(&state, main) {
+                let weight = weights.levels.get(index).copied().unwrap_or(1.0);
+                let mut row = levelled(*time, *up, index, unknowns, &state, (anchor, segment), weight);
+                row.common = LEVEL_COMMON * (self.levels.len() as f64).sqrt();
+                rows.push(row);
+            }
+        }
+        if let Some(start) = &self.known {
+            rows.extend(known(start, unknowns));
+        }
+        rows.sort_by(|a, b| a.time.total_cmp(&b.time));
+        rows
+    }
+}
+
+/// How roughly a start is known, for those of its numbers that the recording does not tell: 0.1 rad, 0.1 s, 0.01 rad/s (by as much biases
+/// change from day to day). That the filter lets every segment begin anywhere adds a twentieth to these.
+pub(super) const KNOWN_SIGMA: f64 = 0.1;
+const KNOWN_BIAS: f64 = 0.01;
+
+/// Rotation, offset and bias as if each had been seen once, each in a segment of its own that no observation has.
+fn known(start: &AlignmentStart, unknowns: &AlignmentUnknowns) -> [ResidualRow; 3] {
+    let row = |number: usize, residual: Vector3<f64>, jacobian: Jacobian| ResidualRow {
+        time: f64::MIN,
+        kind: ResidualKind::Known,
+        index: number,
+        residual,
+        jacobian,
+        speed: Vector3::zeros(),
+        blind: None,
+        sigma: KNOWN_SIGMA,
+        common: 0.0,
+        weight: 1.0,
+        segment: usize::MAX - number,
+    };
+    let mut by = [Jacobian::zeros(); 3];
+    by[0].fixed_columns_mut::<3>(place::ROTATION).fill_with_identity();
+    by[1][(0, place::OFFSET)] = 1.0;
+    by[2].fixed_columns_mut::<3>(place::BIAS).fill_diagonal(KNOWN_SIGMA / KNOWN_BIAS);
+    let turn = log(unknowns.camera_from_imu * start.camera_from_imu.inverse());
+    let offset = Vector3::new(unknowns.offset_s - start.offset_s, 0.0, 0.0);
+    [row(0, vector(turn), by[0]), row(1, offset, by[1]), row(2, vector(unknowns.bias - start.bias), by[2])]
+}
+
+/// Of each observation and level.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Weights {
+    pub observations: Vec<f64>,
+    pub levels: Vec<f64>,
+}
+
+impl Weights {
+    /// One row's own.
+    pub(super) fn set(&mut self, row: &ResidualRow, weight: f64) {
+        let (list, index) = match row.kind {
+            ResidualKind::Level => (&mut self.levels, row.index),
+            ResidualKind::Orientation | ResidualKind::Up => (&mut self.observations, row.index),
+            ResidualKind::Known => return,
+        };
+        if list.len() <= index {
+            list.resize(index + 1, 1.0);
+        }
+        list[index] = weight;
+    }
+}
+
+/// Derivatives that all residuals share: how the prediction `reference_from_imu` turns with the gyro's errors and time.
+fn by_gyro(state: &TrackState, anchor: DQuat, jacobian: &mut Jacobian) -> Vector3<f64> {
+    let turned = DMat3::from_quat(anchor);
+    jacobian.fixed_columns_mut::<3>(place::BIAS).copy_from(&matrix(turned * state.by_bias));
+    jacobian.fixed_columns_mut::<3>(place::SCALE).copy_from(&-matrix(turned * state.by_scale));
+    -vector(anchor * (state.start_from_imu * state.rate))
+}
+
+/// Two directions across `up`.
+fn across(up: DVec3) -> (Vector3<f64>, Vector3<f64>) {
+    let a = up.any_orthonormal_vector();
+    (vector(a), vector(up.cross(a)))
+}
+
+/// A residual about the directions across `up` only.
+fn flatten(row: &mut ResidualRow, up: DVec3) {
+    let blind = vector(up);
+    let keep = nalgebra::Matrix3::identity() - blind * blind.transpose();
+    row.residual = keep * row.residual;
+    row.jacobian = keep * row.jacobian;
+    row.speed = keep * row.speed;
+    let (a, b) = across(up);
+    row.jacobian.set_column(place::UP, &a);
+    row.jacobian.set_column(place::UP + 1, &b);
+    row.blind = Some(blind);
+}
+
+fn observed(
+    o: &Observation,
+    index: usize,
+    unknowns: &AlignmentUnknowns,
+    state: &TrackState,
+    (anchor, segment): (DQuat, usize),
+    weight: f64,
+) -> ResidualRow {
+    let predicted = anchor * state.start_from_imu * unknowns.camera_from_imu.inverse();
+    let mut jacobian = Jacobian::zeros();
+    let speed = by_gyro(state, anchor, &mut jacobian);
+    jacobian.fixed_columns_mut::<3>(place::ROTATION).copy_from(&matrix(DMat3::from_quat(predicted)));
+    jacobian.set_column(place::OFFSET, &speed);
+    let (sigma, line) = match o {
+        Observation::Orientation { sigma, row, .. } | Observation::Up { sigma, row, .. } => (*sigma, *row),
+    };
+    jacobian.set_column(place::READOUT, &(speed * line));
+    let mut row = ResidualRow {
+        time: state.time,
+        kind: ResidualKind::Orientation,
+        index,
+        residual: Vector3::zeros(),
+        jacobian,
+        speed,
+        blind: None,
+        sigma,
+        common: 0.0,
+        weight,
+        segment,
+    };
+    match o {
+        Observation::Orientation { reference_from_camera, .. } => {
+            row.residual = vector(log(*reference_from_camera * predicted.inverse()));
+        }
+        Observation::Up { up_in_camera, .. } => {
+            row.kind = ResidualKind::Up;
+            row.residual = vector(arc(predicted * *up_in_camera, unknowns.up));
+            flatten(&mut row, unknowns.up);
+        }
+    }
+    row
+}
+
+fn levelled(
+    time: f64,
+    up: DVec3,
+    index: usize,
+    unknowns: &AlignmentUnknowns,
+    state: &TrackState,
+    (anchor, segment): (DQuat, usize),
+    weight: f64,
+) -> ResidualRow {
+    let mut jacobian = Jacobian::zeros();
+    let speed = by_gyro(state, anchor, &mut jacobian);
+    let residual = vector(arc(anchor * (state.start_from_imu * up), unknowns.up));
+    let kind = ResidualKind::Level;
+    let mut row = ResidualRow {
+        time,
+        kind,
+        index,
+        residual,
+        jacobian,
+        speed,
+        blind: None,
+        sigma: LEVEL_SIGMA,
+        common: 0.0,
+        weight,
+        segment,
+    };
+    flatten(&mut row, unknowns.up);
+    row
+}
+
+/// Rotation vector of the shortest way from one unit vector to another.
+fn arc(from: DVec3, to: DVec3) -> DVec3 {
+    let cross = from.cross(to);
+    let sin = cross.length();
+    if sin < 1e-12 { cross } else { cross * (sin.atan2(from.dot(to)) / sin) }
+}
+
+/// The rotation with the least sum of angles to all (Weiszfeld's iteration on rotations; Hartley, Aftab & Trumpf 2011), which a
+/// minority of wild ones does not move.
+fn median(all: &[DQuat]) -> DQuat {
+    let spread = |q: DQuat| all.iter().map(|o| log(*o * q.inverse()).length()).sum::<f64>();
+    let stride = (all.len() / 15).max(1);
+    let best = all.iter().step_by(stride).min_by(|a, b| spread(**a).total_cmp(&spread(**b)));
+    let mut q = best.copied().unwrap_or(DQuat::IDENTITY);
+    for _ in 0..12 {
+        let (sum, weight) = all.iter().fold((DVec3::ZERO, 0.0), |(s, n), o| {
+            let off = log(*o * q.inverse());
+            let w = 1.0 / off.length().max(1e-4);
+            (s + off * w, n + w)
+        });
+        q = (exp(sum / weight) * q).normalize();
+    }
+    q
+}
+
+impl AlignmentUnknowns {
+    /// The unknowns after a step of the parameters.
+    pub(super) fn plus(&self, step: &UnknownsStep) -> Self {
+        let three = |i: usize| DVec3::new(step[i], step[i + 1], step[i + 2]);
+        let (a, b) = across(self.up);
+        let tilt = dvec(&(a * step[place::UP] + b * step[place::UP + 1]));
+        Self {
+            camera_from_imu: (exp(three(place::ROTATION)) * self.camera_from_imu).normalize(),
+            offset_s: self.offset_s + step[place::OFFSET],
+            bias: self.bias + three(place::BIAS),
+            readout_s: self.readout_s + step[place::READOUT],
+            // A residual takes the prediction to `up`: its growth by a turn of up is that turn.
+            up: (exp(tilt) * self.up).normalize(),
+            anchors: self.anchors.clone(),
+        }
+    }
+
+    /// Turns each segment's reference by what is left of its residuals in the (weighted) mean, so that they stay small.
+    pub(super) fn settle(&mut self, rows: &[ResidualRow]) {
+        let mut sums: BTreeMap<usize, (Vector3<f64>, f64)> = BTreeMap::new();
+        for row in rows.iter().filter(|r| r.kind.is_seen()) {
+            let (sum, weight) = sums.entry(row.segment).or_insert((Vector3::zeros(), 0.0));
+            // Residuals of half a turn are outliers that were not yet found out.
+            let w = row.weight / row.residual.norm().max(0.05);
+            *sum += row.residual * w;
+            *weight += w;
+        }
+        for (number, anchor) in self.anchors.values_mut().enumerate() {
+            if let Some((sum, weight)) = sums.get(&number) {
+                *anchor = (exp(dvec(&(sum / *weight))) * *anchor).normalize();
+            }
+        }
+    }
+}

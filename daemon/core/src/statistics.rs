@@ -1,0 +1,25 @@
+//! Order statistics.
+
+/// The value below which `share` of those that are numbers lie, between neighbours by a line; zero of nothing.
+pub fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
+    let mut all: Vec<f64> = values.filter(|v| v.is_finite()).collect();
+    all.sort_by(f64::total_cmp);
+    let place = share.clamp(0.0, 1.0) * all.len().saturating_sub(1) as f64;
+    let (low, high) = (place.floor() as usize, place.ceil() as usize);
+    match (all.get(low), all.get(high)) {
+        (Some(a), Some(b)) => a + (b - a) * place.fract(),
+        _ => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantile;
+
+    #[test]
+    fn between_neighbours_by_a_line() {
+        let of = |share| quantile([3.0, f64::NAN, 1.0, 2.0, 4.0].into_iter(), share);
+        assert_eq!([of(0.0), of(0.5), of(1.0), of(0.1)], [1.0, 2.5, 4.0, 1.3]);
+        assert_eq!(quantile([].into_iter(), 0.5), 0.0);
+    }
+}
