@@ -21,21 +21,9 @@ use crate::{
     rolling_shutter::{RollingMeasurements, RollingShutter},
 };
 
-/// Errors that all horizons of a recording share, one standard deviation: refraction, by 0.08 to 0.12 deg in daytime, radians...
-const REFRACTION: f64 = 0.1f64.to_radians();
-/// ...and where in its haze the edge is found, pixels.
-const EDGE_PX: f64 = 0.5;
-/// Pictures with a board from which on horizons are not needed to tell the rotation.
-const BOARDS_ENOUGH: usize = 30;
 /// Most readings and observations that are taken: half an hour at 1000 readings and 60 pictures a second.
 const READINGS_MOST: usize = 1_800_000;
 const OBSERVATIONS_MOST: usize = 108_000;
-
-/// Corners of boards that are kept at most: half an hour of the usual board, 128 MB.
-const CORNERS_MOST: usize = 4_000_000;
-
-/// Rounds of putting pictures right that are read row by row and solving anew.
-const ROUNDS: usize = 2;
 
 /// How long the camera reads a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -245,6 +233,8 @@ impl Capture {
 
     /// Takes in what a picture told.
     pub fn see(&mut self, seen: &PictureSeen) {
+        /// Corners of boards that are kept at most: half an hour of the usual board, 128 MB.
+        const CORNERS_MOST: usize = 4_000_000;
         if !seen.fits {
             self.counts.other_size += 1;
             return;
@@ -314,6 +304,10 @@ impl Capture {
 
     /// Standard deviation of the error of elevation that all horizons share, radians: no recording tells it.
     pub fn horizon_sigma(&self) -> f64 {
+        /// Errors that all horizons of a recording share, one standard deviation: refraction, by 0.08 to 0.12 deg in daytime, radians...
+        const REFRACTION: f64 = 0.1f64.to_radians();
+        /// ...and where in its haze the edge is found, pixels.
+        const EDGE_PX: f64 = 0.5;
         REFRACTION.hypot(EDGE_PX / self.lens.focal.y)
     }
 
@@ -334,6 +328,8 @@ impl Capture {
 
     /// Whether there is nothing, or too little, but horizons.
     pub const fn is_by_horizon(&self) -> bool {
+        /// Pictures with a board from which on horizons are not needed to tell the rotation.
+        const BOARDS_ENOUGH: usize = 30;
         self.counts.boards < BOARDS_ENOUGH
     }
 
@@ -351,6 +347,8 @@ impl Capture {
     /// # Errors
     /// As [`alignment::solve`].
     pub fn solve(&self) -> Result<Alignment, AlignmentError> {
+        /// Rounds of putting pictures right that are read row by row and solving anew.
+        const ROUNDS: usize = 2;
         let mut found = self.solve_from(&self.observations)?;
         let readout = match self.readout {
             Readout::Known(seconds) => (seconds != 0.0).then_some((seconds, None)),

@@ -17,28 +17,6 @@ use crate::{
     target::{OFF_MOST_PX, Oriented, SHEARED_MOST_PX, orient},
 };
 
-/// How far from the picture's middle the horizon's ends are taken, share of its width.
-const END: f64 = 0.4;
-/// Pictures farther apart do not tell how fast the camera moves past the board, seconds.
-const APART_MOST_S: f64 = 0.15;
-/// Readings so far before and after the read-out count as well, seconds.
-const BESIDE_S: f64 = 6e-3;
-/// Sweeps over the boards: each puts how fast they go past right, which a picture that is not straight shows wrong.
-const SWEEPS: usize = 3;
-/// Boards that are asked for the read-out: enough to tell it to some hundredths of a millisecond.
-const ASKED: usize = 150;
-/// Between the read-outs that are tried first, seconds, and the longest that is believed.
-const TRIED_S: f64 = 0.01;
-const LONGEST_S: f64 = 0.05;
-/// Fewer numbers than that tell none.
-const FREEDOM_LEAST: f64 = 400.0;
-/// A read-out counts from so many standard deviations and so many seconds on; known to less than this it is not known.
-const CERTAIN: f64 = 5.0;
-const LEAST_S: f64 = 0.5e-3;
-const SIGMA_MOST_S: f64 = 2e-3;
-/// Corners tell more than their model deserves: speeds are lines between pictures.
-const SIGMA_LEAST_S: f64 = 0.2e-3;
-
 /// Observations with the known alignment of camera and unit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RollingMeasurements<'a> {
@@ -92,6 +70,8 @@ impl<'a> RollingShutter<'a> {
 
     /// How the camera turns while a picture of that stamp is read: a line through the rates; `None` beyond the readings.
     fn turning(&self, stamp: Time, readout_s: f64) -> Option<Turning> {
+        /// Readings so far before and after the read-out count as well, seconds.
+        const BESIDE_S: f64 = 6e-3;
         let middle = stamp.plus_secs(self.seen.offset_s);
         let reach = 0.5 * readout_s.abs() + BESIDE_S;
         let first = self.rates.partition_point(|r| r.0 < middle.plus_secs(-reach));
@@ -127,6 +107,8 @@ impl<'a> RollingShutter<'a> {
 
     /// The horizon through its two ends, each turned to the middle row's time.
     fn horizon(&self, observation: &Observation, readout_s: f64) -> Option<Observation> {
+        /// How far from the picture's middle the horizon's ends are taken, share of its width.
+        const END: f64 = 0.4;
         let Observation::Up { stamp, up_in_camera: up, sigma, .. } = *observation else { return None };
         let still = self.seen.lens;
         let turning = self.turning(stamp, readout_s)?;
@@ -144,6 +126,8 @@ impl<'a> RollingShutter<'a> {
 
     /// Poses of every `stride`-th board as if each picture had been read at once, by the observation's number.
     fn boards(&self, readout_s: f64, stride: usize, most_px: f64) -> Vec<(usize, Oriented)> {
+        /// Sweeps over the boards: each puts how fast they go past right, which a picture that is not straight shows wrong.
+        const SWEEPS: usize = 3;
         let mut made = CorrectedBoards::new();
         let one = |i: usize| Some((self.seen.boards.get(i)?.0, self.board(i, readout_s, SWEEPS, &mut made)?));
         let all = (0..self.seen.boards.len()).step_by(stride.max(1)).filter_map(one);
@@ -191,6 +175,19 @@ impl<'a> RollingShutter<'a> {
     /// The read-out that leaves least of the boards' corners, and its standard deviation, seconds; `None` where it is not to be told from
     /// nothing, or not told well.
     pub(crate) fn readout(&self) -> Option<(f64, f64)> {
+        /// Boards that are asked for the read-out: enough to tell it to some hundredths of a millisecond.
+        const ASKED: usize = 150;
+        /// Between the read-outs that are tried first, seconds, and the longest that is believed.
+        const TRIED_S: f64 = 0.01;
+        const LONGEST_S: f64 = 0.05;
+        /// Fewer numbers than that tell none.
+        const FREEDOM_LEAST: f64 = 400.0;
+        /// A read-out counts from so many standard deviations and so many seconds on; known to less than this it is not known.
+        const CERTAIN: f64 = 5.0;
+        const LEAST_S: f64 = 0.5e-3;
+        const SIGMA_MOST_S: f64 = 2e-3;
+        /// Corners tell more than their model deserves: speeds are lines between pictures.
+        const SIGMA_LEAST_S: f64 = 0.2e-3;
         let stride = (self.seen.boards.len() / ASKED).max(1);
         let left = |seconds: f64| {
             let (squares, freedom) = self.left(seconds, stride);
@@ -232,6 +229,8 @@ fn plane(a: DVec3, b: DVec3, dip: f64, up: DVec3) -> Option<DVec3> {
 /// How fast a board at `place` moves past the camera beyond what its turn makes, camera's axes, m/s: by its places in the pictures before and
 /// after; nothing where these are too far off.
 fn past(turn: DVec3, place: DVec3, stamp: Time, around: [Option<(Time, DVec3)>; 2]) -> DVec3 {
+    /// Pictures farther apart do not tell how fast the camera moves past the board, seconds.
+    const APART_MOST_S: f64 = 0.15;
     let near = around.map(|b| b.filter(|b| b.0.secs_since(stamp).abs() < APART_MOST_S));
     let (from, to) = (near[0].unwrap_or((stamp, place)), near[1].unwrap_or((stamp, place)));
     let span = to.0.secs_since(from.0);
@@ -286,7 +285,7 @@ mod tests {
         all.step_by(5).filter_map(seen).collect()
     }
 
-    struct CorrectedBoards {
+    struct MadeBoards {
         recipe: Recipe,
         readings: Vec<ImuReading>,
         observations: Vec<Observation>,
@@ -294,7 +293,7 @@ mod tests {
         truth: Vec<DQuat>,
     }
 
-    fn made(readout_s: f64) -> CorrectedBoards {
+    fn made(readout_s: f64) -> MadeBoards {
         let (recipe, mut random) = (recipe(readout_s), Random::new(8));
         let lens = Lens::pinhole(1280, 720, 1.2);
         let (mut observations, mut boards, mut truth) = (Vec::new(), Vec::new(), Vec::new());
@@ -312,10 +311,10 @@ mod tests {
             });
             truth.push(poses(&recipe, &[at])[0].camera_from_board.inverse());
         }
-        CorrectedBoards { recipe, readings: recipe.record().readings, observations, boards, truth }
+        MadeBoards { recipe, readings: recipe.record().readings, observations, boards, truth }
     }
 
-    impl CorrectedBoards {
+    impl MadeBoards {
         fn rows(&self) -> RollingShutter<'_> {
             RollingShutter::new(RollingMeasurements {
                 lens: Lens::pinhole(1280, 720, 1.2),

@@ -30,11 +30,11 @@ pub enum Motion {
 }
 
 /// Amplitude in radians and band in hertz of one angle.
-type Band = (f64, f64, f64);
+type SineBand = (f64, f64, f64);
 
 impl Motion {
     /// Traverse, elevation, roll.
-    fn bands(self) -> [Band; 3] {
+    fn bands(self) -> [SineBand; 3] {
         let deg = |d: f64, low: f64, high: f64| (d.to_radians(), low, high);
         let none = (0.0, 0.1, 0.2);
         match self {

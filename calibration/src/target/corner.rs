@@ -31,20 +31,6 @@ impl Refinement {
 /// Least window, and the largest while a corner is approached, pixels.
 const REACH_MIN: f64 = 2.0;
 const APPROACH_PX: f64 = 8.0;
-/// The window by the tag's smallest height: within two modules of ten and three of gap there is nothing but the corner.
-const REACH_SHARE: f64 = 0.13;
-/// How far the corner may be from where it was expected, by the tag's smallest height, and pixels more.
-const OFF_SHARE: f64 = 0.1;
-const OFF_PX: f64 = 1.0;
-/// Least correlation of the window with itself turned by half a turn: what covers a corner, or glare, is not symmetric.
-const LIKENESS: f64 = 0.9;
-/// Half the widths of the edges, sharp and blurred, whose crossings a corner is held against, by the window's reach...
-const SOFT: [f64; 3] = [0.2, 0.5, 1.0];
-/// ...and its least correlation with the best of them. At 0.95 boards that are tilted by 60 degrees, edges askew, lose six tags of ten, at 0.9
-/// none; with rectangles over the board it takes nearly all corners more than two pixels off.
-const CROSSING: f64 = 0.9;
-/// Least of the smaller by the larger spread of edge directions: one edge alone is no corner.
-const EDGES: f64 = 0.04;
 
 /// Pixels around a place, sampled between pixels.
 struct CornerPatch {
@@ -106,6 +92,8 @@ impl CornerSums {
     }
 
     fn solve(&self) -> Option<DVec2> {
+        /// Least of the smaller by the larger spread of edge directions: one edge alone is no corner.
+        const EDGES: f64 = 0.04;
         let det = self.xx * self.yy - self.xy * self.xy;
         let mean = 0.5 * (self.xx + self.yy);
         // The eigenvalues' ratio, from their sum and product.
@@ -123,6 +111,8 @@ impl CornerSums {
 
 /// Half the side of the window about a corner of a tag of that height, `most` at most, pixels.
 fn window(tag_px: f64, most: f64) -> i32 {
+    /// The window by the tag's smallest height: within two modules of ten and three of gap there is nothing but the corner.
+    const REACH_SHARE: f64 = 0.13;
     (REACH_SHARE * tag_px).min(most).max(REACH_MIN).round() as i32
 }
 
@@ -154,6 +144,11 @@ fn towards_symmetry(plane: &Plane, place: DVec2, reach: i32) -> Option<(DVec2, f
 
 /// Whether the edges that cross at `place` run along `sides`: what covers a corner makes others with the tag's.
 pub(super) fn crosses(plane: &Plane, place: DVec2, sides: [DVec2; 2], tag_px: f64, by: Refinement) -> bool {
+    /// Half the widths of the edges, sharp and blurred, whose crossings a corner is held against, by the window's reach...
+    const SOFT: [f64; 3] = [0.2, 0.5, 1.0];
+    /// ...and its least correlation with the best of them. At 0.95 boards that are tilted by 60 degrees, edges askew, lose six tags of ten, at 0.9
+    /// none; with rectangles over the board it takes nearly all corners more than two pixels off.
+    const CROSSING: f64 = 0.9;
     let reach = window(tag_px, by.reach_px());
     let patch = CornerPatch::around(plane, place, reach);
     let mean = patch.mean();
@@ -182,6 +177,11 @@ pub(super) fn crosses(plane: &Plane, place: DVec2, sides: [DVec2; 2], tag_px: f6
 
 /// The corner near `start`, pixels of this plane, of a tag whose smallest height is `tag_px` there; `None` where there is none.
 pub(super) fn refine(plane: &Plane, start: DVec2, tag_px: f64, by: Refinement) -> Option<DVec2> {
+    /// How far the corner may be from where it was expected, by the tag's smallest height, and pixels more.
+    const OFF_SHARE: f64 = 0.1;
+    const OFF_PX: f64 = 1.0;
+    /// Least correlation of the window with itself turned by half a turn: what covers a corner, or glare, is not symmetric.
+    const LIKENESS: f64 = 0.9;
     let off_max = OFF_SHARE * tag_px + OFF_PX;
     let reach = window(tag_px, APPROACH_PX);
     let fine = |p: DVec2| plane.surrounds(p, f64::from(reach) + 1.0) && p.distance(start) <= off_max;

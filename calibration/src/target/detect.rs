@@ -16,21 +16,11 @@ use super::{
 };
 use crate::lens::{BoardView, Corner};
 
-/// Smallest side of a picture of the pyramid, pixels.
-const LEAST_PX: usize = 100;
-/// Side of a tag where the search for its corners begins, pixels.
-const BEGIN_PX: f64 = 24.0;
-/// How far the nearest corner of a tag may be from where another tag expects it: by its least height and the distance between them in
-/// tags, and pixels more.
-const APART: f64 = 0.3;
-const APART_PX: f64 = 1.0;
 /// How far any corner may be from the middle of what the nearest other tags expect: by the tag's least height and the distance in tags,
 /// and pixels more; or by the median of the other tags, where the lens bends the board.
 const STRAY: f64 = 0.1;
 const STRAY_PX: f64 = 0.7;
 const STRAY_MEDIANS: f64 = 4.0;
-/// No lens bends it so far, in times of what is allowed: of few tags, wrong ones would make a large median.
-const STRAY_MOST: f64 = 2.5;
 
 /// A tag in a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +39,8 @@ struct TagPyramid {
 
 impl TagPyramid {
     fn new(picture: &Grey, by: Refinement) -> Self {
+        /// Smallest side of a picture of the pyramid, pixels.
+        const LEAST_PX: usize = 100;
         let mut planes = vec![Plane::smoothed(picture)];
         while let Some(last) = planes.last().filter(|p| p.width.min(p.height) >= 2 * LEAST_PX) {
             planes.push(last.halved());
@@ -81,6 +73,8 @@ impl TagPyramid {
 
     /// Where the search for the corners of a tag of that size begins.
     fn level_for(&self, tag_px: f64) -> usize {
+        /// Side of a tag where the search for its corners begins, pixels.
+        const BEGIN_PX: f64 = 24.0;
         ((tag_px / BEGIN_PX).log2().max(0.0) as usize).min(self.planes.len() - 1)
     }
 
@@ -162,6 +156,10 @@ fn beyond(target: &Target, id: usize, place: DVec2) -> f64 {
 
 /// Whether two tags beside each other on the board stand in the picture as the board says.
 fn agree(target: &Target, (a, one): (usize, &Quad), (b, other): (usize, &Quad)) -> bool {
+    /// How far the nearest corner of a tag may be from where another tag expects it: by its least height and the distance between them in
+    /// tags, and pixels more.
+    const APART: f64 = 0.3;
+    const APART_PX: f64 = 1.0;
     let Some(expected) = TagView::of(one).and_then(|s| s.expected(target, a, b)) else { return false };
     let away = target.corners(b).map(|place| beyond(target, a, place));
     let nearest = (0..4).min_by(|i, k| away[*i].total_cmp(&away[*k])).unwrap_or(0);
@@ -242,6 +240,8 @@ fn stray(target: &Target, found: &BTreeMap<usize, Quad>, id: usize) -> f64 {
 /// Drops tags whose corners are not where their neighbours expect them, the worst one first: it may be what spoils the others, so these are
 /// judged without it.
 fn settle(target: &Target, found: &mut BTreeMap<usize, Quad>) {
+    /// No lens bends it so far, in times of what is allowed: of few tags, wrong ones would make a large median.
+    const STRAY_MOST: f64 = 2.5;
     let strays = |found: &BTreeMap<usize, Quad>| -> Vec<(usize, f64)> {
         found.keys().map(|id| (*id, stray(target, found, *id))).collect()
     };

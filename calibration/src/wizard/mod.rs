@@ -142,7 +142,7 @@ pub enum WizardStep {
 
 /// Settings of the wizard.
 #[derive(Clone, Debug)]
-pub struct Setup {
+pub struct WizardSetup {
     /// The calibration that is begun with.
     pub calibration: Calibration,
     /// Height of the camera above the sea, metres.
@@ -153,7 +153,7 @@ pub struct Setup {
     pub range_m: Option<f64>,
 }
 
-impl Setup {
+impl WizardSetup {
     /// Nothing gathered yet. A read-out that is known is taken as it is, else boards tell it.
     fn capture(&self) -> Capture {
         let Calibration { lens, readout_ns, .. } = &self.calibration;
@@ -170,7 +170,7 @@ const MEASURED_AFTER_S: f64 = 3.0;
 /// The guided calibration.
 #[derive(Debug)]
 pub struct Wizard {
-    setup: Setup,
+    setup: WizardSetup,
     step: WizardStep,
     /// When the step began.
     since: Time,
@@ -197,7 +197,7 @@ pub struct Wizard {
 
 impl Wizard {
     /// Begins with the choice of a task, or with one.
-    pub fn new(setup: Setup, task: Option<Task>) -> Self {
+    pub fn new(setup: WizardSetup, task: Option<Task>) -> Self {
         let first = if setup.target.is_some() { Task::Lens } else { Task::Alignment };
         let mut wizard = Self {
             step: WizardStep::Choose,

@@ -12,9 +12,9 @@ use crate::{
     solve::so3::exp,
 };
 
-fn setup() -> Setup {
+fn setup() -> WizardSetup {
     let calibration = parse(include_str!("../../examples/mount.toml"), "mount.toml").unwrap().calibration;
-    Setup { calibration, eye_height_m: 10.0, target: Some(Target::A4), range_m: Some(40.0) }
+    WizardSetup { calibration, eye_height_m: 10.0, target: Some(Target::A4), range_m: Some(40.0) }
 }
 
 /// Events of a simulated recording in the order of arrival: with the board or with the horizon.
@@ -343,14 +343,14 @@ fn the_lens_is_found_while_the_board_is_led_over_the_picture() {
 
 #[test]
 fn what_cannot_be_begun_says_why() {
-    let bare = Setup { target: None, range_m: None, ..setup() };
+    let bare = WizardSetup { target: None, range_m: None, ..setup() };
     let mut wizard = Wizard::new(bare.clone(), Some(Task::Lens));
     assert_eq!(wizard.step(), WizardStep::Choose);
     assert!(wizard.guide().problem.unwrap().contains("--target"));
     press(&mut wizard, Key::Pick(Task::Boresight));
     press(&mut wizard, Key::Next);
     assert_eq!(wizard.step(), WizardStep::Choose);
-    let with_board = Setup { target: Some(Target::A4), ..bare };
+    let with_board = WizardSetup { target: Some(Target::A4), ..bare };
     let mut wizard = Wizard::new(with_board, Some(Task::Boresight));
     assert!(wizard.guide().problem.unwrap().contains("--range"));
     assert_eq!(press(&mut wizard, Key::Next), None);
@@ -463,7 +463,7 @@ proptest! {
 /// A frame's own type is not needed here but by [`Detector`].
 #[test]
 fn eyes_find_only_what_is_looked_for() {
-    let Setup { calibration, target, .. } = setup();
+    let WizardSetup { calibration, target, .. } = setup();
     let (width, height) = (calibration.lens.width, calibration.lens.height);
     let picture =
         bowwave_core::event::Picture::black(bowwave_core::event::PixelFormat::Rgb, width, height).unwrap();

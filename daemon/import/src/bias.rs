@@ -7,7 +7,7 @@ use crate::ImportError;
 
 /// A gyro's bias, measured at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Bias {
+pub struct GyroBias {
     /// To be subtracted from the rates, rad/s in the unit's axes.
     pub rate: DVec3,
     /// Standard deviation, rad/s.
@@ -43,7 +43,7 @@ pub(crate) const BIAS_MAX: f64 = 10.0 * std::f64::consts::PI / 180.0;
 pub(crate) const SIGMA_MIN: f64 = 0.001 * std::f64::consts::PI / 180.0;
 
 /// The mean rate over the first `seconds` of `samples`, with the standard error that the scatter of half-second means gives.
-pub(crate) fn at_rest(samples: &[ImuSample], seconds: f64) -> Result<Bias, ImportError> {
+pub(crate) fn at_rest(samples: &[ImuSample], seconds: f64) -> Result<GyroBias, ImportError> {
     let fail = |what: String| ImportError::Bias { seconds, what };
     if !(seconds >= BLOCK_S * BLOCKS_MIN as f64 && seconds <= 3600.0) {
         return Err(fail(format!("the span must be {} s to an hour", BLOCK_S * BLOCKS_MIN as f64)));
@@ -75,7 +75,7 @@ pub(crate) fn at_rest(samples: &[ImuSample], seconds: f64) -> Result<Bias, Impor
         let degrees = rate.abs().max_element().to_degrees();
         return Err(fail(format!("the camera was turning at {degrees:.1} deg/s")));
     }
-    Ok(Bias {
+    Ok(GyroBias {
         rate,
         sigma: (scatter / n.sqrt()).max(DVec3::splat(SIGMA_MIN)),
         seconds,
@@ -85,7 +85,7 @@ pub(crate) fn at_rest(samples: &[ImuSample], seconds: f64) -> Result<Bias, Impor
 
 #[cfg(test)]
 mod tests {
-    use super::{Bias, at_rest};
+    use super::{GyroBias, at_rest};
     use bowwave_core::{event::ImuSample, time::Time};
     use glam::DVec3;
 
@@ -105,7 +105,7 @@ mod tests {
     fn the_truth_is_within_the_stated_deviation() {
         let truth = DVec3::new(0.01, -0.02, 0.003);
         let wander = |t: f64| truth + DVec3::new((t * 1.7).sin(), (t * 2.3).cos(), (t * 40.0).sin()) * 0.002;
-        let Bias { rate, sigma, .. } = at_rest(&samples(20.0, wander), 10.0).unwrap();
+        let GyroBias { rate, sigma, .. } = at_rest(&samples(20.0, wander), 10.0).unwrap();
         let off = (rate - truth).abs();
         assert!(off.cmple(sigma * 3.0).all(), "{off} {sigma}");
         assert!(sigma.max_element() < 0.002 && sigma.min_element() > 1e-5, "{sigma}");

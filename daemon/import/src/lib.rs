@@ -27,7 +27,7 @@ mod telemetry;
 pub mod track;
 mod video;
 
-pub use bias::{Bias, BiasSource};
+pub use bias::{BiasSource, GyroBias};
 pub use error::ImportError;
 pub use options::{ImportOptions, ImportReport, Level, Progress, TelemetryReport};
 pub use output::assumed;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bowwave_calibration::{CalibrationFile, Date};
 
-use crate::Bias;
+use crate::GyroBias;
 
 /// Options of an import.
 #[derive(Clone, Debug)]
@@ -81,7 +81,7 @@ pub enum TelemetryReport {
         /// Gyro samples a second by the camera's clock.
         rate_hz: f64,
         /// The bias that was taken from the start of the video, where that was wanted.
-        bias: Option<Bias>,
+        bias: Option<GyroBias>,
     },
 }
 

@@ -12,7 +12,7 @@ use bowwave_core::{calibration::Calibration, geometry::Lens, time::Time};
 use bowwave_record::{CameraInfo, Entry, Properties, RecordingWriter, WrittenSummary};
 use glam::{DQuat, DVec2, DVec3};
 
-use crate::{Bias, BiasSource, ImportError, ImportOptions};
+use crate::{BiasSource, GyroBias, ImportError, ImportOptions};
 
 /// A recording under construction, beside its final place. Dropped before [`RecordingOutput::finish`], it goes away.
 pub(crate) struct RecordingOutput {
@@ -111,7 +111,7 @@ pub fn assumed((width, height): (u32, u32), options: &ImportOptions) -> Calibrat
 }
 
 /// Puts the bias that was just measured in place of the file's.
-pub(crate) fn set_bias(file: &mut CalibrationFile, bias: &Bias, options: &ImportOptions) {
+pub(crate) fn set_bias(file: &mut CalibrationFile, bias: &GyroBias, options: &ImportOptions) {
     file.calibration.gyro_bias = bias.rate;
     file.calibration.gyro_bias_sigma = bias.sigma;
     let how = match bias.source {

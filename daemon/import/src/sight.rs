@@ -9,7 +9,7 @@ use bowwave_core::{calibration::Calibration, event::ImuSample, time::Time};
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::{
-    Bias, BiasSource,
+    BiasSource, GyroBias,
     bias::{BIAS_MAX, SIGMA_MIN},
     gyro::GyroPath,
     track::{Gray, Tracker},
@@ -71,7 +71,11 @@ impl PatchWatch {
 
 /// The bias over the whole span of the sightings, with the standard error that the scatter of the biases of its single
 /// seconds gives; `None` where the pictures do not bear one.
-pub(crate) fn bias(samples: &[ImuSample], calibration: &Calibration, sightings: &Sightings) -> Option<Bias> {
+pub(crate) fn bias(
+    samples: &[ImuSample],
+    calibration: &Calibration,
+    sightings: &Sightings,
+) -> Option<GyroBias> {
     let (first, last) = (*sightings.times.first()?, *sightings.times.last()?);
     let seconds = last.secs_since(first);
     let parts = seconds.round() as usize;
@@ -89,7 +93,7 @@ pub(crate) fn bias(samples: &[ImuSample], calibration: &Calibration, sightings: 
     let sigma = DVec3::new(variance.x.sqrt(), variance.y.sqrt(), variance.z.sqrt()) / n.sqrt();
     let usable = sigma.is_finite() && rate.abs().max_element() <= BIAS_MAX;
     let source = BiasSource::Pictures { patches: sightings.tracks.len() };
-    usable.then(|| Bias { rate, sigma: sigma.max(DVec3::splat(SIGMA_MIN)), seconds, source })
+    usable.then(|| GyroBias { rate, sigma: sigma.max(DVec3::splat(SIGMA_MIN)), seconds, source })
 }
 
 /// Gauss and Newton over the three components of the bias.

@@ -7,7 +7,8 @@ use bowwave_record::{Entry, FrameEntry};
 use glam::{DQuat, DVec3};
 
 use crate::{
-    Bias, ImportError, ImportOptions, ImportReport, Level, Progress, START, Telemetry, TelemetryReport, bias,
+    GyroBias, ImportError, ImportOptions, ImportReport, Level, Progress, START, Telemetry, TelemetryReport,
+    bias,
     ffmpeg::{VideoFrame, VideoInfo, VideoReader, probe},
     gyro::GyroPath,
     output::{RecordingOutput, calibration_for, properties, refuse_existing, set_bias},
@@ -56,7 +57,7 @@ pub fn import_video(
 /// The video's gyro and what became of it.
 struct VideoGyro {
     telemetry: Option<Telemetry>,
-    bias: Option<Bias>,
+    bias: Option<GyroBias>,
     report: TelemetryReport,
 }
 
@@ -84,7 +85,7 @@ impl VideoGyro {
 }
 
 /// Gives every sample the attitude that the gyro leads to from a camera that was held like `level` at the first picture.
-fn orient(samples: &mut [ImuSample], options: &ImportOptions, bias: Option<&Bias>, level: Level) {
+fn orient(samples: &mut [ImuSample], options: &ImportOptions, bias: Option<&GyroBias>, level: Level) {
     let calibration = options.calibration.as_ref().map(|file| &file.calibration);
     let rate = bias.map_or_else(|| calibration.map_or(DVec3::ZERO, |c| c.gyro_bias), |b| b.rate);
     let camera_from_imu = calibration.map_or(DQuat::IDENTITY, |c| c.camera_from_imu);
@@ -104,7 +105,7 @@ fn find_bias(
     samples: &[ImuSample],
     seconds: f64,
     options: &ImportOptions,
-) -> Result<Bias, ImportError> {
+) -> Result<GyroBias, ImportError> {
     let rest = bias::at_rest(samples, seconds);
     let Some(file) = &options.calibration else { return rest };
     if let Err(ImportError::Bias { what, .. }) = &rest {

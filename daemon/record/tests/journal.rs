@@ -1,11 +1,6 @@
 //! The journal: what was shot is there, and files that are no journal are named and left alone.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot go on has failed"
-)]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a step that fails ends the test")]
 
 use std::{
     fs,

@@ -257,6 +257,31 @@ fn flatten(row: &mut ResidualRow, up: DVec3) {
     row.blind = Some(blind);
 }
 
+/// A row whose residual is to be filled in, with the derivatives that all share.
+fn begun(
+    time: f64,
+    index: usize,
+    state: &TrackState,
+    (anchor, segment): (DQuat, usize),
+    weight: f64,
+) -> ResidualRow {
+    let mut jacobian = Jacobian::zeros();
+    let speed = by_gyro(state, anchor, &mut jacobian);
+    ResidualRow {
+        time,
+        kind: ResidualKind::Level,
+        index,
+        residual: Vector3::zeros(),
+        jacobian,
+        speed,
+        blind: None,
+        sigma: LEVEL_SIGMA,
+        common: 0.0,
+        weight,
+        segment,
+    }
+}
+
 fn observed(
     o: &Observation,
     index: usize,
@@ -266,29 +291,18 @@ fn observed(
     weight: f64,
 ) -> ResidualRow {
     let predicted = anchor * state.start_from_imu * unknowns.camera_from_imu.inverse();
-    let mut jacobian = Jacobian::zeros();
-    let speed = by_gyro(state, anchor, &mut jacobian);
-    jacobian.fixed_columns_mut::<3>(place::ROTATION).copy_from(&matrix(DMat3::from_quat(predicted)));
-    jacobian.set_column(place::OFFSET, &speed);
+    let mut row = begun(state.time, index, state, (anchor, segment), weight);
+    let by_turn = matrix(DMat3::from_quat(predicted));
+    row.jacobian.fixed_columns_mut::<3>(place::ROTATION).copy_from(&by_turn);
+    row.jacobian.set_column(place::OFFSET, &row.speed);
     let (sigma, line) = match o {
         Observation::Orientation { sigma, row, .. } | Observation::Up { sigma, row, .. } => (*sigma, *row),
     };
-    jacobian.set_column(place::READOUT, &(speed * line));
-    let mut row = ResidualRow {
-        time: state.time,
-        kind: ResidualKind::Orientation,
-        index,
-        residual: Vector3::zeros(),
-        jacobian,
-        speed,
-        blind: None,
-        sigma,
-        common: 0.0,
-        weight,
-        segment,
-    };
+    row.sigma = sigma;
+    row.jacobian.set_column(place::READOUT, &(row.speed * line));
     match o {
         Observation::Orientation { reference_from_camera, .. } => {
+            row.kind = ResidualKind::Orientation;
             row.residual = vector(log(*reference_from_camera * predicted.inverse()));
         }
         Observation::Up { up_in_camera, .. } => {
@@ -309,23 +323,8 @@ fn levelled(
     (anchor, segment): (DQuat, usize),
     weight: f64,
 ) -> ResidualRow {
-    let mut jacobian = Jacobian::zeros();
-    let speed = by_gyro(state, anchor, &mut jacobian);
-    let residual = vector(arc(anchor * (state.start_from_imu * up), unknowns.up));
-    let kind = ResidualKind::Level;
-    let mut row = ResidualRow {
-        time,
-        kind,
-        index,
-        residual,
-        jacobian,
-        speed,
-        blind: None,
-        sigma: LEVEL_SIGMA,
-        common: 0.0,
-        weight,
-        segment,
-    };
+    let mut row = begun(time, index, state, (anchor, segment), weight);
+    row.residual = vector(arc(anchor * (state.start_from_imu * up), unknowns.up));
     flatten(&mut row, unknowns.up);
     row
 }

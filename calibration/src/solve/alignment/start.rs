@@ -6,14 +6,6 @@ use nalgebra::Matrix3;
 use super::{error::AlignmentError, input::Observation, problem::AlignmentProblem, track::GyroTrack};
 use crate::solve::so3::{log, nearest_rotation, vector};
 
-/// Length of a turn, seconds, and how many of them are looked at.
-const TURN_S: f64 = 0.4;
-/// Where pictures are rare, a turn may take this long.
-const LONGEST_S: f64 = 5.0;
-const TURNS: usize = 400;
-/// Of the first search over offsets, seconds.
-const STEP_S: f64 = 0.01;
-
 /// Rotation, offset and bias to start from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AlignmentStart {
@@ -35,6 +27,11 @@ struct Turn {
 }
 
 fn turns(problem: &AlignmentProblem) -> Vec<Turn> {
+    /// Length of a turn, seconds, and how many of them are looked at.
+    const TURN_S: f64 = 0.4;
+    /// Where pictures are rare, a turn may take this long.
+    const LONGEST_S: f64 = 5.0;
+    const TURNS: usize = 400;
     let seen: Vec<(f64, DQuat, u32)> = problem
         .observations
         .iter()
@@ -153,6 +150,8 @@ fn best_offset(
 
 /// Closed form from whole orientations: offset by correlation, rotation by singular values, bias by the mean difference.
 pub(super) fn from_orientations(problem: &AlignmentProblem) -> Result<AlignmentStart, AlignmentError> {
+    /// Of the first search over offsets, seconds.
+    const STEP_S: f64 = 0.01;
     let track = GyroTrack::new(&problem.gyro, DVec3::ZERO);
     let mut turns = turns(problem);
     let count = turns.len();

@@ -139,7 +139,7 @@ fn words(out: &mut String, target: &Target) -> fmt::Result {
     }
     let lines = [
         format!("This line is {ruler_mm:.0} mm long; a tag is {:.2} mm wide.", target.tag_m() * 1e3),
-        format!("bowwave calibrate camera PICTURES --target {target}"),
+        format!("bowwave calibrate intrinsics PICTURES --target {target}"),
         "Print in true size, glue it to a stiff flat plate (glass, aluminium), keep it matt and evenly lit."
             .to_owned(),
         "20 pictures: all corners and edges of the picture, near and far, tilted left, right, up and down."

@@ -13,7 +13,7 @@ use super::input::{OpenedRecording, open, tell, write};
 use crate::{cli::CalibrateBoresight, outcome::Outcome, today::today};
 
 /// A pull of the trigger, with the picture nearest to it.
-type Shown = Pull<CameraFrame>;
+type PulledPicture = Pull<CameraFrame>;
 
 /// Solves, tells and writes.
 pub fn run(arguments: &CalibrateBoresight) -> Result<Outcome> {
@@ -53,9 +53,9 @@ pub fn run(arguments: &CalibrateBoresight) -> Result<Outcome> {
 }
 
 /// Every pull of the trigger with its picture, and whether the recording was cut short.
-fn pulls(opened: &OpenedRecording) -> Result<(Vec<Shown>, bool)> {
+fn pulls(opened: &OpenedRecording) -> Result<(Vec<PulledPicture>, bool)> {
     let calibration = &opened.file.calibration;
-    let mut pulls: Vec<Shown> = Vec::new();
+    let mut pulls: Vec<PulledPicture> = Vec::new();
     opened.play(false, |event| {
         if let Event::Trigger(TriggerEdge { time, pressed: true }) = event {
             pulls.push(Pull::new(time, calibration));
@@ -71,6 +71,6 @@ fn pulls(opened: &OpenedRecording) -> Result<(Vec<Shown>, bool)> {
 }
 
 /// Where the mark is in each pull's picture.
-fn seen(pulls: &[Shown], target: &Target, tag: usize) -> Vec<Option<DVec2>> {
+fn seen(pulls: &[PulledPicture], target: &Target, tag: usize) -> Vec<Option<DVec2>> {
     pulls.iter().map(|pull| find_tag(target, tag, &pull.nearest.as_ref()?.1.picture)).collect()
 }

@@ -125,12 +125,8 @@ struct JournalSettings {
     pages_max: Option<u32>,
     /// Pages of the database that SQLite may keep in memory.
     pages_cached: Option<u32>,
-    /// As in [`JournalOptions`].
-    reserve_bytes: u64,
-    /// As in [`JournalOptions`].
-    checkpoint_pages: u32,
-    /// As in [`JournalOptions`].
-    own: bool,
+    /// Options of the journal's user.
+    options: JournalOptions,
     /// Most committed rounds of this run kept in memory, for a fresh database.
     kept_max: usize,
     /// Most rounds kept in memory while the database cannot be written.
@@ -148,9 +144,7 @@ impl From<&JournalOptions> for JournalSettings {
         Self {
             pages_max: None,
             pages_cached: None,
-            reserve_bytes: options.reserve_bytes,
-            checkpoint_pages: options.checkpoint_pages,
-            own: options.own,
+            options: *options,
             kept_max: 10_000,
             held_max: 100_000,
             retry_first: Duration::from_millis(50),

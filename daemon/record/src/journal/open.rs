@@ -35,7 +35,7 @@ pub(super) fn for_writing(path: &Path, settings: &JournalSettings) -> Result<Ope
         return Ok(OpenedJournal { connection: connect(path, settings)?, quarantined: Some(resumed) });
     }
     let head = head(path)?;
-    if head.looks_foreign() && !settings.own {
+    if head.looks_foreign() && !settings.options.own {
         return Err(JournalError::NotADatabase { path: path.into() });
     }
     if head.is_blank() && was_never_begun(path)? {

@@ -121,7 +121,8 @@ fn a_database_damaged_while_in_use_is_put_aside_and_this_runs_rounds_written_aga
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hits.db");
     // A cache of a few pages, and a log that is emptied at once: SQLite has to read what was damaged.
-    let settings = JournalSettings { pages_cached: Some(2), checkpoint_pages: 1, ..impatient(None) };
+    let options = JournalOptions { checkpoint_pages: 1, ..JournalOptions::default() };
+    let settings = JournalSettings { pages_cached: Some(2), options, ..impatient(None) };
     let run = Run { scenario: "three skiffs".to_owned(), ..Run::default() };
     let journal = Journal::start(&path, &run, settings).unwrap();
     let shoot = |from: u64, to: u64| {

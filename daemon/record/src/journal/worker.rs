@@ -102,7 +102,7 @@ impl JournalWorker {
             commits,
             told,
             settings,
-            reserve: Reserve::new(path, settings.reserve_bytes),
+            reserve: Reserve::new(path, settings.options.reserve_bytes),
             low: false,
             held: VecDeque::new(),
             kept: VecDeque::new(),
@@ -236,7 +236,7 @@ impl JournalWorker {
             }
             self.clock = None;
         }
-        checkpoint(connection, self.settings.checkpoint_pages)
+        checkpoint(connection, self.settings.options.checkpoint_pages)
     }
 
     /// Puts the damaged database aside and begins another with what is known of this run.

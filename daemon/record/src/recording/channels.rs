@@ -71,12 +71,12 @@ impl Channels {
 
 /// Metadata and attachments of ours, as they are in the file.
 #[derive(Default)]
-pub(crate) struct Notes {
+pub(crate) struct FileNotes {
     pub(crate) metadata: Option<BTreeMap<String, String>>,
     pub(crate) attachments: BTreeMap<String, Vec<u8>>,
 }
 
-impl Notes {
+impl FileNotes {
     pub(crate) fn note(&mut self, record: &Record<'_>) {
         match record {
             Record::Metadata(metadata) if metadata.name == METADATA => {

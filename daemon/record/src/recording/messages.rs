@@ -7,7 +7,7 @@ use mcap::records::{ChunkHeader, Record, op};
 
 use super::{
     RecordError,
-    channels::{Channels, Notes},
+    channels::{Channels, FileNotes},
     records::{PREFIX, Records, parse, u32_at, u64_at},
     schema::Topic,
 };
@@ -16,7 +16,7 @@ use super::{
 const MESSAGE_HEADER: usize = 22;
 
 /// A message of one of our topics.
-pub(crate) struct Found<'a> {
+pub(crate) struct FoundMessage<'a> {
     pub(crate) topic: Topic,
     pub(crate) time: Time,
     pub(crate) sequence: u32,
@@ -28,7 +28,7 @@ pub(crate) struct Found<'a> {
 }
 
 /// A message's header.
-struct Head {
+struct MessageHead {
     topic: Topic,
     time: Time,
     sequence: u32,
@@ -39,7 +39,7 @@ pub(crate) struct Messages {
     records: Records,
     pub(crate) channels: Channels,
     /// Metadata and attachments that were passed.
-    pub(crate) notes: Notes,
+    pub(crate) notes: FileNotes,
     /// The record, or the inside of the chunk, that is being cut up.
     data: Vec<u8>,
     rest: Range<usize>,
@@ -55,7 +55,7 @@ impl Messages {
         Self {
             records,
             channels,
-            notes: Notes::default(),
+            notes: FileNotes::default(),
             data: Vec::new(),
             rest: 0..0,
             offset: 0,
@@ -70,16 +70,16 @@ impl Messages {
 
     /// The next message of a topic of ours; `None` after the last. After an error the next call goes on behind the chunk or
     /// message that it was about, if anything behind it can be found.
-    pub(crate) fn next(&mut self) -> Result<Option<Found<'_>>, RecordError> {
+    pub(crate) fn next(&mut self) -> Result<Option<FoundMessage<'_>>, RecordError> {
         loop {
             if let Some((opcode, body)) = self.next_inner()? {
                 match opcode {
                     op::MESSAGE => {
-                        if let Some(Head { topic, time, sequence }) = self.message(&body)? {
+                        if let Some(MessageHead { topic, time, sequence }) = self.message(&body)? {
                             let data =
                                 self.data.get(body.start + MESSAGE_HEADER..body.end).unwrap_or_default();
                             let (offset, verified) = (self.offset, self.verified);
-                            return Ok(Some(Found { topic, time, sequence, data, offset, verified }));
+                            return Ok(Some(FoundMessage { topic, time, sequence, data, offset, verified }));
                         }
                     }
                     op::SCHEMA | op::CHANNEL => {
@@ -130,7 +130,7 @@ impl Messages {
     }
 
     /// Head of the message at `body`; `None` for a topic that is not ours.
-    fn message(&self, body: &Range<usize>) -> Result<Option<Head>, RecordError> {
+    fn message(&self, body: &Range<usize>) -> Result<Option<MessageHead>, RecordError> {
         let data = self.data.get(body.clone()).unwrap_or_default();
         let (Some(prefix), Some(log_time)) = (u64_at(data, 0), u64_at(data, 6)) else {
             return Err(self.damaged("a message shorter than its header"));
@@ -148,7 +148,7 @@ impl Messages {
         let Ok(ns) = i64::try_from(log_time) else {
             return Err(self.damaged(&format!("a message with the log time {log_time} ns")));
         };
-        Ok(Some(Head { topic, time: Time::from_ns(ns), sequence: (prefix >> 16) as u32 }))
+        Ok(Some(MessageHead { topic, time: Time::from_ns(ns), sequence: (prefix >> 16) as u32 }))
     }
 
     /// Loads the file's next record; `false` after the last.

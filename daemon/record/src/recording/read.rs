@@ -7,7 +7,7 @@ use bowwave_core::time::Time;
 use super::{
     CHUNK_MAX_BYTES, Counts, DISORDER_MAX_NS, Entry, Properties, RecordError,
     channels::Channels,
-    messages::{Found, Messages},
+    messages::{FoundMessage, Messages},
     records::Records,
     ros,
     survey::Survey,
@@ -110,7 +110,7 @@ impl RecordingReader {
 }
 
 /// Decodes a message; `None` for what is no entry.
-pub(crate) fn entry(path: &Path, found: &Found<'_>) -> Result<Option<Entry>, RecordError> {
+pub(crate) fn entry(path: &Path, found: &FoundMessage<'_>) -> Result<Option<Entry>, RecordError> {
     let fail = |what| RecordError::Message {
         path: path.into(),
         offset: found.offset,

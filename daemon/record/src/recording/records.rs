@@ -166,7 +166,7 @@ pub(crate) fn parse<'a>(
 }
 
 /// A part of a record.
-enum Part {
+enum RecordPart {
     /// So many bytes.
     Bytes(usize),
     /// A string: its length, its bytes.
@@ -178,8 +178,8 @@ enum Part {
 }
 
 /// The parts of a record as far as its last string (MCAP specification, "Records").
-const fn parts(opcode: u8) -> &'static [Part] {
-    use Part::{Bytes, Numbers, Text, Texts};
+const fn parts(opcode: u8) -> &'static [RecordPart] {
+    use RecordPart::{Bytes, Numbers, Text, Texts};
     match opcode {
         op::HEADER => &[Text, Text],
         op::SCHEMA => &[Bytes(2), Text, Text],
@@ -199,7 +199,7 @@ fn fits(opcode: u8, data: &[u8]) -> bool {
     parts(opcode).iter().try_fold(0, |at, part| part.end(data, at)).is_some()
 }
 
-impl Part {
+impl RecordPart {
     /// Where the part that begins at `at` ends; `None` where that is beyond the record.
     fn end(&self, data: &[u8], at: usize) -> Option<usize> {
         let end = match self {
@@ -244,15 +244,15 @@ mod tests {
 
     use mcap::records::op;
 
-    use super::{Part, parse, parts};
+    use super::{RecordPart, parse, parts};
 
     /// A record whose parts are all as short as can be, and where its strings and maps begin.
     fn shortest(opcode: u8) -> (Vec<u8>, Vec<usize>) {
         let (mut data, mut places) = (Vec::new(), Vec::new());
         for part in parts(opcode) {
             match part {
-                Part::Bytes(bytes) => data.resize(data.len() + bytes, 0),
-                Part::Text | Part::Texts | Part::Numbers(_) => {
+                RecordPart::Bytes(bytes) => data.resize(data.len() + bytes, 0),
+                RecordPart::Text | RecordPart::Texts | RecordPart::Numbers(_) => {
                     places.push(data.len());
                     data.extend([0; 4]);
                 }

@@ -12,8 +12,8 @@ use mcap::records::{Record, Statistics, op};
 
 use super::{
     CameraInfo, Counts, Properties, RecordError,
-    channels::{Channels, Notes},
-    messages::{Found, Messages},
+    channels::{Channels, FileNotes},
+    messages::{FoundMessage, Messages},
     properties::{CALIBRATION, SCENARIO},
     records::{Records, parse},
     ros,
@@ -23,7 +23,7 @@ use super::{
 /// Survey of a file before its entries are read.
 pub(crate) struct Survey {
     pub(crate) channels: Channels,
-    pub(crate) notes: Notes,
+    pub(crate) notes: FileNotes,
     pub(crate) camera_info: Option<CameraInfo>,
     pub(crate) counts: Counts,
     pub(crate) span: Option<(Time, Time)>,
@@ -104,7 +104,7 @@ impl Survey {
         Ok(survey)
     }
 
-    fn take_message(&mut self, found: &Found<'_>) {
+    fn take_message(&mut self, found: &FoundMessage<'_>) {
         if let Some(count) = self.counts.of(found.topic) {
             *count += 1;
         } else if self.camera_info.is_none() {
@@ -117,7 +117,7 @@ impl Survey {
     fn empty() -> Self {
         Self {
             channels: Channels::default(),
-            notes: Notes::default(),
+            notes: FileNotes::default(),
             camera_info: None,
             counts: Counts::default(),
             span: None,

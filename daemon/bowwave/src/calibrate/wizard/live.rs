@@ -23,7 +23,7 @@ use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
 
 use super::{
     Guided,
-    player::Player,
+    player::RecordingPlayer,
     screen::Screen,
     terminal::{StdinClosed, TerminalUi},
 };
@@ -50,7 +50,7 @@ const PICTURES: usize = 4;
 /// Where events come from.
 enum Source {
     Devices { devices: Box<Devices>, settings: Box<Settings>, data: PathBuf },
-    Recording(Player),
+    Recording(RecordingPlayer),
 }
 
 /// On the configured devices, and on the LCD.
@@ -98,7 +98,7 @@ pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
 }
 
 /// On a recording, at its own pace.
-pub fn paced(guided: Guided, player: Player, arguments: &CalibrateWizard) -> Result<Outcome> {
+pub fn paced(guided: Guided, player: RecordingPlayer, arguments: &CalibrateWizard) -> Result<Outcome> {
     let signals = catch_signals()?;
     let screen = arguments
         .window

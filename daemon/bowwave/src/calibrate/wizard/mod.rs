@@ -14,7 +14,7 @@ use anyhow::Result;
 use bowwave_calibration::{
     CalibrationFile, Date,
     report::{CalibrationReport, html},
-    wizard::{Detector, Input, Setup, Task, Wizard, WizardSolution, WizardStep},
+    wizard::{Detector, Input, WizardSetup, Task, Wizard, WizardSolution, WizardStep},
 };
 use bowwave_core::event::Event;
 
@@ -52,7 +52,7 @@ impl Guided {
         out: Option<PathBuf>,
         eye_height_m: f64,
     ) -> Result<Self> {
-        let setup = Setup {
+        let setup = WizardSetup {
             calibration: file.calibration.clone(),
             eye_height_m,
             target: arguments.target,

@@ -16,13 +16,13 @@ use crate::calibrate::input::open;
 const AHEAD: usize = 64;
 
 /// A recording that is being played. Nobody takes its events while the wizard waits for a key: it stands still meanwhile.
-pub struct Player {
+pub struct RecordingPlayer {
     /// Events of the devices; closed at the end.
     pub events: Receiver<Event>,
     thread: JoinHandle<Result<bool>>,
 }
 
-impl Player {
+impl RecordingPlayer {
     /// Plays the recording, whose pictures have the size of the named calibration's lens.
     pub fn start(recording: PathBuf, calibration: Option<PathBuf>, paced: bool) -> Result<Self> {
         let (sender, events) = bounded(AHEAD);

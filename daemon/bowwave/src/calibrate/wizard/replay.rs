@@ -6,7 +6,7 @@ use anyhow::{Context, Result};
 use bowwave_calibration::wizard::{Ask, Input, Key, WizardStep};
 use bowwave_core::event::Event;
 
-use super::{Guided, live, player::Player, terminal::TerminalUi};
+use super::{Guided, live, player::RecordingPlayer, terminal::TerminalUi};
 use crate::{calibrate::input::open, cli::CalibrateWizard, outcome::Outcome};
 
 /// Runs on a recording: at its own pace, or as fast as it goes.
@@ -19,12 +19,12 @@ pub fn run(recording: &Path, arguments: &CalibrateWizard) -> Result<Outcome> {
     })?;
     let out = arguments.files.out.clone().or_else(|| named.clone());
     let guided = Guided::new(arguments, opened.file, out, height)?;
-    let player = Player::start(recording.to_owned(), named, !arguments.fast)?;
+    let player = RecordingPlayer::start(recording.to_owned(), named, !arguments.fast)?;
     if arguments.fast { fast(guided, player, arguments) } else { live::paced(guided, player, arguments) }
 }
 
 /// Without a clock, and keys only where one is waited for: the same recording and keys give the same pages.
-fn fast(mut guided: Guided, player: Player, arguments: &CalibrateWizard) -> Result<Outcome> {
+fn fast(mut guided: Guided, player: RecordingPlayer, arguments: &CalibrateWizard) -> Result<Outcome> {
     let mut teller = TerminalUi::new();
     let mut eyes = guided.eyes(arguments);
     while guided.wizard.step() != WizardStep::Over {
