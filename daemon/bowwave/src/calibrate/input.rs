@@ -158,10 +158,10 @@ impl OpenedRecording {
 pub fn look(
     recording: &Path,
     calibration: Option<&Path>,
-    material: &InputArgs,
+    input: &InputArgs,
 ) -> Result<(OpenedRecording, Capture, bool)> {
     let opened = open(recording, calibration)?;
-    let height = match material.eye_height {
+    let height = match input.eye_height {
         Some(height) => height,
         None => opened.height().with_context(|| {
             format!("{} does not say how high the camera was; say it with --eye-height", recording.display())
@@ -173,7 +173,7 @@ pub fn look(
     if opened.file.shutter.is_some() {
         capture = capture.with_readout(calibration.readout_ns as f64 * 1e-9);
     }
-    if let Some(target) = material.target {
+    if let Some(target) = input.target {
         watcher = watcher.with_board(Box::new(BoardFinder::new(target)));
     }
     let is_cut = opened.play(true, |event| match &event {
