@@ -60,7 +60,8 @@ impl BoatHistory {
         }
         if !waves.is_flat() {
             let states = &self.states;
-            self.seakeeping.follow(until_s, |time_s| state_in(states, time_s), waves);
+            // Motion in waves begins as of a boat that lies where the scenario begins.
+            self.seakeeping.follow(until_s, |time_s| state_in(states, time_s.max(0.0)), waves);
         }
     }
 
