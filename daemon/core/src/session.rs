@@ -206,12 +206,12 @@ impl Session {
 
     /// The seed of all its chance.
     pub const fn seed(&self) -> u64 {
-        self.setup.scenario.seed
+        self.world.seed()
     }
 
     /// The name of its scenario.
     pub fn scenario_name(&self) -> &str {
-        &self.setup.scenario.name
+        self.world.name()
     }
 
     /// A hash over all that this session gave.

@@ -59,6 +59,7 @@ pub struct LastResult {
 /// The virtual world.
 #[derive(Debug)]
 pub struct World {
+    name: String,
     vessels: Vec<Vessel>,
     models: Arc<[Model]>,
     ammunition: Ammunition,
@@ -92,6 +93,7 @@ impl World {
             behaviour: boat.behaviour.clone(),
         });
         Self {
+            name: scenario.name.clone(),
             vessels: vessels.collect(),
             models,
             ammunition: Ammunition { weapon: scenario.weapon, wind: scenario.wind, seed: scenario.seed },
@@ -196,6 +198,16 @@ impl World {
     /// Boats and rounds; `None` before the first picture.
     pub const fn running(&self) -> Option<&RunningWorld> {
         self.running.as_ref()
+    }
+
+    /// The scenario's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The seed of all its chance.
+    pub const fn seed(&self) -> u64 {
+        self.ammunition.seed
     }
 
     /// Rounds left in the belt.
