@@ -4,8 +4,8 @@ use glam::DVec2;
 use serde::Deserialize;
 
 use super::{
-    BoatSpec, Side, place,
-    read::{M_S_PER_KN, angle},
+    keys::{M_S_PER_KN, angle},
+    spec::{BoatSpec, Side, place},
 };
 use crate::{
     text::toml::{

@@ -3,16 +3,17 @@
 use glam::DVec3;
 use serde::Deserialize;
 
+pub use super::keys::{LightKeys, M_S_PER_KN, ReflectionKeys, SeaKeys, angle, seed};
 use super::{
-    Scenario, WeaponSpec,
     boat::{self, RawBoat},
-    place, sun,
+    spec::{Scenario, WeaponSpec, place},
+    sun,
 };
 use crate::{
     sea::BeaufortForce,
     text::toml::{
-        BareOrQuoted, Loose, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number,
-        one_of, plain_text, whole,
+        Loose, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number, one_of, plain_text,
+        whole,
     },
     water::{ReflectionMethod, ShadowLevel, Water},
     world::{
@@ -23,17 +24,6 @@ use crate::{
 
 /// Most boats of a scenario.
 const BOATS_MAX: usize = 64;
-/// m/s in a knot.
-pub const M_S_PER_KN: f64 = 1852.0 / 3600.0;
-/// A seed of chance.
-pub fn seed() -> ValueRule<'static, i64, u64> {
-    whole(0..=i64::MAX as u64)
-}
-/// An angle clockwise, in either direction.
-pub fn angle() -> ValueRule<'static, f64, f64> {
-    number(-360.0..=360.0, "degrees")
-}
-
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct RawScenario {
@@ -73,48 +63,6 @@ struct RawWeapon {
     ballistic_coefficient_g7_lb_in2: OptionalKey<f64>,
     dispersion_mrad: OptionalKey<f64>,
     tracer_every: OptionalKey<i64>,
-}
-
-/// Keys of a table `[sea]`.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SeaKeys {
-    /// Wind force.
-    pub beaufort: OptionalKey<i64>,
-    /// Where the wind comes from, degrees clockwise from north.
-    pub wind_from_deg: OptionalKey<f64>,
-    /// Significant wave height, metres; of the wind force without it.
-    pub significant_wave_height_m: OptionalKey<f64>,
-    /// Period of the highest waves, seconds; goes with the height.
-    pub peak_period_s: OptionalKey<f64>,
-}
-
-/// Keys of a table `[light]`.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LightKeys {
-    /// Where the sun stands, degrees clockwise from north.
-    pub sun_azimuth_deg: OptionalKey<f64>,
-    /// How high it stands, degrees.
-    pub sun_elevation_deg: OptionalKey<f64>,
-    /// Latitude, degrees north.
-    pub latitude_deg: OptionalKey<f64>,
-    /// Longitude, degrees east.
-    pub longitude_deg: OptionalKey<f64>,
-    /// Date and time, UTC.
-    pub utc: OptionalKey<BareOrQuoted>,
-    /// Meteorological visibility, kilometres.
-    pub visibility_km: OptionalKey<f64>,
-}
-
-/// Keys of a table `[reflection]`.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ReflectionKeys {
-    /// Name of the method.
-    pub method: OptionalKey<String>,
-    /// How strong the shadow is, 0 to 2.
-    pub shadow_level: OptionalKey<i64>,
 }
 
 pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> {

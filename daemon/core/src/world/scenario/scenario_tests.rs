@@ -1,5 +1,7 @@
 use proptest::prelude::*;
 
+use glam::{DVec2, DVec3};
+
 use super::*;
 use crate::{
     water::{ReflectionMethod, ShadowLevel},

@@ -4,7 +4,10 @@ use glam::DVec3;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t, time::JulianDate};
 use toml::value::{Datetime, Offset};
 
-use super::read::{LightKeys, angle};
+use super::{
+    keys::{LightKeys, angle},
+    spec::place,
+};
 use crate::text::toml::{TomlError, TomlSection, date_and_time, number};
 
 /// Sun where the text names none: high enough for plain light, to the south-west.
@@ -55,7 +58,7 @@ fn at(location: Location, utc: &Datetime) -> Result<DVec3, String> {
 
 fn towards(azimuth_deg: f64, elevation_deg: f64) -> DVec3 {
     let (azimuth, elevation) = (azimuth_deg.to_radians(), elevation_deg.to_radians());
-    super::place(azimuth, elevation.cos()).extend(elevation.sin())
+    place(azimuth, elevation.cos()).extend(elevation.sin())
 }
 
 #[cfg(test)]

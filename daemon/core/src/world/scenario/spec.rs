@@ -1,0 +1,136 @@
+//! A checked scenario.
+
+use glam::{DVec2, DVec3};
+
+use crate::{
+    text::toml::{TomlError, TomlPlace},
+    water::Water,
+    world::{
+        boats::Behaviour,
+        gunnery::Projectile,
+        waves::{WaveField, WaveSpec},
+    },
+};
+
+/// Space that every boat must leave between its farthest point and the camera, metres.
+pub const CAMERA_CLEAR_M: f64 = 2.0;
+/// Courses of scenarios without a duration are checked this far ahead, seconds.
+const ENDLESS_S: f64 = 24.0 * 3600.0;
+
+/// A checked scenario.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenario {
+    /// Its name.
+    pub name: String,
+    /// Seed of the waves and of the rounds' scatter.
+    pub seed: u64,
+    /// When it is over, seconds; `None` for one that goes on.
+    pub duration_s: Option<f64>,
+    /// Waves and where the wind comes from.
+    pub waves: WaveSpec,
+    /// Whether the sea is measured in the video; the waves above are then what is drawn until it is.
+    pub sea_from_video: bool,
+    /// Velocity of the air, world, m/s.
+    pub wind: DVec3,
+    /// Height of the camera over the mean sea, metres.
+    pub eye_height_m: f64,
+    /// Unit vector towards the sun, world.
+    pub sun_direction: DVec3,
+    /// Meteorological visibility, metres.
+    pub visibility_m: f64,
+    /// How the sea mirrors, and at which wind force.
+    pub water: Water,
+    /// The training weapon.
+    pub weapon: WeaponSpec,
+    /// The boats.
+    pub boats: Vec<BoatSpec>,
+    /// Former names that the text uses, each with its place and the new name.
+    pub warnings: Vec<String>,
+}
+
+/// The training weapon.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WeaponSpec {
+    /// Cyclic rate.
+    pub rounds_per_minute: f64,
+    /// Rounds in the belt.
+    pub belt: u32,
+    /// Its round.
+    pub projectile: Projectile,
+    /// Scatter, standard deviation along each of two axes, milliradians.
+    pub dispersion_mrad: f64,
+    /// Every how many rounds one is a tracer; `None` for no tracers.
+    pub tracer_every: Option<u32>,
+}
+
+impl WeaponSpec {
+    /// Whether round `shot` (counted from 1) is a tracer.
+    pub fn is_tracer(&self, shot: u64) -> bool {
+        self.tracer_every.is_some_and(|every| shot.is_multiple_of(u64::from(every)))
+    }
+}
+
+/// Whom a boat belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Side {
+    /// It attacks.
+    Hostile,
+    /// It is not to be fired at.
+    Neutral,
+}
+
+impl Side {
+    /// The name used in scenarios, databases and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hostile => "hostile",
+            Self::Neutral => "neutral",
+        }
+    }
+}
+
+/// A boat.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoatSpec {
+    /// Its name, different from all others.
+    pub name: String,
+    /// Its looks: the name of a model or a path to a file, for the caller to resolve.
+    pub model: String,
+    /// Whom it belongs to.
+    pub side: Side,
+    /// What it does.
+    pub behaviour: Behaviour,
+    /// Where the text places it.
+    pub(super) stands: TomlPlace,
+}
+
+impl Scenario {
+    /// The waves of its sea.
+    pub fn wave_field(&self) -> WaveField {
+        WaveField::new(&self.waves, self.seed)
+    }
+
+    /// Whether every boat stays clear of the camera on its whole course. `radii_m` holds for each boat, in order, the radius
+    /// about its origin that holds its model; boats without one are not checked.
+    pub fn check_clearance(&self, radii_m: &[f64]) -> Result<(), TomlError> {
+        let until_s = self.duration_s.unwrap_or(ENDLESS_S);
+        for (boat, &radius_m) in self.boats.iter().zip(radii_m) {
+            let clear_m = radius_m + CAMERA_CLEAR_M;
+            let Some(time_s) = boat.behaviour.first_within(clear_m, until_s) else { continue };
+            let when =
+                if time_s > 0.0 { format!("after {time_s:.0} s") } else { "from the start".to_owned() };
+            let problem = format!(
+                "{} comes within {clear_m:.1} m of the camera {when}: its model {} reaches {radius_m:.1} m; \
+                 start it farther off or change its course",
+                boat.name, boat.model
+            );
+            return Err(boat.stands.error(problem));
+        }
+        Ok(())
+    }
+}
+
+/// World x and y of what lies `range_m` away at `bearing`, radians clockwise from north.
+pub fn place(bearing: f64, range_m: f64) -> DVec2 {
+    DVec2::new(bearing.sin(), bearing.cos()) * range_m
+}
