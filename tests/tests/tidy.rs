@@ -27,6 +27,7 @@ const RANKS: &[(&str, u8)] = &[
     ("bowwave-trainer", 4),
     ("bowwave", 5),
     ("bowwave-lab", 6),
+    ("bowwave-package", 6),
     ("bowwave-tests", 7),
     ("precision", 7),
     ("bowwave-hil", 7),

@@ -7,6 +7,7 @@ use std::{ffi::OsString, path::PathBuf};
 
 use bowwave_core::time::secs_to_ns;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 use hw_sim::fault::{Fault, FaultKind};
 
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateIntrinsics, CalibrateTask};
@@ -18,41 +19,45 @@ pub use mounting::{
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
 #[derive(Debug, Parser)]
 #[command(name = "bowwave", version, max_term_width = 100)]
-pub struct Cli {
+pub struct CommandLine {
     /// Log more (-v: info, -vv: debug); RUST_LOG overrides it
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     pub verbose: u8,
-    /// What to do
+    /// The command
     #[command(subcommand)]
-    pub command: Command,
+    pub command: ProgramCommand,
 }
 
-/// What to do.
+/// Commands of the program.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub enum ProgramCommand {
     /// Run the trainer on this computer's camera, inertial unit, trigger and LCD
-    Run(Run),
+    Run(RunArgs),
     /// Run the trainer on a recording, as if its camera, inertial unit and trigger were there
     Simulate(Simulate),
     /// Step a session through the inputs of its own recording, and say whether the same records and scenes come out
     Replay(ReplayRecording),
-    /// Make a recording from a folder of pictures or from a video
+    /// Make a recording from a folder of pictures or from a video (with bowwave-lab)
     #[command(disable_help_flag = true)]
     Import(LabArguments),
-    /// Compose boats into a photograph
+    /// Compose boats into a photograph (with bowwave-lab)
     #[command(disable_help_flag = true)]
     Compose(LabArguments),
-    /// Make the user study of real and generated reflections, or score its answers
+    /// Make the user study of real and generated reflections, or score its answers (with bowwave-lab)
     #[command(disable_help_flag = true)]
     Study(LabArguments),
     /// Print what a scenario needs: passes, shader variants, memory, and why the rest is left out
-    Plan(Plan),
+    Plan(PlanArgs),
     /// Check this computer: GPU, camera, serial lines, trigger lines, disk; each with what to do about it
     Doctor(Doctor),
     /// Print the virtual rounds of a journal
     Hits(Hits),
     /// Measure lens, mounting and timing, or print the board for it
     Calibrate(Calibrate),
+    /// Print what a shell needs to complete this command line
+    Completions(CompletionsArgs),
+    /// Print the licences of what this program holds of others
+    Licences,
 }
 
 /// Where the configuration lies.
@@ -60,7 +65,7 @@ const CONFIG: &str = "/etc/bowwave/bowwave.toml";
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
-pub struct Run {
+pub struct RunArgs {
     /// Configuration file (TOML)
     #[arg(long, value_name = "FILE", default_value = CONFIG)]
     pub config: PathBuf,
@@ -183,9 +188,17 @@ pub struct LabArguments {
     pub arguments: Vec<OsString>,
 }
 
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_enum)]
+    pub shell: Shell,
+}
+
 /// Arguments of `plan`.
 #[derive(Debug, Args)]
-pub struct Plan {
+pub struct PlanArgs {
     /// Scenario file (TOML); without it the built-in one
     pub scenario: Option<PathBuf>,
     /// Screen size in pixels
@@ -249,7 +262,7 @@ pub struct DoctorImu {
 
 /// How rounds are printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Format {
+pub enum HitsFormat {
     /// Columns for people
     Table,
     /// Comma-separated, a header line first
@@ -265,8 +278,8 @@ pub struct Hits {
     #[arg(default_value = "bowwave-out")]
     pub journal: PathBuf,
     /// How to print
-    #[arg(long, value_enum, default_value_t = Format::Table)]
-    pub format: Format,
+    #[arg(long, value_enum, default_value_t = HitsFormat::Table)]
+    pub format: HitsFormat,
     /// Same as --format json
     #[arg(long, conflicts_with = "format")]
     pub json: bool,
@@ -328,7 +341,7 @@ mod tests {
 
     #[test]
     fn the_command_line_is_consistent() {
-        Cli::command().debug_assert();
+        CommandLine::command().debug_assert();
     }
 
     #[test]

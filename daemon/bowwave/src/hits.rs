@@ -6,7 +6,7 @@ use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots};
 use bowwave_trainer::storage::JOURNAL;
 
 use crate::{
-    cli::{Format, Hits},
+    cli::{Hits, HitsFormat},
     stdout,
 };
 
@@ -40,10 +40,10 @@ pub fn run(arguments: &Hits) -> Result<()> {
         None => RunSelection::Latest,
     };
     let shots = read_shots(&path, &ShotFilter { runs, hits_only: arguments.hits_only })?;
-    match if arguments.json { Format::Json } else { arguments.format } {
-        Format::Table => stdout::print(table(&shots)),
-        Format::Csv => stdout::print(&csv(&shots)?),
-        Format::Json => stdout::print_json(&shots.iter().map(StoredShot::to_json).collect::<Vec<_>>()),
+    match if arguments.json { HitsFormat::Json } else { arguments.format } {
+        HitsFormat::Table => stdout::print(table(&shots)),
+        HitsFormat::Csv => stdout::print(&csv(&shots)?),
+        HitsFormat::Json => stdout::print_json(&shots.iter().map(StoredShot::to_json).collect::<Vec<_>>()),
     }
 }
 

@@ -4,10 +4,13 @@
 mod cache;
 mod calibrate;
 mod cli;
+mod completions;
 pub mod config;
 mod doctor;
+pub mod ending;
 mod hits;
 mod laboratory;
+pub mod licences;
 pub mod loading;
 pub mod outcome;
 mod plan;
@@ -21,32 +24,42 @@ pub mod today;
 use std::process::ExitCode;
 
 use anyhow::Result;
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 
-use cli::{Cli, Command};
+use cli::{CommandLine, ProgramCommand};
 use outcome::Outcome;
 
 /// Parses the command line, runs its command, and gives the exit code.
 pub fn main() -> ExitCode {
     let program_start = bowwave_devices::clock::now();
-    let cli = Cli::parse();
+    let cli = CommandLine::parse();
     program::start_log(cli.verbose);
     program::exit_code(dispatch(&cli, program_start))
 }
 
-fn dispatch(Cli { command, verbose }: &Cli, program_start: bowwave_core::time::Time) -> Result<Outcome> {
+/// The definition of the command line, for manual pages and completions.
+pub fn command_line() -> clap::Command {
+    CommandLine::command()
+}
+
+fn dispatch(
+    CommandLine { command, verbose }: &CommandLine,
+    program_start: bowwave_core::time::Time,
+) -> Result<Outcome> {
     match command {
-        Command::Run(arguments) => run::run(arguments, program_start),
-        Command::Replay(arguments) => replay::run(arguments),
-        Command::Simulate(arguments) => simulate::run(arguments, program_start),
-        Command::Import(lab) => laboratory::run("import", *verbose, &lab.arguments),
-        Command::Compose(lab) => laboratory::run("compose", *verbose, &lab.arguments),
-        Command::Study(lab) => laboratory::run("study", *verbose, &lab.arguments),
-        Command::Plan(arguments) => plan::run(arguments).map(|()| Outcome::Done),
-        Command::Doctor(arguments) => {
+        ProgramCommand::Run(arguments) => run::run(arguments, program_start),
+        ProgramCommand::Replay(arguments) => replay::run(arguments),
+        ProgramCommand::Simulate(arguments) => simulate::run(arguments, program_start),
+        ProgramCommand::Import(lab) => laboratory::run("import", *verbose, &lab.arguments),
+        ProgramCommand::Compose(lab) => laboratory::run("compose", *verbose, &lab.arguments),
+        ProgramCommand::Study(lab) => laboratory::run("study", *verbose, &lab.arguments),
+        ProgramCommand::Plan(arguments) => plan::run(arguments).map(|()| Outcome::Done),
+        ProgramCommand::Doctor(arguments) => {
             doctor::run(arguments).map(|well| if well { Outcome::Done } else { Outcome::Failed })
         }
-        Command::Hits(arguments) => hits::run(arguments).map(|()| Outcome::Done),
-        Command::Calibrate(arguments) => calibrate::run(arguments.task.as_ref()),
+        ProgramCommand::Hits(arguments) => hits::run(arguments).map(|()| Outcome::Done),
+        ProgramCommand::Calibrate(arguments) => calibrate::run(arguments.task.as_ref()),
+        ProgramCommand::Completions(arguments) => completions::run(arguments.shell),
+        ProgramCommand::Licences => licences::run(),
     }
 }

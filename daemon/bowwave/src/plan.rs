@@ -17,7 +17,7 @@ use bowwave_render::{RenderConfig, Renderer};
 use serde::Serialize;
 
 use crate::{
-    cli::Plan,
+    cli::PlanArgs,
     loading::{read_scenario, scenario_models, warn_of_former_names},
     stdout,
 };
@@ -60,7 +60,7 @@ struct PrintedMemory {
 }
 
 /// Prints the plan of a scenario.
-pub fn run(arguments: &Plan) -> Result<()> {
+pub fn run(arguments: &PlanArgs) -> Result<()> {
     let (text, origin, base) = match &arguments.scenario {
         Some(path) => {
             let (text, base) = read_scenario(path)?;

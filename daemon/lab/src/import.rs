@@ -1,9 +1,9 @@
 //! `bowwave import`: recordings from pictures and videos.
 
-use std::ops::ControlFlow;
+use std::{ops::ControlFlow, sync::atomic::Ordering};
 
 use anyhow::{Context, Result, bail};
-use bowwave::{outcome::Outcome, stdout, today::today};
+use bowwave::{ending, outcome::Outcome, stdout, today::today};
 use bowwave_calibration::CalibrationFile;
 use bowwave_import::{ImportOptions, ImportReport, Progress, TelemetryReport, import_pictures, import_video};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -35,6 +35,7 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
     if let Ok(style) = ProgressStyle::with_template("{spinner} {pos} pictures {elapsed}") {
         bar.set_style(style);
     }
+    let end = ending::watch()?;
     let mut known = false;
     let mut progress = |p: Progress| {
         if let (Some(total), false) = (p.frames_total, known) {
@@ -45,7 +46,8 @@ pub fn run(arguments: &Import) -> Result<Outcome> {
             }
         }
         bar.set_position(p.frames);
-        ControlFlow::Continue(())
+        // The importer then removes what it has written so far.
+        if end.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let report = if arguments.source.is_dir() {
         import_pictures(&arguments.source, arguments.rate, &arguments.out, &options, &mut progress)?

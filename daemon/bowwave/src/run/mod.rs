@@ -33,7 +33,7 @@ use signal_hook::{
     iterator::Signals as Incoming,
 };
 
-use crate::{cli::Run, config::ScreenOutput, outcome::Outcome};
+use crate::{cli::RunArgs, config::ScreenOutput, outcome::Outcome};
 pub(crate) use recording::recording_in;
 use settings::{Reader, Settings};
 
@@ -41,7 +41,7 @@ use settings::{Reader, Settings};
 pub const DATA: &str = "/var/lib/bowwave";
 
 /// Runs until a signal ends it.
-pub fn run(arguments: &Run, program_start: Time) -> Result<Outcome> {
+pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
     let signals = catch_signals()?;
     let starts = Arc::new(CrashLoopGuard::begin(env::var_os("RUNTIME_DIRECTORY").map(PathBuf::from), now()));
     let pulse = Pulse::start(Arc::clone(&signals), Arc::clone(&starts))?;

@@ -1,9 +1,12 @@
 //! `bowwave compose`: boats composed into photographs.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::atomic::Ordering,
+};
 
 use anyhow::{Context, Result, bail};
-use bowwave::{loading::warn_of_former_names, outcome::Outcome, stdout};
+use bowwave::{ending, loading::warn_of_former_names, outcome::Outcome, stdout};
 use bowwave_core::water::ReflectionMethod;
 use bowwave_models::BoatModels;
 
@@ -46,11 +49,17 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
     std::fs::create_dir_all(&arguments.out).with_context(|| {
         format!("cannot make the folder {}; name another with --out", arguments.out.display())
     })?;
+    let end = ending::watch()?;
+    let mut whole = true;
     // The method is part of what a renderer is built for; decoding a picture again costs far less than building one.
     for &method in &methods {
         let mut still = still.clone();
         still.water.method = method;
         for (index, picture) in pictures.iter().enumerate() {
+            if end.load(Ordering::Relaxed) {
+                whole = false;
+                break;
+            }
             let target = target(&arguments.out, picture, (methods.len() > 1).then_some(method));
             compose_one(&mut renderer, &still, (index, picture), &target)?;
         }
@@ -59,7 +68,14 @@ pub fn run(arguments: &Compose) -> Result<Outcome> {
     for message in &messages {
         log::error!("{message}");
     }
-    Ok(if messages.is_empty() { Outcome::Done } else { Outcome::Failed })
+    if !whole {
+        log::warn!("ended before all pictures were composed");
+    }
+    Ok(match (messages.is_empty(), whole) {
+        (false, _) => Outcome::Failed,
+        (true, false) => Outcome::Partly,
+        (true, true) => Outcome::Done,
+    })
 }
 
 /// Composes one picture of a series, counted from 0.

@@ -11,10 +11,10 @@ mod pictures;
 mod score;
 mod statistics;
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, sync::atomic::Ordering};
 
 use anyhow::{Context, Result, bail};
-use bowwave::{loading::warn_of_former_names, outcome::Outcome, stdout};
+use bowwave::{ending, loading::warn_of_former_names, outcome::Outcome, stdout};
 use bowwave_core::water::ReflectionMethod;
 use image::RgbImage;
 
@@ -59,8 +59,12 @@ fn make(arguments: &Study) -> Result<Outcome> {
         pictures::Drawer::new(backgrounds, [first, second], arguments.gpu.clone(), arguments.seed)?;
     let bar = indicatif::ProgressBar::new(design.items.len() as u64);
     let mut images: Vec<(usize, RgbImage)> = Vec::with_capacity(design.items.len());
+    let end = ending::watch()?;
     // One condition after the other: the renderer is made anew only where the water changes.
     for index in design.by_condition() {
+        if end.load(Ordering::Relaxed) {
+            bail!("ended before all pictures were drawn; {} holds no study", arguments.out.display());
+        }
         let image = match design.items[index] {
             Item::Real(number) => real[number].1.clone(),
             Item::Generated { condition, replicate } => drawer.draw(CONDITIONS[condition], replicate)?,

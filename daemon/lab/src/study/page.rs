@@ -1,30 +1,43 @@
 //! The page that shows the pictures: one file that needs no other and no network.
 
 use base64::{Engine, engine::general_purpose::STANDARD};
+use maud::{DOCTYPE, PreEscaped, html};
 
 use super::design::Design;
 
-/// The page without its pictures.
-const TEMPLATE: &str = include_str!("page.html");
-/// What the pictures take the place of.
-const PLACE: &str = "/*STUDY*/";
+/// Style of the page.
+const STYLE: &str = include_str!("page.css");
+/// The session with a participant: one picture after the other, two keys, answers saved as CSV.
+const SCRIPT: &str = include_str!("page.js");
 
 /// The page of a design; `files` are the pictures as PNG, in the design's order.
 pub fn page(design: &Design, files: &[Vec<u8>]) -> String {
-    let mut data = String::from("const STUDY = {\"pictures\": [");
-    for (index, file) in files.iter().enumerate() {
-        let comma = if index == 0 { "" } else { "," };
-        let png = STANDARD.encode(file);
-        data += &format!("{comma}\n[\"{}\",\"data:image/png;base64,{png}\"]", design.name(index));
-    }
-    data += "],\n\"orders\": [";
-    for (index, order) in design.orders.iter().enumerate() {
-        let comma = if index == 0 { "" } else { "," };
-        let numbers: Vec<String> = order.iter().map(usize::to_string).collect();
-        data += &format!("{comma}\n[{}]", numbers.join(","));
-    }
-    data += "]};\n";
-    TEMPLATE.replacen(PLACE, &data, 1)
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                title { "Real or not?" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                img #picture alt="";
+                div #text {}
+                script { (PreEscaped(data(design, files))) (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// The pictures and the participants' orders, as a JavaScript constant.
+fn data(design: &Design, files: &[Vec<u8>]) -> String {
+    let pictures: Vec<[String; 2]> = (0..)
+        .zip(files)
+        .map(|(index, file)| [design.name(index), format!("data:image/png;base64,{}", STANDARD.encode(file))])
+        .collect();
+    // Names are p001 and so on, the rest is base64 and numbers: nothing in it can end the script.
+    format!("const STUDY = {};\n", serde_json::json!({ "pictures": pictures, "orders": design.orders }))
 }
 
 #[cfg(test)]
@@ -37,7 +50,12 @@ mod tests {
         let files: Vec<Vec<u8>> = (0..design.items.len()).map(|i| vec![i as u8; 9]).collect();
         let page = page(&design, &files);
         assert_eq!(page.matches("data:image/png;base64,").count(), design.items.len());
-        assert!(!page.contains(PLACE) && !page.contains("http"));
+        assert!(!page.contains("http"));
+        assert!(
+            page.starts_with("<!DOCTYPE html><html lang=\"en\">")
+                && page.ends_with("</script></body></html>")
+        );
+        assert!(page.contains("state === \"shown\" && (key"), "the script stands in it unescaped");
         let json = page.split("const STUDY = ").nth(1).and_then(|s| s.split(";\n").next()).expect("the data");
         let data: serde_json::Value = serde_json::from_str(json).expect("JSON");
         assert_eq!(data["orders"][1].as_array().map(Vec::len), Some(design.items.len()));

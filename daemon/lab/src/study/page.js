@@ -1,21 +1,3 @@
-<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<title>Real or not?</title>
-<style>
-  html, body { height: 100%; margin: 0; background: #808080; color: #111; font: 1.3rem/1.5 sans-serif; }
-  body { display: flex; flex-direction: column; align-items: center; justify-content: center; text-align: center; }
-  #picture { width: 80vw; height: 60vh; object-fit: contain; visibility: hidden; }
-  #text { min-height: 7rem; max-width: 45rem; padding: 0 1rem; }
-  kbd { border: 1px solid #333; border-radius: .3em; padding: 0 .4em; background: #ddd; }
-  button, input { font: inherit; }
-  input { width: 5em; }
-</style>
-<body>
-<img id="picture" alt="">
-<div id="text"></div>
-<script>
-/*STUDY*/
 "use strict";
 // Shown for three seconds each (Nelson 2009, IV.A); the answer may come as soon as the picture does.
 const SHOWN_MS = 3000, PAUSE_MS = 600;
@@ -124,6 +106,3 @@ document.addEventListener("keydown", event => {
   event.preventDefault();
 });
 start();
-</script>
-</body>
-</html>
