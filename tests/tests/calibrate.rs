@@ -95,7 +95,8 @@ fn the_truth_is_found_from_the_horizon_alone_written_and_restored() {
     let old = bowwave_calibration::to_toml(&make::calibration(&by_hand()));
     fs::write(&file, &old).unwrap();
     let at = file.to_str().unwrap();
-    let output = calibrate("extrinsics", recording(), &["--calibration", at, "--report", page.to_str().unwrap()]);
+    let output =
+        calibrate("extrinsics", recording(), &["--calibration", at, "--report", page.to_str().unwrap()]);
     expect_code(&output, 0);
     assert!(told(&output).starts_with("PASS: usable; boats lie within"), "{}", told(&output));
     let written = CalibrationFile::read(&file).unwrap();

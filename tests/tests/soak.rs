@@ -35,7 +35,8 @@ fn hours_with_a_fault_every_half_minute() {
     let further: Vec<&str> = arguments.into_iter().chain(records.then_some("--record")).collect();
     let summary = play(&recording, &out, 0, &further);
     if records {
-        let replayed = bowwave(["replay".as_ref(), out.join("recording.mcap").as_os_str(), "--json".as_ref()]);
+        let replayed =
+            bowwave(["replay".as_ref(), out.join("recording.mcap").as_os_str(), "--json".as_ref()]);
         expect_code(&replayed, 0);
         let replayed: serde_json::Value = serde_json::from_slice(&replayed.stdout).expect("JSON");
         for key in ["records_digest", "scenes_digest"] {

@@ -201,9 +201,13 @@ fn devices_that_are_not_there_are_said_and_what_was_gathered_is_kept() {
     let output = child.wait_with_output().unwrap();
     expect_code(&output, 1);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let kept = said.lines().find_map(|l| l.strip_prefix("what was gathered is kept: bowwave calibrate extrinsics "));
+    let kept =
+        said.lines().find_map(|l| l.strip_prefix("what was gathered is kept: bowwave calibrate extrinsics "));
     let kept = kept.unwrap_or_else(|| panic!("{said}"));
-    assert!(kept.contains("calibrate-extrinsics-") && fs::metadata(kept).is_ok_and(|m| m.len() > 0), "{kept}");
+    assert!(
+        kept.contains("calibrate-extrinsics-") && fs::metadata(kept).is_ok_and(|m| m.len() > 0),
+        "{kept}"
+    );
 }
 
 #[test]

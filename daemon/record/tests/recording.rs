@@ -87,7 +87,13 @@ fn what_cannot_be_recorded_is_refused_and_the_rest_goes_on() {
         pose: CameraPose { world_from_camera: DQuat::from_xyzw(0.0, 0.0, 0.0, 2.0), position: DVec3::ZERO },
     };
     let bad_clock = ImuSample { device_time_ns: i64::MAX, ..imu_sample() };
-    let empty = FrameEntry { arrival: at(1), mid_exposure: at(1), sequence: 0, jpeg: Arc::from(&[][..]) };
+    let empty = FrameEntry {
+        arrival: at(1),
+        mid_exposure: at(1),
+        sequence: 0,
+        jpeg: Arc::from(&[][..]),
+        is_recoded: false,
+    };
     let huge = FrameEntry { jpeg: Arc::from(vec![0; (32 << 20) + 1]), ..empty.clone() };
     for (entry, expected) in [
         (frame(-5, 0, 10), "begin later"),

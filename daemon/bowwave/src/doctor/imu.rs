@@ -34,11 +34,8 @@ pub(super) fn checks(arguments: &DoctorImu) -> Result<Vec<Check>> {
     let mut checks = vec![configured::verdict("imu", &found.faults, unit(status), enough)];
     let fields = status.said.fields;
     if status.said.format.is_some() {
-        let verdict = if fields.clock && fields.rate && fields.accel {
-            Verdict::Ok
-        } else {
-            Verdict::Warning
-        };
+        let verdict =
+            if fields.clock && fields.rate && fields.accel { Verdict::Ok } else { Verdict::Warning };
         checks.push(check("output", verdict, fields.to_string()));
         checks.push(check("timing", Verdict::Ok, timing(status)));
         checks.push(clock(status, found.clock.as_ref()));

@@ -88,7 +88,7 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
 
 /// The trainer on the gun's devices, before it is started.
 struct Gun<'a> {
-    arguments: &'a Run,
+    arguments: &'a RunArgs,
     data: &'a Path,
     mode: Mode,
     program_start: Time,

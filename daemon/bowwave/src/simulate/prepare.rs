@@ -179,13 +179,13 @@ mod tests {
     use clap::Parser as _;
 
     use super::*;
-    use crate::cli::{Cli, Command};
+    use crate::cli::{CommandLine, ProgramCommand};
 
     #[test]
     fn the_former_name_of_a_fused_orientation_is_read_with_a_warning() {
         let asked = |arguments: &[&str]| {
-            let cli = Cli::try_parse_from(["bowwave", "simulate"].iter().chain(arguments)).unwrap();
-            let Command::Simulate(simulate) = cli.command else { panic!("not simulate") };
+            let cli = CommandLine::try_parse_from(["bowwave", "simulate"].iter().chain(arguments)).unwrap();
+            let ProgramCommand::Simulate(simulate) = cli.command else { panic!("not simulate") };
             orientation(&simulate)
         };
         assert_eq!(asked(&[]), (None, None));
@@ -195,7 +195,10 @@ mod tests {
         assert_eq!(former, Some(Source::Fused));
         assert!(warning.is_some_and(|w| w.contains("--orientation fused")), "{warning:?}");
         for wrong in [&["--orientation", "unit"][..], &["--fuse", "--orientation", "auto"]] {
-            assert!(Cli::try_parse_from(["bowwave", "simulate"].iter().chain(wrong)).is_err(), "{wrong:?}");
+            assert!(
+                CommandLine::try_parse_from(["bowwave", "simulate"].iter().chain(wrong)).is_err(),
+                "{wrong:?}"
+            );
         }
     }
 }

@@ -255,7 +255,10 @@ mod tests {
         plausibility.sample(&sample(100, noise(5), noise(6)));
         assert_eq!(plausibility.verdict(Time::from_ns(505 * MS)), None);
         let shaken = |n: i64| sample(n, noise(n), noise(n) + DVec3::X * (-156.0 + noise(n).x));
-        assert!(matches!(verdict_after(shaken), Some((_, Implausible::Saturated { axis: "acceleration x", .. }))));
+        assert!(matches!(
+            verdict_after(shaken),
+            Some((_, Implausible::Saturated { axis: "acceleration x", .. }))
+        ));
     }
 
     #[test]

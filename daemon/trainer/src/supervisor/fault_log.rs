@@ -2,7 +2,7 @@
 
 use bowwave_core::{
     event::Event,
-    fault::{Fault, FaultBoard, FaultChange, LogEntry, Severity, LogEvent},
+    fault::{Fault, FaultBoard, FaultChange, LogEntry, LogEvent, Severity},
 };
 
 /// Keeps the board and writes the log.

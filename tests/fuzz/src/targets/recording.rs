@@ -72,7 +72,12 @@ fn check_entry(entry: &Entry) {
             assert!((pose.world_from_camera.length() - 1.0).abs() < 1e-3, "no rotation: {pose:?}");
         }
         // The inertial unit's values are kept as they were measured; the session judges them.
-        Entry::Imu(_) | Entry::Trigger(_) | Entry::Mark(_) => {}
+        Entry::Imu(_) | Entry::Trigger(_) | Entry::Mark(_) | Entry::Fault(_) | Entry::Tick(_) => {}
+        Entry::Picture(raw) => assert!(!raw.picture.bytes().is_empty(), "a picture without pixels: {raw:?}"),
+        Entry::ShipValues(ship) => {
+            let numbers = [ship.heading, ship.roll, ship.pitch, ship.heading_sigma];
+            assert!(numbers.into_iter().flatten().all(f64::is_finite), "{ship:?}");
+        }
         Entry::Ship(line) => assert!(line.sentence.is_ascii() && !line.sentence.is_empty(), "{line:?}"),
     }
 }
@@ -80,12 +85,15 @@ fn check_entry(entry: &Entry) {
 fn count(counts: &mut Counts, entry: &Entry) {
     *match entry {
         Entry::Imu(_) => &mut counts.imu,
-        Entry::Frame(_) => &mut counts.frames,
+        Entry::Frame(_) | Entry::Picture(_) => &mut counts.frames,
         Entry::Trigger(_) => &mut counts.triggers,
         Entry::Ship(_) => &mut counts.ship,
         Entry::Mark(_) => &mut counts.marks,
         Entry::Truth(_) => &mut counts.truths,
         Entry::Pose(_) => &mut counts.poses,
+        Entry::ShipValues(_) => &mut counts.ship_values,
+        Entry::Fault(_) => &mut counts.faults,
+        Entry::Tick(_) => &mut counts.ticks,
     } += 1;
 }
 

@@ -1,7 +1,7 @@
 //! The scenario: any text.
 
 use bowwave_core::world::{
-    boats::{CourseState, BoatDamage},
+    boats::{BoatDamage, CourseState},
     scenario::Scenario,
 };
 

@@ -37,7 +37,8 @@ impl KarmaClip {
     pub fn load() -> Result<Option<Self>> {
         let Some(path) = recorded::find(video::KARMA) else { return Ok(None) };
         let Some(pictures) = video::karma_pictures()? else { return Ok(None) };
-        let telemetry = read_telemetry(std::path::Path::new("ffmpeg"), &path)?.context("the clip has no gyro")?;
+        let telemetry =
+            read_telemetry(std::path::Path::new("ffmpeg"), &path)?.context("the clip has no gyro")?;
         Ok(Some(Self { pictures, samples: telemetry.samples }))
     }
 

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use bowwave_calibration::{
-    lens::{LensCalibration, LensModel, BoardView, solve},
+    lens::{BoardView, LensCalibration, LensModel, solve},
     simulated::Random,
     target::{Grey, Target, detect, varied, view},
 };
@@ -59,7 +59,8 @@ fn pictures(bench: &mut PartBench, target: &Target, seeds: u64) {
         let ways = [6, 12, 24, 40, 80].map(|count| {
             let all: Vec<Vec<BoardView>> =
                 (0..seeds).map(|seed| views(&lens, target, count, 0.6, 0.1, seed)).collect();
-            let found: Vec<Option<LensCalibration>> = all.iter().map(|v| solve(v, size(&lens)).ok()).collect();
+            let found: Vec<Option<LensCalibration>> =
+                all.iter().map(|v| solve(v, size(&lens)).ok()).collect();
             let error = rms(found.iter().map(|c| focal_error(&lens, c.as_ref())));
             let centre = rms(found.iter().map(|c| centre_error(&lens, c.as_ref())));
             let stated = rms(found.iter().flatten().map(LensCalibration::focal_sigma_px));
@@ -152,7 +153,11 @@ fn models(bench: &mut PartBench, target: &Target, seeds: u64) {
             &format!("{name}: left over where it took no part"),
             "px",
             vec![
-                ExtremeResult::product("two models", "chosen by evidence", rms(chosen.map(|e| e.held_out_px))),
+                ExtremeResult::product(
+                    "two models",
+                    "chosen by evidence",
+                    rms(chosen.map(|e| e.held_out_px)),
+                ),
                 ExtremeResult::rival("one model", "pinhole", left(LensModel::RadialTangential)),
                 ExtremeResult::rival("one model", "fisheye", left(LensModel::Fisheye)),
             ],

@@ -136,7 +136,10 @@ fn gun_params() -> Params {
 type AttitudeRun<'a> = Box<dyn Fn(&Trial, TellAttitude<'_>) + 'a>;
 
 /// Method, setting, whether the product uses it, itself.
-fn ways<'a>(default: InclinationSettings, rate: RateKind) -> Vec<(&'static str, &'static str, bool, AttitudeRun<'a>)> {
+fn ways<'a>(
+    default: InclinationSettings,
+    rate: RateKind,
+) -> Vec<(&'static str, &'static str, bool, AttitudeRun<'a>)> {
     let (gun, hand) = (settings(InclinationSettings::GUN, rate), settings(InclinationSettings::HAND, rate));
     vec![
         (
@@ -172,7 +175,13 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
     }
     for sea in [ship::SEA_4, ship::SEA_6] {
         let trial = ship_trial(sea, true, 300.0, UnitErrors::usual());
-        scene(bench, &format!("gun on a ship, {}", sea.name), &[trial], InclinationSettings::GUN, RateKind::Instant);
+        scene(
+            bench,
+            &format!("gun on a ship, {}", sea.name),
+            &[trial],
+            InclinationSettings::GUN,
+            RateKind::Instant,
+        );
     }
     let usual = UnitErrors::usual();
     let slow = UnitErrors { rate_hz: 100.0, ..usual };

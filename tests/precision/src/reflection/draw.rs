@@ -18,7 +18,9 @@ use bowwave_core::{
     water::{ReflectionMethod, ShadowLevel, Water},
     world::fleet::Afloat,
 };
-use bowwave_render::{Completions, DrawRequest, FinishedFrame, Needs, RenderConfig, Renderer, TimeOuts, SOFTWARE};
+use bowwave_render::{
+    Completions, DrawRequest, FinishedFrame, Needs, RenderConfig, Renderer, SOFTWARE, TimeOuts,
+};
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::RgbImage;
 
@@ -266,7 +268,7 @@ impl Painter {
             needs: Needs { boats_max, rounds_max: 0, wakes_max: 0, waters, optics },
             picture: None,
             // Others may keep the processor that draws.
-            time_outs: TimeOuts { frame: Duration::from_secs(60), rehearsal: Duration::from_secs(120) },
+            time_outs: TimeOuts { frame: Duration::from_secs(60), warm_up: Duration::from_secs(120) },
         };
         let (mut renderer, done) = Renderer::new(&config, models)?;
         renderer.time_every(TIMED_EVERY);

@@ -1,7 +1,7 @@
 //! Boards held before a camera as somebody who calibrates it holds them.
 
 use bowwave_calibration::{
-    lens::{Corner, BoardView},
+    lens::{BoardView, Corner},
     simulated::Random,
     target::Target,
 };

@@ -14,7 +14,7 @@ use anyhow::Result;
 use bowwave_calibration::{
     CalibrationFile, Date,
     report::{CalibrationReport, html},
-    wizard::{Detector, Input, WizardSetup, Task, Wizard, WizardSolution, WizardStep},
+    wizard::{Detector, Input, Task, Wizard, WizardSetup, WizardSolution, WizardStep},
 };
 use bowwave_core::event::Event;
 

@@ -61,7 +61,8 @@ impl GuestWizard {
     fn start(bench: &mut HilBench, arguments: &str) -> Result<Self> {
         bench.machine.guest.shell(&format!("rm -f {KEYS} {SAID}; mkfifo {KEYS}"))?;
         // Of a machine as slow as this one IMU LATE would be said all the time.
-        let text = configuration(&Configured::default()).replace("packet_jitter_ms_max = 30", "packet_jitter_ms_max = 800");
+        let text = configuration(&Configured::default())
+            .replace("packet_jitter_ms_max = 30", "packet_jitter_ms_max = 800");
         bench.machine.guest.call(AgentCommand::Write { path: format!("{FOLDER}/guided.toml"), text })?;
         let line = format!(
             "cd / && GALLIVM_PERF=nopt MESA_SHADER_CACHE_DIR=/var/cache/bowwave CACHE_DIRECTORY=/var/cache/bowwave \

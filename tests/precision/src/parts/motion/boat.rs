@@ -128,7 +128,8 @@ impl DrivenBoat {
 
     /// How the product has the boat begin.
     pub fn start(&self) -> BoatState {
-        let BoatMotion { at, rate } = BoatMotion::of_plane(&self.form(), |t| self.course(t), &self.waves, 0.0);
+        let BoatMotion { at, rate } =
+            BoatMotion::of_plane(&self.form(), |t| self.course(t), &self.waves, 0.0);
         [at.x, at.z, at.y, rate.x, rate.z, rate.y]
     }
 
