@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 pub mod clock;
+mod companion;
 pub mod presenter;
 pub mod replay;
 pub mod source;
@@ -20,4 +21,5 @@ pub mod supervisor;
 mod trainer;
 
 pub use clock::TickClock;
+pub use companion::Companion;
 pub use trainer::{Ended, Finished, Signals, Trainer, TrainerOptions};

@@ -13,7 +13,10 @@ use anyhow::{Context, Result, bail};
 use bowwave_core::{
     event::{Event, Mark, MarkKind},
     fault::{Change, Fault, FaultChange},
-    session::{Note, Session, Setup},
+    frame::scene::Scene,
+    guide::Guide,
+    model::Model,
+    session::{Note, Session, Setup, View},
     time::{NS_PER_S, Time},
 };
 use bowwave_devices::clock::now;
@@ -22,7 +25,8 @@ use bowwave_render::RenderError;
 
 use crate::{
     clock::{DueFrame, TickClock},
-    presenter::{Handed, OutputReport, Presenter, PresenterOptions, UserEvent},
+    companion::Companion,
+    presenter::{Handed, Presented, Presenter, PresenterOptions, UserEvent},
     source::Source,
     storage::Storage,
     summary::{Summary, SummaryOptions, Tally},
@@ -65,8 +69,8 @@ pub enum Ended {
 pub struct TrainerOptions {
     /// What the session is made from.
     pub setup: Setup,
-    /// How frames are drawn and where they go.
-    pub presenter: PresenterOptions,
+    /// How frames are drawn and where they go; `None` draws nothing.
+    pub presenter: Option<PresenterOptions>,
     /// End after so many frames.
     pub frames: Option<u64>,
     /// The run is to reach the end of its recording, so that how that ends is looked at.
@@ -101,13 +105,15 @@ pub struct Trainer {
     source: Source,
     clock: TickClock,
     session: Session,
-    presenter: Presenter,
+    presenter: Option<Presenter>,
     storage: Option<Storage>,
     faults: FaultLog,
     losses: Vec<Time>,
     events: Vec<Event>,
     changes: Vec<FaultChange>,
     tally: Tally,
+    /// The companion has ended.
+    is_dialogue_over: bool,
 }
 
 impl Trainer {
@@ -121,15 +127,12 @@ impl Trainer {
     ) -> Result<Self> {
         let session = Session::new(options.setup.clone())?;
         let mut changes = std::mem::take(&mut options.faults);
-        let presenter = match Presenter::open(&session, &options.setup.models, &options.presenter) {
-            // The GPU that the configuration of a gun names may be gone, or misspelt.
-            Err(e) if options.presenter.gpu.is_some() && matches!(source, Source::Devices(_)) => {
-                let cause = format!("{e:#}; another GPU is used");
-                changes.push(FaultChange::raised(now(), Fault::Config, cause));
-                options.presenter.gpu = None;
-                Presenter::open(&session, &options.setup.models, &options.presenter)?
+        let is_gun = matches!(source, Source::Devices(_));
+        let presenter = match &mut options.presenter {
+            None => None,
+            Some(presenter) => {
+                Some(open_presenter(&session, &options.setup.models, presenter, is_gun, &mut changes)?)
             }
-            opened => opened?,
         };
         let faults = FaultLog::new(options.boot_id.clone());
         let tally = Tally::new(&options.summary);
@@ -146,43 +149,82 @@ impl Trainer {
             events: Vec::with_capacity(256),
             changes,
             tally,
+            is_dialogue_over: false,
         })
     }
 
     /// Runs until it is asked to end, or all frames are drawn. What is recorded is complete when this returns, also with an error.
-    pub fn run(mut self, notifier: &mut Notifier, pulse: Option<&Pulse>) -> Result<Finished> {
-        let ended = self.frames(notifier, pulse);
+    pub fn run(self, notifier: &mut Notifier, pulse: Option<&Pulse>) -> Result<Finished> {
+        self.run_with(notifier, pulse, None)
+    }
+
+    /// Runs until `companion` ends.
+    pub fn accompany(self, companion: &mut dyn Companion) -> Result<Finished> {
+        self.run_with(&mut Notifier::from_environment(), None, Some(companion))
+    }
+
+    fn run_with(
+        mut self,
+        notifier: &mut Notifier,
+        pulse: Option<&Pulse>,
+        companion: Option<&mut dyn Companion>,
+    ) -> Result<Finished> {
+        let trains = companion.is_none();
+        let ended = self.frames(notifier, pulse, companion);
         let _pulsing = pulse.map(Pulse::during);
         if matches!(ended, Ok(Ended::Stopped) | Err(_)) {
             notifier.stopping();
         }
-        if let (Ok(Ended::Stopped), Source::Devices(_)) = (&ended, &self.source) {
+        if let (Ok(Ended::Stopped), Source::Devices(_), true) = (&ended, &self.source, trains) {
             self.farewell(pulse);
         }
         self.end(ended)
     }
 
-    fn frames(&mut self, notifier: &mut Notifier, pulse: Option<&Pulse>) -> Result<Ended> {
-        self.await_first_picture()?;
-        while !self.is_over() {
+    fn frames(
+        &mut self,
+        notifier: &mut Notifier,
+        pulse: Option<&Pulse>,
+        mut companion: Option<&mut dyn Companion>,
+    ) -> Result<Ended> {
+        if companion.is_none() {
+            self.await_first_picture()?;
+        }
+        let mut source_ended = false;
+        while !self.is_over(companion.is_some()) {
             let due = self.clock.next();
-            if self.signals.stop.load(Ordering::Relaxed) {
+            let asked_to_stop = self.signals.stop.swap(false, Ordering::Relaxed);
+            if let Some(companion) = &mut companion {
+                if asked_to_stop {
+                    companion.quit();
+                }
+                if !source_ended && self.source.has_ended() {
+                    source_ended = true;
+                    companion.source_ended();
+                }
+            } else if asked_to_stop {
                 break;
             }
             if self.signals.reload.swap(false, Ordering::Relaxed) || self.screen_changed() {
                 return Ok(Ended::Reload { lcd: self.source.lcd_size() });
             }
-            match self.frame(due, pulse) {
+            // Once more as a plain reference: the loop goes on with it.
+            match self.frame(due, pulse, companion.as_mut().map(|c| &mut **c as &mut dyn Companion)) {
                 Ok(()) => {}
                 Err(e) if is_lost(&e) => self.rebuild(&e, pulse)?,
                 Err(e) => return Err(e),
             }
-            self.supervise(notifier);
+            if companion.is_none() {
+                self.supervise(notifier);
+            }
         }
         Ok(Ended::Stopped)
     }
 
-    fn is_over(&self) -> bool {
+    fn is_over(&self, is_dialogue: bool) -> bool {
+        if is_dialogue {
+            return self.is_dialogue_over;
+        }
         let drawn = self.tally.frames() + self.clock.missed_and_slips().0;
         self.signals.stop.load(Ordering::Relaxed)
             || self.source.has_ended()
@@ -191,7 +233,7 @@ impl Trainer {
 
     /// A recording's frames count from its first picture on; a gun shows at once that its camera is not there yet.
     fn await_first_picture(&mut self) -> Result<()> {
-        if matches!(self.source, Source::Devices(_)) {
+        if !matches!(self.source, Source::Recording(_)) {
             return Ok(());
         }
         let begun = now();
@@ -225,9 +267,14 @@ impl Trainer {
         self.options.follow_lcd && self.source.lcd_size().is_some_and(|size| size != self.session.plan().size)
     }
 
-    /// Fetches what has arrived; changes of faults become events too.
-    fn collect(&mut self, until: Time) {
-        self.source.collect(until, &mut self.events, &mut self.changes);
+    /// Fetches what has arrived; changes of faults become events too. A dialogue tells of them itself.
+    fn collect(&mut self, until: Time, dialogue: Option<&dyn Companion>) {
+        if dialogue.is_none_or(|companion| !companion.waits() || matches!(self.source, Source::Devices(_))) {
+            self.source.collect(until, &mut self.events, &mut self.changes);
+        }
+        if dialogue.is_some() {
+            self.events.extend(self.changes.drain(..).map(Event::Fault));
+        }
         for change in self.changes.drain(..) {
             let power_fails =
                 change.fault == Fault::Brownout && matches!(change.change, Change::Raised { .. });
@@ -236,7 +283,7 @@ impl Trainer {
             }
             self.faults.take(change, &mut self.events);
         }
-        for user in self.presenter.user_events() {
+        for user in self.presenter.iter().flat_map(Presenter::user_events) {
             match user {
                 UserEvent::Trigger(edge) => self.events.push(Event::Trigger(edge)),
                 UserEvent::Rezero => self.events.push(at_stow()),
@@ -268,7 +315,7 @@ impl Trainer {
                 lock.display_lost();
             }
         }
-        for done in self.presenter.done() {
+        for done in self.presenter.iter().flat_map(Presenter::done) {
             if let Some(lock) = &mut lock {
                 lock.rendered(done.complete.ns_since(done.begun));
             }
@@ -277,19 +324,48 @@ impl Trainer {
     }
 
     /// One frame.
-    fn frame(&mut self, due: DueFrame, pulse: Option<&Pulse>) -> Result<()> {
+    fn frame(
+        &mut self,
+        due: DueFrame,
+        pulse: Option<&Pulse>,
+        companion: Option<&mut dyn Companion>,
+    ) -> Result<()> {
         let entered = now();
-        self.collect(due.tick.time);
+        self.collect(due.tick.time, companion.as_deref());
         let collected = now();
         if let Some(storage) = &mut self.storage {
             storage.inputs(&self.events, due.tick, self.session.digest());
         }
+        let page = match companion {
+            None => None,
+            Some(companion) => match companion.frame(&self.events, due.tick)? {
+                Some(page) => Some(Arc::new(page)),
+                None => {
+                    self.is_dialogue_over = true;
+                    return Ok(());
+                }
+            },
+        };
         let planned = *self.session.plan();
-        self.events.iter().for_each(|event| self.session.event(event));
-        self.events.clear();
+        for event in self.events.drain(..) {
+            if page.is_none() || matches!(event, Event::Frame(_)) {
+                self.session.event(&event);
+            }
+        }
         if *self.session.plan() != planned {
             self.open_presenter_again(pulse)?;
         }
+        self.step(due, page, [entered, collected])
+    }
+
+    /// Steps the session and hands its frame on.
+    fn step(
+        &mut self,
+        due: DueFrame,
+        page: Option<Arc<Guide>>,
+        [entered, collected]: [Time; 2],
+    ) -> Result<()> {
+        let is_dialogue = page.is_some();
         let step = self.session.tick(due.tick);
         let stepped = now();
         self.tally.records(step.records);
@@ -305,9 +381,22 @@ impl Trainer {
             let entry = |pose| PoseEntry { time: view.mid_exposure, pose };
             storage.poses(view.pose_known.then(|| entry(view.scene.camera)), truth.map(entry));
         }
-        match self.presenter.show(&view, due.begun, due.deadline)? {
-            Handed::Taken { waited } => self.tally.times(waited, [entered, collected, stepped, now()]),
-            Handed::OutputEnded => return Err(self.output_error()),
+        let with_page = page.map(|page| Scene { guide: Some(page), ..view.scene.clone() });
+        let view = View { scene: with_page.as_ref().unwrap_or(view.scene), ..view };
+        let handed = match &mut self.presenter {
+            Some(presenter) => presenter.show(&view, due.begun, due.deadline).map_err(anyhow::Error::from),
+            None => Ok(Handed::Taken { waited: false }),
+        };
+        match handed {
+            Ok(Handed::Taken { waited }) => self.tally.times(waited, [entered, collected, stepped, now()]),
+            // The terminal goes on with the dialogue.
+            Ok(Handed::OutputEnded) if is_dialogue => self.lose_display(),
+            Ok(Handed::OutputEnded) => return Err(self.output_error()),
+            Err(e) if is_dialogue => {
+                log::error!("{e:#}");
+                self.lose_display();
+            }
+            Err(e) => return Err(e),
         }
         if let Some(storage) = &mut self.storage {
             storage.poll(&mut self.faults, &mut self.events)?;
@@ -315,14 +404,25 @@ impl Trainer {
         Ok(())
     }
 
+    fn lose_display(&mut self) {
+        let why = self.output_error();
+        log::error!("the display is lost, the rest goes on: {why:#}");
+        self.presenter = None;
+    }
+
     fn open_presenter_again(&mut self, pulse: Option<&Pulse>) -> Result<()> {
         let _pulsing = pulse.map(Pulse::during);
-        self.presenter.reopen(&self.session, &self.options.setup.models, &self.options.presenter)
+        match (&mut self.presenter, &self.options.presenter) {
+            (Some(presenter), Some(options)) => {
+                presenter.reopen(&self.session, &self.options.setup.models, options)
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Why the output thread has ended.
     fn output_error(&mut self) -> anyhow::Error {
-        match self.presenter.take_error() {
+        match self.presenter.as_mut().and_then(Presenter::take_error) {
             Some(e) => e,
             None => anyhow::anyhow!("the output thread has ended without a word; report it with the log"),
         }
@@ -368,12 +468,12 @@ impl Trainer {
         self.faults.set(Fault::Stop, Some("asked to stop".to_owned()), &mut self.events);
         let frame = self.tally.frames();
         let due = self.clock.next();
-        if let Err(e) = self.frame(due, pulse) {
+        if let Err(e) = self.frame(due, pulse, None) {
             log::debug!("no last frame: {e:#}");
             return;
         }
         let until = now().plus_ns(FAREWELL.as_nanos() as i64);
-        while now() < until && !self.presenter.done().any(|d| d.frame >= frame) {
+        while now() < until && !self.presenter.iter().flat_map(Presenter::done).any(|d| d.frame >= frame) {
             thread::sleep(Duration::from_millis(2));
         }
     }
@@ -405,25 +505,15 @@ impl Trainer {
             log::error!("{} {e:#}", Fault::GpuHang.code());
             std::process::exit(1);
         }
-        let (device, video) = (self.presenter.device(), self.presenter.picture_path());
-        let messages = self.presenter.validation_messages();
-        for message in &messages {
-            log::error!("Vulkan's validation layer reports: {message}");
-        }
-        let output = match self.presenter.close() {
-            Ok(report) => report,
-            Err(e) => {
-                wrong.push(format!("{e:#}"));
-                OutputReport::default()
-            }
-        };
+        let presented =
+            self.presenter.take().map_or_else(Presented::default, |presenter| presenter.end(&mut wrong));
         let mut counters = self.source.counters();
         counters.push(("recording_entries_dropped", lost_entries));
         let summary = self.tally.summary(
             &self.session,
-            output,
+            presented.output,
             &self.clock,
-            (&device, &video),
+            (&presented.device, &presented.video),
             self.faults.counts(),
             counters,
             &self.options.summary,
@@ -437,7 +527,25 @@ impl Trainer {
             // What is still wrong is found again, and told again.
             self.faults.end_all();
         }
-        Ok(Finished { ended: ended?, summary, wrong, validation: messages })
+        Ok(Finished { ended: ended?, summary, wrong, validation: presented.validation })
+    }
+}
+
+/// Opens renderer and output. A gun does without the GPU that its configuration names, since it may be gone or misspelt.
+fn open_presenter(
+    session: &Session,
+    models: &[Model],
+    options: &mut PresenterOptions,
+    is_gun: bool,
+    faults: &mut Vec<FaultChange>,
+) -> Result<Presenter> {
+    match Presenter::open(session, models, options) {
+        Err(e) if options.gpu.is_some() && is_gun => {
+            faults.push(FaultChange::raised(now(), Fault::Config, format!("{e:#}; another GPU is used")));
+            options.gpu = None;
+            Presenter::open(session, models, options)
+        }
+        opened => opened,
     }
 }
 

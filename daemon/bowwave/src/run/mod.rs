@@ -134,7 +134,7 @@ impl Gun<'_> {
         let options = TrainerOptions {
             follow_lcd: config.size.is_none(),
             setup: settings.setup,
-            presenter,
+            presenter: Some(presenter),
             frames: None,
             plays_to_the_end: false,
             boot_id,

@@ -50,7 +50,7 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     let storage = Storage::open(storage(arguments, &prepared, realtime, origin), &mut faults)?;
     let options = TrainerOptions {
         setup: prepared.setup.clone(),
-        presenter: presenter(arguments, &prepared, realtime, frames),
+        presenter: Some(presenter(arguments, &prepared, realtime, frames)),
         frames: Some(frames),
         plays_to_the_end: arguments.frames.is_none() && arguments.duration.is_none(),
         follow_lcd: false,

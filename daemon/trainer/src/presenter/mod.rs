@@ -132,23 +132,23 @@ impl Presenter {
         self.output.take()?.finish().err()
     }
 
-    /// Device and driver.
-    pub fn device(&self) -> String {
-        format!("{} ({})", self.renderer.device().name, self.renderer.device().driver)
+    /// Takes the last frames out and ends the thread. What went wrong is added to `wrong`.
+    pub fn end(self, wrong: &mut Vec<String>) -> Presented {
+        let (device, counts) = (self.renderer.device(), self.renderer.picture_counts());
+        let device = format!("{} ({})", device.name, device.driver);
+        let video = format!("{} copied, {} read where the camera put them", counts.copied, counts.imported);
+        let validation = self.renderer.validation_messages();
+        for message in &validation {
+            log::error!("Vulkan's validation layer reports: {message}");
+        }
+        let output = self.close().unwrap_or_else(|e| {
+            wrong.push(format!("{e:#}"));
+            OutputReport::default()
+        });
+        Presented { device, video, validation, output }
     }
 
-    /// How pictures reach the GPU: copied or imported, with how many of each.
-    pub fn picture_path(&self) -> String {
-        format!("{:?} {:?}", self.renderer.picture_path(), self.renderer.picture_counts()).to_lowercase()
-    }
-
-    /// What Vulkan's validation layer has said.
-    pub fn validation_messages(&self) -> Vec<String> {
-        self.renderer.validation_messages()
-    }
-
-    /// Takes the last frames out and ends the thread.
-    pub fn close(self) -> Result<OutputReport> {
+    fn close(self) -> Result<OutputReport> {
         let Self { renderer, output, before: mut report } = self;
         drop(renderer);
         if let Some(output) = output {
@@ -156,6 +156,19 @@ impl Presenter {
         }
         Ok(report)
     }
+}
+
+/// Report of a presenter that has ended.
+#[derive(Debug, Default)]
+pub struct Presented {
+    /// Vulkan device and driver.
+    pub device: String,
+    /// How pictures reached the GPU.
+    pub video: String,
+    /// Messages of Vulkan's validation layer.
+    pub validation: Vec<String>,
+    /// Measurements of the output thread.
+    pub output: OutputReport,
 }
 
 /// Outcome of handing a frame over.

@@ -5,6 +5,7 @@ mod devices;
 use bowwave_core::{
     event::Event, fault::FaultChange, frame::scene::Status, geometry::CameraPose, time::Time,
 };
+use crossbeam_channel::{Receiver, TryRecvError};
 use hw_sim::replay::{Replay, ReplayError, ReplayStats};
 
 use crate::supervisor::WallTime;
@@ -17,6 +18,35 @@ pub enum Source {
     Devices(Box<Devices>),
     /// A recording.
     Recording(Box<RecordingSource>),
+    /// Events that another thread hands over, at the pace at which they are taken.
+    Feed(EventFeed),
+}
+
+/// Events that another thread hands over. It has ended when that thread closes the queue.
+#[derive(Debug)]
+pub struct EventFeed {
+    events: Receiver<Event>,
+    is_closed: bool,
+}
+
+impl EventFeed {
+    /// The reading end of a queue.
+    pub const fn new(events: Receiver<Event>) -> Self {
+        Self { events, is_closed: false }
+    }
+
+    fn collect(&mut self, events: &mut Vec<Event>) {
+        loop {
+            match self.events.try_recv() {
+                Ok(event) => events.push(event),
+                Err(TryRecvError::Empty) => return,
+                Err(TryRecvError::Disconnected) => {
+                    self.is_closed = true;
+                    return;
+                }
+            }
+        }
+    }
 }
 
 /// A recording that is replayed.
@@ -49,6 +79,7 @@ impl Source {
                     recording.error = Some(e);
                 }
             }
+            Self::Feed(feed) => feed.collect(events),
         }
     }
 
@@ -57,13 +88,14 @@ impl Source {
         match self {
             Self::Devices(_) => false,
             Self::Recording(recording) => recording.error.is_some() || recording.replay.finished(),
+            Self::Feed(feed) => feed.is_closed,
         }
     }
 
     /// Why the recording cannot be read further, once.
     pub fn take_error(&mut self) -> Option<ReplayError> {
         match self {
-            Self::Devices(_) => None,
+            Self::Devices(_) | Self::Feed(_) => None,
             Self::Recording(recording) => recording.error.take(),
         }
     }
@@ -71,7 +103,7 @@ impl Source {
     /// Where the camera really was at a picture's mid-exposure; only recordings with truth know.
     pub fn truth_at(&self, mid_exposure: Time) -> Option<CameraPose> {
         match self {
-            Self::Devices(_) => None,
+            Self::Devices(_) | Self::Feed(_) => None,
             Self::Recording(recording) => recording.replay.truth_at(mid_exposure),
         }
     }
@@ -80,7 +112,7 @@ impl Source {
     pub fn lcd_size(&self) -> Option<(u32, u32)> {
         match self {
             Self::Devices(devices) => devices.lcd_size(),
-            Self::Recording(_) => None,
+            Self::Recording(_) | Self::Feed(_) => None,
         }
     }
 
@@ -88,7 +120,7 @@ impl Source {
     pub fn flips(&self) -> impl Iterator<Item = (Time, i64)> + '_ {
         match self {
             Self::Devices(devices) => Some(devices.flips()),
-            Self::Recording(_) => None,
+            Self::Recording(_) | Self::Feed(_) => None,
         }
         .into_iter()
         .flatten()
@@ -98,7 +130,7 @@ impl Source {
     pub fn clock_set(&self) -> Option<WallTime> {
         match self {
             Self::Devices(devices) => devices.health().clock_set(),
-            Self::Recording(_) => None,
+            Self::Recording(_) | Self::Feed(_) => None,
         }
     }
 
@@ -106,7 +138,7 @@ impl Source {
     pub fn hanging(&self, now: Time) -> Option<&'static str> {
         match self {
             Self::Devices(devices) => devices.hanging(now),
-            Self::Recording(_) => None,
+            Self::Recording(_) | Self::Feed(_) => None,
         }
     }
 
@@ -122,6 +154,7 @@ impl Source {
         match self {
             Self::Devices(devices) => devices.counters(),
             Self::Recording(recording) => replay_counters(&recording.replay.stats()),
+            Self::Feed(_) => Vec::new(),
         }
     }
 
@@ -130,6 +163,7 @@ impl Source {
         match self {
             Self::Devices(devices) => devices.stop(),
             Self::Recording(recording) => drop(recording.replay.stop()?),
+            Self::Feed(_) => {}
         }
         Ok(())
     }

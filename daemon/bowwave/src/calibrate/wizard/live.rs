@@ -2,9 +2,7 @@
 
 use std::{
     path::{Path, PathBuf},
-    sync::{Arc, atomic::Ordering},
     thread,
-    time::Duration,
 };
 
 use anyhow::{Context, Result};
@@ -15,16 +13,22 @@ use bowwave_calibration::{
 use bowwave_core::{
     event::{CameraFrame, Event, Tick},
     fault::{Change, FaultChange},
+    guide::Guide,
     time::Time,
 };
-use bowwave_devices::clock::now;
-use bowwave_trainer::{Signals, source::Devices, storage::Recorder, supervisor::Mode};
-use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded, unbounded};
+use bowwave_trainer::{
+    Companion, TickClock, Trainer, TrainerOptions,
+    presenter::{OutputOptions, PresenterOptions},
+    source::{Devices, EventFeed, Source},
+    storage::Recorder,
+    summary::SummaryOptions,
+    supervisor::Mode,
+};
+use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 
 use super::{
     Guided,
     player::RecordingPlayer,
-    screen::Screen,
     terminal::{StdinClosed, TerminalUi},
 };
 use crate::{
@@ -41,17 +45,8 @@ use crate::{
     today::today,
 };
 
-/// Time between looks at devices and keys: that of the display.
-const TICK: Duration = Duration::from_millis(33);
-
 /// Pictures that wait to be looked at: as many as come in a slow round, so that a pull finds the one nearest to it.
 const PICTURES: usize = 4;
-
-/// Where events come from.
-enum Source {
-    Devices { devices: Box<Devices>, settings: Box<Settings>, data: PathBuf },
-    Recording(RecordingPlayer),
-}
 
 /// On the configured devices, and on the LCD.
 pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
@@ -86,44 +81,81 @@ pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
     settings.setup.scenario.eye_height_m = height;
     let out = arguments.files.out.clone().or(Some(path));
     let guided = Guided::new(arguments, file, out, height)?;
-    let signals = catch_signals()?;
     let mut faults = Vec::new();
-    let devices = device_settings(&settings, Mode::Training, &mut faults);
-    let devices = Devices::start(devices, &mut faults)?;
-    let screen = (settings.config.output != ScreenOutput::None)
-        .then(|| Screen::open(&mut settings, Some(&devices), arguments.window))
-        .transpose()?;
-    let source = Source::Devices { devices: Box::new(devices), settings: Box::new(settings), data };
-    Loop::new(guided, source, screen, signals, arguments)?.run(faults)
+    let devices = Devices::start(device_settings(&settings, Mode::Training, &mut faults), &mut faults)?;
+    let presenter = (settings.config.output != ScreenOutput::None).then(|| OutputOptions {
+        reporter: Some(devices.output_reporter()),
+        lcd: devices.lcd(),
+        window: arguments.window,
+        ..OutputOptions::default()
+    });
+    let screen = settings.config.size.or_else(|| devices.await_lcd_size());
+    let options = options(&settings, screen, presenter, faults);
+    let trainer = Trainer::start(
+        options,
+        Source::Devices(Box::new(devices)),
+        TickClock::paced(),
+        None,
+        catch_signals()?,
+    )?;
+    Dialogue::new(guided, Some((settings, data)), arguments)?.hold(trainer)
 }
 
 /// On a recording, at its own pace.
 pub fn paced(guided: Guided, player: RecordingPlayer, arguments: &CalibrateWizard) -> Result<Outcome> {
-    let signals = catch_signals()?;
-    let screen = arguments
-        .window
-        .then(|| {
-            let reader = Reader { config: arguments.config.clone(), last_good: None };
-            let mut settings = reader.read()?;
-            settings.setup.calibration = guided.wizard.calibration().clone();
-            Screen::open(&mut settings, None, true)
-        })
-        .transpose()?;
-    Loop::new(guided, Source::Recording(player), screen, signals, arguments)?.run(Vec::new())
+    let reader = Reader { config: arguments.config.clone(), last_good: None };
+    let mut settings = reader.read()?;
+    settings.setup.calibration = guided.wizard.calibration().clone();
+    let presenter = arguments.window.then(|| OutputOptions { window: true, ..OutputOptions::default() });
+    let options = options(&settings, settings.config.size, presenter, Vec::new());
+    let source = Source::Feed(EventFeed::new(player.events.clone()));
+    let trainer = Trainer::start(options, source, TickClock::paced(), None, catch_signals()?)?;
+    let outcome = Dialogue::new(guided, None, arguments)?.hold(trainer);
+    // A recording that cannot be played further says so here.
+    player.finish()?;
+    outcome
+}
+
+/// A trainer without boats and storage.
+fn options(
+    settings: &Settings,
+    screen: Option<(u32, u32)>,
+    output: Option<OutputOptions>,
+    faults: Vec<FaultChange>,
+) -> TrainerOptions {
+    let mut setup = settings.setup.clone();
+    setup.scenario.boats.clear();
+    setup.boat_models.clear();
+    setup.models = Vec::new().into();
+    setup.screen = screen.unwrap_or(setup.screen);
+    TrainerOptions {
+        setup,
+        presenter: output.map(|output| PresenterOptions {
+            gpu: settings.config.gpu.clone(),
+            validation: settings.config.validation,
+            gpu_timeout: settings.config.gpu_timeout,
+            output,
+        }),
+        frames: None,
+        plays_to_the_end: false,
+        follow_lcd: false,
+        boot_id: None,
+        summary: SummaryOptions::default(),
+        faults,
+    }
 }
 
 /// Pictures on their way to the eyes, and what these found.
 type Watched = (Sender<(DetectorMode, CameraFrame)>, Receiver<(Time, Detection)>);
 
-/// The wizard with everything around it.
-struct Loop<'a> {
+/// The wizard with its terminal, detector, solver and recordings.
+struct Dialogue<'a> {
     guided: Guided,
-    source: Source,
-    screen: Option<Screen>,
-    signals: Arc<Signals>,
+    /// Of the gun, with the folder of recordings; `None` where a recording is played.
+    gun: Option<(Settings, PathBuf)>,
     arguments: &'a CalibrateWizard,
-    teller: TerminalUi,
-    /// Pictures that are looked at beside.
+    terminal: TerminalUi,
+    /// Pictures on their way to the detector's thread.
     pictures: Sender<(DetectorMode, CameraFrame)>,
     findings: Receiver<(Time, Detection)>,
     solved: (Sender<Solved>, Receiver<Solved>),
@@ -134,22 +166,58 @@ struct Loop<'a> {
     recordings: Vec<(PathBuf, Task)>,
 }
 
-impl<'a> Loop<'a> {
-    fn new(
-        guided: Guided,
-        source: Source,
-        screen: Option<Screen>,
-        signals: Arc<Signals>,
-        arguments: &'a CalibrateWizard,
-    ) -> Result<Self> {
+impl Companion for Dialogue<'_> {
+    fn waits(&self) -> bool {
+        self.guided.wizard.waits()
+    }
+
+    fn frame(&mut self, events: &[Event], tick: Tick) -> Result<Option<Guide>> {
+        if self.guided.wizard.step() == WizardStep::Over {
+            return Ok(None);
+        }
+        self.keys();
+        if self.gun.is_some() {
+            self.guided.wizard.take(Input::Time(tick.time));
+        }
+        self.record(events, tick)?;
+        for event in events {
+            match event {
+                // Where looking takes longer than pictures come, some are left out.
+                Event::Frame(frame) => {
+                    let _ = self.pictures.try_send((self.guided.wizard.look(), frame.clone()));
+                }
+                event => self.guided.event(event.clone()),
+            }
+        }
+        for (arrival, finding) in self.findings.try_iter() {
+            self.guided.wizard.take(Input::Seen(arrival, finding));
+        }
+        for solved in self.solved.1.try_iter() {
+            let report = solved.report.clone();
+            self.guided.wizard.take(Input::Solved(Box::new(solved)));
+            self.guided.report(&report);
+        }
+        self.serve()?;
+        self.show().map(Some)
+    }
+
+    fn source_ended(&mut self) {
+        self.guided.wizard.take(Input::Ended);
+    }
+
+    fn quit(&mut self) {
+        self.guided.wizard.take(Input::Key(Key::Quit));
+    }
+}
+
+impl<'a> Dialogue<'a> {
+    fn new(guided: Guided, gun: Option<(Settings, PathBuf)>, arguments: &'a CalibrateWizard) -> Result<Self> {
         let (pictures, findings) = watch(guided.eyes(arguments))?;
         Ok(Self {
             guided,
-            source,
-            screen,
-            signals,
+            gun,
             arguments,
-            teller: TerminalUi::new(),
+            terminal: TerminalUi::new(),
             pictures,
             findings,
             solved: unbounded(),
@@ -159,118 +227,50 @@ impl<'a> Loop<'a> {
         })
     }
 
-    fn run(mut self, mut faults: Vec<FaultChange>) -> Result<Outcome> {
-        let ended = self.rounds(&mut faults);
+    /// Holds the dialogue in the trainer's loop.
+    fn hold(mut self, trainer: Trainer) -> Result<Outcome> {
+        let ended = trainer.accompany(&mut self);
         if let Some(recorder) = self.recorder.take()
             && let Err(e) = recorder.finish()
         {
             log::error!("{e:#}");
         }
-        self.teller.finish(&self.guided.wizard.guide())?;
+        self.terminal.finish(&self.guided.wizard.guide())?;
         for (path, task) in &self.recordings {
             eprintln!("what was gathered is kept: bowwave calibrate {} {}", task.command(), path.display());
-        }
-        if let Some(screen) = self.screen {
-            screen.close();
-        }
-        match self.source {
-            Source::Devices { devices, .. } => devices.stop(),
-            // A recording that cannot be played further says so here.
-            Source::Recording(player) => drop(player.finish()?),
         }
         ended?;
         Ok(self.guided.outcome())
     }
 
-    fn rounds(&mut self, faults: &mut Vec<FaultChange>) -> Result<()> {
-        let mut events = Vec::new();
-        while self.guided.wizard.step() != WizardStep::Over {
-            self.keys();
-            self.collect(&mut events, faults);
-            self.record(&events)?;
-            for event in events.drain(..) {
-                self.event(event);
-            }
-            for (arrival, finding) in self.findings.try_iter() {
-                self.guided.wizard.take(Input::Seen(arrival, finding));
-            }
-            for solved in self.solved.1.try_iter() {
-                let report = solved.report.clone();
-                self.guided.wizard.take(Input::Solved(Box::new(solved)));
-                self.guided.report(&report);
-            }
-            self.serve()?;
-            self.show()?;
-            thread::sleep(TICK);
-        }
-        Ok(())
-    }
-
-    fn show(&mut self) -> Result<()> {
-        let mut guide = self.guided.wizard.guide();
-        if let Some(screen) = &mut self.screen
-            && let Err(e) = screen.show(guide.clone())
-        {
-            log::error!("the display is lost, the rest goes on: {e:#}");
-            self.screen = None;
-        }
+    /// The page: on the terminal with the name of the recording.
+    fn show(&mut self) -> Result<Guide> {
+        let page = self.guided.wizard.guide();
+        let mut on_terminal = page.clone();
         if let Some((path, _)) = self.recordings.last().filter(|_| self.recorder.is_some()) {
-            guide.lines.push(format!("recorded in {}", path.display()));
+            on_terminal.lines.push(format!("recorded in {}", path.display()));
         }
-        self.teller.show(&guide)
+        self.terminal.show(&on_terminal)?;
+        Ok(page)
     }
 
     fn keys(&mut self) {
         let is_deaf = loop {
-            match self.teller.key() {
+            match self.terminal.key() {
                 Ok(Some(key)) => self.guided.wizard.take(Input::Key(key)),
                 Ok(None) => break false,
                 Err(StdinClosed) => break true,
             }
         };
         // At the gun the trigger goes on; a recording has nobody who could.
-        if is_deaf && matches!(self.source, Source::Recording(_)) && self.guided.wizard.waits() {
+        if is_deaf && self.gun.is_none() && self.guided.wizard.waits() {
             self.guided.wizard.take(Input::Key(Key::Quit));
         }
-        if self.signals.stop.load(Ordering::Relaxed) || self.screen.as_ref().is_some_and(Screen::is_closed) {
-            self.guided.wizard.take(Input::Key(Key::Quit));
-        }
-    }
-
-    fn collect(&mut self, events: &mut Vec<Event>, faults: &mut Vec<FaultChange>) {
-        match &mut self.source {
-            Source::Devices { devices, .. } => {
-                devices.collect(events, faults);
-                events.extend(faults.drain(..).map(Event::Fault));
-                self.guided.wizard.take(Input::Time(now()));
-            }
-            // A recording stands still while a key is waited for.
-            Source::Recording(_) if self.guided.wizard.waits() => {}
-            Source::Recording(player) => loop {
-                match player.events.try_recv() {
-                    Ok(event) => events.push(event),
-                    Err(TryRecvError::Empty) => break,
-                    Err(TryRecvError::Disconnected) => {
-                        self.guided.wizard.take(Input::Ended);
-                        break;
-                    }
-                }
-            },
-        }
-    }
-
-    fn event(&mut self, event: Event) {
-        let Event::Frame(frame) = event else { return self.guided.event(event) };
-        if let Some(screen) = &mut self.screen {
-            screen.picture(&frame.picture);
-        }
-        // Where looking takes longer than pictures come, some are left out.
-        let _ = self.pictures.try_send((self.guided.wizard.look(), frame));
     }
 
     /// Records the devices' events, so that they can be solved again.
-    fn record(&mut self, events: &[Event]) -> Result<()> {
-        let Source::Devices { settings, data, .. } = &self.source else { return Ok(()) };
+    fn record(&mut self, events: &[Event], tick: Tick) -> Result<()> {
+        let Some((settings, data)) = &self.gun else { return Ok(()) };
         let step = self.guided.wizard.step();
         if step == WizardStep::Gather && self.recorder.is_none() && !self.cannot_record {
             let task = self.guided.wizard.task();
@@ -296,7 +296,6 @@ impl<'a> Loop<'a> {
             }
         }
         if let Some(recorder) = &mut self.recorder {
-            let tick = Tick::at(now());
             events.iter().for_each(|event| recorder.event(event, tick));
         }
         Ok(())
@@ -309,7 +308,7 @@ impl<'a> Loop<'a> {
                 Ask::Save(found) => {
                     self.guided.save(&found);
                     (self.pictures, self.findings) = watch(self.guided.eyes(self.arguments))?;
-                    if let Source::Devices { settings, .. } = &mut self.source {
+                    if let Some((settings, _)) = &mut self.gun {
                         settings.calibration_toml = bowwave_calibration::to_toml(&self.guided.file);
                     }
                 }

@@ -5,7 +5,6 @@
 mod live;
 mod player;
 mod replay;
-mod screen;
 mod terminal;
 
 use std::path::PathBuf;
