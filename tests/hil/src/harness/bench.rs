@@ -206,7 +206,7 @@ pub fn configuration(c: &Configured) -> String {
          [trigger]\nchip = \"bench\"\nline = \"trigger\"\n[interlock]\nchip = \"bench\"\nline = \"interlock\"\n\
          [power_fail]\nchip = \"bench\"\nline = \"power-fail\"\n\
          [lamps]\nchip = \"bench\"\nready = \"lamp-ready\"\nhit = \"lamp-hit\"\nfault = \"lamp-fault\"\n\
-         [gpu]\ngpu_timeout_ms = 15000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\n{data}\
+         [gpu]\ngpu_timeout_ms = 15000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\nrecord_exact = true\n{data}\
          [health]\nthermal = \"/run/hil/thermal\"\ntemperature_c_max = 78.0\n{}",
         LCD.0, LCD.1, c.modes, c.calibration, c.record, c.extra
     )

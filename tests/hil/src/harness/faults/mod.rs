@@ -3,6 +3,7 @@
 mod camera;
 mod computer;
 mod guide;
+mod replayed;
 mod ship;
 mod trigger;
 mod unit;
@@ -211,6 +212,7 @@ pub fn rows() -> Vec<FaultRow> {
     all.extend(unit::rows());
     all.extend(ship::rows());
     all.extend(guide::rows());
+    all.extend(replayed::rows());
     all.extend(trigger::rows());
     all.extend(computer::rows());
     all
