@@ -1,4 +1,4 @@
-//! What a calibration says, as checked numbers. The file format is the `calibration` crate's.
+//! A calibration as checked numbers. The file format is the `calibration` crate's.
 
 use glam::{DQuat, DVec2, DVec3};
 

@@ -86,7 +86,7 @@ impl ImuSample {
     }
 }
 
-/// What the ship's own instruments said in one message. What they call invalid is absent.
+/// One message of the ship's own instruments. Values that they call invalid are absent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShipSample {
     /// When its last byte reached the host: later than the measurement by the feed's latency.
@@ -103,7 +103,7 @@ pub struct ShipSample {
     pub reduced: bool,
 }
 
-/// What the gun stands at when the operator presses.
+/// Place of known bearing at which the operator presses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarkKind {
     /// Its stow, or another place of known bearing on the mount.
@@ -117,7 +117,7 @@ pub enum MarkKind {
 pub struct Mark {
     /// When it was pressed.
     pub time: Time,
-    /// What it stood at.
+    /// The place at which it stood.
     pub kind: MarkKind,
 }
 

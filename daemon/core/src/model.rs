@@ -1,4 +1,4 @@
-//! What a boat looks like and where it can be hit: plain data, filled by the model loader.
+//! Models of boats, their looks and the parts that can be hit: plain data, filled by the model loader.
 
 use glam::{DVec2, Vec2, Vec3};
 

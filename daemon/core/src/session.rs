@@ -58,9 +58,9 @@ pub struct Setup {
     pub video: PixelFormat,
     /// Whose estimate of the orientation is used.
     pub orientation: Source,
-    /// What is known of headings beforehand.
+    /// Settings of heading aiding.
     pub heading: HeadingSettings,
-    /// What of the pictures shows the own ship or gun: no horizon and no sky is sought there.
+    /// Mask of the own ship or gun in the pictures: no horizon and no sky is sought there.
     pub own_ship: Option<Mask>,
 }
 
@@ -83,17 +83,17 @@ pub enum SetupError {
 /// The answer to one tick.
 #[derive(Debug)]
 pub struct TickAnswer<'a> {
-    /// What to draw.
+    /// The frame to draw.
     pub view: View<'a>,
     /// Rounds that ended, in the order in which they were fired within the step.
     pub records: &'a [ShotRecord],
     /// Faults that the session itself has found to come or go. It knows of them already: they are for the log only.
     pub faults: &'a [FaultChange],
-    /// What else the log is to be told.
+    /// Notes for the log.
     pub notes: &'a [Note],
 }
 
-/// What to draw.
+/// The frame to draw.
 #[derive(Debug)]
 pub struct View<'a> {
     /// The scene.
@@ -168,12 +168,12 @@ impl Session {
         })
     }
 
-    /// What the renderer must be able to do for this session.
+    /// The plan that the renderer must be able to draw for this session.
     pub const fn plan(&self) -> &ScenePlan {
         self.composer.plan()
     }
 
-    /// What was wrong with the sensors so far.
+    /// Counts of sensor data that were not used so far.
     pub fn sensor_counts(&self) -> SensorCounts {
         self.estimator.counts()
     }
@@ -193,7 +193,7 @@ impl Session {
         &self.composer.scene().hud
     }
 
-    /// What is known of the sea, where the scenario has it measured in the video.
+    /// The state of the sea, where the scenario has it measured in the video.
     pub fn sea(&self) -> Option<SeaReport> {
         self.estimator.sea()
     }

@@ -29,9 +29,9 @@ pub struct EstimatorSettings<'a> {
     pub calibration: &'a Calibration,
     /// Whose estimate of the orientation is used.
     pub orientation: Source,
-    /// What is known of headings beforehand.
+    /// Settings of heading aiding.
     pub heading: &'a HeadingSettings,
-    /// What of the pictures shows the own ship or gun: no horizon and no sky is sought there.
+    /// Mask of the own ship or gun in the pictures: no horizon and no sky is sought there.
     pub own_ship: Option<&'a Mask>,
     /// Height of the camera over the mean sea, metres.
     pub eye_height_m: f64,
@@ -177,7 +177,7 @@ impl Estimator {
         }
     }
 
-    /// What the sailor must know about the sensors at `now`; `None` where all is well.
+    /// The fault of the sensors at `now` that the sailor must know of; `None` where all is well.
     pub fn trouble(&self, now: Time) -> Option<Fault> {
         self.sensors.trouble(now)
     }
@@ -199,12 +199,12 @@ impl Estimator {
         self.sea.as_ref().and_then(SeaStateTracker::measured)
     }
 
-    /// What is known of the sea, where it is to be measured in the video.
+    /// The state of the sea, where it is to be measured in the video.
     pub fn sea(&self) -> Option<SeaReport> {
         self.sea.as_ref().map(SeaStateTracker::report)
     }
 
-    /// What was wrong with the sensors so far.
+    /// Counts of sensor data that were not used so far.
     pub fn counts(&self) -> SensorCounts {
         self.sensors.counts()
     }

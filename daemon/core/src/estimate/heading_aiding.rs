@@ -17,7 +17,7 @@ use crate::{
     time::{NS_PER_S, Time},
 };
 
-/// What the gun stands at when the operator re-zeroes it.
+/// The stow of the gun: where the operator re-zeroes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stow {
     /// Bearing of the camera's axis from the ship's bow, clockwise, radians; used where the ship tells its heading.
@@ -37,14 +37,14 @@ pub struct Landmark {
     pub sigma: f64,
 }
 
-/// What is known of headings beforehand.
+/// Settings of heading aiding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeadingSettings {
     /// From the ship's measurement to the arrival of its line, nanoseconds.
     pub ship_latency_ns: i64,
     /// Standard deviation of the ship's heading where its instruments tell none, radians.
     pub ship_sigma: f64,
-    /// What the operator's press means.
+    /// The bearing that the operator's press stands for.
     pub stow: Option<Stow>,
     /// What the camera's axis may lie on when the operator presses for a landmark.
     pub landmarks: Vec<Landmark>,
@@ -70,7 +70,7 @@ impl Default for HeadingSettings {
     }
 }
 
-/// What became of headings from outside.
+/// Counts of headings from outside.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HeadingCounts {
     /// Headings of the ship that came.
@@ -136,7 +136,7 @@ const FROZEN_ROLL: f64 = 2.0 * std::f64::consts::PI / 180.0;
 /// A bearing on the mount as gyro and ship make it: when, and how much it differs from the first one, radians.
 type Bearing = (Time, f64);
 
-/// What the gun does on its mount.
+/// Motion of the gun on its mount.
 #[derive(Clone, Copy, Debug)]
 enum MountMotion {
     /// It cannot be told yet.

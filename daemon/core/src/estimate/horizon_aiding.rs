@@ -18,7 +18,7 @@ const EVERY_NS: i64 = 100_000_000;
 /// Chi squared with two degrees of freedom that a horizon exceeds once in a thousand: beyond it is a shore, a cloud or a ship's side.
 const NIS_GATE: f64 = 13.8;
 
-/// What became of the horizons of a session.
+/// Counts of the horizons of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HorizonCounts {
     /// Taken in.

@@ -18,10 +18,10 @@ const WIND_FOLLOWS_S: f64 = 5.0;
 /// The force goes over to the next where the wind is this share beyond the border.
 const FORCE_BEYOND: f64 = 0.08;
 
-/// What is known of the sea in the video.
+/// State of the sea in the video.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeaReport {
-    /// What is drawn, and where it comes from.
+    /// The sea that is drawn, and where it comes from.
     pub in_use: SeaInUse,
     /// The wind that reflections are drawn with, m/s.
     pub wind_m_s: f64,
@@ -121,7 +121,7 @@ impl SeaStateTracker {
         (self.wind, self.force)
     }
 
-    /// What is known.
+    /// The report.
     pub fn report(&self) -> SeaReport {
         SeaReport {
             in_use: self.follower.in_use(),

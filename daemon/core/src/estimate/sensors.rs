@@ -1,4 +1,4 @@
-//! What the devices said last, made sense of: orientation over time, the newest picture, and whether they can be trusted.
+//! Sensor data of the devices: orientation over time, the newest picture, and whether they can be trusted.
 
 use glam::DQuat;
 
@@ -227,7 +227,7 @@ impl Sensors {
         self.counts
     }
 
-    /// What the sailor must know about the sensors at `now`; `None` where all is well.
+    /// The fault of the sensors at `now` that the sailor must know of; `None` where all is well.
     pub fn trouble(&self, now: Time) -> Option<Fault> {
         if self.frame.is_none() {
             let wrong_size = self.counts.frames_wrong_size > 0;

@@ -37,7 +37,7 @@ const NIS_GATE: f64 = 10.8;
 /// So many headings in a row that are not believed mean that it is the anchor that is wrong.
 const REFUSED_MAX: u32 = 20;
 
-/// What became of the headings by the sky of a session.
+/// Counts of the headings by the sky of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SkylineCounts {
     /// Taken in.

@@ -13,18 +13,18 @@ const LINES_PER_WINDOW: u32 = 20;
 pub struct LogEntry {
     /// Which fault.
     pub fault: Fault,
-    /// What happened.
+    /// The change.
     pub what: LogEvent,
     /// Lines of this fault that were left out since the last one, because there were too many.
     pub left_out: u32,
 }
 
-/// What a line of the log says.
+/// The change that a line of the log tells.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LogEvent {
     /// It came.
     Raised {
-        /// What exactly.
+        /// The cause.
         cause: String,
     },
     /// It went.
@@ -34,7 +34,7 @@ pub enum LogEvent {
     },
     /// It happened.
     Noted {
-        /// What exactly.
+        /// The cause.
         cause: String,
     },
 }

@@ -158,19 +158,19 @@ impl Fault {
     }
 }
 
-/// What happened to a fault.
+/// Change of a fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Change {
     /// It is there from now on, until cleared. Raising it again changes nothing but its cause.
     Raised {
-        /// What exactly, for the log: one line with what, where and what to do.
+        /// The cause for the log: one line with what, where and what to do.
         cause: String,
     },
     /// It is gone.
     Cleared,
     /// It happened and is over: the log is told, nothing stays active.
     Noted {
-        /// What exactly, for the log.
+        /// The cause for the log.
         cause: String,
     },
 }
@@ -182,7 +182,7 @@ pub struct FaultChange {
     pub time: Time,
     /// Which.
     pub fault: Fault,
-    /// What became of it.
+    /// Its end.
     pub change: Change,
 }
 

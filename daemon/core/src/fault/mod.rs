@@ -1,4 +1,4 @@
-//! What can break in the field: one name, one code in the log, one word to the sailor for each.
+//! Faults of the field: one name, one code in the log, one word to the sailor for each.
 //!
 //! Whoever notices a fault reports a [`FaultChange`]; the [`FaultBoard`] keeps which faults are active, and what the log is
 //! to be told. Time is an argument here as everywhere in this crate.

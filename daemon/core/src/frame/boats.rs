@@ -1,4 +1,4 @@
-//! What is seen of boats and of what they leave on the water.
+//! Boats and wakes in view.
 
 use crate::{
     frame::{scene::BoatView, view::ViewFrustum, wake::Wake},
@@ -21,7 +21,7 @@ pub(super) fn boats_in_view(
     into.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
 }
 
-/// What a boat has left on the water at `time`.
+/// The wake of a boat at `time`.
 fn wake_of(fleet: &Fleet, afloat: &Afloat<'_>, time: Time, start: Time) -> Option<Wake> {
     let history = fleet.history(afloat.boat)?;
     let hull = history.hull();

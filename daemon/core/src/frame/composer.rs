@@ -52,7 +52,7 @@ pub struct FrameMoment {
     pub video_time: Option<Time>,
     /// Whether the weapon may fire.
     pub permission: FirePermission,
-    /// What the sailor should know though training goes on.
+    /// The fault that the sailor should know of though training goes on.
     pub warning: Option<Fault>,
     /// Whether reflections and wakes are drawn: a computer that is too hot leaves them out, half of the work.
     pub cool: bool,
@@ -117,7 +117,7 @@ impl Composer {
         })
     }
 
-    /// What the renderer must be able to do.
+    /// The plan that the renderer must be able to draw.
     pub const fn plan(&self) -> &ScenePlan {
         &self.plan
     }
@@ -256,7 +256,7 @@ impl Composer {
     }
 }
 
-/// What the sailor is told: what keeps the weapon from scoring, else the newest result.
+/// The status: the fault that keeps the weapon from scoring, else the newest result.
 fn status(permission: FirePermission, result: Option<LastResult>) -> Status {
     match permission {
         FirePermission::Safe(f) => Status::Fault { cause: f.cause(), action: f.action() },

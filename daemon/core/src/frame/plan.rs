@@ -1,4 +1,4 @@
-//! What a scene needs, and why the rest is left out.
+//! The plan of a scene: its needs, and why the rest is left out.
 
 use crate::{
     event::PixelFormat,
@@ -17,7 +17,7 @@ pub fn sea_reflects(force: BeaufortForce) -> bool {
     force.get() <= REFLECTION_FORCE_MAX
 }
 
-/// What the frames of a scenario can ever need. What is left out here is not compiled, not allocated and never run.
+/// The passes and sizes that frames of a scenario can ever need. A pass that is left out here is not compiled, not allocated and never run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScenePlan {
     /// Screen size in pixels.
@@ -34,11 +34,11 @@ pub struct ScenePlan {
     pub video: PixelFormat,
     /// The camera's picture size; equal to the screen's leaves out the scaling variant.
     pub picture: (u32, u32),
-    /// What of the lens and shutter has to be followed; one variant of what draws boats is compiled.
+    /// The optics that drawing has to follow; one variant of the boats' shader is compiled.
     pub optics: Optics,
 }
 
-/// What decides on a plan.
+/// The needs that decide on a plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SceneNeeds {
     /// Screen size in pixels.
@@ -47,7 +47,7 @@ pub struct SceneNeeds {
     pub video: PixelFormat,
     /// The camera's picture size.
     pub picture: (u32, u32),
-    /// What its lens and shutter do.
+    /// The optics of its lens and shutter.
     pub optics: Optics,
     /// How the sea is asked to mirror.
     pub water: Water,

@@ -1,4 +1,4 @@
-//! What is seen of rounds: tracers, splashes and sparks.
+//! Rounds in view: tracers, splashes and sparks.
 
 use glam::{DVec3, Vec3};
 
@@ -23,7 +23,7 @@ const SPLASH_HEIGHT_M: f64 = 1.8;
 /// How long sparks can be seen, seconds.
 const STRIKE_S: f64 = 0.35;
 
-/// What `view` sees of the rounds at `time`, farthest first.
+/// The tracers, splashes and sparks in `view` at `time`, farthest first.
 pub(super) fn rounds_in_view(
     running: &RunningWorld,
     view: &ViewFrustum<'_>,

@@ -1,4 +1,4 @@
-//! What one frame shows: the session's output, the renderer's only input besides the picture.
+//! The scene of one frame: the session's output, the renderer's only input besides the picture.
 
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ pub struct Scene {
     pub camera: CameraPose,
     /// The lens as seen on the screen: [`Lens::covering`] the screen's size.
     pub lens: Lens,
-    /// What is run for this frame and what is left out, one for each of [`Pass::ALL`], in that order.
+    /// The decision for each pass of this frame, one for each of [`Pass::ALL`], in that order.
     pub passes: [PassDecision; Pass::COUNT],
     /// Boats whose hull or reflection can be seen, farthest first.
     pub boats: Vec<BoatView>,
@@ -46,7 +46,7 @@ pub struct Scene {
     pub tones: SeaTones,
     /// The head-up display.
     pub hud: Hud,
-    /// What it shows instead of counts and state, while a maintainer calibrates.
+    /// The page that it shows instead of counts and state, while a maintainer calibrates.
     pub guide: Option<Arc<Guide>>,
 }
 
@@ -186,7 +186,7 @@ pub struct BoatView {
     pub hull: Option<PixelRect>,
     /// Pixels that its reflection or shadow can reach, distortion and blur included; `None` where neither is drawn.
     pub reflection: Option<PixelRect>,
-    /// What it leaves on the water, curvature of the sea taken off; `None` where it lies still or nothing of it is in view.
+    /// Its wake, curvature of the sea taken off; `None` where it lies still or nothing of it is in view.
     pub wake: Option<Wake>,
     /// Distance from the camera, metres.
     pub range_m: f64,
@@ -240,7 +240,7 @@ impl RoundView {
     }
 }
 
-/// What the sailor is told.
+/// The state that the sailor is told.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Status {
     /// Ready to train.
@@ -270,7 +270,7 @@ pub enum Status {
 pub struct Hud {
     /// State with colour, shape and word.
     pub status: Status,
-    /// What the sailor should know though training goes on: [`Severity::Warning`](crate::fault::Severity).
+    /// The fault that the sailor should know of though training goes on: [`Severity::Warning`](crate::fault::Severity).
     pub warning: Option<Fault>,
     /// Rounds left in the belt.
     pub rounds_left: u32,

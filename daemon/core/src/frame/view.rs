@@ -1,4 +1,4 @@
-//! What of a boat falls on which pixels: the rectangles that limit every pass.
+//! Projection of boats onto the screen: the rectangles that limit every pass.
 
 use glam::{DVec2, DVec3};
 
@@ -30,7 +30,7 @@ const REFLECTION_MARGIN_PX: f64 = 12.0;
 /// Waves hide no more of a boat's height: in the mean over their phases something of it is always seen.
 const HIDDEN_SHARE_MAX: f64 = 0.7;
 
-/// What a camera can see: its view frustum, and how far and what of the sea.
+/// The view frustum of a camera, and how far it sees over which sea.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewFrustum<'a> {
     /// The camera.

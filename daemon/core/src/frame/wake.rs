@@ -1,4 +1,4 @@
-//! What a boat under way leaves on the water: the track of its hull, and how high its waves are.
+//! The wake of a boat under way: the track of its hull, and how high its waves are.
 //!
 //! The pattern itself (Kelvin's wedge of 19.47 degrees, transverse waves of wavelength 2 pi U^2 / g, foam) is drawn by the renderer
 //! along the track; here is where the boat was, and the amounts.

@@ -34,7 +34,7 @@ pub enum Bend {
     Fisheye,
 }
 
-/// What a lens does that drawing through it has to follow; the rest is not compiled.
+/// Properties of a lens that drawing through it has to follow; the rest is not compiled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Optics {
     /// How it bends straight lines.

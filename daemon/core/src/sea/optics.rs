@@ -1,4 +1,4 @@
-//! What the water throws back.
+//! Optics of the water's surface.
 
 use glam::DVec3;
 

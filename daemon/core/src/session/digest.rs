@@ -37,7 +37,7 @@ impl Write for Digest {
     }
 }
 
-/// What a session gave so far.
+/// Digest of a session's output so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SessionDigest {
     /// Over the records of all rounds.

@@ -1,4 +1,4 @@
-//! What a session has to say to the log: the sea in the video, the heading, the unit's clock. Each is told once when it changes.
+//! Notes of a session for the log: the sea in the video, the heading, the unit's clock. Each is told once when it changes.
 
 use crate::estimate::{
     HeadingCounts, SeaReport,
@@ -35,7 +35,7 @@ pub(super) struct Notes {
 }
 
 impl Notes {
-    /// What was not told yet.
+    /// The notes that were not told yet.
     pub(super) fn new_ones(&self) -> &[Note] {
         &self.new
     }

@@ -21,7 +21,7 @@ pub struct Vessel {
     pub name: String,
     /// Its model.
     pub model: ModelId,
-    /// What it does.
+    /// Its behaviour.
     pub behaviour: Behaviour,
 }
 

@@ -20,7 +20,7 @@ const TRACER_LIT_M: f64 = 25.0;
 /// How long a splash stands, seconds. Impacts are kept that long.
 pub const SPLASH_S: f64 = 1.6;
 
-/// What flies and how it is aimed.
+/// The ammunition, its dispersion and the wind.
 #[derive(Clone, Copy, Debug)]
 pub struct Ammunition {
     /// The weapon that fires it.

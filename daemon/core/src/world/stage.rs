@@ -71,7 +71,7 @@ pub struct World {
     last_result: Option<LastResult>,
 }
 
-/// What there is from the first picture on.
+/// Boats and rounds, from the first picture on.
 #[derive(Debug)]
 pub struct RunningWorld {
     /// When the scenario began.

@@ -1,4 +1,4 @@
-//! What every estimate of the orientation has in common: how wrong it is believed to be, and what cameras and ships tell of that.
+//! Error state that every estimate of the orientation has: its covariance, and its updates by cameras and ships.
 //!
 //! The error is a small turn of the world: `true = exp(error) estimate` (Sola, "Quaternion kinematics for the error-state Kalman filter",
 //! 2017, section 7, global error). A turn of the world hardly changes from one sample to the next, so that a measurement made some
@@ -41,15 +41,15 @@ pub struct UpdateOutcome {
     pub taken: bool,
 }
 
-/// What a measurement changes: the world is to be turned by this.
+/// Correction by a measurement: the world is to be turned by this.
 pub(super) type Correction = DQuat;
 
-/// What a heading is seen against.
+/// The reference of a heading.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Against {
     /// North itself.
     North,
-    /// What was anchored.
+    /// The anchor.
     Anchor,
     /// The ship, by the gun's bearing on its mount.
     Mount,
@@ -63,7 +63,7 @@ pub(super) struct ErrorState<const N: usize> {
     estimate: SVector<f64, N>,
 }
 
-/// What cameras and ships tell, whatever else the states are.
+/// Updates of the error state by cameras and ships, whatever else the states are.
 pub(super) trait AidingUpdate {
     /// Covariance of the turn of the world, rad^2.
     fn turn_covariance(&self) -> DMat3;
@@ -117,7 +117,7 @@ impl<const N: usize> ErrorState<N> {
         error_state
     }
 
-    /// What is known of a state.
+    /// The estimate of a state.
     pub fn at(&self, state: usize) -> f64 {
         self.estimate[state]
     }
@@ -148,7 +148,7 @@ impl<const N: usize> ErrorState<N> {
         DMat3::from_cols_array_2d(&[0, 1, 2].map(|c| [0, 1, 2].map(|r| p[(state + r, state + c)])))
     }
 
-    /// What `dt_s` seconds do to the states that all have, but for the turn.
+    /// Prediction over `dt_s` seconds of the states that all have, but for the turn.
     pub fn pass_time(&mut self, dt_s: f64) {
         self.fade(REFRACTION, (-dt_s / REFRACTION_TAU_S).exp(), REFRACTION_SIGMA * REFRACTION_SIGMA);
         self.carry(ANCHOR, ANCHOR_RATE, dt_s);

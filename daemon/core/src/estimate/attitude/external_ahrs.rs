@@ -1,4 +1,4 @@
-//! What is wrong with an orientation that the unit finds by itself, and how far that is known.
+//! Errors of an orientation that the unit finds by itself, and their covariance.
 //!
 //! Such a unit corrects itself by ways that it does not tell, so that nothing can be said of its gyro. What can be said: its error on an axis
 //! goes to and fro about a mean within seconds and that mean creeps within minutes; its heading's mean drifts for as long as it runs.

@@ -21,7 +21,7 @@ const SCREW: usize = FORCE + 3;
 const SWAY: usize = SCREW + 3;
 const STATES: usize = SWAY + 2;
 
-/// What the filter is told of a unit's errors.
+/// Noise model of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// White noise of the rate, rad/s/sqrt(Hz).

@@ -62,7 +62,7 @@ pub(super) struct Inclination {
     shaken_s: f64,
 }
 
-/// What came since VQF's last step: the turn, the sum of specific force in the axes at its end and of how many samples, how long.
+/// Motion since VQF's last step: the turn, the sum of specific force in the axes at its end and of how many samples, how long.
 #[derive(Clone, Copy, Debug, Default)]
 struct GatheredMotion {
     turn: DVec3,

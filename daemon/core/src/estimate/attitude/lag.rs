@@ -1,4 +1,4 @@
-//! What constant errors of rate and of specific force do to an inclination that follows specific force with a lag.
+//! Effect of constant errors of rate and of specific force on an inclination that follows specific force with a lag.
 
 use std::f64::consts::SQRT_2;
 

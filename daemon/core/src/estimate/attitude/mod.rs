@@ -58,7 +58,7 @@ pub enum Source {
     Fused,
 }
 
-/// What a unit's rate tells.
+/// Kind of a unit's rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RateKind {
     /// The rate at the sample's time.
@@ -73,7 +73,7 @@ pub enum RateKind {
 pub struct AttitudeSettings {
     /// Whose estimate is used.
     pub source: Source,
-    /// What the unit's rate tells.
+    /// Kind of the unit's rate.
     pub rate: RateKind,
     /// How inclination is found from specific force.
     pub inclination: InclinationSettings,
@@ -233,7 +233,7 @@ impl Attitude {
         }
     }
 
-    /// What takes in aids, brought to the present.
+    /// The error state, brought to the present.
     fn update_now(&mut self) -> Option<&mut dyn AidingUpdate> {
         match &mut self.state {
             FilterState::Running(running) => {

@@ -14,7 +14,7 @@ pub struct Prior {
     pub sigma: f64,
 }
 
-/// What is known when a picture is looked at.
+/// Prior knowledge about a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HorizonView {
     /// The camera's lens; where it is given for another size than the picture has, it is scaled.
@@ -32,7 +32,7 @@ pub struct Horizon {
     pub up: DVec3,
     /// Covariance of roll and elevation, rad^2.
     pub covariance: DMat2,
-    /// What spoke for it.
+    /// Its quality.
     pub quality: LineQuality,
 }
 
@@ -64,7 +64,7 @@ impl Horizon {
     }
 }
 
-/// What speaks for a line and against it.
+/// Quality of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineQuality {
     /// Columns of eight pixels with an edge on the line, and neighbours that have too.

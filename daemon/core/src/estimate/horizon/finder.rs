@@ -69,7 +69,7 @@ impl HorizonFinder {
         Self::default()
     }
 
-    /// What of the pictures shows the own ship or gun, from now on.
+    /// Sets the mask of the own ship or gun in the pictures, from now on.
     pub fn set_mask(&mut self, mask: Option<Mask>) {
         self.hidden.set(mask);
     }

@@ -66,7 +66,7 @@ fn through(a: DVec3, b: DVec3, sin_dip: f64) -> Option<DVec2> {
     Some(angles_of((level - middle * (sin_dip / middle.dot(a))).normalize()))
 }
 
-/// What a line is looked for in.
+/// Input of the search for a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineSearch<'a> {
     pub cells: &'a PictureCells,

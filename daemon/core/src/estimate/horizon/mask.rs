@@ -1,4 +1,4 @@
-//! What of the picture shows the own ship or gun, and is not looked at.
+//! Mask of the own ship or gun in the picture.
 
 use glam::DVec2;
 

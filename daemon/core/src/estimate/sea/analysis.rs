@@ -41,7 +41,7 @@ const NEAR: (f64, f64) = (0.08, 1.0);
 /// Patches that are near anyhow: the nearest.
 const NEAR_LEAST: usize = 20;
 
-/// What a finished analysis found.
+/// Result of an analysis.
 #[derive(Clone, Debug, Default)]
 pub(super) struct AnalysisResult {
     /// By rising frequency.

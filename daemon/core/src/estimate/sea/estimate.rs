@@ -69,7 +69,7 @@ pub enum Unknown {
     TooShort {
         /// Seconds watched.
         seconds: f64,
-        /// What ended the watch before.
+        /// The event that ended the watch before.
         after: Option<Restart>,
     },
     /// The camera does not see enough water.
@@ -125,7 +125,7 @@ pub enum Unknown {
     },
 }
 
-/// What ended a watch.
+/// Event that ended a watch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Restart {
     /// The camera was turned away.

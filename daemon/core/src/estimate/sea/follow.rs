@@ -10,7 +10,7 @@ const BEYOND: f64 = 0.15;
 /// Successive estimates of a new state that change it however near the border they lie.
 const AGREE: u32 = 3;
 
-/// What is needed to make a sea.
+/// Conditions that a sea is made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeaConditions {
     /// Four standard deviations of the water's height, metres.
@@ -28,7 +28,7 @@ impl SeaConditions {
     }
 }
 
-/// What the operator wants.
+/// Order of the operator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum SeaOrder {
     /// The measured sea.

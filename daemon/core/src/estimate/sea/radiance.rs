@@ -1,4 +1,4 @@
-//! What sky, roughness and light out of the water make of the mean picture, and from it how brightness goes with slope.
+//! Radiance model of the mean picture by sky, roughness and light out of the water, and from it how brightness goes with slope.
 //!
 //! Stilwell 1969 (J. Geophys. Res. 74, 1974) took the slopes of waves from the brightness of photographs with a computed
 //! reflection of the sky. Here sky, roughness and the light out of the water are fitted to the picture itself: rows above the

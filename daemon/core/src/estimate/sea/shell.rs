@@ -24,7 +24,7 @@ const LEAST_CELLS: usize = 24;
 /// Weight of the total power against one beam, where waves and noise are told apart.
 const TOTAL_WEIGHT: f64 = 6.0;
 
-/// What was found at one frequency.
+/// Result at one frequency.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ShellLine {
     /// Frequency, Hz.

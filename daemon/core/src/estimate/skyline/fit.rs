@@ -69,7 +69,7 @@ pub(super) struct SkylineFit {
     pub rate_sigma: f64,
 }
 
-/// What is known beforehand.
+/// Prior knowledge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SkylinePrior {
     /// The turn of the picture before.
@@ -107,7 +107,7 @@ const RATE: usize = 5;
 type NormalMatrix = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 type NormalVector = SVector<f64, UNKNOWNS>;
 
-/// What the sights say of the unknowns together.
+/// Normal equations of all tracks.
 #[derive(Default)]
 struct NormalSums {
     normal: NormalMatrix,

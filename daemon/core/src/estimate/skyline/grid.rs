@@ -19,7 +19,7 @@ pub(super) struct FieldGrid {
     pub rows: usize,
     /// Unit vectors in the camera's axes that the fields' corners see, row by row.
     corners: Vec<DVec3>,
-    /// What of the picture shows the own ship, by field.
+    /// Mask of the own ship, by field.
     hidden: Vec<bool>,
     mask: Option<Mask>,
     /// Fields of which some is in the sky.

@@ -67,7 +67,7 @@ const DRIFTS: [f64; 2] = [1e-7, 1e-2];
 /// Smallest picture, in fields.
 const FIELDS_MIN: (usize, usize) = (4, 2);
 
-/// What is known when a picture is looked at.
+/// Prior knowledge about a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SkyView {
     /// The camera's lens; where it is given for another size than the picture has, it is scaled.
@@ -258,7 +258,7 @@ impl Skyline {
         }
     }
 
-    /// What of the pictures shows the own ship or gun, from now on.
+    /// Sets the mask of the own ship or gun in the pictures, from now on.
     pub fn set_mask(&mut self, mask: Option<Mask>) {
         self.grid.set_mask(mask);
     }

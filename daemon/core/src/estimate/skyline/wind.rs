@@ -19,7 +19,7 @@ pub(super) const SPREAD: f64 = 0.2;
 pub(super) const SPREAD_MOST: f64 = 0.5;
 /// Looks that lie so far apart tell of the wind by themselves: until then they are held against the same pictures, seconds.
 const SHARED_S: f64 = 10.0;
-/// What was learnt of the wind fades in this time, seconds: layers and wind change.
+/// Knowledge of the wind fades in this time, seconds: layers and wind change.
 const KEPT_S: f64 = 120.0;
 
 /// Height of the clouds over their distance towards the unit vector `d`: h = r sin(elevation) + r^2 (1 - refraction) / (2 R).
@@ -33,7 +33,7 @@ pub(super) fn carried(d: DVec3, gone: DVec2) -> DVec3 {
     (d + (nearness(d) * gone).extend(0.0)).normalize()
 }
 
-/// What is known of the wind: heights of the clouds a second, in the anchor's world. A normal distribution, by information: the inverse of
+/// Estimate of the wind: heights of the clouds a second, in the anchor's world. A normal distribution, by information: the inverse of
 /// the covariance, and that times the mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Wind {

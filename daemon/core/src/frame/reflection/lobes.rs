@@ -1,4 +1,4 @@
-//! What a sea does to the light of one boat: the table for its place and height.
+//! Reflection of one boat in a sea: the table for its place and height.
 
 use glam::Vec3;
 
@@ -69,7 +69,7 @@ impl LuminanceWeight {
     }
 }
 
-/// What a pixel of water throws back of one band of a boat.
+/// Transfer from one band of a boat to a pixel of water.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReflectionTransfer {
     /// Share of the band's light.
@@ -282,7 +282,7 @@ fn pixel_bands(
     std::array::from_fn(|b| near[b].mix(&far[b], 0.5))
 }
 
-/// What comes from one of the table's cells.
+/// Share of one of the table's cells.
 #[derive(Clone, Copy, Default)]
 struct TableCell {
     thrown: [f32; TONES],

@@ -1,4 +1,4 @@
-//! What the sea does to the light of a boat. [`ReflectionTable`] says, for a sea and a line of sight, how much of what stands how high at
+//! Reflection of a boat in the sea. [`ReflectionTable`] says, for a sea and a line of sight, how much of what stands how high at
 //! which distance a pixel of water throws towards the eye, and how much of the sky's light the boat takes from it; [`Lobes`] is that for one
 //! boat; [`compose`] draws with it, as the GPU's shaders do. [`hidden_m`] says how much of a hull stands behind waves.
 //!

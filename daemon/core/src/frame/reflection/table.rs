@@ -96,7 +96,7 @@ impl ReflectionTable {
         Self { values, spreads: all }
     }
 
-    /// What it says for a wind 10 m above the sea, m/s; between the forces' own winds it is interpolated. Beyond Beaufort 4 it is that.
+    /// The table for a wind 10 m above the sea, m/s; between the forces' own winds it is interpolated. Beyond Beaufort 4 it is that.
     pub fn sea(&self, wind_m_s: f64) -> SeaLobes {
         let mut sea = SeaLobes { values: vec![0.0; WINDS * PLANE], spread: [0.0; 2] };
         self.set_sea(&mut sea, wind_m_s);

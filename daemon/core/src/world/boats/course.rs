@@ -87,7 +87,7 @@ pub struct BoatDamage {
     pub helm_s: Option<f64>,
 }
 
-/// What an attacker does when it has come close.
+/// The end of an attacker's course.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Arrival {
     /// It lies still.

@@ -40,7 +40,7 @@ impl PathPiece {
     }
 }
 
-/// What comes after the last piece.
+/// The end of a path, after the last piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Ending {
     /// The last piece is endless, or the boat stays at its end.

@@ -98,7 +98,7 @@ pub struct BoatSpec {
     pub model: String,
     /// Whom it belongs to.
     pub side: Side,
-    /// What it does.
+    /// Its behaviour.
     pub behaviour: Behaviour,
     /// Where the text places it.
     pub(super) stands: TomlPlace,

@@ -1,4 +1,4 @@
-//! What became of each virtual round: the records that outlive a session, and the swept test that decides them.
+//! Results of virtual rounds: the records that outlive a session, and the swept test that decides them.
 
 mod hit;
 mod round;
@@ -24,11 +24,11 @@ pub struct ShotRecord {
     pub bore: DVec3,
     /// Age of the newest pose measurement at that time, nanoseconds; negative where the pose was interpolated.
     pub pose_age_ns: i64,
-    /// What became of it.
+    /// Its end.
     pub outcome: Outcome,
 }
 
-/// What became of a virtual round.
+/// Result of a virtual round.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// It struck a boat.

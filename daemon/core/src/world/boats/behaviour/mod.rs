@@ -8,7 +8,7 @@ pub use step::BehaviourStep;
 
 use super::course::{BoatDamage, Course, CourseState};
 
-/// What a boat does. A behaviour holds no state of its own: what it does next follows from the boat's last state, the time and the
+/// The behaviour of a boat. It holds no state of its own: what it does next follows from the boat's last state, the time and the
 /// damage, so that a stretch can be stepped anew after a round has struck.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Behaviour {

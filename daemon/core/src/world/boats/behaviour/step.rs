@@ -9,6 +9,6 @@ pub struct BehaviourStep<'a> {
     pub from: &'a CourseState,
     /// Seconds since the scenario began at the end of the step.
     pub to_s: f64,
-    /// What has struck it.
+    /// The hits that it has taken.
     pub damage: &'a BoatDamage,
 }
