@@ -133,14 +133,34 @@ pub enum PixelFormat {
 }
 
 impl PixelFormat {
+    /// Bytes of a pixel in the first plane; luma comes first in each but [`Self::Rgb`].
+    pub const fn pixel_bytes(self) -> usize {
+        match self {
+            Self::Nv12 => 1,
+            Self::Yuyv => 2,
+            Self::Rgb => 3,
+        }
+    }
+
+    /// Bytes of a row without padding; rows of a second plane have as many.
+    pub const fn row_bytes(self, width: u32) -> usize {
+        width as usize * self.pixel_bytes()
+    }
+
+    /// Rows of all planes together.
+    pub const fn rows(self, height: u32) -> usize {
+        let height = height as usize;
+        if matches!(self, Self::Nv12) { height + height / 2 } else { height }
+    }
+
+    /// Byte at which the second plane begins, without padding; `None` where there is none.
+    pub const fn chroma_offset(self, width: u32, height: u32) -> Option<usize> {
+        if matches!(self, Self::Nv12) { Some(self.row_bytes(width) * height as usize) } else { None }
+    }
+
     /// Bytes of a `width` x `height` picture without padding.
     pub const fn byte_len(self, width: u32, height: u32) -> usize {
-        let pixels = width as usize * height as usize;
-        match self {
-            Self::Yuyv => pixels * 2,
-            Self::Nv12 => pixels + pixels / 2,
-            Self::Rgb => pixels * 3,
-        }
+        self.row_bytes(width) * self.rows(height)
     }
 }
 
@@ -231,7 +251,7 @@ impl Picture {
     /// A black picture.
     pub fn black(format: PixelFormat, width: u32, height: u32) -> Result<Self, PictureError> {
         let mut bytes = vec![0; Self::checked_len(format, width, height)?];
-        let luma = width as usize * height as usize;
+        let luma = format.chroma_offset(width, height).unwrap_or(0);
         match format {
             PixelFormat::Rgb => {}
             PixelFormat::Yuyv => bytes.chunks_exact_mut(2).for_each(|p| p.copy_from_slice(&[16, 128])),
@@ -272,6 +292,15 @@ impl Picture {
         self.height
     }
 
+    /// The bytes of a row of the first plane; none beyond the last.
+    pub fn row(&self, y: usize) -> &[u8] {
+        let row_bytes = self.format.row_bytes(self.width);
+        if y >= self.height as usize {
+            return &[];
+        }
+        self.bytes().get(y * row_bytes..(y + 1) * row_bytes).unwrap_or(&[])
+    }
+
     /// The bytes, rows from the top.
     pub fn bytes(&self) -> &[u8] {
         match &self.bytes {
@@ -299,20 +328,22 @@ impl Picture {
     /// sRGB-coded colour of the pixel nearest to (`x`, `y`), clamped to the picture, each channel 0 to 1.
     pub fn srgb_at(&self, x: u32, y: u32) -> [f32; 3] {
         let (x, y) = (x.min(self.width - 1) as usize, y.min(self.height - 1) as usize);
-        let w = self.width as usize;
+        let row_bytes = self.format.row_bytes(self.width);
+        let at = |x: usize| y * row_bytes + x * self.format.pixel_bytes();
         let b = self.bytes();
         match self.format {
             PixelFormat::Rgb => {
-                let i = (y * w + x) * 3;
+                let i = at(x);
                 [b[i], b[i + 1], b[i + 2]].map(|v| f32::from(v) / 255.0)
             }
             PixelFormat::Yuyv => {
-                let i = (y * w + x / 2 * 2) * 2;
-                bt601_to_srgb(b[i + 2 * (x % 2)], b[i + 1], b[i + 3])
+                let pair = at(x / 2 * 2);
+                bt601_to_srgb(b[at(x)], b[pair + 1], b[pair + 3])
             }
             PixelFormat::Nv12 => {
-                let uv = w * self.height as usize + y / 2 * w + x / 2 * 2;
-                bt601_to_srgb(b[y * w + x], b[uv], b[uv + 1])
+                let chroma = self.format.chroma_offset(self.width, self.height).unwrap_or(0);
+                let uv = chroma + y / 2 * row_bytes + x / 2 * 2;
+                bt601_to_srgb(b[at(x)], b[uv], b[uv + 1])
             }
         }
     }

@@ -44,10 +44,7 @@ impl PictureShape {
 
     /// Where the second plane begins in the picture's own bytes; 0 where there is none.
     fn chroma(self) -> u64 {
-        match self.format {
-            PixelFormat::Nv12 => u64::from(self.width) * u64::from(self.height),
-            PixelFormat::Yuyv | PixelFormat::Rgb => 0,
-        }
+        self.format.chroma_offset(self.width, self.height).unwrap_or(0) as u64
     }
 
     /// Bytes from the first on that the shader may read: it reads whole words, and of RGB one beyond the last pixel's.

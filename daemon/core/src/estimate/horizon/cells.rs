@@ -143,13 +143,7 @@ const fn weight(format: PixelFormat) -> usize {
 /// Adds a row of the picture to the cells of `line`. Luma of RGB is (R + 2 G + B) / 4, times four: near enough to BT.601 for
 /// edges.
 fn add_row(picture: &Picture, y: usize, reduction: usize, line: &mut [i32]) {
-    let (bytes, width) = (picture.bytes(), picture.width() as usize);
-    let per_pixel = match picture.format() {
-        PixelFormat::Nv12 => 1,
-        PixelFormat::Yuyv => 2,
-        PixelFormat::Rgb => 3,
-    };
-    let row = bytes.get(y * width * per_pixel..(y + 1) * width * per_pixel).unwrap_or(&[]);
+    let (per_pixel, row) = (picture.format().pixel_bytes(), picture.row(y));
     for (cell, pixels) in line.iter_mut().zip(row.chunks_exact(CELL * reduction * per_pixel)) {
         *cell += match picture.format() {
             PixelFormat::Nv12 => eights(pixels).map(pairs).map(total).sum::<i32>(),

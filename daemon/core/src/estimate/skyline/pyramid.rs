@@ -134,13 +134,7 @@ const fn weight(format: PixelFormat) -> f32 {
 
 /// Adds a row of the picture, `reduction` pixels to a sum. Luma of RGB is (R + 2 G + B) / 4, times four.
 fn add_row(picture: &Picture, y: usize, reduction: usize, sums: &mut [u32]) {
-    let per_pixel = match picture.format() {
-        PixelFormat::Nv12 => 1,
-        PixelFormat::Yuyv => 2,
-        PixelFormat::Rgb => 3,
-    };
-    let bytes = picture.width() as usize * per_pixel;
-    let row = picture.bytes().get(y * bytes..(y + 1) * bytes).unwrap_or(&[]);
+    let (per_pixel, row) = (picture.format().pixel_bytes(), picture.row(y));
     // Fixed steps, so that the compiler lays out the loops.
     match (per_pixel, reduction) {
         (1, 1) => add::<1>(row, sums, |p| total::<1>(p)),
