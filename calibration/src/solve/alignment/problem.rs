@@ -159,14 +159,16 @@ impl AlignmentProblem {
             };
             if let Some((anchor, segment)) = place(&state, chain) {
                 let weight = weights.observations.get(index).copied().unwrap_or(1.0);
-                rows.push(observed(o, index, unknowns, &state, (anchor, segment), weight));
+                let row = begun(state.time, index, &state, (anchor, segment), weight);
+                rows.push(observed(row, o, unknowns, &state, anchor));
             }
         }
         for (index, (time, up)) in self.levels.iter().enumerate() {
             let Some(state) = track.at(*time) else { continue };
             if let Some((anchor, segment)) = place(&state, main) {
                 let weight = weights.levels.get(index).copied().unwrap_or(1.0);
-                let mut row = levelled(*time, *up, index, unknowns, &state, (anchor, segment), weight);
+                let row = begun(*time, index, &state, (anchor, segment), weight);
+                let mut row = levelled(row, *up, unknowns, &state, anchor);
                 row.common = LEVEL_COMMON * (self.levels.len() as f64).sqrt();
                 rows.push(row);
             }
@@ -257,7 +259,7 @@ fn flatten(row: &mut ResidualRow, up: DVec3) {
     row.blind = Some(blind);
 }
 
-/// A row whose residual is to be filled in, with the derivatives that all share.
+/// A row without its residual, with the derivatives that all share.
 fn begun(
     time: f64,
     index: usize,
@@ -282,16 +284,15 @@ fn begun(
     }
 }
 
+/// The row of an observation of the camera.
 fn observed(
+    mut row: ResidualRow,
     o: &Observation,
-    index: usize,
     unknowns: &AlignmentUnknowns,
     state: &TrackState,
-    (anchor, segment): (DQuat, usize),
-    weight: f64,
+    anchor: DQuat,
 ) -> ResidualRow {
     let predicted = anchor * state.start_from_imu * unknowns.camera_from_imu.inverse();
-    let mut row = begun(state.time, index, state, (anchor, segment), weight);
     let by_turn = matrix(DMat3::from_quat(predicted));
     row.jacobian.fixed_columns_mut::<3>(place::ROTATION).copy_from(&by_turn);
     row.jacobian.set_column(place::OFFSET, &row.speed);
@@ -314,16 +315,14 @@ fn observed(
     row
 }
 
+/// The row of a level: where up is in the unit's axes.
 fn levelled(
-    time: f64,
+    mut row: ResidualRow,
     up: DVec3,
-    index: usize,
     unknowns: &AlignmentUnknowns,
     state: &TrackState,
-    (anchor, segment): (DQuat, usize),
-    weight: f64,
+    anchor: DQuat,
 ) -> ResidualRow {
-    let mut row = begun(time, index, state, (anchor, segment), weight);
     row.residual = vector(arc(anchor * (state.start_from_imu * up), unknowns.up));
     flatten(&mut row, unknowns.up);
     row
