@@ -22,16 +22,16 @@ pub struct LabCli {
 #[derive(Debug, Subcommand)]
 pub enum LabCommand {
     /// Make a recording from a folder of pictures or from a video
-    Import(Import),
+    Import(ImportArgs),
     /// Compose boats into a photograph
-    Compose(Compose),
+    Compose(ComposeArgs),
     /// Make the user study of real and generated reflections, or score its answers
-    Study(Study),
+    Study(StudyArgs),
 }
 
 /// Arguments of `import`.
 #[derive(Debug, Args)]
-pub struct Import {
+pub struct ImportArgs {
     /// Folder of JPEG or PNG pictures, or a video file
     pub source: PathBuf,
     /// Recording to write (MCAP)
@@ -63,7 +63,7 @@ pub struct Import {
 
 /// Arguments of `compose`.
 #[derive(Debug, Args)]
-pub struct Compose {
+pub struct ComposeArgs {
     /// Scene file (TOML): picture, camera, boats, sea and light
     #[arg(required_unless_present = "example")]
     pub scene: Option<PathBuf>,
@@ -87,8 +87,8 @@ pub struct Compose {
 /// Arguments of `study`.
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
-pub struct Study {
-    /// What to do instead of making one
+pub struct StudyArgs {
+    /// Task other than making a study
     #[command(subcommand)]
     pub task: Option<StudyTask>,
     /// Folder for the page, the pictures and the key
@@ -117,16 +117,16 @@ pub struct Study {
     pub gpu: Option<String>,
 }
 
-/// What else to do with a study.
+/// Tasks of an existing study.
 #[derive(Debug, Subcommand)]
 pub enum StudyTask {
     /// Compute rates by factor, standard errors and d' from answers
-    Score(StudyScore),
+    Score(StudyScoreArgs),
 }
 
 /// Arguments of `study score`.
 #[derive(Debug, Args)]
-pub struct StudyScore {
+pub struct StudyScoreArgs {
     /// Files that the page saved, or filled-in answer sheets
     #[arg(required = true)]
     pub answers: Vec<PathBuf>,

@@ -9,10 +9,10 @@ use bowwave_import::{ImportOptions, ImportReport, Progress, TelemetryReport, imp
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use crate::cli::Import;
+use crate::cli::ImportArgs;
 
 /// Imports a folder of pictures or a video.
-pub fn run(arguments: &Import) -> Result<Outcome> {
+pub fn run(arguments: &ImportArgs) -> Result<Outcome> {
     if !arguments.source.exists() {
         bail!("no file or folder {}; name a video or a folder of pictures", arguments.source.display());
     }

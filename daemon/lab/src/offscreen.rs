@@ -1,4 +1,4 @@
-//! Draws scenes off screen, one at a time, with the trainer's own renderer.
+//! Off-screen rendering of single scenes by the trainer's own renderer.
 
 use std::time::Duration;
 
@@ -19,7 +19,7 @@ use crate::{
 /// Longest wait for one picture. A large one with many boats takes seconds on a processor.
 const WAIT: Duration = Duration::from_secs(120);
 
-/// A renderer that is kept as long as pictures ask the same of it.
+/// A renderer without a display. It is kept as long as the scenes need the same of it, and made anew otherwise.
 pub struct OffscreenRenderer {
     models: BoatModels,
     gpu: Option<String>,
@@ -31,7 +31,7 @@ pub struct OffscreenRenderer {
 /// A picture with boats in it.
 #[derive(Debug)]
 pub struct Drawn {
-    /// What was drawn, sRGB.
+    /// Its pixels, sRGB.
     pub picture: RgbImage,
     /// How many boats or reflections of boats lie within the picture.
     pub boats_seen: usize,
@@ -65,7 +65,7 @@ impl OffscreenRenderer {
         draw_one(renderer, completions, scene, picture)
     }
 
-    /// What the validation layer has said so far.
+    /// Messages of the validation layer since the last call.
     pub fn validation_messages(&mut self) -> Vec<String> {
         self.put_away();
         std::mem::take(&mut self.messages)

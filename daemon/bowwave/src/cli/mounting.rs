@@ -111,7 +111,7 @@ pub struct CalibrateBoresight {
     pub tag: usize,
     /// The mark's place in the picture of a pull, pixels; once for each pull, in their order
     #[arg(long, value_name = "X,Y", value_parser = parse_mark, required_unless_present = "target")]
-    pub mark: Vec<Mark>,
+    pub mark: Vec<PixelMark>,
     #[command(flatten)]
     pub files: CalibrationFiles,
     #[command(flatten)]
@@ -185,13 +185,13 @@ impl CalibrateWizard {
 
 /// A place in a picture, pixels; the centre of the first pixel is (0.5, 0.5).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mark(pub DVec2);
+pub struct PixelMark(pub DVec2);
 
-fn parse_mark(text: &str) -> Result<Mark, String> {
+fn parse_mark(text: &str) -> Result<PixelMark, String> {
     let numbers =
         text.split_once(',').and_then(|(x, y)| Some((x.trim().parse().ok()?, y.trim().parse().ok()?)));
     let mark = numbers.filter(|(x, y)| (0.0..=8192.0).contains(x) && (0.0..=8192.0).contains(y));
-    mark.map(|(x, y)| Mark(DVec2::new(x, y)))
+    mark.map(|(x, y)| PixelMark(DVec2::new(x, y)))
         .ok_or_else(|| format!("'{text}' is no place: write X,Y in pixels, as 641.5,358"))
 }
 

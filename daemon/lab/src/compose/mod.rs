@@ -11,7 +11,7 @@ use bowwave_core::water::ReflectionMethod;
 use bowwave_models::BoatModels;
 
 use crate::{
-    cli::Compose,
+    cli::ComposeArgs,
     offscreen::OffscreenRenderer,
     photo::Photo,
     still::{self, Still},
@@ -21,7 +21,7 @@ use crate::{
 const PICTURES_MAX: usize = 10_000;
 
 /// Composes what the arguments name.
-pub fn run(arguments: &Compose) -> Result<Outcome> {
+pub fn run(arguments: &ComposeArgs) -> Result<Outcome> {
     if arguments.example {
         stdout::print(still::EXAMPLE)?;
         return Ok(Outcome::Done);

@@ -34,7 +34,7 @@ pub fn film_focal_px(film_mm: f64, (width, height): (u32, u32)) -> f64 {
 
 /// How the camera was held.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Attitude {
+pub enum StillAttitude {
     /// Radians above the horizontal, and clockwise.
     Given {
         /// Upwards.
@@ -62,7 +62,7 @@ pub struct StillCamera {
     /// Where the middle of the picture lies, radians clockwise from north.
     pub azimuth: f64,
     /// How it was held.
-    pub attitude: Attitude,
+    pub attitude: StillAttitude,
     pub(super) focal_at: TomlPlace,
     pub(super) attitude_at: TomlPlace,
 }
@@ -113,8 +113,8 @@ impl StillCamera {
     pub(super) fn pose(&self, lens: &Lens) -> Result<CameraPose, TomlError> {
         let position = DVec3::new(0.0, 0.0, self.eye_height_m);
         let world_from_camera = match self.attitude {
-            Attitude::Given { pitch, roll } => look(self.azimuth, pitch, roll),
-            Attitude::Horizon(points) => self.levelled_by(lens, points)?,
+            StillAttitude::Given { pitch, roll } => look(self.azimuth, pitch, roll),
+            StillAttitude::Horizon(points) => self.levelled_by(lens, points)?,
         };
         Ok(CameraPose { world_from_camera, position })
     }

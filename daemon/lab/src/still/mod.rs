@@ -28,7 +28,7 @@ use bowwave_core::{
         waves::{WaveField, WaveSpec},
     },
 };
-pub use camera::{Attitude, Focal, StillCamera, film_focal_px};
+pub use camera::{Focal, StillAttitude, StillCamera, film_focal_px};
 
 /// A commented text to begin with.
 pub const EXAMPLE: &str = include_str!("example.toml");
@@ -70,12 +70,12 @@ pub struct Still {
 /// A boat in the first picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StillBoat {
-    /// What errors call it.
+    /// Name of the boat, for errors.
     pub name: String,
-    /// What it looks like: the name of a model or a path to a file, for the caller to resolve.
+    /// Name of a model, or path of its file, for the caller to resolve.
     pub model: String,
     /// Where it is.
-    pub place: Place,
+    pub place: StillPlace,
     /// Where it goes, radians clockwise from north.
     pub heading: f64,
     /// How fast, m/s.
@@ -85,7 +85,7 @@ pub struct StillBoat {
 
 impl StillBoat {
     /// A boat at rest that no text places. It is called by its model.
-    pub fn new(model: &str, place: Place, heading: f64) -> Self {
+    pub fn new(model: &str, place: StillPlace, heading: f64) -> Self {
         Self {
             name: model.to_owned(),
             model: model.to_owned(),
@@ -99,19 +99,19 @@ impl StillBoat {
 
 /// Where a boat's middle meets the water.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Place {
+pub enum StillPlace {
     /// World x and y, metres from the camera.
     World(DVec2),
     /// A pixel of the picture; the sea there has its mean height.
     Pixel(DVec2),
 }
 
-/// What is drawn over one picture.
+/// The scene drawn over one picture, with its plan.
 #[derive(Clone, Debug)]
 pub struct Composed {
     /// The scene.
     pub scene: Scene,
-    /// What the renderer must be able to do for it.
+    /// Passes and sizes that the renderer needs for it.
     pub plan: ScenePlan,
 }
 
@@ -199,8 +199,8 @@ impl Still {
         let boat = &self.boats[number];
         let refuse = |problem: String| Err(boat.stands.error(problem));
         let (start, on_mean_sea) = match boat.place {
-            Place::World(place) => (place, false),
-            Place::Pixel(pixel) => match camera::on_the_sea(eye, pixel) {
+            StillPlace::World(place) => (place, false),
+            StillPlace::Pixel(pixel) => match camera::on_the_sea(eye, pixel) {
                 Ok(place) => (place, true),
                 Err(problem) => return refuse(problem),
             },
@@ -233,7 +233,7 @@ impl Still {
         })
     }
 
-    /// What a boat has left on the water: it came straight on.
+    /// The wake of a boat that came straight on.
     fn wake(&self, number: usize, afloat: &Afloat<'_>, waves: &WaveField, time_s: f64) -> Option<Wake> {
         let boat = self.boats.get(number)?;
         let hull = Hull::of(afloat.model);
@@ -246,7 +246,7 @@ impl Still {
         };
         let Hull { length_m, beam_m } = hull;
         // A boat that the picture lays on its water has all of its wake there.
-        let waves = Some(waves).filter(|_| matches!(boat.place, Place::World(_)));
+        let waves = Some(waves).filter(|_| matches!(boat.place, StillPlace::World(_)));
         let height = |p| waves.map_or(0.0, |w| w.plane_under(p, 0.0, length_m, beam_m, time_s).height_m);
         Wake::of(hull, f64::from(-afloat.model.min.z), time_s, state, height)
     }

@@ -15,7 +15,7 @@ use bowwave_core::{
 use glam::DVec2;
 use serde::Deserialize;
 
-use super::{Attitude, BOATS_MAX, Focal, Place, RANGE_MAX_M, Still, StillBoat, StillCamera};
+use super::{BOATS_MAX, Focal, RANGE_MAX_M, Still, StillAttitude, StillBoat, StillCamera, StillPlace};
 
 /// Largest coordinate of a pixel that a text may hold; whether it lies in the picture is checked with the picture.
 const PIXEL_MAX: f64 = 8192.0;
@@ -167,7 +167,7 @@ fn camera(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<StillCamera
     })
 }
 
-fn attitude(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<Attitude, TomlError> {
+fn attitude(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<StillAttitude, TomlError> {
     let text = section.text;
     let what = "two points of the horizon in pixels: [[100, 410], [1180, 404]]";
     let angle = |value: &OptionalKey<f64>| -> Result<Option<f64>, TomlError> {
@@ -181,12 +181,12 @@ fn attitude(section: &TomlSection<'_>, raw: &RawStillCamera) -> Result<Attitude,
             return Err(text.error(value, "follows from horizon; leave out it or that"));
         }
         return match points[..] {
-            [a, b] => Ok(Attitude::Horizon([a, b])),
+            [a, b] => Ok(StillAttitude::Horizon([a, b])),
             _ => Err(text.refuse(horizon, what)),
         };
     }
     match pitch {
-        Some(pitch) => Ok(Attitude::Given { pitch, roll: roll.unwrap_or(0.0) }),
+        Some(pitch) => Ok(StillAttitude::Given { pitch, roll: roll.unwrap_or(0.0) }),
         None => Err(section.missing("horizon", &format!("{what}, or pitch_deg and roll_deg"))),
     }
 }
@@ -200,7 +200,7 @@ fn boat(section: &TomlSection<'_>, raw: &RawStillBoat, nth: usize) -> Result<Sti
         }
         (Some(value), None, None) => {
             let rule = pixel("a point of the water in pixels: [520, 470]");
-            (Place::Pixel(text.needed(value, rule)?), text.place(value))
+            (StillPlace::Pixel(text.needed(value, rule)?), text.place(value))
         }
         (None, None, None) => {
             let what = "a point of the water in pixels, or range_m and bearing_deg";
@@ -210,7 +210,7 @@ fn boat(section: &TomlSection<'_>, raw: &RawStillBoat, nth: usize) -> Result<Sti
             let range_m = section.required("range_m", value, range)?;
             let bearing = section.required("bearing_deg", bearing, angle())?;
             let stands = value.as_ref().map_or_else(|| section.place("range_m"), |value| text.place(value));
-            (Place::World(place(bearing.to_radians(), range_m)), stands)
+            (StillPlace::World(place(bearing.to_radians(), range_m)), stands)
         }
     };
     let Some(model) = &raw.model else {

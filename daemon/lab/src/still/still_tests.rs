@@ -171,7 +171,7 @@ proptest! {
         let mut camera = parse(PLAIN).unwrap().camera;
         camera.eye_height_m = height;
         camera.azimuth = azimuth;
-        camera.attitude = Attitude::Horizon(points);
+        camera.attitude = StillAttitude::Horizon(points);
         let found = camera.pose(&lens).unwrap().world_from_camera;
         prop_assert!(found.angle_between(held) < 1e-6, "{}", found.angle_between(held));
     }

@@ -59,7 +59,7 @@ fn photographed(path: &Path) -> Result<Background> {
     Ok(Background { name: name.replace(',', " "), still, photos })
 }
 
-/// What differs between the simulated seas.
+/// Parameters in which the two simulated seas differ.
 struct Weather {
     seed: u64,
     beaufort: u8,

@@ -38,7 +38,7 @@ pub const REPLICATES: usize = 4;
 
 /// One picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Item {
+pub enum StudyItem {
     /// A photograph of a real reflection, by number.
     Real(usize),
     /// A drawn one.
@@ -54,7 +54,7 @@ pub enum Item {
 #[derive(Clone, Debug)]
 pub struct Design {
     /// All pictures, shuffled: a picture's name tells nothing.
-    pub items: Vec<Item>,
+    pub items: Vec<StudyItem>,
     /// For each participant the indices of [`Design::items`] in order.
     pub orders: Vec<Vec<usize>>,
 }
@@ -66,9 +66,9 @@ impl Design {
     /// blocks go round like a Latin square, so that over four participants each picture comes as early as any other.
     pub fn new(real: usize, participants: usize, seed: u64) -> Self {
         let mut random = Pcg64Mcg::seed_from_u64(seed);
-        let mut items: Vec<Item> = (0..real).map(Item::Real).collect();
+        let mut items: Vec<StudyItem> = (0..real).map(StudyItem::Real).collect();
         for condition in 0..CONDITIONS.len() {
-            items.extend((0..REPLICATES).map(|replicate| Item::Generated { condition, replicate }));
+            items.extend((0..REPLICATES).map(|replicate| StudyItem::Generated { condition, replicate }));
         }
         items.shuffle(&mut random);
         let orders = (0..participants).map(|p| order(&items, p, &mut random)).collect();
@@ -84,21 +84,21 @@ impl Design {
     pub fn by_condition(&self) -> Vec<usize> {
         let mut all: Vec<usize> = (0..self.items.len()).collect();
         all.sort_by_key(|&i| match self.items[i] {
-            Item::Real(n) => (usize::MAX, n),
-            Item::Generated { condition, replicate } => (condition, replicate),
+            StudyItem::Real(n) => (usize::MAX, n),
+            StudyItem::Generated { condition, replicate } => (condition, replicate),
         });
         all
     }
 }
 
-fn order(items: &[Item], participant: usize, random: &mut Pcg64Mcg) -> Vec<usize> {
+fn order(items: &[StudyItem], participant: usize, random: &mut Pcg64Mcg) -> Vec<usize> {
     let mut blocks: [Vec<usize>; REPLICATES] = Default::default();
     for (index, item) in items.iter().enumerate() {
         let block = match *item {
             // Real pictures are dealt out evenly; conditions begin their replicates at different blocks, so that a block
             // holds all boats.
-            Item::Real(number) => number,
-            Item::Generated { condition, replicate } => condition + replicate,
+            StudyItem::Real(number) => number,
+            StudyItem::Generated { condition, replicate } => condition + replicate,
         };
         blocks[(block + participant) % REPLICATES].push(index);
     }
@@ -126,9 +126,9 @@ mod tests {
                 let (mut seen, mut real, mut end) = ([0; 16], 0, begin);
                 while end < order.len() {
                     match design.items[order[end]] {
-                        Item::Real(_) => real += 1,
-                        Item::Generated { condition, .. } if seen[condition] == 1 => break,
-                        Item::Generated { condition, .. } => seen[condition] += 1,
+                        StudyItem::Real(_) => real += 1,
+                        StudyItem::Generated { condition, .. } if seen[condition] == 1 => break,
+                        StudyItem::Generated { condition, .. } => seen[condition] += 1,
                     }
                     end += 1;
                 }

@@ -8,7 +8,7 @@ use bowwave_models::Boat;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
 
-use super::design::{CONDITIONS, Design, Item};
+use super::design::{CONDITIONS, Design, StudyItem};
 
 /// One picture; the factors are empty for real ones.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -30,10 +30,10 @@ pub struct KeyRow {
 }
 
 /// How to read a factor from a row.
-pub type Level = fn(&KeyRow) -> &str;
+pub type FactorLevel = fn(&KeyRow) -> &str;
 
 /// Names of the factors, and how to read each.
-pub const FACTORS: [(&str, Level); 4] = [
+pub const FACTORS: [(&str, FactorLevel); 4] = [
     ("method", |row| row.method.as_str()),
     ("shadow", |row| row.shadow.as_str()),
     ("background", |row| row.background.as_str()),
@@ -47,7 +47,7 @@ pub fn rows(
     methods: [ReflectionMethod; 2],
     real: &[(String, RgbImage)],
 ) -> Vec<KeyRow> {
-    let row = |(index, item): (usize, &Item)| {
+    let row = |(index, item): (usize, &StudyItem)| {
         let empty = KeyRow {
             picture: design.name(index),
             kind: "real".to_owned(),
@@ -58,8 +58,8 @@ pub fn rows(
             source: String::new(),
         };
         match *item {
-            Item::Real(number) => KeyRow { source: real[number].0.clone(), ..empty },
-            Item::Generated { condition, replicate } => {
+            StudyItem::Real(number) => KeyRow { source: real[number].0.clone(), ..empty },
+            StudyItem::Generated { condition, replicate } => {
                 let condition = CONDITIONS[condition];
                 KeyRow {
                     kind: "generated".to_owned(),

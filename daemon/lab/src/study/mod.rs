@@ -18,23 +18,23 @@ use bowwave::{ending, loading::warn_of_former_names, outcome::Outcome, stdout};
 use bowwave_core::water::ReflectionMethod;
 use image::RgbImage;
 
-use crate::cli::{Study, StudyTask};
-use design::{CONDITIONS, Design, Item};
+use crate::cli::{StudyArgs, StudyTask};
+use design::{CONDITIONS, Design, StudyItem};
 
 /// The page that shows the pictures.
 const PAGE: &str = "study.html";
-/// What each picture is.
+/// File name of the key: kind and factors of each picture.
 const KEY: &str = "key.csv";
 
 /// Makes a study, or scores one.
-pub fn run(arguments: &Study) -> Result<Outcome> {
+pub fn run(arguments: &StudyArgs) -> Result<Outcome> {
     match &arguments.task {
         Some(StudyTask::Score(arguments)) => score::run(arguments),
         None => make(arguments),
     }
 }
 
-fn make(arguments: &Study) -> Result<Outcome> {
+fn make(arguments: &StudyArgs) -> Result<Outcome> {
     if let Some(methods) = &arguments.methods {
         warn_of_former_names(&methods.warnings);
     }
@@ -66,8 +66,8 @@ fn make(arguments: &Study) -> Result<Outcome> {
             bail!("ended before all pictures were drawn; {} holds no study", arguments.out.display());
         }
         let image = match design.items[index] {
-            Item::Real(number) => real[number].1.clone(),
-            Item::Generated { condition, replicate } => drawer.draw(CONDITIONS[condition], replicate)?,
+            StudyItem::Real(number) => real[number].1.clone(),
+            StudyItem::Generated { condition, replicate } => drawer.draw(CONDITIONS[condition], replicate)?,
         };
         images.push((index, image));
         bar.inc(1);

@@ -24,7 +24,7 @@ use crate::{
     compose::pictures as files_of,
     offscreen::OffscreenRenderer,
     photo::Photo,
-    still::{Composed, Place, Still, StillBoat},
+    still::{Composed, Still, StillBoat, StillPlace},
 };
 
 /// Boats by replicate.
@@ -118,7 +118,7 @@ impl Drawer {
         let (lens, camera) = still.sight(size, photo.focal_px)?;
         let (pixel, heading) = place(&lens, &camera, &still, model, &mut random)
             .with_context(|| format!("the background {} leaves no room for a boat", background.name))?;
-        still.boats = vec![StillBoat::new(model.name.as_str(), Place::Pixel(pixel), heading)];
+        still.boats = vec![StillBoat::new(model.name.as_str(), StillPlace::Pixel(pixel), heading)];
         let id = ModelId(u16::try_from(which).context("too many models")?);
         let composed = still
             .compose(&photo.picture, 0, (&self.models.list, &[id]), photo.focal_px)
@@ -163,7 +163,7 @@ fn place(
     Ok((DVec2::new(column, row), heading))
 }
 
-/// What lies below the lowest point of the hull: neither boat nor horizon is seen.
+/// The part of the picture below the lowest point of the hull, in which neither boat nor horizon is seen.
 fn cut(drawn: &RgbImage, composed: &Composed, model: &Model) -> Result<RgbImage> {
     let scene = &composed.scene;
     let boat = scene.boats.first().context("the boat lies outside the picture")?;

@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     key::{self, FACTORS, KeyRow},
-    statistics::{Estimate, Tally, d_prime, rate},
+    statistics::{AnswerTally, Estimate, d_prime, rate},
 };
-use crate::cli::StudyScore;
+use crate::cli::StudyScoreArgs;
 
 /// A line of an answer file; further columns are left alone.
 #[derive(Clone, Debug, Deserialize)]
@@ -25,7 +25,7 @@ struct Answer {
 
 /// The result for one group of pictures.
 #[derive(Clone, Debug, Serialize, PartialEq)]
-pub struct Line {
+pub struct ScoreLine {
     /// "kind", or a factor.
     pub factor: String,
     /// Level of the factor.
@@ -45,7 +45,7 @@ pub struct Line {
 }
 
 /// Scores the files that the arguments name.
-pub fn run(arguments: &StudyScore) -> Result<Outcome> {
+pub fn run(arguments: &StudyScoreArgs) -> Result<Outcome> {
     let key = key::read(&arguments.key)?;
     let mut answers = Answers::new(&key);
     for path in &arguments.answers {
@@ -132,9 +132,9 @@ impl<'a> Answers<'a> {
     }
 
     /// Each participant's answers to the pictures that `belongs` picks.
-    fn tallies(&self, belongs: impl Fn(&KeyRow) -> bool) -> Vec<Tally> {
+    fn tallies(&self, belongs: impl Fn(&KeyRow) -> bool) -> Vec<AnswerTally> {
         let of = |answers: &BTreeMap<&str, bool>| {
-            let mut tally = Tally::default();
+            let mut tally = AnswerTally::default();
             for (picture, &called_real) in answers {
                 if self.key.get(picture).is_some_and(|row| belongs(row)) {
                     tally.add(called_real);
@@ -145,13 +145,13 @@ impl<'a> Answers<'a> {
         self.by_participant.values().map(of).collect()
     }
 
-    fn line(&self, factor: &str, level: &str, belongs: impl Fn(&KeyRow) -> bool) -> Option<Line> {
+    fn line(&self, factor: &str, level: &str, belongs: impl Fn(&KeyRow) -> bool) -> Option<ScoreLine> {
         let tallies = self.tallies(belongs);
         let Estimate { value, error } = rate(&tallies)?;
-        let all = tallies.into_iter().fold(Tally::default(), Tally::plus);
-        let real = self.tallies(is_real).into_iter().fold(Tally::default(), Tally::plus);
+        let all = tallies.into_iter().fold(AnswerTally::default(), AnswerTally::plus);
+        let real = self.tallies(is_real).into_iter().fold(AnswerTally::default(), AnswerTally::plus);
         let d = if level == "real" { None } else { d_prime(real, all) };
-        Some(Line {
+        Some(ScoreLine {
             factor: factor.to_owned(),
             level: level.to_owned(),
             seen: all.seen,
@@ -163,8 +163,8 @@ impl<'a> Answers<'a> {
         })
     }
 
-    fn lines(&self) -> Vec<Line> {
-        let mut lines: Vec<Line> = Vec::new();
+    fn lines(&self) -> Vec<ScoreLine> {
+        let mut lines: Vec<ScoreLine> = Vec::new();
         lines.extend(self.line("kind", "real", is_real));
         lines.extend(self.line("kind", "generated", |row| !is_real(row)));
         for (factor, level_of) in FACTORS {
@@ -186,7 +186,7 @@ fn one_line(error: &csv::Error) -> String {
     error.to_string().replace('\n', " ")
 }
 
-fn table(lines: &[Line]) -> String {
+fn table(lines: &[ScoreLine]) -> String {
     let mut text = format!(
         "{:<11} {:<16} {:>5} {:>7} {:>6} {:>6} {:>6}\n",
         "factor", "level", "seen", "real %", "+-", "d'", "+-"

@@ -13,14 +13,14 @@ pub struct Estimate {
 
 /// How often of how many.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct AnswerTally {
     /// Pictures called real.
     pub real: u32,
     /// Pictures answered.
     pub seen: u32,
 }
 
-impl Tally {
+impl AnswerTally {
     /// Takes in one answer.
     pub fn add(&mut self, called_real: bool) {
         self.real += u32::from(called_real);
@@ -46,8 +46,8 @@ impl Tally {
 
 /// The rate of all answers. Its error is that of the mean over participants (their spread by the root of their number), since a
 /// participant's answers are not independent; of a single one, the binomial error.
-pub fn rate(participants: &[Tally]) -> Option<Estimate> {
-    let all = participants.iter().copied().fold(Tally::default(), Tally::plus);
+pub fn rate(participants: &[AnswerTally]) -> Option<Estimate> {
+    let all = participants.iter().copied().fold(AnswerTally::default(), AnswerTally::plus);
     let value = all.rate()?;
     let rates: Vec<f64> = participants.iter().filter_map(|t| t.rate()).collect();
     let n = rates.len() as f64;
@@ -62,7 +62,7 @@ pub fn rate(participants: &[Tally]) -> Option<Estimate> {
 
 /// d' = z(hits) - z(false alarms), hits being real pictures called real and false alarms generated ones called real (Green and
 /// Swets 1966); error by Gourevitch and Galanter 1967. `None` where either kind was not answered.
-pub fn d_prime(real: Tally, generated: Tally) -> Option<Estimate> {
+pub fn d_prime(real: AnswerTally, generated: AnswerTally) -> Option<Estimate> {
     let (hits, false_alarms) = (real.corrected()?, generated.corrected()?);
     let share = |p: f64, n: u32| p * (1.0 - p) / (f64::from(n) * density(z(p)).powi(2));
     Some(Estimate {
@@ -84,8 +84,8 @@ fn density(z: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn tally(real: u32, seen: u32) -> Tally {
-        Tally { real, seen }
+    fn tally(real: u32, seen: u32) -> AnswerTally {
+        AnswerTally { real, seen }
     }
 
     #[test]
@@ -129,8 +129,8 @@ mod tests {
         let three = rate(&[tally(1, 4), tally(2, 4), tally(3, 4)]).expect("answers");
         assert!((three.value - 0.5).abs() < 1e-12 && (three.error - 0.25 / 3f64.sqrt()).abs() < 1e-12);
         // One participant: sqrt(0.25 * 0.75 / 4).
-        let one = rate(&[tally(1, 4), Tally::default()]).expect("answers");
+        let one = rate(&[tally(1, 4), AnswerTally::default()]).expect("answers");
         assert!((one.error - (0.1875_f64 / 4.0).sqrt()).abs() < 1e-12, "{one:?}");
-        assert_eq!(rate(&[Tally::default()]), None);
+        assert_eq!(rate(&[AnswerTally::default()]), None);
     }
 }
