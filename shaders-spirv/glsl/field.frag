@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Nelson 2009, eq. 4 and 5, mended: how the video's brightness changes downwards, and whether it is so bright or dark that the
+// Nelson 2009, eq. 4 and 5, corrected: how the video's brightness changes downwards, and whether it is so bright or dark that the
 // video passes through, once for each FIELD_CELL of the screen. Seen
 // at a grazing angle waves are long and low, so a cell is wider than high. A mean over four pixels, and bilinear fetches of the
 // cells, take the camera's noise off; and it costs an eighth of doing it at every pixel.

@@ -7,21 +7,13 @@ struct WaterBlock {
     vec2 columns;        // across position of the table's first column; columns for each pixel
     vec2 mirror_scale;   // texture coordinates of the mirror layer for each pixel
     vec2 mirror_offset;  // texture coordinates of the mirror layer at pixel (0, 0)
-    vec2 blur;           // step of the box blur, texture coordinates
+    vec2 pad;
     vec4 mirror_bounds;  // smallest and largest texture coordinates that belong to this boat
     vec4 passes;         // wave pass-through: from none to all when dark (x, y), from all to none when bright (z, w)
-    float alpha;         // share of the mirrored light at the hull-water line
-    float alpha_fall;    // 1 / k of eq. 6
     float shadow;        // i of eq. 7
     float shadow_fall;   // 1 / k of eq. 7
-    float shift;         // largest shift of the mirror coordinate, pixels
-    float shift_limit;   // beyond it the reflection is discarded, pixels
     float step;          // pixels between the nine gradients' places
     float flat_spread;   // spread of the gradients below which a patch counts as flat, codes 0 to 1
-    float shift_near;    // share of the largest shift at the hull-water line
-    float shift_grow;    // how that share grows, per pixel below the line
-    float pad0;
-    float pad1;
     vec4 hull_line[HULL_LINE_COLUMNS / 4];  // pixels below `anchor` of the hull-water line, column by column
 };
 

@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod glsl;
 pub mod interface;
 
 /// One compiled shader.
@@ -57,9 +58,7 @@ shaders! {
     SOFTEN_FRAG = "soften.frag";
     /// How the video's brightness changes downwards.
     FIELD_FRAG = "field.frag";
-    /// A boat's light on the sea. Constants: 0 method (0 none, 1 mirror, 2 and 3 Full Reflection as printed and mended, 4 and 5 Physics,
-    /// 6 shadow by light alone),
-    /// 1 shadow level.
+    /// A boat's light on the sea. Constants: 0 method, 1 shadow level, both as `glsl/water_methods.glsl` numbers them.
     WATER_FRAG = "water.frag";
     /// A boat's mirror image collapsed to bands of height.
     BANDS_FRAG = "bands.frag";

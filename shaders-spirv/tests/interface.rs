@@ -13,7 +13,8 @@ use rspirv::{
     spirv::{Decoration, Op, StorageClass, Word},
 };
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, DrawBlock, FrameBlock, HULL_LINE_COLUMNS, HudQuad, LobeBlock, MeshVertex,
+    BOAT_BLOCKS_MAX, BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock,
+    HULL_LINE_COLUMNS, HudQuad, LobeBlock, MeshVertex, MirrorBlock, PhysicsBlock, PhysicsPublishedBlock,
     ReflectBlock, RoundBlock, TRACK_POINTS, VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint,
     WaterBlock,
 };
@@ -25,6 +26,12 @@ const HOST: &[Host] = &[
     ("FrameBlock", FrameBlock::FIELDS, size_of::<FrameBlock>()),
     ("BoatBlock", BoatBlock::FIELDS, size_of::<BoatBlock>()),
     ("WaterBlock", WaterBlock::FIELDS, size_of::<WaterBlock>()),
+    ("MirrorBlock", MirrorBlock::FIELDS, size_of::<MirrorBlock>()),
+    ("FullPublishedBlock", FullPublishedBlock::FIELDS, size_of::<FullPublishedBlock>()),
+    ("FullBlock", FullBlock::FIELDS, size_of::<FullBlock>()),
+    ("PhysicsPublishedBlock", PhysicsPublishedBlock::FIELDS, size_of::<PhysicsPublishedBlock>()),
+    ("PhysicsBlock", PhysicsBlock::FIELDS, size_of::<PhysicsBlock>()),
+    ("ContactBlock", ContactBlock::FIELDS, size_of::<ContactBlock>()),
     ("RoundBlock", RoundBlock::FIELDS, size_of::<RoundBlock>()),
     ("HudQuad", HudQuad::FIELDS, size_of::<HudQuad>()),
     ("VideoBlock", VideoBlock::FIELDS, size_of::<VideoBlock>()),

@@ -10,7 +10,6 @@ use bowwave_core::{
         scene::{Pass, PassDecision},
     },
     model::Model,
-    water::ReflectionMethod,
     world::scenario::{self, Scenario},
 };
 use bowwave_render::{RenderConfig, Renderer};
@@ -145,15 +144,7 @@ fn variants(plan: &ScenePlan) -> Vec<String> {
         if plan.picture == plan.size { "pixel for pixel" } else { "scaled to cover the screen" }
     )];
     if plan.has(Pass::Water) {
-        let method = match plan.water.method {
-            ReflectionMethod::Off => "no reflection",
-            ReflectionMethod::Mirror => "plain mirror",
-            ReflectionMethod::FullAsPrinted => "Full Reflection as printed",
-            ReflectionMethod::Full => "Full Reflection, mended",
-            ReflectionMethod::PhysicsAsPrinted => "Physics as printed",
-            ReflectionMethod::Physics => "Physics, mended",
-            ReflectionMethod::Waves => "light thrown back by waves",
-        };
+        let method = plan.water.method.words();
         variants.push(format!(
             "water: {method}, Beaufort {}, shadow {:?}",
             plan.water.force.get(),

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use ash::vk;
 use bytemuck::Pod;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, FrameBlock, HudQuad, LobeBlock, RoundBlock, WATERS_MAX, WakeBlock, WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, FrameBlock, HudQuad, LobeBlock, MethodBytes, PHYSICS_WAVES, RoundBlock,
+    WATERS_MAX, WakeBlock, WaterBlock,
 };
 
 use crate::{
@@ -43,16 +44,20 @@ pub(crate) struct Capacity {
 /// One slot's upload buffer with the descriptor set that points into it.
 pub(crate) struct FrameData {
     buffer: Buffer,
-    regions: [Region; 8],
+    regions: [Region; 10],
     pub(crate) set: vk::DescriptorSet,
 }
 
 /// Descriptor kinds of set 0.
-pub(crate) fn frame_set_layout(gpu: &Arc<Gpu>) -> Result<SetLayout, RenderError> {
+const fn kinds() -> [vk::DescriptorType; 10] {
     const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
     const UNIFORM: vk::DescriptorType = vk::DescriptorType::UNIFORM_BUFFER;
-    let kinds = [UNIFORM, UNIFORM, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE];
-    SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
+    [UNIFORM, UNIFORM, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE, UNIFORM, UNIFORM]
+}
+
+/// Layout of set 0.
+pub(crate) fn frame_set_layout(gpu: &Arc<Gpu>) -> Result<SetLayout, RenderError> {
+    SetLayout::new(gpu, &kinds(), vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT)
 }
 
 impl FrameData {
@@ -76,6 +81,8 @@ impl FrameData {
             size_of::<[f32; 4]>() * RECTS_MAX,
             size_of::<LobeBlock>() * capacity.lobes.max(1),
             size_of::<WakeBlock>() * capacity.wakes.max(1),
+            size_of::<MethodBytes>() * WATERS_MAX,
+            size_of::<[f32; 4]>() * PHYSICS_WAVES,
         ];
         let mut end = 0;
         let regions = sizes.map(|size| {
@@ -85,9 +92,9 @@ impl FrameData {
         });
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
         let buffer = Buffer::new(gpu, "frame data", end, usage, Access::Upload)?;
-        let bound: [Bound; 8] = std::array::from_fn(|i| {
+        let bound: [Bound; 10] = std::array::from_fn(|i| {
             let (buffer, Region { offset, size }) = (buffer.raw, regions[i]);
-            if i < 3 {
+            if kinds()[i] == vk::DescriptorType::UNIFORM_BUFFER {
                 Bound::Uniform { buffer, offset, size }
             } else {
                 Bound::Storage { buffer, offset, size }
@@ -129,9 +136,13 @@ impl FrameData {
         self.write(7, blocks);
     }
 
-    /// Waves of the mended Physics shader: they stand where lobes stand for another method.
+    pub(crate) fn write_methods(&mut self, blocks: &[f32]) {
+        self.write(8, blocks);
+    }
+
+    /// Waves of the corrected Physics shader.
     pub(crate) fn write_waves(&mut self, waves: &[[f32; 4]]) {
-        self.write(6, waves);
+        self.write(9, waves);
     }
 
     fn write<T: Pod>(&mut self, region: usize, blocks: &[T]) {

@@ -4,39 +4,27 @@
 //! of a few frames; nobody waits for the GPU within a frame. Light is linear inside, sRGB at the edges: the screen image is
 //! seen as codes by the video pass and as linear light by everything that blends.
 
-mod atlas;
-mod coverage;
 mod encoder;
 mod error;
 mod frame_data;
-mod glyphs;
 mod gpu;
-mod hud_layout;
 mod import;
-mod lobes;
 mod memory;
-mod meshes;
 mod of_plan;
-mod parts;
 mod passes;
 mod pipeline;
 mod plan;
 mod rects;
 mod renderer;
 mod ring;
-mod rounds;
-mod simplify;
-mod split;
 mod target;
 #[cfg(test)]
 mod testing;
 mod upload;
 mod view;
-mod wake;
-mod water;
 
 pub use error::RenderError;
 pub use gpu::{DeviceInfo, SOFTWARE, devices, find_device};
-pub use passes::pictures::{PictureCounts, PicturePath, PictureShape};
+pub use passes::video::pictures::{PictureCounts, PicturePath, PictureShape};
 pub use renderer::{DrawRequest, Needs, RenderConfig, Renderer, TIMED_EVERY};
 pub use ring::{Completions, FinishedFrame, TimeOuts};

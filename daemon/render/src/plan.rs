@@ -9,29 +9,38 @@ use bowwave_core::{
 };
 use glam::DVec2;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, ReflectBlock, RoundBlock, TRACK_POINTS, WATERS_MAX, WakeBlock,
-    WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, MethodBytes, PHYSICS_WAVES, ReflectBlock, RoundBlock,
+    TRACK_POINTS, WATERS_MAX, WakeBlock, WaterBlock,
 };
 
 use crate::{
-    atlas::{self, Placed},
-    coverage::{Boxes, Cells},
     frame_data::Capacity,
     frame_data::RECTS_MAX,
-    hud_layout::KINDS,
-    lobes::{STRIP_VECTORS_MAX, Waves, mark_strips, reflect_block, sea_block},
     passes::{
-        boats::BoatDraw,
-        reflect::ReflectDraw,
-        rounds::{RoundDraw, pieces},
-        wake::WakeDraw,
-        water::WaterDraw,
+        boats::{
+            BoatDraw,
+            coverage::{Boxes, Cells},
+        },
+        hud::layout::KINDS,
+        mirror::atlas::{self, Placed},
+        rounds::{RoundDraw, pieces, plan::round_block},
+        wake::{
+            WakeDraw,
+            plan::{WakePlan, spray_rect, strip_rects, wake_plan},
+        },
+        water::{
+            WaterDraw,
+            baked::{
+                ReflectDraw,
+                lobes::{STRIP_VECTORS_MAX, Waves, mark_strips, reflect_block, sea_block},
+            },
+            block::{mirror_scale, water_block},
+            line::{HullLine, hull_line},
+            physics::{PhysicsSea, physics_waves},
+        },
     },
     rects::{around_all, corners, cut, joined, overlap, rect},
-    rounds::round_block,
     view,
-    wake::{WakePlan, spray_rect, strip_rects, wake_plan},
-    water::{self, HullLine, PHYSICS_WAVES, PhysicsSea, hull_line, mirror_scale, physics_waves, water_block},
 };
 
 /// Pixels beyond a reflection's rectangle at which the water shader still compares the video: nine gradients of at most eight
@@ -88,6 +97,8 @@ impl Outline {
 pub(crate) struct Plan {
     pub(crate) boat_blocks: Vec<BoatBlock>,
     pub(crate) water_blocks: Vec<WaterBlock>,
+    /// The method's own blocks of each of `water_blocks`, one after the other.
+    pub(crate) method_blocks: Vec<f32>,
     pub(crate) round_blocks: Vec<RoundBlock>,
     pub(crate) boats: Vec<BoatDraw>,
     pub(crate) mirrors: Vec<BoatDraw>,
@@ -97,7 +108,7 @@ pub(crate) struct Plan {
     pub(crate) waters: Vec<WaterDraw>,
     /// What the sea throws back of each of `waters`, where the method asks for it.
     pub(crate) lobe_blocks: Vec<LobeBlock>,
-    /// Waves of the mended Physics shader about the nearest boat.
+    /// Waves of the corrected Physics shader about the nearest boat.
     pub(crate) physics: Option<[[f32; 4]; PHYSICS_WAVES]>,
     /// For the method `Waves`: the strips of water that throw back light, and how bright the sea is there.
     pub(crate) reflects: Vec<ReflectDraw>,
@@ -145,6 +156,7 @@ impl Plan {
         Self {
             boat_blocks: Vec::with_capacity(boats * 2),
             water_blocks: Vec::with_capacity(boats),
+            method_blocks: Vec::with_capacity(boats * MethodBytes::default().len()),
             round_blocks: Vec::with_capacity(rounds),
             boats: Vec::with_capacity(boats),
             mirrors: Vec::with_capacity(boats),
@@ -204,6 +216,7 @@ impl Plan {
     fn clear(&mut self) {
         self.boat_blocks.clear();
         self.water_blocks.clear();
+        self.method_blocks.clear();
         self.round_blocks.clear();
         self.boats.clear();
         self.mirrors.clear();
@@ -306,7 +319,7 @@ impl Plan {
             let boat = &scene.boats[i];
             let Some(Outline { model, solid, .. }) = models.get(usize::from(boat.model.0)) else { continue };
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
-            let block = water_block(scene, boat, &line, &placed);
+            let (block, method) = water_block(scene, boat, &line, &placed);
             let softened_px = match scene.water.method {
                 ReflectionMethod::Full => 1.5 * f64::from(atlas::SOFT) / placed.scale,
                 _ => 0.0,
@@ -315,20 +328,15 @@ impl Plan {
             if waves {
                 thrown = self.plan_thrown(scene, (boat, model), &line, &sea, size);
             } else if mirrored {
-                solid.mark(
-                    &mut self.cells,
-                    rect,
-                    water::reach_px(&block, scene.water.method, softened_px),
-                    |p| {
-                        let world = pose.to_world(p);
-                        let above = (world.z - boat.water_level).max(0.0);
-                        scene.lens.project(scene.camera.to_camera(world.with_z(boat.water_level - above)))
-                    },
-                );
+                solid.mark(&mut self.cells, rect, method.reach_px + softened_px + 2.0, |p| {
+                    let world = pose.to_world(p);
+                    let above = (world.z - boat.water_level).max(0.0);
+                    scene.lens.project(scene.camera.to_camera(world.with_z(boat.water_level - above)))
+                });
             }
             line.mark_shadow(&mut self.cells, rect, &block);
             if !waves {
-                line.unmark_dry(&mut self.cells, &block, scene.water.method);
+                line.unmark_dry(&mut self.cells, &block, method.fade_px);
             }
             self.rest.clear();
             let marked = self.cells.take(&mut self.rest, WATER_RECTS_MAX);
@@ -346,6 +354,7 @@ impl Plan {
             self.list.extend(self.rest.iter().map(|r| corners(*r)));
             self.touched.extend_from_slice(&self.rest);
             self.water_blocks.push(block);
+            self.method_blocks.extend_from_slice(method.own());
             if mirrored {
                 let index = self.boat_blocks.len() as u32;
                 // Softened, a mirrored boat shows less than the boat itself.

@@ -18,18 +18,18 @@ use crate::{
     error::{Named, RenderError},
     frame_data::{Capacity, FrameData, frame_set_layout},
     gpu::{DeviceInfo, Gpu},
-    meshes::Meshes,
     passes::{
         PassContext,
-        boats::BoatsPass,
+        boats::{BoatsPass, meshes::Meshes},
         hud::HudPass,
         mirror::MirrorPass,
-        pictures::{PictureCounts, PicturePath, PictureShape},
-        reflect::ReflectPass,
         rounds::RoundsPass,
-        video::VideoPass,
+        video::{
+            VideoPass,
+            pictures::{PictureCounts, PicturePath, PictureShape},
+        },
         wake::WakePass,
-        water::WaterPass,
+        water::{WaterPass, baked::ReflectPass},
     },
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
@@ -338,6 +338,7 @@ impl<T> Renderer<T> {
         slot.data.write_frame(&view::frame_block(scene));
         slot.data.write_boats(&plan.boat_blocks);
         slot.data.write_waters(&plan.water_blocks);
+        slot.data.write_methods(&plan.method_blocks);
         slot.data.write_lobes(&plan.lobe_blocks);
         if let Some(waves) = &plan.physics {
             slot.data.write_waves(waves);

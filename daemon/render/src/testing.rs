@@ -25,6 +25,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
     passes[Pass::Hud as usize] = PassDecision::Run;
     Scene {
         frame: 0,
+        time_s: 0.0,
         camera: CameraPose { world_from_camera: look(0.0, -0.03, 0.0), position: DVec3::new(0.0, 0.0, 8.0) },
         lens: Lens::pinhole(width, height, 0.9),
         passes,

@@ -91,6 +91,7 @@ impl Composer {
             CameraPose { world_from_camera: DQuat::IDENTITY, position: DVec3::Z * scenario.eye_height_m };
         let scene = Scene {
             frame: 0,
+            time_s: 0.0,
             camera,
             lens: screen_lens,
             passes: plan.frame(false, &[], &[]),
@@ -193,6 +194,7 @@ impl Composer {
                 reflections: moment.cool && self.plan.has(Pass::Water) && sea_reflects(scene.water.force),
                 wakes: moment.cool && self.plan.has(Pass::Wake),
             };
+            scene.time_s = time.secs_since(running.start);
             boats_in_view(&running.fleet, &frustum, time, running.start, &mut scene.boats);
             rounds_in_view(running, &frustum, time, &mut scene.rounds);
         }

@@ -24,6 +24,8 @@ use crate::{
 pub struct Scene {
     /// Counts from 0 within a session.
     pub frame: u64,
+    /// Time for which boats and water stand as they are drawn, seconds since the session began.
+    pub time_s: f64,
     /// Camera pose at the drawn picture's mid-exposure.
     pub camera: CameraPose,
     /// The lens as seen on the screen: [`Lens::covering`] the screen's size.

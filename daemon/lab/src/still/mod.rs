@@ -171,6 +171,7 @@ impl Still {
         light.sun *= self.sun_strength as f32;
         let scene = Scene {
             frame: u64::from(index),
+            time_s: f64::from(index) / 30.0,
             camera,
             lens,
             passes,

@@ -1,10 +1,8 @@
-//! The passes, one file each, run as a plain ordered list by the renderer.
+//! The passes, one folder each, run as a plain ordered list by the renderer.
 
 pub(crate) mod boats;
 pub(crate) mod hud;
 pub(crate) mod mirror;
-pub(crate) mod pictures;
-pub(crate) mod reflect;
 pub(crate) mod rounds;
 pub(crate) mod video;
 pub(crate) mod wake;

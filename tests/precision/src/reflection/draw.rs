@@ -163,6 +163,7 @@ pub fn bare_scene(
     }
     Scene {
         frame: 0,
+        time_s: 0.0,
         camera,
         lens,
         passes,

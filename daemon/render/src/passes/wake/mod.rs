@@ -1,6 +1,8 @@
 //! Waves and foam of boats under way: one ribbon along each boat's track, drawn over the sea and its reflections, beneath the boats; and
 //! the foam that stands up beside a hull, after them, where no hull hides it.
 
+pub(crate) mod plan;
+
 use ash::vk;
 use shaders_spirv::{SPRAY_FRAG, SPRAY_VERT, Shader, WAKE_FRAG, WAKE_VERT, interface::DrawBlock};
 

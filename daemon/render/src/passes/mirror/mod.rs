@@ -1,19 +1,20 @@
 //! The boats mirrored in the sea, into a layer of their own: what lies above the water, seen by the camera mirrored in the plane of
 //! the boat's mean water. Each boat has its own place in the layer.
 
+pub(crate) mod atlas;
+
 use ash::vk;
+use atlas::{Placed, SOFT};
 use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{SCREEN_VERT, SOFTEN_FRAG};
 
 use crate::{
-    atlas::{Placed, SOFT},
     encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     memory::{Image, ImageShape},
-    meshes::Meshes,
     passes::{
         DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED,
-        boats::{BoatDraw, BoatPipelines},
+        boats::{BoatDraw, BoatPipelines, meshes::Meshes},
     },
     pipeline::{Blend, Bound, DEPTH, LIGHT, Pipeline, PipelineShape, Sampler, SetLayout},
     rects::joined,

@@ -1,8 +1,15 @@
 //! The boats: meshes into a multisampled layer of their own, within the rectangles that their hulls can cover, then the mean of
 //! each pixel's samples over the video in linear light.
 
+pub(crate) mod coverage;
+pub(crate) mod meshes;
+mod parts;
+mod simplify;
+mod split;
+
 use ash::vk;
 use bowwave_core::{frame::scene::PixelRect, model::ModelId};
+use meshes::Meshes;
 use shaders_spirv::{
     BOAT_FRAG, BOAT_TEXTURED_FRAG, BOAT_TEXTURED_VERT, BOAT_VERT, COMPOSITE_FRAG, RECT_VERT,
     interface::{DrawBlock, MeshVertex},
@@ -12,7 +19,6 @@ use crate::{
     encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     memory::{Image, ImageShape},
-    meshes::Meshes,
     passes::{DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED},
     pipeline::{Blend, Bound, DEPTH, Pipeline, PipelineShape, SAMPLES, Sampler, SetLayout, UNORM},
     rects::joined,

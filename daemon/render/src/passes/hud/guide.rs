@@ -179,5 +179,5 @@ fn short(value: &str) -> &str {
 }
 
 #[cfg(test)]
-#[path = "guide_layout_tests.rs"]
+#[path = "guide_tests.rs"]
 mod tests;

@@ -1,6 +1,9 @@
 //! The camera's picture on the whole screen. The shader reads its bytes as words (see [`super::pictures`]); conversion, scaling
 //! and cropping happen there. A fragment writes as many pixels as a word of the target holds.
 
+pub(crate) mod pictures;
+
+use pictures::{PictureCounts, PicturePath, PictureShape, Pictures};
 use std::sync::Arc;
 
 use ash::vk;
@@ -14,10 +17,7 @@ use crate::{
     encoder::CommandEncoder,
     error::RenderError,
     gpu::Gpu,
-    passes::{
-        PassContext,
-        pictures::{PictureCounts, PicturePath, PictureShape, Pictures},
-    },
+    passes::PassContext,
     pipeline::{Blend, Pipeline, PipelineShape, SetLayout},
     rects::around_all,
     target::{DrawTarget, Words},

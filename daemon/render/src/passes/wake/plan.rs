@@ -12,7 +12,7 @@ use bowwave_core::{
 use glam::{DMat3, DVec2, DVec3, Vec3};
 use shaders_spirv::interface::{TRACK_POINTS, WakeBlock, WakeHead, WakePoint};
 
-use crate::water::{SEEN_DOWN, mirrored_sky};
+use crate::passes::water::{SEEN_DOWN, block::mirrored_sky};
 
 const _: () = assert!(TRACK_POINTS == bowwave_core::frame::wake::TRACK_POINTS);
 

@@ -21,7 +21,7 @@ use shaders_spirv::interface::{
 
 use crate::{
     frame_data::QUADS_MAX,
-    glyphs::{Glyphs, TextSize},
+    passes::hud::glyphs::{Glyphs, TextSize},
 };
 
 /// Linear light of the texts and shapes.
@@ -333,9 +333,9 @@ impl HudLayout {
     }
 }
 
-#[path = "guide_layout.rs"]
+#[path = "guide.rs"]
 mod guide;
 
 #[cfg(test)]
-#[path = "hud_layout_tests.rs"]
+#[path = "layout_tests.rs"]
 mod tests;

@@ -5,7 +5,7 @@ use ab_glyph::{Font, FontRef, PxScale, ScaleFont};
 use crate::error::RenderError;
 
 /// B612 (Airbus and Intactile Design), drawn for cockpit displays.
-const FONT: &[u8] = include_bytes!("../assets/B612-Bold.otf");
+const FONT: &[u8] = include_bytes!("../../../assets/B612-Bold.otf");
 
 const FIRST: u8 = b' ';
 const ASCII: usize = (b'~' - b' ') as usize + 1;

@@ -2,6 +2,11 @@
 //! and where nothing else is drawn over the video beneath it, the video pass takes it from there while it writes the pixels. That saves
 //! the frame two copies and a rendering. Otherwise it is drawn over the frame as everything else.
 
+mod glyphs;
+pub(crate) mod layout;
+
+use glyphs::Glyphs;
+use layout::{HudLayout, KINDS, text_px};
 use std::sync::Arc;
 
 use ash::vk;
@@ -12,8 +17,6 @@ use crate::{
     encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     frame_data::{FrameData, QUADS_MAX},
-    glyphs::Glyphs,
-    hud_layout::{HudLayout, KINDS, text_px},
     memory::{Image, ImageShape},
     passes::{DRAWN, FORGET_READ, PassContext, SAMPLED},
     pipeline::{Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},

@@ -2,6 +2,9 @@
 //! from these a small grid of places across the hull and away from it gets what water there throws back and how that changes with a
 //! pixel's brightness; and each pixel takes what belongs to its place and its own brightness. Only the last step is done for every pixel.
 
+pub(crate) mod contact;
+pub(crate) mod lobes;
+
 use ash::vk;
 use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{

@@ -1,7 +1,15 @@
 //! The mirrored layer distorted by the video and blended onto the sea, and the boats' shadows: one quad for each boat, farthest
 //! first, within the rectangle that its reflection can reach.
 
+pub(crate) mod baked;
+pub(crate) mod block;
+pub(crate) mod full;
+pub(crate) mod line;
+pub(crate) mod mirror;
+pub(crate) mod physics;
+
 use ash::vk;
+use block::{method_constant, shadow_constant};
 use bowwave_core::{
     frame::scene::PixelRect,
     water::{ReflectionMethod, ShadowLevel, Water},
@@ -43,6 +51,9 @@ struct Field {
     set: vk::DescriptorSet,
     _set_layout: SetLayout,
 }
+
+/// The sea's mean in the picture stands for a line of sight so far below the horizontal, tangent.
+pub(crate) const SEEN_DOWN: f64 = 0.12;
 
 /// Screen pixels to a cell of the field, as `field.frag` and `water.frag` have it.
 const FIELD_CELL: (u32, u32) = (4, 2);
@@ -240,26 +251,5 @@ fn drawn(method: ReflectionMethod, shadow: ShadowLevel) -> Option<(ReflectionMet
         // Its shadow follows from the light: there are no levels of it.
         (ReflectionMethod::Waves, _) => Some((method, ShadowLevel::Gradual)),
         _ => Some((method, shadow)),
-    }
-}
-
-fn method_constant(method: ReflectionMethod) -> u32 {
-    match method {
-        ReflectionMethod::Off => 0,
-        ReflectionMethod::Mirror => 1,
-        ReflectionMethod::FullAsPrinted => 2,
-        ReflectionMethod::Full => 3,
-        ReflectionMethod::PhysicsAsPrinted => 4,
-        ReflectionMethod::Physics => 5,
-        // Of this method the shader draws the shadow alone.
-        ReflectionMethod::Waves => 6,
-    }
-}
-
-fn shadow_constant(shadow: ShadowLevel) -> u32 {
-    match shadow {
-        ShadowLevel::None => 0,
-        ShadowLevel::Gradual => 1,
-        ShadowLevel::Strong => 2,
     }
 }

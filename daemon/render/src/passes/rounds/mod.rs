@@ -1,6 +1,8 @@
 //! Tracers, splashes and strikes over the boats: one quad each, cut apart where a hull may stand before it, so that the boats'
 //! depth is read only where this frame wrote it.
 
+pub(crate) mod plan;
+
 use ash::vk;
 use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{ROUND_FRAG, ROUND_HIDDEN_FRAG, ROUND_VERT, Shader, interface::DrawBlock};

@@ -15,8 +15,8 @@ use crate::{
     gpu::Gpu,
     memory::{Access, Buffer, Image, ImageShape},
     passes::PassContext,
+    passes::boats::simplify::{Level, simplify},
     pipeline::{Bound, SRGB, Sampler, SetLayout},
-    simplify::{Level, simplify},
     upload::upload_image,
 };
 

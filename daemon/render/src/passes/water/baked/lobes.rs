@@ -16,7 +16,7 @@ use bowwave_core::{
 use glam::{DVec2, DVec3};
 use shaders_spirv::interface::{HULL_LINE_COLUMNS, LAYER_COLUMNS, LOBE_COLUMNS, LobeBlock, ReflectBlock};
 
-use crate::{coverage::Cells, water::HullLine};
+use crate::passes::{boats::coverage::Cells, water::line::HullLine};
 
 /// Beyond the ends of the hull the picture of the boat goes on by this share of its width: what overhangs the water line.
 const OVERHANG: f64 = 0.12;

@@ -5,7 +5,7 @@ use bowwave_core::{frame::scene::PixelRect, model::Model};
 use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
-    parts::Parts,
+    passes::boats::parts::Parts,
     rects::{cut, joined, overlap},
 };
 

@@ -9,9 +9,9 @@ use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_l
 use shaders_spirv::interface::MeshVertex;
 
 use crate::{
-    parts::Parts,
+    passes::boats::parts::Parts,
+    passes::boats::split::{EDGE_PX, split},
     plan::DETAIL_PX,
-    split::{EDGE_PX, split},
 };
 
 /// Error of the finest simplified level, metres; each level has twice the error of the one before.
