@@ -144,7 +144,7 @@ fn variants(plan: &ScenePlan) -> Vec<String> {
         if plan.picture == plan.size { "pixel for pixel" } else { "scaled to cover the screen" }
     )];
     if plan.has(Pass::Water) {
-        let method = plan.water.method.words();
+        let method = plan.water.method.name();
         variants.push(format!(
             "water: {method}, Beaufort {}, shadow {:?}",
             plan.water.force.get(),
