@@ -7,6 +7,7 @@ pub const PHYSICS: &str = include_str!("../glsl/water_physics.glsl");
 
 /// The whole number that stands after `declaration` and "=" in a source, such as `const uint METHOD_FULL`. Fails to compile where there
 /// is none.
+#[allow(clippy::panic, reason = "it runs when the host is compiled")]
 pub const fn number(source: &str, declaration: &str) -> u32 {
     let (source, wanted) = (source.as_bytes(), declaration.as_bytes());
     let mut at = 0;

@@ -506,7 +506,9 @@ impl<T> FinishedFrame<T> {
     pub fn rgba(&self) -> &[u8] {
         // SAFETY: the GPU has finished this slot and does not write it again before `self` is dropped.
         match self.shared.slots.get(self.slot).and_then(|slot| slot.download.as_ref()) {
+            // SAFETY: as above.
             Some(download) => unsafe { download.bytes() },
+            // SAFETY: as above.
             None => unsafe { self.shared.target(self.slot).bytes() },
         }
     }

@@ -49,7 +49,7 @@ fn impact_view(impact: &Impact) -> Option<RoundView> {
     let &Impact { at, on_boat, age_s } = impact;
     if on_boat {
         let left = 1.0 - age_s / STRIKE_S;
-        return (left > 0.0).then(|| RoundView::Strike {
+        return (left > 0.0).then_some(RoundView::Strike {
             at,
             radius_m: (0.15 + 0.5 * (1.0 - left)) as f32,
             opacity: left as f32,

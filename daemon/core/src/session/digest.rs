@@ -19,7 +19,7 @@ impl Digest {
     /// Takes in a value.
     pub fn take(&mut self, value: &impl Debug) {
         // Writing to a hash cannot fail.
-        let _ = write!(self, "{value:?}\n");
+        let _ = writeln!(self, "{value:?}");
     }
 
     /// The hash.

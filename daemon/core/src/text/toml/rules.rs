@@ -9,8 +9,11 @@ use toml::value::Datetime;
 pub struct ValueRule<'r, R, V> {
     /// The allowed values, in words.
     pub allowed: String,
-    check: Box<dyn Fn(&R) -> Option<V> + 'r>,
+    check: ValueCheck<'r, R, V>,
 }
+
+/// Gives the checked value where it is allowed.
+type ValueCheck<'r, R, V> = Box<dyn Fn(&R) -> Option<V> + 'r>;
 
 impl<'r, R, V> ValueRule<'r, R, V> {
     /// A rule; `check` gives the value where it is allowed.

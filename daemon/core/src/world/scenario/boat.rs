@@ -191,7 +191,7 @@ fn course(section: &TomlSection<'_>, raw: &RawBoat, kind: CourseKind) -> Result<
             "range_m" => raw.range_m.as_ref().map(|range| Spanned::new(range.span(), ())),
             _ => raw.course.as_ref().map(|course| Spanned::new(course.span(), ())),
         });
-        value.map_or_else(|| section.error(key, &e), |value| text.error(&value, &e))
+        value.map_or_else(|| section.error(key, e), |value| text.error(&value, e))
     })
 }
 
