@@ -44,7 +44,7 @@ impl TickClock {
     }
 
     /// Waits for the next frame.
-    pub fn next(&mut self) -> DueFrame {
+    pub fn await_next(&mut self) -> DueFrame {
         match self {
             Self::Paced(clock) => {
                 let plan = clock.plan(now());
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn fast_ticks_do_not_drift_and_have_no_deadline() {
         let mut clock = TickClock::fast(Time::from_ns(7));
-        let due: Vec<_> = (0..30).map(|_| clock.next()).collect();
+        let due: Vec<_> = (0..30).map(|_| clock.await_next()).collect();
         assert_eq!(due[29].tick, Tick::at(Time::from_ns(7 + NS_PER_S)));
         assert!(due.iter().all(|d| d.deadline.is_none()) && !clock.is_paced());
     }
@@ -113,7 +113,7 @@ mod tests {
     #[test]
     fn paced_ticks_are_seen_after_they_are_begun() {
         let mut clock = TickClock::paced();
-        let (a, b) = (clock.next(), clock.next());
+        let (a, b) = (clock.await_next(), clock.await_next());
         assert!(a.tick.shown > a.tick.time && b.tick.time > a.tick.time);
         assert_eq!(a.deadline, Some(a.tick.shown));
     }

@@ -192,7 +192,7 @@ impl Trainer {
         }
         let mut source_ended = false;
         while !self.is_over(companion.is_some()) {
-            let due = self.clock.next();
+            let due = self.clock.await_next();
             let asked_to_stop = self.signals.stop.swap(false, Ordering::Relaxed);
             if let Some(companion) = &mut companion {
                 if asked_to_stop {
@@ -467,7 +467,7 @@ impl Trainer {
     fn farewell(&mut self, pulse: Option<&Pulse>) {
         self.faults.set(Fault::Stop, Some("asked to stop".to_owned()), &mut self.events);
         let frame = self.tally.frames();
-        let due = self.clock.next();
+        let due = self.clock.await_next();
         if let Err(e) = self.frame(due, pulse, None) {
             log::debug!("no last frame: {e:#}");
             return;
