@@ -1,5 +1,7 @@
 //! A run follows from its inputs alone: its recording, stepped again, gives the same records and the same scenes.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
 use std::path::Path;
 
 use bowwave_tests::{bowwave, expect_code, play, small_recording};

@@ -1,5 +1,7 @@
 //! A dialogue runs in the trainer's own loop: over pictures of any layout, and over none.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
 use std::sync::Arc;
 
 use anyhow::Result;
