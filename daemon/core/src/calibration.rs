@@ -48,6 +48,26 @@ pub struct TriggerLatency {
 }
 
 impl Calibration {
+    /// A camera whose axes, clock and muzzle are the unit's own, known to a milliradian and a nanosecond: what nothing was measured of.
+    pub fn nominal(lens: Lens) -> Self {
+        Self {
+            lens,
+            focal_sigma_px: 1.0,
+            camera_from_imu: DQuat::IDENTITY,
+            camera_from_imu_sigma: DVec3::splat(1e-3),
+            time_offset_ns: 0,
+            time_offset_sigma_ns: 1,
+            readout_ns: 0,
+            readout_sigma_ns: 0,
+            boresight: DVec2::ZERO,
+            boresight_sigma: 1e-3,
+            muzzle_in_camera: DVec3::ZERO,
+            trigger: None,
+            gyro_bias: DVec3::ZERO,
+            gyro_bias_sigma: DVec3::ONE,
+        }
+    }
+
     /// What drawing through its lens and shutter has to follow.
     pub fn optics(&self) -> Optics {
         Optics { rolling: self.readout_ns != 0, ..self.lens.optics() }

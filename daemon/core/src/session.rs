@@ -2,21 +2,19 @@
 //!
 //! Its three stages are stepped one after the other: [`Estimator`], [`World`], [`Composer`].
 
+mod answer;
 mod digest;
 mod notes;
-
-use std::sync::Arc;
+mod setup;
 
 use crate::{
     calibration::Calibration,
     estimate::{
-        Estimator, EstimatorSettings, HeadingSettings, SeaReport, SensorCounts,
-        attitude::Source,
+        Estimator, EstimatorSettings, SeaReport, SensorCounts,
         clock::ClockReport,
-        horizon::Mask,
         pose::{NoPose, STALE_NS},
     },
-    event::{Event, Input, Picture, PictureError, PixelFormat, Tick, TriggerEdge},
+    event::{Event, Input, Tick, TriggerEdge},
     fault::{Fault, FaultBoard, FaultChange, FirePermission, Severity},
     frame::{
         Composer, ComposerSettings, FrameMoment,
@@ -24,91 +22,23 @@ use crate::{
         scene::{Hud, Scene},
     },
     geometry::CameraPose,
-    model::{Model, ModelId},
     time::Time,
     water::ReflectionMethod,
-    world::{BoreAim, World, scenario::Scenario, score::ShotRecord},
+    world::{BoreAim, World, score::ShotRecord},
 };
 
 pub use crate::frame::ROUNDS_SEEN_MAX;
+pub use answer::{TickAnswer, View};
 pub use digest::{Digest, SessionDigest};
 pub use notes::Note;
 use notes::Notes;
+pub use setup::{Setup, SetupError};
 
 /// How far behind the frame's time rounds are followed while no picture arrives, nanoseconds.
 const BLIND_LAG_NS: i64 = 50_000_000;
 
 /// Longest time that a round waits for an orientation measured after it, before it is scored by prediction, nanoseconds.
 const POSE_WAIT_NS: i64 = 50_000_000;
-
-/// Settings of a session.
-#[derive(Clone, Debug)]
-pub struct Setup {
-    /// The scenario, its seed the one of all chance.
-    pub scenario: Scenario,
-    /// The calibration of the camera and inertial unit in use.
-    pub calibration: Calibration,
-    /// All models in use.
-    pub models: Arc<[Model]>,
-    /// The model of each of the scenario's boats, in order.
-    pub boat_models: Vec<ModelId>,
-    /// Screen size in pixels.
-    pub screen: (u32, u32),
-    /// How the camera's bytes are laid out.
-    pub video: PixelFormat,
-    /// Whose estimate of the orientation is used.
-    pub orientation: Source,
-    /// Settings of heading aiding.
-    pub heading: HeadingSettings,
-    /// Mask of the own ship or gun in the pictures: no horizon and no sky is sought there.
-    pub own_ship: Option<Mask>,
-}
-
-/// Why a session cannot be made.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum SetupError {
-    /// Not every boat has a model.
-    #[error("the scenario has {boats} boats, but models for {models}: give each boat one")]
-    Models {
-        /// Boats in the scenario.
-        boats: usize,
-        /// Models given.
-        models: usize,
-    },
-    /// No picture has the calibrated size in that layout.
-    #[error("the calibrated size does not fit the camera's pictures: {0}")]
-    Picture(#[from] PictureError),
-}
-
-/// The answer to one tick.
-#[derive(Debug)]
-pub struct TickAnswer<'a> {
-    /// The frame to draw.
-    pub view: View<'a>,
-    /// Rounds that ended, in the order in which they were fired within the step.
-    pub records: &'a [ShotRecord],
-    /// Faults that the session itself has found to come or go. It knows of them already: they are for the log only.
-    pub faults: &'a [FaultChange],
-    /// Notes for the log.
-    pub notes: &'a [Note],
-}
-
-/// The frame to draw.
-#[derive(Debug)]
-pub struct View<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// The picture that it is drawn over.
-    pub picture: &'a Picture,
-    /// No picture has come yet: the scene is black and says what is wrong.
-    pub blind: bool,
-    /// Whether the picture is another than the last step's.
-    pub picture_is_new: bool,
-    /// The picture's own time stamp, to find it again.
-    pub mid_exposure: Time,
-    /// Whether the camera's pose was known.
-    pub pose_known: bool,
-}
 
 /// A running session.
 #[derive(Debug)]

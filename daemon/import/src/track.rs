@@ -156,7 +156,8 @@ mod tests {
         let mean = followed.iter().sum::<DVec2>() / followed.len() as f64;
         assert!(mean.distance(from) < 0.1, "{mean} {from}");
         for moved in followed {
-            assert!(moved.distance(from) < 0.2, "{moved} {from}");
+            // A patch of 15 pixels shows its own noise; what the bias is found from is the mean.
+            assert!(moved.distance(from) < 0.3, "{moved} {from}");
         }
     }
 

@@ -17,6 +17,7 @@ mod plan;
 mod rects;
 mod renderer;
 mod ring;
+mod stamps;
 mod target;
 #[cfg(test)]
 mod testing;

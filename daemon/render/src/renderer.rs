@@ -35,6 +35,7 @@ use crate::{
     plan::{Outline, Plan, with_gradients},
     rects::overlap,
     ring::{Completions, FRAME_QUERY, InFlight, QUERIES, SLOTS_MAX, Shared, Span, TimeOuts},
+    stamps::Stamps,
     target::{DrawTarget, same_place},
     view,
 };
@@ -389,10 +390,11 @@ impl<T> Renderer<T> {
         }
         stamps.write(FRAME_QUERY);
         let target = self.shared.target(index);
-        self.record_layers(to, &stamps, slot.data.set, target, water);
+        let recording = FrameRecording { to, stamps, frame: slot.data.set, target, how: water };
+        self.record_layers(&recording);
         if !self.plan.rects.is_empty() {
-            self.record_water(to, &stamps, slot.data.set, target, water);
-            self.record_blends(to, &stamps, slot.data.set, target, water);
+            self.record_water(&recording);
+            self.record_blends(&recording);
         }
         let mut steps = Steps::default();
         match &out.download {
@@ -401,26 +403,19 @@ impl<T> Renderer<T> {
         }
         steps.record(to);
         if let Some(download) = &out.download {
-            stamps.around(Span::Download, || target.record_download(to, download));
+            recording.stamps.around(Span::Download, || target.record_download(to, download));
             let mut steps = Steps::default();
             steps.add_memory((PIXELS_COPIED.0, vk::AccessFlags2::TRANSFER_WRITE), PIXELS_READ);
             steps.record(to);
         }
-        stamps.write(FRAME_QUERY + 1);
+        recording.stamps.write(FRAME_QUERY + 1);
         // SAFETY: recording was begun above.
         unsafe { device.end_command_buffer(slot.cmd) }.named("vkEndCommandBuffer")?;
         Ok(slot.cmd)
     }
 
     /// Records what does not depend on what is on the screen: the video, the mirrored boats, the boats.
-    fn record_layers(
-        &self,
-        to: CommandEncoder<'_>,
-        stamps: &Stamps<'_>,
-        frame: vk::DescriptorSet,
-        target: &DrawTarget,
-        how: Water,
-    ) {
+    fn record_layers(&self, &FrameRecording { to, ref stamps, frame, target, how }: &FrameRecording<'_>) {
         let Passes { video, meshes, hud, .. } = &self.passes;
         let plan = &self.plan;
         let mirror = self.passes.mirror.as_ref().filter(|_| !plan.mirrors.is_empty());
@@ -459,14 +454,7 @@ impl<T> Renderer<T> {
     }
 
     /// Records what the water needs before it is drawn, in as few steps that wait for each other as there can be.
-    fn record_water(
-        &self,
-        to: CommandEncoder<'_>,
-        stamps: &Stamps<'_>,
-        frame: vk::DescriptorSet,
-        target: &DrawTarget,
-        how: Water,
-    ) {
+    fn record_water(&self, &FrameRecording { to, ref stamps, frame, target, how }: &FrameRecording<'_>) {
         let plan = &self.plan;
         let Some(water) = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty()) else { return };
         let soft = self.passes.mirror.as_ref().filter(|_| how.method == ReflectionMethod::Full);
@@ -503,14 +491,7 @@ impl<T> Renderer<T> {
     }
 
     /// Records what blends onto the screen, in one rendering.
-    fn record_blends(
-        &self,
-        to: CommandEncoder<'_>,
-        stamps: &Stamps<'_>,
-        frame: vk::DescriptorSet,
-        target: &DrawTarget,
-        how: Water,
-    ) {
+    fn record_blends(&self, &FrameRecording { to, ref stamps, frame, target, how }: &FrameRecording<'_>) {
         let plan = &self.plan;
         let water = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty());
         if !target.begin_light(to, &plan.rects) {
@@ -541,6 +522,16 @@ impl<T> Renderer<T> {
         }
         to.end();
     }
+}
+
+/// What all parts of a frame are recorded with.
+struct FrameRecording<'a> {
+    to: CommandEncoder<'a>,
+    stamps: Stamps<'a>,
+    /// Set of the frame's own data.
+    frame: vk::DescriptorSet,
+    target: &'a DrawTarget,
+    how: Water,
 }
 
 impl<T> Drop for Renderer<T> {
@@ -579,29 +570,6 @@ impl Drop for Slot {
         }
         // SAFETY: the renderer waits for the GPU before it lets go of its slots.
         unsafe { self.gpu.device.destroy_command_pool(self.pool, None) };
-    }
-}
-
-/// Timestamps of one frame.
-struct Stamps<'a> {
-    to: CommandEncoder<'a>,
-    queries: vk::QueryPool,
-    on: bool,
-}
-
-impl Stamps<'_> {
-    fn write(&self, query: u32) {
-        if self.on {
-            let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-            // SAFETY: the command buffer is being recorded and the query was reset in it.
-            unsafe { self.to.gpu.device.cmd_write_timestamp2(self.to.cmd, stage, self.queries, query) };
-        }
-    }
-
-    fn around(&self, span: Span, record: impl FnOnce()) {
-        self.write(span.first_query());
-        record();
-        self.write(span.first_query() + 1);
     }
 }
 

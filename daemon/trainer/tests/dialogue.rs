@@ -70,22 +70,7 @@ fn setup() -> Setup {
     let text = BUILT_IN.iter().find(|(name, _)| *name == "empty").expect("it is built in").1;
     Setup {
         scenario: Scenario::parse(text, "empty").expect("it is a scenario"),
-        calibration: Calibration {
-            lens: Lens::pinhole(320, 192, 1.0),
-            focal_sigma_px: 1.0,
-            camera_from_imu: glam::DQuat::IDENTITY,
-            camera_from_imu_sigma: glam::DVec3::ONE,
-            time_offset_ns: 0,
-            time_offset_sigma_ns: 1,
-            readout_ns: 0,
-            readout_sigma_ns: 0,
-            boresight: glam::DVec2::ZERO,
-            boresight_sigma: 0.001,
-            muzzle_in_camera: glam::DVec3::ZERO,
-            trigger: None,
-            gyro_bias: glam::DVec3::ZERO,
-            gyro_bias_sigma: glam::DVec3::ONE,
-        },
+        calibration: Calibration::nominal(Lens::pinhole(320, 192, 1.0)),
         models: Vec::new().into(),
         boat_models: Vec::new(),
         screen: (320, 192),

@@ -32,22 +32,7 @@ fn ship_deg(t: f64) -> f64 {
 }
 
 fn calibration() -> Calibration {
-    Calibration {
-        lens: Lens::pinhole(4, 2, 1.0),
-        focal_sigma_px: 1.0,
-        camera_from_imu: DQuat::IDENTITY,
-        camera_from_imu_sigma: DVec3::splat(1e-3),
-        time_offset_ns: 0,
-        time_offset_sigma_ns: 1,
-        readout_ns: 0,
-        readout_sigma_ns: 0,
-        boresight: glam::DVec2::ZERO,
-        boresight_sigma: 0.001,
-        muzzle_in_camera: DVec3::ZERO,
-        trigger: None,
-        gyro_bias: DVec3::ZERO,
-        gyro_bias_sigma: DVec3::ONE,
-    }
+    Calibration::nominal(Lens::pinhole(4, 2, 1.0))
 }
 
 impl HeadingRig {

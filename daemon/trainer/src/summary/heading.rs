@@ -1,39 +1,36 @@
-//! What a run tells of the heading: in the summary.
+//! The heading in the summary of a run.
 
-use bowwave_core::session::Session;
-use serde::Serialize;
+use bowwave_core::{estimate::HeadingCounts, session::Session};
+use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 /// The heading at the end of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeadingSummary {
     /// Standard deviation since it was set or began, degrees.
     pub sigma_deg: f64,
-    /// Headings of the ship that came.
-    pub ship: u64,
-    /// Of these, taken in.
-    pub ship_taken: u64,
-    /// Of these, not believed.
-    pub ship_refused: u64,
-    /// Rests of the gun on its mount at whose start the ship's heading was tied to the gun's.
-    pub rests: u64,
-    /// Presses of the operator that set the heading.
-    pub marks: u64,
-    /// Presses that could not be used.
-    pub marks_refused: u64,
+    /// Headings of the ship, and presses of the operator.
+    pub counts: HeadingCounts,
 }
 
 impl HeadingSummary {
     /// Of a session; `None` where there was no heading.
     pub fn of(session: &Session) -> Option<Self> {
-        let c = session.sensor_counts().headings;
-        Some(Self {
-            sigma_deg: session.heading_sigma()?.to_degrees(),
-            ship: c.ship,
-            ship_taken: c.ship_taken,
-            ship_refused: c.ship_refused,
-            rests: c.rests,
-            marks: c.marks,
-            marks_refused: c.marks_refused,
-        })
+        let counts = session.sensor_counts().headings;
+        Some(Self { sigma_deg: session.heading_sigma()?.to_degrees(), counts })
+    }
+}
+
+impl Serialize for HeadingSummary {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let HeadingCounts { ship, ship_taken, ship_refused, rests, marks, marks_refused } = self.counts;
+        let mut out = serializer.serialize_struct("HeadingSummary", 7)?;
+        out.serialize_field("sigma_deg", &self.sigma_deg)?;
+        out.serialize_field("ship", &ship)?;
+        out.serialize_field("ship_taken", &ship_taken)?;
+        out.serialize_field("ship_refused", &ship_refused)?;
+        out.serialize_field("rests", &rests)?;
+        out.serialize_field("marks", &marks)?;
+        out.serialize_field("marks_refused", &marks_refused)?;
+        out.end()
     }
 }

@@ -63,6 +63,28 @@ pub(super) struct ErrorState<const N: usize> {
     estimate: SVector<f64, N>,
 }
 
+/// A direction of up that a camera saw.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VerticalUpdate {
+    /// Rotation from the camera's axes to the world's, as believed.
+    pub world_from_camera: DQuat,
+    /// Up in the camera's axes, a unit vector.
+    pub up_camera: DVec3,
+    /// Covariance of its part across up, rad^2, in the world's horizontal axes.
+    pub covariance: DMat2,
+}
+
+/// A heading that was seen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HeadingUpdate {
+    /// Reference that it was seen against.
+    pub against: Against,
+    /// The turn of the world about the vertical that it asks for, rad.
+    pub off: f64,
+    /// Variance of that, rad^2.
+    pub variance: f64,
+}
+
 /// Updates of the error state by cameras and ships, whatever else the states are.
 pub(super) trait AidingUpdate {
     /// Covariance of the turn of the world, rad^2.
@@ -74,24 +96,11 @@ pub(super) trait AidingUpdate {
     /// By how much the horizon stands higher than geometry has it, radians.
     fn refraction(&self) -> f64;
 
-    /// Takes in the direction of up that the camera saw, in the camera's axes, with the covariance of its part across up, rad^2, in the
-    /// world's horizontal axes; `gate` is the chi-square gate: the NIS beyond which it is not believed.
-    fn update_vertical(
-        &mut self,
-        world_from_camera: DQuat,
-        up_camera: DVec3,
-        covariance: DMat2,
-        gate: f64,
-    ) -> (Correction, UpdateOutcome);
+    /// Takes in the direction of up that the camera saw; `gate` is the chi-square gate: the NIS beyond which it is not believed.
+    fn update_vertical(&mut self, vertical: &VerticalUpdate, gate: f64) -> (Correction, UpdateOutcome);
 
-    /// Takes in that by what is seen the world is to be turned by `off` about the vertical, rad, known to that variance.
-    fn update_heading(
-        &mut self,
-        against: Against,
-        off: f64,
-        variance: f64,
-        gate: f64,
-    ) -> (Correction, UpdateOutcome);
+    /// Takes in a heading.
+    fn update_heading(&mut self, heading: HeadingUpdate, gate: f64) -> (Correction, UpdateOutcome);
 
     /// The gun's bearing on its mount is what heading and the ship's heading now make it, which errs by `variance` beyond the heading.
     fn anchor_mount(&mut self, variance: f64);
@@ -310,13 +319,8 @@ impl<const N: usize> AidingUpdate for ErrorState<N> {
         self.at(REFRACTION)
     }
 
-    fn update_vertical(
-        &mut self,
-        world_from_camera: DQuat,
-        up_camera: DVec3,
-        covariance: DMat2,
-        gate: f64,
-    ) -> (Correction, UpdateOutcome) {
+    fn update_vertical(&mut self, vertical: &VerticalUpdate, gate: f64) -> (Correction, UpdateOutcome) {
+        let &VerticalUpdate { world_from_camera, up_camera, covariance } = vertical;
         let up = world_from_camera * up_camera;
         let mut rows = up_rows();
         let axes = DMat3::from_quat(world_from_camera);
@@ -333,13 +337,8 @@ impl<const N: usize> AidingUpdate for ErrorState<N> {
         self.update(&rows, differ, covariance, gate)
     }
 
-    fn update_heading(
-        &mut self,
-        against: Against,
-        off: f64,
-        variance: f64,
-        gate: f64,
-    ) -> (Correction, UpdateOutcome) {
+    fn update_heading(&mut self, heading: HeadingUpdate, gate: f64) -> (Correction, UpdateOutcome) {
+        let HeadingUpdate { against, off, variance } = heading;
         let mut row = MeasurementRow::zeros();
         row[HEADING] = 1.0;
         let reference = match against {

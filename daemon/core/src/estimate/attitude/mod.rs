@@ -286,8 +286,9 @@ impl Attitude {
         let axes = DMat3::from_quat(world_from_camera);
         let turned = axes * seen.covariance * axes.transpose();
         let across = DMat2::from_cols(turned.x_axis.truncate(), turned.y_axis.truncate());
-        let (turn, outcome) =
-            self.update_now()?.update_vertical(world_from_camera, seen.up_camera, across, gate);
+        let vertical =
+            error_state::VerticalUpdate { world_from_camera, up_camera: seen.up_camera, covariance: across };
+        let (turn, outcome) = self.update_now()?.update_vertical(&vertical, gate);
         match &mut self.state {
             FilterState::Running(running) if outcome.taken => running.filter.saw_up(),
             FilterState::External(external_ahrs, _) => {
@@ -364,7 +365,8 @@ impl Attitude {
     fn correct_heading(&mut self, seen: &HeadingSeen, against: Against, gate: f64) -> Option<UpdateOutcome> {
         self.history.at(seen.time).ok()?;
         let update = self.update_now()?;
-        let (turn, outcome) = update.update_heading(against, wrapped(seen.off), seen.variance, gate);
+        let heading = error_state::HeadingUpdate { against, off: wrapped(seen.off), variance: seen.variance };
+        let (turn, outcome) = update.update_heading(heading, gate);
         self.turn(turn);
         Some(outcome)
     }

@@ -9,10 +9,7 @@ use shaders_spirv::{SPRAY_FRAG, SPRAY_VERT, Shader, WAKE_FRAG, WAKE_VERT, interf
 use crate::{
     encoder::CommandEncoder,
     error::RenderError,
-    passes::{
-        PassContext,
-        boats::{BoatsPass, HullDepth},
-    },
+    passes::{PassContext, boats},
     pipeline::{Pipeline, PipelineShape, SetLayout},
 };
 
@@ -38,11 +35,11 @@ pub(crate) struct WakeDraw {
 pub(crate) struct WakePass {
     pipeline: Pipeline,
     spray: Pipeline,
-    depth: HullDepth,
+    depth: boats::HullDepth,
 }
 
 impl WakePass {
-    pub(crate) fn new(context: &PassContext<'_>, boats: &BoatsPass) -> Result<Self, RenderError> {
+    pub(crate) fn new(context: &PassContext<'_>, boats: &boats::BoatsPass) -> Result<Self, RenderError> {
         let depth = boats.hull_depth(context)?;
         let lens = context.lens_constants();
         let pipeline = |vertex: Shader, fragment: Shader, sets: &[&SetLayout]| {
