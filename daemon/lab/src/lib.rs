@@ -1,7 +1,7 @@
 //! The laboratory: what a gun does not need.
 //!
-//! Recordings made from pictures and videos ([`import`]), boats composed into photographs ([`still`], [`compose`]), and the user study
-//! of reflections ([`study`]). `bowwave compose`, `bowwave study` and `bowwave import` hand their arguments to this crate's program,
+//! Recordings made from pictures and videos (`import`), boats composed into photographs ([`still`], [`compose`]), and the user study
+//! of reflections (`study`). `bowwave compose`, `bowwave study` and `bowwave import` hand their arguments to this crate's program,
 //! `bowwave-lab`, which the gun's package leaves out.
 
 #![forbid(unsafe_code)]

@@ -27,7 +27,7 @@ const POINTS_PER_WAVE: f64 = 3.6;
 const SQUEEZE: [f32; CASCADES] = [1.6, 0.8, 0.25];
 
 /// Numbers at a point: height in metres, slope to the east, slope to the north, and how much the surface is being
-/// pushed together there, weighted by [`SQUEEZE`].
+/// pushed together there, weighted by `SQUEEZE`.
 pub type Texel = Vec4;
 
 /// One wave and its opposite on a tile's lattice.
