@@ -43,7 +43,7 @@ pub struct PresenterOptions {
 
 /// Draws scenes and takes the frames to where they are seen.
 pub struct Presenter {
-    renderer: Renderer,
+    renderer: Renderer<Ticket>,
     output: Option<OutputThread>,
     before: OutputReport,
 }
@@ -57,7 +57,7 @@ impl Presenter {
             // A computer that draws so much slower compiles so much slower.
             config.time_outs = TimeOuts { frame, warm_up: config.time_outs.warm_up.max(frame * 120) };
         }
-        let (renderer, completions) = Renderer::new(&config, models)?;
+        let (renderer, completions) = Renderer::with_tickets(&config, models)?;
         let output = OutputOptions { size: session.plan().size, ..options.output.clone() };
         let output = OutputThread::start(completions, output)?;
         let mut presenter = Self { renderer, output: Some(output), before: OutputReport::default() };
@@ -83,9 +83,14 @@ impl Presenter {
         let (width, height) = plan.picture;
         let picture = Picture::black(plan.video, width, height).context("no picture of this size")?;
         let begun = now();
-        self.renderer.submit(DrawRequest::new(&scene, &picture, true))?;
+        let ticket = Ticket { frame: 0, begun, submitted: begun, deadline: None, warm_up: true };
+        self.renderer.submit(DrawRequest {
+            scene: &scene,
+            picture: &picture,
+            picture_is_new: true,
+            ticket,
+        })?;
         if let Some(output) = &self.output {
-            output.announce(Ticket { frame: 0, begun, submitted: begun, deadline: None, warm_up: true });
             let begun = now();
             // A software driver on a slow computer compiles for a long time at its first start; the renderer's own time-out
             // ends one that hangs.
@@ -109,8 +114,9 @@ impl Presenter {
         deadline: Option<Time>,
     ) -> Result<Handed, RenderError> {
         let ticket = Ticket { frame: view.scene.frame, begun, submitted: now(), deadline, warm_up: false };
-        let waited = self.renderer.submit(DrawRequest::new(view.scene, view.picture, view.picture_is_new))?;
-        let taken = self.output.as_ref().is_some_and(|o| o.runs() && o.announce(ticket));
+        let View { scene, picture, picture_is_new, .. } = *view;
+        let waited = self.renderer.submit(DrawRequest { scene, picture, picture_is_new, ticket })?;
+        let taken = self.output.as_ref().is_some_and(OutputThread::runs);
         Ok(if taken { Handed::Taken { waited } } else { Handed::OutputEnded })
     }
 

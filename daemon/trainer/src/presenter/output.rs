@@ -56,7 +56,7 @@ pub struct OutputOptions {
     pub window: bool,
 }
 
-/// A frame on its way, told to the output thread when it is submitted.
+/// What a frame carries through the renderer.
 #[derive(Clone, Copy, Debug)]
 pub struct Ticket {
     /// The scene's frame number.
@@ -128,7 +128,6 @@ impl OutputReport {
 /// The running thread.
 #[derive(Debug)]
 pub struct OutputThread {
-    tickets: Option<Sender<Ticket>>,
     user: Receiver<UserEvent>,
     warm: Receiver<()>,
     done: Receiver<CompletedFrame>,
@@ -137,13 +136,12 @@ pub struct OutputThread {
 
 impl OutputThread {
     /// Starts the thread. Files are opened here, so that what cannot work says so before the run.
-    pub fn start(completions: Completions, options: OutputOptions) -> Result<Self> {
+    pub fn start(completions: Completions<Ticket>, options: OutputOptions) -> Result<Self> {
         let video = if options.video {
             Some(VideoWriter::create(&options.folder.join("video.mp4"), options.size)?)
         } else {
             None
         };
-        let (tickets, incoming) = unbounded();
         let (user_sender, user) = unbounded();
         let (warm_sender, warm) = unbounded();
         let (done_sender, done) = bounded(DONE);
@@ -151,14 +149,9 @@ impl OutputThread {
         let hashes = options.frame_hashes.as_deref().map(HashLog::create).transpose()?;
         let thread = thread::Builder::new()
             .name("output".to_owned())
-            .spawn(move || OutputWorker::new(completions, incoming, told, options, (video, hashes)).run())
+            .spawn(move || OutputWorker::new(completions, told, options, (video, hashes)).run())
             .context("cannot start the output thread; are too many processes running?")?;
-        Ok(Self { tickets: Some(tickets), user, warm, done, thread: Some(thread) })
-    }
-
-    /// Tells the thread of a submitted frame; `false` once the thread has ended.
-    pub fn announce(&self, ticket: Ticket) -> bool {
-        self.tickets.as_ref().is_some_and(|t| t.send(ticket).is_ok())
+        Ok(Self { user, warm, done, thread: Some(thread) })
     }
 
     /// Waits until the warm-up is complete, or the thread has ended, but no longer than `timeout`; whether it is complete.
@@ -183,7 +176,6 @@ impl OutputThread {
 
     /// Waits until every frame is taken and all files are written. The renderer must be gone by now.
     pub fn finish(mut self) -> Result<OutputReport> {
-        drop(self.tickets.take());
         let thread = self.thread.take().context("the output thread has already ended")?;
         thread.join().map_err(|_| anyhow!("the output thread broke down; report it with the log"))?
     }
@@ -197,8 +189,7 @@ struct LoopQueues {
 }
 
 struct OutputWorker {
-    completions: Completions,
-    tickets: Receiver<Ticket>,
+    completions: Completions<Ticket>,
     told: LoopQueues,
     options: OutputOptions,
     video: Option<VideoWriter>,
@@ -212,8 +203,7 @@ struct OutputWorker {
 
 impl OutputWorker {
     fn new(
-        completions: Completions,
-        tickets: Receiver<Ticket>,
+        completions: Completions<Ticket>,
         told: LoopQueues,
         options: OutputOptions,
         (video, hashes): (Option<VideoWriter>, Option<HashLog>),
@@ -221,7 +211,6 @@ impl OutputWorker {
         let sheet = options.sheet.then(|| ContactSheet::new(options.frames, options.size));
         Self {
             completions,
-            tickets,
             told,
             options,
             video,
@@ -257,8 +246,8 @@ impl OutputWorker {
         Ok(self.report)
     }
 
-    fn take(&mut self, frame: &FinishedFrame, complete: Time) -> Result<()> {
-        let ticket = self.tickets.recv().context("a frame came out that was not put in")?;
+    fn take(&mut self, frame: &FinishedFrame<Ticket>, complete: Time) -> Result<()> {
+        let ticket = frame.ticket;
         if ticket.warm_up {
             if self.told.warm.send(()).is_err() {
                 log::debug!("the run ended before its warm-up");
@@ -317,7 +306,7 @@ impl OutputWorker {
         self.pictures(frame, ticket.frame)
     }
 
-    fn pictures(&mut self, frame: &FinishedFrame, index: u64) -> Result<()> {
+    fn pictures(&mut self, frame: &FinishedFrame<Ticket>, index: u64) -> Result<()> {
         let on_sheet = self.sheet.as_ref().is_some_and(|s| s.wants(index));
         let still = self.options.stills.contains(&index);
         if !on_sheet && !still {
