@@ -50,20 +50,10 @@ fn block() -> Model {
 
 fn calibration() -> Calibration {
     Calibration {
-        lens: Lens::pinhole(64, 48, 1.0),
-        focal_sigma_px: 1.0,
-        camera_from_imu: DQuat::IDENTITY,
-        camera_from_imu_sigma: DVec3::splat(1e-3),
         time_offset_ns: 4 * MS,
         time_offset_sigma_ns: MS,
-        readout_ns: 0,
-        readout_sigma_ns: 0,
-        boresight: DVec2::ZERO,
-        boresight_sigma: 1e-3,
-        muzzle_in_camera: DVec3::ZERO,
-        trigger: None,
-        gyro_bias: DVec3::ZERO,
         gyro_bias_sigma: DVec3::splat(1e-4),
+        ..Calibration::nominal(Lens::pinhole(64, 48, 1.0))
     }
 }
 
