@@ -26,6 +26,12 @@ TOPICS = {
     "/trigger": ("std_msgs/msg/Bool", "std_msgs.msg.Bool:message"),
     "/truth/pose": ("geometry_msgs/msg/PoseStamped", "InstancePoses3D:translations"),
     "/pose": ("geometry_msgs/msg/PoseStamped", "InstancePoses3D:translations"),
+    "/camera/image_raw": ("sensor_msgs/msg/Image", "Image:buffer"),
+    "/ship": ("nmea_msgs/msg/Sentence", "nmea_msgs.msg.Sentence:message"),
+    "/ship/values": ("bowwave_msgs/msg/ShipValues", "bowwave_msgs.msg.ShipValues:message"),
+    "/mark": ("std_msgs/msg/String", "TextDocument:text"),
+    "/fault": ("diagnostic_msgs/msg/DiagnosticArray", "diagnostic_msgs.msg.DiagnosticArray:message"),
+    "/tick": ("bowwave_msgs/msg/Tick", "bowwave_msgs.msg.Tick:message"),
 }
 
 
@@ -56,6 +62,8 @@ def value_of(topic, message):
         return message.data
     if topic == "/camera/info":
         return tuple(message.k)
+    if topic == "/tick":
+        return (message.inputs, message.records, message.scenes)
     return vector(message.pose.position)
 
 
@@ -88,6 +96,7 @@ def read_with_mcap(path):
         expect(any(m.name == "bowwave" for m in reader.iter_metadata()), "mcap: no bowwave properties")
     expect(messages["/camera/image"], "mcap: no pictures")
     expect(messages["/imu"], "mcap: no inertial measurements")
+    expect(messages["/tick"], "mcap: no ticks")
     return messages
 
 
@@ -97,6 +106,8 @@ def rerun_value(topic, cell):
         return bytes(cell[0])
     if topic in ("/imu", "/trigger"):
         return tuple(cell) if topic == "/imu" else cell[0]["data"]
+    if topic == "/tick":
+        return tuple(cell[0][name] for name in ("inputs", "records", "scenes"))
     if topic == "/camera/info":
         # Rerun stores matrices by columns.
         k = cell[0]
