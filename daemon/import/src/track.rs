@@ -155,10 +155,10 @@ mod tests {
         assert!(followed.len() >= 8, "{}", followed.len());
         let mean = followed.iter().sum::<DVec2>() / followed.len() as f64;
         assert!(mean.distance(from) < 0.1, "{mean} {from}");
-        for moved in followed {
-            // A patch of 15 pixels shows its own noise; what the bias is found from is the mean.
-            assert!(moved.distance(from) < 0.3, "{moved} {from}");
-        }
+        // A patch of 15 pixels that was renewed twice has the noise of three searches; what the bias is found from is the mean.
+        let off =
+            followed.iter().map(|moved| moved.distance_squared(from)).sum::<f64>() / followed.len() as f64;
+        assert!(off.sqrt() < 0.25, "{}", off.sqrt());
     }
 
     #[test]
