@@ -54,8 +54,7 @@ impl TickClock {
             }
             Self::Fast { origin, index } => {
                 *index += 1;
-                let time = origin.plus_ns(*index * NS_PER_S / FRAMES_PER_S);
-                DueFrame { tick: Tick::at(time), begun: now(), deadline: None }
+                DueFrame { tick: Tick::at(time_of(*origin, *index)), begun: now(), deadline: None }
             }
         }
     }
@@ -64,7 +63,7 @@ impl TickClock {
     pub fn next_on_recording(&self) -> Option<Time> {
         match self {
             Self::Paced(_) => None,
-            Self::Fast { origin, index } => Some(origin.plus_ns((*index + 1) * NS_PER_S / FRAMES_PER_S)),
+            Self::Fast { origin, index } => Some(time_of(*origin, *index + 1)),
         }
     }
 
@@ -96,6 +95,11 @@ impl TickClock {
     pub const fn is_paced(&self) -> bool {
         matches!(self, Self::Paced(_))
     }
+}
+
+/// Time of a tick of a recording: exact, without accumulating error.
+fn time_of(origin: Time, index: i64) -> Time {
+    origin.plus_ns(index * NS_PER_S / FRAMES_PER_S)
 }
 
 #[cfg(test)]

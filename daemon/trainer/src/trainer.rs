@@ -493,15 +493,13 @@ impl Trainer {
             storage.rounds(&left);
             let (lost, failed) = storage.finish();
             lost_entries = lost;
-            for e in failed {
-                log::error!("{e:#}");
-                wrong.push(format!("{e:#}"));
-            }
+            wrong.extend(failed.iter().map(|e| format!("{e:#}")));
         }
         if let Err(e) = &ended
             && is_hung(e)
         {
             // Nothing that touches the GPU returns any more. The journal is complete; systemd starts a fresh process.
+            wrong.iter().for_each(|line| log::error!("{line}"));
             log::error!("{} {e:#}", Fault::GpuHang.code());
             std::process::exit(1);
         }
@@ -523,6 +521,7 @@ impl Trainer {
         if let Err(e) = self.source.stop() {
             wrong.push(e.to_string());
         }
+        wrong.iter().for_each(|line| log::error!("{line}"));
         if matches!(ended, Ok(Ended::Reload { .. })) {
             // What is still wrong is found again, and told again.
             self.faults.end_all();

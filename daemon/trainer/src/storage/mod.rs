@@ -308,6 +308,10 @@ impl Storage {
             )),
         };
         wrong.extend(written.err());
+        if self.options.strict && self.options.recording.is_some() && self.recorder.is_none() {
+            let why = "the recording ended before the run: the disk is full or cannot be written; free it and run again";
+            wrong.push(anyhow::anyhow!(why));
+        }
         if let Some(recorder) = self.recorder.take() {
             if self.options.strict {
                 self.lost += recorder.lost();

@@ -33,7 +33,7 @@ pub struct RecorderOptions {
     pub properties: Properties,
     /// Wait for the disk where the queue is full; else entries are lost and counted.
     pub lossless: bool,
-    /// Keep the pixels of pictures that come without a JPEG, as the session saw them. Else they are coded, which takes a twentieth of the
+    /// Keep the pixels of pictures that come without a JPEG, as the session saw them. Else they are coded, which takes a tenth of the
     /// room, and a replay sees slightly other pixels.
     pub exact_pixels: bool,
 }
