@@ -177,7 +177,11 @@ mod tests {
             Distortion::RadialTangential(d) => {
                 let rim = d.reach2().sqrt().min(1e6);
                 let tangential = 4.0 * d.tangential().length() * far(pixel).max(rim.min(10.0)).powi(2);
-                far(pixel) + tangential < 0.999 * d.bend(DVec2::X * rim).x.max(0.0)
+                // Where the radius hardly grows without folding back, the tangential terms may fold it.
+                let slowest = (-0.3 * d.radial().x / d.radial().y).max(0.0);
+                let growth = 1.0 + slowest * (3.0 * d.radial().x + 5.0 * slowest * d.radial().y);
+                let folds = rim == 1e6 && growth < 8.0 * d.tangential().length() * slowest.sqrt();
+                !folds && far(pixel) + tangential < 0.999 * d.bend(DVec2::X * rim).x.max(0.0)
             }
             Distortion::Fisheye(d) => {
                 let rim = DVec3::new((0.999 * d.reach()).sin(), 0.0, (0.999 * d.reach()).cos());
