@@ -9,6 +9,7 @@ use anyhow::{Context, Result, anyhow};
 use bowwave_core::{
     event::{CameraFrame, Event, Picture, Tick},
     session::SessionDigest,
+    time::Time,
 };
 use bowwave_devices::nmea::line_of;
 use bowwave_record::{
@@ -55,6 +56,8 @@ pub struct Recorder {
     exact_pixels: bool,
     lost: u64,
     inputs: u64,
+    /// When the newest input or tick of the recording came.
+    newest: Option<Time>,
 }
 
 impl Recorder {
@@ -88,12 +91,16 @@ impl Recorder {
             exact_pixels: options.exact_pixels,
             lost: 0,
             inputs: 0,
+            newest: None,
         })
     }
 
     /// Takes in an event that the session meets with `tick`.
     pub fn event(&mut self, event: &Event, tick: Tick) {
         self.inputs += 1;
+        let logged = self.newest.unwrap_or(tick.time);
+        let time = time_of(event).unwrap_or(logged);
+        self.newest = Some(time.max(logged));
         match event {
             Event::Imu(sample) => self.entry(Entry::Imu(*sample)),
             Event::Trigger(edge) => self.entry(Entry::Trigger(*edge)),
@@ -113,7 +120,8 @@ impl Recorder {
                 None => self.put(RecorderJob::Code(frame.clone())),
             },
             Event::Fault(change) => {
-                self.entry(Entry::Fault(FaultEntry { logged: tick.time, change: change.clone() }));
+                // With the tick's own time, inputs that a pause held up would come after it and be too old to be recorded.
+                self.entry(Entry::Fault(FaultEntry { logged, change: change.clone() }));
             }
         }
     }
@@ -127,6 +135,7 @@ impl Recorder {
             scenes: digest.scenes.get(),
         }));
         self.inputs += 1;
+        self.newest = self.newest.max(Some(tick.time));
     }
 
     /// What waits goes to the disk now.
@@ -177,6 +186,18 @@ impl Recorder {
     }
 }
 
+/// When an input came; a fault's own time says when it began, which may be long ago.
+fn time_of(event: &Event) -> Option<Time> {
+    match event {
+        Event::Imu(sample) => Some(sample.arrival),
+        Event::Trigger(edge) => Some(edge.time),
+        Event::Ship(sample) => Some(sample.arrival),
+        Event::Mark(mark) => Some(mark.time),
+        Event::Frame(frame) => Some(frame.arrival),
+        Event::Fault(_) => None,
+    }
+}
+
 /// Writes one entry. One that cannot be represented is left out with a line in the log, and a replay notices that it is missing.
 fn write(writer: &mut RecordingWriter, entry: &Entry) -> Result<()> {
     match writer.write(entry) {
@@ -211,4 +232,48 @@ fn jpeg(picture: &Picture) -> Result<Vec<u8>> {
         .encode(&rgb, width, height, ExtendedColorType::Rgb8)
         .context("cannot code a picture for the recording")?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::{
+        event::{Mark, MarkKind, PixelFormat},
+        fault::{Fault, FaultChange},
+    };
+    use bowwave_record::RecordingReader;
+
+    use super::*;
+
+    /// A pause of the loop holds up a second of inputs; a fault that is told before them must not make them too old.
+    #[test]
+    fn inputs_that_a_pause_held_up_are_kept_beside_a_fault() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("recording.mcap");
+        let options = RecorderOptions {
+            path: path.clone(),
+            properties: Properties { picture: (2, 2), ..Properties::default() },
+            lossless: true,
+            exact_pixels: true,
+        };
+        let mut recorder = Recorder::start(&options).unwrap();
+        let at = |seconds| Time::from_ns(0).plus_secs(seconds);
+        let tick = |seconds| Tick::at(at(seconds));
+        let none = SessionDigest::default();
+        let mark = |seconds| Event::Mark(Mark { time: at(seconds), kind: MarkKind::Stow });
+        let picture = Picture::new(PixelFormat::Rgb, 2, 2, vec![0; 12].into()).unwrap();
+        let frame = CameraFrame { arrival: at(0.9), mid_exposure: at(0.9), sequence: 0, picture, jpeg: None };
+        recorder.event(&Event::Frame(frame), tick(1.0));
+        recorder.tick(tick(1.0), none);
+        let fault = FaultChange::raised(at(2.4), Fault::GpuLost, "lost");
+        let events = [Event::Fault(fault), mark(1.1), mark(1.8), mark(2.5)];
+        events.iter().for_each(|event| recorder.event(event, tick(2.6)));
+        recorder.tick(tick(2.6), none);
+        recorder.finish().unwrap();
+
+        let reader = RecordingReader::open(&path).unwrap();
+        let kept: Vec<_> = reader.entries_as_written().unwrap().map(Result::unwrap).collect();
+        let marks = kept.iter().filter(|entry| matches!(entry, Entry::Mark(_))).count();
+        assert_eq!((kept.len(), marks), (7, 3), "{kept:?}");
+        assert!(matches!(kept[2], Entry::Fault(_)), "the fault keeps its place: {kept:?}");
+    }
 }
