@@ -4,7 +4,7 @@ pub mod prepare;
 
 use std::{
     sync::{Arc, atomic::Ordering},
-    time::SystemTime,
+    time::{Duration, SystemTime},
 };
 
 use anyhow::{Context, Result, bail};
@@ -120,7 +120,8 @@ fn presenter(arguments: &Simulate, prepared: &Prepared, realtime: bool, frames: 
     PresenterOptions {
         gpu: prepared.gpu.clone(),
         validation: prepared.validation,
-        gpu_timeout: None,
+        // A desk may do other work than to draw: half a second without a frame is no hung GPU there.
+        gpu_timeout: Some(Duration::from_secs(5)),
         output: OutputOptions {
             folder: arguments.out.clone(),
             frames,
