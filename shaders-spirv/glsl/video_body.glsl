@@ -7,6 +7,9 @@ layout(constant_id = 0) const uint FORMAT = 0;
 layout(constant_id = 1) const bool SCALED = false;
 // Pixels a fragment; divides the screen's width.
 layout(constant_id = 2) const int RUN = 4;
+// Whether the four pixels of a fragment share four neighbours of a row and the next four. The picture's width is then a multiple of
+// four, and it is not made smaller.
+layout(constant_id = 3) const bool FOURS = false;
 
 layout(push_constant) uniform VideoBlock {
     vec2 scale;   // picture pixels for each screen pixel
@@ -14,7 +17,7 @@ layout(push_constant) uniform VideoBlock {
     ivec2 size;   // the picture's, in pixels
 } video;
 
-// Little endian words of the picture; for YUYV at equal size with runs of four, pairs of words.
+// Little endian words of the picture. In fours, a texel holds four pixels: two words of YUYV, three of RGB.
 layout(set = 0, binding = 0) uniform usamplerBuffer words;
 // NV12: words of the second plane.
 layout(set = 0, binding = 1) uniform usamplerBuffer chroma_words;
@@ -50,14 +53,31 @@ vec4 full_range(vec4 y) {
     return y * (255.0 / 219.0) - 16.0 * 255.0 / 219.0;
 }
 
-// Four pixels from `x` on, at equal size.
-uvec4 four(int x, int y) {
+// Y, U, V or R, G, B of four picture pixels from `x` on, a multiple of four, in the lower bytes of each.
+uvec4 raw_four(int x, int y) {
     int first = y * video.size.x + x;
     if (FORMAT == 2) {
-        int i = (first >> 2) * 3;
-        uint a = texelFetch(words, i).x, b = texelFetch(words, i + 1).x, c = texelFetch(words, i + 2).x;
-        return uvec4(a, (a >> 24) | (b << 8), (b >> 16) | (c << 16), c >> 8) | 0xff000000u;
+        uvec3 w = texelFetch(words, first >> 2).xyz;
+        return uvec4(w.x, (w.x >> 24) | (w.y << 8), (w.y >> 16) | (w.z << 16), w.z >> 8);
+    } else if (FORMAT == 0) {
+        uvec2 w = texelFetch(words, first >> 2).xy;
+        uvec2 uv = ((w >> 8) & 0xffu) << 8 | (w >> 24) << 16;
+        uvec2 even = (w & 0xffu) | uv, odd = ((w >> 16) & 0xffu) | uv;
+        return uvec4(even.x, odd.x, even.y, odd.y);
+    } else {
+        uint luma = texelFetch(words, first >> 2).x;
+        uint uvuv = texelFetch(chroma_words, ((y >> 1) * video.size.x + x) >> 2).x;
+        uvec2 uv = uvec2(uvuv << 8, (uvuv >> 16) << 8) & 0xffff00u;
+        return ((uvec4(luma) >> uvec4(0, 8, 16, 24)) & 0xffu) | uv.xxyy;
     }
+}
+
+// Four pixels from `x` on, at equal size.
+uvec4 four(int x, int y) {
+    if (FORMAT == 2) {
+        return raw_four(x, y) | 0xff000000u;
+    }
+    int first = y * video.size.x + x;
     vec4 luma;
     vec4 uvuv;
     if (FORMAT == 0) {
@@ -118,9 +138,55 @@ uint to_code(vec3 c) {
     return pack(FORMAT == 2 ? c : full_range(c.xxxx).x + tint(c.yz));
 }
 
+// Where a point of the screen lies in the picture, counted in pixels from the first one's centre.
+vec2 on_picture(vec2 screen) {
+    return clamp(screen * video.scale + video.offset - 0.5, vec2(0.0), vec2(video.size - 1));
+}
+
+// Five neighbours of row `y` from column `x` on; what would lie beyond the row's end is any number.
+void raw_five(int x, int y, out uvec4 four, out uint fifth) {
+    int begin = x & ~3, shift = x & 3;
+    uvec4 a = raw_four(begin, y), b = raw_four(min(begin + 4, video.size.x - 4), y);
+    bool by_two = (shift & 2) != 0, by_one = (shift & 1) != 0;
+    uvec4 low = by_two ? uvec4(a.zw, b.xy) : a;
+    uvec2 high = by_two ? b.zw : b.xy;
+    four = by_one ? uvec4(low.yzw, high.x) : low;
+    fifth = by_one ? high.y : high.x;
+}
+
+// Four screen pixels from `x` on, bilinear, by what is between the rows at five columns: none of them is further right of the first
+// one's columns than it is on the screen.
+uvec4 blended_four(int x, int y) {
+    vec2 at = on_picture(vec2(x, y) + 0.5);
+    ivec2 low = ivec2(at);
+    float part = at.y - float(low.y);
+    uvec4 top, bottom;
+    uint top_fifth, bottom_fifth;
+    raw_five(low.x, low.y, top, top_fifth);
+    raw_five(low.x, min(low.y + 1, video.size.y - 1), bottom, bottom_fifth);
+    vec3 a = mix(bytes(top.x).xyz, bytes(bottom.x).xyz, part);
+    vec3 b = mix(bytes(top.y).xyz, bytes(bottom.y).xyz, part);
+    vec3 c = mix(bytes(top.z).xyz, bytes(bottom.z).xyz, part);
+    vec3 d = mix(bytes(top.w).xyz, bytes(bottom.w).xyz, part);
+    vec3 e = mix(bytes(top_fifth).xyz, bytes(bottom_fifth).xyz, part);
+    float second = on_picture(vec2(x + 1, y) + 0.5).x, third = on_picture(vec2(x + 2, y) + 0.5).x;
+    float fourth = on_picture(vec2(x + 3, y) + 0.5).x;
+    int to_second = int(second) - low.x, to_third = int(third) - low.x, to_fourth = int(fourth) - low.x;
+    return uvec4(
+        to_code(mix(a, b, at.x - float(low.x))),
+        to_code(mix(to_second > 0 ? b : a, to_second > 0 ? c : b, fract(second))),
+        to_code(mix(to_third > 1 ? c : to_third > 0 ? b : a, to_third > 1 ? d : to_third > 0 ? c : b, fract(third))),
+        to_code(mix(
+            to_fourth > 2 ? d : to_fourth > 1 ? c : to_fourth > 0 ? b : a,
+            to_fourth > 2 ? e : to_fourth > 1 ? d : to_fourth > 0 ? c : b,
+            fract(fourth)
+        ))
+    );
+}
+
 // One screen pixel, bilinear.
 uint blended(vec2 screen) {
-    vec2 at = clamp(screen * video.scale + video.offset - 0.5, vec2(0.0), vec2(video.size - 1));
+    vec2 at = on_picture(screen);
     ivec2 low = ivec2(at);
     vec2 part = at - vec2(low);
     vec3 a, b, c, d;
@@ -148,8 +214,8 @@ uint overlaid(uint code, uint over) {
 
 void main() {
     ivec2 at = ivec2(gl_FragCoord.xy) * ivec2(RUN, 1);
-    if (!SCALED && RUN == 4) {
-        pixels = four(at.x, at.y);
+    if (FOURS) {
+        pixels = SCALED ? blended_four(at.x, at.y) : four(at.x, at.y);
     } else {
         pixels = uvec4(0);
         for (int i = 0; i < RUN; ++i) {

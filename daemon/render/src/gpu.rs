@@ -305,6 +305,13 @@ impl Gpu {
             .contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT | vk::FormatFeatureFlags::TRANSFER_SRC)
     }
 
+    /// Whether shaders can read texels of `format` from a buffer.
+    pub(crate) fn reads_texels(&self, format: vk::Format) -> bool {
+        // SAFETY: `physical` comes from this instance.
+        let has = unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) };
+        has.buffer_features.contains(vk::FormatFeatureFlags::UNIFORM_TEXEL_BUFFER)
+    }
+
     /// The first memory type of those in `bits` that has all of `flags`.
     pub(crate) fn memory_type(&self, bits: u32, flags: vk::MemoryPropertyFlags) -> Option<u32> {
         self.memory

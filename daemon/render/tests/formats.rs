@@ -84,8 +84,18 @@ fn covered(picture: &Picture, width: u32, height: u32, x: u32, y: u32) -> [f64; 
 
 #[test]
 fn other_sizes_are_covered_bilinearly_and_centred() {
-    for (from, to) in [((64, 36), (96, 54)), ((64, 36), (80, 80)), ((96, 54), (64, 40)), ((62, 34), (50, 30))]
-    {
+    // Enlarged, cropped, only cropped, and made smaller; widths that are a multiple of four and that are not.
+    let sizes = [
+        ((64, 36), (96, 54)),
+        ((64, 36), (80, 80)),
+        ((36, 60), (96, 52)),
+        ((64, 48), (64, 36)),
+        ((80, 36), (64, 36)),
+        ((62, 34), (96, 54)),
+        ((96, 54), (64, 40)),
+        ((62, 34), (50, 30)),
+    ];
+    for (from, to) in sizes {
         for format in [PixelFormat::Yuyv, PixelFormat::Nv12, PixelFormat::Rgb] {
             // Colours near grey: where a conversion clips, mixing before and after it differ.
             let noise = picture(format, from.0, from.1);

@@ -23,6 +23,16 @@ use crate::{
     target::{DrawTarget, Words},
 };
 
+/// How the shader reads pictures.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Reading {
+    format: PixelFormat,
+    /// Picture and screen differ in size.
+    scaled: bool,
+    /// Four neighbours of a row at once.
+    in_fours: bool,
+}
+
 /// The video pass.
 pub(crate) struct VideoPass {
     gpu: Arc<Gpu>,
@@ -36,8 +46,10 @@ pub(crate) struct VideoPass {
     counts: PictureCounts,
     /// What lies over the picture.
     overlay: Arc<SetLayout>,
-    /// By format and whether it is scaled: without and with what lies over it; made when first needed.
-    pipelines: [Option<[Pipeline; 2]>; 6],
+    /// Without and with what lies over it, of each way to read pictures that was needed yet.
+    pipelines: Vec<(Reading, [Pipeline; 2])>,
+    /// The pipelines of the current shape.
+    current: usize,
 }
 
 impl VideoPass {
@@ -59,7 +71,8 @@ impl VideoPass {
             pictures: None,
             path: PicturePath::Copied,
             counts: PictureCounts::default(),
-            pipelines: [const { None }; 6],
+            pipelines: Vec::new(),
+            current: 0,
         };
         if let Some(shape) = expected {
             pass.reshape(shape)?;
@@ -67,50 +80,60 @@ impl VideoPass {
         Ok(pass)
     }
 
-    /// Makes the ring and the pipeline for pictures of `shape`. The GPU must be idle if there was another shape before.
+    /// Makes the ring and the pipelines for pictures of `shape`. The GPU must be idle if there was another shape before.
     fn reshape(&mut self, shape: PictureShape) -> Result<(), RenderError> {
         self.pictures = None;
-        // The shader takes words, and where it can, pairs of them.
-        let in_pairs = shape.format == PixelFormat::Yuyv && self.words.run == 4 && !self.is_scaled(shape);
-        self.pictures = Some(Pictures::new(&self.gpu, &self.layout, shape, in_pairs, self.slots)?);
-        self.make_pipeline(shape)
-    }
-
-    /// Whether `shape` needs scaling to the screen.
-    fn is_scaled(&self, shape: PictureShape) -> bool {
-        (shape.width, shape.height) != self.size
-    }
-
-    /// Makes the pipeline of a shape; one for each format and for scaled and unscaled, kept once made.
-    fn make_pipeline(&mut self, shape: PictureShape) -> Result<(), RenderError> {
-        let scaled = self.is_scaled(shape);
-        let index = pipeline_index(shape.format, scaled);
-        if self.pipelines[index].is_none() {
-            let sets: [&SetLayout; 2] = [&self.layout, &self.overlay];
-            let make = |fragment, sets: &[&SetLayout]| {
-                Pipeline::new(
-                    &self.gpu,
-                    &PipelineShape {
-                        vertex: SCREEN_VERT,
-                        fragment,
-                        vertex_constants: &[],
-                        constants: &[format_constant(shape.format), u32::from(scaled), self.words.run],
-                        sets,
-                        push: size_of::<VideoBlock>(),
-                        vertices: None,
-                        topology: vk::PrimitiveTopology::TRIANGLE_LIST,
-                        colour: self.words.format,
-                        targets: 1,
-                        blend: Blend::Replace,
-                        cull: None,
-                        depth: false,
-                        samples: vk::SampleCountFlags::TYPE_1,
-                    },
-                )
-            };
-            self.pipelines[index] = Some([make(VIDEO_FRAG, &sets[..1])?, make(VIDEO_OVERLAID_FRAG, &sets)?]);
-        }
+        let scaled = (shape.width, shape.height) != self.size;
+        let enlarged = covering(shape, self.size).scale[0] <= 1.0;
+        let in_fours = self.words.run == 4
+            && shape.width.is_multiple_of(4)
+            && enlarged
+            && self.gpu.reads_texels(four_pixels(shape.format));
+        let texels = if in_fours { four_pixels(shape.format) } else { vk::Format::R32_UINT };
+        self.pictures = Some(Pictures::new(&self.gpu, &self.layout, shape, texels, self.slots)?);
+        let reading = Reading { format: shape.format, scaled, in_fours };
+        self.current = match self.pipelines.iter().position(|(made, _)| *made == reading) {
+            Some(i) => i,
+            None => {
+                let made = self.make_pipelines(reading)?;
+                self.pipelines.push((reading, made));
+                self.pipelines.len() - 1
+            }
+        };
         Ok(())
+    }
+
+    /// Makes the pipelines of one way to read pictures, without and with what lies over them.
+    fn make_pipelines(&self, reading: Reading) -> Result<[Pipeline; 2], RenderError> {
+        let sets: [&SetLayout; 2] = [&self.layout, &self.overlay];
+        let format = match reading.format {
+            PixelFormat::Yuyv => 0,
+            PixelFormat::Nv12 => 1,
+            PixelFormat::Rgb => 2,
+        };
+        let constants = [format, u32::from(reading.scaled), self.words.run, u32::from(reading.in_fours)];
+        let make = |fragment, sets: &[&SetLayout]| {
+            Pipeline::new(
+                &self.gpu,
+                &PipelineShape {
+                    vertex: SCREEN_VERT,
+                    fragment,
+                    vertex_constants: &[],
+                    constants: &constants,
+                    sets,
+                    push: size_of::<VideoBlock>(),
+                    vertices: None,
+                    topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+                    colour: self.words.format,
+                    targets: 1,
+                    blend: Blend::Replace,
+                    cull: None,
+                    depth: false,
+                    samples: vk::SampleCountFlags::TYPE_1,
+                },
+            )
+        };
+        Ok([make(VIDEO_FRAG, &sets[..1])?, make(VIDEO_OVERLAID_FRAG, &sets)?])
     }
 
     /// Makes what pictures of the shape of `picture` need. The GPU is idle.
@@ -182,11 +205,11 @@ impl VideoPass {
         rest: &[PixelRect],
     ) {
         let Some(pictures) = &self.pictures else { return };
-        let shape = pictures.shape;
-        let index = pipeline_index(shape.format, self.is_scaled(shape));
-        let (Some([alone, both]), Some(set)) = (&self.pipelines[index], pictures.set()) else { return };
+        let (Some((_, [alone, both])), Some(set)) = (self.pipelines.get(self.current), pictures.set()) else {
+            return;
+        };
         target.begin_words(to);
-        let block = covering(shape, self.size);
+        let block = covering(pictures.shape, self.size);
         to.bind(alone, &[set]);
         to.push(alone, &block);
         for r in rest {
@@ -205,17 +228,13 @@ impl VideoPass {
     }
 }
 
-/// The shader's number of a format.
-fn format_constant(format: PixelFormat) -> u32 {
+/// The texel that holds four neighbours of a row of `format`; of NV12 their luma.
+fn four_pixels(format: PixelFormat) -> vk::Format {
     match format {
-        PixelFormat::Yuyv => 0,
-        PixelFormat::Nv12 => 1,
-        PixelFormat::Rgb => 2,
+        PixelFormat::Yuyv => vk::Format::R32G32_UINT,
+        PixelFormat::Nv12 => vk::Format::R32_UINT,
+        PixelFormat::Rgb => vk::Format::R32G32B32_UINT,
     }
-}
-
-fn pipeline_index(format: PixelFormat, scaled: bool) -> usize {
-    format_constant(format) as usize * 2 + usize::from(scaled)
 }
 
 /// How a picture of `shape` covers a screen of `size`: as `Lens::covering`, scaled to leave nothing free, centred.

@@ -47,10 +47,14 @@ impl PictureShape {
         self.format.chroma_offset(self.width, self.height).unwrap_or(0) as u64
     }
 
-    /// Bytes from the first on that the shader may read: it reads whole words, and of RGB one beyond the last pixel's.
-    fn reach(self) -> u64 {
-        let beyond = if self.format == PixelFormat::Rgb { 8 } else { 0 };
-        self.byte_len().next_multiple_of(8) + beyond
+    /// Bytes from the first on that the shader may read as `texels`: whole ones, and of RGB word by word one beyond the last
+    /// pixel's.
+    fn reach(self, texels: vk::Format) -> u64 {
+        match (self.format, texels) {
+            (PixelFormat::Rgb, vk::Format::R32G32B32_UINT) => self.byte_len().next_multiple_of(12),
+            (PixelFormat::Rgb, _) => self.byte_len().next_multiple_of(8) + 8,
+            (PixelFormat::Yuyv | PixelFormat::Nv12, _) => self.byte_len().next_multiple_of(8),
+        }
     }
 }
 
@@ -183,8 +187,8 @@ pub(crate) struct Pictures {
     pub(crate) shape: PictureShape,
     /// Where the second plane begins in the ring's entries.
     chroma: u64,
-    /// The shader's words.
-    format: vk::Format,
+    /// What the shader reads at once.
+    texels: vk::Format,
     entries: Vec<Entry>,
     next: usize,
     places: Vec<Place>,
@@ -196,18 +200,19 @@ pub(crate) struct Pictures {
 }
 
 impl Pictures {
-    /// A ring of `slots` entries for pictures of `shape`, which the shader reads through `layout` in pairs of words or word by
-    /// word.
+    /// A ring of `slots` entries for pictures of `shape`, which the shader reads through `layout` as `texels` of one to three words.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         layout: &SetLayout,
         shape: PictureShape,
-        in_pairs: bool,
+        texels: vk::Format,
         slots: usize,
     ) -> Result<Self, RenderError> {
         let align = texel_align(gpu);
         let chroma = shape.chroma().next_multiple_of(align);
-        let size = (chroma - shape.chroma() + shape.reach()).next_multiple_of(align);
+        let size = (chroma - shape.chroma() + shape.reach(texels)).next_multiple_of(align);
+        // Of three words a texel, a whole number of them.
+        let reach = if texels == vk::Format::R32G32B32_UINT { size - size % 12 } else { size };
         if size / 4 > u64::from(gpu.limits.max_texel_buffer_elements) {
             return Err(RenderError::Unsuitable {
                 device: gpu.info().name.clone(),
@@ -216,12 +221,11 @@ impl Pictures {
         }
         let imports = if gpu.host_import.is_some() { IMPORTS_MAX } else { 0 };
         let pool = SetPool::new(gpu, u32::try_from(slots + imports).unwrap_or(1), 2)?;
-        let format = if in_pairs { vk::Format::R32G32_UINT } else { vk::Format::R32_UINT };
         let mut entries = Vec::with_capacity(slots);
         for _ in 0..slots {
             let usage = vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER;
             let buffer = Buffer::new(gpu, "camera pictures", size, usage, Access::Upload)?;
-            let views = Views::new(gpu, buffer.raw, format, chroma, size)?;
+            let views = Views::new(gpu, buffer.raw, texels, chroma, reach)?;
             let set = pool.set(layout, &views.raw.map(Bound::Texels))?;
             entries.push(Entry { _views: views, buffer, set });
         }
@@ -233,7 +237,7 @@ impl Pictures {
             gpu: gpu.clone(),
             shape,
             chroma,
-            format,
+            texels,
             entries,
             next: 0,
             places,
@@ -355,7 +359,7 @@ impl Pictures {
     }
 
     fn views_of(&self, mapping: &[u8], hold: Hold) -> Result<(Imported, Views), RenderError> {
-        let (chroma, reach) = (self.shape.chroma(), self.shape.reach());
+        let (chroma, reach) = (self.shape.chroma(), self.shape.reach(self.texels));
         if (mapping.len() as u64) < reach || !chroma.is_multiple_of(texel_align(&self.gpu)) {
             return Err(RenderError::Unsuitable {
                 device: self.gpu.info().name.clone(),
@@ -369,7 +373,7 @@ impl Pictures {
             });
         }
         let buffer = Imported::new(&self.gpu, mapping, hold, vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER)?;
-        let views = Views::new(&self.gpu, buffer.raw, self.format, chroma, reach)?;
+        let views = Views::new(&self.gpu, buffer.raw, self.texels, chroma, reach)?;
         Ok((buffer, views))
     }
 }
