@@ -13,6 +13,7 @@ use ash::{ext, vk};
 use crate::{
     error::{Named, RenderError},
     import::HostImport,
+    rasterisers,
 };
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -230,6 +231,9 @@ impl Gpu {
         let family = u32::try_from(family).map_err(|_| lacks("a usable queue"))?;
         let imports = can_import(&instance, physical)?;
         let device = create_device(&instance, physical, family, imports)?;
+        if info.software {
+            rasterisers::keep_to_cores();
+        }
         // SAFETY: the family and its first queue were asked for at creation; `physical` comes from this instance.
         let (queue, properties, memory) = unsafe {
             (

@@ -14,6 +14,7 @@ mod of_plan;
 mod passes;
 mod pipeline;
 mod plan;
+mod rasterisers;
 mod rects;
 mod renderer;
 mod ring;
