@@ -1,4 +1,5 @@
 //! A run follows from its inputs alone: its recording, stepped again, gives the same records and the same scenes.
+//! `BOWWAVE_REPLAYED_MINUTES` says how many minutes of simulated time each of twelve runs lasts; without it, a quarter of one.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
@@ -22,16 +23,20 @@ fn replay(out: &Path, summary: &Value) -> Value {
 
 #[test]
 fn twelve_runs_with_faults_come_out_the_same() {
+    let minutes: f64 = std::env::var("BOWWAVE_REPLAYED_MINUTES")
+        .map_or(0.25, |text| text.parse().expect("minutes as a number"));
+    let seconds = (minutes * 60.0).round().to_string();
     let folder = tempfile::tempdir().expect("a folder");
     let mut digests = Vec::new();
     for seed in 1..=12 {
         let out = folder.path().join(seed.to_string());
         let seed = seed.to_string();
-        let arguments = ["--record", "--duration", "15", "--fault-every", "5", "--seed", &seed];
+        let arguments = ["--record", "--duration", &seconds, "--fault-every", "5", "--seed", &seed];
         let summary = play(small_recording(), &out, 0, &arguments);
         assert!(summary["counts"]["faults_injected"].as_u64() > Some(0), "{summary}");
         let replayed = replay(&out, &summary);
         assert_eq!(replayed["ticks"], summary["frames"]);
+        println!("seed {seed}: {} ticks, scenes {}", replayed["ticks"], replayed["scenes_digest"]);
         digests.push(replayed["scenes_digest"].clone());
         std::fs::remove_dir_all(&out).expect("the folder was there");
     }
