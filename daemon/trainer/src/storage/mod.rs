@@ -139,8 +139,7 @@ impl Storage {
     /// Takes in what the session is about to meet with a tick, for the recording. `digest` is over what the session gave before.
     pub fn inputs(&mut self, events: &[Event], tick: Tick, digest: SessionDigest) {
         if let Some(recorder) = &mut self.recorder {
-            events.iter().for_each(|event| recorder.event(event, tick));
-            recorder.tick(tick, digest);
+            recorder.inputs(events, tick, Some(digest));
         }
     }
 

@@ -7,7 +7,7 @@ use std::{
 
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::{
-    event::{CameraFrame, Event, Picture, Tick},
+    event::{CameraFrame, Event, Picture, PixelFormat, Tick},
     session::SessionDigest,
     time::Time,
 };
@@ -19,8 +19,9 @@ use bowwave_record::{
 use crossbeam_channel::{Sender, TrySendError, bounded};
 use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 
-/// Entries that wait for the disk: about a second.
-const QUEUE: usize = 256;
+/// Ticks whose inputs wait for the disk, with the poses between them: about a second. What a pause of the loop held up comes with one
+/// tick and takes one place.
+const QUEUE: usize = 96;
 
 /// Pictures that come without a JPEG are coded with this quality, of 100, where pixels need not be exact.
 const QUALITY: u8 = 90;
@@ -41,7 +42,7 @@ pub struct RecorderOptions {
 
 /// One job of the thread.
 enum RecorderJob {
-    Entry(Box<Entry>),
+    Entry(Entry),
     /// A picture that no JPEG came with, to be coded.
     Code(CameraFrame),
     Flush,
@@ -50,7 +51,7 @@ enum RecorderJob {
 /// The running thread.
 #[derive(Debug)]
 pub struct Recorder {
-    queue: Option<Sender<RecorderJob>>,
+    queue: Option<Sender<Vec<RecorderJob>>>,
     thread: Option<JoinHandle<Result<WrittenSummary>>>,
     lossless: bool,
     exact_pixels: bool,
@@ -64,11 +65,11 @@ impl Recorder {
     /// Begins a recording.
     pub fn start(options: &RecorderOptions) -> Result<Self> {
         let mut writer = RecordingWriter::replace(&options.path, &options.properties)?;
-        let (queue, jobs) = bounded::<RecorderJob>(QUEUE);
+        let (queue, jobs) = bounded::<Vec<RecorderJob>>(QUEUE);
         let thread = thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || {
-                for job in jobs {
+                for job in jobs.into_iter().flatten() {
                     match job {
                         RecorderJob::Entry(entry) => write(&mut writer, &entry)?,
                         RecorderJob::Code(frame) => {
@@ -95,77 +96,81 @@ impl Recorder {
         })
     }
 
-    /// Takes in an event that the session meets with `tick`.
-    pub fn event(&mut self, event: &Event, tick: Tick) {
-        self.inputs += 1;
-        let logged = self.newest.unwrap_or(tick.time);
-        let time = time_of(event).unwrap_or(logged);
-        self.newest = Some(time.max(logged));
+    /// Takes in the events that the session meets with `tick`, and where it is stepped by it, the tick with a digest over what the session
+    /// gave before.
+    pub fn inputs(&mut self, events: &[Event], tick: Tick, digest: Option<SessionDigest>) {
+        let mut jobs = Vec::with_capacity(events.len() + 1);
+        for event in events {
+            self.inputs += 1;
+            let logged = self.newest.unwrap_or(tick.time);
+            let time = time_of(event).unwrap_or(logged);
+            self.newest = Some(time.max(logged));
+            self.add(event, logged, &mut jobs);
+        }
+        if let Some(digest) = digest {
+            jobs.push(RecorderJob::Entry(Entry::Tick(TickEntry {
+                tick,
+                inputs: self.inputs,
+                records: digest.records.get(),
+                scenes: digest.scenes.get(),
+            })));
+            self.inputs += 1;
+            self.newest = self.newest.max(Some(tick.time));
+        }
+        self.put(jobs);
+    }
+
+    /// Adds what is recorded of an event; `logged` is the time of a fault in the recording. With the tick's own time, inputs that a pause
+    /// held up would come after a fault and be too old to be recorded.
+    fn add(&self, event: &Event, logged: Time, jobs: &mut Vec<RecorderJob>) {
+        let mut entry = |entry| jobs.push(RecorderJob::Entry(entry));
         match event {
-            Event::Imu(sample) => self.entry(Entry::Imu(*sample)),
-            Event::Trigger(edge) => self.entry(Entry::Trigger(*edge)),
+            Event::Imu(sample) => entry(Entry::Imu(*sample)),
+            Event::Trigger(edge) => entry(Entry::Trigger(*edge)),
             Event::Ship(sample) => {
-                self.entry(Entry::Ship(ShipEntry { arrival: sample.arrival, sentence: line_of(sample) }));
-                self.entry(Entry::ShipValues(*sample));
+                entry(Entry::Ship(ShipEntry { arrival: sample.arrival, sentence: line_of(sample) }));
+                entry(Entry::ShipValues(*sample));
             }
-            Event::Mark(mark) => self.entry(Entry::Mark(*mark)),
+            Event::Mark(mark) => entry(Entry::Mark(*mark)),
             Event::Frame(frame) => match &frame.jpeg {
-                Some(jpeg) => self.entry(Entry::Frame(frame_entry(frame, jpeg.clone()))),
-                None if self.exact_pixels => self.entry(Entry::Picture(PictureEntry {
+                Some(jpeg) => entry(Entry::Frame(frame_entry(frame, jpeg.clone()))),
+                None if self.exact_pixels => entry(Entry::Picture(PictureEntry {
                     arrival: frame.arrival,
                     mid_exposure: frame.mid_exposure,
                     sequence: frame.sequence,
                     picture: frame.picture.clone(),
                 })),
-                None => self.put(RecorderJob::Code(frame.clone())),
+                None => jobs.push(RecorderJob::Code(frame.clone())),
             },
-            Event::Fault(change) => {
-                // With the tick's own time, inputs that a pause held up would come after it and be too old to be recorded.
-                self.entry(Entry::Fault(FaultEntry { logged, change: change.clone() }));
-            }
+            Event::Fault(change) => entry(Entry::Fault(FaultEntry { logged, change: change.clone() })),
         }
-    }
-
-    /// Takes in a tick; `digest` is over what the session gave before it.
-    pub fn tick(&mut self, tick: Tick, digest: SessionDigest) {
-        self.entry(Entry::Tick(TickEntry {
-            tick,
-            inputs: self.inputs,
-            records: digest.records.get(),
-            scenes: digest.scenes.get(),
-        }));
-        self.inputs += 1;
-        self.newest = self.newest.max(Some(tick.time));
     }
 
     /// What waits goes to the disk now.
     pub fn flush(&mut self) {
-        self.put(RecorderJob::Flush);
+        self.put(vec![RecorderJob::Flush]);
     }
 
     /// Takes in a pose that was used.
     pub fn pose(&mut self, entry: PoseEntry) {
-        self.entry(Entry::Pose(entry));
+        self.put(vec![RecorderJob::Entry(Entry::Pose(entry))]);
     }
 
     /// Takes in where the camera really was.
     pub fn truth(&mut self, entry: PoseEntry) {
-        self.entry(Entry::Truth(entry));
+        self.put(vec![RecorderJob::Entry(Entry::Truth(entry))]);
     }
 
-    fn entry(&mut self, entry: Entry) {
-        self.put(RecorderJob::Entry(Box::new(entry)));
-    }
-
-    fn put(&mut self, job: RecorderJob) {
-        let Some(queue) = &self.queue else { return };
+    fn put(&mut self, jobs: Vec<RecorderJob>) {
+        let Some(queue) = self.queue.as_ref().filter(|_| !jobs.is_empty()) else { return };
+        let count = jobs.len() as u64;
         // A thread that has ended took its error along: `finish` reports it.
         let lost = if self.lossless {
-            queue.send(job).is_err()
+            queue.send(jobs).is_err()
         } else {
-            matches!(queue.try_send(job), Err(TrySendError::Full(_) | TrySendError::Disconnected(_)))
+            matches!(queue.try_send(jobs), Err(TrySendError::Full(_) | TrySendError::Disconnected(_)))
         };
-        self.lost += u64::from(lost);
+        self.lost += if lost { count } else { 0 };
     }
 
     /// Whether its thread has ended before it was asked to: it could not write. [`Self::finish`] says why.
@@ -221,7 +226,7 @@ fn frame_entry(frame: &CameraFrame, jpeg: std::sync::Arc<[u8]>) -> FrameEntry {
 
 fn jpeg(picture: &Picture) -> Result<Vec<u8>> {
     let (width, height) = (picture.width(), picture.height());
-    let mut rgb = Vec::with_capacity(width as usize * height as usize * 3);
+    let mut rgb = Vec::with_capacity(PixelFormat::Rgb.byte_len(width, height));
     for y in 0..height {
         for x in 0..width {
             rgb.extend(picture.srgb_at(x, y).map(|c| (c * 255.0).round() as u8));
@@ -237,7 +242,7 @@ fn jpeg(picture: &Picture) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use bowwave_core::{
-        event::{Mark, MarkKind, PixelFormat},
+        event::{Mark, MarkKind},
         fault::{Fault, FaultChange},
     };
     use bowwave_record::RecordingReader;
@@ -252,28 +257,27 @@ mod tests {
         let options = RecorderOptions {
             path: path.clone(),
             properties: Properties { picture: (2, 2), ..Properties::default() },
-            lossless: true,
+            lossless: false,
             exact_pixels: true,
         };
         let mut recorder = Recorder::start(&options).unwrap();
         let at = |seconds| Time::from_ns(0).plus_secs(seconds);
         let tick = |seconds| Tick::at(at(seconds));
-        let none = SessionDigest::default();
+        let none = Some(SessionDigest::default());
         let mark = |seconds| Event::Mark(Mark { time: at(seconds), kind: MarkKind::Stow });
         let picture = Picture::new(PixelFormat::Rgb, 2, 2, vec![0; 12].into()).unwrap();
         let frame = CameraFrame { arrival: at(0.9), mid_exposure: at(0.9), sequence: 0, picture, jpeg: None };
-        recorder.event(&Event::Frame(frame), tick(1.0));
-        recorder.tick(tick(1.0), none);
+        recorder.inputs(&[Event::Frame(frame)], tick(1.0), none);
         let fault = FaultChange::raised(at(2.4), Fault::GpuLost, "lost");
-        let events = [Event::Fault(fault), mark(1.1), mark(1.8), mark(2.5)];
-        events.iter().for_each(|event| recorder.event(event, tick(2.6)));
-        recorder.tick(tick(2.6), none);
+        // More than ever wait in the queue come with one tick.
+        let held_up: Vec<_> = (0..3000).map(|n| mark(1.1 + f64::from(n) * 4e-4)).collect();
+        recorder.inputs(&[vec![Event::Fault(fault)], held_up].concat(), tick(2.6), none);
         recorder.finish().unwrap();
 
         let reader = RecordingReader::open(&path).unwrap();
         let kept: Vec<_> = reader.entries_as_written().unwrap().map(Result::unwrap).collect();
         let marks = kept.iter().filter(|entry| matches!(entry, Entry::Mark(_))).count();
-        assert_eq!((kept.len(), marks), (7, 3), "{kept:?}");
-        assert!(matches!(kept[2], Entry::Fault(_)), "the fault keeps its place: {kept:?}");
+        assert_eq!((kept.len(), marks), (3004, 3000));
+        assert!(matches!(kept[2], Entry::Fault(_)), "the fault keeps its place");
     }
 }

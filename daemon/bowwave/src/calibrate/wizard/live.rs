@@ -296,7 +296,7 @@ impl<'a> Dialogue<'a> {
             }
         }
         if let Some(recorder) = &mut self.recorder {
-            events.iter().for_each(|event| recorder.event(event, tick));
+            recorder.inputs(events, tick, None);
         }
         Ok(())
     }

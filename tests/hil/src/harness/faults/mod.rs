@@ -109,6 +109,13 @@ pub struct CaseResult {
     pub note: String,
 }
 
+impl CaseResult {
+    /// All was as it must be.
+    pub fn met(note: String) -> Self {
+        Self { met: true, note, ..Self::default() }
+    }
+}
+
 /// One of both.
 pub enum FaultRow {
     /// The usual kind.

@@ -5,7 +5,7 @@ use std::{thread, time::Duration};
 use anyhow::{Context, Result};
 use serde_json::Value;
 
-use super::{CaseResult, FaultRow, SpecialCase, quiet};
+use super::{CaseResult, FaultRow, SpecialCase, computer, quiet};
 use crate::bench::{Configured, HilBench, STATE};
 use bowwave_hil::protocol::PlayerFeed;
 
@@ -18,7 +18,7 @@ pub(super) fn rows() -> Vec<FaultRow> {
     vec![FaultRow::Own(SpecialCase {
         number: "P",
         fault: "a live run with faults, stepped again from its recording",
-        injected: "unit silent, stuck, saturated, garbled; camera stalled, flagged, late, unplugged; not inert; rounds all the while",
+        injected: "unit silent, stuck, saturated, garbled; camera stalled, flagged, late, unplugged; not inert; hot; wall clock stepped; LCD unplugged; GPU lost; rounds all the while",
         code: "-",
         target: "equal digests of records and of scenes, no input missing",
         run: replayed,
@@ -55,6 +55,11 @@ fn replayed(bench: &mut HilBench) -> Result<CaseResult> {
     thread::sleep(STAYS);
     bench.pull(1, true)?;
     thread::sleep(STAYS);
+    for disturb in computer::disturbances() {
+        bench.shoot(300)?;
+        disturb(bench)?;
+        thread::sleep(STAYS);
+    }
     bench.shoot(300)?;
     thread::sleep(STAYS);
     // A reload ends the recording and leaves the run's summary.

@@ -214,9 +214,7 @@ fn blocked(bench: &mut HilBench) -> Result<CaseResult> {
         lcd: "NOT SCORED".into(),
         seen_s: Some(seen_s),
         within_s: Some(0.2),
-        met: true,
-        note,
-        ..CaseResult::default()
+        ..CaseResult::met(note)
     })
 }
 
