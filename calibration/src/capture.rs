@@ -395,13 +395,7 @@ impl Capture {
     /// # Errors
     /// As [`alignment::compare`].
     pub fn compare(&self, calibration: &Calibration) -> Result<Comparison, AlignmentError> {
-        let known = Known {
-            camera_from_imu: calibration.camera_from_imu,
-            rotation_sigma: calibration.camera_from_imu_sigma,
-            offset_s: calibration.time_offset_ns as f64 * 1e-9,
-            offset_sigma_s: calibration.time_offset_sigma_ns as f64 * 1e-9,
-            gyro_bias: calibration.gyro_bias,
-        };
+        let known = Known::of(calibration);
         let straight = match self.readout {
             Readout::Known(seconds) if seconds != 0.0 => {
                 let rows = self.rows_by(known.camera_from_imu, known.offset_s, known.gyro_bias);

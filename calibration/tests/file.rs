@@ -66,12 +66,7 @@ fn mistakes_are_refused_with_their_place() {
         ("radial = [-0.112, 0.034]", "radial = [-0.112]", "14:10", "a list of 2"),
         ("size_px = [1280, 720]", "size_px = [0, 720]", "10:11", "1 to 8192"),
         ("rotation_wxyz = [0.4956172,", "rotation_wxyz = [0.6,", "21:17", "length"),
-        (
-            "sigma_mrad = [0.7, 0.7, 0.8]",
-            "sigma_mrad = [0.7, inf, 0.8]",
-            "22:14",
-            "camera_from_imu.sigma_mrad",
-        ),
+        ("sigma_mrad = [0.7, 0.7, 0.8]", "sigma_mrad = [0.7, inf, 0.8]", "22:14", "from_imu.sigma_mrad"),
         ("offset_ms = -3.2", "offset_ms = -32000", "27:13", "time_offset.offset_ms"),
         ("sigma_ms = 0.15", "sigma_ms = 1e-9", "28:12", "nanosecond"),
         ("right_deg = 0.21", "right_deg = 90.0", "33:13", "boresight.right_deg"),
@@ -137,12 +132,18 @@ fn a_rolling_shutter_is_optional_and_checked() {
     }
 }
 
-#[test]
-fn writing_keeps_the_former_file() {
+/// The example in a file of its own, and the folder that holds it.
+fn written() -> (tempfile::TempDir, std::path::PathBuf, CalibrationFile) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("calibration.toml");
-    let first = example();
-    first.write(&path).unwrap();
+    let file = example();
+    file.write(&path).unwrap();
+    (folder, path, file)
+}
+
+#[test]
+fn writing_keeps_the_former_file() {
+    let (folder, path, first) = written();
     let mut second = first.clone();
     second.calibration.time_offset_ns = 7_000_001;
     second.write(&path).unwrap();
@@ -154,10 +155,7 @@ fn writing_keeps_the_former_file() {
 
 #[test]
 fn nothing_that_cannot_be_read_back_is_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("calibration.toml");
-    let good = example();
-    good.write(&path).unwrap();
+    let (_folder, path, good) = written();
     let mut bad = good.clone();
     bad.calibration.gyro_bias.x = f64::NAN;
     assert!(matches!(bad.write(&path), Err(CalibrationError::Unreadable(_))));

@@ -40,16 +40,19 @@ fn recording() -> &'static Path {
     path
 }
 
-/// The recording with every entry changed.
-fn changed(to: &Path, mut change: impl FnMut(usize, &mut Entry)) {
+/// The recording with every entry changed, and the folder that holds it.
+fn changed(mut change: impl FnMut(usize, &mut Entry)) -> (TestFolder, PathBuf) {
+    let folder = TestFolder::new();
+    let path = folder.path("changed.mcap");
     let reader = RecordingReader::open(recording()).unwrap();
-    let mut writer = RecordingWriter::create(to, reader.properties()).unwrap();
+    let mut writer = RecordingWriter::create(&path, reader.properties()).unwrap();
     for (number, entry) in reader.entries().unwrap().enumerate() {
         let mut entry = entry.unwrap();
         change(number, &mut entry);
         writer.write(&entry).unwrap();
     }
     writer.finish().unwrap();
+    (folder, path)
 }
 
 fn calibrate(task: &str, recording: &Path, further: &[&str]) -> Output {
@@ -142,6 +145,13 @@ fn a_stale_calibration_is_found_out_and_a_good_one_is_not() {
     }
 }
 
+/// What `calibrate check` says of a recording, and ends with.
+fn check_says(path: &Path, code: i32) -> String {
+    let output = calibrate("check", path, &[]);
+    expect_code(&output, code);
+    told(&output)
+}
+
 #[test]
 fn traverse_alone_is_refused_with_what_is_missing_and_checks_nothing() {
     let folder = TestFolder::new();
@@ -153,18 +163,15 @@ fn traverse_alone_is_refused_with_what_is_missing_and_checks_nothing() {
     let said = told(&output);
     assert!(said.starts_with("FAIL: ") && said.contains("missing: "), "{said}");
     assert!(!out.exists());
-    let output = calibrate("check", &path, &[]);
-    expect_code(&output, 3);
-    assert!(told(&output).starts_with("CANNOT TELL: "), "{}", told(&output));
+    let said = check_says(&path, 3);
+    assert!(said.starts_with("CANNOT TELL: "), "{said}");
 }
 
 #[test]
 fn mounted_upside_down_and_half_a_second_late() {
     let truth = truth().calibration;
-    let folder = TestFolder::new();
-    let path = folder.path("odd.mcap");
     let half_turn = DQuat::from_rotation_z(std::f64::consts::PI);
-    changed(&path, |_, entry| match entry {
+    let (_folder, path) = changed(|_, entry| match entry {
         Entry::Imu(sample) => {
             (sample.rate, sample.accel) = (half_turn * sample.rate, half_turn * sample.accel);
         }
@@ -178,26 +185,21 @@ fn mounted_upside_down_and_half_a_second_late() {
 #[test]
 fn a_wrong_stamp_flag_comes_out_as_offset_and_as_stale() {
     let truth = truth().calibration;
-    let folder = TestFolder::new();
-    let path = folder.path("flag.mcap");
     // The exposure's begin instead of its middle.
-    changed(&path, |_, entry| {
+    let (_folder, path) = changed(|_, entry| {
         if let Entry::Frame(frame) = entry {
             frame.mid_exposure = frame.mid_exposure.plus_ns(-8_000_000);
         }
     });
     holds(&path, truth.camera_from_imu, truth.time_offset_ns + 8_000_000);
-    let output = calibrate("check", &path, &[]);
-    expect_code(&output, 1);
-    assert!(told(&output).contains("8.0"), "{}", told(&output));
+    let said = check_says(&path, 1);
+    assert!(said.contains("8.0"), "{said}");
 }
 
 #[test]
 fn stamps_that_repeat_and_run_backwards_do_no_harm() {
     let truth = truth().calibration;
-    let folder = TestFolder::new();
-    let path = folder.path("stamps.mcap");
-    changed(&path, |number, entry| match entry {
+    let (_folder, path) = changed(|number, entry| match entry {
         Entry::Frame(frame) if frame.sequence % 17 == 3 => {
             frame.mid_exposure = frame.mid_exposure.plus_ns(-250_000_000);
         }
@@ -209,9 +211,7 @@ fn stamps_that_repeat_and_run_backwards_do_no_harm() {
 
 #[test]
 fn mirrored_axes_are_refused_and_stale() {
-    let folder = TestFolder::new();
-    let path = folder.path("mirrored.mcap");
-    changed(&path, |_, entry| {
+    let (_folder, path) = changed(|_, entry| {
         if let Entry::Imu(sample) = entry {
             // A rate is an axial vector: mirrored wiring reverses one axis of both.
             sample.rate.y = -sample.rate.y;

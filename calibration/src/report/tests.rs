@@ -27,14 +27,7 @@ fn calibration(recipe: &Recipe, turn: DVec3, late_s: f64) -> CalibrationFile {
 fn checked(recipe: &Recipe, turn: DVec3, late_s: f64) -> CalibrationReport {
     let recording = recipe.record();
     let c = calibration(recipe, turn, late_s).calibration;
-    let known = Known {
-        camera_from_imu: c.camera_from_imu,
-        rotation_sigma: c.camera_from_imu_sigma,
-        offset_s: c.time_offset_ns as f64 * 1e-9,
-        offset_sigma_s: c.time_offset_sigma_ns as f64 * 1e-9,
-        gyro_bias: c.gyro_bias,
-    };
-    let told = compare(&recording.readings, &recording.orientations, &known, &Options::default());
+    let told = compare(&recording.readings, &recording.orientations, &Known::of(&c), &Options::default());
     CalibrationReport::of_check("a check", &capture(), &c, &told)
 }
 

@@ -14,14 +14,10 @@ use crate::{
     solve::so3::{exp, matrix, vector},
 };
 
-/// Fewest corners of a pose: two tags.
-const CORNERS_LEAST: usize = 8;
 /// Corners that are off by more than this in the mean are those of a wrong lens or board, pixels.
 pub(crate) const OFF_MOST_PX: f64 = 3.0;
 /// The same where the picture may be read row by row while the camera turns.
 pub(crate) const SHEARED_MOST_PX: f64 = 20.0;
-/// Corners are never better than this, pixels.
-const SIGMA_LEAST_PX: f64 = 0.05;
 
 /// Looks for a board in pictures; keeps its memory from picture to picture.
 #[derive(Clone, Debug)]
@@ -68,14 +64,15 @@ pub fn find_tag(target: &Target, tag: usize, picture: &Picture) -> Option<DVec2>
 /// Brightness of every pixel.
 fn to_grey(picture: &Picture, grey: &mut Vec<u8>) {
     grey.clear();
-    let bytes = picture.bytes();
-    match picture.format() {
-        PixelFormat::Yuyv => grey.extend(bytes.iter().step_by(2)),
-        PixelFormat::Nv12 => grey.extend(&bytes[..picture.width() as usize * picture.height() as usize]),
-        PixelFormat::Rgb => grey.extend(bytes.chunks_exact(3).map(|p| {
-            let [r, g, b] = [p[0], p[1], p[2]].map(u32::from);
-            ((77 * r + 150 * g + 29 * b) >> 8) as u8
-        })),
+    for row in (0..picture.height() as usize).map(|y| picture.row(y)) {
+        let pixels = row.chunks_exact(picture.format().pixel_bytes());
+        match picture.format() {
+            PixelFormat::Yuyv | PixelFormat::Nv12 => grey.extend(pixels.map(|p| p[0])),
+            PixelFormat::Rgb => grey.extend(pixels.map(|p| {
+                let [r, g, b] = [p[0], p[1], p[2]].map(u32::from);
+                ((77 * r + 150 * g + 29 * b) >> 8) as u8
+            })),
+        }
     }
 }
 
@@ -125,6 +122,10 @@ pub(crate) struct Oriented {
 
 /// The board's pose by least squares of the corners' pixels; `None` where these are off by more than `most_px` in the mean.
 pub(crate) fn orient(lens: &Lens, corners: &[Corner], most_px: f64) -> Option<Oriented> {
+    /// Fewest corners of a pose: two tags.
+    const CORNERS_LEAST: usize = 8;
+    /// Corners are never better than this, pixels.
+    const SIGMA_LEAST_PX: f64 = 0.05;
     if corners.len() < CORNERS_LEAST {
         return None;
     }

@@ -142,6 +142,14 @@ impl PixelFormat {
         }
     }
 
+    /// How many times a pixel's luma the sum is that stands for it: that of RGB is summed as R + 2 G + B.
+    pub(crate) const fn luma_weight(self) -> u8 {
+        match self {
+            Self::Yuyv | Self::Nv12 => 1,
+            Self::Rgb => 4,
+        }
+    }
+
     /// Bytes of a row without padding; rows of a second plane have as many.
     pub const fn row_bytes(self, width: u32) -> usize {
         width as usize * self.pixel_bytes()

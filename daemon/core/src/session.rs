@@ -34,12 +34,6 @@ pub use notes::Note;
 use notes::Notes;
 pub use setup::{Setup, SetupError};
 
-/// How far behind the frame's time rounds are followed while no picture arrives, nanoseconds.
-const BLIND_LAG_NS: i64 = 50_000_000;
-
-/// Longest time that a round waits for an orientation measured after it, before it is scored by prediction, nanoseconds.
-const POSE_WAIT_NS: i64 = 50_000_000;
-
 /// A running session.
 #[derive(Debug)]
 pub struct Session {
@@ -69,7 +63,7 @@ impl Session {
             eye_height_m: scenario.eye_height_m,
             visibility_m: scenario.visibility_m,
             sun_direction: scenario.sun_direction,
-            measures_tones: scenario.water.method == ReflectionMethod::Waves,
+            measures_tones: scenario.water.method == ReflectionMethod::Baked,
             wind: scenario.wind.truncate(),
             force: scenario.water.force,
             sea: World::sea_assumed(scenario),
@@ -222,6 +216,10 @@ impl Session {
 
     /// Fires what the trigger asks for and follows boats and rounds up to the picture's time.
     fn advance(&mut self, video_time: Time, frame_time: Time) {
+        /// How far behind the frame's time rounds are followed while no picture arrives, nanoseconds.
+        const BLIND_LAG_NS: i64 = 50_000_000;
+        /// Longest time that a round waits for an orientation measured after it, before it is scored by prediction, nanoseconds.
+        const POSE_WAIT_NS: i64 = 50_000_000;
         // A frozen picture must not freeze the rounds.
         let until = video_time.max(frame_time.plus_ns(-BLIND_LAG_NS - STALE_NS));
         let newest = self.estimator.newest_orientation().unwrap_or(Time::MIN);

@@ -9,16 +9,16 @@ pub enum ReflectionMethod {
     Off,
     /// The plain mirror picture.
     Mirror,
-    /// Nelson 2009, Full Reflection shader, eq. 4-6, singular cases as printed.
-    FullAsPrinted,
+    /// Nelson 2009, Full Reflection shader, eq. 4-6, singular cases as published.
+    FullAsPublished,
     /// The same, singular cases mended and distances tied to the boat's size on the screen.
     Full,
-    /// Nelson 2009, Physics shader, eq. 9-16 and table 1, as printed.
-    PhysicsAsPrinted,
+    /// Nelson 2009, Physics shader, eq. 9-16 and table 1, as published.
+    PhysicsAsPublished,
     /// The same with the normal from the slope, waves of the wind force's spectrum, and phases that hold at any distance.
     Physics,
     /// Light thrown back by waves of that wind, from the table of [`crate::frame::reflection`].
-    Waves,
+    Baked,
 }
 
 impl ReflectionMethod {
@@ -27,10 +27,10 @@ impl ReflectionMethod {
         Self::Off,
         Self::Mirror,
         Self::Full,
-        Self::FullAsPrinted,
+        Self::FullAsPublished,
         Self::Physics,
-        Self::PhysicsAsPrinted,
-        Self::Waves,
+        Self::PhysicsAsPublished,
+        Self::Baked,
     ];
 
     /// The name used in scenarios, on the command line and in tables.
@@ -38,11 +38,11 @@ impl ReflectionMethod {
         match self {
             Self::Off => "off",
             Self::Mirror => "mirror",
-            Self::FullAsPrinted => "full_as_published",
+            Self::FullAsPublished => "full_as_published",
             Self::Full => "full",
             Self::Physics => "physics",
-            Self::PhysicsAsPrinted => "physics_as_published",
-            Self::Waves => "baked",
+            Self::PhysicsAsPublished => "physics_as_published",
+            Self::Baked => "baked",
         }
     }
 
@@ -55,9 +55,9 @@ impl ReflectionMethod {
 
     /// Former names, which are read for one version.
     const FORMER_NAMES: [(&str, Self); 3] = [
-        ("waves", Self::Waves),
-        ("full_as_printed", Self::FullAsPrinted),
-        ("physics_as_printed", Self::PhysicsAsPrinted),
+        ("waves", Self::Baked),
+        ("full_as_printed", Self::FullAsPublished),
+        ("physics_as_printed", Self::PhysicsAsPublished),
     ];
 
     /// The warning about a former name: names the new one. `None` for a name of today.

@@ -262,16 +262,24 @@ fn the_pose_is_the_one_at_the_pictures_mid_exposure() {
     assert!(checked > 50);
 }
 
-#[test]
-fn without_orientation_no_boat_is_drawn_and_no_round_is_scored() {
-    let mut s = session(SCENARIO);
-    let stream = DeviceStream { imu: 0..1000, ..ALL };
+/// Records of a run, and what its last tick with a picture showed and did with the boats.
+fn ended(
+    seconds: f64,
+    stream: &DeviceStream,
+    trigger: &[TriggerEdge],
+) -> (Vec<ShotRecord>, Option<(Status, PassDecision)>) {
     let mut records = Vec::new();
     let mut last = None;
-    play(&mut s, 2.0, &stream, &burst(1500, 1650), |_, status, passes, r| {
+    play(&mut session(SCENARIO), seconds, stream, trigger, |_, status, passes, r| {
         records.extend_from_slice(r);
         last = status.map(|s| (s, passes[Pass::Boats as usize]));
     });
+    (records, last)
+}
+
+#[test]
+fn without_orientation_no_boat_is_drawn_and_no_round_is_scored() {
+    let (records, last) = ended(2.0, &DeviceStream { imu: 0..1000, ..ALL }, &burst(1500, 1650));
     assert_eq!(records.len(), 2);
     for r in &records {
         assert_eq!(r.outcome, Outcome::NotScored { cause: NotScored::ImuStale });
@@ -284,17 +292,10 @@ fn without_orientation_no_boat_is_drawn_and_no_round_is_scored() {
 
 #[test]
 fn without_pictures_no_round_is_scored() {
-    let mut s = session(SCENARIO);
-    let stream = DeviceStream { frames: 0..1000, ..ALL };
-    let mut records = Vec::new();
-    let mut last = None;
-    play(&mut s, 2.5, &stream, &burst(1500, 1550), |_, status, _, r| {
-        records.extend_from_slice(r);
-        last = status;
-    });
+    let (records, last) = ended(2.5, &DeviceStream { frames: 0..1000, ..ALL }, &burst(1500, 1550));
     let causes: Vec<_> = records.iter().map(|r| &r.outcome).collect();
     assert_eq!(causes, [&Outcome::NotScored { cause: NotScored::CameraStale }]);
-    assert!(matches!(last, Some(Status::NotScored { cause: "CAMERA LOST", .. })), "{last:?}");
+    assert!(matches!(last, Some((Status::NotScored { cause: "CAMERA LOST", .. }, _))), "{last:?}");
 }
 
 #[test]

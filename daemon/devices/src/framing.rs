@@ -79,6 +79,22 @@ pub(crate) struct FoundPacket<'a, Head> {
     pub(crate) skipped_bytes: u64,
 }
 
+#[cfg(test)]
+impl<F: Framing> Scanner<F> {
+    /// What `parse` makes of all packets in a stream, and the line's counters after it.
+    pub(crate) fn parsed<P>(
+        mut stream: &[u8],
+        parse: impl Fn(&[u8], F::Head) -> Option<P>,
+    ) -> (Vec<P>, LineCounters) {
+        let mut scanner = Self::new();
+        let mut parsed = Vec::new();
+        while let Some(found) = scanner.next_of(&mut stream) {
+            parsed.extend(parse(found.bytes, found.head));
+        }
+        (parsed, scanner.counters())
+    }
+}
+
 /// A pull decoder: bytes of any pieces in, packets out, one at a time. Memory is bounded.
 #[derive(Debug)]
 pub(crate) struct Scanner<F: Framing> {

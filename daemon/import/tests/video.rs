@@ -16,8 +16,10 @@ use std::{
 };
 
 use bowwave_calibration::Date;
-use bowwave_import::{ImportError, ImportOptions, Progress, START, TelemetryReport, import_video};
-use bowwave_record::{Entry, RecordingReader};
+use bowwave_import::{
+    ImportError, ImportOptions, ImportReport, Progress, START, TelemetryReport, import_video,
+};
+use bowwave_record::{Entry, FrameEntry, RecordingReader};
 
 fn options() -> ImportOptions {
     ImportOptions::new(Date::new(2026, 11, 21).unwrap())
@@ -51,6 +53,18 @@ fn failure(video: &Path, options: &ImportOptions) -> ImportError {
     error
 }
 
+/// Report and pictures of an import.
+fn imported(video: &Path) -> (ImportReport, Vec<FrameEntry>) {
+    let out = video.with_file_name("out.mcap");
+    let report = import_video(video, &out, &options(), &mut go_on).unwrap();
+    let entries = RecordingReader::open(&out).unwrap().entries().unwrap();
+    let frames = entries.map(|entry| match entry.unwrap() {
+        Entry::Frame(frame) => frame,
+        other => panic!("{other:?}"),
+    });
+    (report, frames.collect())
+}
+
 #[test]
 fn pictures_keep_the_times_of_the_container() {
     if !have_ffmpeg() {
@@ -64,19 +78,11 @@ fn pictures_keep_the_times_of_the_container() {
         &["-f", "lavfi", "-i", "testsrc=s=320x180:r=25:d=0.4", "-vf", filter, "-fps_mode", "passthrough"],
         &video,
     );
-    let out = folder.path().join("out.mcap");
-    let report = import_video(&video, &out, &options(), &mut go_on).unwrap();
+    let (report, frames) = imported(&video);
     assert_eq!((report.frames, report.picture), (10, (320, 180)));
     assert_eq!(report.telemetry, TelemetryReport::Absent);
     assert!(report.warnings.is_empty(), "{:?}", report.warnings);
-    let reader = RecordingReader::open(&out).unwrap();
-    let entries = reader.entries().unwrap();
-    let times: Vec<i64> = entries
-        .map(|e| match e.unwrap() {
-            Entry::Frame(frame) => frame.mid_exposure.ns_since(START) / 1_000_000,
-            other => panic!("{other:?}"),
-        })
-        .collect();
+    let times: Vec<_> = frames.iter().map(|f| f.mid_exposure.ns_since(START) / 1_000_000).collect();
     assert_eq!(times, [0, 40, 80, 120, 160, 200, 320, 440, 560, 680]);
 }
 
@@ -92,10 +98,8 @@ fn colours_come_through() {
     let space = ["-colorspace", "bt709", "-color_range", "tv"];
     let source = ["-f", "lavfi", "-i", "color=c=0xC83214:s=320x180:r=25:d=0.2", "-vf", tagged];
     ffmpeg(&[&source[..], &space[..]].concat(), &video);
-    let out = folder.path().join("out.mcap");
-    import_video(&video, &out, &options(), &mut go_on).unwrap();
-    let reader = RecordingReader::open(&out).unwrap();
-    let Some(Ok(Entry::Frame(frame))) = reader.entries().unwrap().next() else { panic!("no picture") };
+    let (_, frames) = imported(&video);
+    let frame = frames.first().expect("a picture");
     let [r, g, b] = image::load_from_memory(&frame.jpeg).unwrap().to_rgb8().get_pixel(160, 90).0;
     assert!(r.abs_diff(0xC8) < 5 && g.abs_diff(0x32) < 5 && b.abs_diff(0x14) < 5, "{r} {g} {b}");
 }

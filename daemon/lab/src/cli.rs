@@ -204,7 +204,7 @@ mod tests {
         assert_eq!(list("none, full,off"), Ok((vec![Off, Full], 0)));
         assert_eq!(list("all"), Ok((ReflectionMethod::ALL.to_vec(), 0)));
         let former = parse_methods("full,waves").unwrap();
-        assert_eq!(former.list, [Full, ReflectionMethod::Waves]);
+        assert_eq!(former.list, [Full, ReflectionMethod::Baked]);
         assert!(
             former.warnings.len() == 1 && former.warnings[0].contains("\"baked\""),
             "{:?}",

@@ -344,11 +344,7 @@ proptest! {
     #[test]
     fn changed_bytes_never_panic(changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12)) {
         let folder = tempfile::tempdir().unwrap();
-        let mut bytes = SMALL.with(Clone::clone);
-        for (index, value) in changes {
-            let at = index.index(bytes.len());
-            bytes[at] = value;
-        }
+        let bytes = changed(SMALL.with(Clone::clone), changes);
         exhaust(&folder.path().join("changed.mcap"), &bytes);
     }
 
@@ -358,13 +354,17 @@ proptest! {
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..12)
     ) {
         let folder = tempfile::tempdir().unwrap();
-        let mut bytes = UNCHECKED.with(Clone::clone);
-        for (index, value) in changes {
-            let at = index.index(bytes.len());
-            bytes[at] = value;
-        }
+        let bytes = changed(UNCHECKED.with(Clone::clone), changes);
         exhaust(&folder.path().join("changed.mcap"), &bytes);
     }
+}
+
+fn changed(mut bytes: Vec<u8>, changes: Vec<(prop::sample::Index, u8)>) -> Vec<u8> {
+    for (index, value) in changes {
+        let at = index.index(bytes.len());
+        bytes[at] = value;
+    }
+    bytes
 }
 
 thread_local! {

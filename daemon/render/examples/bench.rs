@@ -100,18 +100,22 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
     step("boat near", "boat far", "more pixels and triangles of the hull", &with(off, none, 60.0));
     for (name, method, why) in [
         ("mirror", ReflectionMethod::Mirror, "the mesh mirrored, once a pixel of water"),
-        ("full as printed", ReflectionMethod::FullAsPrinted, "ten pixels of video compared at each of water"),
+        (
+            "full as printed",
+            ReflectionMethod::FullAsPublished,
+            "ten pixels of video compared at each of water",
+        ),
         ("full", ReflectionMethod::Full, "video compared a cell at a time, mirror softened"),
-        ("physics as printed", ReflectionMethod::PhysicsAsPrinted, "nine rays a pixel of water"),
+        ("physics as printed", ReflectionMethod::PhysicsAsPublished, "nine rays a pixel of water"),
         ("physics", ReflectionMethod::Physics, "nine rays a pixel, eight waves each"),
-        ("waves", ReflectionMethod::Waves, "bands, sums, a grid, two layers a pixel"),
+        ("waves", ReflectionMethod::Baked, "bands, sums, a grid, two layers a pixel"),
     ] {
         step(name, "boat near", why, &with(method, none, 60.0));
     }
-    let shaded = with(ReflectionMethod::Waves, ShadowLevel::Gradual, 60.0);
+    let shaded = with(ReflectionMethod::Baked, ShadowLevel::Gradual, 60.0);
     step("waves, shadow", "waves", "what the hull keeps off the water before it", &shaded);
     let mut moving = bare.clone();
-    (moving.water.method, moving.water.shadow) = (ReflectionMethod::Waves, ShadowLevel::Gradual);
+    (moving.water.method, moving.water.shadow) = (ReflectionMethod::Baked, ShadowLevel::Gradual);
     testing::add_moving_boat(&mut moving, models, 0, [60.0, -0.05, 0.4], [7.0, 0.0]);
     step("waves, shadow, wake", "waves, shadow", "the ribbon of the wake, foam beside the hull", &moving);
     let mut rounds = moving.clone();
@@ -120,8 +124,8 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
     for (name, over, method, speed_m_s) in [
         ("three still, full", "full", ReflectionMethod::Full, 0.0),
         ("three boats, full", "three still, full", ReflectionMethod::Full, 7.0),
-        ("three still, waves", "waves, shadow", ReflectionMethod::Waves, 0.0),
-        ("three boats, waves", "three still, waves", ReflectionMethod::Waves, 7.0),
+        ("three still, waves", "waves, shadow", ReflectionMethod::Baked, 0.0),
+        ("three boats, waves", "three still, waves", ReflectionMethod::Baked, 7.0),
     ] {
         let mut scene = empty.clone();
         (scene.water.method, scene.water.shadow) = (method, ShadowLevel::Gradual);

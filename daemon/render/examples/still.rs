@@ -24,12 +24,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut args = std::env::args().skip(1);
     let (photo, out) = (args.next().ok_or("which photograph?")?, args.next().ok_or("which output?")?);
     let method = match args.next().as_deref() {
-        Some("printed") => ReflectionMethod::FullAsPrinted,
+        Some("printed") => ReflectionMethod::FullAsPublished,
         Some("mirror") => ReflectionMethod::Mirror,
         Some("off") => ReflectionMethod::Off,
-        Some("waves") => ReflectionMethod::Waves,
+        Some("waves") => ReflectionMethod::Baked,
         Some("physics") => ReflectionMethod::Physics,
-        Some("physics_printed") => ReflectionMethod::PhysicsAsPrinted,
+        Some("physics_printed") => ReflectionMethod::PhysicsAsPublished,
         _ => ReflectionMethod::Full,
     };
     let force = BeaufortForce::new(args.next().map_or(Ok(1), |f| f.parse())?).ok_or("no such wind force")?;
@@ -46,7 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     scene.camera.position = DVec3::new(0.0, 0.0, 5.0);
     scene.water = Water { method, force, shadow: ShadowLevel::Gradual };
     // As the trainer does: light from the picture, to which the lens of the scene belongs.
-    let mut meter = LightMeter::new(scene.light.sun_direction, method == ReflectionMethod::Waves);
+    let mut meter = LightMeter::new(scene.light.sun_direction, method == ReflectionMethod::Baked);
     let lens = scene.lens.covering(image.width(), image.height());
     meter.observe(Time::from_ns(0), &picture, &lens, &scene.camera);
     (scene.light, scene.sky, scene.tones) = (meter.light(), meter.sky(force.wind_mean_m_s()), meter.tones());

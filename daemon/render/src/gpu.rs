@@ -346,6 +346,13 @@ impl Gpu {
         }
     }
 
+    /// Has `destroy` destroy what was made from the device; a device that was given up leaves it as it is.
+    pub(crate) fn destroy(&self, destroy: impl FnOnce(&ash::Device)) {
+        if !self.is_abandoned() {
+            destroy(&self.device);
+        }
+    }
+
     /// Whether the device was given up: then whoever drops what was made from it must leave it as it is.
     pub(crate) fn is_abandoned(&self) -> bool {
         self.abandoned.load(Ordering::Acquire)

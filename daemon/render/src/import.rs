@@ -109,16 +109,13 @@ impl Imported {
 
 impl Drop for Imported {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            // The GPU may still read the pages: they stay mapped until the process ends.
-            return;
-        }
+        // Where the device was given up, the GPU may still read the pages: they stay mapped until the process ends.
         // SAFETY: owners drop imports only once no frame in flight reads them; the hold is dropped once, here, after the
         // memory object that needs the mapping.
-        unsafe {
-            self.gpu.device.destroy_buffer(self.raw, None);
-            self.gpu.device.free_memory(self.memory, None);
+        self.gpu.destroy(|device| unsafe {
+            device.destroy_buffer(self.raw, None);
+            device.free_memory(self.memory, None);
             ManuallyDrop::drop(&mut self.hold);
-        }
+        });
     }
 }

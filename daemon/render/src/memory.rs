@@ -132,14 +132,11 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: owners drop buffers only once the GPU is idle (see `Renderer::drop` and `Shared`).
-        unsafe {
-            self.gpu.device.destroy_buffer(self.raw, None);
+        self.gpu.destroy(|device| unsafe {
+            device.destroy_buffer(self.raw, None);
             self.gpu.free(self.what, self.allocated, self.memory);
-        }
+        });
     }
 }
 
@@ -195,11 +192,8 @@ impl ImageMemory {
 
 impl Drop for ImageMemory {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: the images, which are dropped first, were its only users; freeing ends its mapping.
-        unsafe { self.gpu.free(self.what, self.size, self.raw) };
+        self.gpu.destroy(|_| unsafe { self.gpu.free(self.what, self.size, self.raw) });
     }
 }
 
@@ -304,17 +298,14 @@ impl Image {
 
 impl Drop for Image {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: owners drop images only once the GPU is idle; null views are allowed. Its memory goes after it.
-        unsafe {
+        self.gpu.destroy(|device| unsafe {
             if self.second_view != self.view {
-                self.gpu.device.destroy_image_view(self.second_view, None);
+                device.destroy_image_view(self.second_view, None);
             }
-            self.gpu.device.destroy_image_view(self.view, None);
-            self.gpu.device.destroy_image(self.raw, None);
-        }
+            device.destroy_image_view(self.view, None);
+            device.destroy_image(self.raw, None);
+        });
     }
 }
 

@@ -59,11 +59,8 @@ impl SetLayout {
 
 impl Drop for SetLayout {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: pipelines and sets made from the layout do not need it any more.
-        unsafe { self.gpu.device.destroy_descriptor_set_layout(self.raw, None) };
+        self.gpu.destroy(|device| unsafe { device.destroy_descriptor_set_layout(self.raw, None) });
     }
 }
 
@@ -153,11 +150,8 @@ impl SetPool {
 
 impl Drop for SetPool {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: owners drop pools only once the GPU is idle.
-        unsafe { self.gpu.device.destroy_descriptor_pool(self.raw, None) };
+        self.gpu.destroy(|device| unsafe { device.destroy_descriptor_pool(self.raw, None) });
     }
 }
 
@@ -188,11 +182,8 @@ impl Sampler {
 
 impl Drop for Sampler {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: owners drop samplers only once the GPU is idle.
-        unsafe { self.gpu.device.destroy_sampler(self.raw, None) };
+        self.gpu.destroy(|device| unsafe { device.destroy_sampler(self.raw, None) });
     }
 }
 
@@ -369,14 +360,11 @@ impl Pipeline {
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: owners drop pipelines only once the GPU is idle; a null pipeline is allowed.
-        unsafe {
-            self.gpu.device.destroy_pipeline(self.raw, None);
-            self.gpu.device.destroy_pipeline_layout(self.layout, None);
-        }
+        self.gpu.destroy(|device| unsafe {
+            device.destroy_pipeline(self.raw, None);
+            device.destroy_pipeline_layout(self.layout, None);
+        });
     }
 }
 

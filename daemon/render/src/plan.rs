@@ -312,7 +312,7 @@ impl Plan {
         }
         atlas::place(atlas, &self.wanted, &mut self.places);
         let mirrored = scene.water.method != ReflectionMethod::Off;
-        let waves = scene.water.method == ReflectionMethod::Waves;
+        let waves = scene.water.method == ReflectionMethod::Baked;
         let sea = if waves { sea_block(scene) } else { ReflectBlock::default() };
         for n in 0..self.places.len() {
             let (placed, (i, line), (rect, _)) = (self.places[n], self.lines[n], self.wanted[n]);

@@ -58,7 +58,7 @@ pub struct Needs {
 impl Needs {
     /// Boats whose light waves throw back.
     fn lobes(&self) -> usize {
-        let any = self.waters.iter().any(|(method, _)| *method == ReflectionMethod::Waves);
+        let any = self.waters.iter().any(|(method, _)| *method == ReflectionMethod::Baked);
         if any { self.boats_max.min(WATERS_MAX) } else { 0 }
     }
 }
@@ -364,7 +364,7 @@ impl<T> Renderer<T> {
         self.passes.video.divide(overlaid, &mut plan.overlaid, &mut plan.bare);
         plan.backdrop_regions.clear();
         if WaterPass::reads_video(scene.water.method) {
-            let compares = scene.water.method != ReflectionMethod::Waves;
+            let compares = scene.water.method != ReflectionMethod::Baked;
             let below = |r| if compares { with_gradients(r, size) } else { r };
             let below = plan.waters.iter().map(|w| below(w.rect));
             plan.backdrop_regions.extend(below.map(same_place));
@@ -565,11 +565,8 @@ impl Slot {
 
 impl Drop for Slot {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: the renderer waits for the GPU before it lets go of its slots.
-        unsafe { self.gpu.device.destroy_command_pool(self.pool, None) };
+        self.gpu.destroy(|device| unsafe { device.destroy_command_pool(self.pool, None) });
     }
 }
 

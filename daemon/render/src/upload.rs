@@ -24,14 +24,11 @@ struct Once {
 
 impl Drop for Once {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: `run_once` waits for the fence before it returns, or gives the device up; null handles are allowed.
-        unsafe {
-            self.gpu.device.destroy_command_pool(self.pool, None);
-            self.gpu.device.destroy_fence(self.fence, None);
-        }
+        self.gpu.destroy(|device| unsafe {
+            device.destroy_command_pool(self.pool, None);
+            device.destroy_fence(self.fence, None);
+        });
     }
 }
 

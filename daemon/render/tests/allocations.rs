@@ -53,7 +53,7 @@ static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn frames_allocate_nothing_after_the_first() {
-    for method in [ReflectionMethod::Full, ReflectionMethod::Physics, ReflectionMethod::Waves] {
+    for method in [ReflectionMethod::Full, ReflectionMethod::Physics, ReflectionMethod::Baked] {
         check(method);
     }
 }

@@ -78,7 +78,7 @@ fn odd_boats_are_drawn_or_left_out_and_never_break_a_frame() {
         ),
     ];
     let (models, picture) = (models(), sea(SIZE.0, SIZE.1));
-    for method in [ReflectionMethod::Full, ReflectionMethod::FullAsPrinted, ReflectionMethod::Mirror] {
+    for method in [ReflectionMethod::Full, ReflectionMethod::FullAsPublished, ReflectionMethod::Mirror] {
         let mut first = with_boats(vec![cases[0].1.clone()]);
         first.water.method = method;
         let (mut renderer, mut completions) = open(&config(&first), &models);
@@ -147,7 +147,7 @@ fn flat_grey_sea_takes_no_shift_when_mended_and_no_harm_as_printed() {
     mended.water.shadow = ShadowLevel::None;
     add_boat(&mut mended, &models, 0, 45.0, -0.1, 0.5);
     let mut printed = mended.clone();
-    printed.water.method = ReflectionMethod::FullAsPrinted;
+    printed.water.method = ReflectionMethod::FullAsPublished;
     let (a, b) = (draw(&mended, &picture, &models), draw(&mended, &picture, &models));
     assert_eq!(a, b, "the same frame twice");
     // Mended: there is a reflection below the hull, and it is the unshifted one: as wide as the hull.

@@ -183,16 +183,9 @@ fn calibration_pages_on_a_seven_inch_display() {
 
 #[test]
 fn every_way_to_mirror() {
-    for (name, method) in [
-        ("off", ReflectionMethod::Off),
-        ("mirror", ReflectionMethod::Mirror),
-        ("printed", ReflectionMethod::FullAsPrinted),
-        ("full", ReflectionMethod::Full),
-        ("physics_printed", ReflectionMethod::PhysicsAsPrinted),
-        ("physics", ReflectionMethod::Physics),
-        ("waves", ReflectionMethod::Waves),
-    ] {
-        check(&format!("water_{name}"), &boats(method, ShadowLevel::Gradual, 1), &models());
+    for method in ReflectionMethod::ALL {
+        let name = format!("water_{}", method.name());
+        check(&name, &boats(method, ShadowLevel::Gradual, 1), &models());
     }
 }
 
@@ -204,8 +197,8 @@ fn sea_states_and_shadows() {
     }
     check("full_strong_shadow", &boats(ReflectionMethod::Full, ShadowLevel::Strong, 1), &models());
     check(
-        "printed_strong_shadow",
-        &boats(ReflectionMethod::FullAsPrinted, ShadowLevel::Strong, 1),
+        "full_as_published_strong_shadow",
+        &boats(ReflectionMethod::FullAsPublished, ShadowLevel::Strong, 1),
         &models(),
     );
 }
@@ -213,7 +206,7 @@ fn sea_states_and_shadows() {
 #[test]
 fn wakes_of_a_straight_and_of_a_turning_boat() {
     let mut scene = empty_scene(SIZE.0, SIZE.1);
-    scene.water.method = ReflectionMethod::Waves;
+    scene.water.method = ReflectionMethod::Baked;
     add_moving_boat(&mut scene, &models(), 0, [45.0, -0.12, 2.9], [5.0, 0.0]);
     add_moving_boat(&mut scene, &models(), 1, [32.0, 0.12, 1.2], [7.0, 0.3]);
     check("wakes", &scene, &models());

@@ -137,7 +137,7 @@ fn the_gpu_draws_what_the_processor_draws() {
         let video = sea(SIZE.0, SIZE.1);
         let off = scene(ReflectionMethod::Off, wind, roll);
         let without = draw(&off, &video, &models);
-        let with = draw(&scene(ReflectionMethod::Waves, wind, roll), &video, &models);
+        let with = draw(&scene(ReflectionMethod::Baked, wind, roll), &video, &models);
         let (wanted, hidden) = composed(&without, &off);
         let (mut count, mut error, mut bias, mut change, mut worst, mut missed) = (0, 0.0, 0.0, 0.0, 0, 0);
         for n in (0..wanted.len()).filter(|n| !hidden[*n]) {
@@ -177,7 +177,7 @@ fn singular_places_draw() {
     for (range, bearing, eye, wind) in
         [(5000.0, 0.0, 4.0, 3.0), (40.0, 0.45, 8.0, 3.0), (14.0, 0.0, 1.0, 0.0), (60.0, 0.0, 15.0, 14.0)]
     {
-        let mut scene = scene(ReflectionMethod::Waves, DVec2::new(0.0, wind), 0.0);
+        let mut scene = scene(ReflectionMethod::Baked, DVec2::new(0.0, wind), 0.0);
         scene.boats.clear();
         scene.camera.position.z = eye;
         add_boat(&mut scene, &models, 0, range, bearing, 0.7);

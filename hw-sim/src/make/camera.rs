@@ -27,8 +27,6 @@ const LIGHT_MAX: f32 = 1.6;
 const NOISE: usize = 1024;
 /// Steps of the noise's deviation over 0 to [`LIGHT_MAX`].
 const DEVIATIONS: usize = 128;
-/// Half the sun's diameter, radians.
-const SUN_RADIUS: f32 = 0.004_65;
 
 /// Everything to see but the waves.
 pub(super) struct SeaScene {
@@ -196,6 +194,8 @@ impl RecipeCamera {
 /// Light that falls on the sensor along a ray of the camera, turned into the level view.
 #[inline(always)]
 fn light(scene: &SeaScene, turn: Mat3, ray: [f32; 3], view: &LevelView, sea: &SeaPicture, sun: Vec3) -> Vec4 {
+    /// Half the sun's diameter, radians.
+    const SUN_RADIUS: f32 = 0.004_65;
     let d = turn * Vec3::new(ray[0], ray[1], 1.0);
     let inverse = 1.0 / d.z;
     let (nx, ny) = (d.x * inverse, d.y * inverse);

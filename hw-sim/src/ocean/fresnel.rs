@@ -25,13 +25,13 @@ pub fn reflectance(cos: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ocean::table;
 
     #[test]
     fn agrees_with_the_reference_table() {
-        let table = include_str!("../../data/fresnel_seawater.csv");
+        let text = include_str!("../../data/fresnel_seawater.csv");
         let mut rows = 0;
-        for line in table.lines().skip(2) {
-            let columns: Vec<f64> = line.split(',').map(|c| c.trim().parse().unwrap()).collect();
+        for columns in table::rows(text) {
             let got = f64::from(reflectance(columns[0].to_radians().cos() as f32));
             assert!((got - columns[3]).abs() < 3e-6, "{} deg: {got} is not {}", columns[0], columns[3]);
             rows += 1;

@@ -12,6 +12,9 @@
 //! * Light. [`fresnel`]: reflectance. [`sky`]: clear or overcast, in physical units; [`cloudy`]: a clear sky with clouds that stand
 //!   still. [`micro`]: slopes below the resolved waves; [`mesh`]: a boat's triangles; [`trace`]: paths of light between them.
 
+#[cfg(test)]
+pub(crate) mod table;
+
 pub mod cloudy;
 pub mod fresnel;
 pub mod lattice;

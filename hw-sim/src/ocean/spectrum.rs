@@ -376,13 +376,13 @@ fn integrate_log(from: f64, to: f64, steps: u32, f: impl Fn(f64) -> f64) -> f64 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ocean::table;
 
     #[test]
     fn slopes_are_those_of_cox_and_munk() {
-        let table = include_str!("../../data/cox_munk.csv");
+        let text = include_str!("../../data/cox_munk.csv");
         let mut rows = 0;
-        for line in table.lines().skip(2) {
-            let c: Vec<f64> = line.split(',').map(|c| c.trim().parse().unwrap()).collect();
+        for c in table::rows(text) {
             if c[0] < 1.0 {
                 continue; // no wind, no spectrum
             }

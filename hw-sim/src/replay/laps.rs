@@ -1,8 +1,7 @@
 //! The entries of a recording, round after round, on the replay's clock.
 
 use std::{
-    cmp::Reverse,
-    collections::BinaryHeap,
+    collections::BTreeMap,
     path::Path,
     sync::{Arc, Mutex, PoisonError},
 };
@@ -66,8 +65,8 @@ pub(super) struct Laps {
     sequences: Option<(u32, u32)>,
     /// Next entry of the file.
     next: Option<Entry>,
-    /// Entries beyond the end of their round, to be merged with the round after.
-    tail: BinaryHeap<Reverse<Late>>,
+    /// Entries beyond the end of their round, by time and order, to be merged with the round after.
+    tail: BTreeMap<(Time, u64), Entry>,
     tail_count: u64,
     /// The file has nothing more to give.
     ended: bool,
@@ -90,7 +89,7 @@ impl Laps {
             device_shift_ns: 0,
             sequences: None,
             next: None,
-            tail: BinaryHeap::new(),
+            tail: BTreeMap::new(),
             tail_count: 0,
             ended: false,
             error: None,
@@ -124,7 +123,7 @@ impl Laps {
                 Some(Ok(entry)) => {
                     let entry = self.placed(entry);
                     if self.round_end().is_some_and(|end| entry.time() >= end) {
-                        self.tail.push(Reverse(Late { key: (entry.time(), self.tail_count), entry }));
+                        self.tail.insert((entry.time(), self.tail_count), entry);
                         self.tail_count += 1;
                     } else {
                         self.next = Some(entry);
@@ -178,10 +177,11 @@ impl Laps {
                 sample.arrival = sample.arrival.plus_ns(shift);
                 sample.device_time_ns = sample.device_time_ns.saturating_add(self.device_shift_ns);
             }
-            Entry::Frame(frame) => {
-                frame.arrival = frame.arrival.plus_ns(shift);
-                frame.mid_exposure = frame.mid_exposure.plus_ns(shift);
-                frame.sequence = frame.sequence.wrapping_add(self.later_sequence());
+            Entry::Frame(FrameEntry { arrival, mid_exposure, sequence, .. })
+            | Entry::Picture(PictureEntry { arrival, mid_exposure, sequence, .. }) => {
+                *arrival = arrival.plus_ns(shift);
+                *mid_exposure = mid_exposure.plus_ns(shift);
+                *sequence = sequence.wrapping_add(self.later_sequence());
             }
             Entry::Trigger(edge) => edge.time = edge.time.plus_ns(shift),
             Entry::Ship(line) => line.arrival = line.arrival.plus_ns(shift),
@@ -193,11 +193,6 @@ impl Laps {
                 }
             }
             Entry::Pose(pose) => pose.time = pose.time.plus_ns(shift),
-            Entry::Picture(picture) => {
-                picture.arrival = picture.arrival.plus_ns(shift);
-                picture.mid_exposure = picture.mid_exposure.plus_ns(shift);
-                picture.sequence = picture.sequence.wrapping_add(self.later_sequence());
-            }
             // Belong to the run that was recorded.
             Entry::ShipValues(sample) => sample.arrival = sample.arrival.plus_ns(shift),
             Entry::Fault(fault) => fault.logged = fault.logged.plus_ns(shift),
@@ -230,12 +225,11 @@ impl Iterator for Laps {
 
     fn next(&mut self) -> Option<Self::Item> {
         self.fill();
-        let tail_first = match (self.tail.peek(), &self.next) {
-            (Some(Reverse(late)), Some(next)) => late.key.0 <= next.time(),
+        let tail_first = match (self.tail.first_key_value(), &self.next) {
+            (Some(((late, _), _)), Some(next)) => *late <= next.time(),
             (tail, _) => tail.is_some(),
         };
-        let entry =
-            if tail_first { self.tail.pop().map(|Reverse(late)| late.entry) } else { self.next.take() };
+        let entry = if tail_first { self.tail.pop_first().map(|(_, late)| late) } else { self.next.take() };
         match entry {
             Some(entry) if self.timeline.end.is_some_and(|end| entry.time() >= end) => {
                 self.ended = true;
@@ -247,30 +241,5 @@ impl Iterator for Laps {
             Some(entry) => Some(Ok(entry)),
             None => self.error.take().map(Err),
         }
-    }
-}
-
-struct Late {
-    key: (Time, u64),
-    entry: Entry,
-}
-
-impl PartialEq for Late {
-    fn eq(&self, other: &Self) -> bool {
-        self.key == other.key
-    }
-}
-
-impl Eq for Late {}
-
-impl PartialOrd for Late {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Late {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.key.cmp(&other.key)
     }
 }

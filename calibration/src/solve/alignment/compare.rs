@@ -1,6 +1,6 @@
 //! Whether what was found before still fits a recording, also one that does not tell everything.
 
-use bowwave_core::time::Time;
+use bowwave_core::{calibration::Calibration, time::Time};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::{Matrix3, Matrix4, Vector4};
 
@@ -31,6 +31,19 @@ pub struct Known {
     pub offset_sigma_s: f64,
     /// Gyro bias, unit's axes, rad/s.
     pub gyro_bias: DVec3,
+}
+
+impl Known {
+    /// What a calibration says.
+    pub fn of(calibration: &Calibration) -> Self {
+        Self {
+            camera_from_imu: calibration.camera_from_imu,
+            rotation_sigma: calibration.camera_from_imu_sigma,
+            offset_s: calibration.time_offset_ns as f64 * 1e-9,
+            offset_sigma_s: calibration.time_offset_sigma_ns as f64 * 1e-9,
+            gyro_bias: calibration.gyro_bias,
+        }
+    }
 }
 
 /// Comparison of a recording with a former calibration. Differences are recording minus former.

@@ -157,12 +157,6 @@ impl LensCalibration {
 /// Fewest corners of a picture, and pictures.
 pub(crate) const CORNERS_LEAST: usize = 8;
 const VIEWS_LEAST: usize = 4;
-/// How often views that do not fit are left out and the rest is fitted anew.
-const REFITS: usize = 2;
-/// Least tilt that some picture must have, radians.
-const TILT_LEAST: f64 = 0.17;
-/// Most relative uncertainty of the focal length.
-const FOCAL_MOST: f64 = 0.05;
 /// Most residual, as a share of the picture's width.
 const LEFT_MOST: f64 = 0.005;
 
@@ -171,6 +165,12 @@ const LEFT_MOST: f64 = 0.005;
 /// # Errors
 /// Where there are too few pictures, none is tilted, the focal length is not told, or nothing fits.
 pub fn solve(views: &[BoardView], (width, height): (u32, u32)) -> Result<LensCalibration, LensError> {
+    /// How often views that do not fit are left out and the rest is fitted anew.
+    const REFITS: usize = 2;
+    /// Least tilt that some picture must have, radians.
+    const TILT_LEAST: f64 = 0.17;
+    /// Most relative uncertainty of the focal length.
+    const FOCAL_MOST: f64 = 0.05;
     let size = DVec2::new(f64::from(width), f64::from(height)).max(DVec2::ONE);
     let (mut numbers, mut views) = clean(views, size);
     let few = |count| LensError::TooFew { count, least: VIEWS_LEAST, corners: CORNERS_LEAST };

@@ -12,12 +12,6 @@ use crate::{
     time::Time,
 };
 
-/// A horizon is sought so often: it corrects what drifts in seconds.
-const EVERY_NS: i64 = 100_000_000;
-
-/// Chi squared with two degrees of freedom that a horizon exceeds once in a thousand: beyond it is a shore, a cloud or a ship's side.
-const NIS_GATE: f64 = 13.8;
-
 /// Counts of the horizons of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct HorizonCounts {
@@ -56,6 +50,10 @@ impl HorizonAiding {
 
     /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all.
     pub(super) fn look(&mut self, time: Time, picture: &Picture, lens: &Lens, attitude: &mut Attitude) {
+        /// A horizon is sought so often: it corrects what drifts in seconds.
+        const EVERY_NS: i64 = 100_000_000;
+        /// Chi squared with two degrees of freedom that a horizon exceeds once in a thousand: beyond it is a shore, a cloud or a ship's side.
+        const NIS_GATE: f64 = 13.8;
         if time < self.next {
             return;
         }

@@ -5,22 +5,6 @@ use std::fmt;
 
 use crate::{event::ImuSample, time::Time};
 
-/// What repeats or stands still for this long does so for good: the noise of any sensor changes its last digits within a few
-/// samples, and the sailor is to be told within 300 ms.
-const SURE_NS: i64 = 250_000_000;
-/// Fewer samples than this say nothing, however long they take: two that are alike on both sides of a gap are no evidence.
-const SAMPLES_MIN: u32 = 5;
-/// No good sample for this long while bad ones come.
-const BAD_NS: i64 = 150_000_000;
-/// Angular rate beyond which a sample is impossible, rad/s (4000 deg/s: twice what gun-mount units measure).
-const RATE_MAX: f64 = 70.0;
-/// Rates beyond this may be a sensor's end stop (the smallest usual range is 250 deg/s), rad/s.
-const RAIL_RATE: f64 = 4.0;
-/// Specific forces beyond this may be a sensor's end stop (the smallest usual range is 2 g), m/s^2.
-const RAIL_ACCEL: f64 = 19.0;
-/// How still a sensor at its end stop is, although the unit compensates bias and temperature, relative.
-const RAIL_STILL: f64 = 1e-3;
-
 /// Reasons why samples cannot be true.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Implausible {
@@ -79,6 +63,11 @@ impl Standstill {
     }
 
     fn sure(&self, now: Time) -> bool {
+        /// What repeats or stands still for this long does so for good: the noise of any sensor changes its last digits within a few
+        /// samples, and the sailor is to be told within 300 ms.
+        const SURE_NS: i64 = 250_000_000;
+        /// Fewer samples than this say nothing, however long they take: two that are alike on both sides of a gap are no evidence.
+        const SAMPLES_MIN: u32 = 5;
         self.samples >= SAMPLES_MIN && now.ns_since(self.since) >= SURE_NS
     }
 }
@@ -100,6 +89,8 @@ pub struct Plausibility {
 
 /// Whether the numbers of a sample are ones that a unit can measure.
 pub fn is_possible(sample: &ImuSample) -> bool {
+    /// Angular rate beyond which a sample is impossible, rad/s (4000 deg/s: twice what gun-mount units measure).
+    const RATE_MAX: f64 = 70.0;
     sample.is_finite() && sample.rate.abs().max_element() <= RATE_MAX
 }
 
@@ -113,6 +104,8 @@ fn axes(sample: &ImuSample) -> [f64; 6] {
 impl Plausibility {
     /// A sample whose numbers are finite.
     pub fn sample(&mut self, sample: &ImuSample) {
+        /// How still a sensor at its end stop is, although the unit compensates bias and temperature, relative.
+        const RAIL_STILL: f64 = 1e-3;
         self.bad_since = None;
         let now = sample.arrival;
         let values = axes(sample);
@@ -153,6 +146,12 @@ impl Plausibility {
 
     /// What is wrong, by what came until `now`.
     pub fn verdict(&self, now: Time) -> Option<Implausible> {
+        /// No good sample for this long while bad ones come.
+        const BAD_NS: i64 = 150_000_000;
+        /// Rates beyond this may be a sensor's end stop (the smallest usual range is 250 deg/s), rad/s.
+        const RAIL_RATE: f64 = 4.0;
+        /// Specific forces beyond this may be a sensor's end stop (the smallest usual range is 2 g), m/s^2.
+        const RAIL_ACCEL: f64 = 19.0;
         if let Some((since, why)) = self.bad_since
             && now.ns_since(since) >= BAD_NS
         {

@@ -13,11 +13,6 @@ use crate::{
     time::Time,
 };
 
-/// The wind that reflections are drawn with follows the measured one with this time constant, seconds.
-const WIND_FOLLOWS_S: f64 = 5.0;
-/// The force goes over to the next where the wind is this share beyond the border.
-const FORCE_BEYOND: f64 = 0.08;
-
 /// State of the sea in the video.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeaReport {
@@ -95,6 +90,10 @@ impl SeaStateTracker {
 
     /// Lets the wind follow the sea.
     fn blow(&mut self, time: Time) {
+        /// The wind that reflections are drawn with follows the measured one with this time constant, seconds.
+        const WIND_FOLLOWS_S: f64 = 5.0;
+        /// The force goes over to the next where the wind is this share beyond the border.
+        const FORCE_BEYOND: f64 = 0.08;
         let SeaInUse { conditions, source, .. } = self.follower.in_use();
         let since = self.windy_since.replace(time).unwrap_or(time);
         if source == SeaSource::Assumed {

@@ -11,25 +11,9 @@ use crate::{
     time::Time,
 };
 
-/// The sky is looked at so often: at 60 deg/s nine tenths of it are still in view.
-const EVERY_NS: i64 = 100_000_000;
-
 /// What is anchored in may turn by so much itself, as clouds do and as a ship with little way on sees it, rad/s. Ten knots abeam of what is
 /// 10 km off are six times as much. Where a gyro's bias is known better than this, the sky holds the heading little better than the gyro.
 pub const SKY_DRIFT: f64 = 0.005 * std::f64::consts::PI / 180.0;
-
-/// By how much the change of the believed orientation since the last look is wrong at rest, about any axis, radians.
-const CHANGE_SIGMA: f64 = 2e-3;
-
-/// Looks are held against the same patches of the anchor, so that what one errs by the next ones err by, too, seconds: all of them in that
-/// time count as one.
-const LASTING_NS: i64 = 1_000_000_000;
-
-/// How fast the gun turns is told over so long.
-const TURN_NS: i64 = 20_000_000;
-
-/// What the sky shows of its own drift is told where it is so much better known than before: each time costs an update of the filter.
-const TOLD_ANEW: f64 = 0.9;
 
 /// Chi squared with one degree of freedom that a heading exceeds once in a thousand.
 const NIS_GATE: f64 = 10.8;
@@ -93,6 +77,15 @@ impl VisualCompass {
 
     /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all.
     pub(super) fn look(&mut self, time: Time, picture: &Picture, lens: &Lens, attitude: &mut Attitude) {
+        /// The sky is looked at so often: at 60 deg/s nine tenths of it are still in view.
+        const EVERY_NS: i64 = 100_000_000;
+        /// By how much the change of the believed orientation since the last look is wrong at rest, about any axis, radians.
+        const CHANGE_SIGMA: f64 = 2e-3;
+        /// Looks are held against the same patches of the anchor, so that what one errs by the next ones err by, too, seconds: all of them in that
+        /// time count as one.
+        const LASTING_NS: i64 = 1_000_000_000;
+        /// How fast the gun turns is told over so long.
+        const TURN_NS: i64 = 20_000_000;
         if time < self.next {
             return;
         }
@@ -140,6 +133,8 @@ impl VisualCompass {
 
     /// Tells the filter what the sky has shown of its own drift beyond what was told before.
     fn tell_drift(&mut self, sigma: f64, attitude: &mut Attitude) {
+        /// What the sky shows of its own drift is told where it is so much better known than before: each time costs an update of the filter.
+        const TOLD_ANEW: f64 = 0.9;
         let more = sigma.powi(-2) - self.told.powi(-2);
         if sigma < TOLD_ANEW * self.told && attitude.update_anchor_still(1.0 / more) {
             self.told = sigma;

@@ -24,10 +24,6 @@ pub const WEDGE_TANGENT: f64 = 0.353_553_390_593_273_8;
 /// Froude numbers (speed by the root of g times length) between which foam begins and is whole: short of 0.12 even full bows do not break
 /// their waves, from 0.45 on the stern is left dry and all of it breaks (Larsson & Raven 2010, Ship Resistance and Flow, ch. 5).
 pub const FOAM_FROUDE: (f64, f64) = (0.12, 0.45);
-/// Share of the ring about a turning boat's centre that its track takes before it would meet itself.
-const INSIDE_TURN: f64 = 0.85;
-/// The track begins so far ahead of the bow, in lengths.
-const AHEAD: f64 = 0.08;
 
 /// A place of the track.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,6 +63,8 @@ impl Wake {
         course: impl Fn(f64) -> CourseState,
         water: impl Fn(DVec2) -> f64,
     ) -> Option<Self> {
+        /// The track begins so far ahead of the bow, in lengths.
+        const AHEAD: f64 = 0.08;
         let state = |age: f64| {
             let before = (age - time_s).max(0.0);
             let state = course((time_s - age).max(0.0));
@@ -101,6 +99,8 @@ impl Wake {
     }
 
     fn push(&mut self, at: &CourseState, along_m: f64, age_s: f64, water: impl Fn(DVec2) -> f64) {
+        /// Share of the ring about a turning boat's centre that its track takes before it would meet itself.
+        const INSIDE_TURN: f64 = 0.85;
         let curvature = (at.turn_rate / at.speed_m_s.max(SPEED_MIN_M_S)).abs();
         if let Some(point) = self.points.get_mut(self.count) {
             *point = TrackPoint {

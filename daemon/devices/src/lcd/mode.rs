@@ -5,11 +5,6 @@ use std::fmt;
 use bowwave_core::time::NS_PER_S;
 use drm::control::{self, ModeFlags, ModeTypeFlags};
 
-/// Refresh rate that suits a trainer of 30 pictures a second: each picture stays for two vblanks.
-const USUAL_HZ: f64 = 60.0;
-/// A mode whose rate is this near to the wanted one is what was asked for: 59.94 is sold as 60.
-const SAME_HZ: f64 = 0.5;
-
 /// Size and timing of a display mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LcdMode {
@@ -97,6 +92,8 @@ impl ModeWish {
     /// The place of the best of `modes` for this wish: the wanted size where the display has it, otherwise its own; then
     /// progressive before interlaced, then the nearest rate. `None` only where there is no mode at all.
     pub(super) fn choose(&self, modes: &[LcdMode]) -> Option<usize> {
+        /// Refresh rate that suits a trainer of 30 pictures a second: each picture stays for two vblanks.
+        const USUAL_HZ: f64 = 60.0;
         let own = modes
             .iter()
             .find(|m| m.preferred)
@@ -123,6 +120,8 @@ impl ModeWish {
 
     /// In what `mode` differs from the wish, for the status; `None` where it is what was asked for.
     pub(super) fn shortfall(&self, mode: &LcdMode) -> Option<String> {
+        /// A mode whose rate is this near to the wanted one is what was asked for: 59.94 is sold as 60.
+        const SAME_HZ: f64 = 0.5;
         let size = self.size.is_some_and(|size| size != (mode.width, mode.height));
         let rate = self.refresh_hz.is_some_and(|hz| (hz - mode.refresh_hz()).abs() > SAME_HZ);
         let wanted = match (self.size, self.refresh_hz) {

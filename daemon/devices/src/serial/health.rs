@@ -11,14 +11,6 @@ use super::{Baud, feed::LineKind};
 const GARBLED_NS: i64 = 500_000_000;
 /// ...or for this long, where the port sees broken bytes.
 const GARBLED_FRAMING_NS: i64 = 150_000_000;
-/// A single byte of noise is no rate.
-const GARBLED_BYTES_MIN: u64 = 32;
-/// Broken bytes that are a sign of another rate, at least an eighth of all.
-const FRAMING_SHARE: u64 = 8;
-/// Packets that prove a rate.
-const PROOF: u64 = 2;
-/// A port that says it can be read and gives nothing for this long is opened anew.
-const SPURIOUS_NS: i64 = 150_000_000;
 
 /// Next step of the reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -152,6 +144,8 @@ impl LineHealth {
 
     /// `bytes` came; `packets` were completed by them.
     pub(super) fn received(&mut self, now: Time, bytes: usize, packets: u64) {
+        /// Packets that prove a rate.
+        const PROOF: u64 = 2;
         let Some(open) = &mut self.open else { return };
         open.last_bytes = Some(now);
         open.spurious = None;
@@ -191,6 +185,8 @@ impl LineHealth {
 
     /// To be called often. `roam`: another port may be the right one, as long as no unit answered on this one.
     pub(super) fn tick(&mut self, now: Time, roam: bool) -> LineAction {
+        /// A port that says it can be read and gives nothing for this long is opened anew.
+        const SPURIOUS_NS: i64 = 150_000_000;
         let Some(open) = self.open else { return LineAction::Keep };
         if open.spurious.is_some_and(|since| now.ns_since(since) >= SPURIOUS_NS) {
             if !std::mem::replace(&mut self.blocked, true) {
@@ -230,6 +226,10 @@ impl LineHealth {
     }
 
     fn watch(&mut self, now: Time, open: &OpenRate, silent_ns: i64) -> LineAction {
+        /// A single byte of noise is no rate.
+        const GARBLED_BYTES_MIN: u64 = 32;
+        /// Broken bytes that are a sign of another rate, at least an eighth of all.
+        const FRAMING_SHARE: u64 = 8;
         if silent_ns >= self.kind.silent_ns {
             if let Some(open) = &mut self.open {
                 (open.garbage, open.garbage_bytes) = (None, 0);

@@ -106,19 +106,15 @@ impl LineFeed for ImuFeed {
         }
         self.implausible = verdict.is_some();
         let late = self.arrivals.look(now);
-        if late && !self.late {
-            let timing = self.arrivals.timing();
-            let cause = format!(
+        let timing = self.arrivals.timing();
+        reporter.follow(now, Fault::ImuLatency, &mut self.late, late, || {
+            format!(
                 "packets of {:.1} ms come up to {:.1} ms apart (99 %) on {}: set the adapter's latency timer to 1 ms",
                 timing.period_ms,
                 timing.gap_p99_ms,
                 path.display()
-            );
-            reporter.send(FaultChange::raised(now, Fault::ImuLatency, cause));
-        } else if self.late && !late {
-            reporter.send(FaultChange::cleared(now, Fault::ImuLatency));
-        }
-        self.late = late;
+            )
+        });
     }
 
     fn report(&self) -> ImuReport {

@@ -7,7 +7,7 @@ use std::{
 
 use bowwave_core::{
     event::{Event, ShipSample},
-    fault::{Fault, FaultChange},
+    fault::Fault,
     time::Time,
 };
 use crossbeam_channel::Receiver;
@@ -185,17 +185,13 @@ impl LineFeed for ShipFeed {
 
     fn judge(&mut self, path: &Path, now: Time, reporter: &Reporter) {
         let invalid = self.without.is_some_and(|since| now.ns_since(since) >= INVALID_NS);
-        if invalid && !self.invalid {
-            let cause = format!(
+        reporter.follow(now, Fault::ShipInvalid, &mut self.invalid, invalid, || {
+            format!(
                 "lines come on {} and none tells a valid heading (HDT, PASHR or PSXN,23): is the compass settled, and is one of these \
                  switched on?",
                 path.display()
-            );
-            reporter.send(FaultChange::raised(now, Fault::ShipInvalid, cause));
-        } else if self.invalid && !invalid {
-            reporter.send(FaultChange::cleared(now, Fault::ShipInvalid));
-        }
-        self.invalid = invalid;
+            )
+        });
     }
 
     fn report(&self) -> ShipReport {

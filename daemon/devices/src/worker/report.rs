@@ -79,6 +79,23 @@ impl Reporter {
         self.send(FaultChange::cleared(clock::now(), fault));
     }
 
+    /// `fault` is there where `is` says so, with `cause`; tells changes only, from what was told `before`.
+    pub fn follow(
+        &self,
+        now: Time,
+        fault: Fault,
+        before: &mut bool,
+        is: bool,
+        cause: impl FnOnce() -> String,
+    ) {
+        match (*before, is) {
+            (false, true) => self.send(FaultChange::raised(now, fault, cause())),
+            (true, false) => self.send(FaultChange::cleared(now, fault)),
+            _ => {}
+        }
+        *before = is;
+    }
+
     /// `fault` happened and is over.
     pub fn noted(&self, fault: Fault, cause: impl Into<String>) {
         self.send(FaultChange::noted(clock::now(), fault, cause));

@@ -17,9 +17,6 @@ use crate::{
     still::{self, Still},
 };
 
-/// Most pictures of a folder.
-const PICTURES_MAX: usize = 10_000;
-
 /// Composes what the arguments name.
 pub fn run(arguments: &ComposeArgs) -> Result<Outcome> {
     if arguments.example {
@@ -29,15 +26,7 @@ pub fn run(arguments: &ComposeArgs) -> Result<Outcome> {
     let Some(path) = &arguments.scene else {
         bail!("no scene named; `bowwave compose --example > scene.toml` makes one to begin with");
     };
-    let text =
-        std::fs::File::open(path).and_then(bowwave_core::text::toml::bounded_text).with_context(|| {
-            format!(
-                "cannot read the scene {}; `bowwave compose --example > scene.toml` makes one to begin with",
-                path.display()
-            )
-        })?;
-    let still = Still::parse(&text, &path.display().to_string())?;
-    warn_of_former_names(&still.warnings);
+    let still = Still::read(path, "`bowwave compose --example > scene.toml` makes one to begin with")?;
     let base = path.parent().unwrap_or(Path::new(""));
     let models = BoatModels::load(still.boats.iter().map(|b| (b.name.as_str(), b.model.as_str())), base)?;
     let pictures = pictures(&base.join(&still.picture))?;
@@ -105,6 +94,8 @@ fn compose_one(
 
 /// The picture, or the pictures of the folder in the order of their names.
 pub(crate) fn pictures(path: &Path) -> Result<Vec<PathBuf>> {
+    /// Most pictures of a folder.
+    const PICTURES_MAX: usize = 10_000;
     if !path.is_dir() {
         if !path.exists() {
             bail!(

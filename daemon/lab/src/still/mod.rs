@@ -5,6 +5,10 @@
 mod camera;
 mod read;
 
+use std::{fs::File, path::Path};
+
+use anyhow::{Context, Result};
+use bowwave::loading::warn_of_former_names;
 use glam::{DVec2, DVec3};
 
 use bowwave_core::{
@@ -18,7 +22,7 @@ use bowwave_core::{
     },
     geometry::{CameraPose, Lens, ahead},
     model::{Model, ModelId},
-    text::toml::{TomlError, TomlPlace},
+    text::toml::{TomlError, TomlPlace, bounded_text},
     time::Time,
     water::{ReflectionMethod, Water},
     world::{
@@ -121,6 +125,16 @@ impl Still {
         read::still(text, origin)
     }
 
+    /// Reads and checks a file; tells of former names in it. `advice` says where an example of such a file is.
+    pub fn read(path: &Path, advice: &str) -> Result<Self> {
+        let text = File::open(path)
+            .and_then(bounded_text)
+            .with_context(|| format!("cannot read the scene {}; {advice}", path.display()))?;
+        let still = Self::parse(&text, &path.display().to_string())?;
+        warn_of_former_names(&still.warnings);
+        Ok(still)
+    }
+
     /// The scene over picture number `index` (0 for a single one). `boat_models` says for each boat which of `models` it is.
     /// `focal_px` is the picture's own focal length in pixels, where it tells one; the text's goes first.
     ///
@@ -165,7 +179,7 @@ impl Still {
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
         let mut passes = plan.frame(true, &boats, &[]);
         passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
-        let mut meter = LightMeter::new(self.sun_direction, self.water.method == ReflectionMethod::Waves);
+        let mut meter = LightMeter::new(self.sun_direction, self.water.method == ReflectionMethod::Baked);
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.sun_strength as f32;

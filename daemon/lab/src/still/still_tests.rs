@@ -145,7 +145,7 @@ fn boats_of_a_series_move_and_methods_have_names() {
     for method in ReflectionMethod::ALL {
         assert_eq!(ReflectionMethod::of_name(method.name()), Some(method));
     }
-    assert_eq!(ReflectionMethod::of_name("full-as-published"), Some(ReflectionMethod::FullAsPrinted));
+    assert_eq!(ReflectionMethod::of_name("full-as-published"), Some(ReflectionMethod::FullAsPublished));
     assert_eq!(ReflectionMethod::of_name("none"), Some(ReflectionMethod::Off));
     assert_eq!(ReflectionMethod::of_name("nothing"), None);
 }

@@ -37,15 +37,7 @@ pub fn gather(scenes: &[PathBuf]) -> Result<[Background; 2]> {
 }
 
 fn photographed(path: &Path) -> Result<Background> {
-    let text =
-        std::fs::File::open(path).and_then(bowwave_core::text::toml::bounded_text).with_context(|| {
-            format!(
-                "cannot read the scene {}; `bowwave compose --example` shows what it looks like",
-                path.display()
-            )
-        })?;
-    let still = Still::parse(&text, &path.display().to_string())?;
-    bowwave::loading::warn_of_former_names(&still.warnings);
+    let still = Still::read(path, "`bowwave compose --example` shows what it looks like")?;
     let mut photos = Vec::new();
     for picture in
         pictures(&path.parent().unwrap_or(Path::new("")).join(&still.picture))?.iter().take(REPLICATES)

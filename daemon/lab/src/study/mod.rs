@@ -96,7 +96,7 @@ fn make(arguments: &StudyArgs) -> Result<Outcome> {
 
 /// The thesis's pair where both are built, else the two forms of the one.
 fn default_methods() -> [ReflectionMethod; 2] {
-    let other = ReflectionMethod::of_name("physics").unwrap_or(ReflectionMethod::FullAsPrinted);
+    let other = ReflectionMethod::of_name("physics").unwrap_or(ReflectionMethod::FullAsPublished);
     [ReflectionMethod::Full, other]
 }
 

@@ -1,6 +1,6 @@
 //! Reading a recording.
 
-use std::{cmp::Reverse, collections::BinaryHeap, path::Path, sync::Arc};
+use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use bowwave_core::time::Time;
 
@@ -137,7 +137,8 @@ fn ends_as_jpeg(jpeg: &[u8]) -> bool {
 pub struct Entries {
     path: Arc<Path>,
     messages: Messages,
-    waiting: BinaryHeap<Reverse<Waiting>>,
+    /// Entries that wait for older ones that may follow, by time and order in the file.
+    waiting: BTreeMap<(Time, u64), Entry>,
     waiting_bytes: u64,
     count: u64,
     newest: Time,
@@ -146,38 +147,12 @@ pub struct Entries {
     error: Option<RecordError>,
 }
 
-/// An entry that waits for older ones that may follow.
-struct Waiting {
-    key: (Time, u64),
-    entry: Entry,
-}
-
-impl PartialEq for Waiting {
-    fn eq(&self, other: &Self) -> bool {
-        self.key == other.key
-    }
-}
-
-impl Eq for Waiting {}
-
-impl PartialOrd for Waiting {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Waiting {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.key.cmp(&other.key)
-    }
-}
-
 impl Entries {
     pub(crate) fn new(messages: Messages) -> Self {
         Self {
             path: Arc::clone(messages.path()),
             messages,
-            waiting: BinaryHeap::new(),
+            waiting: BTreeMap::new(),
             waiting_bytes: 0,
             count: 0,
             newest: Time::MIN,
@@ -189,11 +164,11 @@ impl Entries {
 
     /// Whether the oldest entry that waits can be given: nothing older can follow, or too much waits.
     fn ready(&self) -> bool {
-        let Some(Reverse(oldest)) = self.waiting.peek() else { return false };
+        let Some(((oldest, _), _)) = self.waiting.first_key_value() else { return false };
         self.ended
             || self.waiting_bytes > CHUNK_MAX_BYTES
             // Twice what writers may leave: one entry that is late and one that is early.
-            || self.newest.ns_since(oldest.key.0) > 2 * DISORDER_MAX_NS
+            || self.newest.ns_since(*oldest) > 2 * DISORDER_MAX_NS
     }
 
     fn pull(&mut self) -> Result<(), RecordError> {
@@ -215,7 +190,7 @@ impl Entries {
         }
         self.newest = self.newest.max(time);
         self.waiting_bytes += held_bytes(&entry);
-        self.waiting.push(Reverse(Waiting { key: (time, self.count), entry }));
+        self.waiting.insert((time, self.count), entry);
         self.count += 1;
         Ok(())
     }
@@ -227,7 +202,7 @@ fn held_bytes(entry: &Entry) -> u64 {
         Entry::Picture(picture) => picture.picture.bytes().len(),
         _ => 0,
     };
-    (picture + size_of::<Waiting>()) as u64
+    (picture + size_of::<((Time, u64), Entry)>()) as u64
 }
 
 impl Iterator for Entries {
@@ -236,11 +211,11 @@ impl Iterator for Entries {
     fn next(&mut self) -> Option<Self::Item> {
         loop {
             if self.ready()
-                && let Some(Reverse(oldest)) = self.waiting.pop()
+                && let Some(((time, _), oldest)) = self.waiting.pop_first()
             {
-                self.waiting_bytes = self.waiting_bytes.saturating_sub(held_bytes(&oldest.entry));
-                self.given = oldest.key.0;
-                return Some(Ok(oldest.entry));
+                self.waiting_bytes = self.waiting_bytes.saturating_sub(held_bytes(&oldest));
+                self.given = time;
+                return Some(Ok(oldest));
             }
             if self.ended {
                 return self.error.take().map(Err);

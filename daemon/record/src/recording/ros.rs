@@ -342,8 +342,7 @@ fn image_message(entry: &PictureEntry) -> Result<Image<'_>, String> {
         width: picture.width(),
         encoding: encoding.to_owned(),
         is_bigendian: 0,
-        step: picture.format().byte_len(picture.width(), 2) as u32
-            / if picture.format() == PixelFormat::Nv12 { 3 } else { 2 },
+        step: picture.format().row_bytes(picture.width()) as u32,
         data: picture.bytes(),
     })
 }

@@ -19,8 +19,6 @@ pub struct Percentiles {
 const LEAST: f64 = 1e-4;
 /// Logarithm of the ratio between the bounds of a class: values are known to a quarter of a per cent.
 const LOG_STEP: f64 = 0.005;
-/// Classes up to 100,000.
-const CLASSES: usize = 4146;
 
 /// Values gathered over a run, counted in classes.
 #[derive(Clone, Debug, Default)]
@@ -35,6 +33,8 @@ pub struct Samples {
 impl Samples {
     /// Adds a value; one that is not finite is left out.
     pub fn push(&mut self, value: f64) {
+        /// Classes up to 100,000.
+        const CLASSES: usize = 4146;
         if !value.is_finite() {
             return;
         }

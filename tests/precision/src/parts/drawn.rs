@@ -194,7 +194,7 @@ fn wake_edges(range_m: f64) -> Result<Vec<[DVec3; 2]>> {
 /// The boats of the timed scene.
 fn view(lens: &Lens, camera: CameraPose, model: &Model, boats: &[Afloats]) -> Result<Scene> {
     let force = BeaufortForce::new(2).context("no such force")?;
-    Ok(scenes::scene((camera, *lens), SeaTones::default(), model, boats, (ReflectionMethod::Waves, force)))
+    Ok(scenes::scene((camera, *lens), SeaTones::default(), model, boats, (ReflectionMethod::Baked, force)))
 }
 
 fn timed(bench: &mut PartBench, lens: &Lens) -> Result<()> {
@@ -215,7 +215,7 @@ fn timed(bench: &mut PartBench, lens: &Lens) -> Result<()> {
             optics,
             SIZE,
             models,
-            &[ReflectionMethod::Waves],
+            &[ReflectionMethod::Baked],
             (boats.len(), Some(SOFTWARE)),
         )?;
         let scene = view(through, camera, &model, &boats)?;

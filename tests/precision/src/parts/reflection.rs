@@ -78,7 +78,7 @@ fn way(cell: &TruthCell, method: ReflectionMethod, default: ReflectionMethod) ->
         (1e6 * (process_ms() - process) - (crate::bench::thread_ns() - thread)).max(0.0)
     };
     let way = Way::telling(method.name(), "one boat", error, 1, frame).holds(held);
-    let excused = method == default && method != ReflectionMethod::Waves;
+    let excused = method == default && method != ReflectionMethod::Baked;
     Ok(if excused { way.default_although(EXCUSE) } else { way.default_if(method == default) })
 }
 

@@ -157,7 +157,7 @@ impl Warped {
         let straight = rectified(lens, 1.0).context("no rectified picture holds it")?;
         let grey = |width, height| picture(&RgbImage::from_pixel(width, height, image::Rgb([110, 115, 120])));
         let painter =
-            |size, boats| Painter::new(size, models, &[ReflectionMethod::Waves], (boats, Some(SOFTWARE)));
+            |size, boats| Painter::new(size, models, &[ReflectionMethod::Baked], (boats, Some(SOFTWARE)));
         let scene = scene_through(&straight)?;
         Ok(Self {
             straight: painter((straight.width, straight.height), boats)?,

@@ -164,7 +164,7 @@ fn lines(times: &[MethodTimes; METHODS]) -> String {
         ],
     );
     let off = &times[index(ReflectionMethod::Off)];
-    let printed = &times[index(ReflectionMethod::FullAsPrinted)];
+    let printed = &times[index(ReflectionMethod::FullAsPublished)];
     let (printed_cpu, printed_gpu) =
         (beyond(&printed.frame_cpu, &off.frame_cpu), median(&mut printed.mirror_gpu.clone()));
     for (method, t) in ReflectionMethod::ALL.iter().zip(times) {

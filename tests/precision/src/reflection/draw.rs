@@ -320,16 +320,6 @@ impl DrawingStudio {
         self.draw_scene(cell, |models| scene(cell, method, beliefs, models))
     }
 
-    /// The same in any sea.
-    pub fn draw_forced(
-        &mut self,
-        cell: &TruthCell,
-        method: ReflectionMethod,
-        beliefs: &Beliefs,
-    ) -> Result<RgbImage> {
-        self.draw_scene(cell, |models| forced_scene(cell, method, beliefs, models))
-    }
-
     /// Draws a scene over a cell's picture.
     pub fn draw_scene(
         &mut self,

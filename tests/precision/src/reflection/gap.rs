@@ -14,16 +14,6 @@ use super::{
 
 /// Distances, metres.
 pub const RANGES_M: [f64; 10] = [30.0, 60.0, 100.0, 150.0, 250.0, 400.0, 700.0, 1000.0, 1500.0, 2000.0];
-/// Height of the eye, metres.
-const EYE_M: f64 = 8.0;
-/// Pixels that the hull covers by more than this are hull.
-const HULL: f64 = 0.5;
-/// Of pixels that it covers by more than this the water's share is too small to be told.
-const COVERED: f64 = 0.75;
-/// A reflection begins where it takes this share of what it takes at its strongest in that column.
-const BEGINS: f64 = 0.5;
-/// A column whose light it changes nowhere by more than this share has no reflection: two or three codes.
-const SEEN: f64 = 0.03;
 
 /// A way to lie in the water.
 pub struct GapCase {
@@ -62,6 +52,14 @@ pub struct ReflectionGap {
 
 /// Measures the gap under a black boat. `off` has the hull alone over `sea`, `drawn` its reflection too. `None` without a hull.
 pub fn measure(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage, reach_px: u32) -> Option<ReflectionGap> {
+    /// Pixels that the hull covers by more than this are hull.
+    const HULL: f64 = 0.5;
+    /// Of pixels that it covers by more than this the water's share is too small to be told.
+    const COVERED: f64 = 0.75;
+    /// A reflection begins where it takes this share of what it takes at its strongest in that column.
+    const BEGINS: f64 = 0.5;
+    /// A column whose light it changes nowhere by more than this share has no reflection: two or three codes.
+    const SEEN: f64 = 0.03;
     let (width, height) = sea.dimensions();
     let light = |of: &RgbImage, x: u32, y: u32| luminance(of.get_pixel(x, y));
     let covered = |x, y| 1.0 - light(off, x, y) / light(sea, x, y).max(1e-6);
@@ -93,6 +91,8 @@ pub fn measure(sea: &RgbImage, off: &RgbImage, drawn: &RgbImage, reach_px: u32) 
 
 /// Draws all cases at all ranges with all methods: a table of median / 95 % of the columns (share of columns with a reflection).
 pub fn table() -> Result<String> {
+    /// Height of the eye, metres.
+    const EYE_M: f64 = 8.0;
     let lens = scenes::lens();
     let model = scenes::grey_boat(0.0);
     let models = std::slice::from_ref(&model);

@@ -224,7 +224,7 @@ mod tests {
             row(60, 1, [0.2, 0.3, 0.30, 0.2, 0.20, 0.4, 0.05], -1.0, 10.0),
             row(400, 3, [0.01, 0.3, 0.30, 0.2, 0.20, 0.4, 0.03], -1.0, 0.0),
         ];
-        let text = summary(&rows, ReflectionMethod::Waves).unwrap();
+        let text = summary(&rows, ReflectionMethod::Baked).unwrap();
         let line = |name: &str| text.lines().find(|l| l.starts_with(name)).unwrap().to_owned();
         let last = |name: &str, n: usize| {
             line(name).split_whitespace().rev().nth(n).unwrap().parse::<f64>().unwrap()

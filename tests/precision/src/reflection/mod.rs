@@ -23,8 +23,8 @@ use crate::table::TextTable;
 pub const THESIS: [ReflectionMethod; 4] = [
     ReflectionMethod::Full,
     ReflectionMethod::Physics,
-    ReflectionMethod::FullAsPrinted,
-    ReflectionMethod::PhysicsAsPrinted,
+    ReflectionMethod::FullAsPublished,
+    ReflectionMethod::PhysicsAsPublished,
 ];
 
 /// Where a method stands in [`ReflectionMethod::ALL`].

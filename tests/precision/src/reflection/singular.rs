@@ -12,7 +12,7 @@ use image::{Rgb, RgbImage};
 
 use super::{
     cell::TruthCell,
-    draw::{Beliefs, DrawingStudio, Painter, picture, tones},
+    draw::{Beliefs, DrawingStudio, Painter, forced_scene, picture, tones},
     grid::METHODS,
     methods_table,
     scenes::{self, Afloats},
@@ -99,10 +99,11 @@ pub fn near_cases(paths: f64) -> Result<Vec<TrueCase>> {
 pub fn outcomes(studio: &mut DrawingStudio, case: &TrueCase) -> Result<[SingularOutcome; METHODS]> {
     let cell = &case.cell;
     let beliefs = Beliefs::right(cell);
-    let off = studio.draw_forced(cell, ReflectionMethod::Off, &beliefs)?;
+    let off =
+        studio.draw_scene(cell, |models| forced_scene(cell, ReflectionMethod::Off, &beliefs, models))?;
     let mut out = Vec::with_capacity(METHODS);
     for method in ReflectionMethod::ALL {
-        let drawn = studio.draw_forced(cell, method, &beliefs)?;
+        let drawn = studio.draw_scene(cell, |models| forced_scene(cell, method, &beliefs, models))?;
         let shown = cell.with_hull(&drawn);
         let map = flip_map(cell.with.as_raw(), shown.as_raw(), cell.size())?;
         let judged = map.iter().zip(&cell.region).filter(|(_, judged)| **judged);

@@ -18,8 +18,6 @@ use super::draw::{BoardShot, TrueLens, draw_by_rows};
 
 /// From the camera to the board where both look at each other, metres.
 const AWAY_M: f64 = 0.62;
-/// Share of the camera's turn that the hand makes up for by going round the board, so that it stays in the picture.
-const ROUND: f64 = 0.65;
 
 /// Object that is moved, and for how long.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +77,8 @@ impl MovedBoard {
 
     /// The board's attitude and middle in the camera's space while each row is read, for a middle row at `seconds`.
     fn rows(&self, seconds: f64) -> Vec<(DQuat, DVec3)> {
+        /// Share of the camera's turn that the hand makes up for by going round the board, so that it stays in the picture.
+        const ROUND: f64 = 0.65;
         let height = self.lens.size.1;
         let at = |row: usize| seconds + ((row as f64 + 0.5) / height as f64 - 0.5) * self.recipe.readout_s;
         let times: Vec<f64> = (0..height).map(at).collect();

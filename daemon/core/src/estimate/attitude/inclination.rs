@@ -8,16 +8,6 @@ use vqf_rs::{Params, VQF};
 
 use crate::physics::GRAVITY_M_S2;
 
-/// Specific force that differs from gravity by more than this, m/s^2, is a shock: recoil or a blow. Hands make 20 m/s^2, and twelve
-/// metres from the middle of a ship in sea state 6 waves make 3.
-const SHOCK: f64 = 60.0;
-
-/// What follows a shock is ringing for so long, seconds.
-const RINGING_S: f64 = 0.05;
-
-/// After so long without a quiet sample it is no shock but what the unit has come to measure, seconds.
-const SHOCK_MOST_S: f64 = 1.0;
-
 /// How VQF is set, and how well it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InclinationSettings {
@@ -110,6 +100,13 @@ impl Inclination {
     }
 
     fn is_steady(&mut self, accel: DVec3, dt_s: f64) -> bool {
+        /// Specific force that differs from gravity by more than this, m/s^2, is a shock: recoil or a blow. Hands make 20 m/s^2, and twelve
+        /// metres from the middle of a ship in sea state 6 waves make 3.
+        const SHOCK: f64 = 60.0;
+        /// What follows a shock is ringing for so long, seconds.
+        const RINGING_S: f64 = 0.05;
+        /// After so long without a quiet sample it is no shock but what the unit has come to measure, seconds.
+        const SHOCK_MOST_S: f64 = 1.0;
         if (accel.length() - GRAVITY_M_S2).abs() > SHOCK {
             self.ringing_s = RINGING_S;
         }

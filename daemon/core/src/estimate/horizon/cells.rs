@@ -50,7 +50,7 @@ impl PictureCells {
     pub fn fill(&mut self, picture: &Picture, wanted: Range<usize>) {
         self.rows = wanted.start.min(self.height)..wanted.end.min(self.height);
         let (columns, reduction, length) = (self.columns, self.reduction, self.rows.len());
-        self.unit = 1.0 / (CELL * reduction * reduction * weight(picture.format())) as f32;
+        self.unit = 1.0 / (CELL * reduction * reduction * usize::from(picture.format().luma_weight())) as f32;
         self.sums.resize(columns * (length + 1), 0);
         self.wiggles.resize(columns * (length + 1), 0);
         self.block.resize(columns * BLOCK, 0);
@@ -129,14 +129,6 @@ impl PictureCells {
         let (a, b) = (rows.start.checked_sub(self.rows.start)?, rows.end.checked_sub(self.rows.start)?);
         let (from, to) = (*wiggles.get(a)?, *wiggles.get(b)?);
         (b > a).then(|| (to - from) as f32 * self.unit / (b - a) as f32)
-    }
-}
-
-/// What a pixel's samples are multiplied with altogether.
-const fn weight(format: PixelFormat) -> usize {
-    match format {
-        PixelFormat::Yuyv | PixelFormat::Nv12 => 1,
-        PixelFormat::Rgb => 4,
     }
 }
 

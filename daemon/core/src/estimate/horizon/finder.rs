@@ -15,41 +15,18 @@ use super::{
 };
 use crate::{event::Picture, geometry::horizon_dip};
 
-/// Score from which a line is taken for the horizon.
-const SCORE_MIN: f64 = 0.7;
-
-/// Score from which a line is so clear that no other need be tried.
-const SCORE_CLEAR: f64 = 1.4;
-
-/// Contrast that a horizon has at least, codes.
-const CONTRAST_MIN: f64 = 2.0;
-
 /// Share of a crisp edge's sharpness below which it is blurred: motion over 15 rows, or fog, which moves the edge that is seen.
 const SHARPNESS_MIN: f64 = 0.3;
-
-/// Sky differs from row to row no more than this many times what noise does, or by this share of the step below it; trees,
-/// houses and rocks do.
-const TEXTURE_MAX: (f64, f64) = (2.0, 0.1);
 
 /// A prediction is sought within this many of its standard deviations...
 const GATE_SIGMAS: f64 = 3.0;
 /// ...and no closer than this, radians.
 const GATE_MIN: f64 = 0.5 * std::f64::consts::PI / 180.0;
-/// A prediction less certain than this is none, radians.
-const GATE_MAX: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
 /// Standard deviation of what moves all of an edge, reduced pixels: of a crisp one, and for each time that a step over 20
 /// rows is larger than one over 3.
 const SHIFT_PX: f64 = 0.1;
 const SHIFT_SOFT_PX: f64 = 0.8;
-/// Standard deviation by which its ends are moved against each other.
-const TURN_PX: f64 = 0.05;
-
-/// Rows beyond the predicted ones that are read as well: the longest step, the sky above an edge, the parallels.
-const MARGIN: f64 = 60.0;
-
-/// Smallest picture, in cells and rows.
-const SIZE_MIN: (usize, usize) = (16, 64);
 
 /// Finds horizons; keeps its memory from picture to picture.
 #[derive(Clone, Debug, Default)]
@@ -76,6 +53,10 @@ impl HorizonFinder {
 
     /// The horizon of `picture`.
     pub fn find(&mut self, picture: &Picture, view: &HorizonView) -> Result<Horizon, NoHorizon> {
+        /// A prediction less certain than this is none, radians.
+        const GATE_MAX: f64 = 10.0 * std::f64::consts::PI / 180.0;
+        /// Smallest picture, in cells and rows.
+        const SIZE_MIN: (usize, usize) = (16, 64);
         self.cells.measure(picture);
         if self.cells.columns < SIZE_MIN.0 || self.cells.height < SIZE_MIN.1 {
             return Err(NoHorizon::TooSmall);
@@ -116,6 +97,8 @@ impl HorizonFinder {
         sin_dip: f64,
         floor: f32,
     ) -> Option<(HorizonFit, LineQuality)> {
+        /// Score from which a line is so clear that no other need be tried.
+        const SCORE_CLEAR: f64 = 1.4;
         let scene = LineSearch { cells: &self.cells, rays: &self.rays, hidden: &self.hidden, sin_dip, floor };
         let mut best: Option<(HorizonFit, LineQuality)> = None;
         for candidate in lines.iter().flatten() {
@@ -136,6 +119,8 @@ impl HorizonFinder {
 
     /// How much rows differ from one to the next where nothing is but noise: a low quantile over pieces of the picture, codes.
     fn noise_floor(&mut self) -> f32 {
+        /// Rows never differ less than this, codes: what rounding leaves.
+        const NOISE_MIN: f32 = 0.3;
         let rows = self.cells.rows();
         self.scratch.clear();
         for column in (0..self.cells.columns).step_by(4) {
@@ -154,6 +139,13 @@ impl HorizonFinder {
 
 /// Why a line with these qualities is not the horizon; `None` if it is.
 fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
+    /// Score from which a line is taken for the horizon.
+    const SCORE_MIN: f64 = 0.7;
+    /// Contrast that a horizon has at least, codes.
+    const CONTRAST_MIN: f64 = 2.0;
+    /// Sky differs from row to row no more than this many times what noise does, or by this share of the step below it; trees,
+    /// houses and rocks do.
+    const TEXTURE_MAX: (f64, f64) = (2.0, 0.1);
     let (noises, steps) = TEXTURE_MAX;
     let texture_max = (noises * quality.noise).max(steps * quality.contrast);
     if quality.score < SCORE_MIN || quality.contrast < CONTRAST_MIN {
@@ -170,14 +162,13 @@ fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
 /// Covariance of what the scatter of the columns does not show: haze and swell move all of an edge, and the more the softer
 /// it is.
 fn unseen(quality: &LineQuality, focal_px: f64, width_px: f64) -> DMat2 {
+    /// Standard deviation by which the line's ends are moved against each other.
+    const TURN_PX: f64 = 0.05;
     let softness = (1.0 / quality.sharpness.clamp(SHARPNESS_MIN, 1.0) - 1.0).max(0.0);
     let shift = (SHIFT_PX + SHIFT_SOFT_PX * softness) / focal_px;
     let turn = TURN_PX * 2.0 / (quality.visible_share * width_px).max(1.0);
     DMat2::from_diagonal(DVec2::new(turn * turn, shift * shift))
 }
-
-/// Rows never differ less than this, codes: what rounding leaves.
-const NOISE_MIN: f32 = 0.3;
 
 /// Where a prediction lets the horizon be.
 struct Gate {
@@ -208,6 +199,8 @@ impl Gate {
 
     /// Rows that have to be read.
     fn all_rows(&self, rays: &Rays, cells: &PictureCells) -> Option<Range<usize>> {
+        /// Rows beyond the predicted ones that are read as well: the longest step, the sky above an edge, the parallels.
+        const MARGIN: f64 = 60.0;
         let rows = (0..cells.columns).filter_map(|column| self.rows(rays, cells, column));
         let all = rows.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end))?;
         let margin = MARGIN as usize;

@@ -9,37 +9,10 @@ use super::{
     rays::Rays,
 };
 
-/// Fewer columns than this are no line.
-const POINTS_MIN: usize = 10;
-
-/// Rounds of reweighting at each window.
-const ROUNDS: usize = 4;
-
-/// Tukey's constant for 95 % efficiency.
-const TUKEY: f64 = 4.685;
-
-/// Columns are never told apart better than this, rows.
-const SCATTER_MIN: f64 = 0.08;
-
 /// The scatter is read off the distance that this share of the points stay below...
 const SCATTER_SHARE: f64 = 0.35;
 /// ...which for normal deviates is their standard deviation over this.
 const SCATTER_SCALE: f64 = 1.0 / 0.453_8;
-
-/// Windows from this on may hold other edges than the line's, rows.
-const WIDE: usize = 12;
-
-/// The stretch that is surveyed: rows to either side, rows that steps are taken over.
-const SURVEY: (usize, usize) = (10, 4);
-
-/// Pairs of points tried of each distance.
-const PAIRS: usize = 24;
-
-/// A point agrees with a line within this, rows.
-const AGREE: f64 = 2.5;
-
-/// A step that is larger than this says no more about its place, codes.
-const STEP_FULL: f32 = 15.0;
 
 /// Up in the camera's axes, for a camera rolled by `roll` that looks up by `elevation` (as [`crate::geometry::look`]), radians.
 pub(super) fn up_of(roll: f64, elevation: f64) -> DVec3 {
@@ -140,6 +113,8 @@ impl Fitter {
     /// The strongest edges of a wider stretch about a line: what merely is strongest somewhere in it lies anywhere, what
     /// belongs to a line lies on it.
     pub fn survey(&mut self, scene: &LineSearch<'_>, line: &HorizonLine) -> &[EdgePoint] {
+        /// The stretch that is surveyed: rows to either side, rows that steps are taken over.
+        const SURVEY: (usize, usize) = (10, 4);
         self.gather(scene, line, SURVEY.0, SURVEY.1);
         self.measure(scene, line);
         &self.points
@@ -153,6 +128,8 @@ impl Fitter {
         mut line: HorizonLine,
         windows: &[(usize, usize)],
     ) -> Option<HorizonFit> {
+        /// Windows from this on may hold other edges than the line's, rows.
+        const WIDE: usize = 12;
         let mut fit = None;
         for (window, size) in windows {
             self.gather(scene, &line, *window, *size);
@@ -167,6 +144,8 @@ impl Fitter {
     }
 
     fn gather(&mut self, scene: &LineSearch<'_>, line: &HorizonLine, window: usize, size: usize) {
+        /// A step that is larger than this says no more about its place, codes.
+        const STEP_FULL: f32 = 15.0;
         self.points.clear();
         let size = line.step_rows(size);
         let window = window.max(size);
@@ -183,6 +162,8 @@ impl Fitter {
     /// The line through two of the points that most others agree with, where they agree with it better than with `line`: half
     /// of the columns may show land, which no average forgives.
     fn consensus(&mut self, scene: &LineSearch<'_>, line: HorizonLine) -> HorizonLine {
+        /// Pairs of points tried of each distance.
+        const PAIRS: usize = 24;
         let mut best = (self.agreement(scene, &line), line);
         let count = self.points.len();
         for lag in [count / 2, count / 3, count / 5] {
@@ -203,6 +184,8 @@ impl Fitter {
 
     /// Weight of the points near the line, those on it most.
     fn agreement(&self, scene: &LineSearch<'_>, line: &HorizonLine) -> f64 {
+        /// A point agrees with a line within this, rows.
+        const AGREE: f64 = 2.5;
         let up = line.up();
         let share = |p: &EdgePoint| {
             let off = (p.ray.dot(up) + scene.sin_dip) / -p.down.dot(up).min(-1e-9) / AGREE;
@@ -212,6 +195,10 @@ impl Fitter {
     }
 
     fn solve(&mut self, scene: &LineSearch<'_>, mut line: HorizonLine) -> Option<HorizonFit> {
+        /// Fewer columns than this are no line.
+        const POINTS_MIN: usize = 10;
+        /// Rounds of reweighting at each window.
+        const ROUNDS: usize = 4;
         let mut scatter = f64::INFINITY;
         let mut covariance = DMat2::IDENTITY;
         for _ in 0..ROUNDS {
@@ -245,6 +232,8 @@ impl Fitter {
 
     /// Standard deviation of the points about the line from their lower distances, rows: land may hold more than half of them.
     fn scatter(&mut self) -> f64 {
+        /// Columns are never told apart better than this, rows.
+        const SCATTER_MIN: f64 = 0.08;
         self.offs.clear();
         self.offs.extend(self.points.iter().map(|p| p.off.abs()));
         let place = (self.offs.len() as f64 * SCATTER_SHARE) as usize;
@@ -290,6 +279,8 @@ impl Fitter {
 }
 
 fn tukey(off: f64, scatter: f64) -> f64 {
+    /// Tukey's constant for 95 % efficiency.
+    const TUKEY: f64 = 4.685;
     let share = off / (TUKEY * scatter);
     if share.abs() < 1.0 { (1.0 - share * share).powi(2) } else { 0.0 }
 }

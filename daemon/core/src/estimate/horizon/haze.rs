@@ -15,21 +15,19 @@ use crate::{
 };
 use glam::DVec3;
 
-/// Rows of the pictures in the lens's own pixels: a tenth of a picture's height, but no fewer than the finder wants.
-const ROWS: u32 = 256;
-/// The horizon stands at so many different places within a row.
-const PHASES: u32 = 4;
 /// Light of sky, and of water without haze, over that of white.
 const SKY: f64 = 0.58;
 const WATER: f64 = 0.1;
-/// Pieces of a row, over which its light is summed.
-const PIECES: u32 = 8;
-/// How well the pictures' up is foretold to the finder, radians.
-const PRIOR_SIGMA: f64 = 0.1f64.to_radians();
 
 /// By how much lower than the true horizon the finder sees it with that lens from that height, at a meteorological visibility of
 /// `visibility_m` metres; radians. `None` where haze, or too coarse a picture, leaves no edge that could be found and believed.
 pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> Option<f64> {
+    /// Rows of the pictures in the lens's own pixels: a tenth of a picture's height, but no fewer than the finder wants.
+    const ROWS: u32 = 256;
+    /// The horizon stands at so many different places within a row.
+    const PHASES: u32 = 4;
+    /// How well the pictures' up is foretold to the finder, radians.
+    const PRIOR_SIGMA: f64 = 0.1f64.to_radians();
     let height = lens.height.min(ROWS);
     let flat = Lens {
         height,
@@ -57,6 +55,8 @@ pub fn lowered_by_haze(lens: &Lens, eye_height_m: f64, visibility_m: f64) -> Opt
 /// Sky, water and haze, seen level but for `elevation` (radians). Light is summed before it is put in codes, which moves an edge towards
 /// the dark.
 fn picture(lens: &Lens, elevation: f64, eye_height_m: f64, visibility_m: f64) -> Option<Picture> {
+    /// Pieces of a row, over which its light is summed.
+    const PIECES: u32 = 8;
     let row_bytes = lens.width as usize * 3;
     let mut bytes = Vec::with_capacity(row_bytes * lens.height as usize);
     for row in 0..lens.height {

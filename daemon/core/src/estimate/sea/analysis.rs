@@ -14,32 +14,10 @@ use super::{
     sky::SkyRows,
 };
 
-/// Patches transformed in one piece of work.
-const CELLS_A_STEP: usize = 8;
 /// Frequencies looked at, Hz: waves of 770 m to 2 m.
 const BAND_HZ: (f64, f64) = (0.045, 0.9);
 /// Frequencies at which only noise is expected in patches that are metres large, Hz: the first, the step, how many.
 const NOISE_HZ: (f64, f64, usize) = (1.5, 0.15, 6);
-/// Lines lie at least this share of their frequency apart.
-const LINE_STEP: f64 = 0.03;
-/// A patch must have been seen for this share of the window.
-const SEEN: f64 = 0.7;
-/// Unevenness of the water's mean brightness beyond which it is not only water: even seas lie at 0.003 to 0.045, glitter at
-/// 0.09 to 0.25.
-const UNEVEN: f64 = 0.065;
-/// Mean luminance of water below which waves drown in the picture's codes.
-const DARK: f64 = 0.0012;
-/// Relative spread of the likely calibrations beyond which a height would be a guess.
-const UNSURE: f64 = 0.45;
-/// Fits counted in in one piece of work.
-const FITS_A_STEP: usize = 3;
-/// Patches with less change of brightness with slope tell nothing, per radian.
-const LEAST_GAIN: f64 = 0.3;
-/// Heights come from patches seen no flatter than this, radians, and than so many times the root mean square slope: farther out
-/// crests hide troughs.
-const NEAR: (f64, f64) = (0.08, 1.0);
-/// Patches that are near anyhow: the nearest.
-const NEAR_LEAST: usize = 20;
 
 /// Result of an analysis.
 #[derive(Clone, Debug, Default)]
@@ -137,6 +115,8 @@ impl Analysis {
 
     /// Does one piece of work; what was found once all is done.
     pub fn step(&mut self, grid: &SeaGrid, record: &Record, sky: &SkyRows) -> Option<FinishedAnalysis> {
+        /// Patches transformed in one piece of work.
+        const CELLS_A_STEP: usize = 8;
         let end = self.start + self.slots;
         let cells = grid.cells.len();
         if self.next_cell < cells {
@@ -158,6 +138,8 @@ impl Analysis {
     }
 
     fn transform(&mut self, record: &Record, cell: usize) {
+        /// A patch must have been seen for this share of the window.
+        const SEEN: f64 = 0.7;
         let (mean, seen) = record.contrast(self.start, cell, &mut self.series);
         if seen < SEEN {
             return;
@@ -182,6 +164,8 @@ impl Analysis {
 
     /// One piece of the calibration of brightness to slope, or why the picture does not allow it.
     fn light(&mut self, grid: &SeaGrid, sky: &SkyRows) -> Result<(), Unknown> {
+        /// Fits counted in in one piece of work.
+        const FITS_A_STEP: usize = 3;
         match &mut self.calibration {
             SlopeCalibration::Waits => {
                 self.check(grid)?;
@@ -208,6 +192,11 @@ impl Analysis {
 
     /// Whether the water is bright and even enough.
     fn check(&self, grid: &SeaGrid) -> Result<(), Unknown> {
+        /// Unevenness of the water's mean brightness beyond which it is not only water: even seas lie at 0.003 to 0.045, glitter at
+        /// 0.09 to 0.25.
+        const UNEVEN: f64 = 0.065;
+        /// Mean luminance of water below which waves drown in the picture's codes.
+        const DARK: f64 = 0.0012;
         let seen: Vec<f64> = self.means.iter().copied().filter(|m| m.is_finite()).collect();
         let luminance = seen.iter().sum::<f64>() / seen.len().max(1) as f64;
         if luminance < DARK {
@@ -219,6 +208,10 @@ impl Analysis {
 
     /// Turns contrast into slope.
     fn calibrate(&mut self, grid: &SeaGrid, gains: &Gains) -> Result<(), Unknown> {
+        /// Relative spread of the likely calibrations beyond which a height would be a guess.
+        const UNSURE: f64 = 0.45;
+        /// Patches with less change of brightness with slope tell nothing, per radian.
+        const LEAST_GAIN: f64 = 0.3;
         let sigma = gains.sigma();
         // No number where there was no fit at all.
         if sigma.is_nan() || sigma >= UNSURE {
@@ -246,6 +239,11 @@ impl Analysis {
 
     /// Marks the patches from which heights are taken.
     fn choose_near(&mut self, grid: &SeaGrid, rough: f64) {
+        /// Heights come from patches seen no flatter than this, radians, and than so many times the root mean square slope: farther out
+        /// crests hide troughs.
+        const NEAR: (f64, f64) = (0.08, 1.0);
+        /// Patches that are near anyhow: the nearest.
+        const NEAR_LEAST: usize = 20;
         let mut by_depression: Vec<usize> =
             (0..grid.cells.len()).filter(|&i| self.weights[i] > 0.0).collect();
         by_depression.sort_by(|&a, &b| grid.cells[b].depression.total_cmp(&grid.cells[a].depression));
@@ -300,6 +298,8 @@ impl Analysis {
 
 /// Bins of the padded transform that are looked at: waves, then noise.
 fn bins(seconds: f64) -> Vec<usize> {
+    /// Lines lie at least this share of their frequency apart.
+    const LINE_STEP: f64 = 0.03;
     let width = 1.0 / (2.0 * seconds);
     let mut bins = Vec::new();
     let mut hz = BAND_HZ.0.max(2.5 / seconds);

@@ -3,13 +3,6 @@
 use super::{MeasuredValue, SeaEstimate, Unknown, summary::wind_m_s};
 use crate::sea::WmoSeaState;
 
-/// Share of a new estimate in the conditions in use.
-const SHARE: f64 = 0.35;
-/// A height must lie this share beyond the border of a state to change it at once.
-const BEYOND: f64 = 0.15;
-/// Successive estimates of a new state that change it however near the border they lie.
-const AGREE: u32 = 3;
-
 /// Conditions that a sea is made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeaConditions {
@@ -94,6 +87,8 @@ impl SeaFollower {
 
     /// Takes a new outcome of the meter in; call it once per outcome.
     pub fn update(&mut self, outcome: &Result<SeaEstimate, Unknown>) {
+        /// Share of a new estimate in the conditions in use.
+        const SHARE: f64 = 0.35;
         let Ok(estimate) = outcome else {
             if self.source == SeaSource::Measured {
                 self.source = SeaSource::Kept;
@@ -118,6 +113,10 @@ impl SeaFollower {
 
     /// Lets the state follow the height, not at once at a border.
     fn settle(&mut self, first: bool) {
+        /// A height must lie this share beyond the border of a state to change it at once.
+        const BEYOND: f64 = 0.15;
+        /// Successive estimates of a new state that change it however near the border they lie.
+        const AGREE: u32 = 3;
         let height = self.conditions.significant_height_m;
         let seen = WmoSeaState::of_wave_height(height);
         if seen == self.state {

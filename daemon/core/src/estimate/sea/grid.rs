@@ -5,17 +5,6 @@ use glam::{DVec2, DVec3};
 use super::{SeaFrame, Unknown};
 use crate::geometry::{CameraPose, Lens};
 
-/// Depression angles between which water is looked at, radians: nearer the horizon crests hide troughs.
-const DEPRESSION: (f64, f64) = (0.045, 0.7);
-/// Share of the picture's width and height that is left free at its edges, for the hand's motion.
-const MARGIN: f64 = 0.04;
-/// Patches wanted: at least and at most.
-const CELLS: (usize, usize) = (120, 420);
-/// Points per patch and axis that are averaged.
-const TAPS: i32 = 3;
-/// A patch counts when at least this many of its points are seen.
-const TAPS_SEEN: u32 = 6;
-
 /// A patch of the plane z = 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeaPatch {
@@ -50,6 +39,8 @@ pub(super) fn azimuth_of(camera: &CameraPose) -> Option<f64> {
 impl SeaGrid {
     /// Patches over the water that the camera sees, as wide in angle as they are long against their range.
     pub fn lay(camera: &CameraPose, lens: &Lens) -> Result<Self, Unknown> {
+        /// Patches wanted: at least and at most.
+        const CELLS: (usize, usize) = (120, 420);
         let azimuth = azimuth_of(camera).ok_or(Unknown::NoWater)?;
         let mut step = 0.08;
         for _ in 0..12 {
@@ -72,6 +63,10 @@ impl SeaGrid {
 
     /// Mean luminance of each patch; NaN where it is hidden or outside of the picture. Answers the share that is seen.
     pub fn sample(&self, frame: &SeaFrame<'_>, out: &mut [f32]) -> f64 {
+        /// Points per patch and axis that are averaged.
+        const TAPS: i32 = 3;
+        /// A patch counts when at least this many of its points are seen.
+        const TAPS_SEEN: u32 = 6;
         let camera_from_world = frame.camera.world_from_camera.inverse();
         let mut seen_cells = 0;
         for (cell, out) in self.cells.iter().zip(out.iter_mut()) {
@@ -97,6 +92,10 @@ impl SeaGrid {
 }
 
 fn cells(camera: &CameraPose, lens: &Lens, azimuth: f64, step: f64) -> Vec<SeaPatch> {
+    /// Depression angles between which water is looked at, radians: nearer the horizon crests hide troughs.
+    const DEPRESSION: (f64, f64) = (0.045, 0.7);
+    /// Share of the picture's width and height that is left free at its edges, for the hand's motion.
+    const MARGIN: f64 = 0.04;
     let height = camera.position.z;
     let camera_from_world = camera.world_from_camera.inverse();
     let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));

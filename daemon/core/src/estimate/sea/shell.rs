@@ -13,16 +13,6 @@ use crate::physics::GRAVITY_M_S2;
 
 /// Directions of beams.
 pub(super) const BEAMS: usize = 24;
-/// Directions tried as the mean one.
-const MEANS: usize = 48;
-/// Exponents tried of the spread cos^2s(angle / 2).
-const SPREADS: [f64; 5] = [1.0, 3.0, 8.0, 20.0, 50.0];
-/// A patch that averages a wave to less than this is not used for it.
-const LEAST_RESPONSE: f64 = 0.35;
-/// Patches that must resolve a wave.
-const LEAST_CELLS: usize = 24;
-/// Weight of the total power against one beam, where waves and noise are told apart.
-const TOTAL_WEIGHT: f64 = 6.0;
 
 /// Result at one frequency.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,6 +60,10 @@ fn power(observed: &Observed<'_>, some: &[usize]) -> f64 {
 
 /// Fits waves and noise to one frequency; `None` where too few patches resolve such waves.
 pub(super) fn fit(observed: &Observed<'_>) -> Option<ShellLine> {
+    /// A patch that averages a wave to less than this is not used for it.
+    const LEAST_RESPONSE: f64 = 0.35;
+    /// Patches that must resolve a wave.
+    const LEAST_CELLS: usize = 24;
     let k = (TAU * observed.hz).powi(2) / GRAVITY_M_S2;
     let used: Vec<usize> = (0..observed.cells.len())
         .filter(|&i| observed.weights[i] > 0.0 && sinc(k * observed.cells[i].size.x / 2.0) > LEAST_RESPONSE)
@@ -189,6 +183,10 @@ struct ShellFit {
 
 /// Most likely mean direction, spread, density and noise.
 fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<ShellFit> {
+    /// Directions tried as the mean one.
+    const MEANS: usize = 48;
+    /// Exponents tried of the spread cos^2s(angle / 2).
+    const SPREADS: [f64; 5] = [1.0, 3.0, 8.0, 20.0, 50.0];
     let mut best: Option<ShellFit> = None;
     for m in 0..MEANS {
         let mean = TAU * m as f64 / MEANS as f64;
@@ -211,6 +209,8 @@ fn search(table: &[Vec<f64>], powers: &[f64]) -> Option<ShellFit> {
 }
 
 fn weight(row: usize) -> f64 {
+    /// Weight of the total power against one beam, where waves and noise are told apart.
+    const TOTAL_WEIGHT: f64 = 6.0;
     if row == BEAMS { TOTAL_WEIGHT } else { 1.0 }
 }
 

@@ -13,24 +13,18 @@ use crate::{
 const LEAST_SHARE: f64 = 0.25;
 /// Lines that must count.
 const LEAST_LINES: usize = 3;
-/// Least relative error of the calibration of brightness to slope, one sigma: what the spread of its fits does not show.
-const GAIN_SIGMA: f64 = 0.1;
 /// Density of the error of the pose's pitch, rad^2/Hz: a milliradian within a tenth of a hertz. It moves the whole picture over
 /// its own fall of brightness, which looks like a very long wave.
 const POSE_DENSITY: f64 = 1.5e-5;
-/// A line must rise this far above what the pose can feign.
-const ABOVE_POSE: f64 = 6.0;
-/// Mean of the fourth power's frequency over that of the peak, for spectra between Pierson-Moskowitz (1.04) and JONSWAP (1.01).
-const FOURTH_OVER_PEAK: f64 = 1.02;
-/// Waves above this share of the eye's height are not measured: the plane z = 0 is no longer near the water.
-const HIGHEST_SHARE: f64 = 0.5;
 /// Significant height below which a sea without a pattern is called flat, metres.
 const FLAT_M: f64 = 0.1;
-/// Lowest frequency of the waves that a flat sea could hide, Hz: longer ones are swell from elsewhere.
-const FLAT_FROM_HZ: f64 = 0.25;
 
 /// Height, period and direction from what was found.
 pub(super) fn summarise(found: &AnalysisResult, eye_m: f64, time: Time) -> Result<SeaEstimate, Unknown> {
+    /// Mean of the fourth power's frequency over that of the peak, for spectra between Pierson-Moskowitz (1.04) and JONSWAP (1.01).
+    const FOURTH_OVER_PEAK: f64 = 1.02;
+    /// Waves above this share of the eye's height are not measured: the plane z = 0 is no longer near the water.
+    const HIGHEST_SHARE: f64 = 0.5;
     if found.lines.iter().filter(|l| counts(l)).count() < LEAST_LINES {
         return flat(found, time);
     }
@@ -53,6 +47,8 @@ pub(super) fn summarise(found: &AnalysisResult, eye_m: f64, time: Time) -> Resul
 
 /// Whether a line shows waves.
 fn counts(line: &ShellLine) -> bool {
+    /// A line must rise this far above what the pose can feign.
+    const ABOVE_POSE: f64 = 6.0;
     line.share > LEAST_SHARE && line.slope > ABOVE_POSE * POSE_DENSITY
 }
 
@@ -116,6 +112,8 @@ fn judged(
     eye_m: f64,
     time: Time,
 ) -> SeaEstimate {
+    /// Least relative error of the calibration of brightness to slope, one sigma: what the spread of its fits does not show.
+    const GAIN_SIGMA: f64 = 0.1;
     // Independent samples of the energy: the band's width times the record's length, and some over the water's area.
     let freedom = (2.0 * m.width_hz * found.seconds).max(2.0);
     let low_eye = height_m / eye_m;
@@ -158,6 +156,8 @@ fn judged(
 
 /// No waves found: a flat sea where short waves of [`FLAT_M`] would have shown, else no answer.
 fn flat(found: &AnalysisResult, time: Time) -> Result<SeaEstimate, Unknown> {
+    /// Lowest frequency of the waves that a flat sea could hide, Hz: longer ones are swell from elsewhere.
+    const FLAT_FROM_HZ: f64 = 0.25;
     let mut hidden = 0.0;
     for pair in found.lines.windows(2).filter(|p| p[0].hz > FLAT_FROM_HZ) {
         // A wave that explained this share of the power would have counted.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::event::{Picture, PixelFormat};
+use crate::event::Picture;
 
 /// Width that pictures are reduced to, about: a sight's place errs by hundredths of these pixels.
 const WIDTH: u32 = 640;
@@ -54,7 +54,8 @@ impl GreyPyramid {
     pub fn fill(&mut self, picture: &Picture, rows: Range<usize>) {
         let rows = rows.start / ALIGN * ALIGN..rows.end.min(self.size.1);
         let width = self.size.0;
-        let unit = 1.0 / ((self.reduction * self.reduction) as f32 * weight(picture.format()));
+        let unit =
+            1.0 / ((self.reduction * self.reduction) as f32 * f32::from(picture.format().luma_weight()));
         let finest = &mut self.levels[0];
         finest.width = width;
         finest.codes.resize(width * rows.len(), 0.0);
@@ -121,14 +122,6 @@ impl PyramidLevel {
     pub fn code(&self, x: usize, y: usize) -> Option<f32> {
         let row = y.checked_sub(self.rows.start)?;
         (x < self.width).then(|| self.codes.get(row * self.width + x).copied())?
-    }
-}
-
-/// What a pixel's samples are multiplied with altogether.
-const fn weight(format: PixelFormat) -> f32 {
-    match format {
-        PixelFormat::Yuyv | PixelFormat::Nv12 => 1.0,
-        PixelFormat::Rgb => 4.0,
     }
 }
 

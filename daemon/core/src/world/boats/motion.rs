@@ -14,14 +14,6 @@ use super::{
 };
 use crate::{geometry::ahead, physics::GRAVITY_M_S2, world::waves::WaveField};
 
-/// Cross-flow drag coefficient of a V section, about.
-const CROSS_FLOW: f64 = 1.0;
-/// Radiation damping of a triangular section by its area, the water's density and the root of g over its beam, near its own
-/// frequency (of the order of the measurements of Vugts 1968, Int. Shipbuild. Prog. 15, 251).
-const RADIATION: f64 = 0.7;
-/// 1 - 1 / sqrt 2: makes [`step`] L-stable in a damping that is known.
-const GAMMA: f64 = 0.292_893_218_813_452_4;
-
 /// Heave of the centre of buoyancy (metres, up from rest), roll (radians, port up) and pitch (radians, bow up), and their rates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BoatMotion {
@@ -75,6 +67,9 @@ impl HullForm {
 
     /// Radiation damping a metre of wetted half beam and of length, kg/(m^2 s).
     fn radiation(&self) -> f64 {
+        /// Radiation damping of a triangular section by its area, the water's density and the root of g over its beam, near its own
+        /// frequency (of the order of the measurements of Vugts 1968, Int. Shipbuild. Prog. 15, 251).
+        const RADIATION: f64 = 0.7;
         let beam_m = 2.0 * self.half_beam_m;
         0.5 * RADIATION * WATER_KG_M3 * self.draught_m * (GRAVITY_M_S2 / beam_m).sqrt()
     }
@@ -112,6 +107,8 @@ impl HullForm {
     }
 
     fn forces(&self, course: &CourseState, motion: &BoatMotion, waves: &WaveField, t: f64) -> Forces {
+        /// Cross-flow drag coefficient of a V section, about.
+        const CROSS_FLOW: f64 = 1.0;
         let DVec3 { x: heave, y: roll, z: pitch } = motion.at;
         let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) = (roll.sin_cos(), pitch.sin_cos());
         let water = self.water(course, pitch, waves, t);
@@ -177,6 +174,8 @@ impl HullForm {
         motion: &BoatMotion,
         h: f64,
     ) -> BoatMotion {
+        /// 1 - 1 / sqrt 2: makes [`step`] L-stable in a damping that is known.
+        const GAMMA: f64 = 0.292_893_218_813_452_4;
         let now = self.forces(courses[0], motion, waves, t);
         let first = |damping: DVec3| now.acceleration / (DVec3::ONE + damping * (GAMMA * h));
         let ahead =

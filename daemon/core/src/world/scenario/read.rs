@@ -152,7 +152,7 @@ pub fn reflection(
     force: BeaufortForce,
     warnings: &mut Vec<String>,
 ) -> Result<Water, TomlError> {
-    let method = text.given(&keys.method, method_name())?.unwrap_or(ReflectionMethod::Waves);
+    let method = text.given(&keys.method, method_name())?.unwrap_or(ReflectionMethod::Baked);
     if let Some(value) = &keys.method
         && let Loose::Fits(name) = value.get_ref()
         && let Some(warning) = ReflectionMethod::warning(name)

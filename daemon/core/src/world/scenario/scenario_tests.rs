@@ -88,7 +88,7 @@ fn the_thesis_swarm_closes_200_yards_at_15_knots() {
 fn an_empty_text_is_a_scenario_of_defaults() {
     let scenario = parse("").expect("valid");
     assert_eq!((scenario.seed, scenario.duration_s, scenario.boats.len()), (1, None, 0));
-    assert_eq!(scenario.water.method, ReflectionMethod::Waves);
+    assert_eq!(scenario.water.method, ReflectionMethod::Baked);
     assert_eq!(scenario.water.shadow, ShadowLevel::Gradual);
     assert_eq!(scenario.weapon.belt, 100);
     assert!((scenario.sun_direction.length() - 1.0).abs() < 1e-12);

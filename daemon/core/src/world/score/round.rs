@@ -13,12 +13,6 @@ use crate::{
 
 /// A round that struck nothing after this time is no longer followed, seconds.
 const LIFE_S: f64 = 20.0;
-/// The path may bend by so much in a turning boat's space before it is followed in shorter pieces, metres.
-const BEND_M: f64 = 0.005;
-/// Most pieces of a stretch.
-const PIECES_MAX: f64 = 32.0;
-/// Distance between the places at which a low round is held against the waves, metres.
-const WATER_STEP_M: f64 = 1.0;
 
 /// A round in the air that may strike boats and the sea. All times are seconds on the clock that the boats are given in.
 #[derive(Clone, Debug)]
@@ -169,6 +163,10 @@ fn sweep_boat(
     from_s: f64,
     to_s: f64,
 ) -> Option<(f64, Zone, DVec3)> {
+    /// The path may bend by so much in a turning boat's space before it is followed in shorter pieces, metres.
+    const BEND_M: f64 = 0.005;
+    /// Most pieces of a stretch.
+    const PIECES_MAX: f64 = 32.0;
     let (a, b) = (segment.from.position, segment.to.position);
     let (p, q) = (moving.pose_at(from_s, eye), moving.pose_at(to_s, eye));
     let (near, far) = (a - p.position, b - q.position);
@@ -202,6 +200,8 @@ fn distance_to_origin(a: DVec3, b: DVec3) -> f64 {
 
 /// How far along the segment the round meets the water.
 fn water_fraction(segment: &FlightSegment, sea: &WaveField, from_s: f64, to_s: f64) -> Option<f64> {
+    /// Distance between the places at which a low round is held against the waves, metres.
+    const WATER_STEP_M: f64 = 1.0;
     let (a, b) = (segment.from.position, segment.to.position);
     let crest = sea.crest_max_m();
     if a.z.min(b.z) > crest {

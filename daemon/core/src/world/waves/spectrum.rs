@@ -2,14 +2,8 @@
 
 use crate::{physics::GRAVITY_M_S2, sea::BeaufortForce};
 
-/// Phillips' constant of the Pierson-Moskowitz spectrum.
-const ALPHA: f64 = 0.0081;
-/// Wind at 19.5 m, where Pierson and Moskowitz measured it, over that at 10 m (logarithmic profile).
-const WIND_19_5_OVER_10: f64 = 1.026;
 /// Frequencies are drawn between these multiples of the peak's: 99.9 % of a Pierson-Moskowitz sea's energy.
 const BAND: (f64, f64) = (0.4, 6.0);
-/// Greatest value of the spreading exponent, for wind waves (Goda 1985).
-const SPREAD_MAX: f64 = 10.0;
 
 /// Wave energy by frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +20,8 @@ impl Spectrum {
     /// The sea that a wind of `wind_m_s` at 10 m (0 to 25 m/s) raises after a long time (Pierson and Moskowitz 1964): peak
     /// at 0.877 g over the wind at 19.5 m. `None` outside that range.
     pub fn fully_developed(wind_m_s: f64) -> Option<Self> {
+        /// Wind at 19.5 m, where Pierson and Moskowitz measured it, over that at 10 m (logarithmic profile).
+        const WIND_19_5_OVER_10: f64 = 1.026;
         if wind_m_s == 0.0 {
             return Some(Self::FLAT);
         }
@@ -103,12 +99,16 @@ impl Spectrum {
 
 /// Significant height of a Pierson-Moskowitz sea with its peak at `peak_rad_s`: 4 sqrt(alpha g^2 / (5 peak^4)).
 fn pierson_moskowitz_height(peak_rad_s: f64) -> f64 {
+    /// Phillips' constant of the Pierson-Moskowitz spectrum.
+    const ALPHA: f64 = 0.0081;
     4.0 * GRAVITY_M_S2 * (ALPHA / 5.0).sqrt() / (peak_rad_s * peak_rad_s)
 }
 
 /// Angle from the wind's direction below which the share `quantile` of the energy at `x` times the peak's frequency runs:
 /// cos^2s(angle / 2) with s after Mitsuyasu 1975, radians.
 pub(super) fn spread_quantile(x: f64, quantile: f64) -> f64 {
+    /// Greatest value of the spreading exponent, for wind waves (Goda 1985).
+    const SPREAD_MAX: f64 = 10.0;
     let s = SPREAD_MAX * if x <= 1.0 { x.powi(5) } else { x.powf(-2.5) };
     let angle = |i: i32| f64::from(i - 360) * std::f64::consts::PI / 360.0;
     let points: Vec<(f64, f64)> =

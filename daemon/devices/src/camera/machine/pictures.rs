@@ -40,12 +40,12 @@ pub(super) struct PictureLayout {
 
 /// The layout, where the format is uncompressed. A row can be no shorter than its pixels, whatever the driver says.
 pub(super) fn layout(format: &SetFormat) -> Option<PictureLayout> {
-    let (width, height) = (format.width as usize, format.height as usize);
-    let (pixels, row, rows) = match format.coding {
-        Coding::Yuyv => (PixelFormat::Yuyv, width * 2, height),
-        Coding::Nv12 => (PixelFormat::Nv12, width, height + height / 2),
+    let pixels = match format.coding {
+        Coding::Yuyv => PixelFormat::Yuyv,
+        Coding::Nv12 => PixelFormat::Nv12,
         Coding::Mjpeg | Coding::Other(_) => return None,
     };
+    let (row, rows) = (pixels.row_bytes(format.width), pixels.rows(format.height));
     let stride = (format.bytes_per_line as usize).max(row);
     // The last row need not be padded.
     Some(PictureLayout { pixels, row, stride, rows, bytes: stride * rows.saturating_sub(1) + row })
@@ -218,27 +218,31 @@ impl CameraMachine {
             self.clear(now, Fault::CamFormat, out);
         }
         self.tell_damage(now, false, stream, out);
-        if self.stillness.push(now, picture.bytes()) {
-            let cause = format!(
+        let still = self.stillness.push(now, picture.bytes()).then(|| {
+            format!(
                 "the pictures of {} have not changed for a second: uncover the lens, or replug the camera",
                 stream.found.best_name().display()
-            );
-            self.raise(now, Fault::CamStatic, cause, out);
-        } else {
-            self.clear(now, Fault::CamStatic, out);
-        }
+            )
+        });
+        self.tell(now, Fault::CamStatic, still, out);
     }
 
     fn tell_damage(&mut self, now: Time, damaged: bool, stream: &CameraStream, out: &mut CameraOutput) {
-        if self.damage.push(now, damaged) {
+        let damaged = self.damage.push(now, damaged).then(|| {
             let (bad, all) = self.damage.share();
-            let cause = format!(
+            format!(
                 "{bad} of {all} pictures of {} are damaged: check its cable",
                 stream.found.best_name().display()
-            );
-            self.raise(now, Fault::CamCorrupt, cause, out);
-        } else {
-            self.clear(now, Fault::CamCorrupt, out);
+            )
+        });
+        self.tell(now, Fault::CamCorrupt, damaged, out);
+    }
+
+    /// `fault` is there for that cause, or is not.
+    fn tell(&mut self, now: Time, fault: Fault, cause: Option<String>, out: &mut CameraOutput) {
+        match cause {
+            Some(cause) => self.raise(now, fault, cause, out),
+            None => self.clear(now, fault, out),
         }
     }
 

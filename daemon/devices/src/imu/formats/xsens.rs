@@ -25,8 +25,6 @@ const MASTER: u8 = 0xff;
 const MTDATA2: u8 = 0x36;
 /// The longest payload that the protocol knows, bytes.
 const PAYLOAD_MAX_BYTES: usize = 2048;
-/// Nanoseconds of the fine sample time's tick (10 kHz).
-const FINE_TICK_NS: i64 = 100_000;
 
 /// Kind of a message, and its payload's place and length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -196,6 +194,8 @@ impl ImuCodec for XsensCodec {
 impl XsensCodec {
     /// The measurements in our axes: the body's y and z are turned over, the reference becomes east-north-up.
     fn convert(&mut self, packet: &XsensMessage) -> Reading {
+        /// Nanoseconds of the fine sample time's tick (10 kHz).
+        const FINE_TICK_NS: i64 = 100_000;
         let count = packet.counter.map(|n| self.counter.next(u64::from(n)));
         let stamp = match (packet.sample_time_fine, count) {
             (Some(ticks), _) => {

@@ -69,18 +69,10 @@ impl Meshes {
             indices.extend_from_slice(&made.indices);
             vertices.extend_from_slice(&made.vertices);
         }
-        let vertices = filled(
-            gpu,
-            "models' corners",
-            bytemuck::cast_slice(&vertices),
-            vk::BufferUsageFlags::VERTEX_BUFFER,
-        )?;
-        let indices = filled(
-            gpu,
-            "models' triangles",
-            bytemuck::cast_slice(&indices),
-            vk::BufferUsageFlags::INDEX_BUFFER,
-        )?;
+        let of = vk::BufferUsageFlags::VERTEX_BUFFER;
+        let vertices = filled(gpu, "models' corners", bytemuck::cast_slice(&vertices), of)?;
+        let of = vk::BufferUsageFlags::INDEX_BUFFER;
+        let indices = filled(gpu, "models' triangles", bytemuck::cast_slice(&indices), of)?;
         Ok(Self { meshes, vertices, indices, skin_layout, _sampler: sampler })
     }
 

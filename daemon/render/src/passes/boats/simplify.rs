@@ -16,12 +16,8 @@ use crate::{
 
 /// Error of the finest simplified level, metres; each level has twice the error of the one before.
 const ERROR_MIN_M: f32 = 0.008;
-/// A level is kept if it has at most this share of the triangles of the one before.
-const WORTHWHILE: f64 = 0.8;
 /// No model is simplified to fewer triangles.
 const TRIANGLES_MIN: usize = 40;
-/// A boat that is longer than so many pixels is not seen whole.
-const FILLED_PX: f32 = 1600.0;
 /// What a whole change of normal and of colour weighs, in parts of the level's error.
 const NORMAL_WEIGHT: f32 = 0.5;
 const ALBEDO_WEIGHT: f32 = 6.0;
@@ -60,11 +56,15 @@ pub(crate) struct Simplified {
 /// What a pixel spans at a boat that is drawn from the level of that error, at least: the error hides in a part of it, and no boat is
 /// looked at from nearer than where it fills the picture.
 fn least_pixel_m(error_m: f32, size_m: f32) -> f32 {
+    /// A boat that is longer than so many pixels is not seen whole.
+    const FILLED_PX: f32 = 1600.0;
     (error_m.max(ERROR_MIN_M / 2.0) / DETAIL_PX as f32).max(size_m / FILLED_PX)
 }
 
 /// Makes the levels of `model`, whose indices are known to lie within its vertices; without long edges where a lens is `bent`.
 pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
+    /// A level is kept if it has at most this share of the triangles of the one before.
+    const WORTHWHILE: f64 = 0.8;
     let vertices: Vec<MeshVertex> = model
         .vertices
         .iter()

@@ -3,8 +3,7 @@ use proptest::prelude::*;
 use super::{
     super::{
         QUADS_MAX, SHAPE_GLYPH,
-        tests::{SIZES, check, letters},
-        text_px,
+        tests::{SIZES, blank, check, letters},
     },
     *,
 };
@@ -34,9 +33,7 @@ fn full() -> Guide {
 #[test]
 fn a_full_page_fits_every_screen_and_what_to_do_is_whole() {
     for size in SIZES {
-        let (large, small) = text_px(size);
-        let glyphs = Glyphs::new(large, small).unwrap();
-        let mut layout = HudLayout::new(size);
+        let (glyphs, mut layout) = blank(size);
         let guide = full();
         let quads = layout.lay_out_guide(&glyphs, &guide).to_vec();
         check(size, &quads, "guide");
@@ -61,9 +58,7 @@ proptest! {
         columns in 0usize..90, cells in 0usize..90, gauges in 0usize..20,
         w in 320_u32..4000, h in 180_u32..2200,
     ) {
-        let (large, small) = text_px((w, h));
-        let glyphs = Glyphs::new(large, small).unwrap();
-        let mut layout = HudLayout::new((w, h));
+        let (glyphs, mut layout) = blank((w, h));
         let [title, says, problem, line, value] = texts.try_into().unwrap();
         let guide = Guide {
             title, says, problem: Some(problem), lines: vec![line],

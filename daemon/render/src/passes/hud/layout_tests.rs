@@ -6,6 +6,12 @@ use super::*;
 pub(super) const SIZES: [(u32, u32); 7] =
     [(800, 480), (640, 360), (320, 180), (1024, 600), (1280, 720), (640, 480), (1920, 1080)];
 
+/// Glyphs for a screen of `size`, and its layout with nothing on it.
+pub(super) fn blank(size: (u32, u32)) -> (Glyphs, HudLayout) {
+    let (large, small) = text_px(size);
+    (Glyphs::new(large, small).unwrap(), HudLayout::new(size))
+}
+
 fn hud(status: Status, warning: Option<Fault>) -> Hud {
     Hud { status, warning, rounds_left: 9999, shots: 9999, hits: 9999, clock_s: 359_999.0, ..Hud::READY }
 }
@@ -48,9 +54,7 @@ pub(super) fn check(size: (u32, u32), quads: &[HudQuad], what: &str) {
 #[test]
 fn the_sea_stands_below_the_clock_and_hides_nothing() {
     for size in SIZES {
-        let (large, small) = text_px(size);
-        let glyphs = Glyphs::new(large, small).unwrap();
-        let mut layout = HudLayout::new(size);
+        let (glyphs, mut layout) = blank(size);
         for source in [SeaSource::Ordered, SeaSource::Measured, SeaSource::Kept, SeaSource::Assumed] {
             let without = glyph_count(layout.lay_out(&glyphs, &hud(Status::Ready, None)));
             let told = Hud { sea: WmoSeaState::new(3).map(|s| (s, source)), ..hud(Status::Ready, None) };
@@ -64,9 +68,7 @@ fn the_sea_stands_below_the_clock_and_hides_nothing() {
 #[test]
 fn the_headings_uncertainty_stands_below_and_hides_nothing() {
     for size in SIZES {
-        let (large, small) = text_px(size);
-        let glyphs = Glyphs::new(large, small).unwrap();
-        let mut layout = HudLayout::new(size);
+        let (glyphs, mut layout) = blank(size);
         let plain = glyph_count(layout.lay_out(&glyphs, &hud(Status::Ready, None)));
         for sea in [None, WmoSeaState::new(3).map(|s| (s, SeaSource::Assumed))] {
             let without = Hud { sea, ..hud(Status::Ready, None) };
@@ -92,9 +94,7 @@ pub(super) fn letters(text: &str) -> usize {
 #[test]
 fn every_state_and_every_warning_fit_together_without_clipping_or_overlap() {
     for size in SIZES {
-        let (large, small) = text_px(size);
-        let glyphs = Glyphs::new(large, small).unwrap();
-        let mut layout = HudLayout::new(size);
+        let (glyphs, mut layout) = blank(size);
         for status in statuses() {
             let plain = layout.lay_out(&glyphs, &hud(status.clone(), None)).to_vec();
             check(size, &plain, &format!("{status:?}"));
@@ -119,9 +119,7 @@ fn every_state_and_every_warning_fit_together_without_clipping_or_overlap() {
 #[test]
 fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
     let size = (800, 480);
-    let (large, small) = text_px(size);
-    let glyphs = Glyphs::new(large, small).unwrap();
-    let mut layout = HudLayout::new(size);
+    let (glyphs, mut layout) = blank(size);
     let (cause, action) = ("A", "B");
     let states = [
         Status::Ready,
@@ -192,9 +190,7 @@ proptest! {
         rounds_left: u32, shots: u32, hits: u32, clock_s in prop::num::f64::ANY,
         w in 320_u32..4000, h in 180_u32..2200,
     ) {
-        let (large, small) = text_px((w, h));
-        let glyphs = Glyphs::new(large, small).unwrap();
-        let mut layout = HudLayout::new((w, h));
+        let (glyphs, mut layout) = blank((w, h));
         let hud = Hud { rounds_left, shots, hits, clock_s, ..hud(Status::Ready, None) };
         check((w, h), layout.lay_out(&glyphs, &hud), "odd numbers");
     }

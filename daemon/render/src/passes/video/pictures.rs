@@ -118,15 +118,12 @@ impl Views {
 
 impl Drop for Views {
     fn drop(&mut self) {
-        if self.gpu.is_abandoned() {
-            return;
-        }
         // SAFETY: owners drop views only once no frame in flight reads through them; null views are allowed.
-        unsafe {
+        self.gpu.destroy(|device| unsafe {
             for view in self.raw {
-                self.gpu.device.destroy_buffer_view(view, None);
+                device.destroy_buffer_view(view, None);
             }
-        }
+        });
     }
 }
 

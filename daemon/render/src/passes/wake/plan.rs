@@ -16,33 +16,8 @@ use crate::passes::water::{SEEN_DOWN, block::mirrored_sky};
 
 const _: () = assert!(TRACK_POINTS == bowwave_core::frame::wake::TRACK_POINTS);
 
-/// Share of the light that fresh foam throws back (Whitlock, Bartlett & Gurganus 1982).
-const FOAM_ALBEDO: f32 = 0.55;
 /// Foam is no brighter than this share of the video's white.
 const FOAM_MAX: f32 = 0.85;
-/// The shader's sea is brought to the picture's by no more than this factor and no less than its inverse.
-const FIT_MAX: f32 = 4.0;
-/// Where a stretch of wake as long as it is wide takes up fewer rows of pixels, nothing is drawn, and from the second on all of it: in
-/// between it fades, so that what shrinks below a pixel does not flicker.
-const ROWS: (f64, f64) = (0.35, 1.5);
-/// Pixels added around a strip, whose sides bulge a little between its corners under a bent lens.
-const STRIP_MARGIN_PX: f64 = 3.0;
-/// Less of a wake is not seen, and its end not either.
-const SHARE_MIN: f64 = 0.02;
-/// What stands beside a hull reaches so far along it: from ahead of the bow, to behind it, in lengths.
-const SPRAY_ALONG: (f64, f64) = (-0.02, 2.2);
-/// The bow's crest stands so much higher at the hull than waves one length off: the power law of their distance, from there to a
-/// fifth of the length.
-const AT_HULL: f64 = 1.7;
-/// Spray of fewer rows of pixels fades, and of fewer than the first is none.
-const SPRAY_ROWS: (f64, f64) = (0.2, 0.6);
-
-/// A strip is no thinner than this where it can be longer instead, pixels: what runs on the processor shades whole blocks of four by four.
-const THIN_PX: f64 = 8.0;
-/// No strip is longer than this for that, seconds: in between, foam's decay is taken for straight.
-const LONG_S: f64 = 1.4;
-/// Points of the track beside the hull: all of them are drawn.
-const HULL_POINTS: usize = 4;
 
 /// What is drawn of a boat's wake.
 pub(crate) struct WakePlan {
@@ -55,6 +30,8 @@ pub(crate) struct WakePlan {
 
 /// What is drawn of a boat's wake: where points of the track are seen close to each other, some are left out.
 pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan {
+    /// Points of the track beside the hull: all of them are drawn.
+    const HULL_POINTS: usize = 4;
     let camera = &scene.camera;
     let camera_from_world = DMat3::from_quat(camera.world_from_camera.inverse());
     let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
@@ -104,6 +81,10 @@ pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan
 
 /// Whether the strip from a point to the next is seen so thin that it may go on to the one after that.
 fn is_thin(scene: &Scene, wake: &Wake, before: &TrackPoint, points: &[TrackPoint]) -> bool {
+    /// A strip is no thinner than this where it can be longer instead, pixels: what runs on the processor shades whole blocks of four by four.
+    const THIN_PX: f64 = 8.0;
+    /// No strip is longer than this for that, seconds: in between, foam's decay is taken for straight.
+    const LONG_S: f64 = 1.4;
     let [point, after, ..] = points else { return false };
     if after.age_s - before.age_s > LONG_S {
         return false;
@@ -121,6 +102,11 @@ fn is_thin(scene: &Scene, wake: &Wake, before: &TrackPoint, points: &[TrackPoint
 
 /// Height of what the bow throws up, metres, and how much of it is drawn.
 fn spray(scene: &Scene, boat: &BoatView, wake: &Wake) -> (f64, f64) {
+    /// The bow's crest stands so much higher at the hull than waves one length off: the power law of their distance, from there to a
+    /// fifth of the length.
+    const AT_HULL: f64 = 1.7;
+    /// Spray of fewer rows of pixels fades, and of fewer than the first is none.
+    const SPRAY_ROWS: (f64, f64) = (0.2, 0.6);
     let Some(now) = wake.points().first().filter(|p| p.speed_m_s >= SPEED_MIN_M_S) else { return (0.0, 0.0) };
     let high = AT_HULL * height_m(now.speed_m_s, &wake.hull, wake.draught_m);
     let grown = |v: f64, (from, to): (f64, f64)| {
@@ -133,6 +119,8 @@ fn spray(scene: &Scene, boat: &BoatView, wake: &Wake) -> (f64, f64) {
 
 /// The pixels that what stands beside a hull can take; `None` where there is none or it is out of view.
 pub(crate) fn spray_rect(scene: &Scene, boat: &BoatView) -> Option<PixelRect> {
+    /// What stands beside a hull reaches so far along it: from ahead of the bow, to behind it, in lengths.
+    const SPRAY_ALONG: (f64, f64) = (-0.02, 2.2);
     let wake = boat.wake.as_ref().filter(|_| !boat.beyond_horizon)?;
     let (high, thrown) = spray(scene, boat, wake);
     let [bow, middle] = [1, 3].map(|i| wake.points().get(i));
@@ -157,6 +145,11 @@ pub(crate) fn spray_rect(scene: &Scene, boat: &BoatView) -> Option<PixelRect> {
 
 /// How much of a point's wake is drawn: less with its age, and none of what would be finer than the picture.
 fn share(scene: &Scene, wake: &Wake, point: &TrackPoint) -> f64 {
+    /// Where a stretch of wake as long as it is wide takes up fewer rows of pixels, nothing is drawn, and from the second on all of it: in
+    /// between it fades, so that what shrinks below a pixel does not flicker.
+    const ROWS: (f64, f64) = (0.35, 1.5);
+    /// Less of a wake is not seen, and its end not either.
+    const SHARE_MIN: f64 = 0.02;
     let to = point.position - scene.camera.position;
     let eye_m = -to.z;
     if eye_m <= 0.05 || point.speed_m_s < SPEED_MIN_M_S {
@@ -171,17 +164,23 @@ fn share(scene: &Scene, wake: &Wake, point: &TrackPoint) -> f64 {
 
 /// The rectangles of the screen that hold the strips of a wake; `None` out of view.
 pub(crate) fn strip_rects(scene: &Scene, wake: &Wake) -> impl Iterator<Item = Option<PixelRect>> {
+    /// Pixels added around a strip, whose sides bulge a little between its corners under a bent lens.
+    const STRIP_MARGIN_PX: f64 = 3.0;
     wake.strips().map(|corners| bounds(&scene.camera, &scene.lens, &corners, STRIP_MARGIN_PX))
 }
 
 /// Light of whole foam, which lies flat. A camera bends bright light over before it is white.
 fn foam_light(light: &Light) -> Vec3 {
+    /// Share of the light that fresh foam throws back (Whitlock, Bartlett & Gurganus 1982).
+    const FOAM_ALBEDO: f32 = 0.55;
     let whole = FOAM_ALBEDO * light.on_level();
     whole * (FOAM_MAX / whole.max_element().max(FOAM_MAX))
 }
 
 /// What brings the shader's sea to the picture's mean sea.
 fn sea_fit(light: &Light, rough: f64) -> Vec3 {
+    /// The shader's sea is brought to the picture's by no more than this factor and no less than its inverse.
+    const FIT_MAX: f32 = 4.0;
     let model = flat_sea(light, SEEN_DOWN, rough);
     (light.sea / model.max(Vec3::splat(1e-4))).clamp(Vec3::splat(1.0 / FIT_MAX), Vec3::splat(FIT_MAX))
 }

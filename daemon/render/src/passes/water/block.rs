@@ -78,7 +78,7 @@ pub(crate) fn mirror_scale(scene: &Scene, line: &HullLine) -> f64 {
     match scene.water.method {
         ReflectionMethod::Full => SCALE_MAX / blur_px(scene, line).max(1.0),
         // Its bands have so many columns; twice as many texels keep what is thin.
-        ReflectionMethod::Waves => {
+        ReflectionMethod::Baked => {
             let (left, right) = line.ends();
             (2.0 * f64::from(LOBE_COLUMNS) / (right - left).max(1.0)).min(1.0)
         }
@@ -120,8 +120,10 @@ pub(crate) fn water_block(
     placed: &Placed,
 ) -> (WaterBlock, MethodPlan) {
     let height = line.height.max(1.0);
-    let published =
-        matches!(scene.water.method, ReflectionMethod::FullAsPrinted | ReflectionMethod::PhysicsAsPrinted);
+    let published = matches!(
+        scene.water.method,
+        ReflectionMethod::FullAsPublished | ReflectionMethod::PhysicsAsPublished
+    );
     let (shadow, shadow_px) = match (scene.water.shadow, published) {
         (ShadowLevel::None, _) => (0.0, 1.0),
         (level, false) => (SHADOW[level as usize - 1].0, SHADOW[level as usize - 1].1 * height),
@@ -147,14 +149,14 @@ pub(crate) fn water_block(
     let plan = match scene.water.method {
         ReflectionMethod::Off => MethodPlan::new(&[0.0_f32; 4], 0.0, DVec2::ZERO),
         ReflectionMethod::Mirror => mirror::plan(scene, boat, line),
-        ReflectionMethod::FullAsPrinted => full::as_published(scene, &block),
+        ReflectionMethod::FullAsPublished => full::as_published(scene, &block),
         ReflectionMethod::Full => full::corrected(scene, boat, line),
-        ReflectionMethod::PhysicsAsPrinted => physics::as_published(scene, boat, line),
+        ReflectionMethod::PhysicsAsPublished => physics::as_published(scene, boat, line),
         ReflectionMethod::Physics => physics::corrected(scene, boat, line),
-        ReflectionMethod::Waves if scene.water.shadow == ShadowLevel::None => {
+        ReflectionMethod::Baked if scene.water.shadow == ShadowLevel::None => {
             MethodPlan::new(&[0.0_f32; 8], 0.0, DVec2::ZERO)
         }
-        ReflectionMethod::Waves => {
+        ReflectionMethod::Baked => {
             MethodPlan::new(&contact_block(scene, boat, line, &mut block), 0.0, DVec2::ZERO)
         }
     };
@@ -186,11 +188,11 @@ pub(super) const fn method_constant(method: ReflectionMethod) -> u32 {
     match method {
         ReflectionMethod::Off => const { of("METHOD_OFF") },
         ReflectionMethod::Mirror => const { of("METHOD_MIRROR") },
-        ReflectionMethod::FullAsPrinted => const { of("METHOD_FULL_AS_PUBLISHED") },
+        ReflectionMethod::FullAsPublished => const { of("METHOD_FULL_AS_PUBLISHED") },
         ReflectionMethod::Full => const { of("METHOD_FULL") },
-        ReflectionMethod::PhysicsAsPrinted => const { of("METHOD_PHYSICS_AS_PUBLISHED") },
+        ReflectionMethod::PhysicsAsPublished => const { of("METHOD_PHYSICS_AS_PUBLISHED") },
         ReflectionMethod::Physics => const { of("METHOD_PHYSICS") },
-        ReflectionMethod::Waves => const { of("METHOD_BAKED") },
+        ReflectionMethod::Baked => const { of("METHOD_BAKED") },
     }
 }
 

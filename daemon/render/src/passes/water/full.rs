@@ -86,8 +86,8 @@ mod tests {
         assert!((f64::from(one.shift / other.shift) - h1 / h2).abs() < 0.01);
         assert!(other.alpha > one.alpha, "the sea mirrors more at a grazing angle");
         assert!((near.fade_px / far.fade_px - h1 / h2).abs() < 0.01);
-        let (_, near) = plan(40.0, ReflectionMethod::FullAsPrinted);
-        let (_, far) = plan(80.0, ReflectionMethod::FullAsPrinted);
+        let (_, near) = plan(40.0, ReflectionMethod::FullAsPublished);
+        let (_, far) = plan(80.0, ReflectionMethod::FullAsPublished);
         assert_eq!((near.own()[2], near.fade_px), (far.own()[2], far.fade_px));
     }
 }

@@ -247,9 +247,9 @@ fn has_field(method: ReflectionMethod) -> bool {
 /// The variant that a way to mirror needs: light thrown back by waves is drawn by a pass of its own, which leaves the shadow.
 fn drawn(method: ReflectionMethod, shadow: ShadowLevel) -> Option<(ReflectionMethod, ShadowLevel)> {
     match (method, shadow) {
-        (ReflectionMethod::Waves, ShadowLevel::None) => None,
+        (ReflectionMethod::Baked, ShadowLevel::None) => None,
         // Its shadow follows from the light: there are no levels of it.
-        (ReflectionMethod::Waves, _) => Some((method, ShadowLevel::Gradual)),
+        (ReflectionMethod::Baked, _) => Some((method, ShadowLevel::Gradual)),
         _ => Some((method, shadow)),
     }
 }

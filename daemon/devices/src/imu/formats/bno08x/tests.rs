@@ -38,13 +38,8 @@ impl SimulatedUnit for Bno08xCodec {
     }
 }
 
-fn parse(mut stream: &[u8]) -> Vec<Bno08xPacket> {
-    let mut scanner = Scanner::<Bno08xCodec>::new();
-    let mut packets = Vec::new();
-    while let Some(found) = scanner.next_of(&mut stream) {
-        packets.extend(Bno08xPacket::parse(found.bytes));
-    }
-    packets
+fn parse(stream: &[u8]) -> Vec<Bno08xPacket> {
+    Scanner::<Bno08xCodec>::parsed(stream, |bytes, ()| Bno08xPacket::parse(bytes)).0
 }
 
 /// The data sheet's example and what it says of it.

@@ -50,13 +50,8 @@ fn sealed(set: u8, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-fn parse(mut stream: &[u8]) -> (Vec<MipPacket>, LineCounters) {
-    let mut scanner = Scanner::<MicroStrainCodec>::new();
-    let mut packets = Vec::new();
-    while let Some(found) = scanner.next_of(&mut stream) {
-        packets.extend(MipPacket::parse(found.bytes, found.head));
-    }
-    (packets, scanner.counters())
+fn parse(stream: &[u8]) -> (Vec<MipPacket>, LineCounters) {
+    Scanner::<MicroStrainCodec>::parsed(stream, MipPacket::parse)
 }
 
 fn recorded() -> Option<Vec<u8>> {

@@ -45,13 +45,8 @@ pub(crate) fn sbg_frame(message: u8, data: &[u8]) -> Vec<u8> {
     [&[0xff, 0x5a][..], &body, &crc.to_le_bytes(), &[0x33]].concat()
 }
 
-fn parse(mut stream: &[u8]) -> (Vec<SbgLog>, LineCounters) {
-    let mut scanner = Scanner::<SbgCodec>::new();
-    let mut logs = Vec::new();
-    while let Some(found) = scanner.next_of(&mut stream) {
-        logs.extend(SbgLog::parse(found.bytes, found.head));
-    }
-    (logs, scanner.counters())
+fn parse(stream: &[u8]) -> (Vec<SbgLog>, LineCounters) {
+    Scanner::<SbgCodec>::parsed(stream, SbgLog::parse)
 }
 
 /// Check value of CRC-16/KERMIT in the CRC catalogue of Greg Cook.

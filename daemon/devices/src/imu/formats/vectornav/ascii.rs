@@ -183,13 +183,8 @@ mod tests {
             eprintln!("skipped: {} is not there", path.display());
             return;
         };
-        let mut scanner = Scanner::<VectorNavLines>::new();
-        let mut lines = Vec::new();
-        let mut text = &text[..];
-        while let Some(found) = scanner.next_of(&mut text) {
-            lines.push(VectorNavLine::parse(found.bytes).expect("a measurement"));
-        }
-        let counters = scanner.counters();
+        let (lines, counters) =
+            Scanner::<VectorNavLines>::parsed(&text, |bytes, ()| VectorNavLine::parse(bytes));
         assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (9, 0, 0));
         assert_eq!(lines[0].yaw_pitch_roll_deg, Some([-165.918, -8.770, 0.198]));
         assert_eq!(lines[0].rate, None, "that line was cut by who quoted it, with its own check sum");

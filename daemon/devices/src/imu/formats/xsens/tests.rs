@@ -82,13 +82,8 @@ fn decoded<const N: usize>(words: &str, name: &str) -> Option<[f64; N]> {
     Some(values)
 }
 
-fn parse(mut stream: &[u8]) -> (Vec<XsensMessage>, crate::framing::LineCounters) {
-    let mut scanner = Scanner::<XsensCodec>::new();
-    let mut packets = Vec::new();
-    while let Some(found) = scanner.next_of(&mut stream) {
-        packets.extend(XsensMessage::parse(found.bytes, found.head));
-    }
-    (packets, scanner.counters())
+fn parse(stream: &[u8]) -> (Vec<XsensMessage>, crate::framing::LineCounters) {
+    Scanner::<XsensCodec>::parsed(stream, XsensMessage::parse)
 }
 
 fn close<const N: usize>(got: Option<[f64; N]>, want: Option<[f64; N]>) {

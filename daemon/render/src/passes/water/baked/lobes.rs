@@ -18,23 +18,10 @@ use shaders_spirv::interface::{HULL_LINE_COLUMNS, LAYER_COLUMNS, LOBE_COLUMNS, L
 
 use crate::passes::{boats::coverage::Cells, water::line::HullLine};
 
-/// Beyond the ends of the hull the picture of the boat goes on by this share of its width: what overhangs the water line.
-const OVERHANG: f64 = 0.12;
-/// Pixels above the hull-water line that are drawn along the hull, so that no bare water shows between hull and reflection.
-const FOOT_PX: f64 = 3.0;
-/// Pixels beyond the farthest light of a reflection.
-const SIDE_MARGIN_PX: f64 = 4.0;
 /// Pieces of a reflection's outline beside the hull, and of what is marked of it.
 const PIECES: usize = 8;
 /// Most vectors of the frame's list that a boat's strips take.
 pub(crate) const STRIP_VECTORS_MAX: usize = 2 * (HULL_LINE_COLUMNS - 1 + 2 * PIECES);
-/// None is lower than so many pixels.
-const PIECE_PX: f64 = 8.0;
-/// Bands that together throw back or take away less are not looked up: of a boat as bright as white, on water a tenth as bright, less
-/// than half a code of 256.
-const UNSEEN: f32 = 1e-3;
-/// Stands for the width of the band after the last that is looked up.
-const NO_MORE: f32 = -1.0;
 /// Pixels to a column of the boat's picture and of the layers, where there are columns enough; and the fewest columns.
 const COLUMN_PX: f64 = 2.0;
 const COLUMNS_MIN: u32 = 12;
@@ -66,6 +53,10 @@ impl Waves {
         model: &Model,
         out: &mut LobeBlock,
     ) -> Option<Reach> {
+        /// Beyond the ends of the hull the picture of the boat goes on by this share of its width: what overhangs the water line.
+        const OVERHANG: f64 = 0.12;
+        /// Stands for the width of the band after the last that is looked up.
+        const NO_MORE: f32 = -1.0;
         let wind_m_s = scene.wind.length();
         if wind_m_s != self.wind_m_s {
             self.table.set_sea(&mut self.sea, wind_m_s);
@@ -136,6 +127,8 @@ impl Waves {
 
     /// How much farther than the hull the last block's reflection goes to each side at a step, pixels.
     fn side(&self, reach: &Reach, step: usize) -> f64 {
+        /// Pixels beyond the farthest light of a reflection.
+        const SIDE_MARGIN_PX: f64 = 4.0;
         let aside = self.lobes.aside_m.get(step).map_or(0.0, |m| m * reach.pixels);
         aside.max(HALF_WIDTH_MIN_PX) + reach.overhang + SIDE_MARGIN_PX
     }
@@ -149,6 +142,10 @@ impl Waves {
 
     /// Appends the strips of water that the last block's reflection is drawn on, as `reflect.vert` takes them; says how many.
     pub(crate) fn strips(&self, reach: &Reach, line: &HullLine, out: &mut Vec<[f32; 4]>) -> u32 {
+        /// Pixels above the hull-water line that are drawn along the hull, so that no bare water shows between hull and reflection.
+        const FOOT_PX: f64 = 3.0;
+        /// No piece of the outline is lower than so many pixels.
+        const PIECE_PX: f64 = 8.0;
         let before = out.len();
         let mut strip = |x: [f64; 2], y: [f64; 2], below: [f64; 3]| {
             out.push([x[0], x[1], y[0], y[1]].map(|v| v as f32));
@@ -221,6 +218,9 @@ fn focal_px(scene: &Scene, boat: &BoatView) -> Option<f64> {
 
 /// How many bands from the water up are seen: close to the hull, water that is seen from above mirrors little that is high.
 fn seen_bands(bands: &[ReflectionTransfer; BANDS]) -> usize {
+    /// Bands that together throw back or take away less are not looked up: of a boat as bright as white, on water a tenth as bright, less
+    /// than half a code of 256.
+    const UNSEEN: f32 = 1e-3;
     let above = bands.iter().rev().scan(0.0, |sum, l| {
         *sum += l.thrown.most().max(l.taken.most());
         Some(*sum)
