@@ -191,13 +191,13 @@ impl HullForm {
         }
     }
 
-    /// Whether a motion is one that a boat can have on a sea with crests of that height; else the numbers have gone wrong.
-    pub(super) fn is_sane(&self, motion: &BoatMotion, crest_m: f64) -> bool {
+    /// Whether a motion is one that a boat can have on a sea with crests of that height, and so is all [`BoatMotion::between`] it and
+    /// another such one `span_s` apart; else the numbers have gone wrong.
+    pub(super) fn is_sane(&self, motion: &BoatMotion, crest_m: f64, span_s: f64) -> bool {
         let reach = crest_m + 3.0 + 2.0 * self.draught_m + self.strip_m * STRIPS as f64;
-        motion.at.x.abs() < reach
-            && motion.at.y.abs() < 0.4 * PI
-            && motion.at.z.abs() < 0.4 * PI
-            && motion.rate.is_finite()
+        // Between places within bounds a cubic passes them by a quarter of what the greater rate makes of the span, at most.
+        let farthest = motion.at.abs() + motion.rate.abs() * (0.25 * span_s);
+        farthest.x < reach && farthest.y < 0.4 * PI && farthest.z < 0.4 * PI && motion.rate.is_finite()
     }
 }
 

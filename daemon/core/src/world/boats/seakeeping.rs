@@ -50,7 +50,7 @@ impl SeakeepingState {
             let motion = self.motions.last().copied().unwrap_or_default();
             let near = !is_far(&to);
             let next = near.then(|| self.form.step([&from, &to], waves, seconds(number), &motion, STEP_S));
-            let next = next.filter(|next| self.form.is_sane(next, waves.crest_max_m()));
+            let next = next.filter(|next| self.form.is_sane(next, waves.crest_max_m(), STEP_S));
             let next = next.unwrap_or_else(|| self.plane(number + 1, &course, waves));
             self.motions.push(next);
             from = to;

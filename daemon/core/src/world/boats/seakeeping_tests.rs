@@ -206,7 +206,7 @@ fn boats_of_scenarios_at_full_speed_never_leave_the_water_for_good() {
                 let (a, b) = (course(seconds(number)), course(seconds(number + 1)));
                 motion = form.step([&a, &b], &waves, seconds(number), &motion, STEP_S);
                 assert!(
-                    form.is_sane(&motion, waves.crest_max_m()),
+                    form.is_sane(&motion, waves.crest_max_m(), 0.0),
                     "force {force}, step {number}: {motion:?}"
                 );
             }
@@ -230,7 +230,7 @@ proptest! {
             let t = f64::from(i) * hitch.min(0.4);
             ride.follow(t, &course, &waves);
             let motion = ride.at(t);
-            let sane = motion.is_some_and(|m| ride.form().is_sane(&m, waves.crest_max_m()));
+            let sane = motion.is_some_and(|m| ride.form().is_sane(&m, waves.crest_max_m(), 0.0));
             prop_assert!(sane, "{motion:?} after {t} s");
         }
     }
