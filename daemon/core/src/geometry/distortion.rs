@@ -36,6 +36,8 @@ const REACH_STEPS: u32 = 512;
 
 /// Newton's method is stopped after so many steps; halving the bracket alone would need as many.
 const STEPS_MAX: usize = 60;
+/// A step of it is halved at most so often.
+const HALVINGS_MAX: i32 = 20;
 
 impl Distortion {
     /// Radial k1, k2 and tangential p1, p2; a pinhole where all are zero.
@@ -152,14 +154,21 @@ impl RadialTangential {
         });
         let mut n = distorted * (radius / far);
         let mut off = distorted - self.bend(n);
+        // Within rounding: no step comes nearer.
+        let enough = 1e-30 * distorted.length_squared();
         for _ in 0..STEPS_MAX {
-            let next = n + self.slope(n).inverse() * off;
-            let left = distorted - self.bend(next);
-            let nearer = left.length_squared() < off.length_squared();
-            if !nearer {
-                break;
-            }
-            (n, off) = (next, left);
+            let step = self.slope(n).inverse() * off;
+            // Where the radius hardly grows a whole step goes too far.
+            let nearer = (0..HALVINGS_MAX).find_map(|halvings| {
+                if halvings > 0 && off.length_squared() <= enough {
+                    return None;
+                }
+                let next = n + step * 0.5f64.powi(halvings);
+                let left = distorted - self.bend(next);
+                (left.length_squared() < off.length_squared()).then_some((next, left))
+            });
+            let Some(nearer) = nearer else { break };
+            (n, off) = nearer;
         }
         n
     }
