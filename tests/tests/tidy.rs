@@ -14,6 +14,7 @@ use serde_json::Value;
 /// Crates by rank: a crate may depend only on crates of lower rank (ARCHITECTURE.md).
 const RANKS: &[(&str, u8)] = &[
     ("bowwave-core", 0),
+    ("bowwave-files", 0),
     ("shaders-spirv", 0),
     // A tool of tests that knows nothing of the product.
     ("gpu-fault-layer", 0),

@@ -13,9 +13,10 @@ pub use error::CalibrationError;
 pub use parse::parse;
 pub use write::to_toml;
 
-use std::{fs, path::Path};
+use std::path::Path;
 
 use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, text::toml::bounded_text};
+use bowwave_files::plain_file;
 use glam::DVec2;
 
 /// When and how something was measured.
@@ -106,7 +107,7 @@ impl CalibrationFile {
 
     /// Reads and checks a file.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
-        let text = fs::File::open(path)
+        let text = plain_file(path)
             .and_then(bounded_text)
             .map_err(|source| CalibrationError::Read { path: path.to_owned(), source })?;
         parse(&text, &path.display().to_string())

@@ -12,6 +12,7 @@ use std::{
 };
 
 use bowwave_core::event::ImuSample;
+use bowwave_files::plain_file;
 use glam::DVec3;
 
 use crate::{
@@ -46,7 +47,7 @@ const PAYLOAD_MAX_BYTES: u64 = 512 << 10;
 pub fn read_telemetry(ffmpeg: &Path, path: &Path) -> Result<Option<Telemetry>, ImportError> {
     let read = |source| ImportError::Read { path: path.to_owned(), source };
     let fail = |what: String| ImportError::Telemetry { path: path.to_owned(), what };
-    let mut file = File::open(path).map_err(read)?;
+    let mut file = plain_file(path).map_err(read)?;
     let Some(packets) = gpmf_packets(ffmpeg, path)? else { return Ok(None) };
     log::debug!("{}: {} payloads in the gyro track", path.display(), packets.len());
     let model = gpmf::camera_model(&ends(&mut file).map_err(read)?).unwrap_or_default();

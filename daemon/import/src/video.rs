@@ -1,8 +1,9 @@
 //! A recording from a video, with its gyro where it has one.
 
-use std::{collections::BTreeMap, fs::File, ops::ControlFlow, path::Path, sync::Arc};
+use std::{collections::BTreeMap, ops::ControlFlow, path::Path, sync::Arc};
 
 use bowwave_core::{event::ImuSample, geometry::look, time::Time};
+use bowwave_files::plain_file;
 use bowwave_record::{Entry, FrameEntry};
 use glam::{DQuat, DVec3};
 
@@ -28,7 +29,7 @@ pub fn import_video(
 ) -> Result<ImportReport, ImportError> {
     refuse_existing(out, options.replace)?;
     // The system's own reason is better than what a program makes of it.
-    File::open(video).map_err(|source| ImportError::Read { path: video.to_owned(), source })?;
+    plain_file(video).map_err(|source| ImportError::Read { path: video.to_owned(), source })?;
     let info = probe(&options.ffmpeg, video)?;
     let gyro = VideoGyro::read(video, options)?;
     let mut reader = VideoReader::start(&options.ffmpeg, video, None)?;

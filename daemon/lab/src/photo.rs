@@ -4,6 +4,7 @@ use std::{io::BufReader, path::Path, sync::Arc};
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::event::{Picture, PixelFormat};
+use bowwave_files::plain_file;
 use image::{DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage, metadata::Orientation};
 
 use crate::still::{SIZE_RANGE, film_focal_px};
@@ -21,7 +22,7 @@ impl Photo {
     /// Reads a JPEG or PNG file, turned as its camera says that it was held.
     pub fn read(path: &Path) -> Result<Self> {
         let said = || format!("cannot read the picture {}; name a JPEG or PNG file", path.display());
-        let file = std::fs::File::open(path).with_context(said)?;
+        let file = plain_file(path).with_context(said)?;
         let mut reader = ImageReader::new(BufReader::new(file)).with_guessed_format().with_context(said)?;
         let mut limits = Limits::default();
         (limits.max_image_width, limits.max_image_height) =

@@ -5,7 +5,7 @@
 mod camera;
 mod read;
 
-use std::{fs::File, path::Path};
+use std::path::Path;
 
 use anyhow::{Context, Result};
 use bowwave::loading::warn_of_former_names;
@@ -32,6 +32,7 @@ use bowwave_core::{
         waves::{WaveField, WaveSpec},
     },
 };
+use bowwave_files::plain_file;
 pub use camera::{Focal, StillAttitude, StillCamera, film_focal_px};
 
 /// A commented text to begin with.
@@ -127,7 +128,7 @@ impl Still {
 
     /// Reads and checks a file; tells of former names in it. `advice` says where an example of such a file is.
     pub fn read(path: &Path, advice: &str) -> Result<Self> {
-        let text = File::open(path)
+        let text = plain_file(path)
             .and_then(bounded_text)
             .with_context(|| format!("cannot read the scene {}; {advice}", path.display()))?;
         let still = Self::parse(&text, &path.display().to_string())?;

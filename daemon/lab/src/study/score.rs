@@ -79,7 +79,7 @@ impl<'a> Answers<'a> {
 
     fn read(&mut self, path: &Path) -> Result<()> {
         let told = || format!("cannot read the answers {}", path.display());
-        let file = std::fs::File::open(path).with_context(told)?;
+        let file = bowwave_files::plain_file(path).with_context(told)?;
         self.take(file, &path.display().to_string())
     }
 

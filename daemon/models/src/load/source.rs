@@ -1,12 +1,12 @@
 //! A glTF document with its buffers in memory, everything bounded.
 
 use std::{
-    fs::File,
     io::Read,
     path::{Component, Path, PathBuf},
 };
 
 use base64::{Engine, engine::general_purpose::STANDARD};
+use bowwave_files::plain_file;
 use gltf::{
     Document,
     json::{self, mesh::Semantic, validation::Checked},
@@ -128,11 +128,8 @@ pub(crate) fn limit(file: &str, what: &'static str, value: u64, most: u64) -> Re
 pub(crate) fn read_bounded(path: &Path) -> Result<Vec<u8>, ModelError> {
     let file = path.display().to_string();
     let read = |source| ModelError::Read { file: file.clone(), source };
-    let handle = File::open(path).map_err(read)?;
+    let handle = plain_file(path).map_err(read)?;
     let meta = handle.metadata().map_err(read)?;
-    if !meta.is_file() {
-        return Err(read(std::io::Error::other("not a plain file")));
-    }
     limit(&file, "the file's size in bytes", meta.len(), FILE_BYTES_MAX)?;
     let mut bytes = Vec::with_capacity(meta.len() as usize);
     handle.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(read)?;

@@ -3,11 +3,12 @@
 
 use std::{
     fs::File,
-    io::{self, Read, Seek, SeekFrom},
+    io::{Read, Seek, SeekFrom},
     path::Path,
     sync::Arc,
 };
 
+use bowwave_files::plain_file;
 use mcap::{
     McapError,
     records::{Record, op},
@@ -41,11 +42,8 @@ impl Records {
     /// From the record that begins at `offset`; 0 is the beginning of the file.
     pub(crate) fn open_at(path: &Arc<Path>, offset: u64) -> Result<Self, RecordError> {
         let open = |source| RecordError::Open { path: path.to_path_buf(), source };
-        let mut file = File::open(path).map_err(open)?;
+        let mut file = plain_file(path).map_err(open)?;
         let status = file.metadata().map_err(open)?;
-        if status.is_dir() {
-            return Err(open(io::Error::from(io::ErrorKind::IsADirectory)));
-        }
         if status.len() == 0 {
             return Err(RecordError::Empty { path: path.to_path_buf() });
         }

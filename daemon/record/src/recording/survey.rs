@@ -1,13 +1,13 @@
 //! Survey of a file before its entries are read: from its index, or by reading all of it once.
 
 use std::{
-    fs::File,
     io::{Read, Seek, SeekFrom},
     path::Path,
     sync::Arc,
 };
 
 use bowwave_core::time::Time;
+use bowwave_files::plain_file;
 use mcap::records::{Record, Statistics, op};
 
 use super::{
@@ -172,7 +172,7 @@ impl Survey {
 /// Where the index begins; `None` where the file does not end as a whole file does.
 fn summary_start(path: &Path) -> Option<u64> {
     const TAIL: usize = 9 + 20 + 8;
-    let mut file = File::open(path).ok()?;
+    let mut file = plain_file(path).ok()?;
     let end = file.seek(SeekFrom::End(-(TAIL as i64))).ok()?;
     let mut tail = [0; TAIL];
     file.read_exact(&mut tail).ok()?;

@@ -1,0 +1,52 @@
+//! How files that somebody named are opened: by this and by nothing else.
+
+#![forbid(unsafe_code)]
+
+use std::{
+    fs::{File, OpenOptions},
+    io,
+    os::unix::fs::OpenOptionsExt as _,
+    path::Path,
+};
+
+use rustix::fs::OFlags;
+
+/// Opens a plain file for reading. Never waits: a pipe without a writer would hold the caller for ever, and a device could answer without
+/// end. Whoever reads bounds what is read.
+///
+/// # Errors
+/// Those of the system; and where it is not a plain file.
+pub fn plain_file(path: &Path) -> io::Result<File> {
+    // The open mode's bits are a C int.
+    let file =
+        OpenOptions::new().read(true).custom_flags(OFlags::NONBLOCK.bits().cast_signed()).open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a plain file"));
+    }
+    Ok(file)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+
+    use super::*;
+
+    #[test]
+    fn what_is_not_a_plain_file_is_refused_without_waiting() {
+        let folder = tempfile::tempdir().unwrap();
+        let pipe = folder.path().join("pipe");
+        mknodat(CWD, &pipe, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0).unwrap();
+        let begun = Instant::now();
+        for path in [&pipe, Path::new("/dev/zero"), folder.path()] {
+            let error = plain_file(path).unwrap_err();
+            assert!(error.to_string().contains("not a plain file"), "{error}");
+        }
+        assert!(begun.elapsed() < Duration::from_secs(5));
+        let file = folder.path().join("file");
+        std::fs::write(&file, "text").unwrap();
+        assert_eq!(io::read_to_string(plain_file(&file).unwrap()).unwrap(), "text");
+    }
+}
