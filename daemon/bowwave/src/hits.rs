@@ -1,7 +1,8 @@
 //! `bowwave hits`: the rounds of a journal as a table, CSV or JSON.
 
 use anyhow::{Context, Result, bail};
-use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots};
+use bowwave_core::text::one_line;
+use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots, side_files};
 
 use bowwave_trainer::storage::JOURNAL;
 
@@ -39,6 +40,12 @@ pub fn run(arguments: &Hits) -> Result<()> {
         None if arguments.all_runs => RunSelection::All,
         None => RunSelection::Latest,
     };
+    for file in side_files(&path).unwrap_or_default() {
+        log::warn!(
+            "{} has rounds that the journal does not; the next run that writes this journal takes them in or says why not",
+            file.display()
+        );
+    }
     let shots = read_shots(&path, &ShotFilter { runs, hits_only: arguments.hits_only })?;
     match if arguments.json { HitsFormat::Json } else { arguments.format } {
         HitsFormat::Table => stdout::print(table(&shots)),
@@ -51,9 +58,17 @@ fn csv(shots: &[StoredShot]) -> Result<Vec<u8>> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(StoredShot::COLUMNS)?;
     for shot in shots {
-        writer.write_record(shot.cells())?;
+        let cells = shot.cells();
+        writer.write_record(StoredShot::COLUMNS.iter().zip(&cells).map(|(name, cell)| plain(name, cell)))?;
     }
     writer.into_inner().context("cannot write the CSV")
+}
+
+/// A name that a spreadsheet would take for a formula, marked as the text that it is.
+fn plain(column: &str, cell: &str) -> String {
+    let is_text = ["outcome", "boat", "zone", "cause"].contains(&column);
+    let mark = if is_text && cell.starts_with(['=', '+', '-', '@', '\t', '\r']) { "'" } else { "" };
+    format!("{mark}{cell}")
 }
 
 fn table(shots: &[StoredShot]) -> String {
@@ -64,7 +79,7 @@ fn table(shots: &[StoredShot]) -> String {
             let text = StoredShot::COLUMNS.iter().position(|c| c == name).map_or("", |i| cells[i].as_str());
             match (digits, text.parse::<f64>()) {
                 (Some(digits), Ok(value)) => format!("{value:.digits$}"),
-                _ => text.to_owned(),
+                _ => one_line(text),
             }
         };
         rows.push(TABLE.iter().map(cell).collect());

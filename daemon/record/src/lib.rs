@@ -8,7 +8,8 @@ pub mod space;
 
 pub use journal::{
     DirtyEnd, DirtyRun, Journal, JournalError, JournalFault, JournalOptions, JournalSummary, Quarantine, Run,
-    RunSelection, ShotFilter, StoredRun, StoredShot, Unwritten, boot_id, read_runs, read_shots,
+    RunSelection, ShotFilter, StoredRun, StoredShot, Unwritten, boot_id, put_aside, read_runs, read_shots,
+    side_files,
 };
 pub use recording::{
     CameraInfo, Counts, Entries, Entry, FaultEntry, FrameEntry, PictureEntry, PoseEntry, Properties,

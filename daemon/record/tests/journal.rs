@@ -179,7 +179,7 @@ fn what_lies_at_the_programs_own_path_was_a_journal() {
     let journal = Journal::open_with(&path, &run(), &options).unwrap();
     let aside = journal.quarantined().unwrap();
     assert!(aside.reason.contains("no database"), "{}", aside.reason);
-    assert_eq!(fs::read(&aside.kept_as).unwrap(), garbage);
+    assert_eq!(fs::read(aside.kept_as.unwrap()).unwrap(), garbage);
     journal.shot(&shot(1)).unwrap();
     journal.finish().unwrap();
     assert_eq!(read_shots(&path, &ShotFilter::default()).unwrap().len(), 1);
@@ -260,7 +260,7 @@ fn a_damaged_journal_is_put_aside_and_a_fresh_one_begun() {
         count += 1;
         let journal = Journal::open(&path, &run()).unwrap();
         let aside = folder.path().join(format!("hits.db.corrupt-{count}"));
-        assert_eq!(journal.quarantined().map(|q| q.kept_as), Some(aside.clone()));
+        assert_eq!(journal.quarantined().unwrap().kept_as, Some(aside.clone()));
         assert!(fs::read(&aside).unwrap() == damaged, "kept as it was");
         journal.shot(&shot(1)).unwrap();
         assert_eq!(journal.finish().unwrap().committed, 1);

@@ -9,6 +9,7 @@ use std::{
     path::{Path, PathBuf},
     sync::{Arc, atomic::AtomicBool, atomic::Ordering},
     thread,
+    time::Duration,
 };
 
 use anyhow::{Context, Result};
@@ -160,6 +161,8 @@ impl Gun<'_> {
             journal: JournalOptions {
                 reserve_bytes: JournalOptions::RESERVE_BYTES,
                 own: true,
+                // The service is killed after two seconds.
+                end_within: Duration::from_millis(700),
                 ..JournalOptions::default()
             },
             recording: settings.config.record.then(|| recording_in(self.data, "recording", settings)),

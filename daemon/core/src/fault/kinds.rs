@@ -61,6 +61,14 @@ faults! {
     CamFormat = "CAM_FORMAT", Fault, "CAL LOST: PICTURE SIZE", "CALIBRATE THIS CAMERA";
     /// There is no calibration that can be used.
     NoCalibration = "CAL_NONE", Fault, "NOT CALIBRATED", "CALIBRATE THE CAMERA";
+    /// The contacts of the inert interlock differ: one of their wires is broken or shorted.
+    Interlock = "INTERLOCK", Fault, "NOT ARMED: INTERLOCK BROKEN", "PULL THE INERT PLUG, FIT IT";
+    /// The interlock's one contact has not shown the plug out since the start: its wire may be shorted.
+    InterlockUntested = "INTERLOCK_TEST", Fault, "NOT ARMED: TEST THE INERT PLUG", "PULL THE INERT PLUG, FIT IT";
+    /// There is no interlock, or a broken wire of it would read as inert.
+    InterlockWiring = "INTERLOCK_CFG", Fault, "NOT ARMED: NO SAFE INTERLOCK", "SEE THE LOG, CORRECT IT";
+    /// The configuration was refused: nothing is armed by an earlier one, which may be that of another gun.
+    FormerConfig = "CFG_FORMER", Fault, "NOT ARMED: OLD CONFIGURATION", "SEE THE LOG, CORRECT IT";
     /// The inert interlock is open: the trainer does not arm.
     NotInert = "NOT_INERT", Fault, "NOT ARMED: GUN NOT INERT", "FIT THE INERT PLUG";
     /// The configuration or a file that it names was refused; the last good one is kept.
@@ -121,6 +129,8 @@ faults! {
     DiskFsync = "DISK_FSYNC", Warning, "REC LOST: DISK FAILS", "REPLACE THE DISK";
     /// The journal was damaged; a fresh one is used and the old one kept.
     DbQuarantine = "DB_QUARANTINE", Warning, "REC: NEW HIT JOURNAL", "KEEP THE OLD FILE, REPORT";
+    /// Another program holds the journal.
+    DbLocked = "DB_LOCKED", Warning, "REC: JOURNAL IN USE", "CLOSE THE OTHER PROGRAM";
     /// The computer is too hot.
     Thermal = "THERMAL", Warning, "HOT", "SHADE THE COMPUTER";
     /// The supply voltage is low.

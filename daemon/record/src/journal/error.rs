@@ -48,6 +48,18 @@ pub enum JournalError {
         /// The database.
         path: PathBuf,
     },
+    /// Another program writes a journal in the same folder.
+    #[error("another program writes a journal in the folder of {}; end it, or give another folder", path.display())]
+    InUse {
+        /// The database.
+        path: PathBuf,
+    },
+    /// Deleted, moved or replaced while in use; another is begun.
+    #[error("the journal {} was deleted, moved or replaced while it was written; this run's rounds go into another in its place", path.display())]
+    Moved {
+        /// Where it was.
+        path: PathBuf,
+    },
     /// The file or its folder cannot be written.
     #[error("the journal {} cannot be written: {reason}; check the permissions of the file and its folder, and that the disk is not mounted read-only", path.display())]
     ReadOnly {
@@ -158,6 +170,8 @@ pub struct Unwritten {
     pub committed: u64,
     /// Why the others were not: one line with what to do.
     pub cause: String,
+    /// How many of them were reported as committed before the disk failed, so that it may have them or not.
+    pub in_doubt: usize,
     /// The rounds, each a line of JSON.
     pub rows: Vec<String>,
     /// The file that they were put into instead; `None` where that failed too and `rows` is all there is of them.
@@ -166,12 +180,24 @@ pub struct Unwritten {
 
 impl fmt::Display for Unwritten {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { committed, cause, rows, side_file, .. } = self;
-        let count = rows.len();
+        let Self { committed, cause, in_doubt, rows, side_file, .. } = self;
+        let count = rows.len() - in_doubt;
         write!(f, "{count} shots could not be written to the journal ({committed} were): {cause}; ")?;
+        if *in_doubt > 0 {
+            write!(f, "the disk may have lost {in_doubt} that were; ")?;
+        }
         match side_file {
-            Some(file) => write!(f, "they are in {} instead", file.display()),
-            None => write!(f, "keep the lines that are printed instead"),
+            Some(file) => write!(f, "they are in {} instead, which the next run takes in", file.display()),
+            None => write!(f, "keep the lines of the log instead"),
+        }
+    }
+}
+
+impl Unwritten {
+    /// Puts each round into the log, which may be on another disk, where no file has them.
+    pub(super) fn log_rows(&self) {
+        for line in self.rows.iter().filter(|_| self.side_file.is_none()) {
+            log::error!("not in the journal: {line}");
         }
     }
 }
@@ -182,8 +208,14 @@ impl JournalError {
         match self {
             Self::Full { .. } => Fault::DiskFull,
             Self::ReadOnly { .. } => Fault::DiskReadOnly,
+            Self::Locked { .. } | Self::InUse { .. } => Fault::DbLocked,
             _ => Fault::DiskFsync,
         }
+    }
+
+    /// Whether what was committed before may have been lost with it.
+    pub(crate) const fn casts_doubt(&self) -> bool {
+        !matches!(self, Self::Locked { .. } | Self::Full { .. })
     }
 
     /// Whether the database itself is damaged.

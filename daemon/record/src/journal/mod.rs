@@ -4,15 +4,20 @@
 //! `synchronous=FULL`: once a round's number comes out of [`Journal::commits`] it survives a crash and a power cut. While the
 //! disk is full or gone, rounds are kept in memory and written as soon as it is back. After an fsync that failed nothing
 //! since the last one that succeeded is taken for written; the database is opened anew and written again. A database that
-//! turns out to be damaged is put aside at any time, and a fresh one goes on with this run's rounds.
+//! turns out to be damaged is put aside at any time, and a fresh one goes on with this run's rounds. A database that was deleted, moved or
+//! replaced is noticed before a round is acknowledged. After any failure of the disk what was acknowledged of this run counts as in doubt
+//! and is inserted again where it is missing.
 //!
 //! Files beside the database `hits.sqlite`: `-wal` and `-shm` are SQLite's, `.reserve` keeps space for when the disk is full,
 //! `.corrupt-N` are damaged databases, `.making` and `.fresh` exist while one is put aside, `.unwritten-N.jsonl` has the
-//! rounds of run N that the database never took.
+//! rounds of run N that the database never took, until the next run takes them in: then it is `.taken-N.jsonl`, or `.refused-N.jsonl`
+//! where the database refuses some of them for good.
 
+mod aside;
 mod boot;
 mod error;
 mod open;
+mod place;
 mod quarantine;
 mod query;
 mod reserve;
@@ -31,12 +36,14 @@ use std::{
 use bowwave_core::{fault::Fault, time::Time, world::score::ShotRecord};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
 
+pub use aside::{put_aside, side_files};
 use boot::WallClock;
 pub use boot::{DirtyEnd, DirtyRun, boot_id};
 pub use error::{JournalError, Unwritten};
+use place::FolderHold;
 pub use query::{RunSelection, ShotFilter, StoredRun, read_runs, read_shots};
 pub use row::StoredShot;
-use worker::{JournalChannels, JournalEnd, JournalWorker};
+use worker::{JournalChannels, JournalEnd, JournalWorker, Pending};
 
 /// Rounds that may wait for the writing thread before [`Journal::shot`] refuses: minutes of firing.
 const QUEUE: usize = 4096;
@@ -71,6 +78,8 @@ pub struct JournalOptions {
     /// The path is the program's own: whatever lies there was a journal, and is put aside where it no longer is one. Else a file
     /// that is no database is taken for somebody's, named by mistake, and left as it is.
     pub own: bool,
+    /// How long the end may take while the disk fails or does not answer; what is not written until then is kept elsewhere.
+    pub end_within: Duration,
 }
 
 impl JournalOptions {
@@ -81,7 +90,7 @@ impl JournalOptions {
 impl Default for JournalOptions {
     /// Without a reserve: for runs on a desk.
     fn default() -> Self {
-        Self { reserve_bytes: 0, checkpoint_pages: 1000, own: false }
+        Self { reserve_bytes: 0, checkpoint_pages: 1000, own: false, end_within: Duration::from_secs(10) }
     }
 }
 
@@ -96,12 +105,12 @@ pub struct JournalFault {
     pub waiting: usize,
 }
 
-/// A damaged database that was put aside.
+/// A database in whose place a fresh one was begun.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Quarantine {
-    /// Where it is now.
-    pub kept_as: PathBuf,
-    /// How it is damaged.
+    /// Where it is now; `None` for one that was deleted or moved by somebody else.
+    pub kept_as: Option<PathBuf>,
+    /// What is wrong with it.
     pub reason: String,
     /// Rounds of the present run that only it may have: more were fired than are kept in memory.
     pub rounds_left_there: u64,
@@ -135,8 +144,8 @@ struct JournalSettings {
     retry_first: Duration,
     /// Longest pause.
     retry_max: Duration,
-    /// Failures after which [`Journal::finish`] gives up.
-    finish_attempts: u32,
+    /// How long the database may be held by another process within one attempt.
+    busy: Duration,
 }
 
 impl From<&JournalOptions> for JournalSettings {
@@ -149,7 +158,7 @@ impl From<&JournalOptions> for JournalSettings {
             held_max: 100_000,
             retry_first: Duration::from_millis(50),
             retry_max: Duration::from_secs(1),
-            finish_attempts: 6,
+            busy: open::BUSY,
         }
     }
 }
@@ -159,6 +168,7 @@ impl From<&JournalOptions> for JournalSettings {
 struct JournalStatus {
     fault: Option<JournalFault>,
     quarantine: Option<Quarantine>,
+    committed: u64,
 }
 
 /// Message to the thread.
@@ -178,7 +188,14 @@ pub struct Journal {
     open: Option<Sender<Infallible>>,
     commits: Receiver<u64>,
     told: Arc<Mutex<JournalStatus>>,
-    thread: Option<JoinHandle<JournalEnd>>,
+    /// What the thread has taken and not written yet.
+    pending: Arc<Mutex<Pending>>,
+    /// What is queued, for when the thread does not answer.
+    queued: Receiver<JournalMessage>,
+    ended: Receiver<JournalEnd>,
+    end_within: Duration,
+    thread: Option<JoinHandle<()>>,
+    _hold: FolderHold,
 }
 
 impl Journal {
@@ -194,21 +211,39 @@ impl Journal {
     }
 
     fn start(path: &Path, run: &Run, settings: JournalSettings) -> Result<Self, JournalError> {
-        let opened = open::for_writing(path, &settings)?;
+        let hold = FolderHold::take(path)?;
+        let mut opened = open::for_writing(path, &settings)?;
         let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
         let previous = boot::last_dirty(&opened.connection, run.boot_id.as_deref()).map_err(fail)?;
+        aside::take_in(&mut opened.connection, path);
         let id = schema::begin_run(&opened.connection, None, run).map_err(fail)?;
         let (queue, incoming) = bounded(QUEUE);
         // Eight bytes a round, and rounds are bounded by belts: not worth losing an acknowledgement for.
         let (committed, commits) = unbounded();
         let (open, closing) = bounded(0);
-        let told = Arc::new(Mutex::new(JournalStatus { fault: None, quarantine: opened.quarantined }));
-        let ends = JournalChannels { incoming, closing, commits: committed, told: Arc::clone(&told) };
+        let told = Arc::new(Mutex::new(JournalStatus {
+            quarantine: opened.quarantined,
+            ..JournalStatus::default()
+        }));
+        let pending = Arc::new(Mutex::new(Pending::default()));
+        let (end, ended) = bounded(1);
+        let ends = JournalChannels {
+            incoming: incoming.clone(),
+            closing,
+            commits: committed,
+            told: Arc::clone(&told),
+            pending: Arc::clone(&pending),
+        };
         let worker = JournalWorker::new(opened.connection, path, (id, run.clone()), ends, settings);
-        let thread =
-            std::thread::Builder::new().name("journal".to_owned()).spawn(move || worker.run()).map_err(
-                |source| JournalError::File { path: path.into(), doing: "start the thread for", source },
-            )?;
+        let thread = std::thread::Builder::new()
+            .name("journal".to_owned())
+            // Nobody waits any more for one that took too long.
+            .spawn(move || drop(end.send(worker.run())))
+            .map_err(|source| JournalError::File {
+                path: path.into(),
+                doing: "start the thread for",
+                source,
+            })?;
         Ok(Self {
             path: path.into(),
             run: id,
@@ -217,7 +252,12 @@ impl Journal {
             open: Some(open),
             commits,
             told,
+            pending,
+            queued: incoming,
+            ended,
+            end_within: settings.options.end_within,
             thread: Some(thread),
+            _hold: hold,
         })
     }
 
@@ -256,7 +296,8 @@ impl Journal {
     }
 
     fn send(&self, message: JournalMessage, shot: u64) -> Result<(), JournalError> {
-        let Some(queue) = &self.queue else { return Err(self.stopped()) };
+        let is_written = self.thread.as_ref().is_some_and(|thread| !thread.is_finished());
+        let Some(queue) = self.queue.as_ref().filter(|_| is_written) else { return Err(self.stopped()) };
         queue.try_send(message).map_err(|error| match error {
             TrySendError::Full(_) => JournalError::QueueFull { path: self.path.clone(), shot },
             TrySendError::Disconnected(_) => self.stopped(),
@@ -279,7 +320,16 @@ impl Journal {
 
     /// Writes what is queued and closes the database. Where rounds cannot be written they go to a file beside it, and
     /// [`JournalError::Unwritten`] carries them too.
-    pub fn finish(mut self) -> Result<JournalSummary, JournalError> {
+    pub fn finish(self) -> Result<JournalSummary, JournalError> {
+        self.finish_with([])
+    }
+
+    /// The same with rounds that the queue had no room for.
+    pub fn finish_with(
+        mut self,
+        rest: impl IntoIterator<Item = ShotRecord>,
+    ) -> Result<JournalSummary, JournalError> {
+        Pending::of(&self.pending).held.extend(rest);
         self.close()
     }
 
@@ -287,11 +337,58 @@ impl Journal {
         self.queue = None;
         self.open = None;
         let Some(thread) = self.thread.take() else { return Err(self.stopped()) };
-        let ended = thread.join().map_err(|_| self.stopped())?;
+        let ended = match self.await_end() {
+            Some(ended) => {
+                // Nothing is left to do there.
+                drop(thread.join());
+                ended
+            }
+            None if thread.is_finished() => return Err(self.stopped()),
+            None => self.without_the_disk(),
+        };
         match ended.unwritten {
-            Some(unwritten) => Err(JournalError::Unwritten(Box::new(unwritten))),
-            None => Ok(JournalSummary { path: self.path.clone(), run: self.run, committed: ended.committed }),
+            Some(unwritten) => {
+                unwritten.log_rows();
+                Err(JournalError::Unwritten(Box::new(unwritten)))
+            }
+            None => {
+                Ok(JournalSummary { path: self.path.clone(), run: ended.run, committed: ended.committed })
+            }
         }
+    }
+
+    /// Waits for the thread's end, as long as it gets on.
+    fn await_end(&self) -> Option<JournalEnd> {
+        loop {
+            let before = self.told().committed;
+            // The thread itself gives up at that time where the disk answers with failures.
+            match self.ended.recv_timeout(self.end_within + Duration::from_millis(100)) {
+                Ok(ended) => return Some(ended),
+                Err(_) if self.told().committed == before => return None,
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// The end where the disk does not answer: a file on it would not be written, either.
+    fn without_the_disk(&self) -> JournalEnd {
+        let mut records = Pending::of(&self.pending).unwritten();
+        records.extend(self.queued.try_iter().filter_map(|message| match message {
+            JournalMessage::Shot(shot) => Some(shot),
+            JournalMessage::Clock(_) => None,
+        }));
+        let committed = self.told().committed;
+        let row = |record| StoredShot { run: self.run, record }.to_json().to_string();
+        let unwritten = Unwritten {
+            path: self.path.clone(),
+            run: self.run,
+            committed,
+            cause: "the disk does not answer; check it".to_owned(),
+            in_doubt: 0,
+            rows: records.into_iter().map(row).collect(),
+            side_file: None,
+        };
+        JournalEnd { run: self.run, committed, unwritten: Some(unwritten) }
     }
 
     fn stopped(&self) -> JournalError {
@@ -306,11 +403,6 @@ impl Drop for Journal {
             && let Err(error) = self.close()
         {
             log::error!("{error}");
-            if let JournalError::Unwritten(unwritten) = error {
-                for line in unwritten.rows.iter().filter(|_| unwritten.side_file.is_none()) {
-                    log::error!("not in the journal: {line}");
-                }
-            }
         }
     }
 }

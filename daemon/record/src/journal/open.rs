@@ -10,6 +10,7 @@ use std::{
 };
 
 use bowwave_core::text::one_line;
+use bowwave_files::plain_file;
 use rusqlite::{Connection, ErrorCode, OpenFlags, config::DbConfig};
 
 use super::{
@@ -17,8 +18,8 @@ use super::{
     schema::{self, APPLICATION_ID, VERSION},
 };
 
-/// How long another process may hold the database before that is an error.
-const BUSY: Duration = Duration::from_secs(2);
+/// How long another process may hold the database, when it is opened, before that is an error.
+pub(super) const BUSY: Duration = Duration::from_secs(2);
 /// SQLite's page.
 const PAGE_BYTES: u64 = 4096;
 const MAGIC: &[u8; 16] = b"SQLite format 3\0";
@@ -53,7 +54,7 @@ pub(super) fn for_writing(path: &Path, settings: &JournalSettings) -> Result<Ope
         return Ok(OpenedJournal { connection: connect(path, settings)?, quarantined: None });
     };
     let kept_as = quarantine::replace(path, settings, |_| Ok(()))?;
-    let quarantined = Some(Quarantine { kept_as, reason, rounds_left_there: 0 });
+    let quarantined = Some(Quarantine { kept_as: Some(kept_as), reason, rounds_left_there: 0 });
     Ok(OpenedJournal { connection: connect(path, settings)?, quarantined })
 }
 
@@ -134,7 +135,7 @@ impl FileHead {
 
 fn head(path: &Path) -> Result<FileHead, JournalError> {
     let mut bytes = Vec::new();
-    match File::open(path) {
+    match plain_file(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => {}
         Err(source) => return Err(JournalError::File { path: path.into(), doing: "open", source }),
         Ok(file) => {
@@ -172,15 +173,17 @@ fn remove_unborn(path: &Path) -> Result<(), JournalError> {
 
 /// Whether the database is intact; the inner error says why not. A fresh one is.
 fn check(path: &Path) -> Result<Result<(), String>, JournalError> {
-    let found = (|| {
+    let found = (|| -> rusqlite::Result<(String, Option<String>)> {
         let connection = Connection::open(path)?;
         connection.busy_timeout(BUSY)?;
         keep_log(&connection);
-        connection.query_row("PRAGMA quick_check(1)", [], |row| row.get::<_, String>(0))
+        let verdict = connection.query_row("PRAGMA quick_check(1)", [], |row| row.get::<_, String>(0))?;
+        Ok((verdict, schema::foreign_part(&connection)?))
     })();
     match found {
-        Ok(verdict) if verdict == "ok" => Ok(Ok(())),
-        Ok(verdict) => Ok(Err(one_line(&verdict))),
+        Ok((verdict, None)) if verdict == "ok" => Ok(Ok(())),
+        Ok((_, Some(foreign))) => Ok(Err(foreign)),
+        Ok((verdict, None)) => Ok(Err(one_line(&verdict))),
         // The first bytes are SQLite's: whatever follows them was one of its databases once.
         Err(error)
             if matches!(
@@ -198,8 +201,11 @@ fn check(path: &Path) -> Result<Result<(), String>, JournalError> {
 pub(super) fn connect(path: &Path, settings: &JournalSettings) -> Result<Connection, JournalError> {
     let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
     let mut connection = Connection::open(path).map_err(fail)?;
-    connection.busy_timeout(BUSY).map_err(fail)?;
+    connection.busy_timeout(settings.busy).map_err(fail)?;
     keep_log(&connection);
+    // Nothing that a file holds may run with a statement of ours.
+    connection.set_db_config(DbConfig::SQLITE_DBCONFIG_DEFENSIVE, true).map_err(fail)?;
+    connection.set_db_config(DbConfig::SQLITE_DBCONFIG_ENABLE_TRIGGER, false).map_err(fail)?;
     schema::claim(&connection, path)?;
     let mode: String =
         connection.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0)).map_err(fail)?;

@@ -55,7 +55,7 @@ pub(super) fn resume(path: &Path) -> Result<Option<Quarantine>, JournalError> {
     }
     let kept_as = put_in_place(path, &fresh)?;
     let reason = "it was being put aside when the last run was interrupted".to_owned();
-    Ok(Some(Quarantine { kept_as, reason, rounds_left_there: 0 }))
+    Ok(Some(Quarantine { kept_as: Some(kept_as), reason, rounds_left_there: 0 }))
 }
 
 fn put_in_place(path: &Path, fresh: &Path) -> Result<PathBuf, JournalError> {

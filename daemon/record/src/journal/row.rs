@@ -8,7 +8,7 @@ use bowwave_core::{
     world::score::{NotScored, Outcome, ShotRecord},
 };
 use glam::DVec3;
-use rusqlite::{Connection, Row, params};
+use rusqlite::{Connection, ErrorCode, Row, params};
 use serde_json::{Value, json};
 
 /// Columns of a round, in the order of the row functions below.
@@ -171,6 +171,36 @@ impl StoredShot {
     }
 }
 
+impl StoredShot {
+    /// The round of an object as [`Self::to_json`] makes it, or what is wrong with it. Numbers that are absent are NaN.
+    pub(super) fn from_json(value: &Value) -> Result<Self, String> {
+        let whole = |key: &str| value[key].as_i64().ok_or_else(|| format!("\"{key}\" is no whole number"));
+        let vector = |key: &str| {
+            DVec3::from_array(std::array::from_fn(|i| value[key][i].as_f64().unwrap_or(f64::NAN)))
+        };
+        let text = |key: &str| value[key].as_str().map(Cow::from);
+        let columns = OutcomeColumns {
+            outcome: text("outcome").unwrap_or_default(),
+            boat: text("boat"),
+            zone: text("zone"),
+            time: value["time_ns"].as_i64().map(Time::from_ns),
+            range_m: value["range_m"].as_f64(),
+            point: Some(vector("point_m")),
+            miss_m: value["miss_m"].as_f64(),
+            cause: text("cause"),
+        };
+        let record = ShotRecord {
+            shot: value["shot"].as_u64().ok_or("\"shot\" is no number of a round")?,
+            fired: Time::from_ns(whole("fired_ns")?),
+            muzzle: vector("muzzle_m"),
+            bore: vector("bore"),
+            pose_age_ns: whole("pose_age_ns")?,
+            outcome: columns.outcome()?,
+        };
+        Ok(Self { run: whole("run")?, record })
+    }
+}
+
 /// Seconds with nine digits, without a detour over floating point.
 fn seconds(time: Time) -> String {
     let ns = time.ns();
@@ -180,7 +210,7 @@ fn seconds(time: Time) -> String {
 }
 
 /// Adds a round; `false` where the run already has one of that number.
-pub(super) fn insert(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Result<bool> {
+fn insert(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Result<bool> {
     let parts = OutcomeColumns::from(&shot.outcome);
     let point = parts.point.map_or([None; 3], |p| p.to_array().map(Some));
     let sql = format!(
@@ -213,6 +243,41 @@ pub(super) fn insert(connection: &Connection, run: i64, shot: &ShotRecord) -> ru
         parts.cause,
     ])?;
     Ok(rows == 1)
+}
+
+/// Adds a round unless it is there already; the inner error says why the database refuses it for good.
+pub(super) fn insert_once(
+    connection: &Connection,
+    run: i64,
+    shot: &ShotRecord,
+) -> rusqlite::Result<Result<(), String>> {
+    match insert(connection, run, shot) {
+        Ok(true) => Ok(Ok(())),
+        // There already: after a COMMIT that failed and took effect all the same, or a number used twice.
+        Ok(false) if stored(connection, run, shot)? => Ok(Ok(())),
+        Ok(false) => Ok(Err("its number is taken by another shot".to_owned())),
+        Err(error) if is_refusal(&error) => Ok(Err(error.to_string())),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether this very round is in the database.
+fn stored(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Result<bool> {
+    let sql = format!("SELECT {COLUMNS} FROM shots WHERE run = ?1 AND shot = ?2");
+    let (_, _, found) = connection.prepare_cached(&sql)?.query_row((run, shot.shot.cast_signed()), parse)?;
+    // Compared as text: NaN is to equal NaN.
+    Ok(found.is_ok_and(|record| {
+        StoredShot { run, record }.to_json() == StoredShot { run, record: shot.clone() }.to_json()
+    }))
+}
+
+/// Whether the database refuses the round itself: no other attempt will help.
+fn is_refusal(error: &rusqlite::Error) -> bool {
+    matches!(error, rusqlite::Error::ToSqlConversionFailure(_))
+        || matches!(
+            error.sqlite_error_code(),
+            Some(ErrorCode::ConstraintViolation | ErrorCode::TooBig | ErrorCode::TypeMismatch)
+        )
 }
 
 /// Number of run and round, and the round or what is wrong with it.

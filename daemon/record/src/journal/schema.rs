@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
-use rusqlite::{Connection, TransactionBehavior, params};
+use bowwave_core::time::Time;
+use rusqlite::{Connection, OptionalExtension as _, TransactionBehavior, params};
 
-use super::{JournalError, Run};
+use bowwave_core::text::one_line;
+
+use super::{JournalError, Run, row};
 
 /// Marks the file as ours ("BOWW").
 pub(super) const APPLICATION_ID: i64 = 0x424f_5757;
@@ -46,6 +49,46 @@ const BOOT_COLUMNS: &str = "
 ALTER TABLE runs ADD COLUMN boot_id TEXT;
 ALTER TABLE runs ADD COLUMN started_ns INTEGER;
 ";
+
+/// What a database that calls itself ours has otherwise than ours have; `None` where it has all. Triggers of a stranger would run with each
+/// round.
+pub(super) fn foreign_part(connection: &Connection) -> rusqlite::Result<Option<String>> {
+    if versions(connection)?.0 != APPLICATION_ID {
+        return Ok(None);
+    }
+    let columns = |table: &str| -> rusqlite::Result<Vec<String>> {
+        let mut ask = connection.prepare("SELECT name FROM pragma_table_xinfo(?1)")?;
+        ask.query_map([table], |row| row.get(0))?.collect()
+    };
+    let wanted: [(&str, &str); 2] = [
+        ("runs", "id, started_wall_ns, scenario, recording, seed, version, finished"),
+        ("shots", row::COLUMNS),
+    ];
+    for (table, names) in wanted {
+        let found = columns(table)?;
+        if let Some(name) = names.split(", ").find(|name| !found.iter().any(|column| column == name)) {
+            return Ok(Some(format!("its table {table} has no column {name}")));
+        }
+    }
+    let sql = "SELECT type || ' ' || name FROM sqlite_schema WHERE type IN ('trigger', 'view') LIMIT 1";
+    let foreign: Option<String> = connection.query_row(sql, [], |row| row.get(0)).optional()?;
+    Ok(foreign.map(|what| format!("it has a {}, which no journal has", one_line(&what))))
+}
+
+/// Number of the run that is described so, if the database has it; the newest of several.
+pub(super) fn find_run(connection: &Connection, run: &Run) -> rusqlite::Result<Option<i64>> {
+    // Not by the wall time, which may have been filled in since.
+    let sql = "SELECT id FROM runs WHERE scenario = ?1 AND recording = ?2 AND seed = ?3 AND version = ?4 \
+               AND boot_id IS ?5 AND started_ns IS ?6 ORDER BY id DESC LIMIT 1";
+    let started = run.started.map(Time::ns);
+    let key = params![run.scenario, run.recording, run.seed.to_string(), run.version, run.boot_id, started];
+    connection.query_row(sql, key, |row| row.get(0)).optional()
+}
+
+/// Whether the database has a run of that number.
+pub(super) fn has_run(connection: &Connection, id: i64) -> rusqlite::Result<bool> {
+    connection.query_row("SELECT EXISTS (SELECT 1 FROM runs WHERE id = ?1)", [id], |row| row.get(0))
+}
 
 /// Refuses databases of other programs and of newer versions.
 pub(super) fn claim(connection: &Connection, path: &Path) -> Result<(), JournalError> {

@@ -3,22 +3,22 @@
 use std::{
     collections::VecDeque,
     convert::Infallible,
-    fs::OpenOptions,
-    io::{self, Write},
+    io,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
-    time::Duration,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::{Duration, Instant},
 };
 
 use bowwave_core::{fault::Fault, world::score::ShotRecord};
 use crossbeam_channel::{Receiver, Sender, TryRecvError, after, never, select};
-use rusqlite::{Connection, ErrorCode, TransactionBehavior};
+use rusqlite::{Connection, TransactionBehavior};
 
 use super::{
     JournalError, JournalFault, JournalMessage, JournalSettings, JournalStatus, Quarantine, Run, StoredShot,
-    Unwritten,
+    Unwritten, aside,
     boot::WallClock,
-    open::{connect, empty_log_at_end, keep_log, with_suffix},
+    open::{connect, empty_log_at_end, keep_log},
+    place::FilePlace,
     quarantine,
     reserve::Reserve,
     row, schema,
@@ -34,12 +34,35 @@ const BUSY: Duration = Duration::from_millis(250);
 const RESERVE_PAUSE: Duration = Duration::from_secs(2);
 
 /// Longest pause between attempts while the journal is being finished.
-const FINISH_PAUSE_MAX: Duration = Duration::from_millis(500);
+const FINISH_PAUSE_MAX: Duration = Duration::from_millis(100);
 
 /// Result of the thread.
 pub(super) struct JournalEnd {
+    /// The run's number in the database.
+    pub(super) run: i64,
     pub(super) committed: u64,
     pub(super) unwritten: Option<Unwritten>,
+}
+
+/// Rounds that the thread has taken and the database has not.
+#[derive(Debug, Default)]
+pub(super) struct Pending {
+    /// To be written, oldest first.
+    pub(super) held: VecDeque<ShotRecord>,
+    /// Refused by the database for good, with the reason.
+    rejected: Vec<(ShotRecord, String)>,
+}
+
+impl Pending {
+    /// Nothing that panics is done under the lock.
+    pub(super) fn of(pending: &Mutex<Self>) -> MutexGuard<'_, Self> {
+        pending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// All of them.
+    pub(super) fn unwritten(&self) -> Vec<ShotRecord> {
+        self.rejected.iter().map(|(shot, _)| shot).chain(&self.held).cloned().collect()
+    }
 }
 
 /// The state of the thread.
@@ -58,8 +81,14 @@ pub(super) struct JournalWorker {
     reserve: Reserve,
     /// The reserve is not there: the disk is full, or was and has not got room enough yet.
     low: bool,
-    /// Taken from the queue and not yet committed, oldest first.
-    held: VecDeque<ShotRecord>,
+    /// Taken from the queue and not yet committed.
+    pending: Arc<Mutex<Pending>>,
+    /// The files that `connection` has open.
+    place: Option<FilePlace>,
+    /// Committed rounds of this run may be missing in the database.
+    in_doubt: bool,
+    /// The file beside the database that has what is not written, once the end has met a failure.
+    side_file: Option<PathBuf>,
     /// Committed rounds of this run, oldest first, for a fresh database.
     kept: VecDeque<ShotRecord>,
     /// Committed rounds that are too many to be kept.
@@ -68,8 +97,6 @@ pub(super) struct JournalWorker {
     clock: Option<WallClock>,
     /// Damage of the database, until it has been put aside.
     damage: Option<String>,
-    /// Rounds that the database refuses for good, with the reason.
-    rejected: Vec<(ShotRecord, String)>,
     committed: u64,
     /// Failures since the last success.
     failures: u32,
@@ -81,6 +108,7 @@ pub(super) struct JournalChannels {
     pub(super) closing: Receiver<Infallible>,
     pub(super) commits: Sender<u64>,
     pub(super) told: Arc<Mutex<JournalStatus>>,
+    pub(super) pending: Arc<Mutex<Pending>>,
 }
 
 impl JournalWorker {
@@ -91,8 +119,9 @@ impl JournalWorker {
         ends: JournalChannels,
         settings: JournalSettings,
     ) -> Self {
-        let JournalChannels { incoming, closing, commits, told } = ends;
+        let JournalChannels { incoming, closing, commits, told, pending } = ends;
         Self {
+            place: FilePlace::of(path).ok(),
             connection: Some(connection),
             path: path.into(),
             id,
@@ -104,37 +133,46 @@ impl JournalWorker {
             settings,
             reserve: Reserve::new(path, settings.options.reserve_bytes),
             low: false,
-            held: VecDeque::new(),
+            pending,
+            in_doubt: false,
+            side_file: None,
             kept: VecDeque::new(),
             not_kept: 0,
             clock: None,
             damage: None,
-            rejected: Vec::new(),
             committed: 0,
             failures: 0,
         }
     }
 
     pub(super) fn run(mut self) -> JournalEnd {
-        if let Some(connection) = &self.connection {
-            be_patient(connection, &self.path);
+        self.settings.busy = BUSY;
+        if let Some(connection) = &self.connection
+            && let Err(error) = connection.busy_timeout(BUSY)
+        {
+            log::warn!("journal {}: {error}", self.path.display());
         }
         self.refill_reserve();
         let mut cause = None;
-        // Each attempt of the last phase counts afresh: the disk may have come back.
-        let mut last_attempts = 0;
+        let mut deadline = None;
         loop {
-            if self.is_idle() && !self.next() {
+            // What the queue had no room for may come with the end.
+            if self.is_idle() && !self.next() && self.is_idle() {
                 break;
             }
             self.take_queued();
             match self.attempt() {
                 Ok(()) => self.recovered(),
                 Err(error) => {
-                    last_attempts += u32::from(self.is_closing());
-                    if last_attempts >= self.settings.finish_attempts {
-                        cause = Some(error.to_string());
-                        break;
+                    if self.is_closing() {
+                        let end = self.settings.options.end_within;
+                        let deadline = *deadline.get_or_insert_with(|| Instant::now() + end);
+                        // First of all: whoever ended the program may not wait.
+                        self.put_aside();
+                        if Instant::now() + self.pause() >= deadline {
+                            cause = Some(error.to_string());
+                            break;
+                        }
                     }
                     self.failed(&error);
                     self.wait();
@@ -146,7 +184,7 @@ impl JournalWorker {
 
     /// Nothing is to be written.
     fn is_idle(&self) -> bool {
-        self.held.is_empty() && self.clock.is_none() && self.failures == 0
+        self.held().held.is_empty() && self.clock.is_none() && self.failures == 0
     }
 
     /// Waits for something to do; `false` at the end.
@@ -164,7 +202,7 @@ impl JournalWorker {
 
     fn take(&mut self, message: JournalMessage) {
         match message {
-            JournalMessage::Shot(shot) => self.held.push_back(shot),
+            JournalMessage::Shot(shot) => self.held().held.push_back(shot),
             JournalMessage::Clock(clock) => {
                 // A fresh database would begin this run with it.
                 self.run.started_wall_ns = self
@@ -176,13 +214,17 @@ impl JournalWorker {
         }
     }
 
+    fn held(&self) -> MutexGuard<'_, Pending> {
+        Pending::of(&self.pending)
+    }
+
     fn is_closing(&self) -> bool {
         self.closing.try_recv().is_err_and(|error: TryRecvError| error.is_disconnected())
     }
 
     /// Takes what is queued, as far as it may be held.
     fn take_queued(&mut self) {
-        while self.held.len() < self.settings.held_max
+        while self.held().held.len() < self.settings.held_max
             && let Ok(message) = self.incoming.try_recv()
         {
             self.take(message);
@@ -198,12 +240,19 @@ impl JournalWorker {
             Some(connection) => connection,
             None => self.reopen()?,
         };
-        let done = self.write(&mut connection).map_err(|error| JournalError::from_sql(&self.path, &error));
+        let done = self.write(&mut connection);
         match &done {
             Ok(()) | Err(JournalError::Locked { .. }) => self.connection = Some(connection),
             Err(error) => {
                 if error.is_damage() {
                     self.damage = Some(error.to_string());
+                }
+                self.in_doubt |= error.casts_doubt();
+                if matches!(error, JournalError::Moved { .. }) {
+                    let (reason, rounds_left_there) = (error.to_string(), self.not_kept);
+                    log::error!("{reason}");
+                    let quarantine = Quarantine { kept_as: None, reason, rounds_left_there };
+                    self.tell(|told| told.quarantine = Some(quarantine));
                 }
                 // What this connection and the system's memory hold is not to be trusted any more.
                 keep_log(&connection);
@@ -220,23 +269,53 @@ impl JournalWorker {
         done
     }
 
-    fn reopen(&self) -> Result<Connection, JournalError> {
+    fn reopen(&mut self) -> Result<Connection, JournalError> {
         let connection = connect(&self.path, &self.settings)?;
-        be_patient(&connection, &self.path);
+        self.place = FilePlace::of(&self.path).ok();
         Ok(connection)
     }
 
-    fn write(&mut self, connection: &mut Connection) -> rusqlite::Result<()> {
-        if !self.held.is_empty() {
+    fn write(&mut self, connection: &mut Connection) -> Result<(), JournalError> {
+        let path = self.path.clone();
+        let fail = |error: rusqlite::Error| JournalError::from_sql(&path, &error);
+        if self.in_doubt {
+            self.insert_kept(connection).map_err(fail)?;
+            self.is_in_place()?;
+            self.in_doubt = false;
+        }
+        if !self.held().held.is_empty() {
             self.commit(connection)?;
         }
         if let Some(clock) = self.clock {
             if let Some(boot_id) = &self.run.boot_id {
-                clock.fill_in(connection, boot_id)?;
+                clock.fill_in(connection, boot_id).map_err(fail)?;
             }
             self.clock = None;
         }
-        checkpoint(connection, self.settings.options.checkpoint_pages)
+        checkpoint(connection, self.settings.options.checkpoint_pages).map_err(fail)
+    }
+
+    /// Whether whoever opens the journal finds the files that were written.
+    fn is_in_place(&self) -> Result<(), JournalError> {
+        let found = FilePlace::of(&self.path).ok();
+        if found.is_some() && found == self.place {
+            return Ok(());
+        }
+        Err(JournalError::Moved { path: self.path.clone() })
+    }
+
+    /// Inserts what is missing of this run's committed rounds, and the run.
+    fn insert_kept(&mut self, connection: &mut Connection) -> rusqlite::Result<()> {
+        let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+        let id = aside::run_for(&transaction, self.id, Some(&self.run))?;
+        for shot in &self.kept {
+            if let Err(why) = row::insert_once(&transaction, id, shot)? {
+                log::error!("shot {} is not in the journal {}: {why}", shot.shot, self.path.display());
+            }
+        }
+        transaction.commit()?;
+        self.id = id;
+        Ok(())
     }
 
     /// Puts the damaged database aside and begins another with what is known of this run.
@@ -247,46 +326,49 @@ impl JournalWorker {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
             schema::begin_run(&transaction, Some(*id), run)?;
             for shot in kept.iter() {
-                row::insert(&transaction, *id, shot)?;
+                // Taken before, so never refused.
+                row::insert_once(&transaction, *id, shot)?.unwrap_or_default();
             }
             transaction.commit()
         })?;
         self.damage = None;
+        self.in_doubt = false;
         let rounds_left_there = self.not_kept;
         self.tell(|told| {
-            told.quarantine = Some(Quarantine { kept_as, reason: reason.to_owned(), rounds_left_there });
+            told.quarantine =
+                Some(Quarantine { kept_as: Some(kept_as), reason: reason.to_owned(), rounds_left_there });
         });
         Ok(())
     }
 
     /// Commits the oldest rounds held, as many as one transaction takes.
-    fn commit(&mut self, connection: &mut Connection) -> rusqlite::Result<()> {
-        let count = self.held.len().min(BATCH);
-        let mut refused = Vec::new();
-        let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
-        for (index, shot) in self.held.iter().take(count).enumerate() {
-            match row::insert(&transaction, self.id, shot) {
-                Ok(true) => {}
-                // There already: after a COMMIT that failed and took effect all the same, or a number used twice.
-                Ok(false) if stored(&transaction, self.id, shot)? => {}
-                Ok(false) => refused.push((index, "its number is taken by another shot".to_owned())),
-                Err(error) if is_refusal(&error) => refused.push((index, error.to_string())),
-                Err(error) => return Err(error),
-            }
-        }
-        transaction.commit()?;
-        let mut refused = refused.into_iter().peekable();
-        for (index, shot) in self.held.drain(..count).enumerate() {
-            if let Some((_, reason)) = refused.next_if(|(at, _)| *at == index) {
+    fn commit(&mut self, connection: &mut Connection) -> Result<(), JournalError> {
+        let batch: Vec<ShotRecord> = self.held().held.iter().take(BATCH).cloned().collect();
+        let insert = |connection: &mut Connection| -> rusqlite::Result<Vec<Result<(), String>>> {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            let done = batch.iter().map(|shot| row::insert_once(&transaction, self.id, shot));
+            let done = done.collect::<rusqlite::Result<_>>()?;
+            transaction.commit()?;
+            Ok(done)
+        };
+        let done = insert(connection).map_err(|error| JournalError::from_sql(&self.path, &error))?;
+        self.is_in_place()?;
+        for (shot, done) in batch.into_iter().zip(done) {
+            let mut pending = Pending::of(&self.pending);
+            pending.held.pop_front();
+            if let Err(reason) = done {
                 log::error!("shot {} is not in the journal {}: {reason}", shot.shot, self.path.display());
-                self.rejected.push((shot, reason));
+                pending.rejected.push((shot, reason));
                 continue;
             }
+            drop(pending);
             self.committed += 1;
             // Nobody may be listening.
             let _ = self.commits.send(shot.shot);
             self.kept.push_back(shot);
         }
+        let committed = self.committed;
+        self.tell(|told| told.committed = committed);
         while self.kept.len() > self.settings.kept_max {
             self.kept.pop_front();
             self.not_kept += 1;
@@ -296,13 +378,13 @@ impl JournalWorker {
 
     fn failed(&mut self, error: &JournalError) {
         self.failures = self.failures.saturating_add(1);
-        let fault =
-            JournalFault { fault: error.fault(), message: error.to_string(), waiting: self.held.len() };
+        let waiting = self.held().held.len();
+        let fault = JournalFault { fault: error.fault(), message: error.to_string(), waiting };
         self.tell(|told| told.fault = Some(fault));
     }
 
     fn recovered(&mut self) {
-        let over = self.failures > 0 && self.held.is_empty();
+        let over = self.failures > 0 && self.held().held.is_empty();
         if over {
             self.failures = 0;
         }
@@ -338,19 +420,26 @@ impl JournalWorker {
         change(&mut self.told.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Pauses before the next attempt and goes on emptying the queue meanwhile.
-    fn wait(&mut self) {
+    /// Pause before the next attempt.
+    fn pause(&self) -> Duration {
         let doublings = self.failures.saturating_sub(1).min(16);
         let pause = self.settings.retry_first.saturating_mul(1 << doublings).min(self.settings.retry_max);
+        if self.is_closing() { pause.min(FINISH_PAUSE_MAX) } else { pause }
+    }
+
+    /// Pauses before the next attempt and goes on emptying the queue meanwhile.
+    fn wait(&mut self) {
+        let pause = self.pause();
         if self.is_closing() {
-            std::thread::sleep(pause.min(FINISH_PAUSE_MAX));
+            std::thread::sleep(pause);
             return;
         }
         let timer = after(pause);
         loop {
             // What may not be held any more fills the queue up, and that says so to whoever shoots.
             let nothing = never();
-            let incoming = if self.held.len() < self.settings.held_max { &self.incoming } else { &nothing };
+            let incoming =
+                if self.held().held.len() < self.settings.held_max { &self.incoming } else { &nothing };
             select! {
                 recv(incoming) -> message => match message {
                     Ok(message) => self.take(message),
@@ -362,40 +451,58 @@ impl JournalWorker {
         }
     }
 
-    /// Closes the run, or saves what could not be written.
-    fn end(mut self, cause: Option<String>) -> JournalEnd {
-        // After giving up, more than may be held can still be queued.
+    /// Takes all that is queued; more than may be held.
+    fn take_all(&mut self) {
         while let Ok(message) = self.incoming.try_recv() {
             self.take(message);
         }
-        if self.held.is_empty() && self.rejected.is_empty() {
+    }
+
+    /// Rounds that the database does not have for sure: those in doubt first, and how many those are.
+    fn unwritten(&self) -> (Vec<String>, usize) {
+        let doubted = if self.in_doubt { self.kept.len() } else { 0 };
+        let pending = self.held().unwritten();
+        let row =
+            |record: &ShotRecord| StoredShot { run: self.id, record: record.clone() }.to_json().to_string();
+        (self.kept.iter().take(doubted).chain(&pending).map(row).collect(), doubted)
+    }
+
+    /// Puts what is not written beside the database, once: the end may be cut short.
+    fn put_aside(&mut self) {
+        if self.side_file.is_none() {
+            self.take_all();
+            let (rows, _) = self.unwritten();
+            self.side_file = aside::save_or_tell(&self.path, (self.id, &self.run), None, &rows);
+        }
+    }
+
+    /// Closes the run, or saves what could not be written.
+    fn end(mut self, cause: Option<String>) -> JournalEnd {
+        self.take_all();
+        let (rows, in_doubt) = self.unwritten();
+        if rows.is_empty() {
             if let Err(error) = self.close_run() {
                 log::warn!("{error}; its last run stays marked as unfinished");
             }
-            return JournalEnd { committed: self.committed, unwritten: None };
+            if let Some(file) = &self.side_file
+                && let Err(error) = aside::remove(&self.path, file)
+            {
+                log::warn!("{} has rounds that are in the journal, and stays: {error}", file.display());
+            }
+            return JournalEnd { run: self.id, committed: self.committed, unwritten: None };
         }
         if let Some(connection) = &self.connection {
             empty_log_at_end(connection);
         }
-        let cause =
-            cause.or_else(|| self.rejected.first().map(|(_, reason)| reason.clone())).unwrap_or_default();
-        let rows: Vec<String> = self
-            .rejected
-            .iter()
-            .map(|(shot, _)| shot)
-            .chain(&self.held)
-            .map(|record| StoredShot { run: self.id, record: record.clone() }.to_json().to_string())
-            .collect();
-        let side_file = match save(&self.path, self.id, &rows) {
-            Ok(file) => Some(file),
-            Err(error) => {
-                log::error!("nor could the shots be put beside the journal {}: {error}", self.path.display());
-                None
-            }
-        };
-        let unwritten =
-            Unwritten { path: self.path, run: self.id, committed: self.committed, cause, rows, side_file };
-        JournalEnd { committed: self.committed, unwritten: Some(unwritten) }
+        let refused = self.held().rejected.first().map(|(_, reason)| reason.clone());
+        let cause = cause.or(refused).unwrap_or_default();
+        // Anew: some of what was put aside may have been written since.
+        let side_file =
+            aside::save_or_tell(&self.path, (self.id, &self.run), self.side_file.as_deref(), &rows)
+                .or(self.side_file);
+        let Self { id: run, committed, path, .. } = self;
+        let unwritten = Unwritten { path, run, committed, cause, in_doubt, rows, side_file };
+        JournalEnd { run, committed, unwritten: Some(unwritten) }
     }
 
     /// Marks the run as finished and moves the log into the database.
@@ -414,12 +521,6 @@ impl JournalWorker {
     }
 }
 
-fn be_patient(connection: &Connection, path: &Path) {
-    if let Err(error) = connection.busy_timeout(BUSY) {
-        log::warn!("journal {}: {error}", path.display());
-    }
-}
-
 /// Moves the log into the database where it has at least so many pages that are not there yet.
 fn checkpoint(connection: &Connection, pages_min: u32) -> rusqlite::Result<()> {
     let mut ask = connection.prepare_cached("PRAGMA wal_checkpoint(NOOP)")?;
@@ -429,35 +530,4 @@ fn checkpoint(connection: &Connection, pages_min: u32) -> rusqlite::Result<()> {
     }
     // Readers may keep some of it in the log: then it is moved later.
     connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
-}
-
-/// Whether this very round is in the database.
-fn stored(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Result<bool> {
-    let sql = format!("SELECT {} FROM shots WHERE run = ?1 AND shot = ?2", row::COLUMNS);
-    let (_, _, found) =
-        connection.prepare_cached(&sql)?.query_row((run, shot.shot.cast_signed()), row::parse)?;
-    // Compared as text: NaN is to equal NaN.
-    Ok(found.is_ok_and(|record| {
-        StoredShot { run, record }.to_json() == StoredShot { run, record: shot.clone() }.to_json()
-    }))
-}
-
-/// Whether the database refuses the round itself: no other attempt will help.
-fn is_refusal(error: &rusqlite::Error) -> bool {
-    matches!(error, rusqlite::Error::ToSqlConversionFailure(_))
-        || matches!(
-            error.sqlite_error_code(),
-            Some(ErrorCode::ConstraintViolation | ErrorCode::TooBig | ErrorCode::TypeMismatch)
-        )
-}
-
-/// Puts the rows into a file beside the database, and onto the disk.
-fn save(path: &Path, run: i64, rows: &[String]) -> io::Result<PathBuf> {
-    let file_path = with_suffix(path, &format!(".unwritten-{run}.jsonl"));
-    let mut file = OpenOptions::new().create(true).append(true).open(&file_path)?;
-    let mut text = rows.join("\n");
-    text.push('\n');
-    file.write_all(text.as_bytes())?;
-    file.sync_all()?;
-    Ok(file_path)
 }

@@ -31,8 +31,12 @@ pub const PHASE_SYNCS_FAIL: u64 = 5;
 const ROUNDS: u64 = 40;
 
 /// As the gun computer has it, but small, so that everything happens within a few rounds.
-pub const OPTIONS: JournalOptions =
-    JournalOptions { reserve_bytes: 64 << 10, checkpoint_pages: 20, own: true };
+pub const OPTIONS: JournalOptions = JournalOptions {
+    reserve_bytes: 64 << 10,
+    checkpoint_pages: 20,
+    own: true,
+    end_within: Duration::from_millis(700),
+};
 
 /// The round of that number.
 pub fn shot(number: u64) -> ShotRecord {

@@ -8,7 +8,6 @@ use std::{
     collections::VecDeque,
     path::{Path, PathBuf},
     thread::{self, JoinHandle},
-    time::Duration,
 };
 
 use anyhow::{Context, Result};
@@ -20,7 +19,10 @@ use bowwave_core::{
     world::score::ShotRecord,
 };
 use bowwave_devices::clock::now;
-use bowwave_record::{Journal, JournalError, JournalOptions, PoseEntry, Room, Run, SpaceWatch};
+use bowwave_record::{
+    Journal, JournalError, JournalOptions, PoseEntry, Quarantine, Room, Run, SpaceWatch, StoredShot,
+    put_aside,
+};
 
 pub use recorder::{Recorder, RecorderOptions};
 
@@ -49,8 +51,7 @@ pub struct StorageOptions {
     pub journal: JournalOptions,
     /// The recording, where there is to be one.
     pub recording: Option<RecorderOptions>,
-    /// A journal that cannot be opened ends the run, and its end waits until every round is written. Else rounds wait in memory and the
-    /// end waits for a third of a second.
+    /// A journal that cannot be opened ends the run. Else rounds wait in memory.
     pub strict: bool,
     /// Print each committed round's number.
     pub print_commits: bool,
@@ -89,7 +90,7 @@ pub struct Storage {
     /// Entries of an ended recording that were lost.
     lost: u64,
     space: SpaceWatch,
-    quarantined: Option<PathBuf>,
+    quarantined: Option<Quarantine>,
     wall: Option<WallTime>,
     print_commits: bool,
 }
@@ -154,13 +155,18 @@ impl Storage {
     /// Takes in rounds that ended.
     pub fn rounds(&mut self, records: &[ShotRecord]) {
         let room = ROUNDS_WAITING_MAX.saturating_sub(self.waiting.len());
-        if records.len() > room {
+        let (kept, rest) = records.split_at(room.min(records.len()));
+        self.waiting.extend(kept.iter().cloned());
+        if !rest.is_empty() {
             log::error!(
                 "{} rounds cannot be kept: the journal takes none and memory for them is full",
-                records.len() - room
+                rest.len()
             );
         }
-        self.waiting.extend(records.iter().take(room).cloned());
+        // The log may be on another disk.
+        for record in rest {
+            log::error!("not in the journal: {}", StoredShot { run: 0, record: record.clone() }.to_json());
+        }
     }
 
     /// The wall clock is known to be set.
@@ -244,6 +250,7 @@ impl Storage {
         let room = self.space.room(now());
         let read_only = (room == Room::ReadOnly)
             .then(|| "the data partition is mounted read-only: hits are kept in memory; look at the kernel's log, replace the disk".to_owned());
+        faults.set(Fault::DbLocked, cause(Fault::DbLocked), events);
         faults.set(Fault::DiskReadOnly, cause(Fault::DiskReadOnly).or(read_only), events);
         if let Some(recorder) = self.recorder.take_if(|r| r.has_ended()) {
             // It ends by itself only where it cannot write.
@@ -267,14 +274,20 @@ impl Storage {
         faults.set(Fault::DiskFull, cause(Fault::DiskFull).or(low), events);
         if let JournalState::Open(journal) = &self.store
             && let Some(quarantine) = journal.quarantined()
-            && self.quarantined.as_ref() != Some(&quarantine.kept_as)
+            && self.quarantined.as_ref() != Some(&quarantine)
         {
-            let cause = format!(
-                "the journal was damaged ({}); it is kept as {} and a fresh one begun",
-                quarantine.reason,
-                quarantine.kept_as.display()
-            );
-            self.quarantined = Some(quarantine.kept_as);
+            let cause = match &quarantine.kept_as {
+                Some(kept_as) => format!(
+                    "the journal was damaged ({}); it is kept as {} and a fresh one begun",
+                    quarantine.reason,
+                    kept_as.display()
+                ),
+                None => quarantine.reason.clone(),
+            };
+            let left = quarantine.rounds_left_there;
+            let cause =
+                if left > 0 { format!("{cause}; {left} rounds of this run are only there") } else { cause };
+            self.quarantined = Some(quarantine);
             faults.set(Fault::DbQuarantine, None, events);
             faults.set(Fault::DbQuarantine, Some(cause), events);
         }
@@ -292,19 +305,15 @@ impl Storage {
         let mut wrong = Vec::new();
         let journal = match self.store {
             JournalState::Open(journal) => Some(journal),
-            // The last chance of rounds that are in memory only.
-            JournalState::Shut { attempt: None, .. } if !self.waiting.is_empty() => {
-                self.options.open().inspect_err(|e| log::error!("{e}")).ok()
-            }
+            // Trying once more may take longer than the end may. The next run takes in what is put aside.
             JournalState::Shut { .. } => None,
         };
         let written = match journal {
             Some(journal) => write_out(journal, &mut self.waiting, &self.options),
             None if self.waiting.is_empty() => Ok(()),
-            None => Err(anyhow::anyhow!(
-                "{} rounds are lost: the journal could not be opened",
-                self.waiting.len()
-            )),
+            None => {
+                Err(put_aside(&self.options.journal_path(), &self.options.run, self.waiting.drain(..)).into())
+            }
         };
         wrong.extend(written.err());
         if self.options.strict && self.options.recording.is_some() && self.recorder.is_none() {
@@ -325,22 +334,8 @@ impl Storage {
 
 /// Hands what waits to the journal and ends it.
 fn write_out(journal: Journal, waiting: &mut VecDeque<ShotRecord>, options: &StorageOptions) -> Result<()> {
-    // Room comes as the journal writes.
-    let give_up = now().plus_secs(0.3);
-    while let Some(record) = waiting.front() {
-        match journal.shot(record) {
-            Ok(()) => drop(waiting.pop_front()),
-            Err(JournalError::QueueFull { .. }) if options.strict || now() < give_up => {
-                thread::sleep(Duration::from_millis(2));
-            }
-            Err(e) => {
-                log::error!("{} rounds are lost: {e}", waiting.len());
-                break;
-            }
-        }
-    }
     let commits = journal.commits().clone();
-    let ended = journal.finish();
+    let ended = journal.finish_with(waiting.drain(..));
     if options.print_commits {
         commits::print(commits.try_iter())?;
     }
@@ -384,7 +379,9 @@ fn end_recording(recorder: Recorder) -> u64 {
 mod tests {
     use super::*;
     use bowwave_core::world::score::{NotScored, Outcome};
-    use bowwave_record::{ShotFilter, read_shots};
+    use std::time::Duration;
+
+    use bowwave_record::{RunSelection, ShotFilter, read_shots};
     use glam::DVec3;
 
     fn round(shot: u64) -> ShotRecord {
@@ -443,6 +440,24 @@ mod tests {
         assert_eq!(storage.finish().1.len(), 0);
         let stored = read_shots(&folder.join(JOURNAL), &ShotFilter::default()).unwrap();
         assert_eq!(stored.iter().map(|s| s.record.shot).collect::<Vec<_>>(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn rounds_of_a_journal_that_never_opened_are_put_aside_and_taken_in_by_the_next_run() {
+        let base = tempfile::tempdir().unwrap();
+        let journal = base.path().join(JOURNAL);
+        std::fs::create_dir(&journal).unwrap();
+        let mut storage = Storage::open(options(base.path()), &mut Vec::new()).unwrap();
+        storage.rounds(&[round(1), round(2)]);
+        let (_, wrong) = storage.finish();
+        assert!(wrong.len() == 1 && wrong[0].to_string().contains("unwritten-0.jsonl"), "{wrong:?}");
+        std::fs::remove_dir(&journal).unwrap();
+        let mut storage = Storage::open(options(base.path()), &mut Vec::new()).unwrap();
+        storage.rounds(&[round(1)]);
+        assert_eq!(storage.finish().1.len(), 0);
+        let stored = read_shots(&journal, &ShotFilter { runs: RunSelection::All, hits_only: false }).unwrap();
+        let numbers: Vec<_> = stored.iter().map(|s| (s.run, s.record.shot)).collect();
+        assert_eq!(numbers, [(1, 1), (1, 2), (2, 1)]);
     }
 
     #[test]
