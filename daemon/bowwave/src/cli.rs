@@ -164,7 +164,7 @@ pub struct Simulate {
     #[arg(long, value_name = "KIND@S+L", value_parser = parse_fault)]
     pub fault: Vec<Fault>,
     /// Let a fault of a random kind come every S seconds as well, 5 at least; the summary says whether each was ridden out
-    #[arg(long, value_name = "S", value_parser = parse_duration)]
+    #[arg(long, value_name = "S", value_parser = parse_fault_period)]
     pub fault_every: Option<f64>,
     /// Vulkan device: its number, or part of its name
     #[arg(long, value_name = "NAME")]
@@ -241,6 +241,22 @@ pub struct Doctor {
 pub enum DoctorDevice {
     /// Listen to the inertial unit: its format, its rate, what it sends and lacks; the trainer must not run meanwhile
     Imu(DoctorImu),
+    /// Test the inert interlock: the plug is pulled and fitted once, and each contact must follow; the trainer must not run meanwhile
+    Interlock(DoctorInterlock),
+}
+
+/// Arguments of `doctor interlock`.
+#[derive(Debug, Args)]
+pub struct DoctorInterlock {
+    /// Configuration that names the interlock
+    #[arg(long, value_name = "FILE", default_value = "/etc/bowwave/bowwave.toml")]
+    pub config: PathBuf,
+    /// How long to wait for each step
+    #[arg(long, value_name = "SECONDS", default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=600))]
+    pub seconds: u32,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `doctor imu`.
@@ -331,6 +347,14 @@ fn parse_duration(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(s) if s.is_finite() && s > 0.0 && s <= 30.0 * 86_400.0 => Ok(s),
         _ => Err(format!("'{text}' is no duration: write seconds above 0, at most 2592000")),
+    }
+}
+
+/// Faults need time to come, to be told and to be ridden out.
+fn parse_fault_period(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(s) if (5.0..=86_400.0).contains(&s) => Ok(s),
+        _ => Err(format!("'{text}' is no pause between faults: write seconds, 5 to 86400")),
     }
 }
 

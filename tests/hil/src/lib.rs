@@ -4,6 +4,8 @@
 //! kernel modules; nothing is changed in the image. The agent plays a recording into the kernel's interfaces and does what the
 //! harness says; they talk over a virtio serial port (`protocol`).
 
+#![forbid(unsafe_code)]
+
 pub mod protocol;
 pub mod tape;
 
@@ -18,7 +20,12 @@ pub const PORT_OUTPUT: &str = "hil.out";
 /// Serial number of the disk that the tape is on.
 pub const TAPE_SERIAL: &str = "hil-tape";
 /// Lines of the simulated GPIO chip, by number.
-pub const LINES: [&str; 6] = ["trigger", "interlock", "power-fail", "lamp-ready", "lamp-hit", "lamp-fault"];
+pub const LINES: [&str; 7] =
+    ["trigger", "interlock", "power-fail", "lamp-ready", "lamp-hit", "lamp-fault", "interlock-inverted"];
+/// The interlock among them...
+pub const INTERLOCK: usize = 1;
+/// ...and its second contact, which is low while the gun is inert.
+pub const INTERLOCK_INVERTED: usize = 6;
 
 /// A fixed computation of one core, seconds it takes: to compare the machine's speed with the host's. Best of two, so that what
 /// else runs counts less.

@@ -12,7 +12,7 @@ use bowwave_devices::{
     imu::ImuFormat,
     lamps::LampSettings,
     serial::{Baud, ImuSettings},
-    trigger::{Bias, InputLine},
+    trigger::{Bias, InputLine, InterlockWiring},
 };
 use serde::Deserialize;
 
@@ -199,10 +199,38 @@ impl RawGpioLine {
             ("pull-up", Bias::PullUp),
             ("pull-down", Bias::PullDown),
             ("disabled", Bias::Disabled),
+            ("external-pull-up", Bias::ExternalPullUp),
+            ("external-pull-down", Bias::ExternalPullDown),
         ];
         let bias = text.given(&self.bias, one_of(&biases))?.unwrap_or(Bias::AsIs);
         let line = text.needed(&self.line, gpio_line_name())?;
         Ok(InputLine { chip: self.chip, line, active_low: self.active_low, bias })
+    }
+}
+
+/// The inert interlock: a line, and where there are two contacts the other one.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawInterlock {
+    chip: String,
+    line: RequiredKey<NumberOrWord>,
+    #[serde(default)]
+    active_low: bool,
+    bias: OptionalKey<String>,
+    debounce_ms: OptionalKey<i64>,
+    second: Option<RawGpioLine>,
+    discrepancy_ms: OptionalKey<i64>,
+}
+
+impl RawInterlock {
+    pub(super) fn wiring(self, text: TomlText<'_>) -> Result<InterlockWiring, TomlError> {
+        let discrepancy = text.given(&self.discrepancy_ms, whole(10..=5000))?.map(Duration::from_millis);
+        let Self { chip, line, active_low, bias, debounce_ms, second, .. } = self;
+        Ok(InterlockWiring {
+            contact: RawGpioLine { chip, line, active_low, bias, debounce_ms }.input(text)?,
+            second: second.map(|line| line.input(text)).transpose()?,
+            discrepancy: discrepancy.unwrap_or(InterlockWiring::DISCREPANCY),
+        })
     }
 }
 

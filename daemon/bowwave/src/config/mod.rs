@@ -15,8 +15,13 @@ use bowwave_core::{
     text::toml::{OptionalKey, RenamedKey, Spanned, TomlError, TomlText, bounded_text, number, one_of},
 };
 use bowwave_devices::{
-    camera::CameraSettings, lamps::LampSettings, lcd::LcdSettings, serial::ImuSettings, trigger::InputLine,
+    camera::CameraSettings,
+    lamps::LampSettings,
+    lcd::LcdSettings,
+    serial::ImuSettings,
+    trigger::{InputLine, InterlockWiring},
 };
+use bowwave_files::plain_file;
 use bowwave_trainer::supervisor::HealthSettings;
 use serde::Deserialize;
 
@@ -63,7 +68,7 @@ pub struct Config {
     /// The trigger's line; without it nothing fires.
     pub trigger: Option<TriggerChoice>,
     /// The input that tells that the gun is inert; without it the trainer does not arm.
-    pub interlock: Option<InputLine>,
+    pub interlock: Option<InterlockWiring>,
     /// The input that tells that the supply voltage sinks.
     pub power_fail: Option<InputLine>,
     /// The lamps.
@@ -109,7 +114,7 @@ struct RawConfig {
     landmarks: heading::RawLandmarks,
     heading: heading::RawHeading,
     trigger: Option<devices::RawGpioLine>,
-    interlock: Option<devices::RawGpioLine>,
+    interlock: Option<devices::RawInterlock>,
     power_fail: Option<devices::RawGpioLine>,
     lamps: Option<devices::RawLamps>,
     gpu: RawGpu,
@@ -155,7 +160,7 @@ struct RawHealth {
 
 /// Reads and checks a configuration file. Relative paths in it are taken from its own folder.
 pub fn read(path: &Path) -> Result<Config> {
-    let text = std::fs::File::open(path).and_then(bounded_text).with_context(|| {
+    let text = plain_file(path).and_then(bounded_text).with_context(|| {
         format!("cannot read the configuration {}; name an existing file with --config", path.display())
     })?;
     let base = path.parent().unwrap_or(Path::new("."));
@@ -211,7 +216,7 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         orientation: raw.imu.orientation(text)?,
         imu: raw.imu.check(text)?,
         trigger: raw.trigger.map(|line| line.trigger(text)).transpose()?,
-        interlock: input(raw.interlock)?,
+        interlock: raw.interlock.map(|interlock| interlock.wiring(text)).transpose()?,
         power_fail: input(raw.power_fail)?,
         lamps: raw.lamps.map(|lamps| lamps.settings(text)).transpose()?,
         gpu: raw.gpu.device.map(Spanned::into_inner),

@@ -93,7 +93,9 @@ fn every_key_is_read() {
         [interlock]
         chip = "/dev/gpiochip0"
         line = "inert"
-        bias = "pull-up"
+        bias = "external-pull-down"
+        second = { chip = "/dev/gpiochip0", line = 9, active_low = true, bias = "pull-up" }
+        discrepancy_ms = 300
         [power_fail]
         chip = "gpio-sim"
         line = 2
@@ -155,7 +157,12 @@ fn every_key_is_read() {
     assert_eq!(heading.presses, [rezero, landmark]);
     let trigger = line("/dev/gpiochip0", "17", true, Bias::AsIs);
     assert_eq!(config.trigger, Some(TriggerChoice { line: trigger, debounce: Duration::from_millis(12) }));
-    assert_eq!(config.interlock, Some(line("/dev/gpiochip0", "inert", false, Bias::PullUp)));
+    let interlock = InterlockWiring {
+        contact: line("/dev/gpiochip0", "inert", false, Bias::ExternalPullDown),
+        second: Some(line("/dev/gpiochip0", "9", true, Bias::PullUp)),
+        discrepancy: Duration::from_millis(300),
+    };
+    assert_eq!(config.interlock, Some(interlock));
     assert_eq!(config.power_fail, Some(line("gpio-sim", "2", false, Bias::AsIs)));
     let lamps = config.lamps.unwrap();
     assert_eq!((lamps.ready.as_deref(), lamps.hit, lamps.fault.as_deref()), (Some("ready"), None, Some("5")));
@@ -211,6 +218,14 @@ fn mistakes_are_refused_where_they_are() {
         (
             "[interlock]\nchip = \"a\"\nline = 1\ndebounce_ms = 15\n",
             "x.toml:4:15: interlock.debounce_ms: is for [trigger] alone",
+        ),
+        (
+            "[interlock]\nchip = \"a\"\nline = 1\nsecond = { chip = \"a\", line = 2, bias = \"up\" }\n",
+            "x.toml:4:41: interlock.second.bias: \"up\" is not allowed; give one of",
+        ),
+        (
+            "[interlock]\nchip = \"a\"\nline = 1\ndiscrepancy_ms = 0\n",
+            "x.toml:4:18: interlock.discrepancy_ms: 0 is not allowed; give a whole number, 10 to 5000",
         ),
         (
             "[trigger]\nchip = \"a\"\nline = -1\n",

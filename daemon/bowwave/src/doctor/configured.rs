@@ -191,14 +191,18 @@ fn lines(config: &Config) -> Vec<Check> {
         Some(t) => one("trigger", &t.line, "pressed", "not pressed"),
         None => failed("trigger", "none is configured: set [trigger] to its line"),
     });
-    checks.push(match &config.interlock {
-        Some(line) => {
-            one("interlock", line, "inert: the trainer arms", "NOT inert: the trainer does not arm")
+    match &config.interlock {
+        Some(wiring) => {
+            checks.push(super::interlock::wiring(wiring));
+            checks.extend(wiring.contacts().map(|line| {
+                one("interlock", line, "inert: the trainer arms", "NOT inert: the trainer does not arm")
+            }));
         }
-        None => {
-            failed("interlock", "none is configured: set [interlock]; without it the trainer does not arm")
-        }
-    });
+        None => checks.push(failed(
+            "interlock",
+            "none is configured: set [interlock]; without it the trainer does not arm",
+        )),
+    }
     if let Some(line) = &config.power_fail {
         checks.push(one("power-fail", line, "power is failing", "power is good"));
     }

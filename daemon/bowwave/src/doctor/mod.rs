@@ -2,6 +2,7 @@
 
 mod configured;
 mod imu;
+mod interlock;
 mod ship;
 
 use std::{fmt, path::Path, process::Command};
@@ -65,6 +66,9 @@ fn failed(name: &'static str, error: impl fmt::Display) -> Check {
 pub fn run(arguments: &Doctor) -> Result<bool> {
     if let Some(DoctorDevice::Imu(arguments)) = &arguments.device {
         return print(&imu::checks(arguments)?, arguments.json);
+    }
+    if let Some(DoctorDevice::Interlock(arguments)) = &arguments.device {
+        return print(&interlock::checks(arguments)?, arguments.json);
     }
     let mut checks = Vec::new();
     if let Some(path) = &arguments.config {

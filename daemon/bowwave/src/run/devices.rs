@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use bowwave_core::{
-    fault::{Fault, FaultChange},
-    world::scenario::WeaponSpec,
+use bowwave_core::fault::{Fault, FaultChange};
+use bowwave_devices::{
+    clock::now,
+    trigger::{InterlockWiring, TriggerSettings},
 };
-use bowwave_devices::{clock::now, trigger::TriggerSettings};
 use bowwave_render::TimeOuts;
 use bowwave_trainer::{
     source::{DeviceSettings, LampChoice},
@@ -30,7 +30,7 @@ pub fn device_settings(settings: &Settings, mode: Mode, faults: &mut Vec<FaultCh
         camera: camera_settings(settings),
         imu: training.then(|| config.imu.clone()),
         ship: config.heading.ship.clone().filter(|_| training),
-        trigger: if training { trigger(config, &settings.setup.scenario.weapon, faults) } else { None },
+        trigger: if training { trigger(settings, faults) } else { None },
         lamps: config.lamps.clone().map(|lamps| LampChoice { lamps, inputs: inputs(config) }),
         health: config.health.clone(),
         gpu_timeout: config.gpu_timeout.unwrap_or(TimeOuts::default().frame),
@@ -41,19 +41,40 @@ pub fn device_settings(settings: &Settings, mode: Mode, faults: &mut Vec<FaultCh
 fn inputs(config: &Config) -> Vec<(&'static str, bowwave_devices::trigger::InputLine)> {
     let lines = [
         ("trigger", config.trigger.as_ref().map(|t| &t.line)),
-        ("interlock", config.interlock.as_ref()),
+        ("interlock", config.interlock.as_ref().map(|interlock| &interlock.contact)),
+        ("second interlock", config.interlock.as_ref().and_then(|interlock| interlock.second.as_ref())),
         ("power-fail", config.power_fail.as_ref()),
     ];
     let presses = config.heading.presses.iter().map(|press| (press.name(), Some(&press.line)));
     lines.into_iter().chain(presses).filter_map(|(name, line)| Some((name, line?.clone()))).collect()
 }
 
-fn trigger(config: &Config, weapon: &WeaponSpec, faults: &mut Vec<FaultChange>) -> Option<TriggerSettings> {
-    if config.interlock.is_none() {
-        let cause =
-            "no interlock is configured: set [interlock] to the line that tells that the gun is inert";
-        faults.push(FaultChange::raised(now(), Fault::NotInert, cause));
+/// The interlock, where it can be believed; else why the trainer does not arm.
+fn interlock(settings: &Settings) -> Result<InterlockWiring, (Fault, String)> {
+    let unsafe_wiring = |why: String| (Fault::InterlockWiring, why);
+    if settings.config_is_former {
+        let why = "the configuration was refused: correct it and reload; an earlier one may name the interlock of another gun";
+        return Err((Fault::FormerConfig, why.to_owned()));
     }
+    let Some(interlock) = &settings.config.interlock else {
+        let why = "no interlock is configured: set [interlock] to the line that tells that the gun is inert";
+        return Err(unsafe_wiring(why.to_owned()));
+    };
+    interlock.check().map_err(|e| unsafe_wiring(e.to_string()))?;
+    if interlock.second.is_none() {
+        log::warn!(
+            "the interlock has one contact: the plug must be pulled and fitted after each start, and a wire that is shorted later is not \
+             noticed; wire a second one (interlock.second)"
+        );
+    }
+    Ok(interlock.clone())
+}
+
+fn trigger(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<TriggerSettings> {
+    let (config, weapon) = (&settings.config, &settings.setup.scenario.weapon);
+    let interlock = interlock(settings)
+        .map_err(|(fault, cause)| faults.push(FaultChange::raised(now(), fault, cause)))
+        .ok();
     let Some(trigger) = &config.trigger else {
         let cause = "no trigger is configured: set [trigger] to its line";
         faults.push(FaultChange::raised(now(), Fault::TriggerLost, cause));
@@ -64,9 +85,56 @@ fn trigger(config: &Config, weapon: &WeaponSpec, faults: &mut Vec<FaultChange>) 
         debounce: trigger.debounce,
         stuck_after: (Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_MOST) + STUCK_BEYOND)
             .min(STUCK_MOST),
-        interlock: config.interlock.clone(),
+        interlock,
         power_fail: config.power_fail.clone(),
         presses: config.heading.presses.clone(),
         ..TriggerSettings::new(trigger.line.clone())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::settings::Reader;
+
+    /// What the training's start says of an interlock that is configured so.
+    fn faults_of(folder: &std::path::Path, interlock: &str) -> Vec<Fault> {
+        let line = "chip = \"chip\"\nline = 1\n";
+        let path = folder.join("bowwave.toml");
+        std::fs::write(&path, format!("[trigger]\n{line}{interlock}")).unwrap();
+        let reader = Reader { config: path, last_good: Some(folder.join("last-good")) };
+        let mut faults = Vec::new();
+        device_settings(&reader.read().unwrap(), Mode::Training, &mut faults);
+        faults.iter().map(|change| change.fault).collect()
+    }
+
+    #[test]
+    fn an_interlock_arms_only_where_a_broken_wire_is_not_inert_and_its_configuration_is_the_present_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let with =
+            |keys: &str| faults_of(folder.path(), &format!("[interlock]\nchip = \"chip\"\nline = 2\n{keys}"));
+        for (keys, fails_safe) in [
+            ("", false),
+            ("active_low = true\n", false),
+            ("bias = \"as-is\"\n", false),
+            ("bias = \"disabled\"\n", false),
+            ("bias = \"pull-up\"\n", false),
+            ("active_low = true\nbias = \"pull-down\"\n", false),
+            ("bias = \"pull-down\"\n", true),
+            ("bias = \"external-pull-down\"\n", true),
+            ("active_low = true\nbias = \"pull-up\"\n", true),
+            ("bias = \"pull-down\"\nsecond = { chip = \"chip\", line = 3, bias = \"pull-down\" }\n", false),
+            (
+                "bias = \"pull-down\"\nsecond = { chip = \"chip\", line = 3, active_low = true, bias = \"pull-up\" }\n",
+                true,
+            ),
+        ] {
+            let expected: &[Fault] = if fails_safe { &[] } else { &[Fault::InterlockWiring] };
+            assert_eq!(with(keys), expected, "{keys}");
+        }
+        assert_eq!(faults_of(folder.path(), ""), [Fault::InterlockWiring]);
+        // The last good one has an interlock that would do; the present one is not readable.
+        with("bias = \"pull-down\"\n");
+        assert_eq!(with("bias = \"pull-down\"\nunknown = 1\n"), [Fault::FormerConfig]);
+    }
 }

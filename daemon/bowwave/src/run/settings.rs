@@ -19,6 +19,7 @@ use bowwave_core::{
     world::scenario::{self, Scenario},
 };
 use bowwave_devices::{camera::CameraSettings, clock::now};
+use bowwave_files::plain_file;
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
@@ -48,6 +49,8 @@ pub struct Settings {
     pub models_base: PathBuf,
     /// What was refused.
     pub faults: Vec<FaultChange>,
+    /// The configuration was refused, and this is an earlier one: its wiring may be that of another gun.
+    pub config_is_former: bool,
 }
 
 /// Reads settings, with a place for the last good ones.
@@ -73,7 +76,7 @@ impl Reader {
         let mut refuse = |fault: Fault, why: &anyhow::Error| {
             faults.push(FaultChange::raised(now(), fault, format!("{why:#}")));
         };
-        let config = self.config(&mut refuse);
+        let (config, config_is_former) = self.config(&mut refuse);
         let calibration = self.calibration(&config, &mut refuse);
         let (scenario, scenario_toml, models, boat_models, models_base) =
             self.scenario(&config, &mut refuse)?;
@@ -93,26 +96,39 @@ impl Reader {
             heading: config.heading.settings.clone(),
             own_ship,
         };
-        Ok(Settings { config, setup, camera_serial, calibration_toml, scenario_toml, models_base, faults })
+        Ok(Settings {
+            config,
+            setup,
+            camera_serial,
+            calibration_toml,
+            scenario_toml,
+            models_base,
+            faults,
+            config_is_former,
+        })
     }
 
-    fn config(&self, refuse: &mut impl FnMut(Fault, &anyhow::Error)) -> Config {
+    /// The configuration, and whether it is an earlier one because the file was refused.
+    fn config(&self, refuse: &mut impl FnMut(Fault, &anyhow::Error)) -> (Config, bool) {
         let base = self.config.parent().unwrap_or(Path::new("."));
         let accepted =
             self.accept("bowwave.toml", Some(&self.config), |text, origin| config::parse(text, origin, base));
         match accepted {
             Some(a) => {
                 if let Some(why) = &a.refused {
-                    refuse(Fault::Config, &why_and_instead(why, "the last good configuration is used"));
+                    refuse(
+                        Fault::Config,
+                        &why_and_instead(why, "the last good configuration is used, and nothing arms"),
+                    );
                 }
                 warn_of_former_names(&a.value.warnings);
-                a.value
+                (a.value, a.refused.is_some())
             }
             None => {
                 let why =
                     config::read(&self.config).err().unwrap_or_else(|| anyhow::anyhow!("cannot be read"));
                 refuse(Fault::Config, &why_and_instead(&why, "the trainer runs as without a configuration"));
-                Config::default()
+                (Config::default(), false)
             }
         }
     }
@@ -235,7 +251,7 @@ impl Reader {
 }
 
 fn read_text(path: &Path) -> Result<String> {
-    fs::File::open(path).and_then(bounded_text).with_context(|| format!("cannot read {}", path.display()))
+    plain_file(path).and_then(bounded_text).with_context(|| format!("cannot read {}", path.display()))
 }
 
 /// Whether there are cameras of this size, in every coding.
@@ -337,6 +353,7 @@ mod tests {
         assert_eq!(faults(&kept), [Fault::Config, Fault::Config]);
         assert_eq!(kept.setup.scenario.boats.len(), boats);
         assert_eq!(kept.setup.calibration.lens, good.setup.calibration.lens);
+        assert!(kept.config_is_former && !good.config_is_former);
         let said = format!("{:?}", kept.faults[0].change);
         assert!(said.contains("bowwave.toml:2:15") && said.contains("last good"), "{said}");
     }

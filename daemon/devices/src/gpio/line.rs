@@ -29,6 +29,21 @@ pub enum LineBias {
     PullDown,
     /// Nothing of the chip's.
     Disabled,
+    /// A resistor outside of the chip pulls it up; the chip does nothing.
+    ExternalPullUp,
+    /// A resistor outside of the chip pulls it down; the chip does nothing.
+    ExternalPullDown,
+}
+
+impl LineBias {
+    /// Whether a line that nothing drives is high; `None` where nothing says so.
+    pub const fn pulls_high(self) -> Option<bool> {
+        match self {
+            Self::PullUp | Self::ExternalPullUp => Some(true),
+            Self::PullDown | Self::ExternalPullDown => Some(false),
+            Self::AsIs | Self::Disabled => None,
+        }
+    }
 }
 
 /// An input line and how it is read.
@@ -46,10 +61,18 @@ pub struct InputLine {
 }
 
 impl InputLine {
+    /// Whether the line is active while its wire is open; `None` where nothing pulls it either way.
+    pub const fn open_wire_is_active(&self) -> Option<bool> {
+        match self.bias.pulls_high() {
+            Some(high) => Some(high != self.active_low),
+            None => None,
+        }
+    }
+
     fn flags(&self) -> LineRequestFlags {
         // GPIOHANDLE_REQUEST_BIAS_* of linux/gpio.h (Linux 5.5 and newer), which the crate does not name.
         let bias = match self.bias {
-            LineBias::AsIs => 0,
+            LineBias::AsIs | LineBias::ExternalPullUp | LineBias::ExternalPullDown => 0,
             LineBias::PullUp => 1 << 5,
             LineBias::PullDown => 1 << 6,
             LineBias::Disabled => 1 << 7,

@@ -195,7 +195,10 @@ fn light(mut bank: LampBank<impl LampChips>, link: &PortLink<LampState>) {
 #[cfg(test)]
 mod tests {
     use super::{chips::LineSpot, *};
-    use crate::{gpio::LineBias, trigger::TriggerSettings};
+    use crate::{
+        gpio::LineBias,
+        trigger::{InterlockWiring, TriggerSettings},
+    };
 
     /// A chip that keeps each call for a while, as one on a bus that is stuck, and tells of each.
     struct Slow(crossbeam_channel::Sender<bool>);
@@ -237,7 +240,7 @@ mod tests {
     #[test]
     fn a_lamp_on_an_input_is_refused_even_where_the_chip_is_absent() {
         let inputs = TriggerSettings {
-            interlock: Some(input("27")),
+            interlock: Some(InterlockWiring::single(input("27"))),
             power_fail: Some(input("PFAIL")),
             ..TriggerSettings::new(input("17"))
         };

@@ -10,20 +10,45 @@ const ARM_NS: i64 = 50_000_000;
 /// The supply must be well for this long before the warning ends.
 const POWER_NS: i64 = 1_000_000_000;
 
-/// The interlock: active means that the gun is inert. It arms late and disarms at once.
+/// A contact of the interlock: whether it is active, and since when.
+#[derive(Clone, Copy, Debug)]
+struct Contact {
+    active: bool,
+    since: Time,
+}
+
+/// The interlock: active means that the gun is inert. It arms late and disarms at once. Two contacts that differ for too long are
+/// believed no more before both have shown the plug out. A single one is believed once it has.
 #[derive(Debug)]
 pub(super) struct Interlock {
-    /// Since when the line has been active without an interruption.
-    active: Option<Time>,
+    /// Its contacts; `None` where one has not been read.
+    contacts: Vec<Option<Contact>>,
+    /// How long two may differ, nanoseconds.
+    discrepancy_ns: i64,
     armed: bool,
     raised: bool,
+    /// The contacts differed for too long.
+    discrepant: bool,
+    /// A shorted wire does not pass for the plug: there are two contacts, or the one has shown the plug out since the start.
+    proven: bool,
+    /// The test of the plug was asked for.
+    asked: bool,
     out: Vec<FaultChange>,
 }
 
 impl Interlock {
-    /// Not armed, and says so, until the line has shown otherwise.
-    pub(super) fn new(now: Time) -> Self {
-        let mut interlock = Self { active: None, armed: false, raised: false, out: Vec::new() };
+    /// Of so many contacts. Not armed, and says so, until they have shown otherwise.
+    pub(super) fn new(now: Time, contacts: usize, discrepancy_ns: i64) -> Self {
+        let mut interlock = Self {
+            contacts: vec![None; contacts],
+            discrepancy_ns,
+            armed: false,
+            raised: false,
+            discrepant: false,
+            proven: contacts > 1,
+            asked: false,
+            out: Vec::new(),
+        };
         interlock.disarm(now, "the interlock has not been read yet");
         interlock
     }
@@ -36,30 +61,65 @@ impl Interlock {
         self.armed
     }
 
-    /// An edge to `level`. An edge to where the line already is comes of an interruption too short to be read.
-    pub(super) fn edge(&mut self, now: Time, level: bool) {
+    /// An edge of a contact to `level`. An edge to where it already is comes of an interruption too short to be read.
+    pub(super) fn edge(&mut self, contact: usize, now: Time, level: bool) {
         self.disarm(now, "the inert plug is out: the interlock's line is not active");
-        self.active = level.then_some(now);
-    }
-
-    /// The line's level, read at `now`.
-    pub(super) fn level(&mut self, now: Time, level: bool) {
-        if !level {
-            self.edge(now, false);
-        } else if self.active.is_none() {
-            self.active = Some(now);
+        if let Some(contact) = self.contacts.get_mut(contact) {
+            *contact = Some(Contact { active: level, since: now });
         }
     }
 
-    /// The line is gone.
-    pub(super) fn lost(&mut self, now: Time, cause: &str) {
+    /// A contact's level, read at `now`.
+    pub(super) fn level(&mut self, contact: usize, now: Time, level: bool) {
+        let known = self.contacts.get(contact).copied().flatten();
+        if known.is_none_or(|known| known.active != level) {
+            self.edge(contact, now, level);
+        }
+    }
+
+    /// A contact's line is gone.
+    pub(super) fn lost(&mut self, contact: usize, now: Time, cause: &str) {
         self.disarm(now, cause);
-        self.active = None;
+        if let Some(contact) = self.contacts.get_mut(contact) {
+            *contact = None;
+        }
     }
 
     /// Time has come to `now`.
     pub(super) fn tick(&mut self, now: Time) {
-        if !self.armed && self.active.is_some_and(|since| now.ns_since(since) >= ARM_NS) {
+        let for_long = |c: &Contact| now.ns_since(c.since) >= ARM_NS;
+        let all = |active: bool| {
+            self.contacts.iter().all(|c| c.is_some_and(|c| c.active == active && for_long(&c)))
+        };
+        let (inert, out) = (all(true), all(false));
+        if let [Some(first), Some(second)] = self.contacts[..]
+            && first.active != second.active
+            && now.ns_since(first.since.max(second.since)) >= self.discrepancy_ns
+            && !std::mem::replace(&mut self.discrepant, true)
+        {
+            let which = if first.active { "second" } else { "first" };
+            let cause = format!(
+                "the interlock's contacts differ: the {which} one is not active, the other is; a wire is broken or shorted, look at the plug \
+                 and its cable, then run `bowwave doctor interlock`"
+            );
+            self.out.push(FaultChange::raised(now, Fault::Interlock, cause));
+        }
+        if self.discrepant && out {
+            self.discrepant = false;
+            self.out.push(FaultChange::cleared(now, Fault::Interlock));
+        }
+        if out {
+            self.proven = true;
+            if std::mem::take(&mut self.asked) {
+                self.out.push(FaultChange::cleared(now, Fault::InterlockUntested));
+            }
+        }
+        if inert && !self.proven && !std::mem::replace(&mut self.asked, true) {
+            let cause = "the interlock has one contact, which has not shown the plug out since the start: a shorted wire would look the same; \
+                         pull the inert plug and fit it, or wire a second contact (interlock.second)";
+            self.out.push(FaultChange::raised(now, Fault::InterlockUntested, cause));
+        }
+        if !self.armed && inert && self.proven && !self.discrepant {
             (self.armed, self.raised) = (true, false);
             self.out.push(FaultChange::cleared(now, Fault::NotInert));
         }
@@ -130,20 +190,47 @@ mod tests {
         changes.map(|c| matches!(c.change, Change::Raised { .. })).collect()
     }
 
+    /// One contact that has shown the plug out.
+    fn tested(from: Time) -> Interlock {
+        let mut interlock = Interlock::new(from, 1, 0);
+        interlock.level(0, from, false);
+        interlock.tick(from.plus_ns(ARM_NS));
+        interlock
+    }
+
+    #[test]
+    fn one_contact_arms_only_after_it_has_shown_the_plug_out() {
+        let mut interlock = Interlock::new(at(0), 1, 0);
+        interlock.level(0, at(0), true);
+        interlock.tick(at(60_000));
+        assert!(!interlock.armed(), "its wire may be shorted");
+        let faults = |changes: &mut Interlock| changes.out().map(|c| c.fault).collect::<Vec<_>>();
+        assert_eq!(faults(&mut interlock), [Fault::NotInert, Fault::InterlockUntested]);
+        interlock.edge(0, at(61_000), false);
+        interlock.tick(at(61_049));
+        assert_eq!(faults(&mut interlock), []);
+        interlock.tick(at(61_050));
+        assert_eq!(faults(&mut interlock), [Fault::InterlockUntested]);
+        interlock.edge(0, at(62_000), true);
+        interlock.tick(at(62_050));
+        assert!(interlock.armed());
+        assert_eq!(faults(&mut interlock), [Fault::NotInert]);
+    }
+
     #[test]
     fn it_arms_after_50_ms_and_disarms_at_once() {
-        let mut interlock = Interlock::new(at(0));
+        let mut interlock = tested(at(-100));
         assert_eq!(raised(interlock.out()), [true], "not armed from the beginning");
-        interlock.level(at(10), true);
+        interlock.level(0, at(10), true);
         interlock.tick(at(59));
         assert!(!interlock.armed());
         interlock.tick(at(60));
         assert!(interlock.armed());
         assert_eq!(raised(interlock.out()), [false]);
-        interlock.edge(at(100), false);
+        interlock.edge(0, at(100), false);
         assert!(!interlock.armed());
-        interlock.edge(at(101), true);
-        interlock.level(at(102), true);
+        interlock.edge(0, at(101), true);
+        interlock.level(0, at(102), true);
         interlock.tick(at(150));
         assert!(!interlock.armed());
         interlock.tick(at(151));
@@ -153,17 +240,53 @@ mod tests {
 
     #[test]
     fn an_interruption_too_short_to_be_read_and_a_lost_line_disarm() {
-        let mut interlock = Interlock::new(at(0));
-        interlock.level(at(0), true);
+        let mut interlock = tested(at(-100));
+        interlock.level(0, at(0), true);
         interlock.tick(at(50));
-        interlock.edge(at(60), true);
+        interlock.edge(0, at(60), true);
         assert!(!interlock.armed());
         interlock.tick(at(110));
         assert!(interlock.armed());
-        interlock.lost(at(120), "gone");
+        interlock.lost(0, at(120), "gone");
         assert!(!interlock.armed());
         interlock.tick(at(1000));
         assert!(!interlock.armed());
+    }
+
+    #[test]
+    fn two_contacts_arm_together_and_one_that_stays_behind_is_told_until_the_plug_was_out() {
+        let mut interlock = Interlock::new(at(0), 2, 500_000_000);
+        assert_eq!(raised(interlock.out()), [true]);
+        interlock.level(0, at(0), true);
+        interlock.tick(at(400));
+        assert!(!interlock.armed(), "the other has not been read");
+        interlock.level(1, at(400), true);
+        interlock.tick(at(450));
+        assert!(interlock.armed());
+        assert_eq!(raised(interlock.out()), [false]);
+        // Pulled: the first one is shorted and stays.
+        interlock.edge(1, at(1000), false);
+        assert!(!interlock.armed());
+        interlock.tick(at(1499));
+        let faults = |changes: &mut Interlock| changes.out().map(|c| c.fault).collect::<Vec<_>>();
+        assert_eq!(faults(&mut interlock), [Fault::NotInert]);
+        interlock.tick(at(1500));
+        assert_eq!(faults(&mut interlock), [Fault::Interlock]);
+        // Fitted again: both say inert, and are not believed.
+        interlock.edge(1, at(2000), true);
+        interlock.tick(at(9000));
+        assert!(!interlock.armed());
+        assert_eq!(faults(&mut interlock), []);
+        // Mended: both show the plug out, then in.
+        interlock.edge(0, at(10_000), false);
+        interlock.edge(1, at(10_100), false);
+        interlock.tick(at(10_200));
+        assert_eq!(faults(&mut interlock), [Fault::Interlock]);
+        interlock.edge(0, at(11_000), true);
+        interlock.edge(1, at(11_300), true);
+        interlock.tick(at(11_350));
+        assert!(interlock.armed());
+        assert_eq!(faults(&mut interlock), [Fault::NotInert]);
     }
 
     #[test]

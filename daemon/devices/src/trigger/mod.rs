@@ -6,6 +6,7 @@
 mod guard;
 mod port;
 mod switch;
+mod wiring;
 
 use std::{io, time::Duration};
 
@@ -14,6 +15,7 @@ use bowwave_core::event::MarkKind;
 pub use self::{
     port::TriggerPort,
     switch::{TriggerCounters, TriggerLife},
+    wiring::{InterlockProbe, InterlockWiring, WiringError},
 };
 use crate::gpio::GpioError;
 pub use crate::gpio::{InputLine, LineBias as Bias};
@@ -24,6 +26,9 @@ pub enum TriggerError {
     /// Its line cannot be used.
     #[error(transparent)]
     Gpio(#[from] GpioError),
+    /// The interlock could arm a gun that is not inert.
+    #[error(transparent)]
+    Wiring(#[from] WiringError),
     /// The window is too short for contacts, or too long for a finger.
     #[error("a debounce of {ms} ms is out of range: give 10 to 20")]
     Debounce {
@@ -89,8 +94,8 @@ pub struct TriggerSettings {
     pub debounce: Duration,
     /// How long a trigger may be held: longer than the longest belt lasts.
     pub stuck_after: Duration,
-    /// The inert interlock: active means that the gun is inert. Where there is none the caller decides what that means.
-    pub interlock: Option<InputLine>,
+    /// The inert interlock. Where there is none the caller decides what that means.
+    pub interlock: Option<InterlockWiring>,
     /// The power supply's warning: active means that power is about to fail.
     pub power_fail: Option<InputLine>,
     /// Buttons by which the operator tells where the gun stands.
@@ -112,9 +117,11 @@ impl TriggerSettings {
 
     /// Every line that is an input, with what it is.
     pub fn inputs(&self) -> impl Iterator<Item = (&'static str, &InputLine)> {
+        let interlock = self.interlock.as_ref();
         [
             ("trigger", Some(&self.trigger)),
-            ("interlock", self.interlock.as_ref()),
+            ("interlock", interlock.map(|interlock| &interlock.contact)),
+            ("second interlock", interlock.and_then(|interlock| interlock.second.as_ref())),
             ("power-fail", self.power_fail.as_ref()),
         ]
         .into_iter()
@@ -130,6 +137,7 @@ impl TriggerSettings {
         if !(Duration::from_secs(1)..=Duration::from_secs(3600)).contains(&self.stuck_after) {
             return Err(TriggerError::StuckAfter { s: self.stuck_after.as_secs_f64() });
         }
+        self.interlock.as_ref().map_or(Ok(()), InterlockWiring::check)?;
         let lines: Vec<_> = self.inputs().collect();
         for (i, (name, line)) in lines.iter().enumerate() {
             if let Some((other, _)) =
@@ -168,6 +176,8 @@ pub struct TriggerStatus {
     pub trigger: LineState,
     /// The interlock's line; `None` where none is wired.
     pub interlock: Option<LineState>,
+    /// Its second line; `None` where none is wired.
+    pub second_interlock: Option<LineState>,
     /// The power supply's line; `None` where none is wired.
     pub power_fail: Option<LineState>,
     /// The interlock is closed: presses count. `None` where none is wired: they count always.

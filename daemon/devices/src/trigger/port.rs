@@ -15,7 +15,7 @@ use bowwave_core::{
 use crossbeam_channel::Receiver;
 
 use super::{
-    LineState, TriggerCounters, TriggerError, TriggerSettings, TriggerStatus,
+    InterlockWiring, LineState, TriggerCounters, TriggerError, TriggerSettings, TriggerStatus,
     guard::{Interlock, PowerSupply},
     switch::{Switch, SwitchOutput},
 };
@@ -92,7 +92,8 @@ impl TriggerPort {
 /// Purpose of a line, and what is kept for it alone.
 enum Role {
     Trigger,
-    Interlock,
+    /// A contact of the interlock, by its number.
+    Interlock(usize),
     PowerFail,
     /// A button of the operator; its contacts while the line is open.
     Button(MarkKind, Option<Debouncer>),
@@ -197,16 +198,16 @@ impl TriggerWatch {
         reporter: Reporter,
         queue: NewestSender<Event>,
     ) -> Self {
-        let presses = settings.presses.iter().map(|p| (Role::Button(p.kind, None), Some(&p.line)));
-        let lines = [
-            (Role::Trigger, Some(&settings.trigger)),
-            (Role::Interlock, settings.interlock.as_ref()),
-            (Role::PowerFail, settings.power_fail.as_ref()),
-        ]
-        .into_iter()
-        .chain(presses)
-        .filter_map(|(role, wanted)| Some(WatchedLine::new(role, wanted?.clone())))
-        .collect();
+        let contacts = settings.interlock.iter().flat_map(InterlockWiring::contacts).enumerate();
+        let contacts = contacts.map(|(number, line)| (Role::Interlock(number), line));
+        let power_fail = settings.power_fail.iter().map(|line| (Role::PowerFail, line));
+        let presses = settings.presses.iter().map(|p| (Role::Button(p.kind, None), &p.line));
+        let lines = std::iter::once((Role::Trigger, &settings.trigger))
+            .chain(contacts)
+            .chain(power_fail)
+            .chain(presses)
+            .map(|(role, wanted)| WatchedLine::new(role, wanted.clone()))
+            .collect();
         Self { dev, link, lines, meaning: Meaning::new(settings, reporter, queue) }
     }
 
@@ -252,7 +253,8 @@ impl TriggerWatch {
         *self.link.status() = TriggerStatus {
             life: switch.life(),
             trigger: of(|role| matches!(role, Role::Trigger)).unwrap_or_default(),
-            interlock: of(|role| matches!(role, Role::Interlock)),
+            interlock: of(|role| matches!(role, Role::Interlock(0))),
+            second_interlock: of(|role| matches!(role, Role::Interlock(1))),
             power_fail: of(|role| matches!(role, Role::PowerFail)),
             armed: interlock.as_ref().map(Interlock::armed),
             counters: TriggerCounters { overflow: queue.dropped(), ..switch.counters() },
@@ -282,7 +284,10 @@ impl Meaning {
         }
         Self {
             switch,
-            interlock: settings.interlock.as_ref().map(|_| Interlock::new(now)),
+            interlock: settings
+                .interlock
+                .as_ref()
+                .map(|wiring| Interlock::new(now, wiring.contacts().count(), ns(wiring.discrepancy))),
             power: PowerSupply::default(),
             debounce_ns,
             reporter,
@@ -294,7 +299,7 @@ impl Meaning {
         match role {
             Role::Trigger => self.switch.opened(asked, now, level),
             Role::Button(_, contacts) => *contacts = Some(Debouncer::new(self.debounce_ns, level, now)),
-            Role::Interlock | Role::PowerFail => self.level(role, now, level),
+            Role::Interlock(_) | Role::PowerFail => self.level(role, now, level),
         }
     }
 
@@ -302,7 +307,9 @@ impl Meaning {
         let now = clock::now();
         match role {
             Role::Trigger => self.switch.edge(now, edge.time, edge.active),
-            Role::Interlock => self.guard(now, |interlock| interlock.edge(now, edge.active)),
+            Role::Interlock(contact) => {
+                self.guard(now, |interlock| interlock.edge(*contact, now, edge.active));
+            }
             Role::PowerFail => self.power.level(now, edge.active),
             Role::Button(kind, contacts) => {
                 if let Some(contacts) = contacts {
@@ -318,7 +325,7 @@ impl Meaning {
     fn level(&mut self, role: &mut Role, now: Time, level: bool) {
         match role {
             Role::Trigger => self.switch.level(now, level),
-            Role::Interlock => self.guard(now, |interlock| interlock.level(now, level)),
+            Role::Interlock(contact) => self.guard(now, |interlock| interlock.level(*contact, now, level)),
             Role::PowerFail => self.power.level(now, level),
             Role::Button(_, contacts) => {
                 if let Some(contacts) = contacts.as_mut().filter(|c| c.level() != level) {
@@ -331,8 +338,9 @@ impl Meaning {
     fn lost(&mut self, role: &mut Role, now: Time, error: &GpioError, first: bool) {
         let noted = match role {
             Role::Trigger => return self.switch.lost(now, &format!("trigger: {error}")),
-            Role::Interlock => {
-                return self.guard(now, |interlock| interlock.lost(now, &format!("interlock: {error}")));
+            Role::Interlock(contact) => {
+                let cause = format!("interlock: {error}");
+                return self.guard(now, |interlock| interlock.lost(*contact, now, &cause));
             }
             Role::Button(..) => format!("button: {error}; the heading cannot be set by it"),
             Role::PowerFail => {
@@ -417,7 +425,7 @@ mod tests {
         let dev = tempfile::tempdir().expect("temporary folder");
         let (reporter, reports) = reporting();
         let settings = TriggerSettings {
-            interlock: Some(line("INERT")),
+            interlock: Some(InterlockWiring::single(line("INERT"))),
             power_fail: Some(line("PFAIL")),
             presses: vec![Press { line: line("REZERO"), kind: MarkKind::Stow }],
             ..TriggerSettings::new(line("TRIGGER"))
@@ -458,7 +466,10 @@ mod tests {
         let same = TriggerSettings { presses: vec![button], ..good.clone() };
         let message = refused(same).to_string();
         assert!(message.contains("landmark and trigger are both line TRIGGER"), "{message}");
-        let twice = TriggerSettings { interlock: Some(line("TRIGGER")), ..good };
+        let wired = |interlock| TriggerSettings { interlock: Some(interlock), ..good.clone() };
+        let dangerous = InputLine { bias: LineBias::PullDown, ..line("INERT") };
+        assert!(matches!(refused(wired(InterlockWiring::single(dangerous))), TriggerError::Wiring(_)));
+        let twice = wired(InterlockWiring::single(line("TRIGGER")));
         let message = refused(twice).to_string();
         assert!(message.contains("interlock and trigger are both line TRIGGER"), "{message}");
     }

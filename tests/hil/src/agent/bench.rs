@@ -10,7 +10,7 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 use bowwave_devices::clock;
-use bowwave_hil::{BENCH, LINES};
+use bowwave_hil::{BENCH, INTERLOCK_INVERTED, LINES};
 use serde::{Deserialize, Serialize};
 
 const CONFIG: &str = "/sys/kernel/config";
@@ -108,7 +108,7 @@ pub struct Gpio {
 }
 
 impl Gpio {
-    /// Makes it; inputs are low at first.
+    /// Makes it; inputs are low at first, and the plug is out.
     pub fn make() -> Result<Self> {
         if !Path::new(CONFIG).join("gpio-sim").exists() {
             let out = Command::new("/bin/mount").args(["-t", "configfs", "none", CONFIG]).output()?;
@@ -134,7 +134,9 @@ impl Gpio {
         };
         let chip = read(bank.join("chip_name"))?;
         let name = read(device.join("dev_name"))?;
-        Ok(Self { lines: Path::new("/sys/devices/platform").join(name).join(&chip), chip })
+        let gpio = Self { lines: Path::new("/sys/devices/platform").join(name).join(&chip), chip };
+        gpio.pull(INTERLOCK_INVERTED, &[(0, true)])?;
+        Ok(gpio)
     }
 
     /// Its device's name.

@@ -100,4 +100,4 @@ impl Agent {
     }
 }
 
-const _: () = assert!(LINES.len() == 6, "bench::Gpio makes these lines");
+const _: () = assert!(LINES.len() == 7, "bench::Gpio makes these lines");

@@ -9,6 +9,7 @@ use std::{
 
 use anyhow::{Context, Result, bail, ensure};
 use bowwave_hil::{
+    INTERLOCK, INTERLOCK_INVERTED,
     protocol::{AgentCommand, PlayerFeed},
     tape::{Tape, TapeHeader},
 };
@@ -181,6 +182,8 @@ pub struct Configured {
     pub data: Option<String>,
     /// Whether what goes in is kept.
     pub record: bool,
+    /// How the interlock is wired.
+    pub interlock: String,
     /// A line of its own.
     pub extra: String,
 }
@@ -193,6 +196,8 @@ impl Default for Configured {
             calibration: "calibration.toml".into(),
             data: None,
             record: false,
+            // The contacts are set one after the other, and the machine is slow.
+            interlock: "bias = \"external-pull-down\"\ndiscrepancy_ms = 5000\nsecond = { chip = \"bench\", line = \"interlock-inverted\", active_low = true, bias = \"external-pull-up\" }".into(),
             extra: String::new(),
         }
     }
@@ -203,12 +208,12 @@ pub fn configuration(c: &Configured) -> String {
     let data = c.data.as_ref().map_or_else(String::new, |d| format!("data = \"{d}\"\n"));
     format!(
         "[screen]\noutput = \"lcd\"\nsize = \"{}x{}\"\n[camera]\nmodes = [{}]\n[imu]\nbaud = [921600, 460800, 230400, 115200]\npacket_jitter_ms_max = 30\n\
-         [trigger]\nchip = \"bench\"\nline = \"trigger\"\n[interlock]\nchip = \"bench\"\nline = \"interlock\"\n\
+         [trigger]\nchip = \"bench\"\nline = \"trigger\"\n[interlock]\nchip = \"bench\"\nline = \"interlock\"\n{}\n\
          [power_fail]\nchip = \"bench\"\nline = \"power-fail\"\n\
          [lamps]\nchip = \"bench\"\nready = \"lamp-ready\"\nhit = \"lamp-hit\"\nfault = \"lamp-fault\"\n\
          [gpu]\ngpu_timeout_ms = 15000\n[files]\nscenario = \"scenario.toml\"\ncalibration = \"{}\"\nrecord = {}\nrecord_exact = true\n{data}\
          [health]\nthermal = \"/run/hil/thermal\"\ntemperature_c_max = 78.0\n{}",
-        LCD.0, LCD.1, c.modes, c.calibration, c.record, c.extra
+        LCD.0, LCD.1, c.modes, c.interlock, c.calibration, c.record, c.extra
     )
 }
 
@@ -290,8 +295,11 @@ impl HilBench {
         at.as_i64().context("a time")
     }
 
-    /// Sets an input; the machine's time after it.
+    /// Sets an input, and with the interlock its second contact; the machine's time after it.
     pub fn pull(&mut self, line: usize, high: bool) -> Result<i64> {
+        if line == INTERLOCK {
+            self.pulls(INTERLOCK_INVERTED, vec![(0, !high)])?;
+        }
         let times = self.pulls(line, vec![(0, high)])?;
         Ok(times.last().map_or(0, |t| t[1]))
     }

@@ -3,35 +3,45 @@
 use std::{thread, time::Duration};
 
 use anyhow::{Context, Result};
-use bowwave_hil::protocol::AgentCommand;
+use bowwave_hil::{INTERLOCK, INTERLOCK_INVERTED, protocol::AgentCommand};
 use serde_json::Value;
 
 use super::{CaseResult, FaultCase, FaultRow, LcdShown, SpecialCase};
 use crate::{
-    bench::{HilBench, JournalChange},
+    bench::{Configured, HilBench, JournalChange, says},
     lcd::Plate,
 };
 
 /// Rows that are tried before all others.
 pub fn first() -> Vec<FaultRow> {
-    vec![FaultRow::Case(FaultCase {
-        number: "I",
-        fault: "Interlock open: gun not inert",
-        injected: "the interlock's line goes low",
-        code: "NOT_INERT",
-        shown: LcdShown::Fault("NOT ARMED"),
-        seen_s: Some(0.1),
-        back_s: Some(0.1),
-        stays_s: 0.3,
-        inject: |b| {
-            let at = b.pull(1, false)?;
-            // Nothing may be fired.
-            b.shoot_blind(Duration::from_millis(300), 200)?;
-            Ok(at)
-        },
-        end: |b| b.pull(1, true),
-        ..FaultCase::USUAL
-    })]
+    vec![
+        FaultRow::Own(SpecialCase {
+            number: "I2",
+            fault: "Interlock wired wrongly, broken, shorted",
+            injected: "24 wirings of a gun that is not inert: both polarities, three biases, one contact or two, the first one's wire open or shorted",
+            code: "NOT_INERT, INTERLOCK, INTERLOCK_CFG, INTERLOCK_TEST",
+            target: "never armed",
+            run: wirings,
+        }),
+        FaultRow::Case(FaultCase {
+            number: "I",
+            fault: "Interlock open: gun not inert",
+            injected: "the interlock's line goes low",
+            code: "NOT_INERT",
+            shown: LcdShown::Fault("NOT ARMED"),
+            seen_s: Some(0.1),
+            back_s: Some(0.1),
+            stays_s: 0.3,
+            inject: |b| {
+                let at = b.pull(1, false)?;
+                // Nothing may be fired.
+                b.shoot_blind(Duration::from_millis(300), 200)?;
+                Ok(at)
+            },
+            end: |b| b.pull(1, true),
+            ..FaultCase::USUAL
+        }),
+    ]
 }
 
 pub fn rows() -> Vec<FaultRow> {
@@ -85,6 +95,81 @@ pub fn last() -> Vec<FaultRow> {
         end: |b| b.pull(0, false),
         ..FaultCase::USUAL
     })]
+}
+
+/// A contact of the interlock as the configuration describes it, and the levels of its wire.
+struct WiredContact {
+    active_low: bool,
+    bias: &'static str,
+}
+
+impl WiredContact {
+    fn keys(&self) -> String {
+        format!("active_low = {}, bias = \"{}\"", self.active_low, self.bias)
+    }
+
+    /// The level that means inert.
+    const fn inert(&self) -> bool {
+        !self.active_low
+    }
+
+    /// The level of an open wire: where no resistor decides it, the worst one.
+    fn open(&self) -> bool {
+        match self.bias {
+            "external-pull-up" => true,
+            "external-pull-down" => false,
+            _ => self.inert(),
+        }
+    }
+}
+
+/// A gun that is not inert, and an interlock of every wiring: nothing may arm.
+fn wirings(bench: &mut HilBench) -> Result<CaseResult> {
+    let mut armed = Vec::new();
+    let mut said: std::collections::BTreeMap<String, u32> = std::collections::BTreeMap::new();
+    for number in 0..24 {
+        let opposite = |bias| match bias {
+            "external-pull-up" => "external-pull-down",
+            "external-pull-down" => "external-pull-up",
+            other => other,
+        };
+        let bias = ["external-pull-up", "external-pull-down", "as-is"][number / 2 % 3];
+        let first = WiredContact { active_low: number % 2 == 1, bias };
+        let second = WiredContact { active_low: !first.active_low, bias: opposite(bias) };
+        let (two, shorted) = (number / 6 % 2 == 1, number / 12 == 1);
+        bench.pulls(INTERLOCK, vec![(0, if shorted { first.inert() } else { first.open() })])?;
+        bench.pulls(INTERLOCK_INVERTED, vec![(0, !second.inert())])?;
+        let from = bench.machine.guest.now_ns();
+        let mut interlock = first.keys().replace(", ", "\n");
+        if two {
+            interlock += &format!(
+                "\ndiscrepancy_ms = 500\nsecond = {{ chip = \"bench\", line = \"interlock-inverted\", {} }}",
+                second.keys()
+            );
+        }
+        bench.configure(&Configured { interlock: interlock.clone(), ..Configured::default() })?;
+        bench.service("reload")?;
+        let patience = bench.scaled(2.0);
+        let is_told = |e: &crate::guest::JournalEntry| {
+            ["NOT_INERT", "INTERLOCK_CFG"]
+                .iter()
+                .any(|code| says(&e.fields, code) == Some(JournalChange::Came))
+        };
+        bench.machine.guest.journal(from, patience, "why nothing arms", is_told)?;
+        // A contact that can be believed would arm within 50 ms.
+        thread::sleep(bench.scaled(0.1));
+        let status = bench.status()?;
+        *said.entry(status.split([';', ',']).next().unwrap_or_default().to_owned()).or_default() += 1;
+        if !status.contains("NOT ARMED") {
+            armed.push(format!("{interlock} {status}"));
+        }
+    }
+    bench.configure(&Configured::default())?;
+    bench.pull(INTERLOCK, false)?;
+    bench.service("reload")?;
+    bench.settle()?;
+    let note = format!("{} of 24 armed {armed:?}; {said:?}", armed.len());
+    Ok(CaseResult { lcd: "NOT ARMED".to_owned(), met: armed.is_empty(), note, ..CaseResult::default() })
 }
 
 /// Shots as the status line counts them.

@@ -1,0 +1,99 @@
+//! `bowwave doctor interlock`: the proof test of the inert interlock. The plug is pulled and fitted once, and each contact must follow.
+
+use std::time::Duration;
+
+use anyhow::{Context, Result};
+use bowwave_devices::{
+    clock::{now, sleep_until},
+    trigger::{InterlockProbe, InterlockWiring},
+};
+
+use super::{Check, Verdict, check, failed};
+use crate::{cli::DoctorInterlock, config};
+
+/// How often the contacts are read.
+const LOOK_S: f64 = 0.02;
+/// How long they must stay as they are: contacts chatter.
+const STEADY_S: f64 = 0.2;
+
+/// Tests the interlock that the configuration names.
+pub(super) fn checks(arguments: &DoctorInterlock) -> Result<Vec<Check>> {
+    let config = config::read(&arguments.config)?;
+    let Some(wiring) = &config.interlock else {
+        return Ok(vec![failed(
+            "interlock",
+            "none is configured: set [interlock]; without it the trainer does not arm",
+        )]);
+    };
+    let mut checks = vec![self::wiring(wiring)];
+    if checks.iter().any(|check| check.verdict == Verdict::Failed) {
+        return Ok(checks);
+    }
+    let probe =
+        InterlockProbe::open(wiring).context("the trainer must not run meanwhile: systemctl stop bowwave")?;
+    let within = Duration::from_secs(u64::from(arguments.seconds));
+    let names: Vec<String> =
+        wiring.contacts().map(|contact| format!("{} line {}", contact.chip, contact.line)).collect();
+    for (ask, active) in
+        [("Fit the inert plug.", true), ("Pull the inert plug.", false), ("Fit the inert plug again.", true)]
+    {
+        eprintln!("{ask}");
+        let found = await_levels(&probe, active, within)?;
+        let passed = found.iter().all(|level| *level == active);
+        checks.extend(names.iter().zip(found).map(|(name, level)| followed(name, active, level)));
+        if !passed {
+            break;
+        }
+    }
+    Ok(checks)
+}
+
+/// Whether the wiring fails safe.
+pub(super) fn wiring(wiring: &InterlockWiring) -> Check {
+    match wiring.check() {
+        Err(e) => failed("interlock", e),
+        Ok(()) if wiring.second.is_none() => check(
+            "interlock",
+            Verdict::Warning,
+            "one contact: a broken wire reads as not inert; the plug must be pulled and fitted after each start, and a wire that is shorted later is \
+             not noticed; wire a second contact with the opposite level (interlock.second)",
+        ),
+        Ok(()) => {
+            check("interlock", Verdict::Ok, "two contacts: a broken or shorted wire reads as not inert")
+        }
+    }
+}
+
+fn followed(name: &str, active: bool, level: bool) -> Check {
+    match (active, level) {
+        (true, true) => check("interlock", Verdict::Ok, format!("{name}: inert with the plug fitted")),
+        (false, false) => check("interlock", Verdict::Ok, format!("{name}: not inert with the plug pulled")),
+        (true, false) => failed(
+            "interlock",
+            format!(
+                "{name}: NOT inert with the plug fitted; look for a broken wire, a loose plug, a wrong active_low"
+            ),
+        ),
+        (false, true) => failed(
+            "interlock",
+            format!(
+                "{name}: still inert with the plug pulled; look for a shorted wire. Do not train before it is mended"
+            ),
+        ),
+    }
+}
+
+/// The contacts' levels once all have been at `active` for a moment, or as they are when the time is over.
+fn await_levels(probe: &InterlockProbe, active: bool, within: Duration) -> Result<Vec<bool>> {
+    let begun = now();
+    let mut since = None;
+    loop {
+        let (levels, at) = (probe.levels()?, now());
+        since = if levels.iter().all(|level| *level == active) { since.or(Some(at)) } else { None };
+        let is_steady = since.is_some_and(|since| at.secs_since(since) >= STEADY_S);
+        if is_steady || at.secs_since(begun) >= within.as_secs_f64() {
+            return Ok(levels);
+        }
+        sleep_until(at.plus_secs(LOOK_S));
+    }
+}
