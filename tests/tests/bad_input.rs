@@ -141,6 +141,59 @@ fn mistakes_in_files_are_named_by_line_and_column() {
 }
 
 #[test]
+fn a_calibration_for_another_picture_size_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let properties = RecordingReader::open(small_recording()).expect("a recording").properties().clone();
+    let text = properties.calibration_toml.as_str();
+    let (width, height) = properties.picture;
+    let of_size = format!("[{width}, {height}]");
+    assert!(text.contains(&of_size), "{of_size} {text}");
+    let other = text.replace(&of_size, &format!("[{}, {}]", 2 * width, 2 * height));
+    let other = file(folder.path(), "other.toml", other.as_bytes());
+    refused(
+        &["--calibration", &other, "--frames", "5"],
+        &["is for pictures of", &format!("{width}x{height}"), "calibration of its camera"],
+    );
+}
+
+#[test]
+fn a_run_that_is_interrupted_keeps_what_there_was_and_says_so() {
+    let out = tempfile::tempdir().expect("a folder");
+    let mut child = Command::new(bowwave_tests::program())
+        .args(["simulate", "--realtime", "--size", "64x64", "--duration", "600", "--print-commits"])
+        .arg("--out")
+        .arg(out.path())
+        .arg(small_recording())
+        .stdout(std::process::Stdio::piped())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    let mut first = String::new();
+    std::io::BufRead::read_line(
+        &mut std::io::BufReader::new(child.stdout.as_mut().expect("a pipe")),
+        &mut first,
+    )
+    .expect("a line");
+    assert!(first.starts_with("committed "), "{first}");
+    let id = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(id, rustix::process::Signal::INT).expect("a signal");
+    let output = child.wait_with_output().expect("it ends");
+    expect_code(&output, 3);
+    assert!(said(&output).contains("interrupted after "), "{}", said(&output));
+    let summary: serde_json::Value =
+        serde_json::from_slice(&fs::read(out.path().join("summary.json")).expect("a summary")).expect("JSON");
+    assert!(summary["frames"].as_u64().is_some_and(|frames| (1..18_000).contains(&frames)), "{summary}");
+}
+
+#[test]
+fn frames_beyond_the_end_and_faults_too_close_are_refused() {
+    refused(&["--frames", "5", "--stills", "4,5"], &["--stills 5", "frames 0 to 4"]);
+    let output = bowwave(["simulate", "--fault-every", "1"]);
+    expect_code(&output, 2);
+    assert!(said(&output).contains("5 to 86400"), "{}", said(&output));
+}
+
+#[test]
 fn a_model_without_its_parts_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     // One triangle in the plane of the keel, in a mesh called "blob".

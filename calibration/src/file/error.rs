@@ -20,7 +20,7 @@ pub enum CalibrationError {
     },
     /// The file could not be written; what was there before is untouched.
     #[error(
-        "cannot write the calibration {path}: {source}; the former one is kept, check the folder's permissions and space"
+        "cannot write the calibration {path}: {source}; what stood there is untouched, check the folder's permissions and space"
     )]
     Write {
         /// The file.

@@ -216,7 +216,9 @@ pub fn write(mut file: CalibrationFile, today: Date, files: &CalibrationFiles) -
         return Ok(());
     };
     file.made = today;
+    let replaces = out.exists();
     file.write(out)?;
-    eprintln!("{} written; what stood there before is kept (bowwave calibrate restore)", out.display());
+    let kept = if replaces { "; what stood there before is kept (bowwave calibrate restore)" } else { "" };
+    eprintln!("{} written{kept}", out.display());
     Ok(())
 }

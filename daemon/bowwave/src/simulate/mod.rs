@@ -3,7 +3,10 @@
 pub mod prepare;
 
 use std::{
-    sync::{Arc, atomic::Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, SystemTime},
 };
 
@@ -33,14 +36,28 @@ use crate::{cli::Simulate, outcome::Outcome, stdout};
 pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     let signals = Arc::new(Signals::default());
     let on_signal = Arc::clone(&signals);
-    ctrlc::set_handler(move || on_signal.stop.store(true, Ordering::Relaxed))
-        .context("cannot catch interrupts")?;
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let is_interrupted = Arc::clone(&interrupted);
+    ctrlc::set_handler(move || {
+        interrupted.store(true, Ordering::Relaxed);
+        on_signal.stop.store(true, Ordering::Relaxed);
+    })
+    .context("cannot catch interrupts")?;
 
     let prepared = prepare::prepare(arguments)?;
     std::fs::create_dir_all(&arguments.out).with_context(|| {
         format!("cannot make the folder {}; name another with --out", arguments.out.display())
     })?;
     let frames = expected_frames(arguments, prepared.duration_ns);
+    if let Some(still) = arguments.stills.iter().find(|still| **still >= frames) {
+        bail!("--stills {still}: the run has frames 0 to {}", frames.saturating_sub(1));
+    }
+    let run_s = frames as f64 / FRAMES_PER_S as f64;
+    if let Some(lasts_s) = prepared.setup.scenario.duration_s.filter(|lasts_s| *lasts_s > run_s + 0.5) {
+        log::warn!(
+            "the scenario lasts {lasts_s} s, and this run ends after {run_s:.1} s; --duration {lasts_s} plays all of it"
+        );
+    }
     let realtime = arguments.realtime || prepared.window;
     let plan = fault_plan(arguments, frames);
     let replay = RecordingSource::new(open_replay(&prepared, realtime, arguments, frames, plan.clone())?);
@@ -64,7 +81,17 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     };
     let source = Source::Recording(Box::new(replay));
     let trainer = Trainer::start(options, source, clock, Some(storage), signals)?;
-    report(trainer.run(&mut Notifier::from_environment(), None)?, arguments)
+    let mut finished = trainer.run(&mut Notifier::from_environment(), None)?;
+    let summary = &finished.summary;
+    if is_interrupted.load(Ordering::Relaxed) && summary.frames < frames {
+        let cut = format!(
+            "interrupted after {} of {frames} frames: what there was until then is written",
+            summary.frames
+        );
+        log::warn!("{cut}");
+        finished.wrong.push(cut);
+    }
+    report(finished, arguments)
 }
 
 /// Writes the summary, tells the user, and says how the run ended.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use bowwave_calibration::CalibrationFile;
 use bowwave_core::{
     estimate::attitude::Source,
@@ -12,6 +12,7 @@ use bowwave_core::{
     text::toml::bounded_text,
     world::scenario::{self, Scenario},
 };
+use bowwave_files::plain_file;
 use bowwave_record::{Properties, RecordingReader};
 use bowwave_trainer::replay::session_properties;
 
@@ -65,6 +66,18 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
 
     let (calibration, calibration_toml) =
         calibration(arguments.calibration.as_ref().or(config.calibration.as_ref()), &properties, &recording)?;
+    let (lens, picture) = (&calibration.calibration.lens, properties.picture);
+    if picture != (0, 0) && picture != (lens.width, lens.height) {
+        bail!(
+            "the calibration is for pictures of {}x{}, those of {} have {}x{}: give the calibration of its camera, or leave --calibration \
+             out for the recording's own",
+            lens.width,
+            lens.height,
+            recording.display(),
+            picture.0,
+            picture.1
+        );
+    }
     let named = arguments.scenario.as_ref().or(config.scenario.as_ref());
     let (mut scenario, scenario_toml, base) = scenario(named, &properties, &recording)?;
     if let Some(seed) = arguments.seed {
@@ -123,7 +136,7 @@ fn calibration(
 ) -> Result<(CalibrationFile, String)> {
     let (text, origin) = match named {
         Some(path) => {
-            let text = std::fs::File::open(path).and_then(bounded_text).with_context(|| {
+            let text = plain_file(path).and_then(bounded_text).with_context(|| {
                 format!(
                     "cannot read the calibration {}; name an existing file with --calibration",
                     path.display()
