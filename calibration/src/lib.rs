@@ -28,6 +28,8 @@
 //! by one unit in the last place (2e-16 of the value) when it is first written, because not every number of radians is a
 //! number of degrees.
 
+#![forbid(unsafe_code)]
+
 pub mod capture;
 mod file;
 pub mod report;

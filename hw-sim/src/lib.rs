@@ -1,5 +1,7 @@
 //! Simulated hardware: replays recordings and makes ones with known truth.
 
+#![forbid(unsafe_code)]
+
 pub mod fault;
 pub mod make;
 pub mod ocean;

@@ -1,5 +1,6 @@
 //! Tests of the whole: what no single crate can check. They live in `tests/`; here is what they share.
 
+#![forbid(unsafe_code)]
 #![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use std::{

@@ -90,6 +90,25 @@ fn every_decision_tells_question_choice_figures_and_what_would_change_it() {
     assert!(decisions > 40, "only {decisions} decisions");
 }
 
+/// The limits that the threat model lists are those of the code.
+#[test]
+fn the_limits_that_are_told_are_those_of_the_code() {
+    let text = fs::read_to_string(root().join("docs/threat-model.md")).expect("a document");
+    let mut limits = 0;
+    for row in text.lines().filter(|line| line.starts_with('|') && line.contains("_MAX")) {
+        let quoted: Vec<&str> = row.split('`').skip(1).step_by(2).collect();
+        let [path, limit] = quoted[..] else { panic!("a row names file and limit: {row}") };
+        let (name, value) = limit.split_once(" = ").expect("a name and its value");
+        let source = fs::read_to_string(root().join(path)).unwrap_or_else(|e| panic!("{path}: {e}"));
+        let found = source
+            .lines()
+            .any(|line| line.contains(&format!("const {name}: ")) && line.ends_with(&format!(" = {value};")));
+        assert!(found, "{path} has no {limit}");
+        limits += 1;
+    }
+    assert!(limits >= 15, "only {limits} limits");
+}
+
 /// Words in backquotes outside of blocks of code.
 fn quoted(text: &str) -> Vec<String> {
     let mut words = Vec::new();

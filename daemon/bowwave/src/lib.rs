@@ -1,6 +1,8 @@
 //! The trainer's program: command line, configuration, main loops. A library so that the laboratory's program ends, logs and answers
 //! alike, and so that tests can reach what reads files.
 
+#![forbid(unsafe_code)]
+
 mod cache;
 mod calibrate;
 mod cli;

@@ -19,6 +19,11 @@ const COMPLAINTS_MAX: usize = 5;
 /// Times that may be known before their pictures; the reader is never more than a few dozen ahead.
 const TIMES_AHEAD_MAX: usize = 65_536;
 
+/// Containers and streams that hold the pictures themselves, by ffmpeg's names. A playlist would have it read other files of this computer.
+const CONTAINERS: &str = "mov,matroska,avi,mpegts,mpeg,mpegvideo,m4v,h264,hevc,mjpeg,mpjpeg,flv,asf,ogg,mxf,nut,dv,gif,ivf,yuv4mpegpipe";
+/// Largest side of a picture, pixels: that of what a camera sends.
+const SIDE_MAX: u64 = 8192;
+
 /// Properties of a video by `ffprobe`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VideoInfo {
@@ -32,18 +37,23 @@ pub(crate) struct VideoInfo {
 pub(crate) fn probe(ffmpeg: &Path, video: &Path) -> Result<VideoInfo, ImportError> {
     let program = ffprobe_beside(ffmpeg);
     let output = Command::new(&program)
-        .args(["-v", "error", "-protocol_whitelist", "file", "-select_streams", "v:0"])
+        .args(["-v", "error", "-protocol_whitelist", "file", "-format_whitelist", CONTAINERS])
+        .args(["-select_streams", "v:0"])
         .args([
             "-show_entries",
-            "stream=codec_name,avg_frame_rate,nb_frames,duration:stream_disposition=attached_pic",
+            "stream=codec_name,width,height,avg_frame_rate,nb_frames,duration:stream_disposition=attached_pic",
         ])
-        .args(["-show_entries", "format=format_name", "-of", "default=noprint_wrappers=1"])
+        .args(["-of", "default=noprint_wrappers=1"])
         .arg(file_url(video))
         .stdin(Stdio::null())
         .output()
         .map_err(|e| start_error(&program, e))?;
     let complaint = || {
         let text = String::from_utf8_lossy(&output.stderr);
+        if text.contains("not on whitelist") {
+            return "it is no container with pictures in it (MP4, Matroska, AVI and their like); a playlist or a text would name other files"
+                .to_owned();
+        }
         text.lines().next_back().map_or_else(|| "no video track".to_owned(), |l| plain(l, video))
     };
     let not_video = |what| ImportError::NotVideo { path: video.to_owned(), what };
@@ -58,10 +68,11 @@ pub(crate) fn probe(ffmpeg: &Path, video: &Path) -> Result<VideoInfo, ImportErro
     if fields.get("DISPOSITION:attached_pic") == Some(&"1") {
         return Err(not_video("it is sound with a cover picture".to_owned()));
     }
-    // ffmpeg takes text for the screen of an old terminal, and single pictures for short videos.
-    let format = fields.get("format_name").copied().unwrap_or_default();
-    if format == "tty" || format == "image2" || format.ends_with("_pipe") {
-        return Err(not_video(format!("it is text or a single picture ({format})")));
+    let side = |name: &str| fields.get(name).and_then(|side| side.parse::<u64>().ok()).unwrap_or(0);
+    if let Some(large) = [side("width"), side("height")].into_iter().find(|side| *side > SIDE_MAX) {
+        return Err(not_video(format!(
+            "its pictures have a side of {large} pixels, and the most is {SIDE_MAX}"
+        )));
     }
     let seconds_per_frame = fields.get("avg_frame_rate").and_then(|rate| {
         let (count, seconds) = rate.split_once('/')?;
@@ -114,7 +125,8 @@ pub(crate) fn gpmf_packets(ffmpeg: &Path, video: &Path) -> Result<Option<Vec<Gpm
 fn ffprobe(ffmpeg: &Path, video: &Path, tracks: &str, entries: &str) -> Result<String, ImportError> {
     let program = ffprobe_beside(ffmpeg);
     let output = Command::new(&program)
-        .args(["-v", "error", "-protocol_whitelist", "file", "-select_streams", tracks])
+        .args(["-v", "error", "-protocol_whitelist", "file", "-format_whitelist", CONTAINERS])
+        .args(["-select_streams", tracks])
         .args(["-show_entries", entries, "-of", "compact=p=0"])
         .arg(file_url(video))
         .stdin(Stdio::null())
@@ -170,7 +182,7 @@ impl VideoReader {
     pub(crate) fn start(ffmpeg: &Path, video: &Path, seconds: Option<f64>) -> Result<Self, ImportError> {
         let mut child = Command::new(ffmpeg)
             .args(["-hide_banner", "-nostdin", "-nostats", "-loglevel", "level+info"])
-            .args(["-copyts", "-protocol_whitelist", "file,pipe"])
+            .args(["-copyts", "-protocol_whitelist", "file,pipe", "-format_whitelist", CONTAINERS])
             .args(seconds.iter().flat_map(|s| ["-t".to_owned(), s.to_string()]))
             .arg("-i")
             .arg(file_url(video))

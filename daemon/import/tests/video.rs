@@ -125,6 +125,17 @@ fn what_is_no_video_says_so() {
     fs::write(at("empty.mp4"), "").unwrap();
     ffmpeg(&["-f", "lavfi", "-i", "sine=d=0.2"], &at("sound.wav"));
     ffmpeg(&["-f", "lavfi", "-i", "testsrc=s=64x48:d=0.04", "-frames:v", "1"], &at("single.png"));
+    ffmpeg(&["-f", "lavfi", "-i", "testsrc=s=64x48:r=25:d=1", "-c:v", "mpeg2video"], &at("whole.ts"));
+    let playlist = "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nwhole.ts\n#EXT-X-ENDLIST\n";
+    fs::write(at("playlist.mp4"), playlist).unwrap();
+    fs::write(at("list.mp4"), "ffconcat version 1.0\nfile whole.ts\n").unwrap();
+    for name in ["playlist.mp4", "list.mp4"] {
+        let error = failure(&at(name), &options()).to_string();
+        assert!(error.contains("no container with pictures"), "{error}");
+    }
+    ffmpeg(&["-f", "lavfi", "-i", "testsrc=s=9000x32:d=0.2", "-c:v", "mjpeg"], &at("wide.mkv"));
+    let error = failure(&at("wide.mkv"), &options()).to_string();
+    assert!(error.contains("a side of 9000 pixels"), "{error}");
     for name in ["text.txt", "noise.mp4", "empty.mp4", "sound.wav", "single.png"] {
         let error = failure(&at(name), &options());
         assert!(

@@ -5,6 +5,8 @@
 //! part in full and is a command of its own ([`alignment`], [`horizon`], [`karma`], [`photograph`], [`reflection`], [`registration`],
 //! [`sea_video`], [`truth`]). The sea of the truths is `hw_sim::ocean`'s. [`table`] prints all tables.
 
+#![forbid(unsafe_code)]
+
 pub mod aided;
 pub mod alignment;
 pub mod bench;

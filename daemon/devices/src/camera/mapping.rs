@@ -48,10 +48,12 @@ impl Mapping {
         Ok(Self { start, len })
     }
 
-    /// The bytes. Only to be looked at while the driver does not have the buffer.
-    pub fn bytes(&self) -> &[u8] {
-        // SAFETY: `start` is mapped for `len` readable bytes until `self` is dropped. The driver writes only to buffers
-        // that are queued; whoever calls holds one that is not.
+    /// The bytes.
+    ///
+    /// # Safety
+    /// The driver must not have the buffer for as long as the bytes are looked at: it would write to them meanwhile.
+    pub unsafe fn bytes(&self) -> &[u8] {
+        // SAFETY: `start` is mapped for `len` readable bytes until `self` is dropped, and nobody writes to them.
         unsafe { std::slice::from_raw_parts(self.start.as_ptr(), self.len) }
     }
 }
@@ -93,7 +95,8 @@ pub(super) struct LentBuffer {
 
 impl Lent for LentBuffer {
     fn mapping(&self) -> &[u8] {
-        self.mapping.bytes()
+        // SAFETY: a buffer is lent by whoever dequeued it, and goes back to the driver only after this was dropped.
+        unsafe { self.mapping.bytes() }
     }
 
     fn hold(&self) -> Option<Arc<dyn Any + Send + Sync>> {

@@ -236,7 +236,8 @@ impl CameraDriver for V4l2 {
 
     fn bytes(&self, index: u32) -> &[u8] {
         let buffer = self.camera.as_ref().and_then(|c| c.buffers.get(index as usize));
-        buffer.filter(|b| b.place == BufferPlace::Here).map_or(&[], |b| b.mapping.bytes())
+        // SAFETY: a buffer that is here was dequeued; only `queue`, which excludes this borrow, gives it back to the driver.
+        buffer.filter(|b| b.place == BufferPlace::Here).map_or(&[], |b| unsafe { b.mapping.bytes() })
     }
 
     fn queue(&mut self, index: u32) -> io::Result<()> {

@@ -5,7 +5,7 @@ use glam::{Mat3, Mat4, Vec2, Vec3};
 use gltf::{Semantic, json::accessor::Type, mesh::Mode};
 
 use super::{
-    TRIANGLES_MAX, VERTICES_MAX,
+    NAMES_MAX, TRIANGLES_MAX, VERTICES_MAX,
     atlas::{self, AtlasPlace},
     source::{ModelSource, limit},
     surface::{TexturePicture, TexturePictures},
@@ -97,7 +97,8 @@ impl NodeWalk<'_, '_> {
         let zone = node.name().and_then(zone_of).or(mesh_name).unwrap_or(inherited);
         if let Some(mesh) = node.mesh() {
             for name in [node.name(), mesh.name()].into_iter().flatten() {
-                if !self.names.iter().any(|n| n == name) {
+                // An error lists no more; a hostile file may have a million.
+                if self.names.len() < NAMES_MAX && !self.names.iter().any(|n| n == name) {
                     self.names.push(name.to_owned());
                 }
             }

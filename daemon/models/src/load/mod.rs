@@ -22,7 +22,7 @@ pub(crate) const TRIANGLES_MAX: u64 = 2_000_000;
 /// Largest width and height of a texture, pixels.
 pub(crate) const TEXTURE_SIDE_MAX: u32 = 4096;
 /// Most names that an error lists.
-const NAMES_MAX: usize = 20;
+pub(crate) const NAMES_MAX: usize = 20;
 
 /// Loads a `.glb` or `.gltf` file: metres, y up, +z forward, the waterline at height 0. Buffers and pictures that it names are
 /// looked for in its folder and below.
@@ -56,8 +56,7 @@ fn from_bytes(bytes: &[u8], file: &str, name: &str, folder: Option<&Path>) -> Re
         .map(Zone::name)
         .collect();
     if !needed.is_empty() {
-        let found = gathered.names.into_iter().take(NAMES_MAX).collect();
-        return Err(ModelError::MissingPart { file: file.to_owned(), needed, found });
+        return Err(ModelError::MissingPart { file: file.to_owned(), needed, found: gathered.names });
     }
     gathered.mesh.finish(file, name, gathered.texture)
 }
