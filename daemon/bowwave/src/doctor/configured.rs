@@ -10,7 +10,7 @@ use bowwave_devices::{
     lcd,
     report::reporting,
     serial,
-    trigger::TriggerSettings,
+    trigger::{InterlockWiring, TriggerSettings},
 };
 
 use super::{Check, Verdict, check, failed};
@@ -191,18 +191,11 @@ fn lines(config: &Config) -> Vec<Check> {
         Some(t) => one("trigger", &t.line, "pressed", "not pressed"),
         None => failed("trigger", "none is configured: set [trigger] to its line"),
     });
-    match &config.interlock {
-        Some(wiring) => {
-            checks.push(super::interlock::wiring(wiring));
-            checks.extend(wiring.contacts().map(|line| {
-                one("interlock", line, "inert: the trainer arms", "NOT inert: the trainer does not arm")
-            }));
-        }
-        None => checks.push(failed(
-            "interlock",
-            "none is configured: set [interlock]; without it the trainer does not arm",
-        )),
-    }
+    checks.push(super::interlock::wiring(config.interlock.as_ref()));
+    let contacts = config.interlock.iter().flat_map(InterlockWiring::contacts);
+    checks.extend(contacts.map(|line| {
+        one("interlock", line, "inert: the trainer arms", "NOT inert: the trainer does not arm")
+    }));
     if let Some(line) = &config.power_fail {
         checks.push(one("power-fail", line, "power is failing", "power is good"));
     }

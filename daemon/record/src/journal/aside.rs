@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use super::{
     JournalError, Run, StoredShot, Unwritten,
-    open::{sync_folder, with_suffix},
+    open::{absent_is_fine, folder_of, sync_folder, with_suffix},
     row, schema,
 };
 
@@ -217,9 +217,8 @@ fn free(path: &Path, kind: &str, id: i64) -> PathBuf {
 fn named(path: &Path, kind: &str) -> io::Result<Vec<PathBuf>> {
     let Some(own) = path.file_name() else { return Ok(Vec::new()) };
     let prefix = [own.as_encoded_bytes(), kind.as_bytes()].concat();
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut files = Vec::new();
-    for entry in fs::read_dir(folder)? {
+    for entry in fs::read_dir(folder_of(path))? {
         let entry = entry?;
         let name = entry.file_name();
         let name = name.as_encoded_bytes();
@@ -241,11 +240,4 @@ fn bounded_text(path: &Path) -> io::Result<String> {
         ));
     }
     Ok(text)
-}
-
-fn absent_is_fine(done: io::Result<()>) -> io::Result<()> {
-    match done {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        other => other,
-    }
 }

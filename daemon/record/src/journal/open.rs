@@ -163,10 +163,7 @@ fn was_never_begun(path: &Path) -> Result<bool, JournalError> {
 fn remove_unborn(path: &Path) -> Result<(), JournalError> {
     let fail = |source| JournalError::from_io(path, "begin again", source);
     for part in ["-journal", ""] {
-        match fs::remove_file(with_suffix(path, part)) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(fail(error)),
-            _ => {}
-        }
+        absent_is_fine(fs::remove_file(with_suffix(path, part))).map_err(fail)?;
     }
     sync_folder(path)
 }
@@ -281,13 +278,22 @@ pub(super) fn empty_log_at_end(connection: &Connection) {
     }
 }
 
+/// The folder of `path`; the present one for a bare name.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A file that is not there need be neither removed nor moved.
+pub(super) fn absent_is_fine(done: io::Result<()>) -> io::Result<()> {
+    match done {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        other => other,
+    }
+}
+
 /// Puts the names in the folder of `path` onto the disk.
 pub(super) fn sync_folder(path: &Path) -> Result<(), JournalError> {
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    File::open(folder)
+    File::open(folder_of(path))
         .and_then(|folder| folder.sync_all())
         .map_err(|source| JournalError::from_io(path, "sync the folder of", source))
 }

@@ -12,7 +12,10 @@ use rustix::{
     io::Errno,
 };
 
-use super::{JournalError, open::with_suffix};
+use super::{
+    JournalError,
+    open::{folder_of, with_suffix},
+};
 
 /// Which files a connection has open: device and number of the database and of its log. A file that was deleted, moved or replaced is
 /// written all the same, and nobody finds it any more.
@@ -36,8 +39,7 @@ pub(super) struct FolderHold {
 impl FolderHold {
     /// Holds the folder of `path`. A file system without such locks is used without; one that cannot be opened will be told by the database.
     pub(super) fn take(path: &Path) -> Result<Self, JournalError> {
-        let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let Ok(folder) = File::open(folder) else { return Ok(Self { _folder: None }) };
+        let Ok(folder) = File::open(folder_of(path)) else { return Ok(Self { _folder: None }) };
         match flock(&folder, FlockOperation::NonBlockingLockExclusive) {
             Ok(()) => Ok(Self { _folder: Some(folder) }),
             Err(Errno::WOULDBLOCK) => Err(JournalError::InUse { path: path.into() }),

@@ -13,7 +13,7 @@ use rusqlite::Connection;
 
 use super::{
     JournalError, JournalSettings, Quarantine,
-    open::{connect, empty_log_at_end, sync_folder, with_suffix},
+    open::{absent_is_fine, connect, empty_log_at_end, sync_folder, with_suffix},
 };
 
 /// The files that SQLite keeps beside a database.
@@ -83,13 +83,6 @@ fn name_aside(path: &Path) -> io::Result<PathBuf> {
         .ok_or_else(|| io::Error::from(io::ErrorKind::AlreadyExists))?;
     let moved = !path.exists() && free > 1;
     Ok(name(if moved { free - 1 } else { free }))
-}
-
-fn absent_is_fine(done: io::Result<()>) -> io::Result<()> {
-    match done {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
-        other => other,
-    }
 }
 
 fn failed(path: &Path, source: io::Error) -> JournalError {
