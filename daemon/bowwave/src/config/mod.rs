@@ -12,7 +12,7 @@ pub use self::heading::HeadingChoice;
 use anyhow::{Context, Result};
 use bowwave_core::{
     estimate::attitude::Source as Orientation,
-    text::toml::{OptionalKey, RenamedKey, Spanned, TomlError, TomlText, bounded_text, number, one_of},
+    text::toml::{OptionalKey, RenamedKey, Spanned, TEXT_BYTES_MAX, TomlError, TomlText, number, one_of},
 };
 use bowwave_devices::{
     camera::CameraSettings,
@@ -21,7 +21,7 @@ use bowwave_devices::{
     serial::ImuSettings,
     trigger::{InputLine, InterlockWiring},
 };
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 use bowwave_trainer::supervisor::HealthSettings;
 use serde::Deserialize;
 
@@ -114,7 +114,7 @@ struct RawConfig {
     landmarks: heading::RawLandmarks,
     heading: heading::RawHeading,
     trigger: Option<devices::RawGpioLine>,
-    interlock: Option<devices::RawInterlock>,
+    interlock: Option<devices::RawGpioLine>,
     power_fail: Option<devices::RawGpioLine>,
     lamps: Option<devices::RawLamps>,
     gpu: RawGpu,
@@ -160,7 +160,7 @@ struct RawHealth {
 
 /// Reads and checks a configuration file. Relative paths in it are taken from its own folder.
 pub fn read(path: &Path) -> Result<Config> {
-    let text = plain_file(path).and_then(bounded_text).with_context(|| {
+    let text = plain_text(path, TEXT_BYTES_MAX).with_context(|| {
         format!("cannot read the configuration {}; name an existing file with --config", path.display())
     })?;
     let base = path.parent().unwrap_or(Path::new("."));
@@ -216,7 +216,7 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         orientation: raw.imu.orientation(text)?,
         imu: raw.imu.check(text)?,
         trigger: raw.trigger.map(|line| line.trigger(text)).transpose()?,
-        interlock: raw.interlock.map(|interlock| interlock.wiring(text)).transpose()?,
+        interlock: raw.interlock.map(|line| line.interlock(text)).transpose()?,
         power_fail: input(raw.power_fail)?,
         lamps: raw.lamps.map(|lamps| lamps.settings(text)).transpose()?,
         gpu: raw.gpu.device.map(Spanned::into_inner),

@@ -224,6 +224,14 @@ fn mistakes_are_refused_where_they_are() {
             "x.toml:4:41: interlock.second.bias: \"up\" is not allowed; give one of",
         ),
         (
+            "[trigger]\nchip = \"a\"\nline = 1\nsecond = { chip = \"a\", line = 2 }\n",
+            "x.toml:4:10: trigger.second: is for [interlock] alone",
+        ),
+        (
+            "[interlock]\nchip = \"a\"\nline = 1\nsecond = { chip = \"a\", line = 2, discrepancy_ms = 20 }\n",
+            "x.toml:4:52: interlock.second.discrepancy_ms: is for [interlock] alone",
+        ),
+        (
             "[interlock]\nchip = \"a\"\nline = 1\ndiscrepancy_ms = 0\n",
             "x.toml:4:18: interlock.discrepancy_ms: 0 is not allowed; give a whole number, 10 to 5000",
         ),

@@ -5,7 +5,7 @@ use std::time::Duration;
 use bowwave_core::fault::{Fault, FaultChange};
 use bowwave_devices::{
     clock::now,
-    trigger::{InterlockWiring, TriggerSettings},
+    trigger::{InputLine, InterlockWiring, TriggerSettings, named_inputs},
 };
 use bowwave_render::TimeOuts;
 use bowwave_trainer::{
@@ -38,15 +38,11 @@ pub fn device_settings(settings: &Settings, mode: Mode, faults: &mut Vec<FaultCh
 }
 
 /// All configured inputs. No lamp may be one of them, whether it is used now or not.
-fn inputs(config: &Config) -> Vec<(&'static str, bowwave_devices::trigger::InputLine)> {
-    let lines = [
-        ("trigger", config.trigger.as_ref().map(|t| &t.line)),
-        ("interlock", config.interlock.as_ref().map(|interlock| &interlock.contact)),
-        ("second interlock", config.interlock.as_ref().and_then(|interlock| interlock.second.as_ref())),
-        ("power-fail", config.power_fail.as_ref()),
-    ];
-    let presses = config.heading.presses.iter().map(|press| (press.name(), Some(&press.line)));
-    lines.into_iter().chain(presses).filter_map(|(name, line)| Some((name, line?.clone()))).collect()
+fn inputs(config: &Config) -> Vec<(&'static str, InputLine)> {
+    let trigger = config.trigger.as_ref().map(|t| &t.line);
+    let (interlock, power_fail) = (config.interlock.as_ref(), config.power_fail.as_ref());
+    let inputs = named_inputs(trigger, interlock, power_fail, &config.heading.presses);
+    inputs.map(|(name, line)| (name, line.clone())).collect()
 }
 
 /// The interlock, where it can be believed; else why the trainer does not arm.

@@ -15,11 +15,11 @@ use bowwave_core::{
     geometry::Lens,
     model::Model,
     session::Setup,
-    text::toml::bounded_text,
+    text::toml::TEXT_BYTES_MAX,
     world::scenario::{self, Scenario},
 };
 use bowwave_devices::{camera::CameraSettings, clock::now};
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
@@ -251,7 +251,7 @@ impl Reader {
 }
 
 fn read_text(path: &Path) -> Result<String> {
-    plain_file(path).and_then(bounded_text).with_context(|| format!("cannot read {}", path.display()))
+    plain_text(path, TEXT_BYTES_MAX).with_context(|| format!("cannot read {}", path.display()))
 }
 
 /// Whether there are cameras of this size, in every coding.

@@ -9,10 +9,10 @@ use bowwave_core::{
     event::PixelFormat,
     model::{Model, ModelId},
     session::Setup,
-    text::toml::bounded_text,
+    text::toml::TEXT_BYTES_MAX,
     world::scenario::{self, Scenario},
 };
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 use bowwave_record::{Properties, RecordingReader};
 use bowwave_trainer::replay::session_properties;
 
@@ -136,7 +136,7 @@ fn calibration(
 ) -> Result<(CalibrationFile, String)> {
     let (text, origin) = match named {
         Some(path) => {
-            let text = plain_file(path).and_then(bounded_text).with_context(|| {
+            let text = plain_text(path, TEXT_BYTES_MAX).with_context(|| {
                 format!(
                     "cannot read the calibration {}; name an existing file with --calibration",
                     path.display()

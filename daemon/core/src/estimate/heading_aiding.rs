@@ -355,19 +355,16 @@ impl HeadingAiding {
     /// The ship's heading holds the gun's: the world is to be turned by `off`.
     fn hold(&mut self, time: Time, off: f64, line: f64, attitude: &mut Attitude) {
         let seen = HeadingSeen { time, off, variance: line * line };
-        match attitude.update_mount_yaw(&seen, NIS_GATE) {
-            Some(outcome) if outcome.taken => {
-                self.counts.ship_taken += 1;
-                self.refused_in_a_row = 0;
-            }
-            _ => {
-                self.counts.ship_refused += 1;
-                self.refused_in_a_row += 1;
-                if self.refused_in_a_row >= REFUSED_MAX {
-                    self.watched.clear();
-                    self.release();
-                }
-            }
+        if attitude.update_mount_yaw(&seen, NIS_GATE).is_some_and(|outcome| outcome.taken) {
+            self.counts.ship_taken += 1;
+            self.refused_in_a_row = 0;
+            return;
+        }
+        self.counts.ship_refused += 1;
+        self.refused_in_a_row += 1;
+        if self.refused_in_a_row >= REFUSED_MAX {
+            self.watched.clear();
+            self.release();
         }
     }
 

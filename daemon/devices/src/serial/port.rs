@@ -14,7 +14,7 @@ use super::{
 use crate::{
     clock, queue,
     report::Reporter,
-    worker::{PortLink, PortWorker, STOP_NS, StopError, ThreadLife},
+    worker::{PortLink, PortWorker, StopError, ThreadLife},
 };
 
 /// A device on a serial line.
@@ -58,7 +58,7 @@ impl<F: LineFeed> LinePort<F> {
     /// Ends the reading and closes the port, within 200 ms.
     pub(super) fn stop(self) -> Result<SerialStatus<F::Report>, SerialError> {
         let link = Arc::clone(self.worker.link());
-        let stopped = self.worker.stop_within(STOP_NS);
+        let stopped = self.worker.stop_in_time();
         let status = link.status().clone();
         match stopped {
             Ok(()) => Ok(status),

@@ -22,7 +22,7 @@ use bowwave_core::{
     },
     geometry::{CameraPose, Lens, ahead},
     model::{Model, ModelId},
-    text::toml::{TomlError, TomlPlace, bounded_text},
+    text::toml::{TEXT_BYTES_MAX, TomlError, TomlPlace},
     time::Time,
     water::{ReflectionMethod, Water},
     world::{
@@ -32,7 +32,7 @@ use bowwave_core::{
         waves::{WaveField, WaveSpec},
     },
 };
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 pub use camera::{Focal, StillAttitude, StillCamera, film_focal_px};
 
 /// A commented text to begin with.
@@ -128,8 +128,7 @@ impl Still {
 
     /// Reads and checks a file; tells of former names in it. `advice` says where an example of such a file is.
     pub fn read(path: &Path, advice: &str) -> Result<Self> {
-        let text = plain_file(path)
-            .and_then(bounded_text)
+        let text = plain_text(path, TEXT_BYTES_MAX)
             .with_context(|| format!("cannot read the scene {}; {advice}", path.display()))?;
         let still = Self::parse(&text, &path.display().to_string())?;
         warn_of_former_names(&still.warnings);
