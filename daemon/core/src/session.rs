@@ -13,6 +13,7 @@ use crate::{
         Estimator, EstimatorSettings, SeaReport, SensorCounts,
         clock::ClockReport,
         pose::{NoPose, STALE_NS},
+        registration::Misfit,
     },
     event::{Event, Input, Tick, TriggerEdge},
     fault::{Fault, FaultBoard, FaultChange, FirePermission, Severity},
@@ -112,6 +113,11 @@ impl Session {
         self.estimator.heading_sigma()
     }
 
+    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
+    pub fn unchecked_s(&self, now: Time) -> f64 {
+        self.estimator.unchecked_s(now)
+    }
+
     /// The head-up display as it was drawn last.
     pub const fn hud(&self) -> &Hud {
         &self.composer.scene().hud
@@ -182,6 +188,7 @@ impl Session {
         self.found.clear();
         self.notes.clear();
         let picture_is_new = self.estimator.look();
+        self.watch_registration(tick.time);
         let permission = FirePermission::now(&self.faults, self.estimator.trouble(tick.time));
         self.world.arm(permission.fires());
         let video_time = self.estimator.video_time();
@@ -195,6 +202,7 @@ impl Session {
             video_time,
             permission,
             warning: self.faults.active().find(|f| f.severity() == Severity::Warning),
+            unchecked_s: self.estimator.unchecked_s(tick.time),
             cool: !self.faults.is_active(Fault::Thermal),
         };
         let pose_known = self.composer.compose(&moment, &self.estimator, &self.world);
@@ -243,6 +251,27 @@ impl Session {
             (None, true) => FaultChange::cleared(time, Fault::ShipFrozen),
             _ => return,
         };
+        self.find(change);
+    }
+
+    /// Tells that picture and inertial unit disagree, or no longer.
+    fn watch_registration(&mut self, time: Time) {
+        let misfit = self.estimator.misfit();
+        let fault = misfit.map(Misfit::fault);
+        for other in Misfit::FAULTS.into_iter().filter(|f| Some(*f) != fault) {
+            if self.faults.is_active(other) {
+                self.find(FaultChange::cleared(time, other));
+            }
+        }
+        if let Some(misfit) = misfit
+            && !self.faults.is_active(misfit.fault())
+        {
+            self.find(FaultChange::raised(time, misfit.fault(), misfit.to_string()));
+        }
+    }
+
+    /// Takes in a fault that this session has found itself.
+    fn find(&mut self, change: FaultChange) {
         let _ = self.faults.take(&change);
         self.found.push(change);
     }

@@ -23,6 +23,7 @@ pub mod reflection;
 pub mod registration;
 pub mod row;
 pub mod sea_video;
+pub mod setups;
 pub mod ship;
 pub mod table;
 pub mod target;

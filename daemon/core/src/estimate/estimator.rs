@@ -9,6 +9,7 @@ use super::{
     horizon::Mask,
     light::{Light, LightMeter, SeaTones, SkyLight},
     pose::NoPose,
+    registration::Misfit,
     sea::SeaConditions,
     sea_state::{SeaReport, SeaStateTracker},
     sensors::{SensorCounts, Sensors},
@@ -180,6 +181,16 @@ impl Estimator {
     /// The fault of the sensors at `now` that the sailor must know of; `None` where all is well.
     pub fn trouble(&self, now: Time) -> Option<Fault> {
         self.sensors.trouble(now)
+    }
+
+    /// How this is set up wrongly, where the pictures say so.
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.sensors.misfit()
+    }
+
+    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
+    pub fn unchecked_s(&self, now: Time) -> f64 {
+        self.sensors.unchecked_s(now)
     }
 
     /// The light that boats are drawn with.

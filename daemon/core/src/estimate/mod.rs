@@ -11,6 +11,7 @@ mod horizon_aiding;
 pub mod light;
 pub mod plausibility;
 pub mod pose;
+pub mod registration;
 pub mod sea;
 mod sea_state;
 mod sensors;

@@ -26,7 +26,8 @@ fn shown(fault: Fault) -> Option<Status> {
 }
 
 fn statuses() -> Vec<Status> {
-    let plain = [Status::Ready, Status::Hit, Status::Miss];
+    let unchecked = Status::NotChecked { cause: "NO HORIZON FOR 30 MIN" };
+    let plain = [Status::Ready, Status::Hit, Status::Miss, unchecked];
     plain.into_iter().chain(Fault::ALL.into_iter().filter_map(shown)).collect()
 }
 
@@ -125,11 +126,12 @@ fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
         Status::Ready,
         Status::Hit,
         Status::Miss,
+        Status::NotChecked { cause },
         Status::NotScored { cause, action },
         Status::Fault { cause, action },
     ];
     let words: Vec<_> = states.iter().map(|s| look(s).word).collect();
-    assert_eq!(words, ["READY", "HIT", "MISS", "NOT SCORED", "FAULT"]);
+    assert_eq!(words, ["READY", "HIT", "MISS", "NOT CHECKED", "NOT SCORED", "FAULT"]);
     let mut icons = Vec::new();
     for status in states {
         let quads = layout.lay_out(&glyphs, &hud(status, None));
