@@ -4,7 +4,7 @@ use glam::DVec3;
 use super::*;
 use crate::{
     CalibrationFile, Date,
-    alignment::{Known, Options, compare, solve},
+    alignment::{Compared, Options, compare, solve},
     parse,
     simulated::{Motion, Recipe},
     solve::so3::exp,
@@ -27,7 +27,13 @@ fn calibration(recipe: &Recipe, turn: DVec3, late_s: f64) -> CalibrationFile {
 fn checked(recipe: &Recipe, turn: DVec3, late_s: f64) -> CalibrationReport {
     let recording = recipe.record();
     let c = calibration(recipe, turn, late_s).calibration;
-    let told = compare(&recording.readings, &recording.orientations, &Known::of(&c), &Options::default());
+    let seen = Compared {
+        readings: &recording.readings,
+        observations: &recording.orientations,
+        sight: &[],
+        lens: None,
+    };
+    let told = compare(&seen, &c, &Options::default());
     CalibrationReport::of_check("a check", &capture(), &c, &told)
 }
 
