@@ -74,7 +74,7 @@ impl Pattern {
 
 /// Readings a second of the unit, pictures a second.
 const GYRO_HZ: f64 = 200.0;
-const CAMERA_HZ: f64 = 30.0;
+const CAMERA_HZ: f64 = 10.0;
 const GRAVITY: f64 = 9.81;
 
 /// A recording's truth and its noises.
