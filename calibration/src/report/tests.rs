@@ -80,7 +80,7 @@ fn a_check_says_good_stale_or_that_it_cannot_tell() {
             DVec3::ZERO,
             0.0,
             CalibrationVerdict::CannotTell,
-            "not told by this recording: focal",
+            "not told by this recording: read-out of the picture, focal length",
         ),
         (2, Motion::ByHand, DVec3::new(0.0, 8e-3, 0.0), 0.0, CalibrationVerdict::Stale, "traverse is not"),
         (3, Motion::ByHand, DVec3::ZERO, 4e-3, CalibrationVerdict::Stale, "time offset is not"),

@@ -85,8 +85,11 @@ pub fn compare(
     problem.known = Some(known);
     let mut fitted = fit(&problem, &known)?;
     if let Some(far) = other.and_then(|other| fit(&problem, &other).ok()) {
+        /// Twice the logarithm by which another solution must be likelier: errors that are alike make several of a hundred sound recordings look
+        /// as if they had one.
+        const LIKELIER: f64 = 200.0;
         let by_row = |f: &Fitted| f.whitened.cost / f.rows.len().max(1) as f64;
-        if by_row(&far) < by_row(&fitted) {
+        if (by_row(&fitted) - by_row(&far)) * fitted.rows.len() as f64 > LIKELIER {
             fitted = far;
         }
     }

@@ -100,6 +100,18 @@ impl Parameter {
         }
     }
 
+    /// An error beyond this is none of this number: no unit reads a fifth too little, no lens is twice as long as it was.
+    fn most(self) -> f64 {
+        match self {
+            Self::Scale(_) => 0.2,
+            Self::Focal => 0.5,
+            Self::CentreRight | Self::CentreDown => 0.3,
+            Self::Distortion => 1.0,
+            Self::Readout => 0.1,
+            Self::Elevation | Self::Traverse | Self::Roll | Self::Offset | Self::Bias(_) => f64::INFINITY,
+        }
+    }
+
     /// Standard deviation that the calibration states, in the parameter's unit: radians, seconds, rad/s, shares, focal lengths.
     fn stated(self, calibration: &Calibration) -> f64 {
         /// Of a camera whose file has no read-out, seconds.
@@ -148,6 +160,8 @@ pub struct Deviation {
     pub stated: f64,
     /// The effect of `off`, radians, see [`Parameter::effect`].
     pub effect: f64,
+    /// So many standard deviations would be surprising.
+    pub surprising: f64,
     /// Whether it is wrong.
     pub judgement: Judgement,
     /// What else would explain it nearly as well.
@@ -163,13 +177,16 @@ impl Deviation {
     /// An effect below which a wrong number might not have been found (in 5 of 100 recordings), radians.
     pub fn unseen_below(&self) -> f64 {
         let by_unit = if self.off == 0.0 { 0.0 } else { self.effect / self.off.abs() };
-        (SURPRISING + POWER) * self.sigma.hypot(self.stated) * by_unit
+        (self.surprising + POWER) * self.sigma.hypot(self.stated) * by_unit
     }
 }
 
-/// Standard deviations that a number must be off by: of a hundred recordings with a sound calibration one exceeds it in any of the
-/// parameters (normal distribution, 0.01 / 15 on both sides together).
+/// Standard deviations that a number must be off by, were these known: of a hundred recordings with a sound calibration one exceeds it in any
+/// of the parameters (normal distribution, 0.01 / 15 on both sides together).
 const SURPRISING: f64 = 3.40;
+/// Errors are alike for so long at most, seconds, and for so large a share of the recording.
+const ALIKE_S: f64 = 4.0;
+const ALIKE_SHARE: f64 = 1.0 / 15.0;
 /// A wrong number is found with 95 % where it is off by so many standard deviations more.
 const POWER: f64 = 1.64;
 /// What has less effect than this is never called wrong: half of a pixel or half of a milliradian, radians and pixels.
@@ -246,21 +263,32 @@ impl Evidence {
             .then(|| Estimate { off: off * unit(at), sigma: sigma * unit(at) })
     }
 
+    fn alike_s(&self) -> f64 {
+        (self.seconds * ALIKE_SHARE).min(ALIKE_S)
+    }
+
+    /// Standard deviations that are surprising: these are estimated themselves, as if by the squares of 1.5 numbers for each time that errors may
+    /// be alike (Priestley 1981, sec. 6.2, Bartlett's window), so that the limit is Student's (Cornish & Fisher's expansion).
+    fn surprising(&self) -> f64 {
+        let freedom = (1.5 * self.seconds / self.alike_s().max(1e-3)).max(4.0);
+        let z = SURPRISING;
+        z + (z.powi(3) + z) / (4.0 * freedom)
+            + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * freedom * freedom)
+    }
+
     /// By what factor the variance of a weighed sum of scores is larger because those that follow each other err alike.
     fn alike(&self, row: &nalgebra::DVector<f64>, unit: impl Fn(usize) -> f64) -> f64 {
-        /// Errors are alike for so long at most, seconds, and for so large a share of the recording.
-        const LONGEST_S: f64 = 4.0;
-        const SHARE: f64 = 1.0 / 15.0;
         let one =
             |s: &UnknownsStep| (0..row.len()).map(|i| row[i] * unit(i) * s[self.active[i]]).sum::<f64>();
         let all: Vec<f64> = self.scores.iter().map(one).collect();
         let by_second = all.len() as f64 / self.seconds.max(1e-3);
-        let lags = ((self.seconds * SHARE).min(LONGEST_S) * by_second) as usize;
+        let lags = (self.alike_s() * by_second) as usize;
         let square: f64 = all.iter().map(|u| u * u).sum();
         let together = |lag: usize| all.iter().zip(all.iter().skip(lag)).map(|(a, b)| a * b).sum::<f64>();
         let weighed = |lag: usize| (1.0 - lag as f64 / (lags + 1) as f64) * together(lag);
         let sum = square + 2.0 * (1..=lags).map(weighed).sum::<f64>();
-        let factor = sum / square.max(1e-300);
+        // What the parameters took of the slowest errors is missing.
+        let factor = sum / square.max(1e-300) / (1.0 - ALIKE_SHARE);
         if factor.is_finite() { factor.max(1.0) } else { 1.0 }
     }
 }
@@ -311,7 +339,7 @@ fn deviations(
     wrong: &[Parameter],
 ) -> Vec<Deviation> {
     let free: Vec<usize> = wrong.iter().map(|p| p.place()).collect();
-    let pixel = 1.0 / calibration.lens.focal.x;
+    let (pixel, surprising) = (1.0 / calibration.lens.focal.x, evidence.surprising());
     let one = |parameter: Parameter| {
         let told = evidence.estimate(parameter.place(), stated, &free);
         let Estimate { off, sigma } = told.unwrap_or(Estimate { off: 0.0, sigma: f64::INFINITY });
@@ -322,14 +350,17 @@ fn deviations(
             sigma,
             stated: stated[parameter.place()],
             effect: off.abs() * by_unit,
+            surprising,
             judgement: Judgement::Agrees,
             or: Vec::new(),
         };
-        let is_surprising = deviation.normalised().abs() > SURPRISING;
-        let is_too_much = off.abs() > SURPRISING * sigma && deviation.effect > TOLD_MOST;
-        if is_surprising && deviation.effect > SEEN_RAD.min(SEEN_PX * pixel) || is_too_much {
+        let is_surprising = deviation.normalised().abs() > surprising;
+        let is_too_much = off.abs() > surprising * sigma && deviation.effect > TOLD_MOST;
+        if off.abs() > parameter.most() {
+            deviation.judgement = Judgement::NotTold;
+        } else if is_surprising && deviation.effect > SEEN_RAD.min(SEEN_PX * pixel) || is_too_much {
             deviation.judgement = Judgement::Wrong;
-        } else if (SURPRISING + POWER) * sigma * by_unit > TOLD_MOST {
+        } else if (surprising + POWER) * sigma * by_unit > TOLD_MOST {
             deviation.judgement = Judgement::NotTold;
         }
         deviation
