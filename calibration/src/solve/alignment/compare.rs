@@ -213,11 +213,3 @@ fn residuals(problem: &AlignmentProblem, known: &AlignmentStart, fitted: &Fitted
         })
         .collect()
 }
-
-impl Comparison {
-    /// Standard deviation about each of the camera's axes of what the recording alone tells, radians.
-    pub fn turn_sigma(&self) -> DVec3 {
-        let c = self.turn_covariance;
-        DVec3::new(c.x_axis.x, c.y_axis.y, c.z_axis.z).max(DVec3::ZERO).map(f64::sqrt)
-    }
-}

@@ -192,4 +192,6 @@ pub fn solve(
 }
 
 #[cfg(test)]
+mod compare_tests;
+#[cfg(test)]
 mod tests;
