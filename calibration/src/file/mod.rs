@@ -19,6 +19,9 @@ use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, text::toml
 use bowwave_files::plain_text;
 use glam::DVec2;
 
+/// Source of the calibrations of simulated hardware, which are exact and do not age.
+pub const SIMULATED: &str = "hw-sim";
+
 /// When and how something was measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Provenance {
