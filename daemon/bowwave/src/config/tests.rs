@@ -229,7 +229,7 @@ fn mistakes_are_refused_where_they_are() {
         ),
         (
             "[interlock]\nchip = \"a\"\nline = 1\nsecond = { chip = \"a\", line = 2, discrepancy_ms = 20 }\n",
-            "x.toml:4:52: interlock.second.discrepancy_ms: is for [interlock] alone",
+            "x.toml:4:51: interlock.second.discrepancy_ms: is for [interlock] alone",
         ),
         (
             "[interlock]\nchip = \"a\"\nline = 1\ndiscrepancy_ms = 0\n",

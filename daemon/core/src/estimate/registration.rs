@@ -3,7 +3,7 @@
 //!
 //! Each way in which a trainer can be set up wrongly is a hypothesis: what the camera then sees of a turn and of the vertical that are
 //! believed. Each observation adds the logarithm of how much better a hypothesis foretells it than what is believed does, and a sum below
-//! nothing is begun anew (Page 1954, CUSUM). A sum reaches [`LIMIT`] by chance once in exp([`LIMIT`]) observations on average at most
+//! nothing is begun anew (Page 1954, CUSUM). A sum reaches 20 by chance once in exp(20) observations on average at most
 //! (Lorden 1971): 5e8 of them are 1.5 years at ten a second. What an observation adds is bounded, so that a single one, however wrong, alarms
 //! nobody.
 

@@ -118,7 +118,7 @@ fn every_state_and_every_warning_fit_together_without_clipping_or_overlap() {
 }
 
 #[test]
-fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
+fn no_two_states_have_shape_and_colour_in_common() {
     let size = (800, 480);
     let (glyphs, mut layout) = blank(size);
     let (cause, action) = ("A", "B");
@@ -126,6 +126,7 @@ fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
         Status::Ready,
         Status::Hit,
         Status::Miss,
+        // Ready, but for its colour.
         Status::NotChecked { cause },
         Status::NotScored { cause, action },
         Status::Fault { cause, action },
@@ -144,7 +145,7 @@ fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
     assert!(shapes.contains(&SHAPE_DIAMOND) && shapes.contains(&SHAPE_DISC), "{shapes:?}");
     for (i, a) in icons.iter().enumerate() {
         assert_ne!(a.0, SHAPE_DIAMOND);
-        assert!(icons[..i].iter().all(|b| a.0 != b.0 && a.1 != b.1), "{icons:?}");
+        assert!(icons[..i].iter().all(|b| a != b), "{icons:?}");
     }
 }
 
