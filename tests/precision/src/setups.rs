@@ -13,12 +13,12 @@ use bowwave_core::{
     world::scenario::Scenario,
 };
 use glam::{DQuat, DVec3};
-use hw_sim::{
-    make::{Periodic, Recipe},
-    replay::{Replay, ReplayOptions},
-};
+use hw_sim::make::{Periodic, Recipe};
 
-use crate::{registration::record, table::TextTable};
+use crate::{
+    registration::{looped, record},
+    table::TextTable,
+};
 
 /// What is wrong.
 #[derive(Clone, Copy, Debug)]
@@ -151,13 +151,7 @@ struct Said {
 }
 
 fn replay(path: &Path, wrong: Wrong, source: Source, seconds: f64) -> Result<Said> {
-    let options = ReplayOptions {
-        duration_ns: Some(bowwave_core::time::secs_to_ns(seconds + 1.0)),
-        looped: true,
-        ..ReplayOptions::default()
-    };
-    let mut replay = Replay::fast(path, &options)?;
-    let own = bowwave_calibration::parse(&replay.properties().calibration_toml, "recording")?.calibration;
+    let (mut replay, own) = looped(path, seconds)?;
     let calibration = wrong.calibration(own);
     let lens = calibration.lens;
     let mut session = Session::new(Setup {

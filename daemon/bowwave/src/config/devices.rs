@@ -11,7 +11,7 @@ use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
     imu::ImuFormat,
     lamps::LampSettings,
-    serial::{Baud, ImuSettings},
+    serial::{Baud, ImuSettings, LineSettings},
     trigger::{Bias, InputLine, InterlockWiring},
 };
 use serde::Deserialize;
@@ -127,10 +127,12 @@ impl RawImu {
         let jitter = text.given(&self.packet_jitter_ms_max, number(1.0..=1000.0, "ms"))?;
         let usual = ImuSettings::default();
         Ok(ImuSettings {
-            device: self.device,
-            baud: text.given(&self.baud, baud_rates())?.unwrap_or_default(),
+            line: LineSettings {
+                device: self.device,
+                baud: text.given(&self.baud, baud_rates())?.unwrap_or_default(),
+                low_latency: self.low_latency.unwrap_or(usual.line.low_latency),
+            },
             format: text.given(&self.format, one_of(&formats))?,
-            low_latency: self.low_latency.unwrap_or(usual.low_latency),
             late: jitter.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
         })
     }

@@ -19,7 +19,7 @@ pub mod skyline;
 mod visual_compass;
 
 pub use estimator::{CameraEstimate, Estimator, EstimatorSettings, SceneLight};
-pub use heading_aiding::{HeadingCounts, HeadingSettings, Landmark, Stow};
+pub use heading_aiding::{HeadingCounts, HeadingSettings, Landmark, ShipHeadings, Stow};
 pub use horizon_aiding::HorizonCounts;
 pub use sea_state::{SeaReport, SeaStateTracker};
 pub use sensors::{SensorCounts, Sensors};

@@ -7,8 +7,11 @@
 //! (Lorden 1971): 5e8 of them are 1.5 years at ten a second. What an observation adds is bounded, so that a single one, however wrong, alarms
 //! nobody.
 
+mod misfit;
+
 use glam::{DMat3, DQuat, DVec3};
 
+pub use self::misfit::Misfit;
 use super::{
     attitude::Attitude,
     skyline::{TurnFinder, TurnSeen},
@@ -16,19 +19,10 @@ use super::{
 use crate::{
     estimate::horizon::Mask,
     event::{ImuSample, Picture},
-    fault::Fault,
     geometry::{Lens, rotation_vector},
     time::Time,
 };
 
-/// The sum at which a hypothesis is believed.
-const LIMIT: f64 = 20.0;
-/// A belief ends where all sums are below this again.
-const LIMIT_BACK: f64 = 5.0;
-/// One that is believed stays until another's sum is larger by this.
-const LIMIT_OTHER: f64 = 2.0;
-/// No sum goes beyond this, so that a belief ends soon after its cause.
-const SUM_MOST: f64 = 60.0;
 /// No observation counts as more than this against any hypothesis (squared deviations).
 const COST_MOST: f64 = 9.0;
 /// A hypothesis that lets the vertical wander, and does not say where to, explains no more than what costs this.
@@ -49,85 +43,6 @@ const ALIKE: f64 = 5.0;
 const OWN_RATE: f64 = 0.5 * std::f64::consts::PI / 180.0;
 /// How far the mean specific force is off up while a gun is moved about, radians.
 const FORCE_SIGMA: f64 = 10.0 * std::f64::consts::PI / 180.0;
-
-/// A way in which the trainer is set up wrongly.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Misfit {
-    /// The unit is turned against the camera by so many degrees.
-    Turned(u16),
-    /// One or all of the gyro's axes have the wrong sign, or all of the specific force.
-    Reversed(&'static str),
-    /// Rates come in deg/s.
-    RateUnit,
-    /// Specific forces come in units of standard gravity.
-    ForceUnit,
-    /// The lens is longer or shorter than the calibrated one.
-    Lens,
-    /// The picture is mirrored.
-    Mirrored,
-    /// Pictures come so many milliseconds later than their stamps say.
-    Late(u16),
-    /// The horizon is all the time at another place than the unit has it.
-    Mount,
-}
-
-impl Misfit {
-    /// What the sailor can be told of.
-    pub const FAULTS: [Fault; 8] = [
-        Fault::UnitTurned,
-        Fault::UnitReversed,
-        Fault::RateUnit,
-        Fault::ForceUnit,
-        Fault::OtherLens,
-        Fault::PictureMirrored,
-        Fault::PictureLate,
-        Fault::NotRegistered,
-    ];
-
-    /// The entry of the table of faults that tells the sailor about it.
-    pub const fn fault(self) -> Fault {
-        match self {
-            Self::Turned(_) => Fault::UnitTurned,
-            Self::Reversed(_) => Fault::UnitReversed,
-            Self::RateUnit => Fault::RateUnit,
-            Self::ForceUnit => Fault::ForceUnit,
-            Self::Lens => Fault::OtherLens,
-            Self::Mirrored => Fault::PictureMirrored,
-            Self::Late(_) => Fault::PictureLate,
-            Self::Mount => Fault::NotRegistered,
-        }
-    }
-}
-
-impl std::fmt::Display for Misfit {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Turned(degrees) => write!(
-                f,
-                "the inertial unit is turned by {degrees} degrees against how it was calibrated: fit it as it was, or calibrate it to the camera"
-            ),
-            Self::Reversed(what) => write!(
-                f,
-                "{what} of the inertial unit has the wrong sign: set its axes to forward, right, down, or calibrate anew"
-            ),
-            Self::RateUnit => f.write_str("the inertial unit sends rates in deg/s: set it to rad/s"),
-            Self::ForceUnit => f.write_str("the inertial unit sends specific force in g: set it to m/s^2"),
-            Self::Lens => f.write_str(
-                "the picture turns faster or slower than the calibrated lens would have it: fit the calibrated camera, undo its zoom, or \
-                 calibrate its lens",
-            ),
-            Self::Mirrored => f.write_str("the picture is mirrored: switch the camera's flip off"),
-            Self::Late(ms) => write!(
-                f,
-                "pictures come about {ms} ms later than calibrated: calibrate the inertial unit to the camera anew"
-            ),
-            Self::Mount => f.write_str(
-                "the horizon in the picture is not where the inertial unit has it: is this the calibration of this mount? calibrate the inertial \
-                 unit to the camera",
-            ),
-        }
-    }
-}
 
 /// What the camera would see if a trainer were set up so.
 #[derive(Clone, Copy, Debug)]
@@ -358,6 +273,14 @@ impl Registration {
     }
 
     fn decide(&mut self) {
+        /// The sum at which a hypothesis is believed.
+        const LIMIT: f64 = 20.0;
+        /// A belief ends where all sums are below this again.
+        const LIMIT_BACK: f64 = 5.0;
+        /// One that is believed stays until another's sum is larger by this.
+        const LIMIT_OTHER: f64 = 2.0;
+        /// No sum goes beyond this, so that a belief ends soon after its cause.
+        const SUM_MOST: f64 = 60.0;
         let most = self.hypotheses.iter().map(|h| h.sum).fold(0.0, f64::max);
         // What is ahead stays ahead.
         let beyond = (most - SUM_MOST).max(0.0);

@@ -110,7 +110,7 @@ impl Composer {
         Ok(Self {
             plan,
             screen_lens,
-            visibility_m: scenario.visibility_m,
+            visibility_m: scenario.daylight.visibility_m,
             eye_height_m: scenario.eye_height_m,
             models: Arc::clone(models),
             boat_models: boat_models.to_vec(),

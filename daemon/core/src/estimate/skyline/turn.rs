@@ -3,6 +3,8 @@
 //! Patches all over the one picture are sought in the other where they were (Lucas & Kanade on the pyramid, `patch`). The turn that most
 //! of them agree on is found by trying those of pairs (Fischler & Bolles 1981, without chance) and refined by weights (Tukey's biweight).
 
+use std::ops::RangeInclusive;
+
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
 use super::{
@@ -11,25 +13,18 @@ use super::{
     patch::HALF,
     pyramid::{GreyPyramid, LEVELS},
 };
-use crate::{estimate::horizon::Mask, event::Picture, geometry::Lens, time::Time};
+use crate::{
+    estimate::horizon::Mask,
+    event::Picture,
+    geometry::Lens,
+    statistics::{BIWEIGHT_END, biweight},
+    time::Time,
+};
 
-/// Patches that are followed at most; fewer than the second tell nothing.
-const PATCHES_MOST: usize = 24;
-const PATCHES_LEAST: usize = 8;
-/// One field in so many is searched for a patch.
-const FIELDS_EVERY: usize = 4;
-/// A patch that looks less like itself than this is not it.
-const LIKENESS_MIN: f32 = 0.8;
+/// Patches that are followed: fewer tell nothing.
+const PATCHES: RangeInclusive<usize> = 8..=24;
 /// Patches within so many reduced pixels of a turn speak for it.
 const AGREE_PX: f64 = 1.5;
-/// At least this share of the patches that are found must agree.
-const AGREED_LEAST: f64 = 0.5;
-/// A place scatters no less than this, reduced pixels: what interpolation errs by.
-const SCATTER_LEAST_PX: f64 = 0.1;
-/// Tukey's biweight: 95 % efficient at this many deviations (Holland & Welsch 1977).
-const TUKEY: f64 = 4.685;
-/// Rounds of weighing.
-const ROUNDS: usize = 3;
 
 /// A turn of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,13 +83,15 @@ impl TurnFinder {
 
     /// Takes a picture that the next one is held against.
     pub fn begin(&mut self, time: Time, picture: &Picture, lens: &Lens) {
+        /// One field in so many is searched for a patch.
+        const FIELDS_EVERY: usize = 4;
         let lens = self.read(picture, lens);
         self.grid.make(&lens, self.pyramid.size);
         self.patches.clear();
         let (columns, count) = (self.grid.columns, self.grid.columns * self.grid.rows);
         for field in 0..count {
             let (column, row) = (field % columns, field / columns);
-            if !(column + 3 * row).is_multiple_of(FIELDS_EVERY) || self.patches.len() == PATCHES_MOST {
+            if !(column + 3 * row).is_multiple_of(FIELDS_EVERY) || self.patches.len() == *PATCHES.end() {
                 continue;
             }
             let usable = |place: DVec2| self.grid.is_open(place);
@@ -108,8 +105,10 @@ impl TurnFinder {
 
     /// The turn from the picture that was begun with to this one; `None` where too few patches are found again or agree.
     pub fn finish(&mut self, picture: &Picture, lens: &Lens) -> Option<TurnSeen> {
+        /// A patch that looks less like itself than this is not it.
+        const LIKENESS_MIN: f32 = 0.8;
         let from = self.begun.take()?;
-        if self.patches.len() < PATCHES_LEAST {
+        if self.patches.len() < *PATCHES.start() {
             return None;
         }
         let lens = self.read(picture, lens);
@@ -124,7 +123,7 @@ impl TurnFinder {
                 }
             }
         }
-        if self.pairs.len() < PATCHES_LEAST {
+        if self.pairs.len() < *PATCHES.start() {
             return None;
         }
         let pixel = 1.0 / lens.focal.x;
@@ -175,19 +174,29 @@ fn agreed(pairs: &[Pair], pixel: f64) -> Option<(DVec3, DMat3, usize)> {
             }
         }
     }
-    let (_, mut turn) = best?;
-    let mut scatter = tolerance / TUKEY;
+    weighed(pairs, best?.1, pixel)
+}
+
+/// The turn near `turn` by least squares over the pairs, far ones weighed down; as for [`agreed`].
+fn weighed(pairs: &[Pair], mut turn: DVec3, pixel: f64) -> Option<(DVec3, DMat3, usize)> {
+    /// At least this share of the patches that are found must agree.
+    const AGREED_LEAST: f64 = 0.5;
+    /// Rounds of weighing.
+    const ROUNDS: usize = 3;
+    /// A place scatters no less than this, reduced pixels: what interpolation errs by.
+    const SCATTER_LEAST_PX: f64 = 0.1;
+    let tolerance = AGREE_PX * pixel;
+    let mut scatter = tolerance / BIWEIGHT_END;
     let (mut normal, mut inliers) = (DMat3::ZERO, 0);
     for _ in 0..ROUNDS {
         let mut pull = DVec3::ZERO;
         let (mut squares, mut weights) = (0.0, 0.0);
         (normal, inliers) = (DMat3::ZERO, 0);
         for pair in pairs {
-            let off = pair.off(turn).length() / (TUKEY * scatter);
-            if off >= 1.0 {
+            let weight = biweight(pair.off(turn).length(), scatter);
+            if weight == 0.0 {
                 continue;
             }
-            let weight = (1.0 - off * off).powi(2);
             let (matrix, right) = pair.normal();
             normal += matrix * weight;
             pull += right * weight;
@@ -202,7 +211,7 @@ fn agreed(pairs: &[Pair], pixel: f64) -> Option<(DVec3, DMat3, usize)> {
         // Two axes to a place.
         scatter = (0.5 * squares / weights).sqrt().clamp(SCATTER_LEAST_PX * pixel, tolerance);
     }
-    let enough = inliers >= PATCHES_LEAST && inliers as f64 >= AGREED_LEAST * pairs.len() as f64;
+    let enough = inliers >= *PATCHES.start() && inliers as f64 >= AGREED_LEAST * pairs.len() as f64;
     // Patches overlap on coarse levels, so that neighbours err alike.
     let shared = f64::from(HALF) / 2.0;
     enough.then(|| (turn, normal.inverse() * (shared * scatter * scatter), inliers))
