@@ -36,6 +36,11 @@ float distance_to(uint kind, vec2 p, float r) {
             return min(box(d, vec2(1.25 * r, 0.28 * r), 0.0), box(d, vec2(0.28 * r, 1.25 * r), 0.0));
         }
         case SHAPE_TRIANGLE: return triangle(p, r);
+        case SHAPE_BARRED: {
+            vec2 d = vec2(p.x + p.y, p.x - p.y) * 0.707107;
+            float ring = abs(length(p) - 0.83 * r) - 0.17 * r;
+            return min(ring, max(box(d, vec2(r, 0.16 * r), 0.0), length(p) - r));
+        }
         case SHAPE_DIAMOND: return (abs(p.x) + abs(p.y) - r) * 0.707107;
         default: return box(p, vec2(r), 0.0);
     }

@@ -7,3 +7,4 @@ const uint SHAPE_CROSS = 4;
 const uint SHAPE_TRIANGLE = 5;
 const uint SHAPE_SQUARE = 6;
 const uint SHAPE_DIAMOND = 7;
+const uint SHAPE_BARRED = 8;

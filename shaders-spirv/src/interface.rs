@@ -363,6 +363,8 @@ pub const SHAPE_TRIANGLE: u32 = 5;
 pub const SHAPE_SQUARE: u32 = 6;
 /// [`HudQuad::shape`]: a square on its corner.
 pub const SHAPE_DIAMOND: u32 = 7;
+/// A ring with a bar across.
+pub const SHAPE_BARRED: u32 = 8;
 
 block! {
     /// Push constants of the video pass: `VideoBlock`.

@@ -1,7 +1,10 @@
 //! `bowwave hits`: the rounds of a journal as a table, CSV or JSON.
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::text::one_line;
+use bowwave_core::{
+    text::one_line,
+    world::{scenario::Side, score::Outcome},
+};
 use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots, side_files};
 
 use bowwave_trainer::storage::JOURNAL;
@@ -18,6 +21,7 @@ const TABLE: &[(&str, &str, Option<usize>)] = &[
     ("fired s", "fired_s", Some(3)),
     ("outcome", "outcome", None),
     ("boat", "boat", None),
+    ("side", "side", None),
     ("zone", "zone", None),
     ("range m", "range_m", Some(1)),
     ("miss m", "miss_m", Some(1)),
@@ -103,11 +107,19 @@ fn table(shots: &[StoredShot]) -> String {
         text.push_str(line.join("  ").trim_end());
         text.push('\n');
     }
-    let hits = shots
-        .iter()
-        .filter(|s| matches!(s.record.outcome, bowwave_core::world::score::Outcome::Hit { .. }))
-        .count();
-    text.push_str(&format!("{} rounds, {hits} hits\n", shots.len()));
+    let struck = |neutral: bool| {
+        let counts = |s: &&StoredShot| match s.record.outcome {
+            Outcome::Hit { side, .. } => neutral == (side == Some(Side::Neutral)),
+            _ => false,
+        };
+        shots.iter().filter(counts).count()
+    };
+    text.push_str(&format!("{} rounds, {} hits", shots.len(), struck(false)));
+    match struck(true) {
+        0 => {}
+        neutral => text.push_str(&format!(", {neutral} HIT A NEUTRAL")),
+    }
+    text.push('\n');
     text
 }
 

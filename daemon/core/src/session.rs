@@ -18,7 +18,7 @@ use crate::{
     event::{Event, Input, Tick, TriggerEdge},
     fault::{Fault, FaultBoard, FaultChange, FirePermission, Severity},
     frame::{
-        Composer, ComposerSettings, FrameMoment,
+        Composer, ComposerSettings, FrameMoment, WaterDrawn,
         plan::ScenePlan,
         scene::{Hud, Scene},
     },
@@ -186,7 +186,7 @@ impl Session {
         self.records.clear();
         self.found.clear();
         self.notes.clear();
-        let picture_is_new = self.estimator.look();
+        let picture_is_new = self.estimator.look(!self.faults.is_active(Fault::LoadUnseen));
         self.watch_registration(tick.time);
         let permission = FirePermission::now(&self.faults, self.estimator.trouble(tick.time));
         self.world.arm(permission.fires());
@@ -202,7 +202,7 @@ impl Session {
             permission,
             warning: self.faults.active().find(|f| f.severity() == Severity::Warning),
             unchecked_s: self.estimator.unchecked_s(tick.time),
-            cool: !self.faults.is_active(Fault::Thermal),
+            water: self.water_drawn(),
         };
         let pose_known = self.composer.compose(&moment, &self.estimator, &self.world);
         self.watch_ship(tick.time);
@@ -234,6 +234,17 @@ impl Session {
         let Self { calibration, estimator, composer, faults, world, records, .. } = self;
         let aim = |fired| aim(calibration, estimator, composer.scene().camera, faults, fired);
         world.advance(video_time, until, known, aim, records);
+    }
+
+    /// Which boats have reflections and wakes: a computer that is too hot or too busy leaves some out, half of a frame's work.
+    fn water_drawn(&self) -> WaterDrawn {
+        if self.faults.is_active(Fault::Thermal) || self.faults.is_active(Fault::LoadWater) {
+            WaterDrawn::None
+        } else if self.faults.is_active(Fault::LoadFar) {
+            WaterDrawn::Nearest
+        } else {
+            WaterDrawn::All
+        }
     }
 
     /// Tells that the ship's heading is stuck, or no longer.

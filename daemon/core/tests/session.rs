@@ -15,7 +15,7 @@ use bowwave_core::{
     session::{Session, Setup},
     time::Time,
     world::{
-        scenario::Scenario,
+        scenario::{Scenario, Side},
         score::{NotScored, Outcome, ShotRecord},
     },
 };
@@ -203,8 +203,28 @@ fn rounds_at_the_block_strike_it() {
         let flight = time.secs_since(record.fired);
         assert!((0.2..0.3).contains(&flight), "{flight}");
     }
-    assert!(states.contains(&Status::Hit) && matches!(states.last(), Some(Status::NotChecked { .. })));
+    assert!(
+        states.contains(&Status::Hit { zone: Zone::Engine })
+            && matches!(states.last(), Some(Status::NotChecked { .. }))
+    );
     assert_eq!(s.score(), (3, 3));
+}
+
+#[test]
+fn a_struck_neutral_is_told_and_no_hit() {
+    let mut s = session(&SCENARIO.replace("\"hostile\"", "\"neutral\""));
+    let (mut states, mut sides) = (Vec::new(), Vec::new());
+    play(&mut s, 3.0, &ALL, &burst(500, 750), |_, status, _, records| {
+        states.extend(status);
+        sides.extend(records.iter().map(|r| match &r.outcome {
+            Outcome::Hit { side, .. } => *side,
+            other => panic!("{other:?}"),
+        }));
+    });
+    assert_eq!(sides, [Some(Side::Neutral); 3]);
+    assert!(states.contains(&Status::NeutralHit { zone: Zone::Engine }), "{states:?}");
+    assert!(!states.iter().any(|s| matches!(s, Status::Hit { .. })), "{states:?}");
+    assert_eq!((s.score(), s.hud().hits, s.hud().neutral_hits), ((3, 0), 0, 3));
 }
 
 #[test]
@@ -398,7 +418,7 @@ fn a_round_fired_while_a_device_is_lost_is_recorded_with_the_reason() {
 fn a_warning_is_shown_and_everything_is_scored() {
     let (outcomes, states, warnings) = with_fault(Fault::DiskFull);
     assert_eq!(outcomes.iter().filter(|o| matches!(o, Outcome::Hit { .. })).count(), 3);
-    assert!(states.iter().all(|s| matches!(s, Status::NotChecked { .. } | Status::Hit)), "{states:?}");
+    assert!(states.iter().all(|s| matches!(s, Status::NotChecked { .. } | Status::Hit { .. })), "{states:?}");
     assert!(warnings.iter().all(|w| *w == Some(Fault::DiskFull)));
 }
 
@@ -415,6 +435,28 @@ fn a_hot_computer_draws_no_reflection() {
     assert_eq!(hot.map(|h| h.1), Some(PassDecision::Run));
     assert_eq!(cool, Some((PassDecision::Run, PassDecision::Run)));
     assert_eq!(hot.map(|h| h.0), Some(PassDecision::LeftOut(LeftOut::NoReflectionInView)));
+}
+
+#[test]
+fn a_busy_computer_leaves_out_the_water_of_far_boats_then_of_all() {
+    let second = SCENARIO.split("[[boat]]").nth(1).map_or("", |boat| boat);
+    let second = second
+        .replace("\"block\"\nmodel", "\"far\"\nmodel")
+        .replace("200", "400")
+        .replace("bearing_deg = 0", "bearing_deg = 3");
+    let two = format!("{SCENARIO}\n[[boat]]{second}");
+    let mirrored = |faults: &[Fault]| {
+        let mut s = session(&two);
+        let raised = |f: &Fault| FaultChange::raised(Time::from_ns(MS), *f, "test");
+        let faults = faults.iter().map(raised).collect();
+        play(&mut s, 1.0, &DeviceStream { faults, ..ALL }, &[], |_, _, _, _| {});
+        let view = s.tick(Tick::at(Time::from_ns(1_010 * MS))).view;
+        view.scene.boats.iter().map(|b| (b.boat, b.reflection.is_some())).collect::<Vec<_>>()
+    };
+    assert_eq!(mirrored(&[]), [(1, true), (0, true)]);
+    assert_eq!(mirrored(&[Fault::LoadUnseen]), [(1, true), (0, true)]);
+    assert_eq!(mirrored(&[Fault::LoadFar]), [(1, false), (0, true)]);
+    assert_eq!(mirrored(&[Fault::LoadFar, Fault::LoadWater]), [(1, false), (0, false)]);
 }
 
 #[test]

@@ -13,7 +13,10 @@ use bowwave_core::{
     fault::Fault,
     model::Zone,
     time::Time,
-    world::score::{NotScored, Outcome, ShotRecord},
+    world::{
+        scenario::Side,
+        score::{NotScored, Outcome, ShotRecord},
+    },
 };
 use bowwave_record::{
     DirtyEnd, Journal, JournalError, JournalOptions, Run, RunSelection, ShotFilter, StoredShot, boot_id,
@@ -39,6 +42,7 @@ fn shot(number: u64) -> ShotRecord {
     let outcome = match number % 3 {
         0 => Outcome::Hit {
             boat: "skiff \"one\", red".to_owned(),
+            side: Side::ALL.get(number as usize % 3).copied(),
             zone: Zone::ALL[number as usize % 3],
             time,
             range_m: 312.25,
@@ -203,9 +207,9 @@ fn what_is_no_journal_is_named_and_left_alone() {
 
     let path = folder.path().join("newer.db");
     shoot(&path, &[shot(1)]);
-    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 3").unwrap();
+    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 4").unwrap();
     let error = Journal::open(&path, &run()).err().unwrap();
-    assert!(matches!(error, JournalError::Newer { found: 3, supported: 2, .. }), "{error}");
+    assert!(matches!(error, JournalError::Newer { found: 4, supported: 3, .. }), "{error}");
     assert!(matches!(read_runs(&path), Err(JournalError::Newer { .. })));
 
     let error = Journal::open(folder.path(), &run()).err().unwrap();
@@ -296,6 +300,7 @@ fn a_journal_of_the_first_version_is_read_and_goes_on() {
     rusqlite::Connection::open(&path).unwrap().execute_batch(VERSION_1).unwrap();
     let runs = read_runs(&path).unwrap();
     assert_eq!((runs[0].run.scenario.as_str(), runs[0].run.boot_id.as_ref()), ("one skiff", None));
+    assert_eq!(all(&path).len(), 1, "as it is");
     assert_eq!(shoot(&path, &[shot(1)]), 2);
     let runs = read_runs(&path).unwrap();
     assert_eq!((runs[0].run.seed, runs[0].shots, &runs[1].run), (7, 1, &run()));
@@ -479,7 +484,14 @@ fn outcome() -> impl Strategy<Value = Outcome> {
     let time = || any::<i64>().prop_map(Time::from_ns);
     prop_oneof![
         (text(), 0..3_usize, time(), number(), vector()).prop_map(|(boat, zone, time, range_m, point)| {
-            Outcome::Hit { boat, zone: Zone::ALL[zone], time, range_m, point }
+            Outcome::Hit {
+                boat,
+                side: Side::ALL.get(zone).copied(),
+                zone: Zone::ALL[zone],
+                time,
+                range_m,
+                point,
+            }
         }),
         (prop::option::of(text()), number(), time(), number())
             .prop_map(|(boat, miss_m, time, range_m)| Outcome::Miss { boat, miss_m, time, range_m }),

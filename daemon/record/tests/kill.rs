@@ -22,7 +22,10 @@ use std::{
 use bowwave_core::{
     model::Zone,
     time::Time,
-    world::score::{Outcome, ShotRecord},
+    world::{
+        scenario::Side,
+        score::{Outcome, ShotRecord},
+    },
 };
 use bowwave_record::{Journal, JournalError, Run, RunSelection, ShotFilter, read_runs, read_shots};
 use glam::DVec3;
@@ -95,6 +98,7 @@ fn shot(number: u64) -> ShotRecord {
         pose_age_ns: 0,
         outcome: Outcome::Hit {
             boat: "skiff".to_owned(),
+            side: Some(Side::Hostile),
             zone: Zone::Engine,
             time,
             range_m: 300.0,

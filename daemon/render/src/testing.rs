@@ -52,6 +52,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             rounds_left: 120,
             shots: 14,
             hits: 3,
+            neutral_hits: 0,
             clock_s: 83.0,
             sea: None,
             heading_tenths_deg: None,
@@ -150,6 +151,7 @@ pub fn add_boat_in(scene: &mut Scene, models: &[Model], model: usize, pose: Rigi
         wind: scene.wind,
         reflections: true,
         wakes: true,
+        water_within_m: f64::INFINITY,
     };
     let model_id = ModelId(u16::try_from(model).unwrap());
     let boat = scene.boats.len();

@@ -15,7 +15,7 @@ use bowwave_core::{
     frame::scene::{Pass, PassDecision, RoundView, Scene, Status},
     geometry::{Distortion, look},
     guide::{Cell, Coverage, Gauge, Guide, Rating},
-    model::{Model, ModelKind, Texture},
+    model::{Model, ModelKind, Texture, Zone},
     sea::BeaufortForce,
     water::{ReflectionMethod, ShadowLevel},
 };
@@ -86,13 +86,15 @@ fn check(name: &str, scene: &Scene, models: &[Model]) {
 fn display_shows_every_state() {
     let states = [
         ("ready", Status::Ready),
-        ("hit", Status::Hit),
+        ("hit", Status::Hit { zone: Zone::Engine }),
+        ("neutral_hit", Status::NeutralHit { zone: Zone::Helm }),
         ("miss", Status::Miss),
         ("not_scored", Status::NotScored { cause: "POSE OLD", action: "Hold still" }),
         ("fault", Status::Fault { cause: "NO CAMERA", action: "Check its plug" }),
     ];
     for (name, status) in states {
         let mut scene = empty_scene(SIZE.0, SIZE.1);
+        scene.hud.neutral_hits = u32::from(matches!(status, Status::NeutralHit { .. }));
         scene.hud.status = status;
         check(&format!("hud_{name}"), &scene, &[]);
     }
@@ -106,7 +108,7 @@ fn faults_and_warnings_on_a_seven_inch_display() {
     let broken = |(cause, action)| Status::Fault { cause, action };
     for (name, status, warning) in [
         ("warning", Status::Ready, Some(Fault::Thermal)),
-        ("warning_long", Status::Hit, Some(Fault::CamBandwidth)),
+        ("warning_long", Status::Hit { zone: Zone::Hull }, Some(Fault::CamBandwidth)),
         ("not_scored", not_scored(state(Fault::ImuBaud)), Some(Fault::DiskFull)),
         ("fault", broken(state(Fault::NotInert)), None),
         ("safe_mode", broken(state(Fault::CrashLoop)), None),

@@ -30,7 +30,7 @@ use crate::{
     source::Source,
     storage::Storage,
     summary::{Summary, SummaryOptions, Tally},
-    supervisor::{FaultLog, Notifier, Pulse},
+    supervisor::{FaultLog, LoadWatch, Notifier, Pulse},
 };
 
 /// So often within a minute the GPU may be lost before the program ends: the driver needs a fresh process then.
@@ -112,6 +112,7 @@ pub struct Trainer {
     events: Vec<Event>,
     changes: Vec<FaultChange>,
     tally: Tally,
+    load: LoadWatch,
     /// The companion has ended.
     is_dialogue_over: bool,
 }
@@ -149,6 +150,7 @@ impl Trainer {
             events: Vec::with_capacity(256),
             changes,
             tally,
+            load: LoadWatch::default(),
             is_dialogue_over: false,
         })
     }
@@ -294,6 +296,9 @@ impl Trainer {
             self.events.push(at_stow());
         }
         self.tell_clock();
+        if dialogue.is_none() {
+            self.shed_load();
+        }
         if let Some(wall) = self.source.clock_set()
             && let Some(storage) = &mut self.storage
         {
@@ -318,8 +323,23 @@ impl Trainer {
         for done in self.presenter.iter().flat_map(Presenter::done) {
             if let Some(lock) = &mut lock {
                 lock.rendered(done.complete.ns_since(done.begun));
+                self.load.drawn(done.complete.secs_since(done.begun) * 1e3, done.is_late);
             }
             self.tally.completed();
+        }
+    }
+
+    /// Leaves out what a busy computer cannot draw in time, and tells of it.
+    fn shed_load(&mut self) {
+        if !self.clock.is_paced() {
+            return;
+        }
+        self.load.missed(self.clock.missed_and_slips().0);
+        for (fault, why) in self.load.decide() {
+            self.faults.set(fault, why, &mut self.events);
+        }
+        if let Some(storage) = &mut self.storage {
+            storage.spare(self.load.leaves_unseen_out());
         }
     }
 

@@ -10,6 +10,7 @@ use precision::{
     front,
     horizon::report::HorizonStudy,
     karma::report::KarmaStudy,
+    overload::OverloadStudy,
     page,
     parts::{About, NumericalPart, PARTS},
     photograph::PhotographStudy,
@@ -55,6 +56,8 @@ enum PrecisionStudy {
     Horizon(HorizonStudy),
     /// A camera calibrated from its own film and gyro, and how far an overlay would drift
     Karma(KarmaStudy),
+    /// The program beside busy loops: how soon it says so, what it leaves out, how soon all is back
+    Overload(OverloadStudy),
     /// Reflections of photographed boats drawn anew and held against the real ones
     Photograph(PhotographStudy),
     /// Drawn reflections against ray-traced ones
@@ -78,6 +81,7 @@ impl PrecisionStudy {
             Self::Calibration(study) => study.run(),
             Self::Horizon(study) => study.run(),
             Self::Karma(study) => study.run(),
+            Self::Overload(study) => study.run(),
             Self::Photograph(study) => study.run(),
             Self::Reflection(study) => study.run(),
             Self::Registration(study) => study.run(),

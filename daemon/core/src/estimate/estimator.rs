@@ -121,8 +121,9 @@ impl Estimator {
         self.sensors.mark(mark);
     }
 
-    /// Measures horizon, sky, light and sea in the newest picture, where it is another than at the last call; says whether it is.
-    pub fn look(&mut self) -> bool {
+    /// Measures horizon, sky, light and, where it `measures_sea`, the sea in the newest picture, where it is another than at the last call;
+    /// says whether it is.
+    pub fn look(&mut self, measures_sea: bool) -> bool {
         let is_new = std::mem::take(&mut self.picture_is_new);
         if is_new && let Some(time) = self.sensors.video_time() {
             self.sensors.sight();
@@ -130,7 +131,7 @@ impl Estimator {
             let lens = self.sensors.lens_at(time);
             if let (Some(camera), Some(frame)) = (camera, self.sensors.newest_frame()) {
                 self.light.observe(time, &frame.picture, &lens, &camera.pose);
-                if let Some(sea) = &mut self.sea {
+                if let Some(sea) = self.sea.as_mut().filter(|_| measures_sea) {
                     sea.observe(time, &frame.picture, &lens, &camera.pose);
                 }
             }

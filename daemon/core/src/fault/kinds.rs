@@ -153,6 +153,14 @@ faults! {
     Brownout = "BROWNOUT", Warning, "PWR LOW", "CHECK THE POWER SUPPLY";
     /// No clock battery: dates are filled in later.
     ClockUnset = "CLK_UNSET", Warning, "CLOCK NOT SET", "DATES ARE FILLED IN LATER";
+    /// Fewer than 30 frames a second are shown.
+    LoadRate = "LOAD_RATE", Warning, "NOT 30 FRAMES A SECOND", "STOP OTHER PROGRAMS";
+    /// The computer is too busy: no boat has a reflection or a wake.
+    LoadWater = "LOAD_WATER", Warning, "BUSY: NO REFLECTIONS", "STOP OTHER PROGRAMS";
+    /// The computer is too busy: only the nearest boat has a reflection and a wake.
+    LoadFar = "LOAD_FAR", Warning, "BUSY: FEWER REFLECTIONS", "STOP OTHER PROGRAMS";
+    /// The computer is too busy: what nobody sees is left out, as the sea's measurement.
+    LoadUnseen = "LOAD_UNSEEN", Warning, "COMPUTER BUSY", "STOP OTHER PROGRAMS";
     /// The GPU's driver lost the device.
     GpuLost = "GPU_LOST", NotScored, "DISPLAY RESTARTED", "WAIT";
     /// The GPU did not finish a frame.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3, Vec3};
 
 use super::{
-    boats::boats_in_view,
+    boats::{boats_in_view, nearest_m},
     plan::{SceneNeeds, ScenePlan, sea_reflects},
     rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
     scene::{BoatView, Hud, Pass, RoundView, Scene, Status},
@@ -24,7 +24,7 @@ use crate::{
         LastResult, RESULT_S, World,
         boats::{CourseState, Hull},
         fleet::Afloat,
-        scenario::Scenario,
+        scenario::{Scenario, Side},
     },
 };
 
@@ -45,6 +45,17 @@ pub struct ComposerSettings<'a> {
     pub boat_models: &'a [ModelId],
 }
 
+/// Which boats have reflections and wakes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WaterDrawn {
+    /// All.
+    All,
+    /// The nearest in view.
+    Nearest,
+    /// None.
+    None,
+}
+
 /// The moment that a frame shows, and what the sailor is to be told.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameMoment {
@@ -56,8 +67,8 @@ pub struct FrameMoment {
     pub warning: Option<Fault>,
     /// For how long nothing in the picture has confirmed where the camera looks, seconds; without end where nothing has so far.
     pub unchecked_s: f64,
-    /// Whether reflections and wakes are drawn: a computer that is too hot leaves them out, half of the work.
-    pub cool: bool,
+    /// Which boats have reflections and wakes.
+    pub water: WaterDrawn,
 }
 
 /// Composes the scenes of a session, one after the other.
@@ -193,10 +204,19 @@ impl Composer {
                 lens: &scene.lens,
                 visibility_m: self.visibility_m,
                 wind: scene.wind,
-                reflections: moment.cool && self.plan.has(Pass::Water) && sea_reflects(scene.water.force),
-                wakes: moment.cool && self.plan.has(Pass::Wake),
+                reflections: self.plan.has(Pass::Water) && sea_reflects(scene.water.force),
+                wakes: self.plan.has(Pass::Wake),
+                water_within_m: f64::INFINITY,
             };
             scene.time_s = time.secs_since(running.start);
+            let frustum = ViewFrustum {
+                water_within_m: match moment.water {
+                    WaterDrawn::All => f64::INFINITY,
+                    WaterDrawn::Nearest => nearest_m(&running.fleet, &frustum, time),
+                    WaterDrawn::None => 0.0,
+                },
+                ..frustum
+            };
             boats_in_view(&running.fleet, &frustum, time, running.start, &mut scene.boats);
             rounds_in_view(running, &frustum, time, &mut scene.rounds);
         }
@@ -211,6 +231,7 @@ impl Composer {
             rounds_left: world.rounds_left(),
             shots: u32::try_from(score.shots).unwrap_or(u32::MAX),
             hits: u32::try_from(score.hits).unwrap_or(u32::MAX),
+            neutral_hits: u32::try_from(score.neutral_hits).unwrap_or(u32::MAX),
             clock_s: world.clock_s(time),
             sea: estimator.sea().map(|sea| (sea.in_use.state, sea.in_use.source)),
             heading_tenths_deg: estimator.heading_shown(),
@@ -232,6 +253,7 @@ impl Composer {
             wind: self.scene.wind,
             reflections: self.plan.has(Pass::Water),
             wakes: self.plan.has(Pass::Wake),
+            water_within_m: f64::INFINITY,
         };
         let boats = self.boat_models.iter().enumerate();
         let boats: Vec<_> = boats.filter_map(|(boat, id)| self.warm_up_boat(&frustum, boat, *id)).collect();
@@ -282,8 +304,9 @@ fn status(moment: &FrameMoment, result: Option<LastResult>) -> Status {
             Status::NotScored { cause: fault.cause(), action: fault.action() }
         }
         FirePermission::Armed => match result {
-            Some(LastResult { hit: true, .. }) => Status::Hit,
-            Some(LastResult { hit: false, .. }) => Status::Miss,
+            Some(LastResult { struck: Some((Side::Hostile, zone)), .. }) => Status::Hit { zone },
+            Some(LastResult { struck: Some((Side::Neutral, zone)), .. }) => Status::NeutralHit { zone },
+            Some(LastResult { struck: None, .. }) => Status::Miss,
             None => {
                 let unchecked = UNCHECKED.iter().rev().find(|(from_s, _)| moment.unchecked_s >= *from_s);
                 unchecked.map_or(Status::Ready, |(_, cause)| Status::NotChecked { cause })

@@ -9,5 +9,5 @@ pub mod scene;
 pub mod view;
 pub mod wake;
 
-pub use composer::{Composer, ComposerSettings, FrameMoment};
+pub use composer::{Composer, ComposerSettings, FrameMoment, WaterDrawn};
 pub use rounds::ROUNDS_SEEN_MAX;

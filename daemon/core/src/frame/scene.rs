@@ -14,7 +14,7 @@ use crate::{
     frame::wake::Wake,
     geometry::{CameraPose, Lens, RigidPose},
     guide::Guide,
-    model::ModelId,
+    model::{ModelId, Zone},
     sea::WmoSeaState,
     water::Water,
 };
@@ -247,8 +247,16 @@ impl RoundView {
 pub enum Status {
     /// Ready to train.
     Ready,
-    /// The last round struck a part that counts.
-    Hit,
+    /// The last round struck a hostile boat.
+    Hit {
+        /// Where.
+        zone: Zone,
+    },
+    /// The last round struck a neutral boat.
+    NeutralHit {
+        /// Where.
+        zone: Zone,
+    },
     /// The last round missed.
     Miss,
     /// Ready, but nothing in the picture has confirmed for some time that boats are drawn where they belong.
@@ -283,8 +291,10 @@ pub struct Hud {
     pub rounds_left: u32,
     /// Rounds fired.
     pub shots: u32,
-    /// Rounds that struck.
+    /// Rounds that struck a hostile boat.
     pub hits: u32,
+    /// Rounds that struck a neutral one.
+    pub neutral_hits: u32,
     /// Seconds since the scenario began.
     pub clock_s: f64,
     /// The sea that is drawn, where it is measured in the video.
@@ -301,6 +311,7 @@ impl Hud {
         rounds_left: 0,
         shots: 0,
         hits: 0,
+        neutral_hits: 0,
         clock_s: 0.0,
         sea: None,
         heading_tenths_deg: None,

@@ -45,6 +45,8 @@ pub struct ViewFrustum<'a> {
     pub reflections: bool,
     /// Whether wakes are drawn at all.
     pub wakes: bool,
+    /// Boats beyond this have neither, metres.
+    pub water_within_m: f64,
 }
 
 impl ViewFrustum<'_> {
@@ -59,7 +61,12 @@ impl ViewFrustum<'_> {
         let offset = boat.pose.position - self.camera.position;
         let range_m = offset.length();
         let beyond_horizon = offset.truncate().length() > horizon_distance(self.camera.position.z);
-        let wake = if self.wakes && !beyond_horizon { wake().and_then(|w| self.see_wake(w)) } else { None };
+        let is_water_drawn = range_m <= self.water_within_m;
+        let wake = if self.wakes && is_water_drawn && !beyond_horizon {
+            wake().and_then(|w| self.see_wake(w))
+        } else {
+            None
+        };
         if !range_m.is_finite() || (wake.is_none() && !self.may_see(offset, range_m, boat.model.radius_m())) {
             return None;
         }
@@ -69,7 +76,7 @@ impl ViewFrustum<'_> {
         let water_level = boat.water_level - drop + hidden_m;
         let corners = corners_above(boat.model, &pose, water_level);
         let hull = bounds(self.camera, self.lens, &corners, HULL_MARGIN_PX);
-        let reflection = if self.reflections {
+        let reflection = if self.reflections && is_water_drawn {
             let mirrored = corners.map(|c| DVec3::new(c.x, c.y, 2.0 * water_level - c.z));
             let height = self.apparent_height_px(range_m, &corners, water_level);
             bounds(self.camera, self.lens, &mirrored, REFLECTION_MARGIN_PX + DISTORTION_SHARE * height)
@@ -115,7 +122,7 @@ impl ViewFrustum<'_> {
     }
 
     /// Cheap first test: whether a sphere, and its mirror image close below it, can touch the field of view.
-    fn may_see(&self, offset: DVec3, range_m: f64, radius_m: f64) -> bool {
+    pub(super) fn may_see(&self, offset: DVec3, range_m: f64, radius_m: f64) -> bool {
         let reach = 2.0 * radius_m;
         if range_m <= reach {
             return true;
@@ -262,7 +269,7 @@ mod tests {
             let model = block();
             let lens = Lens::pinhole(640, 360, 1.0);
             let camera = camera(az, el, roll);
-            let eye = ViewFrustum { camera: &camera, lens: &lens, visibility_m: 2e4, wind: DVec2::ZERO, reflections: true, wakes: true };
+            let eye = ViewFrustum { camera: &camera, lens: &lens, visibility_m: 2e4, wind: DVec2::ZERO, reflections: true, wakes: true, water_within_m: f64::INFINITY };
             let pose = RigidPose {
                 world_from_body: DQuat::from_rotation_z(heading) * DQuat::from_rotation_x(tilt),
                 position: DVec3::new(x, y, 0.0),
@@ -302,6 +309,7 @@ mod tests {
             wind: DVec2::ZERO,
             reflections: true,
             wakes: true,
+            water_within_m: f64::INFINITY,
         };
         let at = |y: f64| {
             let pose = RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::new(0.0, y, 0.0) };

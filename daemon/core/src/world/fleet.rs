@@ -10,6 +10,7 @@ use crate::{
     time::Time,
     world::{
         boats::{Behaviour, BoatHistory, Floating, Hull, HullForm},
+        scenario::Side,
         waves::WaveField,
     },
 };
@@ -19,6 +20,8 @@ use crate::{
 pub struct Vessel {
     /// Its name in the scenario.
     pub name: String,
+    /// Whom it belongs to.
+    pub side: Side,
     /// Its model.
     pub model: ModelId,
     /// Its behaviour.
@@ -43,6 +46,7 @@ pub struct Afloat<'a> {
 #[derive(Clone, Debug)]
 struct FleetBoat {
     name: String,
+    side: Side,
     model: ModelId,
     history: BoatHistory,
 }
@@ -65,7 +69,7 @@ impl Fleet {
             let hull = model.map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
             let form = model.map_or_else(|| HullForm::new((-0.5, 0.5), 0.3, 1.2, |_| 0.5), HullForm::of);
             let history = BoatHistory::new(vessel.behaviour, hull, form);
-            FleetBoat { name: vessel.name, model: vessel.model, history }
+            FleetBoat { name: vessel.name, side: vessel.side, model: vessel.model, history }
         };
         let boats = vessels.into_iter().map(boat).collect();
         Self { boats, models, waves, start, followed: start }
@@ -101,6 +105,11 @@ impl Fleet {
     /// A boat's name.
     pub fn name(&self, boat: usize) -> &str {
         self.boats.get(boat).map_or("", |b| b.name.as_str())
+    }
+
+    /// Whom a boat belongs to.
+    pub fn side(&self, boat: usize) -> Option<Side> {
+        self.boats.get(boat).map(|b| b.side)
     }
 
     /// A boat's model.

@@ -175,7 +175,8 @@ impl Rounds {
                     let time = time_of(time_s);
                     struck.push((boat, zone, time));
                     self.marks.push((time, ImpactMark::Strike { boat, point }));
-                    Outcome::Hit { boat: fleet.name(boat).to_owned(), zone, time, range_m, point }
+                    let (name, side) = (fleet.name(boat).to_owned(), fleet.side(boat));
+                    Outcome::Hit { boat: name, side, zone, time, range_m, point }
                 }
                 End::Splashed { at, time_s } => {
                     self.marks.push((time_of(time_s), ImpactMark::Splash { at }));

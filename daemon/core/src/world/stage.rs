@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{
     fleet::{Fleet, Vessel},
     rounds::{Ammunition, Launch, Rounds},
-    scenario::Scenario,
+    scenario::{Scenario, Side},
     score::{NotScored, Outcome, ShotRecord},
     sea_change::{SeaChange, conditions_of},
     waves::WaveField,
@@ -16,7 +16,7 @@ use super::{
 use crate::{
     estimate::sea::SeaConditions,
     event::TriggerEdge,
-    model::{Model, ModelId},
+    model::{Model, ModelId, Zone},
     time::Time,
 };
 
@@ -43,8 +43,10 @@ pub struct BoreAim {
 pub struct Score {
     /// Rounds fired.
     pub shots: u64,
-    /// Rounds that struck.
+    /// Rounds that struck a hostile boat.
     pub hits: u64,
+    /// Rounds that struck a neutral one.
+    pub neutral_hits: u64,
 }
 
 /// The result of the round that counts as the newest.
@@ -52,8 +54,8 @@ pub struct Score {
 pub struct LastResult {
     /// When it struck, or was closest.
     pub time: Time,
-    /// Whether it struck.
-    pub hit: bool,
+    /// Whose boat it struck, and where; `None` for a miss.
+    pub struck: Option<(Side, Zone)>,
 }
 
 /// The virtual world.
@@ -89,6 +91,7 @@ impl World {
     pub fn new(scenario: &Scenario, models: Arc<[Model]>, boat_models: &[ModelId]) -> Self {
         let vessels = scenario.boats.iter().zip(boat_models).map(|(boat, model)| Vessel {
             name: boat.name.clone(),
+            side: boat.side,
             model: *model,
             behaviour: boat.behaviour.clone(),
         });
@@ -182,15 +185,24 @@ impl World {
 
     fn count(&mut self, records: &[ShotRecord]) {
         for record in records {
-            let (time, hit) = match &record.outcome {
-                Outcome::Hit { time, .. } => (*time, true),
-                Outcome::Miss { time, .. } => (*time, false),
+            let (time, struck) = match &record.outcome {
+                Outcome::Hit { time, side, zone, .. } => {
+                    (*time, Some((side.unwrap_or(Side::Hostile), *zone)))
+                }
+                Outcome::Miss { time, .. } => (*time, None),
                 Outcome::NotScored { .. } => continue,
             };
-            self.score.hits += u64::from(hit);
-            // Of several results at once a hit is what the sailor wants to see.
-            if hit || self.last_result.is_none_or(|r| !r.hit || time.secs_since(r.time) > RESULT_S) {
-                self.last_result = Some(LastResult { time, hit });
+            let is_neutral = matches!(struck, Some((Side::Neutral, _)));
+            self.score.hits += u64::from(struck.is_some() && !is_neutral);
+            self.score.neutral_hits += u64::from(is_neutral);
+            // Of several results at once a hit is what the sailor wants to see, and one on a neutral what he must.
+            let rank = |struck: Option<(Side, Zone)>| {
+                struck.map_or(0, |(side, _)| 1 + u8::from(side == Side::Neutral))
+            };
+            let gives_way =
+                |r: LastResult| rank(struck) >= rank(r.struck) || time.secs_since(r.time) > RESULT_S;
+            if self.last_result.is_none_or(gives_way) {
+                self.last_result = Some(LastResult { time, struck });
             }
         }
     }

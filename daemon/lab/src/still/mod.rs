@@ -164,6 +164,7 @@ impl Still {
             wind: DVec2::ZERO,
             reflections: plan.has(Pass::Water),
             wakes: plan.has(Pass::Wake),
+            water_within_m: f64::INFINITY,
         };
         let waves = WaveField::new(&self.waves, self.seed);
         let time_s = f64::from(index) * self.interval_s.unwrap_or(0.0);

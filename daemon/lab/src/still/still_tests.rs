@@ -182,7 +182,7 @@ proptest! {
         let mut still = parse(PLAIN).unwrap();
         still.camera.eye_height_m = height;
         let (lens, camera) = still.sight((640, 480), None).unwrap();
-        let eye = ViewFrustum { camera: &camera, lens: &lens, visibility_m: 1e4, wind: DVec2::ZERO, reflections: true, wakes: true };
+        let eye = ViewFrustum { camera: &camera, lens: &lens, visibility_m: 1e4, wind: DVec2::ZERO, reflections: true, wakes: true, water_within_m: f64::INFINITY };
         let pixel = DVec2::new(x, y);
         let Ok(place) = camera::on_the_sea(&eye, pixel) else { return Ok(()) };
         let foot = place.extend(-curvature_drop(place.length()));

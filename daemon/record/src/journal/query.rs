@@ -45,7 +45,7 @@ pub struct StoredRun {
 
 /// The rounds that `filter` selects, by run and number.
 pub fn read_shots(path: &Path, filter: &ShotFilter) -> Result<Vec<StoredShot>, JournalError> {
-    let (connection, _) = open::for_reading(path)?;
+    let (connection, version) = open::for_reading(path)?;
     let run = match filter.runs {
         RunSelection::All => None,
         RunSelection::Latest => match span(&connection, path)?.1 {
@@ -60,7 +60,7 @@ pub fn read_shots(path: &Path, filter: &ShotFilter) -> Result<Vec<StoredShot>, J
     let read = || -> rusqlite::Result<Vec<row::Parsed>> {
         let sql = format!(
             "SELECT {} FROM shots WHERE (?1 IS NULL OR run = ?1) AND (NOT ?2 OR outcome = 'hit') ORDER BY run, shot",
-            row::COLUMNS
+            row::columns_of(version)
         );
         let mut statement = connection.prepare(&sql)?;
         let rows = statement.query_map(params![run, filter.hits_only], row::parse)?;

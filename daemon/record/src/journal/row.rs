@@ -5,7 +5,10 @@ use std::borrow::Cow;
 use bowwave_core::{
     model::Zone,
     time::Time,
-    world::score::{NotScored, Outcome, ShotRecord},
+    world::{
+        scenario::Side,
+        score::{NotScored, Outcome, ShotRecord},
+    },
 };
 use glam::DVec3;
 use rusqlite::{Connection, ErrorCode, Row, params};
@@ -13,7 +16,12 @@ use serde_json::{Value, json};
 
 /// Columns of a round, in the order of the row functions below.
 pub(super) const COLUMNS: &str = "run, shot, fired_ns, muzzle_x_m, muzzle_y_m, muzzle_z_m, bore_x, bore_y, bore_z, \
-     pose_age_ns, outcome, boat, zone, time_ns, range_m, point_x_m, point_y_m, point_z_m, miss_m, cause";
+     pose_age_ns, outcome, boat, zone, time_ns, range_m, point_x_m, point_y_m, point_z_m, miss_m, cause, side";
+
+/// The same for a journal of tables that old.
+pub(super) fn columns_of(version: i64) -> String {
+    if version >= 3 { COLUMNS.to_owned() } else { COLUMNS.replace(", side", ", NULL") }
+}
 
 /// A round as it is in the journal.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,18 +43,20 @@ struct OutcomeColumns<'a> {
     point: Option<DVec3>,
     miss_m: Option<f64>,
     cause: Option<Cow<'a, str>>,
+    side: Option<Cow<'a, str>>,
 }
 
 impl<'a> From<&'a Outcome> for OutcomeColumns<'a> {
     fn from(outcome: &'a Outcome) -> Self {
         match outcome {
-            Outcome::Hit { boat, zone, time, range_m, point } => Self {
+            Outcome::Hit { boat, side, zone, time, range_m, point } => Self {
                 outcome: "hit".into(),
                 boat: Some(boat.into()),
                 zone: Some(zone.name().into()),
                 time: Some(*time),
                 range_m: Some(*range_m),
                 point: Some(*point),
+                side: side.map(|side| side.name().into()),
                 ..Self::default()
             },
             Outcome::Miss { boat, miss_m, time, range_m } => Self {
@@ -67,7 +77,7 @@ impl<'a> From<&'a Outcome> for OutcomeColumns<'a> {
 impl OutcomeColumns<'_> {
     /// The outcome, or what is wrong with the columns. Numbers that are absent are NaN.
     fn outcome(self) -> Result<Outcome, String> {
-        let Self { outcome, boat, zone, cause, .. } = self;
+        let Self { outcome, boat, zone, cause, side, .. } = self;
         let (time, range_m) = (self.time.unwrap_or(Time::from_ns(0)), self.range_m.unwrap_or(f64::NAN));
         let boat = boat.map(Cow::into_owned);
         match &*outcome {
@@ -75,7 +85,17 @@ impl OutcomeColumns<'_> {
                 let known = Zone::ALL.into_iter().find(|known| Some(known.name()) == zone.as_deref());
                 let zone = known.ok_or_else(|| format!("unknown zone {zone:?}"))?;
                 let boat = boat.ok_or("a hit without a boat")?;
-                Ok(Outcome::Hit { boat, zone, time, range_m, point: self.point.unwrap_or(DVec3::NAN) })
+                let side = match side {
+                    None => None,
+                    Some(side) => Some(
+                        Side::ALL
+                            .into_iter()
+                            .find(|known| known.name() == side)
+                            .ok_or_else(|| format!("unknown side {side:?}"))?,
+                    ),
+                };
+                let point = self.point.unwrap_or(DVec3::NAN);
+                Ok(Outcome::Hit { boat, side, zone, time, range_m, point })
             }
             "miss" => Ok(Outcome::Miss { boat, miss_m: self.miss_m.unwrap_or(f64::NAN), time, range_m }),
             "not_scored" => cause
@@ -90,12 +110,13 @@ impl OutcomeColumns<'_> {
 
 impl StoredShot {
     /// Names of [`StoredShot::cells`], units last.
-    pub const COLUMNS: [&'static str; 20] = [
+    pub const COLUMNS: [&'static str; 21] = [
         "run",
         "shot",
         "fired_s",
         "outcome",
         "boat",
+        "side",
         "zone",
         "time_s",
         "range_m",
@@ -115,7 +136,7 @@ impl StoredShot {
 
     /// The round as text for tables and CSV, in the order of [`StoredShot::COLUMNS`]; empty where a column does not apply.
     /// Numbers have their full precision.
-    pub fn cells(&self) -> [String; 20] {
+    pub fn cells(&self) -> [String; 21] {
         let record = &self.record;
         let parts = OutcomeColumns::from(&record.outcome);
         let text = |value: &Option<Cow<'_, str>>| value.as_deref().unwrap_or_default().to_owned();
@@ -130,6 +151,7 @@ impl StoredShot {
             seconds(record.fired),
             parts.outcome.to_string(),
             text(&parts.boat),
+            text(&parts.side),
             text(&parts.zone),
             parts.time.map_or_else(String::new, seconds),
             number(parts.range_m),
@@ -158,6 +180,7 @@ impl StoredShot {
             "fired_ns": record.fired.ns(),
             "outcome": parts.outcome,
             "boat": parts.boat,
+            "side": parts.side,
             "zone": parts.zone,
             "time_ns": parts.time.map(Time::ns),
             "range_m": parts.range_m,
@@ -193,6 +216,7 @@ impl StoredShot {
             point: Some(vector("point_m")),
             miss_m: value["miss_m"].as_f64(),
             cause: text("cause"),
+            side: text("side"),
         };
         let record = ShotRecord {
             shot: value["shot"].as_u64().ok_or("\"shot\" is no number of a round")?,
@@ -220,7 +244,7 @@ fn insert(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Res
     let point = parts.point.map_or([None; 3], |p| p.to_array().map(Some));
     let sql = format!(
         "INSERT INTO shots ({COLUMNS}) VALUES \
-         (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20) \
+         (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19, ?20, ?21) \
          ON CONFLICT (run, shot) DO NOTHING"
     );
     let number =
@@ -246,6 +270,7 @@ fn insert(connection: &Connection, run: i64, shot: &ShotRecord) -> rusqlite::Res
         point[2],
         parts.miss_m,
         parts.cause,
+        parts.side,
     ])?;
     Ok(rows == 1)
 }
@@ -305,6 +330,7 @@ pub(super) fn parse(row: &Row<'_>) -> rusqlite::Result<Parsed> {
         point: Some(vector(15)?),
         miss_m: row.get(18)?,
         cause: text(19)?,
+        side: text(20)?,
     };
     let (fired, muzzle, bore) = (Time::from_ns(row.get(2)?), vector(3)?, vector(6)?);
     let pose_age_ns = row.get(9)?;

@@ -11,8 +11,8 @@ use super::{JournalError, Run, row};
 
 /// Marks the file as ours ("BOWW").
 pub(super) const APPLICATION_ID: i64 = 0x424f_5757;
-/// Version of the tables. 2: runs know the boot and the time since it at which they began.
-pub(super) const VERSION: i64 = 2;
+/// Version of the tables. 2: runs know the boot and the time since it at which they began. 3: hits know whose boat was struck.
+pub(super) const VERSION: i64 = 3;
 
 /// The tables of version 1. Numbers that are not finite become NULL, since SQLite has no NaN.
 const TABLES: &str = "
@@ -50,23 +50,29 @@ ALTER TABLE runs ADD COLUMN boot_id TEXT;
 ALTER TABLE runs ADD COLUMN started_ns INTEGER;
 ";
 
+/// From version 2 to 3.
+const SIDE_COLUMN: &str = "
+ALTER TABLE shots ADD COLUMN side TEXT CHECK (side IS NULL OR outcome = 'hit');
+";
+
 /// What a database that calls itself ours has otherwise than ours have; `None` where it has all. Triggers of a stranger would run with each
 /// round.
 pub(super) fn foreign_part(connection: &Connection) -> rusqlite::Result<Option<String>> {
-    if versions(connection)?.0 != APPLICATION_ID {
+    let (application, version) = versions(connection)?;
+    if application != APPLICATION_ID {
         return Ok(None);
     }
     let columns = |table: &str| -> rusqlite::Result<Vec<String>> {
         let mut ask = connection.prepare("SELECT name FROM pragma_table_xinfo(?1)")?;
         ask.query_map([table], |row| row.get(0))?.collect()
     };
-    let wanted: [(&str, &str); 2] = [
-        ("runs", "id, started_wall_ns, scenario, recording, seed, version, finished"),
-        ("shots", row::COLUMNS),
-    ];
+    let shots = row::columns_of(version);
+    let wanted: [(&str, &str); 2] =
+        [("runs", "id, started_wall_ns, scenario, recording, seed, version, finished"), ("shots", &shots)];
     for (table, names) in wanted {
         let found = columns(table)?;
-        if let Some(name) = names.split(", ").find(|name| !found.iter().any(|column| column == name)) {
+        let mut names = names.split(", ").filter(|name| *name != "NULL");
+        if let Some(name) = names.find(|name| !found.iter().any(|column| column == name)) {
             return Ok(Some(format!("its table {table} has no column {name}")));
         }
     }
@@ -127,7 +133,10 @@ pub(super) fn make_tables(connection: &mut Connection) -> rusqlite::Result<()> {
     if found == 0 {
         transaction.execute_batch(TABLES)?;
     }
-    transaction.execute_batch(BOOT_COLUMNS)?;
+    if found < 2 {
+        transaction.execute_batch(BOOT_COLUMNS)?;
+    }
+    transaction.execute_batch(SIDE_COLUMN)?;
     transaction.execute_batch(&format!(
         "PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"
     ))?;

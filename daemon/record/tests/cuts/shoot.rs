@@ -11,7 +11,10 @@ use std::{
 use bowwave_core::{
     model::Zone,
     time::Time,
-    world::score::{NotScored, Outcome, ShotRecord},
+    world::{
+        scenario::Side,
+        score::{NotScored, Outcome, ShotRecord},
+    },
 };
 use bowwave_record::{Journal, JournalOptions, Run};
 use glam::DVec3;
@@ -46,6 +49,7 @@ pub fn shot(number: u64) -> ShotRecord {
             let boat = format!("skiff {}", "x".repeat(number as usize % 300));
             Outcome::Hit {
                 boat,
+                side: Some(Side::Neutral),
                 zone: Zone::ALL[0],
                 time,
                 range_m: 312.25,

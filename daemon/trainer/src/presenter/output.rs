@@ -91,6 +91,8 @@ pub struct CompletedFrame {
     pub begun: Time,
     /// When its pixels were complete.
     pub complete: Time,
+    /// It was complete after its deadline.
+    pub is_late: bool,
 }
 
 /// What the thread measured.
@@ -272,6 +274,7 @@ impl OutputWorker {
             frame: ticket.frame,
             begun: ticket.begun,
             complete: now(),
+            is_late: ticket.deadline.is_some_and(|d| complete > d),
         });
         self.report.frame_ms.push(ms(ticket.begun));
         self.report.gpu_ms.push(ms(ticket.submitted));

@@ -184,8 +184,11 @@ impl Devices {
     pub fn light(&mut self, status: &Status) {
         let Some(lamps) = &mut self.lamps else { return };
         let state = LampState {
-            ready: matches!(status, Status::Ready | Status::Hit | Status::Miss),
-            hit: *status == Status::Hit,
+            ready: matches!(
+                status,
+                Status::Ready | Status::Hit { .. } | Status::NeutralHit { .. } | Status::Miss
+            ),
+            hit: matches!(status, Status::Hit { .. }),
             fault: matches!(status, Status::NotScored { .. } | Status::Fault { .. }),
         };
         lamps.set(state);

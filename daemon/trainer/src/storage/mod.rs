@@ -144,6 +144,13 @@ impl Storage {
         }
     }
 
+    /// Whether the recording gives way to what must keep up with the camera.
+    pub const fn spare(&mut self, spares: bool) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.spare(spares);
+        }
+    }
+
     /// Takes in the pose that was used for a picture, and the true one where that is known.
     pub fn poses(&mut self, used: Option<PoseEntry>, truth: Option<PoseEntry>) {
         if let Some(recorder) = &mut self.recorder {

@@ -2,6 +2,7 @@
 
 use std::{
     path::PathBuf,
+    sync::Arc,
     thread::{self, JoinHandle},
 };
 
@@ -43,9 +44,16 @@ pub struct RecorderOptions {
 /// One job of the thread.
 enum RecorderJob {
     Entry(Entry),
-    /// A picture that no JPEG came with, to be coded.
-    Code(CameraFrame),
+    /// A picture that no JPEG came with, to be coded; or to stand as the one before where coding it takes too long.
+    Code(CameraFrame, Coding),
     Flush,
+}
+
+/// How a picture is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coding {
+    Anew,
+    AsBefore,
 }
 
 /// The running thread.
@@ -55,6 +63,10 @@ pub struct Recorder {
     thread: Option<JoinHandle<Result<WrittenSummary>>>,
     lossless: bool,
     exact_pixels: bool,
+    /// Every other picture is coded only.
+    spares: bool,
+    /// How the newest picture was kept.
+    coding: Coding,
     lost: u64,
     inputs: u64,
     /// When the newest input or tick of the recording came.
@@ -69,11 +81,12 @@ impl Recorder {
         let thread = thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || {
+                let mut coded = PictureCoder::default();
                 for job in jobs.into_iter().flatten() {
                     match job {
                         RecorderJob::Entry(entry) => write(&mut writer, &entry)?,
-                        RecorderJob::Code(frame) => {
-                            let jpeg = jpeg(&frame.picture)?.into();
+                        RecorderJob::Code(frame, coding) => {
+                            let jpeg = coded.jpeg(&frame.picture, coding)?;
                             write(
                                 &mut writer,
                                 &Entry::Frame(FrameEntry { is_recoded: true, ..frame_entry(&frame, jpeg) }),
@@ -90,10 +103,17 @@ impl Recorder {
             thread: Some(thread),
             lossless: options.lossless,
             exact_pixels: options.exact_pixels,
+            spares: false,
+            coding: Coding::AsBefore,
             lost: 0,
             inputs: 0,
             newest: None,
         })
+    }
+
+    /// Whether pictures are coded only every other time, so that a busy computer gets time: the others are kept as the one before.
+    pub const fn spare(&mut self, spares: bool) {
+        self.spares = spares;
     }
 
     /// Takes in the events that the session meets with `tick`, and where it is stepped by it, the tick with a digest over what the session
@@ -122,7 +142,7 @@ impl Recorder {
 
     /// Adds what is recorded of an event; `logged` is the time of a fault in the recording. With the tick's own time, inputs that a pause
     /// held up would come after a fault and be too old to be recorded.
-    fn add(&self, event: &Event, logged: Time, jobs: &mut Vec<RecorderJob>) {
+    fn add(&mut self, event: &Event, logged: Time, jobs: &mut Vec<RecorderJob>) {
         let mut entry = |entry| jobs.push(RecorderJob::Entry(entry));
         match event {
             Event::Imu(sample) => entry(Entry::Imu(*sample)),
@@ -140,7 +160,13 @@ impl Recorder {
                     sequence: frame.sequence,
                     picture: frame.picture.clone(),
                 })),
-                None => jobs.push(RecorderJob::Code(frame.clone())),
+                None => {
+                    self.coding = match self.coding {
+                        Coding::Anew if self.spares => Coding::AsBefore,
+                        _ => Coding::Anew,
+                    };
+                    jobs.push(RecorderJob::Code(frame.clone(), self.coding));
+                }
             },
             Event::Fault(change) => entry(Entry::Fault(FaultEntry { logged, change: change.clone() })),
         }
@@ -214,13 +240,33 @@ fn write(writer: &mut RecordingWriter, entry: &Entry) -> Result<()> {
     }
 }
 
-fn frame_entry(frame: &CameraFrame, jpeg: std::sync::Arc<[u8]>) -> FrameEntry {
+fn frame_entry(frame: &CameraFrame, jpeg: Arc<[u8]>) -> FrameEntry {
     FrameEntry {
         arrival: frame.arrival,
         mid_exposure: frame.mid_exposure,
         sequence: frame.sequence,
         jpeg,
         is_recoded: false,
+    }
+}
+
+/// Codes pictures, and keeps the newest.
+#[derive(Default)]
+struct PictureCoder {
+    newest: Option<((u32, u32), Arc<[u8]>)>,
+}
+
+impl PictureCoder {
+    fn jpeg(&mut self, picture: &Picture, coding: Coding) -> Result<Arc<[u8]>> {
+        let size = (picture.width(), picture.height());
+        if let (Coding::AsBefore, Some((before, jpeg))) = (coding, &self.newest)
+            && *before == size
+        {
+            return Ok(jpeg.clone());
+        }
+        let coded: Arc<[u8]> = jpeg(picture)?.into();
+        self.newest = Some((size, coded.clone()));
+        Ok(coded)
     }
 }
 
@@ -279,5 +325,35 @@ mod tests {
         let marks = kept.iter().filter(|entry| matches!(entry, Entry::Mark(_))).count();
         assert_eq!((kept.len(), marks), (3004, 3000));
         assert!(matches!(kept[2], Entry::Fault(_)), "the fault keeps its place");
+    }
+
+    #[test]
+    fn a_busy_computer_codes_every_other_picture_and_keeps_all_times() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("recording.mcap");
+        let properties = Properties { picture: (16, 16), ..Properties::default() };
+        let options = RecorderOptions { path: path.clone(), properties, lossless: true, exact_pixels: false };
+        let mut recorder = Recorder::start(&options).unwrap();
+        for n in 0..8 {
+            recorder.spare(n >= 4);
+            let time = Time::from_ns(0).plus_secs(f64::from(n) / 30.0);
+            let picture = Picture::new(PixelFormat::Rgb, 16, 16, vec![n as u8 * 30; 768].into()).unwrap();
+            let frame =
+                CameraFrame { arrival: time, mid_exposure: time, sequence: n as u32, picture, jpeg: None };
+            recorder.inputs(&[Event::Frame(frame)], Tick::at(time), None);
+        }
+        recorder.finish().unwrap();
+        let reader = RecordingReader::open(&path).unwrap();
+        let kept: Vec<_> = reader
+            .entries_as_written()
+            .unwrap()
+            .filter_map(|entry| match entry.unwrap() {
+                Entry::Frame(frame) => Some(frame),
+                _ => None,
+            })
+            .collect();
+        let as_before: Vec<bool> = kept.windows(2).map(|pair| pair[0].jpeg == pair[1].jpeg).collect();
+        assert_eq!(kept.len(), 8);
+        assert_eq!(as_before, [false, false, false, true, false, true, false], "a picture and its copy");
     }
 }

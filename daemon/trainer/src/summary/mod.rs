@@ -36,7 +36,7 @@ pub struct Summary {
     pub size: String,
     /// Vulkan device and driver.
     pub device: String,
-    /// From when a frame was begun until its pixels were complete.
+    /// From when a frame was begun until its pixels were complete. With --fast frames overlap, so that it is no time that a frame costs.
     pub frame_ms: Option<Percentiles>,
     /// From begin to begin.
     pub begun_apart_ms: Option<Percentiles>,
@@ -50,8 +50,10 @@ pub struct Summary {
     pub left_out: BTreeMap<String, u64>,
     /// Virtual rounds fired.
     pub shots: u64,
-    /// Virtual rounds that struck a boat.
+    /// Virtual rounds that struck a hostile boat.
     pub hits: u64,
+    /// Virtual rounds that struck a neutral boat.
+    pub neutral_hits: u64,
     /// Virtual rounds that could not be scored.
     pub not_scored: u64,
     /// How far from the recording's truth far things were drawn; null without truth.
@@ -151,6 +153,7 @@ impl Summary {
                 format!("p50 {:.1}, p95 {:.1}, p99 {:.1}, max {:.1} ms", p.p50, p.p95, p.p99, p.max)
             })
         };
+        let frame = if self.missed_deadlines.is_some() { "frame time" } else { "frame latency" };
         let missed = self
             .missed_deadlines
             .map_or("no deadlines in --fast".into(), |n| format!("{n} missed deadlines"));
@@ -163,10 +166,14 @@ impl Summary {
                 c.drift_ppm, c.drift_sigma_ppm, c.jitter_ms, c.jitter_max_ms
             )
         });
+        let neutral = match self.neutral_hits {
+            0 => String::new(),
+            hits => format!(", {hits} HIT A NEUTRAL"),
+        };
         let heading =
             self.heading.map_or("not known".into(), |h| format!("±{:.2} deg (1 sigma)", h.sigma_deg));
         format!(
-            "{} frames of {} on {}; {missed}\nframe time     {}\nregistration   {registration}\nheading        {heading}\nunit's clock   {clock}\nrounds         {} fired, {} hit, {} not scored\n",
+            "{} frames of {} on {}; {missed}\n{frame:15}{}\nregistration   {registration}\nheading        {heading}\nunit's clock   {clock}\nrounds         {} fired, {} hit{neutral}, {} not scored\n",
             self.frames,
             self.size,
             self.device,

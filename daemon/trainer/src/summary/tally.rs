@@ -8,7 +8,10 @@ use bowwave_core::{
     geometry::CameraPose,
     session::{Session, View},
     time::Time,
-    world::score::{Outcome, ShotRecord},
+    world::{
+        scenario::Side,
+        score::{Outcome, ShotRecord},
+    },
 };
 use hw_sim::fault::Fault as InjectedFault;
 
@@ -54,7 +57,8 @@ pub struct Tally {
     submit_ms: Samples,
     ring_waits: u64,
     /// Fired, struck, not scored.
-    rounds: [u64; 3],
+    /// Fired, struck a hostile boat, not scored, struck a neutral one.
+    rounds: [u64; 4],
     recovery: Option<Recovery>,
     memory: MemoryWatch,
 }
@@ -79,7 +83,7 @@ impl Tally {
             step_ms: Samples::default(),
             submit_ms: Samples::default(),
             ring_waits: 0,
-            rounds: [0; 3],
+            rounds: [0; 4],
             recovery: options.injected.clone().map(|(origin, faults)| Recovery::new(origin, faults)),
             memory: MemoryWatch::default(),
         }
@@ -134,7 +138,9 @@ impl Tally {
     pub fn records(&mut self, records: &[ShotRecord]) {
         for record in records {
             self.rounds[0] += 1;
-            self.rounds[1] += u64::from(matches!(record.outcome, Outcome::Hit { .. }));
+            let neutral = matches!(record.outcome, Outcome::Hit { side: Some(Side::Neutral), .. });
+            self.rounds[1] += u64::from(!neutral && matches!(record.outcome, Outcome::Hit { .. }));
+            self.rounds[3] += u64::from(neutral);
             self.rounds[2] += u64::from(matches!(record.outcome, Outcome::NotScored { .. }));
         }
     }
@@ -152,7 +158,7 @@ impl Tally {
         options: &SummaryOptions,
     ) -> Summary {
         let (plan, digest) = (session.plan(), session.digest());
-        let [shots, hits, not_scored] = self.rounds;
+        let [shots, hits, not_scored, neutral_hits] = self.rounds;
         let first_frame = output.first.map(|t| ms_between(options.program_start, t));
         Summary {
             frames: output.frames,
@@ -167,6 +173,7 @@ impl Tally {
             left_out: self.passes.left_out(),
             shots,
             hits,
+            neutral_hits,
             not_scored,
             registration_px: Registration::of(&self.registration, self.registered),
             records_digest: format!("{:016x}", digest.records.get()),

@@ -92,7 +92,8 @@ fn send(state: &[NotifyState<'_>]) {
 pub fn status_text(hud: &Hud, warnings: impl Iterator<Item = Fault>) -> String {
     let mut text = match &hud.status {
         Status::Ready => "READY".to_owned(),
-        Status::Hit => "HIT".to_owned(),
+        Status::Hit { zone } => format!("HIT: {}", zone.name().to_uppercase()),
+        Status::NeutralHit { zone } => format!("NEUTRAL HIT: {}", zone.name().to_uppercase()),
         Status::Miss => "MISS".to_owned(),
         Status::NotChecked { cause } => format!("NOT CHECKED: {cause}"),
         Status::NotScored { cause, .. } => format!("NOT SCORED: {cause}"),
@@ -103,6 +104,9 @@ pub fn status_text(hud: &Hud, warnings: impl Iterator<Item = Fault>) -> String {
         text.push_str(warning.cause());
     }
     text.push_str(&format!("; rounds {}, shots {}, hits {}", hud.rounds_left, hud.shots, hud.hits));
+    if hud.neutral_hits > 0 {
+        text.push_str(&format!(", neutral {}", hud.neutral_hits));
+    }
     text
 }
 
@@ -118,6 +122,7 @@ mod tests {
             rounds_left: 120,
             shots: 14,
             hits: 3,
+            neutral_hits: 0,
             clock_s: 1.0,
             sea: None,
             heading_tenths_deg: None,

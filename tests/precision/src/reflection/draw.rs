@@ -120,6 +120,7 @@ pub fn forced_scene(
         wind,
         reflections: true,
         wakes: false,
+        water_within_m: f64::INFINITY,
     };
     let water_level = pose.position.z;
     let boat = eye.see(&Afloat { boat: 0, model_id, model, pose, water_level });

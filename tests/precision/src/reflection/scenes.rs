@@ -147,6 +147,7 @@ pub fn scene(
         wind,
         reflections: true,
         wakes: false,
+        water_within_m: f64::INFINITY,
     };
     for (boat, afloat) in boats.iter().enumerate() {
         let (pose, water_level) = (afloat.pose(), afloat.water_level);

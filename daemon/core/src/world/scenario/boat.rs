@@ -115,7 +115,7 @@ fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatS
             return Err(text.error(&value, problem));
         }
     }
-    let sides = [("hostile", Side::Hostile), ("neutral", Side::Neutral)];
+    let sides = Side::ALL.map(|side| (side.name(), side));
     let named = |key, value: &OptionalKey<String>, what| match value {
         Some(value) => text.needed(value, plain_text()),
         None => Err(section.missing(key, what)),

@@ -79,6 +79,9 @@ pub enum Side {
 }
 
 impl Side {
+    /// All sides.
+    pub const ALL: [Self; 2] = [Self::Hostile, Self::Neutral];
+
     /// The name used in scenarios, databases and tables.
     pub const fn name(self) -> &'static str {
         match self {

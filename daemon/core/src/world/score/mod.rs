@@ -11,7 +11,7 @@ pub use hit::{Moving, Strike, strike};
 pub use round::{Approach, End, Round};
 
 pub use crate::fault::NotScored;
-use crate::{model::Zone, time::Time};
+use crate::{model::Zone, time::Time, world::scenario::Side};
 
 /// One virtual round, from trigger to end.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,6 +37,8 @@ pub enum Outcome {
     Hit {
         /// The boat's name in the scenario.
         boat: String,
+        /// Whom it belongs to; `None` in records of versions that did not keep it.
+        side: Option<Side>,
         /// The part that was struck.
         zone: Zone,
         /// When it struck.

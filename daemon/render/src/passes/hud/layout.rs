@@ -12,11 +12,12 @@ use bowwave_core::{
     estimate::sea::SeaSource,
     fault::Fault,
     frame::scene::{Hud, PixelRect, Status},
+    model::Zone,
     sea::WmoSeaState,
 };
 use shaders_spirv::interface::{
-    HudQuad, SHAPE_CROSS, SHAPE_DIAMOND, SHAPE_DISC, SHAPE_GLYPH, SHAPE_PLATE, SHAPE_RING, SHAPE_SQUARE,
-    SHAPE_TRIANGLE,
+    HudQuad, SHAPE_BARRED, SHAPE_CROSS, SHAPE_DIAMOND, SHAPE_DISC, SHAPE_GLYPH, SHAPE_PLATE, SHAPE_RING,
+    SHAPE_SQUARE, SHAPE_TRIANGLE,
 };
 
 use crate::{
@@ -30,6 +31,7 @@ const GREEN: [f32; 3] = [0.10, 0.75, 0.16];
 const AMBER: [f32; 3] = [1.0, 0.45, 0.02];
 const RED: [f32; 3] = [1.0, 0.14, 0.10];
 const CYAN: [f32; 3] = [0.12, 0.65, 0.85];
+const MAGENTA: [f32; 3] = [0.95, 0.16, 0.80];
 /// Plates behind the texts: dark enough for every colour above when the camera looks into the sun.
 const PLATE: [f32; 4] = [0.004, 0.006, 0.010, 0.94];
 
@@ -46,7 +48,16 @@ fn look(status: &Status) -> Look<'_> {
     let plain = |shape, colour, word| Look { shape, colour, word, cause: "", action: "" };
     match *status {
         Status::Ready => plain(SHAPE_DISC, GREEN, "READY"),
-        Status::Hit => plain(SHAPE_RING, CYAN, "HIT"),
+        Status::Hit { zone } => {
+            Look { shape: SHAPE_RING, colour: CYAN, word: "HIT", cause: zone_word(zone), action: "" }
+        }
+        Status::NeutralHit { zone } => Look {
+            shape: SHAPE_BARRED,
+            colour: MAGENTA,
+            word: "NEUTRAL HIT",
+            cause: zone_word(zone),
+            action: "HOLD FIRE",
+        },
         Status::Miss => plain(SHAPE_CROSS, WHITE, "MISS"),
         Status::NotChecked { cause } => Look {
             shape: SHAPE_DISC,
@@ -61,6 +72,14 @@ fn look(status: &Status) -> Look<'_> {
         Status::Fault { cause, action } => {
             Look { shape: SHAPE_SQUARE, colour: RED, word: "FAULT", cause, action }
         }
+    }
+}
+
+const fn zone_word(zone: Zone) -> &'static str {
+    match zone {
+        Zone::Hull => "HULL",
+        Zone::Engine => "ENGINE",
+        Zone::Helm => "HELM",
     }
 }
 
@@ -278,25 +297,31 @@ impl HudLayout {
         self.text = text;
     }
 
-    /// Rounds left, shots and hits at the upper right, one below the other.
+    /// Rounds left, shots and hits at the upper right, one below the other; hits on neutrals where there are any.
     fn counts(&mut self, glyphs: &Glyphs, hud: &Hud) {
         let pad = self.pad();
         let line = glyphs.line(TextSize::Small);
-        let rows = [("ROUNDS", hud.rounds_left), ("SHOTS", hud.shots), ("HITS", hud.hits)];
-        let words = rows.iter().map(|(word, _)| glyphs.width_of(TextSize::Small, word)).fold(0.0, f32::max);
+        let rows = [
+            ("ROUNDS", hud.rounds_left, WHITE),
+            ("SHOTS", hud.shots, WHITE),
+            ("HITS", hud.hits, WHITE),
+            ("NEUTRAL", hud.neutral_hits, MAGENTA),
+        ];
+        let rows = if hud.neutral_hits > 0 { &rows[..] } else { &rows[..3] };
+        let words = rows.iter().map(|(word, ..)| glyphs.width_of(TextSize::Small, word)).fold(0.0, f32::max);
         let digits = glyphs.width_of(TextSize::Small, "9999");
         let end = self.size.0 as f32 - 2.0 * pad;
         let x = (end - digits - pad - words).round();
-        self.plate([x - pad, pad, end + pad, pad + 3.0 * line]);
+        self.plate([x - pad, pad, end + pad, pad + rows.len() as f32 * line]);
         let mut text = std::mem::take(&mut self.text);
-        for ((word, count), n) in rows.into_iter().zip(0_u8..) {
+        for ((word, count, colour), n) in rows.iter().zip(0_u8..) {
             let top = pad + line * f32::from(n);
-            self.text(glyphs, TextSize::Small, (x, top), WHITE, word);
+            self.text(glyphs, TextSize::Small, (x, top), *colour, word);
             text.clear();
             // Writing to a String cannot fail.
-            let _ = write!(text, "{}", count.min(9999));
+            let _ = write!(text, "{}", count.min(&9999));
             let from = end - glyphs.width_of(TextSize::Small, &text);
-            self.text(glyphs, TextSize::Small, (from, top), WHITE, &text);
+            self.text(glyphs, TextSize::Small, (from, top), *colour, &text);
         }
         self.text = text;
     }

@@ -13,7 +13,16 @@ pub(super) fn blank(size: (u32, u32)) -> (Glyphs, HudLayout) {
 }
 
 fn hud(status: Status, warning: Option<Fault>) -> Hud {
-    Hud { status, warning, rounds_left: 9999, shots: 9999, hits: 9999, clock_s: 359_999.0, ..Hud::READY }
+    Hud {
+        status,
+        warning,
+        rounds_left: 9999,
+        shots: 9999,
+        hits: 9999,
+        neutral_hits: 9999,
+        clock_s: 359_999.0,
+        ..Hud::READY
+    }
 }
 
 fn shown(fault: Fault) -> Option<Status> {
@@ -27,7 +36,13 @@ fn shown(fault: Fault) -> Option<Status> {
 
 fn statuses() -> Vec<Status> {
     let unchecked = Status::NotChecked { cause: "NO HORIZON FOR 30 MIN" };
-    let plain = [Status::Ready, Status::Hit, Status::Miss, unchecked];
+    let plain = [
+        Status::Ready,
+        Status::Hit { zone: Zone::Engine },
+        Status::NeutralHit { zone: Zone::Engine },
+        Status::Miss,
+        unchecked,
+    ];
     plain.into_iter().chain(Fault::ALL.into_iter().filter_map(shown)).collect()
 }
 
@@ -124,7 +139,8 @@ fn no_two_states_have_shape_and_colour_in_common() {
     let (cause, action) = ("A", "B");
     let states = [
         Status::Ready,
-        Status::Hit,
+        Status::Hit { zone: Zone::Hull },
+        Status::NeutralHit { zone: Zone::Engine },
         Status::Miss,
         // Ready, but for its colour.
         Status::NotChecked { cause },
@@ -132,7 +148,7 @@ fn no_two_states_have_shape_and_colour_in_common() {
         Status::Fault { cause, action },
     ];
     let words: Vec<_> = states.iter().map(|s| look(s).word).collect();
-    assert_eq!(words, ["READY", "HIT", "MISS", "NOT CHECKED", "NOT SCORED", "FAULT"]);
+    assert_eq!(words, ["READY", "HIT", "NEUTRAL HIT", "MISS", "NOT CHECKED", "NOT SCORED", "FAULT"]);
     let mut icons = Vec::new();
     for status in states {
         let quads = layout.lay_out(&glyphs, &hud(status, None));
