@@ -3,8 +3,8 @@
 
 use bowwave_core::{
     estimate::attitude::{
-        Attitude, AttitudeSettings, HeadingSeen, InclinationSettings, Noise, OWN_GROWTH, REFRACTION_SIGMA,
-        RateKind, Source, UpSeen,
+        Attitude, AttitudeSettings, HeadingSeen, Noise, OWN_GROWTH, REFRACTION_SIGMA, RateKind, Source,
+        UpSeen,
     },
     event::ImuSample,
     geometry::wrapped,
@@ -103,13 +103,8 @@ impl AidedRecording {
 
 /// An estimator as the product has it on the gun, of that orientation.
 pub fn product(source: Source) -> Attitude {
-    let settings = AttitudeSettings {
-        source,
-        rate: RateKind::Instant,
-        inclination: InclinationSettings::GUN,
-        noise: Noise::USUAL,
-        own_growth: OWN_GROWTH,
-    };
+    let settings =
+        AttitudeSettings { source, rate: RateKind::Instant, noise: Noise::USUAL, own_growth: OWN_GROWTH };
     Attitude::new(settings, DVec3::ZERO, CAMERA_FROM_IMU)
 }
 
@@ -126,7 +121,7 @@ impl AidedUnit {
             Self::Drawn => {
                 let errors = UnitErrors {
                     gyro_noise: noise.gyro,
-                    gyro_bias: drawn(noise.bias),
+                    gyro_bias: drawn(noise.bias.map(|sigma| sigma.hypot(noise.turn_on))),
                     gyro_walk: noise.bias_walk,
                     gyro_matrix: DMat3::from_cols(drawn(scale), drawn(scale), drawn(scale)),
                     accel_bias: drawn(DVec3::splat(noise.force)),

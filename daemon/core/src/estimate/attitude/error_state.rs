@@ -379,7 +379,7 @@ impl<const N: usize> AidingUpdate for ErrorState<N> {
 }
 
 /// How the horizontal parts of where up is found change with the turn of the world: `up + up x turn`.
-pub(super) fn up_rows<const N: usize>() -> [MeasurementRow<N>; 2] {
+fn up_rows<const N: usize>() -> [MeasurementRow<N>; 2] {
     let mut rows = [MeasurementRow::zeros(); 2];
     rows[0][TURN + 1] = -1.0;
     rows[1][TURN] = 1.0;

@@ -1,34 +1,37 @@
-//! A small error-state filter about an orientation that is integrated from rates: what is still wrong with it, with the gyro's bias, with
-//! the inclination it is held against, and with the camera's place on the unit; and how far each of these is known.
+//! A small error-state filter about an orientation that is integrated from rates: what is still wrong with it, with the gyro's bias and gains,
+//! with the specific force, with the velocity that is integrated from it, and with the camera's place on the unit; and how far each of these
+//! is known.
 
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use super::{
-    error_state::{COMMON, Correction, ErrorState, MeasurementRow, TURN, up_rows},
-    heave::HeaveAcceleration,
-    inclination::InclinationSettings,
-    lag::Lag,
+    carriage::Carriage,
+    consistency::Consistency,
+    error_state::{COMMON, Correction, ErrorState, HEADING, MeasurementRow, TURN},
 };
 use crate::physics::GRAVITY_M_S2;
 
-/// Beside what all have: gyro's bias in the unit's axes (3), error of the inclination it is held against (2), bias of the specific force over
-/// gravity in the unit's axes (3), what a turn about the unit's upright axis is measured too large by about each of its axes, what the
-/// inclination's error is the slope of (2).
+/// Beside what all have: gyro's bias in the unit's axes (3), error of the velocity that is integrated from specific force (2), place and
+/// velocity as what carries the unit has them (2 each), bias of the specific force in the unit's axes (3), what a turn about each of the
+/// unit's axes is measured too large by about each of them, as a share (9, one column after the other).
 const BIAS: usize = COMMON;
-const REFERENCE: usize = BIAS + 3;
-const FORCE: usize = REFERENCE + 2;
-const SCREW: usize = FORCE + 3;
-const SWAY: usize = SCREW + 3;
-const STATES: usize = SWAY + 2;
+const DRIFT: usize = BIAS + 3;
+const PLACE: usize = DRIFT + 2;
+const VELOCITY: usize = PLACE + 2;
+const FORCE: usize = VELOCITY + 2;
+const GAIN: usize = FORCE + 3;
+const STATES: usize = GAIN + 9;
 
 /// Noise model of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// White noise of the rate, rad/s/sqrt(Hz).
     pub gyro: f64,
-    /// Standard deviation of the bias beyond the calibrated one at the start, rad/s.
+    /// Standard deviation of the bias beyond the calibrated one, rad/s, as the calibration has it...
     pub bias: DVec3,
-    /// Random walk of the bias, rad/s in a square root of a second.
+    /// ...and of what it changes by from one start of the unit to the next, rad/s.
+    pub turn_on: f64,
+    /// Random walk of the bias, rad/s in a square root of a second, up to what it is at the start.
     pub bias_walk: f64,
     /// Standard deviation of the rate's scale, and of an axis's share in what another measures.
     pub scale: f64,
@@ -39,14 +42,61 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// A unit of the VN-100's class that nothing is known of but its data sheet: bias within 0.1 deg/s, mounted within a milliradian.
+    /// A unit that nothing is known of: from that of a VN-100, as its data sheet has it, to the worse ones that hobbyists use; mounted within
+    /// a milliradian.
     pub const USUAL: Self = Self {
-        gyro: 6.1e-5,
+        gyro: 1.5e-4,
         bias: DVec3::splat(1.7e-3),
-        bias_walk: 5e-6,
-        scale: 5e-4,
-        force: 0.04,
+        turn_on: 8.7e-3,
+        bias_walk: 2e-5,
+        scale: 1.5e-3,
+        force: 0.02,
         mounting: DVec3::splat(1e-3),
+    };
+
+    /// Standard deviation of the bias at the start, rad/s.
+    fn bias_at_start(&self, axis: usize) -> f64 {
+        self.bias[axis].hypot(self.turn_on)
+    }
+}
+
+/// A sample's motion, with the unit's axes in the world in the middle of its time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SampleMotion {
+    /// The unit's axes in the world.
+    pub axes: DMat3,
+    /// The turn as it was measured, scaled axis, radians, the unit's axes.
+    pub turn: DVec3,
+    /// Specific force, m/s^2, the unit's axes.
+    pub force: DVec3,
+    /// Its time, seconds.
+    pub dt_s: f64,
+}
+
+/// Integrals since the last prediction.
+#[derive(Clone, Copy, Debug)]
+struct Gathered {
+    /// Of the unit's axes in the world, seconds, and of these times the rate about each of its axes, radians.
+    axes: DMat3,
+    turns: [DMat3; 3],
+    /// Of the rate and of the specific force, in the unit's axes and in the world's.
+    turned: DVec3,
+    pushed: DVec3,
+    /// Variances of the turn and of the velocity that the unit did not tell, rad^2 and (m/s)^2.
+    missed: f64,
+    unfelt: f64,
+    dt_s: f64,
+}
+
+impl Gathered {
+    const NOTHING: Self = Self {
+        axes: DMat3::ZERO,
+        turns: [DMat3::ZERO; 3],
+        turned: DVec3::ZERO,
+        pushed: DVec3::ZERO,
+        missed: 0.0,
+        unfelt: 0.0,
+        dt_s: 0.0,
     };
 }
 
@@ -56,76 +106,92 @@ pub(super) struct Filter {
     /// States and how far they are known.
     pub(super) error_state: ErrorState<STATES>,
     noise: Noise,
-    /// The unit's axis that pointed up when it was looked at last.
-    upright: DVec3,
-    lag: Lag,
-    heave: HeaveAcceleration,
-    /// Since the last prediction: integral of the unit's axes in the world, of them times the rate about the upright axis, the turn about
-    /// others, how long.
-    axes: DMat3,
-    screws: DMat3,
-    turned: DVec3,
-    dt_s: f64,
-    /// How far it has turned in the last seconds, in the unit's axes.
-    swing: DVec3,
-    /// What it may have turned since the last prediction without the gyro's telling, radians.
-    missed: f64,
-    /// Mean square of what the inclination it is held against errs by on an axis, rad^2, and for how long it was watched, s.
-    reference_variance: f64,
-    watched_s: f64,
-    /// For how long the inclination still settles, s, and whether up was seen otherwise since that began.
-    settling_s: f64,
-    seen: bool,
-    inclination: InclinationSettings,
+    carriage: Carriage,
+    consistency: Consistency,
+    gathered: Gathered,
+    /// The velocity that is integrated from specific force, m/s, and its change since the last hold, with the time of that.
+    velocity: DVec2,
+    change: DVec2,
+    since_s: f64,
+    /// The bias at the last rest, rad/s, the unit's axes.
+    rested: Option<DVec3>,
+    /// Seconds since up was seen otherwise than by specific force, and for which it is still plain VQF's.
+    unseen_s: f64,
+    fallen_s: f64,
+    falls: u32,
 }
 
-/// VQF's inclination has settled after so many of its time constants: until then what it lags by is not that of the filter alone.
-const SETTLE_TAUS: f64 = 4.0;
-/// How wrong it is at the start, rad: what the first seconds of a sea show of gravity.
-const REFERENCE_START: f64 = 0.05;
-/// How long its size is averaged over, seconds.
-const REFERENCE_MEAN_S: f64 = 60.0;
-/// What it errs by beside that from one time to the next, rad.
-const REFERENCE_NOISE: f64 = 5e-4;
-/// Cosine of how far the upright axis may lean: beyond, a turn about the vertical errs by something else.
-const UPRIGHT_LEAST: f64 = 0.7;
-/// A turn about others is remembered for so long, seconds: longer than a wave, shorter than what corrects its error takes.
-const SWING_TAU_S: f64 = 10.0;
-/// A turn that the gyro did not tell and that is larger than this is more than the inclination's own error, radians.
-const MISSED_MUCH: f64 = 5e-3;
-/// Inclination after levelling, rad.
-const START_TILT: f64 = 0.06;
+/// Velocity and carriage are held together this often, seconds.
+const HOLD_S: f64 = 0.1;
+/// ...to within this, m/s: nothing beside what either is known to.
+const HOLD_NOISE: f64 = 1e-3;
+/// Chi squared at 99.99 % with two degrees of freedom.
+const HOLD_GATE: f64 = 18.4;
+/// Share of the change of the velocity by which it is measured wrong: the scale of the specific force, and axes that are not square.
+const FORCE_SHARE: f64 = 0.02;
+/// White noise of the specific force, m/s^2/sqrt(Hz).
+const FORCE_NOISE: f64 = 0.01;
+/// Share of a turn in a hold's time by which it is measured wrong beside the gains: they are none of every rate alike.
+const TURN_SHARE: f64 = 1e-3;
+/// What a push turns a gyro by, rad/s for each m/s^2 (0.3 deg/s/g).
+const PUSH_TURN: f64 = 5e-4;
+/// What plain VQF's errs by where it is fallen back to, rad, ...
+const FALLEN_TILT: f64 = 2f64.to_radians();
+/// ...for so long, seconds: four of its time constants.
+const FALLEN_S: f64 = 12.0;
+/// Up that was seen so long ago is worth more than VQF's, seconds.
+const SEEN_S: f64 = 2.0;
+/// Standard deviation of the bias as a rest shows it, rad/s (VQF's `bias_sigma_rest`), ...
+const REST_NOISE: f64 = 0.03f64.to_radians();
+/// ...unless it is further than this from what is known (chi squared at 99.7 % with one degree of freedom): then it is no rest.
+const REST_GATE: f64 = 9.0;
 
 impl Filter {
-    /// Nothing learnt yet about an orientation that is held against an inclination so set.
-    pub(super) fn new(noise: Noise, inclination: InclinationSettings) -> Self {
-        let tau_s = inclination.tau_accel_s;
-        let mut error_state = ErrorState::new(noise.mounting);
-        for axis in 0..3 {
-            error_state.forget(BIAS + axis, noise.bias[axis]);
-            error_state.forget(FORCE + axis, noise.force / GRAVITY_M_S2);
-            error_state.forget(SCREW + axis, noise.scale);
-        }
+    /// Nothing learnt yet of an inclination that is wrong by `tilt`, radians.
+    pub(super) fn new(noise: Noise, tilt: f64) -> Self {
         let mut filter = Self {
-            error_state,
+            error_state: ErrorState::new(noise.mounting),
             noise,
-            upright: DVec3::ZERO,
-            lag: Lag::new(tau_s),
-            heave: HeaveAcceleration::new(tau_s),
-            axes: DMat3::ZERO,
-            screws: DMat3::ZERO,
-            turned: DVec3::ZERO,
-            dt_s: 0.0,
-            swing: DVec3::ZERO,
-            missed: 0.0,
-            reference_variance: REFERENCE_START * REFERENCE_START,
-            watched_s: 0.0,
-            settling_s: SETTLE_TAUS * tau_s,
-            seen: false,
-            inclination,
+            carriage: Carriage::new(),
+            consistency: Consistency::default(),
+            gathered: Gathered::NOTHING,
+            velocity: DVec2::ZERO,
+            change: DVec2::ZERO,
+            since_s: 0.0,
+            rested: None,
+            unseen_s: f64::INFINITY,
+            fallen_s: 0.0,
+            falls: 0,
         };
-        filter.forget_tilt();
+        filter.begin(tilt);
         filter
+    }
+
+    /// Nothing is known but a tilt to that deviation.
+    fn begin(&mut self, tilt: f64) {
+        for axis in 0..2 {
+            self.error_state.forget(TURN + axis, tilt);
+        }
+        for axis in 0..3 {
+            self.error_state.forget(BIAS + axis, self.noise.bias_at_start(axis));
+            self.error_state.forget(FORCE + axis, self.noise.force);
+        }
+        for gain in 0..9 {
+            self.error_state.forget(GAIN + gain, self.noise.scale);
+        }
+        self.carriage = Carriage::new();
+        self.consistency = Consistency::default();
+        self.forget_velocity();
+    }
+
+    fn forget_velocity(&mut self) {
+        let (place, speed) = (self.carriage.place_variance().sqrt(), self.carriage.speed_variance().sqrt());
+        for axis in 0..2 {
+            self.error_state.forget(DRIFT + axis, speed);
+            self.error_state.forget(PLACE + axis, place);
+            self.error_state.forget(VELOCITY + axis, speed);
+        }
+        self.velocity = DVec2::ZERO;
     }
 
     /// The bias beyond the calibrated one, rad/s, the unit's axes.
@@ -133,75 +199,86 @@ impl Filter {
         self.error_state.three(BIAS)
     }
 
+    /// How often it has fallen back to plain VQF.
+    pub(super) const fn falls(&self) -> u32 {
+        self.falls
+    }
+
     /// A turn (scaled axis, radians, the unit's axes) that was measured over `dt_s` seconds, without what is known to be wrong with it.
     pub(super) fn corrected(&self, turn: DVec3, dt_s: f64) -> DVec3 {
-        turn - self.bias() * dt_s - self.error_state.three(SCREW) * turn.dot(self.upright)
+        let gains = [0, 1, 2].map(|axis| self.error_state.three(GAIN + 3 * axis) * turn[axis]);
+        turn - self.bias() * dt_s - gains[0] - gains[1] - gains[2]
     }
 
-    /// A step by `turn` (scaled axis, radians) over `dt_s` seconds, with the unit's axes in the world.
-    pub(super) fn step(&mut self, world_from_imu: DQuat, turn: DVec3, dt_s: f64) {
-        let axes = DMat3::from_quat(world_from_imu);
-        let up = axes.transpose().z_axis;
-        if up.dot(self.upright) < UPRIGHT_LEAST {
-            self.set_upright(up);
+    /// Goes on by a sample.
+    pub(super) fn step(&mut self, sample: &SampleMotion) {
+        let &SampleMotion { axes, turn, force, dt_s } = sample;
+        let g = &mut self.gathered;
+        let push = axes * (force - self.error_state.three(FORCE)) * dt_s;
+        g.axes += axes * dt_s;
+        for (axis, turns) in g.turns.iter_mut().enumerate() {
+            *turns += axes * turn[axis];
         }
-        let about = turn.dot(self.upright);
-        self.axes += axes * dt_s;
-        self.screws += axes * about;
-        self.turned += turn - self.upright * about;
-        self.dt_s += dt_s;
+        g.turned += turn;
+        g.pushed += push;
+        g.dt_s += dt_s;
+        self.velocity += push.truncate();
+        self.change += push.truncate();
+        self.since_s += dt_s;
     }
 
-    /// Another axis points up: what is wrong with turns about it is another thing.
-    fn set_upright(&mut self, up: DVec3) {
-        self.upright = up;
-        self.screws = DMat3::ZERO;
-        self.lag.forget_screw();
-        for axis in 0..3 {
-            self.error_state.forget(SCREW + axis, self.noise.scale);
-        }
-    }
-
-    /// It may have turned by another `turn` radians that the gyro did not tell.
-    pub(super) fn miss(&mut self, turn: f64) {
-        self.missed += turn;
+    /// It may have turned by another `turn` radians, and its velocity changed by another `push` m/s, that the unit did not tell.
+    pub(super) fn miss(&mut self, turn: f64, push: f64) {
+        self.gathered.missed += turn * turn;
+        self.gathered.unfelt += push * push;
     }
 
     /// Brings the covariance to the present.
     pub(super) fn predict(&mut self) {
-        let dt = std::mem::take(&mut self.dt_s);
-        if dt <= 0.0 {
+        let g = std::mem::replace(&mut self.gathered, Gathered::NOTHING);
+        if g.dt_s <= 0.0 {
             return;
         }
-        let axes = std::mem::replace(&mut self.axes, DMat3::ZERO);
-        let turned = std::mem::take(&mut self.turned);
-        let screws = std::mem::replace(&mut self.screws, DMat3::ZERO);
-        self.turn_by(BIAS, &axes);
-        self.turn_by(SCREW, &screws);
-        self.lag.step(axes, screws, dt);
-        self.sway_on(dt);
-        self.error_state.pass_time(dt);
-        let missed = std::mem::take(&mut self.missed);
-        // The inclination it is held against has missed the same turn.
-        if missed > MISSED_MUCH {
-            self.settling_s = SETTLE_TAUS * self.inclination.tau_accel_s;
-            self.seen = false;
+        let pushed = g.pushed - DVec3::Z * (GRAVITY_M_S2 * g.dt_s);
+        // A turn of the world turns what is felt, gravity first of all.
+        for (to, from, share) in [
+            (DRIFT, TURN + 1, -g.pushed.z),
+            (DRIFT, HEADING, g.pushed.y),
+            (DRIFT + 1, TURN, g.pushed.z),
+            (DRIFT + 1, HEADING, -g.pushed.x),
+        ] {
+            self.error_state.add(to, from, share);
         }
-        for axis in 0..3 {
-            self.error_state.walk(TURN + axis, self.noise.gyro.powi(2) * dt + missed * missed);
-            self.error_state.walk(BIAS + axis, self.noise.bias_walk.powi(2) * dt);
+        for column in 0..3 {
+            self.error_state.add(DRIFT, FORCE + column, g.axes.col(column).x);
+            self.error_state.add(DRIFT + 1, FORCE + column, g.axes.col(column).y);
         }
-        let before = self.swing * (-dt / SWING_TAU_S).exp();
-        self.swing = before + turned;
-        self.turn_by_axes((self.swing.length_squared() - before.length_squared()).max(0.0));
+        self.turn_by(BIAS, &g.axes);
+        for (axis, turns) in g.turns.iter().enumerate() {
+            self.turn_by(GAIN + 3 * axis, turns);
+        }
+        let (kept, added) = self.carriage.step(pushed.truncate(), g.dt_s);
+        for axis in 0..2 {
+            self.error_state.mix([PLACE + axis, VELOCITY + axis], kept, added);
+        }
+        self.error_state.pass_time(g.dt_s);
+        self.walk(&g, pushed.length());
+        self.unseen_s += g.dt_s;
     }
 
-    /// What wrong scales and axes of the gyro that are not square add up to where it does not turn about the upright axis, `farther` being by
-    /// how much the square of the turn from where it was before has grown: turning back undoes that error, so turns there and back do not
-    /// add up.
-    fn turn_by_axes(&mut self, farther: f64) {
+    /// What chance adds while it is pushed by `pushed` m/s.
+    fn walk(&mut self, g: &Gathered, pushed: f64) {
+        let shares = (TURN_SHARE * g.turned.length()).powi(2) + (PUSH_TURN * pushed).powi(2);
+        let turn = self.noise.gyro.powi(2) * g.dt_s + shares + g.missed;
+        let velocity = FORCE_NOISE * FORCE_NOISE * g.dt_s + (FORCE_SHARE * pushed).powi(2) + g.unfelt;
         for axis in 0..3 {
-            self.error_state.walk(TURN + axis, self.noise.scale.powi(2) * farther);
+            self.error_state.walk(TURN + axis, turn);
+            if self.error_state.variance(BIAS + axis) < self.noise.bias_at_start(axis).powi(2) {
+                self.error_state.walk(BIAS + axis, self.noise.bias_walk.powi(2) * g.dt_s);
+            }
+        }
+        for axis in 0..2 {
+            self.error_state.walk(DRIFT + axis, velocity);
         }
     }
 
@@ -215,81 +292,95 @@ impl Filter {
         }
     }
 
-    /// The inclination's error goes on to and fro.
-    fn sway_on(&mut self, dt: f64) {
-        let (change, added) = self.heave.step(dt);
-        for axis in 0..2 {
-            self.error_state.mix([SWAY + axis, REFERENCE + axis], change, added * self.reference_variance);
-        }
+    /// Whether it is time for [`Self::hold`].
+    pub(super) fn is_due(&self) -> bool {
+        self.since_s >= HOLD_S
     }
 
-    /// Holds `world_from_imu` against an inclination that errs by itself: where up is in the unit's axes, `since_s` after the last one.
-    pub(super) fn incline(&mut self, world_from_imu: DQuat, up_imu: DVec3, since_s: f64) -> Correction {
-        let swung = self.lag.behind() * self.bias() + self.lag.screwed() * self.error_state.three(SCREW);
-        let felt = self.lag.axes() * self.error_state.three(FORCE);
-        let up = (world_from_imu * up_imu - felt + swung.cross(DVec3::Z)).truncate();
-        if self.settling_s > 0.0 {
-            self.settling_s -= since_s;
-            if self.seen {
-                return DQuat::IDENTITY;
+    /// Holds the velocity that is integrated from specific force against how what carries the unit moves, and the orientation against plain
+    /// VQF's direction of up (unit vector in the unit's axes).
+    pub(super) fn hold(&mut self, world_from_imu: DQuat, up_imu: DVec3) -> Correction {
+        self.predict();
+        let since_s = std::mem::take(&mut self.since_s);
+        let change = std::mem::take(&mut self.change);
+        let apart = (world_from_imu * up_imu).truncate();
+        if self.fallen_s > 0.0 && self.unseen_s > SEEN_S {
+            self.fallen_s -= since_s;
+            return self.fall_to(world_from_imu, up_imu);
+        }
+        let rows: [MeasurementRow<STATES>; 2] = [0, 1].map(|axis| {
+            let mut row = MeasurementRow::zeros();
+            row[DRIFT + axis] = 1.0;
+            row[VELOCITY + axis] = 1.0;
+            row
+        });
+        let differ = self.velocity - self.error_state.two(VELOCITY);
+        let noise = DMat2::from_diagonal(DVec2::splat(HOLD_NOISE * HOLD_NOISE));
+        let (turn, outcome) = self.error_state.update(&rows, differ, noise, HOLD_GATE);
+        self.take_drift();
+        self.carriage.watch(self.velocity, change, since_s);
+        let variance = 0.5 * (self.error_state.variance(TURN) + self.error_state.variance(TURN + 1));
+        let holds = self.consistency.holds(outcome.nis, apart, variance, since_s);
+        if !holds && self.unseen_s > SEEN_S {
+            self.falls = self.falls.saturating_add(1);
+            self.fallen_s = FALLEN_S;
+            return self.fall_to(world_from_imu, up_imu);
+        }
+        turn
+    }
+
+    /// The orientation's inclination is plain VQF's, and nothing else that was learnt counts but what a rest has shown.
+    fn fall_to(&mut self, world_from_imu: DQuat, up_imu: DVec3) -> Correction {
+        self.begin(FALLEN_TILT);
+        if let Some(bias) = self.rested {
+            (0..3).for_each(|axis| self.error_state.set(BIAS + axis, bias[axis]));
+        }
+        DQuat::from_rotation_arc((world_from_imu * up_imu).normalize_or(DVec3::Z), DVec3::Z)
+    }
+
+    /// Puts what is known of the velocity's error into it.
+    fn take_drift(&mut self) {
+        self.velocity -= self.error_state.two(DRIFT);
+        (0..2).for_each(|axis| self.error_state.set(DRIFT + axis, 0.0));
+    }
+
+    /// Takes in that the unit has been at rest and turned at that mean rate less the calibrated bias, rad/s.
+    pub(super) fn rest(&mut self, rate: DVec3) -> Correction {
+        self.predict();
+        let mut turn = DQuat::IDENTITY;
+        let mut all = true;
+        for axis in 0..3 {
+            let differ = rate[axis] - self.error_state.at(BIAS + axis);
+            if self.rested.is_none() {
+                // The first rest after a start: what the bias was thought to be may be another start's.
+                let known = self.error_state.variance(BIAS + axis);
+                self.error_state.walk(BIAS + axis, (differ * differ - known).max(0.0));
             }
-            self.forget_tilt();
-        } else {
-            self.watch(up, since_s);
+            let mut row = MeasurementRow::zeros();
+            row[BIAS + axis] = 1.0;
+            let (by, outcome) = self.error_state.update_one(&row, differ, REST_NOISE * REST_NOISE, REST_GATE);
+            turn = by * turn;
+            all &= outcome.taken;
         }
-        let noise = DMat2::from_diagonal(DVec2::splat(REFERENCE_NOISE * REFERENCE_NOISE));
-        let differ = up - self.error_state.two(REFERENCE);
-        self.error_state.update(&self.inclined_rows(), differ, noise, f64::INFINITY).0
-    }
-
-    /// How the horizontal parts of that inclination change with the states.
-    fn inclined_rows(&self) -> [MeasurementRow<STATES>; 2] {
-        let mut rows = up_rows();
-        for column in 0..3 {
-            let (felt, behind, screwed) =
-                (self.lag.axes().col(column), self.lag.behind().col(column), self.lag.screwed().col(column));
-            // A turn of the axes that it works in turns up.
-            for (row, by) in rows.iter_mut().zip([DVec2::new(0.0, -1.0), DVec2::new(1.0, 0.0)]) {
-                row[BIAS + column] = by.dot(behind.truncate());
-                row[SCREW + column] = by.dot(screwed.truncate());
-            }
-            rows[0][FORCE + column] = felt.x;
-            rows[1][FORCE + column] = felt.y;
+        self.take_drift();
+        if all {
+            self.rested = Some(rate);
         }
-        rows[0][REFERENCE] = 1.0;
-        rows[1][REFERENCE + 1] = 1.0;
-        rows
-    }
-
-    /// Until the inclination has settled, nothing that it said before is worth more than what it says now.
-    fn forget_tilt(&mut self) {
-        let place = REFERENCE_START * self.heave.place_variance().sqrt();
-        for axis in 0..2 {
-            self.error_state.forget(TURN + axis, START_TILT);
-            self.error_state.forget(REFERENCE + axis, REFERENCE_START);
-            self.error_state.forget(SWAY + axis, place);
-        }
-    }
-
-    /// Learns how far that inclination swings about.
-    fn watch(&mut self, up: DVec2, since_s: f64) {
-        self.watched_s = (self.watched_s + since_s).min(REFERENCE_MEAN_S);
-        let share = (since_s / self.watched_s.max(since_s)).min(1.0);
-        let seen = 0.5 * up.length_squared();
-        let now = self.reference_variance + share * (seen - self.reference_variance);
-        self.reference_variance =
-            now.clamp(self.inclination.error_least.powi(2), REFERENCE_START * REFERENCE_START);
+        turn
     }
 
     /// Up was seen otherwise than by specific force.
     pub(super) const fn saw_up(&mut self) {
-        self.seen = true;
+        self.unseen_s = 0.0;
     }
 
     /// The heading is set from outside: the world is turned by `off` about the vertical, which is then known to `deviation`.
     pub(super) fn set_heading(&mut self, off: f64, deviation: f64) {
-        self.error_state.set_heading(off, deviation, &[REFERENCE, SWAY]);
-        self.lag.turn(DMat3::from_rotation_z(off));
+        self.take_drift();
+        let turned = DMat2::from_angle(off);
+        self.velocity = turned * self.velocity;
+        self.change = turned * self.change;
+        self.error_state.set_heading(off, deviation, &[DRIFT, PLACE, VELOCITY]);
     }
 
     /// By how much the bias turns the world about the vertical, standard deviation, rad/s, with the unit as in `world_from_imu`.
