@@ -372,6 +372,7 @@ impl Filter {
     /// Up was seen otherwise than by specific force.
     pub(super) const fn saw_up(&mut self) {
         self.unseen_s = 0.0;
+        self.fallen_s = 0.0;
     }
 
     /// The heading is set from outside: the world is turned by `off` about the vertical, which is then known to `deviation`.
