@@ -47,9 +47,9 @@ impl Noise {
     pub const USUAL: Self = Self {
         gyro: 1.5e-4,
         bias: DVec3::splat(1.7e-3),
-        turn_on: 8.7e-3,
+        turn_on: 1.7e-3,
         bias_walk: 2e-5,
-        scale: 1.5e-3,
+        scale: 1.2e-3,
         force: 0.02,
         mounting: DVec3::splat(1e-3),
     };
@@ -82,8 +82,8 @@ struct Gathered {
     /// Of the rate and of the specific force, in the unit's axes and in the world's.
     turned: DVec3,
     pushed: DVec3,
-    /// Variances of the turn and of the velocity that the unit did not tell, rad^2 and (m/s)^2.
-    missed: f64,
+    /// Covariance of the turn and variance of the velocity that the unit did not tell, rad^2 and (m/s)^2.
+    missed: DMat3,
     unfelt: f64,
     dt_s: f64,
 }
@@ -94,7 +94,7 @@ impl Gathered {
         turns: [DMat3::ZERO; 3],
         turned: DVec3::ZERO,
         pushed: DVec3::ZERO,
-        missed: 0.0,
+        missed: DMat3::ZERO,
         unfelt: 0.0,
         dt_s: 0.0,
     };
@@ -119,6 +119,8 @@ pub(super) struct Filter {
     unseen_s: f64,
     fallen_s: f64,
     falls: u32,
+    /// For how long VQF is not worth holding against after a shock, seconds.
+    shaken_s: f64,
 }
 
 /// Velocity and carriage are held together this often, seconds.
@@ -162,6 +164,7 @@ impl Filter {
             unseen_s: f64::INFINITY,
             fallen_s: 0.0,
             falls: 0,
+            shaken_s: 0.0,
         };
         filter.begin(tilt);
         filter
@@ -227,10 +230,17 @@ impl Filter {
         self.since_s += dt_s;
     }
 
-    /// It may have turned by another `turn` radians, and its velocity changed by another `push` m/s, that the unit did not tell.
-    pub(super) fn miss(&mut self, turn: f64, push: f64) {
-        self.gathered.missed += turn * turn;
+    /// It may have turned otherwise by a turn of that covariance (rad^2, the world's axes), and its velocity changed by another of that variance on an
+    /// axis, (m/s)^2, that the unit did not tell.
+    pub(super) fn miss(&mut self, turn: DMat3, push: f64) {
+        self.gathered.missed += turn;
+        self.gathered.unfelt += push;
+    }
+
+    /// A shock changed the velocity by some `push` m/s.
+    pub(super) fn shake(&mut self, push: f64) {
         self.gathered.unfelt += push * push;
+        self.shaken_s = FALLEN_S;
     }
 
     /// Brings the covariance to the present.
@@ -241,21 +251,17 @@ impl Filter {
         }
         let pushed = g.pushed - DVec3::Z * (GRAVITY_M_S2 * g.dt_s);
         // A turn of the world turns what is felt, gravity first of all.
-        for (to, from, share) in [
-            (DRIFT, TURN + 1, -g.pushed.z),
-            (DRIFT, HEADING, g.pushed.y),
-            (DRIFT + 1, TURN, g.pushed.z),
-            (DRIFT + 1, HEADING, -g.pushed.x),
-        ] {
-            self.error_state.add(to, from, share);
+        let [x, y, z] = [g.axes.row(0), g.axes.row(1), g.axes.row(2)];
+        let tilts =
+            [[(TURN + 1, -g.pushed.z), (HEADING, g.pushed.y)], [(TURN, g.pushed.z), (HEADING, -g.pushed.x)]];
+        for (axis, (tilt, row)) in tilts.into_iter().zip([x, y]).enumerate() {
+            let felt = (0..3).map(|column| (FORCE + column, row[column]));
+            self.error_state.add_all(DRIFT + axis, tilt.into_iter().chain(felt));
         }
-        for column in 0..3 {
-            self.error_state.add(DRIFT, FORCE + column, g.axes.col(column).x);
-            self.error_state.add(DRIFT + 1, FORCE + column, g.axes.col(column).y);
-        }
-        self.turn_by(BIAS, &g.axes);
-        for (axis, turns) in g.turns.iter().enumerate() {
-            self.turn_by(GAIN + 3 * axis, turns);
+        for (axis, row) in [x, y, z].into_iter().enumerate() {
+            let bias = (0..3).map(|column| (BIAS + column, -row[column]));
+            let gains = (0..9).map(|gain| (GAIN + gain, -g.turns[gain / 3].col(gain % 3)[axis]));
+            self.error_state.add_all(TURN + axis, bias.chain(gains));
         }
         let (kept, added) = self.carriage.step(pushed.truncate(), g.dt_s);
         for axis in 0..2 {
@@ -268,27 +274,18 @@ impl Filter {
 
     /// What chance adds while it is pushed by `pushed` m/s.
     fn walk(&mut self, g: &Gathered, pushed: f64) {
-        let shares = (TURN_SHARE * g.turned.length()).powi(2) + (PUSH_TURN * pushed).powi(2);
-        let turn = self.noise.gyro.powi(2) * g.dt_s + shares + g.missed;
+        let shares =
+            (TURN_SHARE * g.turned.length()).powi(2) + (PUSH_TURN * pushed).powi(2);
+        let turn = self.noise.gyro.powi(2) * g.dt_s + shares;
         let velocity = FORCE_NOISE * FORCE_NOISE * g.dt_s + (FORCE_SHARE * pushed).powi(2) + g.unfelt;
+        self.error_state.walk_three(TURN, g.missed + DMat3::from_diagonal(DVec3::splat(turn)));
         for axis in 0..3 {
-            self.error_state.walk(TURN + axis, turn);
             if self.error_state.variance(BIAS + axis) < self.noise.bias_at_start(axis).powi(2) {
                 self.error_state.walk(BIAS + axis, self.noise.bias_walk.powi(2) * g.dt_s);
             }
         }
         for axis in 0..2 {
             self.error_state.walk(DRIFT + axis, velocity);
-        }
-    }
-
-    /// What an error of the rate at these three states turned the world by since the last prediction, `axes` being the integral of what
-    /// it turns by where it is one about each of the unit's axes.
-    fn turn_by(&mut self, state: usize, axes: &DMat3) {
-        for row in 0..3 {
-            for column in 0..3 {
-                self.error_state.add(TURN + row, state + column, -axes.col(column)[row]);
-            }
         }
     }
 
@@ -320,6 +317,9 @@ impl Filter {
         self.take_drift();
         self.carriage.watch(self.velocity, change, since_s);
         let variance = 0.5 * (self.error_state.variance(TURN) + self.error_state.variance(TURN + 1));
+        self.shaken_s -= since_s;
+        // Blows tilt the mean force that VQF takes for up.
+        let apart = if self.shaken_s > 0.0 { DVec2::ZERO } else { apart };
         let holds = self.consistency.holds(outcome.nis, apart, variance, since_s);
         if !holds && self.unseen_s > SEEN_S {
             self.falls = self.falls.saturating_add(1);

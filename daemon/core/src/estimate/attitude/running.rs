@@ -9,7 +9,7 @@ use super::{
     rest::RestDetector,
     turn_between,
 };
-use crate::{estimate::pose::OrientationSample, physics::GRAVITY_M_S2, time::Time};
+use crate::{estimate::pose::OrientationSample, time::Time};
 
 /// A step that is longer than so many periods of the unit has samples missing.
 const MISSING_PERIODS: f64 = 1.8;
@@ -20,9 +20,11 @@ const CHANGES_S: f64 = 2.0;
 /// ...and between samples so far apart: as long as what is missing usually is.
 const APART_S: f64 = 0.1;
 
-/// Specific force that exceeds gravity by more than this, m/s^2, is a shock: recoil or a blow. Its samples are taken in, because a blow has two
-/// sides and one of them alone tilts the mean, but what exceeds it counts as not known: the unit may have clipped it or missed its peak.
+/// Specific force that changes by more than this from one sample to the next, m/s^2, is a shock: recoil or a blow. What it changes the velocity
+/// by is not known, as the unit may have clipped it or missed its peak: no velocity is learnt of it, and none is held to have stayed.
 const SHOCK: f64 = 60.0;
+/// After so long it is no shock but what the unit has come to measure, seconds.
+const SHOCK_MOST_S: f64 = 0.05;
 
 /// No gyro's range is smaller, rad/s (30 deg/s).
 const CLIPPED_LEAST: f64 = 0.52;
@@ -45,11 +47,13 @@ pub(super) struct RunningFilter {
     before: Option<(DVec3, i64)>,
     /// The largest rate so far on each axis.
     fastest: DVec3,
-    /// Mean squares of the changes of rate and specific force over their time, rad^2/s^3 and m^2/s^5.
-    changes: [f64; 2],
+    /// Mean squares of the changes of rate and specific force over their time on each axis, rad^2/s^3 and m^2/s^5.
+    changes: [DVec3; 2],
     /// Both when these were looked at last, and how long ago that is, seconds.
     apart: [DVec3; 2],
     apart_s: f64,
+    /// How long a shock has lasted, seconds.
+    shock_s: f64,
 }
 
 impl RunningFilter {
@@ -65,9 +69,10 @@ impl RunningFilter {
             force,
             before: None,
             fastest: DVec3::ZERO,
-            changes: [0.0; 2],
+            changes: [DVec3::ZERO; 2],
             apart: [last.rate, force],
             apart_s: 0.0,
+            shock_s: 0.0,
         }
     }
 
@@ -92,9 +97,10 @@ impl RunningFilter {
             }
         };
         if self.is_clipped(rate) {
-            self.filter.miss(rate.length() * CLIPPED_SHARE * dt_s, 0.0);
+            let missed = (rate.length() * CLIPPED_SHARE * dt_s).powi(2);
+            self.filter.miss(DMat3::from_diagonal(DVec3::splat(missed)), 0.0);
         }
-        self.filter.miss(0.0, (accel.length() - GRAVITY_M_S2 - SHOCK).max(0.0) * dt_s);
+        let accel = self.without_shock(accel, dt_s);
         self.bridge(rate, accel, dt_s, missing);
         let rested = self.rest.watch(rate, accel, dt_s).map(|mean| self.filter.rest(mean));
         let force = match kind {
@@ -119,12 +125,25 @@ impl RunningFilter {
         Some(turn)
     }
 
+    /// What was felt, or in a shock what was felt before it.
+    fn without_shock(&mut self, accel: DVec3, dt_s: f64) -> DVec3 {
+        let change = accel.distance(self.force);
+        if change <= SHOCK || self.shock_s >= SHOCK_MOST_S {
+            self.shock_s = 0.0;
+            return accel;
+        }
+        self.shock_s += dt_s;
+        self.filter.shake(change * dt_s);
+        self.force
+    }
+
     /// What may have happened while samples were missing: rate and specific force between those that came are a Brownian bridge that changes as
     /// they did of late, whose integral over `T` has the variance `q T^3 / 12`.
     fn bridge(&mut self, rate: DVec3, force: DVec3, dt_s: f64, missing: bool) {
         if missing {
-            let [turn, push] = self.changes.map(|change| (change * dt_s.powi(3) / 12.0).sqrt());
-            self.filter.miss(turn, push);
+            let [turn, push] = self.changes.map(|change| change * (dt_s.powi(3) / 12.0));
+            let axes = DMat3::from_quat(self.last.world_from_imu);
+            self.filter.miss(axes * DMat3::from_diagonal(turn) * axes.transpose(), push.max_element());
         }
         self.apart_s += dt_s;
         if self.apart_s < APART_S {
@@ -132,7 +151,8 @@ impl RunningFilter {
         }
         let over_s = std::mem::take(&mut self.apart_s);
         for ((mean, now), before) in self.changes.iter_mut().zip([rate, force]).zip(&mut self.apart) {
-            let square = now.distance_squared(*before) / (3.0 * over_s);
+            let change = now - *before;
+            let square = change * change / over_s;
             *mean += (square - *mean) * (over_s / CHANGES_S).min(1.0);
             *before = now;
         }
