@@ -115,15 +115,17 @@ impl AidedUnit {
         let mut rng = Pcg64::seed_from_u64(seed + 1000);
         let mut drawn =
             |sigma: DVec3| DVec3::new(gaussian(&mut rng), gaussian(&mut rng), gaussian(&mut rng)) * sigma;
-        let scale = DVec3::splat(noise.scale);
+        // What a turn about each axis is measured too large by about each.
+        let gains =
+            [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * noise.scale + (DVec3::ONE - axis) * noise.skew);
         match self {
             Self::Usual => (UnitErrors::usual(), DVec3::new(7e-4, -6e-4, 5e-4), 0.0),
             Self::Drawn => {
                 let errors = UnitErrors {
                     gyro_noise: noise.gyro,
-                    gyro_bias: drawn(noise.bias.map(|sigma| sigma.hypot(noise.turn_on))),
+                    gyro_bias: drawn(noise.bias),
                     gyro_walk: noise.bias_walk,
-                    gyro_matrix: DMat3::from_cols(drawn(scale), drawn(scale), drawn(scale)),
+                    gyro_matrix: DMat3::from_cols(drawn(gains[0]), drawn(gains[1]), drawn(gains[2])),
                     accel_bias: drawn(DVec3::splat(noise.force)),
                     ..UnitErrors::usual()
                 };

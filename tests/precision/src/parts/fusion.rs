@@ -169,10 +169,10 @@ const PULSES: [(f64, f64, bool); 4] =
 /// A mount brings back in this time what a pulse moved, seconds.
 const RETURN_S: f64 = 0.15;
 
-/// What a burst of two rounds a second, three seconds in each thirty, adds along the barrel, m/s^2.
+/// What a burst of two rounds a second, the last three seconds of each thirty, adds along the barrel, m/s^2.
 fn fired((peak_g, lasts_s, sine): (f64, f64, bool), time_s: f64) -> f64 {
     let since_s = time_s % 0.5;
-    if time_s % 30.0 > 3.0 || since_s > lasts_s + RETURN_S {
+    if time_s % 30.0 < 27.0 || since_s > lasts_s + RETURN_S {
         return 0.0;
     }
     let peak = peak_g * GRAVITY_M_S2;

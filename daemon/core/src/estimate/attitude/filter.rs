@@ -7,7 +7,7 @@ use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use super::{
     carriage::Carriage,
     consistency::Consistency,
-    error_state::{COMMON, Correction, ErrorState, HEADING, MeasurementRow, TURN},
+    error_state::{COMMON, Correction, ErrorState, MeasurementRow, TURN},
 };
 use crate::physics::GRAVITY_M_S2;
 
@@ -20,21 +20,22 @@ const PLACE: usize = DRIFT + 2;
 const VELOCITY: usize = PLACE + 2;
 const FORCE: usize = VELOCITY + 2;
 const GAIN: usize = FORCE + 3;
-const STATES: usize = GAIN + 9;
+const SHOCK: usize = GAIN + 9;
+const STATES: usize = SHOCK + 1;
 
 /// Noise model of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     /// White noise of the rate, rad/s/sqrt(Hz).
     pub gyro: f64,
-    /// Standard deviation of the bias beyond the calibrated one, rad/s, as the calibration has it...
+    /// Standard deviation of the bias beyond the calibrated one at the start, rad/s; the first rest may find any.
     pub bias: DVec3,
-    /// ...and of what it changes by from one start of the unit to the next, rad/s.
-    pub turn_on: f64,
     /// Random walk of the bias, rad/s in a square root of a second, up to what it is at the start.
     pub bias_walk: f64,
-    /// Standard deviation of the rate's scale, and of an axis's share in what another measures.
+    /// Standard deviation of the rate's scale...
     pub scale: f64,
+    /// ...and of an axis's share in what another measures.
+    pub skew: f64,
     /// Standard deviation of the specific force's bias, m/s^2.
     pub force: f64,
     /// Standard deviation of the camera's calibrated place on the unit, rad, about the camera's axes.
@@ -45,19 +46,14 @@ impl Noise {
     /// A unit that nothing is known of: from that of a VN-100, as its data sheet has it, to the worse ones that hobbyists use; mounted within
     /// a milliradian.
     pub const USUAL: Self = Self {
-        gyro: 1.5e-4,
+        gyro: 6.1e-5,
         bias: DVec3::splat(1.7e-3),
-        turn_on: 1.7e-3,
-        bias_walk: 2e-5,
-        scale: 1.2e-3,
+        bias_walk: 7e-6,
+        scale: 1.5e-3,
+        skew: 5e-4,
         force: 0.02,
         mounting: DVec3::splat(1e-3),
     };
-
-    /// Standard deviation of the bias at the start, rad/s.
-    fn bias_at_start(&self, axis: usize) -> f64 {
-        self.bias[axis].hypot(self.turn_on)
-    }
 }
 
 /// A sample's motion, with the unit's axes in the world in the middle of its time.
@@ -82,6 +78,8 @@ struct Gathered {
     /// Of the rate and of the specific force, in the unit's axes and in the world's.
     turned: DVec3,
     pushed: DVec3,
+    /// Of what was felt of shocks, m/s, the world's horizontal axes.
+    shocked: DVec2,
     /// Covariance of the turn and variance of the velocity that the unit did not tell, rad^2 and (m/s)^2.
     missed: DMat3,
     unfelt: f64,
@@ -94,6 +92,7 @@ impl Gathered {
         turns: [DMat3::ZERO; 3],
         turned: DVec3::ZERO,
         pushed: DVec3::ZERO,
+        shocked: DVec2::ZERO,
         missed: DMat3::ZERO,
         unfelt: 0.0,
         dt_s: 0.0,
@@ -119,6 +118,8 @@ pub(super) struct Filter {
     unseen_s: f64,
     fallen_s: f64,
     falls: u32,
+    /// For how long what a shock moved may still come back, seconds.
+    returns_s: f64,
     /// For how long VQF is not worth holding against after a shock, seconds.
     shaken_s: f64,
 }
@@ -133,10 +134,20 @@ const HOLD_GATE: f64 = 18.4;
 const FORCE_SHARE: f64 = 0.02;
 /// White noise of the specific force, m/s^2/sqrt(Hz).
 const FORCE_NOISE: f64 = 0.01;
+/// Of what is felt of a shock some share is so, from nothing to all, as units clip it or miss its peak: its mean and its deviation...
+const SHOCK_SHARE: f64 = 0.5;
+/// ...and that of each shock alone, one standard deviation.
+const SHOCK_NOISE: f64 = 0.3;
+/// What a shock moved comes back within this, seconds: until then half of a blow is no velocity...
+const RETURN_S: f64 = 0.25;
+/// ...but one is held after so long, seconds.
+const SHOCKS_MOST_S: f64 = 5.0;
 /// Share of a turn in a hold's time by which it is measured wrong beside the gains: they are none of every rate alike.
 const TURN_SHARE: f64 = 1e-3;
-/// What a push turns a gyro by, rad/s for each m/s^2 (0.3 deg/s/g).
-const PUSH_TURN: f64 = 5e-4;
+/// Random walk of the bias for each rad/s that it turns by, rad/s in a square root of a second.
+const BIAS_TURN: f64 = 2e-5;
+/// What a gyro turns by as it is shaken, rad/s for each (m/s^2)^2 (IEEE Std 952, vibration rectification).
+const PUSH_TURN: f64 = 2e-5;
 /// What plain VQF's errs by where it is fallen back to, rad, ...
 const FALLEN_TILT: f64 = 2f64.to_radians();
 /// ...for so long, seconds: four of its time constants.
@@ -164,6 +175,7 @@ impl Filter {
             unseen_s: f64::INFINITY,
             fallen_s: 0.0,
             falls: 0,
+            returns_s: 0.0,
             shaken_s: 0.0,
         };
         filter.begin(tilt);
@@ -176,12 +188,15 @@ impl Filter {
             self.error_state.forget(TURN + axis, tilt);
         }
         for axis in 0..3 {
-            self.error_state.forget(BIAS + axis, self.noise.bias_at_start(axis));
+            self.error_state.forget(BIAS + axis, self.noise.bias[axis]);
             self.error_state.forget(FORCE + axis, self.noise.force);
         }
         for gain in 0..9 {
-            self.error_state.forget(GAIN + gain, self.noise.scale);
+            let own = gain % 4 == 0;
+            self.error_state.forget(GAIN + gain, if own { self.noise.scale } else { self.noise.skew });
         }
+        self.error_state.forget(SHOCK, SHOCK_SHARE);
+        self.error_state.set(SHOCK, SHOCK_SHARE);
         self.carriage = Carriage::new();
         self.consistency = Consistency::default();
         self.forget_velocity();
@@ -228,6 +243,7 @@ impl Filter {
         self.velocity += push.truncate();
         self.change += push.truncate();
         self.since_s += dt_s;
+        self.returns_s -= dt_s;
     }
 
     /// It may have turned otherwise by a turn of that covariance (rad^2, the world's axes), and its velocity changed by another of that variance on an
@@ -237,9 +253,16 @@ impl Filter {
         self.gathered.unfelt += push;
     }
 
-    /// A shock changed the velocity by some `push` m/s.
-    pub(super) fn shake(&mut self, push: f64) {
-        self.gathered.unfelt += push * push;
+    /// A shock was felt to push it by that, m/s, the world's axes.
+    pub(super) fn shake(&mut self, push: DVec3) {
+        let taken = push * self.error_state.at(SHOCK);
+        let g = &mut self.gathered;
+        g.shocked += push.truncate();
+        g.unfelt += (SHOCK_NOISE * push.length()).powi(2);
+        g.pushed += taken;
+        self.velocity += taken.truncate();
+        self.change += taken.truncate();
+        self.returns_s = RETURN_S;
         self.shaken_s = FALLEN_S;
     }
 
@@ -250,13 +273,14 @@ impl Filter {
             return;
         }
         let pushed = g.pushed - DVec3::Z * (GRAVITY_M_S2 * g.dt_s);
-        // A turn of the world turns what is felt, gravity first of all.
+        // A turn of the world turns what is felt, gravity first of all. That the heading turns it, too, is left out: what carries the unit is alike
+        // in all directions and tells nothing of it, and a filter that is linear would believe that it does.
         let [x, y, z] = [g.axes.row(0), g.axes.row(1), g.axes.row(2)];
-        let tilts =
-            [[(TURN + 1, -g.pushed.z), (HEADING, g.pushed.y)], [(TURN, g.pushed.z), (HEADING, -g.pushed.x)]];
+        let tilts = [(TURN + 1, -g.pushed.z), (TURN, g.pushed.z)];
         for (axis, (tilt, row)) in tilts.into_iter().zip([x, y]).enumerate() {
             let felt = (0..3).map(|column| (FORCE + column, row[column]));
-            self.error_state.add_all(DRIFT + axis, tilt.into_iter().chain(felt));
+            let shocked = (g.shocked[axis] != 0.0).then_some((SHOCK, -g.shocked[axis]));
+            self.error_state.add_all(DRIFT + axis, std::iter::once(tilt).chain(felt).chain(shocked));
         }
         for (axis, row) in [x, y, z].into_iter().enumerate() {
             let bias = (0..3).map(|column| (BIAS + column, -row[column]));
@@ -275,13 +299,14 @@ impl Filter {
     /// What chance adds while it is pushed by `pushed` m/s.
     fn walk(&mut self, g: &Gathered, pushed: f64) {
         let shares =
-            (TURN_SHARE * g.turned.length()).powi(2) + (PUSH_TURN * pushed).powi(2);
+            (TURN_SHARE * g.turned.length()).powi(2) + (PUSH_TURN * pushed * pushed / g.dt_s).powi(2);
         let turn = self.noise.gyro.powi(2) * g.dt_s + shares;
+        let bias = self.noise.bias_walk.powi(2) * g.dt_s + (BIAS_TURN * g.turned.length()).powi(2) / g.dt_s;
         let velocity = FORCE_NOISE * FORCE_NOISE * g.dt_s + (FORCE_SHARE * pushed).powi(2) + g.unfelt;
         self.error_state.walk_three(TURN, g.missed + DMat3::from_diagonal(DVec3::splat(turn)));
         for axis in 0..3 {
-            if self.error_state.variance(BIAS + axis) < self.noise.bias_at_start(axis).powi(2) {
-                self.error_state.walk(BIAS + axis, self.noise.bias_walk.powi(2) * g.dt_s);
+            if self.error_state.variance(BIAS + axis) < self.noise.bias[axis].powi(2) {
+                self.error_state.walk(BIAS + axis, bias);
             }
         }
         for axis in 0..2 {
@@ -291,13 +316,15 @@ impl Filter {
 
     /// Whether it is time for [`Self::hold`].
     pub(super) fn is_due(&self) -> bool {
-        self.since_s >= HOLD_S
+        self.since_s >= if self.returns_s > 0.0 { SHOCKS_MOST_S } else { HOLD_S }
     }
 
     /// Holds the velocity that is integrated from specific force against how what carries the unit moves, and the orientation against plain
     /// VQF's direction of up (unit vector in the unit's axes).
     pub(super) fn hold(&mut self, world_from_imu: DQuat, up_imu: DVec3) -> Correction {
         self.predict();
+        // What a camera has said since the last one.
+        self.take_drift();
         let since_s = std::mem::take(&mut self.since_s);
         let change = std::mem::take(&mut self.change);
         let apart = (world_from_imu * up_imu).truncate();
@@ -318,9 +345,8 @@ impl Filter {
         self.carriage.watch(self.velocity, change, since_s);
         let variance = 0.5 * (self.error_state.variance(TURN) + self.error_state.variance(TURN + 1));
         self.shaken_s -= since_s;
-        // Blows tilt the mean force that VQF takes for up.
-        let apart = if self.shaken_s > 0.0 { DVec2::ZERO } else { apart };
-        let holds = self.consistency.holds(outcome.nis, apart, variance, since_s);
+        // Blows tilt the mean force that VQF takes for up, and are no errors of the unit's.
+        let holds = self.shaken_s > 0.0 || self.consistency.holds(outcome.nis, apart, variance, since_s);
         if !holds && self.unseen_s > SEEN_S {
             self.falls = self.falls.saturating_add(1);
             self.fallen_s = FALLEN_S;

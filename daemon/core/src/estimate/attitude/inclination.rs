@@ -30,10 +30,16 @@ struct GatheredMotion {
     dt_s: f64,
 }
 
-/// Its authors' setting, without estimates of the bias: it is given turns that are free of it. Its own would take a gun that creeps on a
-/// calm day for one at rest, and its turn for the bias.
-fn params() -> Params {
+/// Time constant of the specific force's low-pass filter as VQF's authors have it, seconds.
+pub(super) const TAU_PUBLISHED_S: f64 = 3.0;
+/// One that is longer than waves.
+pub(super) const TAU_WAVES_S: f64 = 10.0;
+
+/// Its authors' setting but for the time constant, without estimates of the bias: its own would take a gun that creeps on a calm day for one at
+/// rest, and its turn for the bias.
+fn params(tau_s: f64) -> Params {
     Params {
+        tau_acc: tau_s,
         rest_bias_est_enabled: false,
         motion_bias_est_enabled: false,
         mag_dist_rejection_enabled: false,
@@ -43,9 +49,9 @@ fn params() -> Params {
 
 impl Inclination {
     /// A filter for samples `period_s` apart, begun with the unit as in `world_from_imu`.
-    pub(super) fn new(period_s: f64, world_from_imu: DQuat) -> Self {
+    pub(super) fn new(tau_s: f64, period_s: f64, world_from_imu: DQuat) -> Self {
         let steps = (STEP_S / period_s - SLACK).ceil().max(1.0);
-        let mut vqf = VQF::new(steps * period_s, None, None, Some(params()));
+        let mut vqf = VQF::new(steps * period_s, None, None, Some(params(tau_s)));
         // The filter takes its first sample's direction for up.
         vqf.update_acc((world_from_imu.inverse() * (DVec3::Z * GRAVITY_M_S2)).to_array());
         Self { vqf, gathered: GatheredMotion::default() }

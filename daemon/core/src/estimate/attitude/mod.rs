@@ -182,7 +182,7 @@ impl Attitude {
     /// `None` where that is not known.
     pub fn up_alone(&self, time: Time) -> Option<DVec3> {
         let up_imu = match &self.state {
-            FilterState::Running(running) => running.inclination.up_imu(),
+            FilterState::Running(running) => running.alone.up_imu(),
             FilterState::External(..) => self.own_up,
             FilterState::Levelling { .. } => return None,
         };

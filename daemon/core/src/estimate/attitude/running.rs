@@ -5,7 +5,7 @@ use glam::{DMat3, DQuat, DVec3};
 use super::{
     RateKind, coning,
     filter::{Filter, Noise, SampleMotion},
-    inclination::Inclination,
+    inclination::{Inclination, TAU_PUBLISHED_S, TAU_WAVES_S},
     rest::RestDetector,
     turn_between,
 };
@@ -22,7 +22,7 @@ const APART_S: f64 = 0.1;
 
 /// Specific force that changes by more than this from one sample to the next, m/s^2, is a shock: recoil or a blow. What it changes the velocity
 /// by is not known, as the unit may have clipped it or missed its peak: no velocity is learnt of it, and none is held to have stayed.
-const SHOCK: f64 = 60.0;
+const SHOCK: f64 = 100.0;
 /// After so long it is no shock but what the unit has come to measure, seconds.
 const SHOCK_MOST_S: f64 = 0.05;
 
@@ -35,7 +35,10 @@ const CLIPPED_SHARE: f64 = 0.5;
 /// The filter of a unit's rate and specific force while it runs.
 #[derive(Debug)]
 pub(super) struct RunningFilter {
+    /// Plain VQF in turns that are free of the bias as it is known...
     inclination: Inclination,
+    /// ...and one that knows nothing but the unit's samples.
+    pub(super) alone: Inclination,
     pub(super) filter: Filter,
     pub(super) last: OrientationSample,
     rest: RestDetector,
@@ -60,7 +63,8 @@ impl RunningFilter {
     /// Begun with the unit as in `last`, wrong by `tilt` radians, where it felt `force` (m/s^2), for samples `period_s` apart.
     pub(super) fn new(noise: Noise, tilt: f64, period_s: f64, last: OrientationSample, force: DVec3) -> Self {
         Self {
-            inclination: Inclination::new(period_s, last.world_from_imu),
+            inclination: Inclination::new(TAU_PUBLISHED_S, period_s, last.world_from_imu),
+            alone: Inclination::new(TAU_WAVES_S, period_s, last.world_from_imu),
             filter: Filter::new(noise, tilt),
             last,
             rest: RestDetector::default(),
@@ -111,6 +115,7 @@ impl RunningFilter {
         (self.rate, self.force) = (rate, accel);
         let corrected = self.filter.corrected(turn, dt_s);
         self.inclination.update(corrected, dt_s, accel);
+        self.alone.update(turn, dt_s, accel);
         let from = self.last.world_from_imu;
         let axes = DMat3::from_quat(from * DQuat::from_scaled_axis(corrected * 0.5));
         self.filter.step(&SampleMotion { axes, turn, force, dt_s });
@@ -133,7 +138,8 @@ impl RunningFilter {
             return accel;
         }
         self.shock_s += dt_s;
-        self.filter.shake(change * dt_s);
+        let excess = accel - self.force;
+        self.filter.shake(self.last.world_from_imu * excess * dt_s);
         self.force
     }
 

@@ -376,3 +376,24 @@ fn a_turn_that_no_sample_told_is_found_by_plain_vqf() {
     assert!(fused.falls() >= 1, "{tilt:?}");
     assert!(tilt[0] > 0.4 && tilt[1] < 3.0 * DEG, "{tilt:?}");
 }
+
+#[test]
+fn a_blow_has_two_sides() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let mut worst = 0.0f64;
+    for i in 0..60 * 200 {
+        let (q, s) = carried_sample(f64::from(i) * 0.005);
+        // Struck by 5 ms of 20 g each 0.4 s, and brought back within 150 ms.
+        let blow = match i % 80 {
+            10 => -200.0,
+            11..=40 => 200.0 / 30.0,
+            _ => 0.0,
+        };
+        let s = ImuSample { accel: s.accel + DVec3::X * blow, ..s };
+        let Some(found) = fused.observe(Time::from_ns(i64::from(i) * 5_000_000), &s) else { continue };
+        if i > 30 * 200 {
+            worst = worst.max((found.world_from_imu * (q.inverse() * DVec3::Z)).truncate().length());
+        }
+    }
+    assert!(worst < 1.5 * DEG, "{} deg", worst / DEG);
+}
