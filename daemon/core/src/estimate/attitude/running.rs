@@ -20,8 +20,8 @@ const CHANGES_S: f64 = 2.0;
 /// ...and between samples so far apart: as long as what is missing usually is.
 const APART_S: f64 = 0.1;
 
-/// Specific force that changes by more than this from one sample to the next, m/s^2, is a shock: recoil or a blow. What it changes the velocity
-/// by is not known, as the unit may have clipped it or missed its peak: no velocity is learnt of it, and none is held to have stayed.
+/// Specific force that changes by more than this from one sample to the next, m/s^2, is a shock: recoil or a blow. Hands and waves change it by
+/// less. Units clip a shock or miss its peak, so that the filter estimates what share of it is so ([`Filter::shake`]).
 const SHOCK: f64 = 100.0;
 /// After so long it is no shock but what the unit has come to measure, seconds.
 const SHOCK_MOST_S: f64 = 0.05;
