@@ -13,7 +13,7 @@ use crate::physics::GRAVITY_M_S2;
 
 /// Beside what all have: gyro's bias in the unit's axes (3), error of the velocity that is integrated from specific force (2), place and
 /// velocity as what carries the unit has them (2 each), bias of the specific force in the unit's axes (3), what a turn about each of the
-/// unit's axes is measured too large by about each of them, as a share (9, one column after the other).
+/// unit's axes is measured too large by about each of them, as a share (9, one column after the other), what share of a shock is as it was felt.
 const BIAS: usize = COMMON;
 const DRIFT: usize = BIAS + 3;
 const PLACE: usize = DRIFT + 2;
@@ -43,8 +43,8 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// A unit that nothing is known of: from that of a VN-100, as its data sheet has it, to the worse ones that hobbyists use; mounted within
-    /// a milliradian.
+    /// A unit of the VN-100's class that nothing is known of but its data sheet: bias within 0.1 deg/s, mounted within a milliradian. Worse ones
+    /// are covered by what their bias walks as they turn (`BIAS_TURN`), and by what a rest says of it.
     pub const USUAL: Self = Self {
         gyro: 6.1e-5,
         bias: DVec3::splat(1.7e-3),
