@@ -3,8 +3,8 @@
 
 use bowwave_core::{
     estimate::attitude::{
-        Attitude, AttitudeSettings, HeadingSeen, InclinationSettings, Noise, OWN_GROWTH, REFRACTION_SIGMA,
-        RateKind, Source, UpSeen,
+        Attitude, AttitudeSettings, HeadingSeen, Noise, OWN_GROWTH, REFRACTION_SIGMA, RateKind, Source,
+        UpSeen,
     },
     event::ImuSample,
     geometry::wrapped,
@@ -103,13 +103,8 @@ impl AidedRecording {
 
 /// An estimator as the product has it on the gun, of that orientation.
 pub fn product(source: Source) -> Attitude {
-    let settings = AttitudeSettings {
-        source,
-        rate: RateKind::Instant,
-        inclination: InclinationSettings::GUN,
-        noise: Noise::USUAL,
-        own_growth: OWN_GROWTH,
-    };
+    let settings =
+        AttitudeSettings { source, rate: RateKind::Instant, noise: Noise::USUAL, own_growth: OWN_GROWTH };
     Attitude::new(settings, DVec3::ZERO, CAMERA_FROM_IMU)
 }
 
@@ -120,7 +115,9 @@ impl AidedUnit {
         let mut rng = Pcg64::seed_from_u64(seed + 1000);
         let mut drawn =
             |sigma: DVec3| DVec3::new(gaussian(&mut rng), gaussian(&mut rng), gaussian(&mut rng)) * sigma;
-        let scale = DVec3::splat(noise.scale);
+        // What a turn about each axis is measured too large by about each.
+        let gains =
+            [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * noise.scale + (DVec3::ONE - axis) * noise.skew);
         match self {
             Self::Usual => (UnitErrors::usual(), DVec3::new(7e-4, -6e-4, 5e-4), 0.0),
             Self::Drawn => {
@@ -128,7 +125,7 @@ impl AidedUnit {
                     gyro_noise: noise.gyro,
                     gyro_bias: drawn(noise.bias),
                     gyro_walk: noise.bias_walk,
-                    gyro_matrix: DMat3::from_cols(drawn(scale), drawn(scale), drawn(scale)),
+                    gyro_matrix: DMat3::from_cols(drawn(gains[0]), drawn(gains[1]), drawn(gains[2])),
                     accel_bias: drawn(DVec3::splat(noise.force)),
                     ..UnitErrors::usual()
                 };

@@ -10,6 +10,7 @@
 pub mod aided;
 pub mod alignment;
 pub mod bench;
+mod broad;
 pub mod check;
 pub mod front;
 pub mod horizon;

@@ -49,6 +49,24 @@ pub const SEA_6: ShipSea = ShipSea {
     periods_s: [11.0, 9.0, 11.0],
 };
 
+/// That sea state, 0 to 6: between those above, as the heights of its waves are (WMO code table 3700, middles).
+pub fn sea_state(state: usize) -> ShipSea {
+    const NAMES: [&str; 7] = ["sea 0", "sea 1", "sea 2", "sea 3", "sea 4", "sea 5", "sea 6"];
+    const HEIGHTS_M: [f64; 7] = [0.0, 0.05, 0.3, 0.9, 1.9, 3.2, 5.0];
+    let state = state.min(6);
+    let of = |sea: ShipSea, share: f64| ShipSea {
+        name: NAMES[state],
+        turns_deg: sea.turns_deg.map(|v| v * share),
+        moves_m: sea.moves_m.map(|v| v * share),
+        periods_s: sea.periods_s,
+    };
+    if state > 4 {
+        of(SEA_6, HEIGHTS_M[state] / HEIGHTS_M[6])
+    } else {
+        of(SEA_4, HEIGHTS_M[state] / HEIGHTS_M[4])
+    }
+}
+
 /// A narrow band of waves: sines about a period, with unit deviation.
 #[derive(Clone, Debug)]
 struct WaveBand(Vec<[f64; 3]>);

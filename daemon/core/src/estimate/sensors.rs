@@ -34,6 +34,8 @@ pub struct SensorCounts {
     pub imu_frozen: u64,
     /// Restarts of the unit's clock.
     pub imu_restarts: u32,
+    /// How often orientation erred by more than it said and fell back to plain VQF's inclination, since the unit's start.
+    pub imu_fallbacks: u32,
     /// Pictures taken in.
     pub frames: u64,
     /// Pictures whose time stamp was not after the one before.
@@ -122,6 +124,7 @@ impl Sensors {
         }
         self.registration.sample(time, sample, sample.rate - self.gyro_bias);
         self.attitude.observe(time, sample);
+        self.counts.imu_fallbacks = self.attitude.falls();
     }
 
     /// Takes in what the ship's instruments said.

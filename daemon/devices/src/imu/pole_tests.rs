@@ -2,7 +2,7 @@
 //! angles to where the camera looks.
 
 use bowwave_core::{
-    estimate::attitude::{Attitude, AttitudeSettings, InclinationSettings, Noise, RateKind, Source},
+    estimate::attitude::{Attitude, AttitudeSettings, Noise, RateKind, Source},
     event::ImuSample,
     geometry::look,
     time::Time,
@@ -86,14 +86,7 @@ fn truth(format: ImuFormat, motion: PoleMotion, n: i64) -> ImuSample {
 
 /// Worst errors through a motion, radians: where the camera looks and how its picture is turned, both at samples and halfway between.
 fn worst(format: ImuFormat, motion: PoleMotion, source: Source) -> [f64; 2] {
-    let inclination = InclinationSettings::GUN;
-    let settings = AttitudeSettings {
-        source,
-        rate: RateKind::Instant,
-        inclination,
-        noise: Noise::USUAL,
-        own_growth: 0.0,
-    };
+    let settings = AttitudeSettings { source, rate: RateKind::Instant, noise: Noise::USUAL, own_growth: 0.0 };
     let mut attitude = Attitude::new(settings, DVec3::ZERO, CAMERA_FROM_IMU);
     let mut decoder = ImuDecoder::fixed(format);
     let (mut worst, mut compared, mut heading) = ([0.0f64; 2], 0, None);

@@ -223,6 +223,7 @@ impl Tally {
             ("imu_insane", s.imu_implausible + not_finite),
             ("imu_frozen", s.imu_frozen),
             ("imu_restarts", u64::from(s.imu_restarts)),
+            ("imu_fallbacks", u64::from(s.imu_fallbacks)),
             ("horizons_taken", s.horizons.taken),
             ("horizons_refused", s.horizons.refused),
             ("horizons_none", s.horizons.none),

@@ -163,6 +163,60 @@ fn consistency(bench: &mut PartBench) {
     }
 }
 
+/// Published pulses: peak (g), length (s), whether a half sine (IEC 60068-2-27) or a sawtooth that ends at its peak (MIL-STD-810H, method 516.8).
+const PULSES: [(f64, f64, bool); 4] =
+    [(30.0, 0.018, true), (50.0, 0.011, true), (100.0, 0.006, true), (40.0, 0.011, false)];
+/// A mount brings back in this time what a pulse moved, seconds.
+const RETURN_S: f64 = 0.15;
+
+/// What a burst of two rounds a second, the last three seconds of each thirty, adds along the barrel, m/s^2.
+fn fired((peak_g, lasts_s, sine): (f64, f64, bool), time_s: f64) -> f64 {
+    let since_s = time_s % 0.5;
+    if time_s % 30.0 < 27.0 || since_s > lasts_s + RETURN_S {
+        return 0.0;
+    }
+    let peak = peak_g * GRAVITY_M_S2;
+    let mean = if sine { 2.0 / std::f64::consts::PI } else { 0.5 };
+    match since_s < lasts_s {
+        true if sine => -peak * (std::f64::consts::PI * since_s / lasts_s).sin(),
+        true => -peak * since_s / lasts_s,
+        false => peak * mean * lasts_s / RETURN_S,
+    }
+}
+
+/// Sea 0 to 6 and a gun that fires, with errors drawn from what the filter assumes: how many runs know their error.
+fn fires(bench: &mut PartBench) {
+    let runs = if bench.is_quick() { 14 } else { 200 };
+    for (name, aid) in [("no horizon", None), ("horizon for 10 s of 20", horizon(10.0))] {
+        let run = |seed: u64| {
+            let sea = ship::sea_state((seed % 7) as usize);
+            let mut recording =
+                AidedRecording::new(sea, AidedUnit::Drawn, (aid, Heading::Start), 240.0, seed);
+            let pulse = PULSES[(seed / 7 % 4) as usize];
+            recording.samples.iter_mut().for_each(|s| s.accel.x += fired(pulse, s.time_s));
+            outcome(&recording, &mut product(Source::Fused))
+        };
+        let all: Vec<AidedOutcome> = (0..runs).into_par_iter().map(run).collect();
+        let mean = |run: &AidedOutcome| run.surprises.iter().sum::<f64>() / run.surprises.len() as f64;
+        // Chi squared at 2.5 and at 97.5 % with two degrees of freedom: what is drawn once in a run is in all its squares.
+        let within = |bounds: std::ops::Range<f64>| {
+            100.0 * all.iter().filter(|run| bounds.contains(&mean(run))).count() as f64 / all.len() as f64
+        };
+        let rms = (all.iter().map(|run| run.up_deg[0].powi(2)).sum::<f64>() / all.len() as f64).sqrt();
+        let note = format!(
+            "{} runs: square over variance within 0.05 to 7.38 in {:.1} %, above in {:.1} %; mean {:.2}; worst {:.3} deg",
+            all.len(),
+            within(0.0506..7.378),
+            within(7.378..f64::INFINITY),
+            all.iter().map(mean).sum::<f64>() / all.len() as f64,
+            all.iter().map(|run| run.up_deg[1]).fold(0.0, f64::max)
+        );
+        let tried =
+            ExtremeResult::product("VQF and error-state filter", "errors drawn from its own", rms).note(note);
+        bench.extreme(&format!("sea 0 to 6, the gun fires, {name}"), "deg", vec![tried]);
+    }
+}
+
 fn headings(bench: &mut PartBench) {
     let noise = 0.05f64.to_radians();
     for (case, heading) in [
@@ -308,6 +362,7 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
     half_seen(bench, ship::SEA_6, 10.0);
     half_seen(bench, ship::SEA_6, 60.0);
     consistency(bench);
+    fires(bench);
     headings(bench);
     damaged(bench);
     day(bench);

@@ -180,6 +180,28 @@ impl<const N: usize> ErrorState<N> {
         }
     }
 
+    /// Chance adds that covariance to three states.
+    pub fn walk_three(&mut self, state: usize, added: DMat3) {
+        for column in 0..3 {
+            for row in 0..3 {
+                self.covariance[(state + row, state + column)] += added.col(column)[row];
+            }
+        }
+    }
+
+    /// Error of the state `to` grows by those shares of the errors of other states: `P + e d' + d e' + e e' (s' d)` with `d = P s`.
+    pub fn add_all(&mut self, to: usize, shares: impl Iterator<Item = (usize, f64)> + Clone) {
+        let mut change = SVector::<f64, N>::zeros();
+        for (from, share) in shares.clone() {
+            change.axpy(share, &self.covariance.column(from), 1.0);
+        }
+        let own: f64 = shares.map(|(from, share)| share * change[from]).sum();
+        let mut column = self.covariance.column(to) + change;
+        column[to] += change[to] + own;
+        self.covariance.set_column(to, &column);
+        self.covariance.set_row(to, &column.transpose());
+    }
+
     /// The same for what is known of it, too.
     pub fn carry(&mut self, to: usize, from: usize, share: f64) {
         self.estimate[to] += share * self.estimate[from];
@@ -379,7 +401,7 @@ impl<const N: usize> AidingUpdate for ErrorState<N> {
 }
 
 /// How the horizontal parts of where up is found change with the turn of the world: `up + up x turn`.
-pub(super) fn up_rows<const N: usize>() -> [MeasurementRow<N>; 2] {
+fn up_rows<const N: usize>() -> [MeasurementRow<N>; 2] {
     let mut rows = [MeasurementRow::zeros(); 2];
     rows[0][TURN + 1] = -1.0;
     rows[1][TURN] = 1.0;

@@ -1,11 +1,13 @@
 //! From the inertial unit's samples, and from what else tells which way it looks, to its orientation over time.
 
+mod carriage;
+mod consistency;
 mod error_state;
 mod external_ahrs;
 mod filter;
-mod heave;
 mod inclination;
-mod lag;
+mod rest;
+mod running;
 #[cfg(test)]
 mod tests;
 
@@ -14,39 +16,33 @@ use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use self::{
     error_state::{Against, AidingUpdate},
     external_ahrs::ExternalAhrs,
-    filter::Filter,
-    inclination::Inclination,
+    running::RunningFilter,
 };
 pub use self::{
     error_state::{REFRACTION_SIGMA, UpdateOutcome},
     filter::Noise,
-    inclination::InclinationSettings,
 };
 use crate::{
     calibration::Calibration,
     estimate::pose::{NoPose, OrientationAt, OrientationSample, PoseHistory},
     event::ImuSample,
     geometry::{rotation_vector, wrapped},
+    physics::GRAVITY_M_S2,
     time::Time,
 };
 
 /// A unit without an orientation of its own is levelled by the mean specific force over this long.
 const LEVEL_NS: i64 = 250_000_000;
 
+/// Inclination after levelling a unit that waves move, and at most, radians.
+const START_TILT: f64 = 0.06;
+const START_TILT_MOST: f64 = 0.6;
+
 /// A gap longer than this is not bridged by integrating: the unit is levelled anew.
 const GAP_NS: i64 = 1_000_000_000;
 
 /// Steps of a filter that are shorter or longer than this are no unit's, seconds.
 const PERIODS_S: [f64; 2] = [1e-4, 0.1];
-
-/// The integrated orientation is held against VQF's inclination this often, seconds.
-const INCLINE_S: f64 = 0.25;
-
-/// No gyro's range is smaller, rad/s (30 deg/s).
-const CLIPPED_LEAST: f64 = 0.52;
-
-/// By what share of it a rate that stands at its range may be exceeded (one standard deviation).
-const CLIPPED_SHARE: f64 = 0.5;
 
 /// Whose estimate of the orientation is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,8 +71,6 @@ pub struct AttitudeSettings {
     pub source: Source,
     /// Kind of the unit's rate.
     pub rate: RateKind,
-    /// How inclination is found from specific force.
-    pub inclination: InclinationSettings,
     /// How the unit errs.
     pub noise: Noise,
     /// By how much the deviation of the heading of a unit's own orientation grows, rad/s.
@@ -92,7 +86,6 @@ impl AttitudeSettings {
         Self {
             source,
             rate: RateKind::Instant,
-            inclination: InclinationSettings::GUN,
             own_growth: OWN_GROWTH,
             noise: Noise {
                 bias: calibration.gyro_bias_sigma,
@@ -126,7 +119,7 @@ pub struct HeadingSeen {
 }
 
 /// Orientation by the unit's own estimate, with what is wrong with that estimated from what else is seen; or integrated from its rates, with
-/// what is wrong with that estimated from VQF's inclination, too. Its heading then starts at the unit's own, or else at the camera's
+/// what is wrong with that estimated from specific force, too. Its heading then starts at the unit's own, or else at the camera's
 /// "north", and drifts with what is left of the gyro's bias about the vertical.
 #[derive(Debug)]
 pub struct Attitude {
@@ -142,29 +135,16 @@ pub struct Attitude {
 
 #[derive(Debug)]
 enum FilterState {
-    /// Gathering specific force: since when, the sum and how many.
-    Levelling { since: Option<Time>, sum: DVec3, count: u32 },
+    /// Gathering specific force: since when, the sum, that of the squares and how many.
+    Levelling { since: Option<Time>, sum: DVec3, squares: f64, count: u32 },
     /// Integrating.
     Running(Box<RunningFilter>),
     /// The unit's own orientation is taken; when it last told one.
     External(Box<ExternalAhrs>, Time),
 }
 
-#[derive(Debug)]
-struct RunningFilter {
-    inclination: Inclination,
-    filter: Filter,
-    last: OrientationSample,
-    /// The newest rate less the calibrated bias, and the one before with its distance in time.
-    rate: DVec3,
-    before: Option<(DVec3, i64)>,
-    /// The largest rate so far on each axis.
-    fastest: DVec3,
-    inclined_s: f64,
-}
-
 impl FilterState {
-    const START: Self = Self::Levelling { since: None, sum: DVec3::ZERO, count: 0 };
+    const START: Self = Self::Levelling { since: None, sum: DVec3::ZERO, squares: 0.0, count: 0 };
 }
 
 impl Attitude {
@@ -202,7 +182,7 @@ impl Attitude {
     /// `None` where that is not known.
     pub fn up_alone(&self, time: Time) -> Option<DVec3> {
         let up_imu = match &self.state {
-            FilterState::Running(running) => running.inclination.up_imu(),
+            FilterState::Running(running) => running.alone.up_imu(),
             FilterState::External(..) => self.own_up,
             FilterState::Levelling { .. } => return None,
         };
@@ -261,6 +241,14 @@ impl Attitude {
                 Some(&mut external_ahrs.error_state)
             }
             FilterState::Levelling { .. } => None,
+        }
+    }
+
+    /// How often the filter has erred by more than it said, and has fallen back to plain VQF's inclination.
+    pub const fn falls(&self) -> u32 {
+        match &self.state {
+            FilterState::Running(running) => running.filter.falls(),
+            FilterState::External(..) | FilterState::Levelling { .. } => 0,
         }
     }
 
@@ -446,88 +434,37 @@ impl Attitude {
 
     /// Gathers specific force until it tells which way is up.
     fn level_out(&mut self, time: Time, sample: &ImuSample, rate: DVec3) -> Option<OrientationSample> {
-        let (since, sum, count) = match self.state {
-            FilterState::Levelling { since, sum, count } => (since.unwrap_or(time), sum, count),
-            FilterState::Running(_) | FilterState::External(..) => (time, DVec3::ZERO, 0),
+        let (since, sum, squares, count) = match self.state {
+            FilterState::Levelling { since, sum, squares, count } => {
+                (since.unwrap_or(time), sum, squares, count)
+            }
+            FilterState::Running(_) | FilterState::External(..) => (time, DVec3::ZERO, 0.0, 0),
         };
-        let (sum, count) = (sum + sample.accel, count + 1);
-        self.state = FilterState::Levelling { since: Some(since), sum, count };
+        let (sum, squares, count) = (sum + sample.accel, squares + sample.accel.length_squared(), count + 1);
+        self.state = FilterState::Levelling { since: Some(since), sum, squares, count };
         let span_ns = time.ns_since(since);
         if span_ns < LEVEL_NS {
             return None;
         }
-        let levelled = level(sum / f64::from(count), self.camera_from_imu);
+        let mean = sum / f64::from(count);
+        let levelled = level(mean, self.camera_from_imu);
         let world_from_imu =
             sample.world_from_imu.map_or(levelled, |external_ahrs| headed(levelled, external_ahrs));
         let [shortest, longest] = PERIODS_S;
         let period_s = (span_ns as f64 * 1e-9 / f64::from(count - 1).max(1.0)).clamp(shortest, longest);
         let last = OrientationSample { time, world_from_imu, rate };
-        let running = RunningFilter {
-            inclination: Inclination::new(&self.settings.inclination, period_s, world_from_imu),
-            filter: Filter::new(self.settings.noise, self.settings.inclination),
-            last,
-            rate,
-            before: None,
-            fastest: DVec3::ZERO,
-            inclined_s: 0.0,
-        };
+        let tilt = start_tilt(mean, squares / f64::from(count));
+        let running = RunningFilter::new(self.settings.noise, tilt, period_s, last, sample.accel);
         self.state = FilterState::Running(Box::new(running));
         Some(last)
     }
 }
 
-impl RunningFilter {
-    /// Goes on to a sample; by what the world is to be turned for all that was before.
-    fn step(
-        &mut self,
-        kind: RateKind,
-        (time, dt_ns): (Time, i64),
-        rate: DVec3,
-        accel: DVec3,
-    ) -> Option<DQuat> {
-        let dt_s = dt_ns as f64 * 1e-9;
-        let turn = match kind {
-            RateKind::Mean => rate * dt_s + coning(self.rate, rate, dt_s),
-            RateKind::Instant => {
-                // Times from a shifting clock map differ by microseconds; only about equal steps have a parabola.
-                let even = self.before.filter(|(_, step_ns)| (step_ns - dt_ns).abs() * 5 < dt_ns);
-                turn_between(even.map(|(w, _)| w), self.rate, rate, dt_s)
-            }
-        };
-        if self.is_clipped(rate) {
-            self.filter.miss(rate.length() * CLIPPED_SHARE * dt_s);
-        }
-        self.before = Some((self.rate, dt_ns));
-        self.rate = rate;
-        self.inclination.update(turn, dt_s, accel);
-        let turn = self.filter.corrected(turn, dt_s);
-        let world_from_imu = (self.last.world_from_imu * DQuat::from_scaled_axis(turn)).normalize();
-        self.last = OrientationSample { time, world_from_imu, rate: rate - self.filter.bias() };
-        self.filter.step(world_from_imu, turn, dt_s);
-        self.inclined_s += dt_s;
-        (self.inclined_s >= INCLINE_S).then(|| {
-            let since_s = std::mem::take(&mut self.inclined_s);
-            self.filter.predict();
-            let up_imu = self.inclination.up_imu();
-            let turn = self.filter.incline(world_from_imu, up_imu, since_s);
-            self.turn(turn);
-            turn
-        })
-    }
-
-    /// Whether the gyro stands at its range: on one axis as fast as ever, and exactly as fast as before, which noise would not let it be.
-    fn is_clipped(&mut self, rate: DVec3) -> bool {
-        let size = rate.abs();
-        self.fastest = self.fastest.max(size);
-        let stands = |axis: usize| {
-            size[axis] > CLIPPED_LEAST && size[axis] >= self.fastest[axis] && rate[axis] == self.rate[axis]
-        };
-        stands(0) || stands(1) || stands(2)
-    }
-
-    fn turn(&mut self, turn: DQuat) {
-        self.last.world_from_imu = (turn * self.last.world_from_imu).normalize();
-    }
+/// How wrong an inclination may be that is levelled by this mean of specific force (m/s^2), with that mean square, radians: what moves the unit
+/// shows in how the force changes and in how its size differs from gravity's.
+fn start_tilt(mean: DVec3, square: f64) -> f64 {
+    let moved = (square - mean.length_squared()).max(0.0) + (mean.length() - GRAVITY_M_S2).powi(2);
+    START_TILT.hypot(moved.sqrt() / GRAVITY_M_S2).min(START_TILT_MOST)
 }
 
 /// Turn over the `h` seconds from rate `from` to rate `to`, a scaled axis in the body's frame: the integral of the rate and the

@@ -7,13 +7,7 @@ fn sample(rate: DVec3, accel: DVec3) -> ImuSample {
 }
 
 fn attitude(source: Source, gyro_bias: DVec3) -> Attitude {
-    let settings = AttitudeSettings {
-        source,
-        rate: RateKind::Instant,
-        inclination: InclinationSettings::GUN,
-        noise: Noise::USUAL,
-        own_growth: 0.0,
-    };
+    let settings = AttitudeSettings { source, rate: RateKind::Instant, noise: Noise::USUAL, own_growth: 0.0 };
     Attitude::new(settings, gyro_bias, DQuat::IDENTITY)
 }
 
@@ -324,4 +318,83 @@ fn a_heading_that_is_set_turns_what_is_known_of_up() {
     assert!((estimator.corrected() - 100.0 * DEG).abs() < 0.1 * DEG);
     external_ahrs(&mut estimator, (20.0, 25.0, 99.0), wrong, |_, _, _| ());
     assert!(up(&estimator) < 0.08 * DEG, "{} deg", up(&estimator) / DEG);
+}
+
+/// A unit in a hand: carried to and fro by decimetres, about once a second, while it turns slowly about every axis.
+fn carried(t: f64) -> (DQuat, DVec3) {
+    let place = |t: f64| {
+        DVec3::new((5.1 * t).sin() + (7.3 * t).cos(), (4.3 * t).cos() + (6.7 * t).sin(), (5.9 * t).sin())
+            * 0.1
+    };
+    let h = 1e-3;
+    let acceleration = (place(t + h) - place(t) * 2.0 + place(t - h)) / (h * h);
+    let turned = DQuat::from_rotation_z(0.4 * t) * DQuat::from_rotation_x(0.6 * (0.5 * t).sin());
+    (turned * DQuat::from_rotation_y(0.5 * (0.3 * t).cos()), acceleration)
+}
+
+fn carried_sample(t: f64) -> (DQuat, ImuSample) {
+    let h = 1e-5;
+    let (q, acceleration) = carried(t);
+    let rate = rotation_vector(carried(t - h).0.inverse() * carried(t + h).0) / (2.0 * h);
+    (q, sample(rate, q.inverse() * (acceleration + DVec3::Z * GRAVITY_M_S2)))
+}
+
+#[test]
+fn no_bias_is_invented_of_a_unit_that_is_carried_about() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let (mut worst, mut tilt) = (0.0f64, 0.0f64);
+    for i in 0..120 * 200 {
+        let (q, s) = carried_sample(f64::from(i) * 0.005);
+        let Some(found) = fused.observe(Time::from_ns(i64::from(i) * 5_000_000), &s) else { continue };
+        if i > 40 * 200 {
+            worst = worst.max((s.rate - found.rate).abs().max_element());
+            tilt = tilt.max((found.world_from_imu * (q.inverse() * DVec3::Z)).truncate().length());
+        }
+    }
+    assert!(worst < 0.1 * DEG && tilt < 0.5 * DEG, "{} deg/s {} deg", worst / DEG, tilt / DEG);
+    assert_eq!(fused.falls(), 0);
+}
+
+#[test]
+fn a_turn_that_no_sample_told_is_found_by_plain_vqf() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let wrong = DQuat::from_rotation_x(0.5);
+    let mut tilt = [0.0f64; 2];
+    for i in 0..120 * 200 {
+        let t = f64::from(i) * 0.005;
+        let (q, s) = carried_sample(t);
+        let later = t > 60.0;
+        // From a minute on the unit sits otherwise in the hand, and its gyro says nothing of that.
+        let turn = if later { wrong } else { DQuat::IDENTITY };
+        let s = ImuSample { rate: turn * s.rate, accel: turn * s.accel, ..s };
+        let Some(found) = fused.observe(Time::from_ns(i64::from(i) * 5_000_000), &s) else { continue };
+        let off = (found.world_from_imu * (turn * (q.inverse() * DVec3::Z))).truncate().length();
+        for (worst, from_s) in tilt.iter_mut().zip([60.0, 80.0]) {
+            *worst = if t > from_s { worst.max(off) } else { *worst };
+        }
+    }
+    assert!(fused.falls() >= 1, "{tilt:?}");
+    assert!(tilt[0] > 0.4 && tilt[1] < 3.0 * DEG, "{tilt:?}");
+}
+
+#[test]
+fn a_blow_has_two_sides() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let (mut worst, mut bias) = (0.0f64, 0.0f64);
+    for i in 0..120 * 200 {
+        let (q, s) = carried_sample(f64::from(i) * 0.005);
+        // Struck by 5 ms of 20 g each 0.4 s, and brought back within 150 ms.
+        let blow = match i % 80 {
+            10 => -200.0,
+            11..=40 => 200.0 / 30.0,
+            _ => 0.0,
+        };
+        let s = ImuSample { accel: s.accel + DVec3::X * blow, ..s };
+        let Some(found) = fused.observe(Time::from_ns(i64::from(i) * 5_000_000), &s) else { continue };
+        if i > 30 * 200 {
+            bias = bias.max((s.rate - found.rate).abs().max_element());
+            worst = worst.max((found.world_from_imu * (q.inverse() * DVec3::Z)).truncate().length());
+        }
+    }
+    assert!(worst < 0.7 * DEG && bias < 0.1 * DEG, "{} deg {} deg/s", worst / DEG, bias / DEG);
 }
