@@ -44,6 +44,15 @@ struct BrightnessStep {
     weight: f32,
 }
 
+/// One of the steps that are kept of a column.
+#[derive(Clone, Copy, Debug)]
+struct KeptStep {
+    row: usize,
+    /// Codes, positive where it is brighter below.
+    step: f32,
+    weight: f32,
+}
+
 /// A line that many steps lie on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LineCandidate {
@@ -98,13 +107,14 @@ impl Seeker {
         self.edges.iter_mut().for_each(Vec::clear);
         for column in 0..cells.columns {
             self.respond(cells, column);
-            for (row, step) in self.strongest(cells, rows(column)).into_iter().flatten() {
+            let weight = |row: usize, step: f32| {
+                step.abs().min(STEP_MAX) * quiet(cells, column, row, floor).unwrap_or(0.5)
+            };
+            for KeptStep { row, step, weight } in self.strongest(cells, rows(column), weight).into_iter().flatten() {
                 if hidden.touches(column, row, SCALES[1].0) {
                     continue;
                 }
                 let Some((ray, _)) = rays.at(column, row as f64) else { continue };
-                let quiet = quiet(cells, column, row, floor).unwrap_or(0.5);
-                let weight = step.abs().min(STEP_MAX) * quiet;
                 let place = (ray.truncate() / ray.z.max(1e-3)).as_vec2();
                 self.edges[usize::from(step > 0.0)].push(BrightnessStep { place, weight });
             }
@@ -130,31 +140,38 @@ impl Seeker {
         }
     }
 
-    /// The strongest steps of the column responded to, with their rows.
-    fn strongest(&self, cells: &PictureCells, rows: Range<usize>) -> [Option<(usize, f32)>; PER_COLUMN] {
+    /// The steps of the column responded to that `weigh` (row, step in codes; no more than the step's size) finds to count
+    /// most. Below the horizon waves have larger steps than it, but no sky above them.
+    fn strongest(
+        &self,
+        cells: &PictureCells,
+        rows: Range<usize>,
+        weigh: impl Fn(usize, f32) -> f32,
+    ) -> [Option<KeptStep>; PER_COLUMN] {
         let offset = cells.rows().start;
-        let mut kept: [Option<(usize, f32)>; PER_COLUMN] = [None; PER_COLUMN];
+        let mut kept: [Option<KeptStep>; PER_COLUMN] = [None; PER_COLUMN];
         let from = rows.start.saturating_sub(offset);
         let to = rows.end.saturating_sub(offset).min(self.response.len());
-        let mut weakest = STEP_MIN;
+        let strength = |k: &Option<KeptStep>| k.map_or(0.0, |k| k.weight);
+        let mut weakest = 0.0;
         for (i, around) in self.response.get(from..to).unwrap_or(&[]).windows(3).enumerate() {
             let size = around[1].abs();
-            if size <= weakest || size < around[0].abs() || size < around[2].abs() {
+            if size <= STEP_MIN.max(weakest) || size < around[0].abs() || size < around[2].abs() {
                 continue;
             }
             let row = offset + from + i + 1;
+            let weight = weigh(row, around[1]);
             // A stronger step near by is kept in place of this one, a weaker one makes room for it.
-            let near = kept.iter().position(|k| k.is_some_and(|(r, _)| row.abs_diff(r) < APART));
+            let near = kept.iter().position(|k| k.is_some_and(|k| row.abs_diff(k.row) < APART));
             let place = near.or_else(|| {
-                let strength = |k: &Option<(usize, f32)>| k.map_or(0.0, |(_, s)| s.abs());
                 (0..PER_COLUMN).min_by(|a, b| strength(&kept[*a]).total_cmp(&strength(&kept[*b])))
             });
             if let Some(slot) = place.and_then(|p| kept.get_mut(p))
-                && slot.is_none_or(|(_, s)| s.abs() < size)
+                && strength(slot) < weight
             {
-                *slot = Some((row, around[1]));
+                *slot = Some(KeptStep { row, step: around[1], weight });
             }
-            weakest = kept.iter().map(|k| k.map_or(STEP_MIN, |(_, s)| s.abs())).fold(f32::MAX, f32::min);
+            weakest = kept.iter().map(strength).fold(f32::MAX, f32::min);
         }
         kept
     }
