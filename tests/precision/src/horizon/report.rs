@@ -77,10 +77,14 @@ pub fn described(answer: &HorizonAnswer) -> String {
     let why = answer.as_ref().err().map(|e| format!(" ({e})")).unwrap_or_default();
     let numbers = |q: LineQuality| {
         format!(
-            "score {:.2}, solid {:.2} of {:.2}, step {:.1}, peak {:.1}, texture {:.2}/{:.2}, sharp {:.2}, scatter {:.2}",
+            "score {:.2}, free {:.2} of {:.2}, land {:.2}, past {:.2}, above {:.2}, open {:.2}, step {:.1}, peak {:.1}, texture {:.2}/{:.2}, sharp {:.2}, scatter {:.2}",
             q.score,
             q.solid_share,
             q.visible_share,
+            q.land_share,
+            q.past_share,
+            q.above_share,
+            q.open_share,
             q.contrast,
             q.peak_ratio,
             q.texture,

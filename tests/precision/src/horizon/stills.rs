@@ -2,19 +2,19 @@
 //! taken for one.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs,
     path::{Path, PathBuf},
 };
 
 use anyhow::{Context as _, Result};
-use bowwave_core::estimate::horizon::{HorizonFinder, Prior};
+use bowwave_core::estimate::horizon::{HorizonFinder, NoHorizon, Prior};
 use glam::{DVec2, DVec3};
 
 use super::{
     frames::{self, SeaFrame},
     overlay,
-    report::{HorizonAnswer, described, laid, qualities},
+    report::{HorizonAnswer, described, laid},
     score::{WIDTH, find, miss, predicted},
 };
 use crate::{front::quantile, recorded};
@@ -122,8 +122,17 @@ struct StillAnswer<'a> {
 }
 
 impl StillAnswer<'_> {
+    /// Its score; nothing where it is refused for another reason.
     fn score(&self) -> f64 {
-        qualities(&self.answer).map_or(0.0, |q| q.score)
+        match &self.answer {
+            Ok(found) => found.quality.score,
+            Err(NoHorizon::Unclear(quality)) => quality.score,
+            Err(_) => 0.0,
+        }
+    }
+
+    fn source(&self) -> (&str, bool) {
+        (&self.still.source, self.still.kind == HorizonKind::Shore)
     }
 }
 
@@ -157,7 +166,7 @@ impl StillsStudy {
     }
 }
 
-/// Found, error and shores taken, by kind; those of one source count as one picture where `weigh` says so.
+/// Found, error and shores taken, by kind.
 fn summary(told: &str, answers: &[StillAnswer<'_>]) {
     for kind in [HorizonKind::Free, HorizonKind::Partial, HorizonKind::Shore] {
         for (set, of_stills) in [("stills", true), ("of before", false)] {
@@ -220,7 +229,63 @@ fn with_predictions(stills: &[Still]) -> Result<()> {
     Ok(())
 }
 /// The score's threshold chosen anew without each source in turn, and that source judged by it.
-fn left_out(_answers: &[StillAnswer<'_>]) {}
+fn left_out(answers: &[StillAnswer<'_>]) {
+    let mut per_source: BTreeMap<(&str, bool), f64> = BTreeMap::new();
+    for a in answers {
+        *per_source.entry(a.source()).or_default() += 1.0;
+    }
+    let scored: Vec<ScoredStill<'_>> = answers
+        .iter()
+        .map(|a| ScoredStill { source: a.source(), score: a.score(), weight: 1.0 / per_source[&a.source()] })
+        .collect();
+    let (mut thresholds, mut counts) = (Vec::new(), [[0.0; 2]; 2]);
+    for left in per_source.keys().map(|(source, _)| *source).collect::<BTreeSet<_>>() {
+        let least = threshold(&scored, left);
+        thresholds.push(least);
+        for still in scored.iter().filter(|s| s.source.0 == left) {
+            let [all, found] = &mut counts[usize::from(still.source.1)];
+            *all += 1.0;
+            *found += f64::from(u8::from(still.score >= least));
+        }
+    }
+    let share = |[all, found]: [f64; 2]| 100.0 * found / f64::max(all, 1.0);
+    println!(
+        "threshold chosen without the source it judges ({} sources): {:.2} to {:.2}; found {:.0} % of marked, taken {:.1} % of shores",
+        thresholds.len(),
+        quantile(&thresholds, 0.0),
+        quantile(&thresholds, 1.0),
+        share(counts[0]),
+        share(counts[1])
+    );
+}
+
+/// What the choice of a threshold needs of a still.
+struct ScoredStill<'a> {
+    /// Source, and whether it shows a shore.
+    source: (&'a str, bool),
+    score: f64,
+    /// Pictures of one source weigh as much as one.
+    weight: f64,
+}
+
+/// The threshold that costs least on all sources but `left`; the middle of those that cost the same.
+fn threshold(scored: &[ScoredStill<'_>], left: &str) -> f64 {
+    /// A shore that is taken costs as much as so many horizons that are missed.
+    const SHORE_COST: f64 = 5.0;
+    let cost = |least: f64| {
+        let others = scored.iter().filter(|s| s.source.0 != left);
+        let costs = others.map(|s| match (s.source.1, s.score >= least) {
+            (true, true) => SHORE_COST * s.weight,
+            (false, false) => s.weight,
+            _ => 0.0,
+        });
+        costs.sum::<f64>()
+    };
+    let tried: Vec<(f64, f64)> = (5..200).map(|i| f64::from(i) / 100.0).map(|t| (t, cost(t))).collect();
+    let least = tried.iter().map(|t| t.1).fold(f64::INFINITY, f64::min);
+    let best: Vec<f64> = tried.iter().filter(|t| t.1 < least + 1e-9).map(|t| t.0).collect();
+    best.iter().sum::<f64>() / best.len().max(1) as f64
+}
 
 fn sheets(folder: &Path, answers: &[StillAnswer<'_>]) -> Result<()> {
     fs::create_dir_all(folder).with_context(|| format!("cannot make the folder {}", folder.display()))?;

@@ -98,6 +98,11 @@ impl PictureCells {
         }
     }
 
+    /// Lengths over those in a picture 1280 pixels wide; no more than 1.
+    pub fn scale(&self) -> f64 {
+        (self.size.x / f64::from(WIDTH)).min(1.0)
+    }
+
     /// Rows that were read.
     pub fn rows(&self) -> Range<usize> {
         self.rows.clone()
@@ -120,6 +125,14 @@ impl PictureCells {
         let (sums, i) = (self.column(column), row.checked_sub(self.rows.start)?);
         let (above, at, below) = (*sums.get(i.checked_sub(size)?)?, *sums.get(i)?, *sums.get(i + size)?);
         Some((below - 2 * at + above) as f32 * self.unit / size as f32)
+    }
+
+    /// Mean of `rows`, codes; `None` where not all of them were read.
+    pub fn mean(&self, column: usize, rows: Range<usize>) -> Option<f32> {
+        let sums = self.column(column);
+        let (a, b) = (rows.start.checked_sub(self.rows.start)?, rows.end.checked_sub(self.rows.start)?);
+        let (from, to) = (*sums.get(a)?, *sums.get(b)?);
+        (b > a).then(|| (to - from) as f32 * self.unit / (b - a) as f32)
     }
 
     /// Mean difference of a row from the next over `rows`, codes; `None` where not all of them were read.

@@ -110,7 +110,9 @@ impl Seeker {
             let weight = |row: usize, step: f32| {
                 step.abs().min(STEP_MAX) * quiet(cells, column, row, floor).unwrap_or(0.5)
             };
-            for KeptStep { row, step, weight } in self.strongest(cells, rows(column), weight).into_iter().flatten() {
+            for KeptStep { row, step, weight } in
+                self.strongest(cells, rows(column), weight).into_iter().flatten()
+            {
                 if hidden.touches(column, row, SCALES[1].0) {
                     continue;
                 }

@@ -12,6 +12,7 @@ use super::{
     judge::HorizonJudge,
     mask::{Mask, MaskedRows},
     rays::Rays,
+    steps::StepBlocks,
 };
 use crate::{event::Picture, geometry::horizon_dip};
 
@@ -33,6 +34,7 @@ const SHIFT_SOFT_PX: f64 = 0.8;
 pub struct HorizonFinder {
     cells: PictureCells,
     rays: Rays,
+    steps: StepBlocks,
     hidden: MaskedRows,
     seeker: Seeker,
     fitter: Fitter,
@@ -70,6 +72,7 @@ impl HorizonFinder {
             None => 0..self.cells.height,
         };
         self.cells.fill(picture, rows);
+        self.steps.measure(&self.cells);
         let floor = self.noise_floor();
         let (cells, rays) = (&self.cells, &self.rays);
         let count = self.seeker.collect(cells, rays, &self.hidden, floor, |column| match &gate {
@@ -79,7 +82,7 @@ impl HorizonFinder {
         if count == 0 {
             return Err(NoHorizon::Featureless);
         }
-        let lines: [Option<LineCandidate>; 4] = self.seeker.lines(&self.rays, dip, span(gate.as_ref()));
+        let lines: [Option<LineCandidate>; 6] = self.seeker.lines(&self.rays, dip, span(gate.as_ref()));
         let (fit, quality) = self.best(&lines, dip.sin(), floor).ok_or(NoHorizon::Featureless)?;
         refusal(&quality).map_or(Ok(()), Err)?;
         let up = fit.line.up();
@@ -98,21 +101,27 @@ impl HorizonFinder {
         floor: f32,
     ) -> Option<(HorizonFit, LineQuality)> {
         /// Score from which a line is so clear that no other need be tried.
-        const SCORE_CLEAR: f64 = 1.4;
-        let scene = LineSearch { cells: &self.cells, rays: &self.rays, hidden: &self.hidden, sin_dip, floor };
+        const SCORE_CLEAR: f64 = 1.2;
+        let (cells, rays, steps, hidden) = (&self.cells, &self.rays, &self.steps, &self.hidden);
+        let scene = LineSearch { cells, rays, steps, hidden, sin_dip, floor };
         let mut best: Option<(HorizonFit, LineQuality)> = None;
         for candidate in lines.iter().flatten() {
             let line = HorizonLine { angles: candidate.angles, brighter_below: candidate.brighter_below };
-            let Some(fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)]) else { continue };
+            let Some(fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)], |_| true) else { continue };
             let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
             if best.is_none_or(|(_, b)| b.score < quality.score) {
                 best = Some((fit, quality));
+                self.judge.keep();
             }
             if quality.score >= SCORE_CLEAR && refusal(&quality).is_none() {
                 break;
             }
         }
-        let fit = self.fitter.refine(&scene, best?.0.line, &[(4, 4), (3, 3)])?;
+        let (line, windows) = (best?.0.line, [(4, 4), (3, 3)]);
+        let fit = match self.judge.kept_free() {
+            Some(is_free) => self.fitter.refine(&scene, line, &windows, is_free),
+            None => self.fitter.refine(&scene, line, &windows, |_| true),
+        }?;
         let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
         Some((fit, quality))
     }
@@ -140,7 +149,7 @@ impl HorizonFinder {
 /// Why a line with these qualities is not the horizon; `None` if it is.
 fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
     /// Score from which a line is taken for the horizon.
-    const SCORE_MIN: f64 = 0.7;
+    const SCORE_MIN: f64 = 0.4;
     /// Contrast that a horizon has at least, codes.
     const CONTRAST_MIN: f64 = 2.0;
     /// Sky differs from row to row no more than this many times what noise does, or by this share of the step below it; trees,

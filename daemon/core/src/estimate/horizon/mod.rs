@@ -11,6 +11,7 @@
 
 mod answer;
 mod cells;
+mod columns;
 mod edges;
 mod finder;
 mod fit;
@@ -18,6 +19,7 @@ mod haze;
 mod judge;
 mod mask;
 mod rays;
+mod steps;
 
 pub use answer::{Horizon, HorizonView, LineQuality, NoHorizon, Prior};
 pub use finder::HorizonFinder;

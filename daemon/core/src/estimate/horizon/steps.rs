@@ -1,0 +1,69 @@
+//! The largest steps of brightness down each column, by blocks of rows.
+//!
+//! Whether nothing in a stretch of sky has an edge is asked of each column of each line that is tried; from these it is had by a
+//! few comparisons.
+
+use std::ops::Range;
+
+use super::cells::PictureCells;
+
+/// Rows that steps are taken over.
+pub(super) const STEP: usize = 5;
+
+/// Rows of a block.
+const BLOCK: usize = 8;
+
+/// Smallest and largest step of each block, codes, positive where it is brighter below.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StepBlocks {
+    first_row: usize,
+    blocks: usize,
+    ranges: Vec<(f32, f32)>,
+    /// Size of the largest step from the upper edge down to the end of each block.
+    largest: Vec<f32>,
+}
+
+impl StepBlocks {
+    /// Measures the rows that `cells` have read.
+    pub fn measure(&mut self, cells: &PictureCells) {
+        self.first_row = cells.rows().start + STEP;
+        self.blocks = cells.rows().len().saturating_sub(2 * STEP) / BLOCK;
+        self.ranges.clear();
+        self.largest.clear();
+        if self.blocks == 0 {
+            return;
+        }
+        let gain = cells.unit() / STEP as f32;
+        for column in 0..cells.columns {
+            let sums = cells.column(column);
+            let mut largest = 0.0_f32;
+            let around = sums.iter().zip(&sums[STEP..]).zip(&sums[2 * STEP..]);
+            let mut steps = around.map(|((above, at), below)| below - 2 * at + above);
+            for _ in 0..self.blocks {
+                let (low, high) = steps
+                    .by_ref()
+                    .take(BLOCK)
+                    .fold((i32::MAX, i32::MIN), |(low, high), step| (low.min(step), high.max(step)));
+                let range = (low as f32 * gain, high as f32 * gain);
+                largest = largest.max(range.1).max(-range.0);
+                self.ranges.push(range);
+                self.largest.push(largest);
+            }
+        }
+    }
+
+    /// Smallest and largest step in the blocks that lie within `rows`; `None` where there is none.
+    pub fn within(&self, column: usize, rows: Range<usize>) -> Option<(f32, f32)> {
+        let from = rows.start.saturating_sub(self.first_row).div_ceil(BLOCK);
+        let to = (rows.end.saturating_sub(self.first_row) / BLOCK).min(self.blocks);
+        let blocks = self.ranges.get(column * self.blocks + from..column * self.blocks + to)?;
+        blocks.iter().copied().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// Size of the largest step in the blocks above `row`, codes.
+    pub fn from_top(&self, column: usize, row: usize) -> f32 {
+        let blocks = (row.saturating_sub(self.first_row) / BLOCK).min(self.blocks);
+        let last = blocks.checked_sub(1).map(|block| column * self.blocks + block);
+        last.and_then(|i| self.largest.get(i)).copied().unwrap_or(0.0)
+    }
+}
