@@ -5,16 +5,23 @@ use std::ops::Range;
 use super::{
     cells::PictureCells,
     fit::{EdgePoint, HorizonLine, LineSearch},
-    steps::STEP,
+    judge::STEP,
+    steps::SHARP,
 };
 
 /// Rows above the line that are looked at for an upper edge of land, at a width of 1280.
-const SKY: Range<usize> = 8..80;
+const SKY: Range<usize> = 8..60;
 
 /// A step in them that makes the picture brighter downwards is no sky's from this share of the line's own step...
 const BRIGHTER: f32 = 0.5;
 /// ...and one that makes it darker from this: land is darker than the sky behind it.
 const DARKER: f32 = 0.3;
+
+/// Up to the picture's edge nothing has a step of more than this share of the line's own: so it is open.
+const OPEN: f32 = 0.6;
+
+/// Noise alone makes steps of no more than this many times what it makes neighbouring rows differ.
+const NOISES: f32 = 3.0;
 
 /// Rows by which sky must end off the line to speak against it: swell lifts and lowers the edge.
 const NEAR: usize = 3;
@@ -42,7 +49,7 @@ pub(super) enum Shown {
 #[derive(Clone, Debug, Default)]
 pub(super) struct ColumnViews {
     shown: Vec<Shown>,
-    /// Free columns that have no step as large as the line's own up to the picture's upper edge.
+    /// Free columns that have no step near as large as the line's own up to the picture's upper edge.
     pub open: usize,
     values: Vec<f32>,
 }
@@ -80,8 +87,9 @@ impl ColumnViews {
             *shown = if !is_solid(column) {
                 along.end_of_sky(column, row)
             } else if along.is_sky(column, row) {
-                self.open +=
-                    usize::from(scene.steps.from_top(column, row.saturating_sub(SKY.start)) < along.own);
+                self.open += usize::from(
+                    scene.steps.from_top(column, row.saturating_sub(SKY.start)) < OPEN * along.own,
+                );
                 Shown::Free
             } else {
                 Shown::Land
@@ -110,9 +118,10 @@ impl Along<'_> {
         (self.scale * rows as f64).round() as usize
     }
 
-    /// Whether steps from `low` to `high`, codes, over `even` ones of a sky that brightens evenly, are none of land.
+    /// Whether steps from `low` to `high`, codes, are none of land, where the sky brightens by `even` codes a row.
     fn is_calm(&self, (low, high): (f32, f32), even: f32) -> bool {
-        low - even > -DARKER * self.own && high - even < BRIGHTER * self.own
+        let (noise, even) = (NOISES * self.scene.floor, even * SHARP as f32);
+        low - even > -(DARKER * self.own).max(noise) && high - even < (BRIGHTER * self.own).max(noise)
     }
 
     /// Whether nothing above the line has an edge as land has.
@@ -123,11 +132,11 @@ impl Along<'_> {
         self.scene.steps.within(column, sky).is_none_or(|range| self.is_calm(range, even))
     }
 
-    /// The step that even brightening over `rows` has everywhere, codes.
+    /// Even brightening over `rows`, codes a row.
     fn even(&self, column: usize, rows: Range<usize>) -> f32 {
         let value = |row: usize| self.scene.cells.mean(column, row..row + 2);
         let rise = value(rows.end).zip(value(rows.start)).map_or(0.0, |(below, above)| below - above);
-        rise * STEP as f32 / rows.len().max(1) as f32
+        rise / rows.len().max(1) as f32
     }
 
     /// Where sky ends in a column that has no edge on the line.
@@ -139,7 +148,7 @@ impl Along<'_> {
         if self.scene.steps.within(column, sky).is_some_and(|range| !self.is_calm(range, even)) {
             return Shown::Else;
         }
-        let (even, most) = (self.line.signed(even), BRIGHTER * self.own);
+        let (even, most) = (self.line.signed(even) * self.size as f32, BRIGHTER * self.own);
         let mut steps = (from..to).map(|row| (row, self.step(column, row).unwrap_or(0.0) - even));
         let Some((mut end, mut size)) = steps.find(|(_, step)| step.abs() > most) else { return Shown::Else };
         for (row, step) in steps {

@@ -89,7 +89,7 @@ impl HorizonFinder {
         if gate.is_some_and(|g| g.up.angle_between(up) > 1.5 * g.half) {
             return Err(NoHorizon::Elsewhere(quality));
         }
-        let covariance = fit.covariance + unseen(&quality, self.rays.focal, self.cells.size.x);
+        let covariance = fit.covariance + unseen(&quality, dip, self.rays.focal, self.cells.size.x);
         Ok(Horizon { up, covariance, quality })
     }
 
@@ -150,6 +150,8 @@ impl HorizonFinder {
 fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
     /// Score from which a line is taken for the horizon.
     const SCORE_MIN: f64 = 0.4;
+    /// Share of the picture's width that shows it free at least: shorter edges are straight by chance.
+    const FREE_MIN: f64 = 0.12;
     /// Contrast that a horizon has at least, codes.
     const CONTRAST_MIN: f64 = 2.0;
     /// Sky differs from row to row no more than this many times what noise does, or by this share of the step below it; trees,
@@ -157,7 +159,8 @@ fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
     const TEXTURE_MAX: (f64, f64) = (2.0, 0.1);
     let (noises, steps) = TEXTURE_MAX;
     let texture_max = (noises * quality.noise).max(steps * quality.contrast);
-    if quality.score < SCORE_MIN || quality.contrast < CONTRAST_MIN {
+    let free = quality.solid_share * quality.visible_share;
+    if quality.score < SCORE_MIN || free < FREE_MIN || quality.contrast < CONTRAST_MIN {
         Some(NoHorizon::Unclear(*quality))
     } else if quality.sharpness < SHARPNESS_MIN {
         Some(NoHorizon::Blurred(*quality))
@@ -169,14 +172,17 @@ fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
 }
 
 /// Covariance of what the scatter of the columns does not show: haze and swell move all of an edge, and the more the softer
-/// it is.
-fn unseen(quality: &LineQuality, focal_px: f64, width_px: f64) -> DMat2 {
+/// it is; and where land stands behind part of the line, the water may end before it does at the horizon: from an eye at
+/// height h, a shore at a quarter of the horizon's distance lies lower by its dip (h / d + d / 2 R, less the square root of
+/// 2 h / R).
+fn unseen(quality: &LineQuality, dip: f64, focal_px: f64, width_px: f64) -> DMat2 {
     /// Standard deviation by which the line's ends are moved against each other.
     const TURN_PX: f64 = 0.05;
     let softness = (1.0 / quality.sharpness.clamp(SHARPNESS_MIN, 1.0) - 1.0).max(0.0);
     let shift = (SHIFT_PX + SHIFT_SOFT_PX * softness) / focal_px;
     let turn = TURN_PX * 2.0 / (quality.visible_share * width_px).max(1.0);
-    DMat2::from_diagonal(DVec2::new(turn * turn, shift * shift))
+    let shore = quality.land_share * dip;
+    DMat2::from_diagonal(DVec2::new(turn * turn, shift * shift + shore * shore))
 }
 
 /// Where a prediction lets the horizon be.

@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use super::cells::PictureCells;
 
-/// Rows that steps are taken over.
-pub(super) const STEP: usize = 5;
+/// Rows that steps are taken over: land's upper edge is sharp, clouds are soft.
+pub(super) const SHARP: usize = 3;
 
 /// Rows of a block.
 const BLOCK: usize = 8;
@@ -26,24 +26,19 @@ pub(super) struct StepBlocks {
 impl StepBlocks {
     /// Measures the rows that `cells` have read.
     pub fn measure(&mut self, cells: &PictureCells) {
-        self.first_row = cells.rows().start + STEP;
-        self.blocks = cells.rows().len().saturating_sub(2 * STEP) / BLOCK;
+        self.first_row = cells.rows().start + SHARP;
+        self.blocks = cells.rows().len().saturating_sub(2 * SHARP) / BLOCK;
         self.ranges.clear();
         self.largest.clear();
         if self.blocks == 0 {
             return;
         }
-        let gain = cells.unit() / STEP as f32;
+        let gain = cells.unit() / SHARP as f32;
         for column in 0..cells.columns {
             let sums = cells.column(column);
             let mut largest = 0.0_f32;
-            let around = sums.iter().zip(&sums[STEP..]).zip(&sums[2 * STEP..]);
-            let mut steps = around.map(|((above, at), below)| below - 2 * at + above);
-            for _ in 0..self.blocks {
-                let (low, high) = steps
-                    .by_ref()
-                    .take(BLOCK)
-                    .fold((i32::MAX, i32::MIN), |(low, high), step| (low.min(step), high.max(step)));
+            for from in (0..self.blocks).map(|block| block * BLOCK) {
+                let (low, high) = range(sums, from).unwrap_or_default();
                 let range = (low as f32 * gain, high as f32 * gain);
                 largest = largest.max(range.1).max(-range.0);
                 self.ranges.push(range);
@@ -66,4 +61,19 @@ impl StepBlocks {
         let last = blocks.checked_sub(1).map(|block| column * self.blocks + block);
         last.and_then(|i| self.largest.get(i)).copied().unwrap_or(0.0)
     }
+}
+
+/// Smallest and largest second difference of the running sums over a block of rows, the first between `from` and twice
+/// [`SHARP`] further; the whole block at once, as processors like it.
+fn range(sums: &[i32], from: usize) -> Option<(i32, i32)> {
+    let block = |from: usize| sums.get(from..)?.first_chunk::<BLOCK>();
+    let (above, at, below) = (block(from)?, block(from + SHARP)?, block(from + 2 * SHARP)?);
+    let steps: [i32; BLOCK] =
+        std::array::from_fn(|i| below[i].wrapping_sub(at[i].wrapping_mul(2)).wrapping_add(above[i]));
+    let (mut low, mut high) = (i32::MAX, i32::MIN);
+    for step in steps {
+        low = low.min(step);
+        high = high.max(step);
+    }
+    Some((low, high))
 }
