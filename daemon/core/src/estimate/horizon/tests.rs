@@ -214,7 +214,7 @@ fn the_free_part_of_a_horizon_tells_it() {
 #[test]
 fn a_water_line_below_land_is_no_horizon() {
     let up = up_of(0.02, 0.0);
-    let hills = |x: usize| 25.0 + 8.0 * (x as f64 / 90.0).sin();
+    let hills = |x: usize| 18.0 + 5.0 * (x as f64 / 90.0).sin();
     // Smooth dark hills over water that mirrors the bright sky, and hazy ones over dark water.
     let land = |land: f64, water: f64| {
         move |over: f64, i: usize| {
