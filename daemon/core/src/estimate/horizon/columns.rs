@@ -88,7 +88,7 @@ impl ColumnViews {
                 along.end_of_sky(column, row)
             } else if along.is_sky(column, row) {
                 self.open += usize::from(
-                    scene.steps.from_top(column, row.saturating_sub(SKY.start)) < OPEN * along.own,
+                    scene.steps.largest_above(column, row.saturating_sub(SKY.start)) < OPEN * along.own,
                 );
                 Shown::Free
             } else {

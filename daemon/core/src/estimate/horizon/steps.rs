@@ -56,7 +56,7 @@ impl StepBlocks {
     }
 
     /// Size of the largest step in the blocks above `row`, codes.
-    pub fn from_top(&self, column: usize, row: usize) -> f32 {
+    pub fn largest_above(&self, column: usize, row: usize) -> f32 {
         let blocks = (row.saturating_sub(self.first_row) / BLOCK).min(self.blocks);
         let last = blocks.checked_sub(1).map(|block| column * self.blocks + block);
         last.and_then(|i| self.largest.get(i)).copied().unwrap_or(0.0)
