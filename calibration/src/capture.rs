@@ -16,8 +16,10 @@ use bowwave_core::{
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
-    alignment::{self, Alignment, AlignmentError, Comparison, ImuReading, Known, Observation, Options},
-    lens::Corner,
+    alignment::{
+        self, Alignment, AlignmentError, BySight, Compared, Comparison, ImuReading, Observation, Options,
+    },
+    lens::{self, BoardView, Corner},
     rolling_shutter::{RollingMeasurements, RollingShutter},
 };
 
@@ -335,9 +337,14 @@ impl Capture {
 
     /// The observations that tell most: of a board alone where it was seen often, because horizons share the error of refraction.
     fn best(&self, all: &[Observation]) -> Vec<Observation> {
+        self.best_numbers(all).into_iter().map(|i| all[i]).collect()
+    }
+
+    /// Their numbers.
+    fn best_numbers(&self, all: &[Observation]) -> Vec<usize> {
         let enough = !self.is_by_horizon();
-        let wanted = |o: &&Observation| !enough || matches!(o, Observation::Orientation { .. });
-        all.iter().filter(wanted).copied().collect()
+        let wanted = |i: &usize| !enough || matches!(all[*i], Observation::Orientation { .. });
+        (0..all.len()).filter(wanted).collect()
     }
 
     /// Finds rotation, time offset and bias: from the board where there is one, with the help of the horizon where the movement alone does
@@ -395,15 +402,31 @@ impl Capture {
     /// # Errors
     /// As [`alignment::compare`].
     pub fn compare(&self, calibration: &Calibration) -> Result<Comparison, AlignmentError> {
-        let known = Known::of(calibration);
-        let straight = match self.readout {
-            Readout::Known(seconds) if seconds != 0.0 => {
-                let rows = self.rows_by(known.camera_from_imu, known.offset_s, known.gyro_bias);
-                rows.straightened(seconds)
-            }
-            _ => self.observations.clone(),
+        /// Boards that the lens is told by: enough for hundredths of a pixel.
+        const BOARDS: usize = 60;
+        let readout_s = calibration.readout_ns as f64 * 1e-9;
+        let offset_s = calibration.time_offset_ns as f64 * 1e-9;
+        let rows = self.rows_by(calibration.camera_from_imu, offset_s, calibration.gyro_bias);
+        let all = if readout_s == 0.0 { self.observations.clone() } else { rows.straightened(readout_s) };
+        let seen = Compared { readings: &self.readings, observations: &all, sight: &[], lens: None };
+        let ups = (self.counts.horizons > 0)
+            .then(|| alignment::expected_ups(&seen, calibration, &self.options()))
+            .flatten()
+            .unwrap_or_default();
+        let sight = rows.by_sight(readout_s, &ups);
+        let boards = rows.straight_boards(readout_s);
+        let few: Vec<BoardView> =
+            boards.iter().step_by(boards.len().div_ceil(BOARDS).max(1)).cloned().collect();
+        let best = self.best_numbers(&all);
+        let (observations, sight): (Vec<Observation>, Vec<BySight>) =
+            best.into_iter().filter_map(|i| Some((*all.get(i)?, (*sight.get(i)?)?))).unzip();
+        let compared = Compared {
+            readings: &self.readings,
+            observations: &observations,
+            sight: &sight,
+            lens: lens::evidence(&few, &self.lens),
         };
-        alignment::compare(&self.readings, &self.best(&straight), &known, &self.options())
+        alignment::compare(&compared, calibration, &self.options())
     }
 }
 

@@ -34,10 +34,11 @@ pub mod capture;
 mod file;
 pub mod report;
 mod rolling_shutter;
+mod sight;
 pub mod simulated;
 mod solve;
 pub mod target;
 pub mod wizard;
 
-pub use file::{CalibrationError, CalibrationFile, Date, Provenance, history, parse, to_toml};
+pub use file::{CalibrationError, CalibrationFile, Date, Provenance, SIMULATED, history, parse, to_toml};
 pub use solve::{alignment, boresight, lens, trigger};

@@ -10,9 +10,10 @@ use bowwave_core::{geometry::Lens, time::Time};
 use glam::{DQuat, DVec3};
 
 use crate::{
-    alignment::{ImuReading, Observation},
+    alignment::{BySight, ImuReading, Observation},
     capture::row,
-    lens::Corner,
+    lens::{BoardPose, BoardView, Corner},
+    sight::{ChangedLenses, of_board},
     solve::so3::exp,
     target::{OFF_MOST_PX, Oriented, SHEARED_MOST_PX, orient},
 };
@@ -54,6 +55,17 @@ impl Turning {
     fn until(&self, seconds: f64) -> DQuat {
         exp((self.rate + self.spin * (0.5 * seconds)) * seconds)
     }
+}
+
+/// A board as if its picture had been read at once.
+struct FlatBoard {
+    /// Of the observation.
+    number: usize,
+    corners: Vec<Corner>,
+    pose: BoardPose,
+    /// How fast the camera turned, its own axes, rad/s, and how fast the board moved past beside that, m/s.
+    rate: DVec3,
+    past: DVec3,
 }
 
 /// Corrected boards by number and round.
@@ -161,6 +173,19 @@ impl<'a> RollingShutter<'a> {
         let mut place = |i: usize| Some((stamp(i)?, self.board(i, readout_s, before, made)?.pose.place));
         let around = [i.checked_sub(1).and_then(&mut place), place(i + 1)];
         let past = past(turning.rate, pose.place, stamp(i)?, around);
+        let straight = self.straight(corners, readout_s, &pose, &turning, past);
+        orient(&self.seen.lens, &straight, SHEARED_MOST_PX)
+    }
+
+    /// Corners where a picture read at once would show them.
+    fn straight(
+        &self,
+        corners: &[Corner],
+        readout_s: f64,
+        pose: &BoardPose,
+        turning: &Turning,
+        past: DVec3,
+    ) -> Vec<Corner> {
         let still = self.seen.lens;
         let straight = |corner: &Corner| {
             let far = (pose.camera_from_board * corner.board.extend(0.0) + pose.place).length();
@@ -168,8 +193,58 @@ impl<'a> RollingShutter<'a> {
             let at = turning.until(late_s) * still.unproject(corner.pixel) * far - past * late_s;
             Some(Corner { pixel: still.project(at)?, ..*corner })
         };
-        let straight: Vec<Corner> = corners.iter().filter_map(straight).collect();
-        orient(&still, &straight, SHEARED_MOST_PX)
+        corners.iter().filter_map(straight).collect()
+    }
+
+    /// How each observation turns with the lens, the read-out and the dip; `None` where that cannot be told, or where a board was sheared by so
+    /// much that it cannot be put straight to the last tenth of a pixel.
+    /// `ups` are where up is expected.
+    pub(crate) fn by_sight(&self, readout_s: f64, ups: &[Option<DVec3>]) -> Vec<Option<BySight>> {
+        let lenses = ChangedLenses::of(&self.seen.lens);
+        let of_horizon = |(i, observation): (usize, &Observation)| {
+            let Observation::Up { stamp, up_in_camera, .. } = *observation else { return None };
+            let up = ups.get(i).copied().flatten().unwrap_or(up_in_camera).try_normalize()?;
+            let turning = self.turning(stamp, readout_s);
+            let turned = |row: f64, s: f64| turning.as_ref().map_or(DQuat::IDENTITY, |t| t.until(row * s));
+            lenses.of_horizon(up, self.seen.dip, readout_s, turned)
+        };
+        let mut out: Vec<Option<BySight>> =
+            self.seen.observations.iter().enumerate().map(of_horizon).collect();
+        for FlatBoard { number, corners, pose, rate, past } in self.flat_boards(readout_s) {
+            if let Some(by) = out.get_mut(number) {
+                *by = of_board(&self.seen.lens, &corners, &pose, rate, past);
+            }
+        }
+        out
+    }
+
+    /// Corners of every board as if each picture had been read at once, for the solver of the lens.
+    pub(crate) fn straight_boards(&self, readout_s: f64) -> Vec<BoardView> {
+        let view = |board: FlatBoard| BoardView { corners: board.corners };
+        self.flat_boards(readout_s).into_iter().map(view).collect()
+    }
+
+    fn flat_boards(&self, readout_s: f64) -> Vec<FlatBoard> {
+        /// Corners of the picture's edge that move by more than this while it is read cannot be put straight to tenths of a pixel, pixels.
+        const SHEAR_MOST_PX: f64 = 1.0;
+        let shear = |rate: DVec3| 0.5 * rate.length() * readout_s.abs() * self.seen.lens.focal.x;
+        let all = self.boards(readout_s, 1, OFF_MOST_PX);
+        let corners: BTreeMap<usize, &Vec<Corner>> = self.seen.boards.iter().map(|b| (b.0, &b.1)).collect();
+        let stamp = |number: usize| Some(self.seen.observations.get(number)?.stamp());
+        let place = |i: usize| {
+            let (number, found) = all.get(i)?;
+            Some((stamp(*number)?, found.pose.place))
+        };
+        let one = |i: usize| {
+            let (number, Oriented { pose, .. }) = *all.get(i)?;
+            let turning =
+                self.turning(stamp(number)?, readout_s).filter(|t| shear(t.rate) < SHEAR_MOST_PX)?;
+            let around = [i.checked_sub(1).and_then(place), place(i + 1)];
+            let past = past(turning.rate, pose.place, stamp(number)?, around);
+            let corners = self.straight(corners.get(&number)?, readout_s, &pose, &turning, past);
+            Some(FlatBoard { number, corners, pose, rate: turning.rate, past })
+        };
+        (0..all.len()).filter_map(one).collect()
     }
 
     /// The read-out that leaves least of the boards' corners, and its standard deviation, seconds; `None` where it is not to be told from

@@ -252,7 +252,7 @@ fn on_a_terminal_keys_are_single_and_the_terminal_is_left_as_it_was() {
         ("> 2 inertial unit", "4"),
         ("> 4 trigger", "2"),
         ("> 2 inertial unit", "\r"),
-        ("to save;", "\r"),
+        ("to save", "\r"),
         ("Saved;", "q"),
     ]
     .into_iter()

@@ -15,9 +15,12 @@ pub use write::to_toml;
 
 use std::path::Path;
 
-use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, text::toml::bounded_text};
-use bowwave_files::plain_file;
+use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, text::toml::TEXT_BYTES_MAX};
+use bowwave_files::plain_text;
 use glam::DVec2;
+
+/// Source of the calibrations of simulated hardware, which are exact and do not age.
+pub const SIMULATED: &str = "hw-sim";
 
 /// When and how something was measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -107,8 +110,7 @@ impl CalibrationFile {
 
     /// Reads and checks a file.
     pub fn read(path: &Path) -> Result<Self, CalibrationError> {
-        let text = plain_file(path)
-            .and_then(bounded_text)
+        let text = plain_text(path, TEXT_BYTES_MAX)
             .map_err(|source| CalibrationError::Read { path: path.to_owned(), source })?;
         parse(&text, &path.display().to_string())
     }

@@ -197,6 +197,7 @@ mod tests {
             rows: vec![("what".to_owned(), "<img src=x>".to_owned())],
             notes: vec!["<b>note</b>".to_owned()],
             covariance: Some(DMat3::from_diagonal(DVec3::new(1e-6, 4e-6, 0.0))),
+            deviations: Vec::new(),
             residuals,
             picture: (DVec2::new(640.0, 360.0), DVec2::splat(500.0)),
         }

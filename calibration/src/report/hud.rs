@@ -13,7 +13,7 @@ pub(crate) fn guide(
 ) -> Guide {
     let passed = report.verdict == CalibrationVerdict::Pass;
     let says = match (passed, has_ended) {
-        (true, _) => "Press Enter to save; what is replaced is kept",
+        (true, _) => "Press Enter to save",
         (false, false) => "Press Enter to gather more",
         (false, true) => "Record again as the lines say; press Enter to end",
     };

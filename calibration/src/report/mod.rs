@@ -13,7 +13,10 @@ use std::fmt;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use crate::{alignment::Residual, capture::Capture};
+use crate::{
+    alignment::{Deviation, Residual},
+    capture::Capture,
+};
 
 pub(crate) use alignment::Wanting;
 pub use html::html;
@@ -85,6 +88,8 @@ pub struct CalibrationReport {
     pub covariance: Option<DMat3>,
     /// Residual of each observation, in order of time.
     pub residuals: Vec<PlacedResidual>,
+    /// Of a check: each number of the calibration, those that are wrong before the others.
+    pub deviations: Vec<Deviation>,
     /// Size and focal length of the picture, pixels.
     pub picture: (DVec2, DVec2),
 }
@@ -113,6 +118,7 @@ impl CalibrationReport {
             notes: Vec::new(),
             covariance: None,
             residuals: Vec::new(),
+            deviations: Vec::new(),
             picture: (DVec2::ONE, DVec2::ONE),
         }
     }

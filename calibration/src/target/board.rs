@@ -35,11 +35,15 @@ impl BoardFinder {
 
 impl FindBoard for BoardFinder {
     fn find(&mut self, picture: &Picture, lens: &Lens) -> Option<BoardSeen> {
-        let corners = look_for(&self.target, picture, &mut self.grey)?.corners;
-        let Oriented { pose, sigma, .. } = orient(lens, &corners, SHEARED_MOST_PX)?;
-        let pixel = corners.iter().map(|c| c.pixel).sum::<DVec2>() / corners.len() as f64;
-        Some(BoardSeen { board_from_camera: pose.camera_from_board.inverse(), sigma, pixel, corners })
+        seen(lens, look_for(&self.target, picture, &mut self.grey)?.corners)
     }
+}
+
+/// The board whose corners were found in a picture; `None` where they are too few or fit no pose.
+pub fn seen(lens: &Lens, corners: Vec<Corner>) -> Option<BoardSeen> {
+    let Oriented { pose, sigma, .. } = orient(lens, &corners, SHEARED_MOST_PX)?;
+    let pixel = corners.iter().map(|c| c.pixel).sum::<DVec2>() / corners.len() as f64;
+    Some(BoardSeen { board_from_camera: pose.camera_from_board.inverse(), sigma, pixel, corners })
 }
 
 /// The board's corners in a picture; `None` where the picture is too large. `grey` is memory that is used again.

@@ -19,7 +19,7 @@ use std::{fmt, str::FromStr};
 
 use glam::DVec2;
 
-pub use board::{BoardFinder, find_tag, look_for};
+pub use board::{BoardFinder, find_tag, look_for, seen};
 pub(crate) use board::{OFF_MOST_PX, Oriented, SHEARED_MOST_PX, orient};
 pub use corner::Refinement;
 pub use detect::{Tag, detect, detect_by, view};

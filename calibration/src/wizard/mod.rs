@@ -151,6 +151,8 @@ pub struct WizardSetup {
     pub target: Option<Target>,
     /// From the camera to the mark on the board, metres; no boresight without it.
     pub range_m: Option<f64>,
+    /// Whether a file stands where results are written, which is then kept.
+    pub replaces: bool,
 }
 
 impl WizardSetup {
@@ -481,6 +483,7 @@ impl Wizard {
         match saved {
             Ok(calibration) => {
                 self.setup.calibration = *calibration;
+                self.setup.replaces = true;
                 self.done[self.task as usize] = true;
                 self.enter(WizardStep::Saved);
             }

@@ -61,8 +61,13 @@ fn choose(w: &Wizard) -> Guide {
 }
 
 fn result(w: &Wizard) -> Guide {
-    let result =
-        |solved: &Solved| hud::guide(&solved.report, solved.gauges.clone(), w.refused.clone(), w.has_ended);
+    let result = |solved: &Solved| {
+        let mut guide = hud::guide(&solved.report, solved.gauges.clone(), w.refused.clone(), w.has_ended);
+        if guide.passed == Some(true) && w.setup.replaces {
+            guide.says += "; what is replaced is kept";
+        }
+        guide
+    };
     w.solved.as_deref().map(result).unwrap_or_default()
 }
 

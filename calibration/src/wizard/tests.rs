@@ -14,7 +14,13 @@ use crate::{
 
 fn setup() -> WizardSetup {
     let calibration = parse(include_str!("../../examples/mount.toml"), "mount.toml").unwrap().calibration;
-    WizardSetup { calibration, eye_height_m: 10.0, target: Some(Target::A4), range_m: Some(40.0) }
+    WizardSetup {
+        calibration,
+        eye_height_m: 10.0,
+        target: Some(Target::A4),
+        range_m: Some(40.0),
+        replaces: false,
+    }
 }
 
 /// Events of a simulated recording in the order of arrival: with the board or with the horizon.
@@ -107,6 +113,8 @@ fn a_good_movement_ends_in_a_pass_that_is_saved() {
     let guide = wizard.guide();
     assert_eq!((wizard.step(), guide.passed), (WizardStep::Result, Some(true)));
     assert!(guide.lines[0].starts_with("good"), "{guide:?}");
+    // Nothing stood there before.
+    assert_eq!(guide.says, "Press Enter to save");
     let Some(WizardSolution::Alignment(found, how)) = press(&mut wizard, Key::Next) else {
         panic!("{guide:?}")
     };

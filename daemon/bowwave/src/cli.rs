@@ -344,18 +344,14 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn parse_duration(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(s) if s.is_finite() && s > 0.0 && s <= 30.0 * 86_400.0 => Ok(s),
-        _ => Err(format!("'{text}' is no duration: write seconds above 0, at most 2592000")),
-    }
+    let seconds = text.parse().ok().filter(|s| *s > 0.0 && *s <= 30.0 * 86_400.0);
+    seconds.ok_or_else(|| format!("'{text}' is no duration: write seconds above 0, at most 2592000"))
 }
 
 /// Faults need time to come, to be told and to be ridden out.
 fn parse_fault_period(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(s) if (5.0..=86_400.0).contains(&s) => Ok(s),
-        _ => Err(format!("'{text}' is no pause between faults: write seconds, 5 to 86400")),
-    }
+    let seconds = text.parse().ok().filter(|s| (5.0..=86_400.0).contains(s));
+    seconds.ok_or_else(|| format!("'{text}' is no pause between faults: write seconds, 5 to 86400"))
 }
 
 #[cfg(test)]

@@ -22,8 +22,9 @@ const TABLE: &[(&str, &str, Option<usize>)] = &[
     ("range m", "range_m", Some(1)),
     ("miss m", "miss_m", Some(1)),
     ("cause", "cause", None),
-    ("pose age ms", "pose_age_ms", Some(1)),
+    ("pose age ms", POSE_AGE, Some(1)),
 ];
+const POSE_AGE: &str = "pose_age_ms";
 
 /// Prints the rounds.
 pub fn run(arguments: &Hits) -> Result<()> {
@@ -78,6 +79,8 @@ fn table(shots: &[StoredShot]) -> String {
         let cell = |(_, name, digits): &(&str, &str, Option<usize>)| {
             let text = StoredShot::COLUMNS.iter().position(|c| c == name).map_or("", |i| cells[i].as_str());
             match (digits, text.parse::<f64>()) {
+                // A pose between two readings is not old: how far before the newest one it lies is for programs.
+                (Some(digits), Ok(value)) if *name == POSE_AGE => format!("{:.digits$}", value.max(0.0)),
                 (Some(digits), Ok(value)) => format!("{value:.digits$}"),
                 _ => one_line(text),
             }
@@ -106,4 +109,35 @@ fn table(shots: &[StoredShot]) -> String {
         .count();
     text.push_str(&format!("{} rounds, {hits} hits\n", shots.len()));
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::{
+        time::Time,
+        world::score::{NotScored, Outcome, ShotRecord},
+    };
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn no_pose_is_younger_than_nothing() {
+        let shot = |pose_age_ns| StoredShot {
+            run: 1,
+            record: ShotRecord {
+                shot: 1,
+                fired: Time::from_ns(5),
+                muzzle: DVec3::ZERO,
+                bore: DVec3::Y,
+                pose_age_ns,
+                outcome: Outcome::NotScored { cause: NotScored::ImuStale },
+            },
+        };
+        let told = table(&[shot(-5_000_000), shot(1_500_000)]);
+        let ages: Vec<&str> = told.lines().skip(1).take(2).filter_map(|l| l.split("  ").last()).collect();
+        assert_eq!(ages.iter().map(|a| a.trim()).collect::<Vec<_>>(), ["0.0", "1.5"], "{told}");
+        // Programs get the number.
+        assert!(String::from_utf8(csv(&[shot(-5_000_000)]).unwrap()).unwrap().contains(",-5"));
+    }
 }

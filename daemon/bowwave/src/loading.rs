@@ -5,16 +5,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use bowwave_core::{
     model::{Model, ModelId},
-    text::toml::bounded_text,
+    text::toml::TEXT_BYTES_MAX,
     world::scenario::{self, Scenario},
 };
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 use bowwave_models::BoatModels;
 
 /// Text of the scenario that `path` names, a file or a built-in one, and the folder that its models' paths start from.
 pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
     let built_in = || scenario::BUILT_IN.iter().find(|(name, _)| path.as_os_str() == *name);
-    match plain_file(path).and_then(bounded_text) {
+    match plain_text(path, TEXT_BYTES_MAX) {
         Ok(text) => Ok((text, path.parent().unwrap_or(Path::new("")).to_path_buf())),
         Err(e) if e.kind() == std::io::ErrorKind::NotFound && built_in().is_some() => {
             Ok((built_in().map_or_else(String::new, |(_, text)| (*text).to_owned()), PathBuf::new()))

@@ -8,6 +8,7 @@
 
 pub mod calibration;
 pub mod colour;
+pub mod daylight;
 pub mod estimate;
 pub mod event;
 pub mod fault;

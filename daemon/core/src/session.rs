@@ -13,6 +13,7 @@ use crate::{
         Estimator, EstimatorSettings, SeaReport, SensorCounts,
         clock::ClockReport,
         pose::{NoPose, STALE_NS},
+        registration::Misfit,
     },
     event::{Event, Input, Tick, TriggerEdge},
     fault::{Fault, FaultBoard, FaultChange, FirePermission, Severity},
@@ -61,8 +62,7 @@ impl Session {
             heading: &setup.heading,
             own_ship: setup.own_ship.as_ref(),
             eye_height_m: scenario.eye_height_m,
-            visibility_m: scenario.visibility_m,
-            sun_direction: scenario.sun_direction,
+            daylight: scenario.daylight,
             measures_tones: scenario.water.method == ReflectionMethod::Baked,
             wind: scenario.wind.truncate(),
             force: scenario.water.force,
@@ -110,6 +110,11 @@ impl Session {
     /// Standard deviation of the heading since it was set or began, radians; `None` before there is one.
     pub fn heading_sigma(&self) -> Option<f64> {
         self.estimator.heading_sigma()
+    }
+
+    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
+    pub fn unchecked_s(&self, now: Time) -> f64 {
+        self.estimator.unchecked_s(now)
     }
 
     /// The head-up display as it was drawn last.
@@ -182,6 +187,7 @@ impl Session {
         self.found.clear();
         self.notes.clear();
         let picture_is_new = self.estimator.look();
+        self.watch_registration(tick.time);
         let permission = FirePermission::now(&self.faults, self.estimator.trouble(tick.time));
         self.world.arm(permission.fires());
         let video_time = self.estimator.video_time();
@@ -195,6 +201,7 @@ impl Session {
             video_time,
             permission,
             warning: self.faults.active().find(|f| f.severity() == Severity::Warning),
+            unchecked_s: self.estimator.unchecked_s(tick.time),
             cool: !self.faults.is_active(Fault::Thermal),
         };
         let pose_known = self.composer.compose(&moment, &self.estimator, &self.world);
@@ -243,6 +250,27 @@ impl Session {
             (None, true) => FaultChange::cleared(time, Fault::ShipFrozen),
             _ => return,
         };
+        self.find(change);
+    }
+
+    /// Tells that picture and inertial unit disagree, or no longer.
+    fn watch_registration(&mut self, time: Time) {
+        let misfit = self.estimator.misfit();
+        let fault = misfit.map(Misfit::fault);
+        for other in Misfit::FAULTS.into_iter().filter(|f| Some(*f) != fault) {
+            if self.faults.is_active(other) {
+                self.find(FaultChange::cleared(time, other));
+            }
+        }
+        if let Some(misfit) = misfit
+            && !self.faults.is_active(misfit.fault())
+        {
+            self.find(FaultChange::raised(time, misfit.fault(), misfit.to_string()));
+        }
+    }
+
+    /// Takes in a fault that this session has found itself.
+    fn find(&mut self, change: FaultChange) {
         let _ = self.faults.take(&change);
         self.found.push(change);
     }

@@ -1,4 +1,13 @@
-//! Order statistics.
+//! Order statistics and robust weights.
+
+/// Tukey's biweight is 95 % efficient on normal errors where it ends at this many deviations (Holland & Welsch 1977).
+pub const BIWEIGHT_END: f64 = 4.685;
+
+/// Tukey's biweight of an error `off`, where errors have the deviation `scatter`: 1 for none, 0 from [`BIWEIGHT_END`] deviations on.
+pub fn biweight(off: f64, scatter: f64) -> f64 {
+    let share = off / (BIWEIGHT_END * scatter);
+    if share.abs() < 1.0 { (1.0 - share * share).powi(2) } else { 0.0 }
+}
 
 /// The value below which `share` of those that are numbers lie, between neighbours by a line; zero of nothing.
 pub fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
@@ -14,7 +23,13 @@ pub fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::quantile;
+    use super::*;
+
+    #[test]
+    fn a_biweight_falls_to_nothing() {
+        assert_eq!([biweight(0.0, 2.0), biweight(-9.37, 2.0), biweight(1e9, 2.0)], [1.0, 0.0, 0.0]);
+        assert!((biweight(2.3425, 1.0) - 0.5625).abs() < 1e-12);
+    }
 
     #[test]
     fn between_neighbours_by_a_line() {

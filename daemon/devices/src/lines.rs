@@ -1,9 +1,36 @@
 //! Lines of text in the style of NMEA 0183: `$`, an address, fields between commas, `*`, a check sum, the end of the line.
 
-use crate::framing::PacketLook;
+use crate::framing::{Framing, PacketLook};
 
 /// The longest line that is taken: NMEA 0183 allows 82, makers' own lines have up to 200, bytes.
 pub(crate) const LINE_MAX_BYTES: usize = 256;
+
+/// Lines whose address begins alike.
+pub(crate) trait LineFraming {
+    /// What it begins with; empty for any line.
+    const PREFIX: &'static [u8];
+
+    /// The text between `$` and `*` of a line that is intact.
+    fn intact_text(line: &[u8]) -> Option<&str> {
+        checked(line)
+    }
+}
+
+impl<T: LineFraming> Framing for T {
+    type Head = ();
+    const SYNC: u8 = b'$';
+    const MAX_BYTES: usize = LINE_MAX_BYTES;
+    // A '$' within a line ends it, so that no false beginning can swallow one.
+    const WEAK: bool = false;
+
+    fn look(bytes: &[u8]) -> PacketLook<()> {
+        look(bytes, T::PREFIX)
+    }
+
+    fn intact(packet: &[u8]) -> bool {
+        T::intact_text(packet).is_some()
+    }
+}
 
 /// Looks at what a `$` begins; the address behind it begins with `prefix`.
 pub(crate) fn look(bytes: &[u8], prefix: &[u8]) -> PacketLook<()> {

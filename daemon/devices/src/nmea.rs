@@ -11,28 +11,16 @@ use bowwave_core::{event::ShipSample, time::Time};
 
 pub use crate::framing::LineCounters;
 use crate::{
-    framing::{Framing, PacketLook, Scanner},
-    lines::{self, LINE_MAX_BYTES, number},
+    framing::Scanner,
+    lines::{self, LineFraming, number},
 };
 
 /// The framing of any line.
 #[derive(Debug)]
 struct AnyLine;
 
-impl Framing for AnyLine {
-    type Head = ();
-    const SYNC: u8 = b'$';
-    const MAX_BYTES: usize = LINE_MAX_BYTES;
-    // A '$' within a line ends it, so that no false beginning can swallow one.
-    const WEAK: bool = false;
-
-    fn look(bytes: &[u8]) -> PacketLook<()> {
-        lines::look(bytes, b"")
-    }
-
-    fn intact(packet: &[u8]) -> bool {
-        lines::checked(packet).is_some()
-    }
+impl LineFraming for AnyLine {
+    const PREFIX: &'static [u8] = b"";
 }
 
 /// Which line a measurement came in.
@@ -226,6 +214,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::lines::LINE_MAX_BYTES;
 
     fn parse(bytes: &[u8], piece: usize) -> (Vec<ShipAttitude>, LineCounters) {
         let mut parser = ShipParser::new();

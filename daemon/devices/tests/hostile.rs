@@ -101,7 +101,8 @@ fn an_hour_of_hostile_bytes_costs_nothing_but_time() {
     let bytes = env::var("BOWWAVE_HOSTILE_BYTES").ok().and_then(|b| b.parse().ok()).unwrap_or(USUAL);
     let (mut master, slave) = terminal();
     let (reporter, reports) = reporting();
-    let settings = ImuSettings { device: Some(slave), baud: Baud::Fixed(921_600), ..ImuSettings::default() };
+    let line = LineSettings { device: Some(slave), baud: Baud::Fixed(921_600), ..LineSettings::default() };
+    let settings = ImuSettings { line, ..ImuSettings::default() };
     let port = ImuPort::start(settings, reporter).expect("starts");
     // Until the port is open, the terminal would answer.
     let opened = Instant::now() + Duration::from_secs(10);

@@ -4,7 +4,7 @@
 
 use std::{
     fs::{File, OpenOptions},
-    io,
+    io::{self, Read as _},
     os::unix::fs::OpenOptionsExt as _,
     path::Path,
 };
@@ -24,6 +24,20 @@ pub fn plain_file(path: &Path) -> io::Result<File> {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a plain file"));
     }
     Ok(file)
+}
+
+/// The text of a plain file of at most `bytes_max` bytes.
+///
+/// # Errors
+/// Those of [`plain_file`] and of reading; and where it is longer, or no UTF-8.
+pub fn plain_text(path: &Path, bytes_max: usize) -> io::Result<String> {
+    let mut text = String::new();
+    plain_file(path)?.take(bytes_max as u64 + 1).read_to_string(&mut text)?;
+    if text.len() > bytes_max {
+        let why = format!("it is longer than {bytes_max} bytes, the most that are read");
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
+    }
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -48,5 +62,17 @@ mod tests {
         let file = folder.path().join("file");
         std::fs::write(&file, "text").unwrap();
         assert_eq!(io::read_to_string(plain_file(&file).unwrap()).unwrap(), "text");
+    }
+
+    #[test]
+    fn a_text_beyond_its_limit_is_refused_and_one_at_it_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        std::fs::write(&file, "12345").unwrap();
+        assert_eq!(plain_text(&file, 5).unwrap(), "12345");
+        let error = plain_text(&file, 4).unwrap_err();
+        assert!(error.to_string().contains("longer than 4 bytes"), "{error}");
+        std::fs::write(&file, b"\xff").unwrap();
+        assert_eq!(plain_text(&file, 5).unwrap_err().kind(), io::ErrorKind::InvalidData);
     }
 }

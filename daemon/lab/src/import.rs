@@ -21,8 +21,7 @@ pub fn run(arguments: &ImportArgs) -> Result<Outcome> {
         options.calibration = Some(CalibrationFile::read(path)?);
     }
     if let Some(path) = &arguments.scenario {
-        let text = bowwave_files::plain_file(path)
-            .and_then(bowwave_core::text::toml::bounded_text)
+        let text = bowwave_files::plain_text(path, bowwave_core::text::toml::TEXT_BYTES_MAX)
             .with_context(|| format!("cannot read the scenario {}; name an existing file", path.display()))?;
         let scenario = bowwave_core::world::scenario::Scenario::parse(&text, &path.display().to_string())?;
         bowwave::loading::warn_of_former_names(&scenario.warnings);

@@ -289,19 +289,18 @@ fn table(running: &mut [Running]) -> Vec<Line> {
 }
 
 fn text(table: &[Line]) -> String {
-    let mut text = format!(
+    let head = format!(
         "{:21} {:>6} {:>7} {:>7} {:>7} {:>7} {:>6} {:>6} {:>6}  passes, p50 ms; step over\n",
         "scene", "MB", "min ms", "p50 ms", "p99 ms", "cpu ms", "wall", "cpu", "step"
     );
-    for l in table {
+    let line = |l: &Line| {
         let [min, p50, p99] = l.wall_ms;
-        let _ = writeln!(
-            text,
-            "{:21} {:6.1} {min:7.2} {p50:7.2} {p99:7.2} {:7.2} {:6.2} {:6.2} {:+6.2}  {}; {}: {}",
+        format!(
+            "{:21} {:6.1} {min:7.2} {p50:7.2} {p99:7.2} {:7.2} {:6.2} {:6.2} {:+6.2}  {}; {}: {}\n",
             l.scene, l.memory_mb, l.cpu_ms, l.wall_ratio, l.cpu_ratio, l.step, l.passes, l.over, l.why
-        );
-    }
-    text
+        )
+    };
+    head + &table.iter().map(line).collect::<String>()
 }
 
 fn csv_of(table: &[Line]) -> String {
@@ -309,11 +308,9 @@ fn csv_of(table: &[Line]) -> String {
         .to_owned();
     for l in table {
         let [min, p50, p99] = l.wall_ms;
-        let _ = writeln!(
-            text,
-            "\"{}\",{:.2},{min:.3},{p50:.3},{p99:.3},{:.3},{:.3},{:.3},{:.3},\"{}\",\"{}\",\"{}\"",
-            l.scene, l.memory_mb, l.cpu_ms, l.wall_ratio, l.cpu_ratio, l.step, l.over, l.passes, l.why
-        );
+        let numbers = [l.memory_mb, min, p50, p99, l.cpu_ms, l.wall_ratio, l.cpu_ratio, l.step];
+        let numbers = numbers.map(|n| format!("{n:.3}")).join(",");
+        let _ = writeln!(text, "\"{}\",{numbers},\"{}\",\"{}\",\"{}\"", l.scene, l.over, l.passes, l.why);
     }
     text
 }

@@ -29,7 +29,10 @@ use crate::{
             pictures::{PictureCounts, PicturePath, PictureShape},
         },
         wake::WakePass,
-        water::{WaterPass, baked::ReflectPass},
+        water::{
+            WaterPass,
+            baked::{LobeDraws, ReflectPass},
+        },
     },
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
@@ -167,7 +170,7 @@ impl Passes {
         let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
         let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(context, boats.as_ref())).transpose()?;
         let hud = HudPass::new(context)?;
-        let video = VideoPass::new(context, config.picture, &hud.layer_layout)?;
+        let video = VideoPass::new(context, config.picture, &hud.overlay.layout)?;
         Ok(Self { video, meshes, mirror, water, reflect, wake, boats, rounds, hud })
     }
 }
@@ -433,7 +436,7 @@ impl<T> Renderer<T> {
             stamps.around(Span::Hud, || hud.record_layer(to, frame, plan.renewed));
         }
         // No barrier between these three: a driver that runs on the processor sorts one's triangles while it fills another.
-        stamps.around(Span::Video, || video.record(to, target, hud.overlay(), &plan.overlaid, &plan.bare));
+        stamps.around(Span::Video, || video.record(to, target, hud.overlay.set, &plan.overlaid, &plan.bare));
         if let Some(pass) = mirror {
             stamps
                 .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));
@@ -459,11 +462,12 @@ impl<T> Renderer<T> {
         let Some(water) = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty()) else { return };
         let soft = self.passes.mirror.as_ref().filter(|_| how.method == ReflectionMethod::Full);
         let reflect = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty());
-        let (waters, lobes) = (&plan.waters, &plan.lobe_blocks);
+        let waters = &plan.waters;
+        let draws = LobeDraws { frame, boats: waters, lobes: &plan.lobe_blocks };
         let mut steps = Steps::default();
         stamps.around(Span::Soften, || {
             steps.add(soft.and_then(|pass| pass.record_soft(to, &plan.mirror_places)));
-            steps.add(reflect.and_then(|pass| pass.record_bands(to, frame, waters, lobes)));
+            steps.add(reflect.and_then(|pass| pass.record_bands(to, &draws)).into_iter().flatten());
         });
         if !plan.backdrop_regions.is_empty() {
             stamps.around(Span::Backdrop, || {
@@ -478,13 +482,13 @@ impl<T> Renderer<T> {
         stamps.around(Span::Field, || {
             water.record_field(to, frame, how, waters);
             steps.add(water.found(how));
-            steps.add(reflect.and_then(|pass| pass.record_sums(to, waters, lobes)));
+            steps.add(reflect.and_then(|pass| pass.record_sums(to, &draws)).into_iter().flatten());
         });
         steps.record(to);
         let mut steps = Steps::default();
         if let Some(pass) = reflect {
             stamps.around(Span::Layers, || {
-                steps.add(pass.record_layers(to, frame, waters, lobes).into_iter().flatten());
+                steps.add(pass.record_layers(to, &draws).into_iter().flatten());
             });
         }
         steps.record(to);

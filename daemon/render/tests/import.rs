@@ -22,7 +22,7 @@ use bowwave_core::{
     event::{Lent, Picture, PixelFormat},
     frame::scene::Scene,
 };
-use bowwave_render::{DrawRequest, PictureCounts, PicturePath, Renderer};
+use bowwave_render::{Completions, DrawRequest, PictureCounts, PicturePath, Renderer};
 use common::{assert_clean, config, open, submit, testing::empty_scene};
 use rustix::mm::{MapFlags, MprotectFlags, ProtFlags, mmap_anonymous, mprotect, munmap};
 
@@ -138,9 +138,32 @@ fn assert_imports(renderer: &Renderer) {
     );
 }
 
-fn frame(scene: &mut Scene, n: u64) -> &Scene {
-    scene.frame = n;
-    scene
+/// A renderer that draws pictures over an empty scene.
+struct Player {
+    renderer: Renderer,
+    completions: Completions,
+    scene: Scene,
+}
+
+impl Player {
+    fn new(width: u32, height: u32) -> Self {
+        let scene = empty_scene(width, height);
+        let (renderer, completions) = open(&config(&scene), &[]);
+        Self { renderer, completions, scene }
+    }
+
+    /// The pixels of the next frame, over `picture`.
+    fn draw(&mut self, picture: &Picture) -> Vec<u8> {
+        let pixels = submit(&mut self.renderer, &mut self.completions, &self.scene, picture);
+        self.scene.frame += 1;
+        pixels
+    }
+
+    /// How many pictures were copied and imported, with nothing to blame the renderer for.
+    fn counts(&self) -> PictureCounts {
+        assert_clean(&self.renderer);
+        self.renderer.picture_counts()
+    }
 }
 
 #[test]
@@ -151,17 +174,13 @@ fn imported_and_copied_pictures_look_the_same() {
             let driver = Driver::default();
             let bytes = bytes(format, width, height, 7);
             let pages = Pages::new(&bytes, &driver.alive);
-            let mut scene = empty_scene(screen.0, screen.1);
-            let (mut renderer, mut completions) = open(&config(&scene), &[]);
-            let owned = Picture::new(format, width, height, bytes.into()).unwrap();
-            let copied = submit(&mut renderer, &mut completions, frame(&mut scene, 0), &owned);
-            assert_eq!(renderer.picture_path(), PicturePath::Copied);
-            let lent = driver.lend((format, width, height), &pages, 0, true);
-            let imported = submit(&mut renderer, &mut completions, frame(&mut scene, 1), &lent);
-            assert_imports(&renderer);
+            let mut player = Player::new(screen.0, screen.1);
+            let copied = player.draw(&Picture::new(format, width, height, bytes.into()).unwrap());
+            assert_eq!(player.renderer.picture_path(), PicturePath::Copied);
+            let imported = player.draw(&driver.lend((format, width, height), &pages, 0, true));
+            assert_imports(&player.renderer);
             assert!(copied == imported, "{format:?} {width}x{height} on {screen:?} differs");
-            assert_eq!(renderer.picture_counts(), PictureCounts { copied: 1, imported: 1 });
-            assert_clean(&renderer);
+            assert_eq!(player.counts(), PictureCounts { copied: 1, imported: 1 });
         }
     }
 }
@@ -174,20 +193,16 @@ fn memory_that_cannot_be_imported_is_copied() {
     let mut shifted = vec![0; 64];
     shifted.extend(&wanted);
     let (aligned, odd) = (Pages::new(&wanted, &driver.alive), Pages::new(&shifted, &driver.alive));
-    let mut scene = empty_scene(64, 48);
-    let (mut renderer, mut completions) = open(&config(&scene), &[]);
-    let owned = Picture::new(shape.0, shape.1, shape.2, wanted.into()).unwrap();
-    let reference = submit(&mut renderer, &mut completions, frame(&mut scene, 0), &owned);
+    let mut player = Player::new(64, 48);
+    let reference = player.draw(&Picture::new(shape.0, shape.1, shape.2, wanted.into()).unwrap());
     // One that may be unmapped at any time, one that begins within a page.
-    for (n, picture) in
-        [driver.lend(shape, &aligned, 0, false), driver.lend(shape, &odd, 64, true)].into_iter().enumerate()
-    {
-        let pixels = submit(&mut renderer, &mut completions, frame(&mut scene, n as u64 + 1), &picture);
-        assert_eq!(renderer.picture_path(), PicturePath::Copied);
-        assert!(pixels == reference, "picture {n} differs");
+    for (pages, skip, holds) in [(&aligned, 0, false), (&odd, 64, true)] {
+        let pixels = player.draw(&driver.lend(shape, pages, skip, holds));
+        assert_eq!(player.renderer.picture_path(), PicturePath::Copied);
+        assert!(pixels == reference, "the picture {skip} bytes behind a page's begin differs");
     }
     assert_eq!(driver.lent(), 0, "a copied picture goes back at once");
-    assert_clean(&renderer);
+    assert_eq!(player.counts(), PictureCounts { copied: 3, imported: 0 });
 }
 
 #[test]
@@ -201,8 +216,9 @@ fn a_buffer_is_kept_while_a_frame_reads_it_and_no_longer() {
     let pages: Vec<_> = (0..4).map(|i| Pages::new(&bytes(shape.0, 320, 240, i), &driver.alive)).collect();
     let mut before = Vec::new();
     for n in 0..12_u64 {
+        scene.frame = n;
         let picture = driver.lend(shape, &pages[n as usize % 4], 0, true);
-        renderer.submit(DrawRequest::new(frame(&mut scene, n), &picture, true)).unwrap();
+        renderer.submit(DrawRequest::new(&scene, &picture, true)).unwrap();
         drop(picture);
         assert_eq!(driver.lent(), 1, "the frame in flight keeps its picture");
         let done = completions.wait_next(Duration::from_secs(20)).unwrap().unwrap();
@@ -216,7 +232,8 @@ fn a_buffer_is_kept_while_a_frame_reads_it_and_no_longer() {
     assert_eq!(renderer.picture_counts(), PictureCounts { copied: 0, imported: 12 });
     // The same picture once more, without being new.
     let again = driver.lend(shape, &pages[3], 0, true);
-    renderer.submit(DrawRequest::new(frame(&mut scene, 12), &again, false)).unwrap();
+    scene.frame = 12;
+    renderer.submit(DrawRequest::new(&scene, &again, false)).unwrap();
     assert_eq!(completions.wait_next(Duration::from_secs(20)).unwrap().unwrap().rgba()[..4096], before[11]);
     assert_eq!(renderer.picture_counts().imported, 12);
     drop(again);
@@ -224,7 +241,8 @@ fn a_buffer_is_kept_while_a_frame_reads_it_and_no_longer() {
     drop(pages);
     assert_eq!(driver.alive(), 4, "imported pages stay mapped");
     let owned = Picture::black(shape.0, 320, 240).unwrap();
-    submit(&mut renderer, &mut completions, frame(&mut scene, 13), &owned);
+    scene.frame = 13;
+    submit(&mut renderer, &mut completions, &scene, &owned);
     assert_eq!(driver.alive(), 0, "pages that the driver let go of are still imported");
     assert_clean(&renderer);
 }
@@ -233,38 +251,31 @@ fn a_buffer_is_kept_while_a_frame_reads_it_and_no_longer() {
 fn other_memory_at_the_same_address_is_not_mistaken_for_the_old() {
     let shape = (PixelFormat::Yuyv, 320, 240);
     let driver = Driver::default();
-    let mut scene = empty_scene(320, 240);
-    let (mut renderer, mut completions) = open(&config(&scene), &[]);
+    let mut player = Player::new(320, 240);
     for n in 0..20 {
         // Each time mapped anew, often at the address that the former had.
         let bytes = bytes(shape.0, 320, 240, n + 50);
         let pages = Pages::new(&bytes, &driver.alive);
-        let lent = driver.lend(shape, &pages, 0, true);
-        let imported = submit(&mut renderer, &mut completions, frame(&mut scene, 2 * n), &lent);
-        let owned = Picture::new(shape.0, 320, 240, bytes.into()).unwrap();
-        let copied = submit(&mut renderer, &mut completions, frame(&mut scene, 2 * n + 1), &owned);
+        let imported = player.draw(&driver.lend(shape, &pages, 0, true));
+        let copied = player.draw(&Picture::new(shape.0, 320, 240, bytes.into()).unwrap());
         assert!(imported == copied, "picture {n} is an older one");
     }
-    assert_eq!(renderer.picture_counts(), PictureCounts { copied: 20, imported: 20 });
-    assert_clean(&renderer);
+    assert_eq!(player.counts(), PictureCounts { copied: 20, imported: 20 });
 }
 
 #[test]
 fn more_buffers_than_places_are_copied_and_a_renderer_gives_all_back() {
     let shape = (PixelFormat::Yuyv, 64, 48);
     let driver = Driver::default();
-    let mut scene = empty_scene(64, 48);
-    let (mut renderer, mut completions) = open(&config(&scene), &[]);
+    let mut player = Player::new(64, 48);
     let pages: Vec<_> = (0..40).map(|i| Pages::new(&bytes(shape.0, 64, 48, i), &driver.alive)).collect();
-    for (n, pages) in pages.iter().enumerate() {
-        let lent = driver.lend(shape, pages, 0, true);
-        submit(&mut renderer, &mut completions, frame(&mut scene, n as u64), &lent);
+    for pages in &pages {
+        player.draw(&driver.lend(shape, pages, 0, true));
     }
-    let counts = renderer.picture_counts();
+    let counts = player.counts();
     assert!(counts.imported >= 8 && counts.copied > 0 && counts.imported + counts.copied == 40, "{counts:?}");
     drop(pages);
     assert!(driver.alive() > 0);
-    assert_clean(&renderer);
-    drop((renderer, completions));
+    drop(player);
     assert_eq!((driver.lent(), driver.alive()), (0, 0));
 }

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::parse;
 use bowwave_core::{
-    estimate::{HeadingSettings, Landmark, Stow, attitude::Source as OrientationSource},
+    estimate::{HeadingSettings, Landmark, ShipHeadings, Stow, attitude::Source as OrientationSource},
     event::{CameraFrame, Event, Input, PixelFormat},
     model::Model,
     session::{Digest, Session, SessionDigest, Setup},
@@ -172,8 +172,8 @@ fn heading_properties(heading: &HeadingSettings) -> [(&'static str, String); 7] 
     let landmarks: Vec<String> =
         heading.landmarks.iter().map(|l| format!("{},{}", number(l.bearing), number(l.sigma))).collect();
     [
-        ("heading.ship_latency_ns", heading.ship_latency_ns.to_string()),
-        ("heading.ship_sigma", number(heading.ship_sigma)),
+        ("heading.ship_latency_ns", heading.ship.latency_ns.to_string()),
+        ("heading.ship_sigma", number(heading.ship.sigma)),
         ("heading.stow", stow),
         ("heading.landmarks", landmarks.join(";")),
         ("heading.own_growth", optional(heading.own_growth)),
@@ -275,8 +275,10 @@ fn heading_of<'a>(
         Ok(Landmark { bearing: parse(key, parts[0])?, sigma: parse(key, parts[1])? })
     });
     Ok(HeadingSettings {
-        ship_latency_ns: latency.parse().with_context(|| wrong("heading.ship_latency_ns", latency))?,
-        ship_sigma: number("heading.ship_sigma")?,
+        ship: ShipHeadings {
+            latency_ns: latency.parse().with_context(|| wrong("heading.ship_latency_ns", latency))?,
+            sigma: number("heading.ship_sigma")?,
+        },
         stow,
         landmarks: landmarks.collect::<Result<_>>()?,
         own_growth: optional("heading.own_growth", text("heading.own_growth")?)?,
@@ -292,8 +294,7 @@ mod tests {
     #[test]
     fn heading_settings_come_back_to_the_last_bit() {
         let heading = HeadingSettings {
-            ship_latency_ns: -3,
-            ship_sigma: 0.1 + 0.2,
+            ship: ShipHeadings { latency_ns: -3, sigma: 0.1 + 0.2 },
             stow: Some(Stow { from_bow: None, from_north: Some(1.0 / 3.0), sigma: 1e-300 }),
             landmarks: vec![Landmark { bearing: 0.1, sigma: 0.2 }, Landmark { bearing: 6.2, sigma: 1e-3 }],
             own_growth: Some(f64::MIN_POSITIVE),

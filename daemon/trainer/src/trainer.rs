@@ -539,9 +539,9 @@ fn open_presenter(
     faults: &mut Vec<FaultChange>,
 ) -> Result<Presenter> {
     match Presenter::open(session, models, options) {
-        Err(e) if options.gpu.is_some() && is_gun => {
+        Err(e) if options.gpu.device.is_some() && is_gun => {
             faults.push(FaultChange::raised(now(), Fault::Config, format!("{e:#}; another GPU is used")));
-            options.gpu = None;
+            options.gpu.device = None;
             Presenter::open(session, models, options)
         }
         opened => opened,

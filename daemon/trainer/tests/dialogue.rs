@@ -16,7 +16,7 @@ use bowwave_core::{
 };
 use bowwave_trainer::{
     Companion, Ended, Signals, TickClock, Trainer, TrainerOptions,
-    presenter::{OutputOptions, PresenterOptions},
+    presenter::{GpuSettings, OutputOptions, PresenterOptions},
     source::{EventFeed, Source},
     summary::SummaryOptions,
 };
@@ -94,9 +94,8 @@ fn pages_are_drawn_over_pictures_of_any_layout_and_over_none() {
     let options = TrainerOptions {
         setup: setup(),
         presenter: Some(PresenterOptions {
-            gpu: Some("llvmpipe".to_owned()),
+            gpu: GpuSettings { device: Some("llvmpipe".to_owned()), ..GpuSettings::default() },
             output,
-            ..PresenterOptions::default()
         }),
         frames: None,
         plays_to_the_end: false,

@@ -37,7 +37,9 @@ pub use write::{DEVICE_LOOP_KEY, MadeRecording, START, calibration, make};
 pub use crate::ocean::{cloudy::SkyRecipe, spectrum::Swell};
 
 /// Raised whenever the same recipe makes another recording than before, so that kept ones are made anew.
-pub const REVISION: u32 = 1;
+pub const REVISION: u32 = 2;
+/// The day of that revision: year, month, day.
+const REVISED_ON: (u16, u8, u8) = (2026, 11, 26);
 
 /// Why no recording was made.
 #[derive(Debug, thiserror::Error)]

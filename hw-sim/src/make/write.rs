@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
-use bowwave_calibration::{CalibrationFile, Date, to_toml};
+use bowwave_calibration::{CalibrationFile, Date, SIMULATED, to_toml};
 use bowwave_core::{
     calibration::Calibration,
     event::{Mark, TriggerEdge},
@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{
-    MakeError, Recipe,
+    MakeError, REVISED_ON, Recipe,
     imu::{self, draw_latency},
     ship,
     studio::{Studio, StudioShot},
@@ -162,14 +162,15 @@ pub fn calibration(recipe: &Recipe) -> CalibrationFile {
         gyro_bias_sigma: DVec3::splat(recipe.imu.gyro_bias_walk.max(1e-6)),
     };
     let mut file =
-        CalibrationFile::new(epoch(), "hw-sim", "exact, from the recipe of a made recording", numbers);
+        CalibrationFile::new(made_on(), SIMULATED, "exact, from the recipe of a made recording", numbers);
     file.camera_name = "simulated camera".to_owned();
     file.imu_name = "simulated unit, VectorNav axes".to_owned();
     file
 }
 
-/// A made recording has no day of measurement; the epoch says so and keeps equal recipes' files equal.
-#[expect(clippy::expect_used, reason = "the epoch is a day")]
-fn epoch() -> Date {
-    Date::from_unix_seconds(0).expect("a day")
+/// Made recordings are of the day of their maker's revision, which keeps equal recipes' files equal.
+#[expect(clippy::expect_used, reason = "it is a day of the calendar")]
+fn made_on() -> Date {
+    let (year, month, day) = REVISED_ON;
+    Date::new(year, month, day).expect("a day")
 }

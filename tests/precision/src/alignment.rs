@@ -10,7 +10,7 @@ use bowwave_calibration::{
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::{front::quantile, parts::rms, table::TextTable};
+use crate::{check::CheckStudy, front::quantile, parts::rms, table::TextTable};
 
 /// One simulated recording and what became of it.
 #[derive(Clone, Debug)]
@@ -94,7 +94,10 @@ pub fn percentile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
 
 /// Solves simulated recordings and compares errors with the stated uncertainty.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct CalibrationStudy {
+    #[command(subcommand)]
+    other: Option<OtherStudy>,
     /// Recordings of each motion and noise
     #[arg(long, default_value_t = 100)]
     runs: u64,
@@ -106,9 +109,18 @@ pub struct CalibrationStudy {
     only: String,
 }
 
+#[derive(Debug, clap::Subcommand)]
+enum OtherStudy {
+    /// Calibrations with one thing wrong, and sound ones, judged by `calibrate check`
+    Check(CheckStudy),
+}
+
 impl CalibrationStudy {
     /// Prints the table of every series.
     pub fn run(&self) -> Result<()> {
+        if let Some(OtherStudy::Check(study)) = &self.other {
+            return study.run();
+        }
         for (name, motion, degrees, jitter_s) in SERIES {
             if name.contains(&self.only) {
                 print!("{}", summary(name, &series(motion, degrees, jitter_s, self.first, self.runs)));

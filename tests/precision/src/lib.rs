@@ -2,7 +2,7 @@
 //!
 //! A [`parts::NumericalPart`] holds the ways of doing one thing against a truth that shares no code with them: [`mod@bench`] times the ways
 //! of a scene in turns, [`front`] finds those that nothing beats, [`row`] writes the table and [`page`] the page. A study goes into one
-//! part in full and is a command of its own ([`alignment`], [`horizon`], [`karma`], [`photograph`], [`reflection`], [`registration`],
+//! part in full and is a command of its own ([`alignment`], [`check`], [`horizon`], [`karma`], [`photograph`], [`reflection`], [`registration`],
 //! [`sea_video`], [`truth`]). The sea of the truths is `hw_sim::ocean`'s. [`table`] prints all tables.
 
 #![forbid(unsafe_code)]
@@ -10,6 +10,7 @@
 pub mod aided;
 pub mod alignment;
 pub mod bench;
+pub mod check;
 pub mod front;
 pub mod horizon;
 pub mod karma;
@@ -23,6 +24,7 @@ pub mod reflection;
 pub mod registration;
 pub mod row;
 pub mod sea_video;
+pub mod setups;
 pub mod ship;
 pub mod table;
 pub mod target;

@@ -17,6 +17,7 @@ use precision::{
     registration::RegistrationStudy,
     row,
     sea_video::score::SeaVideoStudy,
+    setups::SetUpStudy,
     truth::commands::TruthStudy,
 };
 
@@ -61,6 +62,8 @@ enum PrecisionStudy {
     Reflection(ReflectionStudy),
     /// Registration of whole sessions on simulated recordings with truth
     Registration(RegistrationStudy),
+    /// What a trainer says that is set up wrongly, and how soon
+    SetUps(SetUpStudy),
     /// The sea's state from simulated video: errors by class of clip, and the time of a picture
     #[command(alias = "sea_video")]
     SeaVideo(SeaVideoStudy),
@@ -78,6 +81,7 @@ impl PrecisionStudy {
             Self::Photograph(study) => study.run(),
             Self::Reflection(study) => study.run(),
             Self::Registration(study) => study.run(),
+            Self::SetUps(study) => study.run(),
             Self::SeaVideo(study) => study.run(),
             Self::Truth(study) => study.run(),
         }

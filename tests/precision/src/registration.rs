@@ -146,17 +146,23 @@ pub struct Replayed {
     pub seconds: f64,
 }
 
-/// Replays the recording of `recipe` at `path`.
-pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<RegistrationErrors> {
-    let seconds = how.seconds;
-    let frame_ns = (1e9 / recipe.frame_rate_hz).round() as i64;
+/// The recording at `path`, again and again for so many seconds and one more, and its calibration.
+pub fn looped(path: &Path, seconds: f64) -> Result<(Replay, Calibration)> {
     let options = ReplayOptions {
         duration_ns: Some(bowwave_core::time::secs_to_ns(seconds + 1.0)),
         looped: true,
         ..ReplayOptions::default()
     };
-    let mut replay = Replay::fast(path, &options)?;
-    let own = bowwave_calibration::parse(&replay.properties().calibration_toml, "recording")?.calibration;
+    let replay = Replay::fast(path, &options)?;
+    let file = bowwave_calibration::parse(&replay.properties().calibration_toml, "recording")?;
+    Ok((replay, file.calibration))
+}
+
+/// Replays the recording of `recipe` at `path`.
+pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<RegistrationErrors> {
+    let seconds = how.seconds;
+    let frame_ns = (1e9 / recipe.frame_rate_hz).round() as i64;
+    let (mut replay, own) = looped(path, seconds)?;
     let mut calibration = if how.exact { own } else { wrong_by_one_sigma(own) };
     if how.shutter_unknown {
         calibration.readout_ns = 0;

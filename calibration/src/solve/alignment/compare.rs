@@ -1,67 +1,56 @@
 //! Whether what was found before still fits a recording, also one that does not tell everything.
 
+use std::collections::BTreeMap;
+
 use bowwave_core::{calibration::Calibration, time::Time};
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DVec3};
 use nalgebra::{Matrix3, Matrix4, Vector4};
 
 use super::{
-    Options,
+    BySight, Options,
+    deviation::{Deviation, Evidence, judge},
     error::{AlignmentError, Movement},
-    filter::{ResidualRow, place},
-    fit::{Fitted, fit},
+    filter::{ResidualKind, ResidualRow, UnknownsStep, place, whiten},
+    fit::{Fitted, fit, with_usual_walk},
     input::{ImuReading, LeftOutCounts, Observation},
     moved, problem,
-    problem::{AlignmentProblem, KNOWN_SIGMA, Weights},
-    result::{NoiseFound, Residual, horizons_share, judge, missing, noise_found},
+    problem::{AlignmentProblem, Weights},
+    result::{NoiseFound, Residual, missing, noise_found},
     start,
     start::AlignmentStart,
 };
-use crate::solve::so3::{dmat, dvec, log, matrix};
+use crate::solve::so3::{dmat, dvec, exp, log, vector};
 
-/// Former calibration that a recording is compared with.
+/// What corners of boards tell of the lens: a quadratic form about the lens that was calibrated, over share of the focal length, principal point
+/// right and down in focal lengths, and first coefficient of distortion.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Known {
-    /// Rotation from the unit's axes to the camera's.
-    pub camera_from_imu: DQuat,
-    /// Its standard deviation about each of the camera's axes, radians.
-    pub rotation_sigma: DVec3,
-    /// Add to the camera's stamps to get times of the unit, seconds.
-    pub offset_s: f64,
-    /// Its standard deviation, seconds.
-    pub offset_sigma_s: f64,
-    /// Gyro bias, unit's axes, rad/s.
-    pub gyro_bias: DVec3,
+pub struct LensEvidence {
+    /// Information.
+    pub information: Matrix4<f64>,
+    /// Information times the most likely deviations.
+    pub right: Vector4<f64>,
 }
 
-impl Known {
-    /// What a calibration says.
-    pub fn of(calibration: &Calibration) -> Self {
-        Self {
-            camera_from_imu: calibration.camera_from_imu,
-            rotation_sigma: calibration.camera_from_imu_sigma,
-            offset_s: calibration.time_offset_ns as f64 * 1e-9,
-            offset_sigma_s: calibration.time_offset_sigma_ns as f64 * 1e-9,
-            gyro_bias: calibration.gyro_bias,
-        }
-    }
+/// What is compared with a calibration.
+#[derive(Clone, Copy, Debug)]
+pub struct Compared<'a> {
+    /// The unit's readings.
+    pub readings: &'a [ImuReading],
+    /// What the camera saw, through the calibration's lens and read-out.
+    pub observations: &'a [Observation],
+    /// How each of them turns with lens and read-out; empty where that is not asked.
+    pub sight: &'a [BySight],
+    /// What corners tell of the lens beside.
+    pub lens: Option<LensEvidence>,
 }
 
-/// Comparison of a recording with a former calibration. Differences are recording minus former.
+/// Comparison of a recording with a former calibration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Comparison {
-    /// Rotation vector in the camera's axes, radians: `told = exp(turn) known`. Near zero about an axis of which the recording tells nothing.
-    pub turn: DVec3,
-    /// Covariance of what the recording tells of it, rad^2: about 0.01 where that is nothing. What was known has its own beside it.
+    /// Each number of the calibration, those that are wrong before the others, the most certain first.
+    pub deviations: Vec<Deviation>,
+    /// Covariance of what the recording alone tells of the rotation, camera's axes, rad^2: about 0.01 where that is nothing.
     pub turn_covariance: DMat3,
-    /// Time offset, seconds.
-    pub offset_s: f64,
-    /// Standard deviation of what the recording tells of it.
-    pub offset_sigma_s: f64,
-    /// Gyro bias, unit's axes, rad/s.
-    pub gyro_bias: DVec3,
-    /// Square of rotation and offset, weighed by the covariances of both sides: chi-squared with four degrees of freedom where nothing has
-    /// changed.
-    pub surprise: f64,
     /// The movement that would tell most of what the recording does not.
     pub missing: Movement,
     /// Noises as found.
@@ -72,118 +61,144 @@ pub struct Comparison {
     pub left_out: LeftOutCounts,
 }
 
-impl Comparison {
-    /// Standard deviation about each of the camera's axes of what the recording tells, radians.
-    pub fn turn_sigma(&self) -> DVec3 {
-        let c = self.turn_covariance;
-        DVec3::new(c.x_axis.x, c.y_axis.y, c.z_axis.z).max(DVec3::ZERO).map(f64::sqrt)
-    }
-}
-
-/// Extrinsics by the recording alone or, where that does not determine all, with the former ones as a weak prior.
-struct ToldExtrinsics {
-    camera_from_imu: DQuat,
-    rotation: Matrix3<f64>,
-    offset: (f64, f64),
-    bias: DVec3,
-    noise: NoiseFound,
-    missing: Movement,
-}
-
-/// Holds `known` against a recording. Unlike [`super::solve`] it takes any movement: what that does not tell has a large covariance.
+/// Holds `calibration` against a recording. Unlike [`super::solve`] it takes any movement: what that does not tell is not judged.
+///
+/// All numbers are solved for together, from where the calibration has them and held there by very little, so that the noises are told from what is
+/// wrong. What the recording tells about that solution then judges each number alone.
 ///
 /// # Errors
 /// Where there is too little to look at, or the unit's axes are mirrored.
 pub fn compare(
-    readings: &[ImuReading],
-    observations: &[Observation],
-    known: &Known,
+    compared: &Compared<'_>,
+    calibration: &Calibration,
     options: &Options,
 ) -> Result<Comparison, AlignmentError> {
-    let mut problem = problem(readings, observations, options)?;
-    let told = match moved(&problem).and_then(|()| alone(&problem)) {
-        Ok(told) => told,
-        Err(
-            why @ (AlignmentError::NotObservable { .. }
-            | AlignmentError::NoFit { .. }
-            | AlignmentError::NotShared { .. }),
-        ) => {
-            let mut told = together(&mut problem, known)?;
-            if matches!(why, AlignmentError::NotShared { .. }) || moved(&problem).is_err() {
-                // Of a camera at rest, or one that sees little of what the gyro feels, noise alone would tell it.
-                told.offset = (known.offset_s, KNOWN_SIGMA);
-            }
-            told
-        }
-        Err(e) => return Err(e),
+    let Compared { readings, observations, sight, lens } = *compared;
+    let mut problem = problem(readings, observations, sight, options)?;
+    let known = start_of(calibration);
+    let is_moved = moved(&problem).is_ok();
+    let other = match is_moved.then(|| start(&problem)) {
+        Some(Err(why @ AlignmentError::Mirrored { .. })) => return Err(why),
+        Some(Ok(other)) if is_far(&known, &other) => Some(other),
+        _ => None,
     };
-    let turn = log(told.camera_from_imu * known.camera_from_imu.inverse());
-    let offset_s = told.offset.0 - known.offset_s;
-    let own = DMat3::from_diagonal(known.rotation_sigma * known.rotation_sigma);
-    let both = told.rotation + matrix(own);
-    let mut covariance = Matrix4::zeros();
-    covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&both);
-    covariance[(3, 3)] = told.offset.1.powi(2) + known.offset_sigma_s.powi(2);
-    let difference = Vector4::new(turn.x, turn.y, turn.z, offset_s);
-    let surprise = covariance.cholesky().map(|c| difference.dot(&c.solve(&difference)));
+    problem.known = Some(known);
+    let mut fitted = fit(&problem, &known)?;
+    if let Some(far) = other.and_then(|other| fit(&problem, &other).ok()) {
+        /// Twice the logarithm by which another solution must be likelier: errors that are alike make several of a hundred sound recordings look
+        /// as if they had one.
+        const LIKELIER: f64 = 200.0;
+        let by_row = |f: &Fitted| f.whitened.cost / f.rows.len().max(1) as f64;
+        if (by_row(&fitted) - by_row(&far)) * fitted.rows.len() as f64 > LIKELIER {
+            fitted = far;
+        }
+    }
+    let mut evidence = evidence(&problem, &fitted, &known)?;
+    if !is_moved || super::observability::shared(&problem, &fitted).is_err() {
+        // Of a camera at rest, or one that sees little of what the gyro feels, noise alone would tell it.
+        evidence.forget(place::OFFSET);
+        evidence.forget(place::READOUT);
+    }
+    if let Some(lens) = lens {
+        let mut block = evidence.information.fixed_view_mut::<4, 4>(place::LENS, place::LENS);
+        block += lens.information;
+        let mut rows = evidence.right.fixed_rows_mut::<4>(place::LENS);
+        rows += lens.right;
+    }
+    let rotation: Matrix3<f64> =
+        fitted.covariance.fixed_view::<3, 3>(place::ROTATION, place::ROTATION).into();
     Ok(Comparison {
-        turn,
-        turn_covariance: dmat(&told.rotation),
-        offset_s,
-        offset_sigma_s: told.offset.1,
-        gyro_bias: told.bias - known.gyro_bias,
-        surprise: surprise
-            .filter(|s| s.is_finite())
-            .ok_or(AlignmentError::NoFit { problem: "the covariance is no number" })?,
-        missing: told.missing,
-        noise: told.noise,
-        residuals: residuals(&problem, known, &told),
+        deviations: judge(&evidence, calibration),
+        turn_covariance: dmat(&rotation),
+        missing: missing(&problem, &fitted, &rotation),
+        noise: noise_found(&fitted),
+        residuals: residuals(&problem, &known, &fitted),
         left_out: problem.left,
     })
 }
 
-fn alone(problem: &AlignmentProblem) -> Result<ToldExtrinsics, AlignmentError> {
-    let fitted = fit(problem, &start(problem)?)?;
-    let found = judge(problem, &fitted)?;
-    Ok(ToldExtrinsics {
-        camera_from_imu: found.camera_from_imu,
-        rotation: matrix(found.rotation_covariance),
-        offset: (found.offset_s, found.offset_sigma_s),
-        bias: found.gyro_bias,
-        noise: found.noise,
-        missing: found.missing,
+/// Where up is in the camera's axes in each of the observations, by the gyro alone once all of them have told how it began: without the noise of
+/// each. `None` where the gyro has not been there; nothing at all where there is no solution.
+///
+/// How a horizon moves with the focal length is how far it is from the picture's middle. Taken from what was seen, its noise would be in
+/// both the difference and what that is held against, and the longest lens would explain it best.
+pub(crate) fn expected_ups(
+    compared: &Compared<'_>,
+    calibration: &Calibration,
+    options: &Options,
+) -> Option<Vec<Option<DVec3>>> {
+    let count = compared.observations.len();
+    let mut problem = problem(compared.readings, compared.observations, &[], options).ok()?;
+    let known = start_of(calibration);
+    problem.known = Some(known);
+    let fitted = fit(&problem, &known).ok()?;
+    let mut by_stamp = BTreeMap::new();
+    for row in fitted.rows.iter().filter(|row| row.kind == ResidualKind::Up) {
+        let Some(Observation::Up { stamp, up_in_camera, .. }) = problem.observations.get(row.index) else {
+            continue;
+        };
+        let turn = dvec(&(row.reference_from_camera().transpose() * row.residual));
+        by_stamp.insert(*stamp, exp(turn) * *up_in_camera);
+    }
+    let of = |i: usize| by_stamp.get(&compared.observations.get(i)?.stamp())?.try_normalize();
+    Some((0..count).map(of).collect())
+}
+
+fn start_of(calibration: &Calibration) -> AlignmentStart {
+    AlignmentStart {
+        camera_from_imu: calibration.camera_from_imu,
+        offset_s: calibration.time_offset_ns as f64 * 1e-9,
+        bias: calibration.gyro_bias,
+    }
+}
+
+/// Whether an estimate from nothing is so far from the calibration that no small step leads there.
+fn is_far(known: &AlignmentStart, other: &AlignmentStart) -> bool {
+    /// Radians and seconds.
+    const FAR: (f64, f64) = (0.15, 0.06);
+    let turn = log(other.camera_from_imu * known.camera_from_imu.inverse()).length();
+    turn > FAR.0 || (other.offset_s - known.offset_s).abs() > FAR.1
+}
+
+/// What the recording alone tells, about `known`.
+fn evidence(
+    problem: &AlignmentProblem,
+    fitted: &Fitted,
+    known: &AlignmentStart,
+) -> Result<Evidence, AlignmentError> {
+    const NO_NUMBER: AlignmentError = AlignmentError::NoFit { problem: "the covariance is no number" };
+    let rows: Vec<ResidualRow> =
+        fitted.rows.iter().filter(|row| row.kind != ResidualKind::Known).cloned().collect();
+    let whitened = whiten(&rows, &with_usual_walk(&rows, &fitted.levels)).ok_or(NO_NUMBER)?;
+    let unknowns = &fitted.unknowns;
+    let turn = log(unknowns.camera_from_imu * known.camera_from_imu.inverse());
+    let mut off = UnknownsStep::zeros();
+    off.fixed_rows_mut::<3>(place::ROTATION).copy_from(&vector(turn));
+    off[place::OFFSET] = unknowns.offset_s - known.offset_s;
+    off.fixed_rows_mut::<3>(place::BIAS).copy_from(&vector(unknowns.bias - known.bias));
+    off[place::READOUT] = unknowns.readout_s;
+    off.fixed_rows_mut::<3>(place::SCALE).copy_from(&vector(unknowns.scale));
+    for (i, much) in unknowns.lens.iter().enumerate() {
+        off[place::LENS + i] = *much;
+    }
+    let seconds = rows.first().zip(rows.last()).map_or(0.0, |(first, last)| last.time - first.time);
+    Ok(Evidence {
+        information: whitened.normal,
+        right: whitened.normal * off - whitened.gradient,
+        scores: whitened.scores,
+        seconds,
+        active: fitted.active.clone(),
+        dip_sigma: problem.options.horizon_sigma,
     })
 }
 
-fn together(problem: &mut AlignmentProblem, known: &Known) -> Result<ToldExtrinsics, AlignmentError> {
-    let Known { camera_from_imu, offset_s, gyro_bias: bias, .. } = *known;
-    let start = AlignmentStart { camera_from_imu, offset_s, bias };
-    problem.known = Some(start);
-    let fitted: Fitted = fit(problem, &start)?;
-    problem.known = None;
-    let rotation: Matrix3<f64> =
-        fitted.covariance.fixed_view::<3, 3>(place::ROTATION, place::ROTATION).into();
-    let rotation = rotation + horizons_share(problem);
-    let offset_sigma_s = fitted.covariance[(place::OFFSET, place::OFFSET)].max(0.0).sqrt();
-    Ok(ToldExtrinsics {
-        camera_from_imu: fitted.unknowns.camera_from_imu,
-        rotation,
-        offset: (fitted.unknowns.offset_s, offset_sigma_s),
-        bias: fitted.unknowns.bias,
-        noise: noise_found(&fitted),
-        missing: missing(problem, &fitted, &rotation),
-    })
-}
-
-/// Residuals with rotation and offset of the former calibration. The bias is the recording's own: it changes with the temperature, and the trainer learns
-/// it.
-fn residuals(problem: &AlignmentProblem, known: &Known, told: &ToldExtrinsics) -> Vec<Residual> {
-    let start =
-        AlignmentStart { camera_from_imu: known.camera_from_imu, offset_s: known.offset_s, bias: told.bias };
-    let rows = problem.rows(&problem.unknowns(&start), &Weights::default());
+/// Residuals with rotation and offset of the former calibration. The bias is the recording's own, so that they show what is beside it.
+fn residuals(problem: &AlignmentProblem, known: &AlignmentStart, fitted: &Fitted) -> Vec<Residual> {
+    let start = AlignmentStart { bias: fitted.unknowns.bias, ..*known };
+    let (rows, noise) = (problem.rows(&problem.unknowns(&start), &Weights::default()), noise_found(fitted));
     let scale = |row: &ResidualRow| match row.blind {
-        Some(_) => told.noise.up_scale,
-        None => told.noise.orientation_scale,
+        Some(_) => noise.up_scale,
+        None => noise.orientation_scale,
     };
     rows.iter()
         .filter(|row| row.kind.is_seen())

@@ -9,7 +9,7 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Number of parameters, see [`place`].
-pub(super) const PARAMETERS: usize = 13;
+pub(super) const PARAMETERS: usize = 18;
 /// Square matrix over all parameters.
 pub(super) type NormalMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 /// One value for each parameter.
@@ -31,6 +31,10 @@ pub(super) mod place {
     pub const SCALE: usize = 8;
     /// Up in the reference: two.
     pub const UP: usize = 11;
+    /// Lens: share of the focal length, principal point (two), first coefficient of distortion.
+    pub const LENS: usize = 13;
+    /// Error of the horizon's dip that all pictures share.
+    pub const DIP: usize = 17;
 }
 
 /// Kind of measurement behind a residual.
@@ -125,6 +129,8 @@ pub(super) struct Whitened {
     pub innovations: Vec<Vector3<f64>>,
     /// Of each row: the same as independent numbers of variance one, where the noises are what they are taken for.
     pub white: Vec<Vector3<f64>>,
+    /// Of each row: its part of the gradient.
+    pub scores: Vec<UnknownsStep>,
 }
 
 /// Walk and covariance while the filter runs.
@@ -185,6 +191,7 @@ pub(super) fn whiten(rows: &[ResidualRow], levels: &Levels) -> Option<Whitened> 
         squares: Vec::with_capacity(rows.len()),
         innovations: Vec::with_capacity(rows.len()),
         white: Vec::with_capacity(rows.len()),
+        scores: Vec::with_capacity(rows.len()),
     };
     let mut walk = GyroWalk::<COLUMNS>::begin(rows.first()?);
     for row in rows {
@@ -199,7 +206,9 @@ pub(super) fn whiten(rows: &[ResidualRow], levels: &Levels) -> Option<Whitened> 
         let residual: Vector3<f64> = w.column(PARAMETERS).into();
         let turn: Vector3<f64> = innovation.column(PARAMETERS).into();
         out.normal += jacobian.transpose() * jacobian;
-        out.gradient += jacobian.transpose() * residual;
+        let score = jacobian.transpose() * residual;
+        out.gradient += score;
+        out.scores.push(score);
         out.cost += residual.norm_squared() + log_det;
         out.squares.push(if row.weight < 1.0 {
             turn.dot(&plain.cholesky()?.solve(&turn))

@@ -68,7 +68,7 @@ const AGAINST: f64 = 9.0;
 
 /// The noises with the walk that the covariance is to be stated by. Where the movement is slow, rotation and offset take some of the walk for
 /// movement; what they took is missing in the residuals, so that too little of it is found just where they err most.
-fn with_usual_walk(rows: &[ResidualRow], levels: &Levels) -> Levels {
+pub(super) fn with_usual_walk(rows: &[ResidualRow], levels: &Levels) -> Levels {
     let usual = Levels { walk: levels.walk.max(USUAL_WALK.0), ..*levels };
     if restricted(rows, &usual) - restricted(rows, levels) < AGAINST { usual } else { *levels }
 }

@@ -60,6 +60,18 @@ impl Observation {
         }
     }
 
+    pub(super) fn row(&self) -> f64 {
+        match self {
+            Self::Orientation { row, .. } | Self::Up { row, .. } => *row,
+        }
+    }
+
+    pub(super) fn sigma(&self) -> f64 {
+        match self {
+            Self::Orientation { sigma, .. } | Self::Up { sigma, .. } => *sigma,
+        }
+    }
+
     fn is_sound(&self) -> bool {
         let (sigma, row, rest) = match self {
             Self::Orientation { reference_from_camera: q, sigma, row, .. } => {
@@ -214,26 +226,39 @@ fn clipped(rate: &[DVec3], range: Option<f64>) -> Vec<bool> {
     out
 }
 
-/// Sound observations in the order of their stamps. One of a kind remains of several with one stamp.
-pub(super) fn clean_observations(all: &[Observation], left: &mut LeftOutCounts) -> Vec<Observation> {
-    let (ups, orientations): (Vec<Observation>, Vec<Observation>) =
-        all.iter().filter(|o| o.is_sound()).partition(|o| matches!(o, Observation::Up { .. }));
+/// Sound observations in the order of their stamps, each with its number among `all`. One of a kind remains of several with one stamp.
+pub(super) fn clean_observations(
+    all: &[Observation],
+    left: &mut LeftOutCounts,
+) -> (Vec<Observation>, Vec<usize>) {
+    let sound = all.iter().enumerate().filter(|(_, o)| o.is_sound());
+    let (ups, orientations): (Vec<usize>, Vec<usize>) =
+        sound.map(|(i, _)| i).partition(|i| matches!(all[*i], Observation::Up { .. }));
     left.not_finite += all.len() - ups.len() - orientations.len();
-    let mut out = Vec::with_capacity(all.len());
+    let (mut out, mut numbers) = (Vec::with_capacity(all.len()), Vec::with_capacity(all.len()));
     for kind in [orientations, ups] {
-        let stamps: Vec<i64> = kind.iter().map(|o| o.stamp().ns()).collect();
+        let stamps: Vec<i64> = kind.iter().map(|i| all[*i].stamp().ns()).collect();
         let kept = increasing(&stamps);
         left.out_of_order += kind.len() - kept.len();
-        out.extend(kept.into_iter().map(|i| match kind[i] {
-            Observation::Orientation { stamp, reference_from_camera: q, sigma, row, chain } => {
-                Observation::Orientation { stamp, reference_from_camera: q.normalize(), sigma, row, chain }
-            }
-            Observation::Up { stamp, up_in_camera, sigma, row } => {
-                Observation::Up { stamp, up_in_camera: up_in_camera.normalize(), sigma, row }
-            }
-        }));
+        for number in kept.into_iter().map(|i| kind[i]) {
+            numbers.push(number);
+            out.push(match all[number] {
+                Observation::Orientation { stamp, reference_from_camera: q, sigma, row, chain } => {
+                    Observation::Orientation {
+                        stamp,
+                        reference_from_camera: q.normalize(),
+                        sigma,
+                        row,
+                        chain,
+                    }
+                }
+                Observation::Up { stamp, up_in_camera, sigma, row } => {
+                    Observation::Up { stamp, up_in_camera: up_in_camera.normalize(), sigma, row }
+                }
+            });
+        }
     }
-    out
+    (out, numbers)
 }
 
 /// Where up is in the unit's axes, by specific force averaged over half seconds in the frame of their middle: what a hand or a ship adds

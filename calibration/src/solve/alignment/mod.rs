@@ -17,6 +17,7 @@
 //! `true = exp(error) estimate`.
 
 mod compare;
+mod deviation;
 mod error;
 mod filter;
 mod fit;
@@ -28,9 +29,12 @@ mod result;
 mod start;
 mod track;
 
-pub use compare::{Comparison, Known, compare};
+pub(crate) use compare::expected_ups;
+pub use compare::{Compared, Comparison, LensEvidence, compare};
+pub use deviation::{Deviation, Judgement, Parameter};
 pub use error::{AlignmentError, Movement};
 pub use input::{ImuReading, Increment, LeftOutCounts, Observation, chained};
+pub use problem::{BySight, LENS_AND_DIP};
 pub use result::{Alignment, AlignmentFinding, Checks, Grade, NoiseFound, Residual};
 pub use start::AlignmentStart;
 
@@ -72,6 +76,7 @@ const TURNED_LEAST: f64 = 0.02;
 fn problem(
     readings: &[ImuReading],
     observations: &[Observation],
+    sight: &[BySight],
     options: &Options,
 ) -> Result<AlignmentProblem, AlignmentError> {
     let mut left = LeftOutCounts::default();
@@ -80,7 +85,8 @@ fn problem(
     let options =
         Options { offset_range_s: range.clamp(0.01, OFFSET_MOST_S), horizon_sigma: shared, ..*options };
     let gyro = input::clean_gyro(readings, options.gyro_range.filter(|r| *r > 0.0), &mut left);
-    let observations = input::clean_observations(observations, &mut left);
+    let (observations, numbers) = input::clean_observations(observations, &mut left);
+    let sight = numbers.into_iter().filter_map(|i| sight.get(i).copied()).collect();
     let span_s = gyro.time.last().copied().unwrap_or(0.0);
     if gyro.time.len() < READINGS_LEAST {
         let (what, count) = ("sound gyro readings", gyro.time.len());
@@ -102,7 +108,7 @@ fn problem(
     }
     let has_up = observations.iter().any(|o| matches!(o, Observation::Up { .. }));
     let levels = if has_up { input::levels(&gyro) } else { Vec::new() };
-    Ok(AlignmentProblem { gyro, observations, levels, options, left, known: None })
+    Ok(AlignmentProblem { gyro, observations, levels, options, left, known: None, sight })
 }
 
 /// Refuses a camera at rest, whose noise would otherwise be taken for motion.
@@ -164,7 +170,7 @@ pub fn closed_form(
     observations: &[Observation],
     options: &Options,
 ) -> Result<AlignmentStart, AlignmentError> {
-    start(&problem(readings, observations, options)?)
+    start(&problem(readings, observations, &[], options)?)
 }
 
 /// Finds rotation, time offset and gyro bias from `readings` (200 to 1000 Hz) and `observations` (any order, some tens of seconds
@@ -178,12 +184,14 @@ pub fn solve(
     observations: &[Observation],
     options: &Options,
 ) -> Result<Alignment, AlignmentError> {
-    let problem = problem(readings, observations, options)?;
+    let problem = problem(readings, observations, &[], options)?;
     moved(&problem)?;
     let start = start(&problem)?;
     let fitted = fit::fit(&problem, &start)?;
     result::judge(&problem, &fitted)
 }
 
+#[cfg(test)]
+mod compare_tests;
 #[cfg(test)]
 mod tests;

@@ -25,6 +25,8 @@ pub(super) struct AlignmentProblem {
     pub left: LeftOutCounts,
     /// Weak prior ([`known`]).
     pub known: Option<AlignmentStart>,
+    /// How each observation turns with what the camera is taken for; empty where nobody asks.
+    pub sight: Vec<BySight>,
 }
 
 /// Unknowns of the least-squares problem.
@@ -34,6 +36,10 @@ pub(super) struct AlignmentUnknowns {
     pub offset_s: f64,
     pub bias: DVec3,
     pub readout_s: f64,
+    /// Share by which the gyro reads too little, each axis.
+    pub scale: DVec3,
+    /// Lens and dip ([`BySight`]) against what they were taken for.
+    pub lens: [f64; LENS_AND_DIP],
     /// Up in the reference.
     pub up: DVec3,
     /// Rotation from the first reading's frame to the reference, for each segment.
@@ -71,8 +77,12 @@ impl AlignmentProblem {
     /// Which parameters are solved for.
     pub(super) fn active(&self) -> Vec<usize> {
         let mut out: Vec<usize> = (0..7).collect();
-        if self.options.estimate_readout {
+        if self.options.estimate_readout || self.known.is_some() {
             out.push(place::READOUT);
+        }
+        if self.known.is_some() {
+            out.extend(place::SCALE..place::UP);
+            out.extend(place::LENS..place::LENS + LENS_AND_DIP);
         }
         if self.has_ups() && self.has_orientations() {
             out.extend([place::UP, place::UP + 1]);
@@ -87,6 +97,8 @@ impl AlignmentProblem {
             offset_s: start.offset_s,
             bias: start.bias,
             readout_s: 0.0,
+            scale: DVec3::ZERO,
+            lens: [0.0; LENS_AND_DIP],
             up: DVec3::Z,
             anchors: BTreeMap::new(),
         };
@@ -96,7 +108,7 @@ impl AlignmentProblem {
 
     /// Anchors by the median of what was seen; up in the reference by the mean of the horizons.
     fn set_references(&self, unknowns: &mut AlignmentUnknowns) {
-        let track = GyroTrack::new(&self.gyro, unknowns.bias);
+        let track = GyroTrack::new(&self.gyro, unknowns.bias, unknowns.scale);
         let mut seen: BTreeMap<TrackSegment, Vec<DQuat>> = BTreeMap::new();
         let mut ups: BTreeMap<TrackSegment, Vec<DVec3>> = BTreeMap::new();
         let main = self.main_chain();
@@ -131,15 +143,13 @@ impl AlignmentProblem {
         unknowns: &AlignmentUnknowns,
         o: &Observation,
     ) -> Option<TrackState> {
-        let row = match o {
-            Observation::Orientation { row, .. } | Observation::Up { row, .. } => *row,
-        };
+        let row = if self.sight.is_empty() { o.row() } else { 0.0 };
         track.at(o.stamp().secs_since(self.gyro.epoch) + unknowns.offset_s + row * unknowns.readout_s)
     }
 
     /// Residuals in order of time.
     pub(super) fn rows(&self, unknowns: &AlignmentUnknowns, weights: &Weights) -> Vec<ResidualRow> {
-        let track = GyroTrack::new(&self.gyro, unknowns.bias);
+        let track = GyroTrack::new(&self.gyro, unknowns.bias, unknowns.scale);
         let main = self.main_chain();
         let mut keys: BTreeMap<TrackSegment, usize> = BTreeMap::new();
         for key in unknowns.anchors.keys() {
@@ -160,7 +170,7 @@ impl AlignmentProblem {
             if let Some((anchor, segment)) = place(&state, chain) {
                 let weight = weights.observations.get(index).copied().unwrap_or(1.0);
                 let row = begun(state.time, index, &state, (anchor, segment), weight);
-                rows.push(observed(row, o, unknowns, &state, anchor));
+                rows.push(observed(row, o, self.sight.get(index), unknowns, &state, anchor));
             }
         }
         for (index, (time, up)) in self.levels.iter().enumerate() {
@@ -174,40 +184,74 @@ impl AlignmentProblem {
             }
         }
         if let Some(start) = &self.known {
-            rows.extend(known(start, unknowns));
+            rows.extend(known(start, unknowns, self.options.horizon_sigma));
         }
         rows.sort_by(|a, b| a.time.total_cmp(&b.time));
         rows
     }
 }
 
-/// How roughly a start is known, for those of its numbers that the recording does not tell: 0.1 rad, 0.1 s, 0.01 rad/s (by as much biases
-/// change from day to day). That the filter lets every segment begin anywhere adds a twentieth to these.
-pub(super) const KNOWN_SIGMA: f64 = 0.1;
-const KNOWN_BIAS: f64 = 0.01;
+/// How an observation turns with what the camera is taken for: a rotation vector in the camera's axes by each unit. What a picture shows to
+/// be `v` would be shown to be `exp(turn) v`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BySight {
+    /// By the read-out time of the picture, rad/s.
+    pub readout: DVec3,
+    /// By the share of the focal length, the principal point right and down in focal lengths, the first coefficient of distortion, and by the
+    /// horizon's dip.
+    pub lens: [DVec3; LENS_AND_DIP],
+}
 
-/// Rotation, offset and bias as if each had been seen once, each in a segment of its own that no observation has.
-fn known(start: &AlignmentStart, unknowns: &AlignmentUnknowns) -> [ResidualRow; 3] {
-    let row = |number: usize, residual: Vector3<f64>, jacobian: Jacobian| ResidualRow {
-        time: f64::MIN,
-        kind: ResidualKind::Known,
-        index: number,
-        residual,
-        jacobian,
-        speed: Vector3::zeros(),
-        blind: None,
-        sigma: KNOWN_SIGMA,
-        common: 0.0,
-        weight: 1.0,
-        segment: usize::MAX - number,
-    };
-    let mut by = [Jacobian::zeros(); 3];
-    by[0].fixed_columns_mut::<3>(place::ROTATION).fill_with_identity();
-    by[1][(0, place::OFFSET)] = 1.0;
-    by[2].fixed_columns_mut::<3>(place::BIAS).fill_diagonal(KNOWN_SIGMA / KNOWN_BIAS);
+/// Numbers of the lens that are asked for, and the dip.
+pub const LENS_AND_DIP: usize = 5;
+
+/// How roughly a start is known, for those of its numbers that the recording does not tell: 0.1 rad, 0.1 s, 0.01 rad/s (by as much biases
+/// change from day to day), 20 ms of read-out, shares of 0.01 of the gyro's scale, 0.05 of the lens. That the filter lets every segment begin
+/// anywhere adds a twentieth to these. A gyro that reads nothing and a lens of any length would explain every horizon: scale and lens are held
+/// near to what is sold.
+const KNOWN_SIGMA: f64 = 0.1;
+const KNOWN_BIAS: f64 = 0.01;
+const KNOWN_READOUT_S: f64 = 0.02;
+const KNOWN_SCALE: f64 = 0.01;
+const KNOWN_LENS: f64 = 0.05;
+
+/// All numbers as if each had been seen once, three by three, each three in a segment of their own that no observation has.
+fn known(start: &AlignmentStart, unknowns: &AlignmentUnknowns, dip_sigma: f64) -> Vec<ResidualRow> {
     let turn = log(unknowns.camera_from_imu * start.camera_from_imu.inverse());
-    let offset = Vector3::new(unknowns.offset_s - start.offset_s, 0.0, 0.0);
-    [row(0, vector(turn), by[0]), row(1, offset, by[1]), row(2, vector(unknowns.bias - start.bias), by[2])]
+    let [focal, right, down, bend, dip] = unknowns.lens;
+    let (rotation, bias, scale, lens) = (place::ROTATION, place::BIAS, place::SCALE, place::LENS);
+    let single = [unknowns.offset_s - start.offset_s, unknowns.readout_s, dip];
+    let of_single = [KNOWN_SIGMA, KNOWN_READOUT_S, dip_sigma.max(1e-6)];
+    [
+        ([rotation, rotation + 1, rotation + 2], turn.to_array(), [KNOWN_SIGMA; 3]),
+        ([place::OFFSET, place::READOUT, place::DIP], single, of_single),
+        ([bias, bias + 1, bias + 2], (unknowns.bias - start.bias).to_array(), [KNOWN_BIAS; 3]),
+        ([scale, scale + 1, scale + 2], unknowns.scale.to_array(), [KNOWN_SCALE; 3]),
+        ([lens, lens + 1, lens + 2], [focal, right, down], [KNOWN_LENS; 3]),
+        ([lens + 3; 3], [bend, 0.0, 0.0], [KNOWN_LENS, f64::INFINITY, f64::INFINITY]),
+    ]
+    .into_iter()
+    .enumerate()
+    .map(|(number, (places, off, sigma))| {
+        let mut jacobian = Jacobian::zeros();
+        for i in 0..3 {
+            jacobian[(i, places[i])] += KNOWN_SIGMA / sigma[i];
+        }
+        ResidualRow {
+            time: f64::MIN,
+            kind: ResidualKind::Known,
+            index: number,
+            residual: Vector3::from_fn(|i, _| off[i] * KNOWN_SIGMA / sigma[i]),
+            jacobian,
+            speed: Vector3::zeros(),
+            blind: None,
+            sigma: KNOWN_SIGMA,
+            common: 0.0,
+            weight: 1.0,
+            segment: usize::MAX - number,
+        }
+    })
+    .collect()
 }
 
 /// Of each observation and level.
@@ -288,6 +332,7 @@ fn begun(
 fn observed(
     mut row: ResidualRow,
     o: &Observation,
+    sight: Option<&BySight>,
     unknowns: &AlignmentUnknowns,
     state: &TrackState,
     anchor: DQuat,
@@ -296,20 +341,35 @@ fn observed(
     let by_turn = matrix(DMat3::from_quat(predicted));
     row.jacobian.fixed_columns_mut::<3>(place::ROTATION).copy_from(&by_turn);
     row.jacobian.set_column(place::OFFSET, &row.speed);
-    let (sigma, line) = match o {
-        Observation::Orientation { sigma, row, .. } | Observation::Up { sigma, row, .. } => (*sigma, *row),
-    };
-    row.sigma = sigma;
-    row.jacobian.set_column(place::READOUT, &(row.speed * line));
+    row.sigma = o.sigma();
+    // What the camera shows, as it would be with the lens and the read-out that are tried.
+    let mut as_seen = DQuat::IDENTITY;
+    if let Some(sight) = sight {
+        let all = sight.lens.iter().zip(unknowns.lens);
+        as_seen =
+            exp(sight.readout * unknowns.readout_s + all.clone().map(|(by, much)| *by * much).sum::<DVec3>());
+        row.jacobian.set_column(place::READOUT, &-vector(predicted * sight.readout));
+        for (i, (by, _)) in all.enumerate() {
+            row.jacobian.set_column(place::LENS + i, &-vector(predicted * *by));
+        }
+    } else {
+        row.jacobian.set_column(place::READOUT, &(row.speed * o.row()));
+    }
     match o {
         Observation::Orientation { reference_from_camera, .. } => {
             row.kind = ResidualKind::Orientation;
-            row.residual = vector(log(*reference_from_camera * predicted.inverse()));
+            let seen = *reference_from_camera * as_seen.inverse();
+            row.residual = vector(log(seen * predicted.inverse()));
         }
         Observation::Up { up_in_camera, .. } => {
             row.kind = ResidualKind::Up;
-            row.residual = vector(arc(predicted * *up_in_camera, unknowns.up));
+            row.residual = vector(arc(predicted * (as_seen * *up_in_camera), unknowns.up));
             flatten(&mut row, unknowns.up);
+            // A longer lens makes all angles smaller, noise and all: what is left is counted in pixels, or the longest lens would fit best.
+            let grown = 1.0 + unknowns.lens[0];
+            row.residual *= grown;
+            row.jacobian *= grown;
+            row.speed *= grown;
         }
     }
     row
@@ -364,6 +424,8 @@ impl AlignmentUnknowns {
             offset_s: self.offset_s + step[place::OFFSET],
             bias: self.bias + three(place::BIAS),
             readout_s: self.readout_s + step[place::READOUT],
+            scale: self.scale + three(place::SCALE),
+            lens: std::array::from_fn(|i| self.lens[i] + step[place::LENS + i]),
             // A residual takes the prediction to `up`: its growth by a turn of up is that turn.
             up: (exp(tilt) * self.up).normalize(),
             anchors: self.anchors.clone(),

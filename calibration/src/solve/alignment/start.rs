@@ -152,7 +152,7 @@ fn best_offset(
 pub(super) fn from_orientations(problem: &AlignmentProblem) -> Result<AlignmentStart, AlignmentError> {
     /// Of the first search over offsets, seconds.
     const STEP_S: f64 = 0.01;
-    let track = GyroTrack::new(&problem.gyro, DVec3::ZERO);
+    let track = GyroTrack::new(&problem.gyro, DVec3::ZERO, DVec3::ZERO);
     let mut turns = turns(problem);
     let count = turns.len();
     let too_few = || AlignmentError::TooFew { what: "turns over 0.4 s seen by both", count, least: 6 };
@@ -212,7 +212,7 @@ fn drop_outliers(turns: &mut [Turn], track: &GyroTrack<'_>, offset: f64, centred
 
 /// From the horizon alone: for each offset the rotation and the first level that explain the ups best, in turns from several levels.
 pub(super) fn from_ups(problem: &AlignmentProblem) -> Result<AlignmentStart, AlignmentError> {
-    let track = GyroTrack::new(&problem.gyro, DVec3::ZERO);
+    let track = GyroTrack::new(&problem.gyro, DVec3::ZERO, DVec3::ZERO);
     let all: Vec<(f64, DVec3)> = problem
         .observations
         .iter()

@@ -10,6 +10,8 @@ use crate::solve::so3::exp;
 pub(super) struct GyroTrack<'a> {
     gyro: &'a GyroTrace,
     bias: DVec3,
+    /// True rates by those that were read.
+    scale: DVec3,
     nodes: Vec<TrackNode>,
 }
 
@@ -68,7 +70,9 @@ fn integrals(from: (DQuat, DVec3), to: (DQuat, DVec3), h: f64) -> (DMat3, DMat3)
 }
 
 impl<'a> GyroTrack<'a> {
-    pub(super) fn new(gyro: &'a GyroTrace, bias: DVec3) -> Self {
+    /// Integrates the rates less their bias, which are off by the shares `scale` of what was read.
+    pub(super) fn new(gyro: &'a GyroTrace, bias: DVec3, scale: DVec3) -> Self {
+        let scale = DVec3::ONE + scale;
         let mut nodes = Vec::with_capacity(gyro.time.len());
         let mut node = TrackNode {
             start_from_imu: DQuat::IDENTITY,
@@ -79,13 +83,13 @@ impl<'a> GyroTrack<'a> {
         for i in 0..gyro.time.len() {
             if i > 0 {
                 let h = gyro.time[i] - gyro.time[i - 1];
-                let (w0, w1) = (gyro.rate[i - 1] - bias, gyro.rate[i] - bias);
-                node = node.after(w0, w1, h, gyro.bend(i - 1));
+                let (w0, w1) = (gyro.rate[i - 1] * scale - bias, gyro.rate[i] * scale - bias);
+                node = node.after(w0, w1, h, gyro.bend(i - 1) * scale);
                 node.segment += usize::from(gyro.broken[i - 1]);
             }
             nodes.push(node);
         }
-        Self { gyro, bias, nodes }
+        Self { gyro, bias, scale, nodes }
     }
 
     /// `None` before the first reading, after the last and where readings are missing.
@@ -96,7 +100,8 @@ impl<'a> GyroTrack<'a> {
         }
         let i = after - 1;
         let (h, tau) = (self.gyro.time[after] - self.gyro.time[i], t - self.gyro.time[i]);
-        let (w0, w1) = (self.gyro.rate[i] - self.bias, self.gyro.rate[after] - self.bias);
+        let rate = |i: usize| self.gyro.rate[i] * self.scale - self.bias;
+        let (w0, w1) = (rate(i), rate(after));
         let rate = w0 + (w1 - w0) * (tau / h);
         let TrackNode { start_from_imu, by_bias, by_scale, segment } =
             self.nodes[i].after(w0, rate, tau, DVec3::ZERO);
@@ -144,7 +149,7 @@ mod tests {
             DQuat::from_rotation_z(0.5 * t) * DQuat::from_rotation_x(0.3) * DQuat::from_rotation_z(2.0 * t)
         };
         let gyro = coning(200.0);
-        let track = GyroTrack::new(&gyro, DVec3::ZERO);
+        let track = GyroTrack::new(&gyro, DVec3::ZERO, DVec3::ZERO);
         for t in [0.0, 0.0013, 3.3333, 9.99] {
             let expected = truth(0.0).inverse() * truth(t);
             let off = log(track.at(t).unwrap().start_from_imu * expected.inverse()).length();
@@ -156,13 +161,14 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_differences() {
         let gyro = coning(200.0);
-        let (plain, b) = (GyroTrack::new(&gyro, DVec3::ZERO).at(7.0).unwrap(), DVec3::new(1e-6, -2e-6, 3e-6));
-        let biased = GyroTrack::new(&gyro, b).at(7.0).unwrap();
+        let (plain, b) =
+            (GyroTrack::new(&gyro, DVec3::ZERO, DVec3::ZERO).at(7.0).unwrap(), DVec3::new(1e-6, -2e-6, 3e-6));
+        let biased = GyroTrack::new(&gyro, b, DVec3::ZERO).at(7.0).unwrap();
         let turn = log(biased.start_from_imu * plain.start_from_imu.inverse());
         assert!((turn + plain.by_bias * b).length() < 1e-3 * turn.length());
         let mut scaled = gyro.clone();
         scaled.rate.iter_mut().for_each(|w| *w *= DVec3::ONE + b);
-        let turn = log(GyroTrack::new(&scaled, DVec3::ZERO).at(7.0).unwrap().start_from_imu
+        let turn = log(GyroTrack::new(&scaled, DVec3::ZERO, DVec3::ZERO).at(7.0).unwrap().start_from_imu
             * plain.start_from_imu.inverse());
         assert!((turn - plain.by_scale * b).length() < 1e-3 * turn.length(), "{turn}");
     }

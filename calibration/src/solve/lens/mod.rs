@@ -10,8 +10,12 @@ mod judge;
 mod model;
 mod start;
 
-use bowwave_core::{geometry::Lens, guide::Cell};
+use bowwave_core::{
+    geometry::{Distortion, Lens},
+    guide::Cell,
+};
 use glam::{DMat3, DVec2};
+use nalgebra::SMatrix;
 
 pub use judge::Missing;
 pub(crate) use judge::enough;
@@ -19,6 +23,7 @@ pub use model::LensModel;
 pub use start::BoardPose;
 pub(crate) use start::{homography, pose_from};
 
+use crate::alignment::LensEvidence;
 use adjust::{AdjustState, Adjusted, adjust};
 use model::{INTRINSICS, Intrinsics};
 
@@ -229,6 +234,37 @@ pub fn solve(views: &[BoardView], (width, height): (u32, u32)) -> Result<LensCal
         coverage: LensCoverage::of(&views, size, tilt),
         pose_covariances: fit.rotations.iter().map(rotation).collect(),
         poses: numbers.into_iter().zip(fit.state.poses).collect(),
+    })
+}
+
+/// What corners tell of a lens that was calibrated, about it; `None` where they do not tell all of its numbers. The coefficients beyond the first
+/// are taken for what they are.
+pub(crate) fn evidence(views: &[BoardView], lens: &Lens) -> Option<LensEvidence> {
+    let size = DVec2::new(f64::from(lens.width), f64::from(lens.height));
+    let (_, views) = clean(views, size);
+    if views.len() < VIEWS_LEAST {
+        return None;
+    }
+    let (model, coefficients) = match lens.distortion {
+        Distortion::None => (LensModel::RadialTangential, [0.0; 4]),
+        Distortion::RadialTangential(d) => {
+            (LensModel::RadialTangential, [d.radial().x, d.radial().y, d.tangential().x, d.tangential().y])
+        }
+        Distortion::Fisheye(d) => (LensModel::Fisheye, d.k()),
+    };
+    let (f, c, [k1, k2, k3, k4]) = (lens.focal, lens.centre, coefficients);
+    let known = Intrinsics::from([f.x, f.y, c.x, c.y, k1, k2, k3, k4]);
+    let poses: Option<Vec<BoardPose>> = views.iter().map(|v| start::pose(lens, &v.corners)).collect();
+    let found = adjust(model, AdjustState { intrinsics: known, poses: poses? }, &views, false);
+    if found.sigma_px > LEFT_MOST * size.x {
+        return None;
+    }
+    let information = found.covariance?.try_inverse()?;
+    let mut by = SMatrix::<f64, INTRINSICS, 4>::zeros();
+    (by[(0, 0)], by[(1, 0)], by[(2, 1)], by[(3, 2)], by[(4, 3)]) = (f.x, f.y, f.x, f.y, 1.0);
+    Some(LensEvidence {
+        information: by.transpose() * information * by,
+        right: by.transpose() * information * (found.state.intrinsics - known),
     })
 }
 

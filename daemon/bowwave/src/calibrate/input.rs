@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
     CalibrationFile, Date,
+    alignment::{Deviation, Judgement},
     capture::{Capture, Watcher},
     parse,
     report::CalibrationReport,
@@ -200,11 +201,25 @@ pub fn tell(report: &CalibrationReport, told: &OutputArgs) -> Result<()> {
 }
 
 fn as_json(report: &CalibrationReport) -> serde_json::Value {
+    let told =
+        |d: &Deviation, value: f64| (d.judgement != Judgement::NotTold && value.is_finite()).then_some(value);
     json!({
         "verdict": report.verdict.to_string(),
         "says": report.says,
         "rows": report.rows.iter().map(|(what, value)| json!([what, value])).collect::<Vec<_>>(),
         "notes": report.notes,
+        "parameters": report.deviations.iter().map(|d| json!({
+            "name": d.parameter.to_string(),
+            "judged": match d.judgement {
+                Judgement::Wrong => "wrong",
+                Judgement::Agrees => "agrees",
+                Judgement::NotTold => "not told",
+            },
+            "off": told(d, d.off),
+            "sigma": told(d, d.sigma),
+            "effect_mrad": told(d, d.effect * 1e3),
+            "or": d.or.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
         "rotation_covariance_mrad2": report.covariance.map(|c| (c * 1e6).to_cols_array_2d()),
     })
 }

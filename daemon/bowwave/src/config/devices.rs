@@ -11,7 +11,7 @@ use bowwave_devices::{
     camera::{CameraSettings, Coding, Controls, Exposure, Focus, Rate, WantedMode, WhiteBalance},
     imu::ImuFormat,
     lamps::LampSettings,
-    serial::{Baud, ImuSettings},
+    serial::{Baud, ImuSettings, LineSettings},
     trigger::{Bias, InputLine, InterlockWiring},
 };
 use serde::Deserialize;
@@ -127,10 +127,12 @@ impl RawImu {
         let jitter = text.given(&self.packet_jitter_ms_max, number(1.0..=1000.0, "ms"))?;
         let usual = ImuSettings::default();
         Ok(ImuSettings {
-            device: self.device,
-            baud: text.given(&self.baud, baud_rates())?.unwrap_or_default(),
+            line: LineSettings {
+                device: self.device,
+                baud: text.given(&self.baud, baud_rates())?.unwrap_or_default(),
+                low_latency: self.low_latency.unwrap_or(usual.line.low_latency),
+            },
             format: text.given(&self.format, one_of(&formats))?,
-            low_latency: self.low_latency.unwrap_or(usual.low_latency),
             late: jitter.map_or(usual.late, |ms| Duration::from_secs_f64(ms * 1e-3)),
         })
     }
@@ -155,7 +157,8 @@ pub(super) fn baud_rates() -> ValueRule<'static, RawBaud, Baud> {
     })
 }
 
-/// An input line of a chip: trigger, interlock, power-fail or a button.
+/// An input line of a chip: trigger, interlock, power-fail or a button. One type holds what each of them may have, since refused unknown
+/// keys and flattened structures do not go together; what a line may not have is refused by name.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawGpioLine {
@@ -165,6 +168,8 @@ pub(super) struct RawGpioLine {
     active_low: bool,
     bias: OptionalKey<String>,
     debounce_ms: OptionalKey<i64>,
+    second: Option<Spanned<Box<Self>>>,
+    discrepancy_ms: OptionalKey<i64>,
 }
 
 /// A line by its number on the chip or by its name.
@@ -193,7 +198,25 @@ impl RawGpioLine {
         Ok(TriggerChoice { line: self.line(text)?, debounce: Duration::from_millis(ms) })
     }
 
+    /// The inert interlock: a line, and where there are two contacts the other one.
+    pub(super) fn interlock(mut self, text: TomlText<'_>) -> Result<InterlockWiring, TomlError> {
+        let discrepancy = text.given(&self.discrepancy_ms.take(), whole(10..=5000))?;
+        let second = self.second.take().map(|line| line.into_inner().input(text)).transpose()?;
+        Ok(InterlockWiring {
+            contact: self.input(text)?,
+            second,
+            discrepancy: discrepancy.map_or(InterlockWiring::DISCREPANCY, Duration::from_millis),
+        })
+    }
+
     fn line(self, text: TomlText<'_>) -> Result<InputLine, TomlError> {
+        const CONTACTS: &str = "is for [interlock] alone; leave it out";
+        if let Some(second) = &self.second {
+            return Err(text.error(second, CONTACTS));
+        }
+        if let Some(ms) = &self.discrepancy_ms {
+            return Err(text.error(ms, CONTACTS));
+        }
         let biases = [
             ("as-is", Bias::AsIs),
             ("pull-up", Bias::PullUp),
@@ -205,32 +228,6 @@ impl RawGpioLine {
         let bias = text.given(&self.bias, one_of(&biases))?.unwrap_or(Bias::AsIs);
         let line = text.needed(&self.line, gpio_line_name())?;
         Ok(InputLine { chip: self.chip, line, active_low: self.active_low, bias })
-    }
-}
-
-/// The inert interlock: a line, and where there are two contacts the other one.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct RawInterlock {
-    chip: String,
-    line: RequiredKey<NumberOrWord>,
-    #[serde(default)]
-    active_low: bool,
-    bias: OptionalKey<String>,
-    debounce_ms: OptionalKey<i64>,
-    second: Option<RawGpioLine>,
-    discrepancy_ms: OptionalKey<i64>,
-}
-
-impl RawInterlock {
-    pub(super) fn wiring(self, text: TomlText<'_>) -> Result<InterlockWiring, TomlError> {
-        let discrepancy = text.given(&self.discrepancy_ms, whole(10..=5000))?.map(Duration::from_millis);
-        let Self { chip, line, active_low, bias, debounce_ms, second, .. } = self;
-        Ok(InterlockWiring {
-            contact: RawGpioLine { chip, line, active_low, bias, debounce_ms }.input(text)?,
-            second: second.map(|line| line.input(text)).transpose()?,
-            discrepancy: discrepancy.unwrap_or(InterlockWiring::DISCREPANCY),
-        })
     }
 }
 

@@ -9,7 +9,7 @@ use bowwave_core::{
     text::toml::{OptionalKey, RequiredKey, Spanned, TomlError, TomlText, ValueRule, number},
 };
 use bowwave_devices::{
-    serial::ShipSettings,
+    serial::LineSettings,
     trigger::{InputLine, Press},
 };
 use serde::Deserialize;
@@ -88,7 +88,7 @@ pub struct HeadingChoice {
     /// The session's part.
     pub settings: HeadingSettings,
     /// The ship's own heading.
-    pub ship: Option<ShipSettings>,
+    pub ship: Option<LineSettings>,
     /// Buttons of the operator.
     pub presses: Vec<Press>,
 }
@@ -122,20 +122,20 @@ impl RawHeadings {
 }
 
 impl RawShip {
-    fn check(self, text: TomlText<'_>, settings: &mut HeadingSettings) -> Result<ShipSettings> {
+    fn check(self, text: TomlText<'_>, settings: &mut HeadingSettings) -> Result<LineSettings> {
         let device = self.device.get_ref();
         if let Err(e) = glob::Pattern::new(&device.to_string_lossy()) {
             return Err(text.error(&self.device, e).into());
         }
         if let Some(ms) = text.given(&self.latency_ms, number(0.0..=1500.0, "ms"))? {
-            settings.ship_latency_ns = bowwave_core::time::secs_to_ns(ms * 1e-3);
+            settings.ship.latency_ns = bowwave_core::time::secs_to_ns(ms * 1e-3);
         }
         if let Some(deg) = text.given(&self.sigma_deg, sigma())? {
-            settings.ship_sigma = deg.to_radians();
+            settings.ship.sigma = deg.to_radians();
         }
-        let usual = ShipSettings::new(self.device.into_inner());
+        let usual = LineSettings::ship(self.device.into_inner());
         let baud = text.given(&self.baud, baud_rates())?.unwrap_or_else(|| usual.baud.clone());
-        Ok(ShipSettings { baud, ..usual })
+        Ok(LineSettings { baud, ..usual })
     }
 }
 

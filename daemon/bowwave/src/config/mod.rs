@@ -12,7 +12,7 @@ pub use self::heading::HeadingChoice;
 use anyhow::{Context, Result};
 use bowwave_core::{
     estimate::attitude::Source as Orientation,
-    text::toml::{OptionalKey, RenamedKey, Spanned, TomlError, TomlText, bounded_text, number, one_of},
+    text::toml::{OptionalKey, RenamedKey, Spanned, TEXT_BYTES_MAX, TomlError, TomlText, number, one_of},
 };
 use bowwave_devices::{
     camera::CameraSettings,
@@ -21,8 +21,8 @@ use bowwave_devices::{
     serial::ImuSettings,
     trigger::{InputLine, InterlockWiring},
 };
-use bowwave_files::plain_file;
-use bowwave_trainer::supervisor::HealthSettings;
+use bowwave_files::plain_text;
+use bowwave_trainer::{presenter::GpuSettings, supervisor::HealthSettings};
 use serde::Deserialize;
 
 use crate::{cli::parse_size, loading::warn_of_former_names};
@@ -51,6 +51,8 @@ pub struct TriggerChoice {
 /// Checked settings. Everything has a default; the command line overrides it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
+    /// Former names of keys that the text uses, each with its place and the new name.
+    pub warnings: Vec<String>,
     /// Where frames are shown.
     pub output: ScreenOutput,
     /// Picture size in pixels; without it the LCD's own.
@@ -65,6 +67,19 @@ pub struct Config {
     pub orientation: Orientation,
     /// Where headings come from beside the inertial unit.
     pub heading: HeadingChoice,
+    /// What is wired to the computer's GPIO lines.
+    pub gpio: GpioSettings,
+    /// The GPU.
+    pub gpu: GpuSettings,
+    /// Files that are read and written.
+    pub files: FileSettings,
+    /// Sensors that are watched besides the devices.
+    pub health: HealthSettings,
+}
+
+/// What is wired to the computer's GPIO lines, besides presses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GpioSettings {
     /// The trigger's line; without it nothing fires.
     pub trigger: Option<TriggerChoice>,
     /// The input that tells that the gun is inert; without it the trainer does not arm.
@@ -73,12 +88,11 @@ pub struct Config {
     pub power_fail: Option<InputLine>,
     /// The lamps.
     pub lamps: Option<LampSettings>,
-    /// Vulkan device by number or part of its name.
-    pub gpu: Option<String>,
-    /// Whether to run with the validation layer.
-    pub validation: bool,
-    /// How long the GPU may take over a frame before it counts as hung.
-    pub gpu_timeout: Option<Duration>,
+}
+
+/// The table `[files]`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct FileSettings {
     /// Scenario file or the name of a built-in one.
     pub scenario: Option<PathBuf>,
     /// Calibration file.
@@ -89,10 +103,6 @@ pub struct Config {
     pub record_exact: bool,
     /// Folder for hits, recordings and the last good configuration; without it the service's state folder.
     pub data: Option<PathBuf>,
-    /// Sensors that are watched besides the devices.
-    pub health: HealthSettings,
-    /// Former names of keys that the text uses, each with its place and the new name.
-    pub warnings: Vec<String>,
 }
 
 /// Former names of keys.
@@ -114,7 +124,7 @@ struct RawConfig {
     landmarks: heading::RawLandmarks,
     heading: heading::RawHeading,
     trigger: Option<devices::RawGpioLine>,
-    interlock: Option<devices::RawInterlock>,
+    interlock: Option<devices::RawGpioLine>,
     power_fail: Option<devices::RawGpioLine>,
     lamps: Option<devices::RawLamps>,
     gpu: RawGpu,
@@ -160,7 +170,7 @@ struct RawHealth {
 
 /// Reads and checks a configuration file. Relative paths in it are taken from its own folder.
 pub fn read(path: &Path) -> Result<Config> {
-    let text = plain_file(path).and_then(bounded_text).with_context(|| {
+    let text = plain_text(path, TEXT_BYTES_MAX).with_context(|| {
         format!("cannot read the configuration {}; name an existing file with --config", path.display())
     })?;
     let base = path.parent().unwrap_or(Path::new("."));
@@ -215,18 +225,24 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         camera: raw.camera.check(text)?,
         orientation: raw.imu.orientation(text)?,
         imu: raw.imu.check(text)?,
-        trigger: raw.trigger.map(|line| line.trigger(text)).transpose()?,
-        interlock: raw.interlock.map(|interlock| interlock.wiring(text)).transpose()?,
-        power_fail: input(raw.power_fail)?,
-        lamps: raw.lamps.map(|lamps| lamps.settings(text)).transpose()?,
-        gpu: raw.gpu.device.map(Spanned::into_inner),
-        validation: raw.gpu.validation,
-        gpu_timeout: timeout_ms.map(|ms| Duration::from_secs_f64(ms * 1e-3)),
-        scenario,
-        calibration: raw.files.calibration.map(|p| base.join(p)),
-        record: raw.files.record,
-        record_exact: raw.files.record_exact,
-        data: raw.files.data.map(|p| base.join(p)),
+        gpio: GpioSettings {
+            trigger: raw.trigger.map(|line| line.trigger(text)).transpose()?,
+            interlock: raw.interlock.map(|line| line.interlock(text)).transpose()?,
+            power_fail: input(raw.power_fail)?,
+            lamps: raw.lamps.map(|lamps| lamps.settings(text)).transpose()?,
+        },
+        gpu: GpuSettings {
+            device: raw.gpu.device.map(Spanned::into_inner),
+            validation: raw.gpu.validation,
+            timeout: timeout_ms.map(|ms| Duration::from_secs_f64(ms * 1e-3)),
+        },
+        files: FileSettings {
+            scenario,
+            calibration: raw.files.calibration.map(|p| base.join(p)),
+            record: raw.files.record,
+            record_exact: raw.files.record_exact,
+            data: raw.files.data.map(|p| base.join(p)),
+        },
         health: HealthSettings { thermal: raw.health.thermal, temperature_c_max },
         warnings,
     })

@@ -38,7 +38,9 @@ fn every_key_that_the_installed_file_shows_is_valid() {
     assert!(shown > 40, "only {shown} keys");
     let config = parse(&whole, "systemd/bowwave.toml", Path::new(".")).unwrap();
     assert_eq!(config.warnings, [""; 0]);
-    assert!(config.trigger.is_some() && config.lamps.is_some() && config.heading.presses.len() == 2);
+    assert!(
+        config.gpio.trigger.is_some() && config.gpio.lamps.is_some() && config.heading.presses.len() == 2
+    );
 }
 
 #[test]
@@ -127,7 +129,7 @@ fn every_key_is_read() {
     assert_eq!(camera.controls.exposure, Exposure::Locked { time_us: 5000 });
     assert_eq!(camera.controls.white_balance, WhiteBalance::Auto);
     assert_eq!((camera.buffers, camera.readout_us, camera.controls.gain), (5, Some(9000), Some(4)));
-    assert_eq!(config.imu.baud, Baud::Scan(vec![115_200, 921_600]));
+    assert_eq!(config.imu.line.baud, Baud::Scan(vec![115_200, 921_600]));
     assert_eq!(config.imu.format, Some(ImuFormat::Xsens));
     assert_eq!(config.orientation, Orientation::Fused);
     let line = |chip: &str, line: &str, active_low, bias| InputLine {
@@ -138,10 +140,10 @@ fn every_key_is_read() {
     };
     let heading = &config.heading;
     let ship = heading.ship.as_ref().unwrap();
-    assert_eq!(ship.device, Path::new("/dev/serial/by-id/usb-Moxa_*-port0"));
+    assert_eq!(ship.device.as_deref(), Some(Path::new("/dev/serial/by-id/usb-Moxa_*-port0")));
     assert_eq!(ship.baud, Baud::Scan(vec![4_800, 38_400]));
     let s = &heading.settings;
-    assert_eq!((s.ship_latency_ns, s.ship_sigma), (70_000_000, 0.4f64.to_radians()));
+    assert_eq!((s.ship.latency_ns, s.ship.sigma), (70_000_000, 0.4f64.to_radians()));
     let stow = s.stow.unwrap();
     assert_eq!(stow.from_bow, Some((-90f64).to_radians()));
     assert_eq!((stow.from_north, stow.sigma), (Some(318f64.to_radians()), 0.3f64.to_radians()));
@@ -156,21 +158,27 @@ fn every_key_is_read() {
     let landmark = Press { line: line("/dev/gpiochip0", "9", false, Bias::AsIs), kind: MarkKind::Landmark };
     assert_eq!(heading.presses, [rezero, landmark]);
     let trigger = line("/dev/gpiochip0", "17", true, Bias::AsIs);
-    assert_eq!(config.trigger, Some(TriggerChoice { line: trigger, debounce: Duration::from_millis(12) }));
+    assert_eq!(
+        config.gpio.trigger,
+        Some(TriggerChoice { line: trigger, debounce: Duration::from_millis(12) })
+    );
     let interlock = InterlockWiring {
         contact: line("/dev/gpiochip0", "inert", false, Bias::ExternalPullDown),
         second: Some(line("/dev/gpiochip0", "9", true, Bias::PullUp)),
         discrepancy: Duration::from_millis(300),
     };
-    assert_eq!(config.interlock, Some(interlock));
-    assert_eq!(config.power_fail, Some(line("gpio-sim", "2", false, Bias::AsIs)));
-    let lamps = config.lamps.unwrap();
+    assert_eq!(config.gpio.interlock, Some(interlock));
+    assert_eq!(config.gpio.power_fail, Some(line("gpio-sim", "2", false, Bias::AsIs)));
+    let lamps = config.gpio.lamps.unwrap();
     assert_eq!((lamps.ready.as_deref(), lamps.hit, lamps.fault.as_deref()), (Some("ready"), None, Some("5")));
-    assert_eq!((config.gpu.as_deref(), config.validation), (Some("llvm"), true));
-    assert_eq!(config.gpu_timeout, Some(std::time::Duration::from_millis(900)));
-    assert_eq!(config.scenario, Some("/etc/a.toml".into()));
-    assert_eq!((config.calibration, config.record), (Some("/b.toml".into()), true));
-    assert_eq!((config.data, config.health.temperature_c_max), (Some("/var/lib/bowwave".into()), Some(85.0)));
+    assert_eq!((config.gpu.device.as_deref(), config.gpu.validation), (Some("llvm"), true));
+    assert_eq!(config.gpu.timeout, Some(std::time::Duration::from_millis(900)));
+    assert_eq!(config.files.scenario, Some("/etc/a.toml".into()));
+    assert_eq!((config.files.calibration, config.files.record), (Some("/b.toml".into()), true));
+    assert_eq!(
+        (config.files.data, config.health.temperature_c_max),
+        (Some("/var/lib/bowwave".into()), Some(85.0))
+    );
 }
 
 #[test]
@@ -222,6 +230,14 @@ fn mistakes_are_refused_where_they_are() {
         (
             "[interlock]\nchip = \"a\"\nline = 1\nsecond = { chip = \"a\", line = 2, bias = \"up\" }\n",
             "x.toml:4:41: interlock.second.bias: \"up\" is not allowed; give one of",
+        ),
+        (
+            "[trigger]\nchip = \"a\"\nline = 1\nsecond = { chip = \"a\", line = 2 }\n",
+            "x.toml:4:10: trigger.second: is for [interlock] alone",
+        ),
+        (
+            "[interlock]\nchip = \"a\"\nline = 1\nsecond = { chip = \"a\", line = 2, discrepancy_ms = 20 }\n",
+            "x.toml:4:51: interlock.second.discrepancy_ms: is for [interlock] alone",
         ),
         (
             "[interlock]\nchip = \"a\"\nline = 1\ndiscrepancy_ms = 0\n",

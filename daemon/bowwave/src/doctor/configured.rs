@@ -36,7 +36,7 @@ pub(super) fn checks(path: &Path) -> Vec<Check> {
     };
     let mut checks = files(path, &settings);
     let config = &settings.config;
-    let wanted = bowwave_render::find_device(config.gpu.as_deref().unwrap_or("0"));
+    let wanted = bowwave_render::find_device(config.gpu.device.as_deref().unwrap_or("0"));
     checks.push(match wanted {
         Ok(device) => check("vulkan", Verdict::Ok, format!("{} draws", device.name)),
         Err(e) => failed("vulkan", e),
@@ -45,7 +45,7 @@ pub(super) fn checks(path: &Path) -> Vec<Check> {
     let camera = thread::scope(|scope| {
         let camera = scope.spawn(|| camera(&settings));
         let ship =
-            config.heading.ship.as_ref().map(|ship| scope.spawn(|| super::ship::check(ship, LISTEN_SHIP)));
+            config.heading.ship.clone().map(|ship| scope.spawn(|| super::ship::check(ship, LISTEN_SHIP)));
         checks.push(imu(config));
         let broke_down = |name| move |_| failed(name, "the check broke down; report it");
         checks.extend(ship.map(|ship| ship.join().unwrap_or_else(broke_down("ship"))));
@@ -158,12 +158,12 @@ fn imu(config: &Config) -> Check {
     };
     let (status, counters) = (&found.status, found.status.said.counters);
     let text = format!(
-        "{}: {} samples in {:.1} s, {} damaged packets, low latency {:?}",
+        "{}: {} samples in {:.1} s, {} damaged packets, low latency {}",
         super::imu::unit(status),
         counters.samples,
         LISTEN.as_secs_f64(),
         counters.bad_crc,
-        status.line.low_latency
+        super::imu::low_latency(&status.line)
     );
     verdict("imu", &found.faults, text, counters.samples >= PICTURES_MIN)
 }
@@ -187,25 +187,25 @@ fn lines(config: &Config) -> Vec<Check> {
         }
         Err(e) => failed(name, e),
     };
-    checks.push(match &config.trigger {
+    checks.push(match &config.gpio.trigger {
         Some(t) => one("trigger", &t.line, "pressed", "not pressed"),
         None => failed("trigger", "none is configured: set [trigger] to its line"),
     });
-    checks.push(super::interlock::wiring(config.interlock.as_ref()));
-    let contacts = config.interlock.iter().flat_map(InterlockWiring::contacts);
+    checks.push(super::interlock::wiring(config.gpio.interlock.as_ref()));
+    let contacts = config.gpio.interlock.iter().flat_map(InterlockWiring::contacts);
     checks.extend(contacts.map(|line| {
         one("interlock", line, "inert: the trainer arms", "NOT inert: the trainer does not arm")
     }));
-    if let Some(line) = &config.power_fail {
+    if let Some(line) = &config.gpio.power_fail {
         checks.push(one("power-fail", line, "power is failing", "power is good"));
     }
     for press in &config.heading.presses {
         checks.push(one(press.name(), &press.line, "pressed", "not pressed"));
     }
-    if let Some(lamps) = &config.lamps {
-        let trigger = config.trigger.as_ref().map(|t| TriggerSettings {
-            interlock: config.interlock.clone(),
-            power_fail: config.power_fail.clone(),
+    if let Some(lamps) = &config.gpio.lamps {
+        let trigger = config.gpio.trigger.as_ref().map(|t| TriggerSettings {
+            interlock: config.gpio.interlock.clone(),
+            power_fail: config.gpio.power_fail.clone(),
             presses: config.heading.presses.clone(),
             ..TriggerSettings::new(t.line.clone())
         });

@@ -6,7 +6,7 @@ use anyhow::Result;
 use bowwave_core::estimate::clock::{ClockReport, DRIFT_MUCH_PPM};
 use bowwave_devices::{
     imu::ImuFormat,
-    serial::{self, ImuSettings, ImuStatus, LineStatus},
+    serial::{self, ImuSettings, ImuStatus, LineReport, LineStatus, LowLatency},
 };
 
 use super::{Check, Verdict, check, configured, failed};
@@ -22,7 +22,7 @@ pub(super) fn checks(arguments: &DoctorImu) -> Result<Vec<Check>> {
         None => ImuSettings::default(),
     };
     if let Some(device) = &arguments.device {
-        settings.device = Some(device.clone());
+        settings.line.device = Some(device.clone());
     }
     let time = Duration::from_secs(u64::from(arguments.seconds));
     let found = match serial::check(settings, time) {
@@ -47,8 +47,7 @@ pub(super) fn checks(arguments: &DoctorImu) -> Result<Vec<Check>> {
 /// Which unit answers, where and how fast.
 pub(super) fn unit(status: &ImuStatus) -> String {
     let (line, said) = (&status.line, &status.said);
-    let (Some(node), Some(baud)) = (&line.node, line.baud) else { return "no unit answers".to_owned() };
-    let place = format!("{} at {baud} baud", node.display());
+    let Some(place) = &line.open else { return "no unit answers".to_owned() };
     match said.format {
         Some(format) if said.timing.period_ms > 0.0 => {
             format!("{place}: {format}, {:.1} samples a second", 1e3 / said.timing.period_ms)
@@ -112,7 +111,7 @@ fn line(status: &ImuStatus) -> String {
     let (line, c) = (&status.line, status.said.counters);
     format!(
         "{} packets, of them {} samples, {} parts and other ones, {} that lack something, {} with numbers that are none; {} \
-         damaged, {} bytes of no packet; {} framing errors, {} overruns; low latency {:?}",
+         damaged, {} bytes of no packet; {} framing errors, {} overruns; low latency {}",
         c.packets,
         c.samples,
         c.other,
@@ -122,15 +121,25 @@ fn line(status: &ImuStatus) -> String {
         c.skipped_bytes,
         line.framing_errors,
         line.overruns,
-        line.low_latency
+        low_latency(line)
     )
+}
+
+/// Whether the adapter hands bytes on at once, for people.
+pub(super) fn low_latency(line: &LineReport) -> &'static str {
+    match line.open.as_ref().map(|open| open.low_latency) {
+        None | Some(LowLatency::NotAsked) => "not asked for",
+        Some(LowLatency::Set) => "on",
+        Some(LowLatency::NotOffered) => "not offered by the adapter's driver",
+        Some(LowLatency::Refused) => "refused to this user",
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use bowwave_devices::{
         imu::Fields,
-        serial::{ArrivalTiming, ImuReport, LineReport},
+        serial::{ArrivalTiming, ImuReport, OpenLine},
     };
 
     use super::*;
@@ -138,8 +147,11 @@ mod tests {
     fn status() -> ImuStatus {
         ImuStatus {
             line: LineReport {
-                node: Some("/dev/ttyUSB0".into()),
-                baud: Some(115_200),
+                open: Some(OpenLine {
+                    node: "/dev/ttyUSB0".into(),
+                    baud: 115_200,
+                    low_latency: LowLatency::Set,
+                }),
                 ..LineReport::default()
             },
             said: ImuReport {

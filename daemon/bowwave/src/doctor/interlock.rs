@@ -19,8 +19,8 @@ const STEADY_S: f64 = 0.2;
 /// Tests the interlock that the configuration names.
 pub(super) fn checks(arguments: &DoctorInterlock) -> Result<Vec<Check>> {
     let config = config::read(&arguments.config)?;
-    let mut checks = vec![self::wiring(config.interlock.as_ref())];
-    let Some(wiring) = config.interlock.as_ref().filter(|wiring| wiring.check().is_ok()) else {
+    let mut checks = vec![self::wiring(config.gpio.interlock.as_ref())];
+    let Some(wiring) = config.gpio.interlock.as_ref().filter(|wiring| wiring.check().is_ok()) else {
         return Ok(checks);
     };
     let probe =

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bowwave_devices::serial::{self, ShipSettings, ShipStatus};
+use bowwave_devices::serial::{self, LineSettings, ShipStatus};
 
 use super::{Check, configured, failed};
 
@@ -10,7 +10,7 @@ use super::{Check, configured, failed};
 const HEADINGS_MIN: u64 = 2;
 
 /// Listens to the feed for `time`.
-pub(super) fn check(settings: &ShipSettings, time: Duration) -> Check {
+pub(super) fn check(settings: LineSettings, time: Duration) -> Check {
     match serial::check_ship(settings, time) {
         Ok(found) => {
             let enough = found.status.said.headings >= HEADINGS_MIN;
@@ -21,10 +21,7 @@ pub(super) fn check(settings: &ShipSettings, time: Duration) -> Check {
 }
 
 fn told(status: &ShipStatus) -> String {
-    let (Some(node), Some(baud)) = (&status.line.node, status.line.baud) else {
-        return "no ship feed answers".to_owned();
-    };
-    let place = format!("{} at {baud} baud", node.display());
+    let Some(place) = &status.line.open else { return "no ship feed answers".to_owned() };
     let lines = status.said.lines;
     let counts = format!(
         "{} headings in {} lines, {} damaged, {} bytes of no line",
@@ -51,7 +48,7 @@ mod tests {
     use bowwave_core::{event::ShipSample, time::Time};
     use bowwave_devices::{
         nmea::{LineCounters, NmeaSentence},
-        serial::{LineReport, ShipReport},
+        serial::{LineReport, LowLatency, OpenLine, ShipReport},
     };
 
     use super::*;
@@ -72,8 +69,8 @@ mod tests {
             headings: 25,
             lines: LineCounters { packets: 50, bad_crc: 1, skipped_bytes: 7 },
         };
-        let line =
-            LineReport { node: Some("/dev/ttyUSB1".into()), baud: Some(4800), ..LineReport::default() };
+        let open = OpenLine { node: "/dev/ttyUSB1".into(), baud: 4800, low_latency: LowLatency::Set };
+        let line = LineReport { open: Some(open), ..LineReport::default() };
         let told_now = told(&ShipStatus { line: line.clone(), said });
         assert_eq!(
             told_now,
@@ -87,7 +84,7 @@ mod tests {
 
     #[test]
     fn a_feed_that_is_not_there_fails_with_what_to_do() {
-        let found = check(&ShipSettings::new("/dev/absent-ship".into()), Duration::from_millis(300));
+        let found = check(LineSettings::ship("/dev/absent-ship".into()), Duration::from_millis(300));
         assert_eq!(found.verdict, super::super::Verdict::Failed);
         assert!(found.found.contains("absent-ship"), "{}", found.found);
     }

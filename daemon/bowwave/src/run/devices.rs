@@ -5,7 +5,7 @@ use std::time::Duration;
 use bowwave_core::fault::{Fault, FaultChange};
 use bowwave_devices::{
     clock::now,
-    trigger::{InterlockWiring, TriggerSettings},
+    trigger::{InputLine, InterlockWiring, TriggerSettings, named_inputs},
 };
 use bowwave_render::TimeOuts;
 use bowwave_trainer::{
@@ -31,22 +31,18 @@ pub fn device_settings(settings: &Settings, mode: Mode, faults: &mut Vec<FaultCh
         imu: training.then(|| config.imu.clone()),
         ship: config.heading.ship.clone().filter(|_| training),
         trigger: if training { trigger(settings, faults) } else { None },
-        lamps: config.lamps.clone().map(|lamps| LampChoice { lamps, inputs: inputs(config) }),
+        lamps: config.gpio.lamps.clone().map(|lamps| LampChoice { lamps, inputs: inputs(config) }),
         health: config.health.clone(),
-        gpu_timeout: config.gpu_timeout.unwrap_or(TimeOuts::default().frame),
+        gpu_timeout: config.gpu.timeout.unwrap_or(TimeOuts::default().frame),
     }
 }
 
 /// All configured inputs. No lamp may be one of them, whether it is used now or not.
-fn inputs(config: &Config) -> Vec<(&'static str, bowwave_devices::trigger::InputLine)> {
-    let lines = [
-        ("trigger", config.trigger.as_ref().map(|t| &t.line)),
-        ("interlock", config.interlock.as_ref().map(|interlock| &interlock.contact)),
-        ("second interlock", config.interlock.as_ref().and_then(|interlock| interlock.second.as_ref())),
-        ("power-fail", config.power_fail.as_ref()),
-    ];
-    let presses = config.heading.presses.iter().map(|press| (press.name(), Some(&press.line)));
-    lines.into_iter().chain(presses).filter_map(|(name, line)| Some((name, line?.clone()))).collect()
+fn inputs(config: &Config) -> Vec<(&'static str, InputLine)> {
+    let trigger = config.gpio.trigger.as_ref().map(|t| &t.line);
+    let (interlock, power_fail) = (config.gpio.interlock.as_ref(), config.gpio.power_fail.as_ref());
+    let inputs = named_inputs(trigger, interlock, power_fail, &config.heading.presses);
+    inputs.map(|(name, line)| (name, line.clone())).collect()
 }
 
 /// The interlock, where it can be believed; else why the trainer does not arm.
@@ -56,7 +52,7 @@ fn interlock(settings: &Settings) -> Result<InterlockWiring, (Fault, String)> {
         let why = "the configuration was refused: correct it and reload; an earlier one may name the interlock of another gun";
         return Err((Fault::FormerConfig, why.to_owned()));
     }
-    let Some(interlock) = &settings.config.interlock else {
+    let Some(interlock) = &settings.config.gpio.interlock else {
         let why = "no interlock is configured: set [interlock] to the line that tells that the gun is inert";
         return Err(unsafe_wiring(why.to_owned()));
     };
@@ -75,7 +71,7 @@ fn trigger(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<Trigger
     let interlock = interlock(settings)
         .map_err(|(fault, cause)| faults.push(FaultChange::raised(now(), fault, cause)))
         .ok();
-    let Some(trigger) = &config.trigger else {
+    let Some(trigger) = &config.gpio.trigger else {
         let cause = "no trigger is configured: set [trigger] to its line";
         faults.push(FaultChange::raised(now(), Fault::TriggerLost, cause));
         return None;
@@ -86,7 +82,7 @@ fn trigger(settings: &Settings, faults: &mut Vec<FaultChange>) -> Option<Trigger
         stuck_after: (Duration::try_from_secs_f64(belt_s).unwrap_or(STUCK_MOST) + STUCK_BEYOND)
             .min(STUCK_MOST),
         interlock,
-        power_fail: config.power_fail.clone(),
+        power_fail: config.gpio.power_fail.clone(),
         presses: config.heading.presses.clone(),
         ..TriggerSettings::new(trigger.line.clone())
     })

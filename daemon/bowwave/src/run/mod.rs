@@ -23,7 +23,7 @@ use bowwave_devices::clock::now;
 use bowwave_record::{JournalOptions, Run as JournalRun};
 use bowwave_trainer::{
     Ended, Signals, TickClock, Trainer, TrainerOptions,
-    presenter::{OutputOptions, PresenterOptions},
+    presenter::{GpuSettings, OutputOptions, PresenterOptions},
     source::{Devices, Source},
     storage::{Storage, StorageOptions},
     summary::SummaryOptions,
@@ -58,7 +58,7 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
         let data = arguments
             .data
             .clone()
-            .or_else(|| settings.config.data.clone())
+            .or_else(|| settings.config.files.data.clone())
             .or_else(|| state.clone())
             .unwrap_or_else(|| Path::new(DATA).into());
         if let Err(e) = std::fs::create_dir_all(&data) {
@@ -121,9 +121,7 @@ impl Gun<'_> {
         };
         let config = &settings.config;
         let presenter = PresenterOptions {
-            gpu: gpu(&settings, self.mode),
-            validation: config.validation,
-            gpu_timeout: config.gpu_timeout,
+            gpu: gpu(&config.gpu, self.mode),
             output: OutputOptions {
                 reporter: Some(devices.output_reporter()),
                 lcd: devices.lcd(),
@@ -165,7 +163,7 @@ impl Gun<'_> {
                 end_within: Duration::from_millis(700),
                 ..JournalOptions::default()
             },
-            recording: settings.config.record.then(|| recording_in(self.data, "recording", settings)),
+            recording: settings.config.files.record.then(|| recording_in(self.data, "recording", settings)),
             strict: false,
             print_commits: self.arguments.print_commits,
         }
@@ -180,20 +178,21 @@ fn make_safe(settings: &mut Settings) -> Result<()> {
     settings.setup.models = Vec::new().into();
     settings.setup.boat_models = Vec::new();
     settings.setup.video = PixelFormat::Yuyv;
-    settings.config.record = false;
+    settings.config.files.record = false;
     Ok(())
 }
 
 /// The configured device; in SAFE MODE software where there is one, for it may be the GPU's driver that crashes.
-fn gpu(settings: &Settings, mode: Mode) -> Option<String> {
+fn gpu(configured: &GpuSettings, mode: Mode) -> GpuSettings {
     let software = || {
         let devices = bowwave_render::devices().ok()?;
         devices.iter().find(|d| d.software).map(|d| d.index.to_string())
     };
-    match mode {
-        Mode::Training => settings.config.gpu.clone(),
-        Mode::Safe => software().or_else(|| settings.config.gpu.clone()),
-    }
+    let device = match mode {
+        Mode::Training => None,
+        Mode::Safe => software(),
+    };
+    GpuSettings { device: device.or_else(|| configured.device.clone()), ..configured.clone() }
 }
 
 /// SIGTERM and SIGINT end the run, SIGHUP has the settings read anew, SIGUSR1 says that the gun stands at its stow.

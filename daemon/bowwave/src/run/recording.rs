@@ -15,7 +15,7 @@ const NAMES: u32 = 1000;
 /// A recording in `folder` whose name begins with `name`; no file of that name is there yet.
 pub fn recording_in(folder: &Path, name: &str, settings: &Settings) -> RecorderOptions {
     let lens = &settings.setup.calibration.lens;
-    let exact_pixels = settings.config.record_exact;
+    let exact_pixels = settings.config.files.record_exact;
     let mut extra: BTreeMap<String, String> =
         [("eye_height_m".to_owned(), settings.setup.scenario.eye_height_m.to_string())].into();
     extra.extend(session_properties(&settings.setup, &settings.models_base));

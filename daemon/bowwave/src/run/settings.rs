@@ -15,11 +15,11 @@ use bowwave_core::{
     geometry::Lens,
     model::Model,
     session::Setup,
-    text::toml::bounded_text,
+    text::toml::TEXT_BYTES_MAX,
     world::scenario::{self, Scenario},
 };
 use bowwave_devices::{camera::CameraSettings, clock::now};
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
@@ -143,8 +143,8 @@ impl Reader {
             possible(&file.calibration.lens).with_context(|| origin.to_owned())?;
             Ok(file)
         };
-        let accepted = self.accept("calibration.toml", config.calibration.as_deref(), parse);
-        match (&accepted, &config.calibration) {
+        let accepted = self.accept("calibration.toml", config.files.calibration.as_deref(), parse);
+        match (&accepted, &config.files.calibration) {
             (Some(a), _) => {
                 if let Some(why) = &a.refused {
                     refuse(Fault::Config, &why_and_instead(why, "the last good calibration is used"));
@@ -179,7 +179,7 @@ impl Reader {
             scenario.check_clearance(&boats.iter().map(radius).collect::<Vec<_>>())?;
             Ok((scenario, text.to_owned(), models, boats, base.to_owned()))
         };
-        if let Some(path) = &config.scenario {
+        if let Some(path) = &config.files.scenario {
             let named = read_scenario(path).and_then(|(text, base)| {
                 let loaded = load(&text, &path.display().to_string(), &base)?;
                 self.keep("scenario.toml", &text);
@@ -251,7 +251,7 @@ impl Reader {
 }
 
 fn read_text(path: &Path) -> Result<String> {
-    plain_file(path).and_then(bounded_text).with_context(|| format!("cannot read {}", path.display()))
+    plain_text(path, TEXT_BYTES_MAX).with_context(|| format!("cannot read {}", path.display()))
 }
 
 /// Whether there are cameras of this size, in every coding.

@@ -7,7 +7,7 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
-    time::{Duration, SystemTime},
+    time::SystemTime,
 };
 
 use anyhow::{Context, Result, bail};
@@ -146,9 +146,6 @@ fn open_replay(
 fn presenter(arguments: &Simulate, prepared: &Prepared, realtime: bool, frames: u64) -> PresenterOptions {
     PresenterOptions {
         gpu: prepared.gpu.clone(),
-        validation: prepared.validation,
-        // A desk may do other work than to draw: half a second without a frame is no hung GPU there.
-        gpu_timeout: Some(Duration::from_secs(5)),
         output: OutputOptions {
             folder: arguments.out.clone(),
             frames,

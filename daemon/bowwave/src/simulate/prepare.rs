@@ -1,6 +1,9 @@
 //! What a run is made of, gathered from the command line, the configuration, the recording and what is built in.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::CalibrationFile;
@@ -9,12 +12,12 @@ use bowwave_core::{
     event::PixelFormat,
     model::{Model, ModelId},
     session::Setup,
-    text::toml::bounded_text,
+    text::toml::TEXT_BYTES_MAX,
     world::scenario::{self, Scenario},
 };
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 use bowwave_record::{Properties, RecordingReader};
-use bowwave_trainer::replay::session_properties;
+use bowwave_trainer::{presenter::GpuSettings, replay::session_properties};
 
 use crate::{
     cache,
@@ -43,10 +46,8 @@ pub struct Prepared {
     pub calibration_toml: String,
     /// Folder that the paths of the scenario's models start from.
     pub models_base: PathBuf,
-    /// Vulkan device by number or part of its name.
-    pub gpu: Option<String>,
-    /// Whether to validate.
-    pub validation: bool,
+    /// The GPU.
+    pub gpu: GpuSettings,
     /// Whether to show a window.
     pub window: bool,
     /// Whether to keep what went in.
@@ -64,8 +65,11 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
     let properties = reader.properties().clone();
     let duration_ns = reader.duration_ns();
 
-    let (calibration, calibration_toml) =
-        calibration(arguments.calibration.as_ref().or(config.calibration.as_ref()), &properties, &recording)?;
+    let (calibration, calibration_toml) = calibration(
+        arguments.calibration.as_ref().or(config.files.calibration.as_ref()),
+        &properties,
+        &recording,
+    )?;
     let (lens, picture) = (&calibration.calibration.lens, properties.picture);
     if picture != (0, 0) && picture != (lens.width, lens.height) {
         bail!(
@@ -78,7 +82,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
             picture.1
         );
     }
-    let named = arguments.scenario.as_ref().or(config.scenario.as_ref());
+    let named = arguments.scenario.as_ref().or(config.files.scenario.as_ref());
     let (mut scenario, scenario_toml, base) = scenario(named, &properties, &recording)?;
     if let Some(seed) = arguments.seed {
         scenario.seed = seed;
@@ -109,10 +113,14 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
         scenario_toml,
         calibration_toml,
         models_base: base,
-        gpu: arguments.gpu.clone().or(config.gpu),
-        validation: arguments.validation || config.validation,
+        gpu: GpuSettings {
+            device: arguments.gpu.clone().or(config.gpu.device),
+            validation: arguments.validation || config.gpu.validation,
+            // A desk may do other work than to draw: half a second without a frame is no hung GPU there.
+            timeout: Some(Duration::from_secs(5)),
+        },
         window: arguments.window || config.output == ScreenOutput::Window && !arguments.headless,
-        record: arguments.record || config.record,
+        record: arguments.record || config.files.record,
     })
 }
 
@@ -136,7 +144,7 @@ fn calibration(
 ) -> Result<(CalibrationFile, String)> {
     let (text, origin) = match named {
         Some(path) => {
-            let text = plain_file(path).and_then(bounded_text).with_context(|| {
+            let text = plain_text(path, TEXT_BYTES_MAX).with_context(|| {
                 format!(
                     "cannot read the calibration {}; name an existing file with --calibration",
                     path.display()

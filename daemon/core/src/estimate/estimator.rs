@@ -9,12 +9,14 @@ use super::{
     horizon::Mask,
     light::{Light, LightMeter, SeaTones, SkyLight},
     pose::NoPose,
+    registration::Misfit,
     sea::SeaConditions,
     sea_state::{SeaReport, SeaStateTracker},
     sensors::{SensorCounts, Sensors},
 };
 use crate::{
     calibration::Calibration,
+    daylight::Daylight,
     event::{CameraFrame, ImuSample, Mark, ShipSample},
     fault::{Fault, NotScored},
     geometry::{CameraPose, Lens},
@@ -35,10 +37,8 @@ pub struct EstimatorSettings<'a> {
     pub own_ship: Option<&'a Mask>,
     /// Height of the camera over the mean sea, metres.
     pub eye_height_m: f64,
-    /// Meteorological visibility, metres.
-    pub visibility_m: f64,
-    /// Unit vector towards the sun, world.
-    pub sun_direction: DVec3,
+    /// Where the sun stands, and how far one sees.
+    pub daylight: Daylight,
     /// Whether the brightness of the sea is measured.
     pub measures_tones: bool,
     /// Velocity of the wind that is assumed, world x and y, m/s.
@@ -91,9 +91,9 @@ impl Estimator {
                 settings.heading,
                 settings.own_ship,
                 eye_height_m,
-                settings.visibility_m,
+                settings.daylight.visibility_m,
             ),
-            light: LightMeter::new(settings.sun_direction, settings.measures_tones),
+            light: LightMeter::new(settings.daylight.sun_direction, settings.measures_tones),
             sea: settings.sea.map(|assumed| SeaStateTracker::new(assumed, wind, force)),
             assumed_wind: (wind, force),
             eye_height_m,
@@ -180,6 +180,16 @@ impl Estimator {
     /// The fault of the sensors at `now` that the sailor must know of; `None` where all is well.
     pub fn trouble(&self, now: Time) -> Option<Fault> {
         self.sensors.trouble(now)
+    }
+
+    /// How this is set up wrongly, where the pictures say so.
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.sensors.misfit()
+    }
+
+    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
+    pub fn unchecked_s(&self, now: Time) -> f64 {
+        self.sensors.unchecked_s(now)
     }
 
     /// The light that boats are drawn with.

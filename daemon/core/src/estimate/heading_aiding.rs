@@ -37,13 +37,20 @@ pub struct Landmark {
     pub sigma: f64,
 }
 
+/// How the headings of the ship's own instruments come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShipHeadings {
+    /// From the measurement to the arrival of its line, nanoseconds.
+    pub latency_ns: i64,
+    /// Standard deviation where the instruments tell none, radians.
+    pub sigma: f64,
+}
+
 /// Settings of heading aiding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeadingSettings {
-    /// From the ship's measurement to the arrival of its line, nanoseconds.
-    pub ship_latency_ns: i64,
-    /// Standard deviation of the ship's heading where its instruments tell none, radians.
-    pub ship_sigma: f64,
+    /// The ship's own headings.
+    pub ship: ShipHeadings,
     /// The bearing that the operator's press stands for.
     pub stow: Option<Stow>,
     /// What the camera's axis may lie on when the operator presses for a landmark.
@@ -59,8 +66,7 @@ pub struct HeadingSettings {
 impl Default for HeadingSettings {
     fn default() -> Self {
         Self {
-            ship_latency_ns: 0,
-            ship_sigma: 0.5f64.to_radians(),
+            ship: ShipHeadings { latency_ns: 0, sigma: 0.5f64.to_radians() },
             stow: None,
             landmarks: Vec::new(),
             own_growth: None,
@@ -219,7 +225,7 @@ impl HeadingAiding {
     pub(super) fn ship(&mut self, sample: &ShipSample, attitude: &mut Attitude) {
         let Some(heading) = sample.heading else { return };
         self.counts.ship += 1;
-        let time = sample.arrival.plus_ns(-self.settings.ship_latency_ns);
+        let time = sample.arrival.plus_ns(-self.settings.ship.latency_ns);
         let Ok(then) = attitude.at(time) else { return };
         let camera = attitude.camera(then.world_from_imu);
         let Some(bearing) = bearing_on_mount(camera, heading, sample) else { return };
@@ -227,7 +233,7 @@ impl HeadingAiding {
         if before.is_some_and(|b| time <= b.time) {
             return;
         }
-        let sigma = sample.heading_sigma.unwrap_or(self.settings.ship_sigma);
+        let sigma = sample.heading_sigma.unwrap_or(self.settings.ship.sigma);
         // An instrument that says that it is not at its best is believed half as much.
         let sigma = if sample.reduced { 2.0 * sigma } else { sigma };
         self.newest = Some(Newest { time, heading, sigma });
@@ -355,19 +361,16 @@ impl HeadingAiding {
     /// The ship's heading holds the gun's: the world is to be turned by `off`.
     fn hold(&mut self, time: Time, off: f64, line: f64, attitude: &mut Attitude) {
         let seen = HeadingSeen { time, off, variance: line * line };
-        match attitude.update_mount_yaw(&seen, NIS_GATE) {
-            Some(outcome) if outcome.taken => {
-                self.counts.ship_taken += 1;
-                self.refused_in_a_row = 0;
-            }
-            _ => {
-                self.counts.ship_refused += 1;
-                self.refused_in_a_row += 1;
-                if self.refused_in_a_row >= REFUSED_MAX {
-                    self.watched.clear();
-                    self.release();
-                }
-            }
+        if attitude.update_mount_yaw(&seen, NIS_GATE).is_some_and(|outcome| outcome.taken) {
+            self.counts.ship_taken += 1;
+            self.refused_in_a_row = 0;
+            return;
+        }
+        self.counts.ship_refused += 1;
+        self.refused_in_a_row += 1;
+        if self.refused_in_a_row >= REFUSED_MAX {
+            self.watched.clear();
+            self.release();
         }
     }
 

@@ -11,6 +11,7 @@ mod horizon_aiding;
 pub mod light;
 pub mod plausibility;
 pub mod pose;
+pub mod registration;
 pub mod sea;
 mod sea_state;
 mod sensors;
@@ -18,7 +19,7 @@ pub mod skyline;
 mod visual_compass;
 
 pub use estimator::{CameraEstimate, Estimator, EstimatorSettings, SceneLight};
-pub use heading_aiding::{HeadingCounts, HeadingSettings, Landmark, Stow};
+pub use heading_aiding::{HeadingCounts, HeadingSettings, Landmark, ShipHeadings, Stow};
 pub use horizon_aiding::HorizonCounts;
 pub use sea_state::{SeaReport, SeaStateTracker};
 pub use sensors::{SensorCounts, Sensors};

@@ -1,6 +1,6 @@
 //! Sensor data of the devices: orientation over time, the newest picture, and whether they can be trusted.
 
-use glam::DQuat;
+use glam::{DQuat, DVec3};
 
 use super::{
     heading_aiding::{HeadingAiding, HeadingCounts, HeadingSettings},
@@ -15,6 +15,7 @@ use crate::{
         horizon::Mask,
         plausibility::{Plausibility, is_possible},
         pose::{NoPose, OrientationAt, STALE_NS},
+        registration::{Misfit, Registration},
     },
     event::{CameraFrame, ImuSample, Mark, ShipSample},
     fault::Fault,
@@ -50,11 +51,13 @@ pub struct SensorCounts {
 /// Sensors of one session.
 #[derive(Debug)]
 pub struct Sensors {
+    gyro_bias: DVec3,
     time_offset_ns: i64,
     readout_ns: i64,
     lens: Lens,
     level: HorizonAiding,
     steady: VisualCompass,
+    registration: Registration,
     aid: HeadingAiding,
     clock: ClockMap,
     attitude: Attitude,
@@ -77,6 +80,7 @@ impl Sensors {
         let mut settings = AttitudeSettings::new(source, calibration);
         settings.own_growth = heading.own_growth.unwrap_or(settings.own_growth);
         Self {
+            gyro_bias: calibration.gyro_bias,
             time_offset_ns: calibration.time_offset_ns,
             readout_ns: calibration.readout_ns,
             lens: calibration.lens,
@@ -87,6 +91,7 @@ impl Sensors {
                 heading.sky_drift,
                 mask.cloned(),
             ),
+            registration: Registration::new(calibration.camera_from_imu, mask.cloned()),
             aid: HeadingAiding::new(heading.clone()),
             clock: ClockMap::new(),
             attitude: Attitude::new(settings, calibration.gyro_bias, calibration.camera_from_imu),
@@ -115,6 +120,7 @@ impl Sensors {
             self.steady.forget();
             self.aid.forget();
         }
+        self.registration.sample(time, sample, sample.rate - self.gyro_bias);
         self.attitude.observe(time, sample);
     }
 
@@ -173,7 +179,11 @@ impl Sensors {
         if let (Some(frame), Some(time)) = (&self.frame, self.video_time()) {
             // How a rolling shutter bent the picture is not known of the first one: an anchor in it would be wrong for as long as it holds.
             let Some(lens) = self.lens_read(time) else { return };
-            self.level.look(time, &frame.picture, &lens, &mut self.attitude);
+            let up = self.level.look(time, &frame.picture, &lens, &mut self.attitude);
+            if let Some(up) = up {
+                self.registration.up(time, &up, |time| self.attitude.up_alone(time));
+            }
+            self.registration.look(time, &frame.picture, &lens, &self.attitude);
             self.steady.look(time, &frame.picture, &lens, &mut self.attitude);
             self.counts.horizons = self.level.counts();
             self.counts.skyline = self.steady.counts();
@@ -220,6 +230,16 @@ impl Sensors {
     /// Time of the newest orientation.
     pub fn newest_orientation(&self) -> Option<Time> {
         self.attitude.newest()
+    }
+
+    /// How this is set up wrongly, where the pictures say so.
+    pub fn misfit(&self) -> Option<Misfit> {
+        self.registration.wrong()
+    }
+
+    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
+    pub fn unchecked_s(&self, now: Time) -> f64 {
+        self.registration.unchecked_s(now)
     }
 
     /// Counters.

@@ -116,18 +116,16 @@ impl VisualCompass {
         self.tell_drift(yaw.drift_sigma, attitude);
         let alike = LASTING_NS as f64 / EVERY_NS as f64;
         let variance = alike * (yaw.sigma * yaw.sigma + late * late);
-        match attitude.update_anchored_heading(&HeadingSeen { time, off: yaw.off, variance }, NIS_GATE) {
-            Some(outcome) if outcome.taken => {
-                self.counts.taken += 1;
-                self.refused_in_a_row = 0;
-            }
-            _ => {
-                self.counts.refused += 1;
-                self.refused_in_a_row += 1;
-                if self.refused_in_a_row >= REFUSED_MAX {
-                    self.forget();
-                }
-            }
+        let seen = HeadingSeen { time, off: yaw.off, variance };
+        if attitude.update_anchored_heading(&seen, NIS_GATE).is_some_and(|outcome| outcome.taken) {
+            self.counts.taken += 1;
+            self.refused_in_a_row = 0;
+            return;
+        }
+        self.counts.refused += 1;
+        self.refused_in_a_row += 1;
+        if self.refused_in_a_row >= REFUSED_MAX {
+            self.forget();
         }
     }
 

@@ -99,6 +99,22 @@ faults! {
     ImuBaud = "IMU_BAUD", NotScored, "IMU LOST: BAUD RATE", "WAIT, THEN REPLUG THE IMU";
     /// The unit is stuck, saturated, or sends what is no number.
     ImuSanity = "IMU_SANITY", NotScored, "IMU STUCK", "SWITCH THE IMU OFF AND ON";
+    /// The unit is turned against the camera, otherwise than calibrated.
+    UnitTurned = "REG_TURNED", NotScored, "IMU TURNED AGAINST CAMERA", "FIT THE IMU AS CALIBRATED";
+    /// An axis of the unit has the wrong sign.
+    UnitReversed = "REG_REVERSED", NotScored, "IMU AXIS REVERSED", "SET THE IMU'S AXES";
+    /// The unit's rates are in another unit of measurement.
+    RateUnit = "REG_RATE_UNIT", NotScored, "IMU RATES IN DEG/S", "SET THE IMU TO RAD/S";
+    /// The unit's specific force is in another unit of measurement.
+    ForceUnit = "REG_FORCE_UNIT", NotScored, "IMU FORCE IN G", "SET THE IMU TO M/S2";
+    /// The picture is of another lens than the calibrated one.
+    OtherLens = "REG_LENS", NotScored, "OTHER LENS OR ZOOM", "FIT THE CALIBRATED CAMERA";
+    /// The picture is mirrored.
+    PictureMirrored = "REG_MIRROR", NotScored, "PICTURE MIRRORED", "SWITCH THE CAMERA'S FLIP OFF";
+    /// Pictures come later than calibrated.
+    PictureLate = "REG_LATE", NotScored, "PICTURES LATE", "CALIBRATE IMU TO CAMERA";
+    /// Picture and unit disagree otherwise.
+    NotRegistered = "REG_OFF", NotScored, "PICTURE AND IMU DISAGREE", "CALIBRATE IMU TO CAMERA";
     /// The trigger's line is gone.
     TriggerLost = "TRG_LOST", NotScored, "TRIGGER LOST", "CHECK THE TRIGGER CABLE";
     /// The trigger is held far longer than a belt lasts.

@@ -54,6 +54,8 @@ pub struct FrameMoment {
     pub permission: FirePermission,
     /// The fault that the sailor should know of though training goes on.
     pub warning: Option<Fault>,
+    /// For how long nothing in the picture has confirmed where the camera looks, seconds; without end where nothing has so far.
+    pub unchecked_s: f64,
     /// Whether reflections and wakes are drawn: a computer that is too hot leaves them out, half of the work.
     pub cool: bool,
 }
@@ -108,7 +110,7 @@ impl Composer {
         Ok(Self {
             plan,
             screen_lens,
-            visibility_m: scenario.visibility_m,
+            visibility_m: scenario.daylight.visibility_m,
             eye_height_m: scenario.eye_height_m,
             models: Arc::clone(models),
             boat_models: boat_models.to_vec(),
@@ -167,7 +169,7 @@ impl Composer {
         scene.boats.clear();
         scene.rounds.clear();
         scene.passes = self.plan.frame(false, &[], &[]);
-        scene.hud.status = status(moment.permission, None);
+        scene.hud.status = status(moment, None);
         scene.hud.warning = moment.warning;
     }
 
@@ -204,7 +206,7 @@ impl Composer {
         let result = world.last_result().filter(|result| time.secs_since(result.time) < RESULT_S);
         let score = world.score();
         scene.hud = Hud {
-            status: status(moment.permission, result),
+            status: status(moment, result),
             warning: moment.warning,
             rounds_left: world.rounds_left(),
             shots: u32::try_from(score.shots).unwrap_or(u32::MAX),
@@ -258,9 +260,22 @@ impl Composer {
     }
 }
 
-/// The status: the fault that keeps the weapon from scoring, else the newest result.
-fn status(permission: FirePermission, result: Option<LastResult>) -> Status {
-    match permission {
+/// What is said of an orientation that nothing has confirmed, from so many seconds on.
+const UNCHECKED: [(f64, &str); 9] = [
+    (10.0, "NO HORIZON FOR 10 S"),
+    (30.0, "NO HORIZON FOR 30 S"),
+    (60.0, "NO HORIZON FOR 1 MIN"),
+    (120.0, "NO HORIZON FOR 2 MIN"),
+    (300.0, "NO HORIZON FOR 5 MIN"),
+    (600.0, "NO HORIZON FOR 10 MIN"),
+    (1800.0, "NO HORIZON FOR 30 MIN"),
+    (3600.0, "NO HORIZON FOR 1 H"),
+    (f64::INFINITY, "NO HORIZON SEEN YET"),
+];
+
+/// The status: the fault that keeps the weapon from scoring, else the newest result, else whether what is drawn has been confirmed.
+fn status(moment: &FrameMoment, result: Option<LastResult>) -> Status {
+    match moment.permission {
         FirePermission::Safe(f) => Status::Fault { cause: f.cause(), action: f.action() },
         FirePermission::NotScored(why) => {
             let fault = NotScored::fault(why);
@@ -269,7 +284,10 @@ fn status(permission: FirePermission, result: Option<LastResult>) -> Status {
         FirePermission::Armed => match result {
             Some(LastResult { hit: true, .. }) => Status::Hit,
             Some(LastResult { hit: false, .. }) => Status::Miss,
-            None => Status::Ready,
+            None => {
+                let unchecked = UNCHECKED.iter().rev().find(|(from_s, _)| moment.unchecked_s >= *from_s);
+                unchecked.map_or(Status::Ready, |(_, cause)| Status::NotChecked { cause })
+            }
         },
     }
 }

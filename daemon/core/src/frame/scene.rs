@@ -251,6 +251,11 @@ pub enum Status {
     Hit,
     /// The last round missed.
     Miss,
+    /// Ready, but nothing in the picture has confirmed for some time that boats are drawn where they belong.
+    NotChecked {
+        /// For how long, upper case.
+        cause: &'static str,
+    },
     /// Rounds fired now are not scored.
     NotScored {
         /// Short cause, upper case.

@@ -6,12 +6,7 @@
 
 mod rules;
 
-use std::{
-    borrow::Cow,
-    fmt::Display,
-    io::{self, Read},
-    ops::Range,
-};
+use std::{borrow::Cow, fmt::Display, ops::Range};
 
 use ::toml::de::{DeTable, DeValue, Deserializer};
 use serde::{Deserialize, de::IgnoredAny};
@@ -374,20 +369,6 @@ impl TomlSection<'_> {
         let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
         self.text.at(self.start).of_key(path)
     }
-}
-
-/// The text of a file or another source, of at most [`TEXT_BYTES_MAX`] bytes.
-///
-/// # Errors
-/// Those of the source; and where it is longer, or no UTF-8.
-pub fn bounded_text(source: impl Read) -> io::Result<String> {
-    let mut text = String::new();
-    source.take(TEXT_BYTES_MAX as u64 + 1).read_to_string(&mut text)?;
-    if text.len() > TEXT_BYTES_MAX {
-        let why = format!("it is longer than {TEXT_BYTES_MAX} bytes, the most that are read");
-        return Err(io::Error::new(io::ErrorKind::InvalidData, why));
-    }
-    Ok(text)
 }
 
 #[cfg(test)]

@@ -204,6 +204,8 @@ pub enum CameraError {
     },
 }
 
+crate::worker::tells_of_threads!(CameraError);
+
 /// Every camera of this computer: its description, or why it cannot be opened. Nodes that capture no video (metadata,
 /// outputs, codecs) are left out.
 pub fn list() -> Vec<Result<CameraInfo, CameraError>> {

@@ -15,7 +15,7 @@ use crate::{
     clock,
     queue::{self, NewestSender},
     report::Reporter,
-    worker::{PortLink, PortWorker, StopError},
+    worker::{PortLink, PortWorker},
 };
 
 /// Pictures that wait to be drained. The main loop looks thirty times a second and wants the newest; more would keep the
@@ -27,8 +27,6 @@ const SLEEP_MAX_NS: i64 = 50_000_000;
 const CALL_MAX_NS: i64 = 8_000_000_000;
 /// Sleep after a wake-up that brought nothing: a driver that says "ready" for ever must not take a core.
 const IDLE: Duration = Duration::from_millis(2);
-/// How long [`CameraPort::stop`] waits.
-const STOP_NS: i64 = 200_000_000;
 
 /// The camera, wherever and whenever it is there.
 #[derive(Debug)]
@@ -76,12 +74,8 @@ impl CameraPort {
     /// 200 ms (the thread ends when it does), or the thread broke down.
     pub fn stop(self) -> Result<CameraCounters, CameraError> {
         let link = Arc::clone(self.worker.link());
-        self.worker.stop_within(STOP_NS).map_err(|e| match e {
-            StopError::BrokeDown => CameraError::BrokeDown,
-            StopError::Blocked => CameraError::Blocked,
-        })?;
-        let counters = link.status().counters;
-        Ok(counters)
+        self.worker.stop_in_time()?;
+        Ok(link.status().counters)
     }
 }
 

@@ -1,10 +1,22 @@
-//! Simulated units, for tests: what those of each format would send of one and the same motion. Their encoders are in the formats'
+//! Recorded and simulated units, for tests. The simulated ones are what those of each format would send of one and the same motion. Their encoders are in the formats'
 //! own files, written from the manuals' tables by matrices and axes, so that they share no turn with the decoders.
+
+use std::{fs, path::Path};
 
 use bowwave_core::{event::ImuSample, time::Time};
 use glam::{DMat3, DQuat, DVec3};
 
 use super::ImuFormat;
+
+/// The bytes of a real unit in `../shared/data/imu_bytes`; says so where they are not there.
+pub(crate) fn recording(name: &str) -> Option<Vec<u8>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/imu_bytes").join(name);
+    let bytes = fs::read(&path).ok();
+    if bytes.is_none() {
+        eprintln!("skipped: {} is not there", path.display());
+    }
+    bytes
+}
 
 /// Standard gravity, m/s^2.
 pub(crate) const G: f64 = 9.806_65;

@@ -16,7 +16,7 @@ use self::{
 use crate::{
     clock,
     gpio::{GpioError, InputLine},
-    worker::{PortLink, PortWorker, STOP_NS, StopError},
+    worker::{PortLink, PortWorker},
 };
 
 /// Which lines light which lamps. Lamps that are not wired are left out.
@@ -104,6 +104,8 @@ pub enum LampError {
     Blocked,
 }
 
+crate::worker::tells_of_threads!(LampError);
+
 impl LampSettings {
     fn wired(&self) -> impl Iterator<Item = (&'static str, &str)> {
         [("READY", &self.ready), ("HIT", &self.hit), ("FAULT", &self.fault)]
@@ -167,10 +169,7 @@ impl Lamps {
 
     fn end(&mut self) -> Result<(), LampError> {
         let Some(worker) = self.worker.take() else { return Ok(()) };
-        worker.stop_within(STOP_NS).map_err(|e| match e {
-            StopError::BrokeDown => LampError::BrokeDown,
-            StopError::Blocked => LampError::Blocked,
-        })
+        Ok(worker.stop_in_time()?)
     }
 }
 

@@ -35,10 +35,10 @@ use serialport::SerialPortType;
 pub use self::imu_feed::ImuReport;
 pub use self::{
     health::LineStatus,
-    ship::{ShipPort, ShipReport, ShipSettings, ShipStatus, check_ship},
+    ship::{ShipPort, ShipReport, ShipStatus, check_ship},
     timing::ArrivalTiming,
 };
-use self::{imu_feed::ImuFeed, line::SerialLine, port::LinePort};
+use self::{imu_feed::ImuFeed, port::LinePort};
 use crate::{
     clock,
     imu::ImuFormat,
@@ -259,47 +259,52 @@ impl Baud {
     }
 }
 
-/// How the inertial unit is reached.
+/// How a serial line is reached.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ImuSettings {
-    /// Its node, or better its link in `/dev/serial/by-id`. Absent: the first USB adapter on which a unit answers.
+pub struct LineSettings {
+    /// Its node, or better its link in `/dev/serial/by-id`; `*` and `?` in it stand for what may change: the first port that fits and
+    /// answers is taken. Absent: the first USB adapter on which such a device answers.
     pub device: Option<PathBuf>,
     /// Its rate.
     pub baud: Baud,
-    /// The only format that is read; absent: whichever comes.
-    pub format: Option<ImuFormat>,
     /// Ask the adapter to hand bytes on at once.
     pub low_latency: bool,
+}
+
+impl Default for LineSettings {
+    fn default() -> Self {
+        Self { device: None, baud: Baud::default(), low_latency: true }
+    }
+}
+
+impl LineSettings {
+    /// Ship's instruments on that port, at whichever of their usual rates.
+    pub fn ship(device: PathBuf) -> Self {
+        Self { device: Some(device), baud: Baud::Scan(ship::RATES.to_vec()), ..Self::default() }
+    }
+}
+
+/// How the inertial unit is read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ImuSettings {
+    /// Its line.
+    pub line: LineSettings,
+    /// The only format that is read; absent: whichever comes.
+    pub format: Option<ImuFormat>,
     /// How much longer than its period the 99th percentile of the gaps between its packets may be; more is reported.
     pub late: Duration,
 }
 
 impl Default for ImuSettings {
     fn default() -> Self {
-        Self { device: None, baud: Baud::default(), format: None, low_latency: true, late: timing::LATE }
-    }
-}
-
-/// How a line is reached.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct LineSettings {
-    /// Its node, link or pattern; absent: any USB adapter.
-    device: Option<PathBuf>,
-    baud: Baud,
-    low_latency: bool,
-}
-
-impl ImuSettings {
-    fn line(&self) -> LineSettings {
-        LineSettings { device: self.device.clone(), baud: self.baud.clone(), low_latency: self.low_latency }
+        Self { line: LineSettings::default(), format: None, late: timing::LATE }
     }
 }
 
 /// Whether the adapter hands bytes on at once.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LowLatency {
-    /// Nobody asked it to, or no port is open.
-    #[default]
+    /// Nobody asked it to.
     NotAsked,
     /// It does.
     Set,
@@ -309,17 +314,30 @@ pub enum LowLatency {
     Refused,
 }
 
+/// A port that is open.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OpenLine {
+    /// Its node.
+    pub node: PathBuf,
+    /// The rate in use.
+    pub baud: u32,
+    /// Whether the adapter hands bytes on at once.
+    pub low_latency: LowLatency,
+}
+
+impl std::fmt::Display for OpenLine {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} at {} baud", self.node.display(), self.baud)
+    }
+}
+
 /// Report of a line's health.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LineReport {
     /// Its life.
     pub status: LineStatus,
-    /// The node that is open.
-    pub node: Option<PathBuf>,
-    /// The rate in use.
-    pub baud: Option<u32>,
-    /// Whether the adapter hands bytes on at once.
-    pub low_latency: LowLatency,
+    /// The port that is open.
+    pub open: Option<OpenLine>,
     /// Events dropped, oldest first, because nobody drained the queue.
     pub overflow: u64,
     /// Bytes without a stop bit, where the port counts them.
@@ -330,6 +348,15 @@ pub struct LineReport {
     pub opened: u64,
     /// Times that the port said it could be read and gave nothing.
     pub spurious: u64,
+}
+
+impl LineReport {
+    /// The node that is open, for people.
+    pub(crate) fn node(&self) -> String {
+        self.open
+            .as_ref()
+            .map_or_else(|| "the serial port".to_owned(), |open| open.node.display().to_string())
+    }
 }
 
 /// Status of a device on a serial line.
@@ -354,27 +381,15 @@ impl ImuPort {
     /// Begins to look for the unit, to read it, and to look for it again whenever it is lost. That it is not there is told
     /// by `reporter`, as all that happens later.
     pub fn start(settings: ImuSettings, reporter: Reporter) -> Result<Self, SerialError> {
-        settings.baud.check()?;
-        Self::spawn(&settings, None, reporter)
+        let feed = ImuFeed::new(&settings);
+        Ok(Self { port: LinePort::start(settings.line, feed, reporter, QUEUE_SAMPLES)? })
     }
 
     /// Like [`Self::start`] for a port that must be there, without reports: for replays and checks. Bytes that are sent
     /// once this has returned are not lost.
     pub fn open(node: &Path, baud: u32) -> Result<Self, SerialError> {
-        let settings =
-            ImuSettings { device: Some(node.to_owned()), baud: Baud::Fixed(baud), ..ImuSettings::default() };
-        settings.baud.check()?;
-        let line = SerialLine::open(node, baud, settings.low_latency)?;
-        Self::spawn(&settings, Some(line), reporting().0)
-    }
-
-    fn spawn(
-        settings: &ImuSettings,
-        line: Option<SerialLine>,
-        reporter: Reporter,
-    ) -> Result<Self, SerialError> {
-        let port = LinePort::spawn(settings.line(), ImuFeed::new(settings), line, reporter, QUEUE_SAMPLES)?;
-        Ok(Self { port })
+        let feed = ImuFeed::new(&ImuSettings::default());
+        Ok(Self { port: LinePort::open(node, baud, feed, QUEUE_SAMPLES)? })
     }
 
     /// The samples read and not yet drained, [`Event::Imu`] in the order of their arrival. At most [`QUEUE_SAMPLES`]; the

@@ -1,20 +1,20 @@
 //! A serial line with what reads it: two threads, a bounded queue, a status.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
 use bowwave_core::event::Event;
 use crossbeam_channel::Receiver;
 
 use super::{
-    LineSettings, SerialError, SerialStatus,
+    Baud, LineSettings, SerialError, SerialStatus,
     feed::LineFeed,
     line::SerialLine,
     reader::{LineReader, LineWatcher, ReaderEnds},
 };
 use crate::{
     clock, queue,
-    report::Reporter,
-    worker::{PortLink, PortWorker, STOP_NS, StopError, ThreadLife},
+    report::{Reporter, reporting},
+    worker::{PortLink, PortWorker, StopError, ThreadLife},
 };
 
 /// A device on a serial line.
@@ -25,8 +25,27 @@ pub(super) struct LinePort<F: LineFeed> {
 }
 
 impl<F: LineFeed> LinePort<F> {
-    /// Starts the threads, on a `line` that is open already or in search of one. At most `queue` events wait to be drained.
-    pub(super) fn spawn(
+    /// Starts the threads in search of the line. At most `queue` events wait to be drained.
+    pub(super) fn start(
+        settings: LineSettings,
+        feed: F,
+        reporter: Reporter,
+        queue: usize,
+    ) -> Result<Self, SerialError> {
+        settings.baud.check()?;
+        Self::spawn(settings, feed, None, reporter, queue)
+    }
+
+    /// The same on a port that must be there, without reports.
+    pub(super) fn open(node: &Path, baud: u32, feed: F, queue: usize) -> Result<Self, SerialError> {
+        let device = Some(node.to_owned());
+        let settings = LineSettings { device, baud: Baud::Fixed(baud), ..LineSettings::default() };
+        settings.baud.check()?;
+        let line = SerialLine::open(node, baud, settings.low_latency)?;
+        Self::spawn(settings, feed, Some(line), reporting().0, queue)
+    }
+
+    fn spawn(
         settings: LineSettings,
         feed: F,
         line: Option<SerialLine>,
@@ -58,16 +77,12 @@ impl<F: LineFeed> LinePort<F> {
     /// Ends the reading and closes the port, within 200 ms.
     pub(super) fn stop(self) -> Result<SerialStatus<F::Report>, SerialError> {
         let link = Arc::clone(self.worker.link());
-        let stopped = self.worker.stop_within(STOP_NS);
+        let stopped = self.worker.stop_in_time();
         let status = link.status().clone();
         match stopped {
             Ok(()) => Ok(status),
             Err(StopError::BrokeDown) => Err(SerialError::BrokeDown),
-            Err(StopError::Blocked) => {
-                let node = status.line.node;
-                let node = node.map_or_else(|| "the serial port".to_owned(), |n| n.display().to_string());
-                Err(SerialError::Blocked { node })
-            }
+            Err(StopError::Blocked) => Err(SerialError::Blocked { node: status.line.node() }),
         }
     }
 }

@@ -10,7 +10,7 @@ use bowwave_core::{event::Event, fault::FaultChange, time::Time};
 use rustix::event::PollFlags;
 
 use super::{
-    LineSettings, LineStatus, SerialError, SerialStatus,
+    LineSettings, LineStatus, OpenLine, SerialError, SerialStatus,
     feed::{LineFeed, LineKind},
     find::Finder,
     health::{LineAction, LineHealth},
@@ -155,8 +155,11 @@ impl<F: LineFeed> LineReader<F> {
             line.low_latency()
         );
         let report = &mut self.ends.link.status().line;
-        report.node = Some(line.node().to_owned());
-        report.low_latency = line.low_latency();
+        report.open = Some(OpenLine {
+            node: line.node().to_owned(),
+            baud: self.health.baud(),
+            low_latency: line.low_latency(),
+        });
         report.opened += 1;
     }
 
@@ -282,9 +285,9 @@ impl<F: LineFeed> LineReader<F> {
         status.said = self.feed.report();
         let report = &mut status.line;
         report.status = self.health.status();
-        report.baud = self.line.is_some().then(|| self.health.baud());
-        if self.line.is_none() {
-            report.node = None;
+        report.open = report.open.take().filter(|_| self.line.is_some());
+        if let Some(open) = &mut report.open {
+            open.baud = self.health.baud();
         }
         report.overflow = self.ends.queue.dropped();
     }
@@ -329,9 +332,8 @@ impl<R> LineWatcher<R> {
         // A thread that could run and is not let is no matter of the port: the device's silence is told by its own fault.
         let blocked = still && (self.blocked || !self.life.is_runnable());
         if blocked && !self.blocked {
-            let node =
-                self.link.status().line.node.clone().unwrap_or_else(|| PathBuf::from("the serial port"));
-            let cause = format!("a kernel call on {} does not return; unplug the adapter", node.display());
+            let node = self.link.status().line.node();
+            let cause = format!("a kernel call on {node} does not return; unplug the adapter");
             self.reporter.send(FaultChange::raised(now, self.kind.blocked, cause));
         } else if self.blocked && !blocked {
             self.reporter.send(FaultChange::cleared(now, self.kind.blocked));

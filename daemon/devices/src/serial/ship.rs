@@ -1,9 +1,6 @@
 //! The ship's own instruments on a serial line: heading and attitude as lines of NMEA 0183.
 
-use std::{
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::{path::Path, time::Duration};
 
 use bowwave_core::{
     event::{Event, ShipSample},
@@ -13,9 +10,8 @@ use bowwave_core::{
 use crossbeam_channel::Receiver;
 
 use super::{
-    Baud, LineSettings, SerialError, SerialStatus,
+    LineSettings, SerialError, SerialStatus,
     feed::{LineFeed, LineKind, SHIP},
-    line::SerialLine,
     port::LinePort,
 };
 use crate::{
@@ -29,30 +25,13 @@ use crate::{
 const QUEUE_LINES: usize = 512;
 
 /// The rates of ships' instruments, that of the standard first (NMEA 0183: 4800; its high-speed variant: 38400).
-const RATES: [u32; 6] = [4_800, 38_400, 9_600, 19_200, 57_600, 115_200];
+pub(super) const RATES: [u32; 6] = [4_800, 38_400, 9_600, 19_200, 57_600, 115_200];
 
 /// Lines without a valid heading for so long mean that there is none.
 const INVALID_NS: i64 = 3_000_000_000;
 
 /// A beat is the mean over about so many lines.
 const BEATS: f64 = 16.0;
-
-/// How the ship's instruments are reached.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ShipSettings {
-    /// The port's node, or better its link in `/dev/serial/by-id`; `*` and `?` in it stand for what may change (the first port that fits
-    /// and answers is taken).
-    pub device: PathBuf,
-    /// Its rate.
-    pub baud: Baud,
-}
-
-impl ShipSettings {
-    /// On that port at whichever usual rate.
-    pub fn new(device: PathBuf) -> Self {
-        Self { device, baud: Baud::Scan(RATES.to_vec()) }
-    }
-}
 
 /// Report of what the ship's lines said.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -79,31 +58,13 @@ pub struct ShipPort {
 impl ShipPort {
     /// Begins to look for the feed, to read it, and to look for it again whenever it is lost. That it is not there is told by
     /// `reporter`, as all that happens later.
-    pub fn start(settings: &ShipSettings, reporter: Reporter) -> Result<Self, SerialError> {
-        Self::spawn(settings, None, reporter)
+    pub fn start(settings: LineSettings, reporter: Reporter) -> Result<Self, SerialError> {
+        Ok(Self { port: LinePort::start(settings, ShipFeed::default(), reporter, QUEUE_LINES)? })
     }
 
     /// Like [`Self::start`] for a port that must be there, without reports: for replays and checks.
     pub fn open(node: &Path, baud: u32) -> Result<Self, SerialError> {
-        let settings = ShipSettings { device: node.to_owned(), baud: Baud::Fixed(baud) };
-        settings.baud.check()?;
-        let line = SerialLine::open(node, baud, true)?;
-        Self::spawn(&settings, Some(line), reporting().0)
-    }
-
-    fn spawn(
-        settings: &ShipSettings,
-        line: Option<SerialLine>,
-        reporter: Reporter,
-    ) -> Result<Self, SerialError> {
-        settings.baud.check()?;
-        let wanted = LineSettings {
-            device: Some(settings.device.clone()),
-            baud: settings.baud.clone(),
-            low_latency: true,
-        };
-        let port = LinePort::spawn(wanted, ShipFeed::default(), line, reporter, QUEUE_LINES)?;
-        Ok(Self { port })
+        Ok(Self { port: LinePort::open(node, baud, ShipFeed::default(), QUEUE_LINES)? })
     }
 
     /// Measurements not yet drained, [`Event::Ship`] in the order of arrival; the oldest give way.
@@ -123,10 +84,7 @@ impl ShipPort {
 }
 
 /// Reads the feed for `time` and tells how it does: for a check by hand.
-pub fn check_ship(
-    settings: &ShipSettings,
-    time: Duration,
-) -> Result<super::Checked<ShipStatus>, SerialError> {
+pub fn check_ship(settings: LineSettings, time: Duration) -> Result<super::Checked<ShipStatus>, SerialError> {
     let (reporter, reports) = reporting();
     let port = ShipPort::start(settings, reporter)?;
     super::listen(time, || port.events().try_iter().for_each(drop));

@@ -23,7 +23,7 @@ use rustix::{
 };
 
 use super::{
-    Baud, ImuPort, ImuSettings, LineStatus, QUEUE_SAMPLES, SerialError, SerialStatus, ShipPort, ShipSettings,
+    Baud, ImuPort, ImuSettings, LineSettings, LineStatus, QUEUE_SAMPLES, SerialError, SerialStatus, ShipPort,
     feed::IMU,
     health::{LineAction, LineHealth},
     imu_feed::{ImuFeed, ImuReport},
@@ -179,7 +179,8 @@ fn numbers_that_are_not_finite_are_dropped_and_counted() {
 }
 
 fn settings(device: &Path) -> ImuSettings {
-    ImuSettings { device: Some(device.to_owned()), ..ImuSettings::default() }
+    let line = LineSettings { device: Some(device.to_owned()), ..LineSettings::default() };
+    ImuSettings { line, ..ImuSettings::default() }
 }
 
 /// Codes of what has been reported: `+` raised, `-` cleared, `!` noted.
@@ -217,7 +218,7 @@ fn an_unplugged_unit_is_found_again_under_another_name() {
     settle(&port, LineStatus::Listening);
     (0..3).for_each(|n| master.write_all(&packet(n)).expect("written"));
     settle(&port, LineStatus::Streaming);
-    assert_eq!(port.status().line.node.as_deref(), Some(slave.as_path()));
+    assert_eq!(port.status().line.open.as_ref().map(|open| open.node.as_path()), Some(slave.as_path()));
     assert!(codes(&reports).is_empty(), "nothing wrong so far");
     // What the line still holds when it is pulled is lost with it.
     assert_eq!(receive(&port, 3).len(), 3);
@@ -243,7 +244,7 @@ fn an_unplugged_unit_is_found_again_under_another_name() {
     settle(&port, LineStatus::Streaming);
     assert!(clock::now().ns_since(plugged) < 1_000_000_000, "back within a second");
     assert_eq!(receive(&port, 3).len(), 3);
-    wait_for(|| port.status().line.node.as_deref() == Some(slave2.as_path()));
+    wait_for(|| port.status().line.open.as_ref().map(|open| open.node.as_path()) == Some(slave2.as_path()));
     let codes = codes(&reports);
     assert!(codes.contains(&"-IMU_LOST".to_owned()) && codes.contains(&"!IMU_RENUM".to_owned()), "{codes:?}");
     assert_eq!(port.stop().expect("stops").line.opened, 2);
@@ -358,7 +359,7 @@ fn a_reader_that_searches_gives_a_sign_of_life_before_it_pauses() {
         let settings = settings(&device);
         let feed = ImuFeed::new(&settings);
         let ends = ReaderEnds { link, life: Arc::clone(&life), reporter: reporting().0, queue };
-        let mut reader = LineReader::new(settings.line(), feed, None, ends);
+        let mut reader = LineReader::new(settings.line, feed, None, ends);
         let begin = clock::now();
         reader.search();
         assert!(life.last() >= begin, "{}", device.display());
@@ -370,7 +371,8 @@ fn a_reader_that_searches_gives_a_sign_of_life_before_it_pauses() {
 fn a_line_full_of_garbage_recovers() {
     let (mut master, slave) = terminal();
     let (reporter, reports) = reporting();
-    let fixed = ImuSettings { baud: Baud::Fixed(115_200), ..settings(&slave) };
+    let mut fixed = settings(&slave);
+    fixed.line.baud = Baud::Fixed(115_200);
     let port = ImuPort::start(fixed, reporter).expect("starts");
     settle(&port, LineStatus::Listening);
     let mut seed = 1u32;
@@ -445,7 +447,8 @@ fn what_cannot_be_opened_is_refused_in_words() {
     // Locked for root, too, who may open what is exclusive.
     assert!(matches!(refused(&slave, 115_200), SerialError::Busy { .. }));
     let (reporter, _) = reporting();
-    let none = ImuSettings { baud: Baud::Scan(Vec::new()), ..ImuSettings::default() };
+    let mut none = ImuSettings::default();
+    none.line.baud = Baud::Scan(Vec::new());
     assert!(matches!(ImuPort::start(none, reporter), Err(SerialError::NoRates)));
 }
 
@@ -475,7 +478,7 @@ fn a_ship_feed_is_found_by_its_pattern_lost_and_found_again() {
     let (mut master, slave) = terminal();
     symlink(&slave, folder.path().join("usb-Moxa_A-port0")).expect("link");
     let (reporter, reports) = reporting();
-    let port = ShipPort::start(&ShipSettings::new(folder.path().join("usb-Moxa_*-port0")), reporter)
+    let port = ShipPort::start(LineSettings::ship(folder.path().join("usb-Moxa_*-port0")), reporter)
         .expect("starts");
     wait_for(|| port.status().line.status == LineStatus::Listening);
     master.write_all(b"$GPZDA,1,2*00\r\nnoise").expect("written");
@@ -514,8 +517,8 @@ fn a_ship_feed_is_found_by_its_pattern_lost_and_found_again() {
 fn a_ship_feed_without_a_valid_heading_is_told() {
     let (mut master, slave) = terminal();
     let (reporter, reports) = reporting();
-    let settings = ShipSettings { baud: Baud::Fixed(4_800), ..ShipSettings::new(slave) };
-    let port = ShipPort::start(&settings, reporter).expect("starts");
+    let settings = LineSettings { baud: Baud::Fixed(4_800), ..LineSettings::ship(slave) };
+    let port = ShipPort::start(settings, reporter).expect("starts");
     wait_for(|| port.status().line.status == LineStatus::Listening);
     wait_for(|| {
         master.write_all(b"$HEHDT,,T*01\r\n").expect("written");

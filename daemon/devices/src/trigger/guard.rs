@@ -190,6 +190,18 @@ mod tests {
         changes.map(|c| matches!(c.change, Change::Raised { .. })).collect()
     }
 
+    fn faults(interlock: &mut Interlock) -> Vec<Fault> {
+        interlock.out().map(|c| c.fault).collect()
+    }
+
+    /// The plug goes in or out: each contact follows at its time, and 50 ms after the last one they are looked at.
+    fn plug(interlock: &mut Interlock, fitted: bool, at_ms: &[i64]) {
+        for (contact, ms) in (0..).zip(at_ms) {
+            interlock.edge(contact, at(*ms), fitted);
+        }
+        interlock.tick(at(at_ms.iter().fold(0, |last, ms| last.max(*ms)) + 50));
+    }
+
     /// One contact that has shown the plug out.
     fn tested(from: Time) -> Interlock {
         let mut interlock = Interlock::new(from, 1, 0);
@@ -204,15 +216,13 @@ mod tests {
         interlock.level(0, at(0), true);
         interlock.tick(at(60_000));
         assert!(!interlock.armed(), "its wire may be shorted");
-        let faults = |changes: &mut Interlock| changes.out().map(|c| c.fault).collect::<Vec<_>>();
         assert_eq!(faults(&mut interlock), [Fault::NotInert, Fault::InterlockUntested]);
         interlock.edge(0, at(61_000), false);
         interlock.tick(at(61_049));
         assert_eq!(faults(&mut interlock), []);
         interlock.tick(at(61_050));
         assert_eq!(faults(&mut interlock), [Fault::InterlockUntested]);
-        interlock.edge(0, at(62_000), true);
-        interlock.tick(at(62_050));
+        plug(&mut interlock, true, &[62_000]);
         assert!(interlock.armed());
         assert_eq!(faults(&mut interlock), [Fault::NotInert]);
     }
@@ -268,7 +278,6 @@ mod tests {
         interlock.edge(1, at(1000), false);
         assert!(!interlock.armed());
         interlock.tick(at(1499));
-        let faults = |changes: &mut Interlock| changes.out().map(|c| c.fault).collect::<Vec<_>>();
         assert_eq!(faults(&mut interlock), [Fault::NotInert]);
         interlock.tick(at(1500));
         assert_eq!(faults(&mut interlock), [Fault::Interlock]);
@@ -278,13 +287,9 @@ mod tests {
         assert!(!interlock.armed());
         assert_eq!(faults(&mut interlock), []);
         // Mended: both show the plug out, then in.
-        interlock.edge(0, at(10_000), false);
-        interlock.edge(1, at(10_100), false);
-        interlock.tick(at(10_200));
+        plug(&mut interlock, false, &[10_000, 10_100]);
         assert_eq!(faults(&mut interlock), [Fault::Interlock]);
-        interlock.edge(0, at(11_000), true);
-        interlock.edge(1, at(11_300), true);
-        interlock.tick(at(11_350));
+        plug(&mut interlock, true, &[11_000, 11_300]);
         assert!(interlock.armed());
         assert_eq!(faults(&mut interlock), [Fault::NotInert]);
     }

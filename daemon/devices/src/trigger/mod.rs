@@ -66,6 +66,8 @@ pub enum TriggerError {
     Blocked,
 }
 
+crate::worker::tells_of_threads!(TriggerError);
+
 /// A button of the operator.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Press {
@@ -83,6 +85,23 @@ impl Press {
             MarkKind::Landmark => "landmark",
         }
     }
+}
+
+/// The lines that are inputs, with what they are.
+pub fn named_inputs<'a>(
+    trigger: Option<&'a InputLine>,
+    interlock: Option<&'a InterlockWiring>,
+    power_fail: Option<&'a InputLine>,
+    presses: &'a [Press],
+) -> impl Iterator<Item = (&'static str, &'a InputLine)> {
+    let lines = [
+        ("trigger", trigger),
+        ("interlock", interlock.map(|interlock| &interlock.contact)),
+        ("second interlock", interlock.and_then(|interlock| interlock.second.as_ref())),
+        ("power-fail", power_fail),
+    ];
+    let lines = lines.into_iter().filter_map(|(name, line)| Some((name, line?)));
+    lines.chain(presses.iter().map(|press| (press.name(), &press.line)))
 }
 
 /// Wiring of the trigger and the inputs beside it.
@@ -117,16 +136,8 @@ impl TriggerSettings {
 
     /// Every line that is an input, with what it is.
     pub fn inputs(&self) -> impl Iterator<Item = (&'static str, &InputLine)> {
-        let interlock = self.interlock.as_ref();
-        [
-            ("trigger", Some(&self.trigger)),
-            ("interlock", interlock.map(|interlock| &interlock.contact)),
-            ("second interlock", interlock.and_then(|interlock| interlock.second.as_ref())),
-            ("power-fail", self.power_fail.as_ref()),
-        ]
-        .into_iter()
-        .filter_map(|(name, line)| line.map(|line| (name, line)))
-        .chain(self.presses.iter().map(|press| (press.name(), &press.line)))
+        let Self { trigger, interlock, power_fail, presses, .. } = self;
+        named_inputs(Some(trigger), interlock.as_ref(), power_fail.as_ref(), presses)
     }
 
     fn check(&self) -> Result<(), TriggerError> {

@@ -24,7 +24,7 @@ use crate::{
     gpio::{Debouncer, GpioEdge, GpioError, InputHandle, InputLine, clock_is_monotonic},
     queue::{self, NewestSender},
     report::Reporter,
-    worker::{PortLink, PortWorker, STOP_NS, StopError},
+    worker::{PortLink, PortWorker},
 };
 
 /// Edges that wait to be drained.
@@ -80,12 +80,8 @@ impl TriggerPort {
     /// Ends the watch and gives the lines back, within 200 ms.
     pub fn stop(self) -> Result<TriggerCounters, TriggerError> {
         let link = Arc::clone(self.worker.link());
-        self.worker.stop_within(STOP_NS).map_err(|e| match e {
-            StopError::BrokeDown => TriggerError::BrokeDown,
-            StopError::Blocked => TriggerError::Blocked,
-        })?;
-        let counters = link.status().counters;
-        Ok(counters)
+        self.worker.stop_in_time()?;
+        Ok(link.status().counters)
     }
 }
 

@@ -27,7 +27,7 @@ use crate::clock;
 use report::Reporter;
 
 /// How long the stop of a port waits for its threads, nanoseconds: an owner is promised 200 ms.
-pub(crate) const STOP_NS: i64 = 180_000_000;
+const STOP_NS: i64 = 180_000_000;
 
 /// State that the threads of a port and its owner share.
 #[derive(Debug)]
@@ -107,6 +107,21 @@ pub(crate) enum StopError {
     Blocked,
 }
 
+/// A port's own error says the same of its threads.
+macro_rules! tells_of_threads {
+    ($error:ty) => {
+        impl From<crate::worker::StopError> for $error {
+            fn from(error: crate::worker::StopError) -> Self {
+                match error {
+                    crate::worker::StopError::BrokeDown => Self::BrokeDown,
+                    crate::worker::StopError::Blocked => Self::Blocked,
+                }
+            }
+        }
+    };
+}
+pub(crate) use tells_of_threads;
+
 /// Notes the end of the working thread, also by a panic.
 struct EndMark<S>(Arc<PortLink<S>>);
 
@@ -166,8 +181,12 @@ impl<S: Send + 'static, T: Send + 'static> PortWorker<S, T> {
         &self.link
     }
 
-    /// Ends the threads; waits for them at most `ns` nanoseconds. Gives what the work gave.
-    pub(crate) fn stop_within(mut self, ns: i64) -> Result<T, StopError> {
+    /// Ends the threads; waits for them as long as an owner may be made to wait. Gives what the work gave.
+    pub(crate) fn stop_in_time(self) -> Result<T, StopError> {
+        self.stop_within(STOP_NS)
+    }
+
+    fn stop_within(mut self, ns: i64) -> Result<T, StopError> {
         self.stop_until(Some(clock::now().plus_ns(ns)))
     }
 

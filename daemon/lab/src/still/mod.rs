@@ -9,9 +9,10 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use bowwave::loading::warn_of_former_names;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use bowwave_core::{
+    daylight::Daylight,
     estimate::light::LightMeter,
     event::Picture,
     frame::{
@@ -22,7 +23,7 @@ use bowwave_core::{
     },
     geometry::{CameraPose, Lens, ahead},
     model::{Model, ModelId},
-    text::toml::{TomlError, TomlPlace, bounded_text},
+    text::toml::{TEXT_BYTES_MAX, TomlError, TomlPlace},
     time::Time,
     water::{ReflectionMethod, Water},
     world::{
@@ -32,7 +33,7 @@ use bowwave_core::{
         waves::{WaveField, WaveSpec},
     },
 };
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 pub use camera::{Focal, StillAttitude, StillCamera, film_focal_px};
 
 /// A commented text to begin with.
@@ -58,12 +59,8 @@ pub struct Still {
     pub camera: StillCamera,
     /// Waves and where the wind comes from.
     pub waves: WaveSpec,
-    /// Unit vector towards the sun, world.
-    pub sun_direction: DVec3,
-    /// How much of a clear sky's sun comes through, 0 to 1.
-    pub sun_strength: f64,
-    /// Meteorological visibility, metres.
-    pub visibility_m: f64,
+    /// Where the sun stands, and how far one sees.
+    pub daylight: Daylight,
     /// How the sea mirrors, and at which wind force.
     pub water: Water,
     /// The boats.
@@ -128,8 +125,7 @@ impl Still {
 
     /// Reads and checks a file; tells of former names in it. `advice` says where an example of such a file is.
     pub fn read(path: &Path, advice: &str) -> Result<Self> {
-        let text = plain_file(path)
-            .and_then(bounded_text)
+        let text = plain_text(path, TEXT_BYTES_MAX)
             .with_context(|| format!("cannot read the scene {}; {advice}", path.display()))?;
         let still = Self::parse(&text, &path.display().to_string())?;
         warn_of_former_names(&still.warnings);
@@ -163,7 +159,7 @@ impl Still {
         let eye = ViewFrustum {
             camera: &camera,
             lens: &lens,
-            visibility_m: self.visibility_m,
+            visibility_m: self.daylight.visibility_m,
             // The picture shows where the water is.
             wind: DVec2::ZERO,
             reflections: plan.has(Pass::Water),
@@ -180,10 +176,11 @@ impl Still {
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
         let mut passes = plan.frame(true, &boats, &[]);
         passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
-        let mut meter = LightMeter::new(self.sun_direction, self.water.method == ReflectionMethod::Baked);
+        let mut meter =
+            LightMeter::new(self.daylight.sun_direction, self.water.method == ReflectionMethod::Baked);
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
-        light.sun *= self.sun_strength as f32;
+        light.sun *= self.daylight.sun_strength as f32;
         let scene = Scene {
             frame: u64::from(index),
             time_s: f64::from(index) / 30.0,

@@ -83,7 +83,8 @@ pub(super) fn still(text: &str, origin: &str) -> Result<Still, TomlError> {
     let (sun_strength, visibility_km) = (keys.sun_strength, keys.visibility_km);
     let keys =
         LightKeys { sun_azimuth_deg, sun_elevation_deg, latitude_deg, longitude_deg, utc, visibility_km };
-    let (sun_direction, visibility_m) = light(&section, &keys)?;
+    let mut daylight = light(&section, &keys)?;
+    daylight.sun_strength = text.given(&sun_strength, number(0.0..=1.0, ""))?.unwrap_or(1.0);
     let (_, mirror) = text.section("reflection", raw.reflection);
     let (section, view) = text.section("camera", raw.camera);
     let boats = text.sections("boat", raw.boat, BOATS_MAX)?;
@@ -96,9 +97,7 @@ pub(super) fn still(text: &str, origin: &str) -> Result<Still, TomlError> {
         interval_s: text.given(&raw.interval_s, number(0.001..=3600.0, "s"))?,
         camera: camera(&section, &view)?,
         waves,
-        sun_direction,
-        sun_strength: text.given(&sun_strength, number(0.0..=1.0, ""))?.unwrap_or(1.0),
-        visibility_m,
+        daylight,
         water: reflection(text, &mirror, force, &mut warnings)?,
         boats: boats
             .iter()

@@ -162,7 +162,7 @@ proptest! {
         let held = look(azimuth, pitch, roll);
         let point = |off: f64| {
             let (a, d) = (azimuth + off, horizon_dip(height));
-            let far = DVec3::new(a.sin() * d.cos(), a.cos() * d.cos(), -d.sin());
+            let far = glam::DVec3::new(a.sin() * d.cos(), a.cos() * d.cos(), -d.sin());
             lens.project(held.inverse() * far).unwrap()
         };
         let points = [point(left), point(right)];

@@ -3,12 +3,12 @@
 
 use std::{
     fs::{self, OpenOptions},
-    io::{self, Read as _, Write as _},
+    io::{self, Write as _},
     path::{Path, PathBuf},
 };
 
 use bowwave_core::time::Time;
-use bowwave_files::plain_file;
+use bowwave_files::plain_text;
 use rusqlite::{Connection, TransactionBehavior};
 use serde_json::{Value, json};
 
@@ -25,7 +25,7 @@ const TAKEN: &str = ".taken-";
 const REFUSED: &str = ".refused-";
 const END: &str = ".jsonl";
 /// Longest file that is taken in: half a million rounds.
-const BYTES_MAX: u64 = 256 << 20;
+const BYTES_MAX: usize = 256 << 20;
 
 /// Files beside the journal at `path` with rounds that it does not have, sorted: those that the next start takes in, and those that it
 /// could not.
@@ -38,8 +38,7 @@ pub fn side_files(path: &Path) -> io::Result<Vec<PathBuf>> {
 /// Puts rounds beside a journal that could not be opened; its next start takes them in. Rounds for which there is no place there, either,
 /// are in the log.
 pub fn put_aside(path: &Path, run: &Run, rounds: impl IntoIterator<Item = super::ShotRecord>) -> Unwritten {
-    let rows: Vec<String> =
-        rounds.into_iter().map(|record| StoredShot { run: 0, record }.to_json().to_string()).collect();
+    let rows: Vec<String> = rounds.into_iter().map(|record| StoredShot::line(0, record)).collect();
     let side_file = save_or_tell(path, (0, run), None, &rows);
     let cause = "it could not be opened".to_owned();
     let unwritten =
@@ -108,7 +107,7 @@ pub(super) fn take_in(connection: &mut Connection, path: &Path) {
 fn take_in_file(connection: &mut Connection, path: &Path, file: &Path) -> Result<(), JournalError> {
     let io_error = |source| JournalError::from_io(path, "take rounds into", source);
     let sql_error = |error: rusqlite::Error| JournalError::from_sql(path, &error);
-    let text = bounded_text(file).map_err(io_error)?;
+    let text = plain_text(file, BYTES_MAX).map_err(io_error)?;
     let mut lines = text.lines().peekable();
     let described = lines.peek().and_then(|line| of_header(line));
     if described.is_some() {
@@ -228,16 +227,4 @@ fn named(path: &Path, kind: &str) -> io::Result<Vec<PathBuf>> {
     }
     files.sort();
     Ok(files)
-}
-
-fn bounded_text(path: &Path) -> io::Result<String> {
-    let mut text = String::new();
-    plain_file(path)?.take(BYTES_MAX + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > BYTES_MAX {
-        return Err(io::Error::new(
-            io::ErrorKind::FileTooLarge,
-            format!("it is longer than {} MB; cut it into several", BYTES_MAX >> 20),
-        ));
-    }
-    Ok(text)
 }

@@ -378,7 +378,7 @@ impl Journal {
             JournalMessage::Clock(_) => None,
         }));
         let committed = self.told().committed;
-        let row = |record| StoredShot { run: self.run, record }.to_json().to_string();
+        let row = |record| StoredShot::line(self.run, record);
         let unwritten = Unwritten {
             path: self.path.clone(),
             run: self.run,

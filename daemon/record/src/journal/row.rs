@@ -172,6 +172,11 @@ impl StoredShot {
 }
 
 impl StoredShot {
+    /// The line of JSON of a round that stands beside the database or in the log.
+    pub(super) fn line(run: i64, record: ShotRecord) -> String {
+        Self { run, record }.to_json().to_string()
+    }
+
     /// The round of an object as [`Self::to_json`] makes it, or what is wrong with it. Numbers that are absent are NaN.
     pub(super) fn from_json(value: &Value) -> Result<Self, String> {
         let whole = |key: &str| value[key].as_i64().ok_or_else(|| format!("\"{key}\" is no whole number"));

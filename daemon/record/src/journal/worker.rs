@@ -462,8 +462,7 @@ impl JournalWorker {
     fn unwritten(&self) -> (Vec<String>, usize) {
         let doubted = if self.in_doubt { self.kept.len() } else { 0 };
         let pending = self.held().unwritten();
-        let row =
-            |record: &ShotRecord| StoredShot { run: self.id, record: record.clone() }.to_json().to_string();
+        let row = |record: &ShotRecord| StoredShot::line(self.id, record.clone());
         (self.kept.iter().take(doubted).chain(&pending).map(row).collect(), doubted)
     }
 

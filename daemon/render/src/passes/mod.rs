@@ -14,8 +14,9 @@ use ash::vk;
 use bowwave_core::geometry::{Bend, Optics};
 
 use crate::{
+    error::RenderError,
     gpu::Gpu,
-    pipeline::{SetLayout, SetPool},
+    pipeline::{Bound, Sampler, SetLayout, SetPool},
     target::Words,
 };
 
@@ -36,7 +37,24 @@ pub(crate) struct PassContext<'a> {
     pub(crate) optics: Optics,
 }
 
+/// A set with one texture that is read as it is stored, and what it lives on.
+pub(crate) struct TextureSet {
+    pub(crate) set: vk::DescriptorSet,
+    pub(crate) layout: Arc<SetLayout>,
+    _sampler: Sampler,
+}
+
 impl PassContext<'_> {
+    /// The set by which fragment shaders read `view`, texel by texel.
+    pub(crate) fn texture_set(&self, view: vk::ImageView) -> Result<TextureSet, RenderError> {
+        let sampler = Sampler::new(self.gpu, vk::Filter::NEAREST, false)?;
+        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
+        let layout = Arc::new(SetLayout::new(self.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?);
+        let bound = Bound::Texture { view, sampler: sampler.raw, layout: SAMPLED.2 };
+        let set = self.pool.set(&layout, &[bound])?;
+        Ok(TextureSet { set, layout, _sampler: sampler })
+    }
+
     /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`).
     pub(crate) fn lens_constants(&self) -> [u32; 2] {
         let bend = match self.optics.bend {

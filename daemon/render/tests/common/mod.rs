@@ -18,8 +18,8 @@ pub fn config(scene: &Scene) -> RenderConfig {
     RenderConfig {
         width: scene.lens.width,
         height: scene.lens.height,
-        // The software driver: the same pixels everywhere.
-        device: Some("llvmpipe".to_owned()),
+        // The software driver: the same pixels everywhere. A real GPU is held against them by its number or a part of its name.
+        device: Some(std::env::var("BOWWAVE_TEST_GPU").unwrap_or_else(|_| "llvmpipe".to_owned())),
         validation: true,
         frames_in_flight: 2,
         needs: Needs {

@@ -28,15 +28,22 @@ const WARM_UP_S: f64 = 120.0;
 /// How often it is looked whether it still runs.
 const PATIENCE: Duration = Duration::from_millis(500);
 
+/// Which GPU draws, and how.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct GpuSettings {
+    /// Vulkan device by number or part of its name; absent: the first.
+    pub device: Option<String>,
+    /// Whether to run with the validation layer.
+    pub validation: bool,
+    /// How long it may take over a frame before it counts as hung; absent: what is usual.
+    pub timeout: Option<Duration>,
+}
+
 /// Settings of a presenter.
 #[derive(Clone, Debug, Default)]
 pub struct PresenterOptions {
-    /// Vulkan device by number or part of its name.
-    pub gpu: Option<String>,
-    /// Whether to run with the validation layer.
-    pub validation: bool,
-    /// How long the GPU may take over a frame before it counts as hung.
-    pub gpu_timeout: Option<Duration>,
+    /// The GPU.
+    pub gpu: GpuSettings,
     /// Uses of the finished frames; the size is the plan's.
     pub output: OutputOptions,
 }
@@ -52,8 +59,9 @@ impl Presenter {
     /// Opens the GPU, makes what `session` needs and draws it once to nobody, so that the first frames do not wait for the
     /// driver's compiler.
     pub fn open(session: &Session, models: &[Model], options: &PresenterOptions) -> Result<Self> {
-        let mut config = RenderConfig::of_plan(session.plan(), options.gpu.clone(), options.validation);
-        if let Some(frame) = options.gpu_timeout {
+        let mut config =
+            RenderConfig::of_plan(session.plan(), options.gpu.device.clone(), options.gpu.validation);
+        if let Some(frame) = options.gpu.timeout {
             // A computer that draws so much slower compiles so much slower.
             config.time_outs = TimeOuts { frame, warm_up: config.time_outs.warm_up.max(frame * 120) };
         }

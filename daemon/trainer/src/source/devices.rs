@@ -15,7 +15,7 @@ use bowwave_devices::{
     lamps::{LampSettings, LampState, Lamps},
     lcd::{LcdPort, LcdSettings, Vblanks},
     report::{Reporter, Reports, reporting},
-    serial::{ImuPort, ImuSettings, ShipPort, ShipSettings},
+    serial::{ImuPort, ImuSettings, LineSettings, ShipPort},
     trigger::{InputLine, TriggerPort, TriggerSettings},
 };
 
@@ -50,7 +50,7 @@ pub struct DeviceSettings {
     /// The inertial unit.
     pub imu: Option<ImuSettings>,
     /// The feed of the ship's heading.
-    pub ship: Option<ShipSettings>,
+    pub ship: Option<LineSettings>,
     /// Trigger, interlock and presses.
     pub trigger: Option<TriggerSettings>,
     /// The lamps.
@@ -90,7 +90,7 @@ impl Devices {
         let lcd = lcd.map(|lcd| LcdPort::start(lcd, reporter("lcd")).map(Arc::new)).transpose()?;
         let camera = CameraPort::start(camera, reporter("camera"))?;
         let imu = imu.map(|imu| ImuPort::start(imu, reporter("imu"))).transpose()?;
-        let ship = ship.map(|ship| ShipPort::start(&ship, reporter("ship"))).transpose()?;
+        let ship = ship.map(|ship| ShipPort::start(ship, reporter("ship"))).transpose()?;
         let lamps = lamps.and_then(|choice| start_lamps(choice, faults));
         let health = Health::start(&health, reporter(HEALTH))?;
         let output = reporter("output");

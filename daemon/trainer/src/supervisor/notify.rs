@@ -94,6 +94,7 @@ pub fn status_text(hud: &Hud, warnings: impl Iterator<Item = Fault>) -> String {
         Status::Ready => "READY".to_owned(),
         Status::Hit => "HIT".to_owned(),
         Status::Miss => "MISS".to_owned(),
+        Status::NotChecked { cause } => format!("NOT CHECKED: {cause}"),
         Status::NotScored { cause, .. } => format!("NOT SCORED: {cause}"),
         Status::Fault { cause, .. } => format!("FAULT: {cause}"),
     };

@@ -24,9 +24,14 @@ const fn memory_bytes(text_bytes: usize) -> usize {
 }
 
 fn check(scenario: &Scenario) {
-    assert!((scenario.sun_direction.length() - 1.0).abs() < 1e-9, "{:?}", scenario.sun_direction);
+    assert!(
+        (scenario.daylight.sun_direction.length() - 1.0).abs() < 1e-9,
+        "{:?}",
+        scenario.daylight.sun_direction
+    );
     assert!(scenario.wind.is_finite() && scenario.wind.z == 0.0, "{:?}", scenario.wind);
-    for positive in [scenario.eye_height_m, scenario.visibility_m, scenario.weapon.rounds_per_minute] {
+    for positive in [scenario.eye_height_m, scenario.daylight.visibility_m, scenario.weapon.rounds_per_minute]
+    {
         assert!(positive.is_finite() && positive > 0.0, "{scenario:?}");
     }
     assert!(scenario.duration_s.is_none_or(|s| s > 0.0 && s <= 86_400.0), "{:?}", scenario.duration_s);

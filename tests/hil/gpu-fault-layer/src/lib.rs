@@ -71,13 +71,8 @@ unsafe extern "system" fn get_instance_proc_addr(
         // SAFETY: all Vulkan functions have this type to their name.
         return Some(unsafe { link::erase(get_instance_proc_addr as *const ()) });
     }
-    if text == c"vkGetDeviceProcAddr" {
-        // SAFETY: as above.
-        return Some(unsafe { link::erase(get_device_proc_addr as *const ()) });
-    }
-    let own = instance::own(text).or_else(|| device::own(text));
     // SAFETY: the caller's promises are passed on.
-    own.or_else(|| unsafe { instance::below(instance, name) })
+    own_of_device(text).or_else(|| instance::own(text)).or_else(|| unsafe { instance::below(instance, name) })
 }
 
 /// Functions of a device: this layer's own, or those of the layer below.
@@ -87,10 +82,14 @@ unsafe extern "system" fn get_device_proc_addr(
 ) -> vk::PFN_vkVoidFunction {
     // SAFETY: Vulkan passes a string.
     let text = unsafe { CStr::from_ptr(name) };
-    if text == c"vkGetDeviceProcAddr" {
+    // SAFETY: the caller's promises are passed on.
+    own_of_device(text).or_else(|| unsafe { device::below(device, name) })
+}
+
+fn own_of_device(name: &CStr) -> vk::PFN_vkVoidFunction {
+    if name == c"vkGetDeviceProcAddr" {
         // SAFETY: all Vulkan functions have this type to their name.
         return Some(unsafe { link::erase(get_device_proc_addr as *const ()) });
     }
-    // SAFETY: the caller's promises are passed on.
-    device::own(text).or_else(|| unsafe { device::below(device, name) })
+    device::own(name)
 }

@@ -103,20 +103,15 @@ fn csv_row(text: &mut String, cells: &[impl AsRef<str>]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::faults::CaseResult;
 
     #[test]
     fn a_missed_row_is_counted_and_cells_cannot_break_the_table() {
         let line = FaultLine {
-            number: "1".into(),
-            fault: "a | b".into(),
-            injected: "x\ny".into(),
-            lcd: "\"NOT SCORED\"".into(),
-            code: "CAM_LOST".into(),
-            seen_s: Some(0.1234),
-            back_s: None,
+            row: ["1", "a | b", "x\ny", "CAM_LOST"],
+            seen: CaseResult { lcd: "\"NOT SCORED\"".into(), seen_s: Some(0.1234), ..CaseResult::default() },
             target: "seen 0.1 s".into(),
             verdict: FaultVerdict::Missed,
-            note: String::new(),
         };
         let report = HilReport { lines: vec![line], ..HilReport::default() };
         assert!(!report.passed());

@@ -100,18 +100,18 @@ fn try_row(row: &FaultRow, bench: &mut HilBench, report: &mut HilReport) {
     let mut line = row.run(bench);
     if line.verdict == FaultVerdict::Missed && !row.only_once() {
         // The host may have been busy: once more, and the table says so.
-        eprintln!("{:>4} {} was missed: {}; once more", line.number, line.fault, line.note);
+        let [number, fault, ..] = line.row;
+        eprintln!("{number:>4} {fault} was missed: {}; once more", line.seen.note);
         let first = std::mem::replace(&mut line, row.run(bench));
-        line.note = format!("second try; the first: {}; {}", first.note, line.note);
+        line.seen.note = format!("second try; the first: {}; {}", first.seen.note, line.seen.note);
     }
+    let ([number, fault, ..], seen) = (line.row, &line.seen);
     eprintln!(
-        "{:>4} {:<40} {:<14} {:>6.1} s  {} {}",
-        line.number,
-        line.fault,
+        "{number:>4} {fault:<40} {:<14} {:>6.1} s  {} {}",
         line.verdict.text(),
         begun.elapsed().as_secs_f64(),
-        line.lcd,
-        line.note
+        seen.lcd,
+        seen.note
     );
     report.lines.push(line);
 }
@@ -185,16 +185,15 @@ fn power_cut(shop: &Shop, mut bench: HilBench, data: &Path, report: &mut HilRepo
             _ => FaultVerdict::Missed,
         };
         super::faults::FaultLine {
-            number: "32".into(),
-            fault: "Power cut".into(),
-            injected: "QEMU's process is killed while rounds are fired; started again".into(),
-            lcd: seen.lcd,
-            code: "BOOT_DIRTY".into(),
-            seen_s: seen.seen_s,
-            back_s: seen.back_s,
+            row: [
+                "32",
+                "Power cut",
+                "QEMU's process is killed while rounds are fired; started again",
+                "BOOT_DIRTY",
+            ],
+            seen,
             target: "ready in 15 s, no committed hit lost".into(),
             verdict,
-            note: seen.note,
         }
     };
     let slow = bench.slow;

@@ -126,7 +126,8 @@ impl HeadingCase {
 
     /// Heading errors, degrees, of the product and of the naive rival, once a second; with a feed or none, that tells roll and pitch or not.
     fn run(&self, known: &Calibration, fed: bool, attitude: bool) -> HeadingErrors {
-        let settings = HeadingSettings { ship_latency_ns: 60_000_000, ..HeadingSettings::default() };
+        let mut settings = HeadingSettings::default();
+        settings.ship.latency_ns = 60_000_000;
         let mut sensors = Sensors::new(known, Source::Fused, &settings, None, 8.0, 20_000.0);
         let mut rng = Pcg64::seed_from_u64(5);
         let mut found = HeadingErrors::default();

@@ -116,7 +116,7 @@ fn strangers(bench: &mut PartBench) -> Result<()> {
             .filter_map(|(s, up)| Some(px(miss(&s.frame, (*up)?)) - s.uncertainty_px))
             .collect();
         let note = format!("{} of {} answered", errors.len(), marked.len());
-        off.push(m.tried(worst(errors.into_iter())).note(note));
+        off.push(m.tried(worst(errors)).note(note));
         // No prediction of a shore's horizon is right, so that none is told.
         let shown = found_in(m, &shores)?.iter().flatten().count();
         taken.push(m.tried(100.0 * shown as f64 / shores.len().max(1) as f64));

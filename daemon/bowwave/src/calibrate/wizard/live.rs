@@ -52,7 +52,7 @@ const PICTURES: usize = 4;
 pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
     let reader = Reader { config: arguments.config.clone(), last_good: None };
     let mut settings = reader.read()?;
-    let named = arguments.files.calibration.clone().or_else(|| settings.config.calibration.clone());
+    let named = arguments.files.calibration.clone().or_else(|| settings.config.files.calibration.clone());
     let path = named
         .context("nothing says where the calibration lies: set files.calibration in the configuration, or say --calibration")?;
     let file = if path.exists() {
@@ -71,7 +71,7 @@ pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
             log::warn!("{cause}");
         }
     }
-    let data = arguments.data.clone().or_else(|| settings.config.data.clone()).unwrap_or_else(|| {
+    let data = arguments.data.clone().or_else(|| settings.config.files.data.clone()).unwrap_or_else(|| {
         let usual = Path::new(DATA);
         if usual.is_dir() { usual } else { Path::new(".") }.to_owned()
     });
@@ -130,12 +130,7 @@ fn options(
     setup.screen = screen.unwrap_or(setup.screen);
     TrainerOptions {
         setup,
-        presenter: output.map(|output| PresenterOptions {
-            gpu: settings.config.gpu.clone(),
-            validation: settings.config.validation,
-            gpu_timeout: settings.config.gpu_timeout,
-            output,
-        }),
+        presenter: output.map(|output| PresenterOptions { gpu: settings.config.gpu.clone(), output }),
         frames: None,
         plays_to_the_end: false,
         follow_lcd: false,

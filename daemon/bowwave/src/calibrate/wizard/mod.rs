@@ -56,6 +56,7 @@ impl Guided {
             eye_height_m,
             target: arguments.target,
             range_m: arguments.range,
+            replaces: out.as_ref().is_some_and(|out| out.exists()),
         };
         let task = arguments.task.map(|task| match task {
             WizardTask::Intrinsics => Task::Lens,

@@ -136,6 +136,8 @@ pub struct Attitude {
     state: FilterState,
     history: PoseHistory,
     corrected: f64,
+    /// Up by the unit's own orientation, its axes.
+    own_up: DVec3,
 }
 
 #[derive(Debug)]
@@ -175,6 +177,7 @@ impl Attitude {
             state: FilterState::START,
             history: PoseHistory::new(),
             corrected: 0.0,
+            own_up: DVec3::NEG_Z,
         }
     }
 
@@ -193,6 +196,19 @@ impl Attitude {
     /// How the camera turns in the `span_ns` about `time`, radians about its axes; `None` where that is not known.
     pub fn camera_turn(&self, time: Time, span_ns: i64) -> Option<DVec3> {
         Some(self.camera_from_imu() * self.history.turn_over(time, span_ns)?)
+    }
+
+    /// Up at `time` by the unit alone, as it was calibrated to the camera, unit vector in the camera's axes: nothing that was seen is in it.
+    /// `None` where that is not known.
+    pub fn up_alone(&self, time: Time) -> Option<DVec3> {
+        let up_imu = match &self.state {
+            FilterState::Running(running) => running.inclination.up_imu(),
+            FilterState::External(..) => self.own_up,
+            FilterState::Levelling { .. } => return None,
+        };
+        let at = |time: Time| self.history.at(time).ok().map(|at| at.world_from_imu);
+        let since = at(time)?.inverse() * at(self.history.newest()?)?;
+        Some(self.camera_from_imu * (since * up_imu))
     }
 
     /// Time of the newest orientation.
@@ -402,6 +418,7 @@ impl Attitude {
     fn find(&mut self, time: Time, sample: &ImuSample) -> Option<OrientationSample> {
         let rate = sample.rate - self.gyro_bias;
         if let (Some(q), Source::Auto) = (sample.world_from_imu, self.settings.source) {
+            self.own_up = q.normalize().inverse() * DVec3::Z;
             let world_from_imu = self.external_ahrs(time, q.normalize());
             return Some(OrientationSample { time, world_from_imu, rate });
         }

@@ -5,9 +5,11 @@ use std::ops::Range;
 use super::{
     cells::PictureCells,
     fit::{EdgePoint, HorizonLine, LineSearch},
-    judge::STEP,
     steps::SHARP,
 };
+
+/// Rows that steps on the line and its parallels are taken over.
+pub(super) const STEP: usize = 5;
 
 /// Rows above the line that are looked at for an upper edge of land, at a width of 1280.
 const SKY: Range<usize> = 8..60;

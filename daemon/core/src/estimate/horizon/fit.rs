@@ -9,6 +9,7 @@ use super::{
     rays::Rays,
     steps::StepBlocks,
 };
+use crate::statistics::biweight;
 
 /// The scatter is read off the distance that this share of the points stay below...
 const SCATTER_SHARE: f64 = 0.35;
@@ -256,7 +257,7 @@ impl Fitter {
         let (up, [by_roll, by_elevation]) = (line.up(), turns(line.angles));
         let (mut normal, mut right) = (DMat2::ZERO, DVec2::ZERO);
         for point in &self.points {
-            let weight = point.weight * tukey(point.off, scatter);
+            let weight = point.weight * biweight(point.off, scatter);
             let fall = -point.down.dot(up).min(-1e-9);
             let slope = DVec2::new(point.ray.dot(by_roll), point.ray.dot(by_elevation)) / fall;
             normal += DMat2::from_cols(slope * slope.x, slope * slope.y) * weight;
@@ -286,13 +287,6 @@ impl Fitter {
         let r: f64 = ((products / pairs) / (squares / count)).clamp(0.0, 0.9);
         (1.0 + r) / (1.0 - r)
     }
-}
-
-fn tukey(off: f64, scatter: f64) -> f64 {
-    /// Tukey's constant for 95 % efficiency.
-    const TUKEY: f64 = 4.685;
-    let share = off / (TUKEY * scatter);
-    if share.abs() < 1.0 { (1.0 - share * share).powi(2) } else { 0.0 }
 }
 
 /// The largest step in the line's sense within `window` rows of `row`, to a fraction of a row by a parabola, and its size.

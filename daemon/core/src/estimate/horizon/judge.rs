@@ -2,7 +2,7 @@
 
 use super::{
     answer::LineQuality,
-    columns::{ColumnViews, Shown},
+    columns::{ColumnViews, STEP, Shown},
     edges::above,
     fit::{EdgePoint, HorizonFit, LineSearch},
 };
@@ -12,9 +12,6 @@ const CONTRAST_FULL: f64 = 15.0;
 
 /// Rows from the line to the parallels that it is compared with.
 const PARALLELS: [f64; 11] = [8.0, 12.0, 16.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0, 44.0, 48.0];
-
-/// Rows that steps on the line and its parallels are taken over.
-pub(super) const STEP: usize = 5;
 
 /// A column's step counts no more than this, codes, so that one white boat does not make a line.
 const STEP_MAX: f32 = 40.0;

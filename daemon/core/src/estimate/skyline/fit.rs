@@ -4,7 +4,7 @@ use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 use nalgebra::{SMatrix, SVector};
 
 use super::wind::{NEARNESS_SIGMA, SPREAD, SPREAD_MOST, Wind, carried, nearness};
-use crate::geometry::rotation_vector;
+use crate::{geometry::rotation_vector, statistics::BIWEIGHT_END};
 
 /// A point of the sky that was found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -88,8 +88,6 @@ pub(super) struct SkylinePrior {
 const AGREE_PX: f64 = 2.0;
 /// Rounds of weighing.
 const ROUNDS: usize = 6;
-/// Tukey's biweight: 95 % efficient at this many deviations (Holland & Welsch 1977).
-const TUKEY: f64 = 4.685;
 /// Variance of the whole over that of sights that err each by itself: patches overlap on coarse levels. It makes squared errors over
 /// variances about one on drawn skies.
 const SHARED: f64 = 4.0;
@@ -231,7 +229,7 @@ fn weigh(sights: &mut [SkyTrack], turn: DQuat, (wind, rate): (DVec2, f64), scatt
         let (expected, off) = if sight.stands { (coast, as_coast) } else { (cloud, as_cloud) };
         sight.off = off;
         let unit2 = sight.unit * sight.unit + (scatter.share * sight.gone(wind) / scatter.px).powi(2);
-        let share = (1.0 - (off / (TUKEY * scatter.px)).powi(2) / unit2).max(0.0);
+        let share = (1.0 - (off / (BIWEIGHT_END * scatter.px)).powi(2) / unit2).max(0.0);
         sight.weight = sight.trust * share * share / unit2;
         if sight.weight > 0.0 {
             sums.add(sight, turn, wind, expected);

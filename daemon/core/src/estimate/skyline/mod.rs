@@ -17,6 +17,7 @@ mod fit;
 mod grid;
 mod patch;
 mod pyramid;
+mod turn;
 mod wind;
 
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
@@ -35,6 +36,7 @@ use wind::{Wind, carried, nearness};
 
 pub use patch::{PatchMatch, SkyPatch};
 pub use pyramid::GreyPyramid;
+pub use turn::{TurnFinder, TurnSeen};
 
 /// For each point that is followed in a picture, so many are remembered, those out of view included.
 const KEPT: usize = 3;

@@ -11,7 +11,7 @@ const EYE_M: f64 = 6.0;
 /// As clouds at the horizon drift, rad/s.
 const DRIFT: f64 = 1e-4;
 
-fn lens() -> Lens {
+pub(super) fn lens() -> Lens {
     Lens {
         distortion: Distortion::radial_tangential(DVec2::new(-0.15, 0.02), DVec2::ZERO),
         ..Lens::pinhole(SIZE.0, SIZE.1, 1.1)
@@ -37,12 +37,12 @@ fn cloud(x: f64, y: f64) -> f64 {
 }
 
 /// Clouds that stand in the world.
-fn clouds(azimuth: f64, elevation: f64) -> f64 {
+pub(super) fn clouds(azimuth: f64, elevation: f64) -> f64 {
     120.0 + 60.0 * cloud(azimuth * 20.0, elevation * 25.0) + 30.0 * cloud(azimuth * 57.0, elevation * 60.0)
 }
 
 /// What `sky` gives for azimuth and elevation over a rough sea, with noise that differs by `seed`.
-fn painted(world_from_camera: DQuat, seed: u64, sky: impl Fn(f64, f64) -> f64) -> Picture {
+pub(super) fn painted(world_from_camera: DQuat, seed: u64, sky: impl Fn(f64, f64) -> f64) -> Picture {
     painted_by(&lens(), world_from_camera, seed, sky)
 }
 

@@ -1,6 +1,5 @@
 //! The scenario's tables other than the boats. Those of sea, light and reflection serve other texts with boats as well.
 
-use glam::DVec3;
 use serde::Deserialize;
 
 pub use super::keys::{LightKeys, M_S_PER_KN, ReflectionKeys, SeaKeys, angle, seed};
@@ -10,6 +9,7 @@ use super::{
     sun,
 };
 use crate::{
+    daylight::Daylight,
     sea::BeaufortForce,
     text::toml::{
         Loose, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number, one_of, plain_text,
@@ -76,7 +76,7 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let sea_from_video = text.given(&source, one_of(&sources))?.unwrap_or(false);
     let (_, mount) = text.section("mount", raw.mount);
     let (section, keys) = text.section("light", raw.light);
-    let (sun_direction, visibility_m) = light(&section, &keys)?;
+    let daylight = light(&section, &keys)?;
     let (_, keys) = text.section("reflection", raw.reflection);
     let water = reflection(text, &keys, force, &mut warnings)?;
     let (section, keys) = text.section("weapon", raw.weapon);
@@ -90,8 +90,7 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
         sea_from_video,
         wind: -place(waves.wind_from, force.wind_mean_m_s()).extend(0.0),
         eye_height_m: text.given(&mount.eye_height_m, number(0.5..=100.0, "m"))?.unwrap_or(8.0),
-        sun_direction,
-        visibility_m,
+        daylight,
         water,
         weapon,
         boats,
@@ -127,13 +126,17 @@ pub fn sea(section: &TomlSection<'_>, keys: &SeaKeys) -> Result<(BeaufortForce, 
     Ok((force, WaveSpec { spectrum, wind_from }))
 }
 
-/// The unit vector towards the sun, world, and the meteorological visibility, metres, of the table `[light]`.
+/// The daylight of the table `[light]`: a clear sky's sun.
 ///
 /// # Errors
 /// As [`sea`].
-pub fn light(section: &TomlSection<'_>, keys: &LightKeys) -> Result<(DVec3, f64), TomlError> {
+pub fn light(section: &TomlSection<'_>, keys: &LightKeys) -> Result<Daylight, TomlError> {
     let visibility_km = section.text.given(&keys.visibility_km, number(0.05..=200.0, "km"))?.unwrap_or(20.0);
-    Ok((sun::direction(section, keys)?, 1000.0 * visibility_km))
+    Ok(Daylight {
+        sun_direction: sun::direction(section, keys)?,
+        sun_strength: 1.0,
+        visibility_m: 1000.0 * visibility_km,
+    })
 }
 
 /// The name of a reflection method, or a former name.

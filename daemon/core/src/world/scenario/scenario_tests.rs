@@ -91,7 +91,7 @@ fn an_empty_text_is_a_scenario_of_defaults() {
     assert_eq!(scenario.water.method, ReflectionMethod::Baked);
     assert_eq!(scenario.water.shadow, ShadowLevel::Gradual);
     assert_eq!(scenario.weapon.belt, 100);
-    assert!((scenario.sun_direction.length() - 1.0).abs() < 1e-12);
+    assert!((scenario.daylight.sun_direction.length() - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -101,8 +101,8 @@ fn units_become_radians_metres_and_seconds() {
     );
     let scenario = parse(&text).expect("valid");
     assert!((scenario.wind - DVec3::new(-6.688, 0.0, 0.0)).length() < 1e-3, "{}", scenario.wind);
-    assert!((scenario.sun_direction - DVec3::X).length() < 1e-12);
-    assert_eq!(scenario.visibility_m, 5000.0);
+    assert!((scenario.daylight.sun_direction - DVec3::X).length() < 1e-12);
+    assert_eq!(scenario.daylight.visibility_m, 5000.0);
     let boat = scenario.boats[0].behaviour.begin(10.0, &BoatDamage::NONE);
     let start = DVec2::new(10_f64.to_radians().sin(), 10_f64.to_radians().cos()) * 200.0;
     assert!((boat.position - start - DVec2::Y * 46.3).length() < 1e-9, "{boat:?}");

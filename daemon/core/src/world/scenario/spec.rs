@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
+    daylight::Daylight,
     text::toml::{TomlError, TomlPlace},
     water::Water,
     world::{
@@ -34,10 +35,8 @@ pub struct Scenario {
     pub wind: DVec3,
     /// Height of the camera over the mean sea, metres.
     pub eye_height_m: f64,
-    /// Unit vector towards the sun, world.
-    pub sun_direction: DVec3,
-    /// Meteorological visibility, metres.
-    pub visibility_m: f64,
+    /// Where the sun stands, and how far one sees.
+    pub daylight: Daylight,
     /// How the sea mirrors, and at which wind force.
     pub water: Water,
     /// The training weapon.

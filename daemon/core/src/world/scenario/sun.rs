@@ -67,9 +67,9 @@ mod tests {
 
     #[test]
     fn the_sun_stands_where_the_reference_puts_it() {
-        let csv = include_str!("../../../data/sun_spa_points.csv");
-        let mut seen = 0;
-        for line in csv.lines().skip(2) {
+        let lines: Vec<&str> = include_str!("../../../data/sun_spa_points.csv").lines().skip(2).collect();
+        assert!(lines.len() > 40, "{} rows", lines.len());
+        for line in lines {
             let cells: Vec<&str> = line.split(',').collect();
             let number = |i: usize| cells[i].parse::<f64>().expect("a number");
             let utc = format!("{}Z", cells[0].replace(' ', "T")).parse().expect("a time");
@@ -81,8 +81,6 @@ mod tests {
             // The reference refracts in air of 12 C, the standard correction in another: low suns differ by 0.003 degrees.
             let allowed = if number(3) > 0.0 { 0.005 } else { 0.7 };
             assert!(error < allowed, "{line}: {error} deg");
-            seen += 1;
         }
-        assert!(seen > 40, "{seen} rows");
     }
 }

@@ -61,15 +61,6 @@ pub struct Strike {
     pub point: DVec3,
 }
 
-/// Where a round was closest to a boat.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Closest {
-    /// How far along the stretch, 0 to 1.
-    pub fraction: f64,
-    /// Distance, metres; 0 inside the box.
-    pub distance_m: f64,
-}
-
 /// The first triangle of the model that the stretch from `a` to `b` (both in the boat's space, each at its own time) pierces,
 /// from either side. Transparent parts of a picture let the round through.
 pub fn strike(model: &Model, a: DVec3, b: DVec3) -> Option<Strike> {
@@ -94,25 +85,6 @@ pub fn strike(model: &Model, a: DVec3, b: DVec3) -> Option<Strike> {
     first
 }
 
-/// Where the stretch from `a` to `b` (in the boat's space) is closest to the model's bounding box.
-pub fn closest_to_box(model: &Model, a: DVec3, b: DVec3) -> Closest {
-    let (min, max) = (model.min.as_dvec3(), model.max.as_dvec3());
-    let ray = b - a;
-    // The distance to a convex body is convex along the stretch, so its slope has one zero: halve towards it.
-    let outside = |s: f64| {
-        let p = a + ray * s;
-        p - p.max(min).min(max)
-    };
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..48 {
-        let middle = (low + high) / 2.0;
-        if outside(middle).dot(ray) < 0.0 { low = middle } else { high = middle }
-    }
-    // The end itself where the stretch still approaches there.
-    let fraction = if outside(1.0).dot(ray) < 0.0 { 1.0 } else { high };
-    Closest { fraction, distance_m: outside(fraction).length() }
-}
-
 /// Slab test of the bounding box, a little widened.
 fn touches_box(model: &Model, a: DVec3, b: DVec3) -> bool {
     let margin = DVec3::splat(1e-3);
@@ -133,9 +105,9 @@ fn touches_box(model: &Model, a: DVec3, b: DVec3) -> bool {
     enter <= leave
 }
 
-type HullTriangle<'a> = [&'a Vertex; 3];
+pub(super) type HullTriangle<'a> = [&'a Vertex; 3];
 
-fn corners<'a>(model: &'a Model, indices: &[u32]) -> Option<HullTriangle<'a>> {
+pub(super) fn corners<'a>(model: &'a Model, indices: &[u32]) -> Option<HullTriangle<'a>> {
     let corner = |i: usize| indices.get(i).and_then(|&index| model.vertices.get(index as usize));
     Some([corner(0)?, corner(1)?, corner(2)?])
 }
@@ -169,7 +141,11 @@ fn pierce(triangle: HullTriangle<'_>, from: DVec3, ray: DVec3) -> Option<Pierced
 fn is_solid(texture: Option<&Texture>, triangle: HullTriangle<'_>, pierced: Pierced) -> bool {
     let Some(texture) = texture else { return true };
     let [t0, t1, t2] = triangle.map(|v| v.uv.as_dvec2());
-    let uv = t0 + (t1 - t0) * pierced.weights.x + (t2 - t0) * pierced.weights.y;
+    is_solid_at(texture, t0 + (t1 - t0) * pierced.weights.x + (t2 - t0) * pierced.weights.y)
+}
+
+/// Whether a picture is opaque there.
+pub(super) fn is_solid_at(texture: &Texture, uv: DVec2) -> bool {
     let texel =
         |c: f64, size: u32| ((c - c.floor()).min(1.0) * f64::from(size)).floor().min(f64::from(size) - 1.0);
     // A picture's last row and column belong to it: 1 does not wrap to 0.

@@ -36,7 +36,7 @@ pub(in crate::world::score) fn boxed(min: Vec3, max: Vec3) -> Model {
     model
 }
 
-fn vector(reach: f64) -> impl Strategy<Value = DVec3> {
+pub(in crate::world::score) fn vector(reach: f64) -> impl Strategy<Value = DVec3> {
     (-reach..reach, -reach..reach, -reach..reach).prop_map(|(x, y, z)| DVec3::new(x, y, z))
 }
 
@@ -45,7 +45,7 @@ fn depth(model: &Model, p: DVec3) -> f64 {
 }
 
 /// A picture 4 m wide and 2 m high, its left half opaque.
-fn picture() -> Model {
+pub(in crate::world::score) fn picture() -> Model {
     let corner = |x: f32, z: f32, u: f32, v: f32| Vertex {
         position: Vec3::new(x, 0.0, z),
         normal: Vec3::NEG_Y,
@@ -134,20 +134,6 @@ proptest! {
             }
             None => prop_assert!(deepest <= 1e-9, "missed by {deepest} m inside"),
         }
-    }
-
-    #[test]
-    fn the_closest_point_is_what_dense_sampling_finds(
-        low in vector(4.0), size in vector(4.0), a in vector(30.0), b in vector(30.0),
-    ) {
-        let low = low.as_vec3();
-        let model = boxed(low, low + size.abs().as_vec3());
-        let distance = |p: DVec3| (p - p.clamp(model.min.as_dvec3(), model.max.as_dvec3())).length();
-        let sampled = (0..=4000).map(|i| distance(a.lerp(b, f64::from(i) / 4000.0))).fold(f64::INFINITY, f64::min);
-        let found = closest_to_box(&model, a, b);
-        prop_assert!((0.0..=1.0).contains(&found.fraction));
-        prop_assert!((found.distance_m - distance(a.lerp(b, found.fraction))).abs() < 1e-9);
-        prop_assert!(found.distance_m <= sampled + 1e-9 && found.distance_m > sampled - 0.02, "{found:?}, sampled {sampled}");
     }
 
     #[test]

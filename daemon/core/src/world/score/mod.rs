@@ -1,11 +1,13 @@
 //! Results of virtual rounds: the records that outlive a session, and the swept test that decides them.
 
+mod closest;
 mod hit;
 mod round;
 
 use glam::DVec3;
 
-pub use hit::{Closest, Moving, Strike, closest_to_box, strike};
+pub use closest::{Closest, closest_to_box, closest_to_surface};
+pub use hit::{Moving, Strike, strike};
 pub use round::{Approach, End, Round};
 
 pub use crate::fault::NotScored;

@@ -2,7 +2,10 @@
 
 use glam::DVec3;
 
-use super::hit::{Closest, Moving, closest_to_box, strike};
+use super::{
+    closest::{Closest, closest_to_box, closest_to_surface},
+    hit::{Moving, strike},
+};
 use crate::{
     model::Zone,
     world::{
@@ -29,7 +32,7 @@ pub struct Round {
 pub struct Approach {
     /// Index of the boat among those given.
     pub boat: usize,
-    /// Distance to the hull's bounding box, metres.
+    /// Distance to its surface, metres.
     pub distance_m: f64,
     /// When.
     pub time_s: f64,
@@ -133,21 +136,27 @@ impl Round {
         }
         let (from_s, to_s) = (clock(0.0), clock(last));
         for (boat, moving) in boats.iter().enumerate() {
-            self.note_approach(boat, moving, (from_s, a), (to_s, a.lerp(b, last)));
+            self.note_approach(boat, moving, [(from_s, a), (to_s, a.lerp(b, last))], end.is_some());
         }
         end
     }
 
-    fn note_approach(&mut self, boat: usize, moving: &Moving<'_>, from: (f64, DVec3), to: (f64, DVec3)) {
+    fn note_approach(&mut self, boat: usize, moving: &Moving<'_>, [from, to]: [(f64, DVec3); 2], ends: bool) {
         let poses = [from, to].map(|(time_s, _)| moving.pose_at(time_s, self.muzzle));
         let apart = |s: f64| from.1.lerp(to.1, s) - poses[0].position.lerp(poses[1].position, s);
         let least = distance_to_origin(apart(0.0), apart(1.0)) - moving.reach_m();
-        if self.nearest.is_some_and(|n| n.distance_m <= least) {
+        let within_m = self.nearest.map_or(f64::INFINITY, |n| n.distance_m);
+        if within_m <= least {
             return;
         }
-        let Closest { fraction, distance_m } =
-            closest_to_box(moving.model, poses[0].to_body(from.1), poses[1].to_body(to.1));
-        if self.nearest.is_none_or(|n| distance_m < n.distance_m) {
+        let (a, b) = (poses[0].to_body(from.1), poses[1].to_body(to.1));
+        let by_box = closest_to_box(moving.model, a, b);
+        // While it still approaches, the next stretch is closer.
+        if by_box.distance_m >= within_m || (by_box.fraction >= 1.0 && !ends) {
+            return;
+        }
+        let closest = closest_to_surface(moving.model, a, b, within_m);
+        if let Some(Closest { fraction, distance_m }) = closest {
             let range_m = from.1.lerp(to.1, fraction).distance(self.muzzle);
             let time_s = from.0 + fraction * (to.0 - from.0);
             self.nearest = Some(Approach { boat, distance_m, time_s, range_m });

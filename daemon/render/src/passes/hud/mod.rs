@@ -5,12 +5,10 @@
 mod glyphs;
 pub(crate) mod layout;
 
-use glyphs::Glyphs;
-use layout::{HudLayout, KINDS, text_px};
-use std::sync::Arc;
-
 use ash::vk;
 use bowwave_core::frame::scene::{PixelRect, Scene};
+use glyphs::Glyphs;
+use layout::{HudLayout, KINDS, text_px};
 use shaders_spirv::{HUD_FRAG, HUD_VERT, interface::HudQuad};
 
 use crate::{
@@ -18,8 +16,8 @@ use crate::{
     error::RenderError,
     frame_data::{FrameData, QUADS_MAX},
     memory::{Image, ImageShape},
-    passes::{DRAWN, FORGET_READ, PassContext, SAMPLED},
-    pipeline::{Bound, Pipeline, PipelineShape, SRGB, Sampler, SetLayout},
+    passes::{DRAWN, FORGET_READ, PassContext, SAMPLED, TextureSet},
+    pipeline::{Pipeline, PipelineShape, SRGB},
     upload::upload_image,
 };
 
@@ -34,12 +32,9 @@ pub(crate) struct HudPass {
     held: Vec<HudQuad>,
     layer: Image,
     /// The layer, for the video pass.
-    pub(crate) layer_layout: Arc<SetLayout>,
-    layer_set: vk::DescriptorSet,
-    set: vk::DescriptorSet,
+    pub(crate) overlay: TextureSet,
+    atlas: TextureSet,
     _atlas: Image,
-    _sampler: Sampler,
-    _set_layout: SetLayout,
 }
 
 impl HudPass {
@@ -52,12 +47,7 @@ impl HudPass {
         let atlas = Image::new(gpu, "glyphs", shape)?;
         upload_image(gpu, &atlas, &[&glyphs.coverage])?;
         glyphs.coverage = Vec::new();
-        let sampler = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
-        let bound = Bound::Texture { view: atlas.view, sampler: sampler.raw, layout };
-        let set = context.pool.set(&set_layout, &[bound])?;
+        let glyphs_set = context.texture_set(atlas.view)?;
         let pipeline = |kind: u32| {
             Pipeline::new(
                 gpu,
@@ -65,7 +55,7 @@ impl HudPass {
                     vertex_constants: &[],
                     constants: &[kind],
                     push: 0,
-                    ..PipelineShape::over_screen(HUD_VERT, HUD_FRAG, &[context.frame_set, &set_layout])
+                    ..PipelineShape::over_screen(HUD_VERT, HUD_FRAG, &[context.frame_set, &glyphs_set.layout])
                 },
             )
         };
@@ -75,23 +65,16 @@ impl HudPass {
         let shape =
             ImageShape { second: Some(vk::Format::R32_UINT), ..ImageShape::new(context.size, SRGB, usage) };
         let layer = Image::new(gpu, "head-up display", shape)?;
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let layer_layout = Arc::new(SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?);
-        let bound = Bound::Texture { view: layer.second_view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let layer_set = context.pool.set(&layer_layout, &[bound])?;
         Ok(Self {
             held: Vec::with_capacity(QUADS_MAX),
+            overlay: context.texture_set(layer.second_view)?,
             layer,
-            layer_layout,
-            layer_set,
             size: context.size,
             glyphs,
             layout: HudLayout::new(context.size),
             pipelines,
-            set,
+            atlas: glyphs_set,
             _atlas: atlas,
-            _sampler: sampler,
-            _set_layout: set_layout,
         })
     }
 
@@ -113,11 +96,6 @@ impl HudPass {
             self.held.extend_from_slice(quads);
         }
         stale
-    }
-
-    /// The layer, to be sampled.
-    pub(crate) fn overlay(&self) -> vk::DescriptorSet {
-        self.layer_set
     }
 
     /// Draws them into the layer.
@@ -149,7 +127,7 @@ impl HudPass {
         to.scissor(PixelRect { x: 0, y: 0, width, height });
         let mut first = 0;
         for (pipeline, count) in self.pipelines.iter().zip(counts) {
-            to.bind(pipeline, &[frame, self.set]);
+            to.bind(pipeline, &[frame, self.atlas.set]);
             to.draw_from(4, first, count);
             first += count;
         }

@@ -13,10 +13,10 @@ use crate::{
     error::RenderError,
     memory::{Image, ImageShape},
     passes::{
-        DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED,
+        DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED, TextureSet,
         boats::{BoatDraw, BoatPipelines, meshes::Meshes},
     },
-    pipeline::{Blend, Bound, DEPTH, LIGHT, Pipeline, PipelineShape, Sampler, SetLayout},
+    pipeline::{Blend, DEPTH, LIGHT, Pipeline, PipelineShape},
     rects::joined,
 };
 
@@ -34,9 +34,7 @@ pub(crate) struct MirrorPass {
 struct Soft {
     image: Image,
     pipeline: Pipeline,
-    set: vk::DescriptorSet,
-    _sampler: Sampler,
-    _set_layout: SetLayout,
+    layer: TextureSet,
 }
 
 impl MirrorPass {
@@ -109,7 +107,7 @@ impl MirrorPass {
         let (width, height) = (soft.image.shape.width, soft.image.shape.height);
         to.begin(area, Colour::new(soft.image.view, Begin::Forget), None);
         to.window([0.0, 0.0, width as f32, height as f32], area);
-        to.bind(&soft.pipeline, &[soft.set]);
+        to.bind(&soft.pipeline, &[soft.layer.set]);
         to.draw(3, 1);
         to.end();
         Some(Step { image: &soft.image, from: DRAWN, to: SAMPLED })
@@ -141,11 +139,7 @@ impl Soft {
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED;
         let size = (layer.shape.width / SOFT, layer.shape.height / SOFT);
         let image = Image::new(gpu, "mirror layer, softened", ImageShape::new(size, LIGHT, usage))?;
-        let sampler = Sampler::new(gpu, vk::Filter::NEAREST, false)?;
-        let kinds = [vk::DescriptorType::COMBINED_IMAGE_SAMPLER];
-        let set_layout = SetLayout::new(gpu, &kinds, vk::ShaderStageFlags::FRAGMENT)?;
-        let bound = Bound::Texture { view: layer.view, sampler: sampler.raw, layout: SAMPLED.2 };
-        let set = context.pool.set(&set_layout, &[bound])?;
+        let layer = context.texture_set(layer.view)?;
         let pipeline = Pipeline::new(
             gpu,
             &PipelineShape {
@@ -153,7 +147,7 @@ impl Soft {
                 fragment: SOFTEN_FRAG,
                 vertex_constants: &[],
                 constants: &[],
-                sets: &[&set_layout],
+                sets: &[&layer.layout],
                 push: 0,
                 vertices: None,
                 topology: vk::PrimitiveTopology::TRIANGLE_LIST,
@@ -165,6 +159,6 @@ impl Soft {
                 samples: vk::SampleCountFlags::TYPE_1,
             },
         )?;
-        Ok(Self { image, pipeline, set, _sampler: sampler, _set_layout: set_layout })
+        Ok(Self { image, pipeline, layer })
     }
 }

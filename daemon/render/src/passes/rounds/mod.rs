@@ -10,10 +10,7 @@ use shaders_spirv::{ROUND_FRAG, ROUND_HIDDEN_FRAG, ROUND_VERT, Shader, interface
 use crate::{
     encoder::CommandEncoder,
     error::RenderError,
-    passes::{
-        PassContext,
-        boats::{BoatsPass, HullDepth},
-    },
+    passes::{PassContext, TextureSet, boats::BoatsPass},
     pipeline::{Pipeline, PipelineShape, SetLayout},
     rects::{around_all, corners, overlap},
 };
@@ -48,7 +45,7 @@ pub(crate) fn pieces(
 /// What draws where hulls may stand before rounds.
 struct Hidden {
     pipeline: Pipeline,
-    depth: HullDepth,
+    depth: TextureSet,
 }
 
 /// The rounds' pass.

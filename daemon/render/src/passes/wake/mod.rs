@@ -9,7 +9,7 @@ use shaders_spirv::{SPRAY_FRAG, SPRAY_VERT, Shader, WAKE_FRAG, WAKE_VERT, interf
 use crate::{
     encoder::CommandEncoder,
     error::RenderError,
-    passes::{PassContext, boats},
+    passes::{PassContext, TextureSet, boats},
     pipeline::{Pipeline, PipelineShape, SetLayout},
 };
 
@@ -35,7 +35,7 @@ pub(crate) struct WakeDraw {
 pub(crate) struct WakePass {
     pipeline: Pipeline,
     spray: Pipeline,
-    depth: boats::HullDepth,
+    depth: TextureSet,
 }
 
 impl WakePass {

@@ -129,59 +129,32 @@ pub enum FaultRow {
 /// A line of the table.
 #[derive(Clone, Debug)]
 pub struct FaultLine {
-    /// Number.
-    pub number: String,
-    /// The fault.
-    pub fault: String,
-    /// How it was injected.
-    pub injected: String,
-    /// Indication that the LCD showed.
-    pub lcd: String,
-    /// The journal's code.
-    pub code: String,
-    /// Seconds from the cause to the LCD.
-    pub seen_s: Option<f64>,
-    /// Seconds from the cause's end to the fault's.
-    pub back_s: Option<f64>,
+    /// Number, fault, way of injection and the journal's code.
+    pub row: [&'static str; 4],
+    /// What became of it.
+    pub seen: CaseResult,
     /// The target.
     pub target: String,
     /// Its verdict.
     pub verdict: FaultVerdict,
-    /// More to say.
-    pub note: String,
 }
 
 impl FaultLine {
-    /// The line of a row before it is tried: its number, fault, way of injection and code.
-    fn missed([number, fault, injected, code]: [&str; 4]) -> Self {
-        Self {
-            number: number.into(),
-            fault: fault.into(),
-            injected: injected.into(),
-            lcd: String::new(),
-            code: code.into(),
-            seen_s: None,
-            back_s: None,
-            target: String::new(),
-            verdict: FaultVerdict::Missed,
-            note: String::new(),
-        }
-    }
-
     /// Its cells, in the order of both tables' columns.
     pub fn cells(&self) -> [String; 10] {
         let seconds = |value: Option<f64>| value.map_or_else(|| "-".into(), |v| format!("{v:.2}"));
+        let ([number, fault, injected, code], seen) = (self.row.map(str::to_owned), &self.seen);
         [
-            self.number.clone(),
-            self.fault.clone(),
-            self.injected.clone(),
-            self.lcd.clone(),
-            self.code.clone(),
-            seconds(self.seen_s),
-            seconds(self.back_s),
+            number,
+            fault,
+            injected,
+            seen.lcd.clone(),
+            code,
+            seconds(seen.seen_s),
+            seconds(seen.back_s),
             self.target.clone(),
             self.verdict.text().into(),
-            self.note.clone(),
+            seen.note.clone(),
         ]
     }
 }
@@ -246,11 +219,10 @@ impl FaultRow {
             Self::Case(case) => case.line(bench),
             Self::Own(own) => own.line(bench),
             Self::Not(number, fault, why) => FaultLine {
-                lcd: "-".into(),
+                row: [number, fault, "-", "-"],
+                seen: CaseResult { lcd: "-".into(), note: (*why).into(), ..CaseResult::default() },
                 target: "-".into(),
                 verdict: FaultVerdict::Not,
-                note: (*why).into(),
-                ..FaultLine::missed([number, fault, "-", "-"])
             },
         }
     }
@@ -273,15 +245,8 @@ impl SpecialCase {
             (true, _, true) => FaultVerdict::MetScaled,
             _ => FaultVerdict::Missed,
         };
-        FaultLine {
-            lcd: seen.lcd,
-            seen_s: seen.seen_s,
-            back_s: seen.back_s,
-            target: self.target.into(),
-            verdict,
-            note: seen.note,
-            ..FaultLine::missed([self.number, self.fault, self.injected, self.code])
-        }
+        let row = [self.number, self.fault, self.injected, self.code];
+        FaultLine { row, seen, target: self.target.into(), verdict }
     }
 }
 
@@ -290,21 +255,21 @@ const EXTRA: Duration = Duration::from_secs(20);
 
 impl FaultCase {
     fn line(&self, bench: &mut HilBench) -> FaultLine {
-        let mut line = FaultLine {
-            target: self.target(),
-            ..FaultLine::missed([self.number, self.fault, self.injected, self.code])
+        let mut seen = CaseResult::default();
+        let verdict = match self.try_it(bench, &mut seen) {
+            Ok(()) => self.verdict(bench, &seen),
+            Err(e) => {
+                seen.note = format!("{e:#}");
+                bench.keep_picture(&format!("row-{}-missed", self.number));
+                FaultVerdict::Missed
+            }
         };
-        if let Err(e) = self.try_it(bench, &mut line) {
-            line.note = format!("{}{e:#}", if line.note.is_empty() { "" } else { "; " });
-            bench.keep_picture(&format!("row-{}-missed", self.number));
-        } else {
-            line.verdict = self.verdict(bench, &line);
-        }
         // Whatever became of it: the next row begins in peace.
         if let Err(e) = bench.settle() {
-            line.note = format!("{}; afterwards: {e:#}", line.note);
+            seen.note = format!("{}; afterwards: {e:#}", seen.note);
         }
-        line
+        let row = [self.number, self.fault, self.injected, self.code];
+        FaultLine { row, seen, target: self.target(), verdict }
     }
 
     fn target(&self) -> String {
@@ -314,14 +279,14 @@ impl FaultCase {
         if all.is_empty() { "-".into() } else { all.join(", ") }
     }
 
-    fn verdict(&self, bench: &HilBench, line: &FaultLine) -> FaultVerdict {
+    fn verdict(&self, bench: &HilBench, seen: &CaseResult) -> FaultVerdict {
         let within = |value: Option<f64>, target: Option<f64>, factor: f64| match (value, target) {
             (Some(v), Some(t)) => v <= t * factor,
             (None, Some(_)) => false,
             _ => true,
         };
         let all =
-            |factor| within(line.seen_s, self.seen_s, factor) && within(line.back_s, self.back_s, factor);
+            |factor| within(seen.seen_s, self.seen_s, factor) && within(seen.back_s, self.back_s, factor);
         match (all(1.0), all(bench.slow)) {
             (true, _) => FaultVerdict::Met,
             (_, true) => FaultVerdict::MetScaled,
@@ -329,7 +294,7 @@ impl FaultCase {
         }
     }
 
-    fn try_it(&self, bench: &mut HilBench, line: &mut FaultLine) -> Result<()> {
+    fn try_it(&self, bench: &mut HilBench, result: &mut CaseResult) -> Result<()> {
         bench.ready(bench.scaled(2.0) + EXTRA)?;
         let from = bench.machine.guest.now_ns();
         let caused = (self.inject)(bench)?;
@@ -337,13 +302,13 @@ impl FaultCase {
         let patience = bench.scaled(self.seen_s.unwrap_or(1.0)) + EXTRA;
         let came = bench.told(self.code, JournalChange::Came, from, patience)?;
         if let Some(seen) = bench.shown(self.shown, at, patience)? {
-            line.seen_s = Some(seen.saturating_duration_since(at).as_secs_f64());
+            result.seen_s = Some(seen.saturating_duration_since(at).as_secs_f64());
         }
         let cause = match self.shown {
             LcdShown::NotScored(cause) | LcdShown::Fault(cause) | LcdShown::Warning(cause) => cause,
             LcdShown::Nothing => "",
         };
-        line.lcd = bench.says(cause)?;
+        result.lcd = bench.says(cause)?;
         bench.keep_picture(&format!("row-{}", self.number));
         std::thread::sleep(Duration::from_secs_f64(self.stays_s));
         // It may be over with the first thing that is done to end it, or by itself.
@@ -361,7 +326,7 @@ impl FaultCase {
                 let lcd = bench.lcd(over, patience, "READY", |p, _| p == Plate::Ready)?;
                 back = back.max(lcd.saturating_duration_since(over).as_secs_f64());
             }
-            line.back_s = Some(back.max(0.0));
+            result.back_s = Some(back.max(0.0));
         }
         Ok(())
     }

@@ -294,11 +294,16 @@ impl CameraBench {
     /// `count` frames, one a period, each in its turn.
     pub(super) fn frames(&mut self, count: u32) {
         for _ in 0..count {
-            self.now = self.now.plus_ns(PERIOD_NS);
             let picture = self.picture();
-            self.fill(picture, false);
-            self.step(Ready { filled: true, ..Ready::default() });
+            self.send(picture);
         }
+    }
+
+    /// A frame a period later, whatever its bytes are.
+    pub(super) fn send(&mut self, bytes: Vec<u8>) {
+        self.now = self.now.plus_ns(PERIOD_NS);
+        self.fill(bytes, false);
+        self.step(Ready { filled: true, ..Ready::default() });
     }
 
     /// Looks for the camera, opens it and streams.

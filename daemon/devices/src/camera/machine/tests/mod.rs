@@ -145,13 +145,11 @@ fn a_damaged_buffer_is_counted_and_the_next_frame_comes() {
 fn damaged_jpegs_are_counted_told_above_thirty_percent_and_forgotten_below_ten() {
     let mut bench = mjpeg().streaming();
     let send = |bench: &mut CameraBench, cut: bool| {
-        bench.now = bench.now.plus_ns(PERIOD_NS);
         let mut picture = bench.picture();
         if cut {
             picture.truncate(picture.len() * 2 / 3);
         }
-        bench.fill(picture, false);
-        bench.step(Ready { filled: true, ..Ready::default() });
+        bench.send(picture);
     };
     (0..40).for_each(|n| send(&mut bench, n % 5 == 0));
     assert_eq!((bench.frames.len(), bench.told(Time::MIN)), (32, vec![]), "20 % is not worth a word");
@@ -213,9 +211,7 @@ fn another_size_than_the_calibrated_one_is_told_until_it_is_back() {
 fn jpegs_of_another_size_are_no_pictures_and_told_when_it_is_no_single_one() {
     let mut bench = mjpeg().streaming();
     let other = |bench: &mut CameraBench| {
-        bench.now = bench.now.plus_ns(PERIOD_NS);
-        bench.fill(jpeg(32, 9), false);
-        bench.step(Ready { filled: true, ..Ready::default() });
+        bench.send(jpeg(32, 9));
     };
     other(&mut bench);
     other(&mut bench);
@@ -234,9 +230,7 @@ fn jpegs_of_another_size_are_no_pictures_and_told_when_it_is_no_single_one() {
 fn a_camera_that_lies_about_its_format_gives_no_pictures_and_no_panic() {
     let mut bench = yuyv().streaming();
     for bytes in [vec![], vec![1; 100], vec![1; 64 * 48 * 2 - 1]] {
-        bench.now = bench.now.plus_ns(PERIOD_NS);
-        bench.fill(bytes, false);
-        bench.step(Ready { filled: true, ..Ready::default() });
+        bench.send(bytes);
     }
     // More than there is.
     bench.now = bench.now.plus_ns(PERIOD_NS);
@@ -247,9 +241,7 @@ fn a_camera_that_lies_about_its_format_gives_no_pictures_and_no_panic() {
     // The driver's format has changed without a word.
     bench.fake.format_now = Some(SetFormat { width: 32, ..bench.fake.agreed() });
     for _ in 0..15 {
-        bench.now = bench.now.plus_ns(PERIOD_NS);
-        bench.fill(vec![1; 100], false);
-        bench.step(Ready { filled: true, ..Ready::default() });
+        bench.send(vec![1; 100]);
     }
     assert!(bench.fake.log.contains(&"open"), "{:?}", bench.fake.log);
     // A size that no camera has is not even started.
@@ -386,9 +378,7 @@ fn the_middle_of_an_exposure_that_changes_is_followed() {
 fn a_camera_that_is_gone_is_lost_and_nothing_else() {
     let mut bench = mjpeg().streaming();
     for _ in 0..3 {
-        bench.now = bench.now.plus_ns(PERIOD_NS);
-        bench.fill(jpeg(32, 9), false);
-        bench.step(Ready { filled: true, ..Ready::default() });
+        bench.send(jpeg(32, 9));
     }
     let from = bench.now;
     bench.fake.dequeue_fails = Some(Errno::NODEV);
@@ -447,9 +437,7 @@ fn a_picture_that_stays_the_same_is_told_within_a_second() {
     let mut bench = yuyv().streaming();
     let covered = bench.now;
     for _ in 0..33 {
-        bench.now = bench.now.plus_ns(PERIOD_NS);
-        bench.fill(vec![16; 64 * 48 * 2], false);
-        bench.step(Ready { filled: true, ..Ready::default() });
+        bench.send(vec![16; 64 * 48 * 2]);
     }
     let told = bench.told(covered);
     assert!(matches!(told[..], [(Fault::CamStatic, "raised", 1000..1100)]), "{told:?}");

@@ -1,5 +1,3 @@
-use std::{fs, path::Path};
-
 use bowwave_core::{event::ImuSample, time::Time};
 use glam::DVec3;
 
@@ -8,7 +6,7 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{FormatTolerance, G, POLE, SimulatedUnit, encode, i16s, rfu, truth, world_of},
+        streams::{FormatTolerance, G, POLE, SimulatedUnit, encode, i16s, recording, rfu, truth, world_of},
     },
 };
 
@@ -45,12 +43,7 @@ fn parse(stream: &[u8]) -> Vec<Bno08xPacket> {
 /// The data sheet's example and what it says of it.
 #[test]
 fn the_data_sheets_example_is_decoded_as_it_says() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/imu_bytes/bno08x_uart_rvc_datasheet_example.bin");
-    let Ok(bytes) = fs::read(&path) else {
-        eprintln!("skipped: {} is not there", path.display());
-        return;
-    };
+    let Some(bytes) = recording("bno08x_uart_rvc_datasheet_example.bin") else { return };
     let packets = parse(&bytes);
     assert_eq!(
         packets,

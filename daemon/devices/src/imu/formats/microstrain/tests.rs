@@ -1,4 +1,4 @@
-use std::{f64::consts::PI, fs, path::Path};
+use std::f64::consts::PI;
 
 use bowwave_core::{estimate::clock::ClockMap, event::ImuSample, time::Time};
 use glam::{DMat3, DQuat, DVec3};
@@ -9,7 +9,7 @@ use crate::{
     framing::{LineCounters, Scanner},
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{G, SimulatedUnit, be, ned, world_of, wxyz},
+        streams::{G, SimulatedUnit, be, ned, recording, world_of, wxyz},
     },
 };
 
@@ -55,13 +55,7 @@ fn parse(stream: &[u8]) -> (Vec<MipPacket>, LineCounters) {
 }
 
 fn recorded() -> Option<Vec<u8>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/imu_bytes/microstrain_mip/mip_data_first_half.bin");
-    let bytes = fs::read(&path).ok();
-    if bytes.is_none() {
-        eprintln!("skipped: {} is not there", path.display());
-    }
-    bytes
+    recording("microstrain_mip/mip_data_first_half.bin")
 }
 
 fn decode(bytes: &[u8]) -> (Vec<ImuSample>, ImuDecoder) {

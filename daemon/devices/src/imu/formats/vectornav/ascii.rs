@@ -6,31 +6,23 @@ use glam::{DQuat, DVec3};
 
 use super::{super::ImuCodec, CRC};
 use crate::{
-    framing::{FoundPacket, Framing, PacketLook},
+    framing::FoundPacket,
     imu::{
         axes::{SWAP, from_yaw_pitch_roll, unit},
         reading::{Reading, ReadingStamp},
     },
-    lines::{self, LINE_MAX_BYTES, number},
+    lines::{self, LineFraming, number},
 };
 
 /// VectorNav's lines.
 #[derive(Debug, Default)]
 pub(crate) struct VectorNavLines;
 
-impl Framing for VectorNavLines {
-    type Head = ();
-    const SYNC: u8 = b'$';
-    const MAX_BYTES: usize = LINE_MAX_BYTES;
-    // A '$' within a line ends it, so that no false beginning can swallow one.
-    const WEAK: bool = false;
+impl LineFraming for VectorNavLines {
+    const PREFIX: &'static [u8] = b"VN";
 
-    fn look(bytes: &[u8]) -> PacketLook<()> {
-        lines::look(bytes, b"VN")
-    }
-
-    fn intact(packet: &[u8]) -> bool {
-        checked(packet).is_some()
+    fn intact_text(line: &[u8]) -> Option<&str> {
+        checked(line)
     }
 }
 
@@ -121,8 +113,6 @@ fn take<const N: usize>(numbers: &mut impl Iterator<Item = Option<f64>>) -> Opti
 
 #[cfg(test)]
 mod tests {
-    use std::{fs, path::Path};
-
     use bowwave_core::{event::ImuSample, time::Time};
 
     use super::*;
@@ -130,7 +120,7 @@ mod tests {
         framing::Scanner,
         imu::{
             ImuDecoder, ImuFormat,
-            streams::{FormatTolerance, SimulatedUnit, ned, world_of, yaw_pitch_roll},
+            streams::{FormatTolerance, SimulatedUnit, ned, recording, world_of, yaw_pitch_roll},
         },
     };
 
@@ -177,12 +167,7 @@ mod tests {
     /// Lines that others quote in public drivers: what is decoded is what they print, and gravity points down in ours.
     #[test]
     fn quoted_lines_are_decoded() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../../../shared/data/imu_bytes/vnymr_ascii_lines.txt");
-        let Ok(text) = fs::read(&path) else {
-            eprintln!("skipped: {} is not there", path.display());
-            return;
-        };
+        let Some(text) = recording("vnymr_ascii_lines.txt") else { return };
         let (lines, counters) =
             Scanner::<VectorNavLines>::parsed(&text, |bytes, ()| VectorNavLine::parse(bytes));
         assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (9, 0, 0));

@@ -1,5 +1,3 @@
-use std::{fs, path::PathBuf};
-
 use bowwave_core::{event::ImuSample, time::Time};
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
@@ -7,7 +5,7 @@ use proptest::prelude::*;
 use super::{CRC, CommonOutput, VectorNavCodec, VectorNavPacket, layout::MAX_PACKET};
 use crate::{
     framing::{CHUNK, Framing as _, PacketLook, Scanner, intact_places},
-    imu::streams::SimulatedUnit,
+    imu::streams::{SimulatedUnit, recording},
 };
 
 impl SimulatedUnit for VectorNavCodec {
@@ -357,13 +355,8 @@ proptest! {
 
 /// The recorded stream of a real VN-100 with text of a GNSS receiver mixed in, and what its authors decoded from it.
 fn recorded(bytes: &str, decoded: &str) -> Option<(Vec<u8>, Vec<Vec<f32>>)> {
-    let folder =
-        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/imu_bytes/vectornav_vn100");
-    let (Ok(bytes), Ok(decoded)) = (fs::read(folder.join(bytes)), fs::read_to_string(folder.join(decoded)))
-    else {
-        eprintln!("skipped: {} is not there", folder.display());
-        return None;
-    };
+    let of = |name: &str| recording(&format!("vectornav_vn100/{name}"));
+    let (bytes, decoded) = (of(bytes)?, String::from_utf8(of(decoded)?).expect("text"));
     let rows =
         decoded.lines().skip(1).map(|line| line.split(',').filter_map(|v| v.trim().parse().ok()).collect());
     Some((bytes, rows.collect()))

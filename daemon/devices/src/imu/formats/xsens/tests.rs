@@ -1,5 +1,3 @@
-use std::{fs, path::Path};
-
 use bowwave_core::{estimate::clock::ClockMap, event::ImuSample, time::Time};
 use glam::{DMat3, DQuat, DVec3};
 use proptest::prelude::*;
@@ -9,7 +7,7 @@ use crate::{
     framing::Scanner,
     imu::{
         ImuDecoder, ImuFormat,
-        streams::{SimulatedUnit, be, world_of, wxyz},
+        streams::{SimulatedUnit, be, recording, world_of, wxyz},
     },
 };
 
@@ -54,12 +52,8 @@ fn item(id: u16, data: &[u8]) -> Vec<u8> {
 
 /// The payloads that the maker's own program decoded, and its words for them, by turns.
 fn golden() -> Option<Vec<(Vec<u8>, String)>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/imu_bytes/xsens_mtdata2/mtmanager_packets.md");
-    let Ok(text) = fs::read_to_string(&path) else {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    };
+    let text = recording("xsens_mtdata2/mtmanager_packets.md")?;
+    let text = String::from_utf8(text).expect("text");
     let blocks: Vec<&str> = text.split("```").skip(1).step_by(2).map(str::trim).collect();
     let pairs =
         blocks.windows(2).filter(|w| w[0].starts_with("10 20 02") && w[1].starts_with("{(PacketCounter"));

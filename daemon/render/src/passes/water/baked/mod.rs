@@ -40,9 +40,27 @@ pub(crate) struct ReflectPass {
     _samplers: [Sampler; 2],
 }
 
+/// The boats of a frame whose lobes are drawn.
+pub(crate) struct LobeDraws<'a> {
+    /// The frame's set.
+    pub(crate) frame: vk::DescriptorSet,
+    pub(crate) boats: &'a [WaterDraw],
+    /// One for each boat.
+    pub(crate) lobes: &'a [LobeBlock],
+}
+
+impl LobeDraws<'_> {
+    /// Bands, steps, columns of its picture and columns of its layers, of each boat.
+    fn sizes(&self) -> impl Iterator<Item = [u32; 4]> {
+        self.lobes.iter().map(|l| l.sizes.map(i32::unsigned_abs))
+    }
+}
+
 /// A pipeline with what it samples.
 struct Stage {
     pipeline: Pipeline,
+    /// Whether it reads the frame's blocks, and which boat's.
+    framed: bool,
     set: vk::DescriptorSet,
     _layout: SetLayout,
 }
@@ -88,13 +106,34 @@ impl Stage {
                 samples: vk::SampleCountFlags::TYPE_1,
             },
         )?;
-        Ok(Self { pipeline, set, _layout: layout })
+        Ok(Self { pipeline, framed: shape.framed, set, _layout: layout })
     }
-}
 
-impl Stage {
-    fn push_index(&self, to: CommandEncoder<'_>, index: u32) {
-        to.push(&self.pipeline, &DrawBlock { rect: [0.0; 4], index, first: 0 });
+    /// Draws strips of `columns` by `rows` at most into `images`, of each boat as many columns and rows as `sizes` says.
+    fn record_strips<'a, const N: usize>(
+        &self,
+        to: CommandEncoder<'_>,
+        draws: &LobeDraws<'_>,
+        images: [&'a Image; N],
+        (columns, rows): (u32, usize),
+        sizes: impl Iterator<Item = [u32; 2]>,
+    ) -> Option<[Step<'a>; N]> {
+        let height = draws.boats.iter().map(|b| (b.index + 1) * rows as u32).max()?;
+        let area = PixelRect { x: 0, y: 0, width: columns, height };
+        to.begin_all(area, images.map(|image| Colour::new(image.view, Begin::Forget)), None);
+        let sets = [draws.frame, self.set];
+        to.bind(&self.pipeline, if self.framed { &sets } else { &sets[1..] });
+        let shape = &images.first()?.shape;
+        let viewport = [0.0, 0.0, shape.width as f32, shape.height as f32];
+        for (boat, [width, height]) in draws.boats.iter().zip(sizes) {
+            to.window(viewport, PixelRect { x: 0, y: boat.index * rows as u32, width, height });
+            if self.framed {
+                to.push(&self.pipeline, &DrawBlock { rect: [0.0; 4], index: boat.index, first: 0 });
+            }
+            to.draw(3, 1);
+        }
+        to.end();
+        Some(images.map(|image| Step { image, from: DRAWN, to: SAMPLED }))
     }
 }
 
@@ -180,63 +219,31 @@ impl ReflectPass {
         [&self.bands, &self.sums, thrown, taken].map(|image| Step { image, from: was, to: DRAWN })
     }
 
-    /// Collapses the mirrored boats, whose layer is ready to be sampled, to bands. `lobes` go with `boats`.
+    /// Collapses the mirrored boats, whose layer is ready to be sampled, to bands.
     pub(crate) fn record_bands(
         &self,
         to: CommandEncoder<'_>,
-        frame: vk::DescriptorSet,
-        boats: &[WaterDraw],
-        lobes: &[LobeBlock],
-    ) -> Option<Step<'_>> {
-        let area = strip(0, 0, LOBE_COLUMNS, rows(boats, LOBE_BANDS)?);
-        to.begin(area, Colour::new(self.bands.view, Begin::Forget), None);
-        to.bind(&self.to_bands.pipeline, &[frame, self.to_bands.set]);
-        for (boat, [bands, _, columns, _]) in with_sizes(boats, lobes) {
-            to.window(viewport(&self.bands), strip(boat.index, LOBE_BANDS, columns, bands));
-            self.to_bands.push_index(to, boat.index);
-            to.draw(3, 1);
-        }
-        to.end();
-        Some(sampled(&self.bands))
+        draws: &LobeDraws<'_>,
+    ) -> Option<[Step<'_>; 1]> {
+        let sizes = draws.sizes().map(|[bands, _, columns, _]| [columns, bands]);
+        self.to_bands.record_strips(to, draws, [&self.bands], (LOBE_COLUMNS, LOBE_BANDS), sizes)
     }
 
     /// Sums the bands, which are ready to be sampled.
-    pub(crate) fn record_sums(
-        &self,
-        to: CommandEncoder<'_>,
-        boats: &[WaterDraw],
-        lobes: &[LobeBlock],
-    ) -> Option<Step<'_>> {
-        let area = strip(0, 0, LOBE_COLUMNS + 1, rows(boats, LOBE_BANDS)?);
-        to.begin(area, Colour::new(self.sums.view, Begin::Forget), None);
-        to.bind(&self.to_sums.pipeline, &[self.to_sums.set]);
-        for (boat, [bands, _, columns, _]) in with_sizes(boats, lobes) {
-            to.window(viewport(&self.sums), strip(boat.index, LOBE_BANDS, columns + 1, bands));
-            to.draw(3, 1);
-        }
-        to.end();
-        Some(sampled(&self.sums))
+    pub(crate) fn record_sums(&self, to: CommandEncoder<'_>, draws: &LobeDraws<'_>) -> Option<[Step<'_>; 1]> {
+        let sizes = draws.sizes().map(|[bands, _, columns, _]| [columns + 1, bands]);
+        self.to_sums.record_strips(to, draws, [&self.sums], (LOBE_COLUMNS + 1, LOBE_BANDS), sizes)
     }
 
     /// Finds what water throws back from the sums, which are ready to be sampled.
     pub(crate) fn record_layers(
         &self,
         to: CommandEncoder<'_>,
-        frame: vk::DescriptorSet,
-        boats: &[WaterDraw],
-        lobes: &[LobeBlock],
+        draws: &LobeDraws<'_>,
     ) -> Option<[Step<'_>; 2]> {
-        let layers = self.layers.each_ref();
-        let area = strip(0, 0, LAYER_COLUMNS, rows(boats, LOBE_STEPS)?);
-        to.begin_all(area, layers.map(|l| Colour::new(l.view, Begin::Forget)), None);
-        to.bind(&self.to_layers.pipeline, &[frame, self.to_layers.set]);
-        for (boat, [_, steps, _, columns]) in with_sizes(boats, lobes) {
-            to.window(viewport(layers[0]), strip(boat.index, LOBE_STEPS, columns, steps));
-            self.to_layers.push_index(to, boat.index);
-            to.draw(3, 1);
-        }
-        to.end();
-        Some(layers.map(sampled))
+        let (layers, sizes) =
+            (self.layers.each_ref(), draws.sizes().map(|[_, steps, _, columns]| [columns, steps]));
+        self.to_layers.record_strips(to, draws, layers, (LAYER_COLUMNS, LOBE_STEPS), sizes)
     }
 
     /// Draws, within a rendering to the screen.
@@ -249,31 +256,4 @@ impl ReflectPass {
             to.draw(4, boat.strips);
         }
     }
-}
-
-/// A step from being drawn to being sampled.
-fn sampled(image: &Image) -> Step<'_> {
-    Step { image, from: DRAWN, to: SAMPLED }
-}
-
-/// Each boat has a strip of its own, and draws in as much of it as it has.
-fn strip(index: u32, of: usize, width: u32, height: u32) -> PixelRect {
-    PixelRect { x: 0, y: index * of as u32, width, height }
-}
-
-fn viewport(image: &Image) -> [f32; 4] {
-    [0.0, 0.0, image.shape.width as f32, image.shape.height as f32]
-}
-
-/// Rows that the strips of all boats take up, of so many each; `None` without boats.
-fn rows(boats: &[WaterDraw], each: usize) -> Option<u32> {
-    boats.iter().map(|b| (b.index + 1) * each as u32).max()
-}
-
-/// Each boat with its bands, steps, columns of its picture and columns of its layers.
-fn with_sizes<'a>(
-    boats: &'a [WaterDraw],
-    lobes: &'a [LobeBlock],
-) -> impl Iterator<Item = (&'a WaterDraw, [u32; 4])> {
-    boats.iter().zip(lobes.iter().map(|l| l.sizes.map(i32::unsigned_abs)))
 }

@@ -1,0 +1,14 @@
+//! The light that a scene is set up with, before anything was seen in a picture.
+
+use glam::DVec3;
+
+/// The sun, and how far one sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Daylight {
+    /// Unit vector towards the sun, world.
+    pub sun_direction: DVec3,
+    /// How much of a clear sky's sun comes through, 0 to 1.
+    pub sun_strength: f64,
+    /// Meteorological visibility, metres.
+    pub visibility_m: f64,
+}

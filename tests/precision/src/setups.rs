@@ -1,0 +1,277 @@
+//! Wrong set-ups: what a trainer that is set up wrongly says of it, and how soon. Recordings with truth are replayed into sessions with one thing
+//! wrong; the right set-up is replayed beside them.
+
+use std::{collections::VecDeque, path::Path, sync::Arc};
+
+use anyhow::Result;
+use bowwave_core::{
+    calibration::Calibration,
+    estimate::{HeadingSettings, attitude::Source},
+    event::{Event, ImuSample, Picture, PixelFormat, Tick},
+    fault::{Change, Fault, Severity},
+    session::{Session, Setup},
+    world::scenario::Scenario,
+};
+use glam::{DQuat, DVec3};
+use hw_sim::make::{Periodic, Recipe};
+
+use crate::{
+    registration::{looped, record},
+    table::TextTable,
+};
+
+/// What is wrong.
+#[derive(Clone, Copy, Debug)]
+enum Wrong {
+    Nothing,
+    /// The unit is turned about its own axes against how it was calibrated.
+    Turned(DVec3),
+    /// Signs of rates, and of specific forces.
+    Signs(DVec3, DVec3),
+    /// Factors on rates and specific forces.
+    Scale(f64, f64),
+    /// Factor on the focal length of the lens that is calibrated.
+    Focal(f64),
+    /// Columns, rows in reverse order.
+    Flipped(bool, bool),
+    /// Pictures that show what was so many milliseconds before their stamps.
+    Late(i64),
+    /// The calibrated turn from unit to camera is wrong by a turn about the camera's axes.
+    Mount(DVec3),
+}
+
+/// Name, what is wrong, and the faults that name it.
+type SetUp = (&'static str, Wrong, &'static [Fault]);
+
+const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
+const HALF: f64 = std::f64::consts::PI;
+const DEG: f64 = std::f64::consts::PI / 180.0;
+const TURNED: &[Fault] = &[Fault::UnitTurned];
+const REVERSED: &[Fault] = &[Fault::UnitReversed];
+const MOUNT: &[Fault] = &[Fault::NotRegistered];
+const MIRRORED: &[Fault] = &[Fault::PictureMirrored];
+
+const SET_UPS: &[SetUp] = &[
+    ("nothing", Wrong::Nothing, &[]),
+    ("unit turned by 180 deg about x", Wrong::Turned(DVec3::new(HALF, 0.0, 0.0)), TURNED),
+    ("unit turned by 180 deg about y", Wrong::Turned(DVec3::new(0.0, HALF, 0.0)), TURNED),
+    ("unit turned by 180 deg about z", Wrong::Turned(DVec3::new(0.0, 0.0, HALF)), TURNED),
+    ("unit turned by 90 deg about x", Wrong::Turned(DVec3::new(QUARTER, 0.0, 0.0)), TURNED),
+    ("unit turned by -90 deg about x", Wrong::Turned(DVec3::new(-QUARTER, 0.0, 0.0)), TURNED),
+    ("unit turned by 90 deg about y", Wrong::Turned(DVec3::new(0.0, QUARTER, 0.0)), TURNED),
+    ("unit turned by -90 deg about y", Wrong::Turned(DVec3::new(0.0, -QUARTER, 0.0)), TURNED),
+    ("unit turned by 90 deg about z", Wrong::Turned(DVec3::new(0.0, 0.0, QUARTER)), TURNED),
+    ("unit turned by -90 deg about z", Wrong::Turned(DVec3::new(0.0, 0.0, -QUARTER)), TURNED),
+    ("rate x reversed", Wrong::Signs(DVec3::new(-1.0, 1.0, 1.0), DVec3::ONE), REVERSED),
+    ("rate y reversed", Wrong::Signs(DVec3::new(1.0, -1.0, 1.0), DVec3::ONE), REVERSED),
+    ("rate z reversed", Wrong::Signs(DVec3::new(1.0, 1.0, -1.0), DVec3::ONE), REVERSED),
+    ("rates reversed", Wrong::Signs(DVec3::NEG_ONE, DVec3::ONE), REVERSED),
+    ("force reversed", Wrong::Signs(DVec3::ONE, DVec3::NEG_ONE), REVERSED),
+    ("rates in deg/s", Wrong::Scale(1.0 / DEG, 1.0), &[Fault::RateUnit]),
+    ("force in g", Wrong::Scale(1.0, 1.0 / 9.806_65), &[Fault::ForceUnit]),
+    ("lens longer by half", Wrong::Focal(1.0 / 1.5), &[Fault::OtherLens]),
+    ("lens shorter by a third", Wrong::Focal(1.5), &[Fault::OtherLens]),
+    ("picture mirrored", Wrong::Flipped(true, false), MIRRORED),
+    ("picture upside down", Wrong::Flipped(false, true), MIRRORED),
+    ("picture turned by 180 deg", Wrong::Flipped(true, true), &[Fault::UnitTurned, Fault::PictureMirrored]),
+    ("pictures late by 150 ms", Wrong::Late(150), &[Fault::PictureLate]),
+    ("pictures late by 300 ms", Wrong::Late(300), &[Fault::PictureLate]),
+    ("another mount, 5 deg up", Wrong::Mount(DVec3::new(5.0 * DEG, 0.0, 0.0)), MOUNT),
+    ("another mount, 5 deg down", Wrong::Mount(DVec3::new(-5.0 * DEG, 0.0, 0.0)), MOUNT),
+    ("another mount, 5 deg rolled", Wrong::Mount(DVec3::new(0.0, 0.0, 5.0 * DEG)), MOUNT),
+    ("another mount, 2 deg up, 2 rolled", Wrong::Mount(DVec3::new(2.0 * DEG, 0.0, 2.0 * DEG)), MOUNT),
+];
+
+impl Wrong {
+    fn calibration(self, mut calibration: Calibration) -> Calibration {
+        match self {
+            Self::Focal(factor) => calibration.lens.focal *= factor,
+            Self::Mount(turn) => {
+                calibration.camera_from_imu = DQuat::from_scaled_axis(turn) * calibration.camera_from_imu;
+            }
+            _ => {}
+        }
+        calibration
+    }
+
+    fn event(self, event: Event) -> Event {
+        match (self, event) {
+            (Self::Turned(turn), Event::Imu(s)) => {
+                let turn = DQuat::from_scaled_axis(turn);
+                Event::Imu(ImuSample {
+                    rate: turn.inverse() * s.rate,
+                    accel: turn.inverse() * s.accel,
+                    world_from_imu: s.world_from_imu.map(|q| q * turn),
+                    ..s
+                })
+            }
+            (Self::Signs(rate, accel), Event::Imu(s)) => {
+                Event::Imu(ImuSample { rate: s.rate * rate, accel: s.accel * accel, ..s })
+            }
+            (Self::Scale(rate, accel), Event::Imu(s)) => {
+                Event::Imu(ImuSample { rate: s.rate * rate, accel: s.accel * accel, ..s })
+            }
+            (Self::Flipped(columns, rows), Event::Frame(mut frame)) => {
+                if let Some(flipped) = flipped(&frame.picture, columns, rows) {
+                    frame.picture = flipped;
+                }
+                Event::Frame(frame)
+            }
+            (_, event) => event,
+        }
+    }
+}
+
+/// A grey picture of another one's luma, in reverse order.
+fn flipped(picture: &Picture, columns: bool, rows: bool) -> Option<Picture> {
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let bytes = picture.format().pixel_bytes();
+    let mut flipped = Vec::with_capacity(3 * width * height);
+    for y in 0..height {
+        let row = picture.row(if rows { height - 1 - y } else { y });
+        for x in 0..width {
+            let at = bytes * if columns { width - 1 - x } else { x };
+            let luma = if bytes == 3 { *row.get(at + 1)? } else { *row.get(at)? };
+            flipped.extend([luma; 3]);
+        }
+    }
+    Picture::new(PixelFormat::Rgb, picture.width(), picture.height(), flipped.into()).ok()
+}
+
+/// What a session said of a set-up.
+#[derive(Debug, Default)]
+struct Said {
+    /// Seconds from the first pose to the first fault that keeps rounds from being scored, and its code.
+    first: Option<(f64, Fault)>,
+    /// The last one.
+    last: Option<Fault>,
+    /// Share of the frames from two seconds on that were READY, and that were unchecked for more than ten seconds.
+    ready: f64,
+    unchecked: f64,
+}
+
+fn replay(path: &Path, wrong: Wrong, source: Source, seconds: f64) -> Result<Said> {
+    let (mut replay, own) = looped(path, seconds)?;
+    let calibration = wrong.calibration(own);
+    let lens = calibration.lens;
+    let mut session = Session::new(Setup {
+        scenario: Scenario::parse("", "set-up")?,
+        calibration,
+        models: Arc::new([]),
+        boat_models: Vec::new(),
+        screen: (lens.width, lens.height),
+        video: PixelFormat::Rgb,
+        orientation: source,
+        heading: HeadingSettings::default(),
+        own_ship: None,
+    })?;
+    let (mut said, mut events, mut begun) = (Said::default(), Vec::new(), None);
+    let mut shown = VecDeque::new();
+    let (mut frames, mut ready, mut unchecked) = (0_u32, 0_u32, 0_u32);
+    for frame in 1..=(seconds * 30.0) as i64 {
+        let time = replay.origin().plus_ns(frame * 33_333_333);
+        events.clear();
+        replay.collect(time, &mut events)?;
+        for event in events.drain(..) {
+            let mut event = wrong.event(event);
+            if let (Event::Frame(frame), Wrong::Late(late_ms)) = (&mut event, wrong) {
+                // The stamp is this picture's, what it shows is older.
+                shown.push_back(frame.picture.clone());
+                if shown.len() > (late_ms * 30 / 1000) as usize + 1 {
+                    shown.pop_front();
+                }
+                frame.picture = shown.front().cloned().unwrap_or_else(|| frame.picture.clone());
+            }
+            session.event(&event);
+        }
+        let answer = session.tick(Tick::at(time));
+        let known = answer.view.pose_known;
+        let since = |begun: bowwave_core::time::Time| time.secs_since(begun);
+        if known && begun.is_none() {
+            begun = Some(time);
+        }
+        for change in answer.faults {
+            let severe = change.fault.severity() >= Severity::NotScored;
+            if matches!(change.change, Change::Raised { .. }) && severe {
+                said.last = Some(change.fault);
+                said.first = said.first.or(begun.map(|begun| (since(begun), change.fault)));
+            }
+        }
+        let trouble = session.hud().status.clone();
+        if begun.is_some_and(|begun| since(begun) > 2.0) {
+            frames += 1;
+            ready += u32::from(trouble == bowwave_core::frame::scene::Status::Ready);
+            unchecked += u32::from(session.unchecked_s(time) > 10.0);
+        }
+    }
+    replay.stop()?;
+    let share = |count: u32| f64::from(count) / f64::from(frames.max(1));
+    (said.ready, said.unchecked) = (share(ready), share(unchecked));
+    Ok(said)
+}
+
+/// The recordings.
+fn recipes() -> [(&'static str, Recipe); 2] {
+    let small = Recipe { width: 640, height: 360, trigger: Vec::new(), ..Recipe::default() };
+    let deg = f64::to_radians;
+    let mut ship = small.clone();
+    ship.ship.roll = Periodic::new(0.0, &[(2, deg(6.0), 0.3), (3, deg(2.0), 1.0)]);
+    ship.gun.traverse = Periodic::new(deg(42.0), &[]);
+    ship.gun.elevation = Periodic::new(deg(-4.0), &[]);
+    [("gun swung", small), ("ship rolls", ship)]
+}
+
+/// Replays recordings into trainers that are set up wrongly, in many ways, and lists what these say of it.
+#[derive(Debug, clap::Args)]
+pub struct SetUpStudy {
+    /// Seconds that are replayed
+    #[arg(long, default_value_t = 20.0)]
+    seconds: f64,
+    /// Only set-ups whose names contain this
+    #[arg(long)]
+    only: Option<String>,
+}
+
+impl SetUpStudy {
+    /// Prints for each set-up how soon it was told, and as what.
+    pub fn run(&self) -> Result<()> {
+        let titles = [("recording", 12), ("orientation", 12), ("set-up", 36)];
+        let parts =
+            [("told s", 8), ("as", 16), ("last as", 16), ("named", 6), ("ready", 6), ("unchecked", 9)];
+        let mut table = TextTable::new(3, titles.into_iter().chain(parts));
+        let folder = tempfile::tempdir()?;
+        let (mut named, mut all, mut in_time) = (0, 0, 0);
+        for (name, recipe) in recipes() {
+            let path = folder.path().join("set-up.mcap");
+            record(&recipe, &path)?;
+            for (source, orientation) in [(Source::Auto, "unit's own"), (Source::Fused, "fused")] {
+                for (set_up, wrong, faults) in SET_UPS {
+                    if self.only.as_ref().is_some_and(|only| !set_up.contains(only.as_str())) {
+                        continue;
+                    }
+                    let said = replay(&path, *wrong, source, self.seconds)?;
+                    let right = said.last.map_or(faults.is_empty(), |last| faults.contains(&last));
+                    all += 1;
+                    named += u32::from(right);
+                    in_time += u32::from(faults.is_empty() || said.first.is_some_and(|(s, _)| s <= 2.0));
+                    let cells = [
+                        name.to_owned(),
+                        orientation.to_owned(),
+                        (*set_up).to_owned(),
+                        said.first.map_or_else(String::new, |(s, _)| format!("{s:.2}")),
+                        said.first.map_or("", |(_, fault)| fault.code()).to_owned(),
+                        said.last.map_or("", Fault::code).to_owned(),
+                        if right { "yes" } else { "NO" }.to_owned(),
+                        format!("{:.2}", said.ready),
+                        format!("{:.2}", said.unchecked),
+                    ];
+                    table.row(cells);
+                    print!("{}", table.take());
+                }
+            }
+            std::fs::remove_file(&path)?;
+        }
+        println!("{named} of {all} named rightly, {in_time} told within 2 s or rightly not at all");
+        Ok(())
+    }
+}
