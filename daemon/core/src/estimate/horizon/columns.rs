@@ -19,6 +19,11 @@ const BRIGHTER: f32 = 0.5;
 /// ...and one that makes it darker from this: land is darker than the sky behind it.
 const DARKER: f32 = 0.3;
 
+/// What begins at a sharp edge is land if, on average down to the line, it differs by this share of the edge's step...
+const LASTING: f32 = 0.85;
+/// ...from so many rows above the edge. Under the edge of a cloud comes the next one.
+const OVER: usize = 30;
+
 /// Up to the picture's edge nothing has a step of more than this share of the line's own: so it is open.
 const OPEN: f32 = 0.6;
 
@@ -131,7 +136,20 @@ impl Along<'_> {
         let top = row.saturating_sub(self.rows(SKY.end)).max(self.scene.cells.rows().start);
         let sky = top..row.saturating_sub(SKY.start);
         let even = self.even(column, sky.clone());
-        self.scene.steps.within(column, sky).is_none_or(|range| self.is_calm(range, even))
+        let range = self.scene.steps.within(column, sky.clone());
+        range.is_none_or(|range| self.is_calm(range, even)) || !self.is_lasting(column, row, sky)
+    }
+
+    /// Whether what begins at the sharpest edge of `sky` lasts down to the line at `row`, as land does and clouds do not.
+    fn is_lasting(&self, column: usize, row: usize, sky: Range<usize>) -> bool {
+        let cells = self.scene.cells;
+        let steps = cells.steps(column, sky.start..=sky.end, SHARP).into_iter().flatten();
+        let Some((edge, step)) = steps.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) else { return false };
+        let top = edge.saturating_sub(OVER).max(cells.rows().start);
+        let over = cells.mean(column, top..edge.saturating_sub(1));
+        let under = cells.mean(column, edge + 1..row.saturating_sub(SHARP));
+        let change = over.zip(under).map_or(step, |(over, under)| under - over);
+        change * step.signum() > LASTING * step.abs()
     }
 
     /// Even brightening over `rows`, codes a row.

@@ -4,7 +4,11 @@ use std::ops::Range;
 
 use glam::{DVec2, Vec2};
 
-use super::{cells::PictureCells, mask::MaskedRows, rays::Rays};
+use super::{
+    cells::{PictureCells, bend},
+    mask::MaskedRows,
+    rays::Rays,
+};
 
 /// Rows that steps are taken over, and how much a step counts: the shorter, the more of it is noise.
 const SCALES: [(usize, f32); 3] = [(3, 0.7), (8, 1.0), (20, 1.0)];
@@ -69,10 +73,13 @@ pub(super) struct LineSpan {
     pub elevation: (f64, f64),
 }
 
-/// How quiet the rows above `row` are, from 1 (sky) to 0: `floor` is what noise alone would give.
-pub(super) fn quiet(cells: &PictureCells, column: usize, row: usize, floor: f32) -> Option<f32> {
+/// How quiet the rows above `row` are, from 1 (sky) to 0: `floor` is what noise alone would give; clouds above a `step` of many
+/// codes are quiet beside it.
+pub(super) fn quiet(cells: &PictureCells, column: usize, row: usize, step: f32, floor: f32) -> Option<f32> {
+    /// Rows that differ by this share of the step are as quiet as those that differ by the noise.
+    const SHARE: f32 = 0.015;
     let wiggle = above(cells, column, row)?;
-    Some(1.0 / (1.0 + (wiggle / (1.5 * floor)).powi(2)))
+    Some(1.0 / (1.0 + (wiggle / (1.5 * floor.max(SHARE * step.abs()))).powi(2)))
 }
 
 /// How much the rows above `row` that should be sky differ from one to the next, codes; `None` too near the upper edge.
@@ -108,7 +115,7 @@ impl Seeker {
         for column in 0..cells.columns {
             self.respond(cells, column);
             let weight = |row: usize, step: f32| {
-                step.abs().min(STEP_MAX) * quiet(cells, column, row, floor).unwrap_or(0.5)
+                step.abs().min(STEP_MAX) * quiet(cells, column, row, step, floor).unwrap_or(0.5)
             };
             for KeptStep { row, step, weight } in
                 self.strongest(cells, rows(column), weight).into_iter().flatten()
@@ -136,7 +143,7 @@ impl Seeker {
             let gain = gain * cells.unit() / size as f32;
             let around = sums.iter().zip(&sums[size..]).zip(&sums[2 * size..]);
             for (best, ((above, at), below)) in self.response[size..].iter_mut().zip(around) {
-                let step = (below - 2 * at + above) as f32 * gain;
+                let step = bend(*above, *at, *below) as f32 * gain;
                 *best = if step.abs() > best.abs() { step } else { *best };
             }
         }
@@ -198,10 +205,17 @@ impl Seeker {
             grid.vote(edges, votes, 1.0);
         }
         let mut found = [None; N];
+        // Only the votes from which a line was taken change.
+        let mut peaks =
+            [0, 1].map(|sign| self.votes.chunks_exact(bins * rolls).nth(sign).and_then(|v| grid.peak(v)));
         for slot in &mut found {
-            let peak = |(sign, votes)| grid.peak(votes).map(|p| (sign, p));
-            let peaks = self.votes.chunks_exact(bins * rolls).enumerate().filter_map(peak);
-            let Some((sign, peak)) = peaks.max_by(|a, b| a.1.votes.total_cmp(&b.1.votes)) else { break };
+            let sign = match &peaks {
+                [Some(darker), Some(brighter)] => usize::from(brighter.votes >= darker.votes),
+                [Some(_), None] => 0,
+                [None, Some(_)] => 1,
+                [None, None] => break,
+            };
+            let Some(peak) = peaks[sign].take() else { break };
             let angles = grid.angles(&peak, dip);
             *slot = Some(LineCandidate { angles, brighter_below: sign == 1 });
             let (edges, taken) = (&mut self.edges[sign], &mut self.taken);
@@ -215,6 +229,7 @@ impl Seeker {
             });
             if let Some(votes) = self.votes.chunks_exact_mut(bins * rolls).nth(sign) {
                 grid.vote(taken, votes, -1.0);
+                peaks[sign] = grid.peak(votes);
             }
         }
         found

@@ -107,8 +107,19 @@ impl HorizonFinder {
         let mut best: Option<(HorizonFit, LineQuality)> = None;
         for candidate in lines.iter().flatten() {
             let line = HorizonLine { angles: candidate.angles, brighter_below: candidate.brighter_below };
-            let Some(fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)], |_| true) else { continue };
-            let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+            let Some(mut fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)], |_| true) else {
+                continue;
+            };
+            let mut quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+            if quality.score < SCORE_CLEAR {
+                // Land has pulled at the line before it was known for it.
+                let free = self.judge.free();
+                let freed = free.and_then(|free| self.fitter.refine(&scene, fit.line, &[(6, 6)], free));
+                if let Some(freed) = freed {
+                    fit = freed;
+                    quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+                }
+            }
             if best.is_none_or(|(_, b)| b.score < quality.score) {
                 best = Some((fit, quality));
                 self.judge.keep();

@@ -164,7 +164,7 @@ impl Fitter {
             let Some(row) = line.row(scene, column) else { continue };
             let Some((row, step)) = edge_near(scene, line, column, row, window, size) else { continue };
             let Some((ray, down)) = scene.rays.at(column, row) else { continue };
-            let quiet = quiet(scene.cells, column, row as usize, scene.floor).unwrap_or(0.5);
+            let quiet = quiet(scene.cells, column, row as usize, step, scene.floor).unwrap_or(0.5);
             let weight = f64::from(quiet * step.min(STEP_FULL) / STEP_FULL);
             self.points.push(EdgePoint { column, row, off: 0.0, ray, down, weight });
         }
@@ -300,13 +300,14 @@ fn edge_near(
     size: usize,
 ) -> Option<(f64, f32)> {
     let middle = row.round() as usize;
-    let step = |row: usize| Some(line.signed(scene.cells.step(column, row, size)?));
     let rows = middle.saturating_sub(window)..=middle + window;
-    let (best, most) = rows
-        .clone()
-        .filter_map(|row| step(row).map(|s| (row, s)))
+    let (best, most) = scene
+        .cells
+        .steps(column, rows.clone(), size)?
+        .map(|(row, step)| (row, line.signed(step)))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .filter(|(best, most)| *most > 0.0 && best != rows.start() && best != rows.end())?;
+    let step = |row: usize| Some(line.signed(scene.cells.step(column, row, size)?));
     if scene.hidden.touches(column, best, size) {
         return None;
     }

@@ -43,6 +43,12 @@ pub(super) struct HorizonJudge {
     values: Vec<f32>,
 }
 
+fn free_of(views: &ColumnViews) -> Option<impl Fn(usize) -> bool> {
+    /// Fewer columns are better fitted with their neighbours.
+    const FREE_MIN: usize = 16;
+    (views.count(Shown::Free) >= FREE_MIN).then_some(|column| views.is_free(column))
+}
+
 impl HorizonJudge {
     /// What speaks for and against the line, of which `points` are the strongest edges around it.
     pub fn weigh(&mut self, scene: &LineSearch<'_>, fit: &HorizonFit, points: &[EdgePoint]) -> LineQuality {
@@ -73,9 +79,9 @@ impl HorizonJudge {
         quality.score = quality.solid_share.sqrt()
             * (1.0 - 2.0 * quality.past_share).max(0.0)
             * (1.0 - 1.5 * quality.above_share).max(0.0)
-            * (1.0 - quality.land_share).sqrt()
+            * (1.0 - quality.land_share)
             * if fit.line.brighter_below {
-                quality.open_share
+                quality.open_share.powi(2)
             } else {
                 (0.5 + 0.5 * quality.open_share).sqrt()
             }
@@ -116,12 +122,14 @@ impl HorizonJudge {
         std::mem::swap(&mut self.views, &mut self.kept);
     }
 
-    /// Columns in which the line that was kept is free; `None` where they are too few to fit a line to.
+    /// Columns in which the line that was weighed last is free; `None` where they are too few to fit a line to.
+    pub fn free(&self) -> Option<impl Fn(usize) -> bool> {
+        free_of(&self.views)
+    }
+
+    /// The same of the line that was kept.
     pub fn kept_free(&self) -> Option<impl Fn(usize) -> bool> {
-        /// Fewer columns are better fitted with their neighbours.
-        const FREE_MIN: usize = 16;
-        let kept = &self.kept;
-        (kept.count(Shown::Free) >= FREE_MIN).then_some(|column| kept.is_free(column))
+        free_of(&self.kept)
     }
 
     /// Mean step of the solid columns on the line, codes, and that over the root mean square of those on its parallels.

@@ -5,7 +5,7 @@
 
 use std::ops::Range;
 
-use super::cells::PictureCells;
+use super::cells::{PictureCells, bend};
 
 /// Rows that steps are taken over: land's upper edge is sharp, clouds are soft.
 pub(super) const SHARP: usize = 3;
@@ -68,8 +68,7 @@ impl StepBlocks {
 fn range(sums: &[i32], from: usize) -> Option<(i32, i32)> {
     let block = |from: usize| sums.get(from..)?.first_chunk::<BLOCK>();
     let (above, at, below) = (block(from)?, block(from + SHARP)?, block(from + 2 * SHARP)?);
-    let steps: [i32; BLOCK] =
-        std::array::from_fn(|i| below[i].wrapping_sub(at[i].wrapping_mul(2)).wrapping_add(above[i]));
+    let steps: [i32; BLOCK] = std::array::from_fn(|i| bend(above[i], at[i], below[i]));
     let (mut low, mut high) = (i32::MAX, i32::MIN);
     for step in steps {
         low = low.min(step);
