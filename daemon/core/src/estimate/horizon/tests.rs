@@ -246,3 +246,20 @@ fn waves_of_more_contrast_do_not_hide_the_horizon() {
     assert!((found.elevation() - 0.03).abs() * lens(0.0).focal.x < 1.0, "{found:?}");
     assert!((found.roll() + 0.02).abs() < 0.003, "{found:?}");
 }
+
+#[test]
+fn sharp_clouds_are_no_land() {
+    let up = up_of(0.02, -0.04);
+    for seed in 4..8 {
+        // Streaks of cloud low in the sky: their edges are as sharp as land's and half as strong as the horizon, but do not last.
+        let streaks = |over: f64, i: usize| {
+            let (x, _) = at(i);
+            let streak = grain(x / 64 + (over / 4.0).floor().max(0.0) as usize * 10, seed);
+            let sky = 150.0 + 35.0 * (-over / 40.0).exp() * streak + grain(i, 1);
+            if over > 0.0 { sky } else { 80.0 + 12.0 * grain(i / 3, 2) }
+        };
+        let found = find_painted(up, &streaks).unwrap();
+        assert!((found.elevation() + 0.04).abs() * lens(0.0).focal.x < 0.7, "{seed}: {found:?}");
+        assert!((found.roll() - 0.02).abs() < 0.003, "{seed}: {found:?}");
+    }
+}
