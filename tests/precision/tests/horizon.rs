@@ -93,7 +93,6 @@ fn strangers_horizons_are_found_and_their_shores_are_not() {
         [HorizonKind::Free, HorizonKind::Partial, HorizonKind::Shore].map(|k| k as usize);
     assert!(100 * found[free] >= 85 * all[free], "{} of {} free", found[free], all[free]);
     assert!(5 * found[partial] >= 2 * all[partial], "{} of {} in part", found[partial], all[partial]);
-    // Half of one of them is free, whatever its list says.
-    assert!(found[shores] <= 1, "{} of {} shores", found[shores], all[shores]);
+    assert!(100 * found[shores] <= 4 * all[shores], "{} of {} shores", found[shores], all[shores]);
     assert!(px.is_empty() || quantile(&px, 0.5) < 0.5, "{}", quantile(&px, 0.5));
 }

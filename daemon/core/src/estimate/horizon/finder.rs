@@ -160,7 +160,7 @@ impl HorizonFinder {
 /// Why a line with these qualities is not the horizon; `None` if it is.
 fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
     /// Score from which a line is taken for the horizon.
-    const SCORE_MIN: f64 = 0.5;
+    const SCORE_MIN: f64 = 0.55;
     /// Share of the picture's width that shows it free at least: shorter edges are straight by chance.
     const FREE_MIN: f64 = 0.12;
     /// Contrast that a horizon has at least, codes.
