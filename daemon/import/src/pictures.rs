@@ -11,6 +11,7 @@ use std::{
 };
 
 use bowwave_core::{text::one_line, time::NS_PER_S};
+use bowwave_files::ends_as_jpeg;
 use bowwave_record::{Entry, FrameEntry, recording::JPEG_MAX_BYTES};
 use image::{ImageFormat, ImageReader, codecs::jpeg::JpegEncoder};
 
@@ -124,6 +125,9 @@ fn read_picture(path: &Path) -> Result<(Vec<u8>, (u32, u32)), ImportError> {
         return Err(unusable(format!("it is {}x{}, and the largest is 8192x8192", size.0, size.1)));
     }
     let jpeg = match format {
+        ImageFormat::Jpeg if !ends_as_jpeg(&bytes) => {
+            return Err(unusable("it ends in the middle; copy it again".to_owned()));
+        }
         ImageFormat::Jpeg => bytes,
         ImageFormat::Png => {
             let colours = reader().decode().map_err(|e| unusable(one_line(&e.to_string())))?.to_rgb8();

@@ -3,7 +3,7 @@
 use std::{
     ffi::{CStr, c_void},
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex, Once, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -91,6 +91,7 @@ impl Instance {
             result => RenderError::Vulkan { call: "vkCreateInstance", result },
         })?;
         let mut instance = Self { raw, entry, messenger: None, messages: Box::default() };
+        keep_drivers_loaded(&instance.entry, &app);
         if validation {
             let utils = ext::debug_utils::Instance::new(&instance.entry, &instance.raw);
             let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
@@ -98,10 +99,11 @@ impl Instance {
                     vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
                         | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
                 )
+                // What is wrong, not advice on speed, which no message is an error for: the frame stays in the general layout so that two
+                // formats may see it (`target`).
                 .message_type(
                     vk::DebugUtilsMessageTypeFlagsEXT::GENERAL
-                        | vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION
-                        | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
+                        | vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION,
                 )
                 .pfn_user_callback(Some(on_message))
                 .user_data((&raw const *instance.messages).cast_mut().cast());
@@ -147,6 +149,20 @@ impl Instance {
             software: p.device_type == vk::PhysicalDeviceType::CPU,
         }
     }
+}
+
+/// Makes an instance, once in the life of the process, that nobody destroys. The loader unloads a driver with its last instance; but a driver
+/// may have left with each thread that called it something to run at that thread's end (NVIDIA's does), which then is code no longer there.
+fn keep_drivers_loaded(entry: &ash::Entry, app: &vk::ApplicationInfo<'_>) {
+    static KEPT: Once = Once::new();
+    KEPT.call_once(|| {
+        let info = vk::InstanceCreateInfo::default().application_info(app);
+        // SAFETY: `info` and all it points to outlive the call.
+        match unsafe { entry.create_instance(&info, None) } {
+            Ok(instance) => std::mem::forget((entry.clone(), instance)),
+            Err(e) => log::debug!("drivers are not kept loaded: {e}"),
+        }
+    });
 }
 
 impl Drop for Instance {

@@ -1,6 +1,7 @@
 //! `bowwave simulate`: the trainer on a recording, as if its devices were there.
 
-pub mod prepare;
+pub mod leftovers;
+mod prepare;
 
 use std::{
     sync::{
@@ -58,6 +59,7 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
             "the scenario lasts {lasts_s} s, and this run ends after {run_s:.1} s; --duration {lasts_s} plays all of it"
         );
     }
+    leftovers::clear(&arguments.out, prepared.record)?;
     let realtime = arguments.realtime || prepared.window;
     let plan = fault_plan(arguments, frames);
     let replay = RecordingSource::new(open_replay(&prepared, realtime, arguments, frames, plan.clone())?);
@@ -175,7 +177,7 @@ fn storage(arguments: &Simulate, prepared: &Prepared, realtime: bool, origin: Ti
         },
         journal: JournalOptions::default(),
         recording: prepared.record.then(|| RecorderOptions {
-            path: arguments.out.join("recording.mcap"),
+            path: arguments.out.join(leftovers::RECORDING),
             properties: prepare::properties_of_run(prepared, origin),
             lossless: !realtime,
             exact_pixels: true,

@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, path::Path, sync::Arc};
 
 use bowwave_core::time::Time;
+use bowwave_files::ends_as_jpeg;
 
 use super::{
     CHUNK_MAX_BYTES, Counts, DISORDER_MAX_NS, Entry, Properties, RecordError,
@@ -125,12 +126,6 @@ pub(crate) fn entry(path: &Path, found: &FoundMessage<'_>) -> Result<Option<Entr
         return Err(fail("a picture without its end, in a chunk without its checksum".to_owned()));
     }
     Ok(entry)
-}
-
-/// Whether the picture's last marker is there; some cameras pad with zeros behind it.
-fn ends_as_jpeg(jpeg: &[u8]) -> bool {
-    let padding = jpeg.iter().rev().take_while(|byte| **byte == 0).count();
-    jpeg.get(..jpeg.len() - padding).is_some_and(|used| used.ends_with(&[0xff, 0xd9]))
 }
 
 /// The entries of a recording by time.
