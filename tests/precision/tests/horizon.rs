@@ -10,6 +10,7 @@ use precision::{
         cases::{SET_WITH, with_horizon, without_horizon},
         frames,
         score::{DrawnHorizon, find, miss, predicted},
+        stills::{self, HorizonKind},
     },
 };
 
@@ -71,4 +72,27 @@ fn marked_frames_are_found_and_shores_are_not() {
         let found = find(&mut finder, &frame, None).unwrap();
         assert!(found.is_err(), "{}: {found:?}", frame.name);
     }
+}
+
+#[test]
+fn strangers_horizons_are_found_and_their_shores_are_not() {
+    let stills = stills::listed().unwrap();
+    let mut finder = HorizonFinder::new();
+    // Of those that are free, free over part of the width, and shores: how many, and how many are found.
+    let (mut all, mut found, mut px) = ([0; 3], [0; 3], Vec::new());
+    for still in &stills {
+        let kind = still.kind as usize;
+        all[kind] += 1;
+        let Ok(horizon) = find(&mut finder, &still.frame, None).unwrap() else { continue };
+        found[kind] += 1;
+        let Some(off) = miss(&still.frame, horizon.up) else { continue };
+        assert!(off.px < 5.0 + still.uncertainty_px, "{}: {off:?}", still.frame.name);
+        px.push(off.px);
+    }
+    let [free, partial, shores] =
+        [HorizonKind::Free, HorizonKind::Partial, HorizonKind::Shore].map(|k| k as usize);
+    assert!(100 * found[free] >= 85 * all[free], "{} of {} free", found[free], all[free]);
+    assert!(5 * found[partial] >= 2 * all[partial], "{} of {} in part", found[partial], all[partial]);
+    assert!(100 * found[shores] <= 4 * all[shores], "{} of {} shores", found[shores], all[shores]);
+    assert!(px.is_empty() || quantile(&px, 0.5) < 0.5, "{}", quantile(&px, 0.5));
 }

@@ -6,6 +6,7 @@ pub mod overlay;
 pub mod report;
 pub mod rivals;
 pub mod score;
+pub mod stills;
 pub mod synth;
 pub mod video;
 pub mod ways;

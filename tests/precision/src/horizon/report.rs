@@ -16,15 +16,20 @@ use super::{
     frames::{self, SeaFrame},
     overlay,
     score::{DrawnHorizon, Miss, PRIOR_SIGMA, find, miss, predicted},
+    stills::StillsStudy,
     video,
 };
 use crate::front::quantile;
 
-type HorizonAnswer = std::result::Result<Horizon, NoHorizon>;
+/// What the finder answers.
+pub type HorizonAnswer = std::result::Result<Horizon, NoHorizon>;
 
 /// Shows pictures to the horizon finder and lists what it makes of them.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct HorizonStudy {
+    #[command(subcommand)]
+    of: Option<HorizonSubject>,
     /// Folder for the marked frames, and those taken wrongly, with what was found drawn over them
     #[arg(long, value_name = "DIR")]
     overlays: Option<PathBuf>,
@@ -36,9 +41,18 @@ pub struct HorizonStudy {
     set: bool,
 }
 
+#[derive(Debug, clap::Subcommand)]
+enum HorizonSubject {
+    /// Stills of strangers' cameras: found, errors, shores taken for the horizon
+    Stills(StillsStudy),
+}
+
 impl HorizonStudy {
     /// Prints all of it.
     pub fn run(&self) -> Result<()> {
+        if let Some(HorizonSubject::Stills(study)) = &self.of {
+            return study.run();
+        }
         cost()?;
         marked(self.overlays.as_deref())?;
         jitter()?;
@@ -47,7 +61,8 @@ impl HorizonStudy {
     }
 }
 
-fn qualities(answer: &HorizonAnswer) -> Option<LineQuality> {
+/// The qualities of the line that was found or refused; `None` without any.
+pub fn qualities(answer: &HorizonAnswer) -> Option<LineQuality> {
     match answer {
         Ok(found) => Some(found.quality),
         Err(
@@ -57,14 +72,19 @@ fn qualities(answer: &HorizonAnswer) -> Option<LineQuality> {
     }
 }
 
-fn described(answer: &HorizonAnswer) -> String {
+/// These in words.
+pub fn described(answer: &HorizonAnswer) -> String {
     let why = answer.as_ref().err().map(|e| format!(" ({e})")).unwrap_or_default();
     let numbers = |q: LineQuality| {
         format!(
-            "score {:.2}, solid {:.2} of {:.2}, step {:.1}, peak {:.1}, texture {:.2}/{:.2}, sharp {:.2}, scatter {:.2}",
+            "score {:.2}, free {:.2} of {:.2}, land {:.2}, past {:.2}, above {:.2}, open {:.2}, step {:.1}, peak {:.1}, texture {:.2}/{:.2}, sharp {:.2}, scatter {:.2}",
             q.score,
             q.solid_share,
             q.visible_share,
+            q.land_share,
+            q.past_share,
+            q.above_share,
+            q.open_share,
             q.contrast,
             q.peak_ratio,
             q.texture,
@@ -160,7 +180,7 @@ fn jitter() -> Result<()> {
 }
 
 /// Predictions laid all over a frame: twelve heights, five rolls.
-fn laid(frame: &SeaFrame) -> Vec<Prior> {
+pub fn laid(frame: &SeaFrame) -> Vec<Prior> {
     let lens = frame.picture_lens();
     let prior = |i: usize| {
         let row = ((i / 5) as f64 + 0.5) / 12.0 * f64::from(lens.height);

@@ -5,12 +5,13 @@ use bowwave_core::estimate::horizon::HorizonFinder;
 
 use super::{About, worst};
 use crate::{
-    bench::PartBench,
+    bench::{PartBench, PartMethod},
     front::quantile,
     horizon::{
         cases::{SET_WITH, all_glare, with_glare, with_horizon, without_horizon},
         frames::{self, SeaFrame},
         score::{DrawnHorizon, miss},
+        stills::{self, HorizonKind, Still},
         ways::{HorizonMethod, METHODS, in_drawn, in_frame, px},
     },
 };
@@ -20,7 +21,8 @@ pub const ABOUT: About = About {
     part: "horizon",
     what: "Finds the sea's horizon in a picture, or says that there is none: roll and pitch of the camera.",
     truth: "drawn seas of known attitude (seeds that set no constant), by a renderer of its own with haze, waves, clouds, glitter, \
-            ships and a bowed lens; frames of a ship and a drone with two to four points marked by hand, good to .2 to .6 px",
+            ships and a bowed lens; frames of a ship and a drone with two to four points marked by hand, good to .2 to .6 px; stills of \
+            some thirty other cameras with marks and kinds",
     rivals: "Canny's edges and Hough's lines; Otsu's two brightnesses over angle and offset; the strongest step of each column and \
              the line that most of them agree with. They answer where any edge is, so that a scene without a horizon is lost on them",
     why: "it errs a third of plain column steps on drawn seas, and an eighth on marked frames, where half of the columns show a coast \
@@ -90,6 +92,37 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
     let without: Vec<DrawnHorizon> =
         (0..count).map(|i| DrawnHorizon::new(without_horizon(SET_WITH, i))).collect::<Result<_>>()?;
     taken_for_one(bench, "none there: sky, water, fog, night, noise, smear, blank", &without);
+    strangers(bench)
+}
+
+/// Stills of other cameras: the worst error where one is answered, and the shores that are taken for a horizon.
+fn strangers(bench: &mut PartBench) -> Result<()> {
+    let (shores, marked): (Vec<Still>, Vec<Still>) =
+        stills::listed()?.into_iter().partition(|s| s.kind == HorizonKind::Shore);
+    if marked.is_empty() {
+        return Ok(());
+    }
+    let found_in = |m: &PartMethod<HorizonMethod>, stills: &[Still]| {
+        let mut finder = HorizonFinder::new();
+        let mut find = |(i, s): (usize, &Still)| in_frame(m.run, &mut finder, &s.frame, i as u64);
+        stills.iter().enumerate().map(&mut find).collect::<Result<Vec<_>>>()
+    };
+    let (mut off, mut taken) = (Vec::new(), Vec::new());
+    for m in &METHODS {
+        let found = found_in(m, &marked)?;
+        let errors: Vec<f64> = marked
+            .iter()
+            .zip(&found)
+            .filter_map(|(s, up)| Some(px(miss(&s.frame, (*up)?)) - s.uncertainty_px))
+            .collect();
+        let note = format!("{} of {} answered", errors.len(), marked.len());
+        off.push(m.tried(worst(errors)).note(note));
+        // No prediction of a shore's horizon is right, so that none is told.
+        let shown = found_in(m, &shores)?.iter().flatten().count();
+        taken.push(m.tried(100.0 * shown as f64 / shores.len().max(1) as f64));
+    }
+    bench.extreme("other cameras, beyond the mark's uncertainty", "px", off);
+    bench.extreme("other cameras: shores, harbours, rivers", "% taken for one", taken);
     Ok(())
 }
 

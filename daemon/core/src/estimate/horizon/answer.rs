@@ -71,6 +71,14 @@ pub struct LineQuality {
     pub columns: usize,
     /// These over the columns that the line crosses.
     pub solid_share: f64,
+    /// Columns with an edge on the line below what is no sky, over these and the free ones.
+    pub land_share: f64,
+    /// Columns in which sky reaches down past the line, over these and the free ones.
+    pub past_share: f64,
+    /// Columns in which sky ends a little above the line, over these and the free ones.
+    pub above_share: f64,
+    /// Free columns above which nothing up to the picture's edge has as large a step, over all free ones.
+    pub open_share: f64,
     /// Columns that the line crosses, not hidden, over all.
     pub visible_share: f64,
     /// Mean step of brightness across it, codes of 255.

@@ -2,7 +2,7 @@
 //!
 //! Only from these is a step over any number of rows, or how much the rows of a stretch differ, had by a few additions.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use glam::DVec2;
 
@@ -84,18 +84,24 @@ impl PictureCells {
                 0 => self.block[column],
                 _ => self.sums[from] - self.sums[from - 1],
             };
-            let sums = &mut self.sums[from..=from + count];
-            let wiggles = &mut self.wiggles[from..=from + count];
-            let (mut sum, mut wiggle) = (sums[0], wiggles[0]);
-            for row in 0..count {
-                let value = self.block[row * columns + column];
-                wiggle += (value - before).abs();
-                before = value;
-                sum += value;
-                sums[row + 1] = sum;
-                wiggles[row + 1] = wiggle;
+            let (mut sum, mut wiggle) = (self.sums[from], self.wiggles[from]);
+            let values = self.block[column..].iter().step_by(columns).take(count);
+            let sums = &mut self.sums[from + 1..=from + count];
+            let wiggles = &mut self.wiggles[from + 1..=from + count];
+            // No sum of so few rows comes near its limit.
+            for ((value, sum_here), wiggle_here) in values.zip(sums).zip(wiggles) {
+                wiggle = wiggle.wrapping_add(value.wrapping_sub(before).wrapping_abs());
+                before = *value;
+                sum = sum.wrapping_add(*value);
+                *sum_here = sum;
+                *wiggle_here = wiggle;
             }
         }
+    }
+
+    /// Lengths over those in a picture 1280 pixels wide; no more than 1.
+    pub fn scale(&self) -> f64 {
+        (self.size.x / f64::from(WIDTH)).min(1.0)
     }
 
     /// Rows that were read.
@@ -119,7 +125,32 @@ impl PictureCells {
     pub fn step(&self, column: usize, row: usize, size: usize) -> Option<f32> {
         let (sums, i) = (self.column(column), row.checked_sub(self.rows.start)?);
         let (above, at, below) = (*sums.get(i.checked_sub(size)?)?, *sums.get(i)?, *sums.get(i + size)?);
-        Some((below - 2 * at + above) as f32 * self.unit / size as f32)
+        Some(bend(above, at, below) as f32 * self.unit / size as f32)
+    }
+
+    /// [`PictureCells::step`] at each of `rows` that has one; `None` where none has.
+    pub fn steps(
+        &self,
+        column: usize,
+        rows: RangeInclusive<usize>,
+        size: usize,
+    ) -> Option<impl Iterator<Item = (usize, f32)>> {
+        let (sums, first) = (self.column(column), self.rows.start);
+        let from = rows.start().saturating_sub(first).max(size);
+        let to = rows.end().checked_sub(first)?.checked_add(size)?.min(sums.len().checked_sub(1)?);
+        let around = sums.get(from - size..=to)?;
+        let (at, below) = (around.get(size..)?, around.get(2 * size..)?);
+        let gain = self.unit / size as f32;
+        let steps = around.iter().zip(at).zip(below).map(move |((a, b), c)| bend(*a, *b, *c) as f32 * gain);
+        Some((first + from..).zip(steps))
+    }
+
+    /// Mean of `rows`, codes; `None` where not all of them were read.
+    pub fn mean(&self, column: usize, rows: Range<usize>) -> Option<f32> {
+        let sums = self.column(column);
+        let (a, b) = (rows.start.checked_sub(self.rows.start)?, rows.end.checked_sub(self.rows.start)?);
+        let (from, to) = (*sums.get(a)?, *sums.get(b)?);
+        (b > a).then(|| (to - from) as f32 * self.unit / (b - a) as f32)
     }
 
     /// Mean difference of a row from the next over `rows`, codes; `None` where not all of them were read.
@@ -132,16 +163,23 @@ impl PictureCells {
     }
 }
 
+/// Second difference of running sums, which is that of what lies between the first two and the last two. It does not overflow:
+/// no sum comes near its limit.
+pub(super) const fn bend(above: i32, at: i32, below: i32) -> i32 {
+    below.wrapping_sub(at.wrapping_mul(2)).wrapping_add(above)
+}
+
 /// Adds a row of the picture to the cells of `line`. Luma of RGB is (R + 2 G + B) / 4, times four: near enough to BT.601 for
 /// edges.
 fn add_row(picture: &Picture, y: usize, reduction: usize, line: &mut [i32]) {
     let (per_pixel, row) = (picture.format().pixel_bytes(), picture.row(y));
     for (cell, pixels) in line.iter_mut().zip(row.chunks_exact(CELL * reduction * per_pixel)) {
-        *cell += match picture.format() {
+        let sum = match picture.format() {
             PixelFormat::Nv12 => eights(pixels).map(pairs).map(total).sum::<i32>(),
             PixelFormat::Yuyv => eights(pixels).map(|w| total(w & EVEN)).sum(),
             PixelFormat::Rgb => rgb(pixels),
         };
+        *cell = cell.wrapping_add(sum);
     }
 }
 

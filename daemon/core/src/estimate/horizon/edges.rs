@@ -4,7 +4,11 @@ use std::ops::Range;
 
 use glam::{DVec2, Vec2};
 
-use super::{cells::PictureCells, mask::MaskedRows, rays::Rays};
+use super::{
+    cells::{PictureCells, bend},
+    mask::MaskedRows,
+    rays::Rays,
+};
 
 /// Rows that steps are taken over, and how much a step counts: the shorter, the more of it is noise.
 const SCALES: [(usize, f32); 3] = [(3, 0.7), (8, 1.0), (20, 1.0)];
@@ -44,6 +48,15 @@ struct BrightnessStep {
     weight: f32,
 }
 
+/// One of the steps that are kept of a column.
+#[derive(Clone, Copy, Debug)]
+struct KeptStep {
+    row: usize,
+    /// Codes, positive where it is brighter below.
+    step: f32,
+    weight: f32,
+}
+
 /// A line that many steps lie on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LineCandidate {
@@ -60,10 +73,13 @@ pub(super) struct LineSpan {
     pub elevation: (f64, f64),
 }
 
-/// How quiet the rows above `row` are, from 1 (sky) to 0: `floor` is what noise alone would give.
-pub(super) fn quiet(cells: &PictureCells, column: usize, row: usize, floor: f32) -> Option<f32> {
+/// How quiet the rows above `row` are, from 1 (sky) to 0: `floor` is what noise alone would give; clouds above a `step` of many
+/// codes are quiet beside it.
+pub(super) fn quiet(cells: &PictureCells, column: usize, row: usize, step: f32, floor: f32) -> Option<f32> {
+    /// Rows that differ by this share of the step are as quiet as those that differ by the noise.
+    const SHARE: f32 = 0.015;
     let wiggle = above(cells, column, row)?;
-    Some(1.0 / (1.0 + (wiggle / (1.5 * floor)).powi(2)))
+    Some(1.0 / (1.0 + (wiggle / (1.5 * floor.max(SHARE * step.abs()))).powi(2)))
 }
 
 /// How much the rows above `row` that should be sky differ from one to the next, codes; `None` too near the upper edge.
@@ -98,13 +114,16 @@ impl Seeker {
         self.edges.iter_mut().for_each(Vec::clear);
         for column in 0..cells.columns {
             self.respond(cells, column);
-            for (row, step) in self.strongest(cells, rows(column)).into_iter().flatten() {
+            let weight = |row: usize, step: f32| {
+                step.abs().min(STEP_MAX) * quiet(cells, column, row, step, floor).unwrap_or(0.5)
+            };
+            for KeptStep { row, step, weight } in
+                self.strongest(cells, rows(column), weight).into_iter().flatten()
+            {
                 if hidden.touches(column, row, SCALES[1].0) {
                     continue;
                 }
                 let Some((ray, _)) = rays.at(column, row as f64) else { continue };
-                let quiet = quiet(cells, column, row, floor).unwrap_or(0.5);
-                let weight = step.abs().min(STEP_MAX) * quiet;
                 let place = (ray.truncate() / ray.z.max(1e-3)).as_vec2();
                 self.edges[usize::from(step > 0.0)].push(BrightnessStep { place, weight });
             }
@@ -124,37 +143,44 @@ impl Seeker {
             let gain = gain * cells.unit() / size as f32;
             let around = sums.iter().zip(&sums[size..]).zip(&sums[2 * size..]);
             for (best, ((above, at), below)) in self.response[size..].iter_mut().zip(around) {
-                let step = (below - 2 * at + above) as f32 * gain;
+                let step = bend(*above, *at, *below) as f32 * gain;
                 *best = if step.abs() > best.abs() { step } else { *best };
             }
         }
     }
 
-    /// The strongest steps of the column responded to, with their rows.
-    fn strongest(&self, cells: &PictureCells, rows: Range<usize>) -> [Option<(usize, f32)>; PER_COLUMN] {
+    /// The steps of the column responded to that `weigh` (row, step in codes; no more than the step's size) finds to count
+    /// most. Below the horizon waves have larger steps than it, but no sky above them.
+    fn strongest(
+        &self,
+        cells: &PictureCells,
+        rows: Range<usize>,
+        weigh: impl Fn(usize, f32) -> f32,
+    ) -> [Option<KeptStep>; PER_COLUMN] {
         let offset = cells.rows().start;
-        let mut kept: [Option<(usize, f32)>; PER_COLUMN] = [None; PER_COLUMN];
+        let mut kept: [Option<KeptStep>; PER_COLUMN] = [None; PER_COLUMN];
         let from = rows.start.saturating_sub(offset);
         let to = rows.end.saturating_sub(offset).min(self.response.len());
-        let mut weakest = STEP_MIN;
+        let strength = |k: &Option<KeptStep>| k.map_or(0.0, |k| k.weight);
+        let mut weakest = 0.0;
         for (i, around) in self.response.get(from..to).unwrap_or(&[]).windows(3).enumerate() {
             let size = around[1].abs();
-            if size <= weakest || size < around[0].abs() || size < around[2].abs() {
+            if size <= STEP_MIN.max(weakest) || size < around[0].abs() || size < around[2].abs() {
                 continue;
             }
             let row = offset + from + i + 1;
+            let weight = weigh(row, around[1]);
             // A stronger step near by is kept in place of this one, a weaker one makes room for it.
-            let near = kept.iter().position(|k| k.is_some_and(|(r, _)| row.abs_diff(r) < APART));
+            let near = kept.iter().position(|k| k.is_some_and(|k| row.abs_diff(k.row) < APART));
             let place = near.or_else(|| {
-                let strength = |k: &Option<(usize, f32)>| k.map_or(0.0, |(_, s)| s.abs());
                 (0..PER_COLUMN).min_by(|a, b| strength(&kept[*a]).total_cmp(&strength(&kept[*b])))
             });
             if let Some(slot) = place.and_then(|p| kept.get_mut(p))
-                && slot.is_none_or(|(_, s)| s.abs() < size)
+                && strength(slot) < weight
             {
-                *slot = Some((row, around[1]));
+                *slot = Some(KeptStep { row, step: around[1], weight });
             }
-            weakest = kept.iter().map(|k| k.map_or(STEP_MIN, |(_, s)| s.abs())).fold(f32::MAX, f32::min);
+            weakest = kept.iter().map(strength).fold(f32::MAX, f32::min);
         }
         kept
     }
@@ -179,10 +205,17 @@ impl Seeker {
             grid.vote(edges, votes, 1.0);
         }
         let mut found = [None; N];
+        // Only the votes from which a line was taken change.
+        let mut peaks =
+            [0, 1].map(|sign| self.votes.chunks_exact(bins * rolls).nth(sign).and_then(|v| grid.peak(v)));
         for slot in &mut found {
-            let peak = |(sign, votes)| grid.peak(votes).map(|p| (sign, p));
-            let peaks = self.votes.chunks_exact(bins * rolls).enumerate().filter_map(peak);
-            let Some((sign, peak)) = peaks.max_by(|a, b| a.1.votes.total_cmp(&b.1.votes)) else { break };
+            let sign = match &peaks {
+                [Some(darker), Some(brighter)] => usize::from(brighter.votes >= darker.votes),
+                [Some(_), None] => 0,
+                [None, Some(_)] => 1,
+                [None, None] => break,
+            };
+            let Some(peak) = peaks[sign].take() else { break };
             let angles = grid.angles(&peak, dip);
             *slot = Some(LineCandidate { angles, brighter_below: sign == 1 });
             let (edges, taken) = (&mut self.edges[sign], &mut self.taken);
@@ -196,6 +229,7 @@ impl Seeker {
             });
             if let Some(votes) = self.votes.chunks_exact_mut(bins * rolls).nth(sign) {
                 grid.vote(taken, votes, -1.0);
+                peaks[sign] = grid.peak(votes);
             }
         }
         found

@@ -12,6 +12,7 @@ use super::{
     judge::HorizonJudge,
     mask::{Mask, MaskedRows},
     rays::Rays,
+    steps::StepBlocks,
 };
 use crate::{event::Picture, geometry::horizon_dip};
 
@@ -33,6 +34,7 @@ const SHIFT_SOFT_PX: f64 = 0.8;
 pub struct HorizonFinder {
     cells: PictureCells,
     rays: Rays,
+    steps: StepBlocks,
     hidden: MaskedRows,
     seeker: Seeker,
     fitter: Fitter,
@@ -70,6 +72,7 @@ impl HorizonFinder {
             None => 0..self.cells.height,
         };
         self.cells.fill(picture, rows);
+        self.steps.measure(&self.cells);
         let floor = self.noise_floor();
         let (cells, rays) = (&self.cells, &self.rays);
         let count = self.seeker.collect(cells, rays, &self.hidden, floor, |column| match &gate {
@@ -79,14 +82,14 @@ impl HorizonFinder {
         if count == 0 {
             return Err(NoHorizon::Featureless);
         }
-        let lines: [Option<LineCandidate>; 4] = self.seeker.lines(&self.rays, dip, span(gate.as_ref()));
+        let lines: [Option<LineCandidate>; 6] = self.seeker.lines(&self.rays, dip, span(gate.as_ref()));
         let (fit, quality) = self.best(&lines, dip.sin(), floor).ok_or(NoHorizon::Featureless)?;
         refusal(&quality).map_or(Ok(()), Err)?;
         let up = fit.line.up();
         if gate.is_some_and(|g| g.up.angle_between(up) > 1.5 * g.half) {
             return Err(NoHorizon::Elsewhere(quality));
         }
-        let covariance = fit.covariance + unseen(&quality, self.rays.focal, self.cells.size.x);
+        let covariance = fit.covariance + unseen(&quality, dip, self.rays.focal, self.cells.size.x);
         Ok(Horizon { up, covariance, quality })
     }
 
@@ -98,21 +101,38 @@ impl HorizonFinder {
         floor: f32,
     ) -> Option<(HorizonFit, LineQuality)> {
         /// Score from which a line is so clear that no other need be tried.
-        const SCORE_CLEAR: f64 = 1.4;
-        let scene = LineSearch { cells: &self.cells, rays: &self.rays, hidden: &self.hidden, sin_dip, floor };
+        const SCORE_CLEAR: f64 = 1.2;
+        let (cells, rays, steps, hidden) = (&self.cells, &self.rays, &self.steps, &self.hidden);
+        let scene = LineSearch { cells, rays, steps, hidden, sin_dip, floor };
         let mut best: Option<(HorizonFit, LineQuality)> = None;
         for candidate in lines.iter().flatten() {
             let line = HorizonLine { angles: candidate.angles, brighter_below: candidate.brighter_below };
-            let Some(fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)]) else { continue };
-            let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+            let Some(mut fit) = self.fitter.refine(&scene, line, &[(12, 8), (6, 6)], |_| true) else {
+                continue;
+            };
+            let mut quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+            if quality.score < SCORE_CLEAR {
+                // Land has pulled at the line before it was known for it.
+                let free = self.judge.free();
+                let freed = free.and_then(|free| self.fitter.refine(&scene, fit.line, &[(6, 6)], free));
+                if let Some(freed) = freed {
+                    fit = freed;
+                    quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
+                }
+            }
             if best.is_none_or(|(_, b)| b.score < quality.score) {
                 best = Some((fit, quality));
+                self.judge.keep();
             }
             if quality.score >= SCORE_CLEAR && refusal(&quality).is_none() {
                 break;
             }
         }
-        let fit = self.fitter.refine(&scene, best?.0.line, &[(4, 4), (3, 3)])?;
+        let (line, windows) = (best?.0.line, [(4, 4), (3, 3)]);
+        let fit = match self.judge.kept_free() {
+            Some(is_free) => self.fitter.refine(&scene, line, &windows, is_free),
+            None => self.fitter.refine(&scene, line, &windows, |_| true),
+        }?;
         let quality = self.judge.weigh(&scene, &fit, self.fitter.survey(&scene, &fit.line));
         Some((fit, quality))
     }
@@ -140,7 +160,9 @@ impl HorizonFinder {
 /// Why a line with these qualities is not the horizon; `None` if it is.
 fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
     /// Score from which a line is taken for the horizon.
-    const SCORE_MIN: f64 = 0.7;
+    const SCORE_MIN: f64 = 0.55;
+    /// Share of the picture's width that shows it free at least: shorter edges are straight by chance.
+    const FREE_MIN: f64 = 0.12;
     /// Contrast that a horizon has at least, codes.
     const CONTRAST_MIN: f64 = 2.0;
     /// Sky differs from row to row no more than this many times what noise does, or by this share of the step below it; trees,
@@ -148,7 +170,8 @@ fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
     const TEXTURE_MAX: (f64, f64) = (2.0, 0.1);
     let (noises, steps) = TEXTURE_MAX;
     let texture_max = (noises * quality.noise).max(steps * quality.contrast);
-    if quality.score < SCORE_MIN || quality.contrast < CONTRAST_MIN {
+    let free = quality.solid_share * quality.visible_share;
+    if quality.score < SCORE_MIN || free < FREE_MIN || quality.contrast < CONTRAST_MIN {
         Some(NoHorizon::Unclear(*quality))
     } else if quality.sharpness < SHARPNESS_MIN {
         Some(NoHorizon::Blurred(*quality))
@@ -160,14 +183,17 @@ fn refusal(quality: &LineQuality) -> Option<NoHorizon> {
 }
 
 /// Covariance of what the scatter of the columns does not show: haze and swell move all of an edge, and the more the softer
-/// it is.
-fn unseen(quality: &LineQuality, focal_px: f64, width_px: f64) -> DMat2 {
+/// it is; and where land stands behind part of the line, the water may end before it does at the horizon: from an eye at
+/// height h, a shore at a quarter of the horizon's distance lies lower by its dip (h / d + d / 2 R, less the square root of
+/// 2 h / R).
+fn unseen(quality: &LineQuality, dip: f64, focal_px: f64, width_px: f64) -> DMat2 {
     /// Standard deviation by which the line's ends are moved against each other.
     const TURN_PX: f64 = 0.05;
     let softness = (1.0 / quality.sharpness.clamp(SHARPNESS_MIN, 1.0) - 1.0).max(0.0);
     let shift = (SHIFT_PX + SHIFT_SOFT_PX * softness) / focal_px;
     let turn = TURN_PX * 2.0 / (quality.visible_share * width_px).max(1.0);
-    DMat2::from_diagonal(DVec2::new(turn * turn, shift * shift))
+    let shore = quality.land_share * dip;
+    DMat2::from_diagonal(DVec2::new(turn * turn, shift * shift + shore * shore))
 }
 
 /// Where a prediction lets the horizon be.

@@ -7,6 +7,7 @@ use super::{
     edges::quiet,
     mask::MaskedRows,
     rays::Rays,
+    steps::StepBlocks,
 };
 use crate::statistics::biweight;
 
@@ -45,6 +46,7 @@ fn through(a: DVec3, b: DVec3, sin_dip: f64) -> Option<DVec2> {
 pub(super) struct LineSearch<'a> {
     pub cells: &'a PictureCells,
     pub rays: &'a Rays,
+    pub steps: &'a StepBlocks,
     pub hidden: &'a MaskedRows,
     pub sin_dip: f64,
     /// How much noise alone makes rows differ, codes.
@@ -116,7 +118,7 @@ impl Fitter {
     pub fn survey(&mut self, scene: &LineSearch<'_>, line: &HorizonLine) -> &[EdgePoint] {
         /// The stretch that is surveyed: rows to either side, rows that steps are taken over.
         const SURVEY: (usize, usize) = (10, 4);
-        self.gather(scene, line, SURVEY.0, SURVEY.1);
+        self.gather(scene, line, SURVEY.0, SURVEY.1, |_| true);
         self.measure(scene, line);
         &self.points
     }
@@ -128,12 +130,13 @@ impl Fitter {
         scene: &LineSearch<'_>,
         mut line: HorizonLine,
         windows: &[(usize, usize)],
+        wanted: impl Fn(usize) -> bool,
     ) -> Option<HorizonFit> {
         /// Windows from this on may hold other edges than the line's, rows.
         const WIDE: usize = 12;
         let mut fit = None;
         for (window, size) in windows {
-            self.gather(scene, &line, *window, *size);
+            self.gather(scene, &line, *window, *size, &wanted);
             if *window >= WIDE {
                 line = self.consensus(scene, line);
             }
@@ -144,17 +147,24 @@ impl Fitter {
         fit
     }
 
-    fn gather(&mut self, scene: &LineSearch<'_>, line: &HorizonLine, window: usize, size: usize) {
+    fn gather(
+        &mut self,
+        scene: &LineSearch<'_>,
+        line: &HorizonLine,
+        window: usize,
+        size: usize,
+        wanted: impl Fn(usize) -> bool,
+    ) {
         /// A step that is larger than this says no more about its place, codes.
         const STEP_FULL: f32 = 15.0;
         self.points.clear();
         let size = line.step_rows(size);
         let window = window.max(size);
-        for column in 0..scene.cells.columns {
+        for column in (0..scene.cells.columns).filter(|c| wanted(*c)) {
             let Some(row) = line.row(scene, column) else { continue };
             let Some((row, step)) = edge_near(scene, line, column, row, window, size) else { continue };
             let Some((ray, down)) = scene.rays.at(column, row) else { continue };
-            let quiet = quiet(scene.cells, column, row as usize, scene.floor).unwrap_or(0.5);
+            let quiet = quiet(scene.cells, column, row as usize, step, scene.floor).unwrap_or(0.5);
             let weight = f64::from(quiet * step.min(STEP_FULL) / STEP_FULL);
             self.points.push(EdgePoint { column, row, off: 0.0, ray, down, weight });
         }
@@ -167,7 +177,7 @@ impl Fitter {
         const PAIRS: usize = 24;
         let mut best = (self.agreement(scene, &line), line);
         let count = self.points.len();
-        for lag in [count / 2, count / 3, count / 5] {
+        for lag in [count / 2, count / 3, count / 5, count / 9] {
             for first in (0..count).step_by((count / PAIRS).max(1)) {
                 let (Some(a), Some(b)) = (self.points.get(first), self.points.get(first + lag.max(1))) else {
                     break;
@@ -290,13 +300,14 @@ fn edge_near(
     size: usize,
 ) -> Option<(f64, f32)> {
     let middle = row.round() as usize;
-    let step = |row: usize| Some(line.signed(scene.cells.step(column, row, size)?));
     let rows = middle.saturating_sub(window)..=middle + window;
-    let (best, most) = rows
-        .clone()
-        .filter_map(|row| step(row).map(|s| (row, s)))
+    let (best, most) = scene
+        .cells
+        .steps(column, rows.clone(), size)?
+        .map(|(row, step)| (row, line.signed(step)))
         .max_by(|a, b| a.1.total_cmp(&b.1))
         .filter(|(best, most)| *most > 0.0 && best != rows.start() && best != rows.end())?;
+    let step = |row: usize| Some(line.signed(scene.cells.step(column, row, size)?));
     if scene.hidden.touches(column, best, size) {
         return None;
     }

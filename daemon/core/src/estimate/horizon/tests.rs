@@ -182,3 +182,84 @@ fn a_shore_a_blur_and_a_view_past_it_are_told_apart() {
     let wrong = Prior { up: up_of(0.02, 0.1), sigma: 0.005 };
     assert!(find(&sea_and_sky, Some(wrong)).is_err());
 }
+
+/// Column and row of a pixel.
+fn at(i: usize) -> (usize, usize) {
+    (i % SIZE.0 as usize, i / SIZE.0 as usize)
+}
+
+fn find_painted(up: DVec3, paint: &dyn Fn(f64, usize) -> f64) -> Result<Horizon, NoHorizon> {
+    let lens = lens(0.0);
+    HorizonFinder::new().find(&nv12(SIZE, painted(&lens, up, paint)), &view(lens, None))
+}
+
+#[test]
+fn the_free_part_of_a_horizon_tells_it() {
+    let up = up_of(0.03, 0.02);
+    // A nearer coast, whose water line stands lower, hides all but a quarter of it.
+    let coast = |over: f64, i: usize| {
+        let (x, _) = at(i);
+        let top = 28.0 + 8.0 * (x as f64 / 40.0).sin();
+        let rough = 60.0 + 25.0 * grain(x / 3, 8);
+        if x > 160 && (-5.0..top).contains(&over) { rough } else { sea_and_sky(over, i) }
+    };
+    let found = find_painted(up, &coast).unwrap();
+    assert!((found.elevation() - 0.02).abs() * lens(0.0).focal.x < 0.7, "{found:?}");
+    assert!((found.roll() - 0.03).abs() < 0.006, "{found:?}");
+    // The shorter it is, the less it tells of roll.
+    let all = find_painted(up, &sea_and_sky).unwrap();
+    assert!(found.covariance.x_axis.x > 4.0 * all.covariance.x_axis.x, "{found:?}");
+}
+
+#[test]
+fn a_water_line_below_land_is_no_horizon() {
+    let up = up_of(0.02, 0.0);
+    let hills = |x: usize| 18.0 + 5.0 * (x as f64 / 90.0).sin();
+    // Smooth dark hills over water that mirrors the bright sky, and hazy ones over dark water.
+    let land = |land: f64, water: f64| {
+        move |over: f64, i: usize| {
+            let (x, _) = at(i);
+            match over {
+                _ if over > hills(x) => 170.0 + 2.0 * grain(i, 1),
+                _ if over > 0.0 => land + 2.0 * grain(i, 1),
+                _ => water + 12.0 * grain(i / 3, 2),
+            }
+        }
+    };
+    for (name, found) in
+        [("dark", find_painted(up, &land(12.0, 70.0))), ("hazy", find_painted(up, &land(140.0, 80.0)))]
+    {
+        assert!(found.is_err(), "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn waves_of_more_contrast_do_not_hide_the_horizon() {
+    let up = up_of(-0.02, 0.03);
+    // Glitter: its steps are four times the horizon's.
+    let glitter = |over: f64, i: usize| {
+        let (x, y) = at(i);
+        let wave = 60.0 * grain(x / 6 + y / 4 * 107, 3) * (-over / 20.0).clamp(0.0, 1.0);
+        if over > 0.0 { 150.0 + 2.0 * grain(i, 1) } else { 128.0 + wave + 3.0 * grain(i, 2) }
+    };
+    let found = find_painted(up, &glitter).unwrap();
+    assert!((found.elevation() - 0.03).abs() * lens(0.0).focal.x < 1.0, "{found:?}");
+    assert!((found.roll() + 0.02).abs() < 0.003, "{found:?}");
+}
+
+#[test]
+fn sharp_clouds_are_no_land() {
+    let up = up_of(0.02, -0.04);
+    for seed in 4..8 {
+        // Streaks of cloud low in the sky: their edges are as sharp as land's and half as strong as the horizon, but do not last.
+        let streaks = |over: f64, i: usize| {
+            let (x, _) = at(i);
+            let streak = grain(x / 64 + (over / 4.0).floor().max(0.0) as usize * 10, seed);
+            let sky = 150.0 + 35.0 * (-over / 40.0).exp() * streak + grain(i, 1);
+            if over > 0.0 { sky } else { 80.0 + 12.0 * grain(i / 3, 2) }
+        };
+        let found = find_painted(up, &streaks).unwrap();
+        assert!((found.elevation() + 0.04).abs() * lens(0.0).focal.x < 0.7, "{seed}: {found:?}");
+        assert!((found.roll() - 0.02).abs() < 0.003, "{seed}: {found:?}");
+    }
+}
