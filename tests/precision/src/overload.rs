@@ -144,8 +144,8 @@ impl Told {
             let [before, at] = pair else { continue };
             let frames = self.ticks[..=n].iter().rev().take_while(|t| before.secs_since(**t) < 1.0).count();
             let is_told = LOAD.iter().any(|fault| {
-                let of = self.changes.iter().filter(|(time, other, _)| other == fault && time <= at);
-                of.last().is_some_and(|(_, _, came)| *came)
+                let mut of = self.changes.iter().filter(|(time, other, _)| other == fault && time <= at);
+                of.next_back().is_some_and(|(_, _, came)| *came)
             });
             if frames < RATE_KEPT && !is_told {
                 untold_s += at.secs_since(*before);

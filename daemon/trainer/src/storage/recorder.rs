@@ -253,19 +253,20 @@ fn frame_entry(frame: &CameraFrame, jpeg: Arc<[u8]>) -> FrameEntry {
 /// Codes pictures, and keeps the newest.
 #[derive(Default)]
 struct PictureCoder {
-    newest: Option<((u32, u32), Arc<[u8]>)>,
+    size: (u32, u32),
+    newest: Option<Arc<[u8]>>,
 }
 
 impl PictureCoder {
     fn jpeg(&mut self, picture: &Picture, coding: Coding) -> Result<Arc<[u8]>> {
         let size = (picture.width(), picture.height());
-        if let (Coding::AsBefore, Some((before, jpeg))) = (coding, &self.newest)
-            && *before == size
+        if let (Coding::AsBefore, Some(jpeg)) = (coding, &self.newest)
+            && self.size == size
         {
             return Ok(jpeg.clone());
         }
         let coded: Arc<[u8]> = jpeg(picture)?.into();
-        self.newest = Some((size, coded.clone()));
+        (self.size, self.newest) = (size, Some(coded.clone()));
         Ok(coded)
     }
 }
