@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 
-/// The sun, and how far one sees.
+/// Sun and visibility.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Daylight {
     /// Unit vector towards the sun, world.
     pub sun_direction: DVec3,
-    /// How much of a clear sky's sun comes through, 0 to 1.
+    /// Share of a clear sky's sunlight that clouds let through, 0 to 1.
     pub sun_strength: f64,
     /// Meteorological visibility, metres.
     pub visibility_m: f64,

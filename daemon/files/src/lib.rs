@@ -40,7 +40,7 @@ pub fn plain_text(path: &Path, bytes_max: usize) -> io::Result<String> {
     Ok(text)
 }
 
-/// Whether the last marker of a JPEG is there: decoders make grey of what is missing. Some cameras pad with zeros behind it.
+/// Tests for a JPEG's end marker: a decoder fills a truncated picture with grey. Zeros behind it are padding of some cameras.
 pub fn ends_as_jpeg(jpeg: &[u8]) -> bool {
     let padding = jpeg.iter().rev().take_while(|byte| **byte == 0).count();
     jpeg.get(..jpeg.len() - padding).is_some_and(|used| used.ends_with(&[0xff, 0xd9]))

@@ -99,8 +99,8 @@ impl Instance {
                     vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
                         | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
                 )
-                // What is wrong, not advice on speed, which no message is an error for: the frame stays in the general layout so that two
-                // formats may see it (`target`).
+                // Advice on speed is not asked for, since each message counts as an error: the frame stays in the general layout on purpose,
+                // so that two formats may see it (`target`).
                 .message_type(
                     vk::DebugUtilsMessageTypeFlagsEXT::GENERAL
                         | vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION,
@@ -151,8 +151,8 @@ impl Instance {
     }
 }
 
-/// Makes an instance, once in the life of the process, that nobody destroys. The loader unloads a driver with its last instance; but a driver
-/// may have left with each thread that called it something to run at that thread's end (NVIDIA's does), which then is code no longer there.
+/// Makes an instance, once in the life of the process, that nobody destroys. The loader unloads a driver with its last instance. NVIDIA's driver
+/// registers a thread-local destructor with each thread that called it; a thread that ends after the unloading would call code that is gone.
 fn keep_drivers_loaded(entry: &ash::Entry, app: &vk::ApplicationInfo<'_>) {
     static KEPT: Once = Once::new();
     KEPT.call_once(|| {

@@ -67,7 +67,7 @@ pub struct Config {
     pub orientation: Orientation,
     /// Where headings come from beside the inertial unit.
     pub heading: HeadingChoice,
-    /// What is wired to the computer's GPIO lines.
+    /// Trigger, interlock, power-fail input and lamps.
     pub gpio: GpioSettings,
     /// The GPU.
     pub gpu: GpuSettings,
@@ -77,7 +77,7 @@ pub struct Config {
     pub health: HealthSettings,
 }
 
-/// What is wired to the computer's GPIO lines, besides presses.
+/// Settings of the GPIO lines, those of the operator's buttons left out.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GpioSettings {
     /// The trigger's line; without it nothing fires.

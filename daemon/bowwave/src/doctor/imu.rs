@@ -125,10 +125,11 @@ fn line(status: &ImuStatus) -> String {
     )
 }
 
-/// Whether the adapter hands bytes on at once, for people.
+/// Low-latency mode of the serial adapter, in words.
 pub(super) fn low_latency(line: &LineReport) -> &'static str {
     match line.open.as_ref().map(|open| open.low_latency) {
-        None | Some(LowLatency::NotAsked) => "not asked for",
+        None => "unknown, no port is open",
+        Some(LowLatency::NotAsked) => "not asked for",
         Some(LowLatency::Set) => "on",
         Some(LowLatency::NotOffered) => "not offered by the adapter's driver",
         Some(LowLatency::Refused) => "refused to this user",

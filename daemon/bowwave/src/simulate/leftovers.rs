@@ -1,4 +1,4 @@
-//! What an earlier run left in a folder: a run that writes there again must not be taken for it.
+//! Leftovers of an earlier run in an output folder, so that the files of two runs are not mixed.
 
 use std::path::Path;
 
@@ -38,7 +38,7 @@ pub fn clear(folder: &Path, records: bool) -> Result<()> {
     Ok(())
 }
 
-/// Whether a file of that name shows a run: it is made anew by each.
+/// Names of the files that every run makes anew: stills, contact sheet, video, summary.
 fn is_shown(name: &str) -> bool {
     let still = name.strip_prefix("frame-").and_then(|rest| rest.strip_suffix(".png"));
     let is_still = still.is_some_and(|n| n.len() >= 5 && n.bytes().all(|b| b.is_ascii_digit()));

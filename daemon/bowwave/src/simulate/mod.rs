@@ -1,7 +1,7 @@
 //! `bowwave simulate`: the trainer on a recording, as if its devices were there.
 
-pub mod leftovers;
-mod prepare;
+mod leftovers;
+pub mod prepare;
 
 use std::{
     sync::{

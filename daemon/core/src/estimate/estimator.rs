@@ -37,7 +37,7 @@ pub struct EstimatorSettings<'a> {
     pub own_ship: Option<&'a Mask>,
     /// Height of the camera over the mean sea, metres.
     pub eye_height_m: f64,
-    /// Where the sun stands, and how far one sees.
+    /// Sun and visibility.
     pub daylight: Daylight,
     /// Whether the brightness of the sea is measured.
     pub measures_tones: bool,

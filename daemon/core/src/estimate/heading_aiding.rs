@@ -37,7 +37,7 @@ pub struct Landmark {
     pub sigma: f64,
 }
 
-/// How the headings of the ship's own instruments come.
+/// Latency and standard deviation of the headings of the ship's own instruments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShipHeadings {
     /// From the measurement to the arrival of its line, nanoseconds.

@@ -259,7 +259,7 @@ impl Baud {
     }
 }
 
-/// How a serial line is reached.
+/// Port and rate of a serial line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LineSettings {
     /// Its node, or better its link in `/dev/serial/by-id`; `*` and `?` in it stand for what may change: the first port that fits and
@@ -284,7 +284,7 @@ impl LineSettings {
     }
 }
 
-/// How the inertial unit is read.
+/// Line, format and timing of the inertial unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ImuSettings {
     /// Its line.

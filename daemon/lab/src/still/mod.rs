@@ -59,7 +59,7 @@ pub struct Still {
     pub camera: StillCamera,
     /// Waves and where the wind comes from.
     pub waves: WaveSpec,
-    /// Where the sun stands, and how far one sees.
+    /// Sun and visibility.
     pub daylight: Daylight,
     /// How the sea mirrors, and at which wind force.
     pub water: Water,

@@ -28,7 +28,7 @@ const WARM_UP_S: f64 = 120.0;
 /// How often it is looked whether it still runs.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Which GPU draws, and how.
+/// Vulkan device, validation and time-out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GpuSettings {
     /// Vulkan device by number or part of its name; absent: the first.

@@ -24,7 +24,7 @@ pub enum Misfit {
 }
 
 impl Misfit {
-    /// What the sailor can be told of.
+    /// Faults of all misfits.
     pub const FAULTS: [Fault; 8] = [
         Fault::UnitTurned,
         Fault::UnitReversed,

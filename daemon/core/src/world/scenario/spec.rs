@@ -35,7 +35,7 @@ pub struct Scenario {
     pub wind: DVec3,
     /// Height of the camera over the mean sea, metres.
     pub eye_height_m: f64,
-    /// Where the sun stands, and how far one sees.
+    /// Sun and visibility.
     pub daylight: Daylight,
     /// How the sea mirrors, and at which wind force.
     pub water: Water,
