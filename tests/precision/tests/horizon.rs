@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a step that fails fails the test")]
 
-use bowwave_core::estimate::horizon::HorizonFinder;
+use bowwave_core::estimate::horizon::{HorizonFinder, Prior};
 use glam::DVec3;
 use precision::{
     front::quantile,
@@ -35,6 +35,31 @@ fn drawn_horizons_are_found_and_their_covariance_is_right() {
     // Two degrees of freedom: 2 in the mean. More would be overconfident, far less would waste the measurement.
     let mean = squares.iter().sum::<f64>() / squares.len() as f64;
     assert!((0.4..3.0).contains(&mean), "{mean}");
+}
+
+/// A span of half a degree is less than three bins of the line search there: no prediction was ever answered.
+#[test]
+fn a_coarse_camera_sees_predicted_horizons() {
+    let mut finder = HorizonFinder::new();
+    for by in [4, 8] {
+        let (mut px, mut squares) = (Vec::new(), Vec::new());
+        for i in 0..16 {
+            let drawn = DrawnHorizon::coarse(with_horizon(SET_WITH + 6000, i), by).unwrap();
+            let prior = predicted(DVec3::from(drawn.shown.up()), i);
+            // A unit in use foretells the vertical better than this study's.
+            let sure = Prior { up: DVec3::from(drawn.shown.up()), sigma: 0.1_f64.to_radians() };
+            for prior in [prior, sure] {
+                if let Ok(found) = drawn.find(&mut finder, Some(prior)) {
+                    px.push(drawn.miss(found.up).px);
+                    squares.push(drawn.normalised(&found));
+                }
+            }
+        }
+        assert!(px.len() >= 20, "{} of 32 by {by}", px.len());
+        assert!(quantile(&px, 1.0) < 2.0 * by as f64, "{} by {by}", quantile(&px, 1.0));
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        assert!((0.2..4.0).contains(&mean), "{mean} by {by}");
+    }
 }
 
 #[test]

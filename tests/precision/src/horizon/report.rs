@@ -57,7 +57,8 @@ impl HorizonStudy {
         marked(self.overlays.as_deref())?;
         jitter()?;
         without(self.overlays.as_deref())?;
-        drawn(self.drawn, self.set)
+        drawn(self.drawn, self.set)?;
+        coarse(self.drawn / 8, self.set)
     }
 }
 
@@ -254,6 +255,36 @@ fn drawn(count: u64, set: bool) -> Result<()> {
             .collect::<Result<_>>()?;
         let taken: Vec<&str> = none.iter().copied().flatten().collect();
         println!("none drawn, {told}: {} of {} taken for one {taken:?}", taken.len(), none.len());
+    }
+    Ok(())
+}
+
+/// The same seen by cameras with fewer pixels, down to 160 across as thermal cameras have.
+fn coarse(count: u64, set: bool) -> Result<()> {
+    let seed = if set { 0 } else { SET_WITH };
+    for (by, is_told) in [2, 4, 8].into_iter().flat_map(|by| [(by, false), (by, true)]) {
+        let told = |up: [f64; 3], i: u64| is_told.then(|| predicted(DVec3::from(up), seed + i));
+        let rows: Vec<_> = (0..count)
+            .into_par_iter()
+            .map(|i| {
+                let drawn = DrawnHorizon::coarse(with_horizon(seed, i), by)?;
+                let found = drawn.find(&mut HorizonFinder::new(), told(drawn.shown.up(), i)).ok();
+                let none = DrawnHorizon::coarse(without_horizon(seed, i), by)?;
+                // Smear of a few coarse pixels leaves a horizon that may be used, where it is one.
+                let taken = none.find(&mut HorizonFinder::new(), told(none.shown.up(), i)).ok();
+                let wrong = taken.filter(|h| none.shown.smear < 2 || none.miss(h.up).is_failure());
+                Ok((found.map(|h| (drawn.miss(h.up), drawn.normalised(&h))), wrong.map(|_| none.shown.kind)))
+            })
+            .collect::<Result<_>>()?;
+        let misses: Vec<_> = rows.iter().map(|r| r.0.map(|found| found.0)).collect();
+        let squares: Vec<f64> = rows.iter().filter_map(|r| r.0.map(|found| found.1)).collect();
+        let what = format!("{} wide, {}", 1280 / by, if is_told { "prediction" } else { "no prediction" });
+        println!(
+            "{}; normalised square {:.2}; of as many without one taken {:?}",
+            summary(&what, &misses),
+            squares.iter().sum::<f64>() / squares.len() as f64,
+            rows.iter().filter_map(|r| r.1).collect::<Vec<&str>>()
+        );
     }
     Ok(())
 }

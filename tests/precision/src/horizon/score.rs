@@ -90,12 +90,17 @@ pub struct DrawnHorizon {
 impl DrawnHorizon {
     /// Draws it.
     pub fn new(shown: DrawnScene) -> Result<Self> {
-        let (w, h) = shown.size;
-        let mut bytes = shown.draw();
+        Self::coarse(shown, 1)
+    }
+
+    /// Draws it as a camera sees it whose pixels are `by` times as wide and as high.
+    pub fn coarse(shown: DrawnScene, by: usize) -> Result<Self> {
+        let (w, h) = (shown.size.0 / by, shown.size.1 / by);
+        let mut bytes = binned(&shown.draw(), shown.size.0, by);
         bytes.resize(w * h * 3 / 2, 128);
         let picture = Picture::new(PixelFormat::Nv12, w as u32, h as u32, bytes.into())?;
         let lens = Lens {
-            focal: DVec2::splat(shown.lens.focal),
+            focal: DVec2::splat(shown.lens.focal / by as f64),
             distortion: Distortion::radial_tangential(DVec2::from(shown.lens.radial), DVec2::ZERO),
             ..Lens::pinhole(w as u32, h as u32, 1.0)
         };
@@ -134,6 +139,18 @@ impl DrawnHorizon {
         let off = self.off(found.up);
         off.dot(DMat2::inverse(&found.covariance) * off)
     }
+}
+
+/// Means of fields of `by` times `by` codes; what is left over at the right and below is left out.
+fn binned(codes: &[u8], width: usize, by: usize) -> Vec<u8> {
+    let (columns, rows) = (width / by, codes.len() / width / by);
+    let mean = |i: usize| {
+        let corner = (i / columns * width + i % columns) * by;
+        let field = (0..by).flat_map(|row| &codes[corner + row * width..][..by]);
+        let sum: usize = field.map(|code| usize::from(*code)).sum();
+        (sum as f64 / (by * by) as f64).round() as u8
+    };
+    (0..columns * rows).map(mean).collect()
 }
 
 /// Fields that the drawn barrel touches, and a little around it.

@@ -37,7 +37,8 @@ pub(super) const ROLL_MAX: f64 = 65.0 * std::f64::consts::PI / 180.0;
 /// Breadth of a bin of the height at the axis, reduced pixels: half a step of roll moves the ends of a line as much.
 const BIN_PX: f64 = 6.0;
 
-/// Most bins of the height.
+/// Fewest and most bins of the height.
+const BINS_MIN: usize = 3;
 const BINS_MAX: usize = 1024;
 
 /// A step of brightness.
@@ -196,7 +197,9 @@ impl Seeker {
         let bin_size = (BIN_PX / rays.focal).max(2.0 * rays.reach / BINS_MAX as f64);
         let low = (span.elevation.0.tan() + dip).max(-rays.reach);
         let high = (span.elevation.1.tan() + dip).min(rays.reach);
-        let bins = (((high - low) / bin_size).ceil().max(0.0) as usize + 1).min(BINS_MAX);
+        // A peak is told by its neighbours: in a coarse picture a prediction's span is less than three bins.
+        let low = low.min(0.5 * (low + high) - 1.5 * bin_size);
+        let bins = (((high - low) / bin_size).ceil().max(0.0) as usize + 1).clamp(BINS_MIN, BINS_MAX);
         let rolls = ((span.roll.1 - span.roll.0) / ROLL_STEP).ceil().max(0.0) as usize + 1;
         let grid = LineHistogram { low, bin_size, bins, roll_0: span.roll.0 };
         self.votes.clear();
