@@ -13,7 +13,7 @@ use crate::{
         Estimator, EstimatorSettings, SeaReport, SensorCounts,
         clock::ClockReport,
         pose::{NoPose, STALE_NS},
-        registration::Misfit,
+        registration::{Misfit, RegistrationChecks},
     },
     event::{Event, Input, Tick, TriggerEdge},
     fault::{Fault, FaultBoard, FaultChange, FirePermission, Severity},
@@ -112,9 +112,9 @@ impl Session {
         self.estimator.heading_sigma()
     }
 
-    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
-    pub fn unchecked_s(&self, now: Time) -> f64 {
-        self.estimator.unchecked_s(now)
+    /// How far the pictures confirm the orientation.
+    pub fn checks(&self, now: Time) -> RegistrationChecks {
+        self.estimator.checks(now)
     }
 
     /// The head-up display as it was drawn last.
@@ -201,7 +201,7 @@ impl Session {
             video_time,
             permission,
             warning: self.faults.active().find(|f| f.severity() == Severity::Warning),
-            unchecked_s: self.estimator.unchecked_s(tick.time),
+            checks: self.estimator.checks(tick.time),
             water: self.water_drawn(),
         };
         let pose_known = self.composer.compose(&moment, &self.estimator, &self.world);

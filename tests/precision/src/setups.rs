@@ -201,7 +201,7 @@ fn replay(path: &Path, wrong: Wrong, source: Source, seconds: f64) -> Result<Sai
         if begun.is_some_and(|begun| since(begun) > 2.0) {
             frames += 1;
             ready += u32::from(trouble == bowwave_core::frame::scene::Status::Ready);
-            unchecked += u32::from(session.unchecked_s(time) > 10.0);
+            unchecked += u32::from(session.checks(time).unseen_s > 10.0);
         }
     }
     replay.stop()?;

@@ -9,7 +9,7 @@ use super::{
     horizon::Mask,
     light::{Light, LightMeter, SeaTones, SkyLight},
     pose::NoPose,
-    registration::Misfit,
+    registration::{Misfit, RegistrationChecks},
     sea::SeaConditions,
     sea_state::{SeaReport, SeaStateTracker},
     sensors::{SensorCounts, Sensors},
@@ -188,9 +188,9 @@ impl Estimator {
         self.sensors.misfit()
     }
 
-    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
-    pub fn unchecked_s(&self, now: Time) -> f64 {
-        self.sensors.unchecked_s(now)
+    /// How far the pictures confirm the orientation.
+    pub fn checks(&self, now: Time) -> RegistrationChecks {
+        self.sensors.checks(now)
     }
 
     /// The light that boats are drawn with.

@@ -6,8 +6,13 @@
 //! nothing is begun anew (Page 1954, CUSUM). A sum reaches 20 by chance once in exp(20) observations on average at most
 //! (Lorden 1971): 5e8 of them are 1.5 years at ten a second. What an observation adds is bounded, so that a single one, however wrong, alarms
 //! nobody.
+//!
+//! A gun that rests shows neither a reversed axis nor late pictures. So a hypothesis counts as possible until what is believed has foretold
+//! better than it by 7 in all (Wald 1945, sequential test): a wrong set-up passes for a right one once in exp(7) = 1100 starts at most.
 
 mod misfit;
+#[cfg(test)]
+mod tests;
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -27,8 +32,6 @@ use crate::{
 const COST_MOST: f64 = 9.0;
 /// A hypothesis that lets the vertical wander, and does not say where to, explains no more than what costs this.
 const COST_WANDERS: f64 = 5.0;
-/// What a turn costs by chance, three numbers.
-const COST_TURN: f64 = 3.0;
 /// How the sea and what swims on it move by themselves in the picture, rad/s: waves go by at 10 m/s some hundred metres off.
 const SEA_RATE: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// By what share of itself a turn is told wrong by lens, shutter and times.
@@ -54,7 +57,11 @@ struct Hypothesis {
     late_ns: i64,
     /// Where up is on average off where it is expected.
     off: MeanOff,
+    /// How much better it foretold lately than what is believed, nats.
     sum: f64,
+    /// How much better what is believed foretold than this, since the start, nats.
+    against: f64,
+    is_excluded: bool,
 }
 
 /// Where a hypothesis expects up to be seen.
@@ -72,11 +79,29 @@ enum UpExpected {
 
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
-        Self { misfit, turn, up, late_ns: 0, off: MeanOff { mean: DVec3::ZERO, count: 0 }, sum: 0.0 }
+        let off = MeanOff { mean: DVec3::ZERO, count: 0 };
+        Self { misfit, turn, up, late_ns: 0, off, sum: 0.0, against: 0.0, is_excluded: false }
     }
 
     fn add(&mut self, as_believed: f64, other: f64, weight: f64) {
-        self.sum = (self.sum + 0.5 * weight * (as_believed - other)).max(0.0);
+        /// What is believed must have foretold better by this.
+        const EXCLUDED: f64 = 7.0;
+        /// However much better this foretold before, what was wrong may have been put right.
+        const LEAST: f64 = -40.0;
+        let better = 0.5 * weight * (as_believed - other);
+        self.sum = (self.sum + better).max(0.0);
+        self.against = (self.against - better).max(LEAST);
+        self.is_excluded |= self.against >= EXCLUDED;
+    }
+
+    /// Whether what was seen so far leaves it possible. A mount that is off is held against the horizon alone: there it is or it is not.
+    fn is_possible(&self) -> bool {
+        !self.is_excluded && self.misfit != Misfit::Mount
+    }
+
+    /// Counts as possible again.
+    fn reopen(&mut self) {
+        (self.against, self.is_excluded) = (0.0, false);
     }
 }
 
@@ -230,8 +255,8 @@ impl Registration {
         let cost = |believed: DVec3| turn_cost(seen.turn, believed, seen.covariance, floor);
         let as_believed = cost(own);
         for hypothesis in &mut self.hypotheses {
-            let other = believed(hypothesis.late_ns).map_or(COST_TURN, |turn| cost(hypothesis.turn * turn));
-            hypothesis.add(as_believed, other, 1.0);
+            let Some(turn) = believed(hypothesis.late_ns) else { continue };
+            hypothesis.add(as_believed, cost(hypothesis.turn * turn), 1.0);
         }
         self.decide();
     }
@@ -253,7 +278,9 @@ impl Registration {
                     if hypothesis.misfit == Misfit::Reversed(FORCE) && self.unit.own.is_some() => {}
                 UpExpected::At(map) => {
                     let other = cost((map * own).angle_between(up.seen), UP_SIGMA);
-                    hypothesis.add(as_believed, other, 1.0);
+                    // By little is as well a mount that is off.
+                    let weight = if hypothesis.misfit == Misfit::Lens { 1.0 / ALIKE } else { 1.0 };
+                    hypothesis.add(as_believed, other, weight);
                 }
                 UpExpected::Then => {
                     let Some(then) = alone(time.plus_ns(-hypothesis.late_ns)) else { continue };
@@ -291,7 +318,10 @@ impl Registration {
             let alike = self.hypotheses.iter().filter(|h| Some(h.misfit) == self.believed);
             let held = alike.map(|h| h.sum).fold(0.0, f64::max);
             if most.sum > held + LIMIT_OTHER {
-                self.believed = Some(most.misfit);
+                let misfit = most.misfit;
+                self.believed = Some(misfit);
+                let mut alike = self.hypotheses.iter_mut().filter(|h| h.misfit == misfit);
+                alike.by_ref().for_each(Hypothesis::reopen);
             }
         } else if most.sum < LIMIT_BACK {
             self.believed = None;
@@ -303,10 +333,22 @@ impl Registration {
         if self.unit.is_in_g() { Some(Misfit::ForceUnit) } else { self.believed }
     }
 
-    /// For how long nothing in the picture has confirmed what is believed, seconds; without end where nothing has so far.
-    pub fn unchecked_s(&self, now: Time) -> f64 {
-        self.checked.map_or(f64::INFINITY, |checked| now.secs_since(checked).max(0.0))
+    /// How far what is believed has been confirmed.
+    pub fn checks(&self, now: Time) -> RegistrationChecks {
+        RegistrationChecks {
+            unseen_s: self.checked.map_or(f64::INFINITY, |checked| now.secs_since(checked).max(0.0)),
+            is_tried: self.hypotheses.iter().all(|h| !h.is_possible()),
+        }
     }
+}
+
+/// How far the pictures confirm where the camera is believed to look.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RegistrationChecks {
+    /// For how long no horizon was seen where it should be, seconds; without end where none has been so far.
+    pub unseen_s: f64,
+    /// Whether the camera has turned enough, and been seen to, that each way to be set up wrongly would have been told.
+    pub is_tried: bool,
 }
 
 /// The turn that takes `from` to `to`, unit vectors.
@@ -353,7 +395,7 @@ fn hypotheses(camera_from_imu: DMat3) -> Vec<Hypothesis> {
     );
     all.push(Hypothesis::of(Misfit::Mirrored, diagonal(1.0, -1.0, -1.0), At(diagonal(-1.0, 1.0, 1.0))));
     all.push(Hypothesis::of(Misfit::Mirrored, diagonal(-1.0, 1.0, -1.0), At(diagonal(1.0, -1.0, 1.0))));
-    all.extend([100, 200, 400].map(|ms: u16| {
+    all.extend([100, 150, 200, 300, 400].map(|ms: u16| {
         let late = Hypothesis::of(Misfit::Late(ms), identity, Then);
         Hypothesis { late_ns: i64::from(ms) * 1_000_000, ..late }
     }));
@@ -374,126 +416,4 @@ fn quarter_turns() -> Vec<DMat3> {
         }
     }
     turns
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::geometry::look;
-
-    fn at(tenths: i64) -> Time {
-        Time::from_ns(tenths * 100_000_000)
-    }
-
-    /// A gun that is swung on a ship that rolls: where it looks.
-    fn moved(time: Time) -> DQuat {
-        let t = time.secs_since(at(0));
-        look(0.4 * (1.1 * t).sin(), 0.05 * (0.7 * t).sin() - 0.03, 0.06 * (0.8 * t).sin())
-    }
-
-    fn turn(from: Time, to: Time) -> DVec3 {
-        rotation_vector(moved(from).inverse() * moved(to))
-    }
-
-    fn up(time: Time) -> DVec3 {
-        moved(time).inverse() * DVec3::Z
-    }
-
-    /// Ten seconds in which what is seen differs from what is believed; when that was told first, seconds, and what is told at the end.
-    fn told(
-        turned: impl Fn(Time, Time) -> DVec3,
-        seen: impl Fn(Time) -> DVec3,
-    ) -> (Option<f64>, Option<Misfit>) {
-        let mut registration = Registration::new(DQuat::IDENTITY, None);
-        let mut first = None;
-        for tenths in 10..110 {
-            let (now, before) = (at(tenths), at(tenths).plus_ns(-33_000_000));
-            let sight = UpSight { seen: seen(now), predicted: up(now), is_predicted: true };
-            registration.up(now, &sight, |time| Some(up(time)));
-            let covariance = DMat3::from_diagonal(DVec3::splat(1e-7));
-            let seen = TurnSeen { from: before, turn: turned(before, now), covariance, patches: (20, 20) };
-            registration.turned(&seen, now, |ns| Some(turn(before.plus_ns(-ns), now.plus_ns(-ns))));
-            if registration.wrong().is_some() {
-                first.get_or_insert(now.secs_since(at(10)));
-            }
-        }
-        (first, registration.wrong())
-    }
-
-    #[test]
-    fn what_is_as_believed_is_confirmed_and_nothing_is_told() {
-        assert_eq!(told(turn, up), (None, None));
-        // Half a degree off: within what a unit alone is off on a ship.
-        let tilt = DQuat::from_rotation_x(0.5f64.to_radians());
-        assert_eq!(told(turn, |time| tilt * up(time)), (None, None));
-    }
-
-    #[test]
-    fn each_way_to_be_wrong_is_told_within_two_seconds_by_its_name() {
-        let diagonal = |x, y, z| DMat3::from_diagonal(DVec3::new(x, y, z));
-        let turned = DMat3::from_quat(DQuat::from_rotation_z(std::f64::consts::PI));
-        let quarter = DMat3::from_quat(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2));
-        let cases = [
-            (turned, turned, Misfit::Turned(180)),
-            (quarter, quarter, Misfit::Turned(90)),
-            (diagonal(1.0, -1.0, -1.0), diagonal(-1.0, 1.0, 1.0), Misfit::Mirrored),
-            (diagonal(1.0, -1.0, 1.0), DMat3::IDENTITY, Misfit::Reversed("the rate about y")),
-            (DMat3::IDENTITY, diagonal(-1.0, -1.0, -1.0), Misfit::Reversed(FORCE)),
-            (DMat3::IDENTITY * 1f64.to_radians(), DMat3::IDENTITY, Misfit::RateUnit),
-            (DMat3::IDENTITY * 1.5, DMat3::IDENTITY, Misfit::Lens),
-        ];
-        for (by_turn, by_up, misfit) in cases {
-            let (first, last) = told(|from, to| by_turn * turn(from, to), |time| by_up * up(time));
-            assert_eq!(last, Some(misfit));
-            assert!(first.is_some_and(|s| s <= 2.0), "{misfit:?} after {first:?} s");
-        }
-        let tilt = DQuat::from_rotation_x(5f64.to_radians());
-        let (first, last) = told(turn, |time| tilt * up(time));
-        assert_eq!(last, Some(Misfit::Mount), "after {first:?} s");
-        let late = |time: Time| time.plus_ns(-200_000_000);
-        let (first, last) = told(|from, to| turn(late(from), late(to)), |time| up(late(time)));
-        assert_eq!(last, Some(Misfit::Late(200)), "after {first:?} s");
-    }
-
-    #[test]
-    fn a_belief_ends_after_its_cause() {
-        let mut registration = Registration::new(DQuat::IDENTITY, None);
-        let see = |registration: &mut Registration, tenths: i64, map: DMat3| {
-            let sight = UpSight { seen: map * up(at(tenths)), predicted: up(at(tenths)), is_predicted: true };
-            registration.up(at(tenths), &sight, |time| Some(up(time)));
-        };
-        let upside_down = DMat3::from_diagonal(DVec3::new(-1.0, -1.0, 1.0));
-        (0..30).for_each(|tenths| see(&mut registration, tenths, upside_down));
-        assert!(registration.wrong().is_some());
-        assert_eq!(registration.unchecked_s(at(30)), f64::INFINITY);
-        (30..60).for_each(|tenths| see(&mut registration, tenths, DMat3::IDENTITY));
-        assert_eq!(registration.wrong(), None);
-        assert!(registration.unchecked_s(at(60)) < 0.2);
-    }
-
-    #[test]
-    fn force_in_g_is_told_by_its_size_and_rates_by_the_units_own_orientation() {
-        let fed = |factor: f64, rates: DVec3, own: bool| {
-            let mut registration = Registration::new(DQuat::IDENTITY, None);
-            for i in 0..600 {
-                let time = Time::from_ns(i * 5_000_000);
-                let rate = turn(time.plus_ns(-5_000_000), time) / 0.005;
-                let sample = ImuSample {
-                    arrival: time,
-                    device_time_ns: i * 5_000_000,
-                    rate,
-                    accel: up(time) * 9.8 * factor,
-                    world_from_imu: own.then(|| moved(time)),
-                };
-                registration.sample(time, &sample, rate * rates);
-            }
-            registration.wrong()
-        };
-        assert_eq!(fed(1.0, DVec3::ONE, true), None);
-        assert_eq!(fed(1.0 / 9.8, DVec3::ONE, true), Some(Misfit::ForceUnit));
-        assert_eq!(fed(1.0 / 9.8, DVec3::ONE, false), Some(Misfit::ForceUnit));
-        assert_eq!(fed(1.0, DVec3::ONE.with_y(-1.0), true), Some(Misfit::Reversed("the rate about y")));
-        assert_eq!(fed(1.0, DVec3::ONE * 57.3, true), Some(Misfit::RateUnit));
-        assert_eq!(fed(-1.0, DVec3::ONE, true), Some(Misfit::Reversed(FORCE)));
-    }
 }

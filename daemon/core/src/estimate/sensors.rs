@@ -15,7 +15,7 @@ use crate::{
         horizon::Mask,
         plausibility::{Plausibility, is_possible},
         pose::{NoPose, OrientationAt, STALE_NS},
-        registration::{Misfit, Registration},
+        registration::{Misfit, Registration, RegistrationChecks},
     },
     event::{CameraFrame, ImuSample, Mark, ShipSample},
     fault::Fault,
@@ -240,9 +240,9 @@ impl Sensors {
         self.registration.wrong()
     }
 
-    /// For how long nothing in the pictures has confirmed the orientation, seconds; without end where nothing has so far.
-    pub fn unchecked_s(&self, now: Time) -> f64 {
-        self.registration.unchecked_s(now)
+    /// How far the pictures confirm the orientation.
+    pub fn checks(&self, now: Time) -> RegistrationChecks {
+        self.registration.checks(now)
     }
 
     /// Counters.

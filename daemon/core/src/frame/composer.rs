@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     calibration::Calibration,
-    estimate::Estimator,
+    estimate::{Estimator, registration::RegistrationChecks},
     event::{Picture, PictureError, PixelFormat},
     fault::{Fault, FirePermission, NotScored},
     geometry::{CameraPose, Lens, RigidPose, look},
@@ -65,8 +65,8 @@ pub struct FrameMoment {
     pub permission: FirePermission,
     /// The fault that the sailor should know of though training goes on.
     pub warning: Option<Fault>,
-    /// For how long nothing in the picture has confirmed where the camera looks, seconds; without end where nothing has so far.
-    pub unchecked_s: f64,
+    /// How far the pictures confirm where the camera looks.
+    pub checks: RegistrationChecks,
     /// Which boats have reflections and wakes.
     pub water: WaterDrawn,
 }
@@ -295,6 +295,12 @@ const UNCHECKED: [(f64, &str); 9] = [
     (f64::INFINITY, "NO HORIZON SEEN YET"),
 ];
 
+/// Why what is drawn counts as unconfirmed; `None` where it is confirmed.
+fn unchecked(checks: &RegistrationChecks) -> Option<&'static str> {
+    let unseen = UNCHECKED.iter().rev().find(|(from_s, _)| checks.unseen_s >= *from_s);
+    unseen.map(|(_, cause)| *cause).or((!checks.is_tried).then_some("TURN THE GUN TO AND FRO"))
+}
+
 /// The status: the fault that keeps the weapon from scoring, else the newest result, else whether what is drawn has been confirmed.
 fn status(moment: &FrameMoment, result: Option<LastResult>) -> Status {
     match moment.permission {
@@ -307,10 +313,7 @@ fn status(moment: &FrameMoment, result: Option<LastResult>) -> Status {
             Some(LastResult { struck: Some((Side::Hostile, zone)), .. }) => Status::Hit { zone },
             Some(LastResult { struck: Some((Side::Neutral, zone)), .. }) => Status::NeutralHit { zone },
             Some(LastResult { struck: None, .. }) => Status::Miss,
-            None => {
-                let unchecked = UNCHECKED.iter().rev().find(|(from_s, _)| moment.unchecked_s >= *from_s);
-                unchecked.map_or(Status::Ready, |(_, cause)| Status::NotChecked { cause })
-            }
+            None => unchecked(&moment.checks).map_or(Status::Ready, |cause| Status::NotChecked { cause }),
         },
     }
 }

@@ -1,0 +1,146 @@
+//! What is said of set-ups of which one thing is wrong.
+
+use super::*;
+use crate::geometry::look;
+
+fn at(tenths: i64) -> Time {
+    Time::from_ns(tenths * 100_000_000)
+}
+
+/// A gun that is swung on a ship that rolls: where it looks.
+fn moved(time: Time) -> DQuat {
+    let t = time.secs_since(at(0));
+    look(0.4 * (1.1 * t).sin(), 0.05 * (0.7 * t).sin() - 0.03, 0.06 * (0.8 * t).sin())
+}
+
+fn turn(from: Time, to: Time) -> DVec3 {
+    rotation_vector(moved(from).inverse() * moved(to))
+}
+
+fn up(time: Time) -> DVec3 {
+    moved(time).inverse() * DVec3::Z
+}
+
+/// Ten seconds in which what is seen differs from what is believed; when that was told first, seconds, and what is told at the end.
+fn told(turned: impl Fn(Time, Time) -> DVec3, seen: impl Fn(Time) -> DVec3) -> (Option<f64>, Option<Misfit>) {
+    let (first, registration) = watched(1.0, turned, seen);
+    (first, registration.wrong())
+}
+
+/// The same with the watch at the end, of a gun that moves slower by a factor.
+fn watched(
+    speed: f64,
+    turned: impl Fn(Time, Time) -> DVec3,
+    seen: impl Fn(Time) -> DVec3,
+) -> (Option<f64>, Registration) {
+    let slow = |time: Time| at(0).plus_ns((time.ns_since(at(0)) as f64 * speed) as i64);
+    let (turned, seen) = (|from, to| turned(slow(from), slow(to)), |time| seen(slow(time)));
+    let (turn, up) = (|from, to| turn(slow(from), slow(to)), |time| up(slow(time)));
+    let mut registration = Registration::new(DQuat::IDENTITY, None);
+    let mut first = None;
+    for tenths in 10..110 {
+        let (now, before) = (at(tenths), at(tenths).plus_ns(-33_000_000));
+        let sight = UpSight { seen: seen(now), predicted: up(now), is_predicted: true };
+        registration.up(now, &sight, |time| Some(up(time)));
+        let covariance = DMat3::from_diagonal(DVec3::splat(1e-7));
+        let seen = TurnSeen { from: before, turn: turned(before, now), covariance, patches: (20, 20) };
+        registration.turned(&seen, now, |ns| Some(turn(before.plus_ns(-ns), now.plus_ns(-ns))));
+        if registration.wrong().is_some() {
+            first.get_or_insert(now.secs_since(at(10)));
+        }
+    }
+    (first, registration)
+}
+
+#[test]
+fn ready_waits_until_each_way_to_be_wrong_would_have_been_told() {
+    let (_, right) = watched(1.0, turn, up);
+    assert_eq!(right.checks(at(110)), RegistrationChecks { unseen_s: 0.1, is_tried: true });
+    // A gun at rest shows its horizon, and neither late pictures nor a reversed axis.
+    let (_, still) = watched(0.0, turn, up);
+    assert_eq!(still.checks(at(110)), RegistrationChecks { unseen_s: 0.1, is_tried: false });
+    for late_ms in [100, 150, 250, 400] {
+        let late = |time: Time| time.plus_ns(-late_ms * 1_000_000);
+        for speed in [0.1, 0.3, 1.0] {
+            let (_, wrong) = watched(speed, |from, to| turn(late(from), late(to)), |time| up(late(time)));
+            assert!(!wrong.checks(at(110)).is_tried, "{late_ms} ms, speed {speed}");
+        }
+    }
+}
+
+#[test]
+fn what_is_as_believed_is_confirmed_and_nothing_is_told() {
+    assert_eq!(told(turn, up), (None, None));
+    // Half a degree off: within what a unit alone is off on a ship.
+    let tilt = DQuat::from_rotation_x(0.5f64.to_radians());
+    assert_eq!(told(turn, |time| tilt * up(time)), (None, None));
+}
+
+#[test]
+fn each_way_to_be_wrong_is_told_within_two_seconds_by_its_name() {
+    let diagonal = |x, y, z| DMat3::from_diagonal(DVec3::new(x, y, z));
+    let turned = DMat3::from_quat(DQuat::from_rotation_z(std::f64::consts::PI));
+    let quarter = DMat3::from_quat(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2));
+    let cases = [
+        (turned, turned, Misfit::Turned(180)),
+        (quarter, quarter, Misfit::Turned(90)),
+        (diagonal(1.0, -1.0, -1.0), diagonal(-1.0, 1.0, 1.0), Misfit::Mirrored),
+        (diagonal(1.0, -1.0, 1.0), DMat3::IDENTITY, Misfit::Reversed("the rate about y")),
+        (DMat3::IDENTITY, diagonal(-1.0, -1.0, -1.0), Misfit::Reversed(FORCE)),
+        (DMat3::IDENTITY * 1f64.to_radians(), DMat3::IDENTITY, Misfit::RateUnit),
+        (DMat3::IDENTITY * 1.5, DMat3::IDENTITY, Misfit::Lens),
+    ];
+    for (by_turn, by_up, misfit) in cases {
+        let (first, last) = told(|from, to| by_turn * turn(from, to), |time| by_up * up(time));
+        assert_eq!(last, Some(misfit));
+        assert!(first.is_some_and(|s| s <= 2.0), "{misfit:?} after {first:?} s");
+    }
+    let tilt = DQuat::from_rotation_x(5f64.to_radians());
+    let (first, last) = told(turn, |time| tilt * up(time));
+    assert_eq!(last, Some(Misfit::Mount), "after {first:?} s");
+    let late = |time: Time| time.plus_ns(-200_000_000);
+    let (first, last) = told(|from, to| turn(late(from), late(to)), |time| up(late(time)));
+    assert_eq!(last, Some(Misfit::Late(200)), "after {first:?} s");
+}
+
+#[test]
+fn a_belief_ends_after_its_cause() {
+    let mut registration = Registration::new(DQuat::IDENTITY, None);
+    let see = |registration: &mut Registration, tenths: i64, map: DMat3| {
+        let sight = UpSight { seen: map * up(at(tenths)), predicted: up(at(tenths)), is_predicted: true };
+        registration.up(at(tenths), &sight, |time| Some(up(time)));
+    };
+    let upside_down = DMat3::from_diagonal(DVec3::new(-1.0, -1.0, 1.0));
+    (0..30).for_each(|tenths| see(&mut registration, tenths, upside_down));
+    assert!(registration.wrong().is_some());
+    assert_eq!(registration.checks(at(30)).unseen_s, f64::INFINITY);
+    (30..60).for_each(|tenths| see(&mut registration, tenths, DMat3::IDENTITY));
+    assert_eq!(registration.wrong(), None);
+    assert!(registration.checks(at(60)).unseen_s < 0.2);
+}
+
+#[test]
+fn force_in_g_is_told_by_its_size_and_rates_by_the_units_own_orientation() {
+    let fed = |factor: f64, rates: DVec3, own: bool| {
+        let mut registration = Registration::new(DQuat::IDENTITY, None);
+        for i in 0..600 {
+            let time = Time::from_ns(i * 5_000_000);
+            let rate = turn(time.plus_ns(-5_000_000), time) / 0.005;
+            let sample = ImuSample {
+                arrival: time,
+                device_time_ns: i * 5_000_000,
+                rate,
+                accel: up(time) * 9.8 * factor,
+                world_from_imu: own.then(|| moved(time)),
+            };
+            registration.sample(time, &sample, rate * rates);
+        }
+        registration.wrong()
+    };
+    assert_eq!(fed(1.0, DVec3::ONE, true), None);
+    assert_eq!(fed(1.0 / 9.8, DVec3::ONE, true), Some(Misfit::ForceUnit));
+    assert_eq!(fed(1.0 / 9.8, DVec3::ONE, false), Some(Misfit::ForceUnit));
+    assert_eq!(fed(1.0, DVec3::ONE.with_y(-1.0), true), Some(Misfit::Reversed("the rate about y")));
+    assert_eq!(fed(1.0, DVec3::ONE * 57.3, true), Some(Misfit::RateUnit));
+    assert_eq!(fed(-1.0, DVec3::ONE, true), Some(Misfit::Reversed(FORCE)));
+}
