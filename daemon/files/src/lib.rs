@@ -31,13 +31,33 @@ pub fn plain_file(path: &Path) -> io::Result<File> {
 /// # Errors
 /// Those of [`plain_file`] and of reading; and where it is longer, or no UTF-8.
 pub fn plain_text(path: &Path, bytes_max: usize) -> io::Result<String> {
-    let mut text = String::new();
-    plain_file(path)?.take(bytes_max as u64 + 1).read_to_string(&mut text)?;
-    if text.len() > bytes_max {
+    let bytes = plain_bytes(path, bytes_max)?;
+    String::from_utf8(bytes).map_err(|e| io::Error::new(io::ErrorKind::InvalidData, e))
+}
+
+/// The largest file of a picture that is read: one of the largest size, hardly compressed.
+const PICTURE_BYTES_MAX: usize = 256 << 20;
+
+/// The bytes of a file with a picture.
+///
+/// # Errors
+/// Those of [`plain_file`] and of reading; where it is longer than any picture, or a JPEG that ends in the middle.
+pub fn picture_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    let bytes = plain_bytes(path, PICTURE_BYTES_MAX)?;
+    if bytes.starts_with(&[0xff, 0xd8, 0xff]) && !ends_as_jpeg(&bytes) {
+        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, "it ends in the middle; copy it again"));
+    }
+    Ok(bytes)
+}
+
+fn plain_bytes(path: &Path, bytes_max: usize) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    plain_file(path)?.take(bytes_max as u64 + 1).read_to_end(&mut bytes)?;
+    if bytes.len() > bytes_max {
         let why = format!("it is longer than {bytes_max} bytes, the most that are read");
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, why));
     }
-    Ok(text)
+    Ok(bytes)
 }
 
 /// Tests for a JPEG's end marker: a decoder fills a truncated picture with grey. Zeros behind it are padding of some cameras.

@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs,
-    io::Cursor,
+    io::{Cursor, ErrorKind},
     ops::ControlFlow,
     os::unix::ffi::OsStrExt as _,
     path::{Path, PathBuf},
@@ -11,7 +11,7 @@ use std::{
 };
 
 use bowwave_core::{text::one_line, time::NS_PER_S};
-use bowwave_files::ends_as_jpeg;
+use bowwave_files::picture_bytes;
 use bowwave_record::{Entry, FrameEntry, recording::JPEG_MAX_BYTES};
 use image::{ImageFormat, ImageReader, codecs::jpeg::JpegEncoder};
 
@@ -115,7 +115,10 @@ fn format_of(path: &Path) -> Option<ImageFormat> {
 /// A picture as JPEG, with its width and height.
 fn read_picture(path: &Path) -> Result<(Vec<u8>, (u32, u32)), ImportError> {
     let unusable = |what: String| ImportError::Picture { path: path.to_owned(), what };
-    let bytes = fs::read(path).map_err(|source| ImportError::Read { path: path.to_owned(), source })?;
+    let bytes = picture_bytes(path).map_err(|source| match source.kind() {
+        ErrorKind::UnexpectedEof | ErrorKind::FileTooLarge => unusable(source.to_string()),
+        _ => ImportError::Read { path: path.to_owned(), source },
+    })?;
     // The content says what it is; a name may be wrong.
     let format =
         image::guess_format(&bytes).map_err(|_| unusable("it is neither JPEG nor PNG".to_owned()))?;
@@ -125,9 +128,6 @@ fn read_picture(path: &Path) -> Result<(Vec<u8>, (u32, u32)), ImportError> {
         return Err(unusable(format!("it is {}x{}, and the largest is 8192x8192", size.0, size.1)));
     }
     let jpeg = match format {
-        ImageFormat::Jpeg if !ends_as_jpeg(&bytes) => {
-            return Err(unusable("it ends in the middle; copy it again".to_owned()));
-        }
         ImageFormat::Jpeg => bytes,
         ImageFormat::Png => {
             let colours = reader().decode().map_err(|e| unusable(one_line(&e.to_string())))?.to_rgb8();

@@ -1,12 +1,13 @@
 //! Pictures of the board, from a folder or a recording.
 
-use std::path::Path;
+use std::{io::Cursor, path::Path};
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::{
     lens::BoardView,
     target::{Grey, Target, detect, view},
 };
+use bowwave_files::picture_bytes;
 use bowwave_import::picture_names;
 use bowwave_record::{Entry, RecordingReader};
 use image::{GrayImage, ImageFormat, ImageReader, Limits};
@@ -75,8 +76,8 @@ fn folder(source: &Path, target: &Target, looked: &mut BoardPictures) -> Result<
     for path in names {
         bar.inc(1);
         let said = || format!("cannot read the picture {}; take it out of the folder", path.display());
-        let mut reader =
-            ImageReader::open(&path).and_then(ImageReader::with_guessed_format).with_context(said)?;
+        let bytes = picture_bytes(&path).with_context(said)?;
+        let mut reader = ImageReader::new(Cursor::new(&bytes)).with_guessed_format().with_context(said)?;
         let mut limits = Limits::default();
         let side = u32::try_from(Grey::SIDE_MAX).unwrap_or(u32::MAX);
         (limits.max_image_width, limits.max_image_height) = (Some(side), Some(side));

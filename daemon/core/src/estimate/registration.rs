@@ -232,8 +232,8 @@ impl Registration {
     pub fn look(&mut self, time: Time, picture: &Picture, lens: &Lens, attitude: &Attitude) {
         /// So often a turn is looked for.
         const EVERY_NS: i64 = 200_000_000;
-        /// Pictures farther apart are not held against each other.
-        const APART_NS: i64 = 150_000_000;
+        /// Pictures farther apart are not held against each other; a busy computer looks at few.
+        const APART_NS: i64 = 400_000_000;
         if self.finder.is_begun() {
             if let Some(seen) = self.finder.finish(picture, lens)
                 && (1..=APART_NS).contains(&time.ns_since(seen.from))

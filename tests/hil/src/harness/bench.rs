@@ -402,6 +402,19 @@ impl HilBench {
         }
     }
 
+    /// Waits until rounds are scored, whether or not the picture confirms where the camera looks.
+    pub fn scoring(&mut self, patience: Duration) -> Result<()> {
+        let until = Instant::now() + patience;
+        loop {
+            let status = self.status()?;
+            if ["READY", "NOT CHECKED"].iter().any(|word| status.starts_with(word)) {
+                return Ok(());
+            }
+            ensure!(Instant::now() < until, "no rounds are scored: {status}");
+            thread::sleep(Duration::from_millis(300));
+        }
+    }
+
     /// Compares the LCD with the frames' hashes that the trainer keeps; how many of so many pictures were found.
     pub fn identical(&mut self, pictures: usize) -> Result<(usize, usize)> {
         let mut seen = Vec::new();

@@ -87,7 +87,7 @@ pub fn fire_unaided(bench: &mut HilBench) -> Result<(i64, i64)> {
     bench.configure(&Configured { calibration: "unaided.toml".into(), ..Configured::default() })?;
     bench.service("reload")?;
     thread::sleep(Duration::from_secs(2));
-    bench.ready(bench.scaled(2.0))?;
+    bench.scoring(bench.scaled(2.0))?;
     let from = bench.machine.guest.now_ns();
     while bench.machine.guest.now_ns() - from < bench.tape.period_ns {
         bench.shoot(1000)?;

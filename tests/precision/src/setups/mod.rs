@@ -1,7 +1,13 @@
 //! Wrong set-ups: what a trainer that is set up wrongly says of it, and how soon. Recordings with truth are replayed into sessions with one thing
 //! wrong; the right set-up is replayed beside them.
 
-use std::{collections::VecDeque, path::Path, sync::Arc};
+mod right;
+
+use std::{
+    collections::VecDeque,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use anyhow::Result;
 use bowwave_core::{
@@ -10,6 +16,7 @@ use bowwave_core::{
     event::{Event, ImuSample, Picture, PixelFormat, Tick},
     fault::{Change, Fault, Severity},
     session::{Session, Setup},
+    time::secs_to_ns,
     world::scenario::Scenario,
 };
 use glam::{DQuat, DVec3};
@@ -150,12 +157,18 @@ struct Said {
     unchecked: f64,
 }
 
-fn replay(path: &Path, wrong: Wrong, source: Source, seconds: f64) -> Result<Said> {
+fn replay(
+    path: &Path,
+    wrong: Wrong,
+    source: Source,
+    (seconds, rate): (f64, f64),
+    scenario: &str,
+) -> Result<Said> {
     let (mut replay, own) = looped(path, seconds)?;
     let calibration = wrong.calibration(own);
     let lens = calibration.lens;
     let mut session = Session::new(Setup {
-        scenario: Scenario::parse("", "set-up")?,
+        scenario: Scenario::parse(scenario, "set-up")?,
         calibration,
         models: Arc::new([]),
         boat_models: Vec::new(),
@@ -168,8 +181,8 @@ fn replay(path: &Path, wrong: Wrong, source: Source, seconds: f64) -> Result<Sai
     let (mut said, mut events, mut begun) = (Said::default(), Vec::new(), None);
     let mut shown = VecDeque::new();
     let (mut frames, mut ready, mut unchecked) = (0_u32, 0_u32, 0_u32);
-    for frame in 1..=(seconds * 30.0) as i64 {
-        let time = replay.origin().plus_ns(frame * 33_333_333);
+    for frame in 1..=(seconds * rate) as i64 {
+        let time = replay.origin().plus_ns(secs_to_ns(frame as f64 / rate));
         events.clear();
         replay.collect(time, &mut events)?;
         for event in events.drain(..) {
@@ -230,26 +243,47 @@ pub struct SetUpStudy {
     /// Only set-ups whose names contain this
     #[arg(long)]
     only: Option<String>,
+    /// A recording in place of the two that are made
+    #[arg(long, value_name = "FILE")]
+    recording: Option<PathBuf>,
+    /// Frames a second
+    #[arg(long, default_value_t = 30.0)]
+    rate: f64,
+    /// Instead, so many hours of right set-ups in seas of all kinds
+    #[arg(long, value_name = "HOURS", conflicts_with = "only")]
+    right: Option<f64>,
 }
 
 impl SetUpStudy {
     /// Prints for each set-up how soon it was told, and as what.
     pub fn run(&self) -> Result<()> {
+        if let Some(hours) = self.right {
+            return right::run(hours);
+        }
         let titles = [("recording", 12), ("orientation", 12), ("set-up", 36)];
         let parts =
             [("told s", 8), ("as", 16), ("last as", 16), ("named", 6), ("ready", 6), ("unchecked", 9)];
         let mut table = TextTable::new(3, titles.into_iter().chain(parts));
         let folder = tempfile::tempdir()?;
         let (mut named, mut all, mut in_time) = (0, 0, 0);
-        for (name, recipe) in recipes() {
-            let path = folder.path().join("set-up.mcap");
-            record(&recipe, &path)?;
+        let mut recordings = Vec::new();
+        match &self.recording {
+            Some(path) => recordings.push(("given", path.clone())),
+            None => {
+                for (name, recipe) in recipes() {
+                    let path = folder.path().join(name.replace(' ', "-")).with_extension("mcap");
+                    record(&recipe, &path)?;
+                    recordings.push((name, path));
+                }
+            }
+        }
+        for (name, path) in recordings {
             for (source, orientation) in [(Source::Auto, "unit's own"), (Source::Fused, "fused")] {
                 for (set_up, wrong, faults) in SET_UPS {
                     if self.only.as_ref().is_some_and(|only| !set_up.contains(only.as_str())) {
                         continue;
                     }
-                    let said = replay(&path, *wrong, source, self.seconds)?;
+                    let said = replay(&path, *wrong, source, (self.seconds, self.rate), "")?;
                     let right = said.last.map_or(faults.is_empty(), |last| faults.contains(&last));
                     all += 1;
                     named += u32::from(right);
@@ -269,7 +303,6 @@ impl SetUpStudy {
                     print!("{}", table.take());
                 }
             }
-            std::fs::remove_file(&path)?;
         }
         println!("{named} of {all} named rightly, {in_time} told within 2 s or rightly not at all");
         Ok(())
