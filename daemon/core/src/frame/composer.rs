@@ -258,15 +258,19 @@ impl Composer {
         let boats = self.boat_models.iter().enumerate();
         let boats: Vec<_> = boats.filter_map(|(boat, id)| self.warm_up_boat(&frustum, boat, *id)).collect();
         let at = DVec3::new(0.0, self.eye_height_m * 10.0, 0.5);
-        let rounds = vec![
-            RoundView::Splash { at, height_m: 1.0, radius_m: 0.5, opacity: 1.0 },
-            RoundView::Strike { at, radius_m: 0.5, opacity: 1.0 },
-            RoundView::Tracer { from: at, to: at + DVec3::Y * 10.0, radiance: Vec3::ONE },
-        ];
+        let rounds = if self.plan.has(Pass::Rounds) {
+            vec![
+                RoundView::Splash { at, height_m: 1.0, radius_m: 0.5, opacity: 1.0 },
+                RoundView::Strike { at, radius_m: 0.5, opacity: 1.0 },
+                RoundView::Tracer { from: at, to: at + DVec3::Y * 10.0, radiance: Vec3::ONE },
+            ]
+        } else {
+            Vec::new()
+        };
         Scene { camera, passes: self.plan.frame(true, &boats, &rounds), boats, rounds, ..self.scene.clone() }
     }
 
-    /// A boat under way, broadside before the camera.
+    /// A boat broadside before the camera, under way if it is one of as many as move.
     fn warm_up_boat(&self, frustum: &ViewFrustum<'_>, boat: usize, model_id: ModelId) -> Option<BoatView> {
         let model = self.models.get(usize::from(model_id.0))?;
         let ahead_m = (self.eye_height_m * 10.0).max(4.0 * model.radius_m());
@@ -277,7 +281,10 @@ impl Composer {
             speed_m_s: 5.0,
             turn_rate: 0.0,
         };
-        let wake = || Wake::of(Hull::of(model), f64::from(-model.min.z), 0.0, |_| under_way, |_| 0.0);
+        let wake = || {
+            let wake = Wake::of(Hull::of(model), f64::from(-model.min.z), 0.0, |_| under_way, |_| 0.0);
+            wake.filter(|_| boat < self.plan.moving)
+        };
         frustum.see_with_wake(&Afloat { boat, model_id, model, pose, water_level: 0.0 }, wake)
     }
 }
@@ -298,7 +305,7 @@ const UNCHECKED: [(f64, &str); 9] = [
 /// Why what is drawn counts as unconfirmed; `None` where it is confirmed.
 fn unchecked(checks: &RegistrationChecks) -> Option<&'static str> {
     let unseen = UNCHECKED.iter().rev().find(|(from_s, _)| checks.unseen_s >= *from_s);
-    unseen.map(|(_, cause)| *cause).or((!checks.is_tried).then_some("TURN THE GUN TO AND FRO"))
+    unseen.map(|(_, cause)| *cause).or((!checks.is_tried).then_some("TURN AND TILT THE GUN"))
 }
 
 /// The status: the fault that keeps the weapon from scoring, else the newest result, else whether what is drawn has been confirmed.
