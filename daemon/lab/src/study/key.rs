@@ -7,6 +7,7 @@ use bowwave_core::water::ReflectionMethod;
 use bowwave_models::Boat;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest as _, Sha256};
 
 use super::design::{CONDITIONS, Design, StudyItem};
 
@@ -27,6 +28,9 @@ pub struct KeyRow {
     pub boat_type: String,
     /// The boat, or the file of a real picture.
     pub source: String,
+    /// Which study it is of; empty in keys of former versions.
+    #[serde(default)]
+    pub study: String,
 }
 
 /// How to read a factor from a row.
@@ -40,8 +44,16 @@ pub const FACTORS: [(&str, FactorLevel); 4] = [
     ("type", |row| row.boat_type.as_str()),
 ];
 
+/// What tells a study from others whose pictures have the same names: made of the pictures' files.
+pub fn study_of(files: &[Vec<u8>]) -> String {
+    let mut hash = Sha256::new();
+    files.iter().for_each(|file| hash.update(file));
+    hash.finalize().iter().take(4).map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// The key of a design.
 pub fn rows(
+    study: &str,
     design: &Design,
     backgrounds: &[String; 2],
     methods: [ReflectionMethod; 2],
@@ -56,6 +68,7 @@ pub fn rows(
             background: String::new(),
             boat_type: String::new(),
             source: String::new(),
+            study: study.to_owned(),
         };
         match *item {
             StudyItem::Real(number) => KeyRow { source: real[number].0.clone(), ..empty },

@@ -74,12 +74,13 @@ fn make(arguments: &StudyArgs) -> Result<Outcome> {
     }
     bar.finish_and_clear();
     images.sort_by_key(|(index, _)| *index);
-    let rows = key::rows(&design, &names, [first, second], &real);
-    key::write(&arguments.out.join(KEY), &rows)?;
     let files = write_pictures(&arguments.out, &design, images)?;
-    write_sheets(&arguments.out, &design)?;
+    let study = key::study_of(&files);
+    let rows = key::rows(&study, &design, &names, [first, second], &real);
+    key::write(&arguments.out.join(KEY), &rows)?;
+    write_sheets(&arguments.out, &study, &design)?;
     let page = arguments.out.join(PAGE);
-    fs::write(&page, page::page(&design, &files))
+    fs::write(&page, page::page(&study, &design, &files))
         .with_context(|| format!("cannot write {}; check the disk", page.display()))?;
     stdout::print(format!("{}\n", page.display()))?;
     eprintln!(
@@ -127,12 +128,12 @@ fn write_pictures(out: &Path, design: &Design, images: Vec<(usize, RgbImage)>) -
 }
 
 /// The order for each participant, as a sheet that answers can be written into by hand.
-fn write_sheets(out: &Path, design: &Design) -> Result<()> {
+fn write_sheets(out: &Path, study: &str, design: &Design) -> Result<()> {
     let path = out.join("answer-sheet.csv");
-    let mut text = String::from("participant,position,picture,answer\n");
+    let mut text = String::from("participant,position,picture,answer,study\n");
     for (participant, order) in design.orders.iter().enumerate() {
         for (position, &index) in order.iter().enumerate() {
-            text += &format!("{},{},{},\n", participant + 1, position + 1, design.name(index));
+            text += &format!("{},{},{},,{study}\n", participant + 1, position + 1, design.name(index));
         }
     }
     fs::write(&path, text).with_context(|| format!("cannot write {}; check the disk", path.display()))

@@ -67,8 +67,8 @@ function back() {
 }
 
 function csv() {
-  const lines = answers.map(row => [participant, ...row].join(","));
-  return "participant,position,picture,answer,time_ms\n" + lines.join("\n") + "\n";
+  const lines = answers.map(row => [participant, ...row, STUDY.study].join(","));
+  return "participant,position,picture,answer,time_ms,study\n" + lines.join("\n") + "\n";
 }
 
 function save() {
@@ -88,7 +88,7 @@ function finish() {
 }
 
 // What was answered outlives a closed window. A browser that keeps nothing for local files loses only that.
-const name = () => `study-${STUDY.pictures.length}-${STUDY.pictures[0][1].length}-${participant}`;
+const name = () => `study-${STUDY.study}-${participant}`;
 function keep() { try { localStorage.setItem(name(), JSON.stringify(answers)); } catch (error) { } }
 function kept() {
   try { return JSON.parse(localStorage.getItem(name())) || []; } catch (error) { return []; }

@@ -10,8 +10,8 @@ const STYLE: &str = include_str!("page.css");
 /// The session with a participant: one picture after the other, two keys, answers saved as CSV.
 const SCRIPT: &str = include_str!("page.js");
 
-/// The page of a design; `files` are the pictures as PNG, in the design's order.
-pub fn page(design: &Design, files: &[Vec<u8>]) -> String {
+/// The page of a design of that name; `files` are the pictures as PNG, in the design's order.
+pub fn page(study: &str, design: &Design, files: &[Vec<u8>]) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -23,7 +23,7 @@ pub fn page(design: &Design, files: &[Vec<u8>]) -> String {
             body {
                 img #picture alt="";
                 div #text {}
-                script { (PreEscaped(data(design, files))) (PreEscaped(SCRIPT)) }
+                script { (PreEscaped(data(study, design, files))) (PreEscaped(SCRIPT)) }
             }
         }
     };
@@ -31,13 +31,16 @@ pub fn page(design: &Design, files: &[Vec<u8>]) -> String {
 }
 
 /// The pictures and the participants' orders, as a JavaScript constant.
-fn data(design: &Design, files: &[Vec<u8>]) -> String {
+fn data(study: &str, design: &Design, files: &[Vec<u8>]) -> String {
     let pictures: Vec<[String; 2]> = (0..)
         .zip(files)
         .map(|(index, file)| [design.name(index), format!("data:image/png;base64,{}", STANDARD.encode(file))])
         .collect();
-    // Names are p001 and so on, the rest is base64 and numbers: nothing in it can end the script.
-    format!("const STUDY = {};\n", serde_json::json!({ "pictures": pictures, "orders": design.orders }))
+    // Names are p001 and so on, the rest is base64, hexadecimal digits and numbers: nothing in it can end the script.
+    format!(
+        "const STUDY = {};\n",
+        serde_json::json!({ "study": study, "pictures": pictures, "orders": design.orders })
+    )
 }
 
 #[cfg(test)]
@@ -48,7 +51,7 @@ mod tests {
     fn the_page_holds_all_and_asks_the_network_for_nothing() {
         let design = Design::new(1, 2, 5);
         let files: Vec<Vec<u8>> = (0..design.items.len()).map(|i| vec![i as u8; 9]).collect();
-        let page = page(&design, &files);
+        let page = page("5ea51de5", &design, &files);
         assert_eq!(page.matches("data:image/png;base64,").count(), design.items.len());
         assert!(!page.contains("http"));
         assert!(

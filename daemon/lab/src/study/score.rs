@@ -21,6 +21,9 @@ struct Answer {
     participant: String,
     picture: String,
     answer: String,
+    /// Of the pictures that were shown; empty in files of former versions.
+    #[serde(default)]
+    study: String,
 }
 
 /// The result for one group of pictures.
@@ -58,6 +61,13 @@ pub fn run(arguments: &StudyScoreArgs) -> Result<Outcome> {
         stdout::print(table(&lines))?;
         eprintln!("{} participants", answers.by_participant.len());
     }
+    if answers.unmarked > 0 && key.iter().any(|row| !row.study.is_empty()) {
+        log::warn!(
+            "{} answers do not say of which study they are; check that {} is their key",
+            answers.unmarked,
+            arguments.key.display()
+        );
+    }
     let missing = answers.missing();
     if missing > 0 {
         log::warn!("{missing} pictures were not answered; they are left out");
@@ -69,12 +79,14 @@ pub fn run(arguments: &StudyScoreArgs) -> Result<Outcome> {
 struct Answers<'a> {
     key: BTreeMap<&'a str, &'a KeyRow>,
     by_participant: BTreeMap<String, BTreeMap<&'a str, bool>>,
+    /// Answers that do not say of which study they are.
+    unmarked: usize,
 }
 
 impl<'a> Answers<'a> {
     fn new(key: &'a [KeyRow]) -> Self {
         let key = key.iter().map(|row| (row.picture.as_str(), row)).collect();
-        Self { key, by_participant: BTreeMap::new() }
+        Self { key, by_participant: BTreeMap::new(), unmarked: 0 }
     }
 
     fn read(&mut self, path: &Path) -> Result<()> {
@@ -105,9 +117,17 @@ impl<'a> Answers<'a> {
                     bail!("{origin}:{line}: '{other}' is no answer; write real or generated, or nothing")
                 }
             };
-            let Some((&picture, _)) = self.key.get_key_value(answer.picture.as_str()) else {
+            let Some((&picture, row)) = self.key.get_key_value(answer.picture.as_str()) else {
                 bail!("{origin}:{line}: no picture '{}' in the key; is it another study's?", answer.picture);
             };
+            if !answer.study.is_empty() && !row.study.is_empty() && answer.study != row.study {
+                bail!(
+                    "{origin}:{line}: an answer to study {}, and the key is of study {}; name its own key with --key",
+                    answer.study,
+                    row.study
+                );
+            }
+            self.unmarked += usize::from(answer.study.is_empty());
             if answer.participant.is_empty() {
                 bail!("{origin}:{line}: no participant");
             }
@@ -220,6 +240,7 @@ mod tests {
             background: if kind == "real" { "" } else { "sea" }.into(),
             boat_type: if kind == "real" { "" } else { "virtual" }.into(),
             source: String::new(),
+            study: "5ea51de5".into(),
         };
         vec![
             row("p001", "real", "", ""),
@@ -280,6 +301,20 @@ mod tests {
             let said = refuse(&text);
             assert!(said.contains(words) && !said.contains('\n'), "'{words}' not in: {said}");
         }
+    }
+
+    #[test]
+    fn answers_to_another_study_are_refused() {
+        let key = key();
+        let take = |study: &str| {
+            let text = format!("participant,picture,answer,study\n1,p001,real,{study}\n");
+            let mut answers = Answers::new(&key);
+            answers.take(text.as_bytes(), "a.csv").map(|()| answers.unmarked).map_err(|e| e.to_string())
+        };
+        assert_eq!(take("5ea51de5"), Ok(0));
+        assert_eq!(take(""), Ok(1));
+        let said = take("0ther000").expect_err("it must be refused");
+        assert!(said.starts_with("a.csv:2: an answer to study 0ther000"), "{said}");
     }
 
     #[test]
