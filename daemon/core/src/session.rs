@@ -200,7 +200,7 @@ impl Session {
         let moment = FrameMoment {
             video_time,
             permission,
-            warning: self.faults.active().find(|f| f.severity() == Severity::Warning),
+            warning: self.warning_shown(),
             checks: self.estimator.checks(tick.time),
             water: self.water_drawn(),
         };
@@ -234,6 +234,12 @@ impl Session {
         let Self { calibration, estimator, composer, faults, world, records, .. } = self;
         let aim = |fired| aim(calibration, estimator, composer.scene().camera, faults, fired);
         world.advance(video_time, until, known, aim, records);
+    }
+
+    /// The warning that the sailor sees, of all that there are: that the picture is late comes before what does not change it.
+    fn warning_shown(&self) -> Option<Fault> {
+        let late = Some(Fault::LoadRate).filter(|fault| self.faults.is_active(*fault));
+        late.or_else(|| self.faults.active().find(|fault| fault.severity() == Severity::Warning))
     }
 
     /// Which boats have reflections and wakes: a computer that is too hot or too busy leaves some out, half of a frame's work.

@@ -60,10 +60,37 @@ fn plain_bytes(path: &Path, bytes_max: usize) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Tests for a JPEG's end marker: a decoder fills a truncated picture with grey. Zeros behind it are padding of some cameras.
+/// Tests whether a JPEG has its end marker: a decoder fills a truncated picture with grey. Some cameras pad with zeros behind it, others
+/// add data of their own there.
 pub fn ends_as_jpeg(jpeg: &[u8]) -> bool {
     let padding = jpeg.iter().rev().take_while(|byte| **byte == 0).count();
-    jpeg.get(..jpeg.len() - padding).is_some_and(|used| used.ends_with(&[0xff, 0xd9]))
+    jpeg.get(..jpeg.len() - padding).is_some_and(|used| used.ends_with(&[0xff, 0xd9])) || has_end(jpeg)
+}
+
+/// Walks the segments (ITU T.81, annex B) to the end marker behind the last scan.
+fn has_end(jpeg: &[u8]) -> bool {
+    let mut at = 2;
+    let mut in_scan = false;
+    while let Some(rest) = jpeg.get(at..) {
+        let Some(skip) = rest.iter().position(|byte| *byte == 0xff) else { return false };
+        let Some(&marker) = rest.get(skip + 1) else { return false };
+        if !in_scan && skip > 0 {
+            return false;
+        }
+        at += skip + 2;
+        match marker {
+            0xd9 => return in_scan,
+            // Fill, a stuffed zero, restarts.
+            0xff => at -= 1,
+            0x00 | 0x01 | 0xd0..=0xd8 => {}
+            _ => {
+                let Some(&[high, low]) = jpeg.get(at..at + 2) else { return false };
+                at += usize::from(u16::from_be_bytes([high, low])).max(2);
+                in_scan |= marker == 0xda;
+            }
+        }
+    }
+    false
 }
 
 #[cfg(test)]
@@ -100,5 +127,23 @@ mod tests {
         assert!(error.to_string().contains("longer than 4 bytes"), "{error}");
         std::fs::write(&file, b"\xff").unwrap();
         assert_eq!(plain_text(&file, 5).unwrap_err().kind(), io::ErrorKind::InvalidData);
+    }
+
+    #[test]
+    fn a_jpeg_ends_at_its_marker_whatever_stands_behind_it() {
+        // A thumbnail with an end of its own in a segment, a table, a scan with a stuffed zero and a restart.
+        let mut whole = vec![0xff, 0xd8, 0xff, 0xe1, 0, 6, 0xff, 0xd8, 0xff, 0xd9, 0xff, 0xdb, 0, 3, 1];
+        whole.extend([0xff, 0xda, 0, 3, 1, 9, 9, 0xff, 0, 9, 0xff, 0xd0, 9]);
+        assert!(!ends_as_jpeg(&whole));
+        let cut = whole.clone();
+        whole.extend([0xff, 0xd9]);
+        assert!(ends_as_jpeg(&whole));
+        for behind in [&[0, 0, 0][..], b"SEFT", &[0xff, 0xd8, 0xff]] {
+            assert!(ends_as_jpeg(&[&whole[..], behind].concat()), "{behind:?}");
+        }
+        for length in 0..=cut.len() {
+            // The thumbnail's end is the last that a cut behind it shows.
+            assert!(!ends_as_jpeg(&cut[..length]) || length == 10, "{length}");
+        }
     }
 }

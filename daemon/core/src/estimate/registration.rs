@@ -83,14 +83,16 @@ impl Hypothesis {
         Self { misfit, turn, up, late_ns: 0, off, sum: 0.0, against: 0.0, is_excluded: false }
     }
 
-    fn add(&mut self, as_believed: f64, other: f64, weight: f64) {
+    /// Takes in what an observation costs by what is believed and by this. `against` is how much it counts against this: those that follow
+    /// each other err alike.
+    fn add(&mut self, as_believed: f64, other: f64, weight: f64, against: f64) {
         /// What is believed must have foretold better by this.
         const EXCLUDED: f64 = 7.0;
         /// However much better this foretold before, what was wrong may have been put right.
         const LEAST: f64 = -40.0;
-        let better = 0.5 * weight * (as_believed - other);
-        self.sum = (self.sum + better).max(0.0);
-        self.against = (self.against - better).max(LEAST);
+        let better = 0.5 * (as_believed - other);
+        self.sum = (self.sum + weight * better).max(0.0);
+        self.against = (self.against - against * better).max(LEAST);
         self.is_excluded |= self.against >= EXCLUDED;
     }
 
@@ -123,6 +125,29 @@ impl MeanOff {
     }
 }
 
+/// What turns cost that are large enough to tell, by what is believed, on average over some ten seconds.
+#[derive(Clone, Copy, Debug, Default)]
+struct TurnCost {
+    mean: f64,
+    count: u32,
+}
+
+impl TurnCost {
+    fn take(&mut self, cost: f64) {
+        const MOST: u32 = 50;
+        self.count = (self.count + 1).min(MOST);
+        self.mean += (cost - self.mean) / f64::from(self.count);
+    }
+
+    /// Three numbers cost three by chance; nine is the most that is counted. What costs more is a way to be set up wrongly that no hypothesis
+    /// has, as a unit that is turned by 30 degrees about the vertical.
+    fn is_usual(&self) -> bool {
+        const FEWEST: u32 = 10;
+        const USUAL_MOST: f64 = 5.5;
+        self.count < FEWEST || self.mean < USUAL_MOST
+    }
+}
+
 /// A horizon as it was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct UpSight {
@@ -142,6 +167,7 @@ pub(super) struct Registration {
     next: Time,
     hypotheses: Vec<Hypothesis>,
     own_off: MeanOff,
+    turn_cost: TurnCost,
     believed: Option<Misfit>,
     unit: UnitWatch,
     checked: Option<Time>,
@@ -179,10 +205,19 @@ impl Registration {
             next: Time::MIN,
             hypotheses: hypotheses(DMat3::from_quat(camera_from_imu)),
             own_off: MeanOff::default(),
+            turn_cost: TurnCost::default(),
             believed: None,
             unit: UnitWatch::default(),
             checked: None,
         }
+    }
+
+    /// Begins anew, as when the unit has restarted: it may be another one.
+    pub fn restart(&mut self) {
+        self.hypotheses = hypotheses(DMat3::from_quat(self.camera_from_imu));
+        (self.own_off, self.turn_cost) = Default::default();
+        (self.believed, self.checked) = (None, None);
+        self.unit = UnitWatch::default();
     }
 
     /// Holds a unit's own orientation against its rates and its specific force. `rate` is without its bias.
@@ -218,9 +253,11 @@ impl Registration {
         let tilt = |sign: f64| (force.angle_between(up * sign) / FORCE_SIGMA).powi(2).min(COST_MOST);
         for hypothesis in &mut self.hypotheses {
             match hypothesis.misfit {
-                Misfit::Reversed(FORCE) if known => hypothesis.add(tilt(1.0), tilt(-1.0), 1.0 / ALIKE),
+                Misfit::Reversed(FORCE) if known => {
+                    hypothesis.add(tilt(1.0), tilt(-1.0), 1.0 / ALIKE, 1.0 / ALIKE);
+                }
                 Misfit::Reversed(_) | Misfit::RateUnit => {
-                    hypothesis.add(cost(DMat3::IDENTITY), cost(hypothesis.turn), 1.0);
+                    hypothesis.add(cost(DMat3::IDENTITY), cost(hypothesis.turn), 1.0, 1.0);
                 }
                 _ => {}
             }
@@ -254,9 +291,17 @@ impl Registration {
         let Some(own) = believed(0) else { return };
         let cost = |believed: DVec3| turn_cost(seen.turn, believed, seen.covariance, floor);
         let as_believed = cost(own);
+        let stands = seen.turn.length() < 0.5 * floor;
+        if own.length() > 3.0 * floor {
+            self.turn_cost.take(as_believed);
+        }
         for hypothesis in &mut self.hypotheses {
             let Some(turn) = believed(hypothesis.late_ns) else { continue };
-            hypothesis.add(as_believed, cost(hypothesis.turn * turn), 1.0);
+            // What stands in the picture, as a reticle does, does not turn at all.
+            if hypothesis.misfit == Misfit::RateUnit && stands {
+                continue;
+            }
+            hypothesis.add(as_believed, cost(hypothesis.turn * turn), 1.0, 1.0);
         }
         self.decide();
     }
@@ -280,19 +325,19 @@ impl Registration {
                     let other = cost((map * own).angle_between(up.seen), UP_SIGMA);
                     // By little is as well a mount that is off.
                     let weight = if hypothesis.misfit == Misfit::Lens { 1.0 / ALIKE } else { 1.0 };
-                    hypothesis.add(as_believed, other, weight);
+                    hypothesis.add(as_believed, other, weight, 1.0 / ALIKE);
                 }
                 UpExpected::Then => {
                     let Some(then) = alone(time.plus_ns(-hypothesis.late_ns)) else { continue };
                     let apart = hypothesis.off.take(between(then, up.seen));
-                    hypothesis.add(sway, cost(apart, SWAY_SIGMA), 1.0 / ALIKE);
+                    hypothesis.add(sway, cost(apart, SWAY_SIGMA), 1.0 / ALIKE, 1.0 / ALIKE);
                 }
                 UpExpected::Off => {
                     let apart = hypothesis.off.take(off);
-                    hypothesis.add(as_believed, cost(apart, UP_SIGMA), 1.0 / ALIKE);
+                    hypothesis.add(as_believed, cost(apart, UP_SIGMA), 1.0 / ALIKE, 1.0 / ALIKE);
                 }
                 UpExpected::Wanders => {
-                    hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE)
+                    hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE, 1.0 / ALIKE);
                 }
             }
         }
@@ -337,7 +382,7 @@ impl Registration {
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         RegistrationChecks {
             unseen_s: self.checked.map_or(f64::INFINITY, |checked| now.secs_since(checked).max(0.0)),
-            is_tried: self.hypotheses.iter().all(|h| !h.is_possible()),
+            is_tried: self.hypotheses.iter().all(|h| !h.is_possible()) && self.turn_cost.is_usual(),
         }
     }
 }

@@ -119,6 +119,7 @@ impl Sensors {
         if self.clock.restarts() != self.counts.imu_restarts {
             self.counts.imu_restarts = self.clock.restarts();
             self.attitude.restart();
+            self.registration.restart();
             self.steady.forget();
             self.aid.forget();
         }

@@ -26,6 +26,8 @@ const QUEUE: usize = 96;
 
 /// Pictures that come without a JPEG are coded with this quality, of 100, where pixels need not be exact.
 const QUALITY: u8 = 90;
+/// The same on a computer that is too busy.
+const QUALITY_SPARED: u8 = 50;
 
 /// Settings of a recorder.
 #[derive(Clone, Debug)]
@@ -44,16 +46,9 @@ pub struct RecorderOptions {
 /// One job of the thread.
 enum RecorderJob {
     Entry(Entry),
-    /// A picture that no JPEG came with, to be coded; or to stand as the one before where coding it takes too long.
-    Code(CameraFrame, Coding),
+    /// A picture that no JPEG came with, to be coded, and its quality.
+    Code(CameraFrame, u8),
     Flush,
-}
-
-/// How a picture is kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Coding {
-    Anew,
-    AsBefore,
 }
 
 /// The running thread.
@@ -63,10 +58,8 @@ pub struct Recorder {
     thread: Option<JoinHandle<Result<WrittenSummary>>>,
     lossless: bool,
     exact_pixels: bool,
-    /// Every other picture is coded only.
-    spares: bool,
-    /// How the newest picture was kept.
-    coding: Coding,
+    /// Quality of pictures that are coded here.
+    quality: u8,
     lost: u64,
     inputs: u64,
     /// When the newest input or tick of the recording came.
@@ -81,12 +74,11 @@ impl Recorder {
         let thread = thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || {
-                let mut coded = PictureCoder::default();
                 for job in jobs.into_iter().flatten() {
                     match job {
                         RecorderJob::Entry(entry) => write(&mut writer, &entry)?,
-                        RecorderJob::Code(frame, coding) => {
-                            let jpeg = coded.jpeg(&frame.picture, coding)?;
+                        RecorderJob::Code(frame, quality) => {
+                            let jpeg = jpeg(&frame.picture, quality)?.into();
                             write(
                                 &mut writer,
                                 &Entry::Frame(FrameEntry { is_recoded: true, ..frame_entry(&frame, jpeg) }),
@@ -103,17 +95,16 @@ impl Recorder {
             thread: Some(thread),
             lossless: options.lossless,
             exact_pixels: options.exact_pixels,
-            spares: false,
-            coding: Coding::AsBefore,
+            quality: QUALITY,
             lost: 0,
             inputs: 0,
             newest: None,
         })
     }
 
-    /// Whether pictures are coded only every other time, so that a busy computer gets time: the others are kept as the one before.
+    /// Whether pictures are coded coarsely, so that a busy computer gets time.
     pub const fn spare(&mut self, spares: bool) {
-        self.spares = spares;
+        self.quality = if spares { QUALITY_SPARED } else { QUALITY };
     }
 
     /// Takes in the events that the session meets with `tick`, and where it is stepped by it, the tick with a digest over what the session
@@ -160,13 +151,7 @@ impl Recorder {
                     sequence: frame.sequence,
                     picture: frame.picture.clone(),
                 })),
-                None => {
-                    self.coding = match self.coding {
-                        Coding::Anew if self.spares => Coding::AsBefore,
-                        _ => Coding::Anew,
-                    };
-                    jobs.push(RecorderJob::Code(frame.clone(), self.coding));
-                }
+                None => jobs.push(RecorderJob::Code(frame.clone(), self.quality)),
             },
             Event::Fault(change) => entry(Entry::Fault(FaultEntry { logged, change: change.clone() })),
         }
@@ -250,28 +235,7 @@ fn frame_entry(frame: &CameraFrame, jpeg: Arc<[u8]>) -> FrameEntry {
     }
 }
 
-/// Codes pictures, and keeps the newest.
-#[derive(Default)]
-struct PictureCoder {
-    size: (u32, u32),
-    newest: Option<Arc<[u8]>>,
-}
-
-impl PictureCoder {
-    fn jpeg(&mut self, picture: &Picture, coding: Coding) -> Result<Arc<[u8]>> {
-        let size = (picture.width(), picture.height());
-        if let (Coding::AsBefore, Some(jpeg)) = (coding, &self.newest)
-            && self.size == size
-        {
-            return Ok(jpeg.clone());
-        }
-        let coded: Arc<[u8]> = jpeg(picture)?.into();
-        (self.size, self.newest) = (size, Some(coded.clone()));
-        Ok(coded)
-    }
-}
-
-fn jpeg(picture: &Picture) -> Result<Vec<u8>> {
+fn jpeg(picture: &Picture, quality: u8) -> Result<Vec<u8>> {
     let (width, height) = (picture.width(), picture.height());
     let mut rgb = Vec::with_capacity(PixelFormat::Rgb.byte_len(width, height));
     for y in 0..height {
@@ -280,7 +244,7 @@ fn jpeg(picture: &Picture) -> Result<Vec<u8>> {
         }
     }
     let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, QUALITY)
+    JpegEncoder::new_with_quality(&mut bytes, quality)
         .encode(&rgb, width, height, ExtendedColorType::Rgb8)
         .context("cannot code a picture for the recording")?;
     Ok(bytes)
@@ -329,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn a_busy_computer_codes_every_other_picture_and_keeps_all_times() {
+    fn a_busy_computer_codes_pictures_coarsely_and_keeps_each() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("recording.mcap");
         let properties = Properties { picture: (16, 16), ..Properties::default() };
@@ -338,7 +302,13 @@ mod tests {
         for n in 0..8 {
             recorder.spare(n >= 4);
             let time = Time::from_ns(0).plus_secs(f64::from(n) / 30.0);
-            let picture = Picture::new(PixelFormat::Rgb, 16, 16, vec![n as u8 * 30; 768].into()).unwrap();
+            let picture = Picture::new(
+                PixelFormat::Rgb,
+                16,
+                16,
+                (0..768_u32).map(|i| (i * i * 7 + n as u32 * 30) as u8).collect::<Vec<_>>().into(),
+            )
+            .unwrap();
             let frame =
                 CameraFrame { arrival: time, mid_exposure: time, sequence: n as u32, picture, jpeg: None };
             recorder.inputs(&[Event::Frame(frame)], Tick::at(time), None);
@@ -353,8 +323,9 @@ mod tests {
                 _ => None,
             })
             .collect();
-        let as_before: Vec<bool> = kept.windows(2).map(|pair| pair[0].jpeg == pair[1].jpeg).collect();
+        let sizes: Vec<usize> = kept.iter().map(|frame| frame.jpeg.len()).collect();
         assert_eq!(kept.len(), 8);
-        assert_eq!(as_before, [false, false, false, true, false, true, false], "a picture and its copy");
+        assert!(sizes[..4].iter().min() > sizes[4..].iter().max(), "{sizes:?}");
+        assert!(kept.windows(2).all(|pair| pair[0].jpeg != pair[1].jpeg), "each is of its own time");
     }
 }
