@@ -134,18 +134,10 @@ impl Along<'_> {
     /// Whether nothing above the line has an edge as land has.
     fn is_sky(&self, column: usize, row: usize) -> bool {
         let top = row.saturating_sub(self.rows(SKY.end)).max(self.scene.cells.rows().start);
-        let sky = top..row.saturating_sub(self.rows(SKY.start).max(SHARP + 1));
+        let sky = top..row.saturating_sub(SKY.start);
         let even = self.even(column, sky.clone());
-        // In a coarse picture no whole block of steps lies in so few rows.
-        let range =
-            self.scene.steps.within(column, sky.clone()).or_else(|| self.range_of(column, sky.clone()));
+        let range = self.scene.steps.within(column, sky.clone());
         range.is_none_or(|range| self.is_calm(range, even)) || !self.is_lasting(column, row, sky)
-    }
-
-    /// Smallest and largest step of a few rows.
-    fn range_of(&self, column: usize, rows: Range<usize>) -> Option<(f32, f32)> {
-        let steps = self.scene.cells.steps(column, rows.start..=rows.end, SHARP)?.map(|(_, step)| step);
-        steps.map(|step| (step, step)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
     /// Whether what begins at the sharpest edge of `sky` lasts down to the line at `row`, as land does and clouds do not.
