@@ -112,7 +112,7 @@ impl Session {
         self.estimator.heading_sigma()
     }
 
-    /// How far the pictures confirm the orientation.
+    /// Confirmation of the orientation by the pictures.
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         self.estimator.checks(now)
     }

@@ -188,7 +188,7 @@ impl Estimator {
         self.sensors.misfit()
     }
 
-    /// How far the pictures confirm the orientation.
+    /// Confirmation of the orientation by the pictures.
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         self.sensors.checks(now)
     }

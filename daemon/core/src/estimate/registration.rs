@@ -57,9 +57,9 @@ struct Hypothesis {
     late_ns: i64,
     /// Where up is on average off where it is expected.
     off: MeanOff,
-    /// How much better it foretold lately than what is believed, nats.
+    /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).
     sum: f64,
-    /// How much better what is believed foretold than this, since the start, nats.
+    /// The reverse since the start, nats (sequential test).
     against: f64,
     is_excluded: bool,
 }
@@ -83,10 +83,14 @@ impl Hypothesis {
         Self { misfit, turn, up, late_ns: 0, off, sum: 0.0, against: 0.0, is_excluded: false }
     }
 
-    /// Takes in what an observation costs by what is believed and by this. `against` is how much it counts against this: those that follow
-    /// each other err alike.
-    fn add(&mut self, as_believed: f64, other: f64, weight: f64, against: f64) {
-        /// What is believed must have foretold better by this.
+    /// Takes in the costs of an observation by what is believed and by this.
+    fn add(&mut self, as_believed: f64, other: f64, weight: f64) {
+        self.add_apart(as_believed, other, weight, weight);
+    }
+
+    /// The same with weights of its own for the alarm and for the exclusion.
+    fn add_apart(&mut self, as_believed: f64, other: f64, weight: f64, against: f64) {
+        /// Evidence at which a hypothesis is excluded, nats.
         const EXCLUDED: f64 = 7.0;
         /// However much better this foretold before, what was wrong may have been put right.
         const LEAST: f64 = -40.0;
@@ -96,7 +100,7 @@ impl Hypothesis {
         self.is_excluded |= self.against >= EXCLUDED;
     }
 
-    /// Whether what was seen so far leaves it possible. A mount that is off is held against the horizon alone: there it is or it is not.
+    /// Tests whether the observations so far leave it possible. A mount that is off is held against the horizon alone.
     fn is_possible(&self) -> bool {
         !self.is_excluded && self.misfit != Misfit::Mount
     }
@@ -125,7 +129,7 @@ impl MeanOff {
     }
 }
 
-/// What turns cost that are large enough to tell, by what is believed, on average over some ten seconds.
+/// Running mean, over some ten seconds, of the costs of turns by what is believed, where they are large enough to tell.
 #[derive(Clone, Copy, Debug, Default)]
 struct TurnCost {
     mean: f64,
@@ -212,12 +216,10 @@ impl Registration {
         }
     }
 
-    /// Begins anew, as when the unit has restarted: it may be another one.
+    /// Resets all evidence, as after a restart of the unit: it may be another one.
     pub fn restart(&mut self) {
-        self.hypotheses = hypotheses(DMat3::from_quat(self.camera_from_imu));
-        (self.own_off, self.turn_cost) = Default::default();
-        (self.believed, self.checked) = (None, None);
-        self.unit = UnitWatch::default();
+        let finder = std::mem::take(&mut self.finder);
+        *self = Self { finder, next: self.next, ..Self::new(self.camera_from_imu, None) };
     }
 
     /// Holds a unit's own orientation against its rates and its specific force. `rate` is without its bias.
@@ -254,10 +256,10 @@ impl Registration {
         for hypothesis in &mut self.hypotheses {
             match hypothesis.misfit {
                 Misfit::Reversed(FORCE) if known => {
-                    hypothesis.add(tilt(1.0), tilt(-1.0), 1.0 / ALIKE, 1.0 / ALIKE);
+                    hypothesis.add(tilt(1.0), tilt(-1.0), 1.0 / ALIKE);
                 }
                 Misfit::Reversed(_) | Misfit::RateUnit => {
-                    hypothesis.add(cost(DMat3::IDENTITY), cost(hypothesis.turn), 1.0, 1.0);
+                    hypothesis.add(cost(DMat3::IDENTITY), cost(hypothesis.turn), 1.0);
                 }
                 _ => {}
             }
@@ -301,7 +303,7 @@ impl Registration {
             if hypothesis.misfit == Misfit::RateUnit && stands {
                 continue;
             }
-            hypothesis.add(as_believed, cost(hypothesis.turn * turn), 1.0, 1.0);
+            hypothesis.add(as_believed, cost(hypothesis.turn * turn), 1.0);
         }
         self.decide();
     }
@@ -325,19 +327,19 @@ impl Registration {
                     let other = cost((map * own).angle_between(up.seen), UP_SIGMA);
                     // By little is as well a mount that is off.
                     let weight = if hypothesis.misfit == Misfit::Lens { 1.0 / ALIKE } else { 1.0 };
-                    hypothesis.add(as_believed, other, weight, 1.0 / ALIKE);
+                    hypothesis.add_apart(as_believed, other, weight, 1.0 / ALIKE);
                 }
                 UpExpected::Then => {
                     let Some(then) = alone(time.plus_ns(-hypothesis.late_ns)) else { continue };
                     let apart = hypothesis.off.take(between(then, up.seen));
-                    hypothesis.add(sway, cost(apart, SWAY_SIGMA), 1.0 / ALIKE, 1.0 / ALIKE);
+                    hypothesis.add(sway, cost(apart, SWAY_SIGMA), 1.0 / ALIKE);
                 }
                 UpExpected::Off => {
                     let apart = hypothesis.off.take(off);
-                    hypothesis.add(as_believed, cost(apart, UP_SIGMA), 1.0 / ALIKE, 1.0 / ALIKE);
+                    hypothesis.add(as_believed, cost(apart, UP_SIGMA), 1.0 / ALIKE);
                 }
                 UpExpected::Wanders => {
-                    hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE, 1.0 / ALIKE);
+                    hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE);
                 }
             }
         }
@@ -378,7 +380,7 @@ impl Registration {
         if self.unit.is_in_g() { Some(Misfit::ForceUnit) } else { self.believed }
     }
 
-    /// How far what is believed has been confirmed.
+    /// Confirmation of what is believed.
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         RegistrationChecks {
             unseen_s: self.checked.map_or(f64::INFINITY, |checked| now.secs_since(checked).max(0.0)),
@@ -387,7 +389,7 @@ impl Registration {
     }
 }
 
-/// How far the pictures confirm where the camera is believed to look.
+/// Confirmation by the pictures of the orientation that is believed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegistrationChecks {
     /// For how long no horizon was seen where it should be, seconds; without end where none has been so far.

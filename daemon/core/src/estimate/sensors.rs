@@ -241,7 +241,7 @@ impl Sensors {
         self.registration.wrong()
     }
 
-    /// How far the pictures confirm the orientation.
+    /// Confirmation of the orientation by the pictures.
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         self.registration.checks(now)
     }

@@ -65,7 +65,7 @@ pub struct FrameMoment {
     pub permission: FirePermission,
     /// The fault that the sailor should know of though training goes on.
     pub warning: Option<Fault>,
-    /// How far the pictures confirm where the camera looks.
+    /// Confirmation of the orientation by the pictures.
     pub checks: RegistrationChecks,
     /// Which boats have reflections and wakes.
     pub water: WaterDrawn,

@@ -113,14 +113,12 @@ impl LoadWatch {
 
     /// What the late ones of the newest frames took, milliseconds: those before them were drawn under a smaller load.
     fn late_ms(&self) -> f64 {
-        let newest = || self.frames.iter().rev().take(STEP_WITHIN);
-        let late = newest().filter(|f| f.is_late).filter_map(|f| f.took_ms);
-        let most = newest().filter_map(|f| f.took_ms).fold(1.0, f64::max);
-        if newest().any(|f| f.is_late && f.took_ms.is_some()) {
-            bowwave_core::statistics::quantile(late, 0.5).max(1.0)
-        } else {
-            most
+        let newest = self.frames.iter().rev().take(STEP_WITHIN);
+        let mut late = newest.filter(|f| f.is_late).filter_map(|f| f.took_ms).peekable();
+        if late.peek().is_none() {
+            return self.quantile(STEP_WITHIN, 1.0);
         }
+        bowwave_core::statistics::quantile(late, 0.5).max(1.0)
     }
 
     fn quantile(&self, newest: usize, share: f64) -> f64 {
