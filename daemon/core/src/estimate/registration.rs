@@ -14,6 +14,8 @@ mod misfit;
 #[cfg(test)]
 mod tests;
 
+use std::ops::{AddAssign, Mul, Sub};
+
 use glam::{DMat3, DQuat, DVec3};
 
 pub use self::misfit::Misfit;
@@ -111,38 +113,40 @@ impl Hypothesis {
     }
 }
 
-/// The mean of turns, over some ten seconds.
+/// Mean of values: of all of them at first, later of about the last `MOST`.
 #[derive(Clone, Copy, Debug, Default)]
-struct MeanOff {
-    mean: DVec3,
+struct RecentMean<T, const MOST: u32> {
+    mean: T,
     count: u32,
 }
 
+impl<T: Copy + AddAssign + Sub<Output = T> + Mul<f64, Output = T>, const MOST: u32> RecentMean<T, MOST> {
+    fn take(&mut self, value: T) {
+        self.count = (self.count + 1).min(MOST);
+        self.mean += (value - self.mean) * (1.0 / f64::from(self.count));
+    }
+
+    const fn is_full(&self) -> bool {
+        self.count >= MOST
+    }
+}
+
+/// The mean of turns, over some ten seconds.
+type MeanOff = RecentMean<DVec3, 100>;
+
 impl MeanOff {
     /// Takes in a turn; what it differs from the mean before by.
-    fn take(&mut self, off: DVec3) -> f64 {
-        const MOST: u32 = 100;
+    fn take_apart(&mut self, off: DVec3) -> f64 {
         let apart = if self.count == 0 { 0.0 } else { off.distance(self.mean) };
-        self.count = (self.count + 1).min(MOST);
-        self.mean += (off - self.mean) / f64::from(self.count);
+        self.take(off);
         apart
     }
 }
 
-/// Running mean, over some ten seconds, of the costs of turns by what is believed, where they are large enough to tell.
-#[derive(Clone, Copy, Debug, Default)]
-struct TurnCost {
-    mean: f64,
-    count: u32,
-}
+/// The mean, over some ten seconds, of the costs of turns by what is believed, where they are large enough to tell.
+type TurnCost = RecentMean<f64, 50>;
 
 impl TurnCost {
-    fn take(&mut self, cost: f64) {
-        const MOST: u32 = 50;
-        self.count = (self.count + 1).min(MOST);
-        self.mean += (cost - self.mean) / f64::from(self.count);
-    }
-
     /// Three numbers cost three by chance; nine is the most that is counted. What costs more is a way to be set up wrongly that no hypothesis
     /// has, as a unit that is turned by 30 degrees about the vertical.
     fn is_usual(&self) -> bool {
@@ -180,21 +184,18 @@ pub(super) struct Registration {
 /// What a unit's samples say of each other.
 #[derive(Clone, Copy, Debug, Default)]
 struct UnitWatch {
-    size: f64,
-    force: DVec3,
-    samples: u32,
+    /// Size of the specific force and the force itself, m/s^2, its own axes.
+    size: RecentMean<f64, 100>,
+    force: RecentMean<DVec3, 100>,
     /// The unit's own orientation some time ago, the time, and how it turned since by its rates.
     own: Option<(Time, DQuat, DQuat)>,
     last: Option<Time>,
 }
 
 impl UnitWatch {
-    /// Samples over which the mean force forgets, and that it needs.
-    const SAMPLES: f64 = 100.0;
-
     /// No gun on the Earth feels that on average: it is a number of g.
     fn is_in_g(&self) -> bool {
-        f64::from(self.samples) >= Self::SAMPLES && self.size < 5.0
+        self.size.is_full() && self.size.mean < 5.0
     }
 }
 
@@ -227,10 +228,8 @@ impl Registration {
         /// Over so long.
         const SPAN_NS: i64 = 100_000_000;
         let unit = &mut self.unit;
-        unit.samples = unit.samples.saturating_add(1);
-        let share = 1.0 / f64::from(unit.samples).min(UnitWatch::SAMPLES);
-        unit.size += (sample.accel.length() - unit.size) * share;
-        unit.force += (sample.accel - unit.force) * share;
+        unit.size.take(sample.accel.length());
+        unit.force.take(sample.accel);
         let step_s = unit.last.replace(time).map_or(0.0, |last| time.secs_since(last));
         let (Some(own), true) = (sample.world_from_imu, (0.0..0.05).contains(&step_s)) else {
             unit.own = None;
@@ -248,7 +247,7 @@ impl Registration {
         let (seen, by_rates) = (rotation_vector(first.inverse() * own), rotation_vector(*turned));
         let up = own.inverse() * DVec3::Z;
         unit.own = Some((time, own, DQuat::IDENTITY));
-        let (force, known) = (unit.force, f64::from(unit.samples) >= UnitWatch::SAMPLES);
+        let (force, known) = (unit.force.mean, unit.force.is_full());
         let floor = OWN_RATE * span_ns as f64 * 1e-9;
         let [seen, by_rates] = [seen, by_rates].map(|turn| self.camera_from_imu * turn);
         let cost = |map: DMat3| turn_cost(seen, map * by_rates, DMat3::ZERO, floor);
@@ -314,7 +313,7 @@ impl Registration {
         let cost = |off: f64, sigma: f64| (off * off / (sigma * sigma)).min(COST_MOST);
         let off = between(own, up.seen);
         let as_believed = cost(off.length(), UP_SIGMA);
-        let sway = cost(self.own_off.take(off), SWAY_SIGMA);
+        let sway = cost(self.own_off.take_apart(off), SWAY_SIGMA);
         if up.is_predicted && off.length() < 3.0 * UP_SIGMA {
             self.checked = Some(time);
         }
@@ -331,11 +330,11 @@ impl Registration {
                 }
                 UpExpected::Then => {
                     let Some(then) = alone(time.plus_ns(-hypothesis.late_ns)) else { continue };
-                    let apart = hypothesis.off.take(between(then, up.seen));
+                    let apart = hypothesis.off.take_apart(between(then, up.seen));
                     hypothesis.add(sway, cost(apart, SWAY_SIGMA), 1.0 / ALIKE);
                 }
                 UpExpected::Off => {
-                    let apart = hypothesis.off.take(off);
+                    let apart = hypothesis.off.take_apart(off);
                     hypothesis.add(as_believed, cost(apart, UP_SIGMA), 1.0 / ALIKE);
                 }
                 UpExpected::Wanders => {

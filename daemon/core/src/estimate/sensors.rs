@@ -34,7 +34,7 @@ pub struct SensorCounts {
     pub imu_frozen: u64,
     /// Restarts of the unit's clock.
     pub imu_restarts: u32,
-    /// How often orientation erred by more than it said and fell back to plain VQF's inclination, since the unit's start.
+    /// How often orientation erred by more than it said and fell back to plain VQF's inclination.
     pub imu_fallbacks: u32,
     /// Pictures taken in.
     pub frames: u64,
@@ -124,8 +124,10 @@ impl Sensors {
             self.aid.forget();
         }
         self.registration.sample(time, sample, sample.rate - self.gyro_bias);
+        let falls = self.attitude.falls();
         self.attitude.observe(time, sample);
-        self.counts.imu_fallbacks = self.attitude.falls();
+        // A filter that is levelled anew counts from nothing.
+        self.counts.imu_fallbacks += self.attitude.falls().saturating_sub(falls);
     }
 
     /// Takes in what the ship's instruments said.

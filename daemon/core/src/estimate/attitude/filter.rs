@@ -8,6 +8,7 @@ use super::{
     carriage::Carriage,
     consistency::Consistency,
     error_state::{COMMON, Correction, ErrorState, MeasurementRow, TURN},
+    rest::RefusedRests,
 };
 use crate::physics::GRAVITY_M_S2;
 
@@ -114,6 +115,7 @@ pub(super) struct Filter {
     since_s: f64,
     /// The bias at the last rest, rad/s, the unit's axes.
     rested: Option<DVec3>,
+    refused: RefusedRests,
     /// Seconds since up was seen otherwise than by specific force, and for which it is still plain VQF's.
     unseen_s: f64,
     fallen_s: f64,
@@ -172,6 +174,7 @@ impl Filter {
             change: DVec2::ZERO,
             since_s: 0.0,
             rested: None,
+            refused: RefusedRests::default(),
             unseen_s: f64::INFINITY,
             fallen_s: 0.0,
             falls: 0,
@@ -294,6 +297,7 @@ impl Filter {
         self.error_state.pass_time(g.dt_s);
         self.walk(&g, pushed.length());
         self.unseen_s += g.dt_s;
+        self.refused.pass_time(g.dt_s);
     }
 
     /// What chance adds while it is pushed by `pushed` m/s.
@@ -373,12 +377,25 @@ impl Filter {
     /// Takes in that the unit has been at rest and turned at that mean rate less the calibrated bias, rad/s.
     pub(super) fn rest(&mut self, rate: DVec3) -> Correction {
         self.predict();
+        let (turn, all) = self.take_rest(rate);
+        if all {
+            self.refused = RefusedRests::default();
+        } else if self.refused.refuse(rate) {
+            self.refused = RefusedRests::default();
+            self.rested = None;
+            return self.take_rest(rate).0 * turn;
+        }
+        turn
+    }
+
+    /// The correction by a rest, and whether all of it was taken.
+    fn take_rest(&mut self, rate: DVec3) -> (Correction, bool) {
         let mut turn = DQuat::IDENTITY;
         let mut all = true;
         for axis in 0..3 {
             let differ = rate[axis] - self.error_state.at(BIAS + axis);
             if self.rested.is_none() {
-                // The first rest after a start: what the bias was thought to be may be another start's.
+                // The first rest after a start, or one believed against what was learnt: the bias may be another start's.
                 let known = self.error_state.variance(BIAS + axis);
                 self.error_state.walk(BIAS + axis, (differ * differ - known).max(0.0));
             }
@@ -392,7 +409,7 @@ impl Filter {
         if all {
             self.rested = Some(rate);
         }
-        turn
+        (turn, all)
     }
 
     /// Up was seen otherwise than by specific force.

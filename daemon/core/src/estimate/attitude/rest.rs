@@ -52,6 +52,41 @@ impl RestDetector {
     }
 }
 
+/// Refused rests agree within this on each axis, rad/s: three deviations of what a rest shows.
+const AGREE: f64 = 0.1f64.to_radians();
+/// They count once in so long, seconds: a ship that turns steadily on calm water is found at rest again and again, ...
+const OCCASION_S: f64 = 30.0;
+/// ...and so many of them are believed rather than what was learnt before.
+const OCCASIONS: u32 = 3;
+
+/// Rests that were refused, since what they show of the bias contradicts what was learnt. What was learnt may be wrong: the first rest is
+/// taken whatever it shows, and may have been a ship's steady turn.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct RefusedRests {
+    rate: DVec3,
+    occasions: u32,
+    since_s: f64,
+}
+
+impl RefusedRests {
+    /// That much time passes, seconds.
+    pub fn pass_time(&mut self, dt_s: f64) {
+        self.since_s += dt_s;
+    }
+
+    /// A rest of that mean rate, rad/s, is refused; whether it is to be believed after all.
+    pub fn refuse(&mut self, rate: DVec3) -> bool {
+        let agrees = self.occasions > 0 && (rate - self.rate).abs().max_element() <= AGREE;
+        if !agrees {
+            *self = Self { rate, occasions: 1, since_s: 0.0 };
+        } else if self.since_s >= OCCASION_S {
+            self.occasions += 1;
+            self.since_s = 0.0;
+        }
+        self.occasions >= OCCASIONS
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

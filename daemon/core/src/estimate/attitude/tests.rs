@@ -398,3 +398,29 @@ fn a_blow_has_two_sides() {
     }
     assert!(worst < 0.7 * DEG && bias < 0.1 * DEG, "{} deg {} deg/s", worst / DEG, bias / DEG);
 }
+
+#[test]
+fn a_ships_steady_turn_that_was_taken_for_a_rest_is_forgotten_after_three_rests() {
+    let mut fused = attitude(Source::Fused, DVec3::ZERO);
+    let bias = DVec3::new(0.05, -0.02, 0.03) * DEG;
+    let mut off = [0.0f64; 2];
+    for i in 0..170 * 200 {
+        let t = f64::from(i) * 0.005;
+        // The ship turns by a degree each second at first. Then the gun rolls for 34 s, and lies still for six, again and again.
+        let phase = (t % 40.0) * 0.7;
+        let rolls = t > 5.0 && t % 40.0 < 34.0;
+        let (roll, rate) = match (t < 5.0, rolls) {
+            (true, _) => (0.0, DVec3::Z * DEG),
+            (_, true) => (0.2 * phase.sin(), DVec3::X * (0.2 * 0.7 * phase.cos())),
+            (_, false) => (0.2 * (34f64 * 0.7).sin(), DVec3::ZERO),
+        };
+        let up = DQuat::from_rotation_x(-roll) * DVec3::Z;
+        let s = sample(rate + bias, up * GRAVITY_M_S2);
+        let Some(found) = fused.observe(Time::from_ns(i64::from(i) * 5_000_000), &s) else { continue };
+        let wrong = ((s.rate - found.rate) - bias).abs().max_element();
+        for (worst, range) in off.iter_mut().zip([6.0..110.0, 125.0..170.0]) {
+            *worst = if range.contains(&t) { worst.max(wrong) } else { *worst };
+        }
+    }
+    assert!(off[0] > 0.9 * DEG && off[1] < 0.07 * DEG, "{} {} deg/s", off[0] / DEG, off[1] / DEG);
+}

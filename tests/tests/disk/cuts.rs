@@ -3,51 +3,27 @@
 //!
 //! The test starts itself again as a program that shoots, under strace, which sees each operation on files in the order in
 //! which the kernel does, together with each report of a commit. From that record it makes what a disk may hold after a cut
-//! (see `disk.rs` for what is assumed of it), opens it with the product's own code, and looks.
+//! (see `image.rs` for what is assumed of it), opens it with the product's own code, and looks.
 //!
-//! `BOWWAVE_CUTS` says how many cuts (300 unless told); with it set, a missing strace is an error.
-
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot go on has failed"
-)]
-
-mod disk;
-mod shoot;
-mod trace;
-mod verify;
+//! `BOWWAVE_CUTS` says how many cuts (300 unless told).
 
 use std::{env, path::Path, process::Command, time::Instant};
 
-use disk::{Disk, DiskRandom, Survival};
-use trace::TraceStep;
-use verify::ExpectedShots;
+use super::{
+    image::{Disk, DiskRandom, Survival},
+    shoot,
+    trace::{self, TraceStep},
+    verify::{self, ExpectedShots},
+};
 
 const CUTS: usize = 300;
 
 /// How strace has syncs fail: not while the journal is being opened, which would only say so.
 const SYNCS_FAIL: &str = "inject=fsync,fdatasync:error=EIO:when=30+11";
 
-fn main() {
-    let arguments: Vec<_> = env::args().collect();
-    if let [_, flag, path, phase] = &arguments[..]
-        && flag == shoot::FLAG
-    {
-        return shoot::run(Path::new(path), phase.parse().unwrap());
-    }
-    // What else a test runner may pass (filters, --nocapture) changes nothing here; --list has nothing to say.
-    if arguments.iter().any(|argument| argument == "--list") {
-        return;
-    }
-    let asked = env::var("BOWWAVE_CUTS").ok();
-    if !Command::new("strace").arg("-V").output().is_ok_and(|output| output.status.success()) {
-        assert!(asked.is_none(), "no strace here: install it (./check setup)");
-        println!("skipped: no strace here to see what is written");
-        return;
-    }
-    let cuts = asked.map_or(CUTS, |text| text.parse().expect("BOWWAVE_CUTS is no number"));
+/// Cuts the power as often as is asked for.
+pub fn run() {
+    let cuts = super::asked("BOWWAVE_CUTS").unwrap_or(CUTS);
     let steps = record();
     let begun = Instant::now();
     let report = cut(&steps, cuts);
@@ -115,7 +91,7 @@ struct CutReport {
 
 /// Cuts after each step, or after as many as are asked for, evenly spread.
 fn cut(steps: &[TraceStep], cuts: usize) -> CutReport {
-    let folder = scratch();
+    let folder = super::scratch();
     let mut disk = Disk::default();
     let mut expected = ExpectedShots::default();
     let mut random = DiskRandom(0x0b0e_ca75);
@@ -145,9 +121,4 @@ fn cut(steps: &[TraceStep], cuts: usize) -> CutReport {
         }
     }
     report
-}
-
-/// Memory where there is some: thousands of databases are made.
-fn scratch() -> tempfile::TempDir {
-    tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap()
 }

@@ -8,7 +8,7 @@ use std::{
 
 use bowwave_record::{Journal, Run, ShotFilter, read_shots};
 
-use crate::{shoot, trace::TraceStep};
+use super::{shoot, step::Step};
 
 /// A round that is fired after the cut.
 const NEXT: u64 = 1_000_000;
@@ -23,10 +23,10 @@ pub struct ExpectedShots {
 }
 
 impl ExpectedShots {
-    pub fn apply(&mut self, step: &TraceStep) {
+    pub fn apply(&mut self, step: &Step) {
         match step {
-            TraceStep::Fired(shot) => drop(self.fired.insert(*shot)),
-            TraceStep::Committed(shot) => {
+            Step::Fired(shot) => drop(self.fired.insert(*shot)),
+            Step::Committed(shot) => {
                 if self.damaged {
                     // Earlier runs are in the database that was put aside; this one is whole again.
                     self.committed.retain(|earlier| earlier / 1000 == shot / 1000);
@@ -34,7 +34,7 @@ impl ExpectedShots {
                 }
                 self.committed.insert(*shot);
             }
-            TraceStep::Damage => self.damaged = true,
+            Step::Damage => self.damaged = true,
             _ => {}
         }
     }

@@ -12,7 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::trace::TraceStep;
+use super::step::Step;
 
 const SECTOR: usize = 512;
 
@@ -80,33 +80,33 @@ pub struct Disk {
 }
 
 impl Disk {
-    pub fn apply(&mut self, step: &TraceStep) {
+    pub fn apply(&mut self, step: &Step) {
         match step {
-            TraceStep::Create { name } => {
+            Step::Create { name } => {
                 self.namings.push(Naming::Create { name: name.clone(), file: self.files.len() });
                 self.files.push(DiskFile::default());
             }
-            TraceStep::Write { file, offset, bytes } => {
+            Step::Write { file, offset, bytes } => {
                 self.files[*file].changes.push(DiskChange::Write { offset: *offset, bytes: bytes.clone() });
             }
-            TraceStep::Resize { file, length } => self.files[*file].changes.push(DiskChange::Resize(*length)),
-            TraceStep::Sync { file } => {
+            Step::Resize { file, length } => self.files[*file].changes.push(DiskChange::Resize(*length)),
+            Step::Sync { file } => {
                 let DiskFile { synced, changes } = &mut self.files[*file];
                 for change in changes.drain(..) {
                     apply(synced, &change, |_| true);
                 }
             }
-            TraceStep::SyncFailed { file } => self.files[*file].changes.clear(),
-            TraceStep::SyncFolder => {
+            Step::SyncFailed { file } => self.files[*file].changes.clear(),
+            Step::SyncFolder => {
                 for naming in self.namings.drain(..) {
                     rename(&mut self.names, &naming);
                 }
             }
-            TraceStep::Remove { name } => self.namings.push(Naming::Remove(name.clone())),
-            TraceStep::Rename { from, to } => {
+            Step::Remove { name } => self.namings.push(Naming::Remove(name.clone())),
+            Step::Rename { from, to } => {
                 self.namings.push(Naming::Rename { from: from.clone(), to: to.clone() });
             }
-            TraceStep::Fired(_) | TraceStep::Committed(_) | TraceStep::Damage => {}
+            Step::Fired(_) | Step::Committed(_) | Step::Damage | Step::Trouble | Step::Refused => {}
         }
     }
 

@@ -1,0 +1,109 @@
+//! A failing disk, meddling with the files, and each kind of end, at every operation of a run that shoots: no round that was reported is
+//! lost; what was not reported is in the journal, in the side file or in the log, unless the program was killed; the end takes a second
+//! at most.
+//!
+//! The trainer's own storage shoots, SQLite as it is shipped below it. strace stands below both, between them and the system, and has
+//! calls on files fail, succeed without effect, or wait.
+//!
+//! `BOWWAVE_DISK_CASES` says how many cases (200 unless told). `BOWWAVE_DISK_CASE` has that one of them alone, and what it printed.
+
+mod cases;
+pub mod gun;
+mod look;
+mod run;
+
+use std::{
+    collections::BTreeMap,
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use cases::{Case, DiskFailure, Lasting, Operations, Trouble, cases};
+use look::CaseReport;
+use run::Shooting;
+
+const CASES: usize = 200;
+/// Cases that compute and write side by side, and those that mostly wait.
+const AT_ONCE: usize = 3;
+const AT_ONCE_LONG: usize = 16;
+/// The longest that an end may take.
+const END_MOST: Duration = Duration::from_secs(1);
+
+/// Runs the cases and prints a table.
+pub fn run() {
+    let asked = crate::asked("BOWWAVE_DISK_CASES").unwrap_or(CASES);
+    let begun = Instant::now();
+    let operations = run::operations();
+    assert!(operations.0.len() > 100, "{} operations: is strace blind?", operations.0.len());
+    let all: Vec<(usize, Case)> = cases(asked, operations.0.len()).into_iter().enumerate().collect();
+    if let Some(only) = crate::asked("BOWWAVE_DISK_CASE") {
+        let (_, case) = all[only];
+        println!("{case:?}: {:?}", operations.injections(&case, false));
+        println!("{:#?}", Shooting::new(&operations, &case, true).look());
+        return;
+    }
+    let (long, short): (Vec<_>, Vec<_>) = all.iter().copied().partition(|(_, case)| case.is_long());
+    let mut reports = run_all(&operations, &short, AT_ONCE);
+    reports.extend(run_all(&operations, &long, AT_ONCE_LONG));
+    print(&reports);
+    let cases: usize = reports.iter().map(|(_, case, _)| case.count()).sum();
+    let faults = reports.iter().filter(|(_, _, report)| !report.faults.is_empty()).count();
+    println!("{cases} cases at {} operations in {} s", operations.0.len(), begun.elapsed().as_secs());
+    assert_eq!(faults, 0, "runs of the program that lost something, invented something or ended late");
+}
+
+type Done = (usize, Case, CaseReport);
+
+fn run_all(operations: &Operations, cases: &[(usize, Case)], at_once: usize) -> Vec<Done> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    thread::scope(|scope| {
+        for _ in 0..at_once {
+            scope.spawn(|| {
+                while let Some((index, case)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let report = Shooting::new(operations, case, false).look();
+                    for fault in &report.faults {
+                        println!("case {index}, {case:?}: {fault}");
+                    }
+                    done.lock().unwrap().push((*index, *case, report));
+                }
+            });
+        }
+    });
+    done.into_inner().unwrap()
+}
+
+/// A line for each trouble.
+fn print(reports: &[Done]) {
+    let mut by_trouble: BTreeMap<String, Vec<&Done>> = BTreeMap::new();
+    for done in reports {
+        let lasting = match done.1.trouble {
+            Trouble::Disk(DiskFailure::Slow, _) => " by 5 s",
+            Trouble::Disk(_, Lasting::ForEver) | Trouble::Meddling(_, Lasting::ForEver) => ", stays so",
+            Trouble::Disk(..) | Trouble::Meddling(..) => ", for a while",
+        };
+        let name = match done.1.trouble {
+            Trouble::Disk(failure, _) => format!("{failure:?}{lasting}"),
+            Trouble::Meddling(meddling, _) => format!("{meddling:?}{lasting}"),
+        };
+        by_trouble.entry(name).or_default().push(done);
+    }
+    println!("| Trouble | Cases | Rounds reported | Lost | In the side file | In the log | Longest end, s |");
+    println!("|---|---|---|---|---|---|---|");
+    for (name, done) in by_trouble {
+        let sum = |value: fn(&CaseReport) -> usize| done.iter().map(|(_, _, r)| value(r)).sum::<usize>();
+        let end = done.iter().filter_map(|(_, _, r)| r.end).max().unwrap_or_default();
+        println!(
+            "| {name} | {} | {} | {} | {} | {} | {:.2} |",
+            done.iter().map(|(_, case, _)| case.count()).sum::<usize>(),
+            sum(|r| r.reported),
+            sum(|r| r.lost),
+            sum(|r| r.in_side_file),
+            sum(|r| r.in_log),
+            end.as_secs_f64()
+        );
+    }
+}
