@@ -34,6 +34,9 @@ use crate::{
 const COST_MOST: f64 = 9.0;
 /// A hypothesis that lets the vertical wander, and does not say where to, explains no more than what costs this.
 const COST_WANDERS: f64 = 5.0;
+/// A mount that is off, and does not say how far, explains no less than what costs this: two degrees. So far a unit alone goes off up in
+/// a ship's turn.
+const COST_OFF: f64 = 4.0;
 /// How the sea and what swims on it move by themselves in the picture, rad/s: waves go by at 10 m/s some hundred metres off.
 const SEA_RATE: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// By what share of itself a turn is told wrong by lens, shutter and times.
@@ -64,6 +67,7 @@ struct Hypothesis {
     /// The reverse since the start, nats (sequential test).
     against: f64,
     is_excluded: bool,
+    is_believed: bool,
 }
 
 /// Where a hypothesis expects up to be seen.
@@ -82,7 +86,17 @@ enum UpExpected {
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
         let off = MeanOff { mean: DVec3::ZERO, count: 0 };
-        Self { misfit, turn, up, late_ns: 0, off, sum: 0.0, against: 0.0, is_excluded: false }
+        Self {
+            misfit,
+            turn,
+            up,
+            late_ns: 0,
+            off,
+            sum: 0.0,
+            against: 0.0,
+            is_excluded: false,
+            is_believed: false,
+        }
     }
 
     /// Takes in the costs of an observation by what is believed and by this.
@@ -92,12 +106,17 @@ impl Hypothesis {
 
     /// The same with weights of its own for the alarm and for the exclusion.
     fn add_apart(&mut self, as_believed: f64, other: f64, weight: f64, against: f64) {
+        /// An observation that a hypothesis does not foretell better by this, nats, is evidence against it. Without that, one that fits
+        /// itself to what is seen, as a mount that is off does, gathers hundredths of a degree for hours until it is believed. Half a
+        /// degree of the vertical is worth as much.
+        const SLACK: f64 = 0.15;
         /// Evidence at which a hypothesis is excluded, nats.
         const EXCLUDED: f64 = 7.0;
         /// However much better this foretold before, what was wrong may have been put right.
         const LEAST: f64 = -40.0;
         let better = 0.5 * (as_believed - other);
-        self.sum = (self.sum + weight * better).max(0.0);
+        let slack = if self.is_believed { 0.0 } else { SLACK };
+        self.sum = (self.sum + weight * (better - slack)).max(0.0);
         self.against = (self.against - against * better).max(LEAST);
         self.is_excluded |= self.against >= EXCLUDED;
     }
@@ -335,7 +354,7 @@ impl Registration {
                 }
                 UpExpected::Off => {
                     let apart = hypothesis.off.take_apart(off);
-                    hypothesis.add(as_believed, cost(apart, UP_SIGMA), 1.0 / ALIKE);
+                    hypothesis.add(as_believed, COST_OFF + cost(apart, UP_SIGMA), 1.0 / ALIKE);
                 }
                 UpExpected::Wanders => {
                     hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE);
@@ -358,8 +377,9 @@ impl Registration {
         // What is ahead stays ahead.
         let beyond = (most - SUM_MOST).max(0.0);
         self.hypotheses.iter_mut().for_each(|h| h.sum = (h.sum - beyond).max(0.0));
-        let most = self.hypotheses.iter().max_by(|a, b| a.sum.total_cmp(&b.sum));
-        let Some(most) = most else { return };
+        let Some(most) = self.hypotheses.iter().max_by(|a, b| a.sum.total_cmp(&b.sum)).copied() else {
+            return;
+        };
         if most.sum >= LIMIT {
             let alike = self.hypotheses.iter().filter(|h| Some(h.misfit) == self.believed);
             let held = alike.map(|h| h.sum).fold(0.0, f64::max);
@@ -371,6 +391,9 @@ impl Registration {
             }
         } else if most.sum < LIMIT_BACK {
             self.believed = None;
+        }
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.is_believed = Some(hypothesis.misfit) == self.believed;
         }
     }
 

@@ -171,3 +171,15 @@ fn force_in_g_is_told_by_its_size_and_rates_by_the_units_own_orientation() {
     assert_eq!(fed(1.0, DVec3::ONE * 57.3, true), Some(Misfit::RateUnit));
     assert_eq!(fed(-1.0, DVec3::ONE, true), Some(Misfit::Reversed(FORCE)));
 }
+
+#[test]
+fn hours_of_a_small_error_are_no_wrong_set_up() {
+    let mut registration = Registration::new(DQuat::IDENTITY, None);
+    // The unit alone has up half a degree off all the time, as in a long turn; an hour, ten times a second.
+    let seen = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.5f64.to_radians()) * DVec3::Y;
+    for tenths in 0..36_000 {
+        let sight = UpSight { seen, predicted: seen, is_predicted: true };
+        registration.up(at(tenths), &sight, |_| Some(DVec3::Y));
+        assert_eq!(registration.wrong(), None, "after {tenths} tenths of a second");
+    }
+}
