@@ -5,10 +5,13 @@ use std::{
     fs::{self, OpenOptions},
     io::{self, Write as _},
     path::{Path, PathBuf},
+    thread,
+    time::Duration,
 };
 
 use bowwave_core::time::Time;
 use bowwave_files::plain_text;
+use crossbeam_channel::bounded;
 use rusqlite::{Connection, TransactionBehavior};
 use serde_json::{Value, json};
 
@@ -36,10 +39,22 @@ pub fn side_files(path: &Path) -> io::Result<Vec<PathBuf>> {
 }
 
 /// Puts rounds beside a journal that could not be opened; its next start takes them in. Rounds for which there is no place there, either,
-/// are in the log.
-pub fn put_aside(path: &Path, run: &Run, rounds: impl IntoIterator<Item = super::ShotRecord>) -> Unwritten {
+/// are in the log, and so are those that a slow disk has not taken `within` that time.
+pub fn put_aside(
+    path: &Path,
+    run: &Run,
+    rounds: impl IntoIterator<Item = super::ShotRecord>,
+    within: Duration,
+) -> Unwritten {
     let rows: Vec<String> = rounds.into_iter().map(|record| StoredShot::line(0, record)).collect();
-    let side_file = save_or_tell(path, (0, run), None, &rows);
+    let (done, saved) = bounded(1);
+    let work = {
+        let (path, run, rows) = (path.to_path_buf(), run.clone(), rows.clone());
+        // Nobody waits any more for one that took too long.
+        move || drop(done.send(save_or_tell(&path, (0, &run), None, &rows)))
+    };
+    let begun = thread::Builder::new().name("journal-aside".to_owned()).spawn(work);
+    let side_file = begun.ok().and_then(|_| saved.recv_timeout(within).ok()).flatten();
     let cause = "it could not be opened".to_owned();
     let unwritten =
         Unwritten { path: path.into(), run: 0, committed: 0, cause, in_doubt: 0, rows, side_file };

@@ -234,7 +234,8 @@ impl Journal {
             told: Arc::clone(&told),
             pending: Arc::clone(&pending),
         };
-        let worker = JournalWorker::new(opened.connection, path, (id, run.clone()), ends, settings);
+        let worker =
+            JournalWorker::new((opened.connection, opened.place), path, (id, run.clone()), ends, settings);
         let thread = std::thread::Builder::new()
             .name("journal".to_owned())
             // Nobody waits any more for one that took too long.

@@ -14,7 +14,9 @@ use bowwave_files::plain_file;
 use rusqlite::{Connection, ErrorCode, OpenFlags, config::DbConfig};
 
 use super::{
-    JournalError, JournalSettings, Quarantine, quarantine,
+    JournalError, JournalSettings, Quarantine,
+    place::{AboutToOpen, FilePlace},
+    quarantine,
     schema::{self, APPLICATION_ID, VERSION},
 };
 
@@ -27,13 +29,25 @@ const MAGIC: &[u8; 16] = b"SQLite format 3\0";
 /// A database that is ready to be written.
 pub(super) struct OpenedJournal {
     pub(super) connection: Connection,
+    pub(super) place: FilePlace,
     pub(super) quarantined: Option<Quarantine>,
+}
+
+impl OpenedJournal {
+    fn connect(
+        path: &Path,
+        settings: &JournalSettings,
+        quarantined: Option<Quarantine>,
+    ) -> Result<Self, JournalError> {
+        let (connection, place) = connect(path, settings)?;
+        Ok(Self { connection, place, quarantined })
+    }
 }
 
 /// Opens or makes the database for writing; puts a damaged one aside.
 pub(super) fn for_writing(path: &Path, settings: &JournalSettings) -> Result<OpenedJournal, JournalError> {
     if let Some(resumed) = quarantine::resume(path)? {
-        return Ok(OpenedJournal { connection: connect(path, settings)?, quarantined: Some(resumed) });
+        return OpenedJournal::connect(path, settings, Some(resumed));
     }
     let head = head(path)?;
     if head.looks_foreign() && !settings.options.own {
@@ -51,11 +65,11 @@ pub(super) fn for_writing(path: &Path, settings: &JournalSettings) -> Result<Ope
         check(path)?
     };
     let Err(reason) = broken else {
-        return Ok(OpenedJournal { connection: connect(path, settings)?, quarantined: None });
+        return OpenedJournal::connect(path, settings, None);
     };
     let kept_as = quarantine::replace(path, settings, |_| Ok(()))?;
     let quarantined = Some(Quarantine { kept_as: Some(kept_as), reason, rounds_left_there: 0 });
-    Ok(OpenedJournal { connection: connect(path, settings)?, quarantined })
+    OpenedJournal::connect(path, settings, quarantined)
 }
 
 /// Opens an existing journal for reading.
@@ -195,8 +209,12 @@ fn check(path: &Path) -> Result<Result<(), String>, JournalError> {
 }
 
 /// Connects to a database that is intact, or makes it. Everything that can be read over the connection is on the disk.
-pub(super) fn connect(path: &Path, settings: &JournalSettings) -> Result<Connection, JournalError> {
+pub(super) fn connect(
+    path: &Path,
+    settings: &JournalSettings,
+) -> Result<(Connection, FilePlace), JournalError> {
     let fail = |error: rusqlite::Error| JournalError::from_sql(path, &error);
+    let about = AboutToOpen::at(path)?;
     let mut connection = Connection::open(path).map_err(fail)?;
     connection.busy_timeout(settings.busy).map_err(fail)?;
     keep_log(&connection);
@@ -228,7 +246,8 @@ pub(super) fn connect(path: &Path, settings: &JournalSettings) -> Result<Connect
     schema::make_tables(&mut connection).map_err(fail)?;
     // SQLite asks for this too, and does not say when it fails.
     sync_folder(path)?;
-    Ok(connection)
+    let place = about.opened(path)?;
+    Ok((connection, place))
 }
 
 /// Puts the log that is found beside the database onto the disk again.

@@ -1,7 +1,7 @@
 //! Whether the journal's files are still where they were opened, and whose the folder is.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, OpenOptions},
     io,
     os::unix::fs::MetadataExt as _,
     path::Path,
@@ -25,8 +25,39 @@ pub(super) struct FilePlace([(u64, u64); 2]);
 impl FilePlace {
     /// Of the files that are at `path` now.
     pub(super) fn of(path: &Path) -> io::Result<Self> {
-        let one = |part| fs::metadata(with_suffix(path, part)).map(|status| (status.dev(), status.ino()));
-        Ok(Self([one("")?, one("-wal")?]))
+        Ok(Self([file_at(path)?, file_at(&with_suffix(path, "-wal"))?]))
+    }
+
+    /// Whether the database, if not its log, is at `path` still.
+    pub(super) fn has_database(self, path: &Path) -> bool {
+        file_at(path).is_ok_and(|file| file == self.0[0])
+    }
+}
+
+fn file_at(path: &Path) -> io::Result<(u64, u64)> {
+    fs::metadata(path).map(|status| (status.dev(), status.ino()))
+}
+
+/// The database that is about to be opened: an empty one is made where there is none.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AboutToOpen((u64, u64));
+
+impl AboutToOpen {
+    pub(super) fn at(path: &Path) -> Result<Self, JournalError> {
+        let fail = |source| JournalError::from_io(path, "make", source);
+        match OpenOptions::new().write(true).create_new(true).open(path) {
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => return Err(fail(error)),
+            // Closed before SQLite opens it: closing gives up a process's locks.
+            made => drop(made),
+        }
+        file_at(path).map(Self).map_err(fail)
+    }
+
+    /// The files that were opened; an error where they are not the ones that whoever looks finds.
+    pub(super) fn opened(self, path: &Path) -> Result<FilePlace, JournalError> {
+        let moved = || JournalError::Moved { path: path.into() };
+        let place = FilePlace::of(path).map_err(|_| moved())?;
+        if place.0[0] == self.0 { Ok(place) } else { Err(moved()) }
     }
 }
 

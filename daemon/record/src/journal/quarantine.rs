@@ -31,7 +31,7 @@ pub(super) fn replace(
     for leftover in [making.clone(), with_suffix(&making, "-wal"), with_suffix(&making, "-shm")] {
         absent_is_fine(fs::remove_file(leftover)).map_err(|e| failed(path, e))?;
     }
-    let mut connection = connect(&making, settings)?;
+    let (mut connection, _) = connect(&making, settings)?;
     fill(&mut connection).map_err(|error| JournalError::from_sql(path, &error))?;
     // Moved into the database here, where a failure is told; the end of the connection only removes the empty log.
     let busy: i64 = connection

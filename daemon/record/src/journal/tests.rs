@@ -201,7 +201,7 @@ fn a_log_that_was_left_behind_is_put_onto_the_disk_again() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hits.db");
     let settings = impatient(None);
-    let connection = open::connect(&path, &settings).unwrap();
+    let (connection, _) = open::connect(&path, &settings).unwrap();
     schema::begin_run(&connection, None, &Run::default()).unwrap();
     open::keep_log(&connection);
     drop(connection);
@@ -210,7 +210,7 @@ fn a_log_that_was_left_behind_is_put_onto_the_disk_again() {
     assert!(before.len() > 4096);
     let changed = fs::metadata(&log).unwrap().modified().unwrap();
     std::thread::sleep(Duration::from_millis(20));
-    let connection = open::connect(&path, &settings).unwrap();
+    let (connection, _) = open::connect(&path, &settings).unwrap();
     assert_eq!(fs::read(&log).unwrap(), before);
     assert!(fs::metadata(&log).unwrap().modified().unwrap() > changed, "it was not written");
     let runs: i64 = connection.query_row("SELECT count(*) FROM runs", [], |row| row.get(0)).unwrap();
@@ -253,7 +253,7 @@ fn a_side_file_of_another_database_becomes_a_run_of_its_own_and_bad_lines_are_ke
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hits.db");
     let old = Run { scenario: "old".to_owned(), ..Run::default() };
-    let unwritten = put_aside(&path, &old, (1..=3).map(shot));
+    let unwritten = put_aside(&path, &old, (1..=3).map(shot), Duration::from_secs(5));
     // As an earlier version left it, with a line that a power cut tore.
     let row = StoredShot { run: 7, record: shot(9) }.to_json();
     fs::write(folder.path().join("hits.db.unwritten-7.jsonl"), format!("{row}\n{{\"run\": 7, \"sh")).unwrap();

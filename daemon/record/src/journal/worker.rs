@@ -83,8 +83,8 @@ pub(super) struct JournalWorker {
     low: bool,
     /// Taken from the queue and not yet committed.
     pending: Arc<Mutex<Pending>>,
-    /// The files that `connection` has open.
-    place: Option<FilePlace>,
+    /// The files that `connection` has open, or had.
+    place: FilePlace,
     /// Committed rounds of this run may be missing in the database.
     in_doubt: bool,
     /// The file beside the database that has what is not written, once the end has met a failure.
@@ -113,7 +113,7 @@ pub(super) struct JournalChannels {
 
 impl JournalWorker {
     pub(super) fn new(
-        connection: Connection,
+        (connection, place): (Connection, FilePlace),
         path: &Path,
         (id, run): (i64, Run),
         ends: JournalChannels,
@@ -121,7 +121,7 @@ impl JournalWorker {
     ) -> Self {
         let JournalChannels { incoming, closing, commits, told, pending } = ends;
         Self {
-            place: FilePlace::of(path).ok(),
+            place,
             connection: Some(connection),
             path: path.into(),
             id,
@@ -157,7 +157,7 @@ impl JournalWorker {
         let mut deadline = None;
         loop {
             // What the queue had no room for may come with the end.
-            if self.is_idle() && !self.next() && self.is_idle() {
+            if self.is_idle() && !self.next() && self.is_idle() && self.close_run() {
                 break;
             }
             self.take_queued();
@@ -184,7 +184,7 @@ impl JournalWorker {
 
     /// Nothing is to be written.
     fn is_idle(&self) -> bool {
-        self.held().held.is_empty() && self.clock.is_none() && self.failures == 0
+        self.held().held.is_empty() && self.clock.is_none() && self.failures == 0 && !self.in_doubt
     }
 
     /// Waits for something to do; `false` at the end.
@@ -249,10 +249,7 @@ impl JournalWorker {
                 }
                 self.in_doubt |= error.casts_doubt();
                 if matches!(error, JournalError::Moved { .. }) {
-                    let (reason, rounds_left_there) = (error.to_string(), self.not_kept);
-                    log::error!("{reason}");
-                    let quarantine = Quarantine { kept_as: None, reason, rounds_left_there };
-                    self.tell(|told| told.quarantine = Some(quarantine));
+                    self.tell_moved(error);
                 }
                 // What this connection and the system's memory hold is not to be trusted any more.
                 keep_log(&connection);
@@ -270,8 +267,8 @@ impl JournalWorker {
     }
 
     fn reopen(&mut self) -> Result<Connection, JournalError> {
-        let connection = connect(&self.path, &self.settings)?;
-        self.place = FilePlace::of(&self.path).ok();
+        let (connection, place) = connect(&self.path, &self.settings)?;
+        self.place = place;
         Ok(connection)
     }
 
@@ -297,11 +294,17 @@ impl JournalWorker {
 
     /// Whether whoever opens the journal finds the files that were written.
     fn is_in_place(&self) -> Result<(), JournalError> {
-        let found = FilePlace::of(&self.path).ok();
-        if found.is_some() && found == self.place {
+        if FilePlace::of(&self.path).is_ok_and(|found| found == self.place) {
             return Ok(());
         }
         Err(JournalError::Moved { path: self.path.clone() })
+    }
+
+    fn tell_moved(&self, error: &JournalError) {
+        let (reason, rounds_left_there) = (error.to_string(), self.not_kept);
+        log::error!("{reason}");
+        let quarantine = Quarantine { kept_as: None, reason, rounds_left_there };
+        self.tell(|told| told.quarantine = Some(quarantine));
     }
 
     /// Inserts what is missing of this run's committed rounds, and the run.
@@ -480,9 +483,6 @@ impl JournalWorker {
         self.take_all();
         let (rows, in_doubt) = self.unwritten();
         if rows.is_empty() {
-            if let Err(error) = self.close_run() {
-                log::warn!("{error}; its last run stays marked as unfinished");
-            }
             if let Some(file) = &self.side_file
                 && let Err(error) = aside::remove(&self.path, file)
             {
@@ -504,8 +504,28 @@ impl JournalWorker {
         JournalEnd { run, committed, unwritten: Some(unwritten) }
     }
 
-    /// Marks the run as finished and moves the log into the database.
-    fn close_run(&mut self) -> Result<(), JournalError> {
+    /// Marks the run as finished, moves the log into the database and closes it; `false` where rounds are to be written again, since the
+    /// disk failed or the files were moved away meanwhile.
+    fn close_run(&mut self) -> bool {
+        let done = self.try_close_run();
+        // Closed: nothing is written any more, so that what is found now is found later.
+        let is_there = self.committed == 0 || self.place.has_database(&self.path);
+        let moved = || JournalError::Moved { path: self.path.clone() };
+        let Err(error) = done.and_then(|()| if is_there { Ok(()) } else { Err(moved()) }) else {
+            return true;
+        };
+        if self.committed > 0 && error.casts_doubt() {
+            self.in_doubt = true;
+            if matches!(error, JournalError::Moved { .. }) {
+                self.tell_moved(&error);
+            }
+            return false;
+        }
+        log::warn!("{error}; its last run stays marked as unfinished");
+        true
+    }
+
+    fn try_close_run(&mut self) -> Result<(), JournalError> {
         let connection = match self.connection.take() {
             Some(connection) => connection,
             None => self.reopen()?,
@@ -514,7 +534,10 @@ impl JournalWorker {
             connection.execute("UPDATE runs SET finished = 1 WHERE id = ?1", [self.id])?;
             checkpoint(&connection, 1)
         };
-        close().map_err(|error| JournalError::from_sql(&self.path, &error))?;
+        close().map_err(|error| {
+            keep_log(&connection);
+            JournalError::from_sql(&self.path, &error)
+        })?;
         empty_log_at_end(&connection);
         Ok(())
     }

@@ -6,8 +6,11 @@ mod recorder;
 
 use std::{
     collections::VecDeque,
+    io,
+    panic::resume_unwind,
     path::{Path, PathBuf},
     thread::{self, JoinHandle},
+    time::{Duration, Instant},
 };
 
 use anyhow::{Context, Result};
@@ -39,6 +42,8 @@ const HITS_BYTES: u64 = 32 << 20;
 
 /// How long to wait before a journal that cannot be opened is tried again.
 const OPEN_AGAIN_NS: i64 = NS_PER_S;
+/// The start waits so long for the journal; a slow disk, or one that somebody has locked, opens it later.
+const OPEN_WITHIN: Duration = Duration::from_millis(500);
 
 /// Settings of the storage of a run.
 #[derive(Clone, Debug)]
@@ -66,6 +71,12 @@ impl StorageOptions {
     fn open(&self) -> Result<Journal, JournalError> {
         Journal::open_with(&self.journal_path(), &self.run, &self.journal)
     }
+
+    /// The same in a thread: the frame does not wait for the disk.
+    fn open_aside(&self) -> io::Result<JoinHandle<Result<Journal, JournalError>>> {
+        let options = self.clone();
+        thread::Builder::new().name("journal-open".to_owned()).spawn(move || options.open())
+    }
 }
 
 /// The journal, or why there is none yet.
@@ -77,6 +88,40 @@ enum JournalState {
         /// The disk may take its time: the frame does not wait for it.
         attempt: Option<JoinHandle<Result<Journal, JournalError>>>,
     },
+}
+
+impl JournalState {
+    /// The journal, if it can be opened soon.
+    fn start(options: &StorageOptions) -> Self {
+        let shut = |error, attempt| {
+            log::error!("{error}; hits are kept in memory until it can be opened");
+            Self::Shut { error, next: now().plus_ns(OPEN_AGAIN_NS), attempt }
+        };
+        let slow = |reason: String| JournalError::Disk { path: options.journal_path(), reason };
+        let thread = match options.open_aside() {
+            Ok(thread) => thread,
+            Err(e) => return shut(slow(format!("no thread to open it: {e}")), None),
+        };
+        let until = Instant::now() + OPEN_WITHIN;
+        while !thread.is_finished() {
+            if Instant::now() > until {
+                return shut(slow("it has not answered yet".to_owned()), Some(thread));
+            }
+            thread::sleep(Duration::from_millis(1));
+        }
+        match opened(thread) {
+            Ok(journal) => Self::Open(journal),
+            Err(error) => shut(error, None),
+        }
+    }
+}
+
+/// What became of the attempt that a thread has made.
+fn opened(thread: JoinHandle<Result<Journal, JournalError>>) -> Result<Journal, JournalError> {
+    match thread.join() {
+        Ok(done) => done,
+        Err(panic) => resume_unwind(panic),
+    }
 }
 
 /// Journal and recording of a run.
@@ -101,17 +146,11 @@ impl Storage {
     /// # Errors
     /// Only strict storage fails; else what is wrong becomes a fault.
     pub fn open(options: StorageOptions, faults: &mut Vec<FaultChange>) -> Result<Self> {
-        let store = match options.open() {
-            Ok(journal) => {
-                faults.extend(dirty(&journal).filter(|_| !options.strict));
-                JournalState::Open(journal)
-            }
-            Err(error) if options.strict => return Err(error.into()),
-            Err(error) => {
-                log::error!("{error}; hits are kept in memory until it can be opened");
-                JournalState::Shut { error, next: now().plus_ns(OPEN_AGAIN_NS), attempt: None }
-            }
-        };
+        let store =
+            if options.strict { JournalState::Open(options.open()?) } else { JournalState::start(&options) };
+        if let JournalState::Open(journal) = &store {
+            faults.extend(dirty(journal).filter(|_| !options.strict));
+        }
         let mut recording_failed = None;
         let recorder = match options.recording.as_ref().map(Recorder::start).transpose() {
             Ok(recorder) => recorder,
@@ -213,8 +252,8 @@ impl Storage {
     fn open_again(&mut self, faults: &mut FaultLog, events: &mut Vec<Event>) {
         let JournalState::Shut { error, next, attempt } = &mut self.store else { return };
         if let Some(thread) = attempt.take_if(|thread| thread.is_finished()) {
-            match thread.join() {
-                Ok(Ok(journal)) => {
+            match opened(thread) {
+                Ok(journal) => {
                     if let Some(change) = dirty(&journal) {
                         faults.take(change, events);
                     }
@@ -222,14 +261,12 @@ impl Storage {
                     self.store = JournalState::Open(journal);
                     return;
                 }
-                Ok(Err(e)) => *error = e,
-                Err(_) => log::error!("opening the journal broke down; report it with the log"),
+                Err(e) => *error = e,
             }
             *next = now().plus_ns(OPEN_AGAIN_NS);
         }
         if attempt.is_none() && now() >= *next {
-            let options = self.options.clone();
-            match thread::Builder::new().name("journal-open".to_owned()).spawn(move || options.open()) {
+            match self.options.open_aside() {
                 Ok(thread) => *attempt = Some(thread),
                 Err(e) => {
                     log::debug!("no thread to open the journal: {e}");
@@ -313,13 +350,17 @@ impl Storage {
         let journal = match self.store {
             JournalState::Open(journal) => Some(journal),
             // Trying once more may take longer than the end may. The next run takes in what is put aside.
-            JournalState::Shut { .. } => None,
+            JournalState::Shut { attempt, .. } => {
+                attempt.filter(JoinHandle::is_finished).and_then(|thread| opened(thread).ok())
+            }
         };
         let written = match journal {
             Some(journal) => write_out(journal, &mut self.waiting, &self.options),
             None if self.waiting.is_empty() => Ok(()),
             None => {
-                Err(put_aside(&self.options.journal_path(), &self.options.run, self.waiting.drain(..)).into())
+                let StorageOptions { run, journal, .. } = &self.options;
+                let path = self.options.journal_path();
+                Err(put_aside(&path, run, self.waiting.drain(..), journal.end_within).into())
             }
         };
         wrong.extend(written.err());
@@ -386,7 +427,6 @@ fn end_recording(recorder: Recorder) -> u64 {
 mod tests {
     use super::*;
     use bowwave_core::world::score::{NotScored, Outcome};
-    use std::time::Duration;
 
     use bowwave_record::{RunSelection, ShotFilter, read_shots};
     use glam::DVec3;

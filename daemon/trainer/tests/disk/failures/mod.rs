@@ -2,15 +2,14 @@
 //! lost; what was not reported is in the journal, in the side file or in the log, unless the program was killed; the end takes a second
 //! at most.
 //!
-//! The trainer's own storage shoots, SQLite as it is shipped below it. strace stands below both, between them and the system, and has
-//! calls on files fail, succeed without effect, or wait.
+//! The trainer's own storage shoots, SQLite as it is shipped below it. The layer is below both.
 //!
-//! `BOWWAVE_DISK_CASES` says how many cases (200 unless told). `BOWWAVE_DISK_CASE` has that one of them alone, and what it printed.
+//! `BOWWAVE_DISK_CASES` says how many cases (200 unless told, none for 0). `BOWWAVE_DISK_CASE` has that one of them alone, and what it printed.
 
 mod cases;
 pub mod gun;
 mod look;
-mod run;
+mod plan;
 
 use std::{
     collections::BTreeMap,
@@ -22,9 +21,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-use cases::{Case, DiskFailure, Lasting, Operations, Trouble, cases};
-use look::CaseReport;
-use run::Shooting;
+use cases::{Case, DiskFailure, Lasting, Trouble, cases};
+use look::{CaseReport, Shooting};
 
 const CASES: usize = 200;
 /// Cases that compute and write side by side, and those that mostly wait.
@@ -36,35 +34,38 @@ const END_MOST: Duration = Duration::from_secs(1);
 /// Runs the cases and prints a table.
 pub fn run() {
     let asked = crate::asked("BOWWAVE_DISK_CASES").unwrap_or(CASES);
+    if asked == 0 {
+        return;
+    }
     let begun = Instant::now();
-    let operations = run::operations();
-    assert!(operations.0.len() > 100, "{} operations: is strace blind?", operations.0.len());
-    let all: Vec<(usize, Case)> = cases(asked, operations.0.len()).into_iter().enumerate().collect();
+    let calls = Shooting::run(None, false).calls;
+    assert!(calls > 60, "{calls} calls: what is not seen?");
+    let all: Vec<(usize, Case)> = cases(asked, calls).into_iter().enumerate().collect();
     if let Some(only) = crate::asked("BOWWAVE_DISK_CASE") {
         let (_, case) = all[only];
-        println!("{case:?}: {:?}", operations.injections(&case, false));
-        println!("{:#?}", Shooting::new(&operations, &case, true).look());
+        let shooting = Shooting::run(Some(case), true);
+        println!("{}{case:?}\n{:#?}", shooting.log, shooting.look(&case));
         return;
     }
     let (long, short): (Vec<_>, Vec<_>) = all.iter().copied().partition(|(_, case)| case.is_long());
-    let mut reports = run_all(&operations, &short, AT_ONCE);
-    reports.extend(run_all(&operations, &long, AT_ONCE_LONG));
+    let mut reports = run_all(&short, AT_ONCE);
+    reports.extend(run_all(&long, AT_ONCE_LONG));
     print(&reports);
     let cases: usize = reports.iter().map(|(_, case, _)| case.count()).sum();
     let faults = reports.iter().filter(|(_, _, report)| !report.faults.is_empty()).count();
-    println!("{cases} cases at {} operations in {} s", operations.0.len(), begun.elapsed().as_secs());
+    println!("{cases} cases at {calls} calls in {} s", begun.elapsed().as_secs());
     assert_eq!(faults, 0, "runs of the program that lost something, invented something or ended late");
 }
 
 type Done = (usize, Case, CaseReport);
 
-fn run_all(operations: &Operations, cases: &[(usize, Case)], at_once: usize) -> Vec<Done> {
+fn run_all(cases: &[(usize, Case)], at_once: usize) -> Vec<Done> {
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
     thread::scope(|scope| {
         for _ in 0..at_once {
             scope.spawn(|| {
                 while let Some((index, case)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let report = Shooting::new(operations, case, false).look();
+                    let report = Shooting::run(Some(*case), false).look(case);
                     for fault in &report.faults {
                         println!("case {index}, {case:?}: {fault}");
                     }

@@ -32,7 +32,7 @@ use super::step::Step;
 /// A call on a file of the folder, or on the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Call {
-    Open { name: String, makes: bool, empties: bool },
+    Open { name: String, makes: bool, writes: bool, empties: bool },
     OpenFolder,
     Read,
     Write { offset: Option<usize> },
@@ -53,17 +53,17 @@ pub enum Verdict {
     Pretend,
     /// It goes through later.
     Wait(Duration),
-    /// It goes through, and the program gets a signal.
-    Signal(Signal),
 }
 
 /// Decides about calls, and may do things of its own.
 pub trait Plan {
-    /// About the call with that number; `steps` are what has happened so far, to which what the plan does itself is added.
+    /// About the call with that number; what the plan does itself is added to what has happened to `files`.
     fn verdict(&mut self, number: usize, call: &Call, files: &mut FolderFiles) -> Verdict;
 
-    /// Called often while the program runs.
-    fn tick(&mut self) {}
+    /// Called often while the program runs: the signal that it gets now, after so many calls.
+    fn tick(&mut self, _calls: usize) -> Option<Signal> {
+        None
+    }
 }
 
 /// The files of the folder, and what happened to them.
@@ -81,6 +81,11 @@ impl FolderFiles {
         self.names.insert(name.to_owned(), self.created - 1);
         self.steps.push(Step::Create { name: name.to_owned() });
         self.created - 1
+    }
+
+    /// Whether there is a file of that name.
+    pub fn has(&self, name: &str) -> bool {
+        self.names.contains_key(name)
     }
 
     /// A name is gone, if it is there.
@@ -109,7 +114,10 @@ pub struct Ended {
 }
 
 enum OpenFile {
-    File { file: usize, position: usize },
+    File {
+        file: usize,
+        position: usize,
+    },
     Folder,
     /// SQLite's map of its log: what it holds after a cut is made up.
     Map,
@@ -123,20 +131,17 @@ struct Begun {
     verdict: Verdict,
 }
 
-enum Inside {
-    /// A call of no interest.
-    Other,
-    Ours(Begun),
-}
-
 /// The program and what is known of it.
-pub struct Layer<'a> {
+pub struct Layer<P> {
     folder: String,
-    plan: &'a mut dyn Plan,
+    pub plan: P,
     pub files: FolderFiles,
-    calls: Vec<Call>,
+    calls: usize,
+    /// Print each call.
+    pub tells: bool,
     open: HashMap<i64, OpenFile>,
-    inside: HashMap<Pid, Inside>,
+    /// Threads within a call, with the call where it is one on the folder.
+    inside: HashMap<Pid, Option<Begun>>,
     /// Threads that wait, and until when.
     held: BTreeMap<Instant, Vec<Pid>>,
     memory: Option<File>,
@@ -144,19 +149,22 @@ pub struct Layer<'a> {
     asked: Option<Instant>,
 }
 
+/// A program that has not ended by then is killed.
+const HANGS: Duration = Duration::from_secs(40);
 /// What an x86-64 kernel has as a call's result while it begins.
 const BEGINS: i64 = -(Errno::ENOSYS as i64);
 /// The program says so with a line like this that it is about to end by itself.
 pub const ENDING: &str = "ending";
 
-impl<'a> Layer<'a> {
+impl<P: Plan> Layer<P> {
     /// For a program that works in `folder`.
-    pub fn new(folder: &Path, plan: &'a mut dyn Plan) -> Self {
+    pub fn new(folder: &Path, plan: P) -> Self {
         Self {
             folder: folder.to_str().unwrap().to_owned(),
             plan,
             files: FolderFiles::default(),
-            calls: Vec::new(),
+            calls: 0,
+            tells: false,
             open: HashMap::new(),
             inside: HashMap::new(),
             held: BTreeMap::new(),
@@ -166,9 +174,9 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// The calls so far, each by its number.
-    pub fn calls(&self) -> &[Call] {
-        &self.calls
+    /// Number of calls so far.
+    pub const fn calls(&self) -> usize {
+        self.calls
     }
 
     /// Runs this test's program with these arguments to its end, with its log in `log`. The program waits for a line before it begins.
@@ -199,8 +207,13 @@ impl<'a> Layer<'a> {
 
     fn follow(&mut self, child: &mut Child) -> Ended {
         let mut begun = false;
+        let until = Instant::now() + HANGS;
         loop {
-            self.plan.tick();
+            if Instant::now() > until {
+                // What it did so far is looked at all the same.
+                let _ = kill(self.main, Signal::SIGKILL);
+            }
+            self.tick();
             self.let_go();
             let flags = WaitPidFlag::__WALL | WaitPidFlag::__WNOTHREAD | WaitPidFlag::WNOHANG;
             match waitpid(None, Some(flags)) {
@@ -229,6 +242,13 @@ impl<'a> Layer<'a> {
         Ended { code, after: self.asked.map(|asked| asked.elapsed()) }
     }
 
+    fn tick(&mut self) {
+        if let Some(signal) = self.plan.tick(self.calls) {
+            self.asked.get_or_insert_with(Instant::now);
+            kill(self.main, signal).unwrap();
+        }
+    }
+
     /// Lets threads go on whose time has come.
     fn let_go(&mut self) {
         while let Some(first) = self.held.first_entry().filter(|first| *first.key() <= Instant::now()) {
@@ -242,8 +262,8 @@ impl<'a> Layer<'a> {
         match self.inside.remove(&pid) {
             None if regs.rax.cast_signed() == BEGINS => return self.begins(pid, regs),
             // A new thread comes out of the call that made it.
-            None | Some(Inside::Other) => {}
-            Some(Inside::Ours(begun)) => self.ends(pid, &begun, regs),
+            None | Some(None) => {}
+            Some(Some(begun)) => self.ends(pid, &begun, regs),
         }
         go_on(pid, None);
     }
@@ -251,12 +271,16 @@ impl<'a> Layer<'a> {
     fn begins(&mut self, pid: Pid, regs: user_regs_struct) {
         let fd = regs.rdi.cast_signed() as i32 as i64;
         let Some(call) = self.call(&regs, fd) else {
-            self.inside.insert(pid, Inside::Other);
+            self.inside.insert(pid, None);
             return go_on(pid, None);
         };
-        let verdict = self.plan.verdict(self.calls.len(), &call, &mut self.files);
-        self.calls.push(call.clone());
-        self.inside.insert(pid, Inside::Ours(Begun { call, fd, regs, verdict }));
+        let verdict = self.plan.verdict(self.calls, &call, &mut self.files);
+        if self.tells {
+            println!("{} {pid}: {call:?}, {verdict:?}", self.calls);
+        }
+        self.calls += 1;
+        self.tick();
+        self.inside.insert(pid, Some(Begun { call, fd, regs, verdict }));
         match verdict {
             Verdict::Pass => {}
             Verdict::Refuse(_) | Verdict::Pretend => {
@@ -267,10 +291,6 @@ impl<'a> Layer<'a> {
                 self.held.entry(Instant::now() + time).or_default().push(pid);
                 return;
             }
-            Verdict::Signal(signal) => {
-                self.asked = (signal == Signal::SIGTERM).then(Instant::now);
-                kill(self.main, signal).unwrap();
-            }
         }
         go_on(pid, None);
     }
@@ -280,9 +300,11 @@ impl<'a> Layer<'a> {
         let made_up = match begun.verdict {
             Verdict::Refuse(error) => Some(-(error as i64)),
             // A write has taken all.
-            Verdict::Pretend if matches!(begun.call, Call::Write { .. }) => Some(begun.regs.rdx.cast_signed()),
+            Verdict::Pretend if matches!(begun.call, Call::Write { .. }) => {
+                Some(begun.regs.rdx.cast_signed())
+            }
             Verdict::Pretend => Some(0),
-            Verdict::Pass | Verdict::Wait(_) | Verdict::Signal(_) => None,
+            Verdict::Pass | Verdict::Wait(_) => None,
         };
         let result = made_up.unwrap_or(regs.rax.cast_signed());
         if made_up.is_some() {
@@ -304,7 +326,7 @@ impl<'a> Layer<'a> {
             Call::Open { name, .. } if name.ends_with("-shm") => {
                 self.open.insert(result, OpenFile::Map);
             }
-            Call::Open { name, makes, empties } => {
+            Call::Open { name, makes, empties, .. } => {
                 let file = match self.files.names.get(name) {
                     Some(file) => *file,
                     None if *makes => self.files.create(name),
@@ -376,9 +398,7 @@ impl<'a> Layer<'a> {
             libc::SYS_write => at_position(None),
             libc::SYS_pwrite64 => at_position(Some(regs.r10 as usize)),
             libc::SYS_ftruncate => is_ours.then_some(Call::Resize { length: regs.rsi as usize }),
-            libc::SYS_fallocate => {
-                is_ours.then_some(Call::Resize { length: (regs.rdx + regs.r10) as usize })
-            }
+            libc::SYS_fallocate => is_ours.then_some(Call::Resize { length: (regs.rdx + regs.r10) as usize }),
             libc::SYS_fsync | libc::SYS_fdatasync => is_ours.then_some(Call::Sync),
             libc::SYS_unlink => Some(Call::Remove { name: self.name(regs.rdi)? }),
             libc::SYS_unlinkat => Some(Call::Remove { name: self.name(regs.rsi)? }),
@@ -418,7 +438,8 @@ impl<'a> Layer<'a> {
         }
         let name = self.in_folder(&path)?;
         let has = |flag: i32| flags as i32 & flag != 0;
-        Some(Call::Open { name, makes: has(libc::O_CREAT), empties: has(libc::O_TRUNC) })
+        let writes = has(libc::O_WRONLY | libc::O_RDWR);
+        Some(Call::Open { name, makes: has(libc::O_CREAT), writes, empties: has(libc::O_TRUNC) })
     }
 
     fn name(&self, path: u64) -> Option<String> {
@@ -436,6 +457,9 @@ impl<'a> Layer<'a> {
         self.read_memory(regs.rsi, &mut bytes);
         let text = String::from_utf8(bytes).unwrap();
         for line in text.lines() {
+            if self.tells {
+                println!("{line}");
+            }
             match line.split_once(' ') {
                 Some(("fired", shot)) => self.files.steps.push(Step::Fired(shot.parse().unwrap())),
                 Some(("committed", shot)) => self.files.steps.push(Step::Committed(shot.parse().unwrap())),

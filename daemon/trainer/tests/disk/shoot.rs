@@ -65,6 +65,7 @@ pub fn shot(number: u64) -> ShotRecord {
 
 /// One phase: opens the journal, shoots, and ends in its way.
 pub fn run(path: &Path, phase: u64) {
+    wait_for_go();
     if phase == PHASE_DAMAGED {
         damage(path);
     }
@@ -108,8 +109,13 @@ fn shoot(journal: &Journal, numbers: &[u64]) {
     }
 }
 
-/// One line, one write: the trace shows it among the operations on files.
-fn say(line: &str) {
+/// Whoever started the program watches it from here on.
+pub fn wait_for_go() {
+    io::stdin().read_line(&mut String::new()).unwrap();
+}
+
+/// One line, one write: it is seen among the calls on files.
+pub fn say(line: &str) {
     io::stdout().lock().write_all(format!("{line}\n").as_bytes()).unwrap();
 }
 
