@@ -7,7 +7,7 @@ use super::{
     clock::ClockReport,
     heading_aiding::HeadingSettings,
     horizon::Mask,
-    light::{Light, LightMeter, SeaTones, SkyLight},
+    light::{Light, LightContradiction, LightMeter, SeaTones, SkyLight},
     pose::NoPose,
     registration::{Misfit, RegistrationChecks},
     sea::SeaConditions,
@@ -198,6 +198,11 @@ impl Estimator {
         let (wind, _) = self.wind();
         let (boats, tones) = (self.light.light(), self.light.tones());
         SceneLight { boats, sky: self.light.sky(wind.length()), tones }
+    }
+
+    /// Whether the sky that is seen cannot be that of the scenario's sun; `None` before a sky was seen.
+    pub fn light_contradiction(&self) -> Option<Option<LightContradiction>> {
+        self.light.contradiction()
     }
 
     /// Velocity of the air over the water (world x, y), m/s, and its force.

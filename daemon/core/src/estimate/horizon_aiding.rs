@@ -22,6 +22,8 @@ pub struct HorizonCounts {
     pub refused: u64,
     /// Pictures that were looked at and had none.
     pub none: u64,
+    /// Found although none should be seen in the scenario's visibility; not taken in.
+    pub unexpected: u64,
 }
 
 /// Looks for the horizon in pictures, now and then.
@@ -65,10 +67,11 @@ impl HorizonAiding {
         const NIS_GATE: f64 = 13.8;
         /// A horizon that is not where it is predicted is sought in all of the picture so often: that takes twice as long.
         const FREE_EVERY_NS: i64 = 200_000_000;
+        /// One that is not to be seen is looked for so often.
+        const UNEXPECTED_EVERY_NS: i64 = 2_000_000_000;
         if time < self.next {
             return None;
         }
-        let lowered = self.lowered?;
         let (Some(covariance), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return None };
         self.next = time.plus_ns(EVERY_NS);
         let world_from_camera = attitude.camera(then.world_from_imu);
@@ -78,6 +81,11 @@ impl HorizonAiding {
             sigma: (tilt + attitude::REFRACTION_SIGMA * attitude::REFRACTION_SIGMA).sqrt(),
         };
         let view = HorizonView { lens: *lens, eye_height_m: self.eye_height_m, prior: Some(prior) };
+        let Some(lowered) = self.lowered else {
+            self.next = time.plus_ns(UNEXPECTED_EVERY_NS);
+            self.counts.unexpected += u64::from(self.finder.find(picture, &view).is_ok());
+            return None;
+        };
         let predicted = self.finder.find(picture, &view);
         let is_predicted = predicted.is_ok();
         let found = predicted.or_else(|_| {

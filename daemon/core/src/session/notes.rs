@@ -1,8 +1,9 @@
-//! Notes of a session for the log: the sea in the video, the heading, the unit's clock. Each is told once when it changes.
+//! Notes of a session for the log: the sea in the video, the heading, the unit's clock, pictures that contradict the scenario. Each is told once when it changes.
 
 use crate::estimate::{
     HeadingCounts, SeaReport,
     clock::ClockReport,
+    light::LightContradiction,
     sea::{SeaSource, Unknown},
 };
 
@@ -32,6 +33,10 @@ pub(super) struct Notes {
     heading_above: usize,
     headings: HeadingCounts,
     clock_bad: bool,
+    /// For how many frames the light has contradicted the scenario.
+    light_frames: u32,
+    light: Option<LightContradiction>,
+    horizon_told: bool,
 }
 
 impl Notes {
@@ -103,6 +108,49 @@ impl Notes {
         None
     }
 
+    /// Takes in whether the picture's light is that of the scenario, after a frame; `None` where no sky was seen yet.
+    pub(super) fn light(&mut self, seen: Option<Option<LightContradiction>>) {
+        /// Three seconds: a camera that starts is dark or bright for less.
+        const FRAMES: u32 = 90;
+        let Some(seen) = seen else { return };
+        self.light_frames = if seen == self.light { 0 } else { self.light_frames + 1 };
+        if self.light_frames < FRAMES {
+            return;
+        }
+        self.light_frames = 0;
+        self.light = seen;
+        match seen {
+            Some(LightContradiction::BrightAtNight) => self.say(
+                true,
+                "the scenario's sun is below the horizon and the picture's sky is bright: boats are lit as at night; give [light] \
+                 of the scenario the time or the sun of the picture"
+                    .to_owned(),
+            ),
+            Some(LightContradiction::DarkByDay) => self.say(
+                true,
+                "the scenario's sun stands above the horizon and the picture's sky is dark: boats are lit as by day; give [light] \
+                 of the scenario the time or the sun of the picture, or open the lens's cap"
+                    .to_owned(),
+            ),
+            None => self.say(false, "the picture's light is that of the scenario again".to_owned()),
+        }
+    }
+
+    /// Takes in how many horizons were seen that the scenario's visibility hides.
+    pub(super) fn unexpected_horizons(&mut self, count: u64) {
+        /// A cloud's edge is taken for one now and then.
+        const MANY: u64 = 10;
+        if count >= MANY && !self.horizon_told {
+            self.horizon_told = true;
+            self.say(
+                true,
+                "the picture shows a horizon that the scenario's haze would hide, and it is not used: give [light] visibility_km of the \
+                 scenario the picture's"
+                    .to_owned(),
+            );
+        }
+    }
+
     /// Takes in the unit's clock in frame number `frame`.
     pub(super) fn clock(&mut self, frame: u64, report: impl FnOnce() -> Option<ClockReport>) {
         if !frame.is_multiple_of(CLOCK_FRAMES) {
@@ -166,6 +214,20 @@ mod tests {
         let mut notes = Notes::default();
         assert!(notes.cross(3.0).expect("said").contains("above 2 deg"));
         assert!(notes.cross(0.0).expect("said").contains("0.00 deg again"));
+    }
+
+    #[test]
+    fn light_that_contradicts_the_scenario_is_told_once_after_three_seconds() {
+        let mut notes = Notes::default();
+        let at_night = Some(LightContradiction::BrightAtNight);
+        let told = |notes: &Notes| notes.new_ones().iter().map(|n| n.warning).collect::<Vec<_>>();
+        notes.light(None);
+        (0..89).for_each(|_| notes.light(Some(at_night)));
+        assert!(told(&notes).is_empty());
+        (0..500).for_each(|_| notes.light(Some(at_night)));
+        assert_eq!(told(&notes), [true]);
+        (0..200).for_each(|_| notes.light(Some(None)));
+        assert_eq!(told(&notes), [true, false]);
     }
 
     #[test]

@@ -68,6 +68,15 @@ impl Light {
     }
 }
 
+/// A picture's light that cannot be that of the scenario's sun.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LightContradiction {
+    /// The sun is below the horizon by more than six degrees, and the sky is bright.
+    BrightAtNight,
+    /// The sun stands above the horizon by more than six degrees, and the sky is dark.
+    DarkByDay,
+}
+
 /// Mean linear colours of sky and sea as the camera sees them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Means {
@@ -117,6 +126,25 @@ impl LightMeter {
             }
         };
         self.means = Some((time, means));
+    }
+
+    /// Whether the sky that is seen cannot be that of a sun so high; `None` before a sky was seen.
+    pub fn contradiction(&self) -> Option<Option<LightContradiction>> {
+        /// Sines of the sun's elevation at the end of civil twilight, and above which it is day under every cloud.
+        const NIGHT_BELOW: f64 = -0.1045;
+        const DAY_ABOVE: f64 = 0.1;
+        /// Radiance of a sky by day, that no camera makes of a night's, and of one that is none by day, over that of white.
+        const BRIGHT: f32 = 0.2;
+        const DARK: f32 = 0.01;
+        let (_, means) = self.means?;
+        let (sky, sine) = (means.sky.dot(LUMINANCE), self.sun_direction.z);
+        Some(if sine < NIGHT_BELOW && sky > BRIGHT {
+            Some(LightContradiction::BrightAtNight)
+        } else if sine > DAY_ABOVE && sky < DARK {
+            Some(LightContradiction::DarkByDay)
+        } else {
+            None
+        })
     }
 
     /// The sky that boats hide from a sea under a wind of `wind_m_s`: what is seen of it above the horizon, as bright and of the colour
@@ -276,6 +304,24 @@ mod tests {
         // A dark picture ten time constants later is followed.
         meter.observe(Time::from_ns(0).plus_secs(10.0), &two_tone(60, 30), &lens, &camera);
         assert!(meter.light().sky.x < 0.06);
+    }
+
+    #[test]
+    fn a_sky_that_cannot_be_that_of_the_sun_is_told() {
+        let lens = Lens::pinhole(64, 64, 1.0);
+        let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
+        let of = |sine: f64, code: u8| {
+            let mut meter = LightMeter::new(DVec3::new((1.0 - sine * sine).sqrt(), 0.0, sine), false);
+            assert_eq!(meter.contradiction(), None);
+            meter.observe(Time::from_ns(0), &two_tone(code, code / 2), &lens, &camera);
+            meter.contradiction().expect("a sky was seen")
+        };
+        assert_eq!(of(-0.2, 180), Some(LightContradiction::BrightAtNight));
+        assert_eq!(of(0.5, 10), Some(LightContradiction::DarkByDay));
+        // Dusk, an overcast day, a night.
+        for (sine, code) in [(-0.08, 200), (0.3, 90), (-0.5, 60), (0.02, 20)] {
+            assert_eq!(of(sine, code), None, "{sine} {code}");
+        }
     }
 
     /// A sea that mirrors `share` of the sky that is seen above it.

@@ -56,7 +56,7 @@ pub enum Outcome {
         miss_m: f64,
         /// When it was closest.
         time: Time,
-        /// Distance from the muzzle at that time, metres.
+        /// Distance of that boat from the muzzle at that time, metres; of the round's end where there was no boat.
         range_m: f64,
     },
     /// Fired while the trainer could not know where the barrel pointed.

@@ -36,7 +36,7 @@ pub struct Approach {
     pub distance_m: f64,
     /// When.
     pub time_s: f64,
-    /// Distance from the muzzle then, metres.
+    /// Distance of the boat's middle from the muzzle then, metres: a round that falls short ends far from it.
     pub range_m: f64,
 }
 
@@ -157,7 +157,7 @@ impl Round {
         }
         let closest = closest_to_surface(moving.model, a, b, within_m);
         if let Some(Closest { fraction, distance_m }) = closest {
-            let range_m = from.1.lerp(to.1, fraction).distance(self.muzzle);
+            let range_m = poses[0].position.lerp(poses[1].position, fraction).distance(self.muzzle);
             let time_s = from.0 + fraction * (to.0 - from.0);
             self.nearest = Some(Approach { boat, distance_m, time_s, range_m });
         }
