@@ -106,19 +106,26 @@ impl Hypothesis {
 
     /// The same with weights of its own for the alarm and for the exclusion.
     fn add_apart(&mut self, as_believed: f64, other: f64, weight: f64, against: f64) {
-        /// An observation that a hypothesis does not foretell better by this, nats, is evidence against it. Without that, one that fits
-        /// itself to what is seen, as a mount that is off does, gathers hundredths of a degree for hours until it is believed. Half a
-        /// degree of the vertical is worth as much.
-        const SLACK: f64 = 0.15;
         /// Evidence at which a hypothesis is excluded, nats.
         const EXCLUDED: f64 = 7.0;
         /// However much better this foretold before, what was wrong may have been put right.
         const LEAST: f64 = -40.0;
         let better = 0.5 * (as_believed - other);
-        let slack = if self.is_believed { 0.0 } else { SLACK };
-        self.sum = (self.sum + weight * (better - slack)).max(0.0);
+        self.sum = (self.sum + weight * better).max(0.0);
         self.against = (self.against - against * better).max(LEAST);
         self.is_excluded |= self.against >= EXCLUDED;
+    }
+
+    /// Pays for having been held against a vertical.
+    ///
+    /// One that it does not foretell better by this, nats, is evidence against it. Without that, a hypothesis that a lasting small error
+    /// of the unit favours, as a mount that is off or a wider lens, gathers hundredths of a degree for hours until it is believed. Half a
+    /// degree is worth as much.
+    fn pay(&mut self) {
+        const SLACK: f64 = 0.15;
+        if !self.is_believed {
+            self.sum = (self.sum - SLACK / ALIKE).max(0.0);
+        }
     }
 
     /// Tests whether the observations so far leave it possible. A mount that is off is held against the horizon alone.
@@ -359,6 +366,9 @@ impl Registration {
                 UpExpected::Wanders => {
                     hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE);
                 }
+            }
+            if matches!(hypothesis.up, UpExpected::At(_) | UpExpected::Off) {
+                hypothesis.pay();
             }
         }
         self.decide();

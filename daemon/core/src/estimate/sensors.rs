@@ -228,9 +228,10 @@ impl Sensors {
         self.attitude.at(time)
     }
 
-    /// Whether the newest picture was young enough at `time`.
+    /// Whether the newest picture was young enough at `time`: by the camera's own stamps. By how much they are wrong against the unit's is no
+    /// matter of whether pictures come.
     pub fn frame_fresh(&self, time: Time) -> bool {
-        self.video_time().is_some_and(|t| time.ns_since(t) <= STALE_NS)
+        self.frame.as_ref().is_some_and(|frame| time.ns_since(frame.mid_exposure) <= STALE_NS)
     }
 
     /// Time of the newest orientation.
@@ -361,6 +362,17 @@ mod tests {
         assert_eq!(said.map(Fault::cause), Some("IMU STUCK"));
         s.imu(&sample(301));
         assert_eq!(s.trouble(now(301)), None);
+    }
+
+    #[test]
+    fn a_camera_whose_stamps_are_late_is_not_lost() {
+        let mut s = sensors();
+        s.time_offset_ns = -60_000_000;
+        (0..200).for_each(|i| s.imu(&sample(i)));
+        s.frame(&frame(920, 4));
+        let now = |ms: i64| Time::from_ns(ms * 1_000_000);
+        assert_eq!(s.trouble(now(990)), None, "a picture 70 ms old by its own stamp");
+        assert_eq!(s.trouble(now(1021)), Some(Fault::CamLost));
     }
 
     #[test]
