@@ -169,6 +169,14 @@ fn program() -> Vec<FaultRow> {
             run: hang,
         }),
         FaultRow::Own(SpecialCase {
+            number: "43",
+            fault: "Memory used up",
+            injected: "while rounds are fired the service's limit of memory falls to 16 MB, and rises again",
+            code: "BOOT_DIRTY",
+            target: "no stored round lost, READY again by itself",
+            run: memory_used_up,
+        }),
+        FaultRow::Own(SpecialCase {
             number: "40",
             fault: "Crash loop",
             injected: "SIGKILL as soon as it runs, four times",
@@ -419,6 +427,26 @@ fn hang(bench: &mut HilBench) -> Result<CaseResult> {
     let after = main_pid(bench)?;
     let note = format!("told by the trainer: {own}, by systemd: {systemd}; process {before}, then {after}");
     Ok(CaseResult { lcd: "frozen".into(), met: systemd && after != before, note, ..CaseResult::default() })
+}
+
+fn memory_used_up(bench: &mut HilBench) -> Result<CaseResult> {
+    bench.ready(bench.scaled(2.0))?;
+    bench.shoot(400)?;
+    // Until the last round has ended and is stored.
+    thread::sleep(bench.scaled(2.0));
+    let (stored, before) = (bench.rounds()?.len(), main_pid(bench)?);
+    bench.shoot(400)?;
+    let from = bench.machine.guest.now_ns();
+    let limit = "systemctl set-property --runtime bowwave.service MemoryMax=";
+    bench.machine.guest.shell(&format!("{limit}16M; sleep 2; {limit}1G"))?;
+    let killed = |e: &JournalEntry| e.text().contains("oom-kill");
+    bench.machine.guest.journal(from, Duration::from_secs(20), "the kill for want of memory", killed)?;
+    bench.told("BOOT_DIRTY", JournalChange::Came, from, bench.scaled(15.0))?;
+    bench.ready(bench.scaled(15.0))?;
+    let (kept, after) = (bench.rounds()?.len(), main_pid(bench)?);
+    let lcd = bench.status()?;
+    let note = format!("{stored} rounds were stored before, {kept} after; process {before}, then {after}");
+    Ok(CaseResult { lcd, met: stored > 0 && kept >= stored && after != before, note, ..CaseResult::default() })
 }
 
 fn crash_loop(bench: &mut HilBench) -> Result<CaseResult> {
