@@ -30,16 +30,16 @@ const NAMES: [&str; 9] = [
 pub struct Trial {
     /// Its name.
     pub name: String,
+    /// Times of its samples, seconds.
+    pub time_s: Vec<f64>,
+    /// Orientation of the unit in the world, where it is known and counts.
+    pub truth: Vec<Option<DQuat>>,
     /// Samples a second.
     pub rate_hz: f64,
-    /// Their times, seconds.
-    pub time_s: Vec<f64>,
     /// Angular rate, rad/s, the unit's axes.
     pub rate: Vec<DVec3>,
     /// Specific force, m/s^2, the unit's axes.
     pub force: Vec<DVec3>,
-    /// Orientation of the unit in the world, where it is known and counts.
-    pub truth: Vec<Option<DQuat>>,
     /// Bias of the gyro, rad/s: the mean of a rest, and between rests what lies between.
     pub bias: Vec<DVec3>,
 }

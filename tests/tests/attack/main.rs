@@ -4,12 +4,7 @@
 //! Files are made of good ones by damage of many kinds. `BOWWAVE_MUTATIONS` says how many of each kind (12 unless told); what breaks the
 //! program is kept in target/attack.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::panic,
-    reason = "a test that cannot go on has failed"
-)]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 mod mutation;
 mod targets;
@@ -35,7 +30,7 @@ const AT_ONCE: usize = 2;
 #[test]
 fn hostile_files_neither_crash_nor_hang_the_program_nor_forge_its_lines() {
     let asked = std::env::var("BOWWAVE_MUTATIONS").ok();
-    let count = asked.map_or(MUTATIONS, |text| text.parse().expect("BOWWAVE_MUTATIONS is no number"));
+    let count = asked.map_or(MUTATIONS, |text| text.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
     let mut broken = 0;
     for target in targets::all(folder.path()) {
@@ -44,7 +39,11 @@ fn hostile_files_neither_crash_nor_hang_the_program_nor_forge_its_lines() {
             "{}: {count} files, of which {} were taken and {} refused; {faults} broke it",
             target.name, seen.taken, seen.refused
         );
-        assert!(count < 100 || (seen.taken > 0 && seen.refused > 0), "{}: damage of one kind only", target.name);
+        assert!(
+            count < 100 || (seen.taken > 0 && seen.refused > 0),
+            "{}: damage of one kind only",
+            target.name
+        );
         broken += faults;
     }
     assert_eq!(broken, 0, "files that broke the program are in target/attack");

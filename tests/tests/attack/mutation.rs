@@ -35,7 +35,8 @@ pub struct Mutator(Pcg64);
 
 impl Mutator {
     pub fn new(target: &str, number: u64) -> Self {
-        let name = target.bytes().fold(7u64, |hash, byte| hash.wrapping_mul(131).wrapping_add(u64::from(byte)));
+        let name =
+            target.bytes().fold(7u64, |hash, byte| hash.wrapping_mul(131).wrapping_add(u64::from(byte)));
         Self(Pcg64::seed_from_u64(name ^ number.wrapping_mul(0x9e37_79b9_7f4a_7c15)))
     }
 

@@ -44,13 +44,18 @@ impl Target {
     pub fn seeds(&self) -> Vec<Vec<u8>> {
         let read = |path: &Path| {
             let bytes = fs::read(path).unwrap();
-            assert!(bytes.len() < 1 << 20, "{} is too large to be damaged thousands of times", path.display());
+            assert!(
+                bytes.len() < 1 << 20,
+                "{} is too large to be damaged thousands of times",
+                path.display()
+            );
             bytes
         };
         let mut files = Vec::new();
         for path in &self.good {
             if path.is_dir() {
-                let mut found: Vec<_> = fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect();
+                let mut found: Vec<_> =
+                    fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()).collect();
                 found.sort();
                 files.extend(found);
             } else {
@@ -142,7 +147,8 @@ pub fn all(folder: &Path) -> Vec<Target> {
     play(small_recording(), &run, 0, &["--record", "--frames", "20", "--video", "--stills", "3"]);
     let still = run.join("frame-00003.png");
     let board = folder.join("board.yaml");
-    fs::write(&board, "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.022\ntagSpacing: 0.3\n").unwrap();
+    fs::write(&board, "target_type: 'aprilgrid'\ntagCols: 6\ntagRows: 6\ntagSize: 0.022\ntagSpacing: 0.3\n")
+        .unwrap();
     let journal = folder.join("hits.sqlite");
     shoot(&journal);
     let scenario = b"[[boat]]\nname = \"a\"\nmodel = \"boat.glb\"\nbearing_deg = 0\nrange_m = 200\nheading_deg = 90\nspeed_kn = 5\n";
@@ -168,8 +174,18 @@ pub fn all(folder: &Path) -> Vec<Target> {
                 &["calibrate", "intrinsics", ".", "--out", "file.toml"],
             )
         },
-        target("recording", "file.mcap", vec![run.join("recording.mcap"), corpus("recording")], &["replay", "file.mcap"]),
-        target("journal", "file.sqlite", vec![journal], &["hits", "file.sqlite", "--all-runs", "--format", "csv"]),
+        target(
+            "recording",
+            "file.mcap",
+            vec![run.join("recording.mcap"), corpus("recording")],
+            &["replay", "file.mcap"],
+        ),
+        target(
+            "journal",
+            "file.sqlite",
+            vec![journal],
+            &["hits", "file.sqlite", "--all-runs", "--format", "csv"],
+        ),
         target(
             "video",
             "file.mp4",
@@ -209,7 +225,9 @@ fn shoot(path: &Path) {
         };
         let muzzle = DVec3::new(0.0, 0.5, 3.0);
         let shot = u64::from(shot);
-        journal.shot(&ShotRecord { shot, fired: time, muzzle, bore: DVec3::Y, pose_age_ns: 0, outcome }).unwrap();
+        journal
+            .shot(&ShotRecord { shot, fired: time, muzzle, bore: DVec3::Y, pose_age_ns: 0, outcome })
+            .unwrap();
     }
     journal.finish().unwrap();
 }

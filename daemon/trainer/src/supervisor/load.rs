@@ -24,8 +24,6 @@ const LATE: usize = 2;
 const STEP_WITHIN: usize = 10;
 /// For so long no frame may have been late before all is drawn again: less than a second, so that the sailor has it back within one.
 const CALM: usize = 24;
-/// Nine frames of ten must be expected to take less than this with all drawn again, milliseconds, of the 33 that there are.
-const BACK_MS: f64 = 28.0;
 
 /// A frame that was due.
 #[derive(Clone, Copy, Debug)]
@@ -75,6 +73,8 @@ impl LoadWatch {
 
     /// Decides anew; each fault, and why it is there: `None` where it is not.
     pub fn decide(&mut self) -> [(Fault, Option<String>); STEPS.len() + 1] {
+        /// Nine frames of ten must be expected to take less than this with all drawn again, milliseconds, of the 33 that there are.
+        const BACK_MS: f64 = 28.0;
         if self.left_out < STEPS.len() && self.late(STEP_WITHIN.min(self.since)) >= LATE {
             if self.left_out == 0 {
                 self.whole_ms = self.late_ms();

@@ -114,13 +114,13 @@ pub struct Ended {
 }
 
 enum OpenFile {
+    /// SQLite's map of its log: what it holds after a cut is made up.
+    Map,
+    Folder,
     File {
         file: usize,
         position: usize,
     },
-    Folder,
-    /// SQLite's map of its log: what it holds after a cut is made up.
-    Map,
 }
 
 /// A call between its beginning and its end.

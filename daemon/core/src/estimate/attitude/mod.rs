@@ -31,18 +31,8 @@ use crate::{
     time::Time,
 };
 
-/// A unit without an orientation of its own is levelled by the mean specific force over this long.
-const LEVEL_NS: i64 = 250_000_000;
-
-/// Inclination after levelling a unit that waves move, and at most, radians.
-const START_TILT: f64 = 0.06;
-const START_TILT_MOST: f64 = 0.6;
-
 /// A gap longer than this is not bridged by integrating: the unit is levelled anew.
 const GAP_NS: i64 = 1_000_000_000;
-
-/// Steps of a filter that are shorter or longer than this are no unit's, seconds.
-const PERIODS_S: [f64; 2] = [1e-4, 0.1];
 
 /// Whose estimate of the orientation is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -434,6 +424,10 @@ impl Attitude {
 
     /// Gathers specific force until it tells which way is up.
     fn level_out(&mut self, time: Time, sample: &ImuSample, rate: DVec3) -> Option<OrientationSample> {
+        /// A unit without an orientation of its own is levelled by the mean specific force over this long.
+        const LEVEL_NS: i64 = 250_000_000;
+        /// Steps of a filter that are shorter or longer than this are no unit's, seconds.
+        const PERIODS_S: [f64; 2] = [1e-4, 0.1];
         let (since, sum, squares, count) = match self.state {
             FilterState::Levelling { since, sum, squares, count } => {
                 (since.unwrap_or(time), sum, squares, count)
@@ -464,6 +458,9 @@ impl Attitude {
 /// shows in how the force changes and in how its size differs from gravity's.
 fn start_tilt(mean: DVec3, square: f64) -> f64 {
     let moved = (square - mean.length_squared()).max(0.0) + (mean.length() - GRAVITY_M_S2).powi(2);
+    /// Inclination after levelling a unit that waves move, and at most, radians.
+    const START_TILT: f64 = 0.06;
+    const START_TILT_MOST: f64 = 0.6;
     START_TILT.hypot(moved.sqrt() / GRAVITY_M_S2).min(START_TILT_MOST)
 }
 

@@ -2,10 +2,7 @@
 
 use std::{
     path::Path,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic},
     thread,
     time::{Duration, Instant},
 };
@@ -34,7 +31,7 @@ pub fn run(folder: &Path) {
     wait_for_go();
     log::set_logger(&StderrLog).unwrap();
     log::set_max_level(log::LevelFilter::Warn);
-    let ends = Arc::new(AtomicBool::new(false));
+    let ends = Arc::new(atomic::AtomicBool::new(false));
     flag::register(SIGTERM, Arc::clone(&ends)).unwrap();
     let run = Run { started: Some(Time::from_ns(1_000_000_000)), ..Run::default() };
     let options = StorageOptions {
@@ -53,7 +50,7 @@ pub fn run(folder: &Path) {
         events.clear();
     };
     for number in 1..=2 * ROUNDS {
-        if ends.load(Ordering::Relaxed) {
+        if ends.load(atomic::Ordering::Relaxed) {
             break;
         }
         say(&format!("fired {number}"));
@@ -64,7 +61,7 @@ pub fn run(folder: &Path) {
         }
     }
     let shot = Instant::now();
-    while !ends.load(Ordering::Relaxed) && shot.elapsed() < HOLD {
+    while !ends.load(atomic::Ordering::Relaxed) && shot.elapsed() < HOLD {
         poll(&mut storage);
         thread::sleep(Duration::from_millis(2));
     }

@@ -24,14 +24,20 @@ use crate::{
 /// What became of the rounds.
 #[derive(Debug, Default)]
 pub struct CaseReport {
-    pub reported: usize,
-    pub lost: usize,
-    pub in_side_file: usize,
-    pub in_log: usize,
-    /// How long the end took from when it was asked for.
-    pub end: Option<Duration>,
     /// All that is wrong, a line each.
     pub faults: Vec<String>,
+    /// How long the end took from when it was asked for.
+    pub end: Option<Duration>,
+    pub rounds: RoundCounts,
+}
+
+/// Rounds that were reported as committed, that must be somewhere and are not, and that stand beside the journal and in the log.
+#[derive(Debug, Default)]
+pub struct RoundCounts {
+    pub reported: usize,
+    pub lost: usize,
+    pub aside: usize,
+    pub logged: usize,
 }
 
 /// A run of the program.
@@ -72,7 +78,7 @@ impl Shooting {
             return report;
         }
         self.steps.iter().for_each(|step| rounds.take(step));
-        report.reported = rounds.reported.len();
+        report.rounds.reported = rounds.reported.len();
         let was_killed = matches!(case.end, End::Killed(_)) && self.ended.code.is_none();
         if !was_killed {
             if self.ended.code != Some(0) {
@@ -89,8 +95,8 @@ impl Shooting {
                 logged.insert(row["shot"].as_u64().unwrap());
             }
         }
-        report.in_log = logged.len();
-        report.in_side_file = rows_aside(&self.folder);
+        report.rounds.logged = logged.len();
+        report.rounds.aside = rows_aside(&self.folder);
         let must = rounds.must(case, was_killed);
         // What a file system that gave up had not written is not in this folder, although it still reads so.
         let on_disk = if case.trouble_is_abort() && !was_killed {
@@ -126,7 +132,7 @@ impl Shooting {
                 next += 1;
             }
         }
-        report.reported = rounds.reported.len();
+        report.rounds.reported = rounds.reported.len();
     }
 }
 
@@ -223,7 +229,7 @@ fn compare(
     found.extend(stored.into_iter().flatten().map(|stored| stored.record.shot));
     let lost: Vec<_> = must.difference(&found).collect();
     if !lost.is_empty() {
-        report.lost += lost.len();
+        report.rounds.lost += lost.len();
         report.faults.push(format!("rounds {lost:?} are nowhere"));
     }
 }

@@ -22,7 +22,7 @@ use std::{
 };
 
 use cases::{Case, DiskFailure, Lasting, Trouble, cases};
-use look::{CaseReport, Shooting};
+use look::{CaseReport, RoundCounts, Shooting};
 
 const CASES: usize = 200;
 /// Cases that compute and write side by side, and those that mostly wait.
@@ -95,15 +95,16 @@ fn print(reports: &[Done]) {
     println!("| Trouble | Cases | Rounds reported | Lost | In the side file | In the log | Longest end, s |");
     println!("|---|---|---|---|---|---|---|");
     for (name, done) in by_trouble {
-        let sum = |value: fn(&CaseReport) -> usize| done.iter().map(|(_, _, r)| value(r)).sum::<usize>();
+        let sum =
+            |value: fn(&RoundCounts) -> usize| done.iter().map(|(_, _, r)| value(&r.rounds)).sum::<usize>();
         let end = done.iter().filter_map(|(_, _, r)| r.end).max().unwrap_or_default();
         println!(
             "| {name} | {} | {} | {} | {} | {} | {:.2} |",
             done.iter().map(|(_, case, _)| case.count()).sum::<usize>(),
             sum(|r| r.reported),
             sum(|r| r.lost),
-            sum(|r| r.in_side_file),
-            sum(|r| r.in_log),
+            sum(|r| r.aside),
+            sum(|r| r.logged),
             end.as_secs_f64()
         );
     }

@@ -446,7 +446,12 @@ fn memory_used_up(bench: &mut HilBench) -> Result<CaseResult> {
     let (kept, after) = (bench.rounds()?.len(), main_pid(bench)?);
     let lcd = bench.status()?;
     let note = format!("{stored} rounds were stored before, {kept} after; process {before}, then {after}");
-    Ok(CaseResult { lcd, met: stored > 0 && kept >= stored && after != before, note, ..CaseResult::default() })
+    Ok(CaseResult {
+        lcd,
+        met: stored > 0 && kept >= stored && after != before,
+        note,
+        ..CaseResult::default()
+    })
 }
 
 fn crash_loop(bench: &mut HilBench) -> Result<CaseResult> {
