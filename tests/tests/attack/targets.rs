@@ -151,7 +151,7 @@ pub fn all(folder: &Path) -> Vec<Target> {
         .unwrap();
     let journal = folder.join("hits.sqlite");
     shoot(&journal);
-    let scenario = b"[[boat]]\nname = \"a\"\nmodel = \"boat.glb\"\nbearing_deg = 0\nrange_m = 200\nheading_deg = 90\nspeed_kn = 5\n";
+    let scenario = b"[[boat]]\nname = \"a\"\nmodel = \"boat.glb\"\ncourse = \"still\"\nbearing_deg = 0\nrange_m = 200\nheading_deg = 90\n";
     let target = |name, file, good: Vec<PathBuf>, arguments: &[&str]| Target {
         name,
         file,

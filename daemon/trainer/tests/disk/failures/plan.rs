@@ -3,6 +3,11 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
@@ -38,44 +43,53 @@ pub struct TroublePlan {
     begun: Option<Instant>,
     has_refused: bool,
     has_signalled: bool,
-    lock: Lock,
+    locker: Option<Locker>,
 }
 
-enum Lock {
-    None,
-    /// Tried for next at that time.
-    Wanted(Instant),
-    Held(#[expect(dead_code, reason = "it is held")] Connection, Instant),
+/// Somebody who locks the database, in a thread: SQLite may wait for the program that is traced meanwhile.
+struct Locker {
+    ends: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Locker {
+    fn start(path: PathBuf, lasting: Lasting) -> Self {
+        let ends = Arc::new(AtomicBool::new(false));
+        let asked = Arc::clone(&ends);
+        let thread = thread::spawn(move || {
+            let mut held: Option<(Connection, Instant)> = None;
+            while !asked.load(Ordering::Relaxed) {
+                match &held {
+                    None => held = lock(&path).ok().map(|connection| (connection, Instant::now())),
+                    Some((_, since)) if lasting == Lasting::Some && since.elapsed() > LOCKED => break,
+                    Some(_) => {}
+                }
+                thread::sleep(LOCK_PAUSE);
+            }
+        });
+        Self { ends, thread: Some(thread) }
+    }
+}
+
+impl Drop for Locker {
+    fn drop(&mut self) {
+        self.ends.store(true, Ordering::Relaxed);
+        self.thread.take().unwrap().join().unwrap();
+    }
 }
 
 impl TroublePlan {
     pub fn new(folder: &Path, case: Option<Case>) -> Self {
         let folder = folder.to_path_buf();
-        Self { case, folder, begun: None, has_refused: false, has_signalled: false, lock: Lock::None }
+        Self { case, folder, begun: None, has_refused: false, has_signalled: false, locker: None }
     }
 
-    /// Locks the database as soon as that can be, and lets it go where it is not for ever.
-    fn hold_lock(&mut self, lasting: Lasting) {
-        match &self.lock {
-            Lock::Wanted(next) if Instant::now() >= *next => {
-                self.lock = match lock(&self.folder.join(shoot::NAME)) {
-                    Ok(connection) => Lock::Held(connection, Instant::now()),
-                    Err(_) => Lock::Wanted(Instant::now() + LOCK_PAUSE),
-                };
-            }
-            Lock::Held(_, since) if lasting == Lasting::Some && since.elapsed() > LOCKED => {
-                self.lock = Lock::None;
-            }
-            Lock::Held(..) | Lock::Wanted(_) | Lock::None => {}
-        }
-    }
-
-    fn meddle(&mut self, meddling: Meddling, files: &mut FolderFiles) {
+    fn meddle(&mut self, meddling: Meddling, lasting: Lasting, files: &mut FolderFiles) {
         let names = [shoot::NAME.to_owned(), format!("{}-wal", shoot::NAME)];
         let path = |name: &str| self.folder.join(name);
         match meddling {
             Meddling::Locked => {
-                self.lock = Lock::Wanted(Instant::now());
+                self.locker = Some(Locker::start(path(&names[0]), lasting));
                 return;
             }
             Meddling::Moved => {
@@ -137,9 +151,9 @@ impl Plan for TroublePlan {
             files.steps.push(Step::Trouble);
         }
         match case.trouble {
-            Trouble::Meddling(meddling, _) => {
+            Trouble::Meddling(meddling, lasting) => {
                 if since == 0 {
-                    self.meddle(meddling, files);
+                    self.meddle(meddling, lasting, files);
                 }
                 Verdict::Pass
             }
@@ -157,9 +171,6 @@ impl Plan for TroublePlan {
 
     fn tick(&mut self, calls: usize) -> Option<Signal> {
         let case = self.case?;
-        if let Trouble::Meddling(_, lasting) = case.trouble {
-            self.hold_lock(lasting);
-        }
         let (later, signal) = match case.end {
             End::Terminated(later) => (later, Signal::SIGTERM),
             End::Killed(later) => (later, Signal::SIGKILL),
