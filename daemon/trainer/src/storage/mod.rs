@@ -42,8 +42,10 @@ const HITS_BYTES: u64 = 32 << 20;
 
 /// How long to wait before a journal that cannot be opened is tried again.
 const OPEN_AGAIN_NS: i64 = NS_PER_S;
-/// The start waits so long for the journal; a slow disk, or one that somebody has locked, opens it later.
+/// The start waits so long for the journal; a slow disk, or one that somebody has locked, opens it later...
 const OPEN_WITHIN: Duration = Duration::from_millis(500);
+/// ...and is told of after so long.
+const OPEN_TOLD_NS: i64 = 3 * NS_PER_S;
 
 /// Settings of the storage of a run.
 #[derive(Clone, Debug)]
@@ -84,6 +86,8 @@ enum JournalState {
     Open(Journal),
     Shut {
         error: JournalError,
+        /// From when on that is a fault.
+        told_from: Time,
         next: Time,
         /// The disk may take its time: the frame does not wait for it.
         attempt: Option<JoinHandle<Result<Journal, JournalError>>>,
@@ -93,9 +97,10 @@ enum JournalState {
 impl JournalState {
     /// The journal, if it can be opened soon.
     fn start(options: &StorageOptions) -> Self {
-        let shut = |error, attempt| {
-            log::error!("{error}; hits are kept in memory until it can be opened");
-            Self::Shut { error, next: now().plus_ns(OPEN_AGAIN_NS), attempt }
+        let shut = |error: JournalError, attempt: Option<JoinHandle<_>>| {
+            log::warn!("{error}; hits are kept in memory until it can be opened");
+            let told_from = now().plus_ns(if attempt.is_some() { OPEN_TOLD_NS } else { 0 });
+            Self::Shut { error, told_from, next: now().plus_ns(OPEN_AGAIN_NS), attempt }
         };
         let slow = |reason: String| JournalError::Disk { path: options.journal_path(), reason };
         let thread = match options.open_aside() {
@@ -250,7 +255,7 @@ impl Storage {
 
     /// Tries to open a journal that could not be opened.
     fn open_again(&mut self, faults: &mut FaultLog, events: &mut Vec<Event>) {
-        let JournalState::Shut { error, next, attempt } = &mut self.store else { return };
+        let JournalState::Shut { error, told_from, next, attempt } = &mut self.store else { return };
         if let Some(thread) = attempt.take_if(|thread| thread.is_finished()) {
             match opened(thread) {
                 Ok(journal) => {
@@ -261,7 +266,7 @@ impl Storage {
                     self.store = JournalState::Open(journal);
                     return;
                 }
-                Err(e) => *error = e,
+                Err(e) => (*error, *told_from) = (e, now()),
             }
             *next = now().plus_ns(OPEN_AGAIN_NS);
         }
@@ -282,6 +287,7 @@ impl Storage {
             JournalState::Open(journal) => journal
                 .fault()
                 .map(|b| (b.fault, format!("{} ({} rounds wait in memory)", b.message, b.waiting))),
+            JournalState::Shut { told_from, .. } if now() < *told_from => None,
             JournalState::Shut { error, .. } => {
                 Some((error.fault(), format!("{error} ({} rounds wait in memory)", self.waiting.len())))
             }
