@@ -296,7 +296,7 @@ impl Session {
         if let Some(report) = self.estimator.sea() {
             self.notes.sea(&report);
         }
-        self.notes.light(self.estimator.light_contradiction());
+        self.notes.light(self.estimator.sky_agreement());
         self.notes.unexpected_horizons(self.estimator.counts().horizons.unexpected);
         self.notes.heading(self.estimator.heading_sigma(), &self.estimator.counts().headings);
         self.notes.clock(self.composer.scene().frame + 1, || self.estimator.unit_clock());

@@ -7,7 +7,7 @@ use super::{
     clock::ClockReport,
     heading_aiding::HeadingSettings,
     horizon::Mask,
-    light::{Light, LightContradiction, LightMeter, SeaTones, SkyLight},
+    light::{Light, LightMeter, SeaTones, SkyAgreement, SkyLight},
     pose::NoPose,
     registration::{Misfit, RegistrationChecks},
     sea::SeaConditions,
@@ -200,9 +200,9 @@ impl Estimator {
         SceneLight { boats, sky: self.light.sky(wind.length()), tones }
     }
 
-    /// Whether the sky that is seen cannot be that of the scenario's sun; `None` before a sky was seen.
-    pub fn light_contradiction(&self) -> Option<Option<LightContradiction>> {
-        self.light.contradiction()
+    /// Agreement of the sky in the pictures with the scenario's sun; `None` before a sky was seen.
+    pub fn sky_agreement(&self) -> Option<SkyAgreement> {
+        self.light.agreement()
     }
 
     /// Velocity of the air over the water (world x, y), m/s, and its force.

@@ -67,7 +67,6 @@ struct Hypothesis {
     /// The reverse since the start, nats (sequential test).
     against: f64,
     is_excluded: bool,
-    is_believed: bool,
 }
 
 /// Where a hypothesis expects up to be seen.
@@ -86,17 +85,7 @@ enum UpExpected {
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
         let off = MeanOff { mean: DVec3::ZERO, count: 0 };
-        Self {
-            misfit,
-            turn,
-            up,
-            late_ns: 0,
-            off,
-            sum: 0.0,
-            against: 0.0,
-            is_excluded: false,
-            is_believed: false,
-        }
+        Self { misfit, turn, up, late_ns: 0, off, sum: 0.0, against: 0.0, is_excluded: false }
     }
 
     /// Takes in the costs of an observation by what is believed and by this.
@@ -116,16 +105,14 @@ impl Hypothesis {
         self.is_excluded |= self.against >= EXCLUDED;
     }
 
-    /// Pays for having been held against a vertical.
+    /// Pays for having been held against a vertical, unless it is believed: a gun that rests shows no more than it did.
     ///
     /// One that it does not foretell better by this, nats, is evidence against it. Without that, a hypothesis that a lasting small error
     /// of the unit favours, as a mount that is off or a wider lens, gathers hundredths of a degree for hours until it is believed. Half a
     /// degree is worth as much.
     fn pay(&mut self) {
         const SLACK: f64 = 0.15;
-        if !self.is_believed {
-            self.sum = (self.sum - SLACK / ALIKE).max(0.0);
-        }
+        self.sum = (self.sum - SLACK / ALIKE).max(0.0);
     }
 
     /// Tests whether the observations so far leave it possible. A mount that is off is held against the horizon alone.
@@ -367,7 +354,8 @@ impl Registration {
                     hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE);
                 }
             }
-            if matches!(hypothesis.up, UpExpected::At(_) | UpExpected::Off) {
+            let is_believed = Some(hypothesis.misfit) == self.believed;
+            if matches!(hypothesis.up, UpExpected::At(_) | UpExpected::Off) && !is_believed {
                 hypothesis.pay();
             }
         }
@@ -387,9 +375,8 @@ impl Registration {
         // What is ahead stays ahead.
         let beyond = (most - SUM_MOST).max(0.0);
         self.hypotheses.iter_mut().for_each(|h| h.sum = (h.sum - beyond).max(0.0));
-        let Some(most) = self.hypotheses.iter().max_by(|a, b| a.sum.total_cmp(&b.sum)).copied() else {
-            return;
-        };
+        let most = self.hypotheses.iter().max_by(|a, b| a.sum.total_cmp(&b.sum));
+        let Some(most) = most else { return };
         if most.sum >= LIMIT {
             let alike = self.hypotheses.iter().filter(|h| Some(h.misfit) == self.believed);
             let held = alike.map(|h| h.sum).fold(0.0, f64::max);
@@ -401,9 +388,6 @@ impl Registration {
             }
         } else if most.sum < LIMIT_BACK {
             self.believed = None;
-        }
-        for hypothesis in &mut self.hypotheses {
-            hypothesis.is_believed = Some(hypothesis.misfit) == self.believed;
         }
     }
 

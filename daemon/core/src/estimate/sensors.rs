@@ -34,7 +34,7 @@ pub struct SensorCounts {
     pub imu_frozen: u64,
     /// Restarts of the unit's clock.
     pub imu_restarts: u32,
-    /// How often orientation erred by more than it said and fell back to plain VQF's inclination.
+    /// Falls back to plain VQF's inclination, since orientation erred by more than it said.
     pub imu_fallbacks: u32,
     /// Pictures taken in.
     pub frames: u64,
@@ -228,8 +228,8 @@ impl Sensors {
         self.attitude.at(time)
     }
 
-    /// Whether the newest picture was young enough at `time`: by the camera's own stamps. By how much they are wrong against the unit's is no
-    /// matter of whether pictures come.
+    /// Tests whether the newest picture was young enough at `time`, by the camera's own stamps: their offset against the unit's clock says
+    /// nothing of whether pictures come.
     pub fn frame_fresh(&self, time: Time) -> bool {
         self.frame.as_ref().is_some_and(|frame| time.ns_since(frame.mid_exposure) <= STALE_NS)
     }

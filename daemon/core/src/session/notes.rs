@@ -1,9 +1,10 @@
-//! Notes of a session for the log: the sea in the video, the heading, the unit's clock, pictures that contradict the scenario. Each is told once when it changes.
+//! Notes of a session for the log: the sea in the video, the heading, the unit's clock, pictures that contradict the scenario. Each is told
+//! once when it changes.
 
 use crate::estimate::{
     HeadingCounts, SeaReport,
     clock::ClockReport,
-    light::LightContradiction,
+    light::SkyAgreement,
     sea::{SeaSource, Unknown},
 };
 
@@ -33,9 +34,9 @@ pub(super) struct Notes {
     heading_above: usize,
     headings: HeadingCounts,
     clock_bad: bool,
-    /// For how many frames the light has contradicted the scenario.
+    /// Frames since the light's agreement with the scenario is another than the one that was told last.
     light_frames: u32,
-    light: Option<LightContradiction>,
+    light: SkyAgreement,
     horizon_told: bool,
 }
 
@@ -108,8 +109,8 @@ impl Notes {
         None
     }
 
-    /// Takes in whether the picture's light is that of the scenario, after a frame; `None` where no sky was seen yet.
-    pub(super) fn light(&mut self, seen: Option<Option<LightContradiction>>) {
+    /// Takes in the picture's light after a frame; `None` where no sky was seen yet.
+    pub(super) fn light(&mut self, seen: Option<SkyAgreement>) {
         /// Three seconds: a camera that starts is dark or bright for less.
         const FRAMES: u32 = 90;
         let Some(seen) = seen else { return };
@@ -120,19 +121,19 @@ impl Notes {
         self.light_frames = 0;
         self.light = seen;
         match seen {
-            Some(LightContradiction::BrightAtNight) => self.say(
+            SkyAgreement::BrightAtNight => self.say(
                 true,
                 "the scenario's sun is below the horizon and the picture's sky is bright: boats are lit as at night; give [light] \
                  of the scenario the time or the sun of the picture"
                     .to_owned(),
             ),
-            Some(LightContradiction::DarkByDay) => self.say(
+            SkyAgreement::DarkByDay => self.say(
                 true,
                 "the scenario's sun stands above the horizon and the picture's sky is dark: boats are lit as by day; give [light] \
                  of the scenario the time or the sun of the picture, or open the lens's cap"
                     .to_owned(),
             ),
-            None => self.say(false, "the picture's light is that of the scenario again".to_owned()),
+            SkyAgreement::Plausible => self.say(false, "the picture's light is that of the scenario again".to_owned()),
         }
     }
 
@@ -219,14 +220,14 @@ mod tests {
     #[test]
     fn light_that_contradicts_the_scenario_is_told_once_after_three_seconds() {
         let mut notes = Notes::default();
-        let at_night = Some(LightContradiction::BrightAtNight);
+        let at_night = SkyAgreement::BrightAtNight;
         let told = |notes: &Notes| notes.new_ones().iter().map(|n| n.warning).collect::<Vec<_>>();
         notes.light(None);
         (0..89).for_each(|_| notes.light(Some(at_night)));
         assert!(told(&notes).is_empty());
         (0..500).for_each(|_| notes.light(Some(at_night)));
         assert_eq!(told(&notes), [true]);
-        (0..200).for_each(|_| notes.light(Some(None)));
+        (0..200).for_each(|_| notes.light(Some(SkyAgreement::Plausible)));
         assert_eq!(told(&notes), [true, false]);
     }
 

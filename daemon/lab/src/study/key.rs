@@ -28,7 +28,7 @@ pub struct KeyRow {
     pub boat_type: String,
     /// The boat, or the file of a real picture.
     pub source: String,
-    /// Which study it is of; empty in keys of former versions.
+    /// The study's name; empty in keys of former versions.
     #[serde(default)]
     pub study: String,
 }
@@ -44,7 +44,7 @@ pub const FACTORS: [(&str, FactorLevel); 4] = [
     ("type", |row| row.boat_type.as_str()),
 ];
 
-/// What tells a study from others whose pictures have the same names: made of the pictures' files.
+/// A study's name, a hash of its pictures' files: other studies' pictures have the same names.
 pub fn study_of(files: &[Vec<u8>]) -> String {
     let mut hash = Sha256::new();
     files.iter().for_each(|file| hash.update(file));

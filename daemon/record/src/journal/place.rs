@@ -28,7 +28,7 @@ impl FilePlace {
         Ok(Self([file_at(path)?, file_at(&with_suffix(path, "-wal"))?]))
     }
 
-    /// Whether the database, if not its log, is at `path` still.
+    /// Tests whether the database, if not its log, is at `path` still.
     pub(super) fn has_database(self, path: &Path) -> bool {
         file_at(path).is_ok_and(|file| file == self.0[0])
     }

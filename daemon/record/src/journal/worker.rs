@@ -157,11 +157,11 @@ impl JournalWorker {
         let mut deadline = None;
         loop {
             // What the queue had no room for may come with the end.
-            if self.is_idle() && !self.next() && self.is_idle() && self.close_run() {
-                break;
-            }
+            let ends = self.is_idle() && !self.next() && self.is_idle();
             self.take_queued();
-            match self.attempt() {
+            let done = if ends { self.close_run() } else { self.attempt() };
+            match done {
+                Ok(()) if ends => break,
                 Ok(()) => self.recovered(),
                 Err(error) => {
                     if self.is_closing() {
@@ -247,10 +247,7 @@ impl JournalWorker {
                 if error.is_damage() {
                     self.damage = Some(error.to_string());
                 }
-                self.in_doubt |= error.casts_doubt();
-                if matches!(error, JournalError::Moved { .. }) {
-                    self.tell_moved(error);
-                }
+                self.doubt(error);
                 // What this connection and the system's memory hold is not to be trusted any more.
                 keep_log(&connection);
                 drop(connection);
@@ -300,11 +297,15 @@ impl JournalWorker {
         Err(JournalError::Moved { path: self.path.clone() })
     }
 
-    fn tell_moved(&self, error: &JournalError) {
-        let (reason, rounds_left_there) = (error.to_string(), self.not_kept);
-        log::error!("{reason}");
-        let quarantine = Quarantine { kept_as: None, reason, rounds_left_there };
-        self.tell(|told| told.quarantine = Some(quarantine));
+    /// Rounds that were committed may be missing after that failure.
+    fn doubt(&mut self, error: &JournalError) {
+        self.in_doubt |= error.casts_doubt();
+        if matches!(error, JournalError::Moved { .. }) {
+            let (reason, rounds_left_there) = (error.to_string(), self.not_kept);
+            log::error!("{reason}");
+            let quarantine = Quarantine { kept_as: None, reason, rounds_left_there };
+            self.tell(|told| told.quarantine = Some(quarantine));
+        }
     }
 
     /// Inserts what is missing of this run's committed rounds, and the run.
@@ -504,25 +505,25 @@ impl JournalWorker {
         JournalEnd { run, committed, unwritten: Some(unwritten) }
     }
 
-    /// Marks the run as finished, moves the log into the database and closes it; `false` where rounds are to be written again, since the
-    /// disk failed or the files were moved away meanwhile.
-    fn close_run(&mut self) -> bool {
+    /// Marks the run as finished, moves the log into the database and closes it.
+    ///
+    /// # Errors
+    /// Rounds are to be written again, since the disk failed or the files were moved away meanwhile.
+    fn close_run(&mut self) -> Result<(), JournalError> {
         let done = self.try_close_run();
         // Closed: nothing is written any more, so that what is found now is found later.
         let is_there = self.committed == 0 || self.place.has_database(&self.path);
         let moved = || JournalError::Moved { path: self.path.clone() };
-        let Err(error) = done.and_then(|()| if is_there { Ok(()) } else { Err(moved()) }) else {
-            return true;
-        };
-        if self.committed > 0 && error.casts_doubt() {
-            self.in_doubt = true;
-            if matches!(error, JournalError::Moved { .. }) {
-                self.tell_moved(&error);
+        let done = done.and_then(|()| if is_there { Ok(()) } else { Err(moved()) });
+        match done {
+            Err(error) if self.committed > 0 && error.casts_doubt() => {
+                self.doubt(&error);
+                return Err(error);
             }
-            return false;
+            Err(error) => log::warn!("{error}; its last run stays marked as unfinished"),
+            Ok(()) => {}
         }
-        log::warn!("{error}; its last run stays marked as unfinished");
-        true
+        Ok(())
     }
 
     fn try_close_run(&mut self) -> Result<(), JournalError> {

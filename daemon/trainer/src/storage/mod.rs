@@ -7,7 +7,6 @@ mod recorder;
 use std::{
     collections::VecDeque,
     io,
-    panic::resume_unwind,
     path::{Path, PathBuf},
     thread::{self, JoinHandle},
     time::{Duration, Instant},
@@ -42,10 +41,6 @@ const HITS_BYTES: u64 = 32 << 20;
 
 /// How long to wait before a journal that cannot be opened is tried again.
 const OPEN_AGAIN_NS: i64 = NS_PER_S;
-/// The start waits so long for the journal; a slow disk, or one that somebody has locked, opens it later...
-const OPEN_WITHIN: Duration = Duration::from_millis(500);
-/// ...and is told of after so long.
-const OPEN_TOLD_NS: i64 = 3 * NS_PER_S;
 
 /// Settings of the storage of a run.
 #[derive(Clone, Debug)]
@@ -79,6 +74,16 @@ impl StorageOptions {
         let options = self.clone();
         thread::Builder::new().name("journal-open".to_owned()).spawn(move || options.open())
     }
+
+    /// The result of that thread, once it has ended.
+    fn opened(&self, thread: JoinHandle<Result<Journal, JournalError>>) -> Result<Journal, JournalError> {
+        let broke_down = |_| Err(self.unopened("opening it broke down; report it with the log"));
+        thread.join().unwrap_or_else(broke_down)
+    }
+
+    fn unopened(&self, reason: &str) -> JournalError {
+        JournalError::Disk { path: self.journal_path(), reason: reason.to_owned() }
+    }
 }
 
 /// The journal, or why there is none yet.
@@ -86,7 +91,7 @@ enum JournalState {
     Open(Journal),
     Shut {
         error: JournalError,
-        /// From when on that is a fault.
+        /// Beginning of the fault.
         told_from: Time,
         next: Time,
         /// The disk may take its time: the frame does not wait for it.
@@ -97,35 +102,30 @@ enum JournalState {
 impl JournalState {
     /// The journal, if it can be opened soon.
     fn start(options: &StorageOptions) -> Self {
+        /// The start waits so long for the journal; a slow disk, or one that somebody has locked, opens it later...
+        const OPEN_WITHIN: Duration = Duration::from_millis(500);
+        /// ...and is told of after so long.
+        const OPEN_TOLD_NS: i64 = 3 * NS_PER_S;
         let shut = |error: JournalError, attempt: Option<JoinHandle<_>>| {
-            log::warn!("{error}; hits are kept in memory until it can be opened");
+            log::error!("{error}; hits are kept in memory until it can be opened");
             let told_from = now().plus_ns(if attempt.is_some() { OPEN_TOLD_NS } else { 0 });
             Self::Shut { error, told_from, next: now().plus_ns(OPEN_AGAIN_NS), attempt }
         };
-        let slow = |reason: String| JournalError::Disk { path: options.journal_path(), reason };
         let thread = match options.open_aside() {
             Ok(thread) => thread,
-            Err(e) => return shut(slow(format!("no thread to open it: {e}")), None),
+            Err(e) => return shut(options.unopened(&format!("no thread to open it: {e}")), None),
         };
         let until = Instant::now() + OPEN_WITHIN;
         while !thread.is_finished() {
             if Instant::now() > until {
-                return shut(slow("it has not answered yet".to_owned()), Some(thread));
+                return shut(options.unopened("it has not answered yet"), Some(thread));
             }
             thread::sleep(Duration::from_millis(1));
         }
-        match opened(thread) {
+        match options.opened(thread) {
             Ok(journal) => Self::Open(journal),
             Err(error) => shut(error, None),
         }
-    }
-}
-
-/// What became of the attempt that a thread has made.
-fn opened(thread: JoinHandle<Result<Journal, JournalError>>) -> Result<Journal, JournalError> {
-    match thread.join() {
-        Ok(done) => done,
-        Err(panic) => resume_unwind(panic),
     }
 }
 
@@ -257,7 +257,7 @@ impl Storage {
     fn open_again(&mut self, faults: &mut FaultLog, events: &mut Vec<Event>) {
         let JournalState::Shut { error, told_from, next, attempt } = &mut self.store else { return };
         if let Some(thread) = attempt.take_if(|thread| thread.is_finished()) {
-            match opened(thread) {
+            match self.options.opened(thread) {
                 Ok(journal) => {
                     if let Some(change) = dirty(&journal) {
                         faults.take(change, events);
@@ -357,7 +357,7 @@ impl Storage {
             JournalState::Open(journal) => Some(journal),
             // Trying once more may take longer than the end may. The next run takes in what is put aside.
             JournalState::Shut { attempt, .. } => {
-                attempt.filter(JoinHandle::is_finished).and_then(|thread| opened(thread).ok())
+                attempt.filter(JoinHandle::is_finished).and_then(|thread| self.options.opened(thread).ok())
             }
         };
         let written = match journal {

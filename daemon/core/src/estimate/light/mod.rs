@@ -68,9 +68,12 @@ impl Light {
     }
 }
 
-/// A picture's light that cannot be that of the scenario's sun.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LightContradiction {
+/// Agreement of a picture's light with the scenario's sun.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SkyAgreement {
+    /// It may be that sun's.
+    #[default]
+    Plausible,
     /// The sun is below the horizon by more than six degrees, and the sky is bright.
     BrightAtNight,
     /// The sun stands above the horizon by more than six degrees, and the sky is dark.
@@ -128,8 +131,8 @@ impl LightMeter {
         self.means = Some((time, means));
     }
 
-    /// Whether the sky that is seen cannot be that of a sun so high; `None` before a sky was seen.
-    pub fn contradiction(&self) -> Option<Option<LightContradiction>> {
+    /// Agreement of the sky in the pictures with the sun's elevation; `None` before a sky was seen.
+    pub fn agreement(&self) -> Option<SkyAgreement> {
         /// Sines of the sun's elevation at the end of civil twilight, and above which it is day under every cloud.
         const NIGHT_BELOW: f64 = -0.1045;
         const DAY_ABOVE: f64 = 0.1;
@@ -139,11 +142,11 @@ impl LightMeter {
         let (_, means) = self.means?;
         let (sky, sine) = (means.sky.dot(LUMINANCE), self.sun_direction.z);
         Some(if sine < NIGHT_BELOW && sky > BRIGHT {
-            Some(LightContradiction::BrightAtNight)
+            SkyAgreement::BrightAtNight
         } else if sine > DAY_ABOVE && sky < DARK {
-            Some(LightContradiction::DarkByDay)
+            SkyAgreement::DarkByDay
         } else {
-            None
+            SkyAgreement::Plausible
         })
     }
 
@@ -312,15 +315,15 @@ mod tests {
         let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
         let of = |sine: f64, code: u8| {
             let mut meter = LightMeter::new(DVec3::new((1.0 - sine * sine).sqrt(), 0.0, sine), false);
-            assert_eq!(meter.contradiction(), None);
+            assert_eq!(meter.agreement(), None);
             meter.observe(Time::from_ns(0), &two_tone(code, code / 2), &lens, &camera);
-            meter.contradiction().expect("a sky was seen")
+            meter.agreement().expect("a sky was seen")
         };
-        assert_eq!(of(-0.2, 180), Some(LightContradiction::BrightAtNight));
-        assert_eq!(of(0.5, 10), Some(LightContradiction::DarkByDay));
+        assert_eq!(of(-0.2, 180), SkyAgreement::BrightAtNight);
+        assert_eq!(of(0.5, 10), SkyAgreement::DarkByDay);
         // Dusk, an overcast day, a night.
         for (sine, code) in [(-0.08, 200), (0.3, 90), (-0.5, 60), (0.02, 20)] {
-            assert_eq!(of(sine, code), None, "{sine} {code}");
+            assert_eq!(of(sine, code), SkyAgreement::Plausible, "{sine} {code}");
         }
     }
 

@@ -3,10 +3,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::mpsc::{RecvTimeoutError, Sender, channel},
     thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
@@ -48,32 +45,31 @@ pub struct TroublePlan {
 
 /// Somebody who locks the database, in a thread: SQLite may wait for the program that is traced meanwhile.
 struct Locker {
-    ends: Arc<AtomicBool>,
+    /// Its end lets the database go.
+    wanted: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Locker {
     fn start(path: PathBuf, lasting: Lasting) -> Self {
-        let ends = Arc::new(AtomicBool::new(false));
-        let asked = Arc::clone(&ends);
+        let (wanted, ends) = channel();
         let thread = thread::spawn(move || {
             let mut held: Option<(Connection, Instant)> = None;
-            while !asked.load(Ordering::Relaxed) {
+            while ends.recv_timeout(LOCK_PAUSE) == Err(RecvTimeoutError::Timeout) {
                 match &held {
                     None => held = lock(&path).ok().map(|connection| (connection, Instant::now())),
                     Some((_, since)) if lasting == Lasting::Some && since.elapsed() > LOCKED => break,
                     Some(_) => {}
                 }
-                thread::sleep(LOCK_PAUSE);
             }
         });
-        Self { ends, thread: Some(thread) }
+        Self { wanted: Some(wanted), thread: Some(thread) }
     }
 }
 
 impl Drop for Locker {
     fn drop(&mut self) {
-        self.ends.store(true, Ordering::Relaxed);
+        self.wanted = None;
         self.thread.take().unwrap().join().unwrap();
     }
 }
