@@ -13,12 +13,14 @@
 mod misfit;
 #[cfg(test)]
 mod tests;
+mod unit;
 
 use std::ops::{AddAssign, Mul, Sub};
 
 use glam::{DMat3, DQuat, DVec3};
 
 pub use self::misfit::Misfit;
+use self::unit::{LEANS_MOST, UP_SIGMA, UnitWatch};
 use super::{
     attitude::Attitude,
     skyline::{TurnFinder, TurnSeen},
@@ -41,9 +43,7 @@ const COST_OFF: f64 = 4.0;
 const SEA_RATE: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// By what share of itself a turn is told wrong by lens, shutter and times.
 const TURN_SHARE: f64 = 0.08;
-/// How far a unit alone is off up on a ship in waves, radians.
-const UP_SIGMA: f64 = 1.0 * std::f64::consts::PI / 180.0;
-/// How far it goes to and fro about where it is on average, radians.
+/// How far a unit alone is to and fro about where it is on average, radians.
 const SWAY_SIGMA: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// Verticals that are seen one after the other err alike: so many count as one.
 const ALIKE: f64 = 5.0;
@@ -60,14 +60,18 @@ struct Hypothesis {
     turn: DMat3,
     up: UpExpected,
     late_ns: i64,
-    /// Where up is on average off where it is expected.
+    /// Where up is off where it is expected, on average and lately.
     off: MeanOff,
+    sway: MeanSway,
     /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).
     sum: f64,
     /// The reverse since the start, nats (sequential test).
     against: f64,
     is_excluded: bool,
 }
+
+/// A belief ends where all sums are below this again, and nothing is confirmed before.
+const LIMIT_BACK: f64 = 5.0;
 
 /// Where a hypothesis expects up to be seen.
 #[derive(Clone, Copy, Debug)]
@@ -84,8 +88,17 @@ enum UpExpected {
 
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
-        let off = MeanOff { mean: DVec3::ZERO, count: 0 };
-        Self { misfit, turn, up, late_ns: 0, off, sum: 0.0, against: 0.0, is_excluded: false }
+        Self {
+            misfit,
+            turn,
+            up,
+            late_ns: 0,
+            off: MeanOff::NOTHING,
+            sway: MeanSway::NOTHING,
+            sum: 0.0,
+            against: 0.0,
+            is_excluded: false,
+        }
     }
 
     /// Takes in the costs of an observation by what is believed and by this.
@@ -146,8 +159,12 @@ impl<T: Copy + AddAssign + Sub<Output = T> + Mul<f64, Output = T>, const MOST: u
 
 /// The mean of turns, over some ten seconds.
 type MeanOff = RecentMean<DVec3, 100>;
+/// The same over some two: a ship's turn moves it by a degree in ten, late pictures move it to and fro with the waves.
+type MeanSway = RecentMean<DVec3, 20>;
 
-impl MeanOff {
+impl<const MOST: u32> RecentMean<DVec3, MOST> {
+    const NOTHING: Self = Self { mean: DVec3::ZERO, count: 0 };
+
     /// Takes in a turn; what it differs from the mean before by.
     fn take_apart(&mut self, off: DVec3) -> f64 {
         let apart = if self.count == 0 { 0.0 } else { off.distance(self.mean) };
@@ -187,29 +204,13 @@ pub(super) struct Registration {
     finder: TurnFinder,
     next: Time,
     hypotheses: Vec<Hypothesis>,
-    own_off: MeanOff,
+    own_sway: MeanSway,
+    /// When up was last seen.
+    up_seen: Option<Time>,
     turn_cost: TurnCost,
     believed: Option<Misfit>,
     unit: UnitWatch,
     checked: Option<Time>,
-}
-
-/// What a unit's samples say of each other.
-#[derive(Clone, Copy, Debug, Default)]
-struct UnitWatch {
-    /// Size of the specific force and the force itself, m/s^2, its own axes.
-    size: RecentMean<f64, 100>,
-    force: RecentMean<DVec3, 100>,
-    /// The unit's own orientation some time ago, the time, and how it turned since by its rates.
-    own: Option<(Time, DQuat, DQuat)>,
-    last: Option<Time>,
-}
-
-impl UnitWatch {
-    /// No gun on the Earth feels that on average: it is a number of g.
-    fn is_in_g(&self) -> bool {
-        self.size.is_full() && self.size.mean < 5.0
-    }
 }
 
 impl Registration {
@@ -222,7 +223,8 @@ impl Registration {
             finder,
             next: Time::MIN,
             hypotheses: hypotheses(DMat3::from_quat(camera_from_imu)),
-            own_off: MeanOff::default(),
+            own_sway: MeanSway::NOTHING,
+            up_seen: None,
             turn_cost: TurnCost::default(),
             believed: None,
             unit: UnitWatch::default(),
@@ -244,7 +246,11 @@ impl Registration {
         unit.size.take(sample.accel.length());
         unit.force.take(sample.accel);
         let step_s = unit.last.replace(time).map_or(0.0, |last| time.secs_since(last));
-        let (Some(own), true) = (sample.world_from_imu, (0.0..0.05).contains(&step_s)) else {
+        let is_next = (0.0..0.05).contains(&step_s);
+        if is_next {
+            unit.turn(rate, step_s);
+        }
+        let (Some(own), true) = (sample.world_from_imu, is_next) else {
             unit.own = None;
             return;
         };
@@ -325,8 +331,10 @@ impl Registration {
         let Some(own) = alone(time) else { return };
         let cost = |off: f64, sigma: f64| (off * off / (sigma * sigma)).min(COST_MOST);
         let off = between(own, up.seen);
-        let as_believed = cost(off.length(), UP_SIGMA);
-        let sway = cost(self.own_off.take_apart(off), SWAY_SIGMA);
+        let (up_sigma, lasting) = (self.unit.up_sigma(), self.unit.lasting_up_sigma());
+        let as_believed = cost(off.length(), up_sigma);
+        self.forget_sway(time);
+        let sway = cost(self.own_sway.take_apart(off), SWAY_SIGMA);
         if up.is_predicted && off.length() < 3.0 * UP_SIGMA {
             self.checked = Some(time);
         }
@@ -336,19 +344,25 @@ impl Registration {
                 UpExpected::At(_)
                     if hypothesis.misfit == Misfit::Reversed(FORCE) && self.unit.own.is_some() => {}
                 UpExpected::At(map) => {
-                    let other = cost((map * own).angle_between(up.seen), UP_SIGMA);
-                    // By little is as well a mount that is off.
-                    let weight = if hypothesis.misfit == Misfit::Lens { 1.0 / ALIKE } else { 1.0 };
+                    let other = cost((map * own).angle_between(up.seen), up_sigma);
+                    // By little is as well a mount that is off, and a ship's turn, which tilts all alike while it lasts.
+                    let weight = match hypothesis.misfit {
+                        Misfit::Lens => 1.0 / ALIKE,
+                        _ if other > as_believed || off.length() > LEANS_MOST => 1.0,
+                        _ if self.unit.leans() > UP_SIGMA => 0.0,
+                        _ => 1.0 / ALIKE,
+                    };
                     hypothesis.add_apart(as_believed, other, weight, 1.0 / ALIKE);
                 }
                 UpExpected::Then => {
                     let Some(then) = alone(time.plus_ns(-hypothesis.late_ns)) else { continue };
-                    let apart = hypothesis.off.take_apart(between(then, up.seen));
+                    let apart = hypothesis.sway.take_apart(between(then, up.seen));
                     hypothesis.add(sway, cost(apart, SWAY_SIGMA), 1.0 / ALIKE);
                 }
                 UpExpected::Off => {
                     let apart = hypothesis.off.take_apart(off);
-                    hypothesis.add(as_believed, COST_OFF + cost(apart, UP_SIGMA), 1.0 / ALIKE);
+                    let as_believed = cost(off.length(), lasting);
+                    hypothesis.add(as_believed, COST_OFF + cost(apart, lasting), 1.0 / ALIKE);
                 }
                 UpExpected::Wanders => {
                     hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE);
@@ -362,11 +376,20 @@ impl Registration {
         self.decide();
     }
 
+    /// Forgets how the unit was off up lately unless up was seen just before: a turn of the ship, or a shore in place of the horizon, moves
+    /// that meanwhile.
+    fn forget_sway(&mut self, time: Time) {
+        /// So long, seconds.
+        const GAP_S: f64 = 2.0;
+        if self.up_seen.replace(time).is_none_or(|last| time.secs_since(last) > GAP_S) {
+            self.own_sway = MeanSway::NOTHING;
+            self.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.sway = MeanSway::NOTHING);
+        }
+    }
+
     fn decide(&mut self) {
         /// The sum at which a hypothesis is believed.
         const LIMIT: f64 = 20.0;
-        /// A belief ends where all sums are below this again.
-        const LIMIT_BACK: f64 = 5.0;
         /// One that is believed stays until another's sum is larger by this.
         const LIMIT_OTHER: f64 = 2.0;
         /// No sum goes beyond this, so that a belief ends soon after its cause.
@@ -400,7 +423,8 @@ impl Registration {
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         RegistrationChecks {
             unseen_s: self.checked.map_or(f64::INFINITY, |checked| now.secs_since(checked).max(0.0)),
-            is_tried: self.hypotheses.iter().all(|h| !h.is_possible()) && self.turn_cost.is_usual(),
+            is_tried: self.hypotheses.iter().all(|h| !h.is_possible() && h.sum < LIMIT_BACK)
+                && self.turn_cost.is_usual(),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Wrong set-ups: what a trainer that is set up wrongly says of it, and how soon. Recordings with truth are replayed into sessions with one thing
 //! wrong; the right set-up is replayed beside them.
 
+mod obstacles;
 mod right;
 
 use std::{
@@ -20,7 +21,10 @@ use bowwave_core::{
     world::scenario::Scenario,
 };
 use glam::{DQuat, DVec3};
-use hw_sim::make::{Periodic, Recipe};
+use hw_sim::{
+    make::{Periodic, Recipe},
+    replay::Replay,
+};
 
 use crate::{
     registration::{looped, record},
@@ -127,6 +131,23 @@ impl Wrong {
             (_, event) => event,
         }
     }
+
+    /// Events as this makes them of a recording's.
+    fn events(self) -> impl FnMut(Event, &Replay) -> Event {
+        let mut shown = VecDeque::new();
+        move |event, _| {
+            let mut event = self.event(event);
+            if let (Event::Frame(frame), Self::Late(late_ms)) = (&mut event, self) {
+                // The stamp is this picture's, what it shows is older.
+                shown.push_back(frame.picture.clone());
+                if shown.len() > (late_ms * 30 / 1000) as usize + 1 {
+                    shown.pop_front();
+                }
+                frame.picture = shown.front().cloned().unwrap_or_else(|| frame.picture.clone());
+            }
+            event
+        }
+    }
 }
 
 /// A grey picture of another one's luma, in reverse order.
@@ -157,15 +178,26 @@ struct Said {
     unchecked: f64,
 }
 
+/// How a recording is played into a trainer.
+#[derive(Clone, Copy, Debug)]
+struct Played<'a> {
+    source: Source,
+    seconds: f64,
+    /// Frames a second.
+    rate: f64,
+    scenario: &'a str,
+}
+
+/// Plays the recording at `path` with a calibration and events made of its own.
 fn replay(
     path: &Path,
-    wrong: Wrong,
-    source: Source,
-    (seconds, rate): (f64, f64),
-    scenario: &str,
+    played: Played<'_>,
+    calibration: impl FnOnce(Calibration) -> Calibration,
+    mut changed: impl FnMut(Event, &Replay) -> Event,
 ) -> Result<Said> {
+    let Played { source, seconds, rate, scenario } = played;
     let (mut replay, own) = looped(path, seconds)?;
-    let calibration = wrong.calibration(own);
+    let calibration = calibration(own);
     let lens = calibration.lens;
     let mut session = Session::new(Setup {
         scenario: Scenario::parse(scenario, "set-up")?,
@@ -179,23 +211,13 @@ fn replay(
         own_ship: None,
     })?;
     let (mut said, mut events, mut begun) = (Said::default(), Vec::new(), None);
-    let mut shown = VecDeque::new();
     let (mut frames, mut ready, mut unchecked) = (0_u32, 0_u32, 0_u32);
     for frame in 1..=(seconds * rate) as i64 {
         let time = replay.origin().plus_ns(secs_to_ns(frame as f64 / rate));
         events.clear();
         replay.collect(time, &mut events)?;
         for event in events.drain(..) {
-            let mut event = wrong.event(event);
-            if let (Event::Frame(frame), Wrong::Late(late_ms)) = (&mut event, wrong) {
-                // The stamp is this picture's, what it shows is older.
-                shown.push_back(frame.picture.clone());
-                if shown.len() > (late_ms * 30 / 1000) as usize + 1 {
-                    shown.pop_front();
-                }
-                frame.picture = shown.front().cloned().unwrap_or_else(|| frame.picture.clone());
-            }
-            session.event(&event);
+            session.event(&changed(event, &replay));
         }
         let answer = session.tick(Tick::at(time));
         let known = answer.view.pose_known;
@@ -252,13 +274,16 @@ pub struct SetUpStudy {
     /// Instead, so many hours of right set-ups in seas of all kinds
     #[arg(long, value_name = "HOURS", conflicts_with = "only")]
     right: Option<f64>,
+    /// Number of the first of these; others were not looked at before
+    #[arg(long, default_value_t = 0, requires = "right")]
+    first: u64,
 }
 
 impl SetUpStudy {
     /// Prints for each set-up how soon it was told, and as what.
     pub fn run(&self) -> Result<()> {
         if let Some(hours) = self.right {
-            return right::run(hours);
+            return right::run(hours, self.first);
         }
         let titles = [("recording", 12), ("orientation", 12), ("set-up", 36)];
         let parts =
@@ -283,7 +308,8 @@ impl SetUpStudy {
                     if self.only.as_ref().is_some_and(|only| !set_up.contains(only.as_str())) {
                         continue;
                     }
-                    let said = replay(&path, *wrong, source, (self.seconds, self.rate), "")?;
+                    let played = Played { source, seconds: self.seconds, rate: self.rate, scenario: "" };
+                    let said = replay(&path, played, |own| wrong.calibration(own), wrong.events())?;
                     let right = said.last.map_or(faults.is_empty(), |last| faults.contains(&last));
                     all += 1;
                     named += u32::from(right);

@@ -184,7 +184,8 @@ impl<const N: usize> ErrorState<N> {
     pub fn walk_three(&mut self, state: usize, added: DMat3) {
         for column in 0..3 {
             for row in 0..3 {
-                self.covariance[(state + row, state + column)] += added.col(column)[row];
+                let both = added.col(column)[row] + added.col(row)[column];
+                self.covariance[(state + row, state + column)] += 0.5 * both;
             }
         }
     }
@@ -227,6 +228,8 @@ impl<const N: usize> ErrorState<N> {
                 p[(of_row, of_column)] += added.col(column)[row];
             }
         }
+        // Rounding alone makes these two differ.
+        p[(at[1], at[0])] = p[(at[0], at[1])];
     }
 
     /// The state keeps that share of itself, and chance makes up what its variance loses.
@@ -275,15 +278,15 @@ impl<const N: usize> ErrorState<N> {
         variance: f64,
         gate: f64,
     ) -> (Correction, UpdateOutcome) {
-        let gain = self.covariance * row;
-        let expected = row.dot(&gain) + variance;
+        let across = self.across(row);
+        let expected = row.dot(&across) + variance;
         let nis = differ * differ / expected;
         if nis.is_nan() || nis > gate {
             return (DQuat::IDENTITY, UpdateOutcome { nis, taken: false });
         }
-        self.covariance -= gain * gain.transpose() / expected;
-        self.hold_symmetric();
-        (self.put_in(&(gain * (differ / expected))), UpdateOutcome { nis, taken: true })
+        let gain = across / expected;
+        self.take_off([&(across - gain * (0.5 * expected))], [&gain]);
+        (self.put_in(&(gain * differ)), UpdateOutcome { nis, taken: true })
     }
 
     /// Takes in two numbers.
@@ -294,29 +297,46 @@ impl<const N: usize> ErrorState<N> {
         noise: DMat2,
         gate: f64,
     ) -> (Correction, UpdateOutcome) {
-        let rows = SMatrix::<f64, N, 2>::from_columns(rows);
-        let differ = SVector::<f64, 2>::new(differ.x, differ.y);
-        let noise = SMatrix::<f64, 2, 2>::from_fn(|r, c| noise.col(c)[r]);
-        let across = self.covariance * rows;
-        let expected = rows.transpose() * across + noise;
-        let Some(inverse) = expected.try_inverse() else {
-            return (DQuat::IDENTITY, UpdateOutcome { nis: f64::NAN, taken: false });
-        };
-        let nis = (differ.transpose() * inverse * differ)[(0, 0)];
+        let across = [self.across(&rows[0]), self.across(&rows[1])];
+        let shared = rows[0].dot(&across[1]);
+        let own = DVec2::new(rows[0].dot(&across[0]), rows[1].dot(&across[1]));
+        let expected = DMat2::from_cols(DVec2::new(own.x, shared), DVec2::new(shared, own.y)) + noise;
+        let inverse = expected.inverse();
+        let nis = differ.dot(inverse * differ);
         if nis.is_nan() || nis > gate {
             return (DQuat::IDENTITY, UpdateOutcome { nis, taken: false });
         }
-        let gain = across * inverse;
-        // Joseph's form, (I - K H) P (I - K H)' + K R K', from the left: what rounding left of the second factor is taken off by it.
-        self.covariance -= gain * across.transpose();
-        let rest = self.covariance * rows - gain * noise;
-        self.covariance -= rest * gain.transpose();
-        self.hold_symmetric();
-        (self.put_in(&(gain * differ)), UpdateOutcome { nis, taken: true })
+        let sum_of = |of: &[MeasurementRow<N>; 2], shares: DVec2| of[0] * shares.x + of[1] * shares.y;
+        let gain = [0, 1].map(|number| sum_of(&across, inverse.col(number)));
+        // Joseph's form, (I - K H) P (I - K H)' + K R K' = P - A K' - K A' + K S K' with A = P H', S = H P H' + R: as the sum of a matrix and its
+        // transpose, which is symmetric to the last bit.
+        let half = [0, 1].map(|number| across[number] - sum_of(&gain, expected.col(number) * 0.5));
+        let [half, gains] = [&half, &gain].map(|both| [&both[0], &both[1]]);
+        self.take_off(half, gains);
+        (self.put_in(&sum_of(&gain, differ)), UpdateOutcome { nis, taken: true })
     }
 
-    fn hold_symmetric(&mut self) {
-        self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
+    /// Covariance of the errors with that of a measured number: rows have few entries that are not nothing.
+    fn across(&self, row: &MeasurementRow<N>) -> SVector<f64, N> {
+        let mut across = SVector::<f64, N>::zeros();
+        for (state, share) in row.iter().enumerate().filter(|(_, share)| **share != 0.0) {
+            across.axpy(*share, &self.covariance.column(state), 1.0);
+        }
+        across
+    }
+
+    /// Takes `half gain' + gain half'` off the covariance, for each of them.
+    fn take_off<const M: usize>(&mut self, half: [&SVector<f64, N>; M], gain: [&SVector<f64, N>; M]) {
+        let of = |vector: &SVector<f64, N>| vector.data.0[0];
+        let (half, gain) = (half.map(of), gain.map(of));
+        for (number, column) in self.covariance.data.0.iter_mut().enumerate() {
+            for (half, gain) in half.iter().zip(&gain) {
+                let (by_half, by_gain) = (half[number], gain[number]);
+                for ((value, half), gain) in column.iter_mut().zip(half).zip(gain) {
+                    *value -= half * by_gain + gain * by_half;
+                }
+            }
+        }
     }
 
     /// Adds the estimated error to what is known; what is left is the turn of the world.

@@ -227,8 +227,8 @@ impl Filter {
 
     /// A turn (scaled axis, radians, the unit's axes) that was measured over `dt_s` seconds, without what is known to be wrong with it.
     pub(super) fn corrected(&self, turn: DVec3, dt_s: f64) -> DVec3 {
-        let gains = [0, 1, 2].map(|axis| self.error_state.three(GAIN + 3 * axis) * turn[axis]);
-        turn - self.bias() * dt_s - gains[0] - gains[1] - gains[2]
+        let gain = |axis: usize| self.error_state.three(GAIN + 3 * axis) * turn[axis];
+        turn - self.bias() * dt_s - gain(0) - gain(1) - gain(2)
     }
 
     /// Goes on by a sample.

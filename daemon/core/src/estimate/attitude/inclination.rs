@@ -10,7 +10,7 @@ use vqf_rs::{Params, VQF};
 use crate::physics::GRAVITY_M_S2;
 
 /// VQF is fed steps of this length at least, seconds: its time constants are seconds, and a step costs more than all the rest of a sample.
-const STEP_S: f64 = 0.008;
+const STEP_S: f64 = 0.02;
 
 /// Share of a sample's period by which a step may be shorter: clocks shift by microseconds.
 const SLACK: f64 = 0.2;
@@ -74,9 +74,9 @@ impl Inclination {
         self.vqf.update_acc((g.accel / f64::from(g.count)).to_array());
     }
 
-    /// Which way is up, in the unit's axes.
+    /// Which way is up, in the unit's axes at the newest sample.
     pub(super) fn up_imu(&self) -> DVec3 {
-        quaternion(&self.vqf).inverse() * DVec3::Z
+        DQuat::from_scaled_axis(-self.gathered.turn) * (quaternion(&self.vqf).inverse() * DVec3::Z)
     }
 }
 

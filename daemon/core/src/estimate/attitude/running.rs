@@ -117,9 +117,10 @@ impl RunningFilter {
         self.inclination.update(corrected, dt_s, accel);
         self.alone.update(turn, dt_s, accel);
         let from = self.last.world_from_imu;
-        let axes = DMat3::from_quat(from * DQuat::from_scaled_axis(corrected * 0.5));
-        self.filter.step(&SampleMotion { axes, turn, force, dt_s });
-        let world_from_imu = (from * DQuat::from_scaled_axis(corrected)).normalize();
+        let half = small_turn(corrected * 0.5);
+        let middle = from * half;
+        self.filter.step(&SampleMotion { axes: DMat3::from_quat(middle), turn, force, dt_s });
+        let world_from_imu = (middle * half).normalize();
         self.last = OrientationSample { time, world_from_imu, rate: rate - self.filter.bias() };
         let held = self.filter.is_due().then(|| self.filter.hold(world_from_imu, self.inclination.up_imu()));
         let turn = match (rested, held) {
@@ -178,4 +179,18 @@ impl RunningFilter {
     pub(super) fn turn(&mut self, turn: DQuat) {
         self.last.world_from_imu = (turn * self.last.world_from_imu).normalize();
     }
+}
+
+/// The turn of a scaled axis, radians; that of a sample is small, and needs no sine.
+fn small_turn(turn: DVec3) -> DQuat {
+    /// Up to a turn of which half, squared, is so large, the series err by less than 1e-17.
+    const SMALL: f64 = 1e-3;
+    let x = 0.25 * turn.length_squared();
+    if x > SMALL {
+        return DQuat::from_scaled_axis(turn);
+    }
+    let sine = 1.0 + x * (-1.0 / 6.0 + x * (1.0 / 120.0 + x * (-1.0 / 5040.0 + x / 362_880.0)));
+    let cosine = 1.0 + x * (-0.5 + x * (1.0 / 24.0 + x * (-1.0 / 720.0 + x / 40_320.0)));
+    let axis = turn * (0.5 * sine);
+    DQuat::from_xyzw(axis.x, axis.y, axis.z, cosine)
 }

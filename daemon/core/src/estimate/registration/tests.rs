@@ -183,3 +183,44 @@ fn hours_of_a_small_error_are_no_wrong_set_up() {
         assert_eq!(registration.wrong(), None, "after {tenths} tenths of a second");
     }
 }
+
+#[test]
+fn a_ship_that_turns_is_no_wrong_set_up_and_a_mount_that_is_off_is_one() {
+    // Five minutes; the ship turns at 5 deg/s for twenty seconds of each forty, to either side by turns, with 12 m/s of way: up leans by
+    // 6 deg. The gun stands.
+    let run = |turns: bool, off_deg: f64| {
+        let mut registration = Registration::new(DQuat::IDENTITY, None);
+        let mut lean = 0.0;
+        for step in 0..60_000_i64 {
+            let time = Time::from_ns(step * 5_000_000);
+            let phase = (step / 200) % 80;
+            let rate = if turns && phase < 20 {
+                0.087
+            } else if turns && (40..60).contains(&phase) {
+                -0.087
+            } else {
+                0.0
+            };
+            lean += (rate * 12.0 / 9.8 - lean) * 0.0005;
+            let sample = ImuSample {
+                arrival: time,
+                device_time_ns: step * 5_000_000,
+                rate: DVec3::Z * rate,
+                accel: DVec3::Z * 9.8,
+                world_from_imu: None,
+            };
+            registration.sample(time, &sample, sample.rate);
+            if step % 20 == 0 {
+                let seen = DQuat::from_rotation_x(lean + off_deg.to_radians()) * DVec3::Z;
+                let sight = UpSight { seen, predicted: DVec3::Z, is_predicted: true };
+                registration.up(time, &sight, |_| Some(DVec3::Z));
+            }
+            if registration.wrong().is_some() {
+                return registration.wrong();
+            }
+        }
+        None
+    };
+    assert_eq!(run(true, 0.0), None);
+    assert_eq!(run(false, 4.0), Some(Misfit::Mount));
+}

@@ -1,0 +1,81 @@
+//! What a unit's samples say of each other, and how far they leave it off up.
+
+use glam::{DQuat, DVec3};
+
+use super::RecentMean;
+use crate::{physics::GRAVITY_M_S2, time::Time};
+
+/// How far a unit alone is off up on a ship in waves that keeps its course, radians.
+pub(super) const UP_SIGMA: f64 = 1.0 * std::f64::consts::PI / 180.0;
+/// Way of a ship, one standard deviation, m/s: while it turns, specific force leans by that times its rate over gravity.
+const SHIP_SPEED_M_S: f64 = 8.0;
+/// No ship turns faster, rad/s.
+const SHIP_TURN_MOST: f64 = 6.0 * std::f64::consts::PI / 180.0;
+/// A unit alone takes in and forgets that in so long, over which its turn is averaged, seconds, ...
+const LEANS_S: f64 = 10.0;
+/// ...at first over no less.
+const LEANS_LEAST_S: f64 = 2.0;
+/// A unit that has begun on a ship in a turn or in waves is off up by this more, radians, ...
+const BEGUN_SIGMA: f64 = 3.0 * std::f64::consts::PI / 180.0;
+/// ...and forgets it in so long, seconds.
+const BEGUN_S: f64 = 10.0;
+/// No ship's turn tilts it further, radians.
+pub(super) const LEANS_MOST: f64 = 10.0 * std::f64::consts::PI / 180.0;
+
+/// What a unit's samples say of each other.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct UnitWatch {
+    /// Size of the specific force and the force itself, m/s^2, its own axes.
+    pub size: RecentMean<f64, 100>,
+    pub force: RecentMean<DVec3, 100>,
+    /// The unit's own orientation some time ago, the time, and how it turned since by its rates.
+    pub own: Option<(Time, DQuat, DQuat)>,
+    pub last: Option<Time>,
+    /// Mean turn about the vertical over [`LEANS_S`], rad/s, and that of its square, (rad/s)^2; at first over how long they are known.
+    turning: f64,
+    turning_square: f64,
+    known_s: f64,
+    /// The fastest mean turn of late, rad/s, and the same of a turn that was steady.
+    fastest: f64,
+    steadiest: f64,
+}
+
+impl UnitWatch {
+    /// No gun on the Earth feels that on average: it is a number of g.
+    pub(super) fn is_in_g(&self) -> bool {
+        self.size.is_full() && self.size.mean < 5.0
+    }
+
+    /// Takes in a rate, rad/s, that lasted `step_s`.
+    pub(super) fn turn(&mut self, rate: DVec3, step_s: f64) {
+        let about_up = rate.dot(self.force.mean.normalize_or_zero());
+        // What turns faster is a gun on its mount.
+        let about_up = if about_up.abs() > SHIP_TURN_MOST { 0.0 } else { about_up };
+        self.known_s += step_s;
+        let share = step_s / self.known_s.clamp(LEANS_LEAST_S, LEANS_S);
+        self.turning += (about_up - self.turning) * share;
+        self.turning_square += (about_up * about_up - self.turning_square) * share;
+        let now = self.turning.abs();
+        let steady = self.turning * self.turning / self.turning_square.max(f64::MIN_POSITIVE);
+        // A tilt outlasts its turn, and one to the other side goes through none.
+        let kept = 1.0 - step_s / (2.0 * LEANS_S);
+        self.fastest = now.max(self.fastest * kept);
+        self.steadiest = (now * steady).max(self.steadiest * kept);
+    }
+
+    /// How far a turn of the ship tilts the unit's up, standard deviation, radians.
+    pub(super) fn leans(&self) -> f64 {
+        SHIP_SPEED_M_S * self.fastest / GRAVITY_M_S2
+    }
+
+    /// How far the unit alone is off up, standard deviation, radians.
+    pub(super) fn up_sigma(&self) -> f64 {
+        UP_SIGMA.hypot(self.leans()).hypot(BEGUN_SIGMA * (-self.known_s / BEGUN_S).exp())
+    }
+
+    /// The same as a mount that is off is held against it: how the unit began passes, and before a gun that is swung a ship's turn does
+    /// not tilt up the same way all the time.
+    pub(super) fn lasting_up_sigma(&self) -> f64 {
+        UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest / GRAVITY_M_S2)
+    }
+}
