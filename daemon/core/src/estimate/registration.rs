@@ -43,7 +43,7 @@ const COST_OFF: f64 = 4.0;
 const SEA_RATE: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// By what share of itself a turn is told wrong by lens, shutter and times.
 const TURN_SHARE: f64 = 0.08;
-/// How far a unit alone is to and fro about where it is on average, radians.
+/// Deviation of a unit's up, found alone, about its mean of the last seconds, radians.
 const SWAY_SIGMA: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// Verticals that are seen one after the other err alike: so many count as one.
 const ALIKE: f64 = 5.0;
@@ -60,7 +60,7 @@ struct Hypothesis {
     turn: DMat3,
     up: UpExpected,
     late_ns: i64,
-    /// Where up is off where it is expected, on average and lately.
+    /// Error of the expected up, mean of ten seconds (mount) and of two (late pictures).
     off: MeanOff,
     sway: MeanSway,
     /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).

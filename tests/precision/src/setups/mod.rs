@@ -150,19 +150,25 @@ impl Wrong {
     }
 }
 
+/// A picture's brightness, row by row, codes: its luma, or its green.
+fn luma(picture: &Picture) -> impl Iterator<Item = u8> {
+    let bytes = picture.format().pixel_bytes();
+    let rows = (0..picture.height() as usize).map(|y| picture.row(y));
+    rows.flat_map(move |row| row.iter().skip(usize::from(bytes == 3)).step_by(bytes).copied())
+}
+
 /// A grey picture of another one's luma, in reverse order.
 fn flipped(picture: &Picture, columns: bool, rows: bool) -> Option<Picture> {
-    let (width, height) = (picture.width() as usize, picture.height() as usize);
-    let bytes = picture.format().pixel_bytes();
-    let mut flipped = Vec::with_capacity(3 * width * height);
-    for y in 0..height {
-        let row = picture.row(if rows { height - 1 - y } else { y });
-        for x in 0..width {
-            let at = bytes * if columns { width - 1 - x } else { x };
-            let luma = if bytes == 3 { *row.get(at + 1)? } else { *row.get(at)? };
-            flipped.extend([luma; 3]);
-        }
+    let width = picture.width() as usize;
+    let mut luma: Vec<u8> = luma(picture).collect();
+    // All in reverse order is a picture turned by 180 degrees: rows and columns.
+    if rows {
+        luma.reverse();
     }
+    if rows != columns {
+        luma.chunks_exact_mut(width).for_each(<[u8]>::reverse);
+    }
+    let flipped: Vec<u8> = luma.into_iter().flat_map(|luma| [luma; 3]).collect();
     Picture::new(PixelFormat::Rgb, picture.width(), picture.height(), flipped.into()).ok()
 }
 
@@ -274,8 +280,8 @@ pub struct SetUpStudy {
     /// Instead, so many hours of right set-ups in seas of all kinds
     #[arg(long, value_name = "HOURS", conflicts_with = "only")]
     right: Option<f64>,
-    /// Number of the first of these; others were not looked at before
-    #[arg(long, default_value_t = 0, requires = "right")]
+    /// Number of the first of these; those below 200 helped to choose, the others only judge
+    #[arg(long, default_value_t = 200, requires = "right")]
     first: u64,
 }
 

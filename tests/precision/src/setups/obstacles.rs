@@ -4,11 +4,13 @@ use std::{f64::consts::TAU, sync::Arc};
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    geometry::{CameraPose, Lens, horizon_dip, horizon_distance, wrapped},
+    geometry::{CameraPose, Lens, curvature_drop, horizon_dip, horizon_distance, wrapped},
 };
 use glam::{DQuat, DVec2, DVec3};
 use rand::RngExt as _;
 use rand_pcg::Pcg64;
+
+use super::luma;
 
 /// Nothing that is painted but drops stands higher or lower than this, as a part of the distance.
 const HIGHEST: f64 = 0.2;
@@ -193,8 +195,7 @@ impl PassingShip {
 fn span(range_m: f64, height_m: f64, eye_m: f64, elevation: f64, pixel: f64) -> f64 {
     let far_m = horizon_distance(eye_m);
     let dip = horizon_dip(eye_m);
-    // Height of a point above the sea lowers with the square of the distance, as the horizon's dip has it.
-    let falls_m = eye_m * (range_m / far_m).powi(2);
+    let falls_m = curvature_drop(range_m);
     let foot = if range_m < far_m { -(eye_m + falls_m) / range_m } else { -dip };
     let top = (height_m - eye_m - falls_m) / range_m;
     let within = |edge: f64| (0.5 + (edge - elevation) / pixel).clamp(0.0, 1.0);
@@ -209,7 +210,7 @@ fn grain(bearing: f64, elevation: f64) -> f64 {
     hash as f64 / f64::from(1 << 23) - 1.0
 }
 
-/// Where each pixel looks, camera's axes, row by row.
+/// Rays of the pixels, camera's axes, row by row.
 fn rays(lens: &Lens) -> Vec<DVec3> {
     let pixels = (0..lens.height).flat_map(|y| (0..lens.width).map(move |x| (x, y)));
     pixels.map(|(x, y)| lens.unproject(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5))).collect()
@@ -225,13 +226,7 @@ struct Canvas {
 impl Canvas {
     fn of(picture: &Picture) -> Self {
         let (width, height) = (picture.width() as usize, picture.height() as usize);
-        let bytes = picture.format().pixel_bytes();
-        let at = if bytes == 3 { 1 } else { 0 };
-        let luma = (0..height)
-            .flat_map(|y| picture.row(y).iter().skip(at).step_by(bytes).take(width))
-            .map(|luma| f32::from(*luma))
-            .collect();
-        Self { luma, width, height }
+        Self { luma: luma(picture).map(f32::from).collect(), width, height }
     }
 
     fn at(&self, x: f64, y: f64) -> f32 {

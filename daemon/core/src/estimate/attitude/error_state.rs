@@ -303,7 +303,8 @@ impl<const N: usize> ErrorState<N> {
         let expected = DMat2::from_cols(DVec2::new(own.x, shared), DVec2::new(shared, own.y)) + noise;
         let inverse = expected.inverse();
         let nis = differ.dot(inverse * differ);
-        if nis.is_nan() || nis > gate {
+        // What cannot be inverted makes it infinite or no number.
+        if !nis.is_finite() || nis > gate {
             return (DQuat::IDENTITY, UpdateOutcome { nis, taken: false });
         }
         let sum_of = |of: &[MeasurementRow<N>; 2], shares: DVec2| of[0] * shares.x + of[1] * shares.y;

@@ -33,7 +33,7 @@ struct GatheredMotion {
 /// Time constant of the specific force's low-pass filter as VQF's authors have it, seconds.
 pub(super) const TAU_PUBLISHED_S: f64 = 3.0;
 /// One that is longer than waves.
-pub(super) const TAU_WAVES_S: f64 = 10.0;
+pub const TAU_WAVES_S: f64 = 10.0;
 
 /// Its authors' setting but for the time constant, without estimates of the bias: its own would take a gun that creeps on a calm day for one at
 /// rest, and its turn for the bias.
@@ -74,7 +74,7 @@ impl Inclination {
         self.vqf.update_acc((g.accel / f64::from(g.count)).to_array());
     }
 
-    /// Which way is up, in the unit's axes at the newest sample.
+    /// Direction of up in the unit's axes at the newest sample, unit vector.
     pub(super) fn up_imu(&self) -> DVec3 {
         DQuat::from_scaled_axis(-self.gathered.turn) * (quaternion(&self.vqf).inverse() * DVec3::Z)
     }

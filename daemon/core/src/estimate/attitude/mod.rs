@@ -21,6 +21,7 @@ use self::{
 pub use self::{
     error_state::{REFRACTION_SIGMA, UpdateOutcome},
     filter::Noise,
+    inclination::TAU_WAVES_S,
 };
 use crate::{
     calibration::Calibration,

@@ -1,28 +1,26 @@
-//! What a unit's samples say of each other, and how far they leave it off up.
+//! Agreement of a unit's samples with each other, and the deviation of the up that it finds alone.
 
 use glam::{DQuat, DVec3};
 
 use super::RecentMean;
-use crate::{physics::GRAVITY_M_S2, time::Time};
+use crate::{estimate::attitude::TAU_WAVES_S, physics::GRAVITY_M_S2, time::Time};
 
-/// How far a unit alone is off up on a ship in waves that keeps its course, radians.
+/// Deviation of a unit's up, found alone, on a ship in waves that keeps its course, radians.
 pub(super) const UP_SIGMA: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// Way of a ship, one standard deviation, m/s: while it turns, specific force leans by that times its rate over gravity.
 const SHIP_SPEED_M_S: f64 = 8.0;
 /// No ship turns faster, rad/s.
 const SHIP_TURN_MOST: f64 = 6.0 * std::f64::consts::PI / 180.0;
-/// A unit alone takes in and forgets that in so long, over which its turn is averaged, seconds, ...
-const LEANS_S: f64 = 10.0;
+/// Time constant with which a unit alone takes in and forgets that, and over which its turn is averaged, seconds, ...
+const LEANS_S: f64 = TAU_WAVES_S;
 /// ...at first over no less.
 const LEANS_LEAST_S: f64 = 2.0;
-/// A unit that has begun on a ship in a turn or in waves is off up by this more, radians, ...
+/// Deviation of up by which a unit begins on a ship in a turn or in waves, and which it forgets in that time as well, radians.
 const BEGUN_SIGMA: f64 = 3.0 * std::f64::consts::PI / 180.0;
-/// ...and forgets it in so long, seconds.
-const BEGUN_S: f64 = 10.0;
 /// No ship's turn tilts it further, radians.
 pub(super) const LEANS_MOST: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
-/// What a unit's samples say of each other.
+/// Running means of a unit's samples.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct UnitWatch {
     /// Size of the specific force and the force itself, m/s^2, its own axes.
@@ -63,14 +61,14 @@ impl UnitWatch {
         self.steadiest = (now * steady).max(self.steadiest * kept);
     }
 
-    /// How far a turn of the ship tilts the unit's up, standard deviation, radians.
+    /// Tilt of the unit's up by a turn of the ship, standard deviation, radians.
     pub(super) fn leans(&self) -> f64 {
         SHIP_SPEED_M_S * self.fastest / GRAVITY_M_S2
     }
 
-    /// How far the unit alone is off up, standard deviation, radians.
+    /// Error of the unit's up, standard deviation, radians.
     pub(super) fn up_sigma(&self) -> f64 {
-        UP_SIGMA.hypot(self.leans()).hypot(BEGUN_SIGMA * (-self.known_s / BEGUN_S).exp())
+        UP_SIGMA.hypot(self.leans()).hypot(BEGUN_SIGMA * (-self.known_s / LEANS_S).exp())
     }
 
     /// The same as a mount that is off is held against it: how the unit began passes, and before a gun that is swung a ship's turn does
