@@ -22,7 +22,7 @@ use glam::{DMat3, DQuat, DVec3};
 pub use self::misfit::Misfit;
 use self::unit::{LEANS_MOST, UP_SIGMA, UnitWatch};
 use super::{
-    attitude::Attitude,
+    attitude::{Attitude, TAU_WAVES_S},
     skyline::{TurnFinder, TurnSeen},
 };
 use crate::{
@@ -47,8 +47,12 @@ const TURN_SHARE: f64 = 0.08;
 const SWAY_SIGMA: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// Verticals that are seen one after the other err alike: so many count as one.
 const ALIKE: f64 = 5.0;
+/// So many err alike where it is the unit that is off up, as a craft that speeds up tilts it.
+const ALIKE_LONG: f64 = 10.0 * TAU_WAVES_S;
 /// What a unit's own orientation and its rates differ by, rad/s.
 const OWN_RATE: f64 = 0.5 * std::f64::consts::PI / 180.0;
+/// What a gun that moves at all, by .2 deg/s, is believed to turn by where its rates are in deg/s and read as rad/s.
+const FAST: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// How far the mean specific force is off up while a gun is moved about, radians.
 const FORCE_SIGMA: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
@@ -60,9 +64,6 @@ struct Hypothesis {
     turn: DMat3,
     up: UpExpected,
     late_ns: i64,
-    /// Error of the expected up, mean of ten seconds (mount) and of two (late pictures).
-    off: MeanOff,
-    sway: MeanSway,
     /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).
     sum: f64,
     /// The reverse since the start, nats (sequential test).
@@ -78,44 +79,57 @@ const LIMIT_BACK: f64 = 5.0;
 enum UpExpected {
     /// There, where up is believed to be by the unit alone.
     At(DMat3),
-    /// As it is believed, at another time.
-    Then,
-    /// At the same place off it all the time, wherever that is.
-    Off,
+    /// As it is believed, at another time; the mean error of that over two seconds.
+    Then(MeanSway),
+    /// At the same place off it all the time, wherever that is: the mean of ten seconds.
+    Off(MeanOff),
     /// Not far off it.
     Wanders,
 }
 
+/// Costs of an observation by what is believed and by a hypothesis, and what it weighs for the alarm and for the exclusion.
+#[derive(Clone, Copy, Debug)]
+struct Costs {
+    as_believed: f64,
+    other: f64,
+    weight: f64,
+    against: f64,
+}
+
+impl Costs {
+    const fn of(as_believed: f64, other: f64) -> Self {
+        Self { as_believed, other, weight: 1.0, against: 1.0 }
+    }
+
+    /// The same of one out of so many that err alike.
+    fn alike(self, count: f64) -> Self {
+        Self { weight: self.weight / count, against: self.against / count, ..self }
+    }
+}
+
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
-        Self {
-            misfit,
-            turn,
-            up,
-            late_ns: 0,
-            off: MeanOff::NOTHING,
-            sway: MeanSway::NOTHING,
-            sum: 0.0,
-            against: 0.0,
-            is_excluded: false,
-        }
+        Self { misfit, turn, up, late_ns: 0, sum: 0.0, against: 0.0, is_excluded: false }
     }
 
-    /// Takes in the costs of an observation by what is believed and by this.
-    fn add(&mut self, as_believed: f64, other: f64, weight: f64) {
-        self.add_apart(as_believed, other, weight, weight);
-    }
-
-    /// The same with weights of its own for the alarm and for the exclusion.
-    fn add_apart(&mut self, as_believed: f64, other: f64, weight: f64, against: f64) {
+    /// Takes in an observation.
+    fn add(&mut self, costs: Costs) {
         /// Evidence at which a hypothesis is excluded, nats.
         const EXCLUDED: f64 = 7.0;
         /// However much better this foretold before, what was wrong may have been put right.
         const LEAST: f64 = -40.0;
-        let better = 0.5 * (as_believed - other);
-        self.sum = (self.sum + weight * better).max(0.0);
-        self.against = (self.against - against * better).max(LEAST);
+        let better = 0.5 * (costs.as_believed - costs.other);
+        self.sum = (self.sum + costs.weight * better).max(0.0);
+        self.against = (self.against - costs.against * better).max(LEAST);
         self.is_excluded |= self.against >= EXCLUDED;
+    }
+
+    /// Takes in an observation by rates in another unit, which make a gun that moves at all a fast one: while none is believed to be, an
+    /// error of another kind, as the bias of a unit that is turned, is explained as well by no turn at all.
+    fn add_rate_unit(&mut self, costs: Costs, is_fast: bool) {
+        if is_fast || costs.other >= costs.as_believed {
+            self.add(costs);
+        }
     }
 
     /// Pays for having been held against a vertical, unless it is believed: a gun that rests shows no more than it did.
@@ -240,44 +254,24 @@ impl Registration {
 
     /// Holds a unit's own orientation against its rates and its specific force. `rate` is without its bias.
     pub fn sample(&mut self, time: Time, sample: &ImuSample, rate: DVec3) {
-        /// Over so long.
-        const SPAN_NS: i64 = 100_000_000;
-        let unit = &mut self.unit;
-        unit.size.take(sample.accel.length());
-        unit.force.take(sample.accel);
-        let step_s = unit.last.replace(time).map_or(0.0, |last| time.secs_since(last));
-        let is_next = (0.0..0.05).contains(&step_s);
-        if is_next {
-            unit.turn(rate, step_s);
-        }
-        let (Some(own), true) = (sample.world_from_imu, is_next) else {
-            unit.own = None;
-            return;
-        };
-        let Some((from, first, turned)) = &mut unit.own else {
-            unit.own = Some((time, own, DQuat::IDENTITY));
-            return;
-        };
-        *turned = (*turned * DQuat::from_scaled_axis(rate * step_s)).normalize();
-        let span_ns = time.ns_since(*from);
-        if span_ns < SPAN_NS {
-            return;
-        }
-        let (seen, by_rates) = (rotation_vector(first.inverse() * own), rotation_vector(*turned));
-        let up = own.inverse() * DVec3::Z;
-        unit.own = Some((time, own, DQuat::IDENTITY));
-        let (force, known) = (unit.force.mean, unit.force.is_full());
-        let floor = OWN_RATE * span_ns as f64 * 1e-9;
-        let [seen, by_rates] = [seen, by_rates].map(|turn| self.camera_from_imu * turn);
+        let Some(own) = self.unit.sample(time, sample, rate) else { return };
+        let floor = OWN_RATE * own.span_s;
+        let [seen, by_rates] = [own.seen, own.by_rates].map(|turn| self.camera_from_imu * turn);
         let cost = |map: DMat3| turn_cost(seen, map * by_rates, DMat3::ZERO, floor);
-        let tilt = |sign: f64| (force.angle_between(up * sign) / FORCE_SIGMA).powi(2).min(COST_MOST);
+        let is_fast = by_rates.length() > FAST * own.span_s;
         for hypothesis in &mut self.hypotheses {
-            match hypothesis.misfit {
-                Misfit::Reversed(FORCE) if known => {
-                    hypothesis.add(tilt(1.0), tilt(-1.0), 1.0 / ALIKE);
+            match (hypothesis.misfit, own.force) {
+                (Misfit::Reversed(FORCE), Some(force)) => {
+                    let tilt =
+                        |sign: f64| (force.angle_between(own.up * sign) / FORCE_SIGMA).powi(2).min(COST_MOST);
+                    hypothesis.add(Costs::of(tilt(1.0), tilt(-1.0)).alike(ALIKE));
                 }
-                Misfit::Reversed(_) | Misfit::RateUnit => {
-                    hypothesis.add(cost(DMat3::IDENTITY), cost(hypothesis.turn), 1.0);
+                (Misfit::Reversed(_), _) => {
+                    hypothesis.add(Costs::of(cost(DMat3::IDENTITY), cost(hypothesis.turn)))
+                }
+                (Misfit::RateUnit, _) => {
+                    hypothesis
+                        .add_rate_unit(Costs::of(cost(DMat3::IDENTITY), cost(hypothesis.turn)), is_fast);
                 }
                 _ => {}
             }
@@ -307,21 +301,25 @@ impl Registration {
 
     /// Takes in how the camera was seen to turn until `time`; `believed` says how it is believed to have turned as long, so much earlier.
     fn turned(&mut self, seen: &TurnSeen, time: Time, believed: impl Fn(i64) -> Option<DVec3>) {
-        let floor = SEA_RATE * time.secs_since(seen.from);
+        let span_s = time.secs_since(seen.from);
+        let floor = SEA_RATE * span_s;
         let Some(own) = believed(0) else { return };
         let cost = |believed: DVec3| turn_cost(seen.turn, believed, seen.covariance, floor);
         let as_believed = cost(own);
         let stands = seen.turn.length() < 0.5 * floor;
+        let is_fast = own.length() > FAST * span_s;
         if own.length() > 3.0 * floor {
             self.turn_cost.take(as_believed);
         }
         for hypothesis in &mut self.hypotheses {
             let Some(turn) = believed(hypothesis.late_ns) else { continue };
-            // What stands in the picture, as a reticle does, does not turn at all.
-            if hypothesis.misfit == Misfit::RateUnit && stands {
-                continue;
+            let costs = Costs::of(as_believed, cost(hypothesis.turn * turn));
+            match hypothesis.misfit {
+                // What stands in the picture, as a reticle does, does not turn at all.
+                Misfit::RateUnit if stands => {}
+                Misfit::RateUnit => hypothesis.add_rate_unit(costs, is_fast),
+                _ => hypothesis.add(costs),
             }
-            hypothesis.add(as_believed, cost(hypothesis.turn * turn), 1.0);
         }
         self.decide();
     }
@@ -338,38 +336,42 @@ impl Registration {
         if up.is_predicted && off.length() < 3.0 * UP_SIGMA {
             self.checked = Some(time);
         }
+        let is_fast = self.unit.rate() > FAST;
         for hypothesis in &mut self.hypotheses {
-            match hypothesis.up {
+            match &mut hypothesis.up {
                 // The unit's own orientation is not made of the force that it sends.
-                UpExpected::At(_)
-                    if hypothesis.misfit == Misfit::Reversed(FORCE) && self.unit.own.is_some() => {}
+                UpExpected::At(_) if hypothesis.misfit == Misfit::Reversed(FORCE) && self.unit.has_own() => {}
                 UpExpected::At(map) => {
-                    let other = cost((map * own).angle_between(up.seen), up_sigma);
+                    let other = cost((*map * own).angle_between(up.seen), up_sigma);
                     // By little is as well a mount that is off, and a ship's turn, which tilts all alike while it lasts.
                     let weight = match hypothesis.misfit {
-                        Misfit::Lens => 1.0 / ALIKE,
+                        Misfit::Lens => 1.0 / ALIKE_LONG,
                         _ if other > as_believed || off.length() > LEANS_MOST => 1.0,
                         _ if self.unit.leans() > UP_SIGMA => 0.0,
                         _ => 1.0 / ALIKE,
                     };
-                    hypothesis.add_apart(as_believed, other, weight, 1.0 / ALIKE);
+                    hypothesis.add(Costs { as_believed, other, weight, against: 1.0 / ALIKE });
                 }
-                UpExpected::Then => {
+                UpExpected::Then(mean) => {
                     let Some(then) = alone(time.plus_ns(-hypothesis.late_ns)) else { continue };
-                    let apart = hypothesis.sway.take_apart(between(then, up.seen));
-                    hypothesis.add(sway, cost(apart, SWAY_SIGMA), 1.0 / ALIKE);
+                    let apart = mean.take_apart(between(then, up.seen));
+                    hypothesis.add(Costs::of(sway, cost(apart, SWAY_SIGMA)).alike(ALIKE));
                 }
-                UpExpected::Off => {
-                    let apart = hypothesis.off.take_apart(off);
-                    let as_believed = cost(off.length(), lasting);
-                    hypothesis.add(as_believed, COST_OFF + cost(apart, lasting), 1.0 / ALIKE);
+                UpExpected::Off(mean) => {
+                    let apart = mean.take_apart(off);
+                    let costs = Costs::of(cost(off.length(), lasting), COST_OFF + cost(apart, lasting));
+                    hypothesis.add(costs.alike(ALIKE));
                 }
                 UpExpected::Wanders => {
-                    hypothesis.add(as_believed, as_believed.min(COST_WANDERS), 1.0 / ALIKE);
+                    let costs = Costs::of(as_believed, as_believed.min(COST_WANDERS)).alike(ALIKE);
+                    match hypothesis.misfit {
+                        Misfit::RateUnit => hypothesis.add_rate_unit(costs, is_fast),
+                        _ => hypothesis.add(costs),
+                    }
                 }
             }
             let is_believed = Some(hypothesis.misfit) == self.believed;
-            if matches!(hypothesis.up, UpExpected::At(_) | UpExpected::Off) && !is_believed {
+            if matches!(hypothesis.up, UpExpected::At(_) | UpExpected::Off(_)) && !is_believed {
                 hypothesis.pay();
             }
         }
@@ -383,7 +385,11 @@ impl Registration {
         const GAP_S: f64 = 2.0;
         if self.up_seen.replace(time).is_none_or(|last| time.secs_since(last) > GAP_S) {
             self.own_sway = MeanSway::NOTHING;
-            self.hypotheses.iter_mut().for_each(|hypothesis| hypothesis.sway = MeanSway::NOTHING);
+            for hypothesis in &mut self.hypotheses {
+                if let UpExpected::Then(mean) = &mut hypothesis.up {
+                    *mean = MeanSway::NOTHING;
+                }
+            }
         }
     }
 
@@ -475,18 +481,18 @@ fn hypotheses(camera_from_imu: DMat3) -> Vec<Hypothesis> {
     all.extend(reversed.map(|(what, imu)| Hypothesis::of(Misfit::Reversed(what), of_unit(imu), Wanders)));
     all.push(Hypothesis::of(Misfit::Reversed(FORCE), identity, At(-identity)));
     all.push(Hypothesis::of(Misfit::RateUnit, identity * 1f64.to_radians(), Wanders));
-    // The plane through the eye and a line of the picture tilts as the picture is stretched.
-    all.extend(
-        [0.6, 0.77, 1.3, 1.7]
-            .map(|scale| Hypothesis::of(Misfit::Lens, identity * scale, At(diagonal(1.0, 1.0, scale)))),
-    );
+    // Another lens shows turns about the picture's axes larger or smaller, and one about the optical axis as it is; the plane through the eye
+    // and a line of the picture tilts as the picture is stretched.
+    all.extend([0.6, 0.77, 1.3, 1.7].map(|scale| {
+        Hypothesis::of(Misfit::Lens, diagonal(scale, scale, 1.0), At(diagonal(1.0, 1.0, scale)))
+    }));
     all.push(Hypothesis::of(Misfit::Mirrored, diagonal(1.0, -1.0, -1.0), At(diagonal(-1.0, 1.0, 1.0))));
     all.push(Hypothesis::of(Misfit::Mirrored, diagonal(-1.0, 1.0, -1.0), At(diagonal(1.0, -1.0, 1.0))));
     all.extend([100, 150, 200, 300, 400].map(|ms: u16| {
-        let late = Hypothesis::of(Misfit::Late(ms), identity, Then);
+        let late = Hypothesis::of(Misfit::Late(ms), identity, Then(MeanSway::NOTHING));
         Hypothesis { late_ns: i64::from(ms) * 1_000_000, ..late }
     }));
-    all.push(Hypothesis::of(Misfit::Mount, identity, Off));
+    all.push(Hypothesis::of(Misfit::Mount, identity, Off(MeanOff::NOTHING)));
     all
 }
 

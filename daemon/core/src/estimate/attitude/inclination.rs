@@ -10,7 +10,7 @@ use vqf_rs::{Params, VQF};
 use crate::physics::GRAVITY_M_S2;
 
 /// VQF is fed steps of this length at least, seconds: its time constants are seconds, and a step costs more than all the rest of a sample.
-const STEP_S: f64 = 0.02;
+const STEP_S: f64 = 0.04;
 
 /// Share of a sample's period by which a step may be shorter: clocks shift by microseconds.
 const SLACK: f64 = 0.2;

@@ -84,6 +84,21 @@ fn a_reticle_in_the_picture_is_no_rate_in_degrees() {
 }
 
 #[test]
+fn a_gun_that_hardly_turns_has_no_rates_in_degrees() {
+    // It turns by up to 2 deg/s, and the picture does not follow: whatever that is, not a unit that says sixty times too much.
+    let (first, watch) = watched(0.08, |_, _| DVec3::X * 1e-4, |time| DQuat::from_rotation_x(0.2) * up(time));
+    assert!(watch.wrong() != Some(Misfit::RateUnit), "after {first:?} s");
+}
+
+#[test]
+fn a_craft_that_speeds_up_has_no_other_lens() {
+    // The unit alone has up eleven degrees off, as accelerations tilt it, for ten seconds; the picture turns as believed.
+    let tilt = DQuat::from_rotation_x(11f64.to_radians());
+    let (_, watch) = watched(0.3, turn, |time| tilt * up(time));
+    assert!(watch.wrong() != Some(Misfit::Lens), "{:?}", watch.wrong());
+}
+
+#[test]
 fn a_unit_that_restarts_is_checked_anew() {
     let (_, mut watch) = watched(1.0, turn, up);
     assert!(watch.checks(at(110)).is_tried);
@@ -110,7 +125,7 @@ fn each_way_to_be_wrong_is_told_within_two_seconds_by_its_name() {
         (diagonal(1.0, -1.0, -1.0), diagonal(-1.0, 1.0, 1.0), Misfit::Mirrored),
         (diagonal(1.0, -1.0, 1.0), DMat3::IDENTITY, Misfit::Reversed("the rate about y")),
         (DMat3::IDENTITY, diagonal(-1.0, -1.0, -1.0), Misfit::Reversed(FORCE)),
-        (DMat3::IDENTITY * 1.5, DMat3::IDENTITY, Misfit::Lens),
+        (diagonal(1.5, 1.5, 1.0), DMat3::IDENTITY, Misfit::Lens),
     ];
     for (by_turn, by_up, misfit) in cases {
         let (first, last) = told(|from, to| by_turn * turn(from, to), |time| by_up * up(time));

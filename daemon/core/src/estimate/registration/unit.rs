@@ -3,7 +3,10 @@
 use glam::{DQuat, DVec3};
 
 use super::RecentMean;
-use crate::{estimate::attitude::TAU_WAVES_S, physics::GRAVITY_M_S2, time::Time};
+use crate::{
+    estimate::attitude::TAU_WAVES_S, event::ImuSample, geometry::rotation_vector, physics::GRAVITY_M_S2,
+    time::Time,
+};
 
 /// Deviation of a unit's up, found alone, on a ship in waves that keeps its course, radians.
 pub(super) const UP_SIGMA: f64 = 1.0 * std::f64::consts::PI / 180.0;
@@ -24,11 +27,13 @@ pub(super) const LEANS_MOST: f64 = 10.0 * std::f64::consts::PI / 180.0;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct UnitWatch {
     /// Size of the specific force and the force itself, m/s^2, its own axes.
-    pub size: RecentMean<f64, 100>,
-    pub force: RecentMean<DVec3, 100>,
+    size: RecentMean<f64, 100>,
+    force: RecentMean<DVec3, 100>,
+    /// Size of the rate, rad/s.
+    rate: RecentMean<f64, 100>,
     /// The unit's own orientation some time ago, the time, and how it turned since by its rates.
-    pub own: Option<(Time, DQuat, DQuat)>,
-    pub last: Option<Time>,
+    own: Option<(Time, DQuat, DQuat)>,
+    last: Option<Time>,
     /// Mean turn about the vertical over [`LEANS_S`], rad/s, and that of its square, (rad/s)^2; at first over how long they are known.
     turning: f64,
     turning_square: f64,
@@ -38,14 +43,67 @@ pub(super) struct UnitWatch {
     steadiest: f64,
 }
 
+/// How a unit's own orientation turned, and how its rates say that it did: rotation vectors, its own axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OwnTurn {
+    pub seen: DVec3,
+    pub by_rates: DVec3,
+    pub span_s: f64,
+    /// Up by its own orientation, unit vector.
+    pub up: DVec3,
+    /// Mean specific force, m/s^2, where it is known.
+    pub force: Option<DVec3>,
+}
+
 impl UnitWatch {
+    /// Takes in a sample; `rate` is its rate without its bias, rad/s. Its own turn each tenth of a second.
+    pub(super) fn sample(&mut self, time: Time, sample: &ImuSample, rate: DVec3) -> Option<OwnTurn> {
+        const SPAN_S: f64 = 0.1;
+        /// Samples that are farther apart are not of one turn, seconds.
+        const GAP_S: f64 = 0.05;
+        self.size.take(sample.accel.length());
+        self.force.take(sample.accel);
+        self.rate.take(rate.length());
+        let step_s = self.last.replace(time).map_or(0.0, |last| time.secs_since(last));
+        let is_next = (0.0..GAP_S).contains(&step_s);
+        if is_next {
+            self.turn(rate, step_s);
+        }
+        let (Some(own), true) = (sample.world_from_imu, is_next) else {
+            self.own = None;
+            return None;
+        };
+        let (from, first, turned) = self.own.get_or_insert((time, own, DQuat::IDENTITY));
+        if *from < time {
+            *turned = (*turned * DQuat::from_scaled_axis(rate * step_s)).normalize();
+        }
+        let span_s = time.secs_since(*from);
+        if span_s < SPAN_S {
+            return None;
+        }
+        let (seen, by_rates) = (rotation_vector(first.inverse() * own), rotation_vector(*turned));
+        self.own = Some((time, own, DQuat::IDENTITY));
+        let force = self.force.is_full().then_some(self.force.mean);
+        Some(OwnTurn { seen, by_rates, span_s, up: own.inverse() * DVec3::Z, force })
+    }
+
+    /// Whether the unit finds its own orientation.
+    pub(super) const fn has_own(&self) -> bool {
+        self.own.is_some()
+    }
+
+    /// Mean size of the rate, rad/s.
+    pub(super) const fn rate(&self) -> f64 {
+        self.rate.mean
+    }
+
     /// No gun on the Earth feels that on average: it is a number of g.
     pub(super) fn is_in_g(&self) -> bool {
         self.size.is_full() && self.size.mean < 5.0
     }
 
     /// Takes in a rate, rad/s, that lasted `step_s`.
-    pub(super) fn turn(&mut self, rate: DVec3, step_s: f64) {
+    fn turn(&mut self, rate: DVec3, step_s: f64) {
         let about_up = rate.dot(self.force.mean.normalize_or_zero());
         // What turns faster is a gun on its mount.
         let about_up = if about_up.abs() > SHIP_TURN_MOST { 0.0 } else { about_up };
