@@ -7,3 +7,4 @@ pub mod make;
 pub mod ocean;
 pub mod pty;
 pub mod replay;
+pub mod set_up;

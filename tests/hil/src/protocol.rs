@@ -125,6 +125,8 @@ pub struct PlayerFeed {
     pub garbage: f64,
     /// Whether the tape's own pulls of the trigger are played.
     pub trigger: bool,
+    /// Name of the wrong set-up ([`hw_sim::set_up::SET_UPS`]) whose samples and pictures are played; empty for none.
+    pub set_up: String,
 }
 
 /// Messages of the agent.

@@ -258,6 +258,19 @@ pub fn halved(yuyv: &[u8], width: u32, height: u32) -> Vec<u8> {
     out
 }
 
+/// A picture whose columns, rows come in reverse order.
+pub fn flipped(yuyv: &[u8], width: u32, [columns, rows]: [bool; 2]) -> Vec<u8> {
+    let mut all: Vec<&[u8]> = yuyv.chunks_exact(width as usize * 2).collect();
+    if rows {
+        all.reverse();
+    }
+    if !columns {
+        return all.concat();
+    }
+    // Two pixels share their chroma.
+    all.into_iter().flat_map(|row| row.rchunks_exact(4).flat_map(|p| [p[2], p[1], p[0], p[3]])).collect()
+}
+
 /// Mean luma of a YUYV picture as sRGB grey, 0 to 1.
 pub fn mean_grey(yuyv: &[u8]) -> f32 {
     let sum: u64 = yuyv.iter().step_by(2).map(|v| u64::from(*v)).sum();
@@ -278,6 +291,16 @@ mod tests {
                 assert!((a - i32::from(b)).abs() <= 3, "{colour:?} {back:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_flipped_picture_has_its_first_pixels_last() {
+        // Two rows of four pixels.
+        let picture: Vec<u8> = (0..16).collect();
+        assert_eq!(flipped(&picture, 4, [false, true])[..8], picture[8..]);
+        assert_eq!(flipped(&picture, 4, [true, false])[..8], [6, 5, 4, 7, 2, 1, 0, 3]);
+        let back = flipped(&flipped(&picture, 4, [true, true]), 4, [true, true]);
+        assert_eq!(back, picture);
     }
 
     #[test]

@@ -18,9 +18,10 @@ use bowwave_devices::{clock, vectornav::CommonOutput};
 use bowwave_hil::{
     TAPE_SERIAL,
     protocol::{AgentMessage, PlayerFeed},
-    tape::{Tape, TapePacket, halved},
+    tape::{Tape, TapePacket, flipped, halved},
 };
 use glam::{DQuat, DVec3};
+use hw_sim::set_up::{SetUp, WrongSetUp};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
@@ -178,7 +179,7 @@ impl PlayerState {
         let header = &self.tape.header;
         let mut bytes = match mode.fourcc.as_str() {
             "MJPG" => self.tape.jpeg(index).to_vec(),
-            "YUYV" if mode.width == header.width => self.tape.yuyv(index).to_vec(),
+            "YUYV" if mode.width == header.width => self.full_size(index, wrong(feed)),
             "YUYV" if mode.width == header.width / 2 => {
                 halved(self.tape.yuyv(index), header.width, header.height)
             }
@@ -209,6 +210,16 @@ impl PlayerState {
             height: mode.height,
         };
         Some([&head.bytes()[..], &bytes].concat())
+    }
+
+    /// A picture as a camera that is set up so gives it.
+    fn full_size(&self, index: usize, wrong: WrongSetUp) -> Vec<u8> {
+        let count = self.tape.header.frames.len();
+        let shown = self.tape.yuyv((index + count - wrong.frames_late(30)) % count);
+        match wrong.flips() {
+            [false, false] => shown.to_vec(),
+            flips => flipped(shown, self.tape.header.width, flips),
+        }
     }
 
     fn unit(&self, number: u64, origin: Time) {
@@ -267,6 +278,10 @@ impl PlayerState {
     }
 }
 
+fn wrong(feed: &PlayerFeed) -> WrongSetUp {
+    SetUp::named(&feed.set_up).map_or(WrongSetUp::Nothing, |set_up| set_up.wrong)
+}
+
 fn packet(sample: &TapePacket, device_ns: i64, feed: &PlayerFeed) -> Vec<u8> {
     let mut rate = DVec3::from_array(sample.rate);
     if feed.saturated {
@@ -275,13 +290,13 @@ fn packet(sample: &TapePacket, device_ns: i64, feed: &PlayerFeed) -> Vec<u8> {
     if feed.nan {
         rate = DVec3::NAN;
     }
-    let sample = ImuSample {
+    let sample = wrong(feed).sample(ImuSample {
         arrival: Time::from_ns(0),
         device_time_ns: device_ns,
         rate,
         accel: DVec3::from_array(sample.accel),
         world_from_imu: sample.attitude.map(DQuat::from_array),
-    };
+    });
     let mut bytes = Vec::with_capacity(CommonOutput::MAX_BYTES);
     if let Some(output) = CommonOutput::from_sample(&sample) {
         output.encode(&mut bytes);

@@ -14,16 +14,16 @@ use anyhow::Result;
 use bowwave_core::{
     calibration::Calibration,
     estimate::{HeadingSettings, attitude::Source},
-    event::{Event, ImuSample, Picture, PixelFormat, Tick},
+    event::{Event, Picture, PixelFormat, Tick},
     fault::{Change, Fault, Severity},
     session::{Session, Setup},
     time::secs_to_ns,
     world::scenario::Scenario,
 };
-use glam::{DQuat, DVec3};
 use hw_sim::{
     make::{Periodic, Recipe},
     replay::Replay,
+    set_up::{SET_UPS, SetUp, WrongSetUp},
 };
 
 use crate::{
@@ -31,122 +31,30 @@ use crate::{
     table::TextTable,
 };
 
-/// What is wrong.
-#[derive(Clone, Copy, Debug)]
-enum Wrong {
-    Nothing,
-    /// The unit is turned about its own axes against how it was calibrated.
-    Turned(DVec3),
-    /// Signs of rates, and of specific forces.
-    Signs(DVec3, DVec3),
-    /// Factors on rates and specific forces.
-    Scale(f64, f64),
-    /// Factor on the focal length of the lens that is calibrated.
-    Focal(f64),
-    /// Columns, rows in reverse order.
-    Flipped(bool, bool),
-    /// Pictures that show what was so many milliseconds before their stamps.
-    Late(i64),
-    /// The calibrated turn from unit to camera is wrong by a turn about the camera's axes.
-    Mount(DVec3),
-}
-
-/// Name, what is wrong, and the faults that name it.
-type SetUp = (&'static str, Wrong, &'static [Fault]);
-
-const QUARTER: f64 = std::f64::consts::FRAC_PI_2;
-const HALF: f64 = std::f64::consts::PI;
-const DEG: f64 = std::f64::consts::PI / 180.0;
-const TURNED: &[Fault] = &[Fault::UnitTurned];
-const REVERSED: &[Fault] = &[Fault::UnitReversed];
-const MOUNT: &[Fault] = &[Fault::NotRegistered];
-const MIRRORED: &[Fault] = &[Fault::PictureMirrored];
-
-const SET_UPS: &[SetUp] = &[
-    ("nothing", Wrong::Nothing, &[]),
-    ("unit turned by 180 deg about x", Wrong::Turned(DVec3::new(HALF, 0.0, 0.0)), TURNED),
-    ("unit turned by 180 deg about y", Wrong::Turned(DVec3::new(0.0, HALF, 0.0)), TURNED),
-    ("unit turned by 180 deg about z", Wrong::Turned(DVec3::new(0.0, 0.0, HALF)), TURNED),
-    ("unit turned by 90 deg about x", Wrong::Turned(DVec3::new(QUARTER, 0.0, 0.0)), TURNED),
-    ("unit turned by -90 deg about x", Wrong::Turned(DVec3::new(-QUARTER, 0.0, 0.0)), TURNED),
-    ("unit turned by 90 deg about y", Wrong::Turned(DVec3::new(0.0, QUARTER, 0.0)), TURNED),
-    ("unit turned by -90 deg about y", Wrong::Turned(DVec3::new(0.0, -QUARTER, 0.0)), TURNED),
-    ("unit turned by 90 deg about z", Wrong::Turned(DVec3::new(0.0, 0.0, QUARTER)), TURNED),
-    ("unit turned by -90 deg about z", Wrong::Turned(DVec3::new(0.0, 0.0, -QUARTER)), TURNED),
-    ("rate x reversed", Wrong::Signs(DVec3::new(-1.0, 1.0, 1.0), DVec3::ONE), REVERSED),
-    ("rate y reversed", Wrong::Signs(DVec3::new(1.0, -1.0, 1.0), DVec3::ONE), REVERSED),
-    ("rate z reversed", Wrong::Signs(DVec3::new(1.0, 1.0, -1.0), DVec3::ONE), REVERSED),
-    ("rates reversed", Wrong::Signs(DVec3::NEG_ONE, DVec3::ONE), REVERSED),
-    ("force reversed", Wrong::Signs(DVec3::ONE, DVec3::NEG_ONE), REVERSED),
-    ("rates in deg/s", Wrong::Scale(1.0 / DEG, 1.0), &[Fault::RateUnit]),
-    ("force in g", Wrong::Scale(1.0, 1.0 / 9.806_65), &[Fault::ForceUnit]),
-    ("lens longer by half", Wrong::Focal(1.0 / 1.5), &[Fault::OtherLens]),
-    ("lens shorter by a third", Wrong::Focal(1.5), &[Fault::OtherLens]),
-    ("picture mirrored", Wrong::Flipped(true, false), MIRRORED),
-    ("picture upside down", Wrong::Flipped(false, true), MIRRORED),
-    ("picture turned by 180 deg", Wrong::Flipped(true, true), &[Fault::UnitTurned, Fault::PictureMirrored]),
-    ("pictures late by 150 ms", Wrong::Late(150), &[Fault::PictureLate]),
-    ("pictures late by 300 ms", Wrong::Late(300), &[Fault::PictureLate]),
-    ("another mount, 5 deg up", Wrong::Mount(DVec3::new(5.0 * DEG, 0.0, 0.0)), MOUNT),
-    ("another mount, 5 deg down", Wrong::Mount(DVec3::new(-5.0 * DEG, 0.0, 0.0)), MOUNT),
-    ("another mount, 5 deg rolled", Wrong::Mount(DVec3::new(0.0, 0.0, 5.0 * DEG)), MOUNT),
-    ("another mount, 2 deg up, 2 rolled", Wrong::Mount(DVec3::new(2.0 * DEG, 0.0, 2.0 * DEG)), MOUNT),
-];
-
-impl Wrong {
-    fn calibration(self, mut calibration: Calibration) -> Calibration {
-        match self {
-            Self::Focal(factor) => calibration.lens.focal *= factor,
-            Self::Mount(turn) => {
-                calibration.camera_from_imu = DQuat::from_scaled_axis(turn) * calibration.camera_from_imu;
+/// Events as a trainer that is set up so gets them.
+fn events(wrong: WrongSetUp) -> impl FnMut(Event, &Replay) -> Event {
+    let mut shown = VecDeque::new();
+    move |event, _| match event {
+        Event::Imu(sample) => Event::Imu(wrong.sample(sample)),
+        Event::Frame(mut frame) => {
+            let [columns, rows] = wrong.flips();
+            if (columns || rows)
+                && let Some(flipped) = flipped(&frame.picture, columns, rows)
+            {
+                frame.picture = flipped;
             }
-            _ => {}
-        }
-        calibration
-    }
-
-    fn event(self, event: Event) -> Event {
-        match (self, event) {
-            (Self::Turned(turn), Event::Imu(s)) => {
-                let turn = DQuat::from_scaled_axis(turn);
-                Event::Imu(ImuSample {
-                    rate: turn.inverse() * s.rate,
-                    accel: turn.inverse() * s.accel,
-                    world_from_imu: s.world_from_imu.map(|q| q * turn),
-                    ..s
-                })
-            }
-            (Self::Signs(rate, accel), Event::Imu(s)) => {
-                Event::Imu(ImuSample { rate: s.rate * rate, accel: s.accel * accel, ..s })
-            }
-            (Self::Scale(rate, accel), Event::Imu(s)) => {
-                Event::Imu(ImuSample { rate: s.rate * rate, accel: s.accel * accel, ..s })
-            }
-            (Self::Flipped(columns, rows), Event::Frame(mut frame)) => {
-                if let Some(flipped) = flipped(&frame.picture, columns, rows) {
-                    frame.picture = flipped;
-                }
-                Event::Frame(frame)
-            }
-            (_, event) => event,
-        }
-    }
-
-    /// Events as this makes them of a recording's.
-    fn events(self) -> impl FnMut(Event, &Replay) -> Event {
-        let mut shown = VecDeque::new();
-        move |event, _| {
-            let mut event = self.event(event);
-            if let (Event::Frame(frame), Self::Late(late_ms)) = (&mut event, self) {
+            let late = wrong.frames_late(30);
+            if late > 0 {
                 // The stamp is this picture's, what it shows is older.
                 shown.push_back(frame.picture.clone());
-                if shown.len() > (late_ms * 30 / 1000) as usize + 1 {
+                if shown.len() > late + 1 {
                     shown.pop_front();
                 }
                 frame.picture = shown.front().cloned().unwrap_or_else(|| frame.picture.clone());
             }
-            event
+            Event::Frame(frame)
         }
+        event => event,
     }
 }
 
@@ -251,6 +159,13 @@ fn replay(
     Ok(said)
 }
 
+/// What a trainer that is set up so tells last of a recording, and its share of READY frames from two seconds on.
+pub fn told(path: &Path, set_up: &SetUp, source: Source, seconds: f64) -> Result<(Option<Fault>, f64)> {
+    let played = Played { source, seconds, rate: 30.0, scenario: "" };
+    let said = replay(path, played, |own| set_up.wrong.calibration(own), events(set_up.wrong))?;
+    Ok((said.last, said.ready))
+}
+
 /// The recordings.
 fn recipes() -> [(&'static str, Recipe); 2] {
     let small = Recipe { width: 640, height: 360, trigger: Vec::new(), ..Recipe::default() };
@@ -310,20 +225,22 @@ impl SetUpStudy {
         }
         for (name, path) in recordings {
             for (source, orientation) in [(Source::Auto, "unit's own"), (Source::Fused, "fused")] {
-                for (set_up, wrong, faults) in SET_UPS {
-                    if self.only.as_ref().is_some_and(|only| !set_up.contains(only.as_str())) {
+                for set_up in SET_UPS {
+                    if self.only.as_ref().is_some_and(|only| !set_up.name.contains(only.as_str())) {
                         continue;
                     }
                     let played = Played { source, seconds: self.seconds, rate: self.rate, scenario: "" };
-                    let said = replay(&path, played, |own| wrong.calibration(own), wrong.events())?;
-                    let right = said.last.map_or(faults.is_empty(), |last| faults.contains(&last));
+                    let said =
+                        replay(&path, played, |own| set_up.wrong.calibration(own), events(set_up.wrong))?;
+                    let right = set_up.is_named(said.last);
                     all += 1;
                     named += u32::from(right);
-                    in_time += u32::from(faults.is_empty() || said.first.is_some_and(|(s, _)| s <= 2.0));
+                    in_time +=
+                        u32::from(set_up.faults.is_empty() || said.first.is_some_and(|(s, _)| s <= 2.0));
                     let cells = [
                         name.to_owned(),
                         orientation.to_owned(),
-                        (*set_up).to_owned(),
+                        set_up.name.to_owned(),
                         said.first.map_or_else(String::new, |(s, _)| format!("{s:.2}")),
                         said.first.map_or("", |(_, fault)| fault.code()).to_owned(),
                         said.last.map_or("", Fault::code).to_owned(),

@@ -3,6 +3,7 @@
 mod camera;
 mod computer;
 mod guide;
+mod registration;
 mod replayed;
 mod ship;
 mod trigger;
@@ -193,6 +194,7 @@ pub fn rows() -> Vec<FaultRow> {
     all.extend(ship::rows());
     all.extend(guide::rows());
     all.extend(replayed::rows());
+    all.extend(registration::rows());
     all.extend(trigger::rows());
     all.extend(computer::rows());
     all
