@@ -1,10 +1,11 @@
-//! A computer that is busy with something else: how soon the trainer says so, what it leaves out, and how soon all is back. The program itself
-//! runs in real time and keeps a recording, beside threads that do nothing but take processor time.
+//! A computer that is short of processor time, memory or disk: how soon the trainer says so, what it leaves out, and how soon all is back. The
+//! program itself runs in real time and keeps a recording.
+
+mod shortage;
 
 use std::{
     path::{Path, PathBuf},
     process::{Command, Stdio},
-    sync::atomic::{AtomicBool, Ordering},
     thread,
     time::Duration,
 };
@@ -20,21 +21,34 @@ use bowwave_record::{
 };
 use rustix::time::{ClockId, clock_gettime};
 
+use self::shortage::{Place, Shortage};
 use crate::table::TextTable;
 
-/// Seconds before the load, with it, and after it.
+/// Seconds before the shortage, with it, and after it.
 const PHASES_S: [u64; 3] = [8, 10, 8];
-/// What the load may change.
+/// What it may change.
 const LOAD: [Fault; 4] = [Fault::LoadRate, Fault::LoadWater, Fault::LoadFar, Fault::LoadUnseen];
 /// Frames of a second, but for one.
 const RATE_KEPT: usize = 29;
 
-/// Runs the trainer beside busy loops.
+/// Runs the trainer on a computer that falls short: busy loops beside it; as root also heat, memory used up and a slow disk.
 #[derive(Debug, clap::Args)]
 pub struct OverloadStudy {
     /// Numbers of busy loops
     #[arg(long, value_delimiter = ',', default_values_t = [0, 1, 2, 3, 4, 5, 6, 7, 8])]
     loops: Vec<usize>,
+    /// Speeds of a hot processor, of 1
+    #[arg(long, value_delimiter = ',', default_values_t = [0.75, 0.5, 0.25])]
+    heat: Vec<f64>,
+    /// MB of memory that are left
+    #[arg(long, value_delimiter = ',', default_values_t = [64])]
+    memory: Vec<u64>,
+    /// MB that the disk writes a second
+    #[arg(long, value_delimiter = ',', default_values_t = [1])]
+    disk: Vec<u64>,
+    /// Without what only root may bring about
+    #[arg(long)]
+    loops_only: bool,
     /// The program
     #[arg(long, default_value = "target/release/bowwave")]
     program: PathBuf,
@@ -44,7 +58,7 @@ pub struct OverloadStudy {
 #[derive(Debug, Default)]
 struct Told {
     ticks: Vec<Time>,
-    /// When a fault of [`LOAD`] came (`true`) or went.
+    /// When a fault came (`true`) or went.
     changes: Vec<(Time, Fault, bool)>,
 }
 
@@ -54,83 +68,86 @@ fn now() -> Time {
 }
 
 impl OverloadStudy {
-    /// Prints a line for each number of loops.
+    /// Prints a line for each shortage.
     pub fn run(&self) -> Result<()> {
         if !self.program.is_file() {
             bail!("no program at {}; build it with cargo build --release", self.program.display());
         }
         let titles = [
-            ("loops", 5),
+            ("short of", 16),
             ("frames", 7),
             ("told s", 7),
             ("untold s", 8),
             ("back s", 7),
             ("rms px", 6),
             ("rounds", 7),
-            ("left out", 40),
+            ("recorded", 9),
+            ("said", 40),
         ];
-        let mut table = TextTable::new(0, titles);
+        let mut table = TextTable::new(1, titles);
         print!("{}", table.take());
-        for loops in &self.loops {
-            table.row(self.row(*loops)?);
+        let mut all: Vec<_> = self.loops.iter().map(|count| Shortage::Loops(*count)).collect();
+        if !self.loops_only {
+            all.extend(self.heat.iter().map(|share| Shortage::Heat(*share)));
+            all.extend(self.memory.iter().map(|mb| Shortage::Memory(*mb)));
+            all.extend(self.disk.iter().map(|mb| Shortage::Disk(*mb)));
+        }
+        for short in all {
+            table.row(self.row(short)?);
             print!("{}", table.take());
         }
         println!(
-            "frames: shown of 30 a second while the load lasted. told: after the load began. untold: seconds with fewer than {RATE_KEPT} frames \
-             in the last one and no word of it. back: all drawn again after the load ended."
+            "frames: shown of 30 a second while it lasted. told: after it began. untold: seconds with fewer than {RATE_KEPT} frames in the last \
+             one and no word of it. back: all drawn again after it ended. rounds: in the journal of those fired. recorded: frames of those \
+             shown."
         );
         Ok(())
     }
 
-    fn row(&self, loops: usize) -> Result<[String; 8]> {
-        let folder = tempfile::tempdir()?;
+    fn row(&self, short: Shortage) -> Result<[String; 9]> {
+        let place = Place::new(short)?;
+        let folder = place.folder();
         let duration_s: u64 = PHASES_S.iter().sum();
         let mut child = Command::new(&self.program)
             .args(["simulate", "--realtime", "--record", "--duration", &duration_s.to_string(), "--out"])
-            .arg(folder.path())
+            .arg(folder)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .context("the program cannot be started")?;
+        place.enter(child.id())?;
         thread::sleep(Duration::from_secs(PHASES_S[0]));
-        let over = AtomicBool::new(false);
-        let [begun, ended] = thread::scope(|scope| {
-            let begun = now();
-            for _ in 0..loops {
-                scope.spawn(|| {
-                    while !over.load(Ordering::Relaxed) {
-                        std::hint::spin_loop();
-                    }
-                });
-            }
-            thread::sleep(Duration::from_secs(PHASES_S[1]));
-            over.store(true, Ordering::Relaxed);
-            [begun, now()]
-        });
+        let [begun, ended] = place.fall_short(Duration::from_secs(PHASES_S[1]), now)?;
         let status = child.wait()?;
         if !status.success() {
             bail!("the program ended with {status}");
         }
-        let told = read(&folder.path().join("recording.mcap"))?;
+        let told = read(&folder.join("recording.mcap"))?;
         let summary: serde_json::Value =
-            serde_json::from_slice(&std::fs::read(folder.path().join("summary.json"))?)?;
+            serde_json::from_slice(&std::fs::read(folder.join("summary.json"))?)?;
         let filter = ShotFilter { runs: RunSelection::Latest, hits_only: false };
-        let kept = read_shots(&folder.path().join("hits.sqlite"), &filter)?.len();
+        let kept = read_shots(&folder.join("hits.sqlite"), &filter)?.len();
         let shown = told.ticks.iter().filter(|t| **t > begun && **t <= ended).count();
         let seconds = |s: Option<f64>| s.map_or_else(|| "-".to_owned(), |s| format!("{s:.2}"));
-        let came = told.changes.iter().find(|(time, _, came)| *came && *time > begun);
-        let mut codes: Vec<&str> =
-            told.changes.iter().filter(|(_, _, came)| *came).map(|(_, fault, _)| fault.code()).collect();
+        let mut of_load = told.changes.iter().filter(|(_, fault, _)| LOAD.contains(fault));
+        let came = of_load.clone().find(|(time, _, came)| *came && *time > begun);
+        let mut codes: Vec<&str> = told
+            .changes
+            .iter()
+            .filter(|(time, _, came)| *came && *time > begun)
+            .map(|(_, fault, _)| fault.code())
+            .collect();
         codes.sort_unstable();
         codes.dedup();
         Ok([
-            loops.to_string(),
+            short.name(),
             format!("{:.1} %", 100.0 * shown as f64 / (30.0 * ended.secs_since(begun))),
             seconds(came.map(|(time, ..)| time.secs_since(begun))),
             format!("{:.2}", told.untold_s()),
-            seconds(told.changes.iter().rfind(|(_, _, came)| !came).map(|(time, ..)| time.secs_since(ended))),
+            seconds(of_load.rfind(|(_, _, came)| !came).map(|(time, ..)| time.secs_since(ended))),
             summary["registration_px"]["rms"].as_f64().map_or("-".to_owned(), |px| format!("{px:.2}")),
             format!("{kept}/{}", summary["shots"]),
+            format!("{}/{}", told.ticks.len(), summary["frames"]),
             codes.join(" "),
         ])
     }
@@ -160,7 +177,7 @@ fn read(path: &Path) -> Result<Told> {
     for entry in RecordingReader::open(path)?.entries_as_written()? {
         match entry? {
             Entry::Tick(tick) => told.ticks.push(tick.tick.time),
-            Entry::Fault(entry) if LOAD.contains(&entry.change.fault) => {
+            Entry::Fault(entry) => {
                 let came = matches!(entry.change.change, Change::Raised { .. });
                 told.changes.push((entry.change.time, entry.change.fault, came));
             }
