@@ -1,8 +1,8 @@
 //! The whole program on hostile files of each kind that it reads: each run ends by itself within ten seconds and 512 MB, with an exit code
 //! of its own and no panic, and prints no control character and no line that the file made up.
 //!
-//! Files are made of good ones by damage of many kinds. `BOWWAVE_MUTATIONS` says how many of each kind (12 unless told); what breaks the
-//! program is kept in target/attack.
+//! Files are made of good ones by damage of many kinds. `BOWWAVE_MUTATIONS` says how many of each kind (12 unless told), `BOWWAVE_MUTATIONS_FROM`
+//! the number of the first; what breaks the program is kept in target/attack.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
@@ -11,6 +11,7 @@ mod targets;
 
 use std::{
     fs,
+    ops::Range,
     path::Path,
     sync::{
         Mutex,
@@ -32,9 +33,10 @@ fn hostile_files_neither_crash_nor_hang_the_program_nor_forge_its_lines() {
     let asked = std::env::var("BOWWAVE_MUTATIONS").ok();
     let count = asked.map_or(MUTATIONS, |text| text.parse().unwrap());
     let folder = tempfile::tempdir().unwrap();
+    let first = std::env::var("BOWWAVE_MUTATIONS_FROM").map_or(0, |text| text.parse().unwrap());
     let mut broken = 0;
     for target in targets::all(folder.path()) {
-        let (seen, faults) = attack(&target, folder.path(), count);
+        let (seen, faults) = attack(&target, folder.path(), first..first + count);
         println!(
             "{}: {count} files, of which {} were taken and {} refused; {faults} broke it",
             target.name, seen.taken, seen.refused
@@ -55,23 +57,24 @@ struct Seen {
     refused: usize,
 }
 
-/// Runs the program on so many files; how many it took and refused, and how many broke it.
-fn attack(target: &Target, folder: &Path, count: usize) -> (Seen, usize) {
-    let (next, seen, broken) = (AtomicUsize::new(0), Mutex::new(Seen::default()), AtomicUsize::new(0));
+/// Runs the program on the files of these numbers; how many it took and refused, and how many broke it.
+fn attack(target: &Target, folder: &Path, numbers: Range<usize>) -> (Seen, usize) {
+    let (next, seen, broken) =
+        (AtomicUsize::new(numbers.start), Mutex::new(Seen::default()), AtomicUsize::new(0));
     let seeds = target.seeds();
     thread::scope(|scope| {
         for worker in 0..AT_ONCE {
-            let (next, seen, broken, seeds) = (&next, &seen, &broken, &seeds);
+            let (next, seen, broken, seeds, numbers) = (&next, &seen, &broken, &seeds, &numbers);
             scope.spawn(move || {
                 let place = folder.join(format!("{}-{worker}", target.name));
                 fs::create_dir_all(&place).unwrap();
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);
-                    if number >= count {
+                    if number >= numbers.end {
                         break;
                     }
                     let bytes = mutated(seeds, &mut Mutator::new(target.name, number as u64));
-                    match target.run(&place, &bytes) {
+                    match target.run(&place, number, &bytes) {
                         Ok(0) => seen.lock().unwrap().taken += 1,
                         Ok(_) => seen.lock().unwrap().refused += 1,
                         Err(fault) => {
