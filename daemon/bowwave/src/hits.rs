@@ -1,11 +1,14 @@
 //! `bowwave hits`: the rounds of a journal as a table, CSV or JSON.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
     text::one_line,
+    time::Time,
     world::{scenario::Side, score::Outcome},
 };
-use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_shots, side_files};
+use bowwave_record::journal::{RunSelection, ShotFilter, StoredShot, read_runs, read_shots, side_files};
 
 use bowwave_trainer::storage::JOURNAL;
 
@@ -18,7 +21,7 @@ use crate::{
 const TABLE: &[(&str, &str, Option<usize>)] = &[
     ("run", "run", None),
     ("shot", "shot", None),
-    ("fired s", "fired_s", Some(3)),
+    ("fired s", FIRED, Some(2)),
     ("outcome", "outcome", None),
     ("boat", "boat", None),
     ("side", "side", None),
@@ -28,7 +31,11 @@ const TABLE: &[(&str, &str, Option<usize>)] = &[
     ("cause", "cause", None),
     ("pose age ms", POSE_AGE, Some(1)),
 ];
+const FIRED: &str = "fired_s";
 const POSE_AGE: &str = "pose_age_ms";
+
+/// When runs began, by their numbers; older journals do not say.
+type Starts = BTreeMap<i64, Time>;
 
 /// Prints the rounds.
 pub fn run(arguments: &Hits) -> Result<()> {
@@ -53,7 +60,10 @@ pub fn run(arguments: &Hits) -> Result<()> {
     }
     let shots = read_shots(&path, &ShotFilter { runs, hits_only: arguments.hits_only })?;
     match if arguments.json { HitsFormat::Json } else { arguments.format } {
-        HitsFormat::Table => stdout::print(table(&shots)),
+        HitsFormat::Table => {
+            let starts = read_runs(&path)?.into_iter().filter_map(|run| Some((run.id, run.run.started?)));
+            stdout::print(table(&shots, &starts.collect()))
+        }
         HitsFormat::Csv => stdout::print(&csv(&shots)?),
         HitsFormat::Json => stdout::print_json(&shots.iter().map(StoredShot::to_json).collect::<Vec<_>>()),
     }
@@ -69,20 +79,25 @@ fn csv(shots: &[StoredShot]) -> Result<Vec<u8>> {
     writer.into_inner().context("cannot write the CSV")
 }
 
-/// A name that a spreadsheet would take for a formula, marked as the text that it is.
+/// A name that a spreadsheet would take for a formula, marked as the text that it is; in one line, whatever it holds.
 fn plain(column: &str, cell: &str) -> String {
     let is_text = ["outcome", "boat", "zone", "cause"].contains(&column);
     let mark = if is_text && cell.starts_with(['=', '+', '-', '@', '\t', '\r']) { "'" } else { "" };
-    format!("{mark}{cell}")
+    format!("{mark}{}", one_line(cell))
 }
 
-fn table(shots: &[StoredShot]) -> String {
+fn table(shots: &[StoredShot], starts: &Starts) -> String {
     let mut rows: Vec<Vec<String>> = vec![TABLE.iter().map(|(title, ..)| (*title).to_owned()).collect()];
     for shot in shots {
         let cells = shot.cells();
         let cell = |(_, name, digits): &(&str, &str, Option<usize>)| {
             let text = StoredShot::COLUMNS.iter().position(|c| c == name).map_or("", |i| cells[i].as_str());
             match (digits, text.parse::<f64>()) {
+                // As the display counts, from the run's beginning; programs get the time since the computer's start.
+                (Some(digits), Ok(since_boot)) if *name == FIRED => {
+                    let since = starts.get(&shot.run).map(|start| shot.record.fired.secs_since(*start));
+                    format!("{:.digits$}", since.unwrap_or(since_boot))
+                }
                 // A pose between two readings is not old: how far before the newest one it lies is for programs.
                 (Some(digits), Ok(value)) if *name == POSE_AGE => format!("{:.digits$}", value.max(0.0)),
                 (Some(digits), Ok(value)) => format!("{value:.digits$}"),
@@ -126,27 +141,47 @@ fn table(shots: &[StoredShot]) -> String {
 #[cfg(test)]
 mod tests {
     use bowwave_core::{
-        time::Time,
-        world::score::{NotScored, Outcome, ShotRecord},
+        model::Zone,
+        world::score::{NotScored, ShotRecord},
     };
     use glam::DVec3;
 
     use super::*;
 
+    fn round(pose_age_ns: i64, outcome: Outcome) -> StoredShot {
+        let (shot, fired) = (1, Time::from_ns(103_200_000_000));
+        let record = ShotRecord { shot, fired, muzzle: DVec3::ZERO, bore: DVec3::Y, pose_age_ns, outcome };
+        StoredShot { run: 7, record }
+    }
+
+    #[test]
+    fn a_round_is_told_at_the_time_that_the_display_had() {
+        let stale = round(0, Outcome::NotScored { cause: NotScored::ImuStale });
+        let starts = Starts::from([(7, Time::from_ns(100_000_000_000))]);
+        assert!(table(std::slice::from_ref(&stale), &starts).lines().any(|line| line.contains("  3.20  ")));
+        assert!(String::from_utf8(csv(&[stale]).unwrap()).unwrap().contains(",103.2"));
+    }
+
+    #[test]
+    fn a_struck_neutral_is_told_apart_and_no_name_is_a_formula_or_a_line() {
+        let hit = |boat: &str, side| {
+            let (zone, time) = (Zone::ALL[0], Time::from_ns(103_900_000_000));
+            round(
+                0,
+                Outcome::Hit { boat: boat.to_owned(), side, zone, time, range_m: 200.0, point: DVec3::ZERO },
+            )
+        };
+        let shots = [hit("a", Some(Side::Hostile)), hit("=1+1\nFORGED", Some(Side::Neutral))];
+        let told = table(&shots, &Starts::new());
+        assert!(told.contains("2 rounds, 1 hits, 1 HIT A NEUTRAL") && told.contains("neutral"), "{told}");
+        let csv = String::from_utf8(csv(&shots).unwrap()).unwrap();
+        assert!(csv.contains(",'=1+1 FORGED,neutral,") && csv.lines().count() == 3, "{csv}");
+    }
+
     #[test]
     fn no_pose_is_younger_than_nothing() {
-        let shot = |pose_age_ns| StoredShot {
-            run: 1,
-            record: ShotRecord {
-                shot: 1,
-                fired: Time::from_ns(5),
-                muzzle: DVec3::ZERO,
-                bore: DVec3::Y,
-                pose_age_ns,
-                outcome: Outcome::NotScored { cause: NotScored::ImuStale },
-            },
-        };
-        let told = table(&[shot(-5_000_000), shot(1_500_000)]);
+        let shot = |pose_age_ns| round(pose_age_ns, Outcome::NotScored { cause: NotScored::ImuStale });
+        let told = table(&[shot(-5_000_000), shot(1_500_000)], &Starts::new());
         let ages: Vec<&str> = told.lines().skip(1).take(2).filter_map(|l| l.split("  ").last()).collect();
         assert_eq!(ages.iter().map(|a| a.trim()).collect::<Vec<_>>(), ["0.0", "1.5"], "{told}");
         // Programs get the number.

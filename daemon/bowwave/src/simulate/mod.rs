@@ -59,7 +59,6 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
             "the scenario lasts {lasts_s} s, and this run ends after {run_s:.1} s; --duration {lasts_s} plays all of it"
         );
     }
-    leftovers::clear(&arguments.out, prepared.record)?;
     let realtime = arguments.realtime || prepared.window;
     let plan = fault_plan(arguments, frames);
     let replay = RecordingSource::new(open_replay(&prepared, realtime, arguments, frames, plan.clone())?);
@@ -67,6 +66,8 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     let clock = if realtime { TickClock::paced() } else { TickClock::fast(origin) };
     let mut faults = Vec::new();
     let storage = Storage::open(storage(arguments, &prepared, realtime, origin), &mut faults)?;
+    // Not before the folder is this run's own.
+    leftovers::clear(&arguments.out, prepared.record)?;
     let options = TrainerOptions {
         setup: prepared.setup.clone(),
         presenter: Some(presenter(arguments, &prepared, realtime, frames)),
@@ -173,7 +174,7 @@ fn storage(arguments: &Simulate, prepared: &Prepared, realtime: bool, origin: Ti
             seed: prepared.setup.scenario.seed,
             version: env!("CARGO_PKG_VERSION").to_owned(),
             boot_id: bowwave_record::boot_id(),
-            started: Some(bowwave_devices::clock::now()),
+            started: Some(origin),
         },
         journal: JournalOptions::default(),
         recording: prepared.record.then(|| RecorderOptions {

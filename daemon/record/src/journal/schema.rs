@@ -83,11 +83,20 @@ pub(super) fn foreign_part(connection: &Connection) -> rusqlite::Result<Option<S
 
 /// Number of the run that is described so, if the database has it; the newest of several.
 pub(super) fn find_run(connection: &Connection, run: &Run) -> rusqlite::Result<Option<i64>> {
-    // Not by the wall time, which may have been filled in since.
+    // By the wall time only where it was known at the start: it may have been filled in since. A replay begins at its recording's time, so
+    // that nothing else tells two of them apart.
     let sql = "SELECT id FROM runs WHERE scenario = ?1 AND recording = ?2 AND seed = ?3 AND version = ?4 \
-               AND boot_id IS ?5 AND started_ns IS ?6 ORDER BY id DESC LIMIT 1";
+               AND boot_id IS ?5 AND started_ns IS ?6 AND (?7 IS NULL OR started_wall_ns IS ?7) ORDER BY id DESC LIMIT 1";
     let started = run.started.map(Time::ns);
-    let key = params![run.scenario, run.recording, run.seed.to_string(), run.version, run.boot_id, started];
+    let key = params![
+        run.scenario,
+        run.recording,
+        run.seed.to_string(),
+        run.version,
+        run.boot_id,
+        started,
+        run.started_wall_ns
+    ];
     connection.query_row(sql, key, |row| row.get(0)).optional()
 }
 
