@@ -67,7 +67,13 @@ impl RecordingWriter {
                     _ => RecordError::Write { path: path.into(), source },
                 }
             })?;
-        Self::begin(path, file, properties)
+        let recording = Self::begin(path, file, properties)?;
+        // Its name is on the disk as well: what is synced into a file without one is lost with the power.
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        File::open(folder)
+            .and_then(|folder| folder.sync_all())
+            .map_err(|source| RecordError::Write { path: path.into(), source })?;
+        Ok(recording)
     }
 
     /// Begins a recording at `path` in place of what is there.
