@@ -12,6 +12,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use bowwave_core::text::toml::TEXT_BYTES_MAX;
+
 use crate::{CalibrationError, CalibrationFile, Date, parse};
 
 /// So many copies are kept: a calibration every day for three months.
@@ -51,7 +53,7 @@ pub fn copies(path: &Path) -> Result<Vec<StoredCopy>, CalibrationError> {
 pub fn restore(path: &Path, number: Option<u32>) -> Result<Option<StoredCopy>, CalibrationError> {
     let all = copies(path)?;
     let read = |kept: &StoredCopy| {
-        fs::read(&kept.path).map_err(|source| CalibrationError::Read { path: kept.path.clone(), source })
+        bytes_of(&kept.path).map_err(|source| CalibrationError::Read { path: kept.path.clone(), source })
     };
     let (chosen, bytes) = match number {
         Some(number) => {
@@ -62,7 +64,7 @@ pub fn restore(path: &Path, number: Option<u32>) -> Result<Option<StoredCopy>, C
             (kept, bytes)
         }
         None => {
-            let present = fs::read(path).ok();
+            let present = bytes_of(path).ok();
             let mut found = None;
             for kept in all.into_iter().rev() {
                 let bytes = read(&kept)?;
@@ -83,6 +85,11 @@ pub fn restore(path: &Path, number: Option<u32>) -> Result<Option<StoredCopy>, C
     Ok(Some(chosen))
 }
 
+/// What a calibration file holds, whatever that is.
+fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
+    bowwave_files::plain_bytes(path, TEXT_BYTES_MAX)
+}
+
 fn is_calibration(bytes: &[u8], path: &Path) -> Result<CalibrationFile, CalibrationError> {
     parse(&String::from_utf8_lossy(bytes), &path.display().to_string())
 }
@@ -93,7 +100,7 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };
-    match fs::read(path) {
+    match bytes_of(path) {
         // The same once more is no change, and would push out what was.
         Ok(former) if former == bytes => return Ok(()),
         Ok(former) => store(path, beside, &former)?,
@@ -114,7 +121,7 @@ fn store(path: &Path, beside: &Path, former: &[u8]) -> io::Result<()> {
     }
     let all = list(&into)?;
     // A power cut may have come between a copy and the file that was to follow it.
-    if all.last().is_some_and(|k| fs::read(&k.path).is_ok_and(|bytes| bytes == former)) {
+    if all.last().is_some_and(|k| bytes_of(&k.path).is_ok_and(|bytes| bytes == former)) {
         return Ok(());
     }
     let made = is_calibration(former, path).map_or_else(|_| UNREADABLE.to_owned(), |f| f.made.to_string());

@@ -11,18 +11,23 @@ pub fn line_column(text: &str, offset: usize) -> (usize, usize) {
     (line, before[start..].chars().count() + 1)
 }
 
-/// `message` as one line that a terminal and a log show as it is: breaks become spaces, other control characters their escapes.
-/// A quotation from a file may hold any of them.
+/// `message` as one line that a terminal and a log show as it is: breaks become spaces, other control characters and those that reverse the
+/// direction of writing their escapes. A quotation from a file may hold any of them.
 pub fn one_line(message: &str) -> String {
     let mut line = String::with_capacity(message.len());
     for c in message.trim_end().chars() {
         match c {
             '\n' => line.push(' '),
-            c if c.is_control() => line.extend(c.escape_default()),
+            c if c.is_control() || turns_direction(c) => line.extend(c.escape_default()),
             c => line.push(c),
         }
     }
     line
+}
+
+/// Whether a character has what follows it shown from right to left, or ends that (Unicode UAX 9).
+const fn turns_direction(c: char) -> bool {
+    matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]
@@ -46,6 +51,7 @@ mod tests {
     fn a_message_stays_on_its_line() {
         assert_eq!(one_line("a\nb\rc\0d\u{7f}\n"), "a b\\rc\\u{0}d\\u{7f}");
         assert_eq!(one_line("größer"), "größer");
+        assert_eq!(one_line("a\u{202e}txt.exe"), "a\\u{202e}txt.exe");
     }
 
     fn text() -> impl Strategy<Value = String> {

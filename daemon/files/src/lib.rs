@@ -50,7 +50,11 @@ pub fn picture_bytes(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-fn plain_bytes(path: &Path, bytes_max: usize) -> io::Result<Vec<u8>> {
+/// The bytes of a plain file of at most `bytes_max`.
+///
+/// # Errors
+/// Those of [`plain_file`] and of reading; and where it is longer.
+pub fn plain_bytes(path: &Path, bytes_max: usize) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     plain_file(path)?.take(bytes_max as u64 + 1).read_to_end(&mut bytes)?;
     if bytes.len() > bytes_max {

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bowwave_calibration::target::{Target, TargetError};
+use bowwave_core::text::toml::TEXT_BYTES_MAX;
 use clap::{Args, Subcommand};
 
 use super::mounting::{
@@ -94,7 +95,7 @@ pub(super) fn parse_board(text: &str) -> Result<Target, String> {
             .parse()
             .map_err(|e: TargetError| format!("{e}; or name Kalibr's file of it, as april_6x6.yaml"));
     }
-    let yaml = std::fs::read_to_string(path).map_err(|e| {
+    let yaml = bowwave_files::plain_text(path, TEXT_BYTES_MAX).map_err(|e| {
         format!("cannot read {text}: {e}; `bowwave calibrate board --kalibr {text}` writes one")
     })?;
     Target::of_kalibr(&yaml).map_err(|e| format!("{text}: {e}"))

@@ -29,7 +29,7 @@ const PICTURES_MIN: u64 = 10;
 /// Checks everything that `path` names.
 pub(super) fn checks(path: &Path) -> Vec<Check> {
     // No last good copies: the files themselves are asked after.
-    let reader = Reader { config: path.into(), last_good: None };
+    let reader = Reader::new(path.into(), None);
     let settings = match reader.read() {
         Ok(settings) => settings,
         Err(e) => return vec![failed("configuration", format!("{e:#}"))],

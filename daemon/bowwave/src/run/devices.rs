@@ -98,7 +98,7 @@ mod tests {
         let line = "chip = \"chip\"\nline = 1\n";
         let path = folder.join("bowwave.toml");
         std::fs::write(&path, format!("[trigger]\n{line}{interlock}")).unwrap();
-        let reader = Reader { config: path, last_good: Some(folder.join("last-good")) };
+        let reader = Reader::new(path, Some(folder.join("last-good")));
         let mut faults = Vec::new();
         device_settings(&reader.read().unwrap(), Mode::Training, &mut faults);
         faults.iter().map(|change| change.fault).collect()

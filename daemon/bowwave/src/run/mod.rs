@@ -52,7 +52,7 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
     // The folder of the last good settings cannot be configured by settings that may be bad.
     let state = env::var_os("STATE_DIRECTORY").map(PathBuf::from);
     let last_good = arguments.data.clone().or(state.clone()).map(|d| d.join("last-good"));
-    let reader = Reader { config: arguments.config.clone(), last_good };
+    let reader = Reader::new(arguments.config.clone(), last_good);
     loop {
         let settings = reader.read()?;
         let data = arguments
@@ -82,6 +82,9 @@ pub fn run(arguments: &RunArgs, program_start: Time) -> Result<Outcome> {
             Ended::Reload { lcd } => {
                 lcd_size = lcd;
                 notifier.reloading();
+                // All of the former run is written, and a request to stop need not wait for files.
+                drop(pulsing);
+                pulsing = pulse.during_start();
             }
         }
     }

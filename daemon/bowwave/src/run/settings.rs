@@ -4,6 +4,9 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::mpsc::channel,
+    thread,
+    time::Duration,
 };
 
 use anyhow::{Context, Result};
@@ -60,6 +63,8 @@ pub struct Reader {
     pub config: PathBuf,
     /// Folder of the last good copies; none are kept without it.
     pub last_good: Option<PathBuf>,
+    /// The files that were named do not answer: a mount hangs.
+    is_silent: bool,
 }
 
 /// A text that was accepted, or the last good one with why the new one was refused.
@@ -70,8 +75,22 @@ struct Accepted<T> {
 }
 
 impl Reader {
-    /// Reads everything. Fails only where not even what is built in works.
+    /// For that configuration.
+    pub const fn new(config: PathBuf, last_good: Option<PathBuf>) -> Self {
+        Self { config, last_good, is_silent: false }
+    }
+
+    /// Reads everything. Fails only where not even what is built in works. A mount that hangs, as of a stick that was pulled, holds nobody
+    /// for longer than ten seconds: the last good copies are used then.
     pub fn read(&self) -> Result<Settings> {
+        /// A slow disk reads the largest model in a tenth of that.
+        const LONGEST: Duration = Duration::from_secs(10);
+        let reader = self.clone();
+        within(LONGEST, move || reader.read_files())
+            .unwrap_or_else(|| Self { is_silent: true, ..self.clone() }.read_files())
+    }
+
+    fn read_files(&self) -> Result<Settings> {
         let mut faults = Vec::new();
         let mut refuse = |fault: Fault, why: &anyhow::Error| {
             faults.push(FaultChange::raised(now(), fault, format!("{why:#}")));
@@ -125,8 +144,8 @@ impl Reader {
                 (a.value, a.refused.is_some())
             }
             None => {
-                let why =
-                    config::read(&self.config).err().unwrap_or_else(|| anyhow::anyhow!("cannot be read"));
+                let read = self.answers(&self.config).and_then(|()| config::read(&self.config));
+                let why = read.err().unwrap_or_else(|| anyhow::anyhow!("cannot be read"));
                 refuse(Fault::Config, &why_and_instead(&why, "the trainer runs as without a configuration"));
                 (Config::default(), false)
             }
@@ -155,7 +174,8 @@ impl Reader {
                 &anyhow::anyhow!("{} names no calibration: set files.calibration", self.config.display()),
             ),
             (None, Some(path)) => {
-                let why = read_text(path).and_then(|text| parse(&text, &path.display().to_string())).err();
+                let text = self.answers(path).and_then(|()| read_text(path));
+                let why = text.and_then(|text| parse(&text, &path.display().to_string())).err();
                 let why = why.unwrap_or_else(|| anyhow::anyhow!("{} cannot be used", path.display()));
                 refuse(Fault::NoCalibration, &why);
             }
@@ -180,7 +200,7 @@ impl Reader {
             Ok((scenario, text.to_owned(), models, boats, base.to_owned()))
         };
         if let Some(path) = &config.files.scenario {
-            let named = read_scenario(path).and_then(|(text, base)| {
+            let named = self.answers(path).and_then(|()| read_scenario(path)).and_then(|(text, base)| {
                 let loaded = load(&text, &path.display().to_string(), &base)?;
                 self.keep("scenario.toml", &text);
                 Ok(loaded)
@@ -188,8 +208,10 @@ impl Reader {
             let base = path.parent().unwrap_or(Path::new(""));
             match named {
                 Ok(loaded) => return Ok(loaded),
+                // Models that the last good one names may lie where nothing answers.
                 Err(why) => match self
                     .kept("scenario.toml")
+                    .filter(|_| !self.is_silent)
                     .and_then(|text| load(&text, "last good scenario", base).ok())
                 {
                     Some(loaded) => {
@@ -212,7 +234,8 @@ impl Reader {
         parse: impl Fn(&str, &str) -> Result<T>,
     ) -> Option<Accepted<T>> {
         let path = path?;
-        let new = read_text(path).and_then(|text| Ok((parse(&text, &path.display().to_string())?, text)));
+        let text = self.answers(path).and_then(|()| read_text(path));
+        let new = text.and_then(|text| Ok((parse(&text, &path.display().to_string())?, text)));
         match new {
             Ok((value, text)) => {
                 self.keep(name, &text);
@@ -224,6 +247,14 @@ impl Reader {
                 Some(Accepted { value, text, refused: Some(why) })
             }
         }
+    }
+
+    /// Whether a file that somebody named can be read at all; a built-in scenario's name is none.
+    fn answers(&self, path: &Path) -> Result<()> {
+        if self.is_silent && !scenario::BUILT_IN.iter().any(|(name, _)| path == Path::new(name)) {
+            anyhow::bail!("{} does not answer; does its mount hang?", path.display());
+        }
+        Ok(())
     }
 
     fn kept(&self, name: &str) -> Option<String> {
@@ -248,6 +279,19 @@ impl Reader {
             log::warn!("cannot keep a copy of the good {name} in {}: {e}", folder.display());
         }
     }
+}
+
+/// What a call gives, unless it takes longer: then its thread is left behind, for nothing ends a call into a file system that hangs.
+fn within<T: Send + 'static>(longest: Duration, call: impl FnOnce() -> T + Send + 'static) -> Option<T> {
+    let (sender, result) = channel();
+    thread::Builder::new()
+        .name("settings".to_owned())
+        .spawn(move || {
+            // Whoever waited may have given up.
+            let _ = sender.send(call());
+        })
+        .ok()?;
+    result.recv_timeout(longest).ok()
 }
 
 fn read_text(path: &Path) -> Result<String> {
@@ -319,7 +363,7 @@ mod tests {
         }
 
         fn reader(&self) -> Reader {
-            Reader { config: self.0.join("bowwave.toml"), last_good: Some(self.0.join("last-good")) }
+            Reader::new(self.0.join("bowwave.toml"), Some(self.0.join("last-good")))
         }
 
         fn write(&self, name: &str, text: &str) {
@@ -356,6 +400,26 @@ mod tests {
         assert!(kept.config_is_former && !good.config_is_former);
         let said = format!("{:?}", kept.faults[0].change);
         assert!(said.contains("bowwave.toml:2:15") && said.contains("last good"), "{said}");
+    }
+
+    #[test]
+    fn a_mount_that_hangs_holds_nobody_and_the_last_good_copies_are_used() {
+        assert_eq!(within(Duration::from_secs(20), || 3), Some(3));
+        let (hold, held) = channel::<()>();
+        assert_eq!(within(Duration::from_millis(20), move || held.recv().is_ok()), None);
+        drop(hold);
+        let folder = Folder::new("silent");
+        let calibration = include_str!("../../../../calibration/examples/mount.toml");
+        folder.write("calibration.toml", calibration);
+        folder.write("bowwave.toml", "[files]\ncalibration = \"calibration.toml\"\nscenario = \"swarm\"\n");
+        let good = folder.reader().read().unwrap();
+        let kept = Reader { is_silent: true, ..folder.reader() }.read_files().unwrap();
+        assert_eq!(faults(&kept), [Fault::Config, Fault::Config]);
+        assert_eq!(kept.setup.calibration.lens, good.setup.calibration.lens);
+        assert_eq!(kept.setup.scenario.boats.len(), good.setup.scenario.boats.len());
+        assert!(kept.config_is_former);
+        let said = format!("{:?}", kept.faults[0].change);
+        assert!(said.contains("bowwave.toml does not answer"), "{said}");
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use bowwave_core::water::ReflectionMethod;
+use bowwave_files::plain_text;
 use bowwave_models::Boat;
 use image::RgbImage;
 use serde::{Deserialize, Serialize};
@@ -99,10 +100,14 @@ pub fn write(path: &Path, rows: &[KeyRow]) -> Result<()> {
     writer.flush().with_context(told)
 }
 
+/// The longest key, or file of answers, that is read: a hundred participants with a thousand pictures each.
+pub const TABLE_BYTES_MAX: usize = 16 << 20;
+
 /// Reads a key.
 pub fn read(path: &Path) -> Result<Vec<KeyRow>> {
     let told = || format!("cannot read the key {}; name the key.csv of the study with --key", path.display());
-    let mut reader = csv::Reader::from_path(path).with_context(told)?;
+    let text = plain_text(path, TABLE_BYTES_MAX).with_context(told)?;
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
     let rows: Vec<KeyRow> = reader.deserialize().collect::<Result<_, _>>().with_context(told)?;
     anyhow::ensure!(!rows.is_empty(), "the key {} names no picture", path.display());
     for row in &rows {

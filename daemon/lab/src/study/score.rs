@@ -10,7 +10,7 @@ use bowwave::{outcome::Outcome, stdout};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    key::{self, FACTORS, KeyRow},
+    key::{self, FACTORS, KeyRow, TABLE_BYTES_MAX},
     statistics::{AnswerTally, Estimate, d_prime, rate},
 };
 use crate::cli::StudyScoreArgs;
@@ -91,8 +91,8 @@ impl<'a> Answers<'a> {
 
     fn read(&mut self, path: &Path) -> Result<()> {
         let told = || format!("cannot read the answers {}", path.display());
-        let file = bowwave_files::plain_file(path).with_context(told)?;
-        self.take(file, &path.display().to_string())
+        let text = bowwave_files::plain_text(path, TABLE_BYTES_MAX).with_context(told)?;
+        self.take(text.as_bytes(), &path.display().to_string())
     }
 
     fn take(&mut self, input: impl std::io::Read, origin: &str) -> Result<()> {

@@ -50,7 +50,7 @@ const PICTURES: usize = 4;
 
 /// On the configured devices, and on the LCD.
 pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
-    let reader = Reader { config: arguments.config.clone(), last_good: None };
+    let reader = Reader::new(arguments.config.clone(), None);
     let mut settings = reader.read()?;
     let named = arguments.files.calibration.clone().or_else(|| settings.config.files.calibration.clone());
     let path = named
@@ -103,7 +103,7 @@ pub fn run(arguments: &CalibrateWizard) -> Result<Outcome> {
 
 /// On a recording, at its own pace.
 pub fn paced(guided: Guided, player: RecordingPlayer, arguments: &CalibrateWizard) -> Result<Outcome> {
-    let reader = Reader { config: arguments.config.clone(), last_good: None };
+    let reader = Reader::new(arguments.config.clone(), None);
     let mut settings = reader.read()?;
     settings.setup.calibration = guided.wizard.calibration().clone();
     let presenter = arguments.window.then(|| OutputOptions { window: true, ..OutputOptions::default() });
