@@ -10,7 +10,7 @@ use hw_sim::{
 use precision::setups::told;
 
 /// Long enough that a gun that is swung has shown each way to be wrong.
-const SECONDS: f64 = 12.0;
+const SECONDS: f64 = 20.0;
 
 #[test]
 fn a_wrong_set_up_is_named_and_never_ready_and_the_right_one_is() {
@@ -18,16 +18,16 @@ fn a_wrong_set_up_is_named_and_never_ready_and_the_right_one_is() {
     let path = folder.path().join("swung.mcap");
     let recipe = Recipe { width: 384, height: 216, trigger: Vec::new(), ..Recipe::default() };
     make(&recipe, &path, &mut |_, _| {}).unwrap();
-    let kinds = [
-        ("nothing", Source::Auto),
-        ("unit turned by 180 deg about x", Source::Fused),
-        ("rates in deg/s", Source::Fused),
-        ("force in g", Source::Auto),
-        ("picture mirrored", Source::Auto),
-        ("pictures late by 300 ms", Source::Auto),
-        ("another mount, 5 deg rolled", Source::Auto),
+    let by_unit = [
+        "nothing",
+        "force in g",
+        "picture mirrored",
+        "pictures late by 300 ms",
+        "another mount, 5 deg rolled",
     ];
-    for (name, source) in kinds {
+    let fused = ["unit turned by 180 deg about x", "rates in deg/s"];
+    let kinds = [(&by_unit[..], Source::Auto), (&fused[..], Source::Fused)];
+    for (name, source) in kinds.iter().flat_map(|(names, source)| names.iter().map(|name| (*name, *source))) {
         let set_up = SetUp::named(name).unwrap();
         let (last, ready) = told(&path, set_up, source, SECONDS).unwrap();
         assert!(set_up.is_named(last), "{name}: told {last:?}");

@@ -43,8 +43,6 @@ const COST_OFF: f64 = 4.0;
 const SEA_RATE: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// By what share of itself a turn is told wrong by lens, shutter and times.
 const TURN_SHARE: f64 = 0.08;
-/// Deviation of a unit's up, found alone, about its mean of the last seconds, radians.
-const SWAY_SIGMA: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// Verticals that are seen one after the other err alike: so many count as one.
 const ALIKE: f64 = 5.0;
 /// So many err alike where it is the unit that is off up, as a craft that speeds up tilts it.
@@ -83,6 +81,8 @@ enum UpExpected {
     Then(MeanSway),
     /// At the same place off it all the time, wherever that is: the mean of ten seconds.
     Off(MeanOff),
+    /// The same by less than that: it is never believed, but nothing is READY beside it.
+    Doubted(MeanOff),
     /// Not far off it.
     Wanders,
 }
@@ -330,9 +330,11 @@ impl Registration {
         let cost = |off: f64, sigma: f64| (off * off / (sigma * sigma)).min(COST_MOST);
         let off = between(own, up.seen);
         let (up_sigma, lasting) = (self.unit.up_sigma(), self.unit.lasting_up_sigma());
+        let doubted = self.unit.doubted_up_sigma();
         let as_believed = cost(off.length(), up_sigma);
         self.forget_sway(time);
-        let sway = cost(self.own_sway.take_apart(off), SWAY_SIGMA);
+        let sway_sigma = self.unit.sway_sigma();
+        let sway = cost(self.own_sway.take_apart(off), sway_sigma);
         if up.is_predicted && off.length() < 3.0 * UP_SIGMA {
             self.checked = Some(time);
         }
@@ -355,11 +357,16 @@ impl Registration {
                 UpExpected::Then(mean) => {
                     let Some(then) = alone(time.plus_ns(-hypothesis.late_ns)) else { continue };
                     let apart = mean.take_apart(between(then, up.seen));
-                    hypothesis.add(Costs::of(sway, cost(apart, SWAY_SIGMA)).alike(ALIKE));
+                    hypothesis.add(Costs::of(sway, cost(apart, sway_sigma)).alike(ALIKE));
                 }
                 UpExpected::Off(mean) => {
                     let apart = mean.take_apart(off);
                     let costs = Costs::of(cost(off.length(), lasting), COST_OFF + cost(apart, lasting));
+                    hypothesis.add(costs.alike(ALIKE));
+                }
+                UpExpected::Doubted(mean) => {
+                    let apart = mean.take_apart(off);
+                    let costs = Costs::of(cost(off.length(), doubted), COST_OFF + cost(apart, doubted));
                     hypothesis.add(costs.alike(ALIKE));
                 }
                 UpExpected::Wanders => {
@@ -371,7 +378,7 @@ impl Registration {
                 }
             }
             let is_believed = Some(hypothesis.misfit) == self.believed;
-            if matches!(hypothesis.up, UpExpected::At(_) | UpExpected::Off(_)) && !is_believed {
+            if !matches!(hypothesis.up, UpExpected::Then(_) | UpExpected::Wanders) && !is_believed {
                 hypothesis.pay();
             }
         }
@@ -400,14 +407,15 @@ impl Registration {
         const LIMIT_OTHER: f64 = 2.0;
         /// No sum goes beyond this, so that a belief ends soon after its cause.
         const SUM_MOST: f64 = 60.0;
-        let most = self.hypotheses.iter().map(|h| h.sum).fold(0.0, f64::max);
+        let told = |h: &&Hypothesis| !matches!(h.up, UpExpected::Doubted(_));
+        let most = self.hypotheses.iter().filter(told).map(|h| h.sum).fold(0.0, f64::max);
         // What is ahead stays ahead.
         let beyond = (most - SUM_MOST).max(0.0);
-        self.hypotheses.iter_mut().for_each(|h| h.sum = (h.sum - beyond).max(0.0));
-        let most = self.hypotheses.iter().max_by(|a, b| a.sum.total_cmp(&b.sum));
+        self.hypotheses.iter_mut().for_each(|h| h.sum = (h.sum - beyond).clamp(0.0, SUM_MOST));
+        let most = self.hypotheses.iter().filter(told).max_by(|a, b| a.sum.total_cmp(&b.sum));
         let Some(most) = most else { return };
         if most.sum >= LIMIT {
-            let alike = self.hypotheses.iter().filter(|h| Some(h.misfit) == self.believed);
+            let alike = self.hypotheses.iter().filter(told).filter(|h| Some(h.misfit) == self.believed);
             let held = alike.map(|h| h.sum).fold(0.0, f64::max);
             if most.sum > held + LIMIT_OTHER {
                 let misfit = most.misfit;
@@ -462,7 +470,7 @@ const FORCE: &str = "the specific force";
 
 /// All ways to be set up wrongly.
 fn hypotheses(camera_from_imu: DMat3) -> Vec<Hypothesis> {
-    use UpExpected::{At, Off, Then, Wanders};
+    use UpExpected::{At, Doubted, Off, Then, Wanders};
     let (identity, diagonal) = (DMat3::IDENTITY, |x, y, z| DMat3::from_diagonal(DVec3::new(x, y, z)));
     let of_unit = |imu: DMat3| camera_from_imu * imu * camera_from_imu.transpose();
     let mut all: Vec<_> = quarter_turns()
@@ -493,6 +501,7 @@ fn hypotheses(camera_from_imu: DMat3) -> Vec<Hypothesis> {
         Hypothesis { late_ns: i64::from(ms) * 1_000_000, ..late }
     }));
     all.push(Hypothesis::of(Misfit::Mount, identity, Off(MeanOff::NOTHING)));
+    all.push(Hypothesis::of(Misfit::Mount, identity, Doubted(MeanOff::NOTHING)));
     all
 }
 

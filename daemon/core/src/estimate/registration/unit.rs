@@ -20,6 +20,8 @@ const LEANS_S: f64 = TAU_WAVES_S;
 const LEANS_LEAST_S: f64 = 2.0;
 /// Deviation of up by which a unit begins on a ship in a turn or in waves, and which it forgets in that time as well, radians.
 const BEGUN_SIGMA: f64 = 3.0 * std::f64::consts::PI / 180.0;
+/// Deviation of a unit's up, found alone, about its mean of the last two seconds on a ship that keeps its course, radians.
+const SWAY_SIGMA: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// No ship's turn tilts it further, radians.
 pub(super) const LEANS_MOST: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
@@ -37,6 +39,8 @@ pub(super) struct UnitWatch {
     /// Mean turn about the vertical over [`LEANS_S`], rad/s, and that of its square, (rad/s)^2; at first over how long they are known.
     turning: f64,
     turning_square: f64,
+    /// The same mean with the turns of a gun on its mount, which cancel out over some of its swings, rad/s.
+    swung: f64,
     known_s: f64,
     /// The fastest mean turn of late, rad/s, and the same of a turn that was steady.
     fastest: f64,
@@ -105,10 +109,11 @@ impl UnitWatch {
     /// Takes in a rate, rad/s, that lasted `step_s`.
     fn turn(&mut self, rate: DVec3, step_s: f64) {
         let about_up = rate.dot(self.force.mean.normalize_or_zero());
+        let share = step_s / (self.known_s + step_s).clamp(LEANS_LEAST_S, LEANS_S);
+        self.swung += (about_up - self.swung) * share;
         // What turns faster is a gun on its mount.
         let about_up = if about_up.abs() > SHIP_TURN_MOST { 0.0 } else { about_up };
         self.known_s += step_s;
-        let share = step_s / self.known_s.clamp(LEANS_LEAST_S, LEANS_S);
         self.turning += (about_up - self.turning) * share;
         self.turning_square += (about_up * about_up - self.turning_square) * share;
         let now = self.turning.abs();
@@ -129,9 +134,22 @@ impl UnitWatch {
         UP_SIGMA.hypot(self.leans()).hypot(BEGUN_SIGMA * (-self.known_s / LEANS_S).exp())
     }
 
-    /// The same as a mount that is off is held against it: how the unit began passes, and before a gun that is swung a ship's turn does
-    /// not tilt up the same way all the time.
+    /// The same as a mount that is off is held against it: how the unit began passes. A tilt by the ship's turn is as the mean turn is, and
+    /// what a gun's swing adds to that is of either sign.
     pub(super) fn lasting_up_sigma(&self) -> f64 {
+        UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest.max(self.swung.abs()) / GRAVITY_M_S2)
+    }
+
+    /// The same where a gun's swing is no turn of the ship: too little before a gun that is swung while the ship turns, so that what is too
+    /// far off by it is doubted and not told.
+    pub(super) fn doubted_up_sigma(&self) -> f64 {
         UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest / GRAVITY_M_S2)
+    }
+
+    /// Deviation of how up, found alone, sways about its mean of the last two seconds: the tilt by a ship's turn grows meanwhile.
+    pub(super) fn sway_sigma(&self) -> f64 {
+        /// From the middle of these seconds.
+        const SINCE_S: f64 = 1.0;
+        SWAY_SIGMA.hypot(self.leans() * SINCE_S / LEANS_S)
     }
 }
