@@ -19,8 +19,8 @@ use crate::{
 
 /// From the request of a new session to its first frames, and two seconds more, in which READY may still be believed.
 const BEGUN: Duration = Duration::from_secs(5);
-/// Longest wait for a word, and how long it must stay.
-const PATIENCE: Duration = Duration::from_secs(40);
+/// Longest wait for a word on a gun computer, seconds, and how long it must stay.
+const PATIENCE_S: f64 = 4.0;
 const STAYS: Duration = Duration::from_secs(3);
 /// Share of wrong set-ups that must be named.
 const NAMED: f64 = 0.9;
@@ -94,7 +94,7 @@ fn tried(bench: &mut HilBench, set_up: &SetUp, number: usize) -> Result<Told> {
     let from = bench.machine.guest.now_ns();
     bench.service("reload")?;
     let begun = Instant::now() + BEGUN;
-    let until = Instant::now() + PATIENCE;
+    let until = Instant::now() + bench.scaled(PATIENCE_S);
     loop {
         thread::sleep(STAYS);
         let told = told(bench, from);
