@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use bowwave_core::{calibration::Calibration, event::ImuSample, fault::Fault};
 use glam::{DQuat, DVec3};
 
-/// What is wrong.
+/// Fault of a set-up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum WrongSetUp {
     /// Nothing.
@@ -31,7 +31,7 @@ pub enum WrongSetUp {
 pub struct SetUp {
     /// For a table.
     pub name: &'static str,
-    /// What is wrong.
+    /// Its fault.
     pub wrong: WrongSetUp,
     /// One of these must be told; none where nothing is wrong.
     pub faults: &'static [Fault],

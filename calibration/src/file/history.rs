@@ -85,7 +85,7 @@ pub fn restore(path: &Path, number: Option<u32>) -> Result<Option<StoredCopy>, C
     Ok(Some(chosen))
 }
 
-/// What a calibration file holds, whatever that is.
+/// Bytes of a calibration file, good or not.
 fn bytes_of(path: &Path) -> io::Result<Vec<u8>> {
     bowwave_files::plain_bytes(path, TEXT_BYTES_MAX)
 }

@@ -25,7 +25,7 @@ pub fn one_line(message: &str) -> String {
     line
 }
 
-/// Whether a character has what follows it shown from right to left, or ends that (Unicode UAX 9).
+/// Tests for a control of the direction of writing (bidirectional control, Unicode UAX 9).
 const fn turns_direction(c: char) -> bool {
     matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

@@ -2,6 +2,7 @@
 
 #![forbid(unsafe_code)]
 
+mod folder;
 pub mod journal;
 pub mod recording;
 pub mod space;

@@ -174,8 +174,7 @@ impl Reader {
                 &anyhow::anyhow!("{} names no calibration: set files.calibration", self.config.display()),
             ),
             (None, Some(path)) => {
-                let text = self.answers(path).and_then(|()| read_text(path));
-                let why = text.and_then(|text| parse(&text, &path.display().to_string())).err();
+                let why = self.text(path).and_then(|text| parse(&text, &path.display().to_string())).err();
                 let why = why.unwrap_or_else(|| anyhow::anyhow!("{} cannot be used", path.display()));
                 refuse(Fault::NoCalibration, &why);
             }
@@ -234,8 +233,7 @@ impl Reader {
         parse: impl Fn(&str, &str) -> Result<T>,
     ) -> Option<Accepted<T>> {
         let path = path?;
-        let text = self.answers(path).and_then(|()| read_text(path));
-        let new = text.and_then(|text| Ok((parse(&text, &path.display().to_string())?, text)));
+        let new = self.text(path).and_then(|text| Ok((parse(&text, &path.display().to_string())?, text)));
         match new {
             Ok((value, text)) => {
                 self.keep(name, &text);
@@ -249,12 +247,18 @@ impl Reader {
         }
     }
 
-    /// Whether a file that somebody named can be read at all; a built-in scenario's name is none.
+    /// Refuses a file that somebody named while its mount does not answer; a built-in scenario's name is none.
     fn answers(&self, path: &Path) -> Result<()> {
         if self.is_silent && !scenario::BUILT_IN.iter().any(|(name, _)| path == Path::new(name)) {
             anyhow::bail!("{} does not answer; does its mount hang?", path.display());
         }
         Ok(())
+    }
+
+    /// The text of a file that somebody named.
+    fn text(&self, path: &Path) -> Result<String> {
+        self.answers(path)?;
+        read_text(path)
     }
 
     fn kept(&self, name: &str) -> Option<String> {
@@ -281,7 +285,7 @@ impl Reader {
     }
 }
 
-/// What a call gives, unless it takes longer: then its thread is left behind, for nothing ends a call into a file system that hangs.
+/// Result of a call, unless it takes longer: then its thread is left behind, for nothing ends a call into a file system that hangs.
 fn within<T: Send + 'static>(longest: Duration, call: impl FnOnce() -> T + Send + 'static) -> Option<T> {
     let (sender, result) = channel();
     thread::Builder::new()

@@ -49,7 +49,7 @@ const ALIKE: f64 = 5.0;
 const ALIKE_LONG: f64 = 10.0 * TAU_WAVES_S;
 /// What a unit's own orientation and its rates differ by, rad/s.
 const OWN_RATE: f64 = 0.5 * std::f64::consts::PI / 180.0;
-/// What a gun that moves at all, by .2 deg/s, is believed to turn by where its rates are in deg/s and read as rad/s.
+/// Rate of a gun that moves at all, by .2 deg/s, as it is believed where rates in deg/s are read as rad/s, rad/s.
 const FAST: f64 = 10.0 * std::f64::consts::PI / 180.0;
 /// How far the mean specific force is off up while a gun is moved about, radians.
 const FORCE_SIGMA: f64 = 10.0 * std::f64::consts::PI / 180.0;
@@ -62,6 +62,8 @@ struct Hypothesis {
     turn: DMat3,
     up: UpExpected,
     late_ns: i64,
+    /// It is never believed, but nothing is READY while its sum is large.
+    is_doubt: bool,
     /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).
     sum: f64,
     /// The reverse since the start, nats (sequential test).
@@ -81,8 +83,6 @@ enum UpExpected {
     Then(MeanSway),
     /// At the same place off it all the time, wherever that is: the mean of ten seconds.
     Off(MeanOff),
-    /// The same by less than that: it is never believed, but nothing is READY beside it.
-    Doubted(MeanOff),
     /// Not far off it.
     Wanders,
 }
@@ -109,7 +109,7 @@ impl Costs {
 
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
-        Self { misfit, turn, up, late_ns: 0, sum: 0.0, against: 0.0, is_excluded: false }
+        Self { misfit, turn, up, late_ns: 0, is_doubt: false, sum: 0.0, against: 0.0, is_excluded: false }
     }
 
     /// Takes in an observation.
@@ -360,13 +360,9 @@ impl Registration {
                     hypothesis.add(Costs::of(sway, cost(apart, sway_sigma)).alike(ALIKE));
                 }
                 UpExpected::Off(mean) => {
+                    let sigma = if hypothesis.is_doubt { doubted } else { lasting };
                     let apart = mean.take_apart(off);
-                    let costs = Costs::of(cost(off.length(), lasting), COST_OFF + cost(apart, lasting));
-                    hypothesis.add(costs.alike(ALIKE));
-                }
-                UpExpected::Doubted(mean) => {
-                    let apart = mean.take_apart(off);
-                    let costs = Costs::of(cost(off.length(), doubted), COST_OFF + cost(apart, doubted));
+                    let costs = Costs::of(cost(off.length(), sigma), COST_OFF + cost(apart, sigma));
                     hypothesis.add(costs.alike(ALIKE));
                 }
                 UpExpected::Wanders => {
@@ -407,7 +403,7 @@ impl Registration {
         const LIMIT_OTHER: f64 = 2.0;
         /// No sum goes beyond this, so that a belief ends soon after its cause.
         const SUM_MOST: f64 = 60.0;
-        let told = |h: &&Hypothesis| !matches!(h.up, UpExpected::Doubted(_));
+        let told = |h: &&Hypothesis| !h.is_doubt;
         let most = self.hypotheses.iter().filter(told).map(|h| h.sum).fold(0.0, f64::max);
         // What is ahead stays ahead.
         let beyond = (most - SUM_MOST).max(0.0);
@@ -470,7 +466,7 @@ const FORCE: &str = "the specific force";
 
 /// All ways to be set up wrongly.
 fn hypotheses(camera_from_imu: DMat3) -> Vec<Hypothesis> {
-    use UpExpected::{At, Doubted, Off, Then, Wanders};
+    use UpExpected::{At, Off, Then, Wanders};
     let (identity, diagonal) = (DMat3::IDENTITY, |x, y, z| DMat3::from_diagonal(DVec3::new(x, y, z)));
     let of_unit = |imu: DMat3| camera_from_imu * imu * camera_from_imu.transpose();
     let mut all: Vec<_> = quarter_turns()
@@ -500,8 +496,8 @@ fn hypotheses(camera_from_imu: DMat3) -> Vec<Hypothesis> {
         let late = Hypothesis::of(Misfit::Late(ms), identity, Then(MeanSway::NOTHING));
         Hypothesis { late_ns: i64::from(ms) * 1_000_000, ..late }
     }));
-    all.push(Hypothesis::of(Misfit::Mount, identity, Off(MeanOff::NOTHING)));
-    all.push(Hypothesis::of(Misfit::Mount, identity, Doubted(MeanOff::NOTHING)));
+    let off = Hypothesis::of(Misfit::Mount, identity, Off(MeanOff::NOTHING));
+    all.extend([off, Hypothesis { is_doubt: true, ..off }]);
     all
 }
 

@@ -17,9 +17,10 @@ use serde_json::{Value, json};
 
 use super::{
     JournalError, Run, StoredShot, Unwritten,
-    open::{absent_is_fine, folder_of, sync_folder, with_suffix},
+    open::{absent_is_fine, sync_folder, with_suffix},
     row, schema,
 };
+use crate::folder::folder_of;
 
 /// Behind the database's name; the run's number and [`END`] follow.
 const UNWRITTEN: &str = ".unwritten-";

@@ -2,7 +2,7 @@
 
 use std::{
     ffi::OsString,
-    fs::{self, File, OpenOptions},
+    fs::{self, OpenOptions},
     io::{self, Read},
     os::unix::{ffi::OsStrExt, fs::FileExt},
     path::{Path, PathBuf},
@@ -19,6 +19,7 @@ use super::{
     quarantine,
     schema::{self, APPLICATION_ID, VERSION},
 };
+use crate::folder;
 
 /// How long another process may hold the database, when it is opened, before that is an error.
 pub(super) const BUSY: Duration = Duration::from_secs(2);
@@ -297,11 +298,6 @@ pub(super) fn empty_log_at_end(connection: &Connection) {
     }
 }
 
-/// The folder of `path`; the present one for a bare name.
-pub(super) fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
 /// A file that is not there need be neither removed nor moved.
 pub(super) fn absent_is_fine(done: io::Result<()>) -> io::Result<()> {
     match done {
@@ -312,9 +308,7 @@ pub(super) fn absent_is_fine(done: io::Result<()>) -> io::Result<()> {
 
 /// Puts the names in the folder of `path` onto the disk.
 pub(super) fn sync_folder(path: &Path) -> Result<(), JournalError> {
-    File::open(folder_of(path))
-        .and_then(|folder| folder.sync_all())
-        .map_err(|source| JournalError::from_io(path, "sync the folder of", source))
+    folder::sync_folder(path).map_err(|source| JournalError::from_io(path, "sync the folder of", source))
 }
 
 /// `path` with `suffix` behind its name.

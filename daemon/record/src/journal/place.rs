@@ -12,10 +12,8 @@ use rustix::{
     io::Errno,
 };
 
-use super::{
-    JournalError,
-    open::{folder_of, with_suffix},
-};
+use super::{JournalError, open::with_suffix};
+use crate::folder::folder_of;
 
 /// Which files a connection has open: device and number of the database and of its log. A file that was deleted, moved or replaced is
 /// written all the same, and nobody finds it any more.

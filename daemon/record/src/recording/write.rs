@@ -19,6 +19,7 @@ use super::{
     ros,
     schema::{MESSAGE_ENCODING, PROFILE, SCHEMA_ENCODING, Topic},
 };
+use crate::folder::sync_folder;
 
 /// A chunk is closed once it holds this much; a little more than one large picture.
 const CHUNK_TARGET_BYTES: u64 = 1 << 20;
@@ -68,11 +69,7 @@ impl RecordingWriter {
                 }
             })?;
         let recording = Self::begin(path, file, properties)?;
-        // Its name is on the disk as well: what is synced into a file without one is lost with the power.
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        File::open(folder)
-            .and_then(|folder| folder.sync_all())
-            .map_err(|source| RecordError::Write { path: path.into(), source })?;
+        sync_folder(path).map_err(|source| RecordError::Write { path: path.into(), source })?;
         Ok(recording)
     }
 

@@ -303,7 +303,7 @@ impl<const N: usize> ErrorState<N> {
         let expected = DMat2::from_cols(DVec2::new(own.x, shared), DVec2::new(shared, own.y)) + noise;
         let inverse = expected.inverse();
         let nis = differ.dot(inverse * differ);
-        // What cannot be inverted makes it infinite or no number.
+        // The inverse of a singular matrix is infinite or NaN.
         if !nis.is_finite() || nis > gate {
             return (DQuat::IDENTITY, UpdateOutcome { nis, taken: false });
         }

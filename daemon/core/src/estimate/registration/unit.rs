@@ -47,7 +47,7 @@ pub(super) struct UnitWatch {
     steadiest: f64,
 }
 
-/// How a unit's own orientation turned, and how its rates say that it did: rotation vectors, its own axes.
+/// Turn of a unit by its own orientation and by its rates: rotation vectors, its own axes, radians.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnTurn {
     pub seen: DVec3,
@@ -91,7 +91,7 @@ impl UnitWatch {
         Some(OwnTurn { seen, by_rates, span_s, up: own.inverse() * DVec3::Z, force })
     }
 
-    /// Whether the unit finds its own orientation.
+    /// Tests for a unit that sends an orientation of its own.
     pub(super) const fn has_own(&self) -> bool {
         self.own.is_some()
     }
@@ -109,11 +109,11 @@ impl UnitWatch {
     /// Takes in a rate, rad/s, that lasted `step_s`.
     fn turn(&mut self, rate: DVec3, step_s: f64) {
         let about_up = rate.dot(self.force.mean.normalize_or_zero());
-        let share = step_s / (self.known_s + step_s).clamp(LEANS_LEAST_S, LEANS_S);
+        self.known_s += step_s;
+        let share = step_s / self.known_s.clamp(LEANS_LEAST_S, LEANS_S);
         self.swung += (about_up - self.swung) * share;
         // What turns faster is a gun on its mount.
         let about_up = if about_up.abs() > SHIP_TURN_MOST { 0.0 } else { about_up };
-        self.known_s += step_s;
         self.turning += (about_up - self.turning) * share;
         self.turning_square += (about_up * about_up - self.turning_square) * share;
         let now = self.turning.abs();
@@ -140,8 +140,8 @@ impl UnitWatch {
         UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest.max(self.swung.abs()) / GRAVITY_M_S2)
     }
 
-    /// The same where a gun's swing is no turn of the ship: too little before a gun that is swung while the ship turns, so that what is too
-    /// far off by it is doubted and not told.
+    /// Deviation of the unit's up without the turns of a gun on its mount, radians: too small for a gun that is swung while the ship turns. A
+    /// mount that is off by it alone blocks READY and is not reported.
     pub(super) fn doubted_up_sigma(&self) -> f64 {
         UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest / GRAVITY_M_S2)
     }
