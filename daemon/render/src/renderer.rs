@@ -242,6 +242,11 @@ impl<T> Renderer<T> {
         self.timed_every = frames.max(1);
     }
 
+    /// Frames that can be in flight at a time: slots of the ring.
+    pub fn frames_in_flight(&self) -> usize {
+        self.slots.len()
+    }
+
     /// The device that draws.
     pub fn device(&self) -> &DeviceInfo {
         self.gpu.info()

@@ -52,6 +52,11 @@ impl HorizonAiding {
         self.counts
     }
 
+    /// Whether a picture of `time` is to be looked at.
+    pub(super) fn is_due(&self, time: Time) -> bool {
+        time >= self.next
+    }
+
     /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all. Gives where up was seen,
     /// which is sought without the prediction where there is nothing at it.
     pub(super) fn look(
@@ -69,7 +74,7 @@ impl HorizonAiding {
         const FREE_EVERY_NS: i64 = 200_000_000;
         /// One that is not to be seen is looked for so often.
         const UNEXPECTED_EVERY_NS: i64 = 2_000_000_000;
-        if time < self.next {
+        if !self.is_due(time) {
             return None;
         }
         let (Some(covariance), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return None };

@@ -217,6 +217,8 @@ pub(super) struct Registration {
     camera_from_imu: DQuat,
     finder: TurnFinder,
     next: Time,
+    /// [`Exposure::is_looked_at`] of the picture before.
+    was_looked_at: bool,
     hypotheses: Vec<Hypothesis>,
     own_sway: MeanSway,
     /// When up was last seen.
@@ -225,6 +227,19 @@ pub(super) struct Registration {
     believed: Option<Misfit>,
     unit: UnitWatch,
     checked: Option<Time>,
+}
+
+/// A picture, and what else is done with it.
+#[derive(Clone, Copy, Debug)]
+pub struct Exposure<'a> {
+    /// Middle of its exposure on the inertial unit's clock.
+    pub time: Time,
+    /// The picture.
+    pub picture: &'a Picture,
+    /// The lens that it was taken through.
+    pub lens: &'a Lens,
+    /// Whether horizon or sky are sought in it.
+    pub is_looked_at: bool,
 }
 
 impl Registration {
@@ -236,6 +251,7 @@ impl Registration {
             camera_from_imu,
             finder,
             next: Time::MIN,
+            was_looked_at: false,
             hypotheses: hypotheses(DMat3::from_quat(camera_from_imu)),
             own_sway: MeanSway::NOTHING,
             up_seen: None,
@@ -279,23 +295,30 @@ impl Registration {
         self.decide();
     }
 
-    /// Holds how a picture has turned against how the camera is believed to have turned.
-    pub fn look(&mut self, time: Time, picture: &Picture, lens: &Lens, attitude: &Attitude) {
-        /// So often a turn is looked for.
-        const EVERY_NS: i64 = 200_000_000;
+    /// Holds how a picture has turned since the one before against how the camera is believed to have turned. It waits for a picture that
+    /// others do not look at, unless they look at each: no frame waits for both.
+    pub fn look(&mut self, exposure: &Exposure<'_>, attitude: &Attitude) {
+        /// So often a turn is looked for: five times a second, less what stamps of pictures scatter.
+        const EVERY_NS: i64 = 190_000_000;
+        /// So often once each way to be set up wrongly is excluded, and until one is suspected: what changes later, as a camera that was plugged
+        /// in anew, is told three seconds later for it.
+        const TRIED_EVERY_NS: i64 = 990_000_000;
         /// Pictures farther apart are not held against each other; a busy computer looks at few.
         const APART_NS: i64 = 400_000_000;
-        if self.finder.is_begun() {
-            if let Some(seen) = self.finder.finish(picture, lens)
-                && (1..=APART_NS).contains(&time.ns_since(seen.from))
-            {
-                let span_ns = time.ns_since(seen.from);
-                let middle = seen.from.plus_ns(span_ns / 2);
-                self.turned(&seen, time, |late_ns| attitude.camera_turn(middle.plus_ns(-late_ns), span_ns));
-            }
-        } else if time >= self.next {
-            self.next = time.plus_ns(EVERY_NS);
+        let Exposure { time, picture, lens, is_looked_at } = *exposure;
+        let was_looked_at = std::mem::replace(&mut self.was_looked_at, is_looked_at);
+        let is_to_wait = is_looked_at && !was_looked_at;
+        if !self.finder.is_begun() && time >= self.next {
+            self.next = time.plus_ns(if self.is_tried() { TRIED_EVERY_NS } else { EVERY_NS });
             self.finder.begin(time, picture, lens);
+        } else if self.finder.is_begun() && is_to_wait {
+            self.finder.begin(time, picture, lens);
+        } else if let Some(seen) = self.finder.finish(picture, lens)
+            && (1..=APART_NS).contains(&time.ns_since(seen.from))
+        {
+            let span_ns = time.ns_since(seen.from);
+            let middle = seen.from.plus_ns(span_ns / 2);
+            self.turned(&seen, time, |late_ns| attitude.camera_turn(middle.plus_ns(-late_ns), span_ns));
         }
     }
 
@@ -433,9 +456,13 @@ impl Registration {
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         RegistrationChecks {
             unseen_s: self.checked.map_or(f64::INFINITY, |checked| now.secs_since(checked).max(0.0)),
-            is_tried: self.hypotheses.iter().all(|h| !h.is_possible() && h.sum < LIMIT_BACK)
-                && self.turn_cost.is_usual(),
+            is_tried: self.is_tried(),
         }
+    }
+
+    /// As [`RegistrationChecks::is_tried`].
+    fn is_tried(&self) -> bool {
+        self.hypotheses.iter().all(|h| !h.is_possible() && h.sum < LIMIT_BACK) && self.turn_cost.is_usual()
     }
 }
 

@@ -75,6 +75,11 @@ impl VisualCompass {
         self.told = 0.0;
     }
 
+    /// Whether a picture of `time` is to be looked at.
+    pub(super) fn is_due(&self, time: Time) -> bool {
+        time >= self.next
+    }
+
     /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all.
     pub(super) fn look(&mut self, time: Time, picture: &Picture, lens: &Lens, attitude: &mut Attitude) {
         /// The sky is looked at so often: at 60 deg/s nine tenths of it are still in view.
@@ -86,7 +91,7 @@ impl VisualCompass {
         const LASTING_NS: i64 = 1_000_000_000;
         /// How fast the gun turns is told over so long.
         const TURN_NS: i64 = 20_000_000;
-        if time < self.next {
+        if !self.is_due(time) {
             return;
         }
         let (Some(_), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return };

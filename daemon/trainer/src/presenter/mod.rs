@@ -12,6 +12,7 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use bowwave_core::{
     event::Picture,
+    frame::scene::Scene,
     model::Model,
     session::{Session, View},
     time::Time,
@@ -84,20 +85,24 @@ impl Presenter {
         Ok(())
     }
 
-    /// Draws everything that the session can show, to nobody: drivers compile shaders when they are first used.
+    /// Draws everything that the session can show, to nobody: drivers compile shaders when they are first used, and the system puts
+    /// memory where it is first written, so that each slot of the ring is drawn into once.
     fn warm_up(&mut self, session: &Session) -> Result<()> {
         let scene = session.rehearsal();
         let plan = session.plan();
         let (width, height) = plan.picture;
         let picture = Picture::black(plan.video, width, height).context("no picture of this size")?;
+        for _ in 0..self.renderer.frames_in_flight() {
+            self.warm_up_slot(&scene, &picture)?;
+        }
+        Ok(())
+    }
+
+    /// Draws `scene` into the ring's next slot, and waits until that is complete.
+    fn warm_up_slot(&mut self, scene: &Scene, picture: &Picture) -> Result<()> {
         let begun = now();
         let ticket = Ticket { frame: 0, begun, submitted: begun, deadline: None, warm_up: true };
-        self.renderer.submit(DrawRequest {
-            scene: &scene,
-            picture: &picture,
-            picture_is_new: true,
-            ticket,
-        })?;
+        self.renderer.submit(DrawRequest { scene, picture, picture_is_new: true, ticket })?;
         if let Some(output) = &self.output {
             let begun = now();
             // A software driver on a slow computer compiles for a long time at its first start; the renderer's own time-out

@@ -1,7 +1,12 @@
 //! What is said of set-ups of which one thing is wrong.
 
 use super::*;
-use crate::geometry::look;
+use crate::{
+    calibration::Calibration,
+    estimate::attitude::{AttitudeSettings, Source},
+    event::PixelFormat,
+    geometry::look,
+};
 
 fn at(tenths: i64) -> Time {
     Time::from_ns(tenths * 100_000_000)
@@ -238,4 +243,33 @@ fn a_ship_that_turns_is_no_wrong_set_up_and_a_mount_that_is_off_is_one() {
     };
     assert_eq!(run(true, 0.0), None);
     assert_eq!(run(false, 4.0), Some(Misfit::Mount));
+}
+
+/// Pictures of a camera in which a turn was looked for, of those in which horizon and sky are sought in every `busy`-th.
+fn looked_for(period_ns: i64, busy: usize) -> Vec<usize> {
+    let (picture, lens) =
+        (Picture::black(PixelFormat::Yuyv, 640, 360).unwrap(), Lens::pinhole(640, 360, 1.1));
+    let settings = AttitudeSettings::new(Source::Auto, &Calibration::nominal(lens));
+    let attitude = Attitude::new(settings, DVec3::ZERO, DQuat::IDENTITY);
+    let mut registration = Registration::new(DQuat::IDENTITY, None);
+    (0..24)
+        .filter(|&i: &usize| {
+            let time = at(0).plus_ns(i as i64 * period_ns);
+            let is_looked_at = i.is_multiple_of(busy);
+            let was_begun = registration.finder.is_begun();
+            registration.look(&Exposure { time, picture: &picture, lens: &lens, is_looked_at }, &attitude);
+            was_begun && !registration.finder.is_begun()
+        })
+        .collect()
+}
+
+#[test]
+fn a_turn_is_looked_for_in_pictures_that_nothing_else_is_sought_in_where_there_are_such() {
+    // At 30 Hz horizon and sky take every third picture.
+    assert_eq!(looked_for(33_333_333, 3), [1, 7, 13, 19]);
+    // At 20 Hz every other one.
+    assert_eq!(looked_for(50_000_000, 2), [1, 5, 9, 13, 17, 21]);
+    // At 10 Hz they take each, and turns are looked for as often as without them.
+    assert_eq!(looked_for(100_000_000, 1), looked_for(100_000_000, 1000));
+    assert_eq!(looked_for(100_000_000, 1).len(), 12);
 }

@@ -60,12 +60,20 @@ impl Pair {
     }
 }
 
+/// A picture that the next one is held against, and its lens.
+#[derive(Clone, Debug)]
+struct Begun {
+    time: Time,
+    picture: Picture,
+    lens: Lens,
+}
+
 /// Finds how the camera turned from one picture to the next.
 #[derive(Clone, Debug, Default)]
 pub struct TurnFinder {
     pyramid: GreyPyramid,
     grid: FieldGrid,
-    begun: Option<Time>,
+    begun: Option<Begun>,
     patches: Vec<(DVec2, SkyPatch)>,
     pairs: Vec<Pair>,
 }
@@ -81,8 +89,14 @@ impl TurnFinder {
         self.begun.is_some()
     }
 
-    /// Takes a picture that the next one is held against.
+    /// Takes a picture that the next one is held against, in place of one that was taken before. It is kept, and looked at in
+    /// [`TurnFinder::finish`] only.
     pub fn begin(&mut self, time: Time, picture: &Picture, lens: &Lens) {
+        self.begun = Some(Begun { time, picture: picture.clone(), lens: *lens });
+    }
+
+    /// Takes the patches of a picture that are sought in the next one.
+    fn take_patches(&mut self, picture: &Picture, lens: &Lens) {
         /// One field in so many is searched for a patch.
         const FIELDS_EVERY: usize = 4;
         let lens = self.read(picture, lens);
@@ -100,14 +114,14 @@ impl TurnFinder {
             };
             self.patches.extend(SkyPatch::take(&self.pyramid, place).map(|patch| (place, patch)));
         }
-        self.begun = Some(time);
     }
 
     /// The turn from the picture that was begun with to this one; `None` where too few patches are found again or agree.
     pub fn finish(&mut self, picture: &Picture, lens: &Lens) -> Option<TurnSeen> {
         /// A patch that looks less like itself than this is not it.
         const LIKENESS_MIN: f32 = 0.8;
-        let from = self.begun.take()?;
+        let begun = self.begun.take()?;
+        self.take_patches(&begun.picture, &begun.lens);
         if self.patches.len() < *PATCHES.start() {
             return None;
         }
@@ -128,7 +142,7 @@ impl TurnFinder {
         }
         let pixel = 1.0 / lens.focal.x;
         agreed(&self.pairs, pixel).map(|(turn, covariance, agree)| TurnSeen {
-            from,
+            from: begun.time,
             turn,
             covariance,
             patches: (agree, self.pairs.len()),
