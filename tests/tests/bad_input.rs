@@ -194,6 +194,30 @@ fn frames_beyond_the_end_and_faults_too_close_are_refused() {
 }
 
 #[test]
+fn a_run_that_ends_before_its_scenario_says_so_and_calls_no_latency_a_frames_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    let run = |lasts_s: u32| {
+        let scenario = file(
+            folder.path(),
+            "scenario.toml",
+            format!("name = \"long\"\nduration_s = {lasts_s}\n").as_bytes(),
+        );
+        let recording = small_recording().to_str().expect("a plain path");
+        let mut arguments = vec!["simulate", recording, "--fast", "--size", "160x96", "--frames", "30"];
+        arguments.extend(["--scenario", &scenario, "--out", out.to_str().expect("a plain path")]);
+        let output = bowwave(arguments);
+        expect_code(&output, 0);
+        said(&output)
+    };
+    let said = run(40);
+    assert!(said.contains("the scenario lasts 40 s, and this run ends after 1.0 s; --duration 40"), "{said}");
+    assert!(said.contains("frame latency") && !said.contains("frame time"), "{said}");
+    let said = run(1);
+    assert!(!said.contains("the scenario lasts"), "{said}");
+}
+
+#[test]
 fn a_model_without_its_parts_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     // One triangle in the plane of the keel, in a mesh called "blob".

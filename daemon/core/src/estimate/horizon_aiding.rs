@@ -7,6 +7,7 @@ use crate::{
         attitude::{self, Attitude, UpSeen},
         horizon::{HorizonFinder, HorizonView, Mask, NoHorizon, Prior, lowered_by_haze},
         registration::UpSight,
+        schedule::Schedule,
     },
     event::Picture,
     geometry::Lens,
@@ -33,28 +34,28 @@ pub(super) struct HorizonAiding {
     eye_height_m: f64,
     /// By how much lower than the true horizon the one that is seen stands, radians; absent: none is to be seen.
     lowered: Option<f64>,
-    next: Time,
-    next_free: Time,
+    looks: Schedule,
+    free_looks: Schedule,
     counts: HorizonCounts,
 }
 
 impl HorizonAiding {
     /// One for pictures by that lens, in haze that leaves `visibility_m` metres; `mask` hides the own ship.
     pub(super) fn new(lens: &Lens, eye_height_m: f64, visibility_m: f64, mask: Option<Mask>) -> Self {
-        let (next, next_free, counts) = (Time::MIN, Time::MIN, HorizonCounts::default());
+        let (looks, free_looks) = (Schedule::new(), Schedule::new());
         let lowered = lowered_by_haze(lens, eye_height_m, visibility_m);
         let mut finder = HorizonFinder::new();
         finder.set_mask(mask);
-        Self { finder, eye_height_m, lowered, next, next_free, counts }
+        Self { finder, eye_height_m, lowered, looks, free_looks, counts: HorizonCounts::default() }
     }
 
     pub(super) const fn counts(&self) -> HorizonCounts {
         self.counts
     }
 
-    /// Whether a picture of `time` is to be looked at.
+    /// A horizon is sought in a picture of `time`.
     pub(super) fn is_due(&self, time: Time) -> bool {
-        time >= self.next
+        self.looks.is_due(time)
     }
 
     /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all. Gives where up was seen,
@@ -78,7 +79,7 @@ impl HorizonAiding {
             return None;
         }
         let (Some(covariance), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return None };
-        self.next = time.plus_ns(EVERY_NS);
+        self.looks.put_off(time, EVERY_NS);
         let world_from_camera = attitude.camera(then.world_from_imu);
         let tilt = covariance.x_axis.x.max(covariance.y_axis.y);
         let prior = Prior {
@@ -87,7 +88,7 @@ impl HorizonAiding {
         };
         let view = HorizonView { lens: *lens, eye_height_m: self.eye_height_m, prior: Some(prior) };
         let Some(lowered) = self.lowered else {
-            self.next = time.plus_ns(UNEXPECTED_EVERY_NS);
+            self.looks.put_off(time, UNEXPECTED_EVERY_NS);
             self.counts.unexpected += u64::from(self.finder.find(picture, &view).is_ok());
             return None;
         };
@@ -95,10 +96,10 @@ impl HorizonAiding {
         let is_predicted = predicted.is_ok();
         let found = predicted.or_else(|_| {
             self.counts.none += 1;
-            if time < self.next_free {
+            if !self.free_looks.is_due(time) {
                 return Err(NoHorizon::Featureless);
             }
-            self.next_free = time.plus_ns(FREE_EVERY_NS);
+            self.free_looks.put_off(time, FREE_EVERY_NS);
             self.finder.find(picture, &HorizonView { prior: None, ..view })
         });
         let horizon = found.ok()?;

@@ -12,6 +12,7 @@ pub mod light;
 pub mod plausibility;
 pub mod pose;
 pub mod registration;
+mod schedule;
 pub mod sea;
 mod sea_state;
 mod sensors;

@@ -23,6 +23,7 @@ pub use self::misfit::Misfit;
 use self::unit::{LEANS_MOST, UP_SIGMA, UnitWatch};
 use super::{
     attitude::{Attitude, TAU_WAVES_S},
+    schedule::Schedule,
     skyline::{TurnFinder, TurnSeen},
 };
 use crate::{
@@ -66,6 +67,8 @@ struct Hypothesis {
     is_doubt: bool,
     /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).
     sum: f64,
+    /// The same by turns of the picture alone, either way, nats; bounded.
+    by_turns: f64,
     /// The reverse since the start, nats (sequential test).
     against: f64,
     is_excluded: bool,
@@ -109,7 +112,8 @@ impl Costs {
 
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
-        Self { misfit, turn, up, late_ns: 0, is_doubt: false, sum: 0.0, against: 0.0, is_excluded: false }
+        let (sum, by_turns, against) = (0.0, 0.0, 0.0);
+        Self { misfit, turn, up, late_ns: 0, is_doubt: false, sum, by_turns, against, is_excluded: false }
     }
 
     /// Takes in an observation.
@@ -122,6 +126,23 @@ impl Hypothesis {
         self.sum = (self.sum + costs.weight * better).max(0.0);
         self.against = (self.against - costs.against * better).max(LEAST);
         self.is_excluded |= self.against >= EXCLUDED;
+    }
+
+    /// Takes in a turn of the picture.
+    fn add_turn(&mut self, costs: Costs) {
+        /// A gun that begins to move soon outweighs what it showed before.
+        const MOST: f64 = 14.0;
+        let better = 0.5 * (costs.as_believed - costs.other);
+        self.by_turns = (self.by_turns + better).clamp(-MOST, MOST);
+        self.add(costs);
+    }
+
+    /// Tests whether it can be what is wrong. Late pictures show in turns as well as in the vertical, which a ship's turn tilts to and fro
+    /// in a seaway as late pictures would.
+    fn may_be_believed(&self) -> bool {
+        /// What turns must say for it, nats.
+        const LATE_BY_TURNS: f64 = 1.0;
+        !self.is_doubt && (!matches!(self.misfit, Misfit::Late(_)) || self.by_turns >= LATE_BY_TURNS)
     }
 
     /// Takes in an observation by rates in another unit, which make a gun that moves at all a fast one: while none is believed to be, an
@@ -216,9 +237,9 @@ pub(super) struct UpSight {
 pub(super) struct Registration {
     camera_from_imu: DQuat,
     finder: TurnFinder,
-    next: Time,
-    /// [`Exposure::is_looked_at`] of the picture before.
-    was_looked_at: bool,
+    looks: Schedule,
+    /// [`StampedPicture::is_shared`] of the picture before.
+    was_shared: bool,
     hypotheses: Vec<Hypothesis>,
     own_sway: MeanSway,
     /// When up was last seen.
@@ -229,17 +250,17 @@ pub(super) struct Registration {
     checked: Option<Time>,
 }
 
-/// A picture, and what else is done with it.
+/// A picture with its time and lens.
 #[derive(Clone, Copy, Debug)]
-pub struct Exposure<'a> {
+pub struct StampedPicture<'a> {
     /// Middle of its exposure on the inertial unit's clock.
     pub time: Time,
     /// The picture.
     pub picture: &'a Picture,
     /// The lens that it was taken through.
     pub lens: &'a Lens,
-    /// Whether horizon or sky are sought in it.
-    pub is_looked_at: bool,
+    /// Horizon or sky are sought in it as well.
+    pub is_shared: bool,
 }
 
 impl Registration {
@@ -250,8 +271,8 @@ impl Registration {
         Self {
             camera_from_imu,
             finder,
-            next: Time::MIN,
-            was_looked_at: false,
+            looks: Schedule::new(),
+            was_shared: false,
             hypotheses: hypotheses(DMat3::from_quat(camera_from_imu)),
             own_sway: MeanSway::NOTHING,
             up_seen: None,
@@ -265,7 +286,7 @@ impl Registration {
     /// Resets all evidence, as after a restart of the unit: it may be another one.
     pub fn restart(&mut self) {
         let finder = std::mem::take(&mut self.finder);
-        *self = Self { finder, next: self.next, ..Self::new(self.camera_from_imu, None) };
+        *self = Self { finder, looks: self.looks, ..Self::new(self.camera_from_imu, None) };
     }
 
     /// Holds a unit's own orientation against its rates and its specific force. `rate` is without its bias.
@@ -297,21 +318,23 @@ impl Registration {
 
     /// Holds how a picture has turned since the one before against how the camera is believed to have turned. It waits for a picture that
     /// others do not look at, unless they look at each: no frame waits for both.
-    pub fn look(&mut self, exposure: &Exposure<'_>, attitude: &Attitude) {
+    pub fn look(&mut self, stamped: &StampedPicture<'_>, attitude: &Attitude) {
         /// So often a turn is looked for: five times a second, less what stamps of pictures scatter.
         const EVERY_NS: i64 = 190_000_000;
-        /// So often once each way to be set up wrongly is excluded, and until one is suspected: what changes later, as a camera that was plugged
-        /// in anew, is told three seconds later for it.
+        /// The same once each way to be set up wrongly is excluded, and until one is suspected. A change after that, as a camera that was
+        /// plugged in anew, is reported three seconds later for it.
         const TRIED_EVERY_NS: i64 = 990_000_000;
         /// Pictures farther apart are not held against each other; a busy computer looks at few.
         const APART_NS: i64 = 400_000_000;
-        let Exposure { time, picture, lens, is_looked_at } = *exposure;
-        let was_looked_at = std::mem::replace(&mut self.was_looked_at, is_looked_at);
-        let is_to_wait = is_looked_at && !was_looked_at;
-        if !self.finder.is_begun() && time >= self.next {
-            self.next = time.plus_ns(if self.is_tried() { TRIED_EVERY_NS } else { EVERY_NS });
-            self.finder.begin(time, picture, lens);
-        } else if self.finder.is_begun() && is_to_wait {
+        let StampedPicture { time, picture, lens, is_shared } = *stamped;
+        let was_shared = std::mem::replace(&mut self.was_shared, is_shared);
+        let is_begun = self.finder.is_begun();
+        let is_due = !is_begun && self.looks.is_due(time);
+        let waits = is_begun && is_shared && !was_shared;
+        if is_due {
+            self.looks.put_off(time, if self.is_tried() { TRIED_EVERY_NS } else { EVERY_NS });
+        }
+        if is_due || waits {
             self.finder.begin(time, picture, lens);
         } else if let Some(seen) = self.finder.finish(picture, lens)
             && (1..=APART_NS).contains(&time.ns_since(seen.from))
@@ -341,7 +364,7 @@ impl Registration {
                 // What stands in the picture, as a reticle does, does not turn at all.
                 Misfit::RateUnit if stands => {}
                 Misfit::RateUnit => hypothesis.add_rate_unit(costs, is_fast),
-                _ => hypothesis.add(costs),
+                _ => hypothesis.add_turn(costs),
             }
         }
         self.decide();
@@ -426,7 +449,7 @@ impl Registration {
         const LIMIT_OTHER: f64 = 2.0;
         /// No sum goes beyond this, so that a belief ends soon after its cause.
         const SUM_MOST: f64 = 60.0;
-        let told = |h: &&Hypothesis| !h.is_doubt;
+        let told = |h: &&Hypothesis| h.may_be_believed();
         let most = self.hypotheses.iter().filter(told).map(|h| h.sum).fold(0.0, f64::max);
         // What is ahead stays ahead.
         let beyond = (most - SUM_MOST).max(0.0);

@@ -15,7 +15,7 @@ use crate::{
         horizon::Mask,
         plausibility::{Plausibility, is_possible},
         pose::{NoPose, OrientationAt, STALE_NS},
-        registration::{Exposure, Misfit, Registration, RegistrationChecks},
+        registration::{Misfit, Registration, RegistrationChecks, StampedPicture},
     },
     event::{CameraFrame, ImuSample, Mark, ShipSample},
     fault::Fault,
@@ -185,13 +185,13 @@ impl Sensors {
         if let (Some(frame), Some(time)) = (&self.frame, self.video_time()) {
             // How a rolling shutter bent the picture is not known of the first one: an anchor in it would be wrong for as long as it holds.
             let Some(lens) = self.lens_read(time) else { return };
-            let is_looked_at = self.level.is_due(time) || self.steady.is_due(time);
+            let is_shared = self.level.is_due(time) || self.steady.is_due(time);
             let up = self.level.look(time, &frame.picture, &lens, &mut self.attitude);
             if let Some(up) = up {
                 self.registration.up(time, &up, |time| self.attitude.up_alone(time));
             }
-            let exposure = Exposure { time, picture: &frame.picture, lens: &lens, is_looked_at };
-            self.registration.look(&exposure, &self.attitude);
+            let stamped = StampedPicture { time, picture: &frame.picture, lens: &lens, is_shared };
+            self.registration.look(&stamped, &self.attitude);
             self.steady.look(time, &frame.picture, &lens, &mut self.attitude);
             self.counts.horizons = self.level.counts();
             self.counts.skyline = self.steady.counts();

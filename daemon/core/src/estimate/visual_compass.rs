@@ -4,6 +4,7 @@ use crate::{
     estimate::{
         attitude::{Attitude, HeadingSeen},
         horizon::Mask,
+        schedule::Schedule,
         skyline::{SkyView, Skyline},
     },
     event::Picture,
@@ -43,7 +44,7 @@ pub(super) struct VisualCompass {
     drift: f64,
     /// How well the filter was told that the sky does not turn by itself, rad/s.
     told: f64,
-    next: Time,
+    looks: Schedule,
     refused_in_a_row: u32,
     counts: SkylineCounts,
 }
@@ -59,7 +60,7 @@ impl VisualCompass {
             time_sigma_s,
             drift,
             told: 0.0,
-            next: Time::MIN,
+            looks: Schedule::new(),
             refused_in_a_row: 0,
             counts: SkylineCounts::default(),
         }
@@ -75,9 +76,9 @@ impl VisualCompass {
         self.told = 0.0;
     }
 
-    /// Whether a picture of `time` is to be looked at.
+    /// The sky is sought in a picture of `time`.
     pub(super) fn is_due(&self, time: Time) -> bool {
-        time >= self.next
+        self.looks.is_due(time)
     }
 
     /// Looks at a picture exposed at `time` on the inertial unit's clock, where `attitude` can be corrected at all.
@@ -95,7 +96,7 @@ impl VisualCompass {
             return;
         }
         let (Some(_), Ok(then)) = (attitude.covariance(), attitude.at(time)) else { return };
-        self.next = time.plus_ns(EVERY_NS);
+        self.looks.put_off(time, EVERY_NS);
         // A wrong time is a wrong heading while the gun is trained.
         let before = attitude.at(time.plus_ns(-TURN_NS)).map_or(then.world_from_imu, |b| b.world_from_imu);
         let rate = before.angle_between(then.world_from_imu) / (TURN_NS as f64 * 1e-9);

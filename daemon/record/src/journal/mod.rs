@@ -34,7 +34,7 @@ use std::{
 };
 
 use bowwave_core::{fault::Fault, time::Time, world::score::ShotRecord};
-use crossbeam_channel::{Receiver, Sender, TrySendError, bounded, unbounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded, unbounded};
 
 pub use aside::{put_aside, side_files};
 use boot::WallClock;
@@ -339,13 +339,12 @@ impl Journal {
         self.open = None;
         let Some(thread) = self.thread.take() else { return Err(self.stopped()) };
         let ended = match self.await_end() {
-            Some(ended) => {
+            Ok(ended) => {
                 // Nothing is left to do there.
                 drop(thread.join());
                 ended
             }
-            None if thread.is_finished() => return Err(self.stopped()),
-            None => self.without_the_disk(),
+            Err(cause) => self.end_without_the_thread(cause),
         };
         match ended.unwritten {
             Some(unwritten) => {
@@ -358,21 +357,26 @@ impl Journal {
         }
     }
 
-    /// Waits for the thread's end, as long as it gets on.
-    fn await_end(&self) -> Option<JournalEnd> {
+    /// Waits for the thread's end, as long as it gets on; else why it does not come.
+    fn await_end(&self) -> Result<JournalEnd, &'static str> {
         loop {
             let before = self.told().committed;
             // The thread itself gives up at that time where the disk answers with failures.
             match self.ended.recv_timeout(self.end_within + Duration::from_millis(100)) {
-                Ok(ended) => return Some(ended),
-                Err(_) if self.told().committed == before => return None,
-                Err(_) => {}
+                Ok(ended) => return Ok(ended),
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err("the thread that writes it broke down; report it with the log");
+                }
+                Err(RecvTimeoutError::Timeout) if self.told().committed == before => {
+                    return Err("the disk does not answer; check it");
+                }
+                Err(RecvTimeoutError::Timeout) => {}
             }
         }
     }
 
-    /// The end where the disk does not answer: a file on it would not be written, either.
-    fn without_the_disk(&self) -> JournalEnd {
+    /// The end where the thread does not come to it. A disk that does not answer would not take a file, either.
+    fn end_without_the_thread(&self, cause: &str) -> JournalEnd {
         let mut records = Pending::of(&self.pending).unwritten();
         records.extend(self.queued.try_iter().filter_map(|message| match message {
             JournalMessage::Shot(shot) => Some(shot),
@@ -384,7 +388,7 @@ impl Journal {
             path: self.path.clone(),
             run: self.run,
             committed,
-            cause: "the disk does not answer; check it".to_owned(),
+            cause: cause.to_owned(),
             in_doubt: 0,
             rows: records.into_iter().map(row).collect(),
             side_file: None,

@@ -300,6 +300,27 @@ fn the_end_of_a_journal_whose_folder_is_gone_is_quick_and_tells_each_round() {
     assert_eq!((unwritten.rows.len(), unwritten.in_doubt, unwritten.side_file), (2, 1, None));
 }
 
+/// The thread ends as it should; that it broke down is all that is made up.
+#[test]
+fn rounds_of_a_thread_that_broke_down_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hits.sqlite");
+    let mut journal = Journal::open(&path, &Run::default()).unwrap();
+    (journal.queue, journal.open) = (None, None);
+    journal.thread.take().unwrap().join().unwrap();
+    journal.ended = bounded(0).1;
+    journal.thread = Some(std::thread::spawn(|| {}));
+    let (queue, queued) = bounded(1);
+    queue.send(JournalMessage::Shot(shot(2))).unwrap();
+    journal.queued = queued;
+    Pending::of(&journal.pending).held.push_back(shot(1));
+    let Err(JournalError::Unwritten(unwritten)) = journal.finish_with([shot(3)]) else {
+        panic!("nothing is missing")
+    };
+    assert!(unwritten.to_string().contains("broke down"), "{unwritten}");
+    assert_eq!(unwritten.rows, [1, 3, 2].map(|number| StoredShot::line(unwritten.run, shot(number))));
+}
+
 #[test]
 fn a_locked_journal_ends_in_time_with_its_rounds_beside_it() {
     let folder = tempfile::tempdir().unwrap();

@@ -92,31 +92,34 @@ impl Presenter {
         let plan = session.plan();
         let (width, height) = plan.picture;
         let picture = Picture::black(plan.video, width, height).context("no picture of this size")?;
+        let begun = now();
         for _ in 0..self.renderer.frames_in_flight() {
-            self.warm_up_slot(&scene, &picture)?;
+            if !self.warm_up_slot(&scene, &picture, begun)? {
+                break;
+            }
         }
         Ok(())
     }
 
-    /// Draws `scene` into the ring's next slot, and waits until that is complete.
-    fn warm_up_slot(&mut self, scene: &Scene, picture: &Picture) -> Result<()> {
+    /// Draws `scene` into the ring's next slot, and waits until that is complete or the warm-up, which was begun at `warm_up_begun`, has
+    /// lasted too long. Gives `true` where it is complete.
+    fn warm_up_slot(&mut self, scene: &Scene, picture: &Picture, warm_up_begun: Time) -> Result<bool> {
         let begun = now();
         let ticket = Ticket { frame: 0, begun, submitted: begun, deadline: None, warm_up: true };
         self.renderer.submit(DrawRequest { scene, picture, picture_is_new: true, ticket })?;
         if let Some(output) = &self.output {
-            let begun = now();
             // A software driver on a slow computer compiles for a long time at its first start; the renderer's own time-out
             // ends one that hangs.
             while !output.await_warm_up(PATIENCE) && output.runs() {
-                if now().secs_since(begun) > WARM_UP_S {
+                if now().secs_since(warm_up_begun) > WARM_UP_S {
                     log::warn!(
                         "the warm-up was not complete after {WARM_UP_S} s; the first frames may be late"
                     );
-                    break;
+                    return Ok(false);
                 }
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// Hands a frame over that was begun at `begun` and must be complete at `deadline`.

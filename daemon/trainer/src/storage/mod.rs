@@ -7,7 +7,7 @@ mod recorder;
 use std::{
     collections::VecDeque,
     io,
-    path::{Path, PathBuf},
+    path::PathBuf,
     thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
@@ -135,6 +135,8 @@ pub struct Storage {
     store: JournalState,
     waiting: VecDeque<ShotRecord>,
     recorder: Option<Recorder>,
+    /// A recording that takes nothing more, until what waits is written.
+    closed: Option<Recorder>,
     /// Why nothing is recorded although it should be.
     recording_failed: Option<String>,
     /// Entries of an ended recording that were lost.
@@ -165,13 +167,16 @@ impl Storage {
                 None
             }
         };
-        let space = SpaceWatch::new(&options.folder, space_limit(&options.folder, recorder.is_some()));
+        // Room for a recording's end, or for hits alone, and never more than a part of a small disk.
+        let (limit, part) = if recorder.is_some() { (SpaceWatch::LIMIT_BYTES, 8) } else { (HITS_BYTES, 32) };
+        let space = SpaceWatch::new(&options.folder, limit, part);
         let print_commits = options.print_commits;
         Ok(Self {
             options,
             store,
             waiting: VecDeque::new(),
             recorder,
+            closed: None,
             recording_failed,
             lost: 0,
             space,
@@ -297,7 +302,7 @@ impl Storage {
     fn poll_disk(&mut self, faults: &mut FaultLog, events: &mut Vec<Event>) {
         let broken = self.broken();
         let cause = |fault| broken.as_ref().filter(|(f, _)| *f == fault).map(|(_, why)| why.clone());
-        let room = self.space.room(now());
+        let room = self.space.room();
         let read_only = (room == Room::ReadOnly)
             .then(|| "the data partition is mounted read-only: hits are kept in memory; look at the kernel's log, replace the disk".to_owned());
         faults.set(Fault::DbLocked, cause(Fault::DbLocked), events);
@@ -316,9 +321,13 @@ impl Storage {
             )),
         };
         if low.is_some()
-            && let Some(recorder) = self.recorder.take()
+            && let Some(mut recorder) = self.recorder.take()
         {
             // What was recorded so far is whole. It is not begun anew within the run.
+            recorder.close();
+            self.closed = Some(recorder);
+        }
+        if let Some(recorder) = self.closed.take_if(|r| r.has_ended()) {
             self.lost += end_recording(recorder);
         }
         faults.set(Fault::DiskFull, cause(Fault::DiskFull).or(low), events);
@@ -353,6 +362,11 @@ impl Storage {
     /// Writes everything and ends. Tells how many entries the recording lacks, and what went wrong.
     pub fn finish(mut self) -> (u64, Vec<anyhow::Error>) {
         let mut wrong = Vec::new();
+        let until = Instant::now() + self.options.journal.end_within;
+        // It writes what waits while the journal ends.
+        if let Some(recorder) = &mut self.recorder {
+            recorder.close();
+        }
         let journal = match self.store {
             JournalState::Open(journal) => Some(journal),
             // Trying once more may take longer than the end may. The next run takes in what is put aside.
@@ -374,12 +388,12 @@ impl Storage {
             let why = "the recording ended before the run: the disk is full or cannot be written; free it and run again";
             wrong.push(anyhow::anyhow!(why));
         }
-        if let Some(recorder) = self.recorder.take() {
+        if let Some(recorder) = self.recorder.take().or(self.closed.take()) {
             if self.options.strict {
                 self.lost += recorder.lost();
                 wrong.extend(recorder.finish().err());
             } else {
-                self.lost += end_recording(recorder);
+                self.lost += end_recording_until(recorder, until);
             }
         }
         (self.lost, wrong)
@@ -407,16 +421,6 @@ fn dirty(journal: &Journal) -> Option<FaultChange> {
     Some(FaultChange::noted(now(), Fault::BootDirty, cause))
 }
 
-/// Free bytes below which the disk counts as full: room for a recording's end, or for hits alone, and never more than a part
-/// of a small disk.
-fn space_limit(folder: &Path, records: bool) -> u64 {
-    let (limit, part) = if records { (SpaceWatch::LIMIT_BYTES, 8) } else { (HITS_BYTES, 32) };
-    match rustix::fs::statvfs(folder) {
-        Ok(s) => limit.min(s.f_blocks.saturating_mul(s.f_frsize) / part),
-        Err(_) => limit,
-    }
-}
-
 /// Ends a recording and tells how many entries it lacks.
 fn end_recording(recorder: Recorder) -> u64 {
     let lost = recorder.lost();
@@ -429,8 +433,24 @@ fn end_recording(recorder: Recorder) -> u64 {
     lost
 }
 
+/// The same of a recording that was closed, waiting for its disk no longer than `until`: a service that takes longer to end is killed.
+fn end_recording_until(recorder: Recorder, until: Instant) -> u64 {
+    while !recorder.has_ended() {
+        if Instant::now() > until {
+            log::error!(
+                "the disk did not take the recording's end in time; check the disk; `bowwave simulate` plays what is whole"
+            );
+            return recorder.lost();
+        }
+        thread::sleep(Duration::from_millis(2));
+    }
+    end_recording(recorder)
+}
+
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
     use bowwave_core::world::score::{NotScored, Outcome};
 
@@ -511,6 +531,25 @@ mod tests {
         let stored = read_shots(&journal, &ShotFilter { runs: RunSelection::All, hits_only: false }).unwrap();
         let numbers: Vec<_> = stored.iter().map(|s| (s.run, s.record.shot)).collect();
         assert_eq!(numbers, [(1, 1), (1, 2), (2, 1)]);
+    }
+
+    #[test]
+    fn a_recording_whose_disk_does_not_answer_holds_neither_a_frame_nor_the_end() {
+        let base = tempfile::tempdir().unwrap();
+        let mut options = options(base.path());
+        options.journal.end_within = Duration::from_millis(200);
+        let mut storage = Storage::open(options, &mut Vec::new()).unwrap();
+        storage.recorder = Some(Recorder::hung());
+        storage.rounds(&[round(1)]);
+        // As on a disk that is nearly full.
+        storage.space = SpaceWatch::new(base.path(), u64::MAX, 1);
+        let (mut faults, mut events) = (FaultLog::new(None), Vec::new());
+        storage.poll(&mut faults, &mut events).unwrap();
+        assert!(faults.warnings().any(|fault| fault == Fault::DiskFull));
+        assert!(storage.recorder.is_none() && storage.closed.is_some());
+        assert_eq!(storage.finish().1.len(), 0);
+        let stored = read_shots(&base.path().join(JOURNAL), &ShotFilter::default()).unwrap();
+        assert_eq!(stored.len(), 1);
     }
 
     #[test]

@@ -184,7 +184,33 @@ impl Recorder {
         self.lost += if lost { count } else { 0 };
     }
 
-    /// Whether its thread has ended before it was asked to: it could not write. [`Self::finish`] says why.
+    /// One whose disk does not answer.
+    #[cfg(test)]
+    pub(super) fn hung() -> Self {
+        let (queue, _) = bounded(QUEUE);
+        let thread = thread::spawn(|| {
+            loop {
+                thread::park();
+            }
+        });
+        Self {
+            queue: Some(queue),
+            thread: Some(thread),
+            lossless: false,
+            exact_pixels: false,
+            quality: QUALITY,
+            lost: 0,
+            inputs: 0,
+            newest: None,
+        }
+    }
+
+    /// Takes nothing more: its thread writes what waits, and ends. Never waits.
+    pub fn close(&mut self) {
+        self.queue = None;
+    }
+
+    /// Its thread has ended: after [`Self::close`], or because it could not write. [`Self::finish`] says why.
     pub fn has_ended(&self) -> bool {
         self.thread.as_ref().is_some_and(JoinHandle::is_finished)
     }
@@ -196,7 +222,7 @@ impl Recorder {
 
     /// Writes what waits and ends the recording.
     pub fn finish(mut self) -> Result<WrittenSummary> {
-        drop(self.queue.take());
+        self.close();
         let thread = self.thread.take().context("the recorder has already ended")?;
         thread.join().map_err(|_| anyhow!("the recorder's thread broke down; report it with the log"))?
     }

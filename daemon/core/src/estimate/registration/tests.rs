@@ -103,6 +103,42 @@ fn a_craft_that_speeds_up_has_no_other_lens() {
     assert!(watch.wrong() != Some(Misfit::Lens), "{:?}", watch.wrong());
 }
 
+/// Two minutes of a ship that rolls slowly, looked at as once nothing is suspected: the picture turns as believed, and the vertical is seen
+/// as if it was late. When the pictures are called late, seconds.
+fn late_verticals(late_ms: i64, speed: f64) -> Option<f64> {
+    let slow = |time: Time| at(0).plus_ns((time.ns_since(at(0)) as f64 * speed) as i64);
+    let rolled = |time: Time| DQuat::from_rotation_z(0.12 * (0.8 * slow(time).secs_since(at(0))).sin());
+    let (turn, up) = (
+        |from, to| rotation_vector(rolled(from).inverse() * rolled(to)),
+        |time| rolled(time).inverse() * DVec3::NEG_Y,
+    );
+    let mut registration = Registration::new(DQuat::IDENTITY, None);
+    for tenths in 10..1210 {
+        let (now, before) = (at(tenths), at(tenths).plus_ns(-33_000_000));
+        let sight =
+            UpSight { seen: up(now.plus_ns(-late_ms * 1_000_000)), predicted: up(now), is_predicted: true };
+        registration.up(now, &sight, |time| Some(up(time)));
+        if tenths % 10 == 0 {
+            let covariance = DMat3::from_diagonal(DVec3::splat(1e-7));
+            let seen = TurnSeen { from: before, turn: turn(before, now), covariance, patches: (20, 20) };
+            registration.turned(&seen, now, |ns| Some(turn(before.plus_ns(-ns), now.plus_ns(-ns))));
+        }
+        if matches!(registration.wrong(), Some(Misfit::Late(_))) {
+            return Some(now.secs_since(at(10)));
+        }
+    }
+    None
+}
+
+#[test]
+fn verticals_that_sway_late_while_the_picture_turns_in_time_are_no_late_pictures() {
+    for late_ms in [100, 200, 400] {
+        for speed in [0.3, 0.5, 0.7, 1.0, 1.5] {
+            assert_eq!(late_verticals(late_ms, speed), None, "{late_ms} ms, speed {speed}");
+        }
+    }
+}
+
 #[test]
 fn a_unit_that_restarts_is_checked_anew() {
     let (_, mut watch) = watched(1.0, turn, up);
@@ -255,9 +291,10 @@ fn looked_for(period_ns: i64, busy: usize) -> Vec<usize> {
     (0..24)
         .filter(|&i: &usize| {
             let time = at(0).plus_ns(i as i64 * period_ns);
-            let is_looked_at = i.is_multiple_of(busy);
+            let is_shared = i.is_multiple_of(busy);
             let was_begun = registration.finder.is_begun();
-            registration.look(&Exposure { time, picture: &picture, lens: &lens, is_looked_at }, &attitude);
+            let stamped = StampedPicture { time, picture: &picture, lens: &lens, is_shared };
+            registration.look(&stamped, &attitude);
             was_begun && !registration.finder.is_begun()
         })
         .collect()

@@ -1,8 +1,11 @@
 //! A live run with faults is recorded and stepped again from its recording: records and scenes must be the same.
 
-use std::{thread, time::Duration};
+use std::{
+    thread,
+    time::{Duration, Instant},
+};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
 use super::{CaseResult, FaultRow, SpecialCase, computer, quiet};
@@ -11,6 +14,9 @@ use bowwave_hil::protocol::PlayerFeed;
 
 /// How long each fault stays, and how long nothing is wrong after it.
 const STAYS: Duration = Duration::from_millis(1500);
+/// Longest that an ended run may take to leave its summary, and how often it is looked for.
+const SUMMARY_WITHIN: Duration = Duration::from_secs(60);
+const SUMMARY_EVERY: Duration = Duration::from_millis(500);
 /// Longest that the machine may take to step the session through the recording.
 const PATIENCE: Duration = Duration::from_secs(500);
 
@@ -62,12 +68,12 @@ fn replayed(bench: &mut HilBench) -> Result<CaseResult> {
     }
     bench.shoot(300)?;
     thread::sleep(STAYS);
-    // A reload ends the recording and leaves the run's summary.
+    // A reload ends the recording and leaves the run's summary, in place of the one of the run before.
+    bench.machine.guest.shell(&format!("rm -f {STATE}/summary.json"))?;
     bench.configure(&Configured::default())?;
     bench.service("reload")?;
-    thread::sleep(Duration::from_secs(2));
+    let run = summary(bench)?;
     bench.ready(bench.scaled(4.0))?;
-    let run: Value = serde_json::from_str(&bench.machine.guest.shell(&format!("cat {STATE}/summary.json"))?)?;
     let newest = format!("exec bowwave replay \"$(ls -t {STATE}/recording-*.mcap | head -n 1)\" --json");
     let (code, out, said) = bench.machine.guest.run_any(&["/bin/sh", "-c", &newest], PATIENCE)?;
     let replay: Value =
@@ -90,4 +96,22 @@ fn replayed(bench: &mut HilBench) -> Result<CaseResult> {
         ),
         ..CaseResult::default()
     })
+}
+
+/// The summary that the ended run leaves.
+fn summary(bench: &mut HilBench) -> Result<Value> {
+    let until = Instant::now() + SUMMARY_WITHIN;
+    loop {
+        let text = bench.machine.guest.shell(&format!("cat {STATE}/summary.json 2>/dev/null || true"))?;
+        // It is half written for a moment.
+        if let Ok(summary) = serde_json::from_str(&text) {
+            return Ok(summary);
+        }
+        ensure!(
+            Instant::now() < until,
+            "the ended run left no summary within {} s",
+            SUMMARY_WITHIN.as_secs()
+        );
+        thread::sleep(SUMMARY_EVERY);
+    }
 }
