@@ -389,12 +389,17 @@ impl Recipe {
                 "released within it",
             )?;
         }
-        // Three deviations: the eye would otherwise be under water time and again.
-        if self.eye_height_m < 0.75 * self.significant_height_m() {
+        if self.eye_height_m < self.eye_height_least_m() {
             let range = "above the crests: three quarters of the significant wave height, wind sea and swell";
             return bad("eye_height_m", self.eye_height_m, range);
         }
         self.check_view()
+    }
+
+    /// Least height of the camera above the mean sea, metres: three deviations of the water's height. It would otherwise be under water time
+    /// and again.
+    pub fn eye_height_least_m(&self) -> f64 {
+        0.75 * self.significant_height_m()
     }
 
     /// The picture is drawn from a level camera's: no line of sight may come near straight down or up.

@@ -121,8 +121,12 @@ fn lines(bytes: &mut Vec<u8>, chance: &mut Mutator) {
         0 => lines.swap(a, b),
         1 => drop(lines.remove(a)),
         _ => {
+            /// A line of a binary file may be most of it.
+            const ADDED_MOST: usize = 4 << 20;
             let line = lines[a].clone();
-            (0..=chance.below(300)).for_each(|_| lines.insert(b, line.clone()));
+            let most = ADDED_MOST / line.len().max(1);
+            let copies = 1 + chance.below(300).min(most);
+            lines.splice(b..b, std::iter::repeat_n(line, copies));
         }
     }
     *bytes = lines.join(&b'\n');

@@ -21,8 +21,10 @@ use bowwave_record::{Journal, Run};
 use bowwave_tests::{play, program, root, small_recording};
 use glam::DVec3;
 
-/// Longest time that a run may take.
-const TIME: Duration = Duration::from_secs(10);
+/// Longest time that a run may keep a processor busy, seconds, ...
+const BUSY_S: u32 = 10;
+/// ...and take beside others.
+const TIME: Duration = Duration::from_secs(60);
 /// Most memory that it may ask for, KiB.
 const MEMORY_KIB: u32 = 512 << 10;
 
@@ -71,12 +73,13 @@ impl Target {
 
     /// Runs the command on the `number`th file, of those bytes, in `folder`; its exit code, or what is wrong.
     pub fn run(&self, folder: &Path, number: usize, bytes: &[u8]) -> Result<i32, String> {
-        for (name, bytes) in &self.beside {
-            fs::write(folder.join(name), bytes).unwrap();
-        }
-        let file = folder.join(self.file);
-        fs::create_dir_all(file.parent().unwrap()).unwrap();
-        fs::write(file, bytes).unwrap();
+        let put = |name: &str, bytes: &[u8]| {
+            let file = folder.join(name);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, bytes).unwrap();
+        };
+        self.beside.iter().for_each(|(name, bytes)| put(name, bytes));
+        put(self.file, bytes);
         let said = Said::of(folder, &self.arguments, number.is_multiple_of(DRAWN))?;
         said.judge()
     }
@@ -92,7 +95,7 @@ impl Said {
     fn of(folder: &Path, arguments: &[String], is_drawn: bool) -> Result<Self, String> {
         let driver =
             if is_drawn { "" } else { "export VK_DRIVER_FILES=/dev/null VK_ICD_FILENAMES=/dev/null; " };
-        let limited = format!("{driver}ulimit -v {MEMORY_KIB}; exec \"$0\" \"$@\"");
+        let limited = format!("{driver}ulimit -v {MEMORY_KIB}; ulimit -t {BUSY_S}; exec \"$0\" \"$@\"");
         let out = fs::File::create(folder.join("said")).unwrap();
         let mut child = Command::new("sh")
             .args(["-c", &limited])
@@ -171,12 +174,13 @@ pub fn all(folder: &Path) -> Vec<Target> {
             ..target("model", "boat.glb", vec![corpus("model")], &["plan", "scenario.toml"])
         },
         Target {
-            beside: vec![("still.png", fs::read(&still).unwrap())],
+            // Of the size that one of the good calibrations is for.
+            beside: vec![("pictures/still.png", png(1280, 720))],
             ..target(
                 "calibration",
                 "file.toml",
                 vec![corpus("calibration")],
-                &["calibrate", "intrinsics", ".", "--out", "file.toml"],
+                &["import", "pictures", "--calibration", "file.toml", "--force", "--out", "made.mcap"],
             )
         },
         target(
@@ -200,19 +204,32 @@ pub fn all(folder: &Path) -> Vec<Target> {
         target(
             "pictures",
             "pictures/file.png",
-            vec![still, corpus("jpeg")],
-            &["calibrate", "intrinsics", "pictures", "--out", "made.toml"],
+            vec![still, jpegs(&corpus("jpeg"), &folder.join("jpegs"))],
+            &["import", "pictures", "--force", "--out", "made.mcap"],
         ),
-        Target {
-            beside: vec![("picture.png", fs::read(run.join("frame-00003.png")).unwrap())],
-            ..target(
-                "board",
-                "file.yaml",
-                vec![board],
-                &["calibrate", "intrinsics", ".", "--target", "file.yaml", "--out", "made.toml"],
-            )
-        },
+        target(
+            "board",
+            "file.yaml",
+            vec![board],
+            &["calibrate", "board", "--target", "file.yaml", "--force", "--out", "made.svg"],
+        ),
     ]
+}
+
+/// Pictures of the fuzz targets' inputs, whose first byte is none of the picture's; their folder.
+fn jpegs(inputs: &Path, folder: &Path) -> PathBuf {
+    fs::create_dir_all(folder).unwrap();
+    for entry in fs::read_dir(inputs).unwrap().map(Result::unwrap) {
+        fs::write(folder.join(entry.file_name()), &fs::read(entry.path()).unwrap()[1..]).unwrap();
+    }
+    folder.to_owned()
+}
+
+/// A black picture.
+fn png(width: u32, height: u32) -> Vec<u8> {
+    let mut png = std::io::Cursor::new(Vec::new());
+    image::RgbImage::new(width, height).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    png.into_inner()
 }
 
 /// A journal of some rounds.

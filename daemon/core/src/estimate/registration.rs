@@ -10,17 +10,19 @@
 //! A gun that rests shows neither a reversed axis nor late pictures. So a hypothesis counts as possible until what is believed has foretold
 //! better than it by 7 in all (Wald 1945, sequential test): a wrong set-up passes for a right one once in exp(7) = 1100 starts at most.
 
+mod means;
 mod misfit;
 #[cfg(test)]
 mod tests;
 mod unit;
 
-use std::ops::{AddAssign, Mul, Sub};
-
 use glam::{DMat3, DQuat, DVec3};
 
 pub use self::misfit::Misfit;
-use self::unit::{LEANS_MOST, UP_SIGMA, UnitWatch};
+use self::{
+    means::{MeanOff, MeanSway, SEA_RATE, SeaDrift, TurnCost},
+    unit::{LEANS_MOST, UP_SIGMA, UnitWatch},
+};
 use super::{
     attitude::{Attitude, TAU_WAVES_S},
     schedule::Schedule,
@@ -40,8 +42,6 @@ const COST_WANDERS: f64 = 5.0;
 /// A mount that is off, and does not say how far, explains no less than what costs this: two degrees. So far a unit alone goes off up in
 /// a ship's turn.
 const COST_OFF: f64 = 4.0;
-/// How the sea and what swims on it move by themselves in the picture, rad/s: waves go by at 10 m/s some hundred metres off.
-const SEA_RATE: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// By what share of itself a turn is told wrong by lens, shutter and times.
 const TURN_SHARE: f64 = 0.08;
 /// Verticals that are seen one after the other err alike: so many count as one.
@@ -67,6 +67,8 @@ struct Hypothesis {
     is_doubt: bool,
     /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).
     sum: f64,
+    /// What turns of the picture differ from those that it foretells by.
+    drift: SeaDrift,
     /// The same by turns of the picture alone, either way, nats; bounded.
     by_turns: f64,
     /// The reverse since the start, nats (sequential test).
@@ -104,6 +106,11 @@ impl Costs {
         Self { as_believed, other, weight: 1.0, against: 1.0 }
     }
 
+    /// How much better the hypothesis foretells it than what is believed, nats.
+    const fn better(self) -> f64 {
+        0.5 * (self.as_believed - self.other)
+    }
+
     /// The same of one out of so many that err alike.
     fn alike(self, count: f64) -> Self {
         Self { weight: self.weight / count, against: self.against / count, ..self }
@@ -113,7 +120,19 @@ impl Costs {
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
         let (sum, by_turns, against) = (0.0, 0.0, 0.0);
-        Self { misfit, turn, up, late_ns: 0, is_doubt: false, sum, by_turns, against, is_excluded: false }
+        let drift = SeaDrift::NOTHING;
+        Self {
+            misfit,
+            turn,
+            up,
+            late_ns: 0,
+            is_doubt: false,
+            sum,
+            drift,
+            by_turns,
+            against,
+            is_excluded: false,
+        }
     }
 
     /// Takes in an observation.
@@ -122,9 +141,8 @@ impl Hypothesis {
         const EXCLUDED: f64 = 7.0;
         /// However much better this foretold before, what was wrong may have been put right.
         const LEAST: f64 = -40.0;
-        let better = 0.5 * (costs.as_believed - costs.other);
-        self.sum = (self.sum + costs.weight * better).max(0.0);
-        self.against = (self.against - costs.against * better).max(LEAST);
+        self.sum = (self.sum + costs.weight * costs.better()).max(0.0);
+        self.against = (self.against - costs.against * costs.better()).max(LEAST);
         self.is_excluded |= self.against >= EXCLUDED;
     }
 
@@ -132,15 +150,14 @@ impl Hypothesis {
     fn add_turn(&mut self, costs: Costs) {
         /// A gun that begins to move soon outweighs what it showed before.
         const MOST: f64 = 14.0;
-        let better = 0.5 * (costs.as_believed - costs.other);
-        self.by_turns = (self.by_turns + better).clamp(-MOST, MOST);
+        self.by_turns = (self.by_turns + costs.better()).clamp(-MOST, MOST);
         self.add(costs);
     }
 
     /// Tests whether it can be what is wrong. Late pictures show in turns as well as in the vertical, which a ship's turn tilts to and fro
     /// in a seaway as late pictures would.
     fn may_be_believed(&self) -> bool {
-        /// What turns must say for it, nats.
+        /// Evidence of turns that it needs, nats.
         const LATE_BY_TURNS: f64 = 1.0;
         !self.is_doubt && (!matches!(self.misfit, Misfit::Late(_)) || self.by_turns >= LATE_BY_TURNS)
     }
@@ -174,53 +191,6 @@ impl Hypothesis {
     }
 }
 
-/// Mean of values: of all of them at first, later of about the last `MOST`.
-#[derive(Clone, Copy, Debug, Default)]
-struct RecentMean<T, const MOST: u32> {
-    mean: T,
-    count: u32,
-}
-
-impl<T: Copy + AddAssign + Sub<Output = T> + Mul<f64, Output = T>, const MOST: u32> RecentMean<T, MOST> {
-    fn take(&mut self, value: T) {
-        self.count = (self.count + 1).min(MOST);
-        self.mean += (value - self.mean) * (1.0 / f64::from(self.count));
-    }
-
-    const fn is_full(&self) -> bool {
-        self.count >= MOST
-    }
-}
-
-/// The mean of turns, over some ten seconds.
-type MeanOff = RecentMean<DVec3, 100>;
-/// The same over some two: a ship's turn moves it by a degree in ten, late pictures move it to and fro with the waves.
-type MeanSway = RecentMean<DVec3, 20>;
-
-impl<const MOST: u32> RecentMean<DVec3, MOST> {
-    const NOTHING: Self = Self { mean: DVec3::ZERO, count: 0 };
-
-    /// Takes in a turn; what it differs from the mean before by.
-    fn take_apart(&mut self, off: DVec3) -> f64 {
-        let apart = if self.count == 0 { 0.0 } else { off.distance(self.mean) };
-        self.take(off);
-        apart
-    }
-}
-
-/// The mean, over some ten seconds, of the costs of turns by what is believed, where they are large enough to tell.
-type TurnCost = RecentMean<f64, 50>;
-
-impl TurnCost {
-    /// Three numbers cost three by chance; nine is the most that is counted. What costs more is a way to be set up wrongly that no hypothesis
-    /// has, as a unit that is turned by 30 degrees about the vertical.
-    fn is_usual(&self) -> bool {
-        const FEWEST: u32 = 10;
-        const USUAL_MOST: f64 = 5.5;
-        self.count < FEWEST || self.mean < USUAL_MOST
-    }
-}
-
 /// A horizon as it was seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct UpSight {
@@ -242,9 +212,12 @@ pub(super) struct Registration {
     was_shared: bool,
     hypotheses: Vec<Hypothesis>,
     own_sway: MeanSway,
-    /// When up was last seen.
+    /// When up was last seen, and how often since it was not for a while.
     up_seen: Option<Time>,
+    sights: u32,
     turn_cost: TurnCost,
+    /// What turns of the picture differ from those that are believed by.
+    drift: SeaDrift,
     believed: Option<Misfit>,
     unit: UnitWatch,
     checked: Option<Time>,
@@ -276,7 +249,9 @@ impl Registration {
             hypotheses: hypotheses(DMat3::from_quat(camera_from_imu)),
             own_sway: MeanSway::NOTHING,
             up_seen: None,
+            sights: 0,
             turn_cost: TurnCost::default(),
+            drift: SeaDrift::NOTHING,
             believed: None,
             unit: UnitWatch::default(),
             checked: None,
@@ -322,7 +297,7 @@ impl Registration {
         /// So often a turn is looked for: five times a second, less what stamps of pictures scatter.
         const EVERY_NS: i64 = 190_000_000;
         /// The same once each way to be set up wrongly is excluded, and until one is suspected. A change after that, as a camera that was
-        /// plugged in anew, is reported three seconds later for it.
+        /// plugged in anew, is reported three seconds later.
         const TRIED_EVERY_NS: i64 = 990_000_000;
         /// Pictures farther apart are not held against each other; a busy computer looks at few.
         const APART_NS: i64 = 400_000_000;
@@ -350,8 +325,11 @@ impl Registration {
         let span_s = time.secs_since(seen.from);
         let floor = SEA_RATE * span_s;
         let Some(own) = believed(0) else { return };
-        let cost = |believed: DVec3| turn_cost(seen.turn, believed, seen.covariance, floor);
-        let as_believed = cost(own);
+        let cost = |expected: DVec3, drift: &mut SeaDrift| {
+            let drifted = expected + drift.take_in((seen.turn - expected) / span_s) * span_s;
+            turn_cost(seen.turn, drifted, seen.covariance, floor)
+        };
+        let as_believed = cost(own, &mut self.drift);
         let stands = seen.turn.length() < 0.5 * floor;
         let is_fast = own.length() > FAST * span_s;
         if own.length() > 3.0 * floor {
@@ -359,7 +337,7 @@ impl Registration {
         }
         for hypothesis in &mut self.hypotheses {
             let Some(turn) = believed(hypothesis.late_ns) else { continue };
-            let costs = Costs::of(as_believed, cost(hypothesis.turn * turn));
+            let costs = Costs::of(as_believed, cost(hypothesis.turn * turn, &mut hypothesis.drift));
             match hypothesis.misfit {
                 // What stands in the picture, as a reticle does, does not turn at all.
                 Misfit::RateUnit if stands => {}
@@ -372,31 +350,34 @@ impl Registration {
 
     /// Holds where up was seen against where the unit alone has it; `alone` gives that of a time.
     pub fn up(&mut self, time: Time, up: &UpSight, alone: impl Fn(Time) -> Option<DVec3>) {
+        /// A horizon in view is found in most pictures; a level line of another kind, as the edge of a cloud, now and then, and may be as far
+        /// off each time. So many have to follow each other, a second's, before they count for what does not say where up is seen.
+        const SIGHTS_FEWEST: u32 = 10;
         let Some(own) = alone(time) else { return };
         let cost = |off: f64, sigma: f64| (off * off / (sigma * sigma)).min(COST_MOST);
         let off = between(own, up.seen);
         let (up_sigma, lasting) = (self.unit.up_sigma(), self.unit.lasting_up_sigma());
         let doubted = self.unit.doubted_up_sigma();
         let as_believed = cost(off.length(), up_sigma);
-        self.forget_sway(time);
-        let sway_sigma = self.unit.sway_sigma();
+        self.count_sight(time);
+        let sway_sigma = self.unit.sway_sigma(self.own_sway.mean.length());
         let sway = cost(self.own_sway.take_apart(off), sway_sigma);
         if up.is_predicted && off.length() < 3.0 * UP_SIGMA {
             self.checked = Some(time);
         }
         let is_fast = self.unit.rate() > FAST;
+        let is_steady = self.sights >= SIGHTS_FEWEST;
         for hypothesis in &mut self.hypotheses {
             match &mut hypothesis.up {
                 // The unit's own orientation is not made of the force that it sends.
                 UpExpected::At(_) if hypothesis.misfit == Misfit::Reversed(FORCE) && self.unit.has_own() => {}
                 UpExpected::At(map) => {
                     let other = cost((*map * own).angle_between(up.seen), up_sigma);
-                    // By little is as well a mount that is off, and a ship's turn, which tilts all alike while it lasts.
+                    // By little is as well a mount that is off, and a ship's turn, whose tilt is to any side for a gun that is swung.
                     let weight = match hypothesis.misfit {
                         Misfit::Lens => 1.0 / ALIKE_LONG,
                         _ if other > as_believed || off.length() > LEANS_MOST => 1.0,
-                        _ if self.unit.leans() > UP_SIGMA => 0.0,
-                        _ => 1.0 / ALIKE,
+                        _ => 0.0,
                     };
                     hypothesis.add(Costs { as_believed, other, weight, against: 1.0 / ALIKE });
                 }
@@ -408,9 +389,13 @@ impl Registration {
                 UpExpected::Off(mean) => {
                     let sigma = if hypothesis.is_doubt { doubted } else { lasting };
                     let apart = mean.take_apart(off);
+                    if !is_steady {
+                        continue;
+                    }
                     let costs = Costs::of(cost(off.length(), sigma), COST_OFF + cost(apart, sigma));
                     hypothesis.add(costs.alike(ALIKE));
                 }
+                UpExpected::Wanders if !is_steady => {}
                 UpExpected::Wanders => {
                     let costs = Costs::of(as_believed, as_believed.min(COST_WANDERS)).alike(ALIKE);
                     match hypothesis.misfit {
@@ -427,12 +412,14 @@ impl Registration {
         self.decide();
     }
 
-    /// Forgets how the unit was off up lately unless up was seen just before: a turn of the ship, or a shore in place of the horizon, moves
-    /// that meanwhile.
-    fn forget_sway(&mut self, time: Time) {
-        /// So long, seconds.
+    /// Counts up as seen. Forgets how the unit was off it lately unless it was seen just before: a turn of the ship, or a shore in place of
+    /// the horizon, moves that meanwhile.
+    fn count_sight(&mut self, time: Time) {
+        /// Time after which up was not seen just before, seconds.
         const GAP_S: f64 = 2.0;
+        self.sights = self.sights.saturating_add(1);
         if self.up_seen.replace(time).is_none_or(|last| time.secs_since(last) > GAP_S) {
+            self.sights = 1;
             self.own_sway = MeanSway::NOTHING;
             for hypothesis in &mut self.hypotheses {
                 if let UpExpected::Then(mean) = &mut hypothesis.up {

@@ -116,11 +116,8 @@ impl JournalState {
             Err(e) => return shut(options.unopened(&format!("no thread to open it: {e}")), None),
         };
         let until = Instant::now() + OPEN_WITHIN;
-        while !thread.is_finished() {
-            if Instant::now() > until {
-                return shut(options.unopened("it has not answered yet"), Some(thread));
-            }
-            thread::sleep(Duration::from_millis(1));
+        if !comes_before(until, || thread.is_finished()) {
+            return shut(options.unopened("it has not answered yet"), Some(thread));
         }
         match options.opened(thread) {
             Ok(journal) => Self::Open(journal),
@@ -435,16 +432,25 @@ fn end_recording(recorder: Recorder) -> u64 {
 
 /// The same of a recording that was closed, waiting for its disk no longer than `until`: a service that takes longer to end is killed.
 fn end_recording_until(recorder: Recorder, until: Instant) -> u64 {
-    while !recorder.has_ended() {
-        if Instant::now() > until {
-            log::error!(
-                "the disk did not take the recording's end in time; check the disk; `bowwave simulate` plays what is whole"
-            );
-            return recorder.lost();
-        }
-        thread::sleep(Duration::from_millis(2));
+    if comes_before(until, || recorder.has_ended()) {
+        return end_recording(recorder);
     }
-    end_recording(recorder)
+    let lost = recorder.lost();
+    log::error!(
+        "the disk did not take the recording's end in time: what waited for it is lost, and {lost} entries before that; check the disk; `bowwave simulate` plays what is whole"
+    );
+    lost
+}
+
+/// Waits until a thread is done, no longer than `until`; whether it is.
+fn comes_before(until: Instant, is_done: impl Fn() -> bool) -> bool {
+    while !is_done() {
+        if Instant::now() > until {
+            return false;
+        }
+        thread::sleep(Duration::from_millis(1));
+    }
+    true
 }
 
 #[cfg(test)]

@@ -90,16 +90,21 @@ impl Recorder {
                 Ok(writer.finish()?)
             })
             .context("cannot start the recorder's thread; are too many processes running?")?;
-        Ok(Self {
+        let (lossless, exact_pixels) = (options.lossless, options.exact_pixels);
+        Ok(Self { lossless, exact_pixels, ..Self::of(queue, thread) })
+    }
+
+    const fn of(queue: Sender<Vec<RecorderJob>>, thread: JoinHandle<Result<WrittenSummary>>) -> Self {
+        Self {
             queue: Some(queue),
             thread: Some(thread),
-            lossless: options.lossless,
-            exact_pixels: options.exact_pixels,
+            lossless: false,
+            exact_pixels: false,
             quality: QUALITY,
             lost: 0,
             inputs: 0,
             newest: None,
-        })
+        }
     }
 
     /// Whether pictures are coded coarsely, so that a busy computer gets time.
@@ -193,16 +198,7 @@ impl Recorder {
                 thread::park();
             }
         });
-        Self {
-            queue: Some(queue),
-            thread: Some(thread),
-            lossless: false,
-            exact_pixels: false,
-            quality: QUALITY,
-            lost: 0,
-            inputs: 0,
-            newest: None,
-        }
+        Self::of(queue, thread)
     }
 
     /// Takes nothing more: its thread writes what waits, and ends. Never waits.

@@ -139,11 +139,14 @@ impl PassCounts {
 }
 
 impl Summary {
-    /// Writes `summary.json`.
+    /// Writes `summary.json`: a new file that takes the place of a former one, so that nobody reads half of it.
     pub fn write(&self, path: &Path) -> Result<()> {
         let mut text = serde_json::to_string_pretty(self).context("cannot put the summary into JSON")?;
         text.push('\n');
-        std::fs::write(path, text).with_context(|| format!("cannot write {}; check the disk", path.display()))
+        let new = path.with_extension("json.new");
+        std::fs::write(&new, text)
+            .and_then(|()| std::fs::rename(&new, path))
+            .with_context(|| format!("cannot write {}; check the disk", path.display()))
     }
 
     /// The few lines that a person reads.

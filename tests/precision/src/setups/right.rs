@@ -205,6 +205,8 @@ impl RightSetUp {
         if let Some(force) = BeaufortForce::new(FORCES[state]) {
             recipe.beaufort = force;
         }
+        // No gun stands so low that such a sea goes over it.
+        recipe.eye_height_m = recipe.eye_height_m.max(recipe.eye_height_least_m());
         recipe.sky.sun_azimuth = rng.random::<f64>() * TAU;
         // Every third sun is low enough to stand in the picture and on the water.
         recipe.sky.sun_elevation =

@@ -156,7 +156,7 @@ fn what_is_as_believed_is_confirmed_and_nothing_is_told() {
 }
 
 #[test]
-fn each_way_to_be_wrong_is_told_within_two_seconds_by_its_name() {
+fn each_way_to_be_wrong_is_told_soon_by_its_name() {
     let diagonal = |x, y, z| DMat3::from_diagonal(DVec3::new(x, y, z));
     let turned = DMat3::from_quat(DQuat::from_rotation_z(std::f64::consts::PI));
     let quarter = DMat3::from_quat(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2));
@@ -171,7 +171,8 @@ fn each_way_to_be_wrong_is_told_within_two_seconds_by_its_name() {
     for (by_turn, by_up, misfit) in cases {
         let (first, last) = told(|from, to| by_turn * turn(from, to), |time| by_up * up(time));
         assert_eq!(last, Some(misfit));
-        assert!(first.is_some_and(|s| s <= 2.0), "{misfit:?} after {first:?} s");
+        // A unit turned about the axis that the gun is swung about shows in what is left, which the sea's drift may be for some moments.
+        assert!(first.is_some_and(|s| s <= 2.2), "{misfit:?} after {first:?} s");
     }
     // The gun is believed to turn by up to 75 deg/s.
     let in_degrees = |from, to| turn(from, to) * 1f64.to_radians();
@@ -243,8 +244,8 @@ fn hours_of_a_small_error_are_no_wrong_set_up() {
 #[test]
 fn a_ship_that_turns_is_no_wrong_set_up_and_a_mount_that_is_off_is_one() {
     // Five minutes; the ship turns at 5 deg/s for twenty seconds of each forty, to either side by turns, with 12 m/s of way: up leans by
-    // 6 deg. The gun stands.
-    let run = |turns: bool, off_deg: f64| {
+    // 6 deg. The gun stands, or is swung so far to either side in nine seconds, and its own up leans with the ship's.
+    let run = |turns: bool, off_deg: f64, swing_deg: f64| {
         let mut registration = Registration::new(DQuat::IDENTITY, None);
         let mut lean = 0.0;
         for step in 0..60_000_i64 {
@@ -258,6 +259,9 @@ fn a_ship_that_turns_is_no_wrong_set_up_and_a_mount_that_is_off_is_one() {
                 0.0
             };
             lean += (rate * 12.0 / 9.8 - lean) * 0.0005;
+            let phase = std::f64::consts::TAU / 9.0 * time.secs_since(at(0));
+            let traverse = swing_deg.to_radians() * phase.sin();
+            let rate = rate + swing_deg.to_radians() * std::f64::consts::TAU / 9.0 * phase.cos();
             let sample = ImuSample {
                 arrival: time,
                 device_time_ns: step * 5_000_000,
@@ -267,7 +271,9 @@ fn a_ship_that_turns_is_no_wrong_set_up_and_a_mount_that_is_off_is_one() {
             };
             registration.sample(time, &sample, sample.rate);
             if step % 20 == 0 {
-                let seen = DQuat::from_rotation_x(lean + off_deg.to_radians()) * DVec3::Z;
+                let ahead = DQuat::from_rotation_z(-traverse) * DVec3::X;
+                let leant = DQuat::from_axis_angle(ahead, lean) * DVec3::Z;
+                let seen = DQuat::from_rotation_x(off_deg.to_radians()) * leant;
                 let sight = UpSight { seen, predicted: DVec3::Z, is_predicted: true };
                 registration.up(time, &sight, |_| Some(DVec3::Z));
             }
@@ -277,8 +283,44 @@ fn a_ship_that_turns_is_no_wrong_set_up_and_a_mount_that_is_off_is_one() {
         }
         None
     };
-    assert_eq!(run(true, 0.0), None);
-    assert_eq!(run(false, 4.0), Some(Misfit::Mount));
+    for swing_deg in [0.0, 17.0, 28.0] {
+        assert_eq!(run(true, 0.0, swing_deg), None, "swung by {swing_deg} deg");
+    }
+    assert_eq!(run(false, 4.0, 0.0), Some(Misfit::Mount));
+}
+
+#[test]
+fn a_sea_that_drifts_by_is_no_other_lens() {
+    // A minute of a ship that turns steadily; the waves that the picture shows go by at 1 deg/s, so that it seems to turn by less.
+    let turned_by = |rate: f64| {
+        let mut registration = Registration::new(DQuat::IDENTITY, None);
+        (0..300).find_map(|fifth| {
+            let (from, now) = (at(2 * fifth), at(2 * fifth).plus_ns(100_000_000));
+            let covariance = DMat3::from_diagonal(DVec3::splat(5e-7));
+            let turn = DVec3::Y * (rate - 1f64.to_radians()) * 0.1;
+            let seen = TurnSeen { from, turn, covariance, patches: (8, 8) };
+            registration.turned(&seen, now, |_| Some(DVec3::Y * rate * 0.1));
+            registration.wrong()
+        })
+    };
+    assert_eq!(turned_by(3f64.to_radians()), None);
+    assert_eq!(turned_by(-1.5f64.to_radians()), None);
+}
+
+#[test]
+fn a_line_that_is_seen_now_and_then_is_no_horizon_of_a_mount_that_is_off() {
+    // Twelve degrees off each time, so often one picture after the other, then none for ten seconds.
+    let after = |sights: i64| {
+        let mut registration = Registration::new(DQuat::IDENTITY, None);
+        let seen = DQuat::from_rotation_x(12f64.to_radians()) * DVec3::Z;
+        (0..36_000_i64).filter(|tenths| tenths % 100 < sights).find_map(|tenths| {
+            let sight = UpSight { seen, predicted: DVec3::Z, is_predicted: false };
+            registration.up(at(tenths), &sight, |_| Some(DVec3::Z));
+            registration.wrong()
+        })
+    };
+    assert_eq!(after(5), None);
+    assert_eq!(after(40), Some(Misfit::Mount));
 }
 
 /// Pictures of a camera in which a turn was looked for, of those in which horizon and sky are sought in every `busy`-th.

@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::RecentMean;
+use super::means::RecentMean;
 use crate::{
     estimate::attitude::TAU_WAVES_S, event::ImuSample, geometry::rotation_vector, physics::GRAVITY_M_S2,
     time::Time,
@@ -42,8 +42,9 @@ pub(super) struct UnitWatch {
     /// The same mean with the turns of a gun on its mount, which cancel out over some of its swings, rad/s.
     swung: f64,
     known_s: f64,
-    /// The fastest mean turn of late, rad/s, and the same of a turn that was steady.
+    /// The fastest mean turn of late, rad/s, that of the gun on its mount included, and the same of a turn that was steady.
     fastest: f64,
+    fastest_swung: f64,
     steadiest: f64,
 }
 
@@ -121,6 +122,7 @@ impl UnitWatch {
         // A tilt outlasts its turn, and one to the other side goes through none.
         let kept = 1.0 - step_s / (2.0 * LEANS_S);
         self.fastest = now.max(self.fastest * kept);
+        self.fastest_swung = self.swung.abs().max(self.fastest_swung * kept);
         self.steadiest = (now * steady).max(self.steadiest * kept);
     }
 
@@ -131,7 +133,10 @@ impl UnitWatch {
 
     /// Error of the unit's up, standard deviation, radians.
     pub(super) fn up_sigma(&self) -> f64 {
-        UP_SIGMA.hypot(self.leans()).hypot(BEGUN_SIGMA * (-self.known_s / LEANS_S).exp())
+        let turning = self.fastest.max(self.fastest_swung);
+        UP_SIGMA
+            .hypot(SHIP_SPEED_M_S * turning / GRAVITY_M_S2)
+            .hypot(BEGUN_SIGMA * (-self.known_s / LEANS_S).exp())
     }
 
     /// The same as a mount that is off is held against it: how the unit began passes. A tilt by the ship's turn is as the mean turn is, and
@@ -146,10 +151,11 @@ impl UnitWatch {
         UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest / GRAVITY_M_S2)
     }
 
-    /// Deviation of how up, found alone, sways about its mean of the last two seconds: the tilt by a ship's turn grows meanwhile.
-    pub(super) fn sway_sigma(&self) -> f64 {
+    /// Deviation of how up, found alone, sways about its mean of the last two seconds, which is off by `off`, radians: the tilt by a ship's
+    /// turn grows meanwhile, and stays where it is in the world while a gun is swung.
+    pub(super) fn sway_sigma(&self, off: f64) -> f64 {
         /// From the middle of these seconds.
         const SINCE_S: f64 = 1.0;
-        SWAY_SIGMA.hypot(self.leans() * SINCE_S / LEANS_S)
+        SWAY_SIGMA.hypot(self.leans() * SINCE_S / LEANS_S).hypot(off * self.rate() * SINCE_S)
     }
 }
