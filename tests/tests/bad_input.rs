@@ -263,6 +263,55 @@ fn hits_without_a_journal_says_where_it_looked() {
     one_line_with(&said(&output), &["hits.sqlite"]);
 }
 
+#[test]
+fn hits_names_files_of_rounds_that_the_journal_does_not_have() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("out");
+    play(small_recording(), &out, 0, &["--frames", "20"]);
+    file(&out, "hits.sqlite.unwritten-7.jsonl", b"{}\n");
+    let output = bowwave(["hits", out.to_str().expect("a plain path")]);
+    expect_code(&output, 0);
+    let said = said(&output);
+    assert!(said.contains("hits.sqlite.unwritten-7.jsonl has rounds that the journal does not"), "{said}");
+}
+
+/// Nobody ever writes into the pipe: a command that opened it to read would wait for ever.
+#[test]
+fn a_named_pipe_in_the_place_of_a_file_holds_no_command_up() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_str().expect("a plain path").to_owned();
+    for name in ["p.mcap", "p.toml", "p.sqlite", "p.mp4", "p.yaml", "p.glb"] {
+        assert!(Command::new("mkfifo").arg(path(name)).status().expect("mkfifo").success());
+    }
+    let boat = b"[[boat]]\nname = \"a\"\nmodel = \"p.glb\"\ncourse = \"still\"\nbearing_deg = 0\nrange_m = 200\nheading_deg = 90\n";
+    let boat = file(folder.path(), "boat.toml", boat);
+    let recording = small_recording().to_str().expect("a plain path");
+    let [mcap, toml, sqlite, mp4, yaml] = ["p.mcap", "p.toml", "p.sqlite", "p.mp4", "p.yaml"].map(path);
+    let (out, made) = (path("out"), path("made.mcap"));
+    let commands: [&[&str]; 14] = [
+        &["simulate", &mcap, "--out", &out],
+        &["simulate", recording, "--scenario", &toml, "--out", &out],
+        &["simulate", recording, "--calibration", &toml, "--out", &out],
+        &["replay", &mcap],
+        &["hits", &sqlite],
+        &["plan", &toml],
+        &["plan", &boat],
+        &["calibrate", "check", &mcap],
+        &["calibrate", "check", recording, "--calibration", &toml],
+        &["calibrate", "extrinsics", &mcap],
+        &["calibrate", "intrinsics", &mcap],
+        &["calibrate", "board", "--target", &yaml],
+        &["import", &mp4, "--out", &made],
+        &["doctor", "--config", &toml],
+    ];
+    for command in commands {
+        let output = Command::new("timeout").arg("30").arg(bowwave_tests::program()).args(command).output();
+        let output = output.expect("timeout runs");
+        let code = output.status.code();
+        assert!(matches!(code, Some(1 | 2)), "{command:?}: {code:?}, {}", said(&output));
+    }
+}
+
 /// A file system of a given size; `None`, said so, where this user may not mount one.
 struct SmallVolume(tempfile::TempDir);
 

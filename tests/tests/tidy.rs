@@ -116,6 +116,24 @@ fn unsafe_code_stays_in_devices_and_render() {
 }
 
 #[test]
+fn each_crate_but_those_that_speak_to_drivers_forbids_unsafe_code() {
+    let roots = tracked("*/src/lib.rs").into_iter().chain(tracked("*/src/main.rs"));
+    let (mut seen, mut open) = (0, Vec::new());
+    for path in roots {
+        let folder = path.strip_prefix(root()).expect("under root").to_owned();
+        let free = ["daemon/devices", "daemon/render", "tests/hil/gpu-fault-layer", "tests/fuzz"];
+        seen += 1;
+        if !free.iter().any(|crate_of| folder.starts_with(crate_of))
+            && !fs::read_to_string(&path).expect("a source").contains("#![forbid(unsafe_code)]")
+        {
+            open.push(folder);
+        }
+    }
+    assert!(seen > 15, "only {seen} crates");
+    assert!(open.is_empty(), "these do not forbid unsafe code: {open:?}");
+}
+
+#[test]
 fn the_core_has_no_io_no_clock_and_no_threads() {
     let words =
         ["std::fs", "std::net", "std::thread", "Instant::now", "SystemTime::now", "std::process", "println!"];

@@ -1,5 +1,7 @@
 //! The trainer's program.
 
+#![forbid(unsafe_code)]
+
 fn main() -> std::process::ExitCode {
     bowwave::main()
 }

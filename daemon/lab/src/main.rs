@@ -1,5 +1,7 @@
 //! The laboratory's program.
 
+#![forbid(unsafe_code)]
+
 fn main() -> std::process::ExitCode {
     bowwave_lab::main()
 }

@@ -174,3 +174,14 @@ fn made_on() -> Date {
     let (year, month, day) = REVISED_ON;
     Date::new(year, month, day).expect("a day")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_made_calibration_is_of_the_day_of_its_maker() {
+        let made = calibration(&Recipe::default()).made.to_string();
+        assert!(made.as_str() >= "2026-11-26", "{made}");
+    }
+}

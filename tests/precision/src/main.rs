@@ -1,5 +1,7 @@
 //! Error against run time of every numerical part, and the studies behind single parts.
 
+#![forbid(unsafe_code)]
+
 use std::{path::PathBuf, process::ExitCode};
 
 use anyhow::{Context, Result, bail};

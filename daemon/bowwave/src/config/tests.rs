@@ -41,6 +41,10 @@ fn every_key_that_the_installed_file_shows_is_valid() {
     assert!(
         config.gpio.trigger.is_some() && config.gpio.lamps.is_some() && config.heading.presses.len() == 2
     );
+    // An open wire of either contact that it shows reads as not inert.
+    let interlock = config.gpio.interlock.expect("an interlock");
+    assert!(interlock.second.is_some());
+    assert_eq!(interlock.check().map_err(|e| e.to_string()), Ok(()));
 }
 
 #[test]

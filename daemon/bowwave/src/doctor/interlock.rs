@@ -28,11 +28,23 @@ pub(super) fn checks(arguments: &DoctorInterlock) -> Result<Vec<Check>> {
     let within = Duration::from_secs(u64::from(arguments.seconds));
     let names: Vec<String> =
         wiring.contacts().map(|contact| format!("{} line {}", contact.chip, contact.line)).collect();
+    checks.extend(proof(&names, |ask, active| {
+        eprintln!("{ask}");
+        await_levels(&probe, active, within)
+    })?);
+    Ok(checks)
+}
+
+/// Asks for the plug to be fitted, pulled and fitted again; `levels` are the contacts' after that. Ends at the first that does not follow.
+fn proof(
+    names: &[String],
+    mut levels: impl FnMut(&'static str, bool) -> Result<Vec<bool>>,
+) -> Result<Vec<Check>> {
+    let mut checks = Vec::new();
     for (ask, active) in
         [("Fit the inert plug.", true), ("Pull the inert plug.", false), ("Fit the inert plug again.", true)]
     {
-        eprintln!("{ask}");
-        let found = await_levels(&probe, active, within)?;
+        let found = levels(ask, active)?;
         let passed = found.iter().all(|level| *level == active);
         checks.extend(names.iter().zip(found).map(|(name, level)| followed(name, active, level)));
         if !passed {
@@ -95,5 +107,34 @@ fn await_levels(probe: &InterlockProbe, active: bool, within: Duration) -> Resul
             return Ok(levels);
         }
         sleep_until(at.plus_secs(LOOK_S));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Verdicts of two contacts, of which the second reads as `second` says after each request.
+    fn verdicts(second: [bool; 3]) -> (Vec<Verdict>, Vec<bool>) {
+        let names = ["a", "b"].map(str::to_owned);
+        let (mut asked, mut second) = (Vec::new(), second.into_iter());
+        let checks = proof(&names, |_, active| {
+            asked.push(active);
+            Ok(vec![active, second.next().unwrap()])
+        });
+        (checks.unwrap().iter().map(|check| check.verdict).collect(), asked)
+    }
+
+    #[test]
+    fn contacts_that_follow_the_plug_pass_and_the_first_that_does_not_ends_the_test() {
+        use Verdict::{Failed, Ok};
+        assert_eq!(verdicts([true, false, true]), (vec![Ok; 6], vec![true, false, true]));
+        // A broken wire, a shorted one, and one that came loose when the plug was pulled.
+        assert_eq!(verdicts([false; 3]), (vec![Ok, Failed], vec![true]));
+        assert_eq!(verdicts([true; 3]), (vec![Ok, Ok, Ok, Failed], vec![true, false]));
+        assert_eq!(
+            verdicts([true, false, false]),
+            (vec![Ok, Ok, Ok, Ok, Ok, Failed], vec![true, false, true])
+        );
     }
 }

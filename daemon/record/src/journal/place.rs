@@ -62,20 +62,48 @@ impl AboutToOpen {
 /// The folder of a journal, held against other programs that would write one there, for as long as this lives.
 #[derive(Debug)]
 pub(super) struct FolderHold {
-    _folder: Option<File>,
+    folder: Option<File>,
+}
+
+impl Drop for FolderHold {
+    /// A program that is started just then has the open folder until it runs, and would hold it for as long.
+    fn drop(&mut self) {
+        if let Some(folder) = &self.folder
+            && let Err(error) = flock(folder, FlockOperation::Unlock)
+        {
+            log::debug!("the folder of a journal cannot be unlocked: {error}");
+        }
+    }
 }
 
 impl FolderHold {
     /// Holds the folder of `path`. A file system without such locks is used without; one that cannot be opened will be told by the database.
     pub(super) fn take(path: &Path) -> Result<Self, JournalError> {
-        let Ok(folder) = File::open(folder_of(path)) else { return Ok(Self { _folder: None }) };
+        let Ok(folder) = File::open(folder_of(path)) else { return Ok(Self { folder: None }) };
         match flock(&folder, FlockOperation::NonBlockingLockExclusive) {
-            Ok(()) => Ok(Self { _folder: Some(folder) }),
+            Ok(()) => Ok(Self { folder: Some(folder) }),
             Err(Errno::WOULDBLOCK) => Err(JournalError::InUse { path: path.into() }),
             Err(error) => {
                 log::debug!("the folder of the journal {} cannot be locked: {error}", path.display());
-                Ok(Self { _folder: None })
+                Ok(Self { folder: None })
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_free_once_its_hold_ends_even_if_a_child_has_it_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("hits.db");
+        let hold = FolderHold::take(&path).unwrap();
+        let in_child = hold.folder.as_ref().unwrap().try_clone().unwrap();
+        assert!(matches!(FolderHold::take(&path), Err(JournalError::InUse { .. })));
+        drop(hold);
+        FolderHold::take(&path).unwrap();
+        drop(in_child);
     }
 }

@@ -205,21 +205,26 @@ impl Storage {
         }
     }
 
-    /// Takes in rounds that ended.
+    /// Takes in rounds that ended. Those that find no place are in the log, which may be on another disk.
     pub fn rounds(&mut self, records: &[ShotRecord]) {
-        let room = ROUNDS_WAITING_MAX.saturating_sub(self.waiting.len());
-        let (kept, rest) = records.split_at(room.min(records.len()));
-        self.waiting.extend(kept.iter().cloned());
+        let rest = self.keep(records);
         if !rest.is_empty() {
             log::error!(
                 "{} rounds cannot be kept: the journal takes none and memory for them is full",
                 rest.len()
             );
         }
-        // The log may be on another disk.
-        for record in rest {
-            log::error!("not in the journal: {}", StoredShot { run: 0, record: record.clone() }.to_json());
+        for line in rest.iter().map(line_for_log) {
+            log::error!("{line}");
         }
+    }
+
+    /// Keeps rounds for the journal; the rest that finds no place.
+    fn keep<'a>(&mut self, records: &'a [ShotRecord]) -> &'a [ShotRecord] {
+        let room = ROUNDS_WAITING_MAX.saturating_sub(self.waiting.len());
+        let (kept, rest) = records.split_at(room.min(records.len()));
+        self.waiting.extend(kept.iter().cloned());
+        rest
     }
 
     /// The wall clock is known to be set.
@@ -397,6 +402,11 @@ impl Storage {
     }
 }
 
+/// A round that is in no journal, for the log.
+fn line_for_log(record: &ShotRecord) -> String {
+    format!("not in the journal: {}", StoredShot { run: 0, record: record.clone() }.to_json())
+}
+
 /// Hands what waits to the journal and ends it.
 fn write_out(journal: Journal, waiting: &mut VecDeque<ShotRecord>, options: &StorageOptions) -> Result<()> {
     let commits = journal.commits().clone();
@@ -519,6 +529,18 @@ mod tests {
         assert_eq!(storage.finish().1.len(), 0);
         let stored = read_shots(&folder.join(JOURNAL), &ShotFilter::default()).unwrap();
         assert_eq!(stored.iter().map(|s| s.record.shot).collect::<Vec<_>>(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn rounds_beyond_what_memory_holds_are_lines_of_the_log() {
+        let base = tempfile::tempdir().unwrap();
+        let mut storage = Storage::open(options(&base.path().join("absent")), &mut Vec::new()).unwrap();
+        storage.waiting = (1..ROUNDS_WAITING_MAX as u64).map(round).collect();
+        let last = [7, 8, 9].map(round);
+        let rest = storage.keep(&last);
+        assert_eq!((storage.waiting.len(), rest), (ROUNDS_WAITING_MAX, &last[1..]));
+        assert!(line_for_log(&rest[0]).contains("\"shot\":8"), "{}", line_for_log(&rest[0]));
+        storage.waiting.clear();
     }
 
     #[test]

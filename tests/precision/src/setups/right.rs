@@ -1,6 +1,6 @@
 //! Hours of trainers that are set up rightly, in seas, airs, light and motions of many kinds, with coasts, passing ships and drops on the lens:
-//! how often one says that it is set up wrongly, and how long it is READY. Sessions below number 208 were looked at while the weight of a ship's
-//! turn was chosen (decision 0058); those from 208 on only judge.
+//! how often one says that it is set up wrongly, and how long it is READY. Sessions below number 403 were looked at while the weights
+//! of a ship's turn and of the sea's drift were chosen (decision 0058); those from 403 on only judge.
 
 use std::{f64::consts::TAU, path::Path};
 
