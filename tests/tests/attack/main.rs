@@ -1,5 +1,5 @@
-//! The whole program on hostile files of each kind that it reads: each run ends by itself within ten seconds and 512 MB, with an exit code
-//! of its own and no panic, and prints no control character and no line that the file made up.
+//! The whole program on hostile files of each kind that it reads: each run ends by itself within ten seconds of processor time and 512 MB,
+//! with an exit code of its own and no panic, and prints no control character and no line that the file made up.
 //!
 //! Files are made of good ones by damage of many kinds. `BOWWAVE_MUTATIONS` says how many of each kind (12 by default), `BOWWAVE_MUTATIONS_FROM`
 //! the number of the first, `BOWWAVE_MUTATIONS_OF` the only kind; what breaks the program is kept in target/attack.

@@ -67,13 +67,13 @@ struct Hypothesis {
     is_doubt: bool,
     /// Logarithm of its likelihood over that of what is believed, lately, nats (CUSUM).
     sum: f64,
-    /// What turns of the picture differ from those that it foretells by.
-    drift: SeaDrift,
     /// The same by turns of the picture alone, either way, nats; bounded.
     by_turns: f64,
     /// The reverse since the start, nats (sequential test).
     against: f64,
     is_excluded: bool,
+    /// Drift of the sea that turns of the picture show if it is right.
+    drift: SeaDrift,
 }
 
 /// A belief ends where all sums are below this again, and nothing is confirmed before.
@@ -106,7 +106,7 @@ impl Costs {
         Self { as_believed, other, weight: 1.0, against: 1.0 }
     }
 
-    /// How much better the hypothesis foretells it than what is believed, nats.
+    /// Logarithm of the hypothesis's likelihood over that of what is believed, nats.
     const fn better(self) -> f64 {
         0.5 * (self.as_believed - self.other)
     }
@@ -120,7 +120,6 @@ impl Costs {
 impl Hypothesis {
     const fn of(misfit: Misfit, turn: DMat3, up: UpExpected) -> Self {
         let (sum, by_turns, against) = (0.0, 0.0, 0.0);
-        let drift = SeaDrift::NOTHING;
         Self {
             misfit,
             turn,
@@ -128,10 +127,10 @@ impl Hypothesis {
             late_ns: 0,
             is_doubt: false,
             sum,
-            drift,
             by_turns,
             against,
             is_excluded: false,
+            drift: SeaDrift::NOTHING,
         }
     }
 
@@ -216,7 +215,7 @@ pub(super) struct Registration {
     up_seen: Option<Time>,
     sights: u32,
     turn_cost: TurnCost,
-    /// What turns of the picture differ from those that are believed by.
+    /// Drift of the sea that turns of the picture show if what is believed is right.
     drift: SeaDrift,
     believed: Option<Misfit>,
     unit: UnitWatch,

@@ -196,7 +196,7 @@ impl StoredShot {
 
 impl StoredShot {
     /// The line of JSON of a round that stands beside the database or in the log.
-    pub(super) fn line(run: i64, record: ShotRecord) -> String {
+    pub fn line(run: i64, record: ShotRecord) -> String {
         Self { run, record }.to_json().to_string()
     }
 

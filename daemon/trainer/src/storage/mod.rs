@@ -214,8 +214,8 @@ impl Storage {
                 rest.len()
             );
         }
-        for line in rest.iter().map(line_for_log) {
-            log::error!("{line}");
+        for record in rest {
+            log::error!("not in the journal: {}", StoredShot::line(0, record.clone()));
         }
     }
 
@@ -402,11 +402,6 @@ impl Storage {
     }
 }
 
-/// A round that is in no journal, for the log.
-fn line_for_log(record: &ShotRecord) -> String {
-    format!("not in the journal: {}", StoredShot { run: 0, record: record.clone() }.to_json())
-}
-
 /// Hands what waits to the journal and ends it.
 fn write_out(journal: Journal, waiting: &mut VecDeque<ShotRecord>, options: &StorageOptions) -> Result<()> {
     let commits = journal.commits().clone();
@@ -539,7 +534,8 @@ mod tests {
         let last = [7, 8, 9].map(round);
         let rest = storage.keep(&last);
         assert_eq!((storage.waiting.len(), rest), (ROUNDS_WAITING_MAX, &last[1..]));
-        assert!(line_for_log(&rest[0]).contains("\"shot\":8"), "{}", line_for_log(&rest[0]));
+        let line = StoredShot::line(0, rest[0].clone());
+        assert!(line.contains("\"shot\":8"), "{line}");
         storage.waiting.clear();
     }
 

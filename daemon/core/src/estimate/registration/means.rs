@@ -4,7 +4,8 @@ use std::ops::{AddAssign, Mul, Sub};
 
 use glam::DVec3;
 
-/// How the sea and what swims on it move by themselves in the picture, rad/s: waves go by at 10 m/s some hundred metres off.
+/// Deviation of the rate at which the sea and what swims on it move by themselves in the picture, rad/s: waves go by at 10 m/s some hundred
+/// metres off.
 pub(super) const SEA_RATE: f64 = 1.0 * std::f64::consts::PI / 180.0;
 
 /// Mean of values: of all of them at first, later of about the last `MOST`.
@@ -41,12 +42,12 @@ impl<const MOST: u32> RecentMean<DVec3, MOST> {
     }
 }
 
-/// What turns of the picture, rad/s, differ from expected ones by, over some ten seconds: waves go by the same way for as long as a ship holds
-/// its course, or turns.
+/// Mean difference of turns of the picture from expected ones over some ten seconds, rad/s: waves go by the same way for as long as a ship
+/// holds its course, or turns.
 pub(super) type SeaDrift = RecentMean<DVec3, 50>;
 
 impl SeaDrift {
-    /// Takes in what a turn differs by; what the sea adds to it by those before.
+    /// Takes in a turn's difference; the sea's drift in it by those before.
     pub(super) fn take_in(&mut self, off: DVec3) -> DVec3 {
         /// Deviations of the sea's movement that it may be.
         const MOST: f64 = 1.5;

@@ -172,7 +172,8 @@ fn each_way_to_be_wrong_is_told_soon_by_its_name() {
         let (first, last) = told(|from, to| by_turn * turn(from, to), |time| by_up * up(time));
         assert_eq!(last, Some(misfit));
         // A unit turned about the axis that the gun is swung about shows in what is left, which the sea's drift may be for some moments.
-        assert!(first.is_some_and(|s| s <= 2.2), "{misfit:?} after {first:?} s");
+        let limit_s = if misfit == Misfit::Turned(90) { 2.2 } else { 2.0 };
+        assert!(first.is_some_and(|s| s <= limit_s), "{misfit:?} after {first:?} s");
     }
     // The gun is believed to turn by up to 75 deg/s.
     let in_degrees = |from, to| turn(from, to) * 1f64.to_radians();

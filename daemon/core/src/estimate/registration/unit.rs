@@ -127,28 +127,27 @@ impl UnitWatch {
     }
 
     /// Tilt of the unit's up by a turn of the ship, standard deviation, radians.
-    pub(super) fn leans(&self) -> f64 {
-        SHIP_SPEED_M_S * self.fastest / GRAVITY_M_S2
+    fn leans(&self) -> f64 {
+        tilt(self.fastest)
     }
 
     /// Error of the unit's up, standard deviation, radians.
     pub(super) fn up_sigma(&self) -> f64 {
-        let turning = self.fastest.max(self.fastest_swung);
         UP_SIGMA
-            .hypot(SHIP_SPEED_M_S * turning / GRAVITY_M_S2)
+            .hypot(tilt(self.fastest.max(self.fastest_swung)))
             .hypot(BEGUN_SIGMA * (-self.known_s / LEANS_S).exp())
     }
 
     /// The same as a mount that is off is held against it: how the unit began passes. A tilt by the ship's turn is as the mean turn is, and
     /// what a gun's swing adds to that is of either sign.
     pub(super) fn lasting_up_sigma(&self) -> f64 {
-        UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest.max(self.swung.abs()) / GRAVITY_M_S2)
+        UP_SIGMA.hypot(tilt(self.steadiest.max(self.swung.abs())))
     }
 
     /// Deviation of the unit's up without the turns of a gun on its mount, radians: too small for a gun that is swung while the ship turns. A
     /// mount that is off by it alone blocks READY and is not reported.
     pub(super) fn doubted_up_sigma(&self) -> f64 {
-        UP_SIGMA.hypot(SHIP_SPEED_M_S * self.steadiest / GRAVITY_M_S2)
+        UP_SIGMA.hypot(tilt(self.steadiest))
     }
 
     /// Deviation of how up, found alone, sways about its mean of the last two seconds, which is off by `off`, radians: the tilt by a ship's
@@ -158,4 +157,9 @@ impl UnitWatch {
         const SINCE_S: f64 = 1.0;
         SWAY_SIGMA.hypot(self.leans() * SINCE_S / LEANS_S).hypot(off * self.rate() * SINCE_S)
     }
+}
+
+/// Tilt of the specific force by a ship's turn at `rate`, rad/s, standard deviation, radians.
+fn tilt(rate: f64) -> f64 {
+    SHIP_SPEED_M_S * rate / GRAVITY_M_S2
 }
