@@ -127,7 +127,7 @@ pub fn add_moving_boat(
             let side = |h: f64| DVec2::new(-h.cos(), h.sin()) * (speed_m_s / turn_rate);
             side(heading_then) - side(heading)
         };
-        CourseState { position: position + went, heading: heading_then, speed_m_s, turn_rate }
+        CourseState { position: position + went, heading: heading_then, speed_m_s, sway_m_s: 0.0, turn_rate }
     };
     let hull = Hull::of(&models[model]);
     let wake = Wake::of(hull, f64::from(-models[model].min.z), now, state, |_| 0.0);

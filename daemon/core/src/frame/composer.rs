@@ -279,6 +279,7 @@ impl Composer {
             position: pose.position.truncate(),
             heading: std::f64::consts::FRAC_PI_2,
             speed_m_s: 5.0,
+            sway_m_s: 0.0,
             turn_rate: 0.0,
         };
         let wake = || {

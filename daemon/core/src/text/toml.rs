@@ -225,15 +225,7 @@ impl<'a> TomlText<'a> {
         tables: Vec<Spanned<T>>,
         max: usize,
     ) -> Result<Vec<(TomlSection<'a>, T)>, TomlError> {
-        if let Some(beyond) = tables.get(max) {
-            let problem = format!("at most {max} tables are allowed: [[{name}]]");
-            return Err(self.at(beyond.span().start).of_key(name).error(problem));
-        }
-        let section = |(i, table): (usize, Spanned<T>)| {
-            let (path, start) = (format!("{name}[{}]", i + 1), table.span().start);
-            (TomlSection { text: self, path, start }, table.into_inner())
-        };
-        Ok(tables.into_iter().enumerate().map(section).collect())
+        self.root().sections(name, tables, max)
     }
 
     /// The place of a byte.
@@ -337,7 +329,7 @@ pub struct TomlSection<'a> {
     start: usize,
 }
 
-impl TomlSection<'_> {
+impl<'a> TomlSection<'a> {
     /// The value of a key that has to be there.
     ///
     /// # Errors
@@ -354,6 +346,28 @@ impl TomlSection<'_> {
         }
     }
 
+    /// The tables of a list in this one, `name`.
+    ///
+    /// # Errors
+    /// Where there are more than `max`.
+    pub fn sections<T>(
+        &self,
+        name: &str,
+        tables: Vec<Spanned<T>>,
+        max: usize,
+    ) -> Result<Vec<(TomlSection<'a>, T)>, TomlError> {
+        let (text, own) = (self.text, self.path_of(name));
+        if let Some(beyond) = tables.get(max) {
+            let problem = format!("at most {max} tables are allowed: [[{name}]]");
+            return Err(text.at(beyond.span().start).of_key(own).error(problem));
+        }
+        let section = |(i, table): (usize, Spanned<T>)| {
+            let (path, start) = (format!("{own}[{}]", i + 1), table.span().start);
+            (TomlSection { text, path, start }, table.into_inner())
+        };
+        Ok(tables.into_iter().enumerate().map(section).collect())
+    }
+
     /// The error that a key is left out.
     pub fn missing(&self, key: &str, allowed: &str) -> TomlError {
         self.error(key, format!("is missing; give {allowed}"))
@@ -366,8 +380,11 @@ impl TomlSection<'_> {
 
     /// Place of the table, under the name of a key.
     pub fn place(&self, key: &str) -> TomlPlace {
-        let path = if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) };
-        self.text.at(self.start).of_key(path)
+        self.text.at(self.start).of_key(self.path_of(key))
+    }
+
+    fn path_of(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }
 }
 

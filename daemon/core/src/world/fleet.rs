@@ -9,7 +9,11 @@ use crate::{
     model::{Model, ModelId, Zone},
     time::Time,
     world::{
-        boats::{Behaviour, BoatHistory, Floating, Hull, HullForm},
+        boats::{
+            Behaviour, BoatHistory, CourseState, Floating, Hull, HullForm, Signals, StepView, Traffic,
+            step_after, step_seconds,
+        },
+        contact,
         scenario::Side,
         waves::WaveField,
     },
@@ -51,6 +55,47 @@ struct FleetBoat {
     history: BoatHistory,
 }
 
+impl FleetBoat {
+    fn traffic(&self, time_s: f64) -> Traffic {
+        let state = self.history.state(time_s);
+        let CourseState { position, heading, .. } = state;
+        Traffic {
+            position,
+            velocity: state.velocity(),
+            heading,
+            radius_m: 0.5 * self.history.hull().length_m,
+        }
+    }
+
+    fn capsule(&self, time_s: f64) -> contact::Capsule {
+        let state = self.history.state(time_s);
+        contact::Capsule::of(self.history.hull(), &state)
+    }
+}
+
+/// A boat of one's own side this close is a neighbour, metres.
+const NEIGHBOUR_M: f64 = 300.0;
+/// The own ship as other vessels keep clear of her: the gun stands within so many metres of her side.
+const OWN_SHIP: Traffic =
+    Traffic { position: DVec2::ZERO, velocity: DVec2::ZERO, heading: 0.0, radius_m: OWN_RADIUS_M };
+/// Her hull, as far as boats are held off it.
+const OWN_HULL: contact::Capsule = contact::Capsule::round(OWN_RADIUS_M);
+/// Radius about the gun that the own ship takes up, metres.
+const OWN_RADIUS_M: f64 = 12.0;
+
+/// Whether a large vessel hides the gun from a boat at `at`.
+fn hides(vessel: &Traffic, at: DVec2) -> bool {
+    /// Shorter vessels are looked over.
+    const LOW_M: f64 = 8.0;
+    let range2 = at.length_squared();
+    if vessel.radius_m < LOW_M || vessel.position == DVec2::ZERO || range2 < 1.0 {
+        return false;
+    }
+    let along = vessel.position.dot(at) / range2;
+    let off = (vessel.position - at * along).length();
+    (0.0..1.0).contains(&along) && off < 0.6 * vessel.radius_m
+}
+
 /// All boats.
 #[derive(Clone, Debug)]
 pub struct Fleet {
@@ -59,6 +104,8 @@ pub struct Fleet {
     waves: WaveField,
     start: Time,
     followed: Time,
+    /// Boats that were struck, with the seconds since the start.
+    struck: Vec<(usize, f64)>,
 }
 
 impl Fleet {
@@ -72,15 +119,85 @@ impl Fleet {
             FleetBoat { name: vessel.name, side: vessel.side, model: vessel.model, history }
         };
         let boats = vessels.into_iter().map(boat).collect();
-        Self { boats, models, waves, start, followed: start }
+        Self { boats, models, waves, start, followed: start, struck: Vec::new() }
     }
 
     /// Follows all boats up to `time`.
     pub fn follow(&mut self, time: Time) {
         self.followed = self.followed.max(time);
         let until_s = self.followed.secs_since(self.start);
-        for boat in &mut self.boats {
+        // A scripted boat knows nothing of others and can go ahead.
+        for boat in self.boats.iter_mut().filter(|b| !b.history.is_crewed()) {
             boat.history.follow(until_s, &self.waves);
+        }
+        if self.boats.iter().any(|b| b.history.is_crewed()) {
+            self.step_crews(until_s);
+            for boat in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
+                boat.history.follow(until_s, &self.waves);
+            }
+        }
+    }
+
+    /// Steps all crewed boats together, so that each sees the others as they are.
+    fn step_crews(&mut self, until_s: f64) {
+        let last = step_after(until_s);
+        let newest = |b: &FleetBoat| b.history.is_crewed().then(|| b.history.newest());
+        let Some(first) = self.boats.iter().filter_map(newest).min() else { return };
+        let mut traffic = Vec::with_capacity(self.boats.len() + 1);
+        for number in first..last {
+            let time_s = step_seconds(number);
+            traffic.clear();
+            traffic.extend(self.boats.iter().map(|b| b.traffic(time_s)));
+            let own_ship = OWN_SHIP;
+            for i in 0..self.boats.len() {
+                if !self.boats[i].history.is_crewed() {
+                    continue;
+                }
+                // The boat's own place among the others is taken by the own ship.
+                let me = std::mem::replace(&mut traffic[i], own_ship);
+                let signals = self.signals(i, time_s, &traffic);
+                let view = StepView { others: &traffic, own_ship, signals, waves: &self.waves };
+                self.boats[i].history.step(&view);
+                traffic[i] = me;
+            }
+            self.keep_apart(step_seconds(number + 1));
+        }
+    }
+
+    fn signals(&self, boat: usize, time_s: f64, traffic: &[Traffic]) -> Signals {
+        let Some(me) = self.boats.get(boat) else { return Signals::default() };
+        let at = me.history.state(time_s).position;
+        let near = |&&(other, since_s): &&(usize, f64)| {
+            let alike = self.boats.get(other).is_some_and(|b| b.side == me.side);
+            let close = traffic.get(other).is_some_and(|t| t.position.distance(at) < NEIGHBOUR_M);
+            other != boat && since_s <= time_s && alike && close
+        };
+        let hidden = traffic.iter().enumerate().any(|(other, t)| other != boat && hides(t, at));
+        Signals {
+            hit: me.history.first_hit_s().is_some_and(|s| s <= time_s),
+            neighbour_hit: self.struck.iter().find(near).is_some(),
+            sees_gun: !hidden,
+            ..Signals::default()
+        }
+    }
+
+    /// No crewed boat passes through another vessel: where hulls would touch, it is held off.
+    fn keep_apart(&mut self, time_s: f64) {
+        let hulls: Vec<contact::Capsule> = self.boats.iter().map(|b| b.capsule(time_s)).collect();
+        for i in 0..self.boats.len() {
+            if !self.boats[i].history.is_crewed() {
+                continue;
+            }
+            for (j, other) in hulls.iter().enumerate().filter(|(j, _)| *j != i) {
+                let shared = self.boats[j].history.is_crewed();
+                if let Some(touch) = hulls[i].touches(other) {
+                    let part = if shared { 0.5 } else { 1.0 };
+                    self.boats[i].history.push(touch.push * part, touch.stop * part);
+                }
+            }
+            if let Some(touch) = hulls[i].touches(&OWN_HULL) {
+                self.boats[i].history.push(touch.push, touch.stop);
+            }
         }
     }
 
@@ -145,12 +262,26 @@ impl Fleet {
         self.waves.plane_under(place, 0.0, length_m, beam_m, time.secs_since(self.start)).height_m
     }
 
+    /// The name of the state that a boat's crew is in at the newest step; `None` for boats without one.
+    pub fn crew_state(&self, boat: usize) -> Option<&str> {
+        self.boats.get(boat)?.history.crew_state()
+    }
+
     /// Takes in that a boat was struck. A hit on the engine stops it, one on the helm ends its attack; the first counts.
     pub fn strike(&mut self, boat: usize, zone: Zone, time: Time) {
         let seconds = time.secs_since(self.start);
-        if let Some(boat) = self.boats.get_mut(boat) {
-            boat.history.strike(zone, seconds);
+        if let Some(struck) = self.boats.get_mut(boat) {
+            struck.history.strike(zone, seconds);
+            self.struck.push((boat, seconds));
+            // What crews see of it, they see from then on.
+            for other in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
+                other.history.forget_after(seconds);
+            }
         }
         self.follow(self.followed);
     }
 }
+
+#[cfg(test)]
+#[path = "fleet_tests.rs"]
+mod tests;

@@ -3,6 +3,7 @@
 //! This stage knows nothing of what is drawn.
 
 pub mod boats;
+mod contact;
 pub mod fleet;
 pub mod gunnery;
 pub mod rounds;

@@ -230,8 +230,12 @@ impl Still {
                 boat.model
             ));
         }
-        let state =
-            CourseState { position, heading: boat.heading, speed_m_s: boat.speed_m_s, turn_rate: 0.0 };
+        let state = CourseState {
+            position,
+            heading: boat.heading,
+            speed_m_s: boat.speed_m_s,
+            ..CourseState::default()
+        };
         let mut floating = quasi_static(&state, &Hull::of(model), waves, time_s);
         if on_mean_sea {
             // The picture shows where the water is: no wave of ours lifts the boat off it.
@@ -256,6 +260,7 @@ impl Still {
             position: afloat.pose.position.truncate() + forward * (boat.speed_m_s * (t - time_s)),
             heading: boat.heading,
             speed_m_s: boat.speed_m_s,
+            sway_m_s: 0.0,
             turn_rate: 0.0,
         };
         let Hull { length_m, beam_m } = hull;

@@ -1,7 +1,7 @@
 //! The scenario: any text.
 
 use bowwave_core::world::{
-    boats::{BoatDamage, CourseState},
+    boats::{Behaviour, BoatDamage, CourseState},
     scenario::Scenario,
 };
 
@@ -48,10 +48,14 @@ fn check(scenario: &Scenario) {
         );
         let top_m_s = boat.behaviour.speed_max_m_s();
         assert!(top_m_s.is_finite() && (0.0..100.0).contains(&top_m_s), "{top_m_s} m/s: {boat:?}");
-        let hurt = BoatDamage { engine_s: Some(0.25), helm_s: Some(30.0) };
+        let hurt = BoatDamage { engine_s: Some(0.25), helm_s: Some(30.0), first_s: Some(0.25) };
         for time_s in MOMENTS_S {
             for damage in [BoatDamage::NONE, hurt] {
-                check_state(&boat.behaviour.begin(time_s, &damage), top_m_s);
+                let state = match &boat.behaviour {
+                    Behaviour::ScriptedCourse(course) => course.state(time_s, &damage),
+                    Behaviour::Crewed(start) => start.course(),
+                };
+                check_state(&state, top_m_s);
             }
         }
     }

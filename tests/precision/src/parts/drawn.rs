@@ -179,6 +179,7 @@ fn wake_edges(range_m: f64) -> Result<Vec<[DVec3; 2]>> {
         position: DVec2::new(7.0 * (t - 60.0) + 0.3 * range_m, range_m),
         heading: std::f64::consts::FRAC_PI_2,
         speed_m_s: 7.0,
+        sway_m_s: 0.0,
         turn_rate: 0.0,
     };
     let wake = Wake::of(Hull { length_m: 8.0, beam_m: 2.4 }, 0.5, 60.0, state, |_| 0.0)

@@ -30,8 +30,10 @@ pub struct CourseState {
     pub position: DVec2,
     /// Radians clockwise from north.
     pub heading: f64,
-    /// Speed over ground, m/s.
+    /// Speed over ground along the heading, m/s; negative astern.
     pub speed_m_s: f64,
+    /// Speed over ground to starboard, m/s: 0 on courses that are known beforehand.
+    pub sway_m_s: f64,
     /// Change of heading, rad/s clockwise.
     pub turn_rate: f64,
 }
@@ -51,13 +53,14 @@ impl CourseState {
                 - next.velocity() * back,
             heading: self.heading + turn * to + self.turn_rate * out - next.turn_rate * back,
             speed_m_s: self.speed_m_s * t + next.speed_m_s * s,
+            sway_m_s: self.sway_m_s * t + next.sway_m_s * s,
             turn_rate: self.turn_rate * t + next.turn_rate * s,
         }
     }
 
     /// Velocity over ground, m/s.
-    fn velocity(&self) -> DVec2 {
-        ahead(self.heading) * self.speed_m_s
+    pub fn velocity(&self) -> DVec2 {
+        ahead(self.heading) * self.speed_m_s + starboard(self.heading) * self.sway_m_s
     }
 
     /// The state `seconds` later (earlier where negative) of a boat that goes straight on.
@@ -70,11 +73,9 @@ impl CourseState {
     #[must_use]
     pub fn moved(&self, seconds: f64) -> Self {
         let half = 0.5 * self.turn_rate * seconds;
-        Self {
-            position: self.position + ahead(self.heading + half) * (self.speed_m_s * seconds),
-            heading: self.heading + 2.0 * half,
-            ..*self
-        }
+        let heading = self.heading + half;
+        let velocity = ahead(heading) * self.speed_m_s + starboard(heading) * self.sway_m_s;
+        Self { position: self.position + velocity * seconds, heading: self.heading + 2.0 * half, ..*self }
     }
 }
 
@@ -85,6 +86,8 @@ pub struct BoatDamage {
     pub engine_s: Option<f64>,
     /// The helm was hit: the boat goes straight on and slowly loses its way.
     pub helm_s: Option<f64>,
+    /// The boat was hit anywhere.
+    pub first_s: Option<f64>,
 }
 
 /// The end of an attacker's course.
@@ -294,7 +297,13 @@ impl Course {
                 } else {
                     0.0
                 };
-                CourseState { position, heading: heading + sideways.atan2(forward_m_s), speed_m_s, turn_rate }
+                CourseState {
+                    position,
+                    heading: heading + sideways.atan2(forward_m_s),
+                    speed_m_s,
+                    sway_m_s: 0.0,
+                    turn_rate,
+                }
             }
         }
     }
@@ -320,10 +329,11 @@ impl Course {
 
 impl BoatDamage {
     /// No damage.
-    pub const NONE: Self = Self { engine_s: None, helm_s: None };
+    pub const NONE: Self = Self { engine_s: None, helm_s: None, first_s: None };
 
     /// Takes in a hit at `time_s`; says whether it changes what the boat can do. The first hit of each part counts.
     pub fn add(&mut self, zone: Zone, time_s: f64) -> bool {
+        self.first_s = Some(self.first_s.map_or(time_s, |first| first.min(time_s)));
         let slot = match zone {
             Zone::Engine => &mut self.engine_s,
             Zone::Helm => &mut self.helm_s,
@@ -379,6 +389,7 @@ fn drift(at_helm: &CourseState, way_s: f64, share: f64) -> CourseState {
         position: at_helm.position + direction * wanted.min(blocked_at),
         heading: at_helm.heading,
         speed_m_s: if stopped { 0.0 } else { at_helm.speed_m_s * share },
+        sway_m_s: 0.0,
         turn_rate: 0.0,
     }
 }
@@ -402,6 +413,7 @@ fn on_path(path: &CoursePath, speed_m_s: f64, time_s: f64) -> CourseState {
         position: place.position,
         heading: place.heading,
         speed_m_s: speed,
+        sway_m_s: 0.0,
         turn_rate: place.curvature * speed,
     }
 }

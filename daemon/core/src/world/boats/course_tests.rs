@@ -44,11 +44,11 @@ fn states_are_consistent() {
 #[test]
 fn states_are_consistent_after_damage() {
     let cases = [
-        BoatDamage { engine_s: Some(20.0), helm_s: None },
-        BoatDamage { engine_s: None, helm_s: Some(20.0) },
-        BoatDamage { engine_s: Some(15.0), helm_s: Some(16.5) },
-        BoatDamage { engine_s: Some(16.5), helm_s: Some(15.0) },
-        BoatDamage { engine_s: Some(0.0), helm_s: None },
+        BoatDamage { engine_s: Some(20.0), helm_s: None, ..BoatDamage::NONE },
+        BoatDamage { engine_s: None, helm_s: Some(20.0), ..BoatDamage::NONE },
+        BoatDamage { engine_s: Some(15.0), helm_s: Some(16.5), ..BoatDamage::NONE },
+        BoatDamage { engine_s: Some(16.5), helm_s: Some(15.0), ..BoatDamage::NONE },
+        BoatDamage { engine_s: Some(0.0), helm_s: None, ..BoatDamage::NONE },
     ];
     for (name, course) in samples() {
         for damage in &cases {
@@ -63,7 +63,7 @@ fn states_are_consistent_after_damage() {
 #[test]
 fn an_engine_hit_costs_the_way_of_its_time_constant() {
     let course = Course::straight(DVec2::ZERO, 0.0, 10.0).expect("can be sailed");
-    let end = course.state(1e6, &BoatDamage { engine_s: Some(30.0), helm_s: None });
+    let end = course.state(1e6, &BoatDamage { engine_s: Some(30.0), helm_s: None, ..BoatDamage::NONE });
     assert!((end.position.y - (300.0 + 10.0 * ENGINE_LOST_S)).abs() < 1e-9, "{end:?}");
 }
 
@@ -105,7 +105,7 @@ fn a_circling_boat_keeps_its_distance_for_ever() {
 fn a_boat_without_helmsman_does_not_run_into_the_own_ship() {
     let course = Course::closing(NORTH_250, PI, 15.0, 40.0, Arrival::Stop).expect("can be sailed");
     for hit in [5.0, 10.0, 12.0, 14.0, 60.0] {
-        let damage = BoatDamage { engine_s: None, helm_s: Some(hit) };
+        let damage = BoatDamage { engine_s: None, helm_s: Some(hit), ..BoatDamage::NONE };
         for t in 0..200 {
             let at = course.state(f64::from(t), &damage).position;
             assert!(at.length() >= DRIFT_CLEAR_M - 1e-9, "hit at {hit} s: {at} at {t} s");

@@ -16,7 +16,7 @@ use crate::{
 /// Bow-up trim of a boat that planes, radians.
 const PLANING_TRIM: f64 = 4.0 * std::f64::consts::PI / 180.0;
 /// Rise of a boat that planes, by its length.
-const PLANING_RISE: f64 = 0.012;
+pub(super) const PLANING_RISE: f64 = 0.012;
 /// Froude numbers (speed by the root of g times length) between which a boat climbs onto the plane.
 const PLANING_FROUDE: (f64, f64) = (0.4, 1.1);
 /// Share of the angle of a balanced turn by which a planing boat leans inwards.
@@ -36,15 +36,27 @@ pub struct Floating {
 /// Puts a boat into the mean plane of the water under its hull: a quasi-static attitude, that of a boat without inertia. It rises and trims as it planes,
 /// and leans into its turns.
 pub fn quasi_static(state: &CourseState, hull: &Hull, waves: &WaveField, time_s: f64) -> Floating {
-    let water = waves.plane_under(state.position, state.heading, hull.length_m, hull.beam_m, time_s);
-    let at = DVec3::new(water.height_m, water.port_slope.atan(), water.forward_slope.atan());
-    lay(state, hull, at, water.height_m)
+    in_mean_plane(state, hull, &WayAttitude::scripted(state, hull), waves, time_s)
 }
 
-/// Puts a boat onto the waves where its motion has brought it; it rises, trims and leans by itself as in [`quasi_static`].
-pub fn afloat_in_waves(
+/// As [`quasi_static`], with the attitude that its way gives it.
+pub(super) fn in_mean_plane(
     state: &CourseState,
     hull: &Hull,
+    way: &WayAttitude,
+    waves: &WaveField,
+    time_s: f64,
+) -> Floating {
+    let water = waves.plane_under(state.position, state.heading, hull.length_m, hull.beam_m, time_s);
+    let at = DVec3::new(water.height_m, water.port_slope.atan(), water.forward_slope.atan());
+    lay(state, way, at, water.height_m)
+}
+
+/// Puts a boat onto the waves where its motion has brought it; it rises, trims and leans by its way as well.
+pub(super) fn afloat_in_waves(
+    state: &CourseState,
+    hull: &Hull,
+    way: &WayAttitude,
     form: &HullForm,
     motion: &BoatMotion,
     waves: &WaveField,
@@ -54,19 +66,40 @@ pub fn afloat_in_waves(
     let mut at = motion.at;
     // From the centre of buoyancy to the boat's origin.
     at.x -= form.centre_m * at.z.sin();
-    lay(state, hull, at, water.height_m)
+    lay(state, way, at, water.height_m)
+}
+
+/// What its way through the water does to a boat's attitude.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WayAttitude {
+    /// Bow up, radians.
+    pub trim: f64,
+    /// Port up, radians.
+    pub lean: f64,
+    /// Upwards, metres.
+    pub rise_m: f64,
+}
+
+impl WayAttitude {
+    /// Of a boat on a course that is known beforehand, of which no more is known than its size.
+    pub fn scripted(state: &CourseState, hull: &Hull) -> Self {
+        let planing = planing_share(state.speed_m_s, hull.length_m);
+        Self {
+            trim: PLANING_TRIM * planing,
+            // A turn to starboard leans the boat to starboard: port comes up.
+            lean: lean(state.speed_m_s, state.turn_rate) * planing,
+            rise_m: PLANING_RISE * hull.length_m * planing,
+        }
+    }
 }
 
 /// A boat at heave, roll and pitch `at`.
-fn lay(state: &CourseState, hull: &Hull, at: DVec3, water_level: f64) -> Floating {
-    let planing = planing_share(state.speed_m_s, hull.length_m);
-    let pitch_up = at.z + PLANING_TRIM * planing;
-    // A turn to starboard leans the boat to starboard: port comes up.
-    let balanced = (state.speed_m_s * state.turn_rate / GRAVITY_M_S2).atan();
-    let port_up = at.y + (LEAN * balanced).clamp(-LEAN_MAX, LEAN_MAX) * planing;
+fn lay(state: &CourseState, way: &WayAttitude, at: DVec3, water_level: f64) -> Floating {
+    let pitch_up = at.z + way.trim;
+    let port_up = at.y + way.lean;
     let level = level_attitude(ahead(state.heading));
     let world_from_body = level * DQuat::from_rotation_y(-pitch_up) * DQuat::from_rotation_x(port_up);
-    let height = at.x + PLANING_RISE * hull.length_m * planing;
+    let height = at.x + way.rise_m;
     Floating { pose: RigidPose { world_from_body, position: state.position.extend(height) }, water_level }
 }
 
@@ -81,6 +114,12 @@ pub fn facing(pose: &RigidPose, eye: DVec3) -> RigidPose {
 /// Attitude of a level boat whose bow points along the unit vector `forward`.
 fn level_attitude(forward: DVec2) -> DQuat {
     DQuat::from_mat3(&DMat3::from_cols(forward.extend(0.0), forward.perp().extend(0.0), DVec3::Z))
+}
+
+/// Angle by which a planing boat leans into a turn at `speed_m_s` and `turn_rate` (rad/s clockwise), radians, port up.
+pub(super) fn lean(speed_m_s: f64, turn_rate: f64) -> f64 {
+    let balanced = (speed_m_s * turn_rate / GRAVITY_M_S2).atan();
+    (LEAN * balanced).clamp(-LEAN_MAX, LEAN_MAX)
 }
 
 /// 0 for a boat that displaces water, 1 for one that planes.
@@ -99,7 +138,7 @@ mod tests {
     const FRIGATE: Hull = Hull { length_m: 130.0, beam_m: 15.0 };
 
     fn at(heading: f64, speed_m_s: f64, turn_rate: f64) -> CourseState {
-        CourseState { position: DVec2::new(30.0, 200.0), heading, speed_m_s, turn_rate }
+        CourseState { position: DVec2::new(30.0, 200.0), heading, speed_m_s, sway_m_s: 0.0, turn_rate }
     }
 
     #[test]

@@ -48,6 +48,11 @@ impl<T> GridHistory<T> {
         self.states.back()
     }
 
+    /// The newest state, to be changed.
+    pub fn last_mut(&mut self) -> Option<&mut T> {
+        self.states.back_mut()
+    }
+
     /// Forgets everything and begins anew with `state` at step `number`.
     pub fn restart(&mut self, number: i64, state: T) {
         self.states.clear();
@@ -93,11 +98,11 @@ impl<T> GridHistory<T> {
 }
 
 /// Step at or after a time. A time that is no number is step 0.
-pub(super) fn step_after(time_s: f64) -> i64 {
+pub(crate) fn step_after(time_s: f64) -> i64 {
     (time_s * STEPS_PER_S).ceil() as i64
 }
 
 /// Time of a step, seconds.
-pub(super) fn seconds(step: i64) -> f64 {
+pub(crate) fn seconds(step: i64) -> f64 {
     step as f64 / STEPS_PER_S
 }

@@ -1,9 +1,12 @@
 //! Where one boat was over the last seconds: states on a fixed grid, each made from the one before.
 
+use glam::DVec2;
+
 use super::{
-    behaviour::{Behaviour, BehaviourStep},
-    course::{BoatDamage, CourseState},
-    floating::{Floating, afloat_in_waves, quasi_static},
+    behaviour::Behaviour,
+    course::{BoatDamage, Course, CourseState},
+    crewed::{CrewedBoat, StepView},
+    floating::{Floating, WayAttitude, afloat_in_waves, in_mean_plane},
     grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
     hull::{Hull, HullForm},
     seakeeping::{GAP, SeakeepingState},
@@ -16,10 +19,17 @@ pub const HISTORY_S: f64 = 18.0;
 /// States kept.
 const KEPT: usize = (HISTORY_S / STEP_S) as usize;
 
+/// What moves a boat.
+#[derive(Clone, Debug)]
+enum Pilot {
+    Scripted(Course),
+    Crewed(Box<CrewedBoat>),
+}
+
 /// One boat: what it does, what has struck it, and where it was.
 #[derive(Clone, Debug)]
 pub struct BoatHistory {
-    behaviour: Behaviour,
+    pilot: Pilot,
     damage: BoatDamage,
     hull: Hull,
     states: GridHistory<CourseState>,
@@ -30,8 +40,12 @@ impl BoatHistory {
     /// A boat as the scenario begins.
     pub fn new(behaviour: Behaviour, hull: Hull, form: HullForm) -> Self {
         let mut states = GridHistory::new(KEPT);
-        states.restart(0, behaviour.begin(0.0, &BoatDamage::NONE));
-        Self { behaviour, damage: BoatDamage::NONE, hull, states, seakeeping: SeakeepingState::new(form) }
+        states.restart(0, behaviour.begin());
+        let pilot = match behaviour {
+            Behaviour::ScriptedCourse(course) => Pilot::Scripted(course),
+            Behaviour::Crewed(start) => Pilot::Crewed(Box::new(CrewedBoat::new(start, &form))),
+        };
+        Self { pilot, damage: BoatDamage::NONE, hull, states, seakeeping: SeakeepingState::new(form) }
     }
 
     /// The hull's size at the waterline.
@@ -39,30 +53,65 @@ impl BoatHistory {
         self.hull
     }
 
-    /// Steps the boat up to `until_s`, seconds since the scenario began. Does nothing for what is already stepped. A stretch of more than
-    /// 10 s is not stepped through.
+    /// Whether a crew drives it, so that it has to be stepped beside all others.
+    pub const fn is_crewed(&self) -> bool {
+        matches!(self.pilot, Pilot::Crewed(_))
+    }
+
+    /// Steps a scripted boat up to `until_s`, seconds since the scenario began, and lets waves move any boat up to there. Does nothing for
+    /// what is already stepped. A stretch of more than 10 s is not stepped through.
     pub fn follow(&mut self, until_s: f64, waves: &WaveField) {
-        let last = step_after(until_s);
-        if self.states.newest().is_none_or(|newest| last.saturating_sub(newest) > GAP) {
-            let first = if last <= GAP { 0 } else { last.saturating_sub(KEPT as i64 - 1).max(0) };
-            let state = match self.states.last() {
-                Some(before) if first > 0 => self.behaviour.resume(before, seconds(first), &self.damage),
-                _ => self.behaviour.begin(seconds(first), &self.damage),
-            };
-            self.states.restart(first, state);
-        }
-        while let (Some(newest), Some(from)) = (self.states.newest(), self.states.last())
-            && newest < last
-        {
-            let step = BehaviourStep { from, to_s: seconds(newest + 1), damage: &self.damage };
-            let next = self.behaviour.next(&step);
-            self.states.push(next);
+        if let Pilot::Scripted(course) = &self.pilot {
+            let last = step_after(until_s);
+            if self.states.newest().is_none_or(|newest| last.saturating_sub(newest) > GAP) {
+                let first = if last <= GAP { 0 } else { last.saturating_sub(KEPT as i64 - 1).max(0) };
+                self.states.restart(first, course.state(seconds(first), &self.damage));
+            }
+            while let Some(newest) = self.states.newest()
+                && newest < last
+            {
+                self.states.push(course.state(seconds(newest + 1), &self.damage));
+            }
         }
         if !waves.is_flat() {
             let states = &self.states;
             // Motion in waves begins as of a boat that lies where the scenario begins.
             self.seakeeping.follow(until_s, |time_s| state_in(states, time_s.max(0.0)), waves);
         }
+    }
+
+    /// Step of the newest state.
+    pub(crate) fn newest(&self) -> i64 {
+        self.states.newest().unwrap_or(0)
+    }
+
+    /// A crewed boat goes on by a step; the others are as `view` has them.
+    pub(crate) fn step(&mut self, view: &StepView<'_>) {
+        let number = self.newest();
+        if let Pilot::Crewed(boat) = &mut self.pilot {
+            self.states.push(boat.step(number, &self.damage, view));
+        }
+    }
+
+    /// The name of the state that its crew is in at the newest step.
+    pub fn crew_state(&self) -> Option<&str> {
+        match &self.pilot {
+            Pilot::Crewed(boat) => Some(boat.state_name()),
+            Pilot::Scripted(_) => None,
+        }
+    }
+
+    /// Moves a crewed boat off another, see [`CrewedBoat::push`].
+    pub(crate) fn push(&mut self, off: DVec2, stop: DVec2) {
+        if let (Pilot::Crewed(boat), Some(last)) = (&mut self.pilot, self.states.last_mut()) {
+            boat.push(off, stop);
+            *last = boat.course().unwrap_or(*last);
+        }
+    }
+
+    /// When it was first struck, seconds since the scenario began.
+    pub(crate) fn first_hit_s(&self) -> Option<f64> {
+        self.damage.first_s
     }
 
     /// Where the boat is or was at a time. Before the oldest state that is kept, and so before the scenario began, it came straight on;
@@ -75,11 +124,15 @@ impl BoatHistory {
     /// mean plane of the water.
     pub fn floating(&self, time_s: f64, waves: &WaveField) -> Floating {
         let state = self.state(time_s);
+        let way = match &self.pilot {
+            Pilot::Scripted(_) => WayAttitude::scripted(&state, &self.hull),
+            Pilot::Crewed(boat) => boat.craft().way_attitude(&state),
+        };
         match self.seakeeping.at(time_s) {
             Some(motion) => {
-                afloat_in_waves(&state, &self.hull, self.seakeeping.form(), &motion, waves, time_s)
+                afloat_in_waves(&state, &self.hull, &way, self.seakeeping.form(), &motion, waves, time_s)
             }
-            None => quasi_static(&state, &self.hull, waves, time_s),
+            None => in_mean_plane(&state, &self.hull, &way, waves, time_s),
         }
     }
 
@@ -87,8 +140,16 @@ impl BoatHistory {
     /// the helm ends its attack; the first of each counts.
     pub fn strike(&mut self, zone: Zone, time_s: f64) {
         if self.damage.add(zone, time_s) {
-            self.states.forget_after(time_s);
-            self.seakeeping.forget_after(time_s);
+            self.forget_after(time_s);
+        }
+    }
+
+    /// Forgets what comes after `time_s`.
+    pub fn forget_after(&mut self, time_s: f64) {
+        self.states.forget_after(time_s);
+        self.seakeeping.forget_after(time_s);
+        if let Pilot::Crewed(boat) = &mut self.pilot {
+            boat.forget_after(time_s);
         }
     }
 

@@ -2,6 +2,9 @@
 
 pub mod behaviour;
 mod course;
+mod crew;
+mod crewed;
+mod drive;
 mod floating;
 mod grid;
 mod history;
@@ -10,9 +13,13 @@ mod motion;
 mod path;
 mod seakeeping;
 
-pub use behaviour::{Behaviour, BehaviourStep};
+pub use behaviour::{Behaviour, CrewedStart};
 pub use course::{Arrival, BoatDamage, Course, CourseError, CourseState};
-pub use floating::{Floating, afloat_in_waves, facing, quasi_static};
+pub use crew::{Act, CrewPlan, CrewState, Exit, Guard, Signals, Traffic};
+pub use crewed::{StepView, usual_propulsor};
+pub use drive::{Craft, DriveState, HullRunning, Orders, PlaningSurface, Propulsor, Running, Surroundings};
+pub use floating::{Floating, WayAttitude, facing, quasi_static};
+pub(crate) use grid::{seconds as step_seconds, step_after};
 pub use history::{BoatHistory, HISTORY_S};
 pub use hull::{Hull, HullForm};
 pub use motion::BoatMotion;

@@ -36,6 +36,7 @@ fn course(heading: f64, speed_m_s: f64) -> impl Fn(f64) -> CourseState {
             + DVec2::new(heading.sin(), heading.cos()) * (speed_m_s * t.max(0.0)),
         heading,
         speed_m_s,
+        sway_m_s: 0.0,
         turn_rate: 0.0,
     }
 }

@@ -4,15 +4,16 @@ use glam::DVec2;
 use serde::Deserialize;
 
 use super::{
-    keys::{M_S_PER_KN, angle},
+    crew::NamedCrew,
+    group::{self, Formation},
+    keys::{M_S_PER_KN, angle, range, waypoint},
     spec::{BoatSpec, Side, place},
 };
 use crate::{
     text::toml::{
-        OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, ValueRule, number, one_of, plain_text,
-        yes_no,
+        OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, number, one_of, plain_text, whole, yes_no,
     },
-    world::boats::{Arrival, Behaviour, Course, CourseError},
+    world::boats::{Arrival, Behaviour, Course, CourseError, CrewedStart, Propulsor},
 };
 
 /// Kind of a boat's course.
@@ -57,6 +58,13 @@ pub(super) struct RawBoat {
     model: OptionalKey<String>,
     side: OptionalKey<String>,
     course: OptionalKey<String>,
+    crew: OptionalKey<String>,
+    engine: OptionalKey<String>,
+    speed_max_kn: OptionalKey<f64>,
+    keeps_rules: OptionalKey<bool>,
+    count: OptionalKey<i64>,
+    formation: OptionalKey<String>,
+    spacing_m: OptionalKey<f64>,
     range_m: OptionalKey<f64>,
     bearing_deg: OptionalKey<f64>,
     heading_deg: OptionalKey<f64>,
@@ -88,22 +96,109 @@ impl RawBoat {
     }
 }
 
-pub(super) fn boats(tables: Vec<(TomlSection<'_>, RawBoat)>) -> Result<Vec<BoatSpec>, TomlError> {
+/// What boats are read with besides their own tables.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BoatContext<'a> {
+    /// The crews that the scenario knows.
+    pub crews: &'a [NamedCrew],
+    /// Its seed.
+    pub seed: u64,
+    /// Most boats of all groups together.
+    pub boats_max: usize,
+}
+
+pub(super) fn boats(
+    tables: Vec<(TomlSection<'_>, RawBoat)>,
+    context: &BoatContext<'_>,
+) -> Result<Vec<BoatSpec>, TomlError> {
     let mut boats: Vec<BoatSpec> = Vec::with_capacity(tables.len());
     for (number, (section, raw)) in tables.iter().enumerate() {
-        let boat = boat(section, raw, number + 1)?;
-        if let (Some(other), Some(name)) = (boats.iter().position(|b| b.name == boat.name), &raw.name) {
-            let problem =
-                format!("\"{}\" is the name of boat[{}] too; give each boat its own", boat.name, other + 1);
-            return Err(section.text.error(name, problem));
+        for boat in group(section, raw, number + 1, context)? {
+            if let (Some(other), Some(name)) = (boats.iter().position(|b| b.name == boat.name), &raw.name) {
+                let problem = format!(
+                    "\"{}\" is the name of boat[{}] too; give each boat its own",
+                    boat.name,
+                    other + 1
+                );
+                return Err(section.text.error(name, problem));
+            }
+            if boats.len() == context.boats_max {
+                let problem = format!("makes more than {} boats in all; ask for fewer", context.boats_max);
+                return Err(section.error("count", problem));
+            }
+            boats.push(boat);
         }
-        boats.push(boat);
     }
     Ok(boats)
 }
 
-fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatSpec, TomlError> {
+/// The boats of one table: one, or as many as it counts.
+fn group(
+    section: &TomlSection<'_>,
+    raw: &RawBoat,
+    number: usize,
+    context: &BoatContext<'_>,
+) -> Result<Vec<BoatSpec>, TomlError> {
     let text = section.text;
+    let sides = Side::ALL.map(|side| (side.name(), side));
+    let named = |key, value: &OptionalKey<String>, what| match value {
+        Some(value) => text.needed(value, plain_text()),
+        None => Err(section.missing(key, what)),
+    };
+    let range = raw.range_m.as_ref();
+    let key = format!("boat[{number}]");
+    let stands = range.map_or_else(|| section.place("range_m"), |range| text.place_as(range, key));
+    let side = text.given(&raw.side, one_of(&sides))?.unwrap_or(Side::Hostile);
+    let boat = |name: String, behaviour| {
+        let model = named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?;
+        Ok(BoatSpec { name, model, side, behaviour, stands: stands.clone() })
+    };
+    let behaviours = match (&raw.course, &raw.crew) {
+        (Some(_), Some(crew)) => {
+            return Err(text.error(crew, "a boat has a course or a crew; leave out one of them"));
+        }
+        (_, None) => {
+            scripted_only(section, raw)?;
+            vec![Behaviour::ScriptedCourse(scripted(section, raw)?)]
+        }
+        (None, Some(_)) => crewed(section, raw, number, side, context)?,
+    };
+    let name = named("name", &raw.name, "the boat a name of its own")?;
+    match &behaviours[..] {
+        [_] => behaviours.into_iter().map(|behaviour| boat(name.clone(), behaviour)).collect(),
+        _ => {
+            let numbered = |(i, behaviour)| boat(format!("{name}-{}", i + 1), behaviour);
+            behaviours.into_iter().enumerate().map(numbered).collect()
+        }
+    }
+}
+
+/// Refuses what only a boat with a crew has.
+fn scripted_only(section: &TomlSection<'_>, raw: &RawBoat) -> Result<(), TomlError> {
+    fn there<T>(value: &Option<Spanned<T>>) -> Option<Spanned<()>> {
+        value.as_ref().map(|value| Spanned::new(value.span(), ()))
+    }
+    let keys = [
+        there(&raw.engine),
+        there(&raw.speed_max_kn),
+        there(&raw.keeps_rules),
+        there(&raw.count),
+        there(&raw.formation),
+        there(&raw.spacing_m),
+    ];
+    match keys.into_iter().flatten().next() {
+        Some(value) => Err(section
+            .text
+            .error(&value, "has no meaning without crew; leave it out, or give the boat a crew")),
+        None => Ok(()),
+    }
+}
+
+fn scripted(section: &TomlSection<'_>, raw: &RawBoat) -> Result<Course, TomlError> {
+    if raw.course.is_none() {
+        let allowed = format!("{}, or a crew by the key crew", one_of(&KINDS).allowed);
+        return Err(section.missing("course", &allowed));
+    }
     let kind = section.required("course", &raw.course, one_of(&KINDS))?;
     for (key, value) in raw.of_courses() {
         if let Some(value) = value.filter(|_| !kind.keys().contains(&key)) {
@@ -112,39 +207,62 @@ fn boat(section: &TomlSection<'_>, raw: &RawBoat, number: usize) -> Result<BoatS
                 kind.name(),
                 kind.keys().join(", ")
             );
+            return Err(section.text.error(&value, problem));
+        }
+    }
+    course(section, raw, kind)
+}
+
+/// The boats of a table with a crew.
+fn crewed(
+    section: &TomlSection<'_>,
+    raw: &RawBoat,
+    table: usize,
+    side: Side,
+    context: &BoatContext<'_>,
+) -> Result<Vec<Behaviour>, TomlError> {
+    /// Knots that a boat makes where nothing else is said, by its engine.
+    const USUAL_KN: [(Propulsor, f64); 3] =
+        [(Propulsor::Outboard, 28.0), (Propulsor::Jet, 35.0), (Propulsor::Shaft, 10.0)];
+    let text = section.text;
+    for (key, value) in raw.of_courses() {
+        if let Some(value) = value.filter(|_| !["heading_deg", "speed_kn"].contains(&key)) {
+            let problem =
+                "has no meaning for a boat with a crew; leave it out, or write it into the crew's state";
             return Err(text.error(&value, problem));
         }
     }
-    let sides = Side::ALL.map(|side| (side.name(), side));
-    let named = |key, value: &OptionalKey<String>, what| match value {
-        Some(value) => text.needed(value, plain_text()),
-        None => Err(section.missing(key, what)),
+    let names: Vec<(&str, usize)> =
+        context.crews.iter().enumerate().map(|(i, c)| (c.name.as_str(), i)).collect();
+    let crew = section.required("crew", &raw.crew, one_of(&names))?;
+    let engines = Propulsor::ALL.map(|engine| (engine.name(), engine));
+    let propulsor = text.given(&raw.engine, one_of(&engines))?.unwrap_or(Propulsor::Outboard);
+    let usual_kn = USUAL_KN.iter().find(|(engine, _)| *engine == propulsor).map_or(28.0, |(_, kn)| *kn);
+    let speed_max = text.given(&raw.speed_max_kn, number(1.0..=60.0, "kn"))?.unwrap_or(usual_kn);
+    let speed = text.given(&raw.speed_kn, number(0.0..=speed_max, "kn (speed_max_kn)"))?.unwrap_or(0.0);
+    let bearing = section.required("bearing_deg", &raw.bearing_deg, angle())?.to_radians();
+    let middle = place(bearing, section.required("range_m", &raw.range_m, range())?);
+    let heading = text.given(&raw.heading_deg, angle())?.map(f64::to_radians);
+    let heading = heading.unwrap_or(bearing + std::f64::consts::PI);
+    let count = text.given(&raw.count, whole(1..=40_u32))?.unwrap_or(1);
+    let formation = text.given(&raw.formation, one_of(&Formation::NAMES))?.unwrap_or(Formation::Abreast);
+    let spacing_m = text.given(&raw.spacing_m, number(10.0..=2000.0, "m"))?.unwrap_or(40.0);
+    let keeps_rules = text.given(&raw.keeps_rules, yes_no())?.unwrap_or(side == Side::Neutral);
+    let seed = context.seed.wrapping_add((table as u64) << 32);
+    let places = group::places(formation, count, spacing_m, heading, seed);
+    let start = |(i, off): (usize, DVec2)| {
+        Behaviour::Crewed(CrewedStart {
+            plan: std::sync::Arc::clone(&context.crews[crew].plan),
+            seed: seed.wrapping_add(i as u64),
+            keeps_rules,
+            propulsor,
+            speed_max_m_s: speed_max * M_S_PER_KN,
+            position: middle + off,
+            heading,
+            speed_m_s: speed * M_S_PER_KN,
+        })
     };
-    let course = course(section, raw, kind)?;
-    let range = raw.range_m.as_ref();
-    let key = format!("boat[{number}]");
-    let stands = range.map_or_else(|| section.place("range_m"), |range| text.place_as(range, key));
-    Ok(BoatSpec {
-        name: named("name", &raw.name, "the boat a name of its own")?,
-        model: named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?,
-        side: text.given(&raw.side, one_of(&sides))?.unwrap_or(Side::Hostile),
-        behaviour: Behaviour::ScriptedCourse(course),
-        stands,
-    })
-}
-
-/// Distance of a boat or a point of its course from the camera.
-fn range() -> ValueRule<'static, f64, f64> {
-    number(1.0..=20_000.0, "m")
-}
-
-/// A point of a course by bearing and range.
-fn waypoint() -> ValueRule<'static, Vec<f64>, DVec2> {
-    let allowed = "pairs [bearing_deg, range_m] within -360 to 360 degrees and 1 to 20000 m";
-    ValueRule::new(allowed, |raw: &Vec<f64>| match raw[..] {
-        [bearing, range_m] => Some(place(angle().check(&bearing)?.to_radians(), range().check(&range_m)?)),
-        _ => None,
-    })
+    Ok(places.into_iter().enumerate().map(start).collect())
 }
 
 fn course(section: &TomlSection<'_>, raw: &RawBoat, kind: CourseKind) -> Result<Course, TomlError> {

@@ -1,7 +1,9 @@
 //! Keys and rules that texts with boats have in common.
 
+use glam::DVec2;
 use serde::Deserialize;
 
+use super::spec::place;
 use crate::text::toml::{BareOrQuoted, OptionalKey, ValueRule, number, whole};
 
 /// m/s in a knot.
@@ -13,6 +15,20 @@ pub fn seed() -> ValueRule<'static, i64, u64> {
 /// An angle clockwise, in either direction.
 pub fn angle() -> ValueRule<'static, f64, f64> {
     number(-360.0..=360.0, "degrees")
+}
+
+/// Distance of a boat or a point of its course from the camera.
+pub(super) fn range() -> ValueRule<'static, f64, f64> {
+    number(1.0..=20_000.0, "m")
+}
+
+/// A point of a course by bearing and range.
+pub(super) fn waypoint() -> ValueRule<'static, Vec<f64>, DVec2> {
+    let allowed = "pairs [bearing_deg, range_m] within -360 to 360 degrees and 1 to 20000 m";
+    ValueRule::new(allowed, |raw: &Vec<f64>| match raw[..] {
+        [bearing, range_m] => Some(place(angle().check(&bearing)?.to_radians(), range().check(&range_m)?)),
+        _ => None,
+    })
 }
 
 /// Keys of a table `[sea]`.

@@ -3,6 +3,8 @@
 //! Degrees, knots and minutes stay outside: everything here is in radians, metres and seconds.
 
 mod boat;
+mod crew;
+mod group;
 mod keys;
 pub mod read;
 mod spec;
@@ -16,12 +18,13 @@ use crate::text::toml::TomlError;
 pub const DEFAULT: &str = include_str!("../../../scenarios/default.toml");
 
 /// Names and texts of the scenarios that need no file.
-pub const BUILT_IN: [(&str, &str); 5] = [
+pub const BUILT_IN: [(&str, &str); 6] = [
     ("default", DEFAULT),
     ("swarm", include_str!("../../../scenarios/swarm.toml")),
     ("empty", include_str!("../../../scenarios/empty.toml")),
     ("calm-frigate", include_str!("../../../scenarios/calm-frigate.toml")),
     ("karma", include_str!("../../../scenarios/karma.toml")),
+    ("three-axes", include_str!("../../../scenarios/three-axes.toml")),
 ];
 
 impl Scenario {

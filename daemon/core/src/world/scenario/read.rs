@@ -4,7 +4,8 @@ use serde::Deserialize;
 
 pub use super::keys::{LightKeys, M_S_PER_KN, ReflectionKeys, SeaKeys, angle, seed};
 use super::{
-    boat::{self, RawBoat},
+    boat::{self, BoatContext, RawBoat},
+    crew::{self, RawCrew},
     spec::{Scenario, WeaponSpec, place},
     sun,
 };
@@ -35,6 +36,7 @@ struct RawScenario {
     light: Option<Spanned<LightKeys>>,
     reflection: Option<Spanned<ReflectionKeys>>,
     weapon: Option<Spanned<RawWeapon>>,
+    crew: Vec<Spanned<RawCrew>>,
     boat: Vec<Spanned<RawBoat>>,
 }
 
@@ -81,10 +83,19 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let water = reflection(text, &keys, force, &mut warnings)?;
     let (section, keys) = text.section("weapon", raw.weapon);
     let weapon = weapon(&section, &keys)?;
-    let boats = boat::boats(text.sections("boat", raw.boat, BOATS_MAX)?)?;
+    let seed = text.given(&raw.seed, seed())?.unwrap_or(1);
+    let mut crews = crew::crews(text, raw.crew)?;
+    crews.extend(
+        crew::built_in()?
+            .into_iter()
+            .filter(|known| crews.iter().all(|own| own.name != known.name))
+            .collect::<Vec<_>>(),
+    );
+    let context = BoatContext { crews: &crews, seed, boats_max: BOATS_MAX };
+    let boats = boat::boats(text.sections("boat", raw.boat, BOATS_MAX)?, &context)?;
     Ok(Scenario {
         name: text.given(&raw.name, plain_text())?.unwrap_or_else(|| "unnamed".to_owned()),
-        seed: text.given(&raw.seed, seed())?.unwrap_or(1),
+        seed,
         duration_s: text.given(&raw.duration_s, number(0.1..=86_400.0, "s"))?,
         waves,
         sea_from_video,

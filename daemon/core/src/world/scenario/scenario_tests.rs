@@ -5,8 +5,16 @@ use glam::{DVec2, DVec3};
 use super::*;
 use crate::{
     water::{ReflectionMethod, ShadowLevel},
-    world::boats::BoatDamage,
+    world::boats::{Behaviour, BoatDamage, CourseState},
 };
+
+/// Where a boat on a known course is at a time.
+fn scripted(boat: &BoatSpec, time_s: f64) -> CourseState {
+    match &boat.behaviour {
+        Behaviour::ScriptedCourse(course) => course.state(time_s, &BoatDamage::NONE),
+        Behaviour::Crewed(_) => panic!("{} has a crew", boat.name),
+    }
+}
 
 fn parse(text: &str) -> Result<Scenario, TomlError> {
     Scenario::parse(text, "test.toml")
@@ -51,7 +59,7 @@ fn the_default_boats_stay_in_the_sector_that_the_camera_sweeps() {
     assert_eq!(scenario.boats.len(), 3);
     for boat in &scenario.boats {
         for t in 0..=600 {
-            let at = boat.behaviour.begin(f64::from(t) / 10.0, &BoatDamage::NONE).position;
+            let at = scripted(boat, f64::from(t) / 10.0).position;
             let bearing = at.x.atan2(at.y).to_degrees();
             assert!(bearing.abs() < 45.0, "{} at {bearing} deg after {t} ds", boat.name);
             assert!((60.0..=250.0).contains(&at.length()), "{} at {} m after {t} ds", boat.name, at.length());
@@ -63,8 +71,7 @@ fn the_default_boats_stay_in_the_sector_that_the_camera_sweeps() {
 fn the_default_boats_keep_clear_of_each_other() {
     let scenario = parse(DEFAULT).expect("valid");
     for t in 0..=1200 {
-        let at =
-            |i: usize| scenario.boats[i].behaviour.begin(f64::from(t) / 10.0, &BoatDamage::NONE).position;
+        let at = |i: usize| scripted(&scenario.boats[i], f64::from(t) / 10.0).position;
         for (i, j) in [(0, 1), (0, 2), (1, 2)] {
             assert!(at(i).distance(at(j)) > 15.0, "boats {i} and {j} after {t} ds");
         }
@@ -78,7 +85,7 @@ fn the_thesis_swarm_closes_200_yards_at_15_knots() {
     let hostile: Vec<_> = swarm.boats.iter().filter(|b| b.side == Side::Hostile).collect();
     assert_eq!(hostile.len(), 6);
     for boat in hostile {
-        let start = boat.behaviour.begin(0.0, &BoatDamage::NONE);
+        let start = scripted(boat, 0.0);
         assert!((start.position.length() / 0.9144 - 200.0).abs() < 0.1, "{}", boat.name);
         assert!((boat.behaviour.speed_max_m_s() - 7.717).abs() < 2.0, "{}", boat.name);
     }
@@ -103,7 +110,7 @@ fn units_become_radians_metres_and_seconds() {
     assert!((scenario.wind - DVec3::new(-6.688, 0.0, 0.0)).length() < 1e-3, "{}", scenario.wind);
     assert!((scenario.daylight.sun_direction - DVec3::X).length() < 1e-12);
     assert_eq!(scenario.daylight.visibility_m, 5000.0);
-    let boat = scenario.boats[0].behaviour.begin(10.0, &BoatDamage::NONE);
+    let boat = scripted(&scenario.boats[0], 10.0);
     let start = DVec2::new(10_f64.to_radians().sin(), 10_f64.to_radians().cos()) * 200.0;
     assert!((boat.position - start - DVec2::Y * 46.3).length() < 1e-9, "{boat:?}");
 }

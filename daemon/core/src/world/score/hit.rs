@@ -157,4 +157,4 @@ pub(super) fn is_solid_at(texture: &Texture, uv: DVec2) -> bool {
 
 #[cfg(test)]
 #[path = "hit_tests.rs"]
-pub(super) mod tests;
+pub(crate) mod tests;

@@ -5,7 +5,7 @@ use super::*;
 use crate::model::Part;
 
 /// A box from `min` to `max`: its aft third is the engine, the rest the hull.
-pub(in crate::world::score) fn boxed(min: Vec3, max: Vec3) -> Model {
+pub(crate) fn boxed(min: Vec3, max: Vec3) -> Model {
     let mut model = Model {
         name: "box".into(),
         kind: ModelKind::Mesh,

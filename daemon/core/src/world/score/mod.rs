@@ -7,6 +7,8 @@ mod round;
 use glam::DVec3;
 
 pub use closest::{Closest, closest_to_box, closest_to_surface};
+#[cfg(test)]
+pub(crate) use hit::tests::boxed as boxed_model;
 pub use hit::{Moving, Strike, strike};
 pub use round::{Approach, End, Round};
 

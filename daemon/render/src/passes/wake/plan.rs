@@ -205,6 +205,7 @@ mod tests {
             position: DVec2::new(speed * (t - 50.0), range),
             heading: std::f64::consts::FRAC_PI_2,
             speed_m_s: speed,
+            sway_m_s: 0.0,
             turn_rate: 0.0,
         };
         Wake::of(hull, 0.5, 50.0, state, |_| 0.0).unwrap()

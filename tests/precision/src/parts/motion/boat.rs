@@ -116,6 +116,7 @@ impl DrivenBoat {
             position: DVec2::new(0.0, self.speed_m_s * t),
             heading: 0.0,
             speed_m_s: self.speed_m_s,
+            sway_m_s: 0.0,
             turn_rate: 0.0,
         }
     }

@@ -1,0 +1,140 @@
+//! A boat with its crew, stepped on the grid of all boats' times.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use super::{
+    behaviour::CrewedStart,
+    course::{BoatDamage, CourseState},
+    crew::{CrewMemory, CrewPlan, Signals, Situation, Traffic},
+    drive::{Craft, DriveState, Orders, Propulsor, Surroundings},
+    grid::{GridHistory, STEP_S, seconds},
+    hull::HullForm,
+};
+use crate::{
+    geometry::{ahead, starboard},
+    world::waves::WaveField,
+};
+
+/// Steps kept: a strike lies at most a frame back, and a frame may have been followed two steps beyond.
+const KEPT: usize = 64;
+/// Steps from one decision of a crew to the next: ten a second.
+const DECISION: i64 = 6;
+/// Farther off than this the slope of the water does not move a boat along: it would not be seen, metres.
+const SLOPES_M: f64 = 2500.0;
+
+/// Hull and crew at one time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Crewed {
+    drive: DriveState,
+    memory: CrewMemory,
+}
+
+/// A boat that a crew drives.
+#[derive(Clone, Debug)]
+pub struct CrewedBoat {
+    plan: Arc<CrewPlan>,
+    craft: Craft,
+    seed: u64,
+    keeps_rules: bool,
+    kept: GridHistory<Crewed>,
+}
+
+/// The rest of the world as one boat sees it at a step.
+#[derive(Clone, Copy, Debug)]
+pub struct StepView<'a> {
+    /// The other vessels, with the own ship.
+    pub others: &'a [Traffic],
+    /// The own ship.
+    pub own_ship: Traffic,
+    /// What has happened to the boat.
+    pub signals: Signals,
+    /// The sea.
+    pub waves: &'a WaveField,
+}
+
+impl CrewedBoat {
+    /// A boat as the scenario begins.
+    pub fn new(start: CrewedStart, form: &HullForm) -> Self {
+        let craft = Craft::new(form, start.propulsor, start.speed_max_m_s);
+        let drive = DriveState::steady(&craft, start.position, start.heading, start.speed_m_s);
+        let mut kept = GridHistory::new(KEPT);
+        kept.restart(0, Crewed { drive, memory: CrewMemory { from: drive.centre, ..CrewMemory::default() } });
+        Self { plan: start.plan, craft, seed: start.seed, keeps_rules: start.keeps_rules, kept }
+    }
+
+    /// The hull with its engine.
+    pub const fn craft(&self) -> &Craft {
+        &self.craft
+    }
+
+    /// The newest state, as frames see it.
+    pub fn course(&self) -> Option<CourseState> {
+        self.kept.last().map(|now| now.drive.course(&self.craft))
+    }
+
+    /// The name of the state that the crew is in.
+    pub fn state_name(&self) -> &str {
+        let state = self.kept.last().map_or(0, |now| now.memory.state);
+        self.plan.states.get(state).map_or("", |state| state.name.as_str())
+    }
+
+    /// The state a step after `number`.
+    pub(super) fn step(&mut self, number: i64, damage: &BoatDamage, view: &StepView<'_>) -> CourseState {
+        let Some(now) = self.kept.last().copied() else { return CourseState::default() };
+        let time_s = seconds(number);
+        let mut memory = now.memory;
+        if number % DECISION == 0 {
+            let situation = Situation {
+                time_s,
+                seed: self.seed,
+                others: view.others,
+                own_ship: view.own_ship,
+                signals: view.signals,
+                keeps_rules: self.keeps_rules,
+            };
+            memory = self.plan.decide(&self.craft, &now.drive, &memory, &situation);
+        }
+        let struck = |at: Option<f64>| at.is_some_and(|s| s <= time_s);
+        // Without its helmsman a boat goes on as the helm stands, and its engine stops: his cord is pulled.
+        let orders = match (struck(damage.engine_s), struck(damage.helm_s)) {
+            (_, true) => Orders::default(),
+            (true, false) => Orders { throttle: 0.0, ..memory.orders },
+            (false, false) => memory.orders,
+        };
+        let around =
+            Surroundings { anchor: self.plan.anchor(&memory), ..self.slope(&now.drive, view.waves, time_s) };
+        let drive = self.craft.step(&now.drive, &orders, &around, STEP_S);
+        self.kept.push(Crewed { drive, memory });
+        drive.course(&self.craft)
+    }
+
+    fn slope(&self, boat: &DriveState, waves: &WaveField, time_s: f64) -> Surroundings {
+        if waves.is_flat() || boat.centre.length() > SLOPES_M {
+            return Surroundings::default();
+        }
+        let beam_m = 0.3 * self.craft.length_m;
+        let plane = waves.plane_under(boat.centre, boat.heading, self.craft.length_m, beam_m, time_s);
+        Surroundings { forward_slope: plane.forward_slope, port_slope: plane.port_slope, anchor: None }
+    }
+
+    /// Moves the boat off another by `push` (metres), and takes the speed with which it closes (`along` that way, m/s) from it.
+    pub fn push(&mut self, push: DVec2, stop: DVec2) {
+        if let Some(now) = self.kept.last_mut() {
+            now.drive.centre += push;
+            now.drive.surge += stop.dot(ahead(now.drive.heading));
+            now.drive.sway += stop.dot(starboard(now.drive.heading));
+        }
+    }
+
+    /// Forgets what comes after `time_s`.
+    pub(super) fn forget_after(&mut self, time_s: f64) {
+        self.kept.forget_after(time_s);
+    }
+}
+
+/// How a boat of that hull is driven where nothing else is said: by its length.
+pub fn usual_propulsor(length_m: f64) -> Propulsor {
+    if length_m < 12.0 { Propulsor::Outboard } else { Propulsor::Shaft }
+}

@@ -1,0 +1,287 @@
+use std::{f64::consts::PI, sync::Arc};
+
+use glam::{DVec2, Vec3};
+
+use super::*;
+use crate::{
+    geometry::{ahead, heading_of},
+    sea::BeaufortForce,
+    world::{
+        boats::{Act, Course, CrewPlan, CrewState, CrewedStart, Exit, Guard, Propulsor},
+        score::boxed_model,
+        waves::{Spectrum, WaveSpec},
+    },
+};
+
+const KN: f64 = 1852.0 / 3600.0;
+
+fn state(name: &str, act: Act, speed_kn: f64, exits: Vec<Exit>) -> CrewState {
+    CrewState { name: name.to_owned(), act, speed_m_s: speed_kn * KN, exits }
+}
+
+fn exit(guard: Guard, to: usize) -> Exit {
+    Exit { guard, chance: 1.0, to }
+}
+
+fn plan(states: Vec<CrewState>) -> Arc<CrewPlan> {
+    Arc::new(CrewPlan { states })
+}
+
+/// A boat of 7 m that starts at a place by bearing (degrees) and range, towards the gun.
+fn crewed(name: &str, plan: &Arc<CrewPlan>, bearing_deg: f64, range_m: f64, side: Side) -> Vessel {
+    let bearing = bearing_deg.to_radians();
+    let start = CrewedStart {
+        plan: Arc::clone(plan),
+        seed: name.bytes().map(u64::from).sum(),
+        keeps_rules: side == Side::Neutral,
+        propulsor: Propulsor::Outboard,
+        speed_max_m_s: 27.0 * KN,
+        position: ahead(bearing) * range_m,
+        heading: bearing + PI,
+        speed_m_s: 0.0,
+    };
+    Vessel { name: name.to_owned(), side, model: ModelId(0), behaviour: Behaviour::Crewed(start) }
+}
+
+fn models() -> Arc<[Model]> {
+    Arc::new([boxed_model(Vec3::new(-3.5, -1.0, -0.3), Vec3::new(3.5, 1.0, 0.8))])
+}
+
+fn sea(force: u8) -> WaveField {
+    let force = BeaufortForce::new(force).expect("on the scale");
+    WaveField::new(&WaveSpec { spectrum: Spectrum::of_force(force), wind_from: 0.7 }, 3)
+}
+
+fn start() -> Time {
+    Time::from_ns(5_000_000_000)
+}
+
+fn fleet(vessels: Vec<Vessel>, waves: WaveField) -> Fleet {
+    Fleet::new(vessels, models(), waves, start())
+}
+
+/// Follows at 30 frames a second up to `until_s`, with a look at each frame.
+fn follow(fleet: &mut Fleet, from_s: f64, until_s: f64, mut look: impl FnMut(&Fleet, f64)) {
+    let frames = ((until_s - from_s) * 30.0).round() as i32;
+    for frame in 1..=frames {
+        let time_s = from_s + f64::from(frame) / 30.0;
+        fleet.follow(start().plus_secs(time_s));
+        look(fleet, time_s);
+    }
+}
+
+fn place(fleet: &Fleet, boat: usize, time_s: f64) -> CourseState {
+    fleet.boats[boat].history.state(time_s)
+}
+
+/// The ranges of boat 0 over a run, once a second.
+fn ranges(act: Act, speed_kn: f64, bearing_deg: f64, range_m: f64, seconds: f64) -> Vec<f64> {
+    let crew = plan(vec![state("only", act, speed_kn, vec![])]);
+    let mut fleet = fleet(vec![crewed("a", &crew, bearing_deg, range_m, Side::Hostile)], WaveField::FLAT);
+    let mut ranges = Vec::new();
+    follow(&mut fleet, 0.0, seconds, |fleet, time_s| {
+        if (time_s * 30.0).round() as i64 % 30 == 0 {
+            ranges.push(place(fleet, 0, time_s).position.length());
+        }
+    });
+    ranges
+}
+
+#[test]
+fn each_act_does_what_it_is_called() {
+    let last = |ranges: &[f64]| *ranges.last().expect("some");
+    let approach = ranges(Act::Approach { stop_m: 100.0 }, 20.0, 30.0, 600.0, 120.0);
+    assert!((last(&approach) - 100.0).abs() < 20.0, "{approach:?}");
+    assert!(approach.iter().all(|r| *r > 85.0), "it does not run on: {approach:?}");
+    let circle = ranges(Act::Circle { radius_m: 150.0, clockwise: true }, 15.0, 30.0, 300.0, 180.0);
+    assert!(circle[90..].iter().all(|r| (r - 150.0).abs() < 15.0), "{circle:?}");
+    let flee = ranges(Act::Flee, 20.0, 30.0, 200.0, 60.0);
+    assert!(last(&flee) > 550.0, "{flee:?}");
+    let probe = ranges(Act::Probe { turn_m: 200.0 }, 20.0, 30.0, 600.0, 120.0);
+    let nearest = probe.iter().copied().fold(f64::INFINITY, f64::min);
+    assert!((130.0..200.0).contains(&nearest) && last(&probe) > 500.0, "{probe:?}");
+    for (act, within) in
+        [(Act::Loiter { radius_m: 60.0 }, 75.0), (Act::Fish, 220.0), (Act::Anchor, 20.0), (Act::Drift, 5.0)]
+    {
+        let stays = ranges(act.clone(), 3.0, 30.0, 600.0, 600.0);
+        assert!(stays.iter().all(|r| (r - 600.0).abs() < within), "{act:?}: {stays:?}");
+    }
+    let points = vec![ahead(0.3) * 300.0, ahead(-0.3) * 300.0];
+    let crew =
+        plan(vec![state("only", Act::Transit { points: points.clone(), repeat: false }, 12.0, vec![])]);
+    let mut fleet = fleet(vec![crewed("a", &crew, 90.0, 400.0, Side::Hostile)], WaveField::FLAT);
+    let mut nearest = [f64::INFINITY; 2];
+    follow(&mut fleet, 0.0, 200.0, |fleet, time_s| {
+        for (nearest, point) in nearest.iter_mut().zip(&points) {
+            *nearest = nearest.min(place(fleet, 0, time_s).position.distance(*point));
+        }
+    });
+    assert!(nearest.iter().all(|d| *d < 25.0), "{nearest:?}");
+    assert!(place(&fleet, 0, 200.0).speed_m_s.abs() < 0.6, "it lies still at the last");
+}
+
+#[test]
+fn guards_lead_from_state_to_state() {
+    let crew = plan(vec![
+        state(
+            "wait",
+            Act::Loiter { radius_m: 40.0 },
+            4.0,
+            vec![exit(Guard { after_s: Some(5.0), ..Guard::default() }, 1)],
+        ),
+        state(
+            "attack",
+            Act::Attack { stop_m: Some(40.0) },
+            25.0,
+            vec![
+                exit(Guard { hit: true, ..Guard::default() }, 2),
+                exit(Guard { neighbour_hit: true, ..Guard::default() }, 3),
+            ],
+        ),
+        state("give up", Act::Surrender, 0.0, vec![]),
+        state("run", Act::Flee, 25.0, vec![]),
+    ]);
+    let boats = [("a", 10.0), ("b", 20.0), ("far", 200.0)];
+    let vessels = boats.map(|(name, bearing)| crewed(name, &crew, bearing, 500.0, Side::Hostile));
+    let mut fleet = fleet(vessels.to_vec(), sea(3));
+    follow(&mut fleet, 0.0, 4.0, |_, _| {});
+    assert_eq!([0, 1, 2].map(|b| fleet.crew_state(b)), [Some("wait"); 3]);
+    follow(&mut fleet, 4.0, 15.0, |_, _| {});
+    assert_eq!([0, 1, 2].map(|b| fleet.crew_state(b)), [Some("attack"); 3]);
+    fleet.strike(0, Zone::Hull, start().plus_secs(14.99));
+    follow(&mut fleet, 15.0, 40.0, |_, _| {});
+    assert_eq!([0, 1, 2].map(|b| fleet.crew_state(b)), [Some("give up"), Some("run"), Some("attack")]);
+    assert!(place(&fleet, 0, 40.0).speed_m_s.abs() < 1.0, "it lies still");
+}
+
+#[test]
+fn an_engine_that_is_hit_stops_and_a_helm_that_is_hit_is_let_go() {
+    let crew = plan(vec![state("attack", Act::Attack { stop_m: Some(40.0) }, 25.0, vec![])]);
+    for zone in [Zone::Engine, Zone::Helm] {
+        let mut fleet = fleet(vec![crewed("a", &crew, 10.0, 900.0, Side::Hostile)], WaveField::FLAT);
+        follow(&mut fleet, 0.0, 12.0, |_, _| {});
+        let before = place(&fleet, 0, 12.0);
+        assert!(before.speed_m_s > 20.0 * KN, "{before:?}");
+        fleet.strike(0, zone, start().plus_secs(11.98));
+        follow(&mut fleet, 12.0, 60.0, |_, _| {});
+        let after = place(&fleet, 0, 60.0);
+        assert!(after.speed_m_s < 1.5, "{zone:?}: {after:?}");
+        assert!(before.position.distance(after.position) < 120.0, "{zone:?}");
+    }
+}
+
+/// Crews of all kinds about the gun: attackers, one that rams, fishing boats, passers-by and a scripted ship.
+fn crowd(count: usize) -> Vec<Vessel> {
+    let attack = plan(vec![
+        state(
+            "wait",
+            Act::Loiter { radius_m: 30.0 },
+            4.0,
+            vec![exit(Guard { after_s: Some(20.0), ..Guard::default() }, 1)],
+        ),
+        state(
+            "attack",
+            Act::Attack { stop_m: Some(40.0) },
+            20.0,
+            vec![exit(Guard { within_m: Some(60.0), ..Guard::default() }, 2)],
+        ),
+        state("circle", Act::Circle { radius_m: 70.0, clockwise: true }, 15.0, vec![]),
+    ]);
+    let fish = plan(vec![state("fish", Act::Fish, 3.0, vec![])]);
+    let feint = plan(vec![state(
+        "probe",
+        Act::Probe { turn_m: 120.0 },
+        22.0,
+        vec![exit(Guard { arrived: true, ..Guard::default() }, 0)],
+    )]);
+    let through = vec![DVec2::new(400.0, 60.0), DVec2::new(-400.0, -80.0)];
+    let transit = plan(vec![state("pass", Act::Transit { points: through, repeat: true }, 10.0, vec![])]);
+    let mut vessels: Vec<Vessel> = (0..count)
+        .map(|i| {
+            let (crew, side) = match i % 5 {
+                0 | 1 => (&attack, Side::Hostile),
+                2 => (&feint, Side::Hostile),
+                3 => (&fish, Side::Neutral),
+                _ => (&transit, Side::Neutral),
+            };
+            let bearing = 360.0 * i as f64 / count as f64;
+            crewed(&format!("boat-{i}"), crew, bearing, 250.0 + 23.0 * (i % 7) as f64, side)
+        })
+        .collect();
+    let course = Course::straight(DVec2::new(-450.0, 170.0), 0.5 * PI, 3.0).expect("it can be sailed");
+    let behaviour = Behaviour::ScriptedCourse(course);
+    vessels.push(Vessel { name: "scripted".to_owned(), side: Side::Neutral, model: ModelId(0), behaviour });
+    vessels
+}
+
+#[test]
+fn boats_keep_clear_of_each_other_and_of_the_own_ship() {
+    for (count, force, seconds) in [(12, 2, 300.0), (30, 4, 120.0)] {
+        let mut fleet = fleet(crowd(count), sea(force));
+        let (mut closest, mut nearest) = ((f64::INFINITY, 0, 0, 0.0), f64::INFINITY);
+        follow(&mut fleet, 0.0, seconds, |fleet, time_s| {
+            let hulls: Vec<_> = fleet.boats.iter().map(|b| b.capsule(time_s)).collect();
+            for i in 0..hulls.len() {
+                nearest = nearest.min(hulls[i].gap_m(&OWN_HULL));
+                for j in 0..i {
+                    let gap = hulls[i].gap_m(&hulls[j]);
+                    if gap < closest.0 {
+                        closest = (gap, i, j, time_s);
+                    }
+                }
+            }
+        });
+        let beam_m = 2.0;
+        println!("{count} boats: {closest:?}, own ship {nearest}");
+        assert!(closest.0 > beam_m, "{count} boats: {closest:?}");
+        assert!(nearest > beam_m, "{count} boats: {nearest} m from the own ship");
+    }
+}
+
+#[test]
+fn one_that_rams_reaches_the_own_ship_and_no_further() {
+    let crew = plan(vec![state("ram", Act::Attack { stop_m: None }, 25.0, vec![])]);
+    let mut fleet = fleet(vec![crewed("a", &crew, 40.0, 400.0, Side::Hostile)], sea(3));
+    let mut nearest = f64::INFINITY;
+    follow(&mut fleet, 0.0, 90.0, |fleet, time_s| {
+        nearest = nearest.min(fleet.boats[0].capsule(time_s).gap_m(&OWN_HULL));
+    });
+    assert!((-0.5..0.1).contains(&nearest), "{nearest} m");
+}
+
+#[test]
+fn where_crews_are_does_not_depend_on_the_pace_of_frames() {
+    let strikes = [(0_usize, Zone::Engine, 31.234), (7, Zone::Hull, 47.0)];
+    let run = |frames: &[f64]| {
+        let mut fleet = fleet(crowd(15), sea(4));
+        let mut due = strikes.iter().peekable();
+        for time_s in frames {
+            fleet.follow(start().plus_secs(*time_s));
+            if let Some((boat, zone, at)) = due.next_if(|(_, _, at)| at <= time_s) {
+                fleet.strike(*boat, *zone, start().plus_secs(*at));
+            }
+        }
+        (0..16).map(|b| fleet.floating(b, start().plus_secs(59.0)).expect("there").pose).collect::<Vec<_>>()
+    };
+    let steady: Vec<f64> = (1..=1800).map(|i| f64::from(i) / 30.0).collect();
+    let mut stuttering: Vec<f64> = (1..=600).map(|i| 0.1 * f64::from(i) + 0.013 * f64::from(i % 5)).collect();
+    stuttering.retain(|t| !(40.0..41.0).contains(t));
+    stuttering.push(60.0);
+    assert_eq!(run(&steady), run(&stuttering));
+}
+
+#[test]
+fn a_course_over_ground_is_where_the_boat_goes() {
+    let mut fleet = fleet(crowd(10), WaveField::FLAT);
+    follow(&mut fleet, 0.0, 60.0, |fleet, time_s| {
+        if time_s < 1.0 {
+            return;
+        }
+        for boat in 0..10 {
+            let (now, before) = (place(fleet, boat, time_s), place(fleet, boat, time_s - 1.0 / 60.0));
+            let went = (now.position - before.position) * 60.0;
+            let off = went.distance(0.5 * (now.velocity() + before.velocity()));
+            assert!(off < 0.05, "{boat} at {time_s}: {off} m/s, {}", heading_of(went));
+        }
+    });
+}
