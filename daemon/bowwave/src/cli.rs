@@ -2,6 +2,7 @@
 
 mod calibrate;
 mod mounting;
+mod scenario;
 
 use std::{ffi::OsString, path::PathBuf};
 
@@ -14,6 +15,9 @@ pub use calibrate::{Calibrate, CalibrateBoard, CalibrateIntrinsics, CalibrateTas
 pub use mounting::{
     CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
     CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
+};
+pub use scenario::{
+    ScenarioArgs, ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview,
 };
 
 /// On-gun augmented-reality trainer for small-boat defence. It trains only: no output leads to a firing circuit.
@@ -46,6 +50,8 @@ pub enum ProgramCommand {
     /// Make the user study of real and generated reflections, or score its answers (with bowwave-lab)
     #[command(disable_help_flag = true)]
     Study(LabArguments),
+    /// Write, check and preview scenarios, and list those that are built in
+    Scenario(ScenarioArgs),
     /// Print what a scenario needs: passes, shader variants, memory, and why the rest is left out
     Plan(PlanArgs),
     /// Check this computer: GPU, camera, serial lines, trigger lines, disk; each with what to do about it

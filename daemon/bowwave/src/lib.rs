@@ -19,6 +19,7 @@ mod plan;
 pub mod program;
 mod replay;
 mod run;
+mod scenario;
 mod simulate;
 pub mod stdout;
 pub mod today;
@@ -55,6 +56,7 @@ fn dispatch(
         ProgramCommand::Import(lab) => laboratory::run("import", *verbose, &lab.arguments),
         ProgramCommand::Compose(lab) => laboratory::run("compose", *verbose, &lab.arguments),
         ProgramCommand::Study(lab) => laboratory::run("study", *verbose, &lab.arguments),
+        ProgramCommand::Scenario(arguments) => scenario::run(&arguments.command),
         ProgramCommand::Plan(arguments) => plan::run(arguments).map(|()| Outcome::Done),
         ProgramCommand::Doctor(arguments) => {
             doctor::run(arguments).map(|well| if well { Outcome::Done } else { Outcome::Failed })

@@ -10,7 +10,10 @@ use bowwave_core::{
         scene::{Pass, PassDecision},
     },
     model::Model,
-    world::scenario::{self, Scenario},
+    world::{
+        boats::Behaviour,
+        scenario::{self, Scenario},
+    },
 };
 use bowwave_render::{RenderConfig, Renderer};
 use serde::Serialize;
@@ -27,6 +30,8 @@ struct Printed {
     scenario: String,
     size: String,
     boats: Vec<PrintedBoat>,
+    /// What the world's stage does, pass by pass.
+    world: Vec<PrintedPass>,
     passes: Vec<PrintedPass>,
     variants: Vec<String>,
     /// As allocated on `device`, for three frames in flight.
@@ -98,6 +103,7 @@ pub fn run(arguments: &PlanArgs) -> Result<()> {
                 })
             })
             .collect(),
+        world: world(&scenario),
         passes: Pass::ALL.into_iter().map(|p| printed_pass(&plan, p)).collect(),
         variants: variants(&plan),
         memory_bytes: memory.iter().map(|m| m.bytes).sum(),
@@ -116,6 +122,24 @@ fn memory(plan: &ScenePlan, models: &[Model]) -> (Vec<PrintedMemory>, String) {
         }
         Err(e) => (Vec::new(), format!("none: {e}")),
     }
+}
+
+/// The world's parts, and what a scenario does not pay for.
+fn world(scenario: &Scenario) -> Vec<PrintedPass> {
+    let crewed = scenario.boats.iter().any(|b| matches!(b.behaviour, Behaviour::Crewed(_)));
+    let flat = scenario.wave_field().is_flat() && !scenario.sea_from_video;
+    let part =
+        |pass, runs, when, otherwise| PrintedPass { pass, runs, why: if runs { when } else { otherwise } };
+    vec![
+        part(
+            "crews",
+            crewed,
+            "60 steps a second, decisions ten times a second",
+            "no boat has a crew: none sees the others",
+        ),
+        part("waves", !flat, "boats within 2.5 km ride them", "a flat sea"),
+        part("rounds", scenario.weapon.belt > 0, "while one is in the air", "no rounds in the belt"),
+    ]
 }
 
 fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
@@ -165,9 +189,11 @@ fn text_of(plan: &Printed) -> String {
     if plan.boats.is_empty() {
         text += "  none\n";
     }
-    text += "\npasses\n";
-    for p in &plan.passes {
-        text += &format!("  {:<8} {:<9} {}\n", p.pass, if p.runs { "runs" } else { "left out" }, p.why);
+    for (heading, parts) in [("world", &plan.world), ("passes", &plan.passes)] {
+        text += &format!("\n{heading}\n");
+        for p in parts {
+            text += &format!("  {:<8} {:<9} {}\n", p.pass, if p.runs { "runs" } else { "left out" }, p.why);
+        }
     }
     text += "\nshader variants\n";
     for v in &plan.variants {

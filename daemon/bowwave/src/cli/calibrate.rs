@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bowwave_calibration::target::{Target, TargetError};
-use bowwave_core::text::toml::TEXT_BYTES_MAX;
+use bowwave_core::text::{one_line, toml::TEXT_BYTES_MAX};
 use clap::{Args, Subcommand};
 
 use super::mounting::{
@@ -98,5 +98,23 @@ pub(super) fn parse_board(text: &str) -> Result<Target, String> {
     let yaml = bowwave_files::plain_text(path, TEXT_BYTES_MAX).map_err(|e| {
         format!("cannot read {text}: {e}; `bowwave calibrate board --kalibr {text}` writes one")
     })?;
-    Target::of_kalibr(&yaml).map_err(|e| format!("{text}: {e}"))
+    // The parser of arguments prints this as it is, and the file may hold anything.
+    Target::of_kalibr(&yaml).map_err(|e| one_line(&format!("{text}: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_of_a_board_says_is_quoted_without_its_controls() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("board.yaml");
+        let text =
+            "target_type: 'apri\u{202e}txt.exe'\ntagCols: 6\ntagRows: 6\ntagSize: 0.022\ntagSpacing: 0.3\n";
+        std::fs::write(&file, text).expect("written");
+        let error = parse_board(&file.to_string_lossy()).expect_err("no known board");
+        assert!(error.contains("'apri\\u{202e}txt.exe'"), "{error}");
+        assert!(!error.contains('\u{202e}'), "{error}");
+    }
 }

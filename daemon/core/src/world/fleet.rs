@@ -14,7 +14,7 @@ use crate::{
             step_after, step_seconds,
         },
         contact,
-        scenario::Side,
+        scenario::{BoatSpec, Scenario, Side},
         waves::WaveField,
     },
 };
@@ -30,6 +30,19 @@ pub struct Vessel {
     pub model: ModelId,
     /// Its behaviour.
     pub behaviour: Behaviour,
+}
+
+impl Vessel {
+    /// The boats of a scenario. `boat_models` names the model of each.
+    pub fn of_scenario(scenario: &Scenario, boat_models: &[ModelId]) -> Vec<Self> {
+        let vessel = |(boat, model): (&BoatSpec, &ModelId)| Self {
+            name: boat.name.clone(),
+            side: boat.side,
+            model: *model,
+            behaviour: boat.behaviour.clone(),
+        };
+        scenario.boats.iter().zip(boat_models).map(vessel).collect()
+    }
 }
 
 /// A boat on the water at one time.
@@ -120,6 +133,16 @@ impl Fleet {
         };
         let boats = vessels.into_iter().map(boat).collect();
         Self { boats, models, waves, start, followed: start, struck: Vec::new() }
+    }
+
+    /// The boats of a scenario. `boat_models` names the model of each.
+    pub fn of_scenario(
+        scenario: &Scenario,
+        models: Arc<[Model]>,
+        boat_models: &[ModelId],
+        start: Time,
+    ) -> Self {
+        Self::new(Vessel::of_scenario(scenario, boat_models), models, scenario.wave_field(), start)
     }
 
     /// Follows all boats up to `time`.

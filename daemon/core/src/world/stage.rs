@@ -89,15 +89,9 @@ pub struct RunningWorld {
 impl World {
     /// The world of a scenario before it begins. `boat_models` names the model of each of its boats.
     pub fn new(scenario: &Scenario, models: Arc<[Model]>, boat_models: &[ModelId]) -> Self {
-        let vessels = scenario.boats.iter().zip(boat_models).map(|(boat, model)| Vessel {
-            name: boat.name.clone(),
-            side: boat.side,
-            model: *model,
-            behaviour: boat.behaviour.clone(),
-        });
         Self {
             name: scenario.name.clone(),
-            vessels: vessels.collect(),
+            vessels: Vessel::of_scenario(scenario, boat_models),
             models,
             ammunition: Ammunition { weapon: scenario.weapon, wind: scenario.wind, seed: scenario.seed },
             weapon: Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt),

@@ -8,6 +8,7 @@ mod clock;
 mod colour;
 mod depth;
 mod drawn;
+mod driving;
 mod flight;
 mod fresnel;
 mod fusion;
@@ -80,6 +81,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: sea::ABOUT, measure: sea::measure },
     NumericalPart { about: wavefield::ABOUT, measure: wavefield::measure },
     NumericalPart { about: motion::ABOUT, measure: motion::measure },
+    NumericalPart { about: driving::ABOUT, measure: driving::measure },
     NumericalPart { about: reflection::ABOUT, measure: reflection::measure },
     NumericalPart { about: fresnel::ABOUT, measure: fresnel::measure },
     NumericalPart { about: colour::ABOUT, measure: colour::measure },

@@ -104,19 +104,17 @@ impl CrewedBoat {
             (false, false) => memory.orders,
         };
         let around =
-            Surroundings { anchor: self.plan.anchor(&memory), ..self.slope(&now.drive, view.waves, time_s) };
+            Surroundings { anchor: self.plan.anchor(&memory), ..self.slopes(&now.drive, view.waves, time_s) };
         let drive = self.craft.step(&now.drive, &orders, &around, STEP_S);
         self.kept.push(Crewed { drive, memory });
         drive.course(&self.craft)
     }
 
-    fn slope(&self, boat: &DriveState, waves: &WaveField, time_s: f64) -> Surroundings {
-        if waves.is_flat() || boat.centre.length() > SLOPES_M {
+    fn slopes(&self, boat: &DriveState, waves: &WaveField, time_s: f64) -> Surroundings {
+        if boat.centre.length() > SLOPES_M {
             return Surroundings::default();
         }
-        let beam_m = 0.3 * self.craft.length_m;
-        let plane = waves.plane_under(boat.centre, boat.heading, self.craft.length_m, beam_m, time_s);
-        Surroundings { forward_slope: plane.forward_slope, port_slope: plane.port_slope, anchor: None }
+        self.craft.slopes(boat, waves, time_s, STEP_S)
     }
 
     /// Moves the boat off another by `push` (metres), and takes the speed with which it closes (`along` that way, m/s) from it.

@@ -17,7 +17,9 @@ pub use behaviour::{Behaviour, CrewedStart};
 pub use course::{Arrival, BoatDamage, Course, CourseError, CourseState};
 pub use crew::{Act, CrewPlan, CrewState, Exit, Guard, Signals, Traffic};
 pub use crewed::{StepView, usual_propulsor};
-pub use drive::{Craft, DriveState, HullRunning, Orders, PlaningSurface, Propulsor, Running, Surroundings};
+pub use drive::{
+    Craft, DriveRates, DriveState, HullRunning, Orders, PlaningSurface, Propulsor, Running, Surroundings,
+};
 pub use floating::{Floating, WayAttitude, facing, quasi_static};
 pub(crate) use grid::{seconds as step_seconds, step_after};
 pub use history::{BoatHistory, HISTORY_S};

@@ -17,6 +17,8 @@ use crate::text::toml::TomlError;
 /// Text of the scenario that is played when none is named: three boats, all within a northward camera's sweep.
 pub const DEFAULT: &str = include_str!("../../../scenarios/default.toml");
 
+/// Text that a new scenario begins with: an example of everything, explained.
+pub const TEMPLATE: &str = include_str!("../../../templates/scenario.toml");
 /// Names and texts of the scenarios that need no file.
 pub const BUILT_IN: [(&str, &str); 6] = [
     ("default", DEFAULT),

@@ -1,6 +1,7 @@
 //! The program that shoots into a failing disk: the trainer's own storage, a signal handler, and a log.
 
 use std::{
+    io::Write as _,
     path::Path,
     sync::{Arc, atomic},
     thread,
@@ -82,7 +83,9 @@ impl log::Log for StderrLog {
 
     fn log(&self, record: &log::Record<'_>) {
         if self.enabled(record.metadata()) {
-            eprintln!("{}: {}", record.level(), record.args());
+            // A line is written at once, as the program's own log does: one that is killed leaves none in halves.
+            let line = format!("{}: {}\n", record.level(), record.args());
+            let _ = std::io::stderr().write_all(line.as_bytes());
         }
     }
 

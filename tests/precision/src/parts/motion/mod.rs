@@ -2,7 +2,7 @@
 
 mod boat;
 mod stiff;
-mod system;
+pub(super) mod system;
 
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::{

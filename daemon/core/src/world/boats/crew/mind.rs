@@ -1,5 +1,7 @@
 //! A crew at work: from what it sees to throttle and helm.
 
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
 use glam::DVec2;
 use rand::RngExt;
 use rand_pcg::Pcg64;
@@ -158,67 +160,36 @@ impl CrewPlan {
     }
 
     fn wish(&self, craft: &Craft, boat: &DriveState, memory: &mut CrewMemory, at: &Situation<'_>) -> Wish {
-        let stop = Wish { bound: None, arrived: true, rams: false, idles: false };
-        let Some(state) = self.states.get(memory.state) else { return stop };
+        let Some(state) = self.states.get(memory.state) else { return Wish::STOP };
         let speed = state.speed_m_s.min(craft.speed_max_m_s);
-        let go = |to: f64, speed_m_s: f64| Wish {
-            bound: Some(Bound { course: to, speed_m_s }),
-            arrived: false,
-            rams: false,
-            idles: false,
-        };
         let (range_m, outward) = (boat.centre.length(), heading_of(boat.centre));
-        let inward = wrap(outward + std::f64::consts::PI);
-        // A boat needs some lengths to lose its way.
-        let slow = |distance_m: f64| speed.min(1.0 + distance_m.max(0.0) / (2.0 * craft.length_m) * 2.0);
+        let inward = wrap(outward + PI);
         match &state.act {
-            Act::Transit { points, repeat } => {
-                let count = points.len() as u32;
-                let Some(mut to) = points.get(memory.leg as usize) else { return stop };
-                if boat.centre.distance(*to) < REACHED_LENGTHS * craft.length_m {
-                    memory.leg = if *repeat { (memory.leg + 1) % count.max(1) } else { memory.leg + 1 };
-                    match points.get(memory.leg as usize) {
-                        Some(next) => to = next,
-                        None => return stop,
-                    }
-                }
-                let last = !*repeat && memory.leg + 1 == count;
-                let left_m = boat.centre.distance(*to);
-                go(heading_of(*to - boat.centre), if last { slow(left_m) } else { speed })
-            }
-            Act::Loiter { radius_m } => {
-                let off = boat.centre - memory.from;
-                if off.length() < 0.5 * radius_m && memory.leg == 0 {
-                    return Wish { arrived: false, ..stop };
-                }
-                memory.leg = u32::from(off.length() > 0.3 * radius_m);
-                if memory.leg == 0 {
-                    return Wish { arrived: false, ..stop };
-                }
-                go(heading_of(-off), speed)
-            }
+            Act::Transit { points, repeat } => transit(craft, boat, memory, (points, *repeat), speed),
+            Act::Loiter { radius_m } => loiter(boat, memory, *radius_m, speed),
             Act::Fish => fish(boat, memory, at, speed),
-            Act::Anchor | Act::Drift => Wish { arrived: false, idles: true, ..stop },
-            Act::Stop | Act::Surrender => stop,
+            Act::Anchor | Act::Drift => Wish { arrived: false, idles: true, ..Wish::STOP },
+            Act::Stop | Act::Surrender => Wish::STOP,
             Act::Approach { stop_m } | Act::Attack { stop_m: Some(stop_m) } => {
                 let left_m = range_m - stop_m;
-                if left_m < craft.length_m { stop } else { go(inward, slow(left_m)) }
+                let near = left_m < craft.length_m;
+                if near { Wish::STOP } else { Wish::go(inward, craft.slowing(speed, left_m)) }
             }
-            Act::Attack { stop_m: None } => Wish { rams: true, ..go(inward, speed) },
+            Act::Attack { stop_m: None } => Wish { rams: true, ..Wish::go(inward, speed) },
             Act::Probe { turn_m } => {
                 if memory.leg == 0 && range_m < *turn_m {
                     memory.leg = 1;
                 }
                 let arrived = memory.leg == 1 && range_m > 2.0 * turn_m;
-                Wish { arrived, ..go(if memory.leg == 0 { inward } else { outward }, speed) }
+                Wish { arrived, ..Wish::go(if memory.leg == 0 { inward } else { outward }, speed) }
             }
             Act::Circle { radius_m, clockwise } => {
                 let side = if *clockwise { 1.0 } else { -1.0 };
                 // Along the circle, and towards it by how far off it is.
                 let off = ((range_m - radius_m) / (0.5 * radius_m)).clamp(-1.0, 1.0);
-                go(outward + side * std::f64::consts::FRAC_PI_2 * (1.0 + off * 0.9), speed)
+                Wish::go(outward + side * FRAC_PI_2 * (1.0 + off * 0.9), speed)
             }
-            Act::Flee => Wish { arrived: false, ..go(outward, speed) },
+            Act::Flee => Wish::go(outward, speed),
         }
     }
 
@@ -245,12 +216,55 @@ impl CrewPlan {
     }
 }
 
+impl Wish {
+    /// To lie still, which is done.
+    const STOP: Self = Self { bound: None, arrived: true, rams: false, idles: false };
+
+    /// To go on a course at a speed, which is not done.
+    const fn go(course: f64, speed_m_s: f64) -> Self {
+        Self { bound: Some(Bound { course, speed_m_s }), arrived: false, rams: false, idles: false }
+    }
+}
+
+/// From point to point, to the last or for ever.
+fn transit(
+    craft: &Craft,
+    boat: &DriveState,
+    memory: &mut CrewMemory,
+    (points, repeat): (&[DVec2], bool),
+    speed_m_s: f64,
+) -> Wish {
+    let count = points.len() as u32;
+    let reached = |to: &DVec2| boat.centre.distance(*to) < REACHED_LENGTHS * craft.length_m;
+    if points.get(memory.leg as usize).is_some_and(reached) {
+        memory.leg = if repeat { (memory.leg + 1) % count.max(1) } else { memory.leg + 1 };
+    }
+    let Some(to) = points.get(memory.leg as usize) else { return Wish::STOP };
+    let off = *to - boat.centre;
+    let is_last = !repeat && memory.leg + 1 == count;
+    Wish::go(heading_of(off), if is_last { craft.slowing(speed_m_s, off.length()) } else { speed_m_s })
+}
+
+/// Drifts until it is half the radius off, then goes back to a third of it.
+fn loiter(boat: &DriveState, memory: &mut CrewMemory, radius_m: f64, speed_m_s: f64) -> Wish {
+    let off = boat.centre - memory.from;
+    let limit = if memory.leg == 0 { 0.5 } else { 0.3 };
+    memory.leg = u32::from(off.length() > limit * radius_m);
+    let back = Wish::go(heading_of(-off), speed_m_s);
+    if memory.leg == 0 { Wish { arrived: false, ..Wish::STOP } } else { back }
+}
+
 /// The turn that helmsmen dare at a speed, rad/s.
 pub(crate) fn hard_turn(speed_m_s: f64) -> f64 {
     TURN_MAX.min(HARD_TURN_G * GRAVITY_M_S2 / speed_m_s.abs().max(0.1))
 }
 
 impl Craft {
+    /// The speed at which a boat comes to a place that is so far off: it needs some lengths to lose its way.
+    fn slowing(&self, speed_m_s: f64, distance_m: f64) -> f64 {
+        speed_m_s.min(1.0 + distance_m.max(0.0) / self.length_m)
+    }
+
     /// Throttle and helm that bring the boat to a course and a speed.
     pub fn steer_for(&self, boat: &DriveState, bound: Bound) -> Orders {
         /// The turn that is wanted by what is missing of the course, 1/s.
@@ -289,7 +303,7 @@ fn fish(boat: &DriveState, memory: &mut CrewMemory, at: &Situation<'_>, speed_m_
     let drawn = |leg: u32, what: u64| chance(at.seed, [visit | u64::from(leg), FISHING + what]);
     let leg_s = 30.0 + 90.0 * drawn(memory.leg, 0);
     // Four legs go about the same way.
-    let course = std::f64::consts::TAU * drawn(memory.leg / 4, 1) + 1.5 * (drawn(memory.leg, 2) - 0.5);
+    let course = TAU * drawn(memory.leg / 4, 1) + 1.5 * (drawn(memory.leg, 2) - 0.5);
     let moving = memory.leg.is_multiple_of(2);
     if at.time_s - memory.leg_since_s > leg_s {
         memory.leg += 1;
@@ -299,7 +313,7 @@ fn fish(boat: &DriveState, memory: &mut CrewMemory, at: &Situation<'_>, speed_m_
     let home = memory.from - boat.centre;
     let course = if home.length() > 150.0 { heading_of(home) } else { course };
     let bound = moving.then_some(Bound { course, speed_m_s });
-    Wish { bound, arrived: false, rams: false, idles: false }
+    Wish { bound, arrived: false, ..Wish::STOP }
 }
 
 /// A number from 0 to 1 that follows from a boat's seed and what is drawn for.

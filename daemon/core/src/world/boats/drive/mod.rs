@@ -5,5 +5,5 @@ mod motion;
 mod resistance;
 
 pub use craft::{Craft, Propulsor};
-pub use motion::{DriveState, Orders, Surroundings};
+pub use motion::{DriveRates, DriveState, Orders, Surroundings};
 pub use resistance::{HullRunning, PlaningSurface, Running};

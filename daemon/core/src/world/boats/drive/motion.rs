@@ -7,15 +7,21 @@ use super::craft::{Craft, Propulsor};
 use crate::{
     geometry::{ahead, starboard},
     physics::GRAVITY_M_S2,
-    world::boats::{
-        course::CourseState,
-        floating::{PLANING_RISE, WayAttitude, lean},
-        hull::WATER_KG_M3,
+    world::{
+        boats::{
+            course::CourseState,
+            floating::{PLANING_RISE, WayAttitude, lean},
+            hull::WATER_KG_M3,
+        },
+        waves::WaveField,
     },
 };
 
 /// A propeller that turns slower than this, of 1, brakes.
 const BRAKES_BELOW: f64 = 0.3;
+
+/// Width over which the slope of the water is taken, by the length.
+const BEAM: f64 = 0.3;
 
 /// What a helmsman orders.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,12 +64,17 @@ pub struct Surroundings {
 
 /// Changes a second of what the forces move.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Rates {
-    centre: DVec2,
-    heading: f64,
-    surge: f64,
-    sway: f64,
-    yaw_rate: f64,
+pub struct DriveRates {
+    /// Velocity over the ground, world x and y, m/s.
+    pub centre: DVec2,
+    /// Of the heading, rad/s.
+    pub heading: f64,
+    /// Of the speed ahead, m/s^2.
+    pub surge: f64,
+    /// Of the speed to starboard, m/s^2.
+    pub sway: f64,
+    /// Of the turn, rad/s^2.
+    pub yaw_rate: f64,
 }
 
 impl DriveState {
@@ -90,7 +101,7 @@ impl DriveState {
         }
     }
 
-    fn moved(&self, rates: &Rates, seconds: f64) -> Self {
+    fn moved(&self, rates: &DriveRates, seconds: f64) -> Self {
         Self {
             centre: self.centre + rates.centre * seconds,
             heading: self.heading + rates.heading * seconds,
@@ -158,13 +169,25 @@ impl Craft {
         (m.bollard_n * (gross * cos - turns.abs() * share - drag), -m.bollard_n * gross * sin)
     }
 
+    /// The slopes of the waves under a boat, in the middle of a step of `h` seconds from `time_s` on.
+    pub fn slopes(&self, boat: &DriveState, waves: &WaveField, time_s: f64, h: f64) -> Surroundings {
+        if waves.is_flat() {
+            return Surroundings::default();
+        }
+        let velocity = ahead(boat.heading) * boat.surge + starboard(boat.heading) * boat.sway;
+        let (centre, heading) =
+            (boat.centre + velocity * (0.5 * h), boat.heading + boat.yaw_rate * (0.5 * h));
+        let plane = waves.plane_under(centre, heading, self.length_m, BEAM * self.length_m, time_s + 0.5 * h);
+        Surroundings { forward_slope: plane.forward_slope, port_slope: plane.port_slope, anchor: None }
+    }
+
     /// The state `h` seconds later under orders. Heun's method; engine and helm go to what is ordered by their own laws, which have closed
     /// forms, before and after half of the step.
     pub fn step(&self, state: &DriveState, orders: &Orders, around: &Surroundings, h: f64) -> DriveState {
         let start = self.obey(state, orders, 0.5 * h);
         let now = self.rates(&start, around);
         let then = self.rates(&start.moved(&now, h), around);
-        let mean = Rates {
+        let mean = DriveRates {
             centre: 0.5 * (now.centre + then.centre),
             heading: 0.5 * (now.heading + then.heading),
             surge: 0.5 * (now.surge + then.surge),
@@ -175,8 +198,8 @@ impl Craft {
         if next.is_sane() { next } else { DriveState { surge: 0.0, sway: 0.0, yaw_rate: 0.0, ..*state } }
     }
 
-    /// Engine and helm after `seconds` under orders.
-    fn obey(&self, state: &DriveState, orders: &Orders, seconds: f64) -> DriveState {
+    /// Engine and helm after `seconds` under orders: the rest stays.
+    pub fn obey(&self, state: &DriveState, orders: &Orders, seconds: f64) -> DriveState {
         let m = &self.machinery;
         let throttle = orders.throttle.clamp(-m.astern, 1.0);
         let engine = throttle + (state.engine - throttle) * (-seconds / m.spool_s).exp();
@@ -185,7 +208,8 @@ impl Craft {
         DriveState { engine, steer: state.steer + off.clamp(-turned, turned), ..*state }
     }
 
-    fn rates(&self, state: &DriveState, around: &Surroundings) -> Rates {
+    /// What the forces on a boat make of its motion, engine and helm as they stand.
+    pub fn rates(&self, state: &DriveState, around: &Surroundings) -> DriveRates {
         let DriveState { surge: u, sway: v, yaw_rate: r, .. } = *state;
         let running = self.running.at(u);
         let (drive_x, drive_y) = self.drive(state);
@@ -201,7 +225,7 @@ impl Craft {
         // On the plane less water goes along sideways.
         let sway_kg = self.mass_kg + (self.sway_kg - self.mass_kg) * (1.0 - 0.7 * running.planing);
         let forward = ahead(state.heading);
-        Rates {
+        DriveRates {
             centre: forward * u + starboard(state.heading) * v,
             heading: r,
             surge: (x + 0.5 * (self.mass_kg + sway_kg) * v * r) / self.surge_kg,

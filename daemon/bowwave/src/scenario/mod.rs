@@ -1,0 +1,169 @@
+//! `bowwave scenario`: what an instructor does with scenarios before they are played.
+
+mod chart;
+mod rehearsal;
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use bowwave_core::{
+    model::Model,
+    world::{
+        boats::Behaviour,
+        scenario::{self, Scenario, Side},
+    },
+};
+use serde::Serialize;
+
+use crate::{
+    cli::{ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview},
+    loading::{read_scenario, scenario_models, warn_of_former_names},
+    outcome::Outcome,
+    stdout,
+};
+
+/// Runs a task of `scenario`.
+pub fn run(command: &ScenarioCommand) -> Result<Outcome> {
+    match command {
+        ScenarioCommand::List(arguments) => list(arguments),
+        ScenarioCommand::Check(arguments) => check(arguments),
+        ScenarioCommand::Preview(arguments) => preview(arguments),
+        ScenarioCommand::New(arguments) => new(arguments),
+    }
+}
+
+/// A scenario in a list.
+#[derive(Debug, Serialize)]
+struct Listed {
+    name: String,
+    title: String,
+    hostile: usize,
+    neutral: usize,
+    crewed: usize,
+    duration_s: Option<f64>,
+    beaufort: u8,
+}
+
+impl Listed {
+    fn of(name: &str, scenario: &Scenario) -> Self {
+        let of_side = |side: Side| scenario.boats.iter().filter(|b| b.side == side).count();
+        Self {
+            name: name.to_owned(),
+            title: scenario.name.clone(),
+            hostile: of_side(Side::Hostile),
+            neutral: of_side(Side::Neutral),
+            crewed: scenario.boats.iter().filter(|b| matches!(b.behaviour, Behaviour::Crewed(_))).count(),
+            duration_s: scenario.duration_s,
+            beaufort: scenario.water.force.get(),
+        }
+    }
+}
+
+fn list(arguments: &ScenarioList) -> Result<Outcome> {
+    let listed = scenario::BUILT_IN
+        .iter()
+        .map(|(name, text)| Ok(Listed::of(name, &Scenario::parse(text, name)?)))
+        .collect::<Result<Vec<_>>>()?;
+    if arguments.json {
+        stdout::print_json(&listed)?;
+        return Ok(Outcome::Done);
+    }
+    let mut text = format!(
+        "{:<14} {:<22} {:>7} {:>7} {:>6} {:>9} {:>8}\n",
+        "name", "title", "hostile", "neutral", "crewed", "seconds", "Beaufort"
+    );
+    for l in &listed {
+        let seconds = l.duration_s.map_or_else(|| "no end".to_owned(), |s| format!("{s:.0}"));
+        text += &format!(
+            "{:<14} {:<22} {:>7} {:>7} {:>6} {:>9} {:>8}\n",
+            l.name, l.title, l.hostile, l.neutral, l.crewed, seconds, l.beaufort
+        );
+    }
+    text += "\nPlay one with `bowwave simulate --scenario NAME`, look at it with `bowwave scenario preview NAME`.\n";
+    stdout::print(text)?;
+    Ok(Outcome::Done)
+}
+
+/// A scenario that was read and checked, with its models.
+struct Loaded {
+    scenario: Scenario,
+    models: Vec<Model>,
+    of_boats: Vec<bowwave_core::model::ModelId>,
+}
+
+fn load(path: &Path) -> Result<Loaded> {
+    let (text, base) = read_scenario(path)?;
+    let scenario = Scenario::parse(&text, &path.display().to_string())?;
+    warn_of_former_names(&scenario.warnings);
+    let (models, of_boats) = scenario_models(&scenario, &base)?;
+    let radius =
+        |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
+    scenario.check_clearance(&of_boats.iter().map(radius).collect::<Vec<_>>())?;
+    Ok(Loaded { scenario, models, of_boats })
+}
+
+fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
+    let mut outcome = Outcome::Done;
+    for path in &arguments.files {
+        match load(path) {
+            Ok(loaded) => {
+                let l = Listed::of(&path.display().to_string(), &loaded.scenario);
+                stdout::print(format!(
+                    "{}: \"{}\" is sound: {} hostile and {} neutral boats, {} with crews\n",
+                    l.name, l.title, l.hostile, l.neutral, l.crewed
+                ))?;
+            }
+            Err(e) => {
+                eprintln!("bowwave: {}", bowwave_core::text::one_line(&format!("{e:#}")));
+                outcome = Outcome::Failed;
+            }
+        }
+    }
+    Ok(outcome)
+}
+
+fn preview(arguments: &ScenarioPreview) -> Result<Outcome> {
+    let loaded = load(&arguments.scenario)?;
+    let out = arguments.out.clone().unwrap_or_else(|| {
+        let stem = arguments.scenario.file_stem().map_or_else(|| "scenario".into(), |s| s.to_string_lossy());
+        format!("{stem}.svg").into()
+    });
+    refuse_to_replace(&out, arguments.force)?;
+    let seconds = arguments.seconds.or(loaded.scenario.duration_s).unwrap_or(180.0).min(3600.0);
+    let tracks = rehearsal::tracks(&loaded.scenario, loaded.models, &loaded.of_boats, seconds);
+    let picture = chart::draw(&loaded.scenario, &tracks, seconds);
+    write(&out, &picture)?;
+    eprintln!(
+        "{}: where {} boats go in {seconds:.0} s while nobody fires; open it in a browser",
+        out.display(),
+        tracks.len()
+    );
+    Ok(Outcome::Done)
+}
+
+fn new(arguments: &ScenarioNew) -> Result<Outcome> {
+    refuse_to_replace(&arguments.file, arguments.force)?;
+    let text = match &arguments.from {
+        Some(path) => read_scenario(path)?.0,
+        None => scenario::TEMPLATE.to_owned(),
+    };
+    write(&arguments.file, &text)?;
+    let file = arguments.file.display();
+    eprintln!(
+        "{file}: change it in an editor, then `bowwave scenario check {file}`, `bowwave scenario preview {file}` and \
+         `bowwave simulate --scenario {file}`"
+    );
+    Ok(Outcome::Done)
+}
+
+fn refuse_to_replace(path: &Path, force: bool) -> Result<()> {
+    if path.exists() && !force {
+        bail!("{} is there already; name another file, or add --force to replace it", path.display());
+    }
+    Ok(())
+}
+
+fn write(path: &Path, text: &str) -> Result<()> {
+    std::fs::write(path, text)
+        .with_context(|| format!("cannot write {}; check the folder and its permissions", path.display()))
+}

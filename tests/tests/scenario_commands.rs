@@ -1,0 +1,82 @@
+//! `bowwave scenario`: from a new file to a picture of it, and mistakes named by their place.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::fs;
+
+use bowwave_tests::{bowwave, expect_code, said};
+
+fn printed(output: &std::process::Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+#[test]
+fn an_instructor_comes_from_a_new_file_to_its_picture() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
+    let (file, picture) = (path("mine.toml"), path("mine.svg"));
+    let made = bowwave(["scenario", "new", &file]);
+    expect_code(&made, 0);
+    assert!(said(&made).contains(&format!("bowwave scenario check {file}")), "{}", said(&made));
+    let checked = bowwave(["scenario", "check", &file, "three-axes"]);
+    expect_code(&checked, 0);
+    let answer = printed(&checked);
+    assert!(
+        answer.contains("\"My scenario\" is sound: 3 hostile and 2 neutral boats, 4 with crews"),
+        "{answer}"
+    );
+    let drawn = bowwave(["scenario", "preview", &file, "--out", &picture, "--seconds", "60"]);
+    expect_code(&drawn, 0);
+    let svg = fs::read_to_string(&picture).expect("the picture");
+    for name in ["raider-1", "raider-3", "fisher", "passer-by", ">gun<", ">attack<", "nearest"] {
+        assert!(svg.contains(name), "{name} is missing");
+    }
+    // A boat's track has a point for each second, and no number that a browser cannot read.
+    assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    let again = bowwave(["scenario", "preview", &file, "--out", &picture]);
+    expect_code(&again, 1);
+    assert!(said(&again).contains("is there already; name another file, or add --force"), "{}", said(&again));
+    expect_code(&bowwave(["scenario", "new", &file]), 1);
+    expect_code(&bowwave(["scenario", "new", &file, "--from", "swarm", "--force"]), 0);
+    assert!(fs::read_to_string(&file).expect("the file").contains("name = \"Swarm\""));
+}
+
+#[test]
+fn each_wrong_scenario_is_named_by_its_place_and_the_sound_ones_are_still_looked_at() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).expect("a file");
+        path.to_string_lossy().into_owned()
+    };
+    let wrong = path(
+        "wrong.toml",
+        "[[boat]]\nname = \"a\"\nmodel = \"skiff\"\ncrew = \"pirate\"\nrange_m = 300\nbearing_deg = 3\n",
+    );
+    let close = path(
+        "close.toml",
+        "[[boat]]\nname = \"a\"\nmodel = \"skiff\"\ncrew = \"rammer\"\nrange_m = 4\nbearing_deg = 3\n",
+    );
+    let output = bowwave(["scenario", "check", &wrong, "swarm", &close]);
+    expect_code(&output, 1);
+    let (told, answer) = (said(&output), printed(&output));
+    assert!(
+        told.contains("wrong.toml:4:8: boat[1].crew: \"pirate\" is not allowed; give one of \"fisher\""),
+        "{told}"
+    );
+    assert!(told.contains("close.toml:5:11: boat[1]: a comes within"), "{told}");
+    assert!(answer.contains("swarm: \"Swarm\" is sound"), "{answer}");
+}
+
+#[test]
+fn the_list_has_every_built_in_scenario() {
+    let table = printed(&bowwave(["scenario", "list"]));
+    let json = printed(&bowwave(["scenario", "list", "--json"]));
+    let list: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let listed = list.as_array().expect("a list");
+    assert!(listed.len() >= 6, "{json}");
+    for entry in listed {
+        let name = entry["name"].as_str().expect("a name");
+        assert!(table.lines().any(|line| line.starts_with(name)), "{name} is not in the table");
+    }
+}
