@@ -85,7 +85,8 @@ impl CrewedBoat {
         let Some(now) = self.kept.last().copied() else { return CourseState::default() };
         let time_s = seconds(number);
         let mut memory = now.memory;
-        if number % DECISION == 0 {
+        // Not all crews decide at the same step: no frame has to wait for all of them.
+        if (number + (self.seed % DECISION as u64) as i64) % DECISION == 0 {
             let situation = Situation {
                 time_s,
                 seed: self.seed,

@@ -15,6 +15,8 @@ use crate::{
 
 /// How far ahead crews look, seconds.
 const HORIZON_S: f64 = 20.0;
+/// Vessels that a crew heeds at a time: the nearest.
+const HEEDED: usize = 10;
 /// Courses tried, to each side of the one that is wanted, radians.
 const COURSES: [f64; 9] = [0.0, 0.17, 0.35, 0.61, 0.87, 1.22, 1.57, 2.2, PI];
 /// Shares of the wanted speed that are tried.
@@ -73,11 +75,17 @@ enum Encounter {
 impl Helmsman {
     /// The course and speed next to `wanted` that keep clear of `others`.
     pub fn clear(&self, me: &Traffic, wanted: Bound, others: &[Traffic]) -> Bound {
-        let near: Vec<(Traffic, Encounter)> = others
+        let mut near: Vec<(Traffic, Encounter)> = others
             .iter()
             .filter(|other| self.concerns(me, wanted.speed_m_s, other))
             .map(|other| (*other, self.encounter(me, other)))
             .collect();
+        if near.len() > HEEDED {
+            let gap_m =
+                |(other, _): &(Traffic, Encounter)| me.position.distance(other.position) - other.radius_m;
+            near.sort_by(|a, b| gap_m(a).total_cmp(&gap_m(b)));
+            near.truncate(HEEDED);
+        }
         if near.is_empty() || self.soonest(me, wanted, &near) >= HORIZON_S {
             return wanted;
         }
