@@ -14,6 +14,7 @@ mod hits;
 mod laboratory;
 pub mod licences;
 pub mod loading;
+mod new_file;
 pub mod outcome;
 mod plan;
 pub mod program;

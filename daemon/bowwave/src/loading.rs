@@ -39,9 +39,36 @@ pub fn warn_of_former_names(warnings: &[String]) {
     }
 }
 
-/// The models of a scenario's boats.
+/// A scenario with all that its boats need.
+#[derive(Debug)]
+pub struct LoadedScenario {
+    /// The scenario.
+    pub scenario: Scenario,
+    /// The models of its boats, each once.
+    pub models: Vec<Model>,
+    /// The model of each boat.
+    pub of_boats: Vec<ModelId>,
+}
+
+/// A scenario from a file or a built-in one, checked with its models.
+pub fn load_scenario(path: &Path) -> Result<LoadedScenario> {
+    let (text, base) = read_scenario(path)?;
+    parse_scenario(&text, &path.display().to_string(), &base)
+}
+
+/// A scenario's text, checked with its models, whose paths start from `base`.
+pub fn parse_scenario(text: &str, origin: &str, base: &Path) -> Result<LoadedScenario> {
+    let scenario = Scenario::parse(text, origin)?;
+    warn_of_former_names(&scenario.warnings);
+    let (models, of_boats) = scenario_models(&scenario, base)?;
+    Ok(LoadedScenario { scenario, models, of_boats })
+}
+
+/// The models of a scenario's boats, all of which keep clear of the camera.
 pub fn scenario_models(scenario: &Scenario, base: &Path) -> Result<(Vec<Model>, Vec<ModelId>)> {
     let boats = scenario.boats.iter().map(|b| (b.name.as_str(), b.model.as_str()));
     let models = BoatModels::load(boats, base)?;
+    let radius = |id: &ModelId| models.list.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
+    scenario.check_clearance(&models.of_boats.iter().map(radius).collect::<Vec<_>>())?;
     Ok((models.list, models.of_boats))
 }

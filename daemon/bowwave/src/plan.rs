@@ -20,7 +20,7 @@ use serde::Serialize;
 
 use crate::{
     cli::PlanArgs,
-    loading::{read_scenario, scenario_models, warn_of_former_names},
+    loading::{LoadedScenario, load_scenario, parse_scenario},
     stdout,
 };
 
@@ -30,7 +30,7 @@ struct Printed {
     scenario: String,
     size: String,
     boats: Vec<PrintedBoat>,
-    /// What the world's stage does, pass by pass.
+    /// Parts of the world's stage, with the reason for each that is left out.
     world: Vec<PrintedPass>,
     passes: Vec<PrintedPass>,
     variants: Vec<String>,
@@ -65,19 +65,10 @@ struct PrintedMemory {
 
 /// Prints the plan of a scenario.
 pub fn run(arguments: &PlanArgs) -> Result<()> {
-    let (text, origin, base) = match &arguments.scenario {
-        Some(path) => {
-            let (text, base) = read_scenario(path)?;
-            (text, path.display().to_string(), base)
-        }
-        None => (scenario::DEFAULT.to_owned(), "built-in scenario".to_owned(), Path::new("").to_path_buf()),
+    let LoadedScenario { scenario, models, of_boats } = match &arguments.scenario {
+        Some(path) => load_scenario(path)?,
+        None => parse_scenario(scenario::DEFAULT, "built-in scenario", Path::new(""))?,
     };
-    let scenario = Scenario::parse(&text, &origin)?;
-    warn_of_former_names(&scenario.warnings);
-    let (models, of_boats) = scenario_models(&scenario, &base)?;
-    let radius =
-        |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
-    scenario.check_clearance(&of_boats.iter().map(radius).collect::<Vec<_>>())?;
     let plan = ScenePlan::new(&SceneNeeds {
         size: arguments.size,
         video: PixelFormat::Rgb,

@@ -2,10 +2,14 @@
 
 use std::fmt::{self, Write as _};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
 use bowwave_calibration::target::{MODULES, Target, is_white};
 
-use crate::{cli::CalibrateBoard, outcome::Outcome};
+use crate::{
+    cli::CalibrateBoard,
+    new_file::{refuse_to_replace, write_new},
+    outcome::Outcome,
+};
 
 /// White around the board, millimetres: printers cannot print to the edge, and the outermost squares need white beside them.
 const MARGIN_MM: f64 = 12.0;
@@ -20,13 +24,11 @@ pub fn run(arguments: &CalibrateBoard) -> Result<Outcome> {
     draw(&mut text, &arguments.target).context("cannot draw the board")?;
     let kalibr = arguments.kalibr.iter().map(|path| (path, arguments.target.to_kalibr()));
     let files: Vec<_> = [(path, text)].into_iter().chain(kalibr).collect();
-    if let Some((path, _)) = files.iter().find(|(path, _)| path.exists() && !arguments.force) {
-        bail!("{} is there already; name another file, or add --force to replace it", path.display());
+    for (path, _) in &files {
+        refuse_to_replace(path, arguments.force)?;
     }
     for (path, text) in &files {
-        std::fs::write(path, text).with_context(|| {
-            format!("cannot write {}; check the folder and its permissions", path.display())
-        })?;
+        write_new(path, text)?;
     }
     let size = sheet_mm(&arguments.target);
     eprintln!(

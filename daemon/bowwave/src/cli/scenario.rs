@@ -9,7 +9,7 @@ use super::parse_duration;
 /// Arguments of `scenario`.
 #[derive(Debug, Args)]
 pub struct ScenarioArgs {
-    /// What to do
+    /// Task of the command
     #[command(subcommand)]
     pub command: ScenarioCommand,
 }

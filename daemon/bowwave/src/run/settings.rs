@@ -27,7 +27,7 @@ use glam::{DQuat, DVec2, DVec3};
 
 use crate::{
     config::{self, Config},
-    loading::{read_scenario, scenario_models, warn_of_former_names},
+    loading::{LoadedScenario, parse_scenario, read_scenario, warn_of_former_names},
 };
 
 /// Where nobody says how large pictures are.
@@ -189,14 +189,8 @@ impl Reader {
         refuse: &mut impl FnMut(Fault, &anyhow::Error),
     ) -> Result<(Scenario, String, Vec<Model>, Vec<bowwave_core::model::ModelId>, PathBuf)> {
         let load = |text: &str, origin: &str, base: &Path| -> Result<_> {
-            let scenario = Scenario::parse(text, origin)?;
-            warn_of_former_names(&scenario.warnings);
-            let (models, boats) = scenario_models(&scenario, base)?;
-            let radius = |id: &bowwave_core::model::ModelId| {
-                models.get(usize::from(id.0)).map_or(0.0, Model::radius_m)
-            };
-            scenario.check_clearance(&boats.iter().map(radius).collect::<Vec<_>>())?;
-            Ok((scenario, text.to_owned(), models, boats, base.to_owned()))
+            let LoadedScenario { scenario, models, of_boats } = parse_scenario(text, origin, base)?;
+            Ok((scenario, text.to_owned(), models, of_boats, base.to_owned()))
         };
         if let Some(path) = &config.files.scenario {
             let named = self.answers(path).and_then(|()| read_scenario(path)).and_then(|(text, base)| {

@@ -1,23 +1,19 @@
-//! `bowwave scenario`: what an instructor does with scenarios before they are played.
+//! `bowwave scenario`: an instructor's work on scenarios before they are played.
 
 mod chart;
 mod rehearsal;
 
-use std::path::Path;
-
-use anyhow::{Context, Result, bail};
-use bowwave_core::{
-    model::Model,
-    world::{
-        boats::Behaviour,
-        scenario::{self, Scenario, Side},
-    },
+use anyhow::Result;
+use bowwave_core::world::{
+    boats::Behaviour,
+    scenario::{self, Scenario, Side},
 };
 use serde::Serialize;
 
 use crate::{
     cli::{ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview},
-    loading::{read_scenario, scenario_models, warn_of_former_names},
+    loading::{load_scenario, read_scenario},
+    new_file::{refuse_to_replace, write_new},
     outcome::Outcome,
     stdout,
 };
@@ -84,28 +80,10 @@ fn list(arguments: &ScenarioList) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// A scenario that was read and checked, with its models.
-struct Loaded {
-    scenario: Scenario,
-    models: Vec<Model>,
-    of_boats: Vec<bowwave_core::model::ModelId>,
-}
-
-fn load(path: &Path) -> Result<Loaded> {
-    let (text, base) = read_scenario(path)?;
-    let scenario = Scenario::parse(&text, &path.display().to_string())?;
-    warn_of_former_names(&scenario.warnings);
-    let (models, of_boats) = scenario_models(&scenario, &base)?;
-    let radius =
-        |id: &bowwave_core::model::ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
-    scenario.check_clearance(&of_boats.iter().map(radius).collect::<Vec<_>>())?;
-    Ok(Loaded { scenario, models, of_boats })
-}
-
 fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     for path in &arguments.files {
-        match load(path) {
+        match load_scenario(path) {
             Ok(loaded) => {
                 let l = Listed::of(&path.display().to_string(), &loaded.scenario);
                 stdout::print(format!(
@@ -123,7 +101,7 @@ fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
 }
 
 fn preview(arguments: &ScenarioPreview) -> Result<Outcome> {
-    let loaded = load(&arguments.scenario)?;
+    let loaded = load_scenario(&arguments.scenario)?;
     let out = arguments.out.clone().unwrap_or_else(|| {
         let stem = arguments.scenario.file_stem().map_or_else(|| "scenario".into(), |s| s.to_string_lossy());
         format!("{stem}.svg").into()
@@ -132,7 +110,7 @@ fn preview(arguments: &ScenarioPreview) -> Result<Outcome> {
     let seconds = arguments.seconds.or(loaded.scenario.duration_s).unwrap_or(180.0).min(3600.0);
     let tracks = rehearsal::tracks(&loaded.scenario, loaded.models, &loaded.of_boats, seconds);
     let picture = chart::draw(&loaded.scenario, &tracks, seconds);
-    write(&out, &picture)?;
+    write_new(&out, &picture)?;
     eprintln!(
         "{}: where {} boats go in {seconds:.0} s while nobody fires; open it in a browser",
         out.display(),
@@ -147,23 +125,11 @@ fn new(arguments: &ScenarioNew) -> Result<Outcome> {
         Some(path) => read_scenario(path)?.0,
         None => scenario::TEMPLATE.to_owned(),
     };
-    write(&arguments.file, &text)?;
+    write_new(&arguments.file, &text)?;
     let file = arguments.file.display();
     eprintln!(
         "{file}: change it in an editor, then `bowwave scenario check {file}`, `bowwave scenario preview {file}` and \
          `bowwave simulate --scenario {file}`"
     );
     Ok(Outcome::Done)
-}
-
-fn refuse_to_replace(path: &Path, force: bool) -> Result<()> {
-    if path.exists() && !force {
-        bail!("{} is there already; name another file, or add --force to replace it", path.display());
-    }
-    Ok(())
-}
-
-fn write(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text)
-        .with_context(|| format!("cannot write {}; check the folder and its permissions", path.display()))
 }

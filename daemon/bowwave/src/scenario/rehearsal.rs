@@ -19,7 +19,7 @@ pub struct Track {
     pub name: String,
     /// Whom it belongs to.
     pub side: Side,
-    /// Where it is at each second from the begin on.
+    /// Its states at each second from the begin on.
     pub states: Vec<CourseState>,
     /// The states of its crew, each with the second at which it began; empty without a crew.
     pub crew: Vec<(usize, String)>,

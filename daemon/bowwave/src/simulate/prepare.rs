@@ -10,7 +10,6 @@ use bowwave_calibration::CalibrationFile;
 use bowwave_core::{
     estimate::attitude::Source,
     event::PixelFormat,
-    model::{Model, ModelId},
     session::Setup,
     text::toml::TEXT_BYTES_MAX,
     world::scenario::{self, Scenario},
@@ -88,8 +87,6 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
         scenario.seed = seed;
     }
     let (models, boat_models) = scenario_models(&scenario, &base)?;
-    let radius = |id: &ModelId| models.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
-    scenario.check_clearance(&boat_models.iter().map(radius).collect::<Vec<_>>())?;
     let (orientation, warning) = orientation(arguments);
     if let Some(warning) = warning {
         log::warn!("{warning}");

@@ -186,6 +186,20 @@ impl<'a> TomlText<'a> {
         self.error(value, format!("{} is not allowed; give {allowed}", self.written(&value.span())))
     }
 
+    /// Refuses the first key that is there although it is none of `allowed`.
+    ///
+    /// # Errors
+    /// With `problem` at that key's value.
+    pub fn only(
+        self,
+        keys: impl IntoIterator<Item = KeyPlace>,
+        allowed: &[&str],
+        problem: impl FnOnce() -> String,
+    ) -> Result<(), TomlError> {
+        let foreign = keys.into_iter().filter(|(key, _)| !allowed.contains(key)).find_map(|(_, value)| value);
+        foreign.map_or(Ok(()), |value| Err(self.error(&value, problem())))
+    }
+
     /// An error about a value.
     pub fn error<T>(self, value: &Spanned<T>, problem: impl Display) -> TomlError {
         self.place(value).error(problem)
@@ -318,6 +332,14 @@ fn find_in_value(value: &Spanned<DeValue<'_>>, span: &Range<usize>, own: &str, p
         }
         _ => {}
     }
+}
+
+/// A key of a table with the place of its value; `None` where it is left out.
+pub type KeyPlace = (&'static str, Option<Spanned<()>>);
+
+/// A key and the place of its value.
+pub fn key_place<T>(key: &'static str, value: &Option<Spanned<T>>) -> KeyPlace {
+    (key, value.as_ref().map(|value| Spanned::new(value.span(), ())))
 }
 
 /// A table of the text: names the keys that it lacks.

@@ -10,10 +10,10 @@ use crate::{
     time::Time,
     world::{
         boats::{
-            Behaviour, BoatHistory, CourseState, Floating, Hull, HullForm, Signals, StepView, Traffic,
-            step_after, step_seconds,
+            Behaviour, BoatHistory, Floating, Hull, HullForm, Signals, StepView, Traffic, step_after,
+            step_seconds,
         },
-        contact,
+        contact::Capsule,
         scenario::{BoatSpec, Scenario, Side},
         waves::WaveField,
     },
@@ -71,18 +71,12 @@ struct FleetBoat {
 impl FleetBoat {
     fn traffic(&self, time_s: f64) -> Traffic {
         let state = self.history.state(time_s);
-        let CourseState { position, heading, .. } = state;
-        Traffic {
-            position,
-            velocity: state.velocity(),
-            heading,
-            radius_m: 0.5 * self.history.hull().length_m,
-        }
+        let radius_m = 0.5 * self.history.hull().length_m;
+        Traffic { position: state.position, velocity: state.velocity(), heading: state.heading, radius_m }
     }
 
-    fn capsule(&self, time_s: f64) -> contact::Capsule {
-        let state = self.history.state(time_s);
-        contact::Capsule::of(self.history.hull(), &state)
+    fn capsule(&self, time_s: f64) -> Capsule {
+        Capsule::of(self.history.hull(), &self.history.state(time_s))
     }
 }
 
@@ -92,7 +86,7 @@ const NEIGHBOUR_M: f64 = 300.0;
 const OWN_SHIP: Traffic =
     Traffic { position: DVec2::ZERO, velocity: DVec2::ZERO, heading: 0.0, radius_m: OWN_RADIUS_M };
 /// Her hull, as far as boats are held off it.
-const OWN_HULL: contact::Capsule = contact::Capsule::round(OWN_RADIUS_M);
+const OWN_HULL: Capsule = Capsule::round(OWN_RADIUS_M);
 /// Radius about the gun that the own ship takes up, metres.
 const OWN_RADIUS_M: f64 = 12.0;
 
@@ -153,11 +147,9 @@ impl Fleet {
         for boat in self.boats.iter_mut().filter(|b| !b.history.is_crewed()) {
             boat.history.follow(until_s, &self.waves);
         }
-        if self.boats.iter().any(|b| b.history.is_crewed()) {
-            self.step_crews(until_s);
-            for boat in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
-                boat.history.follow(until_s, &self.waves);
-            }
+        self.step_crews(until_s);
+        for boat in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
+            boat.history.follow(until_s, &self.waves);
         }
     }
 
@@ -171,15 +163,15 @@ impl Fleet {
             let time_s = step_seconds(number);
             traffic.clear();
             traffic.extend(self.boats.iter().map(|b| b.traffic(time_s)));
-            let own_ship = OWN_SHIP;
             for i in 0..self.boats.len() {
                 if !self.boats[i].history.is_crewed() {
                     continue;
                 }
                 // The boat's own place among the others is taken by the own ship.
-                let me = std::mem::replace(&mut traffic[i], own_ship);
-                let signals = self.signals(i, time_s, &traffic);
-                let view = StepView { others: &traffic, own_ship, signals, waves: &self.waves };
+                let me = std::mem::replace(&mut traffic[i], OWN_SHIP);
+                let boat = &self.boats[i];
+                let signals = boat.history.decides().then(|| self.signals(i, &me, time_s, &traffic));
+                let view = StepView { others: &traffic, own_ship: OWN_SHIP, signals, waves: &self.waves };
                 self.boats[i].history.step(&view);
                 traffic[i] = me;
             }
@@ -187,10 +179,11 @@ impl Fleet {
         }
     }
 
-    fn signals(&self, boat: usize, time_s: f64, traffic: &[Traffic]) -> Signals {
+    /// Events that have befallen a boat which is at `at`.
+    fn signals(&self, boat: usize, at: &Traffic, time_s: f64, traffic: &[Traffic]) -> Signals {
         let Some(me) = self.boats.get(boat) else { return Signals::default() };
-        let at = me.history.state(time_s).position;
-        let near = |&&(other, since_s): &&(usize, f64)| {
+        let at = at.position;
+        let near = |&(other, since_s): &(usize, f64)| {
             let alike = self.boats.get(other).is_some_and(|b| b.side == me.side);
             let close = traffic.get(other).is_some_and(|t| t.position.distance(at) < NEIGHBOUR_M);
             other != boat && since_s <= time_s && alike && close
@@ -198,7 +191,7 @@ impl Fleet {
         let hidden = traffic.iter().enumerate().any(|(other, t)| other != boat && hides(t, at));
         Signals {
             hit: me.history.first_hit_s().is_some_and(|s| s <= time_s),
-            neighbour_hit: self.struck.iter().find(near).is_some(),
+            neighbour_hit: self.struck.iter().any(near),
             sees_gun: !hidden,
             ..Signals::default()
         }
@@ -206,7 +199,7 @@ impl Fleet {
 
     /// No crewed boat passes through another vessel: where hulls would touch, it is held off.
     fn keep_apart(&mut self, time_s: f64) {
-        let hulls: Vec<contact::Capsule> = self.boats.iter().map(|b| b.capsule(time_s)).collect();
+        let hulls: Vec<Capsule> = self.boats.iter().map(|b| b.capsule(time_s)).collect();
         for i in 0..self.boats.len() {
             if !self.boats[i].history.is_crewed() {
                 continue;

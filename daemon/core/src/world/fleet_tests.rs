@@ -7,7 +7,7 @@ use crate::{
     geometry::{ahead, heading_of},
     sea::BeaufortForce,
     world::{
-        boats::{Act, Course, CrewPlan, CrewState, CrewedStart, Exit, Guard, Propulsor},
+        boats::{Act, Course, CourseState, CrewPlan, CrewState, CrewedStart, Exit, Guard, Propulsor},
         score::boxed_model,
         waves::{Spectrum, WaveSpec},
     },

@@ -22,17 +22,17 @@ pub enum Behaviour {
 /// A boat with a crew as the scenario begins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CrewedStart {
-    /// What its crew does.
+    /// States of its crew.
     pub plan: Arc<CrewPlan>,
     /// Seed of the crew's chance.
     pub seed: u64,
-    /// Whether the crew keeps to the rules of the road.
+    /// The crew keeps to the rules of the road.
     pub keeps_rules: bool,
-    /// How it is driven.
+    /// Engine and helm.
     pub propulsor: Propulsor,
     /// Greatest speed in calm water, m/s.
     pub speed_max_m_s: f64,
-    /// Where it is, world x and y, metres.
+    /// Position of its origin, world x and y, metres.
     pub position: DVec2,
     /// Radians clockwise from north.
     pub heading: f64,
@@ -41,7 +41,7 @@ pub struct CrewedStart {
 }
 
 impl CrewedStart {
-    /// Where it is as the scenario begins.
+    /// State as the scenario begins.
     pub fn course(&self) -> CourseState {
         let Self { position, heading, speed_m_s, .. } = *self;
         CourseState { position, heading, speed_m_s, ..CourseState::default() }
@@ -49,7 +49,7 @@ impl CrewedStart {
 }
 
 impl Behaviour {
-    /// Where the boat is as the scenario begins.
+    /// State of the boat as the scenario begins.
     pub fn begin(&self) -> CourseState {
         match self {
             Self::ScriptedCourse(course) => course.state(0.0, &BoatDamage::NONE),

@@ -8,9 +8,10 @@ use super::{
     behaviour::CrewedStart,
     course::{BoatDamage, CourseState},
     crew::{CrewMemory, CrewPlan, Signals, Situation, Traffic},
-    drive::{Craft, DriveState, Orders, Propulsor, Surroundings},
+    drive::{Craft, DriveState, Orders, Surroundings},
     grid::{GridHistory, STEP_S, seconds},
     hull::HullForm,
+    seakeeping::FAR_M,
 };
 use crate::{
     geometry::{ahead, starboard},
@@ -21,8 +22,6 @@ use crate::{
 const KEPT: usize = 64;
 /// Steps from one decision of a crew to the next: ten a second.
 const DECISION: i64 = 6;
-/// Farther off than this the slope of the water does not move a boat along: it would not be seen, metres.
-const SLOPES_M: f64 = 2500.0;
 
 /// Hull and crew at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -48,8 +47,8 @@ pub struct StepView<'a> {
     pub others: &'a [Traffic],
     /// The own ship.
     pub own_ship: Traffic,
-    /// What has happened to the boat.
-    pub signals: Signals,
+    /// Events that have befallen the boat, for a step at which its crew decides.
+    pub signals: Option<Signals>,
     /// The sea.
     pub waves: &'a WaveField,
 }
@@ -80,19 +79,23 @@ impl CrewedBoat {
         self.plan.states.get(state).map_or("", |state| state.name.as_str())
     }
 
+    /// Whether its crew decides at step `number`. Not all crews do so at the same step: no frame has to wait for all of them.
+    pub fn decides(&self, number: i64) -> bool {
+        (number + (self.seed % DECISION as u64) as i64) % DECISION == 0
+    }
+
     /// The state a step after `number`.
     pub(super) fn step(&mut self, number: i64, damage: &BoatDamage, view: &StepView<'_>) -> CourseState {
         let Some(now) = self.kept.last().copied() else { return CourseState::default() };
         let time_s = seconds(number);
         let mut memory = now.memory;
-        // Not all crews decide at the same step: no frame has to wait for all of them.
-        if (number + (self.seed % DECISION as u64) as i64) % DECISION == 0 {
+        if let Some(signals) = view.signals {
             let situation = Situation {
                 time_s,
                 seed: self.seed,
                 others: view.others,
                 own_ship: view.own_ship,
-                signals: view.signals,
+                signals,
                 keeps_rules: self.keeps_rules,
             };
             memory = self.plan.decide(&self.craft, &now.drive, &memory, &situation);
@@ -111,8 +114,9 @@ impl CrewedBoat {
         drive.course(&self.craft)
     }
 
+    /// The slopes of the water that move a boat along: farther off that would not be seen.
     fn slopes(&self, boat: &DriveState, waves: &WaveField, time_s: f64) -> Surroundings {
-        if boat.centre.length() > SLOPES_M {
+        if boat.centre.length() > FAR_M {
             return Surroundings::default();
         }
         self.craft.slopes(boat, waves, time_s, STEP_S)
@@ -131,9 +135,4 @@ impl CrewedBoat {
     pub(super) fn forget_after(&mut self, time_s: f64) {
         self.kept.forget_after(time_s);
     }
-}
-
-/// How a boat of that hull is driven where nothing else is said: by its length.
-pub fn usual_propulsor(length_m: f64) -> Propulsor {
-    if length_m < 12.0 { Propulsor::Outboard } else { Propulsor::Shaft }
 }

@@ -125,7 +125,12 @@ pub(super) fn lean(speed_m_s: f64, turn_rate: f64) -> f64 {
 /// 0 for a boat that displaces water, 1 for one that planes.
 fn planing_share(speed_m_s: f64, length_m: f64) -> f64 {
     let froude = speed_m_s / (GRAVITY_M_S2 * length_m.max(0.1)).sqrt();
-    let t = ((froude - PLANING_FROUDE.0) / (PLANING_FROUDE.1 - PLANING_FROUDE.0)).clamp(0.0, 1.0);
+    ramp(froude, PLANING_FROUDE)
+}
+
+/// Smooth step from 0 at the first of `ends` and below to 1 at the second and beyond.
+pub(super) fn ramp(value: f64, ends: (f64, f64)) -> f64 {
+    let t = ((value - ends.0) / (ends.1 - ends.0)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 

@@ -85,6 +85,14 @@ impl BoatHistory {
         self.states.newest().unwrap_or(0)
     }
 
+    /// Whether a crew decides at the newest step.
+    pub(crate) fn decides(&self) -> bool {
+        match &self.pilot {
+            Pilot::Crewed(boat) => boat.decides(self.newest()),
+            Pilot::Scripted(_) => false,
+        }
+    }
+
     /// A crewed boat goes on by a step; the others are as `view` has them.
     pub(crate) fn step(&mut self, view: &StepView<'_>) {
         let number = self.newest();

@@ -148,6 +148,11 @@ impl HullForm {
         Self::new((low.x, high.x), -f64::from(model.min.z), flare, half_beam)
     }
 
+    /// Centre of buoyancy forward of the hull's after end, metres.
+    pub(super) fn centre_from_stern_m(&self) -> f64 {
+        self.strip_m / 2.0 - self.strips[0].x_m
+    }
+
     /// Weight, newtons.
     pub(super) fn weight_n(&self) -> f64 {
         self.mass_kg * GRAVITY_M_S2

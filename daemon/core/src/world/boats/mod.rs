@@ -16,7 +16,7 @@ mod seakeeping;
 pub use behaviour::{Behaviour, CrewedStart};
 pub use course::{Arrival, BoatDamage, Course, CourseError, CourseState};
 pub use crew::{Act, CrewPlan, CrewState, Exit, Guard, Signals, Traffic};
-pub use crewed::{StepView, usual_propulsor};
+pub use crewed::StepView;
 pub use drive::{
     Craft, DriveRates, DriveState, HullRunning, Orders, PlaningSurface, Propulsor, Running, Surroundings,
 };

@@ -17,7 +17,7 @@ const KEPT: usize = 240;
 /// anew in the mean plane of the water, as many steps back as are kept.
 pub(super) const GAP: i64 = 600;
 /// Farther off than this, metres, a boat lies in the mean plane of the water: what inertia adds is a small part of a pixel.
-const FAR_M: f64 = 2500.0;
+pub(super) const FAR_M: f64 = 2500.0;
 
 /// Heave, roll and pitch of one boat over the last seconds.
 #[derive(Clone, Debug)]

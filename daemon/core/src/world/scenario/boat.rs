@@ -11,7 +11,8 @@ use super::{
 };
 use crate::{
     text::toml::{
-        OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, number, one_of, plain_text, whole, yes_no,
+        KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, key_place, number, one_of,
+        plain_text, whole, yes_no,
     },
     world::boats::{Arrival, Behaviour, Course, CourseError, CrewedStart, Propulsor},
 };
@@ -79,24 +80,38 @@ pub(super) struct RawBoat {
 
 impl RawBoat {
     /// The keys that some courses have, each with its place where it is there.
-    fn of_courses(&self) -> [(&'static str, Option<Spanned<()>>); 8] {
-        fn there<T>(value: &Option<Spanned<T>>) -> Option<Spanned<()>> {
-            value.as_ref().map(|value| Spanned::new(value.span(), ()))
-        }
+    fn of_courses(&self) -> [KeyPlace; 8] {
         [
-            ("heading_deg", there(&self.heading_deg)),
-            ("speed_kn", there(&self.speed_kn)),
-            ("weave_amplitude_m", there(&self.weave_amplitude_m)),
-            ("weave_period_s", there(&self.weave_period_s)),
-            ("waypoints", there(&self.waypoints)),
-            ("repeat", there(&self.repeat)),
-            ("stop_m", there(&self.stop_m)),
-            ("arrival", there(&self.arrival)),
+            key_place("heading_deg", &self.heading_deg),
+            key_place("speed_kn", &self.speed_kn),
+            key_place("weave_amplitude_m", &self.weave_amplitude_m),
+            key_place("weave_period_s", &self.weave_period_s),
+            key_place("waypoints", &self.waypoints),
+            key_place("repeat", &self.repeat),
+            key_place("stop_m", &self.stop_m),
+            key_place("arrival", &self.arrival),
         ]
+    }
+
+    /// The keys that only boats with a crew have.
+    fn of_crews(&self) -> [KeyPlace; 6] {
+        [
+            key_place("engine", &self.engine),
+            key_place("speed_max_kn", &self.speed_max_kn),
+            key_place("keeps_rules", &self.keeps_rules),
+            key_place("count", &self.count),
+            key_place("formation", &self.formation),
+            key_place("spacing_m", &self.spacing_m),
+        ]
+    }
+
+    /// Whether it asks for a crew.
+    pub fn has_crew(&self) -> bool {
+        self.crew.is_some()
     }
 }
 
-/// What boats are read with besides their own tables.
+/// Context that boats are read in besides their own tables.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoatContext<'a> {
     /// The crews that the scenario knows.
@@ -158,7 +173,9 @@ fn group(
             return Err(text.error(crew, "a boat has a course or a crew; leave out one of them"));
         }
         (_, None) => {
-            scripted_only(section, raw)?;
+            text.only(raw.of_crews(), &[], || {
+                "has no meaning without crew; leave it out, or give the boat a crew".to_owned()
+            })?;
             vec![Behaviour::ScriptedCourse(scripted(section, raw)?)]
         }
         (None, Some(_)) => crewed(section, raw, number, side, context)?,
@@ -173,43 +190,19 @@ fn group(
     }
 }
 
-/// Refuses what only a boat with a crew has.
-fn scripted_only(section: &TomlSection<'_>, raw: &RawBoat) -> Result<(), TomlError> {
-    fn there<T>(value: &Option<Spanned<T>>) -> Option<Spanned<()>> {
-        value.as_ref().map(|value| Spanned::new(value.span(), ()))
-    }
-    let keys = [
-        there(&raw.engine),
-        there(&raw.speed_max_kn),
-        there(&raw.keeps_rules),
-        there(&raw.count),
-        there(&raw.formation),
-        there(&raw.spacing_m),
-    ];
-    match keys.into_iter().flatten().next() {
-        Some(value) => Err(section
-            .text
-            .error(&value, "has no meaning without crew; leave it out, or give the boat a crew")),
-        None => Ok(()),
-    }
-}
-
 fn scripted(section: &TomlSection<'_>, raw: &RawBoat) -> Result<Course, TomlError> {
     if raw.course.is_none() {
         let allowed = format!("{}, or a crew by the key crew", one_of(&KINDS).allowed);
         return Err(section.missing("course", &allowed));
     }
     let kind = section.required("course", &raw.course, one_of(&KINDS))?;
-    for (key, value) in raw.of_courses() {
-        if let Some(value) = value.filter(|_| !kind.keys().contains(&key)) {
-            let problem = format!(
-                "has no meaning on a {} course; leave it out (such a boat has {})",
-                kind.name(),
-                kind.keys().join(", ")
-            );
-            return Err(section.text.error(&value, problem));
-        }
-    }
+    section.text.only(raw.of_courses(), kind.keys(), || {
+        format!(
+            "has no meaning on a {} course; leave it out (such a boat has {})",
+            kind.name(),
+            kind.keys().join(", ")
+        )
+    })?;
     course(section, raw, kind)
 }
 
@@ -225,13 +218,9 @@ fn crewed(
     const USUAL_KN: [(Propulsor, f64); 3] =
         [(Propulsor::Outboard, 28.0), (Propulsor::Jet, 35.0), (Propulsor::Shaft, 10.0)];
     let text = section.text;
-    for (key, value) in raw.of_courses() {
-        if let Some(value) = value.filter(|_| !["heading_deg", "speed_kn"].contains(&key)) {
-            let problem =
-                "has no meaning for a boat with a crew; leave it out, or write it into the crew's state";
-            return Err(text.error(&value, problem));
-        }
-    }
+    text.only(raw.of_courses(), &["heading_deg", "speed_kn"], || {
+        "has no meaning for a boat with a crew; leave it out, or write it into the crew's state".to_owned()
+    })?;
     let names: Vec<(&str, usize)> =
         context.crews.iter().enumerate().map(|(i, c)| (c.name.as_str(), i)).collect();
     let crew = section.required("crew", &raw.crew, one_of(&names))?;
@@ -306,8 +295,8 @@ fn course(section: &TomlSection<'_>, raw: &RawBoat, kind: CourseKind) -> Result<
         let key = blamed(&e);
         let value = raw.of_courses().into_iter().find(|(name, _)| *name == key).and_then(|(_, value)| value);
         let value = value.or_else(|| match key {
-            "range_m" => raw.range_m.as_ref().map(|range| Spanned::new(range.span(), ())),
-            _ => raw.course.as_ref().map(|course| Spanned::new(course.span(), ())),
+            "range_m" => key_place(key, &raw.range_m).1,
+            _ => key_place(key, &raw.course).1,
         });
         value.map_or_else(|| section.error(key, e), |value| text.error(&value, e))
     })

@@ -8,8 +8,8 @@ use serde::Deserialize;
 use super::keys::{M_S_PER_KN, waypoint};
 use crate::{
     text::toml::{
-        OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number, one_of,
-        plain_text, yes_no,
+        KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, key_place,
+        number, one_of, plain_text, yes_no,
     },
     world::boats::{Act, CrewPlan, CrewState, Exit, Guard},
 };
@@ -18,7 +18,7 @@ use crate::{
 const MOST: usize = 32;
 
 /// Text of the crews that every scenario knows.
-pub(super) const BUILT_IN: &str = include_str!("../../../crews/built-in.toml");
+const BUILT_IN: &str = include_str!("../../../crews/built-in.toml");
 
 /// A crew by its name.
 #[derive(Clone, Debug, PartialEq)]
@@ -112,19 +112,16 @@ struct RawState {
 
 impl RawState {
     /// The keys that only some acts have, each with its place where it is there.
-    fn of_acts(&self) -> [(&'static str, Option<Spanned<()>>); 8] {
-        fn there<T>(value: &Option<Spanned<T>>) -> Option<Spanned<()>> {
-            value.as_ref().map(|value| Spanned::new(value.span(), ()))
-        }
+    fn of_acts(&self) -> [KeyPlace; 8] {
         [
-            ("speed_kn", there(&self.speed_kn)),
-            ("radius_m", there(&self.radius_m)),
-            ("stop_m", there(&self.stop_m)),
-            ("turn_m", there(&self.turn_m)),
-            ("clockwise", there(&self.clockwise)),
-            ("rams", there(&self.rams)),
-            ("waypoints", there(&self.waypoints)),
-            ("repeat", there(&self.repeat)),
+            key_place("speed_kn", &self.speed_kn),
+            key_place("radius_m", &self.radius_m),
+            key_place("stop_m", &self.stop_m),
+            key_place("turn_m", &self.turn_m),
+            key_place("clockwise", &self.clockwise),
+            key_place("rams", &self.rams),
+            key_place("waypoints", &self.waypoints),
+            key_place("repeat", &self.repeat),
         ]
     }
 }
@@ -146,10 +143,18 @@ struct RawExit {
 }
 
 /// The crews that every scenario knows.
-pub(super) fn built_in() -> Result<Vec<NamedCrew>, TomlError> {
+fn built_in() -> Result<Vec<NamedCrew>, TomlError> {
     let text = TomlText::new(BUILT_IN, "crews.toml")?;
     let (raw, _) = text.read::<RawCrews>(&[])?;
     crews(text, raw.crew)
+}
+
+/// The crews that a text's boats may have: its own, and those that every scenario knows but for the ones that it replaces.
+pub(super) fn known(text: TomlText<'_>, tables: Vec<Spanned<RawCrew>>) -> Result<Vec<NamedCrew>, TomlError> {
+    let own = crews(text, tables)?;
+    let mut known = built_in()?;
+    known.retain(|known| own.iter().all(|own| own.name != known.name));
+    Ok(own.into_iter().chain(known).collect())
 }
 
 /// The crews of a text.
@@ -201,14 +206,11 @@ fn states(section: &TomlSection<'_>, tables: Vec<Spanned<RawState>>) -> Result<V
 fn act(section: &TomlSection<'_>, raw: &RawState) -> Result<(Act, f64), TomlError> {
     let text = section.text;
     let kind = section.required("does", &raw.does, one_of(&KINDS))?;
-    for (key, value) in raw.of_acts() {
-        if let Some(value) = value.filter(|_| !kind.keys().contains(&key)) {
-            let has =
-                if kind.keys().is_empty() { "no keys of its own".to_owned() } else { kind.keys().join(", ") };
-            let problem = format!("has no meaning for \"{}\"; leave it out (that has {has})", kind.name());
-            return Err(text.error(&value, problem));
-        }
-    }
+    text.only(raw.of_acts(), kind.keys(), || {
+        let has =
+            if kind.keys().is_empty() { "no keys of its own".to_owned() } else { kind.keys().join(", ") };
+        format!("has no meaning for \"{}\"; leave it out (that has {has})", kind.name())
+    })?;
     let speed_m_s = if kind.keys().contains(&"speed_kn") {
         section.required("speed_kn", &raw.speed_kn, number(0.1..=100.0, "kn"))? * M_S_PER_KN
     } else {

@@ -84,13 +84,9 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let (section, keys) = text.section("weapon", raw.weapon);
     let weapon = weapon(&section, &keys)?;
     let seed = text.given(&raw.seed, seed())?.unwrap_or(1);
-    let mut crews = crew::crews(text, raw.crew)?;
-    crews.extend(
-        crew::built_in()?
-            .into_iter()
-            .filter(|known| crews.iter().all(|own| own.name != known.name))
-            .collect::<Vec<_>>(),
-    );
+    // A scenario without crews does not read the built-in ones.
+    let crewed = raw.boat.iter().any(|boat| boat.get_ref().has_crew());
+    let crews = if crewed { crew::known(text, raw.crew)? } else { crew::crews(text, raw.crew)? };
     let context = BoatContext { crews: &crews, seed, boats_max: BOATS_MAX };
     let boats = boat::boats(text.sections("boat", raw.boat, BOATS_MAX)?, &context)?;
     Ok(Scenario {

@@ -112,7 +112,7 @@ impl CrewPlan {
         at: &Situation<'_>,
     ) -> CrewMemory {
         let mut memory = *memory;
-        let wish = self.wish(craft, boat, &mut memory, at);
+        let mut wish = self.wish(craft, boat, &mut memory, at);
         if let Some(to) = self.exit(boat, &mut memory, &wish, at) {
             memory = CrewMemory {
                 state: to,
@@ -124,11 +124,9 @@ impl CrewPlan {
                 declined: 0,
                 orders: memory.orders,
             };
-            let wish = self.wish(craft, boat, &mut memory, at);
-            memory.orders = self.orders(craft, boat, &wish, at);
-        } else {
-            memory.orders = self.orders(craft, boat, &wish, at);
+            wish = self.wish(craft, boat, &mut memory, at);
         }
+        memory.orders = orders(craft, boat, &wish, at);
         memory
     }
 
@@ -192,28 +190,6 @@ impl CrewPlan {
             Act::Flee => Wish::go(outward, speed),
         }
     }
-
-    fn orders(&self, craft: &Craft, boat: &DriveState, wish: &Wish, at: &Situation<'_>) -> Orders {
-        let me = Traffic {
-            position: boat.centre,
-            velocity: ahead(boat.heading) * boat.surge,
-            heading: boat.heading,
-            radius_m: 0.5 * craft.length_m,
-        };
-        let turn_rate = COUNTED_ON * hard_turn(boat.surge);
-        let helmsman = Helmsman { turn_rate, margin_m: craft.length_m, keeps_rules: at.keeps_rules };
-        let wanted = wish.bound.unwrap_or(Bound { course: boat.heading, speed_m_s: 0.0 });
-        if wish.idles || wish.bound.is_none() && boat.surge.abs() < 0.1 {
-            return Orders::default();
-        }
-        let bound = if wish.rams {
-            let others: Vec<Traffic> = at.others.iter().copied().filter(|o| *o != at.own_ship).collect();
-            helmsman.clear(&me, wanted, &others)
-        } else {
-            helmsman.clear(&me, wanted, at.others)
-        };
-        craft.steer_for(boat, bound)
-    }
 }
 
 impl Wish {
@@ -224,6 +200,29 @@ impl Wish {
     const fn go(course: f64, speed_m_s: f64) -> Self {
         Self { bound: Some(Bound { course, speed_m_s }), arrived: false, rams: false, idles: false }
     }
+}
+
+/// Throttle and helm that fulfil a wish and keep clear of others.
+fn orders(craft: &Craft, boat: &DriveState, wish: &Wish, at: &Situation<'_>) -> Orders {
+    let me = Traffic {
+        position: boat.centre,
+        velocity: ahead(boat.heading) * boat.surge,
+        heading: boat.heading,
+        radius_m: 0.5 * craft.length_m,
+    };
+    let turn_rate = COUNTED_ON * hard_turn(boat.surge);
+    let helmsman = Helmsman { turn_rate, margin_m: craft.length_m, keeps_rules: at.keeps_rules };
+    if wish.idles || wish.bound.is_none() && boat.surge.abs() < 0.1 {
+        return Orders::default();
+    }
+    let wanted = wish.bound.unwrap_or(Bound { course: boat.heading, speed_m_s: 0.0 });
+    let bound = if wish.rams {
+        let others: Vec<Traffic> = at.others.iter().copied().filter(|o| *o != at.own_ship).collect();
+        helmsman.clear(&me, wanted, &others)
+    } else {
+        helmsman.clear(&me, wanted, at.others)
+    };
+    craft.steer_for(boat, bound)
 }
 
 /// From point to point, to the last or for ever.

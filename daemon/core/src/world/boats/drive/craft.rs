@@ -106,7 +106,7 @@ impl Craft {
         let running = HullRunning::of(form, speed_max_m_s);
         let block = form.mass_kg / (WATER_KG_M3 * length_m * beam_m * draught_m);
         let hull = ClarkeHull { length_m, beam_m, draught_m, block };
-        let after_m = form.strip_m / 2.0 - form.strips[0].x_m;
+        let after_m = form.centre_from_stern_m();
         let machinery =
             Machinery::of(propulsor, running.at(speed_max_m_s).resistance_n, speed_max_m_s, &hull);
         Self {

@@ -101,6 +101,11 @@ impl DriveState {
         }
     }
 
+    /// Velocity of the centre of mass over the ground, world x and y, m/s.
+    fn velocity(&self) -> DVec2 {
+        ahead(self.heading) * self.surge + starboard(self.heading) * self.sway
+    }
+
     fn moved(&self, rates: &DriveRates, seconds: f64) -> Self {
         Self {
             centre: self.centre + rates.centre * seconds,
@@ -174,9 +179,8 @@ impl Craft {
         if waves.is_flat() {
             return Surroundings::default();
         }
-        let velocity = ahead(boat.heading) * boat.surge + starboard(boat.heading) * boat.sway;
         let (centre, heading) =
-            (boat.centre + velocity * (0.5 * h), boat.heading + boat.yaw_rate * (0.5 * h));
+            (boat.centre + boat.velocity() * (0.5 * h), boat.heading + boat.yaw_rate * (0.5 * h));
         let plane = waves.plane_under(centre, heading, self.length_m, BEAM * self.length_m, time_s + 0.5 * h);
         Surroundings { forward_slope: plane.forward_slope, port_slope: plane.port_slope, anchor: None }
     }
@@ -224,9 +228,8 @@ impl Craft {
         let n = self.transom_m * drive_y + self.bow_m() * rode_y + hull_n;
         // On the plane less water goes along sideways.
         let sway_kg = self.mass_kg + (self.sway_kg - self.mass_kg) * (1.0 - 0.7 * running.planing);
-        let forward = ahead(state.heading);
         DriveRates {
-            centre: forward * u + starboard(state.heading) * v,
+            centre: state.velocity(),
             heading: r,
             surge: (x + 0.5 * (self.mass_kg + sway_kg) * v * r) / self.surge_kg,
             sway: (y - self.surge_kg * u * r) / sway_kg,

@@ -5,7 +5,10 @@
 
 use crate::{
     physics::GRAVITY_M_S2,
-    world::boats::hull::{HullForm, STRIPS, WATER_KG_M3},
+    world::boats::{
+        floating::ramp,
+        hull::{HullForm, STRIPS, WATER_KG_M3},
+    },
 };
 
 /// Kinematic viscosity of sea water at 15 degrees, m^2/s.
@@ -155,9 +158,7 @@ fn volume_froude(form: &HullForm, speed_m_s: f64) -> f64 {
 
 fn running(form: &HullForm, planes: bool, speed_m_s: f64) -> Running {
     let afloat = displacing(form, planes, speed_m_s);
-    let froude = volume_froude(form, speed_m_s);
-    let t = ((froude - PLANING.0) / (PLANING.1 - PLANING.0)).clamp(0.0, 1.0);
-    let planing = t * t * (3.0 - 2.0 * t);
+    let planing = ramp(volume_froude(form, speed_m_s), PLANING);
     if !planes || planing <= 0.0 {
         return afloat;
     }
@@ -173,7 +174,7 @@ fn surface(form: &HullForm) -> PlaningSurface {
         weight_n: form.weight_n(),
         beam_m: 2.0 * chine_m,
         deadrise: deadrise.atan().min(0.5),
-        centre_m: form.strip_m / 2.0 - form.strips[0].x_m,
+        centre_m: form.centre_from_stern_m(),
     }
 }
 
