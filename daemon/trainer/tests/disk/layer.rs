@@ -155,6 +155,8 @@ const HANGS: Duration = Duration::from_secs(40);
 const BEGINS: i64 = -(Errno::ENOSYS as i64);
 /// The program says so with a line like this that it is about to end by itself.
 pub const ENDING: &str = "ending";
+/// The same once nothing is left to do.
+pub const ENDED: &str = "ended";
 
 impl<P: Plan> Layer<P> {
     /// For a program that works in `folder`.
@@ -464,6 +466,7 @@ impl<P: Plan> Layer<P> {
                 Some(("fired", shot)) => self.files.steps.push(Step::Fired(shot.parse().unwrap())),
                 Some(("committed", shot)) => self.files.steps.push(Step::Committed(shot.parse().unwrap())),
                 None if line == "damage" => self.files.steps.push(Step::Damage),
+                None if line == ENDED => {}
                 None if line == ENDING => drop(self.asked.get_or_insert_with(Instant::now)),
                 _ => panic!("the program said {text:?}"),
             }

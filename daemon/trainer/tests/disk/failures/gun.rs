@@ -17,7 +17,7 @@ use bowwave_trainer::{
 use signal_hook::{consts::SIGTERM, flag};
 
 use crate::{
-    layer::ENDING,
+    layer::{ENDED, ENDING},
     shoot::{OPTIONS, say, shot, wait_for_go},
 };
 
@@ -71,6 +71,7 @@ pub fn run(folder: &Path) {
     for wrong in storage.finish().1 {
         log::error!("{wrong:#}");
     }
+    say(ENDED);
 }
 
 /// The log, as on another disk.

@@ -88,13 +88,7 @@ impl Shooting {
                 report.faults.push(format!("its end took {:?}", self.ended.after));
             }
         }
-        let mut logged = BTreeSet::new();
-        for line in self.log.lines() {
-            if let Some((_, row)) = line.split_once("not in the journal: ") {
-                let row: serde_json::Value = serde_json::from_str(row).unwrap();
-                logged.insert(row["shot"].as_u64().unwrap());
-            }
-        }
+        let logged = logged(&self.log);
         report.rounds.logged = logged.len();
         report.rounds.aside = rows_aside(&self.folder);
         let must = rounds.must(case, was_killed);
@@ -138,16 +132,16 @@ impl Shooting {
 
 /// Rounds in the order in which they were fired and reported.
 #[derive(Default)]
-struct Rounds {
-    fired: BTreeSet<u64>,
-    reported: BTreeSet<u64>,
+pub struct Rounds {
+    pub fired: BTreeSet<u64>,
+    pub reported: BTreeSet<u64>,
     /// The last one fired before the trouble, and those reported before it.
     before: Option<(u64, BTreeSet<u64>)>,
     refused: bool,
 }
 
 impl Rounds {
-    fn take(&mut self, step: &Step) {
+    pub fn take(&mut self, step: &Step) {
         match step {
             Step::Fired(shot) => drop(self.fired.insert(*shot)),
             Step::Committed(shot) => drop(self.reported.insert(*shot)),
@@ -184,20 +178,28 @@ impl Case {
     }
 }
 
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+/// Rounds that the log has instead of the journal.
+pub fn logged(log: &str) -> BTreeSet<u64> {
+    let rows = log.lines().filter_map(|line| line.split_once("not in the journal: "));
+    let row = |row| serde_json::from_str::<serde_json::Value>(row).unwrap();
+    rows.map(|(_, text)| row(text)["shot"].as_u64().unwrap()).collect()
+}
+
+/// The folder's files with their contents.
+pub fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entries = fs::read_dir(folder).unwrap().map(Result::unwrap);
     let files = entries.filter(|entry| !entry.file_name().to_string_lossy().ends_with("-shm"));
     files.map(|f| (f.file_name().into_string().unwrap(), fs::read(f.path()).unwrap())).collect()
 }
 
 /// Rounds in files beside the journal.
-fn rows_aside(folder: &Path) -> usize {
+pub fn rows_aside(folder: &Path) -> usize {
     let files = side_files(&folder.join(shoot::NAME)).unwrap();
     files.iter().map(|file| fs::read_to_string(file).unwrap().lines().count().saturating_sub(1)).sum()
 }
 
 /// Has the trainer start on what the disk has, and looks which rounds are where they can be found.
-fn compare(
+pub fn compare(
     on_disk: &BTreeMap<String, Vec<u8>>,
     rounds: &Rounds,
     must: &BTreeSet<u64>,

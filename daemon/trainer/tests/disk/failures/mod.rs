@@ -2,11 +2,12 @@
 //! lost; what was not reported is in the journal, in the side file or in the log, unless the program was killed; the end takes a second
 //! at most.
 //!
-//! The trainer's own storage shoots, SQLite as it is shipped below it. The layer is below both.
+//! The trainer's own storage shoots, SQLite as it is shipped below it. The layer is below both; `filesystem.rs` has a real file system there.
 //!
 //! `BOWWAVE_DISK_CASES` says how many cases (200 unless told, none for 0). `BOWWAVE_DISK_CASE` has that one of them alone, and what it printed.
 
 mod cases;
+mod filesystem;
 pub mod gun;
 mod look;
 mod plan;
@@ -25,6 +26,8 @@ use cases::{Case, DiskFailure, Lasting, Trouble, cases};
 use look::{CaseReport, RoundCounts, Shooting};
 
 const CASES: usize = 200;
+/// For so many cases each trouble goes once with each end on a real file system.
+const CASES_FOR_EACH: usize = 2000;
 /// Cases that compute and write side by side, and those that mostly wait.
 const AT_ONCE: usize = 3;
 const AT_ONCE_LONG: usize = 16;
@@ -54,6 +57,7 @@ pub fn run() {
     let cases: usize = reports.iter().map(|(_, case, _)| case.count()).sum();
     let faults = reports.iter().filter(|(_, _, report)| !report.faults.is_empty()).count();
     println!("{cases} cases at {calls} calls in {} s", begun.elapsed().as_secs());
+    filesystem::run(asked.div_ceil(CASES_FOR_EACH));
     assert_eq!(faults, 0, "runs of the program that lost something, invented something or ended late");
 }
 
