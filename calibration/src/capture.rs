@@ -219,7 +219,12 @@ impl Capture {
         match event {
             Event::Imu(sample) => self.sample(sample),
             Event::Trigger(edge) if self.edges.len() < OBSERVATIONS_MOST => self.edges.push(*edge),
-            Event::Frame(_) | Event::Trigger(_) | Event::Fault(_) | Event::Ship(_) | Event::Mark(_) => {}
+            Event::Frame(_)
+            | Event::Trigger(_)
+            | Event::Fault(_)
+            | Event::Ship(_)
+            | Event::Mark(_)
+            | Event::Act(_) => {}
         }
     }
 

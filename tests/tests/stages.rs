@@ -191,7 +191,7 @@ fn core() -> Modules {
 fn each_stage_sees_only_those_before_it() {
     let arrows = core().arrows();
     let stage = |m: &ModulePath| m.first().cloned().unwrap_or_default();
-    let stages = ["estimate", "world", "frame", "session"];
+    let stages = ["estimate", "world", "frame", "session", "gunner"];
     let rank = |name: &str| stages.iter().position(|s| *s == name);
     let mut seen = BTreeSet::new();
     for (module, used) in &arrows {

@@ -58,6 +58,8 @@ pub enum ProgramCommand {
     Doctor(Doctor),
     /// Print the virtual rounds of a journal
     Hits(Hits),
+    /// Print the score of a run: threats, rounds, calls, rules, and why each round missed
+    Score(ScoreArgs),
     /// Measure lens, mounting and timing, or print the board for it
     Calibrate(Calibrate),
     /// Print what a shell needs to complete this command line
@@ -150,6 +152,13 @@ pub struct Simulate {
     /// Seed of all chance; overrides the scenario's
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
+    /// Have a simulated gunner play the scenario instead, without pictures and recording, and print the score
+    #[arg(long, value_name = "SKILL", value_parser = ["novice", "trained", "expert"],
+        conflicts_with_all = ["recording", "realtime", "window", "frames", "record", "video", "sheet", "stills", "fault", "fault_every"])]
+    pub gunner: Option<String>,
+    /// Play it so often, each time with the next seed, and print the spread of the scores
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "gunner", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub runs: u64,
     /// Folder for summary.json, hits.sqlite and what else is asked for
     #[arg(long, value_name = "DIR", default_value = "bowwave-out")]
     pub out: PathBuf,
@@ -314,6 +323,20 @@ pub struct Hits {
     /// Only rounds that struck
     #[arg(long)]
     pub hits_only: bool,
+}
+
+/// Arguments of `score`.
+#[derive(Debug, Args)]
+pub struct ScoreArgs {
+    /// Journal (SQLite) or the folder that a run left
+    #[arg(default_value = "bowwave-out")]
+    pub run: PathBuf,
+    /// This run of the journal; without it the newest
+    #[arg(long = "run", value_name = "N")]
+    pub number: Option<i64>,
+    /// Print as JSON
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `imu-freeze@2.5+0.5`.

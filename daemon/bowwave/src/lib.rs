@@ -21,6 +21,7 @@ pub mod program;
 mod replay;
 mod run;
 mod scenario;
+mod score;
 mod simulate;
 pub mod stdout;
 pub mod today;
@@ -63,6 +64,7 @@ fn dispatch(
             doctor::run(arguments).map(|well| if well { Outcome::Done } else { Outcome::Failed })
         }
         ProgramCommand::Hits(arguments) => hits::run(arguments).map(|()| Outcome::Done),
+        ProgramCommand::Score(arguments) => score::run(arguments).map(|()| Outcome::Done),
         ProgramCommand::Calibrate(arguments) => calibrate::run(arguments.task.as_ref()),
         ProgramCommand::Completions(arguments) => completions::run(arguments.shell),
         ProgramCommand::Licences => licences::run(),

@@ -4,7 +4,7 @@ use std::{any::Any, sync::Arc};
 
 use glam::{DQuat, DVec3};
 
-use crate::{fault::FaultChange, time::Time};
+use crate::{act::TraineeAct, fault::FaultChange, time::Time};
 
 /// One input of a session. Records and scenes follow from the inputs alone, live as replayed.
 #[derive(Clone, Debug)]
@@ -44,6 +44,8 @@ pub enum Event {
     Ship(ShipSample),
     /// The operator says that the gun stands at something of known bearing.
     Mark(Mark),
+    /// The trainee did something besides pulling the trigger, or an instructor marked a call.
+    Act(TraineeAct),
     /// A fault came or went.
     Fault(FaultChange),
 }
@@ -57,6 +59,7 @@ impl Event {
             Self::Trigger(t) => t.time,
             Self::Ship(s) => s.arrival,
             Self::Mark(m) => m.time,
+            Self::Act(a) => a.time,
             Self::Fault(f) => f.time,
         }
     }

@@ -1,12 +1,14 @@
 //! The trainer without hardware: no I/O, no clock, no threads, no `unsafe`.
 //!
 //! Three stages, each of which sees only those before it: [`estimate`] (where the camera points, what the sea and the light are),
-//! [`world`] (boats, weapon, rounds, score) and [`frame`] (what is drawn, and why not). [`session`] steps them. The other modules are
-//! the vocabulary that all of them share.
+//! [`world`] (boats, weapon, rounds, score) and [`frame`] (what is drawn, and why not). [`session`] steps them. [`gunner`] plays the world
+//! without pictures. The other modules are the vocabulary that all of them share.
 
 #![forbid(unsafe_code)]
 
+pub mod act;
 pub mod calibration;
+mod chance;
 pub mod colour;
 pub mod daylight;
 pub mod estimate;
@@ -15,12 +17,14 @@ pub mod fault;
 pub mod frame;
 pub mod geometry;
 pub mod guide;
+pub mod gunner;
 pub mod levenberg;
 pub mod model;
 pub mod pacing;
 pub mod physics;
 pub mod sea;
 pub mod session;
+pub mod side;
 pub mod statistics;
 pub mod text;
 pub mod time;

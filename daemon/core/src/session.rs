@@ -25,7 +25,7 @@ use crate::{
     geometry::CameraPose,
     time::Time,
     water::ReflectionMethod,
-    world::{BoreAim, World, score::ShotRecord},
+    world::{BoreAim, World, exercise::ExerciseEvent, score::ShotRecord},
 };
 
 pub use crate::frame::ROUNDS_SEEN_MAX;
@@ -44,6 +44,7 @@ pub struct Session {
     composer: Composer,
     faults: FaultBoard,
     records: Vec<ShotRecord>,
+    happened: Vec<ExerciseEvent>,
     found: Vec<FaultChange>,
     notes: Notes,
     digest: SessionDigest,
@@ -86,6 +87,7 @@ impl Session {
             calibration: setup.calibration,
             faults: FaultBoard::new(),
             records: Vec::new(),
+            happened: Vec::new(),
             found: Vec::new(),
             notes: Notes::default(),
             digest: SessionDigest::default(),
@@ -174,6 +176,7 @@ impl Session {
             }),
             Event::Ship(sample) => self.estimator.ship(sample),
             Event::Mark(mark) => self.estimator.mark(mark),
+            Event::Act(act) => self.world.act(*act),
             Event::Fault(change) => {
                 // The line for the log is the caller's affair: this board only knows what is there.
                 let _ = self.faults.take(change);
@@ -184,6 +187,7 @@ impl Session {
     /// A frame is due: gives what to draw, and what became of rounds since the last tick.
     pub fn tick(&mut self, tick: Tick) -> TickAnswer<'_> {
         self.records.clear();
+        self.happened.clear();
         self.found.clear();
         self.notes.clear();
         let picture_is_new = self.estimator.look(!self.faults.is_active(Fault::LoadUnseen));
@@ -218,7 +222,13 @@ impl Session {
             mid_exposure: frame.map_or(tick.time, |frame| frame.mid_exposure),
             pose_known,
         };
-        TickAnswer { view, records: &self.records, faults: &self.found, notes: self.notes.new_ones() }
+        TickAnswer {
+            view,
+            records: &self.records,
+            events: &self.happened,
+            faults: &self.found,
+            notes: self.notes.new_ones(),
+        }
     }
 
     /// Fires what the trigger asks for and follows boats and rounds up to the picture's time.
@@ -234,6 +244,7 @@ impl Session {
         let Self { calibration, estimator, composer, faults, world, records, .. } = self;
         let aim = |fired| aim(calibration, estimator, composer.scene().camera, faults, fired);
         world.advance(video_time, until, known, aim, records);
+        self.happened.extend_from_slice(self.world.events());
     }
 
     /// The warning that the sailor sees, of all that there are: that the picture is late comes before what does not change it.
@@ -308,12 +319,12 @@ impl Session {
         }
     }
 
-    /// Rounds still in the air are recorded as misses: the session ends here.
-    pub fn finish(&mut self) -> &[ShotRecord] {
+    /// Rounds still in the air are recorded as misses: the session ends here. Gives these, and what else the score needs.
+    pub fn finish(&mut self) -> (&[ShotRecord], &[ExerciseEvent]) {
         self.records.clear();
         self.world.finish(&mut self.records);
         self.digest_records();
-        &self.records
+        (&self.records, self.world.events())
     }
 
     /// A scene in which everything that this session can ever show is in view. Drawn once and thrown away before the first

@@ -338,7 +338,7 @@ fn rounds_in_the_air_at_the_end_are_recorded() {
     let mut during = 0;
     play(&mut s, 1.0, &ALL, &burst(800, 850), |_, _, _, r| during += r.len());
     assert_eq!(during, 0);
-    let left = s.finish().to_vec();
+    let left = s.finish().0.to_vec();
     assert_eq!(left.len(), 1);
     assert!(matches!(left[0].outcome, Outcome::Miss { .. }), "{left:?}");
 }

@@ -9,8 +9,8 @@ pub mod space;
 
 pub use journal::{
     DirtyEnd, DirtyRun, Journal, JournalError, JournalFault, JournalOptions, JournalSummary, Quarantine, Run,
-    RunSelection, ShotFilter, StoredRun, StoredShot, Unwritten, boot_id, put_aside, read_runs, read_shots,
-    side_files,
+    RunSelection, ShotFilter, StoredEvent, StoredRun, StoredShot, Unwritten, boot_id, put_aside, read_events,
+    read_runs, read_shots, side_files,
 };
 pub use recording::{
     CameraInfo, Counts, Entries, Entry, FaultEntry, FrameEntry, PictureEntry, PoseEntry, Properties,

@@ -207,9 +207,9 @@ fn what_is_no_journal_is_named_and_left_alone() {
 
     let path = folder.path().join("newer.db");
     shoot(&path, &[shot(1)]);
-    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 4").unwrap();
+    rusqlite::Connection::open(&path).unwrap().execute_batch("PRAGMA user_version = 5").unwrap();
     let error = Journal::open(&path, &run()).err().unwrap();
-    assert!(matches!(error, JournalError::Newer { found: 4, supported: 3, .. }), "{error}");
+    assert!(matches!(error, JournalError::Newer { found: 5, supported: 4, .. }), "{error}");
     assert!(matches!(read_runs(&path), Err(JournalError::Newer { .. })));
 
     let error = Journal::open(folder.path(), &run()).err().unwrap();

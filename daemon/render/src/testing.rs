@@ -56,6 +56,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             clock_s: 83.0,
             sea: None,
             heading_tenths_deg: None,
+            ..Hud::READY
         },
         guide: None,
     }

@@ -124,6 +124,7 @@ fn input_of(entry: Entry, decoder: &mut Decoder, path: &Path) -> Result<Option<R
         Entry::Imu(sample) => Event::Imu(sample),
         Entry::Trigger(edge) => Event::Trigger(edge),
         Entry::Mark(mark) => Event::Mark(mark),
+        Entry::Act(act) => Event::Act(act),
         Entry::ShipValues(sample) => Event::Ship(sample),
         Entry::Fault(entry) => Event::Fault(entry.change),
         Entry::Picture(picture) => Event::Frame(picture.into()),

@@ -289,6 +289,7 @@ impl Trainer {
             match user {
                 UserEvent::Trigger(edge) => self.events.push(Event::Trigger(edge)),
                 UserEvent::Rezero => self.events.push(at_stow()),
+                UserEvent::Act(act) => self.events.push(Event::Act(act)),
                 UserEvent::Quit => self.signals.stop.store(true, Ordering::Relaxed),
             }
         }
@@ -391,6 +392,7 @@ impl Trainer {
         self.tally.records(step.records);
         if let Some(storage) = &mut self.storage {
             storage.rounds(step.records);
+            storage.exercise(step.events);
         }
         step.faults.iter().for_each(|change| self.faults.tell(change));
         step.notes.iter().for_each(tell);
@@ -506,11 +508,13 @@ impl Trainer {
             self.source.collect(Time::from_ns(i64::MAX), &mut self.events, &mut self.changes);
         }
         wrong.extend(self.source.take_error().map(|e| e.to_string()));
-        let left = self.session.finish().to_vec();
+        let (rounds, exercise) = self.session.finish();
+        let (left, exercise) = (rounds.to_vec(), exercise.to_vec());
         self.tally.records(&left);
         let mut lost_entries = 0;
         if let Some(mut storage) = self.storage.take() {
             storage.rounds(&left);
+            storage.exercise(&exercise);
             let (lost, failed) = storage.finish();
             lost_entries = lost;
             wrong.extend(failed.iter().map(|e| format!("{e:#}")));

@@ -145,6 +145,7 @@ impl Producer {
                 ready.extend(self.ship.lines(&bytes, due).map(|said| Ok(Event::Ship(said.sample))));
             }
             Item::Mark(mark) => ready.push(Ok(Event::Mark(mark))),
+            Item::Act(act) => ready.push(Ok(Event::Act(act))),
             Item::Trigger(edge) => {
                 self.triggers += 1;
                 ready.push(Ok(Event::Trigger(edge)));

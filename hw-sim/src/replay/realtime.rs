@@ -10,6 +10,7 @@ use std::{
 };
 
 use bowwave_core::{
+    act::TraineeAct,
     event::{CameraFrame, Event, Mark, TriggerEdge},
     time::Time,
 };
@@ -241,6 +242,7 @@ enum Due {
     Ship(Time, Vec<u8>),
     Trigger(TriggerEdge),
     Mark(Mark),
+    Act(TraineeAct),
 }
 
 impl Reader {
@@ -253,6 +255,7 @@ impl Reader {
                 Ok(Item::Ship { due, bytes }) => self.due.send(Due::Ship(due, bytes)).is_ok(),
                 Ok(Item::Trigger(edge)) => self.due.send(Due::Trigger(edge)).is_ok(),
                 Ok(Item::Mark(mark)) => self.due.send(Due::Mark(mark)).is_ok(),
+                Ok(Item::Act(act)) => self.due.send(Due::Act(act)).is_ok(),
                 Err(error) => {
                     // Room for one from each sender; where it is full something else has been reported.
                     drop(self.errors.try_send(error.into()));
@@ -289,6 +292,7 @@ impl Line {
                 Due::Bytes(time, _) | Due::Ship(time, _) => *time,
                 Due::Trigger(edge) => edge.time,
                 Due::Mark(mark) => mark.time,
+                Due::Act(act) => act.time,
             };
             if !self.pace.wait(time) {
                 return self.terminals;
@@ -307,6 +311,10 @@ impl Line {
                 }
                 Due::Mark(mark) => {
                     self.triggers.send(Event::Mark(mark));
+                    Ok(0)
+                }
+                Due::Act(act) => {
+                    self.triggers.send(Event::Act(act));
                     Ok(0)
                 }
             };

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bowwave_core::{
+    act::TraineeAct,
     event::{ImuSample, Mark, TriggerEdge},
     time::Time,
 };
@@ -34,6 +35,7 @@ pub(super) enum Item {
     },
     /// The operator's press.
     Mark(Mark),
+    Act(TraineeAct),
 }
 
 /// A picture as it is recorded.
@@ -134,6 +136,7 @@ impl Iterator for Wire {
                     Some(Item::Ship { due: line.arrival, bytes: line.sentence.into_bytes() })
                 }
                 Ok(Entry::Mark(mark)) => Some(Item::Mark(mark)),
+                Ok(Entry::Act(act)) => Some(Item::Act(act)),
                 Ok(Entry::Picture(picture)) => Some(Item::Frame(RecordedPicture::Raw(picture))),
                 // Comes over no wire: known afterwards, or of the run that was recorded.
                 Ok(

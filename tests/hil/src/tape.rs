@@ -139,6 +139,7 @@ impl Tape {
                 | Entry::Ship(_)
                 | Entry::ShipValues(_)
                 | Entry::Mark(_)
+                | Entry::Act(_)
                 | Entry::Picture(_)
                 | Entry::Fault(_)
                 | Entry::Tick(_) => {}

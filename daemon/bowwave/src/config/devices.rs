@@ -4,7 +4,9 @@ use std::{path::PathBuf, time::Duration};
 
 use anyhow::Result;
 use bowwave_core::{
+    act::Act,
     estimate::attitude::Source as Orientation,
+    side::Side,
     text::toml::{OptionalKey, RequiredKey, Spanned, TomlError, TomlText, ValueRule, number, one_of, whole},
 };
 use bowwave_devices::{
@@ -12,7 +14,7 @@ use bowwave_devices::{
     imu::ImuFormat,
     lamps::LampSettings,
     serial::{Baud, ImuSettings, LineSettings},
-    trigger::{Bias, InputLine, InterlockWiring},
+    trigger::{Bias, InputLine, InterlockWiring, Press, PressKind},
 };
 use serde::Deserialize;
 
@@ -170,6 +172,37 @@ pub(super) struct RawGpioLine {
     debounce_ms: OptionalKey<i64>,
     second: Option<Spanned<Box<Self>>>,
     discrepancy_ms: OptionalKey<i64>,
+}
+
+/// The table `[buttons]`: lines of the trainee's acts, and of calls that an instructor marks.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct RawButtons {
+    report: Option<RawGpioLine>,
+    hostile: Option<RawGpioLine>,
+    neutral: Option<RawGpioLine>,
+    warn: Option<RawGpioLine>,
+    reload: Option<RawGpioLine>,
+    clear: Option<RawGpioLine>,
+    safe: Option<RawGpioLine>,
+    ready: Option<RawGpioLine>,
+}
+
+impl RawButtons {
+    pub(super) fn presses(self, text: TomlText<'_>) -> Result<Vec<Press>, TomlError> {
+        let lines = [
+            (Act::Report, self.report),
+            (Act::Identify(Side::Hostile), self.hostile),
+            (Act::Identify(Side::Neutral), self.neutral),
+            (Act::Warn, self.warn),
+            (Act::Reload, self.reload),
+            (Act::Clear, self.clear),
+            (Act::Safe, self.safe),
+            (Act::Ready, self.ready),
+        ];
+        let given = lines.into_iter().filter_map(|(act, line)| Some((act, line?)));
+        given.map(|(act, line)| Ok(Press { line: line.input(text)?, kind: PressKind::Act(act) })).collect()
+    }
 }
 
 /// A line by its number on the chip or by its name.

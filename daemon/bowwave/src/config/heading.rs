@@ -10,7 +10,7 @@ use bowwave_core::{
 };
 use bowwave_devices::{
     serial::LineSettings,
-    trigger::{InputLine, Press},
+    trigger::{InputLine, Press, PressKind},
 };
 use serde::Deserialize;
 
@@ -102,11 +102,11 @@ impl RawHeadings {
         if self.rezero.is_some() {
             let (stow, input) = rezero(text, self.rezero)?;
             choice.settings.stow = Some(stow);
-            choice.presses.extend(input.map(|line| Press { line, kind: MarkKind::Stow }));
+            choice.presses.extend(input.map(|line| Press { line, kind: PressKind::Mark(MarkKind::Stow) }));
         }
         let (landmarks, input) = self.landmarks.check(text)?;
         choice.settings.landmarks = landmarks;
-        choice.presses.extend(input.map(|line| Press { line, kind: MarkKind::Landmark }));
+        choice.presses.extend(input.map(|line| Press { line, kind: PressKind::Mark(MarkKind::Landmark) }));
         let per_hour =
             |value| Ok::<_, TomlError>(text.given(value, drift())?.map(|d| d.to_radians() / 3600.0));
         choice.settings.own_growth = per_hour(&self.heading.growth_deg_per_h)?;

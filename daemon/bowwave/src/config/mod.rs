@@ -124,6 +124,7 @@ struct RawConfig {
     landmarks: heading::RawLandmarks,
     heading: heading::RawHeading,
     trigger: Option<devices::RawGpioLine>,
+    buttons: devices::RawButtons,
     interlock: Option<devices::RawGpioLine>,
     power_fail: Option<devices::RawGpioLine>,
     lamps: Option<devices::RawLamps>,
@@ -216,9 +217,11 @@ pub fn parse(text: &str, origin: &str, base: &Path) -> Result<Config> {
         landmarks: raw.landmarks,
         heading: raw.heading,
     };
+    let mut heading = heading.check(text)?;
+    heading.presses.extend(raw.buttons.presses(text)?);
     let input = |line: Option<devices::RawGpioLine>| line.map(|line| line.input(text)).transpose();
     Ok(Config {
-        heading: heading.check(text)?,
+        heading,
         output: text.given(&raw.screen.output, one_of(&outputs))?.unwrap_or_default(),
         size,
         lcd,

@@ -1,9 +1,9 @@
-use bowwave_core::event::MarkKind;
+use bowwave_core::{act::Act, event::MarkKind};
 use bowwave_devices::{
     camera::{Coding, Exposure, Rate, WhiteBalance},
     imu::ImuFormat,
     serial::Baud,
-    trigger::{Bias, Press},
+    trigger::{Bias, Press, PressKind},
 };
 
 use super::*;
@@ -39,7 +39,7 @@ fn every_key_that_the_installed_file_shows_is_valid() {
     let config = parse(&whole, "systemd/bowwave.toml", Path::new(".")).unwrap();
     assert_eq!(config.warnings, [""; 0]);
     assert!(
-        config.gpio.trigger.is_some() && config.gpio.lamps.is_some() && config.heading.presses.len() == 2
+        config.gpio.trigger.is_some() && config.gpio.lamps.is_some() && config.heading.presses.len() == 10
     );
     // An open wire of either contact that it shows reads as not inert.
     let interlock = config.gpio.interlock.expect("an interlock");
@@ -84,6 +84,8 @@ fn every_key_is_read() {
         from_bow_deg = -90
         from_north_deg = 318.0
         sigma_deg = 0.3
+        [buttons]
+        report = { chip = "/dev/gpiochip0", line = "report", active_low = true, bias = "pull-up" }
         [landmarks]
         at = [{ bearing_deg = 41.3, sigma_deg = 0.2 }, { bearing_deg = 127 }]
         input = { chip = "/dev/gpiochip0", line = 9 }
@@ -158,9 +160,19 @@ fn every_key_is_read() {
     );
     assert_eq!((s.own_growth, s.shown_above), (Some(36f64.to_radians() / 3600.0), 0.4f64.to_radians()));
     assert_eq!(s.sky_drift, 1.8f64.to_radians() / 3600.0);
-    let rezero = Press { line: line("/dev/gpiochip0", "rezero", true, Bias::AsIs), kind: MarkKind::Stow };
-    let landmark = Press { line: line("/dev/gpiochip0", "9", false, Bias::AsIs), kind: MarkKind::Landmark };
-    assert_eq!(heading.presses, [rezero, landmark]);
+    let rezero = Press {
+        line: line("/dev/gpiochip0", "rezero", true, Bias::AsIs),
+        kind: PressKind::Mark(MarkKind::Stow),
+    };
+    let landmark = Press {
+        line: line("/dev/gpiochip0", "9", false, Bias::AsIs),
+        kind: PressKind::Mark(MarkKind::Landmark),
+    };
+    let report = Press {
+        line: line("/dev/gpiochip0", "report", true, Bias::PullUp),
+        kind: PressKind::Act(Act::Report),
+    };
+    assert_eq!(heading.presses, [rezero, landmark, report]);
     let trigger = line("/dev/gpiochip0", "17", true, Bias::AsIs);
     assert_eq!(
         config.gpio.trigger,

@@ -6,6 +6,7 @@ mod rehearsal;
 use anyhow::Result;
 use bowwave_core::world::{
     boats::Behaviour,
+    exercise::Engagement,
     scenario::{self, Scenario, Side},
 };
 use serde::Serialize;
@@ -38,6 +39,9 @@ struct Listed {
     crewed: usize,
     duration_s: Option<f64>,
     beaufort: u8,
+    rules: Option<&'static str>,
+    /// Points of the simulated novice and expert on average.
+    par: Option<[f64; 2]>,
 }
 
 impl Listed {
@@ -51,6 +55,8 @@ impl Listed {
             crewed: scenario.boats.iter().filter(|b| matches!(b.behaviour, Behaviour::Crewed(_))).count(),
             duration_s: scenario.duration_s,
             beaufort: scenario.water.force.get(),
+            rules: scenario.exercise.rules.map(Engagement::name),
+            par: scenario.exercise.goals.par,
         }
     }
 }
@@ -65,17 +71,24 @@ fn list(arguments: &ScenarioList) -> Result<Outcome> {
         return Ok(Outcome::Done);
     }
     let mut text = format!(
-        "{:<14} {:<22} {:>7} {:>7} {:>6} {:>9} {:>8}\n",
-        "name", "title", "hostile", "neutral", "crewed", "seconds", "Beaufort"
+        "{:<15} {:<16} {:>7} {:>7} {:>6} {:>8} {:>8}  {:<5} {:>6} {:>6}\n",
+        "name", "title", "hostile", "neutral", "crewed", "seconds", "Beaufort", "rules", "novice", "expert"
     );
     for l in &listed {
         let seconds = l.duration_s.map_or_else(|| "no end".to_owned(), |s| format!("{s:.0}"));
-        text += &format!(
-            "{:<14} {:<22} {:>7} {:>7} {:>6} {:>9} {:>8}\n",
-            l.name, l.title, l.hostile, l.neutral, l.crewed, seconds, l.beaufort
-        );
+        let [novice, expert] =
+            l.par.map_or_else(Default::default, |par| par.map(|points| format!("{points:.0}")));
+        let rules = l.rules.unwrap_or("-");
+        text += format!(
+            "{:<15} {:<16} {:>7} {:>7} {:>6} {seconds:>8} {:>8}  {rules:<5} {novice:>6} {expert:>6}",
+            l.name, l.title, l.hostile, l.neutral, l.crewed, l.beaufort
+        )
+        .trim_end();
+        text.push('\n');
     }
-    text += "\nPlay one with `bowwave simulate --scenario NAME`, look at it with `bowwave scenario preview NAME`.\n";
+    text += "\nThe last columns are the points of a simulated novice and expert on average. Read an exercise with `bowwave scenario new FILE \
+             --from NAME`, look at it with `bowwave scenario preview NAME`, play it with `bowwave simulate --scenario NAME`, have it \
+             played with `bowwave simulate --gunner expert --scenario NAME`.\n";
     stdout::print(text)?;
     Ok(Outcome::Done)
 }

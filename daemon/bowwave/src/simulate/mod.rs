@@ -1,5 +1,6 @@
 //! `bowwave simulate`: the trainer on a recording, as if its devices were there.
 
+mod gunner;
 mod leftovers;
 pub mod prepare;
 
@@ -35,6 +36,9 @@ use crate::{cli::Simulate, outcome::Outcome, stdout};
 
 /// Runs the trainer on a recording.
 pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
+    if let Some(gunner) = &arguments.gunner {
+        return gunner::run(arguments, gunner).map(|()| Outcome::Done);
+    }
     let signals = Arc::new(Signals::default());
     let on_signal = Arc::clone(&signals);
     let interrupted = Arc::new(AtomicBool::new(false));

@@ -235,6 +235,9 @@ impl Composer {
             clock_s: world.clock_s(time),
             sea: estimator.sea().map(|sea| (sea.in_use.state, sea.in_use.source)),
             heading_tenths_deg: estimator.heading_shown(),
+            rules: world.watch().rules(),
+            weapon: world.weapon_state(),
+            message: world.message(time),
         };
         camera
     }

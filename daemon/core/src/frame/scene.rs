@@ -17,6 +17,7 @@ use crate::{
     model::{ModelId, Zone},
     sea::WmoSeaState,
     water::Water,
+    world::{exercise::Engagement, weapon::WeaponState},
 };
 
 /// One frame.
@@ -301,6 +302,12 @@ pub struct Hud {
     pub sea: Option<(WmoSeaState, SeaSource)>,
     /// Standard deviation of the heading in tenths of a degree, where the sailor is to know it.
     pub heading_tenths_deg: Option<u16>,
+    /// Rules of engagement, where the scenario gives any.
+    pub rules: Option<Engagement>,
+    /// State of the virtual weapon.
+    pub weapon: WeaponState,
+    /// Text of the scenario, printable ASCII.
+    pub message: Option<Arc<str>>,
 }
 
 impl Hud {
@@ -315,5 +322,8 @@ impl Hud {
         clock_s: 0.0,
         sea: None,
         heading_tenths_deg: None,
+        rules: None,
+        weapon: WeaponState::Ready,
+        message: None,
     };
 }

@@ -1,7 +1,13 @@
 //! Answer of a session to a tick.
 
 use super::notes::Note;
-use crate::{event::Picture, fault::FaultChange, frame::scene::Scene, time::Time, world::score::ShotRecord};
+use crate::{
+    event::Picture,
+    fault::FaultChange,
+    frame::scene::Scene,
+    time::Time,
+    world::{exercise::ExerciseEvent, score::ShotRecord},
+};
 
 /// The answer to one tick.
 #[derive(Debug)]
@@ -10,6 +16,8 @@ pub struct TickAnswer<'a> {
     pub view: View<'a>,
     /// Rounds that ended, in the order in which they were fired within the step.
     pub records: &'a [ShotRecord],
+    /// Events of the exercise, for the score.
+    pub events: &'a [ExerciseEvent],
     /// Faults that the session itself has found to come or go. It knows of them already: they are for the log only.
     pub faults: &'a [FaultChange],
     /// Notes for the log.

@@ -39,7 +39,7 @@ impl Vessel {
             name: boat.name.clone(),
             side: boat.side,
             model: *model,
-            behaviour: boat.behaviour.clone(),
+            behaviour: boat.behaviour.clone().in_session(scenario.seed),
         };
         scenario.boats.iter().zip(boat_models).map(vessel).collect()
     }
@@ -66,6 +66,8 @@ struct FleetBoat {
     side: Side,
     model: ModelId,
     history: BoatHistory,
+    /// Seconds since the start at which it was warned.
+    warned_s: Option<f64>,
 }
 
 impl FleetBoat {
@@ -123,7 +125,7 @@ impl Fleet {
             let hull = model.map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
             let form = model.map_or_else(|| HullForm::new((-0.5, 0.5), 0.3, 1.2, |_| 0.5), HullForm::of);
             let history = BoatHistory::new(vessel.behaviour, hull, form);
-            FleetBoat { name: vessel.name, side: vessel.side, model: vessel.model, history }
+            FleetBoat { name: vessel.name, side: vessel.side, model: vessel.model, history, warned_s: None }
         };
         let boats = vessels.into_iter().map(boat).collect();
         Self { boats, models, waves, start, followed: start, struck: Vec::new() }
@@ -190,6 +192,7 @@ impl Fleet {
         };
         let hidden = traffic.iter().enumerate().any(|(other, t)| other != boat && hides(t, at));
         Signals {
+            warned: me.warned_s.is_some_and(|s| s <= time_s),
             hit: me.history.first_hit_s().is_some_and(|s| s <= time_s),
             neighbour_hit: self.struck.iter().any(near),
             sees_gun: !hidden,
@@ -248,6 +251,40 @@ impl Fleet {
     /// A boat's model.
     pub fn model(&self, boat: usize) -> Option<&Model> {
         self.models.get(usize::from(self.boats.get(boat)?.model.0))
+    }
+
+    /// Height of the middle of what a boat shows over the water, metres.
+    pub fn middle_m(&self, boat: usize) -> f64 {
+        0.5 * self.height_m(boat)
+    }
+
+    /// Height that a boat shows over the water, metres.
+    pub fn height_m(&self, boat: usize) -> f64 {
+        self.model(boat).map_or(0.0, |model| f64::from(model.max.z).max(0.0))
+    }
+
+    /// When a boat was first struck.
+    pub fn first_hit(&self, boat: usize) -> Option<Time> {
+        let seconds = self.boats.get(boat)?.history.first_hit_s()?;
+        Some(self.start.plus_secs(seconds))
+    }
+
+    /// A boat's crew has given up.
+    pub fn gave_up(&self, boat: usize) -> bool {
+        self.boats.get(boat).is_some_and(|b| b.history.gave_up())
+    }
+
+    /// Takes in that a boat was warned.
+    pub fn warn(&mut self, boat: usize, time: Time) {
+        let seconds = time.secs_since(self.start);
+        if let Some(warned) = self.boats.get_mut(boat) {
+            warned.warned_s.get_or_insert(seconds);
+            // All are stepped together, so all go on from there.
+            for other in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
+                other.history.forget_after(seconds);
+            }
+        }
+        self.follow(self.followed);
     }
 
     /// How a boat lies on the water at `time`. At times that it was not followed to, or that lie too far back, it lies in the mean plane

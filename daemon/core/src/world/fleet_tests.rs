@@ -32,7 +32,7 @@ fn crewed(name: &str, plan: &Arc<CrewPlan>, bearing_deg: f64, range_m: f64, side
     let bearing = bearing_deg.to_radians();
     let start = CrewedStart {
         plan: Arc::clone(plan),
-        seed: name.bytes().map(u64::from).sum(),
+        chance: name.bytes().map(u64::from).sum(),
         keeps_rules: side == Side::Neutral,
         propulsor: Propulsor::Outboard,
         speed_max_m_s: 27.0 * KN,

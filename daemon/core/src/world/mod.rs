@@ -4,6 +4,7 @@
 
 pub mod boats;
 mod contact;
+pub mod exercise;
 pub mod fleet;
 pub mod gunnery;
 pub mod rounds;

@@ -8,7 +8,9 @@ use crate::{
         fleet::Fleet,
         gunnery::{Atmosphere, Flight, dispersed},
         scenario::WeaponSpec,
-        score::{End, Moving, Outcome, Round, ShotRecord},
+        score::{
+            Approach, BoreSample, End, MissExplanation, MissedRound, Moving, Outcome, Round, ShotRecord,
+        },
         waves::WaveField,
     },
 };
@@ -21,7 +23,7 @@ const TRACER_LIT_M: f64 = 25.0;
 pub const SPLASH_S: f64 = 1.6;
 
 /// The ammunition, its dispersion and the wind.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Ammunition {
     /// The weapon that fires it.
     pub weapon: WeaponSpec,
@@ -56,8 +58,49 @@ impl Launch {
 #[derive(Clone, Debug)]
 struct InFlight {
     launch: Launch,
+    /// Direction in which it left, scatter included.
+    flown: DVec3,
+    /// The barrel before, oldest first.
+    before: Vec<BoreSample>,
     round: Round,
     tracer: bool,
+}
+
+/// A round that missed a boat, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExplainedMiss {
+    /// The round's number.
+    pub shot: u64,
+    /// When it was closest to the boat.
+    pub time: Time,
+    /// The boat.
+    pub boat: usize,
+    /// Why.
+    pub why: MissExplanation,
+}
+
+impl InFlight {
+    /// Why the round missed the boat that it came closest to.
+    fn explain(
+        &self,
+        ammunition: &Ammunition,
+        nearest: Approach,
+        start: Time,
+        fleet: &Fleet,
+    ) -> Option<ExplainedMiss> {
+        let Launch { shot, fired, muzzle, bore, .. } = self.launch;
+        let boat = nearest.boat;
+        let middle = DVec3::Z * fleet.middle_m(boat);
+        fleet.floating(boat, fired)?;
+        let target = |s: f64| {
+            let floating = fleet.floating(boat, fired.plus_secs(s));
+            floating.map_or(DVec3::NAN, |floating| floating.pose.to_world(middle))
+        };
+        let (projectile, wind) = (ammunition.weapon.projectile, ammunition.wind);
+        let round = MissedRound { projectile, wind, muzzle, bore, flown: self.flown, before: &self.before };
+        let why = MissExplanation::of(&round, target)?;
+        Some(ExplainedMiss { shot, time: start.plus_secs(nearest.time_s), boat, why })
+    }
 }
 
 /// Where a round ended.
@@ -80,13 +123,15 @@ pub struct Rounds {
     sea: WaveField,
     in_flight: Vec<InFlight>,
     marks: Vec<(Time, ImpactMark)>,
+    explained: Vec<ExplainedMiss>,
     advanced_to: Time,
 }
 
 impl Rounds {
     /// No round has been fired at `start`.
     pub fn new(ammunition: Ammunition, sea: WaveField, start: Time) -> Self {
-        Self { ammunition, sea, in_flight: Vec::new(), marks: Vec::new(), advanced_to: start }
+        let (in_flight, marks, explained) = (Vec::new(), Vec::new(), Vec::new());
+        Self { ammunition, sea, in_flight, marks, explained, advanced_to: start }
     }
 
     /// The sea is another from now on.
@@ -94,15 +139,22 @@ impl Rounds {
         self.sea = sea;
     }
 
-    /// Fires a round. One whose flight cannot be computed (a number is not finite) is recorded as a miss at once.
-    pub fn launch(&mut self, launch: Launch, start: Time, records: &mut Vec<ShotRecord>) {
+    /// Fires a round; `before` has the barrel before that, oldest first. One whose flight cannot be computed (a number is not finite) is
+    /// recorded as a miss at once.
+    pub fn launch(
+        &mut self,
+        launch: Launch,
+        before: Vec<BoreSample>,
+        start: Time,
+        records: &mut Vec<ShotRecord>,
+    ) {
         let a = &self.ammunition;
-        let direction = dispersed(launch.bore, a.weapon.dispersion_mrad, a.seed, launch.shot);
-        match Flight::new(a.weapon.projectile, &Atmosphere::ICAO, launch.muzzle, direction, a.wind) {
+        let flown = dispersed(launch.bore, a.weapon.dispersion_mrad, a.seed, launch.shot);
+        match Flight::new(a.weapon.projectile, &Atmosphere::ICAO, launch.muzzle, flown, a.wind) {
             Some(flight) => {
                 let tracer = a.weapon.is_tracer(launch.shot);
                 let round = Round::new(launch.shot, launch.fired.secs_since(start), flight);
-                self.in_flight.push(InFlight { launch, round, tracer });
+                self.in_flight.push(InFlight { launch, flown, before, round, tracer });
             }
             None => records.push(launch.record(Outcome::Miss {
                 boat: None,
@@ -145,9 +197,14 @@ impl Rounds {
                 })
                 .collect();
             let mut ended = Vec::new();
-            self.in_flight.retain_mut(|f| match f.round.advance(to_s, &boats, &self.sea) {
+            let Self { in_flight, sea, explained, ammunition, .. } = self;
+            in_flight.retain_mut(|f| match f.round.advance(to_s, &boats, sea) {
                 Some(end) => {
-                    ended.push((f.launch, f.round.nearest(), end));
+                    let nearest = f.round.nearest();
+                    if let (Some(nearest), false) = (nearest, matches!(end, End::Struck { .. })) {
+                        explained.extend(f.explain(ammunition, nearest, start, fleet));
+                    }
+                    ended.push((f.launch, nearest, end));
                     false
                 }
                 None => true,
@@ -189,6 +246,11 @@ impl Rounds {
         for (boat, zone, time) in struck {
             fleet.strike(boat, zone, time);
         }
+    }
+
+    /// Misses that were explained since this was last asked.
+    pub fn take_explained(&mut self) -> std::vec::Drain<'_, ExplainedMiss> {
+        self.explained.drain(..)
     }
 
     /// The tracers that glow at `time`, up to which rounds have been followed, each with its path over the last `exposure_s`.

@@ -5,15 +5,17 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::{
+    exercise::{ExerciseEvent, ExerciseFact, ExerciseWatch, WatchedBoat, pointed_at},
     fleet::{Fleet, Vessel},
     rounds::{Ammunition, Launch, Rounds},
     scenario::{Scenario, Side},
-    score::{NotScored, Outcome, ShotRecord},
+    score::{AIM_TREND_S, BoreSample, NotScored, Outcome, ShotRecord},
     sea_change::{SeaChange, conditions_of},
     waves::WaveField,
-    weapon::Weapon,
+    weapon::{Stoppages, Weapon, WeaponState},
 };
 use crate::{
+    act::TraineeAct,
     estimate::sea::SeaConditions,
     event::TriggerEdge,
     model::{Model, ModelId, Zone},
@@ -22,6 +24,8 @@ use crate::{
 
 /// The longest time that a round is followed, seconds, and a second more.
 const ROUND_OVER_S: f64 = 21.0;
+/// How long a text of the scenario stands, seconds.
+const MESSAGE_S: f64 = 6.0;
 /// How long a result stands, seconds: it is shown, and a hit is not replaced by a miss.
 pub const RESULT_S: f64 = 1.5;
 
@@ -69,6 +73,11 @@ pub struct World {
     waves: WaveField,
     sea_change: SeaChange,
     running: Option<RunningWorld>,
+    watch: ExerciseWatch,
+    /// What happened in the exercise within the last call.
+    events: Vec<ExerciseEvent>,
+    /// The scenario's newest text for the trainee, with its time.
+    message: Option<(Time, Arc<str>)>,
     score: Score,
     last_result: Option<LastResult>,
 }
@@ -86,6 +95,68 @@ pub struct RunningWorld {
     pub rounds: Rounds,
 }
 
+impl RunningWorld {
+    /// Notes why rounds missed that ended.
+    fn note_misses(&mut self, events: &mut Vec<ExerciseEvent>) {
+        let Self { fleet, rounds, .. } = self;
+        for missed in rounds.take_explained() {
+            let (shot, boat) = (missed.shot, fleet.name(missed.boat).to_owned());
+            let fact = ExerciseFact::Missed { shot, boat, why: missed.why };
+            events.push(ExerciseEvent { time: missed.time, fact });
+        }
+    }
+
+    /// The event that a round was fired.
+    fn fired(&self, shot: u64, time: Time, aim: &BoreAim) -> ExerciseEvent {
+        let boats = self.watched(aim);
+        let at = pointed_at(&boats).and_then(|boat| boats.get(boat));
+        let (boat, range_m) = (at.map(|b| b.name.to_owned()), at.map(|b| b.range_m));
+        ExerciseEvent { time, fact: ExerciseFact::Fired { shot, boat, range_m } }
+    }
+
+    /// All boats, for whoever watches the exercise, while the barrel points as `aim` says.
+    fn watched(&self, aim: &BoreAim) -> Vec<WatchedBoat<'_>> {
+        self.boats(Some(aim).filter(|aim| aim.unscored.is_none()))
+    }
+
+    /// The same where nobody knows where the barrel points.
+    fn watched_blindly(&self) -> Vec<WatchedBoat<'_>> {
+        self.boats(None)
+    }
+
+    fn boats(&self, aim: Option<&BoreAim>) -> Vec<WatchedBoat<'_>> {
+        let Self { fleet, now, .. } = self;
+        let eye = aim.map_or(DVec3::ZERO, |aim| aim.muzzle);
+        let watched = |boat: usize| {
+            let at = fleet.floating(boat, *now)?.pose.to_world(DVec3::Z * fleet.middle_m(boat));
+            let speed_m_s = fleet.history(boat)?.state(now.secs_since(self.start)).velocity().length();
+            Some(WatchedBoat {
+                name: fleet.name(boat),
+                side: fleet.side(boat)?,
+                range_m: at.truncate().distance(eye.truncate()),
+                speed_m_s,
+                off_bore: aim.map(|aim| aim.bore.angle_between(at - aim.muzzle)),
+                height_m: fleet.height_m(boat),
+                struck: fleet.first_hit(boat).filter(|struck| struck <= now),
+                gave_up: fleet.gave_up(boat),
+            })
+        };
+        (0..fleet.len()).filter_map(watched).collect()
+    }
+}
+
+/// The barrel over the last moments before a round, oldest first, as far as it was known where it pointed.
+fn barrel_before(fired: Time, aim: &mut impl FnMut(Time) -> BoreAim) -> Vec<BoreSample> {
+    /// Samples: as many as pictures in that time.
+    const SAMPLES: u32 = 21;
+    let sample = |i: u32| {
+        let before_s = AIM_TREND_S * f64::from(i) / f64::from(SAMPLES);
+        let BoreAim { muzzle, bore, unscored, .. } = aim(fired.plus_secs(-before_s));
+        unscored.is_none().then_some(BoreSample { before_s, muzzle, bore })
+    };
+    (1..=SAMPLES).rev().filter_map(sample).collect()
+}
+
 impl World {
     /// The world of a scenario before it begins. `boat_models` names the model of each of its boats.
     pub fn new(scenario: &Scenario, models: Arc<[Model]>, boat_models: &[ModelId]) -> Self {
@@ -93,14 +164,30 @@ impl World {
             name: scenario.name.clone(),
             vessels: Vessel::of_scenario(scenario, boat_models),
             models,
-            ammunition: Ammunition { weapon: scenario.weapon, wind: scenario.wind, seed: scenario.seed },
-            weapon: Weapon::new(scenario.weapon.rounds_per_minute, scenario.weapon.belt),
+            ammunition: Ammunition {
+                weapon: scenario.weapon.clone(),
+                wind: scenario.wind,
+                seed: scenario.seed,
+            },
+            weapon: Self::weapon_of(scenario),
             waves: scenario.wave_field(),
             sea_change: SeaChange::new(&scenario.waves),
             running: None,
+            watch: ExerciseWatch::new(scenario.exercise.clone(), scenario.daylight.visibility_m),
+            events: Vec::new(),
+            message: None,
             score: Score::default(),
             last_result: None,
         }
+    }
+
+    fn weapon_of(scenario: &Scenario) -> Weapon {
+        let spec = &scenario.weapon;
+        // The weapon's chance is not that of the rounds' scatter.
+        let stoppages = spec.stoppage_every.map(|every| Stoppages { every, seed: !scenario.seed });
+        Weapon::new(spec.rounds_per_minute, spec.belt)
+            .with_spares(spec.spare_belts, spec.reload_s)
+            .with_stoppages(stoppages)
     }
 
     /// The sea that a scenario assumes until it is measured; `None` where it is not to be measured.
@@ -111,6 +198,12 @@ impl World {
     /// Takes in an edge of the trigger.
     pub fn trigger(&mut self, edge: TriggerEdge) {
         self.weapon.edge(edge);
+    }
+
+    /// Takes in an act of the trainee.
+    pub fn act(&mut self, act: TraineeAct) {
+        self.weapon.act(act);
+        self.watch.act(act);
     }
 
     /// Arms or disarms the weapon.
@@ -128,16 +221,19 @@ impl World {
         mut aim: impl FnMut(Time) -> BoreAim,
         records: &mut Vec<ShotRecord>,
     ) {
+        self.events.clear();
         let mut running = self.running.take().unwrap_or_else(|| self.begin(begin));
         let now = running.now.max(until);
+        let was_stopped = self.weapon.state() == WeaponState::Stoppage;
         while let Some(fired) = self.weapon.fire(known.min(now)) {
             self.score.shots += 1;
             let BoreAim { muzzle, bore, pose_age_ns, unscored } = aim(fired);
             let shot = self.score.shots;
+            self.events.push(running.fired(shot, fired, &BoreAim { muzzle, bore, pose_age_ns, unscored }));
             match unscored {
                 None => {
                     let launch = Launch { shot, fired, muzzle, bore, pose_age_ns };
-                    running.rounds.launch(launch, running.start, records);
+                    running.rounds.launch(launch, barrel_before(fired, &mut aim), running.start, records);
                 }
                 Some(cause) => {
                     let outcome = Outcome::NotScored { cause };
@@ -147,20 +243,70 @@ impl World {
         }
         running.rounds.advance(now, running.start, &mut running.fleet, records);
         running.now = now;
+        if self.weapon.state() == WeaponState::Stoppage && !was_stopped {
+            self.events.push(ExerciseEvent { time: now, fact: ExerciseFact::Stoppage });
+        }
+        self.watch_exercise(&mut running, aim(now));
         self.running = Some(running);
         self.count(records);
     }
 
+    /// Notes what has happened up to now.
+    fn watch_exercise(&mut self, running: &mut RunningWorld, aim: BoreAim) {
+        running.note_misses(&mut self.events);
+        let boats = running.watched(&aim);
+        let orders = self.watch.follow(running.now, &boats, self.weapon.rounds_in_all(), &mut self.events);
+        for boat in orders.warned {
+            running.fleet.warn(boat, running.now);
+        }
+        if orders.stoppage {
+            self.weapon.stop_next();
+        }
+        for event in &self.events {
+            if let ExerciseFact::Message { text } = &event.fact {
+                self.message = Some((event.time, text.as_str().into()));
+            }
+        }
+    }
+
+    /// What happened in the exercise within the last call that went on or ended.
+    pub fn events(&self) -> &[ExerciseEvent] {
+        &self.events
+    }
+
+    /// The exercise around boats and rounds.
+    pub const fn watch(&self) -> &ExerciseWatch {
+        &self.watch
+    }
+
+    /// The scenario's text for the trainee at `time`, if there is one.
+    pub fn message(&self, time: Time) -> Option<Arc<str>> {
+        let (since, text) = self.message.as_ref()?;
+        (time.secs_since(*since) < MESSAGE_S).then(|| Arc::clone(text))
+    }
+
+    /// State of the weapon.
+    pub const fn weapon_state(&self) -> WeaponState {
+        self.weapon.state()
+    }
+
     fn begin(&self, start: Time) -> RunningWorld {
         let fleet = Fleet::new(self.vessels.clone(), Arc::clone(&self.models), self.waves.clone(), start);
-        let rounds = Rounds::new(self.ammunition, self.waves.clone(), start);
+        let rounds = Rounds::new(self.ammunition.clone(), self.waves.clone(), start);
         RunningWorld { start, now: start, fleet, rounds }
     }
 
     /// Rounds still in the air are recorded as misses: the session ends here.
     pub fn finish(&mut self, records: &mut Vec<ShotRecord>) {
-        if let Some(RunningWorld { start, now, fleet, rounds }) = &mut self.running {
+        self.events.clear();
+        if let Some(running) = &mut self.running {
+            let boats = running.watched_blindly();
+            let mut ended = Vec::new();
+            self.watch.finish(running.now, &boats, self.weapon.rounds_in_all(), &mut ended);
+            let RunningWorld { start, now, fleet, rounds } = running;
             rounds.advance(now.plus_secs(ROUND_OVER_S), *start, fleet, records);
+            running.note_misses(&mut self.events);
+            self.events.append(&mut ended);
         }
         self.count(records);
     }

@@ -2,10 +2,37 @@
 
 use std::collections::VecDeque;
 
-use crate::{event::TriggerEdge, time::Time};
+use crate::{
+    act::{Act, TraineeAct},
+    chance::drawn,
+    event::TriggerEdge,
+    time::Time,
+};
 
-/// Edges that can wait to be worked off; a contact that bounces faster than this fills the queue loses its oldest.
-const EDGES_MAX: usize = 256;
+/// Edges and acts that can wait to be worked off; a contact that bounces faster than this fills the queue loses its oldest.
+const INPUTS_MAX: usize = 256;
+
+/// State of the weapon, for the display and for whoever fires it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WeaponState {
+    /// It fires when the trigger is pressed.
+    Ready,
+    /// It was made safe.
+    Safe,
+    /// It needs the immediate action.
+    Stoppage,
+    /// A belt is being put in.
+    Reloading,
+    /// The belt is empty.
+    Empty,
+}
+
+/// Something that the weapon meets at a time.
+#[derive(Clone, Copy, Debug)]
+enum WeaponInput {
+    Trigger(bool),
+    Act(Act),
+}
 
 /// A belt-fed weapon: fires while the trigger is held, at its cyclic rate, until the belt is empty.
 ///
@@ -13,12 +40,37 @@ const EDGES_MAX: usize = 256;
 #[derive(Clone, Debug)]
 pub struct Weapon {
     cycle_ns: i64,
+    belt: u32,
+    spare_belts: u32,
+    reload_s: f64,
+    stoppages: Option<Stoppages>,
     rounds_left: u32,
+    rounds_fired: u64,
     held: bool,
     armed: bool,
+    is_safe: bool,
+    is_stopped: bool,
+    stops_next: bool,
+    reloaded_at: Option<Time>,
     last_round: Option<Time>,
     next_round: Option<Time>,
-    edges: VecDeque<TriggerEdge>,
+    inputs: VecDeque<(Time, WeaponInput)>,
+}
+
+/// Chance of stoppages.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stoppages {
+    /// Rounds from one to the next, on average.
+    pub every: f64,
+    /// Seed of the chance.
+    pub seed: u64,
+}
+
+impl Stoppages {
+    /// Whether the weapon stops after that round, counted from 1.
+    fn after(self, round: u64) -> bool {
+        drawn(self.seed, [round, 0]) * self.every < 1.0
+    }
 }
 
 impl Weapon {
@@ -27,13 +79,34 @@ impl Weapon {
         let rate = if rounds_per_minute.is_finite() { rounds_per_minute.clamp(1.0, 6000.0) } else { 1.0 };
         Self {
             cycle_ns: (60e9 / rate).round() as i64,
+            belt,
+            spare_belts: 0,
+            reload_s: 0.0,
+            stoppages: None,
             rounds_left: belt,
+            rounds_fired: 0,
             held: false,
             armed: true,
+            is_safe: false,
+            is_stopped: false,
+            stops_next: false,
+            reloaded_at: None,
             last_round: None,
             next_round: None,
-            edges: VecDeque::with_capacity(EDGES_MAX),
+            inputs: VecDeque::with_capacity(INPUTS_MAX),
         }
+    }
+
+    /// With so many belts more, each of which takes that long to put in, seconds.
+    #[must_use]
+    pub fn with_spares(self, spare_belts: u32, reload_s: f64) -> Self {
+        Self { spare_belts, reload_s: reload_s.max(0.0), ..self }
+    }
+
+    /// With stoppages by chance.
+    #[must_use]
+    pub fn with_stoppages(self, stoppages: Option<Stoppages>) -> Self {
+        Self { stoppages, ..self }
     }
 
     /// Rounds left in the belt.
@@ -41,13 +114,44 @@ impl Weapon {
         self.rounds_left
     }
 
+    /// Rounds left with those of spare belts.
+    pub const fn rounds_in_all(&self) -> u32 {
+        self.rounds_left.saturating_add(self.spare_belts.saturating_mul(self.belt))
+    }
+
+    /// Its state after all that it has met.
+    pub const fn state(&self) -> WeaponState {
+        if self.reloaded_at.is_some() {
+            WeaponState::Reloading
+        } else if self.is_stopped {
+            WeaponState::Stoppage
+        } else if self.is_safe {
+            WeaponState::Safe
+        } else if self.rounds_left == 0 {
+            WeaponState::Empty
+        } else {
+            WeaponState::Ready
+        }
+    }
+
     /// Takes in an edge of the trigger. Edges may arrive before the time they lie at is reached.
     pub fn edge(&mut self, edge: TriggerEdge) {
-        if self.edges.len() == EDGES_MAX {
-            self.edges.pop_front();
+        self.put(edge.time, WeaponInput::Trigger(edge.pressed));
+    }
+
+    /// Takes in an act of the trainee, as an edge.
+    pub fn act(&mut self, act: TraineeAct) {
+        if matches!(act.act, Act::Reload | Act::Clear | Act::Safe | Act::Ready) {
+            self.put(act.time, WeaponInput::Act(act.act));
         }
-        let place = self.edges.partition_point(|e| e.time <= edge.time);
-        self.edges.insert(place, edge);
+    }
+
+    fn put(&mut self, time: Time, input: WeaponInput) {
+        if self.inputs.len() == INPUTS_MAX {
+            self.inputs.pop_front();
+        }
+        let place = self.inputs.partition_point(|(at, _)| *at <= time);
+        self.inputs.insert(place, (time, input));
     }
 
     /// Arms or disarms. Disarmed, the weapon meets edges and fires nothing; armed again, it fires at the next press.
@@ -58,38 +162,82 @@ impl Weapon {
         }
     }
 
+    /// Has a stoppage after the next round.
+    pub const fn stop_next(&mut self) {
+        self.stops_next = true;
+    }
+
     /// The next round that leaves the muzzle no later than `until`; `None` once there is none. Call until it says so.
     pub fn fire(&mut self, until: Time) -> Option<Time> {
         loop {
-            let edge = self.edges.front().copied().filter(|e| e.time <= until);
+            let input = self.inputs.front().copied().filter(|(time, _)| *time <= until);
+            let belt_in = self.reloaded_at.filter(|time| *time <= until);
             let round = self.next_round.filter(|t| *t <= until);
-            match (edge, round) {
+            match (input, belt_in, round) {
+                (input, Some(time), _) if input.is_none_or(|(at, _)| time <= at) => self.belt_is_in(time),
                 // A release at the very time of a round comes too late to hold it back.
-                (Some(e), r) if r.is_none_or(|t| e.time < t) => {
-                    self.edges.pop_front();
-                    self.apply(e);
+                (Some((time, input)), _, round) if round.is_none_or(|t| time < t) => {
+                    self.inputs.pop_front();
+                    self.meet(time, input);
                 }
-                (_, Some(time)) => return Some(self.leave(time)),
+                (_, _, Some(time)) => return Some(self.leave(time)),
                 _ => return None,
             }
         }
     }
 
-    fn apply(&mut self, edge: TriggerEdge) {
-        if edge.pressed == self.held {
-            return;
+    fn meet(&mut self, time: Time, input: WeaponInput) {
+        match input {
+            WeaponInput::Trigger(pressed) if pressed == self.held => {}
+            WeaponInput::Trigger(pressed) => {
+                self.held = pressed;
+                self.next_round = None;
+                self.begin(time);
+            }
+            WeaponInput::Act(Act::Reload) => {
+                // A belt that is put in takes the place of the one before, with what is left in it.
+                if self.reloaded_at.is_none() && self.spare_belts > 0 {
+                    self.next_round = None;
+                    self.reloaded_at = Some(time.plus_secs(self.reload_s));
+                }
+            }
+            WeaponInput::Act(Act::Clear) => self.is_stopped = false,
+            WeaponInput::Act(Act::Safe) => {
+                self.is_safe = true;
+                self.next_round = None;
+            }
+            WeaponInput::Act(Act::Ready) => self.is_safe = false,
+            WeaponInput::Act(_) => {}
         }
-        self.held = edge.pressed;
-        self.next_round = (self.held && self.armed && self.rounds_left > 0).then(|| {
-            let ready = self.last_round.map_or(edge.time, |t| t.plus_ns(self.cycle_ns));
-            ready.max(edge.time)
+    }
+
+    /// Fires from a press on.
+    fn begin(&mut self, time: Time) {
+        let is_ready = self.state() == WeaponState::Ready && self.armed;
+        self.next_round = (self.held && is_ready).then(|| {
+            let ready = self.last_round.map_or(time, |t| t.plus_ns(self.cycle_ns));
+            ready.max(time)
         });
+    }
+
+    fn belt_is_in(&mut self, time: Time) {
+        self.reloaded_at = None;
+        self.spare_belts = self.spare_belts.saturating_sub(1);
+        self.rounds_left = self.belt;
+        self.is_stopped = false;
+        // The trigger has to be pressed anew.
+        self.next_round = None;
+        self.last_round = self.last_round.map(|last| last.min(time));
     }
 
     fn leave(&mut self, time: Time) -> Time {
         self.rounds_left -= 1;
+        self.rounds_fired += 1;
         self.last_round = Some(time);
-        self.next_round = (self.held && self.rounds_left > 0).then(|| time.plus_ns(self.cycle_ns));
+        let by_chance = self.stoppages.is_some_and(|chance| chance.after(self.rounds_fired));
+        self.is_stopped = std::mem::take(&mut self.stops_next) || by_chance;
+        let goes_on = self.held && self.rounds_left > 0 && !self.is_stopped;
+        self.next_round = goes_on.then(|| time.plus_ns(self.cycle_ns));
         time
     }
 }
@@ -115,9 +263,9 @@ mod tests {
         w.edge(edge(1000, true));
         assert_eq!(rounds(&mut w, 1150), [1000, 1100]);
         w.arm(false);
-        assert_eq!(rounds(&mut w, 2000), []);
+        assert_eq!(rounds(&mut w, 2000), [0i64; 0]);
         w.arm(true);
-        assert_eq!(rounds(&mut w, 3000), [], "held all the time");
+        assert_eq!(rounds(&mut w, 3000), [0i64; 0], "held all the time");
         w.edge(edge(3000, false));
         w.edge(edge(3500, true));
         assert_eq!(rounds(&mut w, 3500), [3500]);
@@ -140,6 +288,58 @@ mod tests {
             w.edge(edge(ms, pressed));
         }
         assert_eq!(rounds(&mut w, 2000), [1000]);
+    }
+
+    fn act(ms: i64, act: Act) -> TraineeAct {
+        TraineeAct { time: Time::from_ns(ms * 1_000_000), act }
+    }
+
+    #[test]
+    fn a_stoppage_lasts_until_the_immediate_action_and_a_new_press() {
+        let mut w = Weapon::new(600.0, 10);
+        w.edge(edge(0, true));
+        assert_eq!(rounds(&mut w, 150), [0, 100]);
+        w.stop_next();
+        assert_eq!(rounds(&mut w, 1000), [200], "the round it stops with is fired");
+        assert_eq!(w.state(), WeaponState::Stoppage);
+        w.act(act(2000, Act::Clear));
+        assert_eq!(rounds(&mut w, 3000), [0i64; 0], "held all the time");
+        assert_eq!(w.state(), WeaponState::Ready);
+        w.edge(edge(3100, false));
+        w.edge(edge(3200, true));
+        assert_eq!(rounds(&mut w, 3250), [3200]);
+    }
+
+    #[test]
+    fn stoppages_come_by_chance_as_often_as_asked() {
+        let stoppages = Stoppages { every: 50.0, seed: 3 };
+        let count = (1..=100_000).filter(|round| stoppages.after(*round)).count();
+        assert!((1800..2200).contains(&count), "{count}");
+    }
+
+    #[test]
+    fn a_belt_takes_its_time_and_safe_holds_fire() {
+        let mut w = Weapon::new(600.0, 3).with_spares(1, 5.0);
+        assert_eq!(w.rounds_in_all(), 6);
+        w.edge(edge(0, true));
+        assert_eq!(rounds(&mut w, 1000), [0, 100, 200]);
+        assert_eq!(w.state(), WeaponState::Empty);
+        w.act(act(1000, Act::Reload));
+        w.edge(edge(1100, false));
+        w.edge(edge(2000, true));
+        assert_eq!(rounds(&mut w, 4000), [0i64; 0]);
+        assert_eq!(w.state(), WeaponState::Reloading);
+        assert_eq!(rounds(&mut w, 6500), [0i64; 0], "pressed before the belt was in");
+        w.edge(edge(6600, false));
+        w.act(act(6700, Act::Safe));
+        w.edge(edge(6800, true));
+        w.edge(edge(7000, false));
+        w.act(act(7100, Act::Ready));
+        w.edge(edge(7200, true));
+        assert_eq!(rounds(&mut w, 7250), [7200]);
+        assert_eq!((w.rounds_left(), w.rounds_in_all()), (2, 2));
+        w.act(act(7300, Act::Reload));
+        assert_eq!(rounds(&mut w, 7500), [7300, 7400], "there is no belt more");
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod wiring;
 
 use std::{io, time::Duration};
 
-use bowwave_core::event::MarkKind;
+use bowwave_core::{act::Act, event::MarkKind};
 
 pub use self::{
     port::TriggerPort,
@@ -73,16 +73,26 @@ crate::worker::tells_of_threads!(TriggerError);
 pub struct Press {
     /// Its line: active is pressed.
     pub line: InputLine,
-    /// Where the gun points when it is pressed.
-    pub kind: MarkKind,
+    /// What it says.
+    pub kind: PressKind,
+}
+
+/// What a button says by being pressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PressKind {
+    /// The gun stands at a place of known bearing.
+    Mark(MarkKind),
+    /// The trainee does something, or an instructor marks a call.
+    Act(Act),
 }
 
 impl Press {
     /// Its name.
     pub const fn name(&self) -> &'static str {
         match self.kind {
-            MarkKind::Stow => "re-zero",
-            MarkKind::Landmark => "landmark",
+            PressKind::Mark(MarkKind::Stow) => "re-zero",
+            PressKind::Mark(MarkKind::Landmark) => "landmark",
+            PressKind::Act(act) => act.name(),
         }
     }
 }
@@ -117,7 +127,7 @@ pub struct TriggerSettings {
     pub interlock: Option<InterlockWiring>,
     /// The power supply's warning: active means that power is about to fail.
     pub power_fail: Option<InputLine>,
-    /// Buttons by which the operator tells where the gun stands.
+    /// Buttons by which the operator tells where the gun stands, and those of the trainee's acts.
     pub presses: Vec<Press>,
 }
 

@@ -8,14 +8,15 @@ use std::{
 };
 
 use bowwave_core::{
-    event::{Event, Mark, MarkKind},
+    act::TraineeAct,
+    event::{Event, Mark},
     fault::{Fault, FaultChange},
     time::Time,
 };
 use crossbeam_channel::Receiver;
 
 use super::{
-    InterlockWiring, LineState, TriggerCounters, TriggerError, TriggerSettings, TriggerStatus,
+    InterlockWiring, LineState, PressKind, TriggerCounters, TriggerError, TriggerSettings, TriggerStatus,
     guard::{Interlock, PowerSupply},
     switch::{Switch, SwitchOutput},
 };
@@ -92,7 +93,7 @@ enum Role {
     Interlock(usize),
     PowerFail,
     /// A button of the operator; its contacts while the line is open.
-    Button(MarkKind, Option<Debouncer>),
+    Button(PressKind, Option<Debouncer>),
 }
 
 /// A line that is wanted, and open where it can be.
@@ -338,7 +339,10 @@ impl Meaning {
                 let cause = format!("interlock: {error}");
                 return self.guard(now, |interlock| interlock.lost(*contact, now, &cause));
             }
-            Role::Button(..) => format!("button: {error}; the heading cannot be set by it"),
+            Role::Button(kind, _) => match kind {
+                PressKind::Mark(_) => format!("button: {error}; the heading cannot be set by it"),
+                PressKind::Act(act) => format!("button {}: {error}; it does nothing", act.name()),
+            },
             Role::PowerFail => {
                 self.power.lost();
                 // Training goes on: the log is told that power may fail unannounced.
@@ -391,9 +395,12 @@ impl Meaning {
 }
 
 /// A button tells by being pressed; that it is let go means nothing.
-fn press(queue: &mut NewestSender<Event>, kind: MarkKind, time: Time, pressed: bool) {
+fn press(queue: &mut NewestSender<Event>, kind: PressKind, time: Time, pressed: bool) {
     if pressed {
-        queue.send(Event::Mark(Mark { time, kind }));
+        queue.send(match kind {
+            PressKind::Mark(kind) => Event::Mark(Mark { time, kind }),
+            PressKind::Act(act) => Event::Act(TraineeAct { time, act }),
+        });
     }
 }
 
@@ -404,6 +411,8 @@ const fn state(level: bool) -> LineState {
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
+
+    use bowwave_core::event::MarkKind;
 
     use super::*;
     use crate::{
@@ -423,7 +432,7 @@ mod tests {
         let settings = TriggerSettings {
             interlock: Some(InterlockWiring::single(line("INERT"))),
             power_fail: Some(line("PFAIL")),
-            presses: vec![Press { line: line("REZERO"), kind: MarkKind::Stow }],
+            presses: vec![Press { line: line("REZERO"), kind: PressKind::Mark(MarkKind::Stow) }],
             ..TriggerSettings::new(line("TRIGGER"))
         };
         let port =
@@ -458,7 +467,7 @@ mod tests {
         assert!(matches!(refused(long), TriggerError::Debounce { ms: 50 }));
         let short = TriggerSettings { stuck_after: Duration::ZERO, ..good.clone() };
         assert!(matches!(refused(short), TriggerError::StuckAfter { .. }));
-        let button = Press { line: line("TRIGGER"), kind: MarkKind::Landmark };
+        let button = Press { line: line("TRIGGER"), kind: PressKind::Mark(MarkKind::Landmark) };
         let same = TriggerSettings { presses: vec![button], ..good.clone() };
         let message = refused(same).to_string();
         assert!(message.contains("landmark and trigger are both line TRIGGER"), "{message}");

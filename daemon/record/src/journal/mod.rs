@@ -16,6 +16,7 @@
 mod aside;
 mod boot;
 mod error;
+mod event;
 mod open;
 mod place;
 mod quarantine;
@@ -33,13 +34,19 @@ use std::{
     time::Duration,
 };
 
-use bowwave_core::{fault::Fault, time::Time, world::score::ShotRecord};
+use bowwave_core::{
+    fault::Fault,
+    time::Time,
+    world::{exercise::ExerciseEvent, score::ShotRecord},
+};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, TrySendError, bounded, unbounded};
 
 pub use aside::{put_aside, side_files};
 use boot::WallClock;
 pub use boot::{DirtyEnd, DirtyRun, boot_id};
 pub use error::{JournalError, Unwritten};
+use event::NumberedEvent;
+pub use event::{StoredEvent, read_events};
 use place::FolderHold;
 pub use query::{RunSelection, ShotFilter, StoredRun, read_runs, read_shots};
 pub use row::StoredShot;
@@ -175,6 +182,7 @@ struct JournalStatus {
 #[derive(Debug)]
 enum JournalMessage {
     Shot(ShotRecord),
+    Event(NumberedEvent),
     Clock(WallClock),
 }
 
@@ -290,6 +298,12 @@ impl Journal {
         self.send(JournalMessage::Shot(shot.clone()), shot.shot)
     }
 
+    /// Queues an event of the exercise, by its number in the run; never waits. Errors as of [`Self::shot`]. Events that are never written
+    /// are lines of the log.
+    pub fn event(&self, number: u64, event: &ExerciseEvent) -> Result<(), JournalError> {
+        self.send(JournalMessage::Event(NumberedEvent { number, event: event.clone() }), 0)
+    }
+
     /// Tells what the wall clock shows, nanoseconds since 1970, at a time since boot, once it is known to be set. All runs of
     /// this boot without a wall time get theirs. Never waits; where the queue is full, say it again later.
     pub fn set_wall_clock(&self, wall_ns: i64, at: Time) -> Result<(), JournalError> {
@@ -380,6 +394,10 @@ impl Journal {
         let mut records = Pending::of(&self.pending).unwritten();
         records.extend(self.queued.try_iter().filter_map(|message| match message {
             JournalMessage::Shot(shot) => Some(shot),
+            JournalMessage::Event(event) => {
+                log::error!("event not in the journal: {}", event.fact());
+                None
+            }
             JournalMessage::Clock(_) => None,
         }));
         let committed = self.told().committed;

@@ -46,17 +46,10 @@ pub struct StoredRun {
 /// The rounds that `filter` selects, by run and number.
 pub fn read_shots(path: &Path, filter: &ShotFilter) -> Result<Vec<StoredShot>, JournalError> {
     let (connection, version) = open::for_reading(path)?;
-    let run = match filter.runs {
-        RunSelection::All => None,
-        RunSelection::Latest => match span(&connection, path)?.1 {
-            Some(last) => Some(last),
-            None => return Ok(Vec::new()),
-        },
-        RunSelection::Run(run) => {
-            check_run(&connection, path, run)?;
-            Some(run)
-        }
-    };
+    let run = selected(&connection, path, filter.runs)?;
+    if run.is_none() && filter.runs != RunSelection::All {
+        return Ok(Vec::new());
+    }
     let read = || -> rusqlite::Result<Vec<row::Parsed>> {
         let sql = format!(
             "SELECT {} FROM shots WHERE (?1 IS NULL OR run = ?1) AND (NOT ?2 OR outcome = 'hit') ORDER BY run, shot",
@@ -74,6 +67,22 @@ pub fn read_shots(path: &Path, filter: &ShotFilter) -> Result<Vec<StoredShot>, J
             Err(what) => Err(JournalError::Row { path: path.into(), run, shot, what }),
         })
         .collect()
+}
+
+/// Number of the run that is selected; `None` for all, and for the latest of none.
+pub(super) fn selected(
+    connection: &Connection,
+    path: &Path,
+    runs: RunSelection,
+) -> Result<Option<i64>, JournalError> {
+    match runs {
+        RunSelection::All => Ok(None),
+        RunSelection::Latest => Ok(span(connection, path)?.1),
+        RunSelection::Run(run) => {
+            check_run(connection, path, run)?;
+            Ok(Some(run))
+        }
+    }
 }
 
 /// All runs, oldest first.

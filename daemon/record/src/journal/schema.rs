@@ -7,12 +7,13 @@ use rusqlite::{Connection, OptionalExtension as _, TransactionBehavior, params};
 
 use bowwave_core::text::one_line;
 
-use super::{JournalError, Run, row};
+use super::{JournalError, Run, event, row};
 
 /// Marks the file as ours ("BOWW").
 pub(super) const APPLICATION_ID: i64 = 0x424f_5757;
-/// Version of the tables. 2: runs know the boot and the time since it at which they began. 3: hits know whose boat was struck.
-pub(super) const VERSION: i64 = 3;
+/// Version of the tables. 2: runs know the boot and the time since it at which they began. 3: hits know whose boat was struck. 4:
+/// events of the exercise.
+pub(super) const VERSION: i64 = event::VERSION;
 
 /// The tables of version 1. Numbers that are not finite become NULL, since SQLite has no NaN.
 const TABLES: &str = "
@@ -67,8 +68,13 @@ pub(super) fn foreign_part(connection: &Connection) -> rusqlite::Result<Option<S
         ask.query_map([table], |row| row.get(0))?.collect()
     };
     let shots = row::columns_of(version);
-    let wanted: [(&str, &str); 2] =
-        [("runs", "id, started_wall_ns, scenario, recording, seed, version, finished"), ("shots", &shots)];
+    let mut wanted = vec![
+        ("runs", "id, started_wall_ns, scenario, recording, seed, version, finished"),
+        ("shots", &*shots),
+    ];
+    if version >= event::VERSION {
+        wanted.push(("events", "run, number, time_ns, fact"));
+    }
     for (table, names) in wanted {
         let found = columns(table)?;
         let mut names = names.split(", ").filter(|name| *name != "NULL");
@@ -145,7 +151,10 @@ pub(super) fn make_tables(connection: &mut Connection) -> rusqlite::Result<()> {
     if found < 2 {
         transaction.execute_batch(BOOT_COLUMNS)?;
     }
-    transaction.execute_batch(SIDE_COLUMN)?;
+    if found < 3 {
+        transaction.execute_batch(SIDE_COLUMN)?;
+    }
+    transaction.execute_batch(event::TABLE)?;
     transaction.execute_batch(&format!(
         "PRAGMA application_id = {APPLICATION_ID}; PRAGMA user_version = {VERSION};"
     ))?;

@@ -34,6 +34,7 @@ mod write;
 use std::sync::Arc;
 
 use bowwave_core::{
+    act::TraineeAct,
     event::{CameraFrame, ImuSample, Mark, Picture, ShipSample, Tick, TriggerEdge},
     fault::FaultChange,
     geometry::CameraPose,
@@ -73,6 +74,8 @@ pub enum Entry {
     Ship(ShipEntry),
     /// The operator's press.
     Mark(Mark),
+    /// An act of the trainee.
+    Act(TraineeAct),
     /// Where the camera really was (recordings with known truth).
     Truth(PoseEntry),
     /// The pose that a session used.
@@ -96,6 +99,7 @@ impl Entry {
             Self::Trigger(edge) => edge.time,
             Self::Ship(line) => line.arrival,
             Self::Mark(mark) => mark.time,
+            Self::Act(act) => act.time,
             Self::Truth(pose) | Self::Pose(pose) => pose.time,
             Self::Picture(picture) => picture.arrival,
             Self::ShipValues(sample) => sample.arrival,
@@ -205,6 +209,8 @@ pub struct Counts {
     pub ship: u64,
     /// The operator's presses.
     pub marks: u64,
+    /// Acts of the trainee.
+    pub acts: u64,
     /// True poses.
     pub truths: u64,
     /// Poses that were used.
@@ -225,6 +231,7 @@ impl Counts {
             + self.triggers
             + self.ship
             + self.marks
+            + self.acts
             + self.truths
             + self.poses
             + self.ship_values
@@ -240,6 +247,7 @@ impl Counts {
             Topic::Trigger => &mut self.triggers,
             Topic::Ship => &mut self.ship,
             Topic::Mark => &mut self.marks,
+            Topic::Act => &mut self.acts,
             Topic::Truth => &mut self.truths,
             Topic::Pose => &mut self.poses,
             Topic::ShipValues => &mut self.ship_values,

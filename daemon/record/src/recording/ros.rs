@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bowwave_core::{
+    act::{Act, TraineeAct},
     event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipSample, Tick, TriggerEdge},
     fault::{Change, Fault, FaultChange},
     geometry::CameraPose,
@@ -223,6 +224,10 @@ pub(crate) fn encode(entry: &Entry, out: &mut Vec<u8>) -> Result<Topic, String> 
             write(out, &Text { data: name.to_owned() })?;
             Ok(Topic::Mark)
         }
+        Entry::Act(act) => {
+            write(out, &Text { data: act.act.name().to_owned() })?;
+            Ok(Topic::Act)
+        }
         Entry::Truth(pose) => {
             write(out, &pose_message(pose)?)?;
             Ok(Topic::Truth)
@@ -318,6 +323,12 @@ pub(crate) fn decode(
             let known = MARKS.into_iter().find(|(_, known)| *known == name);
             let (kind, _) = known.ok_or_else(|| format!("a press at {name:?}, which is no mark"))?;
             Entry::Mark(Mark { time: log_time, kind })
+        }
+        Topic::Act => {
+            let name = read::<Text>(data)?.data;
+            let known = Act::ALL.into_iter().find(|act| act.name() == name);
+            let act = known.ok_or_else(|| format!("an act {name:?}, which this version does not know"))?;
+            Entry::Act(TraineeAct { time: log_time, act })
         }
         Topic::Truth => Entry::Truth(pose_entry(&read(data)?, log_time)?),
         Topic::Pose => Entry::Pose(pose_entry(&read(data)?, log_time)?),

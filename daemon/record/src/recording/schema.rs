@@ -15,6 +15,7 @@ pub(crate) enum Topic {
     Trigger,
     Ship,
     Mark,
+    Act,
     Truth,
     Pose,
     ImageRaw,
@@ -24,13 +25,14 @@ pub(crate) enum Topic {
 }
 
 impl Topic {
-    pub(crate) const ALL: [Self; 12] = [
+    pub(crate) const ALL: [Self; 13] = [
         Self::Image,
         Self::CameraInfo,
         Self::Imu,
         Self::Trigger,
         Self::Ship,
         Self::Mark,
+        Self::Act,
         Self::Truth,
         Self::Pose,
         Self::ImageRaw,
@@ -47,6 +49,7 @@ impl Topic {
             Self::Trigger => "/trigger",
             Self::Ship => "/ship",
             Self::Mark => "/mark",
+            Self::Act => "/act",
             Self::Truth => "/truth/pose",
             Self::Pose => "/pose",
             Self::ImageRaw => "/camera/image_raw",
@@ -63,7 +66,7 @@ impl Topic {
             Self::Imu => "sensor_msgs/msg/Imu",
             Self::Trigger => "std_msgs/msg/Bool",
             Self::Ship => "nmea_msgs/msg/Sentence",
-            Self::Mark => "std_msgs/msg/String",
+            Self::Mark | Self::Act => "std_msgs/msg/String",
             Self::Truth | Self::Pose => "geometry_msgs/msg/PoseStamped",
             Self::ImageRaw => "sensor_msgs/msg/Image",
             Self::ShipValues => "bowwave_msgs/msg/ShipValues",
@@ -84,7 +87,7 @@ impl Topic {
             Self::Imu => &[("", IMU), HEADER, TIME, QUATERNION, VECTOR3],
             Self::Trigger => &[("", "bool data\n")],
             Self::Ship => &[("", "std_msgs/Header header\nstring sentence\n"), HEADER, TIME],
-            Self::Mark => &[("", "string data\n")],
+            Self::Mark | Self::Act => &[("", "string data\n")],
             Self::Truth | Self::Pose => {
                 &[("", "std_msgs/Header header\nPose pose\n"), HEADER, TIME, POSE, POINT, QUATERNION]
             }

@@ -8,7 +8,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, anyhow};
-use bowwave_core::{event::TriggerEdge, frame::scene::Pass, time::Time};
+use bowwave_core::{act::TraineeAct, event::TriggerEdge, frame::scene::Pass, time::Time};
 use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
 use bowwave_render::{Completions, FinishedFrame};
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
@@ -78,6 +78,8 @@ pub enum UserEvent {
     Trigger(TriggerEdge),
     /// Z: the gun stands at its stow.
     Rezero,
+    /// A letter: an act of the trainee.
+    Act(TraineeAct),
     /// Escape, or the window was closed.
     Quit,
 }
@@ -289,6 +291,7 @@ impl OutputWorker {
                 let event = match pressed {
                     Pressed::Fire(pressed) => UserEvent::Trigger(TriggerEdge { time: now(), pressed }),
                     Pressed::Rezero => UserEvent::Rezero,
+                    Pressed::Act(act) => UserEvent::Act(TraineeAct { time: now(), act }),
                     Pressed::Quit => UserEvent::Quit,
                 };
                 // The main loop may have ended already; then nobody wants to know.

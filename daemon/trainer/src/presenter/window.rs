@@ -1,6 +1,8 @@
-//! The window on a desktop. Space is the trigger, Z says that the gun stands at its stow, escape ends.
+//! The window on a desktop. Space is the trigger, letters are the trainee's acts (see [`KEYS`]), Z says that the gun stands at its stow,
+//! escape ends.
 
 use anyhow::{Context, Result};
+use bowwave_core::{act::Act, side::Side};
 use minifb::{Key, KeyRepeat, ScaleMode, Window, WindowOptions};
 
 /// What the user did.
@@ -10,9 +12,23 @@ pub enum Pressed {
     Fire(bool),
     /// The gun stands at its stow.
     Rezero,
+    /// An act of the trainee, or a call that an instructor marks.
+    Act(Act),
     /// The user wants to end.
     Quit,
 }
+
+/// Keys of the trainee's acts.
+pub const KEYS: [(Key, Act); 8] = [
+    (Key::R, Act::Report),
+    (Key::H, Act::Identify(Side::Hostile)),
+    (Key::N, Act::Identify(Side::Neutral)),
+    (Key::W, Act::Warn),
+    (Key::L, Act::Reload),
+    (Key::C, Act::Clear),
+    (Key::S, Act::Safe),
+    (Key::F, Act::Ready),
+];
 
 /// A window of the screen's size.
 pub struct Screen {
@@ -50,6 +66,11 @@ impl Screen {
         self.firing = firing;
         let ends = !self.window.is_open() || self.window.is_key_pressed(Key::Escape, KeyRepeat::No);
         let rezero = self.window.is_key_pressed(Key::Z, KeyRepeat::No).then_some(Pressed::Rezero);
-        Ok(trigger.into_iter().chain(rezero).chain(ends.then_some(Pressed::Quit)))
+        let acts: Vec<Pressed> = KEYS
+            .into_iter()
+            .filter(|(key, _)| self.window.is_key_pressed(*key, KeyRepeat::No))
+            .map(|(_, act)| Pressed::Act(act))
+            .collect();
+        Ok(trigger.into_iter().chain(rezero).chain(acts).chain(ends.then_some(Pressed::Quit)))
     }
 }

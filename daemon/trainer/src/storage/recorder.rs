@@ -148,6 +148,7 @@ impl Recorder {
                 entry(Entry::ShipValues(*sample));
             }
             Event::Mark(mark) => entry(Entry::Mark(*mark)),
+            Event::Act(act) => entry(Entry::Act(*act)),
             Event::Frame(frame) => match &frame.jpeg {
                 Some(jpeg) => entry(Entry::Frame(frame_entry(frame, jpeg.clone()))),
                 None if self.exact_pixels => entry(Entry::Picture(PictureEntry {
@@ -231,6 +232,7 @@ fn time_of(event: &Event) -> Option<Time> {
         Event::Trigger(edge) => Some(edge.time),
         Event::Ship(sample) => Some(sample.arrival),
         Event::Mark(mark) => Some(mark.time),
+        Event::Act(act) => Some(act.time),
         Event::Frame(frame) => Some(frame.arrival),
         Event::Fault(_) => None,
     }

@@ -126,6 +126,7 @@ mod tests {
             clock_s: 1.0,
             sea: None,
             heading_tenths_deg: None,
+            ..Hud::READY
         };
         let said = "NOT SCORED: CAMERA LOST; warning REC: DISK FULL; rounds 120, shots 14, hits 3";
         assert_eq!(status_text(&hud, [Fault::DiskFull].into_iter()), said);

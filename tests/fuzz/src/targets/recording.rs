@@ -72,7 +72,12 @@ fn check_entry(entry: &Entry) {
             assert!((pose.world_from_camera.length() - 1.0).abs() < 1e-3, "no rotation: {pose:?}");
         }
         // The inertial unit's values are kept as they were measured; the session judges them.
-        Entry::Imu(_) | Entry::Trigger(_) | Entry::Mark(_) | Entry::Fault(_) | Entry::Tick(_) => {}
+        Entry::Imu(_)
+        | Entry::Trigger(_)
+        | Entry::Mark(_)
+        | Entry::Act(_)
+        | Entry::Fault(_)
+        | Entry::Tick(_) => {}
         Entry::Picture(raw) => assert!(!raw.picture.bytes().is_empty(), "a picture without pixels: {raw:?}"),
         Entry::ShipValues(ship) => {
             let numbers = [ship.heading, ship.roll, ship.pitch, ship.heading_sigma];
@@ -89,6 +94,7 @@ fn count(counts: &mut Counts, entry: &Entry) {
         Entry::Trigger(_) => &mut counts.triggers,
         Entry::Ship(_) => &mut counts.ship,
         Entry::Mark(_) => &mut counts.marks,
+        Entry::Act(_) => &mut counts.acts,
         Entry::Truth(_) => &mut counts.truths,
         Entry::Pose(_) => &mut counts.poses,
         Entry::ShipValues(_) => &mut counts.ship_values,

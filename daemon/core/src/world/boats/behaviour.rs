@@ -24,8 +24,8 @@ pub enum Behaviour {
 pub struct CrewedStart {
     /// States of its crew.
     pub plan: Arc<CrewPlan>,
-    /// Seed of the crew's chance.
-    pub seed: u64,
+    /// Seed of the crew's chance; in a scenario the crew's number, to which the session's seed is added.
+    pub chance: u64,
     /// The crew keeps to the rules of the road.
     pub keeps_rules: bool,
     /// Engine and helm.
@@ -49,6 +49,17 @@ impl CrewedStart {
 }
 
 impl Behaviour {
+    /// The same in a session with that seed.
+    #[must_use]
+    pub fn in_session(self, seed: u64) -> Self {
+        match self {
+            Self::Crewed(start) => {
+                Self::Crewed(CrewedStart { chance: start.chance.wrapping_add(seed), ..start })
+            }
+            scripted => scripted,
+        }
+    }
+
     /// State of the boat as the scenario begins.
     pub fn begin(&self) -> CourseState {
         match self {

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{
     behaviour::CrewedStart,
     course::{BoatDamage, CourseState},
-    crew::{CrewMemory, CrewPlan, Signals, Situation, Traffic},
+    crew::{Act, CrewMemory, CrewPlan, Signals, Situation, Traffic},
     drive::{Craft, DriveState, Orders, Surroundings},
     grid::{GridHistory, STEP_S, seconds},
     hull::HullForm,
@@ -60,7 +60,7 @@ impl CrewedBoat {
         let drive = DriveState::steady(&craft, start.position, start.heading, start.speed_m_s);
         let mut kept = GridHistory::new(KEPT);
         kept.restart(0, Crewed { drive, memory: CrewMemory { from: drive.centre, ..CrewMemory::default() } });
-        Self { plan: start.plan, craft, seed: start.seed, keeps_rules: start.keeps_rules, kept }
+        Self { plan: start.plan, craft, seed: start.chance, keeps_rules: start.keeps_rules, kept }
     }
 
     /// The hull with its engine.
@@ -77,6 +77,12 @@ impl CrewedBoat {
     pub fn state_name(&self) -> &str {
         let state = self.kept.last().map_or(0, |now| now.memory.state);
         self.plan.states.get(state).map_or("", |state| state.name.as_str())
+    }
+
+    /// Whether its crew has given up.
+    pub fn gave_up(&self) -> bool {
+        let state = self.kept.last().map_or(0, |now| now.memory.state);
+        self.plan.states.get(state).is_some_and(|state| matches!(state.act, Act::Surrender))
     }
 
     /// Whether its crew decides at step `number`. Not all crews do so at the same step: no frame has to wait for all of them.

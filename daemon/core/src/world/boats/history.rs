@@ -101,6 +101,14 @@ impl BoatHistory {
         }
     }
 
+    /// Whether its crew has given up.
+    pub fn gave_up(&self) -> bool {
+        match &self.pilot {
+            Pilot::Crewed(boat) => boat.gave_up(),
+            Pilot::Scripted(_) => false,
+        }
+    }
+
     /// The name of the state that its crew is in at the newest step.
     pub fn crew_state(&self) -> Option<&str> {
         match &self.pilot {

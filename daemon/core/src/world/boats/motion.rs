@@ -47,8 +47,12 @@ impl BoatMotion {
     }
 }
 
-/// Height of the water and its rate at each strip: at the middle, and half the difference between port and starboard.
-struct HullWater {
+/// Height of the water and its rate at each strip of a hull: at the middle, and half the difference between port and starboard.
+///
+/// It is where the strips lie of a hull that lies level: of one that is pitched by five degrees the bow is ten millimetres further aft. So it
+/// does not depend on the motion, and a step begins with what the one before has ended with: half of a step's time.
+#[derive(Clone, Debug)]
+pub(super) struct HullWater {
     middle: [[f64; 2]; STRIPS],
     side: [[f64; 2]; STRIPS],
 }
@@ -74,14 +78,15 @@ impl HullForm {
         0.5 * RADIATION * WATER_KG_M3 * self.draught_m * (GRAVITY_M_S2 / beam_m).sqrt()
     }
 
-    fn water(&self, course: &CourseState, pitch: f64, waves: &WaveField, t: f64) -> HullWater {
+    /// The water under a hull on its course.
+    pub(super) fn water(&self, course: &CourseState, waves: &WaveField, t: f64) -> HullWater {
         let forward = ahead(course.heading);
         let centre = course.position + forward * self.centre_m;
         let mut water = HullWater { middle: [[0.0; 2]; STRIPS], side: [[0.0; 2]; STRIPS] };
         let first_m = self.strips[0].x_m;
         for (factor, wave) in waves.waves_at(t) {
             let k = wave.cycles_per_m * TAU;
-            let (along, across) = (k.dot(forward) * pitch.cos(), k.dot(forward.perp()));
+            let (along, across) = (k.dot(forward), k.dot(forward.perp()));
             // Mean over the strip's length and over each half beam.
             let half_step = 0.5 * along * self.strip_m;
             let (sin_half, cos_half) = half_step.sin_cos();
@@ -106,12 +111,11 @@ impl HullForm {
         water
     }
 
-    fn forces(&self, course: &CourseState, motion: &BoatMotion, waves: &WaveField, t: f64) -> Forces {
+    fn forces(&self, course: &CourseState, motion: &BoatMotion, water: &HullWater) -> Forces {
         /// Cross-flow drag coefficient of a V section, about.
         const CROSS_FLOW: f64 = 1.0;
         let DVec3 { x: heave, y: roll, z: pitch } = motion.at;
         let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) = (roll.sin_cos(), pitch.sin_cos());
-        let water = self.water(course, pitch, waves, t);
         let radiation = self.radiation();
         // Upwards, port up, bow up.
         let (mut force, mut damping) = (DVec3::new(-self.weight_n(), 0.0, 0.0), DVec3::ZERO);
@@ -161,7 +165,7 @@ impl HullForm {
         Forces { acceleration: force / inertia, damping: damping / inertia }
     }
 
-    /// One step from `t` to `t` + `h`, the course given at both.
+    /// One step of `h` seconds, course and water given at its begin and end.
     ///
     /// Heun's method whose speeds are taken implicitly in their own damping: the two-stage W method of Verwer et al. 1999 (SIAM J. Sci.
     /// Comput. 20, 1456, eq. 1.3), of order 2 whatever stands for the Jacobian. Where nothing is stiff it is Heun's method; where a slam
@@ -169,18 +173,17 @@ impl HullForm {
     pub(super) fn step(
         &self,
         courses: [&CourseState; 2],
-        waves: &WaveField,
-        t: f64,
+        waters: [&HullWater; 2],
         motion: &BoatMotion,
         h: f64,
     ) -> BoatMotion {
         /// 1 - 1 / sqrt 2: makes [`step`] L-stable in a damping that is known.
         const GAMMA: f64 = 0.292_893_218_813_452_4;
-        let now = self.forces(courses[0], motion, waves, t);
+        let now = self.forces(courses[0], motion, waters[0]);
         let first = |damping: DVec3| now.acceleration / (DVec3::ONE + damping * (GAMMA * h));
         let ahead =
             BoatMotion { at: motion.at + motion.rate * h, rate: motion.rate + first(now.damping) * h };
-        let then = self.forces(courses[1], &ahead, waves, t + h);
+        let then = self.forces(courses[1], &ahead, waters[1]);
         // A hull that strikes the water within the step is damped there, not before.
         let damping = now.damping.max(then.damping);
         let one = first(damping);

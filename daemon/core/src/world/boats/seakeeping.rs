@@ -7,7 +7,7 @@ use super::{
     course::CourseState,
     grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
     hull::HullForm,
-    motion::BoatMotion,
+    motion::{BoatMotion, HullWater},
 };
 use crate::world::waves::WaveField;
 
@@ -24,12 +24,14 @@ pub(super) const FAR_M: f64 = 2500.0;
 pub struct SeakeepingState {
     form: HullForm,
     motions: GridHistory<BoatMotion>,
+    /// The water at the step of that number, the newest.
+    water: Option<(i64, Box<HullWater>)>,
 }
 
 impl SeakeepingState {
     /// A boat whose motion has not begun.
     pub fn new(form: HullForm) -> Self {
-        Self { form, motions: GridHistory::new(KEPT) }
+        Self { form, motions: GridHistory::new(KEPT), water: None }
     }
 
     /// Follows the boat on its course (a state by seconds) up to `until_s`. Does nothing for what is already followed.
@@ -48,12 +50,25 @@ impl SeakeepingState {
         for number in start..last {
             let to = course(seconds(number + 1));
             let motion = self.motions.last().copied().unwrap_or_default();
-            let near = !is_far(&to);
-            let next = near.then(|| self.form.step([&from, &to], waves, seconds(number), &motion, STEP_S));
+            let next = (!is_far(&to)).then(|| {
+                let water = self.water_at(number, &from, waves);
+                let then = Box::new(self.form.water(&to, waves, seconds(number + 1)));
+                let next = self.form.step([&from, &to], [&water, &then], &motion, STEP_S);
+                self.water = Some((number + 1, then));
+                next
+            });
             let next = next.filter(|next| self.form.is_sane(next, waves.crest_max_m(), STEP_S));
             let next = next.unwrap_or_else(|| self.plane(number + 1, &course, waves));
             self.motions.push(next);
             from = to;
+        }
+    }
+
+    /// The water at the step of that number, as it was left there or anew.
+    fn water_at(&mut self, number: i64, course: &CourseState, waves: &WaveField) -> Box<HullWater> {
+        match self.water.take() {
+            Some((kept, water)) if kept == number => water,
+            _ => Box::new(self.form.water(course, waves, seconds(number))),
         }
     }
 
@@ -64,6 +79,7 @@ impl SeakeepingState {
     /// Forgets what comes after `time_s`: the boat's course or sea is another from there on.
     pub fn forget_after(&mut self, time_s: f64) {
         self.motions.forget_after(time_s);
+        self.water = None;
     }
 
     /// The motion at a time; `None` where it is not followed yet or no longer kept.

@@ -120,10 +120,11 @@ fn a_long_swell_carries_boats_as_its_surface_goes() {
 fn own_period(form: &HullForm, push: DVec3, axis: usize) -> f64 {
     let state = course(0.0, 0.0)(0.0);
     let h = STEP_S;
+    let water = form.water(&state, &WaveField::FLAT, 0.0);
     let mut motion = BoatMotion { at: push, rate: DVec3::ZERO };
     let mut crossings = Vec::new();
     for i in 0..3600 {
-        let next = form.step([&state, &state], &WaveField::FLAT, 0.0, &motion, h);
+        let next = form.step([&state, &state], [&water; 2], &motion, h);
         if motion.at[axis] > 0.0 && next.at[axis] <= 0.0 {
             crossings.push(f64::from(i) * h);
         }
@@ -138,7 +139,8 @@ fn hulls_float_at_their_waterline_and_swing_as_such_boats_do() {
     let rest = course(0.0, 0.0)(0.0);
     let frigate = hull(120.0, 14.0, 4.5);
     for form in [skiff(), hull(14.0, 4.5, 1.2), frigate.clone()] {
-        let next = form.step([&rest, &rest], &WaveField::FLAT, 0.0, &BoatMotion::default(), STEP_S);
+        let water = form.water(&rest, &WaveField::FLAT, 0.0);
+        let next = form.step([&rest, &rest], [&water; 2], &BoatMotion::default(), STEP_S);
         assert!(next.at.length() < 1e-9 && next.rate.length() < 1e-9, "{next:?}");
     }
     // Rolling periods of open boats and of frigates (IMO 2008 IS Code, 2.3: 2 C B / sqrt GM).
@@ -205,7 +207,9 @@ fn boats_of_scenarios_at_full_speed_never_leave_the_water_for_good() {
             let mut motion = BoatMotion::of_plane(&form, &course, &waves, 0.0);
             for number in 0..3600 {
                 let (a, b) = (course(seconds(number)), course(seconds(number + 1)));
-                motion = form.step([&a, &b], &waves, seconds(number), &motion, STEP_S);
+                let now = form.water(&a, &waves, seconds(number));
+                let then = form.water(&b, &waves, seconds(number + 1));
+                motion = form.step([&a, &b], [&now, &then], &motion, STEP_S);
                 assert!(
                     form.is_sane(&motion, waves.crest_max_m(), 0.0),
                     "force {force}, step {number}: {motion:?}"

@@ -25,6 +25,9 @@ pub struct Projectile {
 }
 
 impl Projectile {
+    /// A round of a heavy machine gun, rounded.
+    pub const HEAVY: Self = Self { bc_g7_lb_in2: 0.33, muzzle_velocity_m_s: 890.0 };
+
     /// A round with the G7 ballistic coefficient `bc_g7_lb_in2` (at least 0.01; infinite means no drag) and that muzzle
     /// velocity (0 to 3000 m/s); `None` outside those.
     pub fn new(bc_g7_lb_in2: f64, muzzle_velocity_m_s: f64) -> Option<Self> {

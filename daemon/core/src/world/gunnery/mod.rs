@@ -4,8 +4,10 @@ mod atmosphere;
 mod dispersion;
 mod drag;
 mod flight;
+mod solution;
 
 pub use atmosphere::{Air, Atmosphere};
 pub use dispersion::dispersed;
 pub use drag::g7_drag_coefficient;
 pub use flight::{Flight, FlightSegment, FlightState, Projectile, STEP_S};
+pub use solution::{AimSolution, aim_to_hit};

@@ -7,9 +7,10 @@ use super::{
     crew::NamedCrew,
     group::{self, Formation},
     keys::{M_S_PER_KN, angle, range, waypoint},
-    spec::{BoatSpec, Side, place},
+    spec::{BoatSpec, place},
 };
 use crate::{
+    side::Side,
     text::toml::{
         KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, key_place, number, one_of,
         plain_text, whole, yes_no,
@@ -116,7 +117,7 @@ impl RawBoat {
 pub(super) struct BoatContext<'a> {
     /// The crews that the scenario knows.
     pub crews: &'a [NamedCrew],
-    /// Its seed.
+    /// Its seed, by which groups are scattered.
     pub seed: u64,
     /// Most boats of all groups together.
     pub boats_max: usize,
@@ -237,12 +238,12 @@ fn crewed(
     let formation = text.given(&raw.formation, one_of(&Formation::NAMES))?.unwrap_or(Formation::Abreast);
     let spacing_m = text.given(&raw.spacing_m, number(10.0..=2000.0, "m"))?.unwrap_or(40.0);
     let keeps_rules = text.given(&raw.keeps_rules, yes_no())?.unwrap_or(side == Side::Neutral);
-    let seed = context.seed.wrapping_add((table as u64) << 32);
-    let places = group::places(formation, count, spacing_m, heading, seed);
+    let number = (table as u64) << 32;
+    let places = group::places(formation, count, spacing_m, heading, context.seed.wrapping_add(number));
     let start = |(i, off): (usize, DVec2)| {
         Behaviour::Crewed(CrewedStart {
             plan: std::sync::Arc::clone(&context.crews[crew].plan),
-            seed: seed.wrapping_add(i as u64),
+            chance: number + i as u64,
             keeps_rules,
             propulsor,
             speed_max_m_s: speed_max * M_S_PER_KN,

@@ -80,7 +80,7 @@ fn a_group_stands_about_its_place_and_each_has_its_own_name_and_chance() {
     assert_eq!(names, ["a-1", "a-2", "a-3"]);
     let group = starts(&text);
     assert!((group[0].position.length() - 400.0).abs() < 1e-9);
-    assert!(group.windows(2).all(|pair| pair[0].seed != pair[1].seed));
+    assert!(group.windows(2).all(|pair| pair[0].chance != pair[1].chance));
     assert!(group.iter().all(|b| !b.keeps_rules && (b.speed_m_s - 10.0 * M_S_PER_KN).abs() < 1e-12));
     let neutral = starts(&BOAT.replace("crew =", "side = \"neutral\"\ncrew ="));
     assert!(neutral[0].keeps_rules);

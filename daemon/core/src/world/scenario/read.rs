@@ -6,8 +6,10 @@ pub use super::keys::{LightKeys, M_S_PER_KN, ReflectionKeys, SeaKeys, angle, see
 use super::{
     boat::{self, BoatContext, RawBoat},
     crew::{self, RawCrew},
-    spec::{Scenario, WeaponSpec, place},
+    exercise::{RawCall, RawEvent, RawExercise, RawGoals, RawRules, exercise},
+    spec::{Scenario, place},
     sun,
+    weapon::{self, RawWeapon},
 };
 use crate::{
     daylight::Daylight,
@@ -17,10 +19,7 @@ use crate::{
         whole,
     },
     water::{ReflectionMethod, ShadowLevel, Water},
-    world::{
-        gunnery::Projectile,
-        waves::{Spectrum, WaveSpec},
-    },
+    world::waves::{Spectrum, WaveSpec},
 };
 
 /// Most boats of a scenario.
@@ -36,6 +35,11 @@ struct RawScenario {
     light: Option<Spanned<LightKeys>>,
     reflection: Option<Spanned<ReflectionKeys>>,
     weapon: Option<Spanned<RawWeapon>>,
+    briefing: OptionalKey<String>,
+    rules: Option<Spanned<RawRules>>,
+    goals: Option<Spanned<RawGoals>>,
+    call: Vec<Spanned<RawCall>>,
+    event: Vec<Spanned<RawEvent>>,
     crew: Vec<Spanned<RawCrew>>,
     boat: Vec<Spanned<RawBoat>>,
 }
@@ -56,17 +60,6 @@ struct RawMount {
     eye_height_m: OptionalKey<f64>,
 }
 
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct RawWeapon {
-    rounds_per_minute: OptionalKey<f64>,
-    belt: OptionalKey<i64>,
-    muzzle_velocity_m_s: OptionalKey<f64>,
-    ballistic_coefficient_g7_lb_in2: OptionalKey<f64>,
-    dispersion_mrad: OptionalKey<f64>,
-    tracer_every: OptionalKey<i64>,
-}
-
 pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> {
     let text = TomlText::new(text, origin)?;
     let (raw, mut warnings) = text.read::<RawScenario>(&[])?;
@@ -82,13 +75,15 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let (_, keys) = text.section("reflection", raw.reflection);
     let water = reflection(text, &keys, force, &mut warnings)?;
     let (section, keys) = text.section("weapon", raw.weapon);
-    let weapon = weapon(&section, &keys)?;
+    let weapon = weapon::weapon(&section, &keys)?;
     let seed = text.given(&raw.seed, seed())?.unwrap_or(1);
     // A scenario without crews does not read the built-in ones.
     let crewed = raw.boat.iter().any(|boat| boat.get_ref().has_crew());
     let crews = if crewed { crew::known(text, raw.crew)? } else { crew::crews(text, raw.crew)? };
     let context = BoatContext { crews: &crews, seed, boats_max: BOATS_MAX };
     let boats = boat::boats(text.sections("boat", raw.boat, BOATS_MAX)?, &context)?;
+    let RawScenario { briefing, rules, goals, call, event, .. } = raw;
+    let exercise = exercise(text, RawExercise { briefing, rules, goals, call, event }, &boats)?;
     Ok(Scenario {
         name: text.given(&raw.name, plain_text())?.unwrap_or_else(|| "unnamed".to_owned()),
         seed,
@@ -100,6 +95,7 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
         daylight,
         water,
         weapon,
+        exercise,
         boats,
         warnings,
     })
@@ -175,26 +171,4 @@ pub fn reflection(
         _ => ShadowLevel::Gradual,
     };
     Ok(Water { method, force, shadow })
-}
-
-fn weapon(section: &TomlSection<'_>, keys: &RawWeapon) -> Result<WeaponSpec, TomlError> {
-    let text = section.text;
-    let velocity = text.given(&keys.muzzle_velocity_m_s, number(50.0..=2000.0, "m/s"))?.unwrap_or(890.0);
-    let coefficient =
-        text.given(&keys.ballistic_coefficient_g7_lb_in2, number(0.05..=2.0, "lb/in^2"))?.unwrap_or(0.33);
-    let projectile = Projectile::new(coefficient, velocity).ok_or_else(|| {
-        let problem =
-            "makes no round: muzzle_velocity_m_s and ballistic_coefficient_g7_lb_in2 do not go together";
-        section.error("muzzle_velocity_m_s", problem)
-    })?;
-    let tracer_every = text.given(&keys.tracer_every, whole(0..=1000))?.unwrap_or(5);
-    Ok(WeaponSpec {
-        rounds_per_minute: text
-            .given(&keys.rounds_per_minute, number(1.0..=6000.0, "a minute"))?
-            .unwrap_or(500.0),
-        belt: text.given(&keys.belt, whole(0..=100_000))?.unwrap_or(100),
-        projectile,
-        dispersion_mrad: text.given(&keys.dispersion_mrad, number(0.0..=50.0, "mrad"))?.unwrap_or(0.6),
-        tracer_every: (tracer_every > 0).then_some(tracer_every),
-    })
 }

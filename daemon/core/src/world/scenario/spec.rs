@@ -4,10 +4,12 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     daylight::Daylight,
+    side::Side,
     text::toml::{TomlError, TomlPlace},
     water::Water,
     world::{
         boats::Behaviour,
+        exercise::ExerciseSpec,
         gunnery::Projectile,
         waves::{WaveField, WaveSpec},
     },
@@ -41,6 +43,8 @@ pub struct Scenario {
     pub water: Water,
     /// The training weapon.
     pub weapon: WeaponSpec,
+    /// Rules, goals, calls and events.
+    pub exercise: ExerciseSpec,
     /// The boats.
     pub boats: Vec<BoatSpec>,
     /// Former names that the text uses, each with its place and the new name.
@@ -48,46 +52,61 @@ pub struct Scenario {
 }
 
 /// The training weapon.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WeaponSpec {
+    /// The built-in kind that it is made from, if any.
+    pub kind: Option<String>,
     /// Cyclic rate.
     pub rounds_per_minute: f64,
     /// Rounds in the belt.
     pub belt: u32,
+    /// Belts besides that.
+    pub spare_belts: u32,
+    /// Time that a belt takes to put in, seconds.
+    pub reload_s: f64,
+    /// Rounds from one stoppage to the next on average; `None` for none.
+    pub stoppage_every: Option<f64>,
     /// Its round.
     pub projectile: Projectile,
     /// Scatter, standard deviation along each of two axes, milliradians.
     pub dispersion_mrad: f64,
     /// Every how many rounds one is a tracer; `None` for no tracers.
     pub tracer_every: Option<u32>,
+    /// Distance from the muzzle at which a tracer burns out, metres.
+    pub tracer_burnout_m: f64,
+    /// Height of the splash of a round that enters steeply, metres.
+    pub splash_height_m: f64,
+    /// How long it stands, seconds.
+    pub splash_life_s: f64,
+    /// Angle to the water below which a round bounces, degrees.
+    pub ricochet_below_deg: f64,
+}
+
+impl Default for WeaponSpec {
+    /// Numbers where a scenario gives none: those of the first scenarios.
+    fn default() -> Self {
+        Self {
+            kind: None,
+            rounds_per_minute: 500.0,
+            belt: 100,
+            spare_belts: 0,
+            reload_s: 8.0,
+            stoppage_every: None,
+            projectile: Projectile::HEAVY,
+            dispersion_mrad: 0.6,
+            tracer_every: Some(5),
+            tracer_burnout_m: 1800.0,
+            splash_height_m: 1.5,
+            splash_life_s: 1.6,
+            ricochet_below_deg: 0.0,
+        }
+    }
 }
 
 impl WeaponSpec {
     /// Whether round `shot` (counted from 1) is a tracer.
     pub fn is_tracer(&self, shot: u64) -> bool {
         self.tracer_every.is_some_and(|every| shot.is_multiple_of(u64::from(every)))
-    }
-}
-
-/// Whom a boat belongs to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Side {
-    /// It attacks.
-    Hostile,
-    /// It is not to be fired at.
-    Neutral,
-}
-
-impl Side {
-    /// All sides.
-    pub const ALL: [Self; 2] = [Self::Hostile, Self::Neutral];
-
-    /// The name used in scenarios, databases and tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Hostile => "hostile",
-            Self::Neutral => "neutral",
-        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 mod closest;
 mod hit;
+mod miss;
 mod round;
+mod sheet;
 
 use glam::DVec3;
 
@@ -10,10 +12,14 @@ pub use closest::{Closest, closest_to_box, closest_to_surface};
 #[cfg(test)]
 pub(crate) use hit::tests::boxed as boxed_model;
 pub use hit::{Moving, Strike, strike};
+pub use miss::{AIM_TREND_S, BoreSample, MissCause, MissExplanation, MissedRound};
 pub use round::{Approach, End, Round};
+pub use sheet::{
+    BoatSheet, Breach, CallsSheet, CauseSheet, Ending, RoundsSheet, SCORE_VERSION, ScoreFold, ScoreSheet,
+};
 
 pub use crate::fault::NotScored;
-use crate::{model::Zone, time::Time, world::scenario::Side};
+use crate::{model::Zone, side::Side, time::Time};
 
 /// One virtual round, from trigger to end.
 #[derive(Clone, Debug, PartialEq)]

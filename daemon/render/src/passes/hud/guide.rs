@@ -40,7 +40,7 @@ impl HudLayout {
     /// The quads of a guide, in drawing order.
     pub(crate) fn lay_out_guide(&mut self, glyphs: &Glyphs, guide: &Guide) -> &[HudQuad] {
         self.quads.clear();
-        self.training(glyphs);
+        self.training(glyphs, None);
         let floor = self.panel(glyphs, guide);
         self.gauges(glyphs, &guide.gauges, floor);
         if let Some(coverage) = &guide.coverage {

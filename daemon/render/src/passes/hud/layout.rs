@@ -14,6 +14,7 @@ use bowwave_core::{
     frame::scene::{Hud, PixelRect, Status},
     model::Zone,
     sea::WmoSeaState,
+    world::{exercise::Engagement, weapon::WeaponState},
 };
 use shaders_spirv::interface::{
     HudQuad, SHAPE_BARRED, SHAPE_CROSS, SHAPE_DIAMOND, SHAPE_DISC, SHAPE_GLYPH, SHAPE_PLATE, SHAPE_RING,
@@ -120,7 +121,7 @@ impl HudLayout {
     /// The quads of `hud`, in drawing order.
     pub(crate) fn lay_out(&mut self, glyphs: &Glyphs, hud: &Hud) -> &[HudQuad] {
         self.quads.clear();
-        self.training(glyphs);
+        self.training(glyphs, hud.message.as_deref());
         self.clock(glyphs, hud.clock_s);
         if let Some((state, source)) = hud.sea {
             self.sea(glyphs, state, source);
@@ -128,6 +129,7 @@ impl HudLayout {
         if let Some(tenths) = hud.heading_tenths_deg {
             self.heading(glyphs, tenths, if hud.sea.is_some() { 2 } else { 1 });
         }
+        self.exercise(glyphs, hud);
         self.counts(glyphs, hud);
         let top = self.status(glyphs, &hud.status);
         if let Some(fault) = hud.warning {
@@ -173,13 +175,43 @@ impl HudLayout {
         (8.0 * unit(self.size)).round()
     }
 
-    fn training(&mut self, glyphs: &Glyphs) {
+    /// The word that is always there, with the scenario's text below it.
+    fn training(&mut self, glyphs: &Glyphs, message: Option<&str>) {
         const WORD: &str = "TRAINING";
         let pad = self.pad();
         let (width, line) = (glyphs.width_of(TextSize::Large, WORD), glyphs.line(TextSize::Large));
         let x = ((self.size.0 as f32 - width) / 2.0).round();
         self.plate([x - pad, pad, x + width + pad, pad + line]);
         self.text(glyphs, TextSize::Large, (x, pad), AMBER, WORD);
+        if let Some(message) = message {
+            let (width, small) = (glyphs.width_of(TextSize::Small, message), glyphs.line(TextSize::Small));
+            let (x, top) = (((self.size.0 as f32 - width) / 2.0).round(), (pad + line).ceil());
+            self.plate([x - pad, top, x + width + pad, top + small]);
+            self.text(glyphs, TextSize::Small, (x, top), WHITE, message);
+        }
+    }
+
+    /// Rules of engagement, and what keeps the virtual weapon from firing, below the clock and what stands there.
+    fn exercise(&mut self, glyphs: &Glyphs, hud: &Hud) {
+        let mut row = 1 + u8::from(hud.sea.is_some()) + u8::from(hud.heading_tenths_deg.is_some());
+        if let Some(rules) = hud.rules {
+            let (word, colour) = match rules {
+                Engagement::Hold => ("HOLD FIRE", AMBER),
+                Engagement::Warn => ("WARN FIRST", AMBER),
+                Engagement::Tight => ("WEAPONS TIGHT", AMBER),
+                Engagement::Free => ("WEAPONS FREE", WHITE),
+            };
+            self.below_clock(glyphs, row, colour, format_args!("{word}"));
+            row += 1;
+        }
+        let word = match hud.weapon {
+            WeaponState::Safe => "SAFE",
+            WeaponState::Stoppage => "STOPPAGE",
+            WeaponState::Reloading => "RELOADING",
+            // The count says it.
+            WeaponState::Ready | WeaponState::Empty => return,
+        };
+        self.below_clock(glyphs, row, AMBER, format_args!("{word}"));
     }
 
     /// The state's plate at the lower left; returns its upper edge.

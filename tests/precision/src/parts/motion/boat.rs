@@ -98,11 +98,11 @@ impl DrivenBoat {
         half_beam(self.draught_m)
     }
 
-    /// Mean height and vertical speed of the water under a strip's half, by the waves' own formula; `x` forward, `y` to port of the
-    /// middle, `level` the cosine of the pitch.
-    fn water(&self, x: f64, y: f64, level: f64, t: f64) -> (f64, f64) {
-        let at = DVec2::new(-y, x * level + self.speed_m_s * t);
-        let half = DVec2::new(0.5 * self.rest_half_beam_m(), 0.5 * LENGTH_M / STRIPS as f64 * level);
+    /// Mean height and vertical speed of the water under half a strip of a level hull, by the waves' own formula; `x` forward, `y` to
+    /// port of the middle.
+    fn water(&self, x: f64, y: f64, t: f64) -> (f64, f64) {
+        let at = DVec2::new(-y, x + self.speed_m_s * t);
+        let half = DVec2::new(0.5 * self.rest_half_beam_m(), 0.5 * LENGTH_M / STRIPS as f64);
         self.waves.waves().iter().fold((0.0, 0.0), |(height, speed), w| {
             let (sin, cos) = (TAU * (w.cycles_per_m.dot(at) - w.hz * t + w.phase)).sin_cos();
             let k = w.cycles_per_m * TAU;
@@ -171,7 +171,7 @@ impl RigidSystem<6> for DrivenBoat {
         for i in 0..2 * STRIPS {
             let x = ((i as f64 / 2.0).floor() + 0.5 - STRIPS as f64 / 2.0) * strip_m;
             let side = if i % 2 == 0 { lever } else { -lever };
-            let (water, water_speed) = self.water(x, side, pitch.cos(), t);
+            let (water, water_speed) = self.water(x, side, t);
             let d = water - (heave + x * pitch.sin() + side * roll.sin() - self.draught_m);
             if d <= 0.0 {
                 continue;

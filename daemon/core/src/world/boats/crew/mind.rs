@@ -3,14 +3,13 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::DVec2;
-use rand::RngExt;
-use rand_pcg::Pcg64;
 
 use super::{
     avoid::{Bound, Helmsman, Traffic},
     plan::{Act, CrewPlan, Guard},
 };
 use crate::{
+    chance::drawn,
     geometry::{ahead, heading_of},
     physics::GRAVITY_M_S2,
     world::boats::{
@@ -148,8 +147,8 @@ impl CrewPlan {
             if memory.declined & bit != 0 {
                 continue;
             }
-            let drawn = chance(at.seed, [u64::from(memory.changes), number as u64]);
-            if drawn < exit.chance && exit.to < self.states.len() {
+            let chance = drawn(at.seed, [u64::from(memory.changes), number as u64]);
+            if chance < exit.chance && exit.to < self.states.len() {
                 return Some(exit.to);
             }
             memory.declined |= bit;
@@ -299,10 +298,10 @@ impl Craft {
 /// Legs of a fishing boat: half a minute to two at a walking pace on a course that changes little, then as long without way.
 fn fish(boat: &DriveState, memory: &mut CrewMemory, at: &Situation<'_>, speed_m_s: f64) -> Wish {
     let visit = u64::from(memory.changes) << 32;
-    let drawn = |leg: u32, what: u64| chance(at.seed, [visit | u64::from(leg), FISHING + what]);
-    let leg_s = 30.0 + 90.0 * drawn(memory.leg, 0);
+    let chance = |leg: u32, what: u64| drawn(at.seed, [visit | u64::from(leg), FISHING + what]);
+    let leg_s = 30.0 + 90.0 * chance(memory.leg, 0);
     // Four legs go about the same way.
-    let course = TAU * drawn(memory.leg / 4, 1) + 1.5 * (drawn(memory.leg, 2) - 0.5);
+    let course = TAU * chance(memory.leg / 4, 1) + 1.5 * (chance(memory.leg, 2) - 0.5);
     let moving = memory.leg.is_multiple_of(2);
     if at.time_s - memory.leg_since_s > leg_s {
         memory.leg += 1;
@@ -313,11 +312,6 @@ fn fish(boat: &DriveState, memory: &mut CrewMemory, at: &Situation<'_>, speed_m_
     let course = if home.length() > 150.0 { heading_of(home) } else { course };
     let bound = moving.then_some(Bound { course, speed_m_s });
     Wish { bound, arrived: false, ..Wish::STOP }
-}
-
-/// A number from 0 to 1 that follows from a boat's seed and what is drawn for.
-fn chance(seed: u64, [about, what]: [u64; 2]) -> f64 {
-    Pcg64::new(u128::from(seed), u128::from(about) << 64 | u128::from(what)).random()
 }
 
 impl Guard {

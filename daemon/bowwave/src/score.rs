@@ -1,0 +1,196 @@
+//! `bowwave score`: what a run is worth, and why.
+
+use anyhow::{Result, bail};
+use bowwave_core::{
+    text::one_line,
+    world::{
+        exercise::{ExerciseEvent, ExerciseFact},
+        score::{ScoreFold, ScoreSheet},
+    },
+};
+use bowwave_record::journal::{RunSelection, ShotFilter, read_events, read_shots};
+use bowwave_trainer::storage::JOURNAL;
+use serde::Serialize;
+
+use crate::{cli::ScoreArgs, stdout};
+
+/// A score with the misses that it explains.
+#[derive(Debug, Serialize)]
+struct Scored {
+    #[serde(flatten)]
+    sheet: ScoreSheet,
+    explained: Vec<ExplainedRound>,
+}
+
+/// A round that missed, and why.
+#[derive(Debug, Serialize)]
+struct ExplainedRound {
+    shot: u64,
+    boat: String,
+    error_m: [f64; 2],
+    error_mrad: [f64; 2],
+    largest_cause: &'static str,
+    in_words: String,
+}
+
+/// Prints the score of a run.
+pub fn run(arguments: &ScoreArgs) -> Result<()> {
+    let path = if arguments.run.is_dir() { arguments.run.join(JOURNAL) } else { arguments.run.clone() };
+    if !path.exists() {
+        bail!(
+            "no journal at {}; name the folder that `bowwave simulate --out` left, or the database",
+            path.display()
+        );
+    }
+    let runs = arguments.number.map_or(RunSelection::Latest, RunSelection::Run);
+    let mut fold = ScoreFold::default();
+    let (mut explained, mut unknown) = (Vec::new(), 0);
+    for event in read_events(&path, runs)? {
+        match event {
+            Ok(event) => {
+                explained.extend(explained_round(&event));
+                fold.event(&event);
+            }
+            Err(_) => unknown += 1,
+        }
+    }
+    for stored in read_shots(&path, &ShotFilter { runs, hits_only: false })? {
+        fold.shot(&stored.record);
+    }
+    if unknown > 0 {
+        log::warn!("{unknown} events of the run are of a newer version and do not count; score it with that");
+    }
+    let scored = Scored { sheet: fold.sheet(), explained };
+    if arguments.json {
+        return stdout::print_json(&scored);
+    }
+    stdout::print(format!("{}{}", text(&scored.sheet), misses(&scored)))
+}
+
+fn explained_round(event: &ExerciseEvent) -> Option<ExplainedRound> {
+    let ExerciseFact::Missed { shot, boat, why } = &event.fact else { return None };
+    Some(ExplainedRound {
+        shot: *shot,
+        boat: boat.clone(),
+        error_m: why.error_m(),
+        error_mrad: why.error_mrad,
+        largest_cause: why.largest().name(),
+        in_words: why.to_string(),
+    })
+}
+
+/// A score sheet for people.
+pub fn text(sheet: &ScoreSheet) -> String {
+    let points = match sheet.points {
+        Some(points) => format!("{points:.0} of 100 points (score version {})", sheet.version),
+        None => "no points: the run is of a version that kept no events of the exercise".to_owned(),
+    };
+    let nearest = sheet.nearest_m.map_or_else(String::new, |m| format!("; the nearest came to {m:.0} m"));
+    let mut text = format!("score     {points}, {:.0} s\n", sheet.duration_s);
+    if sheet.points.is_some() {
+        text += &format!(
+            "threats   {} of {} stopped, {} turned away{nearest}; {:.1} s within the range to be kept\n",
+            sheet.stopped, sheet.hostile, sheet.turned_away, sheet.under_threat_s
+        );
+    }
+    text += &rounds(sheet);
+    let calls = sheet.calls;
+    if calls.asked > 0 || calls.wrong > 0 {
+        text += &format!(
+            "calls     {} asked for: {} in time, {} late, {} missing; {} boats called what they are not\n",
+            calls.asked, calls.in_time, calls.late, calls.missing, calls.wrong
+        );
+    }
+    for breach in &sheet.breaches {
+        let boat = breach.boat.as_deref().map_or_else(|| "nothing".to_owned(), one_line);
+        text += &format!(
+            "RULES     broken at {:.1} s: {} rounds at {boat} under \"{}\"\n",
+            breach.at_s,
+            breach.rounds,
+            breach.rules.name()
+        );
+    }
+    if sheet.rounds.neutral_hits > 0 {
+        text += &format!("NEUTRALS  {} rounds struck a neutral boat\n", sheet.rounds.neutral_hits);
+    }
+    text + &boats(sheet)
+}
+
+fn rounds(sheet: &ScoreSheet) -> String {
+    let r = &sheet.rounds;
+    let share = 100.0 * f64::from(r.hits) / f64::from(r.fired.max(1));
+    let parts: Vec<String> = r.by_part.iter().map(|(part, hits)| format!("{part} {hits}")).collect();
+    let mut text = format!("rounds    {} fired, {} hits", r.fired, r.hits);
+    if r.hits > 0 {
+        text += &format!(" ({share:.0} %: {})", parts.join(", "));
+    }
+    text += &format!("; {} bursts, {} hit with the first round", r.bursts, r.first_round_hits);
+    text += &r.per_stop.map_or_else(String::new, |rounds| format!("; {rounds:.0} rounds a stop"));
+    text += &r.left.map_or_else(String::new, |left| format!("; {left} left"));
+    if r.not_scored > 0 {
+        text += &format!("; {} NOT SCORED", r.not_scored);
+    }
+    if r.stoppages > 0 {
+        text += &format!("; {} stoppages", r.stoppages);
+    }
+    text + "\n"
+}
+
+fn boats(sheet: &ScoreSheet) -> String {
+    if sheet.boats.is_empty() {
+        return String::new();
+    }
+    let seconds = |s: Option<f64>| s.map_or_else(|| "-".to_owned(), |s| format!("{s:.1}"));
+    let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.0}"));
+    let mut rows = vec![
+        ["boat", "side", "in view m", "pointed at s", "reported s", "called", "hits", "ended", "nearest m"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    for boat in &sheet.boats {
+        let ending = match (boat.ending, boat.ended_m) {
+            (Some(ending), Some(m)) => {
+                let how = match ending {
+                    bowwave_core::world::score::Ending::Stopped => "stopped",
+                    bowwave_core::world::score::Ending::TurnedAway => "turned away",
+                };
+                format!("{how} at {m:.0} m")
+            }
+            _ => "-".to_owned(),
+        };
+        rows.push(vec![
+            one_line(&boat.name),
+            boat.side.unwrap_or("-").to_owned(),
+            metres(boat.in_view_m),
+            seconds(boat.pointed_s),
+            seconds(boat.reported_s),
+            boat.identified_as.unwrap_or("-").to_owned(),
+            boat.hits.to_string(),
+            ending,
+            metres(boat.nearest_m),
+        ]);
+    }
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
+    let mut text = "\n".to_owned();
+    for row in &rows {
+        let cells: Vec<String> =
+            row.iter().zip(&widths).map(|(cell, width)| format!("{cell:<width$}")).collect();
+        text += cells.join("  ").trim_end();
+        text.push('\n');
+    }
+    text
+}
+
+fn misses(scored: &Scored) -> String {
+    if scored.explained.is_empty() {
+        return String::new();
+    }
+    let causes: Vec<String> =
+        scored.sheet.misses.iter().map(|cause| format!("{} {}", cause.cause, cause.rounds)).collect();
+    let mut text = format!("\nmisses by their largest cause: {}\n", causes.join(", "));
+    for round in &scored.explained {
+        text += &format!("round {:>4}  {}: {}\n", round.shot, one_line(&round.boat), round.in_words);
+    }
+    text
+}

@@ -1,0 +1,151 @@
+//! What a gunner sees.
+
+use glam::{DVec2, DVec3};
+use rand::RngExt;
+use rand_pcg::Pcg64;
+
+use crate::{
+    side::Side,
+    world::{RunningWorld, fleet::Fleet},
+};
+
+/// Metres in a nautical mile.
+const NM: f64 = 1852.0;
+/// Speed of the searchers for whom sweep widths were measured, nautical miles a second.
+const SEARCH_NM_S: f64 = 10.0 / 3600.0;
+/// Angle under which a hull's height shows what kind of boat it is, radians: eight lines of a minute of arc (Johnson 1958).
+const RECOGNISED: f64 = 8.0 / 60.0 * std::f64::consts::PI / 180.0;
+
+/// A boat in sight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Sighted {
+    pub boat: usize,
+    /// The middle of what it shows, world, metres.
+    pub at: DVec3,
+    /// Its velocity over the ground, m/s.
+    pub velocity: DVec3,
+    /// Rate at which somebody who searches comes upon it, 1/s.
+    pub found_per_s: f64,
+    /// It is near enough to say what kind of boat it is.
+    pub is_recognised: bool,
+    /// What it is; only a judgement of it is used.
+    pub side: Side,
+    /// It has no way after having been struck, or has given up: that shows.
+    pub is_over: bool,
+}
+
+/// Seeing conditions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Eye {
+    pub at: DVec3,
+    pub visibility_m: f64,
+    /// Factor of sweep widths by wind and sea for boats below 9 m (National Search and Rescue Manual, table D-1).
+    pub weather: f64,
+}
+
+impl Eye {
+    /// All boats that can be seen from here.
+    pub fn sees(&self, running: &RunningWorld) -> Vec<Sighted> {
+        let boats: Vec<Sighted> = (0..running.fleet.len()).filter_map(|b| self.sight(running, b)).collect();
+        boats.iter().filter(|boat| !self.is_hidden(boat, &boats, &running.fleet)).copied().collect()
+    }
+
+    fn sight(&self, running: &RunningWorld, boat: usize) -> Option<Sighted> {
+        let RunningWorld { fleet, now, start, .. } = running;
+        let at = fleet.floating(boat, *now)?.pose.to_world(DVec3::Z * fleet.middle_m(boat));
+        let history = fleet.history(boat)?;
+        let velocity = history.state(now.secs_since(*start)).velocity().extend(0.0);
+        let (range_m, length_m) = (at.distance(self.at), history.hull().length_m);
+        let is_over = fleet.gave_up(boat)
+            || fleet.first_hit(boat).is_some_and(|t| t <= *now) && velocity.length() < 1.0;
+        Some(Sighted {
+            boat,
+            at,
+            velocity,
+            found_per_s: self.found_per_s(range_m, length_m),
+            is_recognised: fleet.height_m(boat) / range_m.max(1.0) > RECOGNISED,
+            side: fleet.side(boat)?,
+            is_over,
+        })
+    }
+
+    /// Rate at which a searcher finds a boat: Koopman's inverse cube law with the constant that gives a published sweep width W to a searcher
+    /// who passes at a speed v, v W^2 / (8 pi r^3) (Koopman 1980, Search and Screening, 3.2).
+    fn found_per_s(&self, range_m: f64, length_m: f64) -> f64 {
+        let sweep_nm = sweep_width_nm(length_m, self.visibility_m / NM) * self.weather;
+        let range_nm = (range_m / NM).max(0.02);
+        SEARCH_NM_S * sweep_nm * sweep_nm / (8.0 * std::f64::consts::PI * range_nm.powi(3))
+    }
+
+    /// Whether a nearer boat of some size stands before it.
+    fn is_hidden(&self, boat: &Sighted, boats: &[Sighted], fleet: &Fleet) -> bool {
+        let from = |s: &Sighted| s.at.truncate() - self.at.truncate();
+        let sight: DVec2 = from(boat);
+        boats.iter().any(|other| {
+            let off = from(other);
+            let along = off.dot(sight) / sight.length_squared().max(1.0);
+            let beside = (off - sight * along).length();
+            let half_m = fleet.history(other.boat).map_or(0.0, |h| 0.3 * h.hull().length_m);
+            other.boat != boat.boat
+                && (0.0..0.98).contains(&along)
+                && beside < half_m
+                && fleet.height_m(other.boat) >= fleet.height_m(boat.boat)
+        })
+    }
+}
+
+/// Sweep width of a ship's lookouts for a boat, nautical miles: between the values for boats of 5, 7 and 12 m at 5 and 10 miles of
+/// visibility (IAMSAR manual, volume II, appendix N).
+fn sweep_width_nm(length_m: f64, visibility_nm: f64) -> f64 {
+    const LENGTHS: [(f64, f64, f64); 3] = [(5.0, 1.1, 1.4), (7.0, 2.0, 2.9), (12.0, 2.8, 4.3)];
+    let length_m = length_m.clamp(5.0, 12.0);
+    let upper = LENGTHS.iter().position(|(l, ..)| length_m <= *l).unwrap_or(2).max(1);
+    let (a, b) = (LENGTHS[upper - 1], LENGTHS[upper]);
+    let share = (length_m - a.0) / (b.0 - a.0);
+    let (at_5, at_10) = (a.1 + share * (b.1 - a.1), a.2 + share * (b.2 - a.2));
+    // Below five miles the width shrinks with what can be seen.
+    let visibility_nm = visibility_nm.min(10.0);
+    if visibility_nm < 5.0 {
+        at_5 * visibility_nm / 5.0
+    } else {
+        at_5 + (visibility_nm / 5.0 - 1.0) * (at_10 - at_5)
+    }
+}
+
+/// Whether something that happens so often happened within `span_s`.
+pub(super) fn happens(random: &mut Pcg64, per_s: f64, span_s: f64) -> bool {
+    random.random::<f64>() < 1.0 - (-per_s * span_s).exp()
+}
+
+/// A normal deviate (Box and Muller 1958).
+pub(super) fn normal(random: &mut Pcg64) -> f64 {
+    let radius = (-2.0 * (1.0 - random.random::<f64>()).ln()).sqrt();
+    radius * (std::f64::consts::TAU * random.random::<f64>()).cos()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sweep_widths_are_those_of_the_table() {
+        for (length_m, visibility_nm, width_nm) in
+            [(5.0, 5.0, 1.1), (7.0, 10.0, 2.9), (12.0, 5.0, 2.8), (30.0, 20.0, 4.3), (7.0, 2.5, 1.0)]
+        {
+            assert!((sweep_width_nm(length_m, visibility_nm) - width_nm).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_boat_on_a_straight_track_is_found_as_the_inverse_cube_law_says() {
+        let eye = Eye { at: DVec3::ZERO, visibility_m: 10.0 * NM, weather: 1.0 };
+        for lateral_nm in [0.5, 1.0, 2.0] {
+            // The searcher passes at 10 knots; a step of a second.
+            let track = (-40_000..=40_000).map(|s| f64::from(s) * SEARCH_NM_S);
+            let exposure: f64 =
+                track.map(|along_nm| eye.found_per_s(NM * f64::hypot(along_nm, lateral_nm), 7.0)).sum();
+            let expected = 2.9 * 2.9 / (4.0 * std::f64::consts::PI * lateral_nm * lateral_nm);
+            assert!((exposure / expected - 1.0).abs() < 0.01, "{exposure} {expected}");
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! A scenario from beginning to end with a simulated gunner at the gun.
+
+use std::{collections::VecDeque, sync::Arc};
+
+use glam::{DVec2, DVec3};
+use rand_pcg::Pcg64;
+
+use super::{
+    eye::Eye,
+    hand::Hand,
+    head::{Head, KnownWeapon, Moment},
+    skill::Skill,
+};
+use crate::{
+    act::TraineeAct,
+    event::TriggerEdge,
+    model::{Model, ModelId},
+    time::Time,
+    world::{
+        BoreAim, World,
+        exercise::{ExerciseEvent, ExerciseFact, group_of},
+        scenario::Scenario,
+        score::{ScoreFold, ShotRecord},
+    },
+};
+
+/// Step of a gunner, seconds: people do nothing faster than 5 rad/s.
+const STEP_S: f64 = 1.0 / 30.0;
+/// How far back the gun's way is kept, seconds.
+const KEPT_S: f64 = 1.0;
+/// Significant wave height of the sea that [`Skill::sea_mrad`] is for, metres.
+const SEA_2_M: f64 = 0.3;
+/// Stream of the gunner's chance; boats and rounds have others.
+const STREAM: u128 = 0x9u128 << 96;
+/// Time that is played after the last hostile boat was stopped, seconds.
+const AFTER_S: f64 = 10.0;
+
+/// What a played scenario left.
+#[derive(Clone, Debug, Default)]
+pub struct Played {
+    /// Rounds, in the order in which they ended.
+    pub shots: Vec<ShotRecord>,
+    /// Events of the exercise.
+    pub events: Vec<ExerciseEvent>,
+    /// How long it was, seconds of the exercise.
+    pub seconds: f64,
+}
+
+impl Played {
+    /// All of it, to be scored.
+    pub fn fold(&self) -> ScoreFold {
+        let mut fold = ScoreFold::default();
+        self.events.iter().for_each(|event| fold.event(event));
+        self.shots.iter().for_each(|shot| fold.shot(shot));
+        fold
+    }
+}
+
+/// The gun's way over the last second.
+struct BoreTrack {
+    kept: VecDeque<(Time, DVec2)>,
+    muzzle: DVec3,
+}
+
+impl BoreTrack {
+    fn push(&mut self, time: Time, bore: DVec2) {
+        self.kept.push_back((time, bore));
+        while self.kept.front().is_some_and(|(first, _)| time.secs_since(*first) > KEPT_S) {
+            self.kept.pop_front();
+        }
+    }
+
+    /// Where the gun pointed, on a straight way from step to step.
+    fn at(&self, time: Time) -> BoreAim {
+        let after = self.kept.partition_point(|(at, _)| *at < time);
+        let angles = match (after.checked_sub(1).and_then(|i| self.kept.get(i)), self.kept.get(after)) {
+            (Some((from, a)), Some((to, b))) => {
+                *a + (*b - *a) * (time.secs_since(*from) / to.secs_since(*from).max(1e-9))
+            }
+            (Some((_, only)), None) | (None, Some((_, only))) => *only,
+            (None, None) => DVec2::ZERO,
+        };
+        let (flat, up) = (angles.y.cos(), angles.y.sin());
+        let bore = DVec3::new(angles.x.sin() * flat, angles.x.cos() * flat, up);
+        BoreAim { muzzle: self.muzzle, bore, pose_age_ns: 0, unscored: None }
+    }
+}
+
+/// Plays a scenario for `limit_s` seconds at most, or until some seconds after all hostile boats are stopped or gone. All chance follows from
+/// the scenario's seed. `boat_models` names the model of each boat.
+pub fn play(
+    scenario: &Scenario,
+    models: Arc<[Model]>,
+    boat_models: &[ModelId],
+    skill: &Skill,
+    limit_s: f64,
+) -> Played {
+    let begin = Time::from_ns(0);
+    let mut random = Pcg64::new(u128::from(scenario.seed), STREAM);
+    let mut world = World::new(scenario, models, boat_models);
+    let eye = Eye {
+        at: DVec3::new(0.0, 0.0, scenario.eye_height_m),
+        visibility_m: scenario.daylight.visibility_m,
+        weather: weather(scenario.water.force.get()),
+    };
+    let weapon = KnownWeapon {
+        projectile: scenario.weapon.projectile,
+        cycle_s: 60.0 / scenario.weapon.rounds_per_minute.max(1.0),
+        wind: scenario.wind,
+    };
+    let mut head = Head::new(*skill, weapon, scenario.boats.len(), &mut random);
+    let names: Vec<&str> = scenario.boats.iter().map(|boat| group_of(&boat.name)).collect();
+    let groups: Vec<usize> =
+        names.iter().map(|name| names.iter().position(|n| n == name).unwrap_or(0)).collect();
+    let mut hand = Hand::at(0.0, 0.0);
+    let wander = wander(scenario, skill);
+    let mut track = BoreTrack { kept: VecDeque::new(), muzzle: eye.at };
+    let mut played = Played::default();
+    let (mut pressed, mut wanted, mut over_since) = (false, None, None);
+    let mut step = 0_u32;
+    loop {
+        let time = begin.plus_secs(f64::from(step) * STEP_S);
+        track.push(time, hand.bore());
+        world.advance(begin, time, time, |at| track.at(at), &mut played.shots);
+        played.events.extend_from_slice(world.events());
+        let Some(running) = world.running() else { break };
+        for event in world.events() {
+            if let ExerciseFact::Missed { boat, why, .. } = &event.fact
+                && let Some(boat) = (0..running.fleet.len()).find(|b| running.fleet.name(*b) == boat)
+            {
+                head.saw_miss(boat, why.error_mrad);
+            }
+        }
+        let sighted = eye.sees(running);
+        let time_s = f64::from(step) * STEP_S;
+        let off = wanted.map_or(f64::INFINITY, |wanted| hand.off(wanted));
+        let moment = Moment {
+            time_s,
+            span_s: STEP_S,
+            sighted: &sighted,
+            rules: world.watch().rules(),
+            self_defence_m: scenario.exercise.self_defence_m,
+            weapon: world.weapon_state(),
+            eye: eye.at,
+            off,
+            groups: &groups,
+        };
+        let decision = head.decide(&moment, &mut random);
+        for act in decision.acts {
+            world.act(TraineeAct { time, act });
+        }
+        if decision.trigger != pressed {
+            pressed = decision.trigger;
+            world.trigger(TriggerEdge { time, pressed });
+        }
+        wanted = decision.wanted.map(|(at, _)| at);
+        if let Some(to) = decision.wanted {
+            hand.follow(skill, to, wander, STEP_S, &mut random);
+        }
+        if world.watch().is_decided() {
+            over_since.get_or_insert(time_s);
+        } else {
+            over_since = None;
+        }
+        played.seconds = time_s;
+        if time_s >= limit_s || over_since.is_some_and(|since| time_s - since > AFTER_S) {
+            break;
+        }
+        step += 1;
+    }
+    world.finish(&mut played.shots);
+    played.events.extend_from_slice(world.events());
+    played
+}
+
+/// How far the aim wanders on this sea, one standard deviation, radians.
+fn wander(scenario: &Scenario, skill: &Skill) -> f64 {
+    /// Beyond that sea nobody aims any worse.
+    const MOST: f64 = 2.0;
+    let height_m = scenario.waves.spectrum.significant_height_m();
+    (skill.aim_mrad + skill.sea_mrad * (height_m / SEA_2_M).min(MOST)) * 1e-3
+}
+
+/// Factor of sweep widths for small boats by wind force: half above 15 knots, a quarter above 25.
+const fn weather(force: u8) -> f64 {
+    match force {
+        0..=4 => 1.0,
+        5..=6 => 0.5,
+        _ => 0.25,
+    }
+}
+
+#[cfg(test)]
+#[path = "play_tests.rs"]
+mod tests;

@@ -1,0 +1,114 @@
+//! The scenario's weapon: a built-in kind, and what the scenario has otherwise.
+
+use serde::Deserialize;
+
+use super::spec::WeaponSpec;
+use crate::{
+    text::toml::{OptionalKey, Spanned, TomlError, TomlSection, TomlText, number, one_of, plain_text, whole},
+    world::gunnery::Projectile,
+};
+
+/// The built-in weapons, for whom the sources stand beside.
+pub const BUILT_IN: &str = include_str!("../../../weapons/built-in.toml");
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct RawWeapon {
+    kind: OptionalKey<String>,
+    rounds_per_minute: OptionalKey<f64>,
+    belt: OptionalKey<i64>,
+    spare_belts: OptionalKey<i64>,
+    reload_s: OptionalKey<f64>,
+    stoppage_every: OptionalKey<f64>,
+    muzzle_velocity_m_s: OptionalKey<f64>,
+    ballistic_coefficient_g7_lb_in2: OptionalKey<f64>,
+    dispersion_mrad: OptionalKey<f64>,
+    tracer_every: OptionalKey<i64>,
+    tracer_burnout_m: OptionalKey<f64>,
+    splash_height_m: OptionalKey<f64>,
+    splash_life_s: OptionalKey<f64>,
+    ricochet_below_deg: OptionalKey<f64>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawWeapons {
+    weapon: Vec<Spanned<RawWeapon>>,
+}
+
+/// The built-in weapons by name.
+///
+/// # Errors
+/// Never for the text that is built in: a test reads it.
+pub fn built_in() -> Result<Vec<(String, WeaponSpec)>, TomlError> {
+    let text = TomlText::new(BUILT_IN, "the built-in weapons")?;
+    let (raw, _) = text.read::<RawWeapons>(&[])?;
+    let tables = text.sections("weapon", raw.weapon, 32)?;
+    tables
+        .iter()
+        .map(|(section, keys)| {
+            let name = section.required("kind", &keys.kind, plain_text())?;
+            Ok((name, WeaponSpec { kind: None, ..over(section, keys, &WeaponSpec::default())? }))
+        })
+        .collect()
+}
+
+pub(super) fn weapon(section: &TomlSection<'_>, keys: &RawWeapon) -> Result<WeaponSpec, TomlError> {
+    let Some(kind) = &keys.kind else { return over(section, keys, &WeaponSpec::default()) };
+    let known = built_in()?;
+    let names: Vec<(&str, usize)> =
+        known.iter().enumerate().map(|(i, (name, _))| (name.as_str(), i)).collect();
+    let (name, base) = &known[section.text.needed(kind, one_of(&names))?];
+    Ok(WeaponSpec { kind: Some(name.clone()), ..over(section, keys, base)? })
+}
+
+/// A weapon that is as `base` but for the keys that are given.
+fn over(section: &TomlSection<'_>, keys: &RawWeapon, base: &WeaponSpec) -> Result<WeaponSpec, TomlError> {
+    let text = section.text;
+    let velocity = text
+        .given(&keys.muzzle_velocity_m_s, number(50.0..=2000.0, "m/s"))?
+        .unwrap_or(base.projectile.muzzle_velocity_m_s());
+    let coefficient = text
+        .given(&keys.ballistic_coefficient_g7_lb_in2, number(0.05..=2.0, "lb/in^2"))?
+        .unwrap_or(base.projectile.bc_g7_lb_in2());
+    let projectile = Projectile::new(coefficient, velocity).ok_or_else(|| {
+        let problem =
+            "makes no round: muzzle_velocity_m_s and ballistic_coefficient_g7_lb_in2 do not go together";
+        section.error("muzzle_velocity_m_s", problem)
+    })?;
+    let tracer_every = text.given(&keys.tracer_every, whole(0..=1000))?.or(base.tracer_every);
+    let stoppage_every =
+        text.given(&keys.stoppage_every, number(0.0..=1e6, "rounds"))?.or(base.stoppage_every);
+    let given = |value: &OptionalKey<f64>, low: f64, high: f64, unit: &str, usual: f64| {
+        Ok::<f64, TomlError>(text.given(value, number(low..=high, unit))?.unwrap_or(usual))
+    };
+    Ok(WeaponSpec {
+        kind: None,
+        rounds_per_minute: given(&keys.rounds_per_minute, 1.0, 6000.0, "a minute", base.rounds_per_minute)?,
+        belt: text.given(&keys.belt, whole(0..=100_000))?.unwrap_or(base.belt),
+        spare_belts: text.given(&keys.spare_belts, whole(0..=1000))?.unwrap_or(base.spare_belts),
+        reload_s: given(&keys.reload_s, 0.0, 600.0, "s", base.reload_s)?,
+        stoppage_every: stoppage_every.filter(|every| *every > 0.0),
+        projectile,
+        dispersion_mrad: given(&keys.dispersion_mrad, 0.0, 50.0, "mrad", base.dispersion_mrad)?,
+        tracer_every: tracer_every.filter(|every| *every > 0),
+        tracer_burnout_m: given(&keys.tracer_burnout_m, 0.0, 20_000.0, "m", base.tracer_burnout_m)?,
+        splash_height_m: given(&keys.splash_height_m, 0.0, 60.0, "m", base.splash_height_m)?,
+        splash_life_s: given(&keys.splash_life_s, 0.1, 10.0, "s", base.splash_life_s)?,
+        ricochet_below_deg: given(&keys.ricochet_below_deg, 0.0, 45.0, "degrees", base.ricochet_below_deg)?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_built_in_weapons_can_be_read_and_differ() {
+        let weapons = built_in().expect("sound");
+        assert!(weapons.len() >= 4, "{weapons:?}");
+        for (i, (name, weapon)) in weapons.iter().enumerate() {
+            assert!(weapons[..i].iter().all(|(other, spec)| other != name && spec != weapon), "{name}");
+        }
+    }
+}

@@ -1,0 +1,522 @@
+//! The score of a run: a fold over its records, the same live, in review and ashore.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::{MissCause, MissExplanation, Outcome, ShotRecord};
+use crate::{
+    act::Act,
+    model::Zone,
+    side::Side,
+    time::Time,
+    world::exercise::{Engagement, ExerciseEvent, ExerciseFact},
+};
+
+/// Version of what the points mean. 1: as [`ScoreSheet::points`] says.
+pub const SCORE_VERSION: u32 = 1;
+/// Rounds this far apart belong to different bursts, seconds.
+const BURST_GAP_S: f64 = 2.0;
+
+/// All that one run left, to be scored.
+#[derive(Clone, Debug, Default)]
+pub struct ScoreFold {
+    begun: Option<Time>,
+    ended: Option<Time>,
+    goals: Option<GoalsAsked>,
+    rounds_left: Option<u32>,
+    rules: Vec<(Time, Engagement)>,
+    boats: BTreeMap<String, BoatFold>,
+    calls: Vec<CallAsked>,
+    shots: Vec<Fired>,
+    aims: Vec<AimedRound>,
+    misses: Vec<MissExplanation>,
+    close: BTreeMap<String, Time>,
+    under_threat_s: f64,
+    stoppages: u32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct GoalsAsked {
+    hostile: u32,
+    stop: u32,
+    keep_off_m: f64,
+    self_defence_m: f64,
+}
+
+#[derive(Clone, Debug, Default)]
+struct BoatFold {
+    side: Option<Side>,
+    in_view: Option<(Time, f64)>,
+    pointed: Option<Time>,
+    reported: Option<Time>,
+    warned: Option<Time>,
+    identified: Vec<(Time, Side)>,
+    over: Option<(Ending, Time, f64)>,
+    nearest_m: Option<f64>,
+}
+
+/// A round as it was fired.
+#[derive(Clone, Debug)]
+struct AimedRound {
+    fired: Time,
+    /// The boat that the gun pointed at.
+    boat: Option<String>,
+    range_m: f64,
+}
+
+/// How a boat's part in the exercise ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ending {
+    /// It was struck and has lost its way.
+    Stopped,
+    /// It went away or gave up.
+    TurnedAway,
+}
+
+#[derive(Clone, Debug)]
+struct CallAsked {
+    call: Act,
+    boat: String,
+    asked: Time,
+    before_m: Option<f64>,
+    within_s: Option<f64>,
+    made: Option<(Time, f64)>,
+}
+
+#[derive(Clone, Debug)]
+struct Fired {
+    fired: Time,
+    boat: Option<String>,
+    zone: Option<Zone>,
+    side: Option<Side>,
+    is_scored: bool,
+}
+
+/// The score of a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScoreSheet {
+    /// Version of the points' meaning.
+    pub version: u32,
+    /// Points, 0 to 100; `None` for runs of versions that kept no events.
+    ///
+    /// 50 for hostile boats that were stopped or turned away (half for one within the range to be kept), 15 for how little of 20 seconds
+    /// any was within that range, 15 for a fifth of the rounds having struck, 20 for calls (half for late ones); what a scenario does not ask
+    /// for is left out and the rest taken for the whole. 20 are taken off for each neutral boat that was struck and 10 for each burst that
+    /// broke the rules of engagement.
+    pub points: Option<f64>,
+    /// How long it took, seconds.
+    pub duration_s: f64,
+    /// Hostile boats.
+    pub hostile: u32,
+    /// Those of them that were stopped.
+    pub stopped: u32,
+    /// Those that turned away or gave up.
+    pub turned_away: u32,
+    /// Seconds during which a hostile boat was within the range to be kept.
+    pub under_threat_s: f64,
+    /// The nearest that a hostile boat came, metres.
+    pub nearest_m: Option<f64>,
+    /// Rounds.
+    pub rounds: RoundsSheet,
+    /// Calls that were asked for.
+    pub calls: CallsSheet,
+    /// Bursts that broke the rules of engagement.
+    pub breaches: Vec<Breach>,
+    /// Boats, by name.
+    pub boats: Vec<BoatSheet>,
+    /// Misses by their largest cause.
+    pub misses: Vec<CauseSheet>,
+}
+
+/// Rounds of a run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RoundsSheet {
+    /// Rounds fired.
+    pub fired: u32,
+    /// Rounds that struck a hostile boat.
+    pub hits: u32,
+    /// Rounds that struck a neutral boat.
+    pub neutral_hits: u32,
+    /// Rounds fired while it was not known where the barrel pointed.
+    pub not_scored: u32,
+    /// Bursts at a boat.
+    pub bursts: u32,
+    /// Bursts whose first round struck a hostile boat.
+    pub first_round_hits: u32,
+    /// Rounds for each hostile boat that was stopped; `None` where none was.
+    pub per_stop: Option<f64>,
+    /// Rounds that were left; `None` for runs that kept no events.
+    pub left: Option<u32>,
+    /// Stoppages of the virtual weapon.
+    pub stoppages: u32,
+    /// Hits on hostile boats by part.
+    pub by_part: BTreeMap<&'static str, u32>,
+}
+
+/// Calls of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct CallsSheet {
+    /// Calls that were asked for.
+    pub asked: u32,
+    /// Those made in time.
+    pub in_time: u32,
+    /// Those made late.
+    pub late: u32,
+    /// Those never made.
+    pub missing: u32,
+    /// Boats called hostile that are neutral, or the reverse.
+    pub wrong: u32,
+}
+
+/// A burst that broke the rules of engagement.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Breach {
+    /// Seconds since the exercise began.
+    pub at_s: f64,
+    /// The rules.
+    pub rules: Engagement,
+    /// The boat fired at.
+    pub boat: Option<String>,
+    /// Rounds.
+    pub rounds: u32,
+}
+
+/// One boat. Times are seconds from when it could be seen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BoatSheet {
+    /// Its name.
+    pub name: String,
+    /// Whom it belongs to.
+    pub side: Option<&'static str>,
+    /// Range at which it could be seen, metres.
+    pub in_view_m: Option<f64>,
+    /// When the gun pointed at it.
+    pub pointed_s: Option<f64>,
+    /// When it was reported.
+    pub reported_s: Option<f64>,
+    /// When it was identified.
+    pub identified_s: Option<f64>,
+    /// What it was called.
+    pub identified_as: Option<&'static str>,
+    /// When it was warned.
+    pub warned_s: Option<f64>,
+    /// Rounds that struck it.
+    pub hits: u32,
+    /// How it ended.
+    pub ending: Option<Ending>,
+    /// Where that was, metres.
+    pub ended_m: Option<f64>,
+    /// The nearest that it came, metres.
+    pub nearest_m: Option<f64>,
+}
+
+/// Misses with one cause.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CauseSheet {
+    /// The cause.
+    pub cause: &'static str,
+    /// Misses of which it is the largest part.
+    pub rounds: u32,
+    /// The mean of that part in these, to the right and over, mrad.
+    pub mean_mrad: [f64; 2],
+}
+
+impl ScoreFold {
+    /// Takes in an event.
+    pub fn event(&mut self, event: &ExerciseEvent) {
+        let time = event.time;
+        match &event.fact {
+            ExerciseFact::Began { hostile, stop, keep_off_m, self_defence_m, .. } => {
+                self.begun = Some(time);
+                let (keep_off_m, self_defence_m) = (*keep_off_m, *self_defence_m);
+                self.goals = Some(GoalsAsked { hostile: *hostile, stop: *stop, keep_off_m, self_defence_m });
+            }
+            ExerciseFact::Rules { rules } => self.rules.push((time, *rules)),
+            ExerciseFact::CallAsked { call, boat, before_m, within_s } => self.calls.push(CallAsked {
+                call: *call,
+                boat: boat.clone(),
+                asked: time,
+                before_m: *before_m,
+                within_s: *within_s,
+                made: None,
+            }),
+            ExerciseFact::InView { boat, side, range_m } => {
+                let boat = self.boat(boat);
+                boat.side = Some(*side);
+                boat.in_view.get_or_insert((time, *range_m));
+            }
+            ExerciseFact::Pointed { boat, .. } => drop(self.boat(boat).pointed.get_or_insert(time)),
+            ExerciseFact::Did { act, boat, range_m } => self.did(time, *act, boat.as_deref(), *range_m),
+            ExerciseFact::Fired { boat, range_m, .. } => {
+                self.aims.push(AimedRound {
+                    fired: time,
+                    boat: boat.clone(),
+                    range_m: range_m.unwrap_or(f64::INFINITY),
+                });
+            }
+            ExerciseFact::CameClose { boat } => drop(self.close.insert(boat.clone(), time)),
+            ExerciseFact::NoLongerClose { boat } => self.no_longer_close(boat, time),
+            ExerciseFact::Stopped { boat, range_m } => {
+                self.boat(boat).over = Some((Ending::Stopped, time, *range_m));
+            }
+            ExerciseFact::TurnedAway { boat, range_m } => {
+                self.boat(boat).over = Some((Ending::TurnedAway, time, *range_m));
+            }
+            ExerciseFact::CameBack { boat } => self.boat(boat).over = None,
+            ExerciseFact::Stoppage => self.stoppages += 1,
+            ExerciseFact::Message { .. } => {}
+            ExerciseFact::Missed { why, .. } => self.misses.push(*why),
+            ExerciseFact::Nearest { boat, side, range_m } => {
+                let boat = self.boat(boat);
+                (boat.side, boat.nearest_m) = (Some(*side), Some(*range_m));
+            }
+            ExerciseFact::Ended { rounds_left } => {
+                self.ended = Some(time);
+                self.rounds_left = Some(*rounds_left);
+                let close: Vec<String> = self.close.keys().cloned().collect();
+                close.iter().for_each(|boat| self.no_longer_close(boat, time));
+            }
+        }
+    }
+
+    /// Takes in a round.
+    pub fn shot(&mut self, shot: &ShotRecord) {
+        let fired = shot.fired;
+        let (boat, zone, side, is_scored) = match &shot.outcome {
+            Outcome::Hit { boat, zone, side, .. } => {
+                (Some(boat.clone()), Some(*zone), Some(side.unwrap_or(Side::Hostile)), true)
+            }
+            Outcome::Miss { boat, .. } => (boat.clone(), None, None, true),
+            Outcome::NotScored { .. } => (None, None, None, false),
+        };
+        self.shots.push(Fired { fired, boat, zone, side, is_scored });
+    }
+
+    fn boat(&mut self, name: &str) -> &mut BoatFold {
+        self.boats.entry(name.to_owned()).or_default()
+    }
+
+    /// Time under threat is that of one boat at a time: two that are close at once count once.
+    fn no_longer_close(&mut self, boat: &str, time: Time) {
+        let Some(since) = self.close.remove(boat) else { return };
+        // The others go on from here.
+        let others = self.close.values_mut();
+        let mut first = since;
+        for other in others {
+            first = first.min(*other);
+            *other = time.max(*other);
+        }
+        self.under_threat_s += time.secs_since(first).max(0.0);
+    }
+
+    fn did(&mut self, time: Time, act: Act, boat: Option<&str>, range_m: Option<f64>) {
+        let Some(name) = boat else { return };
+        let calls = self.calls.iter_mut().filter(|call| call.call == act && call.boat == name);
+        for call in calls.filter(|call| call.made.is_none()) {
+            call.made = Some((time, range_m.unwrap_or(f64::INFINITY)));
+        }
+        let boat = self.boat(name);
+        match act {
+            Act::Report => drop(boat.reported.get_or_insert(time)),
+            Act::Warn => drop(boat.warned.get_or_insert(time)),
+            Act::Identify(side) => boat.identified.push((time, side)),
+            Act::Reload | Act::Clear | Act::Safe | Act::Ready => {}
+        }
+    }
+
+    /// The score of what was taken in so far.
+    pub fn sheet(&self) -> ScoreSheet {
+        let (rounds, struck_neutrals) = self.rounds();
+        let (calls, breaches) = (self.calls_sheet(), self.breaches());
+        let hostile_over = |ending: Ending| {
+            let is_so =
+                |b: &&BoatFold| b.side == Some(Side::Hostile) && b.over.is_some_and(|o| o.0 == ending);
+            self.boats.values().filter(is_so).count() as u32
+        };
+        let nearest = self.boats.values().filter(|b| b.side == Some(Side::Hostile));
+        let begun = self.begun.or_else(|| self.shots.first().map(|s| s.fired));
+        let last = self.ended.or_else(|| self.shots.last().map(|s| s.fired));
+        let points = self.goals.map(|goals| {
+            let faults = 20.0 * f64::from(struck_neutrals) + 10.0 * breaches.len() as f64;
+            (self.earned(&goals, &rounds, &calls) - faults).clamp(0.0, 100.0)
+        });
+        ScoreSheet {
+            version: SCORE_VERSION,
+            points,
+            duration_s: begun.zip(last).map_or(0.0, |(begun, last)| last.secs_since(begun)),
+            hostile: self.goals.map_or(0, |goals| goals.hostile),
+            stopped: hostile_over(Ending::Stopped),
+            turned_away: hostile_over(Ending::TurnedAway),
+            under_threat_s: self.under_threat_s,
+            nearest_m: nearest.filter_map(|b| b.nearest_m).reduce(f64::min),
+            rounds,
+            calls,
+            breaches,
+            boats: self.boats.iter().map(|(name, boat)| self.boat_sheet(name, boat)).collect(),
+            misses: self.causes(),
+        }
+    }
+
+    /// Points before faults are taken off.
+    fn earned(&self, goals: &GoalsAsked, rounds: &RoundsSheet, calls: &CallsSheet) -> f64 {
+        const THREAT_S: f64 = 20.0;
+        const HIT_SHARE: f64 = 0.2;
+        let mut parts: Vec<(f64, f64)> = Vec::new();
+        if goals.stop > 0 {
+            let over = self.boats.values().filter(|b| b.side == Some(Side::Hostile)).filter_map(|b| b.over);
+            let worth = over.map(|(_, _, range_m)| if range_m >= goals.keep_off_m { 1.0 } else { 0.5 });
+            let mut worth: Vec<f64> = worth.collect();
+            worth.sort_by(|a, b| b.total_cmp(a));
+            let met: f64 = worth.iter().take(goals.stop as usize).sum();
+            parts.push((50.0, met / f64::from(goals.stop)));
+            let share = f64::from(rounds.hits) / f64::from(rounds.fired.max(1));
+            parts.push((15.0, (share / HIT_SHARE).min(1.0)));
+        }
+        if goals.hostile > 0 {
+            parts.push((15.0, (1.0 - self.under_threat_s / THREAT_S).max(0.0)));
+        }
+        if calls.asked > 0 {
+            let made = f64::from(calls.in_time) + 0.5 * f64::from(calls.late) - f64::from(calls.wrong);
+            parts.push((20.0, (made / f64::from(calls.asked)).max(0.0)));
+        }
+        let whole: f64 = parts.iter().map(|(weight, _)| weight).sum();
+        if whole == 0.0 { 100.0 } else { 100.0 * parts.iter().map(|(w, met)| w * met).sum::<f64>() / whole }
+    }
+
+    /// Rounds, and how many neutral boats were struck.
+    fn rounds(&self) -> (RoundsSheet, u32) {
+        let mut sheet = RoundsSheet {
+            fired: self.shots.len() as u32,
+            left: self.rounds_left,
+            stoppages: self.stoppages,
+            ..RoundsSheet::default()
+        };
+        let mut neutrals: Vec<&str> = Vec::new();
+        let mut before: Option<(Time, Option<&str>)> = None;
+        for shot in self.by_time() {
+            sheet.not_scored += u32::from(!shot.is_scored);
+            let is_hit = shot.zone.is_some() && shot.side == Some(Side::Hostile);
+            if let (Some(zone), true) = (shot.zone, is_hit) {
+                sheet.hits += 1;
+                *sheet.by_part.entry(zone.name()).or_default() += 1;
+            }
+            let boat = shot.boat.as_deref();
+            if let (Some(Side::Neutral), Some(boat)) = (shot.side, boat) {
+                sheet.neutral_hits += 1;
+                if !neutrals.contains(&boat) {
+                    neutrals.push(boat);
+                }
+            }
+            let begins =
+                before.is_none_or(|(time, of)| shot.fired.secs_since(time) > BURST_GAP_S || of != boat);
+            sheet.bursts += u32::from(begins);
+            sheet.first_round_hits += u32::from(begins && is_hit);
+            before = Some((shot.fired, boat));
+        }
+        let is_stopped = |b: &&BoatFold| {
+            b.side == Some(Side::Hostile) && b.over.is_some_and(|over| over.0 == Ending::Stopped)
+        };
+        let stopped = self.boats.values().filter(is_stopped).count();
+        sheet.per_stop = (stopped > 0).then(|| f64::from(sheet.fired) / stopped as f64);
+        (sheet, neutrals.len() as u32)
+    }
+
+    /// Rounds in the order in which they were fired.
+    fn by_time(&self) -> Vec<&Fired> {
+        let mut shots: Vec<&Fired> = self.shots.iter().collect();
+        shots.sort_by_key(|shot| shot.fired);
+        shots
+    }
+
+    fn calls_sheet(&self) -> CallsSheet {
+        let mut sheet = CallsSheet { asked: self.calls.len() as u32, ..CallsSheet::default() };
+        for call in &self.calls {
+            match call.made {
+                None => sheet.missing += 1,
+                Some((time, range_m)) => {
+                    let in_time = call.before_m.is_none_or(|m| range_m >= m)
+                        && call.within_s.is_none_or(|s| time.secs_since(call.asked) <= s);
+                    if in_time { sheet.in_time += 1 } else { sheet.late += 1 }
+                }
+            }
+        }
+        let is_wrong = |b: &&BoatFold| {
+            let last = b.identified.last();
+            last.is_some_and(|(_, called)| b.side.is_some_and(|side| side != *called))
+        };
+        sheet.wrong = self.boats.values().filter(is_wrong).count() as u32;
+        sheet
+    }
+
+    fn breaches(&self) -> Vec<Breach> {
+        let mut breaches: Vec<Breach> = Vec::new();
+        let mut last = Time::MIN;
+        for aim in &self.aims {
+            let now = self.rules.iter().rev().find(|(since, _)| *since <= aim.fired);
+            let Some((_, rules)) = now.filter(|(_, rules)| self.breaks(aim, *rules)) else { continue };
+            let at_s = self.begun.map_or(0.0, |begun| aim.fired.secs_since(begun));
+            match breaches.last_mut() {
+                Some(b) if b.rules == *rules && aim.fired.secs_since(last) <= BURST_GAP_S => b.rounds += 1,
+                _ => breaches.push(Breach { at_s, rules: *rules, boat: aim.boat.clone(), rounds: 1 }),
+            }
+            last = aim.fired;
+        }
+        breaches
+    }
+
+    fn breaks(&self, aim: &AimedRound, rules: Engagement) -> bool {
+        let boat = aim.boat.as_ref().and_then(|name| self.boats.get(name));
+        let is_near = self.goals.is_some_and(|goals| aim.range_m <= goals.self_defence_m);
+        if is_near && boat.is_some_and(|b| b.side == Some(Side::Hostile)) {
+            return false;
+        }
+        let before = |time: Option<Time>| time.is_some_and(|time| time <= aim.fired);
+        match (rules, boat) {
+            (Engagement::Hold, _) => true,
+            (Engagement::Warn, Some(boat)) => !before(boat.warned),
+            (Engagement::Tight, Some(boat)) => {
+                let called = boat.identified.iter().rev().find(|(time, _)| *time <= aim.fired);
+                called.is_none_or(|(_, side)| *side != Side::Hostile)
+            }
+            // A shot across the bow is none at a boat.
+            (Engagement::Warn | Engagement::Tight, None) => false,
+            // A neutral that is struck is a fault of its own.
+            (Engagement::Free, _) => false,
+        }
+    }
+
+    fn boat_sheet(&self, name: &str, boat: &BoatFold) -> BoatSheet {
+        let since = |time: Option<Time>| Some(time?.secs_since(boat.in_view?.0));
+        let hits = self.shots.iter().filter(|s| s.zone.is_some() && s.boat.as_deref() == Some(name)).count();
+        BoatSheet {
+            name: name.to_owned(),
+            side: boat.side.map(Side::name),
+            in_view_m: boat.in_view.map(|(_, range_m)| range_m),
+            pointed_s: since(boat.pointed),
+            reported_s: since(boat.reported),
+            identified_s: since(boat.identified.last().map(|(time, _)| *time)),
+            identified_as: boat.identified.last().map(|(_, side)| side.name()),
+            warned_s: since(boat.warned),
+            hits: hits as u32,
+            ending: boat.over.map(|over| over.0),
+            ended_m: boat.over.map(|over| over.2),
+            nearest_m: boat.nearest_m,
+        }
+    }
+
+    fn causes(&self) -> Vec<CauseSheet> {
+        let of = |cause: MissCause| {
+            let misses = self.misses.iter().filter(|miss| miss.largest() == cause);
+            let parts: Vec<[f64; 2]> = misses.map(|miss| miss.parts_mrad[cause as usize]).collect();
+            let mean = |axis: usize| parts.iter().map(|p| p[axis]).sum::<f64>() / parts.len().max(1) as f64;
+            CauseSheet { cause: cause.name(), rounds: parts.len() as u32, mean_mrad: [mean(0), mean(1)] }
+        };
+        MissCause::ALL.map(of).into_iter().filter(|cause| cause.rounds > 0).collect()
+    }
+}
+
+#[cfg(test)]
+#[path = "sheet_tests.rs"]
+mod tests;
