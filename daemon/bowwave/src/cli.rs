@@ -154,11 +154,11 @@ pub struct Simulate {
     pub seed: Option<u64>,
     /// Have a simulated gunner play the scenario instead, without pictures and recording, and print the score
     #[arg(long, value_name = "SKILL", value_parser = ["novice", "trained", "expert"],
-        conflicts_with_all = ["recording", "realtime", "window", "frames", "record", "video", "sheet", "stills", "fault", "fault_every"])]
+        conflicts_with_all = ["recording", "out", "realtime", "window", "frames", "record", "video", "sheet", "stills", "fault", "fault_every"])]
     pub gunner: Option<String>,
     /// Play it so often, each time with the next seed, and print the spread of the scores
-    #[arg(long, value_name = "N", default_value_t = 1, requires = "gunner", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
-    pub runs: u64,
+    #[arg(long, value_name = "N", requires = "gunner", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    pub runs: Option<u64>,
     /// Folder for summary.json, hits.sqlite and what else is asked for
     #[arg(long, value_name = "DIR", default_value = "bowwave-out")]
     pub out: PathBuf,

@@ -1,6 +1,7 @@
 //! `bowwave replay`: does a recording give the records and scenes of the run that it was made in?
 
 use anyhow::Result;
+use bowwave_core::world::score::ScoreSheet;
 use bowwave_trainer::replay::{Replayed, replay};
 use serde::Serialize;
 
@@ -30,6 +31,8 @@ struct ReplaySummary {
     shots: u64,
     /// Rounds that struck.
     hits: u64,
+    /// The score, as `bowwave score` has it of the run's journal.
+    score: ScoreSheet,
 }
 
 /// Replays and tells. Exit code 0: the same; 1: not; 3: the recording does not tell, since not all that the session met is in it.
@@ -59,6 +62,7 @@ fn summary(result: &Replayed) -> ReplaySummary {
         scenes_digest: format!("{:016x}", result.digest.scenes.get()),
         shots: result.score.0,
         hits: result.score.1,
+        score: result.sheet.clone(),
     }
 }
 
@@ -69,6 +73,9 @@ fn words(result: &Replayed) -> String {
         }
         Some(from) => format!("records or scenes differ before {from}"),
     };
+    if let Some(points) = result.sheet.points {
+        text.push_str(&format!("; {points:.0} points"));
+    }
     if result.missing > 0 {
         text.push_str(&format!(
             "; {} inputs are missing, since the disk was too slow or an entry could not be written",

@@ -30,6 +30,8 @@ struct ExplainedRound {
     error_m: [f64; 2],
     error_mrad: [f64; 2],
     largest_cause: &'static str,
+    /// It passed the boat by no more than 50 m.
+    was_aimed: bool,
     in_words: String,
 }
 
@@ -60,6 +62,7 @@ pub fn run(arguments: &ScoreArgs) -> Result<()> {
     if unknown > 0 {
         log::warn!("{unknown} events of the run are of a newer version and do not count; score it with that");
     }
+    explained.sort_by_key(|round: &ExplainedRound| round.shot);
     let scored = Scored { sheet: fold.sheet(), explained };
     if arguments.json {
         return stdout::print_json(&scored);
@@ -75,7 +78,13 @@ fn explained_round(event: &ExerciseEvent) -> Option<ExplainedRound> {
         error_m: why.error_m(),
         error_mrad: why.error_mrad,
         largest_cause: why.largest().name(),
-        in_words: why.to_string(),
+        was_aimed: why.was_aimed(),
+        in_words: if why.was_aimed() {
+            why.to_string()
+        } else {
+            let [right, over] = why.error_m();
+            format!("{:.0} m off at {:.0} m; fired at no boat", right.hypot(over), why.range_m)
+        },
     })
 }
 
@@ -88,6 +97,11 @@ pub fn text(sheet: &ScoreSheet) -> String {
     let nearest = sheet.nearest_m.map_or_else(String::new, |m| format!("; the nearest came to {m:.0} m"));
     let mut text = format!("score     {points}, {:.0} s\n", sheet.duration_s);
     if sheet.points.is_some() {
+        let items: Vec<String> =
+            sheet.items.iter().map(|i| format!("{} {:.0} of {:.0}", i.item, i.points, i.of)).collect();
+        if !items.is_empty() {
+            text += &format!("points    {}\n", items.join(", "));
+        }
         text += &format!(
             "threats   {} of {} stopped, {} turned away{nearest}; {:.1} s within the range to be kept\n",
             sheet.stopped, sheet.hostile, sheet.turned_away, sheet.under_threat_s
@@ -188,7 +202,8 @@ fn misses(scored: &Scored) -> String {
     }
     let causes: Vec<String> =
         scored.sheet.misses.iter().map(|cause| format!("{} {}", cause.cause, cause.rounds)).collect();
-    let mut text = format!("\nmisses by their largest cause: {}\n", causes.join(", "));
+    let causes = if causes.is_empty() { "none was fired at a boat".to_owned() } else { causes.join(", ") };
+    let mut text = format!("\nmisses by their largest cause: {causes}\n");
     for round in &scored.explained {
         text += &format!("round {:>4}  {}: {}\n", round.shot, one_line(&round.boat), round.in_words);
     }

@@ -10,7 +10,11 @@ use bowwave_core::{
     model::Model,
     session::{Digest, Session, SessionDigest, Setup},
     time::Time,
-    world::scenario::Scenario,
+    world::{
+        exercise::ExerciseEvent,
+        scenario::Scenario,
+        score::{ScoreFold, ScoreSheet, ShotRecord},
+    },
 };
 use bowwave_devices::camera::jpeg::Decoder;
 use bowwave_models::BoatModels;
@@ -41,6 +45,8 @@ pub struct Replayed {
     pub digest: SessionDigest,
     /// Rounds fired and rounds that struck.
     pub score: (u64, u64),
+    /// The score of the run.
+    pub sheet: ScoreSheet,
     /// Where the file was cut short.
     pub cut: bool,
 }
@@ -65,6 +71,7 @@ pub fn replay(path: &Path) -> Result<Replayed> {
     let setup = setup_of(reader.properties(), path)?;
     let mut session = Session::new(setup)?;
     let mut decoder = Decoder::for_recordings();
+    let mut fold = ScoreFold::default();
     let mut result = Replayed {
         ticks: 0,
         inputs: 0,
@@ -73,6 +80,7 @@ pub fn replay(path: &Path) -> Result<Replayed> {
         differs_from: None,
         digest: SessionDigest::default(),
         score: (0, 0),
+        sheet: ScoreFold::default().sheet(),
         cut: false,
     };
     for entry in reader.entries_as_written()? {
@@ -100,16 +108,25 @@ pub fn replay(path: &Path) -> Result<Replayed> {
                 if (digest.records.get(), digest.scenes.get()) != (entry.records, entry.scenes) {
                     result.differs_from.get_or_insert(entry.tick.time);
                 }
-                session.input(&Input::Tick(entry.tick));
+                if let Some(answer) = session.input(&Input::Tick(entry.tick)) {
+                    take_in(&mut fold, answer.records, answer.events);
+                }
                 result.ticks += 1;
             }
         }
         result.inputs += 1;
     }
-    session.finish();
+    let (records, events) = session.finish();
+    take_in(&mut fold, records, events);
+    result.sheet = fold.sheet();
     result.digest = session.digest();
     result.score = session.score();
     Ok(result)
+}
+
+fn take_in(fold: &mut ScoreFold, records: &[ShotRecord], events: &[ExerciseEvent]) {
+    events.iter().for_each(|event| fold.event(event));
+    records.iter().for_each(|record| fold.shot(record));
 }
 
 enum RecordedInput {

@@ -25,6 +25,8 @@ pub enum ScenarioCommand {
     Preview(ScenarioPreview),
     /// Write a scenario to start from
     New(ScenarioNew),
+    /// Print the JSON schema of scenarios, for editors that complete and check while one types
+    Schema,
 }
 
 /// Arguments of `scenario list`.

@@ -2,6 +2,7 @@
 
 mod chart;
 mod rehearsal;
+mod schema;
 
 use anyhow::Result;
 use bowwave_core::world::{
@@ -26,6 +27,10 @@ pub fn run(command: &ScenarioCommand) -> Result<Outcome> {
         ScenarioCommand::Check(arguments) => check(arguments),
         ScenarioCommand::Preview(arguments) => preview(arguments),
         ScenarioCommand::New(arguments) => new(arguments),
+        ScenarioCommand::Schema => {
+            stdout::print_json(&schema::scenario())?;
+            Ok(Outcome::Done)
+        }
     }
 }
 
@@ -70,8 +75,10 @@ fn list(arguments: &ScenarioList) -> Result<Outcome> {
         stdout::print_json(&listed)?;
         return Ok(Outcome::Done);
     }
+    let longest = |name: fn(&Listed) -> &str| listed.iter().map(|l| name(l).len()).max().unwrap_or(0);
+    let (name_width, title_width) = (longest(|l| &l.name), longest(|l| &l.title));
     let mut text = format!(
-        "{:<15} {:<16} {:>7} {:>7} {:>6} {:>8} {:>8}  {:<5} {:>6} {:>6}\n",
+        "{:<name_width$}  {:<title_width$} {:>7} {:>7} {:>6} {:>8} {:>8}  {:<5} {:>6} {:>6}\n",
         "name", "title", "hostile", "neutral", "crewed", "seconds", "Beaufort", "rules", "novice", "expert"
     );
     for l in &listed {
@@ -80,7 +87,7 @@ fn list(arguments: &ScenarioList) -> Result<Outcome> {
             l.par.map_or_else(Default::default, |par| par.map(|points| format!("{points:.0}")));
         let rules = l.rules.unwrap_or("-");
         text += format!(
-            "{:<15} {:<16} {:>7} {:>7} {:>6} {seconds:>8} {:>8}  {rules:<5} {novice:>6} {expert:>6}",
+            "{:<name_width$}  {:<title_width$} {:>7} {:>7} {:>6} {seconds:>8} {:>8}  {rules:<5} {novice:>6} {expert:>6}",
             l.name, l.title, l.hostile, l.neutral, l.crewed, l.beaufort
         )
         .trim_end();

@@ -101,11 +101,11 @@ pub fn run(arguments: &Simulate, gunner: &str) -> Result<()> {
         let played = play(&scenario, Arc::clone(&models), &of_boats, &skill, limit_s);
         (played.fold().sheet(), played.seconds)
     };
-    if arguments.runs == 1 {
+    let Some(runs) = arguments.runs else {
         let (sheet, _) = played(0);
         return if arguments.json { stdout::print_json(&sheet) } else { stdout::print(score::text(&sheet)) };
-    }
-    let sheets = side_by_side(arguments.runs, &played);
+    };
+    let sheets = side_by_side(runs, &played);
     let seconds: f64 = sheets.iter().map(|(_, seconds)| seconds).sum();
     let spread = |value: &dyn Fn(&ScoreSheet) -> Option<f64>| {
         Spread::of(sheets.iter().filter_map(|(sheet, _)| value(sheet)))

@@ -60,7 +60,7 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     let run_s = frames as f64 / FRAMES_PER_S as f64;
     if let Some(lasts_s) = prepared.setup.scenario.duration_s.filter(|lasts_s| *lasts_s > run_s + 0.5) {
         log::warn!(
-            "the scenario lasts {lasts_s} s, and this run ends after {run_s:.1} s; --duration {lasts_s} plays all of it"
+            "the scenario lasts {lasts_s} s, and this run ends after {run_s:.1} s; --duration {lasts_s} in place of --frames plays all of it"
         );
     }
     let realtime = arguments.realtime || prepared.window;

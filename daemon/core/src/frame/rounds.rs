@@ -7,7 +7,7 @@ use crate::{
     time::Time,
     world::{
         RunningWorld,
-        rounds::{Impact, SPLASH_S},
+        rounds::{Impact, ImpactKind},
     },
 };
 
@@ -18,7 +18,7 @@ pub const ROUNDS_SEEN_MAX: usize = 64;
 const STREAK_S: f64 = 1.0 / 60.0;
 /// Linear radiance of a tracer.
 const TRACER_RADIANCE: Vec3 = Vec3::new(8.0, 2.4, 0.7);
-/// Height of a splash at its highest, metres.
+/// Height of a splash whose column is 36 cm wide as it rises, metres; others are as wide in proportion.
 const SPLASH_HEIGHT_M: f64 = 1.8;
 /// How long sparks can be seen, seconds.
 const STRIKE_S: f64 = 0.35;
@@ -46,29 +46,32 @@ pub(super) fn rounds_in_view(
 }
 
 fn impact_view(impact: &Impact) -> Option<RoundView> {
-    let &Impact { at, on_boat, age_s } = impact;
-    if on_boat {
-        let left = 1.0 - age_s / STRIKE_S;
-        return (left > 0.0).then_some(RoundView::Strike {
-            at,
-            radius_m: (0.15 + 0.5 * (1.0 - left)) as f32,
-            opacity: left as f32,
-        });
+    let &Impact { at, kind, age_s } = impact;
+    match kind {
+        ImpactKind::Strike => {
+            let left = 1.0 - age_s / STRIKE_S;
+            (left > 0.0).then_some(RoundView::Strike {
+                at,
+                radius_m: (0.15 + 0.5 * (1.0 - left)) as f32,
+                opacity: left as f32,
+            })
+        }
+        ImpactKind::Splash { height_m, life_s } => {
+            (age_s < life_s).then(|| splash(at, height_m, age_s / life_s))
+        }
     }
-    (age_s < SPLASH_S).then(|| splash(at, age_s))
 }
 
-/// A column of water thrown up and falling back.
-fn splash(at: DVec3, age_s: f64) -> RoundView {
-    let share = age_s / SPLASH_S;
+/// A column of water thrown up and falling back; `share` of its life has passed.
+fn splash(at: DVec3, height_m: f64, share: f64) -> RoundView {
     // Thrown up at once, falling back under gravity: a parabola whose top is reached at a third of its life.
     let rise = (share * 3.0).min(1.0);
-    let height = SPLASH_HEIGHT_M
+    let height = height_m
         * if share < 1.0 / 3.0 { rise * (2.0 - rise) } else { 1.0 - ((share - 1.0 / 3.0) * 1.5).powi(2) };
     RoundView::Splash {
         at,
         height_m: height.max(0.05) as f32,
-        radius_m: (0.18 + 0.5 * share) as f32,
+        radius_m: ((0.18 + 0.5 * share) * height_m / SPLASH_HEIGHT_M) as f32,
         opacity: (1.0 - share * share) as f32,
     }
 }

@@ -66,6 +66,8 @@ pub(super) struct Moment<'a> {
     pub span_s: f64,
     pub sighted: &'a [Sighted],
     pub rules: Option<Engagement>,
+    /// Hostile boats are to be warned, by rule or by call.
+    pub warns: bool,
     pub self_defence_m: f64,
     pub weapon: WeaponState,
     /// The muzzle, world, metres.
@@ -224,7 +226,7 @@ impl Head {
         let is_to_be_warned = |b: &Sighted| {
             let known = &self.known[b.boat];
             let comes = range_m(b) < WARNS_WITHIN_M && known.called == Some(Side::Hostile);
-            at.rules == Some(Engagement::Warn) && comes && known.warned_s.is_none()
+            at.warns && comes && known.warned_s.is_none()
         };
         if let Some(boat) = nearest(&is_to_be_warned) {
             return Task::Say(boat, Act::Warn);

@@ -12,13 +12,13 @@ use super::{
     skill::Skill,
 };
 use crate::{
-    act::TraineeAct,
+    act::{Act, TraineeAct},
     event::TriggerEdge,
     model::{Model, ModelId},
     time::Time,
     world::{
         BoreAim, World,
-        exercise::{ExerciseEvent, ExerciseFact, group_of},
+        exercise::{Engagement, ExerciseEvent, ExerciseFact, group_of},
         scenario::Scenario,
         score::{ScoreFold, ShotRecord},
     },
@@ -112,6 +112,7 @@ pub fn play(
     let names: Vec<&str> = scenario.boats.iter().map(|boat| group_of(&boat.name)).collect();
     let groups: Vec<usize> =
         names.iter().map(|name| names.iter().position(|n| n == name).unwrap_or(0)).collect();
+    let asked_to_warn = scenario.exercise.calls.iter().any(|call| call.call == Act::Warn);
     let mut hand = Hand::at(0.0, 0.0);
     let wander = wander(scenario, skill);
     let mut track = BoreTrack { kept: VecDeque::new(), muzzle: eye.at };
@@ -139,6 +140,7 @@ pub fn play(
             span_s: STEP_S,
             sighted: &sighted,
             rules: world.watch().rules(),
+            warns: asked_to_warn || world.watch().rules() == Some(Engagement::Warn),
             self_defence_m: scenario.exercise.self_defence_m,
             weapon: world.weapon_state(),
             eye: eye.at,

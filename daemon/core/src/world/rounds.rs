@@ -3,10 +3,11 @@
 use glam::DVec3;
 
 use crate::{
+    chance::drawn,
     time::Time,
     world::{
         fleet::Fleet,
-        gunnery::{Atmosphere, Flight, dispersed},
+        gunnery::{Atmosphere, Flight, Projectile, dispersed},
         scenario::WeaponSpec,
         score::{
             Approach, BoreSample, End, MissExplanation, MissedRound, Moving, Outcome, Round, ShotRecord,
@@ -15,12 +16,16 @@ use crate::{
     },
 };
 
+/// Draws of bounces are numbered from here.
+const BOUNCE: u64 = 1 << 32;
+/// Height of the splash of a round that bounces, as a share of one that enters.
+const GRAZED: f64 = 0.6;
 /// A stretch of time over which a boat's motion counts as straight, seconds.
 const SPAN_S: f64 = 1.0 / 30.0;
 /// A tracer lights up this far from the muzzle, metres.
 const TRACER_LIT_M: f64 = 25.0;
-/// How long a splash stands, seconds. Impacts are kept that long.
-pub const SPLASH_S: f64 = 1.6;
+/// Strikes are kept so long, seconds, and splashes as long as they stand.
+const STRIKE_KEPT_S: f64 = 1.6;
 
 /// The ammunition, its dispersion and the wind.
 #[derive(Clone, Debug)]
@@ -64,6 +69,7 @@ struct InFlight {
     before: Vec<BoreSample>,
     round: Round,
     tracer: bool,
+    bounces: u32,
 }
 
 /// A round that missed a boat, and why.
@@ -80,6 +86,48 @@ pub struct ExplainedMiss {
 }
 
 impl InFlight {
+    /// The round as it goes on where it meets the water so flatly that it bounces.
+    ///
+    /// It keeps .9 to .5 of its speed, less the steeper it came, and leaves at its angle to half as much more (Haag, Shooting Incident
+    /// Reconstruction, on water); tumbling, with twice the drag, a little aside. Below the critical angle it always does: that is what the
+    /// angle means in the sources.
+    fn ricochet(&self, ammunition: &Ammunition, sea: &WaveField, at: DVec3, time_s: f64) -> Option<Round> {
+        const BOUNCES_MAX: u32 = 5;
+        const SLOWEST_M_S: f64 = 60.0;
+        let critical = ammunition.weapon.ricochet_below_deg.to_radians();
+        if critical <= 0.0 || self.bounces >= BOUNCES_MAX {
+            return None;
+        }
+        let velocity = self.round.state_at(time_s).velocity;
+        let (speed, slope) = (velocity.length(), sea.slope(at.truncate(), time_s));
+        let up = DVec3::new(-slope.x, -slope.y, 1.0).normalize();
+        let angle = (-velocity.dot(up) / speed.max(1e-9)).asin();
+        if !(0.0..critical).contains(&angle) {
+            return None;
+        }
+        let chance = |what: u64| {
+            drawn(ammunition.seed, [self.launch.shot, BOUNCE | u64::from(self.bounces) << 8 | what])
+        };
+        let along = (velocity + up * speed * angle.sin()).try_normalize()?;
+        let aside = 0.1 * (chance(0) - 0.5);
+        let leaves = angle.max(0.01) * (1.0 + 0.5 * chance(1));
+        let across = along.cross(up);
+        let direction = (along + across * aside) * leaves.cos() + up * leaves.sin();
+        let kept = speed * (0.9 - 0.4 * angle / critical);
+        let coefficient = 0.5 * ammunition.weapon.projectile.bc_g7_lb_in2();
+        let projectile = Projectile::new(coefficient, kept).filter(|_| kept > SLOWEST_M_S)?;
+        // A little over the water, which it would meet again at once.
+        let flight = Flight::new(projectile, &Atmosphere::ICAO, at + up * 0.01, direction, ammunition.wind)?;
+        Some(self.round.bounced(flight, time_s))
+    }
+
+    /// Height of the splash that the round throws up: the steeper it comes, the higher.
+    fn splash_m(&self, ammunition: &Ammunition, time_s: f64) -> f64 {
+        let velocity = self.round.state_at(time_s).velocity;
+        let steep = (-velocity.z / velocity.length().max(1e-9)).max(0.0);
+        ammunition.weapon.splash_height_m * (0.85 + 0.5 * steep)
+    }
+
     /// Why the round missed the boat that it came closest to.
     fn explain(
         &self,
@@ -108,6 +156,7 @@ impl InFlight {
 enum ImpactMark {
     Splash {
         at: DVec3,
+        height_m: f64,
     },
     /// In the boat's own space: it moves with the boat.
     Strike {
@@ -154,7 +203,7 @@ impl Rounds {
             Some(flight) => {
                 let tracer = a.weapon.is_tracer(launch.shot);
                 let round = Round::new(launch.shot, launch.fired.secs_since(start), flight);
-                self.in_flight.push(InFlight { launch, flown, before, round, tracer });
+                self.in_flight.push(InFlight { launch, flown, before, round, tracer, bounces: 0 });
             }
             None => records.push(launch.record(Outcome::Miss {
                 boat: None,
@@ -176,7 +225,11 @@ impl Rounds {
             }
             self.advanced_to = to;
         }
-        self.marks.retain(|(since, _)| until.secs_since(*since) < SPLASH_S);
+        let life_s = self.ammunition.weapon.splash_life_s;
+        self.marks.retain(|(since, mark)| {
+            let kept_s = if matches!(mark, ImpactMark::Splash { .. }) { life_s } else { STRIKE_KEPT_S };
+            until.secs_since(*since) < kept_s
+        });
     }
 
     fn advance_span(
@@ -197,21 +250,34 @@ impl Rounds {
                 })
                 .collect();
             let mut ended = Vec::new();
-            let Self { in_flight, sea, explained, ammunition, .. } = self;
+            let Self { in_flight, sea, explained, ammunition, marks, .. } = self;
             in_flight.retain_mut(|f| match f.round.advance(to_s, &boats, sea) {
+                Some(End::Splashed { at, time_s })
+                    if let Some(next) = f.ricochet(ammunition, sea, at, time_s) =>
+                {
+                    let height_m = GRAZED * f.splash_m(ammunition, time_s);
+                    marks.push((start.plus_secs(time_s), ImpactMark::Splash { at, height_m }));
+                    f.round = next;
+                    f.bounces += 1;
+                    true
+                }
                 Some(end) => {
                     let nearest = f.round.nearest();
                     if let (Some(nearest), false) = (nearest, matches!(end, End::Struck { .. })) {
                         explained.extend(f.explain(ammunition, nearest, start, fleet));
                     }
-                    ended.push((f.launch, nearest, end));
+                    let splash_m = match end {
+                        End::Splashed { time_s, .. } => f.splash_m(ammunition, time_s),
+                        _ => 0.0,
+                    };
+                    ended.push((f.launch, nearest, end, splash_m));
                     false
                 }
                 None => true,
             });
             ended
         };
-        for (launch, nearest, end) in ended {
+        for (launch, nearest, end, height_m) in ended {
             let time_of = |s: f64| start.plus_secs(s);
             let miss = |time: Time, at: DVec3| match nearest {
                 Some(n) => Outcome::Miss {
@@ -236,7 +302,7 @@ impl Rounds {
                     Outcome::Hit { boat: name, side, zone, time, range_m, point }
                 }
                 End::Splashed { at, time_s } => {
-                    self.marks.push((time_of(time_s), ImpactMark::Splash { at }));
+                    self.marks.push((time_of(time_s), ImpactMark::Splash { at, height_m }));
                     miss(time_of(time_s), at)
                 }
                 End::Spent { time_s } => miss(time_of(time_s), launch.muzzle),
@@ -256,10 +322,12 @@ impl Rounds {
     /// The tracers that glow at `time`, up to which rounds have been followed, each with its path over the last `exposure_s`.
     pub fn tracers(&self, time: Time, start: Time, exposure_s: f64) -> impl Iterator<Item = TracerPath> {
         let now_s = time.secs_since(start);
+        let burnout_m = self.ammunition.weapon.tracer_burnout_m;
         self.in_flight.iter().filter(|f| f.tracer).filter_map(move |f| {
             let at = |time_s: f64| f.round.state_at(time_s).position;
             let path = TracerPath { from: at(now_s - exposure_s), to: at(now_s) };
-            (path.to.distance(f.launch.muzzle) > TRACER_LIT_M).then_some(path)
+            let far_m = path.to.distance(f.launch.muzzle);
+            (TRACER_LIT_M..burnout_m).contains(&far_m).then_some(path)
         })
     }
 
@@ -267,13 +335,15 @@ impl Rounds {
     pub fn impacts(&self, time: Time, fleet: &Fleet) -> impl Iterator<Item = Impact> {
         self.marks.iter().filter_map(move |(since, mark)| {
             let age_s = time.secs_since(*since);
-            let (at, on_boat) = match *mark {
-                ImpactMark::Splash { at } => (at, false),
+            let (at, kind) = match *mark {
+                ImpactMark::Splash { at, height_m } => {
+                    (at, ImpactKind::Splash { height_m, life_s: self.ammunition.weapon.splash_life_s })
+                }
                 ImpactMark::Strike { boat, point } => {
-                    (fleet.floating(boat, time)?.pose.to_world(point), true)
+                    (fleet.floating(boat, time)?.pose.to_world(point), ImpactKind::Strike)
                 }
             };
-            (age_s >= 0.0).then_some(Impact { at, on_boat, age_s })
+            (age_s >= 0.0).then_some(Impact { at, kind, age_s })
         })
     }
 }
@@ -292,8 +362,26 @@ pub struct TracerPath {
 pub struct Impact {
     /// The place now, world, metres: on a boat it moves with the boat.
     pub at: DVec3,
-    /// Whether it struck a boat; else the sea.
-    pub on_boat: bool,
+    /// What it struck.
+    pub kind: ImpactKind,
     /// Seconds since then.
     pub age_s: f64,
 }
+
+/// What a round has struck.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ImpactKind {
+    /// A boat.
+    Strike,
+    /// The sea.
+    Splash {
+        /// Height of the splash at its highest, metres.
+        height_m: f64,
+        /// How long it stands, seconds.
+        life_s: f64,
+    },
+}
+
+#[cfg(test)]
+#[path = "rounds_tests.rs"]
+mod tests;

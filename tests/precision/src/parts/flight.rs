@@ -28,17 +28,20 @@ const REFERENCE: &str = include_str!("../../../../daemon/core/data/traj_g7_point
 const KG_M2_PER_LB_IN2: f64 = 703.069_579_639_159_3;
 
 /// Position and velocity.
-type Mass = [f64; 6];
+pub type Mass = [f64; 6];
 
 /// A round with drag in air that moves.
 #[derive(Clone, Copy)]
-struct FlownRound {
-    bc: f64,
-    wind: DVec3,
+pub struct FlownRound {
+    /// G7 ballistic coefficient, lb/in^2.
+    pub bc: f64,
+    /// Velocity of the air, m/s.
+    pub wind: DVec3,
 }
 
 impl FlownRound {
-    fn rate(&self, s: &Mass) -> Mass {
+    /// Change of position and velocity a second.
+    pub fn rate(&self, s: &Mass) -> Mass {
         let air = Atmosphere::ICAO.at(s[2]);
         let v = DVec3::new(s[3], s[4], s[5]);
         let through = v - self.wind;

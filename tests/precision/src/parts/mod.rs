@@ -14,8 +14,10 @@ mod fresnel;
 mod fusion;
 mod haze;
 mod heading;
+mod hits;
 mod horizon;
 mod lens;
+mod misses;
 mod motion;
 mod mount;
 mod orientation;
@@ -78,6 +80,8 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: mount::ABOUT, measure: mount::measure },
     NumericalPart { about: pacing::ABOUT, measure: pacing::measure },
     NumericalPart { about: flight::ABOUT, measure: flight::measure },
+    NumericalPart { about: hits::ABOUT, measure: hits::measure },
+    NumericalPart { about: misses::ABOUT, measure: misses::measure },
     NumericalPart { about: sea::ABOUT, measure: sea::measure },
     NumericalPart { about: wavefield::ABOUT, measure: wavefield::measure },
     NumericalPart { about: motion::ABOUT, measure: motion::measure },

@@ -12,6 +12,7 @@ use crate::{
     },
     world::exercise::{
         About, CallSpec, Engagement, ExerciseSpec, Goals, Happening, HappeningCause, HappeningEffect,
+        group_of,
     },
 };
 
@@ -186,8 +187,10 @@ const fn engagements() -> [(&'static str, Engagement); 4] {
 
 /// A side, a boat of the scenario or a group of boats.
 fn boats_of(boats: &[BoatSpec]) -> ValueRule<'_, String, About> {
-    let names: Vec<&str> = boats.iter().map(|boat| boat.name.as_str()).take(8).collect();
-    let more = if boats.len() > names.len() { ", ..." } else { "" };
+    let mut names: Vec<&str> = boats.iter().map(|boat| group_of(&boat.name)).collect();
+    names.dedup();
+    let more = if names.len() > 8 { ", ..." } else { "" };
+    names.truncate(8);
     let allowed = format!(
         "\"hostile\", \"neutral\", or the name of a boat or a group: {}{more}",
         if names.is_empty() { "there is none".to_owned() } else { names.join(", ") }

@@ -103,7 +103,7 @@ fn mistakes_are_named_where_they_stand() {
         ),
         (
             "[[call]]\nsay = \"warn\"\nabout = \"skif\"\nwithin_s = 3\n",
-            "x.toml:3:9: call[1].about: \"skif\" is not allowed; give \"hostile\", \"neutral\", or the name of a boat or a group: skiff-1, ",
+            "x.toml:3:9: call[1].about: \"skif\" is not allowed; give \"hostile\", \"neutral\", or the name of a boat or a group: skiff, dhow",
         ),
         (
             "[[call]]\nsay = \"warn\"\nabout = \"skiff\"\n",

@@ -96,7 +96,7 @@ impl Default for WeaponSpec {
             dispersion_mrad: 0.6,
             tracer_every: Some(5),
             tracer_burnout_m: 1800.0,
-            splash_height_m: 1.5,
+            splash_height_m: 1.8,
             splash_life_s: 1.6,
             ricochet_below_deg: 0.0,
         }

@@ -138,6 +138,13 @@ impl MissExplanation {
         MissCause::ALL.into_iter().reduce(larger).unwrap_or(MissCause::Dispersion)
     }
 
+    /// Whether the round passed so near that it was fired at the boat, and its miss says something of the shooter.
+    pub fn was_aimed(&self) -> bool {
+        const NEAR_M: f64 = 50.0;
+        let [right, over] = self.error_m();
+        right.hypot(over) <= NEAR_M
+    }
+
     /// By how much the round passed, to the right and over, metres at the target's distance.
     pub fn error_m(&self) -> [f64; 2] {
         self.error_mrad.map(|mrad| mrad * 1e-3 * self.range_m)
@@ -171,10 +178,14 @@ impl fmt::Display for MissExplanation {
             }
             MissCause::Elevation => {
                 let held = self.elevation_needed_mrad + self.parts_mrad[MissCause::Elevation as usize][1];
+                let side = |mrad: f64| if mrad >= 0.0 { "over" } else { "under" };
                 write!(
                     f,
-                    "elevation: {held:.1} mrad over the target, {:.1} would have hit",
-                    self.elevation_needed_mrad
+                    "elevation: {:.1} mrad {} the target, {:.1} {} it would have hit",
+                    held.abs(),
+                    side(held),
+                    self.elevation_needed_mrad.abs(),
+                    side(self.elevation_needed_mrad)
                 )
             }
             cause => {

@@ -15,7 +15,8 @@ pub use hit::{Moving, Strike, strike};
 pub use miss::{AIM_TREND_S, BoreSample, MissCause, MissExplanation, MissedRound};
 pub use round::{Approach, End, Round};
 pub use sheet::{
-    BoatSheet, Breach, CallsSheet, CauseSheet, Ending, RoundsSheet, SCORE_VERSION, ScoreFold, ScoreSheet,
+    BoatSheet, Breach, CallsSheet, CauseSheet, Ending, PointsItem, RoundsSheet, SCORE_VERSION, ScoreFold,
+    ScoreSheet,
 };
 
 pub use crate::fault::NotScored;

@@ -78,6 +78,12 @@ impl Round {
         Self { shot, fired_s, muzzle: flight.state().position, flight, nearest: None }
     }
 
+    /// The round goes on from the water at `at`, with another velocity: it has bounced. What it came closest to stays.
+    #[must_use]
+    pub fn bounced(&self, flight: Flight, time_s: f64) -> Self {
+        Self { shot: self.shot, fired_s: time_s, muzzle: self.muzzle, flight, nearest: self.nearest }
+    }
+
     /// The shot's number.
     pub const fn shot(&self) -> u64 {
         self.shot

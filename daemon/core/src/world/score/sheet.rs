@@ -106,6 +106,8 @@ pub struct ScoreSheet {
     /// for is left out and the rest taken for the whole. 20 are taken off for each neutral boat that was struck and 10 for each burst that
     /// broke the rules of engagement.
     pub points: Option<f64>,
+    /// What the points are made of, before faults are taken off: as parts of those that the scenario asks for.
+    pub items: Vec<PointsItem>,
     /// How long it took, seconds.
     pub duration_s: f64,
     /// Hostile boats.
@@ -126,8 +128,19 @@ pub struct ScoreSheet {
     pub breaches: Vec<Breach>,
     /// Boats, by name.
     pub boats: Vec<BoatSheet>,
-    /// Misses by their largest cause.
+    /// Misses by their largest cause; rounds that passed every boat by more than 50 m were fired at none.
     pub misses: Vec<CauseSheet>,
+}
+
+/// Points for one thing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PointsItem {
+    /// What they are for.
+    pub item: &'static str,
+    /// Most that it can give.
+    pub of: f64,
+    /// Points that it gave.
+    pub points: f64,
 }
 
 /// Rounds of a run.
@@ -267,7 +280,9 @@ impl ScoreFold {
             ExerciseFact::CameBack { boat } => self.boat(boat).over = None,
             ExerciseFact::Stoppage => self.stoppages += 1,
             ExerciseFact::Message { .. } => {}
-            ExerciseFact::Missed { why, .. } => self.misses.push(*why),
+            ExerciseFact::Missed { why, .. } => {
+                self.misses.extend(Some(*why).filter(MissExplanation::was_aimed))
+            }
             ExerciseFact::Nearest { boat, side, range_m } => {
                 let boat = self.boat(boat);
                 (boat.side, boat.nearest_m) = (Some(*side), Some(*range_m));
@@ -338,13 +353,16 @@ impl ScoreFold {
         let nearest = self.boats.values().filter(|b| b.side == Some(Side::Hostile));
         let begun = self.begun.or_else(|| self.shots.first().map(|s| s.fired));
         let last = self.ended.or_else(|| self.shots.last().map(|s| s.fired));
-        let points = self.goals.map(|goals| {
+        let items = self.goals.map_or_else(Vec::new, |goals| self.items(&goals, &rounds, &calls));
+        let points = self.goals.map(|_| {
             let faults = 20.0 * f64::from(struck_neutrals) + 10.0 * breaches.len() as f64;
-            (self.earned(&goals, &rounds, &calls) - faults).clamp(0.0, 100.0)
+            let earned = if items.is_empty() { 100.0 } else { items.iter().map(|item| item.points).sum() };
+            (earned - faults).clamp(0.0, 100.0)
         });
         ScoreSheet {
             version: SCORE_VERSION,
             points,
+            items,
             duration_s: begun.zip(last).map_or(0.0, |(begun, last)| last.secs_since(begun)),
             hostile: self.goals.map_or(0, |goals| goals.hostile),
             stopped: hostile_over(Ending::Stopped),
@@ -360,29 +378,34 @@ impl ScoreFold {
     }
 
     /// Points before faults are taken off.
-    fn earned(&self, goals: &GoalsAsked, rounds: &RoundsSheet, calls: &CallsSheet) -> f64 {
+    fn items(&self, goals: &GoalsAsked, rounds: &RoundsSheet, calls: &CallsSheet) -> Vec<PointsItem> {
         const THREAT_S: f64 = 20.0;
         const HIT_SHARE: f64 = 0.2;
-        let mut parts: Vec<(f64, f64)> = Vec::new();
+        let mut parts: Vec<(&'static str, f64, f64)> = Vec::new();
         if goals.stop > 0 {
             let over = self.boats.values().filter(|b| b.side == Some(Side::Hostile)).filter_map(|b| b.over);
             let worth = over.map(|(_, _, range_m)| if range_m >= goals.keep_off_m { 1.0 } else { 0.5 });
             let mut worth: Vec<f64> = worth.collect();
             worth.sort_by(|a, b| b.total_cmp(a));
-            let met: f64 = worth.iter().take(goals.stop as usize).sum();
-            parts.push((50.0, met / f64::from(goals.stop)));
+            // The sum of none is -0.
+            let met = worth.iter().take(goals.stop as usize).sum::<f64>() + 0.0;
+            parts.push(("threats", 50.0, met / f64::from(goals.stop)));
             let share = f64::from(rounds.hits) / f64::from(rounds.fired.max(1));
-            parts.push((15.0, (share / HIT_SHARE).min(1.0)));
+            parts.push(("gunnery", 15.0, (share / HIT_SHARE).min(1.0)));
         }
         if goals.hostile > 0 {
-            parts.push((15.0, (1.0 - self.under_threat_s / THREAT_S).max(0.0)));
+            parts.push(("range kept", 15.0, (1.0 - self.under_threat_s / THREAT_S).max(0.0)));
         }
         if calls.asked > 0 {
             let made = f64::from(calls.in_time) + 0.5 * f64::from(calls.late) - f64::from(calls.wrong);
-            parts.push((20.0, (made / f64::from(calls.asked)).max(0.0)));
+            parts.push(("calls", 20.0, (made / f64::from(calls.asked)).max(0.0)));
         }
-        let whole: f64 = parts.iter().map(|(weight, _)| weight).sum();
-        if whole == 0.0 { 100.0 } else { 100.0 * parts.iter().map(|(w, met)| w * met).sum::<f64>() / whole }
+        let whole: f64 = parts.iter().map(|(_, weight, _)| weight).sum();
+        let item = |(item, weight, met): (&'static str, f64, f64)| {
+            let of = 100.0 * weight / whole;
+            PointsItem { item, of, points: of * met }
+        };
+        parts.into_iter().map(item).collect()
     }
 
     /// Rounds, and how many neutral boats were struck.
