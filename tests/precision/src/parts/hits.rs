@@ -1,5 +1,7 @@
 //! Rounds against boats that move: hit or miss.
 
+use std::f64::consts::TAU;
+
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::{
     geometry::RigidPose,
@@ -84,7 +86,7 @@ impl Shot {
     fn of(number: u64) -> Option<Self> {
         let draw = |what: u64| even(number * 32 + what);
         let between = |what: u64, low: f64, high: f64| low + draw(what) * (high - low);
-        let (bearing, range) = (between(0, 0.0, 6.28), between(1, 40.0, 900.0));
+        let (bearing, range) = (between(0, 0.0, TAU), between(1, 40.0, 900.0));
         let wind = DVec3::new(between(2, -10.0, 10.0), between(3, -10.0, 10.0), 0.0);
         let (bc, speed_m_s) =
             [(0.337, 893.0), (0.2, 853.0), (0.089, 241.0), (0.4, 1100.0)][(draw(4) * 4.0) as usize % 4];
@@ -97,8 +99,8 @@ impl Shot {
             begin: DVec3::new(bearing.sin() * range, bearing.cos() * range, between(5, 60.0, 70.0)),
             velocity: DVec3::new(between(6, -18.0, 18.0), between(7, -18.0, 18.0), between(8, -2.0, 2.0)),
             acceleration: DVec3::new(between(9, -5.0, 5.0), between(10, -5.0, 5.0), between(11, -0.5, 0.5)),
-            heading: [between(12, 0.0, 6.28), between(13, -0.8, 0.8)],
-            roll: [between(14, 0.0, 0.4), between(15, 0.5, 3.0), between(16, 0.0, 6.28)],
+            heading: [between(12, 0.0, TAU), between(13, -0.8, 0.8)],
+            roll: [between(14, 0.0, 0.4), between(15, 0.5, 3.0), between(16, 0.0, TAU)],
         };
         let off = DVec3::new(between(17, -4.5, 4.5), between(18, -2.0, 2.0), between(19, -1.5, 1.5));
         let projectile = Projectile::new(bc, speed_m_s)?;

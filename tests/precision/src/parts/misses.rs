@@ -1,5 +1,7 @@
 //! Causes of misses: each injected alone must be the one that is named.
 
+use std::f64::consts::TAU;
+
 use anyhow::Result;
 use bowwave_core::world::{
     gunnery::{Projectile, aim_to_hit},
@@ -70,11 +72,11 @@ fn explained(
     let draw = |what: u64| even(number * 128 + what);
     let between = |what: u64, low: f64, high: f64| low + draw(what) * (high - low);
     let projectile = Projectile::new(0.337, 893.0)?;
-    let (bearing, range) = (between(0, 0.0, 6.28), between(1, 80.0, 900.0));
+    let (bearing, range) = (between(0, 0.0, TAU), between(1, 80.0, 900.0));
     let begin = DVec3::new(bearing.sin() * range, bearing.cos() * range, 0.7);
     let velocity = DVec3::new(between(2, -15.0, 15.0), between(3, -15.0, 15.0), 0.0);
     let target = |s: f64| begin + velocity * s;
-    let way = DVec2::from_angle(between(4, 0.0, 6.28));
+    let way = DVec2::from_angle(between(4, 0.0, TAU));
     let turned = |direction: DVec3, at: DVec3, off: DVec2| {
         let forward = (at - MUZZLE).normalize();
         let right = forward.cross(DVec3::Z).normalize();
@@ -83,7 +85,7 @@ fn explained(
     // A hand's tremor: sines between one and five a second.
     let tremor = |before_s: f64| {
         let wave = |i: u64| {
-            let phase = between(10 + i, 0.0, 6.28) + between(20 + i, 6.0, 30.0) * before_s;
+            let phase = between(10 + i, 0.0, TAU) + between(20 + i, 6.0, 30.0) * before_s;
             DVec2::new(phase.sin(), (1.3 * phase + 1.0).cos())
         };
         (0..4).map(wave).sum::<DVec2>() * (tremor_mrad / 2.0)

@@ -309,22 +309,27 @@ impl LoopDisk {
         let (image, mounted) = (base.path().join("image"), base.path().join("disk"));
         File::create(&image).unwrap().set_len(SIZE).unwrap();
         fs::create_dir(&mounted).unwrap();
-        command("mkfs.ext4", &["-q", "-F", "-m", "0"], &image);
+        let made = Command::new("mkfs.ext4").args(["-q", "-F", "-m", "0"]).arg(&image).status();
+        made.is_ok_and(|status| status.success()).then_some(())?;
         let output = Command::new("losetup").args(["--find", "--show"]).arg(&image).output().ok()?;
         let device = output.status.success().then(|| String::from_utf8(output.stdout).unwrap())?;
         let disk = Self { base, device: device.trim().to_owned(), mounted };
-        disk.attach();
-        Some(disk)
+        disk.attach().then_some(disk)
     }
 
-    fn attach(&self) {
-        command("mount", &["-o", "errors=remount-ro", &self.device], &self.mounted);
+    fn attach(&self) -> bool {
+        let mounting = Command::new("mount")
+            .args(["-o", "errors=remount-ro", &self.device])
+            .arg(&self.mounted)
+            .stderr(Stdio::null())
+            .status();
+        mounting.is_ok_and(|status| status.success())
     }
 
     /// What the next start meets.
     fn mount_again(&self) {
         assert!(self.unmount(), "{} stays busy", self.mounted.display());
-        self.attach();
+        assert!(self.attach(), "{} cannot be mounted again", self.mounted.display());
     }
 
     /// A program that is being started beside holds what is open here for a moment.
