@@ -6,8 +6,8 @@ mod scenario;
 
 use std::{ffi::OsString, path::PathBuf};
 
-use bowwave_core::time::secs_to_ns;
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use bowwave_core::{gunner::Skill, time::secs_to_ns};
+use clap::{Args, Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
 use clap_complete::Shell;
 use hw_sim::fault::{Fault, FaultKind};
 
@@ -153,7 +153,7 @@ pub struct Simulate {
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
     /// Have a simulated gunner play the scenario instead, without pictures and recording, and print the score
-    #[arg(long, value_name = "SKILL", value_parser = ["novice", "trained", "expert"],
+    #[arg(long, value_name = "SKILL", value_parser = PossibleValuesParser::new(Skill::NAMED.map(|(name, _)| name)),
         conflicts_with_all = ["recording", "out", "realtime", "window", "frames", "record", "video", "sheet", "stills", "fault", "fault_every"])]
     pub gunner: Option<String>,
     /// Play it so often, each time with the next seed, and print the spread of the scores

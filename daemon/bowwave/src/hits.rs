@@ -1,6 +1,9 @@
 //! `bowwave hits`: the rounds of a journal as a table, CSV or JSON.
 
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, Result, bail};
 use bowwave_core::{
@@ -37,16 +40,21 @@ const POSE_AGE: &str = "pose_age_ms";
 /// When runs began, by their numbers; older journals do not say.
 type Starts = BTreeMap<i64, Time>;
 
-/// Prints the rounds.
-pub fn run(arguments: &Hits) -> Result<()> {
-    let path =
-        if arguments.journal.is_dir() { arguments.journal.join(JOURNAL) } else { arguments.journal.clone() };
+/// The journal that a path names: itself, or the one in the folder that a run left.
+pub fn journal_at(named: &Path) -> Result<PathBuf> {
+    let path = if named.is_dir() { named.join(JOURNAL) } else { named.to_owned() };
     if !path.exists() {
         bail!(
             "no journal at {}; name the folder that `bowwave simulate --out` left, or the database",
             path.display()
         );
     }
+    Ok(path)
+}
+
+/// Prints the rounds.
+pub fn run(arguments: &Hits) -> Result<()> {
+    let path = journal_at(&arguments.journal)?;
     let runs = match arguments.run {
         Some(run) => RunSelection::Run(run),
         None if arguments.all_runs => RunSelection::All,

@@ -1,6 +1,6 @@
 //! `bowwave score`: what a run is worth, and why.
 
-use anyhow::{Result, bail};
+use anyhow::Result;
 use bowwave_core::{
     text::one_line,
     world::{
@@ -9,10 +9,9 @@ use bowwave_core::{
     },
 };
 use bowwave_record::journal::{RunSelection, ShotFilter, read_events, read_shots};
-use bowwave_trainer::storage::JOURNAL;
 use serde::Serialize;
 
-use crate::{cli::ScoreArgs, stdout};
+use crate::{cli::ScoreArgs, hits::journal_at, stdout};
 
 /// A score with the misses that it explains.
 #[derive(Debug, Serialize)]
@@ -37,13 +36,7 @@ struct ExplainedRound {
 
 /// Prints the score of a run.
 pub fn run(arguments: &ScoreArgs) -> Result<()> {
-    let path = if arguments.run.is_dir() { arguments.run.join(JOURNAL) } else { arguments.run.clone() };
-    if !path.exists() {
-        bail!(
-            "no journal at {}; name the folder that `bowwave simulate --out` left, or the database",
-            path.display()
-        );
-    }
+    let path = journal_at(&arguments.run)?;
     let runs = arguments.number.map_or(RunSelection::Latest, RunSelection::Run);
     let mut fold = ScoreFold::default();
     let (mut explained, mut unknown) = (Vec::new(), 0);

@@ -51,7 +51,12 @@ impl Act {
         }
     }
 
-    /// Whether it is about what the gun points at.
+    /// Acts that are words about a boat.
+    pub fn calls() -> impl Iterator<Item = Self> {
+        Self::ALL.into_iter().filter(|act| act.is_about_a_boat())
+    }
+
+    /// Tests whether it is a word about the boat that the gun points at.
     pub const fn is_about_a_boat(self) -> bool {
         matches!(self, Self::Report | Self::Identify(_) | Self::Warn)
     }

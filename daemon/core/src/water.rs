@@ -53,6 +53,12 @@ impl ReflectionMethod {
         current.or_else(|| Self::FORMER_NAMES.iter().find(|(old, _)| *old == name).map(|(_, method)| *method))
     }
 
+    /// All names that are read, former ones last.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        let former = Self::FORMER_NAMES.into_iter().map(|(name, _)| name);
+        Self::ALL.into_iter().map(Self::name).chain(former)
+    }
+
     /// Former names, which are read for one version.
     const FORMER_NAMES: [(&str, Self); 3] = [
         ("waves", Self::Baked),

@@ -11,9 +11,8 @@ use bowwave_core::{
     session::{Digest, Session, SessionDigest, Setup},
     time::Time,
     world::{
-        exercise::ExerciseEvent,
         scenario::Scenario,
-        score::{ScoreFold, ScoreSheet, ShotRecord},
+        score::{ScoreFold, ScoreSheet},
     },
 };
 use bowwave_devices::camera::jpeg::Decoder;
@@ -109,7 +108,7 @@ pub fn replay(path: &Path) -> Result<Replayed> {
                     result.differs_from.get_or_insert(entry.tick.time);
                 }
                 if let Some(answer) = session.input(&Input::Tick(entry.tick)) {
-                    take_in(&mut fold, answer.records, answer.events);
+                    fold.take(answer.records, answer.events);
                 }
                 result.ticks += 1;
             }
@@ -117,16 +116,11 @@ pub fn replay(path: &Path) -> Result<Replayed> {
         result.inputs += 1;
     }
     let (records, events) = session.finish();
-    take_in(&mut fold, records, events);
+    fold.take(records, events);
     result.sheet = fold.sheet();
     result.digest = session.digest();
     result.score = session.score();
     Ok(result)
-}
-
-fn take_in(fold: &mut ScoreFold, records: &[ShotRecord], events: &[ExerciseEvent]) {
-    events.iter().for_each(|event| fold.event(event));
-    records.iter().for_each(|record| fold.shot(record));
 }
 
 enum RecordedInput {

@@ -6,6 +6,7 @@
 use bowwave_core::{
     act::Act,
     side::Side,
+    water::ReflectionMethod,
     world::{boats::Propulsor, exercise::Engagement, scenario::built_in_weapons},
 };
 use serde_json::{Map, Value, json};
@@ -132,22 +133,10 @@ fn light() -> Value {
 }
 
 fn reflection() -> Value {
-    let methods = [
-        "off",
-        "mirror",
-        "full",
-        "full_as_published",
-        "physics",
-        "physics_as_published",
-        "baked",
-        "waves",
-        "full_as_printed",
-        "physics_as_printed",
-    ];
     table(
         "How the sea mirrors",
         vec![
-            ("method", one_of(methods, "Method of reflection")),
+            ("method", one_of(ReflectionMethod::names(), "Method of reflection")),
             ("shadow_level", whole(0, 2, "How strong the shadow is")),
         ],
         &[],
@@ -221,7 +210,7 @@ fn about() -> Value {
 }
 
 fn call() -> Value {
-    let calls = Act::ALL.into_iter().filter(|act| act.is_about_a_boat()).map(Act::name);
+    let calls = Act::calls().map(Act::name);
     let mut call = table(
         "A call that is to be made",
         vec![

@@ -1,4 +1,4 @@
-//! What a gunner sees.
+//! A gunner's eye: boats in sight, and the chance of coming upon them.
 
 use glam::{DVec2, DVec3};
 use rand::RngExt;
@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 
 use crate::{
     side::Side,
-    world::{RunningWorld, fleet::Fleet},
+    world::{RunningWorld, exercise::STOPPED_M_S, fleet::Fleet},
 };
 
 /// Metres in a nautical mile.
@@ -28,7 +28,7 @@ pub(super) struct Sighted {
     pub found_per_s: f64,
     /// It is near enough to say what kind of boat it is.
     pub is_recognised: bool,
-    /// What it is; only a judgement of it is used.
+    /// Whose it is; only a judgement of it is used.
     pub side: Side,
     /// It has no way after having been struck, or has given up: that shows.
     pub is_over: bool,
@@ -52,12 +52,12 @@ impl Eye {
 
     fn sight(&self, running: &RunningWorld, boat: usize) -> Option<Sighted> {
         let RunningWorld { fleet, now, start, .. } = running;
-        let at = fleet.floating(boat, *now)?.pose.to_world(DVec3::Z * fleet.middle_m(boat));
+        let at = fleet.middle(boat, *now)?;
         let history = fleet.history(boat)?;
         let velocity = history.state(now.secs_since(*start)).velocity().extend(0.0);
         let (range_m, length_m) = (at.distance(self.at), history.hull().length_m);
         let is_over = fleet.gave_up(boat)
-            || fleet.first_hit(boat).is_some_and(|t| t <= *now) && velocity.length() < 1.0;
+            || fleet.first_hit(boat).is_some_and(|t| t <= *now) && velocity.length() < STOPPED_M_S;
         Some(Sighted {
             boat,
             at,
@@ -77,7 +77,7 @@ impl Eye {
         SEARCH_NM_S * sweep_nm * sweep_nm / (8.0 * std::f64::consts::PI * range_nm.powi(3))
     }
 
-    /// Whether a nearer boat of some size stands before it.
+    /// Tests whether a nearer boat of some size stands before it.
     fn is_hidden(&self, boat: &Sighted, boats: &[Sighted], fleet: &Fleet) -> bool {
         let from = |s: &Sighted| s.at.truncate() - self.at.truncate();
         let sight: DVec2 = from(boat);
@@ -112,7 +112,7 @@ fn sweep_width_nm(length_m: f64, visibility_nm: f64) -> f64 {
     }
 }
 
-/// Whether something that happens so often happened within `span_s`.
+/// Draws whether something that happens so often happened within `span_s`.
 pub(super) fn happens(random: &mut Pcg64, per_s: f64, span_s: f64) -> bool {
     random.random::<f64>() < 1.0 - (-per_s * span_s).exp()
 }

@@ -10,10 +10,10 @@ use super::{eye::normal, skill::Skill};
 /// Time over which the aim wanders about the point that is aimed at, seconds.
 const WANDER_S: f64 = 0.3;
 
-/// Where the gun points, and what the gunner knows of its way there. Angles are azimuth (clockwise from north) and elevation, radians.
+/// Direction of the gun, and the errors that its gunner has seen. Angles are azimuth (clockwise from north) and elevation, radians.
 #[derive(Clone, Debug)]
 pub(super) struct Hand {
-    /// Where it would point without the wander.
+    /// Direction without the wander.
     guided: DVec2,
     wander: DVec2,
     /// Errors and rates of the last moments, newest last.
@@ -25,7 +25,7 @@ impl Hand {
         Self { guided: DVec2::new(azimuth, elevation), wander: DVec2::ZERO, seen: VecDeque::new() }
     }
 
-    /// Where the gun points.
+    /// Direction of the gun.
     pub fn bore(&self) -> DVec2 {
         self.guided + self.wander
     }
@@ -60,8 +60,8 @@ impl Hand {
     }
 }
 
-/// Turn from `b` to `a` by the shorter way.
-fn difference(a: DVec2, b: DVec2) -> DVec2 {
+/// Turn from `b` to `a`, azimuth and elevation, by the shorter way.
+pub(super) fn difference(a: DVec2, b: DVec2) -> DVec2 {
     let turn = std::f64::consts::TAU;
     let azimuth = (a.x - b.x + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
     DVec2::new(azimuth, a.y - b.y)

@@ -1,4 +1,4 @@
-//! A gunner's decisions: what to look at, what to say of it, when to fire.
+//! A gunner's decisions: to look, to speak, to fire.
 
 use glam::{DVec2, DVec3};
 use rand::RngExt;
@@ -6,10 +6,12 @@ use rand_pcg::Pcg64;
 
 use super::{
     eye::{Sighted, happens, normal},
+    hand::difference,
     skill::Skill,
 };
 use crate::{
     act::Act,
+    geometry::heading_of,
     side::Side,
     world::{
         exercise::Engagement,
@@ -333,12 +335,10 @@ impl Head {
 
     /// Tests whether no boat that is not known as hostile is near the line of fire, before or behind the target.
     fn is_clear(&self, aim: DVec2, at: &Moment<'_>) -> bool {
-        at.sighted.iter().filter(|b| self.known[b.boat].called != Some(Side::Hostile)).all(|b| {
-            let off = angles(b.at - at.eye) - aim;
-            let turn = std::f64::consts::TAU;
-            let aside = ((off.x + 0.5 * turn).rem_euclid(turn) - 0.5 * turn).abs();
-            aside > self.skill.clearance_mrad * 1e-3
-        })
+        at.sighted
+            .iter()
+            .filter(|b| self.known[b.boat].called != Some(Side::Hostile))
+            .all(|b| difference(angles(b.at - at.eye), aim).x.abs() > self.skill.clearance_mrad * 1e-3)
     }
 
     /// Takes what the last burst was seen to miss by off the aim.
@@ -363,26 +363,20 @@ impl Head {
         let (at, velocity) = (eye + sight * known.range, (across + along) * known.range);
         let weapon = &self.weapon;
         let aim = aim_to_hit(weapon.projectile, eye, weapon.wind, |s| at + velocity * s);
-        aim.map_or(DVec2::ZERO, |aim| {
-            let off = angles(aim.direction) - angles(sight);
-            let turn = std::f64::consts::TAU;
-            DVec2::new((off.x + 0.5 * turn).rem_euclid(turn) - 0.5 * turn, off.y)
-        })
+        aim.map_or(DVec2::ZERO, |aim| difference(angles(aim.direction), angles(sight)))
     }
 }
 
 /// Azimuth, clockwise from north, and elevation of a direction, radians.
 pub(super) fn angles(direction: DVec3) -> DVec2 {
-    DVec2::new(direction.x.atan2(direction.y), direction.z.atan2(direction.x.hypot(direction.y)))
+    DVec2::new(heading_of(direction.truncate()), direction.z.atan2(direction.x.hypot(direction.y)))
 }
 
 /// Rate of the line of sight to a boat, azimuth and elevation, rad/s.
 fn rate(boat: &Sighted, eye: DVec3) -> DVec2 {
     const SPAN_S: f64 = 0.05;
     let sight = boat.at - eye;
-    let turn = angles(sight + boat.velocity * SPAN_S) - angles(sight);
-    let whole = std::f64::consts::TAU;
-    DVec2::new((turn.x + 0.5 * whole).rem_euclid(whole) - 0.5 * whole, turn.y) / SPAN_S
+    difference(angles(sight + boat.velocity * SPAN_S), angles(sight)) / SPAN_S
 }
 
 /// Seconds until a boat is here if it goes on so; of one that does not close, as if it did so slowly.

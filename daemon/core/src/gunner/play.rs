@@ -50,8 +50,7 @@ impl Played {
     /// All of it, to be scored.
     pub fn fold(&self) -> ScoreFold {
         let mut fold = ScoreFold::default();
-        self.events.iter().for_each(|event| fold.event(event));
-        self.shots.iter().for_each(|shot| fold.shot(shot));
+        fold.take(&self.shots, &self.events);
         fold
     }
 }
@@ -175,7 +174,7 @@ pub fn play(
     played
 }
 
-/// How far the aim wanders on this sea, one standard deviation, radians.
+/// Wander of the aim on this sea, one standard deviation, radians.
 fn wander(scenario: &Scenario, skill: &Skill) -> f64 {
     /// Beyond that sea nobody aims any worse.
     const MOST: f64 = 2.0;

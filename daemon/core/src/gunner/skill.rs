@@ -1,4 +1,4 @@
-//! How good a gunner is.
+//! Skills of gunners.
 
 /// Numbers of a gunner. Sources beside each are tables of human performance; where they give a range, an expert has its better end and a
 /// novice its worse.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use crate::{
     geometry::RigidPose,
@@ -253,9 +253,9 @@ impl Fleet {
         self.models.get(usize::from(self.boats.get(boat)?.model.0))
     }
 
-    /// Height of the middle of what a boat shows over the water, metres.
-    pub fn middle_m(&self, boat: usize) -> f64 {
-        0.5 * self.height_m(boat)
+    /// Middle of a boat's visible part at `time`, world, metres.
+    pub fn middle(&self, boat: usize, time: Time) -> Option<DVec3> {
+        Some(self.floating(boat, time)?.pose.to_world(DVec3::Z * (0.5 * self.height_m(boat))))
     }
 
     /// Height that a boat shows over the water, metres.

@@ -138,12 +138,7 @@ impl InFlight {
     ) -> Option<ExplainedMiss> {
         let Launch { shot, fired, muzzle, bore, .. } = self.launch;
         let boat = nearest.boat;
-        let middle = DVec3::Z * fleet.middle_m(boat);
-        fleet.floating(boat, fired)?;
-        let target = |s: f64| {
-            let floating = fleet.floating(boat, fired.plus_secs(s));
-            floating.map_or(DVec3::NAN, |floating| floating.pose.to_world(middle))
-        };
+        let target = |s: f64| fleet.middle(boat, fired.plus_secs(s)).unwrap_or(DVec3::NAN);
         let (projectile, wind) = (ammunition.weapon.projectile, ammunition.wind);
         let round = MissedRound { projectile, wind, muzzle, bore, flown: self.flown, before: &self.before };
         let why = MissExplanation::of(&round, target)?;

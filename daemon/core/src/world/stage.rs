@@ -108,27 +108,19 @@ impl RunningWorld {
 
     /// The event that a round was fired.
     fn fired(&self, shot: u64, time: Time, aim: &BoreAim) -> ExerciseEvent {
-        let boats = self.watched(aim);
+        let boats = self.watched(Some(aim));
         let at = pointed_at(&boats).and_then(|boat| boats.get(boat));
         let (boat, range_m) = (at.map(|b| b.name.to_owned()), at.map(|b| b.range_m));
         ExerciseEvent { time, fact: ExerciseFact::Fired { shot, boat, range_m } }
     }
 
-    /// All boats, for whoever watches the exercise, while the barrel points as `aim` says.
-    fn watched(&self, aim: &BoreAim) -> Vec<WatchedBoat<'_>> {
-        self.boats(Some(aim).filter(|aim| aim.unscored.is_none()))
-    }
-
-    /// The same where nobody knows where the barrel points.
-    fn watched_blindly(&self) -> Vec<WatchedBoat<'_>> {
-        self.boats(None)
-    }
-
-    fn boats(&self, aim: Option<&BoreAim>) -> Vec<WatchedBoat<'_>> {
+    /// All boats, for whoever watches the exercise, while the barrel points as `aim` says, if that is known.
+    fn watched(&self, aim: Option<&BoreAim>) -> Vec<WatchedBoat<'_>> {
+        let aim = aim.filter(|aim| aim.unscored.is_none());
         let Self { fleet, now, .. } = self;
         let eye = aim.map_or(DVec3::ZERO, |aim| aim.muzzle);
         let watched = |boat: usize| {
-            let at = fleet.floating(boat, *now)?.pose.to_world(DVec3::Z * fleet.middle_m(boat));
+            let at = fleet.middle(boat, *now)?;
             let speed_m_s = fleet.history(boat)?.state(now.secs_since(self.start)).velocity().length();
             Some(WatchedBoat {
                 name: fleet.name(boat),
@@ -254,7 +246,7 @@ impl World {
     /// Notes what has happened up to now.
     fn watch_exercise(&mut self, running: &mut RunningWorld, aim: BoreAim) {
         running.note_misses(&mut self.events);
-        let boats = running.watched(&aim);
+        let boats = running.watched(Some(&aim));
         let orders = self.watch.follow(running.now, &boats, self.weapon.rounds_in_all(), &mut self.events);
         for boat in orders.warned {
             running.fleet.warn(boat, running.now);
@@ -300,7 +292,7 @@ impl World {
     pub fn finish(&mut self, records: &mut Vec<ShotRecord>) {
         self.events.clear();
         if let Some(running) = &mut self.running {
-            let boats = running.watched_blindly();
+            let boats = running.watched(None);
             let mut ended = Vec::new();
             self.watch.finish(running.now, &boats, self.weapon.rounds_in_all(), &mut ended);
             let RunningWorld { start, now, fleet, rounds } = running;

@@ -225,7 +225,7 @@ impl Weapon {
         self.spare_belts = self.spare_belts.saturating_sub(1);
         self.rounds_left = self.belt;
         self.is_stopped = false;
-        // The trigger has to be pressed anew.
+        // The trigger has to be pressed again.
         self.next_round = None;
         self.last_round = self.last_round.map(|last| last.min(time));
     }

@@ -64,7 +64,7 @@ impl SeakeepingState {
         }
     }
 
-    /// The water at the step of that number, as it was left there or anew.
+    /// The water at the step of that number, kept or computed.
     fn water_at(&mut self, number: i64, course: &CourseState, waves: &WaveField) -> Box<HullWater> {
         match self.water.take() {
             Some((kept, water)) if kept == number => water,

@@ -9,4 +9,4 @@ pub use event::{ExerciseEvent, ExerciseFact};
 pub use spec::{
     About, CallSpec, Engagement, ExerciseSpec, Goals, Happening, HappeningCause, HappeningEffect, group_of,
 };
-pub use watch::{ExerciseWatch, WatchedBoat, pointed_at};
+pub use watch::{ExerciseWatch, STOPPED_M_S, WatchedBoat, pointed_at};

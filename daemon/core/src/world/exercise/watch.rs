@@ -15,7 +15,7 @@ const POINTS: f64 = 2.0 * std::f64::consts::PI / 180.0;
 /// How long it has to for that to count as seen, seconds.
 const POINTED_S: f64 = 0.5;
 /// A boat slower than this has no way, m/s.
-const STOPPED_M_S: f64 = 1.0;
+pub const STOPPED_M_S: f64 = 1.0;
 /// A boat that opens at this speed goes away, and one that closes at it comes on, m/s.
 const OPENS_M_S: f64 = 2.0;
 /// How long it has to, seconds.

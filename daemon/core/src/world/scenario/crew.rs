@@ -5,11 +5,11 @@ use std::sync::Arc;
 use glam::DVec2;
 use serde::Deserialize;
 
-use super::keys::{M_S_PER_KN, waypoint};
+use super::keys::{M_S_PER_KN, only_true, waypoint};
 use crate::{
     text::toml::{
-        KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, key_place,
-        number, one_of, plain_text, yes_no,
+        KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, TomlText, key_place, number,
+        one_of, plain_text, yes_no,
     },
     world::boats::{Act, CrewPlan, CrewState, Exit, Guard},
 };
@@ -289,11 +289,6 @@ fn exit(section: &TomlSection<'_>, raw: &RawExit, names: &[String]) -> Result<Ex
     }
     let chance = text.given(&raw.chance, number(0.0..=1.0, ""))?.unwrap_or(1.0);
     Ok(Exit { guard, chance, to })
-}
-
-/// A condition that is asked for; one that is not is left out.
-fn only_true() -> ValueRule<'static, bool, bool> {
-    ValueRule::new("true, or leave it out", |raw: &bool| raw.then_some(true))
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::spec::BoatSpec;
+use super::{keys::only_true, spec::BoatSpec};
 use crate::{
     act::Act,
     side::Side,
@@ -107,8 +107,7 @@ fn goals(text: TomlText<'_>, raw: Option<Spanned<RawGoals>>, boats: &[BoatSpec])
 
 fn call(section: &TomlSection<'_>, raw: &RawCall, boats: &[BoatSpec]) -> Result<CallSpec, TomlError> {
     let text = section.text;
-    let calls = Act::ALL.into_iter().filter(|act| act.is_about_a_boat());
-    let calls: Vec<(&str, Act)> = calls.map(|act| (act.name(), act)).collect();
+    let calls: Vec<(&str, Act)> = Act::calls().map(|act| (act.name(), act)).collect();
     let call = section.required("say", &raw.say, one_of(&calls))?;
     let (before_m, within_s) = (
         text.given(&raw.before_m, number(1.0..=20_000.0, "m"))?,
@@ -152,8 +151,7 @@ fn event(
     } else if let Some(within_m) = text.given(&raw.within_m, number(1.0..=20_000.0, "m"))? {
         HappeningCause::Within(about()?, within_m)
     } else {
-        let only = ValueRule::new("true, or leave it out", |raw: &bool| raw.then_some(true));
-        text.given(&raw.struck, only)?;
+        text.given(&raw.struck, only_true())?;
         HappeningCause::Struck(about()?)
     };
     let mut effects = Vec::new();
@@ -175,14 +173,9 @@ fn event(
     Ok(Happening { cause, effects })
 }
 
-const fn engagements() -> [(&'static str, Engagement); 4] {
-    let mut names = [("", Engagement::Hold); 4];
-    let mut i = 0;
-    while i < names.len() {
-        names[i] = (Engagement::ALL[i].name(), Engagement::ALL[i]);
-        i += 1;
-    }
-    names
+/// Rules of engagement by their names.
+fn engagements() -> [(&'static str, Engagement); 4] {
+    Engagement::ALL.map(|rules| (rules.name(), rules))
 }
 
 /// A side, a boat of the scenario or a group of boats.

@@ -22,6 +22,11 @@ pub(super) fn range() -> ValueRule<'static, f64, f64> {
     number(1.0..=20_000.0, "m")
 }
 
+/// A condition that is asked for; one that is not is left out.
+pub(super) fn only_true() -> ValueRule<'static, bool, bool> {
+    ValueRule::new("true, or leave it out", |raw: &bool| raw.then_some(true))
+}
+
 /// A point of a course by bearing and range.
 pub(super) fn waypoint() -> ValueRule<'static, Vec<f64>, DVec2> {
     let allowed = "pairs [bearing_deg, range_m] within -360 to 360 degrees and 1 to 20000 m";

@@ -48,7 +48,7 @@ pub fn built_in() -> Result<Vec<(String, WeaponSpec)>, TomlError> {
         .iter()
         .map(|(section, keys)| {
             let name = section.required("kind", &keys.kind, plain_text())?;
-            Ok((name, WeaponSpec { kind: None, ..over(section, keys, &WeaponSpec::default())? }))
+            Ok((name, over(section, keys, &WeaponSpec::default())?))
         })
         .collect()
 }

@@ -237,6 +237,12 @@ pub struct CauseSheet {
 }
 
 impl ScoreFold {
+    /// Takes in records and events.
+    pub fn take(&mut self, shots: &[ShotRecord], events: &[ExerciseEvent]) {
+        events.iter().for_each(|event| self.event(event));
+        shots.iter().for_each(|shot| self.shot(shot));
+    }
+
     /// Takes in an event.
     pub fn event(&mut self, event: &ExerciseEvent) {
         let time = event.time;
@@ -345,12 +351,6 @@ impl ScoreFold {
     pub fn sheet(&self) -> ScoreSheet {
         let (rounds, struck_neutrals) = self.rounds();
         let (calls, breaches) = (self.calls_sheet(), self.breaches());
-        let hostile_over = |ending: Ending| {
-            let is_so =
-                |b: &&BoatFold| b.side == Some(Side::Hostile) && b.over.is_some_and(|o| o.0 == ending);
-            self.boats.values().filter(is_so).count() as u32
-        };
-        let nearest = self.boats.values().filter(|b| b.side == Some(Side::Hostile));
         let begun = self.begun.or_else(|| self.shots.first().map(|s| s.fired));
         let last = self.ended.or_else(|| self.shots.last().map(|s| s.fired));
         let items = self.goals.map_or_else(Vec::new, |goals| self.items(&goals, &rounds, &calls));
@@ -365,10 +365,10 @@ impl ScoreFold {
             items,
             duration_s: begun.zip(last).map_or(0.0, |(begun, last)| last.secs_since(begun)),
             hostile: self.goals.map_or(0, |goals| goals.hostile),
-            stopped: hostile_over(Ending::Stopped),
-            turned_away: hostile_over(Ending::TurnedAway),
+            stopped: self.ended(Ending::Stopped),
+            turned_away: self.ended(Ending::TurnedAway),
             under_threat_s: self.under_threat_s,
-            nearest_m: nearest.filter_map(|b| b.nearest_m).reduce(f64::min),
+            nearest_m: self.hostile().filter_map(|b| b.nearest_m).reduce(f64::min),
             rounds,
             calls,
             breaches,
@@ -377,13 +377,23 @@ impl ScoreFold {
         }
     }
 
+    /// Hostile boats.
+    fn hostile(&self) -> impl Iterator<Item = &BoatFold> {
+        self.boats.values().filter(|b| b.side == Some(Side::Hostile))
+    }
+
+    /// Hostile boats that ended so.
+    fn ended(&self, ending: Ending) -> u32 {
+        self.hostile().filter(|b| b.over.is_some_and(|over| over.0 == ending)).count() as u32
+    }
+
     /// Points before faults are taken off.
     fn items(&self, goals: &GoalsAsked, rounds: &RoundsSheet, calls: &CallsSheet) -> Vec<PointsItem> {
         const THREAT_S: f64 = 20.0;
         const HIT_SHARE: f64 = 0.2;
         let mut parts: Vec<(&'static str, f64, f64)> = Vec::new();
         if goals.stop > 0 {
-            let over = self.boats.values().filter(|b| b.side == Some(Side::Hostile)).filter_map(|b| b.over);
+            let over = self.hostile().filter_map(|b| b.over);
             let worth = over.map(|(_, _, range_m)| if range_m >= goals.keep_off_m { 1.0 } else { 0.5 });
             let mut worth: Vec<f64> = worth.collect();
             worth.sort_by(|a, b| b.total_cmp(a));
@@ -438,11 +448,8 @@ impl ScoreFold {
             sheet.first_round_hits += u32::from(begins && is_hit);
             before = Some((shot.fired, boat));
         }
-        let is_stopped = |b: &&BoatFold| {
-            b.side == Some(Side::Hostile) && b.over.is_some_and(|over| over.0 == Ending::Stopped)
-        };
-        let stopped = self.boats.values().filter(is_stopped).count();
-        sheet.per_stop = (stopped > 0).then(|| f64::from(sheet.fired) / stopped as f64);
+        let stopped = self.ended(Ending::Stopped);
+        sheet.per_stop = (stopped > 0).then(|| f64::from(sheet.fired) / f64::from(stopped));
         (sheet, neutrals.len() as u32)
     }
 
