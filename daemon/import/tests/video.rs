@@ -10,7 +10,6 @@
 use std::{
     fs,
     ops::ControlFlow,
-    os::unix::fs::PermissionsExt as _,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -173,14 +172,21 @@ fn a_cut_video_gives_what_it_has_or_says_why_not() {
     assert!(matches!(error, ImportError::NoFrames { .. }), "{error}");
 }
 
+/// A shell script that can be run. Another process writes it: a file that this one had open for writing when a
+/// test beside it forked cannot be run until that child has started its program (`ETXTBSY`).
+fn write_program(path: &Path, script: &str) {
+    let text = format!("#!/bin/sh\n{script}\n");
+    let writer = r#"printf %s "$2" >"$1" && chmod 755 "$1""#;
+    let status = Command::new("sh").args(["-c", writer, "sh"]).arg(path).arg(text).status().unwrap();
+    assert!(status.success(), "{status}");
+}
+
 /// A folder with an `ffmpeg` and an `ffprobe` that are shell scripts.
 fn fake(ffmpeg: &str) -> (tempfile::TempDir, ImportOptions) {
     let folder = tempfile::tempdir().unwrap();
     let probe = "echo codec_name=h264; echo avg_frame_rate=25/1; echo nb_frames=9; echo format_name=mov";
     for (name, script) in [("ffmpeg", ffmpeg), ("ffprobe", probe)] {
-        let path = folder.path().join(name);
-        fs::write(&path, format!("#!/bin/sh\n{script}\n")).unwrap();
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        write_program(&folder.path().join(name), script);
     }
     let options = ImportOptions { ffmpeg: folder.path().join("ffmpeg"), ..options() };
     (folder, options)
