@@ -3,8 +3,11 @@
 #![forbid(unsafe_code)]
 
 pub mod fault;
+pub mod live;
 pub mod make;
 pub mod ocean;
+mod pace;
+pub mod panorama;
 pub mod pty;
 pub mod replay;
 pub mod set_up;

@@ -1,12 +1,17 @@
-//! Where the built-in recording is kept.
+//! Where what can be made again is kept: the built-in recording, and panoramas of the sea for scenarios that are played.
 
 use std::{
     env,
+    fs::File,
     path::{Path, PathBuf},
+    time::SystemTime,
 };
 
 use anyhow::{Context, Result, bail};
-use hw_sim::make::{self, Recipe};
+use hw_sim::{
+    make::{self, Recipe},
+    panorama::{self, PanoramaRecipe},
+};
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
 
@@ -19,54 +24,101 @@ fn folder() -> Result<PathBuf> {
     if let Some(path) = set("XDG_CACHE_HOME").or_else(|| set("HOME").map(|h| h.join(".cache"))) {
         return Ok(path.join("bowwave"));
     }
-    bail!("no folder to keep the built-in recording in: set HOME or BOWWAVE_CACHE")
+    bail!("no folder to keep the built-in recording and seas in: set HOME or BOWWAVE_CACHE")
 }
+
+/// Panoramas that are kept: the ones that were used last. Each has some hundred megabytes.
+const PANORAMAS: usize = 6;
 
 /// Where the built-in recording is, or will be. Its name holds a digest of its recipe and of the maker's revision, so that
 /// neither meets an old file.
 pub fn default_recording_path() -> Result<PathBuf> {
-    let recipe = format!("{} {:?}", make::REVISION, Recipe::default());
-    let digest = Sha256::digest(recipe.as_bytes());
-    let short: String = digest.iter().take(6).map(|b| format!("{b:02x}")).collect();
-    Ok(folder()?.join(format!("built-in-{short}.mcap")))
+    Ok(folder()?.join(format!("built-in-{}.mcap", digest(&Recipe::default()))))
 }
 
 /// The built-in recording, made now where it is not there yet.
 pub fn default_recording() -> Result<PathBuf> {
     let path = default_recording_path()?;
     if !path.exists() {
-        make_recording(&path)?;
+        let note = "making the built-in recording (once, under a minute)";
+        made(&path, note, |part, progress| Ok(make::make(&Recipe::default(), part, progress).map(|_| ())?))?;
     }
     Ok(path)
 }
 
-fn make_recording(path: &Path) -> Result<()> {
+/// The panorama of a recipe, made now where it is not there yet.
+pub fn panorama(recipe: &PanoramaRecipe) -> Result<PathBuf> {
+    let path = folder()?.join(format!("sea-{}.panorama", digest(recipe)));
+    if path.exists() {
+        // Its time says when it was used last; where it cannot be set, it is made again some day.
+        let touched =
+            File::options().append(true).open(&path).and_then(|file| file.set_modified(SystemTime::now()));
+        if let Err(e) = touched {
+            log::debug!("{}: its time cannot be set: {e}", path.display());
+        }
+    } else {
+        let note = "making the sea of this scenario (once, one to two minutes on two processors)";
+        made(&path, note, |part, progress| Ok(panorama::make(recipe, part, progress)?))?;
+        forget_old_panoramas(&path);
+    }
+    Ok(path)
+}
+
+/// The name of what a recipe makes.
+fn digest(recipe: &impl std::fmt::Debug) -> String {
+    let digest = Sha256::digest(format!("{} {recipe:?}", make::REVISION));
+    digest.iter().take(6).map(|b| format!("{b:02x}")).collect()
+}
+
+/// Removes panoramas but the ones that were used last.
+fn forget_old_panoramas(newest: &Path) {
+    let Some(entries) = newest.parent().and_then(|folder| folder.read_dir().ok()) else { return };
+    let mut old: Vec<(SystemTime, PathBuf)> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|e| e == "panorama") && path != newest)
+        .filter_map(|path| Some((path.metadata().ok()?.modified().ok()?, path)))
+        .collect();
+    old.sort();
+    old.reverse();
+    for (_, path) in old.iter().skip(PANORAMAS - 1) {
+        match std::fs::remove_file(path) {
+            Ok(()) => log::info!("{} is removed: it was not used for long", path.display()),
+            Err(e) => log::warn!("cannot remove {}: {e}", path.display()),
+        }
+    }
+}
+
+/// Makes a file at `path`, with its progress shown.
+fn made(
+    path: &Path,
+    note: &str,
+    make: impl FnOnce(&Path, &mut dyn FnMut(u64, u64)) -> Result<()>,
+) -> Result<()> {
     let parent = path.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(parent).with_context(|| {
         format!("cannot make {}; set BOWWAVE_CACHE to a folder that can be written", parent.display())
     })?;
-    let recipe = Recipe::default();
-    eprintln!("making the built-in recording (once, under a minute): {}", path.display());
+    eprintln!("{note}: {}", path.display());
     let bar = ProgressBar::new(0);
     if let Ok(style) = ProgressStyle::with_template("{bar:40} {pos}/{len} frames, {eta} left") {
         bar.set_style(style);
     }
     // Another process may be making it too: each works on a file of its own, and the last rename wins with the same bytes.
     let part = path.with_extension(format!("{}.part", std::process::id()));
-    let made = make::make(&recipe, &part, &mut |done, total| {
+    let result = make(&part, &mut |done, total| {
         bar.set_length(total);
         bar.set_position(done);
     });
     bar.finish_and_clear();
-    if let Err(e) = made {
+    if let Err(e) = result {
         if let Err(e) = std::fs::remove_file(&part).or_else(|e| match e.kind() {
             std::io::ErrorKind::NotFound => Ok(()),
             _ => Err(e),
         }) {
             log::warn!("cannot remove {}: {e}", part.display());
         }
-        return Err(e).with_context(|| format!("cannot make the built-in recording {}", path.display()));
+        return Err(e).with_context(|| format!("cannot make {}", path.display()));
     }
-    std::fs::rename(&part, path)
-        .with_context(|| format!("cannot put the built-in recording at {}", path.display()))
+    std::fs::rename(&part, path).with_context(|| format!("cannot put {} in its place", path.display()))
 }

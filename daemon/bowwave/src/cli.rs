@@ -1,6 +1,7 @@
 //! The command line.
 
 mod calibrate;
+mod desk;
 mod mounting;
 mod scenario;
 
@@ -12,6 +13,7 @@ use clap_complete::Shell;
 use hw_sim::fault::{Fault, FaultKind};
 
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateIntrinsics, CalibrateTask};
+pub use desk::{DeskArgs, Play};
 pub use mounting::{
     CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
     CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
@@ -39,6 +41,8 @@ pub enum ProgramCommand {
     Run(RunArgs),
     /// Run the trainer on a recording, as if its camera, inertial unit and trigger were there
     Simulate(Simulate),
+    /// Play a scenario at this computer: a simulated gun on a simulated sea, aimed with the mouse, by a script or by a simulated gunner
+    Play(Play),
     /// Step a session through the inputs of its own recording, and say whether the same records and scenes come out
     Replay(ReplayRecording),
     /// Make a recording from a folder of pictures or from a video (with bowwave-lab)
@@ -118,30 +122,12 @@ pub struct Simulate {
     /// Calibration file (TOML); without it the recording's own
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<PathBuf>,
-    /// Configuration file (TOML); what is given on the command line overrides it
-    #[arg(long, value_name = "FILE")]
-    pub config: Option<PathBuf>,
-    /// Screen size in pixels
-    #[arg(long, value_name = "WxH", value_parser = parse_size)]
-    pub size: Option<(u32, u32)>,
     /// Replay at the recording's own speed, through a pseudo-terminal and bounded queues
     #[arg(long, conflicts_with = "fast")]
     pub realtime: bool,
     /// Replay as fast as it goes, repeatable to the byte (the default)
     #[arg(long)]
     pub fast: bool,
-    /// Draw off screen only (the default)
-    #[arg(long, conflicts_with = "window")]
-    pub headless: bool,
-    /// Show a window as well: space fires, escape ends
-    #[arg(long)]
-    pub window: bool,
-    /// End after so many frames
-    #[arg(long, value_name = "N", conflicts_with = "duration", value_parser = clap::value_parser!(u64).range(1..))]
-    pub frames: Option<u64>,
-    /// End after so many seconds; without it once through the recording
-    #[arg(long, value_name = "S", value_parser = parse_duration)]
-    pub duration: Option<f64>,
     /// Source of the orientation: the unit's own where it has one (auto), or its rates and specific force fused here and corrected
     /// by the horizon (fused); overrides the configuration's
     #[arg(long, value_name = "SOURCE")]
@@ -149,9 +135,6 @@ pub struct Simulate {
     /// Former name of --orientation fused
     #[arg(long, hide = true, conflicts_with = "orientation")]
     pub fuse: bool,
-    /// Seed of all chance; overrides the scenario's
-    #[arg(long, value_name = "N")]
-    pub seed: Option<u64>,
     /// Have a simulated gunner play the scenario instead, without pictures and recording, and print the score
     #[arg(long, value_name = "SKILL", value_parser = PossibleValuesParser::new(Skill::NAMED.map(|(name, _)| name)),
         conflicts_with_all = ["recording", "out", "realtime", "window", "frames", "record", "video", "sheet", "stills", "fault", "fault_every"])]
@@ -159,21 +142,6 @@ pub struct Simulate {
     /// Play it so often, each time with the next seed, and print the spread of the scores
     #[arg(long, value_name = "N", requires = "gunner", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     pub runs: Option<u64>,
-    /// Folder for summary.json, hits.sqlite and what else is asked for
-    #[arg(long, value_name = "DIR", default_value = "bowwave-out")]
-    pub out: PathBuf,
-    /// Also keep what went in as DIR/recording.mcap
-    #[arg(long)]
-    pub record: bool,
-    /// Also make a video of what was shown, DIR/video.mp4 (needs ffmpeg)
-    #[arg(long)]
-    pub video: bool,
-    /// Also make a contact sheet of what was shown, DIR/contact-sheet.png
-    #[arg(long)]
-    pub sheet: bool,
-    /// Also keep these frames as DIR/frame-NNNNN.png
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
-    pub stills: Vec<u64>,
     /// Let the simulated hardware fail: imu-drop-out, imu-freeze, imu-nan, line-garbage, frame-drop-out,
     /// frame-other-size or frame-corrupt, from second S for L seconds
     #[arg(long, value_name = "KIND@S+L", value_parser = parse_fault)]
@@ -181,18 +149,9 @@ pub struct Simulate {
     /// Let a fault of a random kind come every S seconds as well, 5 at least; the summary says whether each was ridden out
     #[arg(long, value_name = "S", value_parser = parse_fault_period)]
     pub fault_every: Option<f64>,
-    /// Vulkan device: its number, or part of its name
-    #[arg(long, value_name = "NAME")]
-    pub gpu: Option<String>,
-    /// Run with Vulkan's validation layer; anything it reports makes the run fail
-    #[arg(long)]
-    pub validation: bool,
-    /// Print each committed round's number on standard output as soon as the journal says so
-    #[arg(long)]
-    pub print_commits: bool,
-    /// Print the summary on standard output as JSON
-    #[arg(long)]
-    pub json: bool,
+    /// Outputs
+    #[command(flatten)]
+    pub desk: DeskArgs,
 }
 
 /// Arguments of a command of the laboratory, which its program `bowwave-lab` reads.
@@ -372,7 +331,7 @@ pub fn parse_size(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-fn parse_duration(text: &str) -> Result<f64, String> {
+pub(super) fn parse_duration(text: &str) -> Result<f64, String> {
     let seconds = text.parse().ok().filter(|s| *s > 0.0 && *s <= 30.0 * 86_400.0);
     seconds.ok_or_else(|| format!("'{text}' is no duration: write seconds above 0, at most 2592000"))
 }

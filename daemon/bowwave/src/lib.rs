@@ -8,6 +8,7 @@ mod calibrate;
 mod cli;
 mod completions;
 pub mod config;
+mod desk;
 mod doctor;
 pub mod ending;
 mod hits;
@@ -17,6 +18,7 @@ pub mod loading;
 mod new_file;
 pub mod outcome;
 mod plan;
+mod play;
 pub mod program;
 mod replay;
 mod run;
@@ -55,6 +57,7 @@ fn dispatch(
         ProgramCommand::Run(arguments) => run::run(arguments, program_start),
         ProgramCommand::Replay(arguments) => replay::run(arguments),
         ProgramCommand::Simulate(arguments) => simulate::run(arguments, program_start),
+        ProgramCommand::Play(arguments) => play::run(arguments, program_start),
         ProgramCommand::Import(lab) => laboratory::run("import", *verbose, &lab.arguments),
         ProgramCommand::Compose(lab) => laboratory::run("compose", *verbose, &lab.arguments),
         ProgramCommand::Study(lab) => laboratory::run("study", *verbose, &lab.arguments),

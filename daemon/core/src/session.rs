@@ -99,6 +99,11 @@ impl Session {
         self.composer.plan()
     }
 
+    /// The virtual world as it is now.
+    pub const fn world(&self) -> &World {
+        &self.world
+    }
+
     /// Counts of sensor data that were not used so far.
     pub fn sensor_counts(&self) -> SensorCounts {
         self.estimator.counts()

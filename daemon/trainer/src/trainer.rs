@@ -235,7 +235,7 @@ impl Trainer {
 
     /// A recording's frames count from its first picture on; a gun shows at once that its camera is not there yet.
     fn await_first_picture(&mut self) -> Result<()> {
-        if !matches!(self.source, Source::Recording(_)) {
+        if !matches!(self.source, Source::Recording(_) | Source::Live(_)) {
             return Ok(());
         }
         let begun = now();
@@ -288,6 +288,7 @@ impl Trainer {
         for user in self.presenter.iter().flat_map(Presenter::user_events) {
             match user {
                 UserEvent::Trigger(edge) => self.events.push(Event::Trigger(edge)),
+                UserEvent::Turn(turn) => self.source.turn(turn),
                 UserEvent::Rezero => self.events.push(at_stow()),
                 UserEvent::Act(act) => self.events.push(Event::Act(act)),
                 UserEvent::Quit => self.signals.stop.store(true, Ordering::Relaxed),
@@ -420,6 +421,7 @@ impl Trainer {
             }
             Err(e) => return Err(e),
         }
+        self.source.watch(self.session.world());
         if let Some(storage) = &mut self.storage {
             storage.poll(&mut self.faults, &mut self.events)?;
         }

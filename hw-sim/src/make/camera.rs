@@ -9,7 +9,7 @@ use image::{ExtendedColorType, ImageError, codecs::jpeg::JpegEncoder};
 use rand_pcg::{Pcg32, rand_core::Rng};
 
 use super::{
-    march::{LevelView, SeaPicture, SeaShader},
+    march::{LevelView, SeaPicture, SeaShader, ViewShape},
     recipe::Recipe,
 };
 use crate::ocean::{
@@ -22,21 +22,21 @@ use crate::ocean::{
 /// Steps of the transfer table over 0 to [`LIGHT_MAX`].
 const TRANSFER: usize = 8192;
 /// Light at which the sensor is full, in units of white.
-const LIGHT_MAX: f32 = 1.6;
+pub(crate) const LIGHT_MAX: f32 = 1.6;
 /// Values of the noise table; 10 bits of a random number choose one.
 const NOISE: usize = 1024;
 /// Steps of the noise's deviation over 0 to [`LIGHT_MAX`].
 const DEVIATIONS: usize = 128;
 
 /// Everything to see but the waves.
-pub(super) struct SeaScene {
+pub(crate) struct SeaScene {
     pub sky: CloudySky,
     pub panorama: Panorama,
     pub water: SeaShader,
 }
 
 /// The properties of the camera that stay the same from frame to frame.
-pub(super) struct RecipeCamera {
+pub(crate) struct RecipeCamera {
     lens: Lens,
     /// Undistorted normalised coordinates of every pixel's centre, and its share of light.
     rays: Vec<[f32; 3]>,
@@ -53,7 +53,7 @@ pub(super) struct RecipeCamera {
 
 /// Memory for one frame.
 #[derive(Default)]
-pub(super) struct FrameMemory {
+pub(crate) struct FrameMemory {
     sea: SeaPicture,
     pub rgb: Vec<u8>,
 }
@@ -65,27 +65,19 @@ impl RecipeCamera {
             .flat_map(|y| (0..lens.width).map(move |x| (x, y)))
             .map(|(x, y)| {
                 let ray = lens.unproject(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
-                let fall_off = 1.0 - recipe.camera.vignetting * (1.0 - ray.z.powi(4));
+                let fall_off = fall_off(recipe.camera.vignetting, ray);
                 [(ray.x / ray.z) as f32, (ray.y / ray.z) as f32, fall_off as f32]
             })
             .collect();
         let transfer = (0..TRANSFER)
-            .map(|i| {
-                (255.0 * linear_to_srgb(shoulder((i as f32 + 0.5) * LIGHT_MAX / TRANSFER as f32))).round()
-                    as u8
-            })
+            .map(|i| (255.0 * transfer((i as f32 + 0.5) * LIGHT_MAX / TRANSFER as f32)).round() as u8)
             .collect();
         let (read, shot) = (recipe.camera.read_noise as f32, recipe.camera.shot_noise as f32);
         // Twice as long as used, so that its length is a power of two.
         let deviation = (0..2 * DEVIATIONS)
             .map(|i| (read + shot * (i as f32 + 0.5) * LIGHT_MAX / DEVIATIONS as f32).sqrt())
             .collect();
-        let normal = (0..NOISE)
-            .map(|i| {
-                let p = (i as f64 + 0.5) / NOISE as f64;
-                (if p < 0.5 { -upper_quantile(p) } else { upper_quantile(1.0 - p) }) as f32
-            })
-            .collect();
+        let normal = normal_table(NOISE);
         Self {
             rays,
             transfer,
@@ -97,6 +89,11 @@ impl RecipeCamera {
             row_s: recipe.camera.readout_ns as f64 * 1e-9 / f64::from(lens.height),
             lens,
         }
+    }
+
+    /// Draws the sea so many times as finely.
+    pub fn refine(&mut self, detail: f32) {
+        self.level_focal *= detail;
     }
 
     /// Draws what the camera sees of `scene` from `pose` into `memory.rgb`; `turned` is how it is turned so many seconds later.
@@ -152,6 +149,7 @@ impl RecipeCamera {
         // Crests of high seas may stand above the level of a low eye.
         let margin = 4.0 + focal * (0.5 / eye_height).min(0.2);
         LevelView {
+            shape: ViewShape::Plane,
             width: ((right - left) * focal) as usize + 6,
             height: (lowest * focal + margin) as usize + 4,
             focal,
@@ -194,8 +192,6 @@ impl RecipeCamera {
 /// Light that falls on the sensor along a ray of the camera, turned into the level view.
 #[inline(always)]
 fn light(scene: &SeaScene, turn: Mat3, ray: [f32; 3], view: &LevelView, sea: &SeaPicture, sun: Vec3) -> Vec4 {
-    /// Half the sun's diameter, radians.
-    const SUN_RADIUS: f32 = 0.004_65;
     let d = turn * Vec3::new(ray[0], ray[1], 1.0);
     let inverse = 1.0 / d.z;
     let (nx, ny) = (d.x * inverse, d.y * inverse);
@@ -205,14 +201,23 @@ fn light(scene: &SeaScene, turn: Mat3, ray: [f32; 3], view: &LevelView, sea: &Se
         return water;
     }
     let tangent = -ny / (1.0 + nx * nx).sqrt();
-    let mut sky = scene.panorama.at(view.azimuth + arctangent(nx), tangent);
+    let sky = open_sky(scene, view.azimuth + arctangent(nx), tangent, d, sun);
+    water + open * sky
+}
+
+/// Light of the sky, with the sun's disc: `d` looks there and `sun` to the sun, in the same axes.
+#[inline(always)]
+pub(crate) fn open_sky(scene: &SeaScene, azimuth: f32, tangent: f32, d: Vec3, sun: Vec3) -> Vec4 {
+    /// Half the sun's diameter, radians.
+    const SUN_RADIUS: f32 = 0.004_65;
+    let mut sky = scene.panorama.at(azimuth, tangent);
     let towards = d.dot(sun);
     if towards > 0.0 && towards * towards > d.length_squared() * (1.0 - 6.0 * SUN_RADIUS * SUN_RADIUS) {
         let off = d.normalize().cross(sun).length();
         let disc = 1.0 - smoothstep(0.9 * SUN_RADIUS, 1.15 * SUN_RADIUS, off);
         sky += 50.0 * disc;
     }
-    water + open * sky
+    sky
 }
 
 #[inline(always)]
@@ -230,6 +235,26 @@ fn bilinear(sea: &SeaPicture, view: &LevelView, u: f32, v: f32) -> Vec4 {
     upper[0].lerp(upper[1], fu).lerp(lower[0].lerp(lower[1], fu), fv)
 }
 
+/// Share of the light along a ray that a lens lets through: the natural fall-off (cosine to the fourth), or a part of it.
+pub(crate) fn fall_off(vignetting: f64, ray: DVec3) -> f64 {
+    1.0 - vignetting * (1.0 - ray.z.powi(4))
+}
+
+/// Standard normal numbers whose ranks are spread evenly.
+pub(crate) fn normal_table(count: usize) -> Vec<f32> {
+    (0..count)
+        .map(|i| {
+            let p = (i as f64 + 0.5) / count as f64;
+            (if p < 0.5 { -upper_quantile(p) } else { upper_quantile(1.0 - p) }) as f32
+        })
+        .collect()
+}
+
+/// The camera's transfer curve: code of a light, 0 to 1.
+pub(crate) fn transfer(light: f32) -> f32 {
+    linear_to_srgb(shoulder(light))
+}
+
 /// Rolls highlights off from 70 % on instead of cutting them at white.
 fn shoulder(light: f32) -> f32 {
     const KNEE: f32 = 0.7;
@@ -238,13 +263,13 @@ fn shoulder(light: f32) -> f32 {
 
 /// Focal length of the level picture of the sea. A lens and a colour sensor do not resolve single pixels: drawing the sea a
 /// little coarser than the picture costs a quarter less and looks the same.
-pub(super) fn level_focal(lens: &Lens) -> f32 {
+pub(crate) fn level_focal(lens: &Lens) -> f32 {
     0.88 * lens.focal.x as f32
 }
 
 /// Extent of a whole recording's view: azimuths from the first to the last (clockwise), and the largest tangents
 /// of elevation above and below the horizontal.
-pub(super) struct ViewCoverage {
+pub(crate) struct ViewCoverage {
     pub azimuth: [f32; 2],
     pub above: f32,
     pub below: f32,

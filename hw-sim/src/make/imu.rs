@@ -7,8 +7,8 @@ use glam::{DQuat, DVec3};
 use rand_pcg::Pcg64;
 
 use super::{
-    motion::{GRAVITY, Motion},
-    recipe::{Jolt, Recipe},
+    motion::{GRAVITY, MotionState},
+    recipe::{ImuRecipe, Jolt, Recipe},
 };
 use crate::ocean::random::{gaussian, stream, uniform};
 
@@ -37,20 +37,64 @@ impl SlowError {
     }
 }
 
+/// A unit with its errors, noise and latency.
+pub(crate) struct Unit {
+    recipe: ImuRecipe,
+    bias_walk: SlowError,
+    attitude_error: SlowError,
+    noise: Pcg64,
+    latency: Pcg64,
+    start: Time,
+}
+
+impl Unit {
+    /// The unit of a recipe. `start` is the begin on the host's clock.
+    pub fn new(recipe: &Recipe, start: Time) -> Self {
+        let mut errors = stream(recipe.seed, 0x1e0);
+        Self {
+            bias_walk: SlowError::new(&mut errors),
+            attitude_error: SlowError::new(&mut errors),
+            noise: stream(recipe.seed, 0x1e1),
+            latency: stream(recipe.seed, 0x1e2),
+            recipe: recipe.imu.clone(),
+            start,
+        }
+    }
+
+    /// The next sample, measured `time_s` seconds after the begin. `turn` is that in periods of the slow errors, `jolt` an acceleration along
+    /// the unit's x, m/s^2.
+    ///
+    /// A sample measured at host time t carries the device time `clock_start + (t - start) * (1 + drift)` and arrives after t by a latency
+    /// that is never below the least one.
+    pub fn measure(&mut self, exact: &Exact, time_s: f64, turn: f64, jolt: f64) -> ImuSample {
+        let imu = &self.recipe;
+        let white = |rng: &mut Pcg64| DVec3::new(gaussian(rng), gaussian(rng), gaussian(rng));
+        let rate = exact.rate
+            + imu.gyro_bias
+            + self.bias_walk.at(turn) * imu.gyro_bias_walk
+            + white(&mut self.noise) * imu.gyro_noise;
+        let accel = exact.accel + DVec3::X * jolt + imu.accel_bias + white(&mut self.noise) * imu.accel_noise;
+        let slow = self.attitude_error.at(turn);
+        let tilt = DVec3::new(slow.x * imu.tilt_error, slow.y * imu.tilt_error, slow.z * imu.heading_error);
+        let measured_ns = bowwave_core::time::secs_to_ns(time_s);
+        ImuSample {
+            arrival: self.start.plus_ns(measured_ns + draw_latency(&mut self.latency, imu.latency_ns)),
+            device_time_ns: imu.clock_start_ns + device_ns(time_s, imu.clock_drift_ppm),
+            rate: to_step(rate, imu.gyro_step),
+            accel: to_step(accel, imu.accel_step),
+            world_from_imu: Some((DQuat::from_scaled_axis(tilt) * exact.world_from_imu).normalize()),
+        }
+    }
+}
+
 /// All samples of a recording, in the order of measurement. `start` is the recording's start on the host's clock.
-///
-/// A sample measured at host time t carries the device time `clock_start + (t - start) * (1 + drift)` and arrives after t by
-/// a latency that is never below the least one.
 pub fn samples(recipe: &Recipe, start: Time) -> Vec<ImuSample> {
-    let imu = &recipe.imu;
     let motion = recipe.motion();
     let imu_from_camera = recipe.camera_from_imu().inverse();
-    let mut errors = stream(recipe.seed, 0x1e0);
-    let (bias_walk, attitude_error) = (SlowError::new(&mut errors), SlowError::new(&mut errors));
-    let mut noise = stream(recipe.seed, 0x1e1);
-    let mut latency = stream(recipe.seed, 0x1e2);
+    let mut unit = Unit::new(recipe, start);
     let mut sear = stream(recipe.seed, 0x1e3);
-    let jolts: Vec<(f64, &Jolt)> = imu
+    let jolts: Vec<(f64, &Jolt)> = recipe
+        .imu
         .jolt
         .iter()
         .flat_map(|jolt| recipe.trigger.iter().map(move |burst| (burst.start_s + jolt.latency_s, jolt)))
@@ -61,25 +105,8 @@ pub fn samples(recipe: &Recipe, start: Time) -> Vec<ImuSample> {
         .map(|i| {
             let turn = f64::from(i) / f64::from(count);
             let t = turn * recipe.duration_s;
-            let state = exact(&motion, imu_from_camera, t);
-            let white = |rng: &mut Pcg64| DVec3::new(gaussian(rng), gaussian(rng), gaussian(rng));
-            let rate = state.rate
-                + imu.gyro_bias
-                + bias_walk.at(turn) * imu.gyro_bias_walk
-                + white(&mut noise) * imu.gyro_noise;
-            let jolt: f64 = jolts.iter().map(|(at_s, jolt)| jolt.felt(t - at_s)).sum();
-            let accel = state.accel + DVec3::X * jolt + imu.accel_bias + white(&mut noise) * imu.accel_noise;
-            let slow = attitude_error.at(turn);
-            let tilt =
-                DVec3::new(slow.x * imu.tilt_error, slow.y * imu.tilt_error, slow.z * imu.heading_error);
-            let measured_ns = bowwave_core::time::secs_to_ns(t);
-            ImuSample {
-                arrival: start.plus_ns(measured_ns + draw_latency(&mut latency, imu.latency_ns)),
-                device_time_ns: imu.clock_start_ns + device_ns(t, imu.clock_drift_ppm),
-                rate: to_step(rate, imu.gyro_step),
-                accel: to_step(accel, imu.accel_step),
-                world_from_imu: Some((DQuat::from_scaled_axis(tilt) * state.world_from_imu).normalize()),
-            }
+            let jolt = jolts.iter().map(|(at_s, jolt)| jolt.felt(t - at_s)).sum();
+            unit.measure(&Exact::of(&motion.at(t), imu_from_camera), t, turn, jolt)
         })
         .collect()
 }
@@ -89,25 +116,27 @@ pub fn device_ns(host_s: f64, drift_ppm: f64) -> i64 {
     bowwave_core::time::secs_to_ns(host_s * (1.0 + drift_ppm * 1e-6))
 }
 
-struct Exact {
+/// Readings of a perfect unit: rate and specific force in its axes, and how it is turned.
+pub(crate) struct Exact {
     rate: DVec3,
     accel: DVec3,
     world_from_imu: DQuat,
 }
 
-/// Readings of a perfect unit.
-fn exact(motion: &Motion, imu_from_camera: DQuat, time_s: f64) -> Exact {
-    let state = motion.at(time_s);
-    let world_from_imu = state.pose.world_from_camera * imu_from_camera.inverse();
-    Exact {
-        rate: imu_from_camera * state.rate,
-        accel: world_from_imu.inverse() * (state.acceleration + DVec3::Z * GRAVITY),
-        world_from_imu,
+impl Exact {
+    /// Of a unit on a camera in that state.
+    pub fn of(state: &MotionState, imu_from_camera: DQuat) -> Self {
+        let world_from_imu = state.pose.world_from_camera * imu_from_camera.inverse();
+        Self {
+            rate: imu_from_camera * state.rate,
+            accel: world_from_imu.inverse() * (state.acceleration + DVec3::Z * GRAVITY),
+            world_from_imu,
+        }
     }
 }
 
 /// Mostly near the least, with a tail to the most.
-pub(super) fn draw_latency(rng: &mut Pcg64, [least, most]: [i64; 2]) -> i64 {
+pub(crate) fn draw_latency(rng: &mut Pcg64, [least, most]: [i64; 2]) -> i64 {
     let span = (most - least) as f64;
     // Exponential with a mean of a sixth of the span.
     let late = -(1.0 - uniform(rng)).ln() * span / 6.0;

@@ -53,9 +53,20 @@ struct MarchStep {
     foam_threshold: f32,
 }
 
+/// The surface that a level picture is drawn on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ViewShape {
+    /// A plane: columns by the tangent of the angle off the axis.
+    Plane,
+    /// An upright cylinder: columns by azimuth, rows by the tangent of the elevation.
+    Cylinder,
+}
+
 /// A camera without roll or elevation, looking along an azimuth.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LevelView {
+pub(crate) struct LevelView {
+    /// What it is drawn on.
+    pub shape: ViewShape,
     /// Columns.
     pub width: usize,
     /// Rows.
@@ -72,7 +83,7 @@ pub(super) struct LevelView {
 
 /// The picture of the sea alone: linear colour times coverage, and coverage.
 #[derive(Default)]
-pub(super) struct SeaPicture {
+pub(crate) struct SeaPicture {
     pub texels: Vec<Vec4>,
     highest: Vec<f32>,
     columns: Vec<SeaColumn>,
@@ -97,7 +108,7 @@ struct SeaLook<'a> {
 }
 
 /// The part of the drawing that stays the same over a recording.
-pub(super) struct SeaShader {
+pub(crate) struct SeaShader {
     steps: Vec<MarchStep>,
     table: WaterTable,
     patches: Patches,
@@ -107,7 +118,7 @@ pub(super) struct SeaShader {
 }
 
 /// Settings of a [`SeaShader`].
-pub(super) struct SeaShaderInput {
+pub(crate) struct SeaShaderInput {
     pub eye_height: f32,
     pub focal: f32,
     /// Tangent of the steepest line of sight below the horizontal.
@@ -192,16 +203,21 @@ impl SeaShader {
         columns.clear();
         // The last block looks up to one column beyond itself.
         columns.extend((0..=view.width.next_multiple_of(BLOCK)).map(|x| {
-            let n = (x as f32 + 0.5 - view.centre) / view.focal;
-            let secant = (1.0 + n * n).sqrt();
-            let azimuth = (view.azimuth + n.atan()).rem_euclid(TAU);
+            let off = (x as f32 + 0.5 - view.centre) / view.focal;
+            let secant = (1.0 + off * off).sqrt();
+            let turned = if view.shape == ViewShape::Plane { off.atan() } else { off };
+            let azimuth = (view.azimuth + turned).rem_euclid(TAU);
+            let (east, north, scale) = match view.shape {
+                ViewShape::Plane => ((sin + off * cos) / secant, (cos - off * sin) / secant, secant),
+                ViewShape::Cylinder => (azimuth.sin(), azimuth.cos(), 1.0),
+            };
             let degree = azimuth.to_degrees();
             let (low, fraction) = (degree as usize % 360, degree.fract());
             let (a, b) = (self.haze[low], self.haze[(low + 1) % 360]);
             SeaColumn {
-                east: (sin + n * cos) / secant,
-                north: (cos - n * sin) / secant,
-                scale: view.focal * secant,
+                east,
+                north,
+                scale: view.focal * scale,
                 table_column: azimuth * COLUMNS_PER_RADIAN,
                 haze: a.lerp(b, fraction),
             }

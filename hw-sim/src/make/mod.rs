@@ -15,16 +15,16 @@
 //! sun's glitter is Cox and Munk's. The level picture is then turned into the camera's. Left out: second reflections between
 //! waves (only their dimming), shadows of clouds, spray, the ship's own wake. Believable up to about Beaufort 7.
 
-mod camera;
+pub(crate) mod camera;
 mod foam;
-mod imu;
-mod march;
-mod motion;
+pub(crate) mod imu;
+pub(crate) mod march;
+pub(crate) mod motion;
 mod patches;
 mod recipe;
 mod shade;
 mod ship;
-mod studio;
+pub(crate) mod studio;
 mod write;
 
 pub use imu::samples as imu_samples;
@@ -32,6 +32,7 @@ pub use motion::{GRAVITY, GunMotion, Harmonic, Motion, MotionState, Periodic, Sh
 pub use recipe::{Burst, CameraRecipe, ImuRecipe, Jolt, Recipe, ShipFeedRecipe};
 pub use ship::samples as ship_samples;
 pub use studio::{Studio, StudioShot};
+pub(crate) use write::properties;
 pub use write::{DEVICE_LOOP_KEY, MadeRecording, START, calibration, make};
 
 pub use crate::ocean::{cloudy::SkyRecipe, spectrum::Swell};

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use bowwave_core::geometry::CameraPose;
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 
 /// Standard gravity, m/s^2 (CGPM 1901).
 pub use crate::ocean::spectrum::GRAVITY;
@@ -120,14 +120,41 @@ impl Motion {
 
     /// The state `time_s` seconds after the recording's start.
     pub fn at(&self, time_s: f64) -> MotionState {
+        let gun = [&self.gun.traverse, &self.gun.elevation].map(|p| p.at(time_s, self.period_s));
+        self.compose(time_s, gun)
+    }
+
+    /// The state where the gun is turned by traverse and elevation (radians) at these rates, whatever its own motion says.
+    pub(crate) fn with_gun(&self, time_s: f64, angles: DVec2, rates: DVec2) -> MotionState {
+        self.compose(time_s, [[angles.x, rates.x, 0.0], [angles.y, rates.y, 0.0]])
+    }
+
+    /// Second derivatives of the ship's heading, pitch and roll, rad/s^2.
+    pub(crate) fn ship_accelerations(&self, time_s: f64) -> [f64; 3] {
+        [&self.ship.heading, &self.ship.pitch, &self.ship.roll].map(|p| p.at(time_s, self.period_s)[2])
+    }
+
+    /// The heading that the ship swings about, radians.
+    pub(crate) const fn heading_mean(&self) -> f64 {
+        self.ship.heading.mean
+    }
+
+    /// Turn from the deck (x to starboard, y to the bow, z up) to the world.
+    pub(crate) fn world_from_deck(&self, time_s: f64) -> DQuat {
+        let [heading, pitch, roll] = self.ship_at(time_s);
+        let turn = DQuat::from_axis_angle;
+        turn(DVec3::NEG_Z, heading) * turn(DVec3::X, pitch) * turn(DVec3::Y, roll)
+    }
+
+    fn compose(&self, time_s: f64, [traverse, elevation]: [[f64; 3]; 2]) -> MotionState {
         let value = |p: &Periodic| p.at(time_s, self.period_s);
         // From the world to the gun, each turn about an axis of the body so far (x right, y forward, z up).
         let chain = [
             (DVec3::NEG_Z, value(&self.ship.heading)),
             (DVec3::X, value(&self.ship.pitch)),
             (DVec3::Y, value(&self.ship.roll)),
-            (DVec3::NEG_Z, value(&self.gun.traverse)),
-            (DVec3::X, value(&self.gun.elevation)),
+            (DVec3::NEG_Z, traverse),
+            (DVec3::X, elevation),
         ];
         let mut world_from_body = DQuat::IDENTITY;
         let mut rate = DVec3::ZERO;

@@ -42,39 +42,22 @@ pub struct StudioShot {
 impl Studio {
     /// Prepares waves, sky and camera; about a second of work.
     pub fn new(recipe: &Recipe) -> Result<Self, MakeError> {
+        Self::with_detail(recipe, 1.0)
+    }
+
+    /// The same with waves drawn `detail` times as finely as recordings have them, as a truth to compare pictures with.
+    pub fn with_detail(recipe: &Recipe, detail: f32) -> Result<Self, MakeError> {
         recipe.check()?;
-        let wind = wind_of_beaufort(recipe.beaufort.get());
-        let sea = WindSea::new(wind);
-        let field =
-            LoopedSea::new(&sea, recipe.wind_from, recipe.swell.as_ref(), recipe.duration_s, recipe.seed);
-        let mut surface = field.surface();
-        field.evaluate(0.0, &mut surface);
-        let sky = CloudySky::new(&recipe.sky, recipe.seed).ok_or(MakeError::Recipe {
-            what: "sky.turbidity",
-            value: recipe.sky.turbidity,
-            range: "1 to 10",
-        })?;
-        let camera = RecipeCamera::new(recipe);
+        let mut camera = RecipeCamera::new(recipe);
+        camera.refine(detail);
         let coverage = ViewCoverage::new(recipe);
-        let focal = recipe.lens().focal.x as f32;
-        let panorama = Panorama::new(&sky, coverage.azimuth, coverage.above, focal);
-        let dome = CloudyDome::new(&sky);
-        let input = SeaShaderInput {
-            eye_height: recipe.eye_height_m as f32,
-            focal: level_focal(&recipe.lens()),
-            steepest: coverage.below,
-            visibility_m: recipe.visibility_m as f32,
-            slopes: cox_munk_fits(wind),
-            wind_from: recipe.wind_from,
-            wind,
-            upwelling: upwelling(&sky),
-            seed: recipe.seed,
-        };
-        let water = SeaShader::new(&input, &sky, &dome, &surface);
+        let lens = recipe.lens();
+        let focals = FocalLengths { sky: lens.focal.x as f32, sea: detail * level_focal(&lens) };
+        let LitSea { field, scene, surface } = LitSea::new(recipe, &coverage, focals, true)?;
         Ok(Self {
             motion: recipe.motion(),
             field,
-            scene: SeaScene { sky, panorama, water },
+            scene,
             camera,
             exposure_delay_s: recipe.exposure_delay_s(),
             frame_rate_hz: recipe.frame_rate_hz,
@@ -120,6 +103,61 @@ impl Studio {
             spare.push((surface, memory));
         }
         (pose, taken)
+    }
+}
+
+/// Pixels per radian at which sky and sea are prepared.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FocalLengths {
+    pub sky: f32,
+    pub sea: f32,
+}
+
+/// The waves of a recipe and how they are lit.
+pub(crate) struct LitSea {
+    pub field: LoopedSea,
+    pub scene: SeaScene,
+    /// The surface at the recording's begin, and memory for another instant.
+    pub surface: LoopedSurface,
+}
+
+impl LitSea {
+    /// Prepares what is seen within `coverage`, without the sun's own light where it is down; about a second of work.
+    pub fn new(
+        recipe: &Recipe,
+        coverage: &ViewCoverage,
+        focals: FocalLengths,
+        sun_is_up: bool,
+    ) -> Result<Self, MakeError> {
+        let wind = wind_of_beaufort(recipe.beaufort.get());
+        let sea = WindSea::new(wind);
+        let field =
+            LoopedSea::new(&sea, recipe.wind_from, recipe.swell.as_ref(), recipe.duration_s, recipe.seed);
+        let mut surface = field.surface();
+        field.evaluate(0.0, &mut surface);
+        let mut sky = CloudySky::new(&recipe.sky, recipe.seed).ok_or(MakeError::Recipe {
+            what: "sky.turbidity",
+            value: recipe.sky.turbidity,
+            range: "1 to 10",
+        })?;
+        if !sun_is_up {
+            sky.sun_irradiance = [0.0; 3];
+        }
+        let panorama = Panorama::new(&sky, coverage.azimuth, coverage.above, focals.sky);
+        let dome = CloudyDome::new(&sky);
+        let input = SeaShaderInput {
+            eye_height: recipe.eye_height_m as f32,
+            focal: focals.sea,
+            steepest: coverage.below,
+            visibility_m: recipe.visibility_m as f32,
+            slopes: cox_munk_fits(wind),
+            wind_from: recipe.wind_from,
+            wind,
+            upwelling: upwelling(&sky),
+            seed: recipe.seed,
+        };
+        let water = SeaShader::new(&input, &sky, &dome, &surface);
+        Ok(Self { field, scene: SeaScene { sky, panorama, water }, surface })
     }
 }
 

@@ -53,7 +53,7 @@ pub fn make(
     progress: &mut dyn FnMut(u64, u64),
 ) -> Result<MadeRecording, MakeError> {
     let studio = Studio::new(recipe)?;
-    let mut writer = RecordingWriter::create(path, &properties(recipe))?;
+    let mut writer = RecordingWriter::create(path, &properties(recipe, &calibration(recipe)))?;
     let mut others = measurements(recipe).into_iter().peekable();
     let mut latency = stream(recipe.seed, 0xca3);
     let frames = studio.frames();
@@ -120,10 +120,11 @@ fn measurements(recipe: &Recipe) -> Vec<Entry> {
     entries
 }
 
-fn properties(recipe: &Recipe) -> Properties {
+/// What a recording of a recipe says about itself.
+pub(crate) fn properties(recipe: &Recipe, calibration: &CalibrationFile) -> Properties {
     let device_loop = imu::device_ns(recipe.duration_s, recipe.imu.clock_drift_ppm);
     Properties {
-        calibration_toml: to_toml(&calibration(recipe)),
+        calibration_toml: to_toml(calibration),
         scenario_toml: recipe.scenario_toml.clone(),
         loop_ns: Some(recipe.duration_ns()),
         start: START,

@@ -20,6 +20,7 @@ use std::{
     io,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
+    thread::{self, JoinHandle},
 };
 
 use bowwave_core::{event::Event, geometry::CameraPose, time::Time};
@@ -32,7 +33,7 @@ use self::{
     truth::Truth,
     wire::{Wire, WireCounters},
 };
-use crate::fault::FaultPlan;
+use crate::{fault::FaultPlan, panorama::PanoramaError};
 
 /// How a recording is to be replayed.
 #[derive(Clone, Debug)]
@@ -119,6 +120,9 @@ pub enum ReplayError {
     /// The serial code cannot use the pseudo-terminal.
     #[error("a simulated device's line: {0}")]
     Serial(#[from] SerialError),
+    /// The sea that a simulated camera looks at cannot be read.
+    #[error(transparent)]
+    Panorama(#[from] PanoramaError),
     /// A thread could not be started.
     #[error("cannot start the replay's thread {name}: {source}; are too many processes running?")]
     Thread {
@@ -240,9 +244,20 @@ impl Source {
 }
 
 /// Numbers that threads share.
-type Shared<T> = Arc<Mutex<T>>;
+pub(crate) type Shared<T> = Arc<Mutex<T>>;
 
 /// Plain numbers are whole even where a holder panicked.
-fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+pub(crate) fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Starts a thread.
+pub(crate) fn spawn<T: Send + 'static>(
+    name: &'static str,
+    run: impl FnOnce() -> T + Send + 'static,
+) -> Result<JoinHandle<T>, ReplayError> {
+    thread::Builder::new()
+        .name(name.to_owned())
+        .spawn(run)
+        .map_err(|source| ReplayError::Thread { name, source })
 }

@@ -2,11 +2,8 @@
 
 use std::{
     path::Path,
-    sync::{
-        Arc, Mutex,
-        atomic::{AtomicBool, Ordering},
-    },
-    thread::{self, JoinHandle},
+    sync::{Arc, Mutex},
+    thread::JoinHandle,
 };
 
 use bowwave_core::{
@@ -24,10 +21,13 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use super::{
     ReplayError, ReplayOptions, ReplayStats, Shared, Source,
     decode::FrameDecoder,
-    locked,
+    locked, spawn,
     wire::{Item, RecordedPicture, Wire},
 };
-use crate::pty::Terminal;
+use crate::{
+    pace::{StopFlag, StopOnDrop},
+    pty::Terminal,
+};
 
 /// From opening to the recording's beginning: time to read and decode the first picture ahead.
 const PREROLL_NS: i64 = 60_000_000;
@@ -38,9 +38,6 @@ const DECODE_LEAD_NS: i64 = 12_000_000;
 
 /// Pictures older than this when their turn comes are not decoded any more.
 const LATE_MAX_NS: i64 = 100_000_000;
-
-/// Longest sleep before a thread looks at whether to stop.
-const NAP_NS: i64 = 50_000_000;
 
 /// How long the line stays open after its last byte, for the reader to fetch it.
 const LINGER_NS: i64 = 50_000_000;
@@ -85,9 +82,9 @@ impl RealtimeReplay {
         let ship =
             ship_terminal.as_ref().map(|terminal| ShipPort::open(terminal.slave(), SHIP_BAUD)).transpose()?;
         let terminals = Terminals { imu, ship: ship_terminal };
-        let stop = Arc::new(AtomicBool::new(false));
+        let stop = StopFlag::default();
         let stats = Arc::new(Mutex::new(ReplayStats::default()));
-        let pace = || Pace { stop: Arc::clone(&stop), stats: Arc::clone(&stats) };
+        let pace = || Pace { stop: stop.clone(), stats: Arc::clone(&stats) };
         let (errors_in, errors) = bounded(2);
         let (coded_in, coded) = bounded(AHEAD_FRAMES);
         let (due_in, due) = bounded(AHEAD_LINE);
@@ -162,7 +159,7 @@ impl RealtimeReplay {
 
     /// Ends the threads and closes the line.
     pub fn stop(self) -> Result<ReplayStats, ReplayError> {
-        self.stop.0.store(true, Ordering::Relaxed);
+        self.stop.0.stop();
         let broke_down = |name| move |_| ReplayError::BrokeDown { name };
         // All are asked to end before any failure is reported.
         let line = self.line.join().map_err(broke_down("replay-line"));
@@ -178,48 +175,19 @@ impl RealtimeReplay {
     }
 }
 
-/// Has the threads end where a replay is dropped without [`RealtimeReplay::stop`].
-struct StopOnDrop(Arc<AtomicBool>);
-
-impl Drop for StopOnDrop {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
-
-fn spawn<T: Send + 'static>(
-    name: &'static str,
-    run: impl FnOnce() -> T + Send + 'static,
-) -> Result<JoinHandle<T>, ReplayError> {
-    thread::Builder::new()
-        .name(name.to_owned())
-        .spawn(run)
-        .map_err(|source| ReplayError::Thread { name, source })
-}
-
 /// What the threads share.
 struct Pace {
-    stop: Arc<AtomicBool>,
+    stop: StopFlag,
     stats: Shared<ReplayStats>,
 }
 
 impl Pace {
     fn stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+        self.stop.is_stopped()
     }
 
-    /// Waits for `due`; `false` where the replay is stopped before that.
     fn wait(&self, due: Time) -> bool {
-        loop {
-            if self.stopped() {
-                return false;
-            }
-            let now = clock::now();
-            if now >= due {
-                return true;
-            }
-            clock::sleep_until(due.min(now.plus_ns(NAP_NS)));
-        }
+        self.stop.wait(due)
     }
 
     fn count(&self, change: impl FnOnce(&mut ReplayStats)) {

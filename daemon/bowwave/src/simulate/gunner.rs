@@ -88,13 +88,12 @@ struct Runs {
 
 /// Plays the scenario and prints the scores.
 pub fn run(arguments: &Simulate, gunner: &str) -> Result<()> {
-    let named = Skill::NAMED.into_iter().find(|(name, _)| *name == gunner);
-    let (name, skill) = named.context("no such gunner")?;
+    let (name, skill) = Skill::named(gunner).context("no such gunner")?;
     let path = arguments.scenario.as_deref().unwrap_or(Path::new("default"));
     let LoadedScenario { scenario, models, of_boats } = load_scenario(path)?;
     let models: Arc<[Model]> = models.into();
-    let limit_s = arguments.duration.or(scenario.duration_s).unwrap_or(ENDLESS_S);
-    let first_seed = arguments.seed.unwrap_or(scenario.seed);
+    let limit_s = arguments.desk.duration.or(scenario.duration_s).unwrap_or(ENDLESS_S);
+    let first_seed = arguments.desk.seed.unwrap_or(scenario.seed);
     let begun = Instant::now();
     let played = |index: u64| {
         let scenario = Scenario { seed: first_seed.wrapping_add(index), ..scenario.clone() };
@@ -103,7 +102,11 @@ pub fn run(arguments: &Simulate, gunner: &str) -> Result<()> {
     };
     let Some(runs) = arguments.runs else {
         let (sheet, _) = played(0);
-        return if arguments.json { stdout::print_json(&sheet) } else { stdout::print(score::text(&sheet)) };
+        return if arguments.desk.json {
+            stdout::print_json(&sheet)
+        } else {
+            stdout::print(score::text(&sheet))
+        };
     };
     let sheets = side_by_side(runs, &played);
     let seconds: f64 = sheets.iter().map(|(_, seconds)| seconds).sum();
@@ -127,7 +130,7 @@ pub fn run(arguments: &Simulate, gunner: &str) -> Result<()> {
         breaches: spread(&|s| Some(s.breaches.len() as f64)),
         neutral_hits: spread(&|s| Some(f64::from(s.rounds.neutral_hits))),
     };
-    if arguments.json { stdout::print_json(&runs) } else { stdout::print(table(&runs)) }
+    if arguments.desk.json { stdout::print_json(&runs) } else { stdout::print(table(&runs)) }
 }
 
 /// Runs in the order of their seeds, as many at once as there are processors.

@@ -1,9 +1,6 @@
 //! What a run is made of, gathered from the command line, the configuration, the recording and what is built in.
 
-use std::{
-    path::{Path, PathBuf},
-    time::Duration,
-};
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::CalibrationFile;
@@ -16,46 +13,28 @@ use bowwave_core::{
 };
 use bowwave_files::plain_text;
 use bowwave_record::{Properties, RecordingReader};
-use bowwave_trainer::{presenter::GpuSettings, replay::session_properties};
 
 use crate::{
     cache,
     cli::{OrientationArg, Simulate},
-    config::{self, Config, ScreenOutput},
+    desk::{self, PreparedRun},
     loading::{read_scenario, scenario_models, warn_of_former_names},
 };
 
-/// Screen size where nothing else is said.
-const SIZE: (u32, u32) = (1280, 720);
-
-/// A run, ready to begin.
+/// A recording, and the run that it is for.
 #[derive(Debug)]
-pub struct Prepared {
+pub struct PreparedRecording {
     /// The recording.
-    pub recording: PathBuf,
-    /// What it says about itself.
-    pub properties: Properties,
+    pub path: PathBuf,
     /// Its length, nanoseconds.
     pub duration_ns: i64,
-    /// What the session is made from.
-    pub setup: Setup,
-    /// Text of the scenario in use.
-    pub scenario_toml: String,
-    /// Text of the calibration in use.
-    pub calibration_toml: String,
-    /// Folder that the paths of the scenario's models start from.
-    pub models_base: PathBuf,
-    /// The GPU.
-    pub gpu: GpuSettings,
-    /// Whether to show a window.
-    pub window: bool,
-    /// Whether to keep what went in.
-    pub record: bool,
+    /// The run.
+    pub run: PreparedRun,
 }
 
 /// Gathers what a run needs, and refuses what cannot work before anything is begun.
-pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
-    let config = arguments.config.as_deref().map_or_else(|| Ok(Config::default()), config::read)?;
+pub fn prepare(arguments: &Simulate) -> Result<PreparedRecording> {
+    let config = desk::config(&arguments.desk)?;
     let recording = match &arguments.recording {
         Some(path) => path.clone(),
         None => cache::default_recording()?,
@@ -83,7 +62,7 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
     }
     let named = arguments.scenario.as_ref().or(config.files.scenario.as_ref());
     let (mut scenario, scenario_toml, base) = scenario(named, &properties, &recording)?;
-    if let Some(seed) = arguments.seed {
+    if let Some(seed) = arguments.desk.seed {
         scenario.seed = seed;
     }
     let (models, boat_models) = scenario_models(&scenario, &base)?;
@@ -91,34 +70,33 @@ pub fn prepare(arguments: &Simulate) -> Result<Prepared> {
     if let Some(warning) = warning {
         log::warn!("{warning}");
     }
-    Ok(Prepared {
-        recording,
+    let setup = Setup {
+        scenario,
+        own_ship: calibration.own_ship_mask(),
+        calibration: calibration.calibration,
+        models: models.into(),
+        boat_models,
+        screen: desk::screen(&arguments.desk, &config),
+        // JPEG pictures are decoded to RGB.
+        video: PixelFormat::Rgb,
+        orientation: orientation.unwrap_or(config.orientation),
+        heading: config.heading.settings.clone(),
+    };
+    let window = desk::shows_window(&arguments.desk, &config);
+    let record = arguments.desk.record || config.files.record;
+    let gpu = desk::gpu(&arguments.desk, config.gpu);
+    let run = PreparedRun {
         properties,
-        duration_ns,
-        setup: Setup {
-            scenario,
-            own_ship: calibration.own_ship_mask(),
-            calibration: calibration.calibration,
-            models: models.into(),
-            boat_models,
-            screen: arguments.size.or(config.size).unwrap_or(SIZE),
-            // JPEG pictures are decoded to RGB.
-            video: PixelFormat::Rgb,
-            orientation: orientation.unwrap_or(config.orientation),
-            heading: config.heading.settings.clone(),
-        },
+        setup,
         scenario_toml,
         calibration_toml,
         models_base: base,
-        gpu: GpuSettings {
-            device: arguments.gpu.clone().or(config.gpu.device),
-            validation: arguments.validation || config.gpu.validation,
-            // A desk may do other work than to draw: half a second without a frame is no hung GPU there.
-            timeout: Some(Duration::from_secs(5)),
-        },
-        window: arguments.window || config.output == ScreenOutput::Window && !arguments.headless,
-        record: arguments.record || config.files.record,
-    })
+        gpu,
+        window,
+        aims: false,
+        record,
+    };
+    Ok(PreparedRecording { path: recording, duration_ns, run })
 }
 
 /// The source of the orientation that the command line asks for, and the warning about a former name.
@@ -174,22 +152,6 @@ fn scenario(
     let scenario = Scenario::parse(&text, &origin)?;
     warn_of_former_names(&scenario.warnings);
     Ok((scenario, text, base))
-}
-
-/// The properties of a recording of this run: the same hardware, with the calibration and scenario in use.
-pub fn properties_of_run(prepared: &Prepared, start: bowwave_core::time::Time) -> Properties {
-    let mut extra = prepared.properties.extra.clone();
-    extra.extend(session_properties(&prepared.setup, &prepared.models_base));
-    Properties {
-        calibration_toml: prepared.calibration_toml.clone(),
-        scenario_toml: Some(prepared.scenario_toml.clone()),
-        // What is kept is a stretch of the original: it need not close.
-        loop_ns: None,
-        start,
-        source: format!("replay of {}", prepared.properties.source),
-        extra,
-        ..prepared.properties.clone()
-    }
 }
 
 #[cfg(test)]

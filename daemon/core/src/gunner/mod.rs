@@ -10,5 +10,5 @@ mod head;
 mod play;
 mod skill;
 
-pub use play::{Played, play};
+pub use play::{Gunner, GunnerMove, Played, play};
 pub use skill::Skill;

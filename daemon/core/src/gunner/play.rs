@@ -24,8 +24,6 @@ use crate::{
     },
 };
 
-/// Step of a gunner, seconds: people do nothing faster than 5 rad/s.
-const STEP_S: f64 = 1.0 / 30.0;
 /// How far back the gun's way is kept, seconds.
 const KEPT_S: f64 = 1.0;
 /// Significant wave height of the sea that [`Skill::sea_mrad`] is for, metres.
@@ -85,6 +83,119 @@ impl BoreTrack {
     }
 }
 
+/// A gunner at the gun of a world.
+pub struct Gunner {
+    skill: Skill,
+    head: Head,
+    hand: Hand,
+    eye: Eye,
+    wander: f64,
+    groups: Vec<usize>,
+    asked_to_warn: bool,
+    self_defence_m: f64,
+    random: Pcg64,
+    pressed: bool,
+    wanted: Option<DVec2>,
+}
+
+/// What a gunner does in a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GunnerMove {
+    /// Whether the trigger is held from now on.
+    pub pressed: bool,
+    /// What is said or done besides.
+    pub acts: Vec<Act>,
+    /// Azimuth (clockwise from north) and elevation of the gun after the step, radians.
+    pub bore: DVec2,
+    /// Rates at which what is aimed at moves, rad/s.
+    pub rates: DVec2,
+    /// Whether the scenario's hostile boats are all stopped or gone.
+    pub is_decided: bool,
+}
+
+impl Gunner {
+    /// One that plays `scenario` and looks to the north. All chance follows from the scenario's seed.
+    pub fn new(scenario: &Scenario, skill: &Skill) -> Self {
+        let mut random = Pcg64::new(u128::from(scenario.seed), STREAM);
+        let weapon = KnownWeapon {
+            projectile: scenario.weapon.projectile,
+            cycle_s: 60.0 / scenario.weapon.rounds_per_minute.max(1.0),
+            wind: scenario.wind,
+        };
+        let names: Vec<&str> = scenario.boats.iter().map(|boat| group_of(&boat.name)).collect();
+        Self {
+            skill: *skill,
+            head: Head::new(*skill, weapon, scenario.boats.len(), &mut random),
+            hand: Hand::at(0.0, 0.0),
+            eye: Eye {
+                at: DVec3::new(0.0, 0.0, scenario.eye_height_m),
+                visibility_m: scenario.daylight.visibility_m,
+                weather: weather(scenario.water.force.get()),
+            },
+            wander: wander(scenario, skill),
+            groups: names.iter().map(|name| names.iter().position(|n| n == name).unwrap_or(0)).collect(),
+            asked_to_warn: scenario.exercise.calls.iter().any(|call| call.call == Act::Warn),
+            self_defence_m: scenario.exercise.self_defence_m,
+            random,
+            pressed: false,
+            wanted: None,
+        }
+    }
+
+    /// Direction of the gun: azimuth (clockwise from north) and elevation, radians.
+    pub fn bore(&self) -> DVec2 {
+        self.hand.bore()
+    }
+
+    /// Whether the trigger is held.
+    pub const fn presses(&self) -> bool {
+        self.pressed
+    }
+
+    /// Sees the world as it is `time_s` seconds after the begin, and acts for the next [`STEP_S`](Self::STEP_S). `None` before the world runs.
+    pub fn step(&mut self, world: &World, time_s: f64) -> Option<GunnerMove> {
+        let running = world.running()?;
+        for event in world.events() {
+            if let ExerciseFact::Missed { boat, why, .. } = &event.fact
+                && let Some(boat) = (0..running.fleet.len()).find(|b| running.fleet.name(*b) == boat)
+            {
+                self.head.saw_miss(boat, why.error_mrad);
+            }
+        }
+        let sighted = self.eye.sees(running);
+        let off = self.wanted.map_or(f64::INFINITY, |wanted| self.hand.off(wanted));
+        let moment = Moment {
+            time_s,
+            span_s: Self::STEP_S,
+            sighted: &sighted,
+            rules: world.watch().rules(),
+            warns: self.asked_to_warn || world.watch().rules() == Some(Engagement::Warn),
+            self_defence_m: self.self_defence_m,
+            weapon: world.weapon_state(),
+            eye: self.eye.at,
+            off,
+            groups: &self.groups,
+        };
+        let decision = self.head.decide(&moment, &mut self.random);
+        self.pressed = decision.trigger;
+        self.wanted = decision.wanted.map(|(at, _)| at);
+        let rates = decision.wanted.map_or(DVec2::ZERO, |(_, rates)| rates);
+        if let Some(to) = decision.wanted {
+            self.hand.follow(&self.skill, to, self.wander, Self::STEP_S, &mut self.random);
+        }
+        Some(GunnerMove {
+            pressed: decision.trigger,
+            acts: decision.acts,
+            bore: self.hand.bore(),
+            rates,
+            is_decided: world.watch().is_decided(),
+        })
+    }
+
+    /// Step of a gunner, seconds: people do nothing faster than 5 rad/s.
+    pub const STEP_S: f64 = 1.0 / 30.0;
+}
+
 /// Plays a scenario for `limit_s` seconds at most, or until some seconds after all hostile boats are stopped or gone. All chance follows from
 /// the scenario's seed. `boat_models` names the model of each boat.
 pub fn play(
@@ -95,70 +206,28 @@ pub fn play(
     limit_s: f64,
 ) -> Played {
     let begin = Time::from_ns(0);
-    let mut random = Pcg64::new(u128::from(scenario.seed), STREAM);
     let mut world = World::new(scenario, models, boat_models);
-    let eye = Eye {
-        at: DVec3::new(0.0, 0.0, scenario.eye_height_m),
-        visibility_m: scenario.daylight.visibility_m,
-        weather: weather(scenario.water.force.get()),
-    };
-    let weapon = KnownWeapon {
-        projectile: scenario.weapon.projectile,
-        cycle_s: 60.0 / scenario.weapon.rounds_per_minute.max(1.0),
-        wind: scenario.wind,
-    };
-    let mut head = Head::new(*skill, weapon, scenario.boats.len(), &mut random);
-    let names: Vec<&str> = scenario.boats.iter().map(|boat| group_of(&boat.name)).collect();
-    let groups: Vec<usize> =
-        names.iter().map(|name| names.iter().position(|n| n == name).unwrap_or(0)).collect();
-    let asked_to_warn = scenario.exercise.calls.iter().any(|call| call.call == Act::Warn);
-    let mut hand = Hand::at(0.0, 0.0);
-    let wander = wander(scenario, skill);
-    let mut track = BoreTrack { kept: VecDeque::new(), muzzle: eye.at };
+    let mut gunner = Gunner::new(scenario, skill);
+    let muzzle = DVec3::new(0.0, 0.0, scenario.eye_height_m);
+    let mut track = BoreTrack { kept: VecDeque::new(), muzzle };
     let mut played = Played::default();
-    let (mut pressed, mut wanted, mut over_since) = (false, None, None);
+    let mut over_since = None;
     let mut step = 0_u32;
     loop {
-        let time = begin.plus_secs(f64::from(step) * STEP_S);
-        track.push(time, hand.bore());
+        let time_s = f64::from(step) * Gunner::STEP_S;
+        let time = begin.plus_secs(time_s);
+        let pressed = gunner.presses();
+        track.push(time, gunner.bore());
         world.advance(begin, time, time, |at| track.at(at), &mut played.shots);
         played.events.extend_from_slice(world.events());
-        let Some(running) = world.running() else { break };
-        for event in world.events() {
-            if let ExerciseFact::Missed { boat, why, .. } = &event.fact
-                && let Some(boat) = (0..running.fleet.len()).find(|b| running.fleet.name(*b) == boat)
-            {
-                head.saw_miss(boat, why.error_mrad);
-            }
-        }
-        let sighted = eye.sees(running);
-        let time_s = f64::from(step) * STEP_S;
-        let off = wanted.map_or(f64::INFINITY, |wanted| hand.off(wanted));
-        let moment = Moment {
-            time_s,
-            span_s: STEP_S,
-            sighted: &sighted,
-            rules: world.watch().rules(),
-            warns: asked_to_warn || world.watch().rules() == Some(Engagement::Warn),
-            self_defence_m: scenario.exercise.self_defence_m,
-            weapon: world.weapon_state(),
-            eye: eye.at,
-            off,
-            groups: &groups,
-        };
-        let decision = head.decide(&moment, &mut random);
-        for act in decision.acts {
+        let Some(moved) = gunner.step(&world, time_s) else { break };
+        for act in moved.acts {
             world.act(TraineeAct { time, act });
         }
-        if decision.trigger != pressed {
-            pressed = decision.trigger;
-            world.trigger(TriggerEdge { time, pressed });
+        if moved.pressed != pressed {
+            world.trigger(TriggerEdge { time, pressed: moved.pressed });
         }
-        wanted = decision.wanted.map(|(at, _)| at);
-        if let Some(to) = decision.wanted {
-            hand.follow(skill, to, wander, STEP_S, &mut random);
-        }
-        if world.watch().is_decided() {
+        if moved.is_decided {
             over_since.get_or_insert(time_s);
         } else {
             over_since = None;

@@ -112,4 +112,9 @@ impl Skill {
     /// All, by the names that the command line has.
     pub const NAMED: [(&'static str, Self); 3] =
         [("novice", Self::NOVICE), ("trained", Self::TRAINED), ("expert", Self::EXPERT)];
+
+    /// The one of a name, with its name.
+    pub fn named(name: &str) -> Option<(&'static str, Self)> {
+        Self::NAMED.into_iter().find(|(known, _)| *known == name)
+    }
 }

@@ -54,6 +54,8 @@ pub struct OutputOptions {
     pub stills: Vec<u64>,
     /// Whether to show a window.
     pub window: bool,
+    /// Whether mouse and keys turn a gun there.
+    pub aims: bool,
 }
 
 /// What a frame carries through the renderer.
@@ -72,10 +74,12 @@ pub struct Ticket {
 }
 
 /// What the user did at the window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum UserEvent {
     /// The space bar.
     Trigger(TriggerEdge),
+    /// Mouse and arrow keys: a simulated gun is to turn to the right and upwards, in widths of the picture.
+    Turn([f64; 2]),
     /// Z: the gun stands at its stow.
     Rezero,
     /// A letter: an act of the trainee.
@@ -229,7 +233,7 @@ impl OutputWorker {
 
     fn run(mut self) -> Result<OutputReport> {
         if self.options.window {
-            self.screen = Some(Screen::open(self.options.size)?);
+            self.screen = Some(Screen::open(self.options.size, self.options.aims)?);
         }
         while !self.completions.is_over() {
             if let Some(reporter) = &self.options.reporter {
@@ -290,6 +294,7 @@ impl OutputWorker {
             for pressed in screen.show(frame.rgba())? {
                 let event = match pressed {
                     Pressed::Fire(pressed) => UserEvent::Trigger(TriggerEdge { time: now(), pressed }),
+                    Pressed::Turn(turn) => UserEvent::Turn(turn),
                     Pressed::Rezero => UserEvent::Rezero,
                     Pressed::Act(act) => UserEvent::Act(TraineeAct { time: now(), act }),
                     Pressed::Quit => UserEvent::Quit,

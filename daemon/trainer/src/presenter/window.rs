@@ -1,15 +1,17 @@
-//! The window on a desktop. Space is the trigger, letters are the trainee's acts (see [`KEYS`]), Z says that the gun stands at its stow,
-//! escape ends.
+//! The window on a desktop. Space or the left mouse button is the trigger, mouse and arrow keys turn a simulated gun, letters are the
+//! trainee's acts (see [`KEYS`]), Z says that the gun stands at its stow, escape ends.
 
 use anyhow::{Context, Result};
 use bowwave_core::{act::Act, side::Side};
-use minifb::{Key, KeyRepeat, ScaleMode, Window, WindowOptions};
+use minifb::{Key, KeyRepeat, MouseButton, MouseMode, ScaleMode, Window, WindowOptions};
 
 /// What the user did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pressed {
     /// The trigger was pressed (`true`) or released.
     Fire(bool),
+    /// The gun is to turn: to the right and upwards, in widths of the picture.
+    Turn([f64; 2]),
     /// The gun stands at its stow.
     Rezero,
     /// An act of the trainee, or a call that an instructor marks.
@@ -30,6 +32,15 @@ pub const KEYS: [(Key, Act); 8] = [
     (Key::F, Act::Ready),
 ];
 
+/// Keys that turn the gun: to the right and upwards.
+const ARROWS: [(Key, [f64; 2]); 4] =
+    [(Key::Left, [-1.0, 0.0]), (Key::Right, [1.0, 0.0]), (Key::Up, [0.0, 1.0]), (Key::Down, [0.0, -1.0])];
+/// Turn of a frame while an arrow is held, and with a shift key, in widths of the picture: about 12 and 2 degrees a second.
+const ARROW_TURN: [f64; 2] = [0.007, 0.0012];
+/// Share of the window beside its edge in which the pointer goes on turning the gun, and the turn of a frame there.
+const EDGE: f64 = 0.02;
+const EDGE_TURN: f64 = 0.008;
+
 /// A window of the screen's size.
 pub struct Screen {
     window: Window,
@@ -37,20 +48,26 @@ pub struct Screen {
     /// 0RGB words, as the window takes them.
     words: Vec<u32>,
     firing: bool,
+    /// Where the pointer was, in widths and heights of the window.
+    pointer: Option<[f64; 2]>,
 }
 
 impl Screen {
-    /// Opens the window.
-    pub fn open((width, height): (u32, u32)) -> Result<Self> {
+    /// Opens the window; `aims` where mouse and keys turn a gun.
+    pub fn open((width, height): (u32, u32), aims: bool) -> Result<Self> {
         let size = (width as usize, height as usize);
         let options = WindowOptions {
             resize: true,
             scale_mode: ScaleMode::AspectRatioStretch,
             ..WindowOptions::default()
         };
-        let window = Window::new("Bowwave - TRAINING", size.0, size.1, options)
+        let mut window = Window::new("Bowwave - TRAINING", size.0, size.1, options)
             .context("cannot open a window; is there a desktop (DISPLAY)? --headless runs without")?;
-        Ok(Self { window, size, words: vec![0; size.0 * size.1], firing: false })
+        if aims {
+            // The pointer only turns the gun: where it is means nothing.
+            window.set_cursor_visibility(false);
+        }
+        Ok(Self { window, size, words: vec![0; size.0 * size.1], firing: false, pointer: None })
     }
 
     /// Shows a frame (sRGB RGBA bytes) and says what the user did meanwhile.
@@ -61,7 +78,7 @@ impl Screen {
         self.window
             .update_with_buffer(&self.words, self.size.0, self.size.1)
             .context("cannot draw into the window")?;
-        let firing = self.window.is_key_down(Key::Space);
+        let firing = self.window.is_key_down(Key::Space) || self.window.get_mouse_down(MouseButton::Left);
         let trigger = (firing != self.firing).then_some(Pressed::Fire(firing));
         self.firing = firing;
         let ends = !self.window.is_open() || self.window.is_key_pressed(Key::Escape, KeyRepeat::No);
@@ -71,6 +88,33 @@ impl Screen {
             .filter(|(key, _)| self.window.is_key_pressed(*key, KeyRepeat::No))
             .map(|(_, act)| Pressed::Act(act))
             .collect();
-        Ok(trigger.into_iter().chain(rezero).chain(acts).chain(ends.then_some(Pressed::Quit)))
+        let turn = Some(self.turn()).filter(|turn| *turn != [0.0; 2]).map(Pressed::Turn);
+        Ok(trigger.into_iter().chain(turn).chain(rezero).chain(acts).chain(ends.then_some(Pressed::Quit)))
+    }
+
+    /// Turn that mouse and arrow keys ask for since the last frame.
+    fn turn(&mut self) -> [f64; 2] {
+        let (width, height) = self.window.get_size();
+        let pointer = self
+            .window
+            .get_unscaled_mouse_pos(MouseMode::Discard)
+            .map(|(x, y)| [f64::from(x) / width.max(1) as f64, f64::from(y) / height.max(1) as f64]);
+        let aspect = height as f64 / width.max(1) as f64;
+        let mut turn = match (self.pointer, pointer) {
+            (Some(from), Some(to)) => [to[0] - from[0], (from[1] - to[1]) * aspect],
+            _ => [0.0; 2],
+        };
+        self.pointer = pointer;
+        if let Some([x, y]) = pointer {
+            let beyond = |at: f64| f64::from(i8::from(at > 1.0 - EDGE) - i8::from(at < EDGE));
+            turn[0] += EDGE_TURN * beyond(x);
+            turn[1] -= EDGE_TURN * beyond(y);
+        }
+        let shift = [Key::LeftShift, Key::RightShift].into_iter().any(|key| self.window.is_key_down(key));
+        for (_, [right, up]) in ARROWS.into_iter().filter(|(key, _)| self.window.is_key_down(*key)) {
+            turn[0] += right * ARROW_TURN[usize::from(shift)];
+            turn[1] += up * ARROW_TURN[usize::from(shift)];
+        }
+        turn
     }
 }

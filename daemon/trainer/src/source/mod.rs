@@ -1,9 +1,10 @@
 //! Where a session's events come from: the gun's own devices, or a recording as if its devices were there.
 
 mod devices;
+mod live;
 
 use bowwave_core::{
-    event::Event, fault::FaultChange, frame::scene::Status, geometry::CameraPose, time::Time,
+    event::Event, fault::FaultChange, frame::scene::Status, geometry::CameraPose, time::Time, world::World,
 };
 use crossbeam_channel::{Receiver, TryRecvError};
 use hw_sim::replay::{Replay, ReplayError, ReplayStats};
@@ -11,6 +12,7 @@ use hw_sim::replay::{Replay, ReplayError, ReplayStats};
 use crate::supervisor::WallTime;
 
 pub use devices::{DeviceSettings, Devices, LampChoice};
+pub use live::LiveSource;
 
 /// A source of events.
 pub enum Source {
@@ -18,6 +20,8 @@ pub enum Source {
     Devices(Box<Devices>),
     /// A recording.
     Recording(Box<RecordingSource>),
+    /// A simulated gun that somebody aims.
+    Live(Box<LiveSource>),
     /// Events that another thread hands over, at the pace at which they are taken.
     Feed(EventFeed),
 }
@@ -79,7 +83,22 @@ impl Source {
                     recording.error = Some(e);
                 }
             }
+            Self::Live(live) => live.collect(until, events),
             Self::Feed(feed) => feed.collect(events),
+        }
+    }
+
+    /// Turns a simulated gun to the right and upwards, in widths of the picture. Real guns are turned by hand.
+    pub fn turn(&self, turn: [f64; 2]) {
+        if let Self::Live(live) = self {
+            live.turn(turn);
+        }
+    }
+
+    /// Shows a simulated gun the world: its gunner aims by it, and its mount feels the rounds.
+    pub fn watch(&mut self, world: &World) {
+        if let Self::Live(live) = self {
+            live.watch(world);
         }
     }
 
@@ -88,6 +107,7 @@ impl Source {
         match self {
             Self::Devices(_) => false,
             Self::Recording(recording) => recording.error.is_some() || recording.replay.finished(),
+            Self::Live(live) => live.has_ended(),
             Self::Feed(feed) => feed.is_closed,
         }
     }
@@ -97,6 +117,7 @@ impl Source {
         match self {
             Self::Devices(_) | Self::Feed(_) => None,
             Self::Recording(recording) => recording.error.take(),
+            Self::Live(live) => live.take_error(),
         }
     }
 
@@ -105,6 +126,7 @@ impl Source {
         match self {
             Self::Devices(_) | Self::Feed(_) => None,
             Self::Recording(recording) => recording.replay.truth_at(mid_exposure),
+            Self::Live(live) => live.truth_at(mid_exposure),
         }
     }
 
@@ -112,7 +134,7 @@ impl Source {
     pub fn lcd_size(&self) -> Option<(u32, u32)> {
         match self {
             Self::Devices(devices) => devices.lcd_size(),
-            Self::Recording(_) | Self::Feed(_) => None,
+            Self::Recording(_) | Self::Live(_) | Self::Feed(_) => None,
         }
     }
 
@@ -120,7 +142,7 @@ impl Source {
     pub fn flips(&self) -> impl Iterator<Item = (Time, i64)> + '_ {
         match self {
             Self::Devices(devices) => Some(devices.flips()),
-            Self::Recording(_) | Self::Feed(_) => None,
+            Self::Recording(_) | Self::Live(_) | Self::Feed(_) => None,
         }
         .into_iter()
         .flatten()
@@ -130,7 +152,7 @@ impl Source {
     pub fn clock_set(&self) -> Option<WallTime> {
         match self {
             Self::Devices(devices) => devices.health().clock_set(),
-            Self::Recording(_) | Self::Feed(_) => None,
+            Self::Recording(_) | Self::Live(_) | Self::Feed(_) => None,
         }
     }
 
@@ -138,7 +160,7 @@ impl Source {
     pub fn hanging(&self, now: Time) -> Option<&'static str> {
         match self {
             Self::Devices(devices) => devices.hanging(now),
-            Self::Recording(_) | Self::Feed(_) => None,
+            Self::Recording(_) | Self::Live(_) | Self::Feed(_) => None,
         }
     }
 
@@ -154,6 +176,7 @@ impl Source {
         match self {
             Self::Devices(devices) => devices.counters(),
             Self::Recording(recording) => replay_counters(&recording.replay.stats()),
+            Self::Live(live) => live.counters(),
             Self::Feed(_) => Vec::new(),
         }
     }
@@ -163,6 +186,7 @@ impl Source {
         match self {
             Self::Devices(devices) => devices.stop(),
             Self::Recording(recording) => drop(recording.replay.stop()?),
+            Self::Live(live) => live.stop()?,
             Self::Feed(_) => {}
         }
         Ok(())

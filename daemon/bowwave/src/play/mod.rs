@@ -1,0 +1,152 @@
+//! `bowwave play`: the trainer on a simulated gun that somebody aims.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use bowwave_calibration::to_toml;
+use bowwave_core::{
+    event::PixelFormat,
+    gunner::{Gunner, Skill},
+    session::Setup,
+    text::toml::TEXT_BYTES_MAX,
+    time::Time,
+};
+use bowwave_files::plain_text;
+use bowwave_trainer::{
+    TickClock,
+    source::{LiveSource, Source},
+    summary::SummaryOptions,
+};
+use hw_sim::{
+    live::{self, Hands, Live, LiveOptions, Script},
+    panorama::PanoramaRecipe,
+};
+
+use crate::{
+    cache,
+    cli::{DeskArgs, Play, ScoreArgs},
+    config::Config,
+    desk::{self, DeskRun, PreparedRun},
+    loading::{LoadedScenario, parse_scenario, read_scenario},
+    outcome::Outcome,
+    score, stdout,
+};
+
+/// Time that a scenario without an end is played for, seconds.
+const ENDLESS_S: f64 = 300.0;
+
+/// Who aims.
+enum Aimer {
+    /// Somebody at the window.
+    Mouse,
+    /// A simulated gunner.
+    Gunner(Skill),
+    /// A script.
+    Script(Script),
+}
+
+/// Plays a scenario.
+pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
+    let interrupts = desk::catch_interrupts()?;
+    let desk_args = &arguments.desk;
+    let config = desk::config(desk_args)?;
+    let aimer = aimer(&arguments.aim)?;
+    if matches!(aimer, Aimer::Mouse) && (arguments.fast || desk_args.headless) {
+        bail!(
+            "somebody who aims with the mouse needs a window and a clock: leave --headless and --fast out, or let a simulated gunner              aim (--aim expert)"
+        );
+    }
+    let (text, base) = read_scenario(&arguments.scenario)?;
+    let LoadedScenario { mut scenario, models, of_boats } =
+        parse_scenario(&text, &arguments.scenario.display().to_string(), &base)?;
+    // The sea is the scenario's, whatever the seed of its chance.
+    let recipe = PanoramaRecipe::of_scenario(&scenario, arguments.camera);
+    if let Some(seed) = desk_args.seed {
+        scenario.seed = seed;
+    }
+    let length_s = scenario.duration_s.unwrap_or(ENDLESS_S);
+    let frames = desk::frames_asked(desk_args).unwrap_or_else(|| desk::frames_of(length_s));
+    desk::check(desk_args, frames)?;
+    let panorama = cache::panorama(&recipe)?;
+    let gunner = match &aimer {
+        Aimer::Gunner(skill) => Some(Gunner::new(&scenario, skill)),
+        _ => None,
+    };
+    if let Some(briefing) = scenario.exercise.briefing.as_deref().filter(|_| !desk_args.json) {
+        stdout::print(format!("{}\n\n{briefing}\n\n", scenario.name))?;
+    }
+    let calibration = live::calibration(&recipe);
+    let setup = Setup {
+        scenario,
+        own_ship: calibration.own_ship_mask(),
+        calibration: calibration.calibration.clone(),
+        models: models.into(),
+        boat_models: of_boats,
+        screen: desk::screen(desk_args, &config),
+        video: PixelFormat::Rgb,
+        orientation: config.orientation,
+        heading: config.heading.settings.clone(),
+    };
+    let prepared = PreparedRun {
+        properties: live::properties(&recipe, &calibration, &arguments.aim),
+        setup,
+        scenario_toml: text,
+        calibration_toml: to_toml(&calibration),
+        models_base: base,
+        window: shows_window(&aimer, desk_args, &config),
+        aims: matches!(aimer, Aimer::Mouse),
+        record: desk_args.record || config.files.record,
+        gpu: desk::gpu(desk_args, config.gpu),
+    };
+    let script = if let Aimer::Script(script) = aimer { Some(script) } else { None };
+    let realtime = !arguments.fast;
+    let simulated = Live::start(LiveOptions {
+        recipe: &recipe,
+        panorama: &panorama,
+        hands: Hands::default(),
+        script,
+        realtime,
+        is_coded: prepared.record,
+    })?;
+    let lens = &prepared.setup.calibration.lens;
+    let source = LiveSource::new(simulated, f64::from(lens.width) / lens.focal.x, gunner);
+    let origin = source.origin();
+    let finished = desk::run(
+        DeskRun {
+            prepared: &prepared,
+            frames,
+            source: Source::Live(Box::new(source)),
+            clock: if realtime { TickClock::paced() } else { TickClock::fast(origin) },
+            origin,
+            plays_to_the_end: false,
+            summary: SummaryOptions { program_start, recording: None, injected: None },
+        },
+        desk_args,
+        &interrupts,
+    )?;
+    let outcome = desk::report(finished, desk_args)?;
+    if !desk_args.json {
+        score::run(&ScoreArgs { run: desk_args.out.clone(), number: None, json: false })?;
+    }
+    Ok(outcome)
+}
+
+/// Who is named.
+fn aimer(name: &str) -> Result<Aimer> {
+    if name == "mouse" {
+        return Ok(Aimer::Mouse);
+    }
+    if let Some((_, skill)) = Skill::named(name) {
+        return Ok(Aimer::Gunner(skill));
+    }
+    let text = plain_text(Path::new(name), TEXT_BYTES_MAX).with_context(|| {
+        let skills = Skill::NAMED.map(|(name, _)| name).join(", ");
+        format!("cannot read the script {name}; --aim takes mouse, {skills}, or an existing script")
+    })?;
+    Ok(Aimer::Script(Script::parse(&text, name)?))
+}
+
+/// Somebody who aims sees; others are watched where that is asked for.
+fn shows_window(aimer: &Aimer, arguments: &DeskArgs, config: &Config) -> bool {
+    matches!(aimer, Aimer::Mouse) || desk::shows_window(arguments, config)
+}

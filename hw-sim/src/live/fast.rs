@@ -1,0 +1,86 @@
+//! The simulated gun without a clock: the same script gives the same events.
+
+use std::collections::VecDeque;
+
+use bowwave_core::{event::Event, geometry::CameraPose, time::Time};
+use bowwave_devices::{
+    imu::{ImuDecoder, ImuFormat},
+    vectornav::CommonOutput,
+};
+
+use super::{LiveStats, TruePoses, bench::Bench, sensor::Sensor};
+use crate::replay::ReplayError;
+
+/// A simulated gun in process.
+pub(super) struct FastLive {
+    bench: Bench,
+    sensor: Sensor,
+    decoder: ImuDecoder,
+    /// Events that have not been asked for, by arrival.
+    waiting: VecDeque<Event>,
+    truth: TruePoses,
+    stats: LiveStats,
+}
+
+impl FastLive {
+    pub fn new(bench: Bench, sensor: Sensor) -> Self {
+        Self {
+            bench,
+            sensor,
+            // What is simulated is known: no sample waits for a proof of its format.
+            decoder: ImuDecoder::fixed(ImuFormat::VectorNav),
+            waiting: VecDeque::new(),
+            truth: TruePoses::default(),
+            stats: LiveStats::default(),
+        }
+    }
+
+    /// Appends the events that arrive up to and with `until`.
+    pub fn collect(&mut self, until: Time, out: &mut Vec<Event>) -> Result<(), ReplayError> {
+        while self.bench.next_sample() <= until {
+            self.sample();
+            while self.bench.gun.time_s() >= self.bench.exposure_end_s(&self.bench.next_frame()) {
+                self.frame()?;
+            }
+        }
+        let ready = self.waiting.partition_point(|event| event.arrival() <= until);
+        out.extend(self.waiting.drain(..ready));
+        Ok(())
+    }
+
+    pub fn truth_at(&self, stamp: Time) -> Option<CameraPose> {
+        self.truth.at(stamp)
+    }
+
+    pub fn stats(&self) -> LiveStats {
+        LiveStats { imu: self.decoder.counters(), ..self.stats }
+    }
+
+    fn sample(&mut self) {
+        let mut events = Vec::new();
+        let sample = self.bench.sample(&mut events);
+        if let Some(output) = CommonOutput::from_sample(&sample) {
+            let mut bytes = Vec::with_capacity(CommonOutput::MAX_BYTES);
+            output.encode(&mut bytes);
+            events.extend(self.decoder.samples(&bytes, sample.arrival).map(Event::Imu));
+        }
+        events.into_iter().for_each(|event| self.wait(event));
+    }
+
+    fn frame(&mut self) -> Result<(), ReplayError> {
+        let frame = self.bench.next_frame();
+        self.truth.push(frame.stamp, self.bench.pose(frame.exposed_s));
+        let arrival = self.bench.frame_taken();
+        let (bench, rows) = (&self.bench, self.sensor.rows_s());
+        let turned = rows.map(|row_s| bench.pose(frame.exposed_s + row_s).world_from_camera);
+        let picture = self.sensor.expose(&frame, turned, arrival)?;
+        self.stats.frames += 1;
+        self.wait(Event::Frame(picture));
+        Ok(())
+    }
+
+    fn wait(&mut self, event: Event) {
+        let at = self.waiting.partition_point(|other| other.arrival() <= event.arrival());
+        self.waiting.insert(at, event);
+    }
+}
