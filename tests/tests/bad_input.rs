@@ -211,7 +211,7 @@ fn a_run_that_ends_before_its_scenario_says_so_and_calls_no_latency_a_frames_tim
         said(&output)
     };
     let said = run(40);
-    assert!(said.contains("the scenario lasts 40 s, and this run ends after 1.0 s; --duration 40"), "{said}");
+    assert!(said.contains("this run ends after 1.0 s, the scenario after 40 s (--duration 40"), "{said}");
     assert!(said.contains("frame latency") && !said.contains("frame time"), "{said}");
     let said = run(1);
     assert!(!said.contains("the scenario lasts"), "{said}");

@@ -219,6 +219,8 @@ fn inverse_transfer() -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
+    use bowwave_core::geometry::{Distortion, look};
+
     use super::*;
 
     #[test]
@@ -227,6 +229,66 @@ mod tests {
         for code in 1..=253 {
             let back = 255.0 * transfer(light[code * FINE / 256]);
             assert!((back - code as f32).abs() < 0.02, "{code} {back}");
+        }
+    }
+
+    /// A panorama whose red has waves over azimuth and whose green has waves over the tangent of the elevation.
+    fn waves() -> Vec<[u8; 4]> {
+        let wave = |angle: f64| (128.0 + 100.0 * (40.0 * angle).sin()).round() as u8;
+        let place = |i: usize| ((i % 2048) as f64 + 0.5 - 1024.0, 500.0 - ((i / 2048) as f64 + 0.5));
+        (0..2048 * 1000)
+            .map(|i| {
+                let (column, row) = place(i);
+                [wave(column / 500.0), wave(row / 500.0), 0, 0]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_cut_picture_shows_each_direction_where_the_lens_has_it() {
+        let pixels = waves();
+        let view = PanoramaView {
+            pixels: &pixels,
+            columns: 2048,
+            rows: 1000,
+            focal: 500.0,
+            centre: 1024.0,
+            level_row: 500.0,
+        };
+        for (readout_ns, distortion) in [
+            (0, Distortion::None),
+            (20_000_000, Distortion::None),
+            (0, Distortion::fisheye([0.02, -0.01, 0.003, -0.001])),
+        ] {
+            let mut recipe = Recipe { width: 640, height: 360, ..Recipe::default() };
+            (recipe.camera.read_noise, recipe.camera.shot_noise, recipe.camera.vignetting) = (0.0, 0.0, 0.0);
+            (recipe.camera.readout_ns, recipe.camera.distortion) = (readout_ns, distortion);
+            let mut camera = CutCamera::new(&recipe);
+            // Turned, rolled, and turning on at 1 rad/s.
+            let at = |s: f64| look(0.7 + s, -0.12, 0.15);
+            let turned: Vec<DQuat> = camera.rows_s().map(at).collect();
+            let [left, right] = camera.aim(&view, turned);
+            assert!(left < 0.3 && right > 1.1);
+            let mut rgb = vec![0; camera.bytes()];
+            camera.cut(&view, 0, &mut rgb);
+            let lens = recipe.lens();
+            let row_s = readout_ns as f64 * 1e-9 / 360.0;
+            let (mut error, mut steepness) = ([0.0; 2], [0.0; 2]);
+            for i in 0..640 * 360 {
+                let (x, y) = ((i % 640) as f64 + 0.5, (i / 640) as f64 + 0.5);
+                let d = at((y - 180.0) * row_s) * lens.unproject(DVec2::new(x, y));
+                let angles = [d.x.atan2(d.y), d.z / d.x.hypot(d.y)];
+                for (c, angle) in angles.into_iter().enumerate() {
+                    let slope = 100.0 * 40.0 * (40.0 * angle).cos() / 500.0;
+                    let off = f64::from(rgb[3 * i + c]) - (128.0 + 100.0 * (40.0 * angle).sin());
+                    error[c] += off * slope;
+                    steepness[c] += slope * slope;
+                }
+            }
+            for c in 0..2 {
+                let shift_px = error[c] / steepness[c];
+                assert!(shift_px.abs() < 0.02, "{shift_px} px of the panorama, {readout_ns} {distortion:?}");
+            }
         }
     }
 }

@@ -51,6 +51,7 @@ pub fn calibration(recipe: &PanoramaRecipe) -> CalibrationFile {
 pub fn properties(recipe: &PanoramaRecipe, calibration: &CalibrationFile, aimed_by: &str) -> Properties {
     let mut properties = make::properties(&recipe.recipe, calibration);
     properties.loop_ns = None;
+    properties.extra.insert("sun_elevation_deg".to_owned(), recipe.sun_elevation.to_degrees().to_string());
     properties.source = format!("simulated gun, aimed by {aimed_by}");
     properties
 }

@@ -51,7 +51,7 @@ impl PanoramaStudio {
             &panorama.recipe,
             &coverage,
             FocalLengths { sky: focal, sea: focal },
-            panorama.sun_is_up,
+            panorama.sun_is_up(),
         )?;
         let exposure = panorama.exposure as f32;
         let transfer = (0..STEPS)
@@ -108,7 +108,7 @@ impl PanoramaStudio {
         let [azimuth, tangent] = self.header.direction(row, column);
         let (azimuth, tangent) = (azimuth as f32, tangent as f32);
         let scene = &self.sea.scene;
-        let sun = if self.panorama.sun_is_up { scene.sky.sun } else { Vec3::NEG_Z };
+        let sun = if self.panorama.sun_is_up() { scene.sky.sun } else { Vec3::NEG_Z };
         open_sky(scene, azimuth, tangent, Vec3::new(azimuth.sin(), azimuth.cos(), tangent), sun)
     }
 }

@@ -27,10 +27,12 @@ pub struct PanoramaRecipe {
     pub recipe: Recipe,
     /// How the ship under the gun moves.
     pub motion: Motion,
+    /// Pixels a degree, in those of the camera's middle.
+    pub detail: f64,
     /// Sensor's exposure after sunset: share of what it would be by day.
     pub exposure: f64,
-    /// Whether the sun is above the horizon.
-    pub sun_is_up: bool,
+    /// Elevation of the scenario's sun, radians. The sky after sunset is that of a low sun, less exposed and without its disc.
+    pub sun_elevation: f64,
 }
 
 impl PanoramaRecipe {
@@ -65,12 +67,17 @@ impl PanoramaRecipe {
         recipe.camera.read_noise /= exposure;
         recipe.camera.latency_ns = [20_000_000, 24_000_000];
         let motion = Motion::new(ship(height_m), GunMotion::default(), recipe.eye_height_m, SHIP_LOOP_S);
-        Self { recipe, motion, exposure, sun_is_up: elevation > 0.0 }
+        Self { recipe, motion, detail: 1.0, exposure, sun_elevation: elevation }
+    }
+
+    /// Whether the sun is above the horizon.
+    pub fn sun_is_up(&self) -> bool {
+        self.sun_elevation > 0.0
     }
 
     /// Pixels per radian of azimuth and per tangent of elevation.
     pub(crate) fn focal(&self) -> f64 {
-        f64::from(level_focal(&self.recipe.lens()))
+        self.detail * f64::from(level_focal(&self.recipe.lens()))
     }
 
     /// Tangents of the elevation of the upper and the lower edge.
@@ -159,7 +166,7 @@ mod tests {
                 bowwave_core::world::scenario::BUILT_IN.into_iter().find(|(n, _)| *n == name).unwrap();
             PanoramaRecipe::of_scenario(&Scenario::parse(text, name).unwrap(), (1280, 720))
         };
-        assert!(of("first-target").sun_is_up && !of("dusk-patrol").sun_is_up);
+        assert!(of("first-target").sun_is_up() && !of("dusk-patrol").sun_is_up());
         assert!(of("night-intruder").exposure < of("dusk-patrol").exposure);
         assert!(of("night-intruder").recipe.camera.read_noise > of("first-target").recipe.camera.read_noise);
     }

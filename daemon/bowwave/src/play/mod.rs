@@ -124,6 +124,13 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
         desk_args,
         &interrupts,
     )?;
+    let late = finished.summary.counts.get("pictures_late").copied().unwrap_or(0);
+    if late > 0 {
+        log::warn!(
+            "the simulated camera left out {late} pictures: this computer cuts them too slowly; play without --record and --video, or \
+             give --camera 640x360, which is a quarter of the work"
+        );
+    }
     let outcome = desk::report(finished, desk_args)?;
     if !desk_args.json {
         score::run(&ScoreArgs { run: desk_args.out.clone(), number: None, json: false })?;

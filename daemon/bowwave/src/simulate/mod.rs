@@ -1,5 +1,6 @@
 //! `bowwave simulate`: the trainer on a recording, as if its devices were there.
 
+mod contradictions;
 mod gunner;
 pub mod prepare;
 
@@ -21,7 +22,7 @@ use prepare::PreparedRecording;
 
 use crate::{
     cli::Simulate,
-    desk::{self, DeskRun},
+    desk::{self, DeskRun, PreparedRun},
     outcome::Outcome,
 };
 
@@ -36,9 +37,12 @@ pub fn run(arguments: &Simulate, program_start: Time) -> Result<Outcome> {
     let frames = expected_frames(arguments, prepared.duration_ns);
     desk::check(desk_args, frames)?;
     let run_s = frames as f64 / FRAMES_PER_S as f64;
-    if let Some(lasts_s) = prepared.run.setup.scenario.duration_s.filter(|lasts_s| *lasts_s > run_s + 0.5) {
+    let PreparedRun { setup, properties, .. } = &prepared.run;
+    let contradictions = contradictions::contradictions(&setup.scenario, properties, run_s);
+    if !contradictions.is_empty() {
         log::warn!(
-            "the scenario lasts {lasts_s} s, and this run ends after {run_s:.1} s; --duration {lasts_s} in place of --frames plays all of it"
+            "the recording is not of this scenario: {}; `bowwave play` shows a scenario on a sea of its own",
+            contradictions.join("; ")
         );
     }
     let realtime = arguments.realtime || prepared.run.window;

@@ -1,5 +1,6 @@
 //! Renderer and output thread. Both are made anew together when the GPU is lost or pictures come in another layout.
 
+mod gamepad;
 mod hashes;
 mod lateness;
 mod output;

@@ -15,6 +15,7 @@ use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
 use sha2::{Digest, Sha256};
 
 use super::{
+    gamepad::Gamepad,
     hashes::HashLog,
     lateness::Lateness,
     pictures::{ContactSheet, copy_frame, write_still},
@@ -204,6 +205,7 @@ struct OutputWorker {
     hashes: Option<HashLog>,
     sheet: Option<ContactSheet>,
     screen: Option<Screen>,
+    gamepad: Option<Gamepad>,
     hash: Sha256,
     lateness: Lateness,
     report: OutputReport,
@@ -225,6 +227,7 @@ impl OutputWorker {
             hashes,
             sheet,
             screen: None,
+            gamepad: None,
             hash: Sha256::new(),
             lateness: Lateness::default(),
             report: OutputReport::default(),
@@ -234,6 +237,7 @@ impl OutputWorker {
     fn run(mut self) -> Result<OutputReport> {
         if self.options.window {
             self.screen = Some(Screen::open(self.options.size, self.options.aims)?);
+            self.gamepad = Gamepad::find();
         }
         while !self.completions.is_over() {
             if let Some(reporter) = &self.options.reporter {
@@ -290,21 +294,7 @@ impl OutputWorker {
                 samples.push(pass);
             }
         }
-        if let Some(screen) = &mut self.screen {
-            for pressed in screen.show(frame.rgba())? {
-                let event = match pressed {
-                    Pressed::Fire(pressed) => UserEvent::Trigger(TriggerEdge { time: now(), pressed }),
-                    Pressed::Turn(turn) => UserEvent::Turn(turn),
-                    Pressed::Rezero => UserEvent::Rezero,
-                    Pressed::Act(act) => UserEvent::Act(TraineeAct { time: now(), act }),
-                    Pressed::Quit => UserEvent::Quit,
-                };
-                // The main loop may have ended already; then nobody wants to know.
-                if self.told.user.send(event).is_err() {
-                    log::debug!("a key came after the end of the run");
-                }
-            }
-        }
+        self.hear(frame)?;
         if self.options.hash {
             self.hash.update(Sha256::digest(frame.rgba()));
         }
@@ -315,6 +305,32 @@ impl OutputWorker {
             video.frame(frame.rgba())?;
         }
         self.pictures(frame, ticket.frame)
+    }
+
+    /// Shows the frame in the window, and hands on what the user did.
+    fn hear(&mut self, frame: &FinishedFrame<Ticket>) -> Result<()> {
+        let Some(screen) = &mut self.screen else { return Ok(()) };
+        let mut done: Vec<Pressed> = screen.show(frame.rgba())?.collect();
+        if let Some(gamepad) = &mut self.gamepad {
+            match gamepad.poll() {
+                Some(pressed) => done.extend(pressed),
+                None => self.gamepad = None,
+            }
+        }
+        for pressed in done {
+            let event = match pressed {
+                Pressed::Fire(pressed) => UserEvent::Trigger(TriggerEdge { time: now(), pressed }),
+                Pressed::Turn(turn) => UserEvent::Turn(turn),
+                Pressed::Rezero => UserEvent::Rezero,
+                Pressed::Act(act) => UserEvent::Act(TraineeAct { time: now(), act }),
+                Pressed::Quit => UserEvent::Quit,
+            };
+            // The main loop may have ended already; then nobody wants to know.
+            if self.told.user.send(event).is_err() {
+                log::debug!("a key came after the end of the run");
+            }
+        }
+        Ok(())
     }
 
     fn pictures(&mut self, frame: &FinishedFrame<Ticket>, index: u64) -> Result<()> {

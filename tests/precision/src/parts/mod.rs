@@ -6,6 +6,7 @@ mod calibration;
 mod camera;
 mod clock;
 mod colour;
+mod cut;
 mod depth;
 mod drawn;
 mod driving;
@@ -82,6 +83,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: flight::ABOUT, measure: flight::measure },
     NumericalPart { about: hits::ABOUT, measure: hits::measure },
     NumericalPart { about: misses::ABOUT, measure: misses::measure },
+    NumericalPart { about: cut::ABOUT, measure: cut::measure },
     NumericalPart { about: sea::ABOUT, measure: sea::measure },
     NumericalPart { about: wavefield::ABOUT, measure: wavefield::measure },
     NumericalPart { about: motion::ABOUT, measure: motion::measure },

@@ -1,0 +1,204 @@
+//! `./demo` on a virtual desktop, played with the mouse by somebody who sees nothing but its window. Needs Xvfb, and BOWWAVE_DESKTOP set:
+//! `./check desktop` runs it.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::{
+    env, fs,
+    io::{BufRead, BufReader},
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use bowwave_tests::{bowwave, expect_code, root};
+use serde_json::Value;
+use x11rb::{
+    connection::Connection,
+    protocol::{
+        xproto::{AtomEnum, ConnectionExt as _, ImageFormat, Window},
+        xtest::ConnectionExt as _,
+    },
+    rust_connection::RustConnection,
+};
+
+/// Size of the window.
+const SIZE: (u16, u16) = (1280, 720);
+/// How long the first sea may take to be made, and the program to be built.
+const PATIENCE: Duration = Duration::from_secs(1200);
+/// A boat must be hit so long after the window is there.
+const LIMIT_S: f64 = 30.0;
+/// Events of XTEST.
+const BUTTON_PRESS: u8 = 4;
+const BUTTON_RELEASE: u8 = 5;
+const MOTION: u8 = 6;
+
+/// Ends with its owner.
+struct Ended(Child);
+
+impl Drop for Ended {
+    fn drop(&mut self) {
+        if self.0.kill().is_ok() {
+            let _ = self.0.wait();
+        }
+    }
+}
+
+/// A virtual desktop; `None` where Xvfb is not installed.
+fn desktop() -> Option<(Ended, String)> {
+    let mut child = Command::new("Xvfb")
+        .args(["-displayfd", "1", "-screen", "0", "1400x800x24", "-nolisten", "tcp"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .ok()?;
+    let mut number = String::new();
+    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut number).expect("its number");
+    Some((Ended(child), format!(":{}", number.trim())))
+}
+
+/// Somebody before the window.
+struct Sailor {
+    connection: RustConnection,
+    root: Window,
+    window: Window,
+}
+
+impl Sailor {
+    /// Waits for the window.
+    fn before(display: &str, game: &mut Child) -> Self {
+        let (connection, screen) = x11rb::connect(Some(display)).expect("the desktop answers");
+        let root = connection.setup().roots[screen].root;
+        let begun = Instant::now();
+        loop {
+            assert!(begun.elapsed() < PATIENCE, "no window after {PATIENCE:?}");
+            assert!(game.try_wait().expect("it can be asked").is_none(), "the demo ended without a window");
+            let children = connection.query_tree(root).expect("sent").reply().expect("a tree").children;
+            let named = children.into_iter().find(|window| {
+                let asked = connection.get_property(false, *window, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 64);
+                asked.ok().and_then(|c| c.reply().ok()).is_some_and(|name| name.value.starts_with(b"Bowwave"))
+            });
+            if let Some(window) = named {
+                return Self { connection, root, window };
+            }
+            thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Brightness of the window's pixels, where it can be seen.
+    fn look(&self) -> Option<Vec<i32>> {
+        let (width, height) = SIZE;
+        let asked = self.connection.get_image(ImageFormat::Z_PIXMAP, self.window, 0, 0, width, height, !0);
+        let image = asked.ok()?.reply().ok()?;
+        // Blue, green, red and nothing.
+        Some(
+            image
+                .data
+                .chunks_exact(4)
+                .map(|p| i32::from(p[0]) + 2 * i32::from(p[1]) + i32::from(p[2]))
+                .collect(),
+        )
+    }
+
+    fn mouse(&self, kind: u8, detail: u8, to: (i16, i16)) {
+        let sent = self.connection.xtest_fake_input(kind, detail, 0, self.root, to.0, to.1, 0);
+        drop(sent.expect("sent"));
+        self.connection.flush().expect("sent");
+    }
+
+    fn fire(&self) {
+        self.mouse(BUTTON_PRESS, 1, (0, 0));
+        thread::sleep(Duration::from_millis(250));
+        self.mouse(BUTTON_RELEASE, 1, (0, 0));
+    }
+}
+
+/// Row of the horizon in some columns: where the picture darkens most downwards.
+fn horizon(light: &[i32], columns: std::ops::Range<usize>) -> usize {
+    let width = usize::from(SIZE.0);
+    let row = |y: usize| -> i64 { columns.clone().map(|x| i64::from(light[y * width + x])).sum() };
+    (150..600).max_by_key(|y| row(y - 2) + row(y - 1) - row(y + 1) - row(y + 2)).expect("rows")
+}
+
+/// The boat, pixels: what stands out most from the water around it, a little below the horizon.
+fn boat(light: &[i32]) -> Option<(f64, f64)> {
+    const CELL: usize = 8;
+    let width = usize::from(SIZE.0);
+    let (left, right) = (horizon(light, 330..430) as f64, horizon(light, 850..950) as f64);
+    let mut best = (0, (0.0, 0.0));
+    for x0 in (200..1080).step_by(CELL) {
+        let level = left + (right - left) * (x0 as f64 - 380.0) / 520.0;
+        for y0 in ((level as usize + 10)..(level as usize + 60).min(690)).step_by(4) {
+            let (mut stands_out, mut sum, mut weight) = (0, (0.0, 0.0), 0.0);
+            for y in y0..y0 + CELL {
+                // The water to both sides.
+                let beside = [x0 - 60, x0 - 45, x0 + 3 * CELL + 45, x0 + 3 * CELL + 60];
+                let mut beside = beside.map(|x| light[y * width + x.min(width - 1)]);
+                beside.sort_unstable();
+                // One of them may be the front sight.
+                let water = (beside[1] + beside[2]) / 2;
+                // The front sight stands below the middle of the picture.
+                for x in (x0..x0 + 3 * CELL).filter(|x| y < 358 || !(634..647).contains(x)) {
+                    let off = (light[y * width + x] - water).abs();
+                    if off > 70 {
+                        stands_out += off;
+                        sum = (sum.0 + x as f64 * f64::from(off), sum.1 + y as f64 * f64::from(off));
+                        weight += f64::from(off);
+                    }
+                }
+            }
+            if stands_out > best.0 {
+                best = (stands_out, (sum.0 / weight, sum.1 / weight));
+            }
+        }
+    }
+    (best.0 > 1500).then_some(best.1)
+}
+
+#[test]
+fn a_boat_is_hit_within_half_a_minute_by_aiming_with_the_mouse() {
+    if env::var_os("BOWWAVE_DESKTOP").is_none() {
+        eprintln!("skipped: ./check desktop plays the demo");
+        return;
+    }
+    let Some((_desktop, display)) = desktop() else { panic!("Xvfb is missing: ./check setup installs it") };
+    let mut game = Ended(
+        Command::new(root().join("demo"))
+            .env("DISPLAY", &display)
+            .current_dir(root())
+            .spawn()
+            .expect("./demo runs"),
+    );
+    let sailor = Sailor::before(&display, &mut game.0);
+    sailor.mouse(MOTION, 0, (700, 400));
+    let begun = Instant::now();
+    let mut last_fire = begun;
+    while begun.elapsed().as_secs_f64() < LIMIT_S {
+        thread::sleep(Duration::from_millis(70));
+        let Some(light) = sailor.look() else { break };
+        let Some((x, y)) = boat(&light) else { continue };
+        // A round falls by half a metre on its way: the barrel points two pixels above the boat.
+        let off = (x - 640.0, y - 362.0);
+        let step = |off: f64| (0.16 * off).clamp(-40.0, 40.0).round() as i16;
+        sailor.mouse(MOTION, 1, (step(off.0), step(off.1)));
+        let is_on = off.0.abs() < 6.0 && off.1.abs() < 2.5;
+        if is_on && begun.elapsed().as_secs_f64() > 4.0 && last_fire.elapsed().as_secs_f64() > 0.8 {
+            last_fire = Instant::now();
+            sailor.fire();
+        }
+    }
+    assert!(game.0.wait().expect("it ends").success(), "the demo fails");
+    let out = root().join("target/demo");
+    let summary: Value =
+        serde_json::from_slice(&fs::read(out.join("summary.json")).expect("a summary")).expect("JSON");
+    let printed = bowwave(["score", out.to_str().expect("a plain path"), "--json"]);
+    expect_code(&printed, 0);
+    let score: Value = serde_json::from_slice(&printed.stdout).expect("JSON");
+    println!(
+        "missed deadlines {} of {}; registration {}",
+        summary["missed_deadlines"], summary["frames"], summary["registration_px"]
+    );
+    println!("rounds {}", score["rounds"]);
+    // Nothing is fired after the limit.
+    assert!(score["rounds"]["hits"].as_u64() >= Some(1), "no hit: {}", score["rounds"]);
+}
