@@ -9,6 +9,7 @@ use std::{
 };
 
 use bowwave_core::world::scenario::Scenario;
+use hw_sim::live::Script;
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the crate lies in the workspace").to_path_buf()
@@ -225,12 +226,16 @@ fn every_scenario_in_the_documents_is_read() {
             assert_eq!(scenario.warnings, [""; 0], "a document uses a former name");
             read += 1;
         }
-        // Tables in an indented block are parts of a scenario.
+        // Tables in an indented block are parts of a scenario, or of a script for `bowwave play`.
         let indented = text.lines().map(|line| line.strip_prefix("    ").unwrap_or_default());
         let lines: Vec<&str> = indented.collect();
         for start in (0..lines.len()).filter(|i| lines[*i].starts_with('[')) {
             let part: String =
                 lines[start..].iter().take_while(|l| !l.is_empty()).map(|l| format!("{l}\n")).collect();
+            if part.starts_with("[[step]]") {
+                Script::parse(&part, &path.display().to_string()).unwrap_or_else(|e| panic!("{e}"));
+                continue;
+            }
             let scenario =
                 Scenario::parse(&part, &path.display().to_string()).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(scenario.warnings, [""; 0], "a document uses a former name");

@@ -285,3 +285,89 @@ fn a_course_over_ground_is_where_the_boat_goes() {
         }
     });
 }
+
+/// A crew that does everything there is but to ram, so long each, beginning with `first`.
+fn versatile(first: usize, each_s: f64) -> Arc<CrewPlan> {
+    let points = vec![DVec2::new(350.0, 120.0), DVec2::new(-350.0, 160.0), DVec2::new(-200.0, -300.0)];
+    let acts = [
+        ("transit", Act::Transit { points, repeat: true }, 18.0),
+        ("loiter", Act::Loiter { radius_m: 40.0 }, 5.0),
+        ("fish", Act::Fish, 3.0),
+        ("attack", Act::Attack { stop_m: Some(40.0) }, 25.0),
+        ("circle", Act::Circle { radius_m: 90.0, clockwise: first.is_multiple_of(2) }, 20.0),
+        ("probe", Act::Probe { turn_m: 120.0 }, 25.0),
+        ("stop", Act::Stop, 0.0),
+        ("flee", Act::Flee, 25.0),
+        ("approach", Act::Approach { stop_m: 100.0 }, 25.0),
+        ("anchor", Act::Anchor, 0.0),
+        ("drift", Act::Drift, 0.0),
+    ];
+    let count = acts.len();
+    let after = |i: usize| exit(Guard { after_s: Some(each_s), ..Guard::default() }, (i + 1) % count);
+    let states = (0..count).map(|i| {
+        let (name, act, speed_kn) = acts[(first + i) % count].clone();
+        state(name, act, speed_kn, vec![after(i)])
+    });
+    plan(states.collect())
+}
+
+/// `./check soak` gives each sea an hour (BOWWAVE_SEA_S=3600).
+#[test]
+fn boats_stay_sound_in_every_sea_whatever_they_do_and_however_the_computer_stalls() {
+    let seconds = std::env::var("BOWWAVE_SEA_S").ok().and_then(|s| s.parse().ok()).unwrap_or(60.0);
+    let mut unsound = Vec::new();
+    for force in 0..=7 {
+        let waves = sea(force);
+        let height_m =
+            Spectrum::of_force(BeaufortForce::new(force).expect("on the scale")).significant_height_m();
+        let vessels: Vec<Vessel> = (0..11)
+            .map(|i| {
+                let crew = versatile(i, if seconds > 600.0 { 40.0 } else { 15.0 });
+                let bearing = 360.0 * i as f64 / 11.0;
+                crewed(&format!("boat-{i}"), &crew, bearing, 220.0 + 30.0 * (i % 3) as f64, Side::Hostile)
+            })
+            .collect();
+        let mut fleet = fleet(vessels, waves);
+        let (mut closest, mut nearest, mut fastest, mut highest) =
+            (f64::INFINITY, f64::INFINITY, 0.0_f64, 0.0_f64);
+        let mut time_s = 0.0;
+        let mut frame = 0_u64;
+        while time_s < seconds {
+            frame += 1;
+            // Every twenty seconds the process gets no time for one.
+            time_s += if frame.is_multiple_of(600) { 1.0 } else { 1.0 / 30.0 };
+            fleet.follow(start().plus_secs(time_s));
+            if !frame.is_multiple_of(3) {
+                continue;
+            }
+            let hulls: Vec<_> = fleet.boats.iter().map(|b| b.capsule(time_s)).collect();
+            for (i, hull) in hulls.iter().enumerate() {
+                nearest = nearest.min(hull.gap_m(&OWN_HULL));
+                closest = hulls[..i].iter().map(|other| hull.gap_m(other)).fold(closest, f64::min);
+                let floats = fleet.floating(i, start().plus_secs(time_s)).expect("there");
+                let up = floats.pose.world_from_body * DVec3::Z;
+                fastest = fastest.max(place(&fleet, i, time_s).speed_m_s.abs());
+                highest = highest.max((floats.pose.position.z - floats.water_level).abs());
+                assert!(
+                    floats.pose.position.is_finite() && up.is_finite(),
+                    "force {force}, {time_s} s, boat {i}"
+                );
+                assert!(up.z > 0.3, "force {force}, {time_s} s, boat {i} capsizes: {up}");
+            }
+        }
+        println!(
+            "force {force}, {height_m:.1} m, {seconds} s: boats {closest:.1} m apart, own ship {nearest:.1} m; at most {fastest:.1} m/s, {highest:.2} m off the water"
+        );
+        // No faster than its engine drives it and the sea before the wind pushes it; no higher over the water than a metre's leap off a crest
+        // when the trough is below: the highest wave of an hour has twice the significant height (Rayleigh).
+        let beam_m = 2.0;
+        let is_sound = closest > beam_m
+            && nearest > beam_m
+            && fastest < 27.0 * KN * 1.25
+            && highest < 1.0 + 2.0 * height_m;
+        if !is_sound {
+            unsound.push(force);
+        }
+    }
+    assert!(unsound.is_empty(), "in seas of force {unsound:?}");
+}

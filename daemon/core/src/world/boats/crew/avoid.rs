@@ -23,6 +23,8 @@ const COURSES: [f64; 9] = [0.0, 0.17, 0.35, 0.61, 0.87, 1.22, 1.57, 2.2, PI];
 const SPEEDS: [f64; 3] = [1.0, 0.5, 0.0];
 /// Steps into which the turn is cut.
 const TURN_STEPS: usize = 6;
+/// Share of the distance that there is to which a turn away may shrink it, where it is too small already.
+const STILL_CLOSER: f64 = 0.8;
 /// A vessel that must stand on acts by herself once the other is this close, seconds (Rule 17 (b)).
 const LAST_MOMENT_S: f64 = 8.0;
 
@@ -108,6 +110,17 @@ impl Helmsman {
         best.1
     }
 
+    /// The way from a vessel beside this one that comes no farther off: the course on which one that lies still makes room, radians.
+    pub fn room(&self, me: &Traffic, others: &[Traffic]) -> Option<f64> {
+        /// Speed at which two drift apart by themselves, m/s.
+        const OPENS_M_S: f64 = 0.2;
+        let gap_m = |other: &Traffic| me.position.distance(other.position) - me.radius_m - other.radius_m;
+        let nearest = others.iter().min_by(|a, b| gap_m(a).total_cmp(&gap_m(b)))?;
+        let away = (me.position - nearest.position).try_normalize()?;
+        let opens = (me.velocity - nearest.velocity).dot(away) > OPENS_M_S;
+        (gap_m(nearest) < 0.5 * self.margin_m && !opens).then(|| heading_of(away))
+    }
+
     /// Whether another is close enough to meet within the time that is looked ahead.
     fn concerns(&self, me: &Traffic, speed_m_s: f64, other: &Traffic) -> bool {
         let speeds = speed_m_s.max(me.velocity.length()) + other.velocity.length();
@@ -170,8 +183,9 @@ impl Helmsman {
         let start_m_s = me.velocity.length();
         let mut soonest = HORIZON_S;
         for (other, encounter) in near {
-            let space = self.space(me, other);
             let (mut off, mut time) = (me.position - other.position, 0.0);
+            // Who is too close already looks for a way that leads no closer.
+            let space = self.space(me, other).min(STILL_CLOSER * off.length());
             let mut met = None;
             for i in 0..=TURN_STEPS {
                 let last = i == TURN_STEPS;

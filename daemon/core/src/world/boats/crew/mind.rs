@@ -26,6 +26,8 @@ const TURN_MAX: f64 = 0.7;
 const COUNTED_ON: f64 = 0.4;
 /// A point of a transit counts as reached within so many lengths.
 const REACHED_LENGTHS: f64 = 3.0;
+/// Speed at which one that lies still makes room for another, m/s.
+const ROOM_M_S: f64 = 1.5;
 /// Draws of fishing boats are numbered from here, those for exits below.
 const FISHING: u64 = 1 << 32;
 
@@ -93,6 +95,8 @@ struct Wish {
     rams: bool,
     /// The engine is out of gear.
     idles: bool,
+    /// It makes no room for others: it lies at anchor, or has given up.
+    stays: bool,
 }
 
 impl CrewPlan {
@@ -165,8 +169,10 @@ impl CrewPlan {
             Act::Transit { points, repeat } => transit(craft, boat, memory, (points, *repeat), speed),
             Act::Loiter { radius_m } => loiter(boat, memory, *radius_m, speed),
             Act::Fish => fish(boat, memory, at, speed),
-            Act::Anchor | Act::Drift => Wish { arrived: false, idles: true, ..Wish::STOP },
-            Act::Stop | Act::Surrender => Wish::STOP,
+            Act::Anchor => Wish { arrived: false, idles: true, stays: true, ..Wish::STOP },
+            Act::Drift => Wish { arrived: false, idles: true, ..Wish::STOP },
+            Act::Stop => Wish::STOP,
+            Act::Surrender => Wish { stays: true, ..Wish::STOP },
             Act::Approach { stop_m } | Act::Attack { stop_m: Some(stop_m) } => {
                 let left_m = range_m - stop_m;
                 let near = left_m < craft.length_m;
@@ -193,11 +199,17 @@ impl CrewPlan {
 
 impl Wish {
     /// To lie still, which is done.
-    const STOP: Self = Self { bound: None, arrived: true, rams: false, idles: false };
+    const STOP: Self = Self { bound: None, arrived: true, rams: false, idles: false, stays: false };
 
     /// To go on a course at a speed, which is not done.
     const fn go(course: f64, speed_m_s: f64) -> Self {
-        Self { bound: Some(Bound { course, speed_m_s }), arrived: false, rams: false, idles: false }
+        Self {
+            bound: Some(Bound { course, speed_m_s }),
+            arrived: false,
+            rams: false,
+            idles: false,
+            stays: false,
+        }
     }
 }
 
@@ -212,7 +224,9 @@ fn orders(craft: &Craft, boat: &DriveState, wish: &Wish, at: &Situation<'_>) -> 
     let turn_rate = COUNTED_ON * hard_turn(boat.surge);
     let helmsman = Helmsman { turn_rate, margin_m: craft.length_m, keeps_rules: at.keeps_rules };
     if wish.idles || wish.bound.is_none() && boat.surge.abs() < 0.1 {
-        return Orders::default();
+        let room = if wish.stays { None } else { helmsman.room(&me, at.others) };
+        let Some(course) = room else { return Orders::default() };
+        return craft.steer_for(boat, helmsman.clear(&me, Bound { course, speed_m_s: ROOM_M_S }, at.others));
     }
     let wanted = wish.bound.unwrap_or(Bound { course: boat.heading, speed_m_s: 0.0 });
     let bound = if wish.rams {
