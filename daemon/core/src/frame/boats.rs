@@ -40,6 +40,6 @@ fn wake_of(fleet: &Fleet, afloat: &Afloat<'_>, time: Time, start: Time) -> Optio
         f64::from(-afloat.model.min.z),
         time.secs_since(start),
         |time_s| history.state(time_s),
-        |place| fleet.water_over(place, hull, time),
+        fleet.water_over(hull, time),
     )
 }

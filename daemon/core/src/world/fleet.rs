@@ -255,7 +255,7 @@ impl Fleet {
 
     /// Middle of a boat's visible part at `time`, world, metres.
     pub fn middle(&self, boat: usize, time: Time) -> Option<DVec3> {
-        Some(self.floating(boat, time)?.pose.to_world(DVec3::Z * (0.5 * self.height_m(boat))))
+        Some(self.pose(boat, time)?.to_world(DVec3::Z * (0.5 * self.height_m(boat))))
     }
 
     /// Height that a boat shows over the water, metres.
@@ -287,6 +287,12 @@ impl Fleet {
         self.follow(self.followed);
     }
 
+    /// Pose of a boat at `time`, as [`Self::floating`] has it, in half the time.
+    pub fn pose(&self, boat: usize, time: Time) -> Option<RigidPose> {
+        let seconds = time.secs_since(self.start);
+        Some(self.boats.get(boat)?.history.pose(seconds, &self.waves))
+    }
+
     /// How a boat lies on the water at `time`. At times that it was not followed to, or that lie too far back, it lies in the mean plane
     /// of the water.
     pub fn floating(&self, boat: usize, time: Time) -> Option<Floating> {
@@ -308,11 +314,10 @@ impl Fleet {
         Some(&self.boats.get(boat)?.history)
     }
 
-    /// Height at `time` of the water about a place, metres, in the mean over a hull that points north: waves that are shorter than it go
+    /// Height at `time` of the water about places, metres, in the mean over a hull that points north: waves that are shorter than it go
     /// through its wake without lifting it.
-    pub fn water_over(&self, place: DVec2, hull: Hull, time: Time) -> f64 {
-        let Hull { length_m, beam_m } = hull;
-        self.waves.plane_under(place, 0.0, length_m, beam_m, time.secs_since(self.start)).height_m
+    pub fn water_over(&self, hull: Hull, time: Time) -> impl Fn(DVec2) -> f64 {
+        self.waves.level_over(hull.length_m, hull.beam_m, time.secs_since(self.start))
     }
 
     /// The name of the state that a boat's crew is in at the newest step; `None` for boats without one.

@@ -261,7 +261,7 @@ fn where_crews_are_does_not_depend_on_the_pace_of_frames() {
                 fleet.strike(*boat, *zone, start().plus_secs(*at));
             }
         }
-        (0..16).map(|b| fleet.floating(b, start().plus_secs(59.0)).expect("there").pose).collect::<Vec<_>>()
+        (0..16).map(|b| fleet.pose(b, start().plus_secs(59.0)).expect("there")).collect::<Vec<_>>()
     };
     let steady: Vec<f64> = (1..=1800).map(|i| f64::from(i) / 30.0).collect();
     let mut stuttering: Vec<f64> = (1..=600).map(|i| 0.1 * f64::from(i) + 0.013 * f64::from(i % 5)).collect();

@@ -240,7 +240,7 @@ impl Rounds {
         let ended = {
             let boats: Vec<Moving<'_>> = (0..fleet.len())
                 .filter_map(|boat| {
-                    let (a, b) = (fleet.floating(boat, from)?.pose, fleet.floating(boat, to)?.pose);
+                    let (a, b) = (fleet.pose(boat, from)?, fleet.pose(boat, to)?);
                     Some(Moving { model: fleet.model(boat)?, from_s, from: a, to_s, to: b })
                 })
                 .collect();
@@ -335,7 +335,7 @@ impl Rounds {
                     (at, ImpactKind::Splash { height_m, life_s: self.ammunition.weapon.splash_life_s })
                 }
                 ImpactMark::Strike { boat, point } => {
-                    (fleet.floating(boat, time)?.pose.to_world(point), ImpactKind::Strike)
+                    (fleet.pose(boat, time)?.to_world(point), ImpactKind::Strike)
                 }
             };
             (age_s >= 0.0).then_some(Impact { at, kind, age_s })

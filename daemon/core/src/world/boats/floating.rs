@@ -49,24 +49,20 @@ pub(super) fn in_mean_plane(
 ) -> Floating {
     let water = waves.plane_under(state.position, state.heading, hull.length_m, hull.beam_m, time_s);
     let at = DVec3::new(water.height_m, water.port_slope.atan(), water.forward_slope.atan());
-    lay(state, way, at, water.height_m)
+    Floating { pose: lay(state, way, at), water_level: water.height_m }
 }
 
-/// Puts a boat onto the waves where its motion has brought it; it rises, trims and leans by its way as well.
-pub(super) fn afloat_in_waves(
+/// Pose of a boat on the waves where its motion has brought it; it rises, trims and leans by its way as well.
+pub(super) fn pose_in_waves(
     state: &CourseState,
-    hull: &Hull,
     way: &WayAttitude,
     form: &HullForm,
     motion: &BoatMotion,
-    waves: &WaveField,
-    time_s: f64,
-) -> Floating {
-    let water = waves.plane_under(state.position, state.heading, hull.length_m, hull.beam_m, time_s);
+) -> RigidPose {
     let mut at = motion.at;
     // From the centre of buoyancy to the boat's origin.
     at.x -= form.centre_m * at.z.sin();
-    lay(state, way, at, water.height_m)
+    lay(state, way, at)
 }
 
 /// What its way through the water does to a boat's attitude.
@@ -94,13 +90,13 @@ impl WayAttitude {
 }
 
 /// A boat at heave, roll and pitch `at`.
-fn lay(state: &CourseState, way: &WayAttitude, at: DVec3, water_level: f64) -> Floating {
+fn lay(state: &CourseState, way: &WayAttitude, at: DVec3) -> RigidPose {
     let pitch_up = at.z + way.trim;
     let port_up = at.y + way.lean;
     let level = level_attitude(ahead(state.heading));
     let world_from_body = level * DQuat::from_rotation_y(-pitch_up) * DQuat::from_rotation_x(port_up);
     let height = at.x + way.rise_m;
-    Floating { pose: RigidPose { world_from_body, position: state.position.extend(height) }, water_level }
+    RigidPose { world_from_body, position: state.position.extend(height) }
 }
 
 /// The pose of a picture boat ([`crate::model::ModelKind::Quad`]) that is seen from `eye`: upright, its starboard side towards

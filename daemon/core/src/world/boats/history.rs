@@ -6,12 +6,12 @@ use super::{
     behaviour::Behaviour,
     course::{BoatDamage, Course, CourseState},
     crewed::{CrewedBoat, StepView},
-    floating::{Floating, WayAttitude, afloat_in_waves, in_mean_plane},
+    floating::{Floating, WayAttitude, in_mean_plane, pose_in_waves},
     grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
     hull::{Hull, HullForm},
     seakeeping::{GAP, SeakeepingState},
 };
-use crate::{model::Zone, world::waves::WaveField};
+use crate::{geometry::RigidPose, model::Zone, world::waves::WaveField};
 
 /// Seconds of a boat's past that can be asked for: the foam of its wake (15 s), as it lies behind a picture that is as old as
 /// orientations are kept (2 s), and a second more.
@@ -136,19 +136,38 @@ impl BoatHistory {
         state_in(&self.states, time_s)
     }
 
-    /// How the boat lies on the water at a time. Where its motion in waves is not known (on a flat sea there is none), it lies in the
-    /// mean plane of the water.
+    /// Pose of the boat on the water at a time. Where its motion in waves is not known (on a flat sea there is none), it lies in the mean
+    /// plane of the water.
+    pub fn pose(&self, time_s: f64, waves: &WaveField) -> RigidPose {
+        let state = self.state(time_s);
+        self.pose_of(&state, time_s).unwrap_or_else(|| self.in_mean_plane(&state, waves, time_s).pose)
+    }
+
+    /// The same, and the height of the water under it, which takes as long as the rest.
     pub fn floating(&self, time_s: f64, waves: &WaveField) -> Floating {
         let state = self.state(time_s);
-        let way = match &self.pilot {
-            Pilot::Scripted(_) => WayAttitude::scripted(&state, &self.hull),
-            Pilot::Crewed(boat) => boat.craft().way_attitude(&state),
+        let Some(pose) = self.pose_of(&state, time_s) else {
+            return self.in_mean_plane(&state, waves, time_s);
         };
-        match self.seakeeping.at(time_s) {
-            Some(motion) => {
-                afloat_in_waves(&state, &self.hull, &way, self.seakeeping.form(), &motion, waves, time_s)
-            }
-            None => in_mean_plane(&state, &self.hull, &way, waves, time_s),
+        let Hull { length_m, beam_m, .. } = self.hull;
+        let water = waves.plane_under(state.position, state.heading, length_m, beam_m, time_s);
+        Floating { pose, water_level: water.height_m }
+    }
+
+    /// Pose by the motion in waves, where that is known.
+    fn pose_of(&self, state: &CourseState, time_s: f64) -> Option<RigidPose> {
+        let motion = self.seakeeping.at(time_s)?;
+        Some(pose_in_waves(state, &self.way_attitude(state), self.seakeeping.form(), &motion))
+    }
+
+    fn in_mean_plane(&self, state: &CourseState, waves: &WaveField, time_s: f64) -> Floating {
+        in_mean_plane(state, &self.hull, &self.way_attitude(state), waves, time_s)
+    }
+
+    fn way_attitude(&self, state: &CourseState) -> WayAttitude {
+        match &self.pilot {
+            Pilot::Scripted(_) => WayAttitude::scripted(state, &self.hull),
+            Pilot::Crewed(boat) => boat.craft().way_attitude(state),
         }
     }
 

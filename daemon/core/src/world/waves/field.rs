@@ -164,6 +164,28 @@ impl WaveField {
         self.waves_at(time_s).map(slope).sum()
     }
 
+    /// The mean height of the water over places at a time, for a rectangle `length_m` by `beam_m` whose long side points to the north: what
+    /// [`Self::plane_under`] has as height, without its slopes and with all that does not depend on the place worked out once.
+    pub fn level_over(&self, length_m: f64, beam_m: f64, time_s: f64) -> impl Fn(DVec2) -> f64 {
+        let waves: Vec<(f64, [f64; 2], &Wave)> = self
+            .waves_at(time_s)
+            .map(|(factor, wave)| {
+                let k = wave.cycles_per_m * TAU;
+                let [along, across] =
+                    [k.dot(DVec2::Y) * length_m / 2.0, k.dot(DVec2::Y.perp()) * beam_m / 2.0];
+                (factor * wave.amplitude_m, [filters(along)[0], filters(across)[0]], wave)
+            })
+            .collect();
+        move |place| {
+            waves
+                .iter()
+                .map(|(amplitude_m, [along, across], wave)| {
+                    amplitude_m * wave.phase(place, time_s).cos() * along * across
+                })
+                .sum()
+        }
+    }
+
     /// The plane that fits the water best (least squares) over the rectangle `length_m` by `beam_m` about `centre`, whose long
     /// side points `heading` (radians clockwise from north).
     ///
@@ -185,28 +207,26 @@ impl WaveField {
             let k = wave.cycles_per_m * TAU;
             let (k_forward, k_port) = (k.dot(forward), k.dot(port));
             let (along, across) = (k_forward * length_m / 2.0, k_port * beam_m / 2.0);
-            let (mean_along, mean_across) = (mean_filter(along), mean_filter(across));
+            let ([mean_along, slope_along], [mean_across, slope_across]) = (filters(along), filters(across));
             plane.height_m += amplitude_m * cos * mean_along * mean_across;
-            plane.forward_slope -= amplitude_m * sin * k_forward * slope_filter(along) * mean_across;
-            plane.port_slope -= amplitude_m * sin * k_port * slope_filter(across) * mean_along;
+            plane.forward_slope -= amplitude_m * sin * k_forward * slope_along * mean_across;
+            plane.port_slope -= amplitude_m * sin * k_port * slope_across * mean_along;
         }
         plane
     }
 }
 
-/// Mean of cos over -a to a.
-fn mean_filter(a: f64) -> f64 {
-    if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { a.sin() / a }
-}
-
-/// Slope of the line that fits sin best over -a to a: 3 (sin a - a cos a) / a^3.
-fn slope_filter(a: f64) -> f64 {
+/// Mean of cos over -a to a, and the slope of the line that fits sin best there: 3 (sin a - a cos a) / a^3.
+fn filters(a: f64) -> [f64; 2] {
+    let (sin, cos) = a.sin_cos();
+    let mean = if a.abs() < 1e-4 { 1.0 - a * a / 6.0 } else { sin / a };
     // The difference cancels for small a; the series is then exact to rounding.
-    if a.abs() < 1e-2 {
+    let slope = if a.abs() < 1e-2 {
         1.0 - a * a / 10.0 + a.powi(4) / 280.0
     } else {
-        3.0 * (a.sin() - a * a.cos()) / a.powi(3)
-    }
+        3.0 * (sin - a * cos) / a.powi(3)
+    };
+    [mean, slope]
 }
 
 #[cfg(test)]

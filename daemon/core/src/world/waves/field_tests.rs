@@ -154,3 +154,13 @@ proptest! {
         prop_assert!((plane.port_slope - by_y / yy).abs() < 3e-3, "{plane:?}, {}", by_y / yy);
     }
 }
+
+#[test]
+fn the_level_over_places_is_the_height_of_the_plane_there() {
+    let waves = sea(4, 3);
+    let level = waves.level_over(7.0, 2.0, 12.3);
+    for i in 0..200 {
+        let place = DVec2::new(f64::from(i) * 3.7 - 200.0, f64::from(i % 17) * 9.1);
+        assert_eq!(level(place), waves.plane_under(place, 0.0, 7.0, 2.0, 12.3).height_m);
+    }
+}

@@ -177,24 +177,26 @@ impl Helmsman {
 
     /// When the boat on a course first comes within the space of one of `near`, seconds; the horizon where it does not.
     fn soonest(&self, me: &Traffic, tried: Bound, near: &[(Traffic, Encounter)]) -> f64 {
-        let turn = wrap(tried.course - heading_or(me));
-        let turn_s = turn.abs() / self.turn_rate.max(0.01);
-        let step_s = turn_s / TURN_STEPS as f64;
-        let start_m_s = me.velocity.length();
+        let (from, start_m_s) = (heading_or(me), me.velocity.length());
+        let turn = wrap(tried.course - from);
+        let step_s = turn.abs() / self.turn_rate.max(0.01) / TURN_STEPS as f64;
+        // Velocity in each step of the turn, and after it: the same whoever is near.
+        let way: [DVec2; TURN_STEPS + 1] = std::array::from_fn(|i| {
+            if i == TURN_STEPS {
+                return ahead(tried.course) * tried.speed_m_s;
+            }
+            let share = (i as f64 + 0.5) / TURN_STEPS as f64;
+            ahead(from + turn * share) * (start_m_s + (tried.speed_m_s - start_m_s) * share)
+        });
         let mut soonest = HORIZON_S;
         for (other, encounter) in near {
             let (mut off, mut time) = (me.position - other.position, 0.0);
             // Who is too close already looks for a way that leads no closer.
             let space = self.space(me, other).min(STILL_CLOSER * off.length());
             let mut met = None;
-            for i in 0..=TURN_STEPS {
-                let last = i == TURN_STEPS;
-                let share = (i as f64 + 0.5) / TURN_STEPS as f64;
-                let bound = if last { tried.course } else { heading_or(me) + turn * share };
-                let speed =
-                    if last { tried.speed_m_s } else { start_m_s + (tried.speed_m_s - start_m_s) * share };
-                let span = if last { HORIZON_S - time } else { step_s };
-                let relative = ahead(bound) * speed - other.velocity;
+            for (i, velocity) in way.iter().enumerate() {
+                let span = if i == TURN_STEPS { HORIZON_S - time } else { step_s };
+                let relative = *velocity - other.velocity;
                 if let Some(after) = enters(off, relative, space, span) {
                     met = Some(time + after);
                     break;
