@@ -131,7 +131,7 @@ impl Gun {
         }
     }
 
-    /// The camera's state at a time that has been reached, no longer ago than [`KEPT_S`]; nearest to it elsewhere.
+    /// The camera's state at a time that has been reached, no longer ago than .4 s; nearest to it elsewhere.
     pub fn state(&self, time_s: f64) -> MotionState {
         let since = (self.time_s() - time_s) / STEP_S;
         let newest = self.way.len() - 1;

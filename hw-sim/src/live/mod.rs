@@ -2,7 +2,7 @@
 //!
 //! A [`Live`] is a camera, an inertial unit and a trigger on a gun on a ship. [`Hands`] move it: a mouse, a [`Script`], or a simulated gunner.
 //! The gun has inertia, friction and stops, the ship rolls, and what the hands want is followed as arms would. Pictures are cut from a
-//! [`Panorama`](crate::panorama::Panorama) through the lens, with the sensor's noise; samples become the unit's bytes. Without a clock all of
+//! [`Panorama`] through the lens, with the sensor's noise; samples become the unit's bytes. Without a clock all of
 //! it follows from the script; in real time the same bytes go through a pseudo-terminal, and pictures through a queue in which the newest wins.
 
 mod bench;
