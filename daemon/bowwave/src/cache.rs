@@ -4,7 +4,7 @@ use std::{
     env,
     fs::File,
     path::{Path, PathBuf},
-    time::SystemTime,
+    time::{Duration, SystemTime},
 };
 
 use anyhow::{Context, Result, bail};
@@ -29,6 +29,9 @@ fn folder() -> Result<PathBuf> {
 
 /// Panoramas that are kept: the ones that were used last. Each has some hundred megabytes.
 const PANORAMAS: usize = 6;
+
+/// A part that nobody has written to for so long is of a process that is gone.
+const CUT_OFF: Duration = Duration::from_secs(3600);
 
 /// Where the built-in recording is, or will be. Its name holds a digest of its recipe and of the maker's revision, so that
 /// neither meets an old file.
@@ -70,22 +73,34 @@ fn digest(recipe: &impl std::fmt::Debug) -> String {
     digest.iter().take(6).map(|b| format!("{b:02x}")).collect()
 }
 
-/// Removes panoramas but the ones that were used last.
+/// Removes panoramas but the ones that were used last, and what was left of ones whose making was cut off.
 fn forget_old_panoramas(newest: &Path) {
     let Some(entries) = newest.parent().and_then(|folder| folder.read_dir().ok()) else { return };
+    let entries: Vec<std::fs::DirEntry> = entries.flatten().collect();
+    let is_left = |path: &Path| {
+        let age = path.metadata().ok().and_then(|m| m.modified().ok()).and_then(|time| time.elapsed().ok());
+        path.extension().is_some_and(|e| e == "part") && age.is_some_and(|age| age > CUT_OFF)
+    };
+    for path in entries.iter().map(std::fs::DirEntry::path).filter(|path| is_left(path)) {
+        remove(&path, "its making was cut off");
+    }
     let mut old: Vec<(SystemTime, PathBuf)> = entries
-        .flatten()
-        .map(|entry| entry.path())
+        .iter()
+        .map(std::fs::DirEntry::path)
         .filter(|path| path.extension().is_some_and(|e| e == "panorama") && path != newest)
         .filter_map(|path| Some((path.metadata().ok()?.modified().ok()?, path)))
         .collect();
     old.sort();
     old.reverse();
     for (_, path) in old.iter().skip(PANORAMAS - 1) {
-        match std::fs::remove_file(path) {
-            Ok(()) => log::info!("{} is removed: it was not used for long", path.display()),
-            Err(e) => log::warn!("cannot remove {}: {e}", path.display()),
-        }
+        remove(path, "it was not used for long");
+    }
+}
+
+fn remove(path: &Path, why: &str) {
+    match std::fs::remove_file(path) {
+        Ok(()) => log::info!("{} is removed: {why}", path.display()),
+        Err(e) => log::warn!("cannot remove {}: {e}", path.display()),
     }
 }
 

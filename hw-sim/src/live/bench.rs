@@ -68,6 +68,12 @@ impl Bench {
         }
     }
 
+    /// Begins at another time than it was made for.
+    pub fn begin(&mut self, origin: Time) {
+        self.unit = Unit::new(&self.recipe, origin);
+        self.origin = origin;
+    }
+
     /// When the next sample is measured.
     pub fn next_sample(&self) -> Time {
         self.time_of(self.samples as f64 / self.recipe.imu.rate_hz)

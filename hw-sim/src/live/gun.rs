@@ -69,7 +69,7 @@ impl Gun {
     pub fn new(model: MountModel, motion: Motion) -> Self {
         let mut gun =
             Self { model, motion, angles: DVec2::ZERO, rates: DVec2::ZERO, steps: 0, way: VecDeque::new() };
-        gun.angles = gun.clamped(gun.on_mount(DVec2::new(0.0, REST_ELEVATION), 0.0));
+        gun.angles = gun.clamped(gun.on_mount(BEGIN, 0.0));
         gun.way.push_back([gun.angles, gun.rates]);
         gun
     }
@@ -178,8 +178,8 @@ impl Gun {
     }
 }
 
-/// Elevation at the begin, radians: more sea than sky is in the picture.
-const REST_ELEVATION: f64 = -4.0 * std::f64::consts::PI / 180.0;
+/// Azimuth and elevation at the begin, radians: to the north, with more sea than sky in the picture.
+pub(super) const BEGIN: DVec2 = DVec2::new(0.0, -4.0 * std::f64::consts::PI / 180.0);
 
 #[cfg(test)]
 mod tests {

@@ -40,7 +40,7 @@ impl Default for Aim {
 }
 
 impl Hands {
-    /// Turns the gun on its mount by so much to the right and upwards, radians. `limits` are the stops about where it began.
+    /// Turns the gun on its mount by so much to the right and upwards, radians.
     pub fn turn(&self, by: DVec2) {
         let mut held = self.lock();
         let so_far = if let Aim::Turned(so_far) = held.aim { so_far } else { DVec2::ZERO };

@@ -98,27 +98,29 @@ pub struct Live {
 }
 
 enum Way {
+    /// In real time, before anybody asked for events.
+    Waiting(Option<Box<(Bench, Sensor)>>),
     Fast(Box<fast::FastLive>),
     Realtime(Box<realtime::RealtimeLive>),
 }
 
 impl Live {
-    /// Begins now, or without a clock at the time at which made recordings begin.
+    /// One that begins with the first call of [`Self::collect`], or without a clock at the time at which made recordings begin.
     pub fn start(options: LiveOptions<'_>) -> Result<Self, ReplayError> {
         let LiveOptions { recipe, panorama, hands, script, realtime, is_coded } = options;
         let camera = CutCamera::new(&recipe.recipe).with_sight(&recipe.recipe);
         let sensor = Sensor::new(camera, Panorama::open(panorama)?, is_coded);
-        let origin = if realtime { clock::now().plus_ns(realtime::PREROLL_NS) } else { START };
+        let origin = if realtime { clock::now() } else { START };
         let bench = Bench::new(recipe, hands.clone(), script, origin);
         let way = if realtime {
-            Way::Realtime(Box::new(realtime::RealtimeLive::start(bench, sensor)?))
+            Way::Waiting(Some(Box::new((bench, sensor))))
         } else {
             Way::Fast(Box::new(fast::FastLive::new(bench, sensor)))
         };
         Ok(Self { origin, hands, way })
     }
 
-    /// When it begins, on the clock of its events.
+    /// When it begins, on the clock of its events; in real time, before that, when it was made.
     pub const fn origin(&self) -> Time {
         self.origin
     }
@@ -131,7 +133,16 @@ impl Live {
     /// Appends the events that have arrived and were not yet fetched, by arrival: those up to and with `until`, or in real time those that
     /// there are.
     pub fn collect(&mut self, until: Time, out: &mut Vec<Event>) -> Result<(), ReplayError> {
+        if let Way::Waiting(parts) = &mut self.way
+            && let Some(parts) = parts.take()
+        {
+            let (mut bench, sensor) = *parts;
+            self.origin = clock::now().plus_ns(realtime::PREROLL_NS);
+            bench.begin(self.origin);
+            self.way = Way::Realtime(Box::new(realtime::RealtimeLive::start(bench, sensor)?));
+        }
         match &mut self.way {
+            Way::Waiting(_) => Ok(()),
             Way::Fast(live) => live.collect(until, out),
             Way::Realtime(live) => live.drain(out),
         }
@@ -140,6 +151,7 @@ impl Live {
     /// Where the camera really was at a frame's mid-exposure, no longer ago than a second.
     pub fn truth_at(&self, mid_exposure: Time) -> Option<CameraPose> {
         match &self.way {
+            Way::Waiting(_) => None,
             Way::Fast(live) => live.truth_at(mid_exposure),
             Way::Realtime(live) => live.truth_at(mid_exposure),
         }
@@ -148,6 +160,7 @@ impl Live {
     /// What was delivered and left out so far.
     pub fn stats(&self) -> LiveStats {
         match &self.way {
+            Way::Waiting(_) => LiveStats::default(),
             Way::Fast(live) => live.stats(),
             Way::Realtime(live) => live.stats(),
         }
@@ -156,7 +169,7 @@ impl Live {
     /// Ends it and its threads.
     pub fn stop(self) -> Result<(), ReplayError> {
         match self.way {
-            Way::Fast(_) => Ok(()),
+            Way::Waiting(_) | Way::Fast(_) => Ok(()),
             Way::Realtime(live) => live.stop(),
         }
     }

@@ -8,12 +8,16 @@ use bowwave_core::{
 use glam::DVec2;
 use serde::Deserialize;
 
-use super::hands::Hands;
+use super::{gun::BEGIN, hands::Hands};
+use crate::panorama::{ELEVATION, TRAVERSE_MAX};
 
 /// Most steps of a script.
 const STEPS_MAX: usize = 10_000;
 /// Longest script, seconds.
 const LENGTH_MAX_S: f64 = 86_400.0;
+
+/// Shortest pull of the trigger, seconds: a shorter one may fall between two samples of the switch.
+const PRESS_LEAST_S: f64 = 0.01;
 
 /// A script that is played: what is done, in the order of time.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,23 +87,18 @@ impl Script {
         Ok(Self { steps, begun: 0, aim: None, release_s: None })
     }
 
-    /// Seconds after which nothing is done any more.
-    pub fn length_s(&self) -> f64 {
-        self.steps.iter().map(|s| s.at_s + s.over_s.max(s.press_s.unwrap_or(0.0))).fold(0.0, f64::max)
-    }
-
     /// Moves the hands as the script says for `time_s` seconds after the begin, which is `time` on the host's clock.
     pub(super) fn play(&mut self, time_s: f64, time: Time, hands: &Hands) {
         while let Some(step) = self.steps.get(self.begun).filter(|step| step.at_s <= time_s) {
             self.begun += 1;
             if step.azimuth.is_some() || step.elevation.is_some() {
-                let from = self.aim.map_or(DVec2::ZERO, |aim| aim.at(time_s).0);
+                let from = self.aim.map_or(BEGIN, |aim| aim.at(time_s).0);
                 let to = DVec2::new(step.azimuth.unwrap_or(from.x), step.elevation.unwrap_or(from.y));
                 self.aim = Some(ScriptAim { from, to, begin_s: step.at_s, over_s: step.over_s });
             }
             if let Some(press_s) = step.press_s {
                 hands.press(true);
-                self.release_s = Some(step.at_s + press_s);
+                self.release_s = Some(self.release_s.unwrap_or(0.0).max(step.at_s + press_s));
             }
             if let Some(act) = step.act {
                 hands.act(act);
@@ -129,15 +128,16 @@ impl ScriptAim {
 fn step(section: &TomlSection<'_>, raw: &RawStep) -> Result<ScriptStep, TomlError> {
     let text = section.text;
     let seconds = || number(0.0..=LENGTH_MAX_S, "s");
-    let angle = |key: &OptionalKey<f64>, limit: f64| -> Result<Option<f64>, TomlError> {
-        Ok(text.given(key, number(-limit..=limit, "degrees"))?.map(f64::to_radians))
+    let angle = |key: &OptionalKey<f64>, [least, most]: [f64; 2]| -> Result<Option<f64>, TomlError> {
+        let range = least.to_degrees().round()..=most.to_degrees().round();
+        Ok(text.given(key, number(range, "degrees"))?.map(f64::to_radians))
     };
     Ok(ScriptStep {
         at_s: section.required("at_s", &raw.at_s, seconds())?,
-        azimuth: angle(&raw.azimuth_deg, 180.0)?,
-        elevation: angle(&raw.elevation_deg, 90.0)?,
+        azimuth: angle(&raw.azimuth_deg, [-TRAVERSE_MAX, TRAVERSE_MAX])?,
+        elevation: angle(&raw.elevation_deg, ELEVATION)?,
         over_s: text.given(&raw.over_s, seconds())?.unwrap_or(0.0),
-        press_s: text.given(&raw.press_s, seconds())?,
+        press_s: text.given(&raw.press_s, number(PRESS_LEAST_S..=LENGTH_MAX_S, "s"))?,
         act: text.given(&raw.act, one_of(&Act::ALL.map(|act| (act.name(), act))))?,
     })
 }
@@ -189,7 +189,6 @@ press_s = 0.5
         let pressed = seen.iter().filter(|(_, pressed, _)| *pressed).count();
         assert_eq!(pressed, 100);
         assert_eq!(seen.iter().filter_map(|(_, _, act)| *act).collect::<Vec<_>>(), [Act::Report]);
-        assert_eq!(script.length_s(), 4.5);
     }
 
     #[test]
@@ -198,6 +197,8 @@ press_s = 0.5
             ("[[step]]\nazimuth_deg = 3", "test:1", "is missing; give"),
             ("[[step]]\nat_s = -1", "test:2", "is not allowed; give"),
             ("[[step]]\nat_s = 2\n[[step]]\nat_s = 1", "test:3", "in the order of time"),
+            ("[[step]]\nat_s = 1\nazimuth_deg = 120", "test:3", "-70"),
+            ("[[step]]\nat_s = 1\npress_s = 0", "test:3", "0.01"),
             ("[[step]]\nat_s = 1\nact = \"shout\"", "test:3", "report"),
             ("[[step]]\nat_s = 1\nazimut_deg = 1", "test:3", "azimuth_deg"),
         ] {

@@ -134,6 +134,12 @@ impl Motion {
         [&self.ship.heading, &self.ship.pitch, &self.ship.roll].map(|p| p.at(time_s, self.period_s)[2])
     }
 
+    /// Most that the ship's roll or pitch is, radians.
+    pub(crate) fn sway(&self) -> f64 {
+        let most = |p: &Periodic| p.mean.abs() + p.harmonics.iter().map(|h| h.amplitude.abs()).sum::<f64>();
+        most(&self.ship.roll).max(most(&self.ship.pitch))
+    }
+
     /// The heading that the ship swings about, radians.
     pub(crate) const fn heading_mean(&self) -> f64 {
         self.ship.heading.mean

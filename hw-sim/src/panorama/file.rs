@@ -21,8 +21,9 @@ const MAGIC: &[u8; 8] = b"BWPANO1\n";
 const TILE: usize = 128;
 /// Longest header, bytes.
 const HEADER_MAX: u32 = 64 << 10;
-/// Most columns, rows and frames of a file that is read.
-const SIDE_MAX: usize = 16_384;
+/// Most columns and rows, and frames, of a panorama, and most pixels: a gigabyte for each thread that draws it.
+const SIDE_MAX: usize = 8192;
+const PIXELS_MAX: usize = 60_000_000;
 const FRAMES_MAX: usize = 20_000;
 /// Longest tile, bytes.
 const TILE_MAX: u64 = 8 << 20;
@@ -35,6 +36,17 @@ pub enum PanoramaError {
     /// Its recipe cannot be drawn.
     #[error(transparent)]
     Make(#[from] MakeError),
+    /// Its camera sees too finely, or too far up and down.
+    #[error(
+        "the sea around such a camera has {columns}x{rows} pixels, of which 8192 a side and 60 million in all can be had: give a smaller \
+         camera, wider than high"
+    )]
+    Large {
+        /// Columns of the panorama.
+        columns: usize,
+        /// Its rows.
+        rows: usize,
+    },
     /// The file cannot be read or written.
     #[error("{}: cannot {what}: {source}", path.display())]
     File {
@@ -117,6 +129,12 @@ impl PanoramaHeader {
         [self.azimuth_left + (column as f64 + 0.5) / self.focal, (level - row as f64 - 0.5) / self.focal]
     }
 
+    /// Refuses what could not be read again.
+    pub fn check(&self) -> Result<(), PanoramaError> {
+        let (columns, rows) = (self.columns, self.sky_rows + self.sea_rows);
+        if self.is_bounded() { Ok(()) } else { Err(PanoramaError::Large { columns, rows }) }
+    }
+
     fn is_bounded(&self) -> bool {
         let side = |n: usize| (8..=SIDE_MAX).contains(&n);
         let is_whole = [self.level_row, self.focal, self.azimuth_left].iter().all(|x| x.is_finite());
@@ -126,6 +144,7 @@ impl PanoramaHeader {
             && side(self.sea_rows)
             && is_whole
             && is_tiled
+            && self.columns * (self.sky_rows + self.sea_rows) <= PIXELS_MAX
             && self.focal > 1.0
             && (1..=FRAMES_MAX).contains(&self.frames)
     }

@@ -12,7 +12,6 @@ use super::{
 };
 use crate::{
     make::{
-        MakeError,
         camera::{LIGHT_MAX, SeaScene, ViewCoverage, open_sky, transfer},
         march::{LevelView, SeaPicture, ViewShape},
         studio::{FocalLengths, LitSea},
@@ -36,8 +35,8 @@ pub(super) struct PanoramaStudio {
 }
 
 impl PanoramaStudio {
-    pub fn new(panorama: &PanoramaRecipe) -> Result<Self, MakeError> {
-        panorama.recipe.check()?;
+    pub fn new(panorama: &PanoramaRecipe) -> Result<Self, PanoramaError> {
+        panorama.check()?;
         let header = PanoramaHeader::of(panorama);
         let [left, right] = panorama.azimuths();
         let [up, down] = panorama.tangents();

@@ -4,9 +4,10 @@ use std::f64::consts::FRAC_PI_2;
 
 use bowwave_core::world::scenario::Scenario;
 
+use super::{PanoramaError, file::PanoramaHeader};
 use crate::{
     make::{GunMotion, Motion, Periodic, Recipe, ShipMotion, camera::level_focal},
-    ocean::cloudy::SkyRecipe,
+    ocean::{cloudy::SkyRecipe, spectrum::Swell},
 };
 
 /// Length of the loop of the sea, seconds.
@@ -17,8 +18,12 @@ const SHIP_LOOP_S: f64 = 60.0;
 pub const TRAVERSE_MAX: f64 = 70.0 * DEG;
 /// Stops of its elevation, radians.
 pub(crate) const ELEVATION: [f64; 2] = [-18.0 * DEG, 14.0 * DEG];
-/// Most that a ship's roll, pitch and yaw turn the picture by, radians.
-const SWAY: f64 = 8.0 * DEG;
+/// Azimuth beside the view at either stop: yaw, and what a rolled picture's corners reach, radians.
+const BESIDE: f64 = 12.0 * DEG;
+/// Steepest elevation that is drawn, radians.
+const STEEPEST: f64 = 75.0 * DEG;
+/// Waves so many times as high as those of the wind have a swell among them.
+const SWELL_FROM: f64 = 1.3;
 const DEG: f64 = std::f64::consts::PI / 180.0;
 /// A panorama to be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,16 +63,31 @@ impl PanoramaRecipe {
                 cloud_cover: (0.95 - 0.53 * scenario.daylight.sun_strength).clamp(0.0, 1.0),
             },
             visibility_m: scenario.daylight.visibility_m.clamp(100.0, 1e6),
-            eye_height_m: scenario.eye_height_m.clamp(1.0, 200.0),
+            eye_height_m: scenario.eye_height_m,
             ship: ShipMotion { heave: heave(height_m, LOOP_S), ..ShipMotion::default() },
             trigger: Vec::new(),
             ..Recipe::default()
         };
+        // Higher waves than this wind makes are a swell.
+        let wind_sea_m = recipe.significant_height_m();
+        if height_m > SWELL_FROM * wind_sea_m + 0.1 {
+            recipe.swell = Some(Swell {
+                height_m: (height_m * height_m - wind_sea_m * wind_sea_m).sqrt().min(12.0),
+                period_s: scenario.waves.spectrum.peak_period_s().clamp(2.0, LOOP_S),
+                from: scenario.waves.wind_from,
+            });
+        }
         // Cameras in the dark turn their gain up.
         recipe.camera.read_noise /= exposure;
         recipe.camera.latency_ns = [20_000_000, 24_000_000];
         let motion = Motion::new(ship(height_m), GunMotion::default(), recipe.eye_height_m, SHIP_LOOP_S);
         Self { recipe, motion, detail: 1.0, exposure, sun_elevation: elevation }
+    }
+
+    /// Refuses what cannot be drawn.
+    pub fn check(&self) -> Result<(), PanoramaError> {
+        self.recipe.check()?;
+        PanoramaHeader::of(self).check()
     }
 
     /// Whether the sun is above the horizon.
@@ -87,14 +107,20 @@ impl PanoramaRecipe {
         let half = (f64::from(lens.width).hypot(f64::from(lens.height)) / 2.0 / lens.focal.x).atan();
         let tall = (f64::from(lens.height) / 2.0 / lens.focal.y).atan();
         // A rolled picture's corner reaches farther than its edge's middle, by less than the diagonal does.
-        let reach = tall + 0.35 * (half - tall) + 0.5 * SWAY;
-        [(ELEVATION[1] + reach).tan(), (ELEVATION[0] - reach).tan()]
+        let reach = tall + 0.35 * (half - tall) + self.sway();
+        let within = |angle: f64| angle.clamp(-STEEPEST, STEEPEST).tan();
+        [within(ELEVATION[1] + reach), within(ELEVATION[0] - reach)]
     }
 
     /// Azimuths of the left and the right edge, radians: the same to both sides of north, where scenarios begin to look.
     pub(crate) fn azimuths(&self) -> [f64; 2] {
-        let half = (TRAVERSE_MAX + self.recipe.camera.hfov / 2.0 + 1.5 * SWAY).min(2.0 * FRAC_PI_2);
+        let half = (TRAVERSE_MAX + self.recipe.camera.hfov / 2.0 + BESIDE).min(2.0 * FRAC_PI_2);
         [-half, half]
+    }
+
+    /// Most that the ship's roll and pitch turn the picture by, radians.
+    fn sway(&self) -> f64 {
+        self.motion.sway()
     }
 
     /// Frames of the loop.
@@ -146,7 +172,7 @@ mod tests {
     fn every_built_in_scenario_has_a_panorama_that_can_be_made() {
         for (name, text) in bowwave_core::world::scenario::BUILT_IN {
             let panorama = PanoramaRecipe::of_scenario(&Scenario::parse(text, name).unwrap(), (1280, 720));
-            panorama.recipe.check().unwrap_or_else(|e| panic!("{name}: {e}"));
+            panorama.check().unwrap_or_else(|e| panic!("{name}: {e}"));
             let [left, right] = panorama.azimuths();
             let [up, down] = panorama.tangents();
             assert!(

@@ -16,7 +16,7 @@ use bowwave_core::{pacing::FRAMES_PER_S, session::Setup, time::Time};
 use bowwave_record::{JournalOptions, Properties, Run};
 use bowwave_trainer::{
     Finished, Signals, TickClock, Trainer, TrainerOptions,
-    presenter::{GpuSettings, OutputOptions, PresenterOptions},
+    presenter::{GpuSettings, OutputOptions, PresenterOptions, Seat},
     replay::session_properties,
     source::Source,
     storage::{RecorderOptions, Storage, StorageOptions},
@@ -51,8 +51,10 @@ pub struct PreparedRun {
     pub gpu: GpuSettings,
     /// Whether to show a window.
     pub window: bool,
-    /// Whether mouse and keys turn a gun there.
-    pub aims: bool,
+    /// What whoever sits there may do.
+    pub seat: Seat,
+    /// Where its events come from, for people.
+    pub source: String,
     /// Whether to keep what went in.
     pub record: bool,
 }
@@ -193,7 +195,7 @@ fn presenter(arguments: &DeskArgs, prepared: &PreparedRun, realtime: bool, frame
             sheet: arguments.sheet,
             stills: arguments.stills.clone(),
             window: prepared.window,
-            aims: prepared.aims,
+            seat: prepared.seat,
             // A frame's hash costs time that a paced run does not have.
             hash: !realtime,
             ..OutputOptions::default()
@@ -236,7 +238,7 @@ fn properties_of_run(prepared: &PreparedRun, start: Time) -> Properties {
         // What is kept is a stretch of the original: it need not close.
         loop_ns: None,
         start,
-        source: format!("replay of {}", prepared.properties.source),
+        source: prepared.source.clone(),
         extra,
         ..prepared.properties.clone()
     }

@@ -14,12 +14,13 @@ use bowwave_core::{
 use bowwave_files::plain_text;
 use bowwave_trainer::{
     TickClock,
+    presenter::Seat,
     source::{LiveSource, Source},
     summary::SummaryOptions,
 };
 use hw_sim::{
     live::{self, Hands, Live, LiveOptions, Script},
-    panorama::PanoramaRecipe,
+    panorama::{PanoramaRecipe, TRAVERSE_MAX},
 };
 
 use crate::{
@@ -47,13 +48,12 @@ enum Aimer {
 
 /// Plays a scenario.
 pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
-    let interrupts = desk::catch_interrupts()?;
     let desk_args = &arguments.desk;
     let config = desk::config(desk_args)?;
     let aimer = aimer(&arguments.aim)?;
     if matches!(aimer, Aimer::Mouse) && (arguments.fast || desk_args.headless) {
         bail!(
-            "somebody who aims with the mouse needs a window and a clock: leave --headless and --fast out, or let a simulated gunner              aim (--aim expert)"
+            "somebody who aims with the mouse needs a window and a clock: leave --headless and --fast out, or let a simulated gunner aim (--aim expert)"
         );
     }
     let (text, base) = read_scenario(&arguments.scenario)?;
@@ -67,9 +67,13 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
     let length_s = scenario.duration_s.unwrap_or(ENDLESS_S);
     let frames = desk::frames_asked(desk_args).unwrap_or_else(|| desk::frames_of(length_s));
     desk::check(desk_args, frames)?;
+    let drawable = "the sea of this scenario cannot be drawn: change mount.eye_height_m or sea.beaufort in it, or give another --camera";
+    recipe.check().context(drawable)?;
     let panorama = cache::panorama(&recipe)?;
+    // Not before: an interrupt ends the making of a sea at once.
+    let interrupts = desk::catch_interrupts()?;
     let gunner = match &aimer {
-        Aimer::Gunner(skill) => Some(Gunner::new(&scenario, skill)),
+        Aimer::Gunner(skill) => Some(Gunner::new(&scenario, skill).within(TRAVERSE_MAX)),
         _ => None,
     };
     if let Some(briefing) = scenario.exercise.briefing.as_deref().filter(|_| !desk_args.json) {
@@ -87,14 +91,16 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
         orientation: config.orientation,
         heading: config.heading.settings.clone(),
     };
+    let properties = live::properties(&recipe, &calibration, &arguments.aim);
     let prepared = PreparedRun {
-        properties: live::properties(&recipe, &calibration, &arguments.aim),
+        source: properties.source.clone(),
+        properties,
         setup,
         scenario_toml: text,
         calibration_toml: to_toml(&calibration),
         models_base: base,
         window: shows_window(&aimer, desk_args, &config),
-        aims: matches!(aimer, Aimer::Mouse),
+        seat: if matches!(aimer, Aimer::Mouse) { Seat::Gunner } else { Seat::Watcher },
         record: desk_args.record || config.files.record,
         gpu: desk::gpu(desk_args, config.gpu),
     };

@@ -9,6 +9,9 @@ const SUN_DEG: f64 = 20.0;
 const WIND_DEG: f64 = 45.0;
 /// Share by which the eye's height may differ: a boat's distance below the horizon errs by as much.
 const EYE: f64 = 0.1;
+/// Difference between two significant wave heights that shows, metres, and as a share.
+const WAVES_M: f64 = 0.3;
+const WAVES: f64 = 0.35;
 /// Factor between two visibilities that shows.
 const VISIBILITY: f64 = 2.0;
 
@@ -34,6 +37,12 @@ pub fn contradictions(scenario: &Scenario, properties: &Properties, length_s: f6
     let wind = scenario.waves.wind_from.to_degrees().rem_euclid(360.0);
     if let Some(shown) = said("wind_from_deg").filter(|shown| apart_deg(*shown, wind) > WIND_DEG) {
         found.push(format!("the wind comes from {shown:.0} degrees, in the scenario from {wind:.0}"));
+    }
+    let height_m = scenario.waves.spectrum.significant_height_m();
+    let shown =
+        said("significant_height_m").filter(|m| (m - height_m).abs() > WAVES_M + WAVES * m.max(height_m));
+    if let Some(shown) = shown {
+        found.push(format!("the waves are {shown:.1} m high, in the scenario {height_m:.1} m"));
     }
     let eye_m = scenario.eye_height_m;
     if let Some(shown) = said("eye_height_m").filter(|shown| (shown / eye_m - 1.0).abs() > EYE) {

@@ -14,6 +14,8 @@ use bowwave_core::{
 use bowwave_files::plain_text;
 use bowwave_record::{Properties, RecordingReader};
 
+use bowwave_trainer::presenter::Seat;
+
 use crate::{
     cache,
     cli::{OrientationArg, Simulate},
@@ -85,6 +87,7 @@ pub fn prepare(arguments: &Simulate) -> Result<PreparedRecording> {
     let window = desk::shows_window(&arguments.desk, &config);
     let record = arguments.desk.record || config.files.record;
     let gpu = desk::gpu(&arguments.desk, config.gpu);
+    let source = format!("replay of {}", properties.source);
     let run = PreparedRun {
         properties,
         setup,
@@ -93,7 +96,8 @@ pub fn prepare(arguments: &Simulate) -> Result<PreparedRecording> {
         models_base: base,
         gpu,
         window,
-        aims: false,
+        seat: Seat::Trainee,
+        source,
         record,
     };
     Ok(PreparedRecording { path: recording, duration_ns, run })

@@ -96,6 +96,8 @@ pub struct Gunner {
     random: Pcg64,
     pressed: bool,
     wanted: Option<DVec2>,
+    /// Azimuth to each side of north that the mount turns to, radians.
+    traverse: f64,
 }
 
 /// What a gunner does in a step.
@@ -139,6 +141,7 @@ impl Gunner {
             random,
             pressed: false,
             wanted: None,
+            traverse: f64::INFINITY,
         }
     }
 
@@ -152,9 +155,14 @@ impl Gunner {
         self.pressed
     }
 
-    /// Sees the world as it is `time_s` seconds after the begin, and acts for the next [`STEP_S`](Self::STEP_S). `None` before the world runs.
-    pub fn step(&mut self, world: &World, time_s: f64) -> Option<GunnerMove> {
-        let running = world.running()?;
+    /// The same on a mount that turns no further than `traverse` radians to each side of north: boats beyond are left alone.
+    pub fn within(self, traverse: f64) -> Self {
+        Self { traverse, ..self }
+    }
+
+    /// Notes what happened in the world since the last call; once after each of its advances.
+    pub fn hear(&mut self, world: &World) {
+        let Some(running) = world.running() else { return };
         for event in world.events() {
             if let ExerciseFact::Missed { boat, why, .. } = &event.fact
                 && let Some(boat) = (0..running.fleet.len()).find(|b| running.fleet.name(*b) == boat)
@@ -162,7 +170,13 @@ impl Gunner {
                 self.head.saw_miss(boat, why.error_mrad);
             }
         }
-        let sighted = self.eye.sees(running);
+    }
+
+    /// Sees the world as it is `time_s` seconds after the begin, and acts for the next [`STEP_S`](Self::STEP_S). `None` before the world runs.
+    pub fn step(&mut self, world: &World, time_s: f64) -> Option<GunnerMove> {
+        let running = world.running()?;
+        let mut sighted = self.eye.sees(running);
+        sighted.retain(|boat| (boat.at.x.atan2(boat.at.y)).abs() <= self.traverse);
         let off = self.wanted.map_or(f64::INFINITY, |wanted| self.hand.off(wanted));
         let moment = Moment {
             time_s,
@@ -220,6 +234,7 @@ pub fn play(
         track.push(time, gunner.bore());
         world.advance(begin, time, time, |at| track.at(at), &mut played.shots);
         played.events.extend_from_slice(world.events());
+        gunner.hear(&world);
         let Some(moved) = gunner.step(&world, time_s) else { break };
         for act in moved.acts {
             world.act(TraineeAct { time, act });

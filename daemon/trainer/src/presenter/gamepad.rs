@@ -13,13 +13,16 @@ const TURNS: [f64; 2] = [0.023, 0.0035];
 const DEAD: f64 = 0.12;
 /// Share of the right trigger's way at which it is pressed, and at which it is released again.
 const PULLED: [f64; 2] = [0.5, 0.35];
-/// Axes of the two sticks: to the right and downwards.
-const STICKS: [[AbsoluteAxisCode; 2]; 2] = [
-    [AbsoluteAxisCode::ABS_X, AbsoluteAxisCode::ABS_Y],
-    [AbsoluteAxisCode::ABS_RX, AbsoluteAxisCode::ABS_RY],
-];
-/// Axes of the right trigger.
-const TRIGGERS: [AbsoluteAxisCode; 2] = [AbsoluteAxisCode::ABS_RZ, AbsoluteAxisCode::ABS_GAS];
+/// Axes of the left stick: to the right and downwards.
+const LEFT: [AbsoluteAxisCode; 2] = [AbsoluteAxisCode::ABS_X, AbsoluteAxisCode::ABS_Y];
+/// Axes of the right stick, and of the right trigger, of gamepads that name them so.
+const RIGHT: ([AbsoluteAxisCode; 2], AbsoluteAxisCode) =
+    ([AbsoluteAxisCode::ABS_RX, AbsoluteAxisCode::ABS_RY], AbsoluteAxisCode::ABS_RZ);
+/// The same of those that do not.
+const PLAIN: ([AbsoluteAxisCode; 2], AbsoluteAxisCode) =
+    ([AbsoluteAxisCode::ABS_Z, AbsoluteAxisCode::ABS_RZ], AbsoluteAxisCode::ABS_GAS);
+/// Maker whose driver names the left and the upper button by its own letters (X is BTN_NORTH there), not by where they lie.
+const MICROSOFT: u16 = 0x045e;
 
 /// Buttons of the trainee's acts, by where they lie.
 pub const BUTTONS: [(KeyCode, Act); 6] = [
@@ -50,7 +53,7 @@ impl Gamepad {
             log::warn!("the gamepad {} is not used: {e}", path.display());
             return None;
         }
-        let mut pad = Pad::default();
+        let mut pad = Pad { is_lettered: device.input_id().vendor() == MICROSOFT, ..Pad::default() };
         match device.get_absinfo() {
             Ok(axes) => axes.for_each(|(axis, info)| {
                 pad.ranges.push((axis, [f64::from(info.minimum()), f64::from(info.maximum())]));
@@ -87,6 +90,8 @@ struct Pad {
     /// Places of the sticks, -1 to 1 to the right and downwards.
     sticks: [[f64; 2]; 2],
     is_pulled: bool,
+    /// Its left and upper button are named the other way round.
+    is_lettered: bool,
 }
 
 impl Pad {
@@ -97,6 +102,11 @@ impl Pad {
                 self.pull(value == 1)
             }
             EventSummary::Key(_, key, 1) => {
+                let key = match key {
+                    KeyCode::BTN_NORTH if self.is_lettered => KeyCode::BTN_WEST,
+                    KeyCode::BTN_WEST if self.is_lettered => KeyCode::BTN_NORTH,
+                    key => key,
+                };
                 BUTTONS.into_iter().find(|(button, _)| *button == key).map(|(_, act)| Pressed::Act(act))
             }
             EventSummary::AbsoluteAxis(_, axis, value) => self.axis(axis, f64::from(value)),
@@ -110,11 +120,13 @@ impl Pad {
         if !share.is_finite() {
             return None;
         }
-        if TRIGGERS.contains(&axis) {
+        let has = |axis: AbsoluteAxisCode| self.ranges.iter().any(|(known, _)| *known == axis);
+        let (right, trigger) = if RIGHT.0.into_iter().all(has) { RIGHT } else { PLAIN };
+        if axis == trigger {
             let [pull, release] = PULLED;
             return self.pull(share > if self.is_pulled { release } else { pull });
         }
-        for (stick, axes) in self.sticks.iter_mut().zip(STICKS) {
+        for (stick, axes) in self.sticks.iter_mut().zip([LEFT, right]) {
             for (place, code) in stick.iter_mut().zip(axes) {
                 if code == axis {
                     *place = 2.0 * share - 1.0;
@@ -152,7 +164,7 @@ mod tests {
 
     fn pad() -> Pad {
         let stick = [-32768.0, 32767.0];
-        let axes = STICKS.into_iter().flatten().map(|axis| (axis, stick));
+        let axes = LEFT.into_iter().chain(RIGHT.0).map(|axis| (axis, stick));
         Pad { ranges: axes.chain([(AbsoluteAxisCode::ABS_RZ, [0.0, 1023.0])]).collect(), ..Pad::default() }
     }
 
@@ -183,6 +195,19 @@ mod tests {
                 "{code:?} {value}: {turn:?}"
             );
         }
+    }
+
+    #[test]
+    fn a_right_stick_by_other_names_does_not_fire() {
+        let axes = LEFT.into_iter().chain(PLAIN.0).map(|axis| (axis, [0.0, 255.0]));
+        let mut plain = Pad { ranges: axes.collect(), ..Pad::default() };
+        assert_eq!(plain.take(axis(AbsoluteAxisCode::ABS_RZ, 255)), None);
+        assert!(matches!(plain.turn(), Some(Pressed::Turn([right, up])) if right == 0.0 && up < 0.0));
+        let mut lettered = Pad { is_lettered: true, ..pad() };
+        assert_eq!(
+            lettered.take(key(KeyCode::BTN_NORTH, 1)),
+            Some(Pressed::Act(Act::Identify(Side::Neutral)))
+        );
     }
 
     #[test]

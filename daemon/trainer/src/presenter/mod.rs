@@ -23,7 +23,7 @@ use bowwave_render::{DrawRequest, RenderConfig, RenderError, Renderer, TimeOuts}
 
 use output::{OutputThread, Ticket};
 
-pub use output::{CompletedFrame, OutputOptions, OutputReport, UserEvent};
+pub use output::{CompletedFrame, OutputOptions, OutputReport, Seat, UserEvent};
 
 /// A driver that compiles for longer than this is not waited for, seconds.
 const WARM_UP_S: f64 = 120.0;

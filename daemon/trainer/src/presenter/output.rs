@@ -55,8 +55,20 @@ pub struct OutputOptions {
     pub stills: Vec<u64>,
     /// Whether to show a window.
     pub window: bool,
-    /// Whether mouse and keys turn a gun there.
-    pub aims: bool,
+    /// What whoever sits there may do.
+    pub seat: Seat,
+}
+
+/// What whoever sits before the window may do. Escape ends the run from any seat.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Seat {
+    /// To watch.
+    Watcher,
+    /// To fire and to act: the gun moves as it was recorded.
+    #[default]
+    Trainee,
+    /// To turn the gun as well.
+    Gunner,
 }
 
 /// What a frame carries through the renderer.
@@ -236,8 +248,8 @@ impl OutputWorker {
 
     fn run(mut self) -> Result<OutputReport> {
         if self.options.window {
-            self.screen = Some(Screen::open(self.options.size, self.options.aims)?);
-            self.gamepad = Gamepad::find();
+            self.screen = Some(Screen::open(self.options.size, self.options.seat == Seat::Gunner)?);
+            self.gamepad = (self.options.seat != Seat::Watcher).then(Gamepad::find).flatten();
         }
         while !self.completions.is_over() {
             if let Some(reporter) = &self.options.reporter {
@@ -317,7 +329,13 @@ impl OutputWorker {
                 None => self.gamepad = None,
             }
         }
-        for pressed in done {
+        let seat = self.options.seat;
+        let may = |pressed: &Pressed| match pressed {
+            Pressed::Quit => true,
+            Pressed::Turn(_) => seat == Seat::Gunner,
+            Pressed::Fire(_) | Pressed::Rezero | Pressed::Act(_) => seat != Seat::Watcher,
+        };
+        for pressed in done.into_iter().filter(may) {
             let event = match pressed {
                 Pressed::Fire(pressed) => UserEvent::Trigger(TriggerEdge { time: now(), pressed }),
                 Pressed::Turn(turn) => UserEvent::Turn(turn),

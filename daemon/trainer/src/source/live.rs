@@ -44,9 +44,11 @@ impl LiveSource {
         self.live.hands().blow(rounds.saturating_sub(self.rounds));
         self.rounds = rounds;
         let (Some(gunner), Some(running)) = (&mut self.gunner, world.running()) else { return };
+        gunner.hear(world);
         let time_s = running.now.secs_since(running.start);
-        while self.step as f64 * Gunner::STEP_S <= time_s {
-            // Frames come as often as a gunner's steps: a step more or less makes good for those that do not.
+        // Frames come as often as a gunner's steps, rounded to nanoseconds: a step is due half of one early. Those that a stall held up are made
+        // good.
+        while (self.step as f64 - 0.5) * Gunner::STEP_S <= time_s {
             let Some(moved) = gunner.step(world, self.step as f64 * Gunner::STEP_S) else { return };
             self.step += 1;
             let hands = self.live.hands();

@@ -26,8 +26,8 @@ const TURN_MAX: f64 = 0.7;
 const COUNTED_ON: f64 = 0.4;
 /// A point of a transit counts as reached within so many lengths.
 const REACHED_LENGTHS: f64 = 3.0;
-/// Speed at which one that lies still makes room for another, m/s.
-const ROOM_M_S: f64 = 1.5;
+/// Speed at which one that lies still makes room for another, m/s: one that was stopped is not under way by that.
+const ROOM_M_S: f64 = 0.8;
 /// Draws of fishing boats are numbered from here, those for exits below.
 const FISHING: u64 = 1 << 32;
 
