@@ -36,7 +36,7 @@ const CUT_OFF: Duration = Duration::from_secs(3600);
 /// Where the built-in recording is, or will be. Its name holds a digest of its recipe and of the maker's revision, so that
 /// neither meets an old file.
 pub fn default_recording_path() -> Result<PathBuf> {
-    Ok(folder()?.join(format!("built-in-{}.mcap", digest(&Recipe::default()))))
+    Ok(folder()?.join(format!("built-in-{}.mcap", digest(make::REVISION, &Recipe::default()))))
 }
 
 /// The built-in recording, made now where it is not there yet.
@@ -51,7 +51,7 @@ pub fn default_recording() -> Result<PathBuf> {
 
 /// The panorama of a recipe, made now where it is not there yet.
 pub fn panorama(recipe: &PanoramaRecipe) -> Result<PathBuf> {
-    let path = folder()?.join(format!("sea-{}.panorama", digest(recipe)));
+    let path = folder()?.join(format!("sea-{}.panorama", digest(panorama::REVISION, recipe)));
     if path.exists() {
         // Its time says when it was used last; where it cannot be set, it is made again some day.
         let touched =
@@ -67,9 +67,9 @@ pub fn panorama(recipe: &PanoramaRecipe) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// The name of what a recipe makes.
-fn digest(recipe: &impl std::fmt::Debug) -> String {
-    let digest = Sha256::digest(format!("{} {recipe:?}", make::REVISION));
+/// The name of what a recipe makes, with the revision of its maker.
+fn digest(revision: u32, recipe: &impl std::fmt::Debug) -> String {
+    let digest = Sha256::digest(format!("{revision} {recipe:?}"));
     digest.iter().take(6).map(|b| format!("{b:02x}")).collect()
 }
 

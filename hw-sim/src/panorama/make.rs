@@ -26,12 +26,18 @@ const STEPS: usize = 8192;
 /// Frames drawn at once before they are written.
 const BATCH: u32 = 16;
 
+/// Weights of a linear sRGB colour's luminance (IEC 61966-2-1).
+const LUMINANCE: Vec4 = Vec4::new(0.2126, 0.7152, 0.0722, 0.0);
+/// Colour of the twilight, of luminance 1.
+const TWILIGHT: Vec4 = Vec4::new(0.76, 1.0, 1.65, 0.0);
+
 /// Draws the frames of a panorama.
 pub(super) struct PanoramaStudio {
     sea: LitSea,
     panorama: PanoramaRecipe,
     header: PanoramaHeader,
     transfer: Vec<u8>,
+    twilight: f32,
 }
 
 impl PanoramaStudio {
@@ -56,7 +62,7 @@ impl PanoramaStudio {
         let transfer = (0..STEPS)
             .map(|i| (255.0 * transfer(exposure * (i as f32 + 0.5) * LIGHT_MAX / STEPS as f32)).round() as u8)
             .collect();
-        Ok(Self { sea, panorama: panorama.clone(), header, transfer })
+        Ok(Self { sea, panorama: panorama.clone(), header, transfer, twilight: panorama.twilight() as f32 })
     }
 
     /// All rows of the sea at a frame, three bytes a pixel.
@@ -98,6 +104,7 @@ impl PanoramaStudio {
     fn develop(&self, water: Vec4, row: usize, column: usize, rgb: &mut Vec<u8>) {
         let open = 1.0 - water.w;
         let light = if open < 1e-3 { water } else { water + open * self.sky_at(row, column) };
+        let light = light + self.twilight * (Vec4::dot(light, LUMINANCE) * TWILIGHT - light);
         let steps =
             (light * (STEPS as f32 / LIGHT_MAX)).clamp(Vec4::splat(0.5), Vec4::splat(STEPS as f32 - 0.5));
         rgb.extend(steps.to_array()[..3].iter().map(|step| self.transfer[split(*step).0 & (STEPS - 1)]));

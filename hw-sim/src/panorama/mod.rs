@@ -13,3 +13,6 @@ pub use file::{Panorama, PanoramaError, PanoramaView};
 pub use make::make;
 pub(crate) use recipe::ELEVATION;
 pub use recipe::{LOOP_S, PanoramaRecipe, TRAVERSE_MAX};
+
+/// Raised whenever the same recipe makes another panorama than before, so that kept ones are made again.
+pub const REVISION: u32 = 1;

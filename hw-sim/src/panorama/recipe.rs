@@ -95,6 +95,12 @@ impl PanoramaRecipe {
         self.sun_elevation > 0.0
     }
 
+    /// Share of the twilight's blue in the light, 0 to 1: with the sun below the horizon, ozone takes the red and the yellow out of what
+    /// comes from high up (Hulburt 1953, J. Opt. Soc. Am. 43, 113), and the glow of the sunset is gone by 9 degrees.
+    pub(crate) fn twilight(&self) -> f64 {
+        (-self.sun_elevation / (9.0 * DEG)).clamp(0.0, 1.0)
+    }
+
     /// Pixels per radian of azimuth and per tangent of elevation.
     pub(crate) fn focal(&self) -> f64 {
         self.detail * f64::from(level_focal(&self.recipe.lens()))
@@ -129,10 +135,10 @@ impl PanoramaRecipe {
     }
 }
 
-/// Share of the day's exposure at a sun's elevation in degrees: a camera's automatic exposure holds the picture through civil twilight and
-/// loses two stops by nautical dusk.
+/// Share of the day's exposure at a sun's elevation in degrees: a camera's automatic exposure makes good for most of what twilight takes, and
+/// loses three stops by nautical dusk.
 fn exposure(elevation_deg: f64) -> f64 {
-    ((2.0 + elevation_deg / 6.0).clamp(0.0, 2.0) - 2.0).exp2()
+    (elevation_deg / 4.0).clamp(-3.5, 0.0).exp2()
 }
 
 /// A ship of some thousand tonnes without way in waves of that height: periods of 10 s in roll, 6 s in pitch; amplitudes grow with the waves,
@@ -184,7 +190,9 @@ mod tests {
 
     #[test]
     fn a_camera_sees_less_after_sunset() {
-        for (elevation, share) in [(40.0, 1.0), (0.0, 1.0), (-6.0, 0.5), (-12.0, 0.25), (-40.0, 0.25)] {
+        for (elevation, share) in
+            [(40.0, 1.0), (0.0, 1.0), (-4.0, 0.5), (-12.0, 0.125), (-40.0, 2f64.powf(-3.5))]
+        {
             assert!((exposure(elevation) - share).abs() < 1e-12, "{elevation}");
         }
         let of = |name: &str| {
