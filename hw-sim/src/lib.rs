@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod fault;
+mod jpeg;
 pub mod live;
 pub mod make;
 pub mod ocean;

@@ -1,4 +1,4 @@
-//! Where what can be made again is kept: the built-in recording, and panoramas of the sea for scenarios that are played.
+//! The cache of what can be made again: the built-in recording, and panoramas of the sea for scenarios that are played.
 
 use std::{
     env,

@@ -2,10 +2,11 @@
 
 use bowwave_core::{
     act::TraineeAct,
-    event::{Event, ImuSample, TriggerEdge},
+    event::{Event, TriggerEdge},
     geometry::CameraPose,
     time::{Time, secs_to_ns},
 };
+use bowwave_devices::vectornav::CommonOutput;
 use glam::{DQuat, DVec2};
 use rand_pcg::Pcg64;
 
@@ -47,18 +48,18 @@ pub(super) struct Bench {
 }
 
 impl Bench {
-    /// A bench whose time begins at `origin`.
-    pub fn new(panorama: &PanoramaRecipe, hands: Hands, script: Option<Script>, origin: Time) -> Self {
+    /// A bench whose time begins with the host's clock, until [`Self::begun`] says when.
+    pub fn new(panorama: &PanoramaRecipe, hands: Hands, script: Option<Script>) -> Self {
         let recipe = panorama.recipe.clone();
         let gun = Gun::new(MountModel::default(), panorama.motion.clone());
         Self {
             rest: gun.angles(),
             gun,
-            unit: Unit::new(&recipe, origin),
+            unit: Unit::new(&recipe),
             imu_from_camera: recipe.camera_from_imu().inverse(),
             hands,
             script,
-            origin,
+            origin: Time::from_ns(0),
             samples: 0,
             pressed: false,
             blows: stream(recipe.seed, 0xb10),
@@ -68,19 +69,19 @@ impl Bench {
         }
     }
 
-    /// Begins at another time than it was made for.
-    pub fn begin(&mut self, origin: Time) {
-        self.unit = Unit::new(&self.recipe, origin);
-        self.origin = origin;
+    /// The same with its time beginning at `origin`.
+    pub fn begun(self, origin: Time) -> Self {
+        Self { origin, ..self }
     }
 
-    /// When the next sample is measured.
+    /// Time at which the next sample is measured.
     pub fn next_sample(&self) -> Time {
         self.time_of(self.samples as f64 / self.recipe.imu.rate_hz)
     }
 
-    /// Moves the gun to the next sample and measures it. What the hands did besides is added to `events`.
-    pub fn sample(&mut self, events: &mut Vec<Event>) -> ImuSample {
+    /// Moves the gun to the next sample and measures it: puts the unit's packet into `packet`, and adds what the hands did besides to `events`.
+    /// Gives the packet's arrival.
+    pub fn sample(&mut self, packet: &mut Vec<u8>, events: &mut Vec<Event>) -> Time {
         let time_s = self.samples as f64 / self.recipe.imu.rate_hz;
         let time = self.time_of(time_s);
         self.samples += 1;
@@ -103,7 +104,12 @@ impl Bench {
         }
         events.extend(act.map(|act| Event::Act(TraineeAct { time, act })));
         let exact = Exact::of(&self.gun.state(time_s), self.imu_from_camera);
-        self.unit.measure(&exact, time_s, time_s / SLOW_S, 0.0)
+        let sample = self.unit.measure(&exact, (self.origin, time_s), time_s / SLOW_S, 0.0);
+        packet.clear();
+        if let Some(output) = CommonOutput::from_sample(&sample) {
+            output.encode(packet);
+        }
+        sample.arrival
     }
 
     /// The next picture: its number, stamp and mid-exposure.

@@ -34,7 +34,7 @@ pub struct CutCamera {
     nodes: [usize; 2],
     /// Step of the fall-off of each cell.
     shades: Vec<u8>,
-    /// Code times 256 under each step of fall-off that is in use, by code of the panorama.
+    /// Code times 256 under each step of fall-off, by code of the panorama.
     developed: Vec<u16>,
     /// Deviation of the noise by code, codes times 256.
     deviation: [i32; 256],
@@ -105,7 +105,7 @@ impl CutCamera {
         3 * self.width * self.height
     }
 
-    /// When the mesh's rows are exposed, seconds after the mid-exposure.
+    /// Times at which the mesh's rows are exposed, seconds after the mid-exposure.
     pub fn rows_s(&self) -> impl Iterator<Item = f64> + use<> {
         let (middle, row_s) = (self.height as f64 / 2.0, self.row_s);
         (0..self.nodes[1]).map(move |row| ((row * MESH) as f64 - middle) * row_s)

@@ -3,10 +3,7 @@
 use std::collections::VecDeque;
 
 use bowwave_core::{event::Event, geometry::CameraPose, time::Time};
-use bowwave_devices::{
-    imu::{ImuDecoder, ImuFormat},
-    vectornav::CommonOutput,
-};
+use bowwave_devices::imu::{ImuDecoder, ImuFormat};
 
 use super::{LiveStats, TruePoses, bench::Bench, sensor::Sensor};
 use crate::replay::ReplayError;
@@ -16,6 +13,7 @@ pub(super) struct FastLive {
     bench: Bench,
     sensor: Sensor,
     decoder: ImuDecoder,
+    packet: Vec<u8>,
     /// Events that have not been asked for, by arrival.
     waiting: VecDeque<Event>,
     truth: TruePoses,
@@ -29,6 +27,7 @@ impl FastLive {
             sensor,
             // What is simulated is known: no sample waits for a proof of its format.
             decoder: ImuDecoder::fixed(ImuFormat::VectorNav),
+            packet: Vec::new(),
             waiting: VecDeque::new(),
             truth: TruePoses::default(),
             stats: LiveStats::default(),
@@ -58,12 +57,8 @@ impl FastLive {
 
     fn sample(&mut self) {
         let mut events = Vec::new();
-        let sample = self.bench.sample(&mut events);
-        if let Some(output) = CommonOutput::from_sample(&sample) {
-            let mut bytes = Vec::with_capacity(CommonOutput::MAX_BYTES);
-            output.encode(&mut bytes);
-            events.extend(self.decoder.samples(&bytes, sample.arrival).map(Event::Imu));
-        }
+        let arrival = self.bench.sample(&mut self.packet, &mut events);
+        events.extend(self.decoder.samples(&self.packet, arrival).map(Event::Imu));
         events.into_iter().for_each(|event| self.wait(event));
     }
 

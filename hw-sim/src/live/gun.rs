@@ -1,8 +1,8 @@
 //! The simulated gun on its mount: inertia, friction, stops, and the hands that move it on a ship that moves.
 
-use std::{collections::VecDeque, f64::consts::FRAC_PI_2};
+use std::collections::VecDeque;
 
-use bowwave_core::geometry::CameraPose;
+use bowwave_core::geometry::{CameraPose, wrapped};
 use glam::{DVec2, DVec3};
 
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
 
 /// Step of the mount, seconds.
 pub(super) const STEP_S: f64 = 1e-3;
-/// How far back the gun's way is kept, seconds.
+/// Time over which the gun's way is kept, seconds.
 const KEPT_S: f64 = 0.4;
 
 /// A gun on its pintle. Angles are traverse (clockwise from the bow) and elevation (above the deck).
@@ -159,7 +159,7 @@ impl Gun {
         DVec2::new(deck.x.atan2(deck.y), deck.z.clamp(-1.0, 1.0).asin())
     }
 
-    /// What the ship turns under the gun by, about its two axes, rad/s^2.
+    /// Acceleration of the ship's turn under the gun about its two axes, rad/s^2.
     fn ship_acceleration(&self, time_s: f64) -> DVec2 {
         let [heading, pitch, roll] = self.motion.ship_accelerations(time_s);
         let (sin, cos) = self.angles.x.sin_cos();
@@ -169,8 +169,7 @@ impl Gun {
     /// Angles within the stops: to each side of where north was at the begin.
     fn clamped(&self, angles: DVec2) -> DVec2 {
         let middle = -self.motion.heading_mean();
-        let off = angles.x - middle;
-        let off = (off + 2.0 * FRAC_PI_2).rem_euclid(4.0 * FRAC_PI_2) - 2.0 * FRAC_PI_2;
+        let off = wrapped(angles.x - middle);
         DVec2::new(
             middle + off.clamp(-TRAVERSE_MAX, TRAVERSE_MAX),
             angles.y.clamp(ELEVATION[0], ELEVATION[1]),

@@ -30,15 +30,13 @@ pub use script::Script;
 use crate::{
     make::{self, START},
     panorama::{Panorama, PanoramaRecipe},
-    replay::ReplayError,
+    replay::{ReplayError, STAMP_TOLERANCE_NS},
 };
 use bench::Bench;
 use sensor::Sensor;
 
 /// True poses that are kept: a second of them.
 const POSES: usize = 30;
-/// A frame's stamp and its truth's are the same number, rounded at most once.
-const TOLERANCE_NS: i64 = 1_000;
 
 /// A perfect calibration of the simulated gun, with the uncertainties of a good one. Barrel and front sight are its own ship's part.
 pub fn calibration(recipe: &PanoramaRecipe) -> CalibrationFile {
@@ -47,7 +45,7 @@ pub fn calibration(recipe: &PanoramaRecipe) -> CalibrationFile {
     file
 }
 
-/// What a recording of the simulated gun says about itself; `aimed_by` is who moves it.
+/// Properties of a recording of the simulated gun; `aimed_by` is who moves it.
 pub fn properties(recipe: &PanoramaRecipe, calibration: &CalibrationFile, aimed_by: &str) -> Properties {
     let mut properties = make::properties(&recipe.recipe, calibration);
     properties.loop_ns = None;
@@ -59,21 +57,21 @@ pub fn properties(recipe: &PanoramaRecipe, calibration: &CalibrationFile, aimed_
 /// Settings of a simulated gun.
 #[derive(Clone, Debug)]
 pub struct LiveOptions<'a> {
-    /// What the panorama was made from.
+    /// Recipe of the panorama.
     pub recipe: &'a PanoramaRecipe,
     /// The panorama's file.
     pub panorama: &'a Path,
-    /// Who moves it.
+    /// Hands that move it.
     pub hands: Hands,
     /// A script that moves the hands.
     pub script: Option<Script>,
-    /// Whether it runs on the host's clock.
+    /// It runs on the host's clock.
     pub realtime: bool,
-    /// Whether the camera sends JPEG, which takes time and makes recordings of it a tenth as long.
+    /// The camera sends JPEG, which takes time and makes recordings of it a tenth as long.
     pub is_coded: bool,
 }
 
-/// What a simulated gun delivered and what it left out.
+/// Counts of what a simulated gun delivered and left out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LiveStats {
     /// Pictures delivered.
@@ -82,7 +80,7 @@ pub struct LiveStats {
     pub frames_overwritten: u64,
     /// Pictures left out because the computer was too slow to cut them in time.
     pub frames_late: u64,
-    /// What the decoder of the inertial unit's line met.
+    /// Counts of the decoder of the inertial unit's line.
     pub imu: ImuCounters,
     /// Samples dropped, oldest first, because nobody drained the queue.
     pub imu_overflow: u64,
@@ -109,18 +107,18 @@ impl Live {
     pub fn start(options: LiveOptions<'_>) -> Result<Self, ReplayError> {
         let LiveOptions { recipe, panorama, hands, script, realtime, is_coded } = options;
         let camera = CutCamera::new(&recipe.recipe).with_sight(&recipe.recipe);
-        let sensor = Sensor::new(camera, Panorama::open(panorama)?, is_coded);
-        let origin = if realtime { clock::now() } else { START };
-        let bench = Bench::new(recipe, hands.clone(), script, origin);
-        let way = if realtime {
-            Way::Waiting(Some(Box::new((bench, sensor))))
+        let quality = is_coded.then_some(recipe.recipe.camera.jpeg_quality);
+        let sensor = Sensor::new(camera, Panorama::open(panorama)?, quality);
+        let bench = Bench::new(recipe, hands.clone(), script);
+        let (origin, way) = if realtime {
+            (clock::now(), Way::Waiting(Some(Box::new((bench, sensor)))))
         } else {
-            Way::Fast(Box::new(fast::FastLive::new(bench, sensor)))
+            (START, Way::Fast(Box::new(fast::FastLive::new(bench.begun(START), sensor))))
         };
         Ok(Self { origin, hands, way })
     }
 
-    /// When it begins, on the clock of its events; in real time, before that, when it was made.
+    /// Begin, on the clock of its events; in real time, before that, the time at which it was made.
     pub const fn origin(&self) -> Time {
         self.origin
     }
@@ -136,10 +134,10 @@ impl Live {
         if let Way::Waiting(parts) = &mut self.way
             && let Some(parts) = parts.take()
         {
-            let (mut bench, sensor) = *parts;
+            let (bench, sensor) = *parts;
             self.origin = clock::now().plus_ns(realtime::PREROLL_NS);
-            bench.begin(self.origin);
-            self.way = Way::Realtime(Box::new(realtime::RealtimeLive::start(bench, sensor)?));
+            self.way =
+                Way::Realtime(Box::new(realtime::RealtimeLive::start(bench.begun(self.origin), sensor)?));
         }
         match &mut self.way {
             Way::Waiting(_) => Ok(()),
@@ -148,7 +146,7 @@ impl Live {
         }
     }
 
-    /// Where the camera really was at a frame's mid-exposure, no longer ago than a second.
+    /// True pose of the camera at a frame's mid-exposure, no longer ago than a second.
     pub fn truth_at(&self, mid_exposure: Time) -> Option<CameraPose> {
         match &self.way {
             Way::Waiting(_) => None,
@@ -157,7 +155,7 @@ impl Live {
         }
     }
 
-    /// What was delivered and left out so far.
+    /// Counts so far.
     pub fn stats(&self) -> LiveStats {
         match &self.way {
             Way::Waiting(_) => LiveStats::default(),
@@ -188,7 +186,7 @@ impl TruePoses {
     }
 
     fn at(&self, stamp: Time) -> Option<CameraPose> {
-        let near = |time: &Time| time.ns_since(stamp).saturating_abs() <= TOLERANCE_NS;
+        let near = |time: &Time| time.ns_since(stamp).saturating_abs() <= STAMP_TOLERANCE_NS;
         self.0.iter().find(|(time, _)| near(time)).map(|(_, pose)| *pose)
     }
 }

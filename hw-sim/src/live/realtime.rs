@@ -14,7 +14,6 @@ use bowwave_devices::{
     clock,
     queue::{NewestSender, newest},
     serial::ImuPort,
-    vectornav::CommonOutput,
 };
 use crossbeam_channel::{Receiver, Sender, bounded};
 
@@ -134,25 +133,20 @@ struct Line {
 
 impl Line {
     fn run(mut self) -> Terminal {
-        let mut events = Vec::new();
-        let mut bytes = Vec::with_capacity(CommonOutput::MAX_BYTES);
+        let (mut packet, mut events) = (Vec::new(), Vec::new());
         loop {
             let due = locked(&self.bench).next_sample();
             if !self.stop.wait(due) {
                 return self.terminal;
             }
-            let sample = locked(&self.bench).sample(&mut events);
+            let arrival = locked(&self.bench).sample(&mut packet, &mut events);
             for event in events.drain(..) {
                 self.events.send(event);
             }
-            if !self.stop.wait(sample.arrival) {
+            if !self.stop.wait(arrival) {
                 return self.terminal;
             }
-            bytes.clear();
-            if let Some(output) = CommonOutput::from_sample(&sample) {
-                output.encode(&mut bytes);
-            }
-            match self.terminal.send(&bytes) {
+            match self.terminal.send(&packet) {
                 Ok(0) => {}
                 Ok(lost) => locked(&self.stats).line_lost_bytes += lost as u64,
                 Err(source) => {

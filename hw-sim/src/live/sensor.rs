@@ -1,4 +1,4 @@
-//! What the simulated camera sends: pixels, or JPEG as most cameras do.
+//! The pictures that the simulated camera sends: pixels, or JPEG as most cameras do.
 
 use std::sync::Arc;
 
@@ -8,32 +8,29 @@ use bowwave_core::{
 };
 use bowwave_devices::camera::jpeg::Decoder;
 use glam::DQuat;
-use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 
 use super::{bench::DueFrame, camera::CutCamera};
 use crate::{
+    jpeg,
     panorama::{Panorama, PanoramaError},
     replay::ReplayError,
 };
-
-/// JPEG quality of the pictures: that of recordings.
-const QUALITY: u8 = 86;
 
 /// A camera before its sea.
 pub(super) struct Sensor {
     camera: CutCamera,
     panorama: Panorama,
-    /// Where pictures come as JPEG: what they are decoded with.
-    decoder: Option<Decoder>,
+    /// Quality and decoder of pictures that come as JPEG.
+    coder: Option<(u8, Decoder)>,
 }
 
 impl Sensor {
-    /// A camera that sends JPEG where `is_coded`, else pixels.
-    pub fn new(camera: CutCamera, panorama: Panorama, is_coded: bool) -> Self {
-        Self { camera, panorama, decoder: is_coded.then(Decoder::for_recordings) }
+    /// A camera that sends JPEG of that quality, else pixels.
+    pub fn new(camera: CutCamera, panorama: Panorama, quality: Option<u8>) -> Self {
+        Self { camera, panorama, coder: quality.map(|quality| (quality, Decoder::for_recordings())) }
     }
 
-    /// When the rows of the mesh that it turns are exposed, seconds after the mid-exposure.
+    /// Times at which the rows of the mesh that it turns are exposed, seconds after the mid-exposure.
     pub fn rows_s(&self) -> impl Iterator<Item = f64> + use<> {
         self.camera.rows_s()
     }
@@ -54,31 +51,18 @@ impl Sensor {
         self.prepare(frame, azimuths)?;
         let mut rgb = vec![0; self.camera.bytes()];
         self.camera.cut(&self.panorama.view(), frame.number, &mut rgb);
-        let (picture, jpeg) = match &mut self.decoder {
+        let size = self.camera.size();
+        let (picture, jpeg) = match &mut self.coder {
             None => {
-                let (width, height) = self.camera.size();
-                let picture = Picture::new(PixelFormat::Rgb, width, height, rgb.into());
+                let picture = Picture::new(PixelFormat::Rgb, size.0, size.1, rgb.into());
                 (picture.map_err(PanoramaError::Picture)?, None)
             }
-            Some(decoder) => {
-                let (picture, jpeg) = through_jpeg(decoder, &rgb, self.camera.size())?;
-                (picture, Some(jpeg))
+            Some((quality, decoder)) => {
+                let jpeg = jpeg::encode(&rgb, size, *quality).map_err(PanoramaError::Encode)?;
+                let picture = decoder.decode(&jpeg, Some(size)).map_err(PanoramaError::Decode)?;
+                (picture, Some(Arc::from(jpeg)))
             }
         };
         Ok(CameraFrame { arrival, mid_exposure: frame.stamp, sequence: frame.number, picture, jpeg })
     }
-}
-
-/// A picture as a camera that sends JPEG delivers it, and that JPEG.
-fn through_jpeg(
-    decoder: &mut Decoder,
-    rgb: &[u8],
-    (width, height): (u32, u32),
-) -> Result<(Picture, Arc<[u8]>), PanoramaError> {
-    let mut jpeg = Vec::with_capacity(rgb.len() / 8);
-    JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
-        .encode(rgb, width, height, ExtendedColorType::Rgb8)
-        .map_err(PanoramaError::Encode)?;
-    let picture = decoder.decode(&jpeg, Some((width, height))).map_err(PanoramaError::Decode)?;
-    Ok((picture, jpeg.into()))
 }

@@ -5,18 +5,21 @@ use bowwave_core::{
     geometry::{CameraPose, Lens, look},
 };
 use glam::{DQuat, DVec2, DVec3, Mat3, Vec3, Vec4};
-use image::{ExtendedColorType, ImageError, codecs::jpeg::JpegEncoder};
+use image::ImageError;
 use rand_pcg::{Pcg32, rand_core::Rng};
 
 use super::{
     march::{LevelView, SeaPicture, SeaShader, ViewShape},
     recipe::Recipe,
 };
-use crate::ocean::{
-    cloudy::{CloudySky, Panorama, arctangent},
-    looped::{LoopedSurface, split},
-    noise::{smoothstep, upper_quantile},
-    random::mix,
+use crate::{
+    jpeg,
+    ocean::{
+        cloudy::{CloudySky, Panorama, arctangent},
+        looped::{LoopedSurface, split},
+        noise::{smoothstep, upper_quantile},
+        random::mix,
+    },
 };
 
 /// Steps of the transfer table over 0 to [`LIGHT_MAX`].
@@ -178,14 +181,7 @@ impl RecipeCamera {
 
     /// The JPEG of a drawn frame.
     pub fn encode(&self, rgb: &[u8]) -> Result<Vec<u8>, ImageError> {
-        let mut jpeg = Vec::with_capacity(rgb.len() / 8);
-        JpegEncoder::new_with_quality(&mut jpeg, self.quality).encode(
-            rgb,
-            self.lens.width,
-            self.lens.height,
-            ExtendedColorType::Rgb8,
-        )?;
-        Ok(jpeg)
+        jpeg::encode(rgb, (self.lens.width, self.lens.height), self.quality)
     }
 }
 

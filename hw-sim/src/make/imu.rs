@@ -44,12 +44,11 @@ pub(crate) struct Unit {
     attitude_error: SlowError,
     noise: Pcg64,
     latency: Pcg64,
-    start: Time,
 }
 
 impl Unit {
-    /// The unit of a recipe. `start` is the begin on the host's clock.
-    pub fn new(recipe: &Recipe, start: Time) -> Self {
+    /// The unit of a recipe.
+    pub fn new(recipe: &Recipe) -> Self {
         let mut errors = stream(recipe.seed, 0x1e0);
         Self {
             bias_walk: SlowError::new(&mut errors),
@@ -57,16 +56,21 @@ impl Unit {
             noise: stream(recipe.seed, 0x1e1),
             latency: stream(recipe.seed, 0x1e2),
             recipe: recipe.imu.clone(),
-            start,
         }
     }
 
-    /// The next sample, measured `time_s` seconds after the begin. `turn` is that in periods of the slow errors, `jolt` an acceleration along
+    /// The next sample, measured so many seconds after the begin on the host's clock. `turn` is that in periods of the slow errors, `jolt` an acceleration along
     /// the unit's x, m/s^2.
     ///
     /// A sample measured at host time t carries the device time `clock_start + (t - start) * (1 + drift)` and arrives after t by a latency
     /// that is never below the least one.
-    pub fn measure(&mut self, exact: &Exact, time_s: f64, turn: f64, jolt: f64) -> ImuSample {
+    pub fn measure(
+        &mut self,
+        exact: &Exact,
+        (start, time_s): (Time, f64),
+        turn: f64,
+        jolt: f64,
+    ) -> ImuSample {
         let imu = &self.recipe;
         let white = |rng: &mut Pcg64| DVec3::new(gaussian(rng), gaussian(rng), gaussian(rng));
         let rate = exact.rate
@@ -78,7 +82,7 @@ impl Unit {
         let tilt = DVec3::new(slow.x * imu.tilt_error, slow.y * imu.tilt_error, slow.z * imu.heading_error);
         let measured_ns = bowwave_core::time::secs_to_ns(time_s);
         ImuSample {
-            arrival: self.start.plus_ns(measured_ns + draw_latency(&mut self.latency, imu.latency_ns)),
+            arrival: start.plus_ns(measured_ns + draw_latency(&mut self.latency, imu.latency_ns)),
             device_time_ns: imu.clock_start_ns + device_ns(time_s, imu.clock_drift_ppm),
             rate: to_step(rate, imu.gyro_step),
             accel: to_step(accel, imu.accel_step),
@@ -91,7 +95,7 @@ impl Unit {
 pub fn samples(recipe: &Recipe, start: Time) -> Vec<ImuSample> {
     let motion = recipe.motion();
     let imu_from_camera = recipe.camera_from_imu().inverse();
-    let mut unit = Unit::new(recipe, start);
+    let mut unit = Unit::new(recipe);
     let mut sear = stream(recipe.seed, 0x1e3);
     let jolts: Vec<(f64, &Jolt)> = recipe
         .imu
@@ -106,7 +110,7 @@ pub fn samples(recipe: &Recipe, start: Time) -> Vec<ImuSample> {
             let turn = f64::from(i) / f64::from(count);
             let t = turn * recipe.duration_s;
             let jolt = jolts.iter().map(|(at_s, jolt)| jolt.felt(t - at_s)).sum();
-            unit.measure(&Exact::of(&motion.at(t), imu_from_camera), t, turn, jolt)
+            unit.measure(&Exact::of(&motion.at(t), imu_from_camera), (start, t), turn, jolt)
         })
         .collect()
 }

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use glam::{Vec3, Vec4};
-use image::{ExtendedColorType, codecs::jpeg::JpegEncoder};
 use rayon::prelude::*;
 
 use super::{
@@ -11,6 +10,7 @@ use super::{
     file::{PanoramaHeader, PanoramaWriter},
 };
 use crate::{
+    jpeg,
     make::{
         camera::{LIGHT_MAX, SeaScene, ViewCoverage, open_sky, transfer},
         march::{LevelView, SeaPicture, ViewShape},
@@ -19,8 +19,6 @@ use crate::{
     ocean::looped::{LoopedSurface, split},
 };
 
-/// JPEG quality of the tiles: that of recordings.
-const QUALITY: u8 = 86;
 /// Steps of the transfer table.
 const STEPS: usize = 8192;
 /// Frames drawn at once before they are written.
@@ -132,7 +130,10 @@ pub fn make(
     let frames = recipe.frames();
     progress(0, u64::from(frames));
     let tiles = |rgb: &[u8], rows: usize| -> Result<Vec<Vec<u8>>, PanoramaError> {
-        (0..header.tiles()).map(|tile| encode(rgb, header.columns, rows, header.tile_columns(tile))).collect()
+        let quality = recipe.recipe.camera.jpeg_quality;
+        (0..header.tiles())
+            .map(|tile| encode(rgb, header.columns, rows, header.tile_columns(tile), quality))
+            .collect()
     };
     writer.tiles(&tiles(&studio.sky(), header.sky_rows)?)?;
     for first in (0..frames).step_by(BATCH as usize) {
@@ -159,15 +160,12 @@ fn encode(
     width: usize,
     rows: usize,
     columns: std::ops::Range<usize>,
+    quality: u8,
 ) -> Result<Vec<u8>, PanoramaError> {
     let part: Vec<u8> = rgb
         .chunks_exact(3 * width)
         .flat_map(|row| &row[3 * columns.start..3 * columns.end])
         .copied()
         .collect();
-    let mut jpeg = Vec::with_capacity(part.len() / 6);
-    JpegEncoder::new_with_quality(&mut jpeg, QUALITY)
-        .encode(&part, columns.len() as u32, rows as u32, ExtendedColorType::Rgb8)
-        .map_err(PanoramaError::Encode)?;
-    Ok(jpeg)
+    jpeg::encode(&part, (columns.len() as u32, rows as u32), quality).map_err(PanoramaError::Encode)
 }

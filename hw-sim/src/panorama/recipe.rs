@@ -1,6 +1,6 @@
 //! The numbers of a panorama, and those that fit a scenario.
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::PI;
 
 use bowwave_core::world::scenario::Scenario;
 
@@ -24,19 +24,21 @@ const BESIDE: f64 = 12.0 * DEG;
 const STEEPEST: f64 = 75.0 * DEG;
 /// Waves so many times as high as those of the wind have a swell among them.
 const SWELL_FROM: f64 = 1.3;
-const DEG: f64 = std::f64::consts::PI / 180.0;
+const DEG: f64 = PI / 180.0;
+
 /// A panorama to be made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PanoramaRecipe {
     /// Sea, sky, eye height, heave, and the camera that will be cut from it. Its gun, trigger and the ship's turns are not used.
     pub recipe: Recipe,
-    /// How the ship under the gun moves.
+    /// Motion of the ship under the gun.
     pub motion: Motion,
     /// Pixels a degree, in those of the camera's middle.
     pub detail: f64,
     /// Sensor's exposure after sunset: share of what it would be by day.
     pub exposure: f64,
-    /// Elevation of the scenario's sun, radians. The sky after sunset is that of a low sun, less exposed and without its disc.
+    /// Elevation of the scenario's sun, radians. The sky after sunset is that of a low sun without its disc, less exposed and
+    /// bluer.
     pub sun_elevation: f64,
 }
 
@@ -113,20 +115,15 @@ impl PanoramaRecipe {
         let half = (f64::from(lens.width).hypot(f64::from(lens.height)) / 2.0 / lens.focal.x).atan();
         let tall = (f64::from(lens.height) / 2.0 / lens.focal.y).atan();
         // A rolled picture's corner reaches farther than its edge's middle, by less than the diagonal does.
-        let reach = tall + 0.35 * (half - tall) + self.sway();
+        let reach = tall + 0.35 * (half - tall) + self.motion.sway();
         let within = |angle: f64| angle.clamp(-STEEPEST, STEEPEST).tan();
         [within(ELEVATION[1] + reach), within(ELEVATION[0] - reach)]
     }
 
     /// Azimuths of the left and the right edge, radians: the same to both sides of north, where scenarios begin to look.
     pub(crate) fn azimuths(&self) -> [f64; 2] {
-        let half = (TRAVERSE_MAX + self.recipe.camera.hfov / 2.0 + BESIDE).min(2.0 * FRAC_PI_2);
+        let half = (TRAVERSE_MAX + self.recipe.camera.hfov / 2.0 + BESIDE).min(PI);
         [-half, half]
-    }
-
-    /// Most that the ship's roll and pitch turn the picture by, radians.
-    fn sway(&self) -> f64 {
-        self.motion.sway()
     }
 
     /// Frames of the loop.

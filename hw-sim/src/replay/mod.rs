@@ -27,6 +27,7 @@ use bowwave_core::{event::Event, geometry::CameraPose, time::Time};
 use bowwave_devices::{imu::ImuCounters, nmea::LineCounters, serial::SerialError};
 use bowwave_record::{Properties, RecordError, RecordingReader};
 
+pub(crate) use self::truth::STAMP_TOLERANCE_NS;
 pub use self::{decode::FrameCounters, fast::FastReplay, realtime::RealtimeReplay};
 use self::{
     laps::{Laps, Timeline},

@@ -3,7 +3,7 @@
 use bowwave_core::{geometry::CameraPose, time::Time};
 
 /// A frame's stamp and its truth's are the same number, rounded at most once.
-const TOLERANCE_NS: i64 = 1_000;
+pub(crate) const STAMP_TOLERANCE_NS: i64 = 1_000;
 
 /// The true poses met so far, by the replay's time.
 #[derive(Clone, Debug)]
@@ -41,7 +41,7 @@ impl Truth {
             .flatten()
             .filter_map(|i| self.poses.get(i))
             .map(|(t, pose)| (t.ns_since(time).saturating_abs(), pose))
-            .filter(|(distance, _)| *distance <= TOLERANCE_NS)
+            .filter(|(distance, _)| *distance <= STAMP_TOLERANCE_NS)
             .min_by_key(|(distance, _)| *distance)
             .map(|(_, pose)| *pose)
     }

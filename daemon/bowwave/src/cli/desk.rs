@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::{parse_duration, parse_size};
 
-/// What a run on a desk shows and keeps.
+/// Outputs of a run on a desk.
 #[derive(Debug, Args)]
 pub struct DeskArgs {
     /// Configuration file (TOML); what is given on the command line overrides it

@@ -12,7 +12,7 @@ use std::{
 };
 
 use anyhow::{Context, Result, bail};
-use bowwave_core::{pacing::FRAMES_PER_S, session::Setup, time::Time};
+use bowwave_core::{pacing::FRAMES_PER_S, session::Setup, time::Time, world::scenario::Scenario};
 use bowwave_record::{JournalOptions, Properties, Run};
 use bowwave_trainer::{
     Finished, Signals, TickClock, Trainer, TrainerOptions,
@@ -37,9 +37,9 @@ const SIZE: (u32, u32) = (1280, 720);
 /// A run, ready to begin.
 #[derive(Debug)]
 pub struct PreparedRun {
-    /// What the recording, or the simulated hardware, says about itself.
+    /// Properties of the recording, or of the simulated hardware.
     pub properties: Properties,
-    /// What the session is made from.
+    /// Setup of the session.
     pub setup: Setup,
     /// Text of the scenario in use.
     pub scenario_toml: String,
@@ -49,31 +49,31 @@ pub struct PreparedRun {
     pub models_base: PathBuf,
     /// The GPU.
     pub gpu: GpuSettings,
-    /// Whether to show a window.
+    /// A window is shown.
     pub window: bool,
-    /// What whoever sits there may do.
+    /// Seat before the window.
     pub seat: Seat,
-    /// Where its events come from, for people.
+    /// Source of its events, for people.
     pub source: String,
-    /// Whether to keep what went in.
+    /// Inputs are kept.
     pub record: bool,
 }
 
 /// A run with its source.
 pub struct DeskRun<'a> {
-    /// What it is made of.
+    /// Setup, files and outputs.
     pub prepared: &'a PreparedRun,
     /// Frames until its end.
     pub frames: u64,
-    /// Where its events come from.
+    /// Source of its events.
     pub source: Source,
     /// Its ticks.
     pub clock: TickClock,
-    /// When it begins, on the clock of its events.
+    /// Begin, on the clock of its events.
     pub origin: Time,
     /// It is to reach the end of its recording, so that how that ends is looked at.
     pub plays_to_the_end: bool,
-    /// What the summary says besides what was measured.
+    /// Part of the summary that is not measured.
     pub summary: SummaryOptions,
 }
 
@@ -105,7 +105,7 @@ pub fn screen(arguments: &DeskArgs, config: &Config) -> (u32, u32) {
     arguments.size.or(config.size).unwrap_or(SIZE)
 }
 
-/// Whether a window is asked for.
+/// Tests whether a window is asked for.
 pub fn shows_window(arguments: &DeskArgs, config: &Config) -> bool {
     arguments.window || config.output == ScreenOutput::Window && !arguments.headless
 }
@@ -118,6 +118,13 @@ pub fn gpu(arguments: &DeskArgs, config: GpuSettings) -> GpuSettings {
         // A desk may do other work than to draw: half a second without a frame is no hung GPU there.
         timeout: Some(Duration::from_secs(5)),
     }
+}
+
+/// Time that a scenario is played for, seconds.
+pub fn length_s(scenario: &Scenario) -> f64 {
+    /// The same of one without an end.
+    const ENDLESS_S: f64 = 300.0;
+    scenario.duration_s.unwrap_or(ENDLESS_S)
 }
 
 /// Frames of so many seconds.

@@ -1,6 +1,6 @@
 //! `bowwave play`: the trainer on a simulated gun that somebody aims.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use bowwave_calibration::to_toml;
@@ -25,7 +25,7 @@ use hw_sim::{
 
 use crate::{
     cache,
-    cli::{DeskArgs, Play, ScoreArgs},
+    cli::{Play, ScoreArgs},
     config::Config,
     desk::{self, DeskRun, PreparedRun},
     loading::{LoadedScenario, parse_scenario, read_scenario},
@@ -33,10 +33,7 @@ use crate::{
     score, stdout,
 };
 
-/// Time that a scenario without an end is played for, seconds.
-const ENDLESS_S: f64 = 300.0;
-
-/// Who aims.
+/// Somebody or something that aims.
 enum Aimer {
     /// Somebody at the window.
     Mouse,
@@ -57,54 +54,29 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
         );
     }
     let (text, base) = read_scenario(&arguments.scenario)?;
-    let LoadedScenario { mut scenario, models, of_boats } =
-        parse_scenario(&text, &arguments.scenario.display().to_string(), &base)?;
+    let mut loaded = parse_scenario(&text, &arguments.scenario.display().to_string(), &base)?;
     // The sea is the scenario's, whatever the seed of its chance.
-    let recipe = PanoramaRecipe::of_scenario(&scenario, arguments.camera);
+    let recipe = PanoramaRecipe::of_scenario(&loaded.scenario, arguments.camera);
     if let Some(seed) = desk_args.seed {
-        scenario.seed = seed;
+        loaded.scenario.seed = seed;
     }
-    let length_s = scenario.duration_s.unwrap_or(ENDLESS_S);
-    let frames = desk::frames_asked(desk_args).unwrap_or_else(|| desk::frames_of(length_s));
+    let scenario = &loaded.scenario;
+    let frames = desk::frames_asked(desk_args).unwrap_or_else(|| desk::frames_of(desk::length_s(scenario)));
     desk::check(desk_args, frames)?;
     let drawable = "the sea of this scenario cannot be drawn: change mount.eye_height_m or sea.beaufort in it, or give another --camera";
     recipe.check().context(drawable)?;
     let panorama = cache::panorama(&recipe)?;
     // Not before: an interrupt ends the making of a sea at once.
     let interrupts = desk::catch_interrupts()?;
-    let gunner = match &aimer {
-        Aimer::Gunner(skill) => Some(Gunner::new(&scenario, skill).within(TRAVERSE_MAX)),
-        _ => None,
-    };
     if let Some(briefing) = scenario.exercise.briefing.as_deref().filter(|_| !desk_args.json) {
         stdout::print(format!("{}\n\n{briefing}\n\n", scenario.name))?;
     }
-    let calibration = live::calibration(&recipe);
-    let setup = Setup {
-        scenario,
-        own_ship: calibration.own_ship_mask(),
-        calibration: calibration.calibration.clone(),
-        models: models.into(),
-        boat_models: of_boats,
-        screen: desk::screen(desk_args, &config),
-        video: PixelFormat::Rgb,
-        orientation: config.orientation,
-        heading: config.heading.settings.clone(),
+    let (gunner, script) = match &aimer {
+        Aimer::Mouse => (None, None),
+        Aimer::Gunner(skill) => (Some(Gunner::new(scenario, skill).within(TRAVERSE_MAX)), None),
+        Aimer::Script(script) => (None, Some(script.clone())),
     };
-    let properties = live::properties(&recipe, &calibration, &arguments.aim);
-    let prepared = PreparedRun {
-        source: properties.source.clone(),
-        properties,
-        setup,
-        scenario_toml: text,
-        calibration_toml: to_toml(&calibration),
-        models_base: base,
-        window: shows_window(&aimer, desk_args, &config),
-        seat: if matches!(aimer, Aimer::Mouse) { Seat::Gunner } else { Seat::Watcher },
-        record: desk_args.record || config.files.record,
-        gpu: desk::gpu(desk_args, config.gpu),
-    };
-    let script = if let Aimer::Script(script) = aimer { Some(script) } else { None };
+    let prepared = prepare(arguments, config, &aimer, &recipe, (loaded, text, base));
     let realtime = !arguments.fast;
     let simulated = Live::start(LiveOptions {
         recipe: &recipe,
@@ -144,7 +116,45 @@ pub fn run(arguments: &Play, program_start: Time) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// Who is named.
+/// The run of a loaded scenario, whose text and folder are given, on a simulated gun.
+fn prepare(
+    arguments: &Play,
+    config: Config,
+    aimer: &Aimer,
+    recipe: &PanoramaRecipe,
+    (loaded, text, base): (LoadedScenario, String, PathBuf),
+) -> PreparedRun {
+    let desk_args = &arguments.desk;
+    let calibration = live::calibration(recipe);
+    let calibration_toml = to_toml(&calibration);
+    let properties = live::properties(recipe, &calibration, &arguments.aim);
+    // Somebody who aims sees; others are watched where that is asked for.
+    let is_mouse = matches!(aimer, Aimer::Mouse);
+    PreparedRun {
+        source: properties.source.clone(),
+        properties,
+        scenario_toml: text,
+        calibration_toml,
+        models_base: base,
+        window: is_mouse || desk::shows_window(desk_args, &config),
+        seat: if is_mouse { Seat::Gunner } else { Seat::Watcher },
+        record: desk_args.record || config.files.record,
+        setup: Setup {
+            scenario: loaded.scenario,
+            own_ship: calibration.own_ship_mask(),
+            calibration: calibration.calibration,
+            models: loaded.models.into(),
+            boat_models: loaded.of_boats,
+            screen: desk::screen(desk_args, &config),
+            video: PixelFormat::Rgb,
+            orientation: config.orientation,
+            heading: config.heading.settings,
+        },
+        gpu: desk::gpu(desk_args, config.gpu),
+    }
+}
+
+/// The aimer of a name.
 fn aimer(name: &str) -> Result<Aimer> {
     if name == "mouse" {
         return Ok(Aimer::Mouse);
@@ -157,9 +167,4 @@ fn aimer(name: &str) -> Result<Aimer> {
         format!("cannot read the script {name}; --aim takes mouse, {skills}, or an existing script")
     })?;
     Ok(Aimer::Script(Script::parse(&text, name)?))
-}
-
-/// Somebody who aims sees; others are watched where that is asked for.
-fn shows_window(aimer: &Aimer, arguments: &DeskArgs, config: &Config) -> bool {
-    matches!(aimer, Aimer::Mouse) || desk::shows_window(arguments, config)
 }

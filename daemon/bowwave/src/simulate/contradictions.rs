@@ -1,6 +1,9 @@
-//! What a recording shows and its scenario denies: light, sea, eye height, length.
+//! Contradictions between a recording and its scenario: light, sea, eye height, length.
 
-use bowwave_core::{geometry::heading_of, world::scenario::Scenario};
+use bowwave_core::{
+    geometry::{heading_of, wrapped},
+    world::scenario::Scenario,
+};
 use bowwave_record::Properties;
 
 /// Angle between two suns beyond which shadows and glitter contradict each other, degrees.
@@ -15,7 +18,7 @@ const WAVES: f64 = 0.35;
 /// Factor between two visibilities that shows.
 const VISIBILITY: f64 = 2.0;
 
-/// What contradicts, each in a few words; nothing for what the recording does not say. `length_s` is how much of it is played.
+/// Contradictions, each in a few words; none where the recording says nothing. `length_s` of it are played.
 pub fn contradictions(scenario: &Scenario, properties: &Properties, length_s: f64) -> Vec<String> {
     let said = |key: &str| properties.extra.get(key).and_then(|text| text.parse::<f64>().ok());
     let mut found = Vec::new();
@@ -69,7 +72,7 @@ pub fn contradictions(scenario: &Scenario, properties: &Properties, length_s: f6
 
 /// Angle between two directions, degrees.
 fn apart_deg(a: f64, b: f64) -> f64 {
-    ((a - b + 180.0).rem_euclid(360.0) - 180.0).abs()
+    wrapped((a - b).to_radians()).to_degrees().abs()
 }
 
 #[cfg(test)]

@@ -20,12 +20,10 @@ use serde::Serialize;
 
 use crate::{
     cli::Simulate,
+    desk,
     loading::{LoadedScenario, load_scenario},
     score, stdout,
 };
-
-/// Time that a scenario without an end is played for, seconds.
-const ENDLESS_S: f64 = 300.0;
 
 /// The spread of a number over runs.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -92,7 +90,7 @@ pub fn run(arguments: &Simulate, gunner: &str) -> Result<()> {
     let path = arguments.scenario.as_deref().unwrap_or(Path::new("default"));
     let LoadedScenario { scenario, models, of_boats } = load_scenario(path)?;
     let models: Arc<[Model]> = models.into();
-    let limit_s = arguments.desk.duration.or(scenario.duration_s).unwrap_or(ENDLESS_S);
+    let limit_s = arguments.desk.duration.unwrap_or_else(|| desk::length_s(&scenario));
     let first_seed = arguments.desk.seed.unwrap_or(scenario.seed);
     let begun = Instant::now();
     let played = |index: u64| {
