@@ -13,13 +13,16 @@ use bowwave_render::{Completions, DrawRequest, Needs, PictureShape, RenderConfig
 #[path = "../../src/testing.rs"]
 pub mod testing;
 
+/// Names the GPU to draw with, by its number or a part of its name, in place of the software driver.
+pub const TEST_GPU: &str = "BOWWAVE_TEST_GPU";
+
 /// The configuration for scenes like `scene`.
 pub fn config(scene: &Scene) -> RenderConfig {
     RenderConfig {
         width: scene.lens.width,
         height: scene.lens.height,
         // The software driver: the same pixels everywhere. A real GPU is held against them by its number or a part of its name.
-        device: Some(std::env::var("BOWWAVE_TEST_GPU").unwrap_or_else(|_| "llvmpipe".to_owned())),
+        device: Some(std::env::var(TEST_GPU).unwrap_or_else(|_| "llvmpipe".to_owned())),
         validation: true,
         frames_in_flight: 2,
         needs: Needs {
