@@ -137,6 +137,9 @@ fn rounds(sheet: &ScoreSheet) -> String {
     if r.not_scored > 0 {
         text += &format!("; {} NOT SCORED", r.not_scored);
     }
+    if r.barrel_hot > 0 {
+        text += "; barrel hot";
+    }
     if r.stoppages > 0 {
         text += &format!("; {} stoppages", r.stoppages);
     }

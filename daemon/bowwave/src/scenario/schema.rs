@@ -7,7 +7,7 @@ use bowwave_core::{
     act::Act,
     side::Side,
     water::ReflectionMethod,
-    world::{boats::Propulsor, exercise::Engagement, scenario::built_in_weapons},
+    world::{boats::Propulsor, exercise::Engagement, gunnery::DragTable, scenario::built_in_weapons},
 };
 use serde_json::{Map, Value, json};
 
@@ -160,15 +160,41 @@ fn weapon() -> Value {
             ),
             ("muzzle_velocity_m_s", number(50.0, 2000.0, "Speed at the muzzle")),
             ("ballistic_coefficient_g7_lb_in2", number(0.05, 2.0, "G7 ballistic coefficient")),
+            ("ballistic_coefficient_g1_lb_in2", number(0.05, 2.0, "G1 ballistic coefficient, instead")),
+            ("ballistic_coefficient_sphere_lb_in2", number(0.05, 2.0, "The same of a ball, instead")),
+            (
+                "sectional_density_lb_in2",
+                number(0.05, 2.0, "Weight by the square of the diameter, for drag_table"),
+            ),
+            ("drag_table", drag_table()),
             ("dispersion_mrad", number(0.0, 50.0, "Scatter, standard deviation along each of two axes")),
             ("tracer_every", whole(0, 1000, "Every how many rounds one is a tracer; 0 for none")),
             ("tracer_burnout_m", number(0.0, 20_000.0, "Where a tracer burns out")),
             ("splash_height_m", number(0.0, 60.0, "Height of a splash")),
             ("splash_life_s", number(0.1, 10.0, "How long a splash stands")),
             ("ricochet_below_deg", number(0.0, 45.0, "Angle to the water below which a round bounces")),
+            (
+                "barrel_heat_k",
+                number(0.0, 100.0, "Rise of the barrel's temperature with each round; 0: it stays cold"),
+            ),
+            ("barrel_cooling_s", number(1.0, 1e5, "Time constant with which the barrel cools")),
+            ("barrel_hot_k", number(1.0, 2000.0, "Rise above which rounds scatter more")),
+            (
+                "fragments_m",
+                number(0.0, 30.0, "Where half of the people in the open are struck; 0: solid rounds"),
+            ),
+            ("arming_m", number(0.0, 1000.0, "Distance from the muzzle before which a round does not burst")),
         ],
         &[],
     )
+}
+
+fn drag_table() -> Value {
+    let pair = json!({ "type": "array", "minItems": 2, "maxItems": 2, "items": { "type": "number" } });
+    json!({
+        "type": "array", "minItems": 2, "maxItems": DragTable::MOST, "items": pair,
+        "description": "Drag coefficient by Mach number, instead: [[mach, coefficient], ...]",
+    })
 }
 
 fn engagement(what: &str) -> Value {

@@ -3,6 +3,7 @@
 //! This stage knows nothing of what is drawn.
 
 pub mod boats;
+pub mod burst;
 mod contact;
 pub mod exercise;
 pub mod fleet;

@@ -4,8 +4,10 @@ use glam::DVec3;
 
 use crate::{
     chance::drawn,
+    model::Zone,
     time::Time,
     world::{
+        burst::FragmentStrike,
         fleet::Fleet,
         gunnery::{Atmosphere, Flight, Projectile, dispersed},
         scenario::WeaponSpec,
@@ -51,11 +53,24 @@ pub struct Launch {
     pub bore: DVec3,
     /// Age of the pose used, nanoseconds.
     pub pose_age_ns: i64,
+    /// Scatter by that of the weapon's data: more where its barrel is hot.
+    pub scatter: f64,
+}
+
+/// A boat that fragments of a round have struck, whose record names another or none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FragmentHit {
+    /// The round's number.
+    pub shot: u64,
+    /// When.
+    pub time: Time,
+    /// The boat.
+    pub boat: usize,
 }
 
 impl Launch {
     fn record(&self, outcome: Outcome) -> ShotRecord {
-        let Self { shot, fired, muzzle, bore, pose_age_ns } = *self;
+        let Self { shot, fired, muzzle, bore, pose_age_ns, .. } = *self;
         ShotRecord { shot, fired, muzzle, bore, pose_age_ns, outcome }
     }
 }
@@ -114,11 +129,23 @@ impl InFlight {
         let across = along.cross(up);
         let direction = (along + across * aside) * leaves.cos() + up * leaves.sin();
         let kept = speed * (0.9 - 0.4 * angle / critical);
-        let coefficient = 0.5 * ammunition.weapon.projectile.bc_g7_lb_in2();
-        let projectile = Projectile::new(coefficient, kept).filter(|_| kept > SLOWEST_M_S)?;
+        let round = &ammunition.weapon.projectile;
+        let coefficient = 0.5 * round.ballistic_coefficient_lb_in2();
+        let projectile =
+            Projectile::with_drag(*round.drag(), coefficient, kept).filter(|_| kept > SLOWEST_M_S)?;
         // A little over the water, which it would meet again at once.
         let flight = Flight::new(projectile, &Atmosphere::ICAO, at + up * 0.01, direction, ammunition.wind)?;
         Some(self.round.bounced(flight, time_s))
+    }
+
+    /// Boats whose crews its fragments strike where it ends.
+    fn fragments(&self, ammunition: &Ammunition, end: &End, boats: &[Moving<'_>]) -> Vec<FragmentStrike> {
+        let (End::Struck { at, time_s, .. } | End::Splashed { at, time_s }) = *end else { return Vec::new() };
+        let muzzle = self.launch.muzzle;
+        let burst = ammunition.weapon.burst.filter(|burst| burst.is_armed(muzzle, at));
+        burst.map_or_else(Vec::new, |burst| {
+            burst.strikes(ammunition.seed, self.launch.shot, (at, time_s), muzzle, boats)
+        })
     }
 
     /// Height of the splash that the round throws up: the steeper it comes, the higher.
@@ -146,6 +173,16 @@ impl InFlight {
     }
 }
 
+/// The end of a round that burst in the water beside a boat and struck its crew: it has struck the nearest of those.
+fn burst_beside(end: End, fragments: &mut Vec<FragmentStrike>, muzzle: DVec3) -> End {
+    let End::Splashed { at, time_s } = end else { return end };
+    if fragments.is_empty() {
+        return end;
+    }
+    let FragmentStrike { boat, point, .. } = fragments.remove(0);
+    End::Struck { boat, zone: Zone::Helm, time_s, range_m: at.distance(muzzle), point, at }
+}
+
 /// Where a round ended.
 #[derive(Clone, Copy, Debug)]
 enum ImpactMark {
@@ -168,14 +205,15 @@ pub struct Rounds {
     in_flight: Vec<InFlight>,
     marks: Vec<(Time, ImpactMark)>,
     explained: Vec<ExplainedMiss>,
+    fragments: Vec<FragmentHit>,
     advanced_to: Time,
 }
 
 impl Rounds {
     /// No round has been fired at `start`.
     pub fn new(ammunition: Ammunition, sea: WaveField, start: Time) -> Self {
-        let (in_flight, marks, explained) = (Vec::new(), Vec::new(), Vec::new());
-        Self { ammunition, sea, in_flight, marks, explained, advanced_to: start }
+        let (in_flight, marks, explained, fragments) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { ammunition, sea, in_flight, marks, explained, fragments, advanced_to: start }
     }
 
     /// The sea is another from now on.
@@ -193,7 +231,7 @@ impl Rounds {
         records: &mut Vec<ShotRecord>,
     ) {
         let a = &self.ammunition;
-        let flown = dispersed(launch.bore, a.weapon.dispersion_mrad, a.seed, launch.shot);
+        let flown = dispersed(launch.bore, launch.scatter * a.weapon.dispersion_mrad, a.seed, launch.shot);
         match Flight::new(a.weapon.projectile, &Atmosphere::ICAO, launch.muzzle, flown, a.wind) {
             Some(flight) => {
                 let tracer = a.weapon.is_tracer(launch.shot);
@@ -258,21 +296,24 @@ impl Rounds {
                 }
                 Some(end) => {
                     let nearest = f.round.nearest();
-                    if let (Some(nearest), false) = (nearest, matches!(end, End::Struck { .. })) {
+                    let mut fragments = f.fragments(ammunition, &end, &boats);
+                    let end = burst_beside(end, &mut fragments, f.launch.muzzle);
+                    let is_hit = matches!(end, End::Struck { .. });
+                    if let (Some(nearest), false) = (nearest, is_hit) {
                         explained.extend(f.explain(ammunition, nearest, start, fleet));
                     }
                     let splash_m = match end {
                         End::Splashed { time_s, .. } => f.splash_m(ammunition, time_s),
                         _ => 0.0,
                     };
-                    ended.push((f.launch, nearest, end, splash_m));
+                    ended.push((f.launch, nearest, end, splash_m, fragments));
                     false
                 }
                 None => true,
             });
             ended
         };
-        for (launch, nearest, end, height_m) in ended {
+        for (launch, nearest, end, height_m, fragments) in ended {
             let time_of = |s: f64| start.plus_secs(s);
             let miss = |time: Time, at: DVec3| match nearest {
                 Some(n) => Outcome::Miss {
@@ -293,6 +334,12 @@ impl Rounds {
                     let time = time_of(time_s);
                     struck.push((boat, zone, time));
                     self.marks.push((time, ImpactMark::Strike { boat, point }));
+                    for also in fragments {
+                        struck.push((also.boat, Zone::Helm, time));
+                        if also.boat != boat {
+                            self.fragments.push(FragmentHit { shot: launch.shot, time, boat: also.boat });
+                        }
+                    }
                     let (name, side) = (fleet.name(boat).to_owned(), fleet.side(boat));
                     Outcome::Hit { boat: name, side, zone, time, range_m, point }
                 }
@@ -307,6 +354,11 @@ impl Rounds {
         for (boat, zone, time) in struck {
             fleet.strike(boat, zone, time);
         }
+    }
+
+    /// Boats that fragments have struck since this was last asked, beside those that records name.
+    pub fn take_fragments(&mut self) -> std::vec::Drain<'_, FragmentHit> {
+        self.fragments.drain(..)
     }
 
     /// Misses that were explained since this was last asked.

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::{
     exercise::{ExerciseEvent, ExerciseFact, ExerciseWatch, WatchedBoat, pointed_at},
     fleet::{Fleet, Vessel},
-    rounds::{Ammunition, Launch, Rounds},
+    rounds::{Ammunition, FragmentHit, Launch, Rounds},
     scenario::{Scenario, Side},
     score::{AIM_TREND_S, BoreSample, NotScored, Outcome, ShotRecord},
     sea_change::{SeaChange, conditions_of},
@@ -80,6 +80,7 @@ pub struct World {
     message: Option<(Time, Arc<str>)>,
     score: Score,
     last_result: Option<LastResult>,
+    is_hot: bool,
 }
 
 /// Boats and rounds, from the first picture on.
@@ -96,9 +97,14 @@ pub struct RunningWorld {
 }
 
 impl RunningWorld {
-    /// Notes why rounds missed that ended.
-    fn note_misses(&mut self, events: &mut Vec<ExerciseEvent>) {
+    /// Notes whom fragments of rounds struck that ended, and why others missed.
+    fn note_ends(&mut self, events: &mut Vec<ExerciseEvent>) {
         let Self { fleet, rounds, .. } = self;
+        for FragmentHit { shot, time, boat } in rounds.take_fragments() {
+            let Some(side) = fleet.side(boat) else { continue };
+            let fact = ExerciseFact::Fragments { shot, boat: fleet.name(boat).to_owned(), side };
+            events.push(ExerciseEvent { time, fact });
+        }
         for missed in rounds.take_explained() {
             let (shot, boat) = (missed.shot, fleet.name(missed.boat).to_owned());
             let fact = ExerciseFact::Missed { shot, boat, why: missed.why };
@@ -170,6 +176,7 @@ impl World {
             message: None,
             score: Score::default(),
             last_result: None,
+            is_hot: false,
         }
     }
 
@@ -180,6 +187,7 @@ impl World {
         Weapon::new(spec.rounds_per_minute, spec.belt)
             .with_spares(spec.spare_belts, spec.reload_s)
             .with_stoppages(stoppages)
+            .with_heat(spec.heat)
     }
 
     /// The sea that a scenario assumes until it is measured; `None` where it is not to be measured.
@@ -219,12 +227,14 @@ impl World {
         let was_stopped = self.weapon.state() == WeaponState::Stoppage;
         while let Some(fired) = self.weapon.fire(known.min(now)) {
             self.score.shots += 1;
+            let scatter = self.weapon.scatter();
+            self.note_heat(fired, scatter);
             let BoreAim { muzzle, bore, pose_age_ns, unscored } = aim(fired);
             let shot = self.score.shots;
             self.events.push(running.fired(shot, fired, &BoreAim { muzzle, bore, pose_age_ns, unscored }));
             match unscored {
                 None => {
-                    let launch = Launch { shot, fired, muzzle, bore, pose_age_ns };
+                    let launch = Launch { shot, fired, muzzle, bore, pose_age_ns, scatter };
                     running.rounds.launch(launch, barrel_before(fired, &mut aim), running.start, records);
                 }
                 Some(cause) => {
@@ -243,9 +253,19 @@ impl World {
         self.count(records);
     }
 
+    /// Notes that the barrel has got hot, or has cooled.
+    fn note_heat(&mut self, time: Time, scatter: f64) {
+        let is_hot = scatter > 1.0;
+        if is_hot && !self.is_hot {
+            self.events.push(ExerciseEvent { time, fact: ExerciseFact::BarrelHot });
+            self.message = Some((time, "BARREL HOT: rounds scatter, cease fire".into()));
+        }
+        self.is_hot = is_hot;
+    }
+
     /// Notes what has happened up to now.
     fn watch_exercise(&mut self, running: &mut RunningWorld, aim: BoreAim) {
-        running.note_misses(&mut self.events);
+        running.note_ends(&mut self.events);
         let boats = running.watched(Some(&aim));
         let orders = self.watch.follow(running.now, &boats, self.weapon.rounds_in_all(), &mut self.events);
         for boat in orders.warned {
@@ -297,7 +317,7 @@ impl World {
             self.watch.finish(running.now, &boats, self.weapon.rounds_in_all(), &mut ended);
             let RunningWorld { start, now, fleet, rounds } = running;
             rounds.advance(now.plus_secs(ROUND_OVER_S), *start, fleet, records);
-            running.note_misses(&mut self.events);
+            running.note_ends(&mut self.events);
             self.events.append(&mut ended);
         }
         self.count(records);

@@ -44,6 +44,9 @@ pub struct Weapon {
     spare_belts: u32,
     reload_s: f64,
     stoppages: Option<Stoppages>,
+    heat: Option<BarrelHeat>,
+    /// Rise of the barrel's temperature as the last round left, kelvins.
+    rise_k: f64,
     rounds_left: u32,
     rounds_fired: u64,
     held: bool,
@@ -55,6 +58,17 @@ pub struct Weapon {
     last_round: Option<Time>,
     next_round: Option<Time>,
     inputs: VecDeque<(Time, WeaponInput)>,
+}
+
+/// Heat of the barrel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BarrelHeat {
+    /// Rise of the barrel's temperature with each round, kelvins.
+    pub round_k: f64,
+    /// Time constant with which it cools, seconds.
+    pub cooling_s: f64,
+    /// Rise above which it is hot: scatter grows with what it is hotter by, and is twice as wide at twice that rise, kelvins.
+    pub hot_k: f64,
 }
 
 /// Chance of stoppages.
@@ -83,6 +97,8 @@ impl Weapon {
             spare_belts: 0,
             reload_s: 0.0,
             stoppages: None,
+            heat: None,
+            rise_k: 0.0,
             rounds_left: belt,
             rounds_fired: 0,
             held: false,
@@ -107,6 +123,17 @@ impl Weapon {
     #[must_use]
     pub fn with_stoppages(self, stoppages: Option<Stoppages>) -> Self {
         Self { stoppages, ..self }
+    }
+
+    /// With a barrel that gets hot.
+    #[must_use]
+    pub fn with_heat(self, heat: Option<BarrelHeat>) -> Self {
+        Self { heat, ..self }
+    }
+
+    /// Scatter of the round that left last, by that from a cold barrel.
+    pub fn scatter(&self) -> f64 {
+        self.heat.map_or(1.0, |heat| (self.rise_k / heat.hot_k.max(1e-3)).max(1.0))
     }
 
     /// Rounds left in the belt.
@@ -233,6 +260,10 @@ impl Weapon {
     fn leave(&mut self, time: Time) -> Time {
         self.rounds_left -= 1;
         self.rounds_fired += 1;
+        if let Some(heat) = self.heat {
+            let cooled_s = self.last_round.map_or(f64::INFINITY, |last| time.secs_since(last));
+            self.rise_k = self.rise_k * (-cooled_s / heat.cooling_s.max(1e-3)).exp() + heat.round_k;
+        }
         self.last_round = Some(time);
         let by_chance = self.stoppages.is_some_and(|chance| chance.after(self.rounds_fired));
         self.is_stopped = std::mem::take(&mut self.stops_next) || by_chance;
@@ -340,6 +371,23 @@ mod tests {
         assert_eq!((w.rounds_left(), w.rounds_in_all()), (2, 2));
         w.act(act(7300, Act::Reload));
         assert_eq!(rounds(&mut w, 7500), [7300, 7400], "there is no belt more");
+    }
+
+    #[test]
+    fn a_barrel_gets_hot_by_its_rounds_and_cools_between_them() {
+        let heat = BarrelHeat { round_k: 1.5, cooling_s: 600.0, hot_k: 300.0 };
+        let mut w = Weapon::new(600.0, 1000).with_heat(Some(heat));
+        w.edge(edge(0, true));
+        assert_eq!(rounds(&mut w, 19_950).len(), 200);
+        assert_eq!(w.scatter(), 1.0, "200 rounds at once are what it bears");
+        assert_eq!(rounds(&mut w, 49_950).len(), 300);
+        // The sum of what each round leaves by the end.
+        let rise_k: f64 = (0..500).map(|i| 1.5 * (-0.1 * f64::from(i) / 600.0).exp()).sum();
+        assert!((w.scatter() - rise_k / 300.0).abs() < 1e-9, "{}", w.scatter());
+        w.edge(edge(49_970, false));
+        w.edge(edge(1_500_000, true));
+        assert_eq!(rounds(&mut w, 1_500_050).len(), 1);
+        assert_eq!(w.scatter(), 1.0);
     }
 
     #[test]

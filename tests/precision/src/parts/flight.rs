@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::{
     physics::GRAVITY_M_S2,
-    world::gunnery::{Atmosphere, Flight, Projectile, STEP_S, g7_drag_coefficient},
+    world::gunnery::{Atmosphere, DragModel, Flight, Projectile, STEP_S},
 };
 use differential_equations::prelude::*;
 use glam::DVec3;
@@ -47,7 +47,7 @@ impl FlownRound {
         let through = v - self.wind;
         let speed = through.length();
         let drag = std::f64::consts::PI / (8.0 * self.bc * KG_M2_PER_LB_IN2);
-        let cd = g7_drag_coefficient(speed / air.sound_m_s);
+        let cd = DragModel::G7.coefficient(speed / air.sound_m_s);
         let a = -through * (drag * air.density_kg_m3 * cd * speed) - DVec3::Z * GRAVITY_M_S2;
         [v.x, v.y, v.z, a.x, a.y, a.z]
     }

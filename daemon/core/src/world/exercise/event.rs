@@ -118,6 +118,18 @@ pub enum ExerciseFact {
     },
     /// The virtual weapon has a stoppage.
     Stoppage,
+    /// The barrel is so hot that rounds scatter.
+    BarrelHot,
+    /// Fragments of a round that burst beside a boat struck its crew; the round's own record names another boat, or none.
+    Fragments {
+        /// The round's number.
+        shot: u64,
+        /// The boat's name.
+        boat: String,
+        /// Whom it belongs to.
+        #[serde(with = "by_name")]
+        side: Side,
+    },
     /// Text for the trainee.
     Message {
         /// The text.

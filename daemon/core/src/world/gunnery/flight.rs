@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use crate::physics::GRAVITY_M_S2;
 
-use super::{Atmosphere, g7_drag_coefficient};
+use super::{Atmosphere, DragModel};
 
 /// Step of the integrator, seconds. It holds the reference trajectories to 4 micrometres and, through the steep rise of
 /// drag at Mach 1, flights of 5 s to 3 mm (a round of 0.1 lb/in^2; others to 0.4 mm); a second of flight costs 200
@@ -20,24 +20,40 @@ const KEPT: usize = 32;
 /// A round as its maker states it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projectile {
-    bc_g7_lb_in2: f64,
+    drag: DragModel,
+    ballistic_coefficient_lb_in2: f64,
     muzzle_velocity_m_s: f64,
 }
 
 impl Projectile {
     /// A round of a heavy machine gun, rounded.
-    pub const HEAVY: Self = Self { bc_g7_lb_in2: 0.33, muzzle_velocity_m_s: 890.0 };
+    pub const HEAVY: Self =
+        Self { drag: DragModel::G7, ballistic_coefficient_lb_in2: 0.33, muzzle_velocity_m_s: 890.0 };
 
     /// A round with the G7 ballistic coefficient `bc_g7_lb_in2` (at least 0.01; infinite means no drag) and that muzzle
     /// velocity (0 to 3000 m/s); `None` outside those.
     pub fn new(bc_g7_lb_in2: f64, muzzle_velocity_m_s: f64) -> Option<Self> {
-        let fits = bc_g7_lb_in2 >= 0.01 && (0.0..=3000.0).contains(&muzzle_velocity_m_s);
-        fits.then_some(Self { bc_g7_lb_in2, muzzle_velocity_m_s })
+        Self::with_drag(DragModel::G7, bc_g7_lb_in2, muzzle_velocity_m_s)
     }
 
-    /// G7 ballistic coefficient, lb/in^2.
-    pub const fn bc_g7_lb_in2(&self) -> f64 {
-        self.bc_g7_lb_in2
+    /// A round of that drag, with the ballistic coefficient that goes with it: sectional density by form factor.
+    pub fn with_drag(
+        drag: DragModel,
+        ballistic_coefficient_lb_in2: f64,
+        muzzle_velocity_m_s: f64,
+    ) -> Option<Self> {
+        let fits = ballistic_coefficient_lb_in2 >= 0.01 && (0.0..=3000.0).contains(&muzzle_velocity_m_s);
+        fits.then_some(Self { drag, ballistic_coefficient_lb_in2, muzzle_velocity_m_s })
+    }
+
+    /// Its drag.
+    pub const fn drag(&self) -> &DragModel {
+        &self.drag
+    }
+
+    /// Ballistic coefficient, lb/in^2.
+    pub const fn ballistic_coefficient_lb_in2(&self) -> f64 {
+        self.ballistic_coefficient_lb_in2
     }
 
     /// Speed at the muzzle, m/s.
@@ -82,6 +98,7 @@ pub struct Flight {
 struct Dynamics {
     atmosphere: Atmosphere,
     wind: DVec3,
+    model: DragModel,
     /// Drag deceleration is this * density * drag coefficient * airspeed^2, m^2/kg.
     drag: f64,
 }
@@ -108,7 +125,8 @@ impl Flight {
         let dynamics = Dynamics {
             atmosphere: *atmosphere,
             wind,
-            drag: PI / (8.0 * projectile.bc_g7_lb_in2 * KG_M2_PER_LB_IN2),
+            model: projectile.drag,
+            drag: PI / (8.0 * projectile.ballistic_coefficient_lb_in2 * KG_M2_PER_LB_IN2),
         };
         Some(Self { dynamics, steps: [start; KEPT], newest: 0, swept_s: 0.0 })
     }
@@ -181,7 +199,7 @@ impl Dynamics {
         let air = self.atmosphere.at(position.z);
         let through_air = velocity - self.wind;
         let speed = through_air.length();
-        let cd = g7_drag_coefficient(speed / air.sound_m_s);
+        let cd = self.model.coefficient(speed / air.sound_m_s);
         -through_air * (self.drag * air.density_kg_m3 * cd * speed) - DVec3::Z * GRAVITY_M_S2
     }
 

@@ -1,4 +1,4 @@
-//! Flight of a virtual round: standard atmosphere, G7 drag, point mass.
+//! Flight of a virtual round: standard atmosphere, drag, point mass.
 
 mod atmosphere;
 mod dispersion;
@@ -8,6 +8,6 @@ mod solution;
 
 pub use atmosphere::{Air, Atmosphere};
 pub use dispersion::dispersed;
-pub use drag::g7_drag_coefficient;
+pub use drag::{DragModel, DragTable};
 pub use flight::{Flight, FlightSegment, FlightState, Projectile, STEP_S};
 pub use solution::{AimSolution, aim_to_hit};

@@ -146,6 +146,23 @@ fn mistakes_are_named_where_they_stand() {
         ("[weapon]\nreload_s = \"long\"\n", "x.toml:2:12: weapon.reload_s: \"long\" is not allowed"),
         ("[weapon]\nstoppage_every = inf\n", "x.toml:2:18: weapon.stoppage_every: inf is not allowed"),
         ("[weapon]\nricochet_below_deg = 60\n", "x.toml:2:22: weapon.ricochet_below_deg: 60 is not allowed"),
+        (
+            "[weapon]\ndrag_table = [[0, 0.1], [1, 0.2]]\n",
+            "x.toml:2:14: weapon.drag_table: needs sectional_density_lb_in2 beside it",
+        ),
+        (
+            "[weapon]\nsectional_density_lb_in2 = 0.2\n",
+            "x.toml:2:28: weapon.sectional_density_lb_in2: needs drag_table beside it",
+        ),
+        (
+            "[weapon]\nsectional_density_lb_in2 = 0.2\ndrag_table = [[1, 0.1], [0, 0.2]]\n",
+            "x.toml:3:14: weapon.drag_table: [[1, 0.1], [0, 0.2]] is not allowed; give a list of 2 to 32 pairs",
+        ),
+        (
+            "[weapon]\nballistic_coefficient_g7_lb_in2 = 0.3\nballistic_coefficient_g1_lb_in2 = 0.6\n",
+            "x.toml:3:35: weapon.ballistic_coefficient_g1_lb_in2: gives the round a second drag",
+        ),
+        ("[weapon]\nfragments_m = 50\n", "x.toml:2:15: weapon.fragments_m: 50 is not allowed"),
         ("rules = \"hold\"\n", "x.toml:1:9: rules: \"hold\" is not allowed; give a table: [rules]"),
         ("[call]\nsay = \"warn\"\n", "x.toml:1:1: call: "),
     ];
@@ -161,6 +178,14 @@ fn a_built_in_weapon_may_be_changed_key_by_key() {
     let heavy = weapon("[weapon]\nkind = \"heavy-machine-gun\"\nbelt = 50\n");
     assert_eq!((heavy.kind.as_deref(), heavy.belt, heavy.spare_belts), (Some("heavy-machine-gun"), 50, 3));
     assert_eq!(heavy.projectile.muzzle_velocity_m_s(), 893.0);
+    assert_eq!(heavy.projectile.drag().name(), "g7");
+    let ball = "[weapon]\nkind = \"heavy-machine-gun\"\nballistic_coefficient_sphere_lb_in2 = 0.3\n";
+    assert_eq!(weapon(ball).projectile.drag().name(), "sphere");
+    let table = "[weapon]\nsectional_density_lb_in2 = 0.2\ndrag_table = [[0, 0.1], [1.0, 0.5], [3, 0.3]]\n";
+    assert_eq!(weapon(table).projectile.drag().coefficient(1.0), 0.5);
+    let cold = "[weapon]\nkind = \"heavy-machine-gun\"\nbarrel_heat_k = 0\n";
+    assert_eq!((heavy.heat.is_some(), weapon(cold).heat, heavy.burst), (true, None, None));
+    assert!(weapon("[weapon]\nkind = \"automatic-grenade-launcher\"\n").burst.is_some());
     let plain = weapon("");
     assert_eq!(
         (plain.kind, plain.belt, plain.stoppage_every, plain.ricochet_below_deg),

@@ -9,9 +9,11 @@ use crate::{
     water::Water,
     world::{
         boats::Behaviour,
+        burst::BurstSpec,
         exercise::ExerciseSpec,
         gunnery::Projectile,
         waves::{WaveField, WaveSpec},
+        weapon::BarrelHeat,
     },
 };
 
@@ -80,6 +82,10 @@ pub struct WeaponSpec {
     pub splash_life_s: f64,
     /// Angle to the water below which a round bounces, degrees.
     pub ricochet_below_deg: f64,
+    /// Heat of its barrel; `None` for one that stays cold.
+    pub heat: Option<BarrelHeat>,
+    /// Fuze and fragments; `None` for solid rounds.
+    pub burst: Option<BurstSpec>,
 }
 
 impl Default for WeaponSpec {
@@ -99,6 +105,8 @@ impl Default for WeaponSpec {
             splash_height_m: 1.8,
             splash_life_s: 1.6,
             ricochet_below_deg: 0.0,
+            heat: None,
+            burst: None,
         }
     }
 }

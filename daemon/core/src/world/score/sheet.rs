@@ -34,6 +34,9 @@ pub struct ScoreFold {
     close: BTreeMap<String, Time>,
     under_threat_s: f64,
     stoppages: u32,
+    barrel_hot: u32,
+    /// Neutral boats that fragments struck, beside those that rounds' records name.
+    fragments: Vec<String>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -164,6 +167,8 @@ pub struct RoundsSheet {
     pub left: Option<u32>,
     /// Stoppages of the virtual weapon.
     pub stoppages: u32,
+    /// Times that its barrel got hot.
+    pub barrel_hot: u32,
     /// Hits on hostile boats by part.
     pub by_part: BTreeMap<&'static str, u32>,
 }
@@ -285,6 +290,9 @@ impl ScoreFold {
             }
             ExerciseFact::CameBack { boat } => self.boat(boat).over = None,
             ExerciseFact::Stoppage => self.stoppages += 1,
+            ExerciseFact::BarrelHot => self.barrel_hot += 1,
+            ExerciseFact::Fragments { boat, side: Side::Neutral, .. } => self.fragments.push(boat.clone()),
+            ExerciseFact::Fragments { .. } => {}
             ExerciseFact::Message { .. } => {}
             ExerciseFact::Missed { why, .. } => {
                 self.misses.extend(Some(*why).filter(MissExplanation::was_aimed))
@@ -424,6 +432,7 @@ impl ScoreFold {
             fired: self.shots.len() as u32,
             left: self.rounds_left,
             stoppages: self.stoppages,
+            barrel_hot: self.barrel_hot,
             ..RoundsSheet::default()
         };
         let mut neutrals: Vec<&str> = Vec::new();
@@ -447,6 +456,12 @@ impl ScoreFold {
             sheet.bursts += u32::from(begins);
             sheet.first_round_hits += u32::from(begins && is_hit);
             before = Some((shot.fired, boat));
+        }
+        for boat in &self.fragments {
+            sheet.neutral_hits += 1;
+            if !neutrals.contains(&boat.as_str()) {
+                neutrals.push(boat);
+            }
         }
         let stopped = self.ended(Ending::Stopped);
         sheet.per_stop = (stopped > 0).then(|| f64::from(sheet.fired) / f64::from(stopped));
