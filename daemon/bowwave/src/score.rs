@@ -158,15 +158,21 @@ fn boats(sheet: &ScoreSheet) -> String {
             .to_vec(),
     ];
     for boat in &sheet.boats {
+        let fate = match (boat.sank, boat.burns) {
+            (true, _) => ", sank",
+            (false, true) => ", burns",
+            (false, false) => "",
+        };
         let ending = match (boat.ending, boat.ended_m) {
             (Some(ending), Some(m)) => {
                 let how = match ending {
                     bowwave_core::world::score::Ending::Stopped => "stopped",
                     bowwave_core::world::score::Ending::TurnedAway => "turned away",
                 };
-                format!("{how} at {m:.0} m")
+                format!("{how} at {m:.0} m{fate}")
             }
-            _ => "-".to_owned(),
+            _ if fate.is_empty() => "-".to_owned(),
+            _ => fate.trim_start_matches(", ").to_owned(),
         };
         rows.push(vec![
             one_line(&boat.name),

@@ -6,12 +6,12 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     geometry::RigidPose,
-    model::{Model, ModelId, Zone},
+    model::{Model, ModelId},
     time::Time,
     world::{
         boats::{
-            Behaviour, BoatHistory, Floating, Hull, HullForm, Signals, StepView, Traffic, step_after,
-            step_seconds,
+            Behaviour, BoatHistory, Floating, Hull, HullForm, RoundStrike, Signals, StepView, Traffic,
+            step_after, step_seconds,
         },
         contact::Capsule,
         scenario::{BoatSpec, Scenario, Side},
@@ -300,9 +300,10 @@ impl Fleet {
         Some(self.boats.get(boat)?.history.floating(seconds, &self.waves))
     }
 
-    /// All boats that have a model, as they lie at `time`.
+    /// All boats that have a model and have not sunk, as they lie at `time`.
     pub fn afloat(&self, time: Time) -> impl Iterator<Item = Afloat<'_>> {
-        self.boats.iter().enumerate().filter_map(move |(boat, b)| {
+        let swims = move |&(boat, _): &(usize, &FleetBoat)| !self.is_gone(boat, time);
+        self.boats.iter().enumerate().filter(swims).filter_map(move |(boat, b)| {
             let (model, floating) = (self.model(boat)?, self.floating(boat, time)?);
             let Floating { pose, water_level } = floating;
             Some(Afloat { boat, model_id: b.model, model, pose, water_level })
@@ -325,11 +326,29 @@ impl Fleet {
         self.boats.get(boat)?.history.crew_state()
     }
 
+    /// When a boat is full of water and sinks, if it does with the holes that it has.
+    pub fn sinks(&self, boat: usize) -> Option<Time> {
+        Some(self.start.plus_secs(self.boats.get(boat)?.history.sinks_s()?))
+    }
+
+    /// Since when a boat burns.
+    pub fn burns_since(&self, boat: usize) -> Option<Time> {
+        Some(self.start.plus_secs(self.boats.get(boat)?.history.fire_s()?))
+    }
+
+    /// Tests whether nothing of a boat shows over the water any more at `time`: it has sunk.
+    fn is_gone(&self, boat: usize, time: Time) -> bool {
+        /// Waves and the end that goes down last.
+        const SLACK_M: f64 = 2.0;
+        let settled_m = self.boats[boat].history.settled_m(time.secs_since(self.start));
+        settled_m > self.height_m(boat) + SLACK_M
+    }
+
     /// Takes in that a boat was struck. A hit on the engine stops it, one on the helm ends its attack; the first counts.
-    pub fn strike(&mut self, boat: usize, zone: Zone, time: Time) {
+    pub fn strike(&mut self, boat: usize, strike: &RoundStrike, time: Time) {
         let seconds = time.secs_since(self.start);
         if let Some(struck) = self.boats.get_mut(boat) {
-            struck.history.strike(zone, seconds);
+            struck.history.strike(strike, seconds);
             self.struck.push((boat, seconds));
             // What crews see of it, they see from then on.
             for other in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {

@@ -3,6 +3,7 @@ use std::{f64::consts::PI, sync::Arc};
 use glam::{DVec2, Vec3};
 
 use super::*;
+use crate::model::Zone;
 use crate::{
     geometry::{ahead, heading_of},
     sea::BeaufortForce,
@@ -148,7 +149,7 @@ fn guards_lead_from_state_to_state() {
     assert_eq!([0, 1, 2].map(|b| fleet.crew_state(b)), [Some("wait"); 3]);
     follow(&mut fleet, 4.0, 15.0, |_, _| {});
     assert_eq!([0, 1, 2].map(|b| fleet.crew_state(b)), [Some("attack"); 3]);
-    fleet.strike(0, Zone::Hull, start().plus_secs(14.99));
+    fleet.strike(0, &Zone::Hull.into(), start().plus_secs(14.99));
     follow(&mut fleet, 15.0, 40.0, |_, _| {});
     assert_eq!([0, 1, 2].map(|b| fleet.crew_state(b)), [Some("give up"), Some("run"), Some("attack")]);
     assert!(place(&fleet, 0, 40.0).speed_m_s.abs() < 1.0, "it lies still");
@@ -162,12 +163,43 @@ fn an_engine_that_is_hit_stops_and_a_helm_that_is_hit_is_let_go() {
         follow(&mut fleet, 0.0, 12.0, |_, _| {});
         let before = place(&fleet, 0, 12.0);
         assert!(before.speed_m_s > 20.0 * KN, "{before:?}");
-        fleet.strike(0, zone, start().plus_secs(11.98));
+        fleet.strike(0, &zone.into(), start().plus_secs(11.98));
         follow(&mut fleet, 12.0, 60.0, |_, _| {});
         let after = place(&fleet, 0, 60.0);
         assert!(after.speed_m_s < 1.5, "{zone:?}: {after:?}");
         assert!(before.position.distance(after.position) < 120.0, "{zone:?}");
     }
+}
+
+#[test]
+fn a_boat_that_is_holed_loses_its_engine_and_sinks_whatever_the_pace_of_frames() {
+    let crew = plan(vec![state("attack", Act::Attack { stop_m: Some(40.0) }, 25.0, vec![])]);
+    // Each whole second's pose.
+    let run = |frames_a_second: u32| {
+        let mut fleet = fleet(vec![crewed("a", &crew, 10.0, 1500.0, Side::Hostile)], sea(3));
+        let (mut holed, mut poses) = (0, Vec::new());
+        for frame in 1..=200 * frames_a_second {
+            let time_s = f64::from(frame) / f64::from(frames_a_second);
+            fleet.follow(start().plus_secs(time_s));
+            while holed < 40 && 10.0 + 0.1 * f64::from(holed) <= time_s {
+                let hole = Some((DVec3::new(-0.5, 0.8, 0.0), 20e-4));
+                let strike = RoundStrike { hole, ..Zone::Hull.into() };
+                fleet.strike(0, &strike, start().plus_secs(10.0 + 0.1 * f64::from(holed)));
+                holed += 1;
+            }
+            if frame % frames_a_second == 0 {
+                poses.push(fleet.pose(0, start().plus_secs(time_s)));
+            }
+        }
+        (fleet, poses)
+    };
+    let (fleet, poses) = run(30);
+    let sinks = fleet.sinks(0).expect("it is holed").secs_since(start());
+    assert!((15.0..150.0).contains(&sinks), "{sinks} s");
+    assert!(fleet.afloat(start().plus_secs(sinks - 1.0)).count() == 1, "it swims");
+    assert!(fleet.afloat(start().plus_secs(sinks + 30.0)).count() == 0, "it has sunk");
+    assert!(place(&fleet, 0, 199.0).speed_m_s < 1.0, "its engine has drowned");
+    assert_eq!(poses, run(4).1);
 }
 
 /// Crews of all kinds about the gun: attackers, one that rams, fishing boats, passers-by and a scripted ship.
@@ -258,7 +290,7 @@ fn where_crews_are_does_not_depend_on_the_pace_of_frames() {
         for time_s in frames {
             fleet.follow(start().plus_secs(*time_s));
             if let Some((boat, zone, at)) = due.next_if(|(_, _, at)| at <= time_s) {
-                fleet.strike(*boat, *zone, start().plus_secs(*at));
+                fleet.strike(*boat, &(*zone).into(), start().plus_secs(*at));
             }
         }
         (0..16).map(|b| fleet.pose(b, start().plus_secs(59.0)).expect("there")).collect::<Vec<_>>()

@@ -7,6 +7,7 @@ use crate::{
     model::Zone,
     time::Time,
     world::{
+        boats::RoundStrike,
         burst::FragmentStrike,
         fleet::Fleet,
         gunnery::{Atmosphere, Flight, Projectile, dispersed},
@@ -38,6 +39,20 @@ pub struct Ammunition {
     pub wind: DVec3,
     /// Seed of the dispersion.
     pub seed: u64,
+}
+
+/// Draws of fires are numbered from here.
+const FIRE: u64 = 1 << 48;
+
+impl Ammunition {
+    /// Strike of round `shot` on a part of a boat, at `point` of its space.
+    fn strike(&self, shot: u64, zone: Zone, point: DVec3) -> RoundStrike {
+        /// Chance that a solid round sets fire to an engine, and that one which bursts does.
+        const IGNITES: (f64, f64) = (0.15, 0.6);
+        let chance = if self.weapon.burst.is_some() { IGNITES.1 } else { IGNITES.0 };
+        let ignites = zone == Zone::Engine && drawn(self.seed, [shot, FIRE]) < chance;
+        RoundStrike { zone, hole: Some((point, 1e-4 * self.weapon.hole_cm2)), ignites }
+    }
 }
 
 /// A round as it left the muzzle.
@@ -173,6 +188,19 @@ impl InFlight {
     }
 }
 
+/// A round that has ended.
+#[derive(Debug)]
+struct EndedRound {
+    launch: Launch,
+    nearest: Option<Approach>,
+    end: End,
+    splash_m: f64,
+    /// Further boats that its fragments struck.
+    fragments: Vec<FragmentStrike>,
+    /// It burst beside the boat that it struck.
+    beside: bool,
+}
+
 /// The end of a round that burst in the water beside a boat and struck its crew: it has struck the nearest of those.
 fn burst_beside(end: End, fragments: &mut Vec<FragmentStrike>, muzzle: DVec3) -> End {
     let End::Splashed { at, time_s } = end else { return end };
@@ -274,7 +302,7 @@ impl Rounds {
         records: &mut Vec<ShotRecord>,
     ) {
         let (from_s, to_s) = (from.secs_since(start), to.secs_since(start));
-        let mut struck = Vec::new();
+        let mut struck: Vec<(usize, RoundStrike, Time)> = Vec::new();
         let ended = {
             let boats: Vec<Moving<'_>> = (0..fleet.len())
                 .filter_map(|boat| {
@@ -297,23 +325,24 @@ impl Rounds {
                 Some(end) => {
                     let nearest = f.round.nearest();
                     let mut fragments = f.fragments(ammunition, &end, &boats);
+                    let struck = matches!(end, End::Struck { .. });
                     let end = burst_beside(end, &mut fragments, f.launch.muzzle);
-                    let is_hit = matches!(end, End::Struck { .. });
-                    if let (Some(nearest), false) = (nearest, is_hit) {
+                    let beside = !struck && matches!(end, End::Struck { .. });
+                    if let (Some(nearest), false) = (nearest, struck || beside) {
                         explained.extend(f.explain(ammunition, nearest, start, fleet));
                     }
                     let splash_m = match end {
                         End::Splashed { time_s, .. } => f.splash_m(ammunition, time_s),
                         _ => 0.0,
                     };
-                    ended.push((f.launch, nearest, end, splash_m, fragments));
+                    ended.push(EndedRound { launch: f.launch, nearest, end, splash_m, fragments, beside });
                     false
                 }
                 None => true,
             });
             ended
         };
-        for (launch, nearest, end, height_m, fragments) in ended {
+        for EndedRound { launch, nearest, end, splash_m: height_m, fragments, beside } in ended {
             let time_of = |s: f64| start.plus_secs(s);
             let miss = |time: Time, at: DVec3| match nearest {
                 Some(n) => Outcome::Miss {
@@ -332,10 +361,12 @@ impl Rounds {
             let outcome = match end {
                 End::Struck { boat, zone, time_s, range_m, point, .. } => {
                     let time = time_of(time_s);
-                    struck.push((boat, zone, time));
+                    let strike =
+                        if beside { zone.into() } else { self.ammunition.strike(launch.shot, zone, point) };
+                    struck.push((boat, strike, time));
                     self.marks.push((time, ImpactMark::Strike { boat, point }));
                     for also in fragments {
-                        struck.push((also.boat, Zone::Helm, time));
+                        struck.push((also.boat, Zone::Helm.into(), time));
                         if also.boat != boat {
                             self.fragments.push(FragmentHit { shot: launch.shot, time, boat: also.boat });
                         }
@@ -351,8 +382,8 @@ impl Rounds {
             };
             records.push(launch.record(outcome));
         }
-        for (boat, zone, time) in struck {
-            fleet.strike(boat, zone, time);
+        for (boat, strike, time) in struck {
+            fleet.strike(boat, &strike, time);
         }
     }
 

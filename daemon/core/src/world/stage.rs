@@ -137,6 +137,8 @@ impl RunningWorld {
                 height_m: fleet.height_m(boat),
                 struck: fleet.first_hit(boat).filter(|struck| struck <= now),
                 gave_up: fleet.gave_up(boat),
+                sinks: fleet.sinks(boat),
+                burns_since: fleet.burns_since(boat),
             })
         };
         (0..fleet.len()).filter_map(watched).collect()

@@ -48,7 +48,8 @@ fn check(scenario: &Scenario) {
         );
         let top_m_s = boat.behaviour.speed_max_m_s();
         assert!(top_m_s.is_finite() && (0.0..100.0).contains(&top_m_s), "{top_m_s} m/s: {boat:?}");
-        let hurt = BoatDamage { engine_s: Some(0.25), helm_s: Some(30.0), first_s: Some(0.25) };
+        let hurt =
+            BoatDamage { engine_s: Some(0.25), helm_s: Some(30.0), first_s: Some(0.25), ..BoatDamage::NONE };
         for time_s in MOMENTS_S {
             for damage in [BoatDamage::NONE, hurt] {
                 let state = match &boat.behaviour {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::path::{self, CoursePath, Ending, wrap};
 use crate::{
@@ -86,8 +86,29 @@ pub struct BoatDamage {
     pub engine_s: Option<f64>,
     /// The helm was hit: the boat goes straight on and slowly loses its way.
     pub helm_s: Option<f64>,
+    /// Water in the hull drowned the engine, or will.
+    pub drowned_s: Option<f64>,
+    /// The boat burns since then.
+    pub fire_s: Option<f64>,
     /// The boat was hit anywhere.
     pub first_s: Option<f64>,
+}
+
+/// A round's strike on a boat.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoundStrike {
+    /// The part.
+    pub zone: Zone,
+    /// The place in the boat's space, metres, and the area of the hole there, m^2; `None` for fragments.
+    pub hole: Option<(DVec3, f64)>,
+    /// It sets fire to the engine.
+    pub ignites: bool,
+}
+
+impl From<Zone> for RoundStrike {
+    fn from(zone: Zone) -> Self {
+        Self { zone, hole: None, ignites: false }
+    }
 }
 
 /// The end of an attacker's course.
@@ -329,7 +350,8 @@ impl Course {
 
 impl BoatDamage {
     /// No damage.
-    pub const NONE: Self = Self { engine_s: None, helm_s: None, first_s: None };
+    pub const NONE: Self =
+        Self { engine_s: None, helm_s: None, drowned_s: None, fire_s: None, first_s: None };
 
     /// Takes in a hit at `time_s`; says whether it changes what the boat can do. The first hit of each part counts.
     pub fn add(&mut self, zone: Zone, time_s: f64) -> bool {
@@ -346,11 +368,16 @@ impl BoatDamage {
         earlier
     }
 
+    /// When its engine failed, or will.
+    pub fn engine_lost_s(&self) -> Option<f64> {
+        self.engine_s.into_iter().chain(self.drowned_s).reduce(f64::min)
+    }
+
     /// Seconds that an undamaged boat would have needed for the way made until `time_s`, and the share of its speed left.
     ///
     /// Each loss makes the speed decay exponentially from its own time on, so the way made has a closed form between them.
     fn under_way(&self, time_s: f64) -> (f64, f64) {
-        let losses = [(self.engine_s, ENGINE_LOST_S), (self.helm_s, HELM_LOST_S)];
+        let losses = [(self.engine_lost_s(), ENGINE_LOST_S), (self.helm_s, HELM_LOST_S)];
         let mut losses = losses.map(|(at, constant)| (at.map_or(f64::INFINITY, |s| s.max(0.0)), constant));
         losses.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (mut way_s, mut share, mut rate, mut from) = (0.0, 1.0, 0.0, 0.0);

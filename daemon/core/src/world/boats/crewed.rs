@@ -108,7 +108,7 @@ impl CrewedBoat {
         }
         let struck = |at: Option<f64>| at.is_some_and(|s| s <= time_s);
         // Without its helmsman a boat goes on as the helm stands, and its engine stops: his cord is pulled.
-        let orders = match (struck(damage.engine_s), struck(damage.helm_s)) {
+        let orders = match (struck(damage.engine_lost_s()), struck(damage.helm_s)) {
             (_, true) => Orders::default(),
             (true, false) => Orders { throttle: 0.0, ..memory.orders },
             (false, false) => memory.orders,

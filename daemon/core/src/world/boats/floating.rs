@@ -65,7 +65,7 @@ pub(super) fn pose_in_waves(
     lay(state, way, at)
 }
 
-/// What its way through the water does to a boat's attitude.
+/// What its way through the water, or water in it, does to a boat's attitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WayAttitude {
     /// Bow up, radians.
@@ -74,6 +74,15 @@ pub struct WayAttitude {
     pub lean: f64,
     /// Upwards, metres.
     pub rise_m: f64,
+}
+
+impl std::ops::Add for WayAttitude {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        let Self { trim, lean, rise_m } = other;
+        Self { trim: self.trim + trim, lean: self.lean + lean, rise_m: self.rise_m + rise_m }
+    }
 }
 
 impl WayAttitude {

@@ -4,14 +4,15 @@ use glam::DVec2;
 
 use super::{
     behaviour::Behaviour,
-    course::{BoatDamage, Course, CourseState},
+    course::{BoatDamage, Course, CourseState, RoundStrike},
     crewed::{CrewedBoat, StepView},
     floating::{Floating, WayAttitude, in_mean_plane, pose_in_waves},
+    flooding::Flooding,
     grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
     hull::{Hull, HullForm},
     seakeeping::{GAP, SeakeepingState},
 };
-use crate::{geometry::RigidPose, model::Zone, world::waves::WaveField};
+use crate::{geometry::RigidPose, world::waves::WaveField};
 
 /// Seconds of a boat's past that can be asked for: the foam of its wake (15 s), as it lies behind a picture that is as old as
 /// orientations are kept (2 s), and a second more.
@@ -31,6 +32,7 @@ enum Pilot {
 pub struct BoatHistory {
     pilot: Pilot,
     damage: BoatDamage,
+    flooding: Flooding,
     hull: Hull,
     states: GridHistory<CourseState>,
     seakeeping: SeakeepingState,
@@ -45,7 +47,8 @@ impl BoatHistory {
             Behaviour::ScriptedCourse(course) => Pilot::Scripted(course),
             Behaviour::Crewed(start) => Pilot::Crewed(Box::new(CrewedBoat::new(start, &form))),
         };
-        Self { pilot, damage: BoatDamage::NONE, hull, states, seakeeping: SeakeepingState::new(form) }
+        let (damage, flooding) = (BoatDamage::NONE, Flooding::default());
+        Self { pilot, damage, flooding, hull, states, seakeeping: SeakeepingState::new(form) }
     }
 
     /// The hull's size at the waterline.
@@ -157,24 +160,57 @@ impl BoatHistory {
     /// Pose by the motion in waves, where that is known.
     fn pose_of(&self, state: &CourseState, time_s: f64) -> Option<RigidPose> {
         let motion = self.seakeeping.at(time_s)?;
-        Some(pose_in_waves(state, &self.way_attitude(state), self.seakeeping.form(), &motion))
+        Some(pose_in_waves(state, &self.attitude(state, time_s), self.seakeeping.form(), &motion))
     }
 
     fn in_mean_plane(&self, state: &CourseState, waves: &WaveField, time_s: f64) -> Floating {
-        in_mean_plane(state, &self.hull, &self.way_attitude(state), waves, time_s)
+        in_mean_plane(state, &self.hull, &self.attitude(state, time_s), waves, time_s)
     }
 
-    fn way_attitude(&self, state: &CourseState) -> WayAttitude {
-        match &self.pilot {
+    fn attitude(&self, state: &CourseState, time_s: f64) -> WayAttitude {
+        let way = match &self.pilot {
             Pilot::Scripted(_) => WayAttitude::scripted(state, &self.hull),
             Pilot::Crewed(boat) => boat.craft().way_attitude(state),
+        };
+        if self.flooding.is_dry() {
+            way
+        } else {
+            way + self.flooding.attitude(self.seakeeping.form(), time_s)
         }
     }
 
+    /// How far water in the hull has brought it down at a time, metres.
+    pub fn settled_m(&self, time_s: f64) -> f64 {
+        if self.flooding.is_dry() {
+            return 0.0;
+        }
+        -self.flooding.attitude(self.seakeeping.form(), time_s).rise_m
+    }
+
+    /// When the hull is full of water and sinks, seconds since the scenario began, by the holes that it has.
+    pub fn sinks_s(&self) -> Option<f64> {
+        self.flooding.sinks_s()
+    }
+
+    /// Since when it burns, seconds since the scenario began.
+    pub const fn fire_s(&self) -> Option<f64> {
+        self.damage.fire_s
+    }
+
     /// Takes in that the boat was struck at `time_s`: what is stepped after that follows from it. A hit on the engine stops it, one on
-    /// the helm ends its attack; the first of each counts.
-    pub fn strike(&mut self, zone: Zone, time_s: f64) {
-        if self.damage.add(zone, time_s) {
+    /// the helm ends its attack; the first of each counts. Each hole that the sea reaches lets water in.
+    pub fn strike(&mut self, strike: &RoundStrike, time_s: f64) {
+        let mut changes = self.damage.add(strike.zone, time_s);
+        if strike.ignites {
+            self.damage.fire_s.get_or_insert(time_s);
+        }
+        if let Some((point, hole_m2)) = strike.hole
+            && self.flooding.add(self.seakeeping.form(), point, hole_m2, time_s)
+        {
+            self.damage.drowned_s = self.flooding.engine_drowns_s();
+            changes = true;
+        }
+        if changes {
             self.forget_after(time_s);
         }
     }

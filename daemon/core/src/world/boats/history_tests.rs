@@ -1,6 +1,7 @@
 use glam::DVec2;
 
 use super::*;
+use crate::model::Zone;
 use crate::{
     sea::BeaufortForce,
     world::{
@@ -71,7 +72,7 @@ fn what_strikes_a_boat_changes_what_comes_after_and_nothing_before() {
     let (mut hit, mut spared) = (boat(square()), boat(square()));
     follow(&mut hit, 20.0, &waves);
     follow(&mut spared, 20.0, &waves);
-    hit.strike(Zone::Engine, 19.77);
+    hit.strike(&Zone::Engine.into(), 19.77);
     hit.follow(20.0, &waves);
     for t in [10.0, 19.0, 19.75] {
         assert_eq!(hit.floating(t, &waves), spared.floating(t, &waves), "{t}");
@@ -80,10 +81,10 @@ fn what_strikes_a_boat_changes_what_comes_after_and_nothing_before() {
     assert!(hit.state(26.0).speed_m_s < 1.2 && hit.state(19.0).speed_m_s > 8.9);
     // Told later, it is where it would be had it been told at once; a second hit on the engine changes nothing.
     let mut told = boat(square());
-    told.strike(Zone::Engine, 19.77);
+    told.strike(&Zone::Engine.into(), 19.77);
     follow(&mut told, 26.0, &waves);
-    hit.strike(Zone::Engine, 22.0);
-    hit.strike(Zone::Hull, 23.0);
+    hit.strike(&Zone::Engine.into(), 22.0);
+    hit.strike(&Zone::Hull.into(), 23.0);
     for i in 0..60 {
         let t = 23.0 + 0.05 * f64::from(i);
         assert_eq!(hit.floating(t, &waves), told.floating(t, &waves), "{t}");

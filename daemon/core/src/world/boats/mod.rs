@@ -6,6 +6,7 @@ mod crew;
 mod crewed;
 mod drive;
 mod floating;
+mod flooding;
 mod grid;
 mod history;
 mod hull;
@@ -14,7 +15,7 @@ mod path;
 mod seakeeping;
 
 pub use behaviour::{Behaviour, CrewedStart};
-pub use course::{Arrival, BoatDamage, Course, CourseError, CourseState};
+pub use course::{Arrival, BoatDamage, Course, CourseError, CourseState, RoundStrike};
 pub use crew::{Act, CrewPlan, CrewState, Exit, Guard, Signals, Traffic};
 pub use crewed::StepView;
 pub use drive::{

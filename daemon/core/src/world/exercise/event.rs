@@ -104,6 +104,20 @@ pub enum ExerciseFact {
         /// Where.
         range_m: f64,
     },
+    /// A boat that was holed is full of water and sinks.
+    Sank {
+        /// Its name.
+        boat: String,
+        /// Where.
+        range_m: f64,
+    },
+    /// A boat's engine burns.
+    CaughtFire {
+        /// Its name.
+        boat: String,
+        /// Where.
+        range_m: f64,
+    },
     /// A hostile boat that was struck, or warned, goes away or gives up.
     TurnedAway {
         /// Its name.

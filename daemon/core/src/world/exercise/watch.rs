@@ -45,6 +45,10 @@ pub struct WatchedBoat<'a> {
     pub struck: Option<Time>,
     /// Its crew has given up.
     pub gave_up: bool,
+    /// When it is full of water and sinks.
+    pub sinks: Option<Time>,
+    /// Since when it burns.
+    pub burns_since: Option<Time>,
 }
 
 /// What is known of a boat so far.
@@ -61,6 +65,8 @@ struct BoatNotes {
     closing_since: Option<Time>,
     is_stopped: bool,
     is_away: bool,
+    has_sunk: bool,
+    burns: bool,
 }
 
 /// Watches one exercise.
@@ -251,6 +257,14 @@ impl BoatNotes {
             }
         }
         self.point(boat, time, note);
+        if !self.burns && boat.burns_since.is_some_and(|since| since <= time) {
+            self.burns = true;
+            note(ExerciseFact::CaughtFire { boat: name(), range_m });
+        }
+        if !self.has_sunk && boat.sinks.is_some_and(|sinks| sinks <= time) {
+            self.has_sunk = true;
+            note(ExerciseFact::Sank { boat: name(), range_m });
+        }
         if boat.side == Side::Hostile {
             self.threat(boat, time, spec.goals.keep_off_m, note);
         } else if boat.struck.is_some() && boat.speed_m_s < STOPPED_M_S && !self.is_stopped {

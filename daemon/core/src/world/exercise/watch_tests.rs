@@ -15,6 +15,8 @@ fn skiff(range_m: f64, speed_m_s: f64) -> WatchedBoat<'static> {
         height_m: 1.5,
         struck: None,
         gave_up: false,
+        sinks: None,
+        burns_since: None,
     }
 }
 

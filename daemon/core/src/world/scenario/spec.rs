@@ -82,6 +82,8 @@ pub struct WeaponSpec {
     pub splash_life_s: f64,
     /// Angle to the water below which a round bounces, degrees.
     pub ricochet_below_deg: f64,
+    /// Area of the holes that a round makes, where it goes in and where it goes out, cm^2.
+    pub hole_cm2: f64,
     /// Heat of its barrel; `None` for one that stays cold.
     pub heat: Option<BarrelHeat>,
     /// Fuze and fragments; `None` for solid rounds.
@@ -105,6 +107,7 @@ impl Default for WeaponSpec {
             splash_height_m: 1.8,
             splash_life_s: 1.6,
             ricochet_below_deg: 0.0,
+            hole_cm2: 10.0,
             heat: None,
             burst: None,
         }

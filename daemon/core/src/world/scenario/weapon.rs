@@ -41,6 +41,7 @@ pub(super) struct RawWeapon {
     barrel_heat_k: OptionalKey<f64>,
     barrel_cooling_s: OptionalKey<f64>,
     barrel_hot_k: OptionalKey<f64>,
+    hole_cm2: OptionalKey<f64>,
     fragments_m: OptionalKey<f64>,
     arming_m: OptionalKey<f64>,
 }
@@ -101,6 +102,7 @@ fn over(section: &TomlSection<'_>, keys: &RawWeapon, base: &WeaponSpec) -> Resul
         splash_height_m: given(&keys.splash_height_m, 0.0, 60.0, "m", base.splash_height_m)?,
         splash_life_s: given(&keys.splash_life_s, 0.1, 10.0, "s", base.splash_life_s)?,
         ricochet_below_deg: given(&keys.ricochet_below_deg, 0.0, 45.0, "degrees", base.ricochet_below_deg)?,
+        hole_cm2: given(&keys.hole_cm2, 0.0, 10_000.0, "cm^2", base.hole_cm2)?,
         heat: heat(section, keys, base.heat)?,
         burst: burst(section, keys, base.burst)?,
     })

@@ -57,6 +57,8 @@ struct BoatFold {
     identified: Vec<(Time, Side)>,
     over: Option<(Ending, Time, f64)>,
     nearest_m: Option<f64>,
+    sank: bool,
+    burns: bool,
 }
 
 /// A round as it was fired.
@@ -228,6 +230,10 @@ pub struct BoatSheet {
     pub ended_m: Option<f64>,
     /// The nearest that it came, metres.
     pub nearest_m: Option<f64>,
+    /// It sank.
+    pub sank: bool,
+    /// It caught fire.
+    pub burns: bool,
 }
 
 /// Misses with one cause.
@@ -293,6 +299,8 @@ impl ScoreFold {
             ExerciseFact::BarrelHot => self.barrel_hot += 1,
             ExerciseFact::Fragments { boat, side: Side::Neutral, .. } => self.fragments.push(boat.clone()),
             ExerciseFact::Fragments { .. } => {}
+            ExerciseFact::Sank { boat, .. } => self.boat(boat).sank = true,
+            ExerciseFact::CaughtFire { boat, .. } => self.boat(boat).burns = true,
             ExerciseFact::Message { .. } => {}
             ExerciseFact::Missed { why, .. } => {
                 self.misses.extend(Some(*why).filter(MissExplanation::was_aimed))
@@ -548,6 +556,8 @@ impl ScoreFold {
             ending: boat.over.map(|over| over.0),
             ended_m: boat.over.map(|over| over.2),
             nearest_m: boat.nearest_m,
+            sank: boat.sank,
+            burns: boat.burns,
         }
     }
 
