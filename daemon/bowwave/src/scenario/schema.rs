@@ -189,6 +189,14 @@ fn weapon() -> Value {
     )
 }
 
+fn axes() -> Value {
+    json!({
+        "type": "array", "minItems": 1, "maxItems": 8,
+        "items": { "type": "number", "minimum": -360, "maximum": 360 },
+        "description": "Bearings that the boats come from, as many on each, in place of bearing_deg",
+    })
+}
+
 fn drag_table() -> Value {
     let pair = json!({ "type": "array", "minItems": 2, "maxItems": 2, "items": { "type": "number" } });
     json!({
@@ -357,6 +365,8 @@ fn boat() -> Value {
             ("speed_max_kn", number(1.0, 60.0, "Greatest speed in calm water, with a crew")),
             ("keeps_rules", flag("Whether it keeps to the rules of the road, with a crew")),
             ("count", whole(1, 40, "Boats of the group")),
+            ("axes_deg", axes()),
+            ("on_target_s", number(1.0, 86_400.0, "When they are to be where they attack from")),
             ("formation", one_of(["abreast", "column", "wedge", "scattered"], "How the group stands")),
             ("spacing_m", number(10.0, 2000.0, "Distance from one to the next")),
             ("range_m", number(1.0, 20_000.0, "Distance from the camera")),
@@ -370,8 +380,9 @@ fn boat() -> Value {
             ("stop_m", number(5.0, 5000.0, "Of closing: the range at which it arrives")),
             ("arrival", one_of(["stop", "circle"], "Of closing: what it does there")),
         ],
-        &["name", "model", "range_m", "bearing_deg"],
+        &["name", "model", "range_m"],
     );
     boat["oneOf"] = json!([{ "required": ["course"] }, { "required": ["crew"] }]);
+    boat["anyOf"] = json!([{ "required": ["bearing_deg"] }, { "required": ["axes_deg", "crew"] }]);
     boat
 }

@@ -40,6 +40,7 @@ fn crewed(name: &str, plan: &Arc<CrewPlan>, bearing_deg: f64, range_m: f64, side
         position: ahead(bearing) * range_m,
         heading: bearing + PI,
         speed_m_s: 0.0,
+        on_target_s: None,
     };
     Vessel { name: name.to_owned(), side, model: ModelId(0), behaviour: Behaviour::Crewed(start) }
 }
@@ -200,6 +201,31 @@ fn a_boat_that_is_holed_loses_its_engine_and_sinks_whatever_the_pace_of_frames()
     assert!(fleet.afloat(start().plus_secs(sinks + 30.0)).count() == 0, "it has sunk");
     assert!(place(&fleet, 0, 199.0).speed_m_s < 1.0, "its engine has drowned");
     assert_eq!(poses, run(4).1);
+}
+
+#[test]
+fn a_swarm_comes_from_its_axes_and_all_at_once() {
+    let text = "[sea]\nbeaufort = 3\n[[crew]]\nname = \"raider\"\n[[crew.state]]\nname = \"go\"\ndoes = \"attack\"\nspeed_kn = 26\n\
+                stop_m = 60\n[[boat]]\nname = \"near\"\nmodel = \"skiff\"\ncrew = \"raider\"\nrange_m = 400\naxes_deg = [-60, 0]\n\
+                count = 5\nspacing_m = 30\non_target_s = 75\n[[boat]]\nname = \"far\"\nmodel = \"skiff\"\ncrew = \"raider\"\n\
+                range_m = 800\nbearing_deg = 60\ncount = 3\nspacing_m = 30\non_target_s = 75\n";
+    let scenario = crate::world::scenario::Scenario::parse(text, "x").expect("sound");
+    let mut fleet = Fleet::of_scenario(&scenario, models(), &[ModelId(0); 8], start());
+    let bearing = |fleet: &Fleet, boat| heading_of(place(fleet, boat, 0.0).position).to_degrees();
+    let bearings: Vec<f64> = (0..8).map(|boat| bearing(&fleet, boat).round()).collect();
+    assert!(bearings[..3].iter().all(|deg| (deg + 60.0).abs() < 6.0), "{bearings:?}");
+    assert!(bearings[3..5].iter().all(|deg| deg.abs() < 6.0), "{bearings:?}");
+    let mut arrived = [None; 8];
+    follow(&mut fleet, 0.0, 100.0, |fleet, time_s| {
+        for (boat, arrived) in arrived.iter_mut().enumerate() {
+            if place(fleet, boat, time_s).position.length() < 85.0 {
+                arrived.get_or_insert(time_s);
+            }
+        }
+    });
+    let times: Vec<f64> = arrived.iter().map(|time| time.expect("it arrives")).collect();
+    let (first, last) = times.iter().fold((f64::MAX, f64::MIN), |(a, b), t| (a.min(*t), b.max(*t)));
+    assert!(last - first < 10.0 && (60.0..85.0).contains(&first), "{times:?}");
 }
 
 /// Crews of all kinds about the gun: attackers, one that rams, fishing boats, passers-by and a scripted ship.

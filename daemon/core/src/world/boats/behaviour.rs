@@ -38,6 +38,8 @@ pub struct CrewedStart {
     pub heading: f64,
     /// Its speed, m/s.
     pub speed_m_s: f64,
+    /// When it is to be where it attacks from, seconds since the scenario began; `None` as soon as it can.
+    pub on_target_s: Option<f64>,
 }
 
 impl CrewedStart {

@@ -37,6 +37,7 @@ pub struct CrewedBoat {
     craft: Craft,
     seed: u64,
     keeps_rules: bool,
+    on_target_s: Option<f64>,
     kept: GridHistory<Crewed>,
 }
 
@@ -60,7 +61,8 @@ impl CrewedBoat {
         let drive = DriveState::steady(&craft, start.position, start.heading, start.speed_m_s);
         let mut kept = GridHistory::new(KEPT);
         kept.restart(0, Crewed { drive, memory: CrewMemory { from: drive.centre, ..CrewMemory::default() } });
-        Self { plan: start.plan, craft, seed: start.chance, keeps_rules: start.keeps_rules, kept }
+        let CrewedStart { plan, chance: seed, keeps_rules, on_target_s, .. } = start;
+        Self { plan, craft, seed, keeps_rules, on_target_s, kept }
     }
 
     /// The hull with its engine.
@@ -103,6 +105,7 @@ impl CrewedBoat {
                 own_ship: view.own_ship,
                 signals,
                 keeps_rules: self.keeps_rules,
+                on_target_s: self.on_target_s,
             };
             memory = self.plan.decide(&self.craft, &now.drive, &memory, &situation);
         }

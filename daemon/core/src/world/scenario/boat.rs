@@ -1,6 +1,5 @@
 //! The scenario's boats.
 
-use glam::DVec2;
 use serde::Deserialize;
 
 use super::{
@@ -12,8 +11,8 @@ use super::{
 use crate::{
     side::Side,
     text::toml::{
-        KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, key_place, number, one_of,
-        plain_text, whole, yes_no,
+        KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, ValueRule, key_place, number,
+        one_of, plain_text, whole, yes_no,
     },
     world::boats::{Arrival, Behaviour, Course, CourseError, CrewedStart, Propulsor},
 };
@@ -67,6 +66,8 @@ pub(super) struct RawBoat {
     count: OptionalKey<i64>,
     formation: OptionalKey<String>,
     spacing_m: OptionalKey<f64>,
+    axes_deg: OptionalKey<Vec<f64>>,
+    on_target_s: OptionalKey<f64>,
     range_m: OptionalKey<f64>,
     bearing_deg: OptionalKey<f64>,
     heading_deg: OptionalKey<f64>,
@@ -95,7 +96,7 @@ impl RawBoat {
     }
 
     /// The keys that only boats with a crew have.
-    fn of_crews(&self) -> [KeyPlace; 6] {
+    fn of_crews(&self) -> [KeyPlace; 8] {
         [
             key_place("engine", &self.engine),
             key_place("speed_max_kn", &self.speed_max_kn),
@@ -103,6 +104,8 @@ impl RawBoat {
             key_place("count", &self.count),
             key_place("formation", &self.formation),
             key_place("spacing_m", &self.spacing_m),
+            key_place("axes_deg", &self.axes_deg),
+            key_place("on_target_s", &self.on_target_s),
         ]
     }
 
@@ -230,29 +233,54 @@ fn crewed(
     let usual_kn = USUAL_KN.iter().find(|(engine, _)| *engine == propulsor).map_or(28.0, |(_, kn)| *kn);
     let speed_max = text.given(&raw.speed_max_kn, number(1.0..=60.0, "kn"))?.unwrap_or(usual_kn);
     let speed = text.given(&raw.speed_kn, number(0.0..=speed_max, "kn (speed_max_kn)"))?.unwrap_or(0.0);
-    let bearing = section.required("bearing_deg", &raw.bearing_deg, angle())?.to_radians();
-    let middle = place(bearing, section.required("range_m", &raw.range_m, range())?);
+    let axes = axes(section, raw)?;
+    let range_m = section.required("range_m", &raw.range_m, range())?;
     let heading = text.given(&raw.heading_deg, angle())?.map(f64::to_radians);
-    let heading = heading.unwrap_or(bearing + std::f64::consts::PI);
     let count = text.given(&raw.count, whole(1..=40_u32))?.unwrap_or(1);
     let formation = text.given(&raw.formation, one_of(&Formation::NAMES))?.unwrap_or(Formation::Abreast);
     let spacing_m = text.given(&raw.spacing_m, number(10.0..=2000.0, "m"))?.unwrap_or(40.0);
     let keeps_rules = text.given(&raw.keeps_rules, yes_no())?.unwrap_or(side == Side::Neutral);
+    let on_target_s = text.given(&raw.on_target_s, number(1.0..=86_400.0, "s"))?;
     let number = (table as u64) << 32;
-    let places = group::places(formation, count, spacing_m, heading, context.seed.wrapping_add(number));
-    let start = |(i, off): (usize, DVec2)| {
-        Behaviour::Crewed(CrewedStart {
-            plan: std::sync::Arc::clone(&context.crews[crew].plan),
-            chance: number + i as u64,
-            keeps_rules,
-            propulsor,
-            speed_max_m_s: speed_max * M_S_PER_KN,
-            position: middle + off,
-            heading,
-            speed_m_s: speed * M_S_PER_KN,
-        })
-    };
-    Ok(places.into_iter().enumerate().map(start).collect())
+    let mut starts = Vec::with_capacity(count as usize);
+    for (axis, bearing) in axes.iter().enumerate() {
+        // What does not divide goes to the first axes.
+        let on_axis = group::share(count, axes.len() as u32, axis as u32);
+        let middle = place(*bearing, range_m);
+        let heading = heading.unwrap_or(bearing + std::f64::consts::PI);
+        let seed = context.seed.wrapping_add(number).wrapping_add((axis as u64) << 16);
+        for off in group::places(formation, on_axis, spacing_m, heading, seed) {
+            starts.push(Behaviour::Crewed(CrewedStart {
+                plan: std::sync::Arc::clone(&context.crews[crew].plan),
+                chance: number + starts.len() as u64,
+                keeps_rules,
+                propulsor,
+                speed_max_m_s: speed_max * M_S_PER_KN,
+                position: middle + off,
+                heading,
+                speed_m_s: speed * M_S_PER_KN,
+                on_target_s,
+            }));
+        }
+    }
+    Ok(starts)
+}
+
+/// Bearings that the boats of a table come from, radians.
+fn axes(section: &TomlSection<'_>, raw: &RawBoat) -> Result<Vec<f64>, TomlError> {
+    let text = section.text;
+    let rule =
+        ValueRule::new("a list of 1 to 8 bearings, each a number, -360 to 360 degrees", |raw: &Vec<f64>| {
+            let fits = (1..=8).contains(&raw.len()) && raw.iter().all(|deg| deg.abs() <= 360.0);
+            fits.then(|| raw.iter().map(|deg| deg.to_radians()).collect::<Vec<f64>>())
+        });
+    match (text.given(&raw.axes_deg, rule)?, &raw.bearing_deg) {
+        (Some(_), Some(bearing)) => {
+            Err(text.error(bearing, "a group has a bearing or axes_deg; leave out one of them"))
+        }
+        (Some(axes), None) => Ok(axes),
+        (None, _) => Ok(vec![section.required("bearing_deg", &raw.bearing_deg, angle())?.to_radians()]),
+    }
 }
 
 fn course(section: &TomlSection<'_>, raw: &RawBoat, kind: CourseKind) -> Result<Course, TomlError> {

@@ -29,6 +29,11 @@ impl Formation {
     ];
 }
 
+/// How many of `count` boats are in part `part` of `parts`: as even as it goes.
+pub(super) const fn share(count: u32, parts: u32, part: u32) -> u32 {
+    count / parts + (part < count % parts) as u32
+}
+
 /// Places of `count` boats from the group's middle, world x and y, metres, for a group that heads along `heading`.
 pub(super) fn places(
     formation: Formation,

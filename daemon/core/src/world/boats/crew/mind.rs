@@ -67,6 +67,21 @@ pub struct Situation<'a> {
     pub signals: Signals,
     /// Whether it keeps to the rules of the road.
     pub keeps_rules: bool,
+    /// When it is to be where it attacks from, seconds since the scenario began, as others of its swarm are.
+    pub on_target_s: Option<f64>,
+}
+
+impl Situation<'_> {
+    /// The speed at which a boat covers what is left of its way so that it comes when it is to; the state's own once that is past.
+    fn in_time(&self, speed_m_s: f64, left_m: f64) -> f64 {
+        /// Slower than this it would not steer.
+        const SLOWEST_M_S: f64 = 1.5;
+        let left_s = self.on_target_s.map_or(0.0, |due| due - self.time_s);
+        if left_s <= 0.0 {
+            return speed_m_s;
+        }
+        (left_m.max(0.0) / left_s).clamp(SLOWEST_M_S.min(speed_m_s), speed_m_s)
+    }
 }
 
 /// What has happened to a boat so far.
@@ -176,9 +191,12 @@ impl CrewPlan {
             Act::Approach { stop_m } | Act::Attack { stop_m: Some(stop_m) } => {
                 let left_m = range_m - stop_m;
                 let near = left_m < craft.length_m;
+                let speed = at.in_time(speed, left_m);
                 if near { Wish::STOP } else { Wish::go(inward, craft.slowing(speed, left_m)) }
             }
-            Act::Attack { stop_m: None } => Wish { rams: true, ..Wish::go(inward, speed) },
+            Act::Attack { stop_m: None } => {
+                Wish { rams: true, ..Wish::go(inward, at.in_time(speed, range_m)) }
+            }
             Act::Probe { turn_m } => {
                 if memory.leg == 0 && range_m < *turn_m {
                     memory.leg = 1;
