@@ -65,6 +65,10 @@ fn plain(path: &Path) -> &str {
 
 /// A short run of a small camera.
 fn small(aim: &str, out: &Path) -> Value {
+    small_of("first-target", aim, out)
+}
+
+fn small_of(scenario: &str, aim: &str, out: &Path) -> Value {
     let settings = [
         "--fast",
         "--headless",
@@ -77,7 +81,7 @@ fn small(aim: &str, out: &Path) -> Value {
         "--record",
         "--json",
     ];
-    let output = play(["first-target", "--aim", aim, "--out", plain(out)].into_iter().chain(settings));
+    let output = play([scenario, "--aim", aim, "--out", plain(out)].into_iter().chain(settings));
     expect_code(&output, 0);
     serde_json::from_slice(&output.stdout).expect("JSON on standard output")
 }
@@ -97,6 +101,29 @@ fn the_same_script_plays_the_same_and_replays_the_same() {
     let recording = |name: &str| folder.path().join(name).join("recording.mcap");
     assert!(fs::read(recording("a")).expect("read") == fs::read(recording("b")).expect("read"));
     let again = bowwave_tests::bowwave(["replay", plain(&recording("a"))]);
+    expect_code(&again, 0);
+    assert!(said(&again).contains("records and scenes are the same in 150 ticks"), "{}", said(&again));
+}
+
+#[test]
+fn a_boat_that_somebody_drives_sails_as_told_and_replays_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).expect("a file");
+        plain(&path).to_owned()
+    };
+    let target = include_str!("../../daemon/core/scenarios/first-target.toml");
+    let scenario = file("driven.toml", &target.replace("\"anchored\"", "\"driven\""));
+    let orders = "[[step]]\nat_s = 0.5\nact = \"ahead\"\n[[step]]\nat_s = 0.6\nact = \"ahead\"\n[[step]]\nat_s = 0.7\nact = \"starboard\"\n";
+    let (driven, left) =
+        (file("driven-orders.toml", orders), file("none.toml", "[[step]]\nat_s = 0.5\nact = \"safe\"\n"));
+    let [a, b] = [driven, left].map(|script| {
+        let out = folder.path().join(Path::new(&script).file_stem().expect("a name"));
+        (small_of(&scenario, &script, &out), out)
+    });
+    assert_ne!(a.0["scenes_digest"], b.0["scenes_digest"], "it sails");
+    let again = bowwave_tests::bowwave(["replay", plain(&a.1.join("recording.mcap"))]);
     expect_code(&again, 0);
     assert!(said(&again).contains("records and scenes are the same in 150 ticks"), "{}", said(&again));
 }

@@ -22,11 +22,29 @@ pub enum Act {
     Safe,
     /// It is made ready again.
     Ready,
+    /// The person who drives a boat gives it an order. That is no act of the trainee's, and comes the same way.
+    Drive(DriveOrder),
+}
+
+/// An order of the person who drives a boat, as a telegraph and a wheel with notches give it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DriveOrder {
+    /// A notch more ahead: a quarter of the throttle.
+    Ahead,
+    /// A notch more astern.
+    Astern,
+    /// A notch of the helm to port: a third of it.
+    Port,
+    /// A notch to starboard.
+    Starboard,
+    /// Helm amidships.
+    Midships,
 }
 
 impl Act {
     /// All acts.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 13] = [
         Self::Report,
         Self::Identify(Side::Hostile),
         Self::Identify(Side::Neutral),
@@ -35,6 +53,11 @@ impl Act {
         Self::Clear,
         Self::Safe,
         Self::Ready,
+        Self::Drive(DriveOrder::Ahead),
+        Self::Drive(DriveOrder::Astern),
+        Self::Drive(DriveOrder::Port),
+        Self::Drive(DriveOrder::Starboard),
+        Self::Drive(DriveOrder::Midships),
     ];
 
     /// The name in scenarios, configurations and tables.
@@ -48,6 +71,11 @@ impl Act {
             Self::Clear => "clear",
             Self::Safe => "safe",
             Self::Ready => "ready",
+            Self::Drive(DriveOrder::Ahead) => "ahead",
+            Self::Drive(DriveOrder::Astern) => "astern",
+            Self::Drive(DriveOrder::Port) => "port",
+            Self::Drive(DriveOrder::Starboard) => "starboard",
+            Self::Drive(DriveOrder::Midships) => "midships",
         }
     }
 

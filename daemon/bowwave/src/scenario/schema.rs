@@ -291,7 +291,7 @@ fn crew() -> Value {
 }
 
 fn state() -> Value {
-    const ACTS: [&str; 13] = [
+    const ACTS: [&str; 14] = [
         "transit",
         "loiter",
         "fish",
@@ -305,6 +305,7 @@ fn state() -> Value {
         "stop",
         "surrender",
         "drift",
+        "driven",
     ];
     table(
         "A state of a crew; the first is the one that it begins in",

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use crate::{
+    act::DriveOrder,
     geometry::RigidPose,
     model::{Model, ModelId},
     time::Time,
     world::{
         boats::{
-            Behaviour, BoatHistory, Floating, Hull, HullForm, RoundStrike, Signals, StepView, Traffic,
-            step_after, step_seconds,
+            Behaviour, BoatHistory, Floating, Hull, HullForm, Orders, RoundStrike, Signals, StepView,
+            Traffic, step_after, step_seconds,
         },
         contact::Capsule,
         scenario::{BoatSpec, Scenario, Side},
@@ -115,6 +116,8 @@ pub struct Fleet {
     followed: Time,
     /// Boats that were struck, with the seconds since the start.
     struck: Vec<(usize, f64)>,
+    /// What the person ordered who drives boats, each from those seconds on.
+    driven: Vec<(f64, Orders)>,
 }
 
 impl Fleet {
@@ -128,7 +131,8 @@ impl Fleet {
             FleetBoat { name: vessel.name, side: vessel.side, model: vessel.model, history, warned_s: None }
         };
         let boats = vessels.into_iter().map(boat).collect();
-        Self { boats, models, waves, start, followed: start, struck: Vec::new() }
+        let (struck, driven) = (Vec::new(), Vec::new());
+        Self { boats, models, waves, start, followed: start, struck, driven }
     }
 
     /// The boats of a scenario. `boat_models` names the model of each.
@@ -173,12 +177,47 @@ impl Fleet {
                 let me = std::mem::replace(&mut traffic[i], OWN_SHIP);
                 let boat = &self.boats[i];
                 let signals = boat.history.decides().then(|| self.signals(i, &me, time_s, &traffic));
-                let view = StepView { others: &traffic, own_ship: OWN_SHIP, signals, waves: &self.waves };
+                let driven = self.driven_at(time_s);
+                let view =
+                    StepView { others: &traffic, own_ship: OWN_SHIP, signals, waves: &self.waves, driven };
                 self.boats[i].history.step(&view);
                 traffic[i] = me;
             }
             self.keep_apart(step_seconds(number + 1));
         }
+    }
+
+    /// Orders at a time of the person who drives boats.
+    fn driven_at(&self, time_s: f64) -> Orders {
+        let last = self.driven.iter().rev().find(|(since, _)| *since <= time_s);
+        last.map_or_else(Orders::default, |(_, orders)| *orders)
+    }
+
+    /// Takes in an order of that person.
+    pub fn drive(&mut self, order: DriveOrder, time: Time) {
+        const THROTTLE_NOTCH: f64 = 0.25;
+        const HELM_NOTCH: f64 = 1.0 / 3.0;
+        let time_s = time.secs_since(self.start).max(self.driven.last().map_or(0.0, |last| last.0));
+        let was = self.driven_at(time_s);
+        let throttle = |by: f64| Orders { throttle: (was.throttle + by).clamp(-1.0, 1.0), ..was };
+        let helm = |by: f64| Orders { helm: (was.helm + by).clamp(-1.0, 1.0), ..was };
+        let orders = match order {
+            DriveOrder::Ahead => throttle(THROTTLE_NOTCH),
+            DriveOrder::Astern => throttle(-THROTTLE_NOTCH),
+            DriveOrder::Port => helm(-HELM_NOTCH),
+            DriveOrder::Starboard => helm(HELM_NOTCH),
+            DriveOrder::Midships => Orders { helm: 0.0, ..was },
+        };
+        self.driven.push((time_s, orders));
+        self.forget_crews_after(time_s);
+    }
+
+    /// All crews are stepped together, so all go on from `time_s`.
+    fn forget_crews_after(&mut self, time_s: f64) {
+        for boat in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
+            boat.history.forget_after(time_s);
+        }
+        self.follow(self.followed);
     }
 
     /// Events that have befallen a boat which is at `at`.
@@ -279,12 +318,8 @@ impl Fleet {
         let seconds = time.secs_since(self.start);
         if let Some(warned) = self.boats.get_mut(boat) {
             warned.warned_s.get_or_insert(seconds);
-            // All are stepped together, so all go on from there.
-            for other in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
-                other.history.forget_after(seconds);
-            }
         }
-        self.follow(self.followed);
+        self.forget_crews_after(seconds);
     }
 
     /// Pose of a boat at `time`, as [`Self::floating`] has it, in half the time.
@@ -350,12 +385,9 @@ impl Fleet {
         if let Some(struck) = self.boats.get_mut(boat) {
             struck.history.strike(strike, seconds);
             self.struck.push((boat, seconds));
-            // What crews see of it, they see from then on.
-            for other in self.boats.iter_mut().filter(|b| b.history.is_crewed()) {
-                other.history.forget_after(seconds);
-            }
         }
-        self.follow(self.followed);
+        // What crews see of it, they see from then on.
+        self.forget_crews_after(seconds);
     }
 }
 

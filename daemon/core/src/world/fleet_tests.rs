@@ -5,6 +5,7 @@ use glam::{DVec2, Vec3};
 use super::*;
 use crate::model::Zone;
 use crate::{
+    act::DriveOrder,
     geometry::{ahead, heading_of},
     sea::BeaufortForce,
     world::{
@@ -226,6 +227,41 @@ fn a_swarm_comes_from_its_axes_and_all_at_once() {
     let times: Vec<f64> = arrived.iter().map(|time| time.expect("it arrives")).collect();
     let (first, last) = times.iter().fold((f64::MAX, f64::MIN), |(a, b), t| (a.min(*t), b.max(*t)));
     assert!(last - first < 10.0 && (60.0..85.0).contains(&first), "{times:?}");
+}
+
+#[test]
+fn a_person_drives_a_boat_and_the_pace_of_frames_does_not_matter() {
+    let crew = plan(vec![state("driven", Act::Driven, 0.0, vec![])]);
+    let orders = [
+        (1.0, DriveOrder::Ahead),
+        (1.2, DriveOrder::Ahead),
+        (1.4, DriveOrder::Ahead),
+        (20.0, DriveOrder::Starboard),
+        (24.0, DriveOrder::Midships),
+        (40.0, DriveOrder::Astern),
+    ];
+    let run = |frames_a_second: u32| {
+        let mut fleet = fleet(vec![crewed("mine", &crew, 0.0, 900.0, Side::Hostile)], sea(2));
+        let (mut given, mut states) = (0, Vec::new());
+        for frame in 1..=45 * frames_a_second {
+            let time_s = f64::from(frame) / f64::from(frames_a_second);
+            fleet.follow(start().plus_secs(time_s));
+            while let Some((at_s, order)) = orders.get(given).filter(|(at_s, _)| *at_s <= time_s) {
+                fleet.drive(*order, start().plus_secs(*at_s));
+                given += 1;
+            }
+            if frame % frames_a_second == 0 {
+                states.push(place(&fleet, 0, time_s));
+            }
+        }
+        states
+    };
+    let states = run(30);
+    assert!(states[0].speed_m_s.abs() < 0.5, "it lies still until it is told to go");
+    assert!(states[18].speed_m_s > 5.0, "{:?}", states[18]);
+    let turned = (states[28].heading - states[19].heading).to_degrees();
+    assert!((20.0..300.0).contains(&turned), "to starboard by {turned} deg");
+    assert_eq!(states, run(4));
 }
 
 /// Crews of all kinds about the gun: attackers, one that rams, fishing boats, passers-by and a scripted ship.

@@ -15,7 +15,7 @@ use super::{
     weapon::{Stoppages, Weapon, WeaponState},
 };
 use crate::{
-    act::TraineeAct,
+    act::{Act, DriveOrder, TraineeAct},
     estimate::sea::SeaConditions,
     event::TriggerEdge,
     model::{Model, ModelId, Zone},
@@ -81,6 +81,8 @@ pub struct World {
     score: Score,
     last_result: Option<LastResult>,
     is_hot: bool,
+    /// Orders of the person who drives boats that wait for the next call.
+    driving: Vec<(Time, DriveOrder)>,
 }
 
 /// Boats and rounds, from the first picture on.
@@ -179,6 +181,7 @@ impl World {
             score: Score::default(),
             last_result: None,
             is_hot: false,
+            driving: Vec::new(),
         }
     }
 
@@ -204,6 +207,14 @@ impl World {
 
     /// Takes in an act of the trainee.
     pub fn act(&mut self, act: TraineeAct) {
+        if let Act::Drive(order) = act.act {
+            /// More wait only while no picture has come.
+            const WAITING_MAX: usize = 256;
+            if self.driving.len() < WAITING_MAX {
+                self.driving.push((act.time, order));
+            }
+            return;
+        }
         self.weapon.act(act);
         self.watch.act(act);
     }
@@ -226,6 +237,9 @@ impl World {
         self.events.clear();
         let mut running = self.running.take().unwrap_or_else(|| self.begin(begin));
         let now = running.now.max(until);
+        for (time, order) in self.driving.drain(..) {
+            running.fleet.drive(order, time);
+        }
         let was_stopped = self.weapon.state() == WeaponState::Stoppage;
         while let Some(fired) = self.weapon.fire(known.min(now)) {
             self.score.shots += 1;

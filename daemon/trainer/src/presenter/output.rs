@@ -8,7 +8,12 @@ use std::{
 };
 
 use anyhow::{Context, Result, anyhow};
-use bowwave_core::{act::TraineeAct, event::TriggerEdge, frame::scene::Pass, time::Time};
+use bowwave_core::{
+    act::{Act, TraineeAct},
+    event::TriggerEdge,
+    frame::scene::Pass,
+    time::Time,
+};
 use bowwave_devices::{clock::now, lcd::LcdPort, report::Reporter};
 use bowwave_render::{Completions, FinishedFrame};
 use crossbeam_channel::{Receiver, Sender, bounded, unbounded};
@@ -333,6 +338,8 @@ impl OutputWorker {
         let may = |pressed: &Pressed| match pressed {
             Pressed::Quit => true,
             Pressed::Turn(_) => seat == Seat::Gunner,
+            // Whoever watches a simulated gunner may drive a boat against it.
+            Pressed::Act(Act::Drive(_)) => true,
             Pressed::Fire(_) | Pressed::Rezero | Pressed::Act(_) => seat != Seat::Watcher,
         };
         for pressed in done.into_iter().filter(may) {

@@ -1,8 +1,11 @@
 //! The window on a desktop. Space or the left mouse button is the trigger, mouse and arrow keys turn a simulated gun, letters are the
-//! trainee's acts (see [`KEYS`]), Z says that the gun stands at its stow, escape ends.
+//! trainee's acts (see [`KEYS`]), numbers drive a boat (see [`DRIVE_KEYS`]), Z says that the gun stands at its stow, escape ends.
 
 use anyhow::{Context, Result};
-use bowwave_core::{act::Act, side::Side};
+use bowwave_core::{
+    act::{Act, DriveOrder},
+    side::Side,
+};
 use minifb::{Key, KeyRepeat, MouseButton, MouseMode, ScaleMode, Window, WindowOptions};
 
 /// What the user did.
@@ -30,6 +33,15 @@ pub const KEYS: [(Key, Act); 8] = [
     (Key::C, Act::Clear),
     (Key::S, Act::Safe),
     (Key::F, Act::Ready),
+];
+
+/// Keys of the person who drives a boat, as they lie on a pad of numbers; the row above the letters does as well.
+pub const DRIVE_KEYS: [(Key, Key, DriveOrder); 5] = [
+    (Key::NumPad8, Key::Key8, DriveOrder::Ahead),
+    (Key::NumPad2, Key::Key2, DriveOrder::Astern),
+    (Key::NumPad4, Key::Key4, DriveOrder::Port),
+    (Key::NumPad6, Key::Key6, DriveOrder::Starboard),
+    (Key::NumPad5, Key::Key5, DriveOrder::Midships),
 ];
 
 /// Keys that turn the gun: to the right and upwards.
@@ -83,11 +95,11 @@ impl Screen {
         self.firing = firing;
         let ends = !self.window.is_open() || self.window.is_key_pressed(Key::Escape, KeyRepeat::No);
         let rezero = self.window.is_key_pressed(Key::Z, KeyRepeat::No).then_some(Pressed::Rezero);
-        let acts: Vec<Pressed> = KEYS
-            .into_iter()
-            .filter(|(key, _)| self.window.is_key_pressed(*key, KeyRepeat::No))
-            .map(|(_, act)| Pressed::Act(act))
-            .collect();
+        let pressed = |key: Key| self.window.is_key_pressed(key, KeyRepeat::No);
+        let spoken = KEYS.into_iter().filter(|(key, _)| pressed(*key)).map(|(_, act)| act);
+        let driven = DRIVE_KEYS.into_iter().filter(|(pad, row, _)| pressed(*pad) || pressed(*row));
+        let acts: Vec<Pressed> =
+            spoken.chain(driven.map(|(_, _, order)| Act::Drive(order))).map(Pressed::Act).collect();
         let turn = Some(self.turn()).filter(|turn| *turn != [0.0; 2]).map(Pressed::Turn);
         Ok(trigger.into_iter().chain(turn).chain(rezero).chain(acts).chain(ends.then_some(Pressed::Quit)))
     }

@@ -52,6 +52,8 @@ pub struct StepView<'a> {
     pub signals: Option<Signals>,
     /// The sea.
     pub waves: &'a WaveField,
+    /// What the person orders who drives boats.
+    pub driven: Orders,
 }
 
 impl CrewedBoat {
@@ -106,6 +108,7 @@ impl CrewedBoat {
                 signals,
                 keeps_rules: self.keeps_rules,
                 on_target_s: self.on_target_s,
+                driven: view.driven,
             };
             memory = self.plan.decide(&self.craft, &now.drive, &memory, &situation);
         }

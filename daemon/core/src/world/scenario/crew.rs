@@ -43,9 +43,10 @@ enum ActKind {
     Stop,
     Surrender,
     Drift,
+    Driven,
 }
 
-const KINDS: [(&str, ActKind); 13] = [
+const KINDS: [(&str, ActKind); 14] = [
     ("transit", ActKind::Transit),
     ("loiter", ActKind::Loiter),
     ("fish", ActKind::Fish),
@@ -59,6 +60,7 @@ const KINDS: [(&str, ActKind); 13] = [
     ("stop", ActKind::Stop),
     ("surrender", ActKind::Surrender),
     ("drift", ActKind::Drift),
+    ("driven", ActKind::Driven),
 ];
 
 impl ActKind {
@@ -72,7 +74,7 @@ impl ActKind {
             Self::Probe | Self::Feint => &["speed_kn", "turn_m"],
             Self::Attack => &["speed_kn", "stop_m", "rams"],
             Self::Circle => &["speed_kn", "radius_m", "clockwise"],
-            Self::Anchor | Self::Stop | Self::Surrender | Self::Drift => &[],
+            Self::Anchor | Self::Stop | Self::Surrender | Self::Drift | Self::Driven => &[],
         }
     }
 
@@ -236,6 +238,7 @@ fn act(section: &TomlSection<'_>, raw: &RawState) -> Result<(Act, f64), TomlErro
         ActKind::Stop => Act::Stop,
         ActKind::Surrender => Act::Surrender,
         ActKind::Drift => Act::Drift,
+        ActKind::Driven => Act::Driven,
     };
     Ok((act, speed_m_s))
 }

@@ -69,6 +69,8 @@ pub struct Situation<'a> {
     pub keeps_rules: bool,
     /// When it is to be where it attacks from, seconds since the scenario began, as others of its swarm are.
     pub on_target_s: Option<f64>,
+    /// What the person orders who drives boats.
+    pub driven: Orders,
 }
 
 impl Situation<'_> {
@@ -144,7 +146,8 @@ impl CrewPlan {
             };
             wish = self.wish(craft, boat, &mut memory, at);
         }
-        memory.orders = orders(craft, boat, &wish, at);
+        let is_driven = self.states.get(memory.state).is_some_and(|state| state.act == Act::Driven);
+        memory.orders = if is_driven { at.driven } else { orders(craft, boat, &wish, at) };
         memory
     }
 
@@ -186,7 +189,7 @@ impl CrewPlan {
             Act::Fish => fish(boat, memory, at, speed),
             Act::Anchor => Wish { arrived: false, idles: true, stays: true, ..Wish::STOP },
             Act::Drift => Wish { arrived: false, idles: true, ..Wish::STOP },
-            Act::Stop => Wish::STOP,
+            Act::Stop | Act::Driven => Wish::STOP,
             Act::Surrender => Wish { stays: true, ..Wish::STOP },
             Act::Approach { stop_m } | Act::Attack { stop_m: Some(stop_m) } => {
                 let left_m = range_m - stop_m;

@@ -71,6 +71,8 @@ pub enum Act {
     Surrender,
     /// Takes its engine out of gear and goes where that leaves it.
     Drift,
+    /// Does what a person orders.
+    Driven,
 }
 
 /// A way out of a state.
