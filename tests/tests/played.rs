@@ -123,9 +123,19 @@ fn a_boat_that_somebody_drives_sails_as_told_and_replays_the_same() {
         (small_of(&scenario, &script, &out), out)
     });
     assert_ne!(a.0["scenes_digest"], b.0["scenes_digest"], "it sails");
-    let again = bowwave_tests::bowwave(["replay", plain(&a.1.join("recording.mcap"))]);
+    let [a, b] = [a, b].map(|(_, out)| out.join("recording.mcap"));
+    let again = bowwave_tests::bowwave(["replay", plain(&a)]);
     expect_code(&again, 0);
     assert!(said(&again).contains("records and scenes are the same in 150 ticks"), "{}", said(&again));
+    let with_itself = bowwave_tests::bowwave(["replay", plain(&a), "--against", plain(&a)]);
+    expect_code(&with_itself, 0);
+    let apart = bowwave_tests::bowwave(["replay", plain(&a), "--against", plain(&b), "--json"]);
+    expect_code(&apart, 1);
+    let found: Value = serde_json::from_slice(&apart.stdout).expect("JSON on standard output");
+    assert_eq!(found["settings"], Value::Array(Vec::new()), "{found}");
+    assert_eq!(found["input"]["kinds"], serde_json::json!(["act", "act"]), "{found}");
+    assert!(found["input"]["at_s"].as_f64().is_some_and(|s| (0.3..0.7).contains(&s)), "{found}");
+    assert!(said(&apart).contains("s on: another act"), "{}", said(&apart));
 }
 
 #[test]

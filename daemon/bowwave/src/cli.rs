@@ -97,6 +97,9 @@ pub struct RunArgs {
 pub struct ReplayRecording {
     /// Recording of a run (MCAP): made with files.record in the configuration, or by `simulate --record`
     pub recording: PathBuf,
+    /// Say instead where this other run diverges from it: settings, inputs, scenes, rounds, events
+    #[arg(long, value_name = "RECORDING")]
+    pub against: Option<PathBuf>,
     /// Print the result on standard output as JSON
     #[arg(long)]
     pub json: bool,

@@ -1,8 +1,13 @@
-//! `bowwave replay`: does a recording give the records and scenes of the run that it was made in?
+//! `bowwave replay`: does a recording give the records and scenes of the run that it was made in? And where do two runs diverge?
+
+use std::path::Path;
 
 use anyhow::Result;
-use bowwave_core::world::score::ScoreSheet;
-use bowwave_trainer::replay::{Replayed, replay};
+use bowwave_core::{text::one_line, world::score::ScoreSheet};
+use bowwave_trainer::{
+    divergence::{Divergence, RoundDivergence, divergence},
+    replay::{Replayed, replay},
+};
 use serde::Serialize;
 
 use crate::{cli::ReplayRecording, outcome::Outcome, stdout};
@@ -37,6 +42,9 @@ struct ReplaySummary {
 
 /// Replays and tells. Exit code 0: the same; 1: not; 3: the recording does not tell, since not all that the session met is in it.
 pub fn run(arguments: &ReplayRecording) -> Result<Outcome> {
+    if let Some(other) = &arguments.against {
+        return compare(arguments, other);
+    }
     let result = replay(&arguments.recording)?;
     if arguments.json {
         stdout::print_json(&summary(&result))?;
@@ -47,6 +55,54 @@ pub fn run(arguments: &ReplayRecording) -> Result<Outcome> {
         (Some(_), true) => Outcome::Failed,
         (_, false) => Outcome::Partly,
     })
+}
+
+/// Exit code 0: the runs are the same; 1: they are not.
+fn compare(arguments: &ReplayRecording, other: &Path) -> Result<Outcome> {
+    let (_, found) = divergence([&arguments.recording, other])?;
+    if arguments.json {
+        stdout::print_json(&found)?;
+    }
+    eprint!("{}", apart(&found));
+    Ok(if found.is_none() { Outcome::Done } else { Outcome::Failed })
+}
+
+/// Where two runs diverge, in words.
+fn apart(found: &Divergence) -> String {
+    if found.is_none() {
+        return format!("the runs are the same in {} ticks\n", found.ticks);
+    }
+    let mut text = String::new();
+    if !found.settings.is_empty() {
+        text += &format!("settings  {} differ\n", found.settings.join(", "));
+    }
+    match &found.input {
+        None => text += "inputs    are the same\n",
+        Some(input) => {
+            let [one, other] = input.kinds.map(|kind| kind.unwrap_or("end of the run"));
+            let at_s = input.at_s;
+            text += &if one == other {
+                format!("inputs    differ from {at_s:.3} s on: another {one}\n")
+            } else {
+                format!("inputs    differ from {at_s:.3} s on: {one} here, {other} there\n")
+            };
+        }
+    }
+    if let Some(from_s) = found.scenes_from_s {
+        text += &format!("scenes    differ from {from_s:.3} s on\n");
+    }
+    if let Some(RoundDivergence { shot, outcomes: [one, other] }) = &found.round {
+        let (one, other) = (one_line(one), one_line(other));
+        text += &format!("rounds    differ from round {shot} on: {one} here, {other} there\n");
+    }
+    if let Some(event) = &found.event {
+        let told = |i: usize| match (&event.facts[i], event.at_s[i]) {
+            (Some(fact), Some(at_s)) => format!("{at_s:.3} s {}", one_line(fact)),
+            _ => "none".to_owned(),
+        };
+        text += &format!("events    first apart: {} here, {} there\n", told(0), told(1));
+    }
+    text
 }
 
 fn summary(result: &Replayed) -> ReplaySummary {

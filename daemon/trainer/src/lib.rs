@@ -12,6 +12,7 @@
 
 pub mod clock;
 mod companion;
+pub mod divergence;
 pub mod presenter;
 pub mod replay;
 pub mod source;

@@ -11,8 +11,9 @@ use bowwave_core::{
     session::{Digest, Session, SessionDigest, Setup},
     time::Time,
     world::{
+        exercise::ExerciseEvent,
         scenario::Scenario,
-        score::{ScoreFold, ScoreSheet},
+        score::{ScoreFold, ScoreSheet, ShotRecord},
     },
 };
 use bowwave_devices::camera::jpeg::Decoder;
@@ -59,6 +60,11 @@ impl Replayed {
 
 /// Replays `path`. Models of boats that are files are looked for where they lay.
 pub fn replay(path: &Path) -> Result<Replayed> {
+    replay_noting(path, &mut |_, _| {})
+}
+
+/// The same; `note` meets records of rounds and events of the exercise as they come.
+pub fn replay_noting(path: &Path, note: &mut dyn FnMut(&[ShotRecord], &[ExerciseEvent])) -> Result<Replayed> {
     let reader = RecordingReader::open(path)?;
     if reader.counts().ticks == 0 {
         bail!(
@@ -109,6 +115,7 @@ pub fn replay(path: &Path) -> Result<Replayed> {
                 }
                 if let Some(answer) = session.input(&Input::Tick(entry.tick)) {
                     fold.take(answer.records, answer.events);
+                    note(answer.records, answer.events);
                 }
                 result.ticks += 1;
             }
@@ -117,6 +124,7 @@ pub fn replay(path: &Path) -> Result<Replayed> {
     }
     let (records, events) = session.finish();
     fold.take(records, events);
+    note(records, events);
     result.sheet = fold.sheet();
     result.digest = session.digest();
     result.score = session.score();
