@@ -127,6 +127,10 @@ fn a_boat_that_somebody_drives_sails_as_told_and_replays_the_same() {
     let again = bowwave_tests::bowwave(["replay", plain(&a)]);
     expect_code(&again, 0);
     assert!(said(&again).contains("records and scenes are the same in 150 ticks"), "{}", said(&again));
+    let chart = folder.path().join("run.svg");
+    expect_code(&bowwave_tests::bowwave(["replay", plain(&a), "--chart", plain(&chart)]), 0);
+    let svg = fs::read_to_string(&chart).expect("a chart");
+    assert!(svg.contains("as it was sailed, with 0 strikes of rounds") && svg.contains("hulk"), "{svg}");
     let with_itself = bowwave_tests::bowwave(["replay", plain(&a), "--against", plain(&a)]);
     expect_code(&with_itself, 0);
     let apart = bowwave_tests::bowwave(["replay", plain(&a), "--against", plain(&b), "--json"]);

@@ -69,6 +69,35 @@ fn each_wrong_scenario_is_named_by_its_place_and_the_sound_ones_are_still_looked
 }
 
 #[test]
+fn what_is_hardly_meant_is_pointed_out_and_no_built_in_scenario_has_any() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("odd.toml").to_string_lossy().into_owned();
+    let text = "name = \"Odd\"\nduration_s = 60\nbriefing = \"Odd.\"\n[weapon]\nbelt = 0\n[rules]\nengagement = \"free\"\n[goals]\n\
+                keep_off_m = 400\n[[event]]\nat_s = 90\nmessage = \"late\"\n[[call]]\nsay = \"warn\"\nabout = \"a\"\nbefore_m = 350\n\
+                [[boat]]\nname = \"a\"\nmodel = \"skiff\"\ncrew = \"attacker\"\nrange_m = 300\nbearing_deg = 3\non_target_s = 80\n";
+    fs::write(&file, text).expect("a file");
+    let output = bowwave(["scenario", "check", &file]);
+    expect_code(&output, 0);
+    let told = said(&output);
+    for doubt in [
+        "event[1] at 90 s never happens: the scenario ends after 60 s",
+        "call[1] (\"warn\" of \"a\") cannot be in time for \"a\": it begins 300 m off",
+        "\"a\" begins 300 m off, within goals.keep_off_m = 400",
+        "weapon.belt is 0: nobody can fire",
+        "\"a\" is due at 80 s: the scenario ends after 60 s",
+    ] {
+        assert!(told.contains(doubt), "{doubt}\n{told}");
+    }
+    let json = printed(&bowwave(["scenario", "list", "--json"]));
+    let list: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let names: Vec<&str> =
+        list.as_array().expect("a list").iter().filter_map(|e| e["name"].as_str()).collect();
+    let all = bowwave(["scenario", "check"].into_iter().chain(names));
+    expect_code(&all, 0);
+    assert!(!said(&all).contains("look at this"), "{}", said(&all));
+}
+
+#[test]
 fn the_list_has_every_built_in_scenario() {
     let table = printed(&bowwave(["scenario", "list"]));
     let json = printed(&bowwave(["scenario", "list", "--json"]));

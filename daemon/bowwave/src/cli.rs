@@ -98,8 +98,11 @@ pub struct ReplayRecording {
     /// Recording of a run (MCAP): made with files.record in the configuration, or by `simulate --record`
     pub recording: PathBuf,
     /// Say instead where this other run diverges from it: settings, inputs, scenes, rounds, events
-    #[arg(long, value_name = "RECORDING")]
+    #[arg(long, value_name = "RECORDING", conflicts_with = "chart")]
     pub against: Option<PathBuf>,
+    /// Also draw the run from above: the boats' tracks, their crews' states and where rounds struck (SVG)
+    #[arg(long, value_name = "FILE")]
+    pub chart: Option<PathBuf>,
     /// Print the result on standard output as JSON
     #[arg(long)]
     pub json: bool,

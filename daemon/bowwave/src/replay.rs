@@ -3,14 +3,24 @@
 use std::path::Path;
 
 use anyhow::Result;
-use bowwave_core::{text::one_line, world::score::ScoreSheet};
+use bowwave_core::{
+    side::Side,
+    text::one_line,
+    world::score::{Outcome, ScoreSheet},
+};
 use bowwave_trainer::{
     divergence::{Divergence, RoundDivergence, divergence},
-    replay::{Replayed, replay},
+    replay::{Replayed, replay, replay_noting, scenario_of},
 };
 use serde::Serialize;
 
-use crate::{cli::ReplayRecording, outcome::Outcome, stdout};
+use crate::{
+    cli::ReplayRecording,
+    new_file::{refuse_to_replace, write_new},
+    outcome::Outcome as Exit,
+    scenario::{StrikeMark, TrackLog, draw_with},
+    stdout,
+};
 
 #[derive(Debug, Serialize)]
 struct ReplaySummary {
@@ -41,30 +51,60 @@ struct ReplaySummary {
 }
 
 /// Replays and tells. Exit code 0: the same; 1: not; 3: the recording does not tell, since not all that the session met is in it.
-pub fn run(arguments: &ReplayRecording) -> Result<Outcome> {
+pub fn run(arguments: &ReplayRecording) -> Result<Exit> {
     if let Some(other) = &arguments.against {
         return compare(arguments, other);
     }
-    let result = replay(&arguments.recording)?;
+    let result = match &arguments.chart {
+        Some(file) => charted(&arguments.recording, file)?,
+        None => replay(&arguments.recording)?,
+    };
     if arguments.json {
         stdout::print_json(&summary(&result))?;
     }
     eprintln!("{}", words(&result));
     Ok(match (result.differs_from, result.is_complete()) {
-        (None, true) => Outcome::Done,
-        (Some(_), true) => Outcome::Failed,
-        (_, false) => Outcome::Partly,
+        (None, true) => Exit::Done,
+        (Some(_), true) => Exit::Failed,
+        (_, false) => Exit::Partly,
     })
 }
 
+/// Replays, and draws the run from above.
+fn charted(recording: &Path, file: &Path) -> Result<Replayed> {
+    refuse_to_replace(file, false)?;
+    let (mut log, mut strikes, mut seconds) = (TrackLog::default(), Vec::new(), 0.0);
+    let result = replay_noting(recording, &mut |world, records, _| {
+        let Some(running) = world.running() else { return };
+        seconds = running.now.secs_since(running.start);
+        while log.next_second() as f64 <= seconds {
+            log.note(&running.fleet);
+        }
+        for record in records {
+            let Outcome::Hit { boat, side, time, .. } = &record.outcome else { continue };
+            let struck = (0..running.fleet.len()).find(|i| running.fleet.name(*i) == boat);
+            let at = struck.and_then(|boat| running.fleet.pose(boat, *time));
+            strikes.extend(at.map(|pose| StrikeMark {
+                at: pose.position.truncate(),
+                side: side.unwrap_or(Side::Hostile),
+            }));
+        }
+    })?;
+    let scenario = scenario_of(recording)?;
+    let words = format!("as it was sailed, with {} strikes of rounds", strikes.len());
+    write_new(file, &draw_with(&scenario, &log.tracks(), seconds, &words, &strikes))?;
+    eprintln!("{}: the run from above; open it in a browser", file.display());
+    Ok(result)
+}
+
 /// Exit code 0: the runs are the same; 1: they are not.
-fn compare(arguments: &ReplayRecording, other: &Path) -> Result<Outcome> {
+fn compare(arguments: &ReplayRecording, other: &Path) -> Result<Exit> {
     let (_, found) = divergence([&arguments.recording, other])?;
     if arguments.json {
         stdout::print_json(&found)?;
     }
     eprint!("{}", apart(&found));
-    Ok(if found.is_none() { Outcome::Done } else { Outcome::Failed })
+    Ok(if found.is_none() { Exit::Done } else { Exit::Failed })
 }
 
 /// Where two runs diverge, in words.

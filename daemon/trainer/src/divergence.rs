@@ -86,7 +86,7 @@ pub fn divergence(paths: [&Path; 2]) -> Result<(Replayed, Divergence)> {
     let mut outputs = [RunOutput::default(), RunOutput::default()];
     let mut first = None;
     for (path, output) in paths.iter().zip(&mut outputs) {
-        let replayed = replay_noting(path, &mut |records, events| {
+        let replayed = replay_noting(path, &mut |_, records, events| {
             output.records.extend_from_slice(records);
             output.events.extend_from_slice(events);
         })?;

@@ -11,6 +11,7 @@ use bowwave_core::{
     session::{Digest, Session, SessionDigest, Setup},
     time::Time,
     world::{
+        World,
         exercise::ExerciseEvent,
         scenario::Scenario,
         score::{ScoreFold, ScoreSheet, ShotRecord},
@@ -60,11 +61,14 @@ impl Replayed {
 
 /// Replays `path`. Models of boats that are files are looked for where they lay.
 pub fn replay(path: &Path) -> Result<Replayed> {
-    replay_noting(path, &mut |_, _| {})
+    replay_noting(path, &mut |_, _, _| {})
 }
 
-/// The same; `note` meets records of rounds and events of the exercise as they come.
-pub fn replay_noting(path: &Path, note: &mut dyn FnMut(&[ShotRecord], &[ExerciseEvent])) -> Result<Replayed> {
+/// The same; `note` meets the world with the records of rounds and the events of the exercise that each tick gave.
+pub fn replay_noting(
+    path: &Path,
+    note: &mut dyn FnMut(&World, &[ShotRecord], &[ExerciseEvent]),
+) -> Result<Replayed> {
     let reader = RecordingReader::open(path)?;
     if reader.counts().ticks == 0 {
         bail!(
@@ -114,8 +118,9 @@ pub fn replay_noting(path: &Path, note: &mut dyn FnMut(&[ShotRecord], &[Exercise
                     result.differs_from.get_or_insert(entry.tick.time);
                 }
                 if let Some(answer) = session.input(&Input::Tick(entry.tick)) {
-                    fold.take(answer.records, answer.events);
-                    note(answer.records, answer.events);
+                    let (records, events) = (answer.records.to_vec(), answer.events.to_vec());
+                    fold.take(&records, &events);
+                    note(session.world(), &records, &events);
                 }
                 result.ticks += 1;
             }
@@ -123,8 +128,9 @@ pub fn replay_noting(path: &Path, note: &mut dyn FnMut(&[ShotRecord], &[Exercise
         result.inputs += 1;
     }
     let (records, events) = session.finish();
-    fold.take(records, events);
-    note(records, events);
+    let (records, events) = (records.to_vec(), events.to_vec());
+    fold.take(&records, &events);
+    note(session.world(), &records, &events);
     result.sheet = fold.sheet();
     result.digest = session.digest();
     result.score = session.score();
@@ -214,6 +220,18 @@ fn models_digest(models: &[Model]) -> String {
     format!("{:016x}", digest.get())
 }
 
+/// The scenario that the run at `path` played.
+pub fn scenario_of(path: &Path) -> Result<Scenario> {
+    scenario_in(RecordingReader::open(path)?.properties(), path)
+}
+
+fn scenario_in(properties: &Properties, path: &Path) -> Result<Scenario> {
+    let origin = path.display();
+    let toml =
+        properties.scenario_toml.as_deref().with_context(|| format!("{origin}: it holds no scenario"))?;
+    Ok(Scenario::parse(toml, &format!("{origin} (its scenario)"))?)
+}
+
 /// A session's settings out of its recording.
 fn setup_of(properties: &Properties, path: &Path) -> Result<Setup> {
     let origin = path.display();
@@ -232,9 +250,7 @@ fn setup_of(properties: &Properties, path: &Path) -> Result<Setup> {
     let format = text("format")?;
     anyhow::ensure!(format == FORMAT, wrong("format", format));
     let file = parse(&properties.calibration_toml, &format!("{origin} (its calibration)"))?;
-    let scenario_toml =
-        properties.scenario_toml.as_deref().with_context(|| format!("{origin}: it holds no scenario"))?;
-    let mut scenario = Scenario::parse(scenario_toml, &format!("{origin} (its scenario)"))?;
+    let mut scenario = scenario_in(properties, path)?;
     let seed = text("seed")?;
     scenario.seed = seed.parse().with_context(|| wrong("seed", seed))?;
     scenario.eye_height_m = number("eye_height_m")?;

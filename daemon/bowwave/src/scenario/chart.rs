@@ -16,8 +16,28 @@ const MARGIN: f64 = 20.0;
 /// Seconds from dot to dot on a track.
 const DOTS_S: usize = 30;
 
-/// The picture as SVG.
+/// A place on the chart where a round struck a boat.
+#[derive(Clone, Copy, Debug)]
+pub struct StrikeMark {
+    /// World x and y, metres.
+    pub at: DVec2,
+    /// Whose boat it was.
+    pub side: Side,
+}
+
+/// The picture of what boats do while nobody fires, as SVG.
 pub fn draw(scenario: &Scenario, tracks: &[Track], seconds: f64) -> String {
+    draw_with(scenario, tracks, seconds, "while nobody fires", &[])
+}
+
+/// The picture of `what` happened, with the strikes of rounds, as SVG.
+pub fn draw_with(
+    scenario: &Scenario,
+    tracks: &[Track],
+    seconds: f64,
+    what: &str,
+    strikes: &[StrikeMark],
+) -> String {
     let height = MARGIN + 40.0 + CHART + 60.0 + LINE * tracks.len() as f64 + MARGIN;
     let size = format!("0 0 {WIDTH} {height:.0}");
     let picture = html! {
@@ -25,19 +45,19 @@ pub fn draw(scenario: &Scenario, tracks: &[Track], seconds: f64) -> String {
             font-family="sans-serif" font-size="12" {
             rect width="100%" height="100%" fill="#f4f7f9" {}
             text x=(MARGIN) y="26" font-size="18" font-weight="bold" { (scenario.name) }
-            text x=(MARGIN) y="46" { (caption(scenario, tracks, seconds)) }
-            (chart(tracks))
+            text x=(MARGIN) y="46" { (caption(scenario, tracks, seconds, what)) }
+            (chart(tracks, strikes))
             (timeline(tracks, seconds))
         }
     };
     picture.into_string() + "\n"
 }
 
-fn caption(scenario: &Scenario, tracks: &[Track], seconds: f64) -> String {
+fn caption(scenario: &Scenario, tracks: &[Track], seconds: f64, what: &str) -> String {
     let neutral = tracks.iter().filter(|t| t.side == Side::Neutral).count();
     let wind = scenario.waves.wind_from.to_degrees().rem_euclid(360.0);
     format!(
-        "{} hostile (red) and {neutral} neutral (blue) boats, {seconds:.0} s while nobody fires, wind force {} from {wind:.0} degrees, \
+        "{} hostile (red) and {neutral} neutral (blue) boats, {seconds:.0} s {what}, wind force {} from {wind:.0} degrees, \
          visibility {:.0} km",
         tracks.len() - neutral,
         scenario.water.force.get(),
@@ -53,7 +73,7 @@ fn colour(side: Side) -> &'static str {
 }
 
 /// The chart: bearing 0 is up, the gun is in the middle.
-fn chart(tracks: &[Track]) -> Markup {
+fn chart(tracks: &[Track], strikes: &[StrikeMark]) -> Markup {
     let farthest = tracks.iter().flat_map(|t| &t.states).map(|s| s.position.abs().max_element());
     let reach_m = farthest.fold(100.0, f64::max) * 1.08;
     let scale = CHART / 2.0 / reach_m;
@@ -75,6 +95,11 @@ fn chart(tracks: &[Track]) -> Markup {
             circle cx=(middle.x) cy=(middle.y) r="6" fill="#333" {}
             text x=(px(middle.x + 9.0)) y=(px(middle.y + 4.0)) { "gun" }
             @for track in tracks { (drawn(track, &place)) }
+            @for strike in strikes {
+                @let DVec2 { x, y } = place(strike.at);
+                path d=(format!("M{:.1},{:.1} l6,6 m0,-6 l-6,6", x - 3.0, y - 3.0)) fill="none"
+                    stroke=(if strike.side == Side::Neutral { "#1f5fa8" } else { "#111" }) stroke-width="1.2" {}
+            }
         }
     }
 }

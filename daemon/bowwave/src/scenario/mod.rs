@@ -1,8 +1,14 @@
 //! `bowwave scenario`: an instructor's work on scenarios before they are played.
 
 mod chart;
+mod doubts;
 mod rehearsal;
 mod schema;
+
+pub use self::{
+    chart::{StrikeMark, draw_with},
+    rehearsal::TrackLog,
+};
 
 use anyhow::Result;
 use bowwave_core::world::{
@@ -110,6 +116,9 @@ fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
                     "{}: \"{}\" is sound: {} hostile and {} neutral boats, {} with crews\n",
                     l.name, l.title, l.hostile, l.neutral, l.crewed
                 ))?;
+                for doubt in doubts::of(&loaded.scenario) {
+                    eprintln!("{}: look at this: {}", l.name, bowwave_core::text::one_line(&doubt));
+                }
             }
             Err(e) => {
                 eprintln!("bowwave: {}", bowwave_core::text::one_line(&format!("{e:#}")));

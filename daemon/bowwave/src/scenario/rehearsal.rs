@@ -33,21 +33,32 @@ impl Track {
     }
 }
 
-/// The tracks of all boats over so many seconds, while nobody fires.
-pub fn tracks(scenario: &Scenario, models: Vec<Model>, of_boats: &[ModelId], seconds: f64) -> Vec<Track> {
-    let start = Time::from_ns(0);
-    let models: Arc<[Model]> = models.into();
-    let mut fleet = Fleet::of_scenario(scenario, models, of_boats, start);
-    let track = |boat: usize| Track {
-        name: fleet.name(boat).to_owned(),
-        side: fleet.side(boat).unwrap_or(Side::Hostile),
-        states: Vec::new(),
-        crew: Vec::new(),
-    };
-    let mut tracks: Vec<Track> = (0..fleet.len()).map(track).collect();
-    for second in 0..=seconds.ceil() as usize {
-        fleet.follow(start.plus_secs(second as f64));
-        for (boat, track) in tracks.iter_mut().enumerate() {
+/// The tracks of all boats of a fleet, as they become known.
+#[derive(Debug, Default)]
+pub struct TrackLog {
+    tracks: Vec<Track>,
+    noted: usize,
+}
+
+impl TrackLog {
+    /// The second that is to be noted next, since the scenario began.
+    pub const fn next_second(&self) -> usize {
+        self.noted
+    }
+
+    /// Notes where the boats are at the next second, up to which the fleet was followed.
+    pub fn note(&mut self, fleet: &Fleet) {
+        if self.tracks.is_empty() {
+            let track = |boat: usize| Track {
+                name: fleet.name(boat).to_owned(),
+                side: fleet.side(boat).unwrap_or(Side::Hostile),
+                states: Vec::new(),
+                crew: Vec::new(),
+            };
+            self.tracks = (0..fleet.len()).map(track).collect();
+        }
+        let second = self.noted;
+        for (boat, track) in self.tracks.iter_mut().enumerate() {
             let Some(history) = fleet.history(boat) else { continue };
             track.states.push(history.state(second as f64));
             if let Some(state) = fleet.crew_state(boat)
@@ -56,6 +67,24 @@ pub fn tracks(scenario: &Scenario, models: Vec<Model>, of_boats: &[ModelId], sec
                 track.crew.push((second, state.to_owned()));
             }
         }
+        self.noted += 1;
     }
-    tracks
+
+    /// What was noted.
+    pub fn tracks(self) -> Vec<Track> {
+        self.tracks
+    }
+}
+
+/// The tracks of all boats over so many seconds, while nobody fires.
+pub fn tracks(scenario: &Scenario, models: Vec<Model>, of_boats: &[ModelId], seconds: f64) -> Vec<Track> {
+    let start = Time::from_ns(0);
+    let models: Arc<[Model]> = models.into();
+    let mut fleet = Fleet::of_scenario(scenario, models, of_boats, start);
+    let mut log = TrackLog::default();
+    for second in 0..=seconds.ceil() as usize {
+        fleet.follow(start.plus_secs(second as f64));
+        log.note(&fleet);
+    }
+    log.tracks()
 }

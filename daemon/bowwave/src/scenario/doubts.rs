@@ -1,0 +1,118 @@
+//! What is allowed in a scenario and yet hardly meant: things that never happen, or cannot be met.
+
+use bowwave_core::world::{
+    boats::Behaviour,
+    exercise::{About, HappeningCause},
+    scenario::{BoatSpec, Scenario, Side},
+};
+
+/// Sentences about what an instructor may want to look at.
+pub fn of(scenario: &Scenario) -> Vec<String> {
+    let mut doubts = Vec::new();
+    timeline(scenario, &mut doubts);
+    calls(scenario, &mut doubts);
+    goals(scenario, &mut doubts);
+    weapon(scenario, &mut doubts);
+    swarms(scenario, &mut doubts);
+    doubts
+}
+
+fn range_m(boat: &BoatSpec) -> f64 {
+    boat.behaviour.begin().position.length()
+}
+
+fn covered<'a>(scenario: &'a Scenario, about: &'a About) -> impl Iterator<Item = &'a BoatSpec> {
+    scenario.boats.iter().filter(|boat| about.covers(&boat.name, boat.side))
+}
+
+fn named(about: &About) -> String {
+    match about {
+        About::Side(side) => format!("{} boats", side.name()),
+        About::Name(name) => format!("\"{name}\""),
+    }
+}
+
+fn timeline(scenario: &Scenario, doubts: &mut Vec<String>) {
+    for (i, happening) in scenario.exercise.happenings.iter().enumerate() {
+        let event = format!("event[{}]", i + 1);
+        match &happening.cause {
+            HappeningCause::At(at_s) => {
+                if let Some(end_s) = scenario.duration_s.filter(|end_s| at_s >= end_s) {
+                    doubts.push(format!(
+                        "{event} at {at_s} s never happens: the scenario ends after {end_s} s"
+                    ));
+                }
+            }
+            HappeningCause::Within(about, metres) => {
+                let near = covered(scenario, about).find(|boat| range_m(boat) <= *metres);
+                if let Some(boat) = near {
+                    let m = range_m(boat);
+                    doubts.push(format!(
+                        "{event} happens at once: \"{}\" begins {m:.0} m off, within {metres} m",
+                        boat.name
+                    ));
+                }
+            }
+            HappeningCause::Struck(_) => {}
+        }
+    }
+}
+
+fn calls(scenario: &Scenario, doubts: &mut Vec<String>) {
+    for (i, call) in scenario.exercise.calls.iter().enumerate() {
+        let what = format!("call[{}] (\"{}\" of {})", i + 1, call.call.name(), named(&call.about));
+        let nearer = call.before_m.and_then(|m| covered(scenario, &call.about).find(|b| range_m(b) <= m));
+        if let (Some(boat), Some(before_m)) = (nearer, call.before_m) {
+            let m = range_m(boat);
+            doubts.push(format!(
+                "{what} cannot be in time for \"{}\": it begins {m:.0} m off, and is to be called before {before_m} m",
+                boat.name
+            ));
+        }
+        if let (Some(within_s), Some(end_s)) = (call.within_s, scenario.duration_s)
+            && within_s > end_s
+        {
+            doubts.push(format!("{what} may be made in {within_s} s: the scenario ends after {end_s} s"));
+        }
+    }
+}
+
+fn goals(scenario: &Scenario, doubts: &mut Vec<String>) {
+    let goals = &scenario.exercise.goals;
+    let hostile: Vec<&BoatSpec> = scenario.boats.iter().filter(|b| b.side == Side::Hostile).collect();
+    // Without an exercise nobody is to be kept off.
+    let is_exercise = scenario.exercise.briefing.is_some() || scenario.exercise.rules.is_some();
+    if let Some(boat) = hostile.iter().find(|boat| is_exercise && range_m(boat) < goals.keep_off_m) {
+        let (name, m, keep_off_m) = (&boat.name, range_m(boat), goals.keep_off_m);
+        doubts.push(format!("\"{name}\" begins {m:.0} m off, within goals.keep_off_m = {keep_off_m}"));
+    }
+}
+
+fn weapon(scenario: &Scenario, doubts: &mut Vec<String>) {
+    let weapon = &scenario.weapon;
+    if weapon.belt == 0 {
+        doubts.push("weapon.belt is 0: nobody can fire".to_owned());
+    }
+    if let Some(every) = weapon.stoppage_every.filter(|every| *every < 5.0) {
+        doubts.push(format!("weapon.stoppage_every = {every}: the weapon hardly fires a burst"));
+    }
+}
+
+fn swarms(scenario: &Scenario, doubts: &mut Vec<String>) {
+    for boat in &scenario.boats {
+        let Behaviour::Crewed(start) = &boat.behaviour else { continue };
+        let Some(due_s) = start.on_target_s else { continue };
+        let name = &boat.name;
+        if let Some(end_s) = scenario.duration_s.filter(|end_s| due_s > *end_s) {
+            doubts.push(format!("\"{name}\" is due at {due_s} s: the scenario ends after {end_s} s"));
+        }
+        let reach_m = due_s * start.speed_max_m_s;
+        if range_m(boat) > reach_m + 200.0 {
+            doubts.push(format!(
+                "\"{name}\" cannot be there at {due_s} s: it begins {:.0} m off and makes {:.0} kn",
+                range_m(boat),
+                start.speed_max_m_s * 3600.0 / 1852.0
+            ));
+        }
+    }
+}
