@@ -17,6 +17,10 @@ pub fn of(scenario: &Scenario) -> Vec<String> {
     doubts
 }
 
+fn is_exercise(scenario: &Scenario) -> bool {
+    scenario.exercise.briefing.is_some() || scenario.exercise.rules.is_some()
+}
+
 fn range_m(boat: &BoatSpec) -> f64 {
     boat.behaviour.begin().position.length()
 }
@@ -81,8 +85,8 @@ fn goals(scenario: &Scenario, doubts: &mut Vec<String>) {
     let goals = &scenario.exercise.goals;
     let hostile: Vec<&BoatSpec> = scenario.boats.iter().filter(|b| b.side == Side::Hostile).collect();
     // Without an exercise nobody is to be kept off.
-    let is_exercise = scenario.exercise.briefing.is_some() || scenario.exercise.rules.is_some();
-    if let Some(boat) = hostile.iter().find(|boat| is_exercise && range_m(boat) < goals.keep_off_m) {
+    let is_asked = is_exercise(scenario);
+    if let Some(boat) = hostile.iter().find(|boat| is_asked && range_m(boat) < goals.keep_off_m) {
         let (name, m, keep_off_m) = (&boat.name, range_m(boat), goals.keep_off_m);
         doubts.push(format!("\"{name}\" begins {m:.0} m off, within goals.keep_off_m = {keep_off_m}"));
     }
@@ -90,7 +94,7 @@ fn goals(scenario: &Scenario, doubts: &mut Vec<String>) {
 
 fn weapon(scenario: &Scenario, doubts: &mut Vec<String>) {
     let weapon = &scenario.weapon;
-    if weapon.belt == 0 {
+    if weapon.belt == 0 && is_exercise(scenario) {
         doubts.push("weapon.belt is 0: nobody can fire".to_owned());
     }
     if let Some(every) = weapon.stoppage_every.filter(|every| *every < 5.0) {
