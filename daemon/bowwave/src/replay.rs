@@ -1,6 +1,6 @@
 //! `bowwave replay`: does a recording give the records and scenes of the run that it was made in? And where do two runs diverge?
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use bowwave_core::{
@@ -97,14 +97,29 @@ fn charted(recording: &Path, file: &Path) -> Result<Replayed> {
     Ok(result)
 }
 
-/// Exit code 0: the runs are the same; 1: they are not.
-fn compare(arguments: &ReplayRecording, other: &Path) -> Result<Exit> {
-    let (_, found) = divergence([&arguments.recording, other])?;
+/// Exit code 0: the runs are the same; 1: they are not; 3: a recording does not tell what its run met.
+fn compare(arguments: &ReplayRecording, other: &PathBuf) -> Result<Exit> {
+    let (replays, found) = divergence([&arguments.recording, other])?;
     if arguments.json {
         stdout::print_json(&found)?;
     }
     eprint!("{}", apart(&found));
-    Ok(if found.is_none() { Exit::Done } else { Exit::Failed })
+    let mut is_told = true;
+    for (path, replayed) in [&arguments.recording, other].into_iter().zip(&replays) {
+        if !replayed.is_complete() || replayed.differs_from.is_some() {
+            is_told = false;
+            let words = words(replayed);
+            eprintln!(
+                "{}: its replay is not that run, so that rounds and events may be others: {words}",
+                path.display()
+            );
+        }
+    }
+    Ok(match (found.is_none(), is_told) {
+        (_, false) => Exit::Partly,
+        (true, true) => Exit::Done,
+        (false, true) => Exit::Failed,
+    })
 }
 
 /// Where two runs diverge, in words.

@@ -1,6 +1,6 @@
 //! Models of boats, their looks and the parts that can be hit: plain data, filled by the model loader.
 
-use glam::{DVec2, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// Index of a model in the list that a session and the renderer were both made with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -100,6 +100,18 @@ impl Model {
     /// Length over all, metres.
     pub fn length_m(&self) -> f64 {
         f64::from(self.max.x - self.min.x)
+    }
+
+    /// Middle of helm and helmsman; of the whole where no part is one. Metres, the boat's space.
+    pub fn helm_middle(&self) -> DVec3 {
+        let helm = self.parts.iter().filter(|part| part.zone == Zone::Helm);
+        let corners = helm.flat_map(|part| part.indices.clone());
+        let places = corners.filter_map(|i| {
+            let corner = *self.indices.get(usize::try_from(i).ok()?)?;
+            Some(self.vertices.get(usize::try_from(corner).ok()?)?.position.as_dvec3())
+        });
+        let (sum, count) = places.fold((DVec3::ZERO, 0.0), |(sum, count), at| (sum + at, count + 1.0));
+        if count > 0.0 { sum / count } else { 0.5 * (self.min + self.max).as_dvec3() }
     }
 
     /// Greatest beam, metres.

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bowwave_core::{
+    event::ShipSample,
     session::Digest,
     time::Time,
     world::{
@@ -13,6 +14,7 @@ use bowwave_core::{
 };
 use bowwave_record::{Entry, Properties, RecordError, RecordingReader};
 use serde::Serialize;
+use sha2::{Digest as _, Sha256};
 
 use crate::replay::{Replayed, replay_noting};
 
@@ -79,24 +81,24 @@ struct RunOutput {
     events: Vec<ExerciseEvent>,
 }
 
-/// Compares two runs, of which the first was replayed as `a`.
-pub fn divergence(paths: [&Path; 2]) -> Result<(Replayed, Divergence)> {
+/// Compares two runs; the replay of each as well, which tells whether it is that run.
+pub fn divergence(paths: [&Path; 2]) -> Result<(Vec<Replayed>, Divergence)> {
     let mut found = Divergence::default();
     let starts = inputs(paths, &mut found)?;
     let mut outputs = [RunOutput::default(), RunOutput::default()];
-    let mut first = None;
+    let mut replays = Vec::new();
     for (path, output) in paths.iter().zip(&mut outputs) {
         let replayed = replay_noting(path, &mut |_, records, events| {
             output.records.extend_from_slice(records);
             output.events.extend_from_slice(events);
         })?;
-        first.get_or_insert(replayed);
+        replays.push(replayed);
     }
     let [a, b] = &mut outputs;
     [&mut *a, &mut *b].into_iter().for_each(|run| run.records.sort_by_key(|record| record.shot));
     found.round = rounds(&a.records, &b.records);
     found.event = events(&a.events, &b.events, starts);
-    Ok((first.context("a run was replayed")?, found))
+    Ok((replays, found))
 }
 
 /// Compares settings, inputs and the digests that were recorded; the first tick of either.
@@ -135,6 +137,14 @@ fn inputs(paths: [&Path; 2], found: &mut Divergence) -> Result<[Time; 2]> {
             break;
         }
     }
+    // Events count from a run's first tick, which may come after what differs.
+    for run in 0..2 {
+        while ticks[run].is_none()
+            && let Some(met) = next(&mut entries[run], starts[run])?
+        {
+            ticks[run] = met.tick.map(|(time, ..)| time);
+        }
+    }
     Ok([0, 1].map(|run| ticks[run].unwrap_or(starts[run])))
 }
 
@@ -166,11 +176,18 @@ fn next(
                 "sample of the inertial unit"
             }
             Entry::Frame(frame) => {
-                digest.take(&(frame.sequence, &frame.jpeg));
+                digest.take(&(frame.sequence, Sha256::digest(&frame.jpeg)));
                 "picture"
             }
             Entry::Picture(picture) => {
-                digest.take(picture);
+                let seen = &picture.picture;
+                let size = (seen.format(), seen.width(), seen.height());
+                digest.take(&(
+                    picture.sequence,
+                    since(picture.mid_exposure),
+                    size,
+                    Sha256::digest(seen.bytes()),
+                ));
                 "picture"
             }
             Entry::Trigger(edge) => {
@@ -186,11 +203,12 @@ fn next(
                 "act"
             }
             Entry::ShipValues(sample) => {
-                digest.take(sample);
+                digest.take(&ShipSample { arrival: Time::from_ns(since(sample.arrival)), ..*sample });
                 "sample of the ship"
             }
             Entry::Fault(fault) => {
-                digest.take(&fault.change);
+                let change = &fault.change;
+                digest.take(&(since(change.time), change.fault, &change.change));
                 "fault"
             }
             Entry::Tick(entry) => {

@@ -64,11 +64,11 @@ pub fn replay(path: &Path) -> Result<Replayed> {
     replay_noting(path, &mut |_, _, _| {})
 }
 
-/// The same; `note` meets the world with the records of rounds and the events of the exercise that each tick gave.
-pub fn replay_noting(
-    path: &Path,
-    note: &mut dyn FnMut(&World, &[ShotRecord], &[ExerciseEvent]),
-) -> Result<Replayed> {
+/// Meets the world with the records of rounds and the events of the exercise that a tick gave.
+pub type TickNote<'a> = dyn FnMut(&World, &[ShotRecord], &[ExerciseEvent]) + 'a;
+
+/// The same; `note` is called after each tick and at the end.
+pub fn replay_noting(path: &Path, note: &mut TickNote<'_>) -> Result<Replayed> {
     let reader = RecordingReader::open(path)?;
     if reader.counts().ticks == 0 {
         bail!(

@@ -128,7 +128,7 @@ fn prepare(
     let calibration = live::calibration(recipe);
     let calibration_toml = to_toml(&calibration);
     let properties = live::properties(recipe, &calibration, &arguments.aim);
-    // Somebody who aims sees; others are watched where that is asked for.
+    // Somebody who aims sees; others are watched where that is asked for. Without a clock nobody's keys have a time.
     let is_mouse = matches!(aimer, Aimer::Mouse);
     PreparedRun {
         source: properties.source.clone(),
@@ -137,7 +137,11 @@ fn prepare(
         calibration_toml,
         models_base: base,
         window: is_mouse || desk::shows_window(desk_args, &config),
-        seat: if is_mouse { Seat::Gunner } else { Seat::Watcher },
+        seat: match (is_mouse, arguments.fast) {
+            (true, _) => Seat::Gunner,
+            (false, true) => Seat::Watcher,
+            (false, false) => Seat::Driver,
+        },
         record: desk_args.record || config.files.record,
         setup: Setup {
             scenario: loaded.scenario,

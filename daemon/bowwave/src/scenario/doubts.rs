@@ -1,7 +1,7 @@
 //! What is allowed in a scenario and yet hardly meant: things that never happen, or cannot be met.
 
 use bowwave_core::world::{
-    boats::Behaviour,
+    boats::{Act, Behaviour, CrewState},
     exercise::{About, HappeningCause},
     scenario::{BoatSpec, Scenario, Side},
 };
@@ -110,12 +110,26 @@ fn swarms(scenario: &Scenario, doubts: &mut Vec<String>) {
         if let Some(end_s) = scenario.duration_s.filter(|end_s| due_s > *end_s) {
             doubts.push(format!("\"{name}\" is due at {due_s} s: the scenario ends after {end_s} s"));
         }
-        let reach_m = due_s * start.speed_max_m_s;
-        if range_m(boat) > reach_m + 200.0 {
+        let goes = |state: &CrewState| match state.act {
+            Act::Approach { stop_m } | Act::Attack { stop_m: Some(stop_m) } => {
+                Some((state.speed_m_s, stop_m))
+            }
+            Act::Attack { stop_m: None } => Some((state.speed_m_s, 0.0)),
+            _ => None,
+        };
+        let fastest = start.plan.states.iter().filter_map(goes).max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((speed_m_s, stop_m)) = fastest else {
+            doubts
+                .push(format!("\"{name}\" is due at {due_s} s, and its crew neither approaches nor attacks"));
+            continue;
+        };
+        let speed_m_s = speed_m_s.min(start.speed_max_m_s);
+        let needs_s = (range_m(boat) - stop_m) / speed_m_s.max(0.1);
+        if needs_s > due_s {
             doubts.push(format!(
-                "\"{name}\" cannot be there at {due_s} s: it begins {:.0} m off and makes {:.0} kn",
+                "\"{name}\" cannot be there at {due_s} s: it begins {:.0} m off and needs {needs_s:.0} s at {:.0} kn",
                 range_m(boat),
-                start.speed_max_m_s * 3600.0 / 1852.0
+                speed_m_s * 3600.0 / 1852.0
             ));
         }
     }

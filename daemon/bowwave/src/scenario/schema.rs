@@ -180,6 +180,10 @@ fn weapon() -> Value {
             ("barrel_cooling_s", number(1.0, 1e5, "Time constant with which the barrel cools")),
             ("barrel_hot_k", number(1.0, 2000.0, "Rise above which rounds scatter more")),
             (
+                "hole_cm2",
+                number(0.0, 10_000.0, "Area that a round opens in a hull, where it goes in and out"),
+            ),
+            (
                 "fragments_m",
                 number(0.0, 30.0, "Where half of the people in the open are struck; 0: solid rounds"),
             ),

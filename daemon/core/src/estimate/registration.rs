@@ -12,6 +12,7 @@
 
 mod means;
 mod misfit;
+mod swing;
 #[cfg(test)]
 mod tests;
 mod unit;
@@ -21,6 +22,7 @@ use glam::{DMat3, DQuat, DVec3};
 pub use self::misfit::Misfit;
 use self::{
     means::{MeanOff, MeanSway, SEA_RATE, SeaDrift, TurnCost},
+    swing::SwingTest,
     unit::{LEANS_MOST, UP_SIGMA, UnitWatch},
 };
 use super::{
@@ -155,10 +157,14 @@ impl Hypothesis {
 
     /// Tests whether it can be what is wrong. Late pictures show in turns as well as in the vertical, which a ship's turn tilts to and fro
     /// in a seaway as late pictures would.
-    fn may_be_believed(&self) -> bool {
-        /// Evidence of turns that it needs, nats.
-        const LATE_BY_TURNS: f64 = 1.0;
-        !self.is_doubt && (!matches!(self.misfit, Misfit::Late(_)) || self.by_turns >= LATE_BY_TURNS)
+    fn may_be_believed(&self, swing: &SwingTest) -> bool {
+        /// Evidence of turns that it needs, nats: enough alone.
+        const LATE_BY_TURNS: f64 = 10.0;
+        match self.misfit {
+            Misfit::Late(_) => self.by_turns >= LATE_BY_TURNS,
+            Misfit::Mount => !self.is_doubt && swing.may_be_camera(),
+            _ => true,
+        }
     }
 
     /// Takes in an observation by rates in another unit, which make a gun that moves at all a fast one: while none is believed to be, an
@@ -211,6 +217,7 @@ pub(super) struct Registration {
     was_shared: bool,
     hypotheses: Vec<Hypothesis>,
     own_sway: MeanSway,
+    swing: SwingTest,
     /// When up was last seen, and how often since it was not for a while.
     up_seen: Option<Time>,
     sights: u32,
@@ -247,6 +254,7 @@ impl Registration {
             was_shared: false,
             hypotheses: hypotheses(DMat3::from_quat(camera_from_imu)),
             own_sway: MeanSway::NOTHING,
+            swing: SwingTest::default(),
             up_seen: None,
             sights: 0,
             turn_cost: TurnCost::default(),
@@ -361,6 +369,7 @@ impl Registration {
         self.count_sight(time);
         let sway_sigma = self.unit.sway_sigma(self.own_sway.mean.length());
         let sway = cost(self.own_sway.take_apart(off), sway_sigma);
+        self.swing.take(own, off, self.unit.heading());
         if up.is_predicted && off.length() < 3.0 * UP_SIGMA {
             self.checked = Some(time);
         }
@@ -420,6 +429,7 @@ impl Registration {
         if self.up_seen.replace(time).is_none_or(|last| time.secs_since(last) > GAP_S) {
             self.sights = 1;
             self.own_sway = MeanSway::NOTHING;
+            self.swing.pause();
             for hypothesis in &mut self.hypotheses {
                 if let UpExpected::Then(mean) = &mut hypothesis.up {
                     *mean = MeanSway::NOTHING;
@@ -435,7 +445,10 @@ impl Registration {
         const LIMIT_OTHER: f64 = 2.0;
         /// No sum goes beyond this, so that a belief ends soon after its cause.
         const SUM_MOST: f64 = 60.0;
-        let told = |h: &&Hypothesis| h.may_be_believed();
+        // What is believed may be so until its sum says otherwise.
+        let told = |h: &&Hypothesis| {
+            Some(h.misfit) == self.believed && !h.is_doubt || h.may_be_believed(&self.swing)
+        };
         let most = self.hypotheses.iter().filter(told).map(|h| h.sum).fold(0.0, f64::max);
         // What is ahead stays ahead.
         let beyond = (most - SUM_MOST).max(0.0);

@@ -52,7 +52,7 @@ impl Eye {
 
     fn sight(&self, running: &RunningWorld, boat: usize) -> Option<Sighted> {
         let RunningWorld { fleet, now, start, .. } = running;
-        let at = fleet.middle(boat, *now)?;
+        let at = fleet.middle(boat, *now).filter(|_| fleet.swims(boat, *now))?;
         let history = fleet.history(boat)?;
         let velocity = history.state(now.secs_since(*start)).velocity().extend(0.0);
         let (range_m, length_m) = (at.distance(self.at), history.hull().length_m);

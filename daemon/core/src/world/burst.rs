@@ -2,10 +2,7 @@
 
 use glam::DVec3;
 
-use super::{
-    boats::Hull,
-    score::{Moving, closest_to_surface},
-};
+use super::score::Moving;
 use crate::chance::drawn;
 
 /// Draws of bursts are numbered from here.
@@ -25,7 +22,7 @@ pub struct BurstSpec {
 pub struct FragmentStrike {
     /// Index of the boat among those given.
     pub boat: usize,
-    /// Distance of the burst from its surface, metres.
+    /// Distance of the burst from its helmsman, metres.
     pub distance_m: f64,
     /// The burst in the boat's space, metres.
     pub point: DVec3,
@@ -55,15 +52,19 @@ impl BurstSpec {
     ) -> Vec<FragmentStrike> {
         /// Farther off than so many of the radii in which half are struck, one in five hundred is.
         const REACH: f64 = 3.0;
+        /// A helmsman so far below the burst is under water, metres.
+        const UNDER_M: f64 = 1.5;
         let reach_m = REACH * self.lethal_m;
         let near = |(boat, moving): (usize, &Moving<'_>)| {
             let pose = moving.pose_at(time_s, muzzle);
-            let hull = Hull::of(moving.model);
-            if pose.position.distance(at) > reach_m + hull.length_m {
+            let helmsman = moving.model.helm_middle();
+            let point = pose.to_body(at);
+            let distance_m = helmsman.distance(point);
+            // Water stops fragments.
+            let is_under = pose.to_world(helmsman).z < at.z - UNDER_M;
+            if distance_m > reach_m || is_under {
                 return None;
             }
-            let point = pose.to_body(at);
-            let distance_m = closest_to_surface(moving.model, point, point, reach_m)?.distance_m;
             let is_struck = drawn(seed, [shot, BURST | boat as u64]) < self.chance(distance_m);
             is_struck.then_some(FragmentStrike { boat, distance_m, point })
         };
@@ -84,11 +85,10 @@ mod tests {
     fn half_are_struck_at_the_radius_that_says_so_and_none_far_off() {
         let burst = BurstSpec { arming_m: 20.0, lethal_m: 5.0 };
         let model = boxed_model(Vec3::splat(-2.0), Vec3::splat(2.0));
-        let edge = 2.0;
         let count = |off_m: f64| {
             let pose = RigidPose { position: DVec3::X * 300.0, world_from_body: DQuat::IDENTITY };
             let boat = Moving { model: &model, from_s: 0.0, from: pose, to_s: 1.0, to: pose };
-            let at = DVec3::new(300.0 + edge + off_m, 0.0, 0.0);
+            let at = DVec3::new(300.0 + off_m, 0.0, 0.0);
             let struck = |shot: &u64| !burst.strikes(9, *shot, (at, 0.5), DVec3::ZERO, &[boat]).is_empty();
             (0..2000).filter(struck).count()
         };

@@ -88,6 +88,9 @@ const NEIGHBOUR_M: f64 = 300.0;
 /// The own ship as other vessels keep clear of her: the gun stands within so many metres of her side.
 const OWN_SHIP: Traffic =
     Traffic { position: DVec2::ZERO, velocity: DVec2::ZERO, heading: 0.0, radius_m: OWN_RADIUS_M };
+/// A boat that has sunk is in nobody's way.
+const NOWHERE: Traffic =
+    Traffic { position: DVec2::splat(1e7), velocity: DVec2::ZERO, heading: 0.0, radius_m: 0.0 };
 /// Her hull, as far as boats are held off it.
 const OWN_HULL: Capsule = Capsule::round(OWN_RADIUS_M);
 /// Radius about the gun that the own ship takes up, metres.
@@ -168,7 +171,10 @@ impl Fleet {
         for number in first..last {
             let time_s = step_seconds(number);
             traffic.clear();
-            traffic.extend(self.boats.iter().map(|b| b.traffic(time_s)));
+            let seen = |(i, b): (usize, &FleetBoat)| {
+                if self.swims_at(i, time_s) { b.traffic(time_s) } else { NOWHERE }
+            };
+            traffic.extend(self.boats.iter().enumerate().map(seen));
             for i in 0..self.boats.len() {
                 if !self.boats[i].history.is_crewed() {
                     continue;
@@ -208,6 +214,11 @@ impl Fleet {
             DriveOrder::Starboard => helm(HELM_NOTCH),
             DriveOrder::Midships => Orders { helm: 0.0, ..was },
         };
+        // Steps look no further back than frames do.
+        const KEPT: usize = 64;
+        if self.driven.len() == KEPT {
+            self.driven.remove(0);
+        }
         self.driven.push((time_s, orders));
         self.forget_crews_after(time_s);
     }
@@ -242,11 +253,12 @@ impl Fleet {
     /// No crewed boat passes through another vessel: where hulls would touch, it is held off.
     fn keep_apart(&mut self, time_s: f64) {
         let hulls: Vec<Capsule> = self.boats.iter().map(|b| b.capsule(time_s)).collect();
+        let swim: Vec<bool> = (0..hulls.len()).map(|boat| self.swims_at(boat, time_s)).collect();
         for i in 0..self.boats.len() {
-            if !self.boats[i].history.is_crewed() {
+            if !self.boats[i].history.is_crewed() || !swim[i] {
                 continue;
             }
-            for (j, other) in hulls.iter().enumerate().filter(|(j, _)| *j != i) {
+            for (j, other) in hulls.iter().enumerate().filter(|(j, _)| *j != i && swim[*j]) {
                 let shared = self.boats[j].history.is_crewed();
                 if let Some(touch) = hulls[i].touches(other) {
                     let part = if shared { 0.5 } else { 1.0 };
@@ -337,7 +349,7 @@ impl Fleet {
 
     /// All boats that have a model and have not sunk, as they lie at `time`.
     pub fn afloat(&self, time: Time) -> impl Iterator<Item = Afloat<'_>> {
-        let swims = move |&(boat, _): &(usize, &FleetBoat)| !self.is_gone(boat, time);
+        let swims = move |&(boat, _): &(usize, &FleetBoat)| self.swims(boat, time);
         self.boats.iter().enumerate().filter(swims).filter_map(move |(boat, b)| {
             let (model, floating) = (self.model(boat)?, self.floating(boat, time)?);
             let Floating { pose, water_level } = floating;
@@ -371,12 +383,16 @@ impl Fleet {
         Some(self.start.plus_secs(self.boats.get(boat)?.history.fire_s()?))
     }
 
-    /// Tests whether nothing of a boat shows over the water any more at `time`: it has sunk.
-    fn is_gone(&self, boat: usize, time: Time) -> bool {
+    /// Tests whether a boat is there at `time` and shows anything over the water: it has not sunk.
+    pub fn swims(&self, boat: usize, time: Time) -> bool {
+        self.swims_at(boat, time.secs_since(self.start))
+    }
+
+    fn swims_at(&self, boat: usize, time_s: f64) -> bool {
         /// Waves and the end that goes down last.
         const SLACK_M: f64 = 2.0;
-        let settled_m = self.boats[boat].history.settled_m(time.secs_since(self.start));
-        settled_m > self.height_m(boat) + SLACK_M
+        let settled_m = self.boats.get(boat).map(|b| b.history.settled_m(time_s));
+        settled_m.is_some_and(|settled_m| settled_m <= self.height_m(boat) + SLACK_M)
     }
 
     /// Takes in that a boat was struck. A hit on the engine stops it, one on the helm ends its attack; the first counts.

@@ -332,8 +332,10 @@ impl Rounds {
                         explained.extend(f.explain(ammunition, nearest, start, fleet));
                     }
                     let splash_m = match end {
-                        End::Splashed { time_s, .. } => f.splash_m(ammunition, time_s),
-                        _ => 0.0,
+                        End::Splashed { time_s, .. } | End::Struck { time_s, .. } => {
+                            f.splash_m(ammunition, time_s)
+                        }
+                        End::Spent { .. } => 0.0,
                     };
                     ended.push(EndedRound { launch: f.launch, nearest, end, splash_m, fragments, beside });
                     false
@@ -359,12 +361,17 @@ impl Rounds {
                 },
             };
             let outcome = match end {
-                End::Struck { boat, zone, time_s, range_m, point, .. } => {
+                End::Struck { boat, zone, time_s, range_m, point, at } => {
                     let time = time_of(time_s);
                     let strike =
                         if beside { zone.into() } else { self.ammunition.strike(launch.shot, zone, point) };
                     struck.push((boat, strike, time));
-                    self.marks.push((time, ImpactMark::Strike { boat, point }));
+                    let mark = if beside {
+                        ImpactMark::Splash { at, height_m }
+                    } else {
+                        ImpactMark::Strike { boat, point }
+                    };
+                    self.marks.push((time, mark));
                     for also in fragments {
                         struck.push((also.boat, Zone::Helm.into(), time));
                         if also.boat != boat {

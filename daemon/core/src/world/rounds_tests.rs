@@ -81,7 +81,7 @@ fn tracers_burn_out() {
     assert_eq!([0.02, 0.1, 0.15, 0.2, 0.3].map(&mut seen), [0, 1, 1, 0, 0]);
 }
 
-/// Fires so many rounds into the water, `off_m` beside a boat; those that struck its crew.
+/// Fires so many rounds into the water, `off_m` off a helmsman; those that struck its crew.
 fn bursts_beside(burst: Option<BurstSpec>, off_m: f64) -> (usize, Vec<ShotRecord>) {
     let model = Model { kind: ModelKind::Mesh, ..boxed_model(Vec3::splat(-2.0), Vec3::splat(2.0)) };
     let text =
@@ -90,7 +90,7 @@ fn bursts_beside(burst: Option<BurstSpec>, off_m: f64) -> (usize, Vec<ShotRecord
     let mut fleet = Fleet::of_scenario(&scenario, Arc::new([model]), &[ModelId(0)], START);
     let mut rounds = rounds(0.0);
     rounds.ammunition.weapon.burst = burst;
-    let target = fleet.middle(0, START).expect("a boat").with_z(0.0) + DVec3::X * (2.0 + off_m);
+    let target = fleet.middle(0, START).expect("a boat").with_z(0.0) + DVec3::X * off_m;
     let muzzle = target + DVec3::new(0.0, -50.0, 50.0);
     let mut records = Vec::new();
     for shot in 1..=200 {

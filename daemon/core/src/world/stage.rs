@@ -24,6 +24,8 @@ use crate::{
 
 /// The longest time that a round is followed, seconds, and a second more.
 const ROUND_OVER_S: f64 = 21.0;
+/// Orders of the person who drives boats come no later than this, seconds.
+const DRIVEN_LATE_S: f64 = 0.25;
 /// How long a text of the scenario stands, seconds.
 const MESSAGE_S: f64 = 6.0;
 /// How long a result stands, seconds: it is shown, and a hit is not replaced by a miss.
@@ -135,7 +137,9 @@ impl RunningWorld {
                 side: fleet.side(boat)?,
                 range_m: at.truncate().distance(eye.truncate()),
                 speed_m_s,
-                off_bore: aim.map(|aim| aim.bore.angle_between(at - aim.muzzle)),
+                off_bore: aim
+                    .filter(|_| fleet.swims(boat, *now))
+                    .map(|aim| aim.bore.angle_between(at - aim.muzzle)),
                 height_m: fleet.height_m(boat),
                 struck: fleet.first_hit(boat).filter(|struck| struck <= now),
                 gave_up: fleet.gave_up(boat),
@@ -238,6 +242,8 @@ impl World {
         let mut running = self.running.take().unwrap_or_else(|| self.begin(begin));
         let now = running.now.max(until);
         for (time, order) in self.driving.drain(..) {
+            // An order that comes late, or with a time of its own, counts from about now on.
+            let time = time.clamp(running.now.plus_secs(-DRIVEN_LATE_S).min(now), now);
             running.fleet.drive(order, time);
         }
         let was_stopped = self.weapon.state() == WeaponState::Stoppage;
@@ -282,6 +288,7 @@ impl World {
     /// Notes what has happened up to now.
     fn watch_exercise(&mut self, running: &mut RunningWorld, aim: BoreAim) {
         running.note_ends(&mut self.events);
+        self.count_fragments();
         let boats = running.watched(Some(&aim));
         let orders = self.watch.follow(running.now, &boats, self.weapon.rounds_in_all(), &mut self.events);
         for boat in orders.warned {
@@ -336,6 +343,7 @@ impl World {
             running.note_ends(&mut self.events);
             self.events.append(&mut ended);
         }
+        self.count_fragments();
         self.count(records);
     }
 
@@ -348,6 +356,17 @@ impl World {
             self.waves = std::mem::replace(&mut self.waves, WaveField::FLAT).changing_to(next, now_s);
             running.fleet.set_waves(self.waves.clone(), running.now);
             running.rounds.set_sea(self.waves.clone());
+        }
+    }
+
+    /// Counts neutral boats whose crews fragments struck.
+    fn count_fragments(&mut self) {
+        for event in &self.events {
+            if let ExerciseFact::Fragments { side: Side::Neutral, .. } = event.fact {
+                self.score.neutral_hits += 1;
+                self.last_result =
+                    Some(LastResult { time: event.time, struck: Some((Side::Neutral, Zone::Helm)) });
+            }
         }
     }
 

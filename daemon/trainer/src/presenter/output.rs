@@ -69,6 +69,8 @@ pub struct OutputOptions {
 pub enum Seat {
     /// To watch.
     Watcher,
+    /// To watch, and to drive a boat.
+    Driver,
     /// To fire and to act: the gun moves as it was recorded.
     #[default]
     Trainee,
@@ -339,8 +341,10 @@ impl OutputWorker {
             Pressed::Quit => true,
             Pressed::Turn(_) => seat == Seat::Gunner,
             // Whoever watches a simulated gunner may drive a boat against it.
-            Pressed::Act(Act::Drive(_)) => true,
-            Pressed::Fire(_) | Pressed::Rezero | Pressed::Act(_) => seat != Seat::Watcher,
+            Pressed::Act(Act::Drive(_)) => seat != Seat::Watcher,
+            Pressed::Fire(_) | Pressed::Rezero | Pressed::Act(_) => {
+                matches!(seat, Seat::Trainee | Seat::Gunner)
+            }
         };
         for pressed in done.into_iter().filter(may) {
             let event = match pressed {

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, anyhow};
 use bowwave_core::{
     physics::GRAVITY_M_S2,
-    world::gunnery::{Atmosphere, DragModel, Flight, Projectile, STEP_S},
+    world::gunnery::{Atmosphere, DragModel, DragTable, Flight, Projectile, STEP_S},
 };
 use differential_equations::prelude::*;
 use glam::DVec3;
@@ -33,7 +33,9 @@ pub type Mass = [f64; 6];
 /// A round with drag in air that moves.
 #[derive(Clone, Copy)]
 pub struct FlownRound {
-    /// G7 ballistic coefficient, lb/in^2.
+    /// Its drag.
+    pub drag: DragModel,
+    /// The ballistic coefficient that goes with it, lb/in^2.
     pub bc: f64,
     /// Velocity of the air, m/s.
     pub wind: DVec3,
@@ -47,7 +49,7 @@ impl FlownRound {
         let through = v - self.wind;
         let speed = through.length();
         let drag = std::f64::consts::PI / (8.0 * self.bc * KG_M2_PER_LB_IN2);
-        let cd = DragModel::G7.coefficient(speed / air.sound_m_s);
+        let cd = self.drag.coefficient(speed / air.sound_m_s);
         let a = -through * (drag * air.density_kg_m3 * cd * speed) - DVec3::Z * GRAVITY_M_S2;
         [v.x, v.y, v.z, a.x, a.y, a.z]
     }
@@ -115,7 +117,7 @@ fn fly(step: FlightStep, round: &FlownRound, velocity: DVec3, seconds: f64, h: f
 }
 
 fn product(round: &FlownRound, velocity: DVec3, seconds: f64) -> Option<DVec3> {
-    let projectile = Projectile::new(round.bc, velocity.length())?;
+    let projectile = Projectile::with_drag(round.drag, round.bc, velocity.length())?;
     let direction = velocity.try_normalize().unwrap_or(DVec3::X);
     let mut flight = Flight::new(projectile, &Atmosphere::ICAO, DVec3::ZERO, direction, round.wind)?;
     flight.advance(seconds);
@@ -152,7 +154,7 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
         ("BC 0.3, 850 m/s, 1 s, above Mach 1.5", DVec3::X * 850.0, 1.0),
         ("BC 0.3, 850 m/s, 2.4 s, through Mach 1", DVec3::X * 850.0, 2.4),
     ] {
-        let round = FlownRound { bc: 0.3, wind: DVec3::new(0.0, 5.0, 0.0) };
+        let round = FlownRound { drag: DragModel::G7, bc: 0.3, wind: DVec3::new(0.0, 5.0, 0.0) };
         let truth = dop853(&round, velocity, seconds, 1e-12)?;
         let coarse = dop853(&round, velocity, seconds, 1e-10)?;
         let mut ways = Vec::new();
@@ -209,7 +211,8 @@ fn reference_case(bench: &mut PartBench) {
     let mut tried = Vec::new();
     for (method, step, h) in STEPS {
         let error = worst(rows.iter().map(|row| {
-            let (round, mut s) = (FlownRound { bc: row[0], wind: DVec3::ZERO }, start(DVec3::X * row[1]));
+            let (round, mut s) =
+                (FlownRound { drag: DragModel::G7, bc: row[0], wind: DVec3::ZERO }, start(DVec3::X * row[1]));
             let mut at = 0;
             let path = || {
                 // The muzzle itself is the first point.
@@ -248,8 +251,8 @@ fn product_height(bc: f64, v0: f64, range: f64) -> Option<f64> {
     None
 }
 
-/// A flight that is hard in some way: name, ballistic coefficients, velocity, seconds.
-type Hard = (&'static str, [f64; 3], DVec3, f64);
+/// A flight that is hard in some way: name, drag, ballistic coefficients, velocity, seconds.
+type Hard = (&'static str, DragModel, [f64; 3], DVec3, f64);
 
 /// Flights without a closed form, against DOP853.
 fn hard_flights(bench: &mut PartBench) -> Result<()> {
@@ -257,18 +260,25 @@ fn hard_flights(bench: &mut PartBench) -> Result<()> {
         let (sin, cos) = degrees.to_radians().sin_cos();
         DVec3::new(cos, 0.0, sin) * speed
     };
-    let cases: [Hard; 6] = [
-        ("Mach 1.1 to 0.9: 375 m/s, 3 s", [0.1, 0.3, 0.5], up(0.0, 375.0), 3.0),
-        ("Mach 0.95, where drag doubles: 323 m/s, 3 s", [0.1, 0.3, 0.5], up(0.0, 323.0), 3.0),
-        ("speed to zero: straight up and back, 100 m/s, 20 s", [0.05, 0.1, 0.3], up(90.0, 100.0), 20.0),
-        ("speed to zero at once: BC 0.01, 3000 m/s, 10 s", [0.01, 0.02, 0.05], up(0.0, 3000.0), 10.0),
-        ("steep, 80 deg up, 850 m/s, 60 s", [0.1, 0.3, 0.5], up(80.0, 850.0), 60.0),
-        ("steep, 60 deg down, 850 m/s, 3 s", [0.1, 0.3, 0.5], up(-60.0, 850.0), 3.0),
+    // Drag that doubles within a tenth of a Mach number, as a table of few points may have it.
+    let steep = DragTable::new(&[(0.0, 0.15), (0.9, 0.15), (1.0, 0.4), (1.1, 0.45), (4.0, 0.25)]);
+    let steep = steep.map_or(DragModel::G7, DragModel::Table);
+    let (g7, g1, ball) = (DragModel::G7, DragModel::G1, DragModel::Sphere);
+    let cases: [Hard; 9] = [
+        ("Mach 1.1 to 0.9: 375 m/s, 3 s", g7, [0.1, 0.3, 0.5], up(0.0, 375.0), 3.0),
+        ("Mach 0.95, where drag doubles: 323 m/s, 3 s", g7, [0.1, 0.3, 0.5], up(0.0, 323.0), 3.0),
+        ("speed to zero: straight up and back, 100 m/s, 20 s", g7, [0.05, 0.1, 0.3], up(90.0, 100.0), 20.0),
+        ("speed to zero at once: BC 0.01, 3000 m/s, 10 s", g7, [0.01, 0.02, 0.05], up(0.0, 3000.0), 10.0),
+        ("steep, 80 deg up, 850 m/s, 60 s", g7, [0.1, 0.3, 0.5], up(80.0, 850.0), 60.0),
+        ("steep, 60 deg down, 850 m/s, 3 s", g7, [0.1, 0.3, 0.5], up(-60.0, 850.0), 3.0),
+        ("G1 through Mach 1: 450 m/s, 4 s", g1, [0.1, 0.3, 0.6], up(1.0, 450.0), 4.0),
+        ("a ball through Mach 1: 450 m/s, 4 s", ball, [0.1, 0.3, 0.6], up(1.0, 450.0), 4.0),
+        ("a table of five points through Mach 1: 450 m/s, 4 s", steep, [0.1, 0.2, 0.3], up(1.0, 450.0), 4.0),
     ];
-    for (case, coefficients, velocity, seconds) in cases {
+    for (case, drag, coefficients, velocity, seconds) in cases {
         let mut truths = Vec::new();
         for bc in coefficients {
-            let round = FlownRound { bc, wind: DVec3::new(0.0, 5.0, 0.0) };
+            let round = FlownRound { drag, bc, wind: DVec3::new(0.0, 5.0, 0.0) };
             truths.push((round, dop853(&round, velocity, seconds, 1e-12)?));
         }
         let mut tried = Vec::new();
@@ -292,7 +302,7 @@ fn hard_flights(bench: &mut PartBench) -> Result<()> {
 
 /// Cases with a closed form.
 fn closed_forms(bench: &mut PartBench) {
-    let vacuum = FlownRound { bc: f64::INFINITY, wind: DVec3::ZERO };
+    let vacuum = FlownRound { drag: DragModel::G7, bc: f64::INFINITY, wind: DVec3::ZERO };
     let velocity = DVec3::new(1.0, 0.0, 1.0).normalize() * 850.0;
     let exact = velocity * 60.0 - DVec3::Z * (0.5 * GRAVITY_M_S2 * 3600.0);
     let mut tried: Vec<ExtremeResult> = STEPS
@@ -305,7 +315,7 @@ fn closed_forms(bench: &mut PartBench) {
     tried.push(ExtremeResult::product(PRODUCT, &product_setting(), error));
     bench.extreme("vacuum parabola, 45 deg, 60 s", "mm", tried);
 
-    let rested = FlownRound { bc: 0.05, wind: DVec3::ZERO };
+    let rested = FlownRound { drag: DragModel::G7, bc: 0.05, wind: DVec3::ZERO };
     let fallen = product(&rested, DVec3::ZERO, 0.2).map_or(f64::NAN, |p| p.z);
     let error = (fallen + 0.5 * GRAVITY_M_S2 * 0.04).abs() * 1e3;
     let tried = ExtremeResult::product(PRODUCT, &product_setting(), error);
@@ -318,7 +328,8 @@ fn closed_forms(bench: &mut PartBench) {
     // In the air's own frame the round flies straight, so the wind W moves it by W (t - x / v0), gravity or not.
     let lag =
         |round: &FlownRound, p: DVec3, v0: f64, t: f64| (p.y - round.wind.y * (t - p.x / v0)).abs() * 1e3;
-    let winds = [0.1, 5.0, 25.0].map(|w| FlownRound { bc: 0.3, wind: DVec3::new(0.0, w, 0.0) });
+    let winds =
+        [0.1, 5.0, 25.0].map(|w| FlownRound { drag: DragModel::G7, bc: 0.3, wind: DVec3::new(0.0, w, 0.0) });
     let mut tried: Vec<ExtremeResult> = STEPS
         .map(|(method, step, h)| {
             let errors = winds.map(|r| lag(&r, fly(step, &r, DVec3::X * 850.0, 3.0, h), 850.0, 3.0));

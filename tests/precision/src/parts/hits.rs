@@ -7,7 +7,7 @@ use bowwave_core::{
     geometry::RigidPose,
     model::{Model, ModelKind, Part, Vertex, Zone},
     world::{
-        gunnery::{Atmosphere, Flight, Projectile, aim_to_hit},
+        gunnery::{Atmosphere, DragModel, Flight, Projectile, aim_to_hit},
         score::{End, Moving, Round},
         waves::WaveField,
     },
@@ -93,7 +93,7 @@ impl Shot {
         let mut shot = Self {
             muzzle: DVec3::new(0.3, -0.2, 8.0),
             direction: DVec3::X,
-            round: FlownRound { bc, wind },
+            round: FlownRound { drag: DragModel::G7, bc, wind },
             speed_m_s,
             near_s: 0.0,
             begin: DVec3::new(bearing.sin() * range, bearing.cos() * range, between(5, 60.0, 70.0)),

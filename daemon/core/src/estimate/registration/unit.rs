@@ -13,7 +13,7 @@ pub(super) const UP_SIGMA: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// Way of a ship, one standard deviation, m/s: while it turns, specific force leans by that times its rate over gravity.
 const SHIP_SPEED_M_S: f64 = 8.0;
 /// No ship turns faster, rad/s.
-const SHIP_TURN_MOST: f64 = 6.0 * std::f64::consts::PI / 180.0;
+pub(super) const SHIP_TURN_MOST: f64 = 6.0 * std::f64::consts::PI / 180.0;
 /// Time constant with which a unit alone takes in and forgets that, and over which its turn is averaged, seconds, ...
 const LEANS_S: f64 = TAU_WAVES_S;
 /// ...at first over no less.
@@ -21,7 +21,7 @@ const LEANS_LEAST_S: f64 = 2.0;
 /// Deviation of up by which a unit begins on a ship in a turn or in waves, and which it forgets in that time as well, radians.
 const BEGUN_SIGMA: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// Deviation of a unit's up, found alone, about its mean of the last two seconds on a ship that keeps its course, radians.
-const SWAY_SIGMA: f64 = 0.25 * std::f64::consts::PI / 180.0;
+pub(super) const SWAY_SIGMA: f64 = 0.25 * std::f64::consts::PI / 180.0;
 /// No ship's turn tilts it further, radians.
 pub(super) const LEANS_MOST: f64 = 10.0 * std::f64::consts::PI / 180.0;
 
@@ -42,6 +42,10 @@ pub(super) struct UnitWatch {
     /// The same mean with the turns of a gun on its mount, which cancel out over some of its swings, rad/s.
     swung: f64,
     known_s: f64,
+    /// Turn about the vertical since the start, radians, its mean over [`LEANS_S`] and the mean square off that, radians^2.
+    heading: f64,
+    heading_mean: f64,
+    heading_square: f64,
     /// The fastest mean turn of late, rad/s, that of the gun on its mount included, and the same of a turn that was steady.
     fastest: f64,
     fastest_swung: f64,
@@ -113,6 +117,10 @@ impl UnitWatch {
         self.known_s += step_s;
         let share = step_s / self.known_s.clamp(LEANS_LEAST_S, LEANS_S);
         self.swung += (about_up - self.swung) * share;
+        self.heading += about_up * step_s;
+        let off = self.heading - self.heading_mean;
+        self.heading_mean += off * share;
+        self.heading_square += (off * off * (1.0 - share) - self.heading_square) * share;
         // What turns faster is a gun on its mount.
         let about_up = if about_up.abs() > SHIP_TURN_MOST { 0.0 } else { about_up };
         self.turning += (about_up - self.turning) * share;
@@ -138,10 +146,16 @@ impl UnitWatch {
             .hypot(BEGUN_SIGMA * (-self.known_s / LEANS_S).exp())
     }
 
+    /// Turn of the gun about the vertical since the start, radians.
+    pub(super) const fn heading(&self) -> f64 {
+        self.heading
+    }
+
     /// The same as a mount that is off is held against it: how the unit began passes. A tilt by the ship's turn is as the mean turn is, and
-    /// what a gun's swing adds to that is of either sign.
+    /// what a gun's swing adds to that is of either sign: as much as it moved in that time.
     pub(super) fn lasting_up_sigma(&self) -> f64 {
-        UP_SIGMA.hypot(tilt(self.steadiest.max(self.swung.abs())))
+        let swung = self.heading_square.sqrt() / LEANS_S;
+        UP_SIGMA.hypot(tilt(self.steadiest.max(self.swung.abs().max(swung))))
     }
 
     /// Deviation of the unit's up without the turns of a gun on its mount, radians: too small for a gun that is swung while the ship turns. A

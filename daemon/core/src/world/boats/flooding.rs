@@ -52,7 +52,9 @@ impl Hole {
 pub struct Flooding {
     holes: Vec<Hole>,
     reserve_kg: f64,
-    mass_kg: f64,
+    /// When the engine drowns and when it sinks, by the holes that it has.
+    drowns_s: Option<f64>,
+    sinks_s: Option<f64>,
 }
 
 impl Flooding {
@@ -68,13 +70,18 @@ impl Flooding {
             return false;
         }
         let flow_kg_s = WATER_KG_M3 * DISCHARGE * hole_m2 * (2.0 * GRAVITY_M_S2 * head_m).sqrt();
-        (self.reserve_kg, self.mass_kg) = (form.reserve_kg(), form.mass_kg);
+        self.reserve_kg = form.reserve_kg();
         let hole = Hole { time_s, flow_kg_s, forward_m: point.x - form.centre_m, port_m: point.y };
         if self.holes.len() == HOLES_MAX {
             let second = self.holes.remove(1);
             self.holes[0] = self.holes[0].with(&second);
         }
         self.holes.push(hole);
+        // What is past stays as it was.
+        let past = |known: Option<f64>| known.filter(|at| *at <= time_s);
+        let drowns_s = self.reaches((DROWNS_ENGINE * form.mass_kg).min(self.reserve_kg));
+        self.drowns_s = past(self.drowns_s).or(drowns_s);
+        self.sinks_s = past(self.sinks_s).or_else(|| self.reaches(self.reserve_kg));
         true
     }
 
@@ -105,13 +112,13 @@ impl Flooding {
     }
 
     /// When its engine drowns, seconds; `None` while it is dry.
-    pub fn engine_drowns_s(&self) -> Option<f64> {
-        self.reaches((DROWNS_ENGINE * self.mass_kg).min(self.reserve_kg))
+    pub const fn engine_drowns_s(&self) -> Option<f64> {
+        self.drowns_s
     }
 
     /// When it is full and sinks, seconds; `None` while it is dry.
-    pub fn sinks_s(&self) -> Option<f64> {
-        self.reaches(self.reserve_kg)
+    pub const fn sinks_s(&self) -> Option<f64> {
+        self.sinks_s
     }
 
     /// What the water does to the attitude of a hull.
@@ -124,13 +131,15 @@ impl Flooding {
         /// How fast a hull goes down in the end, m/s, and the time in which it gets there, seconds.
         const SINKS_M_S: f64 = 0.4;
         const BEGINS_S: f64 = 4.0;
-        let water_kg = self.water_kg(time_s).min(self.reserve_kg);
+        // Once it is full, it lies as it lay then.
+        let full_s = self.sinks_s.map_or(time_s, |sinks| time_s.min(sinks));
+        let water_kg = self.water_kg(full_s).min(self.reserve_kg);
         if water_kg <= 0.0 {
             return WayAttitude::default();
         }
         let mean = |part: fn(&Hole) -> f64| {
-            let run = |hole: &Hole| hole.flow_kg_s * (time_s - hole.time_s).max(0.0);
-            self.holes.iter().map(|hole| part(hole) * run(hole)).sum::<f64>() / self.water_kg(time_s)
+            let run = |hole: &Hole| hole.flow_kg_s * (full_s - hole.time_s).max(0.0);
+            self.holes.iter().map(|hole| part(hole) * run(hole)).sum::<f64>() / self.water_kg(full_s)
         };
         let share = water_kg / self.reserve_kg;
         let settled_m = water_kg / (WATER_KG_M3 * form.waterplane_m2());
@@ -140,7 +149,7 @@ impl Flooding {
         let length_m = form.strip_m * STRIPS as f64;
         let bow_down = water_kg * 0.3 * mean(|hole| hole.forward_m) / (form.mass_kg * length_m);
         // A full hull goes down by the end that is heavier.
-        let down_s = self.sinks_s().map_or(0.0, |sinks| (time_s - sinks).max(0.0));
+        let down_s = time_s - full_s;
         let grown = 1.0 - (-down_s / BEGINS_S).exp();
         let sunk_m = SINKS_M_S * (down_s - BEGINS_S * grown);
         let is_by_bow = mean(|hole| hole.forward_m) > ENGINE_AFT * length_m;

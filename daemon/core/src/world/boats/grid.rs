@@ -69,10 +69,10 @@ impl<T> GridHistory<T> {
         }
     }
 
-    /// Forgets the states after `time_s`.
+    /// Forgets the states after `time_s`, but for the oldest: from that one it goes on.
     pub fn forget_after(&mut self, time_s: f64) {
         let kept = (time_s * STEPS_PER_S).floor() as i64 - self.first + 1;
-        self.states.truncate(usize::try_from(kept).unwrap_or(0));
+        self.states.truncate(usize::try_from(kept).unwrap_or(0).max(1));
     }
 
     /// The states about `time_s`; `None` where there is none at all.

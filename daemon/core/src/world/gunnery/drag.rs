@@ -64,6 +64,7 @@ static G1_SLOPES: [f64; G1.len()] = slopes(&G1);
 static SPHERE_SLOPES: [f64; SPHERE.len()] = slopes(&SPHERE);
 
 /// Drag of a round as a function of its Mach number.
+#[allow(clippy::large_enum_variant, reason = "a round is copied with its drag, and there are few")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DragModel {
     /// As the G7 standard projectile.
@@ -206,7 +207,10 @@ mod tests {
     use super::*;
     use crate::test_data::rows;
 
-    const STANDARD: [(DragModel, &[(f64, f64)], &str); 3] = [
+    /// A model, its points, and the text of the published table.
+    type Standard = (DragModel, &'static [(f64, f64)], &'static str);
+
+    const STANDARD: [Standard; 3] = [
         (DragModel::G7, &G7, include_str!("../../../data/drag_g7.csv")),
         (DragModel::G1, &G1, include_str!("../../../data/drag_g1.csv")),
         (DragModel::Sphere, &SPHERE, include_str!("../../../data/drag_sphere.csv")),

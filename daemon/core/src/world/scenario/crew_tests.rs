@@ -52,7 +52,7 @@ fn starts(text: &str) -> Vec<CrewedStart> {
 fn the_built_in_crews_are_valid_and_end_nowhere() {
     let crews = built_in().expect("valid");
     let names: Vec<&str> = crews.iter().map(|crew| crew.name.as_str()).collect();
-    assert_eq!(names, ["fisher", "anchored", "curious", "prober", "attacker", "rammer"]);
+    assert_eq!(names, ["fisher", "anchored", "curious", "prober", "attacker", "rammer", "driven"]);
     for crew in &crews {
         for exit in crew.plan.states.iter().flat_map(|state| &state.exits) {
             assert!(exit.to < crew.plan.states.len(), "{}", crew.name);

@@ -155,7 +155,7 @@ pub struct RoundsSheet {
     pub fired: u32,
     /// Rounds that struck a hostile boat.
     pub hits: u32,
-    /// Rounds that struck a neutral boat.
+    /// Strikes on neutral boats: a round that bursts may strike several.
     pub neutral_hits: u32,
     /// Rounds fired while it was not known where the barrel pointed.
     pub not_scored: u32,
@@ -298,6 +298,7 @@ impl ScoreFold {
             ExerciseFact::Stoppage => self.stoppages += 1,
             ExerciseFact::BarrelHot => self.barrel_hot += 1,
             ExerciseFact::Fragments { boat, side: Side::Neutral, .. } => self.fragments.push(boat.clone()),
+            // The round counts for the boat that its record names.
             ExerciseFact::Fragments { .. } => {}
             ExerciseFact::Sank { boat, .. } => self.boat(boat).sank = true,
             ExerciseFact::CaughtFire { boat, .. } => self.boat(boat).burns = true,
