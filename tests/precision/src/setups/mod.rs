@@ -195,8 +195,8 @@ pub struct SetUpStudy {
     /// Instead, so many hours of right set-ups in seas of all kinds
     #[arg(long, value_name = "HOURS", conflicts_with = "only")]
     right: Option<f64>,
-    /// Number of the first of these; those below 403 helped to choose, the others only judge
-    #[arg(long, default_value_t = 403, requires = "right")]
+    /// Number of the first of these; those below 547 helped to choose, the others only judge
+    #[arg(long, default_value_t = 547, requires = "right")]
     first: u64,
 }
 
