@@ -89,6 +89,13 @@ pub fn bowwave<I: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = I>
     Command::new(program()).args(arguments).env_remove("RUST_LOG").output().expect("the program runs")
 }
 
+/// Writes a file of text into a folder; its path.
+pub fn write(folder: &Path, name: &str, text: &str) -> String {
+    let path = folder.join(name);
+    std::fs::write(&path, text).expect("a file");
+    path.to_str().expect("a plain path").to_owned()
+}
+
 /// Standard error of a run.
 pub fn said(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()

@@ -8,7 +8,7 @@ use std::{
 };
 
 use bowwave_core::water::ReflectionMethod;
-use bowwave_tests::{bowwave, expect_code, said};
+use bowwave_tests::{bowwave, expect_code, said, write};
 use image::{Rgb, RgbImage};
 
 /// A bright sky over a darker sea; the horizon lies in the middle.
@@ -27,12 +27,6 @@ fn scene(picture: &str) -> String {
          [[boat]]\nmodel = \"frigate-quad\"\nrange_m = 400\nbearing_deg = 6\nheading_deg = 90\n\
          [sea]\nbeaufort = 1\n"
     )
-}
-
-fn write(folder: &Path, name: &str, text: &str) -> String {
-    let path = folder.join(name);
-    fs::write(&path, text).expect("a file");
-    path.to_str().expect("a plain path").to_owned()
 }
 
 fn compose(scene: &str, out: &Path, further: &[&str]) -> std::process::Output {

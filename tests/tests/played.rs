@@ -9,7 +9,7 @@ use std::{
     sync::LazyLock,
 };
 
-use bowwave_tests::{expect_code, program, said};
+use bowwave_tests::{expect_code, program, said, write};
 use serde_json::Value;
 
 /// Turns to the hulk, which lies 12 degrees to port, and fires at it.
@@ -108,11 +108,7 @@ fn the_same_script_plays_the_same_and_replays_the_same() {
 #[test]
 fn a_boat_that_somebody_drives_sails_as_told_and_replays_the_same() {
     let folder = tempfile::tempdir().expect("a folder");
-    let file = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).expect("a file");
-        plain(&path).to_owned()
-    };
+    let file = |name: &str, text: &str| write(folder.path(), name, text);
     let target = include_str!("../../daemon/core/scenarios/first-target.toml");
     let scenario = file("driven.toml", &target.replace("\"anchored\"", "\"driven\""));
     let orders = "[[step]]\nat_s = 0.5\nact = \"ahead\"\n[[step]]\nat_s = 0.6\nact = \"ahead\"\n[[step]]\nat_s = 0.7\nact = \"starboard\"\n";

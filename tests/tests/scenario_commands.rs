@@ -4,7 +4,7 @@
 
 use std::fs;
 
-use bowwave_tests::{bowwave, expect_code, said};
+use bowwave_tests::{bowwave, expect_code, said, write};
 
 fn printed(output: &std::process::Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
@@ -44,11 +44,7 @@ fn an_instructor_comes_from_a_new_file_to_its_picture() {
 #[test]
 fn each_wrong_scenario_is_named_by_its_place_and_the_sound_ones_are_still_looked_at() {
     let folder = tempfile::tempdir().expect("a folder");
-    let path = |name: &str, text: &str| {
-        let path = folder.path().join(name);
-        fs::write(&path, text).expect("a file");
-        path.to_string_lossy().into_owned()
-    };
+    let path = |name: &str, text: &str| write(folder.path(), name, text);
     let wrong = path(
         "wrong.toml",
         "[[boat]]\nname = \"a\"\nmodel = \"skiff\"\ncrew = \"pirate\"\nrange_m = 300\nbearing_deg = 3\n",
@@ -71,11 +67,10 @@ fn each_wrong_scenario_is_named_by_its_place_and_the_sound_ones_are_still_looked
 #[test]
 fn what_is_hardly_meant_is_pointed_out_and_no_built_in_scenario_has_any() {
     let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("odd.toml").to_string_lossy().into_owned();
     let text = "name = \"Odd\"\nduration_s = 60\nbriefing = \"Odd.\"\n[weapon]\nbelt = 0\n[rules]\nengagement = \"free\"\n[goals]\n\
                 keep_off_m = 400\n[[event]]\nat_s = 90\nmessage = \"late\"\n[[call]]\nsay = \"warn\"\nabout = \"a\"\nbefore_m = 350\n\
                 [[boat]]\nname = \"a\"\nmodel = \"skiff\"\ncrew = \"attacker\"\nrange_m = 300\nbearing_deg = 3\non_target_s = 80\n";
-    fs::write(&file, text).expect("a file");
+    let file = write(folder.path(), "odd.toml", text);
     let output = bowwave(["scenario", "check", &file]);
     expect_code(&output, 0);
     let told = said(&output);

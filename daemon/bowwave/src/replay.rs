@@ -1,6 +1,6 @@
 //! `bowwave replay`: does a recording give the records and scenes of the run that it was made in? And where do two runs diverge?
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Result;
 use bowwave_core::{
@@ -98,14 +98,15 @@ fn charted(recording: &Path, file: &Path) -> Result<Replayed> {
 }
 
 /// Exit code 0: the runs are the same; 1: they are not; 3: a recording does not tell what its run met.
-fn compare(arguments: &ReplayRecording, other: &PathBuf) -> Result<Exit> {
-    let (replays, found) = divergence([&arguments.recording, other])?;
+fn compare(arguments: &ReplayRecording, other: &Path) -> Result<Exit> {
+    let recording = arguments.recording.as_path();
+    let (replays, found) = divergence([recording, other])?;
     if arguments.json {
         stdout::print_json(&found)?;
     }
     eprint!("{}", apart(&found));
     let mut is_told = true;
-    for (path, replayed) in [&arguments.recording, other].into_iter().zip(&replays) {
+    for (path, replayed) in [recording, other].into_iter().zip(&replays) {
         if !replayed.is_complete() || replayed.differs_from.is_some() {
             is_told = false;
             let words = words(replayed);
@@ -122,7 +123,7 @@ fn compare(arguments: &ReplayRecording, other: &PathBuf) -> Result<Exit> {
     })
 }
 
-/// Where two runs diverge, in words.
+/// Divergence of two runs, in words.
 fn apart(found: &Divergence) -> String {
     if found.is_none() {
         return format!("the runs are the same in {} ticks\n", found.ticks);

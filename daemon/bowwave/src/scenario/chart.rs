@@ -98,7 +98,7 @@ fn chart(tracks: &[Track], strikes: &[StrikeMark]) -> Markup {
             @for strike in strikes {
                 @let DVec2 { x, y } = place(strike.at);
                 path d=(format!("M{:.1},{:.1} l6,6 m0,-6 l-6,6", x - 3.0, y - 3.0)) fill="none"
-                    stroke=(if strike.side == Side::Neutral { "#1f5fa8" } else { "#111" }) stroke-width="1.2" {}
+                    stroke=(if strike.side == Side::Neutral { colour(strike.side) } else { "#111" }) stroke-width="1.2" {}
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What is allowed in a scenario and yet hardly meant: things that never happen, or cannot be met.
+//! Doubts about a scenario that is allowed and yet hardly meant so: things that never happen, or cannot be met.
 
 use bowwave_core::world::{
     boats::{Act, Behaviour, CrewState},

@@ -70,7 +70,7 @@ impl TrackLog {
         self.noted += 1;
     }
 
-    /// What was noted.
+    /// All tracks that were noted.
     pub fn tracks(self) -> Vec<Track> {
         self.tracks
     }

@@ -119,7 +119,7 @@ pub struct Fleet {
     followed: Time,
     /// Boats that were struck, with the seconds since the start.
     struck: Vec<(usize, f64)>,
-    /// What the person ordered who drives boats, each from those seconds on.
+    /// Orders of the person who drives boats, each from those seconds on.
     driven: Vec<(f64, Orders)>,
 }
 
@@ -175,6 +175,7 @@ impl Fleet {
                 if self.swims_at(i, time_s) { b.traffic(time_s) } else { NOWHERE }
             };
             traffic.extend(self.boats.iter().enumerate().map(seen));
+            let driven = self.driven_at(time_s);
             for i in 0..self.boats.len() {
                 if !self.boats[i].history.is_crewed() {
                     continue;
@@ -183,7 +184,6 @@ impl Fleet {
                 let me = std::mem::replace(&mut traffic[i], OWN_SHIP);
                 let boat = &self.boats[i];
                 let signals = boat.history.decides().then(|| self.signals(i, &me, time_s, &traffic));
-                let driven = self.driven_at(time_s);
                 let view =
                     StepView { others: &traffic, own_ship: OWN_SHIP, signals, waves: &self.waves, driven };
                 self.boats[i].history.step(&view);
@@ -252,20 +252,18 @@ impl Fleet {
 
     /// No crewed boat passes through another vessel: where hulls would touch, it is held off.
     fn keep_apart(&mut self, time_s: f64) {
-        let hulls: Vec<Capsule> = self.boats.iter().map(|b| b.capsule(time_s)).collect();
-        let swim: Vec<bool> = (0..hulls.len()).map(|boat| self.swims_at(boat, time_s)).collect();
+        let afloat = |(i, b): (usize, &FleetBoat)| self.swims_at(i, time_s).then(|| b.capsule(time_s));
+        let hulls: Vec<Option<Capsule>> = self.boats.iter().enumerate().map(afloat).collect();
         for i in 0..self.boats.len() {
-            if !self.boats[i].history.is_crewed() || !swim[i] {
-                continue;
-            }
-            for (j, other) in hulls.iter().enumerate().filter(|(j, _)| *j != i && swim[*j]) {
+            let Some(hull) = hulls[i].filter(|_| self.boats[i].history.is_crewed()) else { continue };
+            for (j, other) in hulls.iter().enumerate().filter(|(j, _)| *j != i) {
                 let shared = self.boats[j].history.is_crewed();
-                if let Some(touch) = hulls[i].touches(other) {
+                if let Some(touch) = other.and_then(|other| hull.touches(&other)) {
                     let part = if shared { 0.5 } else { 1.0 };
                     self.boats[i].history.push(touch.push * part, touch.stop * part);
                 }
             }
-            if let Some(touch) = hulls[i].touches(&OWN_HULL) {
+            if let Some(touch) = hull.touches(&OWN_HULL) {
                 self.boats[i].history.push(touch.push, touch.stop);
             }
         }

@@ -73,6 +73,25 @@ fn follow(fleet: &mut Fleet, from_s: f64, until_s: f64, mut look: impl FnMut(&Fl
     }
 }
 
+/// Follows so many seconds at a pace of frames, and does `act` with each; what `look` sees at each whole second.
+fn paced<T>(
+    fleet: &mut Fleet,
+    (seconds, frames_a_second): (u32, u32),
+    mut act: impl FnMut(&mut Fleet, f64),
+    look: impl Fn(&Fleet, f64) -> T,
+) -> Vec<T> {
+    let mut seen = Vec::new();
+    for frame in 1..=seconds * frames_a_second {
+        let time_s = f64::from(frame) / f64::from(frames_a_second);
+        fleet.follow(start().plus_secs(time_s));
+        act(fleet, time_s);
+        if frame % frames_a_second == 0 {
+            seen.push(look(fleet, time_s));
+        }
+    }
+    seen
+}
+
 fn place(fleet: &Fleet, boat: usize, time_s: f64) -> CourseState {
     fleet.boats[boat].history.state(time_s)
 }
@@ -179,20 +198,17 @@ fn a_boat_that_is_holed_loses_its_engine_and_sinks_whatever_the_pace_of_frames()
     // Each whole second's pose.
     let run = |frames_a_second: u32| {
         let mut fleet = fleet(vec![crewed("a", &crew, 10.0, 1500.0, Side::Hostile)], sea(3));
-        let (mut holed, mut poses) = (0, Vec::new());
-        for frame in 1..=200 * frames_a_second {
-            let time_s = f64::from(frame) / f64::from(frames_a_second);
-            fleet.follow(start().plus_secs(time_s));
+        let mut holed = 0;
+        let strike = |fleet: &mut Fleet, time_s| {
             while holed < 40 && 10.0 + 0.1 * f64::from(holed) <= time_s {
                 let hole = Some((DVec3::new(-0.5, 0.8, 0.0), 20e-4));
                 let strike = RoundStrike { hole, ..Zone::Hull.into() };
                 fleet.strike(0, &strike, start().plus_secs(10.0 + 0.1 * f64::from(holed)));
                 holed += 1;
             }
-            if frame % frames_a_second == 0 {
-                poses.push(fleet.pose(0, start().plus_secs(time_s)));
-            }
-        }
+        };
+        let look = |fleet: &Fleet, time_s| fleet.pose(0, start().plus_secs(time_s));
+        let poses = paced(&mut fleet, (200, frames_a_second), strike, look);
         (fleet, poses)
     };
     let (fleet, poses) = run(30);
@@ -242,19 +258,13 @@ fn a_person_drives_a_boat_and_the_pace_of_frames_does_not_matter() {
     ];
     let run = |frames_a_second: u32| {
         let mut fleet = fleet(vec![crewed("mine", &crew, 0.0, 900.0, Side::Hostile)], sea(2));
-        let (mut given, mut states) = (0, Vec::new());
-        for frame in 1..=45 * frames_a_second {
-            let time_s = f64::from(frame) / f64::from(frames_a_second);
-            fleet.follow(start().plus_secs(time_s));
-            while let Some((at_s, order)) = orders.get(given).filter(|(at_s, _)| *at_s <= time_s) {
+        let mut due = orders.iter().peekable();
+        let drive = |fleet: &mut Fleet, time_s| {
+            while let Some((at_s, order)) = due.next_if(|(at_s, _)| *at_s <= time_s) {
                 fleet.drive(*order, start().plus_secs(*at_s));
-                given += 1;
             }
-            if frame % frames_a_second == 0 {
-                states.push(place(&fleet, 0, time_s));
-            }
-        }
-        states
+        };
+        paced(&mut fleet, (45, frames_a_second), drive, |fleet, time_s| place(fleet, 0, time_s))
     };
     let states = run(30);
     assert!(states[0].speed_m_s.abs() < 0.5, "it lies still until it is told to go");

@@ -363,14 +363,13 @@ impl Rounds {
             let outcome = match end {
                 End::Struck { boat, zone, time_s, range_m, point, at } => {
                     let time = time_of(time_s);
-                    let strike =
-                        if beside { zone.into() } else { self.ammunition.strike(launch.shot, zone, point) };
-                    struck.push((boat, strike, time));
-                    let mark = if beside {
-                        ImpactMark::Splash { at, height_m }
+                    let (strike, mark) = if beside {
+                        (zone.into(), ImpactMark::Splash { at, height_m })
                     } else {
-                        ImpactMark::Strike { boat, point }
+                        let strike = self.ammunition.strike(launch.shot, zone, point);
+                        (strike, ImpactMark::Strike { boat, point })
                     };
+                    struck.push((boat, strike, time));
                     self.marks.push((time, mark));
                     for also in fragments {
                         struck.push((also.boat, Zone::Helm.into(), time));

@@ -361,12 +361,13 @@ impl World {
 
     /// Counts neutral boats whose crews fragments struck.
     fn count_fragments(&mut self) {
-        for event in &self.events {
-            if let ExerciseFact::Fragments { side: Side::Neutral, .. } = event.fact {
-                self.score.neutral_hits += 1;
-                self.last_result =
-                    Some(LastResult { time: event.time, struck: Some((Side::Neutral, Zone::Helm)) });
-            }
+        let is_neutral = |event: &&ExerciseEvent| {
+            matches!(event.fact, ExerciseFact::Fragments { side: Side::Neutral, .. })
+        };
+        let times: Vec<Time> = self.events.iter().filter(is_neutral).map(|event| event.time).collect();
+        for time in times {
+            self.score.neutral_hits += 1;
+            self.note_result(time, Some((Side::Neutral, Zone::Helm)));
         }
     }
 
@@ -382,15 +383,18 @@ impl World {
             let is_neutral = matches!(struck, Some((Side::Neutral, _)));
             self.score.hits += u64::from(struck.is_some() && !is_neutral);
             self.score.neutral_hits += u64::from(is_neutral);
-            // Of several results at once a hit is what the sailor wants to see, and one on a neutral what he must.
-            let rank = |struck: Option<(Side, Zone)>| {
-                struck.map_or(0, |(side, _)| 1 + u8::from(side == Side::Neutral))
-            };
-            let gives_way =
-                |r: LastResult| rank(struck) >= rank(r.struck) || time.secs_since(r.time) > RESULT_S;
-            if self.last_result.is_none_or(gives_way) {
-                self.last_result = Some(LastResult { time, struck });
-            }
+            self.note_result(time, struck);
+        }
+    }
+
+    /// Has a result shown, unless one that stands is of more weight.
+    fn note_result(&mut self, time: Time, struck: Option<(Side, Zone)>) {
+        // Of several results at once a hit is what the sailor wants to see, and one on a neutral what he must.
+        let rank =
+            |struck: Option<(Side, Zone)>| struck.map_or(0, |(side, _)| 1 + u8::from(side == Side::Neutral));
+        let gives_way = |r: LastResult| rank(struck) >= rank(r.struck) || time.secs_since(r.time) > RESULT_S;
+        if self.last_result.is_none_or(gives_way) {
+            self.last_result = Some(LastResult { time, struck });
         }
     }
 

@@ -30,6 +30,8 @@ impl<T: Copy + AddAssign + Sub<Output = T> + Mul<f64, Output = T>, const MOST: u
 pub(super) type MeanOff = RecentMean<DVec3, 100>;
 /// The same over some two: a ship's turn moves it by a degree in ten, late pictures move it to and fro with the waves.
 pub(super) type MeanSway = RecentMean<DVec3, 20>;
+/// Age of that mean: from the middle of its seconds.
+pub(super) const SWAY_AGE_S: f64 = 1.0;
 
 impl<const MOST: u32> RecentMean<DVec3, MOST> {
     pub(super) const NOTHING: Self = Self { mean: DVec3::ZERO, count: 0 };

@@ -1,10 +1,10 @@
-//! Whether up is off with the camera or with the world, as a gun is swung.
+//! Sequential test of a swung gun: is up off with the camera, or with the world?
 
 use glam::{DQuat, DVec3};
 
 use super::{
     ALIKE, COST_MOST,
-    means::MeanSway,
+    means::{MeanSway, SWAY_AGE_S},
     unit::{LEANS_MOST, SHIP_TURN_MOST, SWAY_SIGMA, UP_SIGMA},
 };
 
@@ -12,20 +12,14 @@ use super::{
 /// unit, and the crest of a shore that is taken for the horizon, stand in the world, or turn with the ship.
 ///
 /// Both foretell how it moves in the picture within the second that the mean of two seconds is old.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SwingTest {
     in_camera: MeanSway,
     in_world: MeanSway,
     /// Logarithm of the likelihood of the camera over that of the world, nats; bounded.
     nats: f64,
-    /// How far up is off, radians.
+    /// Error of up, radians.
     off: f64,
-}
-
-impl Default for SwingTest {
-    fn default() -> Self {
-        Self { in_camera: MeanSway::NOTHING, in_world: MeanSway::NOTHING, nats: 0.0, off: 0.0 }
-    }
 }
 
 impl SwingTest {
@@ -33,14 +27,12 @@ impl SwingTest {
     pub(super) fn take(&mut self, own: DVec3, off: DVec3, heading: f64) {
         /// Evidence that is kept: a mount may come loose.
         const MOST: f64 = 14.0;
-        /// Age of the mean, seconds.
-        const SINCE_S: f64 = 1.0;
         let level = DQuat::from_rotation_z(heading) * DQuat::from_rotation_arc(own, DVec3::Z);
         let by_camera = self.in_camera.take_apart(off);
         let by_world = self.in_world.take_apart(level * off);
         self.off = self.in_camera.mean.length();
         // The ship may turn, to either side, and what leans the unit with it. Neither is held against so much.
-        let slack = self.off * SHIP_TURN_MOST * SINCE_S;
+        let slack = self.off * SHIP_TURN_MOST * SWAY_AGE_S;
         let cost = |apart: f64| ((apart - slack).max(0.0) / SWAY_SIGMA).powi(2).min(COST_MOST);
         self.nats = (self.nats + 0.5 * (cost(by_world) - cost(by_camera)) / ALIKE).clamp(-MOST, MOST);
     }
@@ -65,7 +57,7 @@ impl SwingTest {
 mod tests {
     use super::*;
 
-    /// Whether a minute of a gun that is swung so far to either side in nine seconds, on a ship that turns at so many deg/s, may show a
+    /// Tests whether a minute of a gun that is swung so far to either side in nine seconds, on a ship that turns at so many deg/s, may show a
     /// mount that is off. Up is off by `off_deg` in the picture, or leans as far with the ship.
     fn may_be_camera(swing_deg: f64, ship_deg_s: f64, off_deg: f64, leans: bool) -> bool {
         let mut test = SwingTest::default();

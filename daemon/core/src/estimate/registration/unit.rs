@@ -2,7 +2,7 @@
 
 use glam::{DQuat, DVec3};
 
-use super::means::RecentMean;
+use super::means::{RecentMean, SWAY_AGE_S};
 use crate::{
     estimate::attitude::TAU_WAVES_S, event::ImuSample, geometry::rotation_vector, physics::GRAVITY_M_S2,
     time::Time,
@@ -101,6 +101,11 @@ impl UnitWatch {
         self.own.is_some()
     }
 
+    /// Turn of the gun about the vertical since the start, radians.
+    pub(super) const fn heading(&self) -> f64 {
+        self.heading
+    }
+
     /// Mean size of the rate, rad/s.
     pub(super) const fn rate(&self) -> f64 {
         self.rate.mean
@@ -146,16 +151,11 @@ impl UnitWatch {
             .hypot(BEGUN_SIGMA * (-self.known_s / LEANS_S).exp())
     }
 
-    /// Turn of the gun about the vertical since the start, radians.
-    pub(super) const fn heading(&self) -> f64 {
-        self.heading
-    }
-
     /// The same as a mount that is off is held against it: how the unit began passes. A tilt by the ship's turn is as the mean turn is, and
     /// what a gun's swing adds to that is of either sign: as much as it moved in that time.
     pub(super) fn lasting_up_sigma(&self) -> f64 {
         let swung = self.heading_square.sqrt() / LEANS_S;
-        UP_SIGMA.hypot(tilt(self.steadiest.max(self.swung.abs().max(swung))))
+        UP_SIGMA.hypot(tilt(self.steadiest.max(self.swung.abs()).max(swung)))
     }
 
     /// Deviation of the unit's up without the turns of a gun on its mount, radians: too small for a gun that is swung while the ship turns. A
@@ -167,9 +167,7 @@ impl UnitWatch {
     /// Deviation of how up, found alone, sways about its mean of the last two seconds, which is off by `off`, radians: the tilt by a ship's
     /// turn grows meanwhile, and stays where it is in the world while a gun is swung.
     pub(super) fn sway_sigma(&self, off: f64) -> f64 {
-        /// From the middle of these seconds.
-        const SINCE_S: f64 = 1.0;
-        SWAY_SIGMA.hypot(self.leans() * SINCE_S / LEANS_S).hypot(off * self.rate() * SINCE_S)
+        SWAY_SIGMA.hypot(self.leans() * SWAY_AGE_S / LEANS_S).hypot(off * self.rate() * SWAY_AGE_S)
     }
 }
 

@@ -52,7 +52,7 @@ pub struct StepView<'a> {
     pub signals: Option<Signals>,
     /// The sea.
     pub waves: &'a WaveField,
-    /// What the person orders who drives boats.
+    /// Orders of the person who drives boats.
     pub driven: Orders,
 }
 

@@ -1,6 +1,6 @@
 //! Water in a hull that was struck: how it settles, lists, loses its engine and sinks.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{
     floating::WayAttitude,
@@ -23,23 +23,23 @@ struct Hole {
     time_s: f64,
     /// Water that it lets in, kg/s.
     flow_kg_s: f64,
-    /// Where: forward of the centre of buoyancy, and to port, metres.
-    forward_m: f64,
-    port_m: f64,
+    /// Its place: forward of the centre of buoyancy, and to port, metres.
+    lever_m: DVec2,
 }
 
 impl Hole {
+    /// Water that it has let in, kg.
+    fn let_in_kg(&self, time_s: f64) -> f64 {
+        self.flow_kg_s * (time_s - self.time_s).max(0.0)
+    }
+
     /// Both as one, which from the later of both on has let in as much water.
     fn with(&self, other: &Self) -> Self {
         let flow_kg_s = self.flow_kg_s + other.flow_kg_s;
-        let mean = |part: fn(&Self) -> f64| {
-            (part(self) * self.flow_kg_s + part(other) * other.flow_kg_s) / flow_kg_s
-        };
         Self {
-            time_s: mean(|hole| hole.time_s),
+            time_s: (self.time_s * self.flow_kg_s + other.time_s * other.flow_kg_s) / flow_kg_s,
             flow_kg_s,
-            forward_m: mean(|hole| hole.forward_m),
-            port_m: mean(|hole| hole.port_m),
+            lever_m: (self.lever_m * self.flow_kg_s + other.lever_m * other.flow_kg_s) / flow_kg_s,
         }
     }
 }
@@ -71,7 +71,7 @@ impl Flooding {
         }
         let flow_kg_s = WATER_KG_M3 * DISCHARGE * hole_m2 * (2.0 * GRAVITY_M_S2 * head_m).sqrt();
         self.reserve_kg = form.reserve_kg();
-        let hole = Hole { time_s, flow_kg_s, forward_m: point.x - form.centre_m, port_m: point.y };
+        let hole = Hole { time_s, flow_kg_s, lever_m: DVec2::new(point.x - form.centre_m, point.y) };
         if self.holes.len() == HOLES_MAX {
             let second = self.holes.remove(1);
             self.holes[0] = self.holes[0].with(&second);
@@ -79,8 +79,8 @@ impl Flooding {
         self.holes.push(hole);
         // What is past stays as it was.
         let past = |known: Option<f64>| known.filter(|at| *at <= time_s);
-        let drowns_s = self.reaches((DROWNS_ENGINE * form.mass_kg).min(self.reserve_kg));
-        self.drowns_s = past(self.drowns_s).or(drowns_s);
+        let drowns_kg = (DROWNS_ENGINE * form.mass_kg).min(self.reserve_kg);
+        self.drowns_s = past(self.drowns_s).or_else(|| self.reaches(drowns_kg));
         self.sinks_s = past(self.sinks_s).or_else(|| self.reaches(self.reserve_kg));
         true
     }
@@ -92,7 +92,7 @@ impl Flooding {
 
     /// Water in it, kg.
     fn water_kg(&self, time_s: f64) -> f64 {
-        self.holes.iter().map(|hole| hole.flow_kg_s * (time_s - hole.time_s).max(0.0)).sum()
+        self.holes.iter().map(|hole| hole.let_in_kg(time_s)).sum()
     }
 
     /// When the water in it reaches `kg`, seconds, by the holes that it has.
@@ -133,26 +133,25 @@ impl Flooding {
         const BEGINS_S: f64 = 4.0;
         // Once it is full, it lies as it lay then.
         let full_s = self.sinks_s.map_or(time_s, |sinks| time_s.min(sinks));
-        let water_kg = self.water_kg(full_s).min(self.reserve_kg);
-        if water_kg <= 0.0 {
+        let let_in_kg = self.water_kg(full_s);
+        if let_in_kg <= 0.0 {
             return WayAttitude::default();
         }
-        let mean = |part: fn(&Hole) -> f64| {
-            let run = |hole: &Hole| hole.flow_kg_s * (full_s - hole.time_s).max(0.0);
-            self.holes.iter().map(|hole| part(hole) * run(hole)).sum::<f64>() / self.water_kg(full_s)
-        };
+        let water_kg = let_in_kg.min(self.reserve_kg);
+        let lever_m =
+            self.holes.iter().map(|hole| hole.lever_m * hole.let_in_kg(full_s)).sum::<DVec2>() / let_in_kg;
         let share = water_kg / self.reserve_kg;
         let settled_m = water_kg / (WATER_KG_M3 * form.waterplane_m2());
         // The moment of the water's weight on the side of the holes against the hull's own, which the water's free surface takes from.
         let stiffness = form.mass_kg * form.metacentre_m() * (1.0 - 0.5 * share);
-        let port_down = water_kg * 0.5 * mean(|hole| hole.port_m) / stiffness;
+        let port_down = water_kg * 0.5 * lever_m.y / stiffness;
         let length_m = form.strip_m * STRIPS as f64;
-        let bow_down = water_kg * 0.3 * mean(|hole| hole.forward_m) / (form.mass_kg * length_m);
+        let bow_down = water_kg * 0.3 * lever_m.x / (form.mass_kg * length_m);
         // A full hull goes down by the end that is heavier.
         let down_s = time_s - full_s;
         let grown = 1.0 - (-down_s / BEGINS_S).exp();
         let sunk_m = SINKS_M_S * (down_s - BEGINS_S * grown);
-        let is_by_bow = mean(|hole| hole.forward_m) > ENGINE_AFT * length_m;
+        let is_by_bow = lever_m.x > ENGINE_AFT * length_m;
         let end = if is_by_bow { -1.0 } else { 1.0 };
         WayAttitude {
             trim: (-bow_down).clamp(-TRIM_MOST, TRIM_MOST) + end * 0.5 * grown,

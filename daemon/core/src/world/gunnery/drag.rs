@@ -112,8 +112,6 @@ pub struct DragTable {
 impl DragTable {
     /// Points that a table holds at most.
     pub const MOST: usize = 32;
-    /// A coefficient of one at any speed.
-    pub const FLAT: Self = Self { points: [(0.0, 1.0); Self::MOST], slopes: [0.0; Self::MOST], count: 1 };
 
     /// A table of Mach numbers (0 to 10, rising) and drag coefficients (.01 to 5); `None` for one that has fewer than two or more than
     /// [`Self::MOST`] points, or others.

@@ -126,17 +126,17 @@ fn projectile(
     if let (Some(given), None) = (&keys.sectional_density_lb_in2, &table) {
         return Err(text.error(given, "needs drag_table beside it: [[mach, coefficient], ...]"));
     }
-    let of_table = DragModel::Table(table.unwrap_or(DragTable::FLAT));
     let coefficients = [
-        (&keys.ballistic_coefficient_g7_lb_in2, DragModel::G7),
-        (&keys.ballistic_coefficient_g1_lb_in2, DragModel::G1),
-        (&keys.ballistic_coefficient_sphere_lb_in2, DragModel::Sphere),
-        (&keys.sectional_density_lb_in2, of_table),
+        (&keys.ballistic_coefficient_g7_lb_in2, Some(DragModel::G7)),
+        (&keys.ballistic_coefficient_g1_lb_in2, Some(DragModel::G1)),
+        (&keys.ballistic_coefficient_sphere_lb_in2, Some(DragModel::Sphere)),
+        (&keys.sectional_density_lb_in2, table.map(DragModel::Table)),
     ];
     let (mut drag, mut coefficient, mut is_given) =
         (*base.drag(), base.ballistic_coefficient_lb_in2(), false);
     for (key, model) in coefficients {
-        let Some(value) = text.given(key, number(0.05..=2.0, "lb/in^2"))? else { continue };
+        let value = text.given(key, number(0.05..=2.0, "lb/in^2"))?;
+        let (Some(value), Some(model)) = (value, model) else { continue };
         if let (Some(key), true) = (key, is_given) {
             return Err(text.error(key, "gives the round a second drag: leave one of the two out"));
         }

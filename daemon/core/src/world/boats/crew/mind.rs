@@ -69,7 +69,7 @@ pub struct Situation<'a> {
     pub keeps_rules: bool,
     /// When it is to be where it attacks from, seconds since the scenario began, as others of its swarm are.
     pub on_target_s: Option<f64>,
-    /// What the person orders who drives boats.
+    /// Orders of the person who drives boats.
     pub driven: Orders,
 }
 
