@@ -5,12 +5,11 @@ struct BoatBlock {
     vec4 horizon_plane;        // positive above the line of sight over the sea's horizon
     vec4 sun;                  // xyz: unit vector towards the sun
     vec4 eye;                  // xyz: the eye; w: share of the light that haze replaces
+    vec4 lobes[9];             // light of the whole sky: its lobes' radiances
 };
 
-const int BOAT_BLOCKS_MAX = 128;
-
-layout(std140, set = 0, binding = 1) uniform Boats {
-    BoatBlock boats[BOAT_BLOCKS_MAX];
+layout(std430, set = 0, binding = 1) readonly buffer Boats {
+    BoatBlock boats[];
 };
 
 layout(push_constant) uniform DrawBlock {

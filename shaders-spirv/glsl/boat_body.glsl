@@ -7,6 +7,10 @@ layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
 layout(location = 2) in vec2 uv;
 layout(location = 3) in vec3 albedo;
+// What the corner sees of the sky's lobes and of the sea.
+layout(location = 4) in vec4 sky0;
+layout(location = 5) in vec4 sky1;
+layout(location = 6) in vec2 sky2;
 
 // Light that the corner sends to the eye if it were white, without haze; and its colour as it is, with haze. Both are found
 // here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles cost by the fragment.
@@ -21,11 +25,11 @@ out gl_PerVertex {
 };
 
 vec3 lit(BoatBlock boat) {
-    // Shells are seen from both sides; the side that is seen is the one that is lit.
-    vec3 n = dot(normal, boat.eye.xyz - position) < 0.0 ? -normal : normal;
-    float up = dot(n, boat.water_plane.xyz);
-    vec3 ambient = mix(frame.sea.rgb, frame.sky.rgb, 0.5 + 0.5 * up);
-    return albedo * (frame.sun.rgb * max(dot(n, boat.sun.xyz), 0.0) + ambient);
+    vec3 sky = boat.lobes[0].rgb * sky0.x + boat.lobes[1].rgb * sky0.y + boat.lobes[2].rgb * sky0.z
+        + boat.lobes[3].rgb * sky0.w + boat.lobes[4].rgb * sky1.x + boat.lobes[5].rgb * sky1.y
+        + boat.lobes[6].rgb * sky1.z + boat.lobes[7].rgb * sky1.w + boat.lobes[8].rgb * sky2.x;
+    vec3 around = max(sky, 0.0) + frame.sea.rgb * sky2.y;
+    return albedo * (frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0) + around);
 }
 
 void main() {

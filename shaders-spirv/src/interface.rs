@@ -56,7 +56,7 @@ block! {
 }
 
 block! {
-    /// One drawn boat: `BoatBlock`, set 0, binding 1, std140. Planes and directions are in the boat's space.
+    /// One drawn boat: `BoatBlock`, set 0, binding 1, std430. Planes and directions are in the boat's space.
     pub struct BoatBlock {
         /// Rows of the matrix from the boat's space to the camera's.
         pub camera_from_boat: [[f32; 4]; 3],
@@ -68,6 +68,8 @@ block! {
         pub sun: [f32; 4],
         /// The eye, metres; the last is the share of the light that haze replaces.
         pub eye: [f32; 4],
+        /// The light of the whole sky: its lobes' radiances, boat's axes.
+        pub lobes: [[f32; 4]; 9],
     }
 }
 
@@ -421,7 +423,7 @@ block! {
 }
 
 block! {
-    /// A corner of a boat's mesh: vertex inputs 0 to 3 of `boat.vert`.
+    /// A corner of a boat's mesh: vertex inputs 0 to 6 of `boat.vert`.
     pub struct MeshVertex {
         /// Metres, boat's space.
         pub position: [f32; 3],
@@ -431,5 +433,11 @@ block! {
         pub uv: [f32; 2],
         /// Linear diffuse reflectance.
         pub albedo: [f32; 3],
+        /// Radiance of the corner, were it white, over that of each of the sky's lobes 0 to 3, ...
+        pub sky0: [f32; 4],
+        /// ...4 to 7, ...
+        pub sky1: [f32; 4],
+        /// ...8, and over that of the sea.
+        pub sky2: [f32; 2],
     }
 }

@@ -13,10 +13,9 @@ use rspirv::{
     spirv::{Decoration, Op, StorageClass, Word},
 };
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock,
-    HULL_LINE_COLUMNS, HudQuad, LobeBlock, MeshVertex, MirrorBlock, PhysicsBlock, PhysicsPublishedBlock,
-    ReflectBlock, RoundBlock, TRACK_POINTS, VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint,
-    WaterBlock,
+    BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock, HULL_LINE_COLUMNS,
+    HudQuad, LobeBlock, MeshVertex, MirrorBlock, PhysicsBlock, PhysicsPublishedBlock, ReflectBlock,
+    RoundBlock, TRACK_POINTS, VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint, WaterBlock,
 };
 
 /// Name, fields with offsets, and size of one struct of the host.
@@ -148,7 +147,6 @@ fn arrays_of_blocks_have_the_stride_and_length_of_the_hosts() {
             if i.class.opcode == Op::TypeArray {
                 let length = constants[&word(&i.operands[1])] as usize;
                 let wanted = match *host {
-                    "BoatBlock" => BOAT_BLOCKS_MAX,
                     "WakePoint" => TRACK_POINTS,
                     _ => WATERS_MAX,
                 };

@@ -25,6 +25,7 @@ pub mod physics;
 pub mod sea;
 pub mod session;
 pub mod side;
+pub mod sky;
 pub mod statistics;
 pub mod text;
 pub mod time;

@@ -52,7 +52,7 @@ pub(crate) struct FrameData {
 const fn kinds() -> [vk::DescriptorType; 10] {
     const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
     const UNIFORM: vk::DescriptorType = vk::DescriptorType::UNIFORM_BUFFER;
-    [UNIFORM, UNIFORM, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE, UNIFORM, UNIFORM]
+    [UNIFORM, STORAGE, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE, UNIFORM, UNIFORM]
 }
 
 /// Layout of set 0.

@@ -10,6 +10,7 @@ use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
     sea::BeaufortForce,
+    sky::SkyLobes,
     water::{ReflectionMethod, ShadowLevel, Water},
     world::{
         boats::{CourseState, Hull},
@@ -35,6 +36,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
             sun_direction: DVec3::new(0.5, -0.5, 0.7).normalize(),
             sun: Vec3::new(0.8, 0.76, 0.68),
             sky: Vec3::new(0.35, 0.42, 0.52),
+            dome: SkyLobes::even(Vec3::new(0.35, 0.42, 0.52)),
             horizon: Vec3::new(0.6, 0.66, 0.72),
             sea: Vec3::new(0.08, 0.13, 0.15),
         },

@@ -97,7 +97,9 @@ pub(crate) fn boat_block(scene: &Scene, boat: &BoatView, pose: &RigidPose, mirro
         Some(normal) if boat.beyond_horizon && !mirrored => plane(normal, camera.position),
         _ => [0.0, 0.0, 0.0, 1.0],
     };
+    let lobes = scene.light.dome.turned(pose.world_from_body).terms;
     BoatBlock {
+        lobes: lobes.map(|light| light.extend(0.0).to_array()),
         camera_from_boat: [row(0), row(1), row(2)],
         water_plane,
         horizon_plane,

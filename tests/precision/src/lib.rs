@@ -28,6 +28,7 @@ pub mod row;
 pub mod sea_video;
 pub mod setups;
 pub mod ship;
+pub mod sky;
 pub mod table;
 pub mod target;
 pub mod truth;

@@ -27,6 +27,7 @@ mod pacing;
 mod reflection;
 mod sea;
 mod shutter;
+mod skylight;
 mod skyline;
 mod target;
 mod warp;
@@ -71,6 +72,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: horizon::ABOUT, measure: horizon::measure },
     NumericalPart { about: haze::ABOUT, measure: haze::measure },
     NumericalPart { about: skyline::ABOUT, measure: skyline::measure },
+    NumericalPart { about: skylight::ABOUT, measure: skylight::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },
     NumericalPart { about: shutter::ABOUT, measure: shutter::measure },
@@ -104,7 +106,7 @@ fn table(csv: &str) -> Vec<Vec<f64>> {
 }
 
 /// Uniform numbers 0 to 1 from splitmix64 of `i`: the product draws from another generator.
-fn even(i: u64) -> f64 {
+pub(crate) fn even(i: u64) -> f64 {
     random::unit(random::mix(i.wrapping_mul(random::GOLDEN)))
 }
 

@@ -7,6 +7,7 @@ use bowwave_core::{
     colour::{LUMINANCE, srgb_to_linear},
     estimate::light::Light,
     geometry::{CameraPose, Lens, RigidPose},
+    sky::SkyLobes,
 };
 use glam::{DQuat, DVec2, DVec3, Vec3};
 use image::{GrayImage, Rgb, RgbImage, imageops};
@@ -135,6 +136,7 @@ impl TruthCell {
                 sun_direction: DVec3::from_array(of.light.sun_direction),
                 sun: single(of.light.boat_sun),
                 sky: single(of.light.boat_sky),
+                dome: SkyLobes::even(single(of.light.boat_sky)),
                 horizon: between(&sky, HORIZON_DEG),
                 sea: single(of.light.boat_sea),
             },

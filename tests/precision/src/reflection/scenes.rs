@@ -9,6 +9,7 @@ use bowwave_core::{
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId},
     sea::BeaufortForce,
+    sky::SkyLobes,
     water::{ReflectionMethod, ShadowLevel, Water},
     world::fleet::Afloat,
 };
@@ -41,6 +42,7 @@ pub fn light(sun: f32) -> Light {
         sun_direction: DVec3::new(0.3, -0.5, 0.8).normalize(),
         sun: Vec3::splat(sun),
         sky: Vec3::splat(SKY),
+        dome: SkyLobes::even(Vec3::splat(SKY)),
         horizon: Vec3::splat(SKY),
         sea: Vec3::splat(0.08),
     }

@@ -1,11 +1,13 @@
 //! Light on the boats, taken from the picture itself so that they fit it.
 //!
-//! A few hundred pixels above the horizon give the sky's radiance at the camera's own exposure and white balance; the sun's
-//! share follows from its height. This is an estimate for shading, not a photometric measurement.
+//! A few hundred pixels above the horizon are a part of some sky under the scenario's sun, at the camera's own exposure and white balance
+//! ([`SkyFamily`]): it supplies the rest of the dome, and the sun. This is an estimate for shading, not a photometric measurement.
 
+mod dome;
 mod sky;
 mod tones;
 
+pub use dome::{FittedSky, SkyFamily, SkyPixel, level_irradiance};
 pub use sky::{SKY_SINES, SkyLight};
 pub use tones::{SeaTones, ToneSample};
 
@@ -16,6 +18,7 @@ use crate::{
     event::Picture,
     geometry::{CameraPose, Lens},
     sea::{Facets, rms_slope},
+    sky::SkyLobes,
     time::Time,
 };
 
@@ -25,12 +28,8 @@ const FOLLOW_S: f64 = 1.0;
 /// Pixels sampled along the picture's width and height.
 const GRID: (u32, u32) = (24, 18);
 
-/// A white matt surface facing a high sun in clear air is this many times as bright as one that sees only the sky, as
-/// cameras expose it: illuminances of 70-90 klx and 15-20 klx (CIE S 011), less the highlight roll-off of ordinary cameras.
-const SUN_TO_SKY: f32 = 2.6;
-
-/// Optical depth of a clear maritime atmosphere at about 610, 550 and 465 nm (Rayleigh and background aerosol).
-const OPTICAL_DEPTH: Vec3 = Vec3::new(0.10, 0.14, 0.22);
+/// The whole sky is fitted anew no sooner, seconds: it changes slowly, and a fit takes half a millisecond.
+const FIT_EVERY_S: f64 = 0.5;
 
 /// Light that comes out of the sea over the light that falls on it: clear to coastal water, 0.01 to 0.03 under the surface (Mobley
 /// 1994, section 3.3), of which the surface lets half out.
@@ -53,8 +52,10 @@ pub struct Light {
     pub sun_direction: DVec3,
     /// Radiance of a white matt surface that faces the sun, without the sky; zero when the sun is down.
     pub sun: Vec3,
-    /// Radiance of a white matt surface that sees only the upper sky.
+    /// Radiance of a white matt surface that lies level under the sky without the sun.
     pub sky: Vec3,
+    /// The light of the whole sky by direction, world.
+    pub dome: SkyLobes,
     /// Radiance of the sky at the horizon: what haze adds and what the sea's lower hemisphere is mixed from.
     pub horizon: Vec3,
     /// Radiance that a surface gets from the sea below.
@@ -88,10 +89,20 @@ struct Means {
     sea: Vec3,
 }
 
+/// The sky that was fitted, followed.
+#[derive(Clone, Copy, Debug)]
+struct FollowedSky {
+    fitted: Time,
+    dome: SkyLobes,
+    sun: Vec3,
+}
+
 /// Follows the light of the picture.
 #[derive(Clone, Debug)]
 pub struct LightMeter {
     sun_direction: DVec3,
+    family: SkyFamily,
+    sky: Option<FollowedSky>,
     /// Whether the sea's tones are wanted: only reflections by brightness need them.
     wants_tones: bool,
     means: Option<(Time, Means)>,
@@ -101,8 +112,15 @@ pub struct LightMeter {
 impl LightMeter {
     /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world). The sea's brightness is measured only where
     /// it is wanted: reflections by brightness need it.
-    pub const fn new(sun_direction: DVec3, wants_tones: bool) -> Self {
-        Self { sun_direction, wants_tones, means: None, tones: None }
+    pub fn new(sun_direction: DVec3, wants_tones: bool) -> Self {
+        Self {
+            sun_direction,
+            family: SkyFamily::new(sun_direction),
+            sky: None,
+            wants_tones,
+            means: None,
+            tones: None,
+        }
     }
 
     /// Takes in a picture whose camera stood at `camera` with `lens` (the picture's own, not the screen's).
@@ -116,7 +134,9 @@ impl LightMeter {
             };
             self.tones = Some((time, seen));
         }
-        let Some(seen) = measure(picture, lens, camera) else { return };
+        let (seen, pixels) = measure(picture, lens, camera);
+        let Some(seen) = seen else { return };
+        self.follow_sky(time, &pixels);
         let means = match self.means {
             None => seen,
             Some((since, old)) => {
@@ -129,6 +149,24 @@ impl LightMeter {
             }
         };
         self.means = Some((time, means));
+    }
+
+    /// Fits the whole sky to the pixels of its part in view.
+    fn follow_sky(&mut self, time: Time, pixels: &[SkyPixel]) {
+        let since = self.sky.map(|sky| time.secs_since(sky.fitted));
+        if since.is_some_and(|since| (0.0..FIT_EVERY_S).contains(&since)) {
+            return;
+        }
+        let Some(fitted) = self.family.fit(pixels) else { return };
+        let sun = (fitted.sun + fitted.aureole) / std::f32::consts::PI;
+        self.sky = Some(match self.sky {
+            None => FollowedSky { fitted: time, dome: fitted.lobes, sun },
+            Some(old) => {
+                let share = follow(old.fitted, time);
+                let dome = old.dome.towards(&fitted.lobes, share);
+                FollowedSky { fitted: time, dome, sun: old.sun.lerp(sun, share) }
+            }
+        });
     }
 
     /// Agreement of the sky in the pictures with the sun's elevation; `None` before a sky was seen.
@@ -189,11 +227,14 @@ impl LightMeter {
         )
     }
 
-    /// The light to draw boats with. Before the first picture: that of an overcast grey.
+    /// The light to draw boats with. Before a sky was seen, and where it is too dark to tell: as from everywhere what is seen of it, without
+    /// a sun.
     pub fn light(&self) -> Light {
         let Means { sky, horizon, sea } = self.means();
-        let sun = sun_colour(self.sun_direction.z) * sky.element_sum() / 3.0 * SUN_TO_SKY;
-        Light { sun_direction: self.sun_direction, sun, sky, horizon, sea }
+        let (dome, sun) =
+            self.sky.map_or_else(|| (SkyLobes::even(sky), Vec3::ZERO), |sky| (sky.dome, sky.sun));
+        let level = level_irradiance(&dome).max(Vec3::ZERO) / std::f32::consts::PI;
+        Light { sun_direction: self.sun_direction, sun, sky: level, dome, horizon, sea }
     }
 }
 
@@ -235,23 +276,11 @@ fn tones(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<SeaTones
     SeaTones::fit(samples.get(..count)?)
 }
 
-/// Colour of direct sun light relative to a high sun's green, for the sine of its elevation; black below the horizon.
-fn sun_colour(sin_elevation: f64) -> Vec3 {
-    let degrees = sin_elevation.clamp(-1.0, 1.0).asin().to_degrees();
-    if degrees <= -0.6 {
-        return Vec3::ZERO;
-    }
-    // Relative air mass, Kasten & Young 1989, eq. 3.
-    let airmass = 1.0 / (sin_elevation.max(0.0) + 0.505_72 * (degrees + 6.079_95).powf(-1.636_4));
-    let transmitted = (-OPTICAL_DEPTH * airmass as f32).exp();
-    let overhead = (-OPTICAL_DEPTH).exp();
-    let risen = ((degrees + 0.6) / 1.2).clamp(0.0, 1.0) as f32;
-    transmitted / overhead * risen
-}
-
-fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<Means> {
+/// Mean colours and the pixels of the sky.
+fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> (Option<Means>, Vec<SkyPixel>) {
     let mut sums = [Vec3::ZERO; 3];
     let mut counts = [0u32; 3];
+    let mut pixels = Vec::new();
     for iy in 0..GRID.1 {
         for ix in 0..GRID.0 {
             let share = DVec2::new(
@@ -259,9 +288,9 @@ fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<Means>
                 (f64::from(iy) + 0.5) / f64::from(GRID.1),
             );
             let pixel = share * DVec2::new(f64::from(lens.width), f64::from(lens.height));
-            let up = (camera.world_from_camera * lens.unproject(pixel)).z;
+            let direction = camera.world_from_camera * lens.unproject(pixel);
             // Sky; the strip of 0.5 to 6 degrees over the horizon; sea from 2 degrees below it.
-            let class = match up {
+            let class = match direction.z {
                 u if u > 0.105 => 0,
                 u if u > 0.009 => 1,
                 u if u < -0.035 => 2,
@@ -269,18 +298,23 @@ fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<Means>
             };
             let place = share * DVec2::new(f64::from(picture.width()), f64::from(picture.height()));
             let colour = picture.srgb_at(place.x as u32, place.y as u32).map(srgb_to_linear);
-            sums[class] += Vec3::from_array(colour);
+            let radiance = Vec3::from_array(colour);
+            sums[class] += radiance;
             counts[class] += 1;
+            if class < 2 {
+                pixels.push(SkyPixel { direction, radiance });
+            }
         }
     }
     let mean = |class: usize| (counts[class] > 0).then(|| sums[class] / counts[class] as f32);
     let horizon = mean(1).or(mean(0));
     let sky = mean(0).or(mean(1));
-    match (sky, horizon, mean(2)) {
+    let means = match (sky, horizon, mean(2)) {
         (Some(sky), Some(horizon), sea) => Some(Means { sky, horizon, sea: sea.unwrap_or(sky * 0.2) }),
         // Looking down, no sky: keep what was known of it.
         _ => None,
-    }
+    };
+    (means, pixels)
 }
 
 #[cfg(test)]
@@ -302,11 +336,14 @@ mod tests {
         let mut meter = LightMeter::new(DVec3::new(0.0, 0.6, 0.8), false);
         meter.observe(Time::from_ns(0), &two_tone(188, 99), &lens, &camera);
         let light = meter.light();
-        assert!((light.sky.x - srgb_to_linear(188.0 / 255.0)).abs() < 1e-4);
+        // A grey sky that is as bright everywhere is an overcast one, brighter above.
+        let seen = srgb_to_linear(188.0 / 255.0);
+        assert!(light.sky.x > 0.8 * seen && light.sky.x < 3.0 * seen, "{} {seen}", light.sky);
+        assert!((light.horizon.x - seen).abs() < 1e-4);
         assert!((light.sea.y - srgb_to_linear(99.0 / 255.0)).abs() < 1e-4);
         // A dark picture ten time constants later is followed.
         meter.observe(Time::from_ns(0).plus_secs(10.0), &two_tone(60, 30), &lens, &camera);
-        assert!(meter.light().sky.x < 0.06);
+        assert!(meter.light().sky.x < 0.06 * light.sky.x / seen);
     }
 
     #[test]
@@ -359,18 +396,5 @@ mod tests {
         let mut meter = LightMeter::new(-DVec3::Z, true);
         meter.observe(Time::from_ns(0), &two_tone(0, 255), &lens, &camera);
         assert!(meter.sky(5.0).nodes.iter().all(|n| n.is_finite() && n.min_element() >= 0.0));
-    }
-
-    #[test]
-    fn the_sun_reddens_sets_and_stays_finite() {
-        let noon = sun_colour(1.0);
-        assert!((noon - Vec3::ONE).abs().max_element() < 0.02);
-        let low = sun_colour(3f64.to_radians().sin());
-        assert!(low.x > 2.0 * low.z && low.x < 0.6);
-        for tenth_degrees in -900..=900 {
-            let c = sun_colour((f64::from(tenth_degrees) / 10.0).to_radians().sin());
-            assert!(c.is_finite() && c.min_element() >= 0.0);
-        }
-        assert_eq!(sun_colour(-0.02), Vec3::ZERO);
     }
 }

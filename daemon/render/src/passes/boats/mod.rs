@@ -6,6 +6,7 @@ pub(crate) mod meshes;
 mod parts;
 mod simplify;
 mod split;
+mod transfer;
 
 use ash::vk;
 use bowwave_core::{frame::scene::PixelRect, model::ModelId};
@@ -36,10 +37,9 @@ pub(crate) struct BoatDraw {
     pub(crate) detail_m: f64,
 }
 
-/// What draws meshes: closed parts without their back faces, open shells from both sides, textured ones with their texture.
+/// What draws meshes, without back faces: open shells have a side of their own for each way. Textured ones are drawn with their texture.
 pub(crate) struct BoatPipelines {
-    closed: Pipeline,
-    open: Pipeline,
+    plain: Pipeline,
     textured: Option<Pipeline>,
 }
 
@@ -58,12 +58,15 @@ impl BoatPipelines {
             (vk::Format::R32G32B32_SFLOAT, 12),
             (vk::Format::R32G32_SFLOAT, 24),
             (vk::Format::R32G32B32_SFLOAT, 32),
+            (vk::Format::R32G32B32A32_SFLOAT, 44),
+            (vk::Format::R32G32B32A32_SFLOAT, 60),
+            (vk::Format::R32G32_SFLOAT, 76),
         ];
         // A layer of codes holds roots, one of light is filtered as it is.
         let constants = [u32::from(colour == UNORM), samples.as_raw()];
         let lens = context.lens_constants();
         let sets = [context.frame_set, &meshes.skin_layout];
-        let make = |textured: bool, cull: Option<vk::FrontFace>| {
+        let make = |textured: bool| {
             Pipeline::new(
                 context.gpu,
                 &PipelineShape {
@@ -78,14 +81,14 @@ impl BoatPipelines {
                     colour,
                     targets: 1,
                     blend: Blend::Replace,
-                    cull,
+                    cull: Some(front),
                     depth: true,
                     samples,
                 },
             )
         };
-        let textured = any_textured.then(|| make(true, None)).transpose()?;
-        Ok(Self { closed: make(false, Some(front))?, open: make(false, None)?, textured })
+        let textured = any_textured.then(|| make(true)).transpose()?;
+        Ok(Self { plain: make(false)?, textured })
     }
 
     /// Draws one boat's mesh, within a rendering with depth. The shared buffers are bound.
@@ -98,19 +101,18 @@ impl BoatPipelines {
     ) {
         let Some(level) = meshes.level(boat.model, boat.detail_m) else { return };
         let block = DrawBlock { index: boat.index, ..DrawBlock::default() };
-        if let (Some(skin), Some(pipeline)) = (meshes.skin(boat.model), &self.textured) {
-            to.bind(pipeline, &[frame, skin]);
-            to.push(pipeline, &block);
-            meshes.draw(to, boat.model, &(level.closed.start..level.open.end));
-            return;
-        }
-        for (pipeline, indices) in [(&self.closed, &level.closed), (&self.open, &level.open)] {
-            if !indices.is_empty() {
-                to.bind(pipeline, &[frame]);
-                to.push(pipeline, &block);
-                meshes.draw(to, boat.model, indices);
+        let pipeline = match (meshes.skin(boat.model), &self.textured) {
+            (Some(skin), Some(textured)) => {
+                to.bind(textured, &[frame, skin]);
+                textured
             }
-        }
+            _ => {
+                to.bind(&self.plain, &[frame]);
+                &self.plain
+            }
+        };
+        to.push(pipeline, &block);
+        meshes.draw(to, boat.model, &(level.closed.start..level.open.end));
     }
 }
 

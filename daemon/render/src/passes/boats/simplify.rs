@@ -1,16 +1,18 @@
 //! What a mesh does not need for the size at which it is drawn. Small triangles cost by their number and not by their area, so far
 //! boats are drawn from levels that lie within a part of a pixel of the whole model; and the back faces of closed parts, which
-//! nobody sees, are told apart from open shells, which are seen from both sides.
+//! nobody sees, are told apart from open shells, which are seen from both sides and get a second one for the other.
 
-use std::ops::Range;
+use std::{collections::HashMap, ops::Range};
 
-use bowwave_core::model::{Model, ModelKind};
+use bowwave_core::model::{Model, ModelKind, Vertex};
+use glam::Vec3;
 use meshopt::{SimplifyOptions, VertexDataAdapter, simplify_with_attributes_and_locks};
 use shaders_spirv::interface::MeshVertex;
 
 use crate::{
     passes::boats::parts::Parts,
     passes::boats::split::{EDGE_PX, split},
+    passes::boats::transfer::{Transfer, transfers},
     plan::DETAIL_PX,
 };
 
@@ -29,7 +31,7 @@ pub(crate) struct Level {
     error_tenth_mm: u32,
     /// Triangles of closed parts: back faces can be left out.
     pub(crate) closed: Range<u32>,
-    /// Triangles that are seen from both sides.
+    /// Triangles of open shells, each of their sides by itself.
     pub(crate) open: Range<u32>,
 }
 
@@ -65,22 +67,16 @@ fn least_pixel_m(error_m: f32, size_m: f32) -> f32 {
 pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
     /// A level is kept if it has at most this share of the triangles of the one before.
     const WORTHWHILE: f64 = 0.8;
-    let vertices: Vec<MeshVertex> = model
-        .vertices
-        .iter()
-        .map(|v| MeshVertex {
-            position: v.position.to_array(),
-            normal: v.normal.to_array(),
-            uv: v.uv.to_array(),
-            albedo: v.albedo.to_array(),
-        })
-        .collect();
+    let seen = transfers(model);
+    let corner = |(v, seen): (&Vertex, &[Transfer; 2])| lit_corner(v, v.normal, &seen[0]);
+    let vertices: Vec<MeshVertex> = model.vertices.iter().zip(seen.iter()).map(corner).collect();
     let triangles: Vec<[u32; 3]> = model.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
     let parts = Parts::of(model);
     let closed: Vec<bool> = triangles.iter().map(|t| parts.closed(t[0])).collect();
     let size_m = (model.max - model.min).max_element();
     let mut all = Simplified { vertices, bent, size_m, ..Simplified::default() };
-    all.push(0.0, &triangles, &closed);
+    let mut sides = Sides { model, seen: &seen, others: HashMap::new() };
+    all.push(0.0, &triangles, &closed, &mut sides);
     // A texture's seams would tear, and a picture has few triangles anyway.
     if model.texture.is_some() || model.kind == ModelKind::Quad {
         return all;
@@ -93,11 +89,55 @@ pub(crate) fn simplify(model: &Model, bent: bool) -> Simplified {
         if !fewer.is_empty() && fewer.len() as f64 <= WORTHWHILE * last as f64 {
             last = fewer.len();
             let closed: Vec<bool> = fewer.iter().map(|t| parts.closed(t[0])).collect();
-            all.push(error, &fewer, &closed);
+            all.push(error, &fewer, &closed, &mut sides);
         }
         error *= 2.0;
     }
     all
+}
+
+/// A corner with what it sees on the side of `normal`.
+fn lit_corner(v: &Vertex, normal: Vec3, seen: &Transfer) -> MeshVertex {
+    let [a, b, c, d, e, f, g, h, i, sea] = *seen;
+    MeshVertex {
+        position: v.position.to_array(),
+        normal: normal.to_array(),
+        uv: v.uv.to_array(),
+        albedo: v.albedo.to_array(),
+        sky0: [a, b, c, d],
+        sky1: [e, f, g, h],
+        sky2: [i, sea],
+    }
+}
+
+/// The corners of open shells, which are seen and lit from both sides: each side has its own.
+struct Sides<'a> {
+    model: &'a Model,
+    seen: &'a [[Transfer; 2]],
+    /// The corner of the other side.
+    others: HashMap<u32, u32>,
+}
+
+impl Sides<'_> {
+    /// A triangle of the corners whose normals are on the side from which it is seen this way round.
+    fn facing(&mut self, vertices: &mut Vec<MeshVertex>, triangle: [u32; 3]) -> [u32; 3] {
+        let corners = triangle.map(|i| self.model.vertices.get(i as usize));
+        let [Some(a), Some(b), Some(c)] = corners else { return triangle };
+        let face = (b.position - a.position).cross(c.position - a.position);
+        triangle.map(|i| {
+            let (Some(v), Some(seen)) = (self.model.vertices.get(i as usize), self.seen.get(i as usize))
+            else {
+                return i;
+            };
+            if face.dot(v.normal) >= 0.0 {
+                return i;
+            }
+            *self.others.entry(i).or_insert_with(|| {
+                vertices.push(lit_corner(v, -v.normal, &seen[1]));
+                vertices.len() as u32 - 1
+            })
+        })
+    }
 }
 
 /// The triangles of `model` that keep its surface within `error` metres, its shading and colours likewise.
@@ -131,8 +171,13 @@ fn with_error(model: &Model, parts: &Parts, error: f32) -> Vec<[u32; 3]> {
 }
 
 impl Simplified {
-    fn push(&mut self, error_m: f32, triangles: &[[u32; 3]], closed: &[bool]) {
+    fn push(&mut self, error_m: f32, triangles: &[[u32; 3]], closed: &[bool], sides: &mut Sides<'_>) {
         let mut triangles: Vec<_> = triangles.iter().copied().zip(closed.iter().copied()).collect();
+        let open: Vec<[u32; 3]> = triangles.extract_if(.., |(_, closed)| !*closed).map(|(t, _)| t).collect();
+        for [a, b, c] in open {
+            triangles.push((sides.facing(&mut self.vertices, [a, b, c]), false));
+            triangles.push((sides.facing(&mut self.vertices, [a, c, b]), false));
+        }
         if self.bent {
             triangles = split(&mut self.vertices, triangles, EDGE_PX * least_pixel_m(error_m, self.size_m));
         }
@@ -149,8 +194,6 @@ impl Simplified {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
     use crate::testing;
 
@@ -162,7 +205,7 @@ mod tests {
         let mut open = model.clone();
         open.indices.truncate(30);
         let level = &simplify(&open, false).levels[0];
-        assert_eq!((level.closed.len(), level.open.len()), (0, 30));
+        assert_eq!((level.closed.len(), level.open.len()), (0, 60));
         let mut inverted = model;
         inverted.indices.chunks_exact_mut(3).for_each(|t| t.swap(0, 1));
         assert_eq!(simplify(&inverted, false).levels[0].closed.len(), 0);

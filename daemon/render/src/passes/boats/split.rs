@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 use shaders_spirv::interface::MeshVertex;
 
 /// No edge is drawn longer than this, pixels: through a fisheye of 120 deg it then lies within half a pixel of its curve.
@@ -58,6 +58,9 @@ fn cut(
         normal: normal.to_array(),
         uv: Vec2::from(a.uv).midpoint(Vec2::from(b.uv)).to_array(),
         albedo: middle(a.albedo, b.albedo).to_array(),
+        sky0: Vec4::from(a.sky0).midpoint(Vec4::from(b.sky0)).to_array(),
+        sky1: Vec4::from(a.sky1).midpoint(Vec4::from(b.sky1)).to_array(),
+        sky2: Vec2::from(a.sky2).midpoint(Vec2::from(b.sky2)).to_array(),
     };
     let index = u32::try_from(vertices.len()).ok()?;
     vertices.push(new);

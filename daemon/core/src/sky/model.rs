@@ -1,0 +1,30 @@
+//! Properties of every sky, and the overcast one.
+
+use glam::{DVec3, Vec3};
+
+/// Radiance of starlight and airglow, relative to the sun's irradiance above the air: 2e-4 of 128 000 cd/m^2 (Leinert 1998, table 1). No
+/// sky is darker, whatever the sun does.
+pub const NIGHT: f32 = 1.6e-9;
+
+/// A model of a clear sky under one sun, relative to the sun's irradiance above the air.
+pub trait SkyModel {
+    /// Radiance from unit `direction`, without the sun's disc; below the horizon that of the horizon.
+    fn radiance(&self, direction: DVec3) -> Vec3;
+    /// Irradiance of the sun at sea level on a surface that faces it.
+    fn sunlight(&self) -> Vec3;
+}
+
+/// Radiance of the CIE's overcast sky (Moon and Spencer 1942) from unit `direction`, relative to that of its zenith; below the horizon that
+/// of the horizon.
+pub fn overcast(direction: DVec3) -> f32 {
+    (1.0 + 2.0 * direction.z.clamp(0.0, 1.0) as f32) / 3.0
+}
+
+/// Zenith's radiance of an overcast sky over that of the sun's irradiance above the air, the sun's sine of elevation being `sine`.
+///
+/// Clouds let through a quarter of what falls on them (Kasten and Czeplak 1980), which is what falls on a level surface under a clear sky, and
+/// a level surface gets 7 pi / 9 of the zenith's radiance from a sky of that shape.
+pub fn overcast_zenith(level_clear: Vec3) -> Vec3 {
+    const THROUGH: f32 = 0.25;
+    level_clear * (THROUGH * 9.0 / (7.0 * std::f32::consts::PI))
+}
