@@ -1,4 +1,4 @@
-//! What the air is made of, and how much of the sun comes through it.
+//! Composition of the air, and the share of the sun that comes through it.
 
 use std::sync::OnceLock;
 
@@ -24,7 +24,7 @@ const HAZE_COLOUR: DVec3 = DVec3::new(550.0 / 645.0, 1.0, 550.0 / 440.0);
 /// clear ones together.
 pub(super) const HAZE_G: f64 = 0.70;
 
-/// What haze takes at sea level, 1/m; the turbidity is the optical depth of molecules and haze over that of molecules, at 550 nm.
+/// Extinction by haze at sea level, 1/m; the turbidity is the optical depth of molecules and haze over that of molecules, at 550 nm.
 pub(super) fn haze(turbidity: f64) -> DVec3 {
     (turbidity - 1.0).max(0.0) * RAYLEIGH.y * RAYLEIGH_M / HAZE_M * HAZE_COLOUR
 }
@@ -66,14 +66,9 @@ impl Columns {
     }
 
     fn at(&self, radius: f64, sine: f64) -> DVec3 {
-        let share = ((radius - GROUND_M) / (TOP_M - GROUND_M)).clamp(0.0, 1.0);
         let (near, far) = ways(radius);
-        let line = ((way_to_top(radius, sine) - near) / (far - near).max(1.0)).clamp(0.0, 1.0);
-        let (row, up) = cell(share.cbrt(), HEIGHTS);
-        let (column, along) = cell(line, LINES);
-        let at = |row: usize, column: usize| self.0[row * LINES + column];
-        let low = at(row, column).lerp(at(row, column + 1), along);
-        low.lerp(at(row + 1, column).lerp(at(row + 1, column + 1), along), up)
+        let line = (way_to_top(radius, sine) - near) / (far - near).max(1.0);
+        mixed(&self.0, (share_of_radius(radius), HEIGHTS), (line, LINES))
     }
 }
 
@@ -82,6 +77,19 @@ pub(super) fn cell(share: f64, count: usize) -> (usize, f64) {
     let place = share.clamp(0.0, 1.0) * (count - 1) as f64;
     let index = (place as usize).min(count - 2);
     (index, place - index as f64)
+}
+
+/// Value of a table between its four nodes about a share of its rows and one of its columns; each comes with how many there are.
+pub(super) fn mixed(nodes: &[DVec3], rows: (f64, usize), columns: (f64, usize)) -> DVec3 {
+    let ((row, up), (column, over)) = (cell(rows.0, rows.1), cell(columns.0, columns.1));
+    let at = |row: usize, column: usize| nodes[row * columns.1 + column];
+    let low = at(row, column).lerp(at(row, column + 1), over);
+    low.lerp(at(row + 1, column).lerp(at(row + 1, column + 1), over), up)
+}
+
+/// Share of a table's rows at a radius from the Earth's middle, metres: rows are closer together near the sea, where haze is.
+pub(super) fn share_of_radius(radius: f64) -> f64 {
+    ((radius - GROUND_M) / (TOP_M - GROUND_M)).max(0.0).cbrt()
 }
 
 /// The shortest and the longest way from a radius to the top: straight up, and past the horizon.

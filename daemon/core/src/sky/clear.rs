@@ -19,7 +19,7 @@ const STEPS: u32 = 28;
 /// Height of the eye, metres.
 const EYE_M: f64 = 10.0;
 
-/// What is seen in a direction: light that molecules and haze scattered once, without how much of it they turn by that angle, and all other.
+/// Light from a direction: light that molecules and haze scattered once, without how much of it they turn by that angle, and all other.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
     molecules: Vec3,
@@ -103,7 +103,7 @@ fn haze_phase(cosine: f64) -> f32 {
     (scale * (1.0 + cosine * cosine) / (1.0 + g2 - 2.0 * HAZE_G * cosine).powf(1.5)) as f32
 }
 
-/// What is seen along a line of that sine of elevation, `level` being the cosine of its azimuth from the sun, whose sine of elevation is
+/// Light along a line of sight of that sine of elevation, `level` being the cosine of its azimuth from the sun, whose sine of elevation is
 /// `sun`.
 fn looked(number: usize, sine: f64, level: f64, sun: f64) -> Seen {
     let (turbidity, radius) = (TABLED[number], GROUND_M + EYE_M);

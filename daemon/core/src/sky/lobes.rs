@@ -49,6 +49,13 @@ impl SkyLobes {
         self.terms.iter().zip(Self::basis(direction)).map(|(term, value)| *term * value as f32).sum()
     }
 
+    /// Irradiance of that light on a level surface.
+    pub fn on_level(&self) -> Vec3 {
+        // Over the upper half, the cosine's integral with 1 is pi, with z 2 pi / 3, with 3 z^2 - 1 pi / 2; with the others nothing.
+        let pi = std::f32::consts::PI;
+        self.terms[0] * pi + self.terms[3] * (2.0 * pi / 3.0) + self.terms[8] * (0.5 * pi)
+    }
+
     /// The same light by the directions of a body.
     #[must_use]
     pub fn turned(&self, world_from_body: DQuat) -> Self {

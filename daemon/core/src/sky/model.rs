@@ -20,7 +20,7 @@ pub fn overcast(direction: DVec3) -> f32 {
     (1.0 + 2.0 * direction.z.clamp(0.0, 1.0) as f32) / 3.0
 }
 
-/// Zenith's radiance of an overcast sky over that of the sun's irradiance above the air, the sun's sine of elevation being `sine`.
+/// Zenith's radiance of an overcast sky where a level surface would have the irradiance `level_clear` under a clear one.
 ///
 /// Clouds let through a quarter of what falls on them (Kasten and Czeplak 1980), which is what falls on a level surface under a clear sky, and
 /// a level surface gets 7 pi / 9 of the zenith's radiance from a sky of that shape.

@@ -8,8 +8,8 @@ use std::{
 use glam::DVec3;
 
 use super::air::{
-    GROUND_M, HAZE_ALBEDO, RAYLEIGH, TOP_M, along, cell, densities, depth, haze, through, way_to_sea,
-    way_to_top,
+    GROUND_M, HAZE_ALBEDO, RAYLEIGH, TOP_M, along, densities, depth, haze, mixed, share_of_radius, through,
+    way_to_sea, way_to_top,
 };
 
 /// Reflectance of the sea below, on the average.
@@ -64,11 +64,7 @@ impl Multiple {
 
     /// Radiance that scatters again at a height (radius from the Earth's middle, metres) where the sun's sine of elevation is `sun`.
     pub(super) fn at(&self, radius: f64, sun: f64) -> DVec3 {
-        let (row, up) = cell(((radius - GROUND_M) / (TOP_M - GROUND_M)).max(0.0).cbrt(), HEIGHTS);
-        let (column, over) = cell(share_of_sun(sun), SUNS);
-        let at = |row: usize, column: usize| self.0[row * SUNS + column];
-        let low = at(row, column).lerp(at(row, column + 1), over);
-        low.lerp(at(row + 1, column).lerp(at(row + 1, column + 1), over), up)
+        mixed(&self.0, (share_of_radius(radius), HEIGHTS), (share_of_sun(sun), SUNS))
     }
 }
 

@@ -10,7 +10,7 @@ use crate::sky::{ClearSky, SkyLobes, SkyModel, overcast, overcast_zenith};
 
 /// Shares of the sky under clouds that are tried.
 const COVERS: [f32; 7] = [0.0, 0.2, 0.4, 0.6, 0.8, 0.93, 1.0];
-/// What a right model's brightness is off by at a pixel, natural logarithm: clouds' edges, haze in layers.
+/// Error of a right model's brightness at a pixel, natural logarithm: clouds' edges, haze in layers.
 const MISFIT: f32 = 0.08;
 /// Pixels next to each other err alike: so many count.
 const COUNTED: f32 = 19.0;
@@ -19,7 +19,7 @@ const RARER: f32 = 1.0;
 /// No pixel counts as farther off, natural logarithm: a sail or a shore in the sky.
 const FAR: f32 = 0.5;
 /// Fewer pixels of sky tell no sky from another.
-pub(super) const PIXELS_FEWEST: usize = 12;
+const PIXELS_FEWEST: usize = 12;
 
 /// One pixel of sky.
 #[derive(Clone, Copy, Debug)]
@@ -61,8 +61,6 @@ pub struct FittedSky {
     pub sun: Vec3,
     /// ...and of its aureole.
     pub aureole: Vec3,
-    /// Share of the sky under clouds.
-    pub cover: f32,
 }
 
 impl SkyFamily {
@@ -78,7 +76,7 @@ impl<S: SkyModel> SkyFamily<S> {
         let member = |clear: S| {
             let lobes = SkyLobes::of(|d| without_aureole(&clear, sun, d));
             let aureole = aureole(&clear, sun);
-            let level = level_irradiance(&lobes) + (clear.sunlight() + aureole) * sun.z.max(0.0) as f32;
+            let level = lobes.on_level() + (clear.sunlight() + aureole) * sun.z.max(0.0) as f32;
             Member { clear, lobes, aureole, overcast: overcast_zenith(level) }
         };
         Self {
@@ -118,7 +116,6 @@ impl<S: SkyModel> SkyFamily<S> {
             lobes: SkyLobes::default(),
             sun: Vec3::ZERO,
             aureole: Vec3::ZERO,
-            cover: 0.0,
         };
         for (number, cover, gain, off) in tried {
             let (share, sky) = (weight(cover, off) / total, self.skies.get(number)?);
@@ -130,7 +127,6 @@ impl<S: SkyModel> SkyFamily<S> {
             fitted.lobes.add(&sky.lobes, clear);
             fitted.sun += clear * sky.clear.sunlight();
             fitted.aureole += clear * sky.aureole;
-            fitted.cover += share * cover;
         }
         fitted.lobes.add(&self.overcast, fitted.overcast);
         Some(fitted)
@@ -144,7 +140,7 @@ impl<S: SkyModel> SkyFamily<S> {
     }
 }
 
-/// What is nearer to the sun is its aureole, radians: it falls on a face as the sun does, and nine polynomials cannot follow it without
+/// Radius of the aureole about the sun, radians: it falls on a face as the sun does, and nine polynomials cannot follow it without
 /// going below nothing elsewhere.
 const AUREOLE: f64 = 20.0 * std::f64::consts::PI / 180.0;
 
@@ -191,13 +187,6 @@ fn held_against(seen: &[(&SkyPixel, Vec3)], clear: &[Vec3], zenith: Vec3, cover:
     let square = |off: Vec3| off.clamp(Vec3::splat(-FAR), Vec3::splat(FAR)).length_squared();
     let squares: f32 = seen.iter().zip(clear).map(|(p, c)| square(off(p, c) - mean)).sum();
     (mean.map(f32::exp), squares / (3.0 * count))
-}
-
-/// Irradiance of that light on a level surface.
-pub fn level_irradiance(lobes: &SkyLobes) -> Vec3 {
-    // Over the upper half, the cosine's integral with 1 is pi, with z 2 pi / 3, with 3 z^2 - 1 pi / 2; with the others nothing.
-    let pi = std::f32::consts::PI;
-    lobes.terms[0] * pi + lobes.terms[3] * (2.0 * pi / 3.0) + lobes.terms[8] * (0.5 * pi)
 }
 
 #[cfg(test)]
@@ -250,7 +239,7 @@ mod tests {
                 pixels.iter().map(|p| SkyPixel { radiance: p.radiance * gain, ..*p }).collect();
             let fitted = family.fit(&scaled).expect("enough");
             let truth = SkyLobes::of(light);
-            let (found, expected) = (level_irradiance(&fitted.lobes), level_irradiance(&truth) * gain);
+            let (found, expected) = (fitted.lobes.on_level(), truth.on_level() * gain);
             let off = (found - expected).length() / expected.length();
             assert!(off < 0.15, "{elevation_deg} {number} {cover}: {found}, not {expected}");
             // What is seen is what it was made from.

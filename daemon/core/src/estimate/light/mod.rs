@@ -7,7 +7,7 @@ mod dome;
 mod sky;
 mod tones;
 
-pub use dome::{FittedSky, SkyFamily, SkyPixel, level_irradiance};
+pub use dome::{FittedSky, SkyFamily, SkyPixel};
 pub use sky::{SKY_SINES, SkyLight};
 pub use tones::{SeaTones, ToneSample};
 
@@ -28,7 +28,7 @@ const FOLLOW_S: f64 = 1.0;
 /// Pixels sampled along the picture's width and height.
 const GRID: (u32, u32) = (24, 18);
 
-/// The whole sky is fitted anew no sooner, seconds: it changes slowly, and a fit takes half a millisecond.
+/// Least time between two fits of the whole sky, seconds: it changes slowly, and a fit takes a quarter of a millisecond.
 const FIT_EVERY_S: f64 = 0.5;
 
 /// Light that comes out of the sea over the light that falls on it: clear to coastal water, 0.01 to 0.03 under the surface (Mobley
@@ -134,9 +134,11 @@ impl LightMeter {
             };
             self.tones = Some((time, seen));
         }
-        let (seen, pixels) = measure(picture, lens, camera);
-        let Some(seen) = seen else { return };
-        self.follow_sky(time, &pixels);
+        let mut pixels = self.is_fit_due(time).then(Vec::new);
+        let Some(seen) = measure(picture, lens, camera, pixels.as_mut()) else { return };
+        if let Some(pixels) = pixels {
+            self.follow_sky(time, &pixels);
+        }
         let means = match self.means {
             None => seen,
             Some((since, old)) => {
@@ -151,12 +153,12 @@ impl LightMeter {
         self.means = Some((time, means));
     }
 
+    fn is_fit_due(&self, time: Time) -> bool {
+        self.sky.is_none_or(|sky| !(0.0..FIT_EVERY_S).contains(&time.secs_since(sky.fitted)))
+    }
+
     /// Fits the whole sky to the pixels of its part in view.
     fn follow_sky(&mut self, time: Time, pixels: &[SkyPixel]) {
-        let since = self.sky.map(|sky| time.secs_since(sky.fitted));
-        if since.is_some_and(|since| (0.0..FIT_EVERY_S).contains(&since)) {
-            return;
-        }
         let Some(fitted) = self.family.fit(pixels) else { return };
         let sun = (fitted.sun + fitted.aureole) / std::f32::consts::PI;
         self.sky = Some(match self.sky {
@@ -233,7 +235,7 @@ impl LightMeter {
         let Means { sky, horizon, sea } = self.means();
         let (dome, sun) =
             self.sky.map_or_else(|| (SkyLobes::even(sky), Vec3::ZERO), |sky| (sky.dome, sky.sun));
-        let level = level_irradiance(&dome).max(Vec3::ZERO) / std::f32::consts::PI;
+        let level = dome.on_level().max(Vec3::ZERO) / std::f32::consts::PI;
         Light { sun_direction: self.sun_direction, sun, sky: level, dome, horizon, sea }
     }
 }
@@ -276,11 +278,15 @@ fn tones(picture: &Picture, lens: &Lens, camera: &CameraPose) -> Option<SeaTones
     SeaTones::fit(samples.get(..count)?)
 }
 
-/// Mean colours and the pixels of the sky.
-fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> (Option<Means>, Vec<SkyPixel>) {
+/// Mean colours; the pixels of the sky are added to `pixels`.
+fn measure(
+    picture: &Picture,
+    lens: &Lens,
+    camera: &CameraPose,
+    mut pixels: Option<&mut Vec<SkyPixel>>,
+) -> Option<Means> {
     let mut sums = [Vec3::ZERO; 3];
     let mut counts = [0u32; 3];
-    let mut pixels = Vec::new();
     for iy in 0..GRID.1 {
         for ix in 0..GRID.0 {
             let share = DVec2::new(
@@ -301,7 +307,7 @@ fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> (Option<Means
             let radiance = Vec3::from_array(colour);
             sums[class] += radiance;
             counts[class] += 1;
-            if class < 2 {
+            if let (0 | 1, Some(pixels)) = (class, &mut pixels) {
                 pixels.push(SkyPixel { direction, radiance });
             }
         }
@@ -309,12 +315,11 @@ fn measure(picture: &Picture, lens: &Lens, camera: &CameraPose) -> (Option<Means
     let mean = |class: usize| (counts[class] > 0).then(|| sums[class] / counts[class] as f32);
     let horizon = mean(1).or(mean(0));
     let sky = mean(0).or(mean(1));
-    let means = match (sky, horizon, mean(2)) {
+    match (sky, horizon, mean(2)) {
         (Some(sky), Some(horizon), sea) => Some(Means { sky, horizon, sea: sea.unwrap_or(sky * 0.2) }),
         // Looking down, no sky: keep what was known of it.
         _ => None,
-    };
-    (means, pixels)
+    }
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ pub(crate) struct BoatDraw {
     pub(crate) detail_m: f64,
 }
 
-/// What draws meshes, without back faces: open shells have a side of their own for each way. Textured ones are drawn with their texture.
+/// Pipelines that draw meshes without back faces: open shells have a side of their own for each way. Textured ones are drawn with their texture.
 pub(crate) struct BoatPipelines {
     plain: Pipeline,
     textured: Option<Pipeline>,

@@ -121,19 +121,15 @@ struct Sides<'a> {
 impl Sides<'_> {
     /// A triangle of the corners whose normals are on the side from which it is seen this way round.
     fn facing(&mut self, vertices: &mut Vec<MeshVertex>, triangle: [u32; 3]) -> [u32; 3] {
-        let corners = triangle.map(|i| self.model.vertices.get(i as usize));
-        let [Some(a), Some(b), Some(c)] = corners else { return triangle };
-        let face = (b.position - a.position).cross(c.position - a.position);
+        let [a, b, c] = triangle.map(|i| self.model.vertices[i as usize].position);
+        let face = (b - a).cross(c - a);
         triangle.map(|i| {
-            let (Some(v), Some(seen)) = (self.model.vertices.get(i as usize), self.seen.get(i as usize))
-            else {
-                return i;
-            };
+            let v = &self.model.vertices[i as usize];
             if face.dot(v.normal) >= 0.0 {
                 return i;
             }
             *self.others.entry(i).or_insert_with(|| {
-                vertices.push(lit_corner(v, -v.normal, &seen[1]));
+                vertices.push(lit_corner(v, -v.normal, &self.seen[i as usize][1]));
                 vertices.len() as u32 - 1
             })
         })

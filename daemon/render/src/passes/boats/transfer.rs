@@ -1,4 +1,4 @@
-//! How much of the sky and of the sea each corner of a boat sees past the boat itself: found once when a model is taken, so that a frame's light
+//! Shares of the sky and of the sea that each corner of a boat sees past the boat itself: found once when a model is taken, so that a frame's light
 //! of the whole sky is a sum of ten products a corner (precomputed radiance transfer, Sloan, Kautz and Snyder 2002, for matt surfaces).
 
 use std::{
@@ -217,7 +217,6 @@ struct DepthPicture {
     towards: Vec3,
     /// Greatest way towards the light, metres.
     nearest: Vec<f32>,
-    placed: Vec<Vec3>,
 }
 
 impl DepthPicture {
@@ -231,7 +230,6 @@ impl DepthPicture {
             up: Vec3::Y,
             towards: Vec3::Z,
             nearest: vec![f32::NEG_INFINITY; TEXELS * TEXELS],
-            placed: Vec::with_capacity(model.vertices.len()),
         }
     }
 
@@ -251,11 +249,9 @@ impl DepthPicture {
         (self.across, self.up) = towards.any_orthonormal_pair();
         self.towards = towards;
         self.nearest.fill(f32::NEG_INFINITY);
-        self.placed.clear();
         let placed: Vec<Vec3> = model.vertices.iter().map(|v| self.place(v.position)).collect();
-        self.placed = placed;
         for t in model.indices.chunks_exact(3) {
-            self.draw([t[0], t[1], t[2]].map(|i| self.placed[i as usize]));
+            self.draw([t[0], t[1], t[2]].map(|i| placed[i as usize]));
         }
     }
 
