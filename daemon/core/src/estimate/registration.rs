@@ -156,12 +156,16 @@ impl Hypothesis {
     }
 
     /// Tests whether it can be what is wrong. Late pictures show in turns as well as in the vertical, which a ship's turn tilts to and fro
-    /// in a seaway as late pictures would.
+    /// in a seaway as late pictures would. Another lens does, too: any error that tilts the vertical as a craft speeds up favours one of
+    /// four lenses.
     fn may_be_believed(&self, swing: &SwingTest) -> bool {
-        /// Evidence of turns that it needs, nats: enough alone.
+        /// Evidence of turns that late pictures need, nats: enough alone.
         const LATE_BY_TURNS: f64 = 10.0;
+        /// The same for another lens.
+        const LENS_BY_TURNS: f64 = 3.0;
         match self.misfit {
             Misfit::Late(_) => self.by_turns >= LATE_BY_TURNS,
+            Misfit::Lens => self.by_turns >= LENS_BY_TURNS,
             Misfit::Mount => !self.is_doubt && swing.may_be_camera(),
             _ => true,
         }
