@@ -1,12 +1,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// A boat without a texture: its light is found at the corners.
+// A boat without a texture: its light is found at the corners, and what hides the sun at the pixel.
 #include "coded_light.glsl"
+#include "sunlit.glsl"
 
-layout(location = 0) in vec3 light;
+layout(location = 0) in vec3 around;
+layout(location = 1) in vec3 sun;
+layout(location = 2) in vec3 shade;
 
 layout(location = 0) out vec4 colour;
 
 void main() {
-    colour = vec4(coded(light), 1.0);
+    colour = vec4(coded(around + sunlit(sun, shade)), 1.0);
 }

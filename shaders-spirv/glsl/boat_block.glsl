@@ -3,9 +3,10 @@ struct BoatBlock {
     vec4 camera_from_boat[3];  // rows
     vec4 water_plane;          // dot(plane, (p, 1)): metres above the mean water
     vec4 horizon_plane;        // positive above the line of sight over the sea's horizon
-    vec4 sun;                  // xyz: unit vector towards the sun
+    vec4 sun;                  // xyz: unit vector towards the sun; w: metres off the surface at which its shadow is looked up
     vec4 eye;                  // xyz: the eye; w: share of the light that haze replaces
     vec4 lobes[9];             // light of the whole sky: its lobes' radiances
+    vec4 shadow_from_boat[3];  // rows: to texels of the shadow map and nearness to the sun
 };
 
 layout(std430, set = 0, binding = 1) readonly buffer Boats {

@@ -12,11 +12,15 @@ layout(location = 4) in vec4 sky0;
 layout(location = 5) in vec4 sky1;
 layout(location = 6) in vec2 sky2;
 
-// Light that the corner sends to the eye if it were white, without haze; and its colour as it is, with haze. Both are found
-// here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles cost by the fragment.
-layout(location = 0) out vec3 colour_out;
+// Light that the corner sends to the eye: of sky and sea, with haze, and of the sun, if nothing is before it. A texture's colours and the
+// haze come later. Both are found here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles
+// cost by the fragment.
+layout(location = 0) out vec3 around_out;
+layout(location = 1) out vec3 sun_out;
+// Where the shadow map is looked up.
+layout(location = 2) out vec3 shade_out;
 #ifdef TEXTURED
-layout(location = 1) out vec2 uv_out;
+layout(location = 3) out vec2 uv_out;
 #endif
 
 out gl_PerVertex {
@@ -24,12 +28,11 @@ out gl_PerVertex {
     float gl_ClipDistance[2];
 };
 
-vec3 lit(BoatBlock boat) {
+vec3 lit_around(BoatBlock boat) {
     vec3 sky = boat.lobes[0].rgb * sky0.x + boat.lobes[1].rgb * sky0.y + boat.lobes[2].rgb * sky0.z
         + boat.lobes[3].rgb * sky0.w + boat.lobes[4].rgb * sky1.x + boat.lobes[5].rgb * sky1.y
         + boat.lobes[6].rgb * sky1.z + boat.lobes[7].rgb * sky1.w + boat.lobes[8].rgb * sky2.x;
-    vec3 around = max(sky, 0.0) + frame.sea.rgb * sky2.y;
-    return albedo * (frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0) + around);
+    return albedo * (max(sky, 0.0) + frame.sea.rgb * sky2.y);
 }
 
 void main() {
@@ -39,11 +42,15 @@ void main() {
         vec3(dot(boat.camera_from_boat[0], p), dot(boat.camera_from_boat[1], p), dot(boat.camera_from_boat[2], p)));
     gl_ClipDistance[0] = dot(boat.water_plane, p);
     gl_ClipDistance[1] = dot(boat.horizon_plane, p);
+    around_out = lit_around(boat);
+    sun_out = albedo * frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0);
+    // A little off the surface, so that it does not shade itself by the map's texels.
+    vec4 off = vec4(position + normal * boat.sun.w, 1.0);
+    shade_out = vec3(dot(boat.shadow_from_boat[0], off), dot(boat.shadow_from_boat[1], off), dot(boat.shadow_from_boat[2], off));
 #ifdef TEXTURED
-    // The fragment shader mixes the haze in.
-    colour_out = lit(boat);
     uv_out = uv;
 #else
-    colour_out = mix(lit(boat), frame.horizon.rgb, boat.eye.w);
+    around_out = mix(around_out, frame.horizon.rgb, boat.eye.w);
+    sun_out *= 1.0 - boat.eye.w;
 #endif
 }

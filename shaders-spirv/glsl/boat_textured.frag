@@ -4,14 +4,17 @@
 #include "frame.glsl"
 #include "boat_block.glsl"
 #include "coded_light.glsl"
+#include "sunlit.glsl"
 
 // Samples a pixel of the layer drawn to: a texture's alpha becomes coverage of that many steps.
 layout(constant_id = 1) const uint SAMPLES = 4;
 
-layout(set = 1, binding = 0) uniform sampler2D skin;
+layout(set = 2, binding = 0) uniform sampler2D skin;
 
-layout(location = 0) in vec3 light;
-layout(location = 1) in vec2 uv;
+layout(location = 0) in vec3 around;
+layout(location = 1) in vec3 sun;
+layout(location = 2) in vec3 shade;
+layout(location = 3) in vec2 uv;
 
 layout(location = 0) out vec4 colour;
 
@@ -23,5 +26,6 @@ void main() {
         discard;
     }
     gl_SampleMask[0] = int((1u << covered) - 1u);
+    vec3 light = around + sunlit(sun, shade);
     colour = vec4(coded(mix(light * texel.rgb, frame.horizon.rgb, boats[draw.index].eye.w)), 1.0);
 }

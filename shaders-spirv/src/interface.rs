@@ -64,12 +64,23 @@ block! {
         pub water_plane: [f32; 4],
         /// Plane that is positive above the line of sight over the sea's horizon.
         pub horizon_plane: [f32; 4],
-        /// Unit vector towards the sun; the last is unused.
+        /// Unit vector towards the sun; the last is how far off the surface its shadow is looked up, metres.
         pub sun: [f32; 4],
         /// The eye, metres; the last is the share of the light that haze replaces.
         pub eye: [f32; 4],
         /// The light of the whole sky: its lobes' radiances, boat's axes.
         pub lobes: [[f32; 4]; 9],
+        /// Rows of the matrix from the boat's space to texels of the shadow map and nearness to the sun, 0 to 1; nearness 2 where
+        /// nothing shades the boat.
+        pub shadow_from_boat: [[f32; 4]; 3],
+    }
+}
+
+block! {
+    /// A boat drawn as the sun sees it: `ShadowBlock`, push constants.
+    pub struct ShadowBlock {
+        /// Rows of the matrix from its space to clip space, on the place of the boat that it may shade.
+        pub clip_from_boat: [[f32; 4]; 3],
     }
 }
 

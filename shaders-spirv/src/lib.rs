@@ -48,6 +48,8 @@ shaders! {
     BOAT_FRAG = "boat.frag";
     /// A boat with a texture. Constants: 0 whether the layer holds roots of light, 1 samples.
     BOAT_TEXTURED_FRAG = "boat_textured.frag";
+    /// A corner of a boat as the sun sees it.
+    SHADOW_VERT = "shadow.vert";
     /// A rectangle given in pixels.
     RECT_VERT = "rect.vert";
     /// A strip of water below a hull, given by where the hull-water line is.

@@ -15,7 +15,8 @@ use rspirv::{
 use shaders_spirv::interface::{
     BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock, HULL_LINE_COLUMNS,
     HudQuad, LobeBlock, MeshVertex, MirrorBlock, PhysicsBlock, PhysicsPublishedBlock, ReflectBlock,
-    RoundBlock, TRACK_POINTS, VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint, WaterBlock,
+    RoundBlock, ShadowBlock, TRACK_POINTS, VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint,
+    WaterBlock,
 };
 
 /// Name, fields with offsets, and size of one struct of the host.
@@ -34,6 +35,7 @@ const HOST: &[Host] = &[
     ("RoundBlock", RoundBlock::FIELDS, size_of::<RoundBlock>()),
     ("HudQuad", HudQuad::FIELDS, size_of::<HudQuad>()),
     ("VideoBlock", VideoBlock::FIELDS, size_of::<VideoBlock>()),
+    ("ShadowBlock", ShadowBlock::FIELDS, size_of::<ShadowBlock>()),
     ("DrawBlock", DrawBlock::FIELDS, size_of::<DrawBlock>()),
     ("LobeBlock", LobeBlock::FIELDS, size_of::<LobeBlock>()),
     ("WakePoint", WakePoint::FIELDS, size_of::<WakePoint>()),

@@ -140,6 +140,7 @@ fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
             true,
             match pass {
                 Pass::Video | Pass::Hud => "every frame",
+                Pass::Shadow => "frames with a boat in view while the sun shines",
                 Pass::Mirror | Pass::Water => {
                     "frames with a reflection or shadow in view, on its pixels only"
                 }

@@ -88,6 +88,7 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
         let mut scene = bare.clone();
         (scene.water.method, scene.water.shadow) = (method, shadow);
         testing::add_boat(&mut scene, models, 0, range, -0.05, 0.4);
+        scene.passes[Pass::Shadow as usize] = PassDecision::LeftOut(LeftOut::NoSun);
         for pass in [Pass::Mirror, Pass::Water] {
             if method == ReflectionMethod::Off {
                 scene.passes[pass as usize] = PassDecision::LeftOut(LeftOut::ReflectionOff);
@@ -98,6 +99,14 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
     let (off, none) = (ReflectionMethod::Off, ShadowLevel::None);
     step("boat far", BARE, "its mesh and the pixels of its hull", &with(off, none, 400.0));
     step("boat near", "boat far", "more pixels and triangles of the hull", &with(off, none, 60.0));
+    let mut sunlit = with(off, none, 60.0);
+    sunlit.passes[Pass::Shadow as usize] = PassDecision::Run;
+    step(
+        "boat near, sun",
+        "boat near",
+        "the mesh as the sun sees it, four texels a pixel of the hull",
+        &sunlit,
+    );
     for (name, method, why) in [
         ("mirror", ReflectionMethod::Mirror, "the mesh mirrored, once a pixel of water"),
         (

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Most image steps of one barrier.
-const STEPS_MAX: usize = 12;
+const STEPS_MAX: usize = 16;
 
 /// Recording into one command buffer.
 #[derive(Clone, Copy)]

@@ -199,7 +199,8 @@ pub(crate) enum Blend {
 /// What tells one pipeline from another.
 pub(crate) struct PipelineShape<'a> {
     pub(crate) vertex: Shader,
-    pub(crate) fragment: Shader,
+    /// None where depth alone is drawn.
+    pub(crate) fragment: Option<Shader>,
     /// Vertex shader's specialisation constants, from 0 on.
     pub(crate) vertex_constants: &'a [u32],
     /// Fragment shader's specialisation constants, from 0 on.
@@ -211,7 +212,7 @@ pub(crate) struct PipelineShape<'a> {
     pub(crate) vertices: Option<(u32, &'a [(vk::Format, u32)])>,
     pub(crate) topology: vk::PrimitiveTopology,
     pub(crate) colour: vk::Format,
-    /// Images of that format that are drawn to at once, 1 to [`TARGETS_MAX`].
+    /// Images of that format that are drawn to at once, up to [`TARGETS_MAX`].
     pub(crate) targets: usize,
     pub(crate) blend: Blend,
     /// Leaves out back faces, front ones being seen this way round.
@@ -222,11 +223,31 @@ pub(crate) struct PipelineShape<'a> {
 }
 
 impl<'a> PipelineShape<'a> {
+    /// Depth alone, without constants, attributes and sets.
+    pub(crate) fn of_depth(vertex: Shader) -> Self {
+        Self {
+            vertex,
+            fragment: None,
+            vertex_constants: &[],
+            constants: &[],
+            sets: &[],
+            push: 0,
+            vertices: None,
+            topology: vk::PrimitiveTopology::TRIANGLE_LIST,
+            colour: SRGB,
+            targets: 0,
+            blend: Blend::Replace,
+            cull: None,
+            depth: true,
+            samples: vk::SampleCountFlags::TYPE_1,
+        }
+    }
+
     /// Strips of triangles, told apart by a [`DrawBlock`], laid over the screen by their coverage.
     pub(crate) fn over_screen(vertex: Shader, fragment: Shader, sets: &'a [&'a SetLayout]) -> Self {
         Self {
             vertex,
-            fragment,
+            fragment: Some(fragment),
             vertex_constants: &[],
             constants: &[],
             sets,
@@ -270,8 +291,8 @@ impl Pipeline {
             unsafe { gpu.device.create_pipeline_layout(&info, None) }.named("vkCreatePipelineLayout")?;
         let mut pipeline = Self { gpu: gpu.clone(), raw: vk::Pipeline::null(), layout };
         let vertex = Module::new(gpu, shape.vertex)?;
-        let fragment = Module::new(gpu, shape.fragment)?;
-        pipeline.raw = pipeline.build(shape, &vertex, &fragment)?;
+        let fragment = shape.fragment.map(|shader| Module::new(gpu, shader)).transpose()?;
+        pipeline.raw = pipeline.build(shape, &vertex, fragment.as_ref())?;
         Ok(pipeline)
     }
 
@@ -279,7 +300,7 @@ impl Pipeline {
         &self,
         shape: &PipelineShape<'_>,
         vertex: &Module,
-        fragment: &Module,
+        fragment: Option<&Module>,
     ) -> Result<vk::Pipeline, RenderError> {
         let [for_vertices, for_fragments] = [shape.vertex_constants, shape.constants].map(entries);
         let vertex_special = vk::SpecializationInfo::default()
@@ -296,7 +317,7 @@ impl Pipeline {
                 .specialization_info(&vertex_special),
             vk::PipelineShaderStageCreateInfo::default()
                 .stage(vk::ShaderStageFlags::FRAGMENT)
-                .module(fragment.raw)
+                .module(fragment.map_or(vk::ShaderModule::null(), |f| f.raw))
                 .name(c"main")
                 .specialization_info(&special),
         ];
@@ -326,7 +347,7 @@ impl Pipeline {
             .depth_test_enable(shape.depth)
             .depth_write_enable(shape.depth)
             .depth_compare_op(vk::CompareOp::GREATER);
-        let targets = shape.targets.clamp(1, TARGETS_MAX);
+        let targets = shape.targets.min(TARGETS_MAX);
         let blends = [blend_state(shape.blend); TARGETS_MAX];
         let blends = &blends[..targets];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(blends);
@@ -339,7 +360,7 @@ impl Pipeline {
             rendering = rendering.depth_attachment_format(DEPTH);
         }
         let info = vk::GraphicsPipelineCreateInfo::default()
-            .stages(&stages)
+            .stages(if fragment.is_some() { &stages } else { &stages[..1] })
             .vertex_input_state(&input)
             .input_assembly_state(&assembly)
             .viewport_state(&viewport)

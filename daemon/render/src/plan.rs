@@ -17,13 +17,14 @@ use crate::{
     frame_data::Capacity,
     frame_data::RECTS_MAX,
     passes::{
+        atlas::{self, Placed},
         boats::{
             BoatDraw,
             coverage::{Boxes, Cells},
         },
         hud::layout::KINDS,
-        mirror::atlas::{self, Placed},
         rounds::{RoundDraw, pieces, plan::round_block},
+        shadow::plan::ShadowPlan,
         wake::{
             WakeDraw,
             plan::{WakePlan, spray_rect, strip_rects, wake_plan},
@@ -47,8 +48,6 @@ use crate::{
 /// pixels' step, and the cells that they are taken in.
 const GRADIENTS_REACH_PX: u32 = 84;
 
-/// Boats are drawn simplified by no more than this, pixels.
-pub(crate) const DETAIL_PX: f64 = 0.4;
 /// Pixels around a boat's boxes that its anti-aliased edges can touch.
 const HULL_MARGIN_PX: f64 = 1.5;
 /// Most rectangles for all hulls together, and for one boat's water.
@@ -56,11 +55,6 @@ const HULL_RECTS_MAX: usize = 512;
 const WATER_RECTS_MAX: usize = 256;
 /// Most rectangles that are copied to be blended into, and back.
 const BLENDS_MAX: usize = 512;
-
-/// Metres that a pixel spans at a boat.
-fn pixel_m(scene: &Scene, boat: &BoatView) -> f64 {
-    boat.range_m / scene.lens.focal.max_element().max(1.0)
-}
 
 /// `r` with the pixels that gradients starting in it can reach, on a screen of `size`.
 pub(crate) fn with_gradients(r: PixelRect, size: (u32, u32)) -> PixelRect {
@@ -96,6 +90,7 @@ impl Outline {
 #[derive(Default)]
 pub(crate) struct Plan {
     pub(crate) boat_blocks: Vec<BoatBlock>,
+    pub(crate) shadows: ShadowPlan,
     pub(crate) water_blocks: Vec<WaterBlock>,
     /// The method's own blocks of each of `water_blocks`, one after the other.
     pub(crate) method_blocks: Vec<f32>,
@@ -155,6 +150,7 @@ impl Plan {
         let rects = BLENDS_MAX + 16;
         Self {
             boat_blocks: Vec::with_capacity(boats * 2),
+            shadows: ShadowPlan::with_capacity(boats),
             water_blocks: Vec::with_capacity(boats),
             method_blocks: Vec::with_capacity(boats * MethodBytes::default().len()),
             round_blocks: Vec::with_capacity(rounds),
@@ -195,6 +191,9 @@ impl Plan {
     /// Decides anew for `scene` on a screen of `size` with a mirror layer of `atlas` texels.
     pub(crate) fn make(&mut self, scene: &Scene, models: &[Outline], size: (u32, u32), atlas: (u32, u32)) {
         self.clear();
+        if scene.runs(Pass::Shadow) {
+            self.shadows.make(scene, |id| models.get(usize::from(id.0)).map(|outline| &outline.model));
+        }
         if scene.runs(Pass::Boats) {
             self.plan_boats(scene, models, size);
         }
@@ -215,6 +214,7 @@ impl Plan {
 
     fn clear(&mut self) {
         self.boat_blocks.clear();
+        self.shadows.clear();
         self.water_blocks.clear();
         self.method_blocks.clear();
         self.round_blocks.clear();
@@ -251,14 +251,14 @@ impl Plan {
                 break;
             }
             let pose = view::drawn_pose(&scene.camera, boat, model.kind);
-            let detail_m = DETAIL_PX * pixel_m(scene, boat);
+            let detail_m = view::detail_m(scene, boat);
             self.boats.push(BoatDraw {
                 model: boat.model,
                 index: self.boat_blocks.len() as u32,
                 rect,
                 detail_m,
             });
-            self.boat_blocks.push(view::boat_block(scene, boat, &pose, false));
+            self.boat_blocks.push(view::boat_block(scene, boat, &pose, self.shadows.shade(i), false));
             if let Some(spray) = spray {
                 self.sprayed.push((i, spray));
             }
@@ -359,9 +359,9 @@ impl Plan {
                 let index = self.boat_blocks.len() as u32;
                 // Softened, a mirrored boat shows less than the boat itself.
                 let coarser = (0.2 * softened_px).max(1.0);
-                let detail_m = DETAIL_PX * pixel_m(scene, boat) * coarser;
+                let detail_m = view::detail_m(scene, boat) * coarser;
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
-                self.boat_blocks.push(view::boat_block(scene, boat, &pose, true));
+                self.boat_blocks.push(view::boat_block(scene, boat, &pose, self.shadows.shade(i), true));
                 self.mirror_places.push(placed);
             }
         }

@@ -24,6 +24,7 @@ use crate::{
         hud::HudPass,
         mirror::MirrorPass,
         rounds::RoundsPass,
+        shadow::ShadowPass,
         video::{
             VideoPass,
             pictures::{PictureCounts, PicturePath, PictureShape},
@@ -136,6 +137,7 @@ pub struct Renderer<T = ()> {
 struct Passes {
     video: VideoPass,
     meshes: Meshes,
+    shadow: Option<ShadowPass>,
     mirror: Option<MirrorPass>,
     water: Option<WaterPass>,
     reflect: Option<ReflectPass>,
@@ -151,10 +153,13 @@ impl Passes {
         let any_boat = needs.boats_max > 0;
         let textured = models.iter().any(|m| m.texture.is_some());
         let meshes = Meshes::new(context, if any_boat { models } else { &[] })?;
+        let shadow = any_boat.then(|| ShadowPass::new(context)).transpose()?;
+        let drawn = shadow.as_ref().map(|shadow| (&meshes, &shadow.map));
         let reflects = needs.waters.iter().any(|(method, _)| *method != ReflectionMethod::Off);
         let softens = needs.waters.iter().any(|(method, _)| *method == ReflectionMethod::Full);
-        let mirror = (any_boat && reflects)
-            .then(|| MirrorPass::new(context, &meshes, textured, softens))
+        let mirror = drawn
+            .filter(|_| reflects)
+            .map(|drawn| MirrorPass::new(context, drawn, textured, softens))
             .transpose()?;
         let water = (any_boat && !needs.waters.is_empty())
             .then(|| WaterPass::new(context, mirror.as_ref(), &needs.waters))
@@ -165,13 +170,13 @@ impl Passes {
             }
             _ => None,
         };
-        let boats = any_boat.then(|| BoatsPass::new(context, &meshes, textured)).transpose()?;
+        let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
         let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
         let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
         let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(context, boats.as_ref())).transpose()?;
         let hud = HudPass::new(context)?;
         let video = VideoPass::new(context, config.picture, &hud.overlay.layout)?;
-        Ok(Self { video, meshes, mirror, water, reflect, wake, boats, rounds, hud })
+        Ok(Self { video, meshes, shadow, mirror, water, reflect, wake, boats, rounds, hud })
     }
 }
 
@@ -432,6 +437,8 @@ impl<T> Renderer<T> {
         let reflect = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty());
         let mut steps = Steps::default();
         steps.add_memory((PIXELS_DRAWN.0 | PIXELS_COPIED.0, vk::AccessFlags2::NONE), PIXELS_DRAWN);
+        let shadow = self.passes.shadow.as_ref().filter(|_| mirror.is_some() || boats.is_some());
+        steps.add(shadow.map(ShadowPass::before));
         steps.add(mirror.iter().flat_map(|m| m.before()).flatten());
         steps.add(boats.iter().flat_map(|b| b.before()));
         steps.add(water.iter().flat_map(|w| w.before(how)).flatten());
@@ -440,8 +447,14 @@ impl<T> Renderer<T> {
         if plan.renewed != [0; 3] {
             stamps.around(Span::Hud, || hud.record_layer(to, frame, plan.renewed));
         }
-        // No barrier between these three: a driver that runs on the processor sorts one's triangles while it fills another.
+        // No barrier between these: a driver that runs on the processor sorts one's triangles while it fills another.
         stamps.around(Span::Video, || video.record(to, target, hud.overlay.set, &plan.overlaid, &plan.bare));
+        if let Some(pass) = shadow {
+            stamps.around(Span::Shadow, || pass.record(to, meshes, &plan.shadows));
+            let mut steps = Steps::default();
+            steps.add([pass.between()]);
+            steps.record(to);
+        }
         if let Some(pass) = mirror {
             stamps
                 .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));

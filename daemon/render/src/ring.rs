@@ -58,6 +58,7 @@ fn hung(after: Duration) -> RenderError {
 pub(crate) enum Span {
     Video,
     Download,
+    Shadow,
     Backdrop,
     Mirror,
     Soften,
@@ -73,9 +74,10 @@ pub(crate) enum Span {
 }
 
 impl Span {
-    const ALL: [Self; 14] = [
+    const ALL: [Self; 15] = [
         Self::Video,
         Self::Download,
+        Self::Shadow,
         Self::Backdrop,
         Self::Mirror,
         Self::Soften,
@@ -94,6 +96,7 @@ impl Span {
     fn pass(self) -> Pass {
         match self {
             Self::Video | Self::Download => Pass::Video,
+            Self::Shadow => Pass::Shadow,
             Self::Mirror | Self::Soften => Pass::Mirror,
             Self::Backdrop | Self::Field | Self::Layers | Self::Water => Pass::Water,
             Self::Wake | Self::Spray => Pass::Wake,

@@ -161,7 +161,7 @@ pub fn add_boat_in(scene: &mut Scene, models: &[Model], model: usize, pose: Rigi
     let seen = eye.see(&Afloat { boat, model_id, model: &models[model], pose, water_level: 0.0 });
     scene.boats.extend(seen);
     scene.boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
-    for pass in [Pass::Mirror, Pass::Water, Pass::Boats] {
+    for pass in [Pass::Shadow, Pass::Mirror, Pass::Water, Pass::Boats] {
         scene.passes[pass as usize] = PassDecision::Run;
     }
 }

@@ -75,8 +75,41 @@ pub(crate) fn drawn_pose(camera: &CameraPose, boat: &BoatView, kind: ModelKind) 
     RigidPose { world_from_body, position: boat.pose.position }
 }
 
+/// A boat's place in the shadow map, as its shader looks it up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Shade {
+    /// Rows of the matrix from the boat's space to texels and nearness to the sun.
+    pub(crate) from_boat: [[f32; 4]; 3],
+    /// How far off the surface it is looked up, metres.
+    pub(crate) off_m: f32,
+}
+
+impl Shade {
+    /// Nothing shades it.
+    pub(crate) const NONE: Self = Self { from_boat: [[0.0; 4], [0.0; 4], [0.0, 0.0, 0.0, 2.0]], off_m: 0.0 };
+}
+
+/// Boats are drawn simplified by no more than this, pixels.
+pub(crate) const DETAIL_PX: f64 = 0.4;
+
+/// Metres that a pixel spans at a boat.
+pub(crate) fn pixel_m(scene: &Scene, boat: &BoatView) -> f64 {
+    boat.range_m / scene.lens.focal.max_element().max(1.0)
+}
+
+/// By how much a boat may be simplified unseen, metres.
+pub(crate) fn detail_m(scene: &Scene, boat: &BoatView) -> f64 {
+    DETAIL_PX * pixel_m(scene, boat)
+}
+
 /// A boat as the camera sees it, or, with `mirrored`, its mirror image in the plane of its mean water.
-pub(crate) fn boat_block(scene: &Scene, boat: &BoatView, pose: &RigidPose, mirrored: bool) -> BoatBlock {
+pub(crate) fn boat_block(
+    scene: &Scene,
+    boat: &BoatView,
+    pose: &RigidPose,
+    shade: &Shade,
+    mirrored: bool,
+) -> BoatBlock {
     let camera = &scene.camera;
     let flip = if mirrored { DVec3::new(1.0, 1.0, -1.0) } else { DVec3::ONE };
     let lift = if mirrored { DVec3::new(0.0, 0.0, 2.0 * boat.water_level) } else { DVec3::ZERO };
@@ -103,7 +136,11 @@ pub(crate) fn boat_block(scene: &Scene, boat: &BoatView, pose: &RigidPose, mirro
         camera_from_boat: [row(0), row(1), row(2)],
         water_plane,
         horizon_plane,
-        sun: (boat_from_world * scene.light.sun_direction).extend(0.0).as_vec4().to_array(),
+        sun: (boat_from_world * scene.light.sun_direction)
+            .extend(f64::from(shade.off_m))
+            .as_vec4()
+            .to_array(),
+        shadow_from_boat: shade.from_boat,
         eye: (boat_from_world * (eye - pose.position)).extend(f64::from(boat.haze)).as_vec4().to_array(),
     }
 }
@@ -162,10 +199,10 @@ mod tests {
             };
             let view = boat(pose, -0.5);
             let p = DVec3::new(3.0, -1.0, 2.0);
-            let direct = apply(&boat_block(&scene, &view, &pose, false), p);
+            let direct = apply(&boat_block(&scene, &view, &pose, &Shade::NONE, false), p);
             let want = scene.camera.to_camera(pose.to_world(p));
             assert!((direct - want).length() < 1e-6 * range.max(100.0), "{direct} {want}");
-            let block = boat_block(&scene, &view, &pose, true);
+            let block = boat_block(&scene, &view, &pose, &Shade::NONE, true);
             let world = pose.to_world(p);
             let mirrored = DVec3::new(world.x, world.y, 2.0 * -0.5 - world.z);
             let want = scene.camera.to_camera(mirrored);
@@ -186,7 +223,7 @@ mod tests {
         let position = DVec3::new(0.0, range, -drop);
         let pose = RigidPose { world_from_body: DQuat::IDENTITY, position };
         let view = BoatView { beyond_horizon: true, ..boat(pose, -drop) };
-        let block = boat_block(&scene, &view, &pose, false);
+        let block = boat_block(&scene, &view, &pose, &Shade::NONE, false);
         let above =
             |z: f64| glam::Vec4::from_array(block.horizon_plane).dot(DVec4::new(0.0, 0.0, z, 1.0).as_vec4());
         let hidden = (0..200).map(|i| f64::from(i) * 0.1).find(|z| above(*z) > 0.0).unwrap();

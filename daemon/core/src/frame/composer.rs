@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3, Vec3};
 
 use super::{
     boats::{boats_in_view, nearest_m},
-    plan::{SceneNeeds, ScenePlan, sea_reflects},
+    plan::{InView, SceneNeeds, ScenePlan, sea_reflects},
     rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
     scene::{BoatView, Hud, Pass, RoundView, Scene, Status},
     view::ViewFrustum,
@@ -107,7 +107,7 @@ impl Composer {
             time_s: 0.0,
             camera,
             lens: screen_lens,
-            passes: plan.frame(false, &[], &[]),
+            passes: plan.frame(&InView::default()),
             boats: Vec::with_capacity(scenario.boats.len()),
             rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
             light: light.boats,
@@ -179,7 +179,7 @@ impl Composer {
         let scene = &mut self.scene;
         scene.boats.clear();
         scene.rounds.clear();
-        scene.passes = self.plan.frame(false, &[], &[]);
+        scene.passes = self.plan.frame(&InView::default());
         scene.hud.status = status(moment, None);
         scene.hud.warning = moment.warning;
     }
@@ -220,9 +220,14 @@ impl Composer {
             boats_in_view(&running.fleet, &frustum, time, running.start, &mut scene.boats);
             rounds_in_view(running, &frustum, time, &mut scene.rounds);
         }
-        scene.passes = self.plan.frame(camera.is_some(), &scene.boats, &scene.rounds);
         let light = estimator.light();
         (scene.light, scene.sky, scene.tones) = (light.boats, light.sky, light.tones);
+        scene.passes = self.plan.frame(&InView {
+            pose_known: camera.is_some(),
+            sun_shines: scene.light.sun_shines(),
+            boats: &scene.boats,
+            rounds: &scene.rounds,
+        });
         let result = world.last_result().filter(|result| time.secs_since(result.time) < RESULT_S);
         let score = world.score();
         scene.hud = Hud {
@@ -270,7 +275,8 @@ impl Composer {
         } else {
             Vec::new()
         };
-        Scene { camera, passes: self.plan.frame(true, &boats, &rounds), boats, rounds, ..self.scene.clone() }
+        let in_view = InView { pose_known: true, sun_shines: true, boats: &boats, rounds: &rounds };
+        Scene { camera, passes: self.plan.frame(&in_view), boats, rounds, ..self.scene.clone() }
     }
 
     /// A boat broadside before the camera, under way if it is one of as many as move.

@@ -59,6 +59,19 @@ pub struct SceneNeeds {
     pub belt: u32,
 }
 
+/// A frame's view, as it decides on the passes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct InView<'a> {
+    /// Whether the camera's pose is known.
+    pub pose_known: bool,
+    /// Whether the sun shines so that it casts shadows.
+    pub sun_shines: bool,
+    /// Boats that are seen, or mirrored.
+    pub boats: &'a [BoatView],
+    /// Tracers, splashes and strikes that are seen.
+    pub rounds: &'a [RoundView],
+}
+
 impl SceneNeeds {
     /// The needs of a scenario, for a screen, camera and lens that are yet to be told. A sea that is to be measured may turn out calm
     /// enough to mirror.
@@ -106,6 +119,7 @@ impl ScenePlan {
         let rounds =
             if needs.belt == 0 { PassDecision::LeftOut(LeftOut::NoRounds) } else { PassDecision::Run };
         let mut passes = [PassDecision::Run; Pass::COUNT];
+        passes[Pass::Shadow as usize] = boats;
         passes[Pass::Mirror as usize] = mirror;
         passes[Pass::Water as usize] = water;
         passes[Pass::Wake as usize] = wake;
@@ -129,12 +143,8 @@ impl ScenePlan {
     }
 
     /// The passes of one frame: what the plan allows and what is in view asks for.
-    pub fn frame(
-        &self,
-        pose_known: bool,
-        boats: &[BoatView],
-        rounds: &[RoundView],
-    ) -> [PassDecision; Pass::COUNT] {
+    pub fn frame(&self, in_view: &InView<'_>) -> [PassDecision; Pass::COUNT] {
+        let InView { pose_known, sun_shines, boats, rounds } = *in_view;
         let mut passes = self.passes;
         let mut leave_out = |pass: Pass, unless: bool, why: LeftOut| {
             let decision = &mut passes[pass as usize];
@@ -142,10 +152,12 @@ impl ScenePlan {
                 *decision = PassDecision::LeftOut(why);
             }
         };
-        for pass in [Pass::Mirror, Pass::Water, Pass::Wake, Pass::Boats, Pass::Rounds] {
+        for pass in [Pass::Shadow, Pass::Mirror, Pass::Water, Pass::Wake, Pass::Boats, Pass::Rounds] {
             leave_out(pass, pose_known, LeftOut::NoPose);
         }
         let reflected = boats.iter().any(|b| b.reflection.is_some());
+        leave_out(Pass::Shadow, !boats.is_empty(), LeftOut::NoBoatInView);
+        leave_out(Pass::Shadow, sun_shines, LeftOut::NoSun);
         leave_out(Pass::Mirror, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Wake, boats.iter().any(|b| b.wake.is_some()), LeftOut::NoWakeInView);
@@ -209,19 +221,19 @@ mod tests {
     #[test]
     fn a_frame_runs_only_what_is_in_view() {
         let plan = ScenePlan::new(&needs());
-        let frame = plan.frame(true, &[], &[]);
+        let frame = plan.frame(&InView { pose_known: true, ..InView::default() });
         assert_eq!(frame[Pass::Video as usize], PassDecision::Run);
         assert_eq!(frame[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoBoatInView));
         assert_eq!(frame[Pass::Water as usize], PassDecision::LeftOut(LeftOut::NoReflectionInView));
         assert_eq!(frame[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoWakeInView));
         assert_eq!(frame[Pass::Rounds as usize], PassDecision::LeftOut(LeftOut::NoRoundInView));
-        let lost = plan.frame(false, &[], &[]);
+        let lost = plan.frame(&InView::default());
         assert_eq!(lost[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoPose));
         assert_eq!(lost[Pass::Hud as usize], PassDecision::Run);
         // The scenario's reason stands before the frame's.
         let empty = ScenePlan::new(&SceneNeeds { boats: 0, ..needs() });
         assert_eq!(
-            empty.frame(false, &[], &[])[Pass::Boats as usize],
+            empty.frame(&InView::default())[Pass::Boats as usize],
             PassDecision::LeftOut(LeftOut::NoBoats)
         );
     }

@@ -65,6 +65,8 @@ impl Scene {
 pub enum Pass {
     /// The camera's picture.
     Video,
+    /// Boats as the sun sees them: what it does not see lies in the shade.
+    Shadow,
     /// Boats mirrored in the sea, to a layer of its own.
     Mirror,
     /// The mirrored layer distorted and blended onto the sea; shadows on the water.
@@ -81,15 +83,24 @@ pub enum Pass {
 
 impl Pass {
     /// How many there are.
-    pub const COUNT: usize = 7;
+    pub const COUNT: usize = 8;
     /// All of them, in order.
-    pub const ALL: [Self; Self::COUNT] =
-        [Self::Video, Self::Mirror, Self::Water, Self::Wake, Self::Boats, Self::Rounds, Self::Hud];
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Video,
+        Self::Shadow,
+        Self::Mirror,
+        Self::Water,
+        Self::Wake,
+        Self::Boats,
+        Self::Rounds,
+        Self::Hud,
+    ];
 
     /// The name used in summaries.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Video => "video",
+            Self::Shadow => "shadow",
             Self::Mirror => "mirror",
             Self::Water => "water",
             Self::Wake => "wake",
@@ -132,6 +143,8 @@ pub enum LeftOut {
     NoRoundInView,
     /// The weapon has no rounds.
     NoRounds,
+    /// The sun does not shine: it is down, or clouds hide it.
+    NoSun,
     /// No usable orientation: boats cannot be placed.
     NoPose,
     /// A composed picture tells nobody anything.
@@ -152,6 +165,7 @@ impl LeftOut {
             Self::NoWakeInView => "no_wake_in_view",
             Self::NoRoundInView => "no_round_in_view",
             Self::NoRounds => "no_rounds",
+            Self::NoSun => "no_sun",
             Self::NoPose => "no_pose",
             Self::NoTrainee => "no_trainee",
         }

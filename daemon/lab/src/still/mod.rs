@@ -16,7 +16,7 @@ use bowwave_core::{
     estimate::light::LightMeter,
     event::Picture,
     frame::{
-        plan::{SceneNeeds, ScenePlan},
+        plan::{InView, SceneNeeds, ScenePlan},
         scene::{Hud, LeftOut, Pass, PassDecision, Scene},
         view::ViewFrustum,
         wake::Wake,
@@ -175,13 +175,14 @@ impl Still {
             boats.extend(eye.see_with_wake(&afloat, || self.wake(number, &afloat, &waves, time_s)));
         }
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
-        let mut passes = plan.frame(true, &boats, &[]);
-        passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
         let mut meter =
             LightMeter::new(self.daylight.sun_direction, self.water.method == ReflectionMethod::Baked);
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.daylight.sun_strength as f32;
+        let in_view = InView { pose_known: true, sun_shines: light.sun_shines(), boats: &boats, rounds: &[] };
+        let mut passes = plan.frame(&in_view);
+        passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
         let scene = Scene {
             frame: u64::from(index),
             time_s: f64::from(index) / 30.0,

@@ -1,9 +1,11 @@
 //! The passes, one folder each, run as a plain ordered list by the renderer.
 
+pub(crate) mod atlas;
 pub(crate) mod boats;
 pub(crate) mod hud;
 pub(crate) mod mirror;
 pub(crate) mod rounds;
+pub(crate) mod shadow;
 pub(crate) mod video;
 pub(crate) mod wake;
 pub(crate) mod water;

@@ -26,9 +26,11 @@ mod own;
 mod pacing;
 mod reflection;
 mod sea;
+mod shadow;
 mod shutter;
 mod skylight;
 mod skyline;
+mod sun;
 mod target;
 mod warp;
 mod wavefield;
@@ -72,7 +74,9 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: horizon::ABOUT, measure: horizon::measure },
     NumericalPart { about: haze::ABOUT, measure: haze::measure },
     NumericalPart { about: skyline::ABOUT, measure: skyline::measure },
+    NumericalPart { about: sun::ABOUT, measure: sun::measure },
     NumericalPart { about: skylight::ABOUT, measure: skylight::measure },
+    NumericalPart { about: shadow::ABOUT, measure: shadow::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },
     NumericalPart { about: shutter::ABOUT, measure: shutter::measure },

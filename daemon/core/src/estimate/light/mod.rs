@@ -67,6 +67,12 @@ impl Light {
     pub fn on_level(&self) -> Vec3 {
         self.sky + self.sun * self.sun_direction.z.max(0.0) as f32
     }
+
+    /// Tests whether the sun shines so that its shadows are seen: on what faces it, it adds more than a fiftieth of the sky's light.
+    pub fn sun_shines(&self) -> bool {
+        const SHARE: f32 = 0.02;
+        self.sun.max_element() > SHARE * self.sky.max_element()
+    }
 }
 
 /// Agreement of a picture's light with the scenario's sun.

@@ -41,13 +41,15 @@ pub(crate) struct BoatDraw {
 pub(crate) struct BoatPipelines {
     plain: Pipeline,
     textured: Option<Pipeline>,
+    /// Set of the shadow map.
+    shadow: vk::DescriptorSet,
 }
 
 impl BoatPipelines {
     /// `front` is the way round in which the corners of a front face are seen: mirrored, it is the other one.
     pub(crate) fn new(
         context: &PassContext<'_>,
-        meshes: &Meshes,
+        (meshes, shadow): (&Meshes, &TextureSet),
         samples: vk::SampleCountFlags,
         front: vk::FrontFace,
         colour: vk::Format,
@@ -65,16 +67,16 @@ impl BoatPipelines {
         // A layer of codes holds roots, one of light is filtered as it is.
         let constants = [u32::from(colour == UNORM), samples.as_raw()];
         let lens = context.lens_constants();
-        let sets = [context.frame_set, &meshes.skin_layout];
+        let sets = [context.frame_set, &*shadow.layout, &meshes.skin_layout];
         let make = |textured: bool| {
             Pipeline::new(
                 context.gpu,
                 &PipelineShape {
                     vertex: if textured { BOAT_TEXTURED_VERT } else { BOAT_VERT },
-                    fragment: if textured { BOAT_TEXTURED_FRAG } else { BOAT_FRAG },
+                    fragment: Some(if textured { BOAT_TEXTURED_FRAG } else { BOAT_FRAG }),
                     vertex_constants: &lens,
                     constants: if textured { &constants } else { &constants[..1] },
-                    sets: if textured { &sets } else { &sets[..1] },
+                    sets: if textured { &sets } else { &sets[..2] },
                     push: size_of::<DrawBlock>(),
                     vertices: Some((size_of::<MeshVertex>() as u32, &attributes)),
                     topology: vk::PrimitiveTopology::TRIANGLE_LIST,
@@ -88,7 +90,7 @@ impl BoatPipelines {
             )
         };
         let textured = any_textured.then(|| make(true)).transpose()?;
-        Ok(Self { plain: make(false)?, textured })
+        Ok(Self { plain: make(false)?, textured, shadow: shadow.set })
     }
 
     /// Draws one boat's mesh, within a rendering with depth. The shared buffers are bound.
@@ -103,11 +105,11 @@ impl BoatPipelines {
         let block = DrawBlock { index: boat.index, ..DrawBlock::default() };
         let pipeline = match (meshes.skin(boat.model), &self.textured) {
             (Some(skin), Some(textured)) => {
-                to.bind(textured, &[frame, skin]);
+                to.bind(textured, &[frame, self.shadow, skin]);
                 textured
             }
             _ => {
-                to.bind(&self.plain, &[frame]);
+                to.bind(&self.plain, &[frame, self.shadow]);
                 &self.plain
             }
         };
@@ -129,7 +131,7 @@ pub(crate) struct BoatsPass {
 impl BoatsPass {
     pub(crate) fn new(
         context: &PassContext<'_>,
-        meshes: &Meshes,
+        (meshes, shadow): (&Meshes, &TextureSet),
         any_textured: bool,
     ) -> Result<Self, RenderError> {
         let gpu = context.gpu;
@@ -144,7 +146,7 @@ impl BoatsPass {
             layer(DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | sampled),
         )?;
         let front = vk::FrontFace::COUNTER_CLOCKWISE;
-        let pipelines = BoatPipelines::new(context, meshes, SAMPLES, front, UNORM, any_textured)?;
+        let pipelines = BoatPipelines::new(context, (meshes, shadow), SAMPLES, front, UNORM, any_textured)?;
         let layer = context.texture_set(colour.view)?;
         let composite = Pipeline::new(
             gpu,

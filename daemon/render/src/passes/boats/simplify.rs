@@ -13,7 +13,7 @@ use crate::{
     passes::boats::parts::Parts,
     passes::boats::split::{EDGE_PX, split},
     passes::boats::transfer::{Transfer, transfers},
-    plan::DETAIL_PX,
+    view::DETAIL_PX,
 };
 
 /// Error of the finest simplified level, metres; each level has twice the error of the one before.

@@ -1,10 +1,7 @@
 //! The boats mirrored in the sea, into a layer of their own: what lies above the water, seen by the camera mirrored in the plane of
 //! the boat's mean water. Each boat has its own place in the layer.
 
-pub(crate) mod atlas;
-
 use ash::vk;
-use atlas::{Placed, SOFT};
 use bowwave_core::frame::scene::PixelRect;
 use shaders_spirv::{SCREEN_VERT, SOFTEN_FRAG};
 
@@ -14,6 +11,7 @@ use crate::{
     memory::{Image, ImageShape},
     passes::{
         DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED, TextureSet,
+        atlas::{Placed, SOFT},
         boats::{BoatDraw, BoatPipelines, meshes::Meshes},
     },
     pipeline::{Blend, DEPTH, LIGHT, Pipeline, PipelineShape},
@@ -41,7 +39,7 @@ impl MirrorPass {
     /// `softens` if a method that needs it may be asked for.
     pub(crate) fn new(
         context: &PassContext<'_>,
-        meshes: &Meshes,
+        (meshes, shadow): (&Meshes, &TextureSet),
         any_textured: bool,
         softens: bool,
     ) -> Result<Self, RenderError> {
@@ -58,7 +56,7 @@ impl MirrorPass {
             depth: Image::new(context.gpu, "mirror depth", depth)?,
             pipelines: BoatPipelines::new(
                 context,
-                meshes,
+                (meshes, shadow),
                 vk::SampleCountFlags::TYPE_1,
                 vk::FrontFace::CLOCKWISE,
                 LIGHT,
@@ -144,7 +142,7 @@ impl Soft {
             gpu,
             &PipelineShape {
                 vertex: SCREEN_VERT,
-                fragment: SOFTEN_FRAG,
+                fragment: Some(SOFTEN_FRAG),
                 vertex_constants: &[],
                 constants: &[],
                 sets: &[&layer.layout],

@@ -133,7 +133,7 @@ impl VideoPass {
                 },
             )
         };
-        Ok([make(VIDEO_FRAG, &sets[..1])?, make(VIDEO_OVERLAID_FRAG, &sets)?])
+        Ok([make(Some(VIDEO_FRAG), &sets[..1])?, make(Some(VIDEO_OVERLAID_FRAG), &sets)?])
     }
 
     /// Makes what pictures of the shape of `picture` need. The GPU is idle.

@@ -14,7 +14,7 @@ use shaders_spirv::{
 };
 
 use super::{baked::contact::contact_block, full, line::HullLine, mirror, physics};
-use crate::passes::mirror::atlas::{Placed, SCALE_MAX};
+use crate::passes::atlas::{Placed, SCALE_MAX};
 
 /// Highest wind force at which a reflection is seen.
 pub(super) const FORCE_MAX: usize = 4;

@@ -62,7 +62,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        passes::{mirror::atlas::Placed, water::block::water_block, water::line::hull_line},
+        passes::{atlas::Placed, water::block::water_block, water::line::hull_line},
         testing,
     };
 

@@ -87,7 +87,7 @@ impl Stage {
             context.gpu,
             &PipelineShape {
                 vertex: shape.vertex,
-                fragment: shape.fragment,
+                fragment: Some(shape.fragment),
                 vertex_constants: &[],
                 constants: &[],
                 sets: if shape.framed { &sets } else { &sets[1..] },

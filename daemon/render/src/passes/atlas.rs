@@ -1,4 +1,4 @@
-//! Where each boat's mirror image lies in the mirror layer. Every boat gets a place of its own, so that one boat's water never
+//! Places of boats in a layer that they share, as mirror layer and shadow map. Every boat gets a place of its own, so that one's water never
 //! takes another's light; what is blurred anyway is drawn smaller.
 
 use bowwave_core::frame::scene::PixelRect;

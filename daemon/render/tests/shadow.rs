@@ -1,0 +1,93 @@
+//! The sun's shadows on boats, where they can be worked out: a convex boat has none on itself, and one boat's edge is where its light ends on
+//! another. Against rays on real models they are measured in tests/precision.
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    reason = "a test that cannot go on has failed"
+)]
+
+mod common;
+
+use bowwave_core::{
+    frame::scene::{LeftOut, Pass, PassDecision, Scene},
+    geometry::{RigidPose, look},
+    sky::SkyLobes,
+};
+use common::{
+    at, draw, grey,
+    testing::{add_boat_in, box_model, empty_scene},
+};
+use glam::{DQuat, DVec3, Vec3};
+
+const SIZE: (u32, u32) = (320, 180);
+
+/// A scene over black water that the sun alone lights.
+fn sunlit_scene(sun: DVec3) -> Scene {
+    let mut scene = empty_scene(SIZE.0, SIZE.1);
+    scene.camera.world_from_camera = look(0.0, -0.1, 0.0);
+    scene.light.sun_direction = sun.normalize();
+    scene.light.sun = Vec3::ONE;
+    (scene.light.sky, scene.light.sea, scene.light.horizon) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    scene.light.dome = SkyLobes::even(Vec3::ZERO);
+    scene
+}
+
+fn boats_only(scene: &mut Scene) {
+    for pass in [Pass::Mirror, Pass::Water, Pass::Hud] {
+        scene.passes[pass as usize] = PassDecision::LeftOut(LeftOut::ReflectionOff);
+    }
+}
+
+#[test]
+fn a_convex_boat_never_shades_itself() {
+    let models = [box_model("box", [9.0, 2.6, 1.8], [0.9; 3])];
+    let picture = grey(SIZE.0, SIZE.1, 0);
+    // All round, from the horizon to overhead; along the view and against it.
+    let suns = (0..12).map(|n| {
+        let (sin, cos) = (f64::from(n) * 1.9).sin_cos();
+        DVec3::new(sin, cos, [0.0, 0.02, 0.3, 1.2, 40.0][n as usize % 5])
+    });
+    for sun in suns.chain([DVec3::Z, DVec3::NEG_Y, DVec3::Y]) {
+        let mut scene = sunlit_scene(sun);
+        let turn = DQuat::from_rotation_z(0.7) * DQuat::from_rotation_x(0.1);
+        let pose = RigidPose { world_from_body: turn, position: DVec3::new(0.0, 40.0, 0.0) };
+        add_boat_in(&mut scene, &models, 0, pose);
+        boats_only(&mut scene);
+        let shaded = draw(&scene, &picture, &models);
+        scene.passes[Pass::Shadow as usize] = PassDecision::LeftOut(LeftOut::NoSun);
+        let bare = draw(&scene, &picture, &models);
+        // A pixel of an edge is looked up at its middle, which may lie beyond the surface.
+        let pixels = shaded.chunks_exact(4).zip(bare.chunks_exact(4));
+        let off = pixels.filter(|(a, b)| (0..3).any(|i| a[i].abs_diff(b[i]) > 3)).count();
+        assert!(off <= 2, "{sun}: {off} pixels differ");
+    }
+}
+
+#[test]
+fn a_boats_light_ends_where_another_stands_before_the_sun() {
+    let models =
+        [box_model("wall", [30.0, 2.0, 6.0], [0.9; 3]), box_model("sign", [30.0, 2.0, 8.0], [0.9; 3])];
+    // The sun stands behind the eye. The eye, 14 m up, looks over a wall of 6 m at 30 m at a sign at 40 m.
+    for tangent in [0.1_f64, 0.2] {
+        let mut scene = sunlit_scene(DVec3::new(0.0, -1.0, tangent));
+        let upright =
+            |x: f64, y: f64| RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::new(x, y, 0.0) };
+        scene.camera.position.z = 14.0;
+        scene.camera.world_from_camera = look(0.0, -0.25, 0.0);
+        add_boat_in(&mut scene, &models, 0, upright(0.0, 30.0));
+        add_boat_in(&mut scene, &models, 1, upright(0.0, 40.0));
+        boats_only(&mut scene);
+        let pixels = draw(&scene, &grey(SIZE.0, SIZE.1, 0), &models);
+        // The wall's far edge, 31 m away, to the sign's near face, 39 m away.
+        let edge = 6.0 - 8.0 * tangent;
+        let code = |z: f64| {
+            let place = scene.camera.to_camera(DVec3::new(0.3, 39.0, z));
+            let pixel = scene.lens.project(place).unwrap();
+            at(&pixels, SIZE.0, pixel.x as u32, pixel.y as u32)[1]
+        };
+        let texel_m = 39.0 / scene.lens.focal.x;
+        assert!(code(edge + 2.5 * texel_m) > 100, "lit above {edge} m: {}", code(edge + 2.5 * texel_m));
+        assert!(code(edge - 2.5 * texel_m) < 10, "dark below {edge} m: {}", code(edge - 2.5 * texel_m));
+    }
+}
