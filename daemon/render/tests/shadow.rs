@@ -60,7 +60,8 @@ fn a_convex_boat_never_shades_itself() {
         // A pixel of an edge is looked up at its middle, which may lie beyond the surface.
         let pixels = shaded.chunks_exact(4).zip(bare.chunks_exact(4));
         let off = pixels.filter(|(a, b)| (0..3).any(|i| a[i].abs_diff(b[i]) > 3)).count();
-        assert!(off <= 2, "{sun}: {off} pixels differ");
+        let lit = bare.chunks_exact(4).filter(|p| p[1] > 10).count();
+        assert!(off * 50 <= lit, "{sun}: {off} pixels of {lit} differ");
     }
 }
 

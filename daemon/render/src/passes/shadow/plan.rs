@@ -68,7 +68,7 @@ impl SunView {
     }
 
     /// Matrix and shift to these axes from a boat's own.
-    fn from_boat(&self, pose: &RigidPose) -> (DMat3, DVec3) {
+    fn of_boat(&self, pose: &RigidPose) -> (DMat3, DVec3) {
         let turn = self.from_world * DMat3::from_quat(pose.world_from_body);
         (turn, self.from_world * (pose.position - self.origin))
     }
@@ -76,7 +76,7 @@ impl SunView {
     /// Middle and half the size of a box that holds a boat.
     fn around(&self, pose: &RigidPose, model: &Model) -> (DVec3, DVec3) {
         let (low, high) = (model.min.as_dvec3(), model.max.as_dvec3());
-        let (turn, shift) = self.from_boat(pose);
+        let (turn, shift) = self.of_boat(pose);
         let reach = |row: usize| turn.row(row).abs().dot(0.5 * (high - low));
         (turn * (0.5 * (low + high)) + shift, DVec3::new(reach(0), reach(1), reach(2)))
     }
@@ -103,7 +103,7 @@ impl SunView {
 
     /// Rows of the matrix from a boat's space to texels of the map and nearness to the sun.
     fn rows(&self, pose: &RigidPose, wanted: &PixelRect, placed: &Placed) -> [[f64; 4]; 3] {
-        let (turn, shift) = self.from_boat(pose);
+        let (turn, shift) = self.of_boat(pose);
         let row = |axis: usize, scale: f64, offset: f64| {
             let along = turn.row(axis) * scale;
             [along.x, along.y, along.z, (shift[axis] - self.low[axis]) * scale + offset]
