@@ -52,7 +52,7 @@ fn what_was_recorded_plays_again_the_same() {
 fn real_time_goes_through_the_serial_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
-    let arguments = ["simulate", "--realtime", "--size", "160x96", "--duration", "2", "--json", "--out"];
+    let arguments = ["simulate", "--realtime", "--size", "160x96", "--duration", "3", "--json", "--out"];
     let recording = small_recording().to_str().expect("a plain path");
     let output =
         bowwave_tests::bowwave(arguments.into_iter().chain([out.to_str().expect("a plain path"), recording]));
