@@ -80,7 +80,7 @@ pub(crate) fn drawn_pose(camera: &CameraPose, boat: &BoatView, kind: ModelKind) 
 pub(crate) struct Shade {
     /// Rows of the matrix from the boat's space to texels and nearness to the sun.
     pub(crate) from_boat: [[f32; 4]; 3],
-    /// How far off the surface it is looked up, metres.
+    /// Distance off the surface at which it is looked up, metres.
     pub(crate) off_m: f32,
 }
 

@@ -62,9 +62,9 @@ pub struct SceneNeeds {
 /// A frame's view, as it decides on the passes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct InView<'a> {
-    /// Whether the camera's pose is known.
+    /// The camera's pose is known.
     pub pose_known: bool,
-    /// Whether the sun shines so that it casts shadows.
+    /// The sun shines so that it casts shadows.
     pub sun_shines: bool,
     /// Boats that are seen, or mirrored.
     pub boats: &'a [BoatView],

@@ -153,7 +153,7 @@ impl ShadowPlan {
         self.places.clear();
     }
 
-    /// Decides anew for `scene`.
+    /// Finds the places of `scene`'s boats, and what is drawn into each.
     pub(crate) fn make<'a>(&mut self, scene: &Scene, model: impl Fn(ModelId) -> Option<&'a Model>) {
         let sun = scene.light.sun_direction;
         let mesh = |boat: &BoatView| model(boat.model).filter(|m| m.kind == ModelKind::Mesh);
@@ -165,29 +165,28 @@ impl ShadowPlan {
             self.wanted.push((texels.unwrap_or(nothing), 1.0));
         }
         atlas::place(MAP, &self.wanted, &mut self.places);
-        for (i, placed) in self.places.iter().enumerate() {
-            let (Some(boat), Some(Some(view)), Some((wanted, _))) =
-                (scene.boats.get(i), self.views.get(i), self.wanted.get(i))
-            else {
+        let draws_max = scene.boats.len() * CASTERS_MAX;
+        let views = self.views.iter().zip(&self.wanted).zip(&self.places);
+        for ((i, boat), ((view, (wanted, _)), placed)) in scene.boats.iter().enumerate().zip(views) {
+            let Some(view) = view else {
                 self.shades.push(Shade::NONE);
                 continue;
             };
+            let texel_m = view.texel_m(wanted, placed);
             let from_boat = view.rows(&boat.pose, wanted, placed).map(|row| row.map(|v| v as f32));
-            let off_m = (OFF_TEXELS * view.texel_m(wanted, placed)) as f32;
-            self.shades.push(Shade { from_boat, off_m });
+            self.shades.push(Shade { from_boat, off_m: (OFF_TEXELS * texel_m) as f32 });
             self.clears.push(vk::ClearRect { rect: rect(placed.place), base_array_layer: 0, layer_count: 1 });
+            // Each boat that is still to come has room for itself.
+            let room = draws_max - (scene.boats.len() - i);
             for (n, other) in scene.boats.iter().enumerate() {
                 let Some(caster) = mesh(other) else { continue };
-                let own = n == i;
-                if !own
-                    && (self.draws.len() >= scene.boats.len() * CASTERS_MAX - (scene.boats.len() - i)
-                        || !view.is_shaded_by(&other.pose, caster))
-                {
+                let shades = n == i || (self.draws.len() < room && view.is_shaded_by(&other.pose, caster));
+                if !shades {
                     continue;
                 }
                 self.draws.push(ShadowDraw {
                     model: other.model,
-                    detail_m: DETAIL_TEXELS * view.texel_m(wanted, placed),
+                    detail_m: DETAIL_TEXELS * texel_m,
                     place: placed.place,
                     block: ShadowBlock { clip_from_boat: clip(view.rows(&other.pose, wanted, placed)) },
                 });
