@@ -4,13 +4,13 @@
 //! of a few frames; nobody waits for the GPU within a frame. Light is linear inside, sRGB at the edges: the screen image is
 //! seen as codes by the video pass and as linear light by everything that blends.
 
+mod config;
 mod encoder;
 mod error;
 mod frame_data;
 mod gpu;
 mod import;
 mod memory;
-mod of_plan;
 mod passes;
 mod pipeline;
 mod plan;
@@ -25,8 +25,9 @@ mod testing;
 mod upload;
 mod view;
 
+pub use config::{Needs, RenderConfig};
 pub use error::RenderError;
 pub use gpu::{DeviceInfo, SOFTWARE, devices, find_device};
 pub use passes::video::pictures::{PictureCounts, PicturePath, PictureShape};
-pub use renderer::{DrawRequest, Needs, RenderConfig, Renderer, TIMED_EVERY};
+pub use renderer::{DrawRequest, Renderer, TIMED_EVERY};
 pub use ring::{Completions, FinishedFrame, TimeOuts};

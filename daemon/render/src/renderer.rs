@@ -6,14 +6,12 @@ use ash::vk;
 use bowwave_core::{
     event::Picture,
     frame::scene::{Pass, Scene},
-    geometry::Optics,
     model::Model,
-    water::{ReflectionMethod, ShadowLevel, Water},
+    water::{ReflectionMethod, Water},
 };
 
-use shaders_spirv::interface::WATERS_MAX;
-
 use crate::{
+    config::{Needs, RenderConfig},
     encoder::{CommandEncoder, Reach, Steps},
     error::{Named, RenderError},
     frame_data::{Capacity, FrameData, frame_set_layout},
@@ -27,7 +25,7 @@ use crate::{
         shadow::ShadowPass,
         video::{
             VideoPass,
-            pictures::{PictureCounts, PicturePath, PictureShape},
+            pictures::{PictureCounts, PicturePath},
         },
         wake::WakePass,
         water::{
@@ -38,56 +36,11 @@ use crate::{
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
     rects::overlap,
-    ring::{Completions, FRAME_QUERY, InFlight, QUERIES, SLOTS_MAX, Shared, Span, TimeOuts},
+    ring::{Completions, FRAME_QUERY, InFlight, QUERIES, SLOTS_MAX, Shared, Span},
     stamps::Stamps,
     target::{DrawTarget, same_place},
     view,
 };
-
-/// What can ever be asked of a renderer. The rest is neither compiled nor allocated.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Needs {
-    /// Most boats in one frame.
-    pub boats_max: usize,
-    /// Most tracers, splashes and strikes in one frame.
-    pub rounds_max: usize,
-    /// Most boats in one frame that leave a wake.
-    pub wakes_max: usize,
-    /// How the sea may have to mirror.
-    pub waters: Vec<(ReflectionMethod, ShadowLevel)>,
-    /// What lens and shutter of the camera do.
-    pub optics: Optics,
-}
-
-impl Needs {
-    /// Boats whose light waves throw back.
-    fn lobes(&self) -> usize {
-        let any = self.waters.iter().any(|(method, _)| *method == ReflectionMethod::Baked);
-        if any { self.boats_max.min(WATERS_MAX) } else { 0 }
-    }
-}
-
-/// How a renderer is made.
-#[derive(Clone, Debug)]
-pub struct RenderConfig {
-    /// Screen width in pixels.
-    pub width: u32,
-    /// Screen height in pixels.
-    pub height: u32,
-    /// Index of the device, a part of its name, or [`SOFTWARE`](crate::SOFTWARE); `None`: the first GPU, or the first device of
-    /// any kind.
-    pub device: Option<String>,
-    /// Whether Vulkan's validation layer watches. Slow; for tests.
-    pub validation: bool,
-    /// Frames that may be with the GPU or the reader at once, 1 to 8; 3 keeps both busy.
-    pub frames_in_flight: usize,
-    /// What can ever be asked.
-    pub needs: Needs,
-    /// The pictures that will come, so that the first frame need not prepare for them.
-    pub picture: Option<PictureShape>,
-    /// How long the GPU may take before it counts as hung.
-    pub time_outs: TimeOuts,
-}
 
 /// One frame in this many is timed unless [`Renderer::time_every`] says otherwise: a driver that runs on the processor finishes all work
 /// before it writes a timestamp, so that the passes no longer overlap and the frame takes up to a millisecond longer. Fewer than one in a
