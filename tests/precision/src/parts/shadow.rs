@@ -7,7 +7,7 @@ use bowwave_core::{
     colour::{linear_to_srgb, srgb_to_linear},
     estimate::light::{Light, SeaTones},
     event::Picture,
-    frame::scene::{LeftOut, Pass, PassDecision, Scene},
+    frame::scene::{LeftOut, Pass, PassDecision, PixelRect, Scene},
     geometry::{CameraPose, Lens},
     model::Model,
     sea::BeaufortForce,
@@ -128,9 +128,15 @@ impl Studio {
         let around = Scene { light: Light { sun: Vec3::ZERO, ..bare.light }, ..bare.clone() };
         let (bare, around) = (self.paint(&bare)?, self.paint(&around)?);
         let mesh = boat::mesh(&self.model, Self::afloat(case).pose());
+        let hull =
+            scene.boats.first().and_then(|boat| boat.hull).context("the boat is out of the picture")?;
         let mut truth = bare.clone();
         let mut mask = vec![false; (SIZE.0 * SIZE.1) as usize];
         for ((x, y, pixel), on_boat) in truth.enumerate_pixels_mut().zip(&mut mask) {
+            // Rays beside the boat would meet nothing.
+            if !is_within(hull, (x, y)) {
+                continue;
+            }
             let Some(seen) = sun_seen(&mesh, &scene.camera, &scene.lens, (x, y), case.sun) else { continue };
             *on_boat = true;
             let (lit, dark) = (*pixel, around.get_pixel(x, y));
@@ -147,6 +153,10 @@ impl Studio {
         };
         Ok(([error(&shaded)?, error(&bare)?].map(|sum| sum / count.max(1) as f64), count as u32))
     }
+}
+
+fn is_within(rect: PixelRect, (x, y): (u32, u32)) -> bool {
+    x.wrapping_sub(rect.x) < rect.width && y.wrapping_sub(rect.y) < rect.height
 }
 
 fn without_shadow(scene: &Scene) -> Scene {
