@@ -6,7 +6,7 @@
 
 layout(location = 0) in vec3 around;
 layout(location = 1) in vec3 sun;
-layout(location = 2) in vec3 shade;
+layout(location = 2) centroid in vec3 shade;
 
 layout(location = 0) out vec4 colour;
 

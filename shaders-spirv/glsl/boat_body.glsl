@@ -17,8 +17,8 @@ layout(location = 6) in vec2 sky2;
 // cost by the fragment.
 layout(location = 0) out vec3 around_out;
 layout(location = 1) out vec3 sun_out;
-// Where the shadow map is looked up.
-layout(location = 2) out vec3 shade_out;
+// Where the shadow map is looked up: within the triangle, since beyond it lie other boats' places, or nothing that was drawn.
+layout(location = 2) centroid out vec3 shade_out;
 #ifdef TEXTURED
 layout(location = 3) out vec2 uv_out;
 #endif

@@ -13,7 +13,7 @@ layout(set = 2, binding = 0) uniform sampler2D skin;
 
 layout(location = 0) in vec3 around;
 layout(location = 1) in vec3 sun;
-layout(location = 2) in vec3 shade;
+layout(location = 2) centroid in vec3 shade;
 layout(location = 3) in vec2 uv;
 
 layout(location = 0) out vec4 colour;
