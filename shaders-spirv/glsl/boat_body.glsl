@@ -14,13 +14,18 @@ layout(location = 6) in vec2 sky2;
 
 // Light that the corner sends to the eye: of sky and sea, with haze, and of the sun, if nothing is before it. A texture's colours and the
 // haze come later. Both are found here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles
-// cost by the fragment.
+// cost by the fragment and by what is handed to it. In the sea's mirror nobody sees a shadow: its light is one colour.
 layout(location = 0) out vec3 around_out;
+#ifdef MIRRORED
+const uint UV = 1;
+#else
+const uint UV = 3;
 layout(location = 1) out vec3 sun_out;
 // Where the shadow map is looked up: within the triangle, since beyond it lie other boats' places, or nothing that was drawn.
 layout(location = 2) centroid out vec3 shade_out;
+#endif
 #ifdef TEXTURED
-layout(location = 3) out vec2 uv_out;
+layout(location = UV) out vec2 uv_out;
 #endif
 
 out gl_PerVertex {
@@ -43,14 +48,21 @@ void main() {
     gl_ClipDistance[0] = dot(boat.water_plane, p);
     gl_ClipDistance[1] = dot(boat.horizon_plane, p);
     around_out = lit_around(boat);
-    sun_out = albedo * frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0);
+    vec3 sun = albedo * frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0);
+#ifdef MIRRORED
+    around_out += sun;
+#else
+    sun_out = sun;
     // A little off the surface, so that it does not shade itself by the map's texels.
     vec4 off = vec4(position + normal * boat.sun.w, 1.0);
     shade_out = vec3(dot(boat.shadow_from_boat[0], off), dot(boat.shadow_from_boat[1], off), dot(boat.shadow_from_boat[2], off));
+#endif
 #ifdef TEXTURED
     uv_out = uv;
 #else
     around_out = mix(around_out, frame.horizon.rgb, boat.eye.w);
+#ifndef MIRRORED
     sun_out *= 1.0 - boat.eye.w;
+#endif
 #endif
 }

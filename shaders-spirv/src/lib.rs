@@ -48,6 +48,14 @@ shaders! {
     BOAT_FRAG = "boat.frag";
     /// A boat with a texture. Constants: 0 whether the layer holds roots of light, 1 samples.
     BOAT_TEXTURED_FRAG = "boat_textured.frag";
+    /// A corner of a boat without a texture, mirrored in the sea: its light is one colour, without shadows.
+    BOAT_MIRRORED_VERT = "boat_mirrored.vert";
+    /// The same with its place in the texture.
+    BOAT_TEXTURED_MIRRORED_VERT = "boat_textured_mirrored.vert";
+    /// A boat without a texture, mirrored in the sea. Constant: 0 whether the layer holds roots of light.
+    BOAT_MIRRORED_FRAG = "boat_mirrored.frag";
+    /// A boat with a texture, mirrored in the sea. Constants: 0 whether the layer holds roots of light, 1 samples.
+    BOAT_TEXTURED_MIRRORED_FRAG = "boat_textured_mirrored.frag";
     /// A corner of a boat as the sun sees it.
     SHADOW_VERT = "shadow.vert";
     /// A rectangle given in pixels.

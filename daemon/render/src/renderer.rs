@@ -110,9 +110,8 @@ impl Passes {
         let drawn = shadow.as_ref().map(|shadow| (&meshes, &shadow.map));
         let reflects = needs.waters.iter().any(|(method, _)| *method != ReflectionMethod::Off);
         let softens = needs.waters.iter().any(|(method, _)| *method == ReflectionMethod::Full);
-        let mirror = drawn
-            .filter(|_| reflects)
-            .map(|drawn| MirrorPass::new(context, drawn, textured, softens))
+        let mirror = (any_boat && reflects)
+            .then(|| MirrorPass::new(context, &meshes, textured, softens))
             .transpose()?;
         let water = (any_boat && !needs.waters.is_empty())
             .then(|| WaterPass::new(context, mirror.as_ref(), &needs.waters))
@@ -390,7 +389,7 @@ impl<T> Renderer<T> {
         let reflect = self.passes.reflect.as_ref().filter(|_| !plan.reflects.is_empty());
         let mut steps = Steps::default();
         steps.add_memory((PIXELS_DRAWN.0 | PIXELS_COPIED.0, vk::AccessFlags2::NONE), PIXELS_DRAWN);
-        let shadow = self.passes.shadow.as_ref().filter(|_| mirror.is_some() || boats.is_some());
+        let shadow = self.passes.shadow.as_ref().filter(|_| boats.is_some());
         steps.add(shadow.map(ShadowPass::before));
         steps.add(mirror.iter().flat_map(|m| m.before()).flatten());
         steps.add(boats.iter().flat_map(|b| b.before()));
@@ -404,14 +403,14 @@ impl<T> Renderer<T> {
         stamps.around(Span::Video, || video.record(to, target, hud.overlay.set, &plan.overlaid, &plan.bare));
         if let Some(pass) = shadow {
             stamps.around(Span::Shadow, || pass.record(to, meshes, &plan.shadows));
-            let mut steps = Steps::default();
-            steps.add([pass.between()]);
-            steps.record(to);
         }
         if let Some(pass) = mirror {
             stamps
                 .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));
         }
+        let mut steps = Steps::default();
+        steps.add(shadow.map(ShadowPass::between));
+        steps.record(to);
         if let Some(pass) = boats {
             let clears = (&plan.clears[..], &plan.depth_clears[..]);
             stamps.around(Span::BoatLayer, || pass.record_layer(to, frame, meshes, &plan.boats, clears));

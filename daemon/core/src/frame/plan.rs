@@ -156,7 +156,7 @@ impl ScenePlan {
             leave_out(pass, pose_known, LeftOut::NoPose);
         }
         let reflected = boats.iter().any(|b| b.reflection.is_some());
-        leave_out(Pass::Shadow, !boats.is_empty(), LeftOut::NoBoatInView);
+        leave_out(Pass::Shadow, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
         leave_out(Pass::Shadow, sun_shines, LeftOut::NoSun);
         leave_out(Pass::Mirror, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);

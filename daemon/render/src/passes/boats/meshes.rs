@@ -1,6 +1,6 @@
 //! All models on the device: one vertex buffer, one index buffer, a texture each where there is one.
 
-use std::{ops::Range, sync::Arc};
+use std::{ops::Range, panic::resume_unwind, sync::Arc, thread};
 
 use ash::vk;
 use bowwave_core::{
@@ -15,7 +15,7 @@ use crate::{
     gpu::Gpu,
     memory::{Access, Buffer, Image, ImageShape},
     passes::PassContext,
-    passes::boats::simplify::{Level, simplify},
+    passes::boats::simplify::{Level, Simplified, simplify},
     pipeline::{Bound, SRGB, Sampler, SetLayout},
     upload::upload_image,
 };
@@ -39,6 +39,16 @@ pub(crate) struct Meshes {
     _sampler: Sampler,
 }
 
+/// Simplifies each of `models` on a thread of its own: what its corners see of the sky takes a fifth of a second a boat, and nobody trains
+/// before that is done.
+fn simplify_all(models: &[Model], bent: bool) -> Vec<Simplified> {
+    thread::scope(|scope| {
+        let jobs: Vec<_> = models.iter().map(|model| scope.spawn(move || simplify(model, bent))).collect();
+        let done = jobs.into_iter().map(|job| job.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        done.collect()
+    })
+}
+
 impl Meshes {
     pub(crate) fn new(context: &PassContext<'_>, models: &[Model]) -> Result<Self, RenderError> {
         let gpu = context.gpu;
@@ -52,13 +62,13 @@ impl Meshes {
                 .set(&skin_layout, &[Bound::Texture { view: image.view, sampler: sampler.raw, layout }])
         };
         let (mut vertices, mut indices, mut meshes) = (Vec::new(), Vec::new(), Vec::new());
-        for model in models {
-            check(model)?;
+        models.iter().try_for_each(check)?;
+        let made = simplify_all(models, context.optics.bend != Bend::None);
+        for (model, made) in models.iter().zip(made) {
             let texture = model.texture.as_ref().map(|t| upload_texture(gpu, &model.name, t)).transpose()?;
             let skin = texture.as_ref().map(skin_of).transpose()?;
             let too_big =
                 |_| RenderError::Model { name: model.name.clone(), why: "too many corners".to_owned() };
-            let made = simplify(model, context.optics.bend != Bend::None);
             meshes.push(Mesh {
                 first_index: u32::try_from(indices.len()).map_err(too_big)?,
                 first_vertex: i32::try_from(vertices.len()).map_err(too_big)?,

@@ -12,7 +12,8 @@ use ash::vk;
 use bowwave_core::{frame::scene::PixelRect, model::ModelId};
 use meshes::Meshes;
 use shaders_spirv::{
-    BOAT_FRAG, BOAT_TEXTURED_FRAG, BOAT_TEXTURED_VERT, BOAT_VERT, COMPOSITE_FRAG, RECT_VERT,
+    BOAT_FRAG, BOAT_MIRRORED_FRAG, BOAT_MIRRORED_VERT, BOAT_TEXTURED_FRAG, BOAT_TEXTURED_MIRRORED_FRAG,
+    BOAT_TEXTURED_MIRRORED_VERT, BOAT_TEXTURED_VERT, BOAT_VERT, COMPOSITE_FRAG, RECT_VERT,
     interface::{DrawBlock, MeshVertex},
 };
 
@@ -41,15 +42,16 @@ pub(crate) struct BoatDraw {
 pub(crate) struct BoatPipelines {
     plain: Pipeline,
     textured: Option<Pipeline>,
-    /// Set of the shadow map.
-    shadow: vk::DescriptorSet,
+    /// Set of the shadow map, where shadows are drawn.
+    shadow: Option<vk::DescriptorSet>,
 }
 
 impl BoatPipelines {
-    /// `front` is the way round in which the corners of a front face are seen: mirrored, it is the other one.
+    /// `front` is the way round in which the corners of a front face are seen: mirrored, it is the other one. Without a shadow map, boats are
+    /// drawn as the sea mirrors them.
     pub(crate) fn new(
         context: &PassContext<'_>,
-        (meshes, shadow): (&Meshes, &TextureSet),
+        (meshes, shadow): (&Meshes, Option<&TextureSet>),
         samples: vk::SampleCountFlags,
         front: vk::FrontFace,
         colour: vk::Format,
@@ -67,16 +69,25 @@ impl BoatPipelines {
         // A layer of codes holds roots, one of light is filtered as it is.
         let constants = [u32::from(colour == UNORM), samples.as_raw()];
         let lens = context.lens_constants();
-        let sets = [context.frame_set, &*shadow.layout, &meshes.skin_layout];
+        let mut sets = vec![context.frame_set];
+        sets.extend(shadow.map(|shadow| &*shadow.layout));
+        let plain_sets = sets.len();
+        sets.push(&meshes.skin_layout);
         let make = |textured: bool| {
+            let (vertex, fragment) = match (shadow, textured) {
+                (Some(_), false) => (BOAT_VERT, BOAT_FRAG),
+                (Some(_), true) => (BOAT_TEXTURED_VERT, BOAT_TEXTURED_FRAG),
+                (None, false) => (BOAT_MIRRORED_VERT, BOAT_MIRRORED_FRAG),
+                (None, true) => (BOAT_TEXTURED_MIRRORED_VERT, BOAT_TEXTURED_MIRRORED_FRAG),
+            };
             Pipeline::new(
                 context.gpu,
                 &PipelineShape {
-                    vertex: if textured { BOAT_TEXTURED_VERT } else { BOAT_VERT },
-                    fragment: Some(if textured { BOAT_TEXTURED_FRAG } else { BOAT_FRAG }),
+                    vertex,
+                    fragment: Some(fragment),
                     vertex_constants: &lens,
                     constants: if textured { &constants } else { &constants[..1] },
-                    sets: if textured { &sets } else { &sets[..2] },
+                    sets: if textured { &sets } else { &sets[..plain_sets] },
                     push: size_of::<DrawBlock>(),
                     vertices: Some((size_of::<MeshVertex>() as u32, &attributes)),
                     topology: vk::PrimitiveTopology::TRIANGLE_LIST,
@@ -90,7 +101,7 @@ impl BoatPipelines {
             )
         };
         let textured = any_textured.then(|| make(true)).transpose()?;
-        Ok(Self { plain: make(false)?, textured, shadow: shadow.set })
+        Ok(Self { plain: make(false)?, textured, shadow: shadow.map(|shadow| shadow.set) })
     }
 
     /// Draws one boat's mesh, within a rendering with depth. The shared buffers are bound.
@@ -103,16 +114,14 @@ impl BoatPipelines {
     ) {
         let Some(level) = meshes.level(boat.model, boat.detail_m) else { return };
         let block = DrawBlock { index: boat.index, ..DrawBlock::default() };
-        let pipeline = match (meshes.skin(boat.model), &self.textured) {
-            (Some(skin), Some(textured)) => {
-                to.bind(textured, &[frame, self.shadow, skin]);
-                textured
-            }
-            _ => {
-                to.bind(&self.plain, &[frame, self.shadow]);
-                &self.plain
-            }
-        };
+        let skinned = meshes.skin(boat.model).zip(self.textured.as_ref());
+        let pipeline = skinned.map_or(&self.plain, |(_, textured)| textured);
+        match (self.shadow, skinned) {
+            (Some(shadow), Some((skin, _))) => to.bind(pipeline, &[frame, shadow, skin]),
+            (Some(shadow), None) => to.bind(pipeline, &[frame, shadow]),
+            (None, Some((skin, _))) => to.bind(pipeline, &[frame, skin]),
+            (None, None) => to.bind(pipeline, &[frame]),
+        }
         to.push(pipeline, &block);
         meshes.draw(to, boat.model, &(level.closed.start..level.open.end));
     }
@@ -146,7 +155,8 @@ impl BoatsPass {
             layer(DEPTH, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | sampled),
         )?;
         let front = vk::FrontFace::COUNTER_CLOCKWISE;
-        let pipelines = BoatPipelines::new(context, (meshes, shadow), SAMPLES, front, UNORM, any_textured)?;
+        let pipelines =
+            BoatPipelines::new(context, (meshes, Some(shadow)), SAMPLES, front, UNORM, any_textured)?;
         let layer = context.texture_set(colour.view)?;
         let composite = Pipeline::new(
             gpu,

@@ -39,7 +39,7 @@ impl MirrorPass {
     /// `softens` if a method that needs it may be asked for.
     pub(crate) fn new(
         context: &PassContext<'_>,
-        (meshes, shadow): (&Meshes, &TextureSet),
+        meshes: &Meshes,
         any_textured: bool,
         softens: bool,
     ) -> Result<Self, RenderError> {
@@ -56,7 +56,7 @@ impl MirrorPass {
             depth: Image::new(context.gpu, "mirror depth", depth)?,
             pipelines: BoatPipelines::new(
                 context,
-                (meshes, shadow),
+                (meshes, None),
                 vk::SampleCountFlags::TYPE_1,
                 vk::FrontFace::CLOCKWISE,
                 LIGHT,
