@@ -223,6 +223,7 @@ impl Capture {
             | Event::Trigger(_)
             | Event::Fault(_)
             | Event::Ship(_)
+            | Event::ShipFix(_)
             | Event::Mark(_)
             | Event::Act(_) => {}
         }

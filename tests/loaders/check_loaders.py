@@ -29,6 +29,7 @@ TOPICS = {
     "/camera/image_raw": ("sensor_msgs/msg/Image", "Image:buffer"),
     "/ship": ("nmea_msgs/msg/Sentence", "nmea_msgs.msg.Sentence:message"),
     "/ship/values": ("bowwave_msgs/msg/ShipValues", "bowwave_msgs.msg.ShipValues:message"),
+    "/ship/fix": ("bowwave_msgs/msg/ShipFix", "bowwave_msgs.msg.ShipFix:message"),
     "/mark": ("std_msgs/msg/String", "TextDocument:text"),
     "/fault": ("diagnostic_msgs/msg/DiagnosticArray", "diagnostic_msgs.msg.DiagnosticArray:message"),
     "/tick": ("bowwave_msgs/msg/Tick", "bowwave_msgs.msg.Tick:message"),

@@ -79,6 +79,37 @@ fn a_recording_that_lacks_inputs_or_ticks_says_so() {
     assert!(said.contains("1 inputs are missing"), "{said}");
 }
 
+#[test]
+fn a_run_with_the_ships_place_and_time_comes_out_the_same() {
+    use bowwave_record::{Entry, RecordingReader, RecordingWriter, ShipEntry};
+    // The sun is far down, and the moon is full and high.
+    const LINES: [&str; 2] =
+        ["$GPGGA,,5406.000,N,00754.000,E,1,,,,,,,,*5D\r\n", "$GPZDA,220000.00,24,11,2026,,*66\r\n"];
+    let folder = tempfile::tempdir().expect("a folder");
+    let at_sea = folder.path().join("at-sea.mcap");
+    let reader = RecordingReader::open(small_recording()).expect("a recording");
+    let mut writer = RecordingWriter::create(&at_sea, reader.properties()).expect("a new file");
+    for (n, entry) in reader.entries().expect("entries").enumerate() {
+        let entry = entry.expect("an entry");
+        if n == 100 {
+            for sentence in LINES {
+                let line = ShipEntry { arrival: entry.time(), sentence: sentence.to_owned() };
+                writer.write(&Entry::Ship(line)).expect("written");
+            }
+        }
+        writer.write(&entry).expect("written");
+    }
+    writer.finish().expect("finished");
+    let out = folder.path().join("out");
+    let summary = play(&at_sea, &out, 0, &["--record"]);
+    let sun = &summary["sun"];
+    assert_eq!(sun["source"], "ship", "{sun}");
+    assert!(sun["elevation_deg"].as_f64() < Some(-10.0), "{sun}");
+    let moon = &sun["moonlight"];
+    assert!(moon["elevation_deg"].as_f64() > Some(50.0) && moon["lit"].as_f64() > Some(0.95), "{sun}");
+    replay(&out, &summary);
+}
+
 /// Writes a recording again without some of its measurements.
 fn leave_out(from: &Path, to: &Path, is_left_out: impl Fn(usize) -> bool) {
     use bowwave_record::{Entry, RecordingReader, RecordingWriter};

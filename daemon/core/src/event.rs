@@ -4,7 +4,12 @@ use std::{any::Any, sync::Arc};
 
 use glam::{DQuat, DVec3};
 
-use crate::{act::TraineeAct, fault::FaultChange, time::Time};
+use crate::{
+    act::TraineeAct,
+    ephemeris::{Place, Utc},
+    fault::FaultChange,
+    time::Time,
+};
 
 /// One input of a session. Records and scenes follow from the inputs alone, live as replayed.
 #[derive(Clone, Debug)]
@@ -42,6 +47,8 @@ pub enum Event {
     Trigger(TriggerEdge),
     /// The ship's own instruments told its heading or attitude.
     Ship(ShipSample),
+    /// The ship's own instruments told where she is, or what time it is.
+    ShipFix(ShipFix),
     /// The operator says that the gun stands at something of known bearing.
     Mark(Mark),
     /// The trainee did something besides pulling the trigger, or an instructor marked a call.
@@ -58,6 +65,7 @@ impl Event {
             Self::Frame(f) => f.arrival,
             Self::Trigger(t) => t.time,
             Self::Ship(s) => s.arrival,
+            Self::ShipFix(f) => f.arrival,
             Self::Mark(m) => m.time,
             Self::Act(a) => a.time,
             Self::Fault(f) => f.time,
@@ -104,6 +112,17 @@ pub struct ShipSample {
     pub heading_sigma: Option<f64>,
     /// The instrument says that it is not at its best: reduced quality, or not aligned yet.
     pub reduced: bool,
+}
+
+/// Place and time by the ship's own instruments; a line tells one of them or both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShipFix {
+    /// When its last byte reached the host.
+    pub arrival: Time,
+    /// Where she is.
+    pub place: Option<Place>,
+    /// The time at its arrival, less the feed's latency.
+    pub utc: Option<Utc>,
 }
 
 /// Place of known bearing at which the operator presses.

@@ -11,6 +11,7 @@ pub mod calibration;
 mod chance;
 pub mod colour;
 pub mod daylight;
+pub mod ephemeris;
 pub mod estimate;
 pub mod event;
 pub mod fault;

@@ -12,6 +12,7 @@ use crate::{
     estimate::{
         Estimator, EstimatorSettings, SeaReport, SensorCounts,
         clock::ClockReport,
+        light::Luminaries,
         pose::{NoPose, STALE_NS},
         registration::{Misfit, RegistrationChecks},
     },
@@ -119,6 +120,11 @@ impl Session {
         self.estimator.heading_sigma()
     }
 
+    /// Sun and moon at the newest picture.
+    pub const fn luminaries(&self) -> &Luminaries {
+        self.estimator.luminaries()
+    }
+
     /// Confirmation of the orientation by the pictures.
     pub fn checks(&self, now: Time) -> RegistrationChecks {
         self.estimator.checks(now)
@@ -180,6 +186,7 @@ impl Session {
                 ..*edge
             }),
             Event::Ship(sample) => self.estimator.ship(sample),
+            Event::ShipFix(fix) => self.estimator.ship_fix(fix),
             Event::Mark(mark) => self.estimator.mark(mark),
             Event::Act(act) => self.world.act(*act),
             Event::Fault(change) => {
@@ -313,6 +320,9 @@ impl Session {
             self.notes.sea(&report);
         }
         self.notes.light(self.estimator.sky_agreement());
+        if let Some(time) = self.estimator.video_time() {
+            self.notes.luminaries(self.estimator.luminaries(), self.estimator.unused_moment(time));
+        }
         self.notes.unexpected_horizons(self.estimator.counts().horizons.unexpected);
         self.notes.heading(self.estimator.heading_sigma(), &self.estimator.counts().headings);
         self.notes.clock(self.composer.scene().frame + 1, || self.estimator.unit_clock());

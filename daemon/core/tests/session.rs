@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
+    ephemeris::{Place, Utc},
     estimate::attitude::Source,
-    event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, Tick, TriggerEdge},
+    event::{CameraFrame, Event, ImuSample, Picture, PixelFormat, ShipFix, Tick, TriggerEdge},
     fault::{Fault, FaultChange},
     frame::scene::{LeftOut, Pass, PassDecision, Status},
     geometry::{Lens, look},
@@ -466,6 +467,57 @@ fn before_the_first_picture_a_black_one_says_what_is_wrong() {
     assert!(view.blind);
     assert!(matches!(view.scene.hud.status, Status::NotScored { cause: "NO CAMERA YET", .. }));
     assert!(view.scene.boats.is_empty() && view.picture.bytes().iter().all(|b| *b == 0));
+}
+
+#[test]
+fn the_ships_place_and_time_put_the_sun_where_it_stands() {
+    let fix = |text: &str| {
+        let mut s = session(text);
+        let (place, utc) = (Place::new(54.1, 7.9), Utc::of_day(2026, 6, 1, 12.0 * 3600.0));
+        s.event(&Event::ShipFix(ShipFix { arrival: Time::from_ns(MS), place, utc }));
+        let mut said = Vec::new();
+        let mut sun = DVec3::ZERO;
+        for tick in 1..30 {
+            let now = Time::from_ns(tick * 33 * MS);
+            feed(&mut s, now);
+            let answer = s.tick(Tick::at(now));
+            sun = answer.view.scene.light.sun_direction;
+            said.extend(answer.notes.iter().map(|note| (note.warning, note.text.clone())));
+        }
+        let elevation = sun.z.asin().to_degrees();
+        (elevation, said.into_iter().find(|(_, text)| text.contains("place and time")).expect("it is told"))
+    };
+    let (elevation, (warning, text)) = fix(SCENARIO);
+    assert!((elevation - 57.4).abs() < 0.5 && !warning, "{elevation} {text}");
+    assert!(
+        text.contains(
+            "57 above the horizon by the ship's place and time (54.100 N 7.900 E, 2026-06-01 12:00 UTC)"
+        ),
+        "{text}"
+    );
+    // A scenario with a sun of its own keeps that, and the contradiction is told.
+    let (elevation, (warning, text)) = fix(&format!("{SCENARIO}[light]\nsun_elevation_deg = 5\n"));
+    assert!((elevation - 5.0).abs() < 1e-6 && warning, "{elevation} {text}");
+    assert!(text.contains("source = \"ship\""), "{text}");
+}
+
+/// An orientation and a picture at `now`.
+fn feed(session: &mut Session, now: Time) {
+    session.event(&Event::Imu(ImuSample {
+        arrival: now,
+        device_time_ns: now.ns(),
+        rate: DVec3::new(1e-12 * now.ns() as f64, 0.0, 0.0),
+        accel: attitude(0.0, 0.0).inverse() * DVec3::Z * 9.81,
+        world_from_imu: Some(attitude(0.0, 0.0)),
+    }));
+    let picture = Picture::new(PixelFormat::Rgb, 64, 48, vec![120u8; 64 * 48 * 3].into()).expect("a picture");
+    session.event(&Event::Frame(CameraFrame {
+        arrival: now,
+        mid_exposure: now.plus_ns(-MS),
+        sequence: (now.ns() / MS) as u32,
+        picture,
+        jpeg: None,
+    }));
 }
 
 #[test]

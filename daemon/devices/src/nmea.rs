@@ -1,13 +1,18 @@
-//! Heading and attitude of the ship from its own instruments, as lines of NMEA 0183, sans-io: a second input beside the unit
-//! on the gun, which cannot tell the ship's motion from the gun's and has no heading of its own.
+//! What the ship's own instruments tell as lines of NMEA 0183, sans-io: her heading and attitude, a second input beside the unit on
+//! the gun, which cannot tell the ship's motion from the gun's and has no heading of its own; and place and time, which say where sun and
+//! moon stand.
 //!
 //! Read are `$--HDT` (true heading: NMEA 0183, IEC 61162-1), `$PASHR` (attitude as Applanix, NovAtel and Oxford units send
-//! it) and `$PSXN,23` with its quality `$PSXN,20` (Kongsberg Seapath). Heading is clockwise from true north; roll is positive
-//! with starboard down, pitch with the bow up; all in radians.
+//! it), `$PSXN,23` with its quality `$PSXN,20` (Kongsberg Seapath), `$--RMC` (place and time), `$--GGA` (place) and `$--ZDA` (time).
+//! Heading is clockwise from true north; roll is positive with starboard down, pitch with the bow up; all in radians.
 
 use std::f64::consts::TAU;
 
-use bowwave_core::{event::ShipSample, time::Time};
+use bowwave_core::{
+    ephemeris::{Place, Utc},
+    event::{Event, ShipFix, ShipSample},
+    time::Time,
+};
 
 pub use crate::framing::LineCounters;
 use crate::{
@@ -32,6 +37,12 @@ pub enum NmeaSentence {
     Pashr,
     /// `$PSXN,23`.
     Psxn,
+    /// `$--RMC`.
+    Rmc,
+    /// `$--GGA`.
+    Gga,
+    /// `$--ZDA`.
+    Zda,
 }
 
 impl NmeaSentence {
@@ -41,19 +52,38 @@ impl NmeaSentence {
             Self::Hdt => "HDT",
             Self::Pashr => "PASHR",
             Self::Psxn => "PSXN",
+            Self::Rmc => "RMC",
+            Self::Gga => "GGA",
+            Self::Zda => "ZDA",
         }
     }
 }
 
 /// Measurement in one line of the ship's instruments.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ShipAttitude {
+pub struct ShipLine {
     /// The line.
     pub sentence: NmeaSentence,
-    /// Time of the measurement, seconds of the UTC day, where the line tells it.
-    pub utc_day_s: Option<f64>,
     /// The measurement.
-    pub sample: ShipSample,
+    pub said: ShipSaid,
+}
+
+/// What a line tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShipSaid {
+    /// Heading and attitude.
+    Attitude(ShipSample),
+    /// Place and time.
+    Fix(ShipFix),
+}
+
+impl From<ShipSaid> for Event {
+    fn from(said: ShipSaid) -> Self {
+        match said {
+            ShipSaid::Attitude(sample) => Self::Ship(sample),
+            ShipSaid::Fix(fix) => Self::ShipFix(fix),
+        }
+    }
 }
 
 /// PsxnQuality of `$PSXN,20`: 0 normal, 1 reduced, 2 invalid.
@@ -94,7 +124,7 @@ impl ShipParser {
 
     /// The measurement in the next line that has one, of bytes that arrived together at `arrival`. Bytes are taken from the front of
     /// `input` as far as they are needed; `None`: they are used up.
-    pub fn next_line(&mut self, input: &mut &[u8], arrival: Time) -> Option<ShipAttitude> {
+    pub fn next_line(&mut self, input: &mut &[u8], arrival: Time) -> Option<ShipLine> {
         let Self { scanner, quality } = self;
         while let Some(found) = scanner.next_of(input) {
             let said = lines::checked(found.bytes).and_then(|body| read(body, quality, arrival));
@@ -110,23 +140,36 @@ impl ShipParser {
         &'a mut self,
         mut bytes: &'a [u8],
         arrival: Time,
-    ) -> impl Iterator<Item = ShipAttitude> + 'a {
+    ) -> impl Iterator<Item = ShipLine> + 'a {
         std::iter::from_fn(move || self.next_line(&mut bytes, arrival))
     }
 }
 
 /// The measurement in a line without `$` and check sum; `None` for other lines and those without one.
-fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAttitude> {
+fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipLine> {
     let mut fields = body.split(',');
     let address = fields.next()?;
     let fields: [&str; 11] = std::array::from_fn(|_| fields.next().unwrap_or_default());
+    let attitude = attitude(address, &fields, quality, arrival);
+    let (sentence, said) = attitude
+        .map(|(sentence, sample)| (sentence, ShipSaid::Attitude(sample)))
+        .or_else(|| fix(address, &fields, arrival).map(|(sentence, fix)| (sentence, ShipSaid::Fix(fix))))?;
+    Some(ShipLine { sentence, said })
+}
+
+fn attitude(
+    address: &str,
+    fields: &[&str; 11],
+    quality: &mut PsxnQuality,
+    arrival: Time,
+) -> Option<(NmeaSentence, ShipSample)> {
     let nothing =
         ShipSample { arrival, heading: None, roll: None, pitch: None, heading_sigma: None, reduced: false };
-    let (sentence, utc_day_s, sample) = match (address, fields) {
-        (address, [degrees, "T", ..]) if address.len() == 5 && address.ends_with("HDT") => {
-            (NmeaSentence::Hdt, None, ShipSample { heading: heading(degrees), ..nothing })
+    let (sentence, sample) = match (address, *fields) {
+        (address, [degrees, "T", ..]) if is_of(address, "HDT") => {
+            (NmeaSentence::Hdt, ShipSample { heading: heading(degrees), ..nothing })
         }
-        ("PASHR", [time, degrees, "T", roll, pitch, _, _, _, sigma, _, aligned]) => {
+        ("PASHR", [_, degrees, "T", roll, pitch, _, _, _, sigma, _, aligned]) => {
             let sample = ShipSample {
                 heading: heading(degrees),
                 roll: angle(roll, 180.0),
@@ -135,7 +178,7 @@ fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAtti
                 reduced: aligned == "0",
                 ..nothing
             };
-            (NmeaSentence::Pashr, utc_day_s(time), sample)
+            (NmeaSentence::Pashr, sample)
         }
         ("PSXN", ["20", _, _, heading, roll_pitch, ..]) => {
             // What is no number is as good as invalid.
@@ -151,12 +194,91 @@ fn read(body: &str, quality: &mut PsxnQuality, arrival: Time) -> Option<ShipAtti
                 reduced: quality.heading.max(quality.roll_pitch) > 0,
                 ..nothing
             };
-            (NmeaSentence::Psxn, None, sample)
+            (NmeaSentence::Psxn, sample)
         }
         _ => return None,
     };
     let says = sample.heading.is_some() || sample.roll.is_some() || sample.pitch.is_some();
-    says.then_some(ShipAttitude { sentence, utc_day_s, sample })
+    says.then_some((sentence, sample))
+}
+
+/// Place and time in a line, where its receiver calls them valid.
+fn fix(address: &str, fields: &[&str; 11], arrival: Time) -> Option<(NmeaSentence, ShipFix)> {
+    /// Kinds of a fix: by itself, differential, military, real-time kinematic fixed and floating; not estimated, typed or simulated.
+    const VALID: [&str; 5] = ["1", "2", "3", "4", "5"];
+    let (sentence, place, utc) = match *fields {
+        [time, "A", latitude, north, longitude, east, _, _, date, ..] if is_of(address, "RMC") => {
+            let utc = digit_pairs(date)
+                .and_then(|[day, month, year]| utc(time, day, month, 2000 + i32::from(year)));
+            (NmeaSentence::Rmc, place([latitude, north, longitude, east]), utc)
+        }
+        [_, latitude, north, longitude, east, kind, ..] if is_of(address, "GGA") && VALID.contains(&kind) => {
+            (NmeaSentence::Gga, place([latitude, north, longitude, east]), None)
+        }
+        [time, day, month, year, ..] if is_of(address, "ZDA") => {
+            // Receivers that have heard nothing yet count from the beginning of GPS or of their firmware.
+            let year = year.parse().ok().filter(|year| *year >= 2000)?;
+            (NmeaSentence::Zda, None, utc(time, day.parse().ok()?, month.parse().ok()?, year))
+        }
+        _ => return None,
+    };
+    (place.is_some() || utc.is_some()).then_some((sentence, ShipFix { arrival, place, utc }))
+}
+
+/// Tests whether an address is that of a talker's sentence of that name.
+fn is_of(address: &str, name: &str) -> bool {
+    address.len() == 5 && address.ends_with(name)
+}
+
+/// Latitude `ddmm.mmm`, `N` or `S`, longitude `dddmm.mmm`, `E` or `W`.
+fn place([latitude, north, longitude, east]: [&str; 4]) -> Option<Place> {
+    let degrees = |field: &str, half: &str, [positive, negative]: [&str; 2]| {
+        let value = number(field).filter(|v| (0.0..=18_000.0).contains(v))?;
+        let whole = (value / 100.0).floor();
+        let minutes = value - 100.0 * whole;
+        let degrees = whole + minutes / 60.0;
+        let sign = if half == positive { 1.0 } else { -1.0 };
+        (minutes < 60.0 && (half == positive || half == negative)).then_some(sign * degrees)
+    };
+    Place::new(degrees(latitude, north, ["N", "S"])?, degrees(longitude, east, ["E", "W"])?)
+}
+
+fn utc(time: &str, day: u8, month: u8, year: i32) -> Option<Utc> {
+    Utc::of_day(year, month, day, utc_day_s(time)?)
+}
+
+/// Three numbers of two digits each, at the front of a field.
+fn digit_pairs(field: &str) -> Option<[u8; 3]> {
+    let digits = field.get(..6).filter(|d| d.bytes().all(|b| b.is_ascii_digit()))?;
+    let two = |at: usize| digits.get(at..at + 2).and_then(|d| d.parse().ok());
+    Some([two(0)?, two(2)?, two(4)?])
+}
+
+/// The lines that tell place and time: `$GPGGA` and `$GPZDA`. Read again they are the same to a billionth of a minute of arc and to a
+/// millisecond.
+pub fn fix_lines(fix: &ShipFix) -> String {
+    let place = fix.place.map_or_else(String::new, |place| {
+        let field = |degrees: f64, digits: usize, [positive, negative]: [char; 2]| {
+            let (whole, half) = (degrees.abs().floor(), if degrees < 0.0 { negative } else { positive });
+            let minutes = (degrees.abs() - whole) * 60.0;
+            // A minute that rounds up to the next degree is written as its last billionth.
+            format!("{whole:0digits$.0}{:012.9},{half}", minutes.min(59.999_999_999))
+        };
+        let (latitude, longitude) = (place.latitude_deg(), place.longitude_deg());
+        let (north, east) = (field(latitude, 2, ['N', 'S']), field(longitude, 3, ['E', 'W']));
+        line(&format!("GPGGA,,{north},{east},1,,,,,,,,"))
+    });
+    let time = fix.utc.map_or_else(String::new, |utc| {
+        let (year, month, day, of_day) = utc.day();
+        let (minutes, seconds) = ((of_day / 60.0) as u32, of_day % 60.0);
+        let (hour, minute) = (minutes / 60, minutes % 60);
+        line(&format!("GPZDA,{hour:02}{minute:02}{seconds:06.3},{day:02},{month:02},{year:04},,"))
+    });
+    place + &time
+}
+
+fn line(body: &str) -> String {
+    format!("${body}*{:02X}\r\n", lines::xor(body.as_bytes()))
 }
 
 /// The line that says `sample`: `$HEHDT` where it tells nothing but a heading, else `$PASHR` without a time of day. Read again it is
@@ -177,8 +299,7 @@ pub fn line_of(sample: &ShipSample) -> String {
         let aligned = u8::from(!sample.reduced);
         format!("PASHR,,{heading},T,{roll},{pitch},,,,{sigma},1,{aligned}")
     };
-    let sum = lines::xor(body.as_bytes());
-    format!("${body}*{sum:02X}\r\n")
+    line(&body)
 }
 
 /// Degrees within `limit` either way, as radians.
@@ -193,9 +314,7 @@ fn heading(field: &str) -> Option<f64> {
 
 /// `hhmmss.sss`, or `hhmmssfff` as one maker writes it, as seconds of the day.
 fn utc_day_s(field: &str) -> Option<f64> {
-    let digits = field.get(..6).filter(|d| d.bytes().all(|b| b.is_ascii_digit()))?;
-    let two = |at: usize| digits.get(at..at + 2).and_then(|d| d.parse::<f64>().ok());
-    let (hours, minutes, seconds) = (two(0)?, two(2)?, two(4)?);
+    let [hours, minutes, seconds] = digit_pairs(field)?.map(f64::from);
     let rest = field.get(6..)?;
     let fraction = match rest.strip_prefix('.').unwrap_or(rest) {
         "" => 0.0,
@@ -216,7 +335,7 @@ mod tests {
     use super::*;
     use crate::lines::LINE_MAX_BYTES;
 
-    fn parse(bytes: &[u8], piece: usize) -> (Vec<ShipAttitude>, LineCounters) {
+    fn parse(bytes: &[u8], piece: usize) -> (Vec<ShipLine>, LineCounters) {
         let mut parser = ShipParser::new();
         let mut said = Vec::new();
         for piece in bytes.chunks(piece) {
@@ -225,8 +344,22 @@ mod tests {
         (said, parser.counters())
     }
 
-    fn line(body: &str) -> String {
-        format!("${body}*{:02X}\r\n", lines::xor(body.as_bytes()))
+    /// Heading and attitude in what was said.
+    fn samples(said: &[ShipLine]) -> Vec<ShipSample> {
+        let sample = |line: &ShipLine| match line.said {
+            ShipSaid::Attitude(sample) => Some(sample),
+            ShipSaid::Fix(_) => None,
+        };
+        said.iter().filter_map(sample).collect()
+    }
+
+    /// Place and time in what was said.
+    fn fixes(said: &[ShipLine]) -> Vec<ShipFix> {
+        let fix = |line: &ShipLine| match line.said {
+            ShipSaid::Fix(fix) => Some(fix),
+            ShipSaid::Attitude(_) => None,
+        };
+        said.iter().filter_map(fix).collect()
     }
 
     /// Lines as ships' loggers have published them, check sums included.
@@ -243,25 +376,66 @@ mod tests {
         for piece in 1..LOGGED.len() {
             let (said, counters) = parse(LOGGED.as_bytes(), piece);
             assert_eq!((counters.packets, counters.bad_crc, counters.skipped_bytes), (6, 0, 0));
-            let [hdt, psxn, pashr] = said[..] else { panic!("{said:?}") };
+            let sentences: Vec<NmeaSentence> = said.iter().map(|line| line.sentence).collect();
             assert_eq!(
-                (hdt.sentence, degrees(hdt.sample.heading), hdt.sample.roll),
-                (NmeaSentence::Hdt, Some(235.18), None)
+                sentences,
+                [NmeaSentence::Zda, NmeaSentence::Hdt, NmeaSentence::Psxn, NmeaSentence::Pashr]
             );
-            assert_eq!(psxn.sentence, NmeaSentence::Psxn);
+            let [hdt, psxn, pashr] = samples(&said)[..] else { panic!("{said:?}") };
+            assert_eq!((degrees(hdt.heading), hdt.roll), (Some(235.18), None));
             assert_eq!(
-                [psxn.sample.roll, psxn.sample.pitch, psxn.sample.heading].map(degrees),
+                [psxn.roll, psxn.pitch, psxn.heading].map(degrees),
                 [Some(-2.82), Some(1.0), Some(235.18)]
             );
-            assert!(!psxn.sample.reduced);
+            assert!(!psxn.reduced);
             assert_eq!(
-                [pashr.sample.roll, pashr.sample.pitch, pashr.sample.heading].map(degrees),
+                [pashr.roll, pashr.pitch, pashr.heading].map(degrees),
                 [Some(32.56), Some(48.49), Some(138.24)]
             );
-            assert_eq!(degrees(pashr.sample.heading_sigma), Some(35.0));
-            assert!(pashr.sample.reduced, "its inertial part is not aligned");
-            let utc = pashr.utc_day_s.expect("given");
-            assert!((utc - 60_060.19).abs() < 1e-9, "{utc}");
+            assert_eq!(degrees(pashr.heading_sigma), Some(35.0));
+            assert!(pashr.reduced, "its inertial part is not aligned");
+            let utc = Utc::of_day(2019, 9, 10, 16.0 * 3600.0 + 36.0 * 60.0 + 11.11);
+            assert_eq!(fixes(&said), [ShipFix { arrival: Time::from_ns(3), place: None, utc }]);
+        }
+    }
+
+    /// Lines of receivers as their makers' manuals print them.
+    #[test]
+    fn place_and_time_are_read() {
+        let lines = "$GPRMC,092725.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A*5E\r\n\
+                     $GPGGA,092725.00,4717.11399,N,00833.91590,E,1,08,1.01,499.6,M,48.0,M,,*5B\r\n";
+        let (said, counters) = parse(lines.as_bytes(), 13);
+        assert_eq!((counters.packets, counters.bad_crc), (2, 0));
+        let [rmc, gga] = fixes(&said)[..] else { panic!("{said:?}") };
+        let place = rmc.place.expect("told");
+        assert!((place.latitude_deg() - 47.285_239_5).abs() < 1e-9, "{place}");
+        assert!((place.longitude_deg() - 8.565_253_666_7).abs() < 1e-9, "{place}");
+        assert_eq!(rmc.utc, Utc::of_day(2002, 12, 9, 9.0 * 3600.0 + 27.0 * 60.0 + 25.0));
+        assert_eq!((gga.utc, gga.place.is_some()), (None, true));
+        let south_west =
+            fixes(&parse(line("GNRMC,000000,A,3351.0,S,07040.5,W,,,311226,,,D").as_bytes(), 9).0);
+        let place = south_west[0].place.expect("told");
+        assert_eq!((place.latitude_deg(), place.longitude_deg()), (-33.85, -70.675));
+    }
+
+    #[test]
+    fn a_receiver_without_a_fix_tells_nothing() {
+        let none = [
+            "GPRMC,092725.00,V,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,N",
+            "GPRMC,,V,,,,,,,,,,N",
+            "GPRMC,,A,,,,,,,,,,A",
+            "GPRMC,256100,A,4717.1,N,00833.9,X,,,310226,,,A",
+            "GPRMC,092725,A,4760.1,N,00833.9,E,,,,,,A",
+            "GPRMC,092725,A,9100.0,N,00833.9,E,,,,,,A",
+            "GPGGA,092725.00,4717.11399,N,00833.91590,E,0,08,1.01,499.6,M,48.0,M,,",
+            "GPGGA,092725.00,4717.11399,N,00833.91590,E,8,08,1.01,499.6,M,48.0,M,,",
+            "GPZDA,000012.00,06,01,1980,00,00",
+            "GPZDA,000012.00,31,02,2026,00,00",
+            "GPZDA,,,,,,",
+            "ZDA,163611.11,10,09,2019,,",
+        ];
+        for body in none {
+            assert_eq!(parse(line(body).as_bytes(), 5).0, [], "{body}");
         }
     }
 
@@ -269,7 +443,7 @@ mod tests {
     fn what_an_instrument_calls_invalid_is_absent() {
         let bad = [line("PSXN,20,0,0,2,1"), line("PSXN,23,1.5,-0.5,10.0,0.1")].concat();
         let (said, _) = parse(bad.as_bytes(), 7);
-        let bad = said[0].sample;
+        let bad = samples(&said)[0];
         assert_eq!((bad.heading, degrees(bad.roll), bad.reduced), (None, Some(1.5), true));
         let nothing = [
             line("PSXN,20,0,0,2,2"),
@@ -286,7 +460,7 @@ mod tests {
             (Vec::new(), LineCounters { packets: 7, ..LineCounters::default() })
         );
         let north = parse(line("HEHDT,360.0,T").as_bytes(), 3).0;
-        assert_eq!(north[0].sample.heading, Some(0.0));
+        assert_eq!(samples(&north)[0].heading, Some(0.0));
     }
 
     #[test]
@@ -328,7 +502,26 @@ mod tests {
             let (said, counters) = parse(line_of(&sample).as_bytes(), 11);
             prop_assert_eq!(counters, LineCounters { packets: 1, ..LineCounters::default() });
             let says = heading.is_some() || roll.is_some();
-            prop_assert_eq!(said.iter().map(|a| a.sample).collect::<Vec<_>>(), if says { vec![sample] } else { vec![] });
+            prop_assert_eq!(samples(&said), if says { vec![sample] } else { vec![] });
+        }
+
+        #[test]
+        fn lines_tell_the_place_and_time_that_were_read(
+            latitude in -5_400_000i32..=5_400_000,
+            longitude in -10_800_000i32..=10_800_000,
+            ms in 946_684_800_000i64..32_503_679_000_000,
+        ) {
+            // Thousandths of a minute, as receivers write them.
+            let degrees = |thousandths: i32| f64::from(thousandths) / 60_000.0;
+            let (place, utc) = (Place::new(degrees(latitude), degrees(longitude)), Utc::from_ms(ms));
+            let fix = ShipFix { arrival: Time::from_ns(3), place, utc };
+            let (said, counters) = parse(fix_lines(&fix).as_bytes(), 11);
+            prop_assert_eq!(counters, LineCounters { packets: 2, ..LineCounters::default() });
+            let [there, then] = fixes(&said)[..] else { panic!("{said:?}") };
+            prop_assert_eq!((there.utc, then.place, then.utc), (None, None, utc));
+            let (found, place) = (there.place.expect("told"), place.expect("in range"));
+            prop_assert!((found.latitude_deg() - place.latitude_deg()).abs() < 1e-10);
+            prop_assert!((found.longitude_deg() - place.longitude_deg()).abs() < 1e-10);
         }
 
         /// Whatever lies between them, every line is found, in order and once.
@@ -343,7 +536,7 @@ mod tests {
                 bytes.extend(line(&format!("HEHDT,{n}.5,T")).bytes());
             }
             let (said, _) = parse(&bytes, piece);
-            let said: Vec<_> = said.iter().map(|a| degrees(a.sample.heading)).collect();
+            let said: Vec<_> = samples(&said).iter().map(|a| degrees(a.heading)).collect();
             prop_assert_eq!(said, (0..gaps.len()).map(|n| Some(n as f64 + 0.5)).collect::<Vec<_>>());
         }
     }

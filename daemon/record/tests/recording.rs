@@ -12,7 +12,8 @@ mod support;
 use std::{fs, sync::Arc};
 
 use bowwave_core::{
-    event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipSample, Tick, TriggerEdge},
+    ephemeris::{Place, Utc},
+    event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipFix, ShipSample, Tick, TriggerEdge},
     fault::{Change, Fault, FaultChange},
     geometry::CameraPose,
     time::Time,
@@ -258,6 +259,11 @@ fn inputs(time: Time) -> impl Strategy<Value = Entry> {
                 Entry::ShipValues(ShipSample { arrival: time, heading, roll, pitch, heading_sigma, reduced })
             }
         ),
+        (prop::option::of((-90.0..=90.0, -180.0..=180.0)), prop::option::of(0i64..32_503_679_000_000))
+            .prop_map(move |(place, ms)| {
+                let place = place.and_then(|(latitude, longitude)| Place::new(latitude, longitude));
+                Entry::ShipFix(ShipFix { arrival: time, place, utc: ms.and_then(Utc::from_ms) })
+            }),
         (stamp(), any::<u32>(), layout, 1..5_u32, 1..5_u32, any::<u8>()).prop_map(
             move |(mid_exposure, sequence, format, w, h, first)| {
                 let (width, height) = (2 * w, 2 * h);

@@ -5,6 +5,7 @@
 use std::{error::Error, path::Path, sync::Arc, time::Duration};
 
 use bowwave_core::{
+    daylight::Daylight,
     estimate::light::LightMeter,
     event::{Picture, PixelFormat},
     frame::scene::{LeftOut, Pass, PassDecision, RoundView},
@@ -46,7 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     scene.camera.position = DVec3::new(0.0, 0.0, 5.0);
     scene.water = Water { method, force, shadow: ShadowLevel::Gradual };
     // As the trainer does: light from the picture, to which the lens of the scene belongs.
-    let mut meter = LightMeter::new(scene.light.sun_direction, method == ReflectionMethod::Baked);
+    let daylight = Daylight::fixed(scene.light.sun_direction, 20_000.0);
+    let mut meter = LightMeter::new(&daylight, method == ReflectionMethod::Baked);
     let lens = scene.lens.covering(image.width(), image.height());
     meter.observe(Time::from_ns(0), &picture, &lens, &scene.camera);
     (scene.light, scene.sky, scene.tones) = (meter.light(), meter.sky(force.wind_mean_m_s()), meter.tones());

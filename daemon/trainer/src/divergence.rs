@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use bowwave_core::{
-    event::ShipSample,
+    event::{ShipFix, ShipSample},
     session::Digest,
     time::Time,
     world::{
@@ -205,6 +205,10 @@ fn next(
             Entry::ShipValues(sample) => {
                 digest.take(&ShipSample { arrival: Time::from_ns(since(sample.arrival)), ..*sample });
                 "sample of the ship"
+            }
+            Entry::ShipFix(fix) => {
+                digest.take(&ShipFix { arrival: Time::from_ns(since(fix.arrival)), ..*fix });
+                "place or time of the ship"
             }
             Entry::Fault(fault) => {
                 let change = &fault.change;

@@ -151,6 +151,7 @@ fn input_of(entry: Entry, decoder: &mut Decoder, path: &Path) -> Result<Option<R
         Entry::Mark(mark) => Event::Mark(mark),
         Entry::Act(act) => Event::Act(act),
         Entry::ShipValues(sample) => Event::Ship(sample),
+        Entry::ShipFix(fix) => Event::ShipFix(fix),
         Entry::Fault(entry) => Event::Fault(entry.change),
         Entry::Picture(picture) => Event::Frame(picture.into()),
         Entry::Frame(frame) => {

@@ -142,7 +142,7 @@ impl Producer {
                 ready.extend(self.frames.frame(frame).map(|frame| Ok(Event::Frame(frame))));
             }
             Item::Ship { due, bytes } => {
-                ready.extend(self.ship.lines(&bytes, due).map(|said| Ok(Event::Ship(said.sample))));
+                ready.extend(self.ship.lines(&bytes, due).map(|line| Ok(line.said.into())));
             }
             Item::Mark(mark) => ready.push(Ok(Event::Mark(mark))),
             Item::Act(act) => ready.push(Ok(Event::Act(act))),

@@ -196,6 +196,7 @@ impl Laps {
             Entry::Pose(pose) => pose.time = pose.time.plus_ns(shift),
             // Belong to the run that was recorded.
             Entry::ShipValues(sample) => sample.arrival = sample.arrival.plus_ns(shift),
+            Entry::ShipFix(fix) => fix.arrival = fix.arrival.plus_ns(shift),
             Entry::Fault(fault) => fault.logged = fault.logged.plus_ns(shift),
             Entry::Tick(entry) => entry.tick.time = entry.tick.time.plus_ns(shift),
         }

@@ -4,7 +4,8 @@ use std::{
 };
 
 use bowwave_core::{
-    event::{CameraFrame, Event, ImuSample, Mark, MarkKind, ShipSample, TriggerEdge},
+    ephemeris::Utc,
+    event::{CameraFrame, Event, ImuSample, Mark, MarkKind, ShipFix, ShipSample, TriggerEdge},
     geometry::{CameraPose, look},
     time::Time,
 };
@@ -122,7 +123,7 @@ fn triggers(events: &[Event]) -> Vec<TriggerEdge> {
     events.iter().filter_map(|e| if let Event::Trigger(t) = e { Some(*t) } else { None }).collect()
 }
 
-/// Ten lines of the ship's a second, through north, and two presses of the operator.
+/// Ten lines of the ship's heading a second, through north, one of her place and time, and two presses of the operator.
 fn with_ship() -> Vec<Entry> {
     let mut entries = entries();
     entries.extend((0..10).map(|n| {
@@ -133,8 +134,17 @@ fn with_ship() -> Vec<Entry> {
         [(150, MarkKind::Stow), (850, MarkKind::Landmark)]
             .map(|(ms, kind)| Entry::Mark(Mark { time: START.plus_ns(ms * MS), kind })),
     );
+    let fix = Entry::Ship(ShipEntry {
+        arrival: START.plus_ns(333 * MS),
+        sentence: "$GPRMC,092725.00,A,4717.11437,N,00833.91522,E,0.004,77.52,091202,,,A*5E\r\n".to_owned(),
+    });
+    entries.push(fix);
     entries.sort_by_key(Entry::time);
     entries
+}
+
+fn fixes(events: &[Event]) -> Vec<ShipFix> {
+    events.iter().filter_map(|e| if let Event::ShipFix(f) = e { Some(*f) } else { None }).collect()
 }
 
 fn ship(n: i64) -> ShipSample {
@@ -170,7 +180,9 @@ fn a_ships_lines_and_presses_come_back_in_both_modes() {
         assert!(near(got.heading.expect("told"), sent.heading.expect("told")), "{got:?}");
         assert_eq!(got.roll.is_some(), sent.roll.is_some());
     }
-    assert_eq!((ships(&events).len(), stats.ship.packets, stats.ship.bad_crc), (20, 20, 0));
+    assert_eq!((ships(&events).len(), stats.ship.packets, stats.ship.bad_crc), (20, 22, 0));
+    let told: Vec<_> = fixes(&events).iter().map(|fix| (fix.utc, fix.place.is_some())).collect();
+    assert_eq!(told, [(Utc::of_day(2002, 12, 9, 34_045.0), true); 2]);
     assert_eq!(marks(&events), [MarkKind::Stow, MarkKind::Landmark, MarkKind::Stow, MarkKind::Landmark]);
 
     let mut replay = Replay::realtime(&path, &options(1_000, FaultPlan::default())).expect("opens");
@@ -181,7 +193,7 @@ fn a_ships_lines_and_presses_come_back_in_both_modes() {
     }
     let stats = replay.stop().expect("stops");
     let got = ships(&live);
-    assert_eq!((got.len(), stats.ship.packets), (10, 10));
+    assert_eq!((got.len(), fixes(&live).len(), stats.ship.packets), (10, 1, 11));
     for (n, got) in (0..).zip(&got) {
         assert!(near(got.heading.expect("told"), ship(n).heading.expect("told")));
         let late = got.arrival.ns_since(origin) - ship(n).arrival.ns_since(START);

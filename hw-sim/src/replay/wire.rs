@@ -143,6 +143,7 @@ impl Iterator for Wire {
                     Entry::Truth(_)
                     | Entry::Pose(_)
                     | Entry::ShipValues(_)
+                    | Entry::ShipFix(_)
                     | Entry::Fault(_)
                     | Entry::Tick(_),
                 ) => None,

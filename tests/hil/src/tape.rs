@@ -138,6 +138,7 @@ impl Tape {
                 Entry::Pose(_)
                 | Entry::Ship(_)
                 | Entry::ShipValues(_)
+                | Entry::ShipFix(_)
                 | Entry::Mark(_)
                 | Entry::Act(_)
                 | Entry::Picture(_)

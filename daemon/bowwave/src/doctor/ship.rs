@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use bowwave_devices::serial::{self, LineSettings, ShipStatus};
+use bowwave_devices::serial::{self, LineSettings, ShipReport, ShipStatus};
 
 use super::{Check, configured, failed};
 
@@ -27,8 +27,9 @@ fn told(status: &ShipStatus) -> String {
         "{} headings in {} lines, {} damaged, {} bytes of no line",
         status.said.headings, lines.packets, lines.bad_crc, lines.skipped_bytes
     );
+    let fix = fix_told(&status.said);
     let Some((sentence, sample)) = status.said.newest else {
-        return format!("{place}: no heading; {counts}");
+        return format!("{place}: no heading{fix}; {counts}");
     };
     let deg = |what: &str, angle: Option<f64>| angle.map(|a| format!(", {what} {:.2} deg", a.to_degrees()));
     let rate = status.said.period_s.filter(|s| *s > 0.0).map(|s| format!(", {:.1} a second", s.recip()));
@@ -40,15 +41,29 @@ fn told(status: &ShipStatus) -> String {
         sample.reduced.then(|| ", quality reduced".to_owned()),
         rate,
     ];
-    format!("{place}: {}{}; {counts}", sentence.name(), parts.into_iter().flatten().collect::<String>())
+    format!("{place}: {}{}{fix}; {counts}", sentence.name(), parts.into_iter().flatten().collect::<String>())
+}
+
+/// Place and time, as far as they are told.
+fn fix_told(said: &ShipReport) -> String {
+    match (said.place, said.utc) {
+        (Some(place), Some((_, utc))) => format!("; at {place}, {utc}"),
+        (Some(place), None) => format!("; at {place}, no date (RMC or ZDA)"),
+        (None, Some((_, utc))) => format!("; {utc}, no place (RMC or GGA)"),
+        (None, None) => String::new(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use bowwave_core::{event::ShipSample, time::Time};
+    use bowwave_core::{
+        ephemeris::{Place, Utc},
+        event::ShipSample,
+        time::Time,
+    };
     use bowwave_devices::{
         nmea::{LineCounters, NmeaSentence},
-        serial::{LineReport, LowLatency, OpenLine, ShipReport},
+        serial::{LineReport, LowLatency, OpenLine},
     };
 
     use super::*;
@@ -68,6 +83,7 @@ mod tests {
             period_s: Some(0.1),
             headings: 25,
             lines: LineCounters { packets: 50, bad_crc: 1, skipped_bytes: 7 },
+            ..ShipReport::default()
         };
         let open = OpenLine { node: "/dev/ttyUSB1".into(), baud: 4800, low_latency: LowLatency::Set };
         let line = LineReport { open: Some(open), ..LineReport::default() };
@@ -76,6 +92,13 @@ mod tests {
             told_now,
             "/dev/ttyUSB1 at 4800 baud: HDT, heading 235.18 deg, quality reduced, 10.0 a second; 25 headings in 50 lines, 1 \
              damaged, 7 bytes of no line"
+        );
+        let (place, utc) = (Place::new(54.1, -7.9), Utc::from_ms(1_780_315_200_000));
+        let fixed = ShipReport { place, utc: utc.map(|utc| (Time::MIN, utc)), ..said };
+        let told_fix = told(&ShipStatus { line: line.clone(), said: fixed });
+        assert!(
+            told_fix.contains("10.0 a second; at 54.100 N 7.900 W, 2026-06-01 12:00 UTC; 25 headings"),
+            "{told_fix}"
         );
         let silent = told(&ShipStatus { line, said: ShipReport::default() });
         assert!(silent.starts_with("/dev/ttyUSB1 at 4800 baud: no heading; 0 headings"), "{silent}");

@@ -127,6 +127,13 @@ fn light() -> Value {
             ("longitude_deg", number(-180.0, 180.0, "East")),
             ("utc", json!({ "description": "Date and time, as 2026-06-01T12:00:00Z" })),
             ("visibility_km", number(0.05, 200.0, "Meteorological visibility")),
+            (
+                "source",
+                one_of(
+                    ["scenario", "ship"],
+                    "Whether place and time come from the ship's instruments once these tell them; ship where no sun is named",
+                ),
+            ),
         ],
         &[],
     )

@@ -7,7 +7,7 @@ use super::{
     clock::ClockReport,
     heading_aiding::HeadingSettings,
     horizon::Mask,
-    light::{Light, LightMeter, SeaTones, SkyAgreement, SkyLight},
+    light::{Light, LightMeter, Luminaries, SeaTones, SkyAgreement, SkyLight},
     pose::NoPose,
     registration::{Misfit, RegistrationChecks},
     sea::SeaConditions,
@@ -17,7 +17,8 @@ use super::{
 use crate::{
     calibration::Calibration,
     daylight::Daylight,
-    event::{CameraFrame, ImuSample, Mark, ShipSample},
+    ephemeris::Moment,
+    event::{CameraFrame, ImuSample, Mark, ShipFix, ShipSample},
     fault::{Fault, NotScored},
     geometry::{CameraPose, Lens},
     sea::BeaufortForce,
@@ -93,7 +94,7 @@ impl Estimator {
                 eye_height_m,
                 settings.daylight.visibility_m,
             ),
-            light: LightMeter::new(settings.daylight.sun_direction, settings.measures_tones),
+            light: LightMeter::new(&settings.daylight, settings.measures_tones),
             sea: settings.sea.map(|assumed| SeaStateTracker::new(assumed, wind, force)),
             assumed_wind: (wind, force),
             eye_height_m,
@@ -114,6 +115,11 @@ impl Estimator {
     /// Takes in what the ship's instruments said.
     pub fn ship(&mut self, sample: &ShipSample) {
         self.sensors.ship(sample);
+    }
+
+    /// Takes in where the ship is, or what time it is.
+    pub fn ship_fix(&mut self, fix: &ShipFix) {
+        self.light.fix(fix);
     }
 
     /// Takes in the operator's press.
@@ -198,6 +204,16 @@ impl Estimator {
         let (wind, _) = self.wind();
         let (boats, tones) = (self.light.light(), self.light.tones());
         SceneLight { boats, sky: self.light.sky(wind.length()), tones }
+    }
+
+    /// Sun and moon at the newest picture.
+    pub const fn luminaries(&self) -> &Luminaries {
+        self.light.luminaries()
+    }
+
+    /// The ship's place and time at `time`, where she tells them and the scenario does not take them.
+    pub fn unused_moment(&self, time: Time) -> Option<Moment> {
+        self.light.unused_moment(time)
     }
 
     /// Agreement of the sky in the pictures with the scenario's sun; `None` before a sky was seen.

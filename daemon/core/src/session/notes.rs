@@ -1,11 +1,17 @@
 //! Notes of a session for the log: the sea in the video, the heading, the unit's clock, pictures that contradict the scenario. Each is told
 //! once when it changes.
 
-use crate::estimate::{
-    HeadingCounts, SeaReport,
-    clock::ClockReport,
-    light::SkyAgreement,
-    sea::{SeaSource, Unknown},
+use glam::DVec3;
+
+use crate::{
+    ephemeris::Moment,
+    estimate::{
+        HeadingCounts, SeaReport,
+        clock::ClockReport,
+        light::{Luminaries, SkyAgreement},
+        sea::{SeaSource, Unknown},
+    },
+    geometry::heading_of,
 };
 
 /// The log is told when the heading's standard deviation crosses one of these, degrees: the length of a boat at 500 m, a boat's
@@ -37,6 +43,8 @@ pub(super) struct Notes {
     /// Frames since the light's agreement with the scenario is another than the one that was told last.
     light_frames: u32,
     light: SkyAgreement,
+    /// That the ship's place and time are used, or contradict the scenario.
+    ship_moment_told: bool,
     horizon_told: bool,
 }
 
@@ -137,6 +145,32 @@ impl Notes {
         }
     }
 
+    /// Takes in sun and moon after a frame, and the ship's place and time where the scenario does not take them.
+    pub(super) fn luminaries(&mut self, seen: &Luminaries, unused: Option<Moment>) {
+        /// Angle between two suns beyond which their shadows contradict each other, radians.
+        const APART: f64 = 20.0 * std::f64::consts::PI / 180.0;
+        if self.ship_moment_told {
+            return;
+        }
+        if let Some(moment) = seen.moment.filter(|_| seen.from_ship) {
+            self.ship_moment_told = true;
+            self.say(false, luminaries_words(seen, &moment));
+        } else if let Some(ship) = unused
+            && let Some(sun) = ship.sun().filter(|sun| sun.angle_between(seen.sun) > APART)
+        {
+            self.ship_moment_told = true;
+            let Moment { place, utc } = ship;
+            let (real, given) = (stands(sun), stands(seen.sun));
+            self.say(
+                true,
+                format!(
+                    "by the ship's place and time ({place}, {utc}) the sun stands {real}, the scenario puts it {given}: virtual shadows fall \
+                     otherwise than real ones; with source = \"ship\" in [light] the scenario takes the ship's"
+                ),
+            );
+        }
+    }
+
     /// Takes in how many horizons were seen that the scenario's visibility hides.
     pub(super) fn unexpected_horizons(&mut self, count: u64) {
         /// A cloud's edge is taken for one now and then.
@@ -173,6 +207,26 @@ impl Notes {
             _ => {}
         }
     }
+}
+
+fn luminaries_words(seen: &Luminaries, moment: &Moment) -> String {
+    let moonlight = seen.moonlight().map_or_else(String::new, |moon| {
+        format!(
+            "; the moon lights the scene, {}, {:.0} % of it lit",
+            stands(moon.direction),
+            100.0 * moon.lit
+        )
+    });
+    let (place, utc) = (moment.place, moment.utc);
+    format!("the sun stands {} by the ship's place and time ({place}, {utc}){moonlight}", stands(seen.sun))
+}
+
+/// Where something in the sky stands, in words.
+fn stands(direction: DVec3) -> String {
+    let elevation = direction.z.clamp(-1.0, 1.0).asin().to_degrees();
+    let bearing = heading_of(direction.truncate()).to_degrees();
+    let side = if elevation < 0.0 { "below" } else { "above" };
+    format!("at {bearing:.0} degrees, {:.0} {side} the horizon", elevation.abs())
 }
 
 fn sea_words(report: &SeaReport) -> String {

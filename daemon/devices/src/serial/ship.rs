@@ -1,8 +1,9 @@
-//! The ship's own instruments on a serial line: heading and attitude as lines of NMEA 0183.
+//! The ship's own instruments on a serial line: heading and attitude, place and time as lines of NMEA 0183.
 
 use std::{path::Path, time::Duration};
 
 use bowwave_core::{
+    ephemeris::{Place, Utc},
     event::{Event, ShipSample},
     fault::Fault,
     time::Time,
@@ -16,7 +17,7 @@ use super::{
 };
 use crate::{
     framing::LineCounters,
-    nmea::{NmeaSentence, ShipParser},
+    nmea::{NmeaSentence, ShipParser, ShipSaid},
     queue::NewestSender,
     report::{Reporter, reporting},
 };
@@ -38,12 +39,26 @@ const BEATS: f64 = 16.0;
 pub struct ShipReport {
     /// The newest line that said something of heading or attitude.
     pub newest: Option<(NmeaSentence, ShipSample)>,
+    /// The newest place.
+    pub place: Option<Place>,
+    /// The newest time, and when its line arrived.
+    pub utc: Option<(Time, Utc)>,
     /// Mean time between headings, seconds; nothing before enough came.
     pub period_s: Option<f64>,
     /// Lines with a valid heading.
     pub headings: u64,
     /// Lines of all kinds, damaged ones and bytes of none.
     pub lines: LineCounters,
+}
+
+impl ShipReport {
+    /// Takes in when a heading and the one before it came.
+    fn beat(&mut self, before: Option<Time>, arrival: Time) {
+        let Some(before) = before else { return };
+        let gap_s = arrival.secs_since(before);
+        let mean_s = self.period_s.unwrap_or(gap_s);
+        self.period_s = Some(mean_s + (gap_s - mean_s) / BEATS);
+    }
 }
 
 /// Status of the ship feed.
@@ -67,7 +82,7 @@ impl ShipPort {
         Ok(Self { port: LinePort::open(node, baud, ShipFeed::default(), QUEUE_LINES)? })
     }
 
-    /// Measurements not yet drained, [`Event::Ship`] in the order of arrival; the oldest give way.
+    /// Measurements not yet drained, [`Event::Ship`] and [`Event::ShipFix`] in the order of arrival; the oldest give way.
     pub fn events(&self) -> &Receiver<Event> {
         self.port.events()
     }
@@ -113,17 +128,21 @@ impl LineFeed for ShipFeed {
         let before = self.parser.counters().packets;
         let Self { parser, said, last, without, .. } = self;
         for line in parser.lines(bytes, arrival) {
-            said.newest = Some((line.sentence, line.sample));
-            if line.sample.heading.is_some() {
-                said.headings += 1;
-                *without = None;
-                if let Some(before) = last.replace(arrival) {
-                    let gap_s = arrival.secs_since(before);
-                    let mean_s = said.period_s.unwrap_or(gap_s);
-                    said.period_s = Some(mean_s + (gap_s - mean_s) / BEATS);
+            match line.said {
+                ShipSaid::Attitude(sample) => {
+                    said.newest = Some((line.sentence, sample));
+                    if sample.heading.is_some() {
+                        said.headings += 1;
+                        *without = None;
+                        said.beat(last.replace(arrival), arrival);
+                    }
+                }
+                ShipSaid::Fix(fix) => {
+                    said.place = fix.place.or(said.place);
+                    said.utc = fix.utc.map(|utc| (arrival, utc)).or(said.utc);
                 }
             }
-            queue.send(Event::Ship(line.sample));
+            queue.send(line.said.into());
         }
         let lines = self.parser.counters();
         self.said.lines = lines;

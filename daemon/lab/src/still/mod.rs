@@ -175,8 +175,7 @@ impl Still {
             boats.extend(eye.see_with_wake(&afloat, || self.wake(number, &afloat, &waves, time_s)));
         }
         boats.sort_by(|a, b| b.range_m.total_cmp(&a.range_m));
-        let mut meter =
-            LightMeter::new(self.daylight.sun_direction, self.water.method == ReflectionMethod::Baked);
+        let mut meter = LightMeter::new(&self.daylight, self.water.method == ReflectionMethod::Baked);
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.daylight.sun_strength as f32;

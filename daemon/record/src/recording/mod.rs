@@ -10,6 +10,7 @@
 //! | `/mark` | `std_msgs/msg/String`: `stow` or `landmark` | log: when the operator pressed |
 //! | `/camera/image_raw` | `sensor_msgs/msg/Image`: a picture without JPEG, where the session saw one | log: arrival; header: mid-exposure |
 //! | `/ship/values` | `bowwave_msgs/msg/ShipValues`: the numbers of the line before it, exact | both: arrival |
+//! | `/ship/fix` | `bowwave_msgs/msg/ShipFix`: place and time of the line before it, exact | both: arrival |
 //! | `/fault` | `diagnostic_msgs/msg/DiagnosticArray` of one status: a fault came, went or happened | log: the next tick's; header: the fault's own |
 //! | `/tick` | `bowwave_msgs/msg/Tick`: a frame was due, after all messages before it in the file | log: when it was begun; header: when it is seen |
 //! | `/truth/pose`, `/pose` | `geometry_msgs/msg/PoseStamped` | both: the pose's time |
@@ -35,7 +36,7 @@ use std::sync::Arc;
 
 use bowwave_core::{
     act::TraineeAct,
-    event::{CameraFrame, ImuSample, Mark, Picture, ShipSample, Tick, TriggerEdge},
+    event::{CameraFrame, ImuSample, Mark, Picture, ShipFix, ShipSample, Tick, TriggerEdge},
     fault::FaultChange,
     geometry::CameraPose,
     time::Time,
@@ -84,6 +85,8 @@ pub enum Entry {
     Picture(PictureEntry),
     /// The exact numbers of the ship's line written just before.
     ShipValues(ShipSample),
+    /// Place and time of the ship's line written just before, exact.
+    ShipFix(ShipFix),
     /// A fault came, went or happened.
     Fault(FaultEntry),
     /// A frame was due.
@@ -103,6 +106,7 @@ impl Entry {
             Self::Truth(pose) | Self::Pose(pose) => pose.time,
             Self::Picture(picture) => picture.arrival,
             Self::ShipValues(sample) => sample.arrival,
+            Self::ShipFix(fix) => fix.arrival,
             Self::Fault(fault) => fault.logged,
             Self::Tick(entry) => entry.tick.time,
         }
@@ -217,6 +221,8 @@ pub struct Counts {
     pub poses: u64,
     /// Exact numbers of the ship's lines.
     pub ship_values: u64,
+    /// Exact places and times of the ship's lines.
+    pub ship_fixes: u64,
     /// Changes of faults.
     pub faults: u64,
     /// Ticks.
@@ -235,6 +241,7 @@ impl Counts {
             + self.truths
             + self.poses
             + self.ship_values
+            + self.ship_fixes
             + self.faults
             + self.ticks
     }
@@ -251,6 +258,7 @@ impl Counts {
             Topic::Truth => &mut self.truths,
             Topic::Pose => &mut self.poses,
             Topic::ShipValues => &mut self.ship_values,
+            Topic::ShipFix => &mut self.ship_fixes,
             Topic::Fault => &mut self.faults,
             Topic::Tick => &mut self.ticks,
             Topic::CameraInfo => return None,

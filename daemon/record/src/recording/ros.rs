@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use bowwave_core::{
     act::{Act, TraineeAct},
-    event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipSample, Tick, TriggerEdge},
+    ephemeris::{Place, Utc},
+    event::{ImuSample, Mark, MarkKind, Picture, PixelFormat, ShipFix, ShipSample, Tick, TriggerEdge},
     fault::{Change, Fault, FaultChange},
     geometry::CameraPose,
     time::{NS_PER_S, Time},
@@ -106,6 +107,15 @@ struct ShipValues {
     pitch: f64,
     heading_sigma: f64,
     reduced: bool,
+}
+
+#[derive(Serialize, Deserialize)]
+struct ShipFixMessage {
+    header: Header,
+    latitude: f64,
+    longitude: f64,
+    utc_told: bool,
+    utc_ms: i64,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -245,6 +255,10 @@ pub(crate) fn encode(entry: &Entry, out: &mut Vec<u8>) -> Result<Topic, String> 
             write(out, &ship_message(sample)?)?;
             Ok(Topic::ShipValues)
         }
+        Entry::ShipFix(fix) => {
+            write(out, &fix_message(fix)?)?;
+            Ok(Topic::ShipFix)
+        }
         Entry::Fault(entry) => {
             write(out, &fault_message(&entry.change)?)?;
             Ok(Topic::Fault)
@@ -334,6 +348,7 @@ pub(crate) fn decode(
         Topic::Pose => Entry::Pose(pose_entry(&read(data)?, log_time)?),
         Topic::ImageRaw => Entry::Picture(picture_entry(&read(data)?, log_time, sequence)?),
         Topic::ShipValues => Entry::ShipValues(ship_sample(&read(data)?, log_time)),
+        Topic::ShipFix => Entry::ShipFix(ship_fix(&read(data)?, log_time)?),
         Topic::Fault => Entry::Fault(fault_entry(read(data)?, log_time)?),
         Topic::Tick => {
             let TickMessage { header, inputs, records, scenes } = read(data)?;
@@ -389,6 +404,24 @@ fn ship_sample(message: &ShipValues, arrival: Time) -> ShipSample {
         heading_sigma: told(message.heading_sigma),
         reduced: message.reduced,
     }
+}
+
+fn fix_message(fix: &ShipFix) -> Result<ShipFixMessage, String> {
+    let place = fix.place.map_or([f64::NAN; 2], |place| [place.latitude_deg(), place.longitude_deg()]);
+    Ok(ShipFixMessage {
+        header: header(fix.arrival, FRAME_SHIP)?,
+        latitude: place[0],
+        longitude: place[1],
+        utc_told: fix.utc.is_some(),
+        utc_ms: fix.utc.map_or(0, Utc::ms),
+    })
+}
+
+fn ship_fix(message: &ShipFixMessage, arrival: Time) -> Result<ShipFix, String> {
+    let ShipFixMessage { latitude, longitude, utc_told, utc_ms, .. } = *message;
+    let utc =
+        utc_told.then(|| Utc::from_ms(utc_ms).ok_or_else(|| format!("a time of {utc_ms} ms since 1970")));
+    Ok(ShipFix { arrival, place: Place::new(latitude, longitude), utc: utc.transpose()? })
 }
 
 fn fault_message(change: &FaultChange) -> Result<DiagnosticArray, String> {

@@ -20,12 +20,13 @@ pub(crate) enum Topic {
     Pose,
     ImageRaw,
     ShipValues,
+    ShipFix,
     Fault,
     Tick,
 }
 
 impl Topic {
-    pub(crate) const ALL: [Self; 13] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Image,
         Self::CameraInfo,
         Self::Imu,
@@ -37,6 +38,7 @@ impl Topic {
         Self::Pose,
         Self::ImageRaw,
         Self::ShipValues,
+        Self::ShipFix,
         Self::Fault,
         Self::Tick,
     ];
@@ -54,6 +56,7 @@ impl Topic {
             Self::Pose => "/pose",
             Self::ImageRaw => "/camera/image_raw",
             Self::ShipValues => "/ship/values",
+            Self::ShipFix => "/ship/fix",
             Self::Fault => "/fault",
             Self::Tick => "/tick",
         }
@@ -70,6 +73,7 @@ impl Topic {
             Self::Truth | Self::Pose => "geometry_msgs/msg/PoseStamped",
             Self::ImageRaw => "sensor_msgs/msg/Image",
             Self::ShipValues => "bowwave_msgs/msg/ShipValues",
+            Self::ShipFix => "bowwave_msgs/msg/ShipFix",
             Self::Fault => "diagnostic_msgs/msg/DiagnosticArray",
             Self::Tick => "bowwave_msgs/msg/Tick",
         }
@@ -93,6 +97,7 @@ impl Topic {
             }
             Self::ImageRaw => &[("", IMAGE), HEADER, TIME],
             Self::ShipValues => &[("", SHIP_VALUES), HEADER, TIME],
+            Self::ShipFix => &[("", SHIP_FIX), HEADER, TIME],
             Self::Fault => &[("", DIAGNOSTIC_ARRAY), HEADER, TIME, DIAGNOSTIC_STATUS, KEY_VALUE],
             Self::Tick => &[("", TICK), HEADER, TIME],
         };
@@ -130,6 +135,15 @@ float64 roll
 float64 pitch
 float64 heading_sigma
 bool reduced
+";
+
+/// NaN stands for a place that was not told, degrees north and east; milliseconds since 1970, where the time was told.
+const SHIP_FIX: &str = "\
+std_msgs/Header header
+float64 latitude
+float64 longitude
+bool utc_told
+int64 utc_ms
 ";
 
 const DIAGNOSTIC_ARRAY: &str = "std_msgs/Header header\nDiagnosticStatus[] status\n";

@@ -12,7 +12,7 @@ use bowwave_core::{
     session::SessionDigest,
     time::Time,
 };
-use bowwave_devices::nmea::line_of;
+use bowwave_devices::nmea::{fix_lines, line_of};
 use bowwave_record::{
     Entry, FaultEntry, FrameEntry, PictureEntry, PoseEntry, Properties, RecordError, RecordingWriter,
     ShipEntry, TickEntry, WrittenSummary,
@@ -147,6 +147,12 @@ impl Recorder {
                 entry(Entry::Ship(ShipEntry { arrival: sample.arrival, sentence: line_of(sample) }));
                 entry(Entry::ShipValues(*sample));
             }
+            Event::ShipFix(fix) => {
+                for line in fix_lines(fix).split_inclusive('\n') {
+                    entry(Entry::Ship(ShipEntry { arrival: fix.arrival, sentence: line.to_owned() }));
+                }
+                entry(Entry::ShipFix(*fix));
+            }
             Event::Mark(mark) => entry(Entry::Mark(*mark)),
             Event::Act(act) => entry(Entry::Act(*act)),
             Event::Frame(frame) => match &frame.jpeg {
@@ -231,6 +237,7 @@ fn time_of(event: &Event) -> Option<Time> {
         Event::Imu(sample) => Some(sample.arrival),
         Event::Trigger(edge) => Some(edge.time),
         Event::Ship(sample) => Some(sample.arrival),
+        Event::ShipFix(fix) => Some(fix.arrival),
         Event::Mark(mark) => Some(mark.time),
         Event::Act(act) => Some(act.time),
         Event::Frame(frame) => Some(frame.arrival),

@@ -7,6 +7,7 @@ pub mod recovery;
 pub mod resident;
 pub mod sea;
 pub mod stats;
+pub mod sun;
 mod tally;
 
 use std::{collections::BTreeMap, path::Path};
@@ -23,6 +24,7 @@ use self::{
     memory::Growth,
     sea::SeaSummary,
     stats::{Percentiles, Samples},
+    sun::SunSummary,
 };
 
 /// The summary of a run, `summary.json`. Times are milliseconds.
@@ -84,6 +86,8 @@ pub struct Summary {
     pub sea: Option<SeaSummary>,
     /// How well the heading was known at the end, and what told it; null where it never was.
     pub heading: Option<HeadingSummary>,
+    /// Where the sun stood at the end, and what told it.
+    pub sun: SunSummary,
     /// How the inertial unit's clock did; null where that could not be told.
     pub unit_clock: Option<ClockSummary>,
 }

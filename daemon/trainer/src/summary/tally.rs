@@ -189,6 +189,7 @@ impl Tally {
             counts: self.counts(session, clock, counters),
             sea: session.sea().map(SeaSummary::from),
             heading: HeadingSummary::of(session),
+            sun: session.luminaries().into(),
             unit_clock: session.unit_clock().map(ClockSummary::from),
         }
     }

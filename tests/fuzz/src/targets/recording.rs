@@ -76,6 +76,7 @@ fn check_entry(entry: &Entry) {
         | Entry::Trigger(_)
         | Entry::Mark(_)
         | Entry::Act(_)
+        | Entry::ShipFix(_)
         | Entry::Fault(_)
         | Entry::Tick(_) => {}
         Entry::Picture(raw) => assert!(!raw.picture.bytes().is_empty(), "a picture without pixels: {raw:?}"),
@@ -98,6 +99,7 @@ fn count(counts: &mut Counts, entry: &Entry) {
         Entry::Truth(_) => &mut counts.truths,
         Entry::Pose(_) => &mut counts.poses,
         Entry::ShipValues(_) => &mut counts.ship_values,
+        Entry::ShipFix(_) => &mut counts.ship_fixes,
         Entry::Fault(_) => &mut counts.faults,
         Entry::Tick(_) => &mut counts.ticks,
     } += 1;

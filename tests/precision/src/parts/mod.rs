@@ -19,6 +19,7 @@ mod hits;
 mod horizon;
 mod lens;
 mod misses;
+mod moon;
 mod motion;
 mod mount;
 mod orientation;
@@ -75,6 +76,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: haze::ABOUT, measure: haze::measure },
     NumericalPart { about: skyline::ABOUT, measure: skyline::measure },
     NumericalPart { about: sun::ABOUT, measure: sun::measure },
+    NumericalPart { about: moon::ABOUT, measure: moon::measure },
     NumericalPart { about: skylight::ABOUT, measure: skylight::measure },
     NumericalPart { about: shadow::ABOUT, measure: shadow::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },

@@ -91,7 +91,12 @@ impl Guided {
                 self.wizard.take(Input::Edge(edge));
             }
             Event::Fault(change) => self.wizard.take(Input::Fault(change)),
-            Event::Trigger(_) | Event::Frame(_) | Event::Ship(_) | Event::Mark(_) | Event::Act(_) => {}
+            Event::Trigger(_)
+            | Event::Frame(_)
+            | Event::Ship(_)
+            | Event::ShipFix(_)
+            | Event::Mark(_)
+            | Event::Act(_) => {}
         }
     }
 

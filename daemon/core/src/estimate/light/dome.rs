@@ -68,19 +68,34 @@ impl SkyFamily {
     pub fn new(sun: DVec3) -> Self {
         Self::of((0..ClearSky::TURBIDITIES.len()).map(|number| ClearSky::new(number, sun)), sun)
     }
+
+    /// Skies in it, one a turbidity.
+    pub const fn count(&self) -> usize {
+        self.skies.len()
+    }
+
+    /// Makes the sky of that number anew for a sun towards `sun`.
+    pub fn renew(&mut self, number: usize, sun: DVec3) {
+        if let Some(sky) = self.skies.get_mut(number) {
+            *sky = Member::of(ClearSky::new(number, sun), sun);
+        }
+    }
+}
+
+impl<S: SkyModel> Member<S> {
+    fn of(clear: S, sun: DVec3) -> Self {
+        let lobes = SkyLobes::of(|d| without_aureole(&clear, sun, d));
+        let aureole = aureole(&clear, sun);
+        let level = lobes.on_level() + (clear.sunlight() + aureole) * sun.z.max(0.0) as f32;
+        Self { clear, lobes, aureole, overcast: overcast_zenith(level) }
+    }
 }
 
 impl<S: SkyModel> SkyFamily<S> {
     /// Of these clear skies, all under a sun towards `sun`.
     pub fn of(skies: impl IntoIterator<Item = S>, sun: DVec3) -> Self {
-        let member = |clear: S| {
-            let lobes = SkyLobes::of(|d| without_aureole(&clear, sun, d));
-            let aureole = aureole(&clear, sun);
-            let level = lobes.on_level() + (clear.sunlight() + aureole) * sun.z.max(0.0) as f32;
-            Member { clear, lobes, aureole, overcast: overcast_zenith(level) }
-        };
         Self {
-            skies: skies.into_iter().map(member).collect(),
+            skies: skies.into_iter().map(|clear| Member::of(clear, sun)).collect(),
             overcast: SkyLobes::of(|d| Vec3::splat(overcast(d))),
         }
     }

@@ -1,13 +1,15 @@
 //! Light on the boats, taken from the picture itself so that they fit it.
 //!
-//! A few hundred pixels above the horizon are a part of some sky under the scenario's sun, at the camera's own exposure and white balance
+//! A few hundred pixels above the horizon are a part of some sky under the sun or, by night, the moon ([`SkyClock`]), at the camera's own exposure and white balance
 //! ([`SkyFamily`]): it supplies the rest of the dome, and the sun. This is an estimate for shading, not a photometric measurement.
 
 mod dome;
+mod luminary;
 mod sky;
 mod tones;
 
 pub use dome::{FittedSky, SkyFamily, SkyPixel};
+pub use luminary::{Luminaries, SkyClock};
 pub use sky::{SKY_SINES, SkyLight};
 pub use tones::{SeaTones, ToneSample};
 
@@ -15,7 +17,9 @@ use glam::{DVec2, DVec3, Vec3};
 
 use crate::{
     colour::{LUMINANCE, srgb_to_linear},
-    event::Picture,
+    daylight::Daylight,
+    ephemeris::Moment,
+    event::{Picture, ShipFix},
     geometry::{CameraPose, Lens},
     sea::{Facets, rms_slope},
     sky::SkyLobes,
@@ -48,9 +52,9 @@ const MATCH: [f32; 2] = [0.3, 2.0];
 /// Light, linear, in units in which the video's white is 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
-    /// Unit vector towards the sun, world.
+    /// Unit vector towards the sun, world; by night towards the moon, where that gives more light.
     pub sun_direction: DVec3,
-    /// Radiance of a white matt surface that faces the sun, without the sky; zero when the sun is down.
+    /// Radiance of a white matt surface that faces it, without the sky; zero when it is down.
     pub sun: Vec3,
     /// Radiance of a white matt surface that lies level under the sky without the sun.
     pub sky: Vec3,
@@ -106,8 +110,12 @@ struct FollowedSky {
 /// Follows the light of the picture.
 #[derive(Clone, Debug)]
 pub struct LightMeter {
-    sun_direction: DVec3,
+    clock: SkyClock,
+    luminaries: Luminaries,
     family: SkyFamily,
+    /// The body that the family's skies have, and how many of them still have another.
+    family_of: DVec3,
+    outdated: usize,
     sky: Option<FollowedSky>,
     /// Whether the sea's tones are wanted: only reflections by brightness need them.
     wants_tones: bool,
@@ -116,12 +124,15 @@ pub struct LightMeter {
 }
 
 impl LightMeter {
-    /// A meter for a scene whose sun stands in `sun_direction` (unit vector, world). The sea's brightness is measured only where
-    /// it is wanted: reflections by brightness need it.
-    pub fn new(sun_direction: DVec3, wants_tones: bool) -> Self {
+    /// A meter for a scene of that daylight. The sea's brightness is measured only where it is wanted: reflections by brightness need it.
+    pub fn new(daylight: &Daylight, wants_tones: bool) -> Self {
+        let sun = daylight.sun_direction;
         Self {
-            sun_direction,
-            family: SkyFamily::new(sun_direction),
+            clock: SkyClock::new(daylight),
+            luminaries: Luminaries { sun, moon: None, moment: None, from_ship: false },
+            family: SkyFamily::new(sun),
+            family_of: sun,
+            outdated: 0,
             sky: None,
             wants_tones,
             means: None,
@@ -129,8 +140,40 @@ impl LightMeter {
         }
     }
 
+    /// Takes in where the ship is, or what time it is.
+    pub fn fix(&mut self, fix: &ShipFix) {
+        self.clock.fix(fix);
+    }
+
+    /// Sun and moon at the newest picture.
+    pub const fn luminaries(&self) -> &Luminaries {
+        &self.luminaries
+    }
+
+    /// The ship's place and time at `time`, where she tells them and the scenario does not take them.
+    pub fn unused_moment(&self, time: Time) -> Option<Moment> {
+        self.clock.unused(time)
+    }
+
+    /// Follows sun and moon, and the skies that they make: one of these a picture, each takes milliseconds.
+    fn follow_luminaries(&mut self, time: Time) {
+        /// Angle by which the family's body may be off, radians.
+        const OFF: f64 = 0.25 * std::f64::consts::PI / 180.0;
+        self.luminaries = self.clock.at(time);
+        let brightest = self.luminaries.brightest();
+        if self.family_of.angle_between(brightest) > OFF {
+            self.family_of = brightest;
+            self.outdated = self.family.count();
+        }
+        if let Some(number) = self.outdated.checked_sub(1) {
+            self.family.renew(number, self.family_of);
+            self.outdated = number;
+        }
+    }
+
     /// Takes in a picture whose camera stood at `camera` with `lens` (the picture's own, not the screen's).
     pub fn observe(&mut self, time: Time, picture: &Picture, lens: &Lens, camera: &CameraPose) {
+        self.follow_luminaries(time);
         if self.wants_tones
             && let Some(seen) = tones(picture, lens, camera)
         {
@@ -186,7 +229,7 @@ impl LightMeter {
         const BRIGHT: f32 = 0.2;
         const DARK: f32 = 0.01;
         let (_, means) = self.means?;
-        let (sky, sine) = (means.sky.dot(LUMINANCE), self.sun_direction.z);
+        let (sky, sine) = (means.sky.dot(LUMINANCE), self.luminaries.sun.z);
         Some(if sine < NIGHT_BELOW && sky > BRIGHT {
             SkyAgreement::BrightAtNight
         } else if sine > DAY_ABOVE && sky < DARK {
@@ -242,7 +285,7 @@ impl LightMeter {
         let (dome, sun) =
             self.sky.map_or_else(|| (SkyLobes::even(sky), Vec3::ZERO), |sky| (sky.dome, sky.sun));
         let level = dome.on_level().max(Vec3::ZERO) / std::f32::consts::PI;
-        Light { sun_direction: self.sun_direction, sun, sky: level, dome, horizon, sea }
+        Light { sun_direction: self.luminaries.brightest(), sun, sky: level, dome, horizon, sea }
     }
 }
 
@@ -333,6 +376,10 @@ mod tests {
     use super::*;
     use crate::{colour::linear_to_srgb, event::PixelFormat, geometry::look};
 
+    fn meter(sun_direction: DVec3, wants_tones: bool) -> LightMeter {
+        LightMeter::new(&Daylight::fixed(sun_direction, 20_000.0), wants_tones)
+    }
+
     fn two_tone(sky: u8, sea: u8) -> Picture {
         let (w, h) = (64u32, 64u32);
         let bytes: Vec<u8> =
@@ -344,7 +391,7 @@ mod tests {
     fn the_sky_above_the_horizon_is_what_is_measured() {
         let lens = Lens::pinhole(64, 64, 1.0);
         let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
-        let mut meter = LightMeter::new(DVec3::new(0.0, 0.6, 0.8), false);
+        let mut meter = meter(DVec3::new(0.0, 0.6, 0.8), false);
         meter.observe(Time::from_ns(0), &two_tone(188, 99), &lens, &camera);
         let light = meter.light();
         // A grey sky that is as bright everywhere is an overcast one, brighter above.
@@ -362,7 +409,7 @@ mod tests {
         let lens = Lens::pinhole(64, 64, 1.0);
         let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
         let of = |sine: f64, code: u8| {
-            let mut meter = LightMeter::new(DVec3::new((1.0 - sine * sine).sqrt(), 0.0, sine), false);
+            let mut meter = meter(DVec3::new((1.0 - sine * sine).sqrt(), 0.0, sine), false);
             assert_eq!(meter.agreement(), None);
             meter.observe(Time::from_ns(0), &two_tone(code, code / 2), &lens, &camera);
             meter.agreement().expect("a sky was seen")
@@ -398,13 +445,13 @@ mod tests {
         let camera = CameraPose { world_from_camera: look(0.0, 0.0, 0.0), position: DVec3::Z };
         // The sun is down: nothing but the sky falls on the water.
         for share in [0.4, 1.0, 1.6] {
-            let mut meter = LightMeter::new(-DVec3::Z, true);
+            let mut meter = meter(-DVec3::Z, true);
             meter.observe(Time::from_ns(0), &mirroring(share, &lens, &camera, 2.0), &lens, &camera);
             let times = meter.sky(2.0).at(0.1).y / srgb_to_linear(200.0 / 255.0);
             assert!((f64::from(times) / share - 1.0).abs() < 0.1, "{share}: {times}");
         }
         // However little the two have to do with each other, what is taken stays within bounds.
-        let mut meter = LightMeter::new(-DVec3::Z, true);
+        let mut meter = meter(-DVec3::Z, true);
         meter.observe(Time::from_ns(0), &two_tone(0, 255), &lens, &camera);
         assert!(meter.sky(5.0).nodes.iter().all(|n| n.is_finite() && n.min_element() >= 0.0));
     }

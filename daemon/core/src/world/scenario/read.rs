@@ -15,8 +15,8 @@ use crate::{
     daylight::Daylight,
     sea::BeaufortForce,
     text::toml::{
-        Loose, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number, one_of, plain_text,
-        whole,
+        BareOrQuoted, Loose, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number,
+        one_of, plain_text, whole,
     },
     water::{ReflectionMethod, ShadowLevel, Water},
     world::waves::{Spectrum, WaveSpec},
@@ -32,7 +32,7 @@ struct RawScenario {
     duration_s: OptionalKey<f64>,
     sea: Option<Spanned<RawSea>>,
     mount: Option<Spanned<RawMount>>,
-    light: Option<Spanned<LightKeys>>,
+    light: Option<Spanned<RawLight>>,
     reflection: Option<Spanned<ReflectionKeys>>,
     weapon: Option<Spanned<RawWeapon>>,
     briefing: OptionalKey<String>,
@@ -56,6 +56,18 @@ struct RawSea {
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+struct RawLight {
+    sun_azimuth_deg: OptionalKey<f64>,
+    sun_elevation_deg: OptionalKey<f64>,
+    latitude_deg: OptionalKey<f64>,
+    longitude_deg: OptionalKey<f64>,
+    utc: OptionalKey<BareOrQuoted>,
+    visibility_km: OptionalKey<f64>,
+    source: OptionalKey<String>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 struct RawMount {
     eye_height_m: OptionalKey<f64>,
 }
@@ -71,7 +83,7 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let sea_from_video = text.given(&source, one_of(&sources))?.unwrap_or(false);
     let (_, mount) = text.section("mount", raw.mount);
     let (section, keys) = text.section("light", raw.light);
-    let daylight = light(&section, &keys)?;
+    let daylight = light_of_scenario(&section, keys)?;
     let (_, keys) = text.section("reflection", raw.reflection);
     let water = reflection(text, &keys, force, &mut warnings)?;
     let (section, keys) = text.section("weapon", raw.weapon);
@@ -129,17 +141,34 @@ pub fn sea(section: &TomlSection<'_>, keys: &SeaKeys) -> Result<(BeaufortForce, 
     Ok((force, WaveSpec { spectrum, wind_from }))
 }
 
+/// The daylight of a scenario: where its text names no sun, that of the ship's place and time once these are told.
+fn light_of_scenario(section: &TomlSection<'_>, raw: RawLight) -> Result<Daylight, TomlError> {
+    let RawLight {
+        sun_azimuth_deg,
+        sun_elevation_deg,
+        latitude_deg,
+        longitude_deg,
+        utc,
+        visibility_km,
+        source,
+    } = raw;
+    let keys =
+        LightKeys { sun_azimuth_deg, sun_elevation_deg, latitude_deg, longitude_deg, utc, visibility_km };
+    let daylight = light(section, &keys)?;
+    let sources = [("scenario", false), ("ship", true)];
+    let from_ship = section.text.given(&source, one_of(&sources))?;
+    Ok(Daylight { from_ship: from_ship.unwrap_or(daylight.from_ship), ..daylight })
+}
+
 /// The daylight of the table `[light]`: a clear sky's sun.
 ///
 /// # Errors
 /// As [`sea`].
 pub fn light(section: &TomlSection<'_>, keys: &LightKeys) -> Result<Daylight, TomlError> {
     let visibility_km = section.text.given(&keys.visibility_km, number(0.05..=200.0, "km"))?.unwrap_or(20.0);
-    Ok(Daylight {
-        sun_direction: sun::direction(section, keys)?,
-        sun_strength: 1.0,
-        visibility_m: 1000.0 * visibility_km,
-    })
+    let sun = sun::given(section, keys)?;
+    let fixed = Daylight::fixed(sun.direction, 1000.0 * visibility_km);
+    Ok(Daylight { moment: sun.moment, from_ship: !sun.named, ..fixed })
 }
 
 /// The name of a reflection method, or a former name.

@@ -1,0 +1,209 @@
+//! The body that lights the sky, sun or moon, followed as they move.
+
+use glam::DVec3;
+
+use crate::{
+    daylight::Daylight,
+    ephemeris::{Moment, Moon, Place, Utc},
+    event::ShipFix,
+    time::Time,
+};
+
+/// Sun and moon are sought anew after so long, seconds: the sun has moved by an eighth of a degree.
+const EVERY_S: f64 = 30.0;
+
+/// Sun and moon at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Luminaries {
+    /// Unit vector towards the sun, world.
+    pub sun: DVec3,
+    /// The moon; `None` where neither scenario nor ship tells place and time.
+    pub moon: Option<Moon>,
+    /// Place and time that they follow from.
+    pub moment: Option<Moment>,
+    /// Whether these are the ship's.
+    pub from_ship: bool,
+}
+
+impl Luminaries {
+    /// The moon, where it gives a level surface more light than the sun does.
+    pub fn moonlight(&self) -> Option<&Moon> {
+        self.moon.as_ref().filter(|moon| {
+            moon.direction.z > 0.0
+                && moon.irradiance * illuminance(moon.direction.z) > illuminance(self.sun.z)
+        })
+    }
+
+    /// Unit vector towards the body that gives a level surface the most light.
+    pub fn brightest(&self) -> DVec3 {
+        self.moonlight().map_or(self.sun, |moon| moon.direction)
+    }
+}
+
+/// Illuminance of a level surface under a clear sky with the sun at that sine of elevation, lux (Seidelmann 1992, table of illuminances).
+fn illuminance(sine: f64) -> f64 {
+    const TABLE: [(f64, f64); 8] = [
+        (-18.0, 6.5e-4),
+        (-12.0, 8.3e-3),
+        (-6.0, 3.4),
+        (0.0, 759.0),
+        (5.0, 4760.0),
+        (10.0, 10_900.0),
+        (30.0, 49_000.0),
+        (90.0, 103_000.0),
+    ];
+    let elevation = sine.clamp(-1.0, 1.0).asin().to_degrees();
+    let above = TABLE.iter().position(|(node, _)| *node >= elevation).unwrap_or(TABLE.len() - 1);
+    let [low, high] = [above.saturating_sub(1), above].map(|i| TABLE[i]);
+    let share = ((elevation - low.0) / (high.0 - low.0).max(1e-9)).clamp(0.0, 1.0);
+    (low.1.ln() + share * (high.1 / low.1).ln()).exp()
+}
+
+/// Follows sun and moon from what the scenario gives and what the ship's instruments tell.
+#[derive(Clone, Debug)]
+pub struct SkyClock {
+    given: DVec3,
+    /// Place and time of the scenario, which run from the first picture on.
+    moment: Option<Moment>,
+    begun: Option<Time>,
+    from_ship: bool,
+    place: Option<Place>,
+    utc: Option<(Time, Utc)>,
+    newest: Option<(Time, Luminaries)>,
+}
+
+impl SkyClock {
+    /// A clock that has not begun.
+    pub const fn new(daylight: &Daylight) -> Self {
+        let Daylight { sun_direction: given, moment, from_ship, .. } = *daylight;
+        Self { given, moment, begun: None, from_ship, place: None, utc: None, newest: None }
+    }
+
+    /// Takes in what the ship's instruments told.
+    pub fn fix(&mut self, fix: &ShipFix) {
+        let known = self.ship(fix.arrival).is_some();
+        self.place = fix.place.or(self.place);
+        self.utc = fix.utc.map(|utc| (fix.arrival, utc)).or(self.utc);
+        if self.from_ship && !known && self.ship(fix.arrival).is_some() {
+            self.newest = None;
+        }
+    }
+
+    /// Place and time at `time` by the ship's instruments; `None` before they told both.
+    fn ship(&self, time: Time) -> Option<Moment> {
+        let (arrival, utc) = self.utc?;
+        Some(Moment { place: self.place?, utc: utc.plus_secs(time.secs_since(arrival))? })
+    }
+
+    /// The same, where the scenario does not take it.
+    pub fn unused(&self, time: Time) -> Option<Moment> {
+        self.ship(time).filter(|_| !self.from_ship)
+    }
+
+    /// Sun and moon at `time`.
+    pub fn at(&mut self, time: Time) -> Luminaries {
+        let begun = *self.begun.get_or_insert(time);
+        if let Some((found, newest)) = self.newest
+            && (0.0..EVERY_S).contains(&time.secs_since(found))
+        {
+            return newest;
+        }
+        let ship = self.ship(time).filter(|_| self.from_ship);
+        let given = || {
+            let Moment { place, utc } = self.moment?;
+            Some(Moment { place, utc: utc.plus_secs(time.secs_since(begun))? })
+        };
+        let moment = ship.or_else(given);
+        let newest = Luminaries {
+            sun: moment.and_then(Moment::sun).unwrap_or(self.given),
+            moon: moment.and_then(Moment::moon),
+            moment,
+            from_ship: ship.is_some(),
+        };
+        self.newest = Some((time, newest));
+        newest
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn daylight(moment: Option<Moment>, from_ship: bool) -> Daylight {
+        Daylight { moment, from_ship, ..Daylight::fixed(DVec3::X, 20_000.0) }
+    }
+
+    fn fix(second: i64, place: Option<(f64, f64)>, ms: Option<i64>) -> ShipFix {
+        ShipFix {
+            arrival: Time::from_ns(second * 1_000_000_000),
+            place: place.and_then(|(latitude, longitude)| Place::new(latitude, longitude)),
+            utc: ms.and_then(Utc::from_ms),
+        }
+    }
+
+    /// 2026-06-01, 12:00 UTC.
+    const NOON_MS: i64 = 1_780_315_200_000;
+    const GERMAN_BIGHT: (f64, f64) = (54.1, 7.9);
+
+    #[test]
+    fn the_ships_place_and_time_come_once_both_are_told() {
+        let mut clock = SkyClock::new(&daylight(None, true));
+        assert_eq!(clock.at(Time::from_ns(0)).sun, DVec3::X);
+        clock.fix(&fix(1, Some(GERMAN_BIGHT), None));
+        assert_eq!(clock.at(Time::from_ns(1_500_000_000)).sun, DVec3::X);
+        clock.fix(&fix(2, None, Some(NOON_MS)));
+        let seen = clock.at(Time::from_ns(2_500_000_000));
+        // The sun is in the south and 90 - 54.1 + 22 degrees high, half an hour after its noon there.
+        assert!(seen.from_ship && (seen.sun.z.asin().to_degrees() - 57.4).abs() < 0.5, "{seen:?}");
+        assert!(seen.moon.is_some());
+        // An hour on it has moved by 15 degrees of hour angle, though the feed fell silent.
+        let later = clock.at(Time::from_ns(3_602_000_000_000));
+        let turned = later.sun.angle_between(seen.sun).to_degrees();
+        assert!((10.0..16.0).contains(&turned), "{turned}");
+    }
+
+    #[test]
+    fn a_scenario_that_names_its_sun_keeps_it() {
+        let mut clock = SkyClock::new(&daylight(None, false));
+        clock.fix(&fix(1, Some(GERMAN_BIGHT), Some(NOON_MS)));
+        let seen = clock.at(Time::from_ns(1_500_000_000));
+        assert_eq!((seen.sun, seen.moon, seen.from_ship), (DVec3::X, None, false));
+        assert!(clock.unused(Time::from_ns(1_500_000_000)).is_some());
+    }
+
+    #[test]
+    fn a_scenarios_own_time_runs_from_the_first_picture() {
+        let place = Place::new(54.1, 7.9).expect("a place");
+        let utc = Utc::from_ms(NOON_MS).expect("a time");
+        let mut clock = SkyClock::new(&daylight(Some(Moment { place, utc }), false));
+        let first = clock.at(Time::from_ns(77_000_000_000));
+        assert_eq!(first.moment, Some(Moment { place, utc }));
+        let later = clock.at(Time::from_ns(137_000_000_000)).moment.expect("known");
+        assert_eq!(later.utc.ms() - NOON_MS, 60_000);
+    }
+
+    #[test]
+    fn a_high_full_moon_lights_the_night_and_no_day() {
+        let moon = Moon { direction: DVec3::new(0.0, 0.6, 0.8), lit: 1.0, irradiance: 2.5e-6 };
+        let with = |elevation_deg: f64, moon: Moon| {
+            let (sin, cos) = elevation_deg.to_radians().sin_cos();
+            let sun = DVec3::new(cos, 0.0, sin);
+            Luminaries { sun, moon: Some(moon), moment: None, from_ship: true }
+        };
+        assert!(with(-18.0, moon).moonlight().is_some() && with(-10.0, moon).moonlight().is_some());
+        for elevation_deg in [-5.0, 0.0, 40.0] {
+            assert_eq!(with(elevation_deg, moon).brightest(), with(elevation_deg, moon).sun);
+        }
+        let crescent = Moon { irradiance: 1e-9, ..moon };
+        assert!(with(-11.0, crescent).moonlight().is_none());
+        let set = Moon { direction: DVec3::new(0.0, 0.6, -0.8), ..moon };
+        assert!(with(-18.0, set).moonlight().is_none());
+    }
+
+    #[test]
+    fn a_level_surface_gets_more_from_a_higher_sun() {
+        let lux: Vec<f64> = (-90..=90).map(|deg| illuminance(f64::from(deg).to_radians().sin())).collect();
+        assert!(lux.is_sorted() && lux.iter().all(|lux| *lux > 0.0), "{lux:?}");
+        assert!((illuminance(0.0) - 759.0).abs() < 1e-6);
+    }
+}
