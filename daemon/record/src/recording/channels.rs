@@ -7,20 +7,28 @@ use mcap::records::Record;
 use super::{
     RecordError,
     properties::{CALIBRATION, METADATA, SCENARIO},
-    schema::{MESSAGE_ENCODING, SCHEMA_ENCODING, Topic},
+    schema::{ARRIVAL, MESSAGE_ENCODING, SCHEMA_ENCODING, Topic},
 };
+
+/// A channel of a topic of ours.
+#[derive(Clone, Copy)]
+pub(crate) struct OurChannel {
+    pub(crate) topic: Topic,
+    /// Arrival is the publish time of its messages; else it is the log time.
+    pub(crate) publishes_arrival: bool,
+}
 
 /// Meaning of channels and schemas.
 #[derive(Clone, Default)]
 pub(crate) struct Channels {
     schemas: BTreeMap<u16, (String, String)>,
-    channels: BTreeMap<u16, Option<Topic>>,
+    channels: BTreeMap<u16, Option<OurChannel>>,
     /// All topics, ours or not.
     pub(crate) names: Vec<String>,
 }
 
 impl Channels {
-    pub(crate) fn topic(&self, channel: u16) -> Option<Topic> {
+    pub(crate) fn ours(&self, channel: u16) -> Option<OurChannel> {
         self.channels.get(&channel).copied().flatten()
     }
 
@@ -43,7 +51,9 @@ impl Channels {
                 self.channels.insert(channel.id, None);
                 if let Some(topic) = Topic::from_name(&channel.topic) {
                     self.check(path, topic, channel)?;
-                    self.channels.insert(channel.id, Some(topic));
+                    let (name, place) = ARRIVAL;
+                    let publishes_arrival = channel.metadata.get(name).is_some_and(|found| found == place);
+                    self.channels.insert(channel.id, Some(OurChannel { topic, publishes_arrival }));
                 }
             }
             _ => {}

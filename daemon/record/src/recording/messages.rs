@@ -7,7 +7,7 @@ use mcap::records::{ChunkHeader, Record, op};
 
 use super::{
     RecordError,
-    channels::{Channels, FileNotes},
+    channels::{Channels, FileNotes, OurChannel},
     records::{PREFIX, Records, parse, u32_at, u64_at},
     schema::Topic,
 };
@@ -18,7 +18,10 @@ const MESSAGE_HEADER: usize = 22;
 /// A message of one of our topics.
 pub(crate) struct FoundMessage<'a> {
     pub(crate) topic: Topic,
+    /// Arrival at the host, or the time that a pose is for.
     pub(crate) time: Time,
+    /// Its place by time in the file; the same but for what was written long after it arrived.
+    pub(crate) logged: Time,
     pub(crate) sequence: u32,
     pub(crate) data: &'a [u8],
     /// Where the message is, or the chunk that it is in.
@@ -31,6 +34,7 @@ pub(crate) struct FoundMessage<'a> {
 struct MessageHead {
     topic: Topic,
     time: Time,
+    logged: Time,
     sequence: u32,
 }
 
@@ -75,11 +79,19 @@ impl Messages {
             if let Some((opcode, body)) = self.next_inner()? {
                 match opcode {
                     op::MESSAGE => {
-                        if let Some(MessageHead { topic, time, sequence }) = self.message(&body)? {
+                        if let Some(MessageHead { topic, time, logged, sequence }) = self.message(&body)? {
                             let data =
                                 self.data.get(body.start + MESSAGE_HEADER..body.end).unwrap_or_default();
                             let (offset, verified) = (self.offset, self.verified);
-                            return Ok(Some(FoundMessage { topic, time, sequence, data, offset, verified }));
+                            return Ok(Some(FoundMessage {
+                                topic,
+                                time,
+                                logged,
+                                sequence,
+                                data,
+                                offset,
+                                verified,
+                            }));
                         }
                     }
                     op::SCHEMA | op::CHANNEL => {
@@ -132,23 +144,25 @@ impl Messages {
     /// Head of the message at `body`; `None` for a topic that is not ours.
     fn message(&self, body: &Range<usize>) -> Result<Option<MessageHead>, RecordError> {
         let data = self.data.get(body.clone()).unwrap_or_default();
-        let (Some(prefix), Some(log_time)) = (u64_at(data, 0), u64_at(data, 6)) else {
+        let (Some(prefix), Some(log_time), Some(publish_time)) =
+            (u64_at(data, 0), u64_at(data, 6), u64_at(data, 14))
+        else {
             return Err(self.damaged("a message shorter than its header"));
         };
-        if data.len() < MESSAGE_HEADER {
-            return Err(self.damaged("a message shorter than its header"));
-        }
         let channel = prefix as u16;
-        let Some(topic) = self.channels.topic(channel) else {
+        let Some(OurChannel { topic, publishes_arrival }) = self.channels.ours(channel) else {
             if self.channels.is_declared(channel) {
                 return Ok(None);
             }
             return Err(self.damaged(&format!("a message on the undeclared channel {channel}")));
         };
-        let Ok(ns) = i64::try_from(log_time) else {
-            return Err(self.damaged(&format!("a message with the log time {log_time} ns")));
+        let time = |name: &str, ns: u64| match i64::try_from(ns) {
+            Ok(ns) => Ok(Time::from_ns(ns)),
+            Err(_) => Err(self.damaged(&format!("a message with the {name} time {ns} ns"))),
         };
-        Ok(Some(MessageHead { topic, time: Time::from_ns(ns), sequence: (prefix >> 16) as u32 }))
+        let logged = time("log", log_time)?;
+        let time = if publishes_arrival { time("publish", publish_time)? } else { logged };
+        Ok(Some(MessageHead { topic, time, logged, sequence: (prefix >> 16) as u32 }))
     }
 
     /// Loads the file's next record; `false` after the last.

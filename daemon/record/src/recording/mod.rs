@@ -17,8 +17,10 @@
 //!
 //! Calibration and scenario are attachments (`calibration.toml`, `scenario.toml`), everything else of [`Properties`] is one
 //! metadata record called `bowwave`. A session's inputs stand in the file in the order in which it met them
-//! ([`RecordingReader::entries_as_written`]); [`RecordingReader::entries`] gives all entries by time. Chunks are not compressed, since pictures already are, and none spans more than half
-//! a second: a file that was cut short misses less than a second.
+//! ([`RecordingReader::entries_as_written`]); [`RecordingReader::entries`] gives all entries by time. Where the table says `log`, the
+//! publish time is the same, and it alone is right for what a pause of the computer held up: its log time is half a second before the
+//! newest then ([`DISORDER_MAX_NS`]), so that readers that put messages into order need not look back further. Chunks are not compressed,
+//! since pictures already are, and none spans more than half a second: a file that was cut short misses less than a second.
 
 mod channels;
 mod error;
@@ -59,7 +61,7 @@ pub const SENTENCE_MAX_BYTES: usize = 256;
 /// The largest JPEG that is written or read, bytes.
 pub const JPEG_MAX_BYTES: usize = 32 << 20;
 
-/// How far entries may be out of order when written, nanoseconds; readers put them into order again.
+/// How far log times may be out of order when written, nanoseconds; readers put them into order again.
 pub const DISORDER_MAX_NS: i64 = 500_000_000;
 
 /// One thing that a recording holds.
@@ -94,7 +96,7 @@ pub enum Entry {
 }
 
 impl Entry {
-    /// The time that orders a recording: arrival at the host, or the time that a pose is for.
+    /// Arrival at the host, or the time that a pose is for.
     pub fn time(&self) -> Time {
         match self {
             Self::Imu(sample) => sample.arrival,

@@ -172,13 +172,13 @@ impl Entries {
             return Ok(());
         };
         let offset = found.offset;
+        let time = found.logged;
         let entry = match entry(&self.path, &found) {
             Ok(Some(entry)) => entry,
             Ok(None) => return Ok(()),
             // What a power cut left of a chunk's end need not be what was written.
             Err(error) => return Err(self.messages.end_cut_chunk().unwrap_or(error)),
         };
-        let time = entry.time();
         if time < self.given {
             let late_ns = self.given.ns_since(time);
             return Err(RecordError::OutOfOrder { path: self.path.to_path_buf(), offset, late_ns });

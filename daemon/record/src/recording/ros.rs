@@ -299,13 +299,13 @@ pub(crate) fn decode_camera_info(data: &[u8]) -> Result<CameraInfo, String> {
 /// The entry of a message; `None` for `/camera/info`, which is a property. The error says what is wrong with the message.
 pub(crate) fn decode(
     topic: Topic,
-    log_time: Time,
+    arrival: Time,
     sequence: u32,
     data: &[u8],
 ) -> Result<Option<Entry>, String> {
     Ok(Some(match topic {
         Topic::CameraInfo => return Ok(None),
-        Topic::Imu => Entry::Imu(imu_sample(&read(data)?, log_time)?),
+        Topic::Imu => Entry::Imu(imu_sample(&read(data)?, arrival)?),
         Topic::Image => {
             let message: CompressedImage<'_> = read(data)?;
             let format = message.format.to_ascii_lowercase();
@@ -319,40 +319,40 @@ pub(crate) fn decode(
                 ));
             }
             Entry::Frame(FrameEntry {
-                arrival: log_time,
+                arrival,
                 mid_exposure: time(&message.header.stamp)?,
                 sequence,
                 jpeg: Arc::from(message.data),
                 is_recoded: format == RECODED,
             })
         }
-        Topic::Trigger => Entry::Trigger(TriggerEdge { time: log_time, pressed: read::<Bool>(data)?.data }),
+        Topic::Trigger => Entry::Trigger(TriggerEdge { time: arrival, pressed: read::<Bool>(data)?.data }),
         Topic::Ship => {
             let message: Sentence = read(data)?;
             sentence(&message.sentence)?;
-            Entry::Ship(ShipEntry { arrival: log_time, sentence: message.sentence })
+            Entry::Ship(ShipEntry { arrival, sentence: message.sentence })
         }
         Topic::Mark => {
             let name = read::<Text>(data)?.data;
             let known = MARKS.into_iter().find(|(_, known)| *known == name);
             let (kind, _) = known.ok_or_else(|| format!("a press at {name:?}, which is no mark"))?;
-            Entry::Mark(Mark { time: log_time, kind })
+            Entry::Mark(Mark { time: arrival, kind })
         }
         Topic::Act => {
             let name = read::<Text>(data)?.data;
             let known = Act::ALL.into_iter().find(|act| act.name() == name);
             let act = known.ok_or_else(|| format!("an act {name:?}, which this version does not know"))?;
-            Entry::Act(TraineeAct { time: log_time, act })
+            Entry::Act(TraineeAct { time: arrival, act })
         }
-        Topic::Truth => Entry::Truth(pose_entry(&read(data)?, log_time)?),
-        Topic::Pose => Entry::Pose(pose_entry(&read(data)?, log_time)?),
-        Topic::ImageRaw => Entry::Picture(picture_entry(&read(data)?, log_time, sequence)?),
-        Topic::ShipValues => Entry::ShipValues(ship_sample(&read(data)?, log_time)),
-        Topic::ShipFix => Entry::ShipFix(ship_fix(&read(data)?, log_time)?),
-        Topic::Fault => Entry::Fault(fault_entry(read(data)?, log_time)?),
+        Topic::Truth => Entry::Truth(pose_entry(&read(data)?, arrival)?),
+        Topic::Pose => Entry::Pose(pose_entry(&read(data)?, arrival)?),
+        Topic::ImageRaw => Entry::Picture(picture_entry(&read(data)?, arrival, sequence)?),
+        Topic::ShipValues => Entry::ShipValues(ship_sample(&read(data)?, arrival)),
+        Topic::ShipFix => Entry::ShipFix(ship_fix(&read(data)?, arrival)?),
+        Topic::Fault => Entry::Fault(fault_entry(read(data)?, arrival)?),
         Topic::Tick => {
             let TickMessage { header, inputs, records, scenes } = read(data)?;
-            let tick = Tick { time: log_time, shown: time(&header.stamp)? };
+            let tick = Tick { time: arrival, shown: time(&header.stamp)? };
             Entry::Tick(TickEntry { tick, inputs, records, scenes })
         }
     }))
@@ -514,9 +514,9 @@ fn pose_message(entry: &PoseEntry) -> Result<PoseStamped, String> {
     })
 }
 
-fn pose_entry(message: &PoseStamped, log_time: Time) -> Result<PoseEntry, String> {
+fn pose_entry(message: &PoseStamped, arrival: Time) -> Result<PoseEntry, String> {
     let time = time(&message.header.stamp)?;
-    if time != log_time {
+    if time != arrival {
         return Err(format!("its header says {time}"));
     }
     let q = &message.orientation;

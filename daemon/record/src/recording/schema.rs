@@ -5,6 +5,8 @@
 pub(crate) const PROFILE: &str = "ros2";
 pub(crate) const SCHEMA_ENCODING: &str = "ros2msg";
 pub(crate) const MESSAGE_ENCODING: &str = "cdr";
+/// Metadata of a channel whose messages' publish time is their arrival. Files without it are ordered by arrival: their log time.
+pub(crate) const ARRIVAL: (&str, &str) = ("arrival", "publish_time");
 
 /// What a channel of ours carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

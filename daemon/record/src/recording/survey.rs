@@ -75,7 +75,7 @@ impl Survey {
 
     fn take_statistics(&mut self, statistics: &Statistics) -> Option<()> {
         for (channel, count) in &statistics.channel_message_counts {
-            let Some(slot) = self.channels.topic(*channel).and_then(|topic| self.counts.of(topic)) else {
+            let Some(slot) = self.channels.ours(*channel).and_then(|ours| self.counts.of(ours.topic)) else {
                 continue;
             };
             *slot = slot.checked_add(*count)?;
@@ -110,8 +110,8 @@ impl Survey {
         } else if self.camera_info.is_none() {
             self.camera_info = ros::decode_camera_info(found.data).ok();
         }
-        let (first, last) = self.span.unwrap_or((found.time, found.time));
-        self.span = Some((first.min(found.time), last.max(found.time)));
+        let (first, last) = self.span.unwrap_or((found.logged, found.logged));
+        self.span = Some((first.min(found.logged), last.max(found.logged)));
     }
 
     fn empty() -> Self {

@@ -2,6 +2,7 @@
 
 use std::{
     borrow::Cow,
+    collections::BTreeMap,
     fs::{self, File, OpenOptions},
     io::{self, BufWriter},
     path::{Path, PathBuf},
@@ -17,7 +18,7 @@ use super::{
     Counts, DISORDER_MAX_NS, Entry, Properties, RecordError,
     properties::{CALIBRATION, METADATA, SCENARIO},
     ros,
-    schema::{MESSAGE_ENCODING, PROFILE, SCHEMA_ENCODING, Topic},
+    schema::{ARRIVAL, MESSAGE_ENCODING, PROFILE, SCHEMA_ENCODING, Topic},
 };
 use crate::folder::sync_folder;
 
@@ -106,13 +107,13 @@ impl RecordingWriter {
         .map_err(fail)?;
         attach(&mut mcap, properties).map_err(fail)?;
         let mut channels = [0; Topic::ALL.len()];
+        let arrival = BTreeMap::from([(ARRIVAL.0.to_owned(), ARRIVAL.1.to_owned())]);
         for topic in Topic::ALL {
             let definition = topic.definition();
             let schema =
                 mcap.add_schema(topic.schema_name(), SCHEMA_ENCODING, definition.as_bytes()).map_err(fail)?;
-            channels[topic as usize] = mcap
-                .add_channel(schema, topic.name(), MESSAGE_ENCODING, &Default::default())
-                .map_err(fail)?;
+            channels[topic as usize] =
+                mcap.add_channel(schema, topic.name(), MESSAGE_ENCODING, &arrival).map_err(fail)?;
         }
         // A chunk of their own, so that damage among the data never takes the meaning of what follows with it.
         mcap.flush().map_err(fail)?;
@@ -135,27 +136,20 @@ impl RecordingWriter {
                 time,
                 what,
             })?;
-            writer.put(Topic::CameraInfo, time, 0)?;
+            writer.put(Topic::CameraInfo, time, time, 0)?;
         }
         Ok(writer)
     }
 
-    /// Appends an entry. Entries may come up to [`DISORDER_MAX_NS`] out of order. [`RecordError::Entry`] means that this one
-    /// cannot be recorded and the recording goes on without it; after [`RecordError::Write`] nothing more can be written.
+    /// Appends an entry. One that is older than the newest by more than [`DISORDER_MAX_NS`] (a pause held it up) keeps its time and
+    /// gets the nearest place among the others by time. [`RecordError::Entry`] means that this one cannot be recorded and the recording
+    /// goes on without it; after [`RecordError::Write`] nothing more can be written.
     pub fn write(&mut self, entry: &Entry) -> Result<(), RecordError> {
         let time = entry.time();
         if time.ns() < 0 {
             return Err(negative(&self.path, time));
         }
-        if let Some(newest) = self.newest
-            && newest.ns_since(time) > DISORDER_MAX_NS
-        {
-            let what = format!(
-                "it is {} ns older than the newest one (at most {DISORDER_MAX_NS} are put into order); write entries by time",
-                newest.ns_since(time)
-            );
-            return Err(RecordError::Entry { path: self.path.clone(), time, what });
-        }
+        let logged = self.newest.map_or(time, |newest| time.max(newest.plus_ns(-DISORDER_MAX_NS)));
         let topic = ros::encode(entry, &mut self.message).map_err(|what| RecordError::Entry {
             path: self.path.clone(),
             time,
@@ -171,16 +165,16 @@ impl RecordingWriter {
             }
         };
         if let Some(start) = self.chunk_start
-            && time.ns_since(start) >= CHUNK_MAX_NS
+            && logged.ns_since(start) >= CHUNK_MAX_NS
         {
             self.flush()?;
         }
-        self.put(topic, time, sequence)?;
+        self.put(topic, time, logged, sequence)?;
         if let Some(count) = self.counts.of(topic) {
             *count += 1;
         }
-        self.first = Some(self.first.map_or(time, |first| first.min(time)));
-        self.newest = Some(self.newest.map_or(time, |newest| newest.max(time)));
+        self.first = Some(self.first.map_or(logged, |first| first.min(logged)));
+        self.newest = Some(self.newest.map_or(logged, |newest| newest.max(logged)));
         Ok(())
     }
 
@@ -218,18 +212,17 @@ impl RecordingWriter {
         Ok(WrittenSummary { path: self.path, counts: self.counts, bytes, duration_ns })
     }
 
-    fn put(&mut self, topic: Topic, time: Time, sequence: u32) -> Result<(), RecordError> {
-        let log_time = time.ns().unsigned_abs();
+    fn put(&mut self, topic: Topic, time: Time, logged: Time, sequence: u32) -> Result<(), RecordError> {
         let header = MessageHeader {
             channel_id: self.channels[topic as usize],
             sequence,
-            log_time,
-            publish_time: log_time,
+            log_time: logged.ns().unsigned_abs(),
+            publish_time: time.ns().unsigned_abs(),
         };
         self.mcap
             .write_to_known_channel(&header, &self.message)
             .map_err(|error| write_error(&self.path, error))?;
-        self.chunk_start = Some(self.chunk_start.map_or(time, |start| start.min(time)));
+        self.chunk_start = Some(self.chunk_start.map_or(logged, |start| start.min(logged)));
         Ok(())
     }
 }

@@ -137,7 +137,7 @@ impl Recorder {
     }
 
     /// Adds what is recorded of an event; `logged` is the time of a fault in the recording. With the tick's own time, inputs that a pause
-    /// held up would come after a fault and be too old to be recorded.
+    /// held up would come after a fault and lose their place by time.
     fn add(&mut self, event: &Event, logged: Time, jobs: &mut Vec<RecorderJob>) {
         let mut entry = |entry| jobs.push(RecorderJob::Entry(entry));
         match event {
