@@ -24,6 +24,10 @@ const LATE: usize = 2;
 const STEP_WITHIN: usize = 10;
 /// For so long no frame may have been late before all is drawn again: less than a second, so that the sailor has it back within one.
 const CALM: usize = 24;
+/// Nine frames of ten must be expected to take less than this with all drawn again, milliseconds, of the 33 that there are.
+const BACK_MS: f64 = 28.0;
+/// An expectation that keeps things left out is tried after so many frames, half a minute: scene and load have become others by then.
+const EXPECTED_FOR: usize = 900;
 
 /// A frame that was due.
 #[derive(Clone, Copy, Debug)]
@@ -39,13 +43,22 @@ pub struct LoadWatch {
     frames: VecDeque<DueFrame>,
     /// Steps that are left out.
     left_out: usize,
-    /// Frames since the last step.
+    /// Frames since the last step, or since all is drawn again.
     since: usize,
-    /// What a frame took with all drawn, before the first step, milliseconds.
-    whole_ms: f64,
-    /// How much of that a frame takes as it is drawn now.
-    share: Option<f64>,
+    /// How much of a whole frame's time one takes after each step, as the last return from it showed.
+    shares: [Option<f64>; STEPS.len()],
+    /// The last return, until it has shown that.
+    returned: Option<Return>,
     missed: u64,
+}
+
+/// All was drawn again.
+#[derive(Clone, Copy, Debug)]
+struct Return {
+    /// Steps that were left out before.
+    left_out: usize,
+    /// What a frame took then, milliseconds.
+    took_ms: f64,
 }
 
 impl LoadWatch {
@@ -71,24 +84,17 @@ impl LoadWatch {
         self.since += 1;
     }
 
-    /// Decides anew; each fault, and why it is there: `None` where it is not.
+    /// Decides from the frames so far; each fault, and why it is there: `None` where it is not.
     pub fn decide(&mut self) -> [(Fault, Option<String>); STEPS.len() + 1] {
-        /// Nine frames of ten must be expected to take less than this with all drawn again, milliseconds, of the 33 that there are.
-        const BACK_MS: f64 = 28.0;
-        if self.left_out < STEPS.len() && self.late(STEP_WITHIN.min(self.since)) >= LATE {
-            if self.left_out == 0 {
-                self.whole_ms = self.late_ms();
-            }
-            self.left_out += 1;
-            (self.since, self.share) = (0, None);
-        } else if self.left_out > 0 {
-            if self.since >= STEP_WITHIN && self.share.is_none() {
-                self.share = Some((self.quantile(STEP_WITHIN, 0.5) / self.whole_ms).clamp(0.3, 1.0));
-            }
-            let whole_ms = self.quantile(CALM, 0.9) / self.share.unwrap_or(1.0);
-            if self.since >= CALM && self.late(CALM) == 0 && whole_ms < BACK_MS {
-                (self.left_out, self.since) = (0, 0);
-            }
+        let asks = self.left_out < STEPS.len() && self.late(STEP_WITHIN.min(self.since)) >= LATE;
+        self.learn(asks);
+        if asks {
+            // What did not hold is left out again at once, not step by step.
+            self.left_out = self.returned.take().map_or(self.left_out + 1, |back| back.left_out);
+            self.since = 0;
+        } else if self.left_out > 0 && self.may_return() {
+            self.returned = Some(Return { left_out: self.left_out, took_ms: self.quantile(CALM, 0.5) });
+            (self.left_out, self.since) = (0, 0);
         }
         let late = self.late(WINDOW);
         let slow = (late >= LATE).then(|| {
@@ -111,14 +117,24 @@ impl LoadWatch {
         self.frames.iter().rev().take(newest).filter(|f| f.is_late).count()
     }
 
-    /// What the late ones of the newest frames took, milliseconds: those before them were drawn under a smaller load.
-    fn late_ms(&self) -> f64 {
-        let newest = self.frames.iter().rev().take(STEP_WITHIN);
-        let mut late = newest.filter(|f| f.is_late).filter_map(|f| f.took_ms).peekable();
-        if late.peek().is_none() {
-            return self.quantile(STEP_WITHIN, 1.0);
+    /// Whether all can be drawn again. Only a return shows how much leaving out saves: frames before and after a step differ by the load as
+    /// well, which may be gone a moment later.
+    fn may_return(&self) -> bool {
+        if self.since < CALM || self.late(CALM) > 0 {
+            return false;
         }
-        bowwave_core::statistics::quantile(late, 0.5).max(1.0)
+        let share = self.shares[self.left_out - 1].unwrap_or(1.0);
+        self.quantile(CALM, 0.9) / share < BACK_MS || self.since >= EXPECTED_FOR
+    }
+
+    /// Learns from a return, once it has failed or lasts.
+    fn learn(&mut self, has_failed: bool) {
+        let Some(back) = self.returned.filter(|_| has_failed || self.since >= STEP_WITHIN) else { return };
+        let whole_ms = self.quantile(self.since.min(STEP_WITHIN), 0.5);
+        self.shares[back.left_out - 1] = Some((back.took_ms / whole_ms).min(1.0));
+        if !has_failed {
+            self.returned = None;
+        }
     }
 
     fn quantile(&self, newest: usize, share: f64) -> f64 {
@@ -160,6 +176,28 @@ mod tests {
         assert_eq!(&steps[..6], [0, 1, 1, 2, 2, 3], "within a fifth of a second");
         assert!(steps[6..45].iter().all(|s| *s == 3));
         assert_eq!(steps[45 + 29], 0, "{steps:?}");
+    }
+
+    /// Two frames at the start, or later, take long for no load of the scene's: neither keeps the water away.
+    #[test]
+    fn what_a_moment_held_up_is_back_within_a_second() {
+        for (stops, load) in [(0..3, 2.0), (100..102, 2.0), (100..106, 2.5), (100..103, 1.0)] {
+            let mut watch = LoadWatch::default();
+            let end = stops.end;
+            let steps = run(&mut watch, 900, |frame| if stops.contains(&frame) { 20.0 } else { load });
+            assert!(steps[..end + 1].iter().any(|s| *s > 0), "{stops:?}");
+            assert!(steps[end + 29..].iter().all(|s| *s == 0), "{stops:?} at {load}: {steps:?}");
+        }
+    }
+
+    /// A return that a moment spoilt keeps the water away for half a minute at most.
+    #[test]
+    fn what_a_return_showed_is_not_believed_for_ever() {
+        let mut watch = LoadWatch::default();
+        let long = |frame: usize| (100..102).contains(&frame) || (127..130).contains(&frame);
+        let steps = run(&mut watch, 1200, |frame| if long(frame) { 20.0 } else { 2.0 });
+        assert!(steps[131] > 0 && steps[800] > 0, "{steps:?}");
+        assert!(steps[130 + EXPECTED_FOR + 2..].iter().all(|s| *s == 0), "{steps:?}");
     }
 
     #[test]

@@ -2,8 +2,10 @@
 //! program itself runs in real time and keeps a recording.
 
 mod shortage;
+mod witness;
 
 use std::{
+    collections::BTreeSet,
     path::{Path, PathBuf},
     process::{Command, Stdio},
     thread,
@@ -21,7 +23,10 @@ use bowwave_record::{
 };
 use rustix::time::{ClockId, clock_gettime};
 
-use self::shortage::{Place, Shortage};
+use self::{
+    shortage::{Place, Shortage},
+    witness::{Stops, Witness},
+};
 use crate::table::TextTable;
 
 /// Seconds before the shortage, with it, and after it.
@@ -79,6 +84,7 @@ impl OverloadStudy {
             ("told s", 7),
             ("untold s", 8),
             ("back s", 7),
+            ("stopped", 7),
             ("rms px", 6),
             ("rounds", 7),
             ("recorded", 9),
@@ -98,16 +104,18 @@ impl OverloadStudy {
         }
         println!(
             "frames: shown of 30 a second while it lasted. told: after it began. untold: seconds with fewer than {RATE_KEPT} frames in the last \
-             one and no word of it. back: all drawn again after it ended. rounds: in the journal of those fired. recorded: frames of those \
-             shown."
+             one and no word of it. back: all drawn again after it ended, and for good but for what the host did. stopped: how often after that something was left out \
+             within a second of a stop of the computer itself, of its stops in all (as root, which alone can tell). rounds: in the journal of \
+             those fired. recorded: frames of those shown."
         );
         Ok(())
     }
 
-    fn row(&self, short: Shortage) -> Result<[String; 9]> {
+    fn row(&self, short: Shortage) -> Result<[String; 10]> {
         let place = Place::new(short)?;
         let folder = place.folder();
         let duration_s: u64 = PHASES_S.iter().sum();
+        let witness = Witness::new();
         let mut child = Command::new(&self.program)
             .args(["simulate", "--realtime", "--record", "--duration", &duration_s.to_string(), "--out"])
             .arg(folder)
@@ -119,6 +127,7 @@ impl OverloadStudy {
         thread::sleep(Duration::from_secs(PHASES_S[0]));
         let [begun, ended] = place.fall_short(Duration::from_secs(PHASES_S[1]), now)?;
         let status = child.wait()?;
+        let stops = witness.stops();
         if !status.success() {
             bail!("the program ended with {status}");
         }
@@ -129,8 +138,8 @@ impl OverloadStudy {
         let kept = read_shots(&folder.join("hits.sqlite"), &filter)?.len();
         let shown = told.ticks.iter().filter(|t| **t > begun && **t <= ended).count();
         let seconds = |s: Option<f64>| s.map_or_else(|| "-".to_owned(), |s| format!("{s:.2}"));
-        let mut of_load = told.changes.iter().filter(|(_, fault, _)| LOAD.contains(fault));
-        let came = of_load.clone().find(|(time, _, came)| *came && *time > begun);
+        let (back, stopped) = told.back(ended, &stops);
+        let came = told.of_load().find(|(time, _, came)| *came && *time > begun);
         let mut codes: Vec<&str> = told
             .changes
             .iter()
@@ -144,7 +153,8 @@ impl OverloadStudy {
             format!("{:.1} %", 100.0 * shown as f64 / (30.0 * ended.secs_since(begun))),
             seconds(came.map(|(time, ..)| time.secs_since(begun))),
             format!("{:.2}", told.untold_s()),
-            seconds(of_load.rfind(|(_, _, came)| !came).map(|(time, ..)| time.secs_since(ended))),
+            seconds(back.map(|time| time.secs_since(ended))),
+            format!("{stopped} of {}", stops.count()),
             summary["registration_px"]["rms"].as_f64().map_or("-".to_owned(), |px| format!("{px:.2}")),
             format!("{kept}/{}", summary["shots"]),
             format!("{}/{}", told.ticks.len(), summary["frames"]),
@@ -154,12 +164,43 @@ impl OverloadStudy {
 }
 
 impl Told {
+    /// Changes of what a load may change.
+    fn of_load(&self) -> impl Iterator<Item = &(Time, Fault, bool)> {
+        self.changes.iter().filter(|(_, fault, _)| LOAD.contains(fault))
+    }
+
+    /// Since when all is drawn, after the shortage's end; and how often after that something was left out because the computer itself stopped.
+    fn back(&self, ended: Time, stops: &Stops) -> (Option<Time>, usize) {
+        /// Frames of the last second say whether one is late.
+        const LOOKED_AT_S: f64 = 1.0;
+        let (mut standing, mut back, mut stopped) = (BTreeSet::new(), None, 0);
+        let mut is_of_host = false;
+        for (time, fault, came) in self.of_load() {
+            if *came && standing.is_empty() {
+                let from = time.plus_secs(-LOOKED_AT_S);
+                is_of_host = *time > ended && stops.any_between(from, *time);
+                stopped += usize::from(is_of_host);
+            }
+            if *came {
+                standing.insert(*fault)
+            } else {
+                standing.remove(fault)
+            };
+            if standing.is_empty() && !is_of_host {
+                back = Some(*time);
+            }
+        }
+        (back, stopped)
+    }
+
     /// Seconds in which fewer frames than are promised had been begun in the last one, and nothing said so.
     fn untold_s(&self) -> f64 {
+        /// A second with half a frame's time more, so that the frame of a second ago counts.
+        const SECOND_S: f64 = 1.0 + 0.5 / 30.0;
         let mut untold_s = 0.0;
         for (n, pair) in self.ticks.windows(2).enumerate().skip(30) {
             let [before, at] = pair else { continue };
-            let frames = self.ticks[..=n].iter().rev().take_while(|t| before.secs_since(**t) < 1.0).count();
+            let frames = self.ticks[..=n].iter().rev().take_while(|t| at.secs_since(**t) < SECOND_S).count();
             let is_told = LOAD.iter().any(|fault| {
                 let mut of = self.changes.iter().filter(|(time, other, _)| other == fault && time <= at);
                 of.next_back().is_some_and(|(_, _, came)| *came)
