@@ -11,7 +11,7 @@ pub struct Daylight {
     pub sun_direction: DVec3,
     /// Place and time as the run begins, where the sun follows from them.
     pub moment: Option<Moment>,
-    /// Whether place and time come from the ship's instruments once these tell them.
+    /// Place and time come from the ship's instruments once these tell them.
     pub from_ship: bool,
     /// Share of a clear sky's sunlight that clouds let through, 0 to 1.
     pub sun_strength: f64,

@@ -10,6 +10,8 @@ use skymath::Angle;
 use solar_positioning::{RefractionCorrection, SolarPositions, delta_t, time::JulianDate};
 use time::{Date, Month, OffsetDateTime, Time, UtcOffset};
 
+use crate::geometry::towards;
+
 /// A place at sea level, WGS 84.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
@@ -18,7 +20,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// Degrees north and east. `None` beyond 90 or 180 either way, and for what is no number.
+    /// Degrees north and east; `None` beyond 90 or 180 either way, or for NaN.
     pub fn new(latitude_deg: f64, longitude_deg: f64) -> Option<Self> {
         let fits = latitude_deg.abs() <= 90.0 && longitude_deg.abs() <= 180.0;
         fits.then_some(Self { latitude_deg, longitude_deg })
@@ -158,12 +160,6 @@ impl Moment {
             irradiance: 10f64.powf(0.4 * (SUN - magnitude)) * nearer * nearer,
         })
     }
-}
-
-/// Unit vector of what is seen at `azimuth`, clockwise from north, and `elevation`, radians.
-pub fn towards(azimuth: f64, elevation: f64) -> DVec3 {
-    let (sin, cos) = azimuth.sin_cos();
-    DVec3::new(sin * elevation.cos(), cos * elevation.cos(), elevation.sin())
 }
 
 /// Unit vector by declination and hour angle, radians; the angle is zero in the meridian and grows westwards.

@@ -119,7 +119,7 @@ pub struct ShipSample {
 pub struct ShipFix {
     /// When its last byte reached the host.
     pub arrival: Time,
-    /// Where she is.
+    /// Her place.
     pub place: Option<Place>,
     /// The time at its arrival, less the feed's latency.
     pub utc: Option<Utc>,

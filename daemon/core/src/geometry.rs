@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 use glam::{DMat3, DQuat, DVec2, DVec3};
 
 pub use distortion::{Distortion, Fisheye, RadialTangential};
-pub use heading::{ahead, heading_of, starboard};
+pub use heading::{ahead, bearing_and_elevation_deg, heading_of, starboard, towards};
 pub use lens::{Bend, Lens, Optics};
 pub use linearise::{INTRINSICS, LinearisedPixel};
 

@@ -320,9 +320,7 @@ impl Session {
             self.notes.sea(&report);
         }
         self.notes.light(self.estimator.sky_agreement());
-        if let Some(time) = self.estimator.video_time() {
-            self.notes.luminaries(self.estimator.luminaries(), self.estimator.unused_moment(time));
-        }
+        self.notes.luminaries(self.estimator.luminaries());
         self.notes.unexpected_horizons(self.estimator.counts().horizons.unexpected);
         self.notes.heading(self.estimator.heading_sigma(), &self.estimator.counts().headings);
         self.notes.clock(self.composer.scene().frame + 1, || self.estimator.unit_clock());

@@ -1,4 +1,4 @@
-//! What the ship's own instruments tell as lines of NMEA 0183, sans-io: her heading and attitude, a second input beside the unit on
+//! The ship's own instruments, told as lines of NMEA 0183, sans-io: her heading and attitude, a second input beside the unit on
 //! the gun, which cannot tell the ship's motion from the gun's and has no heading of its own; and place and time, which say where sun and
 //! moon stand.
 //!

@@ -41,7 +41,7 @@ use crate::{
         },
     },
     rects::{around_all, corners, cut, joined, overlap, rect},
-    view,
+    view::{self, Shade},
 };
 
 /// Pixels beyond a reflection's rectangle at which the water shader still compares the video: nine gradients of at most eight
@@ -361,7 +361,7 @@ impl Plan {
                 let coarser = (0.2 * softened_px).max(1.0);
                 let detail_m = view::detail_m(scene, boat) * coarser;
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
-                self.boat_blocks.push(view::boat_block(scene, boat, &pose, self.shadows.shade(i), true));
+                self.boat_blocks.push(view::boat_block(scene, boat, &pose, &Shade::NONE, true));
                 self.mirror_places.push(placed);
             }
         }

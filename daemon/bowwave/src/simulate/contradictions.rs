@@ -1,7 +1,7 @@
 //! Contradictions between a recording and its scenario: light, sea, eye height, length.
 
 use bowwave_core::{
-    geometry::{heading_of, wrapped},
+    geometry::{bearing_and_elevation_deg, wrapped},
     world::scenario::Scenario,
 };
 use bowwave_record::Properties;
@@ -23,9 +23,7 @@ pub fn contradictions(scenario: &Scenario, properties: &Properties, length_s: f6
     let said = |key: &str| properties.extra.get(key).and_then(|text| text.parse::<f64>().ok());
     let mut found = Vec::new();
     if let (Some(azimuth), Some(elevation)) = (said("sun_azimuth_deg"), said("sun_elevation_deg")) {
-        let sun = scenario.daylight.sun_direction;
-        let (own_azimuth, own) =
-            (heading_of(sun.truncate()).to_degrees(), sun.z.clamp(-1.0, 1.0).asin().to_degrees());
+        let [own_azimuth, own] = bearing_and_elevation_deg(scenario.daylight.sun_direction);
         let aside = apart_deg(azimuth, own_azimuth) * own.to_radians().cos().max(0.0);
         if aside.hypot(elevation - own) > SUN_DEG || (elevation > 0.0) != (own > 0.0) {
             found.push(format!(

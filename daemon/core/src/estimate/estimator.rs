@@ -17,7 +17,6 @@ use super::{
 use crate::{
     calibration::Calibration,
     daylight::Daylight,
-    ephemeris::Moment,
     event::{CameraFrame, ImuSample, Mark, ShipFix, ShipSample},
     fault::{Fault, NotScored},
     geometry::{CameraPose, Lens},
@@ -209,11 +208,6 @@ impl Estimator {
     /// Sun and moon at the newest picture.
     pub const fn luminaries(&self) -> &Luminaries {
         self.light.luminaries()
-    }
-
-    /// The ship's place and time at `time`, where she tells them and the scenario does not take them.
-    pub fn unused_moment(&self, time: Time) -> Option<Moment> {
-        self.light.unused_moment(time)
     }
 
     /// Agreement of the sky in the pictures with the scenario's sun; `None` before a sky was seen.

@@ -11,7 +11,7 @@ use crate::{
         light::{Luminaries, SkyAgreement},
         sea::{SeaSource, Unknown},
     },
-    geometry::heading_of,
+    geometry::bearing_and_elevation_deg,
 };
 
 /// The log is told when the heading's standard deviation crosses one of these, degrees: the length of a boat at 500 m, a boat's
@@ -145,8 +145,8 @@ impl Notes {
         }
     }
 
-    /// Takes in sun and moon after a frame, and the ship's place and time where the scenario does not take them.
-    pub(super) fn luminaries(&mut self, seen: &Luminaries, unused: Option<Moment>) {
+    /// Takes in sun and moon after a frame.
+    pub(super) fn luminaries(&mut self, seen: &Luminaries) {
         /// Angle between two suns beyond which their shadows contradict each other, radians.
         const APART: f64 = 20.0 * std::f64::consts::PI / 180.0;
         if self.ship_moment_told {
@@ -155,11 +155,10 @@ impl Notes {
         if let Some(moment) = seen.moment.filter(|_| seen.from_ship) {
             self.ship_moment_told = true;
             self.say(false, luminaries_words(seen, &moment));
-        } else if let Some(ship) = unused
-            && let Some(sun) = ship.sun().filter(|sun| sun.angle_between(seen.sun) > APART)
+        } else if let Some((Moment { place, utc }, sun)) = seen.unused
+            && sun.angle_between(seen.sun) > APART
         {
             self.ship_moment_told = true;
-            let Moment { place, utc } = ship;
             let (real, given) = (stands(sun), stands(seen.sun));
             self.say(
                 true,
@@ -221,10 +220,9 @@ fn luminaries_words(seen: &Luminaries, moment: &Moment) -> String {
     format!("the sun stands {} by the ship's place and time ({place}, {utc}){moonlight}", stands(seen.sun))
 }
 
-/// Where something in the sky stands, in words.
+/// Place of something in the sky, in words.
 fn stands(direction: DVec3) -> String {
-    let elevation = direction.z.clamp(-1.0, 1.0).asin().to_degrees();
-    let bearing = heading_of(direction.truncate()).to_degrees();
+    let [bearing, elevation] = bearing_and_elevation_deg(direction);
     let side = if elevation < 0.0 { "below" } else { "above" };
     format!("at {bearing:.0} degrees, {:.0} {side} the horizon", elevation.abs())
 }

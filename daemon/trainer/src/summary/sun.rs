@@ -1,7 +1,6 @@
 //! Sun and moon in the summary of a run.
 
-use bowwave_core::{estimate::light::Luminaries, geometry::heading_of};
-use glam::DVec3;
+use bowwave_core::{estimate::light::Luminaries, geometry::bearing_and_elevation_deg};
 use serde::Serialize;
 
 /// The sun at the end of a run, and what told where it stands.
@@ -30,20 +29,12 @@ pub struct MoonSummary {
 
 impl From<&Luminaries> for SunSummary {
     fn from(seen: &Luminaries) -> Self {
-        let [bearing_deg, elevation_deg] = stands_deg(seen.sun);
+        let [bearing_deg, elevation_deg] = bearing_and_elevation_deg(seen.sun);
         let moonlight = seen.moonlight().map(|moon| {
-            let [bearing_deg, elevation_deg] = stands_deg(moon.direction);
+            let [bearing_deg, elevation_deg] = bearing_and_elevation_deg(moon.direction);
             MoonSummary { bearing_deg, elevation_deg, lit: moon.lit }
         });
         let source = if seen.from_ship { "ship" } else { "scenario" };
         Self { bearing_deg, elevation_deg, source, moonlight }
     }
-}
-
-/// Bearing and elevation of a direction.
-fn stands_deg(direction: DVec3) -> [f64; 2] {
-    [
-        heading_of(direction.truncate()).to_degrees().rem_euclid(360.0),
-        direction.z.clamp(-1.0, 1.0).asin().to_degrees(),
-    ]
 }

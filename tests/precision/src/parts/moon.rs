@@ -3,7 +3,10 @@
 use std::f64::consts::TAU;
 
 use anyhow::{Context as _, Result};
-use bowwave_core::ephemeris::{Moment, Place, Utc, towards};
+use bowwave_core::{
+    ephemeris::{Moment, Place, Utc},
+    geometry::towards,
+};
 use glam::DVec3;
 
 use super::About;
@@ -47,6 +50,12 @@ impl Sighting {
     fn days(&self) -> f64 {
         self.at.utc.ms() as f64 / 86_400_000.0 - 10_957.5
     }
+
+    /// Sines and cosines of the sidereal time and of the latitude.
+    fn turned(&self) -> ((f64, f64), (f64, f64)) {
+        let sidereal = 280.46062 + 360.985_647_37 * self.days() + self.at.place.longitude_deg();
+        (sidereal.to_radians().sin_cos(), self.at.place.latitude_deg().to_radians().sin_cos())
+    }
 }
 
 fn product(at: &Sighting) -> Option<DVec3> {
@@ -81,9 +90,7 @@ fn series(at: &Sighting) -> DVec3 {
 
 /// What is in that equatorial direction, as it is seen from the place, lifted by standard air (Saemundsson 1986).
 fn seen(at: &Sighting, equatorial: DVec3) -> DVec3 {
-    let sidereal = (280.46062 + 360.985_647_37 * at.days() + at.at.place.longitude_deg()).to_radians();
-    let ((east, north), (up, level)) =
-        (sidereal.sin_cos(), at.at.place.latitude_deg().to_radians().sin_cos());
+    let ((east, north), (up, level)) = at.turned();
     let DVec3 { x, y, z } = equatorial.normalize();
     let flat = x * north + y * east;
     let there = DVec3::new(y * north - x * east, z * level - flat * up, z * up + flat * level);
@@ -94,8 +101,7 @@ fn seen(at: &Sighting, equatorial: DVec3) -> DVec3 {
 }
 
 fn almanac(at: &Sighting) -> Option<DVec3> {
-    let sidereal = (280.46062 + 360.985_647_37 * at.days() + at.at.place.longitude_deg()).to_radians();
-    let ((sin, cos), (up, level)) = (sidereal.sin_cos(), at.at.place.latitude_deg().to_radians().sin_cos());
+    let ((sin, cos), (up, level)) = at.turned();
     Some(seen(at, series(at) - DVec3::new(level * cos, level * sin, up)))
 }
 
@@ -125,7 +131,7 @@ const WAYS: [MoonWay<DVec3>; 3] = [
 
 const PHASES: [MoonWay<f64>; 2] = [("elongation, skymath", true, lit), ("mean month", false, mean_month)];
 
-/// Largest error, degrees; one that is no number is as far as it can be.
+/// Largest error, degrees; NaN counts as the opposite direction.
 fn largest(way: fn(&Sighting) -> Option<DVec3>, sightings: &[&Sighting]) -> f64 {
     let error = |at: &&Sighting| {
         let found = way(at).filter(|d| d.is_finite()).unwrap_or(-at.towards);

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use anyhow::{Context as _, Result};
+use bowwave_core::geometry::towards as direction;
 use glam::DVec3;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, time::JulianDate};
 
@@ -59,11 +60,6 @@ impl Sighting {
         let first = JulianDate::from_utc(self.utc.0, 1, 1, 0, 0, 0.0, 0.0).ok()?;
         Some((self.julian()?.julian_date() - first.julian_date()).floor() + 1.0)
     }
-}
-
-/// Unit vector, x east, y north.
-fn direction(azimuth: f64, elevation: f64) -> DVec3 {
-    DVec3::new(azimuth.sin() * elevation.cos(), azimuth.cos() * elevation.cos(), elevation.sin())
 }
 
 fn by_library(positions: &SolarPositions, at: &Sighting) -> Option<DVec3> {

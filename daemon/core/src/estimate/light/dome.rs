@@ -74,7 +74,7 @@ impl SkyFamily {
         self.skies.len()
     }
 
-    /// Makes the sky of that number anew for a sun towards `sun`.
+    /// Replaces the sky of that number by the one of a sun towards `sun`.
     pub fn renew(&mut self, number: usize, sun: DVec3) {
         if let Some(sky) = self.skies.get_mut(number) {
             *sky = Member::of(ClearSky::new(number, sun), sun);

@@ -9,7 +9,7 @@ use crate::{
     time::Time,
 };
 
-/// Sun and moon are sought anew after so long, seconds: the sun has moved by an eighth of a degree.
+/// Interval at which sun and moon are computed, seconds: the sun has moved by an eighth of a degree.
 const EVERY_S: f64 = 30.0;
 
 /// Sun and moon at a time.
@@ -21,11 +21,18 @@ pub struct Luminaries {
     pub moon: Option<Moon>,
     /// Place and time that they follow from.
     pub moment: Option<Moment>,
-    /// Whether these are the ship's.
+    /// These are the ship's.
     pub from_ship: bool,
+    /// The ship's place and time, and the sun there, where the scenario does not take them.
+    pub unused: Option<(Moment, DVec3)>,
 }
 
 impl Luminaries {
+    /// A sun that nothing is known of but its direction.
+    const fn fixed(sun: DVec3) -> Self {
+        Self { sun, moon: None, moment: None, from_ship: false, unused: None }
+    }
+
     /// The moon, where it gives a level surface more light than the sun does.
     pub fn moonlight(&self) -> Option<&Moon> {
         self.moon.as_ref().filter(|moon| {
@@ -62,21 +69,26 @@ fn illuminance(sine: f64) -> f64 {
 /// Follows sun and moon from what the scenario gives and what the ship's instruments tell.
 #[derive(Clone, Debug)]
 pub struct SkyClock {
-    given: DVec3,
-    /// Place and time of the scenario, which run from the first picture on.
-    moment: Option<Moment>,
+    /// Scenario's sun, place and time; the latter run from the first picture on.
+    daylight: Daylight,
     begun: Option<Time>,
-    from_ship: bool,
     place: Option<Place>,
     utc: Option<(Time, Utc)>,
-    newest: Option<(Time, Luminaries)>,
+    computed: Option<Time>,
+    luminaries: Luminaries,
 }
 
 impl SkyClock {
     /// A clock that has not begun.
     pub const fn new(daylight: &Daylight) -> Self {
-        let Daylight { sun_direction: given, moment, from_ship, .. } = *daylight;
-        Self { given, moment, begun: None, from_ship, place: None, utc: None, newest: None }
+        Self {
+            daylight: *daylight,
+            begun: None,
+            place: None,
+            utc: None,
+            computed: None,
+            luminaries: Luminaries::fixed(daylight.sun_direction),
+        }
     }
 
     /// Takes in what the ship's instruments told.
@@ -84,8 +96,8 @@ impl SkyClock {
         let known = self.ship(fix.arrival).is_some();
         self.place = fix.place.or(self.place);
         self.utc = fix.utc.map(|utc| (fix.arrival, utc)).or(self.utc);
-        if self.from_ship && !known && self.ship(fix.arrival).is_some() {
-            self.newest = None;
+        if !known && self.ship(fix.arrival).is_some() {
+            self.computed = None;
         }
     }
 
@@ -95,33 +107,32 @@ impl SkyClock {
         Some(Moment { place: self.place?, utc: utc.plus_secs(time.secs_since(arrival))? })
     }
 
-    /// The same, where the scenario does not take it.
-    pub fn unused(&self, time: Time) -> Option<Moment> {
-        self.ship(time).filter(|_| !self.from_ship)
+    /// Sun and moon when they were last computed.
+    pub const fn luminaries(&self) -> &Luminaries {
+        &self.luminaries
     }
 
-    /// Sun and moon at `time`.
-    pub fn at(&mut self, time: Time) -> Luminaries {
+    /// Computes sun and moon for `time`, where they have moved since.
+    pub fn follow(&mut self, time: Time) {
         let begun = *self.begun.get_or_insert(time);
-        if let Some((found, newest)) = self.newest
-            && (0.0..EVERY_S).contains(&time.secs_since(found))
-        {
-            return newest;
+        if self.computed.is_some_and(|computed| (0.0..EVERY_S).contains(&time.secs_since(computed))) {
+            return;
         }
-        let ship = self.ship(time).filter(|_| self.from_ship);
+        let Daylight { sun_direction, moment, from_ship, .. } = self.daylight;
+        let (used, unused) = if from_ship { (self.ship(time), None) } else { (None, self.ship(time)) };
         let given = || {
-            let Moment { place, utc } = self.moment?;
+            let Moment { place, utc } = moment?;
             Some(Moment { place, utc: utc.plus_secs(time.secs_since(begun))? })
         };
-        let moment = ship.or_else(given);
-        let newest = Luminaries {
-            sun: moment.and_then(Moment::sun).unwrap_or(self.given),
+        let moment = used.or_else(given);
+        self.computed = Some(time);
+        self.luminaries = Luminaries {
+            sun: moment.and_then(Moment::sun).unwrap_or(sun_direction),
             moon: moment.and_then(Moment::moon),
             moment,
-            from_ship: ship.is_some(),
+            from_ship: used.is_some(),
+            unused: unused.and_then(|ship| Some((ship, ship.sun()?))),
         };
-        self.newest = Some((time, newest));
-        newest
     }
 }
 
@@ -131,6 +142,11 @@ mod tests {
 
     fn daylight(moment: Option<Moment>, from_ship: bool) -> Daylight {
         Daylight { moment, from_ship, ..Daylight::fixed(DVec3::X, 20_000.0) }
+    }
+
+    fn at(clock: &mut SkyClock, time_ns: i64) -> Luminaries {
+        clock.follow(Time::from_ns(time_ns));
+        *clock.luminaries()
     }
 
     fn fix(second: i64, place: Option<(f64, f64)>, ms: Option<i64>) -> ShipFix {
@@ -148,16 +164,16 @@ mod tests {
     #[test]
     fn the_ships_place_and_time_come_once_both_are_told() {
         let mut clock = SkyClock::new(&daylight(None, true));
-        assert_eq!(clock.at(Time::from_ns(0)).sun, DVec3::X);
+        assert_eq!(at(&mut clock, 0).sun, DVec3::X);
         clock.fix(&fix(1, Some(GERMAN_BIGHT), None));
-        assert_eq!(clock.at(Time::from_ns(1_500_000_000)).sun, DVec3::X);
+        assert_eq!(at(&mut clock, 1_500_000_000).sun, DVec3::X);
         clock.fix(&fix(2, None, Some(NOON_MS)));
-        let seen = clock.at(Time::from_ns(2_500_000_000));
+        let seen = at(&mut clock, 2_500_000_000);
         // The sun is in the south and 90 - 54.1 + 22 degrees high, half an hour after its noon there.
         assert!(seen.from_ship && (seen.sun.z.asin().to_degrees() - 57.4).abs() < 0.5, "{seen:?}");
         assert!(seen.moon.is_some());
         // An hour on it has moved by 15 degrees of hour angle, though the feed fell silent.
-        let later = clock.at(Time::from_ns(3_602_000_000_000));
+        let later = at(&mut clock, 3_602_000_000_000);
         let turned = later.sun.angle_between(seen.sun).to_degrees();
         assert!((10.0..16.0).contains(&turned), "{turned}");
     }
@@ -166,9 +182,9 @@ mod tests {
     fn a_scenario_that_names_its_sun_keeps_it() {
         let mut clock = SkyClock::new(&daylight(None, false));
         clock.fix(&fix(1, Some(GERMAN_BIGHT), Some(NOON_MS)));
-        let seen = clock.at(Time::from_ns(1_500_000_000));
+        let seen = at(&mut clock, 1_500_000_000);
         assert_eq!((seen.sun, seen.moon, seen.from_ship), (DVec3::X, None, false));
-        assert!(clock.unused(Time::from_ns(1_500_000_000)).is_some());
+        assert!(seen.unused.is_some());
     }
 
     #[test]
@@ -176,9 +192,9 @@ mod tests {
         let place = Place::new(54.1, 7.9).expect("a place");
         let utc = Utc::from_ms(NOON_MS).expect("a time");
         let mut clock = SkyClock::new(&daylight(Some(Moment { place, utc }), false));
-        let first = clock.at(Time::from_ns(77_000_000_000));
+        let first = at(&mut clock, 77_000_000_000);
         assert_eq!(first.moment, Some(Moment { place, utc }));
-        let later = clock.at(Time::from_ns(137_000_000_000)).moment.expect("known");
+        let later = at(&mut clock, 137_000_000_000).moment.expect("known");
         assert_eq!(later.utc.ms() - NOON_MS, 60_000);
     }
 
@@ -188,7 +204,7 @@ mod tests {
         let with = |elevation_deg: f64, moon: Moon| {
             let (sin, cos) = elevation_deg.to_radians().sin_cos();
             let sun = DVec3::new(cos, 0.0, sin);
-            Luminaries { sun, moon: Some(moon), moment: None, from_ship: true }
+            Luminaries { moon: Some(moon), ..Luminaries::fixed(sun) }
         };
         assert!(with(-18.0, moon).moonlight().is_some() && with(-10.0, moon).moonlight().is_some());
         for elevation_deg in [-5.0, 0.0, 40.0] {

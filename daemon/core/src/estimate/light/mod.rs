@@ -1,7 +1,7 @@
 //! Light on the boats, taken from the picture itself so that they fit it.
 //!
-//! A few hundred pixels above the horizon are a part of some sky under the sun or, by night, the moon ([`SkyClock`]), at the camera's own exposure and white balance
-//! ([`SkyFamily`]): it supplies the rest of the dome, and the sun. This is an estimate for shading, not a photometric measurement.
+//! A few hundred pixels above the horizon are a part of some sky under the sun or, by night, the moon ([`SkyClock`]), at the camera's own
+//! exposure and white balance ([`SkyFamily`]): it supplies the rest of the dome, and the sun. This is an estimate for shading, not a photometric measurement.
 
 mod dome;
 mod luminary;
@@ -18,7 +18,6 @@ use glam::{DVec2, DVec3, Vec3};
 use crate::{
     colour::{LUMINANCE, srgb_to_linear},
     daylight::Daylight,
-    ephemeris::Moment,
     event::{Picture, ShipFix},
     geometry::{CameraPose, Lens},
     sea::{Facets, rms_slope},
@@ -111,10 +110,10 @@ struct FollowedSky {
 #[derive(Clone, Debug)]
 pub struct LightMeter {
     clock: SkyClock,
-    luminaries: Luminaries,
     family: SkyFamily,
-    /// The body that the family's skies have, and how many of them still have another.
+    /// Direction of the body that the family's skies are for.
     family_of: DVec3,
+    /// Skies of the family that are still for another.
     outdated: usize,
     sky: Option<FollowedSky>,
     /// Whether the sea's tones are wanted: only reflections by brightness need them.
@@ -129,7 +128,6 @@ impl LightMeter {
         let sun = daylight.sun_direction;
         Self {
             clock: SkyClock::new(daylight),
-            luminaries: Luminaries { sun, moon: None, moment: None, from_ship: false },
             family: SkyFamily::new(sun),
             family_of: sun,
             outdated: 0,
@@ -147,20 +145,15 @@ impl LightMeter {
 
     /// Sun and moon at the newest picture.
     pub const fn luminaries(&self) -> &Luminaries {
-        &self.luminaries
-    }
-
-    /// The ship's place and time at `time`, where she tells them and the scenario does not take them.
-    pub fn unused_moment(&self, time: Time) -> Option<Moment> {
-        self.clock.unused(time)
+        self.clock.luminaries()
     }
 
     /// Follows sun and moon, and the skies that they make: one of these a picture, each takes milliseconds.
     fn follow_luminaries(&mut self, time: Time) {
         /// Angle by which the family's body may be off, radians.
         const OFF: f64 = 0.25 * std::f64::consts::PI / 180.0;
-        self.luminaries = self.clock.at(time);
-        let brightest = self.luminaries.brightest();
+        self.clock.follow(time);
+        let brightest = self.luminaries().brightest();
         if self.family_of.angle_between(brightest) > OFF {
             self.family_of = brightest;
             self.outdated = self.family.count();
@@ -229,7 +222,7 @@ impl LightMeter {
         const BRIGHT: f32 = 0.2;
         const DARK: f32 = 0.01;
         let (_, means) = self.means?;
-        let (sky, sine) = (means.sky.dot(LUMINANCE), self.luminaries.sun.z);
+        let (sky, sine) = (means.sky.dot(LUMINANCE), self.luminaries().sun.z);
         Some(if sine < NIGHT_BELOW && sky > BRIGHT {
             SkyAgreement::BrightAtNight
         } else if sine > DAY_ABOVE && sky < DARK {
@@ -285,7 +278,7 @@ impl LightMeter {
         let (dome, sun) =
             self.sky.map_or_else(|| (SkyLobes::even(sky), Vec3::ZERO), |sky| (sky.dome, sky.sun));
         let level = dome.on_level().max(Vec3::ZERO) / std::f32::consts::PI;
-        Light { sun_direction: self.luminaries.brightest(), sun, sky: level, dome, horizon, sea }
+        Light { sun_direction: self.luminaries().brightest(), sun, sky: level, dome, horizon, sea }
     }
 }
 

@@ -1,25 +1,26 @@
-//! Where the sun stands: given outright, from place and time, or as the ship's instruments tell.
+//! The sun's direction: given outright, from place and time, or as the ship's instruments tell.
 
 use glam::DVec3;
 use toml::value::{Datetime, Offset};
 
 use super::keys::{LightKeys, angle};
 use crate::{
-    ephemeris::{Moment, Place, Utc, towards},
+    ephemeris::{Moment, Place, Utc},
+    geometry::towards,
     text::toml::{TomlError, TomlSection, date_and_time, number},
 };
 
 /// Sun where the text names none: high enough for plain light, to the south-west.
 const DEFAULT_DEG: (f64, f64) = (215.0, 35.0);
 
-/// Where the sun stands as the run begins.
+/// The sun as the run begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SunGiven {
     /// Unit vector towards it, world.
     pub(super) direction: DVec3,
     /// Place and time that it follows from.
     pub(super) moment: Option<Moment>,
-    /// Whether the text says anything of it.
+    /// The text says something of it.
     pub(super) named: bool,
 }
 

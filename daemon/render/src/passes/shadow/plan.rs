@@ -118,7 +118,7 @@ impl SunView {
 /// One frame's shadow map.
 #[derive(Default)]
 pub(crate) struct ShadowPlan {
-    /// Each boat of the scene in its place; none where the sun does not shine, or where the map is full.
+    /// Each boat of the scene in its place; none where the sun does not shine, or where no hull of it is in view.
     shades: Vec<Shade>,
     pub(crate) draws: Vec<ShadowDraw>,
     pub(super) clears: Vec<vk::ClearRect>,
@@ -158,7 +158,9 @@ impl ShadowPlan {
         let sun = scene.light.sun_direction;
         let mesh = |boat: &BoatView| model(boat.model).filter(|m| m.kind == ModelKind::Mesh);
         for boat in &scene.boats {
-            let view = mesh(boat).map(|model| SunView::of(sun, &boat.pose, model));
+            // In the sea's mirror nothing is shaded.
+            let drawn = mesh(boat).filter(|_| boat.hull.is_some());
+            let view = drawn.map(|model| SunView::of(sun, &boat.pose, model));
             let texels = view.map(|v| v.texels(view::pixel_m(scene, boat)));
             self.views.push(view);
             let nothing = PixelRect { x: 0, y: 0, width: 1, height: 1 };
