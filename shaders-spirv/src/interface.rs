@@ -77,6 +77,24 @@ block! {
 }
 
 block! {
+    /// A point of light on an image: `LightBlock`, push constants.
+    pub struct LightBlock {
+        /// The pixels of the screen that it can reach.
+        pub rect: [f32; 4],
+        /// Its place, the image's own pixels.
+        pub at: [f32; 2],
+        /// Near plane over its distance.
+        pub depth: f32,
+        /// 1 / (2 sigma^2) of its core, per squared pixel of the image.
+        pub sharp: f32,
+        /// Linear light in the middle of the core; the last is unused.
+        pub core: [f32; 4],
+        /// That of the glow about it; the last is 1 / its squared radius, per squared pixel.
+        pub glow: [f32; 4],
+    }
+}
+
+block! {
     /// A boat drawn as the sun sees it: `ShadowBlock`, push constants.
     pub struct ShadowBlock {
         /// Rows of the matrix from its space to clip space, on the place of the boat that it may shade.

@@ -92,6 +92,12 @@ shaders! {
     ROUND_FRAG = "round.frag";
     /// The same where a hull may stand before it: compares depth.
     ROUND_HIDDEN_FRAG = "round_hidden.frag";
+    /// The rectangle that a point of light can reach.
+    LIGHT_VERT = "light.vert";
+    /// A point of light.
+    LIGHT_FRAG = "light.frag";
+    /// The same where a hull may stand before it: compares depth.
+    LIGHT_HIDDEN_FRAG = "light_hidden.frag";
     /// A rectangle of the head-up display.
     HUD_VERT = "hud.vert";
     /// What fills a rectangle of the head-up display. Constant: 0 plates, shapes or glyphs.

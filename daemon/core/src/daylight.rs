@@ -20,6 +20,11 @@ pub struct Daylight {
 }
 
 impl Daylight {
+    /// Tests whether the sun is up and stays where it is.
+    pub fn stays_up(&self) -> bool {
+        self.sun_direction.z > 0.0 && self.moment.is_none() && !self.from_ship
+    }
+
     /// A clear sky whose sun stays towards unit `sun_direction`, world.
     pub const fn fixed(sun_direction: DVec3, visibility_m: f64) -> Self {
         Self { sun_direction, moment: None, from_ship: false, sun_strength: 1.0, visibility_m }

@@ -29,7 +29,7 @@ use crate::{
     world::{BoreAim, World, exercise::ExerciseEvent, score::ShotRecord},
 };
 
-pub use crate::frame::ROUNDS_SEEN_MAX;
+pub use crate::frame::{LIGHTS_A_BOAT, ROUNDS_SEEN_MAX};
 pub use answer::{TickAnswer, View};
 pub use digest::{Digest, SessionDigest};
 pub use notes::Note;

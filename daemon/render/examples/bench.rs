@@ -211,6 +211,7 @@ impl Running {
             frames_in_flight: 3,
             needs: Needs {
                 boats_max: scene.boats.len(),
+                lights_max: scene.lights.len(),
                 rounds_max: scene.rounds.len(),
                 wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
                 waters: water.into_iter().collect(),

@@ -84,6 +84,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         frames_in_flight: 2,
         needs: Needs {
             boats_max: 8,
+            lights_max: 0,
             rounds_max: 8,
             wakes_max: 8,
             waters: vec![(method, scene.water.shadow)],

@@ -3,7 +3,7 @@
 use bowwave_core::{
     frame::{plan::ScenePlan, scene::Pass},
     geometry::Optics,
-    session::ROUNDS_SEEN_MAX,
+    session::{LIGHTS_A_BOAT, ROUNDS_SEEN_MAX},
     water::{ReflectionMethod, ShadowLevel},
 };
 use shaders_spirv::interface::WATERS_MAX;
@@ -17,6 +17,8 @@ pub struct Needs {
     pub boats_max: usize,
     /// Most tracers, splashes and strikes in one frame.
     pub rounds_max: usize,
+    /// Most navigation lights in one frame.
+    pub lights_max: usize,
     /// Most boats in one frame that leave a wake.
     pub wakes_max: usize,
     /// How the sea may have to mirror.
@@ -73,6 +75,7 @@ impl RenderConfig {
             needs: Needs {
                 boats_max: only(Pass::Boats, plan.boats),
                 wakes_max: only(Pass::Wake, plan.moving),
+                lights_max: only(Pass::Lights, LIGHTS_A_BOAT * plan.boats),
                 rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
                 waters,
                 optics: plan.optics,

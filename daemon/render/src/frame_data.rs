@@ -37,6 +37,8 @@ pub(crate) struct Capacity {
     pub(crate) rounds: usize,
     /// Boats whose light waves throw back.
     pub(crate) lobes: usize,
+    /// Navigation lights.
+    pub(crate) lights: usize,
     /// Boats that leave a wake.
     pub(crate) wakes: usize,
 }

@@ -196,6 +196,17 @@ pub(crate) enum Blend {
     Over,
 }
 
+/// What a pipeline does with reverse-Z depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DepthUse {
+    /// There is none.
+    None,
+    /// What is nearer hides what is drawn.
+    Test,
+    /// And what is drawn hides what is farther.
+    Write,
+}
+
 /// What tells one pipeline from another.
 pub(crate) struct PipelineShape<'a> {
     pub(crate) vertex: Shader,
@@ -217,8 +228,7 @@ pub(crate) struct PipelineShape<'a> {
     pub(crate) blend: Blend,
     /// Leaves out back faces, front ones being seen this way round.
     pub(crate) cull: Option<vk::FrontFace>,
-    /// Test and write reverse-Z depth.
-    pub(crate) depth: bool,
+    pub(crate) depth: DepthUse,
     pub(crate) samples: vk::SampleCountFlags,
 }
 
@@ -238,7 +248,7 @@ impl<'a> PipelineShape<'a> {
             targets: 0,
             blend: Blend::Replace,
             cull: None,
-            depth: true,
+            depth: DepthUse::Write,
             samples: vk::SampleCountFlags::TYPE_1,
         }
     }
@@ -258,7 +268,7 @@ impl<'a> PipelineShape<'a> {
             targets: 1,
             blend: Blend::Over,
             cull: None,
-            depth: false,
+            depth: DepthUse::None,
             samples: vk::SampleCountFlags::TYPE_1,
         }
     }
@@ -344,8 +354,8 @@ impl Pipeline {
         }
         let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(shape.samples);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(shape.depth)
-            .depth_write_enable(shape.depth)
+            .depth_test_enable(shape.depth != DepthUse::None)
+            .depth_write_enable(shape.depth == DepthUse::Write)
             .depth_compare_op(vk::CompareOp::GREATER);
         let targets = shape.targets.min(TARGETS_MAX);
         let blends = [blend_state(shape.blend); TARGETS_MAX];
@@ -356,7 +366,7 @@ impl Pipeline {
         let formats = [shape.colour; TARGETS_MAX];
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats[..targets]);
-        if shape.depth {
+        if shape.depth != DepthUse::None {
             rendering = rendering.depth_attachment_format(DEPTH);
         }
         let info = vk::GraphicsPipelineCreateInfo::default()

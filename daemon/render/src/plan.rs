@@ -9,7 +9,7 @@ use bowwave_core::{
 };
 use glam::DVec2;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, LobeBlock, MethodBytes, PHYSICS_WAVES, ReflectBlock, RoundBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, LightBlock, LobeBlock, MethodBytes, PHYSICS_WAVES, ReflectBlock, RoundBlock,
     TRACK_POINTS, WATERS_MAX, WakeBlock, WaterBlock,
 };
 
@@ -18,12 +18,17 @@ use crate::{
     frame_data::RECTS_MAX,
     passes::{
         atlas::{self, Placed},
+        behind_hulls::pieces,
         boats::{
             BoatDraw,
             coverage::{Boxes, Cells},
         },
         hud::layout::KINDS,
-        rounds::{RoundDraw, pieces, plan::round_block},
+        lights::{
+            LightDraw,
+            plan::{Mirror, light_block, mirrored_block},
+        },
+        rounds::{RoundDraw, plan::round_block},
         shadow::plan::ShadowPlan,
         wake::{
             WakeDraw,
@@ -109,6 +114,9 @@ pub(crate) struct Plan {
     pub(crate) reflects: Vec<ReflectDraw>,
     pub(crate) wake_blocks: Vec<WakeBlock>,
     pub(crate) wakes: Vec<WakeDraw>,
+    pub(crate) lights: Vec<LightDraw>,
+    /// Mirrored ones, each with the number of its boat in `mirrors`.
+    pub(crate) mirror_lights: Vec<(usize, LightBlock)>,
     pub(crate) rounds: Vec<RoundDraw>,
     /// Pixels that hulls can cover, each once.
     pub(crate) hulls: Vec<PixelRect>,
@@ -143,9 +151,9 @@ pub(crate) struct Plan {
 
 impl Plan {
     pub(crate) fn with_capacity(capacity: Capacity, size: (u32, u32)) -> Self {
-        let Capacity { boats, rounds, lobes, wakes } = capacity;
+        let Capacity { boats, lights, rounds, lobes, wakes } = capacity;
         let touched =
-            2 * HULL_RECTS_MAX + RECTS_MAX + lobes * WATER_RECTS_MAX + rounds + wakes * TRACK_POINTS;
+            2 * HULL_RECTS_MAX + RECTS_MAX + lobes * WATER_RECTS_MAX + lights + rounds + wakes * TRACK_POINTS;
         // With the display's plates.
         let rects = BLENDS_MAX + 16;
         Self {
@@ -166,6 +174,8 @@ impl Plan {
             waves: (lobes > 0).then(Waves::new),
             wake_blocks: Vec::with_capacity(wakes),
             wakes: Vec::with_capacity(wakes),
+            lights: Vec::with_capacity(lights * 4),
+            mirror_lights: Vec::with_capacity(lights),
             rounds: Vec::with_capacity(rounds * 4),
             hulls: Vec::with_capacity(HULL_RECTS_MAX),
             clears: Vec::with_capacity(HULL_RECTS_MAX),
@@ -203,6 +213,9 @@ impl Plan {
         if scene.runs(Pass::Wake) {
             self.plan_wakes(scene);
         }
+        if scene.runs(Pass::Lights) {
+            self.plan_lights(scene);
+        }
         if scene.runs(Pass::Rounds) {
             self.plan_rounds(scene);
         }
@@ -228,6 +241,8 @@ impl Plan {
         self.physics = None;
         self.wake_blocks.clear();
         self.wakes.clear();
+        self.lights.clear();
+        self.mirror_lights.clear();
         self.rounds.clear();
         self.hulls.clear();
         self.clears.clear();
@@ -362,6 +377,14 @@ impl Plan {
                 let detail_m = view::detail_m(scene, boat) * coarser;
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
                 self.boat_blocks.push(view::boat_block(scene, boat, &pose, &Shade::NONE, true));
+                if scene.runs(Pass::Lights) {
+                    let number = self.mirror_places.len();
+                    let top_m = boat.pose.position.z + f64::from(model.max.z) - boat.water_level;
+                    let mirror = Mirror { water_level: boat.water_level, top_m, placed: &placed };
+                    let own = scene.lights.iter().filter(|light| light.boat == boat.boat);
+                    let blocks = own.filter_map(|light| mirrored_block(scene, light, &mirror));
+                    self.mirror_lights.extend(blocks.map(|block| (number, block)));
+                }
                 self.mirror_places.push(placed);
             }
         }
@@ -415,6 +438,17 @@ impl Plan {
         }
     }
 
+    fn plan_lights(&mut self, scene: &Scene) {
+        for light in &scene.lights {
+            let Some((block, rect)) = light_block(scene, light) else { continue };
+            self.touched.push(rect);
+            let lights = &mut self.lights;
+            pieces(rect, &self.hulls, &mut self.rest, |rect, hidden| {
+                lights.push(LightDraw { block: LightBlock { rect: corners(rect), ..block }, rect, hidden });
+            });
+        }
+    }
+
     fn plan_rounds(&mut self, scene: &Scene) {
         for (i, round) in scene.rounds.iter().enumerate() {
             // The golden ratio's multiples spread evenly: neighbours never look alike.
@@ -423,7 +457,10 @@ impl Plan {
             let index = self.round_blocks.len() as u32;
             self.round_blocks.push(block);
             self.touched.push(rect);
-            pieces(index, rect, &self.hulls, &mut self.rest, &mut self.rounds);
+            let rounds = &mut self.rounds;
+            pieces(rect, &self.hulls, &mut self.rest, |rect, hidden| {
+                rounds.push(RoundDraw { index, rect, hidden });
+            });
         }
     }
 }

@@ -20,6 +20,7 @@ use crate::{
         PassContext,
         boats::{BoatsPass, meshes::Meshes},
         hud::HudPass,
+        lights::LightsPass,
         mirror::MirrorPass,
         rounds::RoundsPass,
         shadow::ShadowPass,
@@ -96,6 +97,7 @@ struct Passes {
     reflect: Option<ReflectPass>,
     wake: Option<WakePass>,
     boats: Option<BoatsPass>,
+    lights: Option<LightsPass>,
     rounds: Option<RoundsPass>,
     hud: HudPass,
 }
@@ -111,7 +113,7 @@ impl Passes {
         let reflects = needs.waters.iter().any(|(method, _)| *method != ReflectionMethod::Off);
         let softens = needs.waters.iter().any(|(method, _)| *method == ReflectionMethod::Full);
         let mirror = (any_boat && reflects)
-            .then(|| MirrorPass::new(context, &meshes, textured, softens))
+            .then(|| MirrorPass::new(context, &meshes, textured, [softens, needs.lights_max > 0]))
             .transpose()?;
         let water = (any_boat && !needs.waters.is_empty())
             .then(|| WaterPass::new(context, mirror.as_ref(), &needs.waters))
@@ -125,10 +127,11 @@ impl Passes {
         let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
         let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
         let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
+        let lights = (needs.lights_max > 0).then(|| LightsPass::new(context, boats.as_ref())).transpose()?;
         let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(context, boats.as_ref())).transpose()?;
         let hud = HudPass::new(context)?;
         let video = VideoPass::new(context, config.picture, &hud.overlay.layout)?;
-        Ok(Self { video, meshes, shadow, mirror, water, reflect, wake, boats, rounds, hud })
+        Ok(Self { video, meshes, shadow, mirror, water, reflect, wake, boats, lights, rounds, hud })
     }
 }
 
@@ -170,6 +173,7 @@ impl<T> Renderer<T> {
         let needs = config.needs.clone();
         let capacity = Capacity {
             boats: needs.boats_max,
+            lights: needs.lights_max,
             rounds: needs.rounds_max,
             lobes: needs.lobes(),
             wakes: needs.wakes_max,
@@ -282,6 +286,9 @@ impl<T> Renderer<T> {
         }
         if scene.rounds.len() > self.needs.rounds_max {
             return missing("more tracers and splashes");
+        }
+        if scene.lights.len() > self.needs.lights_max {
+            return missing("more navigation lights");
         }
         if scene.runs(Pass::Wake)
             && scene.boats.iter().filter(|b| b.wake.is_some()).count() > self.needs.wakes_max
@@ -407,6 +414,7 @@ impl<T> Renderer<T> {
         if let Some(pass) = mirror {
             stamps
                 .around(Span::Mirror, || pass.record(to, frame, meshes, &plan.mirrors, &plan.mirror_places));
+            pass.record_lights(to, frame, &plan.mirror_lights, &plan.mirror_places);
         }
         let mut steps = Steps::default();
         steps.add(shadow.map(ShadowPass::between));
@@ -487,6 +495,9 @@ impl<T> Renderer<T> {
         }
         if let Some(pass) = self.passes.wake.as_ref().filter(|_| plan.wakes.iter().any(|w| w.spray)) {
             stamps.around(Span::Spray, || pass.record_spray(to, frame, &plan.wakes));
+        }
+        if let Some(pass) = self.passes.lights.as_ref().filter(|_| !plan.lights.is_empty()) {
+            stamps.around(Span::Lights, || pass.record(to, frame, &plan.lights));
         }
         if let Some(pass) = self.passes.rounds.as_ref().filter(|_| !plan.rounds.is_empty()) {
             stamps.around(Span::Rounds, || pass.record(to, frame, &plan.rounds));

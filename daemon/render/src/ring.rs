@@ -69,12 +69,13 @@ pub(crate) enum Span {
     Wake,
     Composite,
     Spray,
+    Lights,
     Rounds,
     Hud,
 }
 
 impl Span {
-    const ALL: [Self; 15] = [
+    const ALL: [Self; 16] = [
         Self::Video,
         Self::Download,
         Self::Shadow,
@@ -88,6 +89,7 @@ impl Span {
         Self::Wake,
         Self::Composite,
         Self::Spray,
+        Self::Lights,
         Self::Rounds,
         Self::Hud,
     ];
@@ -101,6 +103,7 @@ impl Span {
             Self::Backdrop | Self::Field | Self::Layers | Self::Water => Pass::Water,
             Self::Wake | Self::Spray => Pass::Wake,
             Self::BoatLayer | Self::Composite => Pass::Boats,
+            Self::Lights => Pass::Lights,
             Self::Rounds => Pass::Rounds,
             Self::Hud => Pass::Hud,
         }

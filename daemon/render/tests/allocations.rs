@@ -16,7 +16,7 @@ use std::{
 };
 
 use bowwave_core::{
-    frame::scene::{Pass, PassDecision, RoundView},
+    frame::scene::{LightView, Pass, PassDecision, RoundView},
     water::ReflectionMethod,
 };
 use bowwave_render::DrawRequest;
@@ -72,7 +72,10 @@ fn check(method: ReflectionMethod) {
         RoundView::Splash { at, height_m: 4.0, radius_m: 0.9, opacity: 1.0 },
         RoundView::Tracer { from: DVec3::new(1.0, 8.0, 7.5), to: at, radiance: Vec3::splat(4.0) },
     ];
-    scene.passes[Pass::Rounds as usize] = PassDecision::Run;
+    scene.lights = vec![LightView { boat: 0, at: at + DVec3::Z, light: Vec3::splat(1e-4) }];
+    for pass in [Pass::Lights, Pass::Rounds] {
+        scene.passes[pass as usize] = PassDecision::Run;
+    }
     // The validation layer allocates for itself, in this thread.
     let config = bowwave_render::RenderConfig { validation: false, ..config(&scene) };
     let (mut renderer, mut completions) = open(&config, &models);

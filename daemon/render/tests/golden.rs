@@ -11,12 +11,14 @@ mod common;
 use std::{path::PathBuf, sync::Arc};
 
 use bowwave_core::{
+    event::{Picture, PixelFormat},
     fault::Fault,
-    frame::scene::{Pass, PassDecision, RoundView, Scene, Status},
+    frame::scene::{LightView, Pass, PassDecision, RoundView, Scene, Status},
     geometry::{Distortion, look},
     guide::{Cell, Coverage, Gauge, Guide, Rating},
     model::{Model, ModelKind, Texture, Zone},
     sea::BeaufortForce,
+    sky::SkyLobes,
     water::{ReflectionMethod, ShadowLevel},
 };
 use common::{
@@ -52,8 +54,12 @@ fn boats(method: ReflectionMethod, shadow: ShadowLevel, force: u8) -> Scene {
 }
 
 fn check(name: &str, scene: &Scene, models: &[Model]) {
+    check_on(name, scene, &sea(scene.lens.width, scene.lens.height), models);
+}
+
+fn check_on(name: &str, scene: &Scene, picture: &Picture, models: &[Model]) {
     let size = (scene.lens.width, scene.lens.height);
-    let pixels = draw(scene, &sea(size.0, size.1), models);
+    let pixels = draw(scene, picture, models);
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(format!("{name}.png"));
     if std::env::var_os("BOWWAVE_BLESS").is_some() {
         image::save_buffer(&path, &pixels, size.0, size.1, image::ExtendedColorType::Rgba8).unwrap();
@@ -252,6 +258,39 @@ fn tracer_splash_and_strike_before_and_behind_a_hull() {
     ];
     scene.passes[Pass::Rounds as usize] = PassDecision::Run;
     check("rounds", &scene, &models());
+}
+
+/// The sea by night.
+fn dark_sea() -> Picture {
+    let bytes: Vec<u8> = sea(SIZE.0, SIZE.1).bytes().iter().map(|code| code / 8).collect();
+    Picture::new(PixelFormat::Rgb, SIZE.0, SIZE.1, Arc::from(bytes)).unwrap()
+}
+
+/// By night: a masthead light and a sidelight, one that the hull hides, and the light of a boat that mirrors it by waves.
+#[test]
+fn lights_before_and_behind_a_hull_and_in_the_sea() {
+    for (name, method) in [("lights", ReflectionMethod::Baked), ("lights_full", ReflectionMethod::Full)] {
+        let mut scene = boats(method, ShadowLevel::None, 1);
+        for light in
+            [&mut scene.light.sun, &mut scene.light.sky, &mut scene.light.horizon, &mut scene.light.sea]
+        {
+            *light *= 0.02;
+        }
+        scene.light.dome = SkyLobes::even(scene.light.sky);
+        let pose = scene.boats[0].pose;
+        let light = |boat, place: DVec3, colour: Vec3| LightView {
+            boat,
+            at: pose.to_world(place),
+            light: colour * 3e-4,
+        };
+        scene.lights = vec![
+            light(0, DVec3::new(0.0, 0.0, 1.8), Vec3::new(1.35, 0.95, 0.45)),
+            light(0, DVec3::new(2.0, -1.4, 1.5), Vec3::new(0.0, 1.32, 0.78)),
+            light(0, DVec3::new(2.0, 1.4, 1.0), Vec3::new(4.7, 0.0, 0.0)),
+        ];
+        scene.passes[Pass::Lights as usize] = PassDecision::Run;
+        check_on(name, &scene, &dark_sea(), &models());
+    }
 }
 
 #[test]

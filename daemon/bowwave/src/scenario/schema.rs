@@ -7,7 +7,12 @@ use bowwave_core::{
     act::Act,
     side::Side,
     water::ReflectionMethod,
-    world::{boats::Propulsor, exercise::Engagement, gunnery::DragTable, scenario::built_in_weapons},
+    world::{
+        boats::{LightsKept, Propulsor},
+        exercise::Engagement,
+        gunnery::DragTable,
+        scenario::built_in_weapons,
+    },
 };
 use serde_json::{Map, Value, json};
 
@@ -376,6 +381,13 @@ fn boat() -> Value {
             ("engine", one_of(Propulsor::ALL.map(Propulsor::name), "How it is driven, with a crew")),
             ("speed_max_kn", number(1.0, 60.0, "Greatest speed in calm water, with a crew")),
             ("keeps_rules", flag("Whether it keeps to the rules of the road, with a crew")),
+            (
+                "lights",
+                one_of(
+                    LightsKept::NAMES.map(|(name, _)| name),
+                    "Its lights by night: of what it does (rules, where it is neutral), off (else), or always the same",
+                ),
+            ),
             ("count", whole(1, 40, "Boats of the group")),
             ("axes_deg", axes()),
             ("on_target_s", number(1.0, 86_400.0, "When they are to be where they attack from")),

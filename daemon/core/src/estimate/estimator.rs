@@ -67,6 +67,8 @@ pub struct SceneLight {
     pub sky: SkyLight,
     /// How bright the sea is in the picture.
     pub tones: SeaTones,
+    /// Luminance that the camera shows as white, cd/m^2.
+    pub white_cd_m2: f64,
 }
 
 /// All that is estimated from devices' reports.
@@ -202,7 +204,8 @@ impl Estimator {
     pub fn light(&self) -> SceneLight {
         let (wind, _) = self.wind();
         let (boats, tones) = (self.light.light(), self.light.tones());
-        SceneLight { boats, sky: self.light.sky(wind.length()), tones }
+        let white_cd_m2 = self.light.white_cd_m2();
+        SceneLight { boats, sky: self.light.sky(wind.length()), tones, white_cd_m2 }
     }
 
     /// Sun and moon at the newest picture.

@@ -6,9 +6,10 @@ use glam::{DQuat, DVec3, Vec3};
 
 use super::{
     boats::{boats_in_view, nearest_m},
+    lights::lights_in_view,
     plan::{InView, SceneNeeds, ScenePlan, sea_reflects},
     rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
-    scene::{BoatView, Hud, Pass, RoundView, Scene, Status},
+    scene::{BoatView, Hud, LightView, Pass, RoundView, Scene, Status},
     view::ViewFrustum,
     wake::Wake,
 };
@@ -110,6 +111,7 @@ impl Composer {
             passes: plan.frame(&InView::default()),
             boats: Vec::with_capacity(scenario.boats.len()),
             rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
+            lights: Vec::new(),
             light: light.boats,
             water: scenario.water,
             wind: scenario.wind.truncate(),
@@ -178,6 +180,7 @@ impl Composer {
     fn compose_black(&mut self, moment: &FrameMoment) {
         let scene = &mut self.scene;
         scene.boats.clear();
+        scene.lights.clear();
         scene.rounds.clear();
         scene.passes = self.plan.frame(&InView::default());
         scene.hud.status = status(moment, None);
@@ -195,7 +198,9 @@ impl Composer {
         let scene = &mut self.scene;
         (scene.wind, scene.water.force) = estimator.wind();
         scene.boats.clear();
+        scene.lights.clear();
         scene.rounds.clear();
+        let light = estimator.light();
         if let (Some(camera), Some(running)) = (&camera, world.running()) {
             scene.camera = *camera;
             scene.lens = estimator.lens_at(time).covering(self.plan.size.0, self.plan.size.1);
@@ -218,14 +223,18 @@ impl Composer {
                 ..frustum
             };
             boats_in_view(&running.fleet, &frustum, time, running.start, &mut scene.boats);
+            if self.plan.has(Pass::Lights) && estimator.luminaries().is_between_sunset_and_sunrise() {
+                let moment = (time, light.white_cd_m2);
+                lights_in_view(&running.fleet, &frustum, moment, &scene.boats, &mut scene.lights);
+            }
             rounds_in_view(running, &frustum, time, &mut scene.rounds);
         }
-        let light = estimator.light();
         (scene.light, scene.sky, scene.tones) = (light.boats, light.sky, light.tones);
         scene.passes = self.plan.frame(&InView {
             pose_known: camera.is_some(),
             sun_shines: scene.light.sun_shines(),
             boats: &scene.boats,
+            lights: &scene.lights,
             rounds: &scene.rounds,
         });
         let result = world.last_result().filter(|result| time.secs_since(result.time) < RESULT_S);
@@ -275,8 +284,16 @@ impl Composer {
         } else {
             Vec::new()
         };
-        let in_view = InView { pose_known: true, sun_shines: true, boats: &boats, rounds: &rounds };
-        Scene { camera, passes: self.plan.frame(&in_view), boats, rounds, ..self.scene.clone() }
+        let on = |view: &BoatView| LightView {
+            boat: view.boat,
+            at: view.pose.position + DVec3::Z,
+            light: Vec3::splat(1e-6),
+        };
+        let lights: Vec<_> =
+            if self.plan.has(Pass::Lights) { boats.iter().map(on).collect() } else { Vec::new() };
+        let in_view =
+            InView { pose_known: true, sun_shines: true, boats: &boats, lights: &lights, rounds: &rounds };
+        Scene { camera, passes: self.plan.frame(&in_view), boats, lights, rounds, ..self.scene.clone() }
     }
 
     /// A boat broadside before the camera, under way if it is one of as many as move.

@@ -2,6 +2,7 @@
 
 mod boats;
 mod composer;
+mod lights;
 pub mod plan;
 pub mod reflection;
 mod rounds;
@@ -10,4 +11,5 @@ pub mod view;
 pub mod wake;
 
 pub use composer::{Composer, ComposerSettings, FrameMoment, WaterDrawn};
+pub use lights::LIGHTS_A_BOAT;
 pub use rounds::ROUNDS_SEEN_MAX;

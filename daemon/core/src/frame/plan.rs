@@ -2,11 +2,11 @@
 
 use crate::{
     event::PixelFormat,
-    frame::scene::{BoatView, LeftOut, Pass, PassDecision, RoundView},
+    frame::scene::{BoatView, LeftOut, LightView, Pass, PassDecision, RoundView},
     geometry::Optics,
     sea::BeaufortForce,
     water::{ReflectionMethod, ShadowLevel, Water},
-    world::scenario::Scenario,
+    world::{boats::LightsKept, scenario::Scenario},
 };
 
 /// Above this wind force no reflection of a boat is seen (Nelson 2009, III.D.1.c), so none is drawn.
@@ -57,6 +57,10 @@ pub struct SceneNeeds {
     pub moving: usize,
     /// Rounds in the belt.
     pub belt: u32,
+    /// Whether any boat shows lights by night.
+    pub lights: bool,
+    /// The sun is up, and neither moves nor comes from the ship.
+    pub sun_stays_up: bool,
 }
 
 /// A frame's view, as it decides on the passes.
@@ -68,6 +72,8 @@ pub struct InView<'a> {
     pub sun_shines: bool,
     /// Boats that are seen, or mirrored.
     pub boats: &'a [BoatView],
+    /// Navigation lights that are seen.
+    pub lights: &'a [LightView],
     /// Tracers, splashes and strikes that are seen.
     pub rounds: &'a [RoundView],
 }
@@ -89,6 +95,8 @@ impl SceneNeeds {
             boats: scenario.boats.len(),
             moving: scenario.boats.iter().filter(|b| b.behaviour.speed_max_m_s() > 0.0).count(),
             belt: scenario.weapon.belt,
+            lights: scenario.boats.iter().any(|b| b.lights != LightsKept::None),
+            sun_stays_up: scenario.daylight.stays_up(),
         }
     }
 }
@@ -116,6 +124,11 @@ impl ScenePlan {
             PassDecision::Run if needs.moving == 0 => PassDecision::LeftOut(LeftOut::NoBoatMoves),
             other => other,
         };
+        let lights = match boats {
+            PassDecision::Run if !needs.lights => PassDecision::LeftOut(LeftOut::NoLights),
+            PassDecision::Run if needs.sun_stays_up => PassDecision::LeftOut(LeftOut::Daylight),
+            other => other,
+        };
         let rounds =
             if needs.belt == 0 { PassDecision::LeftOut(LeftOut::NoRounds) } else { PassDecision::Run };
         let mut passes = [PassDecision::Run; Pass::COUNT];
@@ -124,6 +137,7 @@ impl ScenePlan {
         passes[Pass::Water as usize] = water;
         passes[Pass::Wake as usize] = wake;
         passes[Pass::Boats as usize] = boats;
+        passes[Pass::Lights as usize] = lights;
         passes[Pass::Rounds as usize] = rounds;
         Self {
             size: needs.size,
@@ -144,7 +158,7 @@ impl ScenePlan {
 
     /// The passes of one frame: what the plan allows and what is in view asks for.
     pub fn frame(&self, in_view: &InView<'_>) -> [PassDecision; Pass::COUNT] {
-        let InView { pose_known, sun_shines, boats, rounds } = *in_view;
+        let InView { pose_known, sun_shines, boats, lights, rounds } = *in_view;
         let mut passes = self.passes;
         let mut leave_out = |pass: Pass, unless: bool, why: LeftOut| {
             let decision = &mut passes[pass as usize];
@@ -152,7 +166,7 @@ impl ScenePlan {
                 *decision = PassDecision::LeftOut(why);
             }
         };
-        for pass in [Pass::Shadow, Pass::Mirror, Pass::Water, Pass::Wake, Pass::Boats, Pass::Rounds] {
+        for pass in Pass::ALL.into_iter().filter(|pass| !matches!(pass, Pass::Video | Pass::Hud)) {
             leave_out(pass, pose_known, LeftOut::NoPose);
         }
         let reflected = boats.iter().any(|b| b.reflection.is_some());
@@ -162,6 +176,7 @@ impl ScenePlan {
         leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Wake, boats.iter().any(|b| b.wake.is_some()), LeftOut::NoWakeInView);
         leave_out(Pass::Boats, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
+        leave_out(Pass::Lights, !lights.is_empty(), LeftOut::NoLightInView);
         leave_out(Pass::Rounds, !rounds.is_empty(), LeftOut::NoRoundInView);
         passes
     }
@@ -185,6 +200,8 @@ mod tests {
             boats: 3,
             moving: 2,
             belt: 100,
+            lights: true,
+            sun_stays_up: false,
         }
     }
 
@@ -215,6 +232,11 @@ mod tests {
         );
         assert_eq!(reason(SceneNeeds { moving: 0, ..needs() }, Pass::Wake), Some(LeftOut::NoBoatMoves));
         assert_eq!(reason(empty, Pass::Wake), Some(LeftOut::NoBoats));
+        assert_eq!(reason(SceneNeeds { lights: false, ..needs() }, Pass::Lights), Some(LeftOut::NoLights));
+        assert_eq!(
+            reason(SceneNeeds { sun_stays_up: true, ..needs() }, Pass::Lights),
+            Some(LeftOut::Daylight)
+        );
         assert_eq!(reason(SceneNeeds { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
     }
 

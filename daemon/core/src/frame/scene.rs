@@ -37,6 +37,8 @@ pub struct Scene {
     pub boats: Vec<BoatView>,
     /// Tracers and splashes in view, farthest first.
     pub rounds: Vec<RoundView>,
+    /// Boats' navigation lights that can be seen.
+    pub lights: Vec<LightView>,
     /// Light on the boats.
     pub light: Light,
     /// How the sea mirrors.
@@ -75,6 +77,8 @@ pub enum Pass {
     Wake,
     /// The boats.
     Boats,
+    /// Boats' navigation lights.
+    Lights,
     /// Tracers and splashes.
     Rounds,
     /// Text and state.
@@ -83,7 +87,7 @@ pub enum Pass {
 
 impl Pass {
     /// How many there are.
-    pub const COUNT: usize = 8;
+    pub const COUNT: usize = 9;
     /// All of them, in order.
     pub const ALL: [Self; Self::COUNT] = [
         Self::Video,
@@ -92,6 +96,7 @@ impl Pass {
         Self::Water,
         Self::Wake,
         Self::Boats,
+        Self::Lights,
         Self::Rounds,
         Self::Hud,
     ];
@@ -105,6 +110,7 @@ impl Pass {
             Self::Water => "water",
             Self::Wake => "wake",
             Self::Boats => "boats",
+            Self::Lights => "lights",
             Self::Rounds => "rounds",
             Self::Hud => "hud",
         }
@@ -143,6 +149,12 @@ pub enum LeftOut {
     NoRoundInView,
     /// The weapon has no rounds.
     NoRounds,
+    /// No boat of the scenario shows lights.
+    NoLights,
+    /// The sun is up, and stays where it is.
+    Daylight,
+    /// No light is within the picture, or the sun is up.
+    NoLightInView,
     /// The sun does not shine: it is down, or clouds hide it.
     NoSun,
     /// No usable orientation: boats cannot be placed.
@@ -165,6 +177,9 @@ impl LeftOut {
             Self::NoWakeInView => "no_wake_in_view",
             Self::NoRoundInView => "no_round_in_view",
             Self::NoRounds => "no_rounds",
+            Self::NoLights => "no_lights",
+            Self::Daylight => "daylight",
+            Self::NoLightInView => "no_light_in_view",
             Self::NoSun => "no_sun",
             Self::NoPose => "no_pose",
             Self::NoTrainee => "no_trainee",
@@ -211,6 +226,18 @@ pub struct BoatView {
     pub haze: f32,
     /// Beyond the sea horizon: hide what lies below the line of sight over it.
     pub beyond_horizon: bool,
+}
+
+/// A navigation light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightView {
+    /// Index of its boat in the scenario.
+    pub boat: usize,
+    /// Its place, world, curvature of the sea already taken off its height.
+    pub at: DVec3,
+    /// Its illuminance at the camera over the luminance that the camera shows as white, by colour, sr: what it adds to all pixels together
+    /// times the solid angle of one.
+    pub light: Vec3,
 }
 
 /// A tracer or a splash.

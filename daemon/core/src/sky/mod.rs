@@ -13,4 +13,4 @@ mod scatter;
 pub use air::sunlight;
 pub use clear::ClearSky;
 pub use lobes::{LOBES, SkyLobes};
-pub use model::{NIGHT, SkyModel, overcast, overcast_zenith};
+pub use model::{NIGHT, SUN_LUX, SkyModel, overcast, overcast_zenith};

@@ -2,6 +2,9 @@
 
 use glam::{DVec3, Vec3};
 
+/// Illuminance of a surface that faces the sun above the air, lux (Seidelmann 1992): what relative radiances are to be multiplied with for cd/m^2.
+pub const SUN_LUX: f64 = 128_000.0;
+
 /// Radiance of starlight and airglow, relative to the sun's irradiance above the air: 2e-4 of 128 000 cd/m^2 (Leinert 1998, table 1). No
 /// sky is darker, whatever the sun does.
 pub const NIGHT: f32 = 1.6e-9;

@@ -11,8 +11,8 @@ use crate::{
     time::Time,
     world::{
         boats::{
-            Behaviour, BoatHistory, Floating, Hull, HullForm, Orders, RoundStrike, Signals, StepView,
-            Traffic, step_after, step_seconds,
+            Behaviour, BoatHistory, Floating, Hull, HullForm, LightsKept, LightsRigged, NavigationLight,
+            Orders, RoundStrike, Signals, StepView, Traffic, step_after, step_seconds,
         },
         contact::Capsule,
         scenario::{BoatSpec, Scenario, Side},
@@ -31,6 +31,8 @@ pub struct Vessel {
     pub model: ModelId,
     /// Its behaviour.
     pub behaviour: Behaviour,
+    /// The lights that it shows by night.
+    pub lights: LightsKept,
 }
 
 impl Vessel {
@@ -41,6 +43,7 @@ impl Vessel {
             side: boat.side,
             model: *model,
             behaviour: boat.behaviour.clone().in_session(scenario.seed),
+            lights: boat.lights,
         };
         scenario.boats.iter().zip(boat_models).map(vessel).collect()
     }
@@ -67,6 +70,9 @@ struct FleetBoat {
     side: Side,
     model: ModelId,
     history: BoatHistory,
+    lights: LightsKept,
+    /// Lights on its model, where it shows any.
+    rigged: Option<LightsRigged>,
     /// Seconds since the start at which it was warned.
     warned_s: Option<f64>,
 }
@@ -127,11 +133,13 @@ impl Fleet {
     /// Boats that begin at `start`. Each vessel's model must be in `models`.
     pub fn new(vessels: Vec<Vessel>, models: Arc<[Model]>, waves: WaveField, start: Time) -> Self {
         let boat = |vessel: Vessel| {
-            let model = models.get(usize::from(vessel.model.0));
+            let Vessel { name, side, model: id, behaviour, lights } = vessel;
+            let model = models.get(usize::from(id.0));
             let hull = model.map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
             let form = model.map_or_else(|| HullForm::new((-0.5, 0.5), 0.3, 1.2, |_| 0.5), HullForm::of);
-            let history = BoatHistory::new(vessel.behaviour, hull, form);
-            FleetBoat { name: vessel.name, side: vessel.side, model: vessel.model, history, warned_s: None }
+            let history = BoatHistory::new(behaviour, hull, form);
+            let rigged = model.filter(|_| lights != LightsKept::None).map(LightsRigged::on);
+            FleetBoat { name, side, model: id, history, lights, rigged, warned_s: None }
         };
         let boats = vessels.into_iter().map(boat).collect();
         let (struck, driven) = (Vec::new(), Vec::new());
@@ -364,6 +372,22 @@ impl Fleet {
     /// through its wake without lifting it.
     pub fn water_over(&self, hull: Hull, time: Time) -> impl Fn(DVec2) -> f64 {
         self.waves.level_over(hull.length_m, hull.beam_m, time.secs_since(self.start))
+    }
+
+    /// The lights that a boat shows by night as it goes at `time`.
+    pub fn lights(&self, boat: usize, time: Time) -> &[NavigationLight] {
+        /// Fishing vessels that are slower through the water lie still.
+        const LIES_M_S: f64 = 0.25;
+        let Some((boat, rigged)) = self.boats.get(boat).and_then(|b| Some((b, b.rigged.as_ref()?))) else {
+            return &[];
+        };
+        let conduct = match boat.lights {
+            LightsKept::None => return &[],
+            LightsKept::ByConduct => boat.history.conduct(),
+            LightsKept::Always(conduct) => conduct,
+        };
+        let speed = boat.history.state(time.secs_since(self.start)).velocity().length();
+        rigged.shown(conduct, speed > LIES_M_S)
     }
 
     /// The name of the state that a boat's crew is in at the newest step; `None` for boats without one.

@@ -9,7 +9,9 @@ use crate::{
     geometry::{ahead, heading_of},
     sea::BeaufortForce,
     world::{
-        boats::{Act, Course, CourseState, CrewPlan, CrewState, CrewedStart, Exit, Guard, Propulsor},
+        boats::{
+            Act, Course, CourseState, CrewPlan, CrewState, CrewedStart, Exit, Guard, LightsKept, Propulsor,
+        },
         score::boxed_model,
         waves::{Spectrum, WaveSpec},
     },
@@ -43,7 +45,13 @@ fn crewed(name: &str, plan: &Arc<CrewPlan>, bearing_deg: f64, range_m: f64, side
         speed_m_s: 0.0,
         on_target_s: None,
     };
-    Vessel { name: name.to_owned(), side, model: ModelId(0), behaviour: Behaviour::Crewed(start) }
+    Vessel {
+        name: name.to_owned(),
+        side,
+        model: ModelId(0),
+        behaviour: Behaviour::Crewed(start),
+        lights: LightsKept::None,
+    }
 }
 
 fn models() -> Arc<[Model]> {
@@ -314,7 +322,13 @@ fn crowd(count: usize) -> Vec<Vessel> {
         .collect();
     let course = Course::straight(DVec2::new(-450.0, 170.0), 0.5 * PI, 3.0).expect("it can be sailed");
     let behaviour = Behaviour::ScriptedCourse(course);
-    vessels.push(Vessel { name: "scripted".to_owned(), side: Side::Neutral, model: ModelId(0), behaviour });
+    vessels.push(Vessel {
+        name: "scripted".to_owned(),
+        side: Side::Neutral,
+        model: ModelId(0),
+        behaviour,
+        lights: LightsKept::None,
+    });
     vessels
 }
 

@@ -155,6 +155,8 @@ impl Still {
             boats: self.boats.len(),
             moving: self.boats.iter().filter(|b| b.speed_m_s > 0.0).count(),
             belt: 0,
+            lights: false,
+            sun_stays_up: false,
         });
         let eye = ViewFrustum {
             camera: &camera,
@@ -179,7 +181,13 @@ impl Still {
         meter.observe(Time::from_ns(0), picture, &lens, &camera);
         let mut light = meter.light();
         light.sun *= self.daylight.sun_strength as f32;
-        let in_view = InView { pose_known: true, sun_shines: light.sun_shines(), boats: &boats, rounds: &[] };
+        let in_view = InView {
+            pose_known: true,
+            sun_shines: light.sun_shines(),
+            boats: &boats,
+            lights: &[],
+            rounds: &[],
+        };
         let mut passes = plan.frame(&in_view);
         passes[Pass::Hud as usize] = PassDecision::LeftOut(LeftOut::NoTrainee);
         let scene = Scene {
@@ -190,6 +198,7 @@ impl Still {
             passes,
             boats,
             rounds: Vec::new(),
+            lights: Vec::new(),
             light,
             water: self.water,
             wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),

@@ -1,8 +1,10 @@
 //! The passes, one folder each, run as a plain ordered list by the renderer.
 
 pub(crate) mod atlas;
+pub(crate) mod behind_hulls;
 pub(crate) mod boats;
 pub(crate) mod hud;
+pub(crate) mod lights;
 pub(crate) mod mirror;
 pub(crate) mod rounds;
 pub(crate) mod shadow;

@@ -27,6 +27,7 @@ pub fn config(scene: &Scene) -> RenderConfig {
         frames_in_flight: 2,
         needs: Needs {
             boats_max: scene.boats.len(),
+            lights_max: scene.lights.len(),
             rounds_max: scene.rounds.len(),
             wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
             waters: vec![(scene.water.method, scene.water.shadow)],

@@ -170,6 +170,7 @@ pub fn bare_scene(
         passes,
         boats: Vec::new(),
         rounds: Vec::new(),
+        lights: Vec::new(),
         light,
         water,
         wind: DVec2::ZERO,
@@ -267,7 +268,7 @@ impl Painter {
             device: device.map(str::to_owned),
             validation: false,
             frames_in_flight: 1,
-            needs: Needs { boats_max, rounds_max: 0, wakes_max: 0, waters, optics },
+            needs: Needs { boats_max, lights_max: 0, rounds_max: 0, wakes_max: 0, waters, optics },
             picture: None,
             // Others may keep the processor that draws.
             time_outs: TimeOuts { frame: Duration::from_secs(60), warm_up: Duration::from_secs(120) },

@@ -55,6 +55,8 @@ pub struct FittedSky {
     clear: Vec<Vec3>,
     /// Zenith's radiance of the overcast part.
     overcast: Vec3,
+    /// The camera's exposure and white balance: its light for a radiance of 1, relative to the sun's irradiance above the air.
+    pub gain: Vec3,
     /// The light of the whole dome without the sun's aureole.
     pub lobes: SkyLobes,
     /// Irradiance of the sun on a surface that faces it, ...
@@ -128,6 +130,7 @@ impl<S: SkyModel> SkyFamily<S> {
         let mut fitted = FittedSky {
             clear: vec![Vec3::ZERO; self.skies.len()],
             overcast: Vec3::ZERO,
+            gain: Vec3::ZERO,
             lobes: SkyLobes::default(),
             sun: Vec3::ZERO,
             aureole: Vec3::ZERO,
@@ -139,6 +142,7 @@ impl<S: SkyModel> SkyFamily<S> {
                 *of += clear;
             }
             fitted.overcast += gain * sky.overcast * (share * cover);
+            fitted.gain += gain * share;
             fitted.lobes.add(&sky.lobes, clear);
             fitted.sun += clear * sky.clear.sunlight();
             fitted.aureole += clear * sky.aureole;

@@ -6,6 +6,7 @@ use crate::{
     daylight::Daylight,
     ephemeris::{Moment, Moon, Place, Utc},
     event::ShipFix,
+    sky::SUN_LUX,
     time::Time,
 };
 
@@ -39,6 +40,17 @@ impl Luminaries {
             moon.direction.z > 0.0
                 && moon.irradiance * illuminance(moon.direction.z) > illuminance(self.sun.z)
         })
+    }
+
+    /// Illuminance of a surface that faces that body above the air, lux.
+    pub fn brightest_lux(&self) -> f64 {
+        SUN_LUX * self.moonlight().map_or(1.0, |moon| moon.irradiance)
+    }
+
+    /// Tests whether vessels show their lights: from sunset, when the upper limb is seen to go down, to sunrise (COLREGS rule 20 (b)).
+    pub fn is_between_sunset_and_sunrise(&self) -> bool {
+        const SUNSET_DEG: f64 = -0.833;
+        self.sun.z < SUNSET_DEG.to_radians().sin()
     }
 
     /// Unit vector towards the body that gives a level surface the most light.

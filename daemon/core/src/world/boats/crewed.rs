@@ -11,6 +11,7 @@ use super::{
     drive::{Craft, DriveState, Orders, Surroundings},
     grid::{GridHistory, STEP_S, seconds},
     hull::HullForm,
+    lights::Conduct,
     seakeeping::FAR_M,
 };
 use crate::{
@@ -81,6 +82,16 @@ impl CrewedBoat {
     pub fn state_name(&self) -> &str {
         let state = self.kept.last().map_or(0, |now| now.memory.state);
         self.plan.states.get(state).map_or("", |state| state.name.as_str())
+    }
+
+    /// What it does at the newest step, as the rules of the road tell vessels apart.
+    pub fn conduct(&self) -> Conduct {
+        let state = self.kept.last().map_or(0, |now| now.memory.state);
+        match self.plan.states.get(state).map(|state| &state.act) {
+            Some(Act::Fish) => Conduct::Fishing,
+            Some(Act::Anchor) => Conduct::Anchored,
+            _ => Conduct::UnderWay,
+        }
     }
 
     /// Whether its crew has given up.

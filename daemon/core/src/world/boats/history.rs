@@ -10,6 +10,7 @@ use super::{
     flooding::Flooding,
     grid::{GridHistory, Lookup, STEP_S, seconds, step_after},
     hull::{Hull, HullForm},
+    lights::Conduct,
     seakeeping::{GAP, SeakeepingState},
 };
 use crate::{geometry::RigidPose, world::waves::WaveField};
@@ -101,6 +102,15 @@ impl BoatHistory {
         let number = self.newest();
         if let Pilot::Crewed(boat) = &mut self.pilot {
             self.states.push(boat.step(number, &self.damage, view));
+        }
+    }
+
+    /// What it does at the newest step, as the rules of the road tell vessels apart: one that never moves lies at anchor.
+    pub fn conduct(&self) -> Conduct {
+        match &self.pilot {
+            Pilot::Crewed(boat) => boat.conduct(),
+            Pilot::Scripted(course) if course.speed_max_m_s() > 0.0 => Conduct::UnderWay,
+            Pilot::Scripted(_) => Conduct::Anchored,
         }
     }
 

@@ -14,7 +14,7 @@ use crate::{
         KeyPlace, OptionalKey, RequiredKey, Spanned, TomlError, TomlSection, ValueRule, key_place, number,
         one_of, plain_text, whole, yes_no,
     },
-    world::boats::{Arrival, Behaviour, Course, CourseError, CrewedStart, Propulsor},
+    world::boats::{Arrival, Behaviour, Course, CourseError, CrewedStart, LightsKept, Propulsor},
 };
 
 /// Kind of a boat's course.
@@ -63,6 +63,7 @@ pub(super) struct RawBoat {
     engine: OptionalKey<String>,
     speed_max_kn: OptionalKey<f64>,
     keeps_rules: OptionalKey<bool>,
+    lights: OptionalKey<String>,
     count: OptionalKey<i64>,
     formation: OptionalKey<String>,
     spacing_m: OptionalKey<f64>,
@@ -168,9 +169,11 @@ fn group(
     let key = format!("boat[{number}]");
     let stands = range.map_or_else(|| section.place("range_m"), |range| text.place_as(range, key));
     let side = text.given(&raw.side, one_of(&sides))?.unwrap_or(Side::Hostile);
+    let usual = if side == Side::Neutral { LightsKept::ByConduct } else { LightsKept::None };
+    let lights = text.given(&raw.lights, one_of(&LightsKept::NAMES))?.unwrap_or(usual);
     let boat = |name: String, behaviour| {
         let model = named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?;
-        Ok(BoatSpec { name, model, side, behaviour, stands: stands.clone() })
+        Ok(BoatSpec { name, model, side, behaviour, lights, stands: stands.clone() })
     };
     let behaviours = match (&raw.course, &raw.crew) {
         (Some(_), Some(crew)) => {

@@ -8,7 +8,7 @@ use crate::{
     text::toml::{TomlError, TomlPlace},
     water::Water,
     world::{
-        boats::Behaviour,
+        boats::{Behaviour, LightsKept},
         burst::BurstSpec,
         exercise::ExerciseSpec,
         gunnery::Projectile,
@@ -132,6 +132,8 @@ pub struct BoatSpec {
     pub side: Side,
     /// Its behaviour.
     pub behaviour: Behaviour,
+    /// The lights that it shows between sunset and sunrise.
+    pub lights: LightsKept,
     /// Where the text places it.
     pub(super) stands: TomlPlace,
 }

@@ -22,7 +22,7 @@ use crate::{
     error::RenderError,
     memory::{Image, ImageShape},
     passes::{DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED, TextureSet},
-    pipeline::{Blend, DEPTH, Pipeline, PipelineShape, SAMPLES, UNORM},
+    pipeline::{Blend, DEPTH, DepthUse, Pipeline, PipelineShape, SAMPLES, UNORM},
     rects::joined,
 };
 
@@ -95,7 +95,7 @@ impl BoatPipelines {
                     targets: 1,
                     blend: Blend::Replace,
                     cull: Some(front),
-                    depth: true,
+                    depth: DepthUse::Write,
                     samples,
                 },
             )

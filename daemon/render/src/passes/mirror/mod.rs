@@ -3,18 +3,19 @@
 
 use ash::vk;
 use bowwave_core::frame::scene::PixelRect;
-use shaders_spirv::{SCREEN_VERT, SOFTEN_FRAG};
+use shaders_spirv::{SCREEN_VERT, SOFTEN_FRAG, interface::LightBlock};
 
 use crate::{
-    encoder::{Begin, Colour, CommandEncoder, Step},
+    encoder::{Begin, Colour, CommandEncoder, Step, Steps},
     error::RenderError,
     memory::{Image, ImageShape},
     passes::{
         DEPTH_TESTED, DRAWN, FORGET_READ, PassContext, SAMPLED, TextureSet,
         atlas::{Placed, SOFT},
         boats::{BoatDraw, BoatPipelines, meshes::Meshes},
+        lights,
     },
-    pipeline::{Blend, DEPTH, LIGHT, Pipeline, PipelineShape},
+    pipeline::{Blend, DEPTH, DepthUse, LIGHT, Pipeline, PipelineShape},
     rects::joined,
 };
 
@@ -25,6 +26,8 @@ pub(crate) struct MirrorPass {
     pub(crate) colour: Image,
     depth: Image,
     pipelines: BoatPipelines,
+    /// Adds navigation lights.
+    lights: Option<Pipeline>,
     soft: Option<Soft>,
 }
 
@@ -36,12 +39,12 @@ struct Soft {
 }
 
 impl MirrorPass {
-    /// `softens` if a method that needs it may be asked for.
+    /// `softens` if a method that needs it may be asked for, `any_light` if boats may show lights.
     pub(crate) fn new(
         context: &PassContext<'_>,
         meshes: &Meshes,
         any_textured: bool,
-        softens: bool,
+        [softens, any_light]: [bool; 2],
     ) -> Result<Self, RenderError> {
         let size = Self::layer_size(context.size);
         let sampled = vk::ImageUsageFlags::SAMPLED;
@@ -52,6 +55,7 @@ impl MirrorPass {
         Ok(Self {
             size: context.size,
             soft,
+            lights: any_light.then(|| lights::mirrored(context)).transpose()?,
             colour,
             depth: Image::new(context.gpu, "mirror depth", depth)?,
             pipelines: BoatPipelines::new(
@@ -111,6 +115,33 @@ impl MirrorPass {
         Some(Step { image: &soft.image, from: DRAWN, to: SAMPLED })
     }
 
+    /// Adds the mirrored lights, each onto the place of the boat with that number.
+    pub(crate) fn record_lights(
+        &self,
+        to: CommandEncoder<'_>,
+        frame: vk::DescriptorSet,
+        lights: &[(usize, LightBlock)],
+        places: &[Placed],
+    ) {
+        let Some(pipeline) = self.lights.as_ref().filter(|_| !lights.is_empty()) else { return };
+        let Some(area) = places.iter().map(|p| p.place).reduce(joined) else { return };
+        let mut steps = Steps::default();
+        steps.add([
+            Step { image: &self.colour, from: DRAWN, to: DRAWN },
+            Step { image: &self.depth, from: DEPTH_TESTED, to: DEPTH_TESTED },
+        ]);
+        steps.record(to);
+        to.begin(area, Colour::new(self.colour.view, Begin::Keep), Some((self.depth.view, Begin::Keep)));
+        to.bind(pipeline, &[frame]);
+        for (number, light) in lights {
+            let Some(placed) = places.get(*number) else { continue };
+            to.window(placed.viewport(self.size), placed.place);
+            to.push(pipeline, light);
+            to.draw(4, 1);
+        }
+        to.end();
+    }
+
     /// Draws the mirrored boats, each onto its place.
     pub(crate) fn record(
         &self,
@@ -153,7 +184,7 @@ impl Soft {
                 targets: 1,
                 blend: Blend::Replace,
                 cull: None,
-                depth: false,
+                depth: DepthUse::None,
                 samples: vk::SampleCountFlags::TYPE_1,
             },
         )?;

@@ -18,7 +18,7 @@ use crate::{
     error::RenderError,
     gpu::Gpu,
     passes::PassContext,
-    pipeline::{Blend, Pipeline, PipelineShape, SetLayout},
+    pipeline::{Blend, DepthUse, Pipeline, PipelineShape, SetLayout},
     rects::around_all,
     target::{DrawTarget, Words},
 };
@@ -128,7 +128,7 @@ impl VideoPass {
                     targets: 1,
                     blend: Blend::Replace,
                     cull: None,
-                    depth: false,
+                    depth: DepthUse::None,
                     samples: vk::SampleCountFlags::TYPE_1,
                 },
             )

@@ -17,7 +17,9 @@ use crate::{
     error::RenderError,
     memory::{Image, ImageShape},
     passes::{DRAWN, FORGET_READ, PassContext, SAMPLED, mirror::MirrorPass, water::WaterDraw},
-    pipeline::{Blend, Bound, LIGHT, Pipeline, PipelineShape, SRGB, SUMS, Sampler, SetLayout, UNORM},
+    pipeline::{
+        Blend, Bound, DepthUse, LIGHT, Pipeline, PipelineShape, SRGB, SUMS, Sampler, SetLayout, UNORM,
+    },
 };
 
 /// A boat's strips of water, and what is thrown back there.
@@ -102,7 +104,7 @@ impl Stage {
                 targets: shape.targets,
                 blend: shape.blend,
                 cull: None,
-                depth: false,
+                depth: DepthUse::None,
                 samples: vk::SampleCountFlags::TYPE_1,
             },
         )?;
