@@ -150,10 +150,28 @@ fn a_calibration_for_another_picture_size_is_refused() {
     assert!(text.contains(&of_size), "{of_size} {text}");
     let other = text.replace(&of_size, &format!("[{}, {}]", 2 * width, 2 * height));
     let other = file(folder.path(), "other.toml", other.as_bytes());
-    refused(
-        &["--calibration", &other, "--frames", "5"],
-        &["is for pictures of", &format!("{width}x{height}"), "calibration of its camera"],
-    );
+    for further in [&["--frames", "5"][..], &[]] {
+        refused(
+            &[&["--calibration", other.as_str()], further].concat(),
+            &["is for pictures of", &format!("{width}x{height}"), "calibration of its camera"],
+        );
+    }
+}
+
+#[test]
+fn a_summary_that_cannot_be_written_is_told_and_takes_no_round_along() {
+    let out = tempfile::tempdir().expect("a folder");
+    std::fs::create_dir_all(out.path().join("summary.json/in-the-way")).expect("a folder in its place");
+    let (out, recording) = (out.path().to_str().expect("a plain path"), small_recording());
+    let recording = recording.to_str().expect("a plain path");
+    let output = bowwave(["simulate", "--size", "160x96", "--print-commits", "--out", out, recording]);
+    expect_code(&output, 1);
+    one_line_with(&said(&output), &["summary.json", "check the disk"]);
+    let committed = String::from_utf8_lossy(&output.stdout).matches("committed ").count();
+    let hits = bowwave(["hits", out, "--json"]);
+    expect_code(&hits, 0);
+    let rows: Vec<serde_json::Value> = serde_json::from_slice(&hits.stdout).expect("JSON");
+    assert!(committed > 0 && rows.len() == committed, "{} rows of {committed}", rows.len());
 }
 
 #[test]

@@ -263,7 +263,13 @@ fn dry_shots_tell_the_triggers_latency() {
     let folder = TestFolder::new();
     let (path, out) = (folder.path("dry.mcap"), folder.path("gun.toml"));
     with_pulls(&path, 8, 0.023, 40.0);
-    expect_code(&calibrate("trigger", &path, &["--out", out.to_str().unwrap()]), 0);
+    // Where nothing stood nothing is said to be kept; the second time it is.
+    for is_kept in [false, true] {
+        let output = calibrate("trigger", &path, &["--out", out.to_str().unwrap()]);
+        expect_code(&output, 0);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains(" written") && said.contains("is kept") == is_kept, "{said}");
+    }
     let found = CalibrationFile::read(&out).unwrap().calibration.trigger.unwrap();
     let off = (found.latency_ns - 23_000_000) as f64;
     assert!(off.abs() < 3.0 * found.sigma_ns as f64 && found.sigma_ns < 3_000_000, "{found:?}");

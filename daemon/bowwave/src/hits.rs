@@ -187,6 +187,17 @@ mod tests {
     }
 
     #[test]
+    fn a_round_that_came_close_to_no_boat_has_no_distance_to_one() {
+        let (time, range_m) = (Time::from_ns(104_000_000_000), 1234.0);
+        let lost = round(0, Outcome::Miss { boat: None, miss_m: f64::INFINITY, time, range_m });
+        let told = table(std::slice::from_ref(&lost), &Starts::new());
+        let line = told.lines().find(|line| line.contains("1234.0")).expect("the round");
+        assert!(line.contains("miss") && !line.contains("inf"), "{line}");
+        // The range, and the age of the pose; no distance of a hull that was not there.
+        assert_eq!(line.split_whitespace().filter(|cell| *cell == "0.0").count(), 1, "{line}");
+    }
+
+    #[test]
     fn no_pose_is_younger_than_nothing() {
         let shot = |pose_age_ns| round(pose_age_ns, Outcome::NotScored { cause: NotScored::ImuStale });
         let told = table(&[shot(-5_000_000), shot(1_500_000)], &Starts::new());

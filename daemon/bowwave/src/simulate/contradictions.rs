@@ -101,5 +101,10 @@ mod tests {
         }
         let night = contradictions(&built_in("night-intruder"), &properties("first-target"), 1e6).join("; ");
         assert!(night.contains("the sun stands at 150 degrees and 45 high"), "{night}");
+        let mut other = built_in("first-target");
+        other.eye_height_m *= 1.5;
+        other.daylight.visibility_m *= 0.2;
+        let found = contradictions(&other, &properties("first-target"), 1e6).join("; ");
+        assert!(found.contains("visibility") && found.contains("eye"), "{found}");
     }
 }
