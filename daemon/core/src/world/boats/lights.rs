@@ -229,6 +229,8 @@ impl Places {
     fn on(model: &Model) -> Self {
         /// Distance of a light from what it stands on, metres.
         const OFF_M: f64 = 0.06;
+        /// Height of a pole that carries a light, metres.
+        const POLE_M: f64 = 1.5;
         let corners = || model.vertices.iter().map(|v| v.position.as_dvec3());
         let highest =
             |of: &dyn Fn(DVec3) -> bool| corners().filter(|p| of(*p)).max_by(|a, b| a.z.total_cmp(&b.z));
@@ -241,13 +243,16 @@ impl Places {
         let beam = corners().filter(|p| abreast(*p)).map(|p| p.y.abs()).fold(0.0, f64::max);
         let rail = highest(&|p| abreast(p) && p.y.abs() > 0.85 * beam).map_or(0.5 * high.z, |p| p.z);
         let side = |sign: f64| DVec3::new(top.x, sign * (beam + OFF_M), rail + OFF_M);
+        // The forward light of a long vessel stands on a pole on the highest that there is well before the other, and below that.
+        let before = highest(&|p| p.x > top.x + 0.1 * length_m).unwrap_or(top);
+        let fore = DVec3::new(before.x, 0.0, (before.z + POLE_M).min(top.z));
         let transom = |p: DVec3| p.x < low.x + 0.05 * length_m;
         let taffrail = highest(&transom).map_or(0.5 * high.z, |p| p.z);
         Self {
             top,
             sides: [side(1.0), side(-1.0)],
             stern: DVec3::new(low.x - OFF_M, 0.0, taffrail + OFF_M),
-            fore: DVec3::new(top.x + 0.25 * length_m, 0.0, 0.6 * top.z + 0.4 * rail),
+            fore,
         }
     }
 }
