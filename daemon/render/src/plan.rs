@@ -9,8 +9,8 @@ use bowwave_core::{
 };
 use glam::DVec2;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, LightBlock, LobeBlock, MethodBytes, PHYSICS_WAVES, ReflectBlock, RoundBlock,
-    TRACK_POINTS, WATERS_MAX, WakeBlock, WaterBlock,
+    BOAT_BLOCKS_MAX, BoatBlock, DrawBlock, LightBlock, LobeBlock, MethodBytes, PHYSICS_WAVES, ReflectBlock,
+    RoundBlock, TRACK_POINTS, WATERS_MAX, WakeBlock, WaterBlock,
 };
 
 use crate::{
@@ -18,17 +18,14 @@ use crate::{
     frame_data::RECTS_MAX,
     passes::{
         atlas::{self, Placed},
-        behind_hulls::pieces,
+        behind_hulls::{HullPiece, pieces},
         boats::{
             BoatDraw,
             coverage::{Boxes, Cells},
         },
         hud::layout::KINDS,
-        lights::{
-            LightDraw,
-            plan::{Mirror, light_block, mirrored_block},
-        },
-        rounds::{RoundDraw, plan::round_block},
+        lights::plan::{Mirror, light_block, mirrored_block},
+        rounds::plan::round_block,
         shadow::plan::ShadowPlan,
         wake::{
             WakeDraw,
@@ -114,10 +111,10 @@ pub(crate) struct Plan {
     pub(crate) reflects: Vec<ReflectDraw>,
     pub(crate) wake_blocks: Vec<WakeBlock>,
     pub(crate) wakes: Vec<WakeDraw>,
-    pub(crate) lights: Vec<LightDraw>,
+    pub(crate) lights: Vec<HullPiece<LightBlock>>,
     /// Mirrored ones, each with the number of its boat in `mirrors`.
     pub(crate) mirror_lights: Vec<(usize, LightBlock)>,
-    pub(crate) rounds: Vec<RoundDraw>,
+    pub(crate) rounds: Vec<HullPiece<DrawBlock>>,
     /// Pixels that hulls can cover, each once.
     pub(crate) hulls: Vec<PixelRect>,
     /// The same for clearing.
@@ -444,7 +441,7 @@ impl Plan {
             self.touched.push(rect);
             let lights = &mut self.lights;
             pieces(rect, &self.hulls, &mut self.rest, |rect, hidden| {
-                lights.push(LightDraw { block: LightBlock { rect: corners(rect), ..block }, rect, hidden });
+                lights.push(HullPiece { rect, hidden, block: LightBlock { rect: corners(rect), ..block } });
             });
         }
     }
@@ -459,7 +456,11 @@ impl Plan {
             self.touched.push(rect);
             let rounds = &mut self.rounds;
             pieces(rect, &self.hulls, &mut self.rest, |rect, hidden| {
-                rounds.push(RoundDraw { index, rect, hidden });
+                rounds.push(HullPiece {
+                    rect,
+                    hidden,
+                    block: DrawBlock { rect: corners(rect), index, first: 0 },
+                });
             });
         }
     }

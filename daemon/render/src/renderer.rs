@@ -9,6 +9,7 @@ use bowwave_core::{
     model::Model,
     water::{ReflectionMethod, Water},
 };
+use shaders_spirv::interface::{DrawBlock, LightBlock};
 
 use crate::{
     config::{Needs, RenderConfig},
@@ -18,11 +19,12 @@ use crate::{
     gpu::{DeviceInfo, Gpu},
     passes::{
         PassContext,
+        behind_hulls::BehindHulls,
         boats::{BoatsPass, meshes::Meshes},
         hud::HudPass,
-        lights::LightsPass,
+        lights,
         mirror::MirrorPass,
-        rounds::RoundsPass,
+        rounds,
         shadow::ShadowPass,
         video::{
             VideoPass,
@@ -97,8 +99,8 @@ struct Passes {
     reflect: Option<ReflectPass>,
     wake: Option<WakePass>,
     boats: Option<BoatsPass>,
-    lights: Option<LightsPass>,
-    rounds: Option<RoundsPass>,
+    lights: Option<BehindHulls<LightBlock>>,
+    rounds: Option<BehindHulls<DrawBlock>>,
     hud: HudPass,
 }
 
@@ -127,8 +129,12 @@ impl Passes {
         let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
         let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
         let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
-        let lights = (needs.lights_max > 0).then(|| LightsPass::new(context, boats.as_ref())).transpose()?;
-        let rounds = (needs.rounds_max > 0).then(|| RoundsPass::new(context, boats.as_ref())).transpose()?;
+        let lights = (needs.lights_max > 0)
+            .then(|| BehindHulls::new(context, &lights::SHADERS, boats.as_ref()))
+            .transpose()?;
+        let rounds = (needs.rounds_max > 0)
+            .then(|| BehindHulls::new(context, &rounds::SHADERS, boats.as_ref()))
+            .transpose()?;
         let hud = HudPass::new(context)?;
         let video = VideoPass::new(context, config.picture, &hud.overlay.layout)?;
         Ok(Self { video, meshes, shadow, mirror, water, reflect, wake, boats, lights, rounds, hud })

@@ -57,7 +57,7 @@ pub struct SceneNeeds {
     pub moving: usize,
     /// Rounds in the belt.
     pub belt: u32,
-    /// Whether any boat shows lights by night.
+    /// Some boat shows lights by night.
     pub lights: bool,
     /// The sun is up, and neither moves nor comes from the ship.
     pub sun_stays_up: bool,

@@ -61,7 +61,7 @@ pub const SENTENCE_MAX_BYTES: usize = 256;
 /// The largest JPEG that is written or read, bytes.
 pub const JPEG_MAX_BYTES: usize = 32 << 20;
 
-/// How far log times may be out of order when written, nanoseconds; readers put them into order again.
+/// Greatest disorder of log times in a file, nanoseconds; readers put them into order again.
 pub const DISORDER_MAX_NS: i64 = 500_000_000;
 
 /// One thing that a recording holds.

@@ -1,8 +1,11 @@
-//! What is drawn over the screen and may stand behind hulls: cut apart where one may stand before it, so that the boats' depth is read only
-//! where this frame wrote it.
+//! Rectangles over the screen that hulls may hide: cut apart where one may stand before them, so that the boats' depth is read only where this
+//! frame wrote it.
+
+use std::marker::PhantomData;
 
 use ash::vk;
 use bowwave_core::frame::scene::PixelRect;
+use bytemuck::Pod;
 use shaders_spirv::Shader;
 
 use crate::{
@@ -13,21 +16,29 @@ use crate::{
     rects::{around_all, overlap},
 };
 
-/// Shaders of something that may stand behind hulls.
+/// Shaders of something that hulls may hide.
 pub(crate) struct Shaders {
     pub(crate) vertex: Shader,
-    /// Where no hull can stand before it...
+    /// For pieces that no hull can hide...
     pub(crate) open: Shader,
-    /// ...and where one may: it compares the boats' depth.
+    /// ...and for those that one may: it compares the boats' depth.
     pub(crate) hidden: Shader,
-    /// Bytes of push constants.
-    pub(crate) push: usize,
 }
 
-/// The pipelines for both.
-pub(crate) struct BehindHulls {
+/// A piece of a rectangle, with its push constants.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HullPiece<T> {
+    pub(crate) rect: PixelRect,
+    /// A hull may stand before it.
+    pub(crate) hidden: bool,
+    pub(crate) block: T,
+}
+
+/// A pass of such rectangles, whose push constants are a `T`.
+pub(crate) struct BehindHulls<T> {
     open: Pipeline,
     hidden: Option<Hidden>,
+    push: PhantomData<T>,
 }
 
 struct Hidden {
@@ -35,7 +46,7 @@ struct Hidden {
     depth: TextureSet,
 }
 
-impl BehindHulls {
+impl<T: Pod> BehindHulls<T> {
     /// `boats` is there if there can be any to hide what is drawn.
     pub(crate) fn new(
         context: &PassContext<'_>,
@@ -44,7 +55,7 @@ impl BehindHulls {
     ) -> Result<Self, RenderError> {
         let pipeline = |fragment: Shader, sets: &[&SetLayout]| {
             let shape = PipelineShape::over_screen(shaders.vertex, fragment, sets);
-            Pipeline::new(context.gpu, &PipelineShape { push: shaders.push, ..shape })
+            Pipeline::new(context.gpu, &PipelineShape { push: size_of::<T>(), ..shape })
         };
         let open = pipeline(shaders.open, &[context.frame_set])?;
         let hidden = |boats: &BoatsPass| -> Result<Hidden, RenderError> {
@@ -52,11 +63,20 @@ impl BehindHulls {
             let pipeline = pipeline(shaders.hidden, &[context.frame_set, &depth.layout])?;
             Ok(Hidden { pipeline, depth })
         };
-        Ok(Self { open, hidden: boats.map(hidden).transpose()? })
+        Ok(Self { open, hidden: boats.map(hidden).transpose()?, push: PhantomData })
     }
 
-    /// Binds the pipeline for a piece that a hull may stand before, or may not.
-    pub(crate) fn bind(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, hidden: bool) -> &Pipeline {
+    /// Draws, within a rendering to the screen.
+    pub(crate) fn record(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, pieces: &[HullPiece<T>]) {
+        for piece in pieces {
+            let pipeline = self.bind(to, frame, piece.hidden);
+            to.scissor(piece.rect);
+            to.push(pipeline, &piece.block);
+            to.draw(4, 1);
+        }
+    }
+
+    fn bind(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, hidden: bool) -> &Pipeline {
         match self.hidden.as_ref().filter(|_| hidden) {
             Some(hidden) => {
                 to.bind(&hidden.pipeline, &[frame, hidden.depth.set]);

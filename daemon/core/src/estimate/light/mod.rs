@@ -1,7 +1,8 @@
 //! Light on the boats, taken from the picture itself so that they fit it.
 //!
 //! A few hundred pixels above the horizon are a part of some sky under the sun or, by night, the moon ([`SkyClock`]), at the camera's own
-//! exposure and white balance ([`SkyFamily`]): it supplies the rest of the dome, and the sun. This is an estimate for shading, not a photometric measurement.
+//! exposure and white balance ([`SkyFamily`]): it supplies the rest of the dome, the sun, and the luminance that is white. These are estimates for drawing, not
+//! photometric measurements.
 
 mod dome;
 mod luminary;

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{
     behaviour::CrewedStart,
     course::{BoatDamage, CourseState},
-    crew::{Act, CrewMemory, CrewPlan, Signals, Situation, Traffic},
+    crew::{Act, CrewMemory, CrewPlan, CrewState, Signals, Situation, Traffic},
     drive::{Craft, DriveState, Orders, Surroundings},
     grid::{GridHistory, STEP_S, seconds},
     hull::HullForm,
@@ -80,14 +80,17 @@ impl CrewedBoat {
 
     /// The name of the state that the crew is in.
     pub fn state_name(&self) -> &str {
-        let state = self.kept.last().map_or(0, |now| now.memory.state);
-        self.plan.states.get(state).map_or("", |state| state.name.as_str())
+        self.state().map_or("", |state| state.name.as_str())
     }
 
-    /// What it does at the newest step, as the rules of the road tell vessels apart.
+    /// The state that the crew is in at the newest step.
+    fn state(&self) -> Option<&CrewState> {
+        self.plan.states.get(self.kept.last().map_or(0, |now| now.memory.state))
+    }
+
+    /// Conduct at the newest step by the rules of the road.
     pub fn conduct(&self) -> Conduct {
-        let state = self.kept.last().map_or(0, |now| now.memory.state);
-        match self.plan.states.get(state).map(|state| &state.act) {
+        match self.state().map(|state| &state.act) {
             Some(Act::Fish) => Conduct::Fishing,
             Some(Act::Anchor) => Conduct::Anchored,
             _ => Conduct::UnderWay,
@@ -96,8 +99,7 @@ impl CrewedBoat {
 
     /// Whether its crew has given up.
     pub fn gave_up(&self) -> bool {
-        let state = self.kept.last().map_or(0, |now| now.memory.state);
-        self.plan.states.get(state).is_some_and(|state| matches!(state.act, Act::Surrender))
+        self.state().is_some_and(|state| matches!(state.act, Act::Surrender))
     }
 
     /// Whether its crew decides at step `number`. Not all crews do so at the same step: no frame has to wait for all of them.

@@ -105,7 +105,7 @@ impl BoatHistory {
         }
     }
 
-    /// What it does at the newest step, as the rules of the road tell vessels apart: one that never moves lies at anchor.
+    /// Conduct at the newest step by the rules of the road: one that never moves lies at anchor.
     pub fn conduct(&self) -> Conduct {
         match &self.pilot {
             Pilot::Crewed(boat) => boat.conduct(),

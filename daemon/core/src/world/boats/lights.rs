@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::model::Model;
+use crate::{geometry::bearing_and_elevation_deg, model::Model};
 
 /// A scenario's choice of lights for a boat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,7 +27,7 @@ impl LightsKept {
     ];
 }
 
-/// What a vessel does, as the rules tell vessels apart.
+/// Conduct of a vessel, as the rules tell vessels apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Conduct {
     /// Under way by engine.
@@ -90,8 +90,7 @@ impl Sector {
         let [first, last] = self.cut_off;
         match if off < 0.0 { first } else { last } {
             Some(width) => (1.0 + inside / width).clamp(0.0, 1.0),
-            None if inside >= 0.0 => (0.5 + 0.5 * inside / SOFT_DEG).min(1.0),
-            None => (0.5 + 0.5 * inside / SOFT_DEG).max(0.0),
+            None => (0.5 + 0.5 * inside / SOFT_DEG).clamp(0.0, 1.0),
         }
     }
 }
@@ -104,17 +103,8 @@ const SOFT_DEG: f64 = 5.0;
 /// Share of the intensity at an elevation above or below the level of the vessel: all to 5 degrees, 60 % at 7.5 (annex I, 10); on to nothing
 /// at 25, as lamps with a lens about them do.
 fn vertical_share(elevation_deg: f64) -> f64 {
-    const NODES: [(f64, f64); 3] = [(5.0, 1.0), (7.5, 0.6), (25.0, 0.0)];
     let e = elevation_deg.abs();
-    let [a, b, c] = NODES;
-    let between = |(x0, y0): (f64, f64), (x1, y1): (f64, f64)| y0 + (e - x0) / (x1 - x0) * (y1 - y0);
-    if e <= a.0 {
-        a.1
-    } else if e <= b.0 {
-        between(a, b)
-    } else {
-        between(b, c).max(0.0)
-    }
+    if e <= 7.5 { (1.0 - 0.4 * (e - 5.0) / 2.5).min(1.0) } else { (0.6 * (25.0 - e) / 17.5).max(0.0) }
 }
 
 /// One light of a vessel.
@@ -132,8 +122,9 @@ pub struct NavigationLight {
 impl NavigationLight {
     /// Intensity towards a unit direction of the boat's space, candela.
     pub fn candela_towards(&self, direction: DVec3) -> f64 {
-        let bearing = (-direction.y).atan2(direction.x).to_degrees();
-        let elevation = direction.z.clamp(-1.0, 1.0).asin().to_degrees();
+        // With the bow as north, port is west.
+        let [bearing, elevation] =
+            bearing_and_elevation_deg(DVec3::new(-direction.y, direction.x, direction.z));
         self.candela * self.sector.share(bearing) * vertical_share(elevation)
     }
 }
@@ -182,23 +173,18 @@ impl LightsRigged {
             light(starboard, green, side_nm, Sector::STARBOARD),
             light(stern, white, round_nm, Sector::STERN),
         ];
-        let masts = if length_m >= 50.0 {
-            // The after one is the higher (rule 23 (a) ii).
-            vec![light(top, white, mast_nm, Sector::MASTHEAD), light(fore, white, mast_nm, Sector::MASTHEAD)]
-        } else {
-            vec![light(top, white, mast_nm, Sector::MASTHEAD)]
-        };
+        // From 50 m on there are two (rule 23 (a) ii), and two at anchor (rule 30 (a) ii).
+        let long = length_m >= 50.0;
+        let mast = |place| light(place, white, mast_nm, Sector::MASTHEAD);
+        let masts = if long { vec![mast(top), mast(fore)] } else { vec![mast(top)] };
         let round = |place, colour| light(place, colour, round_nm, Sector::ALL_ROUND);
         let nets = vec![round(top + DVec3::Z * APART_M, red), round(top, white)];
-        let anchor = if length_m >= 50.0 {
-            vec![round(fore, white), round(stern, white)]
-        } else {
-            vec![round(top, white)]
-        };
+        let anchored =
+            if long { vec![round(fore, white), round(stern, white)] } else { vec![round(top, white)] };
         Self {
             under_way: [masts, sides.to_vec()].concat(),
             fishing: [nets, sides.to_vec()].concat(),
-            anchored: anchor,
+            anchored,
         }
     }
 
