@@ -12,6 +12,9 @@ layout(location = 4) in vec4 sky0;
 layout(location = 5) in vec4 sky1;
 layout(location = 6) in vec2 sky2;
 
+// Whether the gun has a searchlight.
+layout(constant_id = 2) const bool SEARCHLIGHT = false;
+
 // Light that the corner sends to the eye: of sky and sea, with haze, and of the sun, if nothing is before it. A texture's colours and the
 // haze come later. Both are found here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles
 // cost by the fragment and by what is handed to it. In the sea's mirror nobody sees a shadow: its light is one colour.
@@ -40,14 +43,28 @@ vec3 lit_around(BoatBlock boat) {
     return albedo * (max(sky, 0.0) + frame.sea.rgb * sky2.y);
 }
 
+// Light of the gun's searchlight, which stands so close to the eye that little is seen that it does not light.
+vec3 lit_by_searchlight(BoatBlock boat, vec3 in_camera) {
+    vec3 ray = in_camera - frame.lamp.xyz;
+    float squared = max(dot(ray, ray), 1.0);
+    vec3 off = cross(ray, frame.beam.xyz);
+    float fall = exp(-frame.lamp.w * dot(off, off) / squared) * step(0.0, dot(ray, frame.beam.xyz));
+    float facing = max(dot(normal, normalize(boat.eye.xyz - position)), 0.0);
+    return albedo * (frame.beam.w * fall * facing * (1.0 - boat.eye.w) / squared);
+}
+
 void main() {
     vec4 p = vec4(position, 1.0);
     BoatBlock boat = boats[draw.index];
-    gl_Position = clip_from_camera(
-        vec3(dot(boat.camera_from_boat[0], p), dot(boat.camera_from_boat[1], p), dot(boat.camera_from_boat[2], p)));
+    vec3 in_camera =
+        vec3(dot(boat.camera_from_boat[0], p), dot(boat.camera_from_boat[1], p), dot(boat.camera_from_boat[2], p));
+    gl_Position = clip_from_camera(in_camera);
     gl_ClipDistance[0] = dot(boat.water_plane, p);
     gl_ClipDistance[1] = dot(boat.horizon_plane, p);
     around_out = lit_around(boat);
+    if (SEARCHLIGHT) {
+        around_out += lit_by_searchlight(boat, in_camera);
+    }
     vec3 sun = albedo * frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0);
 #ifdef MIRRORED
     around_out += sun;

@@ -12,6 +12,8 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec4 sky;         // the same, seeing only the upper sky
     vec4 sea;         // the same, seeing only the sea
     vec4 horizon;     // radiance of the horizon
+    vec4 lamp;        // xyz: the searchlight, camera's axes, metres; w: its light falls with exp(-w sin^2 of the angle off its axis)
+    vec4 beam;        // xyz: its axis, camera's axes; w: linear radiance of white matt that faces it a metre off
     vec4 row_turn;    // the camera's turn from row to row while a rolling shutter reads, radians about its axes
 } frame;
 

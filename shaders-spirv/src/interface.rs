@@ -50,6 +50,10 @@ block! {
         pub sea: [f32; 4],
         /// Radiance of the horizon.
         pub horizon: [f32; 4],
+        /// The searchlight, camera's axes, metres; the last is how its light falls off its axis, 1/rad^2.
+        pub lamp: [f32; 4],
+        /// Its axis, camera's axes; the last is the linear radiance of a white matt surface that faces it a metre off, 0 while it is off.
+        pub beam: [f32; 4],
         /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is unused.
         pub row_turn: [f32; 4],
     }
@@ -91,6 +95,26 @@ block! {
         pub core: [f32; 4],
         /// That of the glow about it; the last is 1 / its squared radius, per squared pixel.
         pub glow: [f32; 4],
+    }
+}
+
+block! {
+    /// Cells of the searchlight's grid: `BeamBlock`, push constants.
+    pub struct BeamBlock {
+        /// Column and row of the first one, how many of its row, and nodes of a row.
+        pub cells: [i32; 4],
+        /// What a node's haze is multiplied with; the last is pixels from node to node.
+        pub haze: [f32; 4],
+        /// The same of its sea; the last is unused.
+        pub sea: [f32; 4],
+    }
+}
+
+block! {
+    /// A node of that grid: `BeamNode`, set 0, binding 10, std430.
+    pub struct BeamNode {
+        /// Light of the air, and of the sea.
+        pub light: [f32; 2],
     }
 }
 

@@ -98,6 +98,12 @@ shaders! {
     LIGHT_FRAG = "light.frag";
     /// The same where a hull may stand before it: compares depth.
     LIGHT_HIDDEN_FRAG = "light_hidden.frag";
+    /// A cell of the searchlight's grid.
+    BEAM_VERT = "beam.vert";
+    /// The light of the searchlight on sea and air.
+    BEAM_FRAG = "beam.frag";
+    /// The same where a hull may stand before the sea: looks at depth.
+    BEAM_HIDDEN_FRAG = "beam_hidden.frag";
     /// A rectangle of the head-up display.
     HUD_VERT = "hud.vert";
     /// What fills a rectangle of the head-up display. Constant: 0 plates, shapes or glyphs.

@@ -13,10 +13,10 @@ use rspirv::{
     spirv::{Decoration, Op, StorageClass, Word},
 };
 use shaders_spirv::interface::{
-    BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock, HULL_LINE_COLUMNS,
-    HudQuad, LobeBlock, MeshVertex, MirrorBlock, PhysicsBlock, PhysicsPublishedBlock, ReflectBlock,
-    RoundBlock, ShadowBlock, TRACK_POINTS, VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint,
-    WaterBlock,
+    BeamBlock, BeamNode, BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock,
+    HULL_LINE_COLUMNS, HudQuad, LightBlock, LobeBlock, MeshVertex, MirrorBlock, PhysicsBlock,
+    PhysicsPublishedBlock, ReflectBlock, RoundBlock, ShadowBlock, TRACK_POINTS, VideoBlock, WATERS_MAX,
+    WakeBlock, WakeHead, WakePoint, WaterBlock,
 };
 
 /// Name, fields with offsets, and size of one struct of the host.
@@ -35,6 +35,9 @@ const HOST: &[Host] = &[
     ("RoundBlock", RoundBlock::FIELDS, size_of::<RoundBlock>()),
     ("HudQuad", HudQuad::FIELDS, size_of::<HudQuad>()),
     ("VideoBlock", VideoBlock::FIELDS, size_of::<VideoBlock>()),
+    ("LightBlock", LightBlock::FIELDS, size_of::<LightBlock>()),
+    ("BeamBlock", BeamBlock::FIELDS, size_of::<BeamBlock>()),
+    ("BeamNode", BeamNode::FIELDS, size_of::<BeamNode>()),
     ("ShadowBlock", ShadowBlock::FIELDS, size_of::<ShadowBlock>()),
     ("DrawBlock", DrawBlock::FIELDS, size_of::<DrawBlock>()),
     ("LobeBlock", LobeBlock::FIELDS, size_of::<LobeBlock>()),

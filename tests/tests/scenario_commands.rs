@@ -65,11 +65,47 @@ fn each_wrong_scenario_is_named_by_its_place_and_the_sound_ones_are_still_looked
 }
 
 #[test]
+fn check_tells_all_mistakes_that_do_not_follow_from_each_other() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "name = \"Odd\"\nduration_s = 0\n[sea]\nbeaufort = 13\nwind = 3\n[goals]\nstop = 2\n[[boat]]\nname = \"a\"\nmodel = \"skiff\"\n\
+                crew = \"attacker\"\nrange_m = -3\nbearing_deg = 400\ncount = 0\n";
+    let file = write(folder.path(), "odd.toml", text);
+    let output = bowwave(["scenario", "check", &file]);
+    expect_code(&output, 1);
+    let told = said(&output);
+    let lines: Vec<&str> = told.lines().filter(|line| line.contains("odd.toml:")).collect();
+    let places = ["2:14: duration_s", "4:12: sea.beaufort", "5:1: sea.wind", "14:9: boat[1].count"];
+    for place in places {
+        assert_eq!(
+            lines.iter().filter(|line| line.contains(&format!("odd.toml:{place}"))).count(),
+            1,
+            "{place}\n{told}"
+        );
+    }
+    // Ranges and bearings of that boat are told or not, but nothing that came of taking lines out is.
+    for follows in ["goals.stop", "is missing"] {
+        assert!(!told.contains(follows), "{told}");
+    }
+}
+
+#[test]
+fn a_model_that_there_is_not_is_named_where_the_boat_stands() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let boat =
+        "[[boat]]\nname = \"a\"\nmodel = \"trawler\"\ncourse = \"still\"\nrange_m = 300\nbearing_deg = 3\n";
+    let file = write(folder.path(), "trawler.toml", &format!("name = \"Trawler\"\n{boat}"));
+    let told = said(&bowwave(["scenario", "check", &file]));
+    assert!(told.contains("trawler.toml:5:11: boat[1]: cannot load the model of a: there is no model \"trawler\"; built in are"), "{told}");
+}
+
+#[test]
 fn what_is_hardly_meant_is_pointed_out_and_no_built_in_scenario_has_any() {
     let folder = tempfile::tempdir().expect("a folder");
     let text = "name = \"Odd\"\nduration_s = 60\nbriefing = \"Odd.\"\n[weapon]\nbelt = 0\n[rules]\nengagement = \"free\"\n[goals]\n\
                 keep_off_m = 400\n[[event]]\nat_s = 90\nmessage = \"late\"\n[[call]]\nsay = \"warn\"\nabout = \"a\"\nbefore_m = 350\n\
-                [[boat]]\nname = \"a\"\nmodel = \"skiff\"\ncrew = \"attacker\"\nrange_m = 300\nbearing_deg = 3\non_target_s = 80\n";
+                [[boat]]\nname = \"a\"\nmodel = \"skiff\"\ncrew = \"attacker\"\nrange_m = 300\nbearing_deg = 3\non_target_s = 80\n[searchlight]\n[light]\nsun_elevation_deg = 40\nsource = \"scenario\"\n[[crew]]\nname = \"slow\"\n\
+                [[crew.state]]\nname = \"lie\"\ndoes = \"stop\"\n[[crew.state]]\nname = \"run\"\ndoes = \"flee\"\nspeed_kn = 20\n[[boat]]\n\
+                name = \"slow\"\nmodel = \"skiff\"\ncrew = \"slow\"\nspeed_max_kn = 10\nrange_m = 500\nbearing_deg = 30\n";
     let file = write(folder.path(), "odd.toml", text);
     let output = bowwave(["scenario", "check", &file]);
     expect_code(&output, 0);
@@ -80,6 +116,9 @@ fn what_is_hardly_meant_is_pointed_out_and_no_built_in_scenario_has_any() {
         "\"a\" begins 300 m off, within goals.keep_off_m = 400",
         "weapon.belt is 0: nobody can fire",
         "\"a\" is due at 80 s: the scenario ends after 60 s",
+        "searchlight lights nobody: the sun is up",
+        "\"slow\" cannot make the 20 kn that its crew's state \"run\" asks for: its speed_max_kn is 10",
+        "nothing leads the crew of \"slow\" to its state \"run\"",
     ] {
         assert!(told.contains(doubt), "{doubt}\n{told}");
     }

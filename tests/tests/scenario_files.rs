@@ -36,6 +36,10 @@ muzzle_velocity_m_s = 890
 ballistic_coefficient_g7_lb_in2 = 0.33
 dispersion_mrad = 0.6
 tracer_every = 5
+[searchlight]
+candela = 150000
+beam_deg = 6
+on = true
 [rules]
 engagement = "warn"
 self_defence_m = 100
@@ -64,6 +68,7 @@ radius_m = 40
 [[crew.state.next]]
 to = "come"
 after_s = 15
+lit = true
 chance = 0.5
 [[crew.state]]
 name = "come"
@@ -96,7 +101,7 @@ bearing_deg = 20
 "#;
 
 /// What stands in the sound one, what stands in its place, the key that is named, and whether a schema can tell.
-const MISTAKES: [(&str, &str, &str, bool); 64] = [
+const MISTAKES: [(&str, &str, &str, bool); 68] = [
     ("name = \"Everything\"", "name = 5", "name", true),
     ("name = \"Everything\"", "name = \"\"", "name", true),
     ("seed = 3", "seed = -3", "seed", true),
@@ -125,6 +130,10 @@ const MISTAKES: [(&str, &str, &str, bool); 64] = [
     ("muzzle_velocity_m_s = 890", "muzzle_velocity_m_s = 20", "weapon.muzzle_velocity_m_s", true),
     ("dispersion_mrad = 0.6", "dispersion_mrad = 60", "weapon.dispersion_mrad", true),
     ("tracer_every = 5", "tracers_every = 5", "weapon.tracers_every", true),
+    ("candela = 150000", "candela = 50", "searchlight.candela", true),
+    ("beam_deg = 6", "beam = 6", "searchlight.beam", true),
+    ("on = true", "on = \"yes\"", "searchlight.on", true),
+    ("lit = true", "lit = false", "crew[1].state[1].next[1].lit", true),
     ("engagement = \"warn\"", "engagement = \"fire\"", "rules.engagement", true),
     ("engagement = \"warn\"\n", "", "rules.engagement", true),
     ("self_defence_m = 100", "self_defense_m = 100", "rules.self_defense_m", true),
@@ -148,7 +157,7 @@ const MISTAKES: [(&str, &str, &str, bool); 64] = [
     ("radius_m = 40", "radius_m = 4", "crew[1].state[1].radius_m", true),
     ("radius_m = 40", "radius_m = 40\nturn_m = 90", "crew[1].state[1].turn_m", false),
     ("to = \"come\"", "to = \"go\"", "crew[1].state[1].next[1].to", false),
-    ("after_s = 15\n", "", "crew[1].state[1].next[1].after_s", true),
+    ("after_s = 15\nlit = true\n", "", "crew[1].state[1].next[1].after_s", true),
     ("chance = 0.5", "chance = 1.5", "crew[1].state[1].next[1].chance", true),
     ("stop_m = 60\n", "", "crew[1].state[2].stop_m", false),
     ("model = \"skiff\"\n", "", "boat[1].model", true),
@@ -243,6 +252,7 @@ fn each_table_of_the_schema_has_the_keys_of_the_reader() {
         ("/properties/light", "[light]\nxyz = 1\n"),
         ("/properties/reflection", "[reflection]\nxyz = 1\n"),
         ("/properties/weapon", "[weapon]\nxyz = 1\n"),
+        ("/properties/searchlight", "[searchlight]\nxyz = 1\n"),
         ("/properties/rules", "[rules]\nxyz = 1\n"),
         ("/properties/goals", "[goals]\nxyz = 1\n"),
         ("/properties/call/items", "[[call]]\nxyz = 1\n"),

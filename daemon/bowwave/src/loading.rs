@@ -9,7 +9,7 @@ use bowwave_core::{
     world::scenario::{self, Scenario},
 };
 use bowwave_files::plain_text;
-use bowwave_models::BoatModels;
+use bowwave_models::{BoatModels, ModelError};
 
 /// Text of the scenario that `path` names, a file or a built-in one, and the folder that its models' paths start from.
 pub fn read_scenario(path: &Path) -> Result<(String, PathBuf)> {
@@ -64,10 +64,21 @@ pub fn parse_scenario(text: &str, origin: &str, base: &Path) -> Result<LoadedSce
     Ok(LoadedScenario { scenario, models, of_boats })
 }
 
+/// A model's error where the text places the boat that has it.
+fn placed(error: ModelError, scenario: &Scenario) -> anyhow::Error {
+    if let ModelError::OfBoat { boat, source } = &error
+        && let Some(spec) = scenario.boats.iter().find(|spec| spec.name == *boat)
+    {
+        let causes: Vec<String> = anyhow::Chain::new(source.as_ref()).map(ToString::to_string).collect();
+        return spec.error(format!("{error}: {}", causes.join(": "))).into();
+    }
+    error.into()
+}
+
 /// The models of a scenario's boats, all of which keep clear of the camera.
 pub fn scenario_models(scenario: &Scenario, base: &Path) -> Result<(Vec<Model>, Vec<ModelId>)> {
     let boats = scenario.boats.iter().map(|b| (b.name.as_str(), b.model.as_str()));
-    let models = BoatModels::load(boats, base)?;
+    let models = BoatModels::load(boats, base).map_err(|error| placed(error, scenario))?;
     let radius = |id: &ModelId| models.list.get(usize::from(id.0)).map_or(0.0, Model::radius_m);
     scenario.check_clearance(&models.of_boats.iter().map(radius).collect::<Vec<_>>())?;
     Ok((models.list, models.of_boats))

@@ -146,6 +146,7 @@ fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
                 }
                 Pass::Wake => "frames with a wake in view, on its pixels only",
                 Pass::Boats => "frames with a boat in view, on its pixels only",
+                Pass::Searchlight => "frames with the searchlight on, on the pixels that it lights",
                 Pass::Lights => "frames between sunset and sunrise with a light in view",
                 Pass::Rounds => "frames with a tracer, splash or strike in view",
             },

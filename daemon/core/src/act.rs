@@ -22,6 +22,8 @@ pub enum Act {
     Safe,
     /// It is made ready again.
     Ready,
+    /// The searchlight on the gun is switched on, or off again.
+    Light,
     /// The person who drives a boat gives it an order. That is no act of the trainee's, and comes the same way.
     Drive(DriveOrder),
 }
@@ -44,7 +46,7 @@ pub enum DriveOrder {
 
 impl Act {
     /// All acts.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Report,
         Self::Identify(Side::Hostile),
         Self::Identify(Side::Neutral),
@@ -53,6 +55,7 @@ impl Act {
         Self::Clear,
         Self::Safe,
         Self::Ready,
+        Self::Light,
         Self::Drive(DriveOrder::Ahead),
         Self::Drive(DriveOrder::Astern),
         Self::Drive(DriveOrder::Port),
@@ -71,6 +74,7 @@ impl Act {
             Self::Clear => "clear",
             Self::Safe => "safe",
             Self::Ready => "ready",
+            Self::Light => "light",
             Self::Drive(DriveOrder::Ahead) => "ahead",
             Self::Drive(DriveOrder::Astern) => "astern",
             Self::Drive(DriveOrder::Port) => "port",

@@ -5,6 +5,7 @@
 use std::sync::Arc;
 
 use bowwave_core::{
+    act::{Act, TraineeAct},
     calibration::{Calibration, TriggerLatency},
     ephemeris::{Place, Utc},
     estimate::attitude::Source,
@@ -534,6 +535,32 @@ fn by_night_a_neutral_boat_shows_its_lights_and_a_hostile_one_none() {
         (starboard[0].at.z - 3.0).abs() < 0.2 && (starboard[0].at.y - 200.0).abs() < 5.0,
         "{starboard:?}"
     );
+}
+
+#[test]
+fn the_searchlight_is_switched_by_the_act_and_lights_by_night_alone() {
+    let light = |table: &str, elevation: &str, acts: &[i64]| {
+        let mut s = session(&format!("{SCENARIO}\n{table}\n[light]\nsun_elevation_deg = {elevation}\n"));
+        let mut seen = Vec::new();
+        for tick in 1..30 {
+            let now = Time::from_ns(tick * 33 * MS);
+            feed(&mut s, now);
+            for _ in acts.iter().filter(|at| **at == tick) {
+                s.event(&Event::Act(TraineeAct { time: now, act: Act::Light }));
+            }
+            let scene = s.tick(Tick::at(now)).view.scene;
+            seen.push((scene.searchlight.is_some(), scene.passes[Pass::Searchlight as usize]));
+        }
+        seen
+    };
+    let left_out = |why| (false, PassDecision::LeftOut(why));
+    let (none, off) = (left_out(LeftOut::NoSearchlight), left_out(LeftOut::SearchlightOff));
+    assert_eq!(light("", "-12", &[5]).last(), Some(&none));
+    assert_eq!(light("[searchlight]", "30", &[5]).last(), Some(&left_out(LeftOut::Daylight)));
+    assert_eq!(light("[searchlight]", "-12", &[]).last(), Some(&off));
+    assert_eq!(light("[searchlight]\non = true", "-12", &[]).last(), Some(&(true, PassDecision::Run)));
+    let switched = light("[searchlight]", "-12", &[5, 15]);
+    assert_eq!((switched[3], switched[12].0, switched[28]), (off, true, off), "{switched:?}");
 }
 
 #[test]

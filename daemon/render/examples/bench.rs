@@ -15,9 +15,13 @@ use std::{
 
 use bowwave_core::{
     event::{Picture, PixelFormat},
-    frame::scene::{LeftOut, Pass, PassDecision, RoundView, Scene},
+    frame::{
+        scene::{LeftOut, Pass, PassDecision, RoundView, Scene},
+        searchlight::SearchlightView,
+    },
     model::Model,
     water::{ReflectionMethod, ShadowLevel},
+    world::searchlight::SearchlightSpec,
 };
 use bowwave_render::{Completions, DrawRequest, Needs, RenderConfig, Renderer, TimeOuts};
 use glam::{DVec3, Vec3};
@@ -106,6 +110,17 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
         "boat near",
         "the mesh as the sun sees it, four texels a pixel of the hull",
         &sunlit,
+    );
+    let spec =
+        SearchlightSpec { candela: SearchlightSpec::CANDELA, beam: SearchlightSpec::BEAM, is_on: true };
+    let mut beam = with(off, none, 60.0);
+    beam.searchlight = Some(SearchlightView::new(&spec, DVec3::Z, 0.5, 10_000.0));
+    beam.passes[Pass::Searchlight as usize] = PassDecision::Run;
+    step(
+        "boat near, searchlight",
+        "boat near",
+        "a third of the pixels blended once more, light at each corner of the mesh",
+        &beam,
     );
     for (name, method, why) in [
         ("mirror", ReflectionMethod::Mirror, "the mesh mirrored, once a pixel of water"),
@@ -212,6 +227,7 @@ impl Running {
             needs: Needs {
                 boats_max: scene.boats.len(),
                 lights_max: scene.lights.len(),
+                searchlight: scene.searchlight.is_some(),
                 rounds_max: scene.rounds.len(),
                 wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
                 waters: water.into_iter().collect(),

@@ -85,6 +85,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         needs: Needs {
             boats_max: 8,
             lights_max: 0,
+            searchlight: scene.searchlight.is_some(),
             rounds_max: 8,
             wakes_max: 8,
             waters: vec![(method, scene.water.shadow)],

@@ -19,6 +19,8 @@ pub struct Needs {
     pub rounds_max: usize,
     /// Most navigation lights in one frame.
     pub lights_max: usize,
+    /// The gun has a searchlight.
+    pub searchlight: bool,
     /// Most boats in one frame that leave a wake.
     pub wakes_max: usize,
     /// How the sea may have to mirror.
@@ -76,6 +78,7 @@ impl RenderConfig {
                 boats_max: only(Pass::Boats, plan.boats),
                 wakes_max: only(Pass::Wake, plan.moving),
                 lights_max: only(Pass::Lights, LIGHTS_A_BOAT * plan.boats),
+                searchlight: plan.has(Pass::Searchlight),
                 rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
                 waters,
                 optics: plan.optics,

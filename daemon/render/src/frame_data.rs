@@ -4,10 +4,11 @@
 use std::sync::Arc;
 
 use ash::vk;
+use bowwave_core::frame::searchlight::BEAM_NODES_MAX;
 use bytemuck::Pod;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BoatBlock, FrameBlock, HudQuad, LobeBlock, MethodBytes, PHYSICS_WAVES, RoundBlock,
-    WATERS_MAX, WakeBlock, WaterBlock,
+    BOAT_BLOCKS_MAX, BeamNode, BoatBlock, FrameBlock, HudQuad, LobeBlock, MethodBytes, PHYSICS_WAVES,
+    RoundBlock, WATERS_MAX, WakeBlock, WaterBlock,
 };
 
 use crate::{
@@ -39,6 +40,8 @@ pub(crate) struct Capacity {
     pub(crate) lobes: usize,
     /// Navigation lights.
     pub(crate) lights: usize,
+    /// Whether there is a searchlight.
+    pub(crate) searchlight: bool,
     /// Boats that leave a wake.
     pub(crate) wakes: usize,
 }
@@ -46,15 +49,18 @@ pub(crate) struct Capacity {
 /// One slot's upload buffer with the descriptor set that points into it.
 pub(crate) struct FrameData {
     buffer: Buffer,
-    regions: [Region; 10],
+    regions: [Region; REGIONS],
     pub(crate) set: vk::DescriptorSet,
 }
 
+/// Bindings of set 0.
+const REGIONS: usize = 11;
+
 /// Descriptor kinds of set 0.
-const fn kinds() -> [vk::DescriptorType; 10] {
+const fn kinds() -> [vk::DescriptorType; REGIONS] {
     const STORAGE: vk::DescriptorType = vk::DescriptorType::STORAGE_BUFFER;
     const UNIFORM: vk::DescriptorType = vk::DescriptorType::UNIFORM_BUFFER;
-    [UNIFORM, STORAGE, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE, UNIFORM, UNIFORM]
+    [UNIFORM, STORAGE, UNIFORM, STORAGE, STORAGE, STORAGE, STORAGE, STORAGE, UNIFORM, UNIFORM, STORAGE]
 }
 
 /// Layout of set 0.
@@ -85,6 +91,7 @@ impl FrameData {
             size_of::<WakeBlock>() * capacity.wakes.max(1),
             size_of::<MethodBytes>() * WATERS_MAX,
             size_of::<[f32; 4]>() * PHYSICS_WAVES,
+            size_of::<BeamNode>() * if capacity.searchlight { BEAM_NODES_MAX } else { 1 },
         ];
         let mut end = 0;
         let regions = sizes.map(|size| {
@@ -94,7 +101,7 @@ impl FrameData {
         });
         let usage = vk::BufferUsageFlags::UNIFORM_BUFFER | vk::BufferUsageFlags::STORAGE_BUFFER;
         let buffer = Buffer::new(gpu, "frame data", end, usage, Access::Upload)?;
-        let bound: [Bound; 10] = std::array::from_fn(|i| {
+        let bound: [Bound; REGIONS] = std::array::from_fn(|i| {
             let (buffer, Region { offset, size }) = (buffer.raw, regions[i]);
             if kinds()[i] == vk::DescriptorType::UNIFORM_BUFFER {
                 Bound::Uniform { buffer, offset, size }
@@ -145,6 +152,11 @@ impl FrameData {
     /// Waves of the corrected Physics shader.
     pub(crate) fn write_waves(&mut self, waves: &[[f32; 4]]) {
         self.write(9, waves);
+    }
+
+    /// Light at the nodes of the searchlight's grid.
+    pub(crate) fn write_beam(&mut self, nodes: &[BeamNode]) {
+        self.write(10, nodes);
     }
 
     fn write<T: Pod>(&mut self, region: usize, blocks: &[T]) {

@@ -26,6 +26,7 @@ use crate::{
         hud::layout::KINDS,
         lights::plan::{Mirror, light_block, mirrored_block},
         rounds::plan::round_block,
+        searchlight::plan::BeamPlan,
         shadow::plan::ShadowPlan,
         wake::{
             WakeDraw,
@@ -111,6 +112,7 @@ pub(crate) struct Plan {
     pub(crate) reflects: Vec<ReflectDraw>,
     pub(crate) wake_blocks: Vec<WakeBlock>,
     pub(crate) wakes: Vec<WakeDraw>,
+    pub(crate) beam: BeamPlan,
     pub(crate) lights: Vec<HullPiece<LightBlock>>,
     /// Mirrored ones, each with the number of its boat in `mirrors`.
     pub(crate) mirror_lights: Vec<(usize, LightBlock)>,
@@ -148,7 +150,7 @@ pub(crate) struct Plan {
 
 impl Plan {
     pub(crate) fn with_capacity(capacity: Capacity, size: (u32, u32)) -> Self {
-        let Capacity { boats, lights, rounds, lobes, wakes } = capacity;
+        let Capacity { boats, lights, searchlight, rounds, lobes, wakes } = capacity;
         let touched =
             2 * HULL_RECTS_MAX + RECTS_MAX + lobes * WATER_RECTS_MAX + lights + rounds + wakes * TRACK_POINTS;
         // With the display's plates.
@@ -171,6 +173,7 @@ impl Plan {
             waves: (lobes > 0).then(Waves::new),
             wake_blocks: Vec::with_capacity(wakes),
             wakes: Vec::with_capacity(wakes),
+            beam: if searchlight { BeamPlan::new(size) } else { BeamPlan::default() },
             lights: Vec::with_capacity(lights * 4),
             mirror_lights: Vec::with_capacity(lights),
             rounds: Vec::with_capacity(rounds * 4),
@@ -210,6 +213,9 @@ impl Plan {
         if scene.runs(Pass::Wake) {
             self.plan_wakes(scene);
         }
+        if let Some(view) = scene.searchlight.as_ref().filter(|_| scene.runs(Pass::Searchlight)) {
+            self.beam.make(scene, view, &self.hulls, (&mut self.rest, &mut self.touched));
+        }
         if scene.runs(Pass::Lights) {
             self.plan_lights(scene);
         }
@@ -238,6 +244,7 @@ impl Plan {
         self.physics = None;
         self.wake_blocks.clear();
         self.wakes.clear();
+        self.beam.clear();
         self.lights.clear();
         self.mirror_lights.clear();
         self.rounds.clear();
@@ -441,7 +448,12 @@ impl Plan {
             self.touched.push(rect);
             let lights = &mut self.lights;
             pieces(rect, &self.hulls, &mut self.rest, |rect, hidden| {
-                lights.push(HullPiece { rect, hidden, block: LightBlock { rect: corners(rect), ..block } });
+                lights.push(HullPiece {
+                    rect,
+                    hidden,
+                    instances: 1,
+                    block: LightBlock { rect: corners(rect), ..block },
+                });
             });
         }
     }
@@ -459,6 +471,7 @@ impl Plan {
                 rounds.push(HullPiece {
                     rect,
                     hidden,
+                    instances: 1,
                     block: DrawBlock { rect: corners(rect), index, first: 0 },
                 });
             });

@@ -9,7 +9,7 @@ use bowwave_core::{
     model::Model,
     water::{ReflectionMethod, Water},
 };
-use shaders_spirv::interface::{DrawBlock, LightBlock};
+use shaders_spirv::interface::{BeamBlock, DrawBlock, LightBlock};
 
 use crate::{
     config::{Needs, RenderConfig},
@@ -24,7 +24,7 @@ use crate::{
         hud::HudPass,
         lights,
         mirror::MirrorPass,
-        rounds,
+        rounds, searchlight,
         shadow::ShadowPass,
         video::{
             VideoPass,
@@ -99,6 +99,7 @@ struct Passes {
     reflect: Option<ReflectPass>,
     wake: Option<WakePass>,
     boats: Option<BoatsPass>,
+    searchlight: Option<BehindHulls<BeamBlock>>,
     lights: Option<BehindHulls<LightBlock>>,
     rounds: Option<BehindHulls<DrawBlock>>,
     hud: HudPass,
@@ -129,6 +130,10 @@ impl Passes {
         let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
         let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
         let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
+        let searchlight = needs
+            .searchlight
+            .then(|| BehindHulls::new(context, &searchlight::SHADERS, boats.as_ref()))
+            .transpose()?;
         let lights = (needs.lights_max > 0)
             .then(|| BehindHulls::new(context, &lights::SHADERS, boats.as_ref()))
             .transpose()?;
@@ -137,7 +142,20 @@ impl Passes {
             .transpose()?;
         let hud = HudPass::new(context)?;
         let video = VideoPass::new(context, config.picture, &hud.overlay.layout)?;
-        Ok(Self { video, meshes, shadow, mirror, water, reflect, wake, boats, lights, rounds, hud })
+        Ok(Self {
+            video,
+            meshes,
+            shadow,
+            mirror,
+            water,
+            reflect,
+            wake,
+            boats,
+            searchlight,
+            lights,
+            rounds,
+            hud,
+        })
     }
 }
 
@@ -174,12 +192,14 @@ impl<T> Renderer<T> {
             words: shared.target(0).words,
             slots: count,
             optics: config.needs.optics,
+            searchlight: config.needs.searchlight,
         };
         let passes = Passes::new(&context, config, models)?;
         let needs = config.needs.clone();
         let capacity = Capacity {
             boats: needs.boats_max,
             lights: needs.lights_max,
+            searchlight: needs.searchlight,
             rounds: needs.rounds_max,
             lobes: needs.lobes(),
             wakes: needs.wakes_max,
@@ -296,6 +316,9 @@ impl<T> Renderer<T> {
         if scene.lights.len() > self.needs.lights_max {
             return missing("more navigation lights");
         }
+        if scene.runs(Pass::Searchlight) && !self.needs.searchlight {
+            return missing("a searchlight");
+        }
         if scene.runs(Pass::Wake)
             && scene.boats.iter().filter(|b| b.wake.is_some()).count() > self.needs.wakes_max
         {
@@ -324,6 +347,7 @@ impl<T> Renderer<T> {
         }
         slot.data.write_wakes(&plan.wake_blocks);
         slot.data.write_rounds(&plan.round_blocks);
+        slot.data.write_beam(&plan.beam.nodes);
         slot.data.write_rects(&plan.list);
         (plan.quads, plan.renewed) = Default::default();
         let mut covered = true;
@@ -501,6 +525,9 @@ impl<T> Renderer<T> {
         }
         if let Some(pass) = self.passes.wake.as_ref().filter(|_| plan.wakes.iter().any(|w| w.spray)) {
             stamps.around(Span::Spray, || pass.record_spray(to, frame, &plan.wakes));
+        }
+        if let Some(pass) = self.passes.searchlight.as_ref().filter(|_| !plan.beam.pieces.is_empty()) {
+            stamps.around(Span::Searchlight, || pass.record(to, frame, &plan.beam.pieces));
         }
         if let Some(pass) = self.passes.lights.as_ref().filter(|_| !plan.lights.is_empty()) {
             stamps.around(Span::Lights, || pass.record(to, frame, &plan.lights));

@@ -69,13 +69,14 @@ pub(crate) enum Span {
     Wake,
     Composite,
     Spray,
+    Searchlight,
     Lights,
     Rounds,
     Hud,
 }
 
 impl Span {
-    const ALL: [Self; 16] = [
+    const ALL: [Self; 17] = [
         Self::Video,
         Self::Download,
         Self::Shadow,
@@ -89,6 +90,7 @@ impl Span {
         Self::Wake,
         Self::Composite,
         Self::Spray,
+        Self::Searchlight,
         Self::Lights,
         Self::Rounds,
         Self::Hud,
@@ -103,6 +105,7 @@ impl Span {
             Self::Backdrop | Self::Field | Self::Layers | Self::Water => Pass::Water,
             Self::Wake | Self::Spray => Pass::Wake,
             Self::BoatLayer | Self::Composite => Pass::Boats,
+            Self::Searchlight => Pass::Searchlight,
             Self::Lights => Pass::Lights,
             Self::Rounds => Pass::Rounds,
             Self::Hud => Pass::Hud,

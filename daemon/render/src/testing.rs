@@ -33,6 +33,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
         boats: Vec::new(),
         rounds: Vec::new(),
         lights: Vec::new(),
+        searchlight: None,
         light: Light {
             sun_direction: DVec3::new(0.5, -0.5, 0.7).normalize(),
             sun: Vec3::new(0.8, 0.76, 0.68),

@@ -19,6 +19,10 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
     let pair = |v: glam::DVec2| v.as_vec2().to_array();
     let light = |v: Vec3| v.extend(0.0).to_array();
     let Light { sun, sky, horizon, sea, .. } = scene.light;
+    let (lamp, beam) = scene.searchlight.map_or_else(Default::default, |light| {
+        let matt = light.strength * std::f64::consts::FRAC_1_PI;
+        (light.lamp.extend(light.sharpness).as_vec4(), light.axis.extend(matt).as_vec4())
+    });
     FrameBlock {
         focal: pair(lens.focal),
         centre: pair(lens.centre),
@@ -30,6 +34,8 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         sky: light(sky),
         sea: light(sea),
         horizon: light(horizon),
+        lamp: lamp.to_array(),
+        beam: beam.to_array(),
         row_turn: lens.row_turn.extend(0.0).as_vec4().to_array(),
     }
 }

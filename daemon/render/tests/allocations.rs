@@ -16,8 +16,12 @@ use std::{
 };
 
 use bowwave_core::{
-    frame::scene::{LightView, Pass, PassDecision, RoundView},
+    frame::{
+        scene::{LightView, Pass, PassDecision, RoundView},
+        searchlight::SearchlightView,
+    },
     water::ReflectionMethod,
+    world::searchlight::SearchlightSpec,
 };
 use bowwave_render::DrawRequest;
 use common::{
@@ -73,7 +77,9 @@ fn check(method: ReflectionMethod) {
         RoundView::Tracer { from: DVec3::new(1.0, 8.0, 7.5), to: at, radiance: Vec3::splat(4.0) },
     ];
     scene.lights = vec![LightView { boat: 0, at: at + DVec3::Z, light: Vec3::splat(1e-4) }];
-    for pass in [Pass::Lights, Pass::Rounds] {
+    let spec = SearchlightSpec { candela: 200_000.0, beam: 0.15, is_on: true };
+    scene.searchlight = Some(SearchlightView::new(&spec, DVec3::Z, 10.0, 5_000.0));
+    for pass in [Pass::Searchlight, Pass::Lights, Pass::Rounds] {
         scene.passes[pass as usize] = PassDecision::Run;
     }
     // The validation layer allocates for itself, in this thread.

@@ -11,15 +11,20 @@ mod common;
 use std::{path::PathBuf, sync::Arc};
 
 use bowwave_core::{
+    estimate::light::Light,
     event::{Picture, PixelFormat},
     fault::Fault,
-    frame::scene::{LightView, Pass, PassDecision, RoundView, Scene, Status},
+    frame::{
+        scene::{LightView, Pass, PassDecision, RoundView, Scene, Status},
+        searchlight::SearchlightView,
+    },
     geometry::{Distortion, look},
     guide::{Cell, Coverage, Gauge, Guide, Rating},
     model::{Model, ModelKind, Texture, Zone},
     sea::BeaufortForce,
     sky::SkyLobes,
     water::{ReflectionMethod, ShadowLevel},
+    world::searchlight::SearchlightSpec,
 };
 use common::{
     draw, sea,
@@ -266,17 +271,20 @@ fn dark_sea() -> Picture {
     Picture::new(PixelFormat::Rgb, SIZE.0, SIZE.1, Arc::from(bytes)).unwrap()
 }
 
+fn dark(scene: &mut Scene) {
+    let Light { sun, sky, horizon, sea, .. } = &mut scene.light;
+    for light in [sun, sky, horizon, sea] {
+        *light *= 0.02;
+    }
+    scene.light.dome = SkyLobes::even(scene.light.sky);
+}
+
 /// By night: a masthead light and a sidelight, one that the hull hides, and the light of a boat that mirrors it by waves.
 #[test]
 fn lights_before_and_behind_a_hull_and_in_the_sea() {
     for (name, method) in [("lights", ReflectionMethod::Baked), ("lights_full", ReflectionMethod::Full)] {
         let mut scene = boats(method, ShadowLevel::None, 1);
-        for light in
-            [&mut scene.light.sun, &mut scene.light.sky, &mut scene.light.horizon, &mut scene.light.sea]
-        {
-            *light *= 0.02;
-        }
-        scene.light.dome = SkyLobes::even(scene.light.sky);
+        dark(&mut scene);
         let pose = scene.boats[0].pose;
         let light = |boat, place: DVec3, colour: Vec3| LightView {
             boat,
@@ -289,6 +297,22 @@ fn lights_before_and_behind_a_hull_and_in_the_sea() {
             light(0, DVec3::new(2.0, 1.4, 1.0), Vec3::new(4.7, 0.0, 0.0)),
         ];
         scene.passes[Pass::Lights as usize] = PassDecision::Run;
+        check_on(name, &scene, &dark_sea(), &models());
+    }
+}
+
+/// By night a beam from above lights two boats, the air before them and the sea between, and what hulls hide of the sea stays dark.
+#[test]
+fn a_searchlight_on_boats_sea_and_air() {
+    for (name, method) in
+        [("searchlight", ReflectionMethod::Baked), ("searchlight_full", ReflectionMethod::Full)]
+    {
+        let mut scene = boats(method, ShadowLevel::None, 1);
+        dark(&mut scene);
+        let spec = SearchlightSpec { candela: 200_000.0, beam: 0.25, is_on: true };
+        let towards = scene.camera.to_camera(scene.boats[0].pose.position).normalize();
+        scene.searchlight = Some(SearchlightView::new(&spec, towards, 40.0, 2_000.0));
+        scene.passes[Pass::Searchlight as usize] = PassDecision::Run;
         check_on(name, &scene, &dark_sea(), &models());
     }
 }

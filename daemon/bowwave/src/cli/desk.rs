@@ -43,7 +43,7 @@ pub struct DeskArgs {
     #[arg(long)]
     pub sheet: bool,
     /// Also keep these frames as DIR/frame-NNNNN.png
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = frame_number)]
     pub stills: Vec<u64>,
     /// Vulkan device: its number, or part of its name
     #[arg(long, value_name = "NAME")]
@@ -77,4 +77,8 @@ pub struct Play {
     /// Outputs
     #[command(flatten)]
     pub desk: DeskArgs,
+}
+
+fn frame_number(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "give numbers of frames, counted from 0, such as 0,30,60".to_owned())
 }

@@ -186,6 +186,7 @@ pub(super) struct RawButtons {
     clear: Option<RawGpioLine>,
     safe: Option<RawGpioLine>,
     ready: Option<RawGpioLine>,
+    light: Option<RawGpioLine>,
 }
 
 impl RawButtons {
@@ -199,6 +200,7 @@ impl RawButtons {
             (Act::Clear, self.clear),
             (Act::Safe, self.safe),
             (Act::Ready, self.ready),
+            (Act::Light, self.light),
         ];
         let given = lines.into_iter().filter_map(|(act, line)| Some((act, line?)));
         given.map(|(act, line)| Ok(Press { line: line.input(text)?, kind: PressKind::Act(act) })).collect()

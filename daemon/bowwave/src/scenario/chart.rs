@@ -27,7 +27,7 @@ pub struct StrikeMark {
 
 /// The picture of what boats do while nobody fires, as SVG.
 pub fn draw(scenario: &Scenario, tracks: &[Track], seconds: f64) -> String {
-    draw_with(scenario, tracks, seconds, "while nobody fires", &[])
+    draw_with(scenario, tracks, seconds, "while nobody fires or shines a light", &[])
 }
 
 /// The picture of `what` happened, with the strikes of rounds, as SVG.

@@ -14,6 +14,8 @@ pub fn of(scenario: &Scenario) -> Vec<String> {
     goals(scenario, &mut doubts);
     weapon(scenario, &mut doubts);
     swarms(scenario, &mut doubts);
+    light(scenario, &mut doubts);
+    crews(scenario, &mut doubts);
     doubts
 }
 
@@ -99,6 +101,53 @@ fn weapon(scenario: &Scenario, doubts: &mut Vec<String>) {
     }
     if let Some(every) = weapon.stoppage_every.filter(|every| *every < 5.0) {
         doubts.push(format!("weapon.stoppage_every = {every}: the weapon hardly fires a burst"));
+    }
+}
+
+fn crews(scenario: &Scenario, doubts: &mut Vec<String>) {
+    const KN_PER_M_S: f64 = 3600.0 / 1852.0;
+    for boat in &scenario.boats {
+        let Behaviour::Crewed(start) = &boat.behaviour else { continue };
+        let (name, states) = (&boat.name, &start.plan.states);
+        if let Some(state) = states.iter().find(|state| state.speed_m_s > 1.001 * start.speed_max_m_s) {
+            doubts.push(format!(
+                "\"{name}\" cannot make the {:.0} kn that its crew's state \"{}\" asks for: its speed_max_kn is {:.0}",
+                state.speed_m_s * KN_PER_M_S,
+                state.name,
+                start.speed_max_m_s * KN_PER_M_S
+            ));
+        }
+        let mut reached = vec![0];
+        let mut next = 0;
+        while let Some(state) = reached.get(next).and_then(|state| states.get(*state)) {
+            let new: Vec<usize> =
+                state.exits.iter().map(|exit| exit.to).filter(|to| !reached.contains(to)).collect();
+            reached.extend(new);
+            next += 1;
+        }
+        if let Some((_, state)) = states.iter().enumerate().find(|(i, _)| !reached.contains(i)) {
+            doubts.push(format!("nothing leads the crew of \"{name}\" to its state \"{}\"", state.name));
+        }
+    }
+}
+
+fn light(scenario: &Scenario, doubts: &mut Vec<String>) {
+    let waits = |boat: &&BoatSpec| match &boat.behaviour {
+        Behaviour::Crewed(start) => {
+            start.plan.states.iter().flat_map(|state| &state.exits).any(|exit| exit.guard.lit)
+        }
+        _ => false,
+    };
+    let waiting = scenario.boats.iter().find(waits);
+    match (waiting, scenario.searchlight) {
+        (Some(boat), None) => doubts.push(format!(
+            "\"{}\" waits until it is lit, and nothing can light it: add a table [searchlight]",
+            boat.name
+        )),
+        (_, Some(_)) if scenario.daylight.stays_up() => {
+            doubts.push("searchlight lights nobody: the sun is up".to_owned());
+        }
+        _ => {}
     }
 }
 

@@ -10,6 +10,8 @@ pub use self::{
     rehearsal::TrackLog,
 };
 
+use std::path::Path;
+
 use anyhow::Result;
 use bowwave_core::world::{
     boats::Behaviour,
@@ -121,12 +123,23 @@ fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
                 }
             }
             Err(e) => {
-                eprintln!("bowwave: {}", bowwave_core::text::one_line(&format!("{e:#}")));
+                let all = mistakes(path);
+                let told = if all.is_empty() { vec![format!("{e:#}")] } else { all };
+                for mistake in told {
+                    eprintln!("bowwave: {}", bowwave_core::text::one_line(&mistake));
+                }
                 outcome = Outcome::Failed;
             }
         }
     }
     Ok(outcome)
+}
+
+/// The mistakes of a scenario's text; none where it is sound, or cannot be read at all.
+fn mistakes(path: &Path) -> Vec<String> {
+    let Ok((text, _)) = read_scenario(path) else { return Vec::new() };
+    let mistakes = scenario::read::mistakes(&text, &path.display().to_string());
+    mistakes.into_iter().map(|mistake| mistake.to_string()).collect()
 }
 
 fn preview(arguments: &ScenarioPreview) -> Result<Outcome> {
@@ -141,7 +154,7 @@ fn preview(arguments: &ScenarioPreview) -> Result<Outcome> {
     let picture = chart::draw(&loaded.scenario, &tracks, seconds);
     write_new(&out, &picture)?;
     eprintln!(
-        "{}: where {} boats go in {seconds:.0} s while nobody fires; open it in a browser",
+        "{}: where {} boats go in {seconds:.0} s while nobody fires or shines a light; open it in a browser",
         out.display(),
         tracks.len()
     );

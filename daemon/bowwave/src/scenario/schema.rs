@@ -37,6 +37,7 @@ pub fn scenario() -> Value {
             ("light", light()),
             ("reflection", reflection()),
             ("weapon", weapon()),
+            ("searchlight", searchlight()),
             ("rules", rules()),
             ("goals", goals()),
             ("call", list(call(), 64)),
@@ -150,6 +151,18 @@ fn reflection() -> Value {
         vec![
             ("method", one_of(ReflectionMethod::names(), "Method of reflection")),
             ("shadow_level", whole(0, 2, "How strong the shadow is")),
+        ],
+        &[],
+    )
+}
+
+fn searchlight() -> Value {
+    table(
+        "A searchlight on the gun; the act light switches it",
+        vec![
+            ("candela", number(100.0, 1e8, "Luminous intensity on its axis")),
+            ("beam_deg", number(0.5, 60.0, "Width of its beam between where it has half of that")),
+            ("on", flag("Whether it is on as the exercise begins")),
         ],
         &[],
     )

@@ -62,7 +62,7 @@ pub fn contradictions(scenario: &Scenario, properties: &Properties, length_s: f6
     }
     if let Some(lasts_s) = scenario.duration_s.filter(|lasts_s| *lasts_s > length_s + 0.5) {
         found.push(format!(
-            "this run ends after {length_s:.1} s, the scenario after {lasts_s} s (--duration {lasts_s} in place of --frames plays all of it)"
+            "this run ends after {length_s:.1} s, the scenario after {lasts_s} s (--duration {lasts_s} plays all of it)"
         ));
     }
     found

@@ -10,6 +10,7 @@ use super::{
     plan::{InView, SceneNeeds, ScenePlan, sea_reflects},
     rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
     scene::{BoatView, Hud, LightView, Pass, RoundView, Scene, Status},
+    searchlight::SearchlightView,
     view::ViewFrustum,
     wake::Wake,
 };
@@ -26,6 +27,7 @@ use crate::{
         boats::{CourseState, Hull},
         fleet::Afloat,
         scenario::{Scenario, Side},
+        searchlight::SearchlightSpec,
     },
 };
 
@@ -79,6 +81,8 @@ pub struct Composer {
     screen_lens: Lens,
     visibility_m: f64,
     eye_height_m: f64,
+    /// The barrel, camera's axes.
+    bore: DVec3,
     models: Arc<[Model]>,
     boat_models: Vec<ModelId>,
     black: Picture,
@@ -112,6 +116,7 @@ impl Composer {
             boats: Vec::with_capacity(scenario.boats.len()),
             rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
             lights: Vec::new(),
+            searchlight: None,
             light: light.boats,
             water: scenario.water,
             wind: scenario.wind.truncate(),
@@ -125,6 +130,7 @@ impl Composer {
             screen_lens,
             visibility_m: scenario.daylight.visibility_m,
             eye_height_m: scenario.eye_height_m,
+            bore: calibration.bore_in_camera(),
             models: Arc::clone(models),
             boat_models: boat_models.to_vec(),
             black,
@@ -181,6 +187,7 @@ impl Composer {
         let scene = &mut self.scene;
         scene.boats.clear();
         scene.lights.clear();
+        scene.searchlight = None;
         scene.rounds.clear();
         scene.passes = self.plan.frame(&InView::default());
         scene.hud.status = status(moment, None);
@@ -229,10 +236,14 @@ impl Composer {
             }
             rounds_in_view(running, &frustum, time, &mut scene.rounds);
         }
+        let shining = world.searchlight().filter(|_| self.plan.has(Pass::Searchlight));
+        scene.searchlight =
+            shining.map(|spec| SearchlightView::new(spec, self.bore, light.white_cd_m2, self.visibility_m));
         (scene.light, scene.sky, scene.tones) = (light.boats, light.sky, light.tones);
         scene.passes = self.plan.frame(&InView {
             pose_known: camera.is_some(),
             sun_shines: scene.light.sun_shines(),
+            searchlight: scene.searchlight.is_some(),
             boats: &scene.boats,
             lights: &scene.lights,
             rounds: &scene.rounds,
@@ -291,9 +302,22 @@ impl Composer {
         };
         let lights: Vec<_> =
             if self.plan.has(Pass::Lights) { boats.iter().map(on).collect() } else { Vec::new() };
-        let in_view =
-            InView { pose_known: true, sun_shines: true, boats: &boats, lights: &lights, rounds: &rounds };
-        Scene { camera, passes: self.plan.frame(&in_view), boats, lights, rounds, ..self.scene.clone() }
+        let spec =
+            SearchlightSpec { candela: SearchlightSpec::CANDELA, beam: SearchlightSpec::BEAM, is_on: true };
+        let searchlight = self
+            .plan
+            .has(Pass::Searchlight)
+            .then(|| SearchlightView::new(&spec, self.bore, 1.0, self.visibility_m));
+        let in_view = InView {
+            pose_known: true,
+            sun_shines: true,
+            searchlight: searchlight.is_some(),
+            boats: &boats,
+            lights: &lights,
+            rounds: &rounds,
+        };
+        let passes = self.plan.frame(&in_view);
+        Scene { camera, passes, boats, lights, searchlight, rounds, ..self.scene.clone() }
     }
 
     /// A boat broadside before the camera, under way if it is one of as many as move.

@@ -7,6 +7,7 @@ pub mod plan;
 pub mod reflection;
 mod rounds;
 pub mod scene;
+pub mod searchlight;
 pub mod view;
 pub mod wake;
 

@@ -59,8 +59,12 @@ pub struct SceneNeeds {
     pub belt: u32,
     /// Some boat shows lights by night.
     pub lights: bool,
+    /// The gun has a searchlight.
+    pub searchlight: bool,
     /// The sun is up, and neither moves nor comes from the ship.
     pub sun_stays_up: bool,
+    /// The same of one that is down.
+    pub sun_stays_down: bool,
 }
 
 /// A frame's view, as it decides on the passes.
@@ -72,6 +76,8 @@ pub struct InView<'a> {
     pub sun_shines: bool,
     /// Boats that are seen, or mirrored.
     pub boats: &'a [BoatView],
+    /// The searchlight is on.
+    pub searchlight: bool,
     /// Navigation lights that are seen.
     pub lights: &'a [LightView],
     /// Tracers, splashes and strikes that are seen.
@@ -96,7 +102,9 @@ impl SceneNeeds {
             moving: scenario.boats.iter().filter(|b| b.behaviour.speed_max_m_s() > 0.0).count(),
             belt: scenario.weapon.belt,
             lights: scenario.boats.iter().any(|b| b.lights != LightsKept::None),
+            searchlight: scenario.searchlight.is_some(),
             sun_stays_up: scenario.daylight.stays_up(),
+            sun_stays_down: scenario.daylight.stays_down(),
         }
     }
 }
@@ -129,14 +137,23 @@ impl ScenePlan {
             PassDecision::Run if needs.sun_stays_up => PassDecision::LeftOut(LeftOut::Daylight),
             other => other,
         };
+        let searchlight = match (needs.searchlight, needs.sun_stays_up) {
+            (false, _) => PassDecision::LeftOut(LeftOut::NoSearchlight),
+            (true, true) => PassDecision::LeftOut(LeftOut::Daylight),
+            (true, false) => PassDecision::Run,
+        };
         let rounds =
             if needs.belt == 0 { PassDecision::LeftOut(LeftOut::NoRounds) } else { PassDecision::Run };
         let mut passes = [PassDecision::Run; Pass::COUNT];
-        passes[Pass::Shadow as usize] = boats;
+        passes[Pass::Shadow as usize] = match boats {
+            PassDecision::Run if needs.sun_stays_down => PassDecision::LeftOut(LeftOut::NoSun),
+            other => other,
+        };
         passes[Pass::Mirror as usize] = mirror;
         passes[Pass::Water as usize] = water;
         passes[Pass::Wake as usize] = wake;
         passes[Pass::Boats as usize] = boats;
+        passes[Pass::Searchlight as usize] = searchlight;
         passes[Pass::Lights as usize] = lights;
         passes[Pass::Rounds as usize] = rounds;
         Self {
@@ -158,7 +175,7 @@ impl ScenePlan {
 
     /// The passes of one frame: what the plan allows and what is in view asks for.
     pub fn frame(&self, in_view: &InView<'_>) -> [PassDecision; Pass::COUNT] {
-        let InView { pose_known, sun_shines, boats, lights, rounds } = *in_view;
+        let InView { pose_known, sun_shines, searchlight, boats, lights, rounds } = *in_view;
         let mut passes = self.passes;
         let mut leave_out = |pass: Pass, unless: bool, why: LeftOut| {
             let decision = &mut passes[pass as usize];
@@ -176,6 +193,7 @@ impl ScenePlan {
         leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Wake, boats.iter().any(|b| b.wake.is_some()), LeftOut::NoWakeInView);
         leave_out(Pass::Boats, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
+        leave_out(Pass::Searchlight, searchlight, LeftOut::SearchlightOff);
         leave_out(Pass::Lights, !lights.is_empty(), LeftOut::NoLightInView);
         leave_out(Pass::Rounds, !rounds.is_empty(), LeftOut::NoRoundInView);
         passes
@@ -201,7 +219,9 @@ mod tests {
             moving: 2,
             belt: 100,
             lights: true,
+            searchlight: true,
             sun_stays_up: false,
+            sun_stays_down: false,
         }
     }
 
@@ -237,6 +257,14 @@ mod tests {
             reason(SceneNeeds { sun_stays_up: true, ..needs() }, Pass::Lights),
             Some(LeftOut::Daylight)
         );
+        let dark = SceneNeeds { searchlight: false, ..needs() };
+        assert_eq!(reason(dark, Pass::Searchlight), Some(LeftOut::NoSearchlight));
+        assert_eq!(
+            reason(SceneNeeds { sun_stays_down: true, ..needs() }, Pass::Shadow),
+            Some(LeftOut::NoSun)
+        );
+        let day = SceneNeeds { sun_stays_up: true, ..needs() };
+        assert_eq!(reason(day, Pass::Searchlight), Some(LeftOut::Daylight));
         assert_eq!(reason(SceneNeeds { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
     }
 
@@ -249,6 +277,7 @@ mod tests {
         assert_eq!(frame[Pass::Water as usize], PassDecision::LeftOut(LeftOut::NoReflectionInView));
         assert_eq!(frame[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoWakeInView));
         assert_eq!(frame[Pass::Rounds as usize], PassDecision::LeftOut(LeftOut::NoRoundInView));
+        assert_eq!(frame[Pass::Searchlight as usize], PassDecision::LeftOut(LeftOut::SearchlightOff));
         let lost = plan.frame(&InView::default());
         assert_eq!(lost[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoPose));
         assert_eq!(lost[Pass::Hud as usize], PassDecision::Run);

@@ -11,7 +11,7 @@ use crate::{
         sea::SeaSource,
     },
     fault::Fault,
-    frame::wake::Wake,
+    frame::{searchlight::SearchlightView, wake::Wake},
     geometry::{CameraPose, Lens, RigidPose},
     guide::Guide,
     model::{ModelId, Zone},
@@ -39,6 +39,8 @@ pub struct Scene {
     pub rounds: Vec<RoundView>,
     /// Boats' navigation lights that can be seen.
     pub lights: Vec<LightView>,
+    /// The gun's searchlight, while it is on.
+    pub searchlight: Option<SearchlightView>,
     /// Light on the boats.
     pub light: Light,
     /// How the sea mirrors.
@@ -77,6 +79,8 @@ pub enum Pass {
     Wake,
     /// The boats.
     Boats,
+    /// The light of the gun's searchlight on sea and air.
+    Searchlight,
     /// Boats' navigation lights.
     Lights,
     /// Tracers and splashes.
@@ -87,7 +91,7 @@ pub enum Pass {
 
 impl Pass {
     /// How many there are.
-    pub const COUNT: usize = 9;
+    pub const COUNT: usize = 10;
     /// All of them, in order.
     pub const ALL: [Self; Self::COUNT] = [
         Self::Video,
@@ -96,6 +100,7 @@ impl Pass {
         Self::Water,
         Self::Wake,
         Self::Boats,
+        Self::Searchlight,
         Self::Lights,
         Self::Rounds,
         Self::Hud,
@@ -110,6 +115,7 @@ impl Pass {
             Self::Water => "water",
             Self::Wake => "wake",
             Self::Boats => "boats",
+            Self::Searchlight => "searchlight",
             Self::Lights => "lights",
             Self::Rounds => "rounds",
             Self::Hud => "hud",
@@ -155,6 +161,10 @@ pub enum LeftOut {
     Daylight,
     /// No light is within the picture, or the sun is up.
     NoLightInView,
+    /// The scenario has no searchlight.
+    NoSearchlight,
+    /// The searchlight is off.
+    SearchlightOff,
     /// The sun does not shine: it is down, or clouds hide it.
     NoSun,
     /// No usable orientation: boats cannot be placed.
@@ -180,6 +190,8 @@ impl LeftOut {
             Self::NoLights => "no_lights",
             Self::Daylight => "daylight",
             Self::NoLightInView => "no_light_in_view",
+            Self::NoSearchlight => "no_searchlight",
+            Self::SearchlightOff => "searchlight_off",
             Self::NoSun => "no_sun",
             Self::NoPose => "no_pose",
             Self::NoTrainee => "no_trainee",

@@ -16,6 +16,7 @@ use crate::{
         },
         contact::Capsule,
         scenario::{BoatSpec, Scenario, Side},
+        searchlight::{Beam, Searchlight},
         waves::WaveField,
     },
 };
@@ -102,7 +103,7 @@ const OWN_HULL: Capsule = Capsule::round(OWN_RADIUS_M);
 /// Radius about the gun that the own ship takes up, metres.
 const OWN_RADIUS_M: f64 = 12.0;
 
-/// Whether a large vessel hides the gun from a boat at `at`.
+/// Whether a large vessel hides the gun from what is at `at`.
 fn hides(vessel: &Traffic, at: DVec2) -> bool {
     /// Shorter vessels are looked over.
     const LOW_M: f64 = 8.0;
@@ -113,6 +114,11 @@ fn hides(vessel: &Traffic, at: DVec2) -> bool {
     let along = vessel.position.dot(at) / range2;
     let off = (vessel.position - at * along).length();
     (0.0..1.0).contains(&along) && off < 0.6 * vessel.radius_m
+}
+
+/// Whether a large vessel hides the gun from a boat at `at`.
+fn is_hidden(boat: usize, at: DVec2, traffic: &[Traffic]) -> bool {
+    traffic.iter().enumerate().any(|(other, vessel)| other != boat && hides(vessel, at))
 }
 
 /// All boats.
@@ -127,6 +133,7 @@ pub struct Fleet {
     struck: Vec<(usize, f64)>,
     /// Orders of the person who drives boats, each from those seconds on.
     driven: Vec<(f64, Orders)>,
+    searchlight: Option<Searchlight>,
 }
 
 impl Fleet {
@@ -143,7 +150,19 @@ impl Fleet {
         };
         let boats = vessels.into_iter().map(boat).collect();
         let (struck, driven) = (Vec::new(), Vec::new());
-        Self { boats, models, waves, start, followed: start, struck, driven }
+        Self { boats, models, waves, start, followed: start, struck, driven, searchlight: None }
+    }
+
+    /// The same where the gun has a searchlight.
+    pub fn with_searchlight(self, searchlight: Option<Searchlight>) -> Self {
+        Self { searchlight, ..self }
+    }
+
+    /// The searchlight's beam is this from `time` on. Boats have not been followed that far.
+    pub fn shine(&mut self, time: Time, beam: Option<Beam>) {
+        if let Some(searchlight) = &mut self.searchlight {
+            searchlight.shine(time.secs_since(self.start), beam);
+        }
     }
 
     /// The boats of a scenario. `boat_models` names the model of each.
@@ -248,14 +267,31 @@ impl Fleet {
             let close = traffic.get(other).is_some_and(|t| t.position.distance(at) < NEIGHBOUR_M);
             other != boat && since_s <= time_s && alike && close
         };
-        let hidden = traffic.iter().enumerate().any(|(other, t)| other != boat && hides(t, at));
+        let hidden = is_hidden(boat, at, traffic);
+        let crew = self.crew_at(boat, at);
         Signals {
             warned: me.warned_s.is_some_and(|s| s <= time_s),
             hit: me.history.first_hit_s().is_some_and(|s| s <= time_s),
             neighbour_hit: self.struck.iter().any(near),
+            lit: !hidden && self.searchlight.as_ref().is_some_and(|light| light.lights(crew, time_s)),
             sees_gun: !hidden,
-            ..Signals::default()
         }
+    }
+
+    /// Tests whether the searchlight is on a boat.
+    pub fn is_lit(&self, boat: usize, time: Time) -> bool {
+        let time_s = time.secs_since(self.start);
+        let Some(light) = self.searchlight.as_ref().filter(|light| light.shines(time_s)) else {
+            return false;
+        };
+        let traffic: Vec<Traffic> = self.boats.iter().map(|boat| boat.traffic(time_s)).collect();
+        let Some(at) = traffic.get(boat).map(|me| me.position) else { return false };
+        !is_hidden(boat, at, &traffic) && light.lights(self.crew_at(boat, at), time_s)
+    }
+
+    /// Where a boat's crew is, world, metres.
+    fn crew_at(&self, boat: usize, at: DVec2) -> DVec3 {
+        at.extend(0.5 * self.height_m(boat))
     }
 
     /// No crewed boat passes through another vessel: where hulls would touch, it is held off.

@@ -6,6 +6,7 @@ use super::*;
 use crate::model::Zone;
 use crate::{
     act::DriveOrder,
+    daylight::Daylight,
     geometry::{ahead, heading_of},
     sea::BeaufortForce,
     world::{
@@ -13,6 +14,7 @@ use crate::{
             Act, Course, CourseState, CrewPlan, CrewState, CrewedStart, Exit, Guard, LightsKept, Propulsor,
         },
         score::boxed_model,
+        searchlight::SearchlightSpec,
         waves::{Spectrum, WaveSpec},
     },
 };
@@ -182,6 +184,40 @@ fn guards_lead_from_state_to_state() {
     follow(&mut fleet, 15.0, 40.0, |_, _| {});
     assert_eq!([0, 1, 2].map(|b| fleet.crew_state(b)), [Some("give up"), Some("run"), Some("attack")]);
     assert!(place(&fleet, 0, 40.0).speed_m_s.abs() < 1.0, "it lies still");
+}
+
+#[test]
+fn a_crew_notices_a_beam_that_is_on_it_at_any_pace_of_frames() {
+    let crew = plan(vec![
+        state(
+            "creep",
+            Act::Loiter { radius_m: 40.0 },
+            4.0,
+            vec![exit(Guard { lit: true, ..Guard::default() }, 1)],
+        ),
+        state("run", Act::Flee, 25.0, vec![]),
+    ]);
+    let spec = SearchlightSpec { candela: 200_000.0, beam: 0.14, is_on: true };
+    let night = Daylight::fixed(DVec3::NEG_Z, 2e4);
+    let seen = |frames_a_second: u32, axis_deg: f64| {
+        let boats = [("ahead", 0.0), ("aside", 30.0)];
+        let vessels = boats.map(|(name, bearing)| crewed(name, &crew, bearing, 300.0, Side::Hostile));
+        let mut fleet =
+            fleet(vessels.to_vec(), sea(2)).with_searchlight(Some(Searchlight::new(spec, &night)));
+        let beam = Beam { lamp: DVec3::Z * 8.0, axis: ahead(axis_deg.to_radians()).extend(0.0) };
+        // Noted before boats are followed that far, as the world does it.
+        fleet.shine(start().plus_secs(2.0), Some(beam));
+        fleet.shine(start().plus_secs(3.0), None);
+        let states = |fleet: &Fleet, _| [0, 1].map(|boat| fleet.crew_state(boat).map(str::to_owned));
+        let states = paced(&mut fleet, (6, frames_a_second), |_, _| {}, states);
+        (states, place(&fleet, 0, 6.0).position)
+    };
+    let (states, place) = seen(30, 0.0);
+    assert_eq!(states[0], [Some("creep".to_owned()), Some("creep".to_owned())]);
+    assert_eq!(states[5], [Some("run".to_owned()), Some("creep".to_owned())], "{states:?}");
+    assert_eq!((states, place), seen(10, 0.0), "at any pace of frames");
+    assert_eq!(seen(30, 30.0).0[5], [Some("creep".to_owned()), Some("run".to_owned())]);
+    assert_eq!(seen(30, 15.0).0[5], [Some("creep".to_owned()), Some("creep".to_owned())]);
 }
 
 #[test]

@@ -12,6 +12,7 @@ pub mod rounds;
 pub mod scenario;
 pub mod score;
 mod sea_change;
+pub mod searchlight;
 mod stage;
 pub mod waves;
 pub mod weapon;

@@ -11,11 +11,13 @@ use super::{
     scenario::{Scenario, Side},
     score::{AIM_TREND_S, BoreSample, NotScored, Outcome, ShotRecord},
     sea_change::{SeaChange, conditions_of},
+    searchlight::{Beam, LightSwitch, Searchlight, SearchlightSpec},
     waves::WaveField,
     weapon::{Stoppages, Weapon, WeaponState},
 };
 use crate::{
     act::{Act, DriveOrder, TraineeAct},
+    daylight::Daylight,
     estimate::sea::SeaConditions,
     event::TriggerEdge,
     model::{Model, ModelId, Zone},
@@ -85,6 +87,8 @@ pub struct World {
     is_hot: bool,
     /// Orders of the person who drives boats that wait for the next call.
     driving: Vec<(Time, DriveOrder)>,
+    searchlight: Option<LightSwitch>,
+    daylight: Daylight,
 }
 
 /// Boats and rounds, from the first picture on.
@@ -142,6 +146,7 @@ impl RunningWorld {
                     .map(|aim| aim.bore.angle_between(at - aim.muzzle)),
                 height_m: fleet.height_m(boat),
                 struck: fleet.first_hit(boat).filter(|struck| struck <= now),
+                is_lit: fleet.is_lit(boat, *now),
                 gave_up: fleet.gave_up(boat),
                 sinks: fleet.sinks(boat),
                 burns_since: fleet.burns_since(boat),
@@ -186,6 +191,8 @@ impl World {
             last_result: None,
             is_hot: false,
             driving: Vec::new(),
+            searchlight: scenario.searchlight.map(LightSwitch::new),
+            daylight: scenario.daylight,
         }
     }
 
@@ -219,6 +226,9 @@ impl World {
             }
             return;
         }
+        if let (Act::Light, Some(switch)) = (act.act, &mut self.searchlight) {
+            switch.press(act.time);
+        }
         self.weapon.act(act);
         self.watch.act(act);
     }
@@ -246,6 +256,7 @@ impl World {
             let time = time.clamp(running.now.plus_secs(-DRIVEN_LATE_S).min(now), now);
             running.fleet.drive(order, time);
         }
+        self.shine(&mut running, now, &mut aim);
         let was_stopped = self.weapon.state() == WeaponState::Stoppage;
         while let Some(fired) = self.weapon.fire(known.min(now)) {
             self.score.shots += 1;
@@ -273,6 +284,20 @@ impl World {
         self.watch_exercise(&mut running, aim(now));
         self.running = Some(running);
         self.count(records);
+    }
+
+    /// Notes where the searchlight's beam went up to `now`, before boats are followed that far.
+    fn shine(&mut self, running: &mut RunningWorld, now: Time, aim: &mut impl FnMut(Time) -> BoreAim) {
+        let Some(switch) = &mut self.searchlight else { return };
+        while let Some((time, is_on)) = switch.next_note(running.start, now) {
+            let aim = is_on.then(|| aim(time)).filter(|aim| aim.unscored.is_none());
+            running.fleet.shine(time, aim.map(|aim| Beam { lamp: aim.muzzle, axis: aim.bore }));
+        }
+    }
+
+    /// The searchlight, while it is on.
+    pub fn searchlight(&self) -> Option<&SearchlightSpec> {
+        self.searchlight.as_ref().and_then(LightSwitch::shining)
     }
 
     /// Notes that the barrel has got hot, or has cooled.
@@ -326,7 +351,8 @@ impl World {
     }
 
     fn begin(&self, start: Time) -> RunningWorld {
-        let fleet = Fleet::new(self.vessels.clone(), Arc::clone(&self.models), self.waves.clone(), start);
+        let fleet = Fleet::new(self.vessels.clone(), Arc::clone(&self.models), self.waves.clone(), start)
+            .with_searchlight(self.searchlight.as_ref().map(|s| Searchlight::new(s.spec, &self.daylight)));
         let rounds = Rounds::new(self.ammunition.clone(), self.waves.clone(), start);
         RunningWorld { start, now: start, fleet, rounds }
     }

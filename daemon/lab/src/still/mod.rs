@@ -156,7 +156,9 @@ impl Still {
             moving: self.boats.iter().filter(|b| b.speed_m_s > 0.0).count(),
             belt: 0,
             lights: false,
+            searchlight: false,
             sun_stays_up: false,
+            sun_stays_down: false,
         });
         let eye = ViewFrustum {
             camera: &camera,
@@ -184,6 +186,7 @@ impl Still {
         let in_view = InView {
             pose_known: true,
             sun_shines: light.sun_shines(),
+            searchlight: false,
             boats: &boats,
             lights: &[],
             rounds: &[],
@@ -199,6 +202,7 @@ impl Still {
             boats,
             rounds: Vec::new(),
             lights: Vec::new(),
+            searchlight: None,
             light,
             water: self.water,
             wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),

@@ -31,6 +31,8 @@ pub(crate) struct HullPiece<T> {
     pub(crate) rect: PixelRect,
     /// A hull may stand before it.
     pub(crate) hidden: bool,
+    /// Strips of four corners that are drawn.
+    pub(crate) instances: u32,
     pub(crate) block: T,
 }
 
@@ -72,7 +74,7 @@ impl<T: Pod> BehindHulls<T> {
             let pipeline = self.bind(to, frame, piece.hidden);
             to.scissor(piece.rect);
             to.push(pipeline, &piece.block);
-            to.draw(4, 1);
+            to.draw(4, piece.instances);
         }
     }
 

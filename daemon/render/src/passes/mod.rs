@@ -7,6 +7,7 @@ pub(crate) mod hud;
 pub(crate) mod lights;
 pub(crate) mod mirror;
 pub(crate) mod rounds;
+pub(crate) mod searchlight;
 pub(crate) mod shadow;
 pub(crate) mod video;
 pub(crate) mod wake;
@@ -39,6 +40,8 @@ pub(crate) struct PassContext<'a> {
     pub(crate) slots: usize,
     /// What lens and shutter of the camera do.
     pub(crate) optics: Optics,
+    /// Whether the gun has a searchlight.
+    pub(crate) searchlight: bool,
 }
 
 /// A set with one texture that is read as it is stored, and what it lives on.
@@ -59,14 +62,14 @@ impl PassContext<'_> {
         Ok(TextureSet { set, layout, _sampler: sampler })
     }
 
-    /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`).
-    pub(crate) fn lens_constants(&self) -> [u32; 2] {
+    /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`); the last is whether boats may be lit by a searchlight.
+    pub(crate) fn lens_constants(&self) -> [u32; 3] {
         let bend = match self.optics.bend {
             Bend::None => 0,
             Bend::RadialTangential => 1,
             Bend::Fisheye => 2,
         };
-        [bend, u32::from(self.optics.rolling)]
+        [bend, u32::from(self.optics.rolling), u32::from(self.searchlight)]
     }
 }
 

@@ -2,7 +2,10 @@
 
 use std::io::ErrorKind;
 
-use bowwave_core::{act::Act, side::Side};
+use bowwave_core::{
+    act::{Act, DriveOrder},
+    side::Side,
+};
 use evdev::{AbsoluteAxisCode, Device, EventSummary, InputEvent, KeyCode};
 
 use super::window::Pressed;
@@ -21,17 +24,24 @@ const RIGHT: ([AbsoluteAxisCode; 2], AbsoluteAxisCode) =
 /// The same of those that do not.
 const PLAIN: ([AbsoluteAxisCode; 2], AbsoluteAxisCode) =
     ([AbsoluteAxisCode::ABS_Z, AbsoluteAxisCode::ABS_RZ], AbsoluteAxisCode::ABS_GAS);
+/// Axes of the cross of four, and the orders to a driven boat at the lower and the upper end of each.
+const CROSS: [(AbsoluteAxisCode, [DriveOrder; 2]); 2] = [
+    (AbsoluteAxisCode::ABS_HAT0X, [DriveOrder::Port, DriveOrder::Starboard]),
+    (AbsoluteAxisCode::ABS_HAT0Y, [DriveOrder::Ahead, DriveOrder::Astern]),
+];
 /// Maker whose driver names the left and the upper button by its own letters (X is BTN_NORTH there), not by where they lie.
 const MICROSOFT: u16 = 0x045e;
 
 /// Buttons of the trainee's acts, by where they lie.
-pub const BUTTONS: [(KeyCode, Act); 6] = [
+pub const BUTTONS: [(KeyCode, Act); 8] = [
     (KeyCode::BTN_SOUTH, Act::Report),
     (KeyCode::BTN_EAST, Act::Identify(Side::Hostile)),
     (KeyCode::BTN_WEST, Act::Identify(Side::Neutral)),
     (KeyCode::BTN_NORTH, Act::Warn),
     (KeyCode::BTN_TL, Act::Reload),
     (KeyCode::BTN_SELECT, Act::Clear),
+    (KeyCode::BTN_START, Act::Light),
+    (KeyCode::BTN_THUMBL, Act::Drive(DriveOrder::Midships)),
 ];
 
 /// A gamepad.
@@ -122,6 +132,10 @@ impl Pad {
         }
         let has = |axis: AbsoluteAxisCode| self.ranges.iter().any(|(known, _)| *known == axis);
         let (right, trigger) = if RIGHT.0.into_iter().all(has) { RIGHT } else { PLAIN };
+        if let Some((_, [low, high])) = CROSS.into_iter().find(|(cross, _)| *cross == axis) {
+            let order = if share < 0.25 { Some(low) } else { (share > 0.75).then_some(high) };
+            return order.map(|order| Pressed::Act(Act::Drive(order)));
+        }
         if axis == trigger {
             let [pull, release] = PULLED;
             return self.pull(share > if self.is_pulled { release } else { pull });
@@ -195,6 +209,21 @@ mod tests {
                 "{code:?} {value}: {turn:?}"
             );
         }
+    }
+
+    #[test]
+    fn the_cross_drives_a_boat_by_notches() {
+        let mut pad = pad();
+        pad.ranges.extend(CROSS.map(|(axis, _)| (axis, [-1.0, 1.0])));
+        let mut press = |code, value| pad.take(axis(code, value));
+        let order = |order| Some(Pressed::Act(Act::Drive(order)));
+        assert_eq!(press(AbsoluteAxisCode::ABS_HAT0Y, -1), order(DriveOrder::Ahead));
+        assert_eq!(press(AbsoluteAxisCode::ABS_HAT0Y, 0), None, "let go");
+        assert_eq!(press(AbsoluteAxisCode::ABS_HAT0Y, 1), order(DriveOrder::Astern));
+        assert_eq!(press(AbsoluteAxisCode::ABS_HAT0X, -1), order(DriveOrder::Port));
+        assert_eq!(press(AbsoluteAxisCode::ABS_HAT0X, 1), order(DriveOrder::Starboard));
+        assert_eq!(pad.take(key(KeyCode::BTN_THUMBL, 1)), order(DriveOrder::Midships));
+        assert_eq!(pad.take(key(KeyCode::BTN_START, 1)), Some(Pressed::Act(Act::Light)));
     }
 
     #[test]

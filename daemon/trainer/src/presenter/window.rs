@@ -24,7 +24,7 @@ pub enum Pressed {
 }
 
 /// Keys of the trainee's acts.
-pub const KEYS: [(Key, Act); 8] = [
+pub const KEYS: [(Key, Act); 9] = [
     (Key::R, Act::Report),
     (Key::H, Act::Identify(Side::Hostile)),
     (Key::N, Act::Identify(Side::Neutral)),
@@ -33,6 +33,7 @@ pub const KEYS: [(Key, Act); 8] = [
     (Key::C, Act::Clear),
     (Key::S, Act::Safe),
     (Key::F, Act::Ready),
+    (Key::B, Act::Light),
 ];
 
 /// Keys of the person who drives a boat, as they lie on a pad of numbers; the row above the letters does as well.

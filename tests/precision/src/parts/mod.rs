@@ -1,6 +1,7 @@
 //! The numerical parts.
 
 mod attitude;
+mod beam;
 mod board;
 mod calibration;
 mod camera;
@@ -79,6 +80,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: moon::ABOUT, measure: moon::measure },
     NumericalPart { about: skylight::ABOUT, measure: skylight::measure },
     NumericalPart { about: shadow::ABOUT, measure: shadow::measure },
+    NumericalPart { about: beam::ABOUT, measure: beam::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },
     NumericalPart { about: shutter::ABOUT, measure: shutter::measure },

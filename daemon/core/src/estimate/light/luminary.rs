@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::{
-    daylight::Daylight,
+    daylight::{Daylight, illuminance_of_sun},
     ephemeris::{Moment, Moon, Place, Utc},
     event::ShipFix,
     sky::SUN_LUX,
@@ -38,7 +38,7 @@ impl Luminaries {
     pub fn moonlight(&self) -> Option<&Moon> {
         self.moon.as_ref().filter(|moon| {
             moon.direction.z > 0.0
-                && moon.irradiance * illuminance(moon.direction.z) > illuminance(self.sun.z)
+                && moon.irradiance * illuminance_of_sun(moon.direction.z) > illuminance_of_sun(self.sun.z)
         })
     }
 
@@ -57,25 +57,6 @@ impl Luminaries {
     pub fn brightest(&self) -> DVec3 {
         self.moonlight().map_or(self.sun, |moon| moon.direction)
     }
-}
-
-/// Illuminance of a level surface under a clear sky with the sun at that sine of elevation, lux (Seidelmann 1992, table of illuminances).
-fn illuminance(sine: f64) -> f64 {
-    const TABLE: [(f64, f64); 8] = [
-        (-18.0, 6.5e-4),
-        (-12.0, 8.3e-3),
-        (-6.0, 3.4),
-        (0.0, 759.0),
-        (5.0, 4760.0),
-        (10.0, 10_900.0),
-        (30.0, 49_000.0),
-        (90.0, 103_000.0),
-    ];
-    let elevation = sine.clamp(-1.0, 1.0).asin().to_degrees();
-    let above = TABLE.iter().position(|(node, _)| *node >= elevation).unwrap_or(TABLE.len() - 1);
-    let [low, high] = [above.saturating_sub(1), above].map(|i| TABLE[i]);
-    let share = ((elevation - low.0) / (high.0 - low.0).max(1e-9)).clamp(0.0, 1.0);
-    (low.1.ln() + share * (high.1 / low.1).ln()).exp()
 }
 
 /// Follows sun and moon from what the scenario gives and what the ship's instruments tell.
@@ -230,8 +211,9 @@ mod tests {
 
     #[test]
     fn a_level_surface_gets_more_from_a_higher_sun() {
-        let lux: Vec<f64> = (-90..=90).map(|deg| illuminance(f64::from(deg).to_radians().sin())).collect();
+        let lux: Vec<f64> =
+            (-90..=90).map(|deg| illuminance_of_sun(f64::from(deg).to_radians().sin())).collect();
         assert!(lux.is_sorted() && lux.iter().all(|lux| *lux > 0.0), "{lux:?}");
-        assert!((illuminance(0.0) - 759.0).abs() < 1e-6);
+        assert!((illuminance_of_sun(0.0) - 759.0).abs() < 1e-6);
     }
 }

@@ -43,6 +43,8 @@ pub struct WatchedBoat<'a> {
     pub height_m: f64,
     /// When it was first struck.
     pub struck: Option<Time>,
+    /// The searchlight is on it.
+    pub is_lit: bool,
     /// Its crew has given up.
     pub gave_up: bool,
     /// When it is full of water and sinks.
@@ -60,6 +62,7 @@ struct BoatNotes {
     pointed_since: Option<Time>,
     pointed: bool,
     is_close: bool,
+    /// By a call, or by light.
     warned: bool,
     opening_since: Option<Time>,
     closing_since: Option<Time>,
@@ -271,6 +274,7 @@ impl BoatNotes {
             self.is_stopped = true;
             note(ExerciseFact::Stopped { boat: name(), range_m });
         }
+        self.warned |= boat.is_lit;
         self.last = Some((time, range_m));
     }
 

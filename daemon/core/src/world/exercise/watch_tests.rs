@@ -14,6 +14,7 @@ fn skiff(range_m: f64, speed_m_s: f64) -> WatchedBoat<'static> {
         off_bore: Some(0.5),
         height_m: 1.5,
         struck: None,
+        is_lit: false,
         gave_up: false,
         sinks: None,
         burns_since: None,
@@ -43,6 +44,23 @@ fn spec() -> ExerciseSpec {
         ],
         ..ExerciseSpec::default()
     }
+}
+
+#[test]
+fn a_boat_that_was_lit_and_opens_has_turned_away() {
+    let ended = |is_lit: bool| {
+        let mut watch = ExerciseWatch::new(ExerciseSpec::default(), 2e4);
+        let mut events = Vec::new();
+        for second in 0..20 {
+            let boat = WatchedBoat {
+                is_lit: is_lit && second == 3,
+                ..skiff(300.0 + 10.0 * f64::from(second - 4).max(0.0), 10.0)
+            };
+            watch.follow(at(f64::from(second)), &[boat], 100, &mut events);
+        }
+        events.iter().any(|event| matches!(event.fact, ExerciseFact::TurnedAway { .. }))
+    };
+    assert!(ended(true) && !ended(false));
 }
 
 /// Names of what happened while the boat is as said at each second.

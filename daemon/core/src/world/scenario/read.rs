@@ -16,10 +16,13 @@ use crate::{
     sea::BeaufortForce,
     text::toml::{
         BareOrQuoted, Loose, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, number,
-        one_of, plain_text, whole,
+        one_of, plain_text, whole, yes_no,
     },
     water::{ReflectionMethod, ShadowLevel, Water},
-    world::waves::{Spectrum, WaveSpec},
+    world::{
+        searchlight::SearchlightSpec,
+        waves::{Spectrum, WaveSpec},
+    },
 };
 
 /// Most boats of a scenario.
@@ -35,6 +38,7 @@ struct RawScenario {
     light: Option<Spanned<RawLight>>,
     reflection: Option<Spanned<ReflectionKeys>>,
     weapon: Option<Spanned<RawWeapon>>,
+    searchlight: Option<Spanned<RawSearchlight>>,
     briefing: OptionalKey<String>,
     rules: Option<Spanned<RawRules>>,
     goals: Option<Spanned<RawGoals>>,
@@ -68,6 +72,14 @@ struct RawLight {
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+struct RawSearchlight {
+    candela: OptionalKey<f64>,
+    beam_deg: OptionalKey<f64>,
+    on: OptionalKey<bool>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 struct RawMount {
     eye_height_m: OptionalKey<f64>,
 }
@@ -88,6 +100,7 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
     let water = reflection(text, &keys, force, &mut warnings)?;
     let (section, keys) = text.section("weapon", raw.weapon);
     let weapon = weapon::weapon(&section, &keys)?;
+    let searchlight = raw.searchlight.map(|raw| searchlight(text, raw.get_ref())).transpose()?;
     let seed = text.given(&raw.seed, seed())?.unwrap_or(1);
     // A scenario without crews does not read the built-in ones.
     let crewed = raw.boat.iter().any(|boat| boat.get_ref().has_crew());
@@ -107,10 +120,42 @@ pub(super) fn scenario(text: &str, origin: &str) -> Result<Scenario, TomlError> 
         daylight,
         water,
         weapon,
+        searchlight,
         exercise,
         boats,
         warnings,
     })
+}
+
+/// The mistakes of a scenario's text, as far as they can be told apart: the line of each is taken out and the rest read again. What may only
+/// follow from a line that was taken out is left out. Empty for a sound text.
+pub fn mistakes(text: &str, origin: &str) -> Vec<TomlError> {
+    const MOST: usize = 20;
+    let mut lines: Vec<&str> = text.lines().collect();
+    let mut mistakes: Vec<TomlError> = Vec::new();
+    for _ in 0..2 * MOST {
+        let Err(mistake) = scenario(&lines.join("\n"), origin) else { break };
+        let line = mistake.line.checked_sub(1).and_then(|line| lines.get_mut(line));
+        let line = line.filter(|line| line.contains('=') && !mistake.key.is_empty());
+        if mistakes.len() < MOST && !mistakes.iter().any(|before| may_follow(&mistake, before)) {
+            mistakes.push(mistake);
+        }
+        let Some(line) = line else { break };
+        *line = "";
+    }
+    mistakes
+}
+
+/// Tests whether a mistake may come of taking out the line of another: of the same table's keys one may need the other, and boats, groups and
+/// crews may go by other names now, or be others.
+fn may_follow(mistake: &TomlError, before: &TomlError) -> bool {
+    let table = |key: &str| key.rsplit_once('.').map_or("", |(table, _)| table).to_owned();
+    let is_about = |error: &TomlError, tables: &[&str]| tables.iter().any(|t| error.key.starts_with(t));
+    let names = |keys: &[&str]| keys.iter().any(|key| mistake.key.ends_with(key));
+    let is_own = mistake.problem.contains("is not allowed") || mistake.problem.starts_with("unknown key");
+    mistake.key.is_empty()
+        || table(&mistake.key) == table(&before.key) && !is_own
+        || is_about(before, &["boat", "crew"]) && names(&[".about", ".boat", ".stop", ".crew", ".to"])
 }
 
 /// Wind force and waves of the table `[sea]`.
@@ -139,6 +184,18 @@ pub fn sea(section: &TomlSection<'_>, keys: &SeaKeys) -> Result<(BeaufortForce, 
         (None, None, _) => Spectrum::of_force(force),
     };
     Ok((force, WaveSpec { spectrum, wind_from }))
+}
+
+/// The searchlight of the table `[searchlight]`.
+fn searchlight(text: TomlText<'_>, raw: &RawSearchlight) -> Result<SearchlightSpec, TomlError> {
+    let beam = text.given(&raw.beam_deg, number(0.5..=60.0, "degrees"))?;
+    Ok(SearchlightSpec {
+        candela: text
+            .given(&raw.candela, number(100.0..=1e8, "candela"))?
+            .unwrap_or(SearchlightSpec::CANDELA),
+        beam: beam.map_or(SearchlightSpec::BEAM, f64::to_radians),
+        is_on: text.given(&raw.on, yes_no())?.unwrap_or(false),
+    })
 }
 
 /// The daylight of a scenario: where its text names no sun, that of the ship's place and time once these are told.

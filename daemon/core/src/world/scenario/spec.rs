@@ -1,5 +1,7 @@
 //! A checked scenario.
 
+use std::fmt::Display;
+
 use glam::{DVec2, DVec3};
 
 use crate::{
@@ -12,6 +14,7 @@ use crate::{
         burst::BurstSpec,
         exercise::ExerciseSpec,
         gunnery::Projectile,
+        searchlight::SearchlightSpec,
         waves::{WaveField, WaveSpec},
         weapon::BarrelHeat,
     },
@@ -45,6 +48,8 @@ pub struct Scenario {
     pub water: Water,
     /// The training weapon.
     pub weapon: WeaponSpec,
+    /// The searchlight on the gun, where there is one.
+    pub searchlight: Option<SearchlightSpec>,
     /// Rules, goals, calls and events.
     pub exercise: ExerciseSpec,
     /// The boats.
@@ -138,6 +143,13 @@ pub struct BoatSpec {
     pub(super) stands: TomlPlace,
 }
 
+impl BoatSpec {
+    /// An error where the text places the boat.
+    pub fn error(&self, problem: impl Display) -> TomlError {
+        self.stands.error(problem)
+    }
+}
+
 impl Scenario {
     /// The waves of its sea.
     pub fn wave_field(&self) -> WaveField {
@@ -158,7 +170,7 @@ impl Scenario {
                  start it farther off or change its course",
                 boat.name, boat.model
             );
-            return Err(boat.stands.error(problem));
+            return Err(boat.error(problem));
         }
         Ok(())
     }

@@ -360,7 +360,7 @@ impl ScoreFold {
             Act::Report => drop(boat.reported.get_or_insert(time)),
             Act::Warn => drop(boat.warned.get_or_insert(time)),
             Act::Identify(side) => boat.identified.push((time, side)),
-            Act::Reload | Act::Clear | Act::Safe | Act::Ready | Act::Drive(_) => {}
+            Act::Reload | Act::Clear | Act::Safe | Act::Ready | Act::Light | Act::Drive(_) => {}
         }
     }
 
