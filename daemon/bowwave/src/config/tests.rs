@@ -39,7 +39,7 @@ fn every_key_that_the_installed_file_shows_is_valid() {
     let config = parse(&whole, "systemd/bowwave.toml", Path::new(".")).unwrap();
     assert_eq!(config.warnings, [""; 0]);
     assert!(
-        config.gpio.trigger.is_some() && config.gpio.lamps.is_some() && config.heading.presses.len() == 10
+        config.gpio.trigger.is_some() && config.gpio.lamps.is_some() && config.heading.presses.len() == 11
     );
     // An open wire of either contact that it shows reads as not inert.
     let interlock = config.gpio.interlock.expect("an interlock");
