@@ -74,7 +74,7 @@ fn check_tells_all_mistakes_that_do_not_follow_from_each_other() {
     expect_code(&output, 1);
     let told = said(&output);
     let lines: Vec<&str> = told.lines().filter(|line| line.contains("odd.toml:")).collect();
-    let places = ["2:14: duration_s", "4:12: sea.beaufort", "5:1: sea.wind", "14:9: boat[1].count"];
+    let places = ["2:14: duration_s", "4:12: sea.beaufort", "5:1: sea.wind", "13:15: boat[1].bearing_deg"];
     for place in places {
         assert_eq!(
             lines.iter().filter(|line| line.contains(&format!("odd.toml:{place}"))).count(),
@@ -82,7 +82,7 @@ fn check_tells_all_mistakes_that_do_not_follow_from_each_other() {
             "{place}\n{told}"
         );
     }
-    // Ranges and bearings of that boat are told or not, but nothing that came of taking lines out is.
+    // What else is wrong with that boat is told once it has a bearing, but nothing that came of taking lines out is.
     for follows in ["goals.stop", "is missing"] {
         assert!(!told.contains(follows), "{told}");
     }
@@ -95,7 +95,7 @@ fn a_model_that_there_is_not_is_named_where_the_boat_stands() {
         "[[boat]]\nname = \"a\"\nmodel = \"trawler\"\ncourse = \"still\"\nrange_m = 300\nbearing_deg = 3\n";
     let file = write(folder.path(), "trawler.toml", &format!("name = \"Trawler\"\n{boat}"));
     let told = said(&bowwave(["scenario", "check", &file]));
-    assert!(told.contains("trawler.toml:5:11: boat[1]: cannot load the model of a: there is no model \"trawler\"; built in are"), "{told}");
+    assert!(told.contains("trawler.toml:6:11: boat[1]: cannot load the model of a: there is no model \"trawler\"; built in are"), "{told}");
 }
 
 #[test]

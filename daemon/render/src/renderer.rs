@@ -130,16 +130,10 @@ impl Passes {
         let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
         let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
         let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
-        let searchlight = needs
-            .searchlight
-            .then(|| BehindHulls::new(context, &searchlight::SHADERS, boats.as_ref()))
-            .transpose()?;
-        let lights = (needs.lights_max > 0)
-            .then(|| BehindHulls::new(context, &lights::SHADERS, boats.as_ref()))
-            .transpose()?;
-        let rounds = (needs.rounds_max > 0)
-            .then(|| BehindHulls::new(context, &rounds::SHADERS, boats.as_ref()))
-            .transpose()?;
+        let over = boats.as_ref();
+        let searchlight = BehindHulls::when(needs.searchlight, context, &searchlight::SHADERS, over)?;
+        let lights = BehindHulls::when(needs.lights_max > 0, context, &lights::SHADERS, over)?;
+        let rounds = BehindHulls::when(needs.rounds_max > 0, context, &rounds::SHADERS, over)?;
         let hud = HudPass::new(context)?;
         let video = VideoPass::new(context, config.picture, &hud.overlay.layout)?;
         Ok(Self {

@@ -68,6 +68,16 @@ impl<T: Pod> BehindHulls<T> {
         Ok(Self { open, hidden: boats.map(hidden).transpose()?, push: PhantomData })
     }
 
+    /// The same, where it is needed at all.
+    pub(crate) fn when(
+        is_needed: bool,
+        context: &PassContext<'_>,
+        shaders: &Shaders,
+        boats: Option<&BoatsPass>,
+    ) -> Result<Option<Self>, RenderError> {
+        is_needed.then(|| Self::new(context, shaders, boats)).transpose()
+    }
+
     /// Draws, within a rendering to the screen.
     pub(crate) fn record(&self, to: CommandEncoder<'_>, frame: vk::DescriptorSet, pieces: &[HullPiece<T>]) {
         for piece in pieces {

@@ -135,15 +135,30 @@ pub fn mistakes(text: &str, origin: &str) -> Vec<TomlError> {
     let mut mistakes: Vec<TomlError> = Vec::new();
     for _ in 0..2 * MOST {
         let Err(mistake) = scenario(&lines.join("\n"), origin) else { break };
-        let line = mistake.line.checked_sub(1).and_then(|line| lines.get_mut(line));
-        let line = line.filter(|line| line.contains('=') && !mistake.key.is_empty());
+        let taken = lines_of(&mistake, &lines);
         if mistakes.len() < MOST && !mistakes.iter().any(|before| may_follow(&mistake, before)) {
             mistakes.push(mistake);
         }
-        let Some(line) = line else { break };
-        *line = "";
+        let Some(taken) = lines.get_mut(taken).filter(|taken| !taken.is_empty()) else { break };
+        taken.fill("");
     }
     mistakes
+}
+
+/// The lines without which the mistake is gone: its own, or all of its table where that lacks something; none where tables after it would be
+/// counted otherwise.
+fn lines_of(mistake: &TomlError, lines: &[&str]) -> std::ops::Range<usize> {
+    let own = mistake.line.saturating_sub(1);
+    match lines.get(own) {
+        Some(line) if !mistake.key.is_empty() && line.contains('=') => own..own + 1,
+        Some(header) if header.starts_with('[') && !header.contains('.') => {
+            let rest = lines.iter().skip(own + 1);
+            let is_last = !header.starts_with("[[") || !rest.clone().any(|line| line == header);
+            let length = rest.take_while(|line| !line.starts_with('[')).count();
+            own..if is_last { own + 1 + length } else { own }
+        }
+        _ => 0..0,
+    }
 }
 
 /// Tests whether a mistake may come of taking out the line of another: of the same table's keys one may need the other, and boats, groups and
