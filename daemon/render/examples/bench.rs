@@ -111,8 +111,7 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
         "the mesh as the sun sees it, four texels a pixel of the hull",
         &sunlit,
     );
-    let spec =
-        SearchlightSpec { candela: SearchlightSpec::CANDELA, beam: SearchlightSpec::BEAM, is_on: true };
+    let spec = SearchlightSpec::default();
     let mut beam = with(off, none, 60.0);
     beam.searchlight = Some(SearchlightView::new(&spec, DVec3::Z, 0.5, 10_000.0));
     beam.passes[Pass::Searchlight as usize] = PassDecision::Run;

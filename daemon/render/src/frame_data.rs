@@ -40,7 +40,7 @@ pub(crate) struct Capacity {
     pub(crate) lobes: usize,
     /// Navigation lights.
     pub(crate) lights: usize,
-    /// Whether there is a searchlight.
+    /// A searchlight may be asked for.
     pub(crate) searchlight: bool,
     /// Boats that leave a wake.
     pub(crate) wakes: usize,

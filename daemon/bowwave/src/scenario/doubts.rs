@@ -3,7 +3,7 @@
 use bowwave_core::world::{
     boats::{Act, Behaviour, CrewState},
     exercise::{About, HappeningCause, group_of},
-    scenario::{BoatSpec, Scenario, Side},
+    scenario::{BoatSpec, Scenario, Side, read::M_S_PER_KN},
 };
 
 /// Sentences about what an instructor may want to look at.
@@ -105,7 +105,6 @@ fn weapon(scenario: &Scenario, doubts: &mut Vec<String>) {
 }
 
 fn crews(scenario: &Scenario, doubts: &mut Vec<String>) {
-    const KN_PER_M_S: f64 = 3600.0 / 1852.0;
     /// Built-in crews ask for all that their boats have, which differs a little from one to another.
     const SLACK: f64 = 1.25;
     let mut seen: Vec<&str> = Vec::new();
@@ -120,9 +119,9 @@ fn crews(scenario: &Scenario, doubts: &mut Vec<String>) {
         if let Some(state) = states.iter().find(|state| state.speed_m_s > SLACK * start.speed_max_m_s) {
             doubts.push(format!(
                 "\"{name}\" cannot make the {:.0} kn that its crew's state \"{}\" asks for: its speed_max_kn is {:.0}",
-                state.speed_m_s * KN_PER_M_S,
+                state.speed_m_s / M_S_PER_KN,
                 state.name,
-                start.speed_max_m_s * KN_PER_M_S
+                start.speed_max_m_s / M_S_PER_KN
             ));
         }
         let mut reached = vec![0];
@@ -186,7 +185,7 @@ fn swarms(scenario: &Scenario, doubts: &mut Vec<String>) {
             doubts.push(format!(
                 "\"{name}\" cannot be there at {due_s} s: it begins {:.0} m off and needs {needs_s:.0} s at {:.0} kn",
                 range_m(boat),
-                speed_m_s * 3600.0 / 1852.0
+                speed_m_s / M_S_PER_KN
             ));
         }
     }

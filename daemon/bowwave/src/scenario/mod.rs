@@ -22,7 +22,7 @@ use serde::Serialize;
 
 use crate::{
     cli::{ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview},
-    loading::{load_scenario, read_scenario},
+    loading::{LoadedScenario, load_scenario, parse_scenario, read_scenario},
     new_file::{refuse_to_replace, write_new},
     outcome::Outcome,
     stdout,
@@ -111,7 +111,7 @@ fn list(arguments: &ScenarioList) -> Result<Outcome> {
 fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     for path in &arguments.files {
-        match load_scenario(path) {
+        match checked(path) {
             Ok(loaded) => {
                 let l = Listed::of(&path.display().to_string(), &loaded.scenario);
                 stdout::print(format!(
@@ -122,10 +122,8 @@ fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
                     eprintln!("{}: look at this: {}", l.name, bowwave_core::text::one_line(&doubt));
                 }
             }
-            Err(e) => {
-                let all = mistakes(path);
-                let told = if all.is_empty() { vec![format!("{e:#}")] } else { all };
-                for mistake in told {
+            Err(mistakes) => {
+                for mistake in mistakes {
                     eprintln!("bowwave: {}", bowwave_core::text::one_line(&mistake));
                 }
                 outcome = Outcome::Failed;
@@ -135,11 +133,18 @@ fn check(arguments: &ScenarioCheck) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// The mistakes of a scenario's text; none where it is sound, or cannot be read at all.
-fn mistakes(path: &Path) -> Vec<String> {
-    let Ok((text, _)) = read_scenario(path) else { return Vec::new() };
-    let mistakes = scenario::read::mistakes(&text, &path.display().to_string());
-    mistakes.into_iter().map(|mistake| mistake.to_string()).collect()
+/// A scenario, or all that is wrong with it.
+fn checked(path: &Path) -> Result<LoadedScenario, Vec<String>> {
+    let (text, base) = read_scenario(path).map_err(|e| vec![format!("{e:#}")])?;
+    let origin = path.display().to_string();
+    parse_scenario(&text, &origin, &base).map_err(|e| {
+        let mistakes = scenario::read::mistakes(&text, &origin);
+        // A sound text may name a model that cannot be used.
+        if mistakes.is_empty() {
+            return vec![format!("{e:#}")];
+        }
+        mistakes.iter().map(ToString::to_string).collect()
+    })
 }
 
 fn preview(arguments: &ScenarioPreview) -> Result<Outcome> {

@@ -302,12 +302,10 @@ impl Composer {
         };
         let lights: Vec<_> =
             if self.plan.has(Pass::Lights) { boats.iter().map(on).collect() } else { Vec::new() };
-        let spec =
-            SearchlightSpec { candela: SearchlightSpec::CANDELA, beam: SearchlightSpec::BEAM, is_on: true };
         let searchlight = self
             .plan
             .has(Pass::Searchlight)
-            .then(|| SearchlightView::new(&spec, self.bore, 1.0, self.visibility_m));
+            .then(|| SearchlightView::new(&SearchlightSpec::default(), self.bore, 1.0, self.visibility_m));
         let in_view = InView {
             pose_known: true,
             sun_shines: true,

@@ -25,7 +25,7 @@ const BACKSCATTER_PER_SR: f64 = 1.0 / 23.0;
 
 /// Share of the light within the sea that comes out of it again, by colour: coastal water of little chlorophyll (Mobley 1994, "Light and
 /// Water", figure 3.27). Waves seen from the lamp throw nothing straight back: their slopes are too small.
-const SEA_ALBEDO: Vec3 = Vec3::new(0.015, 0.03, 0.028);
+pub const SEA_ALBEDO: Vec3 = Vec3::new(0.015, 0.03, 0.028);
 
 /// The searchlight in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,11 +111,6 @@ impl SearchlightView {
         }
         let air_m = squared.sqrt() + range_m;
         FRAC_1_PI * (-self.sharpness * off - self.extinction_per_m * air_m).exp() * facing / squared
-    }
-
-    /// Colour of what comes back of the sea.
-    pub const fn sea_albedo() -> Vec3 {
-        SEA_ALBEDO
     }
 }
 

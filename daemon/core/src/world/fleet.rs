@@ -103,7 +103,7 @@ const OWN_HULL: Capsule = Capsule::round(OWN_RADIUS_M);
 /// Radius about the gun that the own ship takes up, metres.
 const OWN_RADIUS_M: f64 = 12.0;
 
-/// Whether a large vessel hides the gun from what is at `at`.
+/// Tests whether a large vessel hides the gun from something at `at`.
 fn hides(vessel: &Traffic, at: DVec2) -> bool {
     /// Shorter vessels are looked over.
     const LOW_M: f64 = 8.0;
@@ -116,9 +116,9 @@ fn hides(vessel: &Traffic, at: DVec2) -> bool {
     (0.0..1.0).contains(&along) && off < 0.6 * vessel.radius_m
 }
 
-/// Whether a large vessel hides the gun from a boat at `at`.
-fn is_hidden(boat: usize, at: DVec2, traffic: &[Traffic]) -> bool {
-    traffic.iter().enumerate().any(|(other, vessel)| other != boat && hides(vessel, at))
+/// Tests whether a large vessel of the `traffic` hides the gun from a boat at `at`, which is one of them.
+fn is_hidden(boat: usize, at: DVec2, traffic: impl Iterator<Item = Traffic>) -> bool {
+    traffic.enumerate().any(|(other, vessel)| other != boat && hides(&vessel, at))
 }
 
 /// All boats.
@@ -198,10 +198,7 @@ impl Fleet {
         for number in first..last {
             let time_s = step_seconds(number);
             traffic.clear();
-            let seen = |(i, b): (usize, &FleetBoat)| {
-                if self.swims_at(i, time_s) { b.traffic(time_s) } else { NOWHERE }
-            };
-            traffic.extend(self.boats.iter().enumerate().map(seen));
+            traffic.extend(self.traffic(time_s));
             let driven = self.driven_at(time_s);
             for i in 0..self.boats.len() {
                 if !self.boats[i].history.is_crewed() {
@@ -218,6 +215,12 @@ impl Fleet {
             }
             self.keep_apart(step_seconds(number + 1));
         }
+    }
+
+    /// All boats as others see them.
+    fn traffic(&self, time_s: f64) -> impl Iterator<Item = Traffic> + '_ {
+        let boats = self.boats.iter().enumerate();
+        boats.map(move |(i, b)| if self.swims_at(i, time_s) { b.traffic(time_s) } else { NOWHERE })
     }
 
     /// Orders at a time of the person who drives boats.
@@ -267,13 +270,12 @@ impl Fleet {
             let close = traffic.get(other).is_some_and(|t| t.position.distance(at) < NEIGHBOUR_M);
             other != boat && since_s <= time_s && alike && close
         };
-        let hidden = is_hidden(boat, at, traffic);
-        let crew = self.crew_at(boat, at);
+        let hidden = is_hidden(boat, at, traffic.iter().copied());
         Signals {
             warned: me.warned_s.is_some_and(|s| s <= time_s),
             hit: me.history.first_hit_s().is_some_and(|s| s <= time_s),
             neighbour_hit: self.struck.iter().any(near),
-            lit: !hidden && self.searchlight.as_ref().is_some_and(|light| light.lights(crew, time_s)),
+            lit: !hidden && self.is_in_beam(boat, at, time_s),
             sees_gun: !hidden,
         }
     }
@@ -281,17 +283,14 @@ impl Fleet {
     /// Tests whether the searchlight is on a boat.
     pub fn is_lit(&self, boat: usize, time: Time) -> bool {
         let time_s = time.secs_since(self.start);
-        let Some(light) = self.searchlight.as_ref().filter(|light| light.shines(time_s)) else {
-            return false;
-        };
-        let traffic: Vec<Traffic> = self.boats.iter().map(|boat| boat.traffic(time_s)).collect();
-        let Some(at) = traffic.get(boat).map(|me| me.position) else { return false };
-        !is_hidden(boat, at, &traffic) && light.lights(self.crew_at(boat, at), time_s)
+        let Some(at) = self.boats.get(boat).map(|me| me.traffic(time_s).position) else { return false };
+        self.is_in_beam(boat, at, time_s) && !is_hidden(boat, at, self.traffic(time_s))
     }
 
-    /// Where a boat's crew is, world, metres.
-    fn crew_at(&self, boat: usize, at: DVec2) -> DVec3 {
-        at.extend(0.5 * self.height_m(boat))
+    /// Tests whether the searchlight would light the crew of a boat at `at`, if nothing is before it.
+    fn is_in_beam(&self, boat: usize, at: DVec2, time_s: f64) -> bool {
+        let crew = || at.extend(0.5 * self.height_m(boat));
+        self.searchlight.as_ref().is_some_and(|light| light.lights(crew(), time_s))
     }
 
     /// No crewed boat passes through another vessel: where hulls would touch, it is held off.

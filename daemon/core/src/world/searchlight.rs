@@ -1,6 +1,6 @@
 //! The searchlight on the gun: where its beam went of late, and what it lights.
 
-use std::{collections::VecDeque, f64::consts::PI};
+use std::collections::VecDeque;
 
 use glam::DVec3;
 
@@ -22,11 +22,6 @@ pub struct SearchlightSpec {
 }
 
 impl SearchlightSpec {
-    /// Intensity where a scenario gives none, candela: a light that is mounted on a weapon.
-    pub const CANDELA: f64 = 200_000.0;
-    /// Angle where a scenario gives none, radians.
-    pub const BEAM: f64 = 5.0 * PI / 180.0;
-
     /// Exponent of its beam, whose intensity falls with `exp(-k off^2)`, 1/rad^2.
     pub fn sharpness(&self) -> f64 {
         4.0 * std::f64::consts::LN_2 / (self.beam * self.beam)
@@ -38,10 +33,17 @@ impl SearchlightSpec {
     }
 }
 
+impl Default for SearchlightSpec {
+    /// Numbers where a scenario gives none: a small searchlight of a ship, off.
+    fn default() -> Self {
+        Self { candela: 200_000.0, beam: 5f64.to_radians(), is_on: false }
+    }
+}
+
 /// A beam at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beam {
-    /// Where it comes from, world, metres.
+    /// The lamp's place, world, metres.
     pub lamp: DVec3,
     /// Its axis, world, unit vector.
     pub axis: DVec3,
@@ -76,7 +78,7 @@ impl Searchlight {
         }
     }
 
-    /// What it throws on a surface at `at` that faces it, lux.
+    /// Illuminance by it of a surface at `at` that faces it, lux.
     pub fn illuminance(&self, beam: &Beam, at: DVec3) -> f64 {
         /// Nearer than this it is no point, metres.
         const NEAREST_M: f64 = 1.0;
@@ -95,26 +97,18 @@ impl Searchlight {
         self.shone.push_back((time_s, beam));
     }
 
-    /// Tests whether it is on.
-    pub fn shines(&self, time_s: f64) -> bool {
-        self.beam(time_s).is_some()
-    }
-
-    fn beam(&self, time_s: f64) -> Option<&Beam> {
-        let newest = self.shone.iter().rev().find(|(since_s, _)| *since_s <= time_s);
-        newest.and_then(|(_, beam)| beam.as_ref())
-    }
-
     /// Tests whether it lights what is at `at`: it is no darker there than by the sky, and bright enough to be noticed.
     pub fn lights(&self, at: DVec3, time_s: f64) -> bool {
-        self.beam(time_s).is_some_and(|beam| self.illuminance(beam, at) >= self.lit_lux)
+        let newest = self.shone.iter().rev().find(|(since_s, _)| *since_s <= time_s);
+        let beam = newest.and_then(|(_, beam)| beam.as_ref());
+        beam.is_some_and(|beam| self.illuminance(beam, at) >= self.lit_lux)
     }
 }
 
 /// A searchlight's switch.
 #[derive(Clone, Debug)]
 pub struct LightSwitch {
-    /// What it switches.
+    /// The searchlight.
     pub spec: SearchlightSpec,
     is_on: bool,
     /// Presses that lie ahead of what was noted, oldest first.
@@ -157,7 +151,7 @@ impl LightSwitch {
         Some((time, self.is_on))
     }
 
-    /// What shines, while it is on.
+    /// The searchlight, while it is on.
     pub fn shining(&self) -> Option<&SearchlightSpec> {
         Some(&self.spec).filter(|_| self.is_on)
     }
@@ -165,6 +159,8 @@ impl LightSwitch {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     const SPEC: SearchlightSpec = SearchlightSpec { candela: 200_000.0, beam: 0.14, is_on: false };

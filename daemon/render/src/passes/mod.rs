@@ -40,7 +40,7 @@ pub(crate) struct PassContext<'a> {
     pub(crate) slots: usize,
     /// What lens and shutter of the camera do.
     pub(crate) optics: Optics,
-    /// Whether the gun has a searchlight.
+    /// A searchlight may be asked for.
     pub(crate) searchlight: bool,
 }
 
@@ -62,8 +62,8 @@ impl PassContext<'_> {
         Ok(TextureSet { set, layout, _sampler: sampler })
     }
 
-    /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`); the last is whether boats may be lit by a searchlight.
-    pub(crate) fn lens_constants(&self) -> [u32; 3] {
+    /// Specialisation constants of vertex shaders that draw through the lens (`lens.glsl`), and of boats' (`boat_body.glsl`).
+    pub(crate) fn vertex_constants(&self) -> [u32; 3] {
         let bend = match self.optics.bend {
             Bend::None => 0,
             Bend::RadialTangential => 1,

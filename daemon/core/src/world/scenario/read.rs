@@ -203,13 +203,13 @@ pub fn sea(section: &TomlSection<'_>, keys: &SeaKeys) -> Result<(BeaufortForce, 
 
 /// The searchlight of the table `[searchlight]`.
 fn searchlight(text: TomlText<'_>, raw: &RawSearchlight) -> Result<SearchlightSpec, TomlError> {
-    let beam = text.given(&raw.beam_deg, number(0.5..=60.0, "degrees"))?;
+    let usual = SearchlightSpec::default();
+    let candela = text.given(&raw.candela, number(100.0..=1e8, "candela"))?;
+    let beam_deg = text.given(&raw.beam_deg, number(0.5..=60.0, "degrees"))?;
     Ok(SearchlightSpec {
-        candela: text
-            .given(&raw.candela, number(100.0..=1e8, "candela"))?
-            .unwrap_or(SearchlightSpec::CANDELA),
-        beam: beam.map_or(SearchlightSpec::BEAM, f64::to_radians),
-        is_on: text.given(&raw.on, yes_no())?.unwrap_or(false),
+        candela: candela.unwrap_or(usual.candela),
+        beam: beam_deg.map_or(usual.beam, f64::to_radians),
+        is_on: text.given(&raw.on, yes_no())?.unwrap_or(usual.is_on),
     })
 }
 

@@ -68,7 +68,7 @@ impl BoatPipelines {
         ];
         // A layer of codes holds roots, one of light is filtered as it is.
         let constants = [u32::from(colour == UNORM), samples.as_raw()];
-        let lens = context.lens_constants();
+        let lens = context.vertex_constants();
         let mut sets = vec![context.frame_set];
         sets.extend(shadow.map(|shadow| &*shadow.layout));
         let plain_sets = sets.len();

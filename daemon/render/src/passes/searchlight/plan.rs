@@ -2,7 +2,7 @@
 
 use bowwave_core::frame::{
     scene::{PixelRect, Scene},
-    searchlight::{BeamGrid, BeamLight, SearchlightView},
+    searchlight::{BeamGrid, BeamLight, SEA_ALBEDO, SearchlightView},
 };
 use glam::Vec3;
 use shaders_spirv::interface::{BeamBlock, BeamNode};
@@ -47,7 +47,7 @@ impl BeamPlan {
         self.grid.light(view, &scene.camera, &scene.lens);
         self.nodes.extend(self.grid.nodes().iter().map(|node| BeamNode { light: [node.haze, node.sea] }));
         let strength = view.strength as f32;
-        let sea = SearchlightView::sea_albedo() * strength;
+        let sea = SEA_ALBEDO * strength;
         let (columns, cell_px) = (self.grid.columns(), self.grid.cell_px());
         let cell = |pixel: u32| (f64::from(pixel) / cell_px) as i32;
         let block = BeamBlock {

@@ -41,7 +41,7 @@ pub(crate) struct WakePass {
 impl WakePass {
     pub(crate) fn new(context: &PassContext<'_>, boats: &boats::BoatsPass) -> Result<Self, RenderError> {
         let depth = boats.hull_depth(context)?;
-        let lens = context.lens_constants();
+        let lens = context.vertex_constants();
         let pipeline = |vertex: Shader, fragment: Shader, sets: &[&SetLayout]| {
             let shape = PipelineShape::over_screen(vertex, fragment, sets);
             Pipeline::new(context.gpu, &PipelineShape { vertex_constants: &lens, ..shape })
