@@ -16,14 +16,35 @@ use crate::{
 /// Pixels from node to node of the mesh that directions are computed on; between, they are linear. At 8 the worst error of a lens of 60
 /// degrees is .005 px. The lens's fall-off is one of [`SHADES`] within a cell.
 const MESH: usize = 8;
-/// Steps from pixel to pixel of the panorama: two weights of 4 bits and a code of 8 fill 16 bits.
-const STEPS: u64 = 16;
-/// Codes of the panorama with their parts that are kept, as a table's index.
-const FINE: usize = 256 * 16;
+/// Bits of the fraction in a place in the panorama, in fixed point; a panorama's 8192 columns leave two bits for the sign.
+const FRACTION: u32 = 16;
+/// Of them, the bits that weights have: two weights of 4 bits and a code of 8 fill 16 bits.
+const WEIGHT: u32 = 4;
+/// Codes of the panorama with their parts that are kept, as a table's index: a quarter is less than what noise spreads them by, and a table for
+/// each step of the fall-off is then small enough to stay close to the processor.
+const FINE: usize = 256 << FINE_BITS;
+const FINE_BITS: u32 = 2;
 /// Steps of the lens's fall-off, from none to all.
 const SHADES: usize = 256;
-/// Values of the noise table; 10 bits of a random number choose one.
+/// Values of the noise: each row of a picture takes a stretch of them, from a place of its own.
+const NORMALS: usize = 1 << 18;
+/// Different values among them.
 const NORMAL: usize = 1024;
+/// Parts of a code in which pixels are developed, and of a standard deviation in which noise is kept: a deviation in 256ths of a code times
+/// such a number is noise in 16ths of a code, 16 bits up, which processors multiply eight at a time.
+const CODE_PARTS: f32 = 16.0;
+const DEVIATION_PARTS: f32 = 256.0;
+const NORMAL_PARTS: f32 = 4096.0;
+
+/// A developed pixel's colour, in [`CODE_PARTS`], and the deviation of its noise, in [`DEVIATION_PARTS`]. Both together are read at once.
+#[derive(Clone, Copy)]
+struct Developed {
+    code: i16,
+    deviation: i16,
+}
+
+/// A place in the panorama in fixed point, pixels: column and row.
+type Place = [i32; 2];
 
 /// Cuts pictures.
 pub struct CutCamera {
@@ -34,12 +55,10 @@ pub struct CutCamera {
     nodes: [usize; 2],
     /// Step of the fall-off of each cell.
     shades: Vec<u8>,
-    /// Code times 256 under each step of fall-off, by code of the panorama.
-    developed: Vec<u16>,
-    /// Deviation of the noise by code, codes times 256.
-    deviation: [i32; 256],
-    /// Standard normal numbers times 256.
-    normal: Vec<i16>,
+    /// What the sensor makes of a code of the panorama under each step of fall-off.
+    developed: Vec<Developed>,
+    /// Standard normal numbers in [`NORMAL_PARTS`].
+    normals: Vec<i16>,
     row_s: f64,
     seed: u64,
     /// Places of the nodes in the panorama, pixels.
@@ -62,26 +81,26 @@ impl CutCamera {
         };
         let light = inverse_transfer();
         let (read, shot) = (recipe.camera.read_noise as f32, recipe.camera.shot_noise as f32);
+        let deviation: [i16; 256] = std::array::from_fn(|code| {
+            let light = light[code * FINE / 256];
+            let deviation = (read + shot * light).sqrt();
+            // The curve's slope over that deviation, which is finite where it begins.
+            let slope = (transfer(light + deviation) - transfer(light)) / deviation.max(1e-9);
+            (255.0 * DEVIATION_PARTS * slope * deviation).round() as i16
+        });
+        let develop = |i: usize| {
+            let dimmed = light[i % FINE] * (i / FINE) as f32 / (SHADES - 1) as f32;
+            let code = (255.0 * CODE_PARTS * transfer(dimmed)).round() as i16;
+            Developed { code, deviation: deviation[usize::from(code as u16 / CODE_PARTS as u16).min(255)] }
+        };
         Self {
             width,
             height,
             rays: (0..nodes[0] * nodes[1]).map(|i| lens.unproject(node(i))).collect(),
             nodes,
             shades: (0..cells[0] * cells[1]).map(shade).collect(),
-            developed: (0..SHADES * FINE)
-                .map(|i| {
-                    let dimmed = light[i % FINE] * (i / FINE) as f32 / (SHADES - 1) as f32;
-                    (255.0 * 256.0 * transfer(dimmed)).round() as u16
-                })
-                .collect(),
-            deviation: std::array::from_fn(|code| {
-                let light = light[code * FINE / 256];
-                let deviation = (read + shot * light).sqrt();
-                // The curve's slope over that deviation, which is finite where it begins.
-                let slope = (transfer(light + deviation) - transfer(light)) / deviation.max(1e-9);
-                (255.0 * 256.0 * slope * deviation).round() as i32
-            }),
-            normal: normal_table(NORMAL).into_iter().map(|n| (256.0 * n).round() as i16).collect(),
+            developed: (0..SHADES * FINE).map(develop).collect(),
+            normals: normals(mix(recipe.seed)),
             row_s: recipe.camera.readout_ns as f64 * 1e-9 / f64::from(lens.height),
             seed: mix(recipe.seed),
             places: Vec::new(),
@@ -133,28 +152,21 @@ impl CutCamera {
 
     /// Cuts what [`Self::aim`] aimed at out of `view` into `rgb`, three bytes a pixel. `frame` chooses the noise.
     pub fn cut(&self, view: &PanoramaView<'_>, frame: u32, rgb: &mut [u8]) {
-        // Half a step more, since weights are cut off and not rounded.
-        let half = Vec2::splat(0.5 / STEPS as f32);
-        let last = Vec2::new(view.columns as f32 - 1.01, view.rows as f32 - 1.01);
-        let mut edge = vec![Vec2::ZERO; self.nodes[0]];
+        let mut random = Pcg32::new(mix(self.seed ^ u64::from(frame)), 0);
+        let mut edge = vec![[0; 2]; self.nodes[0]];
+        let mut developed = vec![Developed { code: 0, deviation: 0 }; 3 * self.width];
         for (y, row) in rgb.chunks_exact_mut(3 * self.width).enumerate() {
-            let mut random = Pcg32::new(mix(self.seed ^ u64::from(frame)), y as u64);
-            let (line, share) = (y / MESH, (y % MESH) as f32 / MESH as f32 + 0.5 / MESH as f32);
-            let upper = &self.places[line * self.nodes[0]..(line + 1) * self.nodes[0]];
-            let lower = &self.places[(line + 1) * self.nodes[0]..(line + 2) * self.nodes[0]];
-            for ((at, a), b) in edge.iter_mut().zip(upper).zip(lower) {
-                *at = a.lerp(*b, share) + half;
+            self.edge(view, y, &mut edge);
+            let shades = &self.shades[y / MESH * (self.nodes[0] - 1)..];
+            for ((pixels, ends), shade) in developed.chunks_mut(3 * MESH).zip(edge.windows(2)).zip(shades) {
+                develop(view, ends[0], ends[1], &self.developed[usize::from(*shade) * FINE..], pixels);
             }
-            let shades = &self.shades[line * (self.nodes[0] - 1)..];
-            for ((pixels, ends), shade) in row.chunks_mut(3 * MESH).zip(edge.windows(2)).zip(shades) {
-                let step = (ends[1] - ends[0]) / MESH as f32;
-                let mut place = ends[0] + 0.5 * step;
-                let developed = &self.developed[usize::from(*shade) * FINE..][..FINE];
-                for pixel in pixels.chunks_exact_mut(3) {
-                    let codes = bilinear(view, place.clamp(Vec2::ZERO, last));
-                    self.develop(codes, developed, random.next_u32(), pixel);
-                    place += step;
-                }
+            let from = random.next_u32() as usize % (NORMALS - 3 * self.width);
+            for ((value, pixel), normal) in row.iter_mut().zip(&developed).zip(&self.normals[from..]) {
+                // Nothing of this overflows; where that is checked, no two are worked out at once.
+                let noise = (i32::from(pixel.deviation).wrapping_mul(i32::from(*normal)) >> 16) as i16;
+                let parts = pixel.code.wrapping_add(noise).wrapping_add(CODE_PARTS as i16 / 2);
+                *value = (parts >> 4).clamp(0, 255) as u8;
             }
         }
         if let Some(sight) = &self.sight {
@@ -162,43 +174,80 @@ impl CutCamera {
         }
     }
 
-    /// Adds fall-off and noise.
-    #[inline(always)]
-    fn develop(&self, codes: u64, developed: &[u16], random: u32, pixel: &mut [u8]) {
-        for (c, value) in pixel.iter_mut().enumerate() {
-            let clean = i32::from(developed[(codes >> (16 * c + 4)) as usize & (FINE - 1)]);
-            let normal = i32::from(self.normal[(random >> (10 * c + 1)) as usize & (NORMAL - 1)]);
-            let noise = (self.deviation[(clean >> 8) as usize & 255] * normal) >> 8;
-            *value = ((clean + noise + 128) >> 8).clamp(0, 255) as u8;
+    /// Where a row of pixels meets the edges of the mesh's cells.
+    fn edge(&self, view: &PanoramaView<'_>, y: usize, edge: &mut [Place]) {
+        // Half a step more, since weights are cut off and not rounded.
+        let half = Vec2::splat(0.5 / (1 << WEIGHT) as f32);
+        // A pixel between two that are in the panorama is in it, too.
+        let last = |pixels: usize| (((pixels as i32 - 1) << FRACTION) - 1).max(0);
+        let (last_column, last_row) = (last(view.columns), last(view.rows));
+        let (line, share) = (y / MESH, (y % MESH) as f32 / MESH as f32 + 0.5 / MESH as f32);
+        let upper = &self.places[line * self.nodes[0]..(line + 1) * self.nodes[0]];
+        let lower = &self.places[(line + 1) * self.nodes[0]..(line + 2) * self.nodes[0]];
+        for ((at, a), b) in edge.iter_mut().zip(upper).zip(lower) {
+            let place = (a.lerp(*b, share) + half) * (1 << FRACTION) as f32;
+            *at = [(place.x as i32).clamp(0, last_column), (place.y as i32).clamp(0, last_row)];
         }
     }
 }
 
-/// Codes between four pixels: red, green and blue in the lowest three groups of 16 bits, times 256.
+/// Develops a cell's row of pixels between two places of the panorama. `developed` begins with the cell's fall-off.
 #[inline(always)]
-fn bilinear(view: &PanoramaView<'_>, place: Vec2) -> u64 {
-    let steps = (place * STEPS as f32).as_uvec2();
-    let (column, row) = ((steps.x / STEPS as u32) as usize, (steps.y / STEPS as u32) as usize);
-    let (x, y) = (u64::from(steps.x) % STEPS, u64::from(steps.y) % STEPS);
-    let at = row * view.columns + column;
-    let (Some(upper), Some(lower)) =
-        (view.pixels.get(at..at + 2), view.pixels.get(at + view.columns..at + view.columns + 2))
-    else {
-        return 0;
+fn develop(
+    view: &PanoramaView<'_>,
+    from: Place,
+    to: Place,
+    developed: &[Developed],
+    pixels: &mut [Developed],
+) {
+    let Some((developed, _)) = developed.split_first_chunk::<FINE>() else { return };
+    let step = [(to[0] - from[0]) / MESH as i32, (to[1] - from[1]) / MESH as i32];
+    let mut place = [from[0] + step[0] / 2, from[1] + step[1] / 2];
+    for pixel in pixels.chunks_exact_mut(3) {
+        for (value, code) in pixel.iter_mut().zip(bilinear(view, place)) {
+            *value = developed[(code >> (2 * WEIGHT - FINE_BITS)) as usize % FINE];
+        }
+        place = [place[0].wrapping_add(step[0]), place[1].wrapping_add(step[1])];
+    }
+}
+
+/// Codes between four pixels, times 256. Red and blue are weighted side by side in the halves of a word, and both columns of the pair above
+/// and below in the words of another.
+#[inline(always)]
+fn bilinear(view: &PanoramaView<'_>, place: Place) -> [u64; 3] {
+    const EVEN: u64 = 0x00ff_00ff_00ff_00ff;
+    const WHOLE: u64 = 1 << WEIGHT;
+    let weight = |at: i32| (at >> (FRACTION - WEIGHT)) as u64 % WHOLE;
+    let (x, y) = (weight(place[0]), weight(place[1]));
+    let at = ((place[1] >> FRACTION) as usize)
+        .wrapping_mul(view.columns)
+        .wrapping_add((place[0] >> FRACTION) as usize);
+    let (upper, lower) = (pair(view, at), pair(view, at.wrapping_add(view.columns)));
+    // 16 bits hold each; where overflow is looked for, this takes twice the time.
+    let between = |a: u64, b: u64, part: u64| {
+        a.wrapping_mul(WHOLE.wrapping_sub(part)).wrapping_add(b.wrapping_mul(part))
     };
-    let across = |pair: &[[u8; 4]]| spread(pair[0]) * (STEPS - x) + spread(pair[1]) * x;
-    across(upper) * (STEPS - y) + across(lower) * y
+    let down = |upper: u64, lower: u64| between(upper & EVEN, lower & EVEN, y);
+    let across = |pair: u64| between(pair & 0xffff_ffff, pair >> 32, x);
+    let (red_blue, green) = (across(down(upper, lower)), across(down(upper >> 8, lower >> 8)));
+    [red_blue & 0xffff, green & 0xffff, red_blue >> 16]
 }
 
-/// Four bytes in groups of 16 bits.
+/// Two neighbours of a row; black outside.
 #[inline(always)]
-fn spread(pixel: [u8; 4]) -> u64 {
-    let all = u64::from(u32::from_le_bytes(pixel));
-    let pairs = (all | all << 16) & 0x0000_ffff_0000_ffff;
-    (pairs | pairs << 8) & 0x00ff_00ff_00ff_00ff
+fn pair(view: &PanoramaView<'_>, at: usize) -> u64 {
+    let Some([left, right]) = view.pixels.get(at..).and_then(|pixels| pixels.first_chunk()) else { return 0 };
+    u64::from(u32::from_le_bytes(*left)) | u64::from(u32::from_le_bytes(*right)) << 32
 }
 
-/// Light of each sixteenth of a code, by bisection of the transfer curve.
+/// Standard normal numbers in a random order.
+fn normals(seed: u64) -> Vec<i16> {
+    let table = normal_table(NORMAL);
+    let mut random = Pcg32::new(seed, 1);
+    (0..NORMALS).map(|_| (NORMAL_PARTS * table[random.next_u32() as usize % NORMAL]).round() as i16).collect()
+}
+
+/// Light of each quarter of a code, by bisection of the transfer curve.
 fn inverse_transfer() -> Vec<f32> {
     (0..FINE)
         .map(|i| {
@@ -230,6 +279,51 @@ mod tests {
             let back = 255.0 * transfer(light[code * FINE / 256]);
             assert!((back - code as f32).abs() < 0.02, "{code} {back}");
         }
+    }
+
+    #[test]
+    fn the_noise_of_an_even_sky_has_the_sensors_deviation_and_no_bias() {
+        let (mut recipe, grey) = (Recipe { width: 320, height: 180, ..Recipe::default() }, 120);
+        recipe.camera.vignetting = 0.0;
+        let quiet = {
+            let mut quiet = recipe.clone();
+            (quiet.camera.read_noise, quiet.camera.shot_noise) = (0.0, 0.0);
+            quiet
+        };
+        let pixels = vec![[grey; 4]; 1024 * 800];
+        let view = PanoramaView {
+            pixels: &pixels,
+            columns: 1024,
+            rows: 800,
+            focal: 400.0,
+            centre: 512.0,
+            level_row: 400.0,
+        };
+        let shoot = |recipe: &Recipe| {
+            let mut camera = CutCamera::new(recipe);
+            let turned = vec![look(0.0, 0.0, 0.0); camera.rows_s().count()];
+            camera.aim(&view, turned);
+            let mut pictures = [vec![0; camera.bytes()], vec![0; camera.bytes()]];
+            for (frame, picture) in pictures.iter_mut().enumerate() {
+                camera.cut(&view, frame as u32, picture);
+            }
+            pictures
+        };
+        let ([noisy, next], [clean, same]) = (shoot(&recipe), shoot(&quiet));
+        assert_eq!(clean, same);
+        assert!(clean.iter().all(|code| *code == grey));
+        let mean = |f: &dyn Fn(usize) -> f64| (0..clean.len()).map(f).sum::<f64>() / clean.len() as f64;
+        let off = |picture: &[u8], i: usize| f64::from(picture[i]) - f64::from(grey);
+        assert!(mean(&|i| off(&noisy, i)).abs() < 0.05, "{}", mean(&|i| off(&noisy, i)));
+        let code = |light: f64| 255.0 * f64::from(transfer(light as f32));
+        let light = f64::from(inverse_transfer()[usize::from(grey) * FINE / 256]);
+        let deviation = (recipe.camera.read_noise + recipe.camera.shot_noise * light).sqrt();
+        let expected = code(light + deviation) - code(light);
+        // Rounding to whole codes adds a twelfth to the variance.
+        let found = mean(&|i| off(&noisy, i).powi(2)).sqrt();
+        assert!((found / expected.hypot((1.0_f64 / 12.0).sqrt()) - 1.0).abs() < 0.03, "{found} {expected}");
+        let common = mean(&|i| off(&noisy, i) * off(&next, i)) / (found * found);
+        assert!(common.abs() < 0.02, "{common}");
     }
 
     /// A panorama whose red has waves over azimuth and whose green has waves over the tangent of the elevation.

@@ -121,6 +121,15 @@ impl RealtimeLive {
     }
 }
 
+/// Lets the trainer's threads go before this one: a real camera takes none of their time. Where that is not allowed, it goes without.
+fn give_way() {
+    /// The lowest: a thread gets a fiftieth of a core that another one wants.
+    const NICE: i32 = 19;
+    if let Err(error) = rustix::process::setpriority_process(None, NICE) {
+        log::debug!("the simulated camera keeps its priority: {error}");
+    }
+}
+
 /// The gun with its unit and trigger.
 struct Line {
     stop: StopFlag,
@@ -172,6 +181,7 @@ struct Exposer {
 
 impl Exposer {
     fn run(mut self) {
+        give_way();
         loop {
             match self.frame() {
                 Ok(true) => {}
