@@ -24,7 +24,7 @@ use crate::{
 const POINTED: f64 = 0.5 * std::f64::consts::PI / 180.0;
 /// Boats of a group no further apart are spoken of together, radians.
 const BESIDE: f64 = 1.0 * std::f64::consts::PI / 180.0;
-/// Boats nearer than that are fired at before others are reported, metres.
+/// Boats nearer than that are reported, named, warned and fired at before anything is said of others, metres.
 const URGENT_M: f64 = 300.0;
 /// A boat that was warned has this long to turn, seconds.
 const HEEDS_S: f64 = 6.0;
@@ -214,26 +214,34 @@ impl Head {
         {
             return self.task;
         }
-        let nearest = |open: &dyn Fn(&Sighted) -> bool| {
-            found().filter(|b| open(b)).min_by(|a, b| range_m(a).total_cmp(&range_m(b))).map(|b| b.boat)
-        };
-        if let Some(boat) = nearest(&|b| !self.known[b.boat].is_reported) {
-            return Task::Say(boat, Act::Report);
-        }
-        let is_unnamed = |b: &Sighted| self.known[b.boat].called.is_none() && b.is_recognised;
-        if let Some(boat) = nearest(&is_unnamed) {
+        self.to_say(at).or(target.map(|target| Task::Engage(target.boat))).unwrap_or(Task::Search)
+    }
+
+    /// What is said next: of boats that are near, all there is to say, then of the others.
+    fn to_say(&self, at: &Moment<'_>) -> Option<Task> {
+        [URGENT_M, f64::INFINITY].into_iter().find_map(|reach_m| {
+            let nearest = |within_m: f64, open: &dyn Fn(&Sighted, &Known) -> bool| {
+                let range_m = |b: &Sighted| b.at.distance(at.eye);
+                let is_open = |b: &&Sighted| {
+                    let known = &self.known[b.boat];
+                    known.is_found && !b.is_over && range_m(b) < within_m.min(reach_m) && open(b, known)
+                };
+                let open = at.sighted.iter().filter(is_open);
+                open.min_by(|a, b| range_m(a).total_cmp(&range_m(b))).map(|b| b.boat)
+            };
+            let say = |act: Act| move |boat| Task::Say(boat, act);
+            let unreported = nearest(f64::INFINITY, &|_, known| !known.is_reported).map(say(Act::Report));
             // Which side is said when it is known.
-            return Task::Say(boat, Act::Identify(Side::Hostile));
-        }
-        let is_to_be_warned = |b: &Sighted| {
-            let known = &self.known[b.boat];
-            let comes = range_m(b) < WARNS_WITHIN_M && known.called == Some(Side::Hostile);
-            at.warns && comes && known.warned_s.is_none()
-        };
-        if let Some(boat) = nearest(&is_to_be_warned) {
-            return Task::Say(boat, Act::Warn);
-        }
-        target.map_or(Task::Search, |target| Task::Engage(target.boat))
+            let unnamed = || nearest(f64::INFINITY, &|b, known| known.called.is_none() && b.is_recognised);
+            let unwarned = || {
+                let is_hostile =
+                    |known: &Known| known.called == Some(Side::Hostile) && known.warned_s.is_none();
+                at.warns.then(|| nearest(WARNS_WITHIN_M, &|_, known| is_hostile(known))).flatten()
+            };
+            unreported
+                .or_else(|| unnamed().map(say(Act::Identify(Side::Hostile))))
+                .or_else(|| unwarned().map(say(Act::Warn)))
+        })
     }
 
     /// Whether something is still to be said of a boat.
