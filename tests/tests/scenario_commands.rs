@@ -132,6 +132,19 @@ fn what_is_hardly_meant_is_pointed_out_and_no_built_in_scenario_has_any() {
 }
 
 #[test]
+fn the_crowds_that_frames_are_timed_with_are_fifty_boats() {
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/data");
+    for (crowd, boats) in
+        [("ahead", "35 hostile and 15 neutral boats"), ("around", "40 hostile and 10 neutral boats")]
+    {
+        let checked = bowwave(["scenario", "check", &format!("{data}/crowd-{crowd}.toml")]);
+        expect_code(&checked, 0);
+        let answer = printed(&checked);
+        assert!(answer.contains(&format!("is sound: {boats}, 50 with crews")), "{answer}");
+    }
+}
+
+#[test]
 fn the_list_has_every_built_in_scenario() {
     let table = printed(&bowwave(["scenario", "list"]));
     let json = printed(&bowwave(["scenario", "list", "--json"]));

@@ -53,6 +53,8 @@ const GRADIENTS_REACH_PX: u32 = 84;
 
 /// Pixels around a boat's boxes that its anti-aliased edges can touch.
 const HULL_MARGIN_PX: f64 = 1.5;
+/// A mirrored boat whose light is gathered to bands and to columns of two texels is drawn simplified by no more than this, texels.
+const MIRRORED_DETAIL: f64 = 1.0;
 /// Most rectangles for all hulls together, and for one boat's water.
 const HULL_RECTS_MAX: usize = 512;
 const WATER_RECTS_MAX: usize = 256;
@@ -376,9 +378,13 @@ impl Plan {
             self.method_blocks.extend_from_slice(method.own());
             if mirrored {
                 let index = self.boat_blocks.len() as u32;
-                // Softened, a mirrored boat shows less than the boat itself.
-                let coarser = (0.2 * softened_px).max(1.0);
-                let detail_m = view::detail_m(scene, boat) * coarser;
+                // Softened, or its light gathered to columns and bands, a mirrored boat shows less than the boat itself.
+                let coarser = if waves {
+                    MIRRORED_DETAIL / (view::DETAIL_PX * placed.scale)
+                } else {
+                    0.2 * softened_px
+                };
+                let detail_m = view::detail_m(scene, boat) * coarser.max(1.0);
                 self.mirrors.push(BoatDraw { model: boat.model, index, rect: placed.place, detail_m });
                 self.boat_blocks.push(view::boat_block(scene, boat, &pose, &Shade::NONE, true));
                 if scene.runs(Pass::Lights) {

@@ -35,11 +35,12 @@ pub(super) fn nearest_m(fleet: &Fleet, view: &ViewFrustum<'_>, time: Time) -> f6
 fn wake_of(fleet: &Fleet, afloat: &Afloat<'_>, time: Time, start: Time) -> Option<Wake> {
     let history = fleet.history(afloat.boat)?;
     let hull = history.hull();
+    let water = fleet.water_over(hull, time);
     Wake::of(
         hull,
         f64::from(-afloat.model.min.z),
         time.secs_since(start),
         |time_s| history.state(time_s),
-        fleet.water_over(hull, time),
+        |place| water.at(place),
     )
 }

@@ -3,6 +3,8 @@
 //! The pattern itself (Kelvin's wedge of 19.47 degrees, transverse waves of wavelength 2 pi U^2 / g, foam) is drawn by the renderer
 //! along the track; here is where the boat was, and the amounts.
 
+use std::fmt;
+
 use glam::{DVec2, DVec3};
 
 use crate::{
@@ -40,10 +42,12 @@ pub struct TrackPoint {
     pub speed_m_s: f64,
     /// Metres to each side within which the track does not meet itself.
     pub reach_m: f64,
+    /// Metres to each side to which waves, or foam thrown up by the bow, are seen.
+    pub drawn_m: f64,
 }
 
 /// The track of one boat and the hull that made it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, PartialEq)]
 pub struct Wake {
     /// The hull at the water line.
     pub hull: Hull,
@@ -51,6 +55,29 @@ pub struct Wake {
     pub draught_m: f64,
     points: [TrackPoint; TRACK_POINTS],
     count: usize,
+}
+
+/// Of the track, as many points as there are and a hash of all their bits: the text of a scene tells two runs apart, frame by frame, and that of
+/// fifty tracks alone would take a millisecond.
+impl fmt::Debug for Wake {
+    fn fmt(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { hull, draught_m, points: _, count } = self;
+        let numbers = self.points().iter().flat_map(|point| {
+            let TrackPoint { position, starboard, along_m, age_s, speed_m_s, reach_m, drawn_m } = *point;
+            let DVec3 { x, y, z } = position;
+            [x, y, z, starboard.x, starboard.y, along_m, age_s, speed_m_s, reach_m, drawn_m]
+        });
+        // As Knuth's linear congruence mixes; each number goes through a turn of the bits, so that the highest ones count below.
+        let hash = numbers.fold(0_u64, |hash, number| {
+            (hash ^ number.to_bits()).wrapping_mul(0x5851_f42d_4c95_7f2d).rotate_left(29)
+        });
+        to.debug_struct("Wake")
+            .field("hull", hull)
+            .field("draught_m", draught_m)
+            .field("points", count)
+            .field("hash", &hash)
+            .finish()
+    }
 }
 
 impl Wake {
@@ -110,6 +137,7 @@ impl Wake {
                 age_s,
                 speed_m_s: at.speed_m_s,
                 reach_m: INSIDE_TURN / curvature.max(1e-6),
+                drawn_m: drawn_m(&self.hull, self.draught_m, at.speed_m_s, along_m, age_s),
             };
             self.count += 1;
         }
@@ -140,14 +168,73 @@ impl Wake {
         self
     }
 
-    /// Metres to each side of a point that is drawn: what waves can have reached, the wedge with a fifth more for those of its cusp, and
-    /// once they are no longer drawn, foam.
+    /// Metres to each side of a point that is drawn: the mixed water behind the hull, and what is seen of its waves and of the bow's foam.
     pub fn half_width_m(&self, point: &TrackPoint) -> f64 {
-        let wedge = 1.2 * WEDGE_TANGENT * point.along_m.max(0.0);
-        // The last seconds of the waves, faint as they are, are cut off at the sides.
-        let drawn = ((WAVES_S - point.age_s) / (0.5 * WAVES_S)).clamp(0.0, 1.0);
-        (1.4 * self.hull.beam_m + 0.4 + drawn * wedge).min(point.reach_m.max(0.6 * self.hull.beam_m))
+        let beam_m = self.hull.beam_m;
+        (1.4 * beam_m + 0.4 + point.drawn_m).min(point.reach_m.max(0.6 * beam_m))
     }
+}
+
+/// How far aside of the track something other than the mixed water behind the hull is seen, metres. The last seconds of it, faint as they are,
+/// are cut off at the sides.
+fn drawn_m(hull: &Hull, draught_m: f64, speed_m_s: f64, along_m: f64, age_s: f64) -> f64 {
+    let drawn = ((WAVES_S - age_s) / (0.5 * WAVES_S)).clamp(0.0, 1.0);
+    let wedge = WITH_CUSP * WEDGE_TANGENT * along_m.max(0.0);
+    let seen = || {
+        waves_within_m(hull, draught_m, speed_m_s, along_m, age_s)
+            .max(bow_foam_within_m(hull, speed_m_s, along_m, age_s))
+    };
+    if drawn * wedge > 0.0 { (drawn * wedge).min(seen()) } else { 0.0 }
+}
+
+/// Waves of the cusp reach so many times as far as the wedge.
+const WITH_CUSP: f64 = 1.2;
+
+/// How far aside of the track waves are steep enough to be drawn, metres: where `wake.frag` has either of Kelvin's two waves steeper than
+/// its least slope. Of a boat that is fast for its length, the long waves at the wedge's edge are not.
+fn waves_within_m(hull: &Hull, draught_m: f64, speed_m_s: f64, along_m: f64, age_s: f64) -> f64 {
+    /// Slope below which nothing of a wave is drawn, fall of the spectrum beyond which nothing is, and by how much noise raises waves at most.
+    const SLOPE_SEEN: f64 = 0.003;
+    const FALL_MAX: f64 = 9.0;
+    const UNEVEN: f64 = 1.45;
+    /// Places that are looked at, from the wedge's edge inwards: shares of its tangent.
+    const PLACES: [f64; 6] = [1.0, 0.85, 0.7, 0.5, 0.3, 0.1];
+    let (length_m, along_m) = (hull.length_m, along_m.max(0.02 * hull.length_m));
+    let fresh = (1.0 - age_s / WAVES_S).clamp(0.0, 1.0);
+    let highest = 0.4 * height_m(speed_m_s, hull, draught_m) * fresh * fresh;
+    let k0 = GRAVITY_M_S2 / speed_m_s.max(0.3).powi(2);
+    let own = [0.1 * length_m, 0.15 * hull.beam_m].map(|m| 0.5 * std::f64::consts::LOG2_E * m * m);
+    let is_seen = |share: f64| {
+        let tangent = share * WEDGE_TANGENT;
+        let (aside_m, from_bow_m) = (tangent * along_m, along_m * tangent.hypot(1.0));
+        let far_m = aside_m + 0.1 * from_bow_m + 0.3 * length_m;
+        let inside = (1.0 - share * share).max(0.0);
+        let sharp = (k0 * from_bow_m).max(0.1).sqrt();
+        let strength =
+            UNEVEN * highest * (length_m / far_m).powf(DISTANCE_POWER) / (inside + 1.0 / sharp).sqrt().sqrt();
+        // Tangents of the angles of the transverse and the diverging wave that are seen here.
+        let middle = std::f64::consts::FRAC_1_SQRT_2;
+        let [one, two] = [-1.0, 1.0].map(|side| 0.25 * (1.0 + side * inside.sqrt()) / tangent);
+        [one.min(middle), two.max(middle)].into_iter().any(|t| {
+            let k = k0 * (1.0 + t * t);
+            let long_ones = (k * length_m / std::f64::consts::TAU).powi(2);
+            let fall = k0 * k * (own[0] + t * t * own[1]);
+            strength * long_ones / (1.0 + long_ones) * k >= SLOPE_SEEN && fall <= FALL_MAX
+        })
+    };
+    let outermost = PLACES.iter().position(|share| is_seen(*share));
+    // From the place that is seen to the one farther out, of which nothing is.
+    outermost.map_or(0.0, |i| WITH_CUSP * WEDGE_TANGENT * along_m * PLACES[i.saturating_sub(1)])
+}
+
+/// How far aside of the track the foam is seen that the bow throws up, metres, as `wake.frag` has it drift off.
+fn bow_foam_within_m(hull: &Hull, speed_m_s: f64, along_m: f64, age_s: f64) -> f64 {
+    /// Cover of which no lace is seen.
+    const COVER_MIN: f64 = 0.03;
+    let since_bow_s = (age_s + 0.5 * hull.length_m / speed_m_s.max(SPEED_MIN_M_S)).max(0.0);
+    let foams = froude(speed_m_s, hull.length_m) > FOAM_FROUDE.0;
+    let is_seen = foams && 0.7 * (-since_bow_s / 3.53).exp() > COVER_MIN;
+    if is_seen { 0.8 * hull.beam_m + 0.24 * along_m.max(0.0) } else { 0.0 }
 }
 
 /// Height from trough to crest of the highest waves of a boat, one length of it off its track, metres.
@@ -244,6 +331,25 @@ mod tests {
         }
         assert!((froude(4.0, 10.0) - 0.4039).abs() < 1e-3);
         assert!((WEDGE_TANGENT.atan().to_degrees() - 19.47).abs() < 0.01);
+    }
+
+    #[test]
+    fn the_text_of_a_wake_tells_the_last_bit_of_each_number() {
+        let course = Course::straight(DVec2::new(5.0, 90.0), 1.0, 6.0).unwrap();
+        let wake = wake(&course, 40.0).unwrap();
+        let text = format!("{wake:?}");
+        assert_eq!(text, format!("{:?}", { wake }));
+        for i in [0, wake.points().len() - 1] {
+            for change in [
+                |p: &mut TrackPoint| p.position.z = p.position.z.next_up(),
+                |p: &mut TrackPoint| p.starboard.y = p.starboard.y.next_up(),
+                |p: &mut TrackPoint| p.reach_m = p.reach_m.next_up(),
+            ] {
+                let mut other = wake;
+                change(&mut other.points[i]);
+                assert_ne!(text, format!("{other:?}"), "{i}");
+            }
+        }
     }
 
     #[test]

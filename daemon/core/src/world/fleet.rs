@@ -17,7 +17,7 @@ use crate::{
         contact::Capsule,
         scenario::{BoatSpec, Scenario, Side},
         searchlight::{Beam, Searchlight},
-        waves::WaveField,
+        waves::{WaterLevel, WaveField},
     },
 };
 
@@ -405,7 +405,7 @@ impl Fleet {
 
     /// Height at `time` of the water about places, metres, in the mean over a hull that points north: waves that are shorter than it go
     /// through its wake without lifting it.
-    pub fn water_over(&self, hull: Hull, time: Time) -> impl Fn(DVec2) -> f64 {
+    pub fn water_over(&self, hull: Hull, time: Time) -> WaterLevel {
         self.waves.level_over(hull.length_m, hull.beam_m, time.secs_since(self.start))
     }
 

@@ -36,6 +36,9 @@ const WATER: Vec3 = Vec3::new(0.006, 0.022, 0.030);
 /// heights of the boat, over which that falls to a third.
 const WATER_SHADED: f64 = 0.6;
 const WATER_SHADED_HEIGHTS: f64 = 1.4;
+/// Distances among which that is looked for beyond which there is no reflection; and the nearest of them, among which it need not grow weaker.
+const TRIES: usize = 24;
+const NEAREST: usize = 3;
 /// No wave mirrors more than so many times the sky that a bright one does; the sky may be held too dark by some.
 const SKY_MOST: f32 = 1.5;
 
@@ -227,9 +230,8 @@ impl Lobes {
         {
             return;
         }
-        let tries = 24;
-        let reach = (1..=tries).rev().map(|i| farthest * (f64::from(i) / f64::from(tries)).powi(2));
-        let Some(reach_m) = reach.into_iter().find(|d| strength(*d) >= SHARE_MIN) else { return };
+        let reach = |i: usize| farthest * (i as f64 / TRIES as f64).powi(2);
+        let Some(reach_m) = last_seen(|i| strength(reach(i)) >= SHARE_MIN).map(reach) else { return };
         self.reach_m = reach_m;
         let last = divisions(seen.below_px(reach_m), STEP_PX, 2.0, (STEPS_MIN, STEPS)) - 1;
         for i in 0..=last {
@@ -245,6 +247,16 @@ impl Lobes {
             self.steps.push(if i == last { step.map(end) } else { step });
         }
     }
+}
+
+/// The farthest of [`TRIES`] distances at which a reflection is seen, which grows weaker from [`NEAREST`] on.
+fn last_seen(is_seen: impl Fn(usize) -> bool) -> Option<usize> {
+    let (mut seen, mut unseen) = (NEAREST, TRIES + 1);
+    while unseen - seen > 1 {
+        let middle = usize::midpoint(seen, unseen);
+        *(if is_seen(middle) { &mut seen } else { &mut unseen }) = middle;
+    }
+    if seen > NEAREST { Some(seen) } else { (1..=NEAREST).rev().find(|i| is_seen(*i)) }
 }
 
 /// Share of the boat's light that water throws back which lies so far beyond an end of the hull.
@@ -454,6 +466,38 @@ mod tests {
                 assert!(range < 300.0 || lobes.steps.len() <= STEPS / 2 && lobes.bands <= BANDS / 2);
             }
         }
+    }
+
+    #[test]
+    fn a_reflection_ends_where_no_farther_water_shows_it() {
+        let views = |wind: f64| {
+            let sea = ReflectionTable::baked().sea(wind);
+            for range in [5.0, 15.0, 30.0, 60.0, 150.0, 400.0, 1000.0, 5000.0] {
+                for (eye, height) in [(2.0, 0.3), (3.0, 1.0), (6.0, 2.0), (6.0, 8.0), (20.0, 30.0)] {
+                    for (turn, level, tilt) in [(0.0, 0.0, 0.0), (0.7, 0.5, 0.05), (1.5, -0.5, -0.05)] {
+                        let seen = ReflectionView {
+                            eye_m: eye,
+                            height_m: height,
+                            wind_to_view: turn,
+                            level_m: level,
+                            tilt,
+                            ..seen(8.0, range, 3.0)
+                        };
+                        let lobes = Lobes::of(&sea, &seen);
+                        let count = divisions(seen.height_px(), BAND_PX, BAND_POWER, (BANDS_MIN, BANDS));
+                        let width = seen.width_m as f32;
+                        let farthest = (1..=TRIES)
+                            .map(|i| 0.95 * range * (i as f64 / TRIES as f64).powi(2))
+                            .filter(|d| {
+                                seen_beyond(&bands(&sea, &seen, *d, count), -0.5 * width, width) >= SHARE_MIN
+                            })
+                            .last();
+                        assert_eq!(lobes.reach_m, farthest.unwrap_or(0.0), "{wind} m/s, {seen:?}");
+                    }
+                }
+            }
+        };
+        [0.0, 0.5, 2.0, 6.7, 20.0].into_iter().for_each(views);
     }
 
     /// On a calm a boat's whole height is mirrored as far off as geometry has it, and light is what Fresnel's formula leaves of it.

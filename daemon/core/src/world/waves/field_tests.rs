@@ -160,7 +160,15 @@ fn the_level_over_places_is_the_height_of_the_plane_there() {
     let waves = sea(4, 3);
     let level = waves.level_over(7.0, 2.0, 12.3);
     for i in 0..200 {
-        let place = DVec2::new(f64::from(i) * 3.7 - 200.0, f64::from(i % 17) * 9.1);
-        assert_eq!(level(place), waves.plane_under(place, 0.0, 7.0, 2.0, 12.3).height_m);
+        let place = DVec2::new(f64::from(i) * 37.0 - 2000.0, f64::from(i % 17) * 9.1);
+        let off = level.at(place) - waves.plane_under(place, 0.0, 7.0, 2.0, 12.3).height_m;
+        assert!(off.abs() < 1e-10 * waves.crest_max_m(), "{off}");
     }
+    // A sea that goes over into another is the sum of both.
+    let changing = sea(4, 3).changing_to(sea(6, 5), 5.0);
+    let place = DVec2::new(31.0, -7.0);
+    let off = changing.level_over(7.0, 2.0, 12.3).at(place)
+        - changing.plane_under(place, 0.0, 7.0, 2.0, 12.3).height_m;
+    assert!(off.abs() < 1e-10 * changing.crest_max_m(), "{off}");
+    assert_eq!(WaveField::FLAT.level_over(7.0, 2.0, 12.3).at(place), 0.0);
 }

@@ -3,5 +3,5 @@
 mod field;
 mod spectrum;
 
-pub use field::{CHANGE_S, WaterPlane, Wave, WaveField};
+pub use field::{CHANGE_S, WaterLevel, WaterPlane, Wave, WaveField};
 pub use spectrum::{Spectrum, WaveSpec};

@@ -20,6 +20,11 @@ use crate::{
     upload::upload_image,
 };
 
+/// Triangles that a pass draws, where it can do with as few: of three large boats close by. Their number is what a crowd of small boats costs.
+const TRIANGLES_MAX: u32 = 24_000;
+/// A crowd is simplified by no more than so many times what goes unseen.
+const COARSER_MAX: f64 = 3.0;
+
 /// One model's place in the shared buffers.
 struct Mesh {
     first_index: u32,
@@ -104,6 +109,20 @@ impl Meshes {
     pub(crate) fn level(&self, model: ModelId, detail_m: f64) -> Option<&Level> {
         let levels = &self.meshes.get(usize::from(model.0))?.levels;
         levels.iter().rev().find(|l| l.error_m() <= detail_m).or_else(|| levels.first())
+    }
+
+    /// By how many times the detail of boats is coarser than what each gives, so that all have at most [`TRIANGLES_MAX`] triangles; at most
+    /// [`COARSER_MAX`].
+    pub(crate) fn coarser(&self, draws: impl Iterator<Item = (ModelId, f64)> + Clone) -> f64 {
+        let triangles = |factor: f64| -> u32 {
+            let levels = draws.clone().filter_map(|(model, detail_m)| self.level(model, factor * detail_m));
+            levels.map(|level| (level.open.end - level.closed.start) / 3).sum()
+        };
+        let mut factor = 1.0;
+        while factor < COARSER_MAX && triangles(factor) > TRIANGLES_MAX {
+            factor = f64::min(1.2 * factor, COARSER_MAX);
+        }
+        factor
     }
 
     /// Draws some of a model's triangles.

@@ -104,15 +104,15 @@ impl BoatPipelines {
         Ok(Self { plain: make(false)?, textured, shadow: shadow.map(|shadow| shadow.set) })
     }
 
-    /// Draws one boat's mesh, within a rendering with depth. The shared buffers are bound.
+    /// Draws one boat's mesh, within a rendering with depth, simplified so many times more than goes unseen. The shared buffers are bound.
     pub(crate) fn draw(
         &self,
         to: CommandEncoder<'_>,
         frame: vk::DescriptorSet,
-        meshes: &Meshes,
+        (meshes, coarser): (&Meshes, f64),
         boat: &BoatDraw,
     ) {
-        let Some(level) = meshes.level(boat.model, boat.detail_m) else { return };
+        let Some(level) = meshes.level(boat.model, coarser * boat.detail_m) else { return };
         let block = DrawBlock { index: boat.index, ..DrawBlock::default() };
         let skinned = meshes.skin(boat.model).zip(self.textured.as_ref());
         let pipeline = skinned.map_or(&self.plain, |(_, textured)| textured);
@@ -208,9 +208,10 @@ impl BoatsPass {
         to.clear([vk::ImageAspectFlags::COLOR, vk::ImageAspectFlags::DEPTH], clears);
         to.clear([vk::ImageAspectFlags::DEPTH], depth_clears);
         meshes.bind(to);
+        let coarser = meshes.coarser(boats.iter().map(|boat| (boat.model, boat.detail_m)));
         for boat in boats {
             to.scissor(boat.rect);
-            self.pipelines.draw(to, frame, meshes, boat);
+            self.pipelines.draw(to, frame, (meshes, coarser), boat);
         }
         to.end();
     }

@@ -30,8 +30,6 @@ pub(crate) struct WakePlan {
 
 /// What is drawn of a boat's wake: where points of the track are seen close to each other, some are left out.
 pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan {
-    /// Points of the track beside the hull: all of them are drawn.
-    const HULL_POINTS: usize = 4;
     let camera = &scene.camera;
     let camera_from_world = DMat3::from_quat(camera.world_from_camera.inverse());
     let with = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
@@ -50,7 +48,7 @@ pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan
     let mut kept: Option<&TrackPoint> = None;
     for (i, point) in points.iter().enumerate() {
         let share = share(scene, wake, point);
-        let needed = i < HULL_POINTS || i + 1 == points.len();
+        let needed = i + 1 == points.len();
         if !needed && share > 0.0 && kept.is_some_and(|before| is_thin(scene, wake, before, &points[i..])) {
             continue;
         }
@@ -81,14 +79,14 @@ pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan
 
 /// Whether the strip from a point to the next is seen so thin that it may go on to the one after that.
 fn is_thin(scene: &Scene, wake: &Wake, before: &TrackPoint, points: &[TrackPoint]) -> bool {
-    /// A strip is no thinner than this where it can be longer instead, pixels: what runs on the processor shades whole blocks of four by four.
-    const THIN_PX: f64 = 8.0;
-    /// No strip is longer than this for that, seconds: in between, foam's decay is taken for straight.
-    const LONG_S: f64 = 1.4;
+    /// A strip is no thinner than this where it can be longer instead, pixels: what runs on the processor shades whole blocks of four by four,
+    /// and has more to do for a triangle than for its pixels.
+    const THIN_PX: f64 = 16.0;
+    /// No strip is longer than this for that, seconds: in between, foam's decay is taken for straight, which errs by a thirtieth.
+    const LONG_S: f64 = 1.8;
+    /// One that is seen so short has no such bound, pixels.
+    const SHORT_PX: f64 = 3.0;
     let [point, after, ..] = points else { return false };
-    if after.age_s - before.age_s > LONG_S {
-        return false;
-    }
     let on_screen = |p: DVec3| scene.lens.project(scene.camera.to_camera(p));
     let aside = (point.starboard * wake.half_width_m(point)).extend(0.0);
     let (Some(from), Some(to), Some(side)) =
@@ -97,7 +95,8 @@ fn is_thin(scene: &Scene, wake: &Wake, before: &TrackPoint, points: &[TrackPoint
         return false;
     };
     let across = (side - to).normalize_or_zero();
-    (to - from).perp_dot(across).abs() < THIN_PX
+    let is_short = (to - from).length() < SHORT_PX;
+    (is_short || after.age_s - before.age_s <= LONG_S) && (to - from).perp_dot(across).abs() < THIN_PX
 }
 
 /// Height of what the bow throws up, metres, and how much of it is drawn.
