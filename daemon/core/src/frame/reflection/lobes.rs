@@ -486,12 +486,13 @@ mod tests {
                         let lobes = Lobes::of(&sea, &seen);
                         let count = divisions(seen.height_px(), BAND_PX, BAND_POWER, (BANDS_MIN, BANDS));
                         let width = seen.width_m as f32;
-                        let farthest = (1..=TRIES)
-                            .map(|i| 0.95 * range * (i as f64 / TRIES as f64).powi(2))
-                            .filter(|d| {
-                                seen_beyond(&bands(&sea, &seen, *d, count), -0.5 * width, width) >= SHARE_MIN
-                            })
-                            .last();
+                        let is_seen = |distance_m: &f64| {
+                            let bands = bands(&sea, &seen, *distance_m, count);
+                            seen_beyond(&bands, -0.5 * width, width) >= SHARE_MIN
+                        };
+                        let tries =
+                            (1..=TRIES).rev().map(|i| 0.95 * range * (i as f64 / TRIES as f64).powi(2));
+                        let farthest = { tries }.find(is_seen);
                         assert_eq!(lobes.reach_m, farthest.unwrap_or(0.0), "{wind} m/s, {seen:?}");
                     }
                 }

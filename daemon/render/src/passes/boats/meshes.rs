@@ -114,15 +114,10 @@ impl Meshes {
     /// By how many times the detail of boats is coarser than what each gives, so that all have at most [`TRIANGLES_MAX`] triangles; at most
     /// [`COARSER_MAX`].
     pub(crate) fn coarser(&self, draws: impl Iterator<Item = (ModelId, f64)> + Clone) -> f64 {
-        let triangles = |factor: f64| -> u32 {
+        coarser(|factor| {
             let levels = draws.clone().filter_map(|(model, detail_m)| self.level(model, factor * detail_m));
             levels.map(|level| (level.open.end - level.closed.start) / 3).sum()
-        };
-        let mut factor = 1.0;
-        while factor < COARSER_MAX && triangles(factor) > TRIANGLES_MAX {
-            factor = f64::min(1.2 * factor, COARSER_MAX);
-        }
-        factor
+        })
     }
 
     /// Draws some of a model's triangles.
@@ -132,6 +127,15 @@ impl Meshes {
         // SAFETY: within a rendering, with buffers and pipeline bound; the ranges were checked when the model was taken.
         unsafe { to.gpu.device.cmd_draw_indexed(to.cmd, count, 1, first, mesh.first_vertex, 0) };
     }
+}
+
+/// The same by how many triangles there are at a factor.
+fn coarser(triangles: impl Fn(f64) -> u32) -> f64 {
+    let mut factor = 1.0;
+    while factor < COARSER_MAX && triangles(factor) > TRIANGLES_MAX {
+        factor = f64::min(1.2 * factor, COARSER_MAX);
+    }
+    factor
 }
 
 /// Refuses what would make the GPU read beyond its buffers.
@@ -229,6 +233,16 @@ fn code(linear: f32) -> u8 {
 mod tests {
     use super::*;
     use crate::testing;
+
+    #[test]
+    fn a_crowd_is_drawn_coarser_until_it_is_cheap_or_would_show() {
+        assert_eq!(coarser(|_| TRIANGLES_MAX), 1.0);
+        // Triangles fall with the square of the detail.
+        let crowd = |factor: f64| (60_000.0 / (factor * factor)) as u32;
+        let factor = coarser(crowd);
+        assert!(crowd(factor) <= TRIANGLES_MAX && crowd(factor / 1.2) > TRIANGLES_MAX, "{factor}");
+        assert_eq!(coarser(|_| u32::MAX), COARSER_MAX);
+    }
 
     #[test]
     fn smaller_levels_keep_light_and_ignore_what_is_transparent() {
