@@ -490,9 +490,9 @@ mod tests {
                             let bands = bands(&sea, &seen, *distance_m, count);
                             seen_beyond(&bands, -0.5 * width, width) >= SHARE_MIN
                         };
-                        let tries =
+                        let mut tries =
                             (1..=TRIES).rev().map(|i| 0.95 * range * (i as f64 / TRIES as f64).powi(2));
-                        let farthest = { tries }.find(is_seen);
+                        let farthest = tries.find(is_seen);
                         assert_eq!(lobes.reach_m, farthest.unwrap_or(0.0), "{wind} m/s, {seen:?}");
                     }
                 }
