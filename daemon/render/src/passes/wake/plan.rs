@@ -86,17 +86,24 @@ fn is_thin(scene: &Scene, wake: &Wake, before: &TrackPoint, points: &[TrackPoint
     const LONG_S: f64 = 1.8;
     /// One that is seen so short has no such bound, pixels.
     const SHORT_PX: f64 = 3.0;
+    /// The track of a turning boat is cut off by no more than this, pixels.
+    const CUT_PX: f64 = 0.3;
     let [point, after, ..] = points else { return false };
     let on_screen = |p: DVec3| scene.lens.project(scene.camera.to_camera(p));
     let aside = (point.starboard * wake.half_width_m(point)).extend(0.0);
-    let (Some(from), Some(to), Some(side)) =
-        (on_screen(before.position), on_screen(point.position), on_screen(point.position + aside))
-    else {
+    let (Some(from), Some(to), Some(next), Some(side)) = (
+        on_screen(before.position),
+        on_screen(point.position),
+        on_screen(after.position),
+        on_screen(point.position + aside),
+    ) else {
         return false;
     };
     let across = (side - to).normalize_or_zero();
     let is_short = (to - from).length() < SHORT_PX;
-    (is_short || after.age_s - before.age_s <= LONG_S) && (to - from).perp_dot(across).abs() < THIN_PX
+    let is_straight = (to - from).perp_dot((next - from).normalize_or_zero()).abs() < CUT_PX;
+    let is_fresh = is_short || after.age_s - before.age_s <= LONG_S;
+    is_straight && is_fresh && (to - from).perp_dot(across).abs() < THIN_PX
 }
 
 /// Height of what the bow throws up, metres, and how much of it is drawn.
