@@ -219,29 +219,26 @@ impl Head {
 
     /// What is said next: of boats that are near, all there is to say, then of the others.
     fn to_say(&self, at: &Moment<'_>) -> Option<Task> {
-        [URGENT_M, f64::INFINITY].into_iter().find_map(|reach_m| {
-            let nearest = |within_m: f64, open: &dyn Fn(&Sighted, &Known) -> bool| {
-                let range_m = |b: &Sighted| b.at.distance(at.eye);
-                let is_open = |b: &&Sighted| {
-                    let known = &self.known[b.boat];
-                    known.is_found && !b.is_over && range_m(b) < within_m.min(reach_m) && open(b, known)
+        // Which side is said when it is known.
+        let acts = [Act::Report, Act::Identify(Side::Hostile), Act::Warn];
+        let range_m = |b: &Sighted| b.at.distance(at.eye);
+        let nearest = |within_m: f64, act: Act| {
+            let is_due = |b: &&Sighted| {
+                let known = &self.known[b.boat];
+                let in_turn = match act {
+                    Act::Identify(_) => b.is_recognised,
+                    Act::Warn => {
+                        at.warns && known.called == Some(Side::Hostile) && range_m(b) < WARNS_WITHIN_M
+                    }
+                    _ => true,
                 };
-                let open = at.sighted.iter().filter(is_open);
-                open.min_by(|a, b| range_m(a).total_cmp(&range_m(b))).map(|b| b.boat)
+                known.is_found && !b.is_over && range_m(b) < within_m && self.is_open(b.boat, act) && in_turn
             };
-            let say = |act: Act| move |boat| Task::Say(boat, act);
-            let unreported = nearest(f64::INFINITY, &|_, known| !known.is_reported).map(say(Act::Report));
-            // Which side is said when it is known.
-            let unnamed = || nearest(f64::INFINITY, &|b, known| known.called.is_none() && b.is_recognised);
-            let unwarned = || {
-                let is_hostile =
-                    |known: &Known| known.called == Some(Side::Hostile) && known.warned_s.is_none();
-                at.warns.then(|| nearest(WARNS_WITHIN_M, &|_, known| is_hostile(known))).flatten()
-            };
-            unreported
-                .or_else(|| unnamed().map(say(Act::Identify(Side::Hostile))))
-                .or_else(|| unwarned().map(say(Act::Warn)))
-        })
+            let due = at.sighted.iter().filter(is_due);
+            due.min_by(|a, b| range_m(a).total_cmp(&range_m(b))).map(|b| Task::Say(b.boat, act))
+        };
+        let within = |reach_m| acts.into_iter().find_map(|act| nearest(reach_m, act));
+        [URGENT_M, f64::INFINITY].into_iter().find_map(within)
     }
 
     /// Whether something is still to be said of a boat.
