@@ -65,7 +65,7 @@ struct Sailor {
 }
 
 impl Sailor {
-    /// Waits for the window.
+    /// Waits for the window: on a busy computer it is there before it can be seen.
     fn before(display: &str, game: &mut Child) -> Self {
         let (connection, screen) = x11rb::connect(Some(display)).expect("the desktop answers");
         let root = connection.setup().roots[screen].root;
@@ -78,26 +78,11 @@ impl Sailor {
                 let asked = connection.get_property(false, *window, AtomEnum::WM_NAME, AtomEnum::ANY, 0, 64);
                 asked.ok().and_then(|c| c.reply().ok()).is_some_and(|name| name.value.starts_with(b"Bowwave"))
             });
-            if let Some(window) = named {
+            if let Some(window) = named.filter(|window| look(&connection, *window).is_some()) {
                 return Self { connection, root, window };
             }
             thread::sleep(Duration::from_millis(50));
         }
-    }
-
-    /// Brightness of the window's pixels, where it can be seen.
-    fn look(&self) -> Option<Vec<i32>> {
-        let (width, height) = SIZE;
-        let asked = self.connection.get_image(ImageFormat::Z_PIXMAP, self.window, 0, 0, width, height, !0);
-        let image = asked.ok()?.reply().ok()?;
-        // Blue, green, red and nothing.
-        Some(
-            image
-                .data
-                .chunks_exact(4)
-                .map(|p| i32::from(p[0]) + 2 * i32::from(p[1]) + i32::from(p[2]))
-                .collect(),
-        )
     }
 
     fn mouse(&self, kind: u8, detail: u8, to: (i16, i16)) {
@@ -113,6 +98,16 @@ impl Sailor {
     }
 }
 
+/// Brightness of a window's pixels, where it can be seen.
+fn look(connection: &RustConnection, window: Window) -> Option<Vec<i32>> {
+    let (width, height) = SIZE;
+    let asked = connection.get_image(ImageFormat::Z_PIXMAP, window, 0, 0, width, height, !0);
+    let image = asked.ok()?.reply().ok()?;
+    // Blue, green, red and nothing.
+    let pixels = image.data.chunks_exact(4);
+    Some(pixels.map(|p| i32::from(p[0]) + 2 * i32::from(p[1]) + i32::from(p[2])).collect())
+}
+
 /// Row of the horizon in some columns: where the picture darkens most downwards.
 fn horizon(light: &[i32], columns: std::ops::Range<usize>) -> usize {
     let width = usize::from(SIZE.0);
@@ -123,6 +118,8 @@ fn horizon(light: &[i32], columns: std::ops::Range<usize>) -> usize {
 /// The boat, pixels: what stands out most from the water around it, a little below the horizon.
 fn boat(light: &[i32]) -> Option<(f64, f64)> {
     const CELL: usize = 8;
+    // All of it, since the front sight hides its middle once the gun points at it: either half alone would be aimed beside.
+    const LONG: usize = 48;
     let width = usize::from(SIZE.0);
     let (left, right) = (horizon(light, 330..430) as f64, horizon(light, 850..950) as f64);
     let mut best = (0, (0.0, 0.0));
@@ -132,13 +129,13 @@ fn boat(light: &[i32]) -> Option<(f64, f64)> {
             let (mut stands_out, mut sum, mut weight) = (0, (0.0, 0.0), 0.0);
             for y in y0..y0 + CELL {
                 // The water to both sides.
-                let beside = [x0 - 60, x0 - 45, x0 + 3 * CELL + 45, x0 + 3 * CELL + 60];
+                let beside = [x0 - 60, x0 - 45, x0 + LONG + 45, x0 + LONG + 60];
                 let mut beside = beside.map(|x| light[y * width + x.min(width - 1)]);
                 beside.sort_unstable();
                 // One of them may be the front sight.
                 let water = (beside[1] + beside[2]) / 2;
                 // The front sight stands below the middle of the picture.
-                for x in (x0..x0 + 3 * CELL).filter(|x| y < 358 || !(634..647).contains(x)) {
+                for x in (x0..x0 + LONG).filter(|x| y < 358 || !(634..647).contains(x)) {
                     let off = (light[y * width + x] - water).abs();
                     if off > 70 {
                         stands_out += off;
@@ -173,16 +170,9 @@ fn a_boat_is_hit_within_half_a_minute_by_aiming_with_the_mouse() {
     sailor.mouse(MOTION, 0, (700, 400));
     let begun = Instant::now();
     let mut last_fire = begun;
-    let mut has_seen = false;
     while begun.elapsed().as_secs_f64() < LIMIT_S {
         thread::sleep(Duration::from_millis(70));
-        let light = match sailor.look() {
-            Some(light) => light,
-            // On a busy computer the window is there before anything is in it.
-            None if !has_seen => continue,
-            None => break,
-        };
-        has_seen = true;
+        let Some(light) = look(&sailor.connection, sailor.window) else { break };
         let Some((x, y)) = boat(&light) else { continue };
         // A round falls by half a metre on its way: the barrel points two pixels above the boat.
         let off = (x - 640.0, y - 362.0);
