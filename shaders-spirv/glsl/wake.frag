@@ -24,7 +24,7 @@ layout(location = 0) out vec4 colour;
 
 // Slope beyond which waves break: of Stokes' steepest wave, 0.443, a wide margin.
 const float SLOPE_MAX = 0.35;
-// Slope below which nothing of a wave is seen.
+// Slope below which nothing of a wave is seen, as the host's waves_within_m has it.
 const float SLOPE_SEEN = 0.003;
 const float TAU = 6.2831853;
 

@@ -32,7 +32,8 @@ const NORMALS: usize = 1 << 18;
 const NORMAL: usize = 1024;
 /// Parts of a code in which pixels are developed, and of a standard deviation in which noise is kept: a deviation in 256ths of a code times
 /// such a number is noise in 16ths of a code, 16 bits up, which processors multiply eight at a time.
-const CODE_PARTS: f32 = 16.0;
+const CODE_BITS: u32 = 4;
+const CODE_PARTS: f32 = (1 << CODE_BITS) as f32;
 const DEVIATION_PARTS: f32 = 256.0;
 const NORMAL_PARTS: f32 = 4096.0;
 
@@ -55,7 +56,7 @@ pub struct CutCamera {
     nodes: [usize; 2],
     /// Step of the fall-off of each cell.
     shades: Vec<u8>,
-    /// What the sensor makes of a code of the panorama under each step of fall-off.
+    /// Colours and noise by step of fall-off and, within it, by code of the panorama.
     developed: Vec<Developed>,
     /// Standard normal numbers in [`NORMAL_PARTS`].
     normals: Vec<i16>,
@@ -88,10 +89,10 @@ impl CutCamera {
             let slope = (transfer(light + deviation) - transfer(light)) / deviation.max(1e-9);
             (255.0 * DEVIATION_PARTS * slope * deviation).round() as i16
         });
-        let develop = |i: usize| {
+        let developed = |i: usize| {
             let dimmed = light[i % FINE] * (i / FINE) as f32 / (SHADES - 1) as f32;
             let code = (255.0 * CODE_PARTS * transfer(dimmed)).round() as i16;
-            Developed { code, deviation: deviation[usize::from(code as u16 / CODE_PARTS as u16).min(255)] }
+            Developed { code, deviation: deviation[usize::from(code as u16 >> CODE_BITS).min(255)] }
         };
         Self {
             width,
@@ -99,7 +100,7 @@ impl CutCamera {
             rays: (0..nodes[0] * nodes[1]).map(|i| lens.unproject(node(i))).collect(),
             nodes,
             shades: (0..cells[0] * cells[1]).map(shade).collect(),
-            developed: (0..SHADES * FINE).map(develop).collect(),
+            developed: (0..SHADES * FINE).map(developed).collect(),
             normals: normals(mix(recipe.seed)),
             row_s: recipe.camera.readout_ns as f64 * 1e-9 / f64::from(lens.height),
             seed: mix(recipe.seed),
@@ -165,8 +166,8 @@ impl CutCamera {
             for ((value, pixel), normal) in row.iter_mut().zip(&developed).zip(&self.normals[from..]) {
                 // Nothing of this overflows; where that is checked, no two are worked out at once.
                 let noise = (i32::from(pixel.deviation).wrapping_mul(i32::from(*normal)) >> 16) as i16;
-                let parts = pixel.code.wrapping_add(noise).wrapping_add(CODE_PARTS as i16 / 2);
-                *value = (parts >> 4).clamp(0, 255) as u8;
+                let parts = pixel.code.wrapping_add(noise).wrapping_add(1 << (CODE_BITS - 1));
+                *value = (parts >> CODE_BITS).clamp(0, 255) as u8;
             }
         }
         if let Some(sight) = &self.sight {
@@ -174,7 +175,7 @@ impl CutCamera {
         }
     }
 
-    /// Where a row of pixels meets the edges of the mesh's cells.
+    /// Places in the panorama at which a row of pixels meets the edges of the mesh's cells.
     fn edge(&self, view: &PanoramaView<'_>, y: usize, edge: &mut [Place]) {
         // Half a step more, since weights are cut off and not rounded.
         let half = Vec2::splat(0.5 / (1 << WEIGHT) as f32);

@@ -175,7 +175,7 @@ impl Wake {
     }
 }
 
-/// How far aside of the track something other than the mixed water behind the hull is seen, metres. The last seconds of it, faint as they are,
+/// Reach to each side of the track of all that is seen but the mixed water behind the hull, metres. The last seconds of it, faint as they are,
 /// are cut off at the sides.
 fn drawn_m(hull: &Hull, draught_m: f64, speed_m_s: f64, along_m: f64, age_s: f64) -> f64 {
     let drawn = ((WAVES_S - age_s) / (0.5 * WAVES_S)).clamp(0.0, 1.0);
@@ -190,8 +190,8 @@ fn drawn_m(hull: &Hull, draught_m: f64, speed_m_s: f64, along_m: f64, age_s: f64
 /// Waves of the cusp reach so many times as far as the wedge.
 const WITH_CUSP: f64 = 1.2;
 
-/// How far aside of the track waves are steep enough to be drawn, metres: where `wake.frag` has either of Kelvin's two waves steeper than
-/// its least slope. Of a boat that is fast for its length, the long waves at the wedge's edge are not.
+/// Reach to each side of the track of waves that are steep enough to be drawn, metres: `wake.frag` draws either of Kelvin's two waves from its
+/// least slope on. Of a boat that is fast for its length, the long waves at the wedge's edge are not.
 fn waves_within_m(hull: &Hull, draught_m: f64, speed_m_s: f64, along_m: f64, age_s: f64) -> f64 {
     /// Slope below which nothing of a wave is drawn, fall of the spectrum beyond which nothing is, and by how much noise raises waves at most.
     const SLOPE_SEEN: f64 = 0.003;
@@ -227,7 +227,7 @@ fn waves_within_m(hull: &Hull, draught_m: f64, speed_m_s: f64, along_m: f64, age
     outermost.map_or(0.0, |i| WITH_CUSP * WEDGE_TANGENT * along_m * PLACES[i.saturating_sub(1)])
 }
 
-/// How far aside of the track the foam is seen that the bow throws up, metres, as `wake.frag` has it drift off.
+/// Reach to each side of the track of the foam that the bow throws up, metres, as `wake.frag` has it drift off.
 fn bow_foam_within_m(hull: &Hull, speed_m_s: f64, along_m: f64, age_s: f64) -> f64 {
     /// Cover of which no lace is seen.
     const COVER_MIN: f64 = 0.03;

@@ -195,7 +195,7 @@ impl Head {
     }
 
     fn next_task(&self, at: &Moment<'_>) -> Task {
-        let found = || at.sighted.iter().filter(|b| self.known[b.boat].is_found && !b.is_over);
+        let found = || self.found(at);
         let range_m = |b: &Sighted| b.at.distance(at.eye);
         let may = |b: &&Sighted| self.may_fire(b, range_m(b), at);
         let target = found().filter(may).max_by(|a, b| {
@@ -217,7 +217,7 @@ impl Head {
         self.to_say(at).or(target.map(|target| Task::Engage(target.boat))).unwrap_or(Task::Search)
     }
 
-    /// What is said next: of boats that are near, all there is to say, then of the others.
+    /// The next thing to say: of boats that are near, all there is to say, then of the others.
     fn to_say(&self, at: &Moment<'_>) -> Option<Task> {
         // Which side is said when it is known.
         let acts = [Act::Report, Act::Identify(Side::Hostile), Act::Warn];
@@ -232,13 +232,20 @@ impl Head {
                     }
                     _ => true,
                 };
-                known.is_found && !b.is_over && range_m(b) < within_m && self.is_open(b.boat, act) && in_turn
+                range_m(b) < within_m && self.is_open(b.boat, act) && in_turn
             };
-            let due = at.sighted.iter().filter(is_due);
-            due.min_by(|a, b| range_m(a).total_cmp(&range_m(b))).map(|b| Task::Say(b.boat, act))
+            self.found(at)
+                .filter(is_due)
+                .min_by(|a, b| range_m(a).total_cmp(&range_m(b)))
+                .map(|b| Task::Say(b.boat, act))
         };
         let within = |reach_m| acts.into_iter().find_map(|act| nearest(reach_m, act));
         [URGENT_M, f64::INFINITY].into_iter().find_map(within)
+    }
+
+    /// Boats that are known to be there and still matter.
+    fn found<'a>(&'a self, at: &'a Moment<'_>) -> impl Iterator<Item = &'a Sighted> {
+        at.sighted.iter().filter(|b| self.known[b.boat].is_found && !b.is_over)
     }
 
     /// Whether something is still to be said of a boat.

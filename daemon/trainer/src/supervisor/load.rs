@@ -115,7 +115,7 @@ impl LoadWatch {
         self.left_out > 0
     }
 
-    /// Whether frames as they are now leave no room for one that takes a little longer.
+    /// True of frames that leave no room for one that takes a little longer.
     fn is_nearly_late(&self) -> bool {
         self.since >= STEP_WITHIN && self.quantile(STEP_WITHIN, 0.5) > NEARLY_LATE_MS
     }

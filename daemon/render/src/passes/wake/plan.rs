@@ -48,8 +48,7 @@ pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan
     let mut kept: Option<&TrackPoint> = None;
     for (i, point) in points.iter().enumerate() {
         let share = share(scene, wake, point);
-        let needed = i + 1 == points.len();
-        if !needed && share > 0.0 && kept.is_some_and(|before| is_thin(scene, wake, before, &points[i..])) {
+        if share > 0.0 && kept.is_some_and(|before| is_thin(scene, wake, before, &points[i..])) {
             continue;
         }
         kept = Some(point);
