@@ -15,6 +15,7 @@
 //! | `[shutter]` | `readout_ms` (from reading the picture's first row to its last, negative where the last is read first), `sigma_ms`; left out where all rows are exposed at once |
 //! | `[boresight]` | `right_deg`, `down_deg` (of the optical axis), `sigma_mrad`, `muzzle_m = [right, down, forward]` from the camera |
 //! | `[trigger]` | `latency_ms` (from the line's edge to the round, negative where the line is the later one), `sigma_ms`; left out where it was not measured |
+//! | `[own_ship]` | optional; `hidden_px`: polygons in which the sea is not looked for; `[[own_ship.phantom]]`: `outline_px`, traced along the edges of what the camera sees of the gun ([`outline`]), optional `name` |
 //! | `[gyro_bias]` | `bias_deg_per_s = [x, y, z]` (subtracted from the rates, unit's axes), `sigma_deg_per_s` |
 //!
 //! Every section also has `measured` (a TOML date, unquoted) and may have `how`.
@@ -32,6 +33,7 @@
 
 pub mod capture;
 mod file;
+pub mod outline;
 pub mod report;
 mod rolling_shutter;
 mod sight;

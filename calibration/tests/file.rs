@@ -13,6 +13,7 @@ use bowwave_calibration::{CalibrationError, CalibrationFile, Date, Provenance, h
 use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
     geometry::{Distortion, Lens},
+    own_ship::Phantom,
 };
 use glam::{DQuat, DVec2, DVec3};
 use proptest::prelude::*;
@@ -46,8 +47,10 @@ fn the_example_means_what_it_says() {
     assert_eq!(file.lens.measured, Date::new(2026, 11, 18).unwrap());
     assert_eq!(c.lens.centre, DVec2::new(641.7, 358.2));
     assert_eq!(c.time_offset_ns, -3_200_000);
-    assert_eq!(file.own_ship[0][1], DVec2::new(420.0, 560.0));
-    assert!((0.05..0.08).contains(&file.own_ship_mask().unwrap().share()));
+    assert_eq!(file.hidden[0][1], DVec2::new(420.0, 560.0));
+    assert_eq!(file.phantoms[0].outline()[1], DVec2::new(670.0, 610.0));
+    assert!(file.phantoms[0].recoils);
+    assert!((0.05..0.08).contains(&file.own_ship().mask.unwrap().share()));
     assert!((c.gyro_bias.z - 0.021_f64.to_radians()).abs() < 1e-15);
     assert!((c.camera_from_imu_sigma.x - 0.7e-3).abs() < 1e-15);
     // What the unit feels ahead (its x) lies ahead in the camera (its z), what it feels below (its z) below (y).
@@ -264,6 +267,7 @@ prop_compose! {
         sections in [provenance(), provenance(), provenance(), provenance(), provenance(), provenance(), provenance()],
         calibration in calibration(),
         hidden in prop::option::of(0.2f64..1.0),
+        barrel in prop::option::of((0.2f64..0.8, text(20), any::<bool>())),
     ) -> CalibrationFile {
         let [source, camera_name, camera_serial, imu_name, imu_serial] = texts;
         let [lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias] = sections;
@@ -271,10 +275,16 @@ prop_compose! {
         let trigger = calibration.trigger.map(|_| trigger);
         let size = DVec2::new(f64::from(calibration.lens.width), f64::from(calibration.lens.height));
         let corner = |share: f64| vec![DVec2::ZERO, DVec2::new(size.x * share, 0.0), DVec2::new(0.0, size.y)];
-        let own_ship = hidden.map(corner).into_iter().collect();
+        let hidden = hidden.map(corner).into_iter().collect();
+        let picture = (calibration.lens.width, calibration.lens.height);
+        let phantom = |(share, name, recoils): (f64, String, bool)| {
+            Phantom::new(name, corner(share), picture).recoiling(recoils)
+        };
+        let phantoms = barrel.map(phantom).into_iter().collect();
         CalibrationFile {
             made, source, camera_name, camera_serial, imu_name, imu_serial,
-            lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias, own_ship, calibration,
+            lens, camera_from_imu, time_offset, shutter, boresight, trigger, gyro_bias, hidden, phantoms,
+            calibration,
         }
     }
 }

@@ -434,6 +434,22 @@ block! {
 }
 
 block! {
+    /// Push constants of the phantoms' pass: `PhantomBlock`.
+    pub struct PhantomBlock {
+        /// Screen position of the upper left corner of its textures, pixels.
+        pub origin: [f32; 2],
+        /// Their size, pixels.
+        pub size: [f32; 2],
+        /// Screen position at which the bore vanishes.
+        pub bore: [f32; 2],
+        /// What recoils is seen so many times as far from there as it rests.
+        pub recoil: f32,
+        /// Width of an edge, pixels.
+        pub soft: f32,
+    }
+}
+
+block! {
     /// Push constants of everything that is drawn boat by boat: `DrawBlock`.
     pub struct DrawBlock {
         /// x0, y0, x1, y1 in pixels: the quad, or what is added to each quad of the frame's list.

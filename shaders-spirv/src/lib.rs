@@ -104,6 +104,8 @@ shaders! {
     BEAM_FRAG = "beam.frag";
     /// The same where a hull may stand before the sea: looks at depth.
     BEAM_HIDDEN_FRAG = "beam_hidden.frag";
+    /// The own gun and ship in the picture, laid over what was drawn.
+    PHANTOM_FRAG = "phantom.frag";
     /// A rectangle of the head-up display.
     HUD_VERT = "hud.vert";
     /// What fills a rectangle of the head-up display. Constant: 0 plates, shapes or glyphs.

@@ -14,7 +14,7 @@ use rspirv::{
 };
 use shaders_spirv::interface::{
     BeamBlock, BeamNode, BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock,
-    HULL_LINE_COLUMNS, HudQuad, LightBlock, LobeBlock, MeshVertex, MirrorBlock, PhysicsBlock,
+    HULL_LINE_COLUMNS, HudQuad, LightBlock, LobeBlock, MeshVertex, MirrorBlock, PhantomBlock, PhysicsBlock,
     PhysicsPublishedBlock, ReflectBlock, RoundBlock, ShadowBlock, TRACK_POINTS, VideoBlock, WATERS_MAX,
     WakeBlock, WakeHead, WakePoint, WaterBlock,
 };
@@ -35,6 +35,7 @@ const HOST: &[Host] = &[
     ("RoundBlock", RoundBlock::FIELDS, size_of::<RoundBlock>()),
     ("HudQuad", HudQuad::FIELDS, size_of::<HudQuad>()),
     ("VideoBlock", VideoBlock::FIELDS, size_of::<VideoBlock>()),
+    ("PhantomBlock", PhantomBlock::FIELDS, size_of::<PhantomBlock>()),
     ("LightBlock", LightBlock::FIELDS, size_of::<LightBlock>()),
     ("BeamBlock", BeamBlock::FIELDS, size_of::<BeamBlock>()),
     ("BeamNode", BeamNode::FIELDS, size_of::<BeamNode>()),

@@ -15,7 +15,11 @@ pub use write::to_toml;
 
 use std::path::Path;
 
-use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, text::toml::TEXT_BYTES_MAX};
+use bowwave_core::{
+    calibration::Calibration,
+    own_ship::{OwnShip, Phantom},
+    text::toml::TEXT_BYTES_MAX,
+};
 use bowwave_files::plain_text;
 use glam::DVec2;
 
@@ -67,8 +71,11 @@ pub struct CalibrationFile {
     pub trigger: Option<Provenance>,
     /// Where the gyro's bias comes from.
     pub gyro_bias: Provenance,
-    /// Parts of the picture that show the own ship or gun: polygons with corners in pixels, x right, y down, from the upper left corner.
-    pub own_ship: Vec<Vec<DVec2>>,
+    /// Parts of the picture in which the sea is not to be looked for: polygons with corners in pixels, x right, y down, from the upper left
+    /// corner.
+    pub hidden: Vec<Vec<DVec2>>,
+    /// The own gun and ship by their outlines: what hides boats, and is no sea either.
+    pub phantoms: Vec<Phantom>,
     /// The checked numbers.
     pub calibration: Calibration,
 }
@@ -97,15 +104,17 @@ impl CalibrationFile {
             boresight: provenance.clone(),
             trigger: calibration.trigger.map(|_| provenance.clone()),
             gyro_bias: provenance,
-            own_ship: Vec::new(),
+            hidden: Vec::new(),
+            phantoms: Vec::new(),
             calibration,
         }
     }
 
-    /// Mask of the own ship for the finders of horizon and sky line; `None` without one.
-    pub fn own_ship_mask(&self) -> Option<Mask> {
+    /// The own gun and ship in the pictures: for the finders of horizon and sky line, and for what they hide.
+    pub fn own_ship(&self) -> OwnShip {
         let lens = &self.calibration.lens;
-        Mask::of_polygons(&self.own_ship, (lens.width, lens.height))
+        let bore = lens.project(self.calibration.bore_in_camera()).unwrap_or(lens.centre);
+        OwnShip::new(self.phantoms.clone(), bore, &self.hidden, (lens.width, lens.height))
     }
 
     /// Reads and checks a file.

@@ -4,6 +4,7 @@ use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
     estimate::horizon::Mask,
     geometry::{Distortion, Lens},
+    own_ship::{OwnShip, Phantom},
     text::toml::{
         Loose, OptionalKey, RequiredKey, TomlError, TomlText, ValueRule, list_of, number, positive, whole,
     },
@@ -98,7 +99,20 @@ measured! {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawOwnShip {
+    #[serde(default)]
     hidden_px: Vec<RequiredKey<Vec<[f64; 2]>>>,
+    #[serde(default)]
+    phantom: Vec<RawPhantom>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPhantom {
+    #[serde(default)]
+    name: String,
+    outline_px: RequiredKey<Vec<[f64; 2]>>,
+    #[serde(default)]
+    recoils: bool,
 }
 
 /// A calibration's text, checked; `origin` (a file name, usually) stands at the head of error messages.
@@ -108,6 +122,7 @@ struct RawOwnShip {
 pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationError> {
     let text = TomlText::new(text, origin)?;
     let (raw, _) = text.read::<RawCalibration>(&[])?;
+    let (hidden, phantoms) = own_ship(text, &raw)?;
     Ok(CalibrationFile {
         made: text.needed(&raw.made, calendar_day())?,
         lens: raw.lens.provenance(text)?,
@@ -118,7 +133,8 @@ pub fn parse(text: &str, origin: &str) -> Result<CalibrationFile, CalibrationErr
         trigger: raw.trigger.as_ref().map(|trigger| trigger.provenance(text)).transpose()?,
         gyro_bias: raw.gyro_bias.provenance(text)?,
         calibration: calibration(text, &raw)?,
-        own_ship: own_ship(text, &raw)?,
+        hidden,
+        phantoms,
         source: raw.source,
         camera_name: raw.camera_name,
         camera_serial: raw.camera_serial,
@@ -217,41 +233,56 @@ fn calibration(text: TomlText<'_>, raw: &RawCalibration) -> Result<Calibration, 
     })
 }
 
-/// Polygons of the own ship in the picture, in pixels.
-fn own_ship(text: TomlText<'_>, raw: &RawCalibration) -> Result<Vec<Vec<DVec2>>, TomlError> {
-    let Some(own_ship) = &raw.own_ship else { return Ok(Vec::new()) };
+/// What is seen of the own gun and ship in the picture: polygons that hide the sea, and phantoms.
+fn own_ship(text: TomlText<'_>, raw: &RawCalibration) -> Result<(Vec<Vec<DVec2>>, Vec<Phantom>), TomlError> {
+    let Some(own_ship) = &raw.own_ship else { return Ok(Default::default()) };
     let [width, height] = text.needed(&raw.lens.size_px, picture_size())?;
+    let size = (width, height);
+    let all = own_ship.hidden_px.iter().chain(own_ship.phantom.iter().map(|phantom| &phantom.outline_px));
+    if let Some(beyond) = all.clone().nth(POLYGONS_MOST) {
+        return Err(text.error(beyond, format!("is one polygon too many: give {POLYGONS_MOST} at most")));
+    }
+    let polygon = |raw: &RequiredKey<Vec<[f64; 2]>>| polygon(text, raw, size);
+    let hidden = own_ship.hidden_px.iter().map(polygon).collect::<Result<Vec<_>, _>>()?;
+    let phantom = |raw: &RawPhantom| {
+        let outline = polygon(&raw.outline_px)?;
+        Ok(Phantom::new(raw.name.as_str(), outline, size).recoiling(raw.recoils))
+    };
+    let phantoms = own_ship.phantom.iter().map(phantom).collect::<Result<Vec<_>, TomlError>>()?;
+    let seen = OwnShip::new(phantoms, DVec2::ZERO, &hidden, size);
+    if let (Some(first), Some(share)) = (all.clone().next(), seen.mask.map(|mask| mask.share()))
+        && share > SHARE_MOST
+    {
+        let problem = format!("hides {:.0} % of the picture: too little is left to see", share * 100.0);
+        return Err(text.error(first, problem));
+    }
+    Ok((hidden, seen.phantoms.parts.to_vec()))
+}
+
+/// A polygon with an area, its corners in a picture of `size` pixels.
+fn polygon(
+    text: TomlText<'_>,
+    raw: &RequiredKey<Vec<[f64; 2]>>,
+    (width, height): (u32, u32),
+) -> Result<Vec<DVec2>, TomlError> {
+    let Loose::Fits(corners) = raw.get_ref() else {
+        return Err(text.refuse(raw, "a list of corners in pixels: [[0, 640], [420, 560], [430, 720]]"));
+    };
+    if !(3..=CORNERS_MOST).contains(&corners.len()) {
+        let problem = format!("is a polygon of {} corners: give 3 to {CORNERS_MOST}", corners.len());
+        return Err(text.error(raw, problem));
+    }
     let size = DVec2::new(f64::from(width), f64::from(height));
-    let mut polygons = Vec::new();
-    for polygon in &own_ship.hidden_px {
-        let Loose::Fits(corners) = polygon.get_ref() else {
-            return Err(
-                text.refuse(polygon, "a list of corners in pixels: [[0, 640], [420, 560], [430, 720]]")
-            );
-        };
-        if !(3..=CORNERS_MOST).contains(&corners.len()) || polygons.len() >= POLYGONS_MOST {
-            let problem = format!(
-                "has a polygon of {} corners: give 3 to {CORNERS_MOST} for each, and {POLYGONS_MOST} polygons at most",
-                corners.len()
-            );
-            return Err(text.error(polygon, problem));
-        }
-        let outside = |[x, y]: &&[f64; 2]| !((0.0..=size.x).contains(x) && (0.0..=size.y).contains(y));
-        if let Some([x, y]) = corners.iter().find(outside) {
-            let problem = format!("has the corner [{x}, {y}], which is not in a picture of {width}x{height}");
-            return Err(text.error(polygon, problem));
-        }
-        polygons.push(corners.iter().map(|c| DVec2::from_array(*c)).collect());
+    let outside = |[x, y]: &&[f64; 2]| !((0.0..=size.x).contains(x) && (0.0..=size.y).contains(y));
+    if let Some([x, y]) = corners.iter().find(outside) {
+        let problem = format!("has the corner [{x}, {y}], which is not in a picture of {width}x{height}");
+        return Err(text.error(raw, problem));
     }
-    let mask = Mask::of_polygons(&polygons, (width, height));
-    match (own_ship.hidden_px.first(), mask.map(|mask| mask.share())) {
-        (Some(first), Some(share)) if share > SHARE_MOST => {
-            let problem = format!("hides {:.0} % of the picture: too little is left to see", share * 100.0);
-            Err(text.error(first, problem))
-        }
-        (Some(first), None) => Err(text.error(first, "hides nothing: its polygons have no area")),
-        _ => Ok(polygons),
+    let corners: Vec<_> = corners.iter().map(|c| DVec2::from_array(*c)).collect();
+    if Mask::of_polygons(std::slice::from_ref(&corners), (width, height)).is_none() {
+        return Err(text.error(raw, "hides nothing: it has no area"));
     }
+    Ok(corners)
 }
 
 fn rotation(text: TomlText<'_>, raw: &RequiredKey<Vec<f64>>) -> Result<DQuat, TomlError> {

@@ -95,16 +95,21 @@ fn shutter(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
 }
 
 fn own_ship(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {
-    if file.own_ship.is_empty() {
-        return Ok(());
+    let corners = |polygon: &[DVec2]| polygon.iter().map(|c| c.to_array()).collect::<Vec<_>>();
+    if !file.hidden.is_empty() {
+        let what =
+            "Where the sea is not looked for: polygons of [x, y] in pixels from the upper left corner.";
+        section(out, "own_ship", what)?;
+        writeln!(out, "hidden_px = {:?}", file.hidden.iter().map(|p| corners(p)).collect::<Vec<_>>())?;
     }
-    section(
-        out,
-        "own_ship",
-        "What of the picture shows the own gun or ship: polygons of [x, y] in pixels from the upper left corner.",
-    )?;
-    let corners = |polygon: &Vec<DVec2>| polygon.iter().map(|c| c.to_array()).collect::<Vec<_>>();
-    writeln!(out, "hidden_px = {:?}", file.own_ship.iter().map(corners).collect::<Vec<_>>())
+    for phantom in &file.phantoms {
+        let what = "The own gun or ship, traced along its edges: it hides what is drawn.";
+        write!(out, "\n[[own_ship.phantom]]\n# {what}\n")?;
+        writeln!(out, "name = {}", quoted(&phantom.name))?;
+        writeln!(out, "outline_px = {:?}", corners(phantom.outline()))?;
+        writeln!(out, "recoils = {}", phantom.recoils)?;
+    }
+    Ok(())
 }
 
 fn boresight(out: &mut String, file: &CalibrationFile) -> std::fmt::Result {

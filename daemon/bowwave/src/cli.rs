@@ -15,8 +15,8 @@ use hw_sim::fault::{Fault, FaultKind};
 pub use calibrate::{Calibrate, CalibrateBoard, CalibrateIntrinsics, CalibrateTask};
 pub use desk::{DeskArgs, Play};
 pub use mounting::{
-    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
-    CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, WizardTask,
+    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibratePhantom, CalibrateRestore,
+    CalibrateTrigger, CalibrateWizard, CalibrationFiles, InputArgs, OutputArgs, TracedOutline, WizardTask,
 };
 pub use scenario::{
     ScenarioArgs, ScenarioCheck, ScenarioCommand, ScenarioList, ScenarioNew, ScenarioPreview,

@@ -149,6 +149,7 @@ fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
                 Pass::Searchlight => "frames with the searchlight on, on the pixels that it lights",
                 Pass::Lights => "frames between sunset and sunrise with a light in view",
                 Pass::Rounds => "frames with a tracer, splash or strike in view",
+                Pass::Phantoms => "frames with anything drawn, on the pixels that the own gun and ship hide",
             },
         ),
     };

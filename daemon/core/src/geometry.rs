@@ -38,6 +38,15 @@ pub fn curvature_drop(distance_m: f64) -> f64 {
     distance_m * distance_m * (1.0 - REFRACTION) / (2.0 * EARTH_RADIUS_M)
 }
 
+/// Whether `place` lies in a polygon, of one that crosses itself by the even-odd rule: a ray to the right crosses its edges an odd number of times (Shimrat 1962).
+pub fn is_inside(polygon: &[DVec2], place: DVec2) -> bool {
+    let ends = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let crossed = |(a, b): &(&DVec2, &DVec2)| {
+        (a.y > place.y) != (b.y > place.y) && place.x < a.x + (place.y - a.y) / (b.y - a.y) * (b.x - a.x)
+    };
+    ends.filter(crossed).count() % 2 == 1
+}
+
 /// By what a small turn of the world turns it about the vertical, counter-clockwise from above, radians (the twist about z of Dobrowolski
 /// 2015, swing-twist).
 pub fn turn_about_vertical(turn: DQuat) -> f64 {

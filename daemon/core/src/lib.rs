@@ -21,6 +21,7 @@ pub mod guide;
 pub mod gunner;
 pub mod levenberg;
 pub mod model;
+pub mod own_ship;
 pub mod pacing;
 pub mod physics;
 pub mod sea;

@@ -62,7 +62,7 @@ impl Session {
             calibration: &setup.calibration,
             orientation: setup.orientation,
             heading: &setup.heading,
-            own_ship: setup.own_ship.as_ref(),
+            own_ship: &setup.own_ship,
             eye_height_m: scenario.eye_height_m,
             daylight: scenario.daylight,
             measures_tones: scenario.water.method == ReflectionMethod::Baked,
@@ -74,6 +74,7 @@ impl Session {
             &ComposerSettings {
                 scenario,
                 calibration: &setup.calibration,
+                own_ship: &setup.own_ship,
                 screen: setup.screen,
                 video: setup.video,
                 models: &setup.models,

@@ -13,6 +13,7 @@ use bowwave_core::{
     frame::scene::{LeftOut, Pass, PassDecision, Status},
     geometry::{Lens, look},
     model::{Model, ModelId, ModelKind, Part, Vertex, Zone},
+    own_ship::{OwnShip, Phantom},
     session::{Session, Setup},
     time::Time,
     world::{
@@ -87,6 +88,10 @@ fn session(text: &str) -> Session {
 }
 
 fn session_with(text: &str, calibration: Calibration) -> Session {
+    session_on(text, calibration, OwnShip::default())
+}
+
+fn session_on(text: &str, calibration: Calibration, own_ship: OwnShip) -> Session {
     let scenario = Scenario::parse(text, "test").expect("the scenario is valid");
     let boats = scenario.boats.len();
     Session::new(Setup {
@@ -98,7 +103,7 @@ fn session_with(text: &str, calibration: Calibration) -> Session {
         video: PixelFormat::Rgb,
         orientation: Source::Auto,
         heading: bowwave_core::estimate::HeadingSettings::default(),
-        own_ship: None,
+        own_ship,
     })
     .expect("every boat has a model")
 }
@@ -366,7 +371,11 @@ fn an_empty_scenario_is_video_and_display() {
 #[test]
 fn a_rehearsal_has_everything_in_view() {
     let moving = SCENARIO.replace("\"still\"", "\"straight\"\nspeed_kn = 10\nlights = \"rules\"");
-    let scene = session(&format!("{moving}\n[searchlight]\n")).rehearsal();
+    let lens = calibration().lens;
+    let barrel =
+        Phantom::new("", vec![DVec2::ZERO, DVec2::X * 9.0, DVec2::Y * 9.0], (lens.width, lens.height));
+    let own_ship = OwnShip::new(vec![barrel], lens.centre, &[], (lens.width, lens.height));
+    let scene = session_on(&format!("{moving}\n[searchlight]\n"), calibration(), own_ship).rehearsal();
     for pass in Pass::ALL {
         let runs = scene.passes[pass as usize];
         // The sea of this scenario is calm and nothing in it is switched off.

@@ -59,7 +59,7 @@ impl OffscreenRenderer {
             // Nobody waits at 30 Hz: a busy processor that draws slowly is no hung GPU.
             config.time_outs = TimeOuts { frame: WAIT, warm_up: WAIT };
             let (renderer, completions) = Renderer::new(&config, &self.models.list)?;
-            self.ready = Some((*plan, renderer, completions));
+            self.ready = Some((plan.clone(), renderer, completions));
         }
         let (_, renderer, completions) = self.ready.as_mut().context("no renderer")?;
         draw_one(renderer, completions, scene, picture)

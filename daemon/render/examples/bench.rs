@@ -231,6 +231,7 @@ impl Running {
                 wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
                 waters: water.into_iter().collect(),
                 optics: scene.lens.optics(),
+                phantoms: Default::default(),
             },
             picture: None,
             time_outs: TimeOuts::default(),

@@ -90,6 +90,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             wakes_max: 8,
             waters: vec![(method, scene.water.shadow)],
             optics: scene.lens.optics(),
+            phantoms: Default::default(),
         },
         picture: None,
         time_outs: TimeOuts::default(),

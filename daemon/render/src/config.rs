@@ -3,6 +3,7 @@
 use bowwave_core::{
     frame::{plan::ScenePlan, scene::Pass},
     geometry::Optics,
+    own_ship::Phantoms,
     session::{LIGHTS_A_BOAT, ROUNDS_SEEN_MAX},
     water::{ReflectionMethod, ShadowLevel},
 };
@@ -11,7 +12,7 @@ use shaders_spirv::interface::WATERS_MAX;
 use crate::{passes::video::pictures::PictureShape, ring::TimeOuts};
 
 /// Everything that can ever be asked of a renderer. The rest is neither compiled nor allocated.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Needs {
     /// Most boats in one frame.
     pub boats_max: usize,
@@ -27,6 +28,8 @@ pub struct Needs {
     pub waters: Vec<(ReflectionMethod, ShadowLevel)>,
     /// What lens and shutter of the camera do.
     pub optics: Optics,
+    /// The own gun and ship, pixels of the screen.
+    pub phantoms: Phantoms,
 }
 
 impl Needs {
@@ -82,6 +85,7 @@ impl RenderConfig {
                 rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
                 waters,
                 optics: plan.optics,
+                phantoms: if plan.has(Pass::Phantoms) { plan.phantoms.clone() } else { Phantoms::default() },
             },
             picture: Some(PictureShape { format: plan.video, width: plan.picture.0, height: plan.picture.1 }),
             time_outs: TimeOuts::default(),

@@ -133,6 +133,8 @@ pub(crate) struct Plan {
     pub(crate) rects: Vec<PixelRect>,
     /// What of the video the water's shader compares.
     pub(crate) backdrop_regions: Vec<vk::ImageCopy>,
+    /// Recoil of phantoms, where they hide something of it.
+    pub(crate) phantoms: Option<f32>,
     /// Plates, shapes and glyphs of the head-up display that are drawn over the frame.
     pub(crate) quads: [u32; KINDS],
     /// Texels of the video pass that take the display from its layer instead, all others, and what is drawn anew in the layer.
@@ -193,6 +195,7 @@ impl Plan {
             sprayed: Vec::with_capacity(wakes),
             rest: Vec::with_capacity(WATER_RECTS_MAX.max(HULL_RECTS_MAX)),
             outside: Vec::with_capacity(HULL_RECTS_MAX),
+            phantoms: None,
             quads: [0; KINDS],
             overlaid: Vec::with_capacity(16),
             bare: Vec::with_capacity(64),

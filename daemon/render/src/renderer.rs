@@ -9,7 +9,6 @@ use bowwave_core::{
     model::Model,
     water::{ReflectionMethod, Water},
 };
-use shaders_spirv::interface::{BeamBlock, DrawBlock, LightBlock};
 
 use crate::{
     config::{Needs, RenderConfig},
@@ -19,22 +18,12 @@ use crate::{
     gpu::{DeviceInfo, Gpu},
     passes::{
         PassContext,
-        behind_hulls::BehindHulls,
-        boats::{BoatsPass, meshes::Meshes},
-        hud::HudPass,
-        lights,
+        all::Passes,
         mirror::MirrorPass,
-        rounds, searchlight,
+        phantoms::PhantomPass,
         shadow::ShadowPass,
-        video::{
-            VideoPass,
-            pictures::{PictureCounts, PicturePath},
-        },
-        wake::WakePass,
-        water::{
-            WaterPass,
-            baked::{LobeDraws, ReflectPass},
-        },
+        video::pictures::{PictureCounts, PicturePath},
+        water::{WaterPass, baked::LobeDraws},
     },
     pipeline::{SetLayout, SetPool},
     plan::{Outline, Plan, with_gradients},
@@ -87,70 +76,6 @@ pub struct Renderer<T = ()> {
     timed_every: u64,
     _frame_set: SetLayout,
     _sets: SetPool,
-}
-
-/// The passes that can ever be needed, in the order in which they run.
-struct Passes {
-    video: VideoPass,
-    meshes: Meshes,
-    shadow: Option<ShadowPass>,
-    mirror: Option<MirrorPass>,
-    water: Option<WaterPass>,
-    reflect: Option<ReflectPass>,
-    wake: Option<WakePass>,
-    boats: Option<BoatsPass>,
-    searchlight: Option<BehindHulls<BeamBlock>>,
-    lights: Option<BehindHulls<LightBlock>>,
-    rounds: Option<BehindHulls<DrawBlock>>,
-    hud: HudPass,
-}
-
-impl Passes {
-    fn new(context: &PassContext<'_>, config: &RenderConfig, models: &[Model]) -> Result<Self, RenderError> {
-        let needs = &config.needs;
-        let any_boat = needs.boats_max > 0;
-        let textured = models.iter().any(|m| m.texture.is_some());
-        let meshes = Meshes::new(context, if any_boat { models } else { &[] })?;
-        let shadow = any_boat.then(|| ShadowPass::new(context)).transpose()?;
-        let drawn = shadow.as_ref().map(|shadow| (&meshes, &shadow.map));
-        let reflects = needs.waters.iter().any(|(method, _)| *method != ReflectionMethod::Off);
-        let softens = needs.waters.iter().any(|(method, _)| *method == ReflectionMethod::Full);
-        let mirror = (any_boat && reflects)
-            .then(|| MirrorPass::new(context, &meshes, textured, [softens, needs.lights_max > 0]))
-            .transpose()?;
-        let water = (any_boat && !needs.waters.is_empty())
-            .then(|| WaterPass::new(context, mirror.as_ref(), &needs.waters))
-            .transpose()?;
-        let reflect = match (&mirror, &water) {
-            (Some(mirror), Some(water)) if needs.lobes() > 0 => {
-                Some(ReflectPass::new(context, mirror, &water.backdrop, needs.lobes())?)
-            }
-            _ => None,
-        };
-        let boats = drawn.map(|drawn| BoatsPass::new(context, drawn, textured)).transpose()?;
-        let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
-        let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
-        let over = boats.as_ref();
-        let searchlight = BehindHulls::when(needs.searchlight, context, &searchlight::SHADERS, over)?;
-        let lights = BehindHulls::when(needs.lights_max > 0, context, &lights::SHADERS, over)?;
-        let rounds = BehindHulls::when(needs.rounds_max > 0, context, &rounds::SHADERS, over)?;
-        let hud = HudPass::new(context)?;
-        let video = VideoPass::new(context, config.picture, &hud.overlay.layout)?;
-        Ok(Self {
-            video,
-            meshes,
-            shadow,
-            mirror,
-            water,
-            reflect,
-            wake,
-            boats,
-            searchlight,
-            lights,
-            rounds,
-            hud,
-        })
-    }
 }
 
 impl Renderer {
@@ -343,6 +268,12 @@ impl<T> Renderer<T> {
         slot.data.write_rounds(&plan.round_blocks);
         slot.data.write_beam(&plan.beam.nodes);
         slot.data.write_rects(&plan.list);
+        let phantoms = self.passes.phantoms.as_ref().filter(|_| scene.runs(Pass::Phantoms));
+        if self.shared.next_value() == 1 {
+            // The first frame lets drivers finish compiling, whatever lies before the phantoms in it.
+            plan.rects.extend(phantoms.and_then(PhantomPass::first_rect));
+        }
+        plan.phantoms = phantoms.filter(|pass| pass.hide(&plan.rects)).map(|_| scene.recoil as f32);
         (plan.quads, plan.renewed) = Default::default();
         let mut covered = true;
         if scene.runs(Pass::Hud) {
@@ -389,6 +320,7 @@ impl<T> Renderer<T> {
         let recording = FrameRecording { to, stamps, frame: slot.data.set, target, how: water };
         self.record_layers(&recording);
         if !self.plan.rects.is_empty() {
+            self.record_kept(&recording);
             self.record_water(&recording);
             self.record_blends(&recording);
         }
@@ -456,6 +388,21 @@ impl<T> Renderer<T> {
         steps.add(mirror.map(MirrorPass::between));
         steps.add(boats.iter().flat_map(|b| b.between()));
         steps.record(to);
+    }
+
+    /// Records how what phantoms hide is kept.
+    fn record_kept(&self, &FrameRecording { to, ref stamps, target, .. }: &FrameRecording<'_>) {
+        let Some((pass, _)) = self.phantoms() else { return };
+        stamps.around(Span::Kept, || pass.record_copy(to, target));
+        let mut steps = Steps::default();
+        steps.add([pass.copied()]);
+        steps.add_memory((PIXELS_COPIED.0, vk::AccessFlags2::NONE), PIXELS_DRAWN);
+        steps.record(to);
+    }
+
+    /// The phantoms' pass and their recoil, where they hide something.
+    fn phantoms(&self) -> Option<(&PhantomPass, f32)> {
+        self.passes.phantoms.as_ref().zip(self.plan.phantoms)
     }
 
     /// Records what the water needs before it is drawn, in as few steps that wait for each other as there can be.
@@ -528,6 +475,9 @@ impl<T> Renderer<T> {
         }
         if let Some(pass) = self.passes.rounds.as_ref().filter(|_| !plan.rounds.is_empty()) {
             stamps.around(Span::Rounds, || pass.record(to, frame, &plan.rounds));
+        }
+        if let Some((pass, recoil)) = self.phantoms() {
+            stamps.around(Span::Phantoms, || pass.record(to, &plan.rects, recoil));
         }
         if plan.quads != [0; 3] {
             stamps.around(Span::Hud, || self.passes.hud.record(to, frame, plan.quads));

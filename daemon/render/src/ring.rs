@@ -72,11 +72,13 @@ pub(crate) enum Span {
     Searchlight,
     Lights,
     Rounds,
+    Kept,
+    Phantoms,
     Hud,
 }
 
 impl Span {
-    const ALL: [Self; 17] = [
+    const ALL: [Self; 19] = [
         Self::Video,
         Self::Download,
         Self::Shadow,
@@ -93,6 +95,8 @@ impl Span {
         Self::Searchlight,
         Self::Lights,
         Self::Rounds,
+        Self::Kept,
+        Self::Phantoms,
         Self::Hud,
     ];
 
@@ -108,6 +112,7 @@ impl Span {
             Self::Searchlight => Pass::Searchlight,
             Self::Lights => Pass::Lights,
             Self::Rounds => Pass::Rounds,
+            Self::Kept | Self::Phantoms => Pass::Phantoms,
             Self::Hud => Pass::Hud,
         }
     }

@@ -164,14 +164,21 @@ const COLOUR_LAYER: vk::ImageSubresourceLayers = vk::ImageSubresourceLayers {
 
 /// `r` as a copy from one image to the same place of another.
 pub(crate) fn same_place(r: PixelRect) -> vk::ImageCopy {
-    let vk::Rect2D { offset, extent } = rect(r);
-    let offset = vk::Offset3D { x: offset.x, y: offset.y, z: 0 };
+    copied_from(r, (0, 0))
+}
+
+/// `r` as a copy to an image that begins at `origin`, upper left of it.
+pub(crate) fn copied_from(r: PixelRect, origin: (u32, u32)) -> vk::ImageCopy {
+    let offset = |r: PixelRect| {
+        let offset = rect(r).offset;
+        vk::Offset3D { x: offset.x, y: offset.y, z: 0 }
+    };
     vk::ImageCopy {
         src_subresource: COLOUR_LAYER,
-        src_offset: offset,
+        src_offset: offset(r),
         dst_subresource: COLOUR_LAYER,
-        dst_offset: offset,
-        extent: vk::Extent3D { width: extent.width, height: extent.height, depth: 1 },
+        dst_offset: offset(PixelRect { x: r.x - origin.0, y: r.y - origin.1, ..r }),
+        extent: vk::Extent3D { width: r.width, height: r.height, depth: 1 },
     }
 }
 

@@ -34,6 +34,7 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
         rounds: Vec::new(),
         lights: Vec::new(),
         searchlight: None,
+        recoil: 1.0,
         light: Light {
             sun_direction: DVec3::new(0.5, -0.5, 0.7).normalize(),
             sun: Vec3::new(0.8, 0.76, 0.68),

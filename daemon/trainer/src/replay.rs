@@ -269,7 +269,7 @@ fn setup_of(properties: &Properties, path: &Path) -> Result<Setup> {
     let source_of = |name: &str| ORIENTATIONS.into_iter().find(|(_, known)| *known == name);
     Ok(Setup {
         scenario,
-        own_ship: file.own_ship_mask(),
+        own_ship: file.own_ship(),
         calibration: file.calibration,
         models: models.list.into(),
         boat_models: models.of_boats,

@@ -368,7 +368,7 @@ impl Trainer {
                 }
             },
         };
-        let planned = *self.session.plan();
+        let planned = self.session.plan().clone();
         for event in self.events.drain(..) {
             if page.is_none() || matches!(event, Event::Frame(_)) {
                 self.session.event(&event);

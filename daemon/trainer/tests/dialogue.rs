@@ -77,7 +77,7 @@ fn setup() -> Setup {
         video: PixelFormat::Yuyv,
         orientation: Default::default(),
         heading: Default::default(),
-        own_ship: None,
+        own_ship: Default::default(),
     }
 }
 

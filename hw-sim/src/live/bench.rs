@@ -14,6 +14,7 @@ use super::{
     gun::{Gun, MountModel, STEP_S},
     hands::Hands,
     script::Script,
+    sight::recoil,
 };
 use crate::{
     make::{
@@ -134,6 +135,11 @@ impl Bench {
     /// The camera's pose at a time that the gun has reached.
     pub fn pose(&self, time_s: f64) -> CameraPose {
         self.gun.pose(time_s)
+    }
+
+    /// How many times as far from where the bore vanishes the muzzle is seen at such a time as at rest.
+    pub fn recoil(&self, time_s: f64) -> f64 {
+        recoil(self.gun.recoil_m(time_s))
     }
 
     /// A time of the bench on the host's clock.

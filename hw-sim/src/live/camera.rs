@@ -170,8 +170,12 @@ impl CutCamera {
                 *value = (parts >> CODE_BITS).clamp(0, 255) as u8;
             }
         }
+    }
+
+    /// Draws what is seen of the gun, recoiled by a factor, over a picture that was cut.
+    pub(super) fn draw_sight(&self, recoil: f64, rgb: &mut [u8]) {
         if let Some(sight) = &self.sight {
-            sight.draw(rgb);
+            sight.draw(recoil, rgb);
         }
     }
 

@@ -47,7 +47,7 @@ impl FastLive {
         Ok(())
     }
 
-    pub fn truth_at(&self, stamp: Time) -> Option<CameraPose> {
+    pub fn truth_at(&self, stamp: Time) -> Option<(CameraPose, f64)> {
         self.truth.at(stamp)
     }
 
@@ -64,11 +64,12 @@ impl FastLive {
 
     fn frame(&mut self) -> Result<(), ReplayError> {
         let frame = self.bench.next_frame();
-        self.truth.push(frame.stamp, self.bench.pose(frame.exposed_s));
+        let recoil = self.bench.recoil(frame.exposed_s);
+        self.truth.push(frame.stamp, self.bench.pose(frame.exposed_s), recoil);
         let arrival = self.bench.frame_taken();
         let (bench, rows) = (&self.bench, self.sensor.rows_s());
         let turned = rows.map(|row_s| bench.pose(frame.exposed_s + row_s).world_from_camera);
-        let picture = self.sensor.expose(&frame, turned, arrival)?;
+        let picture = self.sensor.expose(&frame, turned, recoil, arrival)?;
         self.stats.frames += 1;
         self.wait(Event::Frame(picture));
         Ok(())

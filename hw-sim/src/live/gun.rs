@@ -14,6 +14,11 @@ use crate::{
 pub(super) const STEP_S: f64 = 1e-3;
 /// Time over which the gun's way is kept, seconds.
 const KEPT_S: f64 = 0.4;
+/// Way of the barrel back along its bore, metres, and until it is forward again, seconds: a heavy machine gun's 1 1/8 inch.
+const STROKE_M: f64 = 0.0286;
+const STROKE_S: f64 = 0.05;
+/// Rounds that can go off while the gun's way is kept.
+const ROUNDS_KEPT: usize = 32;
 
 /// A gun on its pintle. Angles are traverse (clockwise from the bow) and elevation (above the deck).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,13 +67,22 @@ pub struct Gun {
     steps: u64,
     /// Angles and rates of the last moments, oldest first.
     way: VecDeque<[DVec2; 2]>,
+    /// When the last rounds went off, seconds, oldest first.
+    rounds: VecDeque<f64>,
 }
 
 impl Gun {
     /// A gun at rest that looks to the north, on a ship that moves as `motion` says; its gun motion is not used.
     pub fn new(model: MountModel, motion: Motion) -> Self {
-        let mut gun =
-            Self { model, motion, angles: DVec2::ZERO, rates: DVec2::ZERO, steps: 0, way: VecDeque::new() };
+        let mut gun = Self {
+            model,
+            motion,
+            angles: DVec2::ZERO,
+            rates: DVec2::ZERO,
+            steps: 0,
+            way: VecDeque::new(),
+            rounds: VecDeque::new(),
+        };
         gun.angles = gun.clamped(gun.on_mount(BEGIN, 0.0));
         gun.way.push_back([gun.angles, gun.rates]);
         gun
@@ -87,6 +101,17 @@ impl Gun {
     /// A shot's blow, rad/s.
     pub fn kick(&mut self, rates: DVec2) {
         self.rates += rates;
+        self.rounds.push_back(self.time_s());
+        if self.rounds.len() > ROUNDS_KEPT {
+            self.rounds.pop_front();
+        }
+    }
+
+    /// How far back along its bore the barrel is at a time that has been reached, metres.
+    pub fn recoil_m(&self, time_s: f64) -> f64 {
+        let since = self.rounds.iter().rev().map(|round| time_s - round).find(|since| *since >= 0.0);
+        let stroke = |since: f64| STROKE_M * (std::f64::consts::PI * since / STROKE_S).sin();
+        since.filter(|since| *since < STROKE_S).map_or(0.0, stroke)
     }
 
     /// Moves by one step.

@@ -41,7 +41,7 @@ const POSES: usize = 30;
 /// A perfect calibration of the simulated gun, with the uncertainties of a good one. Barrel and front sight are its own ship's part.
 pub fn calibration(recipe: &PanoramaRecipe) -> CalibrationFile {
     let mut file = make::calibration(&recipe.recipe);
-    file.own_ship = sight::hidden(&file.calibration.lens);
+    file.phantoms = sight::phantoms(&file.calibration.lens);
     file
 }
 
@@ -148,6 +148,15 @@ impl Live {
 
     /// True pose of the camera at a frame's mid-exposure, no longer ago than a second.
     pub fn truth_at(&self, mid_exposure: Time) -> Option<CameraPose> {
+        self.exposed_at(mid_exposure).map(|(pose, _)| pose)
+    }
+
+    /// How many times as far from where the bore vanishes the muzzle was seen in such a frame as at rest.
+    pub fn recoil_at(&self, mid_exposure: Time) -> Option<f64> {
+        self.exposed_at(mid_exposure).map(|(_, recoil)| recoil)
+    }
+
+    fn exposed_at(&self, mid_exposure: Time) -> Option<(CameraPose, f64)> {
         match &self.way {
             Way::Waiting(_) => None,
             Way::Fast(live) => live.truth_at(mid_exposure),
@@ -173,20 +182,20 @@ impl Live {
     }
 }
 
-/// The newest true poses.
+/// The newest true poses, and the muzzle's factor by recoil.
 #[derive(Debug, Default)]
-struct TruePoses(VecDeque<(Time, CameraPose)>);
+struct TruePoses(VecDeque<(Time, CameraPose, f64)>);
 
 impl TruePoses {
-    fn push(&mut self, stamp: Time, pose: CameraPose) {
-        self.0.push_back((stamp, pose));
+    fn push(&mut self, stamp: Time, pose: CameraPose, recoil: f64) {
+        self.0.push_back((stamp, pose, recoil));
         while self.0.len() > POSES {
             self.0.pop_front();
         }
     }
 
-    fn at(&self, stamp: Time) -> Option<CameraPose> {
+    fn at(&self, stamp: Time) -> Option<(CameraPose, f64)> {
         let near = |time: &Time| time.ns_since(stamp).saturating_abs() <= STAMP_TOLERANCE_NS;
-        self.0.iter().find(|(time, _)| near(time)).map(|(_, pose)| *pose)
+        self.0.iter().find(|(time, ..)| near(time)).map(|(_, pose, recoil)| (*pose, *recoil))
     }
 }

@@ -99,7 +99,7 @@ impl RealtimeLive {
         self.errors.try_recv().map_or(Ok(()), Err)
     }
 
-    pub fn truth_at(&self, stamp: Time) -> Option<CameraPose> {
+    pub fn truth_at(&self, stamp: Time) -> Option<(CameraPose, f64)> {
         locked(&self.truth).at(stamp)
     }
 
@@ -211,12 +211,12 @@ impl Exposer {
         }
         self.decode_ahead(&frame)?;
         let Some(turned) = self.await_exposure(&frame, ended) else { return Ok(false) };
-        let (pose, due) = {
+        let (pose, recoil, due) = {
             let mut bench = locked(&self.bench);
-            (bench.pose(frame.exposed_s), bench.frame_taken())
+            (bench.pose(frame.exposed_s), bench.recoil(frame.exposed_s), bench.frame_taken())
         };
-        locked(&self.truth).push(frame.stamp, pose);
-        let picture = self.sensor.expose(&frame, turned, due)?;
+        locked(&self.truth).push(frame.stamp, pose, recoil);
+        let picture = self.sensor.expose(&frame, turned, recoil, due)?;
         if !self.stop.wait(due) {
             return Ok(false);
         }

@@ -40,17 +40,20 @@ impl Sensor {
         Ok(self.panorama.show(frame.number as usize, azimuths)?)
     }
 
-    /// Exposes a picture; `turned` is how the camera is turned as each row of the mesh is exposed. It arrives at `arrival`.
+    /// Exposes a picture; `turned` is how the camera is turned as each row of the mesh is exposed, `recoil` the muzzle's factor. It arrives at
+    /// `arrival`.
     pub fn expose(
         &mut self,
         frame: &DueFrame,
         turned: impl IntoIterator<Item = DQuat>,
+        recoil: f64,
         arrival: Time,
     ) -> Result<CameraFrame, ReplayError> {
         let azimuths = self.camera.aim(&self.panorama.view(), turned);
         self.prepare(frame, azimuths)?;
         let mut rgb = vec![0; self.camera.bytes()];
         self.camera.cut(&self.panorama.view(), frame.number, &mut rgb);
+        self.camera.draw_sight(recoil, &mut rgb);
         let size = self.camera.size();
         let (picture, jpeg) = match &mut self.coder {
             None => {

@@ -6,6 +6,7 @@ use bowwave_core::{
     calibration::Calibration,
     estimate::{attitude::Source, horizon::Mask},
     event::{Event, PixelFormat, Tick},
+    own_ship::OwnShip,
     session::{Session, Setup},
     world::scenario::Scenario,
 };
@@ -37,7 +38,7 @@ impl Played {
     }
 
     /// A session by this calibration.
-    pub fn session(&self, scenario: &str, orientation: Source, own_ship: Option<Mask>) -> Session {
+    pub fn session(&self, scenario: &str, orientation: Source, mask: Option<Mask>) -> Session {
         let lens = self.calibration.lens;
         Session::new(Setup {
             scenario: Scenario::parse(scenario, "test").unwrap(),
@@ -48,7 +49,7 @@ impl Played {
             video: PixelFormat::Rgb,
             orientation,
             heading: bowwave_core::estimate::HeadingSettings::default(),
-            own_ship,
+            own_ship: OwnShip { mask, ..OwnShip::default() },
         })
         .unwrap()
     }

@@ -184,7 +184,7 @@ pub fn replay(recipe: &Recipe, path: &Path, how: Replayed) -> Result<Registratio
         video: PixelFormat::Rgb,
         orientation: how.source,
         heading: HeadingSettings { sky_drift: how.sky_drift.unwrap_or(usual.sky_drift), ..usual },
-        own_ship: None,
+        own_ship: Default::default(),
     })?;
     let motion = recipe.motion();
     let least = if recipe.gun.traverse.harmonics.is_empty() { 0.0 } else { SWUNG_DEG_S.to_radians() };

@@ -169,7 +169,7 @@ pub fn look(
         })?,
     };
     let calibration = &opened.file.calibration;
-    let mut watcher = Watcher::new(calibration.lens, height).with_mask(opened.file.own_ship_mask());
+    let mut watcher = Watcher::new(calibration.lens, height).with_mask(opened.file.own_ship().mask);
     let mut capture = Capture::new(calibration.lens, height);
     if opened.file.shutter.is_some() {
         capture = capture.with_readout(calibration.readout_ns as f64 * 1e-9);

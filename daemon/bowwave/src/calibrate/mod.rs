@@ -6,6 +6,7 @@ mod check;
 mod extrinsics;
 mod input;
 mod intrinsics;
+mod phantom;
 mod pictures;
 mod restore;
 mod trigger;
@@ -31,6 +32,7 @@ pub fn run(task: Option<&CalibrateTask>) -> Result<Outcome> {
         CalibrateTask::Extrinsics(arguments) => extrinsics::run(arguments),
         CalibrateTask::Boresight(arguments) => boresight::run(arguments),
         CalibrateTask::Trigger(arguments) => trigger::run(arguments),
+        CalibrateTask::Phantom(arguments) => phantom::run(arguments),
         CalibrateTask::Check(arguments) => check::run(arguments),
         CalibrateTask::Restore(arguments) => restore::run(arguments),
     }

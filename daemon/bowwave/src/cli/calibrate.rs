@@ -7,8 +7,8 @@ use bowwave_core::text::{one_line, toml::TEXT_BYTES_MAX};
 use clap::{Args, Subcommand};
 
 use super::mounting::{
-    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibrateRestore, CalibrateTrigger,
-    CalibrateWizard,
+    CalibrateBoresight, CalibrateCheck, CalibrateExtrinsics, CalibratePhantom, CalibrateRestore,
+    CalibrateTrigger, CalibrateWizard,
 };
 
 /// Arguments of `calibrate`.
@@ -36,6 +36,8 @@ pub enum CalibrateTask {
     Boresight(CalibrateBoresight),
     /// Measure how long after the trigger's edge a round leaves, by dry shots
     Trigger(CalibrateTrigger),
+    /// Trace what the camera sees of the gun itself, so that it hides boats behind it
+    Phantom(CalibratePhantom),
     /// Check on any recording whether a calibration still holds: exit code 0 it does, 1 it does not, 3 the recording does not tell
     Check(CalibrateCheck),
     /// Put a calibration back that was replaced

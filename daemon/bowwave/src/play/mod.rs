@@ -145,7 +145,7 @@ fn prepare(
         record: desk_args.record || config.files.record,
         setup: Setup {
             scenario: loaded.scenario,
-            own_ship: calibration.own_ship_mask(),
+            own_ship: calibration.own_ship(),
             calibration: calibration.calibration,
             models: loaded.models.into(),
             boat_models: loaded.of_boats,

@@ -99,7 +99,7 @@ impl Reader {
         let calibration = self.calibration(&config, &mut refuse);
         let (scenario, scenario_toml, models, boat_models, models_base) =
             self.scenario(&config, &mut refuse)?;
-        let own_ship = calibration.as_ref().and_then(|c| c.value.own_ship_mask());
+        let own_ship = calibration.as_ref().map(|c| c.value.own_ship()).unwrap_or_default();
         let (calibration, calibration_toml, camera_serial) = match calibration {
             Some(c) => (c.value.calibration, c.text, c.value.camera_serial),
             None => (uncalibrated(&config), String::new(), String::new()),

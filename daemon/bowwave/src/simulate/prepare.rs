@@ -74,7 +74,7 @@ pub fn prepare(arguments: &Simulate) -> Result<PreparedRecording> {
     }
     let setup = Setup {
         scenario,
-        own_ship: calibration.own_ship_mask(),
+        own_ship: calibration.own_ship(),
         calibration: calibration.calibration,
         models: models.into(),
         boat_models,

@@ -6,9 +6,9 @@ use super::{
     attitude::Source,
     clock::ClockReport,
     heading_aiding::HeadingSettings,
-    horizon::Mask,
     light::{Light, LightMeter, Luminaries, SeaTones, SkyAgreement, SkyLight},
     pose::NoPose,
+    recoil::RecoilFinder,
     registration::{Misfit, RegistrationChecks},
     sea::SeaConditions,
     sea_state::{SeaReport, SeaStateTracker},
@@ -20,6 +20,7 @@ use crate::{
     event::{CameraFrame, ImuSample, Mark, ShipFix, ShipSample},
     fault::{Fault, NotScored},
     geometry::{CameraPose, Lens},
+    own_ship::OwnShip,
     sea::BeaufortForce,
     time::Time,
 };
@@ -33,8 +34,8 @@ pub struct EstimatorSettings<'a> {
     pub orientation: Source,
     /// Settings of heading aiding.
     pub heading: &'a HeadingSettings,
-    /// Mask of the own ship or gun in the pictures: no horizon and no sky is sought there.
-    pub own_ship: Option<&'a Mask>,
+    /// The own gun and ship in the pictures.
+    pub own_ship: &'a OwnShip,
     /// Height of the camera over the mean sea, metres.
     pub eye_height_m: f64,
     /// Sun and visibility.
@@ -76,6 +77,7 @@ pub struct SceneLight {
 pub struct Estimator {
     sensors: Sensors,
     light: LightMeter,
+    recoil: Option<RecoilFinder>,
     sea: Option<SeaStateTracker>,
     assumed_wind: (DVec2, BeaufortForce),
     eye_height_m: f64,
@@ -91,11 +93,12 @@ impl Estimator {
                 settings.calibration,
                 settings.orientation,
                 settings.heading,
-                settings.own_ship,
+                settings.own_ship.mask.as_ref(),
                 eye_height_m,
                 settings.daylight.visibility_m,
             ),
             light: LightMeter::new(&settings.daylight, settings.measures_tones),
+            recoil: RecoilFinder::new(&settings.own_ship.phantoms),
             sea: settings.sea.map(|assumed| SeaStateTracker::new(assumed, wind, force)),
             assumed_wind: (wind, force),
             eye_height_m,
@@ -136,6 +139,9 @@ impl Estimator {
             self.sensors.sight();
             let camera = self.camera(time).ok();
             let lens = self.sensors.lens_at(time);
+            if let (Some(recoil), Some(frame)) = (&mut self.recoil, self.sensors.newest_frame()) {
+                recoil.observe(&frame.picture);
+            }
             if let (Some(camera), Some(frame)) = (camera, self.sensors.newest_frame()) {
                 self.light.observe(time, &frame.picture, &lens, &camera.pose);
                 if let Some(sea) = self.sea.as_mut().filter(|_| measures_sea) {
@@ -144,6 +150,11 @@ impl Estimator {
             }
         }
         is_new
+    }
+
+    /// How many times as far from where the bore vanishes what recoils is seen in the newest picture, from 1.
+    pub fn recoil(&self) -> f64 {
+        self.recoil.as_ref().map_or(1.0, RecoilFinder::factor)
     }
 
     /// The newest picture.

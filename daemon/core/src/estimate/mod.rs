@@ -11,6 +11,7 @@ mod horizon_aiding;
 pub mod light;
 pub mod plausibility;
 pub mod pose;
+pub mod recoil;
 pub mod registration;
 mod schedule;
 pub mod sea;

@@ -21,6 +21,7 @@ use crate::{
     fault::{Fault, FirePermission, NotScored},
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId},
+    own_ship::OwnShip,
     time::Time,
     world::{
         LastResult, RESULT_S, World,
@@ -38,6 +39,8 @@ pub struct ComposerSettings<'a> {
     pub scenario: &'a Scenario,
     /// The calibration of the camera.
     pub calibration: &'a Calibration,
+    /// The own gun and ship in the camera's pictures.
+    pub own_ship: &'a OwnShip,
     /// Screen size in pixels.
     pub screen: (u32, u32),
     /// How the camera's bytes are laid out.
@@ -93,17 +96,19 @@ pub struct Composer {
 impl Composer {
     /// A composer whose first frame has yet to come. No picture may have the calibrated size in that layout: then there is none.
     pub fn new(settings: &ComposerSettings<'_>, estimator: &Estimator) -> Result<Self, PictureError> {
-        let ComposerSettings { scenario, calibration, screen, video, models, boat_models } = *settings;
+        let ComposerSettings { scenario, calibration, own_ship, screen, video, models, boat_models } =
+            *settings;
         let picture = (calibration.lens.width, calibration.lens.height);
         let black = Picture::black(video, picture.0, picture.1)?;
+        let screen_lens = calibration.lens.covering(screen.0, screen.1);
         let plan = ScenePlan::new(&SceneNeeds {
             size: screen,
             video,
             picture,
             optics: calibration.optics(),
+            phantoms: own_ship.phantoms.on_screen(&calibration.lens, &screen_lens),
             ..SceneNeeds::of_scenario(scenario)
         });
-        let screen_lens = calibration.lens.covering(screen.0, screen.1);
         let light = estimator.light();
         let camera =
             CameraPose { world_from_camera: DQuat::IDENTITY, position: DVec3::Z * scenario.eye_height_m };
@@ -117,6 +122,7 @@ impl Composer {
             rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
             lights: Vec::new(),
             searchlight: None,
+            recoil: 1.0,
             light: light.boats,
             water: scenario.water,
             wind: scenario.wind.truncate(),
@@ -188,6 +194,7 @@ impl Composer {
         scene.boats.clear();
         scene.lights.clear();
         scene.searchlight = None;
+        scene.recoil = 1.0;
         scene.rounds.clear();
         scene.passes = self.plan.frame(&InView::default());
         scene.hud.status = status(moment, None);
@@ -239,6 +246,7 @@ impl Composer {
         let shining = world.searchlight().filter(|_| self.plan.has(Pass::Searchlight));
         scene.searchlight =
             shining.map(|spec| SearchlightView::new(spec, self.bore, light.white_cd_m2, self.visibility_m));
+        scene.recoil = estimator.recoil();
         (scene.light, scene.sky, scene.tones) = (light.boats, light.sky, light.tones);
         scene.passes = self.plan.frame(&InView {
             pose_known: camera.is_some(),

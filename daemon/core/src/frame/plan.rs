@@ -4,6 +4,7 @@ use crate::{
     event::PixelFormat,
     frame::scene::{BoatView, LeftOut, LightView, Pass, PassDecision, RoundView},
     geometry::Optics,
+    own_ship::Phantoms,
     sea::BeaufortForce,
     water::{ReflectionMethod, ShadowLevel, Water},
     world::{boats::LightsKept, scenario::Scenario},
@@ -18,7 +19,7 @@ pub fn sea_reflects(force: BeaufortForce) -> bool {
 }
 
 /// The passes and sizes that frames of a scenario can ever need. A pass that is left out here is not compiled, not allocated and never run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ScenePlan {
     /// Screen size in pixels.
     pub size: (u32, u32),
@@ -36,10 +37,12 @@ pub struct ScenePlan {
     pub picture: (u32, u32),
     /// The optics that drawing has to follow; one variant of the boats' shader is compiled.
     pub optics: Optics,
+    /// Phantoms on the screen, pixels.
+    pub phantoms: Phantoms,
 }
 
 /// The needs that decide on a plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SceneNeeds {
     /// Screen size in pixels.
     pub size: (u32, u32),
@@ -65,6 +68,8 @@ pub struct SceneNeeds {
     pub sun_stays_up: bool,
     /// The same of one that is down.
     pub sun_stays_down: bool,
+    /// Phantoms on the screen, pixels.
+    pub phantoms: Phantoms,
 }
 
 /// A frame's view, as it decides on the passes.
@@ -105,6 +110,7 @@ impl SceneNeeds {
             searchlight: scenario.searchlight.is_some(),
             sun_stays_up: scenario.daylight.stays_up(),
             sun_stays_down: scenario.daylight.stays_down(),
+            phantoms: Phantoms::default(),
         }
     }
 }
@@ -156,6 +162,13 @@ impl ScenePlan {
         passes[Pass::Searchlight as usize] = searchlight;
         passes[Pass::Lights as usize] = lights;
         passes[Pass::Rounds as usize] = rounds;
+        let drawn =
+            [boats, searchlight, lights, rounds].into_iter().find(|decision| *decision == PassDecision::Run);
+        passes[Pass::Phantoms as usize] = match drawn {
+            _ if needs.phantoms.parts.is_empty() => PassDecision::LeftOut(LeftOut::NoPhantoms),
+            None => PassDecision::LeftOut(LeftOut::NothingToHide),
+            Some(run) => run,
+        };
         Self {
             size: needs.size,
             passes,
@@ -165,6 +178,7 @@ impl ScenePlan {
             video: needs.video,
             picture: needs.picture,
             optics: needs.optics,
+            phantoms: needs.phantoms.clone(),
         }
     }
 
@@ -196,15 +210,23 @@ impl ScenePlan {
         leave_out(Pass::Searchlight, searchlight, LeftOut::SearchlightOff);
         leave_out(Pass::Lights, !lights.is_empty(), LeftOut::NoLightInView);
         leave_out(Pass::Rounds, !rounds.is_empty(), LeftOut::NoRoundInView);
+        let drawn = !boats.is_empty() || searchlight || !lights.is_empty() || !rounds.is_empty();
+        leave_out(Pass::Phantoms, drawn, LeftOut::NothingToHide);
         passes
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use glam::DVec2;
+
     use super::*;
+    use crate::own_ship::Phantom;
 
     fn needs() -> SceneNeeds {
+        let triangle = Phantom::new("", vec![DVec2::ZERO, DVec2::X, DVec2::Y], (1280, 720));
         SceneNeeds {
             size: (1280, 720),
             video: PixelFormat::Rgb,
@@ -222,6 +244,7 @@ mod tests {
             searchlight: true,
             sun_stays_up: false,
             sun_stays_down: false,
+            phantoms: Phantoms { parts: Arc::new([triangle]), bore: DVec2::ZERO },
         }
     }
 
@@ -234,16 +257,16 @@ mod tests {
             PassDecision::Run => None,
         };
         let empty = SceneNeeds { boats: 0, ..needs() };
-        assert_eq!(reason(empty, Pass::Mirror), Some(LeftOut::NoBoats));
-        assert_eq!(reason(empty, Pass::Water), Some(LeftOut::NoBoats));
-        assert_eq!(reason(empty, Pass::Boats), Some(LeftOut::NoBoats));
+        assert_eq!(reason(empty.clone(), Pass::Mirror), Some(LeftOut::NoBoats));
+        assert_eq!(reason(empty.clone(), Pass::Water), Some(LeftOut::NoBoats));
+        assert_eq!(reason(empty.clone(), Pass::Boats), Some(LeftOut::NoBoats));
         let rough =
             SceneNeeds { water: Water { force: BeaufortForce::new(5).unwrap(), ..needs().water }, ..needs() };
-        assert_eq!(reason(rough, Pass::Mirror), Some(LeftOut::SeaTooRough));
+        assert_eq!(reason(rough.clone(), Pass::Mirror), Some(LeftOut::SeaTooRough));
         assert_eq!(reason(rough, Pass::Boats), None);
         let shadow_only =
             SceneNeeds { water: Water { method: ReflectionMethod::Off, ..needs().water }, ..needs() };
-        assert_eq!(reason(shadow_only, Pass::Mirror), Some(LeftOut::ReflectionOff));
+        assert_eq!(reason(shadow_only.clone(), Pass::Mirror), Some(LeftOut::ReflectionOff));
         assert_eq!(reason(shadow_only, Pass::Water), None);
         let nothing = Water { method: ReflectionMethod::Off, shadow: ShadowLevel::None, ..needs().water };
         assert_eq!(
@@ -266,6 +289,10 @@ mod tests {
         let day = SceneNeeds { sun_stays_up: true, ..needs() };
         assert_eq!(reason(day, Pass::Searchlight), Some(LeftOut::Daylight));
         assert_eq!(reason(SceneNeeds { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
+        let bare = SceneNeeds { phantoms: Phantoms::default(), ..needs() };
+        assert_eq!(reason(bare, Pass::Phantoms), Some(LeftOut::NoPhantoms));
+        let calm = SceneNeeds { boats: 0, belt: 0, searchlight: false, ..needs() };
+        assert_eq!(reason(calm, Pass::Phantoms), Some(LeftOut::NothingToHide));
     }
 
     #[test]
@@ -278,6 +305,7 @@ mod tests {
         assert_eq!(frame[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoWakeInView));
         assert_eq!(frame[Pass::Rounds as usize], PassDecision::LeftOut(LeftOut::NoRoundInView));
         assert_eq!(frame[Pass::Searchlight as usize], PassDecision::LeftOut(LeftOut::SearchlightOff));
+        assert_eq!(frame[Pass::Phantoms as usize], PassDecision::LeftOut(LeftOut::NothingToHide));
         let lost = plan.frame(&InView::default());
         assert_eq!(lost[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoPose));
         assert_eq!(lost[Pass::Hud as usize], PassDecision::Run);

@@ -41,6 +41,8 @@ pub struct Scene {
     pub lights: Vec<LightView>,
     /// The gun's searchlight, while it is on.
     pub searchlight: Option<SearchlightView>,
+    /// How many times as far from where the bore vanishes what recoils of the gun is seen, from 1.
+    pub recoil: f64,
     /// Light on the boats.
     pub light: Light,
     /// How the sea mirrors.
@@ -85,13 +87,15 @@ pub enum Pass {
     Lights,
     /// Tracers and splashes.
     Rounds,
+    /// The own gun and ship in the picture, before all of these.
+    Phantoms,
     /// Text and state.
     Hud,
 }
 
 impl Pass {
     /// How many there are.
-    pub const COUNT: usize = 10;
+    pub const COUNT: usize = 11;
     /// All of them, in order.
     pub const ALL: [Self; Self::COUNT] = [
         Self::Video,
@@ -103,6 +107,7 @@ impl Pass {
         Self::Searchlight,
         Self::Lights,
         Self::Rounds,
+        Self::Phantoms,
         Self::Hud,
     ];
 
@@ -118,6 +123,7 @@ impl Pass {
             Self::Searchlight => "searchlight",
             Self::Lights => "lights",
             Self::Rounds => "rounds",
+            Self::Phantoms => "phantoms",
             Self::Hud => "hud",
         }
     }
@@ -167,6 +173,10 @@ pub enum LeftOut {
     SearchlightOff,
     /// The sun does not shine: it is down, or clouds hide it.
     NoSun,
+    /// The calibration has no outline of the own gun or ship.
+    NoPhantoms,
+    /// Nothing is drawn that they could hide.
+    NothingToHide,
     /// No usable orientation: boats cannot be placed.
     NoPose,
     /// A composed picture tells nobody anything.
@@ -193,6 +203,8 @@ impl LeftOut {
             Self::NoSearchlight => "no_searchlight",
             Self::SearchlightOff => "searchlight_off",
             Self::NoSun => "no_sun",
+            Self::NoPhantoms => "no_phantoms",
+            Self::NothingToHide => "nothing_to_hide",
             Self::NoPose => "no_pose",
             Self::NoTrainee => "no_trainee",
         }

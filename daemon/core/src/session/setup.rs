@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use crate::{
     calibration::Calibration,
-    estimate::{HeadingSettings, attitude::Source, horizon::Mask},
+    estimate::{HeadingSettings, attitude::Source},
     event::{PictureError, PixelFormat},
     model::{Model, ModelId},
+    own_ship::OwnShip,
     world::scenario::Scenario,
 };
 
@@ -29,8 +30,8 @@ pub struct Setup {
     pub orientation: Source,
     /// Settings of heading aiding.
     pub heading: HeadingSettings,
-    /// Mask of the own ship or gun in the pictures: no horizon and no sky is sought there.
-    pub own_ship: Option<Mask>,
+    /// The own gun and ship in the pictures.
+    pub own_ship: OwnShip,
 }
 
 /// Why a session cannot be made.

@@ -159,6 +159,7 @@ impl Still {
             searchlight: false,
             sun_stays_up: false,
             sun_stays_down: false,
+            phantoms: Default::default(),
         });
         let eye = ViewFrustum {
             camera: &camera,
@@ -203,6 +204,7 @@ impl Still {
             rounds: Vec::new(),
             lights: Vec::new(),
             searchlight: None,
+            recoil: 1.0,
             light,
             water: self.water,
             wind: -place(self.waves.wind_from, self.water.force.wind_mean_m_s()),

@@ -1,11 +1,13 @@
 //! The passes, one folder each, run as a plain ordered list by the renderer.
 
+pub(crate) mod all;
 pub(crate) mod atlas;
 pub(crate) mod behind_hulls;
 pub(crate) mod boats;
 pub(crate) mod hud;
 pub(crate) mod lights;
 pub(crate) mod mirror;
+pub(crate) mod phantoms;
 pub(crate) mod rounds;
 pub(crate) mod searchlight;
 pub(crate) mod shadow;

@@ -33,6 +33,7 @@ pub fn config(scene: &Scene) -> RenderConfig {
             wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
             waters: vec![(scene.water.method, scene.water.shadow)],
             optics: scene.lens.optics(),
+            phantoms: Default::default(),
         },
         picture: None,
         time_outs: TimeOuts::default(),

@@ -80,7 +80,7 @@ pub fn fire_unaided(bench: &mut HilBench) -> Result<(i64, i64)> {
     let mut file = hw_sim::make::calibration(&recipe());
     let (width, height) = PICTURE;
     let [right, bottom] = [f64::from(width), (f64::from(height) * HIDDEN_SHARE).floor()];
-    file.own_ship =
+    file.hidden =
         vec![vec![DVec2::ZERO, DVec2::new(right, 0.0), DVec2::new(right, bottom), DVec2::new(0.0, bottom)]];
     let path = "/run/hil/etc/unaided.toml".to_owned();
     bench.machine.guest.call(AgentCommand::Write { path, text: bowwave_calibration::to_toml(&file) })?;

@@ -26,6 +26,7 @@ mod mount;
 mod orientation;
 mod own;
 mod pacing;
+mod phantom;
 mod reflection;
 mod sea;
 mod shadow;
@@ -80,6 +81,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: moon::ABOUT, measure: moon::measure },
     NumericalPart { about: skylight::ABOUT, measure: skylight::measure },
     NumericalPart { about: shadow::ABOUT, measure: shadow::measure },
+    NumericalPart { about: phantom::ABOUT, measure: phantom::measure },
     NumericalPart { about: beam::ABOUT, measure: beam::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },

@@ -172,6 +172,7 @@ pub fn bare_scene(
         rounds: Vec::new(),
         lights: Vec::new(),
         searchlight: None,
+        recoil: 1.0,
         light,
         water,
         wind: DVec2::ZERO,
@@ -277,6 +278,7 @@ impl Painter {
                 wakes_max: 0,
                 waters,
                 optics,
+                phantoms: Default::default(),
             },
             picture: None,
             // Others may keep the processor that draws.

@@ -122,7 +122,7 @@ fn replay(
         video: PixelFormat::Rgb,
         orientation: source,
         heading: HeadingSettings::default(),
-        own_ship: None,
+        own_ship: Default::default(),
     })?;
     let (mut said, mut events, mut begun) = (Said::default(), Vec::new(), None);
     let (mut frames, mut ready, mut unchecked) = (0_u32, 0_u32, 0_u32);

@@ -79,7 +79,7 @@ impl Guided {
 
     fn eyes(&self, arguments: &CalibrateWizard) -> Detector {
         Detector::new(self.wizard.calibration(), self.eye_height_m, arguments.target, self.tag)
-            .with_mask(self.file.own_ship_mask())
+            .with_mask(self.file.own_ship().mask)
     }
 
     /// Hands over what a device reported; pictures are looked at elsewhere.

@@ -3,6 +3,7 @@
 use glam::DVec2;
 
 use super::cells::{CELL, PictureCells};
+use crate::geometry::is_inside;
 
 /// Fields of a mask that polygons are laid on, across and down: of 8 pixels in a picture of 1280 x 720.
 const FIELDS: (usize, usize) = (160, 90);
@@ -27,9 +28,9 @@ impl Mask {
         (fields > 0 && fields == hidden.len()).then_some(Self { width, height, hidden })
     }
 
-    /// Hides what lies in any of `polygons`, whose corners are pixels of a picture of `size` pixels, x right, y down, from its upper left
-    /// corner; of one that crosses itself what is inside by the even-odd rule. `None` where nothing is hidden.
-    pub fn of_polygons(polygons: &[Vec<DVec2>], size: (u32, u32)) -> Option<Self> {
+    /// Hides the fields in which some place of a picture of `size` pixels is hidden; places are pixels, x right, y down, from its upper left
+    /// corner. `None` where nothing is hidden.
+    pub fn of_places(size: (u32, u32), is_hidden: impl Fn(DVec2) -> bool) -> Option<Self> {
         let (width, height) = FIELDS;
         let step = DVec2::new(f64::from(size.0) / width as f64, f64::from(size.1) / height as f64);
         let hidden: Vec<bool> = (0..width * height)
@@ -37,12 +38,17 @@ impl Mask {
                 let corner = DVec2::new((i % width) as f64, (i / width) as f64);
                 (0..PLACES * PLACES).any(|k| {
                     let part = DVec2::new((k % PLACES) as f64 + 0.5, (k / PLACES) as f64 + 0.5);
-                    let place = (corner + part / PLACES as f64) * step;
-                    polygons.iter().any(|polygon| is_inside(polygon, place))
+                    is_hidden((corner + part / PLACES as f64) * step)
                 })
             })
             .collect();
         hidden.contains(&true).then_some(Self { width, height, hidden })
+    }
+
+    /// Hides what lies in any of `polygons`, whose corners are pixels of a picture of `size` pixels; of one that crosses itself what is inside
+    /// by the even-odd rule. `None` where nothing is hidden.
+    pub fn of_polygons(polygons: &[Vec<DVec2>], size: (u32, u32)) -> Option<Self> {
+        Self::of_places(size, |place| polygons.iter().any(|polygon| is_inside(polygon, place)))
     }
 
     /// Which share of the picture is hidden.
@@ -56,15 +62,6 @@ impl Mask {
         let row = ((y * self.height as f64) as usize).min(self.height - 1);
         self.hidden.get(row * self.width + column).copied().unwrap_or(false)
     }
-}
-
-/// Whether `place` lies in the polygon: a ray to the right crosses its edges an odd number of times (Shimrat 1962).
-fn is_inside(polygon: &[DVec2], place: DVec2) -> bool {
-    let ends = polygon.iter().zip(polygon.iter().cycle().skip(1));
-    let crossed = |(a, b): &(&DVec2, &DVec2)| {
-        (a.y > place.y) != (b.y > place.y) && place.x < a.x + (place.y - a.y) / (b.y - a.y) * (b.x - a.x)
-    };
-    ends.filter(crossed).count() % 2 == 1
 }
 
 /// A mask on the cells of a picture: how many rows of each column are hidden from the top on.

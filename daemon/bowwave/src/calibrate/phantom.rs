@@ -1,0 +1,156 @@
+//! `bowwave calibrate phantom`: what the camera sees of the gun itself, by its outlines.
+
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use bowwave_calibration::outline::{FoundOutlines, OutlineFinder};
+use bowwave_core::{
+    event::Event,
+    own_ship::{OwnShip, Phantom},
+};
+use glam::DVec2;
+use image::{Rgb, RgbImage};
+use serde_json::json;
+
+use super::input::{open, write};
+use crate::{
+    cli::{CalibratePhantom, TracedOutline},
+    outcome::Outcome,
+    stdout,
+    today::today,
+};
+
+/// Half the width of an outline in the picture that shows it, pixels.
+const LINE_PX: f64 = 0.8;
+const LINE: [u8; 3] = [255, 40, 40];
+
+/// Finds or takes the outlines, tells them and writes.
+pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
+    let opened = open(&arguments.recording, arguments.files.calibration.as_deref())?;
+    let lens = &opened.file.calibration.lens;
+    let size = (lens.width, lens.height);
+    let mut finder = OutlineFinder::new(size);
+    let is_traced = !arguments.outline.is_empty();
+    let is_cut = if is_traced && arguments.picture.is_none() {
+        false
+    } else {
+        opened.play(true, |event| {
+            if let Event::Frame(frame) = event {
+                finder.see(&frame.picture);
+            }
+        })?
+    };
+    let found = if is_traced {
+        let part = |t: &TracedOutline| Phantom::new(t.name.as_str(), t.corners.clone(), size);
+        FoundOutlines { phantoms: arguments.outline.iter().map(part).collect(), ..FoundOutlines::default() }
+    } else {
+        finder.find()?
+    };
+    let share =
+        OwnShip::new(found.phantoms.clone(), DVec2::ZERO, &[], size).mask.map_or(0.0, |mask| mask.share());
+    let mut notes = notes(&found);
+    if is_cut {
+        notes.push("the recording was cut short; what there is of it was used".to_owned());
+    }
+    if arguments.json {
+        stdout::print_json(&as_json(&found, share, &notes))?;
+    } else {
+        stdout::print(text_of(&found, share, &notes))?;
+    }
+    if let Some(path) = &arguments.picture {
+        draw(path, &finder.mean(), size, &found.phantoms)?;
+        eprintln!("{} shows them", path.display());
+    }
+    if found.phantoms.is_empty() {
+        return Ok(Outcome::Failed);
+    }
+    let mut file = opened.file;
+    let parts = found.phantoms.into_iter();
+    file.phantoms = parts.map(|part| part.recoiling(arguments.recoils)).collect();
+    write(file, today()?, &arguments.files)?;
+    Ok(Outcome::Done)
+}
+
+/// What is to be known of outlines that were not taken.
+fn notes(found: &FoundOutlines) -> Vec<String> {
+    let percent = |shares: &[f64]| {
+        let shares: Vec<_> = shares.iter().map(|s| format!("{:.1} %", s * 100.0)).collect();
+        shares.join(", ")
+    };
+    let mut notes = Vec::new();
+    if !found.faded.is_empty() {
+        notes.push(format!(
+            "{} of the picture kept still but has no edge, as a sky does: if the gun reaches into it, tilt the gun further while recording",
+            percent(&found.faded)
+        ));
+    }
+    if !found.openings.is_empty() {
+        notes.push(format!(
+            "the sea is seen through openings of {} of the picture, and nothing is drawn in them: trace the parts around one by hand, with \
+             --outline",
+            percent(&found.openings)
+        ));
+    }
+    if found.phantoms.is_empty() {
+        notes.push("nothing of the gun is in the picture, or it is smaller than 0.03 % of it".to_owned());
+    }
+    notes
+}
+
+fn text_of(found: &FoundOutlines, share: f64, notes: &[String]) -> String {
+    let count = found.phantoms.len();
+    let outlines = if count == 1 { "outline" } else { "outlines" };
+    let mut text = format!("{count} {outlines}, {:.1} % of the picture\n", share * 100.0);
+    for phantom in &found.phantoms {
+        let [low, high] = phantom.bounds();
+        text += &format!(
+            "  {:<12} {:>3} corners, from {:.0},{:.0} to {:.0},{:.0}\n",
+            phantom.name,
+            phantom.outline().len(),
+            low.x,
+            low.y,
+            high.x,
+            high.y
+        );
+    }
+    for note in notes {
+        text += &format!("note: {note}\n");
+    }
+    text
+}
+
+fn as_json(found: &FoundOutlines, share: f64, notes: &[String]) -> serde_json::Value {
+    let corners = |p: &Phantom| p.outline().iter().map(|c| c.to_array()).collect::<Vec<_>>();
+    json!({
+        "outlines": found.phantoms.iter()
+            .map(|p| json!({ "name": p.name, "outline_px": corners(p) }))
+            .collect::<Vec<_>>(),
+        "share_of_picture": share,
+        "faded": found.faded,
+        "openings": found.openings,
+        "notes": notes,
+    })
+}
+
+/// Writes the picture with the outlines on it.
+fn draw(path: &Path, mean: &[u8], size: (u32, u32), phantoms: &[Phantom]) -> Result<()> {
+    let mut picture = RgbImage::from_fn(size.0, size.1, |x, y| {
+        Rgb([mean.get((y * size.0 + x) as usize).copied().unwrap_or(0); 3])
+    });
+    for phantom in phantoms {
+        let [low, high] = phantom.bounds();
+        let (low, high) = ((low - 1.0).max(DVec2::ZERO), high + 1.0);
+        for y in low.y as u32..(high.y as u32 + 1).min(size.1) {
+            for x in low.x as u32..(high.x as u32 + 1).min(size.0) {
+                let distance = phantom.distance(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
+                if distance.abs() <= LINE_PX {
+                    picture.put_pixel(x, y, Rgb(LINE));
+                }
+            }
+        }
+    }
+    let said = || {
+        format!("cannot write {}; check the folder, its permissions and that it ends in .png", path.display())
+    };
+    picture.save(path).with_context(said)
+}
