@@ -7,10 +7,11 @@ use bowwave_core::{
     calibration::Calibration,
     estimate::{
         clock::ClockMap,
-        horizon::{HorizonFinder, HorizonView, Mask, NoHorizon},
+        horizon::{HorizonFinder, HorizonView, NoHorizon},
     },
     event::{CameraFrame, Event, ImuSample, Picture, TriggerEdge},
     geometry::{Lens, horizon_dip},
+    own_ship::Mask,
     time::Time,
 };
 use glam::{DQuat, DVec2, DVec3};

@@ -6,8 +6,9 @@
 mod common;
 
 use bowwave_core::{
-    estimate::{SensorCounts, attitude::Source, horizon::Mask},
+    estimate::{SensorCounts, attitude::Source},
     event::{Event, Picture, PixelFormat},
+    own_ship::Mask,
 };
 use common::Played;
 use glam::{DVec2, DVec3};

@@ -2,9 +2,8 @@
 
 use bowwave_core::{
     calibration::{Calibration, TriggerLatency},
-    estimate::horizon::Mask,
     geometry::{Distortion, Lens},
-    own_ship::{OwnShip, Phantom},
+    own_ship::{Mask, OwnShip, Phantom},
     text::toml::{
         Loose, OptionalKey, RequiredKey, TomlError, TomlText, ValueRule, list_of, number, positive, whole,
     },

@@ -1,6 +1,6 @@
 //! Detection of horizon, board and mark in the wizard's pictures.
 
-use bowwave_core::{calibration::Calibration, estimate::horizon::Mask, event::CameraFrame, time::Time};
+use bowwave_core::{calibration::Calibration, event::CameraFrame, own_ship::Mask, time::Time};
 use glam::DVec2;
 
 use crate::{

@@ -3,14 +3,15 @@
 //! A [`Phantom`] is the model of a real thing that is drawn for what it hides, and not for itself (Hughes, Konttinen and Pattanaik 2004,
 //! section 3). Barrel, sight and shield move with the camera, so that an outline in its picture is all of their shape that a frame needs.
 
+mod mask;
+
 use std::sync::Arc;
 
 use glam::DVec2;
 
-use crate::{
-    estimate::horizon::Mask,
-    geometry::{Lens, is_inside},
-};
+use crate::geometry::{Lens, is_inside};
+
+pub use mask::Mask;
 
 /// Pixels of the picture around a phantom in which no horizon and no sky is sought.
 const MARGIN_PX: f64 = 2.0;

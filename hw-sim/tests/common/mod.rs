@@ -4,9 +4,9 @@ use std::{path::Path, sync::Arc};
 
 use bowwave_core::{
     calibration::Calibration,
-    estimate::{attitude::Source, horizon::Mask},
+    estimate::attitude::Source,
     event::{Event, PixelFormat, Tick},
-    own_ship::OwnShip,
+    own_ship::{Mask, OwnShip},
     session::{Session, Setup},
     world::scenario::Scenario,
 };

@@ -5,12 +5,13 @@ use glam::DVec3;
 use crate::{
     estimate::{
         attitude::{self, Attitude, UpSeen},
-        horizon::{HorizonFinder, HorizonView, Mask, NoHorizon, Prior, lowered_by_haze},
+        horizon::{HorizonFinder, HorizonView, NoHorizon, Prior, lowered_by_haze},
         registration::UpSight,
         schedule::Schedule,
     },
     event::Picture,
     geometry::Lens,
+    own_ship::Mask,
     time::Time,
 };
 

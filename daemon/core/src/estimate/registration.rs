@@ -31,9 +31,9 @@ use super::{
     skyline::{TurnFinder, TurnSeen},
 };
 use crate::{
-    estimate::horizon::Mask,
     event::{ImuSample, Picture},
     geometry::{Lens, rotation_vector},
+    own_ship::Mask,
     time::Time,
 };
 

@@ -12,7 +12,6 @@ use crate::{
     estimate::{
         attitude::{Attitude, AttitudeSettings, Source},
         clock::{ClockMap, ClockReport},
-        horizon::Mask,
         plausibility::{Plausibility, is_possible},
         pose::{NoPose, OrientationAt, STALE_NS},
         registration::{Misfit, Registration, RegistrationChecks, StampedPicture},
@@ -20,6 +19,7 @@ use crate::{
     event::{CameraFrame, ImuSample, Mark, ShipSample},
     fault::Fault,
     geometry::Lens,
+    own_ship::Mask,
     time::Time,
 };
 

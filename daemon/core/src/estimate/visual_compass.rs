@@ -3,12 +3,12 @@
 use crate::{
     estimate::{
         attitude::{Attitude, HeadingSeen},
-        horizon::Mask,
         schedule::Schedule,
         skyline::{SkyView, Skyline},
     },
     event::Picture,
     geometry::Lens,
+    own_ship::Mask,
     time::Time,
 };
 

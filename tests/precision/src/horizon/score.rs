@@ -2,9 +2,10 @@
 
 use anyhow::{Context as _, Result};
 use bowwave_core::{
-    estimate::horizon::{Horizon, HorizonFinder, HorizonView, Mask, NoHorizon, Prior},
+    estimate::horizon::{Horizon, HorizonFinder, HorizonView, NoHorizon, Prior},
     event::{Picture, PixelFormat},
     geometry::{Distortion, Lens},
+    own_ship::Mask,
 };
 use glam::{DMat2, DQuat, DVec2, DVec3};
 

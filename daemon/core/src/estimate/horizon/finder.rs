@@ -10,11 +10,11 @@ use super::{
     edges::{LineCandidate, LineSpan, ROLL_MAX, Seeker},
     fit::{Fitter, HorizonFit, HorizonLine, LineSearch, angles_of},
     judge::HorizonJudge,
-    mask::{Mask, MaskedRows},
+    mask::MaskedRows,
     rays::Rays,
     steps::StepBlocks,
 };
-use crate::{event::Picture, geometry::horizon_dip};
+use crate::{event::Picture, geometry::horizon_dip, own_ship::Mask};
 
 /// Share of a crisp edge's sharpness below which it is blurred: motion over 15 rows, or fog, which moves the edge that is seen.
 const SHARPNESS_MIN: f64 = 0.3;

@@ -26,7 +26,6 @@ mod steps;
 pub use answer::{Horizon, HorizonView, LineQuality, NoHorizon, Prior};
 pub use finder::HorizonFinder;
 pub use haze::lowered_by_haze;
-pub use mask::Mask;
 
 #[cfg(test)]
 mod tests;

@@ -7,6 +7,7 @@ use super::{fit::up_of, *};
 use crate::{
     event::{Picture, PixelFormat},
     geometry::{Distortion, Lens, horizon_dip},
+    own_ship::Mask,
 };
 
 /// Evenly spread numbers from -1 to 1, by place.

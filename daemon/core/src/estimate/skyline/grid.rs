@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 
-use crate::{estimate::horizon::Mask, geometry::Lens};
+use crate::{geometry::Lens, own_ship::Mask};
 
 use super::patch::HALF;
 

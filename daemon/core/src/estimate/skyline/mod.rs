@@ -23,9 +23,9 @@ mod wind;
 use glam::{DMat2, DMat3, DQuat, DVec2, DVec3};
 
 use crate::{
-    estimate::horizon::Mask,
     event::Picture,
     geometry::{Lens, horizon_dip, rotation_vector, turn_about_vertical},
+    own_ship::Mask,
     time::Time,
 };
 use fit::{SkyTrack, SkylineFit, SkylinePrior};

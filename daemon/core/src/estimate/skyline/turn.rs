@@ -14,9 +14,9 @@ use super::{
     pyramid::{GreyPyramid, LEVELS},
 };
 use crate::{
-    estimate::horizon::Mask,
     event::Picture,
     geometry::Lens,
+    own_ship::Mask,
     statistics::{BIWEIGHT_END, biweight},
     time::Time,
 };
