@@ -1,8 +1,8 @@
 // One tracer, splash or strike (set 0, binding 3).
 struct RoundBlock {
-    vec4 from;        // one end of the axis: pixels, depth (near / distance), unused
+    vec4 from;        // one end of the axis: pixels, depth (near / distance), reach before and behind that, metres
     vec4 to;          // the other end
-    vec4 colour;      // linear light and opacity
+    vec4 colour;      // linear light and opacity, or optical depth
     vec2 half_width;  // at both ends, pixels
     uint kind;        // ROUND_*
     float seed;       // tells one from another
@@ -11,6 +11,8 @@ struct RoundBlock {
 const uint ROUND_TRACER = 0;
 const uint ROUND_SPLASH = 1;
 const uint ROUND_STRIKE = 2;
+const uint ROUND_SMOKE = 3;
+const uint ROUND_FLAME = 4;
 
 layout(std430, set = 0, binding = 3) readonly buffer Rounds {
     RoundBlock rounds[];

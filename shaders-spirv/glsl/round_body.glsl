@@ -1,4 +1,5 @@
 // Tracers, splashes and strikes: profiles around an axis on the screen. Premultiplied; light without coverage is added.
+#include "frame.glsl"
 #include "round_block.glsl"
 
 #ifdef HIDDEN
@@ -52,6 +53,29 @@ vec4 strike(RoundBlock r, vec2 from_middle, float width) {
     return vec4(r.colour.rgb * light, min(core * r.colour.a, 1.0));
 }
 
+// Smoke: a ball that is torn at its edges, and hides by its optical depth.
+vec4 smoke(RoundBlock r, vec2 from_middle, float width, float before) {
+    vec2 p = from_middle / width;
+    float squared = dot(p, p);
+    if (squared > 4.0) {
+        return vec4(0.0);
+    }
+    float torn = noise(p * 1.6 + r.seed) * 0.65 + noise(p * 4.1 - r.seed) * 0.35;
+    // Nothing is left at twice the width.
+    float fall = max(exp(-squared) - exp(-4.0), 0.0);
+    float hides = 1.0 - exp(-r.colour.a * fall * before * clamp(2.6 * torn - 0.5, 0.0, 2.0));
+    return vec4(r.colour.rgb * (0.7 + 0.6 * torn) * hides, hides);
+}
+
+// A flame: tongues that lick upwards. It shines, and hides a little.
+vec4 flame(RoundBlock r, vec2 from_middle, float width, float before) {
+    vec2 p = from_middle / width;
+    float torn = noise(vec2(p.x * 2.2 + r.seed, p.y * 1.1 - r.seed));
+    float d = length(p * vec2(1.15, 0.7)) + 0.7 * (torn - 0.5);
+    float light = smoothstep(1.0, 0.15, d) * before;
+    return vec4(r.colour.rgb * light, 0.35 * light);
+}
+
 void main() {
     RoundBlock r = rounds[draw.index];
     vec2 at = gl_FragCoord.xy;
@@ -59,8 +83,14 @@ void main() {
     float squared = max(dot(axis, axis), 1e-6);
     float along = dot(at - r.from.xy, axis) / squared;
     float held = clamp(along, 0.0, 1.0);
+    float before = 1.0;
 #ifdef HIDDEN
-    if (texelFetch(boats_depth, ivec2(at), 0).r > mix(r.from.z, r.to.z, held)) {
+    float hull = texelFetch(boats_depth, ivec2(at), 0).r, own = mix(r.from.z, r.to.z, held);
+    if (r.from.w > 0.0) {
+        // Of a ball so much is seen as lies before the hull.
+        float behind = frame.near / max(own, 1e-9) - frame.near / max(hull, 1e-9);
+        before = hull > 0.0 ? clamp(0.5 - 0.5 * behind / r.from.w, 0.0, 1.0) : 1.0;
+    } else if (hull > own) {
         discard;
     }
 #endif
@@ -71,6 +101,10 @@ void main() {
         colour = tracer(r, along, distance(at, nearest), width);
     } else if (r.kind == ROUND_SPLASH) {
         colour = splash(r, along, dot(at - r.from.xy, side), width);
+    } else if (r.kind == ROUND_SMOKE) {
+        colour = smoke(r, at - r.from.xy, width, before);
+    } else if (r.kind == ROUND_FLAME) {
+        colour = flame(r, at - r.from.xy, width, before);
     } else {
         colour = strike(r, at - r.from.xy, width);
     }

@@ -360,11 +360,11 @@ block! {
 block! {
     /// One tracer, splash or strike: `RoundBlock`, set 0, binding 3, std430.
     pub struct RoundBlock {
-        /// One end of the axis: pixels, and depth (near / distance).
+        /// One end of the axis: pixels, depth (near / distance), and how far before and behind that it reaches, metres.
         pub from: [f32; 4],
         /// The other end.
         pub to: [f32; 4],
-        /// Linear light and opacity.
+        /// Linear light and opacity, or optical depth.
         pub colour: [f32; 4],
         /// Half widths at both ends, pixels.
         pub half_width: [f32; 2],
@@ -381,6 +381,10 @@ pub const ROUND_TRACER: u32 = 0;
 pub const ROUND_SPLASH: u32 = 1;
 /// [`RoundBlock::kind`]: sparks on a boat.
 pub const ROUND_STRIKE: u32 = 2;
+/// [`RoundBlock::kind`]: a puff of smoke.
+pub const ROUND_SMOKE: u32 = 3;
+/// [`RoundBlock::kind`]: a flame.
+pub const ROUND_FLAME: u32 = 4;
 
 block! {
     /// One rectangle of the head-up display: `HudQuad`, set 0, binding 4, std430.

@@ -104,8 +104,13 @@ impl Model {
 
     /// Middle of helm and helmsman; of the whole where no part is one. Metres, the boat's space.
     pub fn helm_middle(&self) -> DVec3 {
-        let helm = self.parts.iter().filter(|part| part.zone == Zone::Helm);
-        let corners = helm.flat_map(|part| part.indices.clone());
+        self.middle_of(Zone::Helm)
+    }
+
+    /// Middle of a zone's parts; of the whole where no part is one. Metres, the boat's space.
+    pub fn middle_of(&self, zone: Zone) -> DVec3 {
+        let parts = self.parts.iter().filter(|part| part.zone == zone);
+        let corners = parts.flat_map(|part| part.indices.clone());
         let places = corners.filter_map(|i| {
             let corner = *self.indices.get(usize::try_from(i).ok()?)?;
             Some(self.vertices.get(usize::try_from(corner).ok()?)?.position.as_dvec3())

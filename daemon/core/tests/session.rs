@@ -381,7 +381,8 @@ fn a_rehearsal_has_everything_in_view() {
         // The sea of this scenario is calm and nothing in it is switched off.
         assert_eq!(runs, PassDecision::Run, "{pass:?}");
     }
-    assert_eq!((scene.boats.len(), scene.lights.len(), scene.rounds.len()), (1, 1, 3));
+    // A round of each kind: splash, strike, tracer, smoke, flame.
+    assert_eq!((scene.boats.len(), scene.lights.len(), scene.rounds.len()), (1, 1, 5));
     // A boat that lies still leaves no wake.
     let still = session(SCENARIO).rehearsal();
     assert_eq!(still.passes[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoBoatMoves));

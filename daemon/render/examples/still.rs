@@ -8,14 +8,17 @@ use bowwave_core::{
     daylight::Daylight,
     estimate::light::LightMeter,
     event::{Picture, PixelFormat},
-    frame::scene::{LeftOut, Pass, PassDecision, RoundView},
+    frame::{
+        fires::{Burning, PUFFS_A_BOAT},
+        scene::{LeftOut, Pass, PassDecision, RoundView},
+    },
     geometry::look,
     sea::BeaufortForce,
     time::Time,
     water::{ReflectionMethod, ShadowLevel, Water},
 };
 use bowwave_render::{DrawRequest, Needs, RenderConfig, Renderer, TimeOuts};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 
 #[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
 #[path = "../src/testing.rs"]
@@ -86,7 +89,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             boats_max: 8,
             lights_max: 0,
             searchlight: scene.searchlight.is_some(),
-            rounds_max: 8,
+            rounds_max: 8 + PUFFS_A_BOAT,
             wakes_max: 8,
             waters: vec![(method, scene.water.shadow)],
             optics: scene.lens.optics(),
@@ -105,15 +108,27 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A tracer towards the first boat, a splash before it and a strike on it.
+/// A fire on the first boat, a tracer towards it, a splash before it and a strike on it.
 fn rounds(scene: &bowwave_core::frame::scene::Scene) -> Vec<RoundView> {
     let Some(boat) = scene.boats.first() else { return Vec::new() };
     let (at, eye) = (boat.pose.position, scene.camera.position);
     let on = |share: f64| eye - DVec3::Z * 0.3 + (at + DVec3::Z - eye) * share;
-    vec![
+    let burning = Burning {
+        boat: 0,
+        since_s: 0.0,
+        wind: DVec2::new(4.0, 1.0),
+        eye,
+        visibility_m: 20_000.0,
+        white_cd_m2: 20_000.0,
+    };
+    let mut views = Vec::new();
+    burning.puffs(60.0, |_| Some(at + DVec3::new(2.0, 0.0, 1.2)), &mut views);
+    views.sort_by(|a, b| b.place().distance(eye).total_cmp(&a.place().distance(eye)));
+    views.extend([
         RoundView::Splash { at: at + DVec3::new(4.0, 6.0, 0.0), height_m: 5.0, radius_m: 0.9, opacity: 0.9 },
         RoundView::Splash { at: at - DVec3::new(3.0, 8.0, 0.0), height_m: 3.0, radius_m: 0.7, opacity: 0.8 },
         RoundView::Strike { at: at + DVec3::Z * 1.5, radius_m: 0.8, opacity: 0.9 },
         RoundView::Tracer { from: on(0.5), to: on(0.8), radiance: Vec3::new(4.0, 1.2, 0.5) },
-    ]
+    ]);
+    views
 }

@@ -15,6 +15,7 @@ use bowwave_core::{
     event::{Picture, PixelFormat},
     fault::Fault,
     frame::{
+        fires::Burning,
         scene::{LightView, Pass, PassDecision, RoundView, Scene, Status},
         searchlight::SearchlightView,
     },
@@ -314,6 +315,26 @@ fn a_searchlight_on_boats_sea_and_air() {
         scene.searchlight = Some(SearchlightView::new(&spec, towards, 40.0, 2_000.0));
         scene.passes[Pass::Searchlight as usize] = PassDecision::Run;
         check_on(name, &scene, &dark_sea(), &models());
+    }
+}
+
+/// A boat burns by day, before and behind its own hull, and at night, when the flames are far brighter than the picture's white.
+#[test]
+fn a_boat_burns() {
+    for (name, white_cd_m2) in [("fire", 20_000.0), ("fire_at_night", 20.0)] {
+        let mut scene = boats(ReflectionMethod::Baked, ShadowLevel::None, 1);
+        let picture = if white_cd_m2 < 100.0 { dark_sea() } else { sea(SIZE.0, SIZE.1) };
+        if white_cd_m2 < 100.0 {
+            dark(&mut scene);
+        }
+        let eye = scene.camera.position;
+        let wind = DVec2::new(3.0, -1.0);
+        let burning = Burning { boat: 0, since_s: 0.0, wind, eye, visibility_m: 10_000.0, white_cd_m2 };
+        let at = scene.boats[0].pose.position + DVec3::Z;
+        burning.puffs(40.0, |_| Some(at), &mut scene.rounds);
+        scene.rounds.sort_by(|a, b| b.place().distance(eye).total_cmp(&a.place().distance(eye)));
+        scene.passes[Pass::Rounds as usize] = PassDecision::Run;
+        check_on(name, &scene, &picture, &models());
     }
 }
 

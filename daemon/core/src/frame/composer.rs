@@ -239,9 +239,9 @@ impl Composer {
             boats_in_view(&running.fleet, &frustum, time, running.start, &mut scene.boats);
             if self.plan.has(Pass::Lights) && estimator.luminaries().is_between_sunset_and_sunrise() {
                 let moment = (time, light.white_cd_m2);
-                lights_in_view(&running.fleet, &frustum, moment, &scene.boats, &mut scene.lights);
+                lights_in_view(running, &frustum, moment, &scene.boats, &mut scene.lights);
             }
-            rounds_in_view(running, &frustum, time, &mut scene.rounds);
+            rounds_in_view(running, &frustum, (time, light.white_cd_m2), &mut scene.rounds);
         }
         let shining = world.searchlight().filter(|_| self.plan.has(Pass::Searchlight));
         scene.searchlight =
@@ -299,6 +299,8 @@ impl Composer {
                 RoundView::Splash { at, height_m: 1.0, radius_m: 0.5, opacity: 1.0 },
                 RoundView::Strike { at, radius_m: 0.5, opacity: 1.0 },
                 RoundView::Tracer { from: at, to: at + DVec3::Y * 10.0, radiance: Vec3::ONE },
+                RoundView::Smoke { at, radius_m: 0.5, depth: 1.0, glow: Vec3::ONE, haze: 0.5, seed: 0.0 },
+                RoundView::Flame { at, radius_m: 0.5, light: Vec3::ONE, seed: 0.0 },
             ]
         } else {
             Vec::new()

@@ -1,25 +1,28 @@
-//! Navigation lights in view: how much light of each comes to the camera.
+//! Navigation lights and fires in view: how much light of each comes to the camera.
 
 use super::{
+    fires::Burning,
+    rounds::{fires, source_of},
     scene::{BoatView, LightView},
     view::ViewFrustum,
 };
-use crate::{geometry::horizon_dip, time::Time, world::fleet::Fleet};
+use crate::{geometry::horizon_dip, time::Time, world::RunningWorld};
 
-/// Most lights of a boat.
-pub const LIGHTS_A_BOAT: usize = 6;
+/// Most lights of a boat, its fire among them.
+pub const LIGHTS_A_BOAT: usize = 7;
 
 /// The lights of the `boats` in view at `time`, for a camera that shows so many cd/m^2 as white.
 pub(super) fn lights_in_view(
-    fleet: &Fleet,
+    running: &RunningWorld,
     view: &ViewFrustum<'_>,
     (time, white_cd_m2): (Time, f64),
     boats: &[BoatView],
     into: &mut Vec<LightView>,
 ) {
     into.clear();
+    let fleet = &running.fleet;
     for boat in boats {
-        for light in fleet.lights(boat.boat, time).iter().take(LIGHTS_A_BOAT) {
+        for light in fleet.lights(boat.boat, time).iter().take(LIGHTS_A_BOAT - 1) {
             let at = boat.pose.to_world(light.place);
             let towards_eye = view.camera.position - at;
             let range_m = towards_eye.length();
@@ -36,5 +39,14 @@ pub(super) fn lights_in_view(
                 into.push(LightView { boat: boat.boat, at, light });
             }
         }
+    }
+    let time_s = time.secs_since(running.start);
+    for fire in fires(running, view, white_cd_m2) {
+        let Some(boat) = boats.iter().find(|boat| boat.boat == fire.boat) else { continue };
+        let Some(at) = source_of(running, fire.boat, time)(time_s) else { continue };
+        let range_m = view.camera.position.distance(at).max(1.0);
+        let illuminance = fire.candela(time_s) * f64::from(1.0 - boat.haze) / (range_m * range_m);
+        let light = Burning::colour() * (illuminance / white_cd_m2) as f32;
+        into.push(LightView { boat: fire.boat, at, light });
     }
 }

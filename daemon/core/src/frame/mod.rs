@@ -2,6 +2,7 @@
 
 mod boats;
 mod composer;
+pub mod fires;
 mod lights;
 pub mod plan;
 pub mod reflection;

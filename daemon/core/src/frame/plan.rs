@@ -60,7 +60,7 @@ pub struct SceneNeeds {
     pub moving: usize,
     /// Rounds in the belt.
     pub belt: u32,
-    /// Some boat shows lights by night.
+    /// Some boat shows lights by night, or may burn.
     pub lights: bool,
     /// The gun has a searchlight.
     pub searchlight: bool,
@@ -106,7 +106,7 @@ impl SceneNeeds {
             boats: scenario.boats.len(),
             moving: scenario.boats.iter().filter(|b| b.behaviour.speed_max_m_s() > 0.0).count(),
             belt: scenario.weapon.belt,
-            lights: scenario.boats.iter().any(|b| b.lights != LightsKept::None),
+            lights: scenario.weapon.belt > 0 || scenario.boats.iter().any(|b| b.lights != LightsKept::None),
             searchlight: scenario.searchlight.is_some(),
             sun_stays_up: scenario.daylight.stays_up(),
             sun_stays_down: scenario.daylight.stays_down(),

@@ -161,7 +161,7 @@ pub enum LeftOut {
     NoRoundInView,
     /// The weapon has no rounds.
     NoRounds,
-    /// No boat of the scenario shows lights.
+    /// No boat of the scenario shows lights, or can be set on fire.
     NoLights,
     /// The sun is up, and stays where it is.
     Daylight,
@@ -264,7 +264,7 @@ pub struct LightView {
     pub light: Vec3,
 }
 
-/// A tracer or a splash.
+/// What rounds do: a tracer, a splash, fire and smoke.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RoundView {
     /// The streak of a round in flight over the picture's exposure.
@@ -287,6 +287,32 @@ pub enum RoundView {
         /// 1 fresh, 0 gone.
         opacity: f32,
     },
+    /// A puff of smoke from a boat that burns.
+    Smoke {
+        /// Its middle, world.
+        at: DVec3,
+        /// Its radius, metres: that at which its optical depth is 1/e of that through its middle.
+        radius_m: f32,
+        /// Optical depth through its middle.
+        depth: f32,
+        /// What it throws back of the fire's light, linear radiance.
+        glow: Vec3,
+        /// Share of its light that haze replaces by the horizon's, 0 to 1.
+        haze: f32,
+        /// Tells its shape from others'.
+        seed: f32,
+    },
+    /// A flame.
+    Flame {
+        /// Its middle, world.
+        at: DVec3,
+        /// Its radius, metres.
+        radius_m: f32,
+        /// Linear radiance of its middle.
+        light: Vec3,
+        /// Tells its shape from others'.
+        seed: f32,
+    },
     /// Sparks where a round struck a boat.
     Strike {
         /// The place, world.
@@ -303,7 +329,10 @@ impl RoundView {
     pub const fn place(&self) -> DVec3 {
         match *self {
             Self::Tracer { to, .. } => to,
-            Self::Splash { at, .. } | Self::Strike { at, .. } => at,
+            Self::Splash { at, .. }
+            | Self::Strike { at, .. }
+            | Self::Smoke { at, .. }
+            | Self::Flame { at, .. } => at,
         }
     }
 }

@@ -145,6 +145,9 @@ impl ViewFrustum<'_> {
                 (at, at + DVec3::Z * f64::from(height_m), f64::from(radius_m))
             }
             RoundView::Strike { at, radius_m, .. } => (at, at, f64::from(radius_m)),
+            RoundView::Smoke { at, radius_m, .. } | RoundView::Flame { at, radius_m, .. } => {
+                (at, at, 2.0 * f64::from(radius_m))
+            }
         };
         let low = a.min(b) - radius;
         let high = a.max(b) + radius;

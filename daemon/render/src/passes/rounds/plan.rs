@@ -1,11 +1,14 @@
-//! Tracers, splashes and strikes on the screen: each an axis in pixels with a width.
+//! Tracers, splashes, strikes, smoke and flames on the screen: each an axis in pixels with a width.
 
 use bowwave_core::frame::{
+    fires::SOOT_ALBEDO,
     scene::{PixelRect, RoundView, Scene},
     view::NEAR_M,
 };
 use glam::{DVec2, DVec3, Vec3};
-use shaders_spirv::interface::{ROUND_SPLASH, ROUND_STRIKE, ROUND_TRACER, RoundBlock};
+use shaders_spirv::interface::{
+    ROUND_FLAME, ROUND_SMOKE, ROUND_SPLASH, ROUND_STRIKE, ROUND_TRACER, RoundBlock,
+};
 
 /// Radius of a tracer's burning base as the camera sees it bloom, metres.
 const TRACER_RADIUS_M: f64 = 0.06;
@@ -29,6 +32,7 @@ pub(crate) fn round_block(scene: &Scene, round: &RoundView, seed: f32) -> Option
             colour: radiance.extend(1.0).to_array(),
             kind: ROUND_TRACER,
             nearer: 1.0,
+            thick_m: 0.0,
         },
         RoundView::Splash { at, height_m, radius_m, opacity } => {
             let light = &scene.light;
@@ -41,8 +45,33 @@ pub(crate) fn round_block(scene: &Scene, round: &RoundView, seed: f32) -> Option
                 colour: lit.extend(opacity.clamp(0.0, 1.0)).to_array(),
                 kind: ROUND_SPLASH,
                 nearer: 1.0,
+                thick_m: 0.0,
             }
         }
+        RoundView::Smoke { at, radius_m, depth, glow, haze, .. } => {
+            let light = &scene.light;
+            let lit = (light.sun * 0.25 + light.sky * 0.7 + light.sea * 0.3) * SOOT_ALBEDO as f32 + glow;
+            Shape {
+                ends: [at, at],
+                half_width_m: [f64::from(radius_m); 2],
+                half_width_min_px: 1.0,
+                reach: 2.0,
+                colour: lit.lerp(light.horizon, haze).extend(depth.max(0.0)).to_array(),
+                kind: ROUND_SMOKE,
+                nearer: 1.0,
+                thick_m: f64::from(radius_m),
+            }
+        }
+        RoundView::Flame { at, radius_m, light, .. } => Shape {
+            ends: [at, at],
+            half_width_m: [f64::from(radius_m); 2],
+            half_width_min_px: 1.0,
+            reach: 2.0,
+            colour: light.extend(1.0).to_array(),
+            kind: ROUND_FLAME,
+            nearer: 1.0,
+            thick_m: f64::from(radius_m),
+        },
         RoundView::Strike { at, radius_m, opacity } => Shape {
             ends: [at, at],
             half_width_m: [f64::from(radius_m); 2],
@@ -52,7 +81,12 @@ pub(crate) fn round_block(scene: &Scene, round: &RoundView, seed: f32) -> Option
             kind: ROUND_STRIKE,
             // It happens on the hull: the hull must not hide it.
             nearer: 1.02,
+            thick_m: 0.0,
         },
+    };
+    let seed = match *round {
+        RoundView::Smoke { seed, .. } | RoundView::Flame { seed, .. } => seed,
+        _ => seed,
     };
     shape.project(scene, seed)
 }
@@ -67,6 +101,8 @@ struct Shape {
     kind: u32,
     /// Factor on its depth.
     nearer: f64,
+    /// How far before and behind that depth it reaches, metres; 0 of what is thin.
+    thick_m: f64,
 }
 
 impl Shape {
@@ -90,7 +126,8 @@ impl Shape {
             width: (high.x - low.x) as u32,
             height: (high.y - low.y) as u32,
         };
-        let end = |p: DVec2, c: DVec3| [p.x as f32, p.y as f32, (NEAR_M / c.z * self.nearer) as f32, 0.0];
+        let thick = self.thick_m as f32;
+        let end = |p: DVec2, c: DVec3| [p.x as f32, p.y as f32, (NEAR_M / c.z * self.nearer) as f32, thick];
         let block = RoundBlock {
             from: end(a, from),
             to: end(b, to),
