@@ -90,11 +90,6 @@ impl OutlineFinder {
         }
     }
 
-    /// Pictures seen.
-    pub const fn pictures(&self) -> u32 {
-        self.pictures
-    }
-
     /// Takes a picture; one of another size is not taken.
     pub fn see(&mut self, picture: &Picture) {
         if (picture.width(), picture.height()) != self.size {
@@ -253,7 +248,7 @@ fn between(values: &[f32], (width, height): (u32, u32), place: DVec2) -> f64 {
     row(y) * (1.0 - down) + row(y + 1) * down
 }
 
-/// Luma of a pixel's first bytes, codes: of three it is weighed as Rec. 601 does, to an eighth.
+/// Luma of a pixel's first bytes, codes: of three it is weighed as ITU-R BT.601 does.
 fn luma(pixel: &[u8]) -> f32 {
     match *pixel {
         [r, g, b] => 0.299 * f32::from(r) + 0.587 * f32::from(g) + 0.114 * f32::from(b),

@@ -43,11 +43,6 @@ impl Phantoms {
         let moved = |p: DVec2| (p - lens.centre) * (screen.focal / lens.focal) + screen.centre;
         Self { parts: self.parts.iter().map(|part| part.mapped(moved)).collect(), bore: moved(self.bore) }
     }
-
-    /// Whether any recoils.
-    pub fn recoil(&self) -> bool {
-        self.parts.iter().any(|part| part.recoils)
-    }
 }
 
 impl OwnShip {
