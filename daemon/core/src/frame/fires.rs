@@ -1,6 +1,6 @@
 //! Fire and smoke of boats that burn: puffs, each a function of its number and the time, so that any frame of any pace shows the same.
 //!
-//! A fire on fuel grows with the square of time (the ultra-fast curve of NFPA 92) and stops growing at [`HEAT_MOST_KW`]. Flames reach as high as
+//! A fire on fuel grows with the square of time (the ultra-fast curve of NFPA 92) and stops growing at a megawatt. Flames reach as high as
 //! Heskestad (1984) gives. Smoke rises as a plume that wind bends over (Briggs 1975), widens with its height, and hides what is behind it by the
 //! soot that burns off (yield of fuels: Tewarson 2002; specific extinction: Mulholland and Croarkin 2000).
 
@@ -45,7 +45,7 @@ const FLAME_CD_M2: f64 = 12_000.0;
 const FLAME: Vec3 = Vec3::new(2.1, 0.78, 0.14);
 /// Share of light that a thick cloud of soot throws back.
 pub const SOOT_ALBEDO: f64 = 0.13;
-/// Luminous intensity of a fire for each kW, cd: a third of its heat is radiated, at .16 lm/W as a candle's.
+/// Luminous intensity of a fire for each kW, cd: that of 160 lm to all sides, as a candle gives 12 lm of 80 W.
 const CANDELA_KW: f64 = 12.7;
 
 /// A boat that burns.
