@@ -9,6 +9,8 @@ use glam::DVec2;
 
 use contour::{closed_contours, simplified};
 
+use crate::target::Plane;
+
 mod contour;
 
 /// Pictures that are needed: fewer tell a pixel's deviation by no more than a tenth.
@@ -49,7 +51,7 @@ pub struct OutlineFinder {
     codes: Vec<f32>,
 }
 
-/// What keeps still in the pictures.
+/// Outlines of all that keeps still in the pictures.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FoundOutlines {
     /// The largest first.
@@ -60,7 +62,7 @@ pub struct FoundOutlines {
     pub openings: Vec<f64>,
 }
 
-/// Why no outline can be found.
+/// Error of a search for outlines.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OutlineError {
     /// Too few pictures.
@@ -116,7 +118,7 @@ impl OutlineFinder {
         }
     }
 
-    /// What kept still.
+    /// Outlines of what kept still.
     ///
     /// # Errors
     /// Too few pictures, or pictures that do not change.
@@ -125,15 +127,15 @@ impl OutlineFinder {
             return Err(OutlineError::Pictures(self.pictures));
         }
         let deviation = self.deviation();
-        let moves = quantile(&deviation, deviation.len() / 2);
+        let moves = quantile(&deviation.values, deviation.values.len() / 2);
         if moves < MOVES_LEAST {
             return Err(OutlineError::Still(moves));
         }
         // Between what keeps still and the sea, on a scale of ratios.
-        let still = ((1.0 + quantile(&deviation, deviation.len() / QUIET)) * moves).sqrt();
+        let still = ((1.0 + quantile(&deviation.values, deviation.values.len() / QUIET)) * moves).sqrt();
         let mut found = FoundOutlines::default();
         let all = f64::from(self.size.0) * f64::from(self.size.1);
-        let mut contours: Vec<_> = closed_contours(&deviation, self.size, still)
+        let mut contours: Vec<_> = closed_contours(&deviation.values, self.size, still)
             .into_iter()
             .map(|contour| (area(&contour), contour))
             .filter(|(area, _)| area.abs() >= AREA_LEAST * all)
@@ -157,13 +159,13 @@ impl OutlineFinder {
     }
 
     /// Standard deviation of each pixel, codes, without that of the quietest ones: noise.
-    fn deviation(&self) -> Vec<f32> {
+    fn deviation(&self) -> Plane {
         let count = self.pictures as f32;
         let variance = |[sum, squares]: &[f32; 2]| (squares / count - (sum / count) * (sum / count)).max(0.0);
         let mut variances: Vec<f32> = self.sums.iter().map(variance).collect();
         let noise = quantile(&variances, variances.len() / QUIET);
         variances.iter_mut().for_each(|v| *v = (*v - noise).max(0.0).sqrt());
-        variances
+        Plane { width: self.size.0 as usize, height: self.size.1 as usize, values: variances }
     }
 
     /// The pictures' mean, codes, rows from the top; black before the first.
@@ -194,8 +196,8 @@ impl OutlineFinder {
     }
 
     /// The outline where deviations are half of the sea's beside it.
-    fn refined(&self, contour: &[DVec2], deviation: &[f32]) -> Vec<DVec2> {
-        let at = |place: DVec2| between(deviation, self.size, place);
+    fn refined(&self, contour: &[DVec2], deviation: &Plane) -> Vec<DVec2> {
+        let at = |place: DVec2| deviation.at(place);
         let steps = |[from, to]: [f64; 2]| {
             let count = ((to - from) / SOUGHT_STEP_PX).round() as u32;
             (0..=count).map(move |i| from + f64::from(i) * SOUGHT_STEP_PX)
@@ -219,7 +221,7 @@ impl OutlineFinder {
         (0..contour.len()).map(moved).collect()
     }
 
-    /// Whether a place is so near to the picture's border that nothing is seen beyond.
+    /// Tests whether a place is so near to the picture's border that nothing is seen beyond.
     fn is_border(&self, place: DVec2) -> bool {
         let size = DVec2::new(f64::from(self.size.0), f64::from(self.size.1));
         let margin = DVec2::splat(APART as f64 + 0.5);
@@ -232,20 +234,6 @@ impl OutlineFinder {
         let inside = (0.0..width).contains(&place.x) && (0.0..height).contains(&place.y);
         inside.then(|| place.y as usize * self.size.0 as usize + place.x as usize)
     }
-}
-
-/// The value between the four pixels about a place; beyond the edge that of the edge.
-fn between(values: &[f32], (width, height): (u32, u32), place: DVec2) -> f64 {
-    let last = DVec2::new(f64::from(width - 1), f64::from(height - 1));
-    let at = (place - 0.5).clamp(DVec2::ZERO, last);
-    let (x, y) = (at.x as usize, at.y as usize);
-    let (right, down) = (at.x.fract(), at.y.fract());
-    let value = |x: usize, y: usize| {
-        let i = y.min(height as usize - 1) * width as usize + x.min(width as usize - 1);
-        f64::from(values.get(i).copied().unwrap_or(0.0))
-    };
-    let row = |y: usize| value(x, y) * (1.0 - right) + value(x + 1, y) * right;
-    row(y) * (1.0 - down) + row(y + 1) * down
 }
 
 /// Luma of a pixel's first bytes, codes: of three it is weighed as ITU-R BT.601 does.

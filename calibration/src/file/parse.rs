@@ -232,7 +232,7 @@ fn calibration(text: TomlText<'_>, raw: &RawCalibration) -> Result<Calibration, 
     })
 }
 
-/// What is seen of the own gun and ship in the picture: polygons that hide the sea, and phantoms.
+/// Own gun and ship in the picture: polygons that hide the sea, and phantoms.
 fn own_ship(text: TomlText<'_>, raw: &RawCalibration) -> Result<(Vec<Vec<DVec2>>, Vec<Phantom>), TomlError> {
     let Some(own_ship) = &raw.own_ship else { return Ok(Default::default()) };
     let [width, height] = text.needed(&raw.lens.size_px, picture_size())?;

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use bowwave_core::geometry::distance_squared_to_segment;
 use glam::DVec2;
 
 /// Closed lines around what is below `level`; values belong to the pixels' centres, rows from the top. Outside the picture everything is above
@@ -90,18 +91,12 @@ fn simplified_to(contour: &[DVec2], detail: f64) -> Vec<DVec2> {
     keeps[middle] = true;
     let mut spans = vec![(0, middle), (middle, turned.len() - 1)];
     while let Some((from, to)) = spans.pop() {
-        let off = |i: usize| distance(turned[i], turned[from], turned[to]);
+        let off = |i: usize| distance_squared_to_segment(turned[i], turned[from], turned[to]);
         let most = (from + 1..to).max_by(|a, b| off(*a).total_cmp(&off(*b)));
-        if let Some(most) = most.filter(|i| off(*i) > detail) {
+        if let Some(most) = most.filter(|i| off(*i) > detail * detail) {
             keeps[most] = true;
             spans.extend([(from, most), (most, to)]);
         }
     }
     turned[..contour.len()].iter().zip(keeps).filter(|(_, keep)| *keep).map(|(p, _)| *p).collect()
-}
-
-fn distance(p: DVec2, from: DVec2, to: DVec2) -> f64 {
-    let along = to - from;
-    let share = ((p - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    p.distance(from + along * share)
 }

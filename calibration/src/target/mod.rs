@@ -25,6 +25,7 @@ pub use corner::Refinement;
 pub use detect::{Tag, detect, detect_by, view};
 pub use kalibr::KalibrError;
 pub use picture::Grey;
+pub(crate) use picture::Plane;
 pub use varied::varied;
 pub(crate) use varied::{apart, lie};
 

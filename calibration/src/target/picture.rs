@@ -28,7 +28,7 @@ impl<'a> Grey<'a> {
 
 /// A picture that can be asked between its pixels. The centre of the first pixel is (0.5, 0.5).
 #[derive(Clone, Debug)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     pub width: usize,
     pub height: usize,
     pub values: Vec<f32>,

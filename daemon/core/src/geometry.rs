@@ -47,6 +47,13 @@ pub fn is_inside(polygon: &[DVec2], place: DVec2) -> bool {
     ends.filter(crossed).count() % 2 == 1
 }
 
+/// Squared distance from a place to the nearest point of a segment.
+pub fn distance_squared_to_segment(place: DVec2, from: DVec2, to: DVec2) -> f64 {
+    let along = to - from;
+    let share = ((place - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    place.distance_squared(from + along * share)
+}
+
 /// By what a small turn of the world turns it about the vertical, counter-clockwise from above, radians (the twist about z of Dobrowolski
 /// 2015, swing-twist).
 pub fn turn_about_vertical(turn: DQuat) -> f64 {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use crate::geometry::{Lens, is_inside};
+use crate::geometry::{Lens, distance_squared_to_segment, is_inside};
 
 pub use mask::Mask;
 
@@ -116,8 +116,10 @@ impl Phantom {
     /// Pixels from `place` to the nearest edge that is seen, negative inside; infinite where all of it is one or the other. Along the picture's
     /// border nothing ends but the picture.
     pub fn distance(&self, place: DVec2) -> f64 {
-        let nearest =
-            self.edges().map(|(from, to)| distance_squared(place, from, to)).fold(f64::INFINITY, f64::min);
+        let nearest = self
+            .edges()
+            .map(|(from, to)| distance_squared_to_segment(place, from, to))
+            .fold(f64::INFINITY, f64::min);
         if is_inside(&self.outline, place) { -nearest.sqrt() } else { nearest.sqrt() }
     }
 
@@ -140,13 +142,6 @@ impl Phantom {
         let on = |line: f64, a: f64, b: f64| (a - line).abs() <= NEAR_PX && (b - line).abs() <= NEAR_PX;
         self.picture.iter().any(|corner| on(corner.x, a.x, b.x) || on(corner.y, a.y, b.y))
     }
-}
-
-/// Squared distance from a place to a line's nearest point.
-fn distance_squared(place: DVec2, from: DVec2, to: DVec2) -> f64 {
-    let along = to - from;
-    let share = ((place - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    place.distance_squared(from + along * share)
 }
 
 #[cfg(test)]

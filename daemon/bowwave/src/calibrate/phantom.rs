@@ -71,7 +71,7 @@ pub fn run(arguments: &CalibratePhantom) -> Result<Outcome> {
     Ok(Outcome::Done)
 }
 
-/// What is to be known of outlines that were not taken.
+/// Notes on outlines that were not taken.
 fn notes(found: &FoundOutlines) -> Vec<String> {
     let percent = |shares: &[f64]| {
         let shares: Vec<_> = shares.iter().map(|s| format!("{:.1} %", s * 100.0)).collect();

@@ -126,7 +126,7 @@ pub struct CalibratePhantom {
     /// Trace a part by hand instead: its corners in pixels in order, once for each part; parts that touch must overlap
     #[arg(long, value_name = "[NAME=]X,Y X,Y X,Y...", value_parser = parse_outline)]
     pub outline: Vec<TracedOutline>,
-    /// What is found or traced slides back along the bore with each round, as a machine gun's barrel does; for one part of several write
+    /// The parts slide back along the bore with each round, as a machine gun's barrel does; for one part of several write
     /// `recoils` in the file
     #[arg(long)]
     pub recoils: bool,

@@ -152,7 +152,7 @@ impl Estimator {
         is_new
     }
 
-    /// How many times as far from where the bore vanishes what recoils is seen in the newest picture, from 1.
+    /// Recoil factor of the newest picture: distance from the bore's vanishing point over that at rest, from 1.
     pub fn recoil(&self) -> f64 {
         self.recoil.as_ref().map_or(1.0, RecoilFinder::factor)
     }

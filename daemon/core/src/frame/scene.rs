@@ -41,7 +41,7 @@ pub struct Scene {
     pub lights: Vec<LightView>,
     /// The gun's searchlight, while it is on.
     pub searchlight: Option<SearchlightView>,
-    /// How many times as far from where the bore vanishes what recoils of the gun is seen, from 1.
+    /// Recoil factor of the gun: distance from the bore's vanishing point over that at rest, from 1.
     pub recoil: f64,
     /// Light on the boats.
     pub light: Light,

@@ -15,7 +15,7 @@ use hw_sim::{
     panorama::{self, PanoramaRecipe},
 };
 
-use super::{About, worst};
+use super::{About, rms, worst};
 use crate::bench::{ExtremeResult, PartBench};
 
 /// Description of this part.
@@ -136,14 +136,6 @@ fn distances(truth: &Phantoms, found: &[Phantom]) -> Vec<f64> {
     off
 }
 
-fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for value in values {
-        (sum, count) = (sum + value * value, count + 1.0);
-    }
-    if count > 0.0 { (sum / count).sqrt() } else { f64::INFINITY }
-}
-
 /// Errors of the outlines found while the gun turns: by the sea's change, and by the mean picture.
 fn found(simulated: &Simulated, deg_s: f64) -> Result<[f64; 2]> {
     let mut finder = OutlineFinder::new(simulated.size());
@@ -181,17 +173,8 @@ fn found(simulated: &Simulated, deg_s: f64) -> Result<[f64; 2]> {
 fn recoil(simulated: &Simulated) -> Result<[f64; 3]> {
     let truth = simulated.own_ship().phantoms;
     let mut finder = RecoilFinder::new(&truth).context("the barrel recoils")?;
-    let muzzle = truth
-        .parts
-        .iter()
-        .flat_map(Phantom::outline)
-        .map(|p| p.distance(truth.bore))
-        .fold(f64::INFINITY, f64::min);
-    let muzzle = truth
-        .parts
-        .iter()
-        .find(|p| p.name == "barrel")
-        .map_or(muzzle, |p| p.outline()[0].distance(truth.bore));
+    let barrel = truth.parts.iter().find(|part| part.name == "barrel").context("there is a barrel")?;
+    let muzzle = barrel.outline()[0].distance(truth.bore);
     let (mut followed, mut left, mut at_rest) = (Vec::new(), Vec::new(), Vec::new());
     simulated.play(HELD, LEARN_S + FIRE_S, Some(LEARN_S), |frame, factor| {
         finder.observe(&frame.picture);

@@ -43,7 +43,7 @@ impl Matte {
         let bounds = swept.iter().map(Phantom::bounds);
         let [low, high] = bounds.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
         let (low, high) = ((low - reach).max(DVec2::ZERO), high + reach);
-        // An outline off the screen, or of no number, leaves nothing.
+        // An outline off the screen, or with a NaN, leaves nothing.
         if !(high.cmpgt(low).all() && high.is_finite()) {
             return None;
         }
