@@ -2,6 +2,7 @@
 #include "frame.glsl"
 #include "lens.glsl"
 #include "boat_block.glsl"
+#include "lamplight_block.glsl"
 
 layout(location = 0) in vec3 position;
 layout(location = 1) in vec3 normal;
@@ -12,8 +13,8 @@ layout(location = 4) in vec4 sky0;
 layout(location = 5) in vec4 sky1;
 layout(location = 6) in vec2 sky2;
 
-// Whether the gun has a searchlight.
-layout(constant_id = 2) const bool SEARCHLIGHT = false;
+// Whether there may be a searchlight, flares, fires.
+layout(constant_id = 2) const bool LAMPLIGHT = false;
 
 // Light that the corner sends to the eye: of sky and sea, with haze, and of the sun, if nothing is before it. A texture's colours and the
 // haze come later. Both are found here and not at every pixel: matt light varies little over the triangles of a boat, and small triangles
@@ -53,6 +54,27 @@ vec3 lit_by_searchlight(BoatBlock boat, vec3 in_camera) {
     return albedo * (frame.beam.w * fall * facing * (1.0 - boat.eye.w) / squared);
 }
 
+// Light of flares and fires: what the corner faces of them, without shadows.
+vec3 lit_by_lamps(BoatBlock boat) {
+    vec3 sum = vec3(0.0);
+    int count = int(frame.row_turn.w);
+    for (int i = 0; i < count; i++) {
+        vec3 off = frame.lamps[i].xyz
+            - vec3(boat.camera_from_boat[0].w, boat.camera_from_boat[1].w, boat.camera_from_boat[2].w);
+        vec3 lamp = boat.camera_from_boat[0].xyz * off.x + boat.camera_from_boat[1].xyz * off.y
+            + boat.camera_from_boat[2].xyz * off.z;
+#ifdef MIRRORED
+        // The matrix mirrors the boat, so that this is the lamp's own mirror image.
+        lamp -= boat.water_plane.xyz * (2.0 * dot(boat.water_plane, vec4(lamp, 1.0)));
+#endif
+        vec3 towards = lamp - position;
+        float range = max(length(towards), 1.0);
+        float facing = max(dot(normal, towards), 0.0) / range;
+        sum += frame.lamp_lights[i].rgb * (facing * exp(-frame.lamps[i].w * range) / (range * range));
+    }
+    return albedo * sum;
+}
+
 void main() {
     vec4 p = vec4(position, 1.0);
     BoatBlock boat = boats[draw.index];
@@ -62,8 +84,8 @@ void main() {
     gl_ClipDistance[0] = dot(boat.water_plane, p);
     gl_ClipDistance[1] = dot(boat.horizon_plane, p);
     around_out = lit_around(boat);
-    if (SEARCHLIGHT) {
-        around_out += lit_by_searchlight(boat, in_camera);
+    if (LAMPLIGHT) {
+        around_out += lit_by_searchlight(boat, in_camera) + lit_by_lamps(boat);
     }
     vec3 sun = albedo * frame.sun.rgb * max(dot(normal, boat.sun.xyz), 0.0);
 #ifdef MIRRORED
@@ -79,6 +101,9 @@ void main() {
 #else
     around_out = mix(around_out, frame.horizon.rgb, boat.eye.w);
 #ifndef MIRRORED
+    if (LAMPLIGHT && frame.horizon.a > 0.0) {
+        around_out += air_at((gl_Position.xy / max(gl_Position.w, 1e-6) * 0.5 + 0.5) * frame.size);
+    }
     sun_out *= 1.0 - boat.eye.w;
 #endif
 #endif

@@ -1,6 +1,7 @@
 // A boat with a texture: what is transparent in it is not there.
 #include "frame.glsl"
 #include "boat_block.glsl"
+#include "lamplight_block.glsl"
 #include "coded_light.glsl"
 
 // Samples a pixel of the layer drawn to: a texture's alpha becomes coverage of that many steps.
@@ -33,5 +34,11 @@ void main() {
 #else
     vec3 light = around + sunlit(sun, shade);
 #endif
-    colour = vec4(coded(mix(light * texel.rgb, frame.horizon.rgb, boats[draw.index].eye.w)), 1.0);
+    vec3 seen = mix(light * texel.rgb, frame.horizon.rgb, boats[draw.index].eye.w);
+#ifndef MIRRORED
+    if (frame.horizon.a > 0.0) {
+        seen += air_at(gl_FragCoord.xy);
+    }
+#endif
+    colour = vec4(coded(seen), 1.0);
 }

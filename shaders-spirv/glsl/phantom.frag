@@ -8,6 +8,7 @@ layout(push_constant) uniform PhantomBlock {
     vec2 bore;    // screen position at which the bore vanishes
     float recoil; // what recoils is seen so many times as far from there as it rests
     float soft;   // width of an edge, pixels
+    vec4 lit;     // rgb: light of lamps on a white matt thing; a: luminance that the picture shows of one, lit as it is
 } phantom;
 
 // Distance to the nearest edge of what stays, and of what recoils as it rests, in widths of an edge: 0 stands for -2, inside, and 1 for +2.
@@ -29,6 +30,15 @@ float distance_at(vec2 at) {
     return min(both.r, both.g) * 4.0 - 2.0;
 }
 
+// What a real thing throws back (Hughes, Konttinen and Pattanaik 2004, eq. 1: its picture over the light that it was taken in). In the dark the
+// picture shows noise: then it is that of grey paint.
+vec3 albedo(vec3 seen) {
+    const float GREY = 0.18, LEAST = 0.02, MOST = 0.6;
+    const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+    vec3 known = clamp(seen / max(phantom.lit.a, 1e-6), LEAST, MOST);
+    return mix(vec3(GREY), known, smoothstep(0.004, 0.02, dot(seen, LUMINANCE)));
+}
+
 void main() {
     vec2 at = gl_FragCoord.xy;
     float outside = distance_at(at);
@@ -47,5 +57,6 @@ void main() {
             at -= slope * (short_of * phantom.soft / steep);
         }
     }
-    light = vec4(textureLod(picture, (at - phantom.origin) / phantom.size, 0.0).rgb, 1.0) * cover;
+    vec3 seen = textureLod(picture, (at - phantom.origin) / phantom.size, 0.0).rgb;
+    light = vec4(seen + phantom.lit.rgb * albedo(seen), 1.0) * cover;
 }

@@ -56,13 +56,13 @@ vec4 strike(RoundBlock r, vec2 from_middle, float width) {
 // Smoke: a ball that is torn at its edges, and hides by its optical depth.
 vec4 smoke(RoundBlock r, vec2 from_middle, float width, float before) {
     vec2 p = from_middle / width;
-    float squared = dot(p, p);
-    if (squared > 4.0) {
+    float squared = dot(p, p), ends = r.half_width.y * r.half_width.y;
+    if (squared > ends) {
         return vec4(0.0);
     }
     float torn = noise(p * 1.6 + r.seed) * 0.65 + noise(p * 4.1 - r.seed) * 0.35;
-    // Nothing is left at twice the width.
-    float fall = max(exp(-squared) - exp(-4.0), 0.0);
+    // Nothing is left where the puff's rectangle ends.
+    float fall = max(exp(-squared) - exp(-ends), 0.0) / (1.0 - exp(-ends));
     float hides = 1.0 - exp(-r.colour.a * fall * before * clamp(2.6 * torn - 0.5, 0.0, 2.0));
     return vec4(r.colour.rgb * (0.7 + 0.6 * torn) * hides, hides);
 }

@@ -2,6 +2,10 @@
 
 /// Reflection methods and shadow levels.
 pub const METHODS: &str = include_str!("../glsl/water_methods.glsl");
+/// What all drawing shares.
+pub const FRAME: &str = include_str!("../glsl/frame.glsl");
+/// Pools of light.
+pub const POOL: &str = include_str!("../glsl/pool_block.glsl");
 /// The Physics shader.
 pub const PHYSICS: &str = include_str!("../glsl/water_physics.glsl");
 

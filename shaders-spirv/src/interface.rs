@@ -27,6 +27,13 @@ macro_rules! block {
     };
 }
 
+/// Most lamps of a frame.
+pub const LAMPS: usize = crate::glsl::number(crate::glsl::FRAME, "const int LAMPS") as usize;
+/// Rings of a pool of light...
+pub const POOL_RINGS: u32 = crate::glsl::number(crate::glsl::POOL, "const int POOL_RINGS");
+/// ...and its sectors.
+pub const POOL_SECTORS: u32 = crate::glsl::number(crate::glsl::POOL, "const int POOL_SECTORS");
+
 block! {
     /// Light and lens of one frame: `FrameBlock`, set 0, binding 0, std140.
     pub struct FrameBlock {
@@ -48,14 +55,18 @@ block! {
         pub sky: [f32; 4],
         /// The same, seeing only the sea.
         pub sea: [f32; 4],
-        /// Radiance of the horizon.
+        /// Radiance of the horizon; the last is 1 while lamps shine.
         pub horizon: [f32; 4],
         /// The searchlight, camera's axes, metres; the last is how its light falls off its axis, 1/rad^2.
         pub lamp: [f32; 4],
         /// Its axis, camera's axes; the last is the linear radiance of a white matt surface that faces it a metre off, 0 while it is off.
         pub beam: [f32; 4],
-        /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is unused.
+        /// The camera's turn from row to row while a rolling shutter reads, radians about its axes; the last is how many lamps there are.
         pub row_turn: [f32; 4],
+        /// Lamps, camera's axes, metres; the last is the share of light that air takes in a metre.
+        pub lamps: [[f32; 4]; LAMPS],
+        /// Linear radiance of a white matt surface that faces each a metre off; the last is unused.
+        pub lamp_lights: [[f32; 4]; LAMPS],
     }
 }
 
@@ -99,22 +110,36 @@ block! {
 }
 
 block! {
-    /// Cells of the searchlight's grid: `BeamBlock`, push constants.
-    pub struct BeamBlock {
+    /// Cells of the lamps' grid: `LamplightBlock`, push constants.
+    pub struct LamplightBlock {
         /// Column and row of the first one, how many of its row, and nodes of a row.
         pub cells: [i32; 4],
-        /// What a node's haze is multiplied with; the last is pixels from node to node.
-        pub haze: [f32; 4],
-        /// The same of its sea; the last is unused.
-        pub sea: [f32; 4],
+        /// Pixels from node to node.
+        pub cell_px: f32,
     }
 }
 
 block! {
-    /// A node of that grid: `BeamNode`, set 0, binding 10, std430.
-    pub struct BeamNode {
-        /// Light of the air, and of the sea.
-        pub light: [f32; 2],
+    /// A node of that grid: `LamplightNode`, set 0, binding 10, std430.
+    pub struct LamplightNode {
+        /// Light of the air before everything; the last is pixels from node to node.
+        pub air: [f32; 4],
+        /// The same and that of the sea; the last is nodes of a row.
+        pub both: [f32; 4],
+    }
+}
+
+block! {
+    /// A pool of light on the sea: `PoolBlock`, push constants.
+    pub struct PoolBlock {
+        /// Its middle, camera's axes, metres; the last is the lamp's height over it.
+        pub foot: [f32; 4],
+        /// A level unit vector, camera's axes; the last is the pool's radius, metres.
+        pub aside: [f32; 4],
+        /// The level unit vector across that; the last is unused.
+        pub away: [f32; 4],
+        /// Light of the sea for a unit of what falls flat on it; the last is unused.
+        pub light: [f32; 4],
     }
 }
 
@@ -450,6 +475,8 @@ block! {
         pub recoil: f32,
         /// Width of an edge, pixels.
         pub soft: f32,
+        /// Light of lamps on a white matt thing; the last is the luminance that the picture shows of one, lit as it is.
+        pub lit: [f32; 4],
     }
 }
 

@@ -98,12 +98,12 @@ shaders! {
     LIGHT_FRAG = "light.frag";
     /// The same where a hull may stand before it: compares depth.
     LIGHT_HIDDEN_FRAG = "light_hidden.frag";
-    /// A cell of the searchlight's grid.
-    BEAM_VERT = "beam.vert";
-    /// The light of the searchlight on sea and air.
-    BEAM_FRAG = "beam.frag";
-    /// The same where a hull may stand before the sea: looks at depth.
-    BEAM_HIDDEN_FRAG = "beam_hidden.frag";
+    /// A cell of the lamps' grid.
+    LAMPLIGHT_VERT = "lamplight.vert";
+    /// The pool of light about a low lamp's foot on the sea.
+    POOL_VERT = "pool.vert";
+    /// The light of lamps on sea and air.
+    LAMPLIGHT_FRAG = "lamplight.frag";
     /// The own gun and ship in the picture, laid over what was drawn.
     PHANTOM_FRAG = "phantom.frag";
     /// A rectangle of the head-up display.

@@ -13,10 +13,10 @@ use rspirv::{
     spirv::{Decoration, Op, StorageClass, Word},
 };
 use shaders_spirv::interface::{
-    BeamBlock, BeamNode, BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock,
-    HULL_LINE_COLUMNS, HudQuad, LightBlock, LobeBlock, MeshVertex, MirrorBlock, PhantomBlock, PhysicsBlock,
-    PhysicsPublishedBlock, ReflectBlock, RoundBlock, ShadowBlock, TRACK_POINTS, VideoBlock, WATERS_MAX,
-    WakeBlock, WakeHead, WakePoint, WaterBlock,
+    BoatBlock, ContactBlock, DrawBlock, FrameBlock, FullBlock, FullPublishedBlock, HULL_LINE_COLUMNS,
+    HudQuad, LamplightBlock, LamplightNode, LightBlock, LobeBlock, MeshVertex, MirrorBlock, PhantomBlock,
+    PhysicsBlock, PhysicsPublishedBlock, PoolBlock, ReflectBlock, RoundBlock, ShadowBlock, TRACK_POINTS,
+    VideoBlock, WATERS_MAX, WakeBlock, WakeHead, WakePoint, WaterBlock,
 };
 
 /// Name, fields with offsets, and size of one struct of the host.
@@ -37,8 +37,9 @@ const HOST: &[Host] = &[
     ("VideoBlock", VideoBlock::FIELDS, size_of::<VideoBlock>()),
     ("PhantomBlock", PhantomBlock::FIELDS, size_of::<PhantomBlock>()),
     ("LightBlock", LightBlock::FIELDS, size_of::<LightBlock>()),
-    ("BeamBlock", BeamBlock::FIELDS, size_of::<BeamBlock>()),
-    ("BeamNode", BeamNode::FIELDS, size_of::<BeamNode>()),
+    ("LamplightBlock", LamplightBlock::FIELDS, size_of::<LamplightBlock>()),
+    ("LamplightNode", LamplightNode::FIELDS, size_of::<LamplightNode>()),
+    ("PoolBlock", PoolBlock::FIELDS, size_of::<PoolBlock>()),
     ("ShadowBlock", ShadowBlock::FIELDS, size_of::<ShadowBlock>()),
     ("DrawBlock", DrawBlock::FIELDS, size_of::<DrawBlock>()),
     ("LobeBlock", LobeBlock::FIELDS, size_of::<LobeBlock>()),

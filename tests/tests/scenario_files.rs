@@ -58,6 +58,9 @@ message = "Weapons free"
 boat = "hostile"
 struck = true
 stoppage = true
+[[event]]
+at_s = 50
+flare = { bearing_deg = 5, range_m = 400, height_m = 250 }
 [[crew]]
 name = "wolf"
 [[crew.state]]
@@ -133,6 +136,9 @@ const MISTAKES: [(&str, &str, &str, bool); 68] = [
     ("candela = 150000", "candela = 50", "searchlight.candela", true),
     ("beam_deg = 6", "beam = 6", "searchlight.beam", true),
     ("on = true", "on = \"yes\"", "searchlight.on", true),
+    ("flare = { bearing_deg = 5,", "flare = { bearing = 5,", "event[3].flare.bearing", true),
+    ("range_m = 400, height_m = 250", "range_m = 400, height_m = 5", "event[3].flare.height_m", true),
+    ("range_m = 400, height_m = 250", "height_m = 250", "event[3].flare.range_m", true),
     ("lit = true", "lit = false", "crew[1].state[1].next[1].lit", true),
     ("engagement = \"warn\"", "engagement = \"fire\"", "rules.engagement", true),
     ("engagement = \"warn\"\n", "", "rules.engagement", true),
@@ -257,6 +263,7 @@ fn each_table_of_the_schema_has_the_keys_of_the_reader() {
         ("/properties/goals", "[goals]\nxyz = 1\n"),
         ("/properties/call/items", "[[call]]\nxyz = 1\n"),
         ("/properties/event/items", "[[event]]\nxyz = 1\n"),
+        ("/properties/event/items/properties/flare", "[[event]]\nflare = { xyz = 1 }\n"),
         ("/properties/crew/items", "[[crew]]\nxyz = 1\n"),
         ("/properties/crew/items/properties/state/items", "[[crew]]\n[[crew.state]]\nxyz = 1\n"),
         (

@@ -146,7 +146,9 @@ fn printed_pass(plan: &ScenePlan, pass: Pass) -> PrintedPass {
                 }
                 Pass::Wake => "frames with a wake in view, on its pixels only",
                 Pass::Boats => "frames with a boat in view, on its pixels only",
-                Pass::Searchlight => "frames with the searchlight on, on the pixels that it lights",
+                Pass::Lamplight => {
+                    "frames by night with a searchlight, a flare or a fire, on the pixels that it lights"
+                }
                 Pass::Lights => "frames between sunset and sunrise with a light in view",
                 Pass::Rounds => "frames with a tracer, splash or strike in view",
                 Pass::Phantoms => "frames with anything drawn, on the pixels that the own gun and ship hide",

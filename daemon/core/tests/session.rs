@@ -516,6 +516,11 @@ fn the_ships_place_and_time_put_the_sun_where_it_stands() {
 
 /// An orientation and a picture at `now`.
 fn feed(session: &mut Session, now: Time) {
+    feed_late(session, now, MS);
+}
+
+/// The same with a picture that was exposed so many nanoseconds before.
+fn feed_late(session: &mut Session, now: Time, late_ns: i64) {
     session.event(&Event::Imu(ImuSample {
         arrival: now,
         device_time_ns: now.ns(),
@@ -526,7 +531,7 @@ fn feed(session: &mut Session, now: Time) {
     let picture = Picture::new(PixelFormat::Rgb, 64, 48, vec![120u8; 64 * 48 * 3].into()).expect("a picture");
     session.event(&Event::Frame(CameraFrame {
         arrival: now,
-        mid_exposure: now.plus_ns(-MS),
+        mid_exposure: now.plus_ns(-late_ns),
         sequence: (now.ns() / MS) as u32,
         picture,
         jpeg: None,

@@ -16,6 +16,8 @@ use std::{
 use bowwave_core::{
     event::{Picture, PixelFormat},
     frame::{
+        fires::Burning,
+        lamps::LampView,
         scene::{LeftOut, Pass, PassDecision, RoundView, Scene},
         searchlight::SearchlightView,
     },
@@ -24,7 +26,7 @@ use bowwave_core::{
     world::searchlight::SearchlightSpec,
 };
 use bowwave_render::{Completions, DrawRequest, Needs, RenderConfig, Renderer, TimeOuts};
-use glam::{DVec3, Vec3};
+use glam::{DVec2, DVec3, Vec3};
 use rustix::time::{ClockId, clock_gettime};
 
 #[allow(dead_code, clippy::unwrap_used, reason = "each user takes a part; scenes of constants are sound")]
@@ -114,13 +116,37 @@ fn cases((width, height): (u32, u32), models: &[Model]) -> Vec<Case> {
     let spec = SearchlightSpec::default();
     let mut beam = with(off, none, 60.0);
     beam.searchlight = Some(SearchlightView::new(&spec, DVec3::Z, 0.5, 10_000.0));
-    beam.passes[Pass::Searchlight as usize] = PassDecision::Run;
+    beam.passes[Pass::Lamplight as usize] = PassDecision::Run;
     step(
         "boat near, searchlight",
         "boat near",
         "a third of the pixels blended once more, light at each corner of the mesh",
         &beam,
     );
+    let mut lit = beam.clone();
+    let lamp = |at: DVec3, candela: f32, is_high| LampView {
+        at,
+        strength: Vec3::splat(candela / 0.5),
+        extinction_per_m: 3.912 / 10_000.0,
+        is_high,
+    };
+    let fires = [DVec3::new(-15.0, 120.0, 2.0), DVec3::new(30.0, 260.0, 2.0)];
+    lit.lamps = fires.map(|at| lamp(at, 12_700.0, false)).to_vec();
+    lit.lamps.push(lamp(DVec3::new(30.0, 450.0, 280.0), 80_000.0, true));
+    step(
+        "boat near, searchlight, flare, fires",
+        "boat near, searchlight",
+        "all pixels blended twice over, three lamps at each corner of the mesh, 3700 nodes",
+        &lit,
+    );
+    let mut burns = with(off, none, 60.0);
+    let (at, eye) = (burns.boats[0].pose.position + DVec3::Z, burns.camera.position);
+    let wind = DVec2::new(4.0, 1.0);
+    let burning = Burning { boat: 0, since_s: 0.0, wind, eye, visibility_m: 10_000.0, white_cd_m2: 0.5 };
+    burning.puffs(60.0, |_| Some(at), &mut burns.rounds);
+    burns.rounds.sort_by(|a, b| b.place().distance(eye).total_cmp(&a.place().distance(eye)));
+    burns.passes[Pass::Rounds as usize] = PassDecision::Run;
+    step("boat near, on fire", "boat near", "46 puffs, each over those behind it", &burns);
     for (name, method, why) in [
         ("mirror", ReflectionMethod::Mirror, "the mesh mirrored, once a pixel of water"),
         (
@@ -226,7 +252,7 @@ impl Running {
             needs: Needs {
                 boats_max: scene.boats.len(),
                 lights_max: scene.lights.len(),
-                searchlight: scene.searchlight.is_some(),
+                lamps: scene.runs(Pass::Lamplight),
                 rounds_max: scene.rounds.len(),
                 wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
                 waters: water.into_iter().collect(),

@@ -88,7 +88,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         needs: Needs {
             boats_max: 8,
             lights_max: 0,
-            searchlight: scene.searchlight.is_some(),
+            lamps: scene.runs(bowwave_core::frame::scene::Pass::Lamplight),
             rounds_max: 8 + PUFFS_A_BOAT,
             wakes_max: 8,
             waters: vec![(method, scene.water.shadow)],

@@ -1,7 +1,7 @@
 //! Configuration of a renderer, and how it follows from a scene's plan: one that can draw just that.
 
 use bowwave_core::{
-    frame::{plan::ScenePlan, scene::Pass},
+    frame::{lamps::LAMPS_MAX, plan::ScenePlan, scene::Pass},
     geometry::Optics,
     own_ship::Phantoms,
     session::{LIGHTS_A_BOAT, ROUNDS_SEEN_MAX},
@@ -20,8 +20,8 @@ pub struct Needs {
     pub rounds_max: usize,
     /// Most navigation lights in one frame.
     pub lights_max: usize,
-    /// The gun has a searchlight.
-    pub searchlight: bool,
+    /// A searchlight, flares or fires may be asked for.
+    pub lamps: bool,
     /// Most boats in one frame that leave a wake.
     pub wakes_max: usize,
     /// How the sea may have to mirror.
@@ -80,8 +80,8 @@ impl RenderConfig {
             needs: Needs {
                 boats_max: only(Pass::Boats, plan.boats),
                 wakes_max: only(Pass::Wake, plan.moving),
-                lights_max: only(Pass::Lights, LIGHTS_A_BOAT * plan.boats),
-                searchlight: plan.has(Pass::Searchlight),
+                lights_max: only(Pass::Lights, LIGHTS_A_BOAT * plan.boats + LAMPS_MAX),
+                lamps: plan.has(Pass::Lamplight),
                 rounds_max: only(Pass::Rounds, ROUNDS_SEEN_MAX),
                 waters,
                 optics: plan.optics,

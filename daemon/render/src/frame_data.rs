@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use ash::vk;
-use bowwave_core::frame::searchlight::BEAM_NODES_MAX;
+use bowwave_core::frame::lamplight::NODES_MAX;
 use bytemuck::Pod;
 use shaders_spirv::interface::{
-    BOAT_BLOCKS_MAX, BeamNode, BoatBlock, FrameBlock, HudQuad, LobeBlock, MethodBytes, PHYSICS_WAVES,
+    BOAT_BLOCKS_MAX, BoatBlock, FrameBlock, HudQuad, LamplightNode, LobeBlock, MethodBytes, PHYSICS_WAVES,
     RoundBlock, WATERS_MAX, WakeBlock, WaterBlock,
 };
 
@@ -40,8 +40,8 @@ pub(crate) struct Capacity {
     pub(crate) lobes: usize,
     /// Navigation lights.
     pub(crate) lights: usize,
-    /// A searchlight may be asked for.
-    pub(crate) searchlight: bool,
+    /// Lamps may be asked for: a searchlight, flares, fires.
+    pub(crate) lamps: bool,
     /// Boats that leave a wake.
     pub(crate) wakes: usize,
 }
@@ -91,7 +91,7 @@ impl FrameData {
             size_of::<WakeBlock>() * capacity.wakes.max(1),
             size_of::<MethodBytes>() * WATERS_MAX,
             size_of::<[f32; 4]>() * PHYSICS_WAVES,
-            size_of::<BeamNode>() * if capacity.searchlight { BEAM_NODES_MAX } else { 1 },
+            size_of::<LamplightNode>() * if capacity.lamps { NODES_MAX } else { 1 },
         ];
         let mut end = 0;
         let regions = sizes.map(|size| {
@@ -154,8 +154,8 @@ impl FrameData {
         self.write(9, waves);
     }
 
-    /// Light at the nodes of the searchlight's grid.
-    pub(crate) fn write_beam(&mut self, nodes: &[BeamNode]) {
+    /// Light at the nodes of the lamps' grid.
+    pub(crate) fn write_lamplight(&mut self, nodes: &[LamplightNode]) {
         self.write(10, nodes);
     }
 

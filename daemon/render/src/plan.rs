@@ -24,9 +24,10 @@ use crate::{
             coverage::{Boxes, Cells},
         },
         hud::layout::KINDS,
+        lamplight::plan::LamplightPlan,
         lights::plan::{Mirror, light_block, mirrored_block},
+        phantoms::PhantomLook,
         rounds::plan::round_block,
-        searchlight::plan::BeamPlan,
         shadow::plan::ShadowPlan,
         wake::{
             WakeDraw,
@@ -58,6 +59,8 @@ const MIRRORED_DETAIL: f64 = 1.0;
 /// Most rectangles for all hulls together, and for one boat's water.
 const HULL_RECTS_MAX: usize = 512;
 const WATER_RECTS_MAX: usize = 256;
+/// Rounds in the air that are cut apart by hulls' own cells.
+const ROUNDS_FEW: usize = 16;
 /// Most rectangles that are copied to be blended into, and back.
 const BLENDS_MAX: usize = 512;
 
@@ -114,14 +117,16 @@ pub(crate) struct Plan {
     pub(crate) reflects: Vec<ReflectDraw>,
     pub(crate) wake_blocks: Vec<WakeBlock>,
     pub(crate) wakes: Vec<WakeDraw>,
-    pub(crate) beam: BeamPlan,
+    pub(crate) lamplight: LamplightPlan,
     pub(crate) lights: Vec<HullPiece<LightBlock>>,
     /// Mirrored ones, each with the number of its boat in `mirrors`.
     pub(crate) mirror_lights: Vec<(usize, LightBlock)>,
     pub(crate) rounds: Vec<HullPiece<DrawBlock>>,
     /// Pixels that hulls can cover, each once.
     pub(crate) hulls: Vec<PixelRect>,
-    /// The same for clearing.
+    /// Pixels where the boats' depth is known, each once: those of `hulls`, or, where much is drawn before and behind them, one rectangle about all.
+    known: Vec<PixelRect>,
+    /// Rectangles of `hulls`, for clearing.
     pub(crate) clears: Vec<vk::ClearRect>,
     /// Pixels beside hulls whose depth alone is asked for.
     pub(crate) depth_clears: Vec<vk::ClearRect>,
@@ -133,8 +138,8 @@ pub(crate) struct Plan {
     pub(crate) rects: Vec<PixelRect>,
     /// What of the video the water's shader compares.
     pub(crate) backdrop_regions: Vec<vk::ImageCopy>,
-    /// Recoil of phantoms, where they hide something of it.
-    pub(crate) phantoms: Option<f32>,
+    /// Phantoms' recoil and light, where they hide something of it or lamps light them.
+    pub(crate) phantoms: Option<PhantomLook>,
     /// Plates, shapes and glyphs of the head-up display that are drawn over the frame.
     pub(crate) quads: [u32; KINDS],
     /// Texels of the video pass that take the display from its layer instead, all others, and what is drawn anew in the layer.
@@ -154,7 +159,7 @@ pub(crate) struct Plan {
 
 impl Plan {
     pub(crate) fn with_capacity(capacity: Capacity, size: (u32, u32)) -> Self {
-        let Capacity { boats, lights, searchlight, rounds, lobes, wakes } = capacity;
+        let Capacity { boats, lights, lamps, rounds, lobes, wakes } = capacity;
         let touched =
             2 * HULL_RECTS_MAX + RECTS_MAX + lobes * WATER_RECTS_MAX + lights + rounds + wakes * TRACK_POINTS;
         // With the display's plates.
@@ -177,11 +182,12 @@ impl Plan {
             waves: (lobes > 0).then(Waves::new),
             wake_blocks: Vec::with_capacity(wakes),
             wakes: Vec::with_capacity(wakes),
-            beam: if searchlight { BeamPlan::new(size) } else { BeamPlan::default() },
+            lamplight: if lamps { LamplightPlan::new(size) } else { LamplightPlan::default() },
             lights: Vec::with_capacity(lights * 4),
             mirror_lights: Vec::with_capacity(lights),
             rounds: Vec::with_capacity(rounds * 4),
             hulls: Vec::with_capacity(HULL_RECTS_MAX),
+            known: Vec::with_capacity(HULL_RECTS_MAX),
             clears: Vec::with_capacity(HULL_RECTS_MAX),
             depth_clears: Vec::with_capacity(HULL_RECTS_MAX),
             // The boat that is one too many is found once its strips are written.
@@ -204,8 +210,16 @@ impl Plan {
     }
 
     /// Decides anew for `scene` on a screen of `size` with a mirror layer of `atlas` texels.
-    pub(crate) fn make(&mut self, scene: &Scene, models: &[Outline], size: (u32, u32), atlas: (u32, u32)) {
+    /// `lit` are pixels of real things that lamps light.
+    pub(crate) fn make(
+        &mut self,
+        scene: &Scene,
+        models: &[Outline],
+        (size, atlas): ((u32, u32), (u32, u32)),
+        lit: &[PixelRect],
+    ) {
         self.clear();
+        self.touched.extend_from_slice(lit);
         if scene.runs(Pass::Shadow) {
             self.shadows.make(scene, |id| models.get(usize::from(id.0)).map(|outline| &outline.model));
         }
@@ -218,8 +232,8 @@ impl Plan {
         if scene.runs(Pass::Wake) {
             self.plan_wakes(scene);
         }
-        if let Some(view) = scene.searchlight.as_ref().filter(|_| scene.runs(Pass::Searchlight)) {
-            self.beam.make(scene, view, &self.hulls, (&mut self.rest, &mut self.touched));
+        if scene.runs(Pass::Lamplight) {
+            self.lamplight.make(scene, &mut self.touched);
         }
         if scene.runs(Pass::Lights) {
             self.plan_lights(scene);
@@ -249,11 +263,12 @@ impl Plan {
         self.physics = None;
         self.wake_blocks.clear();
         self.wakes.clear();
-        self.beam.clear();
+        self.lamplight.clear();
         self.lights.clear();
         self.mirror_lights.clear();
         self.rounds.clear();
         self.hulls.clear();
+        self.known.clear();
         self.clears.clear();
         self.depth_clears.clear();
         self.list.clear();
@@ -318,6 +333,13 @@ impl Plan {
             self.depth_clears.extend(self.outside.iter().map(clear));
         }
         self.touched.extend_from_slice(&self.rest);
+        self.known.extend_from_slice(&self.hulls);
+        // Puffs of smoke that are cut apart by each hull's cells cost more than a depth that is cleared farther out.
+        if let Some(around) = around.filter(|_| scene.rounds.len() > ROUNDS_FEW) {
+            self.known.clear();
+            self.known.push(around);
+            self.depth_clears.push(clear(&around));
+        }
     }
 
     /// Boats whose waterline cannot be placed on the screen have no reflection.
@@ -394,7 +416,7 @@ impl Plan {
                     let number = self.mirror_places.len();
                     let top_m = boat.pose.position.z + f64::from(model.max.z) - boat.water_level;
                     let mirror = Mirror { water_level: boat.water_level, top_m, placed: &placed };
-                    let own = scene.lights.iter().filter(|light| light.boat == boat.boat);
+                    let own = scene.lights.iter().filter(|light| light.boat == Some(boat.boat));
                     let blocks = own.filter_map(|light| mirrored_block(scene, light, &mirror));
                     self.mirror_lights.extend(blocks.map(|block| (number, block)));
                 }
@@ -456,13 +478,8 @@ impl Plan {
             let Some((block, rect)) = light_block(scene, light) else { continue };
             self.touched.push(rect);
             let lights = &mut self.lights;
-            pieces(rect, &self.hulls, &mut self.rest, |rect, hidden| {
-                lights.push(HullPiece {
-                    rect,
-                    hidden,
-                    instances: 1,
-                    block: LightBlock { rect: corners(rect), ..block },
-                });
+            pieces(rect, &self.known, &mut self.rest, |rect, hidden| {
+                lights.push(HullPiece { rect, hidden, block: LightBlock { rect: corners(rect), ..block } });
             });
         }
     }
@@ -476,11 +493,10 @@ impl Plan {
             self.round_blocks.push(block);
             self.touched.push(rect);
             let rounds = &mut self.rounds;
-            pieces(rect, &self.hulls, &mut self.rest, |rect, hidden| {
+            pieces(rect, &self.known, &mut self.rest, |rect, hidden| {
                 rounds.push(HullPiece {
                     rect,
                     hidden,
-                    instances: 1,
                     block: DrawBlock { rect: corners(rect), index, first: 0 },
                 });
             });

@@ -9,6 +9,7 @@ use bowwave_core::{
     model::Model,
     water::{ReflectionMethod, Water},
 };
+use glam::Vec3;
 
 use crate::{
     config::{Needs, RenderConfig},
@@ -19,8 +20,9 @@ use crate::{
     passes::{
         PassContext,
         all::Passes,
+        lamplight::plan::on_own_ship,
         mirror::MirrorPass,
-        phantoms::PhantomPass,
+        phantoms::{PhantomLook, PhantomPass},
         shadow::ShadowPass,
         video::pictures::{PictureCounts, PicturePath},
         water::{WaterPass, baked::LobeDraws},
@@ -111,14 +113,14 @@ impl<T> Renderer<T> {
             words: shared.target(0).words,
             slots: count,
             optics: config.needs.optics,
-            searchlight: config.needs.searchlight,
+            lamps: config.needs.lamps,
         };
         let passes = Passes::new(&context, config, models)?;
         let needs = config.needs.clone();
         let capacity = Capacity {
             boats: needs.boats_max,
             lights: needs.lights_max,
-            searchlight: needs.searchlight,
+            lamps: needs.lamps,
             rounds: needs.rounds_max,
             lobes: needs.lobes(),
             wakes: needs.wakes_max,
@@ -235,8 +237,8 @@ impl<T> Renderer<T> {
         if scene.lights.len() > self.needs.lights_max {
             return missing("more navigation lights");
         }
-        if scene.runs(Pass::Searchlight) && !self.needs.searchlight {
-            return missing("a searchlight");
+        if scene.runs(Pass::Lamplight) && !self.needs.lamps {
+            return missing("lamps");
         }
         if scene.runs(Pass::Wake)
             && scene.boats.iter().filter(|b| b.wake.is_some()).count() > self.needs.wakes_max
@@ -254,7 +256,11 @@ impl<T> Renderer<T> {
     fn prepare(&mut self, index: usize, scene: &Scene) {
         let Some(slot) = self.slots.get_mut(index) else { return };
         let size = self.shared.size;
-        self.plan.make(scene, &self.models, size, MirrorPass::layer_size(size));
+        let phantoms = self.passes.phantoms.as_ref().filter(|_| scene.runs(Pass::Phantoms));
+        let lit = if scene.runs(Pass::Lamplight) { on_own_ship(scene) } else { Vec3::ZERO };
+        let is_lit = lit != Vec3::ZERO;
+        let lit_rects = phantoms.filter(|_| is_lit).map_or(&[][..], PhantomPass::rects);
+        self.plan.make(scene, &self.models, (size, MirrorPass::layer_size(size)), lit_rects);
         let plan = &mut self.plan;
         slot.data.write_frame(&view::frame_block(scene));
         slot.data.write_boats(&plan.boat_blocks);
@@ -266,14 +272,13 @@ impl<T> Renderer<T> {
         }
         slot.data.write_wakes(&plan.wake_blocks);
         slot.data.write_rounds(&plan.round_blocks);
-        slot.data.write_beam(&plan.beam.nodes);
+        slot.data.write_lamplight(&plan.lamplight.nodes);
         slot.data.write_rects(&plan.list);
-        let phantoms = self.passes.phantoms.as_ref().filter(|_| scene.runs(Pass::Phantoms));
         if self.shared.next_value() == 1 {
             // The first frame lets drivers finish compiling, whatever lies before the phantoms in it.
-            plan.rects.extend(phantoms.and_then(PhantomPass::first_rect));
+            plan.rects.extend(phantoms.and_then(|pass| pass.rects().first().copied()));
         }
-        plan.phantoms = phantoms.filter(|pass| pass.hide(&plan.rects)).map(|_| scene.recoil as f32);
+        plan.phantoms = phantoms.filter(|pass| pass.hide(&plan.rects)).map(|_| PhantomLook::of(scene, lit));
         (plan.quads, plan.renewed) = Default::default();
         let mut covered = true;
         if scene.runs(Pass::Hud) {
@@ -400,8 +405,8 @@ impl<T> Renderer<T> {
         steps.record(to);
     }
 
-    /// The phantoms' pass and their recoil, where they hide something.
-    fn phantoms(&self) -> Option<(&PhantomPass, f32)> {
+    /// The phantoms' pass and their look, where they hide something or are lit.
+    fn phantoms(&self) -> Option<(&PhantomPass, PhantomLook)> {
         self.passes.phantoms.as_ref().zip(self.plan.phantoms)
     }
 
@@ -447,9 +452,7 @@ impl<T> Renderer<T> {
     fn record_blends(&self, &FrameRecording { to, ref stamps, frame, target, how }: &FrameRecording<'_>) {
         let plan = &self.plan;
         let water = self.passes.water.as_ref().filter(|_| !plan.waters.is_empty());
-        if !target.begin_light(to, &plan.rects) {
-            return;
-        }
+        let Some(area) = target.begin_light(to, &plan.rects) else { return };
         if let Some(pass) = water {
             stamps.around(Span::Water, || {
                 pass.record(to, frame, how, &plan.waters);
@@ -461,14 +464,15 @@ impl<T> Renderer<T> {
         if let Some(pass) = self.passes.wake.as_ref().filter(|_| !plan.wakes.is_empty()) {
             stamps.around(Span::Wake, || pass.record(to, frame, &plan.wakes));
         }
+        if let Some(pass) = self.passes.lamplight.as_ref().filter(|_| !plan.lamplight.cells.is_empty()) {
+            stamps.around(Span::Lamplight, || pass.record(to, frame, &plan.lamplight));
+            to.scissor(area);
+        }
         if let Some(pass) = self.passes.boats.as_ref().filter(|_| !plan.boats.is_empty()) {
             stamps.around(Span::Composite, || pass.record_composite(to, frame, plan.hulls.len() as u32));
         }
         if let Some(pass) = self.passes.wake.as_ref().filter(|_| plan.wakes.iter().any(|w| w.spray)) {
             stamps.around(Span::Spray, || pass.record_spray(to, frame, &plan.wakes));
-        }
-        if let Some(pass) = self.passes.searchlight.as_ref().filter(|_| !plan.beam.pieces.is_empty()) {
-            stamps.around(Span::Searchlight, || pass.record(to, frame, &plan.beam.pieces));
         }
         if let Some(pass) = self.passes.lights.as_ref().filter(|_| !plan.lights.is_empty()) {
             stamps.around(Span::Lights, || pass.record(to, frame, &plan.lights));
@@ -476,8 +480,8 @@ impl<T> Renderer<T> {
         if let Some(pass) = self.passes.rounds.as_ref().filter(|_| !plan.rounds.is_empty()) {
             stamps.around(Span::Rounds, || pass.record(to, frame, &plan.rounds));
         }
-        if let Some((pass, recoil)) = self.phantoms() {
-            stamps.around(Span::Phantoms, || pass.record(to, &plan.rects, recoil));
+        if let Some((pass, look)) = self.phantoms() {
+            stamps.around(Span::Phantoms, || pass.record(to, &plan.rects, &look));
         }
         if plan.quads != [0; 3] {
             stamps.around(Span::Hud, || self.passes.hud.record(to, frame, plan.quads));

@@ -126,16 +126,16 @@ impl DrawTarget {
         (self.size.0 / self.words.run, self.size.1)
     }
 
-    /// Begins to blend linear light within the rectangles; `false` where there are none.
-    pub(crate) fn begin_light(&self, to: CommandEncoder<'_>, rects: &[PixelRect]) -> bool {
-        let Some(area) = rects.iter().copied().reduce(joined) else { return false };
+    /// Begins to blend linear light within the rectangles; the area that holds all of them, `None` where there are none.
+    pub(crate) fn begin_light(&self, to: CommandEncoder<'_>, rects: &[PixelRect]) -> Option<PixelRect> {
+        let area = rects.iter().copied().reduce(joined)?;
         let view = match &self.pixels {
             Pixels::Device(image) => image.second_view,
             Pixels::Host(images) => images.images[1].view,
         };
         to.begin(area, Colour { layout: GENERAL.2, ..Colour::new(view, Begin::Keep) }, None);
         to.window([0.0, 0.0, self.size.0 as f32, self.size.1 as f32], area);
-        true
+        Some(area)
     }
 
     /// Copies parts of it to the same place of another image.

@@ -33,6 +33,8 @@ pub fn empty_scene(width: u32, height: u32) -> Scene {
         boats: Vec::new(),
         rounds: Vec::new(),
         lights: Vec::new(),
+        lamps: Vec::new(),
+        flash: None,
         searchlight: None,
         recoil: 1.0,
         light: Light {

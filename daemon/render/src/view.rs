@@ -4,14 +4,14 @@
 use bowwave_core::{
     estimate::light::Light,
     frame::{
-        scene::{BoatView, Scene},
+        scene::{BoatView, Pass, Scene},
         view::NEAR_M,
     },
     geometry::{CameraPose, Distortion, Lens, RigidPose, horizon_dip},
     model::ModelKind,
 };
 use glam::{DMat3, DQuat, DVec3, DVec4, Vec3};
-use shaders_spirv::interface::{BoatBlock, FrameBlock};
+use shaders_spirv::interface::{BoatBlock, FrameBlock, LAMPS};
 
 /// Lens and light.
 pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
@@ -23,6 +23,12 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         let matt = light.strength * std::f64::consts::FRAC_1_PI;
         (light.lamp.extend(light.sharpness).as_vec4(), light.axis.extend(matt).as_vec4())
     });
+    let (mut lamps, mut lamp_lights) = ([[0.0; 4]; LAMPS], [[0.0; 4]; LAMPS]);
+    for (i, lamp) in scene.lamps.iter().take(LAMPS).enumerate() {
+        let at = scene.camera.to_camera(lamp.at);
+        lamps[i] = at.extend(lamp.extinction_per_m).as_vec4().to_array();
+        lamp_lights[i] = light(lamp.strength * std::f32::consts::FRAC_1_PI);
+    }
     FrameBlock {
         focal: pair(lens.focal),
         centre: pair(lens.centre),
@@ -33,10 +39,12 @@ pub(crate) fn frame_block(scene: &Scene) -> FrameBlock {
         sun: light(sun),
         sky: light(sky),
         sea: light(sea),
-        horizon: light(horizon),
+        horizon: horizon.extend(f32::from(u8::from(scene.runs(Pass::Lamplight)))).to_array(),
         lamp: lamp.to_array(),
         beam: beam.to_array(),
-        row_turn: lens.row_turn.extend(0.0).as_vec4().to_array(),
+        row_turn: lens.row_turn.extend(scene.lamps.len().min(LAMPS) as f64).as_vec4().to_array(),
+        lamps,
+        lamp_lights,
     }
 }
 

@@ -76,10 +76,10 @@ fn check(method: ReflectionMethod) {
         RoundView::Splash { at, height_m: 4.0, radius_m: 0.9, opacity: 1.0 },
         RoundView::Tracer { from: DVec3::new(1.0, 8.0, 7.5), to: at, radiance: Vec3::splat(4.0) },
     ];
-    scene.lights = vec![LightView { boat: 0, at: at + DVec3::Z, light: Vec3::splat(1e-4) }];
+    scene.lights = vec![LightView { boat: Some(0), at: at + DVec3::Z, light: Vec3::splat(1e-4) }];
     let spec = SearchlightSpec { candela: 200_000.0, beam: 0.15, is_on: true };
     scene.searchlight = Some(SearchlightView::new(&spec, DVec3::Z, 10.0, 5_000.0));
-    for pass in [Pass::Searchlight, Pass::Lights, Pass::Rounds] {
+    for pass in [Pass::Lamplight, Pass::Lights, Pass::Rounds] {
         scene.passes[pass as usize] = PassDecision::Run;
     }
     // The validation layer allocates for itself, in this thread.

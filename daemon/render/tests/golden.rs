@@ -16,6 +16,7 @@ use bowwave_core::{
     fault::Fault,
     frame::{
         fires::Burning,
+        lamps::LampView,
         scene::{LightView, Pass, PassDecision, RoundView, Scene, Status},
         searchlight::SearchlightView,
     },
@@ -288,7 +289,7 @@ fn lights_before_and_behind_a_hull_and_in_the_sea() {
         dark(&mut scene);
         let pose = scene.boats[0].pose;
         let light = |boat, place: DVec3, colour: Vec3| LightView {
-            boat,
+            boat: Some(boat),
             at: pose.to_world(place),
             light: colour * 3e-4,
         };
@@ -313,7 +314,7 @@ fn a_searchlight_on_boats_sea_and_air() {
         let spec = SearchlightSpec { candela: 200_000.0, beam: 0.25, is_on: true };
         let towards = scene.camera.to_camera(scene.boats[0].pose.position).normalize();
         scene.searchlight = Some(SearchlightView::new(&spec, towards, 40.0, 2_000.0));
-        scene.passes[Pass::Searchlight as usize] = PassDecision::Run;
+        scene.passes[Pass::Lamplight as usize] = PassDecision::Run;
         check_on(name, &scene, &dark_sea(), &models());
     }
 }
@@ -335,6 +336,36 @@ fn a_boat_burns() {
         scene.rounds.sort_by(|a, b| b.place().distance(eye).total_cmp(&a.place().distance(eye)));
         scene.passes[Pass::Rounds as usize] = PassDecision::Run;
         check_on(name, &scene, &picture, &models());
+    }
+}
+
+/// By night a flare behind the boats, and then a fire on one of them, light boats, their mirror images, the sea and the air.
+#[test]
+fn a_flare_and_a_fire_light_what_is_around_them() {
+    for (name, white_cd_m2) in [("flare", 4.0), ("firelight", 20.0)] {
+        let mut scene = boats(ReflectionMethod::Baked, ShadowLevel::None, 1);
+        dark(&mut scene);
+        let eye = scene.camera.position;
+        let pose = scene.boats[0].pose;
+        let extinction_per_m = 3.912 / 5_000.0;
+        if name == "flare" {
+            let strength = Vec3::splat((80_000.0 / white_cd_m2) as f32);
+            let lamp =
+                LampView { at: DVec3::new(30.0, 180.0, 90.0), strength, extinction_per_m, is_high: true };
+            scene.lamps = vec![lamp];
+        } else {
+            let (wind, since_s) = (DVec2::new(3.0, -1.0), 0.0);
+            let burning = Burning { boat: 0, since_s, wind, eye, visibility_m: 5_000.0, white_cd_m2 };
+            let at = pose.position + DVec3::Z;
+            burning.puffs(40.0, |_| Some(at), &mut scene.rounds);
+            scene.rounds.sort_by(|a, b| b.place().distance(eye).total_cmp(&a.place().distance(eye)));
+            scene.passes[Pass::Rounds as usize] = PassDecision::Run;
+            let strength = Burning::colour() * (burning.candela(40.0) / white_cd_m2) as f32;
+            let at = at + DVec3::Z * (0.5 * burning.flame_height_m(40.0));
+            scene.lamps = vec![LampView { at, strength, extinction_per_m, is_high: false }];
+        }
+        scene.passes[Pass::Lamplight as usize] = PassDecision::Run;
+        check_on(name, &scene, &dark_sea(), &models());
     }
 }
 

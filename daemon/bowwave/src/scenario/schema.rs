@@ -302,13 +302,28 @@ fn event() -> Value {
             ("rules", engagement("Rules of engagement from then on")),
             ("stoppage", flag("The weapon stops with its next round")),
             ("message", message),
+            ("flare", flare()),
         ],
         &[],
     );
     event["oneOf"] = json!([{ "required": ["at_s"] }, { "required": ["within_m", "boat"] }, { "required": ["struck", "boat"] }]);
-    event["anyOf"] =
-        json!([{ "required": ["rules"] }, { "required": ["stoppage"] }, { "required": ["message"] }]);
+    event["anyOf"] = json!([{ "required": ["rules"] }, { "required": ["stoppage"] }, { "required": ["message"] }, { "required": ["flare"] }]);
     event
+}
+
+fn flare() -> Value {
+    table(
+        "An illuminating flare under a parachute is lit; by night it lights all that is about it",
+        vec![
+            ("bearing_deg", angle("Bearing of the place under it, clockwise from north")),
+            ("range_m", number(1.0, 20_000.0, "Distance of that place from the camera")),
+            ("height_m", number(10.0, 2000.0, "Height over the sea")),
+            ("candela", number(100.0, 5e6, "Luminous intensity")),
+            ("burns_s", number(1.0, 600.0, "Time that it burns")),
+            ("falls_m_s", number(0.0, 50.0, "Speed at which it sinks")),
+        ],
+        &["bearing_deg", "range_m"],
+    )
 }
 
 fn crew() -> Value {
@@ -401,6 +416,7 @@ fn boat() -> Value {
                     "Its lights by night: of what it does (rules, where it is neutral), off (else), or always the same",
                 ),
             ),
+            ("burns_at_s", number(0.0, 86_400.0, "On fire from then on, without being hit")),
             ("count", whole(1, 40, "Boats of the group")),
             ("axes_deg", axes()),
             ("on_target_s", number(1.0, 86_400.0, "When they are to be where they attack from")),

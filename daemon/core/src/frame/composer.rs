@@ -6,6 +6,7 @@ use glam::{DQuat, DVec3, Vec3};
 
 use super::{
     boats::{boats_in_view, nearest_m},
+    lamps::{FlashView, LAMPS_MAX, LampView, flares_in_view, flash_at, lamps_at, muzzle_px},
     lights::lights_in_view,
     plan::{InView, SceneNeeds, ScenePlan, sea_reflects},
     rounds::{ROUNDS_SEEN_MAX, rounds_in_view},
@@ -21,7 +22,7 @@ use crate::{
     fault::{Fault, FirePermission, NotScored},
     geometry::{CameraPose, Lens, RigidPose, look},
     model::{Model, ModelId},
-    own_ship::OwnShip,
+    own_ship::{OwnShip, Phantom},
     time::Time,
     world::{
         LastResult, RESULT_S, World,
@@ -86,6 +87,8 @@ pub struct Composer {
     eye_height_m: f64,
     /// The barrel, camera's axes.
     bore: DVec3,
+    /// The muzzle as the camera sees it, its axes; `None` where no outline of the gun is known.
+    muzzle: Option<DVec3>,
     models: Arc<[Model]>,
     boat_models: Vec<ModelId>,
     black: Picture,
@@ -109,6 +112,8 @@ impl Composer {
             phantoms: own_ship.phantoms.on_screen(&calibration.lens, &screen_lens),
             ..SceneNeeds::of_scenario(scenario)
         });
+        let muzzle = plan.phantoms.parts.iter().filter(|part| part.recoils).map(Phantom::outline);
+        let muzzle = muzzle_px(muzzle, plan.phantoms.bore);
         let light = estimator.light();
         let camera =
             CameraPose { world_from_camera: DQuat::IDENTITY, position: DVec3::Z * scenario.eye_height_m };
@@ -121,6 +126,8 @@ impl Composer {
             boats: Vec::with_capacity(scenario.boats.len()),
             rounds: Vec::with_capacity(2 * ROUNDS_SEEN_MAX),
             lights: Vec::new(),
+            lamps: Vec::with_capacity(LAMPS_MAX),
+            flash: None,
             searchlight: None,
             recoil: 1.0,
             light: light.boats,
@@ -137,6 +144,7 @@ impl Composer {
             visibility_m: scenario.daylight.visibility_m,
             eye_height_m: scenario.eye_height_m,
             bore: calibration.bore_in_camera(),
+            muzzle: muzzle.map(|px| screen_lens.unproject(px).normalize()),
             models: Arc::clone(models),
             boat_models: boat_models.to_vec(),
             black,
@@ -193,7 +201,8 @@ impl Composer {
         let scene = &mut self.scene;
         scene.boats.clear();
         scene.lights.clear();
-        scene.searchlight = None;
+        scene.lamps.clear();
+        (scene.searchlight, scene.flash) = (None, None);
         scene.recoil = 1.0;
         scene.rounds.clear();
         scene.passes = self.plan.frame(&InView::default());
@@ -213,7 +222,9 @@ impl Composer {
         (scene.wind, scene.water.force) = estimator.wind();
         scene.boats.clear();
         scene.lights.clear();
+        scene.lamps.clear();
         scene.rounds.clear();
+        scene.flash = None;
         let light = estimator.light();
         if let (Some(camera), Some(running)) = (&camera, world.running()) {
             scene.camera = *camera;
@@ -237,13 +248,21 @@ impl Composer {
                 ..frustum
             };
             boats_in_view(&running.fleet, &frustum, time, running.start, &mut scene.boats);
-            if self.plan.has(Pass::Lights) && estimator.luminaries().is_between_sunset_and_sunrise() {
-                let moment = (time, light.white_cd_m2);
+            let moment = (time, light.white_cd_m2);
+            let is_night = estimator.luminaries().is_between_sunset_and_sunrise();
+            if self.plan.has(Pass::Lights) && is_night {
                 lights_in_view(running, &frustum, moment, &scene.boats, &mut scene.lights);
             }
-            rounds_in_view(running, &frustum, (time, light.white_cd_m2), &mut scene.rounds);
+            rounds_in_view(running, &frustum, moment, &mut scene.rounds);
+            if self.plan.has(Pass::Lamplight) && is_night {
+                lamps_at(running, &frustum, moment, &mut scene.lamps);
+                flares_in_view(&scene.lamps, &frustum, &mut scene.lights);
+                let muzzle = self.muzzle.filter(|_| self.plan.has(Pass::Rounds));
+                scene.flash =
+                    muzzle.and_then(|to| flash_at(running, &frustum, moment, to, &mut scene.rounds));
+            }
         }
-        let shining = world.searchlight().filter(|_| self.plan.has(Pass::Searchlight));
+        let shining = world.searchlight().filter(|_| self.plan.has(Pass::Lamplight));
         scene.searchlight =
             shining.map(|spec| SearchlightView::new(spec, self.bore, light.white_cd_m2, self.visibility_m));
         scene.recoil = estimator.recoil();
@@ -251,7 +270,7 @@ impl Composer {
         scene.passes = self.plan.frame(&InView {
             pose_known: camera.is_some(),
             sun_shines: scene.light.sun_shines(),
-            searchlight: scene.searchlight.is_some(),
+            lamps: scene.searchlight.is_some() || !scene.lamps.is_empty(),
             boats: &scene.boats,
             lights: &scene.lights,
             rounds: &scene.rounds,
@@ -306,7 +325,7 @@ impl Composer {
             Vec::new()
         };
         let on = |view: &BoatView| LightView {
-            boat: view.boat,
+            boat: Some(view.boat),
             at: view.pose.position + DVec3::Z,
             light: Vec3::splat(1e-6),
         };
@@ -314,18 +333,26 @@ impl Composer {
             if self.plan.has(Pass::Lights) { boats.iter().map(on).collect() } else { Vec::new() };
         let searchlight = self
             .plan
-            .has(Pass::Searchlight)
+            .has(Pass::Lamplight)
             .then(|| SearchlightView::new(&SearchlightSpec::default(), self.bore, 1.0, self.visibility_m));
         let in_view = InView {
             pose_known: true,
             sun_shines: true,
-            searchlight: searchlight.is_some(),
+            lamps: searchlight.is_some(),
             boats: &boats,
             lights: &lights,
             rounds: &rounds,
         };
         let passes = self.plan.frame(&in_view);
-        Scene { camera, passes, boats, lights, searchlight, rounds, ..self.scene.clone() }
+        let (strength, extinction_per_m) = (Vec3::splat(1e-3), 1e-4);
+        let lamp = |at: DVec3, is_high| LampView { at, strength, extinction_per_m, is_high };
+        let lamps = if self.plan.has(Pass::Lamplight) {
+            vec![lamp(at, false), lamp(at + DVec3::Z * 50.0, true)]
+        } else {
+            Vec::new()
+        };
+        let flash = self.muzzle.map(|_| FlashView { on_gun: strength });
+        Scene { camera, passes, boats, lights, lamps, flash, searchlight, rounds, ..self.scene.clone() }
     }
 
     /// A boat broadside before the camera, under way if it is one of as many as move.

@@ -33,8 +33,8 @@ const WIDENS: f64 = 0.5;
 /// In less wind than this a plume is as it is in this, m/s.
 const WIND_LEAST_M_S: f64 = 1.5;
 /// Puffs of smoke each second, and how many of them are seen at a time.
-const SMOKE_HZ: f64 = 3.0;
-const SMOKE_PUFFS: usize = 36;
+const SMOKE_HZ: f64 = 1.5;
+const SMOKE_PUFFS: usize = 18;
 /// Flames each second, and how many at a time.
 const FLAME_HZ: f64 = 14.0;
 const FLAME_PUFFS: usize = 10;
@@ -70,6 +70,12 @@ impl Burning {
     pub fn heat_kw(&self, time_s: f64) -> f64 {
         let since_s = time_s - self.since_s;
         if since_s < 0.0 { 0.0 } else { (HEAT_LEAST_KW + GROWTH_KW_S2 * since_s * since_s).min(HEAT_MOST_KW) }
+    }
+
+    /// Height of flames at a time, metres (Heskestad 1984).
+    pub fn flame_height_m(&self, time_s: f64) -> f64 {
+        const LEAST_M: f64 = 0.3;
+        (0.235 * self.heat_kw(time_s).powf(0.4) - 1.02 * DIAMETER_M).max(LEAST_M)
     }
 
     /// Luminous intensity at a time, cd: it flickers by a fifth, ten times a second.
@@ -125,7 +131,7 @@ impl Burning {
         const LIFE_S: f64 = FLAME_PUFFS as f64 / FLAME_HZ;
         let begin_s = self.begin_s(number, FLAME_HZ)?;
         let share = (time_s - begin_s) / LIFE_S;
-        let height_m = (0.235 * self.heat_kw(begin_s).powf(0.4) - 1.02 * DIAMETER_M).max(0.3);
+        let height_m = self.flame_height_m(begin_s);
         let chance = |of: u64| 2.0 * drawn(self.boat as u64, [0xf1a0 + of, number as u64]) - 1.0;
         let stray = DVec3::new(chance(0), chance(1), 0.0) * (0.35 * DIAMETER_M * (1.0 - 0.5 * share));
         // Wind leans flames by its speed over theirs, which is some 4 m/s.

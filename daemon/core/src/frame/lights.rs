@@ -36,7 +36,7 @@ pub(super) fn lights_in_view(
             let illuminance = candela * f64::from(1.0 - boat.haze) / (range_m * range_m);
             if candela > 0.0 {
                 let light = light.colour.rgb() * (illuminance / white_cd_m2) as f32;
-                into.push(LightView { boat: boat.boat, at, light });
+                into.push(LightView { boat: Some(boat.boat), at, light });
             }
         }
     }
@@ -47,6 +47,6 @@ pub(super) fn lights_in_view(
         let range_m = view.camera.position.distance(at).max(1.0);
         let illuminance = fire.candela(time_s) * f64::from(1.0 - boat.haze) / (range_m * range_m);
         let light = Burning::colour() * (illuminance / white_cd_m2) as f32;
-        into.push(LightView { boat: fire.boat, at, light });
+        into.push(LightView { boat: Some(fire.boat), at, light });
     }
 }

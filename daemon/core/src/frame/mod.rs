@@ -3,6 +3,8 @@
 mod boats;
 mod composer;
 pub mod fires;
+pub mod lamplight;
+pub mod lamps;
 mod lights;
 pub mod plan;
 pub mod reflection;

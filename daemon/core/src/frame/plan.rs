@@ -60,10 +60,12 @@ pub struct SceneNeeds {
     pub moving: usize,
     /// Rounds in the belt.
     pub belt: u32,
-    /// Some boat shows lights by night, or may burn.
+    /// A boat burns by itself.
+    pub burns: bool,
+    /// Points of light may be seen by night: boats' own, fires, flares.
     pub lights: bool,
-    /// The gun has a searchlight.
-    pub searchlight: bool,
+    /// Something may light sea and air by night: a searchlight, a flare, a boat on fire.
+    pub lamps: bool,
     /// The sun is up, and neither moves nor comes from the ship.
     pub sun_stays_up: bool,
     /// The same of one that is down.
@@ -81,8 +83,8 @@ pub struct InView<'a> {
     pub sun_shines: bool,
     /// Boats that are seen, or mirrored.
     pub boats: &'a [BoatView],
-    /// The searchlight is on.
-    pub searchlight: bool,
+    /// A lamp shines.
+    pub lamps: bool,
     /// Navigation lights that are seen.
     pub lights: &'a [LightView],
     /// Tracers, splashes and strikes that are seen.
@@ -97,6 +99,7 @@ impl SceneNeeds {
         if scenario.sea_from_video && !sea_reflects(water.force) {
             water.force = BeaufortForce::of_wind(0.0);
         }
+        let burns = scenario.boats.iter().any(|boat| boat.burns_at_s.is_some());
         Self {
             size: (0, 0),
             video: PixelFormat::Rgb,
@@ -106,8 +109,15 @@ impl SceneNeeds {
             boats: scenario.boats.len(),
             moving: scenario.boats.iter().filter(|b| b.behaviour.speed_max_m_s() > 0.0).count(),
             belt: scenario.weapon.belt,
-            lights: scenario.weapon.belt > 0 || scenario.boats.iter().any(|b| b.lights != LightsKept::None),
-            searchlight: scenario.searchlight.is_some(),
+            burns,
+            lights: burns
+                || scenario.weapon.belt > 0
+                || scenario.exercise.has_flares()
+                || scenario.boats.iter().any(|b| b.lights != LightsKept::None),
+            lamps: burns
+                || scenario.searchlight.is_some()
+                || scenario.weapon.belt > 0
+                || scenario.exercise.has_flares(),
             sun_stays_up: scenario.daylight.stays_up(),
             sun_stays_down: scenario.daylight.stays_down(),
             phantoms: Phantoms::default(),
@@ -143,13 +153,16 @@ impl ScenePlan {
             PassDecision::Run if needs.sun_stays_up => PassDecision::LeftOut(LeftOut::Daylight),
             other => other,
         };
-        let searchlight = match (needs.searchlight, needs.sun_stays_up) {
-            (false, _) => PassDecision::LeftOut(LeftOut::NoSearchlight),
+        let lamplight = match (needs.lamps, needs.sun_stays_up) {
+            (false, _) => PassDecision::LeftOut(LeftOut::NoLamps),
             (true, true) => PassDecision::LeftOut(LeftOut::Daylight),
             (true, false) => PassDecision::Run,
         };
-        let rounds =
-            if needs.belt == 0 { PassDecision::LeftOut(LeftOut::NoRounds) } else { PassDecision::Run };
+        let rounds = if needs.belt == 0 && !needs.burns {
+            PassDecision::LeftOut(LeftOut::NoRounds)
+        } else {
+            PassDecision::Run
+        };
         let mut passes = [PassDecision::Run; Pass::COUNT];
         passes[Pass::Shadow as usize] = match boats {
             PassDecision::Run if needs.sun_stays_down => PassDecision::LeftOut(LeftOut::NoSun),
@@ -159,11 +172,11 @@ impl ScenePlan {
         passes[Pass::Water as usize] = water;
         passes[Pass::Wake as usize] = wake;
         passes[Pass::Boats as usize] = boats;
-        passes[Pass::Searchlight as usize] = searchlight;
+        passes[Pass::Lamplight as usize] = lamplight;
         passes[Pass::Lights as usize] = lights;
         passes[Pass::Rounds as usize] = rounds;
         let drawn =
-            [boats, searchlight, lights, rounds].into_iter().find(|decision| *decision == PassDecision::Run);
+            [boats, lamplight, lights, rounds].into_iter().find(|decision| *decision == PassDecision::Run);
         passes[Pass::Phantoms as usize] = match drawn {
             _ if needs.phantoms.parts.is_empty() => PassDecision::LeftOut(LeftOut::NoPhantoms),
             None => PassDecision::LeftOut(LeftOut::NothingToHide),
@@ -189,7 +202,7 @@ impl ScenePlan {
 
     /// The passes of one frame: what the plan allows and what is in view asks for.
     pub fn frame(&self, in_view: &InView<'_>) -> [PassDecision; Pass::COUNT] {
-        let InView { pose_known, sun_shines, searchlight, boats, lights, rounds } = *in_view;
+        let InView { pose_known, sun_shines, lamps, boats, lights, rounds } = *in_view;
         let mut passes = self.passes;
         let mut leave_out = |pass: Pass, unless: bool, why: LeftOut| {
             let decision = &mut passes[pass as usize];
@@ -207,10 +220,10 @@ impl ScenePlan {
         leave_out(Pass::Water, reflected, LeftOut::NoReflectionInView);
         leave_out(Pass::Wake, boats.iter().any(|b| b.wake.is_some()), LeftOut::NoWakeInView);
         leave_out(Pass::Boats, boats.iter().any(|b| b.hull.is_some()), LeftOut::NoBoatInView);
-        leave_out(Pass::Searchlight, searchlight, LeftOut::SearchlightOff);
+        leave_out(Pass::Lamplight, lamps, LeftOut::NoLampShines);
         leave_out(Pass::Lights, !lights.is_empty(), LeftOut::NoLightInView);
         leave_out(Pass::Rounds, !rounds.is_empty(), LeftOut::NoRoundInView);
-        let drawn = !boats.is_empty() || searchlight || !lights.is_empty() || !rounds.is_empty();
+        let drawn = !boats.is_empty() || lamps || !lights.is_empty() || !rounds.is_empty();
         leave_out(Pass::Phantoms, drawn, LeftOut::NothingToHide);
         passes
     }
@@ -240,8 +253,9 @@ mod tests {
             boats: 3,
             moving: 2,
             belt: 100,
+            burns: false,
             lights: true,
-            searchlight: true,
+            lamps: true,
             sun_stays_up: false,
             sun_stays_down: false,
             phantoms: Phantoms { parts: Arc::new([triangle]), bore: DVec2::ZERO },
@@ -280,18 +294,18 @@ mod tests {
             reason(SceneNeeds { sun_stays_up: true, ..needs() }, Pass::Lights),
             Some(LeftOut::Daylight)
         );
-        let dark = SceneNeeds { searchlight: false, ..needs() };
-        assert_eq!(reason(dark, Pass::Searchlight), Some(LeftOut::NoSearchlight));
+        let dark = SceneNeeds { lamps: false, ..needs() };
+        assert_eq!(reason(dark, Pass::Lamplight), Some(LeftOut::NoLamps));
         assert_eq!(
             reason(SceneNeeds { sun_stays_down: true, ..needs() }, Pass::Shadow),
             Some(LeftOut::NoSun)
         );
         let day = SceneNeeds { sun_stays_up: true, ..needs() };
-        assert_eq!(reason(day, Pass::Searchlight), Some(LeftOut::Daylight));
+        assert_eq!(reason(day, Pass::Lamplight), Some(LeftOut::Daylight));
         assert_eq!(reason(SceneNeeds { belt: 0, ..needs() }, Pass::Rounds), Some(LeftOut::NoRounds));
         let bare = SceneNeeds { phantoms: Phantoms::default(), ..needs() };
         assert_eq!(reason(bare, Pass::Phantoms), Some(LeftOut::NoPhantoms));
-        let calm = SceneNeeds { boats: 0, belt: 0, searchlight: false, ..needs() };
+        let calm = SceneNeeds { boats: 0, belt: 0, lamps: false, ..needs() };
         assert_eq!(reason(calm, Pass::Phantoms), Some(LeftOut::NothingToHide));
     }
 
@@ -304,7 +318,7 @@ mod tests {
         assert_eq!(frame[Pass::Water as usize], PassDecision::LeftOut(LeftOut::NoReflectionInView));
         assert_eq!(frame[Pass::Wake as usize], PassDecision::LeftOut(LeftOut::NoWakeInView));
         assert_eq!(frame[Pass::Rounds as usize], PassDecision::LeftOut(LeftOut::NoRoundInView));
-        assert_eq!(frame[Pass::Searchlight as usize], PassDecision::LeftOut(LeftOut::SearchlightOff));
+        assert_eq!(frame[Pass::Lamplight as usize], PassDecision::LeftOut(LeftOut::NoLampShines));
         assert_eq!(frame[Pass::Phantoms as usize], PassDecision::LeftOut(LeftOut::NothingToHide));
         let lost = plan.frame(&InView::default());
         assert_eq!(lost[Pass::Boats as usize], PassDecision::LeftOut(LeftOut::NoPose));

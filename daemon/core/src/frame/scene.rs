@@ -11,7 +11,12 @@ use crate::{
         sea::SeaSource,
     },
     fault::Fault,
-    frame::{searchlight::SearchlightView, wake::Wake},
+    frame::{
+        lamplight::Lamplight,
+        lamps::{FlashView, LampView},
+        searchlight::SearchlightView,
+        wake::Wake,
+    },
     geometry::{CameraPose, Lens, RigidPose},
     guide::Guide,
     model::{ModelId, Zone},
@@ -37,8 +42,12 @@ pub struct Scene {
     pub boats: Vec<BoatView>,
     /// Tracers and splashes in view, farthest first.
     pub rounds: Vec<RoundView>,
-    /// Boats' navigation lights that can be seen.
+    /// Points of light that can be seen: boats' navigation lights, fires and flares.
     pub lights: Vec<LightView>,
+    /// Lamps that light what is around them by night.
+    pub lamps: Vec<LampView>,
+    /// The flash before the muzzle, while a round leaves it by night.
+    pub flash: Option<FlashView>,
     /// The gun's searchlight, while it is on.
     pub searchlight: Option<SearchlightView>,
     /// Recoil factor of the gun: distance from the bore's vanishing point over that at rest, from 1.
@@ -64,6 +73,12 @@ impl Scene {
     pub fn runs(&self, pass: Pass) -> bool {
         self.passes[pass as usize] == PassDecision::Run
     }
+
+    /// What lights the sea and the air.
+    pub fn lamplight(&self) -> Lamplight<'_> {
+        let searchlight = self.searchlight.as_ref();
+        Lamplight { searchlight, lamps: &self.lamps, wind_m_s: self.wind.length() }
+    }
 }
 
 /// The passes in the order in which they run.
@@ -81,9 +96,9 @@ pub enum Pass {
     Wake,
     /// The boats.
     Boats,
-    /// The light of the gun's searchlight on sea and air.
-    Searchlight,
-    /// Boats' navigation lights.
+    /// The light of searchlight, flares and fires on sea and air.
+    Lamplight,
+    /// Points of light: boats' navigation lights, fires, flares.
     Lights,
     /// Tracers and splashes.
     Rounds,
@@ -104,7 +119,7 @@ impl Pass {
         Self::Water,
         Self::Wake,
         Self::Boats,
-        Self::Searchlight,
+        Self::Lamplight,
         Self::Lights,
         Self::Rounds,
         Self::Phantoms,
@@ -120,7 +135,7 @@ impl Pass {
             Self::Water => "water",
             Self::Wake => "wake",
             Self::Boats => "boats",
-            Self::Searchlight => "searchlight",
+            Self::Lamplight => "lamplight",
             Self::Lights => "lights",
             Self::Rounds => "rounds",
             Self::Phantoms => "phantoms",
@@ -167,10 +182,10 @@ pub enum LeftOut {
     Daylight,
     /// No light is within the picture, or the sun is up.
     NoLightInView,
-    /// The scenario has no searchlight.
-    NoSearchlight,
-    /// The searchlight is off.
-    SearchlightOff,
+    /// The scenario has no searchlight and no flare, and no boat can be set on fire.
+    NoLamps,
+    /// No lamp shines.
+    NoLampShines,
     /// The sun does not shine: it is down, or clouds hide it.
     NoSun,
     /// The calibration has no outline of the own gun or ship.
@@ -200,8 +215,8 @@ impl LeftOut {
             Self::NoLights => "no_lights",
             Self::Daylight => "daylight",
             Self::NoLightInView => "no_light_in_view",
-            Self::NoSearchlight => "no_searchlight",
-            Self::SearchlightOff => "searchlight_off",
+            Self::NoLamps => "no_lamps",
+            Self::NoLampShines => "no_lamp_shines",
             Self::NoSun => "no_sun",
             Self::NoPhantoms => "no_phantoms",
             Self::NothingToHide => "nothing_to_hide",
@@ -252,11 +267,11 @@ pub struct BoatView {
     pub beyond_horizon: bool,
 }
 
-/// A navigation light.
+/// A point of light: a navigation light, a fire, a flare.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightView {
-    /// Index of its boat in the scenario.
-    pub boat: usize,
+    /// Index of its boat in the scenario; `None` of what is on none.
+    pub boat: Option<usize>,
     /// Its place, world, curvature of the sea already taken off its height.
     pub at: DVec3,
     /// Its illuminance at the camera over the luminance that the camera shows as white, by colour, sr: what it adds to all pixels together

@@ -4,13 +4,9 @@
 
 use std::f64::consts::FRAC_1_PI;
 
-use glam::{DVec2, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 
-use crate::{
-    geometry::{CameraPose, Lens},
-    physics::extinction_per_m,
-    world::searchlight::SearchlightSpec,
-};
+use crate::{physics::extinction_per_m, world::searchlight::SearchlightSpec};
 
 /// The lamp's place beside the camera, camera's axes, metres: on the ship's side, to the right of the gun and a little lower. On the gun itself,
 /// the air before it would blind the camera: what lies between beam and line of sight is what a searchlight sees by.
@@ -21,7 +17,7 @@ const MEETS_M: f64 = 300.0;
 /// Share of what air takes of a beam that it throws straight back, 1/sr: marine aerosol has an extinction-to-backscatter ratio of 23 sr
 /// (Mueller et al. 2007, "Aerosol-type-dependent lidar ratios observed with Raman lidar", table 1). All that is seen of the beam is nearly
 /// straight back, so that no more of the phase function is needed.
-const BACKSCATTER_PER_SR: f64 = 1.0 / 23.0;
+pub(super) const BACKSCATTER_PER_SR: f64 = 1.0 / 23.0;
 
 /// Share of the light within the sea that comes out of it again, by colour: coastal water of little chlorophyll (Mobley 1994, "Light and
 /// Water", figure 3.27). Waves seen from the lamp throw nothing straight back: their slopes are too small.
@@ -114,85 +110,6 @@ impl SearchlightView {
     }
 }
 
-/// Both parts of a searchlight's light at a pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BeamLight {
-    /// Of the air before what the camera sees.
-    pub haze: f32,
-    /// Of the sea, by its albedo.
-    pub sea: f32,
-}
-
-/// The light at nodes of a grid over the screen, `cell_px` pixels apart. The air's part does not change from frame to frame while lamp, lens
-/// and air stay the same, and is kept.
-#[derive(Clone, Debug, Default)]
-pub struct BeamGrid {
-    columns: usize,
-    cell_px: f64,
-    key: Option<(SearchlightView, Lens)>,
-    rays: Vec<DVec3>,
-    /// One row after the other.
-    nodes: Vec<BeamLight>,
-}
-
-/// Most nodes of a grid.
-pub const BEAM_NODES_MAX: usize = 8192;
-
-impl BeamGrid {
-    /// A grid over a screen of that size.
-    pub fn new((width, height): (u32, u32)) -> Self {
-        /// A beam of half a degree is some ten pixels wide.
-        const LEAST_PX: f64 = 16.0;
-        let (width, height) = (f64::from(width), f64::from(height));
-        let cells = |px: f64, length: f64| (length / px).ceil() as usize + 1;
-        let mut cell_px = LEAST_PX;
-        while cells(cell_px, width) * cells(cell_px, height) > BEAM_NODES_MAX {
-            cell_px += 1.0;
-        }
-        let (columns, rows) = (cells(cell_px, width), cells(cell_px, height));
-        let rays = Vec::with_capacity(columns * rows);
-        Self { columns, cell_px, key: None, rays, nodes: vec![BeamLight::default(); columns * rows] }
-    }
-
-    /// Finds the light of `view` for that camera and lens.
-    pub fn light(&mut self, view: &SearchlightView, camera: &CameraPose, lens: &Lens) {
-        /// Beyond this the air in the beam adds nothing that is seen, metres.
-        const FAR_M: f64 = 2e4;
-        // Of a rolling shutter's turn a beam this soft shows nothing.
-        let lens = Lens { row_turn: DVec3::ZERO, ..*lens };
-        let key = (SearchlightView { strength: 1.0, ..*view }, lens);
-        if self.key != Some(key) {
-            self.key = Some(key);
-            let pixel =
-                |i: usize| DVec2::new((i % self.columns) as f64, (i / self.columns) as f64) * self.cell_px;
-            self.rays.clear();
-            self.rays.extend((0..self.nodes.len()).map(|i| lens.unproject(pixel(i)).normalize()));
-            for (node, ray) in self.nodes.iter_mut().zip(&self.rays) {
-                node.haze = view.haze(*ray, FAR_M) as f32;
-            }
-        }
-        let down_in_camera = camera.world_from_camera.inverse() * DVec3::NEG_Z;
-        for (node, ray) in self.nodes.iter_mut().zip(&self.rays) {
-            node.sea = view.sea(*ray, down_in_camera, camera.position.z) as f32;
-        }
-    }
-
-    /// Nodes of a row.
-    pub const fn columns(&self) -> usize {
-        self.columns
-    }
-
-    /// Pixels from one to the next.
-    pub const fn cell_px(&self) -> f64 {
-        self.cell_px
-    }
-
-    /// The light at the nodes, one row after the other.
-    pub fn nodes(&self) -> &[BeamLight] {
-        &self.nodes
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -271,36 +188,5 @@ mod tests {
         let above = SearchlightView { lamp: -down * 3.0, ..at_eye };
         let more = above.sea(DVec3::Z, down, 8.0) / law;
         assert!((more - 11.0 / 8.0).abs() < 0.05, "{more}");
-    }
-
-    #[test]
-    fn a_grid_covers_its_screen_and_keeps_what_does_not_change() {
-        let lens = Lens::pinhole(1280, 720, 1.1);
-        let camera = CameraPose {
-            world_from_camera: crate::geometry::look(0.0, -0.05, 0.0),
-            position: DVec3::Z * 8.0,
-        };
-        for size in [(1280, 720), (1920, 1080), (3840, 2160), (16, 16)] {
-            let grid = BeamGrid::new(size);
-            let rows = grid.nodes.len() / grid.columns;
-            assert!(grid.nodes.len() <= BEAM_NODES_MAX);
-            assert!((grid.columns - 1) as f64 * grid.cell_px >= f64::from(size.0));
-            assert!((rows - 1) as f64 * grid.cell_px >= f64::from(size.1));
-        }
-        let mut grid = BeamGrid::new((1280, 720));
-        grid.light(&view(8.0, 2e4), &camera, &lens);
-        let brightest = |grid: &BeamGrid| {
-            let nodes = grid.nodes.iter().enumerate();
-            nodes
-                .max_by(|a, b| a.1.haze.total_cmp(&b.1.haze))
-                .map(|(i, _)| (i % grid.columns, i / grid.columns))
-        };
-        // The lamp is below and to the right: there its beam comes into the picture.
-        assert!(brightest(&grid).is_some_and(|(x, y)| x >= 40 && y >= 22), "{:?}", brightest(&grid));
-        let before = grid.nodes.clone();
-        let raised = CameraPose { world_from_camera: crate::geometry::look(0.0, 0.3, 0.0), ..camera };
-        grid.light(&SearchlightView { strength: 5.0, ..view(8.0, 2e4) }, &raised, &lens);
-        assert!(grid.nodes.iter().zip(&before).all(|(a, b)| a.haze == b.haze));
-        assert!(grid.nodes.iter().take(grid.columns).all(|node| node.sea == 0.0), "the sky above");
     }
 }

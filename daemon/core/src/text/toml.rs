@@ -405,6 +405,11 @@ impl<'a> TomlSection<'a> {
         self.text.at(self.start).of_key(self.path_of(key))
     }
 
+    /// A table within this one, `name`.
+    pub fn table<T>(&self, name: &str, table: &Spanned<T>) -> Self {
+        TomlSection { text: self.text, path: self.path_of(name), start: table.span().start }
+    }
+
     fn path_of(&self, key: &str) -> String {
         if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }

@@ -34,6 +34,8 @@ pub struct Vessel {
     pub behaviour: Behaviour,
     /// The lights that it shows by night.
     pub lights: LightsKept,
+    /// When it is on fire by itself, seconds after the beginning; `None` for one that only rounds set on fire.
+    pub burns_at_s: Option<f64>,
 }
 
 impl Vessel {
@@ -45,6 +47,7 @@ impl Vessel {
             model: *model,
             behaviour: boat.behaviour.clone().in_session(scenario.seed),
             lights: boat.lights,
+            burns_at_s: boat.burns_at_s,
         };
         scenario.boats.iter().zip(boat_models).map(vessel).collect()
     }
@@ -72,6 +75,7 @@ struct FleetBoat {
     model: ModelId,
     history: BoatHistory,
     lights: LightsKept,
+    burns_at_s: Option<f64>,
     /// Lights on its model, where it shows any.
     rigged: Option<LightsRigged>,
     /// Seconds since the start at which it was warned.
@@ -140,13 +144,13 @@ impl Fleet {
     /// Boats that begin at `start`. Each vessel's model must be in `models`.
     pub fn new(vessels: Vec<Vessel>, models: Arc<[Model]>, waves: WaveField, start: Time) -> Self {
         let boat = |vessel: Vessel| {
-            let Vessel { name, side, model: id, behaviour, lights } = vessel;
+            let Vessel { name, side, model: id, behaviour, lights, burns_at_s } = vessel;
             let model = models.get(usize::from(id.0));
             let hull = model.map_or(Hull { length_m: 1.0, beam_m: 1.0 }, Hull::of);
             let form = model.map_or_else(|| HullForm::new((-0.5, 0.5), 0.3, 1.2, |_| 0.5), HullForm::of);
             let history = BoatHistory::new(behaviour, hull, form);
             let rigged = model.filter(|_| lights != LightsKept::None).map(LightsRigged::on);
-            FleetBoat { name, side, model: id, history, lights, rigged, warned_s: None }
+            FleetBoat { name, side, model: id, history, lights, burns_at_s, rigged, warned_s: None }
         };
         let boats = vessels.into_iter().map(boat).collect();
         let (struck, driven) = (Vec::new(), Vec::new());
@@ -437,7 +441,9 @@ impl Fleet {
 
     /// Since when a boat burns.
     pub fn burns_since(&self, boat: usize) -> Option<Time> {
-        Some(self.start.plus_secs(self.boats.get(boat)?.history.fire_s()?))
+        let boat = self.boats.get(boat)?;
+        let since_s = boat.history.fire_s().into_iter().chain(boat.burns_at_s).reduce(f64::min)?;
+        Some(self.start.plus_secs(since_s))
     }
 
     /// Tests whether a boat is there at `time` and shows anything over the water: it has not sunk.

@@ -53,6 +53,7 @@ fn crewed(name: &str, plan: &Arc<CrewPlan>, bearing_deg: f64, range_m: f64, side
         model: ModelId(0),
         behaviour: Behaviour::Crewed(start),
         lights: LightsKept::None,
+        burns_at_s: None,
     }
 }
 
@@ -364,6 +365,7 @@ fn crowd(count: usize) -> Vec<Vessel> {
         model: ModelId(0),
         behaviour,
         lights: LightsKept::None,
+        burns_at_s: None,
     });
     vessels
 }

@@ -6,6 +6,7 @@ pub mod boats;
 pub mod burst;
 mod contact;
 pub mod exercise;
+pub mod flare;
 pub mod fleet;
 pub mod gunnery;
 pub mod rounds;

@@ -1,11 +1,12 @@
 //! Stage two as a whole: the trigger's edges and where the barrel points in, boats, rounds and records out.
 
-use std::sync::Arc;
+use std::{collections::VecDeque, sync::Arc};
 
 use glam::DVec3;
 
 use super::{
     exercise::{ExerciseEvent, ExerciseFact, ExerciseWatch, WatchedBoat, pointed_at},
+    flare::Flare,
     fleet::{Fleet, Vessel},
     rounds::{Ammunition, FragmentHit, Launch, Rounds},
     scenario::{Scenario, Side},
@@ -28,6 +29,8 @@ use crate::{
 const ROUND_OVER_S: f64 = 21.0;
 /// Orders of the person who drives boats come no later than this, seconds.
 const DRIVEN_LATE_S: f64 = 0.25;
+/// Rounds whose time is kept: those within a picture's exposure.
+const FIRED_KEPT: usize = 4;
 /// How long a text of the scenario stands, seconds.
 const MESSAGE_S: f64 = 6.0;
 /// How long a result stands, seconds: it is shown, and a hit is not replaced by a miss.
@@ -102,6 +105,10 @@ pub struct RunningWorld {
     pub fleet: Fleet,
     /// The rounds.
     pub rounds: Rounds,
+    /// Flares that were lit, oldest first.
+    pub flares: Vec<Flare>,
+    /// When the newest rounds left the barrel, oldest first; no more than [`FIRED_KEPT`].
+    pub fired: VecDeque<Time>,
 }
 
 impl RunningWorld {
@@ -117,6 +124,13 @@ impl RunningWorld {
             let (shot, boat) = (missed.shot, fleet.name(missed.boat).to_owned());
             let fact = ExerciseFact::Missed { shot, boat, why: missed.why };
             events.push(ExerciseEvent { time: missed.time, fact });
+        }
+    }
+
+    fn note_fired(&mut self, time: Time) {
+        self.fired.push_back(time);
+        if self.fired.len() > FIRED_KEPT {
+            self.fired.pop_front();
         }
     }
 
@@ -264,6 +278,7 @@ impl World {
             self.note_heat(fired, scatter);
             let BoreAim { muzzle, bore, pose_age_ns, unscored } = aim(fired);
             let shot = self.score.shots;
+            running.note_fired(fired);
             self.events.push(running.fired(shot, fired, &BoreAim { muzzle, bore, pose_age_ns, unscored }));
             match unscored {
                 None => {
@@ -322,6 +337,8 @@ impl World {
         if orders.stoppage {
             self.weapon.stop_next();
         }
+        let (lit, wind) = (running.now, self.ammunition.wind.truncate());
+        running.flares.extend(orders.flares.into_iter().map(|spec| Flare { spec, lit, wind }));
         for event in &self.events {
             if let ExerciseFact::Message { text } = &event.fact {
                 self.message = Some((event.time, text.as_str().into()));
@@ -354,7 +371,8 @@ impl World {
         let fleet = Fleet::new(self.vessels.clone(), Arc::clone(&self.models), self.waves.clone(), start)
             .with_searchlight(self.searchlight.as_ref().map(|s| Searchlight::new(s.spec, &self.daylight)));
         let rounds = Rounds::new(self.ammunition.clone(), self.waves.clone(), start);
-        RunningWorld { start, now: start, fleet, rounds }
+        let fired = VecDeque::with_capacity(FIRED_KEPT + 1);
+        RunningWorld { start, now: start, fleet, rounds, flares: Vec::new(), fired }
     }
 
     /// Rounds still in the air are recorded as misses: the session ends here.
@@ -364,7 +382,7 @@ impl World {
             let boats = running.watched(None);
             let mut ended = Vec::new();
             self.watch.finish(running.now, &boats, self.weapon.rounds_in_all(), &mut ended);
-            let RunningWorld { start, now, fleet, rounds } = running;
+            let RunningWorld { start, now, fleet, rounds, .. } = running;
             rounds.advance(now.plus_secs(ROUND_OVER_S), *start, fleet, records);
             running.note_ends(&mut self.events);
             self.events.append(&mut ended);

@@ -1,17 +1,18 @@
 //! All passes of a renderer.
 
 use bowwave_core::{model::Model, water::ReflectionMethod};
-use shaders_spirv::interface::{BeamBlock, DrawBlock, LightBlock};
+use shaders_spirv::interface::{DrawBlock, LightBlock};
 
 use super::{
     PassContext,
     behind_hulls::BehindHulls,
     boats::{BoatsPass, meshes::Meshes},
     hud::HudPass,
+    lamplight::LamplightPass,
     lights,
     mirror::MirrorPass,
     phantoms::PhantomPass,
-    rounds, searchlight,
+    rounds,
     shadow::ShadowPass,
     video::VideoPass,
     wake::WakePass,
@@ -29,7 +30,7 @@ pub(crate) struct Passes {
     pub(crate) reflect: Option<ReflectPass>,
     pub(crate) wake: Option<WakePass>,
     pub(crate) boats: Option<BoatsPass>,
-    pub(crate) searchlight: Option<BehindHulls<BeamBlock>>,
+    pub(crate) lamplight: Option<LamplightPass>,
     pub(crate) lights: Option<BehindHulls<LightBlock>>,
     pub(crate) rounds: Option<BehindHulls<DrawBlock>>,
     pub(crate) phantoms: Option<PhantomPass>,
@@ -66,7 +67,7 @@ impl Passes {
         let wake = boats.as_ref().filter(|_| needs.wakes_max > 0);
         let wake = wake.map(|boats| WakePass::new(context, boats)).transpose()?;
         let over = boats.as_ref();
-        let searchlight = BehindHulls::when(needs.searchlight, context, &searchlight::SHADERS, over)?;
+        let lamplight = needs.lamps.then(|| LamplightPass::new(context)).transpose()?;
         let lights = BehindHulls::when(needs.lights_max > 0, context, &lights::SHADERS, over)?;
         let rounds = BehindHulls::when(needs.rounds_max > 0, context, &rounds::SHADERS, over)?;
         let phantoms = PhantomPass::new(context, &needs.phantoms)?;
@@ -81,7 +82,7 @@ impl Passes {
             reflect,
             wake,
             boats,
-            searchlight,
+            lamplight,
             lights,
             rounds,
             phantoms,

@@ -31,8 +31,6 @@ pub(crate) struct HullPiece<T> {
     pub(crate) rect: PixelRect,
     /// A hull may stand before it.
     pub(crate) hidden: bool,
-    /// Strips of four corners that are drawn.
-    pub(crate) instances: u32,
     pub(crate) block: T,
 }
 
@@ -84,7 +82,7 @@ impl<T: Pod> BehindHulls<T> {
             let pipeline = self.bind(to, frame, piece.hidden);
             to.scissor(piece.rect);
             to.push(pipeline, &piece.block);
-            to.draw(4, piece.instances);
+            to.draw(4, 1);
         }
     }
 

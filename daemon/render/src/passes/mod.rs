@@ -5,11 +5,11 @@ pub(crate) mod atlas;
 pub(crate) mod behind_hulls;
 pub(crate) mod boats;
 pub(crate) mod hud;
+pub(crate) mod lamplight;
 pub(crate) mod lights;
 pub(crate) mod mirror;
 pub(crate) mod phantoms;
 pub(crate) mod rounds;
-pub(crate) mod searchlight;
 pub(crate) mod shadow;
 pub(crate) mod video;
 pub(crate) mod wake;
@@ -42,8 +42,8 @@ pub(crate) struct PassContext<'a> {
     pub(crate) slots: usize,
     /// What lens and shutter of the camera do.
     pub(crate) optics: Optics,
-    /// A searchlight may be asked for.
-    pub(crate) searchlight: bool,
+    /// Lamps may be asked for: a searchlight, flares, fires.
+    pub(crate) lamps: bool,
 }
 
 /// A set with one texture that is read as it is stored, and what it lives on.
@@ -71,7 +71,7 @@ impl PassContext<'_> {
             Bend::RadialTangential => 1,
             Bend::Fisheye => 2,
         };
-        [bend, u32::from(self.optics.rolling), u32::from(self.searchlight)]
+        [bend, u32::from(self.optics.rolling), u32::from(self.lamps)]
     }
 }
 

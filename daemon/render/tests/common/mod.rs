@@ -28,7 +28,7 @@ pub fn config(scene: &Scene) -> RenderConfig {
         needs: Needs {
             boats_max: scene.boats.len(),
             lights_max: scene.lights.len(),
-            searchlight: scene.searchlight.is_some(),
+            lamps: scene.runs(bowwave_core::frame::scene::Pass::Lamplight),
             rounds_max: scene.rounds.len(),
             wakes_max: scene.boats.iter().filter(|b| b.wake.is_some()).count(),
             waters: vec![(scene.water.method, scene.water.shadow)],

@@ -18,6 +18,7 @@ mod haze;
 mod heading;
 mod hits;
 mod horizon;
+mod lamps;
 mod lens;
 mod misses;
 mod moon;
@@ -83,6 +84,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: shadow::ABOUT, measure: shadow::measure },
     NumericalPart { about: phantom::ABOUT, measure: phantom::measure },
     NumericalPart { about: beam::ABOUT, measure: beam::measure },
+    NumericalPart { about: lamps::ABOUT, measure: lamps::measure },
     NumericalPart { about: lens::ABOUT, measure: lens::measure },
     NumericalPart { about: drawn::ABOUT, measure: drawn::measure },
     NumericalPart { about: shutter::ABOUT, measure: shutter::measure },

@@ -171,6 +171,8 @@ pub fn bare_scene(
         boats: Vec::new(),
         rounds: Vec::new(),
         lights: Vec::new(),
+        lamps: Vec::new(),
+        flash: None,
         searchlight: None,
         recoil: 1.0,
         light,
@@ -273,7 +275,7 @@ impl Painter {
             needs: Needs {
                 boats_max,
                 lights_max: 0,
-                searchlight: false,
+                lamps: false,
                 rounds_max: 0,
                 wakes_max: 0,
                 waters,

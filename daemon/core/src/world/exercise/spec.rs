@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{act::Act, side::Side};
+use crate::{act::Act, side::Side, world::flare::FlareSpec};
 
 /// Rules of engagement. A round breaks them by when it was fired, whatever it strikes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,6 +60,14 @@ pub struct Goals {
     pub stop: Option<u32>,
     /// Scores of the simulated novice and expert on average, where they were measured.
     pub par: Option<[f64; 2]>,
+}
+
+impl ExerciseSpec {
+    /// Tests whether flares are lit in it.
+    pub fn has_flares(&self) -> bool {
+        let effects = self.happenings.iter().flat_map(|happening| &happening.effects);
+        effects.into_iter().any(|effect| matches!(effect, HappeningEffect::Flare(_)))
+    }
 }
 
 impl Goals {
@@ -142,4 +150,6 @@ pub enum HappeningEffect {
     Stoppage,
     /// Text for the trainee.
     Message(String),
+    /// An illuminating flare is lit.
+    Flare(FlareSpec),
 }

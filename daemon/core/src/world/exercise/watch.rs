@@ -8,6 +8,7 @@ use crate::{
     act::{Act, TraineeAct},
     side::Side,
     time::Time,
+    world::flare::FlareSpec,
 };
 
 /// A barrel that points no further off a boat than this points at it, radians.
@@ -85,13 +86,15 @@ pub struct ExerciseWatch {
     is_decided: bool,
 }
 
-/// What the watch asks of weapon and crews.
+/// What the watch asks of weapon, crews and sky.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WatchOrders {
     /// Boats that were warned, by their numbers.
     pub warned: Vec<usize>,
     /// The weapon has a stoppage.
     pub stoppage: bool,
+    /// Flares that are lit.
+    pub flares: Vec<FlareSpec>,
 }
 
 impl ExerciseWatch {
@@ -213,6 +216,7 @@ impl ExerciseWatch {
                         note(ExerciseFact::Rules { rules: *rules });
                     }
                     HappeningEffect::Stoppage => orders.stoppage = true,
+                    HappeningEffect::Flare(flare) => orders.flares.push(*flare),
                     HappeningEffect::Message(text) => note(ExerciseFact::Message { text: text.clone() }),
                 }
             }

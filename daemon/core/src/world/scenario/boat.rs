@@ -5,7 +5,7 @@ use serde::Deserialize;
 use super::{
     crew::NamedCrew,
     group::{self, Formation},
-    keys::{M_S_PER_KN, angle, range, waypoint},
+    keys::{M_S_PER_KN, angle, range, seconds, waypoint},
     spec::{BoatSpec, place},
 };
 use crate::{
@@ -64,6 +64,7 @@ pub(super) struct RawBoat {
     speed_max_kn: OptionalKey<f64>,
     keeps_rules: OptionalKey<bool>,
     lights: OptionalKey<String>,
+    burns_at_s: OptionalKey<f64>,
     count: OptionalKey<i64>,
     formation: OptionalKey<String>,
     spacing_m: OptionalKey<f64>,
@@ -171,9 +172,10 @@ fn group(
     let side = text.given(&raw.side, one_of(&sides))?.unwrap_or(Side::Hostile);
     let usual = if side == Side::Neutral { LightsKept::ByConduct } else { LightsKept::None };
     let lights = text.given(&raw.lights, one_of(&LightsKept::NAMES))?.unwrap_or(usual);
+    let burns_at_s = text.given(&raw.burns_at_s, seconds())?;
     let boat = |name: String, behaviour| {
         let model = named("model", &raw.model, "the name of a model or the path of a glTF or PNG file")?;
-        Ok(BoatSpec { name, model, side, behaviour, lights, stands: stands.clone() })
+        Ok(BoatSpec { name, model, side, behaviour, lights, burns_at_s, stands: stands.clone() })
     };
     let behaviours = match (&raw.course, &raw.crew) {
         (Some(_), Some(crew)) => {

@@ -2,7 +2,10 @@
 
 use serde::Deserialize;
 
-use super::{keys::only_true, spec::BoatSpec};
+use super::{
+    keys::{angle, only_true, range, seconds},
+    spec::{BoatSpec, place},
+};
 use crate::{
     act::Act,
     side::Side,
@@ -10,9 +13,12 @@ use crate::{
         KeyPlace, OptionalKey, Spanned, TomlError, TomlSection, TomlText, ValueRule, key_place, list_of,
         number, one_of, yes_no,
     },
-    world::exercise::{
-        About, CallSpec, Engagement, ExerciseSpec, Goals, Happening, HappeningCause, HappeningEffect,
-        group_of,
+    world::{
+        exercise::{
+            About, CallSpec, Engagement, ExerciseSpec, Goals, Happening, HappeningCause, HappeningEffect,
+            group_of,
+        },
+        flare::FlareSpec,
     },
 };
 
@@ -53,6 +59,18 @@ pub(super) struct RawEvent {
     rules: OptionalKey<String>,
     stoppage: OptionalKey<bool>,
     message: OptionalKey<String>,
+    flare: Option<Spanned<RawFlare>>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RawFlare {
+    bearing_deg: OptionalKey<f64>,
+    range_m: OptionalKey<f64>,
+    height_m: OptionalKey<f64>,
+    candela: OptionalKey<f64>,
+    burns_s: OptionalKey<f64>,
+    falls_m_s: OptionalKey<f64>,
 }
 
 /// The tables of an exercise as they stand in the text.
@@ -143,7 +161,7 @@ fn event(
         return Err(text.error(&second, problem));
     }
     let about = || section.required("boat", &raw.boat, boats_of(boats));
-    let cause = if let Some(at_s) = text.given(&raw.at_s, number(0.0..=86_400.0, "s"))? {
+    let cause = if let Some(at_s) = text.given(&raw.at_s, seconds())? {
         if let Some(boat) = &raw.boat {
             return Err(text.error(boat, "has no meaning beside at_s; leave it out"));
         }
@@ -167,10 +185,28 @@ fn event(
         effects.push(HappeningEffect::Stoppage);
     }
     effects.extend(text.given(&raw.message, caption())?.map(HappeningEffect::Message));
+    if let Some(raw) = &raw.flare {
+        effects.push(HappeningEffect::Flare(flare(&section.table("flare", raw), raw.get_ref())?));
+    }
     if effects.is_empty() {
-        return Err(section.missing("message", "what happens: rules, stoppage = true or message"));
+        return Err(section.missing("message", "what happens: rules, stoppage = true, message or flare"));
     }
     Ok(Happening { cause, effects })
+}
+
+/// A flare; what it does not say is that of a hand-fired rocket.
+fn flare(section: &TomlSection<'_>, raw: &RawFlare) -> Result<FlareSpec, TomlError> {
+    let text = section.text;
+    let bearing = section.required("bearing_deg", &raw.bearing_deg, angle())?;
+    let range_m = section.required("range_m", &raw.range_m, range())?;
+    let usual = FlareSpec::rocket(place(bearing.to_radians(), range_m));
+    Ok(FlareSpec {
+        height_m: text.given(&raw.height_m, number(10.0..=2000.0, "m"))?.unwrap_or(usual.height_m),
+        candela: text.given(&raw.candela, number(100.0..=5e6, "cd"))?.unwrap_or(usual.candela),
+        burns_s: text.given(&raw.burns_s, number(1.0..=600.0, "s"))?.unwrap_or(usual.burns_s),
+        falls_m_s: text.given(&raw.falls_m_s, number(0.0..=50.0, "m/s"))?.unwrap_or(usual.falls_m_s),
+        ..usual
+    })
 }
 
 /// Rules of engagement by their names.

@@ -17,6 +17,11 @@ pub fn angle() -> ValueRule<'static, f64, f64> {
     number(-360.0..=360.0, "degrees")
 }
 
+/// A time after the beginning.
+pub(super) fn seconds() -> ValueRule<'static, f64, f64> {
+    number(0.0..=86_400.0, "s")
+}
+
 /// Distance of a boat or a point of its course from the camera.
 pub(super) fn range() -> ValueRule<'static, f64, f64> {
     number(1.0..=20_000.0, "m")

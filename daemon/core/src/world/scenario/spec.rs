@@ -139,6 +139,8 @@ pub struct BoatSpec {
     pub behaviour: Behaviour,
     /// The lights that it shows between sunset and sunrise.
     pub lights: LightsKept,
+    /// When it is on fire by itself, seconds after the beginning; `None` for one that only rounds set on fire.
+    pub burns_at_s: Option<f64>,
     /// Where the text places it.
     pub(super) stands: TomlPlace,
 }

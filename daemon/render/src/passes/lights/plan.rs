@@ -102,7 +102,7 @@ mod tests {
     use crate::testing;
 
     fn view(at: DVec3, light: f32) -> LightView {
-        LightView { boat: 0, at, light: Vec3::splat(light) }
+        LightView { boat: Some(0), at, light: Vec3::splat(light) }
     }
 
     /// What a block adds to all pixels, from its own formula.

@@ -4,7 +4,12 @@
 mod matte;
 
 use ash::vk;
-use bowwave_core::{frame::scene::PixelRect, own_ship::Phantoms};
+use bowwave_core::{
+    colour::LUMINANCE,
+    frame::scene::{PixelRect, Scene},
+    own_ship::Phantoms,
+};
+use glam::Vec3;
 use matte::Matte;
 use shaders_spirv::{PHANTOM_FRAG, SCREEN_VERT, interface::PhantomBlock};
 
@@ -18,6 +23,23 @@ use crate::{
     target::{DrawTarget, copied_from},
     upload::upload_image,
 };
+
+/// The look of phantoms in a frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PhantomLook {
+    /// Recoil factor about the bore's vanishing point.
+    recoil: f32,
+    /// Light of lamps on a white matt thing; the last is the luminance that the picture shows of one, lit as it is.
+    lit: [f32; 4],
+}
+
+impl PhantomLook {
+    /// The look in `scene`, where lamps give a white matt thing that much light.
+    pub(crate) fn of(scene: &Scene, lit: Vec3) -> Self {
+        let white = scene.light.on_level().dot(LUMINANCE);
+        Self { recoil: scene.recoil as f32, lit: lit.extend(white).to_array() }
+    }
+}
 
 /// The phantoms' pass.
 pub(crate) struct PhantomPass {
@@ -66,8 +88,8 @@ impl PhantomPass {
                 origin: [origin.0 as f32, origin.1 as f32],
                 size: [size.0 as f32, size.1 as f32],
                 bore: phantoms.bore.as_vec2().to_array(),
-                recoil: 1.0,
                 soft: matte.soft_px,
+                ..PhantomBlock::default()
             },
             kept,
             regions: matte.rects.iter().map(|r| copied_from(*r, origin)).collect(),
@@ -78,9 +100,9 @@ impl PhantomPass {
         }))
     }
 
-    /// Some of the pixels that they hide.
-    pub(crate) fn first_rect(&self) -> Option<PixelRect> {
-        self.rects.first().copied()
+    /// Pixels that they hide, each once.
+    pub(crate) fn rects(&self) -> &[PixelRect] {
+        &self.rects
     }
 
     /// Whether anything is drawn where they are.
@@ -100,10 +122,10 @@ impl PhantomPass {
         Step { image: &self.kept, from: COPIED_TO, to: SAMPLED }
     }
 
-    /// Lays it over all of `drawn`, recoiled by a factor, within a rendering to the screen.
-    pub(crate) fn record(&self, to: CommandEncoder<'_>, drawn: &[PixelRect], recoil: f32) {
+    /// Lays it over all of `drawn` with that look, within a rendering to the screen.
+    pub(crate) fn record(&self, to: CommandEncoder<'_>, drawn: &[PixelRect], look: &PhantomLook) {
         to.bind(&self.pipeline, &[self.set]);
-        to.push(&self.pipeline, &PhantomBlock { recoil, ..self.block });
+        to.push(&self.pipeline, &PhantomBlock { recoil: look.recoil, lit: look.lit, ..self.block });
         for piece in self.rects.iter().flat_map(|r| drawn.iter().filter_map(|d| overlap(*r, *d))) {
             to.scissor(piece);
             to.draw(3, 1);

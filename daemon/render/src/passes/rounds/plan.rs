@@ -2,6 +2,7 @@
 
 use bowwave_core::frame::{
     fires::SOOT_ALBEDO,
+    lamps::body_at,
     scene::{PixelRect, RoundView, Scene},
     view::NEAR_M,
 };
@@ -18,6 +19,9 @@ const TRACER_HALF_WIDTH_MIN_PX: f64 = 1.3;
 const GLOW: f64 = 2.6;
 /// Light of sparks, paper white at the video's exposure being 1.
 const SPARKS: Vec3 = Vec3::new(3.0, 2.1, 0.9);
+/// Optical depth below which smoke is not seen, and the radii at which it ends at the latest.
+const SMOKE_LEAST: f32 = 0.01;
+const SMOKE_ENDS: f64 = 1.6;
 /// Diffuse reflectance of torn water.
 const FOAM: f32 = 0.8;
 
@@ -36,7 +40,8 @@ pub(crate) fn round_block(scene: &Scene, round: &RoundView, seed: f32) -> Option
         },
         RoundView::Splash { at, height_m, radius_m, opacity } => {
             let light = &scene.light;
-            let lit = (light.sun * 0.5 + light.sky * 0.8 + light.sea * 0.2) * FOAM;
+            let lamps = body_at(&scene.lamps, at);
+            let lit = (light.sun * 0.5 + light.sky * 0.8 + light.sea * 0.2 + lamps) * FOAM;
             Shape {
                 ends: [at, at + DVec3::Z * f64::from(height_m.max(0.0))],
                 half_width_m: [f64::from(radius_m), f64::from(radius_m) * 0.55],
@@ -49,13 +54,18 @@ pub(crate) fn round_block(scene: &Scene, round: &RoundView, seed: f32) -> Option
             }
         }
         RoundView::Smoke { at, radius_m, depth, glow, haze, .. } => {
+            // Farther out it hides less than a hundredth; the shader lets it end there.
+            let reach = f64::from((depth.max(0.0) / SMOKE_LEAST).max(1.2)).ln().sqrt().min(SMOKE_ENDS);
             let light = &scene.light;
-            let lit = (light.sun * 0.25 + light.sky * 0.7 + light.sea * 0.3) * SOOT_ALBEDO as f32 + glow;
+            let high = scene.lamps.iter().filter(|lamp| lamp.is_high).map(|lamp| lamp.matt_at(at) * 0.25);
+            let around = light.sun * 0.25 + light.sky * 0.7 + light.sea * 0.3 + high.sum::<Vec3>();
+            // Flames light their own smoke from below: the puff knows.
+            let lit = around * SOOT_ALBEDO as f32 + glow;
             Shape {
                 ends: [at, at],
-                half_width_m: [f64::from(radius_m); 2],
+                half_width_m: [f64::from(radius_m), 0.0],
                 half_width_min_px: 1.0,
-                reach: 2.0,
+                reach,
                 colour: lit.lerp(light.horizon, haze).extend(depth.max(0.0)).to_array(),
                 kind: ROUND_SMOKE,
                 nearer: 1.0,
@@ -132,7 +142,11 @@ impl Shape {
             from: end(a, from),
             to: end(b, to),
             colour: self.colour,
-            half_width: widths.map(|w| w as f32),
+            half_width: if self.kind == ROUND_SMOKE {
+                [widths[0], self.reach].map(|w| w as f32)
+            } else {
+                widths.map(|w| w as f32)
+            },
             kind: self.kind,
             seed,
         };

@@ -3,6 +3,7 @@
 use bowwave_core::{
     estimate::light::Light,
     frame::{
+        lamps::foam_at,
         scene::{BoatView, PixelRect, Scene},
         view::{bounds, clip_to_screen},
         wake::{FOAM_FROUDE, FOLLOWED_S, SPEED_MIN_M_S, TrackPoint, Wake, froude, height_m},
@@ -39,7 +40,7 @@ pub(crate) fn wake_plan(scene: &Scene, boat: &BoatView, wake: &Wake) -> WakePlan
     let head = WakeHead {
         up: with(camera_from_world * DVec3::Z, rough),
         hull: [wake.hull.length_m as f32, wake.hull.beam_m as f32, boat.haze, high as f32],
-        foam: light(foam_light(&scene.light), thrown),
+        foam: light(foam_light(scene.light.on_level() + foam_at(&scene.lamps, boat.pose.position)), thrown),
         sea: light(sea_fit(&scene.light, rough), 0.0),
     };
     let mut block = WakeBlock { head, ..WakeBlock::default() };
@@ -175,10 +176,10 @@ pub(crate) fn strip_rects(scene: &Scene, wake: &Wake) -> impl Iterator<Item = Op
 }
 
 /// Light of whole foam, which lies flat. A camera bends bright light over before it is white.
-fn foam_light(light: &Light) -> Vec3 {
+fn foam_light(on_level: Vec3) -> Vec3 {
     /// Share of the light that fresh foam throws back (Whitlock, Bartlett & Gurganus 1982).
     const FOAM_ALBEDO: f32 = 0.55;
-    let whole = FOAM_ALBEDO * light.on_level();
+    let whole = FOAM_ALBEDO * on_level;
     whole * (FOAM_MAX / whole.max_element().max(FOAM_MAX))
 }
 
@@ -267,10 +268,10 @@ mod tests {
     fn foam_is_as_bright_as_its_albedo_and_the_sea_as_the_pictures() {
         let (scene, _) = seen(70.0);
         let white = scene.light.sun * scene.light.sun_direction.z as f32 + scene.light.sky;
-        assert!((foam_light(&scene.light) / white - Vec3::splat(0.55)).abs().max_element() < 1e-6);
+        assert!((foam_light(scene.light.on_level()) / white - Vec3::splat(0.55)).abs().max_element() < 1e-6);
         let mut bright = scene.light;
         bright.sky *= 9.0;
-        assert!((foam_light(&bright).max_element() - FOAM_MAX).abs() < 1e-6);
+        assert!((foam_light(bright.on_level()).max_element() - FOAM_MAX).abs() < 1e-6);
         let rough = 0.08;
         let fitted = sea_fit(&scene.light, rough) * flat_sea(&scene.light, SEEN_DOWN, rough);
         assert!((fitted - scene.light.sea).abs().max_element() < 1e-6);
