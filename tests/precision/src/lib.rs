@@ -27,6 +27,7 @@ pub mod registration;
 pub mod row;
 pub mod sea_video;
 pub mod setups;
+pub mod shadows;
 pub mod ship;
 pub mod sky;
 pub mod table;
