@@ -19,6 +19,7 @@ pub mod metric;
 pub mod overload;
 pub mod page;
 pub mod parts;
+pub mod path_traced;
 pub mod photograph;
 pub mod plot;
 pub mod recorded;

@@ -19,6 +19,7 @@ mod heading;
 mod hits;
 mod horizon;
 mod lamps;
+mod hull;
 mod lens;
 mod misses;
 mod moon;
@@ -82,6 +83,7 @@ pub const PARTS: &[NumericalPart] = &[
     NumericalPart { about: moon::ABOUT, measure: moon::measure },
     NumericalPart { about: skylight::ABOUT, measure: skylight::measure },
     NumericalPart { about: shadow::ABOUT, measure: shadow::measure },
+    NumericalPart { about: hull::ABOUT, measure: hull::measure },
     NumericalPart { about: phantom::ABOUT, measure: phantom::measure },
     NumericalPart { about: beam::ABOUT, measure: beam::measure },
     NumericalPart { about: lamps::ABOUT, measure: lamps::measure },

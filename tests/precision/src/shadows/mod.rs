@@ -89,16 +89,11 @@ impl NamedMethod {
     }
 }
 
-/// Name of what the product does.
 const TIGHT: &str = "a map a boat";
-/// Names of the methods of Kolivand and Sunar's Table 1.
-pub const PLAIN: &str = "one map of the scene";
-/// Percentage closer filtering.
-pub const PCF: &str = "one map, PCF";
-/// Cascaded maps.
-pub const CASCADES: &str = "cascaded maps";
-/// Kolivand and Sunar's.
-pub const ZGAF: &str = "Z-GaF maps";
+const PLAIN: &str = "one map of the scene";
+const PCF: &str = "one map, PCF";
+const CASCADES: &str = "cascaded maps";
+const ZGAF: &str = "Z-GaF maps";
 
 /// All methods; the first is the product's.
 pub const METHODS: &[NamedMethod] = &[
@@ -130,6 +125,55 @@ pub const METHODS: &[NamedMethod] = &[
     NamedMethod::new("shadow volumes", "depth-pass, 1000 m, as printed", || {
         Box::new(volumes::ShadowVolumes::new(volumes::Counting::DepthPass { length_m: 1000.0 }))
     }),
+];
+
+/// Methods of Kolivand and Sunar's Table 1 in its order, and frames a second as printed, at its two resolutions; each cascade has as many texels as the one
+/// map.
+pub const TABLE_1: [(usize, [(NamedMethod, f64); 4]); 2] = [
+    (
+        1024,
+        [
+            (NamedMethod::new(PLAIN, "1024 x 1024", || Box::new(whole::WholeMap::new(1024, 1))), 122.0),
+            (
+                NamedMethod::new(PCF, "1024 x 1024, 3 x 3 texels", || {
+                    Box::new(whole::WholeMap::new(1024, 3))
+                }),
+                75.0,
+            ),
+            (
+                NamedMethod::new(CASCADES, "four of 1024 x 1024", || Box::new(cascades::Cascades::new(1024))),
+                84.0,
+            ),
+            (
+                NamedMethod::new(ZGAF, "1024 x 1024", || {
+                    Box::new(zgaf::ZGaf::new(1024, zgaf::Layers::Fitted))
+                }),
+                96.0,
+            ),
+        ],
+    ),
+    (
+        2048,
+        [
+            (NamedMethod::new(PLAIN, "2048 x 2048", || Box::new(whole::WholeMap::new(2048, 1))), 116.0),
+            (
+                NamedMethod::new(PCF, "2048 x 2048, 3 x 3 texels", || {
+                    Box::new(whole::WholeMap::new(2048, 3))
+                }),
+                63.0,
+            ),
+            (
+                NamedMethod::new(CASCADES, "four of 2048 x 2048", || Box::new(cascades::Cascades::new(2048))),
+                79.0,
+            ),
+            (
+                NamedMethod::new(ZGAF, "2048 x 2048", || {
+                    Box::new(zgaf::ZGaf::new(2048, zgaf::Layers::Fitted))
+                }),
+                90.0,
+            ),
+        ],
+    ),
 ];
 
 /// Nothing stands in the sun's light.

@@ -18,10 +18,10 @@ use bowwave_models::resolve;
 use bowwave_render::SOFTWARE;
 use glam::{DVec2, DVec3, Vec3};
 use hw_sim::ocean::mesh::BoatMesh;
-use image::{Rgb, RgbImage, imageops::crop_imm};
+use image::{Rgb, RgbImage};
 
 use crate::{
-    metric::flip_map,
+    metric::Cutout,
     reflection::{
         draw::{Painter, picture},
         scenes::{self, Afloats},
@@ -41,8 +41,6 @@ const HFOV_DEG: f64 = 40.0;
 const EYE_M: f64 = 8.0;
 /// Ranges of the three boats of a scene, metres: one is judged, the others stand in the picture's other parts.
 pub const RANGES_M: [f64; 3] = [60.0, 150.0, 400.0];
-/// Pixels about a boat that its error is found with: the filters of FLIP reach no farther.
-const MARGIN: u32 = 24;
 
 /// A boat in the sun.
 #[derive(Clone, Copy, Debug)]
@@ -216,15 +214,19 @@ impl Studio {
         let staged = self.stage(case, &scene, more)?;
         let bare = without_shadow(&scene);
         let around = Scene { light: Light { sun: Vec3::ZERO, ..bare.light }, ..bare.clone() };
-        let part = Part::of(&staged.seen[0]);
-        let paint = |scene: &Scene| Ok::<_, anyhow::Error>(part.cut(&self.paint(scene)?));
+        let seen = &staged.seen[0];
+        let cutout = Cutout::new(seen.corner, seen.size, [SIZE.0, SIZE.1]);
+        let paint = |scene: &Scene| Ok::<_, anyhow::Error>(cutout.cut(&self.paint(scene)?));
         let (drawn, bare, around) = (paint(&scene)?, paint(&bare)?, paint(&around)?);
-        let composed = |shares: &dyn Fn(usize) -> f64| part.composed(&bare, &around, &staged.truth, shares);
-        let truth = composed(&|pixel| staged.truth[pixel].unwrap_or(0.0));
-        let error = |picture: &RgbImage| part.error(&truth, picture, &staged.truth);
+        let on = &staged.truth;
+        let truth = composed(&cutout, [&bare, &around], on, |pixel| on[pixel].unwrap_or(0.0));
+        let error = |picture: &RgbImage| {
+            let mean = cutout.flip_mean(&truth, picture, on.iter().map(Option::is_some))?;
+            Ok::<_, anyhow::Error>(mean.unwrap_or(0.0))
+        };
         let methods = methods.iter().map(|named| {
             let shares = staged.shares(named);
-            error(&composed(&|pixel| shares[pixel]))
+            error(&composed(&cutout, [&bare, &around], on, |pixel| shares[pixel]))
         });
         Ok(CaseErrors {
             drawn: error(&drawn)?,
@@ -254,72 +256,25 @@ pub fn eye(camera: &CameraPose, lens: &Lens, origin: DVec3) -> ShadowEye {
     }
 }
 
-/// The part of a picture about a boat.
-struct Part {
-    /// Where what is seen begins, within this part.
-    inset: [u32; 2],
-    corner: [u32; 2],
-    size: [u32; 2],
-    /// Size of what is seen.
-    seen: [u32; 2],
-}
-
-impl Part {
-    fn of(seen: &SeenPoints) -> Self {
-        let whole = [SIZE.0, SIZE.1];
-        let corner = seen.corner.map(|v| v.saturating_sub(MARGIN));
-        let end: [u32; 2] = std::array::from_fn(|i| (seen.corner[i] + seen.size[i] + MARGIN).min(whole[i]));
-        Self {
-            inset: std::array::from_fn(|i| seen.corner[i] - corner[i]),
-            corner,
-            size: std::array::from_fn(|i| end[i] - corner[i]),
-            seen: seen.size,
-        }
+/// The picture with so much of the sun at each pixel that shows the boat: between that with all of it and that without.
+fn composed(
+    cutout: &Cutout,
+    [lit, dark]: [&RgbImage; 2],
+    on: &[Option<f64>],
+    share: impl Fn(usize) -> f64,
+) -> RgbImage {
+    let mut made = lit.clone();
+    let linear = |code: u8| srgb_to_linear(f32::from(code) / 255.0);
+    for (i, _) in on.iter().enumerate().filter(|(_, on)| on.is_some()) {
+        let (x, y) = cutout.place(i);
+        let (lit, dark, share) = (lit.get_pixel(x, y), dark.get_pixel(x, y), share(i) as f32);
+        let mixed = [0, 1, 2].map(|c| {
+            let (lit, dark) = (linear(lit[c]), linear(dark[c]));
+            (linear_to_srgb(dark + (lit - dark) * share) * 255.0).round() as u8
+        });
+        made.put_pixel(x, y, Rgb(mixed));
     }
-
-    fn cut(&self, picture: &RgbImage) -> RgbImage {
-        crop_imm(picture, self.corner[0], self.corner[1], self.size[0], self.size[1]).to_image()
-    }
-
-    /// Pixel of this part that shows pixel number `i` of what is seen.
-    fn place(&self, i: usize) -> (u32, u32) {
-        let i = i as u32;
-        (self.inset[0] + i % self.seen[0], self.inset[1] + i / self.seen[0])
-    }
-
-    /// The picture with so much of the sun at each pixel that shows the boat: between that with all of it and that without.
-    fn composed(
-        &self,
-        lit: &RgbImage,
-        dark: &RgbImage,
-        on: &[Option<f64>],
-        share: &dyn Fn(usize) -> f64,
-    ) -> RgbImage {
-        let mut made = lit.clone();
-        let linear = |code: u8| srgb_to_linear(f32::from(code) / 255.0);
-        for (i, _) in on.iter().enumerate().filter(|(_, on)| on.is_some()) {
-            let (x, y) = self.place(i);
-            let (lit, dark, share) = (lit.get_pixel(x, y), dark.get_pixel(x, y), share(i) as f32);
-            let mixed = [0, 1, 2].map(|c| {
-                let (lit, dark) = (linear(lit[c]), linear(dark[c]));
-                (linear_to_srgb(dark + (lit - dark) * share) * 255.0).round() as u8
-            });
-            made.put_pixel(x, y, Rgb(mixed));
-        }
-        made
-    }
-
-    /// Mean FLIP over the boat's pixels.
-    fn error(&self, truth: &RgbImage, drawn: &RgbImage, on: &[Option<f64>]) -> Result<f64> {
-        let map = flip_map(truth.as_raw(), drawn.as_raw(), (self.size[0], self.size[1]))?;
-        let (mut sum, mut count) = (0.0, 0u32);
-        for (i, _) in on.iter().enumerate().filter(|(_, on)| on.is_some()) {
-            let (x, y) = self.place(i);
-            sum += f64::from(map[(y * self.size[0] + x) as usize]);
-            count += 1;
-        }
-        Ok(sum / f64::from(count.max(1)))
-    }
+    made
 }
 
 /// Rays from the eye to a boat, and on to the sun.

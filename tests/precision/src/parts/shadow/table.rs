@@ -1,6 +1,6 @@
 //! Kolivand and Sunar's Table 1 (2014): frames a second of four ways at two resolutions, in one run, with the error beside them.
 
-use anyhow::{Context as _, Result};
+use anyhow::Result;
 use bowwave_core::geometry::{CameraPose, Lens, RigidPose};
 use bowwave_models::resolve;
 use glam::{DVec2, DVec3};
@@ -14,16 +14,12 @@ use crate::{
     metric::flip_map,
     reflection::scenes::{self, Afloats},
     shadows::{
-        CASCADES, METHODS, NamedMethod, PCF, PLAIN, ShadowEye, ShadowFrame, ZGAF,
+        ShadowEye, ShadowFrame, TABLE_1,
         mesh::CasterMesh,
         seen::{SeenPoint, SeenPoints},
     },
     truth::boat,
 };
-
-/// Frames a second as printed, at 1024 x 1024 and at 2048 x 2048: plain maps, PCF, cascades, Z-GaF.
-const PRINTED: [(&str, [f64; 2]); 4] =
-    [(PLAIN, [122.0, 116.0]), (PCF, [75.0, 63.0]), (CASCADES, [84.0, 79.0]), (ZGAF, [96.0, 90.0])];
 
 /// Objects on the ground: boat, metres ahead and to the right, heading in degrees.
 const OBJECTS: [(&str, f64, f64, f64); 7] = [
@@ -153,13 +149,9 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
     let grounds = Grounds::new(size)?;
     let looked = grounds.look(if bench.is_quick() { 4 } else { 16 });
     let truth = grounds.picture(&looked.seen, |point| looked.truth[point.number as usize]);
-    for (column, side) in [1024, 2048].into_iter().enumerate() {
-        if bench.is_quick() && column > 0 {
-            continue;
-        }
+    for (side, methods) in TABLE_1.iter().take(if bench.is_quick() { 1 } else { 2 }) {
         let mut rows = Vec::new();
-        for (method, printed) in PRINTED {
-            let named = of_side(method, column).context("no such method")?;
+        for (named, printed) in methods {
             let mut made = (named.make)();
             made.prepare(&grounds.frame(), &looked.seen);
             let (grounds, seen) = (&grounds, &looked.seen);
@@ -177,14 +169,7 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
                     thread_ns() - before
                 })
                 .collect();
-            rows.push((
-                named,
-                work,
-                error,
-                bytes,
-                1e9 / median(&mut times),
-                printed[column] / PRINTED[0].1[column],
-            ));
+            rows.push((named, work, error, bytes, 1e9 / median(&mut times), *printed / methods[0].1));
         }
         let plain = rows.first().map_or(1.0, |row| row.4);
         let ways = rows.into_iter().map(|(named, work, error, bytes, fps, printed)| {
@@ -197,11 +182,4 @@ pub fn measure(bench: &mut PartBench) -> Result<()> {
         bench.scene(&format!("Kolivand and Sunar's Table 1, {side} x {side}"), "FLIP", 0.001, ways.collect());
     }
     Ok(())
-}
-
-/// The method's first setting, or its last, as the table has it for the smaller and the larger resolution: each cascade is as large as the one map.
-fn of_side(method: &str, column: usize) -> Option<&'static NamedMethod> {
-    let side = ["1024", "2048"][column];
-    let mut of_method = METHODS.iter().filter(|named| named.method == method);
-    of_method.find(|named| named.setting.contains(side) && !named.setting.contains("as printed"))
 }
