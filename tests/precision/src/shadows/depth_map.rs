@@ -218,14 +218,25 @@ impl DepthMap {
         mix(mix(lit(0, 0), lit(1, 0), share.x), mix(lit(0, 1), lit(1, 1), share.x), share.y)
     }
 
-    /// Percentage closer filtering (Reeves, Salesin and Cook 1987): the mean over `width` by `width` places a texel apart, each of which is weighed
-    /// over four texels.
+    /// Percentage closer filtering (Reeves, Salesin and Cook 1987): the mean over a square of `width` by `width` texels about the place, those at its edges by as
+    /// much of them as lies within.
     pub fn filtered(&self, at: Vec3, width: u32) -> f32 {
-        let half = 0.5 * (width - 1) as f32;
+        let corner = at.truncate() - 0.5 * width as f32;
+        let low = corner.floor();
+        let share = corner - low;
+        let weight = |i: u32, share: f32| match i {
+            0 => 1.0 - share,
+            i if i == width => share,
+            _ => 1.0,
+        };
         let mut sum = 0.0;
-        for i in 0..width * width {
-            let step = Vec2::new((i % width) as f32 - half, (i / width) as f32 - half);
-            sum += self.compared_2x2(at + step.extend(0.0));
+        for j in 0..=width {
+            let mut row = 0.0;
+            for i in 0..=width {
+                let texel = self.nearest_at(low.x as i32 + i as i32, low.y as i32 + j as i32);
+                row += weight(i, share.x) * f32::from(texel <= at.z);
+            }
+            sum += weight(j, share.y) * row;
         }
         sum / (width * width) as f32
     }
