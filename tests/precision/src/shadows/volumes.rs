@@ -217,3 +217,66 @@ fn columns(planes: &[Vec3; 3], y: u32, [low, high]: [[u32; 2]; 2], seen: &SeenPo
     let to = (column(to) + 1).min(i64::from(high[0]));
     (from < to).then_some([from as u32, to as u32])
 }
+
+#[cfg(test)]
+mod tests {
+    use bowwave_core::geometry::RigidPose;
+    use glam::{DQuat, DVec3};
+
+    use super::*;
+    use crate::truth::boat::{box_boat, mesh};
+
+    /// Share of the ground's pixels at which a method and rays to the sun agree, for an eye that looks along `ahead`.
+    fn agreed(counting: Counting, eye: Vec3, ahead: Vec3) -> f64 {
+        const SIDE: u32 = 48;
+        let pose = RigidPose { world_from_body: DQuat::IDENTITY, position: DVec3::ZERO };
+        let (rays, caster) = (mesh(&box_boat(), pose), CasterMesh::of(&box_boat(), pose, DVec3::ZERO));
+        let sun = Vec3::new(0.6, 0.1, 0.79).normalize();
+        let ahead = ahead.normalize();
+        let right = ahead.cross(Vec3::Z).normalize();
+        let half = 0.5 * SIDE as f32;
+        let axes = [right, ahead.cross(right), ahead];
+        let eye = ShadowEye { position: eye, axes, reach: [1.0; 2], pixel: 1.0 / half };
+        let mut seen = SeenPoints::begin([0, 0], [SIDE; 2], [[half; 2]; 2]);
+        for i in 0..SIDE * SIDE {
+            let pixel = |v: u32| (v as f32 + 0.5 - half) / half;
+            let ray = Vec3::new(pixel(i % SIDE), pixel(i / SIDE), 1.0);
+            let along = axes[0] * ray.x + axes[1] * ray.y + axes[2];
+            // The ground lies a little below the keel.
+            let depth = (-0.65 - eye.position.z) / along.z;
+            let place = eye.position + along * depth;
+            if depth > 0.0 && rays.meet(eye.position.as_dvec3(), along.as_dvec3(), f64::from(depth)).is_none()
+            {
+                seen.push(SeenPoint {
+                    number: 0,
+                    mesh: SeenPoint::GROUND,
+                    place,
+                    normal: Vec3::Z,
+                    ray,
+                    depth,
+                });
+            }
+            seen.end_pixel();
+        }
+        let meshes = [caster];
+        let mut volumes = ShadowVolumes::new(counting);
+        volumes.prepare(&ShadowFrame { sun, meshes: &meshes, eye }, &seen);
+        let is_free = |p: &SeenPoint| !rays.blocks(p.place.as_dvec3(), sun.as_dvec3());
+        let same = seen.points.iter().filter(|p| (volumes.share(p) > 0.5) == is_free(p)).count();
+        assert!(
+            seen.points.len() > 200 && seen.points.iter().any(is_free) && !seen.points.iter().all(is_free)
+        );
+        same as f64 / seen.points.len() as f64
+    }
+
+    #[test]
+    fn counting_behind_is_right_wherever_the_eye_is_and_counting_before_is_not() {
+        let (far, far_ahead) = (Vec3::new(-5.0, -12.0, 5.0), Vec3::new(0.0, 1.0, -0.4));
+        let (shaded, shaded_ahead) = (Vec3::new(-4.3, 0.05, 0.2), Vec3::new(-1.0, 0.03, -0.2));
+        let pass = Counting::DepthPass { length_m: 100.0 };
+        assert!(agreed(Counting::DepthFail, far, far_ahead) > 0.995);
+        assert!(agreed(pass, far, far_ahead) > 0.995);
+        assert!(agreed(Counting::DepthFail, shaded, shaded_ahead) > 0.995);
+        assert!(agreed(pass, shaded, shaded_ahead) < 0.5);
+    }
+}
