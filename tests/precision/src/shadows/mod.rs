@@ -99,6 +99,14 @@ const ZGAF: &str = "Z-GaF maps";
 pub const METHODS: &[NamedMethod] = &[
     NamedMethod::new(TIGHT, "1024 x 1024, 2 x 2 texels", || Box::new(tight::TightMaps::new(1024, 1.0))),
     NamedMethod::new(TIGHT, "2048 x 2048, two texels a pixel", || Box::new(tight::TightMaps::new(2048, 2.0))),
+    NamedMethod::new(TIGHT, "1024 x 1024, four points a pixel", || {
+        Box::new(tight::TightMaps::new(1024, 1.0))
+    })
+    .at_four_points(),
+    NamedMethod::new(TIGHT, "2048 x 2048, two texels and four points a pixel", || {
+        Box::new(tight::TightMaps::new(2048, 2.0))
+    })
+    .at_four_points(),
     NamedMethod::new("no shadow", "", || Box::new(NoShadow)),
     NamedMethod::new(PLAIN, "1024 x 1024", || Box::new(whole::WholeMap::new(1024, 1))),
     NamedMethod::new(PLAIN, "2048 x 2048", || Box::new(whole::WholeMap::new(2048, 1))).dear(),
