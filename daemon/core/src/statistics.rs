@@ -21,9 +21,29 @@ pub fn quantile(values: impl Iterator<Item = f64>, share: f64) -> f64 {
     }
 }
 
+/// Share of a normal distribution that lies below so many deviations, within 2e-7 (Abramowitz & Stegun 1964, 7.1.26).
+pub fn normal_share(deviations: f64) -> f64 {
+    const SLOPE: f64 = 0.327_591_1;
+    const TERMS: [f64; 5] = [0.254_829_592, -0.284_496_736, 1.421_413_741, -1.453_152_027, 1.061_405_429];
+    let x = deviations.abs() * std::f64::consts::FRAC_1_SQRT_2;
+    let t = 1.0 / (1.0 + SLOPE * x);
+    let beyond = 0.5 * (-x * x).exp() * t * TERMS.iter().rev().fold(0.0, |sum, term| sum * t + term);
+    if deviations < 0.0 { beyond } else { 1.0 - beyond }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_normal_distribution_is_that_of_tables() {
+        for (deviations, share) in
+            [(0.0, 0.5), (1.0, 0.841_344_7), (-1.0, 0.158_655_3), (1.644_854, 0.95), (-3.0, 0.001_349_9)]
+        {
+            assert!((normal_share(deviations) - share).abs() < 3e-7, "{deviations}");
+        }
+        assert_eq!([normal_share(f64::NEG_INFINITY), normal_share(f64::INFINITY)], [0.0, 1.0]);
+    }
 
     #[test]
     fn a_biweight_falls_to_nothing() {

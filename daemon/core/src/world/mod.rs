@@ -14,6 +14,7 @@ pub mod scenario;
 pub mod score;
 mod sea_change;
 pub mod searchlight;
+pub mod seeing;
 mod stage;
 pub mod waves;
 pub mod weapon;
