@@ -94,22 +94,36 @@ impl Eye {
     }
 }
 
-/// Sweep width of a ship's lookouts for a boat, nautical miles: between the values for boats of 5, 7 and 12 m at 5 and 10 miles of
-/// visibility (IAMSAR manual, volume II, appendix N).
+/// Sweep width of a ship's lookouts for a boat, nautical miles: between the values for boats of 5, 7, 12 and 24 m at visibilities of 3 to 20
+/// miles (IAMSAR manual, volume II, table N-4).
 fn sweep_width_nm(length_m: f64, visibility_nm: f64) -> f64 {
-    const LENGTHS: [(f64, f64, f64); 3] = [(5.0, 1.1, 1.4), (7.0, 2.0, 2.9), (12.0, 2.8, 4.3)];
-    let length_m = length_m.clamp(5.0, 12.0);
-    let upper = LENGTHS.iter().position(|(l, ..)| length_m <= *l).unwrap_or(2).max(1);
-    let (a, b) = (LENGTHS[upper - 1], LENGTHS[upper]);
-    let share = (length_m - a.0) / (b.0 - a.0);
-    let (at_5, at_10) = (a.1 + share * (b.1 - a.1), a.2 + share * (b.2 - a.2));
-    // Below five miles the width shrinks with what can be seen.
-    let visibility_nm = visibility_nm.min(10.0);
-    if visibility_nm < 5.0 {
-        at_5 * visibility_nm / 5.0
-    } else {
-        at_5 + (visibility_nm / 5.0 - 1.0) * (at_10 - at_5)
-    }
+    let (short, long, share) = between(&LENGTHS_M, length_m);
+    let width = |row: usize| {
+        let (hazy, clear, share) = between(&VISIBILITIES_NM, visibility_nm);
+        WIDTHS_NM[row][hazy] + share * (WIDTHS_NM[row][clear] - WIDTHS_NM[row][hazy])
+    };
+    let width_nm = width(short) + share * (width(long) - width(short));
+    // In thicker haze the width shrinks with what can be seen.
+    width_nm * (visibility_nm / VISIBILITIES_NM[0]).clamp(0.0, 1.0)
+}
+
+/// Lengths of boats of that table, metres.
+const LENGTHS_M: [f64; 4] = [5.0, 7.0, 12.0, 24.0];
+/// Visibilities of that table, nautical miles.
+const VISIBILITIES_NM: [f64; 5] = [3.0, 5.0, 10.0, 15.0, 20.0];
+/// Sweep widths of that table by length and visibility, nautical miles.
+const WIDTHS_NM: [[f64; 5]; 4] = [
+    [1.1, 1.4, 1.9, 2.1, 2.3],
+    [2.0, 2.9, 4.3, 5.2, 5.8],
+    [2.8, 4.5, 7.6, 9.4, 11.6],
+    [3.2, 5.6, 10.7, 14.7, 18.1],
+];
+
+/// The nodes beside a value, and how far it lies from the first to the second; at the ends, that end.
+fn between(nodes: &[f64], value: f64) -> (usize, usize, f64) {
+    let upper = nodes.partition_point(|node| *node < value).clamp(1, nodes.len() - 1);
+    let (low, high) = (nodes[upper - 1], nodes[upper]);
+    (upper - 1, upper, ((value - low) / (high - low)).clamp(0.0, 1.0))
 }
 
 /// Draws whether something that happens so often happened within `span_s`.
@@ -129,9 +143,14 @@ mod tests {
 
     #[test]
     fn sweep_widths_are_those_of_the_table() {
-        for (length_m, visibility_nm, width_nm) in
-            [(5.0, 5.0, 1.1), (7.0, 10.0, 2.9), (12.0, 5.0, 2.8), (30.0, 20.0, 4.3), (7.0, 2.5, 1.0)]
-        {
+        for (length_m, visibility_nm, width_nm) in [
+            (5.0, 3.0, 1.1),
+            (7.0, 10.0, 4.3),
+            (12.0, 5.0, 4.5),
+            (30.0, 25.0, 18.1),
+            (7.0, 1.5, 1.0),
+            (6.0, 4.0, 1.85),
+        ] {
             assert!((sweep_width_nm(length_m, visibility_nm) - width_nm).abs() < 1e-9);
         }
     }
@@ -144,7 +163,7 @@ mod tests {
             let track = (-40_000..=40_000).map(|s| f64::from(s) * SEARCH_NM_S);
             let exposure: f64 =
                 track.map(|along_nm| eye.found_per_s(NM * f64::hypot(along_nm, lateral_nm), 7.0)).sum();
-            let expected = 2.9 * 2.9 / (4.0 * std::f64::consts::PI * lateral_nm * lateral_nm);
+            let expected = 4.3 * 4.3 / (4.0 * std::f64::consts::PI * lateral_nm * lateral_nm);
             assert!((exposure / expected - 1.0).abs() < 0.01, "{exposure} {expected}");
         }
     }
